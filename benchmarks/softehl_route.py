@@ -37,7 +37,7 @@ def derive(case: Case, route: str) -> Candidate:
     definition = page()
     function = pipeline.compile_task(definition, task)
     name = definition.name
-    header = source.header([abi.declaration(name, task)])
+    header = source.header([abi.function_name(name, task)])
     text = source.source(definition, [function.text])
     seconds = watch.seconds()
     if route == "one lane":

@@ -114,7 +114,7 @@ class Task(StrEnum):
 AT_POINTS = (Task.FIELDS, Task.FIELDS_RATE)
 """Tasks whose values are those of the quadrature points."""
 DESIGN = (Task.PSEUDO_LOAD, Task.FIELDS_RATE)
-"""Tasks of sensitivities, which stand in a file of their own."""
+"""Tasks of sensitivities, which stand in a file of their own unless they share routines."""
 ROLLED = (*AT_POINTS, Task.PSEUDO_LOAD)
 """Tasks whose loop over the points is never written out: they are called once a state."""
 

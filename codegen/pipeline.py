@@ -10,8 +10,8 @@
     schedule    what is computed once, what at each point, what inside a branch
     choice      of all ways the one with fewest operations
     order       straight pieces in the order of a small register file
-    print       one value, one line of C: several elements at once, or where there is little to
-                compute one after another
+    print       C, with a name for each value that is used again: several elements at once, or where
+                there is little to compute one after another
     routines    local iterations and functions of stretches as C functions of their own
 
 A page of fields on a large cell goes another way (`form`): all of this for the function of a point
@@ -98,7 +98,8 @@ class Function:
 class KernelSource:
     """A kernel family: its model, its C file and its functions by task.
 
-    design: a second C file with the tasks of sensitivities, empty where none is offered. shared:
+    design: a second C file with the tasks of sensitivities, empty where none is offered, or where
+    they call the same routines as the others. shared:
     files that other families may have, too, by name. kept: numbers that products by sum
     factorisation keep at a point, 0 where there are none.
     """
@@ -126,6 +127,8 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
         return KernelSource(definition, emit_ufcx.source(definition, texts, before), functions)
     design = [f for t, f in functions.items() if t in DESIGN]
     others = [f for t, f in functions.items() if t not in DESIGN]
+    if {r for f in others for r in f.routines} & {r for f in design for r in f.routines}:
+        others, design = others + design, []  # no routine is written twice
     text, more = _file(definition, others), _file(definition, design) if design else ""
     made = KernelSource(definition, text, functions, more)
     return _with_action(made) if target is Target.SIMD else made

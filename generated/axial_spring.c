@@ -14,297 +14,78 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_axial_spring_energy_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_axial_spring_energy)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const V v2 = X4 - X2;
-    const V v3 = X4 - X6;
-    const V v4 = X2 - X0;
-    const V v5 = X6 - X0;
-    const V v6 = X5 - X3;
-    const V v7 = 0.10566243270259355 * v2;
-    const V v8 = 0.39433756729740643 * v2;
-    const V v9 = 0.39433756729740643 * v4;
-    const V v10 = 0.10566243270259355 * v4;
-    const V v11 = X3 - X1;
-    const V v12 = X5 - X7;
-    const V v13 = 0.39433756729740643 * v5;
-    const V v14 = v13 + v7;
-    const V v15 = 0.10566243270259355 * v5;
-    const V v16 = v15 + v8;
-    const V v17 = X7 - X1;
-    const V v18 = 0.10566243270259355 * v3;
-    const V v19 = v9 + v18;
-    const V v20 = 0.39433756729740643 * v3;
-    const V v21 = v10 + v20;
-    const V v22 = 0.39433756729740643 * v11;
-    const V v23 = 0.10566243270259355 * v11;
-    const V v24 = 0.10566243270259355 * v6;
-    const V v25 = 0.39433756729740643 * v6;
-    const V v26 = 0.10566243270259355 * v12;
-    const V v27 = v22 + v26;
-    const V v28 = 0.39433756729740643 * v12;
-    const V v29 = v23 + v28;
-    const V v30 = 0.39433756729740643 * v17;
-    const V v31 = v30 + v24;
-    const V v32 = 0.10566243270259355 * v17;
-    const V v33 = v32 + v25;
-    const V v34 = 1.5773502691896257 * d0;
-    const V v35 = 0.4226497308103742 * d0;
-    const V v36 = 0.4226497308103742 * d4;
-    const V v37 = 1.5773502691896257 * d4;
-    const V v38 = v19 * v31;
-    const V v39 = v21 * v31;
-    const V v40 = v19 * v33;
-    const V v41 = v21 * v33;
-    const V v42 = 0.4226497308103742 * d2;
-    const V v43 = v34 + v42;
-    const V v44 = 1.5773502691896257 * d2;
-    const V v45 = v35 + v44;
-    const V v46 = 1.5773502691896257 * d6;
-    const V v47 = v36 + v46;
-    const V v48 = 0.4226497308103742 * d6;
-    const V v49 = v37 + v48;
-    const V v50 = v14 * v27;
-    const V v51 = v38 - v50;
-    const V v52 = v14 * v29;
-    const V v53 = v39 - v52;
-    const V v54 = v16 * v27;
-    const V v55 = v40 - v54;
-    const V v56 = v16 * v29;
-    const V v57 = v41 - v56;
-    const V v58 = 0.39433756729740643 * v43;
-    const V v59 = 0.10566243270259355 * v43;
-    const V v60 = 0.39433756729740643 * v45;
-    const V v61 = 0.10566243270259355 * v45;
-    const V v62 = 0.10566243270259355 * v47;
-    const V v63 = v58 + v62;
-    const V v64 = 0.39433756729740643 * v47;
-    const V v65 = v59 + v64;
-    const V v66 = 0.10566243270259355 * v49;
-    const V v67 = v60 + v66;
-    const V v68 = 0.39433756729740643 * v49;
-    const V v69 = v61 + v68;
-    const V v70 = v63 * v63;
-    const V v71 = v65 * v65;
-    const V v72 = v67 * v67;
-    const V v73 = v69 * v69;
-    const V v74 = v70 * v51;
-    const V v75 = v71 * v53;
-    const V v76 = v74 + v75;
-    const V v77 = v72 * v55;
-    const V v78 = v76 + v77;
-    const V v79 = v73 * v57;
-    const V v80 = v79 + v78;
-    const V v81 = v1 * v80;
-    softehl_store1(R + 0, 1, v81);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    (void)d1; (void)d3; (void)d5; (void)d7;
+    const V v1 = X4 - X2, v2 = X4 - X6, v3 = X2 - X0, v4 = X6 - X0, v5 = X5 - X3, v6 = X3 - X1,
+        v7 = X5 - X7, v8 = 0.39433756729740643 * v4 + 0.10566243270259355 * v1,
+        v9 = 0.10566243270259355 * v4 + 0.39433756729740643 * v1, v10 = X7 - X1,
+        v11 = 0.39433756729740643 * v3 + 0.10566243270259355 * v2,
+        v12 = 0.10566243270259355 * v3 + 0.39433756729740643 * v2,
+        v13 = 0.39433756729740643 * v6 + 0.10566243270259355 * v7,
+        v14 = 0.10566243270259355 * v6 + 0.39433756729740643 * v7,
+        v15 = 0.39433756729740643 * v10 + 0.10566243270259355 * v5,
+        v16 = 0.10566243270259355 * v10 + 0.39433756729740643 * v5,
+        v17 = 1.5773502691896257 * d0 + 0.4226497308103742 * d2,
+        v18 = 0.4226497308103742 * d0 + 1.5773502691896257 * d2,
+        v19 = 0.4226497308103742 * d4 + 1.5773502691896257 * d6,
+        v20 = 1.5773502691896257 * d4 + 0.4226497308103742 * d6,
+        v21 = 0.39433756729740643 * v17 + 0.10566243270259355 * v19,
+        v22 = 0.10566243270259355 * v17 + 0.39433756729740643 * v19,
+        v23 = 0.39433756729740643 * v18 + 0.10566243270259355 * v20,
+        v24 = 0.10566243270259355 * v18 + 0.39433756729740643 * v20,
+        v25 = v21 * v21 * (v11 * v15 - v8 * v13) + v22 * v22 * (v12 * v15 - v8 * v14),
+        v26 = v24 * v24 * (v12 * v16 - v9 * v14) + (v25 + v23 * v23 * (v11 * v16 - v9 * v13));
+    softehl_store1(R + 0, 1, 0.5 * parameters[0] * v26);
 }
+SOFTEHL_BATCH(softehl_axial_spring_energy, 8, 8, 0, 0, 1, 0)
 
-void softehl_axial_spring_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_axial_spring_residual)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_axial_spring_energy_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 1 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_axial_spring_energy_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 1 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 1];
-    softehl_axial_spring_energy(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 1 * n; ++i) values[i] = R[i];
-#endif
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    (void)d1; (void)d3; (void)d5; (void)d7; const double v1 = 0.0625 * parameters[0];
+    const V v2 = X4 - X2, v3 = X4 - X6, v4 = X2 - X0, v5 = X6 - X0, v6 = X5 - X3, v7 = X3 - X1,
+        v8 = 0.39433756729740643 * v5 + 0.10566243270259355 * v2,
+        v9 = 0.10566243270259355 * v5 + 0.39433756729740643 * v2,
+        v10 = 0.39433756729740643 * v4 + 0.10566243270259355 * v3,
+        v11 = 0.10566243270259355 * v4 + 0.39433756729740643 * v3, v12 = X5 - X7, v13 = X7 - X1,
+        v14 = 0.39433756729740643 * v13 + 0.10566243270259355 * v6,
+        v15 = 0.10566243270259355 * v13 + 0.39433756729740643 * v6,
+        v16 = 0.39433756729740643 * v7 + 0.10566243270259355 * v12,
+        v17 = 0.10566243270259355 * v7 + 0.39433756729740643 * v12, v18 = d0 + d2, v19 = d0 - d2,
+        v20 = d4 + d6, v21 = d4 - d6, v22 = v18 + v20, v23 = 0.5773502691896257 * (v18 - v20),
+        v24 = 0.5773502691896257 * (v19 - v21), v25 = 0.3333333333333333 * (v19 + v21),
+        v26 = v22 + v24, v27 = v22 - v24, v28 = v23 + v25, v29 = v23 - v25,
+        v30 = (v26 + v28) * ((v10 * v14 - v8 * v16) * v1),
+        v31 = (v26 - v28) * ((v11 * v14 - v8 * v17) * v1),
+        v32 = (v27 + v29) * ((v10 * v15 - v9 * v16) * v1),
+        v33 = (v27 - v29) * ((v11 * v15 - v9 * v17) * v1), v34 = v30 + v31, v35 = v32 + v33,
+        v36 = v32 - v33, v37 = 0.3333333333333333 * (v30 - v31 - v36),
+        v38 = 0.5773502691896257 * (v31 - v30 - v36), v39 = v34 + v35,
+        v40 = 0.5773502691896257 * (v35 - v34), v41 = v39 - v40, v42 = v39 + v40, v43 = v37 + v38,
+        v44 = v37 - v38;
+    softehl_store4(R + 0, 8, v41 + v44, softehl_splat(0.0), v42 - v43, softehl_splat(0.0));
+    softehl_store4(R + 4, 8, v42 + v43, softehl_splat(0.0), v41 - v44, softehl_splat(0.0));
 }
+SOFTEHL_BATCH(softehl_axial_spring_residual, 8, 8, 0, 0, 8, 0)
 
-static void softehl_axial_spring_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_axial_spring_tangent)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.0625 * parameters[0];
-    const V v2 = X4 - X2;
-    const V v3 = X4 - X6;
-    const V v4 = X2 - X0;
-    const V v5 = X6 - X0;
-    const V v6 = 0.10566243270259355 * v2;
-    const V v7 = 0.39433756729740643 * v2;
-    const V v8 = 0.10566243270259355 * v3;
-    const V v9 = 0.39433756729740643 * v3;
-    const V v10 = X5 - X3;
-    const V v11 = X3 - X1;
-    const V v12 = 0.39433756729740643 * v5;
-    const V v13 = v12 + v6;
-    const V v14 = 0.10566243270259355 * v5;
-    const V v15 = v14 + v7;
-    const V v16 = 0.39433756729740643 * v4;
-    const V v17 = v16 + v8;
-    const V v18 = 0.10566243270259355 * v4;
-    const V v19 = v18 + v9;
-    const V v20 = X5 - X7;
-    const V v21 = 0.10566243270259355 * v10;
-    const V v22 = 0.39433756729740643 * v10;
-    const V v23 = X7 - X1;
-    const V v24 = 0.39433756729740643 * v11;
-    const V v25 = 0.10566243270259355 * v11;
-    const V v26 = 0.39433756729740643 * v23;
-    const V v27 = v26 + v21;
-    const V v28 = 0.10566243270259355 * v23;
-    const V v29 = v28 + v22;
-    const V v30 = 0.10566243270259355 * v20;
-    const V v31 = v24 + v30;
-    const V v32 = 0.39433756729740643 * v20;
-    const V v33 = v25 + v32;
-    const V v34 = d0 + d2;
-    const V v35 = d0 - d2;
-    const V v36 = v17 * v27;
-    const V v37 = v19 * v27;
-    const V v38 = v17 * v29;
-    const V v39 = v19 * v29;
-    const V v40 = d4 + d6;
-    const V v41 = d4 - d6;
-    const V v42 = v13 * v31;
-    const V v43 = v36 - v42;
-    const V v44 = v13 * v33;
-    const V v45 = v37 - v44;
-    const V v46 = v15 * v31;
-    const V v47 = v38 - v46;
-    const V v48 = v15 * v33;
-    const V v49 = v39 - v48;
-    const V v50 = v34 + v40;
-    const V v51 = v34 - v40;
-    const V v52 = v35 - v41;
-    const V v53 = v35 + v41;
-    const V v54 = v43 * v1;
-    const V v55 = v45 * v1;
-    const V v56 = v47 * v1;
-    const V v57 = v49 * v1;
-    const V v58 = 0.5773502691896257 * v51;
-    const V v59 = 0.5773502691896257 * v52;
-    const V v60 = 0.3333333333333333 * v53;
-    const V v61 = v50 + v59;
-    const V v62 = v50 - v59;
-    const V v63 = v58 + v60;
-    const V v64 = v58 - v60;
-    const V v65 = v61 + v63;
-    const V v66 = v65 * v54;
-    const V v67 = v61 - v63;
-    const V v68 = v67 * v55;
-    const V v69 = v62 + v64;
-    const V v70 = v69 * v56;
-    const V v71 = v62 - v64;
-    const V v72 = v71 * v57;
-    const V v73 = v66 + v68;
-    const V v74 = v68 - v66;
-    const V v75 = v66 - v68;
-    const V v76 = v70 + v72;
-    const V v77 = v70 - v72;
-    const V v78 = v75 - v77;
-    const V v79 = v74 - v77;
-    const V v80 = 0.3333333333333333 * v78;
-    const V v81 = 0.5773502691896257 * v79;
-    const V v82 = v76 - v73;
-    const V v83 = v73 + v76;
-    const V v84 = 0.5773502691896257 * v82;
-    const V v85 = v83 - v84;
-    const V v86 = v83 + v84;
-    const V v87 = v80 + v81;
-    const V v88 = v80 - v81;
-    const V v89 = v85 + v88;
-    const V v90 = v85 - v88;
-    const V v91 = v86 - v87;
-    softehl_store4(R + 0, 8, v89, softehl_splat(0.0), v91, softehl_splat(0.0));
-    const V v92 = v86 + v87;
-    softehl_store4(R + 4, 8, v92, softehl_splat(0.0), v90, softehl_splat(0.0));
-}
-
-void softehl_axial_spring_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_axial_spring_residual_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_axial_spring_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_axial_spring_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_axial_spring_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    (void)d1; (void)d3; (void)d5; (void)d7;
     softehl_store4(K + 8, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 12, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 24, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
@@ -314,177 +95,39 @@ static void softehl_axial_spring_tangent_group(
     softehl_store4(K + 56, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 60, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     const double v1 = 0.5 * parameters[0];
-    const V v2 = X4 - X2;
-    const V v3 = X4 - X6;
-    const V v4 = X2 - X0;
-    const V v5 = X6 - X0;
-    const V v6 = 0.10566243270259355 * v2;
-    const V v7 = 0.39433756729740643 * v2;
-    const V v8 = 0.10566243270259355 * v3;
-    const V v9 = 0.39433756729740643 * v3;
-    const V v10 = X5 - X3;
-    const V v11 = X3 - X1;
-    const V v12 = 0.39433756729740643 * v5;
-    const V v13 = v12 + v6;
-    const V v14 = 0.10566243270259355 * v5;
-    const V v15 = v14 + v7;
-    const V v16 = 0.39433756729740643 * v4;
-    const V v17 = v16 + v8;
-    const V v18 = 0.10566243270259355 * v4;
-    const V v19 = v18 + v9;
-    const V v20 = X5 - X7;
-    const V v21 = 0.10566243270259355 * v10;
-    const V v22 = 0.39433756729740643 * v10;
-    const V v23 = X7 - X1;
-    const V v24 = 0.39433756729740643 * v11;
-    const V v25 = 0.10566243270259355 * v11;
-    const V v26 = 0.39433756729740643 * v23;
-    const V v27 = v26 + v21;
-    const V v28 = 0.10566243270259355 * v23;
-    const V v29 = v28 + v22;
-    const V v30 = 0.10566243270259355 * v20;
-    const V v31 = v24 + v30;
-    const V v32 = 0.39433756729740643 * v20;
-    const V v33 = v25 + v32;
-    const V v34 = 0.6220084679281462 * d0;
-    const V v35 = 0.04465819873852045 * d0;
-    const V v36 = 0.04465819873852045 * d2;
-    const V v37 = 0.6220084679281462 * d2;
-    const V v38 = d0 + d4;
-    const V v39 = 0.04465819873852045 * d4;
-    const V v40 = v34 + v39;
-    const V v41 = 0.6220084679281462 * d4;
-    const V v42 = v35 + v41;
-    const V v43 = v17 * v27;
-    const V v44 = v19 * v27;
-    const V v45 = v17 * v29;
-    const V v46 = v19 * v29;
-    const V v47 = 0.16666666666666666 * v38;
-    const V v48 = d2 + d6;
-    const V v49 = v13 * v31;
-    const V v50 = v43 - v49;
-    const V v51 = v13 * v33;
-    const V v52 = v44 - v51;
-    const V v53 = v15 * v31;
-    const V v54 = v45 - v53;
-    const V v55 = v15 * v33;
-    const V v56 = v46 - v55;
-    const V v57 = 0.16666666666666666 * v48;
-    const V v58 = v1 * v50;
-    const V v59 = v1 * v52;
-    const V v60 = v1 * v54;
-    const V v61 = v1 * v56;
-    const V v62 = 0.6220084679281462 * d6;
-    const V v63 = v36 + v62;
-    const V v64 = 0.04465819873852045 * d6;
-    const V v65 = v37 + v64;
-    const V v66 = v40 + v57;
-    const V v67 = v42 + v57;
-    const V v68 = v63 + v47;
-    const V v69 = v65 + v47;
-    const V v70 = 2.0 * v58;
-    const V v71 = 2.0 * v59;
-    const V v72 = v66 * v70;
-    const V v73 = v68 * v71;
-    const V v74 = 2.0 * v60;
-    const V v75 = v69 * v74;
-    const V v76 = v58 + v59;
-    const V v77 = 2.0 * v61;
-    const V v78 = v67 * v77;
-    const V v79 = v58 + v60;
-    const V v80 = v58 + v61;
-    const V v81 = v59 + v60;
-    const V v82 = v59 + v61;
-    const V v83 = 0.05555555555555555 * v80;
-    const V v84 = v60 + v61;
-    const V v85 = 0.05555555555555555 * v81;
-    const V v86 = 0.6220084679281462 * v73;
-    const V v87 = 0.04465819873852045 * v73;
-    const V v88 = v76 + v84;
-    const V v89 = 0.6220084679281462 * v78;
-    const V v90 = v72 + v78;
-    const V v91 = 0.04465819873852045 * v78;
-    const V v92 = 0.003988709429138379 * v61;
-    const V v93 = 0.7737890683486394 * v61;
-    const V v94 = 0.16666666666666666 * v90;
-    const V v95 = 0.05555555555555555 * v88;
-    const V v96 = 0.04465819873852045 * v72;
-    const V v97 = v89 + v96;
-    const V v98 = 0.6220084679281462 * v72;
-    const V v99 = v91 + v98;
-    const V v100 = 0.7737890683486394 * v60;
-    const V v101 = 0.003988709429138379 * v60;
-    const V v102 = v92 + v85;
-    const V v103 = v93 + v85;
-    const V v104 = v73 + v75;
-    const V v105 = 0.04465819873852045 * v75;
-    const V v106 = v105 + v86;
-    const V v107 = 0.6220084679281462 * v75;
-    const V v108 = v107 + v87;
-    const V v109 = 0.014886066246173484 * v82;
-    const V v110 = 0.20733615597604874 * v82;
-    const V v111 = 0.16666666666666666 * v104;
-    const V v112 = v100 + v83;
-    const V v113 = v101 + v83;
-    const V v114 = v106 + v94;
-    const V v115 = v108 + v94;
-    const V v116 = 0.014886066246173484 * v84;
-    const V v117 = 0.20733615597604874 * v84;
-    const V v118 = 0.7737890683486394 * v58;
-    const V v119 = v118 + v102;
-    const V v120 = 0.003988709429138379 * v58;
-    const V v121 = v120 + v103;
-    const V v122 = v97 + v111;
-    softehl_store4(R + 4, 8, v122, softehl_splat(0.0), v114, softehl_splat(0.0));
-    const V v123 = v99 + v111;
-    softehl_store4(R + 0, 8, v123, softehl_splat(0.0), v115, softehl_splat(0.0));
-    const V v124 = 0.20733615597604874 * v76;
-    const V v125 = v116 + v124;
-    softehl_store4(K + 4, 64, v95, softehl_splat(0.0), v125, softehl_splat(0.0));
-    softehl_store4(K + 48, 64, v125, softehl_splat(0.0), v95, softehl_splat(0.0));
-    const V v126 = 0.014886066246173484 * v76;
-    const V v127 = v117 + v126;
-    softehl_store4(K + 20, 64, v127, softehl_splat(0.0), v95, softehl_splat(0.0));
-    softehl_store4(K + 32, 64, v95, softehl_splat(0.0), v127, softehl_splat(0.0));
-    const V v128 = 0.003988709429138379 * v59;
-    const V v129 = v128 + v112;
-    const V v130 = 0.7737890683486394 * v59;
-    const V v131 = v130 + v113;
-    const V v132 = 0.20733615597604874 * v79;
-    const V v133 = v109 + v132;
-    softehl_store4(K + 0, 64, v119, softehl_splat(0.0), v133, softehl_splat(0.0));
-    softehl_store4(K + 16, 64, v133, softehl_splat(0.0), v129, softehl_splat(0.0));
-    const V v134 = 0.014886066246173484 * v79;
-    const V v135 = v110 + v134;
-    softehl_store4(K + 36, 64, v121, softehl_splat(0.0), v135, softehl_splat(0.0));
-    softehl_store4(K + 52, 64, v135, softehl_splat(0.0), v131, softehl_splat(0.0));
+    const V v2 = X4 - X2, v3 = X4 - X6, v4 = X2 - X0, v5 = X6 - X0, v6 = X5 - X3, v7 = X3 - X1,
+        v8 = 0.39433756729740643 * v5 + 0.10566243270259355 * v2,
+        v9 = 0.10566243270259355 * v5 + 0.39433756729740643 * v2,
+        v10 = 0.39433756729740643 * v4 + 0.10566243270259355 * v3,
+        v11 = 0.10566243270259355 * v4 + 0.39433756729740643 * v3, v12 = X5 - X7, v13 = X7 - X1,
+        v14 = 0.39433756729740643 * v13 + 0.10566243270259355 * v6,
+        v15 = 0.10566243270259355 * v13 + 0.39433756729740643 * v6,
+        v16 = 0.39433756729740643 * v7 + 0.10566243270259355 * v12,
+        v17 = 0.10566243270259355 * v7 + 0.39433756729740643 * v12,
+        v18 = 0.16666666666666666 * (d0 + d4), v19 = 0.16666666666666666 * (d2 + d6),
+        v20 = v1 * (v10 * v14 - v8 * v16), v21 = v1 * (v11 * v14 - v8 * v17),
+        v22 = v1 * (v10 * v15 - v9 * v16), v23 = v1 * (v11 * v15 - v9 * v17),
+        v24 = (0.6220084679281462 * d0 + 0.04465819873852045 * d4 + v19) * (2.0 * v20),
+        v25 = (0.04465819873852045 * d2 + 0.6220084679281462 * d6 + v18) * (2.0 * v21),
+        v26 = (0.6220084679281462 * d2 + 0.04465819873852045 * d6 + v18) * (2.0 * v22),
+        v27 = v20 + v21,
+        v28 = (0.04465819873852045 * d0 + 0.6220084679281462 * d4 + v19) * (2.0 * v23),
+        v29 = v20 + v22, v30 = v21 + v23, v31 = 0.05555555555555555 * (v20 + v23), v32 = v22 + v23,
+        v33 = 0.05555555555555555 * (v21 + v22), v34 = 0.16666666666666666 * (v24 + v28),
+        v35 = 0.05555555555555555 * (v27 + v32), v36 = 0.16666666666666666 * (v25 + v26);
+    softehl_store4(R + 4, 8, 0.6220084679281462 * v28 + 0.04465819873852045 * v24 + v36, softehl_splat(0.0), 0.04465819873852045 * v26 + 0.6220084679281462 * v25 + v34, softehl_splat(0.0));
+    softehl_store4(R + 0, 8, 0.04465819873852045 * v28 + 0.6220084679281462 * v24 + v36, softehl_splat(0.0), 0.6220084679281462 * v26 + 0.04465819873852045 * v25 + v34, softehl_splat(0.0));
+    const V v37 = 0.014886066246173484 * v32 + 0.20733615597604874 * v27;
+    softehl_store4(K + 4, 64, v35, softehl_splat(0.0), v37, softehl_splat(0.0));
+    softehl_store4(K + 48, 64, v37, softehl_splat(0.0), v35, softehl_splat(0.0));
+    const V v38 = 0.20733615597604874 * v32 + 0.014886066246173484 * v27;
+    softehl_store4(K + 20, 64, v38, softehl_splat(0.0), v35, softehl_splat(0.0));
+    softehl_store4(K + 32, 64, v35, softehl_splat(0.0), v38, softehl_splat(0.0));
+    const V v39 = 0.014886066246173484 * v30 + 0.20733615597604874 * v29;
+    softehl_store4(K + 0, 64, 0.7737890683486394 * v20 + (0.003988709429138379 * v23 + v33), softehl_splat(0.0), v39, softehl_splat(0.0));
+    softehl_store4(K + 16, 64, v39, softehl_splat(0.0), 0.003988709429138379 * v21 + (0.7737890683486394 * v22 + v31), softehl_splat(0.0));
+    const V v40 = 0.20733615597604874 * v30 + 0.014886066246173484 * v29;
+    softehl_store4(K + 36, 64, 0.003988709429138379 * v20 + (0.7737890683486394 * v23 + v33), softehl_splat(0.0), v40, softehl_splat(0.0));
+    softehl_store4(K + 52, 64, v40, softehl_splat(0.0), 0.7737890683486394 * v21 + (0.003988709429138379 * v22 + v31), softehl_splat(0.0));
 }
-
-void softehl_axial_spring_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_axial_spring_tangent_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, tangent + (8 * 8) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_axial_spring_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), tangent + (8 * 8) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    double K[SOFTEHL_LANES * (8 * 8)];
-    softehl_axial_spring_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (8 * 8) * n; ++i) tangent[i] = K[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_axial_spring_tangent, 8, 8, 0, 0, 8, (8 * 8))

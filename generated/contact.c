@@ -15,13 +15,7 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_contact_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_contact_residual)
 {
     (void)points;
     (void)modes;
@@ -30,51 +24,25 @@ void softehl_contact_residual(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 3 * e;
-        const double *restrict a = data + 5 * e;
-        double *restrict R = values + 3 * e;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 3 * e;
+        const double *restrict a = data + 5 * e; double *restrict R = values + 3 * e;
         (void)X; (void)d; (void)a;
-        const double v1 = X[0] + d[0];
-        const double v2 = a[0] * v1;
-        const double v3 = X[1] + d[1];
-        const double v4 = a[1] * v3;
-        const double v5 = v4 + v2;
-        const double v6 = a[2] + parameters[0];
-        const double v7 = v5 - v6;
-        const double v8 = a[4] * v7;
-        const double v9 = d[2] + v8;
-        const int v10 = v9 <= 0.0;
-        double v11, v12;
+        const double v1 = X[0] + d[0], v2 = a[0] * v1, v3 = X[1] + d[1], v4 = a[1] * v3,
+            v5 = v4 + v2, v6 = a[2] + parameters[0], v7 = v5 - v6, v8 = a[4] * v7, v9 = d[2] + v8;
+        const int v10 = v9 <= 0.0; double v11, v12;
         if (v10) {
-            const double v13 = a[3] * parameters[1];
-            const double v14 = v13 * v9;
-            const double v15 = a[3] * v7;
-            v11 = v14;
-            v12 = v15;
+            const double v13 = a[3] * parameters[1], v14 = v13 * v9, v15 = a[3] * v7;
+            v11 = v14; v12 = v15;
         } else {
-            const double v16 = 1.0 / a[4];
-            const double v17 = d[2] * a[3];
-            const double v18 = v17 * v16;
-            const double v19 = -v18;
-            v11 = 0.0;
-            v12 = v19;
+            const double v16 = 1.0 / a[4], v17 = d[2] * a[3], v18 = v17 * v16, v19 = -v18;
+            v11 = 0.0; v12 = v19;
         }
-        const double v20 = a[0] * v11;
-        const double v21 = a[1] * v11;
-        R[0] = v20;
-        R[1] = v21;
-        R[2] = v12;
+        const double v20 = a[0] * v11, v21 = a[1] * v11;
+        R[0] = v20; R[1] = v21; R[2] = v12;
     }
 }
 
-void softehl_contact_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_contact_tangent)
 {
     (void)points;
     (void)modes;
@@ -82,79 +50,27 @@ void softehl_contact_tangent(
     (void)rule;
     (void)basis;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 3 * e;
-        const double *restrict a = data + 5 * e;
-        double *restrict R = values + 3 * e;
-        double *restrict K = tangent + 3 * 3 * e;
-        (void)X; (void)d; (void)a;
-        const double v1 = X[0] + d[0];
-        const double v2 = a[0] * v1;
-        const double v3 = X[1] + d[1];
-        const double v4 = a[1] * v3;
-        const double v5 = v4 + v2;
-        const double v6 = a[2] + parameters[0];
-        const double v7 = v5 - v6;
-        const double v8 = a[4] * v7;
-        const double v9 = d[2] + v8;
-        const int v10 = v9 <= 0.0;
-        double v11, v12, v13, v14, v15, v16, v17, v18, v19, v20;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 3 * e;
+        const double *restrict a = data + 5 * e; double *restrict R = values + 3 * e;
+        double *restrict K = tangent + 3 * 3 * e; (void)X; (void)d; (void)a;
+        const double v1 = X[0] + d[0], v2 = a[0] * v1, v3 = X[1] + d[1], v4 = a[1] * v3,
+            v5 = v4 + v2, v6 = a[2] + parameters[0], v7 = v5 - v6, v8 = a[4] * v7, v9 = d[2] + v8;
+        const int v10 = v9 <= 0.0; double v11, v12, v13, v14, v15, v16, v17, v18, v19, v20;
         if (v10) {
-            const double v21 = a[3] * parameters[1];
-            const double v22 = v21 * v9;
-            const double v23 = a[3] * v7;
-            const double v24 = a[0] * a[0];
-            const double v25 = a[4] * v24;
-            const double v26 = v21 * v25;
-            const double v27 = a[1] * a[4];
-            const double v28 = v21 * v27;
-            const double v29 = a[0] * v28;
-            const double v30 = a[0] * v21;
-            const double v31 = a[1] * v28;
-            const double v32 = a[1] * v21;
-            const double v33 = a[0] * a[3];
-            const double v34 = a[1] * a[3];
-            v11 = v22;
-            v12 = v23;
-            v13 = v26;
-            v14 = v29;
-            v15 = v30;
-            v16 = v31;
-            v17 = v32;
-            v18 = v33;
-            v19 = v34;
-            v20 = 0.0;
+            const double v21 = a[3] * parameters[1], v22 = v21 * v9, v23 = a[3] * v7,
+                v24 = a[0] * a[0], v25 = a[4] * v24, v26 = v21 * v25, v27 = a[1] * a[4],
+                v28 = v21 * v27, v29 = a[0] * v28, v30 = a[0] * v21, v31 = a[1] * v28,
+                v32 = a[1] * v21, v33 = a[0] * a[3], v34 = a[1] * a[3];
+            v11 = v22; v12 = v23; v13 = v26; v14 = v29; v15 = v30; v16 = v31; v17 = v32; v18 = v33;
+            v19 = v34; v20 = 0.0;
         } else {
-            const double v35 = 1.0 / a[4];
-            const double v36 = d[2] * a[3];
-            const double v37 = v36 * v35;
-            const double v38 = -v37;
-            const double v39 = a[3] * v35;
-            const double v40 = -v39;
-            v11 = 0.0;
-            v12 = v38;
-            v13 = 0.0;
-            v14 = 0.0;
-            v15 = 0.0;
-            v16 = 0.0;
-            v17 = 0.0;
-            v18 = 0.0;
-            v19 = 0.0;
-            v20 = v40;
+            const double v35 = 1.0 / a[4], v36 = d[2] * a[3], v37 = v36 * v35, v38 = -v37,
+                v39 = a[3] * v35, v40 = -v39;
+            v11 = 0.0; v12 = v38; v13 = 0.0; v14 = 0.0; v15 = 0.0; v16 = 0.0; v17 = 0.0; v18 = 0.0;
+            v19 = 0.0; v20 = v40;
         }
-        const double v41 = a[0] * v11;
-        const double v42 = a[1] * v11;
-        R[0] = v41;
-        R[1] = v42;
-        R[2] = v12;
-        K[0] = v13;
-        K[1] = v14;
-        K[2] = v15;
-        K[3] = v14;
-        K[4] = v16;
-        K[5] = v17;
-        K[6] = v18;
-        K[7] = v19;
-        K[8] = v20;
+        const double v41 = a[0] * v11, v42 = a[1] * v11;
+        R[0] = v41; R[1] = v42; R[2] = v12; K[0] = v13; K[1] = v14; K[2] = v15; K[3] = v14;
+        K[4] = v16; K[5] = v17; K[6] = v18; K[7] = v19; K[8] = v20;
     }
 }

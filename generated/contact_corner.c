@@ -13,13 +13,7 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_contact_corner_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_contact_corner_energy)
 {
     (void)points;
     (void)modes;
@@ -28,30 +22,19 @@ void softehl_contact_corner_energy(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 3 * e;
-        const double *restrict a = data + 2 * e;
-        (void)X; (void)d; (void)a;
-        const double v1 = parameters[1] + parameters[2];
-        const double v2 = v1 - X[1];
-        const double v3 = v2 - d[1];
-        const double v4 = parameters[0] + parameters[2];
-        const double v5 = v4 - X[0];
-        const double v6 = v5 - d[0];
-        const int v7 = 0.0 < v3;
-        const int v8 = 0.0 < v6;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 3 * e;
+        const double *restrict a = data + 2 * e; (void)X; (void)d; (void)a;
+        const double v1 = parameters[1] + parameters[2], v2 = v1 - X[1], v3 = v2 - d[1],
+            v4 = parameters[0] + parameters[2], v5 = v4 - X[0], v6 = v5 - d[0];
+        const int v7 = 0.0 < v3, v8 = 0.0 < v6;
         double v9;
         if (v8) {
             double v10;
             if (v7) {
-                const double v11 = v3 * v3;
-                const double v12 = v6 * v6;
-                const double v13 = v12 + v11;
-                const int v14 = 0.0 < v13;
-                double v15;
+                const double v11 = v3 * v3, v12 = v6 * v6, v13 = v12 + v11;
+                const int v14 = 0.0 < v13; double v15;
                 if (v14) {
-                    const double v16 = sqrt(v13);
-                    v15 = v16;
+                    const double v16 = sqrt(v13); v15 = v16;
                 } else {
                     v15 = 0.0;
                 }
@@ -65,8 +48,7 @@ void softehl_contact_corner_energy(
             if (v7) {
                 v17 = v3;
             } else {
-                const int v18 = v6 < v3;
-                double v19;
+                const int v18 = v6 < v3; double v19;
                 if (v18) {
                     v19 = v3;
                 } else {
@@ -76,451 +58,197 @@ void softehl_contact_corner_energy(
             }
             v9 = v17;
         }
-        const double v20 = v9 - parameters[2];
-        const double v21 = a[1] * v20;
-        const double v22 = d[2] + v21;
-        const int v23 = 0.0 < v22;
-        double v24;
+        const double v20 = v9 - parameters[2], v21 = a[1] * v20, v22 = d[2] + v21;
+        const int v23 = 0.0 < v22; double v24;
         if (v23) {
             v24 = 0.0;
         } else {
             v24 = v22;
         }
-        const double v25 = v24 * v24;
-        const double v26 = d[2] * d[2];
-        const double v27 = v25 - v26;
-        const double v28 = 1.0 / a[1];
-        const double v29 = 0.5 * a[0];
-        const double v30 = v29 * v28;
-        const double v31 = v27 * v30;
+        const double v25 = v24 * v24, v26 = d[2] * d[2], v27 = v25 - v26, v28 = 1.0 / a[1],
+            v29 = 0.5 * a[0], v30 = v29 * v28, v31 = v27 * v30;
         values[e] = v31;
     }
 }
 
-static void softehl_contact_corner_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_contact_corner_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1;
     softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
     V d0, d1, d2;
     softehl_load3(d + 0, 3, &d0, &d1, &d2);
-    (void)d0; (void)d1; (void)d2;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
-    const V v1 = 0.5 * a0;
-    const V v2 = 1.0 / a1;
-    const V v3 = parameters[0] - X0;
-    const V v4 = parameters[1] - X1;
-    const V v5 = v3 - d0;
-    const V v6 = v4 - d1;
-    const V v7 = v1 * v2;
-    const V v8 = parameters[2] + v5;
-    const V v9 = parameters[2] + v6;
-    const M v10 = softehl_lt(softehl_splat(0.0), v8);
-    const M v11 = softehl_lt(softehl_splat(0.0), v9);
-    const M v12 = softehl_lt(v8, v9);
-    const V v13 = v8 * v8;
-    const V v14 = v9 * v9;
-    const V v15 = v13 + v14;
-    const M v16 = softehl_lt(softehl_splat(0.0), v15);
-    const V v17 = softehl_vsqrt(v15);
-    V v18 = v9;
-    const M m19 = ~v11;
-    if (softehl_any(m19)) {
-        const V v20 = softehl_blend(v12, v9, v8);
-        v18 = softehl_blend(m19, v20, v18);
+    const V v1 = 0.5 * a0 * (1.0 / a1), v2 = parameters[2] + (parameters[0] - X0 - d0),
+        v3 = parameters[2] + (parameters[1] - X1 - d1);
+    const M v4 = softehl_lt(softehl_splat(0.0), v2), v5 = softehl_lt(softehl_splat(0.0), v3),
+        v6 = softehl_lt(v2, v3);
+    const V v7 = v2 * v2 + v3 * v3; const M v8 = softehl_lt(softehl_splat(0.0), v7);
+    const V v9 = softehl_vsqrt(v7); V v10 = v3; const M m11 = ~v5;
+    if (softehl_any(m11)) {
+        const V v12 = softehl_blend(v6, v3, v2); v10 = softehl_blend(m11, v12, v10);
     }
-    V v21 = v18;
-    const M m22 = v10;
-    if (softehl_any(m22)) {
-        V v23 = v8;
-        const M m24 = v11 & m22;
-        if (softehl_any(m24)) {
-            const V v25 = softehl_blend(v16, v17, softehl_splat(0.0));
-            v23 = softehl_blend(m24, v25, v23);
+    V v13 = v10; const M m14 = v4;
+    if (softehl_any(m14)) {
+        V v15 = v2; const M m16 = v5 & m14;
+        if (softehl_any(m16)) {
+            const V v17 = softehl_blend(v8, v9, softehl_splat(0.0));
+            v15 = softehl_blend(m16, v17, v15);
         }
-        v21 = softehl_blend(m22, v23, v21);
+        v13 = softehl_blend(m14, v15, v13);
     }
-    const V v26 = v21 - parameters[2];
-    const V v27 = a1 * v26;
-    const V v28 = d2 + v27;
-    const M v29 = softehl_lt(softehl_splat(0.0), v28);
-    V v30 = softehl_splat(0.0);
-    V v31 = softehl_splat(0.0);
-    V v32 = softehl_splat(0.0);
-    V v33 = softehl_splat(0.0);
-    const M m34 = ~v29;
-    if (softehl_any(m34)) {
-        V v35 = softehl_splat(0.0);
-        V v36 = softehl_splat(0.0);
-        V v37 = softehl_splat(0.0);
-        const M m38 = v10 & m34;
-        if (softehl_any(m38)) {
-            V v39 = softehl_splat(0.0);
-            V v40 = softehl_splat(1.0);
-            const M m41 = v11 & m38;
-            if (softehl_any(m41)) {
-                V v42 = softehl_splat(0.0);
-                const M m43 = v16 & m41;
-                if (softehl_any(m43)) {
-                    const V v44 = 1.0 / v15;
-                    const V v45 = a1 * v7;
-                    const V v46 = softehl_vsqrt(v44);
-                    const V v47 = v46 * v45;
-                    const V v48 = v17 - parameters[2];
-                    const V v49 = a1 * v48;
-                    const V v50 = d2 + v49;
-                    const V v51 = v50 * v47;
-                    v42 = softehl_blend(m43, v51, v42);
+    const V v18 = d2 + a1 * (v13 - parameters[2]);
+    const M v19 = softehl_lt(softehl_splat(0.0), v18);
+    V v20 = softehl_splat(0.0), v21 = softehl_splat(0.0), v22 = softehl_splat(0.0),
+        v23 = softehl_splat(0.0);
+    const M m24 = ~v19;
+    if (softehl_any(m24)) {
+        V v25 = softehl_splat(0.0), v26 = softehl_splat(0.0), v27 = softehl_splat(0.0);
+        const M m28 = v4 & m24;
+        if (softehl_any(m28)) {
+            V v29 = softehl_splat(0.0), v30 = softehl_splat(1.0);
+            const M m31 = v5 & m28;
+            if (softehl_any(m31)) {
+                V v32 = softehl_splat(0.0); const M m33 = v8 & m31;
+                if (softehl_any(m33)) {
+                    const V v34 = softehl_vsqrt(1.0 / v7),
+                        v35 = (d2 + a1 * (v9 - parameters[2])) * (v34 * (a1 * v1));
+                    v32 = softehl_blend(m33, v35, v32);
                 }
-                v39 = softehl_blend(m41, v42, v39);
-                v40 = softehl_blend(m41, softehl_splat(0.0), v40);
+                v29 = softehl_blend(m31, v32, v29);
+                v30 = softehl_blend(m31, softehl_splat(0.0), v30);
             }
-            v35 = softehl_blend(m38, v39, v35);
-            v36 = softehl_blend(m38, v40, v36);
-            v37 = softehl_blend(m38, softehl_splat(0.0), v37);
+            v25 = softehl_blend(m28, v29, v25); v26 = softehl_blend(m28, v30, v26);
+            v27 = softehl_blend(m28, softehl_splat(0.0), v27);
         }
-        const M m52 = ~v10 & m34;
-        if (softehl_any(m52)) {
-            V v53 = softehl_splat(0.0);
-            V v54 = softehl_splat(1.0);
-            const M m55 = ~v11 & m52;
-            if (softehl_any(m55)) {
-                const V v56 = softehl_blend(v12, softehl_splat(0.0), softehl_splat(1.0));
-                const V v57 = softehl_blend(v12, softehl_splat(1.0), softehl_splat(0.0));
-                v53 = softehl_blend(m55, v56, v53);
-                v54 = softehl_blend(m55, v57, v54);
+        const M m36 = ~v4 & m24;
+        if (softehl_any(m36)) {
+            V v37 = softehl_splat(0.0), v38 = softehl_splat(1.0);
+            const M m39 = ~v5 & m36;
+            if (softehl_any(m39)) {
+                const V v40 = softehl_blend(v6, softehl_splat(0.0), softehl_splat(1.0)),
+                    v41 = softehl_blend(v6, softehl_splat(1.0), softehl_splat(0.0));
+                v37 = softehl_blend(m39, v40, v37); v38 = softehl_blend(m39, v41, v38);
             }
-            const V v58 = 2.0 * a1;
-            const V v59 = v18 - parameters[2];
-            const V v60 = a1 * v59;
-            const V v61 = d2 + v60;
-            const V v62 = v7 * v58;
-            const V v63 = v54 * v62;
-            const V v64 = v61 * v63;
-            v35 = softehl_blend(m52, softehl_splat(0.0), v35);
-            v36 = softehl_blend(m52, v53, v36);
-            v37 = softehl_blend(m52, v64, v37);
+            const V v42 = (d2 + a1 * (v10 - parameters[2])) * (v38 * (v1 * (2.0 * a1)));
+            v25 = softehl_blend(m36, softehl_splat(0.0), v25); v26 = softehl_blend(m36, v37, v26);
+            v27 = softehl_blend(m36, v42, v27);
         }
-        const V v65 = a1 * v36;
-        const V v66 = 2.0 * v28;
-        const V v67 = v7 * v66;
-        const V v68 = v65 * v67;
-        v30 = softehl_blend(m34, v35, v30);
-        v31 = softehl_blend(m34, v68, v31);
-        v32 = softehl_blend(m34, v37, v32);
-        v33 = softehl_blend(m34, v67, v33);
+        const V v43 = v1 * (2.0 * v18), v44 = a1 * v26 * v43;
+        v20 = softehl_blend(m24, v25, v20); v21 = softehl_blend(m24, v44, v21);
+        v22 = softehl_blend(m24, v27, v22); v23 = softehl_blend(m24, v43, v23);
     }
-    const V v69 = 2.0 * d2;
-    const V v70 = 2.0 * v9;
-    const V v71 = 2.0 * v8;
-    const V v72 = v7 * v69;
-    const V v73 = v33 - v72;
-    const V v74 = v71 * v30;
-    const V v75 = v31 + v74;
-    const V v76 = v70 * v30;
-    const V v77 = v32 + v76;
-    const V v78 = -v77;
-    const V v79 = -v75;
-    softehl_store3(R + 0, 3, v79, v78, v73);
+    softehl_store3(R + 0, 3, -(v21 + 2.0 * v2 * v20), -(v22 + 2.0 * v3 * v20), v23 - v1 * (2.0 * d2));
 }
+SOFTEHL_BATCH(softehl_contact_corner_residual, 2, 3, 2, 0, 3, 0)
 
-void softehl_contact_corner_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_contact_corner_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_contact_corner_residual_group(points, modes, coordinates + 2 * e, dofs + 3 * e, data + 2 * e, 0, parameters, rule, basis, values + 3 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_contact_corner_residual_group(points, modes, coordinates + 2 * (n - SOFTEHL_LANES), dofs + 3 * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 3 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates, 2, n);
-    double d[SOFTEHL_LANES * 3];
-    softehl_pad(d, dofs, 3, n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * 3];
-    softehl_contact_corner_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 3 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_contact_corner_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1;
     softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
     V d0, d1, d2;
     softehl_load3(d + 0, 3, &d0, &d1, &d2);
-    (void)d0; (void)d1; (void)d2;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
-    const V v1 = 0.5 * a0;
-    const V v2 = 1.0 / a1;
-    const V v3 = parameters[0] - X0;
-    const V v4 = parameters[1] - X1;
-    const V v5 = v3 - d0;
-    const V v6 = v4 - d1;
-    const V v7 = v1 * v2;
-    const V v8 = parameters[2] + v5;
-    const V v9 = parameters[2] + v6;
-    const M v10 = softehl_lt(softehl_splat(0.0), v8);
-    const M v11 = softehl_lt(softehl_splat(0.0), v9);
-    const M v12 = softehl_lt(v8, v9);
-    const V v13 = v8 * v8;
-    const V v14 = v9 * v9;
-    const V v15 = v13 + v14;
-    const V v16 = 2.0 * v7;
-    const M v17 = softehl_lt(softehl_splat(0.0), v15);
-    const V v18 = softehl_vsqrt(v15);
-    V v19 = v9;
-    const M m20 = ~v11;
-    if (softehl_any(m20)) {
-        const V v21 = softehl_blend(v12, v9, v8);
-        v19 = softehl_blend(m20, v21, v19);
+    const V v1 = 0.5 * a0 * (1.0 / a1), v2 = parameters[2] + (parameters[0] - X0 - d0),
+        v3 = parameters[2] + (parameters[1] - X1 - d1);
+    const M v4 = softehl_lt(softehl_splat(0.0), v2), v5 = softehl_lt(softehl_splat(0.0), v3),
+        v6 = softehl_lt(v2, v3);
+    const V v7 = v2 * v2 + v3 * v3, v8 = 2.0 * v1;
+    const M v9 = softehl_lt(softehl_splat(0.0), v7); const V v10 = softehl_vsqrt(v7); V v11 = v3;
+    const M m12 = ~v5;
+    if (softehl_any(m12)) {
+        const V v13 = softehl_blend(v6, v3, v2); v11 = softehl_blend(m12, v13, v11);
     }
-    V v22 = v19;
-    const M m23 = v10;
-    if (softehl_any(m23)) {
-        V v24 = v8;
-        const M m25 = v11 & m23;
-        if (softehl_any(m25)) {
-            const V v26 = softehl_blend(v17, v18, softehl_splat(0.0));
-            v24 = softehl_blend(m25, v26, v24);
+    V v14 = v11; const M m15 = v4;
+    if (softehl_any(m15)) {
+        V v16 = v2; const M m17 = v5 & m15;
+        if (softehl_any(m17)) {
+            const V v18 = softehl_blend(v9, v10, softehl_splat(0.0));
+            v16 = softehl_blend(m17, v18, v16);
         }
-        v22 = softehl_blend(m23, v24, v22);
+        v14 = softehl_blend(m15, v16, v14);
     }
-    const V v27 = 2.0 * v9;
-    const V v28 = 2.0 * v8;
-    const V v29 = v22 - parameters[2];
-    const V v30 = a1 * v29;
-    const V v31 = d2 + v30;
-    const M v32 = softehl_lt(softehl_splat(0.0), v31);
-    V v33 = softehl_splat(0.0);
-    V v34 = softehl_splat(0.0);
-    V v35 = softehl_splat(0.0);
-    V v36 = softehl_splat(0.0);
-    V v37 = softehl_splat(0.0);
-    V v38 = softehl_splat(0.0);
-    V v39 = softehl_splat(0.0);
-    V v40 = softehl_splat(0.0);
-    V v41 = softehl_splat(0.0);
-    V v42 = softehl_splat(0.0);
-    V v43 = softehl_splat(0.0);
-    V v44 = softehl_splat(0.0);
-    const M m45 = ~v32;
-    if (softehl_any(m45)) {
-        const V v46 = 2.0 * a1;
-        const V v47 = v7 * v46;
-        V v48 = softehl_splat(0.0);
-        V v49 = softehl_splat(0.0);
-        V v50 = softehl_splat(0.0);
-        V v51 = softehl_splat(0.0);
-        V v52 = softehl_splat(0.0);
-        V v53 = softehl_splat(0.0);
-        V v54 = softehl_splat(0.0);
-        V v55 = softehl_splat(0.0);
-        V v56 = softehl_splat(0.0);
-        const M m57 = v10 & m45;
-        if (softehl_any(m57)) {
-            V v58 = softehl_splat(0.0);
-            V v59 = softehl_splat(1.0);
-            V v60 = softehl_splat(0.0);
-            V v61 = softehl_splat((-1.0));
-            V v62 = softehl_splat(0.0);
-            V v63 = softehl_splat(0.0);
-            V v64 = softehl_splat(0.0);
-            const M m65 = v11 & m57;
-            if (softehl_any(m65)) {
-                V v66 = softehl_splat(0.0);
-                V v67 = softehl_splat(0.0);
-                V v68 = softehl_splat(0.0);
-                V v69 = softehl_splat(0.0);
-                V v70 = softehl_splat(0.0);
-                V v71 = softehl_splat(0.0);
-                const M m72 = v17 & m65;
-                if (softehl_any(m72)) {
-                    const V v73 = 1.0 / v15;
-                    const V v74 = softehl_vsqrt(v73);
-                    const V v75 = a1 * v28;
-                    const V v76 = v18 - parameters[2];
-                    const V v77 = a1 * v76;
-                    const V v78 = d2 + v77;
-                    const V v79 = 0.5 * v74;
-                    const V v80 = a1 * v79;
-                    const V v81 = v78 * v16;
-                    const V v82 = v80 * v16;
-                    const V v83 = v80 * v81;
-                    const V v84 = v28 * v79;
-                    const V v85 = -v84;
-                    const V v86 = v74 * v79;
-                    const V v87 = v74 * v86;
-                    const V v88 = v27 * v79;
-                    const V v89 = -v88;
-                    const V v90 = v8 * v81;
-                    const V v91 = v9 * v81;
-                    const V v92 = v87 * v90;
-                    const V v93 = v84 * v82;
-                    const V v94 = v92 - v93;
-                    const V v95 = v94 * v75;
-                    const V v96 = v87 * v91;
-                    const V v97 = v88 * v82;
-                    const V v98 = v96 - v97;
-                    const V v99 = a1 * v98;
-                    const V v100 = v28 * v99;
-                    const V v101 = v27 * v99;
-                    v66 = softehl_blend(m72, v83, v66);
-                    v67 = softehl_blend(m72, v95, v67);
-                    v68 = softehl_blend(m72, v85, v68);
-                    v69 = softehl_blend(m72, v100, v69);
-                    v70 = softehl_blend(m72, v89, v70);
-                    v71 = softehl_blend(m72, v101, v71);
+    const V v19 = 2.0 * v3, v20 = 2.0 * v2, v21 = d2 + a1 * (v14 - parameters[2]);
+    const M v22 = softehl_lt(softehl_splat(0.0), v21);
+    V v23 = softehl_splat(0.0), v24 = softehl_splat(0.0), v25 = softehl_splat(0.0),
+        v26 = softehl_splat(0.0), v27 = softehl_splat(0.0), v28 = softehl_splat(0.0),
+        v29 = softehl_splat(0.0), v30 = softehl_splat(0.0), v31 = softehl_splat(0.0),
+        v32 = softehl_splat(0.0), v33 = softehl_splat(0.0), v34 = softehl_splat(0.0);
+    const M m35 = ~v22;
+    if (softehl_any(m35)) {
+        const V v36 = v1 * (2.0 * a1);
+        V v37 = softehl_splat(0.0), v38 = softehl_splat(0.0), v39 = softehl_splat(0.0),
+            v40 = softehl_splat(0.0), v41 = softehl_splat(0.0), v42 = softehl_splat(0.0),
+            v43 = softehl_splat(0.0), v44 = softehl_splat(0.0), v45 = softehl_splat(0.0);
+        const M m46 = v4 & m35;
+        if (softehl_any(m46)) {
+            V v47 = softehl_splat(0.0), v48 = softehl_splat(1.0), v49 = softehl_splat(0.0),
+                v50 = softehl_splat((-1.0)), v51 = softehl_splat(0.0), v52 = softehl_splat(0.0),
+                v53 = softehl_splat(0.0);
+            const M m54 = v5 & m46;
+            if (softehl_any(m54)) {
+                V v55 = softehl_splat(0.0), v56 = softehl_splat(0.0), v57 = softehl_splat(0.0),
+                    v58 = softehl_splat(0.0), v59 = softehl_splat(0.0), v60 = softehl_splat(0.0);
+                const M m61 = v9 & m54;
+                if (softehl_any(m61)) {
+                    const V v62 = softehl_vsqrt(1.0 / v7), v63 = 0.5 * v62, v64 = a1 * v63,
+                        v65 = (d2 + a1 * (v10 - parameters[2])) * v8, v66 = v64 * v8,
+                        v67 = v64 * v65, v68 = v20 * v63, v69 = -v68, v70 = v62 * (v62 * v63),
+                        v71 = v19 * v63, v72 = -v71,
+                        v73 = (v70 * (v2 * v65) - v68 * v66) * (a1 * v20),
+                        v74 = a1 * (v70 * (v3 * v65) - v71 * v66), v75 = v20 * v74, v76 = v19 * v74;
+                    v55 = softehl_blend(m61, v67, v55); v56 = softehl_blend(m61, v73, v56);
+                    v57 = softehl_blend(m61, v69, v57); v58 = softehl_blend(m61, v75, v58);
+                    v59 = softehl_blend(m61, v72, v59); v60 = softehl_blend(m61, v76, v60);
                 }
-                v58 = softehl_blend(m65, v66, v58);
-                v59 = softehl_blend(m65, softehl_splat(0.0), v59);
-                v60 = softehl_blend(m65, v67, v60);
-                v61 = softehl_blend(m65, v68, v61);
-                v62 = softehl_blend(m65, v69, v62);
-                v63 = softehl_blend(m65, v70, v63);
-                v64 = softehl_blend(m65, v71, v64);
+                v47 = softehl_blend(m54, v55, v47);
+                v48 = softehl_blend(m54, softehl_splat(0.0), v48);
+                v49 = softehl_blend(m54, v56, v49); v50 = softehl_blend(m54, v57, v50);
+                v51 = softehl_blend(m54, v58, v51); v52 = softehl_blend(m54, v59, v52);
+                v53 = softehl_blend(m54, v60, v53);
             }
-            v48 = softehl_blend(m57, v58, v48);
-            v49 = softehl_blend(m57, v59, v49);
-            v50 = softehl_blend(m57, softehl_splat(0.0), v50);
-            v51 = softehl_blend(m57, v60, v51);
-            v52 = softehl_blend(m57, v61, v52);
-            v53 = softehl_blend(m57, v62, v53);
-            v54 = softehl_blend(m57, v63, v54);
-            v55 = softehl_blend(m57, v64, v55);
-            v56 = softehl_blend(m57, softehl_splat(0.0), v56);
+            v37 = softehl_blend(m46, v47, v37); v38 = softehl_blend(m46, v48, v38);
+            v39 = softehl_blend(m46, softehl_splat(0.0), v39); v40 = softehl_blend(m46, v49, v40);
+            v41 = softehl_blend(m46, v50, v41); v42 = softehl_blend(m46, v51, v42);
+            v43 = softehl_blend(m46, v52, v43); v44 = softehl_blend(m46, v53, v44);
+            v45 = softehl_blend(m46, softehl_splat(0.0), v45);
         }
-        const M m102 = ~v10 & m45;
-        if (softehl_any(m102)) {
-            V v103 = softehl_splat(0.0);
-            V v104 = softehl_splat(1.0);
-            V v105 = softehl_splat(0.0);
-            V v106 = softehl_splat((-1.0));
-            const M m107 = ~v11 & m102;
-            if (softehl_any(m107)) {
-                const V v108 = softehl_blend(v12, softehl_splat(0.0), softehl_splat(1.0));
-                const V v109 = softehl_blend(v12, softehl_splat(1.0), softehl_splat(0.0));
-                const V v110 = softehl_blend(v12, softehl_splat(0.0), softehl_splat((-1.0)));
-                const V v111 = softehl_blend(v12, softehl_splat((-1.0)), softehl_splat(0.0));
-                v103 = softehl_blend(m107, v108, v103);
-                v104 = softehl_blend(m107, v109, v104);
-                v105 = softehl_blend(m107, v110, v105);
-                v106 = softehl_blend(m107, v111, v106);
+        const M m77 = ~v4 & m35;
+        if (softehl_any(m77)) {
+            V v78 = softehl_splat(0.0), v79 = softehl_splat(1.0), v80 = softehl_splat(0.0),
+                v81 = softehl_splat((-1.0));
+            const M m82 = ~v5 & m77;
+            if (softehl_any(m82)) {
+                const V v83 = softehl_blend(v6, softehl_splat(0.0), softehl_splat(1.0)),
+                    v84 = softehl_blend(v6, softehl_splat(1.0), softehl_splat(0.0)),
+                    v85 = softehl_blend(v6, softehl_splat(0.0), softehl_splat((-1.0))),
+                    v86 = softehl_blend(v6, softehl_splat((-1.0)), softehl_splat(0.0));
+                v78 = softehl_blend(m82, v83, v78); v79 = softehl_blend(m82, v84, v79);
+                v80 = softehl_blend(m82, v85, v80); v81 = softehl_blend(m82, v86, v81);
             }
-            const V v112 = a1 * v104;
-            const V v113 = v19 - parameters[2];
-            const V v114 = a1 * v113;
-            const V v115 = d2 + v114;
-            const V v116 = v112 * v16;
-            const V v117 = v112 * v47;
-            const V v118 = v115 * v116;
-            const V v119 = v106 * v117;
-            v48 = softehl_blend(m102, softehl_splat(0.0), v48);
-            v49 = softehl_blend(m102, v103, v49);
-            v50 = softehl_blend(m102, v118, v50);
-            v51 = softehl_blend(m102, softehl_splat(0.0), v51);
-            v52 = softehl_blend(m102, v105, v52);
-            v53 = softehl_blend(m102, softehl_splat(0.0), v53);
-            v54 = softehl_blend(m102, v106, v54);
-            v55 = softehl_blend(m102, softehl_splat(0.0), v55);
-            v56 = softehl_blend(m102, v119, v56);
+            const V v87 = a1 * v79, v88 = (d2 + a1 * (v11 - parameters[2])) * (v87 * v8),
+                v89 = v81 * (v87 * v36);
+            v37 = softehl_blend(m77, softehl_splat(0.0), v37); v38 = softehl_blend(m77, v78, v38);
+            v39 = softehl_blend(m77, v88, v39); v40 = softehl_blend(m77, softehl_splat(0.0), v40);
+            v41 = softehl_blend(m77, v80, v41); v42 = softehl_blend(m77, softehl_splat(0.0), v42);
+            v43 = softehl_blend(m77, v81, v43); v44 = softehl_blend(m77, softehl_splat(0.0), v44);
+            v45 = softehl_blend(m77, v89, v45);
         }
-        const V v120 = a1 * v49;
-        const V v121 = 2.0 * v31;
-        const V v122 = v7 * v121;
-        const V v123 = v47 * v52;
-        const V v124 = v47 * v54;
-        const V v125 = v120 * v124;
-        const V v126 = v125 + v53;
-        const V v127 = v120 * v123;
-        const V v128 = v120 * v122;
-        const V v129 = -v126;
-        v33 = softehl_blend(m45, v48, v33);
-        v34 = softehl_blend(m45, v128, v34);
-        v35 = softehl_blend(m45, v50, v35);
-        v36 = softehl_blend(m45, v122, v36);
-        v37 = softehl_blend(m45, v51, v37);
-        v38 = softehl_blend(m45, v127, v38);
-        v39 = softehl_blend(m45, v129, v39);
-        v40 = softehl_blend(m45, v123, v40);
-        v41 = softehl_blend(m45, v55, v41);
-        v42 = softehl_blend(m45, v56, v42);
-        v43 = softehl_blend(m45, v124, v43);
-        v44 = softehl_blend(m45, v16, v44);
+        const V v90 = a1 * v38, v91 = v1 * (2.0 * v21), v92 = v36 * v41, v93 = v36 * v43,
+            v94 = v90 * v92, v95 = v90 * v91, v96 = -(v90 * v93 + v42);
+        v23 = softehl_blend(m35, v37, v23); v24 = softehl_blend(m35, v95, v24);
+        v25 = softehl_blend(m35, v39, v25); v26 = softehl_blend(m35, v91, v26);
+        v27 = softehl_blend(m35, v40, v27); v28 = softehl_blend(m35, v94, v28);
+        v29 = softehl_blend(m35, v96, v29); v30 = softehl_blend(m35, v92, v30);
+        v31 = softehl_blend(m35, v44, v31); v32 = softehl_blend(m35, v45, v32);
+        v33 = softehl_blend(m35, v93, v33); v34 = softehl_blend(m35, v8, v34);
     }
-    const V v130 = 2.0 * d2;
-    const V v131 = v7 * v130;
-    const V v132 = v36 - v131;
-    const V v133 = v44 - v16;
-    softehl_store1(K + 8, 9, v133);
-    const V v134 = 2.0 * v33;
-    const V v135 = v28 * v33;
-    const V v136 = v34 + v135;
-    const V v137 = v27 * v33;
-    const V v138 = v35 + v137;
-    const V v139 = -v136;
-    const V v140 = -v138;
-    softehl_store3(R + 0, 3, v139, v140, v132);
-    const V v141 = v134 - v38;
-    const V v142 = v141 - v37;
-    softehl_store4(K + 0, 9, v142, v39, v40, v39);
-    const V v143 = v134 - v42;
-    const V v144 = v143 - v41;
-    softehl_store4(K + 4, 9, v144, v43, v40, v43);
+    softehl_store1(K + 8, 9, v34 - v8); const V v97 = 2.0 * v23;
+    softehl_store3(R + 0, 3, -(v24 + v20 * v23), -(v25 + v19 * v23), v26 - v1 * (2.0 * d2));
+    const V v98 = v97 - v28 - v27; softehl_store4(K + 0, 9, v98, v29, v30, v29);
+    const V v99 = v97 - v32 - v31; softehl_store4(K + 4, 9, v99, v33, v30, v33);
 }
-
-void softehl_contact_corner_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_contact_corner_tangent_group(points, modes, coordinates + 2 * e, dofs + 3 * e, data + 2 * e, 0, parameters, rule, basis, values + 3 * e, tangent + (3 * 3) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_contact_corner_tangent_group(points, modes, coordinates + 2 * (n - SOFTEHL_LANES), dofs + 3 * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 3 * (n - SOFTEHL_LANES), tangent + (3 * 3) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates, 2, n);
-    double d[SOFTEHL_LANES * 3];
-    softehl_pad(d, dofs, 3, n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * 3];
-    double K[SOFTEHL_LANES * (3 * 3)];
-    softehl_contact_corner_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 3 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (3 * 3) * n; ++i) tangent[i] = K[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_contact_corner_tangent, 2, 3, 2, 0, 3, (3 * 3))

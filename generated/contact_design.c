@@ -15,92 +15,38 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_contact_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_contact_pseudo_load)
 {
     (void)modes;
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 3 * e;
-        const double *restrict a = data + 5 * e;
-        const double *restrict t = direction + 9 * e;
-        double *restrict R = values + 3 * e;
-        (void)X; (void)d; (void)a; (void)t;
-        const double v1 = a[2] + parameters[0];
-        const double v2 = X[1] + d[1];
-        const double v3 = a[1] * v2;
-        const double v4 = X[0] + d[0];
-        const double v5 = a[0] * v4;
-        const double v6 = v3 + v5;
-        const double v7 = v6 - v1;
-        const double v8 = a[4] * v7;
-        const double v9 = d[2] + v8;
-        const int v10 = v9 <= 0.0;
-        double v11, v12, v13, v14;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 3 * e;
+        const double *restrict a = data + 5 * e; const double *restrict t = direction + 9 * e;
+        double *restrict R = values + 3 * e; (void)X; (void)d; (void)a; (void)t;
+        const double v1 = a[2] + parameters[0], v2 = X[1] + d[1], v3 = a[1] * v2, v4 = X[0] + d[0],
+            v5 = a[0] * v4, v6 = v3 + v5, v7 = v6 - v1, v8 = a[4] * v7, v9 = d[2] + v8;
+        const int v10 = v9 <= 0.0; double v11, v12, v13, v14;
         if (v10) {
-            const double v15 = a[3] * parameters[1];
-            const double v16 = v15 * v9;
-            const double v17 = v2 * t[3];
-            const double v18 = a[1] * t[1];
-            const double v19 = v17 + v18;
-            const double v20 = v4 * t[2];
-            const double v21 = a[0] * t[0];
-            const double v22 = parameters[1] * t[5];
-            const double v23 = a[3] * t[8];
-            const double v24 = v22 + v23;
-            const double v25 = v19 + v20;
-            const double v26 = v21 + v25;
-            const double v27 = v26 - t[4];
-            const double v28 = v27 - t[7];
-            const double v29 = a[4] * v28;
-            const double v30 = a[3] * v28;
-            const double v31 = v7 * t[6];
-            const double v32 = v7 * t[5];
-            const double v33 = v29 + v31;
-            const double v34 = v30 + v32;
-            const double v35 = v15 * v33;
-            const double v36 = v9 * v24;
-            const double v37 = v35 + v36;
-            const double v38 = a[0] * v37;
-            const double v39 = a[1] * v37;
-            v11 = v16;
-            v12 = v34;
-            v13 = v38;
-            v14 = v39;
+            const double v15 = a[3] * parameters[1], v16 = v15 * v9, v17 = v2 * t[3],
+                v18 = a[1] * t[1], v19 = v17 + v18, v20 = v4 * t[2], v21 = a[0] * t[0],
+                v22 = parameters[1] * t[5], v23 = a[3] * t[8], v24 = v22 + v23, v25 = v19 + v20,
+                v26 = v21 + v25, v27 = v26 - t[4], v28 = v27 - t[7], v29 = a[4] * v28,
+                v30 = a[3] * v28, v31 = v7 * t[6], v32 = v7 * t[5], v33 = v29 + v31,
+                v34 = v30 + v32, v35 = v15 * v33, v36 = v9 * v24, v37 = v35 + v36, v38 = a[0] * v37,
+                v39 = a[1] * v37;
+            v11 = v16; v12 = v34; v13 = v38; v14 = v39;
         } else {
-            const double v40 = 1.0 / a[4];
-            const double v41 = a[3] * v40;
-            const double v42 = v41 * t[6];
-            const double v43 = v42 - t[5];
-            const double v44 = v40 * v43;
-            const double v45 = d[2] * v44;
-            v11 = 0.0;
-            v12 = v45;
-            v13 = 0.0;
-            v14 = 0.0;
+            const double v40 = 1.0 / a[4], v41 = a[3] * v40, v42 = v41 * t[6], v43 = v42 - t[5],
+                v44 = v40 * v43, v45 = d[2] * v44;
+            v11 = 0.0; v12 = v45; v13 = 0.0; v14 = 0.0;
         }
-        const double v46 = v11 * t[2];
-        const double v47 = v11 * t[3];
-        const double v48 = v46 + v13;
-        const double v49 = v47 + v14;
-        double s50 = 0.0;
+        const double v46 = v11 * t[2], v47 = v11 * t[3], v48 = v46 + v13, v49 = v47 + v14;
+        double s50 = {0};
         for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 1 * q;
-            (void)w;
-            s50 += w[0];
+            const double *restrict w = rule + 1 * q; (void)w; s50 += w[0];
         }
-        const double v51 = s50 * v48;
-        const double v52 = s50 * v49;
-        const double v53 = s50 * v12;
-        R[0] = v51;
-        R[1] = v52;
-        R[2] = v53;
+        const double v51 = s50 * v48, v52 = s50 * v49, v53 = s50 * v12;
+        R[0] = v51; R[1] = v52; R[2] = v53;
     }
 }

@@ -18,13 +18,7 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_contact_friction_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_contact_friction_residual)
 {
     (void)points;
     (void)modes;
@@ -33,298 +27,121 @@ void softehl_contact_friction_residual(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 4 * e;
-        const double *restrict a = data + 7 * e;
-        double *restrict R = values + 4 * e;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 4 * e;
+        const double *restrict a = data + 7 * e; double *restrict R = values + 4 * e;
         (void)X; (void)d; (void)a;
-        const double v1 = X[0] + d[0];
-        const double v2 = a[0] * v1;
-        const double v3 = X[1] + d[1];
-        const double v4 = a[1] * v3;
-        const double v5 = v4 + v2;
-        const double v6 = a[2] + parameters[0];
-        const double v7 = v5 - v6;
-        const double v8 = a[4] * v7;
-        const double v9 = d[2] + v8;
-        const double v10 = -v9;
-        const int v11 = 0.0 < v10;
-        double v12;
+        const double v1 = X[0] + d[0], v2 = a[0] * v1, v3 = X[1] + d[1], v4 = a[1] * v3,
+            v5 = v4 + v2, v6 = a[2] + parameters[0], v7 = v5 - v6, v8 = a[4] * v7, v9 = d[2] + v8,
+            v10 = -v9;
+        const int v11 = 0.0 < v10; double v12;
         if (v11) {
             v12 = v10;
         } else {
             v12 = 0.0;
         }
-        const double v13 = parameters[1] * v12;
-        const double v14 = d[1] - a[6];
-        const double v15 = a[0] * v14;
-        const double v16 = d[0] - a[5];
-        const double v17 = a[1] * v16;
-        const double v18 = v17 - v15;
-        const double v19 = a[4] * v18;
-        const double v20 = d[3] + v19;
-        const int v21 = v13 < v20;
-        double v22;
+        const double v13 = parameters[1] * v12, v14 = d[1] - a[6], v15 = a[0] * v14,
+            v16 = d[0] - a[5], v17 = a[1] * v16, v18 = v17 - v15, v19 = a[4] * v18,
+            v20 = d[3] + v19;
+        const int v21 = v13 < v20; double v22;
         if (v21) {
             v22 = v13;
         } else {
             v22 = v20;
         }
-        const double v23 = -v13;
-        const int v24 = v23 < v22;
-        double v25;
+        const double v23 = -v13; const int v24 = v23 < v22; double v25;
         if (v24) {
             v25 = v22;
         } else {
             v25 = v23;
         }
-        const double v26 = a[1] * v25;
-        const double v27 = a[0] * v12;
-        const double v28 = v26 - v27;
-        const double v29 = a[3] * v28;
-        const double v30 = a[0] * v25;
-        const double v31 = a[1] * v12;
-        const double v32 = v31 + v30;
-        const double v33 = a[3] * v32;
-        const double v34 = -v33;
-        const double v35 = d[2] + v12;
-        const double v36 = 1.0 / a[4];
-        const double v37 = a[3] * v36;
-        const double v38 = v37 * v35;
-        const double v39 = -v38;
-        const double v40 = v25 - d[3];
-        const double v41 = v37 * v40;
-        R[0] = v29;
-        R[1] = v34;
-        R[2] = v39;
-        R[3] = v41;
+        const double v26 = a[1] * v25, v27 = a[0] * v12, v28 = v26 - v27, v29 = a[3] * v28,
+            v30 = a[0] * v25, v31 = a[1] * v12, v32 = v31 + v30, v33 = a[3] * v32, v34 = -v33,
+            v35 = d[2] + v12, v36 = 1.0 / a[4], v37 = a[3] * v36, v38 = v37 * v35, v39 = -v38,
+            v40 = v25 - d[3], v41 = v37 * v40;
+        R[0] = v29; R[1] = v34; R[2] = v39; R[3] = v41;
     }
 }
 
-static void softehl_contact_friction_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_contact_friction_tangent)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1;
     softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, 4, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V a0, a1, a2, a3;
-    softehl_load4(a + 0, 7, &a0, &a1, &a2, &a3);
-    (void)a0; (void)a1; (void)a2; (void)a3;
-    V a4, a5, a6;
-    softehl_load3(a + 4, 7, &a4, &a5, &a6);
-    (void)a4; (void)a5; (void)a6;
-    const V v1 = a2 + parameters[0];
-    const V v2 = a0 * a4;
-    const V v3 = a1 * a4;
-    const V v4 = a1 * a3;
-    const V v5 = a0 * a3;
-    const V v6 = X1 * a1;
-    const V v7 = v1 - v6;
-    const V v8 = X0 * a0;
-    const V v9 = v7 - v8;
-    const V v10 = a4 * v9;
-    const V v11 = d0 * v2;
-    const V v12 = v10 - v11;
-    const V v13 = d1 * v3;
-    const V v14 = v12 - v13;
-    const V v15 = v14 - d2;
-    const M v16 = softehl_lt(softehl_splat(0.0), v15);
-    V v17 = softehl_splat(0.0);
-    V v18 = softehl_splat(0.0);
-    V v19 = softehl_splat(0.0);
-    V v20 = softehl_splat(0.0);
-    V v21 = softehl_splat(0.0);
-    V v22 = softehl_splat(0.0);
-    V v23 = softehl_splat(0.0);
-    V v24 = softehl_splat(0.0);
-    V v25 = softehl_splat(0.0);
-    V v26 = softehl_splat(0.0);
-    const M m27 = v16;
-    if (softehl_any(m27)) {
-        const V v28 = -a1;
-        const V v29 = a1 * v3;
-        const V v30 = a0 * v3;
-        const V v31 = a0 * v2;
-        const V v32 = -v30;
-        const V v33 = -v29;
-        v17 = softehl_blend(m27, v15, v17);
-        v18 = softehl_blend(m27, v31, v18);
-        v19 = softehl_blend(m27, v30, v19);
-        v20 = softehl_blend(m27, a0, v20);
-        v21 = softehl_blend(m27, v32, v21);
-        v22 = softehl_blend(m27, v33, v22);
-        v23 = softehl_blend(m27, v28, v23);
-        v24 = softehl_blend(m27, v5, v24);
-        v25 = softehl_blend(m27, v4, v25);
-        v26 = softehl_blend(m27, softehl_splat((-1.0)), v26);
+    V a0, a1, a2, a3, a4, a5, a6;
+    softehl_load4(a + 0, 7, &a0, &a1, &a2, &a3); softehl_load3(a + 4, 7, &a4, &a5, &a6);
+    const V v1 = a0 * a4, v2 = a1 * a4, v3 = a1 * a3, v4 = a0 * a3,
+        v5 = a4 * (a2 + parameters[0] - X1 * a1 - X0 * a0) - d0 * v1 - d1 * v2, v6 = v5 - d2;
+    const M v7 = softehl_lt(softehl_splat(0.0), v6);
+    V v8 = softehl_splat(0.0), v9 = softehl_splat(0.0), v10 = softehl_splat(0.0),
+        v11 = softehl_splat(0.0), v12 = softehl_splat(0.0), v13 = softehl_splat(0.0),
+        v14 = softehl_splat(0.0), v15 = softehl_splat(0.0), v16 = softehl_splat(0.0),
+        v17 = softehl_splat(0.0);
+    const M m18 = v7;
+    if (softehl_any(m18)) {
+        const V v19 = -a1, v20 = a0 * v2, v21 = a0 * v1, v22 = -v20, v23 = -(a1 * v2);
+        v8 = softehl_blend(m18, v6, v8); v9 = softehl_blend(m18, v21, v9);
+        v10 = softehl_blend(m18, v20, v10); v11 = softehl_blend(m18, a0, v11);
+        v12 = softehl_blend(m18, v22, v12); v13 = softehl_blend(m18, v23, v13);
+        v14 = softehl_blend(m18, v19, v14); v15 = softehl_blend(m18, v4, v15);
+        v16 = softehl_blend(m18, v3, v16); v17 = softehl_blend(m18, softehl_splat((-1.0)), v17);
     }
-    const V v34 = parameters[1] * v17;
-    const V v35 = d0 - a5;
-    const V v36 = a6 - d1;
-    const V v37 = v35 * v3;
-    const V v38 = d3 + v37;
-    const V v39 = v2 * v36;
-    const V v40 = v39 + v38;
-    const M v41 = softehl_lt(v34, v40);
-    const V v42 = softehl_blend(v41, v34, v40);
-    const V v43 = -v34;
-    const M v44 = softehl_lt(v43, v42);
-    const V v45 = parameters[1] * v2;
-    const V v46 = parameters[1] * v3;
-    V v47 = softehl_splat(0.0);
-    V v48 = softehl_splat(0.0);
-    V v49 = softehl_splat(0.0);
-    V v50 = softehl_splat(0.0);
-    V v51 = softehl_splat(0.0);
-    V v52 = softehl_splat(0.0);
-    V v53 = softehl_splat(0.0);
-    const M m54 = v44;
-    if (softehl_any(m54)) {
-        V v55 = softehl_splat(0.0);
-        V v56 = softehl_splat(0.0);
-        V v57 = softehl_splat(0.0);
-        V v58 = softehl_splat(0.0);
-        V v59 = softehl_splat(0.0);
-        V v60 = softehl_splat(0.0);
-        const M m61 = v41 & m54;
-        if (softehl_any(m61)) {
-            V v62 = softehl_splat(0.0);
-            V v63 = softehl_splat(0.0);
-            V v64 = softehl_splat(0.0);
-            const M m65 = v16 & m61;
-            if (softehl_any(m65)) {
-                const V v66 = -v45;
-                const V v67 = -v46;
-                const double v68 = -parameters[1];
-                v62 = softehl_blend(m65, v66, v62);
-                v63 = softehl_blend(m65, v67, v63);
-                v64 = softehl_blend(m65, softehl_splat(v68), v64);
+    const V v24 = parameters[1] * v8, v25 = v1 * (a6 - d1) + (d3 + (d0 - a5) * v2);
+    const M v26 = softehl_lt(v24, v25);
+    const V v27 = softehl_blend(v26, v24, v25), v28 = -v24;
+    const M v29 = softehl_lt(v28, v27);
+    const V v30 = parameters[1] * v1, v31 = parameters[1] * v2;
+    V v32 = softehl_splat(0.0), v33 = softehl_splat(0.0), v34 = softehl_splat(0.0),
+        v35 = softehl_splat(0.0), v36 = softehl_splat(0.0), v37 = softehl_splat(0.0),
+        v38 = softehl_splat(0.0);
+    const M m39 = v29;
+    if (softehl_any(m39)) {
+        V v40 = softehl_splat(0.0), v41 = softehl_splat(0.0), v42 = softehl_splat(0.0),
+            v43 = softehl_splat(0.0), v44 = softehl_splat(0.0), v45 = softehl_splat(0.0);
+        const M m46 = v26 & m39;
+        if (softehl_any(m46)) {
+            V v47 = softehl_splat(0.0), v48 = softehl_splat(0.0), v49 = softehl_splat(0.0);
+            const M m50 = v7 & m46;
+            if (softehl_any(m50)) {
+                const V v51 = -v30, v52 = -v31;
+                const double v53 = -parameters[1]; v47 = softehl_blend(m50, v51, v47);
+                v48 = softehl_blend(m50, v52, v48);
+                v49 = softehl_blend(m50, softehl_splat(v53), v49);
             }
-            v55 = softehl_blend(m61, v62, v55);
-            v56 = softehl_blend(m61, v63, v56);
-            v57 = softehl_blend(m61, v64, v57);
-            v58 = softehl_blend(m61, softehl_splat(0.0), v58);
-            v59 = softehl_blend(m61, softehl_splat(0.0), v59);
-            v60 = softehl_blend(m61, softehl_splat(0.0), v60);
+            v40 = softehl_blend(m46, v47, v40); v41 = softehl_blend(m46, v48, v41);
+            v42 = softehl_blend(m46, v49, v42); v43 = softehl_blend(m46, softehl_splat(0.0), v43);
+            v44 = softehl_blend(m46, softehl_splat(0.0), v44);
+            v45 = softehl_blend(m46, softehl_splat(0.0), v45);
         }
-        const M m69 = ~v41 & m54;
-        if (softehl_any(m69)) {
-            const V v70 = -v2;
-            const V v71 = -v5;
-            v55 = softehl_blend(m69, v3, v55);
-            v56 = softehl_blend(m69, v70, v56);
-            v57 = softehl_blend(m69, softehl_splat(0.0), v57);
-            v58 = softehl_blend(m69, v4, v58);
-            v59 = softehl_blend(m69, v71, v59);
-            v60 = softehl_blend(m69, softehl_splat(1.0), v60);
+        const M m54 = ~v26 & m39;
+        if (softehl_any(m54)) {
+            const V v55 = -v1, v56 = -v4;
+            v40 = softehl_blend(m54, v2, v40); v41 = softehl_blend(m54, v55, v41);
+            v42 = softehl_blend(m54, softehl_splat(0.0), v42); v43 = softehl_blend(m54, v3, v43);
+            v44 = softehl_blend(m54, v56, v44); v45 = softehl_blend(m54, softehl_splat(1.0), v45);
         }
-        v47 = softehl_blend(m54, v42, v47);
-        v48 = softehl_blend(m54, v55, v48);
-        v49 = softehl_blend(m54, v56, v49);
-        v50 = softehl_blend(m54, v57, v50);
-        v51 = softehl_blend(m54, v58, v51);
-        v52 = softehl_blend(m54, v59, v52);
-        v53 = softehl_blend(m54, v60, v53);
+        v32 = softehl_blend(m39, v27, v32); v33 = softehl_blend(m39, v40, v33);
+        v34 = softehl_blend(m39, v41, v34); v35 = softehl_blend(m39, v42, v35);
+        v36 = softehl_blend(m39, v43, v36); v37 = softehl_blend(m39, v44, v37);
+        v38 = softehl_blend(m39, v45, v38);
     }
-    const M m72 = ~v44;
-    if (softehl_any(m72)) {
-        const V v73 = softehl_blend(v16, v45, softehl_splat(0.0));
-        const V v74 = softehl_blend(v16, v46, softehl_splat(0.0));
-        const V v75 = softehl_blend(v16, softehl_splat(parameters[1]), softehl_splat(0.0));
-        v47 = softehl_blend(m72, v43, v47);
-        v48 = softehl_blend(m72, v73, v48);
-        v49 = softehl_blend(m72, v74, v49);
-        v50 = softehl_blend(m72, v75, v50);
-        v51 = softehl_blend(m72, softehl_splat(0.0), v51);
-        v52 = softehl_blend(m72, softehl_splat(0.0), v52);
-        v53 = softehl_blend(m72, softehl_splat(0.0), v53);
+    const M m57 = ~v29;
+    if (softehl_any(m57)) {
+        const V v58 = softehl_blend(v7, v30, softehl_splat(0.0)),
+            v59 = softehl_blend(v7, v31, softehl_splat(0.0)),
+            v60 = softehl_blend(v7, softehl_splat(parameters[1]), softehl_splat(0.0));
+        v32 = softehl_blend(m57, v28, v32); v33 = softehl_blend(m57, v58, v33);
+        v34 = softehl_blend(m57, v59, v34); v35 = softehl_blend(m57, v60, v35);
+        v36 = softehl_blend(m57, softehl_splat(0.0), v36);
+        v37 = softehl_blend(m57, softehl_splat(0.0), v37);
+        v38 = softehl_blend(m57, softehl_splat(0.0), v38);
     }
-    const V v76 = 1.0 / a4;
-    const V v77 = 1.0 + v26;
-    const V v78 = d2 + v17;
-    const V v79 = v53 - 1.0;
-    const V v80 = a1 * v47;
-    const V v81 = a1 * v17;
-    const V v82 = a1 * v48;
-    const V v83 = v82 + v18;
-    const V v84 = v47 - d3;
-    const V v85 = a0 * v17;
-    const V v86 = v80 - v85;
-    const V v87 = a0 * v47;
-    const V v88 = v81 + v87;
-    const V v89 = a0 * v48;
-    const V v90 = v89 + v21;
-    const V v91 = a1 * v49;
-    const V v92 = v91 + v19;
-    const V v93 = a1 * v50;
-    const V v94 = v93 + v20;
-    const V v95 = a0 * v49;
-    const V v96 = v22 + v95;
-    const V v97 = a0 * v50;
-    const V v98 = v23 + v97;
-    const V v99 = a3 * v86;
-    const V v100 = a3 * v88;
-    const V v101 = a3 * v83;
-    const V v102 = a3 * v90;
-    const V v103 = a3 * v92;
-    const V v104 = a3 * v94;
-    softehl_store4(K + 0, 16, v101, v103, v104, v51);
-    const V v105 = a3 * v96;
-    const V v106 = a3 * v98;
-    const V v107 = a3 * v76;
-    const V v108 = -v100;
-    const V v109 = -v102;
-    const V v110 = -v105;
-    const V v111 = v107 * v78;
-    const V v112 = v107 * v84;
-    const V v113 = -v106;
-    softehl_store4(K + 4, 16, v109, v110, v113, v52);
-    const V v114 = v107 * v48;
-    const V v115 = v107 * v49;
-    const V v116 = v107 * v50;
-    const V v117 = v107 * v77;
-    const V v118 = v107 * v79;
-    softehl_store4(K + 12, 16, v114, v115, v116, v118);
-    const V v119 = -v111;
-    softehl_store4(R + 0, 4, v99, v108, v119, v112);
-    const V v120 = -v117;
-    softehl_store4(K + 8, 16, v24, v25, v120, softehl_splat(0.0));
+    softehl_store4(K + 0, 16, a3 * (a1 * v33 + v9), a3 * (a1 * v34 + v10), a3 * (a1 * v35 + v11), v36);
+    const V v61 = a3 * (1.0 / a4);
+    softehl_store4(K + 4, 16, -(a3 * (a0 * v33 + v12)), -(a3 * (v13 + a0 * v34)), -(a3 * (v14 + a0 * v35)), v37);
+    softehl_store4(K + 12, 16, v61 * v33, v61 * v34, v61 * v35, v61 * (v38 - 1.0));
+    softehl_store4(R + 0, 4, a3 * (a1 * v32 - a0 * v8), -(a3 * (a1 * v8 + a0 * v32)), -(v61 * (d2 + v8)), v61 * (v32 - d3));
+    softehl_store4(K + 8, 16, v15, v16, -(v61 * (1.0 + v17)), softehl_splat(0.0));
 }
-
-void softehl_contact_friction_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_contact_friction_tangent_group(points, modes, coordinates + 2 * e, dofs + 4 * e, data + 7 * e, 0, parameters, rule, basis, values + 4 * e, tangent + (4 * 4) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_contact_friction_tangent_group(points, modes, coordinates + 2 * (n - SOFTEHL_LANES), dofs + 4 * (n - SOFTEHL_LANES), data + 7 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 4 * (n - SOFTEHL_LANES), tangent + (4 * 4) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates, 2, n);
-    double d[SOFTEHL_LANES * 4];
-    softehl_pad(d, dofs, 4, n);
-    double a[SOFTEHL_LANES * 7];
-    softehl_pad(a, data, 7, n);
-    double R[SOFTEHL_LANES * 4];
-    double K[SOFTEHL_LANES * (4 * 4)];
-    softehl_contact_friction_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 4 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (4 * 4) * n; ++i) tangent[i] = K[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_contact_friction_tangent, 2, 4, 7, 0, 4, (4 * 4))

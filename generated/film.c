@@ -25,19 +25,13 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_film_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -54,153 +48,50 @@ static void softehl_film_residual_group(
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
     const double v1 = 6.283185307179586 * parameters[5];
-    const V v2 = X2 + d2;
-    const V v3 = X1 - parameters[0];
-    const V v4 = X3 - parameters[0];
-    const V v5 = d1 + v3;
-    const V v6 = X3 + d3;
-    const V v7 = d3 + v4;
-    const V v8 = v2 - X0;
-    const V v9 = v8 - d0;
-    const V v10 = 0.5 * v9;
-    const V v11 = v6 - X1;
-    const V v12 = v11 - d1;
-    const V v13 = 0.5 * v12;
-    const V v14 = parameters[4] * v10;
-    const V v15 = v10 * v10;
-    const V v16 = v13 * v13;
-    const V v17 = v13 * v16;
-    const V v18 = v16 * v17;
-    const V v19 = v16 + v15;
-    const V v20 = softehl_vsqrt(v19);
-    const V v21 = v19 * v19;
-    const V v22 = v21 * v21;
-    const V v23 = 1.0 / v22;
-    const V v24 = parameters[6] * v20;
-    const V v25 = v23 * v18;
-    const V v26 = v18 * v25;
-    const V v27 = v15 + v26;
-    const V v28 = softehl_vsqrt(v27);
-    const V v29 = 1.0 / v28;
-    V s30 = softehl_splat(0.0);
-    V s31 = softehl_splat(0.0);
-    V s32 = softehl_splat(0.0);
-    V s33 = softehl_splat(0.0);
+    const V v2 = d1 + (X1 - parameters[0]), v3 = d3 + (X3 - parameters[0]),
+        v4 = 0.5 * (X2 + d2 - X0 - d0), v5 = 0.5 * (X3 + d3 - X1 - d1), v6 = parameters[4] * v4,
+        v7 = v4 * v4, v8 = v5 * v5, v9 = v8 * (v5 * v8), v10 = v8 + v7, v11 = softehl_vsqrt(v10),
+        v12 = v10 * v10, v13 = parameters[6] * v11,
+        v14 = softehl_vsqrt(v7 + v9 * (1.0 / (v12 * v12) * v9)), v15 = 1.0 / v14;
+    V s16 = {0}, s17 = {0}, s18 = {0}, s19 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        const double v34 = 0.5 * w[0];
-        const V v35 = p1 * v29;
-        const double v36 = 0.5 - v34;
-        const double v37 = 0.5 + v34;
-        const V v38 = p0 * parameters[3];
-        const V v39 = -p0;
-        const V v40 = p0 * v10;
-        const V v41 = p0 * v13;
-        const V v42 = softehl_vexp(v38);
-        const M v43 = softehl_lt(softehl_splat(0.0), v39);
-        const V v44 = v36 * v5;
-        const V v45 = w[1] * v40;
-        const V v46 = v37 * v7;
-        const V v47 = v44 + v46;
-        const V v48 = parameters[0] + v47;
-        const V v49 = 0.5 * v47;
-        const V v50 = 1.0 / v47;
-        const V v51 = parameters[2] * v42;
-        const V v52 = parameters[1] * v51;
-        const V v53 = v52 * v50;
-        const V v54 = v49 * v35;
-        const V v55 = v53 - v54;
-        const V v56 = v48 * v1;
-        const V v57 = v24 * v55;
-        const V v58 = v41 - v57;
-        const V v59 = w[1] * v56;
-        const V v60 = v45 * v56;
-        const V v61 = v58 * v59;
-        const V v62 = v37 * v60;
-        s30 += v62;
-        const V v63 = v36 * v60;
-        s31 += v63;
-        const V v64 = v37 * v61;
-        s32 += v64;
-        const V v65 = v36 * v61;
-        s33 += v65;
-        const V v66 = softehl_blend(v43, v39, softehl_splat(0.0));
-        const V v67 = 1.0 / v51;
-        const V v68 = parameters[1] * v49;
-        const V v69 = v66 * v14;
-        const V v70 = 0.08333333333333333 * v47;
-        const V v71 = v47 * v70;
-        const V v72 = v47 * v71;
-        const V v73 = w[1] * v69;
-        const V v74 = v67 * v72;
-        const V v75 = v74 * v35;
-        const V v76 = v68 - v75;
-        const V v77 = w[1] * v76;
+        (void)p0, (void)p1; const double v20 = 0.5 * w[0]; const V v21 = p1 * v15;
+        const double v22 = 0.5 - v20, v23 = 0.5 + v20;
+        const V v24 = -p0, v25 = softehl_vexp(p0 * parameters[3]);
+        const M v26 = softehl_lt(softehl_splat(0.0), v24);
+        const V v27 = v22 * v2 + v23 * v3, v28 = 0.5 * v27, v29 = parameters[2] * v25,
+            v30 = (parameters[0] + v27) * v1, v31 = w[1] * (p0 * v4) * v30,
+            v32 = (p0 * v5 - v13 * (parameters[1] * v29 * (1.0 / v27) - v28 * v21)) * (w[1] * v30);
+        s16 += v23 * v31; s17 += v22 * v31; s18 += v23 * v32; s19 += v22 * v32;
+        const V v33 = softehl_blend(v26, v24, softehl_splat(0.0)), v34 = w[1] * (v33 * v6),
+            v35 = parameters[1] * v28 - 1.0 / v29 * (v27 * (v27 * (0.08333333333333333 * v27))) * v21,
+            v36 = w[1] * v35;
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            const double N = B[2 * i], D = B[2 * i + 1];
-            (void)N, (void)D;
-            R_lanes[4 + i] += N * v73 + D * v77;
+            const double N = B[2 * i], D = B[2 * i + 1]; (void)N, (void)D;
+            R_lanes[4 + i] += N * v34 + D * v36;
         }
     }
-    const V v78 = -s30;
-    const V v79 = -s31;
-    R_lanes[0] = s33;
-    R_lanes[1] = v79;
-    R_lanes[2] = s32;
-    R_lanes[3] = v78;
+    const V v37 = -s16, v38 = -s17;
+    R_lanes[0] = s19; R_lanes[1] = v38; R_lanes[2] = s18; R_lanes[3] = v37;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_residual, 4, (4 + modes), 0, 0, (4 + modes), 0)
 
-void softehl_film_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_residual_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_residual_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -223,367 +114,111 @@ static void softehl_film_tangent_group(
 #endif
     for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
         K_lanes[i] = softehl_splat(0.0);
-    const double v1 = 6.283185307179586 * parameters[5];
-    const double v2 = parameters[2] * parameters[3];
-    const V v3 = X2 + d2;
-    const double v4 = 0.5 * parameters[4];
-    const V v5 = X1 - parameters[0];
-    const V v6 = X3 - parameters[0];
-    const V v7 = d1 + v5;
-    const V v8 = X3 + d3;
-    const V v9 = d3 + v6;
-    const V v10 = v3 - X0;
-    const V v11 = v10 - d0;
-    const V v12 = 0.5 * v11;
-    const double v13 = 0.5 * parameters[1];
-    const V v14 = v8 - X1;
-    const V v15 = v14 - d1;
-    const V v16 = 0.5 * v15;
-    const V v17 = 2.5 * v15;
-    const V v18 = parameters[4] * v12;
-    const V v19 = v12 * v1;
-    const V v20 = v12 * v12;
-    const V v21 = v16 * v16;
-    const V v22 = parameters[6] * v12;
-    const V v23 = parameters[6] * v16;
-    const V v24 = v21 + v20;
-    const V v25 = v21 * v21;
-    const V v26 = v25 * v17;
-    const V v27 = v25 * v26;
-    const V v28 = v16 * v25;
-    const V v29 = v28 * v28;
-    const V v30 = v16 * v29;
-    const V v31 = softehl_vsqrt(v24);
-    const V v32 = parameters[6] * v31;
-    const V v33 = parameters[1] * v32;
-    const V v34 = v24 * v24;
-    const V v35 = 1.0 / v24;
-    const V v36 = 4.0 * v24;
-    const V v37 = softehl_vsqrt(v35);
-    const V v38 = 0.5 * v37;
-    const V v39 = v38 * v22;
-    const V v40 = v38 * v23;
-    const V v41 = v34 * v36;
-    const V v42 = v34 * v34;
-    const V v43 = 1.0 / v42;
-    const V v44 = v43 * v27;
-    const V v45 = v43 * v29;
-    const V v46 = v20 + v45;
-    const V v47 = v43 * v43;
-    const V v48 = v12 * v29;
-    const V v49 = v47 * v48;
-    const V v50 = v47 * v30;
-    const V v51 = v41 * v49;
-    const V v52 = v41 * v50;
-    const V v53 = v12 - v51;
-    const V v54 = v51 - v12;
-    const V v55 = softehl_vsqrt(v46);
-    const V v56 = 1.0 / v55;
-    const V v57 = 1.0 / v46;
-    const V v58 = softehl_vsqrt(v57);
-    const V v59 = 0.5 * v58;
-    const V v60 = v32 * v56;
-    const V v61 = v56 * v56;
-    const V v62 = v61 * v59;
-    const V v63 = 0.08333333333333333 * v56;
-    const V v64 = v54 * v62;
-    const V v65 = v62 * v53;
-    const V v66 = v44 - v52;
-    const V v67 = v62 * v66;
-    const V v68 = v52 - v44;
-    const V v69 = v62 * v68;
-    V s70 = softehl_splat(0.0);
-    V s71 = softehl_splat(0.0);
-    V s72 = softehl_splat(0.0);
-    V s73 = softehl_splat(0.0);
-    V s74 = softehl_splat(0.0);
-    V s75 = softehl_splat(0.0);
-    V s76 = softehl_splat(0.0);
-    V s77 = softehl_splat(0.0);
-    V s78 = softehl_splat(0.0);
-    V s79 = softehl_splat(0.0);
-    V s80 = softehl_splat(0.0);
-    V s81 = softehl_splat(0.0);
-    V s82 = softehl_splat(0.0);
-    V s83 = softehl_splat(0.0);
-    V s84 = softehl_splat(0.0);
-    V s85 = softehl_splat(0.0);
-    V s86 = softehl_splat(0.0);
-    V s87 = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[5], v2 = parameters[2] * parameters[3],
+        v3 = 0.5 * parameters[4];
+    const V v4 = d1 + (X1 - parameters[0]), v5 = d3 + (X3 - parameters[0]),
+        v6 = 0.5 * (X2 + d2 - X0 - d0);
+    const double v7 = 0.5 * parameters[1];
+    const V v8 = X3 + d3 - X1 - d1, v9 = 0.5 * v8, v10 = parameters[4] * v6, v11 = v6 * v1,
+        v12 = v6 * v6, v13 = v9 * v9, v14 = v13 + v12, v15 = v13 * v13, v16 = v9 * v15,
+        v17 = v16 * v16, v18 = softehl_vsqrt(v14), v19 = parameters[6] * v18,
+        v20 = parameters[1] * v19, v21 = v14 * v14, v22 = softehl_vsqrt(1.0 / v14), v23 = 0.5 * v22,
+        v24 = v23 * (parameters[6] * v6), v25 = v23 * (parameters[6] * v9), v26 = v21 * (4.0 * v14),
+        v27 = 1.0 / (v21 * v21), v28 = v27 * (v15 * (v15 * (2.5 * v8))), v29 = v12 + v27 * v17,
+        v30 = v27 * v27, v31 = v26 * (v30 * (v6 * v17)), v32 = v26 * (v30 * (v9 * v17)),
+        v33 = softehl_vsqrt(v29), v34 = 1.0 / v33, v35 = softehl_vsqrt(1.0 / v29), v36 = v19 * v34,
+        v37 = v34 * v34 * (0.5 * v35), v38 = 0.08333333333333333 * v34, v39 = (v31 - v6) * v37,
+        v40 = v37 * (v6 - v31), v41 = v37 * (v28 - v32), v42 = v37 * (v32 - v28);
+    V s43 = {0}, s44 = {0}, s45 = {0}, s46 = {0}, s47 = {0}, s48 = {0}, s49 = {0}, s50 = {0},
+        s51 = {0}, s52 = {0}, s53 = {0}, s54 = {0}, s55 = {0}, s56 = {0}, s57 = {0}, s58 = {0},
+        s59 = {0}, s60 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        const double v88 = 0.5 * w[0];
-        const V v89 = p0 * parameters[3];
-        const V v90 = -p0;
-        const V v91 = p0 * v16;
-        const double v92 = 0.5 - v88;
-        const double v93 = 0.5 + v88;
-        const V v94 = softehl_vexp(v89);
-        const M v95 = softehl_lt(softehl_splat(0.0), v90);
-        const V v96 = p0 * v19;
-        const V v97 = p1 * v56;
-        const V v98 = p1 * v32;
-        const V v99 = v92 * v7;
-        const V v100 = w[1] * v12;
-        const double v101 = v92 * w[1];
-        const double v102 = v93 * w[1];
-        const V v103 = v92 * v96;
-        const V v104 = v93 * v96;
-        const V v105 = 0.5 * v97;
-        const V v106 = v93 * v9;
-        const V v107 = v99 + v106;
-        const V v108 = v101 * v103;
-        s76 += v108;
-        const V v109 = v102 * v103;
-        s78 += v109;
-        const V v110 = v101 * v104;
-        s77 += v110;
-        const V v111 = v102 * v104;
-        s79 += v111;
-        const V v112 = 0.5 * v107;
-        const V v113 = 1.0 / v107;
-        const V v114 = parameters[0] + v107;
-        const V v115 = v112 * v97;
-        const V v116 = v112 * v98;
-        const V v117 = v114 * v1;
-        const V v118 = v117 * v116;
-        const V v119 = parameters[2] * v94;
-        const V v120 = parameters[1] * v119;
-        const V v121 = v120 * v113;
-        const V v122 = v113 * v121;
-        const V v123 = v122 + v105;
-        const V v124 = p0 * v117;
-        const V v125 = v115 - v121;
-        const V v126 = v121 - v115;
-        const V v127 = v32 * v117;
-        const V v128 = v32 * v126;
-        const V v129 = v91 - v128;
-        const V v130 = v123 * v127;
-        const V v131 = v1 * v129;
-        const V v132 = v131 + v130;
-        const V v133 = 0.5 * v124;
-        const V v134 = v100 * v124;
-        const V v135 = v64 * v118;
-        const V v136 = w[1] * v129;
-        const V v137 = v117 * v136;
-        const V v138 = v117 * v125;
-        const V v139 = v101 * v133;
-        s70 += v139;
-        const V v140 = v102 * v133;
-        s71 += v140;
-        const V v141 = v93 * v134;
-        s72 += v141;
-        const V v142 = v92 * v134;
-        s73 += v142;
-        const V v143 = v93 * v137;
-        s74 += v143;
-        const V v144 = v92 * v137;
-        s75 += v144;
-        const V v145 = v93 * v132;
-        const V v146 = v133 + v145;
-        const V v147 = v92 * v132;
-        const V v148 = v147 - v133;
-        const V v149 = v69 * v118;
-        const V v150 = v148 - v149;
-        const V v151 = v39 * v138;
-        const V v152 = v40 * v138;
-        const V v153 = v151 + v135;
-        const V v154 = v67 * v118;
-        const V v155 = v146 - v154;
-        const V v156 = v65 * v118;
-        const V v157 = v151 - v156;
-        const V v158 = v101 * v157;
-        s81 += v158;
-        const V v159 = v102 * v157;
-        s83 += v159;
-        const V v160 = v150 - v152;
-        const V v161 = v152 + v155;
-        const V v162 = v101 * v153;
-        s80 += v162;
-        const V v163 = v102 * v153;
-        s82 += v163;
-        const V v164 = v101 * v160;
-        s84 += v164;
-        const V v165 = v101 * v161;
-        s85 += v165;
-        const V v166 = v102 * v160;
-        s86 += v166;
-        const V v167 = v102 * v161;
-        s87 += v167;
-        V v168 = softehl_splat(0.0);
-        V v169 = softehl_splat(0.0);
-        V v170 = softehl_splat(0.0);
-        V v171 = softehl_splat(0.0);
-        const M m172 = v95;
-        if (softehl_any(m172)) {
-            const V v173 = p0 * v4;
-            const V v174 = w[1] * v18;
-            const V v175 = w[1] * v173;
-            const V v176 = -v174;
-            const V v177 = -v175;
-            v168 = softehl_blend(m172, v90, v168);
-            v169 = softehl_blend(m172, v175, v169);
-            v170 = softehl_blend(m172, v177, v170);
-            v171 = softehl_blend(m172, v176, v171);
+        (void)p0, (void)p1; const double v61 = 0.5 * w[0]; const V v62 = -p0;
+        const double v63 = 0.5 - v61, v64 = 0.5 + v61;
+        const V v65 = softehl_vexp(p0 * parameters[3]);
+        const M v66 = softehl_lt(softehl_splat(0.0), v62);
+        const V v67 = p0 * v11, v68 = p1 * v34;
+        const double v69 = v63 * w[1], v70 = v64 * w[1];
+        const V v71 = v63 * v67, v72 = v64 * v67, v73 = v63 * v4 + v64 * v5;
+        s49 += v69 * v71; s51 += v70 * v71; s50 += v69 * v72; s52 += v70 * v72;
+        const V v74 = 0.5 * v73, v75 = 1.0 / v73, v76 = v74 * v68, v77 = (parameters[0] + v73) * v1,
+            v78 = v77 * (v74 * (p1 * v19)), v79 = parameters[2] * v65,
+            v80 = parameters[1] * v79 * v75, v81 = p0 * v77, v82 = p0 * v9 - v19 * (v80 - v76),
+            v83 = v1 * v82 + (v75 * v80 + 0.5 * v68) * (v19 * v77), v84 = 0.5 * v81,
+            v85 = w[1] * v6 * v81, v86 = v77 * (w[1] * v82), v87 = v77 * (v76 - v80);
+        s43 += v69 * v84; s44 += v70 * v84; s45 += v64 * v85; s46 += v63 * v85; s47 += v64 * v86;
+        s48 += v63 * v86;
+        const V v88 = v24 * v87, v89 = v25 * v87, v90 = v88 + v39 * v78, v91 = v88 - v40 * v78;
+        s54 += v69 * v91; s56 += v70 * v91;
+        const V v92 = v63 * v83 - v84 - v42 * v78 - v89, v93 = v89 + (v84 + v64 * v83 - v41 * v78);
+        s53 += v69 * v90; s55 += v70 * v90; const V v94 = v69 * v92; s57 += v94;
+        const V v95 = v69 * v93; s58 += v95; const V v96 = v70 * v92; s59 += v96;
+        const V v97 = v70 * v93; s60 += v97;
+        V v98 = softehl_splat(0.0), v99 = softehl_splat(0.0), v100 = softehl_splat(0.0),
+            v101 = softehl_splat(0.0);
+        const M m102 = v66;
+        if (softehl_any(m102)) {
+            const V v103 = w[1] * (p0 * v3), v104 = -(w[1] * v10), v105 = -v103;
+            v98 = softehl_blend(m102, v62, v98); v99 = softehl_blend(m102, v103, v99);
+            v100 = softehl_blend(m102, v105, v100); v101 = softehl_blend(m102, v104, v101);
         }
-        const V v178 = 1.0 / v119;
-        const V v179 = v168 * v18;
-        const V v180 = 0.08333333333333333 * p1;
-        const V v181 = v94 * v2;
-        const V v182 = 0.08333333333333333 * v97;
-        const V v183 = v113 * v33;
-        const V v184 = w[1] * v179;
-        const V v185 = v181 * v183;
-        const V v186 = v16 - v185;
-        const V v187 = w[1] * v64;
-        const V v188 = w[1] * v65;
-        const V v189 = w[1] * v63;
-        const V v190 = v107 * v107;
-        const V v191 = v107 * v190;
-        const V v192 = parameters[1] * v112;
-        const V v193 = v112 * v60;
-        const V v194 = v12 * v117;
-        const V v195 = v117 * v186;
-        const V v196 = v117 * v193;
-        const V v197 = v178 * v180;
-        const V v198 = v178 * v189;
-        const V v199 = 3.0 * v178;
-        const V v200 = w[1] * v178;
-        const V v201 = v101 * v194;
-        const V v202 = v102 * v194;
-        const V v203 = v191 * v197;
-        const V v204 = v178 * v200;
-        const V v205 = v101 * v195;
-        const V v206 = v102 * v195;
-        const V v207 = v101 * v196;
-        const V v208 = v102 * v196;
-        const V v209 = -v201;
-        const V v210 = -v202;
-        const V v211 = v191 * v198;
-        const V v212 = v191 * v182;
-        const V v213 = v199 * v182;
-        const V v214 = v178 * v212;
-        const V v215 = v192 - v214;
-        const V v216 = v204 * v212;
-        const V v217 = -v211;
-        const V v218 = v190 * v213;
-        const V v219 = v13 - v218;
-        const V v220 = v203 * v187;
-        const V v221 = v203 * v188;
-        const V v222 = v203 * v69;
-        const V v223 = v203 * v67;
-        const V v224 = w[1] * v215;
-        const V v225 = v181 * v216;
-        const V v226 = v92 * v219;
-        const V v227 = v226 + v222;
-        const V v228 = v93 * v219;
-        const V v229 = v228 + v223;
-        const V v230 = w[1] * v227;
-        const V v231 = w[1] * v229;
+        const V v106 = 1.0 / v79, v107 = v65 * v2, v108 = 0.08333333333333333 * v68,
+            v109 = w[1] * (v98 * v10), v110 = v73 * v73, v111 = v73 * v110, v112 = v6 * v77,
+            v113 = v77 * (v9 - v107 * (v75 * v20)), v114 = v77 * (v74 * v36),
+            v115 = v111 * (v106 * (0.08333333333333333 * p1)), v116 = v69 * v113, v117 = v70 * v113,
+            v118 = v69 * v114, v119 = v70 * v114, v120 = -(v69 * v112), v121 = -(v70 * v112),
+            v122 = v111 * v108, v123 = -(v111 * (v106 * (w[1] * v38))),
+            v124 = v7 - v110 * (3.0 * v106 * v108), v125 = v115 * (w[1] * v39),
+            v126 = v115 * (w[1] * v40), v127 = w[1] * (parameters[1] * v74 - v106 * v122),
+            v128 = v107 * (v106 * (w[1] * v106) * v122), v129 = w[1] * (v63 * v124 + v115 * v42),
+            v130 = w[1] * (v64 * v124 + v115 * v41);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            const double N = B[2 * i], D = B[2 * i + 1];
-            (void)N, (void)D;
-            R_lanes[4 + i] += N * v184 + D * v224;
-            K_lanes[(4 + i) * (4 + modes) + 0] += N * v169 + D * v220;
-            K_lanes[0 * (4 + modes) + 4 + i] += N * v205 + D * v207;
-            K_lanes[(4 + i) * (4 + modes) + 1] += D * v230;
-            K_lanes[1 * (4 + modes) + 4 + i] += N * v209;
-            K_lanes[(4 + i) * (4 + modes) + 2] += N * v170 + D * v221;
-            K_lanes[2 * (4 + modes) + 4 + i] += N * v206 + D * v208;
-            K_lanes[(4 + i) * (4 + modes) + 3] += D * v231;
-            K_lanes[3 * (4 + modes) + 4 + i] += N * v210;
-            const V r0 = N * v171 + D * v225;
-            const V r1 = D * v217;
+            const double N = B[2 * i], D = B[2 * i + 1]; (void)N, (void)D;
+            R_lanes[4 + i] += N * v109 + D * v127;
+            K_lanes[(4 + i) * (4 + modes) + 0] += N * v99 + D * v125;
+            K_lanes[0 * (4 + modes) + 4 + i] += N * v116 + D * v118;
+            K_lanes[(4 + i) * (4 + modes) + 1] += D * v129;
+            K_lanes[1 * (4 + modes) + 4 + i] += N * v120;
+            K_lanes[(4 + i) * (4 + modes) + 2] += N * v100 + D * v126;
+            K_lanes[2 * (4 + modes) + 4 + i] += N * v117 + D * v119;
+            K_lanes[(4 + i) * (4 + modes) + 3] += D * v130;
+            K_lanes[3 * (4 + modes) + 4 + i] += N * v121;
+            const V r0 = N * v101 + D * v128, r1 = D * v123;
             for (ptrdiff_t j = 0; j < modes; ++j)
                 K_lanes[(4 + i) * (4 + modes) + 4 + j] += r0 * B[2 * j] + r1 * B[2 * j + 1];
         }
     }
-    const V v232 = -s70;
-    const V v233 = -s71;
-    const V v234 = -s72;
-    const V v235 = -s73;
-    const V v236 = -s76;
-    const V v237 = -s77;
-    const V v238 = -s78;
-    const V v239 = -s79;
-    const V v240 = -s80;
-    const V v241 = -s82;
-    R_lanes[0] = s75;
-    R_lanes[1] = v235;
-    R_lanes[2] = s74;
-    R_lanes[3] = v234;
-    K_lanes[0 * (4 + modes) + 0] = v240;
-    K_lanes[0 * (4 + modes) + 1] = s84;
-    K_lanes[0 * (4 + modes) + 2] = s81;
-    K_lanes[0 * (4 + modes) + 3] = s85;
-    K_lanes[1 * (4 + modes) + 0] = s70;
-    K_lanes[1 * (4 + modes) + 1] = v236;
-    K_lanes[1 * (4 + modes) + 2] = v232;
-    K_lanes[1 * (4 + modes) + 3] = v237;
-    K_lanes[2 * (4 + modes) + 0] = v241;
-    K_lanes[2 * (4 + modes) + 1] = s86;
-    K_lanes[2 * (4 + modes) + 2] = s83;
-    K_lanes[2 * (4 + modes) + 3] = s87;
-    K_lanes[3 * (4 + modes) + 0] = s71;
-    K_lanes[3 * (4 + modes) + 1] = v238;
-    K_lanes[3 * (4 + modes) + 2] = v233;
-    K_lanes[3 * (4 + modes) + 3] = v239;
+    const V v131 = -s43, v132 = -s44, v133 = -s45, v134 = -s46, v135 = -s49, v136 = -s50,
+        v137 = -s51, v138 = -s52, v139 = -s53, v140 = -s55;
+    R_lanes[0] = s48; R_lanes[1] = v134; R_lanes[2] = s47; R_lanes[3] = v133;
+    K_lanes[0 * (4 + modes) + 0] = v139; K_lanes[0 * (4 + modes) + 1] = s57;
+    K_lanes[0 * (4 + modes) + 2] = s54; K_lanes[0 * (4 + modes) + 3] = s58;
+    K_lanes[1 * (4 + modes) + 0] = s43; K_lanes[1 * (4 + modes) + 1] = v135;
+    K_lanes[1 * (4 + modes) + 2] = v131; K_lanes[1 * (4 + modes) + 3] = v136;
+    K_lanes[2 * (4 + modes) + 0] = v140; K_lanes[2 * (4 + modes) + 1] = s59;
+    K_lanes[2 * (4 + modes) + 2] = s56; K_lanes[2 * (4 + modes) + 3] = s60;
+    K_lanes[3 * (4 + modes) + 0] = s44; K_lanes[3 * (4 + modes) + 1] = v137;
+    K_lanes[3 * (4 + modes) + 2] = v132; K_lanes[3 * (4 + modes) + 3] = v138;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
     softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_tangent, 4, (4 + modes), 0, 0, (4 + modes), ((4 + modes) * (4 + modes)))
 
-void softehl_film_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_tangent_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (4 + modes) * e, tangent + ((4 + modes) * (4 + modes)) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), tangent + ((4 + modes) * (4 + modes)) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    double K[SOFTEHL_LANES * ((4 + modes) * (4 + modes))];
-    softehl_film_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_film_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -592,99 +227,27 @@ static void softehl_film_fields_group(
 #if SOFTEHL_LANES > 1
     softehl_gather(d_lanes, d, (4 + modes));
 #endif
-    const V v1 = X2 + d2;
-    const V v2 = X0 + d0;
-    const V v3 = X1 - parameters[0];
-    const V v4 = X3 - parameters[0];
-    const V v5 = v1 - X0;
-    const V v6 = v5 - d0;
-    const V v7 = X3 + d3;
-    const V v8 = 0.5 * v6;
-    const V v9 = d3 + v4;
-    const V v10 = v7 - X1;
-    const V v11 = d1 + v3;
-    const V v12 = v10 - d1;
-    const V v13 = 0.5 * v12;
-    const V v14 = v8 * v8;
-    const V v15 = v13 * v13;
-    const V v16 = v13 * v15;
-    const V v17 = v15 * v16;
-    const V v18 = v15 + v14;
-    const V v19 = v18 * v18;
-    const V v20 = v19 * v19;
-    const V v21 = 1.0 / v20;
-    const V v22 = v21 * v17;
-    const V v23 = v17 * v22;
-    const V v24 = v14 + v23;
-    const V v25 = softehl_vsqrt(v24);
-    const V v26 = 1.0 / v25;
+    const V v1 = X2 + d2, v2 = X0 + d0, v3 = 0.5 * (v1 - X0 - d0), v4 = d3 + (X3 - parameters[0]),
+        v5 = d1 + (X1 - parameters[0]), v6 = 0.5 * (X3 + d3 - X1 - d1), v7 = v3 * v3, v8 = v6 * v6,
+        v9 = v8 * (v6 * v8), v10 = v8 + v7, v11 = v10 * v10,
+        v12 = softehl_vsqrt(v7 + v9 * (1.0 / (v11 * v11) * v9)), v13 = 1.0 / v12;
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        const double v27 = 0.5 * w[0];
-        const V v28 = p0 * parameters[3];
-        const V v29 = softehl_vexp(v28);
-        const V v30 = p1 * v26;
-        const double v31 = 0.5 - v27;
-        const double v32 = 0.5 + v27;
-        const V v33 = w[1] * v8;
-        const V v34 = v32 * v1;
-        const V v35 = v32 * v9;
-        const V v36 = parameters[2] * v29;
-        const V v37 = v31 * v2;
-        const V v38 = v34 + v37;
-        const V v39 = v31 * v11;
-        const V v40 = v39 + v35;
-        const V v41 = 0.5 * v40;
-        const V v42 = 1.0 / v40;
-        const V v43 = 0.08333333333333333 * v40;
-        const V v44 = v40 * v43;
-        const V v45 = v40 * v44;
-        const V v46 = 1.0 / v36;
-        const V v47 = v46 * v45;
-        const V v48 = parameters[1] * v36;
-        const V v49 = v48 * v42;
-        const V v50 = parameters[1] * v41;
-        const V v51 = v41 * v30;
-        const V v52 = v47 * v30;
-        const V v53 = v50 - v52;
-        const V v54 = v49 - v51;
-        const V v55 = v49 + v51;
-        softehl_store4(R + 8 * q + 0, (8 * points), v38, v33, v40, p0);
-        softehl_store4(R + 8 * q + 4, (8 * points), v54, v53, v55, v36);
+        (void)p0, (void)p1; const double v14 = 0.5 * w[0];
+        const V v15 = softehl_vexp(p0 * parameters[3]), v16 = p1 * v13;
+        const double v17 = 0.5 - v14, v18 = 0.5 + v14;
+        const V v19 = w[1] * v3, v20 = parameters[2] * v15, v21 = v18 * v1 + v17 * v2,
+            v22 = v17 * v5 + v18 * v4, v23 = 0.5 * v22, v24 = parameters[1] * v20 * (1.0 / v22),
+            v25 = v23 * v16,
+            v26 = parameters[1] * v23 - 1.0 / v20 * (v22 * (v22 * (0.08333333333333333 * v22))) * v16,
+            v27 = v24 - v25, v28 = v24 + v25;
+        softehl_store4(R + 8 * q + 0, (8 * points), v21, v19, v22, p0);
+        softehl_store4(R + 8 * q + 4, (8 * points), v27, v26, v28, v20);
     }
 }
-
-void softehl_film_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_fields_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (8 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_fields_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (8 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double R[SOFTEHL_LANES * (8 * points)];
-    softehl_film_fields(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (8 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_fields, 4, (4 + modes), 0, 0, (8 * points), 0)

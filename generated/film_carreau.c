@@ -89,514 +89,109 @@ static void softehl_film_carreau_level_lanes(
     for (int step = 0; step < 50 && softehl_any(active); ++step) {
         M failed = softehl_mask(0), far = failed;
         V g[7], A[49], B[56];
-        const V v1 = s[6] * s[6];
-        const V v2 = 1.0 + v1;
-        const V v3 = softehl_vlog(v2);
-        const V v4 = p[4] * v3;
-        const V v5 = softehl_vexp(v4);
-        const V v6 = p[3] * v5;
-        const V v7 = p[0] + v6;
-        const V v8 = 1.0 / v7;
-        const V v9 = 0.08566224618958518 * s[6];
-        const V v10 = v9 * v8;
-        const V v11 = s[1] * s[1];
-        const V v12 = 1.0 + v11;
-        const V v13 = softehl_vlog(v12);
-        const V v14 = p[4] * v13;
-        const V v15 = softehl_vexp(v14);
-        const V v16 = p[3] * v15;
-        const V v17 = p[0] + v16;
-        const V v18 = 1.0 / v17;
-        const V v19 = 0.08566224618958518 * s[1];
-        const V v20 = v19 * v18;
-        const V v21 = v20 + v10;
-        const V v22 = s[2] * s[2];
-        const V v23 = 1.0 + v22;
-        const V v24 = softehl_vlog(v23);
-        const V v25 = p[4] * v24;
-        const V v26 = softehl_vexp(v25);
-        const V v27 = p[3] * v26;
-        const V v28 = p[0] + v27;
-        const V v29 = 1.0 / v28;
-        const V v30 = 0.1803807865240693 * s[2];
-        const V v31 = v30 * v29;
-        const V v32 = v31 + v21;
-        const V v33 = s[5] * s[5];
-        const V v34 = 1.0 + v33;
-        const V v35 = softehl_vlog(v34);
-        const V v36 = p[4] * v35;
-        const V v37 = softehl_vexp(v36);
-        const V v38 = p[3] * v37;
-        const V v39 = p[0] + v38;
-        const V v40 = 1.0 / v39;
-        const V v41 = 0.1803807865240693 * s[5];
-        const V v42 = v41 * v40;
-        const V v43 = v42 + v32;
-        const V v44 = s[3] * s[3];
-        const V v45 = 1.0 + v44;
-        const V v46 = softehl_vlog(v45);
-        const V v47 = p[4] * v46;
-        const V v48 = softehl_vexp(v47);
-        const V v49 = p[3] * v48;
-        const V v50 = p[0] + v49;
-        const V v51 = 1.0 / v50;
-        const V v52 = 0.23395696728634552 * s[3];
-        const V v53 = v52 * v51;
-        const V v54 = v53 + v43;
-        const V v55 = s[4] * s[4];
-        const V v56 = 1.0 + v55;
-        const V v57 = softehl_vlog(v56);
-        const V v58 = p[4] * v57;
-        const V v59 = softehl_vexp(v58);
-        const V v60 = p[3] * v59;
-        const V v61 = p[0] + v60;
-        const V v62 = 1.0 / v61;
-        const V v63 = 0.23395696728634552 * s[4];
-        const V v64 = v63 * v62;
-        const V v65 = v64 + v54;
-        const V v66 = v65 - p[1];
-        const V v67 = v17 * v17;
-        const V v68 = 1.0 / v67;
-        const V v69 = v11 * v68;
-        const V v70 = 1.0 + v69;
-        const V v71 = softehl_vlog(v70);
-        const V v72 = p[2] * v71;
-        const V v73 = softehl_vexp(v72);
-        const V v74 = p[3] * v73;
-        const V v75 = p[0] + v74;
-        const V v76 = s[1] * v75;
-        const V v77 = v18 * v76;
-        const V v78 = s[0] + p[5];
-        const V v79 = v77 - v78;
-        const V v80 = v28 * v28;
-        const V v81 = 1.0 / v80;
-        const V v82 = v22 * v81;
-        const V v83 = 1.0 + v82;
-        const V v84 = softehl_vlog(v83);
-        const V v85 = p[2] * v84;
-        const V v86 = softehl_vexp(v85);
-        const V v87 = p[3] * v86;
-        const V v88 = p[0] + v87;
-        const V v89 = s[2] * v88;
-        const V v90 = v29 * v89;
-        const V v91 = s[0] + p[6];
-        const V v92 = v90 - v91;
-        const V v93 = v50 * v50;
-        const V v94 = 1.0 / v93;
-        const V v95 = v44 * v94;
-        const V v96 = 1.0 + v95;
-        const V v97 = softehl_vlog(v96);
-        const V v98 = p[2] * v97;
-        const V v99 = softehl_vexp(v98);
-        const V v100 = p[3] * v99;
-        const V v101 = p[0] + v100;
-        const V v102 = s[3] * v101;
-        const V v103 = v51 * v102;
-        const V v104 = s[0] + p[7];
-        const V v105 = v103 - v104;
-        const V v106 = v61 * v61;
-        const V v107 = 1.0 / v106;
-        const V v108 = v55 * v107;
-        const V v109 = 1.0 + v108;
-        const V v110 = softehl_vlog(v109);
-        const V v111 = p[2] * v110;
-        const V v112 = softehl_vexp(v111);
-        const V v113 = p[3] * v112;
-        const V v114 = p[0] + v113;
-        const V v115 = s[4] * v114;
-        const V v116 = v62 * v115;
-        const V v117 = p[7] - s[0];
-        const V v118 = v117 + v116;
-        const V v119 = v39 * v39;
-        const V v120 = 1.0 / v119;
-        const V v121 = v33 * v120;
-        const V v122 = 1.0 + v121;
-        const V v123 = softehl_vlog(v122);
-        const V v124 = p[2] * v123;
-        const V v125 = softehl_vexp(v124);
-        const V v126 = p[3] * v125;
-        const V v127 = p[0] + v126;
-        const V v128 = s[5] * v127;
-        const V v129 = v40 * v128;
-        const V v130 = p[6] - s[0];
-        const V v131 = v130 + v129;
-        const V v132 = v7 * v7;
-        const V v133 = 1.0 / v132;
-        const V v134 = v1 * v133;
-        const V v135 = 1.0 + v134;
-        const V v136 = softehl_vlog(v135);
-        const V v137 = p[2] * v136;
-        const V v138 = softehl_vexp(v137);
-        const V v139 = p[3] * v138;
-        const V v140 = p[0] + v139;
-        const V v141 = s[6] * v140;
-        const V v142 = v8 * v141;
-        const V v143 = p[5] - s[0];
-        const V v144 = v143 + v142;
-        const V v145 = 2.0 * s[1];
-        const V v146 = p[4] * v145;
-        const V v147 = 1.0 / v12;
-        const V v148 = v147 * v146;
-        const V v149 = v18 * v18;
-        const V v150 = v19 * v149;
-        const V v151 = v16 * v150;
-        const V v152 = v151 * v148;
-        const V v153 = 0.08566224618958518 * v18;
-        const V v154 = v153 - v152;
-        const V v155 = 2.0 * s[2];
-        const V v156 = p[4] * v155;
-        const V v157 = 1.0 / v23;
-        const V v158 = v157 * v156;
-        const V v159 = v29 * v29;
-        const V v160 = v30 * v159;
-        const V v161 = v27 * v160;
-        const V v162 = v161 * v158;
-        const V v163 = 0.1803807865240693 * v29;
-        const V v164 = v163 - v162;
-        const V v165 = 2.0 * s[3];
-        const V v166 = p[4] * v165;
-        const V v167 = 1.0 / v45;
-        const V v168 = v167 * v166;
-        const V v169 = v51 * v51;
-        const V v170 = v52 * v169;
-        const V v171 = v49 * v170;
-        const V v172 = v171 * v168;
-        const V v173 = 0.23395696728634552 * v51;
-        const V v174 = v173 - v172;
-        const V v175 = 2.0 * s[4];
-        const V v176 = p[4] * v175;
-        const V v177 = 1.0 / v56;
-        const V v178 = v177 * v176;
-        const V v179 = v62 * v62;
-        const V v180 = v63 * v179;
-        const V v181 = v60 * v180;
-        const V v182 = v181 * v178;
-        const V v183 = 0.23395696728634552 * v62;
-        const V v184 = v183 - v182;
-        const V v185 = 2.0 * s[5];
-        const V v186 = p[4] * v185;
-        const V v187 = 1.0 / v34;
-        const V v188 = v187 * v186;
-        const V v189 = v40 * v40;
-        const V v190 = v41 * v189;
-        const V v191 = v38 * v190;
-        const V v192 = v191 * v188;
-        const V v193 = 0.1803807865240693 * v40;
-        const V v194 = v193 - v192;
-        const V v195 = 2.0 * s[6];
-        const V v196 = p[4] * v195;
-        const V v197 = 1.0 / v2;
-        const V v198 = v197 * v196;
-        const V v199 = v8 * v8;
-        const V v200 = v9 * v199;
-        const V v201 = v6 * v200;
-        const V v202 = v201 * v198;
-        const V v203 = 0.08566224618958518 * v8;
-        const V v204 = v203 - v202;
-        const V v205 = 2.0 * v11;
-        const V v206 = v17 * v205;
-        const V v207 = v68 * v206;
-        const V v208 = v68 * v207;
-        const V v209 = 1.0 / v70;
-        const V v210 = p[2] * v209;
-        const V v211 = s[1] * v18;
-        const V v212 = v74 * v211;
-        const V v213 = v212 * v210;
-        const V v214 = v213 * v208;
-        const V v215 = v76 * v149;
-        const V v216 = v215 + v214;
-        const V v217 = v16 * v216;
-        const V v218 = p[4] * v147;
-        const V v219 = v218 * v217;
-        const V v220 = v68 * v213;
-        const V v221 = v220 - v219;
-        const V v222 = v145 * v221;
-        const V v223 = v18 * v75;
-        const V v224 = v223 + v222;
-        const V v225 = 2.0 * v22;
-        const V v226 = v28 * v225;
-        const V v227 = v81 * v226;
-        const V v228 = v81 * v227;
-        const V v229 = 1.0 / v83;
-        const V v230 = p[2] * v229;
-        const V v231 = s[2] * v29;
-        const V v232 = v87 * v231;
-        const V v233 = v232 * v230;
-        const V v234 = v233 * v228;
-        const V v235 = v89 * v159;
-        const V v236 = v235 + v234;
-        const V v237 = v27 * v236;
-        const V v238 = p[4] * v157;
-        const V v239 = v238 * v237;
-        const V v240 = v81 * v233;
-        const V v241 = v240 - v239;
-        const V v242 = v155 * v241;
-        const V v243 = v29 * v88;
-        const V v244 = v243 + v242;
-        const V v245 = 2.0 * v44;
-        const V v246 = v50 * v245;
-        const V v247 = v94 * v246;
-        const V v248 = v94 * v247;
-        const V v249 = 1.0 / v96;
-        const V v250 = p[2] * v249;
-        const V v251 = s[3] * v51;
-        const V v252 = v100 * v251;
-        const V v253 = v252 * v250;
-        const V v254 = v253 * v248;
-        const V v255 = v102 * v169;
-        const V v256 = v255 + v254;
-        const V v257 = v49 * v256;
-        const V v258 = p[4] * v167;
-        const V v259 = v258 * v257;
-        const V v260 = v94 * v253;
-        const V v261 = v260 - v259;
-        const V v262 = v165 * v261;
-        const V v263 = v51 * v101;
-        const V v264 = v263 + v262;
-        const V v265 = 2.0 * v55;
-        const V v266 = v61 * v265;
-        const V v267 = v107 * v266;
-        const V v268 = v107 * v267;
-        const V v269 = 1.0 / v109;
-        const V v270 = p[2] * v269;
-        const V v271 = s[4] * v62;
-        const V v272 = v113 * v271;
-        const V v273 = v272 * v270;
-        const V v274 = v273 * v268;
-        const V v275 = v115 * v179;
-        const V v276 = v275 + v274;
-        const V v277 = v60 * v276;
-        const V v278 = p[4] * v177;
-        const V v279 = v278 * v277;
-        const V v280 = v107 * v273;
-        const V v281 = v280 - v279;
-        const V v282 = v175 * v281;
-        const V v283 = v62 * v114;
-        const V v284 = v283 + v282;
-        const V v285 = 2.0 * v33;
-        const V v286 = v39 * v285;
-        const V v287 = v120 * v286;
-        const V v288 = v120 * v287;
-        const V v289 = 1.0 / v122;
-        const V v290 = p[2] * v289;
-        const V v291 = s[5] * v40;
-        const V v292 = v126 * v291;
-        const V v293 = v292 * v290;
-        const V v294 = v293 * v288;
-        const V v295 = v128 * v189;
-        const V v296 = v295 + v294;
-        const V v297 = v38 * v296;
-        const V v298 = p[4] * v187;
-        const V v299 = v298 * v297;
-        const V v300 = v120 * v293;
-        const V v301 = v300 - v299;
-        const V v302 = v185 * v301;
-        const V v303 = v40 * v127;
-        const V v304 = v303 + v302;
-        const V v305 = 2.0 * v1;
-        const V v306 = v7 * v305;
-        const V v307 = v133 * v306;
-        const V v308 = v133 * v307;
-        const V v309 = 1.0 / v135;
-        const V v310 = p[2] * v309;
-        const V v311 = s[6] * v8;
-        const V v312 = v139 * v311;
-        const V v313 = v312 * v310;
-        const V v314 = v313 * v308;
-        const V v315 = v141 * v199;
-        const V v316 = v315 + v314;
-        const V v317 = v6 * v316;
-        const V v318 = p[4] * v197;
-        const V v319 = v318 * v317;
-        const V v320 = v133 * v313;
-        const V v321 = v320 - v319;
-        const V v322 = v195 * v321;
-        const V v323 = v8 * v140;
-        const V v324 = v323 + v322;
-        const V v325 = v180 + v170;
-        const V v326 = v325 + v190;
-        const V v327 = v326 + v160;
-        const V v328 = v327 + v200;
-        const V v329 = v328 + v150;
-        const V v330 = -v329;
-        const V v331 = v48 * v170;
-        const V v332 = v59 * v180;
-        const V v333 = v332 + v331;
-        const V v334 = v37 * v190;
-        const V v335 = v333 + v334;
-        const V v336 = v26 * v160;
-        const V v337 = v335 + v336;
-        const V v338 = v5 * v200;
-        const V v339 = v337 + v338;
-        const V v340 = v15 * v150;
-        const V v341 = v339 + v340;
-        const V v342 = -v341;
-        const V v343 = v46 * v171;
-        const V v344 = v57 * v181;
-        const V v345 = v344 + v343;
-        const V v346 = v35 * v191;
-        const V v347 = v345 + v346;
-        const V v348 = v24 * v161;
-        const V v349 = v347 + v348;
-        const V v350 = v3 * v201;
-        const V v351 = v349 + v350;
-        const V v352 = v13 * v151;
-        const V v353 = v351 + v352;
-        const V v354 = -v353;
-        const V v355 = v211 - v216;
-        const V v356 = v71 * v212;
-        const V v357 = v15 * v216;
-        const V v358 = v73 * v211;
-        const V v359 = v358 - v357;
-        const V v360 = v13 * v217;
-        const V v361 = -v360;
-        const V v362 = v231 - v236;
-        const V v363 = v84 * v232;
-        const V v364 = v26 * v236;
-        const V v365 = v86 * v231;
-        const V v366 = v365 - v364;
-        const V v367 = v24 * v237;
-        const V v368 = -v367;
-        const V v369 = v251 - v256;
-        const V v370 = v97 * v252;
-        const V v371 = v48 * v256;
-        const V v372 = v99 * v251;
-        const V v373 = v372 - v371;
-        const V v374 = v46 * v257;
-        const V v375 = -v374;
-        const V v376 = v271 - v276;
-        const V v377 = v110 * v272;
-        const V v378 = v59 * v276;
-        const V v379 = v112 * v271;
-        const V v380 = v379 - v378;
-        const V v381 = v57 * v277;
-        const V v382 = -v381;
-        const V v383 = v291 - v296;
-        const V v384 = v123 * v292;
-        const V v385 = v37 * v296;
-        const V v386 = v125 * v291;
-        const V v387 = v386 - v385;
-        const V v388 = v35 * v297;
-        const V v389 = -v388;
-        const V v390 = v311 - v316;
-        const V v391 = v136 * v312;
-        const V v392 = v5 * v316;
-        const V v393 = v138 * v311;
-        const V v394 = v393 - v392;
-        const V v395 = v3 * v317;
-        const V v396 = -v395;
-        g[0] = v66;
-        g[1] = v79;
-        g[2] = v92;
-        g[3] = v105;
-        g[4] = v118;
-        g[5] = v131;
-        g[6] = v144;
-        A[0] = softehl_splat(0.0);
-        A[1] = v154;
-        A[2] = v164;
-        A[3] = v174;
-        A[4] = v184;
-        A[5] = v194;
-        A[6] = v204;
-        A[7] = softehl_splat((-1.0));
-        A[8] = v224;
-        A[9] = softehl_splat(0.0);
-        A[10] = softehl_splat(0.0);
-        A[11] = softehl_splat(0.0);
-        A[12] = softehl_splat(0.0);
-        A[13] = softehl_splat(0.0);
-        A[14] = softehl_splat((-1.0));
-        A[15] = softehl_splat(0.0);
-        A[16] = v244;
-        A[17] = softehl_splat(0.0);
-        A[18] = softehl_splat(0.0);
-        A[19] = softehl_splat(0.0);
-        A[20] = softehl_splat(0.0);
-        A[21] = softehl_splat((-1.0));
-        A[22] = softehl_splat(0.0);
-        A[23] = softehl_splat(0.0);
-        A[24] = v264;
-        A[25] = softehl_splat(0.0);
-        A[26] = softehl_splat(0.0);
-        A[27] = softehl_splat(0.0);
-        A[28] = softehl_splat((-1.0));
-        A[29] = softehl_splat(0.0);
-        A[30] = softehl_splat(0.0);
-        A[31] = softehl_splat(0.0);
-        A[32] = v284;
-        A[33] = softehl_splat(0.0);
-        A[34] = softehl_splat(0.0);
-        A[35] = softehl_splat((-1.0));
-        A[36] = softehl_splat(0.0);
-        A[37] = softehl_splat(0.0);
-        A[38] = softehl_splat(0.0);
-        A[39] = softehl_splat(0.0);
-        A[40] = v304;
-        A[41] = softehl_splat(0.0);
-        A[42] = softehl_splat((-1.0));
-        A[43] = softehl_splat(0.0);
-        A[44] = softehl_splat(0.0);
-        A[45] = softehl_splat(0.0);
-        A[46] = softehl_splat(0.0);
-        A[47] = softehl_splat(0.0);
-        A[48] = v324;
-        B[0] = v330;
-        B[1] = softehl_splat((-1.0));
-        B[2] = softehl_splat(0.0);
-        B[3] = v342;
-        B[4] = v354;
-        B[5] = softehl_splat(0.0);
-        B[6] = softehl_splat(0.0);
-        B[7] = softehl_splat(0.0);
-        B[8] = v355;
-        B[9] = softehl_splat(0.0);
-        B[10] = v356;
-        B[11] = v359;
-        B[12] = v361;
-        B[13] = softehl_splat((-1.0));
-        B[14] = softehl_splat(0.0);
-        B[15] = softehl_splat(0.0);
-        B[16] = v362;
-        B[17] = softehl_splat(0.0);
-        B[18] = v363;
-        B[19] = v366;
-        B[20] = v368;
-        B[21] = softehl_splat(0.0);
-        B[22] = softehl_splat((-1.0));
-        B[23] = softehl_splat(0.0);
-        B[24] = v369;
-        B[25] = softehl_splat(0.0);
-        B[26] = v370;
-        B[27] = v373;
-        B[28] = v375;
-        B[29] = softehl_splat(0.0);
-        B[30] = softehl_splat(0.0);
-        B[31] = softehl_splat((-1.0));
-        B[32] = v376;
-        B[33] = softehl_splat(0.0);
-        B[34] = v377;
-        B[35] = v380;
-        B[36] = v382;
-        B[37] = softehl_splat(0.0);
-        B[38] = softehl_splat(0.0);
-        B[39] = softehl_splat(1.0);
-        B[40] = v383;
-        B[41] = softehl_splat(0.0);
-        B[42] = v384;
-        B[43] = v387;
-        B[44] = v389;
-        B[45] = softehl_splat(0.0);
-        B[46] = softehl_splat(1.0);
-        B[47] = softehl_splat(0.0);
-        B[48] = v390;
-        B[49] = softehl_splat(0.0);
-        B[50] = v391;
-        B[51] = v394;
-        B[52] = v396;
-        B[53] = softehl_splat(1.0);
-        B[54] = softehl_splat(0.0);
-        B[55] = softehl_splat(0.0);
+        const V v1 = s[6] * s[6], v2 = 1.0 + v1, v3 = softehl_vlog(v2),
+            v4 = softehl_vexp(p[4] * v3), v5 = p[3] * v4, v6 = p[0] + v5, v7 = 1.0 / v6,
+            v8 = 0.08566224618958518 * s[6], v9 = s[1] * s[1], v10 = 1.0 + v9,
+            v11 = softehl_vlog(v10), v12 = softehl_vexp(p[4] * v11), v13 = p[3] * v12,
+            v14 = p[0] + v13, v15 = 1.0 / v14, v16 = 0.08566224618958518 * s[1], v17 = s[2] * s[2],
+            v18 = 1.0 + v17, v19 = softehl_vlog(v18), v20 = softehl_vexp(p[4] * v19),
+            v21 = p[3] * v20, v22 = p[0] + v21, v23 = 1.0 / v22, v24 = 0.1803807865240693 * s[2],
+            v25 = s[5] * s[5], v26 = 1.0 + v25, v27 = softehl_vlog(v26),
+            v28 = softehl_vexp(p[4] * v27), v29 = p[3] * v28, v30 = p[0] + v29, v31 = 1.0 / v30,
+            v32 = 0.1803807865240693 * s[5], v33 = s[3] * s[3], v34 = 1.0 + v33,
+            v35 = softehl_vlog(v34), v36 = softehl_vexp(p[4] * v35), v37 = p[3] * v36,
+            v38 = p[0] + v37, v39 = 1.0 / v38, v40 = 0.23395696728634552 * s[3], v41 = s[4] * s[4],
+            v42 = 1.0 + v41, v43 = softehl_vlog(v42), v44 = softehl_vexp(p[4] * v43),
+            v45 = p[3] * v44, v46 = p[0] + v45, v47 = 1.0 / v46, v48 = 0.23395696728634552 * s[4],
+            v49 = v48 * v47 + (v40 * v39 + (v32 * v31 + (v24 * v23 + (v16 * v15 + v8 * v7)))),
+            v50 = v49 - p[1], v51 = 1.0 / (v14 * v14), v52 = 1.0 + v9 * v51,
+            v53 = softehl_vlog(v52), v54 = softehl_vexp(p[2] * v53), v55 = p[3] * v54,
+            v56 = p[0] + v55, v57 = s[1] * v56, v58 = v15 * v57 - (s[0] + p[5]),
+            v59 = 1.0 / (v22 * v22), v60 = 1.0 + v17 * v59, v61 = softehl_vlog(v60),
+            v62 = softehl_vexp(p[2] * v61), v63 = p[3] * v62, v64 = p[0] + v63, v65 = s[2] * v64,
+            v66 = v23 * v65 - (s[0] + p[6]), v67 = 1.0 / (v38 * v38), v68 = 1.0 + v33 * v67,
+            v69 = softehl_vlog(v68), v70 = softehl_vexp(p[2] * v69), v71 = p[3] * v70,
+            v72 = p[0] + v71, v73 = s[3] * v72, v74 = v39 * v73 - (s[0] + p[7]),
+            v75 = 1.0 / (v46 * v46), v76 = 1.0 + v41 * v75, v77 = softehl_vlog(v76),
+            v78 = softehl_vexp(p[2] * v77), v79 = p[3] * v78, v80 = p[0] + v79, v81 = s[4] * v80,
+            v82 = p[7] - s[0] + v47 * v81, v83 = 1.0 / (v30 * v30), v84 = 1.0 + v25 * v83,
+            v85 = softehl_vlog(v84), v86 = softehl_vexp(p[2] * v85), v87 = p[3] * v86,
+            v88 = p[0] + v87, v89 = s[5] * v88, v90 = p[6] - s[0] + v31 * v89,
+            v91 = 1.0 / (v6 * v6), v92 = 1.0 + v1 * v91, v93 = softehl_vlog(v92),
+            v94 = softehl_vexp(p[2] * v93), v95 = p[3] * v94, v96 = p[0] + v95, v97 = s[6] * v96,
+            v98 = p[5] - s[0] + v7 * v97, v99 = 2.0 * s[1], v100 = 1.0 / v10, v101 = v15 * v15,
+            v102 = v16 * v101, v103 = v13 * v102,
+            v104 = 0.08566224618958518 * v15 - v103 * (v100 * (p[4] * v99)), v105 = 2.0 * s[2],
+            v106 = 1.0 / v18, v107 = v23 * v23, v108 = v24 * v107, v109 = v21 * v108,
+            v110 = 0.1803807865240693 * v23 - v109 * (v106 * (p[4] * v105)), v111 = 2.0 * s[3],
+            v112 = 1.0 / v34, v113 = v39 * v39, v114 = v40 * v113, v115 = v37 * v114,
+            v116 = 0.23395696728634552 * v39 - v115 * (v112 * (p[4] * v111)), v117 = 2.0 * s[4],
+            v118 = 1.0 / v42, v119 = v47 * v47, v120 = v48 * v119, v121 = v45 * v120,
+            v122 = 0.23395696728634552 * v47 - v121 * (v118 * (p[4] * v117)), v123 = 2.0 * s[5],
+            v124 = 1.0 / v26, v125 = v31 * v31, v126 = v32 * v125, v127 = v29 * v126,
+            v128 = 0.1803807865240693 * v31 - v127 * (v124 * (p[4] * v123)), v129 = 2.0 * s[6],
+            v130 = 1.0 / v2, v131 = v7 * v7, v132 = v8 * v131, v133 = v5 * v132,
+            v134 = 0.08566224618958518 * v7 - v133 * (v130 * (p[4] * v129)), v135 = s[1] * v15,
+            v136 = v55 * v135, v137 = v136 * (p[2] * (1.0 / v52)),
+            v138 = v57 * v101 + v137 * (v51 * (v51 * (v14 * (2.0 * v9)))), v139 = v13 * v138,
+            v140 = v15 * v56 + v99 * (v51 * v137 - p[4] * v100 * v139), v141 = s[2] * v23,
+            v142 = v63 * v141, v143 = v142 * (p[2] * (1.0 / v60)),
+            v144 = v65 * v107 + v143 * (v59 * (v59 * (v22 * (2.0 * v17)))), v145 = v21 * v144,
+            v146 = v23 * v64 + v105 * (v59 * v143 - p[4] * v106 * v145), v147 = s[3] * v39,
+            v148 = v71 * v147, v149 = v148 * (p[2] * (1.0 / v68)),
+            v150 = v73 * v113 + v149 * (v67 * (v67 * (v38 * (2.0 * v33)))), v151 = v37 * v150,
+            v152 = v39 * v72 + v111 * (v67 * v149 - p[4] * v112 * v151), v153 = s[4] * v47,
+            v154 = v79 * v153, v155 = v154 * (p[2] * (1.0 / v76)),
+            v156 = v81 * v119 + v155 * (v75 * (v75 * (v46 * (2.0 * v41)))), v157 = v45 * v156,
+            v158 = v47 * v80 + v117 * (v75 * v155 - p[4] * v118 * v157), v159 = s[5] * v31,
+            v160 = v87 * v159, v161 = v160 * (p[2] * (1.0 / v84)),
+            v162 = v89 * v125 + v161 * (v83 * (v83 * (v30 * (2.0 * v25)))), v163 = v29 * v162,
+            v164 = v31 * v88 + v123 * (v83 * v161 - p[4] * v124 * v163), v165 = s[6] * v7,
+            v166 = v95 * v165, v167 = v166 * (p[2] * (1.0 / v92)),
+            v168 = v97 * v131 + v167 * (v91 * (v91 * (v6 * (2.0 * v1)))), v169 = v5 * v168,
+            v170 = v7 * v96 + v129 * (v91 * v167 - p[4] * v130 * v169),
+            v171 = -(v120 + v114 + v126 + v108 + v132 + v102),
+            v172 = v44 * v120 + v36 * v114 + v28 * v126 + v20 * v108 + v4 * v132 + v12 * v102,
+            v173 = -v172,
+            v174 = v43 * v121 + v35 * v115 + v27 * v127 + v19 * v109 + v3 * v133 + v11 * v103,
+            v175 = -v174, v176 = v135 - v138, v177 = v53 * v136, v178 = v54 * v135 - v12 * v138,
+            v179 = -(v11 * v139), v180 = v141 - v144, v181 = v61 * v142,
+            v182 = v62 * v141 - v20 * v144, v183 = -(v19 * v145), v184 = v147 - v150,
+            v185 = v69 * v148, v186 = v70 * v147 - v36 * v150, v187 = -(v35 * v151),
+            v188 = v153 - v156, v189 = v77 * v154, v190 = v78 * v153 - v44 * v156,
+            v191 = -(v43 * v157), v192 = v159 - v162, v193 = v85 * v160,
+            v194 = v86 * v159 - v28 * v162, v195 = -(v27 * v163), v196 = v165 - v168,
+            v197 = v93 * v166, v198 = v94 * v165 - v4 * v168, v199 = -(v3 * v169);
+        g[0] = v50; g[1] = v58; g[2] = v66; g[3] = v74; g[4] = v82; g[5] = v90; g[6] = v98;
+        A[0] = softehl_splat(0.0); A[1] = v104; A[2] = v110; A[3] = v116; A[4] = v122; A[5] = v128;
+        A[6] = v134; A[7] = softehl_splat((-1.0)); A[8] = v140; A[9] = softehl_splat(0.0);
+        A[10] = softehl_splat(0.0); A[11] = softehl_splat(0.0); A[12] = softehl_splat(0.0);
+        A[13] = softehl_splat(0.0); A[14] = softehl_splat((-1.0)); A[15] = softehl_splat(0.0);
+        A[16] = v146; A[17] = softehl_splat(0.0); A[18] = softehl_splat(0.0);
+        A[19] = softehl_splat(0.0); A[20] = softehl_splat(0.0); A[21] = softehl_splat((-1.0));
+        A[22] = softehl_splat(0.0); A[23] = softehl_splat(0.0); A[24] = v152;
+        A[25] = softehl_splat(0.0); A[26] = softehl_splat(0.0); A[27] = softehl_splat(0.0);
+        A[28] = softehl_splat((-1.0)); A[29] = softehl_splat(0.0); A[30] = softehl_splat(0.0);
+        A[31] = softehl_splat(0.0); A[32] = v158; A[33] = softehl_splat(0.0);
+        A[34] = softehl_splat(0.0); A[35] = softehl_splat((-1.0)); A[36] = softehl_splat(0.0);
+        A[37] = softehl_splat(0.0); A[38] = softehl_splat(0.0); A[39] = softehl_splat(0.0);
+        A[40] = v164; A[41] = softehl_splat(0.0); A[42] = softehl_splat((-1.0));
+        A[43] = softehl_splat(0.0); A[44] = softehl_splat(0.0); A[45] = softehl_splat(0.0);
+        A[46] = softehl_splat(0.0); A[47] = softehl_splat(0.0); A[48] = v170; B[0] = v171;
+        B[1] = softehl_splat((-1.0)); B[2] = softehl_splat(0.0); B[3] = v173; B[4] = v175;
+        B[5] = softehl_splat(0.0); B[6] = softehl_splat(0.0); B[7] = softehl_splat(0.0);
+        B[8] = v176; B[9] = softehl_splat(0.0); B[10] = v177; B[11] = v178; B[12] = v179;
+        B[13] = softehl_splat((-1.0)); B[14] = softehl_splat(0.0); B[15] = softehl_splat(0.0);
+        B[16] = v180; B[17] = softehl_splat(0.0); B[18] = v181; B[19] = v182; B[20] = v183;
+        B[21] = softehl_splat(0.0); B[22] = softehl_splat((-1.0)); B[23] = softehl_splat(0.0);
+        B[24] = v184; B[25] = softehl_splat(0.0); B[26] = v185; B[27] = v186; B[28] = v187;
+        B[29] = softehl_splat(0.0); B[30] = softehl_splat(0.0); B[31] = softehl_splat((-1.0));
+        B[32] = v188; B[33] = softehl_splat(0.0); B[34] = v189; B[35] = v190; B[36] = v191;
+        B[37] = softehl_splat(0.0); B[38] = softehl_splat(0.0); B[39] = softehl_splat(1.0);
+        B[40] = v192; B[41] = softehl_splat(0.0); B[42] = v193; B[43] = v194; B[44] = v195;
+        B[45] = softehl_splat(0.0); B[46] = softehl_splat(1.0); B[47] = softehl_splat(0.0);
+        B[48] = v196; B[49] = softehl_splat(0.0); B[50] = v197; B[51] = v198; B[52] = v199;
+        B[53] = softehl_splat(1.0); B[54] = softehl_splat(0.0); B[55] = softehl_splat(0.0);
         V felt[7];
         for (int k = 0; k < 7; ++k) felt[k] = softehl_splat(0.0);
         for (int i = 0; i < 7; ++i) {
@@ -636,20 +231,14 @@ static void softehl_film_carreau_inverse_7_lanes(
     *lost |= spoilt;
 }
 
-static void softehl_film_carreau_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_carreau_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -665,206 +254,61 @@ static void softehl_film_carreau_residual_group(
 #endif
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
-    const double v1 = 6.283185307179586 * parameters[5];
-    const double v2 = 1.0 - parameters[9];
-    const V v3 = X2 + d2;
-    const double v4 = 1.0 / parameters[7];
-    const double v5 = 0.5 * parameters[7];
-    const V v6 = X1 - parameters[0];
-    const V v7 = X3 - parameters[0];
-    const double v8 = 1.0 / parameters[8];
-    const V v9 = v3 - X0;
-    const double v10 = parameters[8] - 1.0;
-    const V v11 = X3 + d3;
-    const V v12 = d3 + v7;
-    const V v13 = v9 - d0;
-    const double v14 = 0.5 * v10;
-    const V v15 = 0.5 * v13;
-    const V v16 = d1 + v6;
-    const V v17 = v11 - X1;
-    const V v18 = v17 - d1;
-    const V v19 = 0.5 * v18;
-    const double v20 = v8 * v14;
-    const V v21 = parameters[4] * v15;
-    const V v22 = v15 * v15;
-    const V v23 = v19 * v19;
-    const V v24 = v19 * v23;
-    const V v25 = v23 * v24;
-    const V v26 = v23 + v22;
-    const V v27 = softehl_vsqrt(v26);
-    const V v28 = v26 * v26;
-    const V v29 = v28 * v28;
-    const V v30 = 1.0 / v29;
-    const V v31 = parameters[6] * v27;
-    const V v32 = v30 * v25;
-    const V v33 = v25 * v32;
-    const V v34 = v22 + v33;
-    const V v35 = softehl_vsqrt(v34);
-    const V v36 = 1.0 / v35;
-    V s37 = softehl_splat(0.0);
-    V s38 = softehl_splat(0.0);
-    V s39 = softehl_splat(0.0);
-    V s40 = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[5], v2 = 1.0 - parameters[9],
+        v3 = 1.0 / parameters[7], v4 = 0.5 * parameters[7];
+    const V v5 = d3 + (X3 - parameters[0]); const double v6 = 0.5 * (parameters[8] - 1.0);
+    const V v7 = 0.5 * (X2 + d2 - X0 - d0), v8 = d1 + (X1 - parameters[0]),
+        v9 = 0.5 * (X3 + d3 - X1 - d1);
+    const double v10 = 1.0 / parameters[8] * v6;
+    const V v11 = parameters[4] * v7, v12 = v7 * v7, v13 = v9 * v9, v14 = v13 * (v9 * v13),
+        v15 = v13 + v12, v16 = softehl_vsqrt(v15), v17 = v15 * v15, v18 = parameters[6] * v16,
+        v19 = softehl_vsqrt(v12 + v14 * (1.0 / (v17 * v17) * v14)), v20 = 1.0 / v19;
+    V s21 = {0}, s22 = {0}, s23 = {0}, s24 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
         (void)p0, (void)p1;
-        const double v41 = 0.5 * w[0];
-        const V v42 = p1 * v36;
-        const double v43 = 0.5 - v41;
-        const double v44 = 0.5 + v41;
-        const V v45 = p0 * parameters[3];
-        const V v46 = p0 * v15;
-        const V v47 = softehl_vexp(v45);
-        const V v48 = w[1] * v46;
-        const V v49 = v43 * v16;
-        const V v50 = v44 * v12;
-        const V v51 = v49 + v50;
-        const V v52 = parameters[0] + v51;
-        const V v53 = 0.5 * v51;
-        const V v54 = parameters[7] * v51;
-        const V v55 = v53 * v42;
-        const V v56 = parameters[2] * v47;
-        const V v57 = parameters[1] * v56;
-        const V v58 = 1.0 / v54;
-        const V v59 = v57 * v58;
-        const V v60 = v52 * v1;
-        const V v61 = v48 * v60;
-        const V v62 = v4 * v55;
-        const V v63 = v59 * v59;
-        const V v64 = 1.0 + v63;
-        const V v65 = softehl_vlog(v64);
-        const V v66 = v65 * v14;
-        const V v67 = softehl_vexp(v66);
-        const V v68 = v2 * v67;
-        const V v69 = parameters[9] + v68;
-        const V v70 = v59 * v69;
-        const V v71 = v44 * v61;
-        s37 += v71;
-        const V v72 = v43 * v61;
-        s38 += v72;
-        const V v73 = 0.932469514203152 * v62;
-        const V v74 = 0.6612093864662645 * v62;
-        const V v75 = 0.2386191860831969 * v62;
-        const V v76 = v73 + v70;
-        const V v77 = v74 + v70;
-        const V v78 = v75 + v70;
-        const V v79 = v70 - v75;
-        const V v80 = v70 - v74;
-        const V v81 = v70 - v73;
-        V v82[7];
-        softehl_film_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[9]), v59, softehl_splat(v14), softehl_splat(v2), softehl_splat(v20), v73, v74, v75, v70, v76, v77, v78, v79, v80, v81}, v82, &failed);
-        const V v83 = v82[0];
-        const V v84 = w[1] * v60;
-        const V v85 = -p0;
-        const V v86 = p0 * v19;
-        const M v87 = softehl_lt(softehl_splat(0.0), v85);
-        const V v88 = parameters[7] * v83;
-        const V v89 = v88 - v55;
-        const V v90 = v31 * v89;
-        const V v91 = v86 - v90;
-        const V v92 = v91 * v84;
-        const V v93 = v44 * v92;
-        s39 += v93;
-        const V v94 = v43 * v92;
-        s40 += v94;
-        const V v95 = softehl_blend(v87, v85, softehl_splat(0.0));
-        const V v96 = 1.0 / v56;
-        const V v97 = v95 * v21;
-        const V v98 = parameters[1] * v53;
-        const V v99 = w[1] * v97;
-        const V v100 = v5 * v51;
-        const V v101 = v51 * v100;
-        const V v102 = v82[1];
-        const V v103 = v82[2];
-        const V v104 = v82[3];
-        const V v105 = v82[4];
-        const V v106 = v82[5];
-        const V v107 = v82[6];
-        const V v108 = v102 * v102;
-        const V v109 = 1.0 + v108;
-        const V v110 = v103 * v103;
-        const V v111 = 1.0 + v110;
-        const V v112 = v104 * v104;
-        const V v113 = 1.0 + v112;
-        const V v114 = v105 * v105;
-        const V v115 = 1.0 + v114;
-        const V v116 = v96 * v101;
-        const V v117 = v106 * v106;
-        const V v118 = 1.0 + v117;
-        const V v119 = softehl_vlog(v109);
-        const V v120 = softehl_vlog(v111);
-        const V v121 = softehl_vlog(v113);
-        const V v122 = softehl_vlog(v115);
-        const V v123 = softehl_vlog(v118);
-        const V v124 = v107 * v107;
-        const V v125 = 1.0 + v124;
-        const V v126 = softehl_vlog(v125);
-        const V v127 = v20 * v120;
-        const V v128 = softehl_vexp(v127);
-        const V v129 = v20 * v121;
-        const V v130 = softehl_vexp(v129);
-        const V v131 = v20 * v119;
-        const V v132 = softehl_vexp(v131);
-        const V v133 = v20 * v126;
-        const V v134 = softehl_vexp(v133);
-        const V v135 = v20 * v122;
-        const V v136 = v20 * v123;
-        const V v137 = softehl_vexp(v135);
-        const V v138 = softehl_vexp(v136);
-        const V v139 = v2 * v128;
-        const V v140 = parameters[9] + v139;
-        const V v141 = v2 * v130;
-        const V v142 = parameters[9] + v141;
-        const V v143 = v2 * v132;
-        const V v144 = parameters[9] + v143;
-        const V v145 = v2 * v134;
-        const V v146 = parameters[9] + v145;
-        const V v147 = v2 * v137;
-        const V v148 = parameters[9] + v147;
-        const V v149 = v2 * v138;
-        const V v150 = parameters[9] + v149;
-        const V v151 = 1.0 / v140;
-        const V v152 = 1.0 / v142;
-        const V v153 = 1.0 / v144;
-        const V v154 = 1.0 / v146;
-        const V v155 = v107 * v154;
-        const V v156 = v102 * v153;
-        const V v157 = v155 - v156;
-        const V v158 = 1.0 / v148;
-        const V v159 = 1.0 / v150;
-        const V v160 = v106 * v159;
-        const V v161 = v103 * v151;
-        const V v162 = v160 - v161;
-        const V v163 = v105 * v158;
-        const V v164 = v104 * v152;
-        const V v165 = v163 - v164;
-        const V v166 = 0.1192694691878821 * v162;
-        const V v167 = 0.07987743308995329 * v157;
-        const V v168 = v166 + v167;
-        const V v169 = 0.05582662111236089 * v165;
-        const V v170 = v168 + v169;
-        const V v171 = v116 * v170;
-        const V v172 = v98 + v171;
-        const V v173 = w[1] * v172;
+        const double v25 = 0.5 * w[0], v26 = 0.5 - v25, v27 = 0.5 + v25;
+        const V v28 = softehl_vexp(p0 * parameters[3]), v29 = v26 * v8 + v27 * v5, v30 = 0.5 * v29,
+            v31 = v30 * (p1 * v20), v32 = parameters[2] * v28,
+            v33 = parameters[1] * v32 * (1.0 / (parameters[7] * v29)),
+            v34 = (parameters[0] + v29) * v1, v35 = w[1] * (p0 * v7) * v34, v36 = v3 * v31,
+            v37 = softehl_vlog(1.0 + v33 * v33), v38 = softehl_vexp(v37 * v6),
+            v39 = v33 * (parameters[9] + v2 * v38);
+        s21 += v27 * v35; s22 += v26 * v35;
+        const V v40 = 0.932469514203152 * v36, v41 = 0.6612093864662645 * v36,
+            v42 = 0.2386191860831969 * v36, v43 = v40 + v39, v44 = v41 + v39, v45 = v42 + v39,
+            v46 = v39 - v42, v47 = v39 - v41, v48 = v39 - v40;
+        V v49[7];
+        softehl_film_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[9]), v33, softehl_splat(v6), softehl_splat(v2), softehl_splat(v10), v40, v41, v42, v39, v43, v44, v45, v46, v47, v48}, v49, &failed);
+        const V v50 = v49[0], v51 = -p0;
+        const M v52 = softehl_lt(softehl_splat(0.0), v51);
+        const V v53 = (p0 * v9 - v18 * (parameters[7] * v50 - v31)) * (w[1] * v34);
+        s23 += v27 * v53; s24 += v26 * v53;
+        const V v54 = softehl_blend(v52, v51, softehl_splat(0.0)), v55 = w[1] * (v54 * v11),
+            v56 = v49[1], v57 = v49[2], v58 = v49[3], v59 = v49[4], v60 = v49[5], v61 = v49[6],
+            v62 = softehl_vlog(1.0 + v56 * v56), v63 = softehl_vlog(1.0 + v57 * v57),
+            v64 = softehl_vlog(1.0 + v58 * v58), v65 = softehl_vlog(1.0 + v59 * v59),
+            v66 = softehl_vlog(1.0 + v60 * v60), v67 = softehl_vlog(1.0 + v61 * v61),
+            v68 = softehl_vexp(v10 * v63), v69 = softehl_vexp(v10 * v64),
+            v70 = softehl_vexp(v10 * v62), v71 = softehl_vexp(v10 * v67),
+            v72 = softehl_vexp(v10 * v65), v73 = softehl_vexp(v10 * v66),
+            v74 = v61 * (1.0 / (parameters[9] + v2 * v71)) - v56 * (1.0 / (parameters[9] + v2 * v70)),
+            v75 = v60 * (1.0 / (parameters[9] + v2 * v73)) - v57 * (1.0 / (parameters[9] + v2 * v68)),
+            v76 = v59 * (1.0 / (parameters[9] + v2 * v72)) - v58 * (1.0 / (parameters[9] + v2 * v69)),
+            v77 = 0.1192694691878821 * v75 + 0.07987743308995329 * v74 + 0.05582662111236089 * v76,
+            v78 = w[1] * (parameters[1] * v30 + 1.0 / v32 * (v29 * (v4 * v29)) * v77);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            const double N = B[2 * i], D = B[2 * i + 1];
-            (void)N, (void)D;
-            R_lanes[4 + i] += N * v99 + D * v173;
+            const double N = B[2 * i], D = B[2 * i + 1]; (void)N, (void)D;
+            R_lanes[4 + i] += N * v55 + D * v78;
         }
     }
-    const V v174 = -s37;
-    const V v175 = -s38;
-    R_lanes[0] = s40;
-    R_lanes[1] = v175;
-    R_lanes[2] = s39;
-    R_lanes[3] = v174;
+    const V v79 = -s21, v80 = -s22;
+    R_lanes[0] = s24; R_lanes[1] = v80; R_lanes[2] = s23; R_lanes[3] = v79;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
@@ -872,48 +316,16 @@ static void softehl_film_carreau_residual_group(
         softehl_spoil(failed, R, (4 + modes));
     }
 }
+SOFTEHL_BATCH(softehl_film_carreau_residual, 4, (4 + modes), 0, 0, (4 + modes), 0)
 
-void softehl_film_carreau_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_carreau_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_carreau_residual_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_carreau_residual_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_carreau_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_carreau_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -936,966 +348,214 @@ static void softehl_film_carreau_tangent_group(
 #endif
     for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
         K_lanes[i] = softehl_splat(0.0);
-    const double v1 = 6.283185307179586 * parameters[5];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = parameters[2] * parameters[3];
-    const double v4 = 1.0 - parameters[9];
-    const V v5 = X2 + d2;
-    const double v6 = 1.0 / parameters[7];
-    const double v7 = 0.5 * parameters[7];
-    const double v8 = 1.0 / parameters[8];
-    const double v9 = 0.23395696728634552 * v4;
-    const double v10 = 0.1803807865240693 * v4;
-    const double v11 = 0.08566224618958518 * v4;
-    const double v12 = parameters[8] - 1.0;
-    const double v13 = 0.5 * v12;
-    const V v14 = v5 - X0;
-    const V v15 = v14 - d0;
-    const V v16 = X1 - parameters[0];
-    const V v17 = X3 - parameters[0];
-    const V v18 = 0.5 * v15;
-    const V v19 = X3 + d3;
-    const double v20 = 0.5 * parameters[4];
-    const double v21 = v8 * v13;
-    const double v22 = v4 * v13;
-    const V v23 = d3 + v17;
-    const V v24 = parameters[4] * v18;
-    const V v25 = v18 * v18;
-    const V v26 = v19 - X1;
-    const V v27 = d1 + v16;
-    const V v28 = v26 - d1;
-    const V v29 = v18 * v1;
-    const double v30 = v21 * v9;
-    const double v31 = v21 * v10;
-    const double v32 = v21 * v11;
-    const double v33 = v4 * v21;
-    const V v34 = 0.5 * v28;
-    const V v35 = 2.5 * v28;
-    const V v36 = parameters[6] * v18;
-    const V v37 = v34 * v34;
-    const V v38 = parameters[6] * v34;
-    const V v39 = v37 + v25;
-    const V v40 = v37 * v37;
-    const V v41 = v40 * v35;
-    const V v42 = v40 * v41;
-    const V v43 = v34 * v40;
-    const V v44 = v43 * v43;
-    const V v45 = v34 * v44;
-    const V v46 = softehl_vsqrt(v39);
-    const V v47 = parameters[6] * v46;
-    const V v48 = parameters[7] * v47;
-    const V v49 = v39 * v39;
-    const V v50 = 1.0 / v39;
-    const V v51 = 4.0 * v39;
-    const V v52 = softehl_vsqrt(v50);
-    const V v53 = 0.5 * v52;
-    const V v54 = v53 * v36;
-    const V v55 = v53 * v38;
-    const V v56 = v49 * v51;
-    const V v57 = v49 * v49;
-    const V v58 = 1.0 / v57;
-    const V v59 = v58 * v42;
-    const V v60 = v58 * v44;
-    const V v61 = v25 + v60;
-    const V v62 = v58 * v58;
-    const V v63 = v18 * v44;
-    const V v64 = v62 * v63;
-    const V v65 = v62 * v45;
-    const V v66 = v56 * v64;
-    const V v67 = v56 * v65;
-    const V v68 = softehl_vsqrt(v61);
-    const V v69 = 1.0 / v68;
-    const V v70 = v69 * v69;
-    const V v71 = 1.0 / v61;
-    const V v72 = softehl_vsqrt(v71);
-    const V v73 = 0.5 * v72;
-    const V v74 = v70 * v73;
-    const V v75 = v66 - v18;
-    const V v76 = v75 * v74;
-    const V v77 = v18 - v66;
-    const V v78 = v74 * v77;
-    const V v79 = v59 - v67;
-    const V v80 = v74 * v79;
-    const V v81 = v67 - v59;
-    const V v82 = v74 * v81;
-    V s83 = softehl_splat(0.0);
-    V s84 = softehl_splat(0.0);
-    V s85 = softehl_splat(0.0);
-    V s86 = softehl_splat(0.0);
-    V s87 = softehl_splat(0.0);
-    V s88 = softehl_splat(0.0);
-    V s89 = softehl_splat(0.0);
-    V s90 = softehl_splat(0.0);
-    V s91 = softehl_splat(0.0);
-    V s92 = softehl_splat(0.0);
-    V s93 = softehl_splat(0.0);
-    V s94 = softehl_splat(0.0);
-    V s95 = softehl_splat(0.0);
-    V s96 = softehl_splat(0.0);
-    V s97 = softehl_splat(0.0);
-    V s98 = softehl_splat(0.0);
-    V s99 = softehl_splat(0.0);
-    V s100 = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[5], v2 = 0.5 * parameters[1],
+        v3 = parameters[2] * parameters[3], v4 = 1.0 - parameters[9], v5 = 1.0 / parameters[7],
+        v6 = 0.5 * parameters[7], v7 = 0.5 * (parameters[8] - 1.0);
+    const V v8 = 0.5 * (X2 + d2 - X0 - d0);
+    const double v9 = 0.5 * parameters[4], v10 = 1.0 / parameters[8] * v7, v11 = v4 * v7;
+    const V v12 = d3 + (X3 - parameters[0]), v13 = parameters[4] * v8, v14 = v8 * v8,
+        v15 = d1 + (X1 - parameters[0]), v16 = X3 + d3 - X1 - d1, v17 = v8 * v1;
+    const double v18 = v10 * (0.23395696728634552 * v4), v19 = v10 * (0.1803807865240693 * v4),
+        v20 = v10 * (0.08566224618958518 * v4), v21 = v4 * v10;
+    const V v22 = 0.5 * v16, v23 = v22 * v22, v24 = v23 + v14, v25 = v23 * v23, v26 = v22 * v25,
+        v27 = v26 * v26, v28 = softehl_vsqrt(v24), v29 = parameters[6] * v28,
+        v30 = parameters[7] * v29, v31 = v24 * v24, v32 = softehl_vsqrt(1.0 / v24), v33 = 0.5 * v32,
+        v34 = v33 * (parameters[6] * v8), v35 = v33 * (parameters[6] * v22),
+        v36 = v31 * (4.0 * v24), v37 = 1.0 / (v31 * v31), v38 = v37 * (v25 * (v25 * (2.5 * v16))),
+        v39 = v14 + v37 * v27, v40 = v37 * v37, v41 = v36 * (v40 * (v8 * v27)),
+        v42 = v36 * (v40 * (v22 * v27)), v43 = softehl_vsqrt(v39), v44 = 1.0 / v43,
+        v45 = softehl_vsqrt(1.0 / v39), v46 = v44 * v44 * (0.5 * v45), v47 = (v41 - v8) * v46,
+        v48 = v46 * (v8 - v41), v49 = v46 * (v38 - v42), v50 = v46 * (v42 - v38);
+    V s51 = {0}, s52 = {0}, s53 = {0}, s54 = {0}, s55 = {0}, s56 = {0}, s57 = {0}, s58 = {0},
+        s59 = {0}, s60 = {0}, s61 = {0}, s62 = {0}, s63 = {0}, s64 = {0}, s65 = {0}, s66 = {0},
+        s67 = {0}, s68 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        const double v101 = 0.5 * w[0];
-        const V v102 = p1 * v69;
-        const double v103 = 0.5 - v101;
-        const double v104 = 0.5 + v101;
-        const V v105 = p0 * parameters[3];
-        const V v106 = p0 * v29;
-        const V v107 = softehl_vexp(v105);
-        const V v108 = v103 * v27;
-        const V v109 = w[1] * v18;
-        const double v110 = v103 * w[1];
-        const double v111 = v104 * w[1];
-        const V v112 = v103 * v106;
-        const V v113 = v104 * v106;
-        const V v114 = v104 * v23;
-        const V v115 = v108 + v114;
-        const V v116 = parameters[0] + v115;
-        const V v117 = 0.5 * v115;
-        const V v118 = parameters[7] * v115;
-        const V v119 = v110 * v112;
-        s87 += v119;
-        const V v120 = v111 * v112;
-        s89 += v120;
-        const V v121 = v110 * v113;
-        s88 += v121;
-        const V v122 = v111 * v113;
-        s90 += v122;
-        const V v123 = v117 * v102;
-        const V v124 = 1.0 / v118;
-        const V v125 = v116 * v1;
-        const V v126 = p0 * v125;
-        const V v127 = parameters[2] * v107;
-        const V v128 = parameters[1] * v127;
-        const V v129 = v128 * v124;
-        const V v130 = v6 * v123;
-        const V v131 = v109 * v126;
-        const V v132 = 0.5 * v126;
-        const V v133 = v110 * v132;
-        s83 += v133;
-        const V v134 = v111 * v132;
-        s84 += v134;
-        const V v135 = v104 * v131;
-        s85 += v135;
-        const V v136 = v103 * v131;
-        s86 += v136;
-        const V v137 = 0.932469514203152 * v130;
-        const V v138 = 0.6612093864662645 * v130;
-        const V v139 = 0.2386191860831969 * v130;
-        const V v140 = v129 * v129;
-        const V v141 = 1.0 + v140;
-        const V v142 = softehl_vlog(v141);
-        const V v143 = v142 * v13;
-        const V v144 = softehl_vexp(v143);
-        const V v145 = v4 * v144;
-        const V v146 = parameters[9] + v145;
-        const V v147 = v129 * v146;
-        const V v148 = v147 + v137;
-        const V v149 = v147 + v138;
-        const V v150 = v147 + v139;
-        const V v151 = v147 - v139;
-        const V v152 = v147 - v138;
-        const V v153 = v147 - v137;
-        V v154[7];
-        softehl_film_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[9]), v129, softehl_splat(v13), softehl_splat(v4), softehl_splat(v21), v137, v138, v139, v147, v148, v149, v150, v151, v152, v153}, v154, &failed);
-        const V v155 = p0 * v34;
-        const V v156 = v154[0];
-        const V v157 = v154[1];
-        const V v158 = v154[2];
-        const V v159 = v154[3];
-        const V v160 = v154[4];
-        const V v161 = parameters[7] * v156;
-        const V v162 = v154[5];
-        const V v163 = v154[6];
-        const V v164 = v157 * v157;
-        const V v165 = 2.0 * v157;
-        const V v166 = v158 * v158;
-        const V v167 = v159 * v159;
-        const V v168 = v160 * v160;
-        const V v169 = 2.0 * v160;
-        const V v170 = v163 * v163;
-        const V v171 = v162 * v162;
-        const V v172 = 2.0 * v159;
-        const V v173 = 2.0 * v162;
-        const V v174 = 2.0 * v158;
-        const V v175 = 2.0 * v163;
-        const V v176 = 2.0 * v166;
-        const V v177 = v161 - v123;
-        const V v178 = 2.0 * v168;
-        const V v179 = 2.0 * v171;
-        const V v180 = 2.0 * v170;
-        const V v181 = 1.0 + v166;
-        const V v182 = 1.0 + v170;
-        const V v183 = v47 * v177;
-        const V v184 = v155 - v183;
-        const V v185 = 1.0 + v168;
-        const V v186 = 1.0 + v171;
-        const V v187 = softehl_vlog(v181);
-        const V v188 = 1.0 / v181;
-        const V v189 = softehl_vlog(v182);
-        const V v190 = 1.0 / v182;
-        const V v191 = w[1] * v184;
-        const V v192 = softehl_vlog(v185);
-        const V v193 = 1.0 / v185;
-        const V v194 = softehl_vlog(v186);
-        const V v195 = 1.0 / v186;
-        const V v196 = 2.0 * v164;
-        const V v197 = 1.0 + v164;
-        const V v198 = v125 * v191;
-        const V v199 = 2.0 * v167;
-        const V v200 = 1.0 + v167;
-        const V v201 = softehl_vlog(v197);
-        const V v202 = 1.0 / v197;
-        const V v203 = softehl_vlog(v200);
-        const V v204 = 1.0 / v200;
-        const V v205 = v104 * v198;
-        s91 += v205;
-        const V v206 = v103 * v198;
-        s92 += v206;
-        const V v207 = v30 * v160;
-        const V v208 = v30 * v159;
-        const V v209 = v22 * v159;
-        const V v210 = v22 * v160;
-        const V v211 = v22 * v157;
-        const V v212 = v32 * v157;
-        const V v213 = v32 * v163;
-        const V v214 = v22 * v163;
-        const V v215 = v22 * v158;
-        const V v216 = v22 * v162;
-        const V v217 = v31 * v162;
-        const V v218 = v31 * v158;
-        const V v219 = v21 * v187;
-        const V v220 = softehl_vexp(v219);
-        const V v221 = v218 * v220;
-        const V v222 = v21 * v203;
-        const V v223 = softehl_vexp(v222);
-        const V v224 = v21 * v201;
-        const V v225 = softehl_vexp(v224);
-        const V v226 = v212 * v225;
-        const V v227 = v21 * v189;
-        const V v228 = softehl_vexp(v227);
-        const V v229 = v213 * v228;
-        const V v230 = v21 * v192;
-        const V v231 = softehl_vexp(v230);
-        const V v232 = v21 * v194;
-        const V v233 = softehl_vexp(v232);
-        const V v234 = v217 * v233;
-        const V v235 = v207 * v231;
-        const V v236 = v208 * v223;
-        const V v237 = v33 * v225;
-        const V v238 = v202 * v237;
-        const V v239 = v33 * v220;
-        const V v240 = v188 * v239;
-        const V v241 = v33 * v223;
-        const V v242 = v204 * v241;
-        const V v243 = v33 * v231;
-        const V v244 = v193 * v243;
-        const V v245 = v4 * v220;
-        const V v246 = parameters[9] + v245;
-        const V v247 = v4 * v223;
-        const V v248 = parameters[9] + v247;
-        const V v249 = v4 * v225;
-        const V v250 = parameters[9] + v249;
-        const V v251 = v4 * v231;
-        const V v252 = parameters[9] + v251;
-        const V v253 = 1.0 / v246;
-        const V v254 = 1.0 / v248;
-        const V v255 = 1.0 / v250;
-        const V v256 = 1.0 / v252;
-        const V v257 = v256 * v256;
-        const V v258 = v254 * v254;
-        const V v259 = v253 * v253;
-        const V v260 = v255 * v255;
-        const V v261 = v250 * v250;
-        const V v262 = 1.0 / v261;
-        const V v263 = v196 * v250;
-        const V v264 = v262 * v263;
-        const V v265 = v262 * v264;
-        const V v266 = v246 * v246;
-        const V v267 = 1.0 / v266;
-        const V v268 = v176 * v246;
-        const V v269 = v267 * v268;
-        const V v270 = v267 * v269;
-        const V v271 = v248 * v248;
-        const V v272 = 1.0 / v271;
-        const V v273 = v199 * v248;
-        const V v274 = v272 * v273;
-        const V v275 = v272 * v274;
-        const V v276 = v252 * v252;
-        const V v277 = 1.0 / v276;
-        const V v278 = v178 * v252;
-        const V v279 = v277 * v278;
-        const V v280 = v277 * v279;
-        const V v281 = v235 * v257;
-        const V v282 = v193 * v281;
-        const V v283 = v160 * v257;
-        const V v284 = v236 * v258;
-        const V v285 = v204 * v284;
-        const V v286 = v159 * v258;
-        const V v287 = v221 * v259;
-        const V v288 = v188 * v287;
-        const V v289 = v158 * v259;
-        const V v290 = v226 * v260;
-        const V v291 = v202 * v290;
-        const V v292 = v157 * v260;
-        const V v293 = v166 * v267;
-        const V v294 = 1.0 + v293;
-        const V v295 = softehl_vlog(v294);
-        const V v296 = 1.0 / v294;
-        const V v297 = v13 * v295;
-        const V v298 = softehl_vexp(v297);
-        const V v299 = v167 * v272;
-        const V v300 = 1.0 + v299;
-        const V v301 = softehl_vlog(v300);
-        const V v302 = v13 * v301;
-        const V v303 = softehl_vexp(v302);
-        const V v304 = 1.0 / v300;
-        const V v305 = v211 * v255;
-        const V v306 = 0.08566224618958518 * v255;
-        const V v307 = v165 * v291;
-        const V v308 = v306 - v307;
-        const V v309 = v215 * v253;
-        const V v310 = v309 * v298;
-        const V v311 = v296 * v310;
-        const V v312 = v267 * v311;
-        const V v313 = v270 * v311;
-        const V v314 = 0.1803807865240693 * v253;
-        const V v315 = v174 * v288;
-        const V v316 = v314 - v315;
-        const V v317 = v209 * v254;
-        const V v318 = v317 * v303;
-        const V v319 = v304 * v318;
-        const V v320 = v272 * v319;
-        const V v321 = v275 * v319;
-        const V v322 = 0.23395696728634552 * v254;
-        const V v323 = v172 * v285;
-        const V v324 = v322 - v323;
-        const V v325 = v210 * v256;
-        const V v326 = 0.23395696728634552 * v256;
-        const V v327 = v169 * v282;
-        const V v328 = v326 - v327;
-        const V v329 = v4 * v298;
-        const V v330 = parameters[9] + v329;
-        const V v331 = v253 * v330;
-        const V v332 = v289 * v330;
-        const V v333 = v313 + v332;
-        const V v334 = v4 * v303;
-        const V v335 = parameters[9] + v334;
-        const V v336 = v254 * v335;
-        const V v337 = v286 * v335;
-        const V v338 = v321 + v337;
-        const V v339 = v242 * v338;
-        const V v340 = v320 - v339;
-        const V v341 = v172 * v340;
-        const V v342 = v336 + v341;
-        const V v343 = v240 * v333;
-        const V v344 = v312 - v343;
-        const V v345 = v174 * v344;
-        const V v346 = v331 + v345;
-        const V v347 = v4 * v228;
-        const V v348 = parameters[9] + v347;
-        const V v349 = v33 * v228;
-        const V v350 = v33 * v233;
-        const V v351 = v4 * v233;
-        const V v352 = parameters[9] + v351;
-        const V v353 = v195 * v350;
-        const V v354 = v190 * v349;
-        const V v355 = 1.0 / v348;
-        const V v356 = 1.0 / v352;
-        const V v357 = v356 * v356;
-        const V v358 = v355 * v355;
-        const V v359 = v352 * v352;
-        const V v360 = 1.0 / v359;
-        const V v361 = v179 * v352;
-        const V v362 = v360 * v361;
-        const V v363 = v360 * v362;
-        const V v364 = v348 * v348;
-        const V v365 = 1.0 / v364;
-        const V v366 = v180 * v348;
-        const V v367 = v365 * v366;
-        const V v368 = v365 * v367;
-        const V v369 = v234 * v357;
-        const V v370 = v195 * v369;
-        const V v371 = v162 * v357;
-        const V v372 = v229 * v358;
-        const V v373 = v190 * v372;
-        const V v374 = v163 * v358;
-        const V v375 = v216 * v356;
-        const V v376 = v214 * v355;
-        const V v377 = 0.1803807865240693 * v356;
-        const V v378 = v173 * v370;
-        const V v379 = v377 - v378;
-        const V v380 = 0.08566224618958518 * v355;
-        const V v381 = v175 * v373;
-        const V v382 = v380 - v381;
-        const V v383 = v171 * v360;
-        const V v384 = 1.0 + v383;
-        const V v385 = softehl_vlog(v384);
-        const V v386 = 1.0 / v384;
-        const V v387 = v13 * v385;
-        const V v388 = softehl_vexp(v387);
-        const V v389 = v375 * v388;
-        const V v390 = v386 * v389;
-        const V v391 = v360 * v390;
-        const V v392 = v363 * v390;
-        const V v393 = v170 * v365;
-        const V v394 = 1.0 + v393;
-        const V v395 = softehl_vlog(v394);
-        const V v396 = v13 * v395;
-        const V v397 = softehl_vexp(v396);
-        const V v398 = 1.0 / v394;
-        const V v399 = v376 * v397;
-        const V v400 = v398 * v399;
-        const V v401 = v365 * v400;
-        const V v402 = v368 * v400;
-        const V v403 = v4 * v388;
-        const V v404 = parameters[9] + v403;
-        const V v405 = v371 * v404;
-        const V v406 = v392 + v405;
-        const V v407 = v356 * v404;
-        const V v408 = v353 * v406;
-        const V v409 = v391 - v408;
-        const V v410 = v173 * v409;
-        const V v411 = v407 + v410;
-        const V v412 = v4 * v397;
-        const V v413 = parameters[9] + v412;
-        const V v414 = v374 * v413;
-        const V v415 = v402 + v414;
-        const V v416 = v355 * v413;
-        const V v417 = v354 * v415;
-        const V v418 = v401 - v417;
-        const V v419 = v175 * v418;
-        const V v420 = v416 + v419;
-        const V v421 = v164 * v262;
-        const V v422 = 1.0 + v421;
-        const V v423 = softehl_vlog(v422);
-        const V v424 = v13 * v423;
-        const V v425 = softehl_vexp(v424);
-        const V v426 = 1.0 / v422;
-        const V v427 = v305 * v425;
-        const V v428 = v426 * v427;
-        const V v429 = v262 * v428;
-        const V v430 = v265 * v428;
-        const V v431 = v4 * v425;
-        const V v432 = parameters[9] + v431;
-        const V v433 = v292 * v432;
-        const V v434 = v430 + v433;
-        const V v435 = v238 * v434;
-        const V v436 = v429 - v435;
-        const V v437 = v255 * v432;
-        const V v438 = v165 * v436;
-        const V v439 = v437 + v438;
-        const V v440 = v168 * v277;
-        const V v441 = 1.0 + v440;
-        const V v442 = softehl_vlog(v441);
-        const V v443 = v13 * v442;
-        const V v444 = softehl_vexp(v443);
-        const V v445 = 1.0 / v441;
-        const V v446 = v4 * v444;
-        const V v447 = parameters[9] + v446;
-        const V v448 = v325 * v444;
-        const V v449 = v445 * v448;
-        const V v450 = v277 * v449;
-        const V v451 = v280 * v449;
-        const V v452 = v283 * v447;
-        const V v453 = v451 + v452;
-        const V v454 = v244 * v453;
-        const V v455 = v450 - v454;
-        const V v456 = v256 * v447;
-        const V v457 = v169 * v455;
-        const V v458 = v456 + v457;
-        V v459[49];
-        softehl_film_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v308, v316, v324, v328, v379, v382, softehl_splat((-1.0)), v439, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v346, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v342, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v458, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v411, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v420}, v459, &failed);
-        const V v460 = -p0;
-        const V v461 = p1 * v117;
-        const V v462 = 0.5 * v102;
-        const M v463 = softehl_lt(softehl_splat(0.0), v460);
-        const V v464 = v1 * v184;
-        const V v465 = parameters[7] * v128;
-        const V v466 = v123 - v161;
-        const V v467 = v459[0];
-        const V v468 = v459[1];
-        const V v469 = v459[2];
-        const V v470 = v459[3];
-        const V v471 = v459[4];
-        const V v472 = v459[5];
-        const V v473 = v459[6];
-        const V v474 = v124 * v465;
-        const V v475 = v124 * v474;
-        const V v476 = v468 - v473;
-        const V v477 = v469 - v472;
-        const V v478 = v470 - v471;
-        const V v479 = v125 * v466;
-        const V v480 = v47 * v125;
-        const V v481 = v6 * v461;
-        const V v482 = v6 * v462;
-        const V v483 = v54 * v479;
-        const V v484 = v55 * v479;
-        const V v485 = 0.932469514203152 * v481;
-        const V v486 = 0.6612093864662645 * v481;
-        const V v487 = 0.2386191860831969 * v481;
-        const V v488 = 0.932469514203152 * v482;
-        const V v489 = 0.6612093864662645 * v482;
-        const V v490 = 0.2386191860831969 * v482;
-        const V v491 = v485 * v476;
-        const V v492 = v488 * v476;
-        const V v493 = v486 * v477;
-        const V v494 = v491 + v493;
-        const V v495 = v489 * v477;
-        const V v496 = v492 + v495;
-        const V v497 = v487 * v478;
-        const V v498 = v497 + v494;
-        const V v499 = v490 * v478;
-        const V v500 = v499 + v496;
-        const V v501 = v475 * v467;
-        const V v502 = v500 - v501;
-        const V v503 = parameters[7] * v498;
-        const V v504 = parameters[7] * v502;
-        const V v505 = v503 - v461;
-        const V v506 = v132 + v484;
-        const V v507 = v505 * v480;
-        const V v508 = v504 - v462;
-        const V v509 = v508 * v480;
-        const V v510 = v464 - v509;
-        const V v511 = v78 * v507;
-        const V v512 = v483 + v511;
-        const V v513 = v80 * v507;
-        const V v514 = v513 + v506;
-        const V v515 = v76 * v507;
-        const V v516 = v82 * v507;
-        const V v517 = v515 - v483;
-        const V v518 = v516 - v132;
-        const V v519 = v518 - v484;
-        const V v520 = v103 * v510;
-        const V v521 = v520 + v519;
-        const V v522 = v104 * v510;
-        const V v523 = v522 + v514;
-        const V v524 = v110 * v517;
-        s93 += v524;
-        const V v525 = v111 * v517;
-        s95 += v525;
-        const V v526 = v110 * v512;
-        s94 += v526;
-        const V v527 = v111 * v512;
-        s96 += v527;
-        const V v528 = v110 * v521;
-        s97 += v528;
-        const V v529 = v110 * v523;
-        s98 += v529;
-        const V v530 = v111 * v521;
-        s99 += v530;
-        const V v531 = v111 * v523;
-        s100 += v531;
-        V v532 = softehl_splat(0.0);
-        V v533 = softehl_splat(0.0);
-        V v534 = softehl_splat(0.0);
-        V v535 = softehl_splat(0.0);
-        const M m536 = v463;
-        if (softehl_any(m536)) {
-            const V v537 = p0 * v20;
-            const V v538 = w[1] * v24;
-            const V v539 = w[1] * v537;
-            const V v540 = -v538;
-            const V v541 = -v539;
-            v532 = softehl_blend(m536, v460, v532);
-            v533 = softehl_blend(m536, v539, v533);
-            v534 = softehl_blend(m536, v541, v534);
-            v535 = softehl_blend(m536, v540, v535);
+        (void)p0, (void)p1; const double v69 = 0.5 * w[0]; const V v70 = p1 * v44;
+        const double v71 = 0.5 - v69, v72 = 0.5 + v69;
+        const V v73 = p0 * v17, v74 = softehl_vexp(p0 * parameters[3]);
+        const double v75 = v71 * w[1], v76 = v72 * w[1];
+        const V v77 = v71 * v73, v78 = v72 * v73, v79 = v71 * v15 + v72 * v12, v80 = 0.5 * v79,
+            v81 = parameters[7] * v79;
+        s55 += v75 * v77; s57 += v76 * v77; s56 += v75 * v78; s58 += v76 * v78;
+        const V v82 = v80 * v70, v83 = 1.0 / v81, v84 = (parameters[0] + v79) * v1, v85 = p0 * v84,
+            v86 = parameters[2] * v74, v87 = parameters[1] * v86, v88 = v87 * v83, v89 = v5 * v82,
+            v90 = w[1] * v8 * v85, v91 = 0.5 * v85;
+        s51 += v75 * v91; s52 += v76 * v91; s53 += v72 * v90; s54 += v71 * v90;
+        const V v92 = 0.932469514203152 * v89, v93 = 0.6612093864662645 * v89,
+            v94 = 0.2386191860831969 * v89, v95 = softehl_vlog(1.0 + v88 * v88),
+            v96 = softehl_vexp(v95 * v7), v97 = v88 * (parameters[9] + v4 * v96), v98 = v97 + v92,
+            v99 = v97 + v93, v100 = v97 + v94, v101 = v97 - v94, v102 = v97 - v93, v103 = v97 - v92;
+        V v104[7];
+        softehl_film_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[9]), v88, softehl_splat(v7), softehl_splat(v4), softehl_splat(v10), v92, v93, v94, v97, v98, v99, v100, v101, v102, v103}, v104, &failed);
+        const V v105 = v104[0], v106 = v104[1], v107 = v104[2], v108 = v104[3], v109 = v104[4],
+            v110 = parameters[7] * v105, v111 = v104[5], v112 = v104[6], v113 = v106 * v106,
+            v114 = 2.0 * v106, v115 = v107 * v107, v116 = v108 * v108, v117 = v109 * v109,
+            v118 = 2.0 * v109, v119 = v112 * v112, v120 = v111 * v111, v121 = 2.0 * v108,
+            v122 = 2.0 * v111, v123 = 2.0 * v107, v124 = 2.0 * v112, v125 = 1.0 + v115,
+            v126 = 1.0 + v119, v127 = p0 * v22 - v29 * (v110 - v82), v128 = 1.0 + v117,
+            v129 = 1.0 + v120, v130 = softehl_vlog(v125), v131 = 1.0 / v125,
+            v132 = softehl_vlog(v126), v133 = 1.0 / v126, v134 = softehl_vlog(v128),
+            v135 = 1.0 / v128, v136 = softehl_vlog(v129), v137 = 1.0 / v129, v138 = 1.0 + v113,
+            v139 = v84 * (w[1] * v127), v140 = 1.0 + v116, v141 = softehl_vlog(v138),
+            v142 = 1.0 / v138, v143 = softehl_vlog(v140), v144 = 1.0 / v140;
+        s59 += v72 * v139; s60 += v71 * v139;
+        const V v145 = softehl_vexp(v10 * v130), v146 = softehl_vexp(v10 * v143),
+            v147 = softehl_vexp(v10 * v141), v148 = softehl_vexp(v10 * v132),
+            v149 = softehl_vexp(v10 * v134), v150 = softehl_vexp(v10 * v136),
+            v151 = parameters[9] + v4 * v145, v152 = parameters[9] + v4 * v146,
+            v153 = parameters[9] + v4 * v147, v154 = parameters[9] + v4 * v149, v155 = 1.0 / v151,
+            v156 = 1.0 / v152, v157 = 1.0 / v153, v158 = 1.0 / v154, v159 = v158 * v158,
+            v160 = v156 * v156, v161 = v155 * v155, v162 = v157 * v157, v163 = 1.0 / (v153 * v153),
+            v164 = 1.0 / (v151 * v151), v165 = 1.0 / (v152 * v152), v166 = 1.0 / (v154 * v154),
+            v167 = 1.0 + v115 * v164, v168 = softehl_vlog(v167), v169 = softehl_vexp(v7 * v168),
+            v170 = 1.0 + v116 * v165, v171 = softehl_vlog(v170), v172 = softehl_vexp(v7 * v171),
+            v173 = 0.08566224618958518 * v157 - v114 * (v142 * (v20 * v106 * v147 * v162)),
+            v174 = 1.0 / v167 * (v11 * v107 * v155 * v169),
+            v175 = 0.1803807865240693 * v155 - v123 * (v131 * (v19 * v107 * v145 * v161)),
+            v176 = 1.0 / v170 * (v11 * v108 * v156 * v172),
+            v177 = 0.23395696728634552 * v156 - v121 * (v144 * (v18 * v108 * v146 * v160)),
+            v178 = 0.23395696728634552 * v158 - v118 * (v135 * (v18 * v109 * v149 * v159)),
+            v179 = parameters[9] + v4 * v169, v180 = parameters[9] + v4 * v172,
+            v181 = v144 * (v21 * v146) * (v165 * (v165 * (2.0 * v116 * v152)) * v176 + v108 * v160 * v180),
+            v182 = v156 * v180 + v121 * (v165 * v176 - v181),
+            v183 = v131 * (v21 * v145) * (v164 * (v164 * (2.0 * v115 * v151)) * v174 + v107 * v161 * v179),
+            v184 = v155 * v179 + v123 * (v164 * v174 - v183), v185 = parameters[9] + v4 * v148,
+            v186 = parameters[9] + v4 * v150, v187 = 1.0 / v185, v188 = 1.0 / v186,
+            v189 = v188 * v188, v190 = v187 * v187, v191 = 1.0 / (v186 * v186),
+            v192 = 1.0 / (v185 * v185),
+            v193 = 0.1803807865240693 * v188 - v122 * (v137 * (v19 * v111 * v150 * v189)),
+            v194 = 0.08566224618958518 * v187 - v124 * (v133 * (v20 * v112 * v148 * v190)),
+            v195 = 1.0 + v120 * v191, v196 = softehl_vlog(v195), v197 = softehl_vexp(v7 * v196),
+            v198 = 1.0 / v195 * (v11 * v111 * v188 * v197), v199 = 1.0 + v119 * v192,
+            v200 = softehl_vlog(v199), v201 = softehl_vexp(v7 * v200),
+            v202 = 1.0 / v199 * (v11 * v112 * v187 * v201), v203 = parameters[9] + v4 * v197,
+            v204 = v137 * (v21 * v150) * (v191 * (v191 * (2.0 * v120 * v186)) * v198 + v111 * v189 * v203),
+            v205 = v188 * v203 + v122 * (v191 * v198 - v204), v206 = parameters[9] + v4 * v201,
+            v207 = v133 * (v21 * v148) * (v192 * (v192 * (2.0 * v119 * v185)) * v202 + v112 * v190 * v206),
+            v208 = v187 * v206 + v124 * (v192 * v202 - v207), v209 = 1.0 + v113 * v163,
+            v210 = softehl_vlog(v209), v211 = softehl_vexp(v7 * v210),
+            v212 = 1.0 / v209 * (v11 * v106 * v157 * v211), v213 = parameters[9] + v4 * v211,
+            v214 = v142 * (v21 * v147) * (v163 * (v163 * (2.0 * v113 * v153)) * v212 + v106 * v162 * v213),
+            v215 = v157 * v213 + v114 * (v163 * v212 - v214), v216 = 1.0 + v117 * v166,
+            v217 = softehl_vlog(v216), v218 = softehl_vexp(v7 * v217),
+            v219 = parameters[9] + v4 * v218, v220 = 1.0 / v216 * (v11 * v109 * v158 * v218),
+            v221 = v135 * (v21 * v149) * (v166 * (v166 * (2.0 * v117 * v154)) * v220 + v109 * v159 * v219),
+            v222 = v158 * v219 + v118 * (v166 * v220 - v221);
+        V v223[49];
+        softehl_film_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v173, v175, v177, v178, v193, v194, softehl_splat((-1.0)), v215, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v184, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v182, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v222, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v205, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v208}, v223, &failed);
+        const V v224 = -p0, v225 = p1 * v80, v226 = 0.5 * v70;
+        const M v227 = softehl_lt(softehl_splat(0.0), v224);
+        const V v228 = v223[0], v229 = v223[1], v230 = v223[2], v231 = v223[3], v232 = v223[4],
+            v233 = v223[5], v234 = v223[6], v235 = v83 * (v83 * (parameters[7] * v87)),
+            v236 = v229 - v234, v237 = v230 - v233, v238 = v231 - v232, v239 = v84 * (v82 - v110),
+            v240 = v29 * v84, v241 = v5 * v225, v242 = v5 * v226, v243 = v34 * v239,
+            v244 = v35 * v239, v245 = 0.932469514203152 * v241, v246 = 0.6612093864662645 * v241,
+            v247 = 0.2386191860831969 * v241, v248 = 0.932469514203152 * v242,
+            v249 = 0.6612093864662645 * v242, v250 = 0.2386191860831969 * v242,
+            v251 = parameters[7] * (v250 * v238 + (v248 * v236 + v249 * v237) - v235 * v228),
+            v252 = parameters[7] * (v247 * v238 + (v245 * v236 + v246 * v237)) - v225,
+            v253 = v252 * v240, v254 = v1 * v127 - (v251 - v226) * v240, v255 = v243 + v48 * v253,
+            v256 = v47 * v253 - v243, v257 = v71 * v254 + (v50 * v253 - v91 - v244),
+            v258 = v72 * v254 + (v49 * v253 + (v91 + v244));
+        s61 += v75 * v256; s63 += v76 * v256; s62 += v75 * v255; s64 += v76 * v255;
+        const V v259 = v75 * v257; s65 += v259; const V v260 = v75 * v258; s66 += v260;
+        const V v261 = v76 * v257; s67 += v261; const V v262 = v76 * v258; s68 += v262;
+        V v263 = softehl_splat(0.0), v264 = softehl_splat(0.0), v265 = softehl_splat(0.0),
+            v266 = softehl_splat(0.0);
+        const M m267 = v227;
+        if (softehl_any(m267)) {
+            const V v268 = w[1] * (p0 * v9), v269 = -(w[1] * v13), v270 = -v268;
+            v263 = softehl_blend(m267, v224, v263); v264 = softehl_blend(m267, v268, v264);
+            v265 = softehl_blend(m267, v270, v265); v266 = softehl_blend(m267, v269, v266);
         }
-        const V v542 = 1.0 / v127;
-        const V v543 = v532 * v24;
-        const V v544 = v107 * v3;
-        const V v545 = 0.1192694691878821 * v158;
-        const V v546 = 0.05582662111236089 * v159;
-        const V v547 = 0.07987743308995329 * v157;
-        const V v548 = 0.07987743308995329 * v163;
-        const V v549 = 0.05582662111236089 * v160;
-        const V v550 = 0.1192694691878821 * v162;
-        const V v551 = w[1] * v543;
-        const V v552 = w[1] * v76;
-        const V v553 = w[1] * v78;
-        const V v554 = v7 * v115;
-        const V v555 = v115 * v554;
-        const V v556 = parameters[1] * v124;
-        const V v557 = parameters[1] * v117;
-        const V v558 = v117 * v69;
-        const V v559 = v33 * v545;
-        const V v560 = v33 * v548;
-        const V v561 = v33 * v550;
-        const V v562 = v548 * v355;
-        const V v563 = 0.07987743308995329 * v355;
-        const V v564 = v559 * v220;
-        const V v565 = v560 * v228;
-        const V v566 = v544 * v556;
-        const V v567 = v561 * v233;
-        const V v568 = v6 * v558;
-        const V v569 = v545 * v253;
-        const V v570 = v562 - v569;
-        const V v571 = v564 * v259;
-        const V v572 = v565 * v358;
-        const V v573 = v566 * v48;
-        const V v574 = v567 * v357;
-        const V v575 = 0.932469514203152 * v568;
-        const V v576 = 0.6612093864662645 * v568;
-        const V v577 = 0.2386191860831969 * v568;
-        const V v578 = v550 * v356;
-        const V v579 = v578 + v570;
-        const V v580 = 0.1192694691878821 * v356;
-        const V v581 = v188 * v571;
-        const V v582 = v190 * v572;
-        const V v583 = v195 * v574;
-        const V v584 = v573 * v467;
-        const V v585 = v34 - v584;
-        const V v586 = v542 * v542;
-        const V v587 = v575 * v476;
-        const V v588 = v542 * v555;
-        const V v589 = v173 * v583;
-        const V v590 = v580 - v589;
-        const V v591 = v174 * v581;
-        const V v592 = w[1] * v542;
-        const V v593 = v175 * v582;
-        const V v594 = v563 - v593;
-        const V v595 = v555 * v592;
-        const V v596 = v576 * v477;
-        const V v597 = v587 + v596;
-        const V v598 = v125 * v585;
-        const V v599 = v18 * v125;
-        const V v600 = 0.1192694691878821 * v253;
-        const V v601 = v591 - v600;
-        const V v602 = v459[7];
-        const V v603 = v459[8];
-        const V v604 = v459[9];
-        const V v605 = v459[10];
-        const V v606 = v459[11];
-        const V v607 = v459[12];
-        const V v608 = v459[13];
-        const V v609 = v459[14];
-        const V v610 = v459[15];
-        const V v611 = v603 - v608;
-        const V v612 = v604 - v607;
-        const V v613 = v605 - v606;
-        const V v614 = v459[16];
-        const V v615 = v459[17];
-        const V v616 = v459[18];
-        const V v617 = v459[19];
-        const V v618 = v459[20];
-        const V v619 = v610 - v618;
-        const V v620 = v459[21];
-        const V v621 = v459[22];
-        const V v622 = v614 - v617;
-        const V v623 = v615 - v616;
-        const V v624 = v459[23];
-        const V v625 = v459[24];
-        const V v626 = v459[25];
-        const V v627 = v459[26];
-        const V v628 = v459[27];
-        const V v629 = v621 - v628;
-        const V v630 = v459[28];
-        const V v631 = v459[29];
-        const V v632 = v624 - v627;
-        const V v633 = v625 - v626;
-        const V v634 = v459[30];
-        const V v635 = v459[31];
-        const V v636 = v459[32];
-        const V v637 = v459[33];
-        const V v638 = v459[34];
-        const V v639 = v631 - v638;
-        const V v640 = v459[35];
-        const V v641 = v459[36];
-        const V v642 = v634 - v637;
-        const V v643 = v635 - v636;
-        const V v644 = v459[37];
-        const V v645 = v459[38];
-        const V v646 = v459[39];
-        const V v647 = v459[40];
-        const V v648 = v459[41];
-        const V v649 = v641 - v648;
-        const V v650 = v459[42];
-        const V v651 = v459[43];
-        const V v652 = v644 - v647;
-        const V v653 = v645 - v646;
-        const V v654 = v459[44];
-        const V v655 = v459[45];
-        const V v656 = v459[46];
-        const V v657 = v459[47];
-        const V v658 = v459[48];
-        const V v659 = v651 - v658;
-        const V v660 = v654 - v657;
-        const V v661 = v655 - v656;
-        const V v662 = 0.05582662111236089 * v256;
-        const V v663 = v549 * v256;
-        const V v664 = v663 + v579;
-        const V v665 = v33 * v549;
-        const V v666 = v33 * v546;
-        const V v667 = v33 * v547;
-        const V v668 = v665 * v231;
-        const V v669 = v666 * v223;
-        const V v670 = v667 * v225;
-        const V v671 = v546 * v254;
-        const V v672 = v664 - v671;
-        const V v673 = v547 * v255;
-        const V v674 = v672 - v673;
-        const V v675 = v668 * v257;
-        const V v676 = v669 * v258;
-        const V v677 = v670 * v260;
-        const V v678 = v118 * v674;
-        const V v679 = v555 * v674;
-        const V v680 = v594 * v650;
-        const V v681 = v577 * v653;
-        const V v682 = v577 * v661;
-        const V v683 = v193 * v675;
-        const V v684 = v204 * v676;
-        const V v685 = v202 * v677;
-        const V v686 = v586 * v679;
-        const V v687 = v577 * v478;
-        const V v688 = v687 + v597;
-        const V v689 = v542 * v679;
-        const V v690 = v557 + v689;
-        const V v691 = parameters[7] * v688;
-        const V v692 = v577 * v613;
-        const V v693 = v487 * v613;
-        const V v694 = v490 * v613;
-        const V v695 = v487 * v661;
-        const V v696 = v490 * v661;
-        const V v697 = v172 * v684;
-        const V v698 = w[1] * v690;
-        const V v699 = v165 * v685;
-        const V v700 = v691 - v558;
-        const V v701 = v169 * v683;
-        const V v702 = v662 - v701;
-        const V v703 = v700 * v480;
-        const V v704 = 0.05582662111236089 * v254;
-        const V v705 = v697 - v704;
-        const V v706 = v475 * v650;
-        const V v707 = v696 - v706;
-        const V v708 = 0.07987743308995329 * v255;
-        const V v709 = v699 - v708;
-        const V v710 = v475 * v602;
-        const V v711 = v694 - v710;
-        const V v712 = v577 * v623;
-        const V v713 = v487 * v623;
-        const V v714 = v490 * v623;
-        const V v715 = v709 * v602;
-        const V v716 = v680 + v715;
-        const V v717 = v577 * v633;
-        const V v718 = v487 * v633;
-        const V v719 = v490 * v633;
-        const V v720 = v577 * v643;
-        const V v721 = v487 * v643;
-        const V v722 = v490 * v643;
-        const V v723 = v487 * v653;
-        const V v724 = v490 * v653;
-        const V v725 = v475 * v609;
-        const V v726 = v714 - v725;
-        const V v727 = v601 * v609;
-        const V v728 = v716 + v727;
-        const V v729 = v475 * v620;
-        const V v730 = v719 - v729;
-        const V v731 = v475 * v630;
-        const V v732 = v722 - v731;
-        const V v733 = v475 * v640;
-        const V v734 = v724 - v733;
-        const V v735 = v705 * v620;
-        const V v736 = v735 + v728;
-        const V v737 = v575 * v629;
-        const V v738 = v737 + v717;
-        const V v739 = v485 * v629;
-        const V v740 = v739 + v718;
-        const V v741 = v488 * v629;
-        const V v742 = v741 + v730;
-        const V v743 = v488 * v619;
-        const V v744 = v743 + v726;
-        const V v745 = v702 * v630;
-        const V v746 = v745 + v736;
-        const V v747 = v488 * v639;
-        const V v748 = v747 + v732;
-        const V v749 = v488 * v649;
-        const V v750 = v749 + v734;
-        const V v751 = v590 * v640;
-        const V v752 = v751 + v746;
-        const V v753 = v566 * v752;
-        const V v754 = v575 * v619;
-        const V v755 = v754 + v712;
-        const V v756 = v485 * v619;
-        const V v757 = v756 + v713;
-        const V v758 = v489 * v622;
-        const V v759 = v758 + v744;
-        const V v760 = v489 * v632;
-        const V v761 = v760 + v742;
-        const V v762 = v489 * v642;
-        const V v763 = v762 + v748;
-        const V v764 = v489 * v652;
-        const V v765 = v764 + v750;
-        const V v766 = v576 * v622;
-        const V v767 = v766 + v755;
-        const V v768 = v486 * v622;
-        const V v769 = v768 + v757;
-        const V v770 = v590 * v765;
-        const V v771 = v576 * v632;
-        const V v772 = v771 + v738;
-        const V v773 = v486 * v632;
-        const V v774 = v773 + v740;
-        const V v775 = v601 * v767;
-        const V v776 = v601 * v769;
-        const V v777 = v601 * v759;
-        const V v778 = v770 + v777;
-        const V v779 = v588 * v753;
-        const V v780 = v544 * v686;
-        const V v781 = v779 - v780;
-        const V v782 = v576 * v642;
-        const V v783 = v782 + v720;
-        const V v784 = v486 * v642;
-        const V v785 = v784 + v721;
-        const V v786 = v705 * v761;
-        const V v787 = v778 + v786;
-        const V v788 = v705 * v772;
-        const V v789 = v775 + v788;
-        const V v790 = v705 * v774;
-        const V v791 = v776 + v790;
-        const V v792 = w[1] * v781;
-        const V v793 = v576 * v652;
-        const V v794 = v793 + v681;
-        const V v795 = v486 * v652;
-        const V v796 = v795 + v723;
-        const V v797 = v575 * v639;
-        const V v798 = v797 + v783;
-        const V v799 = v485 * v639;
-        const V v800 = v799 + v785;
-        const V v801 = v702 * v763;
-        const V v802 = v787 + v801;
-        const V v803 = v702 * v798;
-        const V v804 = v789 + v803;
-        const V v805 = v702 * v800;
-        const V v806 = v791 + v805;
-        const V v807 = v575 * v649;
-        const V v808 = v807 + v794;
-        const V v809 = v485 * v649;
-        const V v810 = v809 + v796;
-        const V v811 = v110 * v599;
-        const V v812 = v111 * v599;
-        const V v813 = -v811;
-        const V v814 = -v812;
-        const V v815 = v110 * v598;
-        const V v816 = v111 * v598;
-        const V v817 = v110 * v703;
-        const V v818 = v111 * v703;
-        const V v819 = v590 * v808;
-        const V v820 = v804 + v819;
-        const V v821 = v590 * v810;
-        const V v822 = v806 + v821;
-        const V v823 = -v817;
-        const V v824 = -v818;
-        const V v825 = v575 * v611;
-        const V v826 = v825 + v692;
-        const V v827 = v485 * v611;
-        const V v828 = v827 + v693;
-        const V v829 = v488 * v611;
-        const V v830 = v829 + v711;
-        const V v831 = v575 * v659;
-        const V v832 = v831 + v682;
-        const V v833 = v485 * v659;
-        const V v834 = v833 + v695;
-        const V v835 = v488 * v659;
-        const V v836 = v835 + v707;
-        const V v837 = v576 * v612;
-        const V v838 = v837 + v826;
-        const V v839 = v576 * v660;
-        const V v840 = v839 + v832;
-        const V v841 = v486 * v612;
-        const V v842 = v841 + v828;
-        const V v843 = v486 * v660;
-        const V v844 = v843 + v834;
-        const V v845 = v489 * v612;
-        const V v846 = v845 + v830;
-        const V v847 = v489 * v660;
-        const V v848 = v847 + v836;
-        const V v849 = v709 * v838;
-        const V v850 = v820 + v849;
-        const V v851 = v709 * v842;
-        const V v852 = v822 + v851;
-        const V v853 = v709 * v846;
-        const V v854 = v802 + v853;
-        const V v855 = v594 * v840;
-        const V v856 = v850 + v855;
-        const V v857 = v594 * v844;
-        const V v858 = v852 + v857;
-        const V v859 = v594 * v848;
-        const V v860 = v854 + v859;
-        const V v861 = v595 * v856;
-        const V v862 = v588 * v858;
-        const V v863 = v555 * v860;
-        const V v864 = v678 + v863;
-        const V v865 = v552 * v862;
-        const V v866 = -v865;
-        const V v867 = v553 * v862;
-        const V v868 = -v867;
-        const V v869 = v542 * v864;
-        const V v870 = v2 + v869;
-        const V v871 = v103 * v870;
-        const V v872 = v104 * v870;
-        const V v873 = v82 * v862;
-        const V v874 = v871 - v873;
-        const V v875 = v80 * v862;
-        const V v876 = v872 - v875;
-        const V v877 = w[1] * v874;
-        const V v878 = w[1] * v876;
+        const V v271 = 1.0 / v86, v272 = v74 * v3, v273 = 0.1192694691878821 * v107,
+            v274 = 0.05582662111236089 * v108, v275 = 0.07987743308995329 * v106,
+            v276 = 0.07987743308995329 * v112, v277 = 0.05582662111236089 * v109,
+            v278 = 0.1192694691878821 * v111, v279 = w[1] * (v263 * v13), v280 = v79 * (v6 * v79),
+            v281 = v80 * v44, v282 = v272 * (parameters[1] * v83), v283 = v5 * v281,
+            v284 = 0.932469514203152 * v283, v285 = 0.6612093864662645 * v283,
+            v286 = 0.2386191860831969 * v283, v287 = v271 * v280,
+            v288 = 0.1192694691878821 * v188 - v122 * (v137 * (v21 * v278 * v150 * v189)),
+            v289 = 0.07987743308995329 * v187 - v124 * (v133 * (v21 * v276 * v148 * v190)),
+            v290 = v84 * (v22 - v282 * v30 * v228), v291 = v8 * v84,
+            v292 = v123 * (v131 * (v21 * v273 * v145 * v161)) - 0.1192694691878821 * v155,
+            v293 = v223[7], v294 = v223[8], v295 = v223[9], v296 = v223[10], v297 = v223[11],
+            v298 = v223[12], v299 = v223[13], v300 = v223[14], v301 = v223[15], v302 = v294 - v299,
+            v303 = v295 - v298, v304 = v296 - v297, v305 = v223[16], v306 = v223[17],
+            v307 = v223[18], v308 = v223[19], v309 = v223[20], v310 = v301 - v309, v311 = v223[21],
+            v312 = v223[22], v313 = v305 - v308, v314 = v306 - v307, v315 = v223[23],
+            v316 = v223[24], v317 = v223[25], v318 = v223[26], v319 = v223[27], v320 = v312 - v319,
+            v321 = v223[28], v322 = v223[29], v323 = v315 - v318, v324 = v316 - v317,
+            v325 = v223[30], v326 = v223[31], v327 = v223[32], v328 = v223[33], v329 = v223[34],
+            v330 = v322 - v329, v331 = v223[35], v332 = v223[36], v333 = v325 - v328,
+            v334 = v326 - v327, v335 = v223[37], v336 = v223[38], v337 = v223[39], v338 = v223[40],
+            v339 = v223[41], v340 = v332 - v339, v341 = v223[42], v342 = v223[43],
+            v343 = v335 - v338, v344 = v336 - v337, v345 = v223[44], v346 = v223[45],
+            v347 = v223[46], v348 = v223[47], v349 = v223[48], v350 = v342 - v349,
+            v351 = v345 - v348, v352 = v346 - v347,
+            v353 = v277 * v158 + (v278 * v188 + (v276 * v187 - v273 * v155)) - v274 * v156,
+            v354 = v353 - v275 * v157, v355 = v280 * v354,
+            v356 = w[1] * (parameters[1] * v80 + v271 * v355),
+            v357 = parameters[7] * (v286 * v238 + (v284 * v236 + v285 * v237)) - v281,
+            v358 = 0.05582662111236089 * v158 - v118 * (v135 * (v21 * v277 * v149 * v159)),
+            v359 = v357 * v240,
+            v360 = v121 * (v144 * (v21 * v274 * v146 * v160)) - 0.05582662111236089 * v156,
+            v361 = v114 * (v142 * (v21 * v275 * v147 * v162)) - 0.07987743308995329 * v157,
+            v362 = v358 * v321 + (v360 * v311 + (v289 * v341 + v361 * v293 + v292 * v300)),
+            v363 = v288 * (v249 * v343 + (v248 * v340 + (v250 * v344 - v235 * v331))),
+            v364 = v292 * (v249 * v313 + (v248 * v310 + (v250 * v314 - v235 * v300))),
+            v365 = v287 * (v282 * (v288 * v331 + v362)) - v272 * (v271 * v271 * v355),
+            v366 = v360 * (v249 * v323 + (v248 * v320 + (v250 * v324 - v235 * v311))),
+            v367 = v292 * (v285 * v313 + (v284 * v310 + v286 * v314)) + v360 * (v285 * v323 + (v284 * v320 + v286 * v324)),
+            v368 = v292 * (v246 * v313 + (v245 * v310 + v247 * v314)) + v360 * (v246 * v323 + (v245 * v320 + v247 * v324)),
+            v369 = w[1] * v365,
+            v370 = v358 * (v249 * v333 + (v248 * v330 + (v250 * v334 - v235 * v321))),
+            v371 = -(v75 * v291), v372 = -(v76 * v291), v373 = v75 * v290, v374 = v76 * v290,
+            v375 = v367 + v358 * (v284 * v330 + (v285 * v333 + v286 * v334)) + v288 * (v284 * v340 + (v285 * v343 + v286 * v344)),
+            v376 = v368 + v358 * (v245 * v330 + (v246 * v333 + v247 * v334)) + v288 * (v245 * v340 + (v246 * v343 + v247 * v344)),
+            v377 = -(v75 * v359), v378 = -(v76 * v359),
+            v379 = v361 * (v249 * v303 + (v248 * v302 + (v250 * v304 - v235 * v293))),
+            v380 = v375 + v361 * (v285 * v303 + (v284 * v302 + v286 * v304)) + v289 * (v285 * v351 + (v284 * v350 + v286 * v352)),
+            v381 = v376 + v361 * (v246 * v303 + (v245 * v302 + v247 * v304)) + v289 * (v246 * v351 + (v245 * v350 + v247 * v352)),
+            v382 = v289 * (v249 * v351 + (v248 * v350 + (v250 * v352 - v235 * v341))),
+            v383 = v280 * (w[1] * v271) * v380, v384 = v287 * v381, v385 = -(w[1] * v47 * v384),
+            v386 = -(w[1] * v48 * v384),
+            v387 = v271 * (v81 * v354 + v280 * (v363 + v364 + v366 + v370 + v379 + v382)),
+            v388 = v2 + v387, v389 = w[1] * (v71 * v388 - v50 * v384),
+            v390 = w[1] * (v72 * v388 - v49 * v384);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            const double N = B[2 * i], D = B[2 * i + 1];
-            (void)N, (void)D;
-            R_lanes[4 + i] += N * v551 + D * v698;
-            K_lanes[(4 + i) * (4 + modes) + 0] += N * v533 + D * v866;
-            K_lanes[0 * (4 + modes) + 4 + i] += N * v815 + D * v823;
-            K_lanes[(4 + i) * (4 + modes) + 1] += D * v877;
-            K_lanes[1 * (4 + modes) + 4 + i] += N * v813;
-            K_lanes[(4 + i) * (4 + modes) + 2] += N * v534 + D * v868;
-            K_lanes[2 * (4 + modes) + 4 + i] += N * v816 + D * v824;
-            K_lanes[(4 + i) * (4 + modes) + 3] += D * v878;
-            K_lanes[3 * (4 + modes) + 4 + i] += N * v814;
-            const V r0 = N * v535 + D * v792;
-            const V r1 = D * v861;
+            const double N = B[2 * i], D = B[2 * i + 1]; (void)N, (void)D;
+            R_lanes[4 + i] += N * v279 + D * v356;
+            K_lanes[(4 + i) * (4 + modes) + 0] += N * v264 + D * v385;
+            K_lanes[0 * (4 + modes) + 4 + i] += N * v373 + D * v377;
+            K_lanes[(4 + i) * (4 + modes) + 1] += D * v389;
+            K_lanes[1 * (4 + modes) + 4 + i] += N * v371;
+            K_lanes[(4 + i) * (4 + modes) + 2] += N * v265 + D * v386;
+            K_lanes[2 * (4 + modes) + 4 + i] += N * v374 + D * v378;
+            K_lanes[(4 + i) * (4 + modes) + 3] += D * v390;
+            K_lanes[3 * (4 + modes) + 4 + i] += N * v372;
+            const V r0 = N * v266 + D * v369, r1 = D * v383;
             for (ptrdiff_t j = 0; j < modes; ++j)
                 K_lanes[(4 + i) * (4 + modes) + 4 + j] += r0 * B[2 * j] + r1 * B[2 * j + 1];
         }
     }
-    const V v879 = -s83;
-    const V v880 = -s84;
-    const V v881 = -s85;
-    const V v882 = -s86;
-    const V v883 = -s87;
-    const V v884 = -s88;
-    const V v885 = -s89;
-    const V v886 = -s90;
-    R_lanes[0] = s92;
-    R_lanes[1] = v882;
-    R_lanes[2] = s91;
-    R_lanes[3] = v881;
-    K_lanes[0 * (4 + modes) + 0] = s93;
-    K_lanes[0 * (4 + modes) + 1] = s97;
-    K_lanes[0 * (4 + modes) + 2] = s94;
-    K_lanes[0 * (4 + modes) + 3] = s98;
-    K_lanes[1 * (4 + modes) + 0] = s83;
-    K_lanes[1 * (4 + modes) + 1] = v883;
-    K_lanes[1 * (4 + modes) + 2] = v879;
-    K_lanes[1 * (4 + modes) + 3] = v884;
-    K_lanes[2 * (4 + modes) + 0] = s95;
-    K_lanes[2 * (4 + modes) + 1] = s99;
-    K_lanes[2 * (4 + modes) + 2] = s96;
-    K_lanes[2 * (4 + modes) + 3] = s100;
-    K_lanes[3 * (4 + modes) + 0] = s84;
-    K_lanes[3 * (4 + modes) + 1] = v885;
-    K_lanes[3 * (4 + modes) + 2] = v880;
-    K_lanes[3 * (4 + modes) + 3] = v886;
+    const V v391 = -s51, v392 = -s52, v393 = -s53, v394 = -s54, v395 = -s55, v396 = -s56,
+        v397 = -s57, v398 = -s58;
+    R_lanes[0] = s60; R_lanes[1] = v394; R_lanes[2] = s59; R_lanes[3] = v393;
+    K_lanes[0 * (4 + modes) + 0] = s61; K_lanes[0 * (4 + modes) + 1] = s65;
+    K_lanes[0 * (4 + modes) + 2] = s62; K_lanes[0 * (4 + modes) + 3] = s66;
+    K_lanes[1 * (4 + modes) + 0] = s51; K_lanes[1 * (4 + modes) + 1] = v395;
+    K_lanes[1 * (4 + modes) + 2] = v391; K_lanes[1 * (4 + modes) + 3] = v396;
+    K_lanes[2 * (4 + modes) + 0] = s63; K_lanes[2 * (4 + modes) + 1] = s67;
+    K_lanes[2 * (4 + modes) + 2] = s64; K_lanes[2 * (4 + modes) + 3] = s68;
+    K_lanes[3 * (4 + modes) + 0] = s52; K_lanes[3 * (4 + modes) + 1] = v397;
+    K_lanes[3 * (4 + modes) + 2] = v392; K_lanes[3 * (4 + modes) + 3] = v398;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
     softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
@@ -1905,50 +565,16 @@ static void softehl_film_carreau_tangent_group(
         softehl_spoil(failed, K, ((4 + modes) * (4 + modes)));
     }
 }
+SOFTEHL_BATCH(softehl_film_carreau_tangent, 4, (4 + modes), 0, 0, (4 + modes), ((4 + modes) * (4 + modes)))
 
-void softehl_film_carreau_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_carreau_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_carreau_tangent_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (4 + modes) * e, tangent + ((4 + modes) * (4 + modes)) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_carreau_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), tangent + ((4 + modes) * (4 + modes)) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    double K[SOFTEHL_LANES * ((4 + modes) * (4 + modes))];
-    softehl_film_carreau_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_film_carreau_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -1958,204 +584,520 @@ static void softehl_film_carreau_fields_group(
     softehl_gather(d_lanes, d, (4 + modes));
 #endif
     const double v1 = 1.0 - parameters[9];
-    const V v2 = X2 + d2;
-    const V v3 = X0 + d0;
-    const V v4 = X1 - parameters[0];
-    const V v5 = X3 - parameters[0];
-    const double v6 = 1.0 / parameters[7];
-    const double v7 = 0.5 * parameters[7];
-    const double v8 = 6.0 * parameters[7];
-    const V v9 = v2 - X0;
-    const V v10 = v9 - d0;
-    const V v11 = X3 + d3;
-    const V v12 = d3 + v5;
-    const V v13 = 0.5 * v10;
-    const double v14 = 1.0 / parameters[8];
-    const V v15 = d1 + v4;
-    const double v16 = parameters[8] - 1.0;
-    const V v17 = v11 - X1;
-    const V v18 = v17 - d1;
-    const V v19 = v13 * v13;
-    const double v20 = 0.5 * v16;
-    const V v21 = 0.5 * v18;
-    const double v22 = v14 * v20;
-    const V v23 = v21 * v21;
-    const V v24 = v21 * v23;
-    const V v25 = v23 * v24;
-    const V v26 = v23 + v19;
-    const V v27 = v26 * v26;
-    const V v28 = v27 * v27;
-    const V v29 = 1.0 / v28;
-    const V v30 = v29 * v25;
-    const V v31 = v25 * v30;
-    const V v32 = v19 + v31;
-    const V v33 = softehl_vsqrt(v32);
-    const V v34 = 1.0 / v33;
+    const V v2 = X2 + d2, v3 = X0 + d0;
+    const double v4 = 1.0 / parameters[7], v5 = 0.5 * parameters[7], v6 = 6.0 * parameters[7];
+    const V v7 = d3 + (X3 - parameters[0]), v8 = 0.5 * (v2 - X0 - d0),
+        v9 = d1 + (X1 - parameters[0]), v10 = v8 * v8;
+    const double v11 = 0.5 * (parameters[8] - 1.0); const V v12 = 0.5 * (X3 + d3 - X1 - d1);
+    const double v13 = 1.0 / parameters[8] * v11;
+    const V v14 = v12 * v12, v15 = v14 * (v12 * v14), v16 = v14 + v10, v17 = v16 * v16,
+        v18 = softehl_vsqrt(v10 + v15 * (1.0 / (v17 * v17) * v15)), v19 = 1.0 / v18;
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        const double v35 = 0.5 * w[0];
-        const V v36 = p0 * parameters[3];
-        const V v37 = softehl_vexp(v36);
-        const V v38 = p1 * v34;
-        const double v39 = 0.5 - v35;
-        const double v40 = 0.5 + v35;
-        const V v41 = w[1] * v13;
-        const V v42 = v39 * v3;
-        const V v43 = v39 * v15;
-        const V v44 = parameters[2] * v37;
-        const V v45 = v40 * v2;
-        const V v46 = v45 + v42;
-        const V v47 = v40 * v12;
-        const V v48 = v43 + v47;
-        const V v49 = parameters[1] * v44;
-        const V v50 = 0.5 * v48;
-        const V v51 = parameters[7] * v48;
-        const V v52 = v50 * v38;
-        const V v53 = 1.0 / v51;
-        const V v54 = v49 * v53;
-        const V v55 = v6 * v52;
-        const V v56 = v54 * v54;
-        const V v57 = 1.0 + v56;
-        const V v58 = softehl_vlog(v57);
-        const V v59 = v58 * v20;
-        const V v60 = softehl_vexp(v59);
-        const V v61 = v1 * v60;
-        const V v62 = parameters[9] + v61;
-        const V v63 = v54 * v62;
-        const V v64 = 0.932469514203152 * v55;
-        const V v65 = 0.6612093864662645 * v55;
-        const V v66 = 0.2386191860831969 * v55;
-        const V v67 = v64 + v63;
-        const V v68 = v65 + v63;
-        const V v69 = v66 + v63;
-        const V v70 = v63 - v66;
-        const V v71 = v63 - v65;
-        const V v72 = v63 - v64;
-        V v73[7];
-        softehl_film_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[9]), v54, softehl_splat(v20), softehl_splat(v1), softehl_splat(v22), v64, v65, v66, v63, v67, v68, v69, v70, v71, v72}, v73, &failed);
-        const V v74 = 1.0 / v44;
-        const V v75 = parameters[1] * v50;
-        const V v76 = v7 * v48;
-        const V v77 = 1.0 / v48;
-        const V v78 = v48 * v76;
-        const V v79 = v73[0];
-        const V v80 = v73[1];
-        const V v81 = v73[2];
-        const V v82 = v73[3];
-        const V v83 = v73[4];
-        const V v84 = v73[5];
-        const V v85 = v73[6];
-        const V v86 = parameters[7] * v79;
-        const V v87 = v80 * v80;
-        const V v88 = 1.0 + v87;
-        const V v89 = v82 * v82;
-        const V v90 = 1.0 + v89;
-        const V v91 = v83 * v83;
-        const V v92 = 1.0 + v91;
-        const V v93 = v74 * v78;
-        const V v94 = v84 * v84;
-        const V v95 = 1.0 + v94;
-        const V v96 = v85 * v85;
-        const V v97 = 1.0 + v96;
-        const V v98 = softehl_vlog(v88);
-        const V v99 = softehl_vlog(v90);
-        const V v100 = softehl_vlog(v92);
-        const V v101 = softehl_vlog(v95);
-        const V v102 = softehl_vlog(v97);
-        const V v103 = v81 * v81;
-        const V v104 = 1.0 + v103;
-        const V v105 = v86 - v52;
-        const V v106 = v52 + v86;
-        const V v107 = softehl_vlog(v104);
-        const V v108 = v22 * v107;
-        const V v109 = softehl_vexp(v108);
-        const V v110 = v22 * v99;
-        const V v111 = softehl_vexp(v110);
-        const V v112 = v22 * v98;
-        const V v113 = softehl_vexp(v112);
-        const V v114 = v22 * v102;
-        const V v115 = softehl_vexp(v114);
-        const V v116 = v22 * v100;
-        const V v117 = v22 * v101;
-        const V v118 = softehl_vexp(v116);
-        const V v119 = softehl_vexp(v117);
-        const V v120 = v1 * v109;
-        const V v121 = parameters[9] + v120;
-        const V v122 = v1 * v111;
-        const V v123 = parameters[9] + v122;
-        const V v124 = v1 * v113;
-        const V v125 = parameters[9] + v124;
-        const V v126 = v1 * v115;
-        const V v127 = parameters[9] + v126;
-        const V v128 = v1 * v118;
-        const V v129 = parameters[9] + v128;
-        const V v130 = v1 * v119;
-        const V v131 = parameters[9] + v130;
-        const V v132 = 1.0 / v121;
-        const V v133 = 1.0 / v123;
-        const V v134 = 1.0 / v125;
-        const V v135 = 1.0 / v127;
-        const V v136 = 1.0 / v129;
-        const V v137 = 1.0 / v131;
-        const V v138 = v85 * v135;
-        const V v139 = v80 * v134;
-        const V v140 = v138 - v139;
-        const V v141 = v83 * v136;
-        const V v142 = v82 * v133;
-        const V v143 = v141 - v142;
-        const V v144 = v84 * v137;
-        const V v145 = v81 * v132;
-        const V v146 = v144 - v145;
-        const V v147 = 0.1192694691878821 * v146;
-        const V v148 = 0.07987743308995329 * v140;
-        const V v149 = v147 + v148;
-        const V v150 = 0.05582662111236089 * v143;
-        const V v151 = v149 + v150;
-        const V v152 = v8 * v151;
-        const V v153 = v77 * v152;
-        const V v154 = -v153;
-        const V v155 = v93 * v151;
-        const V v156 = v75 + v155;
-        softehl_store4(R + 9 * q + 0, (9 * points), v46, v41, v48, p0);
-        softehl_store4(R + 9 * q + 4, (9 * points), v105, v156, v106, v44);
-        softehl_store1(R + 9 * q + 8, (9 * points), v154);
+        (void)p0, (void)p1; const double v20 = 0.5 * w[0];
+        const V v21 = softehl_vexp(p0 * parameters[3]);
+        const double v22 = 0.5 - v20, v23 = 0.5 + v20;
+        const V v24 = w[1] * v8, v25 = parameters[2] * v21, v26 = v23 * v2 + v22 * v3,
+            v27 = v22 * v9 + v23 * v7, v28 = 0.5 * v27, v29 = v28 * (p1 * v19),
+            v30 = parameters[1] * v25 * (1.0 / (parameters[7] * v27)), v31 = v4 * v29,
+            v32 = softehl_vlog(1.0 + v30 * v30), v33 = softehl_vexp(v32 * v11),
+            v34 = v30 * (parameters[9] + v1 * v33), v35 = 0.932469514203152 * v31,
+            v36 = 0.6612093864662645 * v31, v37 = 0.2386191860831969 * v31, v38 = v35 + v34,
+            v39 = v36 + v34, v40 = v37 + v34, v41 = v34 - v37, v42 = v34 - v36, v43 = v34 - v35;
+        V v44[7];
+        softehl_film_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[9]), v30, softehl_splat(v11), softehl_splat(v1), softehl_splat(v13), v35, v36, v37, v34, v38, v39, v40, v41, v42, v43}, v44, &failed);
+        const V v45 = v44[0], v46 = v44[1], v47 = v44[2], v48 = v44[3], v49 = v44[4], v50 = v44[5],
+            v51 = v44[6], v52 = parameters[7] * v45, v53 = softehl_vlog(1.0 + v46 * v46),
+            v54 = softehl_vlog(1.0 + v48 * v48), v55 = softehl_vlog(1.0 + v49 * v49),
+            v56 = softehl_vlog(1.0 + v50 * v50), v57 = softehl_vlog(1.0 + v51 * v51),
+            v58 = v52 - v29, v59 = v29 + v52, v60 = softehl_vlog(1.0 + v47 * v47),
+            v61 = softehl_vexp(v13 * v60), v62 = softehl_vexp(v13 * v54),
+            v63 = softehl_vexp(v13 * v53), v64 = softehl_vexp(v13 * v57),
+            v65 = softehl_vexp(v13 * v55), v66 = softehl_vexp(v13 * v56),
+            v67 = v51 * (1.0 / (parameters[9] + v1 * v64)) - v46 * (1.0 / (parameters[9] + v1 * v63)),
+            v68 = v49 * (1.0 / (parameters[9] + v1 * v65)) - v48 * (1.0 / (parameters[9] + v1 * v62)),
+            v69 = v50 * (1.0 / (parameters[9] + v1 * v66)) - v47 * (1.0 / (parameters[9] + v1 * v61)),
+            v70 = 0.1192694691878821 * v69 + 0.07987743308995329 * v67 + 0.05582662111236089 * v68,
+            v71 = -(1.0 / v27 * (v6 * v70)),
+            v72 = parameters[1] * v28 + 1.0 / v25 * (v27 * (v5 * v27)) * v70;
+        softehl_store4(R + 9 * q + 0, (9 * points), v26, v24, v27, p0);
+        softehl_store4(R + 9 * q + 4, (9 * points), v58, v72, v59, v25);
+        softehl_store1(R + 9 * q + 8, (9 * points), v71);
     }
     if (softehl_any(failed)) {
         softehl_spoil(failed, R, (9 * points));
     }
 }
+SOFTEHL_BATCH(softehl_film_carreau_fields, 4, (4 + modes), 0, 0, (9 * points), 0)
 
-void softehl_film_carreau_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_carreau_pseudo_load)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_carreau_fields_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (9 * points) * e, 0);
+    SOFTEHL_IDLE;
+    M failed = softehl_mask(0);
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13;
+    softehl_load4(t + 0, 14, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 14, &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, 14, &t8, &t9, &t10, &t11); softehl_load2(t + 12, 14, &t12, &t13);
 #if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_carreau_fields_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (9 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double R[SOFTEHL_LANES * (9 * points)];
-    softehl_film_carreau_fields(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (9 * points) * n; ++i) values[i] = R[i];
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
 #endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[5]; const V v2 = parameters[2] * t7;
+    const double v3 = 1.0 - parameters[9]; const V v4 = 6.283185307179586 * t9;
+    const double v5 = 1.0 / parameters[7], v6 = 0.5 * parameters[7], v7 = 1.0 / parameters[8];
+    const V v8 = 0.5 * (t2 - t0); const double v9 = 0.5 * (parameters[8] - 1.0);
+    const V v10 = X2 + d2 - X0 - d0, v11 = 0.5 * v10, v12 = v10 * v8,
+        v13 = d3 + (X3 - parameters[0]);
+    const double v14 = v7 * v9;
+    const V v15 = parameters[4] * v8 + v11 * t8, v16 = v11 * v11, v17 = v5 * t11, v18 = 0.5 * t11,
+        v19 = d1 + (X1 - parameters[0]), v20 = X3 + d3 - X1 - d1, v21 = 0.5 * t12, v22 = 0.5 * v20,
+        v23 = v7 * (v21 - v14 * t12), v24 = v22 * v22, v25 = t1 - t4, v26 = t3 - t4,
+        v27 = 0.5 * (t3 - t1), v28 = v24 + v16, v29 = v24 * v24, v30 = v20 * v27 + v12,
+        v31 = v22 * v29, v32 = softehl_vsqrt(v28), v33 = v28 * v28, v34 = v31 * v31,
+        v35 = 1.0 / (v33 * v33), v36 = parameters[6] * v32, v37 = softehl_vsqrt(1.0 / v28),
+        v38 = v16 + v35 * v34,
+        v39 = v27 * (v29 * (v29 * (5.0 * v20))) - v30 * (v34 * (v35 * (v33 * (4.0 * v28)))),
+        v40 = v32 * t10 + v30 * (v37 * (0.5 * parameters[6])), v41 = softehl_vsqrt(v38),
+        v42 = 1.0 / v41, v43 = softehl_vsqrt(1.0 / v38),
+        v44 = (v12 + v35 * v39) * (v43 * (v42 * (0.5 * v42)));
+    V s45 = {0}, s46 = {0}, s47 = {0}, s48 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q; (void)w;
+        const double *restrict B = basis + 2 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1; const double v49 = 0.5 * w[0]; const V v50 = p1 * v42;
+        const double v51 = 0.5 - v49, v52 = 0.5 + v49;
+        const V v53 = softehl_vexp(p0 * parameters[3]), v54 = v51 * v19 + v52 * v13,
+            v55 = parameters[0] + v54, v56 = v51 * v25 + v52 * v26, v57 = 0.5 * v54,
+            v58 = parameters[7] * v54, v59 = v57 * v50, v60 = parameters[2] * v53, v61 = 1.0 / v58,
+            v62 = parameters[1] * v60 * v61, v63 = v5 * v59, v64 = v55 * v1,
+            v65 = v1 * (t4 + v56) + v55 * v4, v66 = softehl_vlog(1.0 + v62 * v62),
+            v67 = softehl_vexp(v66 * v9), v68 = v62 * (parameters[9] + v3 * v67),
+            v69 = w[1] * (p0 * (v64 * v8 + v11 * v65));
+        s45 += v52 * v69; s46 += v51 * v69;
+        const V v70 = 0.932469514203152 * v63, v71 = 0.6612093864662645 * v63,
+            v72 = 0.2386191860831969 * v63, v73 = v68 + v70, v74 = v68 + v71, v75 = v68 + v72,
+            v76 = v68 - v72, v77 = v68 - v71, v78 = v68 - v70;
+        V v79[7];
+        softehl_film_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[9]), v62, softehl_splat(v9), softehl_splat(v3), softehl_splat(v14), v70, v71, v72, v68, v73, v74, v75, v76, v77, v78}, v79, &failed);
+        const V v80 = v79[1], v81 = v79[2], v82 = v79[3], v83 = v79[4], v84 = v79[5], v85 = v79[6],
+            v86 = v80 * v80, v87 = v81 * v81, v88 = v82 * v82, v89 = v83 * v83, v90 = v84 * v84,
+            v91 = v85 * v85, v92 = 1.0 + v86, v93 = 1.0 + v87, v94 = 1.0 + v88, v95 = 1.0 + v89,
+            v96 = 1.0 + v90, v97 = 1.0 + v91, v98 = softehl_vlog(v92), v99 = softehl_vlog(v93),
+            v100 = softehl_vlog(v94), v101 = softehl_vlog(v95), v102 = softehl_vlog(v96),
+            v103 = softehl_vlog(v97), v104 = 2.0 * v83, v105 = 2.0 * v82, v106 = 2.0 * v84,
+            v107 = 2.0 * v81, v108 = 2.0 * v85, v109 = 2.0 * v80, v110 = softehl_vexp(v14 * v99),
+            v111 = softehl_vexp(v14 * v100), v112 = softehl_vexp(v14 * v98),
+            v113 = softehl_vexp(v14 * v103), v114 = softehl_vexp(v14 * v101),
+            v115 = softehl_vexp(v14 * v102), v116 = v14 * (1.0 / v95), v117 = v14 * (1.0 / v94),
+            v118 = v14 * (1.0 / v96), v119 = v14 * (1.0 / v93), v120 = v14 * (1.0 / v97),
+            v121 = v14 * (1.0 / v92), v122 = v107 * v119, v123 = v109 * v121, v124 = v104 * v116,
+            v125 = v105 * v117, v126 = v108 * v120, v127 = v106 * v118, v128 = v3 * v110,
+            v129 = v3 * v111, v130 = v3 * v112, v131 = v3 * v113, v132 = v3 * v114,
+            v133 = v3 * v115, v134 = parameters[9] + v128, v135 = parameters[9] + v129,
+            v136 = parameters[9] + v130, v137 = parameters[9] + v131, v138 = parameters[9] + v132,
+            v139 = parameters[9] + v133, v140 = 1.0 / v134, v141 = 1.0 / v135, v142 = 1.0 / v136,
+            v143 = 1.0 / v137, v144 = 1.0 / (v134 * v134), v145 = 1.0 / (v135 * v135),
+            v146 = 1.0 / (v136 * v136), v147 = 1.0 / v138, v148 = 1.0 / (v137 * v137),
+            v149 = 1.0 / v139, v150 = 1.0 / (v138 * v138), v151 = 1.0 / (v139 * v139),
+            v152 = v81 * v140, v153 = v140 * v140, v154 = v82 * v141, v155 = v141 * v141,
+            v156 = v153 * (0.1803807865240693 * v81), v157 = v155 * (0.23395696728634552 * v82),
+            v158 = v85 * v143, v159 = v143 * v143, v160 = v159 * (0.08566224618958518 * v85),
+            v161 = v142 * v142, v162 = v80 * v142, v163 = v83 * v147, v164 = v147 * v147,
+            v165 = v161 * (0.08566224618958518 * v80), v166 = v164 * (0.23395696728634552 * v83),
+            v167 = v128 * v156, v168 = v129 * v157, v169 = v131 * v160,
+            v170 = 0.1803807865240693 * v140 - v122 * v167, v171 = v130 * v165,
+            v172 = 0.23395696728634552 * v141 - v125 * v168, v173 = v149 * v149, v174 = v84 * v149,
+            v175 = 0.08566224618958518 * v143 - v126 * v169, v176 = v132 * v166,
+            v177 = v173 * (0.1803807865240693 * v84),
+            v178 = 0.08566224618958518 * v142 - v123 * v171, v179 = 1.0 + v86 * v146,
+            v180 = 0.23395696728634552 * v147 - v124 * v176, v181 = softehl_vlog(v179),
+            v182 = 1.0 + v87 * v144, v183 = v133 * v177, v184 = softehl_vlog(v182),
+            v185 = 1.0 + v88 * v145, v186 = 1.0 + v89 * v150, v187 = softehl_vlog(v185),
+            v188 = softehl_vlog(v186), v189 = 1.0 + v90 * v151,
+            v190 = 0.1803807865240693 * v149 - v127 * v183, v191 = softehl_vlog(v189),
+            v192 = 1.0 + v91 * v148, v193 = softehl_vlog(v192), v194 = softehl_vexp(v9 * v181),
+            v195 = softehl_vexp(v9 * v184), v196 = softehl_vexp(v9 * v187),
+            v197 = softehl_vexp(v9 * v188), v198 = softehl_vexp(v9 * v191),
+            v199 = softehl_vexp(v9 * v193), v200 = v3 * v196, v201 = v3 * v198, v202 = v3 * v199,
+            v203 = parameters[9] + v200, v204 = v200 * v154, v205 = v204 * (v9 * (1.0 / v185)),
+            v206 = parameters[9] + v201, v207 = v201 * v174, v208 = v207 * (v9 * (1.0 / v189)),
+            v209 = parameters[9] + v202, v210 = v202 * v158, v211 = v210 * (v9 * (1.0 / v192)),
+            v212 = v3 * v194, v213 = parameters[9] + v212, v214 = v212 * v162,
+            v215 = v214 * (v9 * (1.0 / v179)), v216 = v3 * v195, v217 = v3 * v197,
+            v218 = parameters[9] + v216, v219 = v216 * v152, v220 = v219 * (v9 * (1.0 / v182)),
+            v221 = parameters[9] + v217, v222 = v217 * v163, v223 = v222 * (v9 * (1.0 / v186)),
+            v224 = v80 * v161 * v213 + v146 * (v146 * (2.0 * v86 * v136)) * v215,
+            v225 = v130 * v224, v226 = v142 * v213 + v109 * (v146 * v215 - v121 * v225),
+            v227 = v81 * v153 * v218 + v144 * (v144 * (2.0 * v87 * v134)) * v220,
+            v228 = v128 * v227, v229 = v140 * v218 + v107 * (v144 * v220 - v119 * v228),
+            v230 = v82 * v155 * v203 + v145 * (v145 * (2.0 * v88 * v135)) * v205,
+            v231 = v129 * v230, v232 = v141 * v203 + v105 * (v145 * v205 - v117 * v231),
+            v233 = v83 * v164 * v221 + v150 * (v150 * (2.0 * v89 * v138)) * v223,
+            v234 = v132 * v233, v235 = v147 * v221 + v104 * (v150 * v223 - v116 * v234),
+            v236 = v84 * v173 * v206 + v151 * (v151 * (2.0 * v90 * v139)) * v208,
+            v237 = v133 * v236, v238 = v149 * v206 + v106 * (v151 * v208 - v118 * v237),
+            v239 = v85 * v159 * v209 + v148 * (v148 * (2.0 * v91 * v137)) * v211,
+            v240 = v131 * v239, v241 = v143 * v209 + v108 * (v148 * v211 - v120 * v240);
+        V v242[49];
+        softehl_film_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v178, v170, v172, v180, v190, v175, softehl_splat((-1.0)), v226, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v229, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v232, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v235, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v238, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v241}, v242, &failed);
+        const V v243 = v79[0], v244 = v181 * v214, v245 = v57 * (p1 * v44), v246 = v184 * v219,
+            v247 = v187 * v204, v248 = v188 * v222, v249 = v191 * v207, v250 = v193 * v210,
+            v251 = v53 * (t6 + p0 * v2);
+        const M v252 = softehl_lt(softehl_splat(0.0), -p0);
+        const V v253 = 0.5 * v56, v254 = v50 * v253,
+            v255 = v60 * t5 + parameters[1] * v251 - v62 * (parameters[7] * v56 + v54 * t11),
+            v256 = parameters[7] * v243 - v59, v257 = v98 * v225, v258 = v61 * v255,
+            v259 = v5 * (v254 - v245 - v59 * v17), v260 = v101 * v234, v261 = v99 * v228,
+            v262 = v100 * v231, v263 = v102 * v237,
+            v264 = v102 * v183 + (v100 * v168 + (v99 * v167 + (v101 * v176 + v98 * v171))),
+            v265 = 0.932469514203152 * v259, v266 = 0.6612093864662645 * v259,
+            v267 = 0.2386191860831969 * v259, v268 = v103 * v240, v269 = v103 * v169 + v264,
+            v270 = v242[0], v271 = v242[1], v272 = v242[2], v273 = v242[3], v274 = v242[4],
+            v275 = v242[5], v276 = v242[6],
+            v277 = v156 + (v177 + (v157 + (v166 - v114 * v166) - v111 * v157) - v115 * v177),
+            v278 = v267 * (v273 - v274) + (v265 * (v271 - v276) + v266 * (v272 - v275)),
+            v279 = v227 + (v195 * v152 - v152 - v110 * v227),
+            v280 = v262 * v273 + (v261 * v272 + (v257 * v271 + (v268 * v276 + v270 * v269))),
+            v281 = v249 * v275 + (v248 * v274 + (v247 * v273 + (v244 * v271 + v246 * v272))),
+            v282 = v224 + (v194 * v162 - v162) - v112 * v224,
+            v283 = v165 + (v160 + (v277 - v110 * v156) - v113 * v160 - v112 * v165),
+            v284 = v230 + (v196 * v154 - v154) - v111 * v230,
+            v285 = v258 * v270 + v278 - v21 * (v250 * v276 + v281) + v23 * (v263 * v275 + (v260 * v274 + v280)),
+            v286 = v233 + (v197 * v163 - v163) - v114 * v233,
+            v287 = v272 * v279 + v271 * v282 + v273 * v284 + v270 * v283 + v274 * v286,
+            v288 = v239 + (v199 * v158 - v158 - v113 * v239),
+            v289 = v236 + (v198 * v174 - v174) - v115 * v236,
+            v290 = parameters[7] * (v285 + t13 * (v287 + v275 * v289 + v276 * v288)),
+            v291 = v64 * (p0 * v27 - v256 * v40 - v36 * (v245 + v243 * t11 - v254 + v290)),
+            v292 = w[1] * ((p0 * v22 - v36 * v256) * v65 + v291), v293 = v52 * v292;
+        s47 += v293; const V v294 = v51 * v292; s48 += v294; V v295 = softehl_splat(0.0);
+        const M m296 = v252;
+        if (softehl_any(m296)) {
+            const V v297 = -(w[1] * (p0 * v15)); v295 = softehl_blend(m296, v297, v295);
+        }
+        const V v298 = 1.0 / v60, v299 = v54 * v54, v300 = 0.1192694691878821 * v81,
+            v301 = 0.05582662111236089 * v82, v302 = 0.07987743308995329 * v80,
+            v303 = 0.07987743308995329 * v85, v304 = 0.05582662111236089 * v83,
+            v305 = 0.1192694691878821 * v84, v306 = v242[7], v307 = v242[8], v308 = v242[9],
+            v309 = v242[10], v310 = v242[11], v311 = v242[12], v312 = v242[13], v313 = v242[14],
+            v314 = v242[15], v315 = v242[16], v316 = v242[17], v317 = v242[18], v318 = v242[19],
+            v319 = v242[20], v320 = v242[21], v321 = v242[22], v322 = v242[23], v323 = v242[24],
+            v324 = v242[25], v325 = v242[26], v326 = v242[27], v327 = v242[28], v328 = v242[29],
+            v329 = v242[30], v330 = v242[31], v331 = v242[32], v332 = v242[33], v333 = v242[34],
+            v334 = v242[35], v335 = v242[36], v336 = v242[37], v337 = v242[38], v338 = v242[39],
+            v339 = v242[40], v340 = v242[41], v341 = v242[42], v342 = v242[43], v343 = v242[44],
+            v344 = v242[45], v345 = v242[46], v346 = v242[47], v347 = v242[48],
+            v348 = v266 * (v329 - v332) + (v265 * (v328 - v333) + v267 * (v330 - v331)),
+            v349 = v266 * (v322 - v325) + (v265 * (v321 - v326) + v267 * (v323 - v324)),
+            v350 = v267 * (v309 - v310) + (v265 * (v307 - v312) + v266 * (v308 - v311)),
+            v351 = v267 * (v337 - v338) + (v265 * (v335 - v340) + v266 * (v336 - v339)),
+            v352 = v267 * (v344 - v345) + (v265 * (v342 - v347) + v266 * (v343 - v346)),
+            v353 = v267 * (v316 - v317) + (v265 * (v314 - v319) + v266 * (v315 - v318)),
+            v354 = v249 * v318 + (v247 * v316 + (v246 * v315 + (v244 * v314 + v248 * v317))),
+            v355 = v263 * v318 + (v262 * v316 + (v261 * v315 + (v257 * v314 + v260 * v317))),
+            v356 = v318 * v289 + (v316 * v284 + (v315 * v279 + (v314 * v282 + v317 * v286))),
+            v357 = v249 * v346 + (v247 * v344 + (v246 * v343 + (v244 * v342 + v248 * v345))),
+            v358 = v263 * v346 + (v262 * v344 + (v261 * v343 + (v257 * v342 + v260 * v345))),
+            v359 = v346 * v289 + (v344 * v284 + (v343 * v279 + (v342 * v282 + v345 * v286))),
+            v360 = v249 * v339 + (v247 * v337 + (v246 * v336 + (v244 * v335 + v248 * v338))),
+            v361 = v263 * v339 + (v262 * v337 + (v261 * v336 + (v257 * v335 + v260 * v338))),
+            v362 = v339 * v289 + (v337 * v284 + (v336 * v279 + (v335 * v282 + v338 * v286))),
+            v363 = v258 * v313 + v353 + t13 * (v313 * v283 + (v319 * v288 + v356)) + v23 * (v269 * v313 + (v268 * v319 + v355)),
+            v364 = v258 * v341 + v352 + t13 * (v341 * v283 + (v347 * v288 + v359)) + v23 * (v269 * v341 + (v268 * v347 + v358)),
+            v365 = v258 * v334 + v351 + t13 * (v334 * v283 + (v340 * v288 + v362)) + v23 * (v269 * v334 + (v268 * v340 + v361)),
+            v366 = v365 - v21 * (v250 * v340 + v360), v367 = v363 - v21 * (v250 * v319 + v354),
+            v368 = v364 - v21 * (v250 * v347 + v357),
+            v369 = v303 * v143 + v304 * v147 - v300 * v140 - v301 * v141 - v302 * v142,
+            v370 = v305 * v149 + v369,
+            v371 = v303 * v159 * (t13 * (1.0 - v113) + v131 * (v103 * v23 + v126 * v368)),
+            v372 = v300 * v153 * (t13 * (1.0 - v110) + v128 * (v99 * v23 + v122 * v367)),
+            v373 = v305 * v173 * (t13 * (1.0 - v115) + v133 * (v102 * v23 + v127 * v366)),
+            v374 = 0.1192694691878821 * (v149 * v366 - v140 * v367) - v371 + v372 - v373,
+            v375 = v262 * v309 + (v261 * v308 + (v257 * v307 + (v269 * v306 + v260 * v310))),
+            v376 = v262 * v323 + (v261 * v322 + (v257 * v321 + (v269 * v320 + v260 * v324))),
+            v377 = v262 * v330 + (v261 * v329 + (v257 * v328 + (v269 * v327 + v260 * v331))),
+            v378 = v309 * v284 + (v308 * v279 + (v307 * v282 + (v310 * v286 + v306 * v283))),
+            v379 = v323 * v284 + (v322 * v279 + (v321 * v282 + (v324 * v286 + v320 * v283))),
+            v380 = v330 * v284 + (v329 * v279 + (v328 * v282 + (v331 * v286 + v327 * v283))),
+            v381 = v249 * v311 + (v247 * v309 + (v246 * v308 + (v244 * v307 + v248 * v310))),
+            v382 = v249 * v325 + (v247 * v323 + (v246 * v322 + (v244 * v321 + v248 * v324))),
+            v383 = v249 * v332 + (v247 * v330 + (v246 * v329 + (v244 * v328 + v248 * v331))),
+            v384 = v258 * v306 + v350 + v23 * (v268 * v312 + (v263 * v311 + v375)) - v21 * (v250 * v312 + v381),
+            v385 = v258 * v327 + v348 + v23 * (v268 * v333 + (v263 * v332 + v377)) - v21 * (v250 * v333 + v383),
+            v386 = v258 * v320 + v349 + v23 * (v268 * v326 + (v263 * v325 + v376)) - v21 * (v250 * v326 + v382),
+            v387 = v384 + t13 * (v312 * v288 + (v311 * v289 + v378)),
+            v388 = v385 + t13 * (v333 * v288 + (v332 * v289 + v380)),
+            v389 = v386 + t13 * (v326 * v288 + (v325 * v289 + v379)),
+            v390 = v374 - v251 * (v298 * v370) + 0.07987743308995329 * (v143 * v368 - v142 * v387),
+            v391 = v302 * v161 * (t13 * (1.0 - v112) + v130 * (v98 * v23 + v123 * v387)),
+            v392 = v301 * v155 * (t13 * (1.0 - v111) + v129 * (v100 * v23 + v125 * v389)),
+            v393 = v304 * v164 * (t13 * (1.0 - v114) + v132 * (v101 * v23 + v124 * v388)),
+            v394 = v390 + v391 + v392 - v393 + 0.05582662111236089 * (v147 * v388 - v141 * v389),
+            v395 = parameters[1] * v253 + v57 * t5 + v298 * ((v299 * v18 + v58 * v56) * v370 + v6 * v299 * v394),
+            v396 = w[1] * v395;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[2 * i], D = B[2 * i + 1]; (void)N, (void)D;
+            R_lanes[4 + i] += N * v295 + D * v396;
+        }
+    }
+    const V v397 = -s45, v398 = -s46;
+    R_lanes[0] = s48; R_lanes[1] = v398; R_lanes[2] = s47; R_lanes[3] = v397;
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+#endif
+    if (softehl_any(failed)) {
+        softehl_spoil(failed, R, (4 + modes));
+    }
 }
+SOFTEHL_BATCH(softehl_film_carreau_pseudo_load, 4, (4 + modes), 0, 14, (4 + modes), 0)
+
+SOFTEHL_GROUP(softehl_film_carreau_fields_rate)
+{
+    SOFTEHL_IDLE;
+    M failed = softehl_mask(0);
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15, t16, t17;
+    softehl_load4(t + 0, (14 + (4 + modes)), &t0, &t1, &t2, &t3);
+    softehl_load4(t + 4, (14 + (4 + modes)), &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, (14 + (4 + modes)), &t8, &t9, &t10, &t11);
+    softehl_load4(t + 12, (14 + (4 + modes)), &t12, &t13, &t14, &t15);
+    softehl_load2(t + 16, (14 + (4 + modes)), &t16, &t17); (void)t8; (void)t9; (void)t10;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V t_lanes[(14 + (4 + modes))];
+#else
+    const V *const t_lanes = t;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(t_lanes, t, (14 + (4 + modes)));
+#endif
+    const double v1 = 1.0 - parameters[9];
+    const V v2 = t1 + t15, v3 = t2 + t16, v4 = t3 + t17;
+    const double v5 = 1.0 / parameters[7], v6 = 0.5 * parameters[7], v7 = 6.0 * parameters[7],
+        v8 = 1.0 / parameters[8];
+    const V v9 = X2 + d2 - X0 - d0; const double v10 = 0.5 * (parameters[8] - 1.0);
+    const V v11 = v2 - t4, v12 = v4 - t4, v13 = 0.5 * (v4 - v2), v14 = 0.5 * v9, v15 = v14 * v14,
+        v16 = d1 + (X1 - parameters[0]);
+    const double v17 = v8 * v10;
+    const V v18 = d3 + (X3 - parameters[0]), v19 = X3 + d3 - X1 - d1, v20 = 0.5 * t12,
+        v21 = 0.5 * v19, v22 = t0 + t14, v23 = 0.5 * (v3 - t0 - t14), v24 = v8 * (v20 - v17 * t12),
+        v25 = v21 * v21, v26 = v9 * v23, v27 = 0.5 * t11, v28 = v5 * t11, v29 = 6.0 * t11,
+        v30 = v25 + v15, v31 = v25 * v25, v32 = v21 * v31, v33 = v30 * v30, v34 = v32 * v32,
+        v35 = 1.0 / (v33 * v33),
+        v36 = v31 * (v31 * (5.0 * v19)) * v13 - v34 * (v35 * (v33 * (4.0 * v30))) * (v26 + v19 * v13),
+        v37 = v15 + v35 * v34, v38 = softehl_vsqrt(v37), v39 = 1.0 / v38,
+        v40 = softehl_vsqrt(1.0 / v37), v41 = v40 * (0.5 * v39) * (v26 + v35 * v36);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q; (void)w;
+        const double *restrict B = basis + 2 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1; V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            tp0 += B[2 * i] * t_lanes[18 + i]; tp1 += B[2 * i + 1] * t_lanes[18 + i];
+        }
+        (void)tp0, (void)tp1; const double v42 = 0.5 * w[0];
+        const V v43 = softehl_vexp(p0 * parameters[3]), v44 = p1 * v39;
+        const double v45 = 0.5 - v42, v46 = 0.5 + v42;
+        const V v47 = w[1] * v23, v48 = v45 * v16 + v46 * v18, v49 = parameters[2] * v43,
+            v50 = v46 * v3 + v45 * v22, v51 = v45 * v11 + v46 * v12, v52 = 0.5 * v48,
+            v53 = parameters[7] * v48, v54 = v52 * v44, v55 = 1.0 / v53,
+            v56 = parameters[1] * v49 * v55, v57 = v5 * v54, v58 = softehl_vlog(1.0 + v56 * v56),
+            v59 = softehl_vexp(v58 * v10), v60 = v56 * (parameters[9] + v1 * v59),
+            v61 = 0.932469514203152 * v57, v62 = 0.6612093864662645 * v57,
+            v63 = 0.2386191860831969 * v57, v64 = v60 + v61, v65 = v60 + v62, v66 = v60 + v63,
+            v67 = v60 - v63, v68 = v60 - v62, v69 = v60 - v61;
+        V v70[7];
+        softehl_film_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[9]), v56, softehl_splat(v10), softehl_splat(v1), softehl_splat(v17), v61, v62, v63, v60, v64, v65, v66, v67, v68, v69}, v70, &failed);
+        const V v71 = v70[1], v72 = v70[2], v73 = v70[3], v74 = v70[4], v75 = v70[5], v76 = v70[6],
+            v77 = v71 * v71, v78 = v72 * v72, v79 = v73 * v73, v80 = v74 * v74, v81 = v75 * v75,
+            v82 = v76 * v76, v83 = 1.0 + v77, v84 = 1.0 + v78, v85 = 1.0 + v79, v86 = 1.0 + v80,
+            v87 = 1.0 + v81, v88 = 1.0 + v82, v89 = softehl_vlog(v83), v90 = softehl_vlog(v84),
+            v91 = softehl_vlog(v85), v92 = softehl_vlog(v86), v93 = softehl_vlog(v87),
+            v94 = softehl_vlog(v88), v95 = 2.0 * v74, v96 = 2.0 * v73, v97 = 2.0 * v75,
+            v98 = 2.0 * v72, v99 = 2.0 * v76, v100 = 2.0 * v71, v101 = softehl_vexp(v17 * v90),
+            v102 = softehl_vexp(v17 * v91), v103 = softehl_vexp(v17 * v89),
+            v104 = softehl_vexp(v17 * v94), v105 = softehl_vexp(v17 * v92),
+            v106 = softehl_vexp(v17 * v93), v107 = v17 * (1.0 / v86), v108 = v17 * (1.0 / v85),
+            v109 = v17 * (1.0 / v87), v110 = v17 * (1.0 / v84), v111 = v17 * (1.0 / v88),
+            v112 = v17 * (1.0 / v83), v113 = v98 * v110, v114 = v100 * v112, v115 = v95 * v107,
+            v116 = v96 * v108, v117 = v99 * v111, v118 = v97 * v109, v119 = v1 * v101,
+            v120 = v1 * v102, v121 = v1 * v103, v122 = v1 * v104, v123 = v1 * v105,
+            v124 = v1 * v106, v125 = parameters[9] + v119, v126 = parameters[9] + v120,
+            v127 = parameters[9] + v121, v128 = parameters[9] + v122, v129 = parameters[9] + v123,
+            v130 = parameters[9] + v124, v131 = 1.0 / v125, v132 = 1.0 / v126, v133 = 1.0 / v127,
+            v134 = 1.0 / v128, v135 = 1.0 / (v125 * v125), v136 = 1.0 / (v126 * v126),
+            v137 = 1.0 / (v127 * v127), v138 = 1.0 / v129, v139 = 1.0 / (v128 * v128),
+            v140 = 1.0 / v130, v141 = 1.0 / (v129 * v129), v142 = 1.0 / (v130 * v130),
+            v143 = v72 * v131, v144 = v131 * v131, v145 = v73 * v132, v146 = v132 * v132,
+            v147 = v144 * (0.1803807865240693 * v72), v148 = v146 * (0.23395696728634552 * v73),
+            v149 = v76 * v134, v150 = v134 * v134, v151 = v150 * (0.08566224618958518 * v76),
+            v152 = v133 * v133, v153 = v71 * v133, v154 = v74 * v138, v155 = v138 * v138,
+            v156 = v152 * (0.08566224618958518 * v71), v157 = v155 * (0.23395696728634552 * v74),
+            v158 = v119 * v147, v159 = v120 * v148, v160 = v122 * v151,
+            v161 = 0.1803807865240693 * v131 - v113 * v158, v162 = v121 * v156,
+            v163 = 0.23395696728634552 * v132 - v116 * v159, v164 = v140 * v140, v165 = v75 * v140,
+            v166 = 0.08566224618958518 * v134 - v117 * v160, v167 = v123 * v157,
+            v168 = v164 * (0.1803807865240693 * v75),
+            v169 = 0.08566224618958518 * v133 - v114 * v162, v170 = 1.0 + v77 * v137,
+            v171 = 0.23395696728634552 * v138 - v115 * v167, v172 = softehl_vlog(v170),
+            v173 = 1.0 + v78 * v135, v174 = v124 * v168, v175 = softehl_vlog(v173),
+            v176 = 1.0 + v79 * v136, v177 = 1.0 + v80 * v141, v178 = softehl_vlog(v176),
+            v179 = softehl_vlog(v177), v180 = 1.0 + v81 * v142,
+            v181 = 0.1803807865240693 * v140 - v118 * v174, v182 = softehl_vlog(v180),
+            v183 = 1.0 + v82 * v139, v184 = softehl_vlog(v183), v185 = softehl_vexp(v10 * v172),
+            v186 = softehl_vexp(v10 * v175), v187 = softehl_vexp(v10 * v178),
+            v188 = softehl_vexp(v10 * v179), v189 = softehl_vexp(v10 * v182),
+            v190 = softehl_vexp(v10 * v184), v191 = v1 * v187, v192 = v1 * v189, v193 = v1 * v190,
+            v194 = parameters[9] + v191, v195 = v191 * v145, v196 = v195 * (v10 * (1.0 / v176)),
+            v197 = parameters[9] + v192, v198 = v192 * v165, v199 = v198 * (v10 * (1.0 / v180)),
+            v200 = parameters[9] + v193, v201 = v193 * v149, v202 = v201 * (v10 * (1.0 / v183)),
+            v203 = v1 * v185, v204 = parameters[9] + v203, v205 = v203 * v153,
+            v206 = v205 * (v10 * (1.0 / v170)), v207 = v1 * v186, v208 = v1 * v188,
+            v209 = parameters[9] + v207, v210 = v207 * v143, v211 = v210 * (v10 * (1.0 / v173)),
+            v212 = parameters[9] + v208, v213 = v208 * v154, v214 = v213 * (v10 * (1.0 / v177)),
+            v215 = v71 * v152 * v204 + v137 * (v137 * (2.0 * v77 * v127)) * v206,
+            v216 = v121 * v215, v217 = v133 * v204 + v100 * (v137 * v206 - v112 * v216),
+            v218 = v72 * v144 * v209 + v135 * (v135 * (2.0 * v78 * v125)) * v211,
+            v219 = v119 * v218, v220 = v131 * v209 + v98 * (v135 * v211 - v110 * v219),
+            v221 = v73 * v146 * v194 + v136 * (v136 * (2.0 * v79 * v126)) * v196,
+            v222 = v120 * v221, v223 = v132 * v194 + v96 * (v136 * v196 - v108 * v222),
+            v224 = v74 * v155 * v212 + v141 * (v141 * (2.0 * v80 * v129)) * v214,
+            v225 = v123 * v224, v226 = v138 * v212 + v95 * (v141 * v214 - v107 * v225),
+            v227 = v75 * v164 * v197 + v142 * (v142 * (2.0 * v81 * v130)) * v199,
+            v228 = v124 * v227, v229 = v140 * v197 + v97 * (v142 * v199 - v109 * v228),
+            v230 = v76 * v150 * v200 + v139 * (v139 * (2.0 * v82 * v128)) * v202,
+            v231 = v122 * v230, v232 = v134 * v200 + v99 * (v139 * v202 - v111 * v231);
+        V v233[49];
+        softehl_film_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v169, v161, v163, v171, v181, v166, softehl_splat((-1.0)), v217, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v220, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v223, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v226, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v229, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v232}, v233, &failed);
+        const V v234 = v43 * t6 + v49 * (p0 * t7 + parameters[3] * tp0), v235 = v70[0],
+            v236 = v172 * v205, v237 = v175 * v210, v238 = v178 * v195, v239 = v179 * v213,
+            v240 = v182 * v198, v241 = v184 * v201, v242 = v89 * v216, v243 = v90 * v219,
+            v244 = v91 * v222, v245 = v92 * v225, v246 = v93 * v228,
+            v247 = v93 * v174 + (v92 * v167 + (v91 * v159 + (v90 * v158 + v89 * v162))),
+            v248 = v94 * v231, v249 = v94 * v160 + v247, v250 = v233[0], v251 = v233[1],
+            v252 = v233[2], v253 = v233[3], v254 = v233[4], v255 = v233[5], v256 = v233[6],
+            v257 = v147 + (v168 + (v148 + (v157 - v105 * v157) - v102 * v148) - v106 * v168),
+            v258 = v218 + (v186 * v143 - v143 - v101 * v218),
+            v259 = v215 + (v185 * v153 - v153) - v103 * v215,
+            v260 = v244 * v253 + (v243 * v252 + (v242 * v251 + (v248 * v256 + v250 * v249))),
+            v261 = v240 * v255 + (v239 * v254 + (v238 * v253 + (v236 * v251 + v237 * v252))),
+            v262 = v151 + (v156 + (v257 - v101 * v147 - v103 * v156)) - v104 * v151,
+            v263 = v221 + (v187 * v145 - v145) - v102 * v221,
+            v264 = v224 + (v188 * v154 - v154) - v105 * v224,
+            v265 = v24 * (v246 * v255 + (v245 * v254 + v260)) - v20 * (v241 * v256 + v261),
+            v266 = 0.5 * v51, v267 = v227 + (v189 * v165 - v165) - v106 * v227,
+            v268 = v255 * v267 + (v252 * v258 + v251 * v259 + v253 * v263 + v254 * v264),
+            v269 = v230 + (v190 * v149 - v149 - v104 * v230),
+            v270 = v44 * v266 + v52 * (v39 * (tp1 - p1 * v41)),
+            v271 = v49 * t5 + parameters[1] * v234 - v56 * (v48 * t11 + parameters[7] * v51),
+            v272 = v55 * v271, v273 = v5 * (v270 - v54 * v28), v274 = 0.932469514203152 * v273,
+            v275 = (v251 - v256) * v274 + (v250 * v272 + v265 + t13 * (v256 * v269 + v268 + v250 * v262)),
+            v276 = 0.6612093864662645 * v273, v277 = 0.2386191860831969 * v273,
+            v278 = parameters[7] * ((v253 - v254) * v277 + ((v252 - v255) * v276 + v275)),
+            v279 = v235 * t11 + v278, v280 = v270 + v279, v281 = v279 - v270, v282 = 1.0 / v49,
+            v283 = v48 * v48, v284 = 0.1192694691878821 * v72, v285 = 0.05582662111236089 * v73,
+            v286 = 0.07987743308995329 * v71, v287 = 0.07987743308995329 * v76,
+            v288 = 0.05582662111236089 * v74, v289 = 0.1192694691878821 * v75, v290 = v233[7],
+            v291 = v233[8], v292 = v233[9], v293 = v233[10], v294 = v233[11], v295 = v233[12],
+            v296 = v233[13], v297 = v233[14], v298 = v233[15], v299 = v233[16], v300 = v233[17],
+            v301 = v233[18], v302 = v233[19], v303 = v233[20], v304 = v233[21], v305 = v233[22],
+            v306 = v233[23], v307 = v233[24], v308 = v233[25], v309 = v233[26], v310 = v233[27],
+            v311 = v233[28], v312 = v233[29], v313 = v233[30], v314 = v233[31], v315 = v233[32],
+            v316 = v233[33], v317 = v233[34], v318 = v233[35], v319 = v233[36], v320 = v233[37],
+            v321 = v233[38], v322 = v233[39], v323 = v233[40], v324 = v233[41], v325 = v233[42],
+            v326 = v233[43], v327 = v233[44], v328 = v233[45], v329 = v233[46], v330 = v233[47],
+            v331 = v233[48],
+            v332 = v240 * v302 + (v238 * v300 + (v237 * v299 + (v236 * v298 + v239 * v301))),
+            v333 = v246 * v302 + (v244 * v300 + (v243 * v299 + (v242 * v298 + v245 * v301))),
+            v334 = v302 * v267 + (v300 * v263 + (v299 * v258 + (v298 * v259 + v301 * v264))),
+            v335 = v240 * v323 + (v238 * v321 + (v237 * v320 + (v236 * v319 + v239 * v322))),
+            v336 = v246 * v323 + (v244 * v321 + (v243 * v320 + (v242 * v319 + v245 * v322))),
+            v337 = v323 * v267 + (v321 * v263 + (v320 * v258 + (v319 * v259 + v322 * v264))),
+            v338 = v240 * v330 + (v238 * v328 + (v237 * v327 + (v236 * v326 + v239 * v329))),
+            v339 = v246 * v330 + (v244 * v328 + (v243 * v327 + (v242 * v326 + v245 * v329))),
+            v340 = v330 * v267 + (v328 * v263 + (v327 * v258 + (v326 * v259 + v329 * v264))),
+            v341 = t13 * (v318 * v262 + (v324 * v269 + v337)) + ((v319 - v324) * v274 - v20 * (v241 * v324 + v335)),
+            v342 = t13 * (v325 * v262 + (v331 * v269 + v340)) + ((v326 - v331) * v274 - v20 * (v241 * v331 + v338)),
+            v343 = t13 * (v297 * v262 + (v303 * v269 + v334)) + ((v298 - v303) * v274 - v20 * (v241 * v303 + v332)),
+            v344 = v297 * v272 + (v24 * (v249 * v297 + (v248 * v303 + v333)) + v343),
+            v345 = v318 * v272 + (v24 * (v249 * v318 + (v248 * v324 + v336)) + v341),
+            v346 = v325 * v272 + (v24 * (v249 * v325 + (v248 * v331 + v339)) + v342),
+            v347 = v288 * v138 + (v287 * v134 - v286 * v133 - v284 * v131 - v285 * v132),
+            v348 = v289 * v140 + v347, v349 = (v300 - v301) * v277 + ((v299 - v302) * v276 + v344),
+            v350 = (v321 - v322) * v277 + ((v320 - v323) * v276 + v345),
+            v351 = (v328 - v329) * v277 + ((v327 - v330) * v276 + v346),
+            v352 = (v293 - v294) * v277 + ((v291 - v296) * v274 + (v292 - v295) * v276),
+            v353 = (v307 - v308) * v277 + ((v305 - v310) * v274 + (v306 - v309) * v276),
+            v354 = (v314 - v315) * v277 + ((v312 - v317) * v274 + (v313 - v316) * v276),
+            v355 = v284 * v144 * (t13 * (1.0 - v101) + v119 * (v90 * v24 + v113 * v349)),
+            v356 = v287 * v150 * (t13 * (1.0 - v104) + v122 * (v94 * v24 + v117 * v351)),
+            v357 = v289 * v164 * (t13 * (1.0 - v106) + v124 * (v93 * v24 + v118 * v350)),
+            v358 = 0.1192694691878821 * (v140 * v350 - v131 * v349) + v355 - v356 - v357,
+            v359 = v244 * v307 + (v243 * v306 + (v249 * v304 + (v242 * v305 + v245 * v308))),
+            v360 = v244 * v293 + (v243 * v292 + (v242 * v291 + (v249 * v290 + v245 * v294))),
+            v361 = v244 * v314 + (v243 * v313 + (v242 * v312 + (v249 * v311 + v245 * v315))),
+            v362 = v293 * v263 + (v292 * v258 + (v291 * v259 + (v294 * v264 + v290 * v262))),
+            v363 = v307 * v263 + (v306 * v258 + (v304 * v262 + (v305 * v259 + v308 * v264))),
+            v364 = v314 * v263 + (v313 * v258 + (v312 * v259 + (v315 * v264 + v311 * v262))),
+            v365 = v240 * v295 + (v238 * v293 + (v237 * v292 + (v236 * v291 + v239 * v294))),
+            v366 = v240 * v309 + (v238 * v307 + (v237 * v306 + (v236 * v305 + v239 * v308))),
+            v367 = v240 * v316 + (v238 * v314 + (v237 * v313 + (v236 * v312 + v239 * v315))),
+            v368 = v24 * (v248 * v317 + (v246 * v316 + v361)) + (v311 * v272 + v354),
+            v369 = v24 * (v248 * v296 + (v246 * v295 + v360)) + (v290 * v272 + v352),
+            v370 = v304 * v272 + v353 + v24 * (v248 * v310 + (v246 * v309 + v359)) - v20 * (v241 * v310 + v366),
+            v371 = t13 * (v296 * v269 + (v295 * v267 + v362)) + (v369 - v20 * (v241 * v296 + v365)),
+            v372 = v370 + t13 * (v310 * v269 + (v309 * v267 + v363)),
+            v373 = t13 * (v317 * v269 + (v316 * v267 + v364)) + (v368 - v20 * (v241 * v317 + v367)),
+            v374 = v286 * v152 * (t13 * (1.0 - v103) + v121 * (v89 * v24 + v114 * v371)),
+            v375 = v285 * v146 * (t13 * (1.0 - v102) + v120 * (v91 * v24 + v116 * v372)),
+            v376 = v358 + 0.07987743308995329 * (v134 * v351 - v133 * v371) + v374 + v375,
+            v377 = v288 * v155 * (t13 * (1.0 - v105) + v123 * (v92 * v24 + v115 * v373)),
+            v378 = v376 - v377 + 0.05582662111236089 * (v138 * v373 - v132 * v372),
+            v379 = (v283 * v27 + v53 * v51) * v348 + v6 * v283 * (v378 - v234 * (v282 * v348)),
+            v380 = v52 * t5 + parameters[1] * v266 + v282 * v379, v381 = 1.0 / v48,
+            v382 = v381 * (v7 * (v51 * (v348 * v381) - v378) - v348 * v29);
+        softehl_store4(R + 9 * q + 0, (9 * points), v50, v47, v51, tp0);
+        softehl_store4(R + 9 * q + 4, (9 * points), v281, v380, v280, v234);
+        softehl_store1(R + 9 * q + 8, (9 * points), v382);
+    }
+    if (softehl_any(failed)) {
+        softehl_spoil(failed, R, (9 * points));
+    }
+}
+SOFTEHL_BATCH(softehl_film_carreau_fields_rate, 4, (4 + modes), 0, (14 + (4 + modes)), (9 * points), 0)

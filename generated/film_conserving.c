@@ -32,22 +32,15 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_film_conserving_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_conserving_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -64,187 +57,62 @@ static void softehl_film_conserving_residual_group(
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
     const double v1 = 6.283185307179586 * parameters[4];
-    const V v2 = X2 + d2;
-    const V v3 = X1 - parameters[0];
-    const V v4 = X3 - parameters[0];
-    const V v5 = d1 + v3;
-    const V v6 = d2 * parameters[6];
-    const V v7 = a1 + v6;
-    const V v8 = d0 * parameters[6];
-    const V v9 = a0 + v8;
-    const V v10 = d3 + v4;
-    const V v11 = v2 - d0;
-    const V v12 = v11 - X0;
-    const V v13 = 0.5 * v12;
-    const V v14 = v10 - v5;
-    const V v15 = 0.5 * v14;
-    const V v16 = v15 * v15;
-    const V v17 = 1.0 / v13;
-    const V v18 = 0.5 * v17;
-    const V v19 = parameters[2] * v13;
-    const V v20 = v13 * v13;
-    const V v21 = v16 + v20;
-    const V v22 = softehl_vsqrt(v21);
-    const V v23 = parameters[5] * v22;
-    V s24 = softehl_splat(0.0);
-    V s25 = softehl_splat(0.0);
-    V s26 = softehl_splat(0.0);
-    V s27 = softehl_splat(0.0);
+    const V v2 = d1 + (X1 - parameters[0]), v3 = a1 + d2 * parameters[6],
+        v4 = a0 + d0 * parameters[6], v5 = d3 + (X3 - parameters[0]),
+        v6 = 0.5 * (X2 + d2 - d0 - X0), v7 = 0.5 * (v5 - v2), v8 = 0.5 * (1.0 / v6),
+        v9 = parameters[2] * v6, v10 = softehl_vsqrt(v7 * v7 + v6 * v6), v11 = parameters[5] * v10;
+    V s12 = {0}, s13 = {0}, s14 = {0}, s15 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v28 = 0.5 * w[0];
-        const V v29 = p0 * v13;
-        const double v30 = 0.5 + v28;
-        const double v31 = 0.5 - v28;
-        const V v32 = w[3] * v29;
-        const V v33 = v30 * v7;
-        const V v34 = parameters[1] - v33;
-        const V v35 = v31 * v5;
-        const V v36 = v31 * v9;
-        const V v37 = v34 - v36;
-        const M v38 = softehl_lt(softehl_splat(0.0), v37);
-        const V v39 = v30 * v10;
-        const V v40 = v35 + v39;
-        const V v41 = parameters[0] + v40;
-        const V v42 = v41 * v1;
-        const V v43 = v32 * v42;
-        const V v44 = v30 * v43;
-        s24 += v44;
-        const V v45 = v31 * v43;
-        s25 += v45;
-        const V v46 = softehl_blend(v38, v37, softehl_splat(0.0));
-        const V v47 = softehl_blend(v38, softehl_splat(0.0), v37);
-        const double v48 = 0.5 * w[1];
-        const double v49 = 0.5 * w[2];
-        const V v50 = 0.08333333333333333 * p3;
-        const V v51 = 1.0 - p6;
-        const V v52 = 1.0 - p4;
-        const double v53 = 0.5 - v48;
-        const double v54 = 0.5 + v48;
-        const double v55 = 0.5 - v49;
-        const double v56 = 0.5 + v49;
-        const V v57 = p1 * v18;
-        const V v58 = v51 * v47;
-        const V v59 = p2 * parameters[3];
-        const V v60 = p0 * parameters[3];
-        const V v61 = p0 * v15;
-        const V v62 = v53 * v5;
-        const V v63 = v55 * v5;
-        const V v64 = softehl_vexp(v59);
-        const V v65 = v52 * v46;
-        const V v66 = v58 + v65;
-        const V v67 = softehl_vexp(v60);
-        const V v68 = v54 * v10;
-        const V v69 = v62 + v68;
-        const V v70 = v56 * v10;
-        const V v71 = v63 + v70;
-        const V v72 = 1.0 / v40;
-        const V v73 = 0.5 * v40;
-        const V v74 = v69 * v71;
-        const V v75 = v73 * v66;
-        const V v76 = v69 + v71;
-        const V v77 = w[3] * v42;
-        const V v78 = 0.5 * v76;
-        const V v79 = parameters[2] * v67;
-        const V v80 = v79 * v66;
-        const V v81 = v72 * v80;
-        const V v82 = v40 * v57;
-        const V v83 = v81 - v82;
-        const V v84 = v23 * v83;
-        const V v85 = v61 - v84;
-        const V v86 = v85 * v77;
-        const V v87 = v50 * v78;
-        const V v88 = v78 * v78;
-        const V v89 = v64 * v19;
-        const V v90 = 1.0 / v89;
-        const V v91 = v88 * v87;
-        const V v92 = 1.0 / v88;
-        const V v93 = v74 * v92;
-        const V v94 = v93 * v91;
-        const V v95 = v90 * v94;
-        const V v96 = v75 - v95;
-        const V v97 = v93 * v96;
-        const V v98 = w[3] * v97;
-        const V v99 = v30 * v86;
-        s26 += v99;
-        const V v100 = v31 * v86;
-        s27 += v100;
+        const double v16 = 0.5 * w[0], v17 = 0.5 + v16, v18 = 0.5 - v16;
+        const V v19 = parameters[1] - v17 * v3 - v18 * v4;
+        const M v20 = softehl_lt(softehl_splat(0.0), v19);
+        const V v21 = v18 * v2 + v17 * v5, v22 = (parameters[0] + v21) * v1,
+            v23 = w[3] * (p0 * v6) * v22;
+        s12 += v17 * v23; s13 += v18 * v23;
+        const V v24 = softehl_blend(v20, v19, softehl_splat(0.0)),
+            v25 = softehl_blend(v20, softehl_splat(0.0), v19);
+        const double v26 = 0.5 * w[1], v27 = 0.5 * w[2];
+        const V v28 = softehl_vexp(p2 * parameters[3]), v29 = (1.0 - p6) * v25 + (1.0 - p4) * v24,
+            v30 = softehl_vexp(p0 * parameters[3]), v31 = (0.5 - v26) * v2 + (0.5 + v26) * v5,
+            v32 = (0.5 - v27) * v2 + (0.5 + v27) * v5, v33 = 0.5 * (v31 + v32),
+            v34 = v11 * (1.0 / v21 * (parameters[2] * v30 * v29) - v21 * (p1 * v8)),
+            v35 = (p0 * v7 - v34) * (w[3] * v22), v36 = v33 * v33, v37 = v31 * v32 * (1.0 / v36),
+            v38 = 1.0 / (v28 * v9) * (v37 * (v36 * (0.08333333333333333 * p3 * v33))),
+            v39 = w[3] * (v37 * (0.5 * v21 * v29 - v38));
+        s14 += v17 * v35; s15 += v18 * v35;
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
             (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
-            R_lanes[4 + i] += D1 * v98;
+            R_lanes[4 + i] += D1 * v39;
         }
     }
-    const V v101 = -s24;
-    const V v102 = -s25;
-    R_lanes[0] = s27;
-    R_lanes[1] = v102;
-    R_lanes[2] = s26;
-    R_lanes[3] = v101;
+    const V v40 = -s12, v41 = -s13;
+    R_lanes[0] = s15; R_lanes[1] = v41; R_lanes[2] = s14; R_lanes[3] = v40;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_conserving_residual, 4, (4 + modes), 2, 0, (4 + modes), 0)
 
-void softehl_film_conserving_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_conserving_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_residual_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_residual_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_conserving_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_conserving_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -267,470 +135,147 @@ static void softehl_film_conserving_tangent_group(
 #endif
     for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
         K_lanes[i] = softehl_splat(0.0);
-    const double v1 = 6.283185307179586 * parameters[4];
-    const V v2 = X2 + d2;
-    const double v3 = parameters[2] * parameters[3];
-    const V v4 = X1 - parameters[0];
-    const V v5 = X3 - parameters[0];
-    const V v6 = d2 * parameters[6];
-    const V v7 = a1 + v6;
-    const V v8 = d1 + v4;
-    const V v9 = d3 + v5;
-    const double v10 = 0.5 * parameters[6];
-    const V v11 = d0 * parameters[6];
-    const V v12 = a0 + v11;
-    const V v13 = v2 - d0;
-    const V v14 = v13 - X0;
-    const V v15 = 0.5 * v14;
-    const V v16 = v9 - v8;
-    const V v17 = 0.5 * v16;
-    const V v18 = v1 * v15;
-    const V v19 = 1.0 / v15;
-    const V v20 = v15 * v3;
-    const V v21 = v15 * v15;
-    const V v22 = parameters[5] * v15;
-    const V v23 = v17 * v17;
-    const V v24 = v23 + v21;
-    const V v25 = parameters[5] * v17;
-    const V v26 = softehl_vsqrt(v24);
-    const V v27 = parameters[5] * v26;
-    const V v28 = 1.0 / v24;
-    const V v29 = softehl_vsqrt(v28);
-    const V v30 = 0.5 * v29;
-    const V v31 = v27 * v3;
-    const V v32 = v22 * v30;
-    const V v33 = v25 * v30;
-    const V v34 = parameters[6] * v27;
-    const V v35 = 0.5 * v19;
-    const V v36 = v19 * v35;
-    const V v37 = v19 * v27;
-    const V v38 = v27 * v36;
-    V s39 = softehl_splat(0.0);
-    V s40 = softehl_splat(0.0);
-    V s41 = softehl_splat(0.0);
-    V s42 = softehl_splat(0.0);
-    V s43 = softehl_splat(0.0);
-    V s44 = softehl_splat(0.0);
-    V s45 = softehl_splat(0.0);
-    V s46 = softehl_splat(0.0);
-    V s47 = softehl_splat(0.0);
-    V s48 = softehl_splat(0.0);
-    V s49 = softehl_splat(0.0);
-    V s50 = softehl_splat(0.0);
-    V s51 = softehl_splat(0.0);
-    V s52 = softehl_splat(0.0);
-    V s53 = softehl_splat(0.0);
-    V s54 = softehl_splat(0.0);
-    V s55 = softehl_splat(0.0);
-    V s56 = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[4], v2 = parameters[2] * parameters[3];
+    const V v3 = a1 + d2 * parameters[6], v4 = d1 + (X1 - parameters[0]),
+        v5 = d3 + (X3 - parameters[0]);
+    const double v6 = 0.5 * parameters[6];
+    const V v7 = a0 + d0 * parameters[6], v8 = 0.5 * (X2 + d2 - d0 - X0), v9 = 0.5 * (v5 - v4),
+        v10 = v1 * v8, v11 = 1.0 / v8, v12 = v8 * v2, v13 = v9 * v9 + v8 * v8,
+        v14 = softehl_vsqrt(v13), v15 = parameters[5] * v14, v16 = softehl_vsqrt(1.0 / v13),
+        v17 = 0.5 * v16, v18 = v15 * v2, v19 = parameters[5] * v8 * v17,
+        v20 = parameters[5] * v9 * v17, v21 = parameters[6] * v15, v22 = v11 * v15,
+        v23 = v15 * (v11 * (0.5 * v11));
+    V s24 = {0}, s25 = {0}, s26 = {0}, s27 = {0}, s28 = {0}, s29 = {0}, s30 = {0}, s31 = {0},
+        s32 = {0}, s33 = {0}, s34 = {0}, s35 = {0}, s36 = {0}, s37 = {0}, s38 = {0}, s39 = {0},
+        s40 = {0}, s41 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v57 = 0.5 * w[0];
-        const double v58 = 0.5 * w[1];
-        const double v59 = 0.5 * w[2];
-        const V v60 = 1.0 - p6;
-        const V v61 = 1.0 - p4;
-        const double v62 = 0.5 + v57;
-        const double v63 = 0.5 - v57;
-        const double v64 = 0.5 - v58;
-        const double v65 = 0.5 + v58;
-        const double v66 = 0.5 - v59;
-        const V v67 = v62 * v7;
-        const V v68 = parameters[1] - v67;
-        const double v69 = v57 - 0.5;
-        const double v70 = 0.5 + v59;
-        const V v71 = v64 * v8;
-        const V v72 = v66 * v8;
-        const V v73 = v63 * v8;
-        const V v74 = v63 * v12;
-        const V v75 = v68 - v74;
-        const V v76 = p0 * parameters[3];
-        const V v77 = p0 * v18;
-        const V v78 = v65 * v9;
-        const V v79 = v71 + v78;
-        const V v80 = v70 * v9;
-        const V v81 = v72 + v80;
-        const V v82 = v62 * v9;
-        const V v83 = v73 + v82;
-        const V v84 = softehl_vexp(v76);
-        const M v85 = softehl_lt(softehl_splat(0.0), v75);
-        const V v86 = parameters[0] + v83;
-        const V v87 = v63 * v77;
-        const V v88 = v62 * v77;
-        const V v89 = v79 * v81;
-        const V v90 = 1.0 / v83;
-        const V v91 = v79 + v81;
-        const V v92 = v86 * v1;
-        const V v93 = 0.5 * v91;
-        const double v94 = v63 * w[3];
-        const double v95 = v62 * w[3];
-        const double v96 = 0.5 * w[3];
-        const V v97 = w[3] * v15;
-        const V v98 = v83 * v96;
-        const V v99 = v94 * v87;
-        s43 += v99;
-        const V v100 = v95 * v87;
-        s45 += v100;
-        const V v101 = v94 * v88;
-        s44 += v101;
-        const V v102 = v95 * v88;
-        s46 += v102;
-        const V v103 = v93 * v93;
-        const V v104 = p0 * v92;
-        const V v105 = v97 * v104;
-        const V v106 = 0.5 * v104;
-        const V v107 = 1.0 / v103;
-        const V v108 = v75 * v98;
-        const V v109 = v89 * v107;
-        const V v110 = v109 * v108;
-        const V v111 = v62 * v105;
-        s41 += v111;
-        const V v112 = v63 * v105;
-        s42 += v112;
-        const V v113 = -v110;
-        const V v114 = v94 * v106;
-        s39 += v114;
-        const V v115 = v95 * v106;
-        s40 += v115;
-        const V v116 = parameters[2] * v84;
-        const V v117 = v116 * v27;
-        const V v118 = v75 * v117;
-        const V v119 = v90 * v118;
-        const V v120 = v92 * v119;
-        const V v121 = v94 * v120;
-        const V v122 = v95 * v120;
-        V v123 = softehl_splat(0.0);
-        V v124 = softehl_splat(0.0);
-        V v125 = softehl_splat(0.0);
-        V v126 = softehl_splat(0.0);
-        V v127 = softehl_splat(0.0);
-        V v128 = softehl_splat(0.0);
-        V v129 = softehl_splat(0.0);
-        V v130 = softehl_splat(0.0);
-        V v131 = softehl_splat(0.0);
-        V v132 = softehl_splat(0.0);
-        V v133 = softehl_splat(0.0);
-        V v134 = softehl_splat(0.0);
-        const M m135 = v85;
-        if (softehl_any(m135)) {
-            const V v136 = v62 * v61;
-            const V v137 = v61 * v69;
-            const V v138 = -v136;
-            v123 = softehl_blend(m135, v75, v123);
-            v124 = softehl_blend(m135, softehl_splat(0.0), v124);
-            v125 = softehl_blend(m135, v137, v125);
-            v126 = softehl_blend(m135, softehl_splat(0.0), v126);
-            v127 = softehl_blend(m135, v138, v127);
-            v128 = softehl_blend(m135, softehl_splat(0.0), v128);
-            v129 = softehl_blend(m135, v121, v129);
-            v130 = softehl_blend(m135, softehl_splat(0.0), v130);
-            v131 = softehl_blend(m135, v122, v131);
-            v132 = softehl_blend(m135, softehl_splat(0.0), v132);
-            v133 = softehl_blend(m135, v113, v133);
-            v134 = softehl_blend(m135, softehl_splat(0.0), v134);
+        const double v42 = 0.5 * w[0], v43 = 0.5 * w[1], v44 = 0.5 * w[2];
+        const V v45 = 1.0 - p6, v46 = 1.0 - p4;
+        const double v47 = 0.5 + v42, v48 = 0.5 - v42, v49 = 0.5 - v43, v50 = 0.5 + v43,
+            v51 = 0.5 - v44, v52 = v42 - 0.5, v53 = 0.5 + v44;
+        const V v54 = parameters[1] - v47 * v3 - v48 * v7, v55 = p0 * v10,
+            v56 = v49 * v4 + v50 * v5, v57 = v51 * v4 + v53 * v5, v58 = v48 * v4 + v47 * v5,
+            v59 = softehl_vexp(p0 * parameters[3]);
+        const M v60 = softehl_lt(softehl_splat(0.0), v54);
+        const V v61 = v48 * v55, v62 = v47 * v55, v63 = v56 * v57, v64 = 1.0 / v58, v65 = v56 + v57,
+            v66 = (parameters[0] + v58) * v1, v67 = 0.5 * v65;
+        const double v68 = v48 * w[3], v69 = v47 * w[3];
+        s28 += v68 * v61; s30 += v69 * v61; s29 += v68 * v62; s31 += v69 * v62;
+        const V v70 = v67 * v67, v71 = p0 * v66, v72 = w[3] * v8 * v71, v73 = 0.5 * v71,
+            v74 = 1.0 / v70, v75 = v63 * v74;
+        s26 += v47 * v72; s27 += v48 * v72; const V v76 = -(v75 * (v54 * (v58 * (0.5 * w[3]))));
+        s24 += v68 * v73; s25 += v69 * v73;
+        const V v77 = parameters[2] * v59, v78 = v66 * (v64 * (v54 * (v77 * v15))), v79 = v68 * v78,
+            v80 = v69 * v78;
+        V v81 = softehl_splat(0.0), v82 = softehl_splat(0.0), v83 = softehl_splat(0.0),
+            v84 = softehl_splat(0.0), v85 = softehl_splat(0.0), v86 = softehl_splat(0.0),
+            v87 = softehl_splat(0.0), v88 = softehl_splat(0.0), v89 = softehl_splat(0.0),
+            v90 = softehl_splat(0.0), v91 = softehl_splat(0.0), v92 = softehl_splat(0.0);
+        const M m93 = v60;
+        if (softehl_any(m93)) {
+            const V v94 = v46 * v52, v95 = -(v47 * v46);
+            v81 = softehl_blend(m93, v54, v81); v82 = softehl_blend(m93, softehl_splat(0.0), v82);
+            v83 = softehl_blend(m93, v94, v83); v84 = softehl_blend(m93, softehl_splat(0.0), v84);
+            v85 = softehl_blend(m93, v95, v85); v86 = softehl_blend(m93, softehl_splat(0.0), v86);
+            v87 = softehl_blend(m93, v79, v87); v88 = softehl_blend(m93, softehl_splat(0.0), v88);
+            v89 = softehl_blend(m93, v80, v89); v90 = softehl_blend(m93, softehl_splat(0.0), v90);
+            v91 = softehl_blend(m93, v76, v91); v92 = softehl_blend(m93, softehl_splat(0.0), v92);
         }
-        const M m139 = ~v85;
-        if (softehl_any(m139)) {
-            const V v140 = v62 * v60;
-            const V v141 = v60 * v69;
-            const V v142 = -v140;
-            v123 = softehl_blend(m139, softehl_splat(0.0), v123);
-            v124 = softehl_blend(m139, v75, v124);
-            v125 = softehl_blend(m139, softehl_splat(0.0), v125);
-            v126 = softehl_blend(m139, v141, v126);
-            v127 = softehl_blend(m139, softehl_splat(0.0), v127);
-            v128 = softehl_blend(m139, v142, v128);
-            v129 = softehl_blend(m139, softehl_splat(0.0), v129);
-            v130 = softehl_blend(m139, v121, v130);
-            v131 = softehl_blend(m139, softehl_splat(0.0), v131);
-            v132 = softehl_blend(m139, v122, v132);
-            v133 = softehl_blend(m139, softehl_splat(0.0), v133);
-            v134 = softehl_blend(m139, v113, v134);
+        const M m96 = ~v60;
+        if (softehl_any(m96)) {
+            const V v97 = v45 * v52, v98 = -(v47 * v45);
+            v81 = softehl_blend(m96, softehl_splat(0.0), v81); v82 = softehl_blend(m96, v54, v82);
+            v83 = softehl_blend(m96, softehl_splat(0.0), v83); v84 = softehl_blend(m96, v97, v84);
+            v85 = softehl_blend(m96, softehl_splat(0.0), v85); v86 = softehl_blend(m96, v98, v86);
+            v87 = softehl_blend(m96, softehl_splat(0.0), v87); v88 = softehl_blend(m96, v79, v88);
+            v89 = softehl_blend(m96, softehl_splat(0.0), v89); v90 = softehl_blend(m96, v80, v90);
+            v91 = softehl_blend(m96, softehl_splat(0.0), v91); v92 = softehl_blend(m96, v76, v92);
         }
-        const V v143 = p2 * parameters[3];
-        const V v144 = 0.08333333333333333 * p3;
-        const V v145 = v84 * v31;
-        const V v146 = v60 * v124;
-        const V v147 = softehl_vexp(v143);
-        const V v148 = v61 * v123;
-        const V v149 = v146 + v148;
-        const V v150 = 0.5 * v83;
-        const V v151 = v83 * v10;
-        const V v152 = v128 + v127;
-        const V v153 = v149 * v145;
-        const V v154 = v126 + v125;
-        const double v155 = 0.08333333333333333 * w[3];
-        const V v156 = 0.5 * v149;
-        const V v157 = v116 * v149;
-        const V v158 = v116 * v34;
-        const V v159 = v150 * v37;
-        const V v160 = v109 * v151;
-        const V v161 = v109 * v109;
-        const V v162 = 2.0 * v109;
-        const V v163 = v83 * v156;
-        const V v164 = v109 * v156;
-        const V v165 = v90 * v157;
-        const V v166 = v90 * v158;
-        const V v167 = v92 * v159;
-        const V v168 = v160 * v154;
-        const V v169 = v160 * v152;
-        const V v170 = v109 * v163;
-        const V v171 = v92 * v166;
-        const V v172 = v90 * v165;
-        const V v173 = p1 * v19;
-        const V v174 = p1 * v38;
-        const V v175 = v93 * v103;
-        const V v176 = 3.0 * v103;
-        const V v177 = 0.5 * v173;
-        const V v178 = v177 + v172;
-        const V v179 = v152 * v171;
-        const V v180 = v150 * v173;
-        const V v181 = v150 * v174;
-        const V v182 = v107 * v107;
-        const V v183 = v64 * v81;
-        const V v184 = v65 * v81;
-        const V v185 = v165 - v180;
-        const double v186 = v64 + v66;
-        const V v187 = v66 * v79;
-        const V v188 = v183 + v187;
-        const V v189 = v70 * v79;
-        const V v190 = v184 + v189;
-        const double v191 = v65 + v70;
-        const V v192 = v180 - v165;
-        const double v193 = 0.5 * v186;
-        const V v194 = v107 * v188;
-        const V v195 = v107 * v190;
-        const double v196 = 0.5 * v191;
-        const V v197 = v92 * v181;
-        const V v198 = v92 * v192;
-        const V v199 = v144 * v175;
-        const V v200 = v144 * v161;
-        const V v201 = p0 * v17;
-        const V v202 = v199 * v161;
-        const V v203 = v199 * v162;
-        const V v204 = v32 * v198;
-        const V v205 = v197 - v204;
-        const V v206 = v33 * v198;
-        const V v207 = v193 * v200;
-        const V v208 = v196 * v200;
-        const V v209 = v90 * v153;
-        const V v210 = v17 - v209;
-        const V v211 = v27 * v185;
-        const V v212 = v201 - v211;
-        const V v213 = v27 * v92;
-        const V v214 = v89 * v193;
-        const V v215 = v89 * v196;
-        const V v216 = v92 * v210;
-        const V v217 = v176 * v207;
-        const V v218 = v176 * v208;
-        const V v219 = v178 * v213;
-        const V v220 = v91 * v214;
-        const V v221 = v91 * v215;
-        const V v222 = v179 + v205;
-        const V v223 = v1 * v212;
-        const V v224 = v219 + v223;
-        const V v225 = w[3] * v212;
-        const V v226 = v154 * v171;
-        const V v227 = v205 - v226;
-        const V v228 = v92 * v225;
-        const V v229 = v15 * v92;
-        const V v230 = v182 * v220;
-        const V v231 = v194 - v230;
-        const V v232 = v182 * v221;
-        const V v233 = v195 - v232;
-        const V v234 = v106 + v206;
-        const V v235 = v231 * v203;
-        const V v236 = v217 + v235;
-        const V v237 = v233 * v203;
-        const V v238 = v218 + v237;
-        const V v239 = v231 * v163;
-        const V v240 = v233 * v163;
-        const V v241 = v94 * v229;
-        const V v242 = v95 * v229;
-        const V v243 = v94 * v227;
-        s49 += v243;
-        const V v244 = v95 * v227;
-        s51 += v244;
-        const V v245 = -v241;
-        const V v246 = -v242;
-        const V v247 = v62 * v224;
-        const V v248 = v247 + v234;
-        const V v249 = v62 * v228;
-        s47 += v249;
-        const V v250 = v63 * v228;
-        s48 += v250;
-        const V v251 = v63 * v224;
-        const V v252 = v63 * v164;
-        const V v253 = v252 + v239;
-        const V v254 = v62 * v164;
-        const V v255 = v254 + v240;
-        const V v256 = v94 * v248;
-        s54 += v256;
-        const V v257 = v95 * v248;
-        s56 += v257;
-        const V v258 = parameters[2] * v147;
-        const V v259 = v147 * v20;
-        const V v260 = v251 - v106;
-        const V v261 = 0.5 * v258;
-        const V v262 = v258 * v15;
-        const V v263 = w[3] * v259;
-        const V v264 = v260 - v206;
-        const V v265 = v94 * v167;
-        const V v266 = v95 * v167;
-        const V v267 = 1.0 / v262;
-        const V v268 = v94 * v216;
-        const V v269 = v95 * v216;
-        const V v270 = v94 * v264;
-        s53 += v270;
-        const V v271 = v95 * v264;
-        s55 += v271;
-        const V v272 = v94 * v222;
-        s50 += v272;
-        const V v273 = v95 * v222;
-        s52 += v273;
-        const V v274 = v261 * v202;
-        const V v275 = v202 * v263;
-        const V v276 = v267 * v238;
-        const V v277 = v255 - v276;
-        const V v278 = w[3] * v277;
-        const V v279 = v267 * v202;
-        const V v280 = v170 - v279;
-        const V v281 = w[3] * v280;
-        const V v282 = v267 * v267;
-        const V v283 = v282 * v274;
-        const V v284 = v282 * v275;
-        const V v285 = v155 * v267;
-        const V v286 = v175 * v285;
-        const V v287 = v161 * v286;
-        const V v288 = -v287;
-        const V v289 = v267 * v236;
-        const V v290 = v253 - v289;
-        const V v291 = w[3] * v290;
-        const V v292 = v168 - v283;
-        const V v293 = w[3] * v292;
-        const V v294 = v283 + v169;
-        const V v295 = w[3] * v294;
+        const V v99 = 0.08333333333333333 * p3, v100 = softehl_vexp(p2 * parameters[3]),
+            v101 = v45 * v82 + v46 * v81, v102 = 0.5 * v58, v103 = v86 + v85, v104 = v84 + v83,
+            v105 = 0.5 * v101, v106 = v75 * (v58 * v6), v107 = v75 * v75, v108 = v58 * v105,
+            v109 = v75 * v105, v110 = v64 * (v77 * v101), v111 = v66 * (v102 * v22),
+            v112 = v66 * (v64 * (v77 * v21)), v113 = p1 * v11, v114 = v67 * v70, v115 = 3.0 * v70,
+            v116 = v102 * v113, v117 = v74 * v74;
+        const double v118 = 0.5 * (v49 + v51), v119 = 0.5 * (v50 + v53);
+        const V v120 = v66 * (v116 - v110), v121 = v99 * v114, v122 = v99 * v107,
+            v123 = v121 * v107, v124 = v121 * (2.0 * v75),
+            v125 = v66 * (v102 * (p1 * v23)) - v19 * v120, v126 = v20 * v120,
+            v127 = p0 * v9 - v15 * (v110 - v116), v128 = v66 * (v9 - v64 * (v101 * (v59 * v18))),
+            v129 = v103 * v112 + v125, v130 = (0.5 * v113 + v64 * v110) * (v15 * v66) + v1 * v127,
+            v131 = v125 - v104 * v112, v132 = v66 * (w[3] * v127), v133 = v8 * v66,
+            v134 = v74 * (v49 * v57 + v51 * v56) - v117 * (v65 * (v63 * v118)),
+            v135 = v74 * (v50 * v57 + v53 * v56) - v117 * (v65 * (v63 * v119));
+        s34 += v68 * v131; s36 += v69 * v131;
+        const V v136 = -(v68 * v133), v137 = -(v69 * v133), v138 = v47 * v130 + (v73 + v126);
+        s32 += v47 * v132; s33 += v48 * v132; const V v139 = v68 * v138; s39 += v139;
+        const V v140 = v69 * v138; s41 += v140;
+        const V v141 = parameters[2] * v100, v142 = v48 * v130 - v73 - v126, v143 = v68 * v111,
+            v144 = v69 * v111, v145 = 1.0 / (v141 * v8), v146 = v68 * v128, v147 = v69 * v128,
+            v148 = v68 * v142;
+        s38 += v148; const V v149 = v69 * v142; s40 += v149; s35 += v68 * v129; s37 += v69 * v129;
+        const V v150 = v47 * v109 + v135 * v108 - v145 * (v115 * (v119 * v122) + v135 * v124),
+            v151 = w[3] * v150, v152 = w[3] * (v75 * v108 - v145 * v123), v153 = v145 * v145,
+            v154 = v153 * (0.5 * v141 * v123), v155 = v153 * (v123 * (w[3] * (v100 * v12))),
+            v156 = -(v107 * (v114 * (0.08333333333333333 * w[3] * v145))),
+            v157 = v48 * v109 + v134 * v108 - v145 * (v115 * (v118 * v122) + v134 * v124),
+            v158 = w[3] * v157, v159 = w[3] * (v106 * v104 - v154),
+            v160 = w[3] * (v154 + v106 * v103);
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
             (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
-            R_lanes[4 + i] += D1 * v281;
-            K_lanes[(4 + i) * (4 + modes) + 0] += D1 * v293;
-            K_lanes[0 * (4 + modes) + 4 + i] += N * v268 + D * v265 + N2 * v129 + N3 * v130;
-            K_lanes[(4 + i) * (4 + modes) + 1] += D1 * v291;
-            K_lanes[1 * (4 + modes) + 4 + i] += N * v245;
-            K_lanes[(4 + i) * (4 + modes) + 2] += D1 * v295;
-            K_lanes[2 * (4 + modes) + 4 + i] += N * v269 + D * v266 + N2 * v131 + N3 * v132;
-            K_lanes[(4 + i) * (4 + modes) + 3] += D1 * v278;
-            K_lanes[3 * (4 + modes) + 4 + i] += N * v246;
-            const V r0 = softehl_splat(0.0);
-            const V r1 = softehl_splat(0.0);
-            const V r2 = D1 * v284;
-            const V r3 = D1 * v288;
-            const V r4 = D1 * v133;
-            const V r5 = softehl_splat(0.0);
-            const V r6 = D1 * v134;
-            const V r7 = softehl_splat(0.0);
+            R_lanes[4 + i] += D1 * v152; K_lanes[(4 + i) * (4 + modes) + 0] += D1 * v159;
+            K_lanes[0 * (4 + modes) + 4 + i] += N * v146 + D * v143 + N2 * v87 + N3 * v88;
+            K_lanes[(4 + i) * (4 + modes) + 1] += D1 * v158;
+            K_lanes[1 * (4 + modes) + 4 + i] += N * v136;
+            K_lanes[(4 + i) * (4 + modes) + 2] += D1 * v160;
+            K_lanes[2 * (4 + modes) + 4 + i] += N * v147 + D * v144 + N2 * v89 + N3 * v90;
+            K_lanes[(4 + i) * (4 + modes) + 3] += D1 * v151;
+            K_lanes[3 * (4 + modes) + 4 + i] += N * v137;
+            const V r0 = softehl_splat(0.0), r1 = softehl_splat(0.0), r2 = D1 * v155,
+                r3 = D1 * v156, r4 = D1 * v91, r5 = softehl_splat(0.0), r6 = D1 * v92,
+                r7 = softehl_splat(0.0);
             for (ptrdiff_t j = 0; j < modes; ++j)
                 K_lanes[(4 + i) * (4 + modes) + 4 + j] += r0 * B[8 * j] + r1 * B[8 * j + 1] + r2 * B[8 * j + 2] + r3 * B[8 * j + 3] + r4 * B[8 * j + 4] + r5 * B[8 * j + 5] + r6 * B[8 * j + 6] + r7 * B[8 * j + 7];
         }
     }
-    const V v296 = -s39;
-    const V v297 = -s40;
-    const V v298 = -s41;
-    const V v299 = -s42;
-    const V v300 = -s43;
-    const V v301 = -s44;
-    const V v302 = -s45;
-    const V v303 = -s46;
-    const V v304 = -s50;
-    const V v305 = -s52;
-    R_lanes[0] = s48;
-    R_lanes[1] = v299;
-    R_lanes[2] = s47;
-    R_lanes[3] = v298;
-    K_lanes[0 * (4 + modes) + 0] = s49;
-    K_lanes[0 * (4 + modes) + 1] = s53;
-    K_lanes[0 * (4 + modes) + 2] = v304;
-    K_lanes[0 * (4 + modes) + 3] = s54;
-    K_lanes[1 * (4 + modes) + 0] = s39;
-    K_lanes[1 * (4 + modes) + 1] = v300;
-    K_lanes[1 * (4 + modes) + 2] = v296;
-    K_lanes[1 * (4 + modes) + 3] = v301;
-    K_lanes[2 * (4 + modes) + 0] = s51;
-    K_lanes[2 * (4 + modes) + 1] = s55;
-    K_lanes[2 * (4 + modes) + 2] = v305;
-    K_lanes[2 * (4 + modes) + 3] = s56;
-    K_lanes[3 * (4 + modes) + 0] = s40;
-    K_lanes[3 * (4 + modes) + 1] = v302;
-    K_lanes[3 * (4 + modes) + 2] = v297;
-    K_lanes[3 * (4 + modes) + 3] = v303;
+    const V v161 = -s24, v162 = -s25, v163 = -s26, v164 = -s27, v165 = -s28, v166 = -s29,
+        v167 = -s30, v168 = -s31, v169 = -s35, v170 = -s37;
+    R_lanes[0] = s33; R_lanes[1] = v164; R_lanes[2] = s32; R_lanes[3] = v163;
+    K_lanes[0 * (4 + modes) + 0] = s34; K_lanes[0 * (4 + modes) + 1] = s38;
+    K_lanes[0 * (4 + modes) + 2] = v169; K_lanes[0 * (4 + modes) + 3] = s39;
+    K_lanes[1 * (4 + modes) + 0] = s24; K_lanes[1 * (4 + modes) + 1] = v165;
+    K_lanes[1 * (4 + modes) + 2] = v161; K_lanes[1 * (4 + modes) + 3] = v166;
+    K_lanes[2 * (4 + modes) + 0] = s36; K_lanes[2 * (4 + modes) + 1] = s40;
+    K_lanes[2 * (4 + modes) + 2] = v170; K_lanes[2 * (4 + modes) + 3] = s41;
+    K_lanes[3 * (4 + modes) + 0] = s25; K_lanes[3 * (4 + modes) + 1] = v167;
+    K_lanes[3 * (4 + modes) + 2] = v162; K_lanes[3 * (4 + modes) + 3] = v168;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
     softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_conserving_tangent, 4, (4 + modes), 2, 0, (4 + modes), ((4 + modes) * (4 + modes)))
 
-void softehl_film_conserving_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_conserving_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_tangent_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (4 + modes) * e, tangent + ((4 + modes) * (4 + modes)) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), tangent + ((4 + modes) * (4 + modes)) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    double K[SOFTEHL_LANES * ((4 + modes) * (4 + modes))];
-    softehl_film_conserving_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_film_conserving_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -739,136 +284,42 @@ static void softehl_film_conserving_fields_group(
 #if SOFTEHL_LANES > 1
     softehl_gather(d_lanes, d, (4 + modes));
 #endif
-    const V v1 = X2 + d2;
-    const V v2 = X1 - parameters[0];
-    const V v3 = X3 - parameters[0];
-    const V v4 = d1 + v2;
-    const V v5 = d2 * parameters[6];
-    const V v6 = a1 + v5;
-    const V v7 = d0 * parameters[6];
-    const V v8 = a0 + v7;
-    const V v9 = d3 + v3;
-    const V v10 = v1 - d0;
-    const V v11 = X0 + d0;
-    const V v12 = v10 - X0;
-    const V v13 = 0.5 * v12;
-    const V v14 = 1.0 / v13;
-    const V v15 = parameters[2] * v13;
-    const V v16 = 0.5 * v14;
+    const V v1 = X2 + d2, v2 = d1 + (X1 - parameters[0]), v3 = a1 + d2 * parameters[6],
+        v4 = a0 + d0 * parameters[6], v5 = d3 + (X3 - parameters[0]), v6 = X0 + d0,
+        v7 = 0.5 * (v1 - d0 - X0), v8 = parameters[2] * v7, v9 = 0.5 * (1.0 / v7);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v17 = 0.5 * w[0];
-        const V v18 = w[3] * v13;
-        const double v19 = 0.5 + v17;
-        const double v20 = 0.5 - v17;
-        const V v21 = v19 * v6;
-        const V v22 = parameters[1] - v21;
-        const V v23 = v19 * v1;
-        const V v24 = v19 * v9;
-        const V v25 = v20 * v8;
-        const V v26 = v22 - v25;
-        const M v27 = softehl_lt(softehl_splat(0.0), v26);
-        const V v28 = v20 * v11;
-        const V v29 = v23 + v28;
-        const V v30 = v20 * v4;
-        const V v31 = v30 + v24;
-        const V v32 = softehl_blend(v27, v26, softehl_splat(0.0));
-        const V v33 = softehl_blend(v27, softehl_splat(0.0), v26);
-        const double v34 = 0.5 * w[1];
-        const double v35 = 0.5 * w[2];
-        const V v36 = 0.08333333333333333 * p3;
-        const V v37 = 1.0 - p6;
-        const V v38 = 1.0 - p4;
-        const double v39 = 0.5 - v34;
-        const double v40 = 0.5 + v34;
-        const double v41 = 0.5 - v35;
-        const double v42 = 0.5 + v35;
-        const V v43 = v37 * v33;
-        const V v44 = p1 * v16;
-        const V v45 = p2 * parameters[3];
-        const V v46 = p0 * parameters[3];
-        const V v47 = v39 * v4;
-        const V v48 = v41 * v4;
-        const V v49 = v38 * v32;
-        const V v50 = v43 + v49;
-        const V v51 = softehl_vexp(v45);
-        const V v52 = softehl_vexp(v46);
-        const V v53 = v31 * v44;
-        const V v54 = v40 * v9;
-        const V v55 = v47 + v54;
-        const V v56 = v42 * v9;
-        const V v57 = v48 + v56;
-        const V v58 = 1.0 / v31;
-        const V v59 = 0.5 * v31;
-        const V v60 = v55 * v57;
-        const V v61 = v59 * v50;
-        const V v62 = v55 + v57;
-        const V v63 = 0.5 * v62;
-        const V v64 = parameters[2] * v52;
-        const V v65 = v64 * v50;
-        const V v66 = v58 * v65;
-        const V v67 = v51 * v15;
-        const V v68 = v36 * v63;
-        const V v69 = v63 * v63;
-        const V v70 = 1.0 / v67;
-        const V v71 = v69 * v68;
-        const V v72 = 1.0 / v69;
-        const V v73 = v60 * v72;
-        const V v74 = v73 * v71;
-        const V v75 = v70 * v74;
-        const V v76 = v61 - v75;
-        const V v77 = v73 * v76;
-        const V v78 = v53 + v66;
-        const V v79 = v66 - v53;
-        softehl_store4(R + 13 * q + 0, (13 * points), v29, v18, v31, p0);
-        softehl_store4(R + 13 * q + 4, (13 * points), v79, v77, v78, v64);
-        softehl_store1(R + 13 * q + 8, (13 * points), v31);
+        const double v10 = 0.5 * w[0]; const V v11 = w[3] * v7;
+        const double v12 = 0.5 + v10, v13 = 0.5 - v10;
+        const V v14 = parameters[1] - v12 * v3 - v13 * v4;
+        const M v15 = softehl_lt(softehl_splat(0.0), v14);
+        const V v16 = v12 * v1 + v13 * v6, v17 = v13 * v2 + v12 * v5,
+            v18 = softehl_blend(v15, v14, softehl_splat(0.0)),
+            v19 = softehl_blend(v15, softehl_splat(0.0), v14);
+        const double v20 = 0.5 * w[1], v21 = 0.5 * w[2];
+        const V v22 = (1.0 - p6) * v19 + (1.0 - p4) * v18, v23 = softehl_vexp(p2 * parameters[3]),
+            v24 = softehl_vexp(p0 * parameters[3]), v25 = v17 * (p1 * v9),
+            v26 = (0.5 - v20) * v2 + (0.5 + v20) * v5, v27 = (0.5 - v21) * v2 + (0.5 + v21) * v5,
+            v28 = 0.5 * (v26 + v27), v29 = parameters[2] * v24, v30 = 1.0 / v17 * (v29 * v22),
+            v31 = v28 * v28, v32 = v26 * v27 * (1.0 / v31),
+            v33 = 1.0 / (v23 * v8) * (v32 * (v31 * (0.08333333333333333 * p3 * v28))),
+            v34 = v32 * (0.5 * v17 * v22 - v33), v35 = v25 + v30, v36 = v30 - v25;
+        softehl_store4(R + 13 * q + 0, (13 * points), v16, v11, v17, p0);
+        softehl_store4(R + 13 * q + 4, (13 * points), v36, v34, v35, v29);
+        softehl_store1(R + 13 * q + 8, (13 * points), v17);
         softehl_store2(R + 13 * q + 11, (13 * points), p4, p6);
     }
     for (ptrdiff_t q = 0; q < points; ++q) {
         softehl_store2(R + 13 * q + 9, (13 * points), softehl_splat(0.0), softehl_splat(0.0));
     }
 }
-
-void softehl_film_conserving_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_fields_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (13 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_fields_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (13 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * (13 * points)];
-    softehl_film_conserving_fields(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (13 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_conserving_fields, 4, (4 + modes), 2, 0, (13 * points), 0)

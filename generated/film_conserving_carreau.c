@@ -96,514 +96,109 @@ static void softehl_film_conserving_carreau_level_lanes(
     for (int step = 0; step < 50 && softehl_any(active); ++step) {
         M failed = softehl_mask(0), far = failed;
         V g[7], A[49], B[56];
-        const V v1 = s[6] * s[6];
-        const V v2 = 1.0 + v1;
-        const V v3 = softehl_vlog(v2);
-        const V v4 = p[3] * v3;
-        const V v5 = softehl_vexp(v4);
-        const V v6 = p[2] * v5;
-        const V v7 = p[0] + v6;
-        const V v8 = 1.0 / v7;
-        const V v9 = 0.08566224618958518 * s[6];
-        const V v10 = v9 * v8;
-        const V v11 = s[1] * s[1];
-        const V v12 = 1.0 + v11;
-        const V v13 = softehl_vlog(v12);
-        const V v14 = p[3] * v13;
-        const V v15 = softehl_vexp(v14);
-        const V v16 = p[2] * v15;
-        const V v17 = p[0] + v16;
-        const V v18 = 1.0 / v17;
-        const V v19 = 0.08566224618958518 * s[1];
-        const V v20 = v19 * v18;
-        const V v21 = v20 + v10;
-        const V v22 = s[2] * s[2];
-        const V v23 = 1.0 + v22;
-        const V v24 = softehl_vlog(v23);
-        const V v25 = p[3] * v24;
-        const V v26 = softehl_vexp(v25);
-        const V v27 = p[2] * v26;
-        const V v28 = p[0] + v27;
-        const V v29 = 1.0 / v28;
-        const V v30 = 0.1803807865240693 * s[2];
-        const V v31 = v30 * v29;
-        const V v32 = v31 + v21;
-        const V v33 = s[5] * s[5];
-        const V v34 = 1.0 + v33;
-        const V v35 = softehl_vlog(v34);
-        const V v36 = p[3] * v35;
-        const V v37 = softehl_vexp(v36);
-        const V v38 = p[2] * v37;
-        const V v39 = p[0] + v38;
-        const V v40 = 1.0 / v39;
-        const V v41 = 0.1803807865240693 * s[5];
-        const V v42 = v41 * v40;
-        const V v43 = v42 + v32;
-        const V v44 = s[3] * s[3];
-        const V v45 = 1.0 + v44;
-        const V v46 = softehl_vlog(v45);
-        const V v47 = p[3] * v46;
-        const V v48 = softehl_vexp(v47);
-        const V v49 = p[2] * v48;
-        const V v50 = p[0] + v49;
-        const V v51 = 1.0 / v50;
-        const V v52 = 0.23395696728634552 * s[3];
-        const V v53 = v52 * v51;
-        const V v54 = v53 + v43;
-        const V v55 = s[4] * s[4];
-        const V v56 = 1.0 + v55;
-        const V v57 = softehl_vlog(v56);
-        const V v58 = p[3] * v57;
-        const V v59 = softehl_vexp(v58);
-        const V v60 = p[2] * v59;
-        const V v61 = p[0] + v60;
-        const V v62 = 1.0 / v61;
-        const V v63 = 0.23395696728634552 * s[4];
-        const V v64 = v63 * v62;
-        const V v65 = v64 + v54;
-        const V v66 = v65 - p[4];
-        const V v67 = v17 * v17;
-        const V v68 = 1.0 / v67;
-        const V v69 = v11 * v68;
-        const V v70 = 1.0 + v69;
-        const V v71 = softehl_vlog(v70);
-        const V v72 = p[1] * v71;
-        const V v73 = softehl_vexp(v72);
-        const V v74 = p[2] * v73;
-        const V v75 = p[0] + v74;
-        const V v76 = s[1] * v75;
-        const V v77 = v18 * v76;
-        const V v78 = s[0] + p[5];
-        const V v79 = v77 - v78;
-        const V v80 = v28 * v28;
-        const V v81 = 1.0 / v80;
-        const V v82 = v22 * v81;
-        const V v83 = 1.0 + v82;
-        const V v84 = softehl_vlog(v83);
-        const V v85 = p[1] * v84;
-        const V v86 = softehl_vexp(v85);
-        const V v87 = p[2] * v86;
-        const V v88 = p[0] + v87;
-        const V v89 = s[2] * v88;
-        const V v90 = v29 * v89;
-        const V v91 = s[0] + p[6];
-        const V v92 = v90 - v91;
-        const V v93 = v50 * v50;
-        const V v94 = 1.0 / v93;
-        const V v95 = v44 * v94;
-        const V v96 = 1.0 + v95;
-        const V v97 = softehl_vlog(v96);
-        const V v98 = p[1] * v97;
-        const V v99 = softehl_vexp(v98);
-        const V v100 = p[2] * v99;
-        const V v101 = p[0] + v100;
-        const V v102 = s[3] * v101;
-        const V v103 = v51 * v102;
-        const V v104 = s[0] + p[7];
-        const V v105 = v103 - v104;
-        const V v106 = v61 * v61;
-        const V v107 = 1.0 / v106;
-        const V v108 = v55 * v107;
-        const V v109 = 1.0 + v108;
-        const V v110 = softehl_vlog(v109);
-        const V v111 = p[1] * v110;
-        const V v112 = softehl_vexp(v111);
-        const V v113 = p[2] * v112;
-        const V v114 = p[0] + v113;
-        const V v115 = s[4] * v114;
-        const V v116 = v62 * v115;
-        const V v117 = p[7] - s[0];
-        const V v118 = v117 + v116;
-        const V v119 = v39 * v39;
-        const V v120 = 1.0 / v119;
-        const V v121 = v33 * v120;
-        const V v122 = 1.0 + v121;
-        const V v123 = softehl_vlog(v122);
-        const V v124 = p[1] * v123;
-        const V v125 = softehl_vexp(v124);
-        const V v126 = p[2] * v125;
-        const V v127 = p[0] + v126;
-        const V v128 = s[5] * v127;
-        const V v129 = v40 * v128;
-        const V v130 = p[6] - s[0];
-        const V v131 = v130 + v129;
-        const V v132 = v7 * v7;
-        const V v133 = 1.0 / v132;
-        const V v134 = v1 * v133;
-        const V v135 = 1.0 + v134;
-        const V v136 = softehl_vlog(v135);
-        const V v137 = p[1] * v136;
-        const V v138 = softehl_vexp(v137);
-        const V v139 = p[2] * v138;
-        const V v140 = p[0] + v139;
-        const V v141 = s[6] * v140;
-        const V v142 = v8 * v141;
-        const V v143 = p[5] - s[0];
-        const V v144 = v143 + v142;
-        const V v145 = 2.0 * s[1];
-        const V v146 = p[3] * v145;
-        const V v147 = 1.0 / v12;
-        const V v148 = v147 * v146;
-        const V v149 = v18 * v18;
-        const V v150 = v19 * v149;
-        const V v151 = v16 * v150;
-        const V v152 = v151 * v148;
-        const V v153 = 0.08566224618958518 * v18;
-        const V v154 = v153 - v152;
-        const V v155 = 2.0 * s[2];
-        const V v156 = p[3] * v155;
-        const V v157 = 1.0 / v23;
-        const V v158 = v157 * v156;
-        const V v159 = v29 * v29;
-        const V v160 = v30 * v159;
-        const V v161 = v27 * v160;
-        const V v162 = v161 * v158;
-        const V v163 = 0.1803807865240693 * v29;
-        const V v164 = v163 - v162;
-        const V v165 = 2.0 * s[3];
-        const V v166 = p[3] * v165;
-        const V v167 = 1.0 / v45;
-        const V v168 = v167 * v166;
-        const V v169 = v51 * v51;
-        const V v170 = v52 * v169;
-        const V v171 = v49 * v170;
-        const V v172 = v171 * v168;
-        const V v173 = 0.23395696728634552 * v51;
-        const V v174 = v173 - v172;
-        const V v175 = 2.0 * s[4];
-        const V v176 = p[3] * v175;
-        const V v177 = 1.0 / v56;
-        const V v178 = v177 * v176;
-        const V v179 = v62 * v62;
-        const V v180 = v63 * v179;
-        const V v181 = v60 * v180;
-        const V v182 = v181 * v178;
-        const V v183 = 0.23395696728634552 * v62;
-        const V v184 = v183 - v182;
-        const V v185 = 2.0 * s[5];
-        const V v186 = p[3] * v185;
-        const V v187 = 1.0 / v34;
-        const V v188 = v187 * v186;
-        const V v189 = v40 * v40;
-        const V v190 = v41 * v189;
-        const V v191 = v38 * v190;
-        const V v192 = v191 * v188;
-        const V v193 = 0.1803807865240693 * v40;
-        const V v194 = v193 - v192;
-        const V v195 = 2.0 * s[6];
-        const V v196 = p[3] * v195;
-        const V v197 = 1.0 / v2;
-        const V v198 = v197 * v196;
-        const V v199 = v8 * v8;
-        const V v200 = v9 * v199;
-        const V v201 = v6 * v200;
-        const V v202 = v201 * v198;
-        const V v203 = 0.08566224618958518 * v8;
-        const V v204 = v203 - v202;
-        const V v205 = 2.0 * v11;
-        const V v206 = v17 * v205;
-        const V v207 = v68 * v206;
-        const V v208 = v68 * v207;
-        const V v209 = 1.0 / v70;
-        const V v210 = p[1] * v209;
-        const V v211 = s[1] * v18;
-        const V v212 = v74 * v211;
-        const V v213 = v212 * v210;
-        const V v214 = v213 * v208;
-        const V v215 = v76 * v149;
-        const V v216 = v215 + v214;
-        const V v217 = v16 * v216;
-        const V v218 = p[3] * v147;
-        const V v219 = v218 * v217;
-        const V v220 = v68 * v213;
-        const V v221 = v220 - v219;
-        const V v222 = v145 * v221;
-        const V v223 = v18 * v75;
-        const V v224 = v223 + v222;
-        const V v225 = 2.0 * v22;
-        const V v226 = v28 * v225;
-        const V v227 = v81 * v226;
-        const V v228 = v81 * v227;
-        const V v229 = 1.0 / v83;
-        const V v230 = p[1] * v229;
-        const V v231 = s[2] * v29;
-        const V v232 = v87 * v231;
-        const V v233 = v232 * v230;
-        const V v234 = v233 * v228;
-        const V v235 = v89 * v159;
-        const V v236 = v235 + v234;
-        const V v237 = v27 * v236;
-        const V v238 = p[3] * v157;
-        const V v239 = v238 * v237;
-        const V v240 = v81 * v233;
-        const V v241 = v240 - v239;
-        const V v242 = v155 * v241;
-        const V v243 = v29 * v88;
-        const V v244 = v243 + v242;
-        const V v245 = 2.0 * v44;
-        const V v246 = v50 * v245;
-        const V v247 = v94 * v246;
-        const V v248 = v94 * v247;
-        const V v249 = 1.0 / v96;
-        const V v250 = p[1] * v249;
-        const V v251 = s[3] * v51;
-        const V v252 = v100 * v251;
-        const V v253 = v252 * v250;
-        const V v254 = v253 * v248;
-        const V v255 = v102 * v169;
-        const V v256 = v255 + v254;
-        const V v257 = v49 * v256;
-        const V v258 = p[3] * v167;
-        const V v259 = v258 * v257;
-        const V v260 = v94 * v253;
-        const V v261 = v260 - v259;
-        const V v262 = v165 * v261;
-        const V v263 = v51 * v101;
-        const V v264 = v263 + v262;
-        const V v265 = 2.0 * v55;
-        const V v266 = v61 * v265;
-        const V v267 = v107 * v266;
-        const V v268 = v107 * v267;
-        const V v269 = 1.0 / v109;
-        const V v270 = p[1] * v269;
-        const V v271 = s[4] * v62;
-        const V v272 = v113 * v271;
-        const V v273 = v272 * v270;
-        const V v274 = v273 * v268;
-        const V v275 = v115 * v179;
-        const V v276 = v275 + v274;
-        const V v277 = v60 * v276;
-        const V v278 = p[3] * v177;
-        const V v279 = v278 * v277;
-        const V v280 = v107 * v273;
-        const V v281 = v280 - v279;
-        const V v282 = v175 * v281;
-        const V v283 = v62 * v114;
-        const V v284 = v283 + v282;
-        const V v285 = 2.0 * v33;
-        const V v286 = v39 * v285;
-        const V v287 = v120 * v286;
-        const V v288 = v120 * v287;
-        const V v289 = 1.0 / v122;
-        const V v290 = p[1] * v289;
-        const V v291 = s[5] * v40;
-        const V v292 = v126 * v291;
-        const V v293 = v292 * v290;
-        const V v294 = v293 * v288;
-        const V v295 = v128 * v189;
-        const V v296 = v295 + v294;
-        const V v297 = v38 * v296;
-        const V v298 = p[3] * v187;
-        const V v299 = v298 * v297;
-        const V v300 = v120 * v293;
-        const V v301 = v300 - v299;
-        const V v302 = v185 * v301;
-        const V v303 = v40 * v127;
-        const V v304 = v303 + v302;
-        const V v305 = 2.0 * v1;
-        const V v306 = v7 * v305;
-        const V v307 = v133 * v306;
-        const V v308 = v133 * v307;
-        const V v309 = 1.0 / v135;
-        const V v310 = p[1] * v309;
-        const V v311 = s[6] * v8;
-        const V v312 = v139 * v311;
-        const V v313 = v312 * v310;
-        const V v314 = v313 * v308;
-        const V v315 = v141 * v199;
-        const V v316 = v315 + v314;
-        const V v317 = v6 * v316;
-        const V v318 = p[3] * v197;
-        const V v319 = v318 * v317;
-        const V v320 = v133 * v313;
-        const V v321 = v320 - v319;
-        const V v322 = v195 * v321;
-        const V v323 = v8 * v140;
-        const V v324 = v323 + v322;
-        const V v325 = v180 + v170;
-        const V v326 = v325 + v190;
-        const V v327 = v326 + v160;
-        const V v328 = v327 + v200;
-        const V v329 = v328 + v150;
-        const V v330 = -v329;
-        const V v331 = v48 * v170;
-        const V v332 = v59 * v180;
-        const V v333 = v332 + v331;
-        const V v334 = v37 * v190;
-        const V v335 = v333 + v334;
-        const V v336 = v26 * v160;
-        const V v337 = v335 + v336;
-        const V v338 = v5 * v200;
-        const V v339 = v337 + v338;
-        const V v340 = v15 * v150;
-        const V v341 = v339 + v340;
-        const V v342 = -v341;
-        const V v343 = v46 * v171;
-        const V v344 = v57 * v181;
-        const V v345 = v344 + v343;
-        const V v346 = v35 * v191;
-        const V v347 = v345 + v346;
-        const V v348 = v24 * v161;
-        const V v349 = v347 + v348;
-        const V v350 = v3 * v201;
-        const V v351 = v349 + v350;
-        const V v352 = v13 * v151;
-        const V v353 = v351 + v352;
-        const V v354 = -v353;
-        const V v355 = v211 - v216;
-        const V v356 = v71 * v212;
-        const V v357 = v15 * v216;
-        const V v358 = v73 * v211;
-        const V v359 = v358 - v357;
-        const V v360 = v13 * v217;
-        const V v361 = -v360;
-        const V v362 = v231 - v236;
-        const V v363 = v84 * v232;
-        const V v364 = v26 * v236;
-        const V v365 = v86 * v231;
-        const V v366 = v365 - v364;
-        const V v367 = v24 * v237;
-        const V v368 = -v367;
-        const V v369 = v251 - v256;
-        const V v370 = v97 * v252;
-        const V v371 = v48 * v256;
-        const V v372 = v99 * v251;
-        const V v373 = v372 - v371;
-        const V v374 = v46 * v257;
-        const V v375 = -v374;
-        const V v376 = v271 - v276;
-        const V v377 = v110 * v272;
-        const V v378 = v59 * v276;
-        const V v379 = v112 * v271;
-        const V v380 = v379 - v378;
-        const V v381 = v57 * v277;
-        const V v382 = -v381;
-        const V v383 = v291 - v296;
-        const V v384 = v123 * v292;
-        const V v385 = v37 * v296;
-        const V v386 = v125 * v291;
-        const V v387 = v386 - v385;
-        const V v388 = v35 * v297;
-        const V v389 = -v388;
-        const V v390 = v311 - v316;
-        const V v391 = v136 * v312;
-        const V v392 = v5 * v316;
-        const V v393 = v138 * v311;
-        const V v394 = v393 - v392;
-        const V v395 = v3 * v317;
-        const V v396 = -v395;
-        g[0] = v66;
-        g[1] = v79;
-        g[2] = v92;
-        g[3] = v105;
-        g[4] = v118;
-        g[5] = v131;
-        g[6] = v144;
-        A[0] = softehl_splat(0.0);
-        A[1] = v154;
-        A[2] = v164;
-        A[3] = v174;
-        A[4] = v184;
-        A[5] = v194;
-        A[6] = v204;
-        A[7] = softehl_splat((-1.0));
-        A[8] = v224;
-        A[9] = softehl_splat(0.0);
-        A[10] = softehl_splat(0.0);
-        A[11] = softehl_splat(0.0);
-        A[12] = softehl_splat(0.0);
-        A[13] = softehl_splat(0.0);
-        A[14] = softehl_splat((-1.0));
-        A[15] = softehl_splat(0.0);
-        A[16] = v244;
-        A[17] = softehl_splat(0.0);
-        A[18] = softehl_splat(0.0);
-        A[19] = softehl_splat(0.0);
-        A[20] = softehl_splat(0.0);
-        A[21] = softehl_splat((-1.0));
-        A[22] = softehl_splat(0.0);
-        A[23] = softehl_splat(0.0);
-        A[24] = v264;
-        A[25] = softehl_splat(0.0);
-        A[26] = softehl_splat(0.0);
-        A[27] = softehl_splat(0.0);
-        A[28] = softehl_splat((-1.0));
-        A[29] = softehl_splat(0.0);
-        A[30] = softehl_splat(0.0);
-        A[31] = softehl_splat(0.0);
-        A[32] = v284;
-        A[33] = softehl_splat(0.0);
-        A[34] = softehl_splat(0.0);
-        A[35] = softehl_splat((-1.0));
-        A[36] = softehl_splat(0.0);
-        A[37] = softehl_splat(0.0);
-        A[38] = softehl_splat(0.0);
-        A[39] = softehl_splat(0.0);
-        A[40] = v304;
-        A[41] = softehl_splat(0.0);
-        A[42] = softehl_splat((-1.0));
-        A[43] = softehl_splat(0.0);
-        A[44] = softehl_splat(0.0);
-        A[45] = softehl_splat(0.0);
-        A[46] = softehl_splat(0.0);
-        A[47] = softehl_splat(0.0);
-        A[48] = v324;
-        B[0] = v330;
-        B[1] = softehl_splat(0.0);
-        B[2] = v342;
-        B[3] = v354;
-        B[4] = softehl_splat((-1.0));
-        B[5] = softehl_splat(0.0);
-        B[6] = softehl_splat(0.0);
-        B[7] = softehl_splat(0.0);
-        B[8] = v355;
-        B[9] = v356;
-        B[10] = v359;
-        B[11] = v361;
-        B[12] = softehl_splat(0.0);
-        B[13] = softehl_splat((-1.0));
-        B[14] = softehl_splat(0.0);
-        B[15] = softehl_splat(0.0);
-        B[16] = v362;
-        B[17] = v363;
-        B[18] = v366;
-        B[19] = v368;
-        B[20] = softehl_splat(0.0);
-        B[21] = softehl_splat(0.0);
-        B[22] = softehl_splat((-1.0));
-        B[23] = softehl_splat(0.0);
-        B[24] = v369;
-        B[25] = v370;
-        B[26] = v373;
-        B[27] = v375;
-        B[28] = softehl_splat(0.0);
-        B[29] = softehl_splat(0.0);
-        B[30] = softehl_splat(0.0);
-        B[31] = softehl_splat((-1.0));
-        B[32] = v376;
-        B[33] = v377;
-        B[34] = v380;
-        B[35] = v382;
-        B[36] = softehl_splat(0.0);
-        B[37] = softehl_splat(0.0);
-        B[38] = softehl_splat(0.0);
-        B[39] = softehl_splat(1.0);
-        B[40] = v383;
-        B[41] = v384;
-        B[42] = v387;
-        B[43] = v389;
-        B[44] = softehl_splat(0.0);
-        B[45] = softehl_splat(0.0);
-        B[46] = softehl_splat(1.0);
-        B[47] = softehl_splat(0.0);
-        B[48] = v390;
-        B[49] = v391;
-        B[50] = v394;
-        B[51] = v396;
-        B[52] = softehl_splat(0.0);
-        B[53] = softehl_splat(1.0);
-        B[54] = softehl_splat(0.0);
-        B[55] = softehl_splat(0.0);
+        const V v1 = s[6] * s[6], v2 = 1.0 + v1, v3 = softehl_vlog(v2),
+            v4 = softehl_vexp(p[3] * v3), v5 = p[2] * v4, v6 = p[0] + v5, v7 = 1.0 / v6,
+            v8 = 0.08566224618958518 * s[6], v9 = s[1] * s[1], v10 = 1.0 + v9,
+            v11 = softehl_vlog(v10), v12 = softehl_vexp(p[3] * v11), v13 = p[2] * v12,
+            v14 = p[0] + v13, v15 = 1.0 / v14, v16 = 0.08566224618958518 * s[1], v17 = s[2] * s[2],
+            v18 = 1.0 + v17, v19 = softehl_vlog(v18), v20 = softehl_vexp(p[3] * v19),
+            v21 = p[2] * v20, v22 = p[0] + v21, v23 = 1.0 / v22, v24 = 0.1803807865240693 * s[2],
+            v25 = s[5] * s[5], v26 = 1.0 + v25, v27 = softehl_vlog(v26),
+            v28 = softehl_vexp(p[3] * v27), v29 = p[2] * v28, v30 = p[0] + v29, v31 = 1.0 / v30,
+            v32 = 0.1803807865240693 * s[5], v33 = s[3] * s[3], v34 = 1.0 + v33,
+            v35 = softehl_vlog(v34), v36 = softehl_vexp(p[3] * v35), v37 = p[2] * v36,
+            v38 = p[0] + v37, v39 = 1.0 / v38, v40 = 0.23395696728634552 * s[3], v41 = s[4] * s[4],
+            v42 = 1.0 + v41, v43 = softehl_vlog(v42), v44 = softehl_vexp(p[3] * v43),
+            v45 = p[2] * v44, v46 = p[0] + v45, v47 = 1.0 / v46, v48 = 0.23395696728634552 * s[4],
+            v49 = v48 * v47 + (v40 * v39 + (v32 * v31 + (v24 * v23 + (v16 * v15 + v8 * v7)))),
+            v50 = v49 - p[4], v51 = 1.0 / (v14 * v14), v52 = 1.0 + v9 * v51,
+            v53 = softehl_vlog(v52), v54 = softehl_vexp(p[1] * v53), v55 = p[2] * v54,
+            v56 = p[0] + v55, v57 = s[1] * v56, v58 = v15 * v57 - (s[0] + p[5]),
+            v59 = 1.0 / (v22 * v22), v60 = 1.0 + v17 * v59, v61 = softehl_vlog(v60),
+            v62 = softehl_vexp(p[1] * v61), v63 = p[2] * v62, v64 = p[0] + v63, v65 = s[2] * v64,
+            v66 = v23 * v65 - (s[0] + p[6]), v67 = 1.0 / (v38 * v38), v68 = 1.0 + v33 * v67,
+            v69 = softehl_vlog(v68), v70 = softehl_vexp(p[1] * v69), v71 = p[2] * v70,
+            v72 = p[0] + v71, v73 = s[3] * v72, v74 = v39 * v73 - (s[0] + p[7]),
+            v75 = 1.0 / (v46 * v46), v76 = 1.0 + v41 * v75, v77 = softehl_vlog(v76),
+            v78 = softehl_vexp(p[1] * v77), v79 = p[2] * v78, v80 = p[0] + v79, v81 = s[4] * v80,
+            v82 = p[7] - s[0] + v47 * v81, v83 = 1.0 / (v30 * v30), v84 = 1.0 + v25 * v83,
+            v85 = softehl_vlog(v84), v86 = softehl_vexp(p[1] * v85), v87 = p[2] * v86,
+            v88 = p[0] + v87, v89 = s[5] * v88, v90 = p[6] - s[0] + v31 * v89,
+            v91 = 1.0 / (v6 * v6), v92 = 1.0 + v1 * v91, v93 = softehl_vlog(v92),
+            v94 = softehl_vexp(p[1] * v93), v95 = p[2] * v94, v96 = p[0] + v95, v97 = s[6] * v96,
+            v98 = p[5] - s[0] + v7 * v97, v99 = 2.0 * s[1], v100 = 1.0 / v10, v101 = v15 * v15,
+            v102 = v16 * v101, v103 = v13 * v102,
+            v104 = 0.08566224618958518 * v15 - v103 * (v100 * (p[3] * v99)), v105 = 2.0 * s[2],
+            v106 = 1.0 / v18, v107 = v23 * v23, v108 = v24 * v107, v109 = v21 * v108,
+            v110 = 0.1803807865240693 * v23 - v109 * (v106 * (p[3] * v105)), v111 = 2.0 * s[3],
+            v112 = 1.0 / v34, v113 = v39 * v39, v114 = v40 * v113, v115 = v37 * v114,
+            v116 = 0.23395696728634552 * v39 - v115 * (v112 * (p[3] * v111)), v117 = 2.0 * s[4],
+            v118 = 1.0 / v42, v119 = v47 * v47, v120 = v48 * v119, v121 = v45 * v120,
+            v122 = 0.23395696728634552 * v47 - v121 * (v118 * (p[3] * v117)), v123 = 2.0 * s[5],
+            v124 = 1.0 / v26, v125 = v31 * v31, v126 = v32 * v125, v127 = v29 * v126,
+            v128 = 0.1803807865240693 * v31 - v127 * (v124 * (p[3] * v123)), v129 = 2.0 * s[6],
+            v130 = 1.0 / v2, v131 = v7 * v7, v132 = v8 * v131, v133 = v5 * v132,
+            v134 = 0.08566224618958518 * v7 - v133 * (v130 * (p[3] * v129)), v135 = s[1] * v15,
+            v136 = v55 * v135, v137 = v136 * (p[1] * (1.0 / v52)),
+            v138 = v57 * v101 + v137 * (v51 * (v51 * (v14 * (2.0 * v9)))), v139 = v13 * v138,
+            v140 = v15 * v56 + v99 * (v51 * v137 - p[3] * v100 * v139), v141 = s[2] * v23,
+            v142 = v63 * v141, v143 = v142 * (p[1] * (1.0 / v60)),
+            v144 = v65 * v107 + v143 * (v59 * (v59 * (v22 * (2.0 * v17)))), v145 = v21 * v144,
+            v146 = v23 * v64 + v105 * (v59 * v143 - p[3] * v106 * v145), v147 = s[3] * v39,
+            v148 = v71 * v147, v149 = v148 * (p[1] * (1.0 / v68)),
+            v150 = v73 * v113 + v149 * (v67 * (v67 * (v38 * (2.0 * v33)))), v151 = v37 * v150,
+            v152 = v39 * v72 + v111 * (v67 * v149 - p[3] * v112 * v151), v153 = s[4] * v47,
+            v154 = v79 * v153, v155 = v154 * (p[1] * (1.0 / v76)),
+            v156 = v81 * v119 + v155 * (v75 * (v75 * (v46 * (2.0 * v41)))), v157 = v45 * v156,
+            v158 = v47 * v80 + v117 * (v75 * v155 - p[3] * v118 * v157), v159 = s[5] * v31,
+            v160 = v87 * v159, v161 = v160 * (p[1] * (1.0 / v84)),
+            v162 = v89 * v125 + v161 * (v83 * (v83 * (v30 * (2.0 * v25)))), v163 = v29 * v162,
+            v164 = v31 * v88 + v123 * (v83 * v161 - p[3] * v124 * v163), v165 = s[6] * v7,
+            v166 = v95 * v165, v167 = v166 * (p[1] * (1.0 / v92)),
+            v168 = v97 * v131 + v167 * (v91 * (v91 * (v6 * (2.0 * v1)))), v169 = v5 * v168,
+            v170 = v7 * v96 + v129 * (v91 * v167 - p[3] * v130 * v169),
+            v171 = -(v120 + v114 + v126 + v108 + v132 + v102),
+            v172 = v44 * v120 + v36 * v114 + v28 * v126 + v20 * v108 + v4 * v132 + v12 * v102,
+            v173 = -v172,
+            v174 = v43 * v121 + v35 * v115 + v27 * v127 + v19 * v109 + v3 * v133 + v11 * v103,
+            v175 = -v174, v176 = v135 - v138, v177 = v53 * v136, v178 = v54 * v135 - v12 * v138,
+            v179 = -(v11 * v139), v180 = v141 - v144, v181 = v61 * v142,
+            v182 = v62 * v141 - v20 * v144, v183 = -(v19 * v145), v184 = v147 - v150,
+            v185 = v69 * v148, v186 = v70 * v147 - v36 * v150, v187 = -(v35 * v151),
+            v188 = v153 - v156, v189 = v77 * v154, v190 = v78 * v153 - v44 * v156,
+            v191 = -(v43 * v157), v192 = v159 - v162, v193 = v85 * v160,
+            v194 = v86 * v159 - v28 * v162, v195 = -(v27 * v163), v196 = v165 - v168,
+            v197 = v93 * v166, v198 = v94 * v165 - v4 * v168, v199 = -(v3 * v169);
+        g[0] = v50; g[1] = v58; g[2] = v66; g[3] = v74; g[4] = v82; g[5] = v90; g[6] = v98;
+        A[0] = softehl_splat(0.0); A[1] = v104; A[2] = v110; A[3] = v116; A[4] = v122; A[5] = v128;
+        A[6] = v134; A[7] = softehl_splat((-1.0)); A[8] = v140; A[9] = softehl_splat(0.0);
+        A[10] = softehl_splat(0.0); A[11] = softehl_splat(0.0); A[12] = softehl_splat(0.0);
+        A[13] = softehl_splat(0.0); A[14] = softehl_splat((-1.0)); A[15] = softehl_splat(0.0);
+        A[16] = v146; A[17] = softehl_splat(0.0); A[18] = softehl_splat(0.0);
+        A[19] = softehl_splat(0.0); A[20] = softehl_splat(0.0); A[21] = softehl_splat((-1.0));
+        A[22] = softehl_splat(0.0); A[23] = softehl_splat(0.0); A[24] = v152;
+        A[25] = softehl_splat(0.0); A[26] = softehl_splat(0.0); A[27] = softehl_splat(0.0);
+        A[28] = softehl_splat((-1.0)); A[29] = softehl_splat(0.0); A[30] = softehl_splat(0.0);
+        A[31] = softehl_splat(0.0); A[32] = v158; A[33] = softehl_splat(0.0);
+        A[34] = softehl_splat(0.0); A[35] = softehl_splat((-1.0)); A[36] = softehl_splat(0.0);
+        A[37] = softehl_splat(0.0); A[38] = softehl_splat(0.0); A[39] = softehl_splat(0.0);
+        A[40] = v164; A[41] = softehl_splat(0.0); A[42] = softehl_splat((-1.0));
+        A[43] = softehl_splat(0.0); A[44] = softehl_splat(0.0); A[45] = softehl_splat(0.0);
+        A[46] = softehl_splat(0.0); A[47] = softehl_splat(0.0); A[48] = v170; B[0] = v171;
+        B[1] = softehl_splat(0.0); B[2] = v173; B[3] = v175; B[4] = softehl_splat((-1.0));
+        B[5] = softehl_splat(0.0); B[6] = softehl_splat(0.0); B[7] = softehl_splat(0.0);
+        B[8] = v176; B[9] = v177; B[10] = v178; B[11] = v179; B[12] = softehl_splat(0.0);
+        B[13] = softehl_splat((-1.0)); B[14] = softehl_splat(0.0); B[15] = softehl_splat(0.0);
+        B[16] = v180; B[17] = v181; B[18] = v182; B[19] = v183; B[20] = softehl_splat(0.0);
+        B[21] = softehl_splat(0.0); B[22] = softehl_splat((-1.0)); B[23] = softehl_splat(0.0);
+        B[24] = v184; B[25] = v185; B[26] = v186; B[27] = v187; B[28] = softehl_splat(0.0);
+        B[29] = softehl_splat(0.0); B[30] = softehl_splat(0.0); B[31] = softehl_splat((-1.0));
+        B[32] = v188; B[33] = v189; B[34] = v190; B[35] = v191; B[36] = softehl_splat(0.0);
+        B[37] = softehl_splat(0.0); B[38] = softehl_splat(0.0); B[39] = softehl_splat(1.0);
+        B[40] = v192; B[41] = v193; B[42] = v194; B[43] = v195; B[44] = softehl_splat(0.0);
+        B[45] = softehl_splat(0.0); B[46] = softehl_splat(1.0); B[47] = softehl_splat(0.0);
+        B[48] = v196; B[49] = v197; B[50] = v198; B[51] = v199; B[52] = softehl_splat(0.0);
+        B[53] = softehl_splat(1.0); B[54] = softehl_splat(0.0); B[55] = softehl_splat(0.0);
         V felt[7];
         for (int k = 0; k < 7; ++k) felt[k] = softehl_splat(0.0);
         for (int i = 0; i < 7; ++i) {
@@ -644,514 +239,109 @@ static void softehl_film_conserving_carreau_level_cell_lanes(
     for (int step = 0; step < 50 && softehl_any(active); ++step) {
         M failed = softehl_mask(0), far = failed;
         V g[7], A[49], B[56];
-        const V v1 = s[6] * s[6];
-        const V v2 = 1.0 + v1;
-        const V v3 = softehl_vlog(v2);
-        const V v4 = p[4] * v3;
-        const V v5 = softehl_vexp(v4);
-        const V v6 = p[3] * v5;
-        const V v7 = p[0] + v6;
-        const V v8 = 1.0 / v7;
-        const V v9 = 0.08566224618958518 * s[6];
-        const V v10 = v9 * v8;
-        const V v11 = s[1] * s[1];
-        const V v12 = 1.0 + v11;
-        const V v13 = softehl_vlog(v12);
-        const V v14 = p[4] * v13;
-        const V v15 = softehl_vexp(v14);
-        const V v16 = p[3] * v15;
-        const V v17 = p[0] + v16;
-        const V v18 = 1.0 / v17;
-        const V v19 = 0.08566224618958518 * s[1];
-        const V v20 = v19 * v18;
-        const V v21 = v20 + v10;
-        const V v22 = s[2] * s[2];
-        const V v23 = 1.0 + v22;
-        const V v24 = softehl_vlog(v23);
-        const V v25 = p[4] * v24;
-        const V v26 = softehl_vexp(v25);
-        const V v27 = p[3] * v26;
-        const V v28 = p[0] + v27;
-        const V v29 = 1.0 / v28;
-        const V v30 = 0.1803807865240693 * s[2];
-        const V v31 = v30 * v29;
-        const V v32 = v31 + v21;
-        const V v33 = s[5] * s[5];
-        const V v34 = 1.0 + v33;
-        const V v35 = softehl_vlog(v34);
-        const V v36 = p[4] * v35;
-        const V v37 = softehl_vexp(v36);
-        const V v38 = p[3] * v37;
-        const V v39 = p[0] + v38;
-        const V v40 = 1.0 / v39;
-        const V v41 = 0.1803807865240693 * s[5];
-        const V v42 = v41 * v40;
-        const V v43 = v42 + v32;
-        const V v44 = s[3] * s[3];
-        const V v45 = 1.0 + v44;
-        const V v46 = softehl_vlog(v45);
-        const V v47 = p[4] * v46;
-        const V v48 = softehl_vexp(v47);
-        const V v49 = p[3] * v48;
-        const V v50 = p[0] + v49;
-        const V v51 = 1.0 / v50;
-        const V v52 = 0.23395696728634552 * s[3];
-        const V v53 = v52 * v51;
-        const V v54 = v53 + v43;
-        const V v55 = s[4] * s[4];
-        const V v56 = 1.0 + v55;
-        const V v57 = softehl_vlog(v56);
-        const V v58 = p[4] * v57;
-        const V v59 = softehl_vexp(v58);
-        const V v60 = p[3] * v59;
-        const V v61 = p[0] + v60;
-        const V v62 = 1.0 / v61;
-        const V v63 = 0.23395696728634552 * s[4];
-        const V v64 = v63 * v62;
-        const V v65 = v64 + v54;
-        const V v66 = v65 - p[1];
-        const V v67 = v17 * v17;
-        const V v68 = 1.0 / v67;
-        const V v69 = v11 * v68;
-        const V v70 = 1.0 + v69;
-        const V v71 = softehl_vlog(v70);
-        const V v72 = p[2] * v71;
-        const V v73 = softehl_vexp(v72);
-        const V v74 = p[3] * v73;
-        const V v75 = p[0] + v74;
-        const V v76 = s[1] * v75;
-        const V v77 = v18 * v76;
-        const V v78 = s[0] + p[5];
-        const V v79 = v77 - v78;
-        const V v80 = v28 * v28;
-        const V v81 = 1.0 / v80;
-        const V v82 = v22 * v81;
-        const V v83 = 1.0 + v82;
-        const V v84 = softehl_vlog(v83);
-        const V v85 = p[2] * v84;
-        const V v86 = softehl_vexp(v85);
-        const V v87 = p[3] * v86;
-        const V v88 = p[0] + v87;
-        const V v89 = s[2] * v88;
-        const V v90 = v29 * v89;
-        const V v91 = s[0] + p[6];
-        const V v92 = v90 - v91;
-        const V v93 = v50 * v50;
-        const V v94 = 1.0 / v93;
-        const V v95 = v44 * v94;
-        const V v96 = 1.0 + v95;
-        const V v97 = softehl_vlog(v96);
-        const V v98 = p[2] * v97;
-        const V v99 = softehl_vexp(v98);
-        const V v100 = p[3] * v99;
-        const V v101 = p[0] + v100;
-        const V v102 = s[3] * v101;
-        const V v103 = v51 * v102;
-        const V v104 = s[0] + p[7];
-        const V v105 = v103 - v104;
-        const V v106 = v61 * v61;
-        const V v107 = 1.0 / v106;
-        const V v108 = v55 * v107;
-        const V v109 = 1.0 + v108;
-        const V v110 = softehl_vlog(v109);
-        const V v111 = p[2] * v110;
-        const V v112 = softehl_vexp(v111);
-        const V v113 = p[3] * v112;
-        const V v114 = p[0] + v113;
-        const V v115 = s[4] * v114;
-        const V v116 = v62 * v115;
-        const V v117 = p[7] - s[0];
-        const V v118 = v117 + v116;
-        const V v119 = v39 * v39;
-        const V v120 = 1.0 / v119;
-        const V v121 = v33 * v120;
-        const V v122 = 1.0 + v121;
-        const V v123 = softehl_vlog(v122);
-        const V v124 = p[2] * v123;
-        const V v125 = softehl_vexp(v124);
-        const V v126 = p[3] * v125;
-        const V v127 = p[0] + v126;
-        const V v128 = s[5] * v127;
-        const V v129 = v40 * v128;
-        const V v130 = p[6] - s[0];
-        const V v131 = v130 + v129;
-        const V v132 = v7 * v7;
-        const V v133 = 1.0 / v132;
-        const V v134 = v1 * v133;
-        const V v135 = 1.0 + v134;
-        const V v136 = softehl_vlog(v135);
-        const V v137 = p[2] * v136;
-        const V v138 = softehl_vexp(v137);
-        const V v139 = p[3] * v138;
-        const V v140 = p[0] + v139;
-        const V v141 = s[6] * v140;
-        const V v142 = v8 * v141;
-        const V v143 = p[5] - s[0];
-        const V v144 = v143 + v142;
-        const V v145 = 2.0 * s[1];
-        const V v146 = p[4] * v145;
-        const V v147 = 1.0 / v12;
-        const V v148 = v147 * v146;
-        const V v149 = v18 * v18;
-        const V v150 = v19 * v149;
-        const V v151 = v16 * v150;
-        const V v152 = v151 * v148;
-        const V v153 = 0.08566224618958518 * v18;
-        const V v154 = v153 - v152;
-        const V v155 = 2.0 * s[2];
-        const V v156 = p[4] * v155;
-        const V v157 = 1.0 / v23;
-        const V v158 = v157 * v156;
-        const V v159 = v29 * v29;
-        const V v160 = v30 * v159;
-        const V v161 = v27 * v160;
-        const V v162 = v161 * v158;
-        const V v163 = 0.1803807865240693 * v29;
-        const V v164 = v163 - v162;
-        const V v165 = 2.0 * s[3];
-        const V v166 = p[4] * v165;
-        const V v167 = 1.0 / v45;
-        const V v168 = v167 * v166;
-        const V v169 = v51 * v51;
-        const V v170 = v52 * v169;
-        const V v171 = v49 * v170;
-        const V v172 = v171 * v168;
-        const V v173 = 0.23395696728634552 * v51;
-        const V v174 = v173 - v172;
-        const V v175 = 2.0 * s[4];
-        const V v176 = p[4] * v175;
-        const V v177 = 1.0 / v56;
-        const V v178 = v177 * v176;
-        const V v179 = v62 * v62;
-        const V v180 = v63 * v179;
-        const V v181 = v60 * v180;
-        const V v182 = v181 * v178;
-        const V v183 = 0.23395696728634552 * v62;
-        const V v184 = v183 - v182;
-        const V v185 = 2.0 * s[5];
-        const V v186 = p[4] * v185;
-        const V v187 = 1.0 / v34;
-        const V v188 = v187 * v186;
-        const V v189 = v40 * v40;
-        const V v190 = v41 * v189;
-        const V v191 = v38 * v190;
-        const V v192 = v191 * v188;
-        const V v193 = 0.1803807865240693 * v40;
-        const V v194 = v193 - v192;
-        const V v195 = 2.0 * s[6];
-        const V v196 = p[4] * v195;
-        const V v197 = 1.0 / v2;
-        const V v198 = v197 * v196;
-        const V v199 = v8 * v8;
-        const V v200 = v9 * v199;
-        const V v201 = v6 * v200;
-        const V v202 = v201 * v198;
-        const V v203 = 0.08566224618958518 * v8;
-        const V v204 = v203 - v202;
-        const V v205 = 2.0 * v11;
-        const V v206 = v205 * v17;
-        const V v207 = v68 * v206;
-        const V v208 = v68 * v207;
-        const V v209 = 1.0 / v70;
-        const V v210 = p[2] * v209;
-        const V v211 = s[1] * v18;
-        const V v212 = v74 * v211;
-        const V v213 = v212 * v210;
-        const V v214 = v213 * v208;
-        const V v215 = v76 * v149;
-        const V v216 = v215 + v214;
-        const V v217 = v16 * v216;
-        const V v218 = p[4] * v147;
-        const V v219 = v218 * v217;
-        const V v220 = v68 * v213;
-        const V v221 = v220 - v219;
-        const V v222 = v145 * v221;
-        const V v223 = v18 * v75;
-        const V v224 = v223 + v222;
-        const V v225 = 2.0 * v22;
-        const V v226 = v225 * v28;
-        const V v227 = v81 * v226;
-        const V v228 = v81 * v227;
-        const V v229 = 1.0 / v83;
-        const V v230 = p[2] * v229;
-        const V v231 = s[2] * v29;
-        const V v232 = v87 * v231;
-        const V v233 = v232 * v230;
-        const V v234 = v233 * v228;
-        const V v235 = v89 * v159;
-        const V v236 = v235 + v234;
-        const V v237 = v27 * v236;
-        const V v238 = p[4] * v157;
-        const V v239 = v238 * v237;
-        const V v240 = v81 * v233;
-        const V v241 = v240 - v239;
-        const V v242 = v155 * v241;
-        const V v243 = v29 * v88;
-        const V v244 = v243 + v242;
-        const V v245 = 2.0 * v44;
-        const V v246 = v245 * v50;
-        const V v247 = v94 * v246;
-        const V v248 = v94 * v247;
-        const V v249 = 1.0 / v96;
-        const V v250 = p[2] * v249;
-        const V v251 = s[3] * v51;
-        const V v252 = v100 * v251;
-        const V v253 = v252 * v250;
-        const V v254 = v253 * v248;
-        const V v255 = v102 * v169;
-        const V v256 = v255 + v254;
-        const V v257 = v49 * v256;
-        const V v258 = p[4] * v167;
-        const V v259 = v258 * v257;
-        const V v260 = v94 * v253;
-        const V v261 = v260 - v259;
-        const V v262 = v165 * v261;
-        const V v263 = v51 * v101;
-        const V v264 = v263 + v262;
-        const V v265 = 2.0 * v55;
-        const V v266 = v265 * v61;
-        const V v267 = v107 * v266;
-        const V v268 = v107 * v267;
-        const V v269 = 1.0 / v109;
-        const V v270 = p[2] * v269;
-        const V v271 = s[4] * v62;
-        const V v272 = v113 * v271;
-        const V v273 = v272 * v270;
-        const V v274 = v273 * v268;
-        const V v275 = v115 * v179;
-        const V v276 = v275 + v274;
-        const V v277 = v60 * v276;
-        const V v278 = p[4] * v177;
-        const V v279 = v278 * v277;
-        const V v280 = v107 * v273;
-        const V v281 = v280 - v279;
-        const V v282 = v175 * v281;
-        const V v283 = v62 * v114;
-        const V v284 = v283 + v282;
-        const V v285 = 2.0 * v33;
-        const V v286 = v285 * v39;
-        const V v287 = v120 * v286;
-        const V v288 = v120 * v287;
-        const V v289 = 1.0 / v122;
-        const V v290 = p[2] * v289;
-        const V v291 = s[5] * v40;
-        const V v292 = v126 * v291;
-        const V v293 = v292 * v290;
-        const V v294 = v293 * v288;
-        const V v295 = v128 * v189;
-        const V v296 = v295 + v294;
-        const V v297 = v38 * v296;
-        const V v298 = p[4] * v187;
-        const V v299 = v298 * v297;
-        const V v300 = v120 * v293;
-        const V v301 = v300 - v299;
-        const V v302 = v185 * v301;
-        const V v303 = v40 * v127;
-        const V v304 = v303 + v302;
-        const V v305 = 2.0 * v1;
-        const V v306 = v305 * v7;
-        const V v307 = v133 * v306;
-        const V v308 = v133 * v307;
-        const V v309 = 1.0 / v135;
-        const V v310 = p[2] * v309;
-        const V v311 = s[6] * v8;
-        const V v312 = v139 * v311;
-        const V v313 = v312 * v310;
-        const V v314 = v313 * v308;
-        const V v315 = v141 * v199;
-        const V v316 = v315 + v314;
-        const V v317 = v6 * v316;
-        const V v318 = p[4] * v197;
-        const V v319 = v318 * v317;
-        const V v320 = v133 * v313;
-        const V v321 = v320 - v319;
-        const V v322 = v195 * v321;
-        const V v323 = v8 * v140;
-        const V v324 = v323 + v322;
-        const V v325 = v180 + v170;
-        const V v326 = v325 + v190;
-        const V v327 = v326 + v160;
-        const V v328 = v327 + v200;
-        const V v329 = v328 + v150;
-        const V v330 = -v329;
-        const V v331 = v48 * v170;
-        const V v332 = v59 * v180;
-        const V v333 = v332 + v331;
-        const V v334 = v37 * v190;
-        const V v335 = v333 + v334;
-        const V v336 = v26 * v160;
-        const V v337 = v335 + v336;
-        const V v338 = v5 * v200;
-        const V v339 = v337 + v338;
-        const V v340 = v15 * v150;
-        const V v341 = v339 + v340;
-        const V v342 = -v341;
-        const V v343 = v46 * v171;
-        const V v344 = v57 * v181;
-        const V v345 = v344 + v343;
-        const V v346 = v35 * v191;
-        const V v347 = v345 + v346;
-        const V v348 = v24 * v161;
-        const V v349 = v347 + v348;
-        const V v350 = v3 * v201;
-        const V v351 = v349 + v350;
-        const V v352 = v13 * v151;
-        const V v353 = v351 + v352;
-        const V v354 = -v353;
-        const V v355 = v211 - v216;
-        const V v356 = v71 * v212;
-        const V v357 = v15 * v216;
-        const V v358 = v73 * v211;
-        const V v359 = v358 - v357;
-        const V v360 = v13 * v217;
-        const V v361 = -v360;
-        const V v362 = v231 - v236;
-        const V v363 = v84 * v232;
-        const V v364 = v26 * v236;
-        const V v365 = v86 * v231;
-        const V v366 = v365 - v364;
-        const V v367 = v24 * v237;
-        const V v368 = -v367;
-        const V v369 = v251 - v256;
-        const V v370 = v97 * v252;
-        const V v371 = v48 * v256;
-        const V v372 = v99 * v251;
-        const V v373 = v372 - v371;
-        const V v374 = v46 * v257;
-        const V v375 = -v374;
-        const V v376 = v271 - v276;
-        const V v377 = v110 * v272;
-        const V v378 = v59 * v276;
-        const V v379 = v112 * v271;
-        const V v380 = v379 - v378;
-        const V v381 = v57 * v277;
-        const V v382 = -v381;
-        const V v383 = v291 - v296;
-        const V v384 = v123 * v292;
-        const V v385 = v37 * v296;
-        const V v386 = v125 * v291;
-        const V v387 = v386 - v385;
-        const V v388 = v35 * v297;
-        const V v389 = -v388;
-        const V v390 = v311 - v316;
-        const V v391 = v136 * v312;
-        const V v392 = v5 * v316;
-        const V v393 = v138 * v311;
-        const V v394 = v393 - v392;
-        const V v395 = v3 * v317;
-        const V v396 = -v395;
-        g[0] = v66;
-        g[1] = v79;
-        g[2] = v92;
-        g[3] = v105;
-        g[4] = v118;
-        g[5] = v131;
-        g[6] = v144;
-        A[0] = softehl_splat(0.0);
-        A[1] = v154;
-        A[2] = v164;
-        A[3] = v174;
-        A[4] = v184;
-        A[5] = v194;
-        A[6] = v204;
-        A[7] = softehl_splat((-1.0));
-        A[8] = v224;
-        A[9] = softehl_splat(0.0);
-        A[10] = softehl_splat(0.0);
-        A[11] = softehl_splat(0.0);
-        A[12] = softehl_splat(0.0);
-        A[13] = softehl_splat(0.0);
-        A[14] = softehl_splat((-1.0));
-        A[15] = softehl_splat(0.0);
-        A[16] = v244;
-        A[17] = softehl_splat(0.0);
-        A[18] = softehl_splat(0.0);
-        A[19] = softehl_splat(0.0);
-        A[20] = softehl_splat(0.0);
-        A[21] = softehl_splat((-1.0));
-        A[22] = softehl_splat(0.0);
-        A[23] = softehl_splat(0.0);
-        A[24] = v264;
-        A[25] = softehl_splat(0.0);
-        A[26] = softehl_splat(0.0);
-        A[27] = softehl_splat(0.0);
-        A[28] = softehl_splat((-1.0));
-        A[29] = softehl_splat(0.0);
-        A[30] = softehl_splat(0.0);
-        A[31] = softehl_splat(0.0);
-        A[32] = v284;
-        A[33] = softehl_splat(0.0);
-        A[34] = softehl_splat(0.0);
-        A[35] = softehl_splat((-1.0));
-        A[36] = softehl_splat(0.0);
-        A[37] = softehl_splat(0.0);
-        A[38] = softehl_splat(0.0);
-        A[39] = softehl_splat(0.0);
-        A[40] = v304;
-        A[41] = softehl_splat(0.0);
-        A[42] = softehl_splat((-1.0));
-        A[43] = softehl_splat(0.0);
-        A[44] = softehl_splat(0.0);
-        A[45] = softehl_splat(0.0);
-        A[46] = softehl_splat(0.0);
-        A[47] = softehl_splat(0.0);
-        A[48] = v324;
-        B[0] = v330;
-        B[1] = softehl_splat((-1.0));
-        B[2] = softehl_splat(0.0);
-        B[3] = v342;
-        B[4] = v354;
-        B[5] = softehl_splat(0.0);
-        B[6] = softehl_splat(0.0);
-        B[7] = softehl_splat(0.0);
-        B[8] = v355;
-        B[9] = softehl_splat(0.0);
-        B[10] = v356;
-        B[11] = v359;
-        B[12] = v361;
-        B[13] = softehl_splat((-1.0));
-        B[14] = softehl_splat(0.0);
-        B[15] = softehl_splat(0.0);
-        B[16] = v362;
-        B[17] = softehl_splat(0.0);
-        B[18] = v363;
-        B[19] = v366;
-        B[20] = v368;
-        B[21] = softehl_splat(0.0);
-        B[22] = softehl_splat((-1.0));
-        B[23] = softehl_splat(0.0);
-        B[24] = v369;
-        B[25] = softehl_splat(0.0);
-        B[26] = v370;
-        B[27] = v373;
-        B[28] = v375;
-        B[29] = softehl_splat(0.0);
-        B[30] = softehl_splat(0.0);
-        B[31] = softehl_splat((-1.0));
-        B[32] = v376;
-        B[33] = softehl_splat(0.0);
-        B[34] = v377;
-        B[35] = v380;
-        B[36] = v382;
-        B[37] = softehl_splat(0.0);
-        B[38] = softehl_splat(0.0);
-        B[39] = softehl_splat(1.0);
-        B[40] = v383;
-        B[41] = softehl_splat(0.0);
-        B[42] = v384;
-        B[43] = v387;
-        B[44] = v389;
-        B[45] = softehl_splat(0.0);
-        B[46] = softehl_splat(1.0);
-        B[47] = softehl_splat(0.0);
-        B[48] = v390;
-        B[49] = softehl_splat(0.0);
-        B[50] = v391;
-        B[51] = v394;
-        B[52] = v396;
-        B[53] = softehl_splat(1.0);
-        B[54] = softehl_splat(0.0);
-        B[55] = softehl_splat(0.0);
+        const V v1 = s[6] * s[6], v2 = 1.0 + v1, v3 = softehl_vlog(v2),
+            v4 = softehl_vexp(p[4] * v3), v5 = p[3] * v4, v6 = p[0] + v5, v7 = 1.0 / v6,
+            v8 = 0.08566224618958518 * s[6], v9 = s[1] * s[1], v10 = 1.0 + v9,
+            v11 = softehl_vlog(v10), v12 = softehl_vexp(p[4] * v11), v13 = p[3] * v12,
+            v14 = p[0] + v13, v15 = 1.0 / v14, v16 = 0.08566224618958518 * s[1], v17 = s[2] * s[2],
+            v18 = 1.0 + v17, v19 = softehl_vlog(v18), v20 = softehl_vexp(p[4] * v19),
+            v21 = p[3] * v20, v22 = p[0] + v21, v23 = 1.0 / v22, v24 = 0.1803807865240693 * s[2],
+            v25 = s[5] * s[5], v26 = 1.0 + v25, v27 = softehl_vlog(v26),
+            v28 = softehl_vexp(p[4] * v27), v29 = p[3] * v28, v30 = p[0] + v29, v31 = 1.0 / v30,
+            v32 = 0.1803807865240693 * s[5], v33 = s[3] * s[3], v34 = 1.0 + v33,
+            v35 = softehl_vlog(v34), v36 = softehl_vexp(p[4] * v35), v37 = p[3] * v36,
+            v38 = p[0] + v37, v39 = 1.0 / v38, v40 = 0.23395696728634552 * s[3], v41 = s[4] * s[4],
+            v42 = 1.0 + v41, v43 = softehl_vlog(v42), v44 = softehl_vexp(p[4] * v43),
+            v45 = p[3] * v44, v46 = p[0] + v45, v47 = 1.0 / v46, v48 = 0.23395696728634552 * s[4],
+            v49 = v48 * v47 + (v40 * v39 + (v32 * v31 + (v24 * v23 + (v16 * v15 + v8 * v7)))),
+            v50 = v49 - p[1], v51 = 1.0 / (v14 * v14), v52 = 1.0 + v9 * v51,
+            v53 = softehl_vlog(v52), v54 = softehl_vexp(p[2] * v53), v55 = p[3] * v54,
+            v56 = p[0] + v55, v57 = s[1] * v56, v58 = v15 * v57 - (s[0] + p[5]),
+            v59 = 1.0 / (v22 * v22), v60 = 1.0 + v17 * v59, v61 = softehl_vlog(v60),
+            v62 = softehl_vexp(p[2] * v61), v63 = p[3] * v62, v64 = p[0] + v63, v65 = s[2] * v64,
+            v66 = v23 * v65 - (s[0] + p[6]), v67 = 1.0 / (v38 * v38), v68 = 1.0 + v33 * v67,
+            v69 = softehl_vlog(v68), v70 = softehl_vexp(p[2] * v69), v71 = p[3] * v70,
+            v72 = p[0] + v71, v73 = s[3] * v72, v74 = v39 * v73 - (s[0] + p[7]),
+            v75 = 1.0 / (v46 * v46), v76 = 1.0 + v41 * v75, v77 = softehl_vlog(v76),
+            v78 = softehl_vexp(p[2] * v77), v79 = p[3] * v78, v80 = p[0] + v79, v81 = s[4] * v80,
+            v82 = p[7] - s[0] + v47 * v81, v83 = 1.0 / (v30 * v30), v84 = 1.0 + v25 * v83,
+            v85 = softehl_vlog(v84), v86 = softehl_vexp(p[2] * v85), v87 = p[3] * v86,
+            v88 = p[0] + v87, v89 = s[5] * v88, v90 = p[6] - s[0] + v31 * v89,
+            v91 = 1.0 / (v6 * v6), v92 = 1.0 + v1 * v91, v93 = softehl_vlog(v92),
+            v94 = softehl_vexp(p[2] * v93), v95 = p[3] * v94, v96 = p[0] + v95, v97 = s[6] * v96,
+            v98 = p[5] - s[0] + v7 * v97, v99 = 2.0 * s[1], v100 = 1.0 / v10, v101 = v15 * v15,
+            v102 = v16 * v101, v103 = v13 * v102,
+            v104 = 0.08566224618958518 * v15 - v103 * (v100 * (p[4] * v99)), v105 = 2.0 * s[2],
+            v106 = 1.0 / v18, v107 = v23 * v23, v108 = v24 * v107, v109 = v21 * v108,
+            v110 = 0.1803807865240693 * v23 - v109 * (v106 * (p[4] * v105)), v111 = 2.0 * s[3],
+            v112 = 1.0 / v34, v113 = v39 * v39, v114 = v40 * v113, v115 = v37 * v114,
+            v116 = 0.23395696728634552 * v39 - v115 * (v112 * (p[4] * v111)), v117 = 2.0 * s[4],
+            v118 = 1.0 / v42, v119 = v47 * v47, v120 = v48 * v119, v121 = v45 * v120,
+            v122 = 0.23395696728634552 * v47 - v121 * (v118 * (p[4] * v117)), v123 = 2.0 * s[5],
+            v124 = 1.0 / v26, v125 = v31 * v31, v126 = v32 * v125, v127 = v29 * v126,
+            v128 = 0.1803807865240693 * v31 - v127 * (v124 * (p[4] * v123)), v129 = 2.0 * s[6],
+            v130 = 1.0 / v2, v131 = v7 * v7, v132 = v8 * v131, v133 = v5 * v132,
+            v134 = 0.08566224618958518 * v7 - v133 * (v130 * (p[4] * v129)), v135 = s[1] * v15,
+            v136 = v55 * v135, v137 = v136 * (p[2] * (1.0 / v52)),
+            v138 = v57 * v101 + v137 * (v51 * (v51 * (2.0 * v9 * v14))), v139 = v13 * v138,
+            v140 = v15 * v56 + v99 * (v51 * v137 - p[4] * v100 * v139), v141 = s[2] * v23,
+            v142 = v63 * v141, v143 = v142 * (p[2] * (1.0 / v60)),
+            v144 = v65 * v107 + v143 * (v59 * (v59 * (2.0 * v17 * v22))), v145 = v21 * v144,
+            v146 = v23 * v64 + v105 * (v59 * v143 - p[4] * v106 * v145), v147 = s[3] * v39,
+            v148 = v71 * v147, v149 = v148 * (p[2] * (1.0 / v68)),
+            v150 = v73 * v113 + v149 * (v67 * (v67 * (2.0 * v33 * v38))), v151 = v37 * v150,
+            v152 = v39 * v72 + v111 * (v67 * v149 - p[4] * v112 * v151), v153 = s[4] * v47,
+            v154 = v79 * v153, v155 = v154 * (p[2] * (1.0 / v76)),
+            v156 = v81 * v119 + v155 * (v75 * (v75 * (2.0 * v41 * v46))), v157 = v45 * v156,
+            v158 = v47 * v80 + v117 * (v75 * v155 - p[4] * v118 * v157), v159 = s[5] * v31,
+            v160 = v87 * v159, v161 = v160 * (p[2] * (1.0 / v84)),
+            v162 = v89 * v125 + v161 * (v83 * (v83 * (2.0 * v25 * v30))), v163 = v29 * v162,
+            v164 = v31 * v88 + v123 * (v83 * v161 - p[4] * v124 * v163), v165 = s[6] * v7,
+            v166 = v95 * v165, v167 = v166 * (p[2] * (1.0 / v92)),
+            v168 = v97 * v131 + v167 * (v91 * (v91 * (2.0 * v1 * v6))), v169 = v5 * v168,
+            v170 = v7 * v96 + v129 * (v91 * v167 - p[4] * v130 * v169),
+            v171 = -(v120 + v114 + v126 + v108 + v132 + v102),
+            v172 = v44 * v120 + v36 * v114 + v28 * v126 + v20 * v108 + v4 * v132 + v12 * v102,
+            v173 = -v172,
+            v174 = v43 * v121 + v35 * v115 + v27 * v127 + v19 * v109 + v3 * v133 + v11 * v103,
+            v175 = -v174, v176 = v135 - v138, v177 = v53 * v136, v178 = v54 * v135 - v12 * v138,
+            v179 = -(v11 * v139), v180 = v141 - v144, v181 = v61 * v142,
+            v182 = v62 * v141 - v20 * v144, v183 = -(v19 * v145), v184 = v147 - v150,
+            v185 = v69 * v148, v186 = v70 * v147 - v36 * v150, v187 = -(v35 * v151),
+            v188 = v153 - v156, v189 = v77 * v154, v190 = v78 * v153 - v44 * v156,
+            v191 = -(v43 * v157), v192 = v159 - v162, v193 = v85 * v160,
+            v194 = v86 * v159 - v28 * v162, v195 = -(v27 * v163), v196 = v165 - v168,
+            v197 = v93 * v166, v198 = v94 * v165 - v4 * v168, v199 = -(v3 * v169);
+        g[0] = v50; g[1] = v58; g[2] = v66; g[3] = v74; g[4] = v82; g[5] = v90; g[6] = v98;
+        A[0] = softehl_splat(0.0); A[1] = v104; A[2] = v110; A[3] = v116; A[4] = v122; A[5] = v128;
+        A[6] = v134; A[7] = softehl_splat((-1.0)); A[8] = v140; A[9] = softehl_splat(0.0);
+        A[10] = softehl_splat(0.0); A[11] = softehl_splat(0.0); A[12] = softehl_splat(0.0);
+        A[13] = softehl_splat(0.0); A[14] = softehl_splat((-1.0)); A[15] = softehl_splat(0.0);
+        A[16] = v146; A[17] = softehl_splat(0.0); A[18] = softehl_splat(0.0);
+        A[19] = softehl_splat(0.0); A[20] = softehl_splat(0.0); A[21] = softehl_splat((-1.0));
+        A[22] = softehl_splat(0.0); A[23] = softehl_splat(0.0); A[24] = v152;
+        A[25] = softehl_splat(0.0); A[26] = softehl_splat(0.0); A[27] = softehl_splat(0.0);
+        A[28] = softehl_splat((-1.0)); A[29] = softehl_splat(0.0); A[30] = softehl_splat(0.0);
+        A[31] = softehl_splat(0.0); A[32] = v158; A[33] = softehl_splat(0.0);
+        A[34] = softehl_splat(0.0); A[35] = softehl_splat((-1.0)); A[36] = softehl_splat(0.0);
+        A[37] = softehl_splat(0.0); A[38] = softehl_splat(0.0); A[39] = softehl_splat(0.0);
+        A[40] = v164; A[41] = softehl_splat(0.0); A[42] = softehl_splat((-1.0));
+        A[43] = softehl_splat(0.0); A[44] = softehl_splat(0.0); A[45] = softehl_splat(0.0);
+        A[46] = softehl_splat(0.0); A[47] = softehl_splat(0.0); A[48] = v170; B[0] = v171;
+        B[1] = softehl_splat((-1.0)); B[2] = softehl_splat(0.0); B[3] = v173; B[4] = v175;
+        B[5] = softehl_splat(0.0); B[6] = softehl_splat(0.0); B[7] = softehl_splat(0.0);
+        B[8] = v176; B[9] = softehl_splat(0.0); B[10] = v177; B[11] = v178; B[12] = v179;
+        B[13] = softehl_splat((-1.0)); B[14] = softehl_splat(0.0); B[15] = softehl_splat(0.0);
+        B[16] = v180; B[17] = softehl_splat(0.0); B[18] = v181; B[19] = v182; B[20] = v183;
+        B[21] = softehl_splat(0.0); B[22] = softehl_splat((-1.0)); B[23] = softehl_splat(0.0);
+        B[24] = v184; B[25] = softehl_splat(0.0); B[26] = v185; B[27] = v186; B[28] = v187;
+        B[29] = softehl_splat(0.0); B[30] = softehl_splat(0.0); B[31] = softehl_splat((-1.0));
+        B[32] = v188; B[33] = softehl_splat(0.0); B[34] = v189; B[35] = v190; B[36] = v191;
+        B[37] = softehl_splat(0.0); B[38] = softehl_splat(0.0); B[39] = softehl_splat(1.0);
+        B[40] = v192; B[41] = softehl_splat(0.0); B[42] = v193; B[43] = v194; B[44] = v195;
+        B[45] = softehl_splat(0.0); B[46] = softehl_splat(1.0); B[47] = softehl_splat(0.0);
+        B[48] = v196; B[49] = softehl_splat(0.0); B[50] = v197; B[51] = v198; B[52] = v199;
+        B[53] = softehl_splat(1.0); B[54] = softehl_splat(0.0); B[55] = softehl_splat(0.0);
         V felt[7];
         for (int k = 0; k < 7; ++k) felt[k] = softehl_splat(0.0);
         for (int i = 0; i < 7; ++i) {
@@ -1191,23 +381,16 @@ static void softehl_film_conserving_carreau_inverse_7_lanes(
     *lost |= spoilt;
 }
 
-static void softehl_film_conserving_carreau_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_conserving_carreau_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -1224,266 +407,79 @@ static void softehl_film_conserving_carreau_residual_group(
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
     const double v1 = 1.0 - parameters[8];
-    const V v2 = X2 + d2;
-    const V v3 = X1 - parameters[0];
-    const V v4 = X3 - parameters[0];
-    const V v5 = d1 + v3;
-    const V v6 = d3 + v4;
-    const V v7 = d2 * parameters[9];
-    const V v8 = a1 + v7;
-    const V v9 = d0 * parameters[9];
-    const V v10 = a0 + v9;
-    const double v11 = 6.283185307179586 * parameters[4];
-    const V v12 = v2 - d0;
-    const double v13 = 1.0 / parameters[7];
-    const V v14 = v12 - X0;
-    const double v15 = parameters[7] - 1.0;
-    const V v16 = 0.5 * v14;
-    const double v17 = 0.5 * v15;
-    const double v18 = 1.0 / parameters[6];
-    const V v19 = v6 - v5;
-    const V v20 = 0.5 * v19;
-    const V v21 = parameters[6] * v16;
-    const double v22 = v13 * v17;
-    const V v23 = 1.0 / v16;
-    const V v24 = v16 * v16;
-    const V v25 = v20 * v20;
-    const V v26 = v25 + v24;
-    const V v27 = 1.0 / v21;
-    const V v28 = softehl_vsqrt(v26);
-    const V v29 = parameters[5] * v28;
-    const V v30 = 0.5 * v27;
-    const V v31 = 0.5 * v23;
-    V s32 = softehl_splat(0.0);
-    V s33 = softehl_splat(0.0);
-    V s34 = softehl_splat(0.0);
-    V s35 = softehl_splat(0.0);
+    const V v2 = d1 + (X1 - parameters[0]), v3 = d3 + (X3 - parameters[0]),
+        v4 = a1 + d2 * parameters[9], v5 = a0 + d0 * parameters[9];
+    const double v6 = 6.283185307179586 * parameters[4]; const V v7 = 0.5 * (X2 + d2 - d0 - X0);
+    const double v8 = 0.5 * (parameters[7] - 1.0), v9 = 1.0 / parameters[6];
+    const V v10 = 0.5 * (v3 - v2); const double v11 = 1.0 / parameters[7] * v8;
+    const V v12 = softehl_vsqrt(v10 * v10 + v7 * v7), v13 = parameters[5] * v12,
+        v14 = 0.5 * (1.0 / (parameters[6] * v7)), v15 = 0.5 * (1.0 / v7);
+    V s16 = {0}, s17 = {0}, s18 = {0}, s19 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v36 = 0.5 * w[0];
-        const V v37 = p1 * v31;
-        const V v38 = p0 * parameters[3];
-        const V v39 = p0 * v16;
-        const double v40 = 0.5 + v36;
-        const double v41 = 0.5 - v36;
-        const V v42 = softehl_vexp(v38);
-        const V v43 = w[3] * v39;
-        const V v44 = v40 * v8;
-        const V v45 = parameters[1] - v44;
-        const V v46 = v40 * v6;
-        const V v47 = v41 * v10;
-        const V v48 = v45 - v47;
-        const V v49 = v41 * v5;
-        const V v50 = v49 + v46;
-        const V v51 = v50 * v37;
-        const V v52 = parameters[0] + v50;
-        const V v53 = parameters[6] * v50;
-        const V v54 = parameters[2] * v42;
-        const V v55 = v54 * v48;
-        const V v56 = 1.0 / v53;
-        const V v57 = v56 * v55;
-        const V v58 = v18 * v51;
-        const V v59 = v52 * v11;
-        const V v60 = v43 * v59;
-        const V v61 = v40 * v60;
-        s32 += v61;
-        const V v62 = v41 * v60;
-        s33 += v62;
-        const V v63 = v57 * v57;
-        const V v64 = 1.0 + v63;
-        const V v65 = softehl_vlog(v64);
-        const V v66 = v17 * v65;
-        const V v67 = softehl_vexp(v66);
-        const V v68 = v1 * v67;
-        const V v69 = parameters[8] + v68;
-        const V v70 = v57 * v69;
-        const V v71 = 0.932469514203152 * v58;
-        const V v72 = 0.6612093864662645 * v58;
-        const V v73 = 0.2386191860831969 * v58;
-        const V v74 = v71 + v70;
-        const V v75 = v72 + v70;
-        const V v76 = v73 + v70;
-        const V v77 = v70 - v73;
-        const V v78 = v70 - v72;
-        const V v79 = v70 - v71;
-        V v80[7];
-        softehl_film_conserving_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), softehl_splat(v17), softehl_splat(v1), softehl_splat(v22), v57, v71, v72, v73, v70, v74, v75, v76, v77, v78, v79}, v80, &failed);
-        const V v81 = v80[0];
-        const V v82 = parameters[6] * v81;
-        const M v83 = softehl_lt(softehl_splat(0.0), v82);
-        const V v84 = softehl_blend(v83, v82, softehl_splat(0.0));
-        const V v85 = softehl_blend(v83, softehl_splat(0.0), v82);
-        const double v86 = 0.5 * w[1];
-        const double v87 = 0.5 * w[2];
-        const V v88 = p2 * parameters[3];
-        const V v89 = softehl_vexp(v88);
-        const V v90 = 1.0 - p6;
-        const V v91 = 1.0 - p4;
-        const double v92 = 0.5 - v86;
-        const double v93 = 0.5 + v86;
-        const V v94 = p3 * v30;
-        const V v95 = v90 * v85;
-        const double v96 = 0.5 - v87;
-        const double v97 = 0.5 + v87;
-        const V v98 = p0 * v20;
-        const V v99 = v92 * v5;
-        const V v100 = v96 * v5;
-        const V v101 = v91 * v84;
-        const V v102 = v95 + v101;
-        const V v103 = w[3] * v59;
-        const V v104 = v93 * v6;
-        const V v105 = v99 + v104;
-        const V v106 = v97 * v6;
-        const V v107 = v100 + v106;
-        const V v108 = v102 - v51;
-        const V v109 = v29 * v108;
-        const V v110 = v98 - v109;
-        const V v111 = v105 + v107;
-        const V v112 = v110 * v103;
-        const V v113 = 0.5 * v111;
-        const V v114 = parameters[2] * v89;
-        const V v115 = v113 * v94;
-        const V v116 = parameters[6] * v113;
-        const V v117 = 1.0 / v116;
-        const V v118 = v114 * v48;
-        const V v119 = v117 * v118;
-        const V v120 = v119 * v119;
-        const V v121 = 1.0 + v120;
-        const V v122 = softehl_vlog(v121);
-        const V v123 = v17 * v122;
-        const V v124 = softehl_vexp(v123);
-        const V v125 = v1 * v124;
-        const V v126 = parameters[8] + v125;
-        const V v127 = v119 * v126;
-        const V v128 = v40 * v112;
-        s34 += v128;
-        const V v129 = v41 * v112;
-        s35 += v129;
-        const V v130 = 0.932469514203152 * v115;
-        const V v131 = 0.6612093864662645 * v115;
-        const V v132 = 0.2386191860831969 * v115;
-        const V v133 = v130 + v127;
-        const V v134 = v131 + v127;
-        const V v135 = v132 + v127;
-        const V v136 = v127 - v132;
-        const V v137 = v127 - v131;
-        const V v138 = v127 - v130;
-        V v139[7];
-        softehl_film_conserving_carreau_level_cell_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), v119, softehl_splat(v17), softehl_splat(v1), softehl_splat(v22), v130, v131, v132, v127, v133, v134, v135, v136, v137, v138}, v139, &failed);
-        const V v140 = v105 * v107;
-        const V v141 = 1.0 / v114;
-        const V v142 = v113 * v113;
-        const M v143 = softehl_lt(softehl_splat(0.0), v48);
-        const V v144 = 1.0 / v142;
-        const V v145 = v139[1];
-        const V v146 = v139[2];
-        const V v147 = v139[3];
-        const V v148 = v139[4];
-        const V v149 = v139[5];
-        const V v150 = v139[6];
-        const V v151 = v145 * v145;
-        const V v152 = 1.0 + v151;
-        const V v153 = v146 * v146;
-        const V v154 = 1.0 + v153;
-        const V v155 = v147 * v147;
-        const V v156 = 1.0 + v155;
-        const V v157 = v148 * v148;
-        const V v158 = 1.0 + v157;
-        const V v159 = v149 * v149;
-        const V v160 = 1.0 + v159;
-        const V v161 = v150 * v150;
-        const V v162 = 1.0 + v161;
-        const V v163 = parameters[6] * v141;
-        const V v164 = softehl_vlog(v152);
-        const V v165 = softehl_vlog(v154);
-        const V v166 = softehl_vlog(v156);
-        const V v167 = softehl_vlog(v158);
-        const V v168 = v142 * v163;
-        const V v169 = softehl_vlog(v160);
-        const V v170 = softehl_vlog(v162);
-        const V v171 = v140 * v144;
-        const V v172 = v171 * v168;
-        const V v173 = v22 * v165;
-        const V v174 = softehl_vexp(v173);
-        const V v175 = v22 * v166;
-        const V v176 = softehl_vexp(v175);
-        const V v177 = v22 * v164;
-        const V v178 = softehl_vexp(v177);
-        const V v179 = v22 * v170;
-        const V v180 = softehl_vexp(v179);
-        const V v181 = v22 * v167;
-        const V v182 = v22 * v169;
-        const V v183 = softehl_vexp(v181);
-        const V v184 = softehl_vexp(v182);
-        const V v185 = v1 * v174;
-        const V v186 = parameters[8] + v185;
-        const V v187 = v1 * v176;
-        const V v188 = parameters[8] + v187;
-        const V v189 = v1 * v178;
-        const V v190 = parameters[8] + v189;
-        const V v191 = v1 * v180;
-        const V v192 = parameters[8] + v191;
-        const V v193 = v1 * v183;
-        const V v194 = parameters[8] + v193;
-        const V v195 = v1 * v184;
-        const V v196 = parameters[8] + v195;
-        const V v197 = 1.0 / v186;
-        const V v198 = 1.0 / v188;
-        const V v199 = 1.0 / v190;
-        const V v200 = 1.0 / v192;
-        const V v201 = v150 * v200;
-        const V v202 = v145 * v199;
-        const V v203 = v201 - v202;
-        const V v204 = 1.0 / v194;
-        const V v205 = 1.0 / v196;
-        const V v206 = v149 * v205;
-        const V v207 = v146 * v197;
-        const V v208 = v206 - v207;
-        const V v209 = v148 * v204;
-        const V v210 = v147 * v198;
-        const V v211 = v209 - v210;
-        const V v212 = 0.1192694691878821 * v208;
-        const V v213 = 0.07987743308995329 * v203;
-        const V v214 = v212 + v213;
-        const V v215 = 0.05582662111236089 * v211;
-        const V v216 = v214 + v215;
-        const V v217 = v172 * v216;
-        const V v218 = softehl_blend(v143, v48, softehl_splat(0.0));
-        const V v219 = softehl_blend(v143, softehl_splat(0.0), v48);
-        const V v220 = v90 * v219;
-        const V v221 = v91 * v218;
-        const V v222 = v220 + v221;
-        const V v223 = v50 * v222;
-        const V v224 = v223 + v217;
-        const V v225 = v171 * v224;
-        const V v226 = 0.5 * v225;
-        const V v227 = w[3] * v226;
+        const double v20 = 0.5 * w[0], v21 = 0.5 + v20, v22 = 0.5 - v20;
+        const V v23 = softehl_vexp(p0 * parameters[3]), v24 = parameters[1] - v21 * v4 - v22 * v5,
+            v25 = v22 * v2 + v21 * v3, v26 = v25 * (p1 * v15),
+            v27 = 1.0 / (parameters[6] * v25) * (parameters[2] * v23 * v24), v28 = v9 * v26,
+            v29 = (parameters[0] + v25) * v6, v30 = w[3] * (p0 * v7) * v29;
+        s16 += v21 * v30; s17 += v22 * v30;
+        const V v31 = softehl_vlog(1.0 + v27 * v27), v32 = softehl_vexp(v8 * v31),
+            v33 = v27 * (parameters[8] + v1 * v32), v34 = 0.932469514203152 * v28,
+            v35 = 0.6612093864662645 * v28, v36 = 0.2386191860831969 * v28, v37 = v34 + v33,
+            v38 = v35 + v33, v39 = v36 + v33, v40 = v33 - v36, v41 = v33 - v35, v42 = v33 - v34;
+        V v43[7];
+        softehl_film_conserving_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), softehl_splat(v8), softehl_splat(v1), softehl_splat(v11), v27, v34, v35, v36, v33, v37, v38, v39, v40, v41, v42}, v43, &failed);
+        const V v44 = v43[0], v45 = parameters[6] * v44;
+        const M v46 = softehl_lt(softehl_splat(0.0), v45);
+        const V v47 = softehl_blend(v46, v45, softehl_splat(0.0)),
+            v48 = softehl_blend(v46, softehl_splat(0.0), v45);
+        const double v49 = 0.5 * w[1], v50 = 0.5 * w[2];
+        const V v51 = softehl_vexp(p2 * parameters[3]), v52 = 1.0 - p6, v53 = 1.0 - p4,
+            v54 = (0.5 - v49) * v2 + (0.5 + v49) * v3, v55 = (0.5 - v50) * v2 + (0.5 + v50) * v3,
+            v56 = (p0 * v10 - v13 * (v52 * v48 + v53 * v47 - v26)) * (w[3] * v29),
+            v57 = 0.5 * (v54 + v55), v58 = parameters[2] * v51, v59 = v57 * (p3 * v14),
+            v60 = 1.0 / (parameters[6] * v57) * (v58 * v24), v61 = softehl_vlog(1.0 + v60 * v60),
+            v62 = softehl_vexp(v8 * v61), v63 = v60 * (parameters[8] + v1 * v62);
+        s18 += v21 * v56; s19 += v22 * v56;
+        const V v64 = 0.932469514203152 * v59, v65 = 0.6612093864662645 * v59,
+            v66 = 0.2386191860831969 * v59, v67 = v64 + v63, v68 = v65 + v63, v69 = v66 + v63,
+            v70 = v63 - v66, v71 = v63 - v65, v72 = v63 - v64;
+        V v73[7];
+        softehl_film_conserving_carreau_level_cell_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), v60, softehl_splat(v8), softehl_splat(v1), softehl_splat(v11), v64, v65, v66, v63, v67, v68, v69, v70, v71, v72}, v73, &failed);
+        const V v74 = v57 * v57; const M v75 = softehl_lt(softehl_splat(0.0), v24);
+        const V v76 = v73[1], v77 = v73[2], v78 = v73[3], v79 = v73[4], v80 = v73[5], v81 = v73[6],
+            v82 = softehl_vlog(1.0 + v76 * v76), v83 = softehl_vlog(1.0 + v77 * v77),
+            v84 = softehl_vlog(1.0 + v78 * v78), v85 = softehl_vlog(1.0 + v79 * v79),
+            v86 = softehl_vlog(1.0 + v80 * v80), v87 = softehl_vlog(1.0 + v81 * v81),
+            v88 = v54 * v55 * (1.0 / v74), v89 = softehl_vexp(v11 * v83),
+            v90 = softehl_vexp(v11 * v84), v91 = softehl_vexp(v11 * v82),
+            v92 = softehl_vexp(v11 * v87), v93 = softehl_vexp(v11 * v85),
+            v94 = softehl_vexp(v11 * v86),
+            v95 = v81 * (1.0 / (parameters[8] + v1 * v92)) - v76 * (1.0 / (parameters[8] + v1 * v91)),
+            v96 = v80 * (1.0 / (parameters[8] + v1 * v94)) - v77 * (1.0 / (parameters[8] + v1 * v89)),
+            v97 = v79 * (1.0 / (parameters[8] + v1 * v93)) - v78 * (1.0 / (parameters[8] + v1 * v90)),
+            v98 = 0.1192694691878821 * v96 + 0.07987743308995329 * v95 + 0.05582662111236089 * v97,
+            v99 = softehl_blend(v75, v24, softehl_splat(0.0)),
+            v100 = softehl_blend(v75, softehl_splat(0.0), v24),
+            v101 = v25 * (v52 * v100 + v53 * v99) + v88 * (v74 * (parameters[6] * (1.0 / v58))) * v98,
+            v102 = w[3] * (0.5 * (v88 * v101));
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
             (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
-            R_lanes[4 + i] += D1 * v227;
+            R_lanes[4 + i] += D1 * v102;
         }
     }
-    const V v228 = -s32;
-    const V v229 = -s33;
-    R_lanes[0] = s35;
-    R_lanes[1] = v229;
-    R_lanes[2] = s34;
-    R_lanes[3] = v228;
+    const V v103 = -s16, v104 = -s17;
+    R_lanes[0] = s19; R_lanes[1] = v104; R_lanes[2] = s18; R_lanes[3] = v103;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
@@ -1491,53 +487,18 @@ static void softehl_film_conserving_carreau_residual_group(
         softehl_spoil(failed, R, (4 + modes));
     }
 }
+SOFTEHL_BATCH(softehl_film_conserving_carreau_residual, 4, (4 + modes), 2, 0, (4 + modes), 0)
 
-void softehl_film_conserving_carreau_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_conserving_carreau_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_carreau_residual_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_carreau_residual_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_conserving_carreau_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_conserving_carreau_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -1560,1558 +521,393 @@ static void softehl_film_conserving_carreau_tangent_group(
 #endif
     for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
         K_lanes[i] = softehl_splat(0.0);
-    const double v1 = 1.0 - parameters[8];
-    const double v2 = 6.283185307179586 * parameters[4];
-    const V v3 = X2 + d2;
-    const double v4 = parameters[2] * parameters[3];
-    const V v5 = X1 - parameters[0];
-    const V v6 = X3 - parameters[0];
-    const V v7 = d2 * parameters[9];
-    const V v8 = a1 + v7;
-    const V v9 = d1 + v5;
-    const V v10 = d3 + v6;
-    const double v11 = 0.23395696728634552 * v1;
-    const double v12 = 0.1803807865240693 * v1;
-    const double v13 = 0.08566224618958518 * v1;
-    const double v14 = parameters[6] * v4;
-    const double v15 = 0.5 * parameters[6];
-    const double v16 = 1.0 / parameters[6];
-    const V v17 = v3 - X0;
-    const V v18 = d0 * parameters[9];
-    const V v19 = a0 + v18;
-    const V v20 = v17 - d0;
-    const V v21 = 0.5 * v20;
-    const V v22 = v10 - v9;
-    const double v23 = 1.0 / parameters[7];
-    const V v24 = 0.5 * v22;
-    const double v25 = parameters[7] - 1.0;
-    const double v26 = 0.5 * v25;
-    const V v27 = parameters[6] * v21;
-    const V v28 = v21 * v2;
-    const V v29 = 1.0 / v21;
-    const V v30 = v21 * v21;
-    const V v31 = parameters[5] * v21;
-    const V v32 = parameters[5] * v24;
-    const V v33 = v24 * v24;
-    const V v34 = v33 + v30;
-    const V v35 = 1.0 / v27;
-    const double v36 = v23 * v26;
-    const double v37 = v1 * v26;
-    const V v38 = softehl_vsqrt(v34);
-    const V v39 = 1.0 / v34;
-    const V v40 = parameters[5] * v38;
-    const V v41 = softehl_vsqrt(v39);
-    const V v42 = 0.5 * v41;
-    const V v43 = v15 * v35;
-    const V v44 = v35 * v43;
-    const V v45 = 0.5 * v35;
-    const double v46 = v1 * v36;
-    const V v47 = v42 * v31;
-    const V v48 = v42 * v32;
-    const double v49 = v36 * v11;
-    const double v50 = v36 * v12;
-    const double v51 = v36 * v13;
-    const V v52 = 0.5 * v29;
-    const V v53 = v29 * v52;
-    const V v54 = parameters[9] * v40;
-    const V v55 = v40 * v53;
-    V s56 = softehl_splat(0.0);
-    V s57 = softehl_splat(0.0);
-    V s58 = softehl_splat(0.0);
-    V s59 = softehl_splat(0.0);
-    V s60 = softehl_splat(0.0);
-    V s61 = softehl_splat(0.0);
-    V s62 = softehl_splat(0.0);
-    V s63 = softehl_splat(0.0);
-    V s64 = softehl_splat(0.0);
-    V s65 = softehl_splat(0.0);
-    V s66 = softehl_splat(0.0);
-    V s67 = softehl_splat(0.0);
-    V s68 = softehl_splat(0.0);
-    V s69 = softehl_splat(0.0);
-    V s70 = softehl_splat(0.0);
-    V s71 = softehl_splat(0.0);
-    V s72 = softehl_splat(0.0);
-    V s73 = softehl_splat(0.0);
+    const double v1 = 1.0 - parameters[8], v2 = 6.283185307179586 * parameters[4],
+        v3 = parameters[2] * parameters[3];
+    const V v4 = a1 + d2 * parameters[9], v5 = d1 + (X1 - parameters[0]),
+        v6 = d3 + (X3 - parameters[0]);
+    const double v7 = parameters[6] * v3, v8 = 0.5 * parameters[6], v9 = 1.0 / parameters[6];
+    const V v10 = a0 + d0 * parameters[9], v11 = 0.5 * (X2 + d2 - X0 - d0), v12 = 0.5 * (v6 - v5);
+    const double v13 = 0.5 * (parameters[7] - 1.0);
+    const V v14 = v11 * v2, v15 = 1.0 / v11, v16 = v12 * v12 + v11 * v11,
+        v17 = 1.0 / (parameters[6] * v11);
+    const double v18 = 1.0 / parameters[7] * v13, v19 = v1 * v13;
+    const V v20 = softehl_vsqrt(v16), v21 = parameters[5] * v20, v22 = softehl_vsqrt(1.0 / v16),
+        v23 = 0.5 * v22, v24 = v17 * (v8 * v17), v25 = 0.5 * v17;
+    const double v26 = v1 * v18;
+    const V v27 = v23 * (parameters[5] * v11), v28 = v23 * (parameters[5] * v12);
+    const double v29 = v18 * (0.23395696728634552 * v1), v30 = v18 * (0.1803807865240693 * v1),
+        v31 = v18 * (0.08566224618958518 * v1);
+    const V v32 = parameters[9] * v21, v33 = v21 * (v15 * (0.5 * v15));
+    V s34 = {0}, s35 = {0}, s36 = {0}, s37 = {0}, s38 = {0}, s39 = {0}, s40 = {0}, s41 = {0},
+        s42 = {0}, s43 = {0}, s44 = {0}, s45 = {0}, s46 = {0}, s47 = {0}, s48 = {0}, s49 = {0},
+        s50 = {0}, s51 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v74 = 0.5 * w[0];
-        const V v75 = p1 * v29;
-        const double v76 = 0.5 + v74;
-        const double v77 = 0.5 - v74;
-        const V v78 = p0 * parameters[3];
-        const V v79 = p0 * v28;
-        const V v80 = softehl_vexp(v78);
-        const V v81 = v76 * v8;
-        const V v82 = parameters[1] - v81;
-        const V v83 = v76 * v10;
-        const V v84 = w[3] * v21;
-        const double v85 = v76 * w[3];
-        const double v86 = v77 * w[3];
-        const V v87 = v77 * v79;
-        const V v88 = v76 * v79;
-        const V v89 = v77 * v19;
-        const V v90 = v82 - v89;
-        const V v91 = v77 * v9;
-        const V v92 = v91 + v83;
-        const V v93 = parameters[0] + v92;
-        const V v94 = 0.5 * v92;
-        const V v95 = parameters[6] * v92;
-        const V v96 = v86 * v87;
-        s60 += v96;
-        const V v97 = v85 * v87;
-        s62 += v97;
-        const V v98 = v86 * v88;
-        s61 += v98;
-        const V v99 = v85 * v88;
-        s63 += v99;
-        const V v100 = v94 * v75;
-        const V v101 = 1.0 / v95;
-        const V v102 = v93 * v2;
-        const V v103 = p0 * v102;
-        const V v104 = parameters[2] * v80;
-        const V v105 = v104 * v90;
-        const V v106 = v101 * v105;
-        const V v107 = v16 * v100;
-        const V v108 = v84 * v103;
-        const V v109 = 0.5 * v103;
-        const V v110 = v86 * v109;
-        s56 += v110;
-        const V v111 = v85 * v109;
-        s57 += v111;
-        const V v112 = v76 * v108;
-        s58 += v112;
-        const V v113 = v77 * v108;
-        s59 += v113;
-        const V v114 = 0.932469514203152 * v107;
-        const V v115 = 0.6612093864662645 * v107;
-        const V v116 = 0.2386191860831969 * v107;
-        const V v117 = v106 * v106;
-        const V v118 = 1.0 + v117;
-        const V v119 = softehl_vlog(v118);
-        const V v120 = v26 * v119;
-        const V v121 = softehl_vexp(v120);
-        const V v122 = v1 * v121;
-        const V v123 = parameters[8] + v122;
-        const V v124 = v106 * v123;
-        const V v125 = v124 + v114;
-        const V v126 = v124 + v115;
-        const V v127 = v124 + v116;
-        const V v128 = v124 - v116;
-        const V v129 = v124 - v115;
-        const V v130 = v124 - v114;
-        V v131[7];
-        softehl_film_conserving_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), softehl_splat(v26), softehl_splat(v1), softehl_splat(v36), v106, v114, v115, v116, v124, v125, v126, v127, v128, v129, v130}, v131, &failed);
-        const V v132 = p1 * v94;
-        const V v133 = v16 * v132;
-        const V v134 = 1.0 - p4;
-        const V v135 = v131[0];
-        const V v136 = v131[1];
-        const V v137 = v131[2];
-        const V v138 = v131[3];
-        const V v139 = v131[4];
-        const V v140 = parameters[6] * v135;
-        const V v141 = v131[5];
-        const V v142 = v131[6];
-        const V v143 = v136 * v136;
-        const V v144 = 2.0 * v136;
-        const V v145 = v137 * v137;
-        const V v146 = v138 * v138;
-        const V v147 = v139 * v139;
-        const M v148 = softehl_lt(softehl_splat(0.0), v140);
-        const V v149 = v141 * v141;
-        const V v150 = v142 * v142;
-        const V v151 = 2.0 * v139;
-        const V v152 = 2.0 * v138;
-        const V v153 = 2.0 * v141;
-        const V v154 = 2.0 * v137;
-        const V v155 = 2.0 * v142;
-        const V v156 = 2.0 * v145;
-        const V v157 = 2.0 * v147;
-        const V v158 = 2.0 * v149;
-        const V v159 = 1.0 + v145;
-        const V v160 = 1.0 + v149;
-        const V v161 = 1.0 + v147;
-        const V v162 = v50 * v141;
-        const V v163 = v50 * v137;
-        const V v164 = softehl_vlog(v159);
-        const V v165 = 1.0 / v159;
-        const V v166 = softehl_vlog(v160);
-        const V v167 = 1.0 / v160;
-        const V v168 = softehl_vlog(v161);
-        const V v169 = 1.0 / v161;
-        const V v170 = 2.0 * v143;
-        const V v171 = 1.0 + v143;
-        const V v172 = v37 * v137;
-        const V v173 = v37 * v141;
-        const V v174 = v37 * v136;
-        const V v175 = v51 * v136;
-        const V v176 = v51 * v142;
-        const V v177 = v37 * v142;
-        const V v178 = softehl_vlog(v171);
-        const V v179 = 1.0 / v171;
-        const V v180 = v37 * v138;
-        const V v181 = v37 * v139;
-        const V v182 = v49 * v139;
-        const V v183 = v49 * v138;
-        const V v184 = 2.0 * v146;
-        const V v185 = 1.0 + v146;
-        const V v186 = 2.0 * v150;
-        const V v187 = 1.0 + v150;
-        const V v188 = softehl_vlog(v185);
-        const V v189 = 1.0 / v185;
-        const V v190 = softehl_vlog(v187);
-        const V v191 = 1.0 / v187;
-        const V v192 = v182 * v169;
-        const V v193 = v46 * v169;
-        const V v194 = v162 * v167;
-        const V v195 = v46 * v167;
-        const V v196 = v163 * v165;
-        const V v197 = v46 * v165;
-        const V v198 = v151 * v192;
-        const V v199 = v153 * v194;
-        const V v200 = v175 * v179;
-        const V v201 = v46 * v179;
-        const V v202 = v154 * v196;
-        const V v203 = v144 * v200;
-        const V v204 = v183 * v189;
-        const V v205 = v46 * v189;
-        const V v206 = v46 * v191;
-        const V v207 = v176 * v191;
-        const V v208 = v152 * v204;
-        const V v209 = v155 * v207;
-        const V v210 = v36 * v178;
-        const V v211 = softehl_vexp(v210);
-        const V v212 = v211 * v203;
-        const V v213 = v211 * v201;
-        const V v214 = v36 * v190;
-        const V v215 = softehl_vexp(v214);
-        const V v216 = v215 * v209;
-        const V v217 = v215 * v206;
-        const V v218 = v36 * v164;
-        const V v219 = softehl_vexp(v218);
-        const V v220 = v219 * v202;
-        const V v221 = v36 * v166;
-        const V v222 = softehl_vexp(v221);
-        const V v223 = v36 * v188;
-        const V v224 = softehl_vexp(v223);
-        const V v225 = v36 * v168;
-        const V v226 = softehl_vexp(v225);
-        const V v227 = v224 * v208;
-        const V v228 = v224 * v205;
-        const V v229 = v226 * v198;
-        const V v230 = v222 * v199;
-        const V v231 = v219 * v197;
-        const V v232 = v226 * v193;
-        const V v233 = v222 * v195;
-        const V v234 = v1 * v215;
-        const V v235 = parameters[8] + v234;
-        const V v236 = v1 * v219;
-        const V v237 = parameters[8] + v236;
-        const V v238 = v1 * v222;
-        const V v239 = parameters[8] + v238;
-        const V v240 = v1 * v224;
-        const V v241 = parameters[8] + v240;
-        const V v242 = v1 * v226;
-        const V v243 = parameters[8] + v242;
-        const V v244 = 1.0 / v235;
-        const V v245 = 1.0 / v237;
-        const V v246 = 1.0 / v239;
-        const V v247 = 1.0 / v241;
-        const V v248 = 1.0 / v243;
-        const V v249 = v248 * v248;
-        const V v250 = v247 * v247;
-        const V v251 = v246 * v246;
-        const V v252 = v245 * v245;
-        const V v253 = v244 * v244;
-        const V v254 = v237 * v237;
-        const V v255 = 1.0 / v254;
-        const V v256 = v156 * v237;
-        const V v257 = v255 * v256;
-        const V v258 = v255 * v257;
-        const V v259 = v241 * v241;
-        const V v260 = 1.0 / v259;
-        const V v261 = v184 * v241;
-        const V v262 = v260 * v261;
-        const V v263 = v260 * v262;
-        const V v264 = v243 * v243;
-        const V v265 = 1.0 / v264;
-        const V v266 = v157 * v243;
-        const V v267 = v265 * v266;
-        const V v268 = v265 * v267;
-        const V v269 = v172 * v245;
-        const V v270 = v137 * v252;
-        const V v271 = v180 * v247;
-        const V v272 = v173 * v246;
-        const V v273 = v177 * v244;
-        const V v274 = 0.23395696728634552 * v247;
-        const V v275 = 0.1803807865240693 * v246;
-        const V v276 = 0.1803807865240693 * v245;
-        const V v277 = v220 * v252;
-        const V v278 = v276 - v277;
-        const V v279 = 0.08566224618958518 * v244;
-        const V v280 = v227 * v250;
-        const V v281 = v274 - v280;
-        const V v282 = v138 * v250;
-        const V v283 = v230 * v251;
-        const V v284 = v275 - v283;
-        const V v285 = v141 * v251;
-        const V v286 = v216 * v253;
-        const V v287 = v279 - v286;
-        const V v288 = v142 * v253;
-        const V v289 = v239 * v239;
-        const V v290 = 1.0 / v289;
-        const V v291 = v158 * v239;
-        const V v292 = v290 * v291;
-        const V v293 = v290 * v292;
-        const V v294 = v149 * v290;
-        const V v295 = 1.0 + v294;
-        const V v296 = softehl_vlog(v295);
-        const V v297 = 1.0 / v295;
-        const V v298 = v26 * v296;
-        const V v299 = softehl_vexp(v298);
-        const V v300 = v272 * v299;
-        const V v301 = v297 * v300;
-        const V v302 = v290 * v301;
-        const V v303 = v293 * v301;
-        const V v304 = v235 * v235;
-        const V v305 = 1.0 / v304;
-        const V v306 = v186 * v235;
-        const V v307 = v305 * v306;
-        const V v308 = v305 * v307;
-        const V v309 = v150 * v305;
-        const V v310 = 1.0 + v309;
-        const V v311 = softehl_vlog(v310);
-        const V v312 = v26 * v311;
-        const V v313 = softehl_vexp(v312);
-        const V v314 = 1.0 / v310;
-        const V v315 = v273 * v313;
-        const V v316 = v314 * v315;
-        const V v317 = v305 * v316;
-        const V v318 = v308 * v316;
-        const V v319 = v181 * v248;
-        const V v320 = 0.23395696728634552 * v248;
-        const V v321 = v229 * v249;
-        const V v322 = v320 - v321;
-        const V v323 = v139 * v249;
-        const V v324 = v1 * v299;
-        const V v325 = parameters[8] + v324;
-        const V v326 = v285 * v325;
-        const V v327 = v303 + v326;
-        const V v328 = v233 * v327;
-        const V v329 = v302 - v328;
-        const V v330 = v246 * v325;
-        const V v331 = v153 * v329;
-        const V v332 = v330 + v331;
-        const V v333 = v1 * v313;
-        const V v334 = parameters[8] + v333;
-        const V v335 = v288 * v334;
-        const V v336 = v318 + v335;
-        const V v337 = v217 * v336;
-        const V v338 = v317 - v337;
-        const V v339 = v244 * v334;
-        const V v340 = v155 * v338;
-        const V v341 = v339 + v340;
-        const V v342 = v1 * v211;
-        const V v343 = parameters[8] + v342;
-        const V v344 = 1.0 / v343;
-        const V v345 = v344 * v344;
-        const V v346 = v343 * v343;
-        const V v347 = 1.0 / v346;
-        const V v348 = v170 * v343;
-        const V v349 = v347 * v348;
-        const V v350 = v347 * v349;
-        const V v351 = v174 * v344;
-        const V v352 = v136 * v345;
-        const V v353 = 0.08566224618958518 * v344;
-        const V v354 = v212 * v345;
-        const V v355 = v353 - v354;
-        const V v356 = v143 * v347;
-        const V v357 = 1.0 + v356;
-        const V v358 = softehl_vlog(v357);
-        const V v359 = v26 * v358;
-        const V v360 = softehl_vexp(v359);
-        const V v361 = 1.0 / v357;
-        const V v362 = v351 * v360;
-        const V v363 = v361 * v362;
-        const V v364 = v347 * v363;
-        const V v365 = v350 * v363;
-        const V v366 = v1 * v360;
-        const V v367 = parameters[8] + v366;
-        const V v368 = v352 * v367;
-        const V v369 = v365 + v368;
-        const V v370 = v344 * v367;
-        const V v371 = v213 * v369;
-        const V v372 = v364 - v371;
-        const V v373 = v144 * v372;
-        const V v374 = v370 + v373;
-        const V v375 = v145 * v255;
-        const V v376 = 1.0 + v375;
-        const V v377 = softehl_vlog(v376);
-        const V v378 = v26 * v377;
-        const V v379 = softehl_vexp(v378);
-        const V v380 = 1.0 / v376;
-        const V v381 = v269 * v379;
-        const V v382 = v380 * v381;
-        const V v383 = v255 * v382;
-        const V v384 = v258 * v382;
-        const V v385 = v1 * v379;
-        const V v386 = parameters[8] + v385;
-        const V v387 = v270 * v386;
-        const V v388 = v384 + v387;
-        const V v389 = v231 * v388;
-        const V v390 = v383 - v389;
-        const V v391 = v245 * v386;
-        const V v392 = v154 * v390;
-        const V v393 = v391 + v392;
-        const V v394 = v146 * v260;
-        const V v395 = 1.0 + v394;
-        const V v396 = softehl_vlog(v395);
-        const V v397 = v26 * v396;
-        const V v398 = softehl_vexp(v397);
-        const V v399 = 1.0 / v395;
-        const V v400 = v271 * v398;
-        const V v401 = v399 * v400;
-        const V v402 = v260 * v401;
-        const V v403 = v263 * v401;
-        const V v404 = v1 * v398;
-        const V v405 = parameters[8] + v404;
-        const V v406 = v282 * v405;
-        const V v407 = v403 + v406;
-        const V v408 = v228 * v407;
-        const V v409 = v402 - v408;
-        const V v410 = v247 * v405;
-        const V v411 = v152 * v409;
-        const V v412 = v410 + v411;
-        const V v413 = v147 * v265;
-        const V v414 = 1.0 + v413;
-        const V v415 = softehl_vlog(v414);
-        const V v416 = v26 * v415;
-        const V v417 = softehl_vexp(v416);
-        const V v418 = 1.0 / v414;
-        const V v419 = v319 * v417;
-        const V v420 = v418 * v419;
-        const V v421 = v1 * v417;
-        const V v422 = parameters[8] + v421;
-        const V v423 = v265 * v420;
-        const V v424 = v268 * v420;
-        const V v425 = v323 * v422;
-        const V v426 = v424 + v425;
-        const V v427 = v248 * v422;
-        const V v428 = v232 * v426;
-        const V v429 = v423 - v428;
-        const V v430 = v151 * v429;
-        const V v431 = v427 + v430;
-        V v432[49];
-        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v355, v278, v281, v322, v284, v287, softehl_splat((-1.0)), v374, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v393, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v412, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v431, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v332, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v341}, v432, &failed);
-        const V v433 = v80 * v14;
-        const V v434 = v94 * v29;
-        const V v435 = 0.5 * v75;
-        const V v436 = v90 * v433;
-        const V v437 = v40 * v140;
-        const V v438 = 1.0 - p6;
-        const V v439 = v16 * v434;
-        const V v440 = v16 * v435;
-        const double v441 = v74 - 0.5;
-        const V v442 = v102 * v437;
-        const double v443 = parameters[6] * v76;
-        const V v444 = parameters[6] * v105;
-        const V v445 = v101 * v436;
-        const V v446 = v101 * v444;
-        const V v447 = parameters[6] * v104;
-        const V v448 = v104 * v443;
-        const V v449 = v101 * v447;
-        const V v450 = v432[0];
-        const V v451 = v432[1];
-        const V v452 = v432[2];
-        const V v453 = v432[3];
-        const V v454 = v432[4];
-        const V v455 = v101 * v448;
-        const V v456 = v101 * v446;
-        const V v457 = v441 * v449;
-        const V v458 = v445 * v450;
-        const V v459 = v432[5];
-        const V v460 = v432[6];
-        const V v461 = v453 - v454;
-        const V v462 = v455 * v450;
-        const V v463 = v452 - v459;
-        const V v464 = v451 - v460;
-        const V v465 = v457 * v450;
-        const V v466 = v86 * v442;
-        const V v467 = v85 * v442;
-        const V v468 = 0.2386191860831969 * v461;
-        const V v469 = 0.932469514203152 * v464;
-        const V v470 = v469 + v468;
-        const V v471 = 0.6612093864662645 * v463;
-        const V v472 = v471 + v470;
-        const V v473 = v439 * v472;
-        const V v474 = v440 * v472;
-        const V v475 = v456 * v450;
-        const V v476 = v474 - v475;
-        const V v477 = parameters[6] * v476;
-        const V v478 = v133 * v472;
-        const V v479 = parameters[6] * v473;
-        const V v480 = parameters[6] * v478;
-        V v481 = softehl_splat(0.0);
-        V v482 = softehl_splat(0.0);
-        V v483 = softehl_splat(0.0);
-        V v484 = softehl_splat(0.0);
-        V v485 = softehl_splat(0.0);
-        V v486 = softehl_splat(0.0);
-        V v487 = softehl_splat(0.0);
-        V v488 = softehl_splat(0.0);
-        V v489 = softehl_splat(0.0);
-        V v490 = softehl_splat(0.0);
-        V v491 = softehl_splat(0.0);
-        V v492 = softehl_splat(0.0);
-        V v493 = softehl_splat(0.0);
-        V v494 = softehl_splat(0.0);
-        V v495 = softehl_splat(0.0);
-        V v496 = softehl_splat(0.0);
-        V v497 = softehl_splat(0.0);
-        V v498 = softehl_splat(0.0);
-        const M m499 = v148;
-        if (softehl_any(m499)) {
-            const V v500 = v134 * v462;
-            const V v501 = v134 * v465;
-            const V v502 = v134 * v458;
-            const V v503 = v134 * v479;
-            const V v504 = -v500;
-            const V v505 = v134 * v480;
-            const V v506 = v134 * v477;
-            v481 = softehl_blend(m499, v140, v481);
-            v482 = softehl_blend(m499, softehl_splat(0.0), v482);
-            v483 = softehl_blend(m499, v505, v483);
-            v484 = softehl_blend(m499, softehl_splat(0.0), v484);
-            v485 = softehl_blend(m499, v501, v485);
-            v486 = softehl_blend(m499, softehl_splat(0.0), v486);
-            v487 = softehl_blend(m499, v504, v487);
-            v488 = softehl_blend(m499, softehl_splat(0.0), v488);
-            v489 = softehl_blend(m499, v506, v489);
-            v490 = softehl_blend(m499, softehl_splat(0.0), v490);
-            v491 = softehl_blend(m499, v502, v491);
-            v492 = softehl_blend(m499, softehl_splat(0.0), v492);
-            v493 = softehl_blend(m499, v503, v493);
-            v494 = softehl_blend(m499, softehl_splat(0.0), v494);
-            v495 = softehl_blend(m499, v466, v495);
-            v496 = softehl_blend(m499, softehl_splat(0.0), v496);
-            v497 = softehl_blend(m499, v467, v497);
-            v498 = softehl_blend(m499, softehl_splat(0.0), v498);
+        const double v52 = 0.5 * w[0]; const V v53 = p1 * v15;
+        const double v54 = 0.5 + v52, v55 = 0.5 - v52;
+        const V v56 = p0 * v14, v57 = softehl_vexp(p0 * parameters[3]);
+        const double v58 = v54 * w[3], v59 = v55 * w[3];
+        const V v60 = v55 * v56, v61 = v54 * v56, v62 = parameters[1] - v54 * v4 - v55 * v10,
+            v63 = v55 * v5 + v54 * v6, v64 = 0.5 * v63;
+        s38 += v59 * v60; s40 += v58 * v60; s39 += v59 * v61; s41 += v58 * v61;
+        const V v65 = v64 * v53, v66 = 1.0 / (parameters[6] * v63),
+            v67 = (parameters[0] + v63) * v2, v68 = p0 * v67, v69 = parameters[2] * v57,
+            v70 = v69 * v62, v71 = v66 * v70, v72 = v9 * v65, v73 = w[3] * v11 * v68,
+            v74 = 0.5 * v68;
+        s34 += v59 * v74; s35 += v58 * v74; s36 += v54 * v73; s37 += v55 * v73;
+        const V v75 = 0.932469514203152 * v72, v76 = 0.6612093864662645 * v72,
+            v77 = 0.2386191860831969 * v72, v78 = softehl_vlog(1.0 + v71 * v71),
+            v79 = softehl_vexp(v13 * v78), v80 = v71 * (parameters[8] + v1 * v79), v81 = v80 + v75,
+            v82 = v80 + v76, v83 = v80 + v77, v84 = v80 - v77, v85 = v80 - v76, v86 = v80 - v75;
+        V v87[7];
+        softehl_film_conserving_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), softehl_splat(v13), softehl_splat(v1), softehl_splat(v18), v71, v75, v76, v77, v80, v81, v82, v83, v84, v85, v86}, v87, &failed);
+        const V v88 = p1 * v64, v89 = 1.0 - p4, v90 = v87[0], v91 = v87[1], v92 = v87[2],
+            v93 = v87[3], v94 = v87[4], v95 = parameters[6] * v90, v96 = v87[5], v97 = v87[6],
+            v98 = v91 * v91, v99 = 2.0 * v91, v100 = v92 * v92, v101 = v93 * v93, v102 = v94 * v94;
+        const M v103 = softehl_lt(softehl_splat(0.0), v95);
+        const V v104 = v96 * v96, v105 = v97 * v97, v106 = 2.0 * v94, v107 = 2.0 * v93,
+            v108 = 2.0 * v96, v109 = 2.0 * v92, v110 = 2.0 * v97, v111 = 1.0 + v100,
+            v112 = 1.0 + v104, v113 = 1.0 + v102, v114 = softehl_vlog(v111), v115 = 1.0 / v111,
+            v116 = softehl_vlog(v112), v117 = 1.0 / v112, v118 = softehl_vlog(v113),
+            v119 = 1.0 / v113, v120 = 1.0 + v98, v121 = softehl_vlog(v120), v122 = 1.0 / v120,
+            v123 = 1.0 + v101, v124 = 1.0 + v105, v125 = softehl_vlog(v123), v126 = 1.0 / v123,
+            v127 = softehl_vlog(v124), v128 = 1.0 / v124, v129 = softehl_vexp(v18 * v121),
+            v130 = softehl_vexp(v18 * v127), v131 = softehl_vexp(v18 * v114),
+            v132 = softehl_vexp(v18 * v116), v133 = softehl_vexp(v18 * v125),
+            v134 = softehl_vexp(v18 * v118), v135 = parameters[8] + v1 * v130,
+            v136 = parameters[8] + v1 * v131, v137 = parameters[8] + v1 * v132,
+            v138 = parameters[8] + v1 * v133, v139 = parameters[8] + v1 * v134, v140 = 1.0 / v135,
+            v141 = 1.0 / v136, v142 = 1.0 / v137, v143 = 1.0 / v138, v144 = 1.0 / v139,
+            v145 = v144 * v144, v146 = v143 * v143, v147 = v142 * v142, v148 = v141 * v141,
+            v149 = v140 * v140, v150 = 1.0 / (v136 * v136), v151 = 1.0 / (v138 * v138),
+            v152 = 1.0 / (v139 * v139),
+            v153 = 0.1803807865240693 * v141 - v131 * (v109 * (v30 * v92 * v115)) * v148,
+            v154 = 0.23395696728634552 * v143 - v133 * (v107 * (v29 * v93 * v126)) * v146,
+            v155 = 0.1803807865240693 * v142 - v132 * (v108 * (v30 * v96 * v117)) * v147,
+            v156 = 0.08566224618958518 * v140 - v130 * (v110 * (v31 * v97 * v128)) * v149,
+            v157 = 1.0 / (v137 * v137), v158 = 1.0 + v104 * v157, v159 = softehl_vlog(v158),
+            v160 = softehl_vexp(v13 * v159), v161 = 1.0 / v158 * (v19 * v96 * v142 * v160),
+            v162 = 1.0 / (v135 * v135), v163 = 1.0 + v105 * v162, v164 = softehl_vlog(v163),
+            v165 = softehl_vexp(v13 * v164), v166 = 1.0 / v163 * (v19 * v97 * v140 * v165),
+            v167 = 0.23395696728634552 * v144 - v134 * (v106 * (v29 * v94 * v119)) * v145,
+            v168 = parameters[8] + v1 * v160,
+            v169 = v132 * (v26 * v117) * (v157 * (v157 * (2.0 * v104 * v137)) * v161 + v96 * v147 * v168),
+            v170 = v142 * v168 + v108 * (v157 * v161 - v169), v171 = parameters[8] + v1 * v165,
+            v172 = v130 * (v26 * v128) * (v162 * (v162 * (2.0 * v105 * v135)) * v166 + v97 * v149 * v171),
+            v173 = v140 * v171 + v110 * (v162 * v166 - v172), v174 = parameters[8] + v1 * v129,
+            v175 = 1.0 / v174, v176 = v175 * v175, v177 = 1.0 / (v174 * v174),
+            v178 = 0.08566224618958518 * v175 - v129 * (v99 * (v31 * v91 * v122)) * v176,
+            v179 = 1.0 + v98 * v177, v180 = softehl_vlog(v179), v181 = softehl_vexp(v13 * v180),
+            v182 = 1.0 / v179 * (v19 * v91 * v175 * v181), v183 = parameters[8] + v1 * v181,
+            v184 = v129 * (v26 * v122) * (v177 * (v177 * (2.0 * v98 * v174)) * v182 + v91 * v176 * v183),
+            v185 = v175 * v183 + v99 * (v177 * v182 - v184), v186 = 1.0 + v100 * v150,
+            v187 = softehl_vlog(v186), v188 = softehl_vexp(v13 * v187),
+            v189 = 1.0 / v186 * (v19 * v92 * v141 * v188), v190 = parameters[8] + v1 * v188,
+            v191 = v131 * (v26 * v115) * (v150 * (v150 * (2.0 * v100 * v136)) * v189 + v92 * v148 * v190),
+            v192 = v141 * v190 + v109 * (v150 * v189 - v191), v193 = 1.0 + v101 * v151,
+            v194 = softehl_vlog(v193), v195 = softehl_vexp(v13 * v194),
+            v196 = 1.0 / v193 * (v19 * v93 * v143 * v195), v197 = parameters[8] + v1 * v195,
+            v198 = v133 * (v26 * v126) * (v151 * (v151 * (2.0 * v101 * v138)) * v196 + v93 * v146 * v197),
+            v199 = v143 * v197 + v107 * (v151 * v196 - v198), v200 = 1.0 + v102 * v152,
+            v201 = softehl_vlog(v200), v202 = softehl_vexp(v13 * v201),
+            v203 = 1.0 / v200 * (v19 * v94 * v144 * v202), v204 = parameters[8] + v1 * v202,
+            v205 = v134 * (v26 * v119) * (v152 * (v152 * (2.0 * v102 * v139)) * v203 + v94 * v145 * v204),
+            v206 = v144 * v204 + v106 * (v152 * v203 - v205);
+        V v207[49];
+        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v178, v153, v154, v167, v155, v156, softehl_splat((-1.0)), v185, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v192, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v199, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v206, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v170, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v173}, v207, &failed);
+        const V v208 = v64 * v15, v209 = 0.5 * v53, v210 = 1.0 - p6;
+        const double v211 = v52 - 0.5;
+        const V v212 = v67 * (v21 * v95), v213 = v207[0], v214 = v207[1], v215 = v207[2],
+            v216 = v207[3], v217 = v207[4], v218 = v66 * (v62 * (v57 * v7)) * v213, v219 = v207[5],
+            v220 = v207[6], v221 = v66 * (v69 * (parameters[6] * v54)) * v213,
+            v222 = v211 * (v66 * (parameters[6] * v69)) * v213, v223 = v59 * v212,
+            v224 = v58 * v212,
+            v225 = 0.932469514203152 * (v214 - v220) + 0.2386191860831969 * (v216 - v217),
+            v226 = 0.6612093864662645 * (v215 - v219) + v225,
+            v227 = parameters[6] * (v9 * v209 * v226 - v66 * (v66 * (parameters[6] * v70)) * v213),
+            v228 = parameters[6] * (v9 * v208 * v226), v229 = parameters[6] * (v9 * v88 * v226);
+        V v230 = softehl_splat(0.0), v231 = softehl_splat(0.0), v232 = softehl_splat(0.0),
+            v233 = softehl_splat(0.0), v234 = softehl_splat(0.0), v235 = softehl_splat(0.0),
+            v236 = softehl_splat(0.0), v237 = softehl_splat(0.0), v238 = softehl_splat(0.0),
+            v239 = softehl_splat(0.0), v240 = softehl_splat(0.0), v241 = softehl_splat(0.0),
+            v242 = softehl_splat(0.0), v243 = softehl_splat(0.0), v244 = softehl_splat(0.0),
+            v245 = softehl_splat(0.0), v246 = softehl_splat(0.0), v247 = softehl_splat(0.0);
+        const M m248 = v103;
+        if (softehl_any(m248)) {
+            const V v249 = v89 * v222, v250 = v89 * v218, v251 = v89 * v228, v252 = -(v89 * v221),
+                v253 = v89 * v229, v254 = v89 * v227;
+            v230 = softehl_blend(m248, v95, v230);
+            v231 = softehl_blend(m248, softehl_splat(0.0), v231);
+            v232 = softehl_blend(m248, v253, v232);
+            v233 = softehl_blend(m248, softehl_splat(0.0), v233);
+            v234 = softehl_blend(m248, v249, v234);
+            v235 = softehl_blend(m248, softehl_splat(0.0), v235);
+            v236 = softehl_blend(m248, v252, v236);
+            v237 = softehl_blend(m248, softehl_splat(0.0), v237);
+            v238 = softehl_blend(m248, v254, v238);
+            v239 = softehl_blend(m248, softehl_splat(0.0), v239);
+            v240 = softehl_blend(m248, v250, v240);
+            v241 = softehl_blend(m248, softehl_splat(0.0), v241);
+            v242 = softehl_blend(m248, v251, v242);
+            v243 = softehl_blend(m248, softehl_splat(0.0), v243);
+            v244 = softehl_blend(m248, v223, v244);
+            v245 = softehl_blend(m248, softehl_splat(0.0), v245);
+            v246 = softehl_blend(m248, v224, v246);
+            v247 = softehl_blend(m248, softehl_splat(0.0), v247);
         }
-        const M m507 = ~v148;
-        if (softehl_any(m507)) {
-            const V v508 = v438 * v462;
-            const V v509 = v438 * v465;
-            const V v510 = v438 * v458;
-            const V v511 = v438 * v479;
-            const V v512 = -v508;
-            const V v513 = v438 * v480;
-            const V v514 = v438 * v477;
-            v481 = softehl_blend(m507, softehl_splat(0.0), v481);
-            v482 = softehl_blend(m507, v140, v482);
-            v483 = softehl_blend(m507, softehl_splat(0.0), v483);
-            v484 = softehl_blend(m507, v513, v484);
-            v485 = softehl_blend(m507, softehl_splat(0.0), v485);
-            v486 = softehl_blend(m507, v509, v486);
-            v487 = softehl_blend(m507, softehl_splat(0.0), v487);
-            v488 = softehl_blend(m507, v512, v488);
-            v489 = softehl_blend(m507, softehl_splat(0.0), v489);
-            v490 = softehl_blend(m507, v514, v490);
-            v491 = softehl_blend(m507, softehl_splat(0.0), v491);
-            v492 = softehl_blend(m507, v510, v492);
-            v493 = softehl_blend(m507, softehl_splat(0.0), v493);
-            v494 = softehl_blend(m507, v511, v494);
-            v495 = softehl_blend(m507, softehl_splat(0.0), v495);
-            v496 = softehl_blend(m507, v466, v496);
-            v497 = softehl_blend(m507, softehl_splat(0.0), v497);
-            v498 = softehl_blend(m507, v467, v498);
+        const M m255 = ~v103;
+        if (softehl_any(m255)) {
+            const V v256 = v210 * v222, v257 = v210 * v218, v258 = v210 * v228,
+                v259 = -(v210 * v221), v260 = v210 * v229, v261 = v210 * v227;
+            v230 = softehl_blend(m255, softehl_splat(0.0), v230);
+            v231 = softehl_blend(m255, v95, v231);
+            v232 = softehl_blend(m255, softehl_splat(0.0), v232);
+            v233 = softehl_blend(m255, v260, v233);
+            v234 = softehl_blend(m255, softehl_splat(0.0), v234);
+            v235 = softehl_blend(m255, v256, v235);
+            v236 = softehl_blend(m255, softehl_splat(0.0), v236);
+            v237 = softehl_blend(m255, v259, v237);
+            v238 = softehl_blend(m255, softehl_splat(0.0), v238);
+            v239 = softehl_blend(m255, v261, v239);
+            v240 = softehl_blend(m255, softehl_splat(0.0), v240);
+            v241 = softehl_blend(m255, v257, v241);
+            v242 = softehl_blend(m255, softehl_splat(0.0), v242);
+            v243 = softehl_blend(m255, v258, v243);
+            v244 = softehl_blend(m255, softehl_splat(0.0), v244);
+            v245 = softehl_blend(m255, v223, v245);
+            v246 = softehl_blend(m255, softehl_splat(0.0), v246);
+            v247 = softehl_blend(m255, v224, v247);
         }
-        const double v515 = 0.5 * w[1];
-        const double v516 = 0.5 * w[2];
-        const V v517 = p2 * parameters[3];
-        const V v518 = softehl_vexp(v517);
-        const double v519 = 0.5 - v515;
-        const double v520 = 0.5 + v515;
-        const V v521 = p0 * v24;
-        const double v522 = 0.5 - v516;
-        const double v523 = 0.5 + v516;
-        const V v524 = v438 * v482;
-        const V v525 = v519 * v9;
-        const V v526 = v522 * v9;
-        const V v527 = v134 * v481;
-        const V v528 = v524 + v527;
-        const V v529 = v488 + v487;
-        const V v530 = v520 * v10;
-        const V v531 = v525 + v530;
-        const V v532 = v523 * v10;
-        const V v533 = v526 + v532;
-        const V v534 = v486 + v485;
-        const V v535 = v484 - v132;
-        const V v536 = v531 + v533;
-        const V v537 = v483 + v535;
-        const V v538 = v102 * v54;
-        const V v539 = v102 * v55;
-        const V v540 = v490 - v435;
-        const V v541 = v539 * v537;
-        const V v542 = v528 - v100;
-        const V v543 = v534 * v538;
-        const V v544 = 0.5 * v536;
-        const V v545 = 0.25 * v536;
-        const V v546 = v100 - v528;
-        const V v547 = v489 + v540;
-        const V v548 = v40 * v542;
-        const V v549 = v521 - v548;
-        const V v550 = v40 * v102;
-        const V v551 = parameters[6] * v544;
-        const V v552 = p3 * v545;
-        const V v553 = v102 * v546;
-        const V v554 = 1.0 / v551;
-        const V v555 = w[3] * v549;
-        const V v556 = v2 * v549;
-        const V v557 = v35 * v552;
-        const V v558 = v550 * v547;
-        const V v559 = v556 - v558;
-        const V v560 = v102 * v555;
-        const V v561 = v47 * v553;
-        const V v562 = v561 + v541;
-        const V v563 = v48 * v553;
-        const V v564 = 0.932469514203152 * v557;
-        const V v565 = 0.6612093864662645 * v557;
-        const V v566 = 0.2386191860831969 * v557;
-        const V v567 = v543 + v562;
-        const V v568 = v529 * v538;
-        const V v569 = v562 - v568;
-        const V v570 = v109 + v563;
-        const V v571 = v77 * v559;
-        const V v572 = v77 * v560;
-        s65 += v572;
-        const V v573 = v76 * v560;
-        s64 += v573;
-        const V v574 = v76 * v559;
-        const V v575 = v570 + v574;
-        const V v576 = v571 - v109;
-        const V v577 = v576 - v563;
-        const V v578 = v86 * v567;
-        s66 += v578;
-        const V v579 = v86 * v569;
-        s67 += v579;
-        const V v580 = v85 * v567;
-        s68 += v580;
-        const V v581 = v85 * v569;
-        s69 += v581;
-        const V v582 = v86 * v577;
-        s70 += v582;
-        const V v583 = v86 * v575;
-        s71 += v583;
-        const V v584 = v85 * v577;
-        s72 += v584;
-        const V v585 = v85 * v575;
-        s73 += v585;
-        const V v586 = parameters[2] * v518;
-        const V v587 = v586 * v90;
-        const V v588 = v554 * v587;
-        const V v589 = v588 * v588;
-        const V v590 = 1.0 + v589;
-        const V v591 = softehl_vlog(v590);
-        const V v592 = v26 * v591;
-        const V v593 = softehl_vexp(v592);
-        const V v594 = v1 * v593;
-        const V v595 = parameters[8] + v594;
-        const V v596 = v588 * v595;
-        const V v597 = v596 + v564;
-        const V v598 = v596 + v565;
-        const V v599 = v596 + v566;
-        const V v600 = v596 - v566;
-        const V v601 = v596 - v565;
-        const V v602 = v596 - v564;
-        V v603[7];
-        softehl_film_conserving_carreau_level_cell_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), v588, softehl_splat(v26), softehl_splat(v1), softehl_splat(v36), v564, v565, v566, v596, v597, v598, v599, v600, v601, v602}, v603, &failed);
-        const V v604 = v531 * v533;
-        const V v605 = 1.0 / v586;
-        const V v606 = v544 * v544;
-        const double v607 = 0.5 * w[3];
-        const V v608 = v92 * v607;
-        const V v609 = 1.0 / v606;
-        const V v610 = v15 * v606;
-        const M v611 = softehl_lt(softehl_splat(0.0), v90);
-        const V v612 = v90 * v608;
-        const V v613 = v603[1];
-        const V v614 = v603[2];
-        const V v615 = v603[3];
-        const V v616 = v603[4];
-        const V v617 = v603[5];
-        const V v618 = v603[6];
-        const V v619 = 0.07987743308995329 * v613;
-        const V v620 = v613 * v613;
-        const V v621 = 0.1192694691878821 * v614;
-        const V v622 = v614 * v614;
-        const V v623 = 0.05582662111236089 * v615;
-        const V v624 = v615 * v615;
-        const V v625 = 0.05582662111236089 * v616;
-        const V v626 = v616 * v616;
-        const V v627 = 0.07987743308995329 * v618;
-        const V v628 = v618 * v618;
-        const V v629 = 1.0 + v620;
-        const V v630 = v604 * v609;
-        const V v631 = 1.0 + v622;
-        const V v632 = 1.0 + v624;
-        const V v633 = 0.1192694691878821 * v617;
-        const V v634 = v617 * v617;
-        const V v635 = softehl_vlog(v629);
-        const V v636 = softehl_vlog(v631);
-        const V v637 = 1.0 + v628;
-        const V v638 = softehl_vlog(v632);
-        const V v639 = 1.0 + v634;
-        const V v640 = v630 * v612;
-        const V v641 = v630 * v630;
-        const V v642 = 1.0 + v626;
-        const V v643 = softehl_vlog(v637);
-        const V v644 = v610 * v641;
-        const V v645 = -v640;
-        const V v646 = softehl_vlog(v642);
-        const V v647 = softehl_vlog(v639);
-        const V v648 = v36 * v636;
-        const V v649 = softehl_vexp(v648);
-        const V v650 = v36 * v638;
-        const V v651 = softehl_vexp(v650);
-        const V v652 = v36 * v635;
-        const V v653 = softehl_vexp(v652);
-        const V v654 = v36 * v643;
-        const V v655 = softehl_vexp(v654);
-        const V v656 = v36 * v646;
-        const V v657 = v36 * v647;
-        const V v658 = softehl_vexp(v656);
-        const V v659 = softehl_vexp(v657);
-        const V v660 = v1 * v649;
-        const V v661 = parameters[8] + v660;
-        const V v662 = v1 * v651;
-        const V v663 = parameters[8] + v662;
-        const V v664 = v1 * v653;
-        const V v665 = parameters[8] + v664;
-        const V v666 = v1 * v655;
-        const V v667 = parameters[8] + v666;
-        const V v668 = v1 * v658;
-        const V v669 = parameters[8] + v668;
-        const V v670 = v1 * v659;
-        const V v671 = parameters[8] + v670;
-        const V v672 = 1.0 / v661;
-        const V v673 = 1.0 / v663;
-        const V v674 = 1.0 / v665;
-        const V v675 = 1.0 / v667;
-        const V v676 = 1.0 / v669;
-        const V v677 = 1.0 / v671;
-        const V v678 = v633 * v677;
-        const V v679 = v621 * v672;
-        const V v680 = v678 - v679;
-        const V v681 = v623 * v673;
-        const V v682 = v680 - v681;
-        const V v683 = v619 * v674;
-        const V v684 = v682 - v683;
-        const V v685 = v627 * v675;
-        const V v686 = v685 + v684;
-        const V v687 = v625 * v676;
-        const V v688 = v687 + v686;
-        const V v689 = v644 * v688;
-        const V v690 = v605 * v689;
-        V v691 = softehl_splat(0.0);
-        V v692 = softehl_splat(0.0);
-        V v693 = softehl_splat(0.0);
-        V v694 = softehl_splat(0.0);
-        V v695 = softehl_splat(0.0);
-        V v696 = softehl_splat(0.0);
-        V v697 = softehl_splat(0.0);
-        V v698 = softehl_splat(0.0);
-        const M m699 = v611;
-        if (softehl_any(m699)) {
-            const V v700 = v76 * v134;
-            const V v701 = v134 * v441;
-            const V v702 = -v700;
-            v691 = softehl_blend(m699, v90, v691);
-            v692 = softehl_blend(m699, softehl_splat(0.0), v692);
-            v693 = softehl_blend(m699, v701, v693);
-            v694 = softehl_blend(m699, softehl_splat(0.0), v694);
-            v695 = softehl_blend(m699, v702, v695);
-            v696 = softehl_blend(m699, softehl_splat(0.0), v696);
-            v697 = softehl_blend(m699, v645, v697);
-            v698 = softehl_blend(m699, softehl_splat(0.0), v698);
+        const double v262 = 0.5 * w[1], v263 = 0.5 * w[2];
+        const V v264 = softehl_vexp(p2 * parameters[3]);
+        const double v265 = 0.5 - v262, v266 = 0.5 + v262, v267 = 0.5 - v263, v268 = 0.5 + v263;
+        const V v269 = v210 * v231 + v89 * v230, v270 = v265 * v5 + v266 * v6,
+            v271 = v267 * v5 + v268 * v6, v272 = v270 + v271, v273 = v67 * v32, v274 = 0.5 * v272,
+            v275 = 0.25 * v272, v276 = p0 * v12 - v21 * (v269 - v65), v277 = v21 * v67,
+            v278 = p3 * v275, v279 = v67 * (v65 - v269), v280 = 1.0 / (parameters[6] * v274),
+            v281 = v17 * v278, v282 = v2 * v276 - v277 * (v238 + (v239 - v209)),
+            v283 = v67 * (w[3] * v276), v284 = v27 * v279 + v67 * v33 * (v232 + (v233 - v88)),
+            v285 = v28 * v279, v286 = 0.932469514203152 * v281, v287 = 0.6612093864662645 * v281,
+            v288 = 0.2386191860831969 * v281, v289 = (v235 + v234) * v273 + v284,
+            v290 = v284 - (v237 + v236) * v273;
+        s43 += v55 * v283; s42 += v54 * v283;
+        const V v291 = v74 + v285 + v54 * v282, v292 = v55 * v282 - v74 - v285, v293 = v59 * v289;
+        s44 += v293; const V v294 = v59 * v290; s45 += v294; const V v295 = v58 * v289; s46 += v295;
+        const V v296 = v58 * v290; s47 += v296; const V v297 = v59 * v292; s48 += v297;
+        const V v298 = v59 * v291; s49 += v298; const V v299 = v58 * v292; s50 += v299;
+        const V v300 = v58 * v291; s51 += v300;
+        const V v301 = parameters[2] * v264, v302 = v301 * v62, v303 = v280 * v302,
+            v304 = softehl_vlog(1.0 + v303 * v303), v305 = softehl_vexp(v13 * v304),
+            v306 = v303 * (parameters[8] + v1 * v305), v307 = v306 + v286, v308 = v306 + v287,
+            v309 = v306 + v288, v310 = v306 - v288, v311 = v306 - v287, v312 = v306 - v286;
+        V v313[7];
+        softehl_film_conserving_carreau_level_cell_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), v303, softehl_splat(v13), softehl_splat(v1), softehl_splat(v18), v286, v287, v288, v306, v307, v308, v309, v310, v311, v312}, v313, &failed);
+        const V v314 = v270 * v271, v315 = 1.0 / v301, v316 = v274 * v274, v317 = 1.0 / v316,
+            v318 = v8 * v316;
+        const M v319 = softehl_lt(softehl_splat(0.0), v62);
+        const V v320 = v313[1], v321 = v313[2], v322 = v313[3], v323 = v313[4], v324 = v313[5],
+            v325 = v313[6], v326 = 0.07987743308995329 * v320, v327 = v320 * v320,
+            v328 = 0.1192694691878821 * v321, v329 = v321 * v321, v330 = 0.05582662111236089 * v322,
+            v331 = v322 * v322, v332 = 0.05582662111236089 * v323, v333 = v323 * v323,
+            v334 = 0.07987743308995329 * v325, v335 = v325 * v325, v336 = 1.0 + v327,
+            v337 = v314 * v317, v338 = 1.0 + v329, v339 = 1.0 + v331,
+            v340 = 0.1192694691878821 * v324, v341 = v324 * v324, v342 = softehl_vlog(v336),
+            v343 = softehl_vlog(v338), v344 = 1.0 + v335, v345 = softehl_vlog(v339),
+            v346 = 1.0 + v341, v347 = v337 * v337, v348 = 1.0 + v333, v349 = softehl_vlog(v344),
+            v350 = v318 * v347, v351 = -(v337 * (v62 * (v63 * (0.5 * w[3])))),
+            v352 = softehl_vlog(v348), v353 = softehl_vlog(v346), v354 = softehl_vexp(v18 * v343),
+            v355 = softehl_vexp(v18 * v345), v356 = softehl_vexp(v18 * v342),
+            v357 = softehl_vexp(v18 * v349), v358 = softehl_vexp(v18 * v352),
+            v359 = softehl_vexp(v18 * v353), v360 = parameters[8] + v1 * v354,
+            v361 = parameters[8] + v1 * v355, v362 = parameters[8] + v1 * v356,
+            v363 = parameters[8] + v1 * v357, v364 = parameters[8] + v1 * v358,
+            v365 = parameters[8] + v1 * v359, v366 = 1.0 / v360, v367 = 1.0 / v361,
+            v368 = 1.0 / v362, v369 = 1.0 / v363, v370 = 1.0 / v364, v371 = 1.0 / v365,
+            v372 = v334 * v369 + (v340 * v371 - v328 * v366 - v330 * v367 - v326 * v368),
+            v373 = v332 * v370 + v372, v374 = v350 * v373, v375 = v315 * v374;
+        V v376 = softehl_splat(0.0), v377 = softehl_splat(0.0), v378 = softehl_splat(0.0),
+            v379 = softehl_splat(0.0), v380 = softehl_splat(0.0), v381 = softehl_splat(0.0),
+            v382 = softehl_splat(0.0), v383 = softehl_splat(0.0);
+        const M m384 = v319;
+        if (softehl_any(m384)) {
+            const V v385 = v89 * v211, v386 = -(v54 * v89);
+            v376 = softehl_blend(m384, v62, v376);
+            v377 = softehl_blend(m384, softehl_splat(0.0), v377);
+            v378 = softehl_blend(m384, v385, v378);
+            v379 = softehl_blend(m384, softehl_splat(0.0), v379);
+            v380 = softehl_blend(m384, v386, v380);
+            v381 = softehl_blend(m384, softehl_splat(0.0), v381);
+            v382 = softehl_blend(m384, v351, v382);
+            v383 = softehl_blend(m384, softehl_splat(0.0), v383);
         }
-        const M m703 = ~v611;
-        if (softehl_any(m703)) {
-            const V v704 = v76 * v438;
-            const V v705 = v438 * v441;
-            const V v706 = -v704;
-            v691 = softehl_blend(m703, softehl_splat(0.0), v691);
-            v692 = softehl_blend(m703, v90, v692);
-            v693 = softehl_blend(m703, softehl_splat(0.0), v693);
-            v694 = softehl_blend(m703, v705, v694);
-            v695 = softehl_blend(m703, softehl_splat(0.0), v695);
-            v696 = softehl_blend(m703, v706, v696);
-            v697 = softehl_blend(m703, softehl_splat(0.0), v697);
-            v698 = softehl_blend(m703, v645, v698);
+        const M m387 = ~v319;
+        if (softehl_any(m387)) {
+            const V v388 = v210 * v211, v389 = -(v54 * v210);
+            v376 = softehl_blend(m387, softehl_splat(0.0), v376);
+            v377 = softehl_blend(m387, v62, v377);
+            v378 = softehl_blend(m387, softehl_splat(0.0), v378);
+            v379 = softehl_blend(m387, v388, v379);
+            v380 = softehl_blend(m387, softehl_splat(0.0), v380);
+            v381 = softehl_blend(m387, v389, v381);
+            v382 = softehl_blend(m387, softehl_splat(0.0), v382);
+            v383 = softehl_blend(m387, v351, v383);
         }
-        const V v707 = 1.0 / v642;
-        const V v708 = 1.0 / v632;
-        const V v709 = 1.0 / v639;
-        const V v710 = 1.0 / v631;
-        const V v711 = 1.0 / v637;
-        const V v712 = 1.0 / v629;
-        const V v713 = v438 * v692;
-        const V v714 = 2.0 * v616;
-        const V v715 = v134 * v691;
-        const V v716 = v713 + v715;
-        const V v717 = 2.0 * v615;
-        const V v718 = 0.5 * v716;
-        const V v719 = 2.0 * v617;
-        const V v720 = 2.0 * v614;
-        const V v721 = 2.0 * v618;
-        const V v722 = 2.0 * v613;
-        const V v723 = v49 * v616;
-        const V v724 = v49 * v615;
-        const V v725 = v50 * v617;
-        const V v726 = v50 * v614;
-        const V v727 = v92 * v718;
-        const V v728 = v723 * v658;
-        const V v729 = v46 * v658;
-        const V v730 = v724 * v651;
-        const V v731 = v46 * v651;
-        const V v732 = v725 * v659;
-        const V v733 = v46 * v659;
-        const V v734 = v726 * v649;
-        const V v735 = v46 * v649;
-        const V v736 = v707 * v729;
-        const V v737 = v708 * v731;
-        const V v738 = v630 * v727;
-        const V v739 = v738 + v690;
-        const V v740 = v709 * v733;
-        const V v741 = 2.0 * v620;
-        const V v742 = v710 * v735;
-        const V v743 = 2.0 * v622;
-        const V v744 = 2.0 * v624;
-        const V v745 = w[3] * v739;
-        const V v746 = 2.0 * v626;
-        const V v747 = v741 * v665;
-        const V v748 = v665 * v665;
-        const V v749 = v743 * v661;
-        const V v750 = v661 * v661;
-        const V v751 = v744 * v663;
-        const V v752 = v663 * v663;
-        const V v753 = 1.0 / v748;
-        const V v754 = v746 * v669;
-        const V v755 = v669 * v669;
-        const V v756 = 1.0 / v750;
-        const V v757 = 1.0 / v752;
-        const V v758 = 1.0 / v755;
-        const V v759 = 2.0 * v634;
-        const V v760 = 2.0 * v628;
-        const V v761 = v676 * v676;
-        const V v762 = 0.23395696728634552 * v676;
-        const V v763 = v759 * v671;
-        const V v764 = v671 * v671;
-        const V v765 = v760 * v667;
-        const V v766 = v667 * v667;
-        const V v767 = v494 - v434;
-        const V v768 = v492 + v491;
-        const V v769 = 1.0 / v764;
-        const V v770 = v728 * v761;
-        const V v771 = 1.0 / v766;
-        const V v772 = v616 * v761;
-        const V v773 = v37 * v616;
-        const V v774 = v707 * v770;
-        const V v775 = v493 + v767;
-        const V v776 = v40 * v768;
-        const V v777 = v24 - v776;
-        const V v778 = v773 * v676;
-        const V v779 = v37 * v613;
-        const V v780 = v51 * v613;
-        const V v781 = v51 * v618;
-        const V v782 = v37 * v618;
-        const V v783 = v550 * v775;
-        const V v784 = v37 * v614;
-        const V v785 = v102 * v777;
-        const V v786 = v21 * v102;
-        const V v787 = v779 * v674;
-        const V v788 = v780 * v653;
-        const V v789 = v781 * v655;
-        const V v790 = v46 * v653;
-        const V v791 = v46 * v655;
-        const V v792 = v674 * v674;
-        const V v793 = v784 * v672;
-        const V v794 = v672 * v672;
-        const V v795 = v782 * v675;
-        const V v796 = v675 * v675;
-        const V v797 = v788 * v792;
-        const V v798 = v613 * v792;
-        const V v799 = v712 * v790;
-        const V v800 = v711 * v791;
-        const V v801 = v789 * v796;
-        const V v802 = v618 * v796;
-        const V v803 = v712 * v797;
-        const V v804 = v734 * v794;
-        const V v805 = v614 * v794;
-        const V v806 = v711 * v801;
-        const V v807 = 0.1803807865240693 * v672;
-        const V v808 = v710 * v804;
-        const V v809 = 0.08566224618958518 * v675;
-        const V v810 = 0.08566224618958518 * v674;
-        const V v811 = v673 * v673;
-        const V v812 = 0.23395696728634552 * v673;
-        const V v813 = v677 * v677;
-        const V v814 = 0.1803807865240693 * v677;
-        const V v815 = v722 * v803;
-        const V v816 = v810 - v815;
-        const V v817 = v720 * v808;
-        const V v818 = v807 - v817;
-        const V v819 = v721 * v806;
-        const V v820 = v809 - v819;
-        const V v821 = v730 * v811;
-        const V v822 = v615 * v811;
-        const V v823 = v37 * v615;
-        const V v824 = v37 * v617;
-        const V v825 = v617 * v813;
-        const V v826 = v732 * v813;
-        const V v827 = v708 * v821;
-        const V v828 = v824 * v677;
-        const V v829 = v709 * v826;
-        const V v830 = v823 * v673;
-        const V v831 = v753 * v747;
-        const V v832 = v620 * v753;
-        const V v833 = 1.0 + v832;
-        const V v834 = v753 * v831;
-        const V v835 = v717 * v827;
-        const V v836 = v812 - v835;
-        const V v837 = v756 * v749;
-        const V v838 = v622 * v756;
-        const V v839 = 1.0 + v838;
-        const V v840 = v756 * v837;
-        const V v841 = softehl_vlog(v833);
-        const V v842 = 1.0 / v833;
-        const V v843 = v757 * v751;
-        const V v844 = v624 * v757;
-        const V v845 = 1.0 + v844;
-        const V v846 = softehl_vlog(v839);
-        const V v847 = 1.0 / v839;
-        const V v848 = v757 * v843;
-        const V v849 = v758 * v754;
-        const V v850 = v626 * v758;
-        const V v851 = 1.0 + v850;
-        const V v852 = softehl_vlog(v845);
-        const V v853 = 1.0 / v845;
-        const V v854 = v758 * v849;
-        const V v855 = v769 * v763;
-        const V v856 = v634 * v769;
-        const V v857 = 1.0 + v856;
-        const V v858 = softehl_vlog(v851);
-        const V v859 = 1.0 / v851;
-        const V v860 = v769 * v855;
-        const V v861 = v771 * v765;
-        const V v862 = v628 * v771;
-        const V v863 = 1.0 + v862;
-        const V v864 = softehl_vlog(v857);
-        const V v865 = 1.0 / v857;
-        const V v866 = v771 * v861;
-        const V v867 = softehl_vlog(v863);
-        const V v868 = 1.0 / v863;
-        const V v869 = v714 * v774;
-        const V v870 = v762 - v869;
-        const V v871 = v719 * v829;
-        const V v872 = v814 - v871;
-        const V v873 = v86 * v786;
-        const V v874 = v85 * v786;
-        const V v875 = -v873;
-        const V v876 = -v874;
-        const V v877 = v86 * v785;
-        const V v878 = v85 * v785;
-        const V v879 = v86 * v783;
-        const V v880 = v85 * v783;
-        const V v881 = -v879;
-        const V v882 = -v880;
-        const V v883 = v26 * v867;
-        const V v884 = softehl_vexp(v883);
-        const V v885 = v26 * v841;
-        const V v886 = softehl_vexp(v885);
-        const V v887 = v26 * v846;
-        const V v888 = softehl_vexp(v887);
-        const V v889 = v26 * v852;
-        const V v890 = softehl_vexp(v889);
-        const V v891 = v26 * v858;
-        const V v892 = softehl_vexp(v891);
-        const V v893 = v26 * v864;
-        const V v894 = softehl_vexp(v893);
-        const V v895 = v787 * v886;
-        const V v896 = v842 * v895;
-        const V v897 = v793 * v888;
-        const V v898 = v847 * v897;
-        const V v899 = v830 * v890;
-        const V v900 = v853 * v899;
-        const V v901 = v778 * v892;
-        const V v902 = v859 * v901;
-        const V v903 = v828 * v894;
-        const V v904 = v865 * v903;
-        const V v905 = v795 * v884;
-        const V v906 = v868 * v905;
-        const V v907 = v753 * v896;
-        const V v908 = v834 * v896;
-        const V v909 = v756 * v898;
-        const V v910 = v840 * v898;
-        const V v911 = v757 * v900;
-        const V v912 = v848 * v900;
-        const V v913 = v758 * v902;
-        const V v914 = v854 * v902;
-        const V v915 = v769 * v904;
-        const V v916 = v860 * v904;
-        const V v917 = v771 * v906;
-        const V v918 = v866 * v906;
-        const V v919 = v1 * v892;
-        const V v920 = parameters[8] + v919;
-        const V v921 = v772 * v920;
-        const V v922 = v914 + v921;
-        const V v923 = v736 * v922;
-        const V v924 = v913 - v923;
-        const V v925 = v676 * v920;
-        const V v926 = v714 * v924;
-        const V v927 = v925 + v926;
-        const V v928 = v1 * v894;
-        const V v929 = parameters[8] + v928;
-        const V v930 = v825 * v929;
-        const V v931 = v916 + v930;
-        const V v932 = v740 * v931;
-        const V v933 = v915 - v932;
-        const V v934 = v677 * v929;
-        const V v935 = v719 * v933;
-        const V v936 = v934 + v935;
-        const V v937 = v1 * v884;
-        const V v938 = parameters[8] + v937;
-        const V v939 = v802 * v938;
-        const V v940 = v918 + v939;
-        const V v941 = v800 * v940;
-        const V v942 = v917 - v941;
-        const V v943 = v675 * v938;
-        const V v944 = v721 * v942;
-        const V v945 = v943 + v944;
-        const V v946 = v1 * v886;
-        const V v947 = parameters[8] + v946;
-        const V v948 = v798 * v947;
-        const V v949 = v908 + v948;
-        const V v950 = v799 * v949;
-        const V v951 = v907 - v950;
-        const V v952 = v674 * v947;
-        const V v953 = v722 * v951;
-        const V v954 = v952 + v953;
-        const V v955 = v1 * v888;
-        const V v956 = parameters[8] + v955;
-        const V v957 = v805 * v956;
-        const V v958 = v910 + v957;
-        const V v959 = v742 * v958;
-        const V v960 = v909 - v959;
-        const V v961 = v672 * v956;
-        const V v962 = v720 * v960;
-        const V v963 = v961 + v962;
-        const V v964 = v1 * v890;
-        const V v965 = parameters[8] + v964;
-        const V v966 = v822 * v965;
-        const V v967 = v912 + v966;
-        const V v968 = v737 * v967;
-        const V v969 = v911 - v968;
-        const V v970 = v673 * v965;
-        const V v971 = v717 * v969;
-        const V v972 = v970 + v971;
-        V v973[49];
-        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v816, v818, v836, v870, v872, v820, softehl_splat((-1.0)), v954, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v963, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v972, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v927, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v936, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v945}, v973, &failed);
-        const V v974 = v586 * v554;
-        const V v975 = v94 * v630;
-        const V v976 = 0.1192694691878821 * v672;
-        const V v977 = 0.05582662111236089 * v673;
-        const V v978 = 0.07987743308995329 * v674;
-        const V v979 = v441 * v974;
-        const V v980 = 0.07987743308995329 * v675;
-        const V v981 = 0.05582662111236089 * v676;
-        const V v982 = 0.1192694691878821 * v677;
-        const V v983 = v694 + v693;
-        const V v984 = v975 * v983;
-        const V v985 = 0.932469514203152 * v552;
-        const V v986 = 0.6612093864662645 * v552;
-        const V v987 = 0.2386191860831969 * v552;
-        const V v988 = v605 * v44;
-        const V v989 = v605 * v644;
-        const V v990 = v644 * v988;
-        const V v991 = v46 * v621;
-        const V v992 = v46 * v623;
-        const V v993 = v46 * v619;
-        const V v994 = v46 * v627;
-        const V v995 = v46 * v625;
-        const V v996 = v46 * v633;
-        const V v997 = v991 * v649;
-        const V v998 = v992 * v651;
-        const V v999 = v993 * v653;
-        const V v1000 = v994 * v655;
-        const V v1001 = v995 * v658;
-        const V v1002 = v996 * v659;
-        const V v1003 = v997 * v794;
-        const V v1004 = v998 * v811;
-        const V v1005 = v999 * v792;
-        const V v1006 = v1000 * v796;
-        const V v1007 = v1001 * v761;
-        const V v1008 = v1002 * v813;
-        const V v1009 = v710 * v1003;
-        const V v1010 = v708 * v1004;
-        const V v1011 = v712 * v1005;
-        const V v1012 = v711 * v1006;
-        const V v1013 = v707 * v1007;
-        const V v1014 = v709 * v1008;
-        const V v1015 = v973[7];
-        const V v1016 = v973[8];
-        const V v1017 = v973[9];
-        const V v1018 = v973[10];
-        const V v1019 = v720 * v1009;
-        const V v1020 = v973[11];
-        const V v1021 = v717 * v1010;
-        const V v1022 = v722 * v1011;
-        const V v1023 = v721 * v1012;
-        const V v1024 = v714 * v1013;
-        const V v1025 = v719 * v1014;
-        const V v1026 = v1018 - v1020;
-        const V v1027 = v973[12];
-        const V v1028 = v980 - v1023;
-        const V v1029 = v981 - v1024;
-        const V v1030 = v982 - v1025;
-        const V v1031 = v1017 - v1027;
-        const V v1032 = v1019 - v976;
-        const V v1033 = v1021 - v977;
-        const V v1034 = v1022 - v978;
-        const V v1035 = v987 * v1026;
-        const V v1036 = v973[13];
-        const V v1037 = v973[14];
-        const V v1038 = v973[15];
-        const V v1039 = v1016 - v1036;
-        const V v1040 = v973[16];
-        const V v1041 = v1034 * v1015;
-        const V v1042 = v973[17];
-        const V v1043 = v973[18];
-        const V v1044 = v973[19];
-        const V v1045 = v973[20];
-        const V v1046 = v1032 * v1037;
-        const V v1047 = v1041 + v1046;
-        const V v1048 = v1038 - v1045;
-        const V v1049 = v1040 - v1044;
-        const V v1050 = v973[21];
-        const V v1051 = v1042 - v1043;
-        const V v1052 = v973[22];
-        const V v1053 = v973[23];
-        const V v1054 = v973[24];
-        const V v1055 = v973[25];
-        const V v1056 = v1033 * v1050;
-        const V v1057 = v1056 + v1047;
-        const V v1058 = v973[26];
-        const V v1059 = v987 * v1051;
-        const V v1060 = v973[27];
-        const V v1061 = v973[28];
-        const V v1062 = v1053 - v1058;
-        const V v1063 = v1054 - v1055;
-        const V v1064 = v1052 - v1060;
-        const V v1065 = v973[29];
-        const V v1066 = v973[30];
-        const V v1067 = v973[31];
-        const V v1068 = v973[32];
-        const V v1069 = v973[33];
-        const V v1070 = v987 * v1063;
-        const V v1071 = v973[34];
-        const V v1072 = v973[35];
-        const V v1073 = v973[36];
-        const V v1074 = v1066 - v1069;
-        const V v1075 = v1065 - v1071;
-        const V v1076 = v1067 - v1068;
-        const V v1077 = v973[37];
-        const V v1078 = v973[38];
-        const V v1079 = v973[39];
-        const V v1080 = v973[40];
-        const V v1081 = v973[41];
-        const V v1082 = v987 * v1076;
-        const V v1083 = v1073 - v1081;
-        const V v1084 = v973[42];
-        const V v1085 = v1077 - v1080;
-        const V v1086 = v1078 - v1079;
-        const V v1087 = v973[43];
-        const V v1088 = v973[44];
-        const V v1089 = v973[45];
-        const V v1090 = v973[46];
-        const V v1091 = v973[47];
-        const V v1092 = v973[48];
-        const V v1093 = v987 * v1086;
-        const V v1094 = v985 * v1075;
-        const V v1095 = v1094 + v1082;
-        const V v1096 = v1087 - v1092;
-        const V v1097 = v1088 - v1091;
-        const V v1098 = v985 * v1083;
-        const V v1099 = v1098 + v1093;
-        const V v1100 = v1089 - v1090;
-        const V v1101 = v986 * v1074;
-        const V v1102 = v1101 + v1095;
-        const V v1103 = v986 * v1085;
-        const V v1104 = v1103 + v1099;
-        const V v1105 = v987 * v1100;
-        const V v1106 = v1028 * v1084;
-        const V v1107 = v1106 + v1057;
-        const V v1108 = v985 * v1039;
-        const V v1109 = v1108 + v1035;
-        const V v1110 = v1029 * v1102;
-        const V v1111 = v1029 * v1061;
-        const V v1112 = v1111 + v1107;
-        const V v1113 = v986 * v1031;
-        const V v1114 = v1113 + v1109;
-        const V v1115 = v985 * v1096;
-        const V v1116 = v1115 + v1105;
-        const V v1117 = v986 * v1097;
-        const V v1118 = v1117 + v1116;
-        const V v1119 = v1028 * v1118;
-        const V v1120 = v1110 + v1119;
-        const V v1121 = v1030 * v1072;
-        const V v1122 = v1121 + v1112;
-        const V v1123 = v979 * v1122;
-        const V v1124 = v985 * v1048;
-        const V v1125 = v1124 + v1059;
-        const V v1126 = v985 * v1064;
-        const V v1127 = v1126 + v1070;
-        const V v1128 = v1030 * v1104;
-        const V v1129 = v1120 + v1128;
-        const V v1130 = v986 * v1049;
-        const V v1131 = v1130 + v1125;
-        const V v1132 = v986 * v1062;
-        const V v1133 = v1132 + v1127;
-        const V v1134 = v1034 * v1114;
-        const V v1135 = v1129 + v1134;
-        const V v1136 = v1032 * v1131;
-        const V v1137 = v1135 + v1136;
-        const V v1138 = v989 * v1123;
-        const V v1139 = v984 + v1138;
-        const V v1140 = v1033 * v1133;
-        const V v1141 = v1137 + v1140;
-        const V v1142 = v990 * v1141;
-        const V v1143 = parameters[9] * v1139;
-        const V v1144 = v1142 + v1143;
-        const V v1145 = w[3] * v1144;
-        const V v1146 = p3 * v45;
-        const V v1147 = v554 * v554;
-        const V v1148 = v15 * v641;
-        const V v1149 = parameters[6] * v587;
-        const V v1150 = v609 * v609;
-        const V v1151 = 2.0 * v630;
-        const V v1152 = v630 * v718;
-        const V v1153 = v610 * v1151;
-        const V v1154 = v519 * v533;
-        const V v1155 = v77 * v1152;
-        const double v1156 = v519 + v522;
-        const V v1157 = v522 * v531;
-        const V v1158 = v1154 + v1157;
-        const V v1159 = v609 * v1158;
-        const double v1160 = 0.5 * v1156;
-        const V v1161 = v1146 * v1160;
-        const V v1162 = v1160 * v1149;
-        const V v1163 = v1147 * v1162;
-        const V v1164 = v536 * v1160;
-        const V v1165 = v1164 * v1148;
-        const V v1166 = v604 * v1164;
-        const V v1167 = v1150 * v1166;
-        const V v1168 = v1159 - v1167;
-        const V v1169 = v1168 * v1153;
-        const V v1170 = v1165 + v1169;
-        const V v1171 = v1168 * v727;
-        const V v1172 = v1155 + v1171;
-        const V v1173 = v1170 * v688;
-        const V v1174 = 0.932469514203152 * v1161;
-        const V v1175 = 0.6612093864662645 * v1161;
-        const V v1176 = 0.2386191860831969 * v1161;
-        const V v1177 = v1174 * v1039;
-        const V v1178 = v1163 * v1015;
-        const V v1179 = v1177 - v1178;
-        const V v1180 = v1175 * v1031;
-        const V v1181 = v1180 + v1179;
-        const V v1182 = v1176 * v1026;
-        const V v1183 = v1182 + v1181;
-        const V v1184 = v1034 * v1183;
-        const V v1185 = v1174 * v1048;
-        const V v1186 = v1174 * v1064;
-        const V v1187 = v1174 * v1075;
-        const V v1188 = v1174 * v1083;
-        const V v1189 = v1174 * v1096;
-        const V v1190 = v1163 * v1037;
-        const V v1191 = v1185 - v1190;
-        const V v1192 = v1163 * v1050;
-        const V v1193 = v1186 - v1192;
-        const V v1194 = v1163 * v1061;
-        const V v1195 = v1187 - v1194;
-        const V v1196 = v1163 * v1072;
-        const V v1197 = v1188 - v1196;
-        const V v1198 = v1163 * v1084;
-        const V v1199 = v1189 - v1198;
-        const V v1200 = v1175 * v1049;
-        const V v1201 = v1200 + v1191;
-        const V v1202 = v1176 * v1051;
-        const V v1203 = v1202 + v1201;
-        const V v1204 = v1175 * v1062;
-        const V v1205 = v1204 + v1193;
-        const V v1206 = v1175 * v1074;
-        const V v1207 = v1206 + v1195;
-        const V v1208 = v1175 * v1085;
-        const V v1209 = v1208 + v1197;
-        const V v1210 = v1175 * v1097;
-        const V v1211 = v1210 + v1199;
-        const V v1212 = v1176 * v1063;
-        const V v1213 = v1212 + v1205;
-        const V v1214 = v1176 * v1076;
-        const V v1215 = v1214 + v1207;
-        const V v1216 = v1176 * v1086;
-        const V v1217 = v1216 + v1209;
-        const V v1218 = v1176 * v1100;
-        const V v1219 = v1218 + v1211;
-        const V v1220 = v1032 * v1203;
-        const V v1221 = v1184 + v1220;
-        const V v1222 = v1028 * v1219;
-        const V v1223 = v1221 + v1222;
-        const V v1224 = v1033 * v1213;
-        const V v1225 = v1223 + v1224;
-        const V v1226 = v1029 * v1215;
-        const V v1227 = v1225 + v1226;
-        const V v1228 = v1030 * v1217;
-        const V v1229 = v1227 + v1228;
-        const V v1230 = v644 * v1229;
-        const V v1231 = v1173 + v1230;
-        const V v1232 = v605 * v1231;
-        const V v1233 = v1172 + v1232;
-        const V v1234 = w[3] * v1233;
-        const V v1235 = v76 * v586;
-        const V v1236 = v554 * v1235;
-        const V v1237 = v696 + v695;
-        const V v1238 = v976 - v1019;
-        const V v1239 = v977 - v1021;
-        const V v1240 = v975 * v1237;
-        const V v1241 = v978 - v1022;
-        const V v1242 = v1238 * v1037;
-        const V v1243 = v1023 - v980;
-        const V v1244 = v1024 - v981;
-        const V v1245 = v1243 * v1084;
-        const V v1246 = v1245 + v1242;
-        const V v1247 = v1025 - v982;
-        const V v1248 = v1241 * v1015;
-        const V v1249 = v1248 + v1246;
-        const V v1250 = v1239 * v1050;
-        const V v1251 = v1249 + v1250;
-        const V v1252 = v1244 * v1061;
-        const V v1253 = v1252 + v1251;
-        const V v1254 = v1247 * v1072;
-        const V v1255 = v1254 + v1253;
-        const V v1256 = v1236 * v1255;
-        const V v1257 = v989 * v1256;
-        const V v1258 = v1240 + v1257;
-        const V v1259 = parameters[9] * v1258;
-        const V v1260 = v1259 - v1142;
-        const V v1261 = w[3] * v1260;
-        const V v1262 = v76 * v1152;
-        const V v1263 = v520 * v533;
-        const double v1264 = v520 + v523;
-        const V v1265 = v523 * v531;
-        const V v1266 = v1263 + v1265;
-        const double v1267 = 0.5 * v1264;
-        const V v1268 = v609 * v1266;
-        const V v1269 = v536 * v1267;
-        const V v1270 = v1146 * v1267;
-        const V v1271 = v1267 * v1149;
-        const V v1272 = v1147 * v1271;
-        const V v1273 = 0.932469514203152 * v1270;
-        const V v1274 = 0.6612093864662645 * v1270;
-        const V v1275 = 0.2386191860831969 * v1270;
-        const V v1276 = v604 * v1269;
-        const V v1277 = v1150 * v1276;
-        const V v1278 = v1268 - v1277;
-        const V v1279 = v1269 * v1148;
-        const V v1280 = v1278 * v1153;
-        const V v1281 = v1279 + v1280;
-        const V v1282 = v1278 * v727;
-        const V v1283 = v1262 + v1282;
-        const V v1284 = v1281 * v688;
-        const V v1285 = v1273 * v1039;
-        const V v1286 = v1272 * v1015;
-        const V v1287 = v1285 - v1286;
-        const V v1288 = v1274 * v1031;
-        const V v1289 = v1288 + v1287;
-        const V v1290 = v1275 * v1026;
-        const V v1291 = v1290 + v1289;
-        const V v1292 = v1034 * v1291;
-        const V v1293 = v1273 * v1048;
-        const V v1294 = v1273 * v1064;
-        const V v1295 = v1273 * v1075;
-        const V v1296 = v1273 * v1083;
-        const V v1297 = v1273 * v1096;
-        const V v1298 = v1272 * v1037;
-        const V v1299 = v1293 - v1298;
-        const V v1300 = v1272 * v1050;
-        const V v1301 = v1294 - v1300;
-        const V v1302 = v1272 * v1061;
-        const V v1303 = v1295 - v1302;
-        const V v1304 = v1272 * v1072;
-        const V v1305 = v1296 - v1304;
-        const V v1306 = v1272 * v1084;
-        const V v1307 = v1297 - v1306;
-        const V v1308 = v1274 * v1049;
-        const V v1309 = v1308 + v1299;
-        const V v1310 = v1275 * v1051;
-        const V v1311 = v1310 + v1309;
-        const V v1312 = v1274 * v1062;
-        const V v1313 = v1312 + v1301;
-        const V v1314 = v1274 * v1074;
-        const V v1315 = v1314 + v1303;
-        const V v1316 = v1274 * v1085;
-        const V v1317 = v1316 + v1305;
-        const V v1318 = v1274 * v1097;
-        const V v1319 = v1318 + v1307;
-        const V v1320 = v1275 * v1063;
-        const V v1321 = v1320 + v1313;
-        const V v1322 = v1275 * v1076;
-        const V v1323 = v1322 + v1315;
-        const V v1324 = v1275 * v1086;
-        const V v1325 = v1324 + v1317;
-        const V v1326 = v1275 * v1100;
-        const V v1327 = v1326 + v1319;
-        const V v1328 = v1032 * v1311;
-        const V v1329 = v1292 + v1328;
-        const V v1330 = v1028 * v1327;
-        const V v1331 = v1329 + v1330;
-        const V v1332 = v1033 * v1321;
-        const V v1333 = v1331 + v1332;
-        const V v1334 = v1029 * v1323;
-        const V v1335 = v1333 + v1334;
-        const V v1336 = v1030 * v1325;
-        const V v1337 = v1335 + v1336;
-        const V v1338 = v644 * v1337;
-        const V v1339 = v1284 + v1338;
-        const V v1340 = v605 * v1339;
-        const V v1341 = v1283 + v1340;
-        const V v1342 = w[3] * v1341;
-        const V v1343 = v605 * v605;
-        const V v1344 = v518 * v4;
-        const V v1345 = v554 * v90;
-        const V v1346 = v1343 * v689;
-        const V v1347 = v1344 * v1345;
-        const V v1348 = v1347 * v1122;
-        const V v1349 = v989 * v1348;
-        const V v1350 = v1344 * v1346;
-        const V v1351 = v1349 - v1350;
-        const V v1352 = w[3] * v1351;
-        const V v1353 = w[3] * v605;
-        const V v1354 = v35 * v545;
-        const V v1355 = v1353 * v644;
-        const V v1356 = 0.932469514203152 * v1354;
-        const V v1357 = 0.6612093864662645 * v1354;
-        const V v1358 = 0.2386191860831969 * v1354;
-        const V v1359 = v1356 * v1039;
-        const V v1360 = v1356 * v1048;
-        const V v1361 = v1356 * v1064;
-        const V v1362 = v1356 * v1075;
-        const V v1363 = v1356 * v1083;
-        const V v1364 = v1356 * v1096;
-        const V v1365 = v1357 * v1031;
-        const V v1366 = v1359 + v1365;
-        const V v1367 = v1358 * v1026;
-        const V v1368 = v1367 + v1366;
-        const V v1369 = v1034 * v1368;
-        const V v1370 = v1357 * v1049;
-        const V v1371 = v1360 + v1370;
-        const V v1372 = v1358 * v1051;
-        const V v1373 = v1372 + v1371;
-        const V v1374 = v1357 * v1062;
-        const V v1375 = v1361 + v1374;
-        const V v1376 = v1358 * v1063;
-        const V v1377 = v1376 + v1375;
-        const V v1378 = v1357 * v1074;
-        const V v1379 = v1362 + v1378;
-        const V v1380 = v1357 * v1085;
-        const V v1381 = v1363 + v1380;
-        const V v1382 = v1357 * v1097;
-        const V v1383 = v1364 + v1382;
-        const V v1384 = v1358 * v1076;
-        const V v1385 = v1384 + v1379;
-        const V v1386 = v1358 * v1086;
-        const V v1387 = v1386 + v1381;
-        const V v1388 = v1358 * v1100;
-        const V v1389 = v1388 + v1383;
-        const V v1390 = v1028 * v1389;
-        const V v1391 = v1390 + v1369;
-        const V v1392 = v1032 * v1373;
-        const V v1393 = v1392 + v1391;
-        const V v1394 = v1033 * v1377;
-        const V v1395 = v1394 + v1393;
-        const V v1396 = v1029 * v1385;
-        const V v1397 = v1396 + v1395;
-        const V v1398 = v1030 * v1387;
-        const V v1399 = v1398 + v1397;
-        const V v1400 = v1355 * v1399;
+        const V v390 = 1.0 / v348, v391 = 1.0 / v339, v392 = 1.0 / v346, v393 = 1.0 / v338,
+            v394 = 1.0 / v344, v395 = 1.0 / v336, v396 = 2.0 * v323, v397 = 2.0 * v322,
+            v398 = 0.5 * (v210 * v377 + v89 * v376), v399 = 2.0 * v324, v400 = 2.0 * v321,
+            v401 = 2.0 * v325, v402 = 2.0 * v320, v403 = v63 * v398,
+            v404 = w[3] * (v337 * v403 + v375), v405 = 1.0 / (v362 * v362),
+            v406 = 1.0 / (v360 * v360), v407 = 1.0 / (v361 * v361), v408 = 1.0 / (v364 * v364),
+            v409 = v370 * v370, v410 = 1.0 / (v365 * v365), v411 = 1.0 / (v363 * v363),
+            v412 = v277 * (v242 + (v243 - v208)), v413 = v67 * (v12 - v21 * (v241 + v240)),
+            v414 = v11 * v67, v415 = v368 * v368, v416 = v366 * v366, v417 = v369 * v369,
+            v418 = v367 * v367, v419 = v371 * v371,
+            v420 = 0.08566224618958518 * v368 - v402 * (v395 * (v31 * v320 * v356 * v415)),
+            v421 = 0.1803807865240693 * v366 - v400 * (v393 * (v30 * v321 * v354 * v416)),
+            v422 = 0.08566224618958518 * v369 - v401 * (v394 * (v31 * v325 * v357 * v417)),
+            v423 = 1.0 + v327 * v405,
+            v424 = 0.23395696728634552 * v367 - v397 * (v391 * (v29 * v322 * v355 * v418)),
+            v425 = 1.0 + v329 * v406, v426 = softehl_vlog(v423), v427 = 1.0 + v331 * v407,
+            v428 = softehl_vlog(v425), v429 = 1.0 + v333 * v408, v430 = softehl_vlog(v427),
+            v431 = 1.0 + v341 * v410, v432 = softehl_vlog(v429), v433 = 1.0 + v335 * v411,
+            v434 = softehl_vlog(v431), v435 = softehl_vlog(v433),
+            v436 = 0.23395696728634552 * v370 - v396 * (v390 * (v29 * v323 * v358 * v409)),
+            v437 = 0.1803807865240693 * v371 - v399 * (v392 * (v30 * v324 * v359 * v419)),
+            v438 = -(v59 * v414), v439 = -(v58 * v414), v440 = v59 * v413, v441 = v58 * v413,
+            v442 = -(v59 * v412), v443 = -(v58 * v412), v444 = softehl_vexp(v13 * v435),
+            v445 = softehl_vexp(v13 * v426), v446 = softehl_vexp(v13 * v428),
+            v447 = softehl_vexp(v13 * v430), v448 = softehl_vexp(v13 * v432),
+            v449 = softehl_vexp(v13 * v434), v450 = 1.0 / v423 * (v19 * v320 * v368 * v445),
+            v451 = 1.0 / v425 * (v19 * v321 * v366 * v446),
+            v452 = 1.0 / v427 * (v19 * v322 * v367 * v447),
+            v453 = 1.0 / v429 * (v19 * v323 * v370 * v448),
+            v454 = 1.0 / v431 * (v19 * v324 * v371 * v449),
+            v455 = 1.0 / v433 * (v19 * v325 * v369 * v444), v456 = parameters[8] + v1 * v448,
+            v457 = v390 * (v26 * v358) * (v408 * (v408 * (2.0 * v333 * v364)) * v453 + v323 * v409 * v456),
+            v458 = v370 * v456 + v396 * (v408 * v453 - v457), v459 = parameters[8] + v1 * v449,
+            v460 = v392 * (v26 * v359) * (v410 * (v410 * (2.0 * v341 * v365)) * v454 + v324 * v419 * v459),
+            v461 = v371 * v459 + v399 * (v410 * v454 - v460), v462 = parameters[8] + v1 * v444,
+            v463 = v394 * (v26 * v357) * (v411 * (v411 * (2.0 * v335 * v363)) * v455 + v325 * v417 * v462),
+            v464 = v369 * v462 + v401 * (v411 * v455 - v463), v465 = parameters[8] + v1 * v445,
+            v466 = v395 * (v26 * v356) * (v405 * (v405 * (2.0 * v327 * v362)) * v450 + v320 * v415 * v465),
+            v467 = v368 * v465 + v402 * (v405 * v450 - v466), v468 = parameters[8] + v1 * v446,
+            v469 = v393 * (v26 * v354) * (v406 * (v406 * (2.0 * v329 * v360)) * v451 + v321 * v416 * v468),
+            v470 = v366 * v468 + v400 * (v406 * v451 - v469), v471 = parameters[8] + v1 * v447,
+            v472 = v391 * (v26 * v355) * (v407 * (v407 * (2.0 * v331 * v361)) * v452 + v322 * v418 * v471),
+            v473 = v367 * v471 + v397 * (v407 * v452 - v472);
+        V v474[49];
+        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v420, v421, v424, v436, v437, v422, softehl_splat((-1.0)), v467, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v470, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v473, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v458, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v461, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v464}, v474, &failed);
+        const V v475 = v64 * v337, v476 = 0.1192694691878821 * v366,
+            v477 = 0.05582662111236089 * v367, v478 = 0.07987743308995329 * v368,
+            v479 = 0.07987743308995329 * v369, v480 = 0.05582662111236089 * v370,
+            v481 = 0.1192694691878821 * v371, v482 = 0.932469514203152 * v278,
+            v483 = 0.6612093864662645 * v278, v484 = 0.2386191860831969 * v278, v485 = v315 * v350,
+            v486 = v474[7], v487 = v474[8], v488 = v474[9], v489 = v474[10],
+            v490 = v400 * (v393 * (v26 * v328 * v354 * v416)), v491 = v474[11],
+            v492 = v397 * (v391 * (v26 * v330 * v355 * v418)),
+            v493 = v402 * (v395 * (v26 * v326 * v356 * v415)),
+            v494 = v401 * (v394 * (v26 * v334 * v357 * v417)),
+            v495 = v396 * (v390 * (v26 * v332 * v358 * v409)),
+            v496 = v399 * (v392 * (v26 * v340 * v359 * v419)), v497 = v489 - v491, v498 = v474[12],
+            v499 = v479 - v494, v500 = v480 - v495, v501 = v481 - v496, v502 = v488 - v498,
+            v503 = v490 - v476, v504 = v492 - v477, v505 = v493 - v478, v506 = v474[13],
+            v507 = v474[14], v508 = v474[15], v509 = v487 - v506, v510 = v474[16], v511 = v474[17],
+            v512 = v474[18], v513 = v474[19], v514 = v474[20], v515 = v508 - v514,
+            v516 = v510 - v513, v517 = v474[21], v518 = v511 - v512, v519 = v474[22],
+            v520 = v474[23], v521 = v474[24], v522 = v474[25], v523 = v474[26], v524 = v474[27],
+            v525 = v474[28], v526 = v520 - v523, v527 = v521 - v522, v528 = v519 - v524,
+            v529 = v474[29], v530 = v474[30], v531 = v474[31], v532 = v474[32], v533 = v474[33],
+            v534 = v474[34], v535 = v474[35], v536 = v474[36], v537 = v530 - v533,
+            v538 = v529 - v534, v539 = v531 - v532, v540 = v474[37], v541 = v474[38],
+            v542 = v474[39], v543 = v474[40], v544 = v474[41], v545 = v536 - v544, v546 = v474[42],
+            v547 = v540 - v543, v548 = v541 - v542, v549 = v474[43], v550 = v474[44],
+            v551 = v474[45], v552 = v474[46], v553 = v474[47], v554 = v474[48], v555 = v549 - v554,
+            v556 = v550 - v553, v557 = v551 - v552,
+            v558 = v500 * v525 + (v499 * v546 + (v504 * v517 + (v505 * v486 + v503 * v507))),
+            v559 = v500 * (v483 * v537 + (v482 * v538 + v484 * v539)) + v499 * (v483 * v556 + (v482 * v555 + v484 * v557)),
+            v560 = v501 * v535 + v558,
+            v561 = v559 + v501 * (v483 * v547 + (v482 * v545 + v484 * v548)) + v505 * (v483 * v502 + (v482 * v509 + v484 * v497)),
+            v562 = v561 + v503 * (v483 * v516 + (v482 * v515 + v484 * v518)) + v504 * (v483 * v526 + (v482 * v528 + v484 * v527)),
+            v563 = v350 * (v315 * v24) * v562,
+            v564 = parameters[9] * (v475 * (v379 + v378) + v485 * (v211 * (v301 * v280) * v560)),
+            v565 = w[3] * (v563 + v564), v566 = p3 * v25, v567 = v280 * v280, v568 = v8 * v347,
+            v569 = parameters[6] * v302, v570 = v317 * v317, v571 = v337 * v398,
+            v572 = v318 * (2.0 * v337);
+        const double v573 = 0.5 * (v265 + v267);
+        const V v574 = v566 * v573, v575 = v567 * (v573 * v569), v576 = v272 * v573,
+            v577 = v317 * (v265 * v271 + v267 * v270) - v570 * (v314 * v576),
+            v578 = 0.932469514203152 * v574, v579 = 0.6612093864662645 * v574,
+            v580 = 0.2386191860831969 * v574,
+            v581 = v505 * (v580 * v497 + (v579 * v502 + (v578 * v509 - v575 * v486))),
+            v582 = v503 * (v580 * v518 + (v579 * v516 + (v578 * v515 - v575 * v507))),
+            v583 = v499 * (v580 * v557 + (v579 * v556 + (v578 * v555 - v575 * v546))),
+            v584 = v504 * (v580 * v527 + (v579 * v526 + (v578 * v528 - v575 * v517))),
+            v585 = v500 * (v580 * v539 + (v579 * v537 + (v578 * v538 - v575 * v525))),
+            v586 = v501 * (v580 * v548 + (v579 * v547 + (v578 * v545 - v575 * v535))),
+            v587 = (v576 * v568 + v577 * v572) * v373 + v350 * (v581 + v582 + v583 + v584 + v585 + v586),
+            v588 = w[3] * (v55 * v571 + v577 * v403 + v315 * v587),
+            v589 = (v478 - v493) * v486 + ((v494 - v479) * v546 + (v476 - v490) * v507),
+            v590 = (v496 - v481) * v535 + ((v495 - v480) * v525 + (v589 + (v477 - v492) * v517)),
+            v591 = parameters[9] * (v475 * (v381 + v380) + v485 * (v280 * (v54 * v301) * v590)),
+            v592 = w[3] * (v591 - v563);
+        const double v593 = 0.5 * (v266 + v268);
+        const V v594 = v272 * v593, v595 = v566 * v593, v596 = v567 * (v593 * v569),
+            v597 = 0.932469514203152 * v595, v598 = 0.6612093864662645 * v595,
+            v599 = 0.2386191860831969 * v595,
+            v600 = v317 * (v266 * v271 + v268 * v270) - v570 * (v314 * v594),
+            v601 = v505 * (v599 * v497 + (v598 * v502 + (v597 * v509 - v596 * v486))),
+            v602 = v503 * (v599 * v518 + (v598 * v516 + (v597 * v515 - v596 * v507))),
+            v603 = v499 * (v599 * v557 + (v598 * v556 + (v597 * v555 - v596 * v546))),
+            v604 = v504 * (v599 * v527 + (v598 * v526 + (v597 * v528 - v596 * v517))),
+            v605 = v500 * (v599 * v539 + (v598 * v537 + (v597 * v538 - v596 * v525))),
+            v606 = v501 * (v599 * v548 + (v598 * v547 + (v597 * v545 - v596 * v535))),
+            v607 = (v594 * v568 + v600 * v572) * v373 + v350 * (v601 + v602 + v603 + v604 + v605 + v606),
+            v608 = w[3] * (v54 * v571 + v600 * v403 + v315 * v607), v609 = v264 * v3,
+            v610 = v485 * (v609 * (v280 * v62) * v560) - v609 * (v315 * v315 * v374),
+            v611 = w[3] * v610, v612 = v17 * v275, v613 = 0.932469514203152 * v612,
+            v614 = 0.6612093864662645 * v612, v615 = 0.2386191860831969 * v612,
+            v616 = v499 * (v615 * v557 + (v613 * v555 + v614 * v556)) + v505 * (v615 * v497 + (v613 * v509 + v614 * v502)),
+            v617 = v504 * (v615 * v527 + (v613 * v528 + v614 * v526)) + (v503 * (v615 * v518 + (v613 * v515 + v614 * v516)) + v616),
+            v618 = v501 * (v615 * v548 + (v613 * v545 + v614 * v547)) + (v500 * (v615 * v539 + (v613 * v538 + v614 * v537)) + v617),
+            v619 = w[3] * v315 * v350 * v618;
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
             (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
-            R_lanes[4 + i] += D1 * v745;
-            K_lanes[(4 + i) * (4 + modes) + 0] += D1 * v1145;
-            K_lanes[0 * (4 + modes) + 4 + i] += N * v877 + D * v881 + N2 * v495 + N3 * v496;
-            K_lanes[(4 + i) * (4 + modes) + 1] += D1 * v1234;
-            K_lanes[1 * (4 + modes) + 4 + i] += N * v875;
-            K_lanes[(4 + i) * (4 + modes) + 2] += D1 * v1261;
-            K_lanes[2 * (4 + modes) + 4 + i] += N * v878 + D * v882 + N2 * v497 + N3 * v498;
-            K_lanes[(4 + i) * (4 + modes) + 3] += D1 * v1342;
-            K_lanes[3 * (4 + modes) + 4 + i] += N * v876;
-            const V r0 = softehl_splat(0.0);
-            const V r1 = softehl_splat(0.0);
-            const V r2 = D1 * v1352;
-            const V r3 = D1 * v1400;
-            const V r4 = D1 * v697;
-            const V r5 = softehl_splat(0.0);
-            const V r6 = D1 * v698;
-            const V r7 = softehl_splat(0.0);
+            R_lanes[4 + i] += D1 * v404; K_lanes[(4 + i) * (4 + modes) + 0] += D1 * v565;
+            K_lanes[0 * (4 + modes) + 4 + i] += N * v440 + D * v442 + N2 * v244 + N3 * v245;
+            K_lanes[(4 + i) * (4 + modes) + 1] += D1 * v588;
+            K_lanes[1 * (4 + modes) + 4 + i] += N * v438;
+            K_lanes[(4 + i) * (4 + modes) + 2] += D1 * v592;
+            K_lanes[2 * (4 + modes) + 4 + i] += N * v441 + D * v443 + N2 * v246 + N3 * v247;
+            K_lanes[(4 + i) * (4 + modes) + 3] += D1 * v608;
+            K_lanes[3 * (4 + modes) + 4 + i] += N * v439;
+            const V r0 = softehl_splat(0.0), r1 = softehl_splat(0.0), r2 = D1 * v611,
+                r3 = D1 * v619, r4 = D1 * v382, r5 = softehl_splat(0.0), r6 = D1 * v383,
+                r7 = softehl_splat(0.0);
             for (ptrdiff_t j = 0; j < modes; ++j)
                 K_lanes[(4 + i) * (4 + modes) + 4 + j] += r0 * B[8 * j] + r1 * B[8 * j + 1] + r2 * B[8 * j + 2] + r3 * B[8 * j + 3] + r4 * B[8 * j + 4] + r5 * B[8 * j + 5] + r6 * B[8 * j + 6] + r7 * B[8 * j + 7];
         }
     }
-    const V v1401 = -s56;
-    const V v1402 = -s57;
-    const V v1403 = -s58;
-    const V v1404 = -s59;
-    const V v1405 = -s60;
-    const V v1406 = -s61;
-    const V v1407 = -s62;
-    const V v1408 = -s63;
-    const V v1409 = -s66;
-    const V v1410 = -s68;
-    R_lanes[0] = s65;
-    R_lanes[1] = v1404;
-    R_lanes[2] = s64;
-    R_lanes[3] = v1403;
-    K_lanes[0 * (4 + modes) + 0] = v1409;
-    K_lanes[0 * (4 + modes) + 1] = s70;
-    K_lanes[0 * (4 + modes) + 2] = s67;
-    K_lanes[0 * (4 + modes) + 3] = s71;
-    K_lanes[1 * (4 + modes) + 0] = s56;
-    K_lanes[1 * (4 + modes) + 1] = v1405;
-    K_lanes[1 * (4 + modes) + 2] = v1401;
-    K_lanes[1 * (4 + modes) + 3] = v1406;
-    K_lanes[2 * (4 + modes) + 0] = v1410;
-    K_lanes[2 * (4 + modes) + 1] = s72;
-    K_lanes[2 * (4 + modes) + 2] = s69;
-    K_lanes[2 * (4 + modes) + 3] = s73;
-    K_lanes[3 * (4 + modes) + 0] = s57;
-    K_lanes[3 * (4 + modes) + 1] = v1407;
-    K_lanes[3 * (4 + modes) + 2] = v1402;
-    K_lanes[3 * (4 + modes) + 3] = v1408;
+    const V v620 = -s34, v621 = -s35, v622 = -s36, v623 = -s37, v624 = -s38, v625 = -s39,
+        v626 = -s40, v627 = -s41, v628 = -s44, v629 = -s46;
+    R_lanes[0] = s43; R_lanes[1] = v623; R_lanes[2] = s42; R_lanes[3] = v622;
+    K_lanes[0 * (4 + modes) + 0] = v628; K_lanes[0 * (4 + modes) + 1] = s48;
+    K_lanes[0 * (4 + modes) + 2] = s45; K_lanes[0 * (4 + modes) + 3] = s49;
+    K_lanes[1 * (4 + modes) + 0] = s34; K_lanes[1 * (4 + modes) + 1] = v624;
+    K_lanes[1 * (4 + modes) + 2] = v620; K_lanes[1 * (4 + modes) + 3] = v625;
+    K_lanes[2 * (4 + modes) + 0] = v629; K_lanes[2 * (4 + modes) + 1] = s50;
+    K_lanes[2 * (4 + modes) + 2] = s47; K_lanes[2 * (4 + modes) + 3] = s51;
+    K_lanes[3 * (4 + modes) + 0] = s35; K_lanes[3 * (4 + modes) + 1] = v626;
+    K_lanes[3 * (4 + modes) + 2] = v621; K_lanes[3 * (4 + modes) + 3] = v627;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
     softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
@@ -3121,55 +917,18 @@ static void softehl_film_conserving_carreau_tangent_group(
         softehl_spoil(failed, K, ((4 + modes) * (4 + modes)));
     }
 }
+SOFTEHL_BATCH(softehl_film_conserving_carreau_tangent, 4, (4 + modes), 2, 0, (4 + modes), ((4 + modes) * (4 + modes)))
 
-void softehl_film_conserving_carreau_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_conserving_carreau_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_carreau_tangent_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (4 + modes) * e, tangent + ((4 + modes) * (4 + modes)) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_carreau_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), tangent + ((4 + modes) * (4 + modes)) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    double K[SOFTEHL_LANES * ((4 + modes) * (4 + modes))];
-    softehl_film_conserving_carreau_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_film_conserving_carreau_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -3179,306 +938,83 @@ static void softehl_film_conserving_carreau_fields_group(
     softehl_gather(d_lanes, d, (4 + modes));
 #endif
     const double v1 = 1.0 - parameters[8];
-    const V v2 = X2 + d2;
-    const V v3 = X1 - parameters[0];
-    const V v4 = X3 - parameters[0];
-    const V v5 = d1 + v3;
-    const V v6 = d3 + v4;
-    const V v7 = d2 * parameters[9];
-    const V v8 = a1 + v7;
-    const V v9 = d0 * parameters[9];
-    const V v10 = a0 + v9;
-    const V v11 = v2 - d0;
-    const double v12 = 1.0 / parameters[7];
-    const double v13 = parameters[7] - 1.0;
-    const V v14 = X0 + d0;
-    const V v15 = v11 - X0;
-    const double v16 = 0.5 * v13;
-    const V v17 = 0.5 * v15;
-    const double v18 = 1.0 / parameters[6];
-    const double v19 = 6.0 * parameters[6];
-    const double v20 = v12 * v16;
-    const V v21 = parameters[6] * v17;
-    const V v22 = 1.0 / v17;
-    const V v23 = 1.0 / v21;
-    const V v24 = 0.5 * v23;
-    const V v25 = 0.5 * v22;
+    const V v2 = X2 + d2, v3 = d1 + (X1 - parameters[0]), v4 = d3 + (X3 - parameters[0]),
+        v5 = a1 + d2 * parameters[9], v6 = a0 + d0 * parameters[9], v7 = X0 + d0;
+    const double v8 = 0.5 * (parameters[7] - 1.0); const V v9 = 0.5 * (v2 - d0 - X0);
+    const double v10 = 1.0 / parameters[6], v11 = 6.0 * parameters[6],
+        v12 = 1.0 / parameters[7] * v8;
+    const V v13 = 0.5 * (1.0 / (parameters[6] * v9)), v14 = 0.5 * (1.0 / v9);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v26 = 0.5 * w[0];
-        const V v27 = p0 * parameters[3];
-        const V v28 = softehl_vexp(v27);
-        const V v29 = p1 * v25;
-        const double v30 = 0.5 + v26;
-        const double v31 = 0.5 - v26;
-        const V v32 = w[3] * v17;
-        const V v33 = v30 * v8;
-        const V v34 = parameters[1] - v33;
-        const V v35 = v30 * v2;
-        const V v36 = v30 * v6;
-        const V v37 = v31 * v10;
-        const V v38 = v34 - v37;
-        const V v39 = v31 * v14;
-        const V v40 = v35 + v39;
-        const V v41 = v31 * v5;
-        const V v42 = v41 + v36;
-        const V v43 = v42 * v29;
-        const V v44 = parameters[6] * v42;
-        const V v45 = parameters[2] * v28;
-        const V v46 = v45 * v38;
-        const V v47 = 1.0 / v44;
-        const V v48 = v47 * v46;
-        const V v49 = v18 * v43;
-        const V v50 = v48 * v48;
-        const V v51 = 1.0 + v50;
-        const V v52 = softehl_vlog(v51);
-        const V v53 = v16 * v52;
-        const V v54 = softehl_vexp(v53);
-        const V v55 = v1 * v54;
-        const V v56 = parameters[8] + v55;
-        const V v57 = v48 * v56;
-        const V v58 = 0.932469514203152 * v49;
-        const V v59 = 0.6612093864662645 * v49;
-        const V v60 = 0.2386191860831969 * v49;
-        const V v61 = v58 + v57;
-        const V v62 = v59 + v57;
-        const V v63 = v60 + v57;
-        const V v64 = v57 - v60;
-        const V v65 = v57 - v59;
-        const V v66 = v57 - v58;
-        V v67[7];
-        softehl_film_conserving_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), softehl_splat(v16), softehl_splat(v1), softehl_splat(v20), v48, v58, v59, v60, v57, v61, v62, v63, v64, v65, v66}, v67, &failed);
-        const V v68 = v67[0];
-        const V v69 = parameters[6] * v68;
-        const M v70 = softehl_lt(softehl_splat(0.0), v69);
-        const V v71 = softehl_blend(v70, v69, softehl_splat(0.0));
-        const V v72 = softehl_blend(v70, softehl_splat(0.0), v69);
-        const double v73 = 0.5 * w[1];
-        const double v74 = 0.5 * w[2];
-        const V v75 = p2 * parameters[3];
-        const V v76 = softehl_vexp(v75);
-        const V v77 = 1.0 - p6;
-        const V v78 = 1.0 - p4;
-        const double v79 = 0.5 - v73;
-        const double v80 = 0.5 + v73;
-        const V v81 = p3 * v24;
-        const V v82 = v77 * v72;
-        const double v83 = 0.5 - v74;
-        const double v84 = 0.5 + v74;
-        const V v85 = v78 * v71;
-        const V v86 = v82 + v85;
-        const V v87 = v79 * v5;
-        const V v88 = v83 * v5;
-        const V v89 = v80 * v6;
-        const V v90 = v87 + v89;
-        const V v91 = v84 * v6;
-        const V v92 = v88 + v91;
-        const V v93 = v90 + v92;
-        const V v94 = v86 - v43;
-        const V v95 = parameters[2] * v76;
-        const V v96 = 0.5 * v93;
-        const V v97 = v96 * v81;
-        const V v98 = parameters[6] * v96;
-        const V v99 = 1.0 / v98;
-        const V v100 = v95 * v38;
-        const V v101 = v99 * v100;
-        const V v102 = v101 * v101;
-        const V v103 = 1.0 + v102;
-        const V v104 = softehl_vlog(v103);
-        const V v105 = v16 * v104;
-        const V v106 = softehl_vexp(v105);
-        const V v107 = v1 * v106;
-        const V v108 = parameters[8] + v107;
-        const V v109 = v101 * v108;
-        const V v110 = 0.932469514203152 * v97;
-        const V v111 = 0.6612093864662645 * v97;
-        const V v112 = 0.2386191860831969 * v97;
-        const V v113 = v110 + v109;
-        const V v114 = v111 + v109;
-        const V v115 = v112 + v109;
-        const V v116 = v109 - v112;
-        const V v117 = v109 - v111;
-        const V v118 = v109 - v110;
-        V v119[7];
-        softehl_film_conserving_carreau_level_cell_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), v101, softehl_splat(v16), softehl_splat(v1), softehl_splat(v20), v110, v111, v112, v109, v113, v114, v115, v116, v117, v118}, v119, &failed);
-        const V v120 = v90 * v92;
-        const V v121 = 1.0 / v95;
-        const V v122 = v96 * v96;
-        const M v123 = softehl_lt(softehl_splat(0.0), v38);
-        const V v124 = 1.0 / v122;
-        const V v125 = v119[1];
-        const V v126 = v119[2];
-        const V v127 = v119[3];
-        const V v128 = v119[4];
-        const V v129 = v119[5];
-        const V v130 = v119[6];
-        const V v131 = v125 * v125;
-        const V v132 = 1.0 + v131;
-        const V v133 = v126 * v126;
-        const V v134 = 1.0 + v133;
-        const V v135 = v127 * v127;
-        const V v136 = 1.0 + v135;
-        const V v137 = v128 * v128;
-        const V v138 = 1.0 + v137;
-        const V v139 = v129 * v129;
-        const V v140 = 1.0 + v139;
-        const V v141 = v130 * v130;
-        const V v142 = 1.0 + v141;
-        const V v143 = parameters[6] * v121;
-        const V v144 = softehl_vlog(v132);
-        const V v145 = softehl_vlog(v134);
-        const V v146 = softehl_vlog(v136);
-        const V v147 = softehl_vlog(v138);
-        const V v148 = v122 * v143;
-        const V v149 = softehl_vlog(v140);
-        const V v150 = softehl_vlog(v142);
-        const V v151 = v120 * v124;
-        const V v152 = v151 * v148;
-        const V v153 = v20 * v145;
-        const V v154 = softehl_vexp(v153);
-        const V v155 = v20 * v146;
-        const V v156 = softehl_vexp(v155);
-        const V v157 = v20 * v144;
-        const V v158 = softehl_vexp(v157);
-        const V v159 = v20 * v150;
-        const V v160 = softehl_vexp(v159);
-        const V v161 = v20 * v147;
-        const V v162 = v20 * v149;
-        const V v163 = softehl_vexp(v161);
-        const V v164 = softehl_vexp(v162);
-        const V v165 = v1 * v154;
-        const V v166 = parameters[8] + v165;
-        const V v167 = v1 * v156;
-        const V v168 = parameters[8] + v167;
-        const V v169 = v1 * v158;
-        const V v170 = parameters[8] + v169;
-        const V v171 = v1 * v160;
-        const V v172 = parameters[8] + v171;
-        const V v173 = v1 * v163;
-        const V v174 = parameters[8] + v173;
-        const V v175 = v1 * v164;
-        const V v176 = parameters[8] + v175;
-        const V v177 = 1.0 / v166;
-        const V v178 = 1.0 / v168;
-        const V v179 = 1.0 / v170;
-        const V v180 = 1.0 / v172;
-        const V v181 = v130 * v180;
-        const V v182 = v125 * v179;
-        const V v183 = v181 - v182;
-        const V v184 = 1.0 / v174;
-        const V v185 = 1.0 / v176;
-        const V v186 = v129 * v185;
-        const V v187 = v126 * v177;
-        const V v188 = v186 - v187;
-        const V v189 = v128 * v184;
-        const V v190 = v127 * v178;
-        const V v191 = v189 - v190;
-        const V v192 = 0.1192694691878821 * v188;
-        const V v193 = 0.07987743308995329 * v183;
-        const V v194 = v192 + v193;
-        const V v195 = 0.05582662111236089 * v191;
-        const V v196 = v194 + v195;
-        const V v197 = v152 * v196;
-        const V v198 = softehl_blend(v123, v38, softehl_splat(0.0));
-        const V v199 = softehl_blend(v123, softehl_splat(0.0), v38);
-        const V v200 = v77 * v199;
-        const V v201 = v43 + v86;
-        const V v202 = v78 * v198;
-        const V v203 = v200 + v202;
-        const V v204 = 1.0 / v42;
-        const V v205 = v42 * v203;
-        const V v206 = v205 + v197;
-        const V v207 = v67[1];
-        const V v208 = v67[2];
-        const V v209 = v67[3];
-        const V v210 = v67[4];
-        const V v211 = v67[5];
-        const V v212 = v67[6];
-        const V v213 = v207 * v207;
-        const V v214 = 1.0 + v213;
-        const V v215 = v208 * v208;
-        const V v216 = 1.0 + v215;
-        const V v217 = v209 * v209;
-        const V v218 = 1.0 + v217;
-        const V v219 = v151 * v206;
-        const V v220 = v210 * v210;
-        const V v221 = 1.0 + v220;
-        const V v222 = v211 * v211;
-        const V v223 = 1.0 + v222;
-        const V v224 = v212 * v212;
-        const V v225 = 1.0 + v224;
-        const V v226 = softehl_vlog(v214);
-        const V v227 = softehl_vlog(v216);
-        const V v228 = softehl_vlog(v218);
-        const V v229 = softehl_vlog(v221);
-        const V v230 = softehl_vlog(v223);
-        const V v231 = 0.5 * v219;
-        const V v232 = softehl_vlog(v225);
-        const V v233 = v19 * v204;
-        const V v234 = v20 * v226;
-        const V v235 = softehl_vexp(v234);
-        const V v236 = v20 * v232;
-        const V v237 = softehl_vexp(v236);
-        const V v238 = v20 * v227;
-        const V v239 = softehl_vexp(v238);
-        const V v240 = v20 * v230;
-        const V v241 = softehl_vexp(v240);
-        const V v242 = v20 * v228;
-        const V v243 = v20 * v229;
-        const V v244 = softehl_vexp(v242);
-        const V v245 = softehl_vexp(v243);
-        const V v246 = v1 * v235;
-        const V v247 = parameters[8] + v246;
-        const V v248 = v1 * v237;
-        const V v249 = parameters[8] + v248;
-        const V v250 = v1 * v239;
-        const V v251 = parameters[8] + v250;
-        const V v252 = v1 * v241;
-        const V v253 = parameters[8] + v252;
-        const V v254 = v1 * v244;
-        const V v255 = parameters[8] + v254;
-        const V v256 = v1 * v245;
-        const V v257 = parameters[8] + v256;
-        const V v258 = 1.0 / v247;
-        const V v259 = 1.0 / v249;
-        const V v260 = v212 * v259;
-        const V v261 = v207 * v258;
-        const V v262 = v260 - v261;
-        const V v263 = 1.0 / v251;
-        const V v264 = 1.0 / v253;
-        const V v265 = 1.0 / v255;
-        const V v266 = 1.0 / v257;
-        const V v267 = v210 * v266;
-        const V v268 = v209 * v265;
-        const V v269 = v267 - v268;
-        const V v270 = v211 * v264;
-        const V v271 = v208 * v263;
-        const V v272 = v270 - v271;
-        const V v273 = 0.1192694691878821 * v272;
-        const V v274 = 0.07987743308995329 * v262;
-        const V v275 = v273 + v274;
-        const V v276 = 0.05582662111236089 * v269;
-        const V v277 = v275 + v276;
-        const V v278 = v233 * v277;
-        const V v279 = -v278;
-        softehl_store4(R + 14 * q + 0, (14 * points), v40, v32, v42, p0);
-        softehl_store4(R + 14 * q + 4, (14 * points), v94, v231, v201, v45);
-        softehl_store1(R + 14 * q + 8, (14 * points), v42);
-        softehl_store3(R + 14 * q + 11, (14 * points), p4, p6, v279);
+        const double v15 = 0.5 * w[0]; const V v16 = softehl_vexp(p0 * parameters[3]);
+        const double v17 = 0.5 + v15, v18 = 0.5 - v15;
+        const V v19 = w[3] * v9, v20 = parameters[1] - v17 * v5 - v18 * v6,
+            v21 = v17 * v2 + v18 * v7, v22 = v18 * v3 + v17 * v4, v23 = v22 * (p1 * v14),
+            v24 = parameters[2] * v16, v25 = 1.0 / (parameters[6] * v22) * (v24 * v20),
+            v26 = v10 * v23, v27 = softehl_vlog(1.0 + v25 * v25), v28 = softehl_vexp(v8 * v27),
+            v29 = v25 * (parameters[8] + v1 * v28), v30 = 0.932469514203152 * v26,
+            v31 = 0.6612093864662645 * v26, v32 = 0.2386191860831969 * v26, v33 = v30 + v29,
+            v34 = v31 + v29, v35 = v32 + v29, v36 = v29 - v32, v37 = v29 - v31, v38 = v29 - v30;
+        V v39[7];
+        softehl_film_conserving_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), softehl_splat(v8), softehl_splat(v1), softehl_splat(v12), v25, v30, v31, v32, v29, v33, v34, v35, v36, v37, v38}, v39, &failed);
+        const V v40 = v39[0], v41 = parameters[6] * v40;
+        const M v42 = softehl_lt(softehl_splat(0.0), v41);
+        const V v43 = softehl_blend(v42, v41, softehl_splat(0.0)),
+            v44 = softehl_blend(v42, softehl_splat(0.0), v41);
+        const double v45 = 0.5 * w[1], v46 = 0.5 * w[2];
+        const V v47 = softehl_vexp(p2 * parameters[3]), v48 = 1.0 - p6, v49 = 1.0 - p4,
+            v50 = v48 * v44 + v49 * v43, v51 = (0.5 - v45) * v3 + (0.5 + v45) * v4,
+            v52 = (0.5 - v46) * v3 + (0.5 + v46) * v4, v53 = v50 - v23, v54 = parameters[2] * v47,
+            v55 = 0.5 * (v51 + v52), v56 = v55 * (p3 * v13),
+            v57 = 1.0 / (parameters[6] * v55) * (v54 * v20), v58 = softehl_vlog(1.0 + v57 * v57),
+            v59 = softehl_vexp(v8 * v58), v60 = v57 * (parameters[8] + v1 * v59),
+            v61 = 0.932469514203152 * v56, v62 = 0.6612093864662645 * v56,
+            v63 = 0.2386191860831969 * v56, v64 = v61 + v60, v65 = v62 + v60, v66 = v63 + v60,
+            v67 = v60 - v63, v68 = v60 - v62, v69 = v60 - v61;
+        V v70[7];
+        softehl_film_conserving_carreau_level_cell_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), v57, softehl_splat(v8), softehl_splat(v1), softehl_splat(v12), v61, v62, v63, v60, v64, v65, v66, v67, v68, v69}, v70, &failed);
+        const V v71 = v55 * v55; const M v72 = softehl_lt(softehl_splat(0.0), v20);
+        const V v73 = v70[1], v74 = v70[2], v75 = v70[3], v76 = v70[4], v77 = v70[5], v78 = v70[6],
+            v79 = softehl_vlog(1.0 + v73 * v73), v80 = softehl_vlog(1.0 + v74 * v74),
+            v81 = softehl_vlog(1.0 + v75 * v75), v82 = softehl_vlog(1.0 + v76 * v76),
+            v83 = softehl_vlog(1.0 + v77 * v77), v84 = softehl_vlog(1.0 + v78 * v78),
+            v85 = v51 * v52 * (1.0 / v71), v86 = softehl_vexp(v12 * v80),
+            v87 = softehl_vexp(v12 * v81), v88 = softehl_vexp(v12 * v79),
+            v89 = softehl_vexp(v12 * v84), v90 = softehl_vexp(v12 * v82),
+            v91 = softehl_vexp(v12 * v83),
+            v92 = v78 * (1.0 / (parameters[8] + v1 * v89)) - v73 * (1.0 / (parameters[8] + v1 * v88)),
+            v93 = v77 * (1.0 / (parameters[8] + v1 * v91)) - v74 * (1.0 / (parameters[8] + v1 * v86)),
+            v94 = v76 * (1.0 / (parameters[8] + v1 * v90)) - v75 * (1.0 / (parameters[8] + v1 * v87)),
+            v95 = 0.1192694691878821 * v93 + 0.07987743308995329 * v92 + 0.05582662111236089 * v94,
+            v96 = softehl_blend(v72, v20, softehl_splat(0.0)),
+            v97 = softehl_blend(v72, softehl_splat(0.0), v20), v98 = v23 + v50,
+            v99 = v22 * (v48 * v97 + v49 * v96) + v85 * (v71 * (parameters[6] * (1.0 / v54))) * v95,
+            v100 = v39[1], v101 = v39[2], v102 = v39[3], v103 = v39[4], v104 = v39[5],
+            v105 = v39[6], v106 = softehl_vlog(1.0 + v100 * v100),
+            v107 = softehl_vlog(1.0 + v101 * v101), v108 = softehl_vlog(1.0 + v102 * v102),
+            v109 = softehl_vlog(1.0 + v103 * v103), v110 = softehl_vlog(1.0 + v104 * v104),
+            v111 = 0.5 * (v85 * v99), v112 = softehl_vlog(1.0 + v105 * v105),
+            v113 = softehl_vexp(v12 * v106), v114 = softehl_vexp(v12 * v112),
+            v115 = softehl_vexp(v12 * v107), v116 = softehl_vexp(v12 * v110),
+            v117 = softehl_vexp(v12 * v108), v118 = softehl_vexp(v12 * v109),
+            v119 = v105 * (1.0 / (parameters[8] + v1 * v114)) - v100 * (1.0 / (parameters[8] + v1 * v113)),
+            v120 = v103 * (1.0 / (parameters[8] + v1 * v118)) - v102 * (1.0 / (parameters[8] + v1 * v117)),
+            v121 = v104 * (1.0 / (parameters[8] + v1 * v116)) - v101 * (1.0 / (parameters[8] + v1 * v115)),
+            v122 = 0.1192694691878821 * v121 + 0.07987743308995329 * v119 + 0.05582662111236089 * v120,
+            v123 = -(v11 * (1.0 / v22) * v122);
+        softehl_store4(R + 14 * q + 0, (14 * points), v21, v19, v22, p0);
+        softehl_store4(R + 14 * q + 4, (14 * points), v53, v111, v98, v24);
+        softehl_store1(R + 14 * q + 8, (14 * points), v22);
+        softehl_store3(R + 14 * q + 11, (14 * points), p4, p6, v123);
     }
     for (ptrdiff_t q = 0; q < points; ++q) {
         softehl_store2(R + 14 * q + 9, (14 * points), softehl_splat(0.0), softehl_splat(0.0));
@@ -3487,32 +1023,803 @@ static void softehl_film_conserving_carreau_fields_group(
         softehl_spoil(failed, R, (14 * points));
     }
 }
+SOFTEHL_BATCH(softehl_film_conserving_carreau_fields, 4, (4 + modes), 2, 0, (14 * points), 0)
 
-void softehl_film_conserving_carreau_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_conserving_carreau_pseudo_load)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_carreau_fields_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (14 * points) * e, 0);
+    SOFTEHL_IDLE;
+    M failed = softehl_mask(0);
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    V a0, a1;
+    softehl_load2(a + 0, 2, &a0, &a1);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15;
+    softehl_load4(t + 0, 16, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 16, &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, 16, &t8, &t9, &t10, &t11);
+    softehl_load4(t + 12, 16, &t12, &t13, &t14, &t15);
 #if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_carreau_fields_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (14 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * (14 * points)];
-    softehl_film_conserving_carreau_fields(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (14 * points) * n; ++i) values[i] = R[i];
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
 #endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const double v1 = 1.0 - parameters[8], v2 = 6.283185307179586 * parameters[4];
+    const V v3 = d1 + (X1 - parameters[0]), v4 = d3 + (X3 - parameters[0]), v5 = parameters[2] * t9,
+        v6 = a1 + d2 * parameters[9], v7 = a0 + d0 * parameters[9], v8 = 6.283185307179586 * t10,
+        v9 = t4 + d0 * t15, v10 = t5 + d2 * t15, v11 = 0.5 * (t2 - t0),
+        v12 = 0.5 * (X2 + d2 - X0 - d0), v13 = 0.5 * (v4 - v3), v14 = t1 - t6, v15 = t3 - t6;
+    const double v16 = 1.0 / parameters[7], v17 = 0.5 * parameters[6], v18 = 1.0 / parameters[6];
+    const V v19 = 1.0 / v12; const double v20 = 0.5 * (parameters[7] - 1.0);
+    const V v21 = 1.0 / (parameters[6] * v12), v22 = 0.5 * (v15 - v14), v23 = v13 * v13 + v12 * v12,
+        v24 = 0.5 * t12;
+    const double v25 = v16 * v20;
+    const V v26 = softehl_vsqrt(v23), v27 = v18 * t12, v28 = 0.5 * t13, v29 = v19 * v19 * v11,
+        v30 = v21 * (parameters[6] * v11 + v12 * t12), v31 = v16 * (v28 - v25 * t13),
+        v32 = parameters[5] * v26, v33 = softehl_vsqrt(1.0 / v23),
+        v34 = v26 * t11 + 2.0 * (v13 * v22 + v12 * v11) * (v33 * (0.5 * parameters[5]));
+    V s35 = {0}, s36 = {0}, s37 = {0}, s38 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 4 * q; (void)w;
+        const double *restrict B = basis + 8 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
+        const double v39 = 0.5 * w[0]; const V v40 = p1 * v19;
+        const double v41 = 0.5 + v39, v42 = 0.5 - v39;
+        const V v43 = softehl_vexp(p0 * parameters[3]), v44 = parameters[1] - v41 * v6 - v42 * v7,
+            v45 = v42 * v3 + v41 * v4, v46 = parameters[0] + v45, v47 = v42 * v14 + v41 * v15,
+            v48 = 0.5 * v45, v49 = v48 * v40, v50 = 1.0 / (parameters[6] * v45),
+            v51 = parameters[2] * v43, v52 = v50 * (v51 * v44), v53 = v46 * v2,
+            v54 = v2 * (t6 + v47) + v46 * v8, v55 = v18 * v49, v56 = softehl_vlog(1.0 + v52 * v52),
+            v57 = softehl_vexp(v20 * v56), v58 = v52 * (parameters[8] + v1 * v57),
+            v59 = 0.932469514203152 * v55, v60 = 0.6612093864662645 * v55,
+            v61 = 0.2386191860831969 * v55, v62 = w[3] * (p0 * (v53 * v11 + v12 * v54));
+        s35 += v41 * v62; s36 += v42 * v62;
+        const V v63 = v58 + v59, v64 = v58 + v60, v65 = v58 + v61, v66 = v58 - v61, v67 = v58 - v60,
+            v68 = v58 - v59;
+        V v69[7];
+        softehl_film_conserving_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), softehl_splat(v20), softehl_splat(v1), softehl_splat(v25), v52, v59, v60, v61, v58, v63, v64, v65, v66, v67, v68}, v69, &failed);
+        const V v70 = v69[1], v71 = v69[2], v72 = v69[3], v73 = v69[4], v74 = v69[5], v75 = v69[6],
+            v76 = v70 * v70, v77 = v71 * v71, v78 = v72 * v72, v79 = v73 * v73, v80 = v74 * v74,
+            v81 = v75 * v75, v82 = 1.0 + v76, v83 = 1.0 + v77, v84 = 1.0 + v78, v85 = 1.0 + v79,
+            v86 = 1.0 + v80, v87 = 1.0 + v81, v88 = softehl_vlog(v82), v89 = softehl_vlog(v83),
+            v90 = softehl_vlog(v84), v91 = softehl_vlog(v85), v92 = softehl_vlog(v86),
+            v93 = softehl_vlog(v87), v94 = softehl_vexp(v25 * v88), v95 = softehl_vexp(v25 * v93),
+            v96 = softehl_vexp(v25 * v89), v97 = softehl_vexp(v25 * v92),
+            v98 = softehl_vexp(v25 * v90), v99 = softehl_vexp(v25 * v91), v100 = 2.0 * v73,
+            v101 = 2.0 * v72, v102 = 2.0 * v74, v103 = 2.0 * v71, v104 = 2.0 * v75,
+            v105 = 2.0 * v70, v106 = v1 * v94, v107 = v1 * v95, v108 = v1 * v96, v109 = v1 * v97,
+            v110 = v1 * v98, v111 = v1 * v99, v112 = v25 * (1.0 / v85), v113 = v25 * (1.0 / v84),
+            v114 = v25 * (1.0 / v86), v115 = v25 * (1.0 / v83), v116 = parameters[8] + v106,
+            v117 = parameters[8] + v107, v118 = parameters[8] + v108, v119 = parameters[8] + v109,
+            v120 = parameters[8] + v110, v121 = parameters[8] + v111, v122 = 1.0 / v116,
+            v123 = 1.0 / v117, v124 = 1.0 / v118, v125 = 1.0 / (v116 * v116), v126 = 1.0 / v119,
+            v127 = 1.0 / (v117 * v117), v128 = 1.0 / (v118 * v118), v129 = 1.0 / v120,
+            v130 = 1.0 / v121, v131 = 1.0 / (v119 * v119), v132 = 1.0 / (v120 * v120),
+            v133 = 1.0 / (v121 * v121), v134 = v25 * (1.0 / v87), v135 = v25 * (1.0 / v82),
+            v136 = v122 * v122, v137 = v70 * v122, v138 = v123 * v123, v139 = v75 * v123,
+            v140 = v136 * (0.08566224618958518 * v70), v141 = v124 * v124, v142 = v71 * v124,
+            v143 = v138 * (0.08566224618958518 * v75), v144 = v141 * (0.1803807865240693 * v71),
+            v145 = v129 * v129, v146 = v126 * v126, v147 = v74 * v126, v148 = v72 * v129,
+            v149 = v106 * v140, v150 = v146 * (0.1803807865240693 * v74), v151 = v107 * v143,
+            v152 = v145 * (0.23395696728634552 * v72), v153 = v108 * v144,
+            v154 = 0.08566224618958518 * v122 - v105 * v135 * v149,
+            v155 = 0.08566224618958518 * v123 - v104 * v134 * v151, v156 = v109 * v150,
+            v157 = 0.1803807865240693 * v124 - v103 * v115 * v153, v158 = v110 * v152,
+            v159 = v130 * v130, v160 = v73 * v130,
+            v161 = 0.1803807865240693 * v126 - v102 * v114 * v156,
+            v162 = v159 * (0.23395696728634552 * v73),
+            v163 = 0.23395696728634552 * v129 - v101 * v113 * v158, v164 = 1.0 + v76 * v125,
+            v165 = 1.0 + v77 * v128, v166 = softehl_vlog(v164), v167 = softehl_vlog(v165),
+            v168 = 1.0 + v78 * v132, v169 = v111 * v162, v170 = softehl_vlog(v168),
+            v171 = 1.0 + v79 * v133, v172 = 1.0 + v80 * v131, v173 = softehl_vlog(v171),
+            v174 = softehl_vlog(v172), v175 = 1.0 + v81 * v127,
+            v176 = 0.23395696728634552 * v130 - v100 * v112 * v169, v177 = softehl_vlog(v175),
+            v178 = softehl_vexp(v20 * v166), v179 = softehl_vexp(v20 * v167),
+            v180 = softehl_vexp(v20 * v170), v181 = softehl_vexp(v20 * v173),
+            v182 = softehl_vexp(v20 * v174), v183 = softehl_vexp(v20 * v177), v184 = v1 * v180,
+            v185 = v1 * v182, v186 = v1 * v183, v187 = parameters[8] + v184, v188 = v184 * v148,
+            v189 = v188 * (v20 * (1.0 / v168)), v190 = parameters[8] + v185, v191 = v185 * v147,
+            v192 = v191 * (v20 * (1.0 / v172)), v193 = parameters[8] + v186, v194 = v186 * v139,
+            v195 = v194 * (v20 * (1.0 / v175)), v196 = v1 * v178, v197 = parameters[8] + v196,
+            v198 = v196 * v137, v199 = v198 * (v20 * (1.0 / v164)), v200 = v1 * v179,
+            v201 = v1 * v181, v202 = parameters[8] + v200, v203 = v200 * v142,
+            v204 = v203 * (v20 * (1.0 / v165)), v205 = parameters[8] + v201, v206 = v201 * v160,
+            v207 = v206 * (v20 * (1.0 / v171)),
+            v208 = v70 * v136 * v197 + v125 * (v125 * (2.0 * v76 * v116)) * v199,
+            v209 = v106 * v208, v210 = v122 * v197 + v105 * (v125 * v199 - v135 * v209),
+            v211 = v71 * v141 * v202 + v128 * (v128 * (2.0 * v77 * v118)) * v204,
+            v212 = v108 * v211, v213 = v124 * v202 + v103 * (v128 * v204 - v115 * v212),
+            v214 = v72 * v145 * v187 + v132 * (v132 * (2.0 * v78 * v120)) * v189,
+            v215 = v110 * v214, v216 = v129 * v187 + v101 * (v132 * v189 - v113 * v215),
+            v217 = v73 * v159 * v205 + v133 * (v133 * (2.0 * v79 * v121)) * v207,
+            v218 = v111 * v217, v219 = v130 * v205 + v100 * (v133 * v207 - v112 * v218),
+            v220 = v74 * v146 * v190 + v131 * (v131 * (2.0 * v80 * v119)) * v192,
+            v221 = v109 * v220, v222 = v126 * v190 + v102 * (v131 * v192 - v114 * v221),
+            v223 = v75 * v138 * v193 + v127 * (v127 * (2.0 * v81 * v117)) * v195,
+            v224 = v107 * v223, v225 = v123 * v193 + v104 * (v127 * v195 - v134 * v224);
+        V v226[49];
+        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v154, v157, v163, v176, v161, v155, softehl_splat((-1.0)), v210, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v213, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v216, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v219, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v222, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v225}, v226, &failed);
+        const V v227 = v69[0], v228 = v48 * (p1 * v29), v229 = 0.5 * v40 * v47, v230 = 1.0 - p6,
+            v231 = 1.0 - p4, v232 = parameters[6] * v227;
+        const M v233 = softehl_lt(softehl_splat(0.0), v232);
+        const V v234 = t7 - v41 * v10 - v42 * v9,
+            v235 = v51 * v234 + v44 * (v43 * (t8 + p0 * v5)) - v52 * (parameters[6] * v47 + v45 * t12),
+            v236 = v92 * v156 + (v91 * v169 + (v90 * v158 + (v89 * v153 + v88 * v149))),
+            v237 = v226[0], v238 = v226[1], v239 = v226[2], v240 = v226[3], v241 = v226[4],
+            v242 = v226[5], v243 = v226[6],
+            v244 = v88 * v209 * v238 + (v92 * v221 * v242 + v237 * (v93 * v151 + v236)),
+            v245 = 0.932469514203152 * (v238 - v243) + 0.6612093864662645 * (v239 - v242),
+            v246 = v173 * v206 * v241 + (v170 * v188 * v240 + (v166 * v198 * v238 + v167 * v203 * v239)),
+            v247 = v144 + (v150 + (v152 + (v162 - v99 * v162) - v98 * v152) - v97 * v150),
+            v248 = v91 * v218 * v241 + (v90 * v215 * v240 + (v89 * v212 * v239 + v244)),
+            v249 = v18 * (v229 - v228 - v49 * v27) * (v245 + 0.2386191860831969 * (v240 - v241)),
+            v250 = v238 * (v208 + (v178 * v137 - v137) - v94 * v208) + v239 * (v211 + (v179 * v142 - v142 - v96 * v211)),
+            v251 = v50 * v235 * v237 + v249 - v28 * (v177 * v194 * v243 + (v174 * v191 * v242 + v246)),
+            v252 = v237 * (v143 + (v140 + (v247 - v96 * v144 - v94 * v140)) - v95 * v143),
+            v253 = v250 + v240 * (v214 + (v180 * v148 - v148) - v98 * v214) + v252 + v242 * (v220 + (v182 * v147 - v147 - v97 * v220)),
+            v254 = v253 + v241 * (v217 + (v181 * v160 - v160) - v99 * v217) + v243 * (v223 + (v183 * v139 - v139 - v95 * v223)),
+            v255 = parameters[6] * (v251 + v31 * (v93 * v224 * v243 + v248) + t14 * v254),
+            v256 = v227 * t12 + v255;
+        V v257 = softehl_splat(0.0), v258 = softehl_splat(0.0), v259 = softehl_splat(0.0),
+            v260 = softehl_splat(0.0);
+        const M m261 = v233;
+        if (softehl_any(m261)) {
+            const V v262 = v231 * v256; v257 = softehl_blend(m261, softehl_splat(0.0), v257);
+            v258 = softehl_blend(m261, v262, v258); v259 = softehl_blend(m261, v232, v259);
+            v260 = softehl_blend(m261, softehl_splat(0.0), v260);
+        }
+        const M m263 = ~v233;
+        if (softehl_any(m263)) {
+            const V v264 = v230 * v256; v257 = softehl_blend(m263, v264, v257);
+            v258 = softehl_blend(m263, softehl_splat(0.0), v258);
+            v259 = softehl_blend(m263, softehl_splat(0.0), v259);
+            v260 = softehl_blend(m263, v232, v260);
+        }
+        const double v265 = 0.5 * w[1], v266 = 0.5 * w[2];
+        const V v267 = 0.5 * p3, v268 = softehl_vexp(p2 * parameters[3]);
+        const double v269 = 0.5 - v265, v270 = 0.5 + v265, v271 = 0.5 - v266, v272 = 0.5 + v266;
+        const V v273 = v269 * v3 + v270 * v4, v274 = v271 * v3 + v272 * v4,
+            v275 = v231 * v259 + (v230 * v260 - v49), v276 = v273 + v274, v277 = 0.5 * v276,
+            v278 = parameters[2] * v268, v279 = v267 * v277, v280 = 1.0 / (parameters[6] * v277),
+            v281 = v53 * (p0 * v22 - v34 * v275 - v32 * (v258 + (v228 - v229 + v257))),
+            v282 = v280 * (v278 * v44), v283 = v21 * v279, v284 = softehl_vlog(1.0 + v282 * v282),
+            v285 = w[3] * (v54 * (p0 * v13 - v32 * v275) + v281), v286 = softehl_vexp(v20 * v284),
+            v287 = v282 * (parameters[8] + v1 * v286), v288 = 0.932469514203152 * v283,
+            v289 = 0.6612093864662645 * v283, v290 = 0.2386191860831969 * v283, v291 = v41 * v285;
+        s37 += v291; const V v292 = v42 * v285; s38 += v292;
+        const V v293 = v287 + v288, v294 = v287 + v289, v295 = v287 + v290, v296 = v287 - v290,
+            v297 = v287 - v289, v298 = v287 - v288;
+        V v299[7];
+        softehl_film_conserving_carreau_level_cell_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), v282, softehl_splat(v20), softehl_splat(v1), softehl_splat(v25), v288, v289, v290, v287, v293, v294, v295, v296, v297, v298}, v299, &failed);
+        const V v300 = v299[1], v301 = v299[2], v302 = v299[3], v303 = v299[4], v304 = v299[5],
+            v305 = v299[6], v306 = v300 * v300, v307 = 2.0 * v300, v308 = v301 * v301,
+            v309 = 2.0 * v301, v310 = v302 * v302, v311 = 2.0 * v302, v312 = 1.0 + v306,
+            v313 = 1.0 + v308, v314 = 1.0 + v310, v315 = v305 * v305, v316 = 2.0 * v305,
+            v317 = v303 * v303, v318 = 2.0 * v303, v319 = 1.0 + v315, v320 = 1.0 + v317,
+            v321 = v304 * v304, v322 = 2.0 * v304, v323 = softehl_vlog(v312),
+            v324 = softehl_vlog(v313), v325 = softehl_vlog(v314), v326 = 1.0 + v321,
+            v327 = softehl_vlog(v319), v328 = softehl_vlog(v320), v329 = softehl_vlog(v326),
+            v330 = 1.0 / v320, v331 = 1.0 / v314, v332 = 1.0 / v326, v333 = 1.0 / v313,
+            v334 = 1.0 / v319, v335 = 1.0 / v312, v336 = softehl_vexp(v25 * v324),
+            v337 = softehl_vexp(v25 * v325), v338 = softehl_vexp(v25 * v323),
+            v339 = softehl_vexp(v25 * v327), v340 = softehl_vexp(v25 * v328),
+            v341 = softehl_vexp(v25 * v329), v342 = v25 * v330, v343 = v25 * v331,
+            v344 = v25 * v332, v345 = v25 * v333, v346 = v25 * v334, v347 = v25 * v335,
+            v348 = v1 * v336, v349 = v1 * v337, v350 = v1 * v338, v351 = v1 * v339,
+            v352 = v1 * v340, v353 = v1 * v341, v354 = parameters[8] + v348,
+            v355 = parameters[8] + v349, v356 = parameters[8] + v350, v357 = parameters[8] + v351,
+            v358 = parameters[8] + v352, v359 = parameters[8] + v353, v360 = 1.0 / v354,
+            v361 = 1.0 / v355, v362 = 1.0 / v356, v363 = 1.0 / v357, v364 = 1.0 / (v354 * v354),
+            v365 = 1.0 / v358, v366 = 1.0 / (v355 * v355), v367 = 1.0 / (v356 * v356),
+            v368 = 1.0 / v359, v369 = 1.0 / (v357 * v357), v370 = 1.0 / (v358 * v358),
+            v371 = 1.0 / (v359 * v359), v372 = v360 * v360, v373 = 0.1803807865240693 * v301 * v372,
+            v374 = v361 * v361, v375 = v301 * v360, v376 = v302 * v361, v377 = v362 * v362,
+            v378 = v300 * v362, v379 = 0.23395696728634552 * v302 * v374,
+            v380 = 0.08566224618958518 * v300 * v377, v381 = v363 * v363, v382 = v305 * v363,
+            v383 = 0.08566224618958518 * v305 * v381, v384 = v365 * v365, v385 = v303 * v365,
+            v386 = 0.23395696728634552 * v303 * v384, v387 = v348 * v373, v388 = v349 * v379,
+            v389 = v350 * v380, v390 = v368 * v368, v391 = v304 * v368, v392 = v351 * v383,
+            v393 = 0.1803807865240693 * v304 * v390, v394 = v352 * v386, v395 = 1.0 + v306 * v367,
+            v396 = 1.0 + v308 * v364, v397 = softehl_vlog(v395), v398 = v353 * v393,
+            v399 = softehl_vlog(v396), v400 = 1.0 + v310 * v366,
+            v401 = 0.08566224618958518 * v363 - v316 * (v334 * (v25 * v392)),
+            v402 = 0.1803807865240693 * v360 - v309 * (v333 * (v25 * v387)),
+            v403 = 0.23395696728634552 * v361 - v311 * (v331 * (v25 * v388)),
+            v404 = softehl_vlog(v400),
+            v405 = 0.23395696728634552 * v365 - v318 * (v330 * (v25 * v394)),
+            v406 = 0.08566224618958518 * v362 - v307 * (v335 * (v25 * v389)),
+            v407 = 1.0 + v317 * v370,
+            v408 = 0.1803807865240693 * v368 - v322 * (v332 * (v25 * v398)),
+            v409 = softehl_vlog(v407), v410 = 1.0 + v321 * v371, v411 = 1.0 + v315 * v369,
+            v412 = softehl_vlog(v410), v413 = softehl_vlog(v411), v414 = softehl_vexp(v20 * v397),
+            v415 = softehl_vexp(v20 * v399), v416 = softehl_vexp(v20 * v404),
+            v417 = softehl_vexp(v20 * v409), v418 = softehl_vexp(v20 * v412),
+            v419 = softehl_vexp(v20 * v413), v420 = v1 * v414, v421 = v1 * v415, v422 = v1 * v416,
+            v423 = v1 * v417, v424 = v1 * v418, v425 = v1 * v419, v426 = parameters[8] + v420,
+            v427 = v378 * v420, v428 = v20 * v427 * (1.0 / v395), v429 = parameters[8] + v421,
+            v430 = v375 * v421, v431 = v20 * v430 * (1.0 / v396), v432 = parameters[8] + v422,
+            v433 = v376 * v422, v434 = v20 * v433 * (1.0 / v400), v435 = parameters[8] + v423,
+            v436 = v385 * v423, v437 = v20 * v436 * (1.0 / v407), v438 = parameters[8] + v424,
+            v439 = v391 * v424, v440 = v20 * v439 * (1.0 / v410), v441 = parameters[8] + v425,
+            v442 = v382 * v425, v443 = v20 * v442 * (1.0 / v411),
+            v444 = v367 * (v367 * (2.0 * v306 * v356)) * v428 + v300 * v377 * v426,
+            v445 = v350 * v444, v446 = v362 * v426 + v307 * (v367 * v428 - v347 * v445),
+            v447 = v364 * (v364 * (2.0 * v308 * v354)) * v431 + v301 * v372 * v429,
+            v448 = v348 * v447, v449 = v360 * v429 + v309 * (v364 * v431 - v345 * v448),
+            v450 = v366 * (v366 * (2.0 * v310 * v355)) * v434 + v302 * v374 * v432,
+            v451 = v349 * v450, v452 = v361 * v432 + v311 * (v366 * v434 - v343 * v451),
+            v453 = v370 * (v370 * (2.0 * v317 * v358)) * v437 + v303 * v384 * v435,
+            v454 = v352 * v453, v455 = v365 * v435 + v318 * (v370 * v437 - v342 * v454),
+            v456 = v371 * (v371 * (2.0 * v321 * v359)) * v440 + v304 * v390 * v438,
+            v457 = v353 * v456, v458 = v368 * v438 + v322 * (v371 * v440 - v344 * v457),
+            v459 = v369 * (v369 * (2.0 * v315 * v357)) * v443 + v305 * v381 * v441,
+            v460 = v351 * v459, v461 = v363 * v441 + v316 * (v369 * v443 - v346 * v460);
+        V v462[49];
+        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v406, v402, v403, v405, v408, v401, softehl_splat((-1.0)), v446, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v449, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v452, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v455, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v458, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v461}, v462, &failed);
+        const V v463 = v277 * v277, v464 = 1.0 / v463, v465 = v273 * v274 * v464,
+            v466 = v269 * v14 + v270 * v15, v467 = v271 * v14 + v272 * v15,
+            v468 = 0.5 * (v466 + v467), v469 = v276 * v468,
+            v470 = v464 * (v274 * v466 + v273 * v467 - v465 * v469),
+            v471 = 0.1192694691878821 * v301, v472 = 0.05582662111236089 * v302,
+            v473 = 0.07987743308995329 * v300, v474 = 0.07987743308995329 * v305,
+            v475 = 0.05582662111236089 * v303, v476 = 0.1192694691878821 * v304, v477 = v397 * v427,
+            v478 = v399 * v430, v479 = v404 * v433, v480 = v409 * v436, v481 = v412 * v439,
+            v482 = v413 * v442, v483 = v268 * (t8 + p2 * v5), v484 = 1.0 / v278,
+            v485 = v21 * (v267 * v468 - v279 * v30), v486 = v465 * v465,
+            v487 = v44 * v483 + (v278 * v234 - v282 * (parameters[6] * v468 + v277 * t12)),
+            v488 = v280 * v487, v489 = v323 * v445, v490 = v324 * v448,
+            v491 = 0.932469514203152 * v485, v492 = 0.6612093864662645 * v485,
+            v493 = 0.2386191860831969 * v485, v494 = v325 * v451, v495 = v328 * v454,
+            v496 = v329 * v457,
+            v497 = v329 * v398 + (v328 * v394 + (v325 * v388 + (v324 * v387 + v323 * v389))),
+            v498 = v327 * v460, v499 = v327 * v392 + v497, v500 = v462[7], v501 = v462[8],
+            v502 = v462[9], v503 = v462[10], v504 = v462[11], v505 = v462[12], v506 = v462[13],
+            v507 = v462[14], v508 = v462[15], v509 = v462[16], v510 = v462[17], v511 = v462[18],
+            v512 = v462[19], v513 = v462[20], v514 = v462[21], v515 = v462[22], v516 = v462[23],
+            v517 = v462[24], v518 = v462[25], v519 = v462[26], v520 = v462[27], v521 = v462[28],
+            v522 = v462[29], v523 = v462[30], v524 = v462[31], v525 = v462[32], v526 = v462[33],
+            v527 = v462[34], v528 = v462[35], v529 = v462[36], v530 = v462[37], v531 = v462[38],
+            v532 = v462[39], v533 = v462[40], v534 = v462[41], v535 = v462[42], v536 = v462[43],
+            v537 = v462[44], v538 = v462[45], v539 = v462[46], v540 = v462[47], v541 = v462[48],
+            v542 = v17 * v463,
+            v543 = v492 * (v537 - v540) + (v491 * (v536 - v541) + v493 * (v538 - v539)),
+            v544 = v444 + (v378 * v414 - v378) - v338 * v444,
+            v545 = v450 + (v376 * v416 - v376 - v337 * v450),
+            v546 = v453 + (v385 * v417 - v385 - v340 * v453),
+            v547 = v447 + (v375 * v415 - v375) - v336 * v447,
+            v548 = v380 + (v379 + (v386 - v340 * v386) - v337 * v379 - v338 * v380) - v336 * v373,
+            v549 = v456 + (v391 * v418 - v391) - v341 * v456,
+            v550 = v459 + (v382 * v419 - v382) - v339 * v459,
+            v551 = v383 + (v393 + (v373 + v548) - v341 * v393 - v339 * v383),
+            v552 = v493 * (v524 - v525) + (v491 * (v522 - v527) + v492 * (v523 - v526)),
+            v553 = v493 * (v503 - v504) + (v491 * (v501 - v506) + v492 * (v502 - v505)),
+            v554 = v493 * (v510 - v511) + (v491 * (v508 - v513) + v492 * (v509 - v512)),
+            v555 = v493 * (v517 - v518) + (v491 * (v515 - v520) + v492 * (v516 - v519)),
+            v556 = v491 * (v529 - v534) + (v492 * (v530 - v533) + v493 * (v531 - v532)),
+            v557 = v494 * v531 + (v490 * v530 + (v489 * v529 + (v495 * v532 + v498 * v534))),
+            v558 = v501 * v544 + v502 * v547 + v505 * v549 + v504 * v546 + v503 * v545,
+            v559 = v494 * v538 + (v490 * v537 + (v489 * v536 + (v495 * v539 + v498 * v541))),
+            v560 = v494 * v510 + (v490 * v509 + (v489 * v508 + (v495 * v511 + v498 * v513))),
+            v561 = v479 * v510 + (v478 * v509 + (v477 * v508 + (v480 * v511 + v482 * v513))),
+            v562 = v508 * v544 + v511 * v546 + v513 * v550 + v509 * v547 + v510 * v545,
+            v563 = v479 * v531 + (v478 * v530 + (v477 * v529 + (v480 * v532 + v482 * v534))),
+            v564 = v479 * v538 + (v478 * v537 + (v477 * v536 + (v480 * v539 + v482 * v541))),
+            v565 = v532 * v546 + v534 * v550 + v529 * v544 + v530 * v547 + v531 * v545,
+            v566 = v539 * v546 + v541 * v550 + v536 * v544 + v537 * v547 + v538 * v545,
+            v567 = v481 * v505 + (v477 * v501 + (v479 * v503 + (v478 * v502 + v480 * v504))),
+            v568 = v496 * v505 + (v489 * v501 + (v494 * v503 + (v490 * v502 + v495 * v504))),
+            v569 = v481 * v519 + (v477 * v515 + (v479 * v517 + (v478 * v516 + v480 * v518))),
+            v570 = v498 * v520 + (v489 * v515 + (v494 * v517 + (v490 * v516 + v495 * v518))),
+            v571 = v515 * v544 + v518 * v546 + v516 * v547 + v517 * v545 + v520 * v550,
+            v572 = v556 + v528 * v488 + t14 * (v565 + v533 * v549 + v528 * v551) - v28 * (v481 * v533 + v563),
+            v573 = v554 + v507 * v488 + t14 * (v562 + v512 * v549 + v507 * v551) - v28 * (v481 * v512 + v561),
+            v574 = v543 + v535 * v488 + t14 * (v566 + v540 * v549 + v535 * v551) - v28 * (v481 * v540 + v564),
+            v575 = v482 * v527 + (v479 * v524 + (v478 * v523 + (v477 * v522 + v480 * v525))),
+            v576 = v498 * v527 + (v494 * v524 + (v490 * v523 + (v489 * v522 + v495 * v525))),
+            v577 = v525 * v546 + v522 * v544 + v523 * v547 + v524 * v545 + v527 * v550,
+            v578 = v553 + v500 * v488 + t14 * (v558 + v500 * v551 + v506 * v550) - v28 * (v482 * v506 + v567),
+            v579 = v572 + v31 * (v496 * v533 + v557 + v528 * v499),
+            v580 = v573 + v31 * (v496 * v512 + v560 + v507 * v499),
+            v581 = v574 + v31 * (v496 * v540 + v559 + v535 * v499),
+            v582 = v578 + v31 * (v498 * v506 + (v568 + v500 * v499)),
+            v583 = v471 * v372 * (t14 * (1.0 - v336) + v348 * (v31 * v324 + v309 * v345 * v580)),
+            v584 = v476 * v368 + (v474 * v363 + v475 * v365 - v473 * v362) - v471 * v360,
+            v585 = v473 * v377 * (t14 * (1.0 - v338) + v350 * (v31 * v323 + v307 * v347 * v582)),
+            v586 = v584 - v472 * v361,
+            v587 = v474 * v381 * (t14 * (1.0 - v339) + v351 * (v31 * v327 + v316 * v346 * v581)),
+            v588 = v555 - v28 * (v482 * v520 + v569) + v514 * v488 + t14 * (v571 + v519 * v549 + v514 * v551),
+            v589 = v552 - v28 * (v481 * v526 + v575) + v521 * v488 + t14 * (v577 + v526 * v549 + v521 * v551),
+            v590 = v476 * v390 * (t14 * (1.0 - v341) + v353 * (v31 * v329 + v322 * v344 * v579)),
+            v591 = (v486 * (v17 * v469 + v463 * v24) + v542 * (2.0 * v465) * v470) * v586,
+            v592 = v583 + v585 - v587 - v590 + 0.1192694691878821 * (v368 * v579 - v360 * v580),
+            v593 = v588 + v31 * (v496 * v519 + v570 + v514 * v499),
+            v594 = v589 + v31 * (v496 * v526 + v576 + v521 * v499),
+            v595 = v592 + 0.07987743308995329 * (v363 * v581 - v362 * v582) - v484 * v483 * v586,
+            v596 = v472 * v374 * (t14 * (1.0 - v337) + v349 * (v31 * v325 + v311 * v343 * v593)),
+            v597 = v475 * v384 * (t14 * (1.0 - v340) + v352 * (v31 * v328 + v318 * v342 * v594)),
+            v598 = v595 + 0.05582662111236089 * (v365 * v594 - v361 * v593) + v596 - v597,
+            v599 = v484 * (v591 + v542 * v486 * v598);
+        const M v600 = softehl_lt(softehl_splat(0.0), v44);
+        V v601 = softehl_splat(0.0), v602 = softehl_splat(0.0), v603 = softehl_splat(0.0),
+            v604 = softehl_splat(0.0);
+        const M m605 = v600;
+        if (softehl_any(m605)) {
+            const V v606 = v231 * v234; v601 = softehl_blend(m605, v606, v601);
+            v602 = softehl_blend(m605, softehl_splat(0.0), v602);
+            v603 = softehl_blend(m605, v44, v603);
+            v604 = softehl_blend(m605, softehl_splat(0.0), v604);
+        }
+        const M m607 = ~v600;
+        if (softehl_any(m607)) {
+            const V v608 = v230 * v234; v601 = softehl_blend(m607, softehl_splat(0.0), v601);
+            v602 = softehl_blend(m607, v608, v602);
+            v603 = softehl_blend(m607, softehl_splat(0.0), v603);
+            v604 = softehl_blend(m607, v44, v604);
+        }
+        const V v609 = 0.5 * (v230 * v604 + v231 * v603),
+            v610 = v465 * (v609 * v47 + v48 * (v602 + v601)) + (v45 * v609 * v470 + v599),
+            v611 = w[3] * v610;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
+            (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
+            R_lanes[4 + i] += D1 * v611;
+        }
+    }
+    const V v612 = -s35, v613 = -s36;
+    R_lanes[0] = s38; R_lanes[1] = v613; R_lanes[2] = s37; R_lanes[3] = v612;
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+#endif
+    if (softehl_any(failed)) {
+        softehl_spoil(failed, R, (4 + modes));
+    }
 }
+SOFTEHL_BATCH(softehl_film_conserving_carreau_pseudo_load, 4, (4 + modes), 2, 16, (4 + modes), 0)
+
+SOFTEHL_GROUP(softehl_film_conserving_carreau_fields_rate)
+{
+    SOFTEHL_IDLE;
+    M failed = softehl_mask(0);
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+    V a0, a1;
+    softehl_load2(a + 0, 2, &a0, &a1);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15, t16, t17, t18, t19;
+    softehl_load4(t + 0, (16 + (4 + modes)), &t0, &t1, &t2, &t3);
+    softehl_load4(t + 4, (16 + (4 + modes)), &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, (16 + (4 + modes)), &t8, &t9, &t10, &t11);
+    softehl_load4(t + 12, (16 + (4 + modes)), &t12, &t13, &t14, &t15);
+    softehl_load4(t + 16, (16 + (4 + modes)), &t16, &t17, &t18, &t19); (void)t10; (void)t11;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V t_lanes[(16 + (4 + modes))];
+#else
+    const V *const t_lanes = t;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(t_lanes, t, (16 + (4 + modes)));
+#endif
+    const double v1 = 1.0 - parameters[8];
+    const V v2 = d1 + (X1 - parameters[0]), v3 = d3 + (X3 - parameters[0]),
+        v4 = a1 + d2 * parameters[9], v5 = a0 + d0 * parameters[9];
+    const double v6 = 1.0 / parameters[7];
+    const V v7 = 0.5 * (X2 + d2 - X0 - d0), v8 = t1 + t17 - t6, v9 = t3 + t19 - t6;
+    const double v10 = 0.5 * (parameters[7] - 1.0), v11 = 0.5 * parameters[6],
+        v12 = 1.0 / parameters[6], v13 = 6.0 * parameters[6];
+    const V v14 = t2 + t18, v15 = t5 + d2 * t15 + parameters[9] * t18,
+        v16 = t4 + d0 * t15 + parameters[9] * t16, v17 = 1.0 / v7, v18 = 0.5 * t12,
+        v19 = 1.0 / (parameters[6] * v7), v20 = 6.0 * t12;
+    const double v21 = v6 * v10;
+    const V v22 = 0.5 * t13, v23 = t0 + t16, v24 = v12 * t12, v25 = v6 * (v22 - v21 * t13),
+        v26 = 0.5 * (v14 - t16 - t0), v27 = v17 * v26, v28 = v19 * (v7 * t12 + parameters[6] * v26);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 4 * q; (void)w;
+        const double *restrict B = basis + 8 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
+        V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0), tp2 = softehl_splat(0.0), tp3 = softehl_splat(0.0), tp4 = softehl_splat(0.0), tp5 = softehl_splat(0.0), tp6 = softehl_splat(0.0), tp7 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            tp0 += B[8 * i] * t_lanes[20 + i]; tp1 += B[8 * i + 1] * t_lanes[20 + i];
+            tp2 += B[8 * i + 2] * t_lanes[20 + i]; tp3 += B[8 * i + 3] * t_lanes[20 + i];
+            tp4 += B[8 * i + 4] * t_lanes[20 + i]; tp5 += B[8 * i + 5] * t_lanes[20 + i];
+            tp6 += B[8 * i + 6] * t_lanes[20 + i]; tp7 += B[8 * i + 7] * t_lanes[20 + i];
+        }
+        (void)tp0, (void)tp1, (void)tp2, (void)tp3, (void)tp4, (void)tp5, (void)tp6, (void)tp7;
+        const double v29 = 0.5 * w[0];
+        const V v30 = softehl_vexp(p0 * parameters[3]), v31 = p1 * v17;
+        const double v32 = 0.5 + v29, v33 = 0.5 - v29;
+        const V v34 = w[3] * v26, v35 = parameters[1] - v32 * v4 - v33 * v5,
+            v36 = v33 * v2 + v32 * v3, v37 = v32 * v14 + v33 * v23, v38 = v33 * v8 + v32 * v9,
+            v39 = 0.5 * v36, v40 = v39 * v31, v41 = 1.0 / (parameters[6] * v36),
+            v42 = parameters[2] * v30, v43 = v41 * (v42 * v35), v44 = v12 * v40,
+            v45 = softehl_vlog(1.0 + v43 * v43), v46 = softehl_vexp(v10 * v45),
+            v47 = v43 * (parameters[8] + v1 * v46), v48 = 0.932469514203152 * v44,
+            v49 = 0.6612093864662645 * v44, v50 = 0.2386191860831969 * v44, v51 = v47 + v48,
+            v52 = v47 + v49, v53 = v47 + v50, v54 = v47 - v50, v55 = v47 - v49, v56 = v47 - v48;
+        V v57[7];
+        softehl_film_conserving_carreau_level_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), softehl_splat(v10), softehl_splat(v1), softehl_splat(v21), v43, v48, v49, v50, v47, v51, v52, v53, v54, v55, v56}, v57, &failed);
+        const V v58 = v57[1], v59 = v57[2], v60 = v57[3], v61 = v57[4], v62 = v57[5], v63 = v57[6],
+            v64 = v58 * v58, v65 = v59 * v59, v66 = v60 * v60, v67 = v61 * v61, v68 = v62 * v62,
+            v69 = v63 * v63, v70 = 1.0 + v64, v71 = 1.0 + v65, v72 = 1.0 + v66, v73 = 1.0 + v67,
+            v74 = 1.0 + v68, v75 = 1.0 + v69, v76 = softehl_vlog(v70), v77 = softehl_vlog(v71),
+            v78 = softehl_vlog(v72), v79 = softehl_vlog(v73), v80 = softehl_vlog(v74),
+            v81 = softehl_vlog(v75), v82 = 2.0 * v61, v83 = 2.0 * v60, v84 = 2.0 * v62,
+            v85 = 2.0 * v59, v86 = 2.0 * v63, v87 = 2.0 * v58, v88 = softehl_vexp(v21 * v76),
+            v89 = softehl_vexp(v21 * v81), v90 = softehl_vexp(v21 * v77),
+            v91 = softehl_vexp(v21 * v80), v92 = softehl_vexp(v21 * v78),
+            v93 = softehl_vexp(v21 * v79), v94 = v21 * (1.0 / v73), v95 = v21 * (1.0 / v72),
+            v96 = v21 * (1.0 / v74), v97 = v21 * (1.0 / v71), v98 = v21 * (1.0 / v75),
+            v99 = v21 * (1.0 / v70), v100 = v85 * v97, v101 = v82 * v94, v102 = v83 * v95,
+            v103 = v86 * v98, v104 = v84 * v96, v105 = v87 * v99, v106 = v1 * v88, v107 = v1 * v89,
+            v108 = v1 * v90, v109 = v1 * v91, v110 = v1 * v92, v111 = v1 * v93,
+            v112 = parameters[8] + v106, v113 = parameters[8] + v107, v114 = parameters[8] + v108,
+            v115 = parameters[8] + v109, v116 = parameters[8] + v110, v117 = parameters[8] + v111,
+            v118 = 1.0 / v112, v119 = 1.0 / v113, v120 = 1.0 / v114, v121 = 1.0 / v115,
+            v122 = 1.0 / (v112 * v112), v123 = 1.0 / (v113 * v113), v124 = 1.0 / v116,
+            v125 = 1.0 / (v114 * v114), v126 = 1.0 / (v115 * v115), v127 = 1.0 / v117,
+            v128 = 1.0 / (v116 * v116), v129 = 1.0 / (v117 * v117), v130 = v63 * v119,
+            v131 = v119 * v119, v132 = v118 * v118, v133 = v58 * v118, v134 = v59 * v120,
+            v135 = v120 * v120, v136 = v135 * (0.1803807865240693 * v59),
+            v137 = v132 * (0.08566224618958518 * v58), v138 = v131 * (0.08566224618958518 * v63),
+            v139 = v62 * v121, v140 = v121 * v121, v141 = v60 * v124, v142 = v124 * v124,
+            v143 = v140 * (0.1803807865240693 * v62), v144 = v106 * v137, v145 = v107 * v138,
+            v146 = v108 * v136, v147 = v142 * (0.23395696728634552 * v60),
+            v148 = 0.08566224618958518 * v118 - v105 * v144,
+            v149 = 0.08566224618958518 * v119 - v103 * v145, v150 = v109 * v143,
+            v151 = 0.1803807865240693 * v120 - v100 * v146, v152 = v127 * v127, v153 = v61 * v127,
+            v154 = v110 * v147, v155 = v152 * (0.23395696728634552 * v61),
+            v156 = 0.1803807865240693 * v121 - v104 * v150, v157 = 1.0 + v64 * v122,
+            v158 = 0.23395696728634552 * v124 - v102 * v154, v159 = softehl_vlog(v157),
+            v160 = 1.0 + v65 * v125, v161 = 1.0 + v66 * v128, v162 = v111 * v155,
+            v163 = softehl_vlog(v160), v164 = softehl_vlog(v161), v165 = 1.0 + v67 * v129,
+            v166 = 1.0 + v68 * v126, v167 = softehl_vlog(v165), v168 = softehl_vlog(v166),
+            v169 = 0.23395696728634552 * v127 - v101 * v162, v170 = 1.0 + v69 * v123,
+            v171 = softehl_vlog(v170), v172 = softehl_vexp(v10 * v159),
+            v173 = softehl_vexp(v10 * v163), v174 = softehl_vexp(v10 * v164),
+            v175 = softehl_vexp(v10 * v167), v176 = softehl_vexp(v10 * v168),
+            v177 = softehl_vexp(v10 * v171), v178 = v1 * v174, v179 = v1 * v176, v180 = v1 * v177,
+            v181 = parameters[8] + v178, v182 = v178 * v141, v183 = v182 * (v10 * (1.0 / v161)),
+            v184 = parameters[8] + v179, v185 = v179 * v139, v186 = v185 * (v10 * (1.0 / v166)),
+            v187 = parameters[8] + v180, v188 = v180 * v130, v189 = v188 * (v10 * (1.0 / v170)),
+            v190 = v1 * v172, v191 = parameters[8] + v190, v192 = v190 * v133,
+            v193 = v192 * (v10 * (1.0 / v157)), v194 = v1 * v173, v195 = v1 * v175,
+            v196 = parameters[8] + v194, v197 = v194 * v134, v198 = v197 * (v10 * (1.0 / v160)),
+            v199 = parameters[8] + v195, v200 = v195 * v153, v201 = v200 * (v10 * (1.0 / v165)),
+            v202 = v58 * v132 * v191 + v122 * (v122 * (2.0 * v64 * v112)) * v193,
+            v203 = v106 * v202, v204 = v118 * v191 + v87 * (v122 * v193 - v99 * v203),
+            v205 = v59 * v135 * v196 + v125 * (v125 * (2.0 * v65 * v114)) * v198,
+            v206 = v108 * v205, v207 = v120 * v196 + v85 * (v125 * v198 - v97 * v206),
+            v208 = v60 * v142 * v181 + v128 * (v128 * (2.0 * v66 * v116)) * v183,
+            v209 = v110 * v208, v210 = v124 * v181 + v83 * (v128 * v183 - v95 * v209),
+            v211 = v61 * v152 * v199 + v129 * (v129 * (2.0 * v67 * v117)) * v201,
+            v212 = v111 * v211, v213 = v127 * v199 + v82 * (v129 * v201 - v94 * v212),
+            v214 = v62 * v140 * v184 + v126 * (v126 * (2.0 * v68 * v115)) * v186,
+            v215 = v109 * v214, v216 = v121 * v184 + v84 * (v126 * v186 - v96 * v215),
+            v217 = v63 * v131 * v187 + v123 * (v123 * (2.0 * v69 * v113)) * v189,
+            v218 = v107 * v217, v219 = v119 * v187 + v86 * (v123 * v189 - v98 * v218);
+        V v220[49];
+        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v148, v151, v158, v169, v156, v149, softehl_splat((-1.0)), v204, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v207, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v210, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v213, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v216, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v219}, v220, &failed);
+        const V v221 = v57[0], v222 = v159 * v192, v223 = v163 * v197, v224 = v164 * v182,
+            v225 = 1.0 - p6, v226 = 1.0 - p4, v227 = v167 * v200, v228 = v168 * v185,
+            v229 = v171 * v188, v230 = parameters[6] * v221;
+        const M v231 = softehl_lt(softehl_splat(0.0), v230);
+        const V v232 = t7 - v32 * v15 - v33 * v16,
+            v233 = v30 * t8 + v42 * (p0 * t9 + parameters[3] * tp0), v234 = v76 * v203,
+            v235 = v77 * v206,
+            v236 = v42 * v232 + v35 * v233 - v43 * (v36 * t12 + parameters[6] * v38),
+            v237 = v39 * (v17 * (tp1 - p1 * v27)) + 0.5 * v31 * v38, v238 = v78 * v209,
+            v239 = v41 * v236, v240 = v79 * v212, v241 = v80 * v215,
+            v242 = v80 * v150 + (v79 * v162 + (v78 * v154 + (v77 * v146 + v76 * v144))),
+            v243 = v81 * v218, v244 = v81 * v145 + v242, v245 = v220[0], v246 = v220[1],
+            v247 = v220[2], v248 = v220[3], v249 = v220[4], v250 = v220[5], v251 = v220[6],
+            v252 = v12 * (v237 - v40 * v24),
+            v253 = v136 + (v143 + (v147 + (v155 - v93 * v155) - v92 * v147) - v91 * v143),
+            v254 = 0.932469514203152 * v252, v255 = 0.6612093864662645 * v252,
+            v256 = 0.2386191860831969 * v252,
+            v257 = (v248 - v249) * v256 + ((v247 - v250) * v255 + (v245 * v239 + (v246 - v251) * v254)),
+            v258 = v240 * v249 + (v235 * v247 + (v234 * v246 + (v241 * v250 + v245 * v244))),
+            v259 = v229 * v251 + (v228 * v250 + (v227 * v249 + (v222 * v246 + v223 * v247))),
+            v260 = v202 + (v172 * v133 - v133) - v88 * v202,
+            v261 = v205 + (v173 * v134 - v134 - v90 * v205),
+            v262 = v137 + (v138 + (v253 - v90 * v136) - v89 * v138 - v88 * v137),
+            v263 = v257 + v25 * (v238 * v248 + (v243 * v251 + v258)) - v22 * (v224 * v248 + v259),
+            v264 = v208 + (v174 * v141 - v141) - v92 * v208,
+            v265 = v211 + (v175 * v153 - v153) - v93 * v211,
+            v266 = v217 + (v177 * v130 - v130 - v89 * v217),
+            v267 = v214 + (v176 * v139 - v139) - v91 * v214,
+            v268 = v249 * v265 + (v248 * v264 + (v246 * v260 + v247 * v261 + v245 * v262)),
+            v269 = parameters[6] * (v263 + t14 * (v251 * v266 + (v268 + v250 * v267))),
+            v270 = v221 * t12 + v269;
+        V v271 = softehl_splat(0.0), v272 = softehl_splat(0.0);
+        const M m273 = v231;
+        if (softehl_any(m273)) {
+            const V v274 = v226 * v270 - v230 * tp4; v271 = softehl_blend(m273, v274, v271);
+            v272 = softehl_blend(m273, softehl_splat(0.0), v272);
+        }
+        const M m275 = ~v231;
+        if (softehl_any(m275)) {
+            const V v276 = v225 * v270 - v230 * tp6;
+            v271 = softehl_blend(m275, softehl_splat(0.0), v271);
+            v272 = softehl_blend(m275, v276, v272);
+        }
+        const double v277 = 0.5 * w[1], v278 = 0.5 * w[2];
+        const V v279 = softehl_vexp(p2 * parameters[3]);
+        const double v280 = 0.5 - v277, v281 = 0.5 + v277, v282 = 0.5 - v278, v283 = 0.5 + v278;
+        const V v284 = v272 + v271, v285 = v280 * v2 + v281 * v3, v286 = v282 * v2 + v283 * v3,
+            v287 = v285 + v286, v288 = parameters[2] * v279, v289 = v284 - v237, v290 = 0.5 * v287,
+            v291 = 0.25 * v287, v292 = 1.0 / (parameters[6] * v290), v293 = v292 * (v288 * v35),
+            v294 = p3 * v291, v295 = v19 * v294, v296 = softehl_vlog(1.0 + v293 * v293),
+            v297 = softehl_vexp(v10 * v296), v298 = v293 * (parameters[8] + v1 * v297),
+            v299 = 0.932469514203152 * v295, v300 = 0.6612093864662645 * v295,
+            v301 = 0.2386191860831969 * v295, v302 = v298 + v299, v303 = v298 + v300,
+            v304 = v298 + v301, v305 = v298 - v301, v306 = v298 - v300, v307 = v298 - v299;
+        V v308[7];
+        softehl_film_conserving_carreau_level_cell_lanes(softehl_mask(1), (const V[]){softehl_splat(parameters[8]), v293, softehl_splat(v10), softehl_splat(v1), softehl_splat(v21), v299, v300, v301, v298, v302, v303, v304, v305, v306, v307}, v308, &failed);
+        const V v309 = v308[1], v310 = v308[2], v311 = v308[3], v312 = v308[4], v313 = v308[5],
+            v314 = v308[6], v315 = v309 * v309, v316 = v310 * v310, v317 = v311 * v311,
+            v318 = v312 * v312, v319 = v313 * v313, v320 = v314 * v314, v321 = 1.0 + v315,
+            v322 = 1.0 + v316, v323 = 1.0 + v317, v324 = 1.0 + v318, v325 = 1.0 + v319,
+            v326 = 1.0 + v320, v327 = softehl_vlog(v321), v328 = softehl_vlog(v322),
+            v329 = softehl_vlog(v323), v330 = softehl_vlog(v324), v331 = softehl_vlog(v325),
+            v332 = softehl_vlog(v326), v333 = 2.0 * v312, v334 = 2.0 * v311, v335 = 2.0 * v313,
+            v336 = 2.0 * v310, v337 = 2.0 * v314, v338 = 2.0 * v309,
+            v339 = softehl_vexp(v21 * v328), v340 = softehl_vexp(v21 * v329),
+            v341 = softehl_vexp(v21 * v327), v342 = softehl_vexp(v21 * v332),
+            v343 = softehl_vexp(v21 * v330), v344 = softehl_vexp(v21 * v331),
+            v345 = v21 * (1.0 / v324), v346 = v21 * (1.0 / v323), v347 = v21 * (1.0 / v325),
+            v348 = v21 * (1.0 / v322), v349 = v21 * (1.0 / v326), v350 = v21 * (1.0 / v321),
+            v351 = v336 * v348, v352 = v338 * v350, v353 = v333 * v345, v354 = v334 * v346,
+            v355 = v337 * v349, v356 = v335 * v347, v357 = v1 * v339, v358 = v1 * v340,
+            v359 = v1 * v341, v360 = v1 * v342, v361 = v1 * v343, v362 = v1 * v344,
+            v363 = parameters[8] + v357, v364 = parameters[8] + v358, v365 = parameters[8] + v359,
+            v366 = parameters[8] + v360, v367 = parameters[8] + v361, v368 = parameters[8] + v362,
+            v369 = 1.0 / v363, v370 = 1.0 / v364, v371 = 1.0 / v365, v372 = 1.0 / v366,
+            v373 = 1.0 / (v363 * v363), v374 = 1.0 / (v364 * v364), v375 = 1.0 / (v365 * v365),
+            v376 = 1.0 / v367, v377 = 1.0 / (v366 * v366), v378 = 1.0 / v368,
+            v379 = 1.0 / (v367 * v367), v380 = 1.0 / (v368 * v368), v381 = v310 * v369,
+            v382 = v369 * v369, v383 = v311 * v370, v384 = v370 * v370,
+            v385 = v382 * (0.1803807865240693 * v310), v386 = v384 * (0.23395696728634552 * v311),
+            v387 = v314 * v372, v388 = v372 * v372, v389 = v388 * (0.08566224618958518 * v314),
+            v390 = v371 * v371, v391 = v309 * v371, v392 = v312 * v376, v393 = v376 * v376,
+            v394 = v390 * (0.08566224618958518 * v309), v395 = v393 * (0.23395696728634552 * v312),
+            v396 = v357 * v385, v397 = v358 * v386, v398 = v360 * v389,
+            v399 = 0.1803807865240693 * v369 - v351 * v396, v400 = v359 * v394,
+            v401 = 0.23395696728634552 * v370 - v354 * v397, v402 = v378 * v378, v403 = v313 * v378,
+            v404 = 0.08566224618958518 * v372 - v355 * v398, v405 = v361 * v395,
+            v406 = v402 * (0.1803807865240693 * v313),
+            v407 = 0.08566224618958518 * v371 - v352 * v400, v408 = 1.0 + v315 * v375,
+            v409 = 0.23395696728634552 * v376 - v353 * v405, v410 = softehl_vlog(v408),
+            v411 = 1.0 + v316 * v373, v412 = v362 * v406, v413 = softehl_vlog(v411),
+            v414 = 1.0 + v317 * v374, v415 = 1.0 + v318 * v379, v416 = softehl_vlog(v414),
+            v417 = softehl_vlog(v415), v418 = 1.0 + v319 * v380,
+            v419 = 0.1803807865240693 * v378 - v356 * v412, v420 = softehl_vlog(v418),
+            v421 = 1.0 + v320 * v377, v422 = softehl_vlog(v421), v423 = softehl_vexp(v10 * v410),
+            v424 = softehl_vexp(v10 * v413), v425 = softehl_vexp(v10 * v416),
+            v426 = softehl_vexp(v10 * v417), v427 = softehl_vexp(v10 * v420),
+            v428 = softehl_vexp(v10 * v422), v429 = v1 * v425, v430 = v1 * v427, v431 = v1 * v428,
+            v432 = parameters[8] + v429, v433 = v429 * v383, v434 = v433 * (v10 * (1.0 / v414)),
+            v435 = parameters[8] + v430, v436 = v430 * v403, v437 = v436 * (v10 * (1.0 / v418)),
+            v438 = parameters[8] + v431, v439 = v431 * v387, v440 = v439 * (v10 * (1.0 / v421)),
+            v441 = v1 * v423, v442 = parameters[8] + v441, v443 = v441 * v391,
+            v444 = v443 * (v10 * (1.0 / v408)), v445 = v1 * v424, v446 = v1 * v426,
+            v447 = parameters[8] + v445, v448 = v445 * v381, v449 = v448 * (v10 * (1.0 / v411)),
+            v450 = parameters[8] + v446, v451 = v446 * v392, v452 = v451 * (v10 * (1.0 / v415)),
+            v453 = v309 * v390 * v442 + v375 * (v375 * (2.0 * v315 * v365)) * v444,
+            v454 = v359 * v453, v455 = v371 * v442 + v338 * (v375 * v444 - v350 * v454),
+            v456 = v310 * v382 * v447 + v373 * (v373 * (2.0 * v316 * v363)) * v449,
+            v457 = v357 * v456, v458 = v369 * v447 + v336 * (v373 * v449 - v348 * v457),
+            v459 = v311 * v384 * v432 + v374 * (v374 * (2.0 * v317 * v364)) * v434,
+            v460 = v358 * v459, v461 = v370 * v432 + v334 * (v374 * v434 - v346 * v460),
+            v462 = v312 * v393 * v450 + v379 * (v379 * (2.0 * v318 * v367)) * v452,
+            v463 = v361 * v462, v464 = v376 * v450 + v333 * (v379 * v452 - v345 * v463),
+            v465 = v313 * v402 * v435 + v380 * (v380 * (2.0 * v319 * v368)) * v437,
+            v466 = v362 * v465, v467 = v378 * v435 + v335 * (v380 * v437 - v347 * v466),
+            v468 = v314 * v388 * v438 + v377 * (v377 * (2.0 * v320 * v366)) * v440,
+            v469 = v360 * v468, v470 = v372 * v438 + v337 * (v377 * v440 - v349 * v469);
+        V v471[49];
+        softehl_film_conserving_carreau_inverse_7_lanes(softehl_mask(1), (const V[]){softehl_splat(0.0), v407, v399, v401, v409, v419, v404, softehl_splat((-1.0)), v455, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), v458, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), v461, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v464, softehl_splat(0.0), softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v467, softehl_splat(0.0), softehl_splat((-1.0)), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v470}, v471, &failed);
+        const V v472 = v290 * v290, v473 = 1.0 / v472, v474 = v285 * v286 * v473,
+            v475 = v280 * v8 + v281 * v9, v476 = v282 * v8 + v283 * v9, v477 = 0.5 * (v475 + v476),
+            v478 = v287 * v477, v479 = v473 * (v286 * v475 + v285 * v476 - v474 * v478),
+            v480 = 0.1192694691878821 * v310, v481 = 0.05582662111236089 * v311,
+            v482 = 0.07987743308995329 * v309, v483 = 0.07987743308995329 * v314,
+            v484 = 0.05582662111236089 * v312, v485 = 0.1192694691878821 * v313, v486 = v410 * v443,
+            v487 = v413 * v448, v488 = v416 * v433, v489 = v417 * v451, v490 = v420 * v436,
+            v491 = v422 * v439, v492 = v279 * t8 + v288 * (p2 * t9 + parameters[3] * tp2),
+            v493 = 1.0 / v288, v494 = v19 * (0.5 * p3 * v477 + (v291 * tp3 - v294 * v28)),
+            v495 = v474 * v474, v496 = v327 * v454, v497 = v328 * v457,
+            v498 = v35 * v492 + (v288 * v232 - v293 * (v290 * t12 + parameters[6] * v477)),
+            v499 = v292 * v498, v500 = 0.932469514203152 * v494, v501 = 0.6612093864662645 * v494,
+            v502 = 0.2386191860831969 * v494, v503 = v329 * v460, v504 = v330 * v463,
+            v505 = v331 * v466,
+            v506 = v331 * v412 + (v330 * v405 + (v329 * v397 + (v328 * v396 + v327 * v400))),
+            v507 = v332 * v469, v508 = v332 * v398 + v506, v509 = v471[7], v510 = v471[8],
+            v511 = v471[9], v512 = v471[10], v513 = v471[11], v514 = v471[12], v515 = v471[13],
+            v516 = v471[14], v517 = v471[15], v518 = v471[16], v519 = v471[17], v520 = v471[18],
+            v521 = v471[19], v522 = v471[20], v523 = v471[21], v524 = v471[22], v525 = v471[23],
+            v526 = v471[24], v527 = v471[25], v528 = v471[26], v529 = v471[27], v530 = v471[28],
+            v531 = v471[29], v532 = v471[30], v533 = v471[31], v534 = v471[32], v535 = v471[33],
+            v536 = v471[34], v537 = v471[35], v538 = v471[36], v539 = v471[37], v540 = v471[38],
+            v541 = v471[39], v542 = v471[40], v543 = v471[41], v544 = v471[42], v545 = v471[43],
+            v546 = v471[44], v547 = v471[45], v548 = v471[46], v549 = v471[47], v550 = v471[48],
+            v551 = v11 * v472, v552 = v459 + (v425 * v383 - v383 - v340 * v459),
+            v553 = v453 + (v423 * v391 - v391) - v341 * v453,
+            v554 = v462 + (v426 * v392 - v392 - v343 * v462),
+            v555 = v456 + (v424 * v381 - v381) - v339 * v456,
+            v556 = v394 + (v386 + (v395 - v343 * v395) - v340 * v386 - v341 * v394) - v339 * v385,
+            v557 = v465 + (v427 * v403 - v403) - v344 * v465,
+            v558 = v468 + (v428 * v387 - v387) - v342 * v468,
+            v559 = v389 + (v406 + (v385 + v556) - v344 * v406) - v342 * v389,
+            v560 = (v531 - v536) * v500 + (v533 - v534) * v502 + (v532 - v535) * v501,
+            v561 = (v510 - v515) * v500 + (v512 - v513) * v502 + (v511 - v514) * v501,
+            v562 = (v517 - v522) * v500 + (v519 - v520) * v502 + (v518 - v521) * v501,
+            v563 = (v524 - v529) * v500 + (v526 - v527) * v502 + (v525 - v528) * v501,
+            v564 = (v545 - v550) * v500 + (v547 - v548) * v502 + (v546 - v549) * v501,
+            v565 = (v540 - v541) * v502 + (v539 - v542) * v501 + (v538 - v543) * v500,
+            v566 = v503 * v540 + (v497 * v539 + (v496 * v538 + v507 * v543) + v537 * v508),
+            v567 = v538 * v553 + v543 * v558 + v539 * v555 + v537 * v559 + v540 * v552,
+            v568 = v545 * v553 + v550 * v558 + v546 * v555 + v544 * v559 + v547 * v552,
+            v569 = v503 * v547 + (v497 * v546 + (v496 * v545 + v507 * v550) + v544 * v508),
+            v570 = v484 * v376 + (v483 * v372 - v480 * v369 - v481 * v370 - v482 * v371),
+            v571 = v485 * v378 + v570,
+            v572 = v489 * v541 + (v488 * v540 + (v487 * v539 + (v486 * v538 + v491 * v543))),
+            v573 = v489 * v548 + (v488 * v547 + (v487 * v546 + (v486 * v545 + v491 * v550))),
+            v574 = (v495 * (v472 * v18 + v11 * v478) + v551 * (2.0 * v474) * v479) * v571,
+            v575 = v565 + v537 * v499 - v22 * (v490 * v542 + v572) + v25 * (v505 * v542 + (v504 * v541 + v566)),
+            v576 = v564 + v544 * v499 - v22 * (v490 * v549 + v573) + v25 * (v505 * v549 + (v504 * v548 + v569)),
+            v577 = v575 + t14 * (v567 + v541 * v554 + v542 * v557),
+            v578 = v576 + t14 * (v568 + v548 * v554 + v549 * v557),
+            v579 = v518 * v555 + v517 * v553 + v520 * v554 + v521 * v557 + v519 * v552,
+            v580 = v488 * v519 + (v487 * v518 + (v490 * v521 + (v486 * v517 + v489 * v520))),
+            v581 = v503 * v519 + (v497 * v518 + (v505 * v521 + (v496 * v517 + v504 * v520))),
+            v582 = v510 * v553 + v511 * v555 + v514 * v557 + v513 * v554 + v512 * v552,
+            v583 = v491 * v515 + (v488 * v512 + (v487 * v511 + (v486 * v510 + v489 * v513))),
+            v584 = v507 * v515 + (v503 * v512 + (v497 * v511 + (v496 * v510 + v504 * v513))),
+            v585 = v562 - v22 * (v491 * v522 + v580) + v516 * v499 + v25 * (v507 * v522 + v581 + v516 * v508),
+            v586 = v585 + t14 * (v579 + v522 * v558 + v516 * v559),
+            v587 = v561 + v509 * v499 + v25 * (v505 * v514 + (v584 + v509 * v508)) + t14 * (v582 + v515 * v558 + v509 * v559),
+            v588 = v587 - v22 * (v490 * v514 + v583),
+            v589 = v525 * v555 + v527 * v554 + v524 * v553 + v528 * v557 + v523 * v559,
+            v590 = v532 * v555 + v531 * v553 + v534 * v554 + v535 * v557 + v530 * v559,
+            v591 = v497 * v525 + (v505 * v528 + (v496 * v524 + v504 * v527) + v523 * v508),
+            v592 = v497 * v532 + (v505 * v535 + (v496 * v531 + v504 * v534) + v530 * v508),
+            v593 = v480 * v382 * (t14 * (1.0 - v339) + v357 * (v328 * v25 + v351 * v586)),
+            v594 = v488 * v526 + (v487 * v525 + (v490 * v528 + (v486 * v524 + v489 * v527))),
+            v595 = v488 * v533 + (v487 * v532 + (v490 * v535 + (v486 * v531 + v489 * v534))),
+            v596 = v482 * v390 * (t14 * (1.0 - v341) + v359 * (v327 * v25 + v352 * v588)),
+            v597 = 0.1192694691878821 * (v378 * v577 - v369 * v586) + v593 + v596 + 0.07987743308995329 * (v372 * v578 - v371 * v588),
+            v598 = v483 * v388 * (t14 * (1.0 - v342) + v360 * (v332 * v25 + v355 * v578)),
+            v599 = v563 + v523 * v499 + t14 * (v589 + v526 * v552 + v529 * v558) - v22 * (v491 * v529 + v594),
+            v600 = v560 + v530 * v499 + t14 * (v590 + v533 * v552 + v536 * v558) - v22 * (v491 * v536 + v595),
+            v601 = v599 + v25 * (v507 * v529 + (v503 * v526 + v591)),
+            v602 = v600 + v25 * (v507 * v536 + (v503 * v533 + v592)),
+            v603 = v485 * v402 * (t14 * (1.0 - v344) + v362 * (v331 * v25 + v356 * v577)),
+            v604 = v597 - v598 - v603 - v492 * (v493 * v571) + 0.05582662111236089 * (v376 * v602 - v370 * v601),
+            v605 = v481 * v384 * (t14 * (1.0 - v340) + v358 * (v329 * v25 + v354 * v601)),
+            v606 = v484 * v393 * (t14 * (1.0 - v343) + v361 * (v330 * v25 + v353 * v602)),
+            v607 = v493 * (v574 + v551 * v495 * (v604 + v605 - v606));
+        const M v608 = softehl_lt(softehl_splat(0.0), v35);
+        V v609 = softehl_splat(0.0), v610 = softehl_splat(0.0), v611 = softehl_splat(0.0),
+            v612 = softehl_splat(0.0);
+        const M m613 = v608;
+        if (softehl_any(m613)) {
+            const V v614 = v226 * v232 - v35 * tp4; v609 = softehl_blend(m613, v614, v609);
+            v610 = softehl_blend(m613, softehl_splat(0.0), v610);
+            v611 = softehl_blend(m613, v35, v611);
+            v612 = softehl_blend(m613, softehl_splat(0.0), v612);
+        }
+        const M m615 = ~v608;
+        if (softehl_any(m615)) {
+            const V v616 = v225 * v232 - v35 * tp6;
+            v609 = softehl_blend(m615, softehl_splat(0.0), v609);
+            v610 = softehl_blend(m615, v616, v610);
+            v611 = softehl_blend(m615, softehl_splat(0.0), v611);
+            v612 = softehl_blend(m615, v35, v612);
+        }
+        const V v617 = 0.5 * (v225 * v612 + v226 * v611),
+            v618 = v474 * (v617 * v38 + v39 * (v610 + v609)) + (v36 * v617 * v479 + v607),
+            v619 = v237 + v284, v620 = 1.0 / v36, v621 = 0.1192694691878821 * v59,
+            v622 = 0.05582662111236089 * v60, v623 = 0.07987743308995329 * v58,
+            v624 = 0.07987743308995329 * v63, v625 = 0.05582662111236089 * v61,
+            v626 = 0.1192694691878821 * v62, v627 = v220[7], v628 = v220[8], v629 = v220[9],
+            v630 = v220[10], v631 = v220[11], v632 = v220[12], v633 = v220[13], v634 = v220[14],
+            v635 = v220[15], v636 = v220[16], v637 = v220[17], v638 = v220[18], v639 = v220[19],
+            v640 = v220[20], v641 = v220[21], v642 = v220[22], v643 = v220[23], v644 = v220[24],
+            v645 = v220[25], v646 = v220[26], v647 = v220[27], v648 = v220[28], v649 = v220[29],
+            v650 = v220[30], v651 = v220[31], v652 = v220[32], v653 = v220[33], v654 = v220[34],
+            v655 = v220[35], v656 = v220[36], v657 = v220[37], v658 = v220[38], v659 = v220[39],
+            v660 = v220[40], v661 = v220[41], v662 = v220[42], v663 = v220[43], v664 = v220[44],
+            v665 = v220[45], v666 = v220[46], v667 = v220[47], v668 = v220[48],
+            v669 = v256 * (v651 - v652) + (v254 * (v649 - v654) + v255 * (v650 - v653)),
+            v670 = v256 * (v637 - v638) + (v254 * (v635 - v640) + v255 * (v636 - v639)),
+            v671 = v256 * (v644 - v645) + (v254 * (v642 - v647) + v255 * (v643 - v646)),
+            v672 = v254 * (v656 - v661) + (v255 * (v657 - v660) + v256 * (v658 - v659)),
+            v673 = v254 * (v628 - v633) + (v255 * (v629 - v632) + v256 * (v630 - v631)),
+            v674 = v254 * (v663 - v668) + (v255 * (v664 - v667) + v256 * (v665 - v666)),
+            v675 = v244 * v655 + (v234 * v656 + (v243 * v661 + (v240 * v659 + v241 * v660))),
+            v676 = v262 * v655 + (v260 * v656 + (v266 * v661 + (v265 * v659 + v267 * v660))),
+            v677 = v244 * v662 + (v234 * v663 + (v243 * v668 + (v240 * v666 + v241 * v667))),
+            v678 = v262 * v662 + (v260 * v663 + (v266 * v668 + (v265 * v666 + v267 * v667))),
+            v679 = v127 * v625 + (v119 * v624 - v118 * v623 - v120 * v621 - v124 * v622),
+            v680 = v121 * v626 + v679,
+            v681 = v223 * v664 + (v222 * v663 + (v229 * v668 + (v227 * v666 + v228 * v667))),
+            v682 = v223 * v657 + (v222 * v656 + (v229 * v661 + (v227 * v659 + v228 * v660))),
+            v683 = v239 * v655 + v672 + v25 * (v238 * v658 + (v235 * v657 + v675)) - v22 * (v224 * v658 + v682),
+            v684 = v239 * v662 + v674 + v25 * (v238 * v665 + (v235 * v664 + v677)) - v22 * (v224 * v665 + v681),
+            v685 = v683 + t14 * (v264 * v658 + (v261 * v657 + v676)),
+            v686 = v684 + t14 * (v264 * v665 + (v261 * v664 + v678)),
+            v687 = v234 * v628 + (v238 * v630 + (v235 * v629 + (v244 * v627 + v240 * v631))),
+            v688 = v260 * v628 + (v264 * v630 + (v261 * v629 + (v265 * v631 + v262 * v627))),
+            v689 = v228 * v632 + (v222 * v628 + (v224 * v630 + (v223 * v629 + v227 * v631))),
+            v690 = v140 * v626 * (t14 * (1.0 - v91) + v109 * (v80 * v25 + v104 * v685)),
+            v691 = v131 * v624 * (t14 * (1.0 - v89) + v107 * (v81 * v25 + v103 * v686)),
+            v692 = v239 * v627 + v673 - v22 * (v229 * v633 + v689) + t14 * (v266 * v633 + (v267 * v632 + v688)),
+            v693 = v692 + v25 * (v243 * v633 + (v241 * v632 + v687)),
+            v694 = v620 * v38 * v680 + v690 + v691 - 0.07987743308995329 * (v119 * v686 - v118 * v693),
+            v695 = v132 * v623 * (t14 * (1.0 - v88) + v106 * (v76 * v25 + v105 * v693)),
+            v696 = v235 * v636 + (v244 * v634 + (v243 * v640 + (v234 * v635 + v240 * v638))),
+            v697 = v235 * v643 + (v244 * v641 + (v243 * v647 + (v234 * v642 + v240 * v645))),
+            v698 = v235 * v650 + (v244 * v648 + (v243 * v654 + (v234 * v649 + v240 * v652))),
+            v699 = v261 * v643 + (v262 * v641 + (v266 * v647 + (v260 * v642 + v265 * v645))),
+            v700 = v261 * v650 + (v262 * v648 + (v266 * v654 + (v260 * v649 + v265 * v652))),
+            v701 = v261 * v636 + (v262 * v634 + (v266 * v640 + (v260 * v635 + v265 * v638))),
+            v702 = v224 * v644 + (v223 * v643 + (v229 * v647 + (v222 * v642 + v227 * v645))),
+            v703 = v224 * v651 + (v223 * v650 + (v229 * v654 + (v222 * v649 + v227 * v652))),
+            v704 = v224 * v637 + (v223 * v636 + (v229 * v640 + (v222 * v635 + v227 * v638))),
+            v705 = v239 * v634 + v670 + v25 * (v241 * v639 + (v238 * v637 + v696)) - v22 * (v228 * v639 + v704),
+            v706 = v239 * v641 + v671 + v25 * (v241 * v646 + (v238 * v644 + v697)) - v22 * (v228 * v646 + v702),
+            v707 = v239 * v648 + v669 + v25 * (v241 * v653 + (v238 * v651 + v698)) - v22 * (v228 * v653 + v703),
+            v708 = v705 + t14 * (v267 * v639 + (v264 * v637 + v701)),
+            v709 = v706 + t14 * (v267 * v646 + (v264 * v644 + v699)),
+            v710 = v707 + t14 * (v267 * v653 + (v264 * v651 + v700)),
+            v711 = v135 * v621 * (t14 * (1.0 - v90) + v108 * (v77 * v25 + v100 * v708)),
+            v712 = v694 - v695 - 0.1192694691878821 * (v121 * v685 - v120 * v708) - v711,
+            v713 = v142 * v622 * (t14 * (1.0 - v92) + v110 * (v78 * v25 + v102 * v709)),
+            v714 = v152 * v625 * (t14 * (1.0 - v93) + v111 * (v79 * v25 + v101 * v710)),
+            v715 = v712 - v713 + v714 - 0.05582662111236089 * (v127 * v710 - v124 * v709),
+            v716 = v620 * (v13 * v715 - v20 * v680);
+        softehl_store4(R + 14 * q + 0, (14 * points), v37, v34, v38, tp0);
+        softehl_store4(R + 14 * q + 4, (14 * points), v289, v618, v619, v233);
+        softehl_store1(R + 14 * q + 8, (14 * points), v38);
+        softehl_store3(R + 14 * q + 11, (14 * points), tp4, tp6, v716);
+    }
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        softehl_store2(R + 14 * q + 9, (14 * points), softehl_splat(0.0), softehl_splat(0.0));
+    }
+    if (softehl_any(failed)) {
+        softehl_spoil(failed, R, (14 * points));
+    }
+}
+SOFTEHL_BATCH(softehl_film_conserving_carreau_fields_rate, 4, (4 + modes), 2, (16 + (4 + modes)), (14 * points), 0)

@@ -32,34 +32,18 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_film_conserving_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_conserving_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 13, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 13, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
-    softehl_load4(t + 8, 13, &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    V t12;
-    softehl_load1(t + 12, 13, &t12);
-    (void)t12;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12;
+    softehl_load4(t + 0, 13, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 13, &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, 13, &t8, &t9, &t10, &t11); softehl_load1(t + 12, 13, &t12);
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -76,322 +60,97 @@ static void softehl_film_conserving_pseudo_load_group(
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
     const double v1 = 6.283185307179586 * parameters[4];
-    const V v2 = X2 + d2;
-    const V v3 = X1 - parameters[0];
-    const V v4 = X3 - parameters[0];
-    const V v5 = d1 + v3;
-    const V v6 = d3 + v4;
-    const V v7 = parameters[2] * t9;
-    const V v8 = d2 * parameters[6];
-    const V v9 = a1 + v8;
-    const V v10 = d0 * parameters[6];
-    const V v11 = a0 + v10;
-    const V v12 = v2 - X0;
-    const V v13 = t2 - t0;
-    const V v14 = v12 - d0;
-    const V v15 = d0 * t12;
-    const V v16 = t4 + v15;
-    const V v17 = d2 * t12;
-    const V v18 = t5 + v17;
-    const V v19 = v6 - v5;
-    const V v20 = 0.5 * v14;
-    const V v21 = 0.5 * v13;
-    const V v22 = 0.5 * v19;
-    const V v23 = 6.283185307179586 * t10;
-    const V v24 = t1 - t6;
-    const V v25 = t3 - t6;
-    const double v26 = 0.5 * parameters[5];
-    const V v27 = 1.0 / v20;
-    const V v28 = v20 * v20;
-    const V v29 = v20 * v21;
-    const V v30 = v25 - v24;
-    const V v31 = 0.5 * v30;
-    const V v32 = v22 * v22;
-    const V v33 = v32 + v28;
-    const V v34 = v22 * v31;
-    const V v35 = v34 + v29;
-    const V v36 = softehl_vsqrt(v33);
-    const V v37 = 1.0 / v33;
-    const V v38 = parameters[5] * v36;
-    const V v39 = softehl_vsqrt(v37);
-    const V v40 = v39 * v26;
-    const V v41 = v27 * v27;
-    const V v42 = v41 * v21;
-    const V v43 = 2.0 * v35;
-    const V v44 = v43 * v40;
-    const V v45 = v36 * t11;
-    const V v46 = v45 + v44;
-    V s47 = softehl_splat(0.0);
-    V s48 = softehl_splat(0.0);
-    V s49 = softehl_splat(0.0);
-    V s50 = softehl_splat(0.0);
+    const V v2 = d1 + (X1 - parameters[0]), v3 = d3 + (X3 - parameters[0]), v4 = parameters[2] * t9,
+        v5 = a1 + d2 * parameters[6], v6 = a0 + d0 * parameters[6], v7 = t4 + d0 * t12,
+        v8 = t5 + d2 * t12, v9 = 0.5 * (X2 + d2 - X0 - d0), v10 = 0.5 * (t2 - t0),
+        v11 = 0.5 * (v3 - v2), v12 = 6.283185307179586 * t10, v13 = t1 - t6, v14 = t3 - t6,
+        v15 = 1.0 / v9, v16 = 0.5 * (v14 - v13), v17 = v11 * v11 + v9 * v9,
+        v18 = softehl_vsqrt(v17), v19 = parameters[5] * v18, v20 = softehl_vsqrt(1.0 / v17),
+        v21 = v15 * v15 * v10,
+        v22 = v18 * t11 + 2.0 * (v11 * v16 + v9 * v10) * (v20 * (0.5 * parameters[5]));
+    V s23 = {0}, s24 = {0}, s25 = {0}, s26 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v51 = 0.5 * w[0];
-        const V v52 = 1.0 - p6;
-        const V v53 = 1.0 - p4;
-        const double v54 = 0.5 + v51;
-        const double v55 = 0.5 - v51;
-        const V v56 = v54 * v9;
-        const V v57 = parameters[1] - v56;
-        const V v58 = v54 * v6;
-        const V v59 = v54 * v25;
-        const V v60 = v54 * v18;
-        const V v61 = t7 - v60;
-        const V v62 = v55 * v11;
-        const V v63 = v57 - v62;
-        const M v64 = softehl_lt(softehl_splat(0.0), v63);
-        const V v65 = v55 * v5;
-        const V v66 = v65 + v58;
-        const V v67 = parameters[0] + v66;
-        const V v68 = v55 * v16;
-        const V v69 = v61 - v68;
-        const V v70 = v55 * v24;
-        const V v71 = v70 + v59;
-        const V v72 = t6 + v71;
-        const V v73 = v67 * v23;
-        const V v74 = v67 * v1;
-        const V v75 = v1 * v72;
-        const V v76 = v75 + v73;
-        const V v77 = v74 * v21;
-        const V v78 = v20 * v76;
-        const V v79 = v77 + v78;
-        const V v80 = p0 * v79;
-        const V v81 = w[3] * v80;
-        const V v82 = v54 * v81;
-        s47 += v82;
-        const V v83 = v55 * v81;
-        s48 += v83;
-        V v84 = softehl_splat(0.0);
-        V v85 = softehl_splat(0.0);
-        V v86 = softehl_splat(0.0);
-        V v87 = softehl_splat(0.0);
-        const M m88 = v64;
-        if (softehl_any(m88)) {
-            const V v89 = v53 * v69;
-            v84 = softehl_blend(m88, v63, v84);
-            v85 = softehl_blend(m88, softehl_splat(0.0), v85);
-            v86 = softehl_blend(m88, v89, v86);
-            v87 = softehl_blend(m88, softehl_splat(0.0), v87);
+        const double v27 = 0.5 * w[0];
+        const V v28 = 1.0 - p6, v29 = 1.0 - p4;
+        const double v30 = 0.5 + v27, v31 = 0.5 - v27;
+        const V v32 = parameters[1] - v30 * v5 - v31 * v6;
+        const M v33 = softehl_lt(softehl_splat(0.0), v32);
+        const V v34 = v31 * v2 + v30 * v3, v35 = parameters[0] + v34,
+            v36 = t7 - v30 * v8 - v31 * v7, v37 = v31 * v13 + v30 * v14, v38 = v35 * v1,
+            v39 = v1 * (t6 + v37) + v35 * v12, v40 = w[3] * (p0 * (v38 * v10 + v9 * v39));
+        s23 += v30 * v40; s24 += v31 * v40;
+        V v41 = softehl_splat(0.0), v42 = softehl_splat(0.0), v43 = softehl_splat(0.0),
+            v44 = softehl_splat(0.0);
+        const M m45 = v33;
+        if (softehl_any(m45)) {
+            const V v46 = v29 * v36; v41 = softehl_blend(m45, v32, v41);
+            v42 = softehl_blend(m45, softehl_splat(0.0), v42); v43 = softehl_blend(m45, v46, v43);
+            v44 = softehl_blend(m45, softehl_splat(0.0), v44);
         }
-        const M m90 = ~v64;
-        if (softehl_any(m90)) {
-            const V v91 = v52 * v69;
-            v84 = softehl_blend(m90, softehl_splat(0.0), v84);
-            v85 = softehl_blend(m90, v63, v85);
-            v86 = softehl_blend(m90, softehl_splat(0.0), v86);
-            v87 = softehl_blend(m90, v91, v87);
+        const M m47 = ~v33;
+        if (softehl_any(m47)) {
+            const V v48 = v28 * v36; v41 = softehl_blend(m47, softehl_splat(0.0), v41);
+            v42 = softehl_blend(m47, v32, v42); v43 = softehl_blend(m47, softehl_splat(0.0), v43);
+            v44 = softehl_blend(m47, v48, v44);
         }
-        const double v92 = 0.5 * w[1];
-        const double v93 = 0.5 * w[2];
-        const V v94 = v52 * v85;
-        const double v95 = 0.5 - v92;
-        const double v96 = 0.5 + v92;
-        const double v97 = 0.5 - v93;
-        const double v98 = 0.5 + v93;
-        const V v99 = v53 * v84;
-        const V v100 = v94 + v99;
-        const V v101 = 0.08333333333333333 * p3;
-        const V v102 = 0.25 * p3;
-        const V v103 = 1.0 / v66;
-        const V v104 = 0.5 * v66;
-        const V v105 = 0.5 * v100;
-        const V v106 = v87 + v86;
-        const V v107 = p1 * v27;
-        const V v108 = p1 * v42;
-        const V v109 = v66 * v105;
-        const V v110 = v95 * v5;
-        const V v111 = v97 * v5;
-        const V v112 = v95 * v24;
-        const V v113 = v97 * v24;
-        const V v114 = v104 * v108;
-        const V v115 = 0.5 * v107;
-        const V v116 = v105 * v71;
-        const V v117 = p0 * v22;
-        const V v118 = p0 * v31;
-        const V v119 = p0 * parameters[3];
-        const V v120 = p2 * parameters[3];
-        const V v121 = v115 * v71;
-        const V v122 = v114 - v121;
-        const V v123 = softehl_vexp(v119);
-        const V v124 = softehl_vexp(v120);
-        const V v125 = p2 * v7;
-        const V v126 = p0 * v7;
-        const V v127 = v104 * v106;
-        const V v128 = v116 + v127;
-        const V v129 = v96 * v6;
-        const V v130 = v110 + v129;
-        const V v131 = v98 * v6;
-        const V v132 = v111 + v131;
-        const V v133 = v96 * v25;
-        const V v134 = v112 + v133;
-        const V v135 = v98 * v25;
-        const V v136 = v113 + v135;
-        const V v137 = t8 + v125;
-        const V v138 = t8 + v126;
-        const V v139 = v130 * v132;
-        const V v140 = v130 * v136;
-        const V v141 = v130 + v132;
-        const V v142 = 0.5 * v141;
-        const V v143 = v132 * v134;
-        const V v144 = v143 + v140;
-        const V v145 = v134 + v136;
-        const V v146 = 2.0 * v139;
-        const V v147 = 0.5 * v145;
-        const V v148 = v142 * v146;
-        const V v149 = v142 * v142;
-        const V v150 = v101 * v142;
-        const V v151 = v149 * v150;
-        const V v152 = v124 * v137;
-        const V v153 = v123 * v138;
-        const V v154 = parameters[2] * v124;
-        const V v155 = parameters[2] * v123;
-        const V v156 = 1.0 / v149;
-        const V v157 = v149 * v102;
-        const V v158 = v139 * v156;
-        const V v159 = v156 * v148;
-        const V v160 = v147 * v159;
-        const V v161 = v144 - v160;
-        const V v162 = v156 * v161;
-        const V v163 = v155 * v106;
-        const V v164 = v158 * v128;
-        const V v165 = v155 * v100;
-        const V v166 = v100 * v153;
-        const V v167 = v163 + v166;
-        const V v168 = v103 * v165;
-        const V v169 = v168 * v71;
-        const V v170 = v167 - v169;
-        const V v171 = v103 * v170;
-        const V v172 = v122 + v171;
-        const V v173 = v104 * v107;
-        const V v174 = v168 - v173;
-        const V v175 = v158 * v158;
-        const V v176 = 2.0 * v158;
-        const V v177 = v175 * v157;
-        const V v178 = v174 * v46;
-        const V v179 = v118 - v178;
-        const V v180 = v38 * v174;
-        const V v181 = v117 - v180;
-        const V v182 = v38 * v172;
-        const V v183 = v179 - v182;
-        const V v184 = v181 * v76;
-        const V v185 = v74 * v183;
-        const V v186 = v184 + v185;
-        const V v187 = v109 * v162;
-        const V v188 = v187 + v164;
-        const V v189 = v154 * v21;
-        const V v190 = v20 * v152;
-        const V v191 = v189 + v190;
-        const V v192 = v154 * v20;
-        const V v193 = 1.0 / v192;
-        const V v194 = v193 * v175;
-        const V v195 = v191 * v194;
-        const V v196 = v176 * v162;
-        const V v197 = v195 - v196;
-        const V v198 = v151 * v197;
-        const V v199 = v147 * v177;
-        const V v200 = v198 - v199;
-        const V v201 = v193 * v200;
-        const V v202 = v188 + v201;
-        const V v203 = w[3] * v202;
-        const V v204 = w[3] * v186;
-        const V v205 = v54 * v204;
-        s49 += v205;
-        const V v206 = v55 * v204;
-        s50 += v206;
+        const double v49 = 0.5 * w[1], v50 = 0.5 * w[2], v51 = 0.5 - v49, v52 = 0.5 + v49,
+            v53 = 0.5 - v50, v54 = 0.5 + v50;
+        const V v55 = v28 * v42 + v29 * v41, v56 = 1.0 / v34, v57 = 0.5 * v34, v58 = 0.5 * v55,
+            v59 = v44 + v43, v60 = p1 * v15, v61 = softehl_vexp(p0 * parameters[3]),
+            v62 = softehl_vexp(p2 * parameters[3]), v63 = v51 * v2 + v52 * v3,
+            v64 = v53 * v2 + v54 * v3, v65 = v51 * v13 + v52 * v14, v66 = v53 * v13 + v54 * v14,
+            v67 = v63 * v64, v68 = 0.5 * (v63 + v64), v69 = 0.5 * (v65 + v66), v70 = v68 * v68,
+            v71 = parameters[2] * v62, v72 = parameters[2] * v61, v73 = 1.0 / v70, v74 = v67 * v73,
+            v75 = v73 * (v64 * v65 + v63 * v66 - v69 * (v73 * (v68 * (2.0 * v67)))),
+            v76 = v56 * (v72 * v55),
+            v77 = v57 * (p1 * v21) - 0.5 * v60 * v37 + v56 * (v72 * v59 + v55 * (v61 * (t8 + p0 * v4)) - v76 * v37),
+            v78 = v76 - v57 * v60, v79 = v74 * v74,
+            v80 = (p0 * v11 - v19 * v78) * v39 + v38 * (p0 * v16 - v78 * v22 - v19 * v77),
+            v81 = 1.0 / (v71 * v9),
+            v82 = (v71 * v10 + v9 * (v62 * (t8 + p2 * v4))) * (v81 * v79) - 2.0 * v74 * v75,
+            v83 = v70 * (0.08333333333333333 * p3 * v68) * v82 - v69 * (v79 * (v70 * (0.25 * p3))),
+            v84 = w[3] * (v34 * v58 * v75 + v74 * (v58 * v37 + v57 * v59) + v81 * v83),
+            v85 = w[3] * v80, v86 = v30 * v85;
+        s25 += v86; const V v87 = v31 * v85; s26 += v87;
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
             (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
-            R_lanes[4 + i] += D1 * v203;
+            R_lanes[4 + i] += D1 * v84;
         }
     }
-    const V v207 = -s47;
-    const V v208 = -s48;
-    R_lanes[0] = s50;
-    R_lanes[1] = v208;
-    R_lanes[2] = s49;
-    R_lanes[3] = v207;
+    const V v88 = -s23, v89 = -s24;
+    R_lanes[0] = s26; R_lanes[1] = v89; R_lanes[2] = s25; R_lanes[3] = v88;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_conserving_pseudo_load, 4, (4 + modes), 2, 13, (4 + modes), 0)
 
-void softehl_film_conserving_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_conserving_fields_rate)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_pseudo_load_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, direction + 13 * e, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_pseudo_load_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), direction + 13 * (n - SOFTEHL_LANES), parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double t[SOFTEHL_LANES * 13];
-    softehl_pad(t, direction, 13, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_conserving_pseudo_load(SOFTEHL_LANES, points, modes, X, d, a, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_conserving_fields_rate_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
-    V t0, t1, t2, t3;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15, t16;
     softehl_load4(t + 0, (13 + (4 + modes)), &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
     softehl_load4(t + 4, (13 + (4 + modes)), &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
     softehl_load4(t + 8, (13 + (4 + modes)), &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    V t12, t13, t14, t15;
     softehl_load4(t + 12, (13 + (4 + modes)), &t12, &t13, &t14, &t15);
-    (void)t12; (void)t13; (void)t14; (void)t15;
-    V t16;
-    softehl_load1(t + 16, (13 + (4 + modes)), &t16);
-    (void)t16;
+    softehl_load1(t + 16, (13 + (4 + modes)), &t16); (void)t10; (void)t11;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -408,258 +167,77 @@ static void softehl_film_conserving_fields_rate_group(
 #if SOFTEHL_LANES > 1
     softehl_gather(t_lanes, t, (13 + (4 + modes)));
 #endif
-    const V v1 = X2 + d2;
-    const V v2 = X1 - parameters[0];
-    const V v3 = X3 - parameters[0];
-    const V v4 = d1 + v2;
-    const V v5 = d3 + v3;
-    const V v6 = d2 * parameters[6];
-    const V v7 = a1 + v6;
-    const V v8 = t1 + t14;
-    const V v9 = d0 * parameters[6];
-    const V v10 = a0 + v9;
-    const V v11 = v1 - X0;
-    const V v12 = v8 - t6;
-    const V v13 = t3 - t6;
-    const V v14 = v11 - d0;
-    const V v15 = d0 * t12;
-    const V v16 = t4 + v15;
-    const V v17 = d2 * t12;
-    const V v18 = t5 + v17;
-    const V v19 = 0.5 * v14;
-    const V v20 = v13 + t16;
-    const V v21 = t2 + t15;
-    const V v22 = parameters[6] * t15;
-    const V v23 = v18 + v22;
-    const V v24 = parameters[6] * t13;
-    const V v25 = v16 + v24;
-    const V v26 = 1.0 / v19;
-    const V v27 = t0 + t13;
-    const V v28 = v21 - t0;
-    const V v29 = v28 - t13;
-    const V v30 = 0.5 * v29;
-    const V v31 = v26 * v30;
+    const V v1 = d1 + (X1 - parameters[0]), v2 = d3 + (X3 - parameters[0]),
+        v3 = a1 + d2 * parameters[6], v4 = a0 + d0 * parameters[6], v5 = t1 + t14 - t6,
+        v6 = 0.5 * (X2 + d2 - X0 - d0), v7 = t3 - t6 + t16, v8 = t2 + t15,
+        v9 = t5 + d2 * t12 + parameters[6] * t15, v10 = t4 + d0 * t12 + parameters[6] * t13,
+        v11 = 1.0 / v6, v12 = t0 + t13, v13 = 0.5 * (v8 - t0 - t13), v14 = v11 * v13;
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
         V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0), tp2 = softehl_splat(0.0), tp3 = softehl_splat(0.0), tp4 = softehl_splat(0.0), tp5 = softehl_splat(0.0), tp6 = softehl_splat(0.0), tp7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            tp0 += B[8 * i] * t_lanes[17 + i];
-            tp1 += B[8 * i + 1] * t_lanes[17 + i];
-            tp2 += B[8 * i + 2] * t_lanes[17 + i];
-            tp3 += B[8 * i + 3] * t_lanes[17 + i];
-            tp4 += B[8 * i + 4] * t_lanes[17 + i];
-            tp5 += B[8 * i + 5] * t_lanes[17 + i];
-            tp6 += B[8 * i + 6] * t_lanes[17 + i];
-            tp7 += B[8 * i + 7] * t_lanes[17 + i];
+            tp0 += B[8 * i] * t_lanes[17 + i]; tp1 += B[8 * i + 1] * t_lanes[17 + i];
+            tp2 += B[8 * i + 2] * t_lanes[17 + i]; tp3 += B[8 * i + 3] * t_lanes[17 + i];
+            tp4 += B[8 * i + 4] * t_lanes[17 + i]; tp5 += B[8 * i + 5] * t_lanes[17 + i];
+            tp6 += B[8 * i + 6] * t_lanes[17 + i]; tp7 += B[8 * i + 7] * t_lanes[17 + i];
         }
         (void)tp0, (void)tp1, (void)tp2, (void)tp3, (void)tp4, (void)tp5, (void)tp6, (void)tp7;
-        const double v32 = 0.5 * w[0];
-        const V v33 = 1.0 - p6;
-        const V v34 = 1.0 - p4;
-        const V v35 = w[3] * v30;
-        const double v36 = 0.5 + v32;
-        const double v37 = 0.5 - v32;
-        const V v38 = v36 * v7;
-        const V v39 = parameters[1] - v38;
-        const V v40 = v36 * v21;
-        const V v41 = v36 * v20;
-        const V v42 = v36 * v23;
-        const V v43 = t7 - v42;
-        const V v44 = v37 * v10;
-        const V v45 = v39 - v44;
-        const M v46 = softehl_lt(softehl_splat(0.0), v45);
-        const V v47 = v37 * v27;
-        const V v48 = v40 + v47;
-        const V v49 = v37 * v25;
-        const V v50 = v43 - v49;
-        const V v51 = v37 * v12;
-        const V v52 = v51 + v41;
-        V v53 = softehl_splat(0.0);
-        V v54 = softehl_splat(0.0);
-        V v55 = softehl_splat(0.0);
-        V v56 = softehl_splat(0.0);
-        const M m57 = v46;
-        if (softehl_any(m57)) {
-            const V v58 = v34 * v50;
-            const V v59 = v45 * tp4;
-            const V v60 = v58 - v59;
-            v53 = softehl_blend(m57, v45, v53);
-            v54 = softehl_blend(m57, softehl_splat(0.0), v54);
-            v55 = softehl_blend(m57, v60, v55);
-            v56 = softehl_blend(m57, softehl_splat(0.0), v56);
+        const double v15 = 0.5 * w[0];
+        const V v16 = 1.0 - p6, v17 = 1.0 - p4, v18 = w[3] * v13;
+        const double v19 = 0.5 + v15, v20 = 0.5 - v15;
+        const V v21 = parameters[1] - v19 * v3 - v20 * v4;
+        const M v22 = softehl_lt(softehl_splat(0.0), v21);
+        const V v23 = v19 * v8 + v20 * v12, v24 = t7 - v19 * v9 - v20 * v10,
+            v25 = v20 * v5 + v19 * v7;
+        V v26 = softehl_splat(0.0), v27 = softehl_splat(0.0), v28 = softehl_splat(0.0),
+            v29 = softehl_splat(0.0);
+        const M m30 = v22;
+        if (softehl_any(m30)) {
+            const V v31 = v17 * v24 - v21 * tp4; v26 = softehl_blend(m30, v21, v26);
+            v27 = softehl_blend(m30, softehl_splat(0.0), v27); v28 = softehl_blend(m30, v31, v28);
+            v29 = softehl_blend(m30, softehl_splat(0.0), v29);
         }
-        const M m61 = ~v46;
-        if (softehl_any(m61)) {
-            const V v62 = v33 * v50;
-            const V v63 = v45 * tp6;
-            const V v64 = v62 - v63;
-            v53 = softehl_blend(m61, softehl_splat(0.0), v53);
-            v54 = softehl_blend(m61, v45, v54);
-            v55 = softehl_blend(m61, softehl_splat(0.0), v55);
-            v56 = softehl_blend(m61, v64, v56);
+        const M m32 = ~v22;
+        if (softehl_any(m32)) {
+            const V v33 = v16 * v24 - v21 * tp6; v26 = softehl_blend(m32, softehl_splat(0.0), v26);
+            v27 = softehl_blend(m32, v21, v27); v28 = softehl_blend(m32, softehl_splat(0.0), v28);
+            v29 = softehl_blend(m32, v33, v29);
         }
-        const double v65 = 0.5 * w[1];
-        const double v66 = 0.5 * w[2];
-        const V v67 = v33 * v54;
-        const double v68 = 0.5 - v65;
-        const double v69 = 0.5 + v65;
-        const double v70 = 0.5 - v66;
-        const double v71 = 0.5 + v66;
-        const V v72 = v34 * v53;
-        const V v73 = v67 + v72;
-        const V v74 = 0.08333333333333333 * p3;
-        const V v75 = 0.25 * p3;
-        const V v76 = 0.5 * v73;
-        const V v77 = v56 + v55;
-        const V v78 = v37 * v4;
-        const V v79 = v68 * v4;
-        const V v80 = v70 * v4;
-        const V v81 = v68 * v12;
-        const V v82 = v70 * v12;
-        const V v83 = p1 * v31;
-        const V v84 = tp1 - v83;
-        const V v85 = 0.5 * p1;
-        const V v86 = v36 * v5;
-        const V v87 = v78 + v86;
-        const V v88 = v69 * v5;
-        const V v89 = v79 + v88;
-        const V v90 = v71 * v5;
-        const V v91 = v80 + v90;
-        const V v92 = v69 * v20;
-        const V v93 = v81 + v92;
-        const V v94 = v71 * v20;
-        const V v95 = v82 + v94;
-        const V v96 = 1.0 / v87;
-        const V v97 = 0.5 * v87;
-        const V v98 = v87 * v76;
-        const V v99 = v89 * v91;
-        const V v100 = v89 * v95;
-        const V v101 = v89 + v91;
-        const V v102 = v97 * v77;
-        const V v103 = v97 * v84;
-        const V v104 = 0.5 * v101;
-        const V v105 = v91 * v93;
-        const V v106 = v105 + v100;
-        const V v107 = v93 + v95;
-        const V v108 = 2.0 * v99;
-        const V v109 = v76 * v52;
-        const V v110 = v109 + v102;
-        const V v111 = v52 * v85;
-        const V v112 = v103 + v111;
-        const V v113 = 0.5 * v107;
-        const V v114 = v104 * v108;
-        const V v115 = v26 * v112;
-        const V v116 = v104 * v104;
-        const V v117 = parameters[3] * tp2;
-        const V v118 = parameters[3] * tp0;
-        const V v119 = p2 * parameters[3];
-        const V v120 = p0 * parameters[3];
-        const V v121 = softehl_vexp(v119);
-        const V v122 = p2 * t9;
-        const V v123 = v122 + v117;
-        const V v124 = p0 * t9;
-        const V v125 = v124 + v118;
-        const V v126 = softehl_vexp(v120);
-        const V v127 = v104 * v116;
-        const V v128 = 1.0 / v116;
-        const V v129 = v116 * v75;
-        const V v130 = v129 * v113;
-        const V v131 = v74 * v127;
-        const V v132 = 0.08333333333333333 * v127;
-        const V v133 = tp3 * v132;
-        const V v134 = v133 + v130;
-        const V v135 = v96 * v73;
-        const V v136 = v52 * v135;
-        const V v137 = v77 - v136;
-        const V v138 = v128 * v114;
-        const V v139 = v138 * v113;
-        const V v140 = v106 - v139;
-        const V v141 = v128 * v140;
-        const V v142 = v99 * v128;
-        const V v143 = v142 * v110;
-        const V v144 = v142 * v142;
-        const V v145 = 2.0 * v142;
-        const V v146 = v98 * v141;
-        const V v147 = v146 + v143;
-        const V v148 = parameters[2] * v121;
-        const V v149 = parameters[2] * v126;
-        const V v150 = v149 * v125;
-        const V v151 = v149 * v137;
-        const V v152 = v126 * t8;
-        const V v153 = v152 + v150;
-        const V v154 = v73 * v153;
-        const V v155 = v154 + v151;
-        const V v156 = v121 * t8;
-        const V v157 = v96 * v155;
-        const V v158 = v148 * v123;
-        const V v159 = v156 + v158;
-        const V v160 = v115 + v157;
-        const V v161 = v157 - v115;
-        const V v162 = v148 * v30;
-        const V v163 = v19 * v159;
-        const V v164 = v162 + v163;
-        const V v165 = v148 * v19;
-        const V v166 = 1.0 / v165;
-        const V v167 = v166 * v144;
-        const V v168 = v167 * v164;
-        const V v169 = v145 * v141;
-        const V v170 = v168 - v169;
-        const V v171 = v131 * v170;
-        const V v172 = v144 * v134;
-        const V v173 = v171 - v172;
-        const V v174 = v166 * v173;
-        const V v175 = v147 + v174;
-        softehl_store4(R + 13 * q + 0, (13 * points), v48, v35, v52, tp0);
-        softehl_store4(R + 13 * q + 4, (13 * points), v161, v175, v160, v153);
-        softehl_store1(R + 13 * q + 8, (13 * points), v52);
+        const double v34 = 0.5 * w[1], v35 = 0.5 * w[2], v36 = 0.5 - v34, v37 = 0.5 + v34,
+            v38 = 0.5 - v35, v39 = 0.5 + v35;
+        const V v40 = v16 * v27 + v17 * v26, v41 = 0.5 * v40, v42 = v29 + v28,
+            v43 = v20 * v1 + v19 * v2, v44 = v36 * v1 + v37 * v2, v45 = v38 * v1 + v39 * v2,
+            v46 = v36 * v5 + v37 * v7, v47 = v38 * v5 + v39 * v7, v48 = 1.0 / v43, v49 = 0.5 * v43,
+            v50 = v44 * v45, v51 = 0.5 * (v44 + v45), v52 = 0.5 * (v46 + v47),
+            v53 = v11 * (v49 * (tp1 - p1 * v14) + v25 * (0.5 * p1)), v54 = v51 * v51,
+            v55 = softehl_vexp(p2 * parameters[3]), v56 = softehl_vexp(p0 * parameters[3]),
+            v57 = v51 * v54, v58 = 1.0 / v54,
+            v59 = v58 * (v45 * v46 + v44 * v47 - v58 * (v51 * (2.0 * v50)) * v52), v60 = v50 * v58,
+            v61 = v60 * v60, v62 = parameters[2] * v55, v63 = parameters[2] * v56,
+            v64 = v56 * t8 + v63 * (p0 * t9 + parameters[3] * tp0),
+            v65 = v48 * (v40 * v64 + v63 * (v42 - v25 * (v48 * v40))), v66 = v53 + v65,
+            v67 = v65 - v53,
+            v68 = v62 * v13 + v6 * (v55 * t8 + v62 * (p2 * t9 + parameters[3] * tp2)),
+            v69 = 1.0 / (v62 * v6),
+            v70 = 0.08333333333333333 * p3 * v57 * (v69 * v61 * v68 - 2.0 * v60 * v59),
+            v71 = v61 * (tp3 * (0.08333333333333333 * v57) + v54 * (0.25 * p3) * v52),
+            v72 = v43 * v41 * v59 + v60 * (v41 * v25 + v49 * v42) + v69 * (v70 - v71);
+        softehl_store4(R + 13 * q + 0, (13 * points), v23, v18, v25, tp0);
+        softehl_store4(R + 13 * q + 4, (13 * points), v67, v72, v66, v64);
+        softehl_store1(R + 13 * q + 8, (13 * points), v25);
         softehl_store2(R + 13 * q + 11, (13 * points), tp4, tp6);
     }
     for (ptrdiff_t q = 0; q < points; ++q) {
         softehl_store2(R + 13 * q + 9, (13 * points), softehl_splat(0.0), softehl_splat(0.0));
     }
 }
-
-void softehl_film_conserving_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_fields_rate_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, direction + (13 + (4 + modes)) * e, parameters, rule, basis, values + (13 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_fields_rate_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), direction + (13 + (4 + modes)) * (n - SOFTEHL_LANES), parameters, rule, basis, values + (13 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double t[SOFTEHL_LANES * (13 + (4 + modes))];
-    softehl_pad(t, direction, (13 + (4 + modes)), n);
-    double R[SOFTEHL_LANES * (13 * points)];
-    softehl_film_conserving_fields_rate(SOFTEHL_LANES, points, modes, X, d, a, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (13 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_conserving_fields_rate, 4, (4 + modes), 2, (13 + (4 + modes)), (13 * points), 0)

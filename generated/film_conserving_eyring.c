@@ -40,22 +40,15 @@ SOFTEHL_LANEWISE(cosh)
 
 SOFTEHL_LANEWISE(sinh)
 
-static void softehl_film_conserving_eyring_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_conserving_eyring_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -72,327 +65,115 @@ static void softehl_film_conserving_eyring_residual_group(
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
     const double v1 = 6.283185307179586 * parameters[4];
-    const V v2 = X2 + d2;
-    const V v3 = X1 - parameters[0];
-    const V v4 = X3 - parameters[0];
-    const V v5 = d1 + v3;
-    const V v6 = d2 * parameters[7];
-    const V v7 = a1 + v6;
-    const V v8 = d0 * parameters[7];
-    const V v9 = a0 + v8;
-    const V v10 = d3 + v4;
-    const double v11 = 1.0 / parameters[6];
-    const V v12 = v2 - d0;
-    const V v13 = v12 - X0;
-    const V v14 = 0.5 * v13;
-    const V v15 = v10 - v5;
-    const V v16 = 0.5 * v15;
-    const V v17 = parameters[6] * v14;
-    const V v18 = 1.0 / v17;
-    const V v19 = 1.0 / v14;
-    const V v20 = v14 * v14;
-    const V v21 = v16 * v16;
-    const V v22 = v21 + v20;
-    const V v23 = softehl_vsqrt(v22);
-    const V v24 = parameters[5] * v23;
-    const V v25 = 0.5 * v18;
-    const V v26 = 0.5 * v19;
-    V s27 = softehl_splat(0.0);
-    V s28 = softehl_splat(0.0);
-    V s29 = softehl_splat(0.0);
-    V s30 = softehl_splat(0.0);
+    const V v2 = d1 + (X1 - parameters[0]), v3 = a1 + d2 * parameters[7],
+        v4 = a0 + d0 * parameters[7], v5 = d3 + (X3 - parameters[0]);
+    const double v6 = 1.0 / parameters[6];
+    const V v7 = 0.5 * (X2 + d2 - d0 - X0), v8 = 0.5 * (v5 - v2),
+        v9 = softehl_vsqrt(v8 * v8 + v7 * v7), v10 = parameters[5] * v9,
+        v11 = 0.5 * (1.0 / (parameters[6] * v7)), v12 = 0.5 * (1.0 / v7);
+    V s13 = {0}, s14 = {0}, s15 = {0}, s16 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v31 = 0.5 * w[0];
-        const V v32 = p1 * v26;
-        const V v33 = p0 * v14;
-        const double v34 = 0.5 + v31;
-        const double v35 = 0.5 - v31;
-        const V v36 = w[3] * v33;
-        const V v37 = v35 * v5;
-        const V v38 = v34 * v10;
-        const V v39 = v37 + v38;
-        const V v40 = v39 * v32;
-        const V v41 = parameters[0] + v39;
-        const V v42 = v11 * v40;
-        const V v43 = v42 * v42;
-        const M v44 = softehl_lt(v43, softehl_splat(1.0));
-        const V v45 = v41 * v1;
-        const V v46 = v36 * v45;
-        const V v47 = v34 * v46;
-        s27 += v47;
-        const V v48 = v35 * v46;
-        s28 += v48;
-        V v49 = softehl_splat(0.0);
-        const M m50 = v44;
-        if (softehl_any(m50)) {
-            const V v51 = 1.9572941063391263e-20 * v43;
-            const V v52 = 8.22063524662433e-18 + v51;
-            const V v53 = v43 * v52;
-            const V v54 = 2.8114572543455206e-15 + v53;
-            const V v55 = v43 * v54;
-            const V v56 = 7.647163731819816e-13 + v55;
-            const V v57 = v43 * v56;
-            const V v58 = 1.6059043836821613e-10 + v57;
-            const V v59 = v43 * v58;
-            const V v60 = 2.505210838544172e-08 + v59;
-            const V v61 = v43 * v60;
-            const V v62 = 2.7557319223985893e-06 + v61;
-            const V v63 = v43 * v62;
-            const V v64 = 0.0001984126984126984 + v63;
-            const V v65 = v43 * v64;
-            const V v66 = 0.008333333333333333 + v65;
-            const V v67 = v43 * v66;
-            const V v68 = 0.16666666666666666 + v67;
-            const V v69 = v43 * v68;
-            const V v70 = 1.0 + v69;
-            const V v71 = 1.0 / v70;
-            v49 = softehl_blend(m50, v71, v49);
+        const double v17 = 0.5 * w[0], v18 = 0.5 + v17, v19 = 0.5 - v17;
+        const V v20 = v19 * v2 + v18 * v5, v21 = v20 * (p1 * v12), v22 = v6 * v21, v23 = v22 * v22;
+        const M v24 = softehl_lt(v23, softehl_splat(1.0));
+        const V v25 = (parameters[0] + v20) * v1, v26 = w[3] * (p0 * v7) * v25;
+        s13 += v18 * v26; s14 += v19 * v26; V v27 = softehl_splat(0.0); const M m28 = v24;
+        if (softehl_any(m28)) {
+            const V v29 = 2.8114572543455206e-15 + v23 * (8.22063524662433e-18 + 1.9572941063391263e-20 * v23),
+                v30 = 1.6059043836821613e-10 + v23 * (7.647163731819816e-13 + v23 * v29),
+                v31 = 2.7557319223985893e-06 + v23 * (2.505210838544172e-08 + v23 * v30),
+                v32 = v23 * (0.008333333333333333 + v23 * (0.0001984126984126984 + v23 * v31)),
+                v33 = 1.0 / (1.0 + v23 * (0.16666666666666666 + v32));
+            v27 = softehl_blend(m28, v33, v27);
         }
-        const M m72 = ~v44;
-        if (softehl_any(m72)) {
-            const V v73 = softehl_vsinh(v42);
-            const V v74 = 1.0 / v73;
-            const V v75 = v42 * v74;
-            v49 = softehl_blend(m72, v75, v49);
+        const M m34 = ~v24;
+        if (softehl_any(m34)) {
+            const V v35 = softehl_vsinh(v22), v36 = v22 * (1.0 / v35);
+            v27 = softehl_blend(m34, v36, v27);
         }
-        const V v76 = p0 * parameters[3];
-        const V v77 = softehl_vexp(v76);
-        const V v78 = parameters[6] * v39;
-        const V v79 = v34 * v7;
-        const V v80 = parameters[1] - v79;
-        const V v81 = 1.0 / v78;
-        const V v82 = v35 * v9;
-        const V v83 = v80 - v82;
-        const V v84 = parameters[2] * v77;
-        const V v85 = v84 * v83;
-        const V v86 = v81 * v85;
-        const V v87 = v49 * v86;
-        const V v88 = softehl_vasinh(v87);
-        const V v89 = parameters[6] * v88;
-        const M v90 = softehl_lt(softehl_splat(0.0), v89);
-        const M v91 = softehl_eq(v89, v89);
-        V v92 = softehl_splat(0.0);
-        const M m93 = v91;
-        if (softehl_any(m93)) {
-            const V v94 = softehl_blend(v90, v89, softehl_splat(0.0));
-            v92 = softehl_blend(m93, v94, v92);
+        const V v37 = softehl_vexp(p0 * parameters[3]), v38 = parameters[1] - v18 * v3 - v19 * v4,
+            v39 = v27 * (1.0 / (parameters[6] * v20) * (parameters[2] * v37 * v38)),
+            v40 = softehl_vasinh(v39), v41 = parameters[6] * v40;
+        const M v42 = softehl_lt(softehl_splat(0.0), v41), v43 = softehl_eq(v41, v41);
+        V v44 = softehl_splat(0.0); const M m45 = v43;
+        if (softehl_any(m45)) {
+            const V v46 = softehl_blend(v42, v41, softehl_splat(0.0));
+            v44 = softehl_blend(m45, v46, v44);
         }
-        const M m95 = ~v91;
-        if (softehl_any(m95)) {
-            const V v96 = v89 * v89;
-            const V v97 = v89 * v96;
-            const V v98 = -v97;
-            v92 = softehl_blend(m95, v98, v92);
+        const M m47 = ~v43;
+        if (softehl_any(m47)) {
+            const V v48 = -(v41 * (v41 * v41)); v44 = softehl_blend(m47, v48, v44);
         }
-        const V v99 = 1.0 - p4;
-        const V v100 = v99 * v92;
-        const V v101 = softehl_blend(v90, softehl_splat(0.0), v89);
-        const double v102 = 0.5 * w[1];
-        const double v103 = 0.5 * w[2];
-        const V v104 = 1.0 - p6;
-        const double v105 = 0.5 - v102;
-        const double v106 = 0.5 + v102;
-        const V v107 = p3 * v25;
-        const double v108 = 0.5 - v103;
-        const double v109 = 0.5 + v103;
-        const V v110 = v104 * v101;
-        const V v111 = w[3] * v45;
-        const V v112 = p0 * v16;
-        const V v113 = v105 * v5;
-        const V v114 = v108 * v5;
-        const V v115 = v106 * v10;
-        const V v116 = v113 + v115;
-        const V v117 = v109 * v10;
-        const V v118 = v114 + v117;
-        const V v119 = v110 - v40;
-        const V v120 = v100 + v119;
-        const V v121 = v24 * v120;
-        const V v122 = v112 - v121;
-        const V v123 = v116 + v118;
-        const V v124 = v111 * v122;
-        const V v125 = 0.5 * v123;
-        const V v126 = v125 * v107;
-        const V v127 = v126 * v126;
-        const M v128 = softehl_lt(v127, softehl_splat(1.0));
-        const V v129 = v34 * v124;
-        s29 += v129;
-        const V v130 = v35 * v124;
-        s30 += v130;
-        V v131 = softehl_splat(0.0);
-        V v132 = softehl_splat(0.0);
-        const M m133 = v128;
-        if (softehl_any(m133)) {
-            const V v134 = 1.9572941063391263e-20 * v127;
-            const V v135 = 8.22063524662433e-18 + v134;
-            const V v136 = v127 * v135;
-            const V v137 = 2.8114572543455206e-15 + v136;
-            const V v138 = 2.5529923126162516e-21 * v127;
-            const V v139 = 1.1743764638034756e-18 + v138;
-            const V v140 = v127 * v139;
-            const V v141 = 4.439143033177138e-16 + v140;
-            const V v142 = v127 * v137;
-            const V v143 = 7.647163731819816e-13 + v142;
-            const V v144 = v127 * v143;
-            const V v145 = 1.6059043836821613e-10 + v144;
-            const V v146 = v127 * v145;
-            const V v147 = 2.505210838544172e-08 + v146;
-            const V v148 = v127 * v141;
-            const V v149 = 1.34949948208585e-13 + v148;
-            const V v150 = v127 * v147;
-            const V v151 = 2.7557319223985893e-06 + v150;
-            const V v152 = v127 * v149;
-            const V v153 = 3.2118087673643227e-11 + v152;
-            const V v154 = v127 * v153;
-            const V v155 = 5.7812557812557815e-09 + v154;
-            const V v156 = v127 * v155;
-            const V v157 = 7.515632515632515e-07 + v156;
-            const V v158 = v127 * v157;
-            const V v159 = 6.613756613756614e-05 + v158;
-            const V v160 = v127 * v159;
-            const V v161 = 0.0035714285714285713 + v160;
-            const V v162 = v127 * v161;
-            const V v163 = 0.1 + v162;
-            const V v164 = v127 * v151;
-            const V v165 = 0.0001984126984126984 + v164;
-            const V v166 = v127 * v165;
-            const V v167 = 0.008333333333333333 + v166;
-            const V v168 = v127 * v167;
-            const V v169 = 0.16666666666666666 + v168;
-            const V v170 = v127 * v169;
-            const V v171 = 1.0 + v170;
-            const V v172 = 1.0 / v171;
-            const V v173 = v127 * v163;
-            const V v174 = 1.0 + v173;
-            v131 = softehl_blend(m133, v172, v131);
-            v132 = softehl_blend(m133, v174, v132);
+        const V v49 = 1.0 - p4, v50 = softehl_blend(v42, softehl_splat(0.0), v41);
+        const double v51 = 0.5 * w[1], v52 = 0.5 * w[2];
+        const V v53 = 1.0 - p6, v54 = (0.5 - v51) * v2 + (0.5 + v51) * v5,
+            v55 = (0.5 - v52) * v2 + (0.5 + v52) * v5,
+            v56 = w[3] * v25 * (p0 * v8 - v10 * (v49 * v44 + (v53 * v50 - v21))),
+            v57 = 0.5 * (v54 + v55), v58 = v57 * (p3 * v11), v59 = v58 * v58;
+        const M v60 = softehl_lt(v59, softehl_splat(1.0)); const V v61 = v18 * v56; s15 += v61;
+        const V v62 = v19 * v56; s16 += v62;
+        V v63 = softehl_splat(0.0), v64 = softehl_splat(0.0);
+        const M m65 = v60;
+        if (softehl_any(m65)) {
+            const V v66 = 2.8114572543455206e-15 + v59 * (8.22063524662433e-18 + 1.9572941063391263e-20 * v59),
+                v67 = 4.439143033177138e-16 + v59 * (1.1743764638034756e-18 + 2.5529923126162516e-21 * v59),
+                v68 = 1.6059043836821613e-10 + v59 * (7.647163731819816e-13 + v59 * v66),
+                v69 = 2.7557319223985893e-06 + v59 * (2.505210838544172e-08 + v59 * v68),
+                v70 = 3.2118087673643227e-11 + v59 * (1.34949948208585e-13 + v59 * v67),
+                v71 = 7.515632515632515e-07 + v59 * (5.7812557812557815e-09 + v59 * v70),
+                v72 = 0.0035714285714285713 + v59 * (6.613756613756614e-05 + v59 * v71),
+                v73 = v59 * (0.008333333333333333 + v59 * (0.0001984126984126984 + v59 * v69)),
+                v74 = 1.0 / (1.0 + v59 * (0.16666666666666666 + v73)),
+                v75 = 1.0 + v59 * (0.1 + v59 * v72);
+            v63 = softehl_blend(m65, v74, v63); v64 = softehl_blend(m65, v75, v64);
         }
-        const M m175 = ~v128;
-        if (softehl_any(m175)) {
-            const V v176 = softehl_vsinh(v126);
-            const V v177 = softehl_vcosh(v126);
-            const V v178 = v126 * v127;
-            const V v179 = v126 * v177;
-            const V v180 = 1.0 / v176;
-            const V v181 = 1.0 / v178;
-            const V v182 = v126 * v180;
-            const V v183 = v179 - v176;
-            const V v184 = 3.0 * v183;
-            const V v185 = v184 * v181;
-            v131 = softehl_blend(m175, v182, v131);
-            v132 = softehl_blend(m175, v185, v132);
+        const M m76 = ~v60;
+        if (softehl_any(m76)) {
+            const V v77 = softehl_vsinh(v58), v78 = softehl_vcosh(v58), v79 = v58 * (1.0 / v77),
+                v80 = 3.0 * (v58 * v78 - v77) * (1.0 / (v58 * v59));
+            v63 = softehl_blend(m76, v79, v63); v64 = softehl_blend(m76, v80, v64);
         }
-        const V v186 = p2 * parameters[3];
-        const V v187 = 0.08333333333333333 * p3;
-        const V v188 = v116 * v118;
-        const V v189 = softehl_vexp(v186);
-        const V v190 = parameters[6] * v125;
-        const V v191 = v125 * v125;
-        const V v192 = v187 * v125;
-        const V v193 = 1.0 / v190;
-        const M v194 = softehl_lt(softehl_splat(0.0), v83);
-        const V v195 = 1.0 / v191;
-        const V v196 = v188 * v195;
-        const V v197 = parameters[2] * v189;
-        const V v198 = v197 * v83;
-        const V v199 = v193 * v198;
-        const V v200 = v197 * v14;
-        const V v201 = 1.0 / v200;
-        const V v202 = v201 * v192;
-        const V v203 = v191 * v202;
-        const V v204 = v196 * v203;
-        const V v205 = v131 * v199;
-        const V v206 = v205 * v205;
-        const V v207 = 1.0 + v206;
-        const V v208 = softehl_vsqrt(v207);
-        const V v209 = v204 * v208;
-        const V v210 = v132 * v209;
-        const V v211 = softehl_blend(v194, v83, softehl_splat(0.0));
-        const V v212 = softehl_blend(v194, softehl_splat(0.0), v83);
-        const V v213 = 0.5 * v39;
-        const V v214 = v104 * v212;
-        const V v215 = v99 * v211;
-        const V v216 = v214 + v215;
-        const V v217 = v213 * v216;
-        const V v218 = v217 - v210;
-        const V v219 = v196 * v218;
-        const V v220 = w[3] * v219;
+        const V v81 = softehl_vexp(p2 * parameters[3]), v82 = v57 * v57;
+        const M v83 = softehl_lt(softehl_splat(0.0), v38);
+        const V v84 = v54 * v55 * (1.0 / v82), v85 = parameters[2] * v81,
+            v86 = v84 * (v82 * (1.0 / (v85 * v7) * (0.08333333333333333 * p3 * v57))),
+            v87 = v63 * (1.0 / (parameters[6] * v57) * (v85 * v38)),
+            v88 = softehl_vsqrt(1.0 + v87 * v87), v89 = softehl_blend(v83, v38, softehl_splat(0.0)),
+            v90 = softehl_blend(v83, softehl_splat(0.0), v38),
+            v91 = w[3] * (v84 * (0.5 * v20 * (v53 * v90 + v49 * v89) - v64 * (v86 * v88)));
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
             (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
-            R_lanes[4 + i] += D1 * v220;
+            R_lanes[4 + i] += D1 * v91;
         }
     }
-    const V v221 = -s27;
-    const V v222 = -s28;
-    R_lanes[0] = s30;
-    R_lanes[1] = v222;
-    R_lanes[2] = s29;
-    R_lanes[3] = v221;
+    const V v92 = -s13, v93 = -s14;
+    R_lanes[0] = s16; R_lanes[1] = v93; R_lanes[2] = s15; R_lanes[3] = v92;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_conserving_eyring_residual, 4, (4 + modes), 2, 0, (4 + modes), 0)
 
-void softehl_film_conserving_eyring_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_conserving_eyring_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_eyring_residual_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_eyring_residual_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_conserving_eyring_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_conserving_eyring_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -416,1163 +197,328 @@ static void softehl_film_conserving_eyring_tangent_group(
     for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
         K_lanes[i] = softehl_splat(0.0);
     const double v1 = 6.283185307179586 * parameters[4];
-    const V v2 = X2 + d2;
-    const V v3 = X1 - parameters[0];
-    const V v4 = X3 - parameters[0];
-    const V v5 = d1 + v3;
-    const V v6 = d2 * parameters[7];
-    const V v7 = a1 + v6;
-    const V v8 = d3 + v4;
-    const double v9 = parameters[2] * parameters[3];
-    const V v10 = d0 * parameters[7];
-    const V v11 = a0 + v10;
-    const V v12 = v2 - d0;
-    const double v13 = 1.0 / parameters[6];
-    const double v14 = parameters[6] * v9;
-    const V v15 = v12 - X0;
-    const V v16 = 0.5 * v15;
-    const V v17 = v8 - v5;
-    const V v18 = 0.5 * v17;
-    const V v19 = v1 * v16;
-    const V v20 = 1.0 / v16;
-    const V v21 = parameters[6] * v16;
-    const V v22 = 1.0 / v21;
-    const V v23 = v16 * v16;
-    const V v24 = parameters[5] * v16;
-    const V v25 = parameters[6] * v22;
-    const V v26 = v22 * v25;
-    const V v27 = 0.5 * v22;
-    const V v28 = parameters[5] * v18;
-    const V v29 = v18 * v18;
-    const V v30 = v29 + v23;
-    const V v31 = softehl_vsqrt(v30);
-    const V v32 = parameters[5] * v31;
-    const V v33 = 1.0 / v30;
-    const V v34 = softehl_vsqrt(v33);
-    const V v35 = 0.5 * v34;
-    const V v36 = v24 * v35;
-    const V v37 = v28 * v35;
-    const V v38 = parameters[7] * v32;
-    const V v39 = 0.5 * v20;
-    const V v40 = v20 * v39;
-    const V v41 = v32 * v40;
-    V s42 = softehl_splat(0.0);
-    V s43 = softehl_splat(0.0);
-    V s44 = softehl_splat(0.0);
-    V s45 = softehl_splat(0.0);
-    V s46 = softehl_splat(0.0);
-    V s47 = softehl_splat(0.0);
-    V s48 = softehl_splat(0.0);
-    V s49 = softehl_splat(0.0);
-    V s50 = softehl_splat(0.0);
-    V s51 = softehl_splat(0.0);
-    V s52 = softehl_splat(0.0);
-    V s53 = softehl_splat(0.0);
-    V s54 = softehl_splat(0.0);
-    V s55 = softehl_splat(0.0);
-    V s56 = softehl_splat(0.0);
-    V s57 = softehl_splat(0.0);
-    V s58 = softehl_splat(0.0);
-    V s59 = softehl_splat(0.0);
+    const V v2 = d1 + (X1 - parameters[0]), v3 = a1 + d2 * parameters[7],
+        v4 = d3 + (X3 - parameters[0]);
+    const double v5 = parameters[2] * parameters[3]; const V v6 = a0 + d0 * parameters[7];
+    const double v7 = 1.0 / parameters[6], v8 = parameters[6] * v5;
+    const V v9 = 0.5 * (X2 + d2 - d0 - X0), v10 = 0.5 * (v4 - v2), v11 = v1 * v9, v12 = 1.0 / v9,
+        v13 = 1.0 / (parameters[6] * v9), v14 = v13 * (parameters[6] * v13), v15 = 0.5 * v13,
+        v16 = v10 * v10 + v9 * v9, v17 = softehl_vsqrt(v16), v18 = parameters[5] * v17,
+        v19 = softehl_vsqrt(1.0 / v16), v20 = 0.5 * v19, v21 = parameters[5] * v9 * v20,
+        v22 = parameters[5] * v10 * v20, v23 = parameters[7] * v18, v24 = v18 * (v12 * (0.5 * v12));
+    V s25 = {0}, s26 = {0}, s27 = {0}, s28 = {0}, s29 = {0}, s30 = {0}, s31 = {0}, s32 = {0},
+        s33 = {0}, s34 = {0}, s35 = {0}, s36 = {0}, s37 = {0}, s38 = {0}, s39 = {0}, s40 = {0},
+        s41 = {0}, s42 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v60 = 0.5 * w[0];
-        const double v61 = 0.5 + v60;
-        const double v62 = 0.5 - v60;
-        const V v63 = w[3] * v16;
-        const V v64 = p0 * v19;
-        const V v65 = p1 * v20;
-        const double v66 = v62 * w[3];
-        const double v67 = v61 * w[3];
-        const V v68 = v62 * v5;
-        const V v69 = 0.5 * v65;
-        const V v70 = v62 * v64;
-        const V v71 = v61 * v64;
-        const V v72 = v61 * v8;
-        const V v73 = v68 + v72;
-        const V v74 = parameters[0] + v73;
-        const V v75 = 0.5 * v73;
-        const V v76 = v13 * v69;
-        const V v77 = v66 * v70;
-        s46 += v77;
-        const V v78 = v67 * v70;
-        s48 += v78;
-        const V v79 = v66 * v71;
-        s47 += v79;
-        const V v80 = v67 * v71;
-        s49 += v80;
-        const V v81 = v74 * v1;
-        const V v82 = p1 * v75;
-        const V v83 = v75 * v65;
-        const V v84 = v75 * v20;
-        const V v85 = p0 * v81;
-        const V v86 = v13 * v82;
-        const V v87 = v13 * v83;
-        const V v88 = v13 * v84;
-        const V v89 = v87 * v87;
-        const M v90 = softehl_lt(v89, softehl_splat(1.0));
-        const V v91 = 0.5 * v85;
-        const V v92 = v66 * v91;
-        s42 += v92;
-        const V v93 = v67 * v91;
-        s43 += v93;
-        const V v94 = v63 * v85;
-        const V v95 = v61 * v94;
-        s44 += v95;
-        const V v96 = v62 * v94;
-        s45 += v96;
-        V v97 = softehl_splat(0.0);
-        V v98 = softehl_splat(0.0);
-        V v99 = softehl_splat(0.0);
-        V v100 = softehl_splat(0.0);
-        const M m101 = v90;
-        if (softehl_any(m101)) {
-            const V v102 = 2.0 * v87;
-            const V v103 = v88 * v102;
-            const V v104 = v86 * v102;
-            const V v105 = v76 * v102;
-            const V v106 = 1.9572941063391263e-20 * v89;
-            const V v107 = 8.22063524662433e-18 + v106;
-            const V v108 = v106 + v107;
-            const V v109 = v89 * v107;
-            const V v110 = 2.8114572543455206e-15 + v109;
-            const V v111 = v89 * v110;
-            const V v112 = 7.647163731819816e-13 + v111;
-            const V v113 = v89 * v108;
-            const V v114 = v110 + v113;
-            const V v115 = v89 * v112;
-            const V v116 = 1.6059043836821613e-10 + v115;
-            const V v117 = v89 * v116;
-            const V v118 = 2.505210838544172e-08 + v117;
-            const V v119 = v89 * v118;
-            const V v120 = 2.7557319223985893e-06 + v119;
-            const V v121 = v89 * v120;
-            const V v122 = 0.0001984126984126984 + v121;
-            const V v123 = v89 * v122;
-            const V v124 = 0.008333333333333333 + v123;
-            const V v125 = v89 * v124;
-            const V v126 = 0.16666666666666666 + v125;
-            const V v127 = v89 * v126;
-            const V v128 = 1.0 + v127;
-            const V v129 = 1.0 / v128;
-            const V v130 = v129 * v129;
-            const V v131 = v103 * v114;
-            const V v132 = v89 * v131;
-            const V v133 = v112 * v103;
-            const V v134 = v133 + v132;
-            const V v135 = v89 * v134;
-            const V v136 = v116 * v103;
-            const V v137 = v136 + v135;
-            const V v138 = v89 * v137;
-            const V v139 = v104 * v114;
-            const V v140 = v105 * v114;
-            const V v141 = v112 * v104;
-            const V v142 = v112 * v105;
-            const V v143 = v89 * v139;
-            const V v144 = v141 + v143;
-            const V v145 = v89 * v140;
-            const V v146 = v142 + v145;
-            const V v147 = v118 * v103;
-            const V v148 = v147 + v138;
-            const V v149 = v89 * v144;
-            const V v150 = v116 * v105;
-            const V v151 = v116 * v104;
-            const V v152 = v151 + v149;
-            const V v153 = v89 * v146;
-            const V v154 = v150 + v153;
-            const V v155 = v89 * v152;
-            const V v156 = v118 * v104;
-            const V v157 = v156 + v155;
-            const V v158 = v118 * v105;
-            const V v159 = v89 * v154;
-            const V v160 = v158 + v159;
-            const V v161 = v89 * v148;
-            const V v162 = v120 * v103;
-            const V v163 = v162 + v161;
-            const V v164 = v89 * v157;
-            const V v165 = v120 * v104;
-            const V v166 = v165 + v164;
-            const V v167 = v120 * v105;
-            const V v168 = v89 * v160;
-            const V v169 = v167 + v168;
-            const V v170 = v89 * v163;
-            const V v171 = v122 * v103;
-            const V v172 = v171 + v170;
-            const V v173 = v89 * v166;
-            const V v174 = v122 * v104;
-            const V v175 = v174 + v173;
-            const V v176 = v122 * v105;
-            const V v177 = v89 * v169;
-            const V v178 = v176 + v177;
-            const V v179 = v89 * v172;
-            const V v180 = v124 * v103;
-            const V v181 = v180 + v179;
-            const V v182 = v126 * v103;
-            const V v183 = v89 * v181;
-            const V v184 = v182 + v183;
-            const V v185 = v130 * v184;
-            const V v186 = -v185;
-            const V v187 = v89 * v175;
-            const V v188 = v124 * v104;
-            const V v189 = v188 + v187;
-            const V v190 = v124 * v105;
-            const V v191 = v89 * v178;
-            const V v192 = v190 + v191;
-            const V v193 = v126 * v104;
-            const V v194 = v126 * v105;
-            const V v195 = v89 * v189;
-            const V v196 = v193 + v195;
-            const V v197 = v89 * v192;
-            const V v198 = v194 + v197;
-            const V v199 = v130 * v196;
-            const V v200 = v130 * v198;
-            const V v201 = -v199;
-            const V v202 = -v200;
-            v97 = softehl_blend(m101, v129, v97);
-            v98 = softehl_blend(m101, v201, v98);
-            v99 = softehl_blend(m101, v202, v99);
-            v100 = softehl_blend(m101, v186, v100);
+        const double v43 = 0.5 * w[0], v44 = 0.5 + v43, v45 = 0.5 - v43;
+        const V v46 = p0 * v11, v47 = p1 * v12;
+        const double v48 = v45 * w[3], v49 = v44 * w[3];
+        const V v50 = 0.5 * v47, v51 = v45 * v46, v52 = v44 * v46, v53 = v45 * v2 + v44 * v4,
+            v54 = 0.5 * v53, v55 = v7 * v50;
+        s29 += v48 * v51; s31 += v49 * v51; s30 += v48 * v52; s32 += v49 * v52;
+        const V v56 = (parameters[0] + v53) * v1, v57 = p1 * v54, v58 = v54 * v47, v59 = v54 * v12,
+            v60 = p0 * v56, v61 = v7 * v57, v62 = v7 * v58, v63 = v7 * v59, v64 = v62 * v62;
+        const M v65 = softehl_lt(v64, softehl_splat(1.0)); const V v66 = 0.5 * v60;
+        s25 += v48 * v66; s26 += v49 * v66; const V v67 = w[3] * v9 * v60; s27 += v44 * v67;
+        s28 += v45 * v67;
+        V v68 = softehl_splat(0.0), v69 = softehl_splat(0.0), v70 = softehl_splat(0.0),
+            v71 = softehl_splat(0.0);
+        const M m72 = v65;
+        if (softehl_any(m72)) {
+            const V v73 = 2.0 * v62, v74 = v63 * v73, v75 = v61 * v73, v76 = v55 * v73,
+                v77 = 1.9572941063391263e-20 * v64, v78 = 8.22063524662433e-18 + v77,
+                v79 = 2.8114572543455206e-15 + v64 * v78, v80 = 7.647163731819816e-13 + v64 * v79,
+                v81 = v79 + v64 * (v77 + v78), v82 = 1.6059043836821613e-10 + v64 * v80,
+                v83 = 2.505210838544172e-08 + v64 * v82, v84 = 2.7557319223985893e-06 + v64 * v83,
+                v85 = 0.0001984126984126984 + v64 * v84, v86 = 0.008333333333333333 + v64 * v85,
+                v87 = 0.16666666666666666 + v64 * v86, v88 = 1.0 / (1.0 + v64 * v87),
+                v89 = v88 * v88,
+                v90 = v83 * v74 + v64 * (v82 * v74 + v64 * (v80 * v74 + v64 * (v74 * v81))),
+                v91 = v83 * v75 + v64 * (v82 * v75 + v64 * (v80 * v75 + v64 * (v75 * v81))),
+                v92 = v83 * v76 + v64 * (v82 * v76 + v64 * (v80 * v76 + v64 * (v76 * v81))),
+                v93 = v64 * (v86 * v74 + v64 * (v85 * v74 + v64 * (v84 * v74 + v64 * v90))),
+                v94 = -(v89 * (v87 * v74 + v93)),
+                v95 = v64 * (v86 * v75 + v64 * (v85 * v75 + v64 * (v84 * v75 + v64 * v91))),
+                v96 = v64 * (v86 * v76 + v64 * (v85 * v76 + v64 * (v84 * v76 + v64 * v92))),
+                v97 = -(v89 * (v87 * v75 + v95)), v98 = -(v89 * (v87 * v76 + v96));
+            v68 = softehl_blend(m72, v88, v68); v69 = softehl_blend(m72, v97, v69);
+            v70 = softehl_blend(m72, v98, v70); v71 = softehl_blend(m72, v94, v71);
         }
-        const M m203 = ~v90;
-        if (softehl_any(m203)) {
-            const V v204 = softehl_vsinh(v87);
-            const V v205 = softehl_vcosh(v87);
-            const V v206 = 1.0 / v204;
-            const V v207 = v87 * v206;
-            const V v208 = v207 * v205;
-            const V v209 = 1.0 - v208;
-            const V v210 = v206 * v209;
-            const V v211 = v88 * v210;
-            const V v212 = v86 * v210;
-            const V v213 = v76 * v210;
-            v97 = softehl_blend(m203, v207, v97);
-            v98 = softehl_blend(m203, v212, v98);
-            v99 = softehl_blend(m203, v213, v99);
-            v100 = softehl_blend(m203, v211, v100);
+        const M m99 = ~v65;
+        if (softehl_any(m99)) {
+            const V v100 = softehl_vsinh(v62), v101 = softehl_vcosh(v62), v102 = 1.0 / v100,
+                v103 = v62 * v102, v104 = v102 * (1.0 - v103 * v101), v105 = v63 * v104,
+                v106 = v61 * v104, v107 = v55 * v104;
+            v68 = softehl_blend(m99, v103, v68); v69 = softehl_blend(m99, v106, v69);
+            v70 = softehl_blend(m99, v107, v70); v71 = softehl_blend(m99, v105, v71);
         }
-        const V v214 = p0 * parameters[3];
-        const V v215 = softehl_vexp(v214);
-        const V v216 = parameters[6] * v73;
-        const double v217 = v60 - 0.5;
-        const V v218 = v62 * v11;
-        const V v219 = parameters[1] - v218;
-        const V v220 = 1.0 / v216;
-        const double v221 = parameters[6] * v61;
-        const V v222 = v61 * v7;
-        const V v223 = v219 - v222;
-        const V v224 = parameters[2] * v215;
-        const V v225 = v224 * v221;
-        const V v226 = v220 * v225;
-        const V v227 = v215 * v14;
-        const V v228 = v227 * v223;
-        const V v229 = v224 * v223;
-        const V v230 = parameters[6] * v224;
-        const V v231 = v220 * v230;
-        const V v232 = v220 * v228;
-        const V v233 = parameters[6] * v220;
-        const V v234 = v226 * v97;
-        const V v235 = v231 * v97;
-        const V v236 = v217 * v235;
-        const V v237 = v97 * v232;
-        const V v238 = v97 * v229;
-        const V v239 = parameters[6] * v229;
-        const V v240 = v220 * v239;
-        const V v241 = v99 * v229;
-        const V v242 = v233 * v238;
-        const V v243 = v241 - v242;
-        const V v244 = v220 * v238;
-        const V v245 = v220 * v243;
-        const V v246 = v244 * v244;
-        const V v247 = 1.0 + v246;
-        const V v248 = softehl_vasinh(v244);
-        const V v249 = parameters[6] * v248;
-        const V v250 = softehl_vsqrt(v247);
-        const V v251 = 1.0 / v250;
-        const V v252 = v234 * v251;
-        const V v253 = v236 * v251;
-        const V v254 = v237 * v251;
-        const V v255 = v240 * v251;
-        const V v256 = parameters[6] * v251;
-        const V v257 = v245 * v256;
-        const M v258 = softehl_lt(softehl_splat(0.0), v249);
-        const M v259 = softehl_eq(v249, v249);
-        const V v260 = v100 * v255;
-        const V v261 = v98 * v255;
-        V v262 = softehl_splat(0.0);
-        V v263 = softehl_splat(0.0);
-        V v264 = softehl_splat(0.0);
-        V v265 = softehl_splat(0.0);
-        V v266 = softehl_splat(0.0);
-        V v267 = softehl_splat(0.0);
-        V v268 = softehl_splat(0.0);
-        const M m269 = v259;
-        if (softehl_any(m269)) {
-            V v270 = softehl_splat(0.0);
-            V v271 = softehl_splat(0.0);
-            V v272 = softehl_splat(0.0);
-            V v273 = softehl_splat(0.0);
-            V v274 = softehl_splat(0.0);
-            V v275 = softehl_splat(0.0);
-            V v276 = softehl_splat(0.0);
-            const M m277 = v258 & m269;
-            if (softehl_any(m277)) {
-                const V v278 = -v252;
-                v270 = softehl_blend(m277, v249, v270);
-                v271 = softehl_blend(m277, v261, v271);
-                v272 = softehl_blend(m277, v253, v272);
-                v273 = softehl_blend(m277, v278, v273);
-                v274 = softehl_blend(m277, v257, v274);
-                v275 = softehl_blend(m277, v254, v275);
-                v276 = softehl_blend(m277, v260, v276);
+        const V v108 = softehl_vexp(p0 * parameters[3]); const double v109 = v43 - 0.5;
+        const V v110 = 1.0 / (parameters[6] * v53), v111 = parameters[1] - v45 * v6 - v44 * v3,
+            v112 = parameters[2] * v108, v113 = v112 * v111, v114 = v68 * v113, v115 = v110 * v114,
+            v116 = softehl_vasinh(v115), v117 = parameters[6] * v116,
+            v118 = softehl_vsqrt(1.0 + v115 * v115), v119 = 1.0 / v118,
+            v120 = v110 * (v112 * (parameters[6] * v44)) * v68 * v119,
+            v121 = v109 * (v110 * (parameters[6] * v112) * v68) * v119,
+            v122 = v68 * (v110 * (v108 * v8 * v111)) * v119,
+            v123 = v110 * (parameters[6] * v113) * v119,
+            v124 = v110 * (v70 * v113 - parameters[6] * v110 * v114) * (parameters[6] * v119);
+        const M v125 = softehl_lt(softehl_splat(0.0), v117), v126 = softehl_eq(v117, v117);
+        const V v127 = v71 * v123, v128 = v69 * v123;
+        V v129 = softehl_splat(0.0), v130 = softehl_splat(0.0), v131 = softehl_splat(0.0),
+            v132 = softehl_splat(0.0), v133 = softehl_splat(0.0), v134 = softehl_splat(0.0),
+            v135 = softehl_splat(0.0);
+        const M m136 = v126;
+        if (softehl_any(m136)) {
+            V v137 = softehl_splat(0.0), v138 = softehl_splat(0.0), v139 = softehl_splat(0.0),
+                v140 = softehl_splat(0.0), v141 = softehl_splat(0.0), v142 = softehl_splat(0.0),
+                v143 = softehl_splat(0.0);
+            const M m144 = v125 & m136;
+            if (softehl_any(m144)) {
+                const V v145 = -v120; v137 = softehl_blend(m144, v117, v137);
+                v138 = softehl_blend(m144, v128, v138); v139 = softehl_blend(m144, v121, v139);
+                v140 = softehl_blend(m144, v145, v140); v141 = softehl_blend(m144, v124, v141);
+                v142 = softehl_blend(m144, v122, v142); v143 = softehl_blend(m144, v127, v143);
             }
-            v262 = softehl_blend(m269, v270, v262);
-            v263 = softehl_blend(m269, v271, v263);
-            v264 = softehl_blend(m269, v272, v264);
-            v265 = softehl_blend(m269, v273, v265);
-            v266 = softehl_blend(m269, v274, v266);
-            v267 = softehl_blend(m269, v275, v267);
-            v268 = softehl_blend(m269, v276, v268);
+            v129 = softehl_blend(m136, v137, v129); v130 = softehl_blend(m136, v138, v130);
+            v131 = softehl_blend(m136, v139, v131); v132 = softehl_blend(m136, v140, v132);
+            v133 = softehl_blend(m136, v141, v133); v134 = softehl_blend(m136, v142, v134);
+            v135 = softehl_blend(m136, v143, v135);
         }
-        const M m279 = ~v259;
-        if (softehl_any(m279)) {
-            const V v280 = v249 * v249;
-            const V v281 = v249 * v280;
-            const V v282 = 3.0 * v280;
-            const V v283 = -v281;
-            const V v284 = v282 * v252;
-            const V v285 = v282 * v253;
-            const V v286 = -v285;
-            const V v287 = v282 * v254;
-            const V v288 = v282 * v260;
-            const V v289 = v282 * v261;
-            const V v290 = v282 * v257;
-            const V v291 = -v287;
-            const V v292 = -v288;
-            const V v293 = -v289;
-            const V v294 = -v290;
-            v262 = softehl_blend(m279, v283, v262);
-            v263 = softehl_blend(m279, v293, v263);
-            v264 = softehl_blend(m279, v286, v264);
-            v265 = softehl_blend(m279, v284, v265);
-            v266 = softehl_blend(m279, v294, v266);
-            v267 = softehl_blend(m279, v291, v267);
-            v268 = softehl_blend(m279, v292, v268);
+        const M m146 = ~v126;
+        if (softehl_any(m146)) {
+            const V v147 = v117 * v117, v148 = 3.0 * v147, v149 = -(v117 * v147),
+                v150 = v148 * v120, v151 = -(v148 * v121), v152 = -(v148 * v122),
+                v153 = -(v148 * v127), v154 = -(v148 * v128), v155 = -(v148 * v124);
+            v129 = softehl_blend(m146, v149, v129); v130 = softehl_blend(m146, v154, v130);
+            v131 = softehl_blend(m146, v151, v131); v132 = softehl_blend(m146, v150, v132);
+            v133 = softehl_blend(m146, v155, v133); v134 = softehl_blend(m146, v152, v134);
+            v135 = softehl_blend(m146, v153, v135);
         }
-        const V v295 = 1.0 - p6;
-        const V v296 = 1.0 - p4;
-        const V v297 = v296 * v262;
-        V v298 = softehl_splat(0.0);
-        V v299 = softehl_splat(0.0);
-        V v300 = softehl_splat(0.0);
-        V v301 = softehl_splat(0.0);
-        V v302 = softehl_splat(0.0);
-        V v303 = softehl_splat(0.0);
-        V v304 = softehl_splat(0.0);
-        V v305 = softehl_splat(0.0);
-        V v306 = softehl_splat(0.0);
-        const M m307 = ~v258;
-        if (softehl_any(m307)) {
-            const V v308 = v32 * v249;
-            const V v309 = v295 * v252;
-            const V v310 = v295 * v253;
-            const V v311 = v295 * v254;
-            const V v312 = v295 * v260;
-            const V v313 = -v309;
-            const V v314 = v81 * v308;
-            const V v315 = v295 * v261;
-            const V v316 = v295 * v257;
-            const V v317 = v66 * v314;
-            const V v318 = v67 * v314;
-            v298 = softehl_blend(m307, v249, v298);
-            v299 = softehl_blend(m307, v315, v299);
-            v300 = softehl_blend(m307, v310, v300);
-            v301 = softehl_blend(m307, v313, v301);
-            v302 = softehl_blend(m307, v316, v302);
-            v303 = softehl_blend(m307, v311, v303);
-            v304 = softehl_blend(m307, v312, v304);
-            v305 = softehl_blend(m307, v317, v305);
-            v306 = softehl_blend(m307, v318, v306);
+        const V v156 = 1.0 - p6, v157 = 1.0 - p4;
+        V v158 = softehl_splat(0.0), v159 = softehl_splat(0.0), v160 = softehl_splat(0.0),
+            v161 = softehl_splat(0.0), v162 = softehl_splat(0.0), v163 = softehl_splat(0.0),
+            v164 = softehl_splat(0.0), v165 = softehl_splat(0.0), v166 = softehl_splat(0.0);
+        const M m167 = ~v125;
+        if (softehl_any(m167)) {
+            const V v168 = v156 * v121, v169 = v156 * v122, v170 = v156 * v127,
+                v171 = -(v156 * v120), v172 = v56 * (v18 * v117), v173 = v156 * v128,
+                v174 = v156 * v124, v175 = v48 * v172, v176 = v49 * v172;
+            v158 = softehl_blend(m167, v117, v158); v159 = softehl_blend(m167, v173, v159);
+            v160 = softehl_blend(m167, v168, v160); v161 = softehl_blend(m167, v171, v161);
+            v162 = softehl_blend(m167, v174, v162); v163 = softehl_blend(m167, v169, v163);
+            v164 = softehl_blend(m167, v170, v164); v165 = softehl_blend(m167, v175, v165);
+            v166 = softehl_blend(m167, v176, v166);
         }
-        const double v319 = 0.5 * w[1];
-        const double v320 = 0.5 * w[2];
-        const V v321 = p0 * v18;
-        const double v322 = 0.5 - v319;
-        const double v323 = 0.5 + v319;
-        const double v324 = 0.5 - v320;
-        const double v325 = 0.5 + v320;
-        const V v326 = v295 * v298;
-        const V v327 = v322 * v5;
-        const V v328 = v324 * v5;
-        const V v329 = v326 + v297;
-        const double v330 = v322 + v324;
-        const double v331 = v323 + v325;
-        const V v332 = v299 - v82;
-        const V v333 = v323 * v8;
-        const V v334 = v327 + v333;
-        const V v335 = v325 * v8;
-        const V v336 = v328 + v335;
-        const double v337 = 0.5 * v330;
-        const double v338 = 0.5 * v331;
-        const V v339 = v296 * v265;
-        const V v340 = v301 + v339;
-        const V v341 = v296 * v264;
-        const V v342 = v300 + v341;
-        const V v343 = v296 * v263;
-        const V v344 = v343 + v332;
-        const V v345 = v334 + v336;
-        const V v346 = v296 * v266;
-        const V v347 = v302 + v346;
-        const V v348 = 0.25 * v345;
-        const V v349 = v329 - v83;
-        const V v350 = v83 - v329;
-        const V v351 = v347 - v69;
-        const V v352 = v32 * v349;
-        const V v353 = v321 - v352;
-        const V v354 = v32 * v81;
-        const V v355 = v81 * v38;
-        const V v356 = v81 * v350;
-        const V v357 = v81 * v41;
-        const V v358 = v357 * v344;
-        const V v359 = v342 * v355;
-        const V v360 = p3 * v27;
-        const V v361 = p3 * v348;
-        const V v362 = v22 * v348;
-        const V v363 = v22 * v361;
-        const V v364 = v360 * v337;
-        const V v365 = v360 * v338;
-        const V v366 = w[3] * v353;
-        const V v367 = v1 * v353;
-        const V v368 = v351 * v354;
-        const V v369 = v367 - v368;
-        const V v370 = v81 * v366;
-        const V v371 = v37 * v356;
-        const V v372 = v36 * v356;
-        const V v373 = v372 + v358;
-        const V v374 = v363 * v363;
-        const V v375 = v359 + v373;
-        const V v376 = v340 * v355;
-        const V v377 = v373 - v376;
-        const V v378 = v91 + v371;
-        const M v379 = softehl_lt(v374, softehl_splat(1.0));
-        const V v380 = v62 * v369;
-        const V v381 = v62 * v370;
-        s51 += v381;
-        const V v382 = v61 * v370;
-        s50 += v382;
-        const V v383 = v61 * v369;
-        const V v384 = v383 + v378;
-        const V v385 = v380 - v91;
-        const V v386 = v385 - v371;
-        const V v387 = v66 * v377;
-        s53 += v387;
-        const V v388 = v67 * v377;
-        s55 += v388;
-        const V v389 = v66 * v375;
-        s52 += v389;
-        const V v390 = v67 * v375;
-        s54 += v390;
-        const V v391 = v66 * v384;
-        s57 += v391;
-        const V v392 = v67 * v384;
-        s59 += v392;
-        const V v393 = v66 * v386;
-        s56 += v393;
-        const V v394 = v67 * v386;
-        s58 += v394;
-        V v395 = softehl_splat(0.0);
-        V v396 = softehl_splat(0.0);
-        V v397 = softehl_splat(0.0);
-        V v398 = softehl_splat(0.0);
-        V v399 = softehl_splat(0.0);
-        V v400 = softehl_splat(0.0);
-        V v401 = softehl_splat(0.0);
-        V v402 = softehl_splat(0.0);
-        V v403 = softehl_splat(0.0);
-        V v404 = softehl_splat(0.0);
-        const M m405 = v379;
-        if (softehl_any(m405)) {
-            const V v406 = 2.0 * v363;
-            const V v407 = v362 * v406;
-            const V v408 = v361 * v406;
-            const V v409 = v406 * v364;
-            const V v410 = v406 * v365;
-            const V v411 = 1.9572941063391263e-20 * v374;
-            const V v412 = 2.5529923126162516e-21 * v374;
-            const V v413 = 8.22063524662433e-18 + v411;
-            const V v414 = 1.1743764638034756e-18 + v412;
-            const V v415 = v411 + v413;
-            const V v416 = v374 * v413;
-            const V v417 = 2.8114572543455206e-15 + v416;
-            const V v418 = v412 + v414;
-            const V v419 = v374 * v414;
-            const V v420 = 4.439143033177138e-16 + v419;
-            const V v421 = v374 * v420;
-            const V v422 = 1.34949948208585e-13 + v421;
-            const V v423 = v374 * v418;
-            const V v424 = v420 + v423;
-            const V v425 = v374 * v415;
-            const V v426 = v417 + v425;
-            const V v427 = v374 * v417;
-            const V v428 = 7.647163731819816e-13 + v427;
-            const V v429 = v374 * v422;
-            const V v430 = 3.2118087673643227e-11 + v429;
-            const V v431 = v374 * v430;
-            const V v432 = 5.7812557812557815e-09 + v431;
-            const V v433 = v374 * v432;
-            const V v434 = 7.515632515632515e-07 + v433;
-            const V v435 = v374 * v434;
-            const V v436 = 6.613756613756614e-05 + v435;
-            const V v437 = v374 * v436;
-            const V v438 = 0.0035714285714285713 + v437;
-            const V v439 = v374 * v438;
-            const V v440 = 0.1 + v439;
-            const V v441 = v409 * v426;
-            const V v442 = v410 * v426;
-            const V v443 = v428 * v409;
-            const V v444 = v374 * v441;
-            const V v445 = v443 + v444;
-            const V v446 = v428 * v410;
-            const V v447 = v422 * v409;
-            const V v448 = v422 * v410;
-            const V v449 = v374 * v428;
-            const V v450 = 1.6059043836821613e-10 + v449;
-            const V v451 = v374 * v442;
-            const V v452 = v446 + v451;
-            const V v453 = v428 * v407;
-            const V v454 = v428 * v408;
-            const V v455 = v407 * v426;
-            const V v456 = v408 * v426;
-            const V v457 = v422 * v407;
-            const V v458 = v422 * v408;
-            const V v459 = v374 * v455;
-            const V v460 = v453 + v459;
-            const V v461 = v374 * v456;
-            const V v462 = v454 + v461;
-            const V v463 = v450 * v407;
-            const V v464 = v450 * v408;
-            const V v465 = v450 * v409;
-            const V v466 = v450 * v410;
-            const V v467 = v374 * v450;
-            const V v468 = 2.505210838544172e-08 + v467;
-            const V v469 = v374 * v460;
-            const V v470 = v463 + v469;
-            const V v471 = v374 * v452;
-            const V v472 = v466 + v471;
-            const V v473 = v374 * v462;
-            const V v474 = v464 + v473;
-            const V v475 = v374 * v445;
-            const V v476 = v465 + v475;
-            const V v477 = v468 * v407;
-            const V v478 = v468 * v408;
-            const V v479 = v468 * v409;
-            const V v480 = v468 * v410;
-            const V v481 = v374 * v468;
-            const V v482 = 2.7557319223985893e-06 + v481;
-            const V v483 = v374 * v470;
-            const V v484 = v477 + v483;
-            const V v485 = v374 * v476;
-            const V v486 = v479 + v485;
-            const V v487 = v374 * v472;
-            const V v488 = v480 + v487;
-            const V v489 = v374 * v474;
-            const V v490 = v478 + v489;
-            const V v491 = v482 * v407;
-            const V v492 = v482 * v408;
-            const V v493 = v482 * v409;
-            const V v494 = v482 * v410;
-            const V v495 = v374 * v482;
-            const V v496 = 0.0001984126984126984 + v495;
-            const V v497 = v374 * v484;
-            const V v498 = v491 + v497;
-            const V v499 = v374 * v486;
-            const V v500 = v493 + v499;
-            const V v501 = v374 * v488;
-            const V v502 = v494 + v501;
-            const V v503 = v374 * v490;
-            const V v504 = v492 + v503;
-            const V v505 = v496 * v407;
-            const V v506 = v496 * v408;
-            const V v507 = v496 * v409;
-            const V v508 = v496 * v410;
-            const V v509 = v374 * v496;
-            const V v510 = 0.008333333333333333 + v509;
-            const V v511 = v374 * v498;
-            const V v512 = v505 + v511;
-            const V v513 = v374 * v500;
-            const V v514 = v507 + v513;
-            const V v515 = v374 * v502;
-            const V v516 = v508 + v515;
-            const V v517 = v374 * v504;
-            const V v518 = v506 + v517;
-            const V v519 = v510 * v407;
-            const V v520 = v510 * v408;
-            const V v521 = v374 * v514;
-            const V v522 = v510 * v410;
-            const V v523 = v374 * v510;
-            const V v524 = 0.16666666666666666 + v523;
-            const V v525 = v374 * v512;
-            const V v526 = v519 + v525;
-            const V v527 = v374 * v516;
-            const V v528 = v522 + v527;
-            const V v529 = v374 * v518;
-            const V v530 = v520 + v529;
-            const V v531 = v510 * v409;
-            const V v532 = v531 + v521;
-            const V v533 = v524 * v407;
-            const V v534 = v524 * v408;
-            const V v535 = v374 * v528;
-            const V v536 = v524 * v409;
-            const V v537 = v374 * v524;
-            const V v538 = 1.0 + v537;
-            const V v539 = v374 * v526;
-            const V v540 = v533 + v539;
-            const V v541 = v374 * v532;
-            const V v542 = v536 + v541;
-            const V v543 = v374 * v530;
-            const V v544 = v534 + v543;
-            const V v545 = 1.0 / v538;
-            const V v546 = v524 * v410;
-            const V v547 = v546 + v535;
-            const V v548 = v430 * v407;
-            const V v549 = v430 * v408;
-            const V v550 = v430 * v409;
-            const V v551 = v430 * v410;
-            const V v552 = v432 * v407;
-            const V v553 = v432 * v408;
-            const V v554 = v432 * v409;
-            const V v555 = v432 * v410;
-            const V v556 = v434 * v407;
-            const V v557 = v434 * v408;
-            const V v558 = v434 * v409;
-            const V v559 = v434 * v410;
-            const V v560 = v436 * v407;
-            const V v561 = v436 * v408;
-            const V v562 = v436 * v409;
-            const V v563 = v436 * v410;
-            const V v564 = v438 * v407;
-            const V v565 = v438 * v408;
-            const V v566 = v438 * v409;
-            const V v567 = v438 * v410;
-            const V v568 = v440 * v407;
-            const V v569 = v440 * v408;
-            const V v570 = v407 * v424;
-            const V v571 = v408 * v424;
-            const V v572 = v409 * v424;
-            const V v573 = v410 * v424;
-            const V v574 = v440 * v409;
-            const V v575 = v440 * v410;
-            const V v576 = v545 * v545;
-            const V v577 = v374 * v440;
-            const V v578 = 1.0 + v577;
-            const V v579 = v374 * v570;
-            const V v580 = v457 + v579;
-            const V v581 = v374 * v571;
-            const V v582 = v458 + v581;
-            const V v583 = v374 * v572;
-            const V v584 = v447 + v583;
-            const V v585 = v374 * v573;
-            const V v586 = v448 + v585;
-            const V v587 = v576 * v540;
-            const V v588 = v576 * v542;
-            const V v589 = v576 * v547;
-            const V v590 = v576 * v544;
-            const V v591 = v374 * v580;
-            const V v592 = v548 + v591;
-            const V v593 = v374 * v582;
-            const V v594 = v549 + v593;
-            const V v595 = v374 * v584;
-            const V v596 = v550 + v595;
-            const V v597 = -v587;
-            const V v598 = -v588;
-            const V v599 = -v589;
-            const V v600 = -v590;
-            const V v601 = v374 * v586;
-            const V v602 = v551 + v601;
-            const V v603 = v374 * v592;
-            const V v604 = v552 + v603;
-            const V v605 = v374 * v594;
-            const V v606 = v553 + v605;
-            const V v607 = v374 * v596;
-            const V v608 = v554 + v607;
-            const V v609 = v374 * v602;
-            const V v610 = v555 + v609;
-            const V v611 = v374 * v604;
-            const V v612 = v556 + v611;
-            const V v613 = v374 * v606;
-            const V v614 = v557 + v613;
-            const V v615 = v374 * v608;
-            const V v616 = v558 + v615;
-            const V v617 = v374 * v610;
-            const V v618 = v559 + v617;
-            const V v619 = v374 * v612;
-            const V v620 = v560 + v619;
-            const V v621 = v374 * v614;
-            const V v622 = v561 + v621;
-            const V v623 = v374 * v616;
-            const V v624 = v562 + v623;
-            const V v625 = v374 * v624;
-            const V v626 = v566 + v625;
-            const V v627 = v374 * v626;
-            const V v628 = v574 + v627;
-            const V v629 = v374 * v618;
-            const V v630 = v563 + v629;
-            const V v631 = v374 * v630;
-            const V v632 = v567 + v631;
-            const V v633 = v374 * v632;
-            const V v634 = v575 + v633;
-            const V v635 = v374 * v620;
-            const V v636 = v564 + v635;
-            const V v637 = v374 * v636;
-            const V v638 = v568 + v637;
-            const V v639 = v374 * v622;
-            const V v640 = v565 + v639;
-            const V v641 = v374 * v640;
-            const V v642 = v569 + v641;
-            v395 = softehl_blend(m405, v545, v395);
-            v396 = softehl_blend(m405, v578, v396);
-            v397 = softehl_blend(m405, v642, v397);
-            v398 = softehl_blend(m405, v600, v398);
-            v399 = softehl_blend(m405, v598, v399);
-            v400 = softehl_blend(m405, v628, v400);
-            v401 = softehl_blend(m405, v599, v401);
-            v402 = softehl_blend(m405, v634, v402);
-            v403 = softehl_blend(m405, v597, v403);
-            v404 = softehl_blend(m405, v638, v404);
+        const double v177 = 0.5 * w[1], v178 = 0.5 * w[2], v179 = 0.5 - v177, v180 = 0.5 + v177,
+            v181 = 0.5 - v178, v182 = 0.5 + v178;
+        const V v183 = v156 * v158 + v157 * v129, v184 = v179 * v2 + v180 * v4,
+            v185 = v181 * v2 + v182 * v4;
+        const double v186 = 0.5 * (v179 + v181), v187 = 0.5 * (v180 + v182);
+        const V v188 = v184 + v185, v189 = 0.25 * v188, v190 = p0 * v10 - v18 * (v183 - v58),
+            v191 = v18 * v56, v192 = v56 * v23, v193 = v56 * (v58 - v183), v194 = p3 * v15,
+            v195 = p3 * v189, v196 = v13 * v189, v197 = v13 * v195, v198 = v194 * v186,
+            v199 = v194 * v187, v200 = v1 * v190 - (v162 + v157 * v133 - v50) * v191,
+            v201 = v56 * (w[3] * v190), v202 = v22 * v193,
+            v203 = v21 * v193 + v56 * v24 * (v157 * v130 + (v159 - v57)), v204 = v197 * v197,
+            v205 = (v160 + v157 * v131) * v192 + v203, v206 = v203 - (v161 + v157 * v132) * v192;
+        const M v207 = softehl_lt(v204, softehl_splat(1.0)); s34 += v45 * v201; s33 += v44 * v201;
+        const V v208 = v44 * v200 + (v66 + v202), v209 = v45 * v200 - v66 - v202, v210 = v48 * v206;
+        s36 += v210; const V v211 = v49 * v206; s38 += v211; const V v212 = v48 * v205; s35 += v212;
+        const V v213 = v49 * v205; s37 += v213; const V v214 = v48 * v208; s40 += v214;
+        const V v215 = v49 * v208; s42 += v215; const V v216 = v48 * v209; s39 += v216;
+        const V v217 = v49 * v209; s41 += v217;
+        V v218 = softehl_splat(0.0), v219 = softehl_splat(0.0), v220 = softehl_splat(0.0),
+            v221 = softehl_splat(0.0), v222 = softehl_splat(0.0), v223 = softehl_splat(0.0),
+            v224 = softehl_splat(0.0), v225 = softehl_splat(0.0), v226 = softehl_splat(0.0),
+            v227 = softehl_splat(0.0);
+        const M m228 = v207;
+        if (softehl_any(m228)) {
+            const V v229 = 2.0 * v197, v230 = v196 * v229, v231 = v195 * v229, v232 = v229 * v198,
+                v233 = v229 * v199, v234 = 1.9572941063391263e-20 * v204,
+                v235 = 2.5529923126162516e-21 * v204, v236 = 8.22063524662433e-18 + v234,
+                v237 = 1.1743764638034756e-18 + v235, v238 = 2.8114572543455206e-15 + v204 * v236,
+                v239 = 4.439143033177138e-16 + v204 * v237,
+                v240 = 1.34949948208585e-13 + v204 * v239, v241 = v239 + v204 * (v235 + v237),
+                v242 = v238 + v204 * (v234 + v236), v243 = 7.647163731819816e-13 + v204 * v238,
+                v244 = 3.2118087673643227e-11 + v204 * v240,
+                v245 = 5.7812557812557815e-09 + v204 * v244,
+                v246 = 7.515632515632515e-07 + v204 * v245,
+                v247 = 6.613756613756614e-05 + v204 * v246,
+                v248 = 0.0035714285714285713 + v204 * v247, v249 = 0.1 + v204 * v248,
+                v250 = 1.6059043836821613e-10 + v204 * v243,
+                v251 = 2.505210838544172e-08 + v204 * v250,
+                v252 = 2.7557319223985893e-06 + v204 * v251,
+                v253 = v204 * (v250 * v230 + v204 * (v243 * v230 + v204 * (v230 * v242))),
+                v254 = v204 * (v250 * v232 + v204 * (v243 * v232 + v204 * (v232 * v242))),
+                v255 = v204 * (v250 * v233 + v204 * (v243 * v233 + v204 * (v233 * v242))),
+                v256 = v204 * (v250 * v231 + v204 * (v243 * v231 + v204 * (v231 * v242))),
+                v257 = 0.0001984126984126984 + v204 * v252,
+                v258 = 0.008333333333333333 + v204 * v257,
+                v259 = v204 * (v257 * v232 + v204 * (v252 * v232 + v204 * (v251 * v232 + v254))),
+                v260 = 0.16666666666666666 + v204 * v258,
+                v261 = v204 * (v257 * v230 + v204 * (v252 * v230 + v204 * (v251 * v230 + v253))),
+                v262 = v204 * (v257 * v233 + v204 * (v252 * v233 + v204 * (v251 * v233 + v255))),
+                v263 = v204 * (v257 * v231 + v204 * (v252 * v231 + v204 * (v251 * v231 + v256))),
+                v264 = 1.0 / (1.0 + v204 * v260), v265 = v264 * v264, v266 = 1.0 + v204 * v249,
+                v267 = -(v265 * (v260 * v230 + v204 * (v258 * v230 + v261))),
+                v268 = -(v265 * (v260 * v232 + v204 * (v258 * v232 + v259))),
+                v269 = -(v265 * (v260 * v233 + v204 * (v258 * v233 + v262))),
+                v270 = -(v265 * (v260 * v231 + v204 * (v258 * v231 + v263))),
+                v271 = v204 * (v244 * v230 + v204 * (v240 * v230 + v204 * (v230 * v241))),
+                v272 = v204 * (v244 * v231 + v204 * (v240 * v231 + v204 * (v231 * v241))),
+                v273 = v204 * (v244 * v232 + v204 * (v240 * v232 + v204 * (v232 * v241))),
+                v274 = v204 * (v244 * v233 + v204 * (v240 * v233 + v204 * (v233 * v241))),
+                v275 = v204 * (v247 * v232 + v204 * (v246 * v232 + v204 * (v245 * v232 + v273))),
+                v276 = v249 * v232 + v204 * (v248 * v232 + v275),
+                v277 = v204 * (v247 * v233 + v204 * (v246 * v233 + v204 * (v245 * v233 + v274))),
+                v278 = v249 * v233 + v204 * (v248 * v233 + v277),
+                v279 = v204 * (v247 * v230 + v204 * (v246 * v230 + v204 * (v245 * v230 + v271))),
+                v280 = v249 * v230 + v204 * (v248 * v230 + v279),
+                v281 = v204 * (v247 * v231 + v204 * (v246 * v231 + v204 * (v245 * v231 + v272))),
+                v282 = v249 * v231 + v204 * (v248 * v231 + v281);
+            v218 = softehl_blend(m228, v264, v218); v219 = softehl_blend(m228, v266, v219);
+            v220 = softehl_blend(m228, v282, v220); v221 = softehl_blend(m228, v270, v221);
+            v222 = softehl_blend(m228, v268, v222); v223 = softehl_blend(m228, v276, v223);
+            v224 = softehl_blend(m228, v269, v224); v225 = softehl_blend(m228, v278, v225);
+            v226 = softehl_blend(m228, v267, v226); v227 = softehl_blend(m228, v280, v227);
         }
-        const M m643 = ~v379;
-        if (softehl_any(m643)) {
-            const V v644 = softehl_vsinh(v363);
-            const V v645 = 3.0 * v363;
-            const V v646 = softehl_vcosh(v363);
-            const V v647 = v363 * v374;
-            const V v648 = 3.0 * v374;
-            const V v649 = 1.0 / v644;
-            const V v650 = 1.0 / v647;
-            const V v651 = v644 * v645;
-            const V v652 = v645 * v646;
-            const V v653 = 3.0 * v646;
-            const V v654 = v363 * v646;
-            const V v655 = 3.0 * v644;
-            const V v656 = v652 - v655;
-            const V v657 = v646 * v362;
-            const V v658 = v653 + v651;
-            const V v659 = v646 * v364;
-            const V v660 = v646 * v365;
-            const V v661 = v656 * v362;
-            const V v662 = v363 * v657;
-            const V v663 = v656 * v648;
-            const V v664 = v648 * v661;
-            const V v665 = v362 * v658;
-            const V v666 = v658 * v364;
-            const V v667 = v658 * v365;
-            const V v668 = 3.0 * v657;
-            const V v669 = v665 - v668;
-            const V v670 = 3.0 * v659;
-            const V v671 = v666 - v670;
-            const V v672 = 3.0 * v660;
-            const V v673 = v667 - v672;
-            const V v674 = v649 * v362;
-            const V v675 = v363 * v649;
-            const V v676 = v649 * v649;
-            const V v677 = v649 * v364;
-            const V v678 = v649 * v365;
-            const V v679 = v650 * v669;
-            const V v680 = v650 * v671;
-            const V v681 = v650 * v673;
-            const V v682 = v656 * v650;
-            const V v683 = v650 * v650;
-            const V v684 = v650 * v651;
-            const V v685 = v363 * v676;
-            const V v686 = v676 * v662;
-            const V v687 = v674 - v686;
-            const V v688 = v683 * v664;
-            const V v689 = v679 - v688;
-            const V v690 = v683 * v663;
-            const V v691 = v660 * v685;
-            const V v692 = v678 - v691;
-            const V v693 = v659 * v685;
-            const V v694 = v677 - v693;
-            const V v695 = v364 * v690;
-            const V v696 = v680 - v695;
-            const V v697 = v365 * v690;
-            const V v698 = v681 - v697;
-            const V v699 = v684 - v690;
-            const V v700 = v676 * v654;
-            const V v701 = v649 - v700;
-            const V v702 = v361 * v701;
-            const V v703 = v361 * v699;
-            v395 = softehl_blend(m643, v675, v395);
-            v396 = softehl_blend(m643, v682, v396);
-            v397 = softehl_blend(m643, v703, v397);
-            v398 = softehl_blend(m643, v702, v398);
-            v399 = softehl_blend(m643, v694, v399);
-            v400 = softehl_blend(m643, v696, v400);
-            v401 = softehl_blend(m643, v692, v401);
-            v402 = softehl_blend(m643, v698, v402);
-            v403 = softehl_blend(m643, v687, v403);
-            v404 = softehl_blend(m643, v689, v404);
+        const M m283 = ~v207;
+        if (softehl_any(m283)) {
+            const V v284 = softehl_vsinh(v197), v285 = 3.0 * v197, v286 = softehl_vcosh(v197),
+                v287 = 3.0 * v204, v288 = 1.0 / v284, v289 = 1.0 / (v197 * v204),
+                v290 = v284 * v285, v291 = v285 * v286 - 3.0 * v284, v292 = v286 * v196,
+                v293 = 3.0 * v286 + v290, v294 = v286 * v198, v295 = v286 * v199,
+                v296 = v197 * v288, v297 = v288 * v288, v298 = v291 * v289, v299 = v289 * v289,
+                v300 = v197 * v297, v301 = v288 * v196 - v297 * (v197 * v292),
+                v302 = v289 * (v196 * v293 - 3.0 * v292) - v299 * (v287 * (v291 * v196)),
+                v303 = v299 * (v291 * v287), v304 = v288 * v199 - v295 * v300,
+                v305 = v288 * v198 - v294 * v300,
+                v306 = v289 * (v293 * v198 - 3.0 * v294) - v198 * v303,
+                v307 = v289 * (v293 * v199 - 3.0 * v295) - v199 * v303,
+                v308 = v195 * (v288 - v297 * (v197 * v286)), v309 = v195 * (v289 * v290 - v303);
+            v218 = softehl_blend(m283, v296, v218); v219 = softehl_blend(m283, v298, v219);
+            v220 = softehl_blend(m283, v309, v220); v221 = softehl_blend(m283, v308, v221);
+            v222 = softehl_blend(m283, v305, v222); v223 = softehl_blend(m283, v306, v223);
+            v224 = softehl_blend(m283, v304, v224); v225 = softehl_blend(m283, v307, v225);
+            v226 = softehl_blend(m283, v301, v226); v227 = softehl_blend(m283, v302, v227);
         }
-        const V v704 = p2 * parameters[3];
-        const V v705 = 0.08333333333333333 * p3;
-        const V v706 = v334 * v336;
-        const V v707 = 0.5 * v345;
-        const V v708 = softehl_vexp(v704);
-        const double v709 = 0.5 * w[3];
-        const V v710 = parameters[6] * v707;
-        const V v711 = v707 * v707;
-        const V v712 = v73 * v709;
-        const M v713 = softehl_lt(softehl_splat(0.0), v223);
-        const V v714 = 1.0 / v710;
-        const V v715 = v707 * v711;
-        const V v716 = 1.0 / v711;
-        const V v717 = v706 * v716;
-        const V v718 = v223 * v712;
-        const V v719 = v705 * v715;
-        const V v720 = parameters[2] * v708;
-        const V v721 = v720 * v223;
-        const V v722 = v720 * v16;
-        const V v723 = 1.0 / v722;
-        const V v724 = v717 * v718;
-        const V v725 = v717 * v717;
-        const V v726 = v719 * v725;
-        const V v727 = -v724;
-        const V v728 = v721 * v395;
-        const V v729 = v714 * v728;
-        const V v730 = v729 * v729;
-        const V v731 = 1.0 + v730;
-        const V v732 = softehl_vsqrt(v731);
-        const V v733 = v726 * v732;
-        const V v734 = v396 * v733;
-        const V v735 = v723 * v734;
-        V v736 = softehl_splat(0.0);
-        V v737 = softehl_splat(0.0);
-        V v738 = softehl_splat(0.0);
-        V v739 = softehl_splat(0.0);
-        V v740 = softehl_splat(0.0);
-        V v741 = softehl_splat(0.0);
-        V v742 = softehl_splat(0.0);
-        V v743 = softehl_splat(0.0);
-        const M m744 = v713;
-        if (softehl_any(m744)) {
-            const V v745 = v61 * v296;
-            const V v746 = v296 * v217;
-            const V v747 = -v745;
-            v736 = softehl_blend(m744, v223, v736);
-            v737 = softehl_blend(m744, softehl_splat(0.0), v737);
-            v738 = softehl_blend(m744, v746, v738);
-            v739 = softehl_blend(m744, softehl_splat(0.0), v739);
-            v740 = softehl_blend(m744, v747, v740);
-            v741 = softehl_blend(m744, softehl_splat(0.0), v741);
-            v742 = softehl_blend(m744, v727, v742);
-            v743 = softehl_blend(m744, softehl_splat(0.0), v743);
+        const V v310 = 0.08333333333333333 * p3, v311 = v184 * v185, v312 = 0.5 * v188,
+            v313 = softehl_vexp(p2 * parameters[3]), v314 = v312 * v312;
+        const M v315 = softehl_lt(softehl_splat(0.0), v111);
+        const V v316 = 1.0 / (parameters[6] * v312), v317 = v312 * v314, v318 = 1.0 / v314,
+            v319 = v311 * v318, v320 = v310 * v317, v321 = parameters[2] * v313, v322 = v321 * v111,
+            v323 = 1.0 / (v321 * v9), v324 = v319 * v319, v325 = v320 * v324,
+            v326 = -(v319 * (v111 * (v53 * (0.5 * w[3])))), v327 = v322 * v218, v328 = v316 * v327,
+            v329 = 1.0 + v328 * v328, v330 = softehl_vsqrt(v329), v331 = v325 * v330,
+            v332 = v219 * v331;
+        V v333 = softehl_splat(0.0), v334 = softehl_splat(0.0), v335 = softehl_splat(0.0),
+            v336 = softehl_splat(0.0), v337 = softehl_splat(0.0), v338 = softehl_splat(0.0),
+            v339 = softehl_splat(0.0), v340 = softehl_splat(0.0);
+        const M m341 = v315;
+        if (softehl_any(m341)) {
+            const V v342 = v157 * v109, v343 = -(v44 * v157);
+            v333 = softehl_blend(m341, v111, v333);
+            v334 = softehl_blend(m341, softehl_splat(0.0), v334);
+            v335 = softehl_blend(m341, v342, v335);
+            v336 = softehl_blend(m341, softehl_splat(0.0), v336);
+            v337 = softehl_blend(m341, v343, v337);
+            v338 = softehl_blend(m341, softehl_splat(0.0), v338);
+            v339 = softehl_blend(m341, v326, v339);
+            v340 = softehl_blend(m341, softehl_splat(0.0), v340);
         }
-        const M m748 = ~v713;
-        if (softehl_any(m748)) {
-            const V v749 = v61 * v295;
-            const V v750 = v295 * v217;
-            const V v751 = -v749;
-            v736 = softehl_blend(m748, softehl_splat(0.0), v736);
-            v737 = softehl_blend(m748, v223, v737);
-            v738 = softehl_blend(m748, softehl_splat(0.0), v738);
-            v739 = softehl_blend(m748, v750, v739);
-            v740 = softehl_blend(m748, softehl_splat(0.0), v740);
-            v741 = softehl_blend(m748, v751, v741);
-            v742 = softehl_blend(m748, softehl_splat(0.0), v742);
-            v743 = softehl_blend(m748, v727, v743);
+        const M m344 = ~v315;
+        if (softehl_any(m344)) {
+            const V v345 = v156 * v109, v346 = -(v44 * v156);
+            v333 = softehl_blend(m344, softehl_splat(0.0), v333);
+            v334 = softehl_blend(m344, v111, v334);
+            v335 = softehl_blend(m344, softehl_splat(0.0), v335);
+            v336 = softehl_blend(m344, v345, v336);
+            v337 = softehl_blend(m344, softehl_splat(0.0), v337);
+            v338 = softehl_blend(m344, v346, v338);
+            v339 = softehl_blend(m344, softehl_splat(0.0), v339);
+            v340 = softehl_blend(m344, v326, v340);
         }
-        const V v752 = v708 * v9;
-        const V v753 = 3.0 * v711;
-        const V v754 = 0.08333333333333333 * v715;
-        const V v755 = v295 * v737;
-        const V v756 = 2.0 * v729;
-        const V v757 = parameters[6] * v728;
-        const V v758 = 1.0 / v731;
-        const V v759 = v725 * v754;
-        const V v760 = v705 * v725;
-        const V v761 = v296 * v736;
-        const V v762 = v755 + v761;
-        const V v763 = v741 + v740;
-        const V v764 = 0.5 * v762;
-        const V v765 = v739 + v738;
-        const V v766 = v759 * v732;
-        const V v767 = v296 * v267;
-        const V v768 = v303 + v767;
-        const V v769 = v714 * v721;
-        const V v770 = v714 * v714;
-        const V v771 = v714 * v223;
-        const V v772 = v296 * v268;
-        const V v773 = v304 + v772;
-        const V v774 = v723 * v723;
-        const V v775 = v723 * v26;
-        const V v776 = v723 * v771;
-        const V v777 = v73 * v764;
-        const V v778 = v717 * v764;
-        const V v779 = 2.0 * v717;
-        const V v780 = v773 - v84;
-        const V v781 = v75 * v717;
-        const V v782 = v719 * v779;
-        const V v783 = v717 * v777;
-        const V v784 = softehl_vsqrt(v758);
-        const V v785 = v780 * v354;
-        const V v786 = v62 * v778;
-        const V v787 = v61 * v778;
-        const V v788 = v61 * v720;
-        const V v789 = v720 * v714;
-        const V v790 = v720 * v774;
-        const V v791 = v714 * v788;
-        const V v792 = v395 * v776;
-        const V v793 = v783 - v735;
-        const V v794 = v723 * v789;
-        const V v795 = v781 * v763;
-        const V v796 = v781 * v765;
-        const V v797 = v716 * v716;
-        const V v798 = v723 * v791;
-        const V v799 = v726 * v792;
-        const V v800 = v395 * v794;
-        const V v801 = w[3] * v793;
-        const V v802 = w[3] * v723;
-        const V v803 = v395 * v798;
-        const V v804 = v734 * v790;
-        const V v805 = v16 * v734;
-        const V v806 = v16 * v81;
-        const V v807 = v396 * v799;
-        const V v808 = v726 * v800;
-        const V v809 = v774 * v805;
-        const V v810 = v322 * v336;
-        const V v811 = v323 * v336;
-        const V v812 = v769 * v726;
-        const V v813 = v769 * v399;
-        const V v814 = v769 * v401;
-        const V v815 = v726 * v803;
-        const V v816 = v726 * v756;
-        const V v817 = v756 * v807;
-        const V v818 = v396 * v808;
-        const V v819 = v324 * v334;
-        const V v820 = v810 + v819;
-        const V v821 = v325 * v334;
-        const V v822 = v811 + v821;
-        const V v823 = v812 * v756;
-        const V v824 = v396 * v812;
-        const V v825 = v396 * v815;
-        const V v826 = 0.5 * v784;
-        const V v827 = v217 * v818;
-        const V v828 = v716 * v820;
-        const V v829 = v716 * v822;
-        const V v830 = v756 * v824;
-        const V v831 = v817 * v826;
-        const V v832 = v809 - v831;
-        const V v833 = v823 * v826;
-        const V v834 = v816 * v826;
-        const V v835 = v825 * v756;
-        const V v836 = v827 * v756;
-        const V v837 = v830 * v826;
-        const V v838 = v752 * v832;
-        const V v839 = v32 * v262;
-        const V v840 = v32 * v768;
-        const V v841 = v18 - v840;
-        const V v842 = v833 * v403;
-        const V v843 = v766 + v842;
-        const V v844 = v66 * v806;
-        const V v845 = v67 * v806;
-        const V v846 = v835 * v826;
-        const V v847 = v795 + v846;
-        const V v848 = v836 * v826;
-        const V v849 = v796 - v848;
-        const V v850 = v837 * v398;
-        const V v851 = -v844;
-        const V v852 = -v845;
-        const V v853 = v396 * v843;
-        const V v854 = v81 * v839;
-        const V v855 = v81 * v841;
-        const V v856 = w[3] * v838;
-        const V v857 = parameters[7] * v847;
-        const V v858 = parameters[7] * v849;
-        const V v859 = v66 * v854;
-        const V v860 = v67 * v854;
-        const V v861 = v733 * v397;
-        const V v862 = v850 + v861;
-        const V v863 = v733 * v404;
-        const V v864 = v863 + v853;
-        const V v865 = v66 * v855;
-        const V v866 = v67 * v855;
-        const V v867 = v66 * v785;
-        const V v868 = v67 * v785;
-        const V v869 = v802 * v864;
-        const V v870 = v733 * v400;
-        const V v871 = v733 * v402;
-        const V v872 = v862 * v775;
-        const V v873 = v804 + v872;
-        const V v874 = -v867;
-        const V v875 = -v868;
-        const V v876 = 0.5 * v873;
-        const V v877 = -v869;
-        const V v878 = v706 * v337;
-        const V v879 = v706 * v338;
-        const V v880 = v337 * v760;
-        const V v881 = v338 * v760;
-        const V v882 = v337 * v757;
-        const V v883 = v338 * v757;
-        const V v884 = v345 * v878;
-        const V v885 = v345 * v879;
-        const V v886 = v753 * v880;
-        const V v887 = v753 * v881;
-        const V v888 = v770 * v882;
-        const V v889 = v813 - v888;
-        const V v890 = v770 * v883;
-        const V v891 = v814 - v890;
-        const V v892 = v858 - v876;
-        const V v893 = v857 + v876;
-        const V v894 = v797 * v884;
-        const V v895 = v828 - v894;
-        const V v896 = v797 * v885;
-        const V v897 = v829 - v896;
-        const V v898 = w[3] * v892;
-        const V v899 = w[3] * v893;
-        const V v900 = v834 * v889;
-        const V v901 = v834 * v891;
-        const V v902 = v895 * v782;
-        const V v903 = v886 + v902;
-        const V v904 = v897 * v782;
-        const V v905 = v887 + v904;
-        const V v906 = v895 * v777;
-        const V v907 = v786 + v906;
-        const V v908 = v897 * v777;
-        const V v909 = v787 + v908;
-        const V v910 = v903 * v732;
-        const V v911 = v910 + v900;
-        const V v912 = v905 * v732;
-        const V v913 = v912 + v901;
-        const V v914 = v396 * v911;
-        const V v915 = v870 + v914;
-        const V v916 = v396 * v913;
-        const V v917 = v871 + v916;
-        const V v918 = v723 * v915;
-        const V v919 = v907 - v918;
-        const V v920 = v723 * v917;
-        const V v921 = v909 - v920;
-        const V v922 = w[3] * v919;
-        const V v923 = w[3] * v921;
+        const V v347 = 3.0 * v314, v348 = 2.0 * v328, v349 = parameters[6] * v327,
+            v350 = v310 * v324, v351 = 0.5 * (v156 * v334 + v157 * v333), v352 = v316 * v322,
+            v353 = v316 * v316, v354 = v323 * v323, v355 = v53 * v351, v356 = v319 * v351,
+            v357 = v54 * v319, v358 = v320 * (2.0 * v319), v359 = softehl_vsqrt(1.0 / v329),
+            v360 = (v164 + v157 * v135 - v59) * v191, v361 = v318 * v318,
+            v362 = w[3] * (v319 * v355 - v323 * v332), v363 = v9 * v56, v364 = v352 * v325,
+            v365 = 0.5 * v359,
+            v366 = v354 * (v9 * v332) - v348 * (v219 * (v325 * (v218 * (v323 * (v316 * v111))))) * v365,
+            v367 = v325 * v348 * v365,
+            v368 = v324 * (0.08333333333333333 * v317) * v330 + v364 * v348 * v365 * v226,
+            v369 = v219 * (v325 * (v218 * (v323 * (v316 * (v44 * v321))))) * v348 * v365,
+            v370 = v109 * (v219 * (v325 * (v218 * (v323 * (v321 * v316))))) * v348 * v365,
+            v371 = -(v48 * v363), v372 = -(v49 * v363), v373 = v56 * (v18 * v129),
+            v374 = v56 * (v10 - v18 * (v163 + v157 * v134)), v375 = w[3] * (v313 * v5 * v366),
+            v376 = v48 * v373, v377 = v49 * v373, v378 = v48 * v374, v379 = v49 * v374,
+            v380 = (v348 * (v219 * v364) * v365 * v221 + v331 * v220) * (v323 * v14),
+            v381 = -(v48 * v360), v382 = -(v49 * v360), v383 = 0.5 * (v332 * (v321 * v354) + v380),
+            v384 = -(w[3] * v323 * (v331 * v227 + v219 * v368)),
+            v385 = v318 * (v179 * v185 + v181 * v184) - v361 * (v188 * (v311 * v186)),
+            v386 = v318 * (v180 * v185 + v182 * v184) - v361 * (v188 * (v311 * v187)),
+            v387 = w[3] * (parameters[7] * (v357 * (v336 + v335) - v370) - v383),
+            v388 = w[3] * (parameters[7] * (v357 * (v338 + v337) + v369) + v383),
+            v389 = (v347 * (v186 * v350) + v385 * v358) * v330 + v367 * (v352 * v222 - v353 * (v186 * v349)),
+            v390 = (v347 * (v187 * v350) + v386 * v358) * v330 + v367 * (v352 * v224 - v353 * (v187 * v349)),
+            v391 = w[3] * (v45 * v356 + v385 * v355 - v323 * (v331 * v223 + v219 * v389)),
+            v392 = w[3] * (v44 * v356 + v386 * v355 - v323 * (v331 * v225 + v219 * v390));
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
             (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
-            R_lanes[4 + i] += D1 * v801;
-            K_lanes[(4 + i) * (4 + modes) + 0] += D1 * v898;
-            K_lanes[0 * (4 + modes) + 4 + i] += N * v865 + D * v874 + N2 * v859 + N3 * v305;
-            K_lanes[(4 + i) * (4 + modes) + 1] += D1 * v922;
-            K_lanes[1 * (4 + modes) + 4 + i] += N * v851;
-            K_lanes[(4 + i) * (4 + modes) + 2] += D1 * v899;
-            K_lanes[2 * (4 + modes) + 4 + i] += N * v866 + D * v875 + N2 * v860 + N3 * v306;
-            K_lanes[(4 + i) * (4 + modes) + 3] += D1 * v923;
-            K_lanes[3 * (4 + modes) + 4 + i] += N * v852;
-            const V r0 = softehl_splat(0.0);
-            const V r1 = softehl_splat(0.0);
-            const V r2 = D1 * v856;
-            const V r3 = D1 * v877;
-            const V r4 = D1 * v742;
-            const V r5 = softehl_splat(0.0);
-            const V r6 = D1 * v743;
-            const V r7 = softehl_splat(0.0);
+            R_lanes[4 + i] += D1 * v362; K_lanes[(4 + i) * (4 + modes) + 0] += D1 * v387;
+            K_lanes[0 * (4 + modes) + 4 + i] += N * v378 + D * v381 + N2 * v376 + N3 * v165;
+            K_lanes[(4 + i) * (4 + modes) + 1] += D1 * v391;
+            K_lanes[1 * (4 + modes) + 4 + i] += N * v371;
+            K_lanes[(4 + i) * (4 + modes) + 2] += D1 * v388;
+            K_lanes[2 * (4 + modes) + 4 + i] += N * v379 + D * v382 + N2 * v377 + N3 * v166;
+            K_lanes[(4 + i) * (4 + modes) + 3] += D1 * v392;
+            K_lanes[3 * (4 + modes) + 4 + i] += N * v372;
+            const V r0 = softehl_splat(0.0), r1 = softehl_splat(0.0), r2 = D1 * v375,
+                r3 = D1 * v384, r4 = D1 * v339, r5 = softehl_splat(0.0), r6 = D1 * v340,
+                r7 = softehl_splat(0.0);
             for (ptrdiff_t j = 0; j < modes; ++j)
                 K_lanes[(4 + i) * (4 + modes) + 4 + j] += r0 * B[8 * j] + r1 * B[8 * j + 1] + r2 * B[8 * j + 2] + r3 * B[8 * j + 3] + r4 * B[8 * j + 4] + r5 * B[8 * j + 5] + r6 * B[8 * j + 6] + r7 * B[8 * j + 7];
         }
     }
-    const V v924 = -s42;
-    const V v925 = -s43;
-    const V v926 = -s44;
-    const V v927 = -s45;
-    const V v928 = -s46;
-    const V v929 = -s47;
-    const V v930 = -s48;
-    const V v931 = -s49;
-    const V v932 = -s52;
-    const V v933 = -s54;
-    R_lanes[0] = s51;
-    R_lanes[1] = v927;
-    R_lanes[2] = s50;
-    R_lanes[3] = v926;
-    K_lanes[0 * (4 + modes) + 0] = v932;
-    K_lanes[0 * (4 + modes) + 1] = s56;
-    K_lanes[0 * (4 + modes) + 2] = s53;
-    K_lanes[0 * (4 + modes) + 3] = s57;
-    K_lanes[1 * (4 + modes) + 0] = s42;
-    K_lanes[1 * (4 + modes) + 1] = v928;
-    K_lanes[1 * (4 + modes) + 2] = v924;
-    K_lanes[1 * (4 + modes) + 3] = v929;
-    K_lanes[2 * (4 + modes) + 0] = v933;
-    K_lanes[2 * (4 + modes) + 1] = s58;
-    K_lanes[2 * (4 + modes) + 2] = s55;
-    K_lanes[2 * (4 + modes) + 3] = s59;
-    K_lanes[3 * (4 + modes) + 0] = s43;
-    K_lanes[3 * (4 + modes) + 1] = v930;
-    K_lanes[3 * (4 + modes) + 2] = v925;
-    K_lanes[3 * (4 + modes) + 3] = v931;
+    const V v393 = -s25, v394 = -s26, v395 = -s27, v396 = -s28, v397 = -s29, v398 = -s30,
+        v399 = -s31, v400 = -s32, v401 = -s35, v402 = -s37;
+    R_lanes[0] = s34; R_lanes[1] = v396; R_lanes[2] = s33; R_lanes[3] = v395;
+    K_lanes[0 * (4 + modes) + 0] = v401; K_lanes[0 * (4 + modes) + 1] = s39;
+    K_lanes[0 * (4 + modes) + 2] = s36; K_lanes[0 * (4 + modes) + 3] = s40;
+    K_lanes[1 * (4 + modes) + 0] = s25; K_lanes[1 * (4 + modes) + 1] = v397;
+    K_lanes[1 * (4 + modes) + 2] = v393; K_lanes[1 * (4 + modes) + 3] = v398;
+    K_lanes[2 * (4 + modes) + 0] = v402; K_lanes[2 * (4 + modes) + 1] = s41;
+    K_lanes[2 * (4 + modes) + 2] = s38; K_lanes[2 * (4 + modes) + 3] = s42;
+    K_lanes[3 * (4 + modes) + 0] = s26; K_lanes[3 * (4 + modes) + 1] = v399;
+    K_lanes[3 * (4 + modes) + 2] = v394; K_lanes[3 * (4 + modes) + 3] = v400;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
     softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_conserving_eyring_tangent, 4, (4 + modes), 2, 0, (4 + modes), ((4 + modes) * (4 + modes)))
 
-void softehl_film_conserving_eyring_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_conserving_eyring_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_eyring_tangent_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (4 + modes) * e, tangent + ((4 + modes) * (4 + modes)) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_eyring_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), tangent + ((4 + modes) * (4 + modes)) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    double K[SOFTEHL_LANES * ((4 + modes) * (4 + modes))];
-    softehl_film_conserving_eyring_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_film_conserving_eyring_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -1581,310 +527,105 @@ static void softehl_film_conserving_eyring_fields_group(
 #if SOFTEHL_LANES > 1
     softehl_gather(d_lanes, d, (4 + modes));
 #endif
-    const V v1 = X2 + d2;
-    const V v2 = X1 - parameters[0];
-    const V v3 = X3 - parameters[0];
-    const V v4 = d1 + v2;
-    const V v5 = d2 * parameters[7];
-    const V v6 = a1 + v5;
-    const V v7 = d0 * parameters[7];
-    const V v8 = a0 + v7;
-    const V v9 = d3 + v3;
-    const V v10 = v1 - d0;
-    const double v11 = 1.0 / parameters[6];
-    const V v12 = X0 + d0;
-    const V v13 = v10 - X0;
-    const V v14 = 0.5 * v13;
-    const V v15 = parameters[6] * v14;
-    const V v16 = 1.0 / v14;
-    const V v17 = 1.0 / v15;
-    const V v18 = 0.5 * v17;
+    const V v1 = X2 + d2, v2 = d1 + (X1 - parameters[0]), v3 = a1 + d2 * parameters[7],
+        v4 = a0 + d0 * parameters[7], v5 = d3 + (X3 - parameters[0]);
+    const double v6 = 1.0 / parameters[6];
+    const V v7 = X0 + d0, v8 = 0.5 * (v1 - d0 - X0), v9 = 1.0 / v8,
+        v10 = 0.5 * (1.0 / (parameters[6] * v8));
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v19 = 0.5 * w[0];
-        const V v20 = p1 * v16;
-        const V v21 = w[3] * v14;
-        const double v22 = 0.5 + v19;
-        const double v23 = 0.5 - v19;
-        const V v24 = v22 * v1;
-        const V v25 = v22 * v9;
-        const V v26 = v23 * v12;
-        const V v27 = v24 + v26;
-        const V v28 = v23 * v4;
-        const V v29 = v28 + v25;
-        const V v30 = 0.5 * v29;
-        const V v31 = v30 * v20;
-        const V v32 = v11 * v31;
-        const V v33 = v32 * v32;
-        const M v34 = softehl_lt(v33, softehl_splat(1.0));
-        V v35 = softehl_splat(0.0);
-        V v36 = softehl_splat(0.0);
-        const M m37 = v34;
-        if (softehl_any(m37)) {
-            const V v38 = 1.9572941063391263e-20 * v33;
-            const V v39 = 8.22063524662433e-18 + v38;
-            const V v40 = v33 * v39;
-            const V v41 = 2.8114572543455206e-15 + v40;
-            const V v42 = 2.5529923126162516e-21 * v33;
-            const V v43 = 1.1743764638034756e-18 + v42;
-            const V v44 = v33 * v43;
-            const V v45 = 4.439143033177138e-16 + v44;
-            const V v46 = v33 * v41;
-            const V v47 = 7.647163731819816e-13 + v46;
-            const V v48 = v33 * v47;
-            const V v49 = 1.6059043836821613e-10 + v48;
-            const V v50 = v33 * v49;
-            const V v51 = 2.505210838544172e-08 + v50;
-            const V v52 = v33 * v45;
-            const V v53 = 1.34949948208585e-13 + v52;
-            const V v54 = v33 * v51;
-            const V v55 = 2.7557319223985893e-06 + v54;
-            const V v56 = v33 * v53;
-            const V v57 = 3.2118087673643227e-11 + v56;
-            const V v58 = v33 * v57;
-            const V v59 = 5.7812557812557815e-09 + v58;
-            const V v60 = v33 * v59;
-            const V v61 = 7.515632515632515e-07 + v60;
-            const V v62 = v33 * v61;
-            const V v63 = 6.613756613756614e-05 + v62;
-            const V v64 = v33 * v63;
-            const V v65 = 0.0035714285714285713 + v64;
-            const V v66 = v33 * v65;
-            const V v67 = 0.1 + v66;
-            const V v68 = v33 * v55;
-            const V v69 = 0.0001984126984126984 + v68;
-            const V v70 = v33 * v69;
-            const V v71 = 0.008333333333333333 + v70;
-            const V v72 = v33 * v71;
-            const V v73 = 0.16666666666666666 + v72;
-            const V v74 = v33 * v73;
-            const V v75 = 1.0 + v74;
-            const V v76 = 1.0 / v75;
-            const V v77 = v33 * v67;
-            const V v78 = 1.0 + v77;
-            v35 = softehl_blend(m37, v76, v35);
-            v36 = softehl_blend(m37, v78, v36);
+        const double v11 = 0.5 * w[0];
+        const V v12 = p1 * v9, v13 = w[3] * v8;
+        const double v14 = 0.5 + v11, v15 = 0.5 - v11;
+        const V v16 = v14 * v1 + v15 * v7, v17 = v15 * v2 + v14 * v5, v18 = 0.5 * v17,
+            v19 = v18 * v12, v20 = v6 * v19, v21 = v20 * v20;
+        const M v22 = softehl_lt(v21, softehl_splat(1.0));
+        V v23 = softehl_splat(0.0), v24 = softehl_splat(0.0);
+        const M m25 = v22;
+        if (softehl_any(m25)) {
+            const V v26 = 2.8114572543455206e-15 + v21 * (8.22063524662433e-18 + 1.9572941063391263e-20 * v21),
+                v27 = 4.439143033177138e-16 + v21 * (1.1743764638034756e-18 + 2.5529923126162516e-21 * v21),
+                v28 = 1.6059043836821613e-10 + v21 * (7.647163731819816e-13 + v21 * v26),
+                v29 = 2.7557319223985893e-06 + v21 * (2.505210838544172e-08 + v21 * v28),
+                v30 = 3.2118087673643227e-11 + v21 * (1.34949948208585e-13 + v21 * v27),
+                v31 = 7.515632515632515e-07 + v21 * (5.7812557812557815e-09 + v21 * v30),
+                v32 = 0.0035714285714285713 + v21 * (6.613756613756614e-05 + v21 * v31),
+                v33 = v21 * (0.008333333333333333 + v21 * (0.0001984126984126984 + v21 * v29)),
+                v34 = 1.0 / (1.0 + v21 * (0.16666666666666666 + v33)),
+                v35 = 1.0 + v21 * (0.1 + v21 * v32);
+            v23 = softehl_blend(m25, v34, v23); v24 = softehl_blend(m25, v35, v24);
         }
-        const M m79 = ~v34;
-        if (softehl_any(m79)) {
-            const V v80 = softehl_vsinh(v32);
-            const V v81 = softehl_vcosh(v32);
-            const V v82 = v32 * v33;
-            const V v83 = v32 * v81;
-            const V v84 = 1.0 / v80;
-            const V v85 = 1.0 / v82;
-            const V v86 = v32 * v84;
-            const V v87 = v83 - v80;
-            const V v88 = 3.0 * v87;
-            const V v89 = v88 * v85;
-            v35 = softehl_blend(m79, v86, v35);
-            v36 = softehl_blend(m79, v89, v36);
+        const M m36 = ~v22;
+        if (softehl_any(m36)) {
+            const V v37 = softehl_vsinh(v20), v38 = softehl_vcosh(v20), v39 = v20 * (1.0 / v37),
+                v40 = 3.0 * (v20 * v38 - v37) * (1.0 / (v20 * v21));
+            v23 = softehl_blend(m36, v39, v23); v24 = softehl_blend(m36, v40, v24);
         }
-        const V v90 = p0 * parameters[3];
-        const V v91 = softehl_vexp(v90);
-        const V v92 = parameters[6] * v29;
-        const V v93 = v22 * v6;
-        const V v94 = parameters[1] - v93;
-        const V v95 = 1.0 / v92;
-        const V v96 = v23 * v8;
-        const V v97 = v94 - v96;
-        const V v98 = parameters[2] * v91;
-        const V v99 = v98 * v97;
-        const V v100 = v95 * v99;
-        const V v101 = v100 * v35;
-        const V v102 = softehl_vasinh(v101);
-        const V v103 = parameters[6] * v102;
-        const M v104 = softehl_lt(softehl_splat(0.0), v103);
-        const M v105 = softehl_eq(v103, v103);
-        V v106 = softehl_splat(0.0);
-        const M m107 = v105;
-        if (softehl_any(m107)) {
-            const V v108 = softehl_blend(v104, v103, softehl_splat(0.0));
-            v106 = softehl_blend(m107, v108, v106);
+        const V v41 = softehl_vexp(p0 * parameters[3]), v42 = parameters[1] - v14 * v3 - v15 * v4,
+            v43 = parameters[2] * v41, v44 = 1.0 / (parameters[6] * v17) * (v43 * v42) * v23,
+            v45 = softehl_vasinh(v44), v46 = parameters[6] * v45;
+        const M v47 = softehl_lt(softehl_splat(0.0), v46), v48 = softehl_eq(v46, v46);
+        V v49 = softehl_splat(0.0); const M m50 = v48;
+        if (softehl_any(m50)) {
+            const V v51 = softehl_blend(v47, v46, softehl_splat(0.0));
+            v49 = softehl_blend(m50, v51, v49);
         }
-        const M m109 = ~v105;
-        if (softehl_any(m109)) {
-            const V v110 = v103 * v103;
-            const V v111 = v103 * v110;
-            const V v112 = -v111;
-            v106 = softehl_blend(m109, v112, v106);
+        const M m52 = ~v48;
+        if (softehl_any(m52)) {
+            const V v53 = -(v46 * (v46 * v46)); v49 = softehl_blend(m52, v53, v49);
         }
-        const V v113 = 1.0 - p4;
-        const V v114 = v113 * v106;
-        const V v115 = softehl_blend(v104, softehl_splat(0.0), v103);
-        const double v116 = 0.5 * w[1];
-        const double v117 = 0.5 * w[2];
-        const V v118 = 1.0 - p6;
-        const double v119 = 0.5 - v116;
-        const double v120 = 0.5 + v116;
-        const V v121 = p3 * v18;
-        const double v122 = 0.5 - v117;
-        const double v123 = 0.5 + v117;
-        const V v124 = v118 * v115;
-        const V v125 = v119 * v4;
-        const V v126 = v122 * v4;
-        const V v127 = v124 + v114;
-        const V v128 = v120 * v9;
-        const V v129 = v125 + v128;
-        const V v130 = v123 * v9;
-        const V v131 = v126 + v130;
-        const V v132 = v129 + v131;
-        const V v133 = 0.5 * v132;
-        const V v134 = v133 * v121;
-        const V v135 = v127 - v31;
-        const V v136 = v134 * v134;
-        const M v137 = softehl_lt(v136, softehl_splat(1.0));
-        V v138 = softehl_splat(0.0);
-        V v139 = softehl_splat(0.0);
-        const M m140 = v137;
-        if (softehl_any(m140)) {
-            const V v141 = 1.9572941063391263e-20 * v136;
-            const V v142 = 8.22063524662433e-18 + v141;
-            const V v143 = v136 * v142;
-            const V v144 = 2.8114572543455206e-15 + v143;
-            const V v145 = 2.5529923126162516e-21 * v136;
-            const V v146 = 1.1743764638034756e-18 + v145;
-            const V v147 = v136 * v146;
-            const V v148 = 4.439143033177138e-16 + v147;
-            const V v149 = v136 * v144;
-            const V v150 = 7.647163731819816e-13 + v149;
-            const V v151 = v136 * v150;
-            const V v152 = 1.6059043836821613e-10 + v151;
-            const V v153 = v136 * v152;
-            const V v154 = 2.505210838544172e-08 + v153;
-            const V v155 = v136 * v148;
-            const V v156 = 1.34949948208585e-13 + v155;
-            const V v157 = v136 * v154;
-            const V v158 = 2.7557319223985893e-06 + v157;
-            const V v159 = v136 * v156;
-            const V v160 = 3.2118087673643227e-11 + v159;
-            const V v161 = v136 * v160;
-            const V v162 = 5.7812557812557815e-09 + v161;
-            const V v163 = v136 * v162;
-            const V v164 = 7.515632515632515e-07 + v163;
-            const V v165 = v136 * v164;
-            const V v166 = 6.613756613756614e-05 + v165;
-            const V v167 = v136 * v166;
-            const V v168 = 0.0035714285714285713 + v167;
-            const V v169 = v136 * v168;
-            const V v170 = 0.1 + v169;
-            const V v171 = v136 * v158;
-            const V v172 = 0.0001984126984126984 + v171;
-            const V v173 = v136 * v172;
-            const V v174 = 0.008333333333333333 + v173;
-            const V v175 = v136 * v174;
-            const V v176 = 0.16666666666666666 + v175;
-            const V v177 = v136 * v176;
-            const V v178 = 1.0 + v177;
-            const V v179 = 1.0 / v178;
-            const V v180 = v136 * v170;
-            const V v181 = 1.0 + v180;
-            v138 = softehl_blend(m140, v179, v138);
-            v139 = softehl_blend(m140, v181, v139);
+        const V v54 = 1.0 - p4, v55 = softehl_blend(v47, softehl_splat(0.0), v46);
+        const double v56 = 0.5 * w[1], v57 = 0.5 * w[2];
+        const V v58 = 1.0 - p6, v59 = v58 * v55 + v54 * v49,
+            v60 = (0.5 - v56) * v2 + (0.5 + v56) * v5, v61 = (0.5 - v57) * v2 + (0.5 + v57) * v5,
+            v62 = 0.5 * (v60 + v61), v63 = v62 * (p3 * v10), v64 = v59 - v19, v65 = v63 * v63;
+        const M v66 = softehl_lt(v65, softehl_splat(1.0));
+        V v67 = softehl_splat(0.0), v68 = softehl_splat(0.0);
+        const M m69 = v66;
+        if (softehl_any(m69)) {
+            const V v70 = 2.8114572543455206e-15 + v65 * (8.22063524662433e-18 + 1.9572941063391263e-20 * v65),
+                v71 = 4.439143033177138e-16 + v65 * (1.1743764638034756e-18 + 2.5529923126162516e-21 * v65),
+                v72 = 1.6059043836821613e-10 + v65 * (7.647163731819816e-13 + v65 * v70),
+                v73 = 2.7557319223985893e-06 + v65 * (2.505210838544172e-08 + v65 * v72),
+                v74 = 3.2118087673643227e-11 + v65 * (1.34949948208585e-13 + v65 * v71),
+                v75 = 7.515632515632515e-07 + v65 * (5.7812557812557815e-09 + v65 * v74),
+                v76 = 0.0035714285714285713 + v65 * (6.613756613756614e-05 + v65 * v75),
+                v77 = v65 * (0.008333333333333333 + v65 * (0.0001984126984126984 + v65 * v73)),
+                v78 = 1.0 / (1.0 + v65 * (0.16666666666666666 + v77)),
+                v79 = 1.0 + v65 * (0.1 + v65 * v76);
+            v67 = softehl_blend(m69, v78, v67); v68 = softehl_blend(m69, v79, v68);
         }
-        const M m182 = ~v137;
-        if (softehl_any(m182)) {
-            const V v183 = softehl_vsinh(v134);
-            const V v184 = softehl_vcosh(v134);
-            const V v185 = v134 * v136;
-            const V v186 = v134 * v184;
-            const V v187 = 1.0 / v183;
-            const V v188 = 1.0 / v185;
-            const V v189 = v134 * v187;
-            const V v190 = v186 - v183;
-            const V v191 = 3.0 * v190;
-            const V v192 = v191 * v188;
-            v138 = softehl_blend(m182, v189, v138);
-            v139 = softehl_blend(m182, v192, v139);
+        const M m80 = ~v66;
+        if (softehl_any(m80)) {
+            const V v81 = softehl_vsinh(v63), v82 = softehl_vcosh(v63), v83 = v63 * (1.0 / v81),
+                v84 = 3.0 * (v63 * v82 - v81) * (1.0 / (v63 * v65));
+            v67 = softehl_blend(m80, v83, v67); v68 = softehl_blend(m80, v84, v68);
         }
-        const V v193 = p2 * parameters[3];
-        const V v194 = 0.08333333333333333 * p3;
-        const V v195 = v129 * v131;
-        const V v196 = softehl_vexp(v193);
-        const V v197 = parameters[6] * v133;
-        const V v198 = v133 * v133;
-        const V v199 = v194 * v133;
-        const V v200 = 1.0 / v197;
-        const M v201 = softehl_lt(softehl_splat(0.0), v97);
-        const V v202 = 1.0 / v198;
-        const V v203 = v195 * v202;
-        const V v204 = parameters[2] * v196;
-        const V v205 = v204 * v97;
-        const V v206 = v200 * v205;
-        const V v207 = v204 * v14;
-        const V v208 = 1.0 / v207;
-        const V v209 = v208 * v199;
-        const V v210 = v198 * v209;
-        const V v211 = v203 * v210;
-        const V v212 = v138 * v206;
-        const V v213 = v212 * v212;
-        const V v214 = 1.0 + v213;
-        const V v215 = softehl_vsqrt(v214);
-        const V v216 = v211 * v215;
-        const V v217 = v139 * v216;
-        const V v218 = softehl_blend(v201, v97, softehl_splat(0.0));
-        const V v219 = softehl_blend(v201, softehl_splat(0.0), v97);
-        const V v220 = v118 * v219;
-        const V v221 = v20 * v36;
-        const V v222 = v113 * v218;
-        const V v223 = v220 + v222;
-        const V v224 = v101 * v101;
-        const V v225 = 1.0 + v224;
-        const V v226 = v30 * v223;
-        const V v227 = v31 + v127;
-        const V v228 = softehl_vsqrt(v225);
-        const V v229 = v221 * v228;
-        const V v230 = v226 - v217;
-        const V v231 = v203 * v230;
-        softehl_store4(R + 14 * q + 0, (14 * points), v27, v21, v29, p0);
-        softehl_store4(R + 14 * q + 4, (14 * points), v135, v231, v227, v98);
-        softehl_store1(R + 14 * q + 8, (14 * points), v29);
-        softehl_store3(R + 14 * q + 11, (14 * points), p4, p6, v229);
+        const V v85 = softehl_vexp(p2 * parameters[3]), v86 = v62 * v62;
+        const M v87 = softehl_lt(softehl_splat(0.0), v42);
+        const V v88 = v60 * v61 * (1.0 / v86), v89 = parameters[2] * v85,
+            v90 = v88 * (v86 * (1.0 / (v89 * v8) * (0.08333333333333333 * p3 * v62))),
+            v91 = v67 * (1.0 / (parameters[6] * v62) * (v89 * v42)),
+            v92 = softehl_vsqrt(1.0 + v91 * v91), v93 = softehl_blend(v87, v42, softehl_splat(0.0)),
+            v94 = softehl_blend(v87, softehl_splat(0.0), v42), v95 = v19 + v59,
+            v96 = softehl_vsqrt(1.0 + v44 * v44), v97 = v12 * v24 * v96,
+            v98 = v88 * (v18 * (v58 * v94 + v54 * v93) - v68 * (v90 * v92));
+        softehl_store4(R + 14 * q + 0, (14 * points), v16, v13, v17, p0);
+        softehl_store4(R + 14 * q + 4, (14 * points), v64, v98, v95, v43);
+        softehl_store1(R + 14 * q + 8, (14 * points), v17);
+        softehl_store3(R + 14 * q + 11, (14 * points), p4, p6, v97);
     }
     for (ptrdiff_t q = 0; q < points; ++q) {
         softehl_store2(R + 14 * q + 9, (14 * points), softehl_splat(0.0), softehl_splat(0.0));
     }
 }
-
-void softehl_film_conserving_eyring_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_eyring_fields_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (14 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_eyring_fields_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (14 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * (14 * points)];
-    softehl_film_conserving_eyring_fields(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (14 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_conserving_eyring_fields, 4, (4 + modes), 2, 0, (14 * points), 0)

@@ -40,34 +40,18 @@ SOFTEHL_LANEWISE(cosh)
 
 SOFTEHL_LANEWISE(sinh)
 
-static void softehl_film_conserving_eyring_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_conserving_eyring_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 14, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 14, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
-    softehl_load4(t + 8, 14, &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    V t12, t13;
-    softehl_load2(t + 12, 14, &t12, &t13);
-    (void)t12; (void)t13;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13;
+    softehl_load4(t + 0, 14, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 14, &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, 14, &t8, &t9, &t10, &t11); softehl_load2(t + 12, 14, &t12, &t13);
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -84,639 +68,197 @@ static void softehl_film_conserving_eyring_pseudo_load_group(
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
     const double v1 = 6.283185307179586 * parameters[4];
-    const V v2 = X2 + d2;
-    const V v3 = X1 - parameters[0];
-    const V v4 = X3 - parameters[0];
-    const V v5 = d1 + v3;
-    const V v6 = d3 + v4;
-    const V v7 = parameters[2] * t9;
-    const V v8 = d2 * parameters[7];
-    const V v9 = a1 + v8;
-    const V v10 = d0 * parameters[7];
-    const V v11 = a0 + v10;
-    const V v12 = v2 - X0;
-    const V v13 = t2 - t0;
-    const V v14 = v12 - d0;
-    const V v15 = d0 * t13;
-    const V v16 = t4 + v15;
-    const V v17 = d2 * t13;
-    const V v18 = t5 + v17;
-    const V v19 = v6 - v5;
-    const V v20 = 0.5 * v14;
-    const V v21 = 0.5 * v13;
-    const V v22 = 0.5 * v19;
-    const V v23 = 6.283185307179586 * t10;
-    const V v24 = t1 - t6;
-    const V v25 = t3 - t6;
-    const double v26 = 1.0 / parameters[6];
-    const double v27 = 0.5 * parameters[5];
-    const V v28 = 1.0 / v20;
-    const V v29 = parameters[6] * v20;
-    const V v30 = parameters[6] * v21;
-    const V v31 = v20 * v20;
-    const V v32 = v20 * v21;
-    const V v33 = 1.0 / v29;
-    const V v34 = v25 - v24;
-    const V v35 = v22 * v22;
-    const V v36 = v35 + v31;
-    const V v37 = v20 * t12;
-    const V v38 = v30 + v37;
-    const V v39 = 0.5 * v34;
-    const V v40 = v22 * v39;
-    const V v41 = v40 + v32;
-    const V v42 = softehl_vsqrt(v36);
-    const V v43 = 1.0 / v36;
-    const V v44 = v26 * t12;
-    const V v45 = v33 * v38;
-    const V v46 = parameters[5] * v42;
-    const V v47 = softehl_vsqrt(v43);
-    const V v48 = v47 * v27;
-    const V v49 = v28 * v28;
-    const V v50 = v49 * v21;
-    const V v51 = 2.0 * v41;
-    const V v52 = v51 * v48;
-    const V v53 = v42 * t11;
-    const V v54 = v53 + v52;
-    V s55 = softehl_splat(0.0);
-    V s56 = softehl_splat(0.0);
-    V s57 = softehl_splat(0.0);
-    V s58 = softehl_splat(0.0);
+    const V v2 = d1 + (X1 - parameters[0]), v3 = d3 + (X3 - parameters[0]), v4 = parameters[2] * t9,
+        v5 = a1 + d2 * parameters[7], v6 = a0 + d0 * parameters[7], v7 = t4 + d0 * t13,
+        v8 = t5 + d2 * t13, v9 = 0.5 * (X2 + d2 - X0 - d0), v10 = 0.5 * (t2 - t0),
+        v11 = 0.5 * (v3 - v2), v12 = 6.283185307179586 * t10, v13 = t1 - t6, v14 = t3 - t6;
+    const double v15 = 1.0 / parameters[6];
+    const V v16 = 1.0 / v9, v17 = 1.0 / (parameters[6] * v9), v18 = v11 * v11 + v9 * v9,
+        v19 = 0.5 * (v14 - v13), v20 = softehl_vsqrt(v18), v21 = v15 * t12,
+        v22 = v17 * (parameters[6] * v10 + v9 * t12), v23 = parameters[5] * v20,
+        v24 = softehl_vsqrt(1.0 / v18), v25 = v16 * v16 * v10,
+        v26 = v20 * t11 + 2.0 * (v11 * v19 + v9 * v10) * (v24 * (0.5 * parameters[5]));
+    V s27 = {0}, s28 = {0}, s29 = {0}, s30 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v59 = 0.5 * w[0];
-        const double v60 = 0.5 + v59;
-        const double v61 = 0.5 - v59;
-        const V v62 = p1 * v28;
-        const V v63 = p1 * v50;
-        const V v64 = 0.5 * v62;
-        const V v65 = v61 * v5;
-        const V v66 = v61 * v24;
-        const V v67 = v60 * v6;
-        const V v68 = v65 + v67;
-        const V v69 = parameters[0] + v68;
-        const V v70 = 0.5 * v68;
-        const V v71 = v60 * v25;
-        const V v72 = v66 + v71;
-        const V v73 = v64 * v72;
-        const V v74 = t6 + v72;
-        const V v75 = v70 * v62;
-        const V v76 = v70 * v63;
-        const V v77 = v73 - v76;
-        const V v78 = v75 * v44;
-        const V v79 = v77 - v78;
-        const V v80 = v1 * v74;
-        const V v81 = v69 * v1;
-        const V v82 = v69 * v23;
-        const V v83 = v80 + v82;
-        const V v84 = v81 * v21;
-        const V v85 = v20 * v83;
-        const V v86 = v84 + v85;
-        const V v87 = p0 * v86;
-        const V v88 = w[3] * v87;
-        const V v89 = v26 * v75;
-        const V v90 = v26 * v79;
-        const V v91 = v89 * v89;
-        const M v92 = softehl_lt(v91, softehl_splat(1.0));
-        const V v93 = v60 * v88;
-        s55 += v93;
-        const V v94 = v61 * v88;
-        s56 += v94;
-        V v95 = softehl_splat(0.0);
-        V v96 = softehl_splat(0.0);
-        const M m97 = v92;
-        if (softehl_any(m97)) {
-            const V v98 = 2.0 * v89;
-            const V v99 = 1.9572941063391263e-20 * v91;
-            const V v100 = v98 * v90;
-            const V v101 = 8.22063524662433e-18 + v99;
-            const V v102 = v99 + v101;
-            const V v103 = v91 * v101;
-            const V v104 = 2.8114572543455206e-15 + v103;
-            const V v105 = v91 * v104;
-            const V v106 = 7.647163731819816e-13 + v105;
-            const V v107 = v91 * v102;
-            const V v108 = v104 + v107;
-            const V v109 = v108 * v100;
-            const V v110 = v91 * v106;
-            const V v111 = 1.6059043836821613e-10 + v110;
-            const V v112 = v91 * v111;
-            const V v113 = 2.505210838544172e-08 + v112;
-            const V v114 = v91 * v113;
-            const V v115 = 2.7557319223985893e-06 + v114;
-            const V v116 = v106 * v100;
-            const V v117 = v91 * v109;
-            const V v118 = v116 + v117;
-            const V v119 = v91 * v115;
-            const V v120 = 0.0001984126984126984 + v119;
-            const V v121 = v111 * v100;
-            const V v122 = v91 * v118;
-            const V v123 = v121 + v122;
-            const V v124 = v91 * v120;
-            const V v125 = 0.008333333333333333 + v124;
-            const V v126 = v113 * v100;
-            const V v127 = v91 * v123;
-            const V v128 = v126 + v127;
-            const V v129 = v91 * v125;
-            const V v130 = 0.16666666666666666 + v129;
-            const V v131 = v115 * v100;
-            const V v132 = v91 * v128;
-            const V v133 = v131 + v132;
-            const V v134 = v91 * v130;
-            const V v135 = 1.0 + v134;
-            const V v136 = 1.0 / v135;
-            const V v137 = v136 * v136;
-            const V v138 = v120 * v100;
-            const V v139 = v91 * v133;
-            const V v140 = v138 + v139;
-            const V v141 = v125 * v100;
-            const V v142 = v130 * v100;
-            const V v143 = v91 * v140;
-            const V v144 = v141 + v143;
-            const V v145 = v91 * v144;
-            const V v146 = v142 + v145;
-            const V v147 = v137 * v146;
-            const V v148 = -v147;
-            v95 = softehl_blend(m97, v148, v95);
-            v96 = softehl_blend(m97, v136, v96);
+        const double v31 = 0.5 * w[0], v32 = 0.5 + v31, v33 = 0.5 - v31;
+        const V v34 = p1 * v16, v35 = v33 * v2 + v32 * v3, v36 = parameters[0] + v35,
+            v37 = 0.5 * v35, v38 = v33 * v13 + v32 * v14, v39 = 0.5 * v34 * v38, v40 = v37 * v34,
+            v41 = v37 * (p1 * v25), v42 = v36 * v1, v43 = v1 * (t6 + v38) + v36 * v12,
+            v44 = w[3] * (p0 * (v42 * v10 + v9 * v43)), v45 = v15 * v40,
+            v46 = v15 * (v39 - v41 - v40 * v21), v47 = v45 * v45;
+        const M v48 = softehl_lt(v47, softehl_splat(1.0)); s27 += v32 * v44; s28 += v33 * v44;
+        V v49 = softehl_splat(0.0), v50 = softehl_splat(0.0);
+        const M m51 = v48;
+        if (softehl_any(m51)) {
+            const V v52 = 1.9572941063391263e-20 * v47, v53 = 2.0 * v45 * v46,
+                v54 = 8.22063524662433e-18 + v52, v55 = 2.8114572543455206e-15 + v47 * v54,
+                v56 = 7.647163731819816e-13 + v47 * v55, v57 = 1.6059043836821613e-10 + v47 * v56,
+                v58 = 2.505210838544172e-08 + v47 * v57, v59 = 2.7557319223985893e-06 + v47 * v58,
+                v60 = 0.0001984126984126984 + v47 * v59,
+                v61 = v57 * v53 + v47 * (v56 * v53 + v47 * ((v55 + v47 * (v52 + v54)) * v53)),
+                v62 = 0.008333333333333333 + v47 * v60, v63 = 0.16666666666666666 + v47 * v62,
+                v64 = 1.0 / (1.0 + v47 * v63),
+                v65 = v47 * (v60 * v53 + v47 * (v59 * v53 + v47 * (v58 * v53 + v47 * v61))),
+                v66 = -(v64 * v64 * (v63 * v53 + v47 * (v62 * v53 + v65)));
+            v49 = softehl_blend(m51, v66, v49); v50 = softehl_blend(m51, v64, v50);
         }
-        const M m149 = ~v92;
-        if (softehl_any(m149)) {
-            const V v150 = softehl_vsinh(v89);
-            const V v151 = softehl_vcosh(v89);
-            const V v152 = 1.0 / v150;
-            const V v153 = v89 * v152;
-            const V v154 = v153 * v151;
-            const V v155 = 1.0 - v154;
-            const V v156 = v155 * v90;
-            const V v157 = v152 * v156;
-            v95 = softehl_blend(m149, v157, v95);
-            v96 = softehl_blend(m149, v153, v96);
+        const M m67 = ~v48;
+        if (softehl_any(m67)) {
+            const V v68 = softehl_vsinh(v45), v69 = softehl_vcosh(v45), v70 = 1.0 / v68,
+                v71 = v45 * v70, v72 = v70 * ((1.0 - v71 * v69) * v46);
+            v49 = softehl_blend(m67, v72, v49); v50 = softehl_blend(m67, v71, v50);
         }
-        const V v158 = p0 * parameters[3];
-        const V v159 = p0 * v7;
-        const V v160 = t8 + v159;
-        const V v161 = softehl_vexp(v158);
-        const V v162 = v60 * v9;
-        const V v163 = parameters[1] - v162;
-        const V v164 = v60 * v18;
-        const V v165 = t7 - v164;
-        const V v166 = parameters[6] * v72;
-        const V v167 = parameters[6] * v68;
-        const V v168 = 1.0 / v167;
-        const V v169 = v61 * v11;
-        const V v170 = v163 - v169;
-        const V v171 = v61 * v16;
-        const V v172 = v165 - v171;
-        const V v173 = v68 * t12;
-        const V v174 = v166 + v173;
-        const V v175 = v161 * v160;
-        const V v176 = parameters[2] * v161;
-        const V v177 = v176 * v172;
-        const V v178 = v176 * v170;
-        const V v179 = v170 * v175;
-        const V v180 = v177 + v179;
-        const V v181 = v96 * v180;
-        const V v182 = v178 * v96;
-        const V v183 = v168 * v182;
-        const V v184 = v183 * v174;
-        const V v185 = v181 - v184;
-        const V v186 = v178 * v95;
-        const V v187 = v186 + v185;
-        const V v188 = v168 * v187;
-        const V v189 = v183 * v183;
-        const V v190 = 1.0 + v189;
-        const V v191 = softehl_vasinh(v183);
-        const V v192 = softehl_vsqrt(v190);
-        const V v193 = 1.0 / v192;
-        const V v194 = parameters[6] * v193;
-        const V v195 = v194 * v188;
-        const V v196 = v191 * t12;
-        const V v197 = v196 + v195;
-        const V v198 = parameters[6] * v191;
-        const M v199 = softehl_lt(softehl_splat(0.0), v198);
-        const M v200 = softehl_eq(v198, v198);
-        V v201 = softehl_splat(0.0);
-        V v202 = softehl_splat(0.0);
-        const M m203 = v200;
+        const V v73 = softehl_vexp(p0 * parameters[3]), v74 = 1.0 / (parameters[6] * v35),
+            v75 = parameters[1] - v32 * v5 - v33 * v6, v76 = t7 - v32 * v8 - v33 * v7,
+            v77 = parameters[2] * v73, v78 = v77 * v75, v79 = v74 * (v78 * v50),
+            v80 = v50 * (v77 * v76 + v75 * (v73 * (t8 + p0 * v4))) - v79 * (parameters[6] * v38 + v35 * t12),
+            v81 = softehl_vasinh(v79), v82 = softehl_vsqrt(1.0 + v79 * v79),
+            v83 = v81 * t12 + parameters[6] * (1.0 / v82) * (v74 * (v78 * v49 + v80)),
+            v84 = parameters[6] * v81;
+        const M v85 = softehl_lt(softehl_splat(0.0), v84), v86 = softehl_eq(v84, v84);
+        V v87 = softehl_splat(0.0), v88 = softehl_splat(0.0);
+        const M m89 = v86;
+        if (softehl_any(m89)) {
+            const V v90 = softehl_blend(v85, v83, softehl_splat(0.0)),
+                v91 = softehl_blend(v85, v84, softehl_splat(0.0));
+            v87 = softehl_blend(m89, v90, v87); v88 = softehl_blend(m89, v91, v88);
+        }
+        const M m92 = ~v86;
+        if (softehl_any(m92)) {
+            const V v93 = v84 * v84, v94 = -(v84 * v93), v95 = -(3.0 * v93 * v83);
+            v87 = softehl_blend(m92, v95, v87); v88 = softehl_blend(m92, v94, v88);
+        }
+        const V v96 = 1.0 - p6, v97 = 1.0 - p4;
+        V v98 = softehl_splat(0.0), v99 = softehl_splat(0.0);
+        const M m100 = ~v85;
+        if (softehl_any(m100)) {
+            const V v101 = v96 * v83; v98 = softehl_blend(m100, v101, v98);
+            v99 = softehl_blend(m100, v84, v99);
+        }
+        const double v102 = 0.5 * w[1], v103 = 0.5 * w[2];
+        const V v104 = 0.5 * p3;
+        const double v105 = 0.5 - v102, v106 = 0.5 + v102, v107 = 0.5 - v103, v108 = 0.5 + v103;
+        const V v109 = v97 * v88 + (v96 * v99 - v40), v110 = v105 * v2 + v106 * v3,
+            v111 = v107 * v2 + v108 * v3, v112 = v105 * v13 + v106 * v14,
+            v113 = v107 * v13 + v108 * v14, v114 = 0.5 * (v110 + v111), v115 = 0.5 * (v112 + v113),
+            v116 = v42 * (p0 * v19 - v26 * v109 - v23 * (v97 * v87 + (v41 - v39 + v98))),
+            v117 = v104 * v114, v118 = w[3] * (v43 * (p0 * v11 - v23 * v109) + v116),
+            v119 = v17 * v117, v120 = v17 * (v104 * v115 - v117 * v22), v121 = v119 * v119;
+        const M v122 = softehl_lt(v121, softehl_splat(1.0)); const V v123 = v32 * v118; s29 += v123;
+        const V v124 = v33 * v118; s30 += v124;
+        V v125 = softehl_splat(0.0), v126 = softehl_splat(0.0), v127 = softehl_splat(0.0),
+            v128 = softehl_splat(0.0);
+        const M m129 = v122;
+        if (softehl_any(m129)) {
+            const V v130 = 1.9572941063391263e-20 * v121, v131 = 2.5529923126162516e-21 * v121,
+                v132 = 2.0 * v119 * v120, v133 = 8.22063524662433e-18 + v130,
+                v134 = 1.1743764638034756e-18 + v131, v135 = 2.8114572543455206e-15 + v121 * v133,
+                v136 = 4.439143033177138e-16 + v121 * v134,
+                v137 = 7.647163731819816e-13 + v121 * v135,
+                v138 = 1.34949948208585e-13 + v121 * v136,
+                v139 = 3.2118087673643227e-11 + v121 * v138,
+                v140 = 5.7812557812557815e-09 + v121 * v139,
+                v141 = v121 * (v138 * v132 + v121 * (v132 * (v136 + v121 * (v131 + v134)))),
+                v142 = 1.6059043836821613e-10 + v121 * v137,
+                v143 = 7.515632515632515e-07 + v121 * v140,
+                v144 = 2.505210838544172e-08 + v121 * v142,
+                v145 = v121 * (v137 * v132 + v121 * (v132 * (v135 + v121 * (v130 + v133)))),
+                v146 = 6.613756613756614e-05 + v121 * v143,
+                v147 = 0.0035714285714285713 + v121 * v146,
+                v148 = v121 * (v143 * v132 + v121 * (v140 * v132 + v121 * (v139 * v132 + v141))),
+                v149 = 2.7557319223985893e-06 + v121 * v144, v150 = 0.1 + v121 * v147,
+                v151 = 0.0001984126984126984 + v121 * v149,
+                v152 = v121 * (v149 * v132 + v121 * (v144 * v132 + v121 * (v142 * v132 + v145))),
+                v153 = 0.008333333333333333 + v121 * v151,
+                v154 = v150 * v132 + v121 * (v147 * v132 + v121 * (v146 * v132 + v148)),
+                v155 = 0.16666666666666666 + v121 * v153, v156 = 1.0 / (1.0 + v121 * v155),
+                v157 = 1.0 + v121 * v150,
+                v158 = v156 * v156 * (v155 * v132 + v121 * (v153 * v132 + v121 * (v151 * v132 + v152))),
+                v159 = -v158;
+            v125 = softehl_blend(m129, v159, v125); v126 = softehl_blend(m129, v156, v126);
+            v127 = softehl_blend(m129, v157, v127); v128 = softehl_blend(m129, v154, v128);
+        }
+        const M m160 = ~v122;
+        if (softehl_any(m160)) {
+            const V v161 = softehl_vsinh(v119), v162 = 3.0 * v119, v163 = softehl_vcosh(v119),
+                v164 = 1.0 / v161, v165 = 1.0 / (v119 * v121), v166 = v162 * v163 - 3.0 * v161,
+                v167 = v119 * v164, v168 = v166 * v165, v169 = v164 * (v120 * (1.0 - v167 * v163)),
+                v170 = v165 * (v120 * (v161 * v162 - v165 * (v121 * (3.0 * v166))));
+            v125 = softehl_blend(m160, v169, v125); v126 = softehl_blend(m160, v167, v126);
+            v127 = softehl_blend(m160, v168, v127); v128 = softehl_blend(m160, v170, v128);
+        }
+        const V v171 = softehl_vexp(p2 * parameters[3]), v172 = v114 * v114, v173 = 1.0 / v172,
+            v174 = v172 * (0.08333333333333333 * p3 * v114), v175 = 1.0 / (parameters[6] * v114);
+        const M v176 = softehl_lt(softehl_splat(0.0), v75);
+        const V v177 = v110 * v111, v178 = v177 * v173, v179 = v171 * (t8 + p2 * v4),
+            v180 = parameters[2] * v171,
+            v181 = v111 * v112 + v110 * v113 - v115 * (v173 * (v114 * (2.0 * v177))),
+            v182 = v173 * v181, v183 = v180 * v75, v184 = v178 * v178, v185 = v184 * v174,
+            v186 = v115 * (v184 * (v172 * (0.25 * p3))) + v182 * (2.0 * v178 * v174),
+            v187 = 1.0 / (v180 * v9), v188 = v183 * v126,
+            v189 = v126 * (v180 * v76 + v75 * v179) - v175 * (parameters[6] * v115 + v114 * t12) * v188,
+            v190 = v175 * v188, v191 = 1.0 + v190 * v190, v192 = softehl_vsqrt(v191),
+            v193 = v185 * v192, v194 = softehl_vsqrt(1.0 / v191),
+            v195 = v193 * (v187 * (v180 * v10 + v9 * v179)) - v186 * v192 - v185 * v190 * v194 * (v175 * (v183 * v125 + v189)),
+            v196 = v187 * (v127 * v195 - v193 * v128);
+        V v197 = softehl_splat(0.0), v198 = softehl_splat(0.0), v199 = softehl_splat(0.0),
+            v200 = softehl_splat(0.0);
+        const M m201 = v176;
+        if (softehl_any(m201)) {
+            const V v202 = v97 * v76; v197 = softehl_blend(m201, v202, v197);
+            v198 = softehl_blend(m201, softehl_splat(0.0), v198);
+            v199 = softehl_blend(m201, v75, v199);
+            v200 = softehl_blend(m201, softehl_splat(0.0), v200);
+        }
+        const M m203 = ~v176;
         if (softehl_any(m203)) {
-            const V v204 = softehl_blend(v199, v197, softehl_splat(0.0));
-            const V v205 = softehl_blend(v199, v198, softehl_splat(0.0));
-            v201 = softehl_blend(m203, v204, v201);
-            v202 = softehl_blend(m203, v205, v202);
+            const V v204 = v96 * v76; v197 = softehl_blend(m203, softehl_splat(0.0), v197);
+            v198 = softehl_blend(m203, v204, v198);
+            v199 = softehl_blend(m203, softehl_splat(0.0), v199);
+            v200 = softehl_blend(m203, v75, v200);
         }
-        const M m206 = ~v200;
-        if (softehl_any(m206)) {
-            const V v207 = v198 * v198;
-            const V v208 = v198 * v207;
-            const V v209 = 3.0 * v207;
-            const V v210 = -v208;
-            const V v211 = v209 * v197;
-            const V v212 = -v211;
-            v201 = softehl_blend(m206, v212, v201);
-            v202 = softehl_blend(m206, v210, v202);
-        }
-        const V v213 = 1.0 - p6;
-        const V v214 = 1.0 - p4;
-        const V v215 = v214 * v201;
-        V v216 = softehl_splat(0.0);
-        V v217 = softehl_splat(0.0);
-        const M m218 = ~v199;
-        if (softehl_any(m218)) {
-            const V v219 = v213 * v197;
-            v216 = softehl_blend(m218, v219, v216);
-            v217 = softehl_blend(m218, v198, v217);
-        }
-        const double v220 = 0.5 * w[1];
-        const double v221 = 0.5 * w[2];
-        const V v222 = 0.5 * p3;
-        const double v223 = 0.5 - v220;
-        const double v224 = 0.5 + v220;
-        const V v225 = v213 * v217;
-        const double v226 = 0.5 - v221;
-        const double v227 = 0.5 + v221;
-        const V v228 = v225 - v75;
-        const V v229 = p0 * v22;
-        const V v230 = p0 * v39;
-        const V v231 = v214 * v202;
-        const V v232 = v231 + v228;
-        const V v233 = v223 * v5;
-        const V v234 = v226 * v5;
-        const V v235 = v223 * v24;
-        const V v236 = v226 * v24;
-        const V v237 = v76 - v73;
-        const V v238 = v54 * v232;
-        const V v239 = v230 - v238;
-        const V v240 = v46 * v232;
-        const V v241 = v229 - v240;
-        const V v242 = v224 * v6;
-        const V v243 = v233 + v242;
-        const V v244 = v227 * v6;
-        const V v245 = v234 + v244;
-        const V v246 = v224 * v25;
-        const V v247 = v235 + v246;
-        const V v248 = v227 * v25;
-        const V v249 = v236 + v248;
-        const V v250 = v237 + v216;
-        const V v251 = v83 * v241;
-        const V v252 = v243 + v245;
-        const V v253 = v215 + v250;
-        const V v254 = v46 * v253;
-        const V v255 = v239 - v254;
-        const V v256 = 0.5 * v252;
-        const V v257 = v247 + v249;
-        const V v258 = 0.5 * v257;
-        const V v259 = v81 * v255;
-        const V v260 = v251 + v259;
-        const V v261 = v222 * v256;
-        const V v262 = v222 * v258;
-        const V v263 = w[3] * v260;
-        const V v264 = v261 * v45;
-        const V v265 = v262 - v264;
-        const V v266 = v33 * v261;
-        const V v267 = v33 * v265;
-        const V v268 = v266 * v266;
-        const M v269 = softehl_lt(v268, softehl_splat(1.0));
-        const V v270 = v60 * v263;
-        s57 += v270;
-        const V v271 = v61 * v263;
-        s58 += v271;
-        V v272 = softehl_splat(0.0);
-        V v273 = softehl_splat(0.0);
-        V v274 = softehl_splat(0.0);
-        V v275 = softehl_splat(0.0);
-        const M m276 = v269;
-        if (softehl_any(m276)) {
-            const V v277 = 2.0 * v266;
-            const V v278 = 1.9572941063391263e-20 * v268;
-            const V v279 = 2.5529923126162516e-21 * v268;
-            const V v280 = v277 * v267;
-            const V v281 = 8.22063524662433e-18 + v278;
-            const V v282 = 1.1743764638034756e-18 + v279;
-            const V v283 = v278 + v281;
-            const V v284 = v268 * v281;
-            const V v285 = 2.8114572543455206e-15 + v284;
-            const V v286 = v279 + v282;
-            const V v287 = v268 * v282;
-            const V v288 = 4.439143033177138e-16 + v287;
-            const V v289 = v268 * v285;
-            const V v290 = 7.647163731819816e-13 + v289;
-            const V v291 = v268 * v283;
-            const V v292 = v285 + v291;
-            const V v293 = v268 * v288;
-            const V v294 = 1.34949948208585e-13 + v293;
-            const V v295 = v268 * v286;
-            const V v296 = v288 + v295;
-            const V v297 = v280 * v292;
-            const V v298 = v280 * v296;
-            const V v299 = v268 * v294;
-            const V v300 = 3.2118087673643227e-11 + v299;
-            const V v301 = v294 * v280;
-            const V v302 = v268 * v298;
-            const V v303 = v301 + v302;
-            const V v304 = v268 * v300;
-            const V v305 = 5.7812557812557815e-09 + v304;
-            const V v306 = v300 * v280;
-            const V v307 = v268 * v303;
-            const V v308 = v306 + v307;
-            const V v309 = v290 * v280;
-            const V v310 = v268 * v290;
-            const V v311 = 1.6059043836821613e-10 + v310;
-            const V v312 = v268 * v297;
-            const V v313 = v309 + v312;
-            const V v314 = v268 * v305;
-            const V v315 = 7.515632515632515e-07 + v314;
-            const V v316 = v305 * v280;
-            const V v317 = v268 * v308;
-            const V v318 = v316 + v317;
-            const V v319 = v311 * v280;
-            const V v320 = v268 * v311;
-            const V v321 = 2.505210838544172e-08 + v320;
-            const V v322 = v268 * v313;
-            const V v323 = v319 + v322;
-            const V v324 = v268 * v315;
-            const V v325 = 6.613756613756614e-05 + v324;
-            const V v326 = v315 * v280;
-            const V v327 = v268 * v318;
-            const V v328 = v326 + v327;
-            const V v329 = v268 * v325;
-            const V v330 = 0.0035714285714285713 + v329;
-            const V v331 = v325 * v280;
-            const V v332 = v268 * v328;
-            const V v333 = v331 + v332;
-            const V v334 = v321 * v280;
-            const V v335 = v268 * v321;
-            const V v336 = 2.7557319223985893e-06 + v335;
-            const V v337 = v268 * v323;
-            const V v338 = v334 + v337;
-            const V v339 = v268 * v330;
-            const V v340 = 0.1 + v339;
-            const V v341 = v330 * v280;
-            const V v342 = v268 * v333;
-            const V v343 = v341 + v342;
-            const V v344 = v268 * v338;
-            const V v345 = v336 * v280;
-            const V v346 = v345 + v344;
-            const V v347 = v268 * v336;
-            const V v348 = 0.0001984126984126984 + v347;
-            const V v349 = v268 * v346;
-            const V v350 = v348 * v280;
-            const V v351 = v350 + v349;
-            const V v352 = v268 * v351;
-            const V v353 = v268 * v343;
-            const V v354 = v268 * v348;
-            const V v355 = 0.008333333333333333 + v354;
-            const V v356 = v355 * v280;
-            const V v357 = v356 + v352;
-            const V v358 = v268 * v357;
-            const V v359 = v340 * v280;
-            const V v360 = v359 + v353;
-            const V v361 = v268 * v355;
-            const V v362 = 0.16666666666666666 + v361;
-            const V v363 = v362 * v280;
-            const V v364 = v363 + v358;
-            const V v365 = v268 * v362;
-            const V v366 = 1.0 + v365;
-            const V v367 = 1.0 / v366;
-            const V v368 = v268 * v340;
-            const V v369 = 1.0 + v368;
-            const V v370 = v367 * v367;
-            const V v371 = v370 * v364;
-            const V v372 = -v371;
-            v272 = softehl_blend(m276, v372, v272);
-            v273 = softehl_blend(m276, v367, v273);
-            v274 = softehl_blend(m276, v369, v274);
-            v275 = softehl_blend(m276, v360, v275);
-        }
-        const M m373 = ~v269;
-        if (softehl_any(m373)) {
-            const V v374 = softehl_vsinh(v266);
-            const V v375 = 3.0 * v266;
-            const V v376 = softehl_vcosh(v266);
-            const V v377 = v266 * v268;
-            const V v378 = 1.0 / v374;
-            const V v379 = 1.0 / v377;
-            const V v380 = v374 * v375;
-            const V v381 = v375 * v376;
-            const V v382 = 3.0 * v374;
-            const V v383 = v381 - v382;
-            const V v384 = 3.0 * v383;
-            const V v385 = v268 * v384;
-            const V v386 = v266 * v378;
-            const V v387 = v386 * v376;
-            const V v388 = 1.0 - v387;
-            const V v389 = v379 * v385;
-            const V v390 = v380 - v389;
-            const V v391 = v383 * v379;
-            const V v392 = v267 * v388;
-            const V v393 = v378 * v392;
-            const V v394 = v267 * v390;
-            const V v395 = v379 * v394;
-            v272 = softehl_blend(m373, v393, v272);
-            v273 = softehl_blend(m373, v386, v273);
-            v274 = softehl_blend(m373, v391, v274);
-            v275 = softehl_blend(m373, v395, v275);
-        }
-        const V v396 = p2 * parameters[3];
-        const V v397 = p2 * v7;
-        const V v398 = t8 + v397;
-        const V v399 = softehl_vexp(v396);
-        const V v400 = 0.08333333333333333 * p3;
-        const V v401 = 0.25 * p3;
-        const V v402 = v256 * v256;
-        const V v403 = v256 * t12;
-        const V v404 = v400 * v256;
-        const V v405 = v402 * v401;
-        const V v406 = parameters[6] * v256;
-        const V v407 = 1.0 / v402;
-        const V v408 = v402 * v404;
-        const V v409 = parameters[6] * v258;
-        const V v410 = v409 + v403;
-        const V v411 = 1.0 / v406;
-        const M v412 = softehl_lt(softehl_splat(0.0), v170);
-        const V v413 = v245 * v247;
-        const V v414 = v243 * v245;
-        const V v415 = v243 * v249;
-        const V v416 = v413 + v415;
-        const V v417 = 2.0 * v414;
-        const V v418 = v256 * v417;
-        const V v419 = v414 * v407;
-        const V v420 = v399 * v398;
-        const V v421 = parameters[2] * v399;
-        const V v422 = v407 * v418;
-        const V v423 = v258 * v422;
-        const V v424 = v416 - v423;
-        const V v425 = v407 * v424;
-        const V v426 = v411 * v410;
-        const V v427 = v421 * v170;
-        const V v428 = v170 * v420;
-        const V v429 = v421 * v172;
-        const V v430 = v429 + v428;
-        const V v431 = v419 * v419;
-        const V v432 = 2.0 * v419;
-        const V v433 = v431 * v405;
-        const V v434 = v258 * v433;
-        const V v435 = v431 * v408;
-        const V v436 = v432 * v408;
-        const V v437 = v425 * v436;
-        const V v438 = v434 + v437;
-        const V v439 = v421 * v21;
-        const V v440 = v20 * v420;
-        const V v441 = v439 + v440;
-        const V v442 = v421 * v20;
-        const V v443 = 1.0 / v442;
-        const V v444 = v443 * v441;
-        const V v445 = v273 * v430;
-        const V v446 = v427 * v273;
-        const V v447 = v426 * v446;
-        const V v448 = v445 - v447;
-        const V v449 = v427 * v272;
-        const V v450 = v449 + v448;
-        const V v451 = v411 * v446;
-        const V v452 = v411 * v450;
-        const V v453 = v451 * v451;
-        const V v454 = 1.0 + v453;
-        const V v455 = v435 * v451;
-        const V v456 = softehl_vsqrt(v454);
-        const V v457 = v435 * v456;
-        const V v458 = 1.0 / v454;
-        const V v459 = softehl_vsqrt(v458);
-        const V v460 = v455 * v459;
-        const V v461 = v457 * v444;
-        const V v462 = v438 * v456;
-        const V v463 = v461 - v462;
-        const V v464 = v460 * v452;
-        const V v465 = v463 - v464;
-        const V v466 = v274 * v465;
-        const V v467 = v457 * v275;
-        const V v468 = v466 - v467;
-        const V v469 = v443 * v468;
-        V v470 = softehl_splat(0.0);
-        V v471 = softehl_splat(0.0);
-        V v472 = softehl_splat(0.0);
-        V v473 = softehl_splat(0.0);
-        const M m474 = v412;
-        if (softehl_any(m474)) {
-            const V v475 = v214 * v172;
-            v470 = softehl_blend(m474, v475, v470);
-            v471 = softehl_blend(m474, softehl_splat(0.0), v471);
-            v472 = softehl_blend(m474, v170, v472);
-            v473 = softehl_blend(m474, softehl_splat(0.0), v473);
-        }
-        const M m476 = ~v412;
-        if (softehl_any(m476)) {
-            const V v477 = v213 * v172;
-            v470 = softehl_blend(m476, softehl_splat(0.0), v470);
-            v471 = softehl_blend(m476, v477, v471);
-            v472 = softehl_blend(m476, softehl_splat(0.0), v472);
-            v473 = softehl_blend(m476, v170, v473);
-        }
-        const V v478 = v213 * v473;
-        const V v479 = v214 * v472;
-        const V v480 = v478 + v479;
-        const V v481 = 0.5 * v480;
-        const V v482 = v471 + v470;
-        const V v483 = v70 * v482;
-        const V v484 = v481 * v72;
-        const V v485 = v484 + v483;
-        const V v486 = v68 * v481;
-        const V v487 = v486 * v425;
-        const V v488 = v487 + v469;
-        const V v489 = v419 * v485;
-        const V v490 = v489 + v488;
-        const V v491 = w[3] * v490;
+        const V v205 = 0.5 * (v96 * v200 + v97 * v199),
+            v206 = v178 * (v205 * v38 + v37 * (v198 + v197)) + (v35 * v205 * v182 + v196),
+            v207 = w[3] * v206;
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
             (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
-            R_lanes[4 + i] += D1 * v491;
+            R_lanes[4 + i] += D1 * v207;
         }
     }
-    const V v492 = -s55;
-    const V v493 = -s56;
-    R_lanes[0] = s58;
-    R_lanes[1] = v493;
-    R_lanes[2] = s57;
-    R_lanes[3] = v492;
+    const V v208 = -s27, v209 = -s28;
+    R_lanes[0] = s30; R_lanes[1] = v209; R_lanes[2] = s29; R_lanes[3] = v208;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_conserving_eyring_pseudo_load, 4, (4 + modes), 2, 14, (4 + modes), 0)
 
-void softehl_film_conserving_eyring_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_conserving_eyring_fields_rate)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_eyring_pseudo_load_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, direction + 14 * e, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_eyring_pseudo_load_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), direction + 14 * (n - SOFTEHL_LANES), parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double t[SOFTEHL_LANES * 14];
-    softehl_pad(t, direction, 14, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_conserving_eyring_pseudo_load(SOFTEHL_LANES, points, modes, X, d, a, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_conserving_eyring_fields_rate_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
-    V t0, t1, t2, t3;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15, t16, t17;
     softehl_load4(t + 0, (14 + (4 + modes)), &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
     softehl_load4(t + 4, (14 + (4 + modes)), &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
     softehl_load4(t + 8, (14 + (4 + modes)), &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    V t12, t13, t14, t15;
     softehl_load4(t + 12, (14 + (4 + modes)), &t12, &t13, &t14, &t15);
-    (void)t12; (void)t13; (void)t14; (void)t15;
-    V t16, t17;
-    softehl_load2(t + 16, (14 + (4 + modes)), &t16, &t17);
-    (void)t16; (void)t17;
+    softehl_load2(t + 16, (14 + (4 + modes)), &t16, &t17); (void)t10; (void)t11;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -733,654 +275,192 @@ static void softehl_film_conserving_eyring_fields_rate_group(
 #if SOFTEHL_LANES > 1
     softehl_gather(t_lanes, t, (14 + (4 + modes)));
 #endif
-    const V v1 = X2 + d2;
-    const V v2 = X1 - parameters[0];
-    const V v3 = X3 - parameters[0];
-    const V v4 = d1 + v2;
-    const V v5 = d3 + v3;
-    const V v6 = d2 * parameters[7];
-    const V v7 = a1 + v6;
-    const V v8 = d0 * parameters[7];
-    const V v9 = a0 + v8;
-    const V v10 = t1 + t15;
-    const V v11 = v1 - X0;
-    const double v12 = 1.0 / parameters[6];
-    const V v13 = v11 - d0;
-    const V v14 = v10 - t6;
-    const V v15 = t3 - t6;
-    const V v16 = 0.5 * v13;
-    const V v17 = d0 * t13;
-    const V v18 = t4 + v17;
-    const V v19 = d2 * t13;
-    const V v20 = t5 + v19;
-    const V v21 = t2 + t16;
-    const V v22 = parameters[7] * t16;
-    const V v23 = v20 + v22;
-    const V v24 = v15 + t17;
-    const V v25 = parameters[7] * t14;
-    const V v26 = v18 + v25;
-    const V v27 = 1.0 / v16;
-    const V v28 = parameters[6] * v16;
-    const V v29 = v16 * t12;
-    const V v30 = v12 * t12;
-    const V v31 = v21 - t14;
-    const V v32 = t0 + t14;
-    const V v33 = v31 - t0;
-    const V v34 = 1.0 / v28;
-    const V v35 = 0.5 * v33;
-    const V v36 = parameters[6] * v35;
-    const V v37 = v29 + v36;
-    const V v38 = v27 * v35;
-    const V v39 = v34 * v37;
+    const V v1 = d1 + (X1 - parameters[0]), v2 = d3 + (X3 - parameters[0]),
+        v3 = a1 + d2 * parameters[7], v4 = a0 + d0 * parameters[7];
+    const double v5 = 1.0 / parameters[6];
+    const V v6 = t1 + t15 - t6, v7 = 0.5 * (X2 + d2 - X0 - d0), v8 = t2 + t16,
+        v9 = t5 + d2 * t13 + parameters[7] * t16, v10 = t3 - t6 + t17,
+        v11 = t4 + d0 * t13 + parameters[7] * t14, v12 = 1.0 / v7, v13 = v5 * t12, v14 = t0 + t14,
+        v15 = 1.0 / (parameters[6] * v7), v16 = 0.5 * (v8 - t14 - t0), v17 = v12 * v16,
+        v18 = v15 * (v7 * t12 + parameters[6] * v16);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
         V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0), tp2 = softehl_splat(0.0), tp3 = softehl_splat(0.0), tp4 = softehl_splat(0.0), tp5 = softehl_splat(0.0), tp6 = softehl_splat(0.0), tp7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            tp0 += B[8 * i] * t_lanes[18 + i];
-            tp1 += B[8 * i + 1] * t_lanes[18 + i];
-            tp2 += B[8 * i + 2] * t_lanes[18 + i];
-            tp3 += B[8 * i + 3] * t_lanes[18 + i];
-            tp4 += B[8 * i + 4] * t_lanes[18 + i];
-            tp5 += B[8 * i + 5] * t_lanes[18 + i];
-            tp6 += B[8 * i + 6] * t_lanes[18 + i];
-            tp7 += B[8 * i + 7] * t_lanes[18 + i];
+            tp0 += B[8 * i] * t_lanes[18 + i]; tp1 += B[8 * i + 1] * t_lanes[18 + i];
+            tp2 += B[8 * i + 2] * t_lanes[18 + i]; tp3 += B[8 * i + 3] * t_lanes[18 + i];
+            tp4 += B[8 * i + 4] * t_lanes[18 + i]; tp5 += B[8 * i + 5] * t_lanes[18 + i];
+            tp6 += B[8 * i + 6] * t_lanes[18 + i]; tp7 += B[8 * i + 7] * t_lanes[18 + i];
         }
         (void)tp0, (void)tp1, (void)tp2, (void)tp3, (void)tp4, (void)tp5, (void)tp6, (void)tp7;
-        const double v40 = 0.5 * w[0];
-        const V v41 = w[3] * v35;
-        const double v42 = 0.5 + v40;
-        const double v43 = 0.5 - v40;
-        const V v44 = p1 * v27;
-        const V v45 = p1 * v38;
-        const V v46 = tp1 - v45;
-        const V v47 = v27 * v46;
-        const V v48 = 0.5 * v44;
-        const V v49 = v43 * v4;
-        const V v50 = v42 * v21;
-        const V v51 = v43 * v14;
-        const V v52 = v43 * v32;
-        const V v53 = v50 + v52;
-        const V v54 = v42 * v5;
-        const V v55 = v49 + v54;
-        const V v56 = 0.5 * v55;
-        const V v57 = v42 * v24;
-        const V v58 = v51 + v57;
-        const V v59 = v48 * v58;
-        const V v60 = v56 * v47;
-        const V v61 = v60 + v59;
-        const V v62 = v56 * v44;
-        const V v63 = v62 * v30;
-        const V v64 = v61 - v63;
-        const V v65 = v12 * v62;
-        const V v66 = v12 * v64;
-        const V v67 = v65 * v65;
-        const M v68 = softehl_lt(v67, softehl_splat(1.0));
-        V v69 = softehl_splat(0.0);
-        V v70 = softehl_splat(0.0);
-        V v71 = softehl_splat(0.0);
-        V v72 = softehl_splat(0.0);
-        const M m73 = v68;
-        if (softehl_any(m73)) {
-            const V v74 = 2.0 * v65;
-            const V v75 = v74 * v66;
-            const V v76 = 1.9572941063391263e-20 * v67;
-            const V v77 = 2.5529923126162516e-21 * v67;
-            const V v78 = 8.22063524662433e-18 + v76;
-            const V v79 = 1.1743764638034756e-18 + v77;
-            const V v80 = v76 + v78;
-            const V v81 = v67 * v78;
-            const V v82 = 2.8114572543455206e-15 + v81;
-            const V v83 = v77 + v79;
-            const V v84 = v67 * v79;
-            const V v85 = 4.439143033177138e-16 + v84;
-            const V v86 = v67 * v80;
-            const V v87 = v82 + v86;
-            const V v88 = v67 * v82;
-            const V v89 = 7.647163731819816e-13 + v88;
-            const V v90 = v87 * v75;
-            const V v91 = v67 * v85;
-            const V v92 = 1.34949948208585e-13 + v91;
-            const V v93 = v67 * v83;
-            const V v94 = v85 + v93;
-            const V v95 = v75 * v94;
-            const V v96 = v67 * v92;
-            const V v97 = 3.2118087673643227e-11 + v96;
-            const V v98 = v92 * v75;
-            const V v99 = v67 * v95;
-            const V v100 = v98 + v99;
-            const V v101 = v67 * v97;
-            const V v102 = 5.7812557812557815e-09 + v101;
-            const V v103 = v97 * v75;
-            const V v104 = v67 * v100;
-            const V v105 = v103 + v104;
-            const V v106 = v89 * v75;
-            const V v107 = v67 * v89;
-            const V v108 = 1.6059043836821613e-10 + v107;
-            const V v109 = v67 * v90;
-            const V v110 = v106 + v109;
-            const V v111 = v67 * v102;
-            const V v112 = 7.515632515632515e-07 + v111;
-            const V v113 = v102 * v75;
-            const V v114 = v67 * v105;
-            const V v115 = v113 + v114;
-            const V v116 = v67 * v112;
-            const V v117 = 6.613756613756614e-05 + v116;
-            const V v118 = v112 * v75;
-            const V v119 = v67 * v115;
-            const V v120 = v118 + v119;
-            const V v121 = v108 * v75;
-            const V v122 = v67 * v108;
-            const V v123 = 2.505210838544172e-08 + v122;
-            const V v124 = v67 * v110;
-            const V v125 = v121 + v124;
-            const V v126 = v67 * v117;
-            const V v127 = 0.0035714285714285713 + v126;
-            const V v128 = v117 * v75;
-            const V v129 = v67 * v120;
-            const V v130 = v128 + v129;
-            const V v131 = v123 * v75;
-            const V v132 = v67 * v123;
-            const V v133 = 2.7557319223985893e-06 + v132;
-            const V v134 = v67 * v125;
-            const V v135 = v131 + v134;
-            const V v136 = v67 * v127;
-            const V v137 = 0.1 + v136;
-            const V v138 = v127 * v75;
-            const V v139 = v67 * v130;
-            const V v140 = v138 + v139;
-            const V v141 = v67 * v135;
-            const V v142 = v133 * v75;
-            const V v143 = v142 + v141;
-            const V v144 = v67 * v133;
-            const V v145 = 0.0001984126984126984 + v144;
-            const V v146 = v67 * v143;
-            const V v147 = v145 * v75;
-            const V v148 = v147 + v146;
-            const V v149 = v67 * v148;
-            const V v150 = v67 * v140;
-            const V v151 = v137 * v75;
-            const V v152 = v151 + v150;
-            const V v153 = v67 * v145;
-            const V v154 = 0.008333333333333333 + v153;
-            const V v155 = v154 * v75;
-            const V v156 = v155 + v149;
-            const V v157 = v67 * v156;
-            const V v158 = v67 * v154;
-            const V v159 = 0.16666666666666666 + v158;
-            const V v160 = v159 * v75;
-            const V v161 = v160 + v157;
-            const V v162 = v67 * v159;
-            const V v163 = 1.0 + v162;
-            const V v164 = 1.0 / v163;
-            const V v165 = v164 * v164;
-            const V v166 = v165 * v161;
-            const V v167 = v67 * v137;
-            const V v168 = 1.0 + v167;
-            const V v169 = -v166;
-            v69 = softehl_blend(m73, v169, v69);
-            v70 = softehl_blend(m73, v164, v70);
-            v71 = softehl_blend(m73, v168, v71);
-            v72 = softehl_blend(m73, v152, v72);
+        const double v19 = 0.5 * w[0]; const V v20 = w[3] * v16;
+        const double v21 = 0.5 + v19, v22 = 0.5 - v19;
+        const V v23 = p1 * v12, v24 = v12 * (tp1 - p1 * v17), v25 = v21 * v8 + v22 * v14,
+            v26 = v22 * v1 + v21 * v2, v27 = 0.5 * v26, v28 = v22 * v6 + v21 * v10,
+            v29 = v27 * v24 + 0.5 * v23 * v28, v30 = v27 * v23, v31 = v5 * v30,
+            v32 = v5 * (v29 - v30 * v13), v33 = v31 * v31;
+        const M v34 = softehl_lt(v33, softehl_splat(1.0));
+        V v35 = softehl_splat(0.0), v36 = softehl_splat(0.0), v37 = softehl_splat(0.0),
+            v38 = softehl_splat(0.0);
+        const M m39 = v34;
+        if (softehl_any(m39)) {
+            const V v40 = 2.0 * v31 * v32, v41 = 1.9572941063391263e-20 * v33,
+                v42 = 2.5529923126162516e-21 * v33, v43 = 8.22063524662433e-18 + v41,
+                v44 = 1.1743764638034756e-18 + v42, v45 = 2.8114572543455206e-15 + v33 * v43,
+                v46 = 4.439143033177138e-16 + v33 * v44, v47 = 7.647163731819816e-13 + v33 * v45,
+                v48 = 1.34949948208585e-13 + v33 * v46, v49 = 3.2118087673643227e-11 + v33 * v48,
+                v50 = 5.7812557812557815e-09 + v33 * v49,
+                v51 = v49 * v40 + v33 * (v48 * v40 + v33 * (v40 * (v46 + v33 * (v42 + v44)))),
+                v52 = 1.6059043836821613e-10 + v33 * v47, v53 = 7.515632515632515e-07 + v33 * v50,
+                v54 = 6.613756613756614e-05 + v33 * v53, v55 = 2.505210838544172e-08 + v33 * v52,
+                v56 = v52 * v40 + v33 * (v47 * v40 + v33 * ((v45 + v33 * (v41 + v43)) * v40)),
+                v57 = 0.0035714285714285713 + v33 * v54, v58 = 2.7557319223985893e-06 + v33 * v55,
+                v59 = 0.1 + v33 * v57,
+                v60 = v33 * (v54 * v40 + v33 * (v53 * v40 + v33 * (v50 * v40 + v33 * v51))),
+                v61 = 0.0001984126984126984 + v33 * v58,
+                v62 = v33 * (v61 * v40 + v33 * (v58 * v40 + v33 * (v55 * v40 + v33 * v56))),
+                v63 = v59 * v40 + v33 * (v57 * v40 + v60), v64 = 0.008333333333333333 + v33 * v61,
+                v65 = 0.16666666666666666 + v33 * v64, v66 = 1.0 / (1.0 + v33 * v65),
+                v67 = 1.0 + v33 * v59, v68 = -(v66 * v66 * (v65 * v40 + v33 * (v64 * v40 + v62)));
+            v35 = softehl_blend(m39, v68, v35); v36 = softehl_blend(m39, v66, v36);
+            v37 = softehl_blend(m39, v67, v37); v38 = softehl_blend(m39, v63, v38);
         }
-        const M m170 = ~v68;
-        if (softehl_any(m170)) {
-            const V v171 = softehl_vsinh(v65);
-            const V v172 = softehl_vcosh(v65);
-            const V v173 = 3.0 * v65;
-            const V v174 = v65 * v67;
-            const V v175 = 3.0 * v67;
-            const V v176 = 1.0 / v171;
-            const V v177 = 1.0 / v174;
-            const V v178 = v172 * v173;
-            const V v179 = v171 * v173;
-            const V v180 = 3.0 * v171;
-            const V v181 = v178 - v180;
-            const V v182 = v65 * v176;
-            const V v183 = v182 * v172;
-            const V v184 = 1.0 - v183;
-            const V v185 = v177 * v175;
-            const V v186 = v181 * v185;
-            const V v187 = v179 - v186;
-            const V v188 = v177 * v181;
-            const V v189 = v184 * v66;
-            const V v190 = v66 * v187;
-            const V v191 = v176 * v189;
-            const V v192 = v177 * v190;
-            v69 = softehl_blend(m170, v191, v69);
-            v70 = softehl_blend(m170, v182, v70);
-            v71 = softehl_blend(m170, v188, v71);
-            v72 = softehl_blend(m170, v192, v72);
+        const M m69 = ~v34;
+        if (softehl_any(m69)) {
+            const V v70 = softehl_vsinh(v31), v71 = softehl_vcosh(v31), v72 = 3.0 * v31,
+                v73 = 1.0 / v70, v74 = 1.0 / (v31 * v33), v75 = v71 * v72 - 3.0 * v70,
+                v76 = v31 * v73, v77 = v74 * v75, v78 = v73 * ((1.0 - v76 * v71) * v32),
+                v79 = v74 * (v32 * (v70 * v72 - v75 * (v74 * (3.0 * v33))));
+            v35 = softehl_blend(m69, v78, v35); v36 = softehl_blend(m69, v76, v36);
+            v37 = softehl_blend(m69, v77, v37); v38 = softehl_blend(m69, v79, v38);
         }
-        const V v193 = p0 * t9;
-        const V v194 = p0 * parameters[3];
-        const V v195 = parameters[3] * tp0;
-        const V v196 = v193 + v195;
-        const V v197 = softehl_vexp(v194);
-        const V v198 = v42 * v7;
-        const V v199 = parameters[1] - v198;
-        const V v200 = v42 * v23;
-        const V v201 = t7 - v200;
-        const V v202 = parameters[6] * v58;
-        const V v203 = parameters[6] * v55;
-        const V v204 = 1.0 / v203;
-        const V v205 = v43 * v9;
-        const V v206 = v199 - v205;
-        const V v207 = v43 * v26;
-        const V v208 = v201 - v207;
-        const V v209 = v55 * t12;
-        const V v210 = v209 + v202;
-        const V v211 = parameters[2] * v197;
-        const V v212 = v197 * t8;
-        const V v213 = v211 * v196;
-        const V v214 = v212 + v213;
-        const V v215 = v211 * v208;
-        const V v216 = v211 * v206;
-        const V v217 = v206 * v214;
-        const V v218 = v215 + v217;
-        const V v219 = v70 * v218;
-        const V v220 = v216 * v70;
-        const V v221 = v204 * v220;
-        const V v222 = v221 * v210;
-        const V v223 = v219 - v222;
-        const V v224 = v216 * v69;
-        const V v225 = v224 + v223;
-        const V v226 = v204 * v225;
-        const V v227 = v221 * v221;
-        const V v228 = 1.0 + v227;
-        const V v229 = softehl_vasinh(v221);
-        const V v230 = softehl_vsqrt(v228);
-        const V v231 = 1.0 / v230;
-        const V v232 = parameters[6] * v231;
-        const V v233 = v232 * v226;
-        const V v234 = v229 * t12;
-        const V v235 = v234 + v233;
-        const V v236 = parameters[6] * v229;
-        const M v237 = softehl_lt(softehl_splat(0.0), v236);
-        const M v238 = softehl_eq(v236, v236);
-        V v239 = softehl_splat(0.0);
-        V v240 = softehl_splat(0.0);
-        const M m241 = v238;
-        if (softehl_any(m241)) {
-            const V v242 = softehl_blend(v237, v235, softehl_splat(0.0));
-            const V v243 = softehl_blend(v237, v236, softehl_splat(0.0));
-            v239 = softehl_blend(m241, v242, v239);
-            v240 = softehl_blend(m241, v243, v240);
+        const V v80 = softehl_vexp(p0 * parameters[3]), v81 = 1.0 / (parameters[6] * v26),
+            v82 = parameters[1] - v21 * v3 - v22 * v4, v83 = t7 - v21 * v9 - v22 * v11,
+            v84 = parameters[2] * v80, v85 = v80 * t8 + v84 * (p0 * t9 + parameters[3] * tp0),
+            v86 = v84 * v82, v87 = v81 * (v86 * v36),
+            v88 = v36 * (v84 * v83 + v82 * v85) - v87 * (v26 * t12 + parameters[6] * v28),
+            v89 = v81 * (v86 * v35 + v88), v90 = 1.0 + v87 * v87, v91 = softehl_vasinh(v87),
+            v92 = softehl_vsqrt(v90), v93 = v91 * t12 + parameters[6] * (1.0 / v92) * v89,
+            v94 = parameters[6] * v91;
+        const M v95 = softehl_lt(softehl_splat(0.0), v94), v96 = softehl_eq(v94, v94);
+        V v97 = softehl_splat(0.0), v98 = softehl_splat(0.0);
+        const M m99 = v96;
+        if (softehl_any(m99)) {
+            const V v100 = softehl_blend(v95, v93, softehl_splat(0.0)),
+                v101 = softehl_blend(v95, v94, softehl_splat(0.0));
+            v97 = softehl_blend(m99, v100, v97); v98 = softehl_blend(m99, v101, v98);
         }
-        const M m244 = ~v238;
-        if (softehl_any(m244)) {
-            const V v245 = v236 * v236;
-            const V v246 = v236 * v245;
-            const V v247 = 3.0 * v245;
-            const V v248 = -v246;
-            const V v249 = v247 * v235;
-            const V v250 = -v249;
-            v239 = softehl_blend(m244, v250, v239);
-            v240 = softehl_blend(m244, v248, v240);
+        const M m102 = ~v96;
+        if (softehl_any(m102)) {
+            const V v103 = v94 * v94, v104 = -(v94 * v103), v105 = -(3.0 * v103 * v93);
+            v97 = softehl_blend(m102, v105, v97); v98 = softehl_blend(m102, v104, v98);
         }
-        const V v251 = 1.0 - p6;
-        const V v252 = 1.0 - p4;
-        const V v253 = v252 * v239;
-        V v254 = softehl_splat(0.0);
-        const M m255 = ~v237;
-        if (softehl_any(m255)) {
-            const V v256 = v251 * v235;
-            const V v257 = v236 * tp6;
-            const V v258 = v256 - v257;
-            v254 = softehl_blend(m255, v258, v254);
+        const V v106 = 1.0 - p6, v107 = 1.0 - p4;
+        V v108 = softehl_splat(0.0); const M m109 = ~v95;
+        if (softehl_any(m109)) {
+            const V v110 = v106 * v93 - v94 * tp6; v108 = softehl_blend(m109, v110, v108);
         }
-        const double v259 = 0.5 * w[1];
-        const double v260 = 0.5 * w[2];
-        const double v261 = 0.5 - v259;
-        const double v262 = 0.5 + v259;
-        const double v263 = 0.5 - v260;
-        const double v264 = 0.5 + v260;
-        const V v265 = 0.5 * p3;
-        const V v266 = v240 * tp4;
-        const V v267 = v253 - v266;
-        const V v268 = v261 * v4;
-        const V v269 = v263 * v4;
-        const V v270 = v261 * v14;
-        const V v271 = v263 * v14;
-        const V v272 = v254 + v267;
-        const V v273 = v262 * v5;
-        const V v274 = v268 + v273;
-        const V v275 = v264 * v5;
-        const V v276 = v269 + v275;
-        const V v277 = v262 * v24;
-        const V v278 = v270 + v277;
-        const V v279 = v264 * v24;
-        const V v280 = v271 + v279;
-        const V v281 = v274 + v276;
-        const V v282 = v272 - v61;
-        const V v283 = 0.25 * v281;
-        const V v284 = v278 + v280;
-        const V v285 = 0.5 * v284;
-        const V v286 = v265 * v285;
-        const V v287 = p3 * v283;
-        const V v288 = v283 * tp3;
-        const V v289 = v288 + v286;
-        const V v290 = v287 * v39;
-        const V v291 = v289 - v290;
-        const V v292 = v34 * v287;
-        const V v293 = v34 * v291;
-        const V v294 = v292 * v292;
-        const M v295 = softehl_lt(v294, softehl_splat(1.0));
-        V v296 = softehl_splat(0.0);
-        V v297 = softehl_splat(0.0);
-        V v298 = softehl_splat(0.0);
-        V v299 = softehl_splat(0.0);
-        const M m300 = v295;
-        if (softehl_any(m300)) {
-            const V v301 = 2.0 * v292;
-            const V v302 = 1.9572941063391263e-20 * v294;
-            const V v303 = 2.5529923126162516e-21 * v294;
-            const V v304 = v301 * v293;
-            const V v305 = 8.22063524662433e-18 + v302;
-            const V v306 = 1.1743764638034756e-18 + v303;
-            const V v307 = v302 + v305;
-            const V v308 = v294 * v305;
-            const V v309 = 2.8114572543455206e-15 + v308;
-            const V v310 = v303 + v306;
-            const V v311 = v294 * v306;
-            const V v312 = 4.439143033177138e-16 + v311;
-            const V v313 = v294 * v309;
-            const V v314 = 7.647163731819816e-13 + v313;
-            const V v315 = v294 * v307;
-            const V v316 = v309 + v315;
-            const V v317 = v294 * v310;
-            const V v318 = v294 * v312;
-            const V v319 = 1.34949948208585e-13 + v318;
-            const V v320 = v312 + v317;
-            const V v321 = v316 * v304;
-            const V v322 = v320 * v304;
-            const V v323 = v294 * v319;
-            const V v324 = 3.2118087673643227e-11 + v323;
-            const V v325 = v319 * v304;
-            const V v326 = v294 * v322;
-            const V v327 = v325 + v326;
-            const V v328 = v294 * v324;
-            const V v329 = 5.7812557812557815e-09 + v328;
-            const V v330 = v324 * v304;
-            const V v331 = v294 * v327;
-            const V v332 = v330 + v331;
-            const V v333 = v314 * v304;
-            const V v334 = v294 * v314;
-            const V v335 = 1.6059043836821613e-10 + v334;
-            const V v336 = v294 * v321;
-            const V v337 = v333 + v336;
-            const V v338 = v294 * v329;
-            const V v339 = 7.515632515632515e-07 + v338;
-            const V v340 = v329 * v304;
-            const V v341 = v294 * v332;
-            const V v342 = v340 + v341;
-            const V v343 = v294 * v339;
-            const V v344 = 6.613756613756614e-05 + v343;
-            const V v345 = v335 * v304;
-            const V v346 = v294 * v335;
-            const V v347 = 2.505210838544172e-08 + v346;
-            const V v348 = v294 * v337;
-            const V v349 = v345 + v348;
-            const V v350 = v339 * v304;
-            const V v351 = v294 * v342;
-            const V v352 = v350 + v351;
-            const V v353 = v294 * v344;
-            const V v354 = 0.0035714285714285713 + v353;
-            const V v355 = v344 * v304;
-            const V v356 = v294 * v352;
-            const V v357 = v355 + v356;
-            const V v358 = v347 * v304;
-            const V v359 = v294 * v347;
-            const V v360 = 2.7557319223985893e-06 + v359;
-            const V v361 = v294 * v349;
-            const V v362 = v358 + v361;
-            const V v363 = v294 * v354;
-            const V v364 = 0.1 + v363;
-            const V v365 = v354 * v304;
-            const V v366 = v294 * v357;
-            const V v367 = v365 + v366;
-            const V v368 = v294 * v362;
-            const V v369 = v360 * v304;
-            const V v370 = v369 + v368;
-            const V v371 = v294 * v360;
-            const V v372 = 0.0001984126984126984 + v371;
-            const V v373 = v294 * v370;
-            const V v374 = v372 * v304;
-            const V v375 = v374 + v373;
-            const V v376 = v294 * v375;
-            const V v377 = v294 * v367;
-            const V v378 = v294 * v372;
-            const V v379 = 0.008333333333333333 + v378;
-            const V v380 = v379 * v304;
-            const V v381 = v380 + v376;
-            const V v382 = v294 * v381;
-            const V v383 = v364 * v304;
-            const V v384 = v383 + v377;
-            const V v385 = v294 * v379;
-            const V v386 = 0.16666666666666666 + v385;
-            const V v387 = v386 * v304;
-            const V v388 = v387 + v382;
-            const V v389 = v294 * v386;
-            const V v390 = 1.0 + v389;
-            const V v391 = 1.0 / v390;
-            const V v392 = v294 * v364;
-            const V v393 = 1.0 + v392;
-            const V v394 = v391 * v391;
-            const V v395 = v394 * v388;
-            const V v396 = -v395;
-            v296 = softehl_blend(m300, v396, v296);
-            v297 = softehl_blend(m300, v391, v297);
-            v298 = softehl_blend(m300, v393, v298);
-            v299 = softehl_blend(m300, v384, v299);
+        const double v111 = 0.5 * w[1], v112 = 0.5 * w[2], v113 = 0.5 - v111, v114 = 0.5 + v111,
+            v115 = 0.5 - v112, v116 = 0.5 + v112;
+        const V v117 = v108 + (v107 * v97 - v98 * tp4), v118 = v113 * v1 + v114 * v2,
+            v119 = v115 * v1 + v116 * v2, v120 = v113 * v6 + v114 * v10,
+            v121 = v115 * v6 + v116 * v10, v122 = v118 + v119, v123 = v117 - v29,
+            v124 = 0.25 * v122, v125 = 0.5 * (v120 + v121), v126 = p3 * v124, v127 = v15 * v126,
+            v128 = v15 * (v124 * tp3 + 0.5 * p3 * v125 - v126 * v18), v129 = v127 * v127;
+        const M v130 = softehl_lt(v129, softehl_splat(1.0));
+        V v131 = softehl_splat(0.0), v132 = softehl_splat(0.0), v133 = softehl_splat(0.0),
+            v134 = softehl_splat(0.0);
+        const M m135 = v130;
+        if (softehl_any(m135)) {
+            const V v136 = 1.9572941063391263e-20 * v129, v137 = 2.5529923126162516e-21 * v129,
+                v138 = 2.0 * v127 * v128, v139 = 8.22063524662433e-18 + v136,
+                v140 = 1.1743764638034756e-18 + v137, v141 = 2.8114572543455206e-15 + v129 * v139,
+                v142 = 4.439143033177138e-16 + v129 * v140,
+                v143 = 7.647163731819816e-13 + v129 * v141,
+                v144 = 1.34949948208585e-13 + v129 * v142,
+                v145 = 3.2118087673643227e-11 + v129 * v144,
+                v146 = 5.7812557812557815e-09 + v129 * v145,
+                v147 = v129 * (v144 * v138 + v129 * ((v142 + v129 * (v137 + v140)) * v138)),
+                v148 = 1.6059043836821613e-10 + v129 * v143,
+                v149 = 7.515632515632515e-07 + v129 * v146,
+                v150 = 6.613756613756614e-05 + v129 * v149,
+                v151 = 2.505210838544172e-08 + v129 * v148,
+                v152 = v129 * (v143 * v138 + v129 * ((v141 + v129 * (v136 + v139)) * v138)),
+                v153 = 0.0035714285714285713 + v129 * v150,
+                v154 = v129 * (v149 * v138 + v129 * (v146 * v138 + v129 * (v145 * v138 + v147))),
+                v155 = 2.7557319223985893e-06 + v129 * v151, v156 = 0.1 + v129 * v153,
+                v157 = 0.0001984126984126984 + v129 * v155,
+                v158 = v129 * (v155 * v138 + v129 * (v151 * v138 + v129 * (v148 * v138 + v152))),
+                v159 = 0.008333333333333333 + v129 * v157,
+                v160 = v156 * v138 + v129 * (v153 * v138 + v129 * (v150 * v138 + v154)),
+                v161 = 0.16666666666666666 + v129 * v159, v162 = 1.0 / (1.0 + v129 * v161),
+                v163 = 1.0 + v129 * v156,
+                v164 = v162 * v162 * (v161 * v138 + v129 * (v159 * v138 + v129 * (v157 * v138 + v158))),
+                v165 = -v164;
+            v131 = softehl_blend(m135, v165, v131); v132 = softehl_blend(m135, v162, v132);
+            v133 = softehl_blend(m135, v163, v133); v134 = softehl_blend(m135, v160, v134);
         }
-        const M m397 = ~v295;
-        if (softehl_any(m397)) {
-            const V v398 = softehl_vsinh(v292);
-            const V v399 = 3.0 * v292;
-            const V v400 = softehl_vcosh(v292);
-            const V v401 = v292 * v294;
-            const V v402 = 1.0 / v398;
-            const V v403 = 1.0 / v401;
-            const V v404 = v398 * v399;
-            const V v405 = v399 * v400;
-            const V v406 = 3.0 * v398;
-            const V v407 = v405 - v406;
-            const V v408 = 3.0 * v407;
-            const V v409 = v294 * v408;
-            const V v410 = v292 * v402;
-            const V v411 = v410 * v400;
-            const V v412 = 1.0 - v411;
-            const V v413 = v403 * v409;
-            const V v414 = v404 - v413;
-            const V v415 = v407 * v403;
-            const V v416 = v293 * v412;
-            const V v417 = v293 * v414;
-            const V v418 = v402 * v416;
-            const V v419 = v403 * v417;
-            v296 = softehl_blend(m397, v418, v296);
-            v297 = softehl_blend(m397, v410, v297);
-            v298 = softehl_blend(m397, v415, v298);
-            v299 = softehl_blend(m397, v419, v299);
+        const M m166 = ~v130;
+        if (softehl_any(m166)) {
+            const V v167 = softehl_vsinh(v127), v168 = 3.0 * v127, v169 = softehl_vcosh(v127),
+                v170 = 1.0 / v167, v171 = 1.0 / (v127 * v129), v172 = v168 * v169 - 3.0 * v167,
+                v173 = v127 * v170, v174 = v172 * v171, v175 = v170 * (v128 * (1.0 - v173 * v169)),
+                v176 = v171 * (v128 * (v167 * v168 - v171 * (v129 * (3.0 * v172))));
+            v131 = softehl_blend(m166, v175, v131); v132 = softehl_blend(m166, v173, v132);
+            v133 = softehl_blend(m166, v174, v133); v134 = softehl_blend(m166, v176, v134);
         }
-        const V v420 = 0.5 * v281;
-        const V v421 = 0.08333333333333333 * p3;
-        const V v422 = 0.25 * p3;
-        const M v423 = softehl_lt(softehl_splat(0.0), v206);
-        const V v424 = v420 * v420;
-        const V v425 = v420 * t12;
-        const V v426 = parameters[6] * v420;
-        const V v427 = 1.0 / v426;
-        const V v428 = v424 * v422;
-        const V v429 = p2 * t9;
-        const V v430 = p2 * parameters[3];
-        const V v431 = parameters[3] * tp2;
-        const V v432 = v429 + v431;
-        const V v433 = softehl_vexp(v430);
-        const V v434 = 1.0 / v424;
-        const V v435 = v420 * v424;
-        const V v436 = parameters[6] * v285;
-        const V v437 = v425 + v436;
-        const V v438 = v421 * v435;
-        const V v439 = 0.08333333333333333 * v435;
-        const V v440 = v428 * v285;
-        const V v441 = v276 * v278;
-        const V v442 = v274 * v276;
-        const V v443 = v274 * v280;
-        const V v444 = v441 + v443;
-        const V v445 = v439 * tp3;
-        const V v446 = v445 + v440;
-        const V v447 = 2.0 * v442;
-        const V v448 = v420 * v447;
-        const V v449 = v442 * v434;
-        const V v450 = v434 * v448;
-        const V v451 = v450 * v285;
-        const V v452 = v444 - v451;
-        const V v453 = v434 * v452;
-        const V v454 = parameters[2] * v433;
-        const V v455 = v433 * t8;
-        const V v456 = v454 * v432;
-        const V v457 = v455 + v456;
-        const V v458 = v454 * v206;
-        const V v459 = v206 * v457;
-        const V v460 = v454 * v208;
-        const V v461 = v460 + v459;
-        const V v462 = v449 * v449;
-        const V v463 = 2.0 * v449;
-        const V v464 = v438 * v463;
-        const V v465 = v464 * v453;
-        const V v466 = v462 * v446;
-        const V v467 = v466 + v465;
-        const V v468 = v438 * v462;
-        const V v469 = v454 * v35;
-        const V v470 = v16 * v457;
-        const V v471 = v469 + v470;
-        const V v472 = v454 * v16;
-        const V v473 = 1.0 / v472;
-        const V v474 = v297 * v461;
-        const V v475 = v458 * v297;
-        const V v476 = v427 * v475;
-        const V v477 = v476 * v437;
-        const V v478 = v474 - v477;
-        const V v479 = v458 * v296;
-        const V v480 = v479 + v478;
-        const V v481 = v427 * v480;
-        const V v482 = v476 * v476;
-        const V v483 = 1.0 + v482;
-        const V v484 = v468 * v476;
-        const V v485 = softehl_vsqrt(v483);
-        const V v486 = v468 * v485;
-        const V v487 = 1.0 / v483;
-        const V v488 = softehl_vsqrt(v487);
-        const V v489 = v488 * v484;
-        const V v490 = v473 * v486;
-        const V v491 = v471 * v490;
-        const V v492 = v485 * v467;
-        const V v493 = v491 - v492;
-        const V v494 = v489 * v481;
-        const V v495 = v493 - v494;
-        const V v496 = v298 * v495;
-        const V v497 = v486 * v299;
-        const V v498 = v496 - v497;
-        const V v499 = v473 * v498;
-        V v500 = softehl_splat(0.0);
-        V v501 = softehl_splat(0.0);
-        V v502 = softehl_splat(0.0);
-        V v503 = softehl_splat(0.0);
-        const M m504 = v423;
-        if (softehl_any(m504)) {
-            const V v505 = v252 * v208;
-            const V v506 = v206 * tp4;
-            const V v507 = v505 - v506;
-            v500 = softehl_blend(m504, v507, v500);
-            v501 = softehl_blend(m504, softehl_splat(0.0), v501);
-            v502 = softehl_blend(m504, v206, v502);
-            v503 = softehl_blend(m504, softehl_splat(0.0), v503);
+        const V v177 = 0.5 * v122; const M v178 = softehl_lt(softehl_splat(0.0), v82);
+        const V v179 = v177 * v177, v180 = 1.0 / (parameters[6] * v177),
+            v181 = softehl_vexp(p2 * parameters[3]), v182 = 1.0 / v179, v183 = v177 * v179,
+            v184 = 0.08333333333333333 * p3 * v183, v185 = v118 * v119, v186 = v185 * v182,
+            v187 = v182 * (v119 * v120 + v118 * v121 - v182 * (v177 * (2.0 * v185)) * v125),
+            v188 = parameters[2] * v181, v189 = v181 * t8 + v188 * (p2 * t9 + parameters[3] * tp2),
+            v190 = v188 * v82, v191 = v186 * v186,
+            v192 = v191 * (0.08333333333333333 * v183 * tp3 + v179 * (0.25 * p3) * v125),
+            v193 = v184 * v191, v194 = 1.0 / (v188 * v7), v195 = v180 * (v190 * v132),
+            v196 = v132 * (v188 * v83 + v82 * v189) - v195 * (v177 * t12 + parameters[6] * v125),
+            v197 = 1.0 + v195 * v195, v198 = softehl_vsqrt(v197), v199 = v193 * v198,
+            v200 = softehl_vsqrt(1.0 / v197),
+            v201 = (v188 * v16 + v7 * v189) * (v194 * v199) - v198 * (v192 + v184 * (2.0 * v186) * v187),
+            v202 = v133 * (v201 - v200 * (v193 * v195) * (v180 * (v190 * v131 + v196))),
+            v203 = v194 * (v202 - v199 * v134);
+        V v204 = softehl_splat(0.0), v205 = softehl_splat(0.0), v206 = softehl_splat(0.0),
+            v207 = softehl_splat(0.0);
+        const M m208 = v178;
+        if (softehl_any(m208)) {
+            const V v209 = v107 * v83 - v82 * tp4; v204 = softehl_blend(m208, v209, v204);
+            v205 = softehl_blend(m208, softehl_splat(0.0), v205);
+            v206 = softehl_blend(m208, v82, v206);
+            v207 = softehl_blend(m208, softehl_splat(0.0), v207);
         }
-        const M m508 = ~v423;
-        if (softehl_any(m508)) {
-            const V v509 = v251 * v208;
-            const V v510 = v206 * tp6;
-            const V v511 = v509 - v510;
-            v500 = softehl_blend(m508, softehl_splat(0.0), v500);
-            v501 = softehl_blend(m508, v511, v501);
-            v502 = softehl_blend(m508, softehl_splat(0.0), v502);
-            v503 = softehl_blend(m508, v206, v503);
+        const M m210 = ~v178;
+        if (softehl_any(m210)) {
+            const V v211 = v106 * v83 - v82 * tp6;
+            v204 = softehl_blend(m210, softehl_splat(0.0), v204);
+            v205 = softehl_blend(m210, v211, v205);
+            v206 = softehl_blend(m210, softehl_splat(0.0), v206);
+            v207 = softehl_blend(m210, v82, v207);
         }
-        const V v512 = v251 * v503;
-        const V v513 = 1.0 / v228;
-        const V v514 = v252 * v502;
-        const V v515 = v512 + v514;
-        const V v516 = v501 + v500;
-        const V v517 = 0.5 * v515;
-        const V v518 = v56 * v516;
-        const V v519 = v61 + v272;
-        const V v520 = v44 * v221;
-        const V v521 = v44 * v230;
-        const V v522 = v230 * v47;
-        const V v523 = v521 * v72;
-        const V v524 = v517 * v58;
-        const V v525 = v524 + v518;
-        const V v526 = v55 * v517;
-        const V v527 = v526 * v453;
-        const V v528 = v527 + v499;
-        const V v529 = v449 * v525;
-        const V v530 = v529 + v528;
-        const V v531 = softehl_vsqrt(v513);
-        const V v532 = v520 * v531;
-        const V v533 = v532 * v226;
-        const V v534 = v522 + v533;
-        const V v535 = v71 * v534;
-        const V v536 = v523 + v535;
-        softehl_store4(R + 14 * q + 0, (14 * points), v53, v41, v58, tp0);
-        softehl_store4(R + 14 * q + 4, (14 * points), v282, v530, v519, v214);
-        softehl_store1(R + 14 * q + 8, (14 * points), v58);
-        softehl_store3(R + 14 * q + 11, (14 * points), tp4, tp6, v536);
+        const V v212 = 0.5 * (v106 * v207 + v107 * v206), v213 = v29 + v117,
+            v214 = v186 * (v212 * v28 + v27 * (v205 + v204)) + (v26 * v212 * v187 + v203),
+            v215 = softehl_vsqrt(1.0 / v90),
+            v216 = v23 * v92 * v38 + v37 * (v92 * v24 + v23 * v87 * v215 * v89);
+        softehl_store4(R + 14 * q + 0, (14 * points), v25, v20, v28, tp0);
+        softehl_store4(R + 14 * q + 4, (14 * points), v123, v214, v213, v85);
+        softehl_store1(R + 14 * q + 8, (14 * points), v28);
+        softehl_store3(R + 14 * q + 11, (14 * points), tp4, tp6, v216);
     }
     for (ptrdiff_t q = 0; q < points; ++q) {
         softehl_store2(R + 14 * q + 9, (14 * points), softehl_splat(0.0), softehl_splat(0.0));
     }
 }
-
-void softehl_film_conserving_eyring_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_conserving_eyring_fields_rate_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, direction + (14 + (4 + modes)) * e, parameters, rule, basis, values + (14 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_conserving_eyring_fields_rate_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), direction + (14 + (4 + modes)) * (n - SOFTEHL_LANES), parameters, rule, basis, values + (14 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double t[SOFTEHL_LANES * (14 + (4 + modes))];
-    softehl_pad(t, direction, (14 + (4 + modes)), n);
-    double R[SOFTEHL_LANES * (14 * points)];
-    softehl_film_conserving_eyring_fields_rate(SOFTEHL_LANES, points, modes, X, d, a, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (14 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_conserving_eyring_fields_rate, 4, (4 + modes), 2, (14 + (4 + modes)), (14 * points), 0)

@@ -25,28 +25,16 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_film_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10;
+    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
     softehl_load3(t + 8, 11, &t8, &t9, &t10);
-    (void)t8; (void)t9; (void)t10;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -63,250 +51,71 @@ static void softehl_film_pseudo_load_group(
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
     const double v1 = 6.283185307179586 * parameters[5];
-    const V v2 = parameters[2] * t7;
-    const V v3 = X2 + d2;
-    const V v4 = 6.283185307179586 * t9;
-    const V v5 = t2 - t0;
-    const V v6 = 0.5 * v5;
-    const V v7 = X3 + d3;
-    const V v8 = X1 - parameters[0];
-    const V v9 = X3 - parameters[0];
-    const V v10 = d1 + v8;
-    const V v11 = d3 + v9;
-    const V v12 = v3 - X0;
-    const V v13 = v12 - d0;
-    const V v14 = parameters[4] * v6;
-    const V v15 = v7 - X1;
-    const V v16 = v15 - d1;
-    const V v17 = v13 * v6;
-    const V v18 = 0.5 * v13;
-    const double v19 = 0.5 * parameters[6];
-    const V v20 = 0.5 * v16;
-    const V v21 = 5.0 * v16;
-    const V v22 = t3 - t1;
-    const V v23 = v18 * t8;
-    const V v24 = v14 + v23;
-    const V v25 = v18 * v18;
-    const V v26 = 0.5 * v22;
-    const V v27 = v20 * v20;
-    const V v28 = t1 - t4;
-    const V v29 = t3 - t4;
-    const V v30 = v16 * v26;
-    const V v31 = v30 + v17;
-    const V v32 = v27 * v27;
-    const V v33 = v27 + v25;
-    const V v34 = v20 * v32;
-    const V v35 = v32 * v21;
-    const V v36 = softehl_vsqrt(v33);
-    const V v37 = v33 * v33;
-    const V v38 = 1.0 / v33;
-    const V v39 = 4.0 * v33;
-    const V v40 = v32 * v35;
-    const V v41 = v34 * v34;
-    const V v42 = v37 * v39;
-    const V v43 = v37 * v37;
-    const V v44 = v26 * v40;
-    const V v45 = 1.0 / v43;
-    const V v46 = parameters[6] * v36;
-    const V v47 = softehl_vsqrt(v38);
-    const V v48 = v47 * v19;
-    const V v49 = v45 * v42;
-    const V v50 = v41 * v49;
-    const V v51 = v45 * v41;
-    const V v52 = v25 + v51;
-    const V v53 = v31 * v50;
-    const V v54 = v44 - v53;
-    const V v55 = v45 * v54;
-    const V v56 = v17 + v55;
-    const V v57 = v31 * v48;
-    const V v58 = v36 * t10;
-    const V v59 = v58 + v57;
-    const V v60 = softehl_vsqrt(v52);
-    const V v61 = 1.0 / v60;
-    const V v62 = 1.0 / v52;
-    const V v63 = softehl_vsqrt(v62);
-    const V v64 = 0.5 * v61;
-    const V v65 = v61 * v64;
-    const V v66 = v63 * v65;
-    const V v67 = v56 * v66;
-    V s68 = softehl_splat(0.0);
-    V s69 = softehl_splat(0.0);
-    V s70 = softehl_splat(0.0);
-    V s71 = softehl_splat(0.0);
+    const V v2 = parameters[2] * t7, v3 = 6.283185307179586 * t9, v4 = 0.5 * (t2 - t0),
+        v5 = d1 + (X1 - parameters[0]), v6 = d3 + (X3 - parameters[0]), v7 = X2 + d2 - X0 - d0,
+        v8 = X3 + d3 - X1 - d1, v9 = v7 * v4, v10 = 0.5 * v7, v11 = 0.5 * v8,
+        v12 = parameters[4] * v4 + v10 * t8, v13 = v10 * v10, v14 = 0.5 * (t3 - t1),
+        v15 = v11 * v11, v16 = t1 - t4, v17 = t3 - t4, v18 = v8 * v14 + v9, v19 = v15 * v15,
+        v20 = v15 + v13, v21 = v11 * v19, v22 = softehl_vsqrt(v20), v23 = v20 * v20,
+        v24 = v21 * v21, v25 = 1.0 / (v23 * v23), v26 = parameters[6] * v22,
+        v27 = softehl_vsqrt(1.0 / v20), v28 = v13 + v25 * v24,
+        v29 = v14 * (v19 * (v19 * (5.0 * v8))) - v18 * (v24 * (v25 * (v23 * (4.0 * v20)))),
+        v30 = v22 * t10 + v18 * (v27 * (0.5 * parameters[6])), v31 = softehl_vsqrt(v28),
+        v32 = 1.0 / v31, v33 = softehl_vsqrt(1.0 / v28),
+        v34 = (v9 + v25 * v29) * (v33 * (v32 * (0.5 * v32)));
+    V s35 = {0}, s36 = {0}, s37 = {0}, s38 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
         (void)p0, (void)p1;
-        const double v72 = 0.5 * w[0];
-        const double v73 = 0.5 - v72;
-        const double v74 = 0.5 + v72;
-        const V v75 = p0 * parameters[3];
-        const V v76 = -p0;
-        const V v77 = p0 * v20;
-        const V v78 = softehl_vexp(v75);
-        const V v79 = p0 * v2;
-        const V v80 = t6 + v79;
-        const M v81 = softehl_lt(softehl_splat(0.0), v76);
-        const V v82 = p0 * v26;
-        const V v83 = v73 * v10;
-        const V v84 = v73 * v28;
-        const V v85 = p1 * v61;
-        const V v86 = p1 * v67;
-        const V v87 = v74 * v11;
-        const V v88 = v83 + v87;
-        const V v89 = v74 * v29;
-        const V v90 = v84 + v89;
-        const V v91 = parameters[0] + v88;
-        const V v92 = 0.5 * v88;
-        const V v93 = 1.0 / v88;
-        const V v94 = t4 + v90;
-        const V v95 = 0.5 * v90;
-        const V v96 = v92 * v86;
-        const V v97 = v85 * v95;
-        const V v98 = v96 - v97;
-        const V v99 = v91 * v4;
-        const V v100 = v91 * v1;
-        const V v101 = v1 * v94;
-        const V v102 = v101 + v99;
-        const V v103 = v78 * v80;
-        const V v104 = parameters[2] * v78;
-        const V v105 = v100 * v6;
-        const V v106 = v18 * v102;
-        const V v107 = v105 + v106;
-        const V v108 = p0 * v107;
-        const V v109 = v104 * t5;
-        const V v110 = parameters[1] * v104;
-        const V v111 = parameters[1] * v103;
-        const V v112 = v109 + v111;
-        const V v113 = v110 * v93;
-        const V v114 = v113 * v90;
-        const V v115 = v112 - v114;
-        const V v116 = v93 * v115;
-        const V v117 = v116 + v98;
-        const V v118 = v92 * v85;
-        const V v119 = v113 - v118;
-        const V v120 = v119 * v59;
-        const V v121 = v82 - v120;
-        const V v122 = v46 * v119;
-        const V v123 = v77 - v122;
-        const V v124 = v46 * v117;
-        const V v125 = v121 - v124;
-        const V v126 = v123 * v102;
-        const V v127 = v100 * v125;
-        const V v128 = v126 + v127;
-        const V v129 = w[1] * v108;
-        const V v130 = w[1] * v128;
-        const V v131 = v74 * v129;
-        s68 += v131;
-        const V v132 = v73 * v129;
-        s69 += v132;
-        const V v133 = v74 * v130;
-        s70 += v133;
-        const V v134 = v73 * v130;
-        s71 += v134;
-        V v135 = softehl_splat(0.0);
-        const M m136 = v81;
-        if (softehl_any(m136)) {
-            const V v137 = p0 * v24;
-            const V v138 = w[1] * v137;
-            const V v139 = -v138;
-            v135 = softehl_blend(m136, v139, v135);
+        const double v39 = 0.5 * w[0], v40 = 0.5 - v39, v41 = 0.5 + v39;
+        const V v42 = softehl_vexp(p0 * parameters[3]);
+        const M v43 = softehl_lt(softehl_splat(0.0), -p0);
+        const V v44 = p1 * v32, v45 = p1 * v34, v46 = v40 * v5 + v41 * v6,
+            v47 = v40 * v16 + v41 * v17, v48 = parameters[0] + v46, v49 = 0.5 * v46,
+            v50 = 1.0 / v46, v51 = 0.5 * v47, v52 = v48 * v1, v53 = v1 * (t4 + v47) + v48 * v3,
+            v54 = v42 * (t6 + p0 * v2), v55 = parameters[2] * v42, v56 = parameters[1] * v55 * v50,
+            v57 = v50 * (v55 * t5 + parameters[1] * v54 - v56 * v47) + (v49 * v45 - v44 * v51),
+            v58 = v56 - v49 * v44,
+            v59 = (p0 * v11 - v26 * v58) * v53 + v52 * (p0 * v14 - v58 * v30 - v26 * v57),
+            v60 = w[1] * (p0 * (v52 * v4 + v10 * v53)), v61 = w[1] * v59;
+        s35 += v41 * v60; s36 += v40 * v60; const V v62 = v41 * v61; s37 += v62;
+        const V v63 = v40 * v61; s38 += v63; V v64 = softehl_splat(0.0); const M m65 = v43;
+        if (softehl_any(m65)) {
+            const V v66 = -(w[1] * (p0 * v12)); v64 = softehl_blend(m65, v66, v64);
         }
-        const V v140 = 1.0 / v104;
-        const V v141 = parameters[1] * v95;
-        const V v142 = v88 * v88;
-        const V v143 = v88 * v142;
-        const V v144 = 0.25 * v142;
-        const V v145 = v92 * t5;
-        const V v146 = v141 + v145;
-        const V v147 = v85 * v144;
-        const V v148 = v140 * v85;
-        const V v149 = v103 * v148;
-        const V v150 = v86 + v149;
-        const V v151 = v143 * v150;
-        const V v152 = 0.08333333333333333 * v151;
-        const V v153 = v90 * v147;
-        const V v154 = v152 - v153;
-        const V v155 = v140 * v154;
-        const V v156 = v146 + v155;
-        const V v157 = w[1] * v156;
+        const V v67 = 1.0 / v55, v68 = v46 * v46,
+            v69 = 0.08333333333333333 * (v46 * v68 * (v45 + v54 * (v67 * v44))) - v47 * (v44 * (0.25 * v68)),
+            v70 = w[1] * (parameters[1] * v51 + v49 * t5 + v67 * v69);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            const double N = B[2 * i], D = B[2 * i + 1];
-            (void)N, (void)D;
-            R_lanes[4 + i] += N * v135 + D * v157;
+            const double N = B[2 * i], D = B[2 * i + 1]; (void)N, (void)D;
+            R_lanes[4 + i] += N * v64 + D * v70;
         }
     }
-    const V v158 = -s68;
-    const V v159 = -s69;
-    R_lanes[0] = s71;
-    R_lanes[1] = v159;
-    R_lanes[2] = s70;
-    R_lanes[3] = v158;
+    const V v71 = -s35, v72 = -s36;
+    R_lanes[0] = s38; R_lanes[1] = v72; R_lanes[2] = s37; R_lanes[3] = v71;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_pseudo_load, 4, (4 + modes), 0, 11, (4 + modes), 0)
 
-void softehl_film_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_fields_rate)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_pseudo_load_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, direction + 11 * e, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_pseudo_load_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, direction + 11 * (n - SOFTEHL_LANES), parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double t[SOFTEHL_LANES * 11];
-    softehl_pad(t, direction, 11, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_fields_rate_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V t0, t1, t2, t3;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14;
     softehl_load4(t + 0, (11 + (4 + modes)), &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
     softehl_load4(t + 4, (11 + (4 + modes)), &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
     softehl_load4(t + 8, (11 + (4 + modes)), &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    V t12, t13, t14;
-    softehl_load3(t + 12, (11 + (4 + modes)), &t12, &t13, &t14);
-    (void)t12; (void)t13; (void)t14;
+    softehl_load3(t + 12, (11 + (4 + modes)), &t12, &t13, &t14); (void)t8; (void)t9; (void)t10;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -323,166 +132,38 @@ static void softehl_film_fields_rate_group(
 #if SOFTEHL_LANES > 1
     softehl_gather(t_lanes, t, (11 + (4 + modes)));
 #endif
-    const V v1 = X2 + d2;
-    const V v2 = t1 + t12;
-    const V v3 = t2 + t13;
-    const V v4 = t3 + t14;
-    const V v5 = X1 - parameters[0];
-    const V v6 = X3 - parameters[0];
-    const V v7 = v1 - X0;
-    const V v8 = X3 + d3;
-    const V v9 = v7 - d0;
-    const V v10 = d3 + v6;
-    const V v11 = v4 - v2;
-    const V v12 = 0.5 * v9;
-    const V v13 = d1 + v5;
-    const V v14 = v8 - X1;
-    const V v15 = v14 - d1;
-    const V v16 = 0.5 * v11;
-    const V v17 = v12 * v12;
-    const V v18 = v2 - t4;
-    const V v19 = v4 - t4;
-    const V v20 = 0.5 * v15;
-    const V v21 = 5.0 * v15;
-    const V v22 = v3 - t0;
-    const V v23 = v15 * v16;
-    const V v24 = v20 * v20;
-    const V v25 = v22 - t11;
-    const V v26 = t0 + t11;
-    const V v27 = 0.5 * v25;
-    const V v28 = v24 + v17;
-    const V v29 = v24 * v24;
-    const V v30 = v9 * v27;
-    const V v31 = v20 * v29;
-    const V v32 = v31 * v31;
-    const V v33 = v29 * v21;
-    const V v34 = v29 * v33;
-    const V v35 = v34 * v16;
-    const V v36 = v28 * v28;
-    const V v37 = 4.0 * v28;
-    const V v38 = v36 * v37;
-    const V v39 = v36 * v36;
-    const V v40 = 1.0 / v39;
-    const V v41 = v30 + v23;
-    const V v42 = v40 * v38;
-    const V v43 = v32 * v42;
-    const V v44 = v43 * v41;
-    const V v45 = v35 - v44;
-    const V v46 = v40 * v32;
-    const V v47 = v17 + v46;
-    const V v48 = v40 * v45;
-    const V v49 = v30 + v48;
-    const V v50 = softehl_vsqrt(v47);
-    const V v51 = 1.0 / v50;
-    const V v52 = 1.0 / v47;
-    const V v53 = softehl_vsqrt(v52);
-    const V v54 = 0.5 * v51;
-    const V v55 = v53 * v54;
-    const V v56 = v55 * v49;
+    const V v1 = t1 + t12, v2 = t2 + t13, v3 = t3 + t14, v4 = X2 + d2 - X0 - d0,
+        v5 = d3 + (X3 - parameters[0]), v6 = 0.5 * v4, v7 = d1 + (X1 - parameters[0]),
+        v8 = X3 + d3 - X1 - d1, v9 = 0.5 * (v3 - v1), v10 = v6 * v6, v11 = v1 - t4, v12 = v3 - t4,
+        v13 = 0.5 * v8, v14 = v13 * v13, v15 = t0 + t11, v16 = 0.5 * (v2 - t0 - t11),
+        v17 = v14 + v10, v18 = v14 * v14, v19 = v4 * v16, v20 = v13 * v18, v21 = v20 * v20,
+        v22 = v17 * v17, v23 = 1.0 / (v22 * v22),
+        v24 = v18 * (v18 * (5.0 * v8)) * v9 - v21 * (v23 * (v22 * (4.0 * v17))) * (v19 + v8 * v9),
+        v25 = v10 + v23 * v21, v26 = softehl_vsqrt(v25), v27 = 1.0 / v26,
+        v28 = softehl_vsqrt(1.0 / v25), v29 = v28 * (0.5 * v27) * (v19 + v23 * v24);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0);
+        (void)p0, (void)p1; V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            tp0 += B[2 * i] * t_lanes[15 + i];
-            tp1 += B[2 * i + 1] * t_lanes[15 + i];
+            tp0 += B[2 * i] * t_lanes[15 + i]; tp1 += B[2 * i + 1] * t_lanes[15 + i];
         }
-        (void)tp0, (void)tp1;
-        const double v57 = 0.5 * w[0];
-        const V v58 = w[1] * v27;
-        const double v59 = 0.5 - v57;
-        const double v60 = 0.5 + v57;
-        const V v61 = p0 * t7;
-        const V v62 = p0 * parameters[3];
-        const V v63 = parameters[3] * tp0;
-        const V v64 = v61 + v63;
-        const V v65 = softehl_vexp(v62);
-        const V v66 = p1 * v56;
-        const V v67 = tp1 - v66;
-        const V v68 = p1 * v51;
-        const V v69 = v51 * v67;
-        const V v70 = v59 * v13;
-        const V v71 = v60 * v3;
-        const V v72 = v59 * v18;
-        const V v73 = v59 * v26;
-        const V v74 = v71 + v73;
-        const V v75 = v60 * v10;
-        const V v76 = v70 + v75;
-        const V v77 = v60 * v19;
-        const V v78 = v72 + v77;
-        const V v79 = 0.5 * v76;
-        const V v80 = 1.0 / v76;
-        const V v81 = v76 * v76;
-        const V v82 = 0.5 * v78;
-        const V v83 = v76 * v81;
-        const V v84 = 0.25 * v81;
-        const V v85 = v68 * v84;
-        const V v86 = v79 * v69;
-        const V v87 = v79 * t5;
-        const V v88 = parameters[2] * v65;
-        const V v89 = v65 * t6;
-        const V v90 = v88 * v64;
-        const V v91 = v89 + v90;
-        const V v92 = v68 * v82;
-        const V v93 = v92 + v86;
-        const V v94 = v88 * t5;
-        const V v95 = parameters[1] * v82;
-        const V v96 = v87 + v95;
-        const V v97 = 1.0 / v88;
-        const V v98 = v97 * v68;
-        const V v99 = v88 * v80;
-        const V v100 = v98 * v91;
-        const V v101 = v100 - v69;
-        const V v102 = v83 * v101;
-        const V v103 = v78 * v99;
-        const V v104 = v91 - v103;
-        const V v105 = parameters[1] * v104;
-        const V v106 = v94 + v105;
-        const V v107 = v80 * v106;
-        const V v108 = 0.08333333333333333 * v102;
-        const V v109 = v85 * v78;
-        const V v110 = v108 - v109;
-        const V v111 = v97 * v110;
-        const V v112 = v96 + v111;
-        const V v113 = v93 + v107;
-        const V v114 = v107 - v93;
-        softehl_store4(R + 8 * q + 0, (8 * points), v74, v58, v78, tp0);
-        softehl_store4(R + 8 * q + 4, (8 * points), v114, v112, v113, v91);
+        (void)tp0, (void)tp1; const double v30 = 0.5 * w[0]; const V v31 = w[1] * v16;
+        const double v32 = 0.5 - v30, v33 = 0.5 + v30;
+        const V v34 = softehl_vexp(p0 * parameters[3]), v35 = p1 * v27,
+            v36 = v27 * (tp1 - p1 * v29), v37 = v33 * v2 + v32 * v15, v38 = v32 * v7 + v33 * v5,
+            v39 = v32 * v11 + v33 * v12, v40 = 0.5 * v38, v41 = 1.0 / v38, v42 = v38 * v38,
+            v43 = 0.5 * v39, v44 = parameters[2] * v34,
+            v45 = v34 * t6 + v44 * (p0 * t7 + parameters[3] * tp0), v46 = v35 * v43 + v40 * v36,
+            v47 = 1.0 / v44, v48 = v41 * (v44 * t5 + parameters[1] * (v45 - v39 * (v44 * v41))),
+            v49 = 0.08333333333333333 * (v38 * v42 * (v47 * v35 * v45 - v36)) - v35 * (0.25 * v42) * v39,
+            v50 = v40 * t5 + parameters[1] * v43 + v47 * v49, v51 = v46 + v48, v52 = v48 - v46;
+        softehl_store4(R + 8 * q + 0, (8 * points), v37, v31, v39, tp0);
+        softehl_store4(R + 8 * q + 4, (8 * points), v52, v50, v51, v45);
     }
 }
-
-void softehl_film_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_fields_rate_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, direction + (11 + (4 + modes)) * e, parameters, rule, basis, values + (8 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_fields_rate_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, direction + (11 + (4 + modes)) * (n - SOFTEHL_LANES), parameters, rule, basis, values + (8 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double t[SOFTEHL_LANES * (11 + (4 + modes))];
-    softehl_pad(t, direction, (11 + (4 + modes)), n);
-    double R[SOFTEHL_LANES * (8 * points)];
-    softehl_film_fields_rate(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (8 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_fields_rate, 4, (4 + modes), 0, (11 + (4 + modes)), (8 * points), 0)

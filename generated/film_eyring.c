@@ -33,19 +33,13 @@ SOFTEHL_LANEWISE(cosh)
 
 SOFTEHL_LANEWISE(sinh)
 
-static void softehl_film_eyring_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_eyring_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -61,230 +55,79 @@ static void softehl_film_eyring_residual_group(
 #endif
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
-    const double v1 = 1.0 / parameters[7];
-    const double v2 = 6.283185307179586 * parameters[5];
-    const V v3 = X2 + d2;
-    const V v4 = X3 + d3;
-    const V v5 = X1 - parameters[0];
-    const V v6 = X3 - parameters[0];
-    const V v7 = d1 + v5;
-    const V v8 = d3 + v6;
-    const V v9 = v3 - X0;
-    const V v10 = v9 - d0;
-    const V v11 = v4 - X1;
-    const V v12 = v11 - d1;
-    const V v13 = 0.5 * v10;
-    const V v14 = 0.5 * v12;
-    const V v15 = parameters[4] * v13;
-    const V v16 = v13 * v13;
-    const V v17 = v14 * v14;
-    const V v18 = v14 * v17;
-    const V v19 = v17 * v18;
-    const V v20 = v17 + v16;
-    const V v21 = softehl_vsqrt(v20);
-    const V v22 = v20 * v20;
-    const V v23 = v22 * v22;
-    const V v24 = 1.0 / v23;
-    const V v25 = parameters[6] * v21;
-    const V v26 = v24 * v19;
-    const V v27 = v19 * v26;
-    const V v28 = v16 + v27;
-    const V v29 = softehl_vsqrt(v28);
-    const V v30 = 1.0 / v29;
-    V s31 = softehl_splat(0.0);
-    V s32 = softehl_splat(0.0);
-    V s33 = softehl_splat(0.0);
-    V s34 = softehl_splat(0.0);
+    const double v1 = 1.0 / parameters[7], v2 = 6.283185307179586 * parameters[5];
+    const V v3 = d1 + (X1 - parameters[0]), v4 = d3 + (X3 - parameters[0]),
+        v5 = 0.5 * (X2 + d2 - X0 - d0), v6 = 0.5 * (X3 + d3 - X1 - d1), v7 = parameters[4] * v5,
+        v8 = v5 * v5, v9 = v6 * v6, v10 = v9 * (v6 * v9), v11 = v9 + v8, v12 = softehl_vsqrt(v11),
+        v13 = v11 * v11, v14 = parameters[6] * v12,
+        v15 = softehl_vsqrt(v8 + v10 * (1.0 / (v13 * v13) * v10)), v16 = 1.0 / v15;
+    V s17 = {0}, s18 = {0}, s19 = {0}, s20 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        const double v35 = 0.5 * w[0];
-        const V v36 = p0 * v13;
-        const V v37 = p1 * v30;
-        const double v38 = 0.5 - v35;
-        const double v39 = 0.5 + v35;
-        const V v40 = w[1] * v36;
-        const V v41 = v38 * v7;
-        const V v42 = v39 * v8;
-        const V v43 = v41 + v42;
-        const V v44 = parameters[0] + v43;
-        const V v45 = 0.5 * v43;
-        const V v46 = v45 * v37;
-        const V v47 = v1 * v46;
-        const V v48 = v47 * v47;
-        const M v49 = softehl_lt(v48, softehl_splat(1.0));
-        const V v50 = v44 * v2;
-        const V v51 = v40 * v50;
-        const V v52 = v39 * v51;
-        s31 += v52;
-        const V v53 = v38 * v51;
-        s32 += v53;
-        V v54 = softehl_splat(0.0);
-        V v55 = softehl_splat(0.0);
-        const M m56 = v49;
-        if (softehl_any(m56)) {
-            const V v57 = 1.9572941063391263e-20 * v48;
-            const V v58 = 8.22063524662433e-18 + v57;
-            const V v59 = v48 * v58;
-            const V v60 = 2.8114572543455206e-15 + v59;
-            const V v61 = 2.5529923126162516e-21 * v48;
-            const V v62 = 1.1743764638034756e-18 + v61;
-            const V v63 = v48 * v62;
-            const V v64 = 4.439143033177138e-16 + v63;
-            const V v65 = v48 * v60;
-            const V v66 = 7.647163731819816e-13 + v65;
-            const V v67 = v48 * v66;
-            const V v68 = 1.6059043836821613e-10 + v67;
-            const V v69 = v48 * v68;
-            const V v70 = 2.505210838544172e-08 + v69;
-            const V v71 = v48 * v64;
-            const V v72 = 1.34949948208585e-13 + v71;
-            const V v73 = v48 * v70;
-            const V v74 = 2.7557319223985893e-06 + v73;
-            const V v75 = v48 * v72;
-            const V v76 = 3.2118087673643227e-11 + v75;
-            const V v77 = v48 * v76;
-            const V v78 = 5.7812557812557815e-09 + v77;
-            const V v79 = v48 * v78;
-            const V v80 = 7.515632515632515e-07 + v79;
-            const V v81 = v48 * v80;
-            const V v82 = 6.613756613756614e-05 + v81;
-            const V v83 = v48 * v82;
-            const V v84 = 0.0035714285714285713 + v83;
-            const V v85 = v48 * v84;
-            const V v86 = 0.1 + v85;
-            const V v87 = v48 * v74;
-            const V v88 = 0.0001984126984126984 + v87;
-            const V v89 = v48 * v88;
-            const V v90 = 0.008333333333333333 + v89;
-            const V v91 = v48 * v90;
-            const V v92 = 0.16666666666666666 + v91;
-            const V v93 = v48 * v92;
-            const V v94 = 1.0 + v93;
-            const V v95 = 1.0 / v94;
-            const V v96 = v48 * v86;
-            const V v97 = 1.0 + v96;
-            v54 = softehl_blend(m56, v95, v54);
-            v55 = softehl_blend(m56, v97, v55);
+        (void)p0, (void)p1; const double v21 = 0.5 * w[0]; const V v22 = p1 * v16;
+        const double v23 = 0.5 - v21, v24 = 0.5 + v21;
+        const V v25 = v23 * v3 + v24 * v4, v26 = 0.5 * v25, v27 = v26 * v22, v28 = v1 * v27,
+            v29 = v28 * v28;
+        const M v30 = softehl_lt(v29, softehl_splat(1.0));
+        const V v31 = (parameters[0] + v25) * v2, v32 = w[1] * (p0 * v5) * v31;
+        s17 += v24 * v32; s18 += v23 * v32;
+        V v33 = softehl_splat(0.0), v34 = softehl_splat(0.0);
+        const M m35 = v30;
+        if (softehl_any(m35)) {
+            const V v36 = 2.8114572543455206e-15 + v29 * (8.22063524662433e-18 + 1.9572941063391263e-20 * v29),
+                v37 = 4.439143033177138e-16 + v29 * (1.1743764638034756e-18 + 2.5529923126162516e-21 * v29),
+                v38 = 1.6059043836821613e-10 + v29 * (7.647163731819816e-13 + v29 * v36),
+                v39 = 2.7557319223985893e-06 + v29 * (2.505210838544172e-08 + v29 * v38),
+                v40 = 3.2118087673643227e-11 + v29 * (1.34949948208585e-13 + v29 * v37),
+                v41 = 7.515632515632515e-07 + v29 * (5.7812557812557815e-09 + v29 * v40),
+                v42 = 0.0035714285714285713 + v29 * (6.613756613756614e-05 + v29 * v41),
+                v43 = v29 * (0.008333333333333333 + v29 * (0.0001984126984126984 + v29 * v39)),
+                v44 = 1.0 / (1.0 + v29 * (0.16666666666666666 + v43)),
+                v45 = 1.0 + v29 * (0.1 + v29 * v42);
+            v33 = softehl_blend(m35, v44, v33); v34 = softehl_blend(m35, v45, v34);
         }
-        const M m98 = ~v49;
-        if (softehl_any(m98)) {
-            const V v99 = softehl_vsinh(v47);
-            const V v100 = v47 * v48;
-            const V v101 = softehl_vcosh(v47);
-            const V v102 = 1.0 / v100;
-            const V v103 = 1.0 / v99;
-            const V v104 = v47 * v101;
-            const V v105 = v47 * v103;
-            const V v106 = v104 - v99;
-            const V v107 = 3.0 * v106;
-            const V v108 = v107 * v102;
-            v54 = softehl_blend(m98, v105, v54);
-            v55 = softehl_blend(m98, v108, v55);
+        const M m46 = ~v30;
+        if (softehl_any(m46)) {
+            const V v47 = softehl_vsinh(v28), v48 = softehl_vcosh(v28), v49 = v28 * (1.0 / v47),
+                v50 = 3.0 * (v28 * v48 - v47) * (1.0 / (v28 * v29));
+            v33 = softehl_blend(m46, v49, v33); v34 = softehl_blend(m46, v50, v34);
         }
-        const V v109 = w[1] * v50;
-        const V v110 = p0 * parameters[3];
-        const V v111 = -p0;
-        const V v112 = p0 * v14;
-        const V v113 = softehl_vexp(v110);
-        const M v114 = softehl_lt(softehl_splat(0.0), v111);
-        const V v115 = parameters[7] * v43;
-        const V v116 = 1.0 / v115;
-        const V v117 = parameters[2] * v113;
-        const V v118 = parameters[1] * v117;
-        const V v119 = v118 * v116;
-        const V v120 = v119 * v54;
-        const V v121 = softehl_vasinh(v120);
-        const V v122 = parameters[7] * v121;
-        const V v123 = v122 - v46;
-        const V v124 = v25 * v123;
-        const V v125 = v112 - v124;
-        const V v126 = v125 * v109;
-        const V v127 = v39 * v126;
-        s33 += v127;
-        const V v128 = v38 * v126;
-        s34 += v128;
-        const V v129 = softehl_blend(v114, v111, softehl_splat(0.0));
-        const V v130 = 1.0 / v117;
-        const V v131 = parameters[1] * v45;
-        const V v132 = v129 * v15;
-        const V v133 = 0.08333333333333333 * v43;
-        const V v134 = v120 * v120;
-        const V v135 = 1.0 + v134;
-        const V v136 = v43 * v133;
-        const V v137 = softehl_vsqrt(v135);
-        const V v138 = w[1] * v132;
-        const V v139 = v43 * v136;
-        const V v140 = v130 * v139;
-        const V v141 = v140 * v37;
-        const V v142 = v137 * v141;
-        const V v143 = v55 * v142;
-        const V v144 = v131 - v143;
-        const V v145 = w[1] * v144;
+        const V v51 = -p0, v52 = softehl_vexp(p0 * parameters[3]);
+        const M v53 = softehl_lt(softehl_splat(0.0), v51);
+        const V v54 = parameters[2] * v52,
+            v55 = parameters[1] * v54 * (1.0 / (parameters[7] * v25)) * v33,
+            v56 = softehl_vasinh(v55),
+            v57 = (p0 * v6 - v14 * (parameters[7] * v56 - v27)) * (w[1] * v31);
+        s19 += v24 * v57; s20 += v23 * v57;
+        const V v58 = softehl_blend(v53, v51, softehl_splat(0.0)),
+            v59 = softehl_vsqrt(1.0 + v55 * v55), v60 = w[1] * (v58 * v7),
+            v61 = v59 * (1.0 / v54 * (v25 * (v25 * (0.08333333333333333 * v25))) * v22),
+            v62 = w[1] * (parameters[1] * v26 - v34 * v61);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            const double N = B[2 * i], D = B[2 * i + 1];
-            (void)N, (void)D;
-            R_lanes[4 + i] += N * v138 + D * v145;
+            const double N = B[2 * i], D = B[2 * i + 1]; (void)N, (void)D;
+            R_lanes[4 + i] += N * v60 + D * v62;
         }
     }
-    const V v146 = -s31;
-    const V v147 = -s32;
-    R_lanes[0] = s34;
-    R_lanes[1] = v147;
-    R_lanes[2] = s33;
-    R_lanes[3] = v146;
+    const V v63 = -s17, v64 = -s18;
+    R_lanes[0] = s20; R_lanes[1] = v64; R_lanes[2] = s19; R_lanes[3] = v63;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_eyring_residual, 4, (4 + modes), 0, 0, (4 + modes), 0)
 
-void softehl_film_eyring_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_eyring_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_eyring_residual_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_eyring_residual_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_eyring_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_eyring_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -307,703 +150,188 @@ static void softehl_film_eyring_tangent_group(
 #endif
     for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
         K_lanes[i] = softehl_splat(0.0);
-    const double v1 = 6.283185307179586 * parameters[5];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = parameters[2] * parameters[3];
-    const V v4 = X2 + d2;
-    const double v5 = 1.0 / parameters[7];
-    const V v6 = X3 + d3;
-    const V v7 = X1 - parameters[0];
-    const V v8 = X3 - parameters[0];
-    const V v9 = d1 + v7;
-    const V v10 = d3 + v8;
-    const V v11 = v4 - X0;
-    const double v12 = 0.5 * parameters[4];
-    const V v13 = v11 - d0;
-    const V v14 = v6 - X1;
-    const V v15 = v14 - d1;
-    const V v16 = 0.5 * v13;
-    const V v17 = 0.5 * v15;
-    const V v18 = 2.5 * v15;
-    const V v19 = parameters[4] * v16;
-    const V v20 = v16 * v1;
-    const V v21 = v16 * v16;
-    const V v22 = v17 * v17;
-    const V v23 = parameters[6] * v16;
-    const V v24 = parameters[6] * v17;
-    const V v25 = v22 + v21;
-    const V v26 = v22 * v22;
-    const V v27 = v26 * v18;
-    const V v28 = v26 * v27;
-    const V v29 = v17 * v26;
-    const V v30 = v29 * v29;
-    const V v31 = v17 * v30;
-    const V v32 = softehl_vsqrt(v25);
-    const V v33 = parameters[6] * v32;
-    const V v34 = parameters[7] * v33;
-    const V v35 = v25 * v25;
-    const V v36 = 1.0 / v25;
-    const V v37 = 4.0 * v25;
-    const V v38 = softehl_vsqrt(v36);
-    const V v39 = 0.5 * v38;
-    const V v40 = v39 * v23;
-    const V v41 = v39 * v24;
-    const V v42 = v35 * v37;
-    const V v43 = v35 * v35;
-    const V v44 = 1.0 / v43;
-    const V v45 = v44 * v28;
-    const V v46 = v44 * v30;
-    const V v47 = v21 + v46;
-    const V v48 = v44 * v44;
-    const V v49 = v16 * v30;
-    const V v50 = v48 * v49;
-    const V v51 = v48 * v31;
-    const V v52 = v42 * v50;
-    const V v53 = v42 * v51;
-    const V v54 = v16 - v52;
-    const V v55 = v52 - v16;
-    const V v56 = softehl_vsqrt(v47);
-    const V v57 = 1.0 / v56;
-    const V v58 = 1.0 / v47;
-    const V v59 = softehl_vsqrt(v58);
-    const V v60 = 0.5 * v59;
-    const V v61 = v57 * v57;
-    const V v62 = v61 * v60;
-    const V v63 = 0.08333333333333333 * v57;
-    const V v64 = v55 * v62;
-    const V v65 = v62 * v54;
-    const V v66 = v45 - v53;
-    const V v67 = v62 * v66;
-    const V v68 = v53 - v45;
-    const V v69 = v62 * v68;
-    V s70 = softehl_splat(0.0);
-    V s71 = softehl_splat(0.0);
-    V s72 = softehl_splat(0.0);
-    V s73 = softehl_splat(0.0);
-    V s74 = softehl_splat(0.0);
-    V s75 = softehl_splat(0.0);
-    V s76 = softehl_splat(0.0);
-    V s77 = softehl_splat(0.0);
-    V s78 = softehl_splat(0.0);
-    V s79 = softehl_splat(0.0);
-    V s80 = softehl_splat(0.0);
-    V s81 = softehl_splat(0.0);
-    V s82 = softehl_splat(0.0);
-    V s83 = softehl_splat(0.0);
-    V s84 = softehl_splat(0.0);
-    V s85 = softehl_splat(0.0);
-    V s86 = softehl_splat(0.0);
-    V s87 = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[5], v2 = 0.5 * parameters[1],
+        v3 = parameters[2] * parameters[3], v4 = 1.0 / parameters[7];
+    const V v5 = d1 + (X1 - parameters[0]), v6 = d3 + (X3 - parameters[0]);
+    const double v7 = 0.5 * parameters[4];
+    const V v8 = X3 + d3 - X1 - d1, v9 = 0.5 * (X2 + d2 - X0 - d0), v10 = 0.5 * v8,
+        v11 = parameters[4] * v9, v12 = v9 * v1, v13 = v9 * v9, v14 = v10 * v10, v15 = v14 + v13,
+        v16 = v14 * v14, v17 = v10 * v16, v18 = v17 * v17, v19 = softehl_vsqrt(v15),
+        v20 = parameters[6] * v19, v21 = parameters[7] * v20, v22 = v15 * v15,
+        v23 = softehl_vsqrt(1.0 / v15), v24 = 0.5 * v23, v25 = v24 * (parameters[6] * v9),
+        v26 = v24 * (parameters[6] * v10), v27 = v22 * (4.0 * v15), v28 = 1.0 / (v22 * v22),
+        v29 = v28 * (v16 * (v16 * (2.5 * v8))), v30 = v13 + v28 * v18, v31 = v28 * v28,
+        v32 = v27 * (v31 * (v9 * v18)), v33 = v27 * (v31 * (v10 * v18)), v34 = softehl_vsqrt(v30),
+        v35 = 1.0 / v34, v36 = softehl_vsqrt(1.0 / v30), v37 = v35 * v35 * (0.5 * v36),
+        v38 = 0.08333333333333333 * v35, v39 = (v32 - v9) * v37, v40 = v37 * (v9 - v32),
+        v41 = v37 * (v29 - v33), v42 = v37 * (v33 - v29);
+    V s43 = {0}, s44 = {0}, s45 = {0}, s46 = {0}, s47 = {0}, s48 = {0}, s49 = {0}, s50 = {0},
+        s51 = {0}, s52 = {0}, s53 = {0}, s54 = {0}, s55 = {0}, s56 = {0}, s57 = {0}, s58 = {0},
+        s59 = {0}, s60 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
         (void)p0, (void)p1;
-        const double v88 = 0.5 * w[0];
-        const double v89 = 0.5 - v88;
-        const double v90 = 0.5 + v88;
-        const V v91 = w[1] * v16;
-        const V v92 = p1 * v57;
-        const double v93 = v89 * w[1];
-        const double v94 = v90 * w[1];
-        const V v95 = 0.5 * v92;
-        const V v96 = v89 * v9;
-        const V v97 = v90 * v10;
-        const V v98 = v96 + v97;
-        const V v99 = parameters[0] + v98;
-        const V v100 = 0.5 * v98;
-        const V v101 = v99 * v1;
-        const V v102 = v5 * v95;
-        const V v103 = p1 * v100;
-        const V v104 = v5 * v103;
-        const V v105 = v100 * v92;
-        const V v106 = v100 * v57;
-        const V v107 = v5 * v105;
-        const V v108 = v5 * v106;
-        const V v109 = v107 * v107;
-        const M v110 = softehl_lt(v109, softehl_splat(1.0));
-        const V v111 = p0 * v101;
-        const V v112 = v91 * v111;
-        const V v113 = 0.5 * v111;
-        const V v114 = v93 * v113;
-        s70 += v114;
-        const V v115 = v94 * v113;
-        s71 += v115;
-        const V v116 = v90 * v112;
-        s72 += v116;
-        const V v117 = v89 * v112;
-        s73 += v117;
-        V v118 = softehl_splat(0.0);
-        V v119 = softehl_splat(0.0);
-        V v120 = softehl_splat(0.0);
-        V v121 = softehl_splat(0.0);
-        V v122 = softehl_splat(0.0);
-        V v123 = softehl_splat(0.0);
-        V v124 = softehl_splat(0.0);
-        V v125 = softehl_splat(0.0);
-        const M m126 = v110;
-        if (softehl_any(m126)) {
-            const V v127 = 2.0 * v107;
-            const V v128 = v108 * v127;
-            const V v129 = v104 * v127;
-            const V v130 = v102 * v127;
-            const V v131 = 1.9572941063391263e-20 * v109;
-            const V v132 = 2.5529923126162516e-21 * v109;
-            const V v133 = 8.22063524662433e-18 + v131;
-            const V v134 = 1.1743764638034756e-18 + v132;
-            const V v135 = v131 + v133;
-            const V v136 = v132 + v134;
-            const V v137 = v109 * v134;
-            const V v138 = 4.439143033177138e-16 + v137;
-            const V v139 = v109 * v133;
-            const V v140 = 2.8114572543455206e-15 + v139;
-            const V v141 = v109 * v138;
-            const V v142 = 1.34949948208585e-13 + v141;
-            const V v143 = v109 * v136;
-            const V v144 = v138 + v143;
-            const V v145 = v109 * v135;
-            const V v146 = v140 + v145;
-            const V v147 = v109 * v140;
-            const V v148 = 7.647163731819816e-13 + v147;
-            const V v149 = v109 * v142;
-            const V v150 = 3.2118087673643227e-11 + v149;
-            const V v151 = v109 * v150;
-            const V v152 = 5.7812557812557815e-09 + v151;
-            const V v153 = v109 * v152;
-            const V v154 = 7.515632515632515e-07 + v153;
-            const V v155 = v109 * v154;
-            const V v156 = 6.613756613756614e-05 + v155;
-            const V v157 = v109 * v156;
-            const V v158 = 0.0035714285714285713 + v157;
-            const V v159 = v109 * v158;
-            const V v160 = 0.1 + v159;
-            const V v161 = v128 * v146;
-            const V v162 = v129 * v146;
-            const V v163 = v130 * v146;
-            const V v164 = v148 * v128;
-            const V v165 = v148 * v129;
-            const V v166 = v148 * v130;
-            const V v167 = v109 * v148;
-            const V v168 = 1.6059043836821613e-10 + v167;
-            const V v169 = v109 * v161;
-            const V v170 = v164 + v169;
-            const V v171 = v109 * v162;
-            const V v172 = v165 + v171;
-            const V v173 = v109 * v163;
-            const V v174 = v166 + v173;
-            const V v175 = v142 * v128;
-            const V v176 = v142 * v129;
-            const V v177 = v142 * v130;
-            const V v178 = v128 * v144;
-            const V v179 = v129 * v144;
-            const V v180 = v130 * v144;
-            const V v181 = v109 * v178;
-            const V v182 = v175 + v181;
-            const V v183 = v109 * v179;
-            const V v184 = v176 + v183;
-            const V v185 = v168 * v128;
-            const V v186 = v109 * v180;
-            const V v187 = v177 + v186;
-            const V v188 = v168 * v129;
-            const V v189 = v109 * v170;
-            const V v190 = v185 + v189;
-            const V v191 = v168 * v130;
-            const V v192 = v109 * v168;
-            const V v193 = 2.505210838544172e-08 + v192;
-            const V v194 = v109 * v172;
-            const V v195 = v188 + v194;
-            const V v196 = v109 * v174;
-            const V v197 = v191 + v196;
-            const V v198 = v109 * v182;
-            const V v199 = v109 * v184;
-            const V v200 = v109 * v187;
-            const V v201 = v193 * v128;
-            const V v202 = v193 * v129;
-            const V v203 = v193 * v130;
-            const V v204 = v109 * v193;
-            const V v205 = 2.7557319223985893e-06 + v204;
-            const V v206 = v109 * v190;
-            const V v207 = v201 + v206;
-            const V v208 = v109 * v195;
-            const V v209 = v202 + v208;
-            const V v210 = v109 * v197;
-            const V v211 = v203 + v210;
-            const V v212 = v150 * v128;
-            const V v213 = v212 + v198;
-            const V v214 = v150 * v129;
-            const V v215 = v214 + v199;
-            const V v216 = v150 * v130;
-            const V v217 = v216 + v200;
-            const V v218 = v109 * v207;
-            const V v219 = v109 * v209;
-            const V v220 = v109 * v211;
-            const V v221 = v109 * v213;
-            const V v222 = v109 * v215;
-            const V v223 = v109 * v217;
-            const V v224 = v109 * v205;
-            const V v225 = 0.0001984126984126984 + v224;
-            const V v226 = v205 * v128;
-            const V v227 = v226 + v218;
-            const V v228 = v205 * v129;
-            const V v229 = v228 + v219;
-            const V v230 = v205 * v130;
-            const V v231 = v230 + v220;
-            const V v232 = v158 * v128;
-            const V v233 = v158 * v129;
-            const V v234 = v158 * v130;
-            const V v235 = v109 * v227;
-            const V v236 = v109 * v229;
-            const V v237 = v109 * v231;
-            const V v238 = v152 * v128;
-            const V v239 = v238 + v221;
-            const V v240 = v152 * v129;
-            const V v241 = v240 + v222;
-            const V v242 = v152 * v130;
-            const V v243 = v242 + v223;
-            const V v244 = v225 * v128;
-            const V v245 = v244 + v235;
-            const V v246 = v160 * v128;
-            const V v247 = v225 * v129;
-            const V v248 = v247 + v236;
-            const V v249 = v109 * v239;
-            const V v250 = v225 * v130;
-            const V v251 = v250 + v237;
-            const V v252 = v109 * v225;
-            const V v253 = 0.008333333333333333 + v252;
-            const V v254 = v109 * v241;
-            const V v255 = v109 * v243;
-            const V v256 = v109 * v245;
-            const V v257 = v109 * v248;
-            const V v258 = v109 * v251;
-            const V v259 = v160 * v129;
-            const V v260 = v160 * v130;
-            const V v261 = v109 * v160;
-            const V v262 = 1.0 + v261;
-            const V v263 = v253 * v128;
-            const V v264 = v263 + v256;
-            const V v265 = v253 * v129;
-            const V v266 = v265 + v257;
-            const V v267 = v154 * v128;
-            const V v268 = v267 + v249;
-            const V v269 = v154 * v129;
-            const V v270 = v269 + v254;
-            const V v271 = v154 * v130;
-            const V v272 = v271 + v255;
-            const V v273 = v253 * v130;
-            const V v274 = v273 + v258;
-            const V v275 = v109 * v253;
-            const V v276 = 0.16666666666666666 + v275;
-            const V v277 = v109 * v264;
-            const V v278 = v109 * v266;
-            const V v279 = v109 * v268;
-            const V v280 = v109 * v270;
-            const V v281 = v109 * v272;
-            const V v282 = v109 * v274;
-            const V v283 = v276 * v128;
-            const V v284 = v283 + v277;
-            const V v285 = v276 * v129;
-            const V v286 = v285 + v278;
-            const V v287 = v156 * v128;
-            const V v288 = v287 + v279;
-            const V v289 = v156 * v129;
-            const V v290 = v289 + v280;
-            const V v291 = v156 * v130;
-            const V v292 = v291 + v281;
-            const V v293 = v276 * v130;
-            const V v294 = v293 + v282;
-            const V v295 = v109 * v276;
-            const V v296 = 1.0 + v295;
-            const V v297 = 1.0 / v296;
-            const V v298 = v109 * v288;
-            const V v299 = v232 + v298;
-            const V v300 = v109 * v290;
-            const V v301 = v233 + v300;
-            const V v302 = v109 * v292;
-            const V v303 = v234 + v302;
-            const V v304 = v109 * v299;
-            const V v305 = v246 + v304;
-            const V v306 = v109 * v301;
-            const V v307 = v259 + v306;
-            const V v308 = v109 * v303;
-            const V v309 = v260 + v308;
-            const V v310 = v297 * v297;
-            const V v311 = v310 * v284;
-            const V v312 = -v311;
-            const V v313 = v310 * v286;
-            const V v314 = v310 * v294;
-            const V v315 = -v313;
-            const V v316 = -v314;
-            v118 = softehl_blend(m126, v297, v118);
-            v119 = softehl_blend(m126, v315, v119);
-            v120 = softehl_blend(m126, v316, v120);
-            v121 = softehl_blend(m126, v262, v121);
-            v122 = softehl_blend(m126, v312, v122);
-            v123 = softehl_blend(m126, v307, v123);
-            v124 = softehl_blend(m126, v309, v124);
-            v125 = softehl_blend(m126, v305, v125);
+        const double v61 = 0.5 * w[0], v62 = 0.5 - v61, v63 = 0.5 + v61;
+        const V v64 = p1 * v35;
+        const double v65 = v62 * w[1], v66 = v63 * w[1];
+        const V v67 = 0.5 * v64, v68 = v62 * v5 + v63 * v6, v69 = 0.5 * v68,
+            v70 = (parameters[0] + v68) * v1, v71 = v4 * v67, v72 = p1 * v69, v73 = v4 * v72,
+            v74 = v69 * v64, v75 = v69 * v35, v76 = v4 * v74, v77 = v4 * v75, v78 = v76 * v76;
+        const M v79 = softehl_lt(v78, softehl_splat(1.0));
+        const V v80 = p0 * v70, v81 = w[1] * v9 * v80, v82 = 0.5 * v80;
+        s43 += v65 * v82; s44 += v66 * v82; s45 += v63 * v81; s46 += v62 * v81;
+        V v83 = softehl_splat(0.0), v84 = softehl_splat(0.0), v85 = softehl_splat(0.0),
+            v86 = softehl_splat(0.0), v87 = softehl_splat(0.0), v88 = softehl_splat(0.0),
+            v89 = softehl_splat(0.0), v90 = softehl_splat(0.0);
+        const M m91 = v79;
+        if (softehl_any(m91)) {
+            const V v92 = 2.0 * v76, v93 = v77 * v92, v94 = v73 * v92, v95 = v71 * v92,
+                v96 = 1.9572941063391263e-20 * v78, v97 = 2.5529923126162516e-21 * v78,
+                v98 = 8.22063524662433e-18 + v96, v99 = 1.1743764638034756e-18 + v97,
+                v100 = 4.439143033177138e-16 + v78 * v99, v101 = 2.8114572543455206e-15 + v78 * v98,
+                v102 = 1.34949948208585e-13 + v78 * v100, v103 = v100 + v78 * (v97 + v99),
+                v104 = v101 + v78 * (v96 + v98), v105 = 7.647163731819816e-13 + v78 * v101,
+                v106 = 3.2118087673643227e-11 + v78 * v102,
+                v107 = 5.7812557812557815e-09 + v78 * v106,
+                v108 = 7.515632515632515e-07 + v78 * v107,
+                v109 = 6.613756613756614e-05 + v78 * v108,
+                v110 = 0.0035714285714285713 + v78 * v109, v111 = 0.1 + v78 * v110,
+                v112 = 1.6059043836821613e-10 + v78 * v105,
+                v113 = 2.505210838544172e-08 + v78 * v112,
+                v114 = 2.7557319223985893e-06 + v78 * v113,
+                v115 = v113 * v93 + v78 * (v112 * v93 + v78 * (v105 * v93 + v78 * (v93 * v104))),
+                v116 = v113 * v94 + v78 * (v112 * v94 + v78 * (v105 * v94 + v78 * (v94 * v104))),
+                v117 = v113 * v95 + v78 * (v112 * v95 + v78 * (v105 * v95 + v78 * (v95 * v104))),
+                v118 = 0.0001984126984126984 + v78 * v114,
+                v119 = v107 * v93 + v78 * (v106 * v93 + v78 * (v102 * v93 + v78 * (v93 * v103))),
+                v120 = v107 * v94 + v78 * (v106 * v94 + v78 * (v102 * v94 + v78 * (v94 * v103))),
+                v121 = v107 * v95 + v78 * (v106 * v95 + v78 * (v102 * v95 + v78 * (v95 * v103))),
+                v122 = 0.008333333333333333 + v78 * v118, v123 = 1.0 + v78 * v111,
+                v124 = v122 * v93 + v78 * (v118 * v93 + v78 * (v114 * v93 + v78 * v115)),
+                v125 = v122 * v94 + v78 * (v118 * v94 + v78 * (v114 * v94 + v78 * v116)),
+                v126 = v122 * v95 + v78 * (v118 * v95 + v78 * (v114 * v95 + v78 * v117)),
+                v127 = 0.16666666666666666 + v78 * v122, v128 = 1.0 / (1.0 + v78 * v127),
+                v129 = v110 * v93 + v78 * (v109 * v93 + v78 * (v108 * v93 + v78 * v119)),
+                v130 = v110 * v94 + v78 * (v109 * v94 + v78 * (v108 * v94 + v78 * v120)),
+                v131 = v110 * v95 + v78 * (v109 * v95 + v78 * (v108 * v95 + v78 * v121)),
+                v132 = v111 * v93 + v78 * v129, v133 = v111 * v94 + v78 * v130,
+                v134 = v111 * v95 + v78 * v131, v135 = v128 * v128,
+                v136 = -(v135 * (v127 * v93 + v78 * v124)),
+                v137 = -(v135 * (v127 * v94 + v78 * v125)),
+                v138 = -(v135 * (v127 * v95 + v78 * v126));
+            v83 = softehl_blend(m91, v128, v83); v84 = softehl_blend(m91, v137, v84);
+            v85 = softehl_blend(m91, v138, v85); v86 = softehl_blend(m91, v123, v86);
+            v87 = softehl_blend(m91, v136, v87); v88 = softehl_blend(m91, v133, v88);
+            v89 = softehl_blend(m91, v134, v89); v90 = softehl_blend(m91, v132, v90);
         }
-        const M m317 = ~v110;
-        if (softehl_any(m317)) {
-            const V v318 = softehl_vsinh(v107);
-            const V v319 = 3.0 * v107;
-            const V v320 = softehl_vcosh(v107);
-            const V v321 = v107 * v109;
-            const V v322 = 3.0 * v109;
-            const V v323 = 1.0 / v318;
-            const V v324 = 1.0 / v321;
-            const V v325 = v319 * v320;
-            const V v326 = v318 * v319;
-            const V v327 = 3.0 * v318;
-            const V v328 = v325 - v327;
-            const V v329 = v320 * v108;
-            const V v330 = v104 * v320;
-            const V v331 = v320 * v102;
-            const V v332 = 3.0 * v320;
-            const V v333 = v332 + v326;
-            const V v334 = v107 * v329;
-            const V v335 = v328 * v108;
-            const V v336 = v104 * v328;
-            const V v337 = v328 * v102;
-            const V v338 = v107 * v330;
-            const V v339 = v107 * v331;
-            const V v340 = v108 * v333;
-            const V v341 = v104 * v333;
-            const V v342 = v102 * v333;
-            const V v343 = 3.0 * v330;
-            const V v344 = v341 - v343;
-            const V v345 = 3.0 * v331;
-            const V v346 = v342 - v345;
-            const V v347 = v322 * v335;
-            const V v348 = v322 * v336;
-            const V v349 = v322 * v337;
-            const V v350 = 3.0 * v329;
-            const V v351 = v340 - v350;
-            const V v352 = v107 * v323;
-            const V v353 = v323 * v108;
-            const V v354 = v104 * v323;
-            const V v355 = v323 * v102;
-            const V v356 = v323 * v323;
-            const V v357 = v328 * v324;
-            const V v358 = v324 * v351;
-            const V v359 = v324 * v344;
-            const V v360 = v324 * v346;
-            const V v361 = v324 * v324;
-            const V v362 = v356 * v334;
-            const V v363 = v353 - v362;
-            const V v364 = v356 * v338;
-            const V v365 = v354 - v364;
-            const V v366 = v356 * v339;
-            const V v367 = v355 - v366;
-            const V v368 = v361 * v347;
-            const V v369 = v358 - v368;
-            const V v370 = v361 * v348;
-            const V v371 = v359 - v370;
-            const V v372 = v361 * v349;
-            const V v373 = v360 - v372;
-            v118 = softehl_blend(m317, v352, v118);
-            v119 = softehl_blend(m317, v365, v119);
-            v120 = softehl_blend(m317, v367, v120);
-            v121 = softehl_blend(m317, v357, v121);
-            v122 = softehl_blend(m317, v363, v122);
-            v123 = softehl_blend(m317, v371, v123);
-            v124 = softehl_blend(m317, v373, v124);
-            v125 = softehl_blend(m317, v369, v125);
+        const M m139 = ~v79;
+        if (softehl_any(m139)) {
+            const V v140 = softehl_vsinh(v76), v141 = 3.0 * v76, v142 = softehl_vcosh(v76),
+                v143 = 3.0 * v78, v144 = 1.0 / v140, v145 = 1.0 / (v76 * v78),
+                v146 = v141 * v142 - 3.0 * v140, v147 = v142 * v77, v148 = v73 * v142,
+                v149 = v142 * v71, v150 = 3.0 * v142 + v140 * v141, v151 = v76 * v144,
+                v152 = v144 * v144, v153 = v146 * v145, v154 = v145 * v145,
+                v155 = v144 * v77 - v152 * (v76 * v147), v156 = v73 * v144 - v152 * (v76 * v148),
+                v157 = v144 * v71 - v152 * (v76 * v149),
+                v158 = v145 * (v77 * v150 - 3.0 * v147) - v154 * (v143 * (v146 * v77)),
+                v159 = v145 * (v73 * v150 - 3.0 * v148) - v154 * (v143 * (v73 * v146)),
+                v160 = v145 * (v71 * v150 - 3.0 * v149) - v154 * (v143 * (v146 * v71));
+            v83 = softehl_blend(m139, v151, v83); v84 = softehl_blend(m139, v156, v84);
+            v85 = softehl_blend(m139, v157, v85); v86 = softehl_blend(m139, v153, v86);
+            v87 = softehl_blend(m139, v155, v87); v88 = softehl_blend(m139, v159, v88);
+            v89 = softehl_blend(m139, v160, v89); v90 = softehl_blend(m139, v158, v90);
         }
-        const V v374 = p0 * parameters[3];
-        const V v375 = -p0;
-        const V v376 = p0 * v17;
-        const V v377 = p0 * v20;
-        const V v378 = softehl_vexp(v374);
-        const M v379 = softehl_lt(softehl_splat(0.0), v375);
-        const V v380 = parameters[7] * v98;
-        const V v381 = 1.0 / v380;
-        const V v382 = v89 * v377;
-        const V v383 = v90 * v377;
-        const V v384 = parameters[2] * v378;
-        const V v385 = v33 * v101;
-        const V v386 = parameters[1] * v384;
-        const V v387 = v93 * v382;
-        s76 += v387;
-        const V v388 = v93 * v383;
-        s77 += v388;
-        const V v389 = v94 * v382;
-        s78 += v389;
-        const V v390 = v94 * v383;
-        s79 += v390;
-        const V v391 = v386 * v118;
-        const V v392 = v386 * v381;
-        const V v393 = v381 * v391;
-        const V v394 = softehl_vasinh(v393);
-        const V v395 = v393 * v393;
-        const V v396 = 1.0 + v395;
-        const V v397 = softehl_vsqrt(v396);
-        const V v398 = 1.0 / v397;
-        const V v399 = parameters[7] * v394;
-        const V v400 = parameters[7] * v398;
-        const V v401 = parameters[7] * v381;
-        const V v402 = v381 * v401;
-        const V v403 = v392 * v119;
-        const V v404 = v392 * v120;
-        const V v405 = v402 * v391;
-        const V v406 = v404 - v405;
-        const V v407 = v400 * v403;
-        const V v408 = v400 * v406;
-        const V v409 = v407 - v103;
-        const V v410 = v409 * v385;
-        const V v411 = v408 - v95;
-        const V v412 = v399 - v105;
-        const V v413 = v33 * v412;
-        const V v414 = v376 - v413;
-        const V v415 = v105 - v399;
-        const V v416 = v101 * v415;
-        const V v417 = v64 * v410;
-        const V v418 = v69 * v410;
-        const V v419 = v65 * v410;
-        const V v420 = v67 * v410;
-        const V v421 = v113 + v420;
-        const V v422 = w[1] * v414;
-        const V v423 = v1 * v414;
-        const V v424 = v411 * v385;
-        const V v425 = v423 - v424;
-        const V v426 = v101 * v422;
-        const V v427 = v418 - v113;
-        const V v428 = v89 * v425;
-        const V v429 = v428 + v427;
-        const V v430 = v90 * v425;
-        const V v431 = v430 + v421;
-        const V v432 = v90 * v426;
-        s74 += v432;
-        const V v433 = v89 * v426;
-        s75 += v433;
-        const V v434 = v40 * v416;
-        const V v435 = v41 * v416;
-        const V v436 = v417 - v434;
-        const V v437 = v434 + v419;
-        const V v438 = v429 - v435;
-        const V v439 = v435 + v431;
-        const V v440 = v93 * v436;
-        s80 += v440;
-        const V v441 = v94 * v436;
-        s82 += v441;
-        const V v442 = v93 * v437;
-        s81 += v442;
-        const V v443 = v94 * v437;
-        s83 += v443;
-        const V v444 = v93 * v438;
-        s84 += v444;
-        const V v445 = v93 * v439;
-        s85 += v445;
-        const V v446 = v94 * v438;
-        s86 += v446;
-        const V v447 = v94 * v439;
-        s87 += v447;
-        V v448 = softehl_splat(0.0);
-        V v449 = softehl_splat(0.0);
-        V v450 = softehl_splat(0.0);
-        V v451 = softehl_splat(0.0);
-        const M m452 = v379;
-        if (softehl_any(m452)) {
-            const V v453 = p0 * v12;
-            const V v454 = w[1] * v19;
-            const V v455 = w[1] * v453;
-            const V v456 = -v454;
-            const V v457 = -v455;
-            v448 = softehl_blend(m452, v375, v448);
-            v449 = softehl_blend(m452, v455, v449);
-            v450 = softehl_blend(m452, v457, v450);
-            v451 = softehl_blend(m452, v456, v451);
+        const V v161 = -p0, v162 = p0 * v12, v163 = softehl_vexp(p0 * parameters[3]);
+        const M v164 = softehl_lt(softehl_splat(0.0), v161);
+        const V v165 = 1.0 / (parameters[7] * v68), v166 = v62 * v162, v167 = v63 * v162,
+            v168 = parameters[2] * v163, v169 = v20 * v70, v170 = parameters[1] * v168;
+        s49 += v65 * v166; s50 += v65 * v167; s51 += v66 * v166; s52 += v66 * v167;
+        const V v171 = v170 * v83, v172 = v170 * v165, v173 = v165 * v171,
+            v174 = softehl_vasinh(v173), v175 = 1.0 + v173 * v173, v176 = softehl_vsqrt(v175),
+            v177 = 1.0 / v176, v178 = parameters[7] * v174, v179 = parameters[7] * v177,
+            v180 = v172 * v84, v181 = v172 * v85 - v165 * (parameters[7] * v165) * v171,
+            v182 = (v179 * v180 - v72) * v169, v183 = p0 * v10 - v20 * (v178 - v74),
+            v184 = v70 * (v74 - v178), v185 = v1 * v183 - (v179 * v181 - v67) * v169,
+            v186 = v70 * (w[1] * v183);
+        s47 += v63 * v186; s48 += v62 * v186;
+        const V v187 = v25 * v184, v188 = v26 * v184, v189 = v39 * v182 - v187,
+            v190 = v187 + v40 * v182, v191 = v62 * v185 + (v42 * v182 - v82) - v188,
+            v192 = v188 + (v63 * v185 + (v82 + v41 * v182));
+        s53 += v65 * v189; s55 += v66 * v189; s54 += v65 * v190; s56 += v66 * v190;
+        const V v193 = v65 * v191; s57 += v193; const V v194 = v65 * v192; s58 += v194;
+        const V v195 = v66 * v191; s59 += v195; const V v196 = v66 * v192; s60 += v196;
+        V v197 = softehl_splat(0.0), v198 = softehl_splat(0.0), v199 = softehl_splat(0.0),
+            v200 = softehl_splat(0.0);
+        const M m201 = v164;
+        if (softehl_any(m201)) {
+            const V v202 = w[1] * (p0 * v7), v203 = -(w[1] * v11), v204 = -v202;
+            v197 = softehl_blend(m201, v161, v197); v198 = softehl_blend(m201, v202, v198);
+            v199 = softehl_blend(m201, v204, v199); v200 = softehl_blend(m201, v203, v200);
         }
-        const V v458 = 1.0 / v384;
-        const V v459 = v448 * v19;
-        const V v460 = 0.08333333333333333 * p1;
-        const V v461 = v378 * v3;
-        const V v462 = 2.0 * v393;
-        const V v463 = 1.0 / v396;
-        const V v464 = v398 * v34;
-        const V v465 = w[1] * v459;
-        const V v466 = w[1] * v64;
-        const V v467 = w[1] * v65;
-        const V v468 = v392 * v122;
-        const V v469 = v98 * v98;
-        const V v470 = parameters[1] * v381;
-        const V v471 = parameters[1] * v100;
-        const V v472 = v98 * v469;
-        const V v473 = v470 * v118;
-        const V v474 = 0.08333333333333333 * v92;
-        const V v475 = 0.25 * v92;
-        const V v476 = v469 * v475;
-        const V v477 = v400 * v468;
-        const V v478 = v472 * v474;
-        const V v479 = v477 - v106;
-        const V v480 = softehl_vsqrt(v463);
-        const V v481 = v472 * v460;
-        const V v482 = v472 * v63;
-        const V v483 = v479 * v385;
-        const V v484 = v461 * v473;
-        const V v485 = v458 * v461;
-        const V v486 = w[1] * v458;
-        const V v487 = v16 * v101;
-        const V v488 = v397 * v476;
-        const V v489 = v397 * v482;
-        const V v490 = v481 * v397;
-        const V v491 = v478 * v397;
-        const V v492 = v478 * v462;
-        const V v493 = v478 * v121;
-        const V v494 = v462 * v493;
-        const V v495 = v484 * v464;
-        const V v496 = v17 - v495;
-        const V v497 = v101 * v496;
-        const V v498 = v491 * v121;
-        const V v499 = v93 * v487;
-        const V v500 = v94 * v487;
-        const V v501 = v491 * v125;
-        const V v502 = v491 * v123;
-        const V v503 = v491 * v124;
-        const V v504 = -v499;
-        const V v505 = -v500;
-        const V v506 = v498 * v485;
-        const V v507 = v93 * v483;
-        const V v508 = v94 * v483;
-        const V v509 = v93 * v497;
-        const V v510 = v94 * v497;
-        const V v511 = -v507;
-        const V v512 = -v508;
-        const V v513 = v458 * v498;
-        const V v514 = v471 - v513;
-        const V v515 = w[1] * v514;
-        const V v516 = 0.5 * v480;
-        const V v517 = v516 * v492;
-        const V v518 = v516 * v494;
-        const V v519 = v484 * v518;
-        const V v520 = v506 - v519;
-        const V v521 = v458 * v520;
-        const V v522 = w[1] * v521;
-        const V v523 = v517 * v468;
-        const V v524 = v489 + v523;
-        const V v525 = v121 * v524;
-        const V v526 = v525 + v501;
-        const V v527 = v486 * v526;
-        const V v528 = -v527;
-        const V v529 = v517 * v403;
-        const V v530 = v490 + v529;
-        const V v531 = v121 * v530;
-        const V v532 = v531 + v502;
-        const V v533 = v458 * v532;
-        const V v534 = v517 * v406;
-        const V v535 = v488 + v534;
-        const V v536 = v121 * v535;
-        const V v537 = v536 + v503;
-        const V v538 = v458 * v537;
-        const V v539 = v2 - v538;
-        const V v540 = v466 * v533;
-        const V v541 = v467 * v533;
-        const V v542 = v89 * v539;
-        const V v543 = v90 * v539;
-        const V v544 = v69 * v533;
-        const V v545 = v542 + v544;
-        const V v546 = v67 * v533;
-        const V v547 = v543 + v546;
-        const V v548 = w[1] * v545;
-        const V v549 = w[1] * v547;
+        const V v205 = 1.0 / v168, v206 = v163 * v3, v207 = 2.0 * v173, v208 = w[1] * (v197 * v11),
+            v209 = v172 * v87, v210 = v68 * v68, v211 = v68 * v210,
+            v212 = v211 * (0.08333333333333333 * v64), v213 = softehl_vsqrt(1.0 / v175),
+            v214 = (v179 * v209 - v75) * v169, v215 = v206 * (parameters[1] * v165 * v83),
+            v216 = v9 * v70, v217 = v212 * v176, v218 = v70 * (v10 - v215 * (v177 * v21)),
+            v219 = v217 * v86, v220 = -(v65 * v216), v221 = -(v66 * v216), v222 = v65 * v218,
+            v223 = v66 * v218, v224 = -(v65 * v214), v225 = -(v66 * v214),
+            v226 = w[1] * (parameters[1] * v69 - v205 * v219), v227 = 0.5 * v213,
+            v228 = v227 * (v212 * v207),
+            v229 = v205 * (v219 * (v205 * v206) - v215 * (v227 * (v207 * (v212 * v86)))),
+            v230 = w[1] * v229,
+            v231 = w[1] * v205 * (v86 * (v176 * (v211 * v38) + v228 * v209) + v217 * v90),
+            v232 = -v231,
+            v233 = v86 * (v211 * (0.08333333333333333 * p1) * v176 + v228 * v180) + v217 * v88,
+            v234 = v205 * v233,
+            v235 = v205 * (v86 * (v176 * (v210 * (0.25 * v64)) + v228 * v181) + v217 * v89),
+            v236 = v2 - v235, v237 = w[1] * v39 * v234, v238 = w[1] * v40 * v234,
+            v239 = w[1] * (v62 * v236 + v42 * v234), v240 = w[1] * (v63 * v236 + v41 * v234);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            const double N = B[2 * i], D = B[2 * i + 1];
-            (void)N, (void)D;
-            R_lanes[4 + i] += N * v465 + D * v515;
-            K_lanes[(4 + i) * (4 + modes) + 0] += N * v449 + D * v540;
-            K_lanes[0 * (4 + modes) + 4 + i] += N * v509 + D * v511;
-            K_lanes[(4 + i) * (4 + modes) + 1] += D * v548;
-            K_lanes[1 * (4 + modes) + 4 + i] += N * v504;
-            K_lanes[(4 + i) * (4 + modes) + 2] += N * v450 + D * v541;
-            K_lanes[2 * (4 + modes) + 4 + i] += N * v510 + D * v512;
-            K_lanes[(4 + i) * (4 + modes) + 3] += D * v549;
-            K_lanes[3 * (4 + modes) + 4 + i] += N * v505;
-            const V r0 = N * v451 + D * v522;
-            const V r1 = D * v528;
+            const double N = B[2 * i], D = B[2 * i + 1]; (void)N, (void)D;
+            R_lanes[4 + i] += N * v208 + D * v226;
+            K_lanes[(4 + i) * (4 + modes) + 0] += N * v198 + D * v237;
+            K_lanes[0 * (4 + modes) + 4 + i] += N * v222 + D * v224;
+            K_lanes[(4 + i) * (4 + modes) + 1] += D * v239;
+            K_lanes[1 * (4 + modes) + 4 + i] += N * v220;
+            K_lanes[(4 + i) * (4 + modes) + 2] += N * v199 + D * v238;
+            K_lanes[2 * (4 + modes) + 4 + i] += N * v223 + D * v225;
+            K_lanes[(4 + i) * (4 + modes) + 3] += D * v240;
+            K_lanes[3 * (4 + modes) + 4 + i] += N * v221;
+            const V r0 = N * v200 + D * v230, r1 = D * v232;
             for (ptrdiff_t j = 0; j < modes; ++j)
                 K_lanes[(4 + i) * (4 + modes) + 4 + j] += r0 * B[2 * j] + r1 * B[2 * j + 1];
         }
     }
-    const V v550 = -s70;
-    const V v551 = -s71;
-    const V v552 = -s72;
-    const V v553 = -s73;
-    const V v554 = -s76;
-    const V v555 = -s77;
-    const V v556 = -s78;
-    const V v557 = -s79;
-    R_lanes[0] = s75;
-    R_lanes[1] = v553;
-    R_lanes[2] = s74;
-    R_lanes[3] = v552;
-    K_lanes[0 * (4 + modes) + 0] = s80;
-    K_lanes[0 * (4 + modes) + 1] = s84;
-    K_lanes[0 * (4 + modes) + 2] = s81;
-    K_lanes[0 * (4 + modes) + 3] = s85;
-    K_lanes[1 * (4 + modes) + 0] = s70;
-    K_lanes[1 * (4 + modes) + 1] = v554;
-    K_lanes[1 * (4 + modes) + 2] = v550;
-    K_lanes[1 * (4 + modes) + 3] = v555;
-    K_lanes[2 * (4 + modes) + 0] = s82;
-    K_lanes[2 * (4 + modes) + 1] = s86;
-    K_lanes[2 * (4 + modes) + 2] = s83;
-    K_lanes[2 * (4 + modes) + 3] = s87;
-    K_lanes[3 * (4 + modes) + 0] = s71;
-    K_lanes[3 * (4 + modes) + 1] = v556;
-    K_lanes[3 * (4 + modes) + 2] = v551;
-    K_lanes[3 * (4 + modes) + 3] = v557;
+    const V v241 = -s43, v242 = -s44, v243 = -s45, v244 = -s46, v245 = -s49, v246 = -s50,
+        v247 = -s51, v248 = -s52;
+    R_lanes[0] = s48; R_lanes[1] = v244; R_lanes[2] = s47; R_lanes[3] = v243;
+    K_lanes[0 * (4 + modes) + 0] = s53; K_lanes[0 * (4 + modes) + 1] = s57;
+    K_lanes[0 * (4 + modes) + 2] = s54; K_lanes[0 * (4 + modes) + 3] = s58;
+    K_lanes[1 * (4 + modes) + 0] = s43; K_lanes[1 * (4 + modes) + 1] = v245;
+    K_lanes[1 * (4 + modes) + 2] = v241; K_lanes[1 * (4 + modes) + 3] = v246;
+    K_lanes[2 * (4 + modes) + 0] = s55; K_lanes[2 * (4 + modes) + 1] = s59;
+    K_lanes[2 * (4 + modes) + 2] = s56; K_lanes[2 * (4 + modes) + 3] = s60;
+    K_lanes[3 * (4 + modes) + 0] = s44; K_lanes[3 * (4 + modes) + 1] = v247;
+    K_lanes[3 * (4 + modes) + 2] = v242; K_lanes[3 * (4 + modes) + 3] = v248;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
     softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_eyring_tangent, 4, (4 + modes), 0, 0, (4 + modes), ((4 + modes) * (4 + modes)))
 
-void softehl_film_eyring_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_eyring_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_eyring_tangent_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (4 + modes) * e, tangent + ((4 + modes) * (4 + modes)) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_eyring_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), tangent + ((4 + modes) * (4 + modes)) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    double K[SOFTEHL_LANES * ((4 + modes) * (4 + modes))];
-    softehl_film_eyring_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_film_eyring_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -1013,177 +341,53 @@ static void softehl_film_eyring_fields_group(
     softehl_gather(d_lanes, d, (4 + modes));
 #endif
     const double v1 = 1.0 / parameters[7];
-    const V v2 = X2 + d2;
-    const V v3 = X0 + d0;
-    const V v4 = X1 - parameters[0];
-    const V v5 = X3 - parameters[0];
-    const V v6 = d1 + v4;
-    const V v7 = v2 - X0;
-    const V v8 = v7 - d0;
-    const V v9 = X3 + d3;
-    const V v10 = 0.5 * v8;
-    const V v11 = d3 + v5;
-    const V v12 = v9 - X1;
-    const V v13 = v12 - d1;
-    const V v14 = 0.5 * v13;
-    const V v15 = v10 * v10;
-    const V v16 = v14 * v14;
-    const V v17 = v14 * v16;
-    const V v18 = v16 * v17;
-    const V v19 = v16 + v15;
-    const V v20 = v19 * v19;
-    const V v21 = v20 * v20;
-    const V v22 = 1.0 / v21;
-    const V v23 = v22 * v18;
-    const V v24 = v18 * v23;
-    const V v25 = v15 + v24;
-    const V v26 = softehl_vsqrt(v25);
-    const V v27 = 1.0 / v26;
+    const V v2 = X2 + d2, v3 = X0 + d0, v4 = d1 + (X1 - parameters[0]), v5 = 0.5 * (v2 - X0 - d0),
+        v6 = d3 + (X3 - parameters[0]), v7 = 0.5 * (X3 + d3 - X1 - d1), v8 = v5 * v5, v9 = v7 * v7,
+        v10 = v9 * (v7 * v9), v11 = v9 + v8, v12 = v11 * v11,
+        v13 = softehl_vsqrt(v8 + v10 * (1.0 / (v12 * v12) * v10)), v14 = 1.0 / v13;
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        const double v28 = 0.5 * w[0];
-        const V v29 = p1 * v27;
-        const V v30 = w[1] * v10;
-        const double v31 = 0.5 - v28;
-        const double v32 = 0.5 + v28;
-        const V v33 = v32 * v2;
-        const V v34 = v32 * v11;
-        const V v35 = v31 * v3;
-        const V v36 = v33 + v35;
-        const V v37 = v31 * v6;
-        const V v38 = v37 + v34;
-        const V v39 = 0.5 * v38;
-        const V v40 = v39 * v29;
-        const V v41 = v1 * v40;
-        const V v42 = v41 * v41;
-        const M v43 = softehl_lt(v42, softehl_splat(1.0));
-        V v44 = softehl_splat(0.0);
-        V v45 = softehl_splat(0.0);
-        const M m46 = v43;
-        if (softehl_any(m46)) {
-            const V v47 = 1.9572941063391263e-20 * v42;
-            const V v48 = 8.22063524662433e-18 + v47;
-            const V v49 = v42 * v48;
-            const V v50 = 2.8114572543455206e-15 + v49;
-            const V v51 = 2.5529923126162516e-21 * v42;
-            const V v52 = 1.1743764638034756e-18 + v51;
-            const V v53 = v42 * v52;
-            const V v54 = 4.439143033177138e-16 + v53;
-            const V v55 = v42 * v50;
-            const V v56 = 7.647163731819816e-13 + v55;
-            const V v57 = v42 * v56;
-            const V v58 = 1.6059043836821613e-10 + v57;
-            const V v59 = v42 * v58;
-            const V v60 = 2.505210838544172e-08 + v59;
-            const V v61 = v42 * v54;
-            const V v62 = 1.34949948208585e-13 + v61;
-            const V v63 = v42 * v60;
-            const V v64 = 2.7557319223985893e-06 + v63;
-            const V v65 = v42 * v62;
-            const V v66 = 3.2118087673643227e-11 + v65;
-            const V v67 = v42 * v66;
-            const V v68 = 5.7812557812557815e-09 + v67;
-            const V v69 = v42 * v68;
-            const V v70 = 7.515632515632515e-07 + v69;
-            const V v71 = v42 * v70;
-            const V v72 = 6.613756613756614e-05 + v71;
-            const V v73 = v42 * v72;
-            const V v74 = 0.0035714285714285713 + v73;
-            const V v75 = v42 * v74;
-            const V v76 = 0.1 + v75;
-            const V v77 = v42 * v64;
-            const V v78 = 0.0001984126984126984 + v77;
-            const V v79 = v42 * v78;
-            const V v80 = 0.008333333333333333 + v79;
-            const V v81 = v42 * v80;
-            const V v82 = 0.16666666666666666 + v81;
-            const V v83 = v42 * v82;
-            const V v84 = 1.0 + v83;
-            const V v85 = 1.0 / v84;
-            const V v86 = v42 * v76;
-            const V v87 = 1.0 + v86;
-            v44 = softehl_blend(m46, v85, v44);
-            v45 = softehl_blend(m46, v87, v45);
+        (void)p0, (void)p1; const double v15 = 0.5 * w[0];
+        const V v16 = p1 * v14, v17 = w[1] * v5;
+        const double v18 = 0.5 - v15, v19 = 0.5 + v15;
+        const V v20 = v19 * v2 + v18 * v3, v21 = v18 * v4 + v19 * v6, v22 = 0.5 * v21,
+            v23 = v22 * v16, v24 = v1 * v23, v25 = v24 * v24;
+        const M v26 = softehl_lt(v25, softehl_splat(1.0));
+        V v27 = softehl_splat(0.0), v28 = softehl_splat(0.0);
+        const M m29 = v26;
+        if (softehl_any(m29)) {
+            const V v30 = 2.8114572543455206e-15 + v25 * (8.22063524662433e-18 + 1.9572941063391263e-20 * v25),
+                v31 = 4.439143033177138e-16 + v25 * (1.1743764638034756e-18 + 2.5529923126162516e-21 * v25),
+                v32 = 1.6059043836821613e-10 + v25 * (7.647163731819816e-13 + v25 * v30),
+                v33 = 2.7557319223985893e-06 + v25 * (2.505210838544172e-08 + v25 * v32),
+                v34 = 3.2118087673643227e-11 + v25 * (1.34949948208585e-13 + v25 * v31),
+                v35 = 7.515632515632515e-07 + v25 * (5.7812557812557815e-09 + v25 * v34),
+                v36 = 0.0035714285714285713 + v25 * (6.613756613756614e-05 + v25 * v35),
+                v37 = v25 * (0.008333333333333333 + v25 * (0.0001984126984126984 + v25 * v33)),
+                v38 = 1.0 / (1.0 + v25 * (0.16666666666666666 + v37)),
+                v39 = 1.0 + v25 * (0.1 + v25 * v36);
+            v27 = softehl_blend(m29, v38, v27); v28 = softehl_blend(m29, v39, v28);
         }
-        const M m88 = ~v43;
-        if (softehl_any(m88)) {
-            const V v89 = softehl_vsinh(v41);
-            const V v90 = v41 * v42;
-            const V v91 = softehl_vcosh(v41);
-            const V v92 = 1.0 / v90;
-            const V v93 = 1.0 / v89;
-            const V v94 = v41 * v91;
-            const V v95 = v41 * v93;
-            const V v96 = v94 - v89;
-            const V v97 = 3.0 * v96;
-            const V v98 = v97 * v92;
-            v44 = softehl_blend(m88, v95, v44);
-            v45 = softehl_blend(m88, v98, v45);
+        const M m40 = ~v26;
+        if (softehl_any(m40)) {
+            const V v41 = softehl_vsinh(v24), v42 = softehl_vcosh(v24), v43 = v24 * (1.0 / v41),
+                v44 = 3.0 * (v24 * v42 - v41) * (1.0 / (v24 * v25));
+            v27 = softehl_blend(m40, v43, v27); v28 = softehl_blend(m40, v44, v28);
         }
-        const V v99 = p0 * parameters[3];
-        const V v100 = softehl_vexp(v99);
-        const V v101 = 0.08333333333333333 * v38;
-        const V v102 = parameters[7] * v38;
-        const V v103 = v38 * v101;
-        const V v104 = 1.0 / v102;
-        const V v105 = parameters[1] * v39;
-        const V v106 = v38 * v103;
-        const V v107 = parameters[2] * v100;
-        const V v108 = parameters[1] * v107;
-        const V v109 = v108 * v104;
-        const V v110 = 1.0 / v107;
-        const V v111 = v110 * v106;
-        const V v112 = v109 * v44;
-        const V v113 = v112 * v112;
-        const V v114 = 1.0 + v113;
-        const V v115 = softehl_vsqrt(v114);
-        const V v116 = softehl_vasinh(v112);
-        const V v117 = parameters[7] * v116;
-        const V v118 = v40 + v117;
-        const V v119 = v117 - v40;
-        const V v120 = v111 * v29;
-        const V v121 = v115 * v120;
-        const V v122 = v29 * v115;
-        const V v123 = v45 * v121;
-        const V v124 = v105 - v123;
-        const V v125 = v45 * v122;
-        softehl_store4(R + 9 * q + 0, (9 * points), v36, v30, v38, p0);
-        softehl_store4(R + 9 * q + 4, (9 * points), v119, v124, v118, v107);
-        softehl_store1(R + 9 * q + 8, (9 * points), v125);
+        const V v45 = softehl_vexp(p0 * parameters[3]), v46 = parameters[2] * v45,
+            v47 = parameters[1] * v46 * (1.0 / (parameters[7] * v21)) * v27,
+            v48 = softehl_vsqrt(1.0 + v47 * v47), v49 = softehl_vasinh(v47),
+            v50 = parameters[7] * v49, v51 = v23 + v50, v52 = v50 - v23,
+            v53 = v48 * (1.0 / v46 * (v21 * (v21 * (0.08333333333333333 * v21))) * v16),
+            v54 = parameters[1] * v22 - v28 * v53, v55 = v28 * (v16 * v48);
+        softehl_store4(R + 9 * q + 0, (9 * points), v20, v17, v21, p0);
+        softehl_store4(R + 9 * q + 4, (9 * points), v52, v54, v51, v46);
+        softehl_store1(R + 9 * q + 8, (9 * points), v55);
     }
 }
-
-void softehl_film_eyring_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_eyring_fields_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (9 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_eyring_fields_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (9 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double R[SOFTEHL_LANES * (9 * points)];
-    softehl_film_eyring_fields(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (9 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_eyring_fields, 4, (4 + modes), 0, 0, (9 * points), 0)

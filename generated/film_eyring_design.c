@@ -33,28 +33,16 @@ SOFTEHL_LANEWISE(cosh)
 
 SOFTEHL_LANEWISE(sinh)
 
-static void softehl_film_eyring_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_eyring_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 12, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 12, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11;
+    softehl_load4(t + 0, 12, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 12, &t4, &t5, &t6, &t7);
     softehl_load4(t + 8, 12, &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -70,427 +58,115 @@ static void softehl_film_eyring_pseudo_load_group(
 #endif
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
-    const double v1 = 1.0 / parameters[7];
-    const double v2 = 6.283185307179586 * parameters[5];
-    const V v3 = parameters[2] * t7;
-    const V v4 = X2 + d2;
-    const V v5 = 6.283185307179586 * t9;
-    const V v6 = t2 - t0;
-    const V v7 = 0.5 * v6;
-    const V v8 = X3 + d3;
-    const V v9 = X1 - parameters[0];
-    const V v10 = X3 - parameters[0];
-    const V v11 = d1 + v9;
-    const V v12 = d3 + v10;
-    const V v13 = v4 - X0;
-    const V v14 = v1 * t11;
-    const V v15 = v13 - d0;
-    const V v16 = parameters[4] * v7;
-    const V v17 = v8 - X1;
-    const V v18 = v17 - d1;
-    const V v19 = v15 * v7;
-    const V v20 = 0.5 * v15;
-    const double v21 = 0.5 * parameters[6];
-    const V v22 = 0.5 * v18;
-    const V v23 = 5.0 * v18;
-    const V v24 = t3 - t1;
-    const V v25 = v20 * t8;
-    const V v26 = v16 + v25;
-    const V v27 = v20 * v20;
-    const V v28 = 0.5 * v24;
-    const V v29 = v22 * v22;
-    const V v30 = t1 - t4;
-    const V v31 = t3 - t4;
-    const V v32 = v18 * v28;
-    const V v33 = v32 + v19;
-    const V v34 = v29 * v29;
-    const V v35 = v29 + v27;
-    const V v36 = v22 * v34;
-    const V v37 = v34 * v23;
-    const V v38 = v34 * v37;
-    const V v39 = softehl_vsqrt(v35);
-    const V v40 = v35 * v35;
-    const V v41 = 1.0 / v35;
-    const V v42 = 4.0 * v35;
-    const V v43 = v36 * v36;
-    const V v44 = v40 * v42;
-    const V v45 = v40 * v40;
-    const V v46 = v28 * v38;
-    const V v47 = 1.0 / v45;
-    const V v48 = parameters[6] * v39;
-    const V v49 = softehl_vsqrt(v41);
-    const V v50 = v49 * v21;
-    const V v51 = v47 * v44;
-    const V v52 = v43 * v51;
-    const V v53 = v47 * v43;
-    const V v54 = v27 + v53;
-    const V v55 = v33 * v52;
-    const V v56 = v46 - v55;
-    const V v57 = v47 * v56;
-    const V v58 = v19 + v57;
-    const V v59 = v33 * v50;
-    const V v60 = v39 * t10;
-    const V v61 = v60 + v59;
-    const V v62 = softehl_vsqrt(v54);
-    const V v63 = 1.0 / v62;
-    const V v64 = 1.0 / v54;
-    const V v65 = softehl_vsqrt(v64);
-    const V v66 = 0.5 * v63;
-    const V v67 = v63 * v66;
-    const V v68 = v65 * v67;
-    const V v69 = v58 * v68;
-    V s70 = softehl_splat(0.0);
-    V s71 = softehl_splat(0.0);
-    V s72 = softehl_splat(0.0);
-    V s73 = softehl_splat(0.0);
+    const double v1 = 1.0 / parameters[7], v2 = 6.283185307179586 * parameters[5];
+    const V v3 = parameters[2] * t7, v4 = 6.283185307179586 * t9, v5 = 0.5 * (t2 - t0),
+        v6 = d1 + (X1 - parameters[0]), v7 = d3 + (X3 - parameters[0]), v8 = v1 * t11,
+        v9 = X2 + d2 - X0 - d0, v10 = X3 + d3 - X1 - d1, v11 = v9 * v5, v12 = 0.5 * v9,
+        v13 = 0.5 * v10, v14 = parameters[4] * v5 + v12 * t8, v15 = v12 * v12,
+        v16 = 0.5 * (t3 - t1), v17 = v13 * v13, v18 = t1 - t4, v19 = t3 - t4, v20 = v10 * v16 + v11,
+        v21 = v17 * v17, v22 = v17 + v15, v23 = v13 * v21, v24 = softehl_vsqrt(v22),
+        v25 = v22 * v22, v26 = v23 * v23, v27 = 1.0 / (v25 * v25), v28 = parameters[6] * v24,
+        v29 = softehl_vsqrt(1.0 / v22), v30 = v15 + v27 * v26,
+        v31 = v16 * (v21 * (v21 * (5.0 * v10))) - v20 * (v26 * (v27 * (v25 * (4.0 * v22)))),
+        v32 = v24 * t10 + v20 * (v29 * (0.5 * parameters[6])), v33 = softehl_vsqrt(v30),
+        v34 = 1.0 / v33, v35 = softehl_vsqrt(1.0 / v30),
+        v36 = (v11 + v27 * v31) * (v35 * (v34 * (0.5 * v34)));
+    V s37 = {0}, s38 = {0}, s39 = {0}, s40 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
         (void)p0, (void)p1;
-        const double v74 = 0.5 * w[0];
-        const double v75 = 0.5 - v74;
-        const double v76 = 0.5 + v74;
-        const V v77 = p1 * v63;
-        const V v78 = p1 * v69;
-        const V v79 = v75 * v11;
-        const V v80 = v75 * v30;
-        const V v81 = v76 * v12;
-        const V v82 = v79 + v81;
-        const V v83 = parameters[0] + v82;
-        const V v84 = 0.5 * v82;
-        const V v85 = v76 * v31;
-        const V v86 = v80 + v85;
-        const V v87 = t4 + v86;
-        const V v88 = 0.5 * v86;
-        const V v89 = v77 * v88;
-        const V v90 = v84 * v77;
-        const V v91 = v84 * v78;
-        const V v92 = v89 - v91;
-        const V v93 = v90 * v14;
-        const V v94 = v92 - v93;
-        const V v95 = v2 * v87;
-        const V v96 = v83 * v2;
-        const V v97 = v83 * v5;
-        const V v98 = v95 + v97;
-        const V v99 = v96 * v7;
-        const V v100 = v20 * v98;
-        const V v101 = v99 + v100;
-        const V v102 = p0 * v101;
-        const V v103 = w[1] * v102;
-        const V v104 = v1 * v90;
-        const V v105 = v1 * v94;
-        const V v106 = v104 * v104;
-        const M v107 = softehl_lt(v106, softehl_splat(1.0));
-        const V v108 = v76 * v103;
-        s70 += v108;
-        const V v109 = v75 * v103;
-        s71 += v109;
-        V v110 = softehl_splat(0.0);
-        V v111 = softehl_splat(0.0);
-        V v112 = softehl_splat(0.0);
-        V v113 = softehl_splat(0.0);
-        const M m114 = v107;
-        if (softehl_any(m114)) {
-            const V v115 = 2.0 * v104;
-            const V v116 = 1.9572941063391263e-20 * v106;
-            const V v117 = 2.5529923126162516e-21 * v106;
-            const V v118 = v115 * v105;
-            const V v119 = 8.22063524662433e-18 + v116;
-            const V v120 = 1.1743764638034756e-18 + v117;
-            const V v121 = v116 + v119;
-            const V v122 = v106 * v119;
-            const V v123 = 2.8114572543455206e-15 + v122;
-            const V v124 = v117 + v120;
-            const V v125 = v106 * v120;
-            const V v126 = 4.439143033177138e-16 + v125;
-            const V v127 = v106 * v123;
-            const V v128 = 7.647163731819816e-13 + v127;
-            const V v129 = v106 * v121;
-            const V v130 = v123 + v129;
-            const V v131 = v106 * v124;
-            const V v132 = v106 * v126;
-            const V v133 = 1.34949948208585e-13 + v132;
-            const V v134 = v126 + v131;
-            const V v135 = v130 * v118;
-            const V v136 = v134 * v118;
-            const V v137 = v106 * v133;
-            const V v138 = 3.2118087673643227e-11 + v137;
-            const V v139 = v106 * v138;
-            const V v140 = 5.7812557812557815e-09 + v139;
-            const V v141 = v133 * v118;
-            const V v142 = v106 * v136;
-            const V v143 = v141 + v142;
-            const V v144 = v106 * v140;
-            const V v145 = 7.515632515632515e-07 + v144;
-            const V v146 = v128 * v118;
-            const V v147 = v106 * v128;
-            const V v148 = 1.6059043836821613e-10 + v147;
-            const V v149 = v106 * v135;
-            const V v150 = v146 + v149;
-            const V v151 = v138 * v118;
-            const V v152 = v106 * v143;
-            const V v153 = v151 + v152;
-            const V v154 = v106 * v145;
-            const V v155 = 6.613756613756614e-05 + v154;
-            const V v156 = v140 * v118;
-            const V v157 = v106 * v153;
-            const V v158 = v156 + v157;
-            const V v159 = v148 * v118;
-            const V v160 = v106 * v148;
-            const V v161 = 2.505210838544172e-08 + v160;
-            const V v162 = v106 * v150;
-            const V v163 = v159 + v162;
-            const V v164 = v106 * v155;
-            const V v165 = 0.0035714285714285713 + v164;
-            const V v166 = v145 * v118;
-            const V v167 = v106 * v158;
-            const V v168 = v166 + v167;
-            const V v169 = v106 * v165;
-            const V v170 = 0.1 + v169;
-            const V v171 = v161 * v118;
-            const V v172 = v106 * v161;
-            const V v173 = 2.7557319223985893e-06 + v172;
-            const V v174 = v106 * v163;
-            const V v175 = v171 + v174;
-            const V v176 = v155 * v118;
-            const V v177 = v106 * v168;
-            const V v178 = v176 + v177;
-            const V v179 = v165 * v118;
-            const V v180 = v106 * v178;
-            const V v181 = v179 + v180;
-            const V v182 = v106 * v175;
-            const V v183 = v173 * v118;
-            const V v184 = v183 + v182;
-            const V v185 = v106 * v173;
-            const V v186 = 0.0001984126984126984 + v185;
-            const V v187 = v106 * v184;
-            const V v188 = v186 * v118;
-            const V v189 = v188 + v187;
-            const V v190 = v106 * v189;
-            const V v191 = v106 * v181;
-            const V v192 = v106 * v186;
-            const V v193 = 0.008333333333333333 + v192;
-            const V v194 = v193 * v118;
-            const V v195 = v194 + v190;
-            const V v196 = v106 * v195;
-            const V v197 = v170 * v118;
-            const V v198 = v197 + v191;
-            const V v199 = v106 * v193;
-            const V v200 = 0.16666666666666666 + v199;
-            const V v201 = v200 * v118;
-            const V v202 = v201 + v196;
-            const V v203 = v106 * v200;
-            const V v204 = 1.0 + v203;
-            const V v205 = 1.0 / v204;
-            const V v206 = v106 * v170;
-            const V v207 = 1.0 + v206;
-            const V v208 = v205 * v205;
-            const V v209 = v208 * v202;
-            const V v210 = -v209;
-            v110 = softehl_blend(m114, v210, v110);
-            v111 = softehl_blend(m114, v205, v111);
-            v112 = softehl_blend(m114, v207, v112);
-            v113 = softehl_blend(m114, v198, v113);
+        const double v41 = 0.5 * w[0], v42 = 0.5 - v41, v43 = 0.5 + v41;
+        const V v44 = p1 * v34, v45 = p1 * v36, v46 = v42 * v6 + v43 * v7,
+            v47 = parameters[0] + v46, v48 = 0.5 * v46, v49 = v42 * v18 + v43 * v19,
+            v50 = 0.5 * v49, v51 = v44 * v50, v52 = v48 * v44, v53 = v48 * v45, v54 = v47 * v2,
+            v55 = v2 * (t4 + v49) + v47 * v4, v56 = w[1] * (p0 * (v54 * v5 + v12 * v55)),
+            v57 = v1 * v52, v58 = v1 * (v51 - v53 - v52 * v8), v59 = v57 * v57;
+        const M v60 = softehl_lt(v59, softehl_splat(1.0)); s37 += v43 * v56; s38 += v42 * v56;
+        V v61 = softehl_splat(0.0), v62 = softehl_splat(0.0), v63 = softehl_splat(0.0),
+            v64 = softehl_splat(0.0);
+        const M m65 = v60;
+        if (softehl_any(m65)) {
+            const V v66 = 1.9572941063391263e-20 * v59, v67 = 2.5529923126162516e-21 * v59,
+                v68 = 2.0 * v57 * v58, v69 = 8.22063524662433e-18 + v66,
+                v70 = 1.1743764638034756e-18 + v67, v71 = 2.8114572543455206e-15 + v59 * v69,
+                v72 = 4.439143033177138e-16 + v59 * v70, v73 = 7.647163731819816e-13 + v59 * v71,
+                v74 = 1.34949948208585e-13 + v59 * v72, v75 = 3.2118087673643227e-11 + v59 * v74,
+                v76 = 5.7812557812557815e-09 + v59 * v75, v77 = 7.515632515632515e-07 + v59 * v76,
+                v78 = 1.6059043836821613e-10 + v59 * v73,
+                v79 = v75 * v68 + v59 * (v74 * v68 + v59 * ((v72 + v59 * (v67 + v70)) * v68)),
+                v80 = 6.613756613756614e-05 + v59 * v77, v81 = 2.505210838544172e-08 + v59 * v78,
+                v82 = v78 * v68 + v59 * (v73 * v68 + v59 * ((v71 + v59 * (v66 + v69)) * v68)),
+                v83 = 0.0035714285714285713 + v59 * v80, v84 = 0.1 + v59 * v83,
+                v85 = 2.7557319223985893e-06 + v59 * v81,
+                v86 = v59 * (v80 * v68 + v59 * (v77 * v68 + v59 * (v76 * v68 + v59 * v79))),
+                v87 = 0.0001984126984126984 + v59 * v85,
+                v88 = v59 * (v87 * v68 + v59 * (v85 * v68 + v59 * (v81 * v68 + v59 * v82))),
+                v89 = 0.008333333333333333 + v59 * v87, v90 = v84 * v68 + v59 * (v83 * v68 + v86),
+                v91 = 0.16666666666666666 + v59 * v89, v92 = 1.0 / (1.0 + v59 * v91),
+                v93 = 1.0 + v59 * v84, v94 = -(v92 * v92 * (v91 * v68 + v59 * (v89 * v68 + v88)));
+            v61 = softehl_blend(m65, v94, v61); v62 = softehl_blend(m65, v92, v62);
+            v63 = softehl_blend(m65, v93, v63); v64 = softehl_blend(m65, v90, v64);
         }
-        const M m211 = ~v107;
-        if (softehl_any(m211)) {
-            const V v212 = softehl_vsinh(v104);
-            const V v213 = 3.0 * v104;
-            const V v214 = softehl_vcosh(v104);
-            const V v215 = v104 * v106;
-            const V v216 = 3.0 * v106;
-            const V v217 = 1.0 / v212;
-            const V v218 = 1.0 / v215;
-            const V v219 = v212 * v213;
-            const V v220 = v213 * v214;
-            const V v221 = 3.0 * v212;
-            const V v222 = v220 - v221;
-            const V v223 = v222 * v216;
-            const V v224 = v104 * v217;
-            const V v225 = v224 * v214;
-            const V v226 = 1.0 - v225;
-            const V v227 = v218 * v223;
-            const V v228 = v219 - v227;
-            const V v229 = v222 * v218;
-            const V v230 = v105 * v226;
-            const V v231 = v217 * v230;
-            const V v232 = v105 * v228;
-            const V v233 = v218 * v232;
-            v110 = softehl_blend(m211, v231, v110);
-            v111 = softehl_blend(m211, v224, v111);
-            v112 = softehl_blend(m211, v229, v112);
-            v113 = softehl_blend(m211, v233, v113);
+        const M m95 = ~v60;
+        if (softehl_any(m95)) {
+            const V v96 = softehl_vsinh(v57), v97 = 3.0 * v57, v98 = softehl_vcosh(v57),
+                v99 = 1.0 / v96, v100 = 1.0 / (v57 * v59), v101 = v97 * v98 - 3.0 * v96,
+                v102 = v57 * v99, v103 = v101 * v100, v104 = v99 * (v58 * (1.0 - v102 * v98)),
+                v105 = v100 * (v58 * (v96 * v97 - v100 * (v101 * (3.0 * v59))));
+            v61 = softehl_blend(m95, v104, v61); v62 = softehl_blend(m95, v102, v62);
+            v63 = softehl_blend(m95, v103, v63); v64 = softehl_blend(m95, v105, v64);
         }
-        const V v234 = p0 * parameters[3];
-        const V v235 = -p0;
-        const V v236 = p0 * v22;
-        const V v237 = softehl_vexp(v234);
-        const M v238 = softehl_lt(softehl_splat(0.0), v235);
-        const V v239 = p0 * v3;
-        const V v240 = t6 + v239;
-        const V v241 = p0 * v28;
-        const V v242 = v91 - v89;
-        const V v243 = parameters[7] * v86;
-        const V v244 = parameters[7] * v82;
-        const V v245 = 1.0 / v244;
-        const V v246 = v82 * t11;
-        const V v247 = v243 + v246;
-        const V v248 = v237 * v240;
-        const V v249 = parameters[2] * v237;
-        const V v250 = v249 * t5;
-        const V v251 = parameters[1] * v249;
-        const V v252 = parameters[1] * v248;
-        const V v253 = v250 + v252;
-        const V v254 = v111 * v253;
-        const V v255 = v251 * v111;
-        const V v256 = v245 * v255;
-        const V v257 = v256 * v247;
-        const V v258 = v254 - v257;
-        const V v259 = v251 * v110;
-        const V v260 = v259 + v258;
-        const V v261 = v245 * v260;
-        const V v262 = v256 * v256;
-        const V v263 = 1.0 + v262;
-        const V v264 = softehl_vsqrt(v263);
-        const V v265 = softehl_vasinh(v256);
-        const V v266 = 1.0 / v264;
-        const V v267 = parameters[7] * v266;
-        const V v268 = v267 * v261;
-        const V v269 = v242 + v268;
-        const V v270 = v265 * t11;
-        const V v271 = v270 + v269;
-        const V v272 = parameters[7] * v265;
-        const V v273 = v272 - v90;
-        const V v274 = v273 * v61;
-        const V v275 = v241 - v274;
-        const V v276 = v48 * v273;
-        const V v277 = v236 - v276;
-        const V v278 = v48 * v271;
-        const V v279 = v275 - v278;
-        const V v280 = v277 * v98;
-        const V v281 = v96 * v279;
-        const V v282 = v280 + v281;
-        const V v283 = w[1] * v282;
-        const V v284 = v76 * v283;
-        s72 += v284;
-        const V v285 = v75 * v283;
-        s73 += v285;
-        V v286 = softehl_splat(0.0);
-        const M m287 = v238;
-        if (softehl_any(m287)) {
-            const V v288 = p0 * v26;
-            const V v289 = w[1] * v288;
-            const V v290 = -v289;
-            v286 = softehl_blend(m287, v290, v286);
+        const V v106 = softehl_vexp(p0 * parameters[3]);
+        const M v107 = softehl_lt(softehl_splat(0.0), -p0);
+        const V v108 = 1.0 / (parameters[7] * v46), v109 = v106 * (t6 + p0 * v3),
+            v110 = parameters[2] * v106, v111 = parameters[1] * v110, v112 = v108 * (v111 * v62),
+            v113 = v62 * (v110 * t5 + parameters[1] * v109) - v112 * (parameters[7] * v49 + v46 * t11),
+            v114 = v108 * (v111 * v61 + v113), v115 = 1.0 + v112 * v112, v116 = softehl_vsqrt(v115),
+            v117 = softehl_vasinh(v112), v118 = parameters[7] * v117 - v52,
+            v119 = v28 * (v117 * t11 + (v53 - v51 + parameters[7] * (1.0 / v116) * v114)),
+            v120 = (p0 * v13 - v28 * v118) * v55 + v54 * (p0 * v16 - v118 * v32 - v119),
+            v121 = w[1] * v120, v122 = v43 * v121;
+        s39 += v122; const V v123 = v42 * v121; s40 += v123; V v124 = softehl_splat(0.0);
+        const M m125 = v107;
+        if (softehl_any(m125)) {
+            const V v126 = -(w[1] * (p0 * v14)); v124 = softehl_blend(m125, v126, v124);
         }
-        const V v291 = 1.0 / v249;
-        const V v292 = 1.0 / v263;
-        const V v293 = parameters[1] * v88;
-        const V v294 = v82 * v82;
-        const V v295 = 0.08333333333333333 * v77;
-        const V v296 = 0.25 * v77;
-        const V v297 = v82 * v294;
-        const V v298 = v294 * v296;
-        const V v299 = v84 * t5;
-        const V v300 = v293 + v299;
-        const V v301 = v297 * v295;
-        const V v302 = 0.08333333333333333 * v297;
-        const V v303 = v298 * v86;
-        const V v304 = v302 * v78;
-        const V v305 = v303 - v304;
-        const V v306 = softehl_vsqrt(v292);
-        const V v307 = v256 * v301;
-        const V v308 = v306 * v307;
-        const V v309 = v301 * v264;
-        const V v310 = v264 * v305;
-        const V v311 = v308 * v261;
-        const V v312 = v310 + v311;
-        const V v313 = v291 * v112;
-        const V v314 = v248 * v313;
-        const V v315 = v314 - v113;
-        const V v316 = v309 * v315;
-        const V v317 = v112 * v312;
-        const V v318 = v316 - v317;
-        const V v319 = v291 * v318;
-        const V v320 = v300 + v319;
-        const V v321 = w[1] * v320;
+        const V v127 = 1.0 / v110, v128 = v46 * v46, v129 = v46 * v128,
+            v130 = v129 * (0.08333333333333333 * v44), v131 = softehl_vsqrt(1.0 / v115),
+            v132 = v116 * (v128 * (0.25 * v44) * v49 - 0.08333333333333333 * v129 * v45),
+            v133 = v130 * v116 * (v109 * (v127 * v63) - v64) - v63 * (v132 + v131 * (v112 * v130) * v114),
+            v134 = w[1] * (parameters[1] * v50 + v48 * t5 + v127 * v133);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            const double N = B[2 * i], D = B[2 * i + 1];
-            (void)N, (void)D;
-            R_lanes[4 + i] += N * v286 + D * v321;
+            const double N = B[2 * i], D = B[2 * i + 1]; (void)N, (void)D;
+            R_lanes[4 + i] += N * v124 + D * v134;
         }
     }
-    const V v322 = -s70;
-    const V v323 = -s71;
-    R_lanes[0] = s73;
-    R_lanes[1] = v323;
-    R_lanes[2] = s72;
-    R_lanes[3] = v322;
+    const V v135 = -s37, v136 = -s38;
+    R_lanes[0] = s40; R_lanes[1] = v136; R_lanes[2] = s39; R_lanes[3] = v135;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_eyring_pseudo_load, 4, (4 + modes), 0, 12, (4 + modes), 0)
 
-void softehl_film_eyring_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_eyring_fields_rate)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_eyring_pseudo_load_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, direction + 12 * e, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_eyring_pseudo_load_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, direction + 12 * (n - SOFTEHL_LANES), parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double t[SOFTEHL_LANES * 12];
-    softehl_pad(t, direction, 12, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_eyring_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_eyring_fields_rate_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V t0, t1, t2, t3;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15;
     softehl_load4(t + 0, (12 + (4 + modes)), &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
     softehl_load4(t + 4, (12 + (4 + modes)), &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
     softehl_load4(t + 8, (12 + (4 + modes)), &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    V t12, t13, t14, t15;
-    softehl_load4(t + 12, (12 + (4 + modes)), &t12, &t13, &t14, &t15);
-    (void)t12; (void)t13; (void)t14; (void)t15;
+    softehl_load4(t + 12, (12 + (4 + modes)), &t12, &t13, &t14, &t15); (void)t8; (void)t9;
+    (void)t10;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -508,349 +184,82 @@ static void softehl_film_eyring_fields_rate_group(
     softehl_gather(t_lanes, t, (12 + (4 + modes)));
 #endif
     const double v1 = 1.0 / parameters[7];
-    const V v2 = X2 + d2;
-    const V v3 = t1 + t13;
-    const V v4 = t2 + t14;
-    const V v5 = t3 + t15;
-    const V v6 = X1 - parameters[0];
-    const V v7 = X3 - parameters[0];
-    const V v8 = v2 - X0;
-    const V v9 = X3 + d3;
-    const V v10 = v8 - d0;
-    const V v11 = v1 * t11;
-    const V v12 = d3 + v7;
-    const V v13 = v5 - v3;
-    const V v14 = 0.5 * v10;
-    const V v15 = d1 + v6;
-    const V v16 = v9 - X1;
-    const V v17 = v16 - d1;
-    const V v18 = 0.5 * v13;
-    const V v19 = v14 * v14;
-    const V v20 = v3 - t4;
-    const V v21 = v5 - t4;
-    const V v22 = 0.5 * v17;
-    const V v23 = 5.0 * v17;
-    const V v24 = v4 - t0;
-    const V v25 = v17 * v18;
-    const V v26 = v22 * v22;
-    const V v27 = v24 - t12;
-    const V v28 = t0 + t12;
-    const V v29 = 0.5 * v27;
-    const V v30 = v26 + v19;
-    const V v31 = v26 * v26;
-    const V v32 = v10 * v29;
-    const V v33 = v22 * v31;
-    const V v34 = v33 * v33;
-    const V v35 = v31 * v23;
-    const V v36 = v31 * v35;
-    const V v37 = v36 * v18;
-    const V v38 = v30 * v30;
-    const V v39 = 4.0 * v30;
-    const V v40 = v38 * v39;
-    const V v41 = v38 * v38;
-    const V v42 = 1.0 / v41;
-    const V v43 = v32 + v25;
-    const V v44 = v42 * v40;
-    const V v45 = v34 * v44;
-    const V v46 = v45 * v43;
-    const V v47 = v37 - v46;
-    const V v48 = v42 * v34;
-    const V v49 = v19 + v48;
-    const V v50 = v42 * v47;
-    const V v51 = v32 + v50;
-    const V v52 = softehl_vsqrt(v49);
-    const V v53 = 1.0 / v52;
-    const V v54 = 1.0 / v49;
-    const V v55 = softehl_vsqrt(v54);
-    const V v56 = 0.5 * v53;
-    const V v57 = v55 * v56;
-    const V v58 = v57 * v51;
+    const V v2 = t1 + t13, v3 = t2 + t14, v4 = t3 + t15, v5 = X2 + d2 - X0 - d0, v6 = v1 * t11,
+        v7 = d3 + (X3 - parameters[0]), v8 = 0.5 * v5, v9 = d1 + (X1 - parameters[0]),
+        v10 = X3 + d3 - X1 - d1, v11 = 0.5 * (v4 - v2), v12 = v8 * v8, v13 = v2 - t4, v14 = v4 - t4,
+        v15 = 0.5 * v10, v16 = v15 * v15, v17 = t0 + t12, v18 = 0.5 * (v3 - t0 - t12),
+        v19 = v16 + v12, v20 = v16 * v16, v21 = v5 * v18, v22 = v15 * v20, v23 = v22 * v22,
+        v24 = v19 * v19, v25 = 1.0 / (v24 * v24),
+        v26 = v20 * (v20 * (5.0 * v10)) * v11 - v23 * (v25 * (v24 * (4.0 * v19))) * (v21 + v10 * v11),
+        v27 = v12 + v25 * v23, v28 = softehl_vsqrt(v27), v29 = 1.0 / v28,
+        v30 = softehl_vsqrt(1.0 / v27), v31 = v30 * (0.5 * v29) * (v21 + v25 * v26);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0);
+        (void)p0, (void)p1; V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            tp0 += B[2 * i] * t_lanes[16 + i];
-            tp1 += B[2 * i + 1] * t_lanes[16 + i];
+            tp0 += B[2 * i] * t_lanes[16 + i]; tp1 += B[2 * i + 1] * t_lanes[16 + i];
         }
-        (void)tp0, (void)tp1;
-        const double v59 = 0.5 * w[0];
-        const V v60 = w[1] * v29;
-        const double v61 = 0.5 - v59;
-        const double v62 = 0.5 + v59;
-        const V v63 = p1 * v53;
-        const V v64 = p1 * v58;
-        const V v65 = tp1 - v64;
-        const V v66 = v53 * v65;
-        const V v67 = v61 * v15;
-        const V v68 = v62 * v4;
-        const V v69 = v61 * v20;
-        const V v70 = v61 * v28;
-        const V v71 = v68 + v70;
-        const V v72 = v62 * v12;
-        const V v73 = v67 + v72;
-        const V v74 = v62 * v21;
-        const V v75 = v69 + v74;
-        const V v76 = 0.5 * v73;
-        const V v77 = 0.5 * v75;
-        const V v78 = v63 * v77;
-        const V v79 = v76 * v63;
-        const V v80 = v76 * v66;
-        const V v81 = v78 + v80;
-        const V v82 = v79 * v11;
-        const V v83 = v81 - v82;
-        const V v84 = v1 * v79;
-        const V v85 = v1 * v83;
-        const V v86 = v84 * v84;
-        const M v87 = softehl_lt(v86, softehl_splat(1.0));
-        V v88 = softehl_splat(0.0);
-        V v89 = softehl_splat(0.0);
-        V v90 = softehl_splat(0.0);
-        V v91 = softehl_splat(0.0);
-        const M m92 = v87;
-        if (softehl_any(m92)) {
-            const V v93 = 2.0 * v84;
-            const V v94 = 1.9572941063391263e-20 * v86;
-            const V v95 = 2.5529923126162516e-21 * v86;
-            const V v96 = v93 * v85;
-            const V v97 = 8.22063524662433e-18 + v94;
-            const V v98 = 1.1743764638034756e-18 + v95;
-            const V v99 = v94 + v97;
-            const V v100 = v86 * v97;
-            const V v101 = 2.8114572543455206e-15 + v100;
-            const V v102 = v95 + v98;
-            const V v103 = v86 * v98;
-            const V v104 = 4.439143033177138e-16 + v103;
-            const V v105 = v86 * v101;
-            const V v106 = 7.647163731819816e-13 + v105;
-            const V v107 = v86 * v99;
-            const V v108 = v101 + v107;
-            const V v109 = v86 * v102;
-            const V v110 = v86 * v104;
-            const V v111 = 1.34949948208585e-13 + v110;
-            const V v112 = v104 + v109;
-            const V v113 = v108 * v96;
-            const V v114 = v112 * v96;
-            const V v115 = v86 * v111;
-            const V v116 = 3.2118087673643227e-11 + v115;
-            const V v117 = v111 * v96;
-            const V v118 = v86 * v114;
-            const V v119 = v117 + v118;
-            const V v120 = v86 * v116;
-            const V v121 = 5.7812557812557815e-09 + v120;
-            const V v122 = v116 * v96;
-            const V v123 = v86 * v119;
-            const V v124 = v122 + v123;
-            const V v125 = v106 * v96;
-            const V v126 = v86 * v106;
-            const V v127 = 1.6059043836821613e-10 + v126;
-            const V v128 = v86 * v113;
-            const V v129 = v125 + v128;
-            const V v130 = v86 * v121;
-            const V v131 = 7.515632515632515e-07 + v130;
-            const V v132 = v121 * v96;
-            const V v133 = v86 * v124;
-            const V v134 = v132 + v133;
-            const V v135 = v86 * v131;
-            const V v136 = 6.613756613756614e-05 + v135;
-            const V v137 = v127 * v96;
-            const V v138 = v86 * v127;
-            const V v139 = 2.505210838544172e-08 + v138;
-            const V v140 = v86 * v129;
-            const V v141 = v137 + v140;
-            const V v142 = v131 * v96;
-            const V v143 = v86 * v134;
-            const V v144 = v142 + v143;
-            const V v145 = v86 * v136;
-            const V v146 = 0.0035714285714285713 + v145;
-            const V v147 = v136 * v96;
-            const V v148 = v86 * v144;
-            const V v149 = v147 + v148;
-            const V v150 = v139 * v96;
-            const V v151 = v86 * v139;
-            const V v152 = 2.7557319223985893e-06 + v151;
-            const V v153 = v86 * v141;
-            const V v154 = v150 + v153;
-            const V v155 = v86 * v146;
-            const V v156 = 0.1 + v155;
-            const V v157 = v146 * v96;
-            const V v158 = v86 * v149;
-            const V v159 = v157 + v158;
-            const V v160 = v86 * v154;
-            const V v161 = v152 * v96;
-            const V v162 = v161 + v160;
-            const V v163 = v86 * v152;
-            const V v164 = 0.0001984126984126984 + v163;
-            const V v165 = v86 * v162;
-            const V v166 = v164 * v96;
-            const V v167 = v166 + v165;
-            const V v168 = v86 * v167;
-            const V v169 = v86 * v159;
-            const V v170 = v86 * v164;
-            const V v171 = 0.008333333333333333 + v170;
-            const V v172 = v171 * v96;
-            const V v173 = v172 + v168;
-            const V v174 = v86 * v173;
-            const V v175 = v156 * v96;
-            const V v176 = v175 + v169;
-            const V v177 = v86 * v171;
-            const V v178 = 0.16666666666666666 + v177;
-            const V v179 = v178 * v96;
-            const V v180 = v179 + v174;
-            const V v181 = v86 * v178;
-            const V v182 = 1.0 + v181;
-            const V v183 = 1.0 / v182;
-            const V v184 = v86 * v156;
-            const V v185 = 1.0 + v184;
-            const V v186 = v183 * v183;
-            const V v187 = v186 * v180;
-            const V v188 = -v187;
-            v88 = softehl_blend(m92, v188, v88);
-            v89 = softehl_blend(m92, v183, v89);
-            v90 = softehl_blend(m92, v185, v90);
-            v91 = softehl_blend(m92, v176, v91);
+        (void)tp0, (void)tp1; const double v32 = 0.5 * w[0]; const V v33 = w[1] * v18;
+        const double v34 = 0.5 - v32, v35 = 0.5 + v32;
+        const V v36 = p1 * v29, v37 = v29 * (tp1 - p1 * v31), v38 = v35 * v3 + v34 * v17,
+            v39 = v34 * v9 + v35 * v7, v40 = v34 * v13 + v35 * v14, v41 = 0.5 * v39,
+            v42 = 0.5 * v40, v43 = v41 * v36, v44 = v36 * v42 + v41 * v37, v45 = v1 * v43,
+            v46 = v1 * (v44 - v43 * v6), v47 = v45 * v45;
+        const M v48 = softehl_lt(v47, softehl_splat(1.0));
+        V v49 = softehl_splat(0.0), v50 = softehl_splat(0.0), v51 = softehl_splat(0.0),
+            v52 = softehl_splat(0.0);
+        const M m53 = v48;
+        if (softehl_any(m53)) {
+            const V v54 = 1.9572941063391263e-20 * v47, v55 = 2.5529923126162516e-21 * v47,
+                v56 = 2.0 * v45 * v46, v57 = 8.22063524662433e-18 + v54,
+                v58 = 1.1743764638034756e-18 + v55, v59 = 2.8114572543455206e-15 + v47 * v57,
+                v60 = 4.439143033177138e-16 + v47 * v58, v61 = 7.647163731819816e-13 + v47 * v59,
+                v62 = 1.34949948208585e-13 + v47 * v60, v63 = 3.2118087673643227e-11 + v47 * v62,
+                v64 = 5.7812557812557815e-09 + v47 * v63,
+                v65 = v63 * v56 + v47 * (v62 * v56 + v47 * ((v60 + v47 * (v55 + v58)) * v56)),
+                v66 = 1.6059043836821613e-10 + v47 * v61, v67 = 7.515632515632515e-07 + v47 * v64,
+                v68 = 6.613756613756614e-05 + v47 * v67, v69 = 2.505210838544172e-08 + v47 * v66,
+                v70 = v66 * v56 + v47 * (v61 * v56 + v47 * ((v59 + v47 * (v54 + v57)) * v56)),
+                v71 = 0.0035714285714285713 + v47 * v68, v72 = 2.7557319223985893e-06 + v47 * v69,
+                v73 = 0.1 + v47 * v71,
+                v74 = v47 * (v68 * v56 + v47 * (v67 * v56 + v47 * (v64 * v56 + v47 * v65))),
+                v75 = 0.0001984126984126984 + v47 * v72,
+                v76 = v47 * (v75 * v56 + v47 * (v72 * v56 + v47 * (v69 * v56 + v47 * v70))),
+                v77 = 0.008333333333333333 + v47 * v75, v78 = v73 * v56 + v47 * (v71 * v56 + v74),
+                v79 = 0.16666666666666666 + v47 * v77, v80 = 1.0 / (1.0 + v47 * v79),
+                v81 = 1.0 + v47 * v73, v82 = -(v80 * v80 * (v79 * v56 + v47 * (v77 * v56 + v76)));
+            v49 = softehl_blend(m53, v82, v49); v50 = softehl_blend(m53, v80, v50);
+            v51 = softehl_blend(m53, v81, v51); v52 = softehl_blend(m53, v78, v52);
         }
-        const M m189 = ~v87;
-        if (softehl_any(m189)) {
-            const V v190 = softehl_vsinh(v84);
-            const V v191 = 3.0 * v84;
-            const V v192 = softehl_vcosh(v84);
-            const V v193 = v84 * v86;
-            const V v194 = 3.0 * v86;
-            const V v195 = 1.0 / v190;
-            const V v196 = 1.0 / v193;
-            const V v197 = v190 * v191;
-            const V v198 = v191 * v192;
-            const V v199 = 3.0 * v190;
-            const V v200 = v198 - v199;
-            const V v201 = v200 * v194;
-            const V v202 = v84 * v195;
-            const V v203 = v202 * v192;
-            const V v204 = 1.0 - v203;
-            const V v205 = v196 * v201;
-            const V v206 = v197 - v205;
-            const V v207 = v200 * v196;
-            const V v208 = v204 * v85;
-            const V v209 = v206 * v85;
-            const V v210 = v195 * v208;
-            const V v211 = v196 * v209;
-            v88 = softehl_blend(m189, v210, v88);
-            v89 = softehl_blend(m189, v202, v89);
-            v90 = softehl_blend(m189, v207, v90);
-            v91 = softehl_blend(m189, v211, v91);
+        const M m83 = ~v48;
+        if (softehl_any(m83)) {
+            const V v84 = softehl_vsinh(v45), v85 = 3.0 * v45, v86 = softehl_vcosh(v45),
+                v87 = 1.0 / v84, v88 = 1.0 / (v45 * v47), v89 = v85 * v86 - 3.0 * v84,
+                v90 = v45 * v87, v91 = v89 * v88, v92 = v87 * ((1.0 - v90 * v86) * v46),
+                v93 = v88 * ((v84 * v85 - v88 * (v89 * (3.0 * v47))) * v46);
+            v49 = softehl_blend(m83, v92, v49); v50 = softehl_blend(m83, v90, v50);
+            v51 = softehl_blend(m83, v91, v51); v52 = softehl_blend(m83, v93, v52);
         }
-        const V v212 = v73 * v73;
-        const V v213 = parameters[7] * v73;
-        const V v214 = 0.08333333333333333 * v63;
-        const V v215 = 0.25 * v63;
-        const V v216 = 1.0 / v213;
-        const V v217 = v73 * v212;
-        const V v218 = v212 * v215;
-        const V v219 = v73 * t11;
-        const V v220 = v217 * v214;
-        const V v221 = 0.08333333333333333 * v217;
-        const V v222 = p0 * t7;
-        const V v223 = p0 * parameters[3];
-        const V v224 = parameters[3] * tp0;
-        const V v225 = v222 + v224;
-        const V v226 = softehl_vexp(v223);
-        const V v227 = parameters[7] * v75;
-        const V v228 = v219 + v227;
-        const V v229 = v218 * v75;
-        const V v230 = v76 * t5;
-        const V v231 = v221 * v66;
-        const V v232 = v229 + v231;
-        const V v233 = parameters[1] * v77;
-        const V v234 = v230 + v233;
-        const V v235 = parameters[2] * v226;
-        const V v236 = v226 * t6;
-        const V v237 = v235 * v225;
-        const V v238 = v236 + v237;
-        const V v239 = v235 * t5;
-        const V v240 = parameters[1] * v238;
-        const V v241 = v239 + v240;
-        const V v242 = parameters[1] * v235;
-        const V v243 = 1.0 / v235;
-        const V v244 = v89 * v241;
-        const V v245 = v242 * v89;
-        const V v246 = v216 * v245;
-        const V v247 = v246 * v228;
-        const V v248 = v244 - v247;
-        const V v249 = v242 * v88;
-        const V v250 = v249 + v248;
-        const V v251 = v216 * v250;
-        const V v252 = softehl_vasinh(v246);
-        const V v253 = v252 * t11;
-        const V v254 = v246 * v246;
-        const V v255 = 1.0 + v254;
-        const V v256 = softehl_vsqrt(v255);
-        const V v257 = 1.0 / v255;
-        const V v258 = softehl_vsqrt(v257);
-        const V v259 = v246 * v258;
-        const V v260 = v259 * v251;
-        const V v261 = v256 * v232;
-        const V v262 = v256 * v66;
-        const V v263 = v220 * v256;
-        const V v264 = v220 * v260;
-        const V v265 = v261 + v264;
-        const V v266 = v63 * v260;
-        const V v267 = v262 + v266;
-        const V v268 = v63 * v256;
-        const V v269 = 1.0 / v256;
-        const V v270 = parameters[7] * v269;
-        const V v271 = v270 * v251;
-        const V v272 = v253 + v271;
-        const V v273 = v81 + v272;
-        const V v274 = v272 - v81;
-        const V v275 = v268 * v91;
-        const V v276 = v90 * v267;
-        const V v277 = v275 + v276;
-        const V v278 = v243 * v90;
-        const V v279 = v278 * v238;
-        const V v280 = v279 - v91;
-        const V v281 = v263 * v280;
-        const V v282 = v90 * v265;
-        const V v283 = v281 - v282;
-        const V v284 = v243 * v283;
-        const V v285 = v234 + v284;
-        softehl_store4(R + 9 * q + 0, (9 * points), v71, v60, v75, tp0);
-        softehl_store4(R + 9 * q + 4, (9 * points), v274, v285, v273, v238);
-        softehl_store1(R + 9 * q + 8, (9 * points), v277);
+        const V v94 = v39 * v39, v95 = 1.0 / (parameters[7] * v39), v96 = v39 * v94,
+            v97 = v96 * (0.08333333333333333 * v36), v98 = softehl_vexp(p0 * parameters[3]),
+            v99 = parameters[2] * v98, v100 = v98 * t6 + v99 * (p0 * t7 + parameters[3] * tp0),
+            v101 = parameters[1] * v99, v102 = 1.0 / v99, v103 = v95 * (v101 * v50),
+            v104 = v50 * (v99 * t5 + parameters[1] * v100) - v103 * (v39 * t11 + parameters[7] * v40),
+            v105 = v95 * (v101 * v49 + v104), v106 = softehl_vasinh(v103), v107 = 1.0 + v103 * v103,
+            v108 = softehl_vsqrt(v107), v109 = softehl_vsqrt(1.0 / v107), v110 = v103 * v109 * v105,
+            v111 = v108 * (v94 * (0.25 * v36) * v40 + 0.08333333333333333 * v96 * v37),
+            v112 = v106 * t11 + parameters[7] * (1.0 / v108) * v105, v113 = v44 + v112,
+            v114 = v112 - v44, v115 = v36 * v108 * v52 + v51 * (v108 * v37 + v36 * v110),
+            v116 = v97 * v108 * (v102 * v51 * v100 - v52) - v51 * (v111 + v97 * v110),
+            v117 = v41 * t5 + parameters[1] * v42 + v102 * v116;
+        softehl_store4(R + 9 * q + 0, (9 * points), v38, v33, v40, tp0);
+        softehl_store4(R + 9 * q + 4, (9 * points), v114, v117, v113, v100);
+        softehl_store1(R + 9 * q + 8, (9 * points), v115);
     }
 }
-
-void softehl_film_eyring_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_eyring_fields_rate_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, direction + (12 + (4 + modes)) * e, parameters, rule, basis, values + (9 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_eyring_fields_rate_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, direction + (12 + (4 + modes)) * (n - SOFTEHL_LANES), parameters, rule, basis, values + (9 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double t[SOFTEHL_LANES * (12 + (4 + modes))];
-    softehl_pad(t, direction, (12 + (4 + modes)), n);
-    double R[SOFTEHL_LANES * (9 * points)];
-    softehl_film_eyring_fields_rate(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (9 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_eyring_fields_rate, 4, (4 + modes), 0, (12 + (4 + modes)), (9 * points), 0)

@@ -21,13 +21,7 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_film_facet_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_film_facet_residual)
 {
     (void)data;
     (void)direction;
@@ -35,96 +29,47 @@ void softehl_film_facet_residual(
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict X = coordinates + 6 * e;
         const double *restrict d = dofs + (6 + modes) * e;
-        double *restrict R = values + (6 + modes) * e;
-        (void)X; (void)d;
+        double *restrict R = values + (6 + modes) * e; (void)X; (void)d;
         for (ptrdiff_t i = 0; i < (6 + modes); ++i) R[i] = 0.0;
-        const double v1 = X[3] - parameters[0];
-        const double v2 = X[2] + d[2];
-        const double v3 = d[3] + v1;
-        const double v4 = 0.5 * parameters[1];
-        const double v5 = v3 * v4;
-        const double v6 = 0.08333333333333333 * v3;
-        const double v7 = v3 * v6;
-        const double v8 = v3 * v7;
-        const double v9 = X[0] + d[0];
-        const double v10 = X[4] + d[4];
-        const double v11 = v2 - v9;
-        const double v12 = v10 - v2;
-        const double v13 = 0.5 * v11;
-        const double v14 = 0.5 * v12;
-        const double v15 = parameters[2] * v13;
-        const double v16 = parameters[2] * v14;
-        const double v17 = 2.0 * v5;
+        const double v1 = X[3] - parameters[0], v2 = X[2] + d[2], v3 = d[3] + v1,
+            v4 = 0.5 * parameters[1], v5 = v3 * v4, v6 = 0.08333333333333333 * v3, v7 = v3 * v6,
+            v8 = v3 * v7, v9 = X[0] + d[0], v10 = X[4] + d[4], v11 = v2 - v9, v12 = v10 - v2,
+            v13 = 0.5 * v11, v14 = 0.5 * v12, v15 = parameters[2] * v13, v16 = parameters[2] * v14,
+            v17 = 2.0 * v5;
         for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 1 * q;
-            (void)w;
+            const double *restrict w = rule + 1 * q; (void)w;
             const double *restrict B = basis + 4 * modes * q;
             double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
             for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[6 + i];
-                p1 += B[4 * i + 1] * d[6 + i];
-                p2 += B[4 * i + 2] * d[6 + i];
-                p3 += B[4 * i + 3] * d[6 + i];
+                p0 += B[4 * i] * d[6 + i]; p1 += B[4 * i + 1] * d[6 + i];
+                p2 += B[4 * i + 2] * d[6 + i]; p3 += B[4 * i + 3] * d[6 + i];
             }
             (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v18 = p2 * parameters[3];
-            const double v19 = exp(v18);
-            const double v20 = v19 * v16;
-            const double v21 = 1.0 / v20;
-            const double v22 = v8 * v21;
-            const double v23 = p3 * v22;
-            const double v24 = p0 * parameters[3];
-            const double v25 = exp(v24);
-            const double v26 = v25 * v15;
-            const double v27 = 1.0 / v26;
-            const double v28 = v8 * v27;
-            const double v29 = p1 * v28;
-            const double v30 = v29 + v23;
-            const double v31 = v17 - v30;
-            const double v32 = 0.5 * v31;
-            const double v33 = w[0] * v32;
-            const double v34 = -v33;
-            const double v35 = p0 - p2;
-            const double v36 = 0.5 * v35;
-            const double v37 = w[0] * v36;
-            const double v38 = v37 * v28;
-            const double v39 = -v38;
-            const double v40 = v37 * v22;
-            const double v41 = -v40;
+            const double v18 = p2 * parameters[3], v19 = exp(v18), v20 = v19 * v16, v21 = 1.0 / v20,
+                v22 = v8 * v21, v23 = p3 * v22, v24 = p0 * parameters[3], v25 = exp(v24),
+                v26 = v25 * v15, v27 = 1.0 / v26, v28 = v8 * v27, v29 = p1 * v28, v30 = v29 + v23,
+                v31 = v17 - v30, v32 = 0.5 * v31, v33 = w[0] * v32, v34 = -v33, v35 = p0 - p2,
+                v36 = 0.5 * v35, v37 = w[0] * v36, v38 = v37 * v28, v39 = -v38, v40 = v37 * v22,
+                v41 = -v40;
             for (ptrdiff_t i = 0; i < modes; ++i) {
                 const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
                 (void)N, (void)D, (void)N1, (void)D1;
                 R[6 + i] += N * v34 + D * v39 + N1 * v33 + D1 * v41;
             }
         }
-        R[0] = 0.0;
-        R[1] = 0.0;
-        R[2] = 0.0;
-        R[3] = 0.0;
-        R[4] = 0.0;
-        R[5] = 0.0;
+        R[0] = 0.0; R[1] = 0.0; R[2] = 0.0; R[3] = 0.0; R[4] = 0.0; R[5] = 0.0;
     }
 }
 
-static void softehl_film_facet_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_facet_tangent)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5;
-    softehl_load2(X + 4, 6, &X4, &X5);
-    (void)X4; (void)X5;
-    V d0, d1, d2, d3;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5;
+    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3); softehl_load2(X + 4, 6, &X4, &X5); (void)X1;
+    (void)X5;
+    V d0, d1, d2, d3, d4, d5;
     softehl_load4(d + 0, (6 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5;
-    softehl_load2(d + 4, (6 + modes), &d4, &d5);
-    (void)d4; (void)d5;
+    softehl_load2(d + 4, (6 + modes), &d4, &d5); (void)d1; (void)d5;
 #if SOFTEHL_LANES > 1
     V d_lanes[(6 + modes)];
 #else
@@ -147,140 +92,45 @@ static void softehl_film_facet_tangent_group(
 #endif
     for (ptrdiff_t i = 0; i < ((6 + modes) * (6 + modes)); ++i)
         K_lanes[i] = softehl_splat(0.0);
-    const double v1 = 0.5 * parameters[1];
-    const V v2 = X0 + d0;
-    const V v3 = X2 + d2;
-    const V v4 = X4 + d4;
-    const V v5 = X3 - parameters[0];
-    const double v6 = parameters[2] * parameters[3];
-    const V v7 = d3 + v5;
-    const V v8 = v3 - v2;
-    const V v9 = v4 - v3;
-    const V v10 = 0.5 * v8;
-    const V v11 = 0.5 * v9;
-    const V v12 = v7 * v1;
-    const V v13 = v7 * v7;
-    const V v14 = 0.08333333333333333 * v7;
-    const V v15 = v10 * v6;
-    const V v16 = v11 * v6;
-    const V v17 = 2.0 * v12;
-    const V v18 = v13 * v14;
-    const V v19 = 0.25 * v13;
-    const V v20 = v18 * v15;
-    const V v21 = v18 * v16;
+    const double v1 = 0.5 * parameters[1]; const V v2 = X2 + d2;
+    const double v3 = parameters[2] * parameters[3];
+    const V v4 = d3 + (X3 - parameters[0]), v5 = 0.5 * (v2 - (X0 + d0)), v6 = 0.5 * (X4 + d4 - v2),
+        v7 = v4 * v4, v8 = 2.0 * (v4 * v1), v9 = v7 * (0.08333333333333333 * v4), v10 = 0.25 * v7,
+        v11 = v9 * (v5 * v3), v12 = v9 * (v6 * v3);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 1 * q;
-        (void)w;
+        const double *restrict w = rule + 1 * q; (void)w;
         const double *restrict B = basis + 4 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[4 * i] * d_lanes[6 + i];
-            p1 += B[4 * i + 1] * d_lanes[6 + i];
-            p2 += B[4 * i + 2] * d_lanes[6 + i];
-            p3 += B[4 * i + 3] * d_lanes[6 + i];
+            p0 += B[4 * i] * d_lanes[6 + i]; p1 += B[4 * i + 1] * d_lanes[6 + i];
+            p2 += B[4 * i + 2] * d_lanes[6 + i]; p3 += B[4 * i + 3] * d_lanes[6 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3;
-        const V v22 = 0.5 * p1;
-        const V v23 = 0.25 * p1;
-        const V v24 = 0.5 * p3;
-        const V v25 = 0.25 * p3;
-        const double v26 = 0.5 * w[0];
-        const V v27 = w[0] * v22;
-        const V v28 = w[0] * v19;
-        const V v29 = w[0] * v24;
-        const V v30 = p0 * parameters[3];
-        const V v31 = p2 * parameters[3];
-        const V v32 = p0 - p2;
-        const V v33 = softehl_vexp(v30);
-        const V v34 = softehl_vexp(v31);
-        const V v35 = 0.5 * v32;
-        const V v36 = v35 * v26;
-        const V v37 = w[0] * v35;
-        const V v38 = v33 * v20;
-        const V v39 = parameters[2] * v33;
-        const V v40 = parameters[2] * v34;
-        const V v41 = v34 * v21;
-        const V v42 = v39 * v10;
-        const V v43 = 1.0 / v42;
-        const V v44 = v39 * v18;
-        const V v45 = v40 * v18;
-        const V v46 = v40 * v11;
-        const V v47 = 1.0 / v46;
-        const V v48 = v24 * v47;
-        const V v49 = v22 * v43;
-        const V v50 = v49 + v48;
-        const V v51 = v19 * v50;
-        const V v52 = v43 * v43;
-        const V v53 = v44 * v52;
-        const V v54 = v52 * v38;
-        const V v55 = v47 * v47;
-        const V v56 = v45 * v55;
-        const V v57 = v55 * v41;
-        const V v58 = v29 * v57;
-        const V v59 = -v58;
-        const V v60 = v35 * v57;
-        const V v61 = v18 * v43;
-        const V v62 = v18 * v47;
-        const V v63 = v37 * v62;
-        const V v64 = -v63;
-        const V v65 = v37 * v61;
-        const V v66 = -v65;
-        const V v67 = v1 - v51;
-        const V v68 = w[0] * v67;
-        const V v69 = v51 - v1;
-        const V v70 = w[0] * v69;
-        const V v71 = 0.5 * v61;
-        const V v72 = 0.5 * v62;
-        const V v73 = v72 + v60;
-        const V v74 = w[0] * v72;
-        const V v75 = -v74;
-        const V v76 = w[0] * v73;
-        const V v77 = v25 * v56;
-        const V v78 = w[0] * v77;
-        const V v79 = -v78;
-        const V v80 = w[0] * v71;
-        const V v81 = -v80;
-        const V v82 = v28 * v43;
-        const V v83 = v28 * v47;
-        const V v84 = v35 * v82;
-        const V v85 = -v84;
-        const V v86 = v35 * v83;
-        const V v87 = -v86;
-        const V v88 = v36 * v56;
-        const V v89 = -v88;
-        const V v90 = v36 * v53;
-        const V v91 = v23 * v53;
-        const V v92 = -v90;
-        const V v93 = w[0] * v91;
-        const V v94 = -v93;
-        const V v95 = p1 * v61;
-        const V v96 = v17 - v95;
-        const V v97 = p3 * v62;
-        const V v98 = v96 - v97;
-        const V v99 = 0.5 * v98;
-        const V v100 = w[0] * v99;
-        const V v101 = -v100;
-        const V v102 = v91 - v77;
-        const V v103 = v77 - v91;
-        const V v104 = w[0] * v103;
-        const V v105 = w[0] * v102;
-        const V v106 = v35 * v54;
-        const V v107 = v106 - v71;
-        const V v108 = w[0] * v107;
-        const V v109 = v27 * v54;
-        const V v110 = -v109;
+        const V v13 = 0.5 * p1, v14 = 0.5 * p3, v15 = w[0] * v10,
+            v16 = softehl_vexp(p0 * parameters[3]), v17 = softehl_vexp(p2 * parameters[3]),
+            v18 = 0.5 * (p0 - p2), v19 = v18 * (0.5 * w[0]), v20 = w[0] * v18,
+            v21 = parameters[2] * v16, v22 = parameters[2] * v17, v23 = 1.0 / (v21 * v5),
+            v24 = 1.0 / (v22 * v6), v25 = v10 * (v13 * v23 + v14 * v24), v26 = v23 * v23,
+            v27 = v21 * v9 * v26, v28 = v26 * (v16 * v11), v29 = v24 * v24, v30 = v22 * v9 * v29,
+            v31 = v29 * (v17 * v12), v32 = w[0] * v14 * v31, v33 = -v32, v34 = v9 * v23,
+            v35 = v9 * v24, v36 = -(v20 * v35), v37 = -(v20 * v34), v38 = w[0] * (v1 - v25),
+            v39 = w[0] * (v25 - v1), v40 = 0.5 * v34, v41 = 0.5 * v35, v42 = w[0] * v41, v43 = -v42,
+            v44 = w[0] * (v41 + v18 * v31), v45 = 0.25 * p3 * v30, v46 = w[0] * v45, v47 = -v46,
+            v48 = w[0] * v40, v49 = -v48, v50 = -(v18 * (v15 * v23)), v51 = -(v18 * (v15 * v24)),
+            v52 = v19 * v30, v53 = -v52, v54 = v19 * v27, v55 = 0.25 * p1 * v27, v56 = -v54,
+            v57 = w[0] * v55, v58 = -v57, v59 = w[0] * (0.5 * (v8 - p1 * v34 - p3 * v35)),
+            v60 = -v59, v61 = w[0] * (v45 - v55), v62 = w[0] * (v55 - v45),
+            v63 = w[0] * (v18 * v28 - v40), v64 = w[0] * v13 * v28, v65 = -v64;
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
             (void)N, (void)D, (void)N1, (void)D1;
-            R_lanes[6 + i] += N * v101 + D * v66 + N1 * v100 + D1 * v64;
-            K_lanes[(6 + i) * (6 + modes) + 0] += N * v93 + D * v92 + N1 * v94;
-            K_lanes[(6 + i) * (6 + modes) + 2] += N * v104 + D * v90 + N1 * v105 + D1 * v89;
-            K_lanes[(6 + i) * (6 + modes) + 3] += N * v70 + D * v85 + N1 * v68 + D1 * v87;
-            K_lanes[(6 + i) * (6 + modes) + 4] += N * v79 + N1 * v78 + D1 * v88;
-            const V r0 = N * v110 + D * v108 + N1 * v109 + D1 * v75;
-            const V r1 = N * v80 + N1 * v81;
-            const V r2 = N * v59 + D * v80 + N1 * v58 + D1 * v76;
-            const V r3 = N * v74 + N1 * v75;
+            R_lanes[6 + i] += N * v60 + D * v37 + N1 * v59 + D1 * v36;
+            K_lanes[(6 + i) * (6 + modes) + 0] += N * v57 + D * v56 + N1 * v58;
+            K_lanes[(6 + i) * (6 + modes) + 2] += N * v61 + D * v54 + N1 * v62 + D1 * v53;
+            K_lanes[(6 + i) * (6 + modes) + 3] += N * v39 + D * v50 + N1 * v38 + D1 * v51;
+            K_lanes[(6 + i) * (6 + modes) + 4] += N * v47 + N1 * v46 + D1 * v52;
+            const V r0 = N * v65 + D * v63 + N1 * v64 + D1 * v43, r1 = N * v48 + N1 * v49,
+                r2 = N * v33 + D * v48 + N1 * v32 + D1 * v44, r3 = N * v42 + N1 * v43;
             for (ptrdiff_t j = 0; j < modes; ++j)
                 K_lanes[(6 + i) * (6 + modes) + 6 + j] += r0 * B[4 * j] + r1 * B[4 * j + 1] + r2 * B[4 * j + 2] + r3 * B[4 * j + 3];
         }
@@ -290,106 +140,38 @@ static void softehl_film_facet_tangent_group(
     softehl_scatter(K, K_lanes, ((6 + modes) * (6 + modes)));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_facet_tangent, 6, (6 + modes), 0, 0, (6 + modes), ((6 + modes) * (6 + modes)))
 
-void softehl_film_facet_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_facet_tangent_group(points, modes, coordinates + 6 * e, dofs + (6 + modes) * e, 0, 0, parameters, rule, basis, values + (6 + modes) * e, tangent + ((6 + modes) * (6 + modes)) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_facet_tangent_group(points, modes, coordinates + 6 * (n - SOFTEHL_LANES), dofs + (6 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (6 + modes) * (n - SOFTEHL_LANES), tangent + ((6 + modes) * (6 + modes)) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 6];
-    softehl_pad(X, coordinates, 6, n);
-    double d[SOFTEHL_LANES * (6 + modes)];
-    softehl_pad(d, dofs, (6 + modes), n);
-    double R[SOFTEHL_LANES * (6 + modes)];
-    double K[SOFTEHL_LANES * ((6 + modes) * (6 + modes))];
-    softehl_film_facet_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < (6 + modes) * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < ((6 + modes) * (6 + modes)) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-void softehl_film_facet_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_film_facet_fields)
 {
     (void)data;
     (void)direction;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict X = coordinates + 6 * e;
-        const double *restrict d = dofs + (6 + modes) * e;
-        (void)X; (void)d;
-        const double v1 = X[2] + d[2];
-        const double v2 = X[3] - parameters[0];
-        const double v3 = d[3] + v2;
-        const double v4 = 0.5 * parameters[1];
-        const double v5 = v3 * v4;
-        const double v6 = 0.08333333333333333 * v3;
-        const double v7 = v3 * v6;
-        const double v8 = v3 * v7;
-        const double v9 = X[0] + d[0];
-        const double v10 = X[4] + d[4];
-        const double v11 = v1 - v9;
-        const double v12 = v10 - v1;
-        const double v13 = 0.5 * v11;
-        const double v14 = 0.5 * v12;
-        const double v15 = parameters[2] * v13;
-        const double v16 = parameters[2] * v14;
+        const double *restrict d = dofs + (6 + modes) * e; (void)X; (void)d;
+        const double v1 = X[2] + d[2], v2 = X[3] - parameters[0], v3 = d[3] + v2,
+            v4 = 0.5 * parameters[1], v5 = v3 * v4, v6 = 0.08333333333333333 * v3, v7 = v3 * v6,
+            v8 = v3 * v7, v9 = X[0] + d[0], v10 = X[4] + d[4], v11 = v1 - v9, v12 = v10 - v1,
+            v13 = 0.5 * v11, v14 = 0.5 * v12, v15 = parameters[2] * v13, v16 = parameters[2] * v14;
         for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 1 * q;
-            (void)w;
+            const double *restrict w = rule + 1 * q; (void)w;
             const double *restrict B = basis + 4 * modes * q;
             double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
             for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[6 + i];
-                p1 += B[4 * i + 1] * d[6 + i];
-                p2 += B[4 * i + 2] * d[6 + i];
-                p3 += B[4 * i + 3] * d[6 + i];
+                p0 += B[4 * i] * d[6 + i]; p1 += B[4 * i + 1] * d[6 + i];
+                p2 += B[4 * i + 2] * d[6 + i]; p3 += B[4 * i + 3] * d[6 + i];
             }
             (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v17 = p0 - p2;
-            const double v18 = p3 * v8;
-            const double v19 = p2 * parameters[3];
-            const double v20 = exp(v19);
-            const double v21 = v20 * v16;
-            const double v22 = 1.0 / v21;
-            const double v23 = v22 * v18;
-            const double v24 = v5 - v23;
-            const double v25 = p1 * v8;
-            const double v26 = p0 * parameters[3];
-            const double v27 = exp(v26);
-            const double v28 = v27 * v15;
-            const double v29 = 1.0 / v28;
-            const double v30 = v29 * v25;
-            const double v31 = v5 - v30;
-            const double v32 = v31 + v24;
-            const double v33 = 0.5 * v32;
-            const double v34 = v31 - v24;
-            double *restrict out = values + 5 * (points * e + q);
-            out[2] = v17;
-            out[3] = v33;
+            const double v17 = p0 - p2, v18 = p3 * v8, v19 = p2 * parameters[3], v20 = exp(v19),
+                v21 = v20 * v16, v22 = 1.0 / v21, v23 = v22 * v18, v24 = v5 - v23, v25 = p1 * v8,
+                v26 = p0 * parameters[3], v27 = exp(v26), v28 = v27 * v15, v29 = 1.0 / v28,
+                v30 = v29 * v25, v31 = v5 - v30, v32 = v31 + v24, v33 = 0.5 * v32, v34 = v31 - v24;
+            double *restrict out = values + 5 * (points * e + q); out[2] = v17; out[3] = v33;
             out[4] = v34;
         }
         for (ptrdiff_t q = 0; q < points; ++q) {
-            double *restrict out = values + 5 * (points * e + q);
-            out[0] = v1;
-            out[1] = v3;
+            double *restrict out = values + 5 * (points * e + q); out[0] = v1; out[1] = v3;
         }
     }
 }

@@ -21,34 +21,18 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_film_facet_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_facet_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5;
-    softehl_load2(X + 4, 6, &X4, &X5);
-    (void)X4; (void)X5;
-    V d0, d1, d2, d3;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5;
+    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3); softehl_load2(X + 4, 6, &X4, &X5); (void)X1;
+    (void)X5;
+    V d0, d1, d2, d3, d4, d5;
     softehl_load4(d + 0, (6 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5;
-    softehl_load2(d + 4, (6 + modes), &d4, &d5);
-    (void)d4; (void)d5;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 10, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 10, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9;
-    softehl_load2(t + 8, 10, &t8, &t9);
-    (void)t8; (void)t9;
+    softehl_load2(d + 4, (6 + modes), &d4, &d5); (void)d1; (void)d5;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9;
+    softehl_load4(t + 0, 10, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 10, &t4, &t5, &t6, &t7);
+    softehl_load2(t + 8, 10, &t8, &t9); (void)t1; (void)t5;
 #if SOFTEHL_LANES > 1
     V d_lanes[(6 + modes)];
 #else
@@ -64,154 +48,53 @@ static void softehl_film_facet_pseudo_load_group(
 #endif
     for (ptrdiff_t i = 0; i < (6 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
-    const V v1 = X0 + d0;
-    const V v2 = X2 + d2;
-    const V v3 = X4 + d4;
-    const V v4 = X3 - parameters[0];
-    const V v5 = parameters[2] * t9;
-    const V v6 = d3 + v4;
-    const V v7 = v2 - v1;
-    const V v8 = v3 - v2;
-    const V v9 = t3 - t6;
-    const V v10 = 0.5 * v7;
-    const V v11 = 0.5 * v8;
-    const V v12 = v6 * v6;
-    const V v13 = 0.08333333333333333 * v6;
-    const V v14 = v6 * t7;
-    const V v15 = t4 - t2;
-    const V v16 = v12 * v13;
-    const V v17 = 0.25 * v12;
-    const V v18 = 0.5 * v15;
-    const V v19 = t2 - t0;
-    const V v20 = parameters[1] * v9;
-    const V v21 = v14 + v20;
-    const V v22 = 0.5 * v19;
-    const V v23 = v17 * v9;
+    const V v1 = X2 + d2, v2 = parameters[2] * t9, v3 = d3 + (X3 - parameters[0]), v4 = t3 - t6,
+        v5 = 0.5 * (v1 - (X0 + d0)), v6 = 0.5 * (X4 + d4 - v1), v7 = v3 * v3,
+        v8 = v7 * (0.08333333333333333 * v3), v9 = 0.5 * (t4 - t2),
+        v10 = v3 * t7 + parameters[1] * v4, v11 = 0.5 * (t2 - t0), v12 = 0.25 * v7 * v4;
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 1 * q;
-        (void)w;
+        const double *restrict w = rule + 1 * q; (void)w;
         const double *restrict B = basis + 4 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[4 * i] * d_lanes[6 + i];
-            p1 += B[4 * i + 1] * d_lanes[6 + i];
-            p2 += B[4 * i + 2] * d_lanes[6 + i];
-            p3 += B[4 * i + 3] * d_lanes[6 + i];
+            p0 += B[4 * i] * d_lanes[6 + i]; p1 += B[4 * i + 1] * d_lanes[6 + i];
+            p2 += B[4 * i + 2] * d_lanes[6 + i]; p3 += B[4 * i + 3] * d_lanes[6 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3;
-        const V v24 = p0 * parameters[3];
-        const V v25 = p2 * parameters[3];
-        const V v26 = p0 * v5;
-        const V v27 = p2 * v5;
-        const V v28 = p0 - p2;
-        const V v29 = softehl_vexp(v24);
-        const V v30 = softehl_vexp(v25);
-        const V v31 = 0.5 * v28;
-        const V v32 = t8 + v26;
-        const V v33 = t8 + v27;
-        const V v34 = v29 * v32;
-        const V v35 = w[0] * v31;
-        const V v36 = v30 * v33;
-        const V v37 = parameters[2] * v29;
-        const V v38 = parameters[2] * v30;
-        const V v39 = v37 * v22;
-        const V v40 = v10 * v34;
-        const V v41 = v39 + v40;
-        const V v42 = v37 * v10;
-        const V v43 = 1.0 / v42;
-        const V v44 = v38 * v18;
-        const V v45 = v11 * v36;
-        const V v46 = v44 + v45;
-        const V v47 = v38 * v11;
-        const V v48 = 1.0 / v47;
-        const V v49 = v16 * v43;
-        const V v50 = v49 * v41;
-        const V v51 = v16 * v48;
-        const V v52 = v51 * v46;
-        const V v53 = v50 - v23;
-        const V v54 = v43 * v53;
-        const V v55 = v52 - v23;
-        const V v56 = v48 * v55;
-        const V v57 = p1 * v54;
-        const V v58 = v21 + v57;
-        const V v59 = v35 * v54;
-        const V v60 = v35 * v56;
-        const V v61 = p3 * v56;
-        const V v62 = v61 + v58;
-        const V v63 = 0.5 * v62;
-        const V v64 = w[0] * v63;
-        const V v65 = -v64;
+        const V v13 = softehl_vexp(p0 * parameters[3]), v14 = softehl_vexp(p2 * parameters[3]),
+            v15 = w[0] * (0.5 * (p0 - p2)), v16 = parameters[2] * v13, v17 = parameters[2] * v14,
+            v18 = 1.0 / (v16 * v5), v19 = 1.0 / (v17 * v6),
+            v20 = v18 * (v8 * v18 * (v16 * v11 + v5 * (v13 * (t8 + p0 * v2))) - v12),
+            v21 = v19 * (v8 * v19 * (v17 * v9 + v6 * (v14 * (t8 + p2 * v2))) - v12),
+            v22 = v15 * v20, v23 = v15 * v21, v24 = w[0] * (0.5 * (p3 * v21 + (v10 + p1 * v20))),
+            v25 = -v24;
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
             (void)N, (void)D, (void)N1, (void)D1;
-            R_lanes[6 + i] += N * v65 + D * v59 + N1 * v64 + D1 * v60;
+            R_lanes[6 + i] += N * v25 + D * v22 + N1 * v24 + D1 * v23;
         }
     }
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (6 + modes));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_facet_pseudo_load, 6, (6 + modes), 0, 10, (6 + modes), 0)
 
-void softehl_film_facet_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_facet_fields_rate)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_facet_pseudo_load_group(points, modes, coordinates + 6 * e, dofs + (6 + modes) * e, 0, direction + 10 * e, parameters, rule, basis, values + (6 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_facet_pseudo_load_group(points, modes, coordinates + 6 * (n - SOFTEHL_LANES), dofs + (6 + modes) * (n - SOFTEHL_LANES), 0, direction + 10 * (n - SOFTEHL_LANES), parameters, rule, basis, values + (6 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 6];
-    softehl_pad(X, coordinates, 6, n);
-    double d[SOFTEHL_LANES * (6 + modes)];
-    softehl_pad(d, dofs, (6 + modes), n);
-    double t[SOFTEHL_LANES * 10];
-    softehl_pad(t, direction, 10, n);
-    double R[SOFTEHL_LANES * (6 + modes)];
-    softehl_film_facet_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (6 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_facet_fields_rate_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5;
-    softehl_load2(X + 4, 6, &X4, &X5);
-    (void)X4; (void)X5;
-    V d0, d1, d2, d3;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5;
+    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3); softehl_load2(X + 4, 6, &X4, &X5); (void)X1;
+    (void)X5;
+    V d0, d1, d2, d3, d4, d5;
     softehl_load4(d + 0, (6 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5;
-    softehl_load2(d + 4, (6 + modes), &d4, &d5);
-    (void)d4; (void)d5;
-    V t0, t1, t2, t3;
+    softehl_load2(d + 4, (6 + modes), &d4, &d5); (void)d1; (void)d5;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15;
     softehl_load4(t + 0, (10 + (6 + modes)), &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
     softehl_load4(t + 4, (10 + (6 + modes)), &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
     softehl_load4(t + 8, (10 + (6 + modes)), &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    V t12, t13, t14, t15;
-    softehl_load4(t + 12, (10 + (6 + modes)), &t12, &t13, &t14, &t15);
-    (void)t12; (void)t13; (void)t14; (void)t15;
+    softehl_load4(t + 12, (10 + (6 + modes)), &t12, &t13, &t14, &t15); (void)t1; (void)t5;
+    (void)t11; (void)t15;
 #if SOFTEHL_LANES > 1
     V d_lanes[(6 + modes)];
 #else
@@ -228,133 +111,38 @@ static void softehl_film_facet_fields_rate_group(
 #if SOFTEHL_LANES > 1
     softehl_gather(t_lanes, t, (10 + (6 + modes)));
 #endif
-    const V v1 = X0 + d0;
-    const V v2 = X2 + d2;
-    const V v3 = X4 + d4;
-    const V v4 = X3 - parameters[0];
-    const V v5 = d3 + v4;
-    const V v6 = v2 - v1;
-    const V v7 = t2 + t12;
-    const V v8 = v3 - v2;
-    const V v9 = 0.5 * v6;
-    const V v10 = t3 - t6;
-    const V v11 = 0.5 * v8;
-    const V v12 = t4 + t14;
-    const V v13 = v5 * v5;
-    const V v14 = 0.08333333333333333 * v5;
-    const V v15 = v5 * t7;
-    const V v16 = v10 + t13;
-    const V v17 = v12 - v7;
-    const V v18 = v13 * v14;
-    const V v19 = 0.25 * v13;
-    const V v20 = parameters[1] * v16;
-    const V v21 = v15 + v20;
-    const V v22 = 0.5 * v17;
-    const V v23 = v7 - t0;
-    const V v24 = v19 * v16;
-    const V v25 = v23 - t10;
-    const V v26 = 0.5 * v21;
-    const V v27 = 0.5 * v25;
+    const V v1 = X2 + d2, v2 = d3 + (X3 - parameters[0]), v3 = t2 + t12,
+        v4 = 0.5 * (v1 - (X0 + d0)), v5 = 0.5 * (X4 + d4 - v1), v6 = v2 * v2, v7 = t3 - t6 + t13,
+        v8 = v6 * (0.08333333333333333 * v2), v9 = 0.5 * (t4 + t14 - v3), v10 = 0.25 * v6 * v7,
+        v11 = 0.5 * (v2 * t7 + parameters[1] * v7), v12 = 0.5 * (v3 - t0 - t10);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 1 * q;
-        (void)w;
+        const double *restrict w = rule + 1 * q; (void)w;
         const double *restrict B = basis + 4 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[4 * i] * d_lanes[6 + i];
-            p1 += B[4 * i + 1] * d_lanes[6 + i];
-            p2 += B[4 * i + 2] * d_lanes[6 + i];
-            p3 += B[4 * i + 3] * d_lanes[6 + i];
+            p0 += B[4 * i] * d_lanes[6 + i]; p1 += B[4 * i + 1] * d_lanes[6 + i];
+            p2 += B[4 * i + 2] * d_lanes[6 + i]; p3 += B[4 * i + 3] * d_lanes[6 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3;
         V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0), tp2 = softehl_splat(0.0), tp3 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            tp0 += B[4 * i] * t_lanes[16 + i];
-            tp1 += B[4 * i + 1] * t_lanes[16 + i];
-            tp2 += B[4 * i + 2] * t_lanes[16 + i];
-            tp3 += B[4 * i + 3] * t_lanes[16 + i];
+            tp0 += B[4 * i] * t_lanes[16 + i]; tp1 += B[4 * i + 1] * t_lanes[16 + i];
+            tp2 += B[4 * i + 2] * t_lanes[16 + i]; tp3 += B[4 * i + 3] * t_lanes[16 + i];
         }
         (void)tp0, (void)tp1, (void)tp2, (void)tp3;
-        const V v28 = parameters[3] * tp0;
-        const V v29 = p0 * parameters[3];
-        const V v30 = p2 * parameters[3];
-        const V v31 = p2 * t9;
-        const V v32 = p0 * t9;
-        const V v33 = v32 + v28;
-        const V v34 = softehl_vexp(v29);
-        const V v35 = softehl_vexp(v30);
-        const V v36 = tp0 - tp2;
-        const V v37 = parameters[3] * tp2;
-        const V v38 = v31 + v37;
-        const V v39 = parameters[2] * v34;
-        const V v40 = parameters[2] * v35;
-        const V v41 = v39 * v33;
-        const V v42 = v40 * v38;
-        const V v43 = v34 * t8;
-        const V v44 = v43 + v41;
-        const V v45 = v35 * t8;
-        const V v46 = v45 + v42;
-        const V v47 = v39 * v27;
-        const V v48 = v9 * v44;
-        const V v49 = v47 + v48;
-        const V v50 = v39 * v9;
-        const V v51 = 1.0 / v50;
-        const V v52 = v40 * v22;
-        const V v53 = v11 * v46;
-        const V v54 = v52 + v53;
-        const V v55 = v40 * v11;
-        const V v56 = 1.0 / v55;
-        const V v57 = v18 * v51;
-        const V v58 = v18 * v56;
-        const V v59 = v57 * v49;
-        const V v60 = v57 * tp1;
-        const V v61 = v26 - v60;
-        const V v62 = v58 * v54;
-        const V v63 = v58 * tp3;
-        const V v64 = v26 - v63;
-        const V v65 = v59 - v24;
-        const V v66 = v51 * v65;
-        const V v67 = v62 - v24;
-        const V v68 = v56 * v67;
-        const V v69 = p1 * v66;
-        const V v70 = v69 + v61;
-        const V v71 = p3 * v68;
-        const V v72 = v71 + v64;
-        const V v73 = v70 + v72;
-        const V v74 = v70 - v72;
-        const V v75 = 0.5 * v73;
-        softehl_store3(R + 5 * q + 2, (5 * points), v36, v75, v74);
+        const V v13 = softehl_vexp(p0 * parameters[3]), v14 = softehl_vexp(p2 * parameters[3]),
+            v15 = tp0 - tp2, v16 = parameters[2] * v13, v17 = parameters[2] * v14,
+            v18 = v16 * v12 + v4 * (v13 * t8 + v16 * (p0 * t9 + parameters[3] * tp0)),
+            v19 = 1.0 / (v16 * v4),
+            v20 = v17 * v9 + v5 * (v14 * t8 + v17 * (p2 * t9 + parameters[3] * tp2)),
+            v21 = 1.0 / (v17 * v5), v22 = v8 * v19, v23 = v8 * v21,
+            v24 = p1 * (v19 * (v22 * v18 - v10)) + (v11 - v22 * tp1),
+            v25 = p3 * (v21 * (v23 * v20 - v10)) + (v11 - v23 * tp3), v26 = v24 - v25,
+            v27 = 0.5 * (v24 + v25);
+        softehl_store3(R + 5 * q + 2, (5 * points), v15, v27, v26);
     }
     for (ptrdiff_t q = 0; q < points; ++q) {
-        softehl_store2(R + 5 * q + 0, (5 * points), v7, v16);
+        softehl_store2(R + 5 * q + 0, (5 * points), v3, v7);
     }
 }
-
-void softehl_film_facet_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_facet_fields_rate_group(points, modes, coordinates + 6 * e, dofs + (6 + modes) * e, 0, direction + (10 + (6 + modes)) * e, parameters, rule, basis, values + (5 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_facet_fields_rate_group(points, modes, coordinates + 6 * (n - SOFTEHL_LANES), dofs + (6 + modes) * (n - SOFTEHL_LANES), 0, direction + (10 + (6 + modes)) * (n - SOFTEHL_LANES), parameters, rule, basis, values + (5 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 6];
-    softehl_pad(X, coordinates, 6, n);
-    double d[SOFTEHL_LANES * (6 + modes)];
-    softehl_pad(d, dofs, (6 + modes), n);
-    double t[SOFTEHL_LANES * (10 + (6 + modes))];
-    softehl_pad(t, direction, (10 + (6 + modes)), n);
-    double R[SOFTEHL_LANES * (5 * points)];
-    softehl_film_facet_fields_rate(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (5 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_facet_fields_rate, 6, (6 + modes), 0, (10 + (6 + modes)), (5 * points), 0)

@@ -39,22 +39,15 @@
 
 SOFTEHL_LANEWISE(erfc)
 
-static void softehl_film_rough_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_rough_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -71,557 +64,179 @@ static void softehl_film_rough_residual_group(
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
     const double v1 = parameters[11] * parameters[11];
-    const V v2 = X2 + d2;
-    const V v3 = X1 - parameters[0];
-    const V v4 = X3 - parameters[0];
-    const V v5 = d1 + v3;
-    const V v6 = d3 + v4;
-    const V v7 = d2 * parameters[6];
-    const V v8 = a1 + v7;
-    const V v9 = d0 * parameters[6];
-    const V v10 = a0 + v9;
-    const double v11 = 6.283185307179586 * parameters[4];
-    const double v12 = 0.3989422804014327 * parameters[9];
-    const V v13 = v2 - d0;
-    const double v14 = 1.0 / parameters[7];
-    const double v15 = 0.5 * parameters[7];
-    const V v16 = v13 - X0;
-    const V v17 = 0.5 * v16;
-    const V v18 = v6 - v5;
-    const V v19 = 0.5 * v18;
-    const double v20 = 4.0 * v14;
-    const V v21 = v19 * v19;
-    const V v22 = 1.0 / v17;
-    const V v23 = parameters[2] * v17;
-    const V v24 = v17 * v17;
-    const V v25 = v21 + v24;
-    const V v26 = softehl_vsqrt(v25);
-    const V v27 = parameters[5] * v26;
-    const V v28 = 0.5 * v22;
-    V s29 = softehl_splat(0.0);
-    V s30 = softehl_splat(0.0);
-    V s31 = softehl_splat(0.0);
-    V s32 = softehl_splat(0.0);
+    const V v2 = d1 + (X1 - parameters[0]), v3 = d3 + (X3 - parameters[0]),
+        v4 = a1 + d2 * parameters[6], v5 = a0 + d0 * parameters[6];
+    const double v6 = 6.283185307179586 * parameters[4], v7 = 0.3989422804014327 * parameters[9],
+        v8 = 1.0 / parameters[7], v9 = 0.5 * parameters[7];
+    const V v10 = 0.5 * (X2 + d2 - d0 - X0), v11 = 0.5 * (v3 - v2);
+    const double v12 = 4.0 * v8;
+    const V v13 = parameters[2] * v10, v14 = softehl_vsqrt(v11 * v11 + v10 * v10),
+        v15 = parameters[5] * v14, v16 = 0.5 * (1.0 / v10);
+    V s17 = {0}, s18 = {0}, s19 = {0}, s20 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v33 = 0.5 * w[0];
-        const double v34 = 0.5 + v33;
-        const double v35 = 0.5 - v33;
-        const V v36 = w[3] * v17;
-        const V v37 = v35 * v5;
-        const V v38 = v34 * v6;
-        const V v39 = v37 + v38;
-        const V v40 = v14 * v39;
-        const V v41 = parameters[0] + v39;
-        const V v42 = 2.7777777777777777 + v40;
-        const V v43 = 0.6944444444444444 + v40;
-        const V v44 = 12.25 + v40;
-        const V v45 = 5.444444444444445 + v40;
-        const V v46 = 1.3611111111111112 + v40;
-        const V v47 = 7.111111111111111 + v40;
-        const V v48 = 11.11111111111111 + v40;
-        const V v49 = 3.361111111111111 + v40;
-        const V v50 = 4.694444444444445 + v40;
-        const V v51 = 8.027777777777779 + v40;
-        const V v52 = 10.027777777777779 + v40;
-        const V v53 = v41 * v11;
-        const M v54 = softehl_le(softehl_splat(0.5), v40);
-        const V v55 = 9.0 + v40;
-        const V v56 = 1.0 + v40;
-        const V v57 = 0.25 + v40;
-        const V v58 = 0.1111111111111111 + v40;
-        const V v59 = v36 * v53;
-        const V v60 = 0.027777777777777776 + v40;
-        const V v61 = 0.5 * v55;
-        const V v62 = 0.5 * v56;
-        const V v63 = v55 * v61;
-        const V v64 = 0.5 * v57;
-        const V v65 = v56 * v62;
-        const V v66 = 0.5 * v58;
-        const V v67 = v57 * v64;
-        const V v68 = v58 * v66;
-        const V v69 = 0.5 * v60;
-        const V v70 = v60 * v69;
-        const V v71 = 0.5 * v47;
-        const V v72 = 0.5 * v48;
-        const V v73 = v47 * v71;
-        const V v74 = v48 * v72;
-        const V v75 = -v63;
-        const V v76 = -v65;
-        const V v77 = -v67;
-        const V v78 = -v68;
-        const V v79 = 0.5 * v49;
-        const V v80 = 0.5 * v50;
-        const V v81 = v49 * v79;
-        const V v82 = -v70;
-        const V v83 = v50 * v80;
-        const V v84 = softehl_vexp(v75);
-        const V v85 = softehl_vexp(v76);
-        const V v86 = -v73;
-        const V v87 = softehl_vexp(v77);
-        const V v88 = -v74;
-        const V v89 = softehl_vexp(v78);
-        const V v90 = softehl_vexp(v82);
-        const V v91 = 0.5 * v51;
-        const V v92 = softehl_vexp(v86);
-        const V v93 = -v81;
-        const V v94 = v51 * v91;
-        const V v95 = softehl_vexp(v88);
-        const V v96 = -v83;
-        const V v97 = 0.5 * v52;
-        const V v98 = v52 * v97;
-        const V v99 = softehl_vexp(v93);
-        const V v100 = softehl_vexp(v96);
-        const V v101 = 4.0 + v40;
-        const V v102 = 0.4444444444444444 + v40;
-        const V v103 = -v94;
-        const V v104 = 2.25 + v40;
-        const V v105 = 1.7777777777777777 + v40;
-        const V v106 = 6.25 + v40;
-        const V v107 = 0.5 * v101;
-        const V v108 = 0.5 * v102;
-        const V v109 = v101 * v107;
-        const V v110 = -v98;
-        const V v111 = v102 * v108;
-        const V v112 = 0.5 * v104;
-        const V v113 = softehl_vexp(v103);
-        const V v114 = v104 * v112;
-        const V v115 = 0.5 * v105;
-        const V v116 = 0.5 * v106;
-        const V v117 = v105 * v115;
-        const V v118 = v106 * v116;
-        const V v119 = softehl_vexp(v110);
-        const V v120 = -v109;
-        const V v121 = -v111;
-        const V v122 = -v114;
-        const V v123 = 0.5 * v42;
-        const V v124 = v42 * v123;
-        const V v125 = -v117;
-        const V v126 = -v118;
-        const V v127 = softehl_vexp(v120);
-        const V v128 = softehl_vexp(v121);
-        const V v129 = softehl_vexp(v122);
-        const V v130 = 0.5 * v43;
-        const V v131 = v43 * v130;
-        const V v132 = softehl_vexp(v125);
-        const V v133 = -v124;
-        const V v134 = softehl_vexp(v126);
-        const V v135 = 0.5 * v44;
-        const V v136 = v44 * v135;
-        const V v137 = 0.5 * v45;
-        const V v138 = v45 * v137;
-        const V v139 = 0.5 * v46;
-        const V v140 = v46 * v139;
-        const V v141 = -v131;
-        const V v142 = softehl_vexp(v133);
-        const V v143 = -v136;
-        const V v144 = -v138;
-        const V v145 = softehl_vexp(v141);
-        const V v146 = -v140;
-        const V v147 = softehl_vexp(v143);
-        const V v148 = softehl_vexp(v144);
-        const V v149 = softehl_vexp(v146);
-        const V v150 = 5.333333333333333 * v127;
-        const V v151 = 0.06584362139917696 * v128;
-        const V v152 = v150 + v151;
-        const V v153 = 1.6875 * v129;
-        const V v154 = v153 + v152;
-        const V v155 = 1.0534979423868314 * v132;
-        const V v156 = v155 + v154;
-        const V v157 = 13.020833333333334 * v134;
-        const V v158 = v157 + v156;
-        const V v159 = 2.57201646090535 * v142;
-        const V v160 = v159 + v158;
-        const V v161 = 0.16075102880658437 * v145;
-        const V v162 = v161 + v160;
-        const V v163 = 50.020833333333336 * v147;
-        const V v164 = v163 + v162;
-        const V v165 = 9.880658436213992 * v148;
-        const V v166 = v165 + v164;
-        const V v167 = 0.6175411522633745 * v149;
-        const V v168 = v167 + v166;
-        const V v169 = 41.1522633744856 * v95;
-        const V v170 = v169 + v168;
-        const V v171 = 3.765689300411523 * v99;
-        const V v172 = v171 + v170;
-        const V v173 = 7.345936213991769 * v100;
-        const V v174 = v173 + v172;
-        const V v175 = 21.48173868312757 * v113;
-        const V v176 = v175 + v174;
-        const V v177 = 33.51877572016461 * v119;
-        const V v178 = v177 + v176;
-        const V v179 = 27.0 * v84;
-        const V v180 = v179 + v178;
-        const V v181 = 0.3333333333333333 * v85;
-        const V v182 = v181 + v180;
-        const V v183 = 0.020833333333333332 * v87;
-        const V v184 = v183 + v182;
-        const V v185 = 0.00411522633744856 * v89;
-        const V v186 = v185 + v184;
-        const V v187 = 0.000257201646090535 * v90;
-        const V v188 = v187 + v186;
-        const V v189 = 16.855967078189302 * v92;
-        const V v190 = v189 + v188;
-        const V v191 = v12 * v190;
-        const V v192 = p0 + v191;
-        const V v193 = v59 * v192;
-        const V v194 = v34 * v193;
-        s29 += v194;
-        const V v195 = v35 * v193;
-        s30 += v195;
-        V v196 = v40;
-        const M m197 = ~v54;
-        if (softehl_any(m197)) {
-            const V v198 = 1.0 - v40;
-            const V v199 = 4.0 * v198;
-            const V v200 = 1.0 / v199;
-            v196 = softehl_blend(m197, v200, v196);
+        const double v21 = 0.5 * w[0], v22 = 0.5 + v21, v23 = 0.5 - v21;
+        const V v24 = v23 * v2 + v22 * v3, v25 = v8 * v24, v26 = 2.7777777777777777 + v25,
+            v27 = 0.6944444444444444 + v25, v28 = 12.25 + v25, v29 = 5.444444444444445 + v25,
+            v30 = 1.3611111111111112 + v25, v31 = 7.111111111111111 + v25,
+            v32 = 11.11111111111111 + v25, v33 = 3.361111111111111 + v25,
+            v34 = 4.694444444444445 + v25, v35 = 8.027777777777779 + v25,
+            v36 = 10.027777777777779 + v25, v37 = (parameters[0] + v24) * v6;
+        const M v38 = softehl_le(softehl_splat(0.5), v25);
+        const V v39 = 9.0 + v25, v40 = 1.0 + v25, v41 = 0.25 + v25, v42 = 0.1111111111111111 + v25,
+            v43 = 0.027777777777777776 + v25, v44 = softehl_vexp(-(v39 * (0.5 * v39))),
+            v45 = softehl_vexp(-(v40 * (0.5 * v40))), v46 = softehl_vexp(-(v41 * (0.5 * v41))),
+            v47 = softehl_vexp(-(v42 * (0.5 * v42))), v48 = softehl_vexp(-(v43 * (0.5 * v43))),
+            v49 = softehl_vexp(-(v31 * (0.5 * v31))), v50 = softehl_vexp(-(v32 * (0.5 * v32))),
+            v51 = softehl_vexp(-(v33 * (0.5 * v33))), v52 = softehl_vexp(-(v34 * (0.5 * v34))),
+            v53 = 4.0 + v25, v54 = 0.4444444444444444 + v25, v55 = 2.25 + v25,
+            v56 = 1.7777777777777777 + v25, v57 = 6.25 + v25,
+            v58 = softehl_vexp(-(v35 * (0.5 * v35))), v59 = softehl_vexp(-(v36 * (0.5 * v36))),
+            v60 = softehl_vexp(-(v53 * (0.5 * v53))), v61 = softehl_vexp(-(v54 * (0.5 * v54))),
+            v62 = softehl_vexp(-(v55 * (0.5 * v55))), v63 = softehl_vexp(-(v56 * (0.5 * v56))),
+            v64 = softehl_vexp(-(v57 * (0.5 * v57))), v65 = softehl_vexp(-(v26 * (0.5 * v26))),
+            v66 = softehl_vexp(-(v27 * (0.5 * v27))), v67 = softehl_vexp(-(v28 * (0.5 * v28))),
+            v68 = softehl_vexp(-(v29 * (0.5 * v29))), v69 = softehl_vexp(-(v30 * (0.5 * v30))),
+            v70 = 1.6875 * v62 + (5.333333333333333 * v60 + 0.06584362139917696 * v61),
+            v71 = 2.57201646090535 * v65 + (13.020833333333334 * v64 + (1.0534979423868314 * v63 + v70)),
+            v72 = 9.880658436213992 * v68 + (50.020833333333336 * v67 + (0.16075102880658437 * v66 + v71)),
+            v73 = 3.765689300411523 * v51 + (41.1522633744856 * v50 + (0.6175411522633745 * v69 + v72)),
+            v74 = 33.51877572016461 * v59 + (21.48173868312757 * v58 + (7.345936213991769 * v52 + v73)),
+            v75 = 0.020833333333333332 * v46 + (0.3333333333333333 * v45 + (27.0 * v44 + v74)),
+            v76 = 16.855967078189302 * v49 + (0.000257201646090535 * v48 + (0.00411522633744856 * v47 + v75)),
+            v77 = v7 * v76, v78 = p0 + v77, v79 = w[3] * v10 * v37 * v78, v80 = v22 * v79;
+        s17 += v80; const V v81 = v23 * v79; s18 += v81; V v82 = v25; const M m83 = ~v38;
+        if (softehl_any(m83)) {
+            const V v84 = 1.0 / (4.0 * (1.0 - v25)); v82 = softehl_blend(m83, v84, v82);
         }
-        const M v201 = softehl_eq(v196, v196);
-        const V v202 = v196 * v196;
-        V v203 = softehl_splat(0.0);
-        const M m204 = v201;
-        if (softehl_any(m204)) {
-            const M v205 = softehl_le(softehl_splat(6.0), v196);
-            V v206 = softehl_splat(0.0);
-            const M m207 = v205 & m204;
-            if (softehl_any(m207)) {
-                const V v208 = 1.0 / v202;
-                const V v209 = 0.0003054234477944064 * v208;
-                const V v210 = 4.1273438891135995e-05 + v209;
-                const V v211 = 9.0 * v208;
-                const V v212 = v210 * v211;
-                const V v213 = 5.0707367780538514e-05 + v212;
-                const V v214 = v211 * v213;
-                const V v215 = 6.3000063000063e-05 + v214;
-                const V v216 = v211 * v215;
-                const V v217 = 7.925814377427281e-05 + v216;
-                const V v218 = v211 * v217;
-                const V v219 = 0.00010112245929821013 + v218;
-                const V v220 = v211 * v219;
-                const V v221 = 0.00013108466946064277 + v220;
-                const V v222 = v211 * v221;
-                const V v223 = 0.00017303176368804846 + v222;
-                const V v224 = v211 * v223;
-                const V v225 = 0.0002332167249708479 + v224;
-                const V v226 = v211 * v225;
-                const V v227 = 0.00032206119162640903 + v226;
-                const V v228 = v211 * v227;
-                const V v229 = 0.0004576659038901602 + v228;
-                const V v230 = v211 * v229;
-                const V v231 = 0.0006730380939561179 + v230;
-                const V v232 = v211 * v231;
-                const V v233 = 0.0010319917440660474 + v232;
-                const V v234 = v211 * v233;
-                const V v235 = 0.0016670635865682305 + v234;
-                const V v236 = v211 * v235;
-                const V v237 = 0.002879473467708762 + v236;
-                const V v238 = v211 * v237;
-                const V v239 = 0.005439005439005439 + v238;
-                const V v240 = v211 * v239;
-                const V v241 = 0.011655011655011656 + v240;
-                const V v242 = v211 * v241;
-                const V v243 = 0.030303030303030304 + v242;
-                const V v244 = v211 * v243;
-                const V v245 = 0.1111111111111111 + v244;
-                const V v246 = v211 * v245;
-                const V v247 = 1.0 + v246;
-                v206 = softehl_blend(m207, v247, v206);
+        const M v85 = softehl_eq(v82, v82); const V v86 = v82 * v82; V v87 = softehl_splat(0.0);
+        const M m88 = v85;
+        if (softehl_any(m88)) {
+            const M v89 = softehl_le(softehl_splat(6.0), v82); V v90 = softehl_splat(0.0);
+            const M m91 = v89 & m88;
+            if (softehl_any(m91)) {
+                const V v92 = 1.0 / v86, v93 = 9.0 * v92,
+                    v94 = 5.0707367780538514e-05 + (4.1273438891135995e-05 + 0.0003054234477944064 * v92) * v93,
+                    v95 = v93 * (7.925814377427281e-05 + v93 * (6.3000063000063e-05 + v93 * v94)),
+                    v96 = v93 * (0.00013108466946064277 + v93 * (0.00010112245929821013 + v95)),
+                    v97 = v93 * (0.0002332167249708479 + v93 * (0.00017303176368804846 + v96)),
+                    v98 = v93 * (0.0004576659038901602 + v93 * (0.00032206119162640903 + v97)),
+                    v99 = v93 * (0.0010319917440660474 + v93 * (0.0006730380939561179 + v98)),
+                    v100 = v93 * (0.002879473467708762 + v93 * (0.0016670635865682305 + v99)),
+                    v101 = v93 * (0.011655011655011656 + v93 * (0.005439005439005439 + v100)),
+                    v102 = 1.0 + v93 * (0.1111111111111111 + v93 * (0.030303030303030304 + v101));
+                v90 = softehl_blend(m91, v102, v90);
             }
-            const M m248 = ~v205 & m204;
-            if (softehl_any(m248)) {
-                const V v249 = 0.1111111111111111 * v202;
-                const M v250 = softehl_lt(softehl_splat(3.0), v196);
-                const V v251 = 0.3645833333333333 * v196;
-                const V v252 = 0.3333333333333333 * v196;
-                const V v253 = 1.0 - v249;
-                const V v254 = v253 * v253;
-                const V v255 = v253 * v254;
-                V v256 = softehl_splat(0.0);
-                const M m257 = v250 & m248;
-                if (softehl_any(m257)) {
-                    const V v258 = 0.022222222222222223 * v196;
-                    const V v259 = 1.0 + v252;
-                    const V v260 = (-1.0) + v252;
-                    const V v261 = 3.3333333333333335 * v202;
-                    const V v262 = (-80.0) + v261;
-                    const V v263 = 1.0 / v260;
-                    const V v264 = v249 * v262;
-                    const V v265 = 66.0 + v264;
-                    const V v266 = v259 * v263;
-                    const V v267 = v258 * v265;
-                    const V v268 = softehl_vlog(v266);
-                    const V v269 = v268 * v255;
-                    const V v270 = v269 + v267;
-                    const V v271 = v251 * v270;
-                    v256 = softehl_blend(m257, v271, v256);
+            const M m103 = ~v89 & m88;
+            if (softehl_any(m103)) {
+                const V v104 = 0.1111111111111111 * v86;
+                const M v105 = softehl_lt(softehl_splat(3.0), v82);
+                const V v106 = 0.3645833333333333 * v82, v107 = 0.3333333333333333 * v82,
+                    v108 = 1.0 - v104, v109 = v108 * (v108 * v108);
+                V v110 = softehl_splat(0.0); const M m111 = v105 & m103;
+                if (softehl_any(m111)) {
+                    const V v112 = 0.022222222222222223 * v82 * (66.0 + v104 * ((-80.0) + 3.3333333333333335 * v86)),
+                        v113 = softehl_vlog((1.0 + v107) * (1.0 / ((-1.0) + v107))),
+                        v114 = v106 * (v113 * v109 + v112);
+                    v110 = softehl_blend(m111, v114, v110);
                 }
-                const M m272 = ~v250 & m248;
-                if (softehl_any(m272)) {
-                    const V v273 = 100.0 * v196;
-                    const V v274 = 300.0 + v273;
-                    const V v275 = 0.005555555555555556 * v196;
-                    const V v276 = 49.0 * v196;
-                    const V v277 = 60.0 + v276;
-                    const V v278 = softehl_vlog(v274);
-                    const V v279 = v252 * v277;
-                    const V v280 = (-405.0) + v279;
-                    const V v281 = v252 * v280;
-                    const V v282 = (-160.0) + v281;
-                    const V v283 = v252 * v282;
-                    const V v284 = 345.0 + v283;
-                    const V v285 = v252 * v284;
-                    const V v286 = 132.0 + v285;
-                    const V v287 = v275 * v286;
-                    const V v288 = (-0.9166666666666666) + v287;
-                    const V v289 = v278 * v255;
-                    const V v290 = v289 + v288;
-                    const V v291 = v251 * v290;
-                    v256 = softehl_blend(m272, v291, v256);
+                const M m115 = ~v105 & m103;
+                if (softehl_any(m115)) {
+                    const V v116 = softehl_vlog(300.0 + 100.0 * v82),
+                        v117 = v107 * ((-160.0) + v107 * ((-405.0) + v107 * (60.0 + 49.0 * v82))),
+                        v118 = (-0.9166666666666666) + 0.005555555555555556 * v82 * (132.0 + v107 * (345.0 + v117)),
+                        v119 = v106 * (v116 * v109 + v118);
+                    v110 = softehl_blend(m115, v119, v110);
                 }
-                v206 = softehl_blend(m248, v256, v206);
+                v90 = softehl_blend(m103, v110, v90);
             }
-            v203 = softehl_blend(m204, v206, v203);
+            v87 = softehl_blend(m88, v90, v87);
         }
-        const M m292 = ~v201;
-        if (softehl_any(m292)) {
-            const V v293 = 6.0 - v196;
-            const V v294 = v293 * v293;
-            const V v295 = v293 * v294;
-            v203 = softehl_blend(m292, v295, v203);
+        const M m120 = ~v85;
+        if (softehl_any(m120)) {
+            const V v121 = 6.0 - v82, v122 = v121 * (v121 * v121);
+            v87 = softehl_blend(m120, v122, v87);
         }
-        const M v296 = softehl_le(v196, softehl_splat(5.0));
-        V v297 = softehl_splat(0.0);
-        V v298 = softehl_splat(0.0);
-        const M m299 = v296;
-        if (softehl_any(m299)) {
-            const V v300 = softehl_vpow(v196, 0.98);
-            const V v301 = softehl_vpow(v196, 2.31);
-            const V v302 = 1.899 * v300;
-            const V v303 = 11.1 * v301;
-            const V v304 = 0.05 * v202;
-            const V v305 = 0.11 * v202;
-            const V v306 = 0.92 * v196;
-            const V v307 = v304 - v306;
-            const V v308 = 2.38 * v196;
-            const V v309 = v305 - v308;
-            const V v310 = softehl_vexp(v307);
-            const V v311 = softehl_vexp(v309);
-            const V v312 = v302 * v310;
-            const V v313 = v303 * v311;
-            v297 = softehl_blend(m299, v313, v297);
-            v298 = softehl_blend(m299, v312, v298);
+        const M v123 = softehl_le(v82, softehl_splat(5.0));
+        V v124 = softehl_splat(0.0), v125 = softehl_splat(0.0);
+        const M m126 = v123;
+        if (softehl_any(m126)) {
+            const V v127 = softehl_vpow(v82, 0.98), v128 = softehl_vpow(v82, 2.31),
+                v129 = softehl_vexp(0.05 * v86 - 0.92 * v82),
+                v130 = softehl_vexp(0.11 * v86 - 2.38 * v82), v131 = 1.899 * v127 * v129,
+                v132 = 11.1 * v128 * v130;
+            v124 = softehl_blend(m126, v132, v124); v125 = softehl_blend(m126, v131, v125);
         }
-        const M m314 = ~v296;
-        if (softehl_any(m314)) {
-            const V v315 = 0.25 * v196;
-            const V v316 = 1.25 - v315;
-            const V v317 = 0.818 * v196;
-            const V v318 = 4.09 - v317;
-            const V v319 = softehl_vexp(v316);
-            const V v320 = softehl_vexp(v318);
-            const V v321 = 0.3225737734624401 * v319;
-            const V v322 = 0.048545522453863246 * v320;
-            v297 = softehl_blend(m314, v322, v297);
-            v298 = softehl_blend(m314, v321, v298);
+        const M m133 = ~v123;
+        if (softehl_any(m133)) {
+            const V v134 = softehl_vexp(1.25 - 0.25 * v82), v135 = softehl_vexp(4.09 - 0.818 * v82),
+                v136 = 0.3225737734624401 * v134, v137 = 0.048545522453863246 * v135;
+            v124 = softehl_blend(m133, v137, v124); v125 = softehl_blend(m133, v136, v125);
         }
-        const V v323 = v34 * v8;
-        const V v324 = parameters[1] - v323;
-        const V v325 = v35 * v10;
-        const V v326 = v324 - v325;
-        const M v327 = softehl_lt(softehl_splat(0.0), v326);
-        const V v328 = parameters[8] * v297;
-        const V v329 = v203 + v328;
-        const V v330 = softehl_blend(v327, v326, softehl_splat(0.0));
-        const V v331 = softehl_blend(v327, softehl_splat(0.0), v326);
-        const double v332 = 0.5 * w[2];
-        const V v333 = p0 * parameters[3];
-        const V v334 = softehl_vexp(v333);
-        const V v335 = 1.0 - p6;
-        const V v336 = 1.0 - p4;
-        const V v337 = p1 * v28;
-        const double v338 = 0.5 - v332;
-        const double v339 = 0.5 + v332;
-        const V v340 = v335 * v331;
-        const V v341 = v338 * v5;
-        const V v342 = w[3] * v53;
-        const V v343 = v19 * v192;
-        const V v344 = v336 * v330;
-        const V v345 = v340 + v344;
-        const V v346 = v339 * v6;
-        const V v347 = v341 + v346;
-        const V v348 = parameters[7] * v196;
-        const V v349 = 0.66 * v196;
-        const V v350 = v14 * v347;
-        const V v351 = v348 * v337;
-        const V v352 = 1.0 / v348;
-        const V v353 = -v349;
-        const V v354 = v326 * v326;
-        const V v355 = v1 + v354;
-        const V v356 = parameters[10] * v326;
-        const V v357 = softehl_vsqrt(v355);
-        const M v358 = softehl_le(softehl_splat(0.5), v350);
-        const V v359 = softehl_vexp(v353);
-        const V v360 = 1.4 * v359;
-        const V v361 = 1.0 - v360;
-        const V v362 = parameters[2] * v334;
-        const V v363 = v362 * v345;
-        const V v364 = v352 * v363;
-        const V v365 = 1.0 / v357;
-        const V v366 = v356 * v365;
-        const V v367 = v366 * v191;
-        const V v368 = v361 * v351;
-        const V v369 = v367 - v368;
-        const V v370 = v364 * v329;
-        const V v371 = v370 + v369;
-        const V v372 = v27 * v371;
-        const V v373 = v343 - v372;
-        const V v374 = v342 * v373;
-        const V v375 = v34 * v374;
-        s31 += v375;
-        const V v376 = v35 * v374;
-        s32 += v376;
-        V v377 = v350;
-        const M m378 = ~v358;
-        if (softehl_any(m378)) {
-            const V v379 = v347 * v20;
-            const V v380 = 4.0 - v379;
-            const V v381 = 1.0 / v380;
-            v377 = softehl_blend(m378, v381, v377);
+        const V v138 = parameters[1] - v22 * v4 - v23 * v5;
+        const M v139 = softehl_lt(softehl_splat(0.0), v138);
+        const V v140 = softehl_blend(v139, v138, softehl_splat(0.0)),
+            v141 = softehl_blend(v139, softehl_splat(0.0), v138);
+        const double v142 = 0.5 * w[2];
+        const V v143 = softehl_vexp(p0 * parameters[3]),
+            v144 = (1.0 - p6) * v141 + (1.0 - p4) * v140,
+            v145 = (0.5 - v142) * v2 + (0.5 + v142) * v3, v146 = parameters[7] * v82,
+            v147 = v8 * v145, v148 = softehl_vsqrt(v1 + v138 * v138);
+        const M v149 = softehl_le(softehl_splat(0.5), v147);
+        const V v150 = softehl_vexp(-(0.66 * v82)),
+            v151 = parameters[10] * v138 * (1.0 / v148) * v77 - (1.0 - 1.4 * v150) * (v146 * (p1 * v16)),
+            v152 = 1.0 / v146 * (parameters[2] * v143 * v144) * (v87 + parameters[8] * v124),
+            v153 = w[3] * v37 * (v11 * v78 - v15 * (v152 + v151)), v154 = v22 * v153;
+        s19 += v154; const V v155 = v23 * v153; s20 += v155; V v156 = v147; const M m157 = ~v149;
+        if (softehl_any(m157)) {
+            const V v158 = 1.0 / (4.0 - v145 * v12); v156 = softehl_blend(m157, v158, v156);
         }
-        const double v382 = 0.5 * w[1];
-        const V v383 = parameters[7] * v377;
-        const double v384 = 0.5 - v382;
-        const double v385 = 0.5 + v382;
-        const V v386 = v384 * v5;
-        const V v387 = v385 * v6;
-        const V v388 = v386 + v387;
-        const V v389 = v14 * v388;
-        const M v390 = softehl_le(softehl_splat(0.5), v389);
-        V v391 = v389;
-        const M m392 = ~v390;
-        if (softehl_any(m392)) {
-            const V v393 = v388 * v20;
-            const V v394 = 4.0 - v393;
-            const V v395 = 1.0 / v394;
-            v391 = softehl_blend(m392, v395, v391);
+        const double v159 = 0.5 * w[1];
+        const V v160 = parameters[7] * v156, v161 = (0.5 - v159) * v2 + (0.5 + v159) * v3,
+            v162 = v8 * v161;
+        const M v163 = softehl_le(softehl_splat(0.5), v162); V v164 = v162; const M m165 = ~v163;
+        if (softehl_any(m165)) {
+            const V v166 = 1.0 / (4.0 - v161 * v12); v164 = softehl_blend(m165, v166, v164);
         }
-        const V v396 = p2 * parameters[3];
-        const V v397 = 0.08333333333333333 * p3;
-        const V v398 = parameters[7] * v391;
-        const V v399 = softehl_vexp(v396);
-        const V v400 = 0.56 * v196;
-        const V v401 = v15 * v345;
-        const V v402 = v398 * v383;
-        const V v403 = -v400;
-        const V v404 = v398 + v383;
-        const V v405 = 0.5 * v40;
-        const V v406 = 0.7071067811865476 * v40;
-        const V v407 = 0.5 * v404;
-        const V v408 = v40 * v405;
-        const V v409 = softehl_vexp(v403);
-        const V v410 = softehl_verfc(v406);
-        const V v411 = parameters[8] * v298;
-        const V v412 = -v408;
-        const V v413 = 0.5 * v410;
-        const V v414 = 1.0 - v413;
-        const V v415 = v407 * v407;
-        const V v416 = v40 * v414;
-        const V v417 = v416 + v411;
-        const V v418 = 0.9 * v409;
-        const V v419 = 1.0 - v418;
-        const V v420 = v397 * v419;
-        const V v421 = v407 * v420;
-        const V v422 = softehl_vexp(v412);
-        const V v423 = 1.0 / v415;
-        const V v424 = v402 * v423;
-        const V v425 = 0.3989422804014327 * v422;
-        const V v426 = v425 + v417;
-        const V v427 = v401 * v426;
-        const V v428 = v399 * v23;
-        const V v429 = 1.0 / v428;
-        const V v430 = v429 * v421;
-        const V v431 = v415 * v430;
-        const V v432 = v424 * v431;
-        const V v433 = v427 - v432;
-        const V v434 = v424 * v433;
-        const V v435 = w[3] * v434;
+        const V v167 = parameters[7] * v164, v168 = softehl_vexp(p2 * parameters[3]),
+            v169 = 0.5 * (v167 + v160), v170 = softehl_vexp(-(0.56 * v82)),
+            v171 = softehl_verfc(0.7071067811865476 * v25), v172 = v169 * v169,
+            v173 = softehl_vexp(-(v25 * (0.5 * v25))), v174 = v167 * v160 * (1.0 / v172),
+            v175 = 0.3989422804014327 * v173 + (v25 * (1.0 - 0.5 * v171) + parameters[8] * v125),
+            v176 = 1.0 / (v168 * v13) * (v169 * (0.08333333333333333 * p3 * (1.0 - 0.9 * v170))),
+            v177 = w[3] * (v174 * (v9 * v144 * v175 - v174 * (v172 * v176)));
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
             (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
-            R_lanes[4 + i] += D1 * v435;
+            R_lanes[4 + i] += D1 * v177;
         }
     }
-    const V v436 = -s29;
-    const V v437 = -s30;
-    R_lanes[0] = s32;
-    R_lanes[1] = v437;
-    R_lanes[2] = s31;
-    R_lanes[3] = v436;
+    const V v178 = -s17, v179 = -s18;
+    R_lanes[0] = s20; R_lanes[1] = v179; R_lanes[2] = s19; R_lanes[3] = v178;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_rough_residual, 4, (4 + modes), 2, 0, (4 + modes), 0)
 
-void softehl_film_rough_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_rough_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_rough_residual_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_rough_residual_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_rough_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_rough_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -644,1174 +259,369 @@ static void softehl_film_rough_tangent_group(
 #endif
     for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
         K_lanes[i] = softehl_splat(0.0);
-    const double v1 = parameters[11] * parameters[11];
-    const double v2 = 6.283185307179586 * parameters[4];
-    const V v3 = X2 + d2;
-    const double v4 = 0.3989422804014327 * parameters[9];
-    const double v5 = parameters[2] * parameters[3];
-    const V v6 = d2 * parameters[6];
-    const V v7 = a1 + v6;
-    const V v8 = X1 - parameters[0];
-    const V v9 = X3 - parameters[0];
-    const V v10 = d1 + v8;
-    const V v11 = d3 + v9;
-    const double v12 = 0.5 * parameters[6];
-    const V v13 = d0 * parameters[6];
-    const V v14 = a0 + v13;
-    const V v15 = v3 - d0;
-    const double v16 = 1.0 / parameters[7];
-    const double v17 = parameters[7] * parameters[8];
-    const V v18 = v15 - X0;
-    const V v19 = 0.5 * v18;
-    const V v20 = v11 - v10;
-    const V v21 = 0.5 * v20;
-    const double v22 = 4.0 * v16;
-    const V v23 = v2 * v19;
-    const V v24 = 1.0 / v19;
-    const V v25 = v19 * v5;
-    const V v26 = v19 * v19;
-    const V v27 = parameters[5] * v19;
-    const V v28 = v21 * v21;
-    const V v29 = v28 + v26;
-    const V v30 = parameters[5] * v21;
-    const V v31 = softehl_vsqrt(v29);
-    const V v32 = parameters[5] * v31;
-    const V v33 = 1.0 / v29;
-    const V v34 = softehl_vsqrt(v33);
-    const V v35 = 0.5 * v34;
-    const V v36 = v32 * v5;
-    const V v37 = v27 * v35;
-    const V v38 = v30 * v35;
-    const V v39 = parameters[6] * v32;
-    const V v40 = 0.5 * v24;
-    const V v41 = v24 * v40;
-    const V v42 = v24 * v32;
-    const V v43 = v32 * v41;
-    V s44 = softehl_splat(0.0);
-    V s45 = softehl_splat(0.0);
-    V s46 = softehl_splat(0.0);
-    V s47 = softehl_splat(0.0);
-    V s48 = softehl_splat(0.0);
-    V s49 = softehl_splat(0.0);
-    V s50 = softehl_splat(0.0);
-    V s51 = softehl_splat(0.0);
-    V s52 = softehl_splat(0.0);
-    V s53 = softehl_splat(0.0);
-    V s54 = softehl_splat(0.0);
-    V s55 = softehl_splat(0.0);
-    V s56 = softehl_splat(0.0);
-    V s57 = softehl_splat(0.0);
-    V s58 = softehl_splat(0.0);
-    V s59 = softehl_splat(0.0);
-    V s60 = softehl_splat(0.0);
-    V s61 = softehl_splat(0.0);
+    const double v1 = parameters[11] * parameters[11], v2 = 6.283185307179586 * parameters[4],
+        v3 = 0.3989422804014327 * parameters[9], v4 = parameters[2] * parameters[3];
+    const V v5 = a1 + d2 * parameters[6], v6 = d1 + (X1 - parameters[0]),
+        v7 = d3 + (X3 - parameters[0]);
+    const double v8 = 0.5 * parameters[6]; const V v9 = a0 + d0 * parameters[6];
+    const double v10 = 1.0 / parameters[7], v11 = parameters[7] * parameters[8];
+    const V v12 = 0.5 * (X2 + d2 - d0 - X0), v13 = 0.5 * (v7 - v6);
+    const double v14 = 4.0 * v10;
+    const V v15 = v2 * v12, v16 = 1.0 / v12, v17 = v12 * v4, v18 = v13 * v13 + v12 * v12,
+        v19 = softehl_vsqrt(v18), v20 = parameters[5] * v19, v21 = softehl_vsqrt(1.0 / v18),
+        v22 = 0.5 * v21, v23 = v20 * v4, v24 = parameters[5] * v12 * v22,
+        v25 = parameters[5] * v13 * v22, v26 = parameters[6] * v20, v27 = v16 * v20,
+        v28 = v20 * (v16 * (0.5 * v16));
+    V s29 = {0}, s30 = {0}, s31 = {0}, s32 = {0}, s33 = {0}, s34 = {0}, s35 = {0}, s36 = {0},
+        s37 = {0}, s38 = {0}, s39 = {0}, s40 = {0}, s41 = {0}, s42 = {0}, s43 = {0}, s44 = {0},
+        s45 = {0}, s46 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v62 = 0.5 * w[0];
-        const double v63 = 0.5 + v62;
-        const double v64 = 0.5 - v62;
-        const V v65 = v64 * v10;
-        const double v66 = v64 * w[3];
-        const double v67 = v64 * v16;
-        const double v68 = v63 * v16;
-        const double v69 = v63 * w[3];
-        const V v70 = v63 * v11;
-        const V v71 = v65 + v70;
-        const V v72 = v16 * v71;
-        const V v73 = parameters[0] + v71;
-        const V v74 = v73 * v2;
-        const V v75 = 1.3611111111111112 + v72;
-        const V v76 = 7.111111111111111 + v72;
-        const V v77 = 11.11111111111111 + v72;
-        const V v78 = 3.361111111111111 + v72;
-        const V v79 = 4.694444444444445 + v72;
-        const V v80 = 8.027777777777779 + v72;
-        const V v81 = 10.027777777777779 + v72;
-        const M v82 = softehl_le(softehl_splat(0.5), v72);
-        const V v83 = 9.0 + v72;
-        const V v84 = 1.0 + v72;
-        const V v85 = 0.25 + v72;
-        const V v86 = 0.1111111111111111 + v72;
-        const V v87 = 0.027777777777777776 + v72;
-        const V v88 = 4.0 + v72;
-        const V v89 = 0.4444444444444444 + v72;
-        const V v90 = 2.25 + v72;
-        const V v91 = 1.7777777777777777 + v72;
-        const V v92 = 0.5 * v83;
-        const V v93 = 0.5 * v84;
-        const V v94 = 0.5 * v85;
-        const V v95 = 0.5 * v86;
-        const V v96 = 0.5 * v87;
-        const V v97 = 0.5 * v88;
-        const V v98 = 0.5 * v89;
-        const V v99 = 0.5 * v91;
-        const V v100 = v83 * v92;
-        const V v101 = 27.0 * v83;
-        const V v102 = v84 * v93;
-        const V v103 = v85 * v94;
-        const V v104 = v86 * v95;
-        const V v105 = v87 * v96;
-        const V v106 = v88 * v97;
-        const V v107 = v89 * v98;
-        const V v108 = v91 * v99;
-        const V v109 = 0.3333333333333333 * v84;
-        const V v110 = -v100;
-        const V v111 = -v102;
-        const V v112 = -v103;
-        const V v113 = -v104;
-        const V v114 = -v105;
-        const V v115 = -v106;
-        const V v116 = -v107;
-        const V v117 = -v108;
-        const V v118 = softehl_vexp(v110);
-        const V v119 = softehl_vexp(v111);
-        const V v120 = softehl_vexp(v112);
-        const V v121 = softehl_vexp(v113);
-        const V v122 = softehl_vexp(v114);
-        const V v123 = softehl_vexp(v115);
-        const V v124 = softehl_vexp(v116);
-        const V v125 = softehl_vexp(v117);
-        const V v126 = 0.020833333333333332 * v85;
-        const V v127 = 0.00411522633744856 * v86;
-        const V v128 = 0.000257201646090535 * v87;
-        const V v129 = 5.333333333333333 * v88;
-        const V v130 = 0.06584362139917696 * v89;
-        const V v131 = 1.0534979423868314 * v91;
-        const V v132 = 0.5 * v90;
-        const V v133 = 1.6875 * v90;
-        const V v134 = v90 * v132;
-        const V v135 = 0.5 * v75;
-        const V v136 = 0.6175411522633745 * v75;
-        const V v137 = v75 * v135;
-        const V v138 = 0.5 * v76;
-        const V v139 = 16.855967078189302 * v76;
-        const V v140 = v76 * v138;
-        const V v141 = -v134;
-        const V v142 = 0.5 * v77;
-        const V v143 = 41.1522633744856 * v77;
-        const V v144 = v77 * v142;
-        const V v145 = -v137;
-        const V v146 = 0.5 * v78;
-        const V v147 = 3.765689300411523 * v78;
-        const V v148 = v78 * v146;
-        const V v149 = -v140;
-        const V v150 = softehl_vexp(v141);
-        const V v151 = 0.5 * v79;
-        const V v152 = 7.345936213991769 * v79;
-        const V v153 = v79 * v151;
-        const V v154 = -v144;
-        const V v155 = softehl_vexp(v145);
-        const V v156 = softehl_vexp(v149);
-        const V v157 = -v148;
-        const V v158 = 0.5 * v80;
-        const V v159 = 21.48173868312757 * v80;
-        const V v160 = v80 * v158;
-        const V v161 = softehl_vexp(v154);
-        const V v162 = -v153;
-        const V v163 = 0.5 * v81;
-        const V v164 = 33.51877572016461 * v81;
-        const V v165 = v81 * v163;
-        const V v166 = softehl_vexp(v157);
-        const V v167 = -v160;
-        const V v168 = softehl_vexp(v162);
-        const V v169 = 0.5 * v74;
-        const V v170 = v19 * v74;
-        const V v171 = -v165;
-        const V v172 = 6.25 + v72;
-        const V v173 = 2.7777777777777777 + v72;
-        const V v174 = 0.6944444444444444 + v72;
-        const V v175 = 12.25 + v72;
-        const V v176 = 5.444444444444445 + v72;
-        const V v177 = softehl_vexp(v167);
-        const V v178 = w[3] * v170;
-        const V v179 = 0.5 * v172;
-        const V v180 = 0.5 * v173;
-        const V v181 = 0.5 * v174;
-        const V v182 = 0.5 * v175;
-        const V v183 = 13.020833333333334 * v172;
-        const V v184 = v172 * v179;
-        const V v185 = softehl_vexp(v171);
-        const V v186 = v173 * v180;
-        const V v187 = 2.57201646090535 * v173;
-        const V v188 = v174 * v181;
-        const V v189 = 0.16075102880658437 * v174;
-        const V v190 = v175 * v182;
-        const V v191 = 50.020833333333336 * v175;
-        const V v192 = 0.5 * v176;
-        const V v193 = -v184;
-        const V v194 = -v186;
-        const V v195 = -v188;
-        const V v196 = -v190;
-        const V v197 = v176 * v192;
-        const V v198 = 9.880658436213992 * v176;
-        const V v199 = softehl_vexp(v193);
-        const V v200 = softehl_vexp(v194);
-        const V v201 = softehl_vexp(v195);
-        const V v202 = softehl_vexp(v196);
-        const V v203 = -v197;
-        const V v204 = softehl_vexp(v203);
-        const V v205 = v199 * v183;
-        const V v206 = 13.020833333333334 * v199;
-        const V v207 = v200 * v187;
-        const V v208 = v205 + v207;
-        const V v209 = 2.57201646090535 * v200;
-        const V v210 = v206 + v209;
-        const V v211 = v201 * v189;
-        const V v212 = v211 + v208;
-        const V v213 = 0.16075102880658437 * v201;
-        const V v214 = v213 + v210;
-        const V v215 = v202 * v191;
-        const V v216 = v215 + v212;
-        const V v217 = 50.020833333333336 * v202;
-        const V v218 = v217 + v214;
-        const V v219 = v204 * v198;
-        const V v220 = v219 + v216;
-        const V v221 = 9.880658436213992 * v204;
-        const V v222 = v221 + v218;
-        const V v223 = 7.345936213991769 * v168;
-        const V v224 = v223 + v222;
-        const V v225 = v168 * v152;
-        const V v226 = v225 + v220;
-        const V v227 = 21.48173868312757 * v177;
-        const V v228 = v227 + v224;
-        const V v229 = v177 * v159;
-        const V v230 = v229 + v226;
-        const V v231 = 33.51877572016461 * v185;
-        const V v232 = v231 + v228;
-        const V v233 = v185 * v164;
-        const V v234 = v233 + v230;
-        const V v235 = 27.0 * v118;
-        const V v236 = v235 + v232;
-        const V v237 = v118 * v101;
-        const V v238 = v237 + v234;
-        const V v239 = 0.3333333333333333 * v119;
-        const V v240 = v239 + v236;
-        const V v241 = v119 * v109;
-        const V v242 = v241 + v238;
-        const V v243 = 0.020833333333333332 * v120;
-        const V v244 = v243 + v240;
-        const V v245 = v120 * v126;
-        const V v246 = v245 + v242;
-        const V v247 = 0.00411522633744856 * v121;
-        const V v248 = v247 + v244;
-        const V v249 = v121 * v127;
-        const V v250 = v249 + v246;
-        const V v251 = 0.000257201646090535 * v122;
-        const V v252 = v251 + v248;
-        const V v253 = v122 * v128;
-        const V v254 = v253 + v250;
-        const V v255 = 5.333333333333333 * v123;
-        const V v256 = v255 + v252;
-        const V v257 = v123 * v129;
-        const V v258 = v257 + v254;
-        const V v259 = 0.06584362139917696 * v124;
-        const V v260 = v259 + v256;
-        const V v261 = v124 * v130;
-        const V v262 = v261 + v258;
-        const V v263 = 1.0534979423868314 * v125;
-        const V v264 = v263 + v260;
-        const V v265 = v125 * v131;
-        const V v266 = v265 + v262;
-        const V v267 = 1.6875 * v150;
-        const V v268 = v267 + v264;
-        const V v269 = v150 * v133;
-        const V v270 = v269 + v266;
-        const V v271 = 0.6175411522633745 * v155;
-        const V v272 = v271 + v268;
-        const V v273 = v155 * v136;
-        const V v274 = v273 + v270;
-        const V v275 = 16.855967078189302 * v156;
-        const V v276 = v275 + v272;
-        const V v277 = v156 * v139;
-        const V v278 = v277 + v274;
-        const V v279 = 41.1522633744856 * v161;
-        const V v280 = v279 + v276;
-        const V v281 = v161 * v143;
-        const V v282 = v281 + v278;
-        const V v283 = 3.765689300411523 * v166;
-        const V v284 = v283 + v280;
-        const V v285 = v166 * v147;
-        const V v286 = v285 + v282;
-        const V v287 = v4 * v284;
-        const V v288 = v4 * v286;
-        const V v289 = v170 * v288;
-        const V v290 = p0 + v287;
-        const V v291 = v169 * v290;
-        const V v292 = v178 * v290;
-        const V v293 = v23 * v290;
-        const V v294 = v67 * v289;
-        const V v295 = v68 * v289;
-        const V v296 = v64 * v293;
-        const V v297 = v294 - v296;
-        const V v298 = v64 * v292;
-        s47 += v298;
-        const V v299 = v63 * v293;
-        const V v300 = v295 - v299;
-        const V v301 = v63 * v292;
-        s46 += v301;
-        const V v302 = v66 * v291;
-        s44 += v302;
-        const V v303 = v69 * v291;
-        s45 += v303;
-        const V v304 = v66 * v297;
-        s48 += v304;
-        const V v305 = v66 * v300;
-        s49 += v305;
-        const V v306 = v69 * v297;
-        s50 += v306;
-        const V v307 = v69 * v300;
-        s51 += v307;
-        V v308 = v72;
-        V v309 = softehl_splat(1.0);
-        const M m310 = ~v82;
-        if (softehl_any(m310)) {
-            const V v311 = 1.0 - v72;
-            const V v312 = 4.0 * v311;
-            const V v313 = 1.0 / v312;
-            const V v314 = 4.0 * v313;
-            const V v315 = v313 * v314;
-            v308 = softehl_blend(m310, v313, v308);
-            v309 = softehl_blend(m310, v315, v309);
+        const double v47 = 0.5 * w[0], v48 = 0.5 + v47, v49 = 0.5 - v47, v50 = v49 * w[3],
+            v51 = v49 * v10, v52 = v48 * v10, v53 = v48 * w[3];
+        const V v54 = v49 * v6 + v48 * v7, v55 = v10 * v54, v56 = (parameters[0] + v54) * v2,
+            v57 = 1.3611111111111112 + v55, v58 = 7.111111111111111 + v55,
+            v59 = 11.11111111111111 + v55, v60 = 3.361111111111111 + v55,
+            v61 = 4.694444444444445 + v55, v62 = 8.027777777777779 + v55,
+            v63 = 10.027777777777779 + v55;
+        const M v64 = softehl_le(softehl_splat(0.5), v55);
+        const V v65 = 9.0 + v55, v66 = 1.0 + v55, v67 = 0.25 + v55, v68 = 0.1111111111111111 + v55,
+            v69 = 0.027777777777777776 + v55, v70 = 4.0 + v55, v71 = 0.4444444444444444 + v55,
+            v72 = 2.25 + v55, v73 = 1.7777777777777777 + v55,
+            v74 = softehl_vexp(-(v65 * (0.5 * v65))), v75 = softehl_vexp(-(v66 * (0.5 * v66))),
+            v76 = softehl_vexp(-(v67 * (0.5 * v67))), v77 = softehl_vexp(-(v68 * (0.5 * v68))),
+            v78 = softehl_vexp(-(v69 * (0.5 * v69))), v79 = softehl_vexp(-(v70 * (0.5 * v70))),
+            v80 = softehl_vexp(-(v71 * (0.5 * v71))), v81 = softehl_vexp(-(v73 * (0.5 * v73))),
+            v82 = softehl_vexp(-(v72 * (0.5 * v72))), v83 = softehl_vexp(-(v57 * (0.5 * v57))),
+            v84 = softehl_vexp(-(v58 * (0.5 * v58))), v85 = softehl_vexp(-(v59 * (0.5 * v59))),
+            v86 = softehl_vexp(-(v60 * (0.5 * v60))), v87 = softehl_vexp(-(v61 * (0.5 * v61))),
+            v88 = v12 * v56, v89 = 6.25 + v55, v90 = 2.7777777777777777 + v55,
+            v91 = 0.6944444444444444 + v55, v92 = 12.25 + v55, v93 = 5.444444444444445 + v55,
+            v94 = softehl_vexp(-(v62 * (0.5 * v62))), v95 = softehl_vexp(-(v63 * (0.5 * v63))),
+            v96 = softehl_vexp(-(v89 * (0.5 * v89))), v97 = softehl_vexp(-(v90 * (0.5 * v90))),
+            v98 = softehl_vexp(-(v91 * (0.5 * v91))), v99 = softehl_vexp(-(v92 * (0.5 * v92))),
+            v100 = softehl_vexp(-(v93 * (0.5 * v93))),
+            v101 = v96 * (13.020833333333334 * v89) + v97 * (2.57201646090535 * v90),
+            v102 = 0.16075102880658437 * v98 + (13.020833333333334 * v96 + 2.57201646090535 * v97),
+            v103 = v99 * (50.020833333333336 * v92) + (v98 * (0.16075102880658437 * v91) + v101),
+            v104 = 7.345936213991769 * v87 + (9.880658436213992 * v100 + (50.020833333333336 * v99 + v102)),
+            v105 = v87 * (7.345936213991769 * v61) + (v100 * (9.880658436213992 * v93) + v103),
+            v106 = v95 * (33.51877572016461 * v63) + (v94 * (21.48173868312757 * v62) + v105),
+            v107 = 27.0 * v74 + (33.51877572016461 * v95 + (21.48173868312757 * v94 + v104)),
+            v108 = v76 * (0.020833333333333332 * v67) + (v75 * (0.3333333333333333 * v66) + (v74 * (27.0 * v65) + v106)),
+            v109 = 0.00411522633744856 * v77 + (0.020833333333333332 * v76 + (0.3333333333333333 * v75 + v107)),
+            v110 = v78 * (0.000257201646090535 * v69) + (v77 * (0.00411522633744856 * v68) + v108),
+            v111 = 0.06584362139917696 * v80 + (5.333333333333333 * v79 + (0.000257201646090535 * v78 + v109)),
+            v112 = v80 * (0.06584362139917696 * v71) + (v79 * (5.333333333333333 * v70) + v110),
+            v113 = 0.6175411522633745 * v83 + (1.6875 * v82 + (1.0534979423868314 * v81 + v111)),
+            v114 = v83 * (0.6175411522633745 * v57) + (v82 * (1.6875 * v72) + (v81 * (1.0534979423868314 * v73) + v112)),
+            v115 = v85 * (41.1522633744856 * v59) + (v84 * (16.855967078189302 * v58) + v114),
+            v116 = 3.765689300411523 * v86 + (41.1522633744856 * v85 + (16.855967078189302 * v84 + v113)),
+            v117 = v3 * v116, v118 = v3 * (v86 * (3.765689300411523 * v60) + v115),
+            v119 = v88 * v118, v120 = p0 + v117, v121 = 0.5 * v56 * v120, v122 = w[3] * v88 * v120,
+            v123 = v15 * v120, v124 = v51 * v119 - v49 * v123, v125 = v49 * v122;
+        s32 += v125;
+        const V v126 = v52 * v119 - v48 * v123, v127 = v48 * v122;
+        s31 += v127; const V v128 = v50 * v121; s29 += v128; const V v129 = v53 * v121; s30 += v129;
+        const V v130 = v50 * v124; s33 += v130; const V v131 = v50 * v126; s34 += v131;
+        const V v132 = v53 * v124; s35 += v132; const V v133 = v53 * v126; s36 += v133;
+        V v134 = v55, v135 = softehl_splat(1.0);
+        const M m136 = ~v64;
+        if (softehl_any(m136)) {
+            const V v137 = 1.0 / (4.0 * (1.0 - v55)), v138 = v137 * (4.0 * v137);
+            v134 = softehl_blend(m136, v137, v134); v135 = softehl_blend(m136, v138, v135);
         }
-        const M v316 = softehl_eq(v308, v308);
-        const V v317 = v308 * v308;
-        V v318 = softehl_splat(0.0);
-        V v319 = softehl_splat(0.0);
-        const M m320 = v316;
+        const M v139 = softehl_eq(v134, v134); const V v140 = v134 * v134;
+        V v141 = softehl_splat(0.0), v142 = softehl_splat(0.0);
+        const M m143 = v139;
+        if (softehl_any(m143)) {
+            const M v144 = softehl_le(softehl_splat(6.0), v134);
+            V v145 = softehl_splat(0.0), v146 = softehl_splat(0.0);
+            const M m147 = v144 & m143;
+            if (softehl_any(m147)) {
+                const V v148 = 1.0 / v140, v149 = 9.0 * v148,
+                    v150 = 9.0 * (4.1273438891135995e-05 + 0.0003054234477944064 * v148),
+                    v151 = v148 * (v148 * (2.0 * v134)),
+                    v152 = 9.0 * (5.0707367780538514e-05 + v148 * v150),
+                    v153 = 9.0 * (6.3000063000063e-05 + v148 * v152),
+                    v154 = 9.0 * (7.925814377427281e-05 + v148 * v153),
+                    v155 = 9.0 * (0.00010112245929821013 + v148 * v154),
+                    v156 = 9.0 * (0.00013108466946064277 + v148 * v155),
+                    v157 = 9.0 * (0.00017303176368804846 + v148 * v156),
+                    v158 = 9.0 * (0.0002332167249708479 + v148 * v157),
+                    v159 = 9.0 * (0.00032206119162640903 + v148 * v158),
+                    v160 = 9.0 * (0.0004576659038901602 + v148 * v159),
+                    v161 = 9.0 * (0.0006730380939561179 + v148 * v160),
+                    v162 = v149 * (v151 * (v152 + v149 * (v150 + 0.0027488110301496574 * v148))),
+                    v163 = 9.0 * (0.0010319917440660474 + v148 * v161),
+                    v164 = v149 * (v155 * v151 + v149 * (v154 * v151 + v149 * (v153 * v151 + v162))),
+                    v165 = v149 * (v158 * v151 + v149 * (v157 * v151 + v149 * (v156 * v151 + v164))),
+                    v166 = v149 * (v161 * v151 + v149 * (v160 * v151 + v149 * (v159 * v151 + v165))),
+                    v167 = 9.0 * (0.0016670635865682305 + v148 * v163),
+                    v168 = 9.0 * (0.002879473467708762 + v148 * v167),
+                    v169 = v149 * (v168 * v151 + v149 * (v167 * v151 + v149 * (v163 * v151 + v166))),
+                    v170 = 9.0 * (0.005439005439005439 + v148 * v168),
+                    v171 = 9.0 * (0.011655011655011656 + v148 * v170),
+                    v172 = 9.0 * (0.030303030303030304 + v148 * v171),
+                    v173 = v149 * (v172 * v151 + v149 * (v171 * v151 + v149 * (v170 * v151 + v169))),
+                    v174 = 9.0 * (0.1111111111111111 + v148 * v172), v175 = 1.0 + v148 * v174,
+                    v176 = -(v174 * v151 + v173);
+                v145 = softehl_blend(m147, v175, v145); v146 = softehl_blend(m147, v176, v146);
+            }
+            const M m177 = ~v144 & m143;
+            if (softehl_any(m177)) {
+                const V v178 = 0.1111111111111111 * v140, v179 = 1.0 - v178;
+                const M v180 = softehl_lt(softehl_splat(3.0), v134);
+                const V v181 = 0.3645833333333333 * v134, v182 = 0.3333333333333333 * v134,
+                    v183 = 0.2222222222222222 * v134, v184 = v179 * v179, v185 = v179 * v184,
+                    v186 = v183 * (3.0 * v184);
+                V v187 = softehl_splat(0.0), v188 = softehl_splat(0.0);
+                const M m189 = v180 & m177;
+                if (softehl_any(m189)) {
+                    const V v190 = 0.022222222222222223 * v134,
+                        v191 = (-80.0) + 3.3333333333333335 * v140, v192 = 1.0 / ((-1.0) + v182),
+                        v193 = 66.0 + v178 * v191, v194 = (1.0 + v182) * v192,
+                        v195 = 0.022222222222222223 * v193 + v190 * (v191 * v183 + v178 * (6.666666666666667 * v134)),
+                        v196 = softehl_vlog(v194), v197 = v196 * v185 + v190 * v193,
+                        v198 = 0.3333333333333333 * (v192 * (1.0 - v194)) * (v185 * (1.0 / v194)),
+                        v199 = 0.3645833333333333 * v197 + v181 * (v198 + (v195 - v196 * v186)),
+                        v200 = v181 * v197;
+                    v187 = softehl_blend(m189, v200, v187); v188 = softehl_blend(m189, v199, v188);
+                }
+                const M m201 = ~v180 & m177;
+                if (softehl_any(m201)) {
+                    const V v202 = 0.005555555555555556 * v134, v203 = 300.0 + 100.0 * v134,
+                        v204 = 60.0 + 49.0 * v134, v205 = softehl_vlog(v203),
+                        v206 = (-405.0) + v182 * v204, v207 = (-160.0) + v182 * v206,
+                        v208 = 0.3333333333333333 * v206 + v182 * (0.3333333333333333 * v204 + 16.333333333333332 * v134),
+                        v209 = 345.0 + v182 * v207, v210 = 132.0 + v182 * v209,
+                        v211 = 0.3333333333333333 * v209 + v182 * (0.3333333333333333 * v207 + v182 * v208),
+                        v212 = v202 * v210 + ((-0.9166666666666666) + v205 * v185),
+                        v213 = 0.005555555555555556 * v210 + (v202 * v211 + (1.0 / v203 * (100.0 * v185) - v205 * v186)),
+                        v214 = v181 * v212, v215 = 0.3645833333333333 * v212 + v181 * v213;
+                    v187 = softehl_blend(m201, v214, v187); v188 = softehl_blend(m201, v215, v188);
+                }
+                v145 = softehl_blend(m177, v187, v145); v146 = softehl_blend(m177, v188, v146);
+            }
+            v141 = softehl_blend(m143, v145, v141); v142 = softehl_blend(m143, v146, v142);
+        }
+        const M m216 = ~v139;
+        if (softehl_any(m216)) {
+            const V v217 = 6.0 - v134, v218 = v217 * v217, v219 = v217 * v218, v220 = -(3.0 * v218);
+            v141 = softehl_blend(m216, v219, v141); v142 = softehl_blend(m216, v220, v142);
+        }
+        const M v221 = softehl_le(v134, softehl_splat(5.0));
+        V v222 = softehl_splat(0.0), v223 = softehl_splat(0.0), v224 = softehl_splat(0.0),
+            v225 = softehl_splat(0.0);
+        const M m226 = v221;
+        if (softehl_any(m226)) {
+            const V v227 = softehl_vpow(v134, 0.98), v228 = softehl_vpow(v134, 2.31),
+                v229 = softehl_vpow(v134, 1.31), v230 = softehl_vpow(v134, (-0.02)),
+                v231 = softehl_vexp(0.05 * v140 - 0.92 * v134),
+                v232 = softehl_vexp(0.11 * v140 - 2.38 * v134), v233 = 1.899 * v227 * v231,
+                v234 = 11.1 * v228 * v232,
+                v235 = v229 * (25.641 * v232) + v234 * ((-2.38) + 0.22 * v134),
+                v236 = v230 * (1.86102 * v231) + v233 * ((-0.92) + 0.1 * v134);
+            v222 = softehl_blend(m226, v234, v222); v223 = softehl_blend(m226, v235, v223);
+            v224 = softehl_blend(m226, v233, v224); v225 = softehl_blend(m226, v236, v225);
+        }
+        const M m237 = ~v221;
+        if (softehl_any(m237)) {
+            const V v238 = softehl_vexp(1.25 - 0.25 * v134),
+                v239 = softehl_vexp(4.09 - 0.818 * v134), v240 = 0.3225737734624401 * v238,
+                v241 = -(0.08064344336561002 * v238), v242 = 0.048545522453863246 * v239,
+                v243 = -(0.039710237367260134 * v239);
+            v222 = softehl_blend(m237, v242, v222); v223 = softehl_blend(m237, v243, v223);
+            v224 = softehl_blend(m237, v240, v224); v225 = softehl_blend(m237, v241, v225);
+        }
+        const double v244 = 0.5 * w[1];
+        const V v245 = 1.0 - p6, v246 = 1.0 - p4, v247 = softehl_vexp(p0 * parameters[3]);
+        const double v248 = 0.5 - v244, v249 = 0.5 + v244;
+        const V v250 = parameters[7] * v134; const double v251 = v47 - 0.5;
+        const V v252 = parameters[1] - v48 * v5 - v49 * v9, v253 = 1.0 / v250,
+            v254 = v248 * v6 + v249 * v7;
+        const M v255 = softehl_lt(softehl_splat(0.0), v252);
+        const V v256 = v10 * v254, v257 = parameters[8] * v222 + v141, v258 = parameters[2] * v247;
+        const M v259 = softehl_le(softehl_splat(0.5), v256);
+        const V v260 = v56 * (v253 * (v252 * (v258 * v20)) * v257), v261 = v50 * v260,
+            v262 = v53 * v260;
+        V v263 = softehl_splat(0.0), v264 = softehl_splat(0.0), v265 = softehl_splat(0.0);
+        const M m266 = v259;
+        if (softehl_any(m266)) {
+            const double v267 = v10 * v248, v268 = v10 * v249;
+            v263 = softehl_blend(m266, v256, v263);
+            v264 = softehl_blend(m266, softehl_splat(v267), v264);
+            v265 = softehl_blend(m266, softehl_splat(v268), v265);
+        }
+        const M m269 = ~v259;
+        if (softehl_any(m269)) {
+            const V v270 = 1.0 / (4.0 - v254 * v14), v271 = v270 * v270, v272 = v248 * v14 * v271,
+                v273 = v249 * v14 * v271;
+            v263 = softehl_blend(m269, v270, v263); v264 = softehl_blend(m269, v272, v264);
+            v265 = softehl_blend(m269, v273, v265);
+        }
+        const double v274 = 0.5 * w[2]; const V v275 = parameters[7] * v263;
+        const double v276 = 0.5 - v274, v277 = 0.5 + v274;
+        const V v278 = v276 * v6 + v277 * v7, v279 = v10 * v278;
+        const M v280 = softehl_le(softehl_splat(0.5), v279);
+        V v281 = softehl_splat(0.0), v282 = softehl_splat(0.0), v283 = softehl_splat(0.0);
+        const M m284 = v280;
+        if (softehl_any(m284)) {
+            const double v285 = v10 * v276, v286 = v10 * v277;
+            v281 = softehl_blend(m284, v279, v281);
+            v282 = softehl_blend(m284, softehl_splat(v285), v282);
+            v283 = softehl_blend(m284, softehl_splat(v286), v283);
+        }
+        const M m287 = ~v280;
+        if (softehl_any(m287)) {
+            const V v288 = 1.0 / (4.0 - v278 * v14), v289 = v288 * v288, v290 = v276 * v14 * v289,
+                v291 = v277 * v14 * v289;
+            v281 = softehl_blend(m287, v288, v281); v282 = softehl_blend(m287, v290, v282);
+            v283 = softehl_blend(m287, v291, v283);
+        }
+        const V v292 = 0.7071067811865476 * v55, v293 = softehl_verfc(v292),
+            v294 = parameters[7] * v281, v295 = v275 * v294, v296 = v275 + v294,
+            v297 = 1.0 - 0.5 * v293, v298 = 0.5 * v296, v299 = softehl_vexp(-(v55 * (0.5 * v55))),
+            v300 = parameters[7] * (0.3989422804014327 * v299 + (v55 * v297 + parameters[8] * v224)),
+            v301 = v298 * v298, v302 = 1.0 / v301, v303 = v295 * v302,
+            v304 = -(v303 * (v252 * (0.5 * w[3]) * v300));
+        V v305 = softehl_splat(0.0), v306 = softehl_splat(0.0), v307 = softehl_splat(0.0),
+            v308 = softehl_splat(0.0), v309 = softehl_splat(0.0), v310 = softehl_splat(0.0),
+            v311 = softehl_splat(0.0), v312 = softehl_splat(0.0), v313 = softehl_splat(0.0),
+            v314 = softehl_splat(0.0), v315 = softehl_splat(0.0), v316 = softehl_splat(0.0);
+        const M m317 = v255;
+        if (softehl_any(m317)) {
+            const V v318 = v246 * v251, v319 = -(v48 * v246);
+            v305 = softehl_blend(m317, v252, v305);
+            v306 = softehl_blend(m317, softehl_splat(0.0), v306);
+            v307 = softehl_blend(m317, v318, v307);
+            v308 = softehl_blend(m317, softehl_splat(0.0), v308);
+            v309 = softehl_blend(m317, v319, v309);
+            v310 = softehl_blend(m317, softehl_splat(0.0), v310);
+            v311 = softehl_blend(m317, v261, v311);
+            v312 = softehl_blend(m317, softehl_splat(0.0), v312);
+            v313 = softehl_blend(m317, v262, v313);
+            v314 = softehl_blend(m317, softehl_splat(0.0), v314);
+            v315 = softehl_blend(m317, v304, v315);
+            v316 = softehl_blend(m317, softehl_splat(0.0), v316);
+        }
+        const M m320 = ~v255;
         if (softehl_any(m320)) {
-            const M v321 = softehl_le(softehl_splat(6.0), v308);
-            V v322 = softehl_splat(0.0);
-            V v323 = softehl_splat(0.0);
-            const M m324 = v321 & m320;
-            if (softehl_any(m324)) {
-                const V v325 = 1.0 / v317;
-                const V v326 = 2.0 * v308;
-                const V v327 = 0.0003054234477944064 * v325;
-                const V v328 = 4.1273438891135995e-05 + v327;
-                const V v329 = 9.0 * v325;
-                const V v330 = v325 * v326;
-                const V v331 = 0.0027488110301496574 * v325;
-                const V v332 = 9.0 * v328;
-                const V v333 = v325 * v330;
-                const V v334 = v332 + v331;
-                const V v335 = v325 * v332;
-                const V v336 = 5.0707367780538514e-05 + v335;
-                const V v337 = 9.0 * v336;
-                const V v338 = v325 * v337;
-                const V v339 = 6.3000063000063e-05 + v338;
-                const V v340 = 9.0 * v339;
-                const V v341 = v329 * v334;
-                const V v342 = v337 + v341;
-                const V v343 = v325 * v340;
-                const V v344 = 7.925814377427281e-05 + v343;
-                const V v345 = 9.0 * v344;
-                const V v346 = v325 * v345;
-                const V v347 = 0.00010112245929821013 + v346;
-                const V v348 = 9.0 * v347;
-                const V v349 = v333 * v342;
-                const V v350 = v325 * v348;
-                const V v351 = 0.00013108466946064277 + v350;
-                const V v352 = 9.0 * v351;
-                const V v353 = v325 * v352;
-                const V v354 = 0.00017303176368804846 + v353;
-                const V v355 = 9.0 * v354;
-                const V v356 = v325 * v355;
-                const V v357 = 0.0002332167249708479 + v356;
-                const V v358 = 9.0 * v357;
-                const V v359 = v325 * v358;
-                const V v360 = 0.00032206119162640903 + v359;
-                const V v361 = 9.0 * v360;
-                const V v362 = v325 * v361;
-                const V v363 = 0.0004576659038901602 + v362;
-                const V v364 = 9.0 * v363;
-                const V v365 = v325 * v364;
-                const V v366 = 0.0006730380939561179 + v365;
-                const V v367 = 9.0 * v366;
-                const V v368 = v340 * v333;
-                const V v369 = v329 * v349;
-                const V v370 = v368 + v369;
-                const V v371 = v325 * v367;
-                const V v372 = 0.0010319917440660474 + v371;
-                const V v373 = 9.0 * v372;
-                const V v374 = v345 * v333;
-                const V v375 = v329 * v370;
-                const V v376 = v374 + v375;
-                const V v377 = v348 * v333;
-                const V v378 = v329 * v376;
-                const V v379 = v377 + v378;
-                const V v380 = v352 * v333;
-                const V v381 = v329 * v379;
-                const V v382 = v380 + v381;
-                const V v383 = v355 * v333;
-                const V v384 = v329 * v382;
-                const V v385 = v383 + v384;
-                const V v386 = v358 * v333;
-                const V v387 = v329 * v385;
-                const V v388 = v386 + v387;
-                const V v389 = v361 * v333;
-                const V v390 = v329 * v388;
-                const V v391 = v389 + v390;
-                const V v392 = v364 * v333;
-                const V v393 = v329 * v391;
-                const V v394 = v392 + v393;
-                const V v395 = v367 * v333;
-                const V v396 = v329 * v394;
-                const V v397 = v395 + v396;
-                const V v398 = v329 * v397;
-                const V v399 = v373 * v333;
-                const V v400 = v399 + v398;
-                const V v401 = v329 * v400;
-                const V v402 = v325 * v373;
-                const V v403 = 0.0016670635865682305 + v402;
-                const V v404 = 9.0 * v403;
-                const V v405 = v404 * v333;
-                const V v406 = v405 + v401;
-                const V v407 = v329 * v406;
-                const V v408 = v325 * v404;
-                const V v409 = 0.002879473467708762 + v408;
-                const V v410 = 9.0 * v409;
-                const V v411 = v410 * v333;
-                const V v412 = v411 + v407;
-                const V v413 = v329 * v412;
-                const V v414 = v325 * v410;
-                const V v415 = 0.005439005439005439 + v414;
-                const V v416 = 9.0 * v415;
-                const V v417 = v416 * v333;
-                const V v418 = v417 + v413;
-                const V v419 = v329 * v418;
-                const V v420 = v325 * v416;
-                const V v421 = 0.011655011655011656 + v420;
-                const V v422 = 9.0 * v421;
-                const V v423 = v422 * v333;
-                const V v424 = v423 + v419;
-                const V v425 = v329 * v424;
-                const V v426 = v325 * v422;
-                const V v427 = 0.030303030303030304 + v426;
-                const V v428 = 9.0 * v427;
-                const V v429 = v428 * v333;
-                const V v430 = v429 + v425;
-                const V v431 = v329 * v430;
-                const V v432 = v325 * v428;
-                const V v433 = 0.1111111111111111 + v432;
-                const V v434 = 9.0 * v433;
-                const V v435 = v434 * v333;
-                const V v436 = v435 + v431;
-                const V v437 = v325 * v434;
-                const V v438 = 1.0 + v437;
-                const V v439 = -v436;
-                v322 = softehl_blend(m324, v438, v322);
-                v323 = softehl_blend(m324, v439, v323);
-            }
-            const M m440 = ~v321 & m320;
-            if (softehl_any(m440)) {
-                const V v441 = 0.1111111111111111 * v317;
-                const V v442 = 1.0 - v441;
-                const M v443 = softehl_lt(softehl_splat(3.0), v308);
-                const V v444 = 0.3645833333333333 * v308;
-                const V v445 = 0.3333333333333333 * v308;
-                const V v446 = 0.2222222222222222 * v308;
-                const V v447 = v442 * v442;
-                const V v448 = v442 * v447;
-                const V v449 = 3.0 * v447;
-                const V v450 = v446 * v449;
-                V v451 = softehl_splat(0.0);
-                V v452 = softehl_splat(0.0);
-                const M m453 = v443 & m440;
-                if (softehl_any(m453)) {
-                    const V v454 = 0.022222222222222223 * v308;
-                    const V v455 = 6.666666666666667 * v308;
-                    const V v456 = 1.0 + v445;
-                    const V v457 = (-1.0) + v445;
-                    const V v458 = 3.3333333333333335 * v317;
-                    const V v459 = (-80.0) + v458;
-                    const V v460 = 1.0 / v457;
-                    const V v461 = v441 * v455;
-                    const V v462 = v441 * v459;
-                    const V v463 = 66.0 + v462;
-                    const V v464 = v459 * v446;
-                    const V v465 = v464 + v461;
-                    const V v466 = v456 * v460;
-                    const V v467 = v454 * v465;
-                    const V v468 = v454 * v463;
-                    const V v469 = 0.022222222222222223 * v463;
-                    const V v470 = v469 + v467;
-                    const V v471 = 1.0 - v466;
-                    const V v472 = v460 * v471;
-                    const V v473 = 0.3333333333333333 * v472;
-                    const V v474 = softehl_vlog(v466);
-                    const V v475 = 1.0 / v466;
-                    const V v476 = v474 * v450;
-                    const V v477 = v470 - v476;
-                    const V v478 = v474 * v448;
-                    const V v479 = v478 + v468;
-                    const V v480 = v448 * v475;
-                    const V v481 = v473 * v480;
-                    const V v482 = v481 + v477;
-                    const V v483 = 0.3645833333333333 * v479;
-                    const V v484 = v444 * v482;
-                    const V v485 = v483 + v484;
-                    const V v486 = v444 * v479;
-                    v451 = softehl_blend(m453, v486, v451);
-                    v452 = softehl_blend(m453, v485, v452);
-                }
-                const M m487 = ~v443 & m440;
-                if (softehl_any(m487)) {
-                    const V v488 = 0.005555555555555556 * v308;
-                    const V v489 = 100.0 * v308;
-                    const V v490 = 300.0 + v489;
-                    const V v491 = 16.333333333333332 * v308;
-                    const V v492 = 49.0 * v308;
-                    const V v493 = 60.0 + v492;
-                    const V v494 = softehl_vlog(v490);
-                    const V v495 = 1.0 / v490;
-                    const V v496 = 0.3333333333333333 * v493;
-                    const V v497 = v496 + v491;
-                    const V v498 = v445 * v493;
-                    const V v499 = (-405.0) + v498;
-                    const V v500 = 100.0 * v448;
-                    const V v501 = v495 * v500;
-                    const V v502 = v445 * v499;
-                    const V v503 = (-160.0) + v502;
-                    const V v504 = 0.3333333333333333 * v499;
-                    const V v505 = v445 * v497;
-                    const V v506 = v504 + v505;
-                    const V v507 = v494 * v448;
-                    const V v508 = (-0.9166666666666666) + v507;
-                    const V v509 = v494 * v450;
-                    const V v510 = v501 - v509;
-                    const V v511 = v445 * v503;
-                    const V v512 = 345.0 + v511;
-                    const V v513 = 0.3333333333333333 * v503;
-                    const V v514 = v445 * v506;
-                    const V v515 = v513 + v514;
-                    const V v516 = v445 * v512;
-                    const V v517 = 132.0 + v516;
-                    const V v518 = v445 * v515;
-                    const V v519 = 0.3333333333333333 * v512;
-                    const V v520 = v519 + v518;
-                    const V v521 = v488 * v520;
-                    const V v522 = v521 + v510;
-                    const V v523 = v488 * v517;
-                    const V v524 = v523 + v508;
-                    const V v525 = 0.005555555555555556 * v517;
-                    const V v526 = v525 + v522;
-                    const V v527 = v444 * v526;
-                    const V v528 = v444 * v524;
-                    const V v529 = 0.3645833333333333 * v524;
-                    const V v530 = v529 + v527;
-                    v451 = softehl_blend(m487, v528, v451);
-                    v452 = softehl_blend(m487, v530, v452);
-                }
-                v322 = softehl_blend(m440, v451, v322);
-                v323 = softehl_blend(m440, v452, v323);
-            }
-            v318 = softehl_blend(m320, v322, v318);
-            v319 = softehl_blend(m320, v323, v319);
+            const V v321 = v245 * v251, v322 = -(v48 * v245);
+            v305 = softehl_blend(m320, softehl_splat(0.0), v305);
+            v306 = softehl_blend(m320, v252, v306);
+            v307 = softehl_blend(m320, softehl_splat(0.0), v307);
+            v308 = softehl_blend(m320, v321, v308);
+            v309 = softehl_blend(m320, softehl_splat(0.0), v309);
+            v310 = softehl_blend(m320, v322, v310);
+            v311 = softehl_blend(m320, softehl_splat(0.0), v311);
+            v312 = softehl_blend(m320, v261, v312);
+            v313 = softehl_blend(m320, softehl_splat(0.0), v313);
+            v314 = softehl_blend(m320, v262, v314);
+            v315 = softehl_blend(m320, softehl_splat(0.0), v315);
+            v316 = softehl_blend(m320, v304, v316);
         }
-        const M m531 = ~v316;
-        if (softehl_any(m531)) {
-            const V v532 = 6.0 - v308;
-            const V v533 = v532 * v532;
-            const V v534 = v532 * v533;
-            const V v535 = 3.0 * v533;
-            const V v536 = -v535;
-            v318 = softehl_blend(m531, v534, v318);
-            v319 = softehl_blend(m531, v536, v319);
-        }
-        const M v537 = softehl_le(v308, softehl_splat(5.0));
-        V v538 = softehl_splat(0.0);
-        V v539 = softehl_splat(0.0);
-        V v540 = softehl_splat(0.0);
-        V v541 = softehl_splat(0.0);
-        const M m542 = v537;
-        if (softehl_any(m542)) {
-            const V v543 = softehl_vpow(v308, 0.98);
-            const V v544 = softehl_vpow(v308, 2.31);
-            const V v545 = softehl_vpow(v308, 1.31);
-            const V v546 = 1.899 * v543;
-            const V v547 = softehl_vpow(v308, (-0.02));
-            const V v548 = 11.1 * v544;
-            const V v549 = 0.1 * v308;
-            const V v550 = (-0.92) + v549;
-            const V v551 = 0.22 * v308;
-            const V v552 = (-2.38) + v551;
-            const V v553 = 0.05 * v317;
-            const V v554 = 0.11 * v317;
-            const V v555 = 0.92 * v308;
-            const V v556 = v553 - v555;
-            const V v557 = 2.38 * v308;
-            const V v558 = v554 - v557;
-            const V v559 = softehl_vexp(v556);
-            const V v560 = softehl_vexp(v558);
-            const V v561 = v546 * v559;
-            const V v562 = v561 * v550;
-            const V v563 = v548 * v560;
-            const V v564 = v563 * v552;
-            const V v565 = 25.641 * v560;
-            const V v566 = v545 * v565;
-            const V v567 = v566 + v564;
-            const V v568 = 1.86102 * v559;
-            const V v569 = v547 * v568;
-            const V v570 = v569 + v562;
-            v538 = softehl_blend(m542, v563, v538);
-            v539 = softehl_blend(m542, v567, v539);
-            v540 = softehl_blend(m542, v561, v540);
-            v541 = softehl_blend(m542, v570, v541);
-        }
-        const M m571 = ~v537;
-        if (softehl_any(m571)) {
-            const V v572 = 0.25 * v308;
-            const V v573 = 1.25 - v572;
-            const V v574 = 0.818 * v308;
-            const V v575 = 4.09 - v574;
-            const V v576 = softehl_vexp(v573);
-            const V v577 = softehl_vexp(v575);
-            const V v578 = 0.3225737734624401 * v576;
-            const V v579 = 0.08064344336561002 * v576;
-            const V v580 = -v579;
-            const V v581 = 0.048545522453863246 * v577;
-            const V v582 = 0.039710237367260134 * v577;
-            const V v583 = -v582;
-            v538 = softehl_blend(m571, v581, v538);
-            v539 = softehl_blend(m571, v583, v539);
-            v540 = softehl_blend(m571, v578, v540);
-            v541 = softehl_blend(m571, v580, v541);
-        }
-        const double v584 = 0.5 * w[1];
-        const V v585 = p0 * parameters[3];
-        const V v586 = 1.0 - p6;
-        const V v587 = 1.0 - p4;
-        const V v588 = softehl_vexp(v585);
-        const V v589 = v63 * v7;
-        const V v590 = parameters[1] - v589;
-        const double v591 = 0.5 - v584;
-        const double v592 = 0.5 + v584;
-        const V v593 = parameters[7] * v308;
-        const double v594 = v62 - 0.5;
-        const V v595 = v64 * v14;
-        const V v596 = v590 - v595;
-        const V v597 = v591 * v10;
-        const V v598 = 1.0 / v593;
-        const V v599 = parameters[8] * v538;
-        const V v600 = v592 * v11;
-        const V v601 = v597 + v600;
-        const M v602 = softehl_lt(softehl_splat(0.0), v596);
-        const V v603 = v16 * v601;
-        const V v604 = v599 + v318;
-        const V v605 = parameters[2] * v588;
-        const M v606 = softehl_le(softehl_splat(0.5), v603);
-        const V v607 = v605 * v32;
-        const V v608 = v596 * v607;
-        const V v609 = v598 * v608;
-        const V v610 = v609 * v604;
-        const V v611 = v74 * v610;
-        const V v612 = v66 * v611;
-        const V v613 = v69 * v611;
-        V v614 = softehl_splat(0.0);
-        V v615 = softehl_splat(0.0);
-        V v616 = softehl_splat(0.0);
-        const M m617 = v606;
-        if (softehl_any(m617)) {
-            const double v618 = v16 * v591;
-            const double v619 = v16 * v592;
-            v614 = softehl_blend(m617, v603, v614);
-            v615 = softehl_blend(m617, softehl_splat(v618), v615);
-            v616 = softehl_blend(m617, softehl_splat(v619), v616);
-        }
-        const M m620 = ~v606;
-        if (softehl_any(m620)) {
-            const double v621 = v591 * v22;
-            const double v622 = v592 * v22;
-            const V v623 = v601 * v22;
-            const V v624 = 4.0 - v623;
-            const V v625 = 1.0 / v624;
-            const V v626 = v625 * v625;
-            const V v627 = v621 * v626;
-            const V v628 = v622 * v626;
-            v614 = softehl_blend(m620, v625, v614);
-            v615 = softehl_blend(m620, v627, v615);
-            v616 = softehl_blend(m620, v628, v616);
-        }
-        const double v629 = 0.5 * w[2];
-        const V v630 = parameters[7] * v614;
-        const double v631 = 0.5 - v629;
-        const double v632 = 0.5 + v629;
-        const V v633 = v631 * v10;
-        const V v634 = v632 * v11;
-        const V v635 = v633 + v634;
-        const V v636 = v16 * v635;
-        const M v637 = softehl_le(softehl_splat(0.5), v636);
-        V v638 = softehl_splat(0.0);
-        V v639 = softehl_splat(0.0);
-        V v640 = softehl_splat(0.0);
-        const M m641 = v637;
-        if (softehl_any(m641)) {
-            const double v642 = v16 * v631;
-            const double v643 = v16 * v632;
-            v638 = softehl_blend(m641, v636, v638);
-            v639 = softehl_blend(m641, softehl_splat(v642), v639);
-            v640 = softehl_blend(m641, softehl_splat(v643), v640);
-        }
-        const M m644 = ~v637;
-        if (softehl_any(m644)) {
-            const double v645 = v631 * v22;
-            const double v646 = v632 * v22;
-            const V v647 = v635 * v22;
-            const V v648 = 4.0 - v647;
-            const V v649 = 1.0 / v648;
-            const V v650 = v649 * v649;
-            const V v651 = v645 * v650;
-            const V v652 = v646 * v650;
-            v638 = softehl_blend(m644, v649, v638);
-            v639 = softehl_blend(m644, v651, v639);
-            v640 = softehl_blend(m644, v652, v640);
-        }
-        const double v653 = 0.5 * w[3];
-        const V v654 = parameters[8] * v540;
-        const V v655 = 0.5 * v72;
-        const V v656 = 0.7071067811865476 * v72;
-        const V v657 = v596 * v653;
-        const V v658 = v72 * v655;
-        const V v659 = softehl_verfc(v656);
-        const V v660 = parameters[7] * v638;
-        const V v661 = v630 * v660;
-        const V v662 = v630 + v660;
-        const V v663 = -v658;
-        const V v664 = 0.5 * v659;
-        const V v665 = 1.0 - v664;
-        const V v666 = v72 * v665;
-        const V v667 = v666 + v654;
-        const V v668 = 0.5 * v662;
-        const V v669 = softehl_vexp(v663);
-        const V v670 = 0.3989422804014327 * v669;
-        const V v671 = v670 + v667;
-        const V v672 = parameters[7] * v671;
-        const V v673 = v657 * v672;
-        const V v674 = v668 * v668;
-        const V v675 = 1.0 / v674;
-        const V v676 = v661 * v675;
-        const V v677 = v676 * v673;
-        const V v678 = -v677;
-        V v679 = softehl_splat(0.0);
-        V v680 = softehl_splat(0.0);
-        V v681 = softehl_splat(0.0);
-        V v682 = softehl_splat(0.0);
-        V v683 = softehl_splat(0.0);
-        V v684 = softehl_splat(0.0);
-        V v685 = softehl_splat(0.0);
-        V v686 = softehl_splat(0.0);
-        V v687 = softehl_splat(0.0);
-        V v688 = softehl_splat(0.0);
-        V v689 = softehl_splat(0.0);
-        V v690 = softehl_splat(0.0);
-        const M m691 = v602;
-        if (softehl_any(m691)) {
-            const V v692 = v63 * v587;
-            const V v693 = v587 * v594;
-            const V v694 = -v692;
-            v679 = softehl_blend(m691, v596, v679);
-            v680 = softehl_blend(m691, softehl_splat(0.0), v680);
-            v681 = softehl_blend(m691, v693, v681);
-            v682 = softehl_blend(m691, softehl_splat(0.0), v682);
-            v683 = softehl_blend(m691, v694, v683);
-            v684 = softehl_blend(m691, softehl_splat(0.0), v684);
-            v685 = softehl_blend(m691, v612, v685);
-            v686 = softehl_blend(m691, softehl_splat(0.0), v686);
-            v687 = softehl_blend(m691, v613, v687);
-            v688 = softehl_blend(m691, softehl_splat(0.0), v688);
-            v689 = softehl_blend(m691, v678, v689);
-            v690 = softehl_blend(m691, softehl_splat(0.0), v690);
-        }
-        const M m695 = ~v602;
-        if (softehl_any(m695)) {
-            const V v696 = v63 * v586;
-            const V v697 = v586 * v594;
-            const V v698 = -v696;
-            v679 = softehl_blend(m695, softehl_splat(0.0), v679);
-            v680 = softehl_blend(m695, v596, v680);
-            v681 = softehl_blend(m695, softehl_splat(0.0), v681);
-            v682 = softehl_blend(m695, v697, v682);
-            v683 = softehl_blend(m695, softehl_splat(0.0), v683);
-            v684 = softehl_blend(m695, v698, v684);
-            v685 = softehl_blend(m695, softehl_splat(0.0), v685);
-            v686 = softehl_blend(m695, v612, v686);
-            v687 = softehl_blend(m695, softehl_splat(0.0), v687);
-            v688 = softehl_blend(m695, v613, v688);
-            v689 = softehl_blend(m695, softehl_splat(0.0), v689);
-            v690 = softehl_blend(m695, v678, v690);
-        }
-        const V v699 = p2 * parameters[3];
-        const V v700 = 0.08333333333333333 * p3;
-        const V v701 = 0.5 * v593;
-        const V v702 = softehl_vexp(v699);
-        const V v703 = v588 * v36;
-        const V v704 = v586 * v680;
-        const V v705 = v701 * v42;
-        const V v706 = v656 * v656;
-        const V v707 = 0.3989422804014327 * v72;
-        const V v708 = v587 * v679;
-        const V v709 = v704 + v708;
-        const V v710 = v596 * v596;
-        const V v711 = v1 + v710;
-        const V v712 = -v706;
-        const V v713 = 2.0 * v596;
-        const V v714 = parameters[10] * v596;
-        const V v715 = v709 * v703;
-        const V v716 = v684 + v683;
-        const V v717 = 0.5 * v709;
-        const V v718 = v605 * v709;
-        const V v719 = softehl_vsqrt(v711);
-        const V v720 = 1.0 / v711;
-        const V v721 = softehl_vexp(v712);
-        const V v722 = v605 * v598;
-        const V v723 = v598 * v715;
-        const V v724 = v598 * v598;
-        const V v725 = v598 * v718;
-        const V v726 = v17 * v717;
-        const V v727 = v718 * v604;
-        const V v728 = v722 * v604;
-        const V v729 = v682 + v681;
-        const V v730 = v676 * v726;
-        const V v731 = v676 * v676;
-        const V v732 = 2.0 * v676;
-        const V v733 = v598 * v727;
-        const V v734 = v724 * v727;
-        const V v735 = parameters[8] * v539;
-        const V v736 = v319 + v735;
-        const V v737 = v730 * v541;
-        const V v738 = 0.56 * v308;
-        const V v739 = 0.66 * v308;
-        const V v740 = v725 * v736;
-        const V v741 = -v738;
-        const V v742 = -v739;
-        const V v743 = softehl_vsqrt(v720);
-        const V v744 = parameters[7] * v615;
-        const V v745 = parameters[7] * v616;
-        const V v746 = parameters[7] * v639;
-        const V v747 = parameters[7] * v640;
-        const V v748 = softehl_vexp(v741);
-        const V v749 = softehl_vexp(v742);
-        const V v750 = v660 * v744;
-        const V v751 = v660 * v745;
-        const V v752 = 1.0 / v719;
-        const V v753 = v744 + v746;
-        const V v754 = v630 * v746;
-        const V v755 = v750 + v754;
-        const V v756 = v630 * v747;
-        const V v757 = v751 + v756;
-        const V v758 = v745 + v747;
-        const V v759 = 0.5 * v753;
-        const V v760 = 0.5 * v758;
-        const double v761 = 0.08333333333333333 * w[3];
-        const V v762 = w[3] * v74;
-        const V v763 = v74 * v39;
-        const V v764 = v675 * v755;
-        const V v765 = v675 * v757;
-        const V v766 = v675 * v675;
-        const V v767 = p1 * v24;
-        const V v768 = p1 * v43;
-        const V v769 = v668 * v674;
-        const V v770 = 3.0 * v674;
-        const V v771 = v21 * v290;
-        const V v772 = v701 * v768;
-        const V v773 = v767 * v701;
-        const V v774 = v723 * v604;
-        const V v775 = v21 - v774;
-        const V v776 = v700 * v769;
-        const V v777 = v700 * v731;
-        const V v778 = v74 * v775;
-        const V v779 = v32 * v74;
-        const V v780 = v32 * v714;
-        const V v781 = v714 * v287;
-        const V v782 = 0.5 * v743;
-        const V v783 = v731 * v776;
-        const V v784 = v752 * v752;
-        const V v785 = parameters[10] * v752;
-        const V v786 = v752 * v780;
-        const V v787 = v287 * v785;
-        const V v788 = v752 * v781;
-        const V v789 = v788 + v733;
-        const V v790 = v713 * v781;
-        const V v791 = v782 * v790;
-        const V v792 = v786 - v21;
-        const V v793 = v759 * v777;
-        const V v794 = v661 * v759;
-        const V v795 = v661 * v760;
-        const V v796 = v760 * v777;
-        const V v797 = v792 * v288;
-        const V v798 = v784 * v791;
-        const V v799 = v662 * v794;
-        const V v800 = v662 * v795;
-        const V v801 = v770 * v793;
-        const V v802 = v770 * v796;
-        const V v803 = v74 * v797;
-        const V v804 = parameters[2] * v702;
-        const V v805 = v702 * v25;
-        const V v806 = v12 * v672;
-        const V v807 = v717 * v672;
-        const V v808 = parameters[7] * v717;
-        const V v809 = 0.5 * v804;
-        const V v810 = v804 * v19;
-        const V v811 = w[3] * v805;
-        const V v812 = v787 - v798;
-        const V v813 = v676 * v806;
-        const V v814 = v676 * v808;
-        const V v815 = v676 * v807;
-        const V v816 = 1.0 / v810;
-        const V v817 = v798 - v787;
-        const V v818 = v594 * v812;
-        const V v819 = v67 * v803;
-        const V v820 = v68 * v803;
-        const V v821 = v67 * v309;
-        const V v822 = v68 * v309;
-        const V v823 = v63 * v817;
-        const V v824 = v729 * v813;
-        const V v825 = v729 * v728;
-        const V v826 = v818 + v825;
-        const V v827 = v716 * v813;
-        const V v828 = v716 * v728;
-        const V v829 = v823 + v828;
-        const V v830 = v766 * v799;
-        const V v831 = v764 - v830;
-        const V v832 = v766 * v800;
-        const V v833 = v765 - v832;
-        const V v834 = v66 * v170;
-        const V v835 = v69 * v170;
-        const V v836 = -v834;
-        const V v837 = -v835;
-        const V v838 = v763 * v829;
-        const V v839 = v776 * v831;
-        const V v840 = v776 * v833;
-        const V v841 = v831 * v807;
-        const V v842 = v833 * v807;
-        const V v843 = v66 * v778;
-        const V v844 = v69 * v778;
-        const V v845 = v816 * v816;
-        const V v846 = v732 * v839;
-        const V v847 = v801 + v846;
-        const V v848 = v732 * v840;
-        const V v849 = v802 + v848;
-        const V v850 = v809 * v845;
-        const V v851 = v845 * v811;
-        const V v852 = 0.504 * v748;
-        const V v853 = 0.9 * v748;
-        const V v854 = 1.0 - v853;
-        const V v855 = 0.924 * v749;
-        const V v856 = 1.4 * v749;
-        const V v857 = 1.0 - v856;
-        const V v858 = v816 * v852;
-        const V v859 = v854 * v816;
-        const V v860 = v854 * v761;
-        const V v861 = v854 * v783;
-        const V v862 = 0.5 * v857;
-        const V v863 = v857 * v705;
-        const V v864 = v857 * v772;
-        const V v865 = v857 * v773;
-        const V v866 = v773 * v855;
-        const V v867 = v740 - v866;
-        const V v868 = v783 * v858;
-        const V v869 = v737 - v868;
-        const V v870 = v861 * v850;
-        const V v871 = v861 * v851;
-        const V v872 = v816 * v860;
-        const V v873 = v816 * v861;
-        const V v874 = v815 - v873;
-        const V v875 = v767 * v862;
-        const V v876 = v875 + v734;
-        const V v877 = v789 - v865;
-        const V v878 = v847 * v859;
-        const V v879 = v841 - v878;
-        const V v880 = v849 * v859;
-        const V v881 = v842 - v880;
-        const V v882 = v74 * v863;
-        const V v883 = v74 * v864;
-        const V v884 = v769 * v872;
-        const V v885 = parameters[7] * v876;
-        const V v886 = v867 - v885;
-        const V v887 = v865 - v789;
-        const V v888 = v74 * v887;
-        const V v889 = w[3] * v874;
-        const V v890 = v32 * v877;
-        const V v891 = v771 - v890;
-        const V v892 = v731 * v884;
-        const V v893 = v824 - v870;
-        const V v894 = v870 + v827;
-        const V v895 = v779 * v886;
-        const V v896 = w[3] * v893;
-        const V v897 = w[3] * v894;
-        const V v898 = v762 * v891;
-        const V v899 = v2 * v891;
-        const V v900 = -v892;
-        const V v901 = v37 * v888;
-        const V v902 = v883 - v901;
-        const V v903 = v38 * v888;
-        const V v904 = v291 + v903;
-        const V v905 = v66 * v882;
-        const V v906 = v69 * v882;
-        const V v907 = v63 * v898;
-        s52 += v907;
-        const V v908 = v64 * v898;
-        s53 += v908;
-        const V v909 = v64 * v899;
-        const V v910 = v819 + v909;
-        const V v911 = v63 * v899;
-        const V v912 = v820 + v911;
-        const V v913 = v838 + v902;
-        const V v914 = v910 - v904;
-        const V v915 = v904 + v912;
-        const V v916 = v763 * v826;
-        const V v917 = v902 - v916;
-        const V v918 = v66 * v913;
-        s55 += v918;
-        const V v919 = v69 * v913;
-        s57 += v919;
-        const V v920 = v66 * v917;
-        s54 += v920;
-        const V v921 = v69 * v917;
-        s56 += v921;
-        const V v922 = v821 * v895;
-        const V v923 = v914 - v922;
-        const V v924 = v822 * v895;
-        const V v925 = v915 - v924;
-        const V v926 = v821 * v869;
-        const V v927 = v926 + v879;
-        const V v928 = v822 * v869;
-        const V v929 = v928 + v881;
-        const V v930 = v66 * v923;
-        s58 += v930;
-        const V v931 = v69 * v923;
-        s60 += v931;
-        const V v932 = v66 * v925;
-        s59 += v932;
-        const V v933 = v69 * v925;
-        s61 += v933;
-        const V v934 = v721 - v669;
-        const V v935 = v707 * v934;
-        const V v936 = v665 + v935;
-        const V v937 = v814 * v936;
-        const V v938 = v67 * v937;
-        const V v939 = v938 + v927;
-        const V v940 = v68 * v937;
-        const V v941 = v940 + v929;
-        const V v942 = w[3] * v939;
-        const V v943 = w[3] * v941;
+        const V v323 = 0.08333333333333333 * p3, v324 = 0.5 * v250,
+            v325 = softehl_vexp(p2 * parameters[3]), v326 = v245 * v306 + v246 * v305,
+            v327 = v1 + v252 * v252, v328 = parameters[10] * v252, v329 = v310 + v309,
+            v330 = 0.5 * v326, v331 = v258 * v326, v332 = softehl_vsqrt(v327),
+            v333 = softehl_vexp(-(v292 * v292)), v334 = v331 * v257, v335 = v258 * v253 * v257,
+            v336 = v308 + v307, v337 = v303 * v303, v338 = 2.0 * v303,
+            v339 = softehl_vsqrt(1.0 / v327), v340 = parameters[7] * v264,
+            v341 = parameters[7] * v265, v342 = parameters[7] * v282, v343 = parameters[7] * v283,
+            v344 = softehl_vexp(-(0.56 * v134)), v345 = softehl_vexp(-(0.66 * v134)),
+            v346 = 1.0 / v332, v347 = 0.5 * (v340 + v342), v348 = 0.5 * (v341 + v343),
+            v349 = v56 * v26, v350 = v302 * v302, v351 = p1 * v16, v352 = v298 * v301,
+            v353 = 3.0 * v301, v354 = v351 * v324, v355 = v323 * v352, v356 = v323 * v337,
+            v357 = v56 * (v13 - v253 * (v326 * (v247 * v23)) * v257), v358 = v328 * v117,
+            v359 = v337 * v355, v360 = v117 * (parameters[10] * v346),
+            v361 = v346 * v358 + v253 * v334,
+            v362 = v346 * v346 * (0.5 * v339 * (2.0 * v252 * v358)),
+            v363 = v56 * ((v346 * (v20 * v328) - v13) * v118), v364 = parameters[2] * v325,
+            v365 = v330 * v300, v366 = v303 * (v8 * v300), v367 = 1.0 / (v364 * v12),
+            v368 = v51 * v135, v369 = v52 * v135,
+            v370 = v302 * (v294 * v340 + v275 * v342) - v350 * (v296 * (v295 * v347)),
+            v371 = v302 * (v294 * v341 + v275 * v343) - v350 * (v296 * (v295 * v348)),
+            v372 = -(v50 * v88), v373 = -(v53 * v88), v374 = v50 * v357, v375 = v53 * v357,
+            v376 = v367 * v367, v377 = 1.0 - 0.9 * v344, v378 = 1.0 - 1.4 * v345,
+            v379 = v377 * v367, v380 = v377 * v359, v381 = v378 * v354,
+            v382 = v253 * v331 * (v142 + parameters[8] * v223) - v354 * (0.924 * v345),
+            v383 = v303 * (v11 * v330) * v225 - v359 * (v367 * (0.504 * v344)),
+            v384 = v380 * (0.5 * v364 * v376), v385 = v380 * (v376 * (w[3] * (v325 * v17))),
+            v386 = v370 * v365 - (v353 * (v347 * v356) + v338 * (v355 * v370)) * v379,
+            v387 = v371 * v365 - (v353 * (v348 * v356) + v338 * (v355 * v371)) * v379,
+            v388 = v56 * (v378 * (v324 * v27)),
+            v389 = v382 - parameters[7] * (v351 * (0.5 * v378) + v253 * v253 * v334),
+            v390 = v56 * (v381 - v361), v391 = w[3] * (v303 * v365 - v367 * v380),
+            v392 = v13 * v120 - v20 * (v361 - v381), v393 = v20 * v56 * v389,
+            v394 = w[3] * (v336 * v366 - v384), v395 = w[3] * (v384 + v329 * v366),
+            v396 = w[3] * v56 * v392, v397 = v2 * v392,
+            v398 = -(v337 * (v352 * (v367 * (v377 * (0.08333333333333333 * w[3]))))),
+            v399 = v56 * (v378 * (v324 * (p1 * v28))) - v24 * v390, v400 = v121 + v25 * v390,
+            v401 = v50 * v388, v402 = v53 * v388;
+        s37 += v48 * v396; s38 += v49 * v396;
+        const V v403 = v349 * (v48 * (v362 - v360) + v329 * v335) + v399,
+            v404 = v399 - v349 * (v251 * (v360 - v362) + v336 * v335);
+        s40 += v50 * v403; s42 += v53 * v403; s39 += v50 * v404; s41 += v53 * v404;
+        const V v405 = v51 * v363 + v49 * v397 - v400 - v368 * v393,
+            v406 = v400 + (v52 * v363 + v48 * v397) - v369 * v393, v407 = v50 * v405;
+        s43 += v407; const V v408 = v53 * v405; s45 += v408; s44 += v50 * v406; s46 += v53 * v406;
+        const V v409 = v303 * (parameters[7] * v330) * (v297 + 0.3989422804014327 * v55 * (v333 - v299)),
+            v410 = w[3] * (v51 * v409 + (v368 * v383 + v386)),
+            v411 = w[3] * (v52 * v409 + (v369 * v383 + v387));
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
             (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
-            R_lanes[4 + i] += D1 * v889;
-            K_lanes[(4 + i) * (4 + modes) + 0] += D1 * v896;
-            K_lanes[0 * (4 + modes) + 4 + i] += N * v843 + D * v905 + N2 * v685 + N3 * v686;
-            K_lanes[(4 + i) * (4 + modes) + 1] += D1 * v942;
-            K_lanes[1 * (4 + modes) + 4 + i] += N * v836;
-            K_lanes[(4 + i) * (4 + modes) + 2] += D1 * v897;
-            K_lanes[2 * (4 + modes) + 4 + i] += N * v844 + D * v906 + N2 * v687 + N3 * v688;
-            K_lanes[(4 + i) * (4 + modes) + 3] += D1 * v943;
-            K_lanes[3 * (4 + modes) + 4 + i] += N * v837;
-            const V r0 = softehl_splat(0.0);
-            const V r1 = softehl_splat(0.0);
-            const V r2 = D1 * v871;
-            const V r3 = D1 * v900;
-            const V r4 = D1 * v689;
-            const V r5 = softehl_splat(0.0);
-            const V r6 = D1 * v690;
-            const V r7 = softehl_splat(0.0);
+            R_lanes[4 + i] += D1 * v391; K_lanes[(4 + i) * (4 + modes) + 0] += D1 * v394;
+            K_lanes[0 * (4 + modes) + 4 + i] += N * v374 + D * v401 + N2 * v311 + N3 * v312;
+            K_lanes[(4 + i) * (4 + modes) + 1] += D1 * v410;
+            K_lanes[1 * (4 + modes) + 4 + i] += N * v372;
+            K_lanes[(4 + i) * (4 + modes) + 2] += D1 * v395;
+            K_lanes[2 * (4 + modes) + 4 + i] += N * v375 + D * v402 + N2 * v313 + N3 * v314;
+            K_lanes[(4 + i) * (4 + modes) + 3] += D1 * v411;
+            K_lanes[3 * (4 + modes) + 4 + i] += N * v373;
+            const V r0 = softehl_splat(0.0), r1 = softehl_splat(0.0), r2 = D1 * v385,
+                r3 = D1 * v398, r4 = D1 * v315, r5 = softehl_splat(0.0), r6 = D1 * v316,
+                r7 = softehl_splat(0.0);
             for (ptrdiff_t j = 0; j < modes; ++j)
                 K_lanes[(4 + i) * (4 + modes) + 4 + j] += r0 * B[8 * j] + r1 * B[8 * j + 1] + r2 * B[8 * j + 2] + r3 * B[8 * j + 3] + r4 * B[8 * j + 4] + r5 * B[8 * j + 5] + r6 * B[8 * j + 6] + r7 * B[8 * j + 7];
         }
     }
-    const V v944 = -s44;
-    const V v945 = -s45;
-    const V v946 = -s46;
-    const V v947 = -s47;
-    const V v948 = -s55;
-    const V v949 = -s57;
-    R_lanes[0] = s53;
-    R_lanes[1] = v947;
-    R_lanes[2] = s52;
-    R_lanes[3] = v946;
-    K_lanes[0 * (4 + modes) + 0] = s54;
-    K_lanes[0 * (4 + modes) + 1] = s58;
-    K_lanes[0 * (4 + modes) + 2] = v948;
-    K_lanes[0 * (4 + modes) + 3] = s59;
-    K_lanes[1 * (4 + modes) + 0] = s44;
-    K_lanes[1 * (4 + modes) + 1] = s48;
-    K_lanes[1 * (4 + modes) + 2] = v944;
-    K_lanes[1 * (4 + modes) + 3] = s49;
-    K_lanes[2 * (4 + modes) + 0] = s56;
-    K_lanes[2 * (4 + modes) + 1] = s60;
-    K_lanes[2 * (4 + modes) + 2] = v949;
-    K_lanes[2 * (4 + modes) + 3] = s61;
-    K_lanes[3 * (4 + modes) + 0] = s45;
-    K_lanes[3 * (4 + modes) + 1] = s50;
-    K_lanes[3 * (4 + modes) + 2] = v945;
-    K_lanes[3 * (4 + modes) + 3] = s51;
+    const V v412 = -s29, v413 = -s30, v414 = -s31, v415 = -s32, v416 = -s40, v417 = -s42;
+    R_lanes[0] = s38; R_lanes[1] = v415; R_lanes[2] = s37; R_lanes[3] = v414;
+    K_lanes[0 * (4 + modes) + 0] = s39; K_lanes[0 * (4 + modes) + 1] = s43;
+    K_lanes[0 * (4 + modes) + 2] = v416; K_lanes[0 * (4 + modes) + 3] = s44;
+    K_lanes[1 * (4 + modes) + 0] = s29; K_lanes[1 * (4 + modes) + 1] = s33;
+    K_lanes[1 * (4 + modes) + 2] = v412; K_lanes[1 * (4 + modes) + 3] = s34;
+    K_lanes[2 * (4 + modes) + 0] = s41; K_lanes[2 * (4 + modes) + 1] = s45;
+    K_lanes[2 * (4 + modes) + 2] = v417; K_lanes[2 * (4 + modes) + 3] = s46;
+    K_lanes[3 * (4 + modes) + 0] = s30; K_lanes[3 * (4 + modes) + 1] = s35;
+    K_lanes[3 * (4 + modes) + 2] = v413; K_lanes[3 * (4 + modes) + 3] = s36;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
     softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_rough_tangent, 4, (4 + modes), 2, 0, (4 + modes), ((4 + modes) * (4 + modes)))
 
-void softehl_film_rough_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_rough_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_rough_tangent_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (4 + modes) * e, tangent + ((4 + modes) * (4 + modes)) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_rough_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), tangent + ((4 + modes) * (4 + modes)) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    double K[SOFTEHL_LANES * ((4 + modes) * (4 + modes))];
-    softehl_film_rough_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_film_rough_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -1821,502 +631,159 @@ static void softehl_film_rough_fields_group(
     softehl_gather(d_lanes, d, (4 + modes));
 #endif
     const double v1 = parameters[11] * parameters[11];
-    const V v2 = X2 + d2;
-    const V v3 = X1 - parameters[0];
-    const V v4 = X3 - parameters[0];
-    const V v5 = d1 + v3;
-    const V v6 = d2 * parameters[6];
-    const V v7 = a1 + v6;
-    const V v8 = d0 * parameters[6];
-    const V v9 = a0 + v8;
-    const V v10 = d3 + v4;
-    const double v11 = 0.3989422804014327 * parameters[9];
-    const V v12 = v2 - d0;
-    const double v13 = 1.0 / parameters[7];
-    const double v14 = 0.5 * parameters[7];
-    const V v15 = X0 + d0;
-    const V v16 = v12 - X0;
-    const V v17 = 0.5 * v16;
-    const double v18 = 4.0 * v13;
-    const V v19 = 1.0 / v17;
-    const V v20 = parameters[2] * v17;
-    const V v21 = 0.5 * v19;
+    const V v2 = X2 + d2, v3 = d1 + (X1 - parameters[0]), v4 = a1 + d2 * parameters[6],
+        v5 = a0 + d0 * parameters[6], v6 = d3 + (X3 - parameters[0]);
+    const double v7 = 0.3989422804014327 * parameters[9], v8 = 1.0 / parameters[7],
+        v9 = 0.5 * parameters[7];
+    const V v10 = X0 + d0, v11 = 0.5 * (v2 - d0 - X0);
+    const double v12 = 4.0 * v8;
+    const V v13 = parameters[2] * v11, v14 = 0.5 * (1.0 / v11);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v22 = 0.5 * w[0];
-        const V v23 = w[3] * v17;
-        const double v24 = 0.5 + v22;
-        const double v25 = 0.5 - v22;
-        const V v26 = v24 * v2;
-        const V v27 = v24 * v10;
-        const V v28 = v25 * v15;
-        const V v29 = v26 + v28;
-        const V v30 = v25 * v5;
-        const V v31 = v30 + v27;
-        const V v32 = v13 * v31;
-        const M v33 = softehl_le(softehl_splat(0.5), v32);
-        V v34 = v32;
-        const M m35 = ~v33;
-        if (softehl_any(m35)) {
-            const V v36 = 1.0 - v32;
-            const V v37 = 4.0 * v36;
-            const V v38 = 1.0 / v37;
-            v34 = softehl_blend(m35, v38, v34);
+        const double v15 = 0.5 * w[0]; const V v16 = w[3] * v11;
+        const double v17 = 0.5 + v15, v18 = 0.5 - v15;
+        const V v19 = v17 * v2 + v18 * v10, v20 = v18 * v3 + v17 * v6, v21 = v8 * v20;
+        const M v22 = softehl_le(softehl_splat(0.5), v21); V v23 = v21; const M m24 = ~v22;
+        if (softehl_any(m24)) {
+            const V v25 = 1.0 / (4.0 * (1.0 - v21)); v23 = softehl_blend(m24, v25, v23);
         }
-        const M v39 = softehl_eq(v34, v34);
-        const V v40 = v34 * v34;
-        V v41 = softehl_splat(0.0);
-        const M m42 = v39;
-        if (softehl_any(m42)) {
-            const M v43 = softehl_le(softehl_splat(6.0), v34);
-            V v44 = softehl_splat(0.0);
-            const M m45 = v43 & m42;
-            if (softehl_any(m45)) {
-                const V v46 = 1.0 / v40;
-                const V v47 = 0.0003054234477944064 * v46;
-                const V v48 = 4.1273438891135995e-05 + v47;
-                const V v49 = 9.0 * v46;
-                const V v50 = v48 * v49;
-                const V v51 = 5.0707367780538514e-05 + v50;
-                const V v52 = v49 * v51;
-                const V v53 = 6.3000063000063e-05 + v52;
-                const V v54 = v49 * v53;
-                const V v55 = 7.925814377427281e-05 + v54;
-                const V v56 = v49 * v55;
-                const V v57 = 0.00010112245929821013 + v56;
-                const V v58 = v49 * v57;
-                const V v59 = 0.00013108466946064277 + v58;
-                const V v60 = v49 * v59;
-                const V v61 = 0.00017303176368804846 + v60;
-                const V v62 = v49 * v61;
-                const V v63 = 0.0002332167249708479 + v62;
-                const V v64 = v49 * v63;
-                const V v65 = 0.00032206119162640903 + v64;
-                const V v66 = v49 * v65;
-                const V v67 = 0.0004576659038901602 + v66;
-                const V v68 = v49 * v67;
-                const V v69 = 0.0006730380939561179 + v68;
-                const V v70 = v49 * v69;
-                const V v71 = 0.0010319917440660474 + v70;
-                const V v72 = v49 * v71;
-                const V v73 = 0.0016670635865682305 + v72;
-                const V v74 = v49 * v73;
-                const V v75 = 0.002879473467708762 + v74;
-                const V v76 = v49 * v75;
-                const V v77 = 0.005439005439005439 + v76;
-                const V v78 = v49 * v77;
-                const V v79 = 0.011655011655011656 + v78;
-                const V v80 = v49 * v79;
-                const V v81 = 0.030303030303030304 + v80;
-                const V v82 = v49 * v81;
-                const V v83 = 0.1111111111111111 + v82;
-                const V v84 = v49 * v83;
-                const V v85 = 1.0 + v84;
-                v44 = softehl_blend(m45, v85, v44);
+        const M v26 = softehl_eq(v23, v23); const V v27 = v23 * v23; V v28 = softehl_splat(0.0);
+        const M m29 = v26;
+        if (softehl_any(m29)) {
+            const M v30 = softehl_le(softehl_splat(6.0), v23); V v31 = softehl_splat(0.0);
+            const M m32 = v30 & m29;
+            if (softehl_any(m32)) {
+                const V v33 = 1.0 / v27, v34 = 9.0 * v33,
+                    v35 = 5.0707367780538514e-05 + (4.1273438891135995e-05 + 0.0003054234477944064 * v33) * v34,
+                    v36 = v34 * (7.925814377427281e-05 + v34 * (6.3000063000063e-05 + v34 * v35)),
+                    v37 = v34 * (0.00013108466946064277 + v34 * (0.00010112245929821013 + v36)),
+                    v38 = v34 * (0.0002332167249708479 + v34 * (0.00017303176368804846 + v37)),
+                    v39 = v34 * (0.0004576659038901602 + v34 * (0.00032206119162640903 + v38)),
+                    v40 = v34 * (0.0010319917440660474 + v34 * (0.0006730380939561179 + v39)),
+                    v41 = v34 * (0.002879473467708762 + v34 * (0.0016670635865682305 + v40)),
+                    v42 = v34 * (0.011655011655011656 + v34 * (0.005439005439005439 + v41)),
+                    v43 = 1.0 + v34 * (0.1111111111111111 + v34 * (0.030303030303030304 + v42));
+                v31 = softehl_blend(m32, v43, v31);
             }
-            const M m86 = ~v43 & m42;
-            if (softehl_any(m86)) {
-                const V v87 = 0.1111111111111111 * v40;
-                const M v88 = softehl_lt(softehl_splat(3.0), v34);
-                const V v89 = 0.3645833333333333 * v34;
-                const V v90 = 0.3333333333333333 * v34;
-                const V v91 = 1.0 - v87;
-                const V v92 = v91 * v91;
-                const V v93 = v91 * v92;
-                V v94 = softehl_splat(0.0);
-                const M m95 = v88 & m86;
-                if (softehl_any(m95)) {
-                    const V v96 = 0.022222222222222223 * v34;
-                    const V v97 = 1.0 + v90;
-                    const V v98 = (-1.0) + v90;
-                    const V v99 = 3.3333333333333335 * v40;
-                    const V v100 = (-80.0) + v99;
-                    const V v101 = 1.0 / v98;
-                    const V v102 = v87 * v100;
-                    const V v103 = 66.0 + v102;
-                    const V v104 = v97 * v101;
-                    const V v105 = v96 * v103;
-                    const V v106 = softehl_vlog(v104);
-                    const V v107 = v106 * v93;
-                    const V v108 = v107 + v105;
-                    const V v109 = v89 * v108;
-                    v94 = softehl_blend(m95, v109, v94);
+            const M m44 = ~v30 & m29;
+            if (softehl_any(m44)) {
+                const V v45 = 0.1111111111111111 * v27;
+                const M v46 = softehl_lt(softehl_splat(3.0), v23);
+                const V v47 = 0.3645833333333333 * v23, v48 = 0.3333333333333333 * v23,
+                    v49 = 1.0 - v45, v50 = v49 * (v49 * v49);
+                V v51 = softehl_splat(0.0); const M m52 = v46 & m44;
+                if (softehl_any(m52)) {
+                    const V v53 = 0.022222222222222223 * v23 * (66.0 + v45 * ((-80.0) + 3.3333333333333335 * v27)),
+                        v54 = softehl_vlog((1.0 + v48) * (1.0 / ((-1.0) + v48))),
+                        v55 = v47 * (v54 * v50 + v53);
+                    v51 = softehl_blend(m52, v55, v51);
                 }
-                const M m110 = ~v88 & m86;
-                if (softehl_any(m110)) {
-                    const V v111 = 100.0 * v34;
-                    const V v112 = 300.0 + v111;
-                    const V v113 = 0.005555555555555556 * v34;
-                    const V v114 = 49.0 * v34;
-                    const V v115 = 60.0 + v114;
-                    const V v116 = softehl_vlog(v112);
-                    const V v117 = v90 * v115;
-                    const V v118 = (-405.0) + v117;
-                    const V v119 = v90 * v118;
-                    const V v120 = (-160.0) + v119;
-                    const V v121 = v90 * v120;
-                    const V v122 = 345.0 + v121;
-                    const V v123 = v90 * v122;
-                    const V v124 = 132.0 + v123;
-                    const V v125 = v113 * v124;
-                    const V v126 = (-0.9166666666666666) + v125;
-                    const V v127 = v116 * v93;
-                    const V v128 = v127 + v126;
-                    const V v129 = v89 * v128;
-                    v94 = softehl_blend(m110, v129, v94);
+                const M m56 = ~v46 & m44;
+                if (softehl_any(m56)) {
+                    const V v57 = softehl_vlog(300.0 + 100.0 * v23),
+                        v58 = 345.0 + v48 * ((-160.0) + v48 * ((-405.0) + v48 * (60.0 + 49.0 * v23))),
+                        v59 = (-0.9166666666666666) + 0.005555555555555556 * v23 * (132.0 + v48 * v58),
+                        v60 = v47 * (v57 * v50 + v59);
+                    v51 = softehl_blend(m56, v60, v51);
                 }
-                v44 = softehl_blend(m86, v94, v44);
+                v31 = softehl_blend(m44, v51, v31);
             }
-            v41 = softehl_blend(m42, v44, v41);
+            v28 = softehl_blend(m29, v31, v28);
         }
-        const M m130 = ~v39;
-        if (softehl_any(m130)) {
-            const V v131 = 6.0 - v34;
-            const V v132 = v131 * v131;
-            const V v133 = v131 * v132;
-            v41 = softehl_blend(m130, v133, v41);
+        const M m61 = ~v26;
+        if (softehl_any(m61)) {
+            const V v62 = 6.0 - v23, v63 = v62 * (v62 * v62);
+            v28 = softehl_blend(m61, v63, v28);
         }
-        const M v134 = softehl_le(v34, softehl_splat(5.0));
-        V v135 = softehl_splat(0.0);
-        V v136 = softehl_splat(0.0);
-        const M m137 = v134;
-        if (softehl_any(m137)) {
-            const V v138 = softehl_vpow(v34, 0.98);
-            const V v139 = softehl_vpow(v34, 2.31);
-            const V v140 = 1.899 * v138;
-            const V v141 = 11.1 * v139;
-            const V v142 = 0.05 * v40;
-            const V v143 = 0.11 * v40;
-            const V v144 = 0.92 * v34;
-            const V v145 = v142 - v144;
-            const V v146 = 2.38 * v34;
-            const V v147 = v143 - v146;
-            const V v148 = softehl_vexp(v145);
-            const V v149 = softehl_vexp(v147);
-            const V v150 = v140 * v148;
-            const V v151 = v141 * v149;
-            v135 = softehl_blend(m137, v151, v135);
-            v136 = softehl_blend(m137, v150, v136);
+        const M v64 = softehl_le(v23, softehl_splat(5.0));
+        V v65 = softehl_splat(0.0), v66 = softehl_splat(0.0);
+        const M m67 = v64;
+        if (softehl_any(m67)) {
+            const V v68 = softehl_vpow(v23, 0.98), v69 = softehl_vpow(v23, 2.31),
+                v70 = softehl_vexp(0.05 * v27 - 0.92 * v23),
+                v71 = softehl_vexp(0.11 * v27 - 2.38 * v23), v72 = 1.899 * v68 * v70,
+                v73 = 11.1 * v69 * v71;
+            v65 = softehl_blend(m67, v73, v65); v66 = softehl_blend(m67, v72, v66);
         }
-        const M m152 = ~v134;
-        if (softehl_any(m152)) {
-            const V v153 = 0.25 * v34;
-            const V v154 = 1.25 - v153;
-            const V v155 = 0.818 * v34;
-            const V v156 = 4.09 - v155;
-            const V v157 = softehl_vexp(v154);
-            const V v158 = softehl_vexp(v156);
-            const V v159 = 0.3225737734624401 * v157;
-            const V v160 = 0.048545522453863246 * v158;
-            v135 = softehl_blend(m152, v160, v135);
-            v136 = softehl_blend(m152, v159, v136);
+        const M m74 = ~v64;
+        if (softehl_any(m74)) {
+            const V v75 = softehl_vexp(1.25 - 0.25 * v23), v76 = softehl_vexp(4.09 - 0.818 * v23),
+                v77 = 0.3225737734624401 * v75, v78 = 0.048545522453863246 * v76;
+            v65 = softehl_blend(m74, v78, v65); v66 = softehl_blend(m74, v77, v66);
         }
-        const V v161 = v24 * v7;
-        const V v162 = parameters[1] - v161;
-        const V v163 = v25 * v9;
-        const V v164 = v162 - v163;
-        const M v165 = softehl_lt(softehl_splat(0.0), v164);
-        const V v166 = parameters[8] * v135;
-        const V v167 = v41 + v166;
-        const V v168 = softehl_blend(v165, v164, softehl_splat(0.0));
-        const V v169 = softehl_blend(v165, softehl_splat(0.0), v164);
-        const double v170 = 0.5 * w[2];
-        const V v171 = p0 * parameters[3];
-        const V v172 = softehl_vexp(v171);
-        const V v173 = 1.0 - p6;
-        const V v174 = 1.0 - p4;
-        const double v175 = 0.5 - v170;
-        const double v176 = 0.5 + v170;
-        const V v177 = v173 * v169;
-        const V v178 = v175 * v5;
-        const V v179 = v174 * v168;
-        const V v180 = v177 + v179;
-        const V v181 = v176 * v10;
-        const V v182 = v178 + v181;
-        const V v183 = v13 * v182;
-        const M v184 = softehl_le(softehl_splat(0.5), v183);
-        const V v185 = 2.25 + v32;
-        const V v186 = 6.25 + v32;
-        const V v187 = 2.7777777777777777 + v32;
-        const V v188 = 0.6944444444444444 + v32;
-        const V v189 = 12.25 + v32;
-        const V v190 = 5.444444444444445 + v32;
-        const V v191 = 1.3611111111111112 + v32;
-        const V v192 = 7.111111111111111 + v32;
-        const V v193 = 11.11111111111111 + v32;
-        const V v194 = 3.361111111111111 + v32;
-        const V v195 = 4.694444444444445 + v32;
-        const V v196 = 8.027777777777779 + v32;
-        const V v197 = 10.027777777777779 + v32;
-        const V v198 = 0.5 * v185;
-        const V v199 = 0.5 * v186;
-        const V v200 = v185 * v198;
-        const V v201 = v186 * v199;
-        const V v202 = 0.5 * v187;
-        const V v203 = 0.5 * v188;
-        const V v204 = v187 * v202;
-        const V v205 = v188 * v203;
-        const V v206 = 0.5 * v189;
-        const V v207 = 0.5 * v190;
-        const V v208 = v189 * v206;
-        const V v209 = v190 * v207;
-        const V v210 = 0.5 * v191;
-        const V v211 = -v200;
-        const V v212 = -v201;
-        const V v213 = v191 * v210;
-        const V v214 = 0.5 * v192;
-        const V v215 = -v204;
-        const V v216 = -v205;
-        const V v217 = v192 * v214;
-        const V v218 = softehl_vexp(v211);
-        const V v219 = -v208;
-        const V v220 = softehl_vexp(v212);
-        const V v221 = -v209;
-        const V v222 = 0.5 * v193;
-        const V v223 = softehl_vexp(v215);
-        const V v224 = -v213;
-        const V v225 = softehl_vexp(v216);
-        const V v226 = v193 * v222;
-        const V v227 = softehl_vexp(v219);
-        const V v228 = -v217;
-        const V v229 = softehl_vexp(v221);
-        const V v230 = 0.5 * v194;
-        const V v231 = softehl_vexp(v224);
-        const V v232 = v194 * v230;
-        const V v233 = 0.5 * v195;
-        const V v234 = 0.5 * v196;
-        const V v235 = v195 * v233;
-        const V v236 = softehl_vexp(v228);
-        const V v237 = -v226;
-        const V v238 = v196 * v234;
-        const V v239 = 0.5 * v197;
-        const V v240 = p1 * v21;
-        const V v241 = v197 * v239;
-        const V v242 = softehl_vexp(v237);
-        const V v243 = -v232;
-        const V v244 = 9.0 + v32;
-        const V v245 = -v235;
-        const V v246 = -v238;
-        const V v247 = 1.0 + v32;
-        const V v248 = 0.25 + v32;
-        const V v249 = 0.1111111111111111 + v32;
-        const V v250 = 0.5 * v244;
-        const V v251 = softehl_vexp(v243);
-        const V v252 = v244 * v250;
-        const V v253 = -v241;
-        const V v254 = parameters[2] * v172;
-        const V v255 = 0.5 * v247;
-        const V v256 = softehl_vexp(v245);
-        const V v257 = softehl_vexp(v246);
-        const V v258 = v247 * v255;
-        const V v259 = 0.5 * v248;
-        const V v260 = 0.5 * v249;
-        const V v261 = v248 * v259;
-        const V v262 = v254 * v180;
-        const V v263 = softehl_vexp(v253);
-        const V v264 = v249 * v260;
-        const V v265 = -v252;
-        const V v266 = -v258;
-        const V v267 = 0.027777777777777776 + v32;
-        const V v268 = 4.0 + v32;
-        const V v269 = -v261;
-        const V v270 = softehl_vexp(v265);
-        const V v271 = -v264;
-        const V v272 = 0.4444444444444444 + v32;
-        const V v273 = 1.7777777777777777 + v32;
-        const V v274 = 0.5 * v267;
-        const V v275 = softehl_vexp(v266);
-        const V v276 = 0.5 * v268;
-        const V v277 = v267 * v274;
-        const V v278 = v268 * v276;
-        const V v279 = softehl_vexp(v269);
-        const V v280 = 0.5 * v272;
-        const V v281 = softehl_vexp(v271);
-        const V v282 = v272 * v280;
-        const V v283 = 0.5 * v273;
-        const V v284 = v273 * v283;
-        const V v285 = -v277;
-        const V v286 = -v278;
-        const V v287 = parameters[7] * v34;
-        const V v288 = 0.66 * v34;
-        const V v289 = -v282;
-        const V v290 = -v288;
-        const V v291 = softehl_vexp(v285);
-        const V v292 = -v284;
-        const V v293 = 1.0 / v287;
-        const V v294 = v287 * v240;
-        const V v295 = softehl_vexp(v286);
-        const V v296 = softehl_vexp(v289);
-        const V v297 = parameters[10] * v164;
-        const V v298 = v164 * v164;
-        const V v299 = v1 + v298;
-        const V v300 = softehl_vexp(v290);
-        const V v301 = softehl_vexp(v292);
-        const V v302 = softehl_vsqrt(v299);
-        const V v303 = v293 * v262;
-        const V v304 = 27.0 * v270;
-        const V v305 = 0.3333333333333333 * v275;
-        const V v306 = v304 + v305;
-        const V v307 = 0.020833333333333332 * v279;
-        const V v308 = v306 + v307;
-        const V v309 = 0.00411522633744856 * v281;
-        const V v310 = v308 + v309;
-        const V v311 = 0.000257201646090535 * v291;
-        const V v312 = v310 + v311;
-        const V v313 = 5.333333333333333 * v295;
-        const V v314 = v312 + v313;
-        const V v315 = 0.06584362139917696 * v296;
-        const V v316 = v314 + v315;
-        const V v317 = 1.0534979423868314 * v301;
-        const V v318 = v316 + v317;
-        const V v319 = 21.48173868312757 * v257;
-        const V v320 = v319 + v318;
-        const V v321 = 33.51877572016461 * v263;
-        const V v322 = v321 + v320;
-        const V v323 = 1.0 / v302;
-        const V v324 = v297 * v323;
-        const V v325 = v303 * v167;
-        const V v326 = 1.6875 * v218;
-        const V v327 = v326 + v322;
-        const V v328 = 13.020833333333334 * v220;
-        const V v329 = v328 + v327;
-        const V v330 = 2.57201646090535 * v223;
-        const V v331 = v330 + v329;
-        const V v332 = 0.16075102880658437 * v225;
-        const V v333 = v332 + v331;
-        const V v334 = 50.020833333333336 * v227;
-        const V v335 = v334 + v333;
-        const V v336 = 9.880658436213992 * v229;
-        const V v337 = v336 + v335;
-        const V v338 = 0.6175411522633745 * v231;
-        const V v339 = v338 + v337;
-        const V v340 = 16.855967078189302 * v236;
-        const V v341 = v340 + v339;
-        const V v342 = 41.1522633744856 * v242;
-        const V v343 = v342 + v341;
-        const V v344 = 3.765689300411523 * v251;
-        const V v345 = v344 + v343;
-        const V v346 = 7.345936213991769 * v256;
-        const V v347 = v346 + v345;
-        const V v348 = v11 * v347;
-        const V v349 = v324 * v348;
-        const V v350 = v325 + v349;
-        const V v351 = 1.4 * v300;
-        const V v352 = 1.0 - v351;
-        const V v353 = v352 * v294;
-        const V v354 = v350 - v353;
-        V v355 = v183;
-        const M m356 = ~v184;
-        if (softehl_any(m356)) {
-            const V v357 = v182 * v18;
-            const V v358 = 4.0 - v357;
-            const V v359 = 1.0 / v358;
-            v355 = softehl_blend(m356, v359, v355);
+        const V v79 = parameters[1] - v17 * v4 - v18 * v5;
+        const M v80 = softehl_lt(softehl_splat(0.0), v79);
+        const V v81 = softehl_blend(v80, v79, softehl_splat(0.0)),
+            v82 = softehl_blend(v80, softehl_splat(0.0), v79);
+        const double v83 = 0.5 * w[2];
+        const V v84 = softehl_vexp(p0 * parameters[3]), v85 = (1.0 - p6) * v82 + (1.0 - p4) * v81,
+            v86 = (0.5 - v83) * v3 + (0.5 + v83) * v6, v87 = v8 * v86;
+        const M v88 = softehl_le(softehl_splat(0.5), v87);
+        const V v89 = 2.25 + v21, v90 = 6.25 + v21, v91 = 2.7777777777777777 + v21,
+            v92 = 0.6944444444444444 + v21, v93 = 12.25 + v21, v94 = 5.444444444444445 + v21,
+            v95 = 1.3611111111111112 + v21, v96 = 7.111111111111111 + v21,
+            v97 = 11.11111111111111 + v21, v98 = 3.361111111111111 + v21,
+            v99 = 4.694444444444445 + v21, v100 = 8.027777777777779 + v21,
+            v101 = 10.027777777777779 + v21, v102 = softehl_vexp(-(v89 * (0.5 * v89))),
+            v103 = softehl_vexp(-(v90 * (0.5 * v90))), v104 = softehl_vexp(-(v91 * (0.5 * v91))),
+            v105 = softehl_vexp(-(v92 * (0.5 * v92))), v106 = softehl_vexp(-(v93 * (0.5 * v93))),
+            v107 = softehl_vexp(-(v94 * (0.5 * v94))), v108 = softehl_vexp(-(v95 * (0.5 * v95))),
+            v109 = softehl_vexp(-(v96 * (0.5 * v96))), v110 = softehl_vexp(-(v97 * (0.5 * v97))),
+            v111 = 9.0 + v21, v112 = 1.0 + v21, v113 = 0.25 + v21, v114 = 0.1111111111111111 + v21,
+            v115 = softehl_vexp(-(v98 * (0.5 * v98))), v116 = parameters[2] * v84,
+            v117 = softehl_vexp(-(v99 * (0.5 * v99))), v118 = softehl_vexp(-(v100 * (0.5 * v100))),
+            v119 = softehl_vexp(-(v101 * (0.5 * v101))), v120 = 0.027777777777777776 + v21,
+            v121 = 4.0 + v21, v122 = softehl_vexp(-(v111 * (0.5 * v111))),
+            v123 = 0.4444444444444444 + v21, v124 = 1.7777777777777777 + v21,
+            v125 = softehl_vexp(-(v112 * (0.5 * v112))),
+            v126 = softehl_vexp(-(v113 * (0.5 * v113))),
+            v127 = softehl_vexp(-(v114 * (0.5 * v114))), v128 = parameters[7] * v23,
+            v129 = softehl_vexp(-(v120 * (0.5 * v120))),
+            v130 = softehl_vexp(-(v121 * (0.5 * v121))),
+            v131 = softehl_vexp(-(v123 * (0.5 * v123))), v132 = softehl_vexp(-(0.66 * v23)),
+            v133 = softehl_vexp(-(v124 * (0.5 * v124))), v134 = softehl_vsqrt(v1 + v79 * v79),
+            v135 = 27.0 * v122 + 0.3333333333333333 * v125 + 0.020833333333333332 * v126,
+            v136 = v135 + 0.00411522633744856 * v127 + 0.000257201646090535 * v129 + 5.333333333333333 * v130,
+            v137 = 21.48173868312757 * v118 + (v136 + 0.06584362139917696 * v131 + 1.0534979423868314 * v133),
+            v138 = 13.020833333333334 * v103 + (1.6875 * v102 + (33.51877572016461 * v119 + v137)),
+            v139 = 50.020833333333336 * v106 + (0.16075102880658437 * v105 + (2.57201646090535 * v104 + v138)),
+            v140 = 16.855967078189302 * v109 + (0.6175411522633745 * v108 + (9.880658436213992 * v107 + v139)),
+            v141 = 7.345936213991769 * v117 + (3.765689300411523 * v115 + (41.1522633744856 * v110 + v140)),
+            v142 = v7 * v141, v143 = parameters[10] * v79 * (1.0 / v134) * v142,
+            v144 = 1.0 / v128 * (v116 * v85) * (v28 + parameters[8] * v65) + v143,
+            v145 = (1.0 - 1.4 * v132) * (v128 * (p1 * v14)), v146 = v144 - v145;
+        V v147 = v87; const M m148 = ~v88;
+        if (softehl_any(m148)) {
+            const V v149 = 1.0 / (4.0 - v86 * v12); v147 = softehl_blend(m148, v149, v147);
         }
-        const double v360 = 0.5 * w[1];
-        const V v361 = parameters[7] * v355;
-        const double v362 = 0.5 - v360;
-        const double v363 = 0.5 + v360;
-        const V v364 = v362 * v5;
-        const V v365 = v363 * v10;
-        const V v366 = v364 + v365;
-        const V v367 = v13 * v366;
-        const M v368 = softehl_le(softehl_splat(0.5), v367);
-        V v369 = v367;
-        const M m370 = ~v368;
-        if (softehl_any(m370)) {
-            const V v371 = v366 * v18;
-            const V v372 = 4.0 - v371;
-            const V v373 = 1.0 / v372;
-            v369 = softehl_blend(m370, v373, v369);
+        const double v150 = 0.5 * w[1];
+        const V v151 = parameters[7] * v147, v152 = (0.5 - v150) * v3 + (0.5 + v150) * v6,
+            v153 = v8 * v152;
+        const M v154 = softehl_le(softehl_splat(0.5), v153); V v155 = v153; const M m156 = ~v154;
+        if (softehl_any(m156)) {
+            const V v157 = 1.0 / (4.0 - v152 * v12); v155 = softehl_blend(m156, v157, v155);
         }
-        const V v374 = p2 * parameters[3];
-        const V v375 = 0.08333333333333333 * p3;
-        const V v376 = 0.56 * v34;
-        const V v377 = softehl_vexp(v374);
-        const V v378 = v14 * v180;
-        const V v379 = -v376;
-        const V v380 = 0.5 * v32;
-        const V v381 = 0.7071067811865476 * v32;
-        const V v382 = v32 * v380;
-        const V v383 = parameters[7] * v369;
-        const V v384 = softehl_vexp(v379);
-        const V v385 = softehl_verfc(v381);
-        const V v386 = v353 + v350;
-        const V v387 = parameters[8] * v136;
-        const V v388 = v383 * v361;
-        const V v389 = -v382;
-        const V v390 = 0.5 * v385;
-        const V v391 = 1.0 - v390;
-        const V v392 = v383 + v361;
-        const V v393 = 0.5 * v392;
-        const V v394 = softehl_vexp(v389);
-        const V v395 = v32 * v391;
-        const V v396 = 0.9 * v384;
-        const V v397 = 1.0 - v396;
-        const V v398 = v375 * v397;
-        const V v399 = 0.3989422804014327 * v394;
-        const V v400 = v395 + v399;
-        const V v401 = v377 * v20;
-        const V v402 = v393 * v393;
-        const V v403 = v393 * v398;
-        const V v404 = 1.0 / v401;
-        const V v405 = v404 * v403;
-        const V v406 = v402 * v405;
-        const V v407 = 1.0 / v402;
-        const V v408 = v388 * v407;
-        const V v409 = parameters[7] * v400;
-        const V v410 = v400 + v387;
-        const V v411 = v378 * v410;
-        const V v412 = v408 * v406;
-        const V v413 = v411 - v412;
-        const V v414 = v408 * v413;
-        softehl_store4(R + 13 * q + 0, (13 * points), v29, v23, v31, p0);
-        softehl_store4(R + 13 * q + 4, (13 * points), v354, v414, v386, v254);
-        softehl_store4(R + 13 * q + 8, (13 * points), v409, v348, v349, p4);
+        const V v158 = softehl_vexp(p2 * parameters[3]), v159 = parameters[7] * v155,
+            v160 = softehl_vexp(-(0.56 * v23)), v161 = softehl_verfc(0.7071067811865476 * v21),
+            v162 = v145 + v144, v163 = 0.5 * (v159 + v151),
+            v164 = softehl_vexp(-(v21 * (0.5 * v21))),
+            v165 = v21 * (1.0 - 0.5 * v161) + 0.3989422804014327 * v164, v166 = v163 * v163,
+            v167 = 1.0 / (v158 * v13) * (v163 * (0.08333333333333333 * p3 * (1.0 - 0.9 * v160))),
+            v168 = v159 * v151 * (1.0 / v166), v169 = parameters[7] * v165,
+            v170 = v168 * (v9 * v85 * (v165 + parameters[8] * v66) - v168 * (v166 * v167));
+        softehl_store4(R + 13 * q + 0, (13 * points), v19, v16, v20, p0);
+        softehl_store4(R + 13 * q + 4, (13 * points), v146, v170, v162, v116);
+        softehl_store4(R + 13 * q + 8, (13 * points), v169, v142, v143, p4);
         softehl_store1(R + 13 * q + 12, (13 * points), p6);
     }
 }
-
-void softehl_film_rough_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_rough_fields_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, 0, parameters, rule, basis, values + (13 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_rough_fields_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (13 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * (13 * points)];
-    softehl_film_rough_fields(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (13 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_rough_fields, 4, (4 + modes), 2, 0, (13 * points), 0)

@@ -39,37 +39,19 @@
 
 SOFTEHL_LANEWISE(erfc)
 
-static void softehl_film_rough_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_rough_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 18, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 18, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15, t16, t17;
+    softehl_load4(t + 0, 18, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 18, &t4, &t5, &t6, &t7);
     softehl_load4(t + 8, 18, &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    V t12, t13, t14, t15;
-    softehl_load4(t + 12, 18, &t12, &t13, &t14, &t15);
-    (void)t12; (void)t13; (void)t14; (void)t15;
-    V t16, t17;
-    softehl_load2(t + 16, 18, &t16, &t17);
-    (void)t16; (void)t17;
+    softehl_load4(t + 12, 18, &t12, &t13, &t14, &t15); softehl_load2(t + 16, 18, &t16, &t17);
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -85,1044 +67,301 @@ static void softehl_film_rough_pseudo_load_group(
 #endif
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
-    const double v1 = 1.0 / parameters[7];
-    const double v2 = 6.283185307179586 * parameters[4];
-    const V v3 = X2 + d2;
-    const V v4 = X1 - parameters[0];
-    const V v5 = X3 - parameters[0];
-    const V v6 = d1 + v4;
-    const V v7 = d3 + v5;
-    const V v8 = d2 * parameters[6];
-    const V v9 = a1 + v8;
-    const V v10 = d0 * parameters[6];
-    const V v11 = a0 + v10;
-    const V v12 = parameters[2] * t9;
-    const V v13 = v3 - X0;
-    const double v14 = 4.0 * v1;
-    const double v15 = v1 * v1;
-    const V v16 = t2 - t0;
-    const V v17 = v13 - d0;
-    const V v18 = d0 * t12;
-    const V v19 = t4 + v18;
-    const V v20 = d2 * t12;
-    const V v21 = t5 + v20;
-    const V v22 = v7 - v6;
-    const V v23 = t13 * v15;
-    const V v24 = 0.5 * v17;
-    const V v25 = 0.5 * v16;
-    const V v26 = 0.5 * v22;
-    const V v27 = 6.283185307179586 * t10;
-    const V v28 = 0.7071067811865476 * t15;
-    const V v29 = t1 - t6;
-    const V v30 = t3 - t6;
-    const double v31 = parameters[11] * parameters[11];
-    const V v32 = parameters[11] * t17;
-    const V v33 = 1.0 / v24;
-    const V v34 = v24 * v24;
-    const V v35 = v24 * v25;
-    const double v36 = 0.7071067811865476 * parameters[9];
-    const double v37 = 0.3989422804014327 * parameters[9];
-    const V v38 = v26 * v26;
-    const V v39 = v38 + v34;
-    const V v40 = v30 - v29;
-    const double v41 = 0.5 * parameters[5];
-    const V v42 = 0.5 * v40;
-    const V v43 = softehl_vsqrt(v39);
-    const V v44 = 1.0 / v39;
-    const V v45 = v26 * v42;
-    const V v46 = v45 + v35;
-    const V v47 = parameters[5] * v43;
-    const V v48 = softehl_vsqrt(v44);
-    const V v49 = v48 * v41;
-    const V v50 = v33 * v33;
-    const V v51 = v50 * v25;
-    const V v52 = 2.0 * v46;
-    const V v53 = v52 * v49;
-    const V v54 = v43 * t11;
-    const V v55 = v54 + v53;
-    V s56 = softehl_splat(0.0);
-    V s57 = softehl_splat(0.0);
-    V s58 = softehl_splat(0.0);
-    V s59 = softehl_splat(0.0);
+    const double v1 = 1.0 / parameters[7], v2 = 6.283185307179586 * parameters[4];
+    const V v3 = d1 + (X1 - parameters[0]), v4 = d3 + (X3 - parameters[0]),
+        v5 = a1 + d2 * parameters[6], v6 = a0 + d0 * parameters[6], v7 = parameters[2] * t9;
+    const double v8 = 4.0 * v1;
+    const V v9 = t4 + d0 * t12, v10 = t5 + d2 * t12, v11 = t13 * (v1 * v1),
+        v12 = 0.5 * (X2 + d2 - X0 - d0), v13 = 0.5 * (t2 - t0), v14 = 0.5 * (v4 - v3),
+        v15 = 6.283185307179586 * t10, v16 = 0.7071067811865476 * t15, v17 = t1 - t6, v18 = t3 - t6;
+    const double v19 = parameters[11] * parameters[11];
+    const V v20 = parameters[11] * t17, v21 = 1.0 / v12;
+    const double v22 = 0.7071067811865476 * parameters[9], v23 = 0.3989422804014327 * parameters[9];
+    const V v24 = v14 * v14 + v12 * v12, v25 = 0.5 * (v18 - v17), v26 = softehl_vsqrt(v24),
+        v27 = parameters[5] * v26, v28 = softehl_vsqrt(1.0 / v24), v29 = v21 * v21 * v13,
+        v30 = v26 * t11 + 2.0 * (v14 * v25 + v12 * v13) * (v28 * (0.5 * parameters[5]));
+    V s31 = {0}, s32 = {0}, s33 = {0}, s34 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
-        const double v60 = 0.5 * w[0];
-        const double v61 = 0.5 + v60;
-        const double v62 = 0.5 - v60;
-        const V v63 = v62 * v6;
-        const V v64 = v62 * v29;
-        const V v65 = v61 * v7;
-        const V v66 = v63 + v65;
-        const V v67 = v61 * v30;
-        const V v68 = v64 + v67;
-        const V v69 = t6 + v68;
-        const V v70 = parameters[0] + v66;
-        const V v71 = v1 * v66;
-        const V v72 = v1 * v68;
-        const V v73 = 5.444444444444445 + v71;
-        const V v74 = 1.3611111111111112 + v71;
-        const V v75 = 7.111111111111111 + v71;
-        const V v76 = 11.11111111111111 + v71;
-        const V v77 = 3.361111111111111 + v71;
-        const V v78 = 4.694444444444445 + v71;
-        const V v79 = 8.027777777777779 + v71;
-        const V v80 = 10.027777777777779 + v71;
-        const V v81 = v66 * v23;
-        const V v82 = v72 - v81;
-        const M v83 = softehl_le(softehl_splat(0.5), v71);
-        const V v84 = 9.0 + v71;
-        const V v85 = 1.0 + v71;
-        const V v86 = 0.25 + v71;
-        const V v87 = 0.1111111111111111 + v71;
-        const V v88 = 0.027777777777777776 + v71;
-        const V v89 = 0.5 * v84;
-        const V v90 = 0.5 * v74;
-        const V v91 = 0.5 * v85;
-        const V v92 = 0.5 * v77;
-        const V v93 = 0.5 * v86;
-        const V v94 = 0.5 * v87;
-        const V v95 = 0.5 * v88;
-        const V v96 = v84 * v89;
-        const V v97 = 27.0 * v84;
-        const V v98 = v74 * v90;
-        const V v99 = 0.6175411522633745 * v74;
-        const V v100 = v85 * v91;
-        const V v101 = v86 * v93;
-        const V v102 = v87 * v94;
-        const V v103 = v77 * v92;
-        const V v104 = v88 * v95;
-        const V v105 = 0.3333333333333333 * v85;
-        const V v106 = 0.020833333333333332 * v86;
-        const V v107 = -v96;
-        const V v108 = -v98;
-        const V v109 = -v100;
-        const V v110 = -v101;
-        const V v111 = -v102;
-        const V v112 = -v104;
-        const V v113 = -v103;
-        const V v114 = 0.00411522633744856 * v87;
-        const V v115 = softehl_vexp(v107);
-        const V v116 = softehl_vexp(v108);
-        const V v117 = softehl_vexp(v109);
-        const V v118 = softehl_vexp(v110);
-        const V v119 = softehl_vexp(v111);
-        const V v120 = softehl_vexp(v112);
-        const V v121 = softehl_vexp(v113);
-        const V v122 = 0.000257201646090535 * v88;
-        const V v123 = 3.765689300411523 * v77;
-        const V v124 = 4.0 + v71;
-        const V v125 = 0.4444444444444444 + v71;
-        const V v126 = 2.25 + v71;
-        const V v127 = 1.7777777777777777 + v71;
-        const V v128 = 6.25 + v71;
-        const V v129 = 2.7777777777777777 + v71;
-        const V v130 = 0.5 * v124;
-        const V v131 = 0.5 * v125;
-        const V v132 = 5.333333333333333 * v124;
-        const V v133 = v124 * v130;
-        const V v134 = 0.5 * v126;
-        const V v135 = 0.5 * v127;
-        const V v136 = 0.5 * v128;
-        const V v137 = 0.5 * v129;
-        const V v138 = v125 * v131;
-        const V v139 = 0.06584362139917696 * v125;
-        const V v140 = v126 * v134;
-        const V v141 = 1.6875 * v126;
-        const V v142 = v127 * v135;
-        const V v143 = v128 * v136;
-        const V v144 = v129 * v137;
-        const V v145 = 1.0534979423868314 * v127;
-        const V v146 = 13.020833333333334 * v128;
-        const V v147 = -v133;
-        const V v148 = -v138;
-        const V v149 = -v140;
-        const V v150 = -v142;
-        const V v151 = -v143;
-        const V v152 = -v144;
-        const V v153 = 2.57201646090535 * v129;
-        const V v154 = softehl_vexp(v147);
-        const V v155 = softehl_vexp(v148);
-        const V v156 = softehl_vexp(v149);
-        const V v157 = softehl_vexp(v150);
-        const V v158 = softehl_vexp(v151);
-        const V v159 = softehl_vexp(v152);
-        const V v160 = 0.6944444444444444 + v71;
-        const V v161 = 12.25 + v71;
-        const V v162 = 0.5 * v73;
-        const V v163 = 9.880658436213992 * v73;
-        const V v164 = v73 * v162;
-        const V v165 = 0.5 * v160;
-        const V v166 = 0.5 * v161;
-        const V v167 = 0.16075102880658437 * v160;
-        const V v168 = v160 * v165;
-        const V v169 = 50.020833333333336 * v161;
-        const V v170 = v161 * v166;
-        const V v171 = 0.5 * v75;
-        const V v172 = 16.855967078189302 * v75;
-        const V v173 = v75 * v171;
-        const V v174 = -v164;
-        const V v175 = 0.5 * v76;
-        const V v176 = 41.1522633744856 * v76;
-        const V v177 = v76 * v175;
-        const V v178 = -v168;
-        const V v179 = -v170;
-        const V v180 = softehl_vexp(v174);
-        const V v181 = -v173;
-        const V v182 = 0.5 * v78;
-        const V v183 = 7.345936213991769 * v78;
-        const V v184 = v78 * v182;
-        const V v185 = -v177;
-        const V v186 = softehl_vexp(v178);
-        const V v187 = softehl_vexp(v179);
-        const V v188 = 0.5 * v79;
-        const V v189 = 21.48173868312757 * v79;
-        const V v190 = v79 * v188;
-        const V v191 = softehl_vexp(v181);
-        const V v192 = -v184;
-        const V v193 = softehl_vexp(v185);
-        const V v194 = 0.5 * v80;
-        const V v195 = 33.51877572016461 * v80;
-        const V v196 = v80 * v194;
-        const V v197 = -v190;
-        const V v198 = softehl_vexp(v192);
-        const V v199 = v2 * v69;
-        const V v200 = v70 * v2;
-        const V v201 = v70 * v27;
-        const V v202 = v199 + v201;
-        const V v203 = -v196;
-        const V v204 = softehl_vexp(v197);
-        const V v205 = v200 * v25;
-        const V v206 = v24 * v200;
-        const V v207 = v24 * v202;
-        const V v208 = v205 + v207;
-        const V v209 = softehl_vexp(v203);
-        const V v210 = v193 * v176;
-        const V v211 = v198 * v183;
-        const V v212 = v210 + v211;
-        const V v213 = 27.0 * v115;
-        const V v214 = 41.1522633744856 * v193;
-        const V v215 = v213 + v214;
-        const V v216 = 7.345936213991769 * v198;
-        const V v217 = v216 + v215;
-        const V v218 = v115 * v97;
-        const V v219 = v218 + v212;
-        const V v220 = v204 * v189;
-        const V v221 = v220 + v219;
-        const V v222 = 21.48173868312757 * v204;
-        const V v223 = v222 + v217;
-        const V v224 = v209 * v195;
-        const V v225 = v224 + v221;
-        const V v226 = 33.51877572016461 * v209;
-        const V v227 = v226 + v223;
-        const V v228 = 0.16075102880658437 * v186;
-        const V v229 = v228 + v227;
-        const V v230 = v186 * v167;
-        const V v231 = v230 + v225;
-        const V v232 = 50.020833333333336 * v187;
-        const V v233 = v232 + v229;
-        const V v234 = v187 * v169;
-        const V v235 = v234 + v231;
-        const V v236 = 9.880658436213992 * v180;
-        const V v237 = v236 + v233;
-        const V v238 = v180 * v163;
-        const V v239 = v238 + v235;
-        const V v240 = 16.855967078189302 * v191;
-        const V v241 = v240 + v237;
-        const V v242 = v191 * v172;
-        const V v243 = v242 + v239;
-        const V v244 = 0.3333333333333333 * v117;
-        const V v245 = v244 + v241;
-        const V v246 = v117 * v105;
-        const V v247 = v246 + v243;
-        const V v248 = 0.020833333333333332 * v118;
-        const V v249 = v248 + v245;
-        const V v250 = v118 * v106;
-        const V v251 = v250 + v247;
-        const V v252 = 0.00411522633744856 * v119;
-        const V v253 = v252 + v249;
-        const V v254 = v119 * v114;
-        const V v255 = v254 + v251;
-        const V v256 = 0.000257201646090535 * v120;
-        const V v257 = v256 + v253;
-        const V v258 = v120 * v122;
-        const V v259 = v258 + v255;
-        const V v260 = 0.6175411522633745 * v116;
-        const V v261 = v260 + v257;
-        const V v262 = v116 * v99;
-        const V v263 = v262 + v259;
-        const V v264 = 3.765689300411523 * v121;
-        const V v265 = v264 + v261;
-        const V v266 = v121 * v123;
-        const V v267 = v266 + v263;
-        const V v268 = 5.333333333333333 * v154;
-        const V v269 = v268 + v265;
-        const V v270 = v154 * v132;
-        const V v271 = v270 + v267;
-        const V v272 = 0.06584362139917696 * v155;
-        const V v273 = v272 + v269;
-        const V v274 = v155 * v139;
-        const V v275 = v274 + v271;
-        const V v276 = 1.6875 * v156;
-        const V v277 = v276 + v273;
-        const V v278 = v156 * v141;
-        const V v279 = v278 + v275;
-        const V v280 = 1.0534979423868314 * v157;
-        const V v281 = v280 + v277;
-        const V v282 = v157 * v145;
-        const V v283 = v282 + v279;
-        const V v284 = 13.020833333333334 * v158;
-        const V v285 = v284 + v281;
-        const V v286 = v158 * v146;
-        const V v287 = v286 + v283;
-        const V v288 = 2.57201646090535 * v159;
-        const V v289 = v288 + v285;
-        const V v290 = v159 * v153;
-        const V v291 = v290 + v287;
-        const V v292 = v82 * v291;
-        const V v293 = v37 * v289;
-        const V v294 = v28 * v289;
-        const V v295 = v36 * v292;
-        const V v296 = v294 - v295;
-        const V v297 = 0.5641895835477563 * v296;
-        const V v298 = v206 * v297;
-        const V v299 = p0 + v293;
-        const V v300 = v208 * v299;
-        const V v301 = v298 + v300;
-        const V v302 = w[3] * v301;
-        const V v303 = v61 * v302;
-        s56 += v303;
-        const V v304 = v62 * v302;
-        s57 += v304;
-        V v305 = v71;
-        V v306 = v82;
-        const M m307 = ~v83;
-        if (softehl_any(m307)) {
-            const V v308 = 1.0 - v71;
-            const V v309 = 4.0 * v308;
-            const V v310 = 1.0 / v309;
-            const V v311 = 4.0 * v310;
-            const V v312 = v310 * v311;
-            const V v313 = v312 * v82;
-            v305 = softehl_blend(m307, v310, v305);
-            v306 = softehl_blend(m307, v313, v306);
+        const double v35 = 0.5 * w[0], v36 = 0.5 + v35, v37 = 0.5 - v35;
+        const V v38 = v37 * v3 + v36 * v4, v39 = v37 * v17 + v36 * v18, v40 = parameters[0] + v38,
+            v41 = v1 * v38, v42 = 5.444444444444445 + v41, v43 = 1.3611111111111112 + v41,
+            v44 = 7.111111111111111 + v41, v45 = 11.11111111111111 + v41,
+            v46 = 3.361111111111111 + v41, v47 = 4.694444444444445 + v41,
+            v48 = 8.027777777777779 + v41, v49 = 10.027777777777779 + v41,
+            v50 = v1 * v39 - v38 * v11;
+        const M v51 = softehl_le(softehl_splat(0.5), v41);
+        const V v52 = 9.0 + v41, v53 = 1.0 + v41, v54 = 0.25 + v41, v55 = 0.1111111111111111 + v41,
+            v56 = 0.027777777777777776 + v41, v57 = softehl_vexp(-(v52 * (0.5 * v52))),
+            v58 = softehl_vexp(-(v43 * (0.5 * v43))), v59 = softehl_vexp(-(v53 * (0.5 * v53))),
+            v60 = softehl_vexp(-(v54 * (0.5 * v54))), v61 = softehl_vexp(-(v55 * (0.5 * v55))),
+            v62 = softehl_vexp(-(v56 * (0.5 * v56))), v63 = softehl_vexp(-(v46 * (0.5 * v46))),
+            v64 = 4.0 + v41, v65 = 0.4444444444444444 + v41, v66 = 2.25 + v41,
+            v67 = 1.7777777777777777 + v41, v68 = 6.25 + v41, v69 = 2.7777777777777777 + v41,
+            v70 = softehl_vexp(-(v64 * (0.5 * v64))), v71 = softehl_vexp(-(v65 * (0.5 * v65))),
+            v72 = softehl_vexp(-(v66 * (0.5 * v66))), v73 = softehl_vexp(-(v67 * (0.5 * v67))),
+            v74 = softehl_vexp(-(v68 * (0.5 * v68))), v75 = softehl_vexp(-(v69 * (0.5 * v69))),
+            v76 = 0.6944444444444444 + v41, v77 = 12.25 + v41,
+            v78 = softehl_vexp(-(v42 * (0.5 * v42))), v79 = softehl_vexp(-(v76 * (0.5 * v76))),
+            v80 = softehl_vexp(-(v77 * (0.5 * v77))), v81 = softehl_vexp(-(v44 * (0.5 * v44))),
+            v82 = softehl_vexp(-(v45 * (0.5 * v45))), v83 = softehl_vexp(-(v47 * (0.5 * v47))),
+            v84 = v40 * v2, v85 = v2 * (t6 + v39) + v40 * v15,
+            v86 = softehl_vexp(-(v48 * (0.5 * v48))), v87 = softehl_vexp(-(v49 * (0.5 * v49))),
+            v88 = v57 * (27.0 * v52) + (v82 * (41.1522633744856 * v45) + v83 * (7.345936213991769 * v47)),
+            v89 = 21.48173868312757 * v86 + (7.345936213991769 * v83 + (27.0 * v57 + 41.1522633744856 * v82)),
+            v90 = v87 * (33.51877572016461 * v49) + (v86 * (21.48173868312757 * v48) + v88),
+            v91 = 50.020833333333336 * v80 + (0.16075102880658437 * v79 + (33.51877572016461 * v87 + v89)),
+            v92 = v80 * (50.020833333333336 * v77) + (v79 * (0.16075102880658437 * v76) + v90),
+            v93 = v81 * (16.855967078189302 * v44) + (v78 * (9.880658436213992 * v42) + v92),
+            v94 = 0.3333333333333333 * v59 + (16.855967078189302 * v81 + (9.880658436213992 * v78 + v91)),
+            v95 = v60 * (0.020833333333333332 * v54) + (v59 * (0.3333333333333333 * v53) + v93),
+            v96 = 0.000257201646090535 * v62 + (0.00411522633744856 * v61 + (0.020833333333333332 * v60 + v94)),
+            v97 = v62 * (0.000257201646090535 * v56) + (v61 * (0.00411522633744856 * v55) + v95),
+            v98 = v63 * (3.765689300411523 * v46) + (v58 * (0.6175411522633745 * v43) + v97),
+            v99 = 5.333333333333333 * v70 + (3.765689300411523 * v63 + (0.6175411522633745 * v58 + v96)),
+            v100 = v71 * (0.06584362139917696 * v65) + (v70 * (5.333333333333333 * v64) + v98),
+            v101 = 1.0534979423868314 * v73 + (1.6875 * v72 + (0.06584362139917696 * v71 + v99)),
+            v102 = v74 * (13.020833333333334 * v68) + (v73 * (1.0534979423868314 * v67) + (v72 * (1.6875 * v66) + v100)),
+            v103 = 2.57201646090535 * v75 + (13.020833333333334 * v74 + v101), v104 = v23 * v103,
+            v105 = v16 * v103 - v22 * (v50 * (v75 * (2.57201646090535 * v69) + v102)),
+            v106 = 0.5641895835477563 * v105, v107 = p0 + v104,
+            v108 = w[3] * (v12 * v84 * v106 + (v84 * v13 + v12 * v85) * v107), v109 = v36 * v108;
+        s31 += v109; const V v110 = v37 * v108; s32 += v110;
+        V v111 = v41, v112 = v50;
+        const M m113 = ~v51;
+        if (softehl_any(m113)) {
+            const V v114 = 1.0 / (4.0 * (1.0 - v41)), v115 = v114 * (4.0 * v114) * v50;
+            v111 = softehl_blend(m113, v114, v111); v112 = softehl_blend(m113, v115, v112);
         }
-        const M v314 = softehl_eq(v305, v305);
-        const V v315 = v305 * v305;
-        const V v316 = 2.0 * v305;
-        const V v317 = v316 * v306;
-        V v318 = softehl_splat(0.0);
-        V v319 = softehl_splat(0.0);
-        const M m320 = v314;
-        if (softehl_any(m320)) {
-            const M v321 = softehl_le(softehl_splat(6.0), v305);
-            V v322 = softehl_splat(0.0);
-            V v323 = softehl_splat(0.0);
-            const M m324 = v321 & m320;
-            if (softehl_any(m324)) {
-                const V v325 = 1.0 / v315;
-                const V v326 = 0.0003054234477944064 * v325;
-                const V v327 = 4.1273438891135995e-05 + v326;
-                const V v328 = 9.0 * v325;
-                const V v329 = v325 * v325;
-                const V v330 = 0.0027488110301496574 * v325;
-                const V v331 = 9.0 * v327;
-                const V v332 = v329 * v317;
-                const V v333 = v331 + v330;
-                const V v334 = v325 * v331;
-                const V v335 = 5.0707367780538514e-05 + v334;
-                const V v336 = 9.0 * v335;
-                const V v337 = v325 * v336;
-                const V v338 = 6.3000063000063e-05 + v337;
-                const V v339 = 9.0 * v338;
-                const V v340 = v328 * v333;
-                const V v341 = v336 + v340;
-                const V v342 = v325 * v339;
-                const V v343 = 7.925814377427281e-05 + v342;
-                const V v344 = 9.0 * v343;
-                const V v345 = v325 * v344;
-                const V v346 = 0.00010112245929821013 + v345;
-                const V v347 = 9.0 * v346;
-                const V v348 = v341 * v332;
-                const V v349 = v325 * v347;
-                const V v350 = 0.00013108466946064277 + v349;
-                const V v351 = 9.0 * v350;
-                const V v352 = v325 * v351;
-                const V v353 = 0.00017303176368804846 + v352;
-                const V v354 = 9.0 * v353;
-                const V v355 = v325 * v354;
-                const V v356 = 0.0002332167249708479 + v355;
-                const V v357 = 9.0 * v356;
-                const V v358 = v325 * v357;
-                const V v359 = 0.00032206119162640903 + v358;
-                const V v360 = 9.0 * v359;
-                const V v361 = v325 * v360;
-                const V v362 = 0.0004576659038901602 + v361;
-                const V v363 = 9.0 * v362;
-                const V v364 = v325 * v363;
-                const V v365 = 0.0006730380939561179 + v364;
-                const V v366 = 9.0 * v365;
-                const V v367 = v339 * v332;
-                const V v368 = v328 * v348;
-                const V v369 = v367 + v368;
-                const V v370 = v325 * v366;
-                const V v371 = 0.0010319917440660474 + v370;
-                const V v372 = 9.0 * v371;
-                const V v373 = v344 * v332;
-                const V v374 = v328 * v369;
-                const V v375 = v373 + v374;
-                const V v376 = v347 * v332;
-                const V v377 = v328 * v375;
-                const V v378 = v376 + v377;
-                const V v379 = v351 * v332;
-                const V v380 = v328 * v378;
-                const V v381 = v379 + v380;
-                const V v382 = v354 * v332;
-                const V v383 = v328 * v381;
-                const V v384 = v382 + v383;
-                const V v385 = v357 * v332;
-                const V v386 = v328 * v384;
-                const V v387 = v385 + v386;
-                const V v388 = v360 * v332;
-                const V v389 = v328 * v387;
-                const V v390 = v388 + v389;
-                const V v391 = v363 * v332;
-                const V v392 = v328 * v390;
-                const V v393 = v391 + v392;
-                const V v394 = v366 * v332;
-                const V v395 = v328 * v393;
-                const V v396 = v394 + v395;
-                const V v397 = v328 * v396;
-                const V v398 = v372 * v332;
-                const V v399 = v398 + v397;
-                const V v400 = v328 * v399;
-                const V v401 = v325 * v372;
-                const V v402 = 0.0016670635865682305 + v401;
-                const V v403 = 9.0 * v402;
-                const V v404 = v403 * v332;
-                const V v405 = v404 + v400;
-                const V v406 = v328 * v405;
-                const V v407 = v325 * v403;
-                const V v408 = 0.002879473467708762 + v407;
-                const V v409 = 9.0 * v408;
-                const V v410 = v409 * v332;
-                const V v411 = v410 + v406;
-                const V v412 = v328 * v411;
-                const V v413 = v325 * v409;
-                const V v414 = 0.005439005439005439 + v413;
-                const V v415 = 9.0 * v414;
-                const V v416 = v415 * v332;
-                const V v417 = v416 + v412;
-                const V v418 = v328 * v417;
-                const V v419 = v325 * v415;
-                const V v420 = 0.011655011655011656 + v419;
-                const V v421 = 9.0 * v420;
-                const V v422 = v421 * v332;
-                const V v423 = v422 + v418;
-                const V v424 = v328 * v423;
-                const V v425 = v325 * v421;
-                const V v426 = 0.030303030303030304 + v425;
-                const V v427 = 9.0 * v426;
-                const V v428 = v427 * v332;
-                const V v429 = v428 + v424;
-                const V v430 = v328 * v429;
-                const V v431 = v325 * v427;
-                const V v432 = 0.1111111111111111 + v431;
-                const V v433 = 9.0 * v432;
-                const V v434 = v433 * v332;
-                const V v435 = v434 + v430;
-                const V v436 = v325 * v433;
-                const V v437 = 1.0 + v436;
-                const V v438 = -v435;
-                v322 = softehl_blend(m324, v438, v322);
-                v323 = softehl_blend(m324, v437, v323);
+        const M v116 = softehl_eq(v111, v111);
+        const V v117 = v111 * v111, v118 = 2.0 * v111 * v112;
+        V v119 = softehl_splat(0.0), v120 = softehl_splat(0.0);
+        const M m121 = v116;
+        if (softehl_any(m121)) {
+            const M v122 = softehl_le(softehl_splat(6.0), v111);
+            V v123 = softehl_splat(0.0), v124 = softehl_splat(0.0);
+            const M m125 = v122 & m121;
+            if (softehl_any(m125)) {
+                const V v126 = 1.0 / v117, v127 = 9.0 * v126,
+                    v128 = 9.0 * (4.1273438891135995e-05 + 0.0003054234477944064 * v126),
+                    v129 = v126 * v126 * v118, v130 = 9.0 * (5.0707367780538514e-05 + v126 * v128),
+                    v131 = 9.0 * (6.3000063000063e-05 + v126 * v130),
+                    v132 = 9.0 * (7.925814377427281e-05 + v126 * v131),
+                    v133 = 9.0 * (0.00010112245929821013 + v126 * v132),
+                    v134 = 9.0 * (0.00013108466946064277 + v126 * v133),
+                    v135 = 9.0 * (0.00017303176368804846 + v126 * v134),
+                    v136 = 9.0 * (0.0002332167249708479 + v126 * v135),
+                    v137 = 9.0 * (0.00032206119162640903 + v126 * v136),
+                    v138 = 9.0 * (0.0004576659038901602 + v126 * v137),
+                    v139 = 9.0 * (0.0006730380939561179 + v126 * v138),
+                    v140 = v127 * ((v130 + v127 * (v128 + 0.0027488110301496574 * v126)) * v129),
+                    v141 = 9.0 * (0.0010319917440660474 + v126 * v139),
+                    v142 = v127 * (v133 * v129 + v127 * (v132 * v129 + v127 * (v131 * v129 + v140))),
+                    v143 = v127 * (v136 * v129 + v127 * (v135 * v129 + v127 * (v134 * v129 + v142))),
+                    v144 = v127 * (v139 * v129 + v127 * (v138 * v129 + v127 * (v137 * v129 + v143))),
+                    v145 = 9.0 * (0.0016670635865682305 + v126 * v141),
+                    v146 = 9.0 * (0.002879473467708762 + v126 * v145),
+                    v147 = v127 * (v146 * v129 + v127 * (v145 * v129 + v127 * (v141 * v129 + v144))),
+                    v148 = 9.0 * (0.005439005439005439 + v126 * v146),
+                    v149 = 9.0 * (0.011655011655011656 + v126 * v148),
+                    v150 = 9.0 * (0.030303030303030304 + v126 * v149),
+                    v151 = v127 * (v150 * v129 + v127 * (v149 * v129 + v127 * (v148 * v129 + v147))),
+                    v152 = 9.0 * (0.1111111111111111 + v126 * v150), v153 = 1.0 + v126 * v152,
+                    v154 = -(v152 * v129 + v151);
+                v123 = softehl_blend(m125, v154, v123); v124 = softehl_blend(m125, v153, v124);
             }
-            const M m439 = ~v321 & m320;
-            if (softehl_any(m439)) {
-                const V v440 = 0.1111111111111111 * v315;
-                const V v441 = 0.1111111111111111 * v317;
-                const V v442 = 1.0 - v440;
-                const M v443 = softehl_lt(softehl_splat(3.0), v305);
-                const V v444 = 0.3645833333333333 * v305;
-                const V v445 = 0.3333333333333333 * v305;
-                const V v446 = 0.3645833333333333 * v306;
-                const V v447 = 0.3333333333333333 * v306;
-                const V v448 = v442 * v442;
-                const V v449 = v442 * v448;
-                const V v450 = 3.0 * v448;
-                const V v451 = v450 * v441;
-                V v452 = softehl_splat(0.0);
-                V v453 = softehl_splat(0.0);
-                const M m454 = v443 & m439;
-                if (softehl_any(m454)) {
-                    const V v455 = 0.022222222222222223 * v305;
-                    const V v456 = 1.0 + v445;
-                    const V v457 = (-1.0) + v445;
-                    const V v458 = 1.0 / v457;
-                    const V v459 = 0.37037037037037035 * v315;
-                    const V v460 = 3.3333333333333335 * v315;
-                    const V v461 = (-80.0) + v460;
-                    const V v462 = v317 * v459;
-                    const V v463 = v440 * v461;
-                    const V v464 = 66.0 + v463;
-                    const V v465 = v456 * v458;
-                    const V v466 = v461 * v441;
-                    const V v467 = v466 + v462;
-                    const V v468 = 1.0 - v465;
-                    const V v469 = v455 * v467;
-                    const V v470 = v455 * v464;
-                    const V v471 = 0.022222222222222223 * v464;
-                    const V v472 = v468 * v447;
-                    const V v473 = v458 * v472;
-                    const V v474 = v471 * v306;
-                    const V v475 = v474 + v469;
-                    const V v476 = softehl_vlog(v465);
-                    const V v477 = 1.0 / v465;
-                    const V v478 = v449 * v477;
-                    const V v479 = v478 * v473;
-                    const V v480 = v479 + v475;
-                    const V v481 = v476 * v449;
-                    const V v482 = v481 + v470;
-                    const V v483 = v476 * v451;
-                    const V v484 = v480 - v483;
-                    const V v485 = v482 * v446;
-                    const V v486 = v444 * v484;
-                    const V v487 = v485 + v486;
-                    const V v488 = v444 * v482;
-                    v452 = softehl_blend(m454, v487, v452);
-                    v453 = softehl_blend(m454, v488, v453);
+            const M m155 = ~v122 & m121;
+            if (softehl_any(m155)) {
+                const V v156 = 0.1111111111111111 * v117, v157 = 0.1111111111111111 * v118,
+                    v158 = 1.0 - v156;
+                const M v159 = softehl_lt(softehl_splat(3.0), v111);
+                const V v160 = 0.3645833333333333 * v111, v161 = 0.3333333333333333 * v111,
+                    v162 = 0.3645833333333333 * v112, v163 = 0.3333333333333333 * v112,
+                    v164 = v158 * v158, v165 = v158 * v164, v166 = 3.0 * v164 * v157;
+                V v167 = softehl_splat(0.0), v168 = softehl_splat(0.0);
+                const M m169 = v159 & m155;
+                if (softehl_any(m169)) {
+                    const V v170 = 0.022222222222222223 * v111, v171 = 1.0 / ((-1.0) + v161),
+                        v172 = (-80.0) + 3.3333333333333335 * v117, v173 = 66.0 + v156 * v172,
+                        v174 = (1.0 + v161) * v171,
+                        v175 = 0.022222222222222223 * v173 * v112 + v170 * (v172 * v157 + v118 * (0.37037037037037035 * v117)),
+                        v176 = softehl_vlog(v174), v177 = v176 * v165 + v170 * v173,
+                        v178 = v165 * (1.0 / v174) * (v171 * ((1.0 - v174) * v163)) + v175 - v176 * v166,
+                        v179 = v177 * v162 + v160 * v178, v180 = v160 * v177;
+                    v167 = softehl_blend(m169, v179, v167); v168 = softehl_blend(m169, v180, v168);
                 }
-                const M m489 = ~v443 & m439;
-                if (softehl_any(m489)) {
-                    const V v490 = 0.005555555555555556 * v305;
-                    const V v491 = 100.0 * v305;
-                    const V v492 = 300.0 + v491;
-                    const V v493 = 16.333333333333332 * v305;
-                    const V v494 = 49.0 * v305;
-                    const V v495 = 60.0 + v494;
-                    const V v496 = 100.0 * v449;
-                    const V v497 = softehl_vlog(v492);
-                    const V v498 = 1.0 / v492;
-                    const V v499 = v493 * v306;
-                    const V v500 = v445 * v495;
-                    const V v501 = (-405.0) + v500;
-                    const V v502 = v498 * v496;
-                    const V v503 = v445 * v501;
-                    const V v504 = (-160.0) + v503;
-                    const V v505 = v495 * v447;
-                    const V v506 = v505 + v499;
-                    const V v507 = v501 * v447;
-                    const V v508 = v445 * v506;
-                    const V v509 = v507 + v508;
-                    const V v510 = v497 * v449;
-                    const V v511 = (-0.9166666666666666) + v510;
-                    const V v512 = v445 * v504;
-                    const V v513 = 345.0 + v512;
-                    const V v514 = v504 * v447;
-                    const V v515 = v445 * v509;
-                    const V v516 = v514 + v515;
-                    const V v517 = v445 * v513;
-                    const V v518 = 132.0 + v517;
-                    const V v519 = v513 * v447;
-                    const V v520 = v445 * v516;
-                    const V v521 = v519 + v520;
-                    const V v522 = v490 * v518;
-                    const V v523 = v522 + v511;
-                    const V v524 = 0.005555555555555556 * v518;
-                    const V v525 = v524 + v502;
-                    const V v526 = v490 * v521;
-                    const V v527 = v306 * v525;
-                    const V v528 = v526 + v527;
-                    const V v529 = v497 * v451;
-                    const V v530 = v528 - v529;
-                    const V v531 = v523 * v446;
-                    const V v532 = v444 * v523;
-                    const V v533 = v444 * v530;
-                    const V v534 = v531 + v533;
-                    v452 = softehl_blend(m489, v534, v452);
-                    v453 = softehl_blend(m489, v532, v453);
+                const M m181 = ~v159 & m155;
+                if (softehl_any(m181)) {
+                    const V v182 = 0.005555555555555556 * v111, v183 = 300.0 + 100.0 * v111,
+                        v184 = 60.0 + 49.0 * v111, v185 = softehl_vlog(v183),
+                        v186 = (-405.0) + v161 * v184, v187 = (-160.0) + v161 * v186,
+                        v188 = v186 * v163 + v161 * (v184 * v163 + 16.333333333333332 * v111 * v112),
+                        v189 = 345.0 + v161 * v187, v190 = 132.0 + v161 * v189,
+                        v191 = v182 * v190 + ((-0.9166666666666666) + v185 * v165),
+                        v192 = v112 * (0.005555555555555556 * v190 + 1.0 / v183 * (100.0 * v165)),
+                        v193 = v182 * (v189 * v163 + v161 * (v187 * v163 + v161 * v188)) + v192 - v185 * v166,
+                        v194 = v160 * v191, v195 = v191 * v162 + v160 * v193;
+                    v167 = softehl_blend(m181, v195, v167); v168 = softehl_blend(m181, v194, v168);
                 }
-                v322 = softehl_blend(m439, v452, v322);
-                v323 = softehl_blend(m439, v453, v323);
+                v123 = softehl_blend(m155, v167, v123); v124 = softehl_blend(m155, v168, v124);
             }
-            v318 = softehl_blend(m320, v322, v318);
-            v319 = softehl_blend(m320, v323, v319);
+            v119 = softehl_blend(m121, v123, v119); v120 = softehl_blend(m121, v124, v120);
         }
-        const M m535 = ~v314;
-        if (softehl_any(m535)) {
-            const V v536 = 6.0 - v305;
-            const V v537 = v536 * v536;
-            const V v538 = v536 * v537;
-            const V v539 = 3.0 * v537;
-            const V v540 = v539 * v306;
-            const V v541 = -v540;
-            v318 = softehl_blend(m535, v541, v318);
-            v319 = softehl_blend(m535, v538, v319);
+        const M m196 = ~v116;
+        if (softehl_any(m196)) {
+            const V v197 = 6.0 - v111, v198 = v197 * v197, v199 = v197 * v198,
+                v200 = -(3.0 * v198 * v112);
+            v119 = softehl_blend(m196, v200, v119); v120 = softehl_blend(m196, v199, v120);
         }
-        const M v542 = softehl_le(v305, softehl_splat(5.0));
-        V v543 = softehl_splat(0.0);
-        V v544 = softehl_splat(0.0);
-        V v545 = softehl_splat(0.0);
-        V v546 = softehl_splat(0.0);
-        const M m547 = v542;
-        if (softehl_any(m547)) {
-            const V v548 = softehl_vpow(v305, 0.98);
-            const V v549 = softehl_vpow(v305, 2.31);
-            const V v550 = softehl_vpow(v305, 1.31);
-            const V v551 = softehl_vpow(v305, (-0.02));
-            const V v552 = 1.899 * v548;
-            const V v553 = 11.1 * v549;
-            const V v554 = 0.05 * v315;
-            const V v555 = 0.11 * v315;
-            const V v556 = 0.92 * v305;
-            const V v557 = v554 - v556;
-            const V v558 = 2.38 * v305;
-            const V v559 = v555 - v558;
-            const V v560 = softehl_vexp(v557);
-            const V v561 = softehl_vexp(v559);
-            const V v562 = 0.05 * v317;
-            const V v563 = 0.11 * v317;
-            const V v564 = v552 * v560;
-            const V v565 = 0.92 * v306;
-            const V v566 = v562 - v565;
-            const V v567 = 2.38 * v306;
-            const V v568 = v563 - v567;
-            const V v569 = v564 * v566;
-            const V v570 = v553 * v561;
-            const V v571 = v570 * v568;
-            const V v572 = 25.641 * v561;
-            const V v573 = v550 * v572;
-            const V v574 = v573 * v306;
-            const V v575 = v574 + v571;
-            const V v576 = 1.86102 * v560;
-            const V v577 = v551 * v576;
-            const V v578 = v577 * v306;
-            const V v579 = v578 + v569;
-            v543 = softehl_blend(m547, v575, v543);
-            v544 = softehl_blend(m547, v570, v544);
-            v545 = softehl_blend(m547, v564, v545);
-            v546 = softehl_blend(m547, v579, v546);
+        const M v201 = softehl_le(v111, softehl_splat(5.0));
+        V v202 = softehl_splat(0.0), v203 = softehl_splat(0.0), v204 = softehl_splat(0.0),
+            v205 = softehl_splat(0.0);
+        const M m206 = v201;
+        if (softehl_any(m206)) {
+            const V v207 = softehl_vpow(v111, 0.98), v208 = softehl_vpow(v111, 2.31),
+                v209 = softehl_vpow(v111, 1.31), v210 = softehl_vpow(v111, (-0.02)),
+                v211 = softehl_vexp(0.05 * v117 - 0.92 * v111),
+                v212 = softehl_vexp(0.11 * v117 - 2.38 * v111), v213 = 1.899 * v207 * v211,
+                v214 = 11.1 * v208 * v212,
+                v215 = v209 * (25.641 * v212) * v112 + v214 * (0.11 * v118 - 2.38 * v112),
+                v216 = v210 * (1.86102 * v211) * v112 + v213 * (0.05 * v118 - 0.92 * v112);
+            v202 = softehl_blend(m206, v215, v202); v203 = softehl_blend(m206, v214, v203);
+            v204 = softehl_blend(m206, v213, v204); v205 = softehl_blend(m206, v216, v205);
         }
-        const M m580 = ~v542;
-        if (softehl_any(m580)) {
-            const V v581 = 0.25 * v305;
-            const V v582 = 1.25 - v581;
-            const V v583 = 0.818 * v305;
-            const V v584 = 4.09 - v583;
-            const V v585 = softehl_vexp(v582);
-            const V v586 = softehl_vexp(v584);
-            const V v587 = 0.3225737734624401 * v585;
-            const V v588 = 0.08064344336561002 * v585;
-            const V v589 = 0.048545522453863246 * v586;
-            const V v590 = 0.039710237367260134 * v586;
-            const V v591 = v588 * v306;
-            const V v592 = v590 * v306;
-            const V v593 = -v591;
-            const V v594 = -v592;
-            v543 = softehl_blend(m580, v594, v543);
-            v544 = softehl_blend(m580, v589, v544);
-            v545 = softehl_blend(m580, v587, v545);
-            v546 = softehl_blend(m580, v593, v546);
+        const M m217 = ~v201;
+        if (softehl_any(m217)) {
+            const V v218 = softehl_vexp(1.25 - 0.25 * v111),
+                v219 = softehl_vexp(4.09 - 0.818 * v111), v220 = 0.3225737734624401 * v218,
+                v221 = 0.048545522453863246 * v219, v222 = -(0.08064344336561002 * v218 * v112),
+                v223 = -(0.039710237367260134 * v219 * v112);
+            v202 = softehl_blend(m217, v223, v202); v203 = softehl_blend(m217, v221, v203);
+            v204 = softehl_blend(m217, v220, v204); v205 = softehl_blend(m217, v222, v205);
         }
-        const V v595 = 1.0 - p6;
-        const V v596 = 1.0 - p4;
-        const V v597 = v61 * v9;
-        const V v598 = parameters[1] - v597;
-        const V v599 = v61 * v21;
-        const V v600 = t7 - v599;
-        const V v601 = v544 * t14;
-        const V v602 = v318 + v601;
-        const V v603 = v62 * v11;
-        const V v604 = v598 - v603;
-        const V v605 = v62 * v19;
-        const V v606 = v600 - v605;
-        const M v607 = softehl_lt(softehl_splat(0.0), v604);
-        const V v608 = parameters[8] * v543;
-        const V v609 = v608 + v602;
-        V v610 = softehl_splat(0.0);
-        V v611 = softehl_splat(0.0);
-        V v612 = softehl_splat(0.0);
-        V v613 = softehl_splat(0.0);
-        const M m614 = v607;
-        if (softehl_any(m614)) {
-            const V v615 = v596 * v606;
-            v610 = softehl_blend(m614, v604, v610);
-            v611 = softehl_blend(m614, softehl_splat(0.0), v611);
-            v612 = softehl_blend(m614, v615, v612);
-            v613 = softehl_blend(m614, softehl_splat(0.0), v613);
+        const V v224 = 1.0 - p6, v225 = 1.0 - p4, v226 = parameters[1] - v36 * v5 - v37 * v6,
+            v227 = t7 - v36 * v10 - v37 * v9;
+        const M v228 = softehl_lt(softehl_splat(0.0), v226);
+        const V v229 = parameters[8] * v202 + (v119 + v203 * t14);
+        V v230 = softehl_splat(0.0), v231 = softehl_splat(0.0), v232 = softehl_splat(0.0),
+            v233 = softehl_splat(0.0);
+        const M m234 = v228;
+        if (softehl_any(m234)) {
+            const V v235 = v225 * v227; v230 = softehl_blend(m234, v226, v230);
+            v231 = softehl_blend(m234, softehl_splat(0.0), v231);
+            v232 = softehl_blend(m234, v235, v232);
+            v233 = softehl_blend(m234, softehl_splat(0.0), v233);
         }
-        const M m616 = ~v607;
-        if (softehl_any(m616)) {
-            const V v617 = v595 * v606;
-            v610 = softehl_blend(m616, softehl_splat(0.0), v610);
-            v611 = softehl_blend(m616, v604, v611);
-            v612 = softehl_blend(m616, softehl_splat(0.0), v612);
-            v613 = softehl_blend(m616, v617, v613);
+        const M m236 = ~v228;
+        if (softehl_any(m236)) {
+            const V v237 = v224 * v227; v230 = softehl_blend(m236, softehl_splat(0.0), v230);
+            v231 = softehl_blend(m236, v226, v231);
+            v232 = softehl_blend(m236, softehl_splat(0.0), v232);
+            v233 = softehl_blend(m236, v237, v233);
         }
-        const double v618 = 0.5 * w[2];
-        const V v619 = v595 * v611;
-        const double v620 = 0.5 - v618;
-        const double v621 = 0.5 + v618;
-        const V v622 = v596 * v610;
-        const V v623 = v619 + v622;
-        const V v624 = v604 * v604;
-        const V v625 = v31 + v624;
-        const V v626 = v620 * v6;
-        const V v627 = v620 * v29;
-        const V v628 = v604 * t16;
-        const V v629 = parameters[8] * v544;
-        const V v630 = v629 + v319;
-        const V v631 = 0.5 * v623;
-        const V v632 = softehl_vsqrt(v625);
-        const V v633 = 1.0 / v625;
-        const V v634 = v621 * v7;
-        const V v635 = v626 + v634;
-        const V v636 = v621 * v30;
-        const V v637 = v627 + v636;
-        const V v638 = v1 * v635;
-        const V v639 = p0 * parameters[3];
-        const V v640 = p0 * v12;
-        const V v641 = t8 + v640;
-        const V v642 = softehl_vexp(v639);
-        const V v643 = 0.5 * v71;
-        const V v644 = 0.7071067811865476 * v71;
-        const V v645 = 0.3989422804014327 * v71;
-        const V v646 = v613 + v612;
-        const V v647 = v71 * v643;
-        const M v648 = softehl_le(softehl_splat(0.5), v638);
-        const V v649 = parameters[8] * v546;
-        const V v650 = parameters[8] * v545;
-        const V v651 = softehl_verfc(v644);
-        const V v652 = v644 * v644;
-        const V v653 = -v647;
-        const V v654 = v545 * t14;
-        const V v655 = v654 + v649;
-        const V v656 = -v652;
-        const V v657 = 0.66 * v305;
-        const V v658 = softehl_vsqrt(v633);
-        const V v659 = 0.5 * v651;
-        const V v660 = 1.0 - v659;
-        const V v661 = -v657;
-        const V v662 = parameters[7] * v305;
-        const V v663 = v305 * t13;
-        const V v664 = softehl_vexp(v653);
-        const V v665 = v71 * v660;
-        const V v666 = v665 + v650;
-        const V v667 = softehl_vexp(v656);
-        const V v668 = 1.0 / v662;
-        const V v669 = 0.5 * v662;
-        const V v670 = softehl_vexp(v661);
-        const V v671 = parameters[7] * v306;
-        const V v672 = v663 + v671;
-        const V v673 = p1 * v33;
-        const V v674 = p1 * v51;
-        const V v675 = 1.0 / v632;
-        const V v676 = v673 * v669;
-        const V v677 = 0.5 * v673;
-        const V v678 = v299 * v42;
-        const V v679 = v26 * v299;
-        const V v680 = parameters[10] * v604;
-        const V v681 = parameters[10] * v606;
-        const V v682 = v681 + v628;
-        const V v683 = v604 * v606;
-        const V v684 = v32 + v683;
-        const V v685 = v26 * v297;
-        const V v686 = v678 + v685;
-        const V v687 = v680 * v297;
-        const V v688 = v672 * v677;
-        const V v689 = 2.0 * v684;
-        const V v690 = v680 * v293;
-        const V v691 = v669 * v674;
-        const V v692 = v688 - v691;
-        const V v693 = v293 * v682;
-        const V v694 = v693 + v687;
-        const V v695 = 0.924 * v670;
-        const V v696 = v676 * v695;
-        const V v697 = 1.4 * v670;
-        const V v698 = 1.0 - v697;
-        const V v699 = 0.5 * v675;
-        const V v700 = v690 * v699;
-        const V v701 = v675 * v690;
-        const V v702 = v698 * v676;
-        const V v703 = v701 - v702;
-        const V v704 = v658 * v700;
-        const V v705 = v689 * v704;
-        const V v706 = v694 - v705;
-        const V v707 = v675 * v706;
-        const V v708 = v698 * v692;
-        const V v709 = v707 - v708;
-        const V v710 = v696 * v306;
-        const V v711 = v709 - v710;
-        const V v712 = v667 - v664;
-        const V v713 = 0.3989422804014327 * v664;
-        const V v714 = v713 + v666;
-        const V v715 = parameters[7] * v714;
-        const V v716 = 0.5 * v715;
-        const V v717 = v714 * t13;
-        const V v718 = v645 * v712;
-        const V v719 = v660 + v718;
-        const V v720 = v719 * v82;
-        const V v721 = v720 + v655;
-        const V v722 = parameters[7] * v721;
-        const V v723 = v717 + v722;
-        const V v724 = v631 * v723;
-        const V v725 = v646 * v716;
-        const V v726 = v724 + v725;
-        const V v727 = parameters[2] * v642;
-        const V v728 = v642 * v641;
-        const V v729 = v727 * v646;
-        const V v730 = v623 * v728;
-        const V v731 = v729 + v730;
-        const V v732 = v727 * v623;
-        const V v733 = v630 * v731;
-        const V v734 = v732 * v630;
-        const V v735 = v732 * v609;
-        const V v736 = v733 + v735;
-        const V v737 = v668 * v734;
-        const V v738 = v737 * v672;
-        const V v739 = v736 - v738;
-        const V v740 = v668 * v739;
-        const V v741 = v740 + v711;
-        const V v742 = v737 + v703;
-        const V v743 = v55 * v742;
-        const V v744 = v686 - v743;
-        const V v745 = v47 * v742;
-        const V v746 = v679 - v745;
-        const V v747 = v47 * v741;
-        const V v748 = v744 - v747;
-        const V v749 = v202 * v746;
-        const V v750 = v200 * v748;
-        const V v751 = v749 + v750;
-        const V v752 = w[3] * v751;
-        const V v753 = v61 * v752;
-        s58 += v753;
-        const V v754 = v62 * v752;
-        s59 += v754;
-        V v755 = softehl_splat(0.0);
-        V v756 = softehl_splat(0.0);
-        const M m757 = v648;
-        if (softehl_any(m757)) {
-            const V v758 = v1 * v637;
-            const V v759 = v635 * v23;
-            const V v760 = v758 - v759;
-            v755 = softehl_blend(m757, v638, v755);
-            v756 = softehl_blend(m757, v760, v756);
+        const double v238 = 0.5 * w[2], v239 = 0.5 - v238, v240 = 0.5 + v238;
+        const V v241 = v224 * v231 + v225 * v230, v242 = v19 + v226 * v226,
+            v243 = parameters[8] * v203 + v120, v244 = 0.5 * v241, v245 = softehl_vsqrt(v242),
+            v246 = v239 * v3 + v240 * v4, v247 = v239 * v17 + v240 * v18, v248 = v1 * v246,
+            v249 = softehl_vexp(p0 * parameters[3]), v250 = 0.7071067811865476 * v41,
+            v251 = v233 + v232;
+        const M v252 = softehl_le(softehl_splat(0.5), v248);
+        const V v253 = softehl_verfc(v250), v254 = softehl_vsqrt(1.0 / v242),
+            v255 = 1.0 - 0.5 * v253, v256 = parameters[7] * v111,
+            v257 = softehl_vexp(-(v41 * (0.5 * v41))), v258 = softehl_vexp(-(v250 * v250)),
+            v259 = 1.0 / v256, v260 = 0.5 * v256, v261 = softehl_vexp(-(0.66 * v111)),
+            v262 = v111 * t13 + parameters[7] * v112, v263 = p1 * v21, v264 = 1.0 / v245,
+            v265 = v263 * v260, v266 = parameters[10] * v226, v267 = v266 * v104,
+            v268 = 1.0 - 1.4 * v261,
+            v269 = v104 * (parameters[10] * v227 + v226 * t16) + v266 * v106 - 2.0 * (v20 + v226 * v227) * (v254 * (v267 * (0.5 * v264))),
+            v270 = v264 * v269 - v268 * (v262 * (0.5 * v263) - v260 * (p1 * v29)) - v265 * (0.924 * v261) * v112,
+            v271 = 0.3989422804014327 * v257 + (v41 * v255 + parameters[8] * v204),
+            v272 = parameters[7] * v271,
+            v273 = (v255 + 0.3989422804014327 * v41 * (v258 - v257)) * v50 + (v204 * t14 + parameters[8] * v205),
+            v274 = v244 * (v271 * t13 + parameters[7] * v273) + v251 * (0.5 * v272),
+            v275 = parameters[2] * v249, v276 = v275 * v241,
+            v277 = v243 * (v275 * v251 + v241 * (v249 * (t8 + p0 * v7))) + v276 * v229,
+            v278 = v259 * (v276 * v243), v279 = v278 + (v264 * v267 - v268 * v265),
+            v280 = v107 * v25 + v14 * v106 - v30 * v279 - v27 * (v259 * (v277 - v278 * v262) + v270),
+            v281 = w[3] * (v85 * (v14 * v107 - v27 * v279) + v84 * v280), v282 = v36 * v281;
+        s33 += v282; const V v283 = v37 * v281; s34 += v283;
+        V v284 = softehl_splat(0.0), v285 = softehl_splat(0.0);
+        const M m286 = v252;
+        if (softehl_any(m286)) {
+            const V v287 = v1 * v247 - v246 * v11; v284 = softehl_blend(m286, v248, v284);
+            v285 = softehl_blend(m286, v287, v285);
         }
-        const M m761 = ~v648;
-        if (softehl_any(m761)) {
-            const V v762 = 4.0 * v635;
-            const V v763 = v1 * v762;
-            const V v764 = 4.0 - v763;
-            const V v765 = v762 * v23;
-            const V v766 = 1.0 / v764;
-            const V v767 = v766 * v766;
-            const V v768 = v14 * v637;
-            const V v769 = v765 - v768;
-            const V v770 = v767 * v769;
-            const V v771 = -v770;
-            v755 = softehl_blend(m761, v766, v755);
-            v756 = softehl_blend(m761, v771, v756);
+        const M m288 = ~v252;
+        if (softehl_any(m288)) {
+            const V v289 = 4.0 * v246, v290 = 1.0 / (4.0 - v1 * v289),
+                v291 = -(v290 * v290 * (v289 * v11 - v8 * v247));
+            v284 = softehl_blend(m288, v290, v284); v285 = softehl_blend(m288, v291, v285);
         }
-        const double v772 = 0.5 * w[1];
-        const V v773 = parameters[7] * v755;
-        const double v774 = 0.5 - v772;
-        const double v775 = 0.5 + v772;
-        const V v776 = v774 * v6;
-        const V v777 = v774 * v29;
-        const V v778 = v775 * v7;
-        const V v779 = v776 + v778;
-        const V v780 = v775 * v30;
-        const V v781 = v777 + v780;
-        const V v782 = v1 * v779;
-        const M v783 = softehl_le(softehl_splat(0.5), v782);
-        V v784 = softehl_splat(0.0);
-        V v785 = softehl_splat(0.0);
-        const M m786 = v783;
-        if (softehl_any(m786)) {
-            const V v787 = v1 * v781;
-            const V v788 = v779 * v23;
-            const V v789 = v787 - v788;
-            v784 = softehl_blend(m786, v782, v784);
-            v785 = softehl_blend(m786, v789, v785);
+        const double v292 = 0.5 * w[1]; const V v293 = parameters[7] * v284;
+        const double v294 = 0.5 - v292, v295 = 0.5 + v292;
+        const V v296 = v294 * v3 + v295 * v4, v297 = v294 * v17 + v295 * v18, v298 = v1 * v296;
+        const M v299 = softehl_le(softehl_splat(0.5), v298);
+        V v300 = softehl_splat(0.0), v301 = softehl_splat(0.0);
+        const M m302 = v299;
+        if (softehl_any(m302)) {
+            const V v303 = v1 * v297 - v296 * v11; v300 = softehl_blend(m302, v298, v300);
+            v301 = softehl_blend(m302, v303, v301);
         }
-        const M m790 = ~v783;
-        if (softehl_any(m790)) {
-            const V v791 = 4.0 * v779;
-            const V v792 = v1 * v791;
-            const V v793 = 4.0 - v792;
-            const V v794 = v791 * v23;
-            const V v795 = 1.0 / v793;
-            const V v796 = v795 * v795;
-            const V v797 = v14 * v781;
-            const V v798 = v794 - v797;
-            const V v799 = v796 * v798;
-            const V v800 = -v799;
-            v784 = softehl_blend(m790, v795, v784);
-            v785 = softehl_blend(m790, v800, v785);
+        const M m304 = ~v299;
+        if (softehl_any(m304)) {
+            const V v305 = 4.0 * v296, v306 = 1.0 / (4.0 - v1 * v305),
+                v307 = -(v306 * v306 * (v305 * v11 - v8 * v297));
+            v300 = softehl_blend(m304, v306, v300); v301 = softehl_blend(m304, v307, v301);
         }
-        const V v801 = 0.56 * v305;
-        const V v802 = v631 * v715;
-        const V v803 = -v801;
-        const V v804 = p2 * parameters[3];
-        const V v805 = p2 * v12;
-        const V v806 = t8 + v805;
-        const V v807 = softehl_vexp(v804);
-        const V v808 = 0.08333333333333333 * p3;
-        const V v809 = 0.25 * p3;
-        const V v810 = softehl_vexp(v803);
-        const V v811 = v755 * t13;
-        const V v812 = v784 * t13;
-        const V v813 = parameters[7] * v784;
-        const V v814 = parameters[7] * v756;
-        const V v815 = v811 + v814;
-        const V v816 = parameters[7] * v785;
-        const V v817 = v812 + v816;
-        const V v818 = v813 + v773;
-        const V v819 = v813 * v773;
-        const V v820 = v813 * v815;
-        const V v821 = 0.5 * v818;
-        const V v822 = v773 * v817;
-        const V v823 = v822 + v820;
-        const V v824 = v817 + v815;
-        const V v825 = 0.5 * v824;
-        const V v826 = 2.0 * v819;
-        const V v827 = v808 * v821;
-        const V v828 = v821 * v826;
-        const V v829 = v821 * v821;
-        const V v830 = v829 * v827;
-        const V v831 = v807 * v806;
-        const V v832 = parameters[2] * v807;
-        const V v833 = 0.9 * v810;
-        const V v834 = 1.0 - v833;
-        const V v835 = 0.504 * v810;
-        const V v836 = v809 * v829;
-        const V v837 = 1.0 / v829;
-        const V v838 = v819 * v837;
-        const V v839 = v837 * v828;
-        const V v840 = v825 * v839;
-        const V v841 = v823 - v840;
-        const V v842 = v837 * v841;
-        const V v843 = v802 * v842;
-        const V v844 = v838 * v838;
-        const V v845 = v844 * v836;
-        const V v846 = v844 * v830;
-        const V v847 = v835 * v846;
-        const V v848 = 2.0 * v838;
-        const V v849 = v848 * v830;
-        const V v850 = v838 * v726;
-        const V v851 = v843 + v850;
-        const V v852 = v832 * v25;
-        const V v853 = v24 * v831;
-        const V v854 = v852 + v853;
-        const V v855 = v832 * v24;
-        const V v856 = 1.0 / v855;
-        const V v857 = v856 * v846;
-        const V v858 = v854 * v857;
-        const V v859 = v825 * v845;
-        const V v860 = v858 - v859;
-        const V v861 = v842 * v849;
-        const V v862 = v860 - v861;
-        const V v863 = v834 * v862;
-        const V v864 = v306 * v847;
-        const V v865 = v863 - v864;
-        const V v866 = v856 * v865;
-        const V v867 = v851 + v866;
-        const V v868 = w[3] * v867;
+        const V v308 = softehl_vexp(p2 * parameters[3]), v309 = softehl_vexp(-(0.56 * v111)),
+            v310 = parameters[7] * v300, v311 = v284 * t13 + parameters[7] * v285,
+            v312 = v300 * t13 + parameters[7] * v301, v313 = v310 * v293,
+            v314 = 0.5 * (v310 + v293), v315 = 0.5 * (v312 + v311), v316 = v314 * v314,
+            v317 = v316 * (0.08333333333333333 * p3 * v314), v318 = parameters[2] * v308,
+            v319 = 1.0 / v316, v320 = v313 * v319,
+            v321 = v293 * v312 + v310 * v311 - v315 * (v319 * (v314 * (2.0 * v313))),
+            v322 = v319 * v321, v323 = v320 * v320, v324 = v323 * v317, v325 = 1.0 / (v318 * v12),
+            v326 = (v318 * v13 + v12 * (v308 * (t8 + p2 * v7))) * (v325 * v324) - v315 * (v323 * (0.25 * p3 * v316)),
+            v327 = (1.0 - 0.9 * v309) * (v326 - v322 * (2.0 * v320 * v317)) - v112 * (0.504 * v309 * v324),
+            v328 = w[3] * (v244 * v272 * v322 + v320 * v274 + v325 * v327);
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
             (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
-            R_lanes[4 + i] += D1 * v868;
+            R_lanes[4 + i] += D1 * v328;
         }
     }
-    const V v869 = -s56;
-    const V v870 = -s57;
-    R_lanes[0] = s59;
-    R_lanes[1] = v870;
-    R_lanes[2] = s58;
-    R_lanes[3] = v869;
+    const V v329 = -s31, v330 = -s32;
+    R_lanes[0] = s34; R_lanes[1] = v330; R_lanes[2] = s33; R_lanes[3] = v329;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_rough_pseudo_load, 4, (4 + modes), 2, 18, (4 + modes), 0)
 
-void softehl_film_rough_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_rough_fields_rate)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_rough_pseudo_load_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, direction + 18 * e, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_rough_pseudo_load_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), direction + 18 * (n - SOFTEHL_LANES), parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double t[SOFTEHL_LANES * 18];
-    softehl_pad(t, direction, 18, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_rough_pseudo_load(SOFTEHL_LANES, points, modes, X, d, a, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_rough_fields_rate_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
-    V t0, t1, t2, t3;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14, t15, t16, t17, t18, t19, t20,
+        t21;
     softehl_load4(t + 0, (18 + (4 + modes)), &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
     softehl_load4(t + 4, (18 + (4 + modes)), &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
     softehl_load4(t + 8, (18 + (4 + modes)), &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    V t12, t13, t14, t15;
     softehl_load4(t + 12, (18 + (4 + modes)), &t12, &t13, &t14, &t15);
-    (void)t12; (void)t13; (void)t14; (void)t15;
-    V t16, t17, t18, t19;
     softehl_load4(t + 16, (18 + (4 + modes)), &t16, &t17, &t18, &t19);
-    (void)t16; (void)t17; (void)t18; (void)t19;
-    V t20, t21;
-    softehl_load2(t + 20, (18 + (4 + modes)), &t20, &t21);
-    (void)t20; (void)t21;
+    softehl_load2(t + 20, (18 + (4 + modes)), &t20, &t21); (void)t10; (void)t11;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -1140,965 +379,284 @@ static void softehl_film_rough_fields_rate_group(
     softehl_gather(t_lanes, t, (18 + (4 + modes)));
 #endif
     const double v1 = 1.0 / parameters[7];
-    const V v2 = X2 + d2;
-    const V v3 = 0.7071067811865476 * t15;
-    const V v4 = X1 - parameters[0];
-    const V v5 = X3 - parameters[0];
-    const V v6 = d1 + v4;
-    const V v7 = d3 + v5;
-    const V v8 = d2 * parameters[6];
-    const V v9 = a1 + v8;
-    const V v10 = d0 * parameters[6];
-    const V v11 = a0 + v10;
-    const V v12 = v2 - X0;
-    const double v13 = parameters[11] * parameters[11];
-    const V v14 = parameters[11] * t17;
-    const V v15 = v12 - d0;
-    const V v16 = t1 + t19;
-    const V v17 = t3 + t21;
-    const V v18 = d0 * t12;
-    const V v19 = t4 + v18;
-    const V v20 = d2 * t12;
-    const V v21 = t5 + v20;
-    const V v22 = 0.5 * v15;
-    const V v23 = t2 + t20;
-    const V v24 = parameters[6] * t20;
-    const V v25 = v21 + v24;
-    const V v26 = parameters[6] * t18;
-    const V v27 = v19 + v26;
-    const V v28 = v16 - t6;
-    const V v29 = v17 - t6;
-    const V v30 = 1.0 / v22;
-    const double v31 = 4.0 * v1;
-    const double v32 = v1 * v1;
-    const V v33 = t0 + t18;
-    const V v34 = v23 - t0;
-    const V v35 = t13 * v32;
-    const V v36 = v34 - t18;
-    const double v37 = 0.7071067811865476 * parameters[9];
-    const double v38 = 0.3989422804014327 * parameters[9];
-    const V v39 = 0.5 * v36;
-    const V v40 = v30 * v39;
+    const V v2 = 0.7071067811865476 * t15, v3 = d1 + (X1 - parameters[0]),
+        v4 = d3 + (X3 - parameters[0]), v5 = a1 + d2 * parameters[6], v6 = a0 + d0 * parameters[6];
+    const double v7 = parameters[11] * parameters[11];
+    const V v8 = parameters[11] * t17, v9 = 0.5 * (X2 + d2 - X0 - d0), v10 = t2 + t20,
+        v11 = t5 + d2 * t12 + parameters[6] * t20, v12 = t4 + d0 * t12 + parameters[6] * t18,
+        v13 = t1 + t19 - t6, v14 = t3 + t21 - t6, v15 = 1.0 / v9;
+    const double v16 = 4.0 * v1;
+    const V v17 = t0 + t18, v18 = t13 * (v1 * v1);
+    const double v19 = 0.7071067811865476 * parameters[9], v20 = 0.3989422804014327 * parameters[9];
+    const V v21 = 0.5 * (v10 - t0 - t18), v22 = v15 * v21;
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 4 * q;
-        (void)w;
+        const double *restrict w = rule + 4 * q; (void)w;
         const double *restrict B = basis + 8 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0), p4 = softehl_splat(0.0), p5 = softehl_splat(0.0), p6 = softehl_splat(0.0), p7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[8 * i] * d_lanes[4 + i];
-            p1 += B[8 * i + 1] * d_lanes[4 + i];
-            p2 += B[8 * i + 2] * d_lanes[4 + i];
-            p3 += B[8 * i + 3] * d_lanes[4 + i];
-            p4 += B[8 * i + 4] * d_lanes[4 + i];
-            p5 += B[8 * i + 5] * d_lanes[4 + i];
-            p6 += B[8 * i + 6] * d_lanes[4 + i];
-            p7 += B[8 * i + 7] * d_lanes[4 + i];
+            p0 += B[8 * i] * d_lanes[4 + i]; p1 += B[8 * i + 1] * d_lanes[4 + i];
+            p2 += B[8 * i + 2] * d_lanes[4 + i]; p3 += B[8 * i + 3] * d_lanes[4 + i];
+            p4 += B[8 * i + 4] * d_lanes[4 + i]; p5 += B[8 * i + 5] * d_lanes[4 + i];
+            p6 += B[8 * i + 6] * d_lanes[4 + i]; p7 += B[8 * i + 7] * d_lanes[4 + i];
         }
         (void)p0, (void)p1, (void)p2, (void)p3, (void)p4, (void)p5, (void)p6, (void)p7;
         V tp0 = softehl_splat(0.0), tp1 = softehl_splat(0.0), tp2 = softehl_splat(0.0), tp3 = softehl_splat(0.0), tp4 = softehl_splat(0.0), tp5 = softehl_splat(0.0), tp6 = softehl_splat(0.0), tp7 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            tp0 += B[8 * i] * t_lanes[22 + i];
-            tp1 += B[8 * i + 1] * t_lanes[22 + i];
-            tp2 += B[8 * i + 2] * t_lanes[22 + i];
-            tp3 += B[8 * i + 3] * t_lanes[22 + i];
-            tp4 += B[8 * i + 4] * t_lanes[22 + i];
-            tp5 += B[8 * i + 5] * t_lanes[22 + i];
-            tp6 += B[8 * i + 6] * t_lanes[22 + i];
-            tp7 += B[8 * i + 7] * t_lanes[22 + i];
+            tp0 += B[8 * i] * t_lanes[22 + i]; tp1 += B[8 * i + 1] * t_lanes[22 + i];
+            tp2 += B[8 * i + 2] * t_lanes[22 + i]; tp3 += B[8 * i + 3] * t_lanes[22 + i];
+            tp4 += B[8 * i + 4] * t_lanes[22 + i]; tp5 += B[8 * i + 5] * t_lanes[22 + i];
+            tp6 += B[8 * i + 6] * t_lanes[22 + i]; tp7 += B[8 * i + 7] * t_lanes[22 + i];
         }
         (void)tp0, (void)tp1, (void)tp2, (void)tp3, (void)tp4, (void)tp5, (void)tp6, (void)tp7;
-        const double v41 = 0.5 * w[0];
-        const V v42 = w[3] * v39;
-        const double v43 = 0.5 + v41;
-        const double v44 = 0.5 - v41;
-        const V v45 = v44 * v6;
-        const V v46 = v43 * v7;
-        const V v47 = v45 + v46;
-        const V v48 = v43 * v23;
-        const V v49 = v43 * v29;
-        const V v50 = v44 * v33;
-        const V v51 = v48 + v50;
-        const V v52 = v44 * v28;
-        const V v53 = v52 + v49;
-        const V v54 = v1 * v53;
-        const V v55 = v1 * v47;
-        const V v56 = v47 * v35;
-        const V v57 = v54 - v56;
-        const M v58 = softehl_le(softehl_splat(0.5), v55);
-        V v59 = v55;
-        V v60 = v57;
-        const M m61 = ~v58;
-        if (softehl_any(m61)) {
-            const V v62 = 1.0 - v55;
-            const V v63 = 4.0 * v62;
-            const V v64 = 1.0 / v63;
-            const V v65 = 4.0 * v64;
-            const V v66 = v64 * v65;
-            const V v67 = v66 * v57;
-            v59 = softehl_blend(m61, v64, v59);
-            v60 = softehl_blend(m61, v67, v60);
+        const double v23 = 0.5 * w[0]; const V v24 = w[3] * v21;
+        const double v25 = 0.5 + v23, v26 = 0.5 - v23;
+        const V v27 = v26 * v3 + v25 * v4, v28 = v25 * v10 + v26 * v17, v29 = v26 * v13 + v25 * v14,
+            v30 = v1 * v27, v31 = v1 * v29 - v27 * v18;
+        const M v32 = softehl_le(softehl_splat(0.5), v30);
+        V v33 = v30, v34 = v31;
+        const M m35 = ~v32;
+        if (softehl_any(m35)) {
+            const V v36 = 1.0 / (4.0 * (1.0 - v30)), v37 = v36 * (4.0 * v36) * v31;
+            v33 = softehl_blend(m35, v36, v33); v34 = softehl_blend(m35, v37, v34);
         }
-        const M v68 = softehl_eq(v59, v59);
-        const V v69 = v59 * v59;
-        const V v70 = 2.0 * v59;
-        const V v71 = v70 * v60;
-        V v72 = softehl_splat(0.0);
-        V v73 = softehl_splat(0.0);
-        const M m74 = v68;
-        if (softehl_any(m74)) {
-            const M v75 = softehl_le(softehl_splat(6.0), v59);
-            V v76 = softehl_splat(0.0);
-            V v77 = softehl_splat(0.0);
-            const M m78 = v75 & m74;
-            if (softehl_any(m78)) {
-                const V v79 = 1.0 / v69;
-                const V v80 = 0.0003054234477944064 * v79;
-                const V v81 = 4.1273438891135995e-05 + v80;
-                const V v82 = 9.0 * v79;
-                const V v83 = v79 * v79;
-                const V v84 = 0.0027488110301496574 * v79;
-                const V v85 = 9.0 * v81;
-                const V v86 = v83 * v71;
-                const V v87 = v85 + v84;
-                const V v88 = v79 * v85;
-                const V v89 = 5.0707367780538514e-05 + v88;
-                const V v90 = 9.0 * v89;
-                const V v91 = v79 * v90;
-                const V v92 = 6.3000063000063e-05 + v91;
-                const V v93 = 9.0 * v92;
-                const V v94 = v82 * v87;
-                const V v95 = v90 + v94;
-                const V v96 = v79 * v93;
-                const V v97 = 7.925814377427281e-05 + v96;
-                const V v98 = 9.0 * v97;
-                const V v99 = v79 * v98;
-                const V v100 = 0.00010112245929821013 + v99;
-                const V v101 = 9.0 * v100;
-                const V v102 = v95 * v86;
-                const V v103 = v79 * v101;
-                const V v104 = 0.00013108466946064277 + v103;
-                const V v105 = 9.0 * v104;
-                const V v106 = v79 * v105;
-                const V v107 = 0.00017303176368804846 + v106;
-                const V v108 = 9.0 * v107;
-                const V v109 = v79 * v108;
-                const V v110 = 0.0002332167249708479 + v109;
-                const V v111 = 9.0 * v110;
-                const V v112 = v79 * v111;
-                const V v113 = 0.00032206119162640903 + v112;
-                const V v114 = 9.0 * v113;
-                const V v115 = v79 * v114;
-                const V v116 = 0.0004576659038901602 + v115;
-                const V v117 = 9.0 * v116;
-                const V v118 = v79 * v117;
-                const V v119 = 0.0006730380939561179 + v118;
-                const V v120 = 9.0 * v119;
-                const V v121 = v93 * v86;
-                const V v122 = v82 * v102;
-                const V v123 = v121 + v122;
-                const V v124 = v79 * v120;
-                const V v125 = 0.0010319917440660474 + v124;
-                const V v126 = 9.0 * v125;
-                const V v127 = v98 * v86;
-                const V v128 = v82 * v123;
-                const V v129 = v127 + v128;
-                const V v130 = v101 * v86;
-                const V v131 = v82 * v129;
-                const V v132 = v130 + v131;
-                const V v133 = v105 * v86;
-                const V v134 = v82 * v132;
-                const V v135 = v133 + v134;
-                const V v136 = v108 * v86;
-                const V v137 = v82 * v135;
-                const V v138 = v136 + v137;
-                const V v139 = v111 * v86;
-                const V v140 = v82 * v138;
-                const V v141 = v139 + v140;
-                const V v142 = v114 * v86;
-                const V v143 = v82 * v141;
-                const V v144 = v142 + v143;
-                const V v145 = v117 * v86;
-                const V v146 = v82 * v144;
-                const V v147 = v145 + v146;
-                const V v148 = v120 * v86;
-                const V v149 = v82 * v147;
-                const V v150 = v148 + v149;
-                const V v151 = v82 * v150;
-                const V v152 = v126 * v86;
-                const V v153 = v152 + v151;
-                const V v154 = v82 * v153;
-                const V v155 = v79 * v126;
-                const V v156 = 0.0016670635865682305 + v155;
-                const V v157 = 9.0 * v156;
-                const V v158 = v157 * v86;
-                const V v159 = v158 + v154;
-                const V v160 = v82 * v159;
-                const V v161 = v79 * v157;
-                const V v162 = 0.002879473467708762 + v161;
-                const V v163 = 9.0 * v162;
-                const V v164 = v163 * v86;
-                const V v165 = v164 + v160;
-                const V v166 = v82 * v165;
-                const V v167 = v79 * v163;
-                const V v168 = 0.005439005439005439 + v167;
-                const V v169 = 9.0 * v168;
-                const V v170 = v169 * v86;
-                const V v171 = v170 + v166;
-                const V v172 = v82 * v171;
-                const V v173 = v79 * v169;
-                const V v174 = 0.011655011655011656 + v173;
-                const V v175 = 9.0 * v174;
-                const V v176 = v175 * v86;
-                const V v177 = v176 + v172;
-                const V v178 = v82 * v177;
-                const V v179 = v79 * v175;
-                const V v180 = 0.030303030303030304 + v179;
-                const V v181 = 9.0 * v180;
-                const V v182 = v181 * v86;
-                const V v183 = v182 + v178;
-                const V v184 = v82 * v183;
-                const V v185 = v79 * v181;
-                const V v186 = 0.1111111111111111 + v185;
-                const V v187 = 9.0 * v186;
-                const V v188 = v187 * v86;
-                const V v189 = v188 + v184;
-                const V v190 = v79 * v187;
-                const V v191 = 1.0 + v190;
-                const V v192 = -v189;
-                v76 = softehl_blend(m78, v192, v76);
-                v77 = softehl_blend(m78, v191, v77);
+        const M v38 = softehl_eq(v33, v33);
+        const V v39 = v33 * v33, v40 = 2.0 * v33 * v34;
+        V v41 = softehl_splat(0.0), v42 = softehl_splat(0.0);
+        const M m43 = v38;
+        if (softehl_any(m43)) {
+            const M v44 = softehl_le(softehl_splat(6.0), v33);
+            V v45 = softehl_splat(0.0), v46 = softehl_splat(0.0);
+            const M m47 = v44 & m43;
+            if (softehl_any(m47)) {
+                const V v48 = 1.0 / v39, v49 = 9.0 * v48,
+                    v50 = 9.0 * (4.1273438891135995e-05 + 0.0003054234477944064 * v48),
+                    v51 = v48 * v48 * v40, v52 = 9.0 * (5.0707367780538514e-05 + v48 * v50),
+                    v53 = 9.0 * (6.3000063000063e-05 + v48 * v52),
+                    v54 = 9.0 * (7.925814377427281e-05 + v48 * v53),
+                    v55 = 9.0 * (0.00010112245929821013 + v48 * v54),
+                    v56 = 9.0 * (0.00013108466946064277 + v48 * v55),
+                    v57 = 9.0 * (0.00017303176368804846 + v48 * v56),
+                    v58 = 9.0 * (0.0002332167249708479 + v48 * v57),
+                    v59 = 9.0 * (0.00032206119162640903 + v48 * v58),
+                    v60 = 9.0 * (0.0004576659038901602 + v48 * v59),
+                    v61 = 9.0 * (0.0006730380939561179 + v48 * v60),
+                    v62 = v53 * v51 + v49 * ((v52 + v49 * (v50 + 0.0027488110301496574 * v48)) * v51),
+                    v63 = 9.0 * (0.0010319917440660474 + v48 * v61),
+                    v64 = v49 * (v56 * v51 + v49 * (v55 * v51 + v49 * (v54 * v51 + v49 * v62))),
+                    v65 = v60 * v51 + v49 * (v59 * v51 + v49 * (v58 * v51 + v49 * (v57 * v51 + v64))),
+                    v66 = 9.0 * (0.0016670635865682305 + v48 * v63),
+                    v67 = v49 * (v66 * v51 + v49 * (v63 * v51 + v49 * (v61 * v51 + v49 * v65))),
+                    v68 = 9.0 * (0.002879473467708762 + v48 * v66),
+                    v69 = 9.0 * (0.005439005439005439 + v48 * v68),
+                    v70 = 9.0 * (0.011655011655011656 + v48 * v69),
+                    v71 = 9.0 * (0.030303030303030304 + v48 * v70),
+                    v72 = v71 * v51 + v49 * (v70 * v51 + v49 * (v69 * v51 + v49 * (v68 * v51 + v67))),
+                    v73 = 9.0 * (0.1111111111111111 + v48 * v71), v74 = 1.0 + v48 * v73,
+                    v75 = -(v73 * v51 + v49 * v72);
+                v45 = softehl_blend(m47, v75, v45); v46 = softehl_blend(m47, v74, v46);
             }
-            const M m193 = ~v75 & m74;
-            if (softehl_any(m193)) {
-                const V v194 = 0.1111111111111111 * v69;
-                const V v195 = 0.1111111111111111 * v71;
-                const V v196 = 1.0 - v194;
-                const M v197 = softehl_lt(softehl_splat(3.0), v59);
-                const V v198 = 0.3645833333333333 * v59;
-                const V v199 = 0.3333333333333333 * v59;
-                const V v200 = 0.3645833333333333 * v60;
-                const V v201 = 0.3333333333333333 * v60;
-                const V v202 = v196 * v196;
-                const V v203 = v196 * v202;
-                const V v204 = 3.0 * v202;
-                const V v205 = v204 * v195;
-                V v206 = softehl_splat(0.0);
-                V v207 = softehl_splat(0.0);
-                const M m208 = v197 & m193;
-                if (softehl_any(m208)) {
-                    const V v209 = 0.022222222222222223 * v59;
-                    const V v210 = 1.0 + v199;
-                    const V v211 = (-1.0) + v199;
-                    const V v212 = 1.0 / v211;
-                    const V v213 = 0.37037037037037035 * v69;
-                    const V v214 = 3.3333333333333335 * v69;
-                    const V v215 = (-80.0) + v214;
-                    const V v216 = v213 * v71;
-                    const V v217 = v194 * v215;
-                    const V v218 = 66.0 + v217;
-                    const V v219 = v215 * v195;
-                    const V v220 = v216 + v219;
-                    const V v221 = v210 * v212;
-                    const V v222 = 1.0 - v221;
-                    const V v223 = v209 * v220;
-                    const V v224 = v209 * v218;
-                    const V v225 = 0.022222222222222223 * v218;
-                    const V v226 = v222 * v201;
-                    const V v227 = v212 * v226;
-                    const V v228 = v225 * v60;
-                    const V v229 = v228 + v223;
-                    const V v230 = softehl_vlog(v221);
-                    const V v231 = 1.0 / v221;
-                    const V v232 = v203 * v231;
-                    const V v233 = v232 * v227;
-                    const V v234 = v233 + v229;
-                    const V v235 = v230 * v203;
-                    const V v236 = v235 + v224;
-                    const V v237 = v230 * v205;
-                    const V v238 = v234 - v237;
-                    const V v239 = v236 * v200;
-                    const V v240 = v198 * v238;
-                    const V v241 = v239 + v240;
-                    const V v242 = v198 * v236;
-                    v206 = softehl_blend(m208, v241, v206);
-                    v207 = softehl_blend(m208, v242, v207);
+            const M m76 = ~v44 & m43;
+            if (softehl_any(m76)) {
+                const V v77 = 0.1111111111111111 * v39, v78 = 0.1111111111111111 * v40,
+                    v79 = 1.0 - v77;
+                const M v80 = softehl_lt(softehl_splat(3.0), v33);
+                const V v81 = 0.3645833333333333 * v33, v82 = 0.3333333333333333 * v33,
+                    v83 = 0.3645833333333333 * v34, v84 = 0.3333333333333333 * v34, v85 = v79 * v79,
+                    v86 = v79 * v85, v87 = 3.0 * v85 * v78;
+                V v88 = softehl_splat(0.0), v89 = softehl_splat(0.0);
+                const M m90 = v80 & m76;
+                if (softehl_any(m90)) {
+                    const V v91 = 0.022222222222222223 * v33, v92 = 1.0 / ((-1.0) + v82),
+                        v93 = (-80.0) + 3.3333333333333335 * v39, v94 = 66.0 + v77 * v93,
+                        v95 = (1.0 + v82) * v92,
+                        v96 = 0.022222222222222223 * v94 * v34 + v91 * (0.37037037037037035 * v39 * v40 + v93 * v78),
+                        v97 = softehl_vlog(v95), v98 = v97 * v86 + v91 * v94,
+                        v99 = v86 * (1.0 / v95) * (v92 * ((1.0 - v95) * v84)) + v96 - v97 * v87,
+                        v100 = v98 * v83 + v81 * v99, v101 = v81 * v98;
+                    v88 = softehl_blend(m90, v100, v88); v89 = softehl_blend(m90, v101, v89);
                 }
-                const M m243 = ~v197 & m193;
-                if (softehl_any(m243)) {
-                    const V v244 = 0.005555555555555556 * v59;
-                    const V v245 = 100.0 * v59;
-                    const V v246 = 300.0 + v245;
-                    const V v247 = 16.333333333333332 * v59;
-                    const V v248 = 49.0 * v59;
-                    const V v249 = 60.0 + v248;
-                    const V v250 = 100.0 * v203;
-                    const V v251 = softehl_vlog(v246);
-                    const V v252 = 1.0 / v246;
-                    const V v253 = v247 * v60;
-                    const V v254 = v199 * v249;
-                    const V v255 = (-405.0) + v254;
-                    const V v256 = v252 * v250;
-                    const V v257 = v199 * v255;
-                    const V v258 = (-160.0) + v257;
-                    const V v259 = v249 * v201;
-                    const V v260 = v253 + v259;
-                    const V v261 = v255 * v201;
-                    const V v262 = v199 * v260;
-                    const V v263 = v261 + v262;
-                    const V v264 = v251 * v203;
-                    const V v265 = (-0.9166666666666666) + v264;
-                    const V v266 = v199 * v258;
-                    const V v267 = 345.0 + v266;
-                    const V v268 = v258 * v201;
-                    const V v269 = v199 * v263;
-                    const V v270 = v268 + v269;
-                    const V v271 = v199 * v267;
-                    const V v272 = 132.0 + v271;
-                    const V v273 = v267 * v201;
-                    const V v274 = v199 * v270;
-                    const V v275 = v273 + v274;
-                    const V v276 = v244 * v272;
-                    const V v277 = v276 + v265;
-                    const V v278 = 0.005555555555555556 * v272;
-                    const V v279 = v278 + v256;
-                    const V v280 = v244 * v275;
-                    const V v281 = v279 * v60;
-                    const V v282 = v280 + v281;
-                    const V v283 = v251 * v205;
-                    const V v284 = v282 - v283;
-                    const V v285 = v277 * v200;
-                    const V v286 = v198 * v277;
-                    const V v287 = v198 * v284;
-                    const V v288 = v287 + v285;
-                    v206 = softehl_blend(m243, v288, v206);
-                    v207 = softehl_blend(m243, v286, v207);
+                const M m102 = ~v80 & m76;
+                if (softehl_any(m102)) {
+                    const V v103 = 0.005555555555555556 * v33, v104 = 300.0 + 100.0 * v33,
+                        v105 = 60.0 + 49.0 * v33, v106 = softehl_vlog(v104),
+                        v107 = (-405.0) + v82 * v105, v108 = (-160.0) + v82 * v107,
+                        v109 = 345.0 + v82 * v108,
+                        v110 = v82 * (v107 * v84 + v82 * (16.333333333333332 * v33 * v34 + v105 * v84)),
+                        v111 = 132.0 + v82 * v109,
+                        v112 = v103 * v111 + ((-0.9166666666666666) + v106 * v86),
+                        v113 = v103 * (v109 * v84 + v82 * (v108 * v84 + v110)) + (0.005555555555555556 * v111 + 1.0 / v104 * (100.0 * v86)) * v34,
+                        v114 = v81 * v112, v115 = v81 * (v113 - v106 * v87) + v112 * v83;
+                    v88 = softehl_blend(m102, v115, v88); v89 = softehl_blend(m102, v114, v89);
                 }
-                v76 = softehl_blend(m193, v206, v76);
-                v77 = softehl_blend(m193, v207, v77);
+                v45 = softehl_blend(m76, v88, v45); v46 = softehl_blend(m76, v89, v46);
             }
-            v72 = softehl_blend(m74, v76, v72);
-            v73 = softehl_blend(m74, v77, v73);
+            v41 = softehl_blend(m43, v45, v41); v42 = softehl_blend(m43, v46, v42);
         }
-        const M m289 = ~v68;
-        if (softehl_any(m289)) {
-            const V v290 = 6.0 - v59;
-            const V v291 = v290 * v290;
-            const V v292 = v290 * v291;
-            const V v293 = 3.0 * v291;
-            const V v294 = v293 * v60;
-            const V v295 = -v294;
-            v72 = softehl_blend(m289, v295, v72);
-            v73 = softehl_blend(m289, v292, v73);
+        const M m116 = ~v38;
+        if (softehl_any(m116)) {
+            const V v117 = 6.0 - v33, v118 = v117 * v117, v119 = v117 * v118,
+                v120 = -(3.0 * v118 * v34);
+            v41 = softehl_blend(m116, v120, v41); v42 = softehl_blend(m116, v119, v42);
         }
-        const M v296 = softehl_le(v59, softehl_splat(5.0));
-        V v297 = softehl_splat(0.0);
-        V v298 = softehl_splat(0.0);
-        V v299 = softehl_splat(0.0);
-        V v300 = softehl_splat(0.0);
-        const M m301 = v296;
-        if (softehl_any(m301)) {
-            const V v302 = softehl_vpow(v59, 0.98);
-            const V v303 = softehl_vpow(v59, 2.31);
-            const V v304 = softehl_vpow(v59, 1.31);
-            const V v305 = softehl_vpow(v59, (-0.02));
-            const V v306 = 1.899 * v302;
-            const V v307 = 11.1 * v303;
-            const V v308 = 0.05 * v69;
-            const V v309 = 0.11 * v69;
-            const V v310 = 0.92 * v59;
-            const V v311 = v308 - v310;
-            const V v312 = 2.38 * v59;
-            const V v313 = v309 - v312;
-            const V v314 = softehl_vexp(v311);
-            const V v315 = softehl_vexp(v313);
-            const V v316 = 0.05 * v71;
-            const V v317 = 0.11 * v71;
-            const V v318 = v306 * v314;
-            const V v319 = 0.92 * v60;
-            const V v320 = v316 - v319;
-            const V v321 = 2.38 * v60;
-            const V v322 = v317 - v321;
-            const V v323 = v318 * v320;
-            const V v324 = v307 * v315;
-            const V v325 = v324 * v322;
-            const V v326 = 25.641 * v315;
-            const V v327 = v304 * v326;
-            const V v328 = v327 * v60;
-            const V v329 = v328 + v325;
-            const V v330 = 1.86102 * v314;
-            const V v331 = v305 * v330;
-            const V v332 = v331 * v60;
-            const V v333 = v332 + v323;
-            v297 = softehl_blend(m301, v329, v297);
-            v298 = softehl_blend(m301, v324, v298);
-            v299 = softehl_blend(m301, v318, v299);
-            v300 = softehl_blend(m301, v333, v300);
+        const M v121 = softehl_le(v33, softehl_splat(5.0));
+        V v122 = softehl_splat(0.0), v123 = softehl_splat(0.0), v124 = softehl_splat(0.0),
+            v125 = softehl_splat(0.0);
+        const M m126 = v121;
+        if (softehl_any(m126)) {
+            const V v127 = softehl_vpow(v33, 0.98), v128 = softehl_vpow(v33, 2.31),
+                v129 = softehl_vpow(v33, 1.31), v130 = softehl_vpow(v33, (-0.02)),
+                v131 = softehl_vexp(0.05 * v39 - 0.92 * v33),
+                v132 = softehl_vexp(0.11 * v39 - 2.38 * v33), v133 = 1.899 * v127 * v131,
+                v134 = 11.1 * v128 * v132,
+                v135 = v129 * (25.641 * v132) * v34 + v134 * (0.11 * v40 - 2.38 * v34),
+                v136 = v130 * (1.86102 * v131) * v34 + v133 * (0.05 * v40 - 0.92 * v34);
+            v122 = softehl_blend(m126, v135, v122); v123 = softehl_blend(m126, v134, v123);
+            v124 = softehl_blend(m126, v133, v124); v125 = softehl_blend(m126, v136, v125);
         }
-        const M m334 = ~v296;
-        if (softehl_any(m334)) {
-            const V v335 = 0.25 * v59;
-            const V v336 = 1.25 - v335;
-            const V v337 = 0.818 * v59;
-            const V v338 = 4.09 - v337;
-            const V v339 = softehl_vexp(v336);
-            const V v340 = softehl_vexp(v338);
-            const V v341 = 0.3225737734624401 * v339;
-            const V v342 = 0.08064344336561002 * v339;
-            const V v343 = 0.048545522453863246 * v340;
-            const V v344 = 0.039710237367260134 * v340;
-            const V v345 = v342 * v60;
-            const V v346 = v344 * v60;
-            const V v347 = -v345;
-            const V v348 = -v346;
-            v297 = softehl_blend(m334, v348, v297);
-            v298 = softehl_blend(m334, v343, v298);
-            v299 = softehl_blend(m334, v341, v299);
-            v300 = softehl_blend(m334, v347, v300);
+        const M m137 = ~v121;
+        if (softehl_any(m137)) {
+            const V v138 = softehl_vexp(1.25 - 0.25 * v33), v139 = softehl_vexp(4.09 - 0.818 * v33),
+                v140 = 0.3225737734624401 * v138, v141 = 0.048545522453863246 * v139,
+                v142 = -(0.08064344336561002 * v138 * v34),
+                v143 = -(0.039710237367260134 * v139 * v34);
+            v122 = softehl_blend(m137, v143, v122); v123 = softehl_blend(m137, v141, v123);
+            v124 = softehl_blend(m137, v140, v124); v125 = softehl_blend(m137, v142, v125);
         }
-        const V v349 = 1.0 - p6;
-        const V v350 = 1.0 - p4;
-        const V v351 = v43 * v9;
-        const V v352 = parameters[1] - v351;
-        const V v353 = v43 * v25;
-        const V v354 = t7 - v353;
-        const V v355 = v59 * t13;
-        const V v356 = parameters[7] * v59;
-        const V v357 = parameters[7] * v60;
-        const V v358 = v355 + v357;
-        const V v359 = 1.0 / v356;
-        const V v360 = v44 * v11;
-        const V v361 = v352 - v360;
-        const V v362 = v44 * v27;
-        const V v363 = v354 - v362;
-        const M v364 = softehl_lt(softehl_splat(0.0), v361);
-        const V v365 = v298 * t14;
-        const V v366 = v365 + v72;
-        const V v367 = parameters[8] * v298;
-        const V v368 = v367 + v73;
-        const V v369 = parameters[8] * v297;
-        const V v370 = v369 + v366;
-        const V v371 = v359 * v368;
-        const V v372 = v358 * v371;
-        const V v373 = v370 - v372;
-        V v374 = softehl_splat(0.0);
-        V v375 = softehl_splat(0.0);
-        V v376 = softehl_splat(0.0);
-        V v377 = softehl_splat(0.0);
-        const M m378 = v364;
-        if (softehl_any(m378)) {
-            const V v379 = v350 * v363;
-            const V v380 = v361 * tp4;
-            const V v381 = v379 - v380;
-            v374 = softehl_blend(m378, v361, v374);
-            v375 = softehl_blend(m378, softehl_splat(0.0), v375);
-            v376 = softehl_blend(m378, v381, v376);
-            v377 = softehl_blend(m378, softehl_splat(0.0), v377);
+        const V v144 = 1.0 - p6, v145 = 1.0 - p4, v146 = parameters[7] * v33,
+            v147 = v33 * t13 + parameters[7] * v34, v148 = 1.0 / v146,
+            v149 = parameters[1] - v25 * v5 - v26 * v6, v150 = t7 - v25 * v11 - v26 * v12;
+        const M v151 = softehl_lt(softehl_splat(0.0), v149);
+        const V v152 = parameters[8] * v123 + v42,
+            v153 = parameters[8] * v122 + (v123 * t14 + v41) - v147 * (v148 * v152);
+        V v154 = softehl_splat(0.0), v155 = softehl_splat(0.0), v156 = softehl_splat(0.0),
+            v157 = softehl_splat(0.0);
+        const M m158 = v151;
+        if (softehl_any(m158)) {
+            const V v159 = v145 * v150 - v149 * tp4; v154 = softehl_blend(m158, v149, v154);
+            v155 = softehl_blend(m158, softehl_splat(0.0), v155);
+            v156 = softehl_blend(m158, v159, v156);
+            v157 = softehl_blend(m158, softehl_splat(0.0), v157);
         }
-        const M m382 = ~v364;
-        if (softehl_any(m382)) {
-            const V v383 = v349 * v363;
-            const V v384 = v361 * tp6;
-            const V v385 = v383 - v384;
-            v374 = softehl_blend(m382, softehl_splat(0.0), v374);
-            v375 = softehl_blend(m382, v361, v375);
-            v376 = softehl_blend(m382, softehl_splat(0.0), v376);
-            v377 = softehl_blend(m382, v385, v377);
+        const M m160 = ~v151;
+        if (softehl_any(m160)) {
+            const V v161 = v144 * v150 - v149 * tp6;
+            v154 = softehl_blend(m160, softehl_splat(0.0), v154);
+            v155 = softehl_blend(m160, v149, v155);
+            v156 = softehl_blend(m160, softehl_splat(0.0), v156);
+            v157 = softehl_blend(m160, v161, v157);
         }
-        const double v386 = 0.5 * w[2];
-        const double v387 = 0.5 - v386;
-        const double v388 = 0.5 + v386;
-        const V v389 = 0.66 * v59;
-        const V v390 = 2.25 + v55;
-        const V v391 = 6.25 + v55;
-        const V v392 = 2.7777777777777777 + v55;
-        const V v393 = 0.6944444444444444 + v55;
-        const V v394 = 12.25 + v55;
-        const V v395 = 5.444444444444445 + v55;
-        const V v396 = 1.3611111111111112 + v55;
-        const V v397 = -v389;
-        const V v398 = 7.111111111111111 + v55;
-        const V v399 = 11.11111111111111 + v55;
-        const V v400 = 3.361111111111111 + v55;
-        const V v401 = 4.694444444444445 + v55;
-        const V v402 = 8.027777777777779 + v55;
-        const V v403 = 10.027777777777779 + v55;
-        const V v404 = softehl_vexp(v397);
-        const V v405 = 0.5 * v390;
-        const V v406 = 0.5 * v391;
-        const V v407 = 0.5 * v393;
-        const V v408 = 0.5 * v395;
-        const V v409 = 0.5 * v398;
-        const V v410 = v390 * v405;
-        const V v411 = 1.6875 * v390;
-        const V v412 = v391 * v406;
-        const V v413 = 13.020833333333334 * v391;
-        const V v414 = v393 * v407;
-        const V v415 = 0.16075102880658437 * v393;
-        const V v416 = v395 * v408;
-        const V v417 = v398 * v409;
-        const V v418 = 9.880658436213992 * v395;
-        const V v419 = 16.855967078189302 * v398;
-        const V v420 = -v410;
-        const V v421 = -v412;
-        const V v422 = -v414;
-        const V v423 = -v416;
-        const V v424 = -v417;
-        const V v425 = 0.5 * v400;
-        const V v426 = softehl_vexp(v420);
-        const V v427 = softehl_vexp(v421);
-        const V v428 = softehl_vexp(v422);
-        const V v429 = softehl_vexp(v423);
-        const V v430 = softehl_vexp(v424);
-        const V v431 = v400 * v425;
-        const V v432 = 3.765689300411523 * v400;
-        const V v433 = 0.5 * v402;
-        const V v434 = 0.5 * v403;
-        const V v435 = 21.48173868312757 * v402;
-        const V v436 = v402 * v433;
-        const V v437 = -v431;
-        const V v438 = v403 * v434;
-        const V v439 = 33.51877572016461 * v403;
-        const V v440 = 0.5 * v356;
-        const V v441 = v349 * v375;
-        const V v442 = softehl_vexp(v437);
-        const V v443 = -v436;
-        const V v444 = -v438;
-        const V v445 = v350 * v374;
-        const V v446 = v441 + v445;
-        const V v447 = 0.5 * v392;
-        const V v448 = 2.57201646090535 * v392;
-        const V v449 = v392 * v447;
-        const V v450 = softehl_vexp(v443);
-        const V v451 = softehl_vexp(v444);
-        const V v452 = v377 + v376;
-        const V v453 = p1 * v40;
-        const V v454 = tp1 - v453;
-        const V v455 = p1 * v30;
-        const V v456 = v30 * v454;
-        const V v457 = 0.5 * v394;
-        const V v458 = 50.020833333333336 * v394;
-        const V v459 = v394 * v457;
-        const V v460 = -v449;
-        const V v461 = 0.5 * v455;
-        const V v462 = 0.924 * v455;
-        const V v463 = 0.5 * v396;
-        const V v464 = 0.6175411522633745 * v396;
-        const V v465 = v396 * v463;
-        const V v466 = softehl_vexp(v460);
-        const V v467 = -v459;
-        const V v468 = v461 * v358;
-        const V v469 = v440 * v462;
-        const V v470 = v440 * v456;
-        const V v471 = v470 + v468;
-        const V v472 = v387 * v6;
-        const V v473 = v387 * v28;
-        const V v474 = -v465;
-        const V v475 = 0.5 * v399;
-        const V v476 = 41.1522633744856 * v399;
-        const V v477 = v399 * v475;
-        const V v478 = softehl_vexp(v467);
-        const V v479 = v388 * v7;
-        const V v480 = v472 + v479;
-        const V v481 = v388 * v29;
-        const V v482 = v473 + v481;
-        const V v483 = v1 * v480;
-        const V v484 = softehl_vexp(v474);
-        const V v485 = 0.5 * v401;
-        const V v486 = 7.345936213991769 * v401;
-        const V v487 = v401 * v485;
-        const V v488 = -v477;
-        const M v489 = softehl_le(softehl_splat(0.5), v483);
-        const V v490 = p0 * parameters[3];
-        const V v491 = p0 * t9;
-        const V v492 = softehl_vexp(v490);
-        const V v493 = parameters[3] * tp0;
-        const V v494 = v491 + v493;
-        const V v495 = softehl_vexp(v488);
-        const V v496 = -v487;
-        const V v497 = 9.0 + v55;
-        const V v498 = 1.0 + v55;
-        const V v499 = 0.25 + v55;
-        const V v500 = 0.1111111111111111 + v55;
-        const V v501 = 0.027777777777777776 + v55;
-        const V v502 = 0.5 * v497;
-        const V v503 = 4.0 + v55;
-        const V v504 = 0.5 * v498;
-        const V v505 = 27.0 * v497;
-        const V v506 = v497 * v502;
-        const V v507 = 0.5 * v499;
-        const V v508 = softehl_vexp(v496);
-        const V v509 = 0.5 * v500;
-        const V v510 = 0.5 * v501;
-        const V v511 = v498 * v504;
-        const V v512 = 0.3333333333333333 * v498;
-        const V v513 = v499 * v507;
-        const V v514 = 0.020833333333333332 * v499;
-        const V v515 = v500 * v509;
-        const V v516 = 0.00411522633744856 * v500;
-        const V v517 = v501 * v510;
-        const V v518 = 0.000257201646090535 * v501;
-        const V v519 = -v506;
-        const V v520 = -v511;
-        const V v521 = -v513;
-        const V v522 = -v515;
-        const V v523 = -v517;
-        const V v524 = 0.5 * v503;
-        const V v525 = softehl_vexp(v519);
-        const V v526 = softehl_vexp(v520);
-        const V v527 = softehl_vexp(v521);
-        const V v528 = v503 * v524;
-        const V v529 = 5.333333333333333 * v503;
-        const V v530 = softehl_vexp(v522);
-        const V v531 = softehl_vexp(v523);
-        const V v532 = 0.4444444444444444 + v55;
-        const V v533 = 1.7777777777777777 + v55;
-        const V v534 = -v528;
-        const V v535 = 1.6875 * v426;
-        const V v536 = v426 * v411;
-        const V v537 = 0.5 * v532;
-        const V v538 = 0.5 * v533;
-        const V v539 = 0.06584362139917696 * v532;
-        const V v540 = v532 * v537;
-        const V v541 = 1.0534979423868314 * v533;
-        const V v542 = v533 * v538;
-        const V v543 = softehl_vexp(v534);
-        const V v544 = 13.020833333333334 * v427;
-        const V v545 = v535 + v544;
-        const V v546 = v427 * v413;
-        const V v547 = v536 + v546;
-        const V v548 = v404 * v469;
-        const V v549 = 1.4 * v404;
-        const V v550 = 1.0 - v549;
-        const V v551 = -v540;
-        const V v552 = v548 * v60;
-        const V v553 = -v542;
-        const V v554 = 0.16075102880658437 * v428;
-        const V v555 = v554 + v545;
-        const V v556 = v428 * v415;
-        const V v557 = v556 + v547;
-        const V v558 = v550 * v471;
-        const V v559 = v552 + v558;
-        const V v560 = v361 * t16;
-        const V v561 = parameters[10] * v361;
-        const V v562 = v361 * v361;
-        const V v563 = v13 + v562;
-        const V v564 = softehl_vexp(v551);
-        const V v565 = softehl_vexp(v553);
-        const V v566 = 9.880658436213992 * v429;
-        const V v567 = v566 + v555;
-        const V v568 = v429 * v418;
-        const V v569 = v568 + v557;
-        const V v570 = parameters[10] * v363;
-        const V v571 = v560 + v570;
-        const V v572 = v361 * v363;
-        const V v573 = v14 + v572;
-        const V v574 = softehl_vsqrt(v563);
-        const V v575 = 1.0 / v563;
-        const V v576 = 16.855967078189302 * v430;
-        const V v577 = v576 + v567;
-        const V v578 = v430 * v419;
-        const V v579 = v578 + v569;
-        const V v580 = 1.0 / v574;
-        const V v581 = 3.765689300411523 * v442;
-        const V v582 = v581 + v577;
-        const V v583 = v442 * v432;
-        const V v584 = v583 + v579;
-        const V v585 = 2.57201646090535 * v466;
-        const V v586 = v585 + v582;
-        const V v587 = v466 * v448;
-        const V v588 = v587 + v584;
-        const V v589 = v564 * v539;
-        const V v590 = v589 + v588;
-        const V v591 = 0.06584362139917696 * v564;
-        const V v592 = v591 + v586;
-        const V v593 = v565 * v541;
-        const V v594 = v593 + v590;
-        const V v595 = 1.0534979423868314 * v565;
-        const V v596 = v595 + v592;
-        const V v597 = softehl_vsqrt(v575);
-        const V v598 = 0.00411522633744856 * v530;
-        const V v599 = v598 + v596;
-        const V v600 = v530 * v516;
-        const V v601 = v600 + v594;
-        const V v602 = 0.000257201646090535 * v531;
-        const V v603 = v602 + v599;
-        const V v604 = v531 * v518;
-        const V v605 = v604 + v601;
-        const V v606 = 5.333333333333333 * v543;
-        const V v607 = v606 + v603;
-        const V v608 = v543 * v529;
-        const V v609 = v608 + v605;
-        const V v610 = v561 * v580;
-        const V v611 = v610 * v597;
-        const V v612 = v573 * v611;
-        const V v613 = v571 - v612;
-        const V v614 = parameters[2] * v492;
-        const V v615 = v492 * t8;
-        const V v616 = v614 * v494;
-        const V v617 = v615 + v616;
-        const V v618 = v446 * v617;
-        const V v619 = v614 * v446;
-        const V v620 = v614 * v452;
-        const V v621 = v618 + v620;
-        const V v622 = v368 * v621;
-        const V v623 = v619 * v373;
-        const V v624 = v622 + v623;
-        const V v625 = v359 * v624;
-        const V v626 = 27.0 * v525;
-        const V v627 = v626 + v607;
-        const V v628 = v525 * v505;
-        const V v629 = v628 + v609;
-        const V v630 = 0.3333333333333333 * v526;
-        const V v631 = v630 + v627;
-        const V v632 = v526 * v512;
-        const V v633 = v632 + v629;
-        const V v634 = 0.020833333333333332 * v527;
-        const V v635 = v634 + v631;
-        const V v636 = v527 * v514;
-        const V v637 = v636 + v633;
-        const V v638 = 50.020833333333336 * v478;
-        const V v639 = v638 + v635;
-        const V v640 = v478 * v458;
-        const V v641 = v640 + v637;
-        const V v642 = 0.6175411522633745 * v484;
-        const V v643 = v642 + v639;
-        const V v644 = v484 * v464;
-        const V v645 = v644 + v641;
-        const V v646 = 41.1522633744856 * v495;
-        const V v647 = v646 + v643;
-        const V v648 = v495 * v476;
-        const V v649 = v648 + v645;
-        const V v650 = 7.345936213991769 * v508;
-        const V v651 = v650 + v647;
-        const V v652 = v508 * v486;
-        const V v653 = v652 + v649;
-        const V v654 = 21.48173868312757 * v450;
-        const V v655 = v654 + v651;
-        const V v656 = v450 * v435;
-        const V v657 = v656 + v653;
-        const V v658 = 33.51877572016461 * v451;
-        const V v659 = v658 + v655;
-        const V v660 = v451 * v439;
-        const V v661 = v660 + v657;
-        const V v662 = v57 * v661;
-        const V v663 = v38 * v659;
-        const V v664 = v3 * v659;
-        const V v665 = v613 * v663;
-        const V v666 = v37 * v662;
-        const V v667 = v664 - v666;
-        const V v668 = 0.5641895835477563 * v667;
-        const V v669 = v561 * v668;
-        const V v670 = v665 + v669;
-        const V v671 = v580 * v670;
-        const V v672 = v625 + v671;
-        const V v673 = v672 - v559;
-        V v674 = softehl_splat(0.0);
-        V v675 = softehl_splat(0.0);
-        const M m676 = v489;
-        if (softehl_any(m676)) {
-            const V v677 = v1 * v482;
-            const V v678 = v480 * v35;
-            const V v679 = v677 - v678;
-            v674 = softehl_blend(m676, v483, v674);
-            v675 = softehl_blend(m676, v679, v675);
+        const double v162 = 0.5 * w[2], v163 = 0.5 - v162, v164 = 0.5 + v162;
+        const V v165 = 2.25 + v30, v166 = 6.25 + v30, v167 = 2.7777777777777777 + v30,
+            v168 = 0.6944444444444444 + v30, v169 = 12.25 + v30, v170 = 5.444444444444445 + v30,
+            v171 = 1.3611111111111112 + v30, v172 = 7.111111111111111 + v30,
+            v173 = 11.11111111111111 + v30, v174 = 3.361111111111111 + v30,
+            v175 = 4.694444444444445 + v30, v176 = 8.027777777777779 + v30,
+            v177 = 10.027777777777779 + v30, v178 = softehl_vexp(-(0.66 * v33)),
+            v179 = softehl_vexp(-(v165 * (0.5 * v165))),
+            v180 = softehl_vexp(-(v166 * (0.5 * v166))),
+            v181 = softehl_vexp(-(v168 * (0.5 * v168))),
+            v182 = softehl_vexp(-(v170 * (0.5 * v170))),
+            v183 = softehl_vexp(-(v172 * (0.5 * v172))), v184 = 0.5 * v146,
+            v185 = softehl_vexp(-(v174 * (0.5 * v174))), v186 = v144 * v155 + v145 * v154,
+            v187 = softehl_vexp(-(v176 * (0.5 * v176))),
+            v188 = softehl_vexp(-(v177 * (0.5 * v177))), v189 = v157 + v156, v190 = p1 * v15,
+            v191 = softehl_vexp(-(v167 * (0.5 * v167))),
+            v192 = softehl_vexp(-(v169 * (0.5 * v169))), v193 = v163 * v3 + v164 * v4,
+            v194 = v163 * v13 + v164 * v14, v195 = v1 * v193,
+            v196 = softehl_vexp(-(v171 * (0.5 * v171)));
+        const M v197 = softehl_le(softehl_splat(0.5), v195);
+        const V v198 = softehl_vexp(p0 * parameters[3]),
+            v199 = softehl_vexp(-(v173 * (0.5 * v173))), v200 = 9.0 + v30, v201 = 1.0 + v30,
+            v202 = 0.25 + v30, v203 = 0.1111111111111111 + v30, v204 = 0.027777777777777776 + v30,
+            v205 = 4.0 + v30, v206 = softehl_vexp(-(v175 * (0.5 * v175))),
+            v207 = softehl_vexp(-(v200 * (0.5 * v200))),
+            v208 = softehl_vexp(-(v201 * (0.5 * v201))),
+            v209 = softehl_vexp(-(v202 * (0.5 * v202))),
+            v210 = softehl_vexp(-(v203 * (0.5 * v203))),
+            v211 = softehl_vexp(-(v204 * (0.5 * v204))), v212 = 0.4444444444444444 + v30,
+            v213 = 1.7777777777777777 + v30, v214 = softehl_vexp(-(v205 * (0.5 * v205))),
+            v215 = 0.16075102880658437 * v181 + (1.6875 * v179 + 13.020833333333334 * v180),
+            v216 = v181 * (0.16075102880658437 * v168) + (v179 * (1.6875 * v165) + v180 * (13.020833333333334 * v166)),
+            v217 = (1.0 - 1.4 * v178) * (v184 * (v15 * (tp1 - p1 * v22)) + 0.5 * v190 * v147),
+            v218 = v178 * (v184 * (0.924 * v190)) * v34 + v217, v219 = parameters[10] * v149,
+            v220 = v7 + v149 * v149, v221 = softehl_vexp(-(v212 * (0.5 * v212))),
+            v222 = softehl_vexp(-(v213 * (0.5 * v213))), v223 = softehl_vsqrt(v220),
+            v224 = v183 * (16.855967078189302 * v172) + (v182 * (9.880658436213992 * v170) + v216),
+            v225 = 1.0 / v223,
+            v226 = 3.765689300411523 * v185 + (16.855967078189302 * v183 + (9.880658436213992 * v182 + v215)),
+            v227 = v191 * (2.57201646090535 * v167) + (v185 * (3.765689300411523 * v174) + v224),
+            v228 = v222 * (1.0534979423868314 * v213) + (v221 * (0.06584362139917696 * v212) + v227),
+            v229 = 1.0534979423868314 * v222 + (0.06584362139917696 * v221 + (2.57201646090535 * v191 + v226)),
+            v230 = softehl_vsqrt(1.0 / v220),
+            v231 = 0.000257201646090535 * v211 + (0.00411522633744856 * v210 + v229),
+            v232 = v211 * (0.000257201646090535 * v204) + (v210 * (0.00411522633744856 * v203) + v228),
+            v233 = v149 * t16 + parameters[10] * v150 - (v8 + v149 * v150) * (v219 * v225 * v230),
+            v234 = parameters[2] * v198, v235 = v198 * t8 + v234 * (p0 * t9 + parameters[3] * tp0),
+            v236 = v207 * (27.0 * v200) + (v214 * (5.333333333333333 * v205) + v232),
+            v237 = 0.3333333333333333 * v208 + (27.0 * v207 + (5.333333333333333 * v214 + v231)),
+            v238 = v209 * (0.020833333333333332 * v202) + (v208 * (0.3333333333333333 * v201) + v236),
+            v239 = 0.6175411522633745 * v196 + (50.020833333333336 * v192 + (0.020833333333333332 * v209 + v237)),
+            v240 = v196 * (0.6175411522633745 * v171) + (v192 * (50.020833333333336 * v169) + v238),
+            v241 = v206 * (7.345936213991769 * v175) + (v199 * (41.1522633744856 * v173) + v240),
+            v242 = 21.48173868312757 * v187 + (7.345936213991769 * v206 + (41.1522633744856 * v199 + v239)),
+            v243 = 33.51877572016461 * v188 + v242,
+            v244 = v188 * (33.51877572016461 * v177) + (v187 * (21.48173868312757 * v176) + v241),
+            v245 = 0.5641895835477563 * (v2 * v243 - v19 * (v31 * v244)),
+            v246 = v225 * (v233 * (v20 * v243) + v219 * v245),
+            v247 = v148 * (v152 * (v186 * v235 + v234 * v189) + v234 * v186 * v153) + v246,
+            v248 = v247 - v218;
+        V v249 = softehl_splat(0.0), v250 = softehl_splat(0.0);
+        const M m251 = v197;
+        if (softehl_any(m251)) {
+            const V v252 = v1 * v194 - v193 * v18; v249 = softehl_blend(m251, v195, v249);
+            v250 = softehl_blend(m251, v252, v250);
         }
-        const M m680 = ~v489;
-        if (softehl_any(m680)) {
-            const V v681 = 4.0 * v480;
-            const V v682 = v1 * v681;
-            const V v683 = 4.0 - v682;
-            const V v684 = v681 * v35;
-            const V v685 = 1.0 / v683;
-            const V v686 = v685 * v685;
-            const V v687 = v31 * v482;
-            const V v688 = v684 - v687;
-            const V v689 = v686 * v688;
-            const V v690 = -v689;
-            v674 = softehl_blend(m680, v685, v674);
-            v675 = softehl_blend(m680, v690, v675);
+        const M m253 = ~v197;
+        if (softehl_any(m253)) {
+            const V v254 = 4.0 * v193, v255 = 1.0 / (4.0 - v1 * v254),
+                v256 = -(v255 * v255 * (v254 * v18 - v16 * v194));
+            v249 = softehl_blend(m253, v255, v249); v250 = softehl_blend(m253, v256, v250);
         }
-        const double v691 = 0.5 * w[1];
-        const V v692 = parameters[7] * v674;
-        const double v693 = 0.5 - v691;
-        const double v694 = 0.5 + v691;
-        const V v695 = v693 * v6;
-        const V v696 = v693 * v28;
-        const V v697 = v694 * v7;
-        const V v698 = v695 + v697;
-        const V v699 = v694 * v29;
-        const V v700 = v696 + v699;
-        const V v701 = v1 * v698;
-        const M v702 = softehl_le(softehl_splat(0.5), v701);
-        V v703 = softehl_splat(0.0);
-        V v704 = softehl_splat(0.0);
-        const M m705 = v702;
-        if (softehl_any(m705)) {
-            const V v706 = v1 * v700;
-            const V v707 = v698 * v35;
-            const V v708 = v706 - v707;
-            v703 = softehl_blend(m705, v701, v703);
-            v704 = softehl_blend(m705, v708, v704);
+        const double v257 = 0.5 * w[1]; const V v258 = parameters[7] * v249;
+        const double v259 = 0.5 - v257, v260 = 0.5 + v257;
+        const V v261 = v259 * v3 + v260 * v4, v262 = v259 * v13 + v260 * v14, v263 = v1 * v261;
+        const M v264 = softehl_le(softehl_splat(0.5), v263);
+        V v265 = softehl_splat(0.0), v266 = softehl_splat(0.0);
+        const M m267 = v264;
+        if (softehl_any(m267)) {
+            const V v268 = v1 * v262 - v261 * v18; v265 = softehl_blend(m267, v263, v265);
+            v266 = softehl_blend(m267, v268, v266);
         }
-        const M m709 = ~v702;
-        if (softehl_any(m709)) {
-            const V v710 = 4.0 * v698;
-            const V v711 = v1 * v710;
-            const V v712 = 4.0 - v711;
-            const V v713 = v710 * v35;
-            const V v714 = 1.0 / v712;
-            const V v715 = v714 * v714;
-            const V v716 = v31 * v700;
-            const V v717 = v713 - v716;
-            const V v718 = v715 * v717;
-            const V v719 = -v718;
-            v703 = softehl_blend(m709, v714, v703);
-            v704 = softehl_blend(m709, v719, v704);
+        const M m269 = ~v264;
+        if (softehl_any(m269)) {
+            const V v270 = 4.0 * v261, v271 = 1.0 / (4.0 - v1 * v270),
+                v272 = -(v271 * v271 * (v270 * v18 - v16 * v262));
+            v265 = softehl_blend(m269, v271, v265); v266 = softehl_blend(m269, v272, v266);
         }
-        const V v720 = 0.56 * v59;
-        const V v721 = 0.5 * v446;
-        const V v722 = -v720;
-        const V v723 = 0.08333333333333333 * p3;
-        const V v724 = 0.25 * p3;
-        const V v725 = 0.5 * v55;
-        const V v726 = 0.7071067811865476 * v55;
-        const V v727 = 0.3989422804014327 * v55;
-        const V v728 = v55 * v725;
-        const V v729 = softehl_vexp(v722);
-        const V v730 = softehl_verfc(v726);
-        const V v731 = v726 * v726;
-        const V v732 = 0.5 * v730;
-        const V v733 = 1.0 - v732;
-        const V v734 = -v728;
-        const V v735 = v559 + v672;
-        const V v736 = -v731;
-        const V v737 = p2 * t9;
-        const V v738 = p2 * parameters[3];
-        const V v739 = parameters[3] * tp2;
-        const V v740 = v737 + v739;
-        const V v741 = softehl_vexp(v738);
-        const V v742 = softehl_vexp(v734);
-        const V v743 = softehl_vexp(v736);
-        const V v744 = v55 * v733;
-        const V v745 = v674 * t13;
-        const V v746 = v703 * t13;
-        const V v747 = parameters[7] * v703;
-        const V v748 = v747 + v692;
-        const V v749 = parameters[7] * v675;
-        const V v750 = v745 + v749;
-        const V v751 = parameters[7] * v704;
-        const V v752 = v746 + v751;
-        const V v753 = v747 * v692;
-        const V v754 = v747 * v750;
-        const V v755 = v299 * t14;
-        const V v756 = parameters[8] * v299;
-        const V v757 = 0.5 * v748;
-        const V v758 = parameters[8] * v300;
-        const V v759 = v755 + v758;
-        const V v760 = v692 * v752;
-        const V v761 = v760 + v754;
-        const V v762 = v752 + v750;
-        const V v763 = 2.0 * v753;
-        const V v764 = 0.5 * v762;
-        const V v765 = v757 * v763;
-        const V v766 = v757 * v757;
-        const V v767 = v757 * v766;
-        const V v768 = v743 - v742;
-        const V v769 = 0.3989422804014327 * v742;
-        const V v770 = v744 + v769;
-        const V v771 = v727 * v768;
-        const V v772 = v733 + v771;
-        const V v773 = v770 + v756;
-        const V v774 = 1.0 / v766;
-        const V v775 = v724 * v766;
-        const V v776 = v753 * v774;
-        const V v777 = v774 * v765;
-        const V v778 = v777 * v764;
-        const V v779 = v761 - v778;
-        const V v780 = v774 * v779;
-        const V v781 = v775 * v764;
-        const V v782 = v772 * v57;
-        const V v783 = v723 * v767;
-        const V v784 = 0.08333333333333333 * v767;
-        const V v785 = tp3 * v784;
-        const V v786 = v785 + v781;
-        const V v787 = parameters[2] * v741;
-        const V v788 = v741 * t8;
-        const V v789 = v787 * v740;
-        const V v790 = v788 + v789;
-        const V v791 = v770 * t13;
-        const V v792 = v773 * t13;
-        const V v793 = parameters[7] * v773;
-        const V v794 = v782 + v759;
-        const V v795 = parameters[7] * v782;
-        const V v796 = v791 + v795;
-        const V v797 = parameters[7] * v794;
-        const V v798 = v792 + v797;
-        const V v799 = v776 * v776;
-        const V v800 = 2.0 * v776;
-        const V v801 = v800 * v783;
-        const V v802 = v799 * v783;
-        const V v803 = 0.5 * v793;
-        const V v804 = v803 * v452;
-        const V v805 = v721 * v793;
-        const V v806 = v721 * v798;
-        const V v807 = v804 + v806;
-        const V v808 = v776 * v807;
-        const V v809 = v805 * v780;
-        const V v810 = v809 + v808;
-        const V v811 = v787 * v39;
-        const V v812 = v22 * v790;
-        const V v813 = v811 + v812;
-        const V v814 = v787 * v22;
-        const V v815 = 1.0 / v814;
-        const V v816 = v815 * v802;
-        const V v817 = v813 * v816;
-        const V v818 = v799 * v786;
-        const V v819 = v817 - v818;
-        const V v820 = v801 * v780;
-        const V v821 = v819 - v820;
-        const V v822 = 0.504 * v729;
-        const V v823 = v822 * v802;
-        const V v824 = 0.9 * v729;
-        const V v825 = 1.0 - v824;
-        const V v826 = v825 * v821;
-        const V v827 = v823 * v60;
-        const V v828 = v826 - v827;
-        const V v829 = v815 * v828;
-        const V v830 = v810 + v829;
-        softehl_store4(R + 13 * q + 0, (13 * points), v51, v42, v53, tp0);
-        softehl_store4(R + 13 * q + 4, (13 * points), v673, v830, v735, v617);
-        softehl_store4(R + 13 * q + 8, (13 * points), v796, v668, v671, tp4);
+        const V v273 = 0.5 * v186, v274 = 0.7071067811865476 * v30,
+            v275 = softehl_vexp(-(0.56 * v33)), v276 = softehl_verfc(v274), v277 = 1.0 - 0.5 * v276,
+            v278 = v218 + v247, v279 = softehl_vexp(p2 * parameters[3]),
+            v280 = softehl_vexp(-(v30 * (0.5 * v30))), v281 = softehl_vexp(-(v274 * v274)),
+            v282 = parameters[7] * v265, v283 = v249 * t13 + parameters[7] * v250,
+            v284 = v265 * t13 + parameters[7] * v266, v285 = v282 * v258,
+            v286 = 0.5 * (v282 + v258), v287 = 0.5 * (v284 + v283), v288 = v286 * v286,
+            v289 = v286 * v288, v290 = v30 * v277 + 0.3989422804014327 * v280,
+            v291 = v290 + parameters[8] * v124, v292 = 1.0 / v288, v293 = v285 * v292,
+            v294 = v292 * (v258 * v284 + v282 * v283 - v292 * (v286 * (2.0 * v285)) * v287),
+            v295 = (v277 + 0.3989422804014327 * v30 * (v281 - v280)) * v31,
+            v296 = 0.08333333333333333 * p3 * v289, v297 = parameters[2] * v279,
+            v298 = parameters[7] * v291, v299 = v290 * t13 + parameters[7] * v295,
+            v300 = v291 * t13 + parameters[7] * (v295 + (v124 * t14 + parameters[8] * v125)),
+            v301 = v293 * v293, v302 = v301 * v296,
+            v303 = v297 * v21 + v9 * (v279 * t8 + v297 * (p2 * t9 + parameters[3] * tp2)),
+            v304 = 1.0 / (v297 * v9),
+            v305 = v301 * (tp3 * (0.08333333333333333 * v289) + 0.25 * p3 * v288 * v287),
+            v306 = (1.0 - 0.9 * v275) * (v303 * (v304 * v302) - v305 - 2.0 * v293 * v296 * v294),
+            v307 = v273 * v298 * v294 + v293 * (0.5 * v298 * v189 + v273 * v300) + v304 * (v306 - 0.504 * v275 * v302 * v34);
+        softehl_store4(R + 13 * q + 0, (13 * points), v28, v24, v29, tp0);
+        softehl_store4(R + 13 * q + 4, (13 * points), v248, v307, v278, v235);
+        softehl_store4(R + 13 * q + 8, (13 * points), v299, v245, v246, tp4);
         softehl_store1(R + 13 * q + 12, (13 * points), tp6);
     }
 }
-
-void softehl_film_rough_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_rough_fields_rate_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + 2 * e, direction + (18 + (4 + modes)) * e, parameters, rule, basis, values + (13 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_rough_fields_rate_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), direction + (18 + (4 + modes)) * (n - SOFTEHL_LANES), parameters, rule, basis, values + (13 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double t[SOFTEHL_LANES * (18 + (4 + modes))];
-    softehl_pad(t, direction, (18 + (4 + modes)), n);
-    double R[SOFTEHL_LANES * (13 * points)];
-    softehl_film_rough_fields_rate(SOFTEHL_LANES, points, modes, X, d, a, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (13 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_rough_fields_rate, 4, (4 + modes), 2, (18 + (4 + modes)), (13 * points), 0)

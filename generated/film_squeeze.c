@@ -17,13 +17,7 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_film_squeeze_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_film_squeeze_residual)
 {
     (void)direction;
     (void)tangent;
@@ -31,64 +25,34 @@ void softehl_film_squeeze_residual(
         const double *restrict X = coordinates + 4 * e;
         const double *restrict d = dofs + (4 + modes) * e;
         const double *restrict a = data + (0 + 1 * points) * e;
-        double *restrict R = values + (4 + modes) * e;
-        (void)X; (void)d; (void)a;
+        double *restrict R = values + (4 + modes) * e; (void)X; (void)d; (void)a;
         for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        const double v1 = X[1] - parameters[0];
-        const double v2 = X[3] - parameters[0];
-        const double v3 = d[1] + v1;
-        const double v4 = d[3] + v2;
-        const double v5 = X[2] + d[2];
-        const double v6 = v5 - X[0];
-        const double v7 = v6 - d[0];
-        const double v8 = 0.5 * v7;
-        const double v9 = parameters[1] * v8;
+        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = d[1] + v1,
+            v4 = d[3] + v2, v5 = X[2] + d[2], v6 = v5 - X[0], v7 = v6 - d[0], v8 = 0.5 * v7,
+            v9 = parameters[1] * v8;
         for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict b = a + 0 + 1 * q;
-            (void)b;
+            const double *restrict w = rule + 2 * q; (void)w;
+            const double *restrict b = a + 0 + 1 * q; (void)b;
             const double *restrict B = basis + 4 * modes * q;
             double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
             for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[4 + i];
-                p1 += B[4 * i + 1] * d[4 + i];
-                p2 += B[4 * i + 2] * d[4 + i];
-                p3 += B[4 * i + 3] * d[4 + i];
+                p0 += B[4 * i] * d[4 + i]; p1 += B[4 * i + 1] * d[4 + i];
+                p2 += B[4 * i + 2] * d[4 + i]; p3 += B[4 * i + 3] * d[4 + i];
             }
             (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v10 = 0.5 * w[0];
-            const double v11 = 0.5 + v10;
-            const double v12 = v11 * v4;
-            const double v13 = 0.5 - v10;
-            const double v14 = v13 * v3;
-            const double v15 = v14 + v12;
-            const double v16 = 1.0 - p2;
-            const double v17 = v16 * v9;
-            const double v18 = v15 * v17;
-            const double v19 = b[0] + v18;
-            const double v20 = w[1] * v19;
-            const double v21 = -v20;
+            const double v10 = 0.5 * w[0], v11 = 0.5 + v10, v12 = v11 * v4, v13 = 0.5 - v10,
+                v14 = v13 * v3, v15 = v14 + v12, v16 = 1.0 - p2, v17 = v16 * v9, v18 = v15 * v17,
+                v19 = b[0] + v18, v20 = w[1] * v19, v21 = -v20;
             for (ptrdiff_t i = 0; i < modes; ++i) {
                 const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
-                (void)N, (void)D, (void)N1, (void)D1;
-                R[4 + i] += N * v21;
+                (void)N, (void)D, (void)N1, (void)D1; R[4 + i] += N * v21;
             }
         }
-        R[0] = 0.0;
-        R[1] = 0.0;
-        R[2] = 0.0;
-        R[3] = 0.0;
+        R[0] = 0.0; R[1] = 0.0; R[2] = 0.0; R[3] = 0.0;
     }
 }
 
-void softehl_film_squeeze_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_film_squeeze_tangent)
 {
     (void)direction;
     for (ptrdiff_t e = 0; e < n; ++e) {
@@ -96,151 +60,72 @@ void softehl_film_squeeze_tangent(
         const double *restrict d = dofs + (4 + modes) * e;
         const double *restrict a = data + (0 + 1 * points) * e;
         double *restrict R = values + (4 + modes) * e;
-        double *restrict K = tangent + (4 + modes) * (4 + modes) * e;
-        (void)X; (void)d; (void)a;
+        double *restrict K = tangent + (4 + modes) * (4 + modes) * e; (void)X; (void)d; (void)a;
         for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
         for (ptrdiff_t i = 0; i < (4 + modes) * (4 + modes); ++i) K[i] = 0.0;
-        const double v1 = X[1] - parameters[0];
-        const double v2 = X[3] - parameters[0];
-        const double v3 = d[1] + v1;
-        const double v4 = d[3] + v2;
-        const double v5 = X[2] + d[2];
-        const double v6 = v5 - X[0];
-        const double v7 = v6 - d[0];
-        const double v8 = 0.5 * v7;
-        const double v9 = parameters[1] * v8;
-        const double v10 = 0.5 * parameters[1];
+        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = d[1] + v1,
+            v4 = d[3] + v2, v5 = X[2] + d[2], v6 = v5 - X[0], v7 = v6 - d[0], v8 = 0.5 * v7,
+            v9 = parameters[1] * v8, v10 = 0.5 * parameters[1];
         for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict b = a + 0 + 1 * q;
-            (void)b;
+            const double *restrict w = rule + 2 * q; (void)w;
+            const double *restrict b = a + 0 + 1 * q; (void)b;
             const double *restrict B = basis + 4 * modes * q;
             double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
             for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[4 + i];
-                p1 += B[4 * i + 1] * d[4 + i];
-                p2 += B[4 * i + 2] * d[4 + i];
-                p3 += B[4 * i + 3] * d[4 + i];
+                p0 += B[4 * i] * d[4 + i]; p1 += B[4 * i + 1] * d[4 + i];
+                p2 += B[4 * i + 2] * d[4 + i]; p3 += B[4 * i + 3] * d[4 + i];
             }
             (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v11 = 0.5 * w[0];
-            const double v12 = 0.5 + v11;
-            const double v13 = v12 * v4;
-            const double v14 = 0.5 - v11;
-            const double v15 = v14 * v3;
-            const double v16 = v15 + v13;
-            const double v17 = v16 * v8;
-            const double v18 = 1.0 - p2;
-            const double v19 = parameters[1] * v18;
-            const double v20 = v19 * v17;
-            const double v21 = b[0] + v20;
-            const double v22 = w[1] * v21;
-            const double v23 = -v22;
-            const double v24 = v18 * v10;
-            const double v25 = w[1] * v24;
-            const double v26 = v16 * v25;
-            const double v27 = v14 * w[1];
-            const double v28 = v18 * v9;
-            const double v29 = v28 * v27;
-            const double v30 = -v29;
-            const double v31 = -v26;
-            const double v32 = v12 * w[1];
-            const double v33 = v28 * v32;
-            const double v34 = -v33;
-            const double v35 = parameters[1] * w[1];
-            const double v36 = v35 * v17;
+            const double v11 = 0.5 * w[0], v12 = 0.5 + v11, v13 = v12 * v4, v14 = 0.5 - v11,
+                v15 = v14 * v3, v16 = v15 + v13, v17 = v16 * v8, v18 = 1.0 - p2,
+                v19 = parameters[1] * v18, v20 = v19 * v17, v21 = b[0] + v20, v22 = w[1] * v21,
+                v23 = -v22, v24 = v18 * v10, v25 = w[1] * v24, v26 = v16 * v25, v27 = v14 * w[1],
+                v28 = v18 * v9, v29 = v28 * v27, v30 = -v29, v31 = -v26, v32 = v12 * w[1],
+                v33 = v28 * v32, v34 = -v33, v35 = parameters[1] * w[1], v36 = v35 * v17;
             for (ptrdiff_t i = 0; i < modes; ++i) {
                 const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
-                (void)N, (void)D, (void)N1, (void)D1;
-                R[4 + i] += N * v23;
-                K[(4 + i) * (4 + modes) + 0] += N * v26;
-                K[(4 + i) * (4 + modes) + 1] += N * v30;
-                K[(4 + i) * (4 + modes) + 2] += N * v31;
-                K[(4 + i) * (4 + modes) + 3] += N * v34;
-                const double r0 = 0.0;
-                const double r1 = 0.0;
-                const double r2 = N * v36;
-                const double r3 = 0.0;
+                (void)N, (void)D, (void)N1, (void)D1; R[4 + i] += N * v23;
+                K[(4 + i) * (4 + modes) + 0] += N * v26; K[(4 + i) * (4 + modes) + 1] += N * v30;
+                K[(4 + i) * (4 + modes) + 2] += N * v31; K[(4 + i) * (4 + modes) + 3] += N * v34;
+                const double r0 = 0.0, r1 = 0.0, r2 = N * v36, r3 = 0.0;
                 for (ptrdiff_t j = 0; j < modes; ++j)
                     K[(4 + i) * (4 + modes) + 4 + j] += r0 * B[4 * j] + r1 * B[4 * j + 1] + r2 * B[4 * j + 2] + r3 * B[4 * j + 3];
             }
         }
-        R[0] = 0.0;
-        R[1] = 0.0;
-        R[2] = 0.0;
-        R[3] = 0.0;
-        K[0 * (4 + modes) + 0] = 0.0;
-        K[0 * (4 + modes) + 1] = 0.0;
-        K[0 * (4 + modes) + 2] = 0.0;
-        K[0 * (4 + modes) + 3] = 0.0;
-        K[1 * (4 + modes) + 0] = 0.0;
-        K[1 * (4 + modes) + 1] = 0.0;
-        K[1 * (4 + modes) + 2] = 0.0;
-        K[1 * (4 + modes) + 3] = 0.0;
-        K[2 * (4 + modes) + 0] = 0.0;
-        K[2 * (4 + modes) + 1] = 0.0;
-        K[2 * (4 + modes) + 2] = 0.0;
-        K[2 * (4 + modes) + 3] = 0.0;
-        K[3 * (4 + modes) + 0] = 0.0;
-        K[3 * (4 + modes) + 1] = 0.0;
-        K[3 * (4 + modes) + 2] = 0.0;
-        K[3 * (4 + modes) + 3] = 0.0;
+        R[0] = 0.0; R[1] = 0.0; R[2] = 0.0; R[3] = 0.0; K[0 * (4 + modes) + 0] = 0.0;
+        K[0 * (4 + modes) + 1] = 0.0; K[0 * (4 + modes) + 2] = 0.0; K[0 * (4 + modes) + 3] = 0.0;
+        K[1 * (4 + modes) + 0] = 0.0; K[1 * (4 + modes) + 1] = 0.0; K[1 * (4 + modes) + 2] = 0.0;
+        K[1 * (4 + modes) + 3] = 0.0; K[2 * (4 + modes) + 0] = 0.0; K[2 * (4 + modes) + 1] = 0.0;
+        K[2 * (4 + modes) + 2] = 0.0; K[2 * (4 + modes) + 3] = 0.0; K[3 * (4 + modes) + 0] = 0.0;
+        K[3 * (4 + modes) + 1] = 0.0; K[3 * (4 + modes) + 2] = 0.0; K[3 * (4 + modes) + 3] = 0.0;
     }
 }
 
-void softehl_film_squeeze_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_film_squeeze_fields)
 {
     (void)direction;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict X = coordinates + 4 * e;
         const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict a = data + (0 + 1 * points) * e;
-        (void)X; (void)d; (void)a;
-        const double v1 = X[1] - parameters[0];
-        const double v2 = X[3] - parameters[0];
-        const double v3 = d[1] + v1;
-        const double v4 = d[3] + v2;
-        const double v5 = X[2] + d[2];
-        const double v6 = v5 - X[0];
-        const double v7 = v6 - d[0];
-        const double v8 = 0.5 * v7;
+        const double *restrict a = data + (0 + 1 * points) * e; (void)X; (void)d; (void)a;
+        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = d[1] + v1,
+            v4 = d[3] + v2, v5 = X[2] + d[2], v6 = v5 - X[0], v7 = v6 - d[0], v8 = 0.5 * v7;
         for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict b = a + 0 + 1 * q;
-            (void)b;
+            const double *restrict w = rule + 2 * q; (void)w;
+            const double *restrict b = a + 0 + 1 * q; (void)b;
             const double *restrict B = basis + 4 * modes * q;
             double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
             for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[4 + i];
-                p1 += B[4 * i + 1] * d[4 + i];
-                p2 += B[4 * i + 2] * d[4 + i];
-                p3 += B[4 * i + 3] * d[4 + i];
+                p0 += B[4 * i] * d[4 + i]; p1 += B[4 * i + 1] * d[4 + i];
+                p2 += B[4 * i + 2] * d[4 + i]; p3 += B[4 * i + 3] * d[4 + i];
             }
             (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v9 = 0.5 * w[0];
-            const double v10 = 0.5 + v9;
-            const double v11 = v10 * v4;
-            const double v12 = 0.5 - v9;
-            const double v13 = v12 * v3;
-            const double v14 = v13 + v11;
-            const double v15 = 1.0 - p2;
-            const double v16 = v15 * v8;
-            const double v17 = v14 * v16;
-            const double v18 = w[1] * v8;
-            double *restrict out = values + 4 * (points * e + q);
-            out[0] = v17;
-            out[1] = v18;
-            out[2] = p2;
-            out[3] = v14;
+            const double v9 = 0.5 * w[0], v10 = 0.5 + v9, v11 = v10 * v4, v12 = 0.5 - v9,
+                v13 = v12 * v3, v14 = v13 + v11, v15 = 1.0 - p2, v16 = v15 * v8, v17 = v14 * v16,
+                v18 = w[1] * v8;
+            double *restrict out = values + 4 * (points * e + q); out[0] = v17; out[1] = v18;
+            out[2] = p2; out[3] = v14;
         }
     }
 }

@@ -20,13 +20,7 @@
 
 SOFTEHL_LANEWISE(erfc)
 
-void softehl_film_squeeze_rough_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_film_squeeze_rough_residual)
 {
     (void)direction;
     (void)tangent;
@@ -34,84 +28,43 @@ void softehl_film_squeeze_rough_residual(
         const double *restrict X = coordinates + 4 * e;
         const double *restrict d = dofs + (4 + modes) * e;
         const double *restrict a = data + (0 + 1 * points) * e;
-        double *restrict R = values + (4 + modes) * e;
-        (void)X; (void)d; (void)a;
+        double *restrict R = values + (4 + modes) * e; (void)X; (void)d; (void)a;
         for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        const double v1 = X[1] - parameters[0];
-        const double v2 = X[3] - parameters[0];
-        const double v3 = 1.0 / parameters[2];
-        const double v4 = d[1] + v1;
-        const double v5 = d[3] + v2;
-        const double v6 = X[2] + d[2];
-        const double v7 = v6 - X[0];
-        const double v8 = v7 - d[0];
-        const double v9 = 0.5 * v8;
-        const double v10 = parameters[1] * v9;
-        const double v11 = parameters[2] * v10;
+        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = 1.0 / parameters[2],
+            v4 = d[1] + v1, v5 = d[3] + v2, v6 = X[2] + d[2], v7 = v6 - X[0], v8 = v7 - d[0],
+            v9 = 0.5 * v8, v10 = parameters[1] * v9, v11 = parameters[2] * v10;
         for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict b = a + 0 + 1 * q;
-            (void)b;
+            const double *restrict w = rule + 2 * q; (void)w;
+            const double *restrict b = a + 0 + 1 * q; (void)b;
             const double *restrict B = basis + 4 * modes * q;
             double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
             for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[4 + i];
-                p1 += B[4 * i + 1] * d[4 + i];
-                p2 += B[4 * i + 2] * d[4 + i];
-                p3 += B[4 * i + 3] * d[4 + i];
+                p0 += B[4 * i] * d[4 + i]; p1 += B[4 * i + 1] * d[4 + i];
+                p2 += B[4 * i + 2] * d[4 + i]; p3 += B[4 * i + 3] * d[4 + i];
             }
             (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v12 = 0.5 * w[0];
-            const double v13 = 0.5 + v12;
-            const double v14 = v13 * v5;
-            const double v15 = 0.5 - v12;
-            const double v16 = v15 * v4;
-            const double v17 = v16 + v14;
-            const double v18 = v3 * v17;
-            const double v19 = 0.5 * v18;
-            const double v20 = v18 * v19;
-            const double v21 = -v20;
-            const double v22 = exp(v21);
-            const double v23 = 0.3989422804014327 * v22;
-            const double v24 = 0.7071067811865476 * v18;
-            const double v25 = erfc(v24);
-            const double v26 = 0.5 * v25;
-            const double v27 = 1.0 - v26;
-            const double v28 = v18 * v27;
-            const double v29 = v28 + v23;
-            const double v30 = 1.0 - p2;
-            const double v31 = v30 * v11;
-            const double v32 = v31 * v29;
-            const double v33 = b[0] + v32;
-            const double v34 = w[1] * v33;
-            const double v35 = -v34;
+            const double v12 = 0.5 * w[0], v13 = 0.5 + v12, v14 = v13 * v5, v15 = 0.5 - v12,
+                v16 = v15 * v4, v17 = v16 + v14, v18 = v3 * v17, v19 = 0.5 * v18, v20 = v18 * v19,
+                v21 = -v20, v22 = exp(v21), v23 = 0.3989422804014327 * v22,
+                v24 = 0.7071067811865476 * v18, v25 = erfc(v24), v26 = 0.5 * v25, v27 = 1.0 - v26,
+                v28 = v18 * v27, v29 = v28 + v23, v30 = 1.0 - p2, v31 = v30 * v11, v32 = v31 * v29,
+                v33 = b[0] + v32, v34 = w[1] * v33, v35 = -v34;
             for (ptrdiff_t i = 0; i < modes; ++i) {
                 const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
-                (void)N, (void)D, (void)N1, (void)D1;
-                R[4 + i] += N * v35;
+                (void)N, (void)D, (void)N1, (void)D1; R[4 + i] += N * v35;
             }
         }
-        R[0] = 0.0;
-        R[1] = 0.0;
-        R[2] = 0.0;
-        R[3] = 0.0;
+        R[0] = 0.0; R[1] = 0.0; R[2] = 0.0; R[3] = 0.0;
     }
 }
 
-static void softehl_film_squeeze_rough_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_squeeze_rough_tangent)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -134,95 +87,38 @@ static void softehl_film_squeeze_rough_tangent_group(
 #endif
     for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
         K_lanes[i] = softehl_splat(0.0);
-    const V v1 = X2 + d2;
-    const double v2 = 1.0 / parameters[2];
-    const V v3 = X1 - parameters[0];
-    const V v4 = X3 - parameters[0];
-    const V v5 = d1 + v3;
-    const V v6 = d3 + v4;
-    const double v7 = 0.5 * parameters[1];
-    const V v8 = v1 - X0;
-    const V v9 = v8 - d0;
-    const V v10 = 0.5 * v9;
-    const V v11 = parameters[1] * v10;
-    const V v12 = parameters[2] * v11;
+    const double v1 = 1.0 / parameters[2];
+    const V v2 = d1 + (X1 - parameters[0]), v3 = d3 + (X3 - parameters[0]);
+    const double v4 = 0.5 * parameters[1];
+    const V v5 = 0.5 * (X2 + d2 - X0 - d0), v6 = parameters[2] * (parameters[1] * v5);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const double *restrict b = a + 0 + 1 * q;
-        V b0;
-        softehl_load1(b + 0, (0 + 1 * points), &b0);
-        (void)b0;
+        const double *restrict w = rule + 2 * q; (void)w; const double *restrict b = a + 0 + 1 * q;
+        V b0; softehl_load1(b + 0, (0 + 1 * points), &b0);
         const double *restrict B = basis + 4 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[4 * i] * d_lanes[4 + i];
-            p1 += B[4 * i + 1] * d_lanes[4 + i];
-            p2 += B[4 * i + 2] * d_lanes[4 + i];
-            p3 += B[4 * i + 3] * d_lanes[4 + i];
+            p0 += B[4 * i] * d_lanes[4 + i]; p1 += B[4 * i + 1] * d_lanes[4 + i];
+            p2 += B[4 * i + 2] * d_lanes[4 + i]; p3 += B[4 * i + 3] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1, (void)p2, (void)p3;
-        const double v13 = 0.5 * w[0];
-        const V v14 = 1.0 - p2;
-        const double v15 = 0.5 - v13;
-        const double v16 = 0.5 + v13;
-        const V v17 = v14 * v12;
-        const V v18 = v14 * v7;
-        const V v19 = parameters[1] * v14;
-        const double v20 = parameters[1] * w[1];
-        const V v21 = v15 * v5;
-        const double v22 = v15 * v2;
-        const double v23 = v16 * v2;
-        const V v24 = v16 * v6;
-        const V v25 = v21 + v24;
-        const V v26 = v2 * v25;
-        const V v27 = w[1] * v18;
-        const double v28 = w[1] * v22;
-        const double v29 = w[1] * v23;
-        const V v30 = 0.5 * v26;
-        const V v31 = v26 * v30;
-        const V v32 = -v31;
-        const V v33 = 0.7071067811865476 * v26;
-        const V v34 = 0.3989422804014327 * v26;
-        const V v35 = softehl_vexp(v32);
-        const V v36 = softehl_verfc(v33);
-        const V v37 = 0.5 * v36;
-        const V v38 = 1.0 - v37;
-        const V v39 = v33 * v33;
-        const V v40 = -v39;
-        const V v41 = softehl_vexp(v40);
-        const V v42 = v26 * v38;
-        const V v43 = 0.3989422804014327 * v35;
-        const V v44 = v42 + v43;
-        const V v45 = parameters[2] * v44;
-        const V v46 = v27 * v45;
-        const V v47 = -v46;
-        const V v48 = v10 * v45;
-        const V v49 = v19 * v48;
-        const V v50 = b0 + v49;
-        const V v51 = w[1] * v50;
-        const V v52 = v20 * v48;
-        const V v53 = -v51;
-        const V v54 = v41 - v35;
-        const V v55 = v34 * v54;
-        const V v56 = v38 + v55;
-        const V v57 = v17 * v56;
-        const V v58 = v28 * v57;
-        const V v59 = v29 * v57;
-        const V v60 = -v58;
-        const V v61 = -v59;
+        (void)p0, (void)p1, (void)p2, (void)p3; const double v7 = 0.5 * w[0]; const V v8 = 1.0 - p2;
+        const double v9 = 0.5 - v7, v10 = 0.5 + v7;
+        const V v11 = v1 * (v9 * v2 + v10 * v3), v12 = 0.7071067811865476 * v11,
+            v13 = softehl_vexp(-(v11 * (0.5 * v11))), v14 = softehl_verfc(v12),
+            v15 = 1.0 - 0.5 * v14, v16 = softehl_vexp(-(v12 * v12)),
+            v17 = parameters[2] * (v11 * v15 + 0.3989422804014327 * v13),
+            v18 = w[1] * (v8 * v4) * v17, v19 = -v18, v20 = v5 * v17,
+            v21 = parameters[1] * w[1] * v20, v22 = -(w[1] * (b0 + parameters[1] * v8 * v20)),
+            v23 = v8 * v6 * (v15 + 0.3989422804014327 * v11 * (v16 - v13)),
+            v24 = -(w[1] * (v9 * v1) * v23), v25 = -(w[1] * (v10 * v1) * v23);
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
-            (void)N, (void)D, (void)N1, (void)D1;
-            R_lanes[4 + i] += N * v53;
-            K_lanes[(4 + i) * (4 + modes) + 0] += N * v46;
-            K_lanes[(4 + i) * (4 + modes) + 1] += N * v60;
-            K_lanes[(4 + i) * (4 + modes) + 2] += N * v47;
-            K_lanes[(4 + i) * (4 + modes) + 3] += N * v61;
-            const V r0 = softehl_splat(0.0);
-            const V r1 = softehl_splat(0.0);
-            const V r2 = N * v52;
-            const V r3 = softehl_splat(0.0);
+            (void)N, (void)D, (void)N1, (void)D1; R_lanes[4 + i] += N * v22;
+            K_lanes[(4 + i) * (4 + modes) + 0] += N * v18;
+            K_lanes[(4 + i) * (4 + modes) + 1] += N * v24;
+            K_lanes[(4 + i) * (4 + modes) + 2] += N * v19;
+            K_lanes[(4 + i) * (4 + modes) + 3] += N * v25;
+            const V r0 = softehl_splat(0.0), r1 = softehl_splat(0.0), r2 = N * v21,
+                r3 = softehl_splat(0.0);
             for (ptrdiff_t j = 0; j < modes; ++j)
                 K_lanes[(4 + i) * (4 + modes) + 4 + j] += r0 * B[4 * j] + r1 * B[4 * j + 1] + r2 * B[4 * j + 2] + r3 * B[4 * j + 3];
         }
@@ -232,104 +128,37 @@ static void softehl_film_squeeze_rough_tangent_group(
     softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_squeeze_rough_tangent, 4, (4 + modes), (0 + 1 * points), 0, (4 + modes), ((4 + modes) * (4 + modes)))
 
-void softehl_film_squeeze_rough_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_squeeze_rough_tangent_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, data + (0 + 1 * points) * e, 0, parameters, rule, basis, values + (4 + modes) * e, tangent + ((4 + modes) * (4 + modes)) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_squeeze_rough_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), data + (0 + 1 * points) * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), tangent + ((4 + modes) * (4 + modes)) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double a[SOFTEHL_LANES * (0 + 1 * points)];
-    softehl_pad(a, data, (0 + 1 * points), n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    double K[SOFTEHL_LANES * ((4 + modes) * (4 + modes))];
-    softehl_film_squeeze_rough_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-void softehl_film_squeeze_rough_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_film_squeeze_rough_fields)
 {
     (void)direction;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict X = coordinates + 4 * e;
         const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict a = data + (0 + 1 * points) * e;
-        (void)X; (void)d; (void)a;
-        const double v1 = X[1] - parameters[0];
-        const double v2 = X[3] - parameters[0];
-        const double v3 = 1.0 / parameters[2];
-        const double v4 = d[1] + v1;
-        const double v5 = d[3] + v2;
-        const double v6 = X[2] + d[2];
-        const double v7 = v6 - X[0];
-        const double v8 = v7 - d[0];
-        const double v9 = 0.5 * v8;
+        const double *restrict a = data + (0 + 1 * points) * e; (void)X; (void)d; (void)a;
+        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = 1.0 / parameters[2],
+            v4 = d[1] + v1, v5 = d[3] + v2, v6 = X[2] + d[2], v7 = v6 - X[0], v8 = v7 - d[0],
+            v9 = 0.5 * v8;
         for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict b = a + 0 + 1 * q;
-            (void)b;
+            const double *restrict w = rule + 2 * q; (void)w;
+            const double *restrict b = a + 0 + 1 * q; (void)b;
             const double *restrict B = basis + 4 * modes * q;
             double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
             for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[4 + i];
-                p1 += B[4 * i + 1] * d[4 + i];
-                p2 += B[4 * i + 2] * d[4 + i];
-                p3 += B[4 * i + 3] * d[4 + i];
+                p0 += B[4 * i] * d[4 + i]; p1 += B[4 * i + 1] * d[4 + i];
+                p2 += B[4 * i + 2] * d[4 + i]; p3 += B[4 * i + 3] * d[4 + i];
             }
             (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v10 = 0.5 * w[0];
-            const double v11 = 0.5 + v10;
-            const double v12 = v11 * v5;
-            const double v13 = 0.5 - v10;
-            const double v14 = v13 * v4;
-            const double v15 = v14 + v12;
-            const double v16 = v3 * v15;
-            const double v17 = 0.5 * v16;
-            const double v18 = v16 * v17;
-            const double v19 = -v18;
-            const double v20 = exp(v19);
-            const double v21 = 0.3989422804014327 * v20;
-            const double v22 = 0.7071067811865476 * v16;
-            const double v23 = erfc(v22);
-            const double v24 = 0.5 * v23;
-            const double v25 = 1.0 - v24;
-            const double v26 = v16 * v25;
-            const double v27 = v26 + v21;
-            const double v28 = parameters[2] * v27;
-            const double v29 = 1.0 - p2;
-            const double v30 = v29 * v9;
-            const double v31 = v28 * v30;
-            const double v32 = w[1] * v9;
-            double *restrict out = values + 4 * (points * e + q);
-            out[0] = v31;
-            out[1] = v32;
-            out[2] = p2;
-            out[3] = v28;
+            const double v10 = 0.5 * w[0], v11 = 0.5 + v10, v12 = v11 * v5, v13 = 0.5 - v10,
+                v14 = v13 * v4, v15 = v14 + v12, v16 = v3 * v15, v17 = 0.5 * v16, v18 = v16 * v17,
+                v19 = -v18, v20 = exp(v19), v21 = 0.3989422804014327 * v20,
+                v22 = 0.7071067811865476 * v16, v23 = erfc(v22), v24 = 0.5 * v23, v25 = 1.0 - v24,
+                v26 = v16 * v25, v27 = v26 + v21, v28 = parameters[2] * v27, v29 = 1.0 - p2,
+                v30 = v29 * v9, v31 = v28 * v30, v32 = w[1] * v9;
+            double *restrict out = values + 4 * (points * e + q); out[0] = v31; out[1] = v32;
+            out[2] = p2; out[3] = v28;
         }
     }
 }

@@ -16,13 +16,7 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_film_upwind_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_film_upwind_residual)
 {
     (void)data;
     (void)direction;
@@ -30,98 +24,49 @@ void softehl_film_upwind_residual(
     for (ptrdiff_t e = 0; e < n; ++e) {
         const double *restrict X = coordinates + 4 * e;
         const double *restrict d = dofs + (4 + modes) * e;
-        double *restrict R = values + (4 + modes) * e;
-        (void)X; (void)d;
+        double *restrict R = values + (4 + modes) * e; (void)X; (void)d;
         for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        const double v1 = X[1] - parameters[0];
-        const double v2 = X[3] - parameters[0];
-        const double v3 = 6.0 * parameters[1];
-        const double v4 = parameters[2] * v3;
-        const double v5 = d[1] + v1;
-        const double v6 = d[3] + v2;
-        const double v7 = v6 - v5;
-        const double v8 = 5.0 * v7;
-        const double v9 = parameters[4] * parameters[5];
-        const double v10 = X[2] + d[2];
-        const double v11 = v10 - X[0];
-        const double v12 = v11 - d[0];
-        const double v13 = 0.5 * v12;
-        const double v14 = v4 * v13;
-        const double v15 = v13 * v14;
-        const double v16 = v9 * v13;
-        const double v17 = v5 + v6;
-        const double v18 = 0.5 * v17;
-        const double v19 = 0.5 * v7;
-        const double v20 = 1.0 / v18;
-        const double v21 = v8 * v20;
-        const double v22 = parameters[1] * v21;
-        const int v23 = v22 <= 0.0;
-        const double v24 = parameters[0] + v18;
-        double v25;
+        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = 6.0 * parameters[1],
+            v4 = parameters[2] * v3, v5 = d[1] + v1, v6 = d[3] + v2, v7 = v6 - v5, v8 = 5.0 * v7,
+            v9 = parameters[4] * parameters[5], v10 = X[2] + d[2], v11 = v10 - X[0],
+            v12 = v11 - d[0], v13 = 0.5 * v12, v14 = v4 * v13, v15 = v13 * v14, v16 = v9 * v13,
+            v17 = v5 + v6, v18 = 0.5 * v17, v19 = 0.5 * v7, v20 = 1.0 / v18, v21 = v8 * v20,
+            v22 = parameters[1] * v21;
+        const int v23 = v22 <= 0.0; const double v24 = parameters[0] + v18; double v25;
         if (v23) {
             v25 = 1.0;
         } else {
-            const double v26 = v21 * v21;
-            const double v27 = 1.0 + v26;
-            const double v28 = 1.0 / v27;
+            const double v26 = v21 * v21, v27 = 1.0 + v26, v28 = 1.0 / v27;
             v25 = v28;
         }
-        const double v29 = 3.141592653589793 * parameters[3];
-        const double v30 = 3.141592653589793 * v16;
-        const double v31 = v18 * v29;
-        const double v32 = v18 * v31;
-        const double v33 = v18 * v32;
-        const double v34 = 1.0 / v33;
-        const double v35 = v15 * v34;
-        const double v36 = v35 * v35;
-        const double v37 = 9.0 + v36;
-        const double v38 = 1.0 / v37;
-        const double v39 = v25 * v30;
-        const double v40 = v36 * v39;
-        const double v41 = v38 * v40;
-        double s42 = 0.0;
+        const double v29 = 3.141592653589793 * parameters[3], v30 = 3.141592653589793 * v16,
+            v31 = v18 * v29, v32 = v18 * v31, v33 = v18 * v32, v34 = 1.0 / v33, v35 = v15 * v34,
+            v36 = v35 * v35, v37 = 9.0 + v36, v38 = 1.0 / v37, v39 = v25 * v30, v40 = v36 * v39,
+            v41 = v38 * v40;
+        double s42 = {0};
         for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q;
-            (void)w;
-            const double *restrict B = basis + 2 * modes * q;
-            double p0 = 0.0, p1 = 0.0;
+            const double *restrict w = rule + 2 * q; (void)w;
+            const double *restrict B = basis + 2 * modes * q; double p0 = 0.0, p1 = 0.0;
             for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[2 * i] * d[4 + i];
-                p1 += B[2 * i + 1] * d[4 + i];
+                p0 += B[2 * i] * d[4 + i]; p1 += B[2 * i + 1] * d[4 + i];
             }
             (void)p0, (void)p1;
-            const double v43 = w[0] * v24;
-            const double v44 = 0.5 * w[0];
-            const double v45 = w[0] * v44;
-            const double v46 = (-0.16666666666666666) + v45;
-            const double v47 = v46 * v19;
-            const double v48 = v47 + v43;
-            const double v49 = p1 * v41;
-            const double v50 = w[1] * v49;
-            const double v51 = v48 * v50;
+            const double v43 = w[0] * v24, v44 = 0.5 * w[0], v45 = w[0] * v44,
+                v46 = (-0.16666666666666666) + v45, v47 = v46 * v19, v48 = v47 + v43,
+                v49 = p1 * v41, v50 = w[1] * v49, v51 = v48 * v50;
             s42 += v51;
         }
-        const double v52 = -s42;
-        R[0] = 0.0;
-        R[1] = v52;
-        R[2] = 0.0;
-        R[3] = s42;
+        const double v52 = -s42; R[0] = 0.0; R[1] = v52; R[2] = 0.0; R[3] = s42;
     }
 }
 
-static void softehl_film_upwind_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_upwind_tangent)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -145,203 +90,62 @@ static void softehl_film_upwind_tangent_group(
     for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
         K_lanes[i] = softehl_splat(0.0);
     const double v1 = parameters[4] * parameters[5];
-    const V v2 = X2 + d2;
-    const double v3 = 3.141592653589793 * parameters[3];
-    const V v4 = X1 - parameters[0];
-    const V v5 = X3 - parameters[0];
-    const V v6 = d1 + v4;
-    const V v7 = d3 + v5;
-    const double v8 = 6.0 * parameters[1];
-    const double v9 = parameters[2] * v8;
-    const V v10 = v2 - X0;
-    const V v11 = v10 - d0;
-    const V v12 = 0.5 * v11;
-    const V v13 = v6 + v7;
-    const V v14 = v7 - v6;
-    const V v15 = v1 * v12;
-    const V v16 = 0.5 * v13;
-    const V v17 = 5.0 * v14;
-    const V v18 = 0.5 * v14;
-    const V v19 = v9 * v12;
-    const V v20 = v12 * v12;
-    const V v21 = v9 * v20;
-    const V v22 = v16 * v3;
-    const V v23 = parameters[0] + v16;
-    const V v24 = 1.0 / v16;
-    const V v25 = v16 * v16;
-    const V v26 = v17 * v24;
-    const V v27 = parameters[1] * v26;
-    const V v28 = v22 * v25;
-    const M v29 = softehl_le(v27, softehl_splat(0.0));
-    const V v30 = 1.0 / v28;
-    const V v31 = v21 * v30;
-    const V v32 = v31 * v31;
-    V v33 = softehl_splat(1.0);
-    V v34 = softehl_splat(0.0);
-    V v35 = softehl_splat(0.0);
-    const M m36 = ~v29;
-    if (softehl_any(m36)) {
-        const V v37 = 2.5 * v14;
-        const V v38 = 2.0 * v26;
-        const V v39 = v26 * v26;
-        const V v40 = 1.0 + v39;
-        const V v41 = 1.0 / v40;
-        const V v42 = 5.0 * v24;
-        const V v43 = v24 * v37;
-        const V v44 = v24 * v43;
-        const V v45 = v41 * v41;
-        const V v46 = v38 * v45;
-        const V v47 = v46 * v32;
-        const V v48 = v42 + v44;
-        const V v49 = v42 - v44;
-        const V v50 = v48 * v47;
-        const V v51 = v49 * v47;
-        const V v52 = -v51;
-        v33 = softehl_blend(m36, v41, v33);
-        v34 = softehl_blend(m36, v50, v34);
-        v35 = softehl_blend(m36, v52, v35);
+    const V v2 = d1 + (X1 - parameters[0]), v3 = d3 + (X3 - parameters[0]);
+    const double v4 = parameters[2] * (6.0 * parameters[1]);
+    const V v5 = 0.5 * (X2 + d2 - X0 - d0), v6 = v3 - v2, v7 = 0.5 * (v2 + v3), v8 = 0.5 * v6,
+        v9 = v4 * (v5 * v5), v10 = parameters[0] + v7, v11 = 1.0 / v7, v12 = v7 * v7,
+        v13 = 5.0 * v6 * v11;
+    const M v14 = softehl_le(parameters[1] * v13, softehl_splat(0.0));
+    const V v15 = 1.0 / (v7 * (3.141592653589793 * parameters[3]) * v12), v16 = v9 * v15,
+        v17 = v16 * v16;
+    V v18 = softehl_splat(1.0), v19 = softehl_splat(0.0), v20 = softehl_splat(0.0);
+    const M m21 = ~v14;
+    if (softehl_any(m21)) {
+        const V v22 = 1.0 / (1.0 + v13 * v13), v23 = 5.0 * v11, v24 = v11 * (v11 * (2.5 * v6)),
+            v25 = 2.0 * v13 * (v22 * v22) * v17, v26 = (v23 + v24) * v25,
+            v27 = -((v23 - v24) * v25);
+        v18 = softehl_blend(m21, v22, v18); v19 = softehl_blend(m21, v26, v19);
+        v20 = softehl_blend(m21, v27, v20);
     }
-    const V v53 = 3.141592653589793 * v15;
-    const double v54 = 3.141592653589793 * v1;
-    const double v55 = 4.71238898038469 * parameters[3];
-    const V v56 = 2.0 * v31;
-    const V v57 = v25 * v55;
-    const V v58 = v19 * v30;
-    const V v59 = v56 * v58;
-    const V v60 = 9.0 + v32;
-    const V v61 = v33 * v32;
-    const V v62 = v21 * v57;
-    const V v63 = 1.0 / v60;
-    const V v64 = v54 * v61;
-    const V v65 = v30 * v62;
-    const V v66 = v30 * v65;
-    const V v67 = v56 * v66;
-    const V v68 = v59 * v61;
-    const V v69 = v63 * v64;
-    const V v70 = v12 * v69;
-    const V v71 = 0.5 * v69;
-    const V v72 = 0.5 * v70;
-    const V v73 = v33 * v63;
-    const V v74 = v59 * v73;
-    const V v75 = v33 * v67;
-    const V v76 = v34 - v75;
-    const V v77 = v35 - v75;
-    const V v78 = v63 * v76;
-    const V v79 = v63 * v77;
-    const V v80 = v63 * v63;
-    const V v81 = v80 * v68;
-    const V v82 = v61 * v80;
-    const V v83 = v67 * v82;
-    const V v84 = v83 + v78;
-    const V v85 = v83 + v79;
-    const V v86 = v53 * v84;
-    const V v87 = v53 * v85;
-    const V v88 = v74 - v81;
-    const V v89 = v53 * v88;
-    const V v90 = v71 + v89;
-    const V v91 = v81 - v74;
-    const V v92 = v53 * v91;
-    const V v93 = v92 - v71;
-    V s94 = softehl_splat(0.0);
-    V s95 = softehl_splat(0.0);
-    V s96 = softehl_splat(0.0);
-    V s97 = softehl_splat(0.0);
-    V s98 = softehl_splat(0.0);
+    const V v28 = 3.141592653589793 * (v1 * v5), v29 = 2.0 * v16, v30 = v29 * (v4 * v5 * v15),
+        v31 = v18 * v17, v32 = 1.0 / (9.0 + v17),
+        v33 = v29 * (v15 * (v15 * (v9 * (v12 * (4.71238898038469 * parameters[3]))))),
+        v34 = v32 * (3.141592653589793 * v1 * v31), v35 = v5 * v34, v36 = 0.5 * v34,
+        v37 = 0.5 * v35, v38 = v30 * (v18 * v32), v39 = v18 * v33, v40 = v32 * v32,
+        v41 = v40 * (v30 * v31), v42 = v33 * (v31 * v40), v43 = v28 * (v42 + v32 * (v19 - v39)),
+        v44 = v28 * (v42 + v32 * (v20 - v39)), v45 = v36 + v28 * (v38 - v41),
+        v46 = v28 * (v41 - v38) - v36;
+    V s47 = {0}, s48 = {0}, s49 = {0}, s50 = {0}, s51 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        const double v99 = 0.5 * w[0];
-        const V v100 = w[0] * v23;
-        const double v101 = w[0] * v99;
-        const double v102 = (-0.16666666666666666) + v101;
-        const V v103 = p1 * v72;
-        const V v104 = p1 * w[1];
-        const V v105 = w[1] * v93;
-        const V v106 = w[0] * v103;
-        const V v107 = w[1] * v90;
-        const V v108 = v102 * v103;
-        const V v109 = v102 * v18;
-        const V v110 = v109 + v100;
-        const V v111 = p1 * v110;
-        const V v112 = v110 * v70;
-        const V v113 = v104 * v112;
-        s94 += v113;
-        const V v114 = w[1] * v112;
-        const V v115 = -v114;
-        const V v116 = v111 * v105;
-        s95 += v116;
-        const V v117 = v106 - v108;
-        const V v118 = v106 + v108;
-        const V v119 = v111 * v107;
-        s96 += v119;
-        const V v120 = v111 * v86;
-        const V v121 = v120 + v117;
-        const V v122 = v111 * v87;
-        const V v123 = v122 + v118;
-        const V v124 = w[1] * v121;
-        s97 += v124;
-        const V v125 = w[1] * v123;
-        s98 += v125;
+        (void)p0, (void)p1; const double v52 = (-0.16666666666666666) + w[0] * (0.5 * w[0]);
+        const V v53 = p1 * v37, v54 = w[0] * v53, v55 = v52 * v53, v56 = v52 * v8 + w[0] * v10,
+            v57 = p1 * v56, v58 = v56 * v35;
+        s47 += p1 * w[1] * v58;
+        const V v59 = w[1] * v58, v60 = -v59;
+        s48 += v57 * (w[1] * v46); s49 += v57 * (w[1] * v45);
+        const V v61 = w[1] * (v57 * v43 + (v54 - v55)); s50 += v61;
+        s51 += w[1] * (v57 * v44 + (v54 + v55));
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            const double N = B[2 * i], D = B[2 * i + 1];
-            (void)N, (void)D;
-            K_lanes[1 * (4 + modes) + 4 + i] += D * v115;
-            K_lanes[3 * (4 + modes) + 4 + i] += D * v114;
+            const double N = B[2 * i], D = B[2 * i + 1]; (void)N, (void)D;
+            K_lanes[1 * (4 + modes) + 4 + i] += D * v60;
+            K_lanes[3 * (4 + modes) + 4 + i] += D * v59;
         }
     }
-    const V v126 = -s94;
-    const V v127 = -s95;
-    const V v128 = -s96;
-    const V v129 = -s97;
-    const V v130 = -s98;
-    R_lanes[1] = v126;
-    R_lanes[3] = s94;
-    K_lanes[1 * (4 + modes) + 0] = v127;
-    K_lanes[1 * (4 + modes) + 1] = v129;
-    K_lanes[1 * (4 + modes) + 2] = v128;
-    K_lanes[1 * (4 + modes) + 3] = v130;
-    K_lanes[3 * (4 + modes) + 0] = s95;
-    K_lanes[3 * (4 + modes) + 1] = s97;
-    K_lanes[3 * (4 + modes) + 2] = s96;
-    K_lanes[3 * (4 + modes) + 3] = s98;
+    const V v62 = -s47, v63 = -s48, v64 = -s49, v65 = -s50, v66 = -s51;
+    R_lanes[1] = v62; R_lanes[3] = s47; K_lanes[1 * (4 + modes) + 0] = v63;
+    K_lanes[1 * (4 + modes) + 1] = v65; K_lanes[1 * (4 + modes) + 2] = v64;
+    K_lanes[1 * (4 + modes) + 3] = v66; K_lanes[3 * (4 + modes) + 0] = s48;
+    K_lanes[3 * (4 + modes) + 1] = s50; K_lanes[3 * (4 + modes) + 2] = s49;
+    K_lanes[3 * (4 + modes) + 3] = s51;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
     softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
 #endif
 }
-
-void softehl_film_upwind_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_upwind_tangent_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (4 + modes) * e, tangent + ((4 + modes) * (4 + modes)) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_upwind_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), tangent + ((4 + modes) * (4 + modes)) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    double K[SOFTEHL_LANES * ((4 + modes) * (4 + modes))];
-    softehl_film_upwind_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)) * n; ++i) tangent[i] = K[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_upwind_tangent, 4, (4 + modes), 0, 0, (4 + modes), ((4 + modes) * (4 + modes)))

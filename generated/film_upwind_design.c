@@ -16,28 +16,16 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_film_upwind_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_upwind_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 10, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 10, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9;
+    softehl_load4(t + 0, 10, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 10, &t4, &t5, &t6, &t7);
     softehl_load2(t + 8, 10, &t8, &t9);
-    (void)t8; (void)t9;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -53,168 +41,47 @@ static void softehl_film_upwind_pseudo_load_group(
 #endif
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
-    const V v1 = X2 + d2;
-    const double v2 = 3.141592653589793 * parameters[3];
-    const V v3 = X1 - parameters[0];
-    const V v4 = X3 - parameters[0];
-    const V v5 = d1 + v3;
-    const V v6 = d3 + v4;
-    const V v7 = t1 - t4;
-    const V v8 = t3 - t4;
-    const V v9 = v1 - X0;
-    const double v10 = 6.0 * parameters[1];
-    const V v11 = v9 - d0;
-    const double v12 = parameters[2] * v10;
-    const V v13 = 0.5 * v11;
-    const V v14 = v5 + v6;
-    const V v15 = v7 + v8;
-    const V v16 = v6 - v5;
-    const V v17 = 0.5 * v14;
-    const V v18 = 0.5 * v15;
-    const V v19 = v13 * v13;
-    const V v20 = 5.0 * v16;
-    const V v21 = 0.5 * v16;
-    const V v22 = v12 * v19;
-    const V v23 = parameters[0] + v17;
-    const V v24 = 1.0 / v17;
-    const V v25 = v20 * v24;
-    const V v26 = v17 * v17;
-    const V v27 = v17 * v26;
-    const V v28 = parameters[1] * v25;
-    const V v29 = v2 * v27;
-    const M v30 = softehl_le(v28, softehl_splat(0.0));
-    const V v31 = 1.0 / v29;
-    const V v32 = v22 * v31;
-    const V v33 = v32 * v32;
-    V v34 = softehl_splat(1.0);
-    V v35 = softehl_splat(0.0);
-    const M m36 = ~v30;
-    if (softehl_any(m36)) {
-        const V v37 = 2.0 * v25;
-        const V v38 = v25 * v25;
-        const V v39 = 1.0 + v38;
-        const V v40 = 1.0 / v39;
-        const V v41 = v37 * v33;
-        const V v42 = t4 - t1;
-        const V v43 = v8 + v42;
-        const V v44 = 5.0 * v43;
-        const V v45 = v25 * v18;
-        const V v46 = v44 - v45;
-        const V v47 = v24 * v46;
-        const V v48 = v40 * v41;
-        const V v49 = v40 * v48;
-        const V v50 = v49 * v47;
-        const V v51 = -v50;
-        v34 = softehl_blend(m36, v40, v34);
-        v35 = softehl_blend(m36, v51, v35);
+    const V v1 = d1 + (X1 - parameters[0]), v2 = d3 + (X3 - parameters[0]), v3 = t1 - t4,
+        v4 = t3 - t4;
+    const double v5 = 6.0 * parameters[1]; const V v6 = X2 + d2 - X0 - d0;
+    const double v7 = parameters[2] * v5;
+    const V v8 = 0.5 * v6, v9 = v2 - v1, v10 = 0.5 * (v1 + v2), v11 = 0.5 * (v3 + v4),
+        v12 = v8 * v8, v13 = 0.5 * v9, v14 = parameters[0] + v10, v15 = 1.0 / v10,
+        v16 = 5.0 * v9 * v15, v17 = v10 * v10, v18 = v10 * v17;
+    const M v19 = softehl_le(parameters[1] * v16, softehl_splat(0.0));
+    const V v20 = 1.0 / (3.141592653589793 * parameters[3] * v18), v21 = v7 * v12 * v20,
+        v22 = v21 * v21;
+    V v23 = softehl_splat(1.0), v24 = softehl_splat(0.0);
+    const M m25 = ~v19;
+    if (softehl_any(m25)) {
+        const V v26 = 1.0 / (1.0 + v16 * v16),
+            v27 = v26 * (v26 * (2.0 * v16 * v22)) * (v15 * (5.0 * (v4 + (t4 - t1)) - v16 * v11)),
+            v28 = -v27;
+        v23 = softehl_blend(m25, v26, v23); v24 = softehl_blend(m25, v28, v24);
     }
-    const double v52 = 6.0 * parameters[2];
-    const V v53 = v12 * v11;
-    const double v54 = 9.42477796076938 * parameters[3];
-    const V v55 = t5 * v52;
-    const V v56 = 3.141592653589793 * v27;
-    const V v57 = t2 - t0;
-    const V v58 = v26 * v54;
-    const V v59 = t7 * v56;
-    const V v60 = 0.5 * v57;
-    const V v61 = v8 - v7;
-    const V v62 = v10 * t6;
-    const V v63 = v62 + v55;
-    const V v64 = t4 + v18;
-    const V v65 = v18 * v58;
-    const V v66 = v59 + v65;
-    const V v67 = 0.5 * v61;
-    const V v68 = v19 * v63;
-    const V v69 = 9.0 + v33;
-    const V v70 = v34 * v33;
-    const V v71 = 1.0 / v69;
-    const V v72 = v60 * v53;
-    const V v73 = v72 + v68;
-    const double v74 = 3.141592653589793 * parameters[5];
-    const V v75 = 3.141592653589793 * v70;
-    const V v76 = 2.0 * v32;
-    const V v77 = v32 * v66;
-    const V v78 = v73 - v77;
-    const V v79 = v31 * v78;
-    const V v80 = v76 * v79;
-    const V v81 = v70 * v71;
-    const V v82 = v34 - v81;
-    const V v83 = v80 * v82;
-    const V v84 = v35 + v83;
-    const V v85 = v71 * v75;
-    const V v86 = v71 * v84;
-    const V v87 = v74 * v86;
-    const V v88 = parameters[5] * v85;
-    const V v89 = t9 * v85;
-    const V v90 = v89 + v87;
-    const V v91 = t8 * v88;
-    const V v92 = parameters[4] * v90;
-    const V v93 = v91 + v92;
-    const V v94 = parameters[4] * v88;
-    const V v95 = v60 * v94;
-    const V v96 = v13 * v93;
-    const V v97 = v95 + v96;
-    const V v98 = v13 * v94;
-    V s99 = softehl_splat(0.0);
+    const V v29 = 0.5 * (t2 - t0), v30 = t4 + v11,
+        v31 = t7 * (3.141592653589793 * v18) + v11 * (v17 * (9.42477796076938 * parameters[3])),
+        v32 = 0.5 * (v4 - v3), v33 = v23 * v22, v34 = 1.0 / (9.0 + v22),
+        v35 = v29 * (v7 * v6) + v12 * (v5 * t6 + t5 * (6.0 * parameters[2])) - v21 * v31,
+        v36 = v34 * (3.141592653589793 * v33),
+        v37 = 3.141592653589793 * parameters[5] * (v34 * (v24 + 2.0 * v21 * (v20 * v35) * (v23 - v33 * v34))),
+        v38 = parameters[5] * v36, v39 = parameters[4] * v38,
+        v40 = v29 * v39 + v8 * (t8 * v38 + parameters[4] * (t9 * v36 + v37)), v41 = v8 * v39;
+    V s42 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        const V v100 = p1 * w[1];
-        const double v101 = 0.5 * w[0];
-        const V v102 = w[0] * v23;
-        const double v103 = w[0] * v101;
-        const double v104 = (-0.16666666666666666) + v103;
-        const V v105 = w[0] * v64;
-        const V v106 = v104 * v21;
-        const V v107 = v106 + v102;
-        const V v108 = v104 * v67;
-        const V v109 = v108 + v105;
-        const V v110 = v109 * v98;
-        const V v111 = v107 * v97;
-        const V v112 = v110 + v111;
-        const V v113 = v100 * v112;
-        s99 += v113;
+        (void)p0, (void)p1; const double v43 = (-0.16666666666666666) + w[0] * (0.5 * w[0]);
+        const V v44 = p1 * w[1] * ((v43 * v32 + w[0] * v30) * v41 + (v43 * v13 + w[0] * v14) * v40);
+        s42 += v44;
     }
-    const V v114 = -s99;
-    R_lanes[1] = v114;
-    R_lanes[3] = s99;
+    const V v45 = -s42; R_lanes[1] = v45; R_lanes[3] = s42;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
 }
-
-void softehl_film_upwind_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_upwind_pseudo_load_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, direction + 10 * e, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_upwind_pseudo_load_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, direction + 10 * (n - SOFTEHL_LANES), parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double t[SOFTEHL_LANES * 10];
-    softehl_pad(t, direction, 10, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_upwind_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_upwind_pseudo_load, 4, (4 + modes), 0, 10, (4 + modes), 0)

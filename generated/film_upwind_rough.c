@@ -17,19 +17,13 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_film_upwind_rough_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_upwind_rough_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -45,133 +39,49 @@ static void softehl_film_upwind_rough_residual_group(
 #endif
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
-    const double v1 = 1.0 / parameters[0];
-    const double v2 = 6.0 * parameters[2];
-    const V v3 = X2 + d2;
-    const double v4 = parameters[5] * parameters[6];
-    const double v5 = parameters[3] * v2;
-    const V v6 = X1 - parameters[1];
-    const V v7 = X3 - parameters[1];
-    const V v8 = d1 + v6;
-    const V v9 = d3 + v7;
-    const V v10 = v3 - X0;
-    const V v11 = v10 - d0;
-    const V v12 = 0.5 * v11;
-    const V v13 = v9 - v8;
-    const V v14 = v8 + v9;
-    const V v15 = v5 * v12;
-    const V v16 = v4 * v12;
-    const V v17 = v12 * v15;
-    const V v18 = 0.5 * v14;
-    const V v19 = 5.0 * v13;
-    const V v20 = 0.5 * v13;
-    const V v21 = v1 * v18;
-    const V v22 = parameters[1] + v18;
-    const M v23 = softehl_le(softehl_splat(0.5), v21);
-    V v24 = v21;
-    const M m25 = ~v23;
-    if (softehl_any(m25)) {
-        const V v26 = 1.0 - v21;
-        const V v27 = 4.0 * v26;
-        const V v28 = 1.0 / v27;
-        v24 = softehl_blend(m25, v28, v24);
+    const V v1 = d1 + (X1 - parameters[1]), v2 = d3 + (X3 - parameters[1]),
+        v3 = 0.5 * (X2 + d2 - X0 - d0), v4 = v2 - v1, v5 = 0.5 * (v1 + v2), v6 = 0.5 * v4,
+        v7 = 1.0 / parameters[0] * v5, v8 = parameters[1] + v5;
+    const M v9 = softehl_le(softehl_splat(0.5), v7); V v10 = v7; const M m11 = ~v9;
+    if (softehl_any(m11)) {
+        const V v12 = 1.0 / (4.0 * (1.0 - v7)); v10 = softehl_blend(m11, v12, v10);
     }
-    const V v29 = parameters[0] * v24;
-    const V v30 = 1.0 / v29;
-    const V v31 = v19 * v30;
-    const V v32 = parameters[2] * v31;
-    const M v33 = softehl_le(v32, softehl_splat(0.0));
-    V v34 = softehl_splat(1.0);
-    const M m35 = ~v33;
-    if (softehl_any(m35)) {
-        const V v36 = v31 * v31;
-        const V v37 = 1.0 + v36;
-        const V v38 = 1.0 / v37;
-        v34 = softehl_blend(m35, v38, v34);
+    const V v13 = parameters[0] * v10, v14 = 5.0 * v4 * (1.0 / v13);
+    const M v15 = softehl_le(parameters[2] * v14, softehl_splat(0.0)); V v16 = softehl_splat(1.0);
+    const M m17 = ~v15;
+    if (softehl_any(m17)) {
+        const V v18 = 1.0 / (1.0 + v14 * v14); v16 = softehl_blend(m17, v18, v16);
     }
-    const double v39 = 3.141592653589793 * parameters[4];
-    const V v40 = 3.141592653589793 * v16;
-    const V v41 = v29 * v39;
-    const V v42 = v29 * v41;
-    const V v43 = v29 * v42;
-    const V v44 = 1.0 / v43;
-    const V v45 = v17 * v44;
-    const V v46 = v45 * v45;
-    const V v47 = v40 * v46;
-    const V v48 = 9.0 + v46;
-    const V v49 = 1.0 / v48;
-    const V v50 = v34 * v47;
-    const V v51 = v49 * v50;
-    V s52 = softehl_splat(0.0);
+    const V v19 = 1.0 / (v13 * (v13 * (v13 * (3.141592653589793 * parameters[4])))),
+        v20 = v3 * (parameters[3] * (6.0 * parameters[2]) * v3) * v19, v21 = v20 * v20,
+        v22 = v16 * (3.141592653589793 * (parameters[5] * parameters[6] * v3) * v21),
+        v23 = 1.0 / (9.0 + v21) * v22;
+    V s24 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
         (void)p0, (void)p1;
-        const V v53 = p1 * v51;
-        const double v54 = 0.5 * w[0];
-        const V v55 = w[0] * v22;
-        const double v56 = w[0] * v54;
-        const double v57 = (-0.16666666666666666) + v56;
-        const V v58 = w[1] * v53;
-        const V v59 = v57 * v20;
-        const V v60 = v59 + v55;
-        const V v61 = v60 * v58;
-        s52 += v61;
+        const V v25 = (((-0.16666666666666666) + w[0] * (0.5 * w[0])) * v6 + w[0] * v8) * (w[1] * (p1 * v23));
+        s24 += v25;
     }
-    const V v62 = -s52;
-    R_lanes[1] = v62;
-    R_lanes[3] = s52;
+    const V v26 = -s24; R_lanes[1] = v26; R_lanes[3] = s24;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
 }
+SOFTEHL_BATCH(softehl_film_upwind_rough_residual, 4, (4 + modes), 0, 0, (4 + modes), 0)
 
-void softehl_film_upwind_rough_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_film_upwind_rough_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_upwind_rough_residual_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_upwind_rough_residual_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_upwind_rough_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_film_upwind_rough_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -194,229 +104,76 @@ static void softehl_film_upwind_rough_tangent_group(
 #endif
     for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
         K_lanes[i] = softehl_splat(0.0);
-    const double v1 = 1.0 / parameters[0];
-    const double v2 = 6.0 * parameters[2];
-    const V v3 = X2 + d2;
-    const double v4 = parameters[5] * parameters[6];
-    const double v5 = parameters[3] * v2;
-    const V v6 = X1 - parameters[1];
-    const V v7 = X3 - parameters[1];
-    const V v8 = d1 + v6;
-    const V v9 = d3 + v7;
-    const V v10 = v3 - X0;
-    const V v11 = v10 - d0;
-    const V v12 = 0.5 * v11;
-    const V v13 = v9 - v8;
-    const V v14 = v8 + v9;
-    const V v15 = v5 * v12;
-    const V v16 = v4 * v12;
-    const V v17 = 0.5 * v14;
-    const V v18 = 5.0 * v13;
-    const V v19 = 0.5 * v13;
-    const V v20 = v1 * v17;
-    const V v21 = parameters[1] + v17;
-    const M v22 = softehl_le(softehl_splat(0.5), v20);
-    V v23 = softehl_splat(0.0);
-    V v24 = softehl_splat(0.0);
-    const M m25 = v22;
-    if (softehl_any(m25)) {
-        const double v26 = 0.5 * v1;
-        v23 = softehl_blend(m25, v20, v23);
-        v24 = softehl_blend(m25, softehl_splat(v26), v24);
+    const double v1 = 1.0 / parameters[0], v2 = parameters[5] * parameters[6],
+        v3 = parameters[3] * (6.0 * parameters[2]);
+    const V v4 = d1 + (X1 - parameters[1]), v5 = d3 + (X3 - parameters[1]),
+        v6 = 0.5 * (X2 + d2 - X0 - d0), v7 = v5 - v4, v8 = 0.5 * (v4 + v5), v9 = 0.5 * v7,
+        v10 = v1 * v8, v11 = parameters[1] + v8;
+    const M v12 = softehl_le(softehl_splat(0.5), v10);
+    V v13 = softehl_splat(0.0), v14 = softehl_splat(0.0);
+    const M m15 = v12;
+    if (softehl_any(m15)) {
+        const double v16 = 0.5 * v1; v13 = softehl_blend(m15, v10, v13);
+        v14 = softehl_blend(m15, softehl_splat(v16), v14);
     }
-    const M m27 = ~v22;
-    if (softehl_any(m27)) {
-        const double v28 = 2.0 * v1;
-        const V v29 = 1.0 - v20;
-        const V v30 = 4.0 * v29;
-        const V v31 = 1.0 / v30;
-        const V v32 = v31 * v28;
-        const V v33 = v31 * v32;
-        v23 = softehl_blend(m27, v31, v23);
-        v24 = softehl_blend(m27, v33, v24);
+    const M m17 = ~v12;
+    if (softehl_any(m17)) {
+        const V v18 = 1.0 / (4.0 * (1.0 - v10)), v19 = v18 * (v18 * (2.0 * v1));
+        v13 = softehl_blend(m17, v18, v13); v14 = softehl_blend(m17, v19, v14);
     }
-    const double v34 = 3.141592653589793 * parameters[4];
-    const V v35 = v12 * v12;
-    const V v36 = parameters[0] * v23;
-    const V v37 = parameters[0] * v24;
-    const V v38 = v5 * v35;
-    const V v39 = v36 * v34;
-    const V v40 = 1.0 / v36;
-    const V v41 = v36 * v36;
-    const V v42 = v39 * v41;
-    const V v43 = v18 * v40;
-    const V v44 = parameters[2] * v43;
-    const M v45 = softehl_le(v44, softehl_splat(0.0));
-    const V v46 = 1.0 / v42;
-    const V v47 = v38 * v46;
-    const V v48 = v47 * v47;
-    V v49 = softehl_splat(1.0);
-    V v50 = softehl_splat(0.0);
-    V v51 = softehl_splat(0.0);
-    const M m52 = ~v45;
-    if (softehl_any(m52)) {
-        const V v53 = 2.0 * v43;
-        const V v54 = 5.0 * v40;
-        const V v55 = v40 * v43;
-        const V v56 = v43 * v43;
-        const V v57 = 1.0 + v56;
-        const V v58 = v53 * v48;
-        const V v59 = 1.0 / v57;
-        const V v60 = v37 * v55;
-        const V v61 = v54 + v60;
-        const V v62 = v54 - v60;
-        const V v63 = v59 * v59;
-        const V v64 = v61 * v58;
-        const V v65 = v62 * v58;
-        const V v66 = v63 * v64;
-        const V v67 = v63 * v65;
-        const V v68 = -v67;
-        v49 = softehl_blend(m52, v59, v49);
-        v50 = softehl_blend(m52, v66, v50);
-        v51 = softehl_blend(m52, v68, v51);
+    const V v20 = parameters[0] * v13, v21 = parameters[0] * v14, v22 = v3 * (v6 * v6),
+        v23 = 1.0 / v20, v24 = v20 * v20, v25 = 5.0 * v7 * v23;
+    const M v26 = softehl_le(parameters[2] * v25, softehl_splat(0.0));
+    const V v27 = 1.0 / (v20 * (3.141592653589793 * parameters[4]) * v24), v28 = v22 * v27,
+        v29 = v28 * v28;
+    V v30 = softehl_splat(1.0), v31 = softehl_splat(0.0), v32 = softehl_splat(0.0);
+    const M m33 = ~v26;
+    if (softehl_any(m33)) {
+        const V v34 = 5.0 * v23, v35 = 2.0 * v25 * v29, v36 = 1.0 / (1.0 + v25 * v25),
+            v37 = v21 * (v23 * v25), v38 = v36 * v36, v39 = v38 * ((v34 + v37) * v35),
+            v40 = -(v38 * ((v34 - v37) * v35));
+        v30 = softehl_blend(m33, v36, v30); v31 = softehl_blend(m33, v39, v31);
+        v32 = softehl_blend(m33, v40, v32);
     }
-    const V v69 = 3.141592653589793 * v16;
-    const double v70 = 3.141592653589793 * v4;
-    const double v71 = 9.42477796076938 * parameters[4];
-    const V v72 = 2.0 * v47;
-    const V v73 = v38 * v71;
-    const V v74 = v15 * v46;
-    const V v75 = v72 * v74;
-    const V v76 = 9.0 + v48;
-    const V v77 = v49 * v48;
-    const V v78 = v41 * v73;
-    const V v79 = 1.0 / v76;
-    const V v80 = v70 * v77;
-    const V v81 = v46 * v78;
-    const V v82 = v46 * v81;
-    const V v83 = v75 * v77;
-    const V v84 = v37 * v82;
-    const V v85 = v72 * v84;
-    const V v86 = v79 * v80;
-    const V v87 = v12 * v86;
-    const V v88 = 0.5 * v86;
-    const V v89 = 0.5 * v87;
-    const V v90 = v49 * v79;
-    const V v91 = v75 * v90;
-    const V v92 = v49 * v85;
-    const V v93 = v50 - v92;
-    const V v94 = v51 - v92;
-    const V v95 = v79 * v93;
-    const V v96 = v79 * v94;
-    const V v97 = v79 * v79;
-    const V v98 = v97 * v83;
-    const V v99 = v77 * v97;
-    const V v100 = v85 * v99;
-    const V v101 = v100 + v95;
-    const V v102 = v100 + v96;
-    const V v103 = v69 * v101;
-    const V v104 = v69 * v102;
-    const V v105 = v91 - v98;
-    const V v106 = v69 * v105;
-    const V v107 = v88 + v106;
-    const V v108 = v98 - v91;
-    const V v109 = v69 * v108;
-    const V v110 = v109 - v88;
-    V s111 = softehl_splat(0.0);
-    V s112 = softehl_splat(0.0);
-    V s113 = softehl_splat(0.0);
-    V s114 = softehl_splat(0.0);
-    V s115 = softehl_splat(0.0);
+    const V v41 = 3.141592653589793 * (v2 * v6), v42 = 2.0 * v28, v43 = v42 * (v3 * v6 * v27),
+        v44 = v30 * v29, v45 = 1.0 / (9.0 + v29),
+        v46 = v21 * (v27 * (v27 * (v24 * (v22 * (9.42477796076938 * parameters[4]))))),
+        v47 = v42 * v46, v48 = v45 * (3.141592653589793 * v2 * v44), v49 = v6 * v48,
+        v50 = 0.5 * v48, v51 = 0.5 * v49, v52 = v43 * (v30 * v45), v53 = v30 * v47, v54 = v45 * v45,
+        v55 = v54 * (v43 * v44), v56 = v47 * (v44 * v54), v57 = v41 * (v56 + v45 * (v31 - v53)),
+        v58 = v41 * (v56 + v45 * (v32 - v53)), v59 = v50 + v41 * (v52 - v55),
+        v60 = v41 * (v55 - v52) - v50;
+    V s61 = {0}, s62 = {0}, s63 = {0}, s64 = {0}, s65 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        const double v116 = 0.5 * w[0];
-        const V v117 = w[0] * v21;
-        const double v118 = w[0] * v116;
-        const double v119 = (-0.16666666666666666) + v118;
-        const V v120 = p1 * v89;
-        const V v121 = p1 * w[1];
-        const V v122 = w[1] * v110;
-        const V v123 = w[1] * v107;
-        const V v124 = w[0] * v120;
-        const V v125 = v119 * v120;
-        const V v126 = v119 * v19;
-        const V v127 = v126 + v117;
-        const V v128 = p1 * v127;
-        const V v129 = v127 * v87;
-        const V v130 = v121 * v129;
-        s111 += v130;
-        const V v131 = w[1] * v129;
-        const V v132 = -v131;
-        const V v133 = v128 * v122;
-        s112 += v133;
-        const V v134 = v124 - v125;
-        const V v135 = v124 + v125;
-        const V v136 = v128 * v123;
-        s113 += v136;
-        const V v137 = v128 * v103;
-        const V v138 = v137 + v134;
-        const V v139 = v128 * v104;
-        const V v140 = v139 + v135;
-        const V v141 = w[1] * v138;
-        s114 += v141;
-        const V v142 = w[1] * v140;
-        s115 += v142;
+        (void)p0, (void)p1; const double v66 = (-0.16666666666666666) + w[0] * (0.5 * w[0]);
+        const V v67 = p1 * v51, v68 = w[0] * v67, v69 = v66 * v67, v70 = v66 * v9 + w[0] * v11,
+            v71 = p1 * v70, v72 = v70 * v49;
+        s61 += p1 * w[1] * v72;
+        const V v73 = w[1] * v72, v74 = -v73;
+        s62 += v71 * (w[1] * v60); s63 += v71 * (w[1] * v59);
+        const V v75 = w[1] * (v71 * v57 + (v68 - v69)); s64 += v75;
+        s65 += w[1] * (v71 * v58 + (v68 + v69));
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            const double N = B[2 * i], D = B[2 * i + 1];
-            (void)N, (void)D;
-            K_lanes[1 * (4 + modes) + 4 + i] += D * v132;
-            K_lanes[3 * (4 + modes) + 4 + i] += D * v131;
+            const double N = B[2 * i], D = B[2 * i + 1]; (void)N, (void)D;
+            K_lanes[1 * (4 + modes) + 4 + i] += D * v74;
+            K_lanes[3 * (4 + modes) + 4 + i] += D * v73;
         }
     }
-    const V v143 = -s111;
-    const V v144 = -s112;
-    const V v145 = -s113;
-    const V v146 = -s114;
-    const V v147 = -s115;
-    R_lanes[1] = v143;
-    R_lanes[3] = s111;
-    K_lanes[1 * (4 + modes) + 0] = v144;
-    K_lanes[1 * (4 + modes) + 1] = v146;
-    K_lanes[1 * (4 + modes) + 2] = v145;
-    K_lanes[1 * (4 + modes) + 3] = v147;
-    K_lanes[3 * (4 + modes) + 0] = s112;
-    K_lanes[3 * (4 + modes) + 1] = s114;
-    K_lanes[3 * (4 + modes) + 2] = s113;
-    K_lanes[3 * (4 + modes) + 3] = s115;
+    const V v76 = -s61, v77 = -s62, v78 = -s63, v79 = -s64, v80 = -s65;
+    R_lanes[1] = v76; R_lanes[3] = s61; K_lanes[1 * (4 + modes) + 0] = v77;
+    K_lanes[1 * (4 + modes) + 1] = v79; K_lanes[1 * (4 + modes) + 2] = v78;
+    K_lanes[1 * (4 + modes) + 3] = v80; K_lanes[3 * (4 + modes) + 0] = s62;
+    K_lanes[3 * (4 + modes) + 1] = s64; K_lanes[3 * (4 + modes) + 2] = s63;
+    K_lanes[3 * (4 + modes) + 3] = s65;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
     softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
 #endif
 }
-
-void softehl_film_upwind_rough_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_upwind_rough_tangent_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, 0, parameters, rule, basis, values + (4 + modes) * e, tangent + ((4 + modes) * (4 + modes)) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_upwind_rough_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), tangent + ((4 + modes) * (4 + modes)) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    double K[SOFTEHL_LANES * ((4 + modes) * (4 + modes))];
-    softehl_film_upwind_rough_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)) * n; ++i) tangent[i] = K[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_upwind_rough_tangent, 4, (4 + modes), 0, 0, (4 + modes), ((4 + modes) * (4 + modes)))

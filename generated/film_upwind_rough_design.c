@@ -17,28 +17,16 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_film_upwind_rough_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_film_upwind_rough_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10;
+    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
     softehl_load3(t + 8, 11, &t8, &t9, &t10);
-    (void)t8; (void)t9; (void)t10;
 #if SOFTEHL_LANES > 1
     V d_lanes[(4 + modes)];
 #else
@@ -54,203 +42,60 @@ static void softehl_film_upwind_rough_pseudo_load_group(
 #endif
     for (ptrdiff_t i = 0; i < (4 + modes); ++i)
         R_lanes[i] = softehl_splat(0.0);
-    const double v1 = 1.0 / parameters[0];
-    const double v2 = 6.0 * parameters[2];
-    const V v3 = X2 + d2;
-    const V v4 = X1 - parameters[1];
-    const V v5 = X3 - parameters[1];
-    const V v6 = d1 + v4;
-    const V v7 = d3 + v5;
-    const V v8 = t2 - t0;
-    const V v9 = v2 * t7;
-    const double v10 = parameters[3] * v2;
-    const double v11 = 6.0 * parameters[3];
-    const V v12 = v3 - X0;
-    const V v13 = 0.5 * v8;
-    const V v14 = t6 * v11;
-    const V v15 = v9 + v14;
-    const V v16 = v12 - d0;
-    const double v17 = v1 * v1;
-    const V v18 = v6 + v7;
-    const V v19 = v7 - v6;
-    const V v20 = 0.5 * v16;
-    const V v21 = v10 * v16;
-    const V v22 = t4 * v17;
-    const V v23 = 0.5 * v18;
-    const V v24 = v13 * v21;
-    const V v25 = 5.0 * v19;
-    const V v26 = 0.5 * v19;
-    const V v27 = v20 * v20;
-    const V v28 = t1 - t5;
-    const V v29 = t3 - t5;
-    const V v30 = v1 * v23;
-    const V v31 = parameters[1] + v23;
-    const V v32 = v27 * v15;
-    const V v33 = v24 + v32;
-    const V v34 = v10 * v27;
-    const M v35 = softehl_le(softehl_splat(0.5), v30);
-    const V v36 = v28 + v29;
-    const V v37 = v29 - v28;
-    const double v38 = 3.141592653589793 * parameters[4];
-    const double v39 = 9.42477796076938 * parameters[4];
-    const V v40 = 0.5 * v36;
-    const V v41 = 0.5 * v37;
-    const V v42 = t5 + v40;
-    V v43 = softehl_splat(0.0);
-    V v44 = softehl_splat(0.0);
-    const M m45 = v35;
-    if (softehl_any(m45)) {
-        const V v46 = v1 * v40;
-        const V v47 = v23 * v22;
-        const V v48 = v46 - v47;
-        v43 = softehl_blend(m45, v30, v43);
-        v44 = softehl_blend(m45, v48, v44);
+    const double v1 = 1.0 / parameters[0], v2 = 6.0 * parameters[2];
+    const V v3 = d1 + (X1 - parameters[1]), v4 = d3 + (X3 - parameters[1]);
+    const double v5 = parameters[3] * v2;
+    const V v6 = 0.5 * (t2 - t0), v7 = X2 + d2 - X0 - d0, v8 = v3 + v4, v9 = v4 - v3,
+        v10 = 0.5 * v7, v11 = t4 * (v1 * v1), v12 = 0.5 * v8, v13 = 0.5 * v9, v14 = v10 * v10,
+        v15 = t1 - t5, v16 = t3 - t5, v17 = v1 * v12, v18 = parameters[1] + v12;
+    const M v19 = softehl_le(softehl_splat(0.5), v17);
+    const V v20 = 0.5 * (v15 + v16), v21 = 0.5 * (v16 - v15), v22 = t5 + v20;
+    V v23 = softehl_splat(0.0), v24 = softehl_splat(0.0);
+    const M m25 = v19;
+    if (softehl_any(m25)) {
+        const V v26 = v1 * v20 - v12 * v11; v23 = softehl_blend(m25, v17, v23);
+        v24 = softehl_blend(m25, v26, v24);
     }
-    const M m49 = ~v35;
-    if (softehl_any(m49)) {
-        const V v50 = 2.0 * v18;
-        const double v51 = 4.0 * v1;
-        const V v52 = v1 * v50;
-        const V v53 = 4.0 - v52;
-        const V v54 = v22 * v50;
-        const V v55 = v51 * v40;
-        const V v56 = v54 - v55;
-        const V v57 = 1.0 / v53;
-        const V v58 = v57 * v57;
-        const V v59 = v56 * v58;
-        const V v60 = -v59;
-        v43 = softehl_blend(m49, v57, v43);
-        v44 = softehl_blend(m49, v60, v44);
+    const M m27 = ~v19;
+    if (softehl_any(m27)) {
+        const V v28 = 2.0 * v8, v29 = 1.0 / (4.0 - v1 * v28),
+            v30 = -((v11 * v28 - 4.0 * v1 * v20) * (v29 * v29));
+        v23 = softehl_blend(m27, v29, v23); v24 = softehl_blend(m27, v30, v24);
     }
-    const V v61 = t4 * v43;
-    const V v62 = parameters[0] * v43;
-    const V v63 = parameters[0] * v44;
-    const V v64 = v61 + v63;
-    const V v65 = 1.0 / v62;
-    const V v66 = v62 * v62;
-    const V v67 = v62 * v66;
-    const V v68 = v25 * v65;
-    const V v69 = parameters[2] * v68;
-    const M v70 = softehl_le(v69, softehl_splat(0.0));
-    const V v71 = v38 * v67;
-    const V v72 = 1.0 / v71;
-    const V v73 = v34 * v72;
-    const V v74 = v73 * v73;
-    V v75 = softehl_splat(1.0);
-    V v76 = softehl_splat(0.0);
-    const M m77 = ~v70;
-    if (softehl_any(m77)) {
-        const V v78 = 2.0 * v68;
-        const V v79 = v68 * v68;
-        const V v80 = 1.0 + v79;
-        const V v81 = v78 * v74;
-        const V v82 = 1.0 / v80;
-        const V v83 = t5 - t1;
-        const V v84 = v29 + v83;
-        const V v85 = 5.0 * v84;
-        const V v86 = v68 * v64;
-        const V v87 = v85 - v86;
-        const V v88 = v65 * v87;
-        const V v89 = v82 * v81;
-        const V v90 = v82 * v89;
-        const V v91 = v90 * v88;
-        const V v92 = -v91;
-        v75 = softehl_blend(m77, v82, v75);
-        v76 = softehl_blend(m77, v92, v76);
+    const V v31 = parameters[0] * v23, v32 = t4 * v23 + parameters[0] * v24, v33 = 1.0 / v31,
+        v34 = v31 * v31, v35 = v31 * v34, v36 = 5.0 * v9 * v33;
+    const M v37 = softehl_le(parameters[2] * v36, softehl_splat(0.0));
+    const V v38 = 1.0 / (3.141592653589793 * parameters[4] * v35), v39 = v5 * v14 * v38,
+        v40 = v39 * v39;
+    V v41 = softehl_splat(1.0), v42 = softehl_splat(0.0);
+    const M m43 = ~v37;
+    if (softehl_any(m43)) {
+        const V v44 = 1.0 / (1.0 + v36 * v36),
+            v45 = v44 * (v44 * (2.0 * v36 * v40)) * (v33 * (5.0 * (v16 + (t5 - t1)) - v36 * v32)),
+            v46 = -v45;
+        v41 = softehl_blend(m43, v44, v41); v42 = softehl_blend(m43, v46, v42);
     }
-    const V v93 = 3.141592653589793 * v67;
-    const V v94 = v39 * v66;
-    const V v95 = t8 * v93;
-    const double v96 = 3.141592653589793 * parameters[6];
-    const V v97 = 2.0 * v73;
-    const V v98 = v64 * v94;
-    const V v99 = v95 + v98;
-    const V v100 = v73 * v99;
-    const V v101 = v33 - v100;
-    const V v102 = 9.0 + v74;
-    const V v103 = v75 * v74;
-    const V v104 = 1.0 / v102;
-    const V v105 = 3.141592653589793 * v103;
-    const V v106 = v103 * v104;
-    const V v107 = v75 - v106;
-    const V v108 = v72 * v101;
-    const V v109 = v97 * v108;
-    const V v110 = v109 * v107;
-    const V v111 = v76 + v110;
-    const V v112 = v104 * v105;
-    const V v113 = v104 * v111;
-    const V v114 = v96 * v113;
-    const V v115 = parameters[6] * v112;
-    const V v116 = t10 * v112;
-    const V v117 = v116 + v114;
-    const V v118 = t9 * v115;
-    const V v119 = parameters[5] * v117;
-    const V v120 = v118 + v119;
-    const V v121 = parameters[5] * v115;
-    const V v122 = v13 * v121;
-    const V v123 = v20 * v120;
-    const V v124 = v122 + v123;
-    const V v125 = v20 * v121;
-    V s126 = softehl_splat(0.0);
+    const V v47 = t8 * (3.141592653589793 * v35) + v32 * (9.42477796076938 * parameters[4] * v34),
+        v48 = v6 * (v5 * v7) + v14 * (v2 * t7 + t6 * (6.0 * parameters[3])) - v39 * v47,
+        v49 = v41 * v40, v50 = 1.0 / (9.0 + v40), v51 = v50 * (3.141592653589793 * v49),
+        v52 = 3.141592653589793 * parameters[6] * (v50 * (v42 + 2.0 * v39 * (v38 * v48) * (v41 - v49 * v50))),
+        v53 = parameters[6] * v51, v54 = parameters[5] * v53,
+        v55 = v6 * v54 + v10 * (t9 * v53 + parameters[5] * (t10 * v51 + v52)), v56 = v10 * v54;
+    V s57 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
+        const double *restrict w = rule + 2 * q; (void)w;
         const double *restrict B = basis + 2 * modes * q;
         V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
         for (ptrdiff_t i = 0; i < modes; ++i) {
-            p0 += B[2 * i] * d_lanes[4 + i];
-            p1 += B[2 * i + 1] * d_lanes[4 + i];
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
         }
-        (void)p0, (void)p1;
-        const V v127 = p1 * w[1];
-        const double v128 = 0.5 * w[0];
-        const V v129 = w[0] * v31;
-        const double v130 = w[0] * v128;
-        const double v131 = (-0.16666666666666666) + v130;
-        const V v132 = w[0] * v42;
-        const V v133 = v131 * v26;
-        const V v134 = v133 + v129;
-        const V v135 = v131 * v41;
-        const V v136 = v135 + v132;
-        const V v137 = v136 * v125;
-        const V v138 = v134 * v124;
-        const V v139 = v137 + v138;
-        const V v140 = v127 * v139;
-        s126 += v140;
+        (void)p0, (void)p1; const double v58 = (-0.16666666666666666) + w[0] * (0.5 * w[0]);
+        const V v59 = p1 * w[1] * ((v58 * v21 + w[0] * v22) * v56 + (v58 * v13 + w[0] * v18) * v55);
+        s57 += v59;
     }
-    const V v141 = -s126;
-    R_lanes[1] = v141;
-    R_lanes[3] = s126;
+    const V v60 = -s57; R_lanes[1] = v60; R_lanes[3] = s57;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
 }
-
-void softehl_film_upwind_rough_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_film_upwind_rough_pseudo_load_group(points, modes, coordinates + 4 * e, dofs + (4 + modes) * e, 0, direction + 11 * e, parameters, rule, basis, values + (4 + modes) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_film_upwind_rough_pseudo_load_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + (4 + modes) * (n - SOFTEHL_LANES), 0, direction + 11 * (n - SOFTEHL_LANES), parameters, rule, basis, values + (4 + modes) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * (4 + modes)];
-    softehl_pad(d, dofs, (4 + modes), n);
-    double t[SOFTEHL_LANES * 11];
-    softehl_pad(t, direction, 11, n);
-    double R[SOFTEHL_LANES * (4 + modes)];
-    softehl_film_upwind_rough_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (4 + modes) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_film_upwind_rough_pseudo_load, 4, (4 + modes), 0, 11, (4 + modes), 0)

@@ -10,13 +10,7 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_film_void_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_film_void_residual)
 {
     (void)points;
     (void)modes;
@@ -27,45 +21,23 @@ void softehl_film_void_residual(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)d;
-        const double v1 = 1.0 / parameters[1];
-        const double v2 = d[0] - parameters[0];
-        const double v3 = v2 * v1;
-        const double v4 = v3 * v3;
-        const double v5 = 1.0 / parameters[2];
-        const double v6 = d[1] * v5;
-        const double v7 = v6 * v6;
-        const double v8 = 1e-30 + v7;
-        const double v9 = v8 + v4;
-        const double v10 = sqrt(v9);
-        const double v11 = v3 + v6;
-        const int v12 = 0.0 < v11;
-        double v13;
+        const double *restrict d = dofs + 2 * e; double *restrict R = values + 2 * e; (void)d;
+        const double v1 = 1.0 / parameters[1], v2 = d[0] - parameters[0], v3 = v2 * v1,
+            v4 = v3 * v3, v5 = 1.0 / parameters[2], v6 = d[1] * v5, v7 = v6 * v6, v8 = 1e-30 + v7,
+            v9 = v8 + v4, v10 = sqrt(v9), v11 = v3 + v6;
+        const int v12 = 0.0 < v11; double v13;
         if (v12) {
-            const double v14 = v11 + v10;
-            const double v15 = 1.0 / v14;
-            const double v16 = 2.0 * v6;
-            const double v17 = v3 * v16;
-            const double v18 = v17 * v15;
+            const double v14 = v11 + v10, v15 = 1.0 / v14, v16 = 2.0 * v6, v17 = v3 * v16,
+                v18 = v17 * v15;
             v13 = v18;
         } else {
-            const double v19 = v11 - v10;
-            v13 = v19;
+            const double v19 = v11 - v10; v13 = v19;
         }
-        R[0] = 0.0;
-        R[1] = v13;
+        R[0] = 0.0; R[1] = v13;
     }
 }
 
-void softehl_film_void_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_film_void_tangent)
 {
     (void)points;
     (void)modes;
@@ -75,66 +47,25 @@ void softehl_film_void_tangent(
     (void)rule;
     (void)basis;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        double *restrict K = tangent + 2 * 2 * e;
-        (void)d;
-        const double v1 = 1.0 / parameters[1];
-        const double v2 = d[0] - parameters[0];
-        const double v3 = v2 * v1;
-        const double v4 = v3 * v3;
-        const double v5 = 1.0 / parameters[2];
-        const double v6 = d[1] * v5;
-        const double v7 = v6 * v6;
-        const double v8 = 1e-30 + v7;
-        const double v9 = v8 + v4;
-        const double v10 = sqrt(v9);
-        const double v11 = v3 + v6;
-        const double v12 = 2.0 * v3;
+        const double *restrict d = dofs + 2 * e; double *restrict R = values + 2 * e;
+        double *restrict K = tangent + 2 * 2 * e; (void)d;
+        const double v1 = 1.0 / parameters[1], v2 = d[0] - parameters[0], v3 = v2 * v1,
+            v4 = v3 * v3, v5 = 1.0 / parameters[2], v6 = d[1] * v5, v7 = v6 * v6, v8 = 1e-30 + v7,
+            v9 = v8 + v4, v10 = sqrt(v9), v11 = v3 + v6, v12 = 2.0 * v3;
         const int v13 = 0.0 < v11;
-        const double v14 = v1 * v12;
-        const double v15 = 1.0 / v9;
-        const double v16 = sqrt(v15);
-        const double v17 = 0.5 * v16;
-        const double v18 = v14 * v17;
-        const double v19 = 2.0 * v5;
-        const double v20 = v6 * v19;
-        const double v21 = v20 * v17;
+        const double v14 = v1 * v12, v15 = 1.0 / v9, v16 = sqrt(v15), v17 = 0.5 * v16,
+            v18 = v14 * v17, v19 = 2.0 * v5, v20 = v6 * v19, v21 = v20 * v17;
         double v22, v23, v24;
         if (v13) {
-            const double v25 = v11 + v10;
-            const double v26 = 1.0 / v25;
-            const double v27 = v6 * v12;
-            const double v28 = v27 * v26;
-            const double v29 = v26 * v26;
-            const double v30 = v27 * v29;
-            const double v31 = v1 + v18;
-            const double v32 = v31 * v30;
-            const double v33 = 2.0 * v1;
-            const double v34 = v6 * v33;
-            const double v35 = v26 * v34;
-            const double v36 = v35 - v32;
-            const double v37 = v5 + v21;
-            const double v38 = v37 * v30;
-            const double v39 = v5 * v12;
-            const double v40 = v26 * v39;
-            const double v41 = v40 - v38;
-            v22 = v28;
-            v23 = v36;
-            v24 = v41;
+            const double v25 = v11 + v10, v26 = 1.0 / v25, v27 = v6 * v12, v28 = v27 * v26,
+                v29 = v26 * v26, v30 = v27 * v29, v31 = v1 + v18, v32 = v31 * v30, v33 = 2.0 * v1,
+                v34 = v6 * v33, v35 = v26 * v34, v36 = v35 - v32, v37 = v5 + v21, v38 = v37 * v30,
+                v39 = v5 * v12, v40 = v26 * v39, v41 = v40 - v38;
+            v22 = v28; v23 = v36; v24 = v41;
         } else {
-            const double v42 = v11 - v10;
-            const double v43 = v1 - v18;
-            const double v44 = v5 - v21;
-            v22 = v42;
-            v23 = v43;
-            v24 = v44;
+            const double v42 = v11 - v10, v43 = v1 - v18, v44 = v5 - v21;
+            v22 = v42; v23 = v43; v24 = v44;
         }
-        R[0] = 0.0;
-        R[1] = v22;
-        K[0] = 0.0;
-        K[1] = 0.0;
-        K[2] = v23;
-        K[3] = v24;
+        R[0] = 0.0; R[1] = v22; K[0] = 0.0; K[1] = 0.0; K[2] = v23; K[3] = v24;
     }
 }

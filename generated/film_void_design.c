@@ -10,13 +10,7 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_film_void_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_film_void_pseudo_load)
 {
     (void)modes;
     (void)coordinates;
@@ -24,62 +18,28 @@ void softehl_film_void_pseudo_load(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict d = dofs + 2 * e;
-        const double *restrict t = direction + 3 * e;
-        double *restrict R = values + 2 * e;
-        (void)d; (void)t;
-        const double v1 = d[0] - parameters[0];
-        const double v2 = 1.0 / parameters[1];
-        const double v3 = v1 * v2;
-        const double v4 = 1.0 / parameters[2];
-        const double v5 = d[1] * v4;
-        const double v6 = v3 + v5;
+        const double *restrict d = dofs + 2 * e; const double *restrict t = direction + 3 * e;
+        double *restrict R = values + 2 * e; (void)d; (void)t;
+        const double v1 = d[0] - parameters[0], v2 = 1.0 / parameters[1], v3 = v1 * v2,
+            v4 = 1.0 / parameters[2], v5 = d[1] * v4, v6 = v3 + v5;
         const int v7 = 0.0 < v6;
-        const double v8 = 2.0 * v3;
-        const double v9 = v5 * v5;
-        const double v10 = 2.0 * v5;
-        const double v11 = 1e-30 + v9;
-        const double v12 = v3 * v3;
-        const double v13 = v11 + v12;
-        const double v14 = 1.0 / v13;
-        const double v15 = sqrt(v14);
-        const double v16 = 0.5 * v15;
-        const double v17 = v4 * v5;
-        const double v18 = t[2] * v17;
-        const double v19 = v10 * v18;
-        const double v20 = v3 * t[1];
-        const double v21 = t[0] + v20;
-        const double v22 = v2 * v21;
-        const double v23 = v18 + v22;
-        const double v24 = v8 * v22;
-        const double v25 = v19 + v24;
-        const double v26 = v16 * v25;
+        const double v8 = 2.0 * v3, v9 = v5 * v5, v10 = 2.0 * v5, v11 = 1e-30 + v9, v12 = v3 * v3,
+            v13 = v11 + v12, v14 = 1.0 / v13, v15 = sqrt(v14), v16 = 0.5 * v15, v17 = v4 * v5,
+            v18 = t[2] * v17, v19 = v10 * v18, v20 = v3 * t[1], v21 = t[0] + v20, v22 = v2 * v21,
+            v23 = v18 + v22, v24 = v8 * v22, v25 = v19 + v24, v26 = v16 * v25;
         double v27;
         if (v7) {
-            const double v28 = sqrt(v13);
-            const double v29 = v6 + v28;
-            const double v30 = 1.0 / v29;
-            const double v31 = v10 * v22;
-            const double v32 = v23 + v26;
-            const double v33 = v5 * v30;
-            const double v34 = v32 * v33;
-            const double v35 = v34 - v18;
-            const double v36 = v8 * v35;
-            const double v37 = v36 - v31;
-            const double v38 = v30 * v37;
+            const double v28 = sqrt(v13), v29 = v6 + v28, v30 = 1.0 / v29, v31 = v10 * v22,
+                v32 = v23 + v26, v33 = v5 * v30, v34 = v32 * v33, v35 = v34 - v18, v36 = v8 * v35,
+                v37 = v36 - v31, v38 = v30 * v37;
             v27 = v38;
         } else {
-            const double v39 = v26 - v23;
-            v27 = v39;
+            const double v39 = v26 - v23; v27 = v39;
         }
-        double s40 = 0.0;
+        double s40 = {0};
         for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 1 * q;
-            (void)w;
-            s40 += w[0];
+            const double *restrict w = rule + 1 * q; (void)w; s40 += w[0];
         }
-        const double v41 = s40 * v27;
-        R[0] = 0.0;
-        R[1] = v41;
+        const double v41 = s40 * v27; R[0] = 0.0; R[1] = v41;
     }
 }

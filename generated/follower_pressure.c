@@ -10,13 +10,7 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_follower_pressure_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_follower_pressure_residual)
 {
     (void)points;
     (void)modes;
@@ -26,60 +20,24 @@ void softehl_follower_pressure_residual(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + 4 * e;
-        double *restrict R = values + 4 * e;
-        (void)X; (void)d;
-        const double v1 = X[1] + d[1];
-        const double v2 = 0.2113248654051871 * v1;
-        const double v3 = X[3] + d[3];
-        const double v4 = 0.7886751345948129 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = 6.283185307179586 * parameters[0];
-        const double v7 = v6 * v5;
-        const double v8 = v3 - X[1];
-        const double v9 = v8 - d[1];
-        const double v10 = 0.5 * v9;
-        const double v11 = v10 * v7;
-        const double v12 = 0.2113248654051871 * v11;
-        const double v13 = 0.7886751345948129 * v1;
-        const double v14 = 0.2113248654051871 * v3;
-        const double v15 = v14 + v13;
-        const double v16 = v6 * v15;
-        const double v17 = v10 * v16;
-        const double v18 = 0.7886751345948129 * v17;
-        const double v19 = v18 + v12;
-        const double v20 = X[2] + d[2];
-        const double v21 = v20 - X[0];
-        const double v22 = v21 - d[0];
-        const double v23 = 0.5 * v22;
-        const double v24 = v23 * v7;
-        const double v25 = 0.2113248654051871 * v24;
-        const double v26 = v23 * v16;
-        const double v27 = 0.7886751345948129 * v26;
-        const double v28 = v27 + v25;
-        const double v29 = -v28;
-        const double v30 = 0.7886751345948129 * v11;
-        const double v31 = 0.2113248654051871 * v17;
-        const double v32 = v31 + v30;
-        const double v33 = 0.7886751345948129 * v24;
-        const double v34 = 0.2113248654051871 * v26;
-        const double v35 = v34 + v33;
-        const double v36 = -v35;
-        R[0] = v19;
-        R[1] = v29;
-        R[2] = v32;
-        R[3] = v36;
+        const double *restrict X = coordinates + 4 * e; const double *restrict d = dofs + 4 * e;
+        double *restrict R = values + 4 * e; (void)X; (void)d;
+        const double v1 = X[1] + d[1], v2 = 0.2113248654051871 * v1, v3 = X[3] + d[3],
+            v4 = 0.7886751345948129 * v3, v5 = v4 + v2, v6 = 6.283185307179586 * parameters[0],
+            v7 = v6 * v5, v8 = v3 - X[1], v9 = v8 - d[1], v10 = 0.5 * v9, v11 = v10 * v7,
+            v12 = 0.2113248654051871 * v11, v13 = 0.7886751345948129 * v1,
+            v14 = 0.2113248654051871 * v3, v15 = v14 + v13, v16 = v6 * v15, v17 = v10 * v16,
+            v18 = 0.7886751345948129 * v17, v19 = v18 + v12, v20 = X[2] + d[2], v21 = v20 - X[0],
+            v22 = v21 - d[0], v23 = 0.5 * v22, v24 = v23 * v7, v25 = 0.2113248654051871 * v24,
+            v26 = v23 * v16, v27 = 0.7886751345948129 * v26, v28 = v27 + v25, v29 = -v28,
+            v30 = 0.7886751345948129 * v11, v31 = 0.2113248654051871 * v17, v32 = v31 + v30,
+            v33 = 0.7886751345948129 * v24, v34 = 0.2113248654051871 * v26, v35 = v34 + v33,
+            v36 = -v35;
+        R[0] = v19; R[1] = v29; R[2] = v32; R[3] = v36;
     }
 }
 
-void softehl_follower_pressure_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_follower_pressure_tangent)
 {
     (void)points;
     (void)modes;
@@ -88,88 +46,28 @@ void softehl_follower_pressure_tangent(
     (void)rule;
     (void)basis;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + 4 * e;
-        double *restrict R = values + 4 * e;
-        double *restrict K = tangent + 4 * 4 * e;
+        const double *restrict X = coordinates + 4 * e; const double *restrict d = dofs + 4 * e;
+        double *restrict R = values + 4 * e; double *restrict K = tangent + 4 * 4 * e;
         (void)X; (void)d;
-        const double v1 = X[1] + d[1];
-        const double v2 = 0.2113248654051871 * v1;
-        const double v3 = X[3] + d[3];
-        const double v4 = 0.7886751345948129 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = 6.283185307179586 * parameters[0];
-        const double v7 = v6 * v5;
-        const double v8 = v3 - X[1];
-        const double v9 = v8 - d[1];
-        const double v10 = 0.5 * v9;
-        const double v11 = v10 * v7;
-        const double v12 = 0.2113248654051871 * v11;
-        const double v13 = 0.7886751345948129 * v1;
-        const double v14 = 0.2113248654051871 * v3;
-        const double v15 = v14 + v13;
-        const double v16 = v6 * v15;
-        const double v17 = v10 * v16;
-        const double v18 = 0.7886751345948129 * v17;
-        const double v19 = v18 + v12;
-        const double v20 = X[2] + d[2];
-        const double v21 = v20 - X[0];
-        const double v22 = v21 - d[0];
-        const double v23 = 0.5 * v22;
-        const double v24 = v23 * v7;
-        const double v25 = 0.2113248654051871 * v24;
-        const double v26 = v23 * v16;
-        const double v27 = 0.7886751345948129 * v26;
-        const double v28 = v27 + v25;
-        const double v29 = -v28;
-        const double v30 = 0.7886751345948129 * v11;
-        const double v31 = 0.2113248654051871 * v17;
-        const double v32 = v31 + v30;
-        const double v33 = 0.7886751345948129 * v24;
-        const double v34 = 0.2113248654051871 * v26;
-        const double v35 = v34 + v33;
-        const double v36 = -v35;
-        const double v37 = 0.10566243270259355 * v7;
-        const double v38 = 0.39433756729740643 * v16;
-        const double v39 = v38 + v37;
-        const double v40 = 4.1887902047863905 * parameters[0];
-        const double v41 = v10 * v40;
-        const double v42 = v41 - v39;
-        const double v43 = 0.39433756729740643 * v7;
-        const double v44 = 0.10566243270259355 * v16;
-        const double v45 = v44 + v43;
-        const double v46 = 1.3277932893555753 * parameters[0];
-        const double v47 = v23 * v46;
-        const double v48 = 0.2113248654051871 * v47;
-        const double v49 = 4.9553920178240105 * parameters[0];
-        const double v50 = 0.39433756729740643 * v22;
-        const double v51 = v50 * v49;
-        const double v52 = v51 + v48;
-        const double v53 = -v52;
-        const double v54 = -v39;
-        const double v55 = 1.5773502691896257 * v47;
-        const double v56 = -v55;
-        const double v57 = v45 + v41;
-        const double v58 = -v45;
-        R[0] = v19;
-        R[1] = v29;
-        R[2] = v32;
-        R[3] = v36;
-        K[0] = 0.0;
-        K[1] = v42;
-        K[2] = 0.0;
-        K[3] = v45;
-        K[4] = v39;
-        K[5] = v53;
-        K[6] = v54;
-        K[7] = v56;
-        K[8] = 0.0;
-        K[9] = v54;
-        K[10] = 0.0;
-        K[11] = v57;
-        K[12] = v45;
-        K[13] = v56;
-        K[14] = v58;
-        K[15] = v53;
+        const double v1 = X[1] + d[1], v2 = 0.2113248654051871 * v1, v3 = X[3] + d[3],
+            v4 = 0.7886751345948129 * v3, v5 = v4 + v2, v6 = 6.283185307179586 * parameters[0],
+            v7 = v6 * v5, v8 = v3 - X[1], v9 = v8 - d[1], v10 = 0.5 * v9, v11 = v10 * v7,
+            v12 = 0.2113248654051871 * v11, v13 = 0.7886751345948129 * v1,
+            v14 = 0.2113248654051871 * v3, v15 = v14 + v13, v16 = v6 * v15, v17 = v10 * v16,
+            v18 = 0.7886751345948129 * v17, v19 = v18 + v12, v20 = X[2] + d[2], v21 = v20 - X[0],
+            v22 = v21 - d[0], v23 = 0.5 * v22, v24 = v23 * v7, v25 = 0.2113248654051871 * v24,
+            v26 = v23 * v16, v27 = 0.7886751345948129 * v26, v28 = v27 + v25, v29 = -v28,
+            v30 = 0.7886751345948129 * v11, v31 = 0.2113248654051871 * v17, v32 = v31 + v30,
+            v33 = 0.7886751345948129 * v24, v34 = 0.2113248654051871 * v26, v35 = v34 + v33,
+            v36 = -v35, v37 = 0.10566243270259355 * v7, v38 = 0.39433756729740643 * v16,
+            v39 = v38 + v37, v40 = 4.1887902047863905 * parameters[0], v41 = v10 * v40,
+            v42 = v41 - v39, v43 = 0.39433756729740643 * v7, v44 = 0.10566243270259355 * v16,
+            v45 = v44 + v43, v46 = 1.3277932893555753 * parameters[0], v47 = v23 * v46,
+            v48 = 0.2113248654051871 * v47, v49 = 4.9553920178240105 * parameters[0],
+            v50 = 0.39433756729740643 * v22, v51 = v50 * v49, v52 = v51 + v48, v53 = -v52,
+            v54 = -v39, v55 = 1.5773502691896257 * v47, v56 = -v55, v57 = v45 + v41, v58 = -v45;
+        R[0] = v19; R[1] = v29; R[2] = v32; R[3] = v36; K[0] = 0.0; K[1] = v42; K[2] = 0.0;
+        K[3] = v45; K[4] = v39; K[5] = v53; K[6] = v54; K[7] = v56; K[8] = 0.0; K[9] = v54;
+        K[10] = 0.0; K[11] = v57; K[12] = v45; K[13] = v56; K[14] = v58; K[15] = v53;
     }
 }

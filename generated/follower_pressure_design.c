@@ -10,105 +10,27 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_follower_pressure_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_follower_pressure_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
     V d0, d1, d2, d3;
     softehl_load4(d + 0, 4, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 5, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4;
-    softehl_load1(t + 4, 5, &t4);
-    (void)t4;
+    V t0, t1, t2, t3, t4;
+    softehl_load4(t + 0, 5, &t0, &t1, &t2, &t3); softehl_load1(t + 4, 5, &t4);
     const double v1 = 6.283185307179586 * parameters[0];
-    const V v2 = 6.283185307179586 * t4;
-    const V v3 = X2 + d2;
-    const V v4 = X3 + d3;
-    const V v5 = t2 - t0;
-    const V v6 = t3 - t1;
-    const V v7 = X1 + d1;
-    const V v8 = v4 - X1;
-    const V v9 = v8 - d1;
-    const V v10 = v3 - X0;
-    const V v11 = v10 - d0;
-    V s12 = softehl_splat(0.0);
-    V s13 = softehl_splat(0.0);
-    V s14 = softehl_splat(0.0);
-    V s15 = softehl_splat(0.0);
+    const V v2 = 6.283185307179586 * t4, v3 = X3 + d3, v4 = t2 - t0, v5 = t3 - t1, v6 = X1 + d1,
+        v7 = v3 - X1 - d1, v8 = X2 + d2 - X0 - d0;
+    V s9 = {0}, s10 = {0}, s11 = {0}, s12 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const double v16 = 0.5 * w[0];
-        const double v17 = 0.5 + v16;
-        const double v18 = 0.5 - v16;
-        const V v19 = v17 * v4;
-        const V v20 = v18 * v7;
-        const V v21 = v19 + v20;
-        const V v22 = v17 * t3;
-        const V v23 = v18 * t1;
-        const V v24 = v22 + v23;
-        const V v25 = v21 * v2;
-        const V v26 = v1 * v24;
-        const V v27 = v25 + v26;
-        const V v28 = v21 * v1;
-        const V v29 = v6 * v28;
-        const V v30 = v5 * v28;
-        const V v31 = v9 * v27;
-        const V v32 = v29 + v31;
-        const V v33 = v11 * v27;
-        const V v34 = v30 + v33;
-        const V v35 = 0.5 * v32;
-        const V v36 = 0.5 * v34;
-        const V v37 = w[1] * v36;
-        const V v38 = w[1] * v35;
-        const V v39 = v17 * v37;
-        s12 += v39;
-        const V v40 = v18 * v37;
-        s14 += v40;
-        const V v41 = v17 * v38;
-        s13 += v41;
-        const V v42 = v18 * v38;
-        s15 += v42;
+        const double *restrict w = rule + 2 * q; (void)w;
+        const double v13 = 0.5 * w[0], v14 = 0.5 + v13, v15 = 0.5 - v13;
+        const V v16 = v14 * v3 + v15 * v6, v17 = v16 * v2 + v1 * (v14 * t3 + v15 * t1),
+            v18 = v16 * v1, v19 = w[1] * (0.5 * (v4 * v18 + v8 * v17)),
+            v20 = w[1] * (0.5 * (v5 * v18 + v7 * v17));
+        s9 += v14 * v19; s11 += v15 * v19; s10 += v14 * v20; s12 += v15 * v20;
     }
-    const V v43 = -s12;
-    const V v44 = -s14;
-    softehl_store4(R + 0, 4, s15, v44, s13, v43);
+    softehl_store4(R + 0, 4, s12, -s11, s10, -s9);
 }
-
-void softehl_follower_pressure_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_follower_pressure_pseudo_load_group(points, modes, coordinates + 4 * e, dofs + 4 * e, 0, direction + 5 * e, parameters, rule, basis, values + 4 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_follower_pressure_pseudo_load_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + 4 * (n - SOFTEHL_LANES), 0, direction + 5 * (n - SOFTEHL_LANES), parameters, rule, basis, values + 4 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * 4];
-    softehl_pad(d, dofs, 4, n);
-    double t[SOFTEHL_LANES * 5];
-    softehl_pad(t, direction, 5, n);
-    double R[SOFTEHL_LANES * 4];
-    softehl_follower_pressure_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 4 * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_follower_pressure_pseudo_load, 4, 4, 0, 5, 4, 0)

@@ -16,316 +16,79 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_mean_axial_energy_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_mean_axial_energy)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8;
-    softehl_load1(d + 8, 9, &d8);
-    (void)d8;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8;
+    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
+    softehl_load1(d + 8, 9, &d8); (void)d1; (void)d3; (void)d5; (void)d7;
+    const V v1 = X4 - X2, v2 = X4 - X6, v3 = X2 - X0, v4 = X6 - X0, v5 = X5 - X3, v6 = X3 - X1,
+        v7 = X5 - X7, v8 = 0.39433756729740643 * v4 + 0.10566243270259355 * v1,
+        v9 = 0.10566243270259355 * v4 + 0.39433756729740643 * v1, v10 = X7 - X1,
+        v11 = 0.39433756729740643 * v3 + 0.10566243270259355 * v2,
+        v12 = 0.10566243270259355 * v3 + 0.39433756729740643 * v2,
+        v13 = 0.39433756729740643 * v6 + 0.10566243270259355 * v7,
+        v14 = 0.10566243270259355 * v6 + 0.39433756729740643 * v7,
+        v15 = 0.39433756729740643 * v10 + 0.10566243270259355 * v5,
+        v16 = 0.10566243270259355 * v10 + 0.39433756729740643 * v5,
+        v17 = 1.5773502691896257 * d0 + 0.4226497308103742 * d2,
+        v18 = 0.4226497308103742 * d0 + 1.5773502691896257 * d2,
+        v19 = 0.4226497308103742 * d4 + 1.5773502691896257 * d6,
+        v20 = 1.5773502691896257 * d4 + 0.4226497308103742 * d6,
+        v21 = 0.39433756729740643 * v17 + 0.10566243270259355 * v19 - parameters[1],
+        v22 = 0.10566243270259355 * v17 + 0.39433756729740643 * v19 - parameters[1],
+        v23 = 0.39433756729740643 * v18 + 0.10566243270259355 * v20 - parameters[1],
+        v24 = 0.10566243270259355 * v18 + 0.39433756729740643 * v20 - parameters[1],
+        v25 = (v11 * v15 - v8 * v13) * v21 + (v12 * v15 - v8 * v14) * v22 + (v11 * v16 - v9 * v13) * v23,
+        v26 = d8 * (1.0 / parameters[0]) * ((v12 * v16 - v9 * v14) * v24 + v25);
+    softehl_store1(R + 0, 1, v26);
+}
+SOFTEHL_BATCH(softehl_mean_axial_energy, 8, 9, 0, 0, 1, 0)
+
+SOFTEHL_GROUP(softehl_mean_axial_residual)
+{
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8;
+    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
+    softehl_load1(d + 8, 9, &d8); (void)d1; (void)d3; (void)d5; (void)d7;
     const double v1 = 1.0 / parameters[0];
-    const V v2 = X4 - X2;
-    const V v3 = X4 - X6;
-    const V v4 = X2 - X0;
-    const V v5 = X6 - X0;
-    const V v6 = X5 - X3;
-    const V v7 = 0.10566243270259355 * v2;
-    const V v8 = 0.39433756729740643 * v2;
-    const V v9 = 0.39433756729740643 * v4;
-    const V v10 = 0.10566243270259355 * v4;
-    const V v11 = X3 - X1;
-    const V v12 = X5 - X7;
-    const V v13 = 0.39433756729740643 * v5;
-    const V v14 = v13 + v7;
-    const V v15 = 0.10566243270259355 * v5;
-    const V v16 = v15 + v8;
-    const V v17 = X7 - X1;
-    const V v18 = 0.10566243270259355 * v3;
-    const V v19 = v9 + v18;
-    const V v20 = 0.39433756729740643 * v3;
-    const V v21 = v10 + v20;
-    const V v22 = d8 * v1;
-    const V v23 = 0.39433756729740643 * v11;
-    const V v24 = 0.10566243270259355 * v11;
-    const V v25 = 0.10566243270259355 * v6;
-    const V v26 = 0.39433756729740643 * v6;
-    const V v27 = 0.10566243270259355 * v12;
-    const V v28 = v23 + v27;
-    const V v29 = 0.39433756729740643 * v12;
-    const V v30 = v24 + v29;
-    const V v31 = 0.39433756729740643 * v17;
-    const V v32 = v31 + v25;
-    const V v33 = 0.10566243270259355 * v17;
-    const V v34 = v33 + v26;
-    const V v35 = 1.5773502691896257 * d0;
-    const V v36 = 0.4226497308103742 * d0;
-    const V v37 = 0.4226497308103742 * d4;
-    const V v38 = 1.5773502691896257 * d4;
-    const V v39 = v19 * v32;
-    const V v40 = v21 * v32;
-    const V v41 = v19 * v34;
-    const V v42 = v21 * v34;
-    const V v43 = 0.4226497308103742 * d2;
-    const V v44 = v35 + v43;
-    const V v45 = 1.5773502691896257 * d2;
-    const V v46 = v36 + v45;
-    const V v47 = 1.5773502691896257 * d6;
-    const V v48 = v37 + v47;
-    const V v49 = 0.4226497308103742 * d6;
-    const V v50 = v38 + v49;
-    const V v51 = v14 * v28;
-    const V v52 = v39 - v51;
-    const V v53 = v14 * v30;
-    const V v54 = v40 - v53;
-    const V v55 = v16 * v28;
-    const V v56 = v41 - v55;
-    const V v57 = v16 * v30;
-    const V v58 = v42 - v57;
-    const V v59 = 0.39433756729740643 * v44;
-    const V v60 = 0.10566243270259355 * v44;
-    const V v61 = 0.39433756729740643 * v46;
-    const V v62 = 0.10566243270259355 * v46;
-    const V v63 = 0.10566243270259355 * v48;
-    const V v64 = v59 + v63;
-    const V v65 = 0.39433756729740643 * v48;
-    const V v66 = v60 + v65;
-    const V v67 = 0.10566243270259355 * v50;
-    const V v68 = v61 + v67;
-    const V v69 = 0.39433756729740643 * v50;
-    const V v70 = v62 + v69;
-    const V v71 = v64 - parameters[1];
-    const V v72 = v66 - parameters[1];
-    const V v73 = v68 - parameters[1];
-    const V v74 = v70 - parameters[1];
-    const V v75 = v52 * v71;
-    const V v76 = v54 * v72;
-    const V v77 = v75 + v76;
-    const V v78 = v56 * v73;
-    const V v79 = v77 + v78;
-    const V v80 = v58 * v74;
-    const V v81 = v80 + v79;
-    const V v82 = v22 * v81;
-    softehl_store1(R + 0, 1, v82);
+    const V v2 = X4 - X2, v3 = X4 - X6, v4 = X2 - X0, v5 = X6 - X0, v6 = X5 - X3, v7 = X3 - X1,
+        v8 = 0.39433756729740643 * v5 + 0.10566243270259355 * v2,
+        v9 = 0.10566243270259355 * v5 + 0.39433756729740643 * v2,
+        v10 = 0.39433756729740643 * v4 + 0.10566243270259355 * v3,
+        v11 = 0.10566243270259355 * v4 + 0.39433756729740643 * v3, v12 = X5 - X7, v13 = X7 - X1,
+        v14 = d8 * v1, v15 = 0.39433756729740643 * v13 + 0.10566243270259355 * v6,
+        v16 = 0.10566243270259355 * v13 + 0.39433756729740643 * v6,
+        v17 = 0.39433756729740643 * v7 + 0.10566243270259355 * v12,
+        v18 = 0.10566243270259355 * v7 + 0.39433756729740643 * v12, v19 = d0 + d2, v20 = d0 - d2,
+        v21 = d4 + d6, v22 = d4 - d6, v23 = v10 * v16 - v9 * v17, v24 = v11 * v16 - v9 * v18,
+        v25 = v10 * v15 - v8 * v17, v26 = v11 * v15 - v8 * v18, v27 = v19 + v21, v28 = v14 * v23,
+        v29 = v14 * v24, v30 = v14 * v25, v31 = v14 * v26, v32 = 0.14433756729740643 * (v19 - v21),
+        v33 = v20 - v22, v34 = 0.08333333333333333 * (v20 + v22), v35 = v30 + v31,
+        v36 = 0.14433756729740643 * v33 + (parameters[1] - 0.25 * v27), v37 = v28 + v29,
+        v38 = 0.25 * (v27 + 0.5773502691896257 * v33), v39 = v32 + v34,
+        v40 = 0.14433756729740643 * (v29 + (v31 - v30 - v28)), v41 = 0.25 * (v35 + v37),
+        v42 = 0.14433756729740643 * (v37 - v35),
+        v43 = v23 * (v32 - v34 - v36) + v24 * (v34 - v32 - v36) + v25 * (v38 + v39 - parameters[1]),
+        v44 = v41 - v42, v45 = v42 + v41;
+    softehl_store4(R + 4, 9, v45 + v40, softehl_splat(0.0), v44 + v40, softehl_splat(0.0));
+    softehl_store1(R + 8, 9, v1 * (v43 + v26 * (v38 - v39 - parameters[1])));
+    softehl_store4(R + 0, 9, v44 - v40, softehl_splat(0.0), v45 - v40, softehl_splat(0.0));
 }
+SOFTEHL_BATCH(softehl_mean_axial_residual, 8, 9, 0, 0, 9, 0)
 
-void softehl_mean_axial_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_mean_axial_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mean_axial_energy_group(points, modes, coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters, rule, basis, values + 1 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mean_axial_energy_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 9 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 1 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 9];
-    softehl_pad(d, dofs, 9, n);
-    double R[SOFTEHL_LANES * 1];
-    softehl_mean_axial_energy(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 1 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_mean_axial_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8;
-    softehl_load1(d + 8, 9, &d8);
-    (void)d8;
-    const double v1 = 1.0 / parameters[0];
-    const V v2 = X4 - X2;
-    const V v3 = X4 - X6;
-    const V v4 = X2 - X0;
-    const V v5 = X6 - X0;
-    const V v6 = 0.10566243270259355 * v2;
-    const V v7 = 0.39433756729740643 * v2;
-    const V v8 = 0.10566243270259355 * v3;
-    const V v9 = 0.39433756729740643 * v3;
-    const V v10 = X5 - X3;
-    const V v11 = X3 - X1;
-    const V v12 = 0.39433756729740643 * v5;
-    const V v13 = v12 + v6;
-    const V v14 = 0.10566243270259355 * v5;
-    const V v15 = v14 + v7;
-    const V v16 = 0.39433756729740643 * v4;
-    const V v17 = v16 + v8;
-    const V v18 = 0.10566243270259355 * v4;
-    const V v19 = v18 + v9;
-    const V v20 = X5 - X7;
-    const V v21 = 0.10566243270259355 * v10;
-    const V v22 = 0.39433756729740643 * v10;
-    const V v23 = X7 - X1;
-    const V v24 = d8 * v1;
-    const V v25 = 0.39433756729740643 * v11;
-    const V v26 = 0.10566243270259355 * v11;
-    const V v27 = 0.39433756729740643 * v23;
-    const V v28 = v27 + v21;
-    const V v29 = 0.10566243270259355 * v23;
-    const V v30 = v29 + v22;
-    const V v31 = 0.10566243270259355 * v20;
-    const V v32 = v25 + v31;
-    const V v33 = 0.39433756729740643 * v20;
-    const V v34 = v26 + v33;
-    const V v35 = d0 + d2;
-    const V v36 = d0 - d2;
-    const V v37 = v17 * v28;
-    const V v38 = v19 * v28;
-    const V v39 = v17 * v30;
-    const V v40 = v19 * v30;
-    const V v41 = d4 + d6;
-    const V v42 = d4 - d6;
-    const V v43 = v15 * v32;
-    const V v44 = v39 - v43;
-    const V v45 = v15 * v34;
-    const V v46 = v40 - v45;
-    const V v47 = v13 * v32;
-    const V v48 = v37 - v47;
-    const V v49 = v13 * v34;
-    const V v50 = v38 - v49;
-    const V v51 = v35 + v41;
-    const V v52 = v35 - v41;
-    const V v53 = v24 * v44;
-    const V v54 = v24 * v46;
-    const V v55 = v24 * v48;
-    const V v56 = v24 * v50;
-    const V v57 = 0.14433756729740643 * v52;
-    const V v58 = v36 - v42;
-    const V v59 = v36 + v42;
-    const V v60 = 0.25 * v51;
-    const V v61 = parameters[1] - v60;
-    const V v62 = 0.08333333333333333 * v59;
-    const V v63 = v55 + v56;
-    const V v64 = 0.14433756729740643 * v58;
-    const V v65 = v64 + v61;
-    const V v66 = 0.5773502691896257 * v58;
-    const V v67 = v51 + v66;
-    const V v68 = v53 + v54;
-    const V v69 = v56 - v55;
-    const V v70 = 0.25 * v67;
-    const V v71 = v69 - v53;
-    const V v72 = v54 + v71;
-    const V v73 = v57 + v62;
-    const V v74 = v63 + v68;
-    const V v75 = 0.14433756729740643 * v72;
-    const V v76 = v68 - v63;
-    const V v77 = v57 - v62;
-    const V v78 = 0.25 * v74;
-    const V v79 = 0.14433756729740643 * v76;
-    const V v80 = v62 - v57;
-    const V v81 = v77 - v65;
-    const V v82 = v80 - v65;
-    const V v83 = v44 * v81;
-    const V v84 = v70 + v73;
-    const V v85 = v70 - v73;
-    const V v86 = v46 * v82;
-    const V v87 = v83 + v86;
-    const V v88 = v84 - parameters[1];
-    const V v89 = v85 - parameters[1];
-    const V v90 = v48 * v88;
-    const V v91 = v87 + v90;
-    const V v92 = v78 - v79;
-    const V v93 = v79 + v78;
-    const V v94 = v50 * v89;
-    const V v95 = v91 + v94;
-    const V v96 = v92 + v75;
-    const V v97 = v93 + v75;
-    softehl_store4(R + 4, 9, v97, softehl_splat(0.0), v96, softehl_splat(0.0));
-    const V v98 = v1 * v95;
-    softehl_store1(R + 8, 9, v98);
-    const V v99 = v92 - v75;
-    const V v100 = v93 - v75;
-    softehl_store4(R + 0, 9, v99, softehl_splat(0.0), v100, softehl_splat(0.0));
-}
-
-void softehl_mean_axial_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mean_axial_residual_group(points, modes, coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters, rule, basis, values + 9 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mean_axial_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 9 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 9 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 9];
-    softehl_pad(d, dofs, 9, n);
-    double R[SOFTEHL_LANES * 9];
-    softehl_mean_axial_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 9 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_mean_axial_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8;
-    softehl_load1(d + 8, 9, &d8);
-    (void)d8;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8;
+    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
+    softehl_load1(d + 8, 9, &d8); (void)d1; (void)d3; (void)d5; (void)d7;
     softehl_store4(K + 0, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 4, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 12, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
@@ -340,162 +103,40 @@ static void softehl_mean_axial_tangent_group(
     softehl_store4(K + 56, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 64, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 68, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store1(K + 80, 81, softehl_splat(0.0));
-    const double v1 = 1.0 / parameters[0];
-    const V v2 = X4 - X2;
-    const V v3 = X4 - X6;
-    const V v4 = X2 - X0;
-    const V v5 = X6 - X0;
-    const V v6 = 0.10566243270259355 * v2;
-    const V v7 = 0.39433756729740643 * v2;
-    const V v8 = 0.10566243270259355 * v3;
-    const V v9 = 0.39433756729740643 * v3;
-    const V v10 = X5 - X3;
-    const V v11 = X3 - X1;
-    const V v12 = 0.39433756729740643 * v5;
-    const V v13 = v12 + v6;
-    const V v14 = 0.10566243270259355 * v5;
-    const V v15 = v14 + v7;
-    const V v16 = 0.39433756729740643 * v4;
-    const V v17 = v16 + v8;
-    const V v18 = 0.10566243270259355 * v4;
-    const V v19 = v18 + v9;
-    const V v20 = X5 - X7;
-    const V v21 = 0.10566243270259355 * v10;
-    const V v22 = 0.39433756729740643 * v10;
-    const V v23 = X7 - X1;
-    const V v24 = d8 * v1;
-    const V v25 = 0.39433756729740643 * v11;
-    const V v26 = 0.10566243270259355 * v11;
-    const V v27 = 0.39433756729740643 * v23;
-    const V v28 = v27 + v21;
-    const V v29 = 0.10566243270259355 * v23;
-    const V v30 = v29 + v22;
-    const V v31 = 0.10566243270259355 * v20;
-    const V v32 = v25 + v31;
-    const V v33 = 0.39433756729740643 * v20;
-    const V v34 = v26 + v33;
-    const V v35 = v17 * v28;
-    const V v36 = v19 * v28;
-    const V v37 = v17 * v30;
-    const V v38 = v19 * v30;
-    const V v39 = d0 + d2;
-    const V v40 = d0 - d2;
-    const V v41 = d4 + d6;
-    const V v42 = d4 - d6;
-    const V v43 = v15 * v32;
-    const V v44 = v37 - v43;
-    const V v45 = v15 * v34;
-    const V v46 = v38 - v45;
-    const V v47 = v13 * v32;
-    const V v48 = v35 - v47;
-    const V v49 = v13 * v34;
-    const V v50 = v36 - v49;
-    const V v51 = v24 * v44;
-    const V v52 = v1 * v44;
-    const V v53 = v24 * v48;
-    const V v54 = v1 * v48;
-    const V v55 = v39 + v41;
-    const V v56 = v39 - v41;
-    const V v57 = v40 - v42;
-    const V v58 = v40 + v42;
-    const V v59 = v24 * v50;
-    const V v60 = v24 * v46;
-    const V v61 = v1 * v50;
-    const V v62 = v1 * v46;
-    const V v63 = 0.14433756729740643 * v56;
-    const V v64 = 0.08333333333333333 * v58;
-    const V v65 = v53 + v59;
-    const V v66 = 0.25 * v55;
-    const V v67 = parameters[1] - v66;
-    const V v68 = v59 - v53;
-    const V v69 = v51 + v60;
-    const V v70 = 0.5773502691896257 * v57;
-    const V v71 = v55 + v70;
-    const V v72 = 0.14433756729740643 * v57;
-    const V v73 = v72 + v67;
-    const V v74 = v68 - v51;
-    const V v75 = v54 + v61;
-    const V v76 = v60 + v74;
-    const V v77 = 0.25 * v71;
-    const V v78 = v61 - v54;
-    const V v79 = v52 + v62;
-    const V v80 = 0.14433756729740643 * v76;
-    const V v81 = v65 + v69;
-    const V v82 = v69 - v65;
-    const V v83 = v78 - v52;
-    const V v84 = 0.25 * v81;
-    const V v85 = 0.14433756729740643 * v82;
-    const V v86 = v62 + v83;
-    const V v87 = v63 + v64;
-    const V v88 = 0.14433756729740643 * v86;
-    const V v89 = v63 - v64;
-    const V v90 = v77 + v87;
-    const V v91 = v77 - v87;
-    const V v92 = v64 - v63;
-    const V v93 = v85 + v84;
-    const V v94 = v84 - v85;
-    const V v95 = v90 - parameters[1];
-    const V v96 = v91 - parameters[1];
-    const V v97 = v93 + v80;
-    const V v98 = v94 + v80;
-    softehl_store4(R + 4, 9, v97, softehl_splat(0.0), v98, softehl_splat(0.0));
-    const V v99 = v54 * v95;
-    const V v100 = v89 - v73;
-    const V v101 = v92 - v73;
-    const V v102 = v93 - v80;
-    const V v103 = v94 - v80;
-    softehl_store4(R + 0, 9, v103, softehl_splat(0.0), v102, softehl_splat(0.0));
-    const V v104 = v62 * v101;
-    const V v105 = v99 + v104;
-    const V v106 = v75 + v79;
-    const V v107 = v79 - v75;
-    const V v108 = 0.25 * v106;
-    const V v109 = 0.14433756729740643 * v107;
-    const V v110 = v61 * v96;
-    const V v111 = v105 + v110;
-    const V v112 = v52 * v100;
-    const V v113 = v111 + v112;
-    softehl_store1(R + 8, 9, v113);
-    const V v114 = v108 - v109;
-    const V v115 = v108 + v109;
-    const V v116 = v114 + v88;
-    softehl_store4(K + 60, 81, softehl_splat(0.0), softehl_splat(0.0), v116, softehl_splat(0.0));
-    const V v117 = v114 - v88;
-    softehl_store4(K + 8, 81, v117, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v118 = v115 + v88;
-    softehl_store4(K + 44, 81, v118, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 76, 81, v118, softehl_splat(0.0), v116, softehl_splat(0.0));
-    const V v119 = v115 - v88;
-    softehl_store4(K + 24, 81, softehl_splat(0.0), softehl_splat(0.0), v119, softehl_splat(0.0));
-    softehl_store4(K + 72, 81, v117, softehl_splat(0.0), v119, softehl_splat(0.0));
+    softehl_store1(K + 80, 81, softehl_splat(0.0)); const double v1 = 1.0 / parameters[0];
+    const V v2 = X4 - X2, v3 = X4 - X6, v4 = X2 - X0, v5 = X6 - X0, v6 = X5 - X3, v7 = X3 - X1,
+        v8 = 0.39433756729740643 * v5 + 0.10566243270259355 * v2,
+        v9 = 0.10566243270259355 * v5 + 0.39433756729740643 * v2,
+        v10 = 0.39433756729740643 * v4 + 0.10566243270259355 * v3,
+        v11 = 0.10566243270259355 * v4 + 0.39433756729740643 * v3, v12 = X5 - X7, v13 = X7 - X1,
+        v14 = d8 * v1, v15 = 0.39433756729740643 * v13 + 0.10566243270259355 * v6,
+        v16 = 0.10566243270259355 * v13 + 0.39433756729740643 * v6,
+        v17 = 0.39433756729740643 * v7 + 0.10566243270259355 * v12,
+        v18 = 0.10566243270259355 * v7 + 0.39433756729740643 * v12, v19 = d0 + d2, v20 = d0 - d2,
+        v21 = d4 + d6, v22 = d4 - d6, v23 = v10 * v16 - v9 * v17, v24 = v11 * v16 - v9 * v18,
+        v25 = v10 * v15 - v8 * v17, v26 = v11 * v15 - v8 * v18, v27 = v14 * v23, v28 = v1 * v23,
+        v29 = v14 * v25, v30 = v1 * v25, v31 = v19 + v21, v32 = v20 - v22, v33 = v14 * v26,
+        v34 = v14 * v24, v35 = v1 * v26, v36 = v1 * v24, v37 = 0.14433756729740643 * (v19 - v21),
+        v38 = 0.08333333333333333 * (v20 + v22), v39 = v29 + v33, v40 = v27 + v34,
+        v41 = 0.14433756729740643 * v32 + (parameters[1] - 0.25 * v31), v42 = v30 + v35,
+        v43 = 0.25 * (v31 + 0.5773502691896257 * v32), v44 = v28 + v36,
+        v45 = 0.14433756729740643 * (v34 + (v33 - v29 - v27)), v46 = 0.25 * (v39 + v40),
+        v47 = 0.14433756729740643 * (v40 - v39), v48 = v37 + v38,
+        v49 = 0.14433756729740643 * (v36 + (v35 - v30 - v28)), v50 = v47 + v46, v51 = v46 - v47;
+    softehl_store4(R + 4, 9, v50 + v45, softehl_splat(0.0), v51 + v45, softehl_splat(0.0));
+    softehl_store4(R + 0, 9, v51 - v45, softehl_splat(0.0), v50 - v45, softehl_splat(0.0));
+    const V v52 = 0.25 * (v42 + v44), v53 = 0.14433756729740643 * (v44 - v42),
+        v54 = v30 * (v43 + v48 - parameters[1]) + v36 * (v38 - v37 - v41) + v35 * (v43 - v48 - parameters[1]);
+    softehl_store1(R + 8, 9, v54 + v28 * (v37 - v38 - v41));
+    const V v55 = v52 - v53, v56 = v52 + v53, v57 = v55 + v49;
+    softehl_store4(K + 60, 81, softehl_splat(0.0), softehl_splat(0.0), v57, softehl_splat(0.0));
+    const V v58 = v55 - v49;
+    softehl_store4(K + 8, 81, v58, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    const V v59 = v56 + v49;
+    softehl_store4(K + 44, 81, v59, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 76, 81, v59, softehl_splat(0.0), v57, softehl_splat(0.0));
+    const V v60 = v56 - v49;
+    softehl_store4(K + 24, 81, softehl_splat(0.0), softehl_splat(0.0), v60, softehl_splat(0.0));
+    softehl_store4(K + 72, 81, v58, softehl_splat(0.0), v60, softehl_splat(0.0));
 }
-
-void softehl_mean_axial_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mean_axial_tangent_group(points, modes, coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters, rule, basis, values + 9 * e, tangent + (9 * 9) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mean_axial_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 9 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 9 * (n - SOFTEHL_LANES), tangent + (9 * 9) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 9];
-    softehl_pad(d, dofs, 9, n);
-    double R[SOFTEHL_LANES * 9];
-    double K[SOFTEHL_LANES * (9 * 9)];
-    softehl_mean_axial_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 9 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (9 * 9) * n; ++i) tangent[i] = K[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_mean_axial_tangent, 8, 9, 0, 0, 9, (9 * 9))

@@ -16,192 +16,40 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_mean_axial_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_mean_axial_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8;
-    softehl_load1(d + 8, 9, &d8);
-    (void)d8;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 10, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 10, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9;
-    softehl_load2(t + 8, 10, &t8, &t9);
-    (void)t8; (void)t9;
-    const double v1 = 1.0 / parameters[0];
-    const V v2 = X4 - X6;
-    const V v3 = X4 - X2;
-    const V v4 = X5 - X7;
-    const V v5 = X5 - X3;
-    const V v6 = d0 + d2;
-    const V v7 = d0 - d2;
-    const V v8 = d4 - d6;
-    const V v9 = d4 + d6;
-    const V v10 = v6 + v9;
-    const V v11 = t4 - t6;
-    const V v12 = t4 - t2;
-    const double v13 = v1 * v1;
-    const V v14 = v6 - d4;
-    const V v15 = v14 - d6;
-    const V v16 = v7 - v8;
-    const V v17 = v7 + v8;
-    const V v18 = t8 * v13;
-    const V v19 = t5 - t7;
-    const V v20 = t5 - t3;
-    V s21 = softehl_splat(0.0);
-    V s22 = softehl_splat(0.0);
-    V s23 = softehl_splat(0.0);
-    V s24 = softehl_splat(0.0);
-    V s25 = softehl_splat(0.0);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8;
+    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
+    softehl_load1(d + 8, 9, &d8); (void)d1; (void)d3; (void)d5; (void)d7;
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9;
+    softehl_load4(t + 0, 10, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 10, &t4, &t5, &t6, &t7);
+    softehl_load2(t + 8, 10, &t8, &t9); const double v1 = 1.0 / parameters[0];
+    const V v2 = X4 - X6, v3 = X4 - X2, v4 = X5 - X7, v5 = X5 - X3, v6 = d0 + d2, v7 = d0 - d2,
+        v8 = d4 - d6, v9 = v6 + (d4 + d6), v10 = t4 - t6, v11 = t4 - t2, v12 = v6 - d4 - d6,
+        v13 = v7 - v8, v14 = v7 + v8, v15 = t8 * (v1 * v1), v16 = t5 - t7, v17 = t5 - t3;
+    V s18 = {0}, s19 = {0}, s20 = {0}, s21 = {0}, s22 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v26 = 0.25 * w[1];
-        const double v27 = 0.25 * w[0];
-        const double v28 = w[0] * w[1];
-        const double v29 = 0.25 - v26;
-        const double v30 = 0.25 + v26;
-        const double v31 = 0.25 + v27;
-        const double v32 = 0.25 - v27;
-        const V v33 = w[1] * v15;
-        const V v34 = v10 - v33;
-        const V v35 = d8 * w[2];
-        const double v36 = v26 - 0.25;
-        const double v37 = v27 - 0.25;
-        const V v38 = X2 * v29;
-        const V v39 = X3 * v29;
-        const V v40 = v29 * t2;
-        const V v41 = v29 * t3;
-        const V v42 = w[0] * v16;
-        const V v43 = v34 - v42;
-        const V v44 = X6 * v32;
-        const V v45 = X7 * v32;
-        const V v46 = v32 * t6;
-        const V v47 = v32 * t7;
-        const V v48 = v31 * v3;
-        const V v49 = v44 + v48;
-        const V v50 = v28 * v17;
-        const V v51 = v50 + v43;
-        const V v52 = X0 * v36;
-        const V v53 = v38 + v52;
-        const V v54 = X0 * v37;
-        const V v55 = v54 + v49;
-        const V v56 = v31 * v5;
-        const V v57 = v45 + v56;
-        const V v58 = v31 * v12;
-        const V v59 = v46 + v58;
-        const V v60 = v31 * v20;
-        const V v61 = v47 + v60;
-        const V v62 = 0.25 * v51;
-        const V v63 = X1 * v36;
-        const V v64 = v39 + v63;
-        const V v65 = X1 * v37;
-        const V v66 = v65 + v57;
-        const V v67 = v30 * v2;
-        const V v68 = v67 + v53;
-        const V v69 = v30 * v11;
-        const V v70 = v40 + v69;
-        const V v71 = v30 * v19;
-        const V v72 = v41 + v71;
-        const V v73 = v30 * v4;
-        const V v74 = v73 + v64;
-        const V v75 = v62 - parameters[1];
-        const V v76 = t0 * v37;
-        const V v77 = v76 + v59;
-        const V v78 = t0 * v36;
-        const V v79 = v78 + v70;
-        const V v80 = t1 * v37;
-        const V v81 = v80 + v61;
-        const V v82 = t1 * v36;
-        const V v83 = v82 + v72;
-        const V v84 = v68 * v66;
-        const V v85 = v66 * v79;
-        const V v86 = v74 * v55;
-        const V v87 = v84 - v86;
-        const V v88 = v68 * v81;
-        const V v89 = v85 + v88;
-        const V v90 = v74 * v77;
-        const V v91 = v89 - v90;
-        const V v92 = v55 * v83;
-        const V v93 = v91 - v92;
-        const V v94 = v18 * v87;
-        const V v95 = v75 * v93;
-        const V v96 = t9 * v87;
-        const V v97 = v95 - v96;
-        const V v98 = v1 * v93;
-        const V v99 = v1 * v97;
-        const V v100 = v75 * v94;
-        const V v101 = v99 - v100;
-        const V v102 = v98 - v94;
-        const V v103 = v35 * v102;
-        const V v104 = 0.25 * v103;
-        s24 += v104;
-        const V v105 = w[2] * v101;
-        s25 += v105;
-        const V v106 = v28 * v104;
-        s21 += v106;
-        const V v107 = w[0] * v104;
-        s23 += v107;
-        const V v108 = w[1] * v104;
-        s22 += v108;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v23 = 0.25 * w[1], v24 = 0.25 * w[0], v25 = w[0] * w[1], v26 = 0.25 - v23,
+            v27 = 0.25 + v23, v28 = 0.25 + v24, v29 = 0.25 - v24, v30 = v23 - 0.25,
+            v31 = v24 - 0.25;
+        const V v32 = X0 * v31 + (X6 * v29 + v28 * v3), v33 = X1 * v31 + (X7 * v29 + v28 * v5),
+            v34 = v27 * v2 + (X2 * v26 + X0 * v30), v35 = v27 * v4 + (X3 * v26 + X1 * v30),
+            v36 = 0.25 * (v25 * v14 + (v9 - w[1] * v12 - w[0] * v13)) - parameters[1],
+            v37 = v34 * v33 - v35 * v32,
+            v38 = v33 * (t0 * v30 + (v26 * t2 + v27 * v10)) + v34 * (t1 * v31 + (v29 * t7 + v28 * v17)),
+            v39 = v38 - v35 * (t0 * v31 + (v29 * t6 + v28 * v11)) - v32 * (t1 * v30 + (v26 * t3 + v27 * v16)),
+            v40 = v15 * v37, v41 = 0.25 * (d8 * w[2] * (v1 * v39 - v40));
+        s21 += v41; const V v42 = w[2] * (v1 * (v36 * v39 - t9 * v37) - v36 * v40); s22 += v42;
+        const V v43 = v25 * v41; s18 += v43; const V v44 = w[0] * v41; s20 += v44;
+        const V v45 = w[1] * v41; s19 += v45;
     }
-    softehl_store1(R + 8, 9, s25);
-    const V v109 = s23 + s24;
-    const V v110 = s24 - s23;
-    const V v111 = s21 + s22;
-    const V v112 = s21 - s22;
-    const V v113 = v109 - v111;
-    const V v114 = v109 + v111;
-    const V v115 = v110 + v112;
-    softehl_store4(R + 0, 9, v115, softehl_splat(0.0), v113, softehl_splat(0.0));
-    const V v116 = v110 - v112;
-    softehl_store4(R + 4, 9, v114, softehl_splat(0.0), v116, softehl_splat(0.0));
+    softehl_store1(R + 8, 9, s22);
+    const V v46 = s20 + s21, v47 = s21 - s20, v48 = s18 + s19, v49 = s18 - s19;
+    softehl_store4(R + 0, 9, v47 + v49, softehl_splat(0.0), v46 - v48, softehl_splat(0.0));
+    softehl_store4(R + 4, 9, v46 + v48, softehl_splat(0.0), v47 - v49, softehl_splat(0.0));
 }
-
-void softehl_mean_axial_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mean_axial_pseudo_load_group(points, modes, coordinates + 8 * e, dofs + 9 * e, 0, direction + 10 * e, parameters, rule, basis, values + 9 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mean_axial_pseudo_load_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 9 * (n - SOFTEHL_LANES), 0, direction + 10 * (n - SOFTEHL_LANES), parameters, rule, basis, values + 9 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 9];
-    softehl_pad(d, dofs, 9, n);
-    double t[SOFTEHL_LANES * 10];
-    softehl_pad(t, direction, 10, n);
-    double R[SOFTEHL_LANES * 9];
-    softehl_mean_axial_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 9 * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_mean_axial_pseudo_load, 8, 9, 0, 10, 9, 0)

@@ -18,530 +18,111 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_mean_rotation_energy_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_mean_rotation_energy)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8;
+    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
     softehl_load1(d + 8, 9, &d8);
-    (void)d8;
-    const double v1 = 1.0 / parameters[2];
-    const V v2 = 0.6220084679281462 * X0;
-    const V v3 = 0.04465819873852045 * X0;
-    const V v4 = 0.04465819873852045 * X2;
-    const V v5 = 0.6220084679281462 * X2;
-    const V v6 = X0 + X4;
-    const V v7 = 0.04465819873852045 * X4;
-    const V v8 = v2 + v7;
-    const V v9 = X2 - X0;
-    const V v10 = 0.6220084679281462 * X4;
-    const V v11 = v3 + v10;
-    const V v12 = X4 - X2;
-    const V v13 = 0.16666666666666666 * v6;
-    const V v14 = X2 + X6;
-    const V v15 = X4 - X6;
-    const V v16 = 0.6220084679281462 * X6;
-    const V v17 = v4 + v16;
-    const V v18 = 0.04465819873852045 * X6;
-    const V v19 = v5 + v18;
-    const V v20 = X6 - X0;
-    const V v21 = d8 * v1;
-    const V v22 = 0.39433756729740643 * v9;
-    const V v23 = 0.10566243270259355 * v9;
-    const V v24 = v13 - parameters[0];
-    const V v25 = 0.10566243270259355 * v12;
-    const V v26 = 0.39433756729740643 * v12;
-    const V v27 = 0.10566243270259355 * v15;
-    const V v28 = v22 + v27;
-    const V v29 = 0.39433756729740643 * v15;
-    const V v30 = v23 + v29;
-    const V v31 = 0.16666666666666666 * v14;
-    const V v32 = parameters[0] - v31;
-    const V v33 = v17 + v24;
-    const V v34 = v19 + v24;
-    const V v35 = 0.39433756729740643 * v20;
-    const V v36 = v35 + v25;
-    const V v37 = 0.10566243270259355 * v20;
-    const V v38 = v37 + v26;
-    const V v39 = v8 - v32;
-    const V v40 = v11 - v32;
-    const V v41 = 0.6220084679281462 * X1;
-    const V v42 = 0.04465819873852045 * X1;
-    const V v43 = v33 * v33;
-    const V v44 = v34 * v34;
-    const V v45 = 0.04465819873852045 * X3;
-    const V v46 = 0.6220084679281462 * X3;
-    const V v47 = X1 + X5;
-    const V v48 = 0.04465819873852045 * X5;
-    const V v49 = v41 + v48;
-    const V v50 = 0.6220084679281462 * X5;
-    const V v51 = v42 + v50;
-    const V v52 = X3 - X1;
-    const V v53 = X3 + X7;
-    const V v54 = 0.6220084679281462 * X7;
-    const V v55 = v45 + v54;
-    const V v56 = 0.16666666666666666 * v47;
-    const V v57 = X5 - X3;
-    const V v58 = X5 - X7;
-    const V v59 = 0.04465819873852045 * X7;
-    const V v60 = v46 + v59;
-    const V v61 = X7 - X1;
-    const V v62 = 0.39433756729740643 * v52;
-    const V v63 = 0.10566243270259355 * v52;
-    const V v64 = v56 - parameters[1];
-    const V v65 = 0.10566243270259355 * v57;
-    const V v66 = 0.39433756729740643 * v57;
-    const V v67 = 0.16666666666666666 * v53;
-    const V v68 = parameters[1] - v67;
-    const V v69 = 0.10566243270259355 * v58;
-    const V v70 = v62 + v69;
-    const V v71 = 0.39433756729740643 * v58;
-    const V v72 = v63 + v71;
-    const V v73 = v55 + v64;
-    const V v74 = v60 + v64;
-    const V v75 = 0.39433756729740643 * v61;
-    const V v76 = v75 + v65;
-    const V v77 = 0.10566243270259355 * v61;
-    const V v78 = v77 + v66;
-    const V v79 = v49 - v68;
-    const V v80 = v51 - v68;
-    const V v81 = v73 * v73;
-    const V v82 = v81 + v43;
-    const V v83 = v74 * v74;
-    const V v84 = v83 + v44;
-    const V v85 = 0.6220084679281462 * d0;
-    const V v86 = 0.04465819873852045 * d0;
-    const V v87 = 0.6220084679281462 * d1;
-    const V v88 = 0.04465819873852045 * d1;
-    const V v89 = v79 * v79;
-    const V v90 = d0 + d4;
-    const V v91 = 0.04465819873852045 * d4;
-    const V v92 = v85 + v91;
-    const V v93 = 0.6220084679281462 * d4;
-    const V v94 = v86 + v93;
-    const V v95 = d1 + d5;
-    const V v96 = 0.04465819873852045 * d5;
-    const V v97 = v87 + v96;
-    const V v98 = 0.6220084679281462 * d5;
-    const V v99 = v88 + v98;
-    const V v100 = 0.16666666666666666 * v90;
-    const V v101 = 0.16666666666666666 * v95;
-    const V v102 = v80 * v80;
-    const V v103 = v39 * v39;
-    const V v104 = v89 + v103;
-    const V v105 = 0.04465819873852045 * d2;
-    const V v106 = 0.6220084679281462 * d2;
-    const V v107 = 0.04465819873852045 * d3;
-    const V v108 = 0.6220084679281462 * d3;
-    const V v109 = d2 + d6;
-    const V v110 = 0.6220084679281462 * d6;
-    const V v111 = v105 + v110;
-    const V v112 = 0.04465819873852045 * d6;
-    const V v113 = v106 + v112;
-    const V v114 = 0.16666666666666666 * v109;
-    const V v115 = d3 + d7;
-    const V v116 = 0.6220084679281462 * d7;
-    const V v117 = v107 + v116;
-    const V v118 = 0.04465819873852045 * d7;
-    const V v119 = v108 + v118;
-    const V v120 = v111 + v100;
-    const V v121 = v113 + v100;
-    const V v122 = 0.16666666666666666 * v115;
-    const V v123 = v117 + v101;
-    const V v124 = v119 + v101;
-    const V v125 = v94 + v114;
-    const V v126 = v40 * v40;
-    const V v127 = v102 + v126;
-    const V v128 = v92 + v114;
-    const V v129 = v123 * v33;
-    const V v130 = v124 * v34;
-    const V v131 = v97 + v122;
-    const V v132 = v99 + v122;
-    const V v133 = v131 * v39;
-    const V v134 = v120 * v73;
-    const V v135 = v129 - v134;
-    const V v136 = v132 * v40;
-    const V v137 = v121 * v74;
-    const V v138 = v130 - v137;
-    const V v139 = v125 * v80;
-    const V v140 = v136 - v139;
-    const V v141 = parameters[3] * v82;
-    const V v142 = v135 - v141;
-    const V v143 = parameters[3] * v127;
-    const V v144 = v140 - v143;
-    const V v145 = parameters[3] * v84;
-    const V v146 = v138 - v145;
-    const V v147 = parameters[3] * v104;
-    const V v148 = v133 - v147;
-    const V v149 = v128 * v79;
-    const V v150 = v148 - v149;
-    const V v151 = v28 * v76;
-    const V v152 = v30 * v76;
-    const V v153 = v28 * v78;
-    const V v154 = v30 * v78;
-    const V v155 = v36 * v70;
-    const V v156 = v151 - v155;
-    const V v157 = v156 * v150;
-    const V v158 = v36 * v72;
-    const V v159 = v152 - v158;
-    const V v160 = v38 * v70;
-    const V v161 = v153 - v160;
-    const V v162 = v38 * v72;
-    const V v163 = v154 - v162;
-    const V v164 = v159 * v142;
-    const V v165 = v164 + v157;
-    const V v166 = v161 * v146;
-    const V v167 = v166 + v165;
-    const V v168 = v163 * v144;
-    const V v169 = v168 + v167;
-    const V v170 = v21 * v169;
-    softehl_store1(R + 0, 1, v170);
+    const V v1 = X2 - X0, v2 = X4 - X2, v3 = X4 - X6, v4 = X6 - X0,
+        v5 = 0.16666666666666666 * (X0 + X4) - parameters[0],
+        v6 = 0.39433756729740643 * v1 + 0.10566243270259355 * v3,
+        v7 = 0.10566243270259355 * v1 + 0.39433756729740643 * v3,
+        v8 = parameters[0] - 0.16666666666666666 * (X2 + X6),
+        v9 = 0.04465819873852045 * X2 + 0.6220084679281462 * X6 + v5,
+        v10 = 0.6220084679281462 * X2 + 0.04465819873852045 * X6 + v5,
+        v11 = 0.39433756729740643 * v4 + 0.10566243270259355 * v2,
+        v12 = 0.10566243270259355 * v4 + 0.39433756729740643 * v2,
+        v13 = 0.6220084679281462 * X0 + 0.04465819873852045 * X4 - v8,
+        v14 = 0.04465819873852045 * X0 + 0.6220084679281462 * X4 - v8, v15 = X3 - X1, v16 = X5 - X3,
+        v17 = X5 - X7, v18 = X7 - X1, v19 = 0.16666666666666666 * (X1 + X5) - parameters[1],
+        v20 = parameters[1] - 0.16666666666666666 * (X3 + X7),
+        v21 = 0.39433756729740643 * v15 + 0.10566243270259355 * v17,
+        v22 = 0.10566243270259355 * v15 + 0.39433756729740643 * v17,
+        v23 = 0.04465819873852045 * X3 + 0.6220084679281462 * X7 + v19,
+        v24 = 0.6220084679281462 * X3 + 0.04465819873852045 * X7 + v19,
+        v25 = 0.39433756729740643 * v18 + 0.10566243270259355 * v16,
+        v26 = 0.10566243270259355 * v18 + 0.39433756729740643 * v16,
+        v27 = 0.6220084679281462 * X1 + 0.04465819873852045 * X5 - v20,
+        v28 = 0.04465819873852045 * X1 + 0.6220084679281462 * X5 - v20,
+        v29 = 0.16666666666666666 * (d0 + d4), v30 = 0.16666666666666666 * (d1 + d5),
+        v31 = 0.16666666666666666 * (d2 + d6), v32 = 0.16666666666666666 * (d3 + d7),
+        v33 = (0.04465819873852045 * d3 + 0.6220084679281462 * d7 + v30) * v9 - (0.04465819873852045 * d2 + 0.6220084679281462 * d6 + v29) * v23,
+        v34 = (0.6220084679281462 * d3 + 0.04465819873852045 * d7 + v30) * v10 - (0.6220084679281462 * d2 + 0.04465819873852045 * d6 + v29) * v24,
+        v35 = (0.04465819873852045 * d1 + 0.6220084679281462 * d5 + v32) * v14 - (0.04465819873852045 * d0 + 0.6220084679281462 * d4 + v31) * v28,
+        v36 = (0.6220084679281462 * d1 + 0.04465819873852045 * d5 + v32) * v13 - parameters[3] * (v27 * v27 + v13 * v13),
+        v37 = v36 - (0.6220084679281462 * d0 + 0.04465819873852045 * d4 + v31) * v27,
+        v38 = (v7 * v25 - v11 * v22) * (v33 - parameters[3] * (v23 * v23 + v9 * v9)),
+        v39 = (v6 * v26 - v12 * v21) * (v34 - parameters[3] * (v24 * v24 + v10 * v10)),
+        v40 = (v7 * v26 - v12 * v22) * (v35 - parameters[3] * (v28 * v28 + v14 * v14)),
+        v41 = d8 * (1.0 / parameters[2]) * (v40 + (v39 + (v38 + (v6 * v25 - v11 * v21) * v37)));
+    softehl_store1(R + 0, 1, v41);
 }
+SOFTEHL_BATCH(softehl_mean_rotation_energy, 8, 9, 0, 0, 1, 0)
 
-void softehl_mean_rotation_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_mean_rotation_residual)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mean_rotation_energy_group(points, modes, coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters, rule, basis, values + 1 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mean_rotation_energy_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 9 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 1 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 9];
-    softehl_pad(d, dofs, 9, n);
-    double R[SOFTEHL_LANES * 1];
-    softehl_mean_rotation_energy(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 1 * n; ++i) values[i] = R[i];
-#endif
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8;
+    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
+    softehl_load1(d + 8, 9, &d8); const double v1 = 1.0 / parameters[2];
+    const V v2 = X2 - X0, v3 = X4 - X2, v4 = X4 - X6, v5 = X6 - X0,
+        v6 = 0.16666666666666666 * (X0 + X4) - parameters[0], v7 = d8 * v1,
+        v8 = parameters[0] - 0.16666666666666666 * (X2 + X6),
+        v9 = 0.39433756729740643 * v2 + 0.10566243270259355 * v4,
+        v10 = 0.10566243270259355 * v2 + 0.39433756729740643 * v4,
+        v11 = 0.04465819873852045 * X2 + 0.6220084679281462 * X6 + v6,
+        v12 = 0.6220084679281462 * X2 + 0.04465819873852045 * X6 + v6,
+        v13 = 0.39433756729740643 * v5 + 0.10566243270259355 * v3,
+        v14 = 0.10566243270259355 * v5 + 0.39433756729740643 * v3,
+        v15 = 0.6220084679281462 * X0 + 0.04465819873852045 * X4 - v8,
+        v16 = 0.04465819873852045 * X0 + 0.6220084679281462 * X4 - v8, v17 = X3 - X1, v18 = X5 - X3,
+        v19 = X5 - X7, v20 = X7 - X1, v21 = 0.16666666666666666 * (X1 + X5) - parameters[1],
+        v22 = parameters[1] - 0.16666666666666666 * (X3 + X7),
+        v23 = 0.39433756729740643 * v17 + 0.10566243270259355 * v19,
+        v24 = 0.10566243270259355 * v17 + 0.39433756729740643 * v19,
+        v25 = 0.04465819873852045 * X3 + 0.6220084679281462 * X7 + v21,
+        v26 = 0.6220084679281462 * X3 + 0.04465819873852045 * X7 + v21,
+        v27 = 0.39433756729740643 * v20 + 0.10566243270259355 * v18,
+        v28 = 0.10566243270259355 * v20 + 0.39433756729740643 * v18,
+        v29 = 0.6220084679281462 * X1 + 0.04465819873852045 * X5 - v22,
+        v30 = 0.04465819873852045 * X1 + 0.6220084679281462 * X5 - v22,
+        v31 = 0.16666666666666666 * (d0 + d4), v32 = 0.16666666666666666 * (d1 + d5),
+        v33 = 0.16666666666666666 * (d2 + d6), v34 = 0.16666666666666666 * (d3 + d7),
+        v35 = (0.04465819873852045 * d3 + 0.6220084679281462 * d7 + v32) * v11 - (0.04465819873852045 * d2 + 0.6220084679281462 * d6 + v31) * v25,
+        v36 = (0.6220084679281462 * d3 + 0.04465819873852045 * d7 + v32) * v12 - (0.6220084679281462 * d2 + 0.04465819873852045 * d6 + v31) * v26,
+        v37 = v9 * v27 - v13 * v23, v38 = v10 * v27 - v13 * v24, v39 = v9 * v28 - v14 * v23,
+        v40 = v10 * v28 - v14 * v24,
+        v41 = (0.6220084679281462 * d1 + 0.04465819873852045 * d5 + v34) * v15 - parameters[3] * (v29 * v29 + v15 * v15),
+        v42 = (0.04465819873852045 * d1 + 0.6220084679281462 * d5 + v34) * v16 - parameters[3] * (v30 * v30 + v16 * v16),
+        v43 = v7 * v38, v44 = v7 * v37, v45 = v7 * v39, v46 = v7 * v40,
+        v47 = v38 * (v35 - parameters[3] * (v25 * v25 + v11 * v11)) + v39 * (v36 - parameters[3] * (v26 * v26 + v12 * v12)),
+        v48 = v44 * v15, v49 = v43 * v25, v50 = v43 * v11, v51 = v45 * v26, v52 = v45 * v12,
+        v53 = v46 * v16, v54 = v44 * v29,
+        v55 = v41 - (0.6220084679281462 * d0 + 0.04465819873852045 * d4 + v33) * v29,
+        v56 = v46 * v30,
+        v57 = v42 - (0.04465819873852045 * d0 + 0.6220084679281462 * d4 + v33) * v30,
+        v58 = 0.16666666666666666 * (v48 + v53);
+    softehl_store1(R + 8, 9, v1 * (v47 + v37 * v55 + v40 * v57));
+    const V v59 = 0.16666666666666666 * (v49 + v51), v60 = 0.16666666666666666 * (v50 + v52),
+        v61 = 0.16666666666666666 * (v54 + v56);
+    softehl_store4(R + 4, 9, -(0.04465819873852045 * v54 + (v59 + 0.6220084679281462 * v56)), v60 + (0.6220084679281462 * v53 + 0.04465819873852045 * v48), -(0.04465819873852045 * v51 + 0.6220084679281462 * v49 + v61), 0.04465819873852045 * v52 + 0.6220084679281462 * v50 + v58);
+    softehl_store4(R + 0, 9, -(0.6220084679281462 * v54 + (v59 + 0.04465819873852045 * v56)), v60 + (0.04465819873852045 * v53 + 0.6220084679281462 * v48), -(0.6220084679281462 * v51 + 0.04465819873852045 * v49 + v61), 0.6220084679281462 * v52 + 0.04465819873852045 * v50 + v58);
 }
+SOFTEHL_BATCH(softehl_mean_rotation_residual, 8, 9, 0, 0, 9, 0)
 
-static void softehl_mean_rotation_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_mean_rotation_tangent)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8;
+    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
     softehl_load1(d + 8, 9, &d8);
-    (void)d8;
-    const double v1 = 1.0 / parameters[2];
-    const V v2 = 0.6220084679281462 * X0;
-    const V v3 = 0.04465819873852045 * X0;
-    const V v4 = 0.04465819873852045 * X2;
-    const V v5 = 0.6220084679281462 * X2;
-    const V v6 = X0 + X4;
-    const V v7 = 0.04465819873852045 * X4;
-    const V v8 = v2 + v7;
-    const V v9 = X2 - X0;
-    const V v10 = 0.6220084679281462 * X4;
-    const V v11 = v3 + v10;
-    const V v12 = 0.16666666666666666 * v6;
-    const V v13 = X4 - X2;
-    const V v14 = X2 + X6;
-    const V v15 = X4 - X6;
-    const V v16 = 0.6220084679281462 * X6;
-    const V v17 = v4 + v16;
-    const V v18 = 0.04465819873852045 * X6;
-    const V v19 = v5 + v18;
-    const V v20 = X6 - X0;
-    const V v21 = 0.39433756729740643 * v9;
-    const V v22 = 0.10566243270259355 * v9;
-    const V v23 = v12 - parameters[0];
-    const V v24 = d8 * v1;
-    const V v25 = 0.10566243270259355 * v13;
-    const V v26 = 0.39433756729740643 * v13;
-    const V v27 = 0.16666666666666666 * v14;
-    const V v28 = parameters[0] - v27;
-    const V v29 = 0.10566243270259355 * v15;
-    const V v30 = v21 + v29;
-    const V v31 = 0.39433756729740643 * v15;
-    const V v32 = v22 + v31;
-    const V v33 = v17 + v23;
-    const V v34 = v19 + v23;
-    const V v35 = 0.39433756729740643 * v20;
-    const V v36 = v35 + v25;
-    const V v37 = 0.10566243270259355 * v20;
-    const V v38 = v37 + v26;
-    const V v39 = v8 - v28;
-    const V v40 = v11 - v28;
-    const V v41 = 0.6220084679281462 * X1;
-    const V v42 = 0.04465819873852045 * X1;
-    const V v43 = v33 * v33;
-    const V v44 = v34 * v34;
-    const V v45 = 0.04465819873852045 * X3;
-    const V v46 = 0.6220084679281462 * X3;
-    const V v47 = X1 + X5;
-    const V v48 = 0.04465819873852045 * X5;
-    const V v49 = v41 + v48;
-    const V v50 = 0.6220084679281462 * X5;
-    const V v51 = v42 + v50;
-    const V v52 = X3 - X1;
-    const V v53 = 0.16666666666666666 * v47;
-    const V v54 = X5 - X3;
-    const V v55 = X3 + X7;
-    const V v56 = 0.6220084679281462 * X7;
-    const V v57 = v45 + v56;
-    const V v58 = X5 - X7;
-    const V v59 = 0.04465819873852045 * X7;
-    const V v60 = v46 + v59;
-    const V v61 = X7 - X1;
-    const V v62 = 0.39433756729740643 * v52;
-    const V v63 = 0.10566243270259355 * v52;
-    const V v64 = v53 - parameters[1];
-    const V v65 = 0.10566243270259355 * v54;
-    const V v66 = 0.39433756729740643 * v54;
-    const V v67 = 0.16666666666666666 * v55;
-    const V v68 = parameters[1] - v67;
-    const V v69 = 0.10566243270259355 * v58;
-    const V v70 = v62 + v69;
-    const V v71 = 0.39433756729740643 * v58;
-    const V v72 = v63 + v71;
-    const V v73 = v57 + v64;
-    const V v74 = v60 + v64;
-    const V v75 = 0.39433756729740643 * v61;
-    const V v76 = v75 + v65;
-    const V v77 = 0.10566243270259355 * v61;
-    const V v78 = v77 + v66;
-    const V v79 = v49 - v68;
-    const V v80 = v51 - v68;
-    const V v81 = v73 * v73;
-    const V v82 = v81 + v43;
-    const V v83 = v74 * v74;
-    const V v84 = v83 + v44;
-    const V v85 = 0.6220084679281462 * d0;
-    const V v86 = 0.04465819873852045 * d0;
-    const V v87 = 0.6220084679281462 * d1;
-    const V v88 = 0.04465819873852045 * d1;
-    const V v89 = v79 * v79;
-    const V v90 = d0 + d4;
-    const V v91 = 0.04465819873852045 * d4;
-    const V v92 = v85 + v91;
-    const V v93 = 0.6220084679281462 * d4;
-    const V v94 = v86 + v93;
-    const V v95 = d1 + d5;
-    const V v96 = 0.04465819873852045 * d5;
-    const V v97 = v87 + v96;
-    const V v98 = 0.6220084679281462 * d5;
-    const V v99 = v88 + v98;
-    const V v100 = 0.16666666666666666 * v90;
-    const V v101 = 0.16666666666666666 * v95;
-    const V v102 = v80 * v80;
-    const V v103 = v39 * v39;
-    const V v104 = v89 + v103;
-    const V v105 = 0.04465819873852045 * d2;
-    const V v106 = 0.6220084679281462 * d2;
-    const V v107 = 0.04465819873852045 * d3;
-    const V v108 = 0.6220084679281462 * d3;
-    const V v109 = v40 * v40;
-    const V v110 = v102 + v109;
-    const V v111 = d2 + d6;
-    const V v112 = 0.6220084679281462 * d6;
-    const V v113 = v105 + v112;
-    const V v114 = 0.04465819873852045 * d6;
-    const V v115 = v106 + v114;
-    const V v116 = d3 + d7;
-    const V v117 = 0.6220084679281462 * d7;
-    const V v118 = v107 + v117;
-    const V v119 = 0.04465819873852045 * d7;
-    const V v120 = v108 + v119;
-    const V v121 = 0.16666666666666666 * v111;
-    const V v122 = v113 + v100;
-    const V v123 = v115 + v100;
-    const V v124 = 0.16666666666666666 * v116;
-    const V v125 = v118 + v101;
-    const V v126 = v120 + v101;
-    const V v127 = v97 + v124;
-    const V v128 = v99 + v124;
-    const V v129 = v92 + v121;
-    const V v130 = v94 + v121;
-    const V v131 = v125 * v33;
-    const V v132 = v126 * v34;
-    const V v133 = v127 * v39;
-    const V v134 = v128 * v40;
-    const V v135 = v122 * v73;
-    const V v136 = v131 - v135;
-    const V v137 = v123 * v74;
-    const V v138 = v132 - v137;
-    const V v139 = v30 * v76;
-    const V v140 = v32 * v76;
-    const V v141 = v30 * v78;
-    const V v142 = v32 * v78;
-    const V v143 = parameters[3] * v82;
-    const V v144 = v136 - v143;
-    const V v145 = parameters[3] * v84;
-    const V v146 = v138 - v145;
-    const V v147 = v36 * v70;
-    const V v148 = v139 - v147;
-    const V v149 = v36 * v72;
-    const V v150 = v140 - v149;
-    const V v151 = v38 * v70;
-    const V v152 = v141 - v151;
-    const V v153 = v38 * v72;
-    const V v154 = v142 - v153;
-    const V v155 = v150 * v144;
-    const V v156 = parameters[3] * v104;
-    const V v157 = v133 - v156;
-    const V v158 = parameters[3] * v110;
-    const V v159 = v134 - v158;
-    const V v160 = v24 * v150;
-    const V v161 = v24 * v148;
-    const V v162 = v24 * v152;
-    const V v163 = v24 * v154;
-    const V v164 = v152 * v146;
-    const V v165 = v155 + v164;
-    const V v166 = v161 * v39;
-    const V v167 = v160 * v73;
-    const V v168 = v160 * v33;
-    const V v169 = v162 * v74;
-    const V v170 = v162 * v34;
-    const V v171 = v163 * v40;
-    const V v172 = v161 * v79;
-    const V v173 = v129 * v79;
-    const V v174 = v157 - v173;
-    const V v175 = v148 * v174;
-    const V v176 = v165 + v175;
-    const V v177 = v163 * v80;
-    const V v178 = v130 * v80;
-    const V v179 = v159 - v178;
-    const V v180 = 0.04465819873852045 * v166;
-    const V v181 = 0.6220084679281462 * v166;
-    const V v182 = v154 * v179;
-    const V v183 = v176 + v182;
-    const V v184 = 0.04465819873852045 * v170;
-    const V v185 = v166 + v171;
-    const V v186 = 0.04465819873852045 * v169;
-    const V v187 = 0.6220084679281462 * v171;
-    const V v188 = v187 + v180;
-    const V v189 = 0.04465819873852045 * v171;
-    const V v190 = v189 + v181;
-    const V v191 = v167 + v169;
-    const V v192 = 0.6220084679281462 * v169;
-    const V v193 = v168 + v170;
-    const V v194 = 0.6220084679281462 * v170;
-    const V v195 = 0.16666666666666666 * v185;
-    const V v196 = v1 * v183;
-    softehl_store1(R + 8, 9, v196);
-    const V v197 = 0.16666666666666666 * v191;
-    const V v198 = 0.16666666666666666 * v193;
-    const V v199 = 0.6220084679281462 * v168;
-    const V v200 = v184 + v199;
-    const V v201 = 0.04465819873852045 * v168;
-    const V v202 = v194 + v201;
-    const V v203 = 0.6220084679281462 * v167;
-    const V v204 = v186 + v203;
-    const V v205 = 0.04465819873852045 * v167;
-    const V v206 = v192 + v205;
-    const V v207 = 0.6220084679281462 * v177;
-    const V v208 = v200 + v195;
-    const V v209 = v202 + v195;
-    const V v210 = v198 + v188;
-    const V v211 = v198 + v190;
-    const V v212 = v172 + v177;
-    const V v213 = 0.04465819873852045 * v177;
-    const V v214 = v197 + v207;
-    const V v215 = 0.16666666666666666 * v212;
-    const V v216 = v197 + v213;
-    const V v217 = 0.04465819873852045 * v172;
-    const V v218 = v217 + v214;
-    const V v219 = 0.6220084679281462 * v172;
-    const V v220 = v219 + v216;
-    const V v221 = -v218;
-    const V v222 = -v220;
-    const V v223 = v204 + v215;
-    const V v224 = v206 + v215;
-    const V v225 = -v223;
-    softehl_store4(R + 4, 9, v221, v210, v225, v208);
-    const V v226 = -v224;
-    softehl_store4(R + 0, 9, v222, v211, v226, v209);
-}
-
-void softehl_mean_rotation_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mean_rotation_residual_group(points, modes, coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters, rule, basis, values + 9 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mean_rotation_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 9 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 9 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 9];
-    softehl_pad(d, dofs, 9, n);
-    double R[SOFTEHL_LANES * 9];
-    softehl_mean_rotation_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 9 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_mean_rotation_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8;
-    softehl_load1(d + 8, 9, &d8);
-    (void)d8;
     softehl_store4(K + 0, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 4, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 12, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
@@ -552,328 +133,73 @@ static void softehl_mean_rotation_tangent_group(
     softehl_store4(K + 48, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 56, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 64, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store1(K + 80, 81, softehl_splat(0.0));
-    const double v1 = 1.0 / parameters[2];
-    const V v2 = 0.6220084679281462 * X0;
-    const V v3 = 0.04465819873852045 * X0;
-    const V v4 = 0.04465819873852045 * X2;
-    const V v5 = 0.6220084679281462 * X2;
-    const V v6 = X0 + X4;
-    const V v7 = 0.04465819873852045 * X4;
-    const V v8 = v2 + v7;
-    const V v9 = X2 - X0;
-    const V v10 = 0.6220084679281462 * X4;
-    const V v11 = v3 + v10;
-    const V v12 = 0.16666666666666666 * v6;
-    const V v13 = X4 - X2;
-    const V v14 = X2 + X6;
-    const V v15 = X4 - X6;
-    const V v16 = 0.6220084679281462 * X6;
-    const V v17 = v4 + v16;
-    const V v18 = 0.04465819873852045 * X6;
-    const V v19 = v5 + v18;
-    const V v20 = 0.39433756729740643 * v9;
-    const V v21 = 0.10566243270259355 * v9;
-    const V v22 = X6 - X0;
-    const V v23 = 0.10566243270259355 * v13;
-    const V v24 = 0.39433756729740643 * v13;
-    const V v25 = d8 * v1;
-    const V v26 = 0.10566243270259355 * v15;
-    const V v27 = v20 + v26;
-    const V v28 = 0.39433756729740643 * v15;
-    const V v29 = v21 + v28;
-    const V v30 = v12 - parameters[0];
-    const V v31 = 0.39433756729740643 * v22;
-    const V v32 = v31 + v23;
-    const V v33 = 0.10566243270259355 * v22;
-    const V v34 = v33 + v24;
-    const V v35 = 0.16666666666666666 * v14;
-    const V v36 = parameters[0] - v35;
-    const V v37 = v17 + v30;
-    const V v38 = v19 + v30;
-    const V v39 = 0.6220084679281462 * X1;
-    const V v40 = 0.04465819873852045 * X1;
-    const V v41 = v8 - v36;
-    const V v42 = v11 - v36;
-    const V v43 = 0.04465819873852045 * X3;
-    const V v44 = 0.6220084679281462 * X3;
-    const V v45 = X1 + X5;
-    const V v46 = 0.04465819873852045 * X5;
-    const V v47 = v39 + v46;
-    const V v48 = 0.6220084679281462 * X5;
-    const V v49 = v40 + v48;
-    const V v50 = X3 - X1;
-    const V v51 = 0.16666666666666666 * v45;
-    const V v52 = X5 - X3;
-    const V v53 = X3 + X7;
-    const V v54 = 0.6220084679281462 * X7;
-    const V v55 = v43 + v54;
-    const V v56 = 0.04465819873852045 * X7;
-    const V v57 = v44 + v56;
-    const V v58 = X5 - X7;
-    const V v59 = 0.39433756729740643 * v50;
-    const V v60 = 0.10566243270259355 * v50;
-    const V v61 = X7 - X1;
-    const V v62 = 0.10566243270259355 * v52;
-    const V v63 = 0.39433756729740643 * v52;
-    const V v64 = v51 - parameters[1];
-    const V v65 = 0.10566243270259355 * v58;
-    const V v66 = v59 + v65;
-    const V v67 = 0.39433756729740643 * v58;
-    const V v68 = v60 + v67;
-    const V v69 = 0.16666666666666666 * v53;
-    const V v70 = parameters[1] - v69;
-    const V v71 = 0.39433756729740643 * v61;
-    const V v72 = v71 + v62;
-    const V v73 = 0.10566243270259355 * v61;
-    const V v74 = v73 + v63;
-    const V v75 = v55 + v64;
-    const V v76 = v57 + v64;
-    const V v77 = v38 * v38;
-    const V v78 = v47 - v70;
-    const V v79 = v49 - v70;
-    const V v80 = v41 * v41;
-    const V v81 = v42 * v42;
-    const V v82 = v76 * v76;
-    const V v83 = v82 + v77;
-    const V v84 = v75 * v75;
-    const V v85 = v78 * v78;
-    const V v86 = v85 + v80;
-    const V v87 = v79 * v79;
-    const V v88 = v87 + v81;
-    const V v89 = 0.6220084679281462 * d0;
-    const V v90 = 0.04465819873852045 * d0;
-    const V v91 = 0.6220084679281462 * d1;
-    const V v92 = 0.04465819873852045 * d1;
-    const V v93 = v37 * v37;
-    const V v94 = v84 + v93;
-    const V v95 = d0 + d4;
-    const V v96 = 0.04465819873852045 * d4;
-    const V v97 = v89 + v96;
-    const V v98 = 0.6220084679281462 * d4;
-    const V v99 = v90 + v98;
-    const V v100 = 0.16666666666666666 * v95;
-    const V v101 = d1 + d5;
-    const V v102 = 0.04465819873852045 * d5;
-    const V v103 = v91 + v102;
-    const V v104 = 0.6220084679281462 * d5;
-    const V v105 = v92 + v104;
-    const V v106 = 0.16666666666666666 * v101;
-    const V v107 = 0.04465819873852045 * d2;
-    const V v108 = 0.6220084679281462 * d2;
-    const V v109 = 0.04465819873852045 * d3;
-    const V v110 = 0.6220084679281462 * d3;
-    const V v111 = d2 + d6;
-    const V v112 = 0.6220084679281462 * d6;
-    const V v113 = v107 + v112;
-    const V v114 = 0.04465819873852045 * d6;
-    const V v115 = v108 + v114;
-    const V v116 = 0.16666666666666666 * v111;
-    const V v117 = d3 + d7;
-    const V v118 = 0.6220084679281462 * d7;
-    const V v119 = v109 + v118;
-    const V v120 = 0.04465819873852045 * d7;
-    const V v121 = v110 + v120;
-    const V v122 = v113 + v100;
-    const V v123 = v115 + v100;
-    const V v124 = 0.16666666666666666 * v117;
-    const V v125 = v119 + v106;
-    const V v126 = v121 + v106;
-    const V v127 = v97 + v116;
-    const V v128 = v99 + v116;
-    const V v129 = v125 * v37;
-    const V v130 = v103 + v124;
-    const V v131 = v105 + v124;
-    const V v132 = v126 * v38;
-    const V v133 = v27 * v72;
-    const V v134 = v29 * v72;
-    const V v135 = v27 * v74;
-    const V v136 = v29 * v74;
-    const V v137 = v122 * v75;
-    const V v138 = v129 - v137;
-    const V v139 = v123 * v76;
-    const V v140 = v132 - v139;
-    const V v141 = parameters[3] * v94;
-    const V v142 = v138 - v141;
-    const V v143 = v130 * v41;
-    const V v144 = v131 * v42;
-    const V v145 = parameters[3] * v83;
-    const V v146 = v140 - v145;
-    const V v147 = v32 * v66;
-    const V v148 = v133 - v147;
-    const V v149 = v32 * v68;
-    const V v150 = v134 - v149;
-    const V v151 = v34 * v66;
-    const V v152 = v135 - v151;
-    const V v153 = v34 * v68;
-    const V v154 = v136 - v153;
-    const V v155 = parameters[3] * v86;
-    const V v156 = v143 - v155;
-    const V v157 = parameters[3] * v88;
-    const V v158 = v144 - v157;
-    const V v159 = v25 * v148;
-    const V v160 = v1 * v148;
-    const V v161 = v25 * v150;
-    const V v162 = v1 * v150;
-    const V v163 = v25 * v152;
-    const V v164 = v25 * v154;
-    const V v165 = v1 * v152;
-    const V v166 = v1 * v154;
-    const V v167 = v142 * v162;
-    const V v168 = v159 * v41;
-    const V v169 = v41 * v160;
-    const V v170 = v159 * v78;
-    const V v171 = v127 * v78;
-    const V v172 = v156 - v171;
-    const V v173 = v78 * v160;
-    const V v174 = v164 * v42;
-    const V v175 = v42 * v166;
-    const V v176 = v172 * v160;
-    const V v177 = v167 + v176;
-    const V v178 = v164 * v79;
-    const V v179 = v128 * v79;
-    const V v180 = v158 - v179;
-    const V v181 = v79 * v166;
-    const V v182 = v166 * v180;
-    const V v183 = v177 + v182;
-    const V v184 = 0.6220084679281462 * v174;
-    const V v185 = 0.04465819873852045 * v170;
-    const V v186 = 0.6220084679281462 * v170;
-    const V v187 = v170 + v178;
-    const V v188 = v168 + v174;
-    const V v189 = 0.04465819873852045 * v174;
-    const V v190 = 0.16666666666666666 * v187;
-    const V v191 = 0.04465819873852045 * v168;
-    const V v192 = v184 + v191;
-    const V v193 = 0.16666666666666666 * v188;
-    const V v194 = v146 * v165;
-    const V v195 = v194 + v183;
-    softehl_store1(R + 8, 9, v195);
-    const V v196 = 0.6220084679281462 * v168;
-    const V v197 = v189 + v196;
-    const V v198 = 0.6220084679281462 * v178;
-    const V v199 = v198 + v185;
-    const V v200 = 0.04465819873852045 * v178;
-    const V v201 = v200 + v186;
-    const V v202 = v173 + v181;
-    const V v203 = 0.04465819873852045 * v181;
-    const V v204 = 0.6220084679281462 * v181;
-    const V v205 = 0.16666666666666666 * v202;
-    const V v206 = v169 + v175;
-    const V v207 = 0.04465819873852045 * v175;
-    const V v208 = 0.6220084679281462 * v175;
-    const V v209 = 0.16666666666666666 * v206;
-    const V v210 = v76 * v165;
-    const V v211 = v163 * v76;
-    const V v212 = v163 * v38;
-    const V v213 = v38 * v165;
-    const V v214 = 0.6220084679281462 * v169;
-    const V v215 = v207 + v214;
-    const V v216 = 0.04465819873852045 * v169;
-    const V v217 = v208 + v216;
-    const V v218 = 0.04465819873852045 * v211;
-    const V v219 = v218 + v190;
-    const V v220 = 0.6220084679281462 * v211;
-    const V v221 = v220 + v190;
-    const V v222 = 0.04465819873852045 * v212;
-    const V v223 = v222 + v193;
-    const V v224 = 0.6220084679281462 * v212;
-    const V v225 = v224 + v193;
-    const V v226 = 0.6220084679281462 * v210;
-    const V v227 = v226 + v205;
-    const V v228 = 0.04465819873852045 * v210;
-    const V v229 = v228 + v205;
-    const V v230 = 0.6220084679281462 * v213;
-    const V v231 = 0.04465819873852045 * v213;
-    const V v232 = 0.04465819873852045 * v173;
-    const V v233 = v204 + v232;
-    const V v234 = 0.6220084679281462 * v173;
-    const V v235 = v203 + v234;
-    const V v236 = v161 * v75;
-    const V v237 = v161 * v37;
-    const V v238 = v75 * v162;
-    const V v239 = v37 * v162;
-    const V v240 = v237 + v212;
-    const V v241 = 0.6220084679281462 * v237;
-    const V v242 = v241 + v223;
-    const V v243 = 0.04465819873852045 * v237;
-    const V v244 = v243 + v225;
-    const V v245 = v238 + v210;
-    const V v246 = 0.04465819873852045 * v238;
-    const V v247 = v246 + v227;
-    const V v248 = 0.6220084679281462 * v238;
-    const V v249 = v248 + v229;
-    const V v250 = v239 + v213;
-    const V v251 = 0.04465819873852045 * v239;
-    const V v252 = v230 + v251;
-    const V v253 = 0.6220084679281462 * v239;
-    const V v254 = v231 + v253;
-    const V v255 = 0.16666666666666666 * v240;
-    const V v256 = 0.16666666666666666 * v245;
-    const V v257 = -v247;
-    softehl_store4(K + 24, 81, softehl_splat(0.0), softehl_splat(0.0), v257, softehl_splat(0.0));
-    const V v258 = -v249;
-    softehl_store4(K + 60, 81, softehl_splat(0.0), softehl_splat(0.0), v258, softehl_splat(0.0));
-    const V v259 = 0.16666666666666666 * v250;
-    const V v260 = v236 + v211;
-    const V v261 = v252 + v209;
-    softehl_store4(K + 32, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v261);
-    const V v262 = v254 + v209;
-    softehl_store4(K + 68, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v262);
-    const V v263 = 0.16666666666666666 * v260;
-    const V v264 = v256 + v235;
-    const V v265 = v256 + v233;
-    const V v266 = 0.6220084679281462 * v236;
-    const V v267 = v266 + v219;
-    const V v268 = 0.04465819873852045 * v236;
-    const V v269 = v268 + v221;
-    const V v270 = -v267;
-    const V v271 = -v269;
-    const V v272 = v255 + v192;
-    const V v273 = v255 + v197;
-    const V v274 = -v264;
-    softehl_store4(K + 8, 81, v274, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v275 = -v265;
-    softehl_store4(K + 44, 81, v275, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v276 = v259 + v215;
-    softehl_store4(K + 16, 81, softehl_splat(0.0), v276, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 72, 81, v274, v276, v257, v261);
-    const V v277 = v259 + v217;
-    softehl_store4(K + 52, 81, softehl_splat(0.0), v277, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 76, 81, v275, v277, v258, v262);
-    const V v278 = v263 + v199;
-    const V v279 = v263 + v201;
-    const V v280 = -v278;
-    softehl_store4(R + 4, 9, v280, v272, v270, v242);
-    const V v281 = -v279;
-    softehl_store4(R + 0, 9, v281, v273, v271, v244);
+    softehl_store1(K + 80, 81, softehl_splat(0.0)); const double v1 = 1.0 / parameters[2];
+    const V v2 = X2 - X0, v3 = X4 - X2, v4 = X4 - X6, v5 = X6 - X0, v6 = d8 * v1,
+        v7 = 0.39433756729740643 * v2 + 0.10566243270259355 * v4,
+        v8 = 0.10566243270259355 * v2 + 0.39433756729740643 * v4,
+        v9 = 0.16666666666666666 * (X0 + X4) - parameters[0],
+        v10 = 0.39433756729740643 * v5 + 0.10566243270259355 * v3,
+        v11 = 0.10566243270259355 * v5 + 0.39433756729740643 * v3,
+        v12 = parameters[0] - 0.16666666666666666 * (X2 + X6),
+        v13 = 0.04465819873852045 * X2 + 0.6220084679281462 * X6 + v9,
+        v14 = 0.6220084679281462 * X2 + 0.04465819873852045 * X6 + v9,
+        v15 = 0.6220084679281462 * X0 + 0.04465819873852045 * X4 - v12,
+        v16 = 0.04465819873852045 * X0 + 0.6220084679281462 * X4 - v12, v17 = X3 - X1,
+        v18 = X5 - X3, v19 = X5 - X7, v20 = X7 - X1,
+        v21 = 0.16666666666666666 * (X1 + X5) - parameters[1],
+        v22 = 0.39433756729740643 * v17 + 0.10566243270259355 * v19,
+        v23 = 0.10566243270259355 * v17 + 0.39433756729740643 * v19,
+        v24 = parameters[1] - 0.16666666666666666 * (X3 + X7),
+        v25 = 0.39433756729740643 * v20 + 0.10566243270259355 * v18,
+        v26 = 0.10566243270259355 * v20 + 0.39433756729740643 * v18,
+        v27 = 0.04465819873852045 * X3 + 0.6220084679281462 * X7 + v21,
+        v28 = 0.6220084679281462 * X3 + 0.04465819873852045 * X7 + v21,
+        v29 = 0.6220084679281462 * X1 + 0.04465819873852045 * X5 - v24,
+        v30 = 0.04465819873852045 * X1 + 0.6220084679281462 * X5 - v24,
+        v31 = 0.16666666666666666 * (d0 + d4), v32 = 0.16666666666666666 * (d1 + d5),
+        v33 = 0.16666666666666666 * (d2 + d6), v34 = 0.16666666666666666 * (d3 + d7),
+        v35 = (0.04465819873852045 * d3 + 0.6220084679281462 * d7 + v32) * v13 - (0.04465819873852045 * d2 + 0.6220084679281462 * d6 + v31) * v27,
+        v36 = (0.6220084679281462 * d3 + 0.04465819873852045 * d7 + v32) * v14 - (0.6220084679281462 * d2 + 0.04465819873852045 * d6 + v31) * v28,
+        v37 = v7 * v25 - v10 * v22, v38 = v8 * v25 - v10 * v23, v39 = v7 * v26 - v11 * v22,
+        v40 = v8 * v26 - v11 * v23,
+        v41 = (0.6220084679281462 * d1 + 0.04465819873852045 * d5 + v34) * v15 - parameters[3] * (v29 * v29 + v15 * v15),
+        v42 = (0.04465819873852045 * d1 + 0.6220084679281462 * d5 + v34) * v16 - parameters[3] * (v30 * v30 + v16 * v16),
+        v43 = v6 * v37, v44 = v1 * v37, v45 = v6 * v38, v46 = v1 * v38, v47 = v6 * v39,
+        v48 = v6 * v40, v49 = v1 * v39, v50 = v1 * v40, v51 = v43 * v15, v52 = v15 * v44,
+        v53 = v43 * v29,
+        v54 = v41 - (0.6220084679281462 * d0 + 0.04465819873852045 * d4 + v33) * v29,
+        v55 = v29 * v44, v56 = v48 * v16, v57 = v16 * v50,
+        v58 = (v35 - parameters[3] * (v27 * v27 + v13 * v13)) * v46 + v54 * v44, v59 = v48 * v30,
+        v60 = v42 - (0.04465819873852045 * d0 + 0.6220084679281462 * d4 + v33) * v30,
+        v61 = v30 * v50, v62 = 0.16666666666666666 * (v53 + v59),
+        v63 = 0.16666666666666666 * (v51 + v56),
+        v64 = (v36 - parameters[3] * (v28 * v28 + v14 * v14)) * v49 + (v58 + v50 * v60);
+    softehl_store1(R + 8, 9, v64);
+    const V v65 = 0.16666666666666666 * (v55 + v61), v66 = 0.16666666666666666 * (v52 + v57),
+        v67 = v28 * v49, v68 = v47 * v28, v69 = v47 * v14, v70 = v14 * v49, v71 = v45 * v27,
+        v72 = v45 * v13, v73 = v27 * v46, v74 = v13 * v46, v75 = 0.16666666666666666 * (v72 + v69),
+        v76 = 0.16666666666666666 * (v73 + v67),
+        v77 = -(0.04465819873852045 * v73 + (0.6220084679281462 * v67 + v65));
+    softehl_store4(K + 24, 81, softehl_splat(0.0), softehl_splat(0.0), v77, softehl_splat(0.0));
+    const V v78 = -(0.6220084679281462 * v73 + (0.04465819873852045 * v67 + v65));
+    softehl_store4(K + 60, 81, softehl_splat(0.0), softehl_splat(0.0), v78, softehl_splat(0.0));
+    const V v79 = 0.16666666666666666 * (v74 + v70),
+        v80 = 0.6220084679281462 * v70 + 0.04465819873852045 * v74 + v66;
+    softehl_store4(K + 32, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v80);
+    const V v81 = 0.04465819873852045 * v70 + 0.6220084679281462 * v74 + v66;
+    softehl_store4(K + 68, 81, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v81);
+    const V v82 = 0.16666666666666666 * (v71 + v68),
+        v83 = -(v76 + (0.04465819873852045 * v61 + 0.6220084679281462 * v55));
+    softehl_store4(K + 8, 81, v83, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    const V v84 = -(v76 + (0.6220084679281462 * v61 + 0.04465819873852045 * v55));
+    softehl_store4(K + 44, 81, v84, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    const V v85 = v79 + (0.04465819873852045 * v57 + 0.6220084679281462 * v52);
+    softehl_store4(K + 16, 81, softehl_splat(0.0), v85, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 72, 81, v83, v85, v77, v80);
+    const V v86 = v79 + (0.6220084679281462 * v57 + 0.04465819873852045 * v52);
+    softehl_store4(K + 52, 81, softehl_splat(0.0), v86, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 76, 81, v84, v86, v78, v81);
+    softehl_store4(R + 4, 9, -(v82 + (0.6220084679281462 * v59 + 0.04465819873852045 * v53)), v75 + (0.6220084679281462 * v56 + 0.04465819873852045 * v51), -(0.6220084679281462 * v71 + (0.04465819873852045 * v68 + v62)), 0.6220084679281462 * v72 + (0.04465819873852045 * v69 + v63));
+    softehl_store4(R + 0, 9, -(v82 + (0.04465819873852045 * v59 + 0.6220084679281462 * v53)), v75 + (0.04465819873852045 * v56 + 0.6220084679281462 * v51), -(0.04465819873852045 * v71 + (0.6220084679281462 * v68 + v62)), 0.04465819873852045 * v72 + (0.6220084679281462 * v69 + v63));
 }
-
-void softehl_mean_rotation_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mean_rotation_tangent_group(points, modes, coordinates + 8 * e, dofs + 9 * e, 0, 0, parameters, rule, basis, values + 9 * e, tangent + (9 * 9) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mean_rotation_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 9 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 9 * (n - SOFTEHL_LANES), tangent + (9 * 9) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 9];
-    softehl_pad(d, dofs, 9, n);
-    double R[SOFTEHL_LANES * 9];
-    double K[SOFTEHL_LANES * (9 * 9)];
-    softehl_mean_rotation_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 9 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (9 * 9) * n; ++i) tangent[i] = K[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_mean_rotation_tangent, 8, 9, 0, 0, 9, (9 * 9))

@@ -18,267 +18,50 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_mean_rotation_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_mean_rotation_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8;
+    softehl_load4(d + 0, 9, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 9, &d4, &d5, &d6, &d7);
     softehl_load1(d + 8, 9, &d8);
-    (void)d8;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 12, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 12, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
-    softehl_load4(t + 8, 12, &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    const double v1 = 1.0 / parameters[2];
-    const V v2 = X4 - X6;
-    const V v3 = X4 - X2;
-    const V v4 = X5 - X7;
-    const V v5 = X5 - X3;
-    const V v6 = t4 - t2;
-    const V v7 = t4 - t6;
-    const V v8 = t5 - t3;
-    const V v9 = t5 - t7;
-    const V v10 = d8 * v1;
-    const double v11 = v1 * v1;
-    const V v12 = t10 * v11;
-    V s13 = softehl_splat(0.0);
-    V s14 = softehl_splat(0.0);
-    V s15 = softehl_splat(0.0);
-    V s16 = softehl_splat(0.0);
-    V s17 = softehl_splat(0.0);
-    V s18 = softehl_splat(0.0);
-    V s19 = softehl_splat(0.0);
-    V s20 = softehl_splat(0.0);
-    V s21 = softehl_splat(0.0);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11;
+    softehl_load4(t + 0, 12, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 12, &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, 12, &t8, &t9, &t10, &t11); const double v1 = 1.0 / parameters[2];
+    const V v2 = X4 - X6, v3 = X4 - X2, v4 = X5 - X7, v5 = X5 - X3, v6 = t4 - t2, v7 = t4 - t6,
+        v8 = t5 - t3, v9 = t5 - t7, v10 = d8 * v1, v11 = t10 * (v1 * v1);
+    V s12 = {0}, s13 = {0}, s14 = {0}, s15 = {0}, s16 = {0}, s17 = {0}, s18 = {0}, s19 = {0},
+        s20 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v22 = 1.0 - w[1];
-        const double v23 = 1.0 + w[1];
-        const double v24 = 0.25 * w[1];
-        const double v25 = 1.0 - w[0];
-        const double v26 = 1.0 + w[0];
-        const double v27 = 0.25 * w[0];
-        const double v28 = 0.25 * v22;
-        const double v29 = 0.25 * v23;
-        const double v30 = 0.25 - v24;
-        const double v31 = 0.25 + v24;
-        const double v32 = 0.25 + v27;
-        const double v33 = 0.25 - v27;
-        const double v34 = v28 * v25;
-        const double v35 = v25 * v29;
-        const double v36 = v26 * v29;
-        const double v37 = v28 * v26;
-        const double v38 = v24 - 0.25;
-        const double v39 = v27 - 0.25;
-        const V v40 = v31 * v2;
-        const V v41 = v32 * v3;
-        const V v42 = v31 * v4;
-        const V v43 = v32 * v5;
-        const V v44 = X5 * v36;
-        const V v45 = X4 * v36;
-        const V v46 = v36 * t5;
-        const V v47 = v36 * t4;
-        const V v48 = v31 * v7;
-        const V v49 = v31 * v9;
-        const V v50 = v45 - parameters[0];
-        const V v51 = v44 - parameters[1];
-        const V v52 = v46 - t9;
-        const V v53 = v47 - t8;
-        const V v54 = v32 * v6;
-        const V v55 = v32 * v8;
-        const V v56 = d8 * w[2];
-        const V v57 = w[2] * v10;
-        const V v58 = X0 * v39;
-        const V v59 = v58 + v41;
-        const V v60 = X0 * v34;
-        const V v61 = v60 + v50;
-        const V v62 = X1 * v34;
-        const V v63 = v62 + v51;
-        const V v64 = v34 * t1;
-        const V v65 = v64 + v52;
-        const V v66 = t1 * v39;
-        const V v67 = v66 + v55;
-        const V v68 = t1 * v38;
-        const V v69 = v68 + v49;
-        const V v70 = X0 * v38;
-        const V v71 = v70 + v40;
-        const V v72 = v34 * t0;
-        const V v73 = v72 + v53;
-        const V v74 = t0 * v39;
-        const V v75 = v74 + v54;
-        const V v76 = X1 * v39;
-        const V v77 = v76 + v43;
-        const V v78 = X1 * v38;
-        const V v79 = v78 + v42;
-        const V v80 = t0 * v38;
-        const V v81 = v80 + v48;
-        const V v82 = X6 * v33;
-        const V v83 = v82 + v59;
-        const V v84 = X6 * v35;
-        const V v85 = v84 + v61;
-        const V v86 = v33 * t7;
-        const V v87 = v86 + v67;
-        const V v88 = v35 * t7;
-        const V v89 = v88 + v65;
-        const V v90 = v33 * t6;
-        const V v91 = v90 + v75;
-        const V v92 = v35 * t6;
-        const V v93 = v92 + v73;
-        const V v94 = X7 * v33;
-        const V v95 = v94 + v77;
-        const V v96 = X7 * v35;
-        const V v97 = v96 + v63;
-        const V v98 = X2 * v30;
-        const V v99 = v98 + v71;
-        const V v100 = X2 * v37;
-        const V v101 = v100 + v85;
-        const V v102 = X3 * v30;
-        const V v103 = v102 + v79;
-        const V v104 = X3 * v37;
-        const V v105 = v104 + v97;
-        const V v106 = v30 * t2;
-        const V v107 = v106 + v81;
-        const V v108 = t2 * v37;
-        const V v109 = v108 + v93;
-        const V v110 = v87 * v99;
-        const V v111 = v95 * v99;
-        const V v112 = t3 * v37;
-        const V v113 = v112 + v89;
-        const V v114 = v30 * t3;
-        const V v115 = v114 + v69;
-        const V v116 = v95 * v107;
-        const V v117 = v110 + v116;
-        const V v118 = v83 * v103;
-        const V v119 = v111 - v118;
-        const V v120 = v91 * v103;
-        const V v121 = v117 - v120;
-        const V v122 = v83 * v115;
-        const V v123 = v121 - v122;
-        const V v124 = v56 * v119;
-        const V v125 = v57 * v123;
-        const V v126 = v12 * v124;
-        const V v127 = v125 - v126;
-        const V v128 = v1 * v124;
-        const V v129 = v113 * v128;
-        const V v130 = v109 * v128;
-        const V v131 = v105 * v127;
-        const V v132 = v129 + v131;
-        const V v133 = v101 * v127;
-        const V v134 = v130 + v133;
-        const V v135 = v35 * v132;
-        s14 += v135;
-        const V v136 = v35 * v134;
-        s13 += v136;
-        const V v137 = v37 * v132;
-        s18 += v137;
-        const V v138 = v37 * v134;
-        s17 += v138;
-        const V v139 = v34 * v132;
-        s20 += v139;
-        const V v140 = v34 * v134;
-        s19 += v140;
-        const V v141 = v36 * v132;
-        s16 += v141;
-        const V v142 = v36 * v134;
-        s15 += v142;
-        const V v143 = d1 * v34;
-        const V v144 = d0 * v34;
-        const V v145 = v105 * v105;
-        const V v146 = v105 * v113;
-        const V v147 = v1 * v123;
-        const V v148 = d5 * v36;
-        const V v149 = v143 + v148;
-        const V v150 = d4 * v36;
-        const V v151 = v144 + v150;
-        const V v152 = v101 * v101;
-        const V v153 = v145 + v152;
-        const V v154 = v101 * v109;
-        const V v155 = v146 + v154;
-        const V v156 = 2.0 * v155;
-        const V v157 = d7 * v35;
-        const V v158 = v157 + v149;
-        const V v159 = d6 * v35;
-        const V v160 = v159 + v151;
-        const V v161 = d3 * v37;
-        const V v162 = v161 + v158;
-        const V v163 = d2 * v37;
-        const V v164 = v163 + v160;
-        const V v165 = v101 * v162;
-        const V v166 = v162 * v109;
-        const V v167 = v105 * v164;
-        const V v168 = v165 - v167;
-        const V v169 = v164 * v113;
-        const V v170 = v166 - v169;
-        const V v171 = t11 * v153;
-        const V v172 = v170 - v171;
-        const V v173 = parameters[3] * v156;
-        const V v174 = v172 - v173;
-        const V v175 = parameters[3] * v153;
-        const V v176 = v168 - v175;
-        const V v177 = v176 * v147;
-        const V v178 = v1 * v174;
-        const V v179 = v12 * v176;
-        const V v180 = v178 - v179;
-        const V v181 = v180 * v119;
-        const V v182 = v177 + v181;
-        const V v183 = w[2] * v182;
-        s21 += v183;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v21 = 0.25 * w[1], v22 = 1.0 - w[0], v23 = 1.0 + w[0], v24 = 0.25 * w[0],
+            v25 = 0.25 * (1.0 - w[1]), v26 = 0.25 * (1.0 + w[1]), v27 = 0.25 - v21,
+            v28 = 0.25 + v21, v29 = 0.25 + v24, v30 = 0.25 - v24, v31 = v25 * v22, v32 = v22 * v26,
+            v33 = v23 * v26, v34 = v25 * v23, v35 = v21 - 0.25, v36 = v24 - 0.25;
+        const V v37 = X6 * v30 + (X0 * v36 + v29 * v3), v38 = X7 * v30 + (X1 * v36 + v29 * v5),
+            v39 = X2 * v27 + (X0 * v35 + v28 * v2),
+            v40 = X2 * v34 + (X6 * v32 + (X0 * v31 + (X4 * v33 - parameters[0]))),
+            v41 = X3 * v27 + (X1 * v35 + v28 * v4),
+            v42 = X3 * v34 + (X7 * v32 + (X1 * v31 + (X5 * v33 - parameters[1]))),
+            v43 = t2 * v34 + (v32 * t6 + (v31 * t0 + (v33 * t4 - t8))),
+            v44 = t3 * v34 + (v32 * t7 + (v31 * t1 + (v33 * t5 - t9))),
+            v45 = (v30 * t7 + (t1 * v36 + v29 * v8)) * v39 + v38 * (v27 * t2 + (t0 * v35 + v28 * v7)),
+            v46 = v38 * v39 - v37 * v41,
+            v47 = v45 - (v30 * t6 + (t0 * v36 + v29 * v6)) * v41 - v37 * (v27 * t3 + (t1 * v35 + v28 * v9)),
+            v48 = d8 * w[2] * v46, v49 = w[2] * v10 * v47 - v11 * v48, v50 = v1 * v48,
+            v51 = v44 * v50 + v42 * v49, v52 = v43 * v50 + v40 * v49, v53 = v32 * v51;
+        s13 += v53; const V v54 = v32 * v52; s12 += v54; const V v55 = v34 * v51; s17 += v55;
+        const V v56 = v34 * v52; s16 += v56; const V v57 = v31 * v51; s19 += v57;
+        const V v58 = v31 * v52; s18 += v58; const V v59 = v33 * v51; s15 += v59;
+        const V v60 = v33 * v52; s14 += v60;
+        const V v61 = v42 * v42 + v40 * v40, v62 = d3 * v34 + (d7 * v32 + (d1 * v31 + d5 * v33)),
+            v63 = d2 * v34 + (d6 * v32 + (d0 * v31 + d4 * v33)),
+            v64 = v62 * v43 - v63 * v44 - t11 * v61 - parameters[3] * (2.0 * (v42 * v44 + v40 * v43)),
+            v65 = v40 * v62 - v42 * v63 - parameters[3] * v61;
+        s20 += w[2] * (v65 * (v1 * v47) + (v1 * v64 - v11 * v65) * v46);
     }
-    softehl_store1(R + 8, 9, s21);
-    const V v184 = -s14;
-    const V v185 = -s16;
-    softehl_store4(R + 4, 9, v185, s15, v184, s13);
-    const V v186 = -s18;
-    const V v187 = -s20;
-    softehl_store4(R + 0, 9, v187, s19, v186, s17);
+    softehl_store1(R + 8, 9, s20); softehl_store4(R + 4, 9, -s15, s14, -s13, s12);
+    softehl_store4(R + 0, 9, -s19, s18, -s17, s16);
 }
-
-void softehl_mean_rotation_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mean_rotation_pseudo_load_group(points, modes, coordinates + 8 * e, dofs + 9 * e, 0, direction + 12 * e, parameters, rule, basis, values + 9 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mean_rotation_pseudo_load_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 9 * (n - SOFTEHL_LANES), 0, direction + 12 * (n - SOFTEHL_LANES), parameters, rule, basis, values + 9 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 9];
-    softehl_pad(d, dofs, 9, n);
-    double t[SOFTEHL_LANES * 12];
-    softehl_pad(t, direction, 12, n);
-    double R[SOFTEHL_LANES * 9];
-    softehl_mean_rotation_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 9 * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_mean_rotation_pseudo_load, 8, 9, 0, 12, 9, 0)

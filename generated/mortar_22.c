@@ -30,2780 +30,849 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_mortar_22_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_mortar_22_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 12, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 12, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11;
+    softehl_load4(d + 0, 12, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 12, &d4, &d5, &d6, &d7);
     softehl_load4(d + 8, 12, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V a0, a1, a2, a3;
-    softehl_load4(a + 0, 13, &a0, &a1, &a2, &a3);
-    (void)a0; (void)a1; (void)a2; (void)a3;
-    V a4, a5, a6, a7;
-    softehl_load4(a + 4, 13, &a4, &a5, &a6, &a7);
-    (void)a4; (void)a5; (void)a6; (void)a7;
-    V a8, a9, a10, a11;
-    softehl_load4(a + 8, 13, &a8, &a9, &a10, &a11);
-    (void)a8; (void)a9; (void)a10; (void)a11;
-    V a12;
-    softehl_load1(a + 12, 13, &a12);
-    (void)a12;
-    const V v1 = 1.0 / a8;
-    const V v2 = X0 + d0;
-    const V v3 = X1 + d1;
-    const V v4 = X2 + d2;
-    const V v5 = X0 + a0;
-    const V v6 = X2 - X0;
-    const V v7 = X1 + a4;
-    const V v8 = X6 + d6;
-    const V v9 = X2 + a1;
-    const V v10 = X3 + d3;
-    const V v11 = 0.5 * v6;
-    const V v12 = X6 + a3;
-    const V v13 = X3 - X1;
-    const V v14 = X7 + d7;
-    const V v15 = X3 + a5;
-    const V v16 = v11 * v11;
-    const V v17 = 0.5 * v13;
-    const V v18 = X7 + a7;
-    const V v19 = X4 + a2;
-    const V v20 = v8 - X4;
-    const V v21 = v17 * v17;
-    const V v22 = v16 + v21;
-    const V v23 = X5 + a6;
-    const V v24 = v14 - X5;
-    const V v25 = X4 + d4;
-    const V v26 = v20 - d4;
-    const V v27 = X5 + d5;
-    const V v28 = v24 - d5;
-    const V v29 = v3 + v10;
-    const V v30 = v10 - v3;
-    const V v31 = 0.5 * v29;
-    const V v32 = 0.5 * v30;
-    const V v33 = v2 + v4;
-    const V v34 = v4 - v2;
-    const V v35 = 0.5 * v33;
-    const V v36 = 0.5 * v34;
-    const V v37 = v14 - v31;
-    const V v38 = v27 - v31;
-    const V v39 = v32 * v32;
-    const V v40 = v8 - v35;
-    const V v41 = v25 - v35;
-    const V v42 = v32 * v37;
-    const V v43 = v32 * v38;
-    const V v44 = v36 * v36;
-    const V v45 = v44 + v39;
-    const V v46 = v36 * v40;
-    const V v47 = v46 + v42;
-    const V v48 = v36 * v41;
-    const V v49 = v48 + v43;
-    const V v50 = 1.0 / v45;
-    const V v51 = v47 * v50;
-    const M v52 = softehl_lt(softehl_splat(1.0), v51);
-    const V v53 = softehl_blend(v52, softehl_splat(1.0), v51);
-    const M v54 = softehl_eq(v53, v53);
-    const V v55 = v49 * v50;
+    V a0, a1, a2, a3, a4, a5, a6, a7, a8, a9, a10, a11, a12;
+    softehl_load4(a + 0, 13, &a0, &a1, &a2, &a3); softehl_load4(a + 4, 13, &a4, &a5, &a6, &a7);
+    softehl_load4(a + 8, 13, &a8, &a9, &a10, &a11); softehl_load1(a + 12, 13, &a12);
+    const V v1 = 1.0 / a8, v2 = X0 + d0, v3 = X1 + d1, v4 = X2 + d2, v5 = X0 + a0, v6 = X1 + a4,
+        v7 = X6 + d6, v8 = X2 + a1, v9 = X3 + d3, v10 = 0.5 * (X2 - X0), v11 = X6 + a3,
+        v12 = X7 + d7, v13 = X3 + a5, v14 = 0.5 * (X3 - X1), v15 = X7 + a7, v16 = X4 + a2,
+        v17 = X5 + a6, v18 = X4 + d4, v19 = X5 + d5, v20 = 0.5 * (v3 + v9), v21 = 0.5 * (v9 - v3),
+        v22 = 0.5 * (v2 + v4), v23 = 0.5 * (v4 - v2), v24 = v23 * v23 + v21 * v21, v25 = 1.0 / v24,
+        v26 = (v23 * (v7 - v22) + v21 * (v12 - v20)) * v25;
+    const M v27 = softehl_lt(softehl_splat(1.0), v26);
+    const V v28 = softehl_blend(v27, softehl_splat(1.0), v26); const M v29 = softehl_eq(v28, v28);
+    const V v30 = (v23 * (v18 - v22) + v21 * (v19 - v20)) * v25;
+    const M v31 = softehl_lt(softehl_splat(1.0), v30);
+    const V v32 = softehl_blend(v31, softehl_splat(1.0), v30); const M v33 = softehl_eq(v32, v32);
+    const V v34 = softehl_vsqrt(v10 * v10 + v14 * v14), v35 = softehl_vsqrt(v24), v36 = 1.0 / v35,
+        v37 = v23 * v36, v38 = v21 * v36;
+    V v39 = softehl_splat(0.0); const M m40 = v29;
+    if (softehl_any(m40)) {
+        const M v41 = softehl_lt(softehl_splat((-1.0)), v28);
+        const V v42 = softehl_blend(v41, v28, softehl_splat((-1.0)));
+        v39 = softehl_blend(m40, v42, v39);
+    }
+    const M m43 = ~v29;
+    if (softehl_any(m43)) {
+        const V v44 = (-1.0) - v28, v45 = v44 * (v44 * v44);
+        v39 = softehl_blend(m43, v45, v39);
+    }
+    V v46 = softehl_splat(0.0); const M m47 = v33;
+    if (softehl_any(m47)) {
+        const M v48 = softehl_lt(softehl_splat((-1.0)), v32);
+        const V v49 = softehl_blend(v48, v32, softehl_splat((-1.0)));
+        v46 = softehl_blend(m47, v49, v46);
+    }
+    const M m50 = ~v33;
+    if (softehl_any(m50)) {
+        const V v51 = (-1.0) - v32, v52 = v51 * (v51 * v51);
+        v46 = softehl_blend(m50, v52, v46);
+    }
+    const V v53 = v46 - v39; const M v54 = softehl_eq(v53, v53); V v55 = softehl_splat(0.0);
+    const M m56 = v54;
+    if (softehl_any(m56)) {
+        const M v57 = softehl_lt(softehl_splat(0.0), v53);
+        const V v58 = softehl_blend(v57, v53, softehl_splat(0.0));
+        v55 = softehl_blend(m56, v58, v55);
+    }
+    const M m59 = ~v54;
+    if (softehl_any(m59)) {
+        const V v60 = v39 - v46, v61 = v60 * (v60 * v60);
+        v55 = softehl_blend(m59, v61, v55);
+    }
+    const V v62 = 0.5 * v55, v63 = v34 * v62, v64 = 0.5 * (v39 + v46),
+        v65 = 0.5 * (d6 + (d4 + (X4 + X6))), v66 = 0.5 * (d7 + (d5 + (X5 + X7))),
+        v67 = 0.5 * (1.0 / (0.5 * ((v7 - X4 - d4) * v37 + (v12 - X5 - d5) * v38)));
+    V s68 = {0}, s69 = {0}, s70 = {0}, s71 = {0}, s72 = {0}, s73 = {0}, s74 = {0}, s75 = {0},
+        s76 = {0}, s77 = {0}, s78 = {0}, s79 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q; (void)w;
+        const V v80 = 0.5 * (w[0] * v62 + v64), v81 = 0.5 - v80, v82 = 0.5 + v80,
+            v83 = v2 * v81 + v4 * v82, v84 = v3 * v81 + v9 * v82, v85 = d8 * v81 + d10 * v82,
+            v86 = (v37 * (v83 - v65) + v38 * (v84 - v66)) * v67, v87 = 0.5 - v86, v88 = 0.5 + v86,
+            v89 = v38 * (v7 * v88 + (v18 * v87 - v83)) - v37 * (v12 * v88 + (v19 * v87 - v84)),
+            v90 = a8 * v89, v91 = v85 - v90;
+        const M v92 = softehl_eq(v91, v91);
+        V v93 = softehl_splat(0.0), v94 = softehl_splat(0.0);
+        const M m95 = v92;
+        if (softehl_any(m95)) {
+            const M v96 = softehl_le(softehl_splat(0.0), v91);
+            V v97 = softehl_splat(0.0), v98 = softehl_splat(0.0);
+            const M m99 = v96 & m95;
+            if (softehl_any(m99)) {
+                const V v100 = (a10 + v89) * (v89 - a11); const M v101 = softehl_eq(v100, v100);
+                V v102 = softehl_splat(0.0); const M m103 = v101 & m99;
+                if (softehl_any(m103)) {
+                    const M v104 = softehl_lt(v100, softehl_splat(0.0));
+                    const V v105 = softehl_blend(v104, v91, softehl_splat(0.0));
+                    v102 = softehl_blend(m103, v105, v102);
+                }
+                const M m106 = ~v101 & m99;
+                if (softehl_any(m106)) {
+                    const V v107 = v100 * (v100 * v100); v102 = softehl_blend(m106, v107, v102);
+                }
+                const V v108 = a9 * v102; const M v109 = softehl_eq(v108, v108);
+                const V v110 = v37 * (v11 * v88 + (v16 * v87 - v5 * v81 - v8 * v82)) + v38 * (v15 * v88 + (v17 * v87 - v6 * v81 - v13 * v82)),
+                    v111 = d9 * v81 + d11 * v82 + a8 * v110;
+                const M v112 = softehl_eq(v111, v111), v113 = v109 & v112;
+                V v114 = softehl_splat(0.0); const M m115 = v113 & m99;
+                if (softehl_any(m115)) {
+                    const M v116 = softehl_lt(v108, v111); V v117 = v108;
+                    const M m118 = ~v116 & m115;
+                    if (softehl_any(m118)) {
+                        V v119 = softehl_splat(0.0); const M m120 = v109 & m118;
+                        if (softehl_any(m120)) {
+                            const M v121 = softehl_lt(v108, -v111); V v122 = v111;
+                            const M m123 = v121 & m120;
+                            if (softehl_any(m123)) {
+                                const V v124 = -v108; v122 = softehl_blend(m123, v124, v122);
+                            }
+                            v119 = softehl_blend(m120, v122, v119);
+                        }
+                        const M m125 = ~v109 & m118;
+                        if (softehl_any(m125)) {
+                            const V v126 = v111 + v108, v127 = v126 * (v126 * v126);
+                            v119 = softehl_blend(m125, v127, v119);
+                        }
+                        v117 = softehl_blend(m118, v119, v117);
+                    }
+                    v114 = softehl_blend(m115, v117, v114);
+                }
+                const M m128 = ~v113 & m99;
+                if (softehl_any(m128)) {
+                    const V v129 = v108 - v111, v130 = v129 * (v129 * v129);
+                    v114 = softehl_blend(m128, v130, v114);
+                }
+                v97 = softehl_blend(m99, v102, v97); v98 = softehl_blend(m99, v114, v98);
+            }
+            v93 = softehl_blend(m95, v97, v93); v94 = softehl_blend(m95, v98, v94);
+        }
+        const M m131 = ~v92;
+        if (softehl_any(m131)) {
+            const V v132 = v90 - v85, v133 = v132 * (v132 * v132);
+            v93 = softehl_blend(m131, v133, v93); v94 = softehl_blend(m131, v133, v94);
+        }
+        const V v134 = v1 * w[1], v135 = w[1] * v88, v136 = w[1] * v87, v137 = w[1] * v82,
+            v138 = w[1] * v81, v139 = v134 * v81, v140 = v134 * v82,
+            v141 = v63 * (1.0 + a12 * ((-1.0) + 6.283185307179586 * (X1 * v81 + X3 * v82))),
+            v142 = v93 * v141, v143 = v94 * v141, v144 = (v38 * v93 + v37 * v94) * v141,
+            v145 = (v38 * v94 - v37 * v93) * v141;
+        s68 += v140 * v142; s69 += v139 * v142; s70 += v140 * v143; s71 += v139 * v143;
+        s72 += v135 * v145; s73 += v135 * v144; s74 += v136 * v145; s75 += v136 * v144;
+        s76 += v137 * v145; s78 += v138 * v145; s77 += v137 * v144; s79 += v138 * v144;
+    }
+    softehl_store4(R + 8, 12, s69, s71, s68, s70); softehl_store4(R + 0, 12, s79, s78, s77, s76);
+    softehl_store4(R + 4, 12, -s75, -s74, -s73, -s72);
+}
+SOFTEHL_BATCH(softehl_mortar_22_residual, 8, 12, 13, 0, 12, 0)
+
+SOFTEHL_GROUP(softehl_mortar_22_tangent)
+{
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11;
+    softehl_load4(d + 0, 12, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 12, &d4, &d5, &d6, &d7);
+    softehl_load4(d + 8, 12, &d8, &d9, &d10, &d11);
+    V a0, a1, a2, a3, a4, a5, a6, a7, a8, a9, a10, a11, a12;
+    softehl_load4(a + 0, 13, &a0, &a1, &a2, &a3); softehl_load4(a + 4, 13, &a4, &a5, &a6, &a7);
+    softehl_load4(a + 8, 13, &a8, &a9, &a10, &a11); softehl_load1(a + 12, 13, &a12);
+    const V v1 = X2 + d2, v2 = X2 + a1, v3 = X0 + a0, v4 = X4 + a2, v5 = X6 + a3,
+        v6 = 0.5 * (X2 - X0), v7 = X1 + a4, v8 = X3 + d3, v9 = X3 + a5, v10 = X0 + d0,
+        v11 = 0.5 * (X3 - X1), v12 = X1 + d1, v13 = -a9, v14 = X5 + a6, v15 = X7 + a7,
+        v16 = 0.5 * (v12 + v8), v17 = X5 + d5, v18 = v8 - X1, v19 = 0.5 * (v8 - v12), v20 = X7 + d7,
+        v21 = v18 - d1, v22 = 0.5 * (d7 + (d5 + (X5 + X7))), v23 = v17 - v16,
+        v24 = softehl_vsqrt(v6 * v6 + v11 * v11), v25 = 0.5 * v21, v26 = 0.25 * v21,
+        v27 = v20 - v16, v28 = 0.5 * (v20 - X5 - d5), v29 = 0.5 * v23, v30 = 0.5 * v27,
+        v31 = 0.5 * (v10 + v1), v32 = v1 - X0, v33 = 0.5 * (v1 - v10), v34 = v32 - d0,
+        v35 = 1.0 / a8, v36 = -a8, v37 = 0.5 * v34, v38 = 0.25 * v34, v39 = 0.5 * (d8 - d10),
+        v40 = 0.5 * (d10 - d8), v41 = 0.5 * (d9 - d11), v42 = 0.5 * (d11 - d9),
+        v43 = v37 * v37 + v25 * v25, v44 = 1.0 / v43, v45 = X4 + d4, v46 = X6 + d6,
+        v47 = 0.5 * (d6 + (d4 + (X4 + X6))), v48 = 0.5 * (v46 - d4 - X4), v49 = v45 - v31,
+        v50 = v46 - v31, v51 = 0.5 * v49, v52 = v49 * v37 + v23 * v25, v53 = 0.5 * v50,
+        v54 = v50 * v37 + v27 * v25, v55 = v54 * v44;
     const M v56 = softehl_lt(softehl_splat(1.0), v55);
-    const V v57 = softehl_blend(v56, softehl_splat(1.0), v55);
-    const M v58 = softehl_eq(v57, v57);
-    const V v59 = softehl_vsqrt(v22);
-    const V v60 = softehl_vsqrt(v45);
-    const V v61 = 1.0 / v60;
-    const V v62 = v36 * v61;
-    const V v63 = v32 * v61;
-    V v64 = softehl_splat(0.0);
-    const M m65 = v54;
-    if (softehl_any(m65)) {
-        const M v66 = softehl_lt(softehl_splat((-1.0)), v53);
-        const V v67 = softehl_blend(v66, v53, softehl_splat((-1.0)));
-        v64 = softehl_blend(m65, v67, v64);
+    const V v57 = softehl_blend(v56, softehl_splat(1.0), v55); const M v58 = softehl_eq(v57, v57);
+    const V v59 = v52 * v44; const M v60 = softehl_lt(softehl_splat(1.0), v59);
+    const V v61 = softehl_blend(v60, softehl_splat(1.0), v59); const M v62 = softehl_eq(v61, v61);
+    const V v63 = softehl_vsqrt(v43), v64 = v44 * v44, v65 = (v51 - v38) * v44,
+        v66 = (v53 - v38) * v44, v67 = (v29 - v26) * v44, v68 = (v30 - v26) * v44,
+        v69 = 0.5 * (d0 - v32) * v64, v70 = 0.5 * (d1 - v18) * v64, v71 = softehl_vsqrt(v44),
+        v72 = v37 * v64, v73 = v25 * v64, v74 = v37 * v44, v75 = v25 * v44,
+        v76 = v52 * v69 + (v51 + v38) * v44, v77 = (v53 + v38) * v44 + v54 * v69,
+        v78 = v52 * v70 + (v29 + v26) * v44, v79 = (v30 + v26) * v44 + v54 * v70, v80 = v52 * v72,
+        v81 = v54 * v72, v82 = v52 * v73, v83 = v54 * v73, v84 = 0.5 * v71, v85 = 1.0 / v63,
+        v86 = v37 * v85, v87 = v25 * v85, v88 = v85 * v85, v89 = 0.5 * v85, v90 = v84 * (v37 * v88),
+        v91 = v84 * (v25 * v88), v92 = v25 * v90, v93 = v28 * v92, v94 = v37 * v90, v95 = v25 * v91,
+        v96 = v37 * v91, v97 = v48 * v96, v98 = v89 - v94, v99 = v94 - v89, v100 = v89 - v95,
+        v101 = v95 - v89;
+    V v102 = softehl_splat(0.0), v103 = softehl_splat(0.0), v104 = softehl_splat(0.0),
+        v105 = softehl_splat(0.0), v106 = softehl_splat(0.0), v107 = softehl_splat(0.0),
+        v108 = softehl_splat(0.0);
+    const M m109 = v58;
+    if (softehl_any(m109)) {
+        const M v110 = softehl_lt(softehl_splat((-1.0)), v57);
+        V v111 = softehl_splat((-1.0)), v112 = softehl_splat(0.0), v113 = softehl_splat(0.0),
+            v114 = softehl_splat(0.0), v115 = softehl_splat(0.0), v116 = softehl_splat(0.0),
+            v117 = softehl_splat(0.0);
+        const M m118 = v110 & m109;
+        if (softehl_any(m118)) {
+            V v119 = softehl_splat(0.0), v120 = softehl_splat(0.0), v121 = softehl_splat(0.0),
+                v122 = softehl_splat(0.0), v123 = softehl_splat(0.0), v124 = softehl_splat(0.0);
+            const M m125 = ~v56 & m118;
+            if (softehl_any(m125)) {
+                const V v126 = -v77, v127 = -v79, v128 = v66 - v81, v129 = v68 - v83;
+                v119 = softehl_blend(m125, v74, v119); v120 = softehl_blend(m125, v75, v120);
+                v121 = softehl_blend(m125, v126, v121); v122 = softehl_blend(m125, v127, v122);
+                v123 = softehl_blend(m125, v128, v123); v124 = softehl_blend(m125, v129, v124);
+            }
+            v111 = softehl_blend(m118, v57, v111); v112 = softehl_blend(m118, v119, v112);
+            v113 = softehl_blend(m118, v120, v113); v114 = softehl_blend(m118, v121, v114);
+            v115 = softehl_blend(m118, v122, v115); v116 = softehl_blend(m118, v123, v116);
+            v117 = softehl_blend(m118, v124, v117);
+        }
+        v102 = softehl_blend(m109, v111, v102); v103 = softehl_blend(m109, v114, v103);
+        v104 = softehl_blend(m109, v115, v104); v105 = softehl_blend(m109, v116, v105);
+        v106 = softehl_blend(m109, v117, v106); v107 = softehl_blend(m109, v112, v107);
+        v108 = softehl_blend(m109, v113, v108);
     }
-    const M m68 = ~v54;
-    if (softehl_any(m68)) {
-        const V v69 = (-1.0) - v53;
-        const V v70 = v69 * v69;
-        const V v71 = v69 * v70;
-        v64 = softehl_blend(m68, v71, v64);
+    const M m130 = ~v58;
+    if (softehl_any(m130)) {
+        const V v131 = (-1.0) - v57, v132 = v131 * (v131 * v131);
+        V v133 = softehl_splat(0.0), v134 = softehl_splat(0.0), v135 = softehl_splat(0.0),
+            v136 = softehl_splat(0.0), v137 = softehl_splat(0.0), v138 = softehl_splat(0.0);
+        const M m139 = ~v56 & m130;
+        if (softehl_any(m139)) {
+            const V v140 = (-1.0) - v55, v141 = v140 * (3.0 * v140), v142 = (v81 - v66) * v141,
+                v143 = (v83 - v68) * v141, v144 = v77 * v141, v145 = v79 * v141,
+                v146 = -(v74 * v141), v147 = -(v75 * v141);
+            v133 = softehl_blend(m139, v144, v133); v134 = softehl_blend(m139, v145, v134);
+            v135 = softehl_blend(m139, v142, v135); v136 = softehl_blend(m139, v143, v136);
+            v137 = softehl_blend(m139, v146, v137); v138 = softehl_blend(m139, v147, v138);
+        }
+        v102 = softehl_blend(m130, v132, v102); v103 = softehl_blend(m130, v133, v103);
+        v104 = softehl_blend(m130, v134, v104); v105 = softehl_blend(m130, v135, v105);
+        v106 = softehl_blend(m130, v136, v106); v107 = softehl_blend(m130, v137, v107);
+        v108 = softehl_blend(m130, v138, v108);
     }
-    V v72 = softehl_splat(0.0);
-    const M m73 = v58;
-    if (softehl_any(m73)) {
-        const M v74 = softehl_lt(softehl_splat((-1.0)), v57);
-        const V v75 = softehl_blend(v74, v57, softehl_splat((-1.0)));
-        v72 = softehl_blend(m73, v75, v72);
+    V v148 = softehl_splat(0.0), v149 = softehl_splat(0.0), v150 = softehl_splat(0.0),
+        v151 = softehl_splat(0.0), v152 = softehl_splat(0.0), v153 = softehl_splat(0.0),
+        v154 = softehl_splat(0.0);
+    const M m155 = v62;
+    if (softehl_any(m155)) {
+        const M v156 = softehl_lt(softehl_splat((-1.0)), v61);
+        V v157 = softehl_splat((-1.0)), v158 = softehl_splat(0.0), v159 = softehl_splat(0.0),
+            v160 = softehl_splat(0.0), v161 = softehl_splat(0.0), v162 = softehl_splat(0.0),
+            v163 = softehl_splat(0.0);
+        const M m164 = v156 & m155;
+        if (softehl_any(m164)) {
+            V v165 = softehl_splat(0.0), v166 = softehl_splat(0.0), v167 = softehl_splat(0.0),
+                v168 = softehl_splat(0.0), v169 = softehl_splat(0.0), v170 = softehl_splat(0.0);
+            const M m171 = ~v60 & m164;
+            if (softehl_any(m171)) {
+                const V v172 = -v76, v173 = -v78, v174 = v65 - v80, v175 = v67 - v82;
+                v165 = softehl_blend(m171, v74, v165); v166 = softehl_blend(m171, v75, v166);
+                v167 = softehl_blend(m171, v172, v167); v168 = softehl_blend(m171, v173, v168);
+                v169 = softehl_blend(m171, v174, v169); v170 = softehl_blend(m171, v175, v170);
+            }
+            v157 = softehl_blend(m164, v61, v157); v158 = softehl_blend(m164, v165, v158);
+            v159 = softehl_blend(m164, v166, v159); v160 = softehl_blend(m164, v167, v160);
+            v161 = softehl_blend(m164, v168, v161); v162 = softehl_blend(m164, v169, v162);
+            v163 = softehl_blend(m164, v170, v163);
+        }
+        v148 = softehl_blend(m155, v157, v148); v149 = softehl_blend(m155, v160, v149);
+        v150 = softehl_blend(m155, v161, v150); v151 = softehl_blend(m155, v162, v151);
+        v152 = softehl_blend(m155, v163, v152); v153 = softehl_blend(m155, v158, v153);
+        v154 = softehl_blend(m155, v159, v154);
     }
-    const M m76 = ~v58;
-    if (softehl_any(m76)) {
-        const V v77 = (-1.0) - v57;
-        const V v78 = v77 * v77;
-        const V v79 = v77 * v78;
-        v72 = softehl_blend(m76, v79, v72);
+    const M m176 = ~v62;
+    if (softehl_any(m176)) {
+        const V v177 = (-1.0) - v61, v178 = v177 * (v177 * v177);
+        V v179 = softehl_splat(0.0), v180 = softehl_splat(0.0), v181 = softehl_splat(0.0),
+            v182 = softehl_splat(0.0), v183 = softehl_splat(0.0), v184 = softehl_splat(0.0);
+        const M m185 = ~v60 & m176;
+        if (softehl_any(m185)) {
+            const V v186 = (-1.0) - v59, v187 = v186 * (3.0 * v186), v188 = (v80 - v65) * v187,
+                v189 = (v82 - v67) * v187, v190 = v76 * v187, v191 = v78 * v187,
+                v192 = -(v74 * v187), v193 = -(v75 * v187);
+            v179 = softehl_blend(m185, v190, v179); v180 = softehl_blend(m185, v191, v180);
+            v181 = softehl_blend(m185, v188, v181); v182 = softehl_blend(m185, v189, v182);
+            v183 = softehl_blend(m185, v192, v183); v184 = softehl_blend(m185, v193, v184);
+        }
+        v148 = softehl_blend(m176, v178, v148); v149 = softehl_blend(m176, v179, v149);
+        v150 = softehl_blend(m176, v180, v150); v151 = softehl_blend(m176, v181, v151);
+        v152 = softehl_blend(m176, v182, v152); v153 = softehl_blend(m176, v183, v153);
+        v154 = softehl_blend(m176, v184, v154);
     }
-    const V v80 = v72 - v64;
-    const M v81 = softehl_eq(v80, v80);
-    V v82 = softehl_splat(0.0);
-    const M m83 = v81;
-    if (softehl_any(m83)) {
-        const M v84 = softehl_lt(softehl_splat(0.0), v80);
-        const V v85 = softehl_blend(v84, v80, softehl_splat(0.0));
-        v82 = softehl_blend(m83, v85, v82);
+    const V v194 = 1.0 / (v48 * v86 + v28 * v87), v195 = v148 - v102;
+    const M v196 = softehl_eq(v195, v195);
+    const V v197 = 0.5 * v194, v198 = v86 * v194, v199 = 0.5 * v198, v200 = v87 * v194,
+        v201 = v194 * v194, v202 = 0.5 * v200, v203 = 0.5 * v86 * v201, v204 = 0.5 * v87 * v201;
+    V v205 = softehl_splat(0.0), v206 = softehl_splat(0.0), v207 = softehl_splat(0.0),
+        v208 = softehl_splat(0.0), v209 = softehl_splat(0.0), v210 = softehl_splat(0.0),
+        v211 = softehl_splat(0.0), v212 = softehl_splat(0.0), v213 = softehl_splat(0.0);
+    const M m214 = v196;
+    if (softehl_any(m214)) {
+        const M v215 = softehl_lt(softehl_splat(0.0), v195);
+        V v216 = softehl_splat(0.0), v217 = softehl_splat(0.0), v218 = softehl_splat(0.0),
+            v219 = softehl_splat(0.0), v220 = softehl_splat(0.0), v221 = softehl_splat(0.0),
+            v222 = softehl_splat(0.0), v223 = softehl_splat(0.0), v224 = softehl_splat(0.0);
+        const M m225 = v215 & m214;
+        if (softehl_any(m225)) {
+            const V v226 = -v107, v227 = v149 - v103, v228 = -v108, v229 = v150 - v104,
+                v230 = v151 - v105, v231 = v152 - v106;
+            v216 = softehl_blend(m225, v195, v216); v217 = softehl_blend(m225, v227, v217);
+            v218 = softehl_blend(m225, v229, v218); v219 = softehl_blend(m225, v230, v219);
+            v220 = softehl_blend(m225, v231, v220); v221 = softehl_blend(m225, v153, v221);
+            v222 = softehl_blend(m225, v154, v222); v223 = softehl_blend(m225, v226, v223);
+            v224 = softehl_blend(m225, v228, v224);
+        }
+        v205 = softehl_blend(m214, v216, v205); v206 = softehl_blend(m214, v217, v206);
+        v207 = softehl_blend(m214, v218, v207); v208 = softehl_blend(m214, v219, v208);
+        v209 = softehl_blend(m214, v220, v209); v210 = softehl_blend(m214, v221, v210);
+        v211 = softehl_blend(m214, v222, v211); v212 = softehl_blend(m214, v223, v212);
+        v213 = softehl_blend(m214, v224, v213);
     }
-    const M m86 = ~v81;
-    if (softehl_any(m86)) {
-        const V v87 = v64 - v72;
-        const V v88 = v87 * v87;
-        const V v89 = v87 * v88;
-        v82 = softehl_blend(m86, v89, v82);
+    const M m232 = ~v196;
+    if (softehl_any(m232)) {
+        const V v233 = v102 - v148, v234 = v233 * v233, v235 = v233 * v234, v236 = 3.0 * v234,
+            v237 = (v103 - v149) * v236, v238 = (v104 - v150) * v236, v239 = (v105 - v151) * v236,
+            v240 = (v106 - v152) * v236, v241 = -(v153 * v236), v242 = -(v154 * v236),
+            v243 = v107 * v236, v244 = v108 * v236;
+        v205 = softehl_blend(m232, v235, v205); v206 = softehl_blend(m232, v237, v206);
+        v207 = softehl_blend(m232, v238, v207); v208 = softehl_blend(m232, v239, v208);
+        v209 = softehl_blend(m232, v240, v209); v210 = softehl_blend(m232, v241, v210);
+        v211 = softehl_blend(m232, v242, v211); v212 = softehl_blend(m232, v243, v212);
+        v213 = softehl_blend(m232, v244, v213);
     }
-    const V v90 = 0.5 * v82;
-    const V v91 = v26 * v62;
-    const V v92 = X4 + X6;
-    const V v93 = v59 * v90;
-    const V v94 = X5 + X7;
-    const V v95 = v64 + v72;
-    const V v96 = v28 * v63;
-    const V v97 = v91 + v96;
-    const V v98 = d4 + v92;
-    const V v99 = 0.5 * v95;
-    const V v100 = d5 + v94;
-    const V v101 = 0.5 * v97;
-    const V v102 = d6 + v98;
-    const V v103 = d7 + v100;
-    const V v104 = 0.5 * v102;
-    const V v105 = 0.5 * v103;
-    const V v106 = 1.0 / v101;
-    const V v107 = 0.5 * v106;
-    V s108 = softehl_splat(0.0);
-    V s109 = softehl_splat(0.0);
-    V s110 = softehl_splat(0.0);
-    V s111 = softehl_splat(0.0);
-    V s112 = softehl_splat(0.0);
-    V s113 = softehl_splat(0.0);
-    V s114 = softehl_splat(0.0);
-    V s115 = softehl_splat(0.0);
-    V s116 = softehl_splat(0.0);
-    V s117 = softehl_splat(0.0);
-    V s118 = softehl_splat(0.0);
-    V s119 = softehl_splat(0.0);
+    const V v245 = 0.5 * v205, v246 = 0.5 * v206, v247 = 0.5 * v207, v248 = 0.5 * v208,
+        v249 = v24 * v245, v250 = v24 * v246, v251 = v24 * v247, v252 = v24 * v248,
+        v253 = 0.5 * (v102 + v148), v254 = 0.5 * (v149 + v103), v255 = 0.5 * v209,
+        v256 = 0.5 * (v150 + v104), v257 = 0.5 * v210, v258 = v24 * v255, v259 = 0.5 * v211,
+        v260 = 0.5 * v212, v261 = v24 * v257, v262 = 0.5 * (v151 + v105), v263 = v24 * v259,
+        v264 = v24 * v260, v265 = 0.5 * v213, v266 = 0.5 * (v152 + v106), v267 = v24 * v265,
+        v268 = 0.5 * v153, v269 = 0.5 * v154, v270 = 0.5 * v107, v271 = 0.5 * v108,
+        v272 = v201 * (v93 + v48 * v99), v273 = v201 * (v97 + v28 * v101),
+        v274 = v201 * (v48 * v98 - v93), v275 = v201 * (v28 * v100 - v97),
+        v276 = v249 * (6.283185307179586 * (a12 * v11)),
+        v277 = 0.5 * ((v46 - v45) * v87 - (v20 - v17) * v86),
+        v278 = 0.5 * ((v5 - v4) * v86 + (v15 - v14) * v87),
+        v279 = 0.5 * ((v3 - v2) * v86 + (v7 - v9) * v87);
+    V s280 = {0}, s281 = {0}, s282 = {0}, s283 = {0}, s284 = {0}, s285 = {0}, s286 = {0},
+        s287 = {0}, s288 = {0}, s289 = {0}, s290 = {0}, s291 = {0}, s292 = {0}, s293 = {0},
+        s294 = {0}, s295 = {0}, s296 = {0}, s297 = {0}, s298 = {0}, s299 = {0}, s300 = {0},
+        s301 = {0}, s302 = {0}, s303 = {0}, s304 = {0}, s305 = {0}, s306 = {0}, s307 = {0},
+        s308 = {0}, s309 = {0}, s310 = {0}, s311 = {0}, s312 = {0}, s313 = {0}, s314 = {0},
+        s315 = {0}, s316 = {0}, s317 = {0}, s318 = {0}, s319 = {0}, s320 = {0}, s321 = {0},
+        s322 = {0}, s323 = {0}, s324 = {0}, s325 = {0}, s326 = {0}, s327 = {0}, s328 = {0},
+        s329 = {0}, s330 = {0}, s331 = {0}, s332 = {0}, s333 = {0}, s334 = {0}, s335 = {0},
+        s336 = {0}, s337 = {0}, s338 = {0}, s339 = {0}, s340 = {0}, s341 = {0}, s342 = {0},
+        s343 = {0}, s344 = {0}, s345 = {0}, s346 = {0}, s347 = {0}, s348 = {0}, s349 = {0},
+        s350 = {0}, s351 = {0}, s352 = {0}, s353 = {0}, s354 = {0}, s355 = {0}, s356 = {0},
+        s357 = {0}, s358 = {0}, s359 = {0}, s360 = {0}, s361 = {0}, s362 = {0}, s363 = {0},
+        s364 = {0}, s365 = {0}, s366 = {0}, s367 = {0}, s368 = {0}, s369 = {0}, s370 = {0},
+        s371 = {0}, s372 = {0}, s373 = {0}, s374 = {0}, s375 = {0}, s376 = {0}, s377 = {0},
+        s378 = {0}, s379 = {0}, s380 = {0}, s381 = {0}, s382 = {0}, s383 = {0}, s384 = {0},
+        s385 = {0}, s386 = {0}, s387 = {0}, s388 = {0}, s389 = {0}, s390 = {0}, s391 = {0},
+        s392 = {0}, s393 = {0}, s394 = {0}, s395 = {0}, s396 = {0}, s397 = {0}, s398 = {0},
+        s399 = {0}, s400 = {0}, s401 = {0}, s402 = {0}, s403 = {0}, s404 = {0}, s405 = {0},
+        s406 = {0}, s407 = {0}, s408 = {0}, s409 = {0}, s410 = {0}, s411 = {0}, s412 = {0},
+        s413 = {0}, s414 = {0}, s415 = {0}, s416 = {0}, s417 = {0}, s418 = {0}, s419 = {0},
+        s420 = {0}, s421 = {0}, s422 = {0}, s423 = {0}, s424 = {0}, s425 = {0}, s426 = {0},
+        s427 = {0}, s428 = {0}, s429 = {0}, s430 = {0}, s431 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const V v120 = w[0] * v90;
-        const V v121 = v120 + v99;
-        const V v122 = 0.5 * v121;
-        const V v123 = 0.5 - v122;
-        const V v124 = 0.5 + v122;
-        const V v125 = v2 * v123;
-        const V v126 = v4 * v124;
-        const V v127 = v125 + v126;
-        const V v128 = v3 * v123;
-        const V v129 = d8 * v123;
-        const V v130 = v10 * v124;
-        const V v131 = v128 + v130;
-        const V v132 = d10 * v124;
-        const V v133 = v129 + v132;
-        const V v134 = v127 - v104;
-        const V v135 = v62 * v134;
-        const V v136 = v131 - v105;
-        const V v137 = v63 * v136;
-        const V v138 = v135 + v137;
-        const V v139 = v138 * v107;
-        const V v140 = 0.5 - v139;
-        const V v141 = 0.5 + v139;
-        const V v142 = v25 * v140;
-        const V v143 = v142 - v127;
-        const V v144 = v27 * v140;
-        const V v145 = v144 - v131;
-        const V v146 = v8 * v141;
-        const V v147 = v146 + v143;
-        const V v148 = v63 * v147;
-        const V v149 = v14 * v141;
-        const V v150 = v149 + v145;
-        const V v151 = v62 * v150;
-        const V v152 = v148 - v151;
-        const V v153 = a8 * v152;
-        const V v154 = v133 - v153;
-        const M v155 = softehl_eq(v154, v154);
-        V v156 = softehl_splat(0.0);
-        V v157 = softehl_splat(0.0);
-        const M m158 = v155;
-        if (softehl_any(m158)) {
-            const M v159 = softehl_le(softehl_splat(0.0), v154);
-            V v160 = softehl_splat(0.0);
-            V v161 = softehl_splat(0.0);
-            const M m162 = v159 & m158;
-            if (softehl_any(m162)) {
-                const V v163 = a10 + v152;
-                const V v164 = v152 - a11;
-                const V v165 = v163 * v164;
-                const M v166 = softehl_eq(v165, v165);
-                V v167 = softehl_splat(0.0);
-                const M m168 = v166 & m162;
-                if (softehl_any(m168)) {
-                    const M v169 = softehl_lt(v165, softehl_splat(0.0));
-                    const V v170 = softehl_blend(v169, v154, softehl_splat(0.0));
-                    v167 = softehl_blend(m168, v170, v167);
+        const double *restrict w = rule + 2 * q; (void)w;
+        const V v432 = w[0] * v257 + v268, v433 = w[0] * v259 + v269, v434 = w[0] * v260 + v270,
+            v435 = w[0] * v246 + v254, v436 = w[0] * v247 + v256, v437 = w[0] * v248 + v262,
+            v438 = w[0] * v255 + v266, v439 = w[0] * v265 + v271, v440 = 0.5 * (w[0] * v245 + v253),
+            v441 = v33 * v432, v442 = v19 * v432, v443 = v19 * v435, v444 = v33 * v436,
+            v445 = v19 * v437, v446 = v33 * v438, v447 = v33 * v433, v448 = v19 * v433,
+            v449 = v33 * v439, v450 = v19 * v439, v451 = v33 * v434, v452 = v19 * v434,
+            v453 = 0.5 - v440, v454 = 0.5 + v440, v455 = v440 - 0.5, v456 = v19 * v438 + v454,
+            v457 = v10 * v453 + v1 * v454, v458 = v12 * v453 + v8 * v454,
+            v459 = d8 * v453 + d10 * v454, v460 = v457 - v47, v461 = v458 - v22,
+            v462 = v33 * v435 + v453, v463 = v19 * v436 + v453, v464 = v33 * v437 + v454,
+            v465 = v194 * v460, v466 = v194 * v461,
+            v467 = 1.0 + a12 * ((-1.0) + 6.283185307179586 * (X1 * v453 + X3 * v454)),
+            v468 = v86 * v460 + v87 * v461, v469 = v249 * v467, v470 = w[1] * v454,
+            v471 = w[1] * v453, v472 = v35 * v453, v473 = v35 * v454, v474 = v197 * v468,
+            v475 = v203 * v468, v476 = v204 * v468, v477 = v472 * v469, v478 = v473 * v469,
+            v479 = v87 * v469, v480 = v86 * v469, v481 = w[1] * v477, v482 = w[1] * v478,
+            v483 = v198 * v451 + (v200 * v452 - v199 - v475),
+            v484 = v198 * v441 + (v200 * v442 + (v475 - v199)), v485 = v92 * v466,
+            v486 = v96 * v465, v487 = 0.5 - v474, v488 = 0.5 + v474, v489 = w[1] * v487,
+            v490 = w[1] * v488, v491 = v87 * (v487 - v441) + (v86 * v442 + v277 * v484),
+            v492 = v87 * (v488 - v451) + (v86 * v452 + v277 * v483),
+            v493 = v46 * v488 + (v45 * v487 - v457), v494 = v20 * v488 + (v17 * v487 - v458),
+            v495 = v92 * v493, v496 = v96 * v494, v497 = v87 * v493 - v86 * v494, v498 = a8 * v497,
+            v499 = v476 + (v198 * v447 + (v200 * v448 - v202)),
+            v500 = v198 * v449 + (v200 * v450 - v202) - v476,
+            v501 = v86 * (v448 - v487) - v87 * v447 + v277 * v499,
+            v502 = v86 * (v450 - v488) - v87 * v449 + v277 * v500, v503 = v459 - v498;
+        const M v504 = softehl_eq(v503, v503);
+        const V v505 = v100 * v466 + (v198 * v446 + (v200 * v456 - v486 - v275 * v468)),
+            v506 = v101 * v466 + (v486 + (v198 * v444 + (v200 * v463 - v273 * v468))),
+            v507 = v496 + (v86 * v456 - v87 * v446) + v100 * v493 + v277 * v505,
+            v508 = v86 * v463 - v87 * v444 - v496 + v101 * v493 + v277 * v506,
+            v509 = v99 * v465 + (v485 + (v200 * v443 + v198 * v462) - v272 * v468),
+            v510 = v98 * v465 + (v198 * v464 + (v200 * v445 - v485 - v274 * v468)),
+            v511 = v86 * v443 - v87 * v462 + v495 - v99 * v494 + v277 * v509,
+            v512 = v86 * v445 - v87 * v464 - v495 - v98 * v494 + v277 * v510;
+        V v513 = softehl_splat(0.0), v514 = softehl_splat(0.0), v515 = softehl_splat(0.0),
+            v516 = softehl_splat(0.0), v517 = softehl_splat(0.0), v518 = softehl_splat(0.0),
+            v519 = softehl_splat(0.0), v520 = softehl_splat(0.0), v521 = softehl_splat(0.0),
+            v522 = softehl_splat(0.0), v523 = softehl_splat(0.0), v524 = softehl_splat(0.0),
+            v525 = softehl_splat(0.0), v526 = softehl_splat(0.0), v527 = softehl_splat(0.0),
+            v528 = softehl_splat(0.0), v529 = softehl_splat(0.0), v530 = softehl_splat(0.0),
+            v531 = softehl_splat(0.0), v532 = softehl_splat(0.0), v533 = softehl_splat(0.0),
+            v534 = softehl_splat(0.0), v535 = softehl_splat(0.0), v536 = softehl_splat(0.0),
+            v537 = softehl_splat(0.0), v538 = softehl_splat(0.0), v539 = softehl_splat(0.0),
+            v540 = softehl_splat(0.0), v541 = softehl_splat(0.0), v542 = softehl_splat(0.0),
+            v543 = softehl_splat(0.0), v544 = softehl_splat(0.0), v545 = softehl_splat(0.0),
+            v546 = softehl_splat(0.0), v547 = softehl_splat(0.0), v548 = softehl_splat(0.0),
+            v549 = softehl_splat(0.0), v550 = softehl_splat(0.0), v551 = softehl_splat(0.0),
+            v552 = softehl_splat(0.0), v553 = softehl_splat(0.0), v554 = softehl_splat(0.0),
+            v555 = softehl_splat(0.0), v556 = softehl_splat(0.0), v557 = softehl_splat(0.0),
+            v558 = softehl_splat(0.0), v559 = softehl_splat(0.0);
+        const M m560 = v504;
+        if (softehl_any(m560)) {
+            const M v561 = softehl_le(softehl_splat(0.0), v503);
+            V v562 = softehl_splat(0.0), v563 = softehl_splat(0.0), v564 = softehl_splat(0.0),
+                v565 = softehl_splat(0.0), v566 = softehl_splat(0.0), v567 = softehl_splat(0.0),
+                v568 = softehl_splat(0.0), v569 = softehl_splat(0.0), v570 = softehl_splat(0.0),
+                v571 = softehl_splat(0.0), v572 = softehl_splat(0.0), v573 = softehl_splat(0.0),
+                v574 = softehl_splat(0.0), v575 = softehl_splat(0.0), v576 = softehl_splat(0.0),
+                v577 = softehl_splat(0.0), v578 = softehl_splat(0.0), v579 = softehl_splat(0.0),
+                v580 = softehl_splat(0.0), v581 = softehl_splat(0.0), v582 = softehl_splat(0.0),
+                v583 = softehl_splat(0.0), v584 = softehl_splat(0.0), v585 = softehl_splat(0.0),
+                v586 = softehl_splat(0.0), v587 = softehl_splat(0.0), v588 = softehl_splat(0.0),
+                v589 = softehl_splat(0.0), v590 = softehl_splat(0.0), v591 = softehl_splat(0.0),
+                v592 = softehl_splat(0.0), v593 = softehl_splat(0.0), v594 = softehl_splat(0.0),
+                v595 = softehl_splat(0.0), v596 = softehl_splat(0.0), v597 = softehl_splat(0.0),
+                v598 = softehl_splat(0.0);
+            const M m599 = v561 & m560;
+            if (softehl_any(m599)) {
+                const V v600 = a10 + v497, v601 = v497 - a11, v602 = v600 * v601;
+                const M v603 = softehl_eq(v602, v602);
+                V v604 = softehl_splat(0.0), v605 = softehl_splat(0.0), v606 = softehl_splat(0.0),
+                    v607 = softehl_splat(0.0), v608 = softehl_splat(0.0);
+                const M m609 = v603 & m599;
+                if (softehl_any(m609)) {
+                    const M v610 = softehl_lt(v602, softehl_splat(0.0));
+                    const V v611 = softehl_blend(v610, v503, softehl_splat(0.0)),
+                        v612 = softehl_blend(v610, v453, softehl_splat(0.0)),
+                        v613 = softehl_blend(v610, v454, softehl_splat(0.0)),
+                        v614 = softehl_blend(v610, v36, softehl_splat(0.0)),
+                        v615 = softehl_blend(v610, v40, softehl_splat(0.0));
+                    v604 = softehl_blend(m609, v611, v604); v605 = softehl_blend(m609, v612, v605);
+                    v606 = softehl_blend(m609, v613, v606); v607 = softehl_blend(m609, v614, v607);
+                    v608 = softehl_blend(m609, v615, v608);
                 }
-                const M m171 = ~v166 & m162;
-                if (softehl_any(m171)) {
-                    const V v172 = v165 * v165;
-                    const V v173 = v165 * v172;
-                    v167 = softehl_blend(m171, v173, v167);
+                const M m616 = ~v603 & m599;
+                if (softehl_any(m616)) {
+                    const V v617 = v602 * v602, v618 = v602 * v617,
+                        v619 = 3.0 * v617 * (v600 + v601);
+                    v604 = softehl_blend(m616, v618, v604);
+                    v605 = softehl_blend(m616, softehl_splat(0.0), v605);
+                    v606 = softehl_blend(m616, softehl_splat(0.0), v606);
+                    v607 = softehl_blend(m616, v619, v607);
+                    v608 = softehl_blend(m616, softehl_splat(0.0), v608);
                 }
-                const V v174 = a9 * v167;
-                const V v175 = d9 * v123;
-                const V v176 = v19 * v140;
-                const V v177 = v23 * v140;
-                const M v178 = softehl_eq(v174, v174);
-                const V v179 = v5 * v123;
-                const V v180 = v176 - v179;
-                const V v181 = v7 * v123;
-                const V v182 = v177 - v181;
-                const V v183 = d11 * v124;
-                const V v184 = v175 + v183;
-                const V v185 = v9 * v124;
-                const V v186 = v180 - v185;
-                const V v187 = v15 * v124;
-                const V v188 = v182 - v187;
-                const V v189 = v12 * v141;
-                const V v190 = v189 + v186;
-                const V v191 = v18 * v141;
-                const V v192 = v191 + v188;
-                const V v193 = v62 * v190;
-                const V v194 = v63 * v192;
-                const V v195 = v193 + v194;
-                const V v196 = a8 * v195;
-                const V v197 = v184 + v196;
-                const M v198 = softehl_eq(v197, v197);
-                const M v199 = v178 & v198;
-                V v200 = softehl_splat(0.0);
-                const M m201 = v199 & m162;
-                if (softehl_any(m201)) {
-                    const M v202 = softehl_lt(v174, v197);
-                    V v203 = v174;
-                    const M m204 = ~v202 & m201;
-                    if (softehl_any(m204)) {
-                        V v205 = softehl_splat(0.0);
-                        const M m206 = v178 & m204;
-                        if (softehl_any(m206)) {
-                            const V v207 = -v197;
-                            const M v208 = softehl_lt(v174, v207);
-                            V v209 = v197;
-                            const M m210 = v208 & m206;
-                            if (softehl_any(m210)) {
-                                const V v211 = -v174;
-                                v209 = softehl_blend(m210, v211, v209);
+                const V v620 = a9 * v604; const M v621 = softehl_eq(v620, v620);
+                const V v622 = v5 * v488 + (v4 * v487 - v3 * v453 - v2 * v454),
+                    v623 = v15 * v488 + (v14 * v487 - v7 * v453 - v9 * v454),
+                    v624 = d9 * v453 + d11 * v454 + a8 * (v86 * v622 + v87 * v623);
+                const M v625 = softehl_eq(v624, v624), v626 = v621 & v625;
+                V v627 = softehl_splat(0.0), v628 = softehl_splat(0.0), v629 = softehl_splat(0.0),
+                    v630 = softehl_splat(0.0), v631 = softehl_splat(0.0), v632 = softehl_splat(0.0);
+                const M m633 = v626 & m599;
+                if (softehl_any(m633)) {
+                    const M v634 = softehl_lt(v620, v624);
+                    V v635 = v620, v636 = softehl_splat(0.0), v637 = softehl_splat(0.0), v638 = a9,
+                        v639 = softehl_splat(0.0), v640 = softehl_splat(0.0);
+                    const M m641 = ~v634 & m633;
+                    if (softehl_any(m641)) {
+                        V v642 = softehl_splat(0.0), v643 = softehl_splat(0.0),
+                            v644 = softehl_splat(0.0), v645 = softehl_splat(0.0),
+                            v646 = softehl_splat(0.0), v647 = softehl_splat(0.0);
+                        const M m648 = v621 & m641;
+                        if (softehl_any(m648)) {
+                            const M v649 = softehl_lt(v620, -v624);
+                            V v650 = v624, v651 = v453, v652 = v454, v653 = softehl_splat(0.0),
+                                v654 = a8, v655 = v42;
+                            const M m656 = v649 & m648;
+                            if (softehl_any(m656)) {
+                                const V v657 = -v620; v650 = softehl_blend(m656, v657, v650);
+                                v651 = softehl_blend(m656, softehl_splat(0.0), v651);
+                                v652 = softehl_blend(m656, softehl_splat(0.0), v652);
+                                v653 = softehl_blend(m656, v13, v653);
+                                v654 = softehl_blend(m656, softehl_splat(0.0), v654);
+                                v655 = softehl_blend(m656, softehl_splat(0.0), v655);
                             }
-                            v205 = softehl_blend(m206, v209, v205);
+                            v642 = softehl_blend(m648, v650, v642);
+                            v643 = softehl_blend(m648, v651, v643);
+                            v644 = softehl_blend(m648, v652, v644);
+                            v645 = softehl_blend(m648, v653, v645);
+                            v646 = softehl_blend(m648, v654, v646);
+                            v647 = softehl_blend(m648, v655, v647);
                         }
-                        const M m212 = ~v178 & m204;
-                        if (softehl_any(m212)) {
-                            const V v213 = v197 + v174;
-                            const V v214 = v213 * v213;
-                            const V v215 = v213 * v214;
-                            v205 = softehl_blend(m212, v215, v205);
+                        const M m658 = ~v621 & m641;
+                        if (softehl_any(m658)) {
+                            const V v659 = v624 + v620, v660 = v659 * v659, v661 = v659 * v660,
+                                v662 = 3.0 * v660, v663 = v42 * v662, v664 = a9 * v662,
+                                v665 = a8 * v662, v666 = v453 * v662, v667 = v454 * v662;
+                            v642 = softehl_blend(m658, v661, v642);
+                            v643 = softehl_blend(m658, v666, v643);
+                            v644 = softehl_blend(m658, v667, v644);
+                            v645 = softehl_blend(m658, v664, v645);
+                            v646 = softehl_blend(m658, v665, v646);
+                            v647 = softehl_blend(m658, v663, v647);
                         }
-                        v203 = softehl_blend(m204, v205, v203);
+                        v635 = softehl_blend(m641, v642, v635);
+                        v636 = softehl_blend(m641, v643, v636);
+                        v637 = softehl_blend(m641, v644, v637);
+                        v638 = softehl_blend(m641, v645, v638);
+                        v639 = softehl_blend(m641, v646, v639);
+                        v640 = softehl_blend(m641, v647, v640);
                     }
-                    v200 = softehl_blend(m201, v203, v200);
+                    v627 = softehl_blend(m633, v635, v627); v628 = softehl_blend(m633, v636, v628);
+                    v629 = softehl_blend(m633, v637, v629); v630 = softehl_blend(m633, v638, v630);
+                    v631 = softehl_blend(m633, v639, v631); v632 = softehl_blend(m633, v640, v632);
                 }
-                const M m216 = ~v199 & m162;
-                if (softehl_any(m216)) {
-                    const V v217 = v174 - v197;
-                    const V v218 = v217 * v217;
-                    const V v219 = v217 * v218;
-                    v200 = softehl_blend(m216, v219, v200);
+                const M m668 = ~v626 & m599;
+                if (softehl_any(m668)) {
+                    const V v669 = v620 - v624, v670 = v669 * v669, v671 = v669 * v670,
+                        v672 = 3.0 * v670, v673 = v41 * v672, v674 = a9 * v672, v675 = -(a8 * v672),
+                        v676 = v455 * v672, v677 = -(v454 * v672);
+                    v627 = softehl_blend(m668, v671, v627); v628 = softehl_blend(m668, v676, v628);
+                    v629 = softehl_blend(m668, v677, v629); v630 = softehl_blend(m668, v674, v630);
+                    v631 = softehl_blend(m668, v675, v631); v632 = softehl_blend(m668, v673, v632);
                 }
-                v160 = softehl_blend(m162, v167, v160);
-                v161 = softehl_blend(m162, v200, v161);
+                const V v678 = v92 * v623, v679 = v96 * v622, v680 = v605 * v630,
+                    v681 = v606 * v630,
+                    v682 = v630 * (v436 * v608 + v607 * v508) + v631 * (v436 * v279 + (v506 * v278 + (v679 + v101 * v623))),
+                    v683 = v630 * (v437 * v608 + v607 * v512) + v631 * (v437 * v279 + (v510 * v278 + (v98 * v622 - v678))),
+                    v684 = v630 * (v438 * v608 + v607 * v507) + v631 * (v438 * v279 + (v505 * v278 + (v100 * v623 - v679))),
+                    v685 = v631 * (v432 * v279 + v484 * v278) + v630 * (v432 * v608 + v607 * v491),
+                    v686 = v631 * (v433 * v279 + v499 * v278) + v630 * (v433 * v608 + v607 * v501),
+                    v687 = v631 * (v434 * v279 + v483 * v278) + v630 * (v434 * v608 + v607 * v492),
+                    v688 = v630 * (v435 * v608 + v607 * v511) + v631 * (v435 * v279 + (v509 * v278 + (v99 * v622 + v678))),
+                    v689 = v631 * (v439 * v279 + v500 * v278) + v630 * (v439 * v608 + v607 * v502),
+                    v690 = v628 * v480, v691 = v629 * v480, v692 = v628 * v479, v693 = v629 * v479,
+                    v694 = v628 * v481, v695 = v629 * v481, v696 = v628 * v482, v697 = v629 * v482,
+                    v698 = v471 * v690, v699 = v471 * v691, v700 = v471 * v692, v701 = v471 * v693,
+                    v702 = v470 * v690, v703 = v470 * v691, v704 = v470 * v692, v705 = v470 * v693,
+                    v706 = -(v489 * v690), v707 = -(v489 * v691), v708 = -(v489 * v692),
+                    v709 = -(v489 * v693), v710 = -(v490 * v690), v711 = -(v490 * v691),
+                    v712 = -(v490 * v692), v713 = -(v490 * v693);
+                v562 = softehl_blend(m599, v604, v562); v563 = softehl_blend(m599, v605, v563);
+                v564 = softehl_blend(m599, v606, v564); v565 = softehl_blend(m599, v627, v565);
+                v566 = softehl_blend(m599, v698, v566); v567 = softehl_blend(m599, v699, v567);
+                v568 = softehl_blend(m599, v700, v568); v569 = softehl_blend(m599, v701, v569);
+                v570 = softehl_blend(m599, v702, v570); v571 = softehl_blend(m599, v703, v571);
+                v572 = softehl_blend(m599, v704, v572); v573 = softehl_blend(m599, v705, v573);
+                v574 = softehl_blend(m599, v706, v574); v575 = softehl_blend(m599, v707, v575);
+                v576 = softehl_blend(m599, v708, v576); v577 = softehl_blend(m599, v709, v577);
+                v578 = softehl_blend(m599, v710, v578); v579 = softehl_blend(m599, v711, v579);
+                v580 = softehl_blend(m599, v712, v580); v581 = softehl_blend(m599, v713, v581);
+                v582 = softehl_blend(m599, v694, v582); v583 = softehl_blend(m599, v695, v583);
+                v584 = softehl_blend(m599, v696, v584); v585 = softehl_blend(m599, v697, v585);
+                v586 = softehl_blend(m599, v680, v586); v587 = softehl_blend(m599, v681, v587);
+                v588 = softehl_blend(m599, v607, v588); v589 = softehl_blend(m599, v608, v589);
+                v590 = softehl_blend(m599, v688, v590); v591 = softehl_blend(m599, v632, v591);
+                v592 = softehl_blend(m599, v682, v592); v593 = softehl_blend(m599, v683, v593);
+                v594 = softehl_blend(m599, v684, v594); v595 = softehl_blend(m599, v685, v595);
+                v596 = softehl_blend(m599, v686, v596); v597 = softehl_blend(m599, v687, v597);
+                v598 = softehl_blend(m599, v689, v598);
             }
-            v156 = softehl_blend(m158, v160, v156);
-            v157 = softehl_blend(m158, v161, v157);
+            v513 = softehl_blend(m560, v562, v513); v514 = softehl_blend(m560, v563, v514);
+            v515 = softehl_blend(m560, v564, v515); v516 = softehl_blend(m560, v565, v516);
+            v517 = softehl_blend(m560, v566, v517); v518 = softehl_blend(m560, v567, v518);
+            v519 = softehl_blend(m560, v568, v519); v520 = softehl_blend(m560, v569, v520);
+            v521 = softehl_blend(m560, v570, v521); v522 = softehl_blend(m560, v571, v522);
+            v523 = softehl_blend(m560, v572, v523); v524 = softehl_blend(m560, v573, v524);
+            v525 = softehl_blend(m560, v574, v525); v526 = softehl_blend(m560, v575, v526);
+            v527 = softehl_blend(m560, v576, v527); v528 = softehl_blend(m560, v577, v528);
+            v529 = softehl_blend(m560, v578, v529); v530 = softehl_blend(m560, v579, v530);
+            v531 = softehl_blend(m560, v580, v531); v532 = softehl_blend(m560, v581, v532);
+            v533 = softehl_blend(m560, v582, v533); v534 = softehl_blend(m560, v583, v534);
+            v535 = softehl_blend(m560, v584, v535); v536 = softehl_blend(m560, v585, v536);
+            v537 = softehl_blend(m560, v586, v537);
+            v538 = softehl_blend(m560, softehl_splat(0.0), v538);
+            v539 = softehl_blend(m560, v587, v539);
+            v540 = softehl_blend(m560, softehl_splat(0.0), v540);
+            v541 = softehl_blend(m560, v588, v541); v542 = softehl_blend(m560, v589, v542);
+            v543 = softehl_blend(m560, v590, v543); v544 = softehl_blend(m560, v591, v544);
+            v545 = softehl_blend(m560, softehl_splat(0.0), v545);
+            v546 = softehl_blend(m560, v592, v546);
+            v547 = softehl_blend(m560, softehl_splat(0.0), v547);
+            v548 = softehl_blend(m560, v593, v548);
+            v549 = softehl_blend(m560, softehl_splat(0.0), v549);
+            v550 = softehl_blend(m560, v594, v550);
+            v551 = softehl_blend(m560, softehl_splat(0.0), v551);
+            v552 = softehl_blend(m560, v595, v552);
+            v553 = softehl_blend(m560, softehl_splat(0.0), v553);
+            v554 = softehl_blend(m560, v596, v554);
+            v555 = softehl_blend(m560, softehl_splat(0.0), v555);
+            v556 = softehl_blend(m560, v597, v556);
+            v557 = softehl_blend(m560, softehl_splat(0.0), v557);
+            v558 = softehl_blend(m560, v598, v558);
+            v559 = softehl_blend(m560, softehl_splat(0.0), v559);
         }
-        const M m220 = ~v155;
-        if (softehl_any(m220)) {
-            const V v221 = v153 - v133;
-            const V v222 = v221 * v221;
-            const V v223 = v221 * v222;
-            v156 = softehl_blend(m220, v223, v156);
-            v157 = softehl_blend(m220, v223, v157);
+        const M m714 = ~v504;
+        if (softehl_any(m714)) {
+            const V v715 = v498 - v459, v716 = v715 * v715, v717 = v715 * v716, v718 = 3.0 * v716,
+                v719 = v455 * v718, v720 = v39 * v718, v721 = -(v454 * v718), v722 = a8 * v718,
+                v723 = v722 * v511, v724 = v722 * v508, v725 = v722 * v512, v726 = v722 * v507,
+                v727 = v722 * v491, v728 = v722 * v501, v729 = v722 * v492, v730 = v722 * v502;
+            v513 = softehl_blend(m714, v717, v513); v514 = softehl_blend(m714, v719, v514);
+            v515 = softehl_blend(m714, v721, v515); v516 = softehl_blend(m714, v717, v516);
+            v517 = softehl_blend(m714, softehl_splat(0.0), v517);
+            v518 = softehl_blend(m714, softehl_splat(0.0), v518);
+            v519 = softehl_blend(m714, softehl_splat(0.0), v519);
+            v520 = softehl_blend(m714, softehl_splat(0.0), v520);
+            v521 = softehl_blend(m714, softehl_splat(0.0), v521);
+            v522 = softehl_blend(m714, softehl_splat(0.0), v522);
+            v523 = softehl_blend(m714, softehl_splat(0.0), v523);
+            v524 = softehl_blend(m714, softehl_splat(0.0), v524);
+            v525 = softehl_blend(m714, softehl_splat(0.0), v525);
+            v526 = softehl_blend(m714, softehl_splat(0.0), v526);
+            v527 = softehl_blend(m714, softehl_splat(0.0), v527);
+            v528 = softehl_blend(m714, softehl_splat(0.0), v528);
+            v529 = softehl_blend(m714, softehl_splat(0.0), v529);
+            v530 = softehl_blend(m714, softehl_splat(0.0), v530);
+            v531 = softehl_blend(m714, softehl_splat(0.0), v531);
+            v532 = softehl_blend(m714, softehl_splat(0.0), v532);
+            v533 = softehl_blend(m714, softehl_splat(0.0), v533);
+            v534 = softehl_blend(m714, softehl_splat(0.0), v534);
+            v535 = softehl_blend(m714, softehl_splat(0.0), v535);
+            v536 = softehl_blend(m714, softehl_splat(0.0), v536);
+            v537 = softehl_blend(m714, softehl_splat(0.0), v537);
+            v538 = softehl_blend(m714, v719, v538);
+            v539 = softehl_blend(m714, softehl_splat(0.0), v539);
+            v540 = softehl_blend(m714, v721, v540); v541 = softehl_blend(m714, v722, v541);
+            v542 = softehl_blend(m714, v720, v542);
+            v543 = softehl_blend(m714, softehl_splat(0.0), v543);
+            v544 = softehl_blend(m714, v720, v544); v545 = softehl_blend(m714, v723, v545);
+            v546 = softehl_blend(m714, softehl_splat(0.0), v546);
+            v547 = softehl_blend(m714, v724, v547);
+            v548 = softehl_blend(m714, softehl_splat(0.0), v548);
+            v549 = softehl_blend(m714, v725, v549);
+            v550 = softehl_blend(m714, softehl_splat(0.0), v550);
+            v551 = softehl_blend(m714, v726, v551);
+            v552 = softehl_blend(m714, softehl_splat(0.0), v552);
+            v553 = softehl_blend(m714, v727, v553);
+            v554 = softehl_blend(m714, softehl_splat(0.0), v554);
+            v555 = softehl_blend(m714, v728, v555);
+            v556 = softehl_blend(m714, softehl_splat(0.0), v556);
+            v557 = softehl_blend(m714, v729, v557);
+            v558 = softehl_blend(m714, softehl_splat(0.0), v558);
+            v559 = softehl_blend(m714, v730, v559);
         }
-        const V v224 = v1 * w[1];
-        const V v225 = w[1] * v141;
-        const V v226 = w[1] * v140;
-        const V v227 = w[1] * v124;
-        const V v228 = w[1] * v123;
-        const V v229 = X1 * v123;
-        const V v230 = v224 * v123;
-        const V v231 = v224 * v124;
-        const V v232 = X3 * v124;
-        const V v233 = v229 + v232;
-        const V v234 = 6.283185307179586 * v233;
-        const V v235 = (-1.0) + v234;
-        const V v236 = a12 * v235;
-        const V v237 = 1.0 + v236;
-        const V v238 = v63 * v156;
-        const V v239 = v63 * v157;
-        const V v240 = v62 * v157;
-        const V v241 = v238 + v240;
-        const V v242 = v62 * v156;
-        const V v243 = v239 - v242;
-        const V v244 = v93 * v237;
-        const V v245 = v156 * v244;
-        const V v246 = v157 * v244;
-        const V v247 = v241 * v244;
-        const V v248 = v243 * v244;
-        const V v249 = v231 * v245;
-        s108 += v249;
-        const V v250 = v230 * v245;
-        s109 += v250;
-        const V v251 = v231 * v246;
-        s110 += v251;
-        const V v252 = v230 * v246;
-        s111 += v252;
-        const V v253 = v225 * v248;
-        s112 += v253;
-        const V v254 = v225 * v247;
-        s113 += v254;
-        const V v255 = v226 * v248;
-        s114 += v255;
-        const V v256 = v226 * v247;
-        s115 += v256;
-        const V v257 = v227 * v248;
-        s116 += v257;
-        const V v258 = v228 * v248;
-        s118 += v258;
-        const V v259 = v227 * v247;
-        s117 += v259;
-        const V v260 = v228 * v247;
-        s119 += v260;
+        s288 += v517; s289 += v518; s290 += v519; s291 += v520; s292 += v521; s293 += v522;
+        s294 += v523; s295 += v524; s296 += v525; s297 += v526; s298 += v527; s299 += v528;
+        s300 += v529; s301 += v530; s302 += v531; s303 += v532; s304 += v533; s305 += v534;
+        s306 += v535; s307 += v536;
+        const V v731 = v538 + v537, v732 = v540 + v539, v733 = v435 * v542 + v541 * v511,
+            v734 = v436 * v542 + v541 * v508, v735 = v437 * v542 + v541 * v512,
+            v736 = v438 * v542 + v541 * v507, v737 = v432 * v542 + v541 * v491,
+            v738 = v433 * v542 + v541 * v501, v739 = v434 * v542 + v541 * v492,
+            v740 = v439 * v542 + v541 * v502, v741 = w[1] * v514, v742 = v35 * w[1],
+            v743 = w[1] * v515, v744 = v514 * v479 + v731 * v480, v745 = v731 * v479 - v514 * v480;
+        s282 += v741 * v477; s284 += v741 * v478; s283 += v743 * v477; s285 += v743 * v478;
+        const V v746 = v515 * v479 + v732 * v480, v747 = v732 * v479 - v515 * v480;
+        s316 += v731 * v481; s317 += v732 * v481; s318 += v731 * v482; s319 += v732 * v482;
+        s322 += v471 * v745; s321 += v471 * v746; s323 += v471 * v747; s320 += v471 * v744;
+        s324 += v470 * v744; s325 += v470 * v746; s326 += v470 * v745; s327 += v470 * v747;
+        s328 += v489 * v744; s329 += v489 * v746; s330 += v489 * v745; s331 += v489 * v747;
+        s332 += v490 * v744; s333 += v490 * v746; s334 += v490 * v745; s335 += v490 * v747;
+        const V v748 = v742 * v454, v749 = v742 * v453, v750 = v513 * v469, v751 = v513 * v467,
+            v752 = v513 * v276, v753 = v516 * v469, v754 = v516 * v467, v755 = v516 * v276;
+        s280 += v748 * v750; s286 += v748 * v753; s281 += v749 * v750; s287 += v749 * v753;
+        const V v756 = 0.5 * v750, v757 = 0.5 * v753, v758 = v92 * v750, v759 = v92 * v753,
+            v760 = v96 * v750, v761 = v96 * v753, v762 = v35 * (v756 + v454 * v752),
+            v763 = v35 * (v757 + v454 * v755), v764 = v35 * (v453 * v752 - v756),
+            v765 = v35 * (v453 * v755 - v757), v766 = v435 * v544 + (v545 + v543),
+            v767 = v436 * v544 + (v547 + v546), v768 = v437 * v544 + (v549 + v548),
+            v769 = v438 * v544 + (v551 + v550), v770 = v439 * v544 + (v559 + v558),
+            v771 = v432 * v544 + (v553 + v552), v772 = v433 * v544 + (v555 + v554),
+            v773 = v434 * v544 + (v557 + v556), v774 = v472 * v751, v775 = v473 * v751,
+            v776 = v472 * v754, v777 = v473 * v754, v778 = v87 * v513 + v86 * v516,
+            v779 = v87 * v516 - v86 * v513, v780 = v778 * v469, v781 = v779 * v469,
+            v782 = v778 * v467, v783 = v779 * v467, v784 = v778 * v276, v785 = v779 * v276,
+            v786 = 0.5 * v780, v787 = 0.5 * v781;
+        s309 += v490 * v780; s308 += v490 * v781; s310 += v489 * v781; s311 += v489 * v780;
+        s312 += v470 * v781; s313 += v470 * v780; s314 += v471 * v781; s315 += v471 * v780;
+        const V v788 = v435 * v786, v789 = v435 * v787, v790 = v436 * v786, v791 = v436 * v787,
+            v792 = v437 * v786, v793 = v437 * v787, v794 = v438 * v786, v795 = v438 * v787,
+            v796 = v432 * v786, v797 = v432 * v787, v798 = v433 * v786, v799 = v433 * v787,
+            v800 = v434 * v786, v801 = v434 * v787, v802 = v439 * v786, v803 = v439 * v787,
+            v804 = v509 * v786, v805 = v509 * v787, v806 = v506 * v786, v807 = v506 * v787,
+            v808 = v510 * v786, v809 = v510 * v787, v810 = v505 * v786, v811 = v505 * v787,
+            v812 = v484 * v786, v813 = v484 * v787, v814 = v499 * v786, v815 = v499 * v787,
+            v816 = v483 * v786, v817 = v483 * v787, v818 = v500 * v786, v819 = v500 * v787,
+            v820 = v439 * v785 + (v267 * v783 + (v479 * v770 - v740 * v480)),
+            v821 = v250 * v782 + (v435 * v784 + (v99 * v753 + (v758 + v733 * v479))),
+            v822 = w[1] * (v453 * v820 - v803);
+        s383 += v822; const V v823 = w[1] * (v803 + v454 * v820); s399 += v823;
+        const V v824 = w[1] * (v819 - v487 * v820); s415 += v824;
+        const V v825 = w[1] * (v819 + v488 * v820); s431 += v825;
+        const V v826 = v267 * v782 + (v439 * v784 + v740 * v479) + v480 * v770,
+            v827 = v821 + v480 * v766,
+            v828 = v250 * v783 + (v435 * v785 + (v759 - v99 * v750)) - v733 * v480 + v479 * v766;
+        s336 += w[1] * (v250 * v774 + v435 * v764 + v733 * v477);
+        const V v829 = w[1] * (v453 * v826 - v802); s375 += v829;
+        s337 += w[1] * (v251 * v774 + v436 * v764 + v734 * v477);
+        s338 += w[1] * (v252 * v774 + v437 * v764 + v735 * v477);
+        const V v830 = w[1] * (v453 * v828 - v789); s376 += v830;
+        const V v831 = w[1] * (v453 * v827 - v788); s368 += v831;
+        const V v832 = w[1] * (v788 + v454 * v827); s384 += v832;
+        const V v833 = w[1] * (v789 + v454 * v828); s392 += v833;
+        const V v834 = w[1] * (v250 * v775 + (v435 * v762 + v733 * v478)); s344 += v834;
+        const V v835 = w[1] * (v252 * v775 + (v437 * v762 + v735 * v478)); s346 += v835;
+        const V v836 = w[1] * (v251 * v775 + (v436 * v762 + v734 * v478)); s345 += v836;
+        const V v837 = v437 * v785 + (v252 * v783 + (v479 * v768 - v98 * v750 - v759 - v735 * v480)),
+            v838 = v432 * v785 + (v261 * v783 + (v479 * v771 - v737 * v480)),
+            v839 = w[1] * (v453 * v837 - v793);
+        s378 += v839; s348 += w[1] * (v261 * v775 + v432 * v762 + v737 * v478);
+        s340 += w[1] * (v261 * v774 + v432 * v764 + v737 * v477);
+        const V v840 = w[1] * (v453 * v838 - v797); s380 += v840;
+        const V v841 = v251 * v782 + (v436 * v784 + (v761 + (v101 * v750 + v734 * v479)));
+        s339 += w[1] * (v258 * v774 + v438 * v764 + v736 * v477);
+        s347 += w[1] * (v258 * v775 + v438 * v762 + v736 * v478);
+        const V v842 = v841 + v480 * v767,
+            v843 = v261 * v782 + (v432 * v784 + v737 * v479) + v480 * v771,
+            v844 = w[1] * (v251 * v776 + (v436 * v765 + v477 * v767));
+        s353 += v844; const V v845 = w[1] * (v261 * v776 + (v432 * v765 + v477 * v771));
+        s356 += v845; const V v846 = w[1] * (v261 * v777 + (v432 * v763 + v478 * v771));
+        s364 += v846; const V v847 = w[1] * (v251 * v777 + v436 * v763 + v478 * v767); s361 += v847;
+        const V v848 = v436 * v785 + (v251 * v783 + (v101 * v753 - v760 - v734 * v480)) + v479 * v767,
+            v849 = v438 * v785 + (v258 * v783 + (v760 + v100 * v753)) - v736 * v480 + v479 * v769,
+            v850 = w[1] * (v453 * v842 - v790);
+        s369 += v850; const V v851 = w[1] * (v453 * v843 - v796); s372 += v851;
+        const V v852 = w[1] * (v453 * v848 - v791); s377 += v852;
+        const V v853 = w[1] * (v453 * v849 - v795); s379 += v853;
+        const V v854 = w[1] * (v790 + v454 * v842); s385 += v854;
+        const V v855 = w[1] * (v796 + v454 * v843); s388 += v855;
+        const V v856 = w[1] * (v791 + v454 * v848); s393 += v856;
+        const V v857 = w[1] * (v795 + v454 * v849); s395 += v857;
+        const V v858 = w[1] * (v258 * v777 + (v438 * v763 + v478 * v769)); s363 += v858;
+        const V v859 = v258 * v782 + (v438 * v784 + (v100 * v750 + (v736 * v479 - v761))),
+            v860 = v252 * v782 + (v437 * v784 + (v98 * v753 + (v735 * v479 - v758))),
+            v861 = v859 + v480 * v769, v862 = w[1] * (v258 * v776 + v438 * v765 + v477 * v769);
+        s355 += v862;
+        const V v863 = v860 + v480 * v768, v864 = w[1] * (v250 * v776 + v435 * v765 + v477 * v766);
+        s352 += v864; const V v865 = w[1] * (v250 * v777 + v435 * v763 + v478 * v766); s360 += v865;
+        const V v866 = w[1] * (v252 * v776 + v437 * v765 + v477 * v768); s354 += v866;
+        const V v867 = w[1] * (v252 * v777 + v437 * v763 + v478 * v768); s362 += v867;
+        const V v868 = w[1] * (v453 * v861 - v794); s371 += v868;
+        const V v869 = w[1] * (v453 * v863 - v792); s370 += v869;
+        s341 += w[1] * (v263 * v774 + v433 * v764 + v738 * v477);
+        s349 += w[1] * (v263 * v775 + v433 * v762 + v738 * v478);
+        s342 += w[1] * (v264 * v774 + v434 * v764 + v739 * v477);
+        s350 += w[1] * (v264 * v775 + v434 * v762 + v739 * v478);
+        s343 += w[1] * (v267 * v774 + v439 * v764 + v740 * v477);
+        s351 += w[1] * (v267 * v775 + v439 * v762 + v740 * v478);
+        const V v870 = w[1] * (v263 * v776 + v433 * v765 + v477 * v772); s357 += v870;
+        const V v871 = w[1] * (v264 * v776 + v434 * v765 + v477 * v773); s358 += v871;
+        const V v872 = w[1] * (v267 * v776 + v439 * v765 + v477 * v770); s359 += v872;
+        const V v873 = w[1] * (v267 * v777 + v439 * v763 + v478 * v770); s367 += v873;
+        const V v874 = w[1] * (v263 * v777 + v433 * v763 + v478 * v772); s365 += v874;
+        const V v875 = w[1] * (v264 * v777 + v434 * v763 + v478 * v773); s366 += v875;
+        const V v876 = w[1] * (v792 + v454 * v863); s386 += v876;
+        const V v877 = w[1] * (v794 + v454 * v861); s387 += v877;
+        const V v878 = w[1] * (v802 + v454 * v826); s391 += v878;
+        const V v879 = w[1] * (v793 + v454 * v837); s394 += v879;
+        const V v880 = v433 * v784 + (v263 * v782 + (v738 * v479 + v480 * v772)),
+            v881 = v434 * v784 + (v264 * v782 + (v739 * v479 + v480 * v773)),
+            v882 = v433 * v785 + (v263 * v783 + (v479 * v772 - v738 * v480)),
+            v883 = v434 * v785 + (v264 * v783 + (v479 * v773 - v739 * v480)),
+            v884 = w[1] * (v797 + v454 * v838);
+        s396 += v884; const V v885 = w[1] * (v798 + v454 * v880); s389 += v885;
+        const V v886 = w[1] * (v453 * v880 - v798); s373 += v886;
+        const V v887 = w[1] * (v453 * v881 - v800); s374 += v887;
+        const V v888 = w[1] * (v453 * v882 - v799); s381 += v888;
+        const V v889 = w[1] * (v453 * v883 - v801); s382 += v889;
+        const V v890 = w[1] * (v800 + v454 * v881); s390 += v890;
+        const V v891 = w[1] * (v799 + v454 * v882); s397 += v891;
+        const V v892 = w[1] * (v801 + v454 * v883); s398 += v892;
+        const V v893 = w[1] * (v814 - v487 * v880); s405 += v893;
+        const V v894 = w[1] * (v816 - v487 * v881); s406 += v894;
+        const V v895 = w[1] * (v815 - v487 * v882); s413 += v895;
+        const V v896 = w[1] * (v817 - v487 * v883); s414 += v896;
+        const V v897 = w[1] * (v814 + v488 * v880); s421 += v897;
+        const V v898 = w[1] * (v816 + v488 * v881); s422 += v898;
+        const V v899 = w[1] * (v815 + v488 * v882); s429 += v899;
+        const V v900 = w[1] * (v817 + v488 * v883); s430 += v900;
+        const V v901 = w[1] * (v804 - v487 * v827); s400 += v901;
+        const V v902 = w[1] * (v804 + v488 * v827); s416 += v902;
+        const V v903 = w[1] * (v806 - v487 * v842); s401 += v903;
+        const V v904 = w[1] * (v806 + v488 * v842); s417 += v904;
+        const V v905 = w[1] * (v808 - v487 * v863); s402 += v905;
+        const V v906 = w[1] * (v808 + v488 * v863); s418 += v906;
+        const V v907 = w[1] * (v810 - v487 * v861); s403 += v907;
+        const V v908 = w[1] * (v810 + v488 * v861); s419 += v908;
+        const V v909 = w[1] * (v812 - v487 * v843); s404 += v909;
+        const V v910 = w[1] * (v812 + v488 * v843); s420 += v910;
+        const V v911 = w[1] * (v818 - v487 * v826); s407 += v911;
+        const V v912 = w[1] * (v818 + v488 * v826); s423 += v912;
+        const V v913 = w[1] * (v805 - v487 * v828); s408 += v913;
+        const V v914 = w[1] * (v805 + v488 * v828); s424 += v914;
+        const V v915 = w[1] * (v807 - v487 * v848); s409 += v915;
+        const V v916 = w[1] * (v807 + v488 * v848); s425 += v916;
+        const V v917 = w[1] * (v809 - v487 * v837); s410 += v917;
+        const V v918 = w[1] * (v809 + v488 * v837); s426 += v918;
+        const V v919 = w[1] * (v811 - v487 * v849); s411 += v919;
+        const V v920 = w[1] * (v811 + v488 * v849); s427 += v920;
+        const V v921 = w[1] * (v813 - v487 * v838); s412 += v921;
+        const V v922 = w[1] * (v813 + v488 * v838); s428 += v922;
     }
-    softehl_store4(R + 8, 12, s109, s111, s108, s110);
-    softehl_store4(R + 0, 12, s119, s118, s117, s116);
-    const V v261 = -s112;
-    const V v262 = -s113;
-    const V v263 = -s114;
-    const V v264 = -s115;
-    softehl_store4(R + 4, 12, v264, v263, v262, v261);
+    softehl_store4(K + 104, 144, s282, softehl_splat(0.0), s283, softehl_splat(0.0));
+    softehl_store4(K + 128, 144, s284, softehl_splat(0.0), s285, softehl_splat(0.0));
+    softehl_store4(R + 8, 12, s281, s287, s280, s286);
+    softehl_store4(R + 0, 12, s315, s314, s313, s312);
+    softehl_store4(K + 116, 144, s316, s304, s317, s305);
+    softehl_store4(K + 140, 144, s318, s306, s319, s307);
+    softehl_store4(K + 8, 144, s320, s288, s321, s289);
+    softehl_store4(K + 20, 144, s322, s290, s323, s291);
+    softehl_store4(K + 32, 144, s324, s292, s325, s293);
+    softehl_store4(K + 44, 144, s326, s294, s327, s295);
+    softehl_store4(K + 96, 144, s336, s337, s338, s339);
+    softehl_store4(K + 100, 144, s340, s341, s342, s343);
+    softehl_store4(K + 120, 144, s344, s345, s346, s347);
+    softehl_store4(K + 124, 144, s348, s349, s350, s351);
+    softehl_store4(K + 108, 144, s352, s353, s354, s355);
+    softehl_store4(K + 112, 144, s356, s357, s358, s359);
+    softehl_store4(K + 132, 144, s360, s361, s362, s363);
+    softehl_store4(K + 136, 144, s364, s365, s366, s367);
+    softehl_store4(K + 0, 144, s368, s369, s370, s371);
+    softehl_store4(K + 4, 144, s372, s373, s374, s375);
+    softehl_store4(K + 12, 144, s376, s377, s378, s379);
+    softehl_store4(K + 16, 144, s380, s381, s382, s383);
+    softehl_store4(K + 24, 144, s384, s385, s386, s387);
+    softehl_store4(K + 28, 144, s388, s389, s390, s391);
+    softehl_store4(K + 36, 144, s392, s393, s394, s395);
+    softehl_store4(K + 40, 144, s396, s397, s398, s399);
+    softehl_store4(K + 48, 144, s400, s401, s402, s403);
+    softehl_store4(K + 52, 144, s404, s405, s406, s407);
+    softehl_store4(K + 60, 144, s408, s409, s410, s411);
+    softehl_store4(K + 64, 144, s412, s413, s414, s415);
+    softehl_store4(R + 4, 12, -s311, -s310, -s309, -s308);
+    softehl_store4(K + 56, 144, -s328, s296, -s329, s297);
+    softehl_store4(K + 68, 144, -s330, s298, -s331, s299);
+    softehl_store4(K + 80, 144, -s332, s300, -s333, s301);
+    softehl_store4(K + 92, 144, -s334, s302, -s335, s303);
+    softehl_store4(K + 72, 144, -s416, -s417, -s418, -s419);
+    softehl_store4(K + 76, 144, -s420, -s421, -s422, -s423);
+    softehl_store4(K + 84, 144, -s424, -s425, -s426, -s427);
+    softehl_store4(K + 88, 144, -s428, -s429, -s430, -s431);
 }
-
-void softehl_mortar_22_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mortar_22_residual_group(points, modes, coordinates + 8 * e, dofs + 12 * e, data + 13 * e, 0, parameters, rule, basis, values + 12 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mortar_22_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 12 * (n - SOFTEHL_LANES), data + 13 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 12 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 12];
-    softehl_pad(d, dofs, 12, n);
-    double a[SOFTEHL_LANES * 13];
-    softehl_pad(a, data, 13, n);
-    double R[SOFTEHL_LANES * 12];
-    softehl_mortar_22_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 12 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_mortar_22_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 12, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 12, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
-    softehl_load4(d + 8, 12, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V a0, a1, a2, a3;
-    softehl_load4(a + 0, 13, &a0, &a1, &a2, &a3);
-    (void)a0; (void)a1; (void)a2; (void)a3;
-    V a4, a5, a6, a7;
-    softehl_load4(a + 4, 13, &a4, &a5, &a6, &a7);
-    (void)a4; (void)a5; (void)a6; (void)a7;
-    V a8, a9, a10, a11;
-    softehl_load4(a + 8, 13, &a8, &a9, &a10, &a11);
-    (void)a8; (void)a9; (void)a10; (void)a11;
-    V a12;
-    softehl_load1(a + 12, 13, &a12);
-    (void)a12;
-    const V v1 = X2 + d2;
-    const V v2 = X2 + a1;
-    const V v3 = X0 + a0;
-    const V v4 = X4 + a2;
-    const V v5 = X2 - X0;
-    const V v6 = X6 + a3;
-    const V v7 = X4 + X6;
-    const V v8 = 0.5 * v5;
-    const V v9 = v3 - v2;
-    const V v10 = X1 + a4;
-    const V v11 = X3 + d3;
-    const V v12 = X3 + a5;
-    const V v13 = v6 - v4;
-    const V v14 = v8 * v8;
-    const V v15 = X3 - X1;
-    const V v16 = X0 + d0;
-    const V v17 = v10 - v12;
-    const V v18 = 0.5 * v15;
-    const V v19 = X1 + d1;
-    const V v20 = -a9;
-    const V v21 = X5 + a6;
-    const V v22 = X7 + a7;
-    const V v23 = v19 + v11;
-    const V v24 = X5 + X7;
-    const V v25 = v11 - v19;
-    const V v26 = 0.5 * v23;
-    const V v27 = X5 + d5;
-    const V v28 = v11 - X1;
-    const V v29 = d5 + v24;
-    const V v30 = v22 - v21;
-    const V v31 = 0.5 * v25;
-    const V v32 = X7 + d7;
-    const V v33 = d7 + v29;
-    const V v34 = d1 - v28;
-    const V v35 = v28 - d1;
-    const V v36 = 0.5 * v33;
-    const V v37 = a12 * v18;
-    const V v38 = v18 * v18;
-    const V v39 = v14 + v38;
-    const V v40 = 0.5 * v34;
-    const V v41 = v27 - v26;
-    const V v42 = v32 - X5;
-    const V v43 = softehl_vsqrt(v39);
-    const V v44 = v42 - d5;
-    const V v45 = 0.5 * v35;
-    const V v46 = 0.25 * v35;
-    const V v47 = v32 - v26;
-    const V v48 = v32 - v27;
-    const V v49 = 0.5 * v44;
-    const V v50 = 0.5 * v41;
-    const V v51 = v41 * v45;
-    const V v52 = v16 + v1;
-    const V v53 = 0.5 * v47;
-    const V v54 = v47 * v45;
-    const V v55 = v45 * v45;
-    const V v56 = 0.5 * v52;
-    const V v57 = v1 - X0;
-    const V v58 = v1 - v16;
-    const V v59 = 0.5 * v58;
-    const V v60 = d0 - v57;
-    const V v61 = v50 + v46;
-    const V v62 = v50 - v46;
-    const V v63 = v53 + v46;
-    const V v64 = v53 - v46;
-    const V v65 = v57 - d0;
-    const V v66 = 0.5 * v60;
-    const V v67 = 1.0 / a8;
-    const V v68 = -a8;
-    const V v69 = 0.5 * v65;
-    const V v70 = 0.25 * v65;
-    const V v71 = d8 - d10;
-    const V v72 = d10 - d8;
-    const V v73 = d9 - d11;
-    const V v74 = d11 - d9;
-    const V v75 = 0.5 * v71;
-    const V v76 = 0.5 * v72;
-    const V v77 = 0.5 * v73;
-    const V v78 = 0.5 * v74;
-    const V v79 = v69 * v69;
-    const V v80 = v79 + v55;
-    const V v81 = 1.0 / v80;
-    const V v82 = X4 + d4;
-    const V v83 = d4 + v7;
-    const V v84 = X6 + d6;
-    const V v85 = d6 + v83;
-    const V v86 = 0.5 * v85;
-    const V v87 = v84 - v82;
-    const V v88 = v84 - d4;
-    const V v89 = v88 - X4;
-    const V v90 = 0.5 * v89;
-    const V v91 = v82 - v56;
-    const V v92 = v84 - v56;
-    const V v93 = 0.5 * v91;
-    const V v94 = v91 * v69;
-    const V v95 = v94 + v51;
-    const V v96 = 0.5 * v92;
-    const V v97 = v92 * v69;
-    const V v98 = v97 + v54;
-    const V v99 = v98 * v81;
-    const V v100 = v93 + v70;
-    const V v101 = v96 + v70;
-    const M v102 = softehl_lt(softehl_splat(1.0), v99);
-    const V v103 = v93 - v70;
-    const V v104 = v96 - v70;
-    const V v105 = softehl_blend(v102, softehl_splat(1.0), v99);
-    const M v106 = softehl_eq(v105, v105);
-    const V v107 = v95 * v81;
-    const M v108 = softehl_lt(softehl_splat(1.0), v107);
-    const V v109 = softehl_blend(v108, softehl_splat(1.0), v107);
-    const M v110 = softehl_eq(v109, v109);
-    const V v111 = softehl_vsqrt(v80);
-    const V v112 = v81 * v81;
-    const V v113 = v103 * v81;
-    const V v114 = v104 * v81;
-    const V v115 = v62 * v81;
-    const V v116 = v64 * v81;
-    const V v117 = v100 * v81;
-    const V v118 = v101 * v81;
-    const V v119 = v66 * v112;
-    const V v120 = v40 * v112;
-    const V v121 = softehl_vsqrt(v81);
-    const V v122 = v61 * v81;
-    const V v123 = v63 * v81;
-    const V v124 = v69 * v112;
-    const V v125 = v45 * v112;
-    const V v126 = v69 * v81;
-    const V v127 = v45 * v81;
-    const V v128 = v95 * v119;
-    const V v129 = v128 + v117;
-    const V v130 = v98 * v119;
-    const V v131 = v118 + v130;
-    const V v132 = v95 * v120;
-    const V v133 = v132 + v122;
-    const V v134 = v98 * v120;
-    const V v135 = v123 + v134;
-    const V v136 = v95 * v124;
-    const V v137 = v98 * v124;
-    const V v138 = v95 * v125;
-    const V v139 = v98 * v125;
-    const V v140 = 0.5 * v121;
-    const V v141 = 1.0 / v111;
-    const V v142 = v69 * v141;
-    const V v143 = v45 * v141;
-    const V v144 = v141 * v141;
-    const V v145 = 0.5 * v141;
-    const V v146 = 0.5 * v142;
-    const V v147 = v90 * v142;
-    const V v148 = v49 * v143;
-    const V v149 = v147 + v148;
-    const V v150 = 0.5 * v143;
-    const V v151 = v69 * v144;
-    const V v152 = v140 * v151;
-    const V v153 = v45 * v144;
-    const V v154 = v140 * v153;
-    const V v155 = v45 * v152;
-    const V v156 = v49 * v155;
-    const V v157 = v69 * v152;
-    const V v158 = v45 * v154;
-    const V v159 = v69 * v154;
-    const V v160 = v90 * v159;
-    const V v161 = v145 - v157;
-    const V v162 = v157 - v145;
-    const V v163 = v145 - v158;
-    const V v164 = v158 - v145;
-    V v165 = softehl_splat(0.0);
-    V v166 = softehl_splat(0.0);
-    V v167 = softehl_splat(0.0);
-    V v168 = softehl_splat(0.0);
-    V v169 = softehl_splat(0.0);
-    V v170 = softehl_splat(0.0);
-    V v171 = softehl_splat(0.0);
-    const M m172 = v106;
-    if (softehl_any(m172)) {
-        const M v173 = softehl_lt(softehl_splat((-1.0)), v105);
-        V v174 = softehl_splat((-1.0));
-        V v175 = softehl_splat(0.0);
-        V v176 = softehl_splat(0.0);
-        V v177 = softehl_splat(0.0);
-        V v178 = softehl_splat(0.0);
-        V v179 = softehl_splat(0.0);
-        V v180 = softehl_splat(0.0);
-        const M m181 = v173 & m172;
-        if (softehl_any(m181)) {
-            V v182 = softehl_splat(0.0);
-            V v183 = softehl_splat(0.0);
-            V v184 = softehl_splat(0.0);
-            V v185 = softehl_splat(0.0);
-            V v186 = softehl_splat(0.0);
-            V v187 = softehl_splat(0.0);
-            const M m188 = ~v102 & m181;
-            if (softehl_any(m188)) {
-                const V v189 = -v131;
-                const V v190 = -v135;
-                const V v191 = v114 - v137;
-                const V v192 = v116 - v139;
-                v182 = softehl_blend(m188, v126, v182);
-                v183 = softehl_blend(m188, v127, v183);
-                v184 = softehl_blend(m188, v189, v184);
-                v185 = softehl_blend(m188, v190, v185);
-                v186 = softehl_blend(m188, v191, v186);
-                v187 = softehl_blend(m188, v192, v187);
-            }
-            v174 = softehl_blend(m181, v105, v174);
-            v175 = softehl_blend(m181, v182, v175);
-            v176 = softehl_blend(m181, v183, v176);
-            v177 = softehl_blend(m181, v184, v177);
-            v178 = softehl_blend(m181, v185, v178);
-            v179 = softehl_blend(m181, v186, v179);
-            v180 = softehl_blend(m181, v187, v180);
-        }
-        v165 = softehl_blend(m172, v174, v165);
-        v166 = softehl_blend(m172, v177, v166);
-        v167 = softehl_blend(m172, v178, v167);
-        v168 = softehl_blend(m172, v179, v168);
-        v169 = softehl_blend(m172, v180, v169);
-        v170 = softehl_blend(m172, v175, v170);
-        v171 = softehl_blend(m172, v176, v171);
-    }
-    const M m193 = ~v106;
-    if (softehl_any(m193)) {
-        const V v194 = (-1.0) - v105;
-        const V v195 = v194 * v194;
-        const V v196 = v194 * v195;
-        V v197 = softehl_splat(0.0);
-        V v198 = softehl_splat(0.0);
-        V v199 = softehl_splat(0.0);
-        V v200 = softehl_splat(0.0);
-        V v201 = softehl_splat(0.0);
-        V v202 = softehl_splat(0.0);
-        const M m203 = ~v102 & m193;
-        if (softehl_any(m203)) {
-            const V v204 = (-1.0) - v99;
-            const V v205 = v137 - v114;
-            const V v206 = v139 - v116;
-            const V v207 = 3.0 * v204;
-            const V v208 = v204 * v207;
-            const V v209 = v205 * v208;
-            const V v210 = v206 * v208;
-            const V v211 = v131 * v208;
-            const V v212 = v135 * v208;
-            const V v213 = v126 * v208;
-            const V v214 = -v213;
-            const V v215 = v127 * v208;
-            const V v216 = -v215;
-            v197 = softehl_blend(m203, v211, v197);
-            v198 = softehl_blend(m203, v212, v198);
-            v199 = softehl_blend(m203, v209, v199);
-            v200 = softehl_blend(m203, v210, v200);
-            v201 = softehl_blend(m203, v214, v201);
-            v202 = softehl_blend(m203, v216, v202);
-        }
-        v165 = softehl_blend(m193, v196, v165);
-        v166 = softehl_blend(m193, v197, v166);
-        v167 = softehl_blend(m193, v198, v167);
-        v168 = softehl_blend(m193, v199, v168);
-        v169 = softehl_blend(m193, v200, v169);
-        v170 = softehl_blend(m193, v201, v170);
-        v171 = softehl_blend(m193, v202, v171);
-    }
-    V v217 = softehl_splat(0.0);
-    V v218 = softehl_splat(0.0);
-    V v219 = softehl_splat(0.0);
-    V v220 = softehl_splat(0.0);
-    V v221 = softehl_splat(0.0);
-    V v222 = softehl_splat(0.0);
-    V v223 = softehl_splat(0.0);
-    const M m224 = v110;
-    if (softehl_any(m224)) {
-        const M v225 = softehl_lt(softehl_splat((-1.0)), v109);
-        V v226 = softehl_splat((-1.0));
-        V v227 = softehl_splat(0.0);
-        V v228 = softehl_splat(0.0);
-        V v229 = softehl_splat(0.0);
-        V v230 = softehl_splat(0.0);
-        V v231 = softehl_splat(0.0);
-        V v232 = softehl_splat(0.0);
-        const M m233 = v225 & m224;
-        if (softehl_any(m233)) {
-            V v234 = softehl_splat(0.0);
-            V v235 = softehl_splat(0.0);
-            V v236 = softehl_splat(0.0);
-            V v237 = softehl_splat(0.0);
-            V v238 = softehl_splat(0.0);
-            V v239 = softehl_splat(0.0);
-            const M m240 = ~v108 & m233;
-            if (softehl_any(m240)) {
-                const V v241 = -v129;
-                const V v242 = -v133;
-                const V v243 = v113 - v136;
-                const V v244 = v115 - v138;
-                v234 = softehl_blend(m240, v126, v234);
-                v235 = softehl_blend(m240, v127, v235);
-                v236 = softehl_blend(m240, v241, v236);
-                v237 = softehl_blend(m240, v242, v237);
-                v238 = softehl_blend(m240, v243, v238);
-                v239 = softehl_blend(m240, v244, v239);
-            }
-            v226 = softehl_blend(m233, v109, v226);
-            v227 = softehl_blend(m233, v234, v227);
-            v228 = softehl_blend(m233, v235, v228);
-            v229 = softehl_blend(m233, v236, v229);
-            v230 = softehl_blend(m233, v237, v230);
-            v231 = softehl_blend(m233, v238, v231);
-            v232 = softehl_blend(m233, v239, v232);
-        }
-        v217 = softehl_blend(m224, v226, v217);
-        v218 = softehl_blend(m224, v229, v218);
-        v219 = softehl_blend(m224, v230, v219);
-        v220 = softehl_blend(m224, v231, v220);
-        v221 = softehl_blend(m224, v232, v221);
-        v222 = softehl_blend(m224, v227, v222);
-        v223 = softehl_blend(m224, v228, v223);
-    }
-    const M m245 = ~v110;
-    if (softehl_any(m245)) {
-        const V v246 = (-1.0) - v109;
-        const V v247 = v246 * v246;
-        const V v248 = v246 * v247;
-        V v249 = softehl_splat(0.0);
-        V v250 = softehl_splat(0.0);
-        V v251 = softehl_splat(0.0);
-        V v252 = softehl_splat(0.0);
-        V v253 = softehl_splat(0.0);
-        V v254 = softehl_splat(0.0);
-        const M m255 = ~v108 & m245;
-        if (softehl_any(m255)) {
-            const V v256 = (-1.0) - v107;
-            const V v257 = v136 - v113;
-            const V v258 = v138 - v115;
-            const V v259 = 3.0 * v256;
-            const V v260 = v256 * v259;
-            const V v261 = v257 * v260;
-            const V v262 = v258 * v260;
-            const V v263 = v129 * v260;
-            const V v264 = v133 * v260;
-            const V v265 = v126 * v260;
-            const V v266 = -v265;
-            const V v267 = v127 * v260;
-            const V v268 = -v267;
-            v249 = softehl_blend(m255, v263, v249);
-            v250 = softehl_blend(m255, v264, v250);
-            v251 = softehl_blend(m255, v261, v251);
-            v252 = softehl_blend(m255, v262, v252);
-            v253 = softehl_blend(m255, v266, v253);
-            v254 = softehl_blend(m255, v268, v254);
-        }
-        v217 = softehl_blend(m245, v248, v217);
-        v218 = softehl_blend(m245, v249, v218);
-        v219 = softehl_blend(m245, v250, v219);
-        v220 = softehl_blend(m245, v251, v220);
-        v221 = softehl_blend(m245, v252, v221);
-        v222 = softehl_blend(m245, v253, v222);
-        v223 = softehl_blend(m245, v254, v223);
-    }
-    const V v269 = 1.0 / v149;
-    const V v270 = v217 - v165;
-    const M v271 = softehl_eq(v270, v270);
-    const V v272 = v90 * v161;
-    const V v273 = v90 * v162;
-    const V v274 = v156 + v273;
-    const V v275 = v272 - v156;
-    const V v276 = v49 * v164;
-    const V v277 = v160 + v276;
-    const V v278 = v49 * v163;
-    const V v279 = v278 - v160;
-    const V v280 = 0.5 * v269;
-    const V v281 = v142 * v269;
-    const V v282 = 0.5 * v281;
-    const V v283 = v143 * v269;
-    const V v284 = v269 * v269;
-    const V v285 = 0.5 * v283;
-    const V v286 = v146 * v284;
-    const V v287 = v150 * v284;
-    V v288 = softehl_splat(0.0);
-    V v289 = softehl_splat(0.0);
-    V v290 = softehl_splat(0.0);
-    V v291 = softehl_splat(0.0);
-    V v292 = softehl_splat(0.0);
-    V v293 = softehl_splat(0.0);
-    V v294 = softehl_splat(0.0);
-    V v295 = softehl_splat(0.0);
-    V v296 = softehl_splat(0.0);
-    const M m297 = v271;
-    if (softehl_any(m297)) {
-        const M v298 = softehl_lt(softehl_splat(0.0), v270);
-        V v299 = softehl_splat(0.0);
-        V v300 = softehl_splat(0.0);
-        V v301 = softehl_splat(0.0);
-        V v302 = softehl_splat(0.0);
-        V v303 = softehl_splat(0.0);
-        V v304 = softehl_splat(0.0);
-        V v305 = softehl_splat(0.0);
-        V v306 = softehl_splat(0.0);
-        V v307 = softehl_splat(0.0);
-        const M m308 = v298 & m297;
-        if (softehl_any(m308)) {
-            const V v309 = -v170;
-            const V v310 = v218 - v166;
-            const V v311 = -v171;
-            const V v312 = v219 - v167;
-            const V v313 = v220 - v168;
-            const V v314 = v221 - v169;
-            v299 = softehl_blend(m308, v270, v299);
-            v300 = softehl_blend(m308, v310, v300);
-            v301 = softehl_blend(m308, v312, v301);
-            v302 = softehl_blend(m308, v313, v302);
-            v303 = softehl_blend(m308, v314, v303);
-            v304 = softehl_blend(m308, v222, v304);
-            v305 = softehl_blend(m308, v223, v305);
-            v306 = softehl_blend(m308, v309, v306);
-            v307 = softehl_blend(m308, v311, v307);
-        }
-        v288 = softehl_blend(m297, v299, v288);
-        v289 = softehl_blend(m297, v300, v289);
-        v290 = softehl_blend(m297, v301, v290);
-        v291 = softehl_blend(m297, v302, v291);
-        v292 = softehl_blend(m297, v303, v292);
-        v293 = softehl_blend(m297, v304, v293);
-        v294 = softehl_blend(m297, v305, v294);
-        v295 = softehl_blend(m297, v306, v295);
-        v296 = softehl_blend(m297, v307, v296);
-    }
-    const M m315 = ~v271;
-    if (softehl_any(m315)) {
-        const V v316 = v165 - v217;
-        const V v317 = v166 - v218;
-        const V v318 = v167 - v219;
-        const V v319 = v168 - v220;
-        const V v320 = v169 - v221;
-        const V v321 = v316 * v316;
-        const V v322 = v316 * v321;
-        const V v323 = 3.0 * v321;
-        const V v324 = v317 * v323;
-        const V v325 = v318 * v323;
-        const V v326 = v319 * v323;
-        const V v327 = v320 * v323;
-        const V v328 = v222 * v323;
-        const V v329 = -v328;
-        const V v330 = v223 * v323;
-        const V v331 = -v330;
-        const V v332 = v170 * v323;
-        const V v333 = v171 * v323;
-        v288 = softehl_blend(m315, v322, v288);
-        v289 = softehl_blend(m315, v324, v289);
-        v290 = softehl_blend(m315, v325, v290);
-        v291 = softehl_blend(m315, v326, v291);
-        v292 = softehl_blend(m315, v327, v292);
-        v293 = softehl_blend(m315, v329, v293);
-        v294 = softehl_blend(m315, v331, v294);
-        v295 = softehl_blend(m315, v332, v295);
-        v296 = softehl_blend(m315, v333, v296);
-    }
-    const V v334 = 0.5 * v288;
-    const V v335 = 0.5 * v289;
-    const V v336 = 0.5 * v290;
-    const V v337 = 0.5 * v291;
-    const V v338 = v165 + v217;
-    const V v339 = v43 * v334;
-    const V v340 = v43 * v335;
-    const V v341 = v218 + v166;
-    const V v342 = v43 * v336;
-    const V v343 = v219 + v167;
-    const V v344 = v43 * v337;
-    const V v345 = 0.5 * v338;
-    const V v346 = 0.5 * v341;
-    const V v347 = 0.5 * v292;
-    const V v348 = 0.5 * v343;
-    const V v349 = 0.5 * v293;
-    const V v350 = v220 + v168;
-    const V v351 = v43 * v347;
-    const V v352 = 0.5 * v294;
-    const V v353 = 0.5 * v295;
-    const V v354 = v221 + v169;
-    const V v355 = v43 * v349;
-    const V v356 = 0.5 * v350;
-    const V v357 = v43 * v352;
-    const V v358 = v43 * v353;
-    const V v359 = 0.5 * v296;
-    const V v360 = 0.5 * v354;
-    const V v361 = v43 * v359;
-    const V v362 = 0.5 * v222;
-    const V v363 = 0.5 * v223;
-    const V v364 = 0.5 * v170;
-    const V v365 = 0.5 * v171;
-    const V v366 = 6.283185307179586 * v37;
-    const V v367 = v284 * v274;
-    const V v368 = v284 * v277;
-    const V v369 = v284 * v275;
-    const V v370 = v284 * v279;
-    const V v371 = v339 * v366;
-    const V v372 = v87 * v143;
-    const V v373 = v30 * v143;
-    const V v374 = v17 * v143;
-    const V v375 = v48 * v142;
-    const V v376 = v372 - v375;
-    const V v377 = v13 * v142;
-    const V v378 = v377 + v373;
-    const V v379 = v9 * v142;
-    const V v380 = v379 + v374;
-    const V v381 = 0.5 * v376;
-    const V v382 = 0.5 * v378;
-    const V v383 = 0.5 * v380;
-    V s384 = softehl_splat(0.0);
-    V s385 = softehl_splat(0.0);
-    V s386 = softehl_splat(0.0);
-    V s387 = softehl_splat(0.0);
-    V s388 = softehl_splat(0.0);
-    V s389 = softehl_splat(0.0);
-    V s390 = softehl_splat(0.0);
-    V s391 = softehl_splat(0.0);
-    V s392 = softehl_splat(0.0);
-    V s393 = softehl_splat(0.0);
-    V s394 = softehl_splat(0.0);
-    V s395 = softehl_splat(0.0);
-    V s396 = softehl_splat(0.0);
-    V s397 = softehl_splat(0.0);
-    V s398 = softehl_splat(0.0);
-    V s399 = softehl_splat(0.0);
-    V s400 = softehl_splat(0.0);
-    V s401 = softehl_splat(0.0);
-    V s402 = softehl_splat(0.0);
-    V s403 = softehl_splat(0.0);
-    V s404 = softehl_splat(0.0);
-    V s405 = softehl_splat(0.0);
-    V s406 = softehl_splat(0.0);
-    V s407 = softehl_splat(0.0);
-    V s408 = softehl_splat(0.0);
-    V s409 = softehl_splat(0.0);
-    V s410 = softehl_splat(0.0);
-    V s411 = softehl_splat(0.0);
-    V s412 = softehl_splat(0.0);
-    V s413 = softehl_splat(0.0);
-    V s414 = softehl_splat(0.0);
-    V s415 = softehl_splat(0.0);
-    V s416 = softehl_splat(0.0);
-    V s417 = softehl_splat(0.0);
-    V s418 = softehl_splat(0.0);
-    V s419 = softehl_splat(0.0);
-    V s420 = softehl_splat(0.0);
-    V s421 = softehl_splat(0.0);
-    V s422 = softehl_splat(0.0);
-    V s423 = softehl_splat(0.0);
-    V s424 = softehl_splat(0.0);
-    V s425 = softehl_splat(0.0);
-    V s426 = softehl_splat(0.0);
-    V s427 = softehl_splat(0.0);
-    V s428 = softehl_splat(0.0);
-    V s429 = softehl_splat(0.0);
-    V s430 = softehl_splat(0.0);
-    V s431 = softehl_splat(0.0);
-    V s432 = softehl_splat(0.0);
-    V s433 = softehl_splat(0.0);
-    V s434 = softehl_splat(0.0);
-    V s435 = softehl_splat(0.0);
-    V s436 = softehl_splat(0.0);
-    V s437 = softehl_splat(0.0);
-    V s438 = softehl_splat(0.0);
-    V s439 = softehl_splat(0.0);
-    V s440 = softehl_splat(0.0);
-    V s441 = softehl_splat(0.0);
-    V s442 = softehl_splat(0.0);
-    V s443 = softehl_splat(0.0);
-    V s444 = softehl_splat(0.0);
-    V s445 = softehl_splat(0.0);
-    V s446 = softehl_splat(0.0);
-    V s447 = softehl_splat(0.0);
-    V s448 = softehl_splat(0.0);
-    V s449 = softehl_splat(0.0);
-    V s450 = softehl_splat(0.0);
-    V s451 = softehl_splat(0.0);
-    V s452 = softehl_splat(0.0);
-    V s453 = softehl_splat(0.0);
-    V s454 = softehl_splat(0.0);
-    V s455 = softehl_splat(0.0);
-    V s456 = softehl_splat(0.0);
-    V s457 = softehl_splat(0.0);
-    V s458 = softehl_splat(0.0);
-    V s459 = softehl_splat(0.0);
-    V s460 = softehl_splat(0.0);
-    V s461 = softehl_splat(0.0);
-    V s462 = softehl_splat(0.0);
-    V s463 = softehl_splat(0.0);
-    V s464 = softehl_splat(0.0);
-    V s465 = softehl_splat(0.0);
-    V s466 = softehl_splat(0.0);
-    V s467 = softehl_splat(0.0);
-    V s468 = softehl_splat(0.0);
-    V s469 = softehl_splat(0.0);
-    V s470 = softehl_splat(0.0);
-    V s471 = softehl_splat(0.0);
-    V s472 = softehl_splat(0.0);
-    V s473 = softehl_splat(0.0);
-    V s474 = softehl_splat(0.0);
-    V s475 = softehl_splat(0.0);
-    V s476 = softehl_splat(0.0);
-    V s477 = softehl_splat(0.0);
-    V s478 = softehl_splat(0.0);
-    V s479 = softehl_splat(0.0);
-    V s480 = softehl_splat(0.0);
-    V s481 = softehl_splat(0.0);
-    V s482 = softehl_splat(0.0);
-    V s483 = softehl_splat(0.0);
-    V s484 = softehl_splat(0.0);
-    V s485 = softehl_splat(0.0);
-    V s486 = softehl_splat(0.0);
-    V s487 = softehl_splat(0.0);
-    V s488 = softehl_splat(0.0);
-    V s489 = softehl_splat(0.0);
-    V s490 = softehl_splat(0.0);
-    V s491 = softehl_splat(0.0);
-    V s492 = softehl_splat(0.0);
-    V s493 = softehl_splat(0.0);
-    V s494 = softehl_splat(0.0);
-    V s495 = softehl_splat(0.0);
-    V s496 = softehl_splat(0.0);
-    V s497 = softehl_splat(0.0);
-    V s498 = softehl_splat(0.0);
-    V s499 = softehl_splat(0.0);
-    V s500 = softehl_splat(0.0);
-    V s501 = softehl_splat(0.0);
-    V s502 = softehl_splat(0.0);
-    V s503 = softehl_splat(0.0);
-    V s504 = softehl_splat(0.0);
-    V s505 = softehl_splat(0.0);
-    V s506 = softehl_splat(0.0);
-    V s507 = softehl_splat(0.0);
-    V s508 = softehl_splat(0.0);
-    V s509 = softehl_splat(0.0);
-    V s510 = softehl_splat(0.0);
-    V s511 = softehl_splat(0.0);
-    V s512 = softehl_splat(0.0);
-    V s513 = softehl_splat(0.0);
-    V s514 = softehl_splat(0.0);
-    V s515 = softehl_splat(0.0);
-    V s516 = softehl_splat(0.0);
-    V s517 = softehl_splat(0.0);
-    V s518 = softehl_splat(0.0);
-    V s519 = softehl_splat(0.0);
-    V s520 = softehl_splat(0.0);
-    V s521 = softehl_splat(0.0);
-    V s522 = softehl_splat(0.0);
-    V s523 = softehl_splat(0.0);
-    V s524 = softehl_splat(0.0);
-    V s525 = softehl_splat(0.0);
-    V s526 = softehl_splat(0.0);
-    V s527 = softehl_splat(0.0);
-    V s528 = softehl_splat(0.0);
-    V s529 = softehl_splat(0.0);
-    V s530 = softehl_splat(0.0);
-    V s531 = softehl_splat(0.0);
-    V s532 = softehl_splat(0.0);
-    V s533 = softehl_splat(0.0);
-    V s534 = softehl_splat(0.0);
-    V s535 = softehl_splat(0.0);
-    for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const V v536 = w[0] * v349;
-        const V v537 = v536 + v362;
-        const V v538 = w[0] * v352;
-        const V v539 = v538 + v363;
-        const V v540 = w[0] * v353;
-        const V v541 = v540 + v364;
-        const V v542 = w[0] * v334;
-        const V v543 = v542 + v345;
-        const V v544 = w[0] * v335;
-        const V v545 = v544 + v346;
-        const V v546 = w[0] * v336;
-        const V v547 = v546 + v348;
-        const V v548 = w[0] * v337;
-        const V v549 = v548 + v356;
-        const V v550 = w[0] * v347;
-        const V v551 = v550 + v360;
-        const V v552 = w[0] * v359;
-        const V v553 = v552 + v365;
-        const V v554 = 0.5 * v543;
-        const V v555 = v59 * v537;
-        const V v556 = v31 * v537;
-        const V v557 = v31 * v545;
-        const V v558 = v59 * v545;
-        const V v559 = v59 * v547;
-        const V v560 = v31 * v547;
-        const V v561 = v31 * v549;
-        const V v562 = v59 * v549;
-        const V v563 = v59 * v551;
-        const V v564 = v31 * v551;
-        const V v565 = v59 * v539;
-        const V v566 = v31 * v539;
-        const V v567 = v59 * v553;
-        const V v568 = v31 * v553;
-        const V v569 = v59 * v541;
-        const V v570 = v31 * v541;
-        const V v571 = 0.5 - v554;
-        const V v572 = 0.5 + v554;
-        const V v573 = v283 * v566;
-        const V v574 = v554 - 0.5;
-        const V v575 = v283 * v561;
-        const V v576 = v142 * v561;
-        const V v577 = v564 + v572;
-        const V v578 = v283 * v570;
-        const V v579 = v142 * v570;
-        const V v580 = v283 * v568;
-        const V v581 = v16 * v571;
-        const V v582 = v19 * v571;
-        const V v583 = d8 * v571;
-        const V v584 = X1 * v571;
-        const V v585 = v578 - v282;
-        const V v586 = v1 * v572;
-        const V v587 = v581 + v586;
-        const V v588 = v11 * v572;
-        const V v589 = v582 + v588;
-        const V v590 = d10 * v572;
-        const V v591 = v583 + v590;
-        const V v592 = v283 * v577;
-        const V v593 = v142 * v577;
-        const V v594 = X3 * v572;
-        const V v595 = v584 + v594;
-        const V v596 = v580 - v285;
-        const V v597 = v573 - v285;
-        const V v598 = v587 - v86;
-        const V v599 = 6.283185307179586 * v595;
-        const V v600 = (-1.0) + v599;
-        const V v601 = v589 - v36;
-        const V v602 = v558 + v571;
-        const V v603 = v560 + v571;
-        const V v604 = v562 + v572;
-        const V v605 = v142 * v598;
-        const V v606 = v269 * v598;
-        const V v607 = v269 * v601;
-        const V v608 = a12 * v600;
-        const V v609 = 1.0 + v608;
-        const V v610 = v142 * v603;
-        const V v611 = v283 * v603;
-        const V v612 = v143 * v601;
-        const V v613 = v605 + v612;
-        const V v614 = v339 * v609;
-        const V v615 = w[1] * v572;
-        const V v616 = w[1] * v571;
-        const V v617 = v67 * v571;
-        const V v618 = v67 * v572;
-        const V v619 = v280 * v613;
-        const V v620 = v286 * v613;
-        const V v621 = v287 * v613;
-        const V v622 = v368 * v613;
-        const V v623 = v611 - v622;
-        const V v624 = v617 * v614;
-        const V v625 = v618 * v614;
-        const V v626 = v143 * v559;
-        const V v627 = v610 - v626;
-        const V v628 = v143 * v614;
-        const V v629 = v142 * v614;
-        const V v630 = v281 * v559;
-        const V v631 = v630 + v623;
-        const V v632 = v585 - v620;
-        const V v633 = w[1] * v624;
-        const V v634 = w[1] * v625;
-        const V v635 = v620 - v282;
-        const V v636 = v142 * v557;
-        const V v637 = v283 * v557;
-        const V v638 = v281 * v569;
-        const V v639 = v638 + v632;
-        const V v640 = v283 * v556;
-        const V v641 = v640 + v635;
-        const V v642 = v142 * v556;
-        const V v643 = v143 * v602;
-        const V v644 = v636 - v643;
-        const V v645 = v281 * v602;
-        const V v646 = v637 + v645;
-        const V v647 = v281 * v555;
-        const V v648 = v647 + v641;
-        const V v649 = v155 * v607;
-        const V v650 = v159 * v606;
-        const V v651 = v649 + v646;
-        const V v652 = v381 * v648;
-        const V v653 = v642 + v652;
-        const V v654 = v381 * v639;
-        const V v655 = v579 + v654;
-        const V v656 = v575 - v649;
-        const V v657 = 0.5 - v619;
-        const V v658 = 0.5 + v619;
-        const V v659 = v650 + v631;
-        const V v660 = v592 - v650;
-        const V v661 = v82 * v657;
-        const V v662 = v27 * v657;
-        const V v663 = v566 - v657;
-        const V v664 = w[1] * v657;
-        const V v665 = w[1] * v658;
-        const V v666 = v657 - v555;
-        const V v667 = v658 - v569;
-        const V v668 = v661 - v587;
-        const V v669 = v662 - v589;
-        const V v670 = v142 * v663;
-        const V v671 = v143 * v666;
-        const V v672 = v671 + v653;
-        const V v673 = v143 * v667;
-        const V v674 = v673 + v655;
-        const V v675 = v84 * v658;
-        const V v676 = v675 + v668;
-        const V v677 = v32 * v658;
-        const V v678 = v677 + v669;
-        const V v679 = v568 - v658;
-        const V v680 = v367 * v613;
-        const V v681 = v651 - v680;
-        const V v682 = v369 * v613;
-        const V v683 = v656 - v682;
-        const V v684 = v370 * v613;
-        const V v685 = v660 - v684;
-        const V v686 = v143 * v565;
-        const V v687 = v670 - v686;
-        const V v688 = v142 * v679;
-        const V v689 = v155 * v676;
-        const V v690 = v159 * v678;
-        const V v691 = v143 * v676;
-        const V v692 = v142 * v678;
-        const V v693 = v691 - v692;
-        const V v694 = v281 * v565;
-        const V v695 = v694 + v597;
-        const V v696 = v281 * v563;
-        const V v697 = v696 + v685;
-        const V v698 = v143 * v563;
-        const V v699 = v593 - v698;
-        const V v700 = a8 * v693;
-        const V v701 = v281 * v604;
-        const V v702 = v701 + v683;
-        const V v703 = v143 * v604;
-        const V v704 = v576 - v703;
-        const V v705 = v143 * v567;
-        const V v706 = v688 - v705;
-        const V v707 = v281 * v567;
-        const V v708 = v707 + v596;
-        const V v709 = v621 + v695;
-        const V v710 = v708 - v621;
-        const V v711 = v690 + v699;
-        const V v712 = v627 - v690;
-        const V v713 = v704 - v689;
-        const V v714 = v644 + v689;
-        const V v715 = v381 * v709;
-        const V v716 = v687 + v715;
-        const V v717 = v381 * v710;
-        const V v718 = v706 + v717;
-        const V v719 = v591 - v700;
-        const M v720 = softehl_eq(v719, v719);
-        const V v721 = v163 * v676;
-        const V v722 = v711 + v721;
-        const V v723 = v163 * v607;
-        const V v724 = v723 + v697;
-        const V v725 = v164 * v676;
-        const V v726 = v712 + v725;
-        const V v727 = v164 * v607;
-        const V v728 = v727 + v659;
-        const V v729 = v381 * v724;
-        const V v730 = v722 + v729;
-        const V v731 = v381 * v728;
-        const V v732 = v726 + v731;
-        const V v733 = v162 * v678;
-        const V v734 = v714 - v733;
-        const V v735 = v162 * v606;
-        const V v736 = v735 + v681;
-        const V v737 = v161 * v606;
-        const V v738 = v737 + v702;
-        const V v739 = v161 * v678;
-        const V v740 = v713 - v739;
-        const V v741 = v381 * v736;
-        const V v742 = v734 + v741;
-        const V v743 = v381 * v738;
-        const V v744 = v740 + v743;
-        V v745 = softehl_splat(0.0);
-        V v746 = softehl_splat(0.0);
-        V v747 = softehl_splat(0.0);
-        V v748 = softehl_splat(0.0);
-        V v749 = softehl_splat(0.0);
-        V v750 = softehl_splat(0.0);
-        V v751 = softehl_splat(0.0);
-        V v752 = softehl_splat(0.0);
-        V v753 = softehl_splat(0.0);
-        V v754 = softehl_splat(0.0);
-        V v755 = softehl_splat(0.0);
-        V v756 = softehl_splat(0.0);
-        V v757 = softehl_splat(0.0);
-        V v758 = softehl_splat(0.0);
-        V v759 = softehl_splat(0.0);
-        V v760 = softehl_splat(0.0);
-        V v761 = softehl_splat(0.0);
-        V v762 = softehl_splat(0.0);
-        V v763 = softehl_splat(0.0);
-        V v764 = softehl_splat(0.0);
-        V v765 = softehl_splat(0.0);
-        V v766 = softehl_splat(0.0);
-        V v767 = softehl_splat(0.0);
-        V v768 = softehl_splat(0.0);
-        V v769 = softehl_splat(0.0);
-        V v770 = softehl_splat(0.0);
-        V v771 = softehl_splat(0.0);
-        V v772 = softehl_splat(0.0);
-        V v773 = softehl_splat(0.0);
-        V v774 = softehl_splat(0.0);
-        V v775 = softehl_splat(0.0);
-        V v776 = softehl_splat(0.0);
-        V v777 = softehl_splat(0.0);
-        V v778 = softehl_splat(0.0);
-        V v779 = softehl_splat(0.0);
-        V v780 = softehl_splat(0.0);
-        V v781 = softehl_splat(0.0);
-        V v782 = softehl_splat(0.0);
-        V v783 = softehl_splat(0.0);
-        V v784 = softehl_splat(0.0);
-        V v785 = softehl_splat(0.0);
-        V v786 = softehl_splat(0.0);
-        V v787 = softehl_splat(0.0);
-        V v788 = softehl_splat(0.0);
-        V v789 = softehl_splat(0.0);
-        V v790 = softehl_splat(0.0);
-        V v791 = softehl_splat(0.0);
-        const M m792 = v720;
-        if (softehl_any(m792)) {
-            const M v793 = softehl_le(softehl_splat(0.0), v719);
-            V v794 = softehl_splat(0.0);
-            V v795 = softehl_splat(0.0);
-            V v796 = softehl_splat(0.0);
-            V v797 = softehl_splat(0.0);
-            V v798 = softehl_splat(0.0);
-            V v799 = softehl_splat(0.0);
-            V v800 = softehl_splat(0.0);
-            V v801 = softehl_splat(0.0);
-            V v802 = softehl_splat(0.0);
-            V v803 = softehl_splat(0.0);
-            V v804 = softehl_splat(0.0);
-            V v805 = softehl_splat(0.0);
-            V v806 = softehl_splat(0.0);
-            V v807 = softehl_splat(0.0);
-            V v808 = softehl_splat(0.0);
-            V v809 = softehl_splat(0.0);
-            V v810 = softehl_splat(0.0);
-            V v811 = softehl_splat(0.0);
-            V v812 = softehl_splat(0.0);
-            V v813 = softehl_splat(0.0);
-            V v814 = softehl_splat(0.0);
-            V v815 = softehl_splat(0.0);
-            V v816 = softehl_splat(0.0);
-            V v817 = softehl_splat(0.0);
-            V v818 = softehl_splat(0.0);
-            V v819 = softehl_splat(0.0);
-            V v820 = softehl_splat(0.0);
-            V v821 = softehl_splat(0.0);
-            V v822 = softehl_splat(0.0);
-            V v823 = softehl_splat(0.0);
-            V v824 = softehl_splat(0.0);
-            V v825 = softehl_splat(0.0);
-            V v826 = softehl_splat(0.0);
-            V v827 = softehl_splat(0.0);
-            V v828 = softehl_splat(0.0);
-            V v829 = softehl_splat(0.0);
-            V v830 = softehl_splat(0.0);
-            const M m831 = v793 & m792;
-            if (softehl_any(m831)) {
-                const V v832 = a10 + v693;
-                const V v833 = v693 - a11;
-                const V v834 = v832 * v833;
-                const M v835 = softehl_eq(v834, v834);
-                V v836 = softehl_splat(0.0);
-                V v837 = softehl_splat(0.0);
-                V v838 = softehl_splat(0.0);
-                V v839 = softehl_splat(0.0);
-                V v840 = softehl_splat(0.0);
-                const M m841 = v835 & m831;
-                if (softehl_any(m841)) {
-                    const M v842 = softehl_lt(v834, softehl_splat(0.0));
-                    const V v843 = softehl_blend(v842, v719, softehl_splat(0.0));
-                    const V v844 = softehl_blend(v842, v571, softehl_splat(0.0));
-                    const V v845 = softehl_blend(v842, v572, softehl_splat(0.0));
-                    const V v846 = softehl_blend(v842, v68, softehl_splat(0.0));
-                    const V v847 = softehl_blend(v842, v76, softehl_splat(0.0));
-                    v836 = softehl_blend(m841, v843, v836);
-                    v837 = softehl_blend(m841, v844, v837);
-                    v838 = softehl_blend(m841, v845, v838);
-                    v839 = softehl_blend(m841, v846, v839);
-                    v840 = softehl_blend(m841, v847, v840);
-                }
-                const M m848 = ~v835 & m831;
-                if (softehl_any(m848)) {
-                    const V v849 = v834 * v834;
-                    const V v850 = v832 + v833;
-                    const V v851 = v834 * v849;
-                    const V v852 = 3.0 * v849;
-                    const V v853 = v852 * v850;
-                    v836 = softehl_blend(m848, v851, v836);
-                    v837 = softehl_blend(m848, softehl_splat(0.0), v837);
-                    v838 = softehl_blend(m848, softehl_splat(0.0), v838);
-                    v839 = softehl_blend(m848, v853, v839);
-                    v840 = softehl_blend(m848, softehl_splat(0.0), v840);
-                }
-                const V v854 = a9 * v836;
-                const V v855 = d9 * v571;
-                const V v856 = v4 * v657;
-                const V v857 = v21 * v657;
-                const M v858 = softehl_eq(v854, v854);
-                const V v859 = v3 * v571;
-                const V v860 = v856 - v859;
-                const V v861 = v10 * v571;
-                const V v862 = v857 - v861;
-                const V v863 = d11 * v572;
-                const V v864 = v855 + v863;
-                const V v865 = v2 * v572;
-                const V v866 = v860 - v865;
-                const V v867 = v12 * v572;
-                const V v868 = v862 - v867;
-                const V v869 = v6 * v658;
-                const V v870 = v869 + v866;
-                const V v871 = v22 * v658;
-                const V v872 = v871 + v868;
-                const V v873 = v142 * v870;
-                const V v874 = v143 * v872;
-                const V v875 = v873 + v874;
-                const V v876 = a8 * v875;
-                const V v877 = v864 + v876;
-                const M v878 = softehl_eq(v877, v877);
-                const M v879 = v858 & v878;
-                V v880 = softehl_splat(0.0);
-                V v881 = softehl_splat(0.0);
-                V v882 = softehl_splat(0.0);
-                V v883 = softehl_splat(0.0);
-                V v884 = softehl_splat(0.0);
-                V v885 = softehl_splat(0.0);
-                const M m886 = v879 & m831;
-                if (softehl_any(m886)) {
-                    const M v887 = softehl_lt(v854, v877);
-                    V v888 = v854;
-                    V v889 = softehl_splat(0.0);
-                    V v890 = softehl_splat(0.0);
-                    V v891 = a9;
-                    V v892 = softehl_splat(0.0);
-                    V v893 = softehl_splat(0.0);
-                    const M m894 = ~v887 & m886;
-                    if (softehl_any(m894)) {
-                        V v895 = softehl_splat(0.0);
-                        V v896 = softehl_splat(0.0);
-                        V v897 = softehl_splat(0.0);
-                        V v898 = softehl_splat(0.0);
-                        V v899 = softehl_splat(0.0);
-                        V v900 = softehl_splat(0.0);
-                        const M m901 = v858 & m894;
-                        if (softehl_any(m901)) {
-                            const V v902 = -v877;
-                            const M v903 = softehl_lt(v854, v902);
-                            V v904 = v877;
-                            V v905 = v571;
-                            V v906 = v572;
-                            V v907 = softehl_splat(0.0);
-                            V v908 = a8;
-                            V v909 = v78;
-                            const M m910 = v903 & m901;
-                            if (softehl_any(m910)) {
-                                const V v911 = -v854;
-                                v904 = softehl_blend(m910, v911, v904);
-                                v905 = softehl_blend(m910, softehl_splat(0.0), v905);
-                                v906 = softehl_blend(m910, softehl_splat(0.0), v906);
-                                v907 = softehl_blend(m910, v20, v907);
-                                v908 = softehl_blend(m910, softehl_splat(0.0), v908);
-                                v909 = softehl_blend(m910, softehl_splat(0.0), v909);
-                            }
-                            v895 = softehl_blend(m901, v904, v895);
-                            v896 = softehl_blend(m901, v905, v896);
-                            v897 = softehl_blend(m901, v906, v897);
-                            v898 = softehl_blend(m901, v907, v898);
-                            v899 = softehl_blend(m901, v908, v899);
-                            v900 = softehl_blend(m901, v909, v900);
-                        }
-                        const M m912 = ~v858 & m894;
-                        if (softehl_any(m912)) {
-                            const V v913 = v877 + v854;
-                            const V v914 = v913 * v913;
-                            const V v915 = v913 * v914;
-                            const V v916 = 3.0 * v914;
-                            const V v917 = v78 * v916;
-                            const V v918 = a9 * v916;
-                            const V v919 = a8 * v916;
-                            const V v920 = v571 * v916;
-                            const V v921 = v572 * v916;
-                            v895 = softehl_blend(m912, v915, v895);
-                            v896 = softehl_blend(m912, v920, v896);
-                            v897 = softehl_blend(m912, v921, v897);
-                            v898 = softehl_blend(m912, v918, v898);
-                            v899 = softehl_blend(m912, v919, v899);
-                            v900 = softehl_blend(m912, v917, v900);
-                        }
-                        v888 = softehl_blend(m894, v895, v888);
-                        v889 = softehl_blend(m894, v896, v889);
-                        v890 = softehl_blend(m894, v897, v890);
-                        v891 = softehl_blend(m894, v898, v891);
-                        v892 = softehl_blend(m894, v899, v892);
-                        v893 = softehl_blend(m894, v900, v893);
-                    }
-                    v880 = softehl_blend(m886, v888, v880);
-                    v881 = softehl_blend(m886, v889, v881);
-                    v882 = softehl_blend(m886, v890, v882);
-                    v883 = softehl_blend(m886, v891, v883);
-                    v884 = softehl_blend(m886, v892, v884);
-                    v885 = softehl_blend(m886, v893, v885);
-                }
-                const M m922 = ~v879 & m831;
-                if (softehl_any(m922)) {
-                    const V v923 = v854 - v877;
-                    const V v924 = v923 * v923;
-                    const V v925 = v923 * v924;
-                    const V v926 = 3.0 * v924;
-                    const V v927 = v77 * v926;
-                    const V v928 = a9 * v926;
-                    const V v929 = a8 * v926;
-                    const V v930 = -v929;
-                    const V v931 = v574 * v926;
-                    const V v932 = v572 * v926;
-                    const V v933 = -v932;
-                    v880 = softehl_blend(m922, v925, v880);
-                    v881 = softehl_blend(m922, v931, v881);
-                    v882 = softehl_blend(m922, v933, v882);
-                    v883 = softehl_blend(m922, v928, v883);
-                    v884 = softehl_blend(m922, v930, v884);
-                    v885 = softehl_blend(m922, v927, v885);
-                }
-                const V v934 = v155 * v872;
-                const V v935 = v164 * v872;
-                const V v936 = v163 * v872;
-                const V v937 = v159 * v870;
-                const V v938 = v162 * v870;
-                const V v939 = v161 * v870;
-                const V v940 = v837 * v883;
-                const V v941 = v838 * v883;
-                const V v942 = v937 + v935;
-                const V v943 = v936 - v937;
-                const V v944 = v938 + v934;
-                const V v945 = v939 - v934;
-                const V v946 = v648 * v382;
-                const V v947 = v709 * v382;
-                const V v948 = v639 * v382;
-                const V v949 = v710 * v382;
-                const V v950 = v736 * v382;
-                const V v951 = v950 + v944;
-                const V v952 = v728 * v382;
-                const V v953 = v952 + v942;
-                const V v954 = v738 * v382;
-                const V v955 = v954 + v945;
-                const V v956 = v724 * v382;
-                const V v957 = v956 + v943;
-                const V v958 = v839 * v742;
-                const V v959 = v839 * v732;
-                const V v960 = v839 * v744;
-                const V v961 = v839 * v730;
-                const V v962 = v839 * v672;
-                const V v963 = v839 * v716;
-                const V v964 = v839 * v674;
-                const V v965 = v839 * v718;
-                const V v966 = v545 * v840;
-                const V v967 = v966 + v958;
-                const V v968 = v545 * v383;
-                const V v969 = v968 + v951;
-                const V v970 = v547 * v840;
-                const V v971 = v970 + v959;
-                const V v972 = v547 * v383;
-                const V v973 = v972 + v953;
-                const V v974 = v549 * v840;
-                const V v975 = v974 + v960;
-                const V v976 = v549 * v383;
-                const V v977 = v976 + v955;
-                const V v978 = v551 * v840;
-                const V v979 = v978 + v961;
-                const V v980 = v551 * v383;
-                const V v981 = v980 + v957;
-                const V v982 = v537 * v840;
-                const V v983 = v982 + v962;
-                const V v984 = v537 * v383;
-                const V v985 = v984 + v946;
-                const V v986 = v539 * v840;
-                const V v987 = v986 + v963;
-                const V v988 = v539 * v383;
-                const V v989 = v988 + v947;
-                const V v990 = v541 * v840;
-                const V v991 = v990 + v964;
-                const V v992 = v541 * v383;
-                const V v993 = v992 + v948;
-                const V v994 = v884 * v969;
-                const V v995 = v884 * v973;
-                const V v996 = v884 * v977;
-                const V v997 = v884 * v981;
-                const V v998 = v884 * v985;
-                const V v999 = v884 * v989;
-                const V v1000 = v884 * v993;
-                const V v1001 = v883 * v971;
-                const V v1002 = v1001 + v995;
-                const V v1003 = v883 * v975;
-                const V v1004 = v1003 + v996;
-                const V v1005 = v883 * v979;
-                const V v1006 = v1005 + v997;
-                const V v1007 = v883 * v983;
-                const V v1008 = v998 + v1007;
-                const V v1009 = v883 * v987;
-                const V v1010 = v999 + v1009;
-                const V v1011 = v883 * v991;
-                const V v1012 = v1000 + v1011;
-                const V v1013 = v883 * v967;
-                const V v1014 = v1013 + v994;
-                const V v1015 = v553 * v840;
-                const V v1016 = v1015 + v965;
-                const V v1017 = v553 * v383;
-                const V v1018 = v1017 + v949;
-                const V v1019 = v883 * v1016;
-                const V v1020 = v884 * v1018;
-                const V v1021 = v1020 + v1019;
-                const V v1022 = v881 * v629;
-                const V v1023 = v882 * v629;
-                const V v1024 = v881 * v628;
-                const V v1025 = v882 * v628;
-                const V v1026 = v881 * v633;
-                const V v1027 = v882 * v633;
-                const V v1028 = v881 * v634;
-                const V v1029 = v882 * v634;
-                const V v1030 = v616 * v1022;
-                const V v1031 = v616 * v1023;
-                const V v1032 = v616 * v1024;
-                const V v1033 = v616 * v1025;
-                const V v1034 = v615 * v1022;
-                const V v1035 = v615 * v1023;
-                const V v1036 = v615 * v1024;
-                const V v1037 = v615 * v1025;
-                const V v1038 = v664 * v1022;
-                const V v1039 = v664 * v1023;
-                const V v1040 = v664 * v1024;
-                const V v1041 = v664 * v1025;
-                const V v1042 = v665 * v1022;
-                const V v1043 = v665 * v1023;
-                const V v1044 = v665 * v1024;
-                const V v1045 = v665 * v1025;
-                const V v1046 = -v1038;
-                const V v1047 = -v1039;
-                const V v1048 = -v1040;
-                const V v1049 = -v1041;
-                const V v1050 = -v1042;
-                const V v1051 = -v1043;
-                const V v1052 = -v1044;
-                const V v1053 = -v1045;
-                v794 = softehl_blend(m831, v836, v794);
-                v795 = softehl_blend(m831, v837, v795);
-                v796 = softehl_blend(m831, v838, v796);
-                v797 = softehl_blend(m831, v880, v797);
-                v798 = softehl_blend(m831, v1030, v798);
-                v799 = softehl_blend(m831, v1031, v799);
-                v800 = softehl_blend(m831, v1032, v800);
-                v801 = softehl_blend(m831, v1033, v801);
-                v802 = softehl_blend(m831, v1034, v802);
-                v803 = softehl_blend(m831, v1035, v803);
-                v804 = softehl_blend(m831, v1036, v804);
-                v805 = softehl_blend(m831, v1037, v805);
-                v806 = softehl_blend(m831, v1046, v806);
-                v807 = softehl_blend(m831, v1047, v807);
-                v808 = softehl_blend(m831, v1048, v808);
-                v809 = softehl_blend(m831, v1049, v809);
-                v810 = softehl_blend(m831, v1050, v810);
-                v811 = softehl_blend(m831, v1051, v811);
-                v812 = softehl_blend(m831, v1052, v812);
-                v813 = softehl_blend(m831, v1053, v813);
-                v814 = softehl_blend(m831, v1026, v814);
-                v815 = softehl_blend(m831, v1027, v815);
-                v816 = softehl_blend(m831, v1028, v816);
-                v817 = softehl_blend(m831, v1029, v817);
-                v818 = softehl_blend(m831, v940, v818);
-                v819 = softehl_blend(m831, v941, v819);
-                v820 = softehl_blend(m831, v839, v820);
-                v821 = softehl_blend(m831, v840, v821);
-                v822 = softehl_blend(m831, v1014, v822);
-                v823 = softehl_blend(m831, v885, v823);
-                v824 = softehl_blend(m831, v1002, v824);
-                v825 = softehl_blend(m831, v1004, v825);
-                v826 = softehl_blend(m831, v1006, v826);
-                v827 = softehl_blend(m831, v1008, v827);
-                v828 = softehl_blend(m831, v1010, v828);
-                v829 = softehl_blend(m831, v1012, v829);
-                v830 = softehl_blend(m831, v1021, v830);
-            }
-            v745 = softehl_blend(m792, v794, v745);
-            v746 = softehl_blend(m792, v795, v746);
-            v747 = softehl_blend(m792, v796, v747);
-            v748 = softehl_blend(m792, v797, v748);
-            v749 = softehl_blend(m792, v798, v749);
-            v750 = softehl_blend(m792, v799, v750);
-            v751 = softehl_blend(m792, v800, v751);
-            v752 = softehl_blend(m792, v801, v752);
-            v753 = softehl_blend(m792, v802, v753);
-            v754 = softehl_blend(m792, v803, v754);
-            v755 = softehl_blend(m792, v804, v755);
-            v756 = softehl_blend(m792, v805, v756);
-            v757 = softehl_blend(m792, v806, v757);
-            v758 = softehl_blend(m792, v807, v758);
-            v759 = softehl_blend(m792, v808, v759);
-            v760 = softehl_blend(m792, v809, v760);
-            v761 = softehl_blend(m792, v810, v761);
-            v762 = softehl_blend(m792, v811, v762);
-            v763 = softehl_blend(m792, v812, v763);
-            v764 = softehl_blend(m792, v813, v764);
-            v765 = softehl_blend(m792, v814, v765);
-            v766 = softehl_blend(m792, v815, v766);
-            v767 = softehl_blend(m792, v816, v767);
-            v768 = softehl_blend(m792, v817, v768);
-            v769 = softehl_blend(m792, v818, v769);
-            v770 = softehl_blend(m792, softehl_splat(0.0), v770);
-            v771 = softehl_blend(m792, v819, v771);
-            v772 = softehl_blend(m792, softehl_splat(0.0), v772);
-            v773 = softehl_blend(m792, v820, v773);
-            v774 = softehl_blend(m792, v821, v774);
-            v775 = softehl_blend(m792, v822, v775);
-            v776 = softehl_blend(m792, v823, v776);
-            v777 = softehl_blend(m792, softehl_splat(0.0), v777);
-            v778 = softehl_blend(m792, v824, v778);
-            v779 = softehl_blend(m792, softehl_splat(0.0), v779);
-            v780 = softehl_blend(m792, v825, v780);
-            v781 = softehl_blend(m792, softehl_splat(0.0), v781);
-            v782 = softehl_blend(m792, v826, v782);
-            v783 = softehl_blend(m792, softehl_splat(0.0), v783);
-            v784 = softehl_blend(m792, v827, v784);
-            v785 = softehl_blend(m792, softehl_splat(0.0), v785);
-            v786 = softehl_blend(m792, v828, v786);
-            v787 = softehl_blend(m792, softehl_splat(0.0), v787);
-            v788 = softehl_blend(m792, v829, v788);
-            v789 = softehl_blend(m792, softehl_splat(0.0), v789);
-            v790 = softehl_blend(m792, v830, v790);
-            v791 = softehl_blend(m792, softehl_splat(0.0), v791);
-        }
-        const M m1054 = ~v720;
-        if (softehl_any(m1054)) {
-            const V v1055 = v700 - v591;
-            const V v1056 = v1055 * v1055;
-            const V v1057 = v1055 * v1056;
-            const V v1058 = 3.0 * v1056;
-            const V v1059 = v574 * v1058;
-            const V v1060 = v75 * v1058;
-            const V v1061 = v572 * v1058;
-            const V v1062 = -v1061;
-            const V v1063 = a8 * v1058;
-            const V v1064 = v1063 * v742;
-            const V v1065 = v1063 * v732;
-            const V v1066 = v1063 * v744;
-            const V v1067 = v1063 * v730;
-            const V v1068 = v1063 * v672;
-            const V v1069 = v1063 * v716;
-            const V v1070 = v1063 * v674;
-            const V v1071 = v1063 * v718;
-            v745 = softehl_blend(m1054, v1057, v745);
-            v746 = softehl_blend(m1054, v1059, v746);
-            v747 = softehl_blend(m1054, v1062, v747);
-            v748 = softehl_blend(m1054, v1057, v748);
-            v749 = softehl_blend(m1054, softehl_splat(0.0), v749);
-            v750 = softehl_blend(m1054, softehl_splat(0.0), v750);
-            v751 = softehl_blend(m1054, softehl_splat(0.0), v751);
-            v752 = softehl_blend(m1054, softehl_splat(0.0), v752);
-            v753 = softehl_blend(m1054, softehl_splat(0.0), v753);
-            v754 = softehl_blend(m1054, softehl_splat(0.0), v754);
-            v755 = softehl_blend(m1054, softehl_splat(0.0), v755);
-            v756 = softehl_blend(m1054, softehl_splat(0.0), v756);
-            v757 = softehl_blend(m1054, softehl_splat(0.0), v757);
-            v758 = softehl_blend(m1054, softehl_splat(0.0), v758);
-            v759 = softehl_blend(m1054, softehl_splat(0.0), v759);
-            v760 = softehl_blend(m1054, softehl_splat(0.0), v760);
-            v761 = softehl_blend(m1054, softehl_splat(0.0), v761);
-            v762 = softehl_blend(m1054, softehl_splat(0.0), v762);
-            v763 = softehl_blend(m1054, softehl_splat(0.0), v763);
-            v764 = softehl_blend(m1054, softehl_splat(0.0), v764);
-            v765 = softehl_blend(m1054, softehl_splat(0.0), v765);
-            v766 = softehl_blend(m1054, softehl_splat(0.0), v766);
-            v767 = softehl_blend(m1054, softehl_splat(0.0), v767);
-            v768 = softehl_blend(m1054, softehl_splat(0.0), v768);
-            v769 = softehl_blend(m1054, softehl_splat(0.0), v769);
-            v770 = softehl_blend(m1054, v1059, v770);
-            v771 = softehl_blend(m1054, softehl_splat(0.0), v771);
-            v772 = softehl_blend(m1054, v1062, v772);
-            v773 = softehl_blend(m1054, v1063, v773);
-            v774 = softehl_blend(m1054, v1060, v774);
-            v775 = softehl_blend(m1054, softehl_splat(0.0), v775);
-            v776 = softehl_blend(m1054, v1060, v776);
-            v777 = softehl_blend(m1054, v1064, v777);
-            v778 = softehl_blend(m1054, softehl_splat(0.0), v778);
-            v779 = softehl_blend(m1054, v1065, v779);
-            v780 = softehl_blend(m1054, softehl_splat(0.0), v780);
-            v781 = softehl_blend(m1054, v1066, v781);
-            v782 = softehl_blend(m1054, softehl_splat(0.0), v782);
-            v783 = softehl_blend(m1054, v1067, v783);
-            v784 = softehl_blend(m1054, softehl_splat(0.0), v784);
-            v785 = softehl_blend(m1054, v1068, v785);
-            v786 = softehl_blend(m1054, softehl_splat(0.0), v786);
-            v787 = softehl_blend(m1054, v1069, v787);
-            v788 = softehl_blend(m1054, softehl_splat(0.0), v788);
-            v789 = softehl_blend(m1054, v1070, v789);
-            v790 = softehl_blend(m1054, softehl_splat(0.0), v790);
-            v791 = softehl_blend(m1054, v1071, v791);
-        }
-        s392 += v749;
-        s393 += v750;
-        s394 += v751;
-        s395 += v752;
-        s396 += v753;
-        s397 += v754;
-        s398 += v755;
-        s399 += v756;
-        s400 += v757;
-        s401 += v758;
-        s402 += v759;
-        s403 += v760;
-        s404 += v761;
-        s405 += v762;
-        s406 += v763;
-        s407 += v764;
-        s408 += v765;
-        s409 += v766;
-        s410 += v767;
-        s411 += v768;
-        const V v1072 = v770 + v769;
-        const V v1073 = v772 + v771;
-        const V v1074 = v777 + v775;
-        const V v1075 = v779 + v778;
-        const V v1076 = v781 + v780;
-        const V v1077 = v783 + v782;
-        const V v1078 = v785 + v784;
-        const V v1079 = v787 + v786;
-        const V v1080 = v789 + v788;
-        const V v1081 = v791 + v790;
-        const V v1082 = v773 * v742;
-        const V v1083 = v773 * v732;
-        const V v1084 = v773 * v744;
-        const V v1085 = v773 * v730;
-        const V v1086 = v773 * v672;
-        const V v1087 = v773 * v716;
-        const V v1088 = v773 * v674;
-        const V v1089 = v773 * v718;
-        const V v1090 = v545 * v774;
-        const V v1091 = v1090 + v1082;
-        const V v1092 = v547 * v774;
-        const V v1093 = v1092 + v1083;
-        const V v1094 = v549 * v774;
-        const V v1095 = v1094 + v1084;
-        const V v1096 = v551 * v774;
-        const V v1097 = v1096 + v1085;
-        const V v1098 = v537 * v774;
-        const V v1099 = v1098 + v1086;
-        const V v1100 = v539 * v774;
-        const V v1101 = v1100 + v1087;
-        const V v1102 = v541 * v774;
-        const V v1103 = v1102 + v1088;
-        const V v1104 = v553 * v774;
-        const V v1105 = v1104 + v1089;
-        const V v1106 = v1091 * v628;
-        const V v1107 = v1093 * v628;
-        const V v1108 = v1095 * v628;
-        const V v1109 = v1097 * v628;
-        const V v1110 = v1099 * v628;
-        const V v1111 = v1101 * v628;
-        const V v1112 = v1103 * v628;
-        const V v1113 = v1105 * v628;
-        const V v1114 = v746 * v628;
-        const V v1115 = w[1] * v746;
-        const V v1116 = v67 * w[1];
-        const V v1117 = w[1] * v747;
-        const V v1118 = v747 * v628;
-        const V v1119 = v1072 * v628;
-        const V v1120 = v1072 * v629;
-        const V v1121 = v1114 + v1120;
-        const V v1122 = v746 * v629;
-        const V v1123 = v1119 - v1122;
-        const V v1124 = v1115 * v624;
-        s386 += v1124;
-        const V v1125 = v1115 * v625;
-        s388 += v1125;
-        const V v1126 = v1117 * v624;
-        s387 += v1126;
-        const V v1127 = v1117 * v625;
-        s389 += v1127;
-        const V v1128 = v1073 * v629;
-        const V v1129 = v1118 + v1128;
-        const V v1130 = v1073 * v628;
-        const V v1131 = v747 * v629;
-        const V v1132 = v1130 - v1131;
-        const V v1133 = v1072 * v633;
-        s420 += v1133;
-        const V v1134 = v1073 * v633;
-        s421 += v1134;
-        const V v1135 = v1072 * v634;
-        s422 += v1135;
-        const V v1136 = v1073 * v634;
-        s423 += v1136;
-        const V v1137 = v616 * v1123;
-        s426 += v1137;
-        const V v1138 = v616 * v1129;
-        s425 += v1138;
-        const V v1139 = v616 * v1132;
-        s427 += v1139;
-        const V v1140 = v616 * v1121;
-        s424 += v1140;
-        const V v1141 = v615 * v1121;
-        s428 += v1141;
-        const V v1142 = v615 * v1129;
-        s429 += v1142;
-        const V v1143 = v615 * v1123;
-        s430 += v1143;
-        const V v1144 = v615 * v1132;
-        s431 += v1144;
-        const V v1145 = v664 * v1121;
-        s432 += v1145;
-        const V v1146 = v664 * v1129;
-        s433 += v1146;
-        const V v1147 = v664 * v1123;
-        s434 += v1147;
-        const V v1148 = v664 * v1132;
-        s435 += v1148;
-        const V v1149 = v665 * v1121;
-        s436 += v1149;
-        const V v1150 = v665 * v1129;
-        s437 += v1150;
-        const V v1151 = v665 * v1123;
-        s438 += v1151;
-        const V v1152 = v665 * v1132;
-        s439 += v1152;
-        const V v1153 = v1116 * v572;
-        const V v1154 = v1116 * v571;
-        const V v1155 = v745 * v614;
-        const V v1156 = v745 * v609;
-        const V v1157 = v745 * v371;
-        const V v1158 = v748 * v614;
-        const V v1159 = v748 * v609;
-        const V v1160 = v748 * v371;
-        const V v1161 = v1153 * v1155;
-        s384 += v1161;
-        const V v1162 = v1153 * v1158;
-        s390 += v1162;
-        const V v1163 = v1154 * v1155;
-        s385 += v1163;
-        const V v1164 = v1154 * v1158;
-        s391 += v1164;
-        const V v1165 = 0.5 * v1155;
-        const V v1166 = 0.5 * v1158;
-        const V v1167 = v155 * v1155;
-        const V v1168 = v155 * v1158;
-        const V v1169 = v159 * v1155;
-        const V v1170 = v159 * v1158;
-        const V v1171 = v164 * v1158;
-        const V v1172 = v164 * v1155;
-        const V v1173 = v1172 + v1107;
-        const V v1174 = v1171 - v1169;
-        const V v1175 = v1167 + v1106;
-        const V v1176 = v1108 - v1167;
-        const V v1177 = v1170 + v1173;
-        const V v1178 = v1109 - v1170;
-        const V v1179 = v572 * v1157;
-        const V v1180 = v1165 + v1179;
-        const V v1181 = v571 * v1157;
-        const V v1182 = v572 * v1160;
-        const V v1183 = v1166 + v1182;
-        const V v1184 = v571 * v1160;
-        const V v1185 = v162 * v1155;
-        const V v1186 = v1168 - v1185;
-        const V v1187 = v162 * v1158;
-        const V v1188 = v1187 + v1175;
-        const V v1189 = v1181 - v1165;
-        const V v1190 = v67 * v1180;
-        const V v1191 = v67 * v1183;
-        const V v1192 = v1184 - v1166;
-        const V v1193 = v67 * v1189;
-        const V v1194 = v67 * v1192;
-        const V v1195 = v163 * v1155;
-        const V v1196 = v1195 + v1178;
-        const V v1197 = v163 * v1158;
-        const V v1198 = v1169 + v1197;
-        const V v1199 = v161 * v1158;
-        const V v1200 = v1199 + v1176;
-        const V v1201 = v545 * v1190;
-        const V v1202 = v545 * v1191;
-        const V v1203 = v547 * v1190;
-        const V v1204 = v547 * v1191;
-        const V v1205 = v545 * v1193;
-        const V v1206 = v547 * v1193;
-        const V v1207 = v549 * v1190;
-        const V v1208 = v549 * v1193;
-        const V v1209 = v549 * v1191;
-        const V v1210 = v551 * v1193;
-        const V v1211 = v551 * v1190;
-        const V v1212 = v551 * v1191;
-        const V v1213 = v537 * v1193;
-        const V v1214 = v537 * v1190;
-        const V v1215 = v537 * v1191;
-        const V v1216 = v539 * v1193;
-        const V v1217 = v539 * v1190;
-        const V v1218 = v539 * v1191;
-        const V v1219 = v541 * v1193;
-        const V v1220 = v553 * v1193;
-        const V v1221 = v541 * v1190;
-        const V v1222 = v553 * v1190;
-        const V v1223 = v541 * v1191;
-        const V v1224 = v553 * v1191;
-        const V v1225 = v537 * v1194;
-        const V v1226 = v539 * v1194;
-        const V v1227 = v541 * v1194;
-        const V v1228 = v553 * v1194;
-        const V v1229 = v545 * v1194;
-        const V v1230 = v547 * v1194;
-        const V v1231 = v549 * v1194;
-        const V v1232 = v551 * v1194;
-        const V v1233 = v545 * v776;
-        const V v1234 = v1233 + v1074;
-        const V v1235 = v547 * v776;
-        const V v1236 = v1235 + v1075;
-        const V v1237 = v549 * v776;
-        const V v1238 = v1237 + v1076;
-        const V v1239 = v551 * v776;
-        const V v1240 = v1239 + v1077;
-        const V v1241 = v553 * v776;
-        const V v1242 = v1241 + v1081;
-        const V v1243 = v537 * v776;
-        const V v1244 = v1243 + v1078;
-        const V v1245 = v539 * v776;
-        const V v1246 = v1245 + v1079;
-        const V v1247 = v541 * v776;
-        const V v1248 = v1247 + v1080;
-        const V v1249 = v617 * v1156;
-        const V v1250 = v618 * v1156;
-        const V v1251 = v617 * v1159;
-        const V v1252 = v618 * v1159;
-        const V v1253 = v628 * v1238;
-        const V v1254 = v628 * v1244;
-        const V v1255 = v628 * v1246;
-        const V v1256 = v628 * v1248;
-        const V v1257 = v161 * v1155;
-        const V v1258 = v1253 - v1257;
-        const V v1259 = v628 * v1242;
-        const V v1260 = v1258 - v1168;
-        const V v1261 = v143 * v745;
-        const V v1262 = v143 * v748;
-        const V v1263 = v142 * v748;
-        const V v1264 = v1261 + v1263;
-        const V v1265 = v142 * v745;
-        const V v1266 = v1262 - v1265;
-        const V v1267 = v1099 * v629;
-        const V v1268 = v1254 - v1267;
-        const V v1269 = v1101 * v629;
-        const V v1270 = v1255 - v1269;
-        const V v1271 = v1103 * v629;
-        const V v1272 = v1256 - v1271;
-        const V v1273 = v1095 * v629;
-        const V v1274 = v1260 - v1273;
-        const V v1275 = v1105 * v629;
-        const V v1276 = v1259 - v1275;
-        const V v1277 = v1264 * v614;
-        const V v1278 = v1266 * v614;
-        const V v1279 = v1264 * v609;
-        const V v1280 = v1266 * v609;
-        const V v1281 = v1264 * v371;
-        const V v1282 = v1266 * v371;
-        const V v1283 = 0.5 * v1277;
-        const V v1284 = 0.5 * v1278;
-        const V v1285 = v665 * v1277;
-        s413 += v1285;
-        const V v1286 = v665 * v1278;
-        s412 += v1286;
-        const V v1287 = v664 * v1278;
-        s414 += v1287;
-        const V v1288 = v664 * v1277;
-        s415 += v1288;
-        const V v1289 = v615 * v1278;
-        s416 += v1289;
-        const V v1290 = v615 * v1277;
-        s417 += v1290;
-        const V v1291 = v616 * v1278;
-        s418 += v1291;
-        const V v1292 = v616 * v1277;
-        s419 += v1292;
-        const V v1293 = v361 * v1280;
-        const V v1294 = v1293 + v1276;
-        const V v1295 = v545 * v1283;
-        const V v1296 = v545 * v1284;
-        const V v1297 = v547 * v1283;
-        const V v1298 = v547 * v1284;
-        const V v1299 = v549 * v1283;
-        const V v1300 = v549 * v1284;
-        const V v1301 = v551 * v1283;
-        const V v1302 = v551 * v1284;
-        const V v1303 = v537 * v1283;
-        const V v1304 = v537 * v1284;
-        const V v1305 = v539 * v1283;
-        const V v1306 = v539 * v1284;
-        const V v1307 = v541 * v1283;
-        const V v1308 = v541 * v1284;
-        const V v1309 = v553 * v1283;
-        const V v1310 = v553 * v1284;
-        const V v1311 = v736 * v1283;
-        const V v1312 = v736 * v1284;
-        const V v1313 = v728 * v1283;
-        const V v1314 = v728 * v1284;
-        const V v1315 = v738 * v1283;
-        const V v1316 = v738 * v1284;
-        const V v1317 = v724 * v1283;
-        const V v1318 = v724 * v1284;
-        const V v1319 = v648 * v1283;
-        const V v1320 = v648 * v1284;
-        const V v1321 = v709 * v1283;
-        const V v1322 = v709 * v1284;
-        const V v1323 = v639 * v1283;
-        const V v1324 = v639 * v1284;
-        const V v1325 = v710 * v1283;
-        const V v1326 = v710 * v1284;
-        const V v1327 = v553 * v1282;
-        const V v1328 = v1327 + v1294;
-        const V v1329 = v553 * v1281;
-        const V v1330 = v1329 + v1113;
-        const V v1331 = v545 * v1281;
-        const V v1332 = v1331 + v1188;
-        const V v1333 = v545 * v1282;
-        const V v1334 = v1333 + v1186;
-        const V v1335 = v657 * v1328;
-        const V v1336 = v1326 - v1335;
-        const V v1337 = v658 * v1328;
-        const V v1338 = v1326 + v1337;
-        const V v1339 = v571 * v1328;
-        const V v1340 = v572 * v1328;
-        const V v1341 = v1310 + v1340;
-        const V v1342 = v1339 - v1310;
-        const V v1343 = v361 * v1279;
-        const V v1344 = v1343 + v1330;
-        const V v1345 = v340 * v1279;
-        const V v1346 = v1345 + v1332;
-        const V v1347 = v340 * v1280;
-        const V v1348 = v1347 + v1334;
-        const V v1349 = w[1] * v1342;
-        s487 += v1349;
-        const V v1350 = w[1] * v1341;
-        s503 += v1350;
-        const V v1351 = w[1] * v1336;
-        s519 += v1351;
-        const V v1352 = w[1] * v1338;
-        s535 += v1352;
-        const V v1353 = v629 * v1242;
-        const V v1354 = v1344 + v1353;
-        const V v1355 = v629 * v1234;
-        const V v1356 = v1346 + v1355;
-        const V v1357 = v1091 * v629;
-        const V v1358 = v1348 - v1357;
-        const V v1359 = v340 * v1249;
-        const V v1360 = v1359 + v1205;
-        const V v1361 = v342 * v1249;
-        const V v1362 = v1361 + v1206;
-        const V v1363 = v344 * v1249;
-        const V v1364 = v1363 + v1208;
-        const V v1365 = v628 * v1234;
-        const V v1366 = v1358 + v1365;
-        const V v1367 = v1091 * v624;
-        const V v1368 = v1360 + v1367;
-        const V v1369 = v571 * v1354;
-        const V v1370 = v1369 - v1309;
-        const V v1371 = v1093 * v624;
-        const V v1372 = v1362 + v1371;
-        const V v1373 = v1095 * v624;
-        const V v1374 = v1364 + v1373;
-        const V v1375 = w[1] * v1368;
-        s440 += v1375;
-        const V v1376 = w[1] * v1370;
-        s479 += v1376;
-        const V v1377 = w[1] * v1372;
-        s441 += v1377;
-        const V v1378 = w[1] * v1374;
-        s442 += v1378;
-        const V v1379 = v571 * v1366;
-        const V v1380 = v1379 - v1296;
-        const V v1381 = w[1] * v1380;
-        s480 += v1381;
-        const V v1382 = v571 * v1356;
-        const V v1383 = v1382 - v1295;
-        const V v1384 = w[1] * v1383;
-        s472 += v1384;
-        const V v1385 = v1091 * v625;
-        const V v1386 = v1201 + v1385;
-        const V v1387 = v1095 * v625;
-        const V v1388 = v1207 + v1387;
-        const V v1389 = v1093 * v625;
-        const V v1390 = v1203 + v1389;
-        const V v1391 = v1093 * v629;
-        const V v1392 = v1174 - v1391;
-        const V v1393 = v572 * v1356;
-        const V v1394 = v1295 + v1393;
-        const V v1395 = v572 * v1366;
-        const V v1396 = v1296 + v1395;
-        const V v1397 = w[1] * v1394;
-        s488 += v1397;
-        const V v1398 = w[1] * v1396;
-        s496 += v1398;
-        const V v1399 = v340 * v1250;
-        const V v1400 = v1399 + v1386;
-        const V v1401 = v344 * v1250;
-        const V v1402 = v1401 + v1388;
-        const V v1403 = v342 * v1250;
-        const V v1404 = v1403 + v1390;
-        const V v1405 = w[1] * v1400;
-        s448 += v1405;
-        const V v1406 = w[1] * v1402;
-        s450 += v1406;
-        const V v1407 = w[1] * v1404;
-        s449 += v1407;
-        const V v1408 = v342 * v1280;
-        const V v1409 = v1408 + v1392;
-        const V v1410 = v344 * v1280;
-        const V v1411 = v1410 + v1274;
-        const V v1412 = v351 * v1250;
-        const V v1413 = v1412 + v1211;
-        const V v1414 = v351 * v1280;
-        const V v1415 = v1414 + v1198;
-        const V v1416 = v351 * v1249;
-        const V v1417 = v1416 + v1210;
-        const V v1418 = v355 * v1249;
-        const V v1419 = v1418 + v1213;
-        const V v1420 = v355 * v1250;
-        const V v1421 = v1420 + v1214;
-        const V v1422 = v355 * v1280;
-        const V v1423 = v1422 + v1268;
-        const V v1424 = v549 * v1282;
-        const V v1425 = v1424 + v1411;
-        const V v1426 = v547 * v1282;
-        const V v1427 = v1426 + v1409;
-        const V v1428 = v551 * v1282;
-        const V v1429 = v1428 + v1415;
-        const V v1430 = v547 * v1281;
-        const V v1431 = v1430 + v1177;
-        const V v1432 = v549 * v1281;
-        const V v1433 = v1432 + v1200;
-        const V v1434 = v551 * v1281;
-        const V v1435 = v1434 + v1196;
-        const V v1436 = v537 * v1282;
-        const V v1437 = v1436 + v1423;
-        const V v1438 = v537 * v1281;
-        const V v1439 = v1438 + v1110;
-        const V v1440 = v571 * v1425;
-        const V v1441 = v1440 - v1300;
-        const V v1442 = v1099 * v625;
-        const V v1443 = v1421 + v1442;
-        const V v1444 = v1099 * v624;
-        const V v1445 = v1419 + v1444;
-        const V v1446 = v571 * v1437;
-        const V v1447 = w[1] * v1441;
-        s482 += v1447;
-        const V v1448 = w[1] * v1443;
-        s452 += v1448;
-        const V v1449 = w[1] * v1445;
-        s444 += v1449;
-        const V v1450 = v1446 - v1304;
-        const V v1451 = w[1] * v1450;
-        s484 += v1451;
-        const V v1452 = v342 * v1279;
-        const V v1453 = v1452 + v1431;
-        const V v1454 = v355 * v1279;
-        const V v1455 = v1454 + v1439;
-        const V v1456 = v1097 * v624;
-        const V v1457 = v1417 + v1456;
-        const V v1458 = v1097 * v625;
-        const V v1459 = v1413 + v1458;
-        const V v1460 = w[1] * v1457;
-        s443 += v1460;
-        const V v1461 = w[1] * v1459;
-        s451 += v1461;
-        const V v1462 = v1097 * v629;
-        const V v1463 = v1429 - v1462;
-        const V v1464 = v629 * v1236;
-        const V v1465 = v1453 + v1464;
-        const V v1466 = v629 * v1244;
-        const V v1467 = v1455 + v1466;
-        const V v1468 = v624 * v1236;
-        const V v1469 = v1230 + v1468;
-        const V v1470 = v624 * v1244;
-        const V v1471 = v1225 + v1470;
-        const V v1472 = v625 * v1244;
-        const V v1473 = v1215 + v1472;
-        const V v1474 = v342 * v1251;
-        const V v1475 = v1474 + v1469;
-        const V v1476 = v342 * v1252;
-        const V v1477 = v1476 + v1204;
-        const V v1478 = w[1] * v1475;
-        s457 += v1478;
-        const V v1479 = v355 * v1251;
-        const V v1480 = v1479 + v1471;
-        const V v1481 = v355 * v1252;
-        const V v1482 = v1481 + v1473;
-        const V v1483 = v625 * v1236;
-        const V v1484 = v1477 + v1483;
-        const V v1485 = w[1] * v1480;
-        s460 += v1485;
-        const V v1486 = w[1] * v1482;
-        s468 += v1486;
-        const V v1487 = w[1] * v1484;
-        s465 += v1487;
-        const V v1488 = v628 * v1236;
-        const V v1489 = v1427 + v1488;
-        const V v1490 = v628 * v1240;
-        const V v1491 = v1463 + v1490;
-        const V v1492 = v571 * v1465;
-        const V v1493 = v571 * v1467;
-        const V v1494 = v1492 - v1297;
-        const V v1495 = v1493 - v1303;
-        const V v1496 = v571 * v1489;
-        const V v1497 = w[1] * v1494;
-        s473 += v1497;
-        const V v1498 = v571 * v1491;
-        const V v1499 = w[1] * v1495;
-        s476 += v1499;
-        const V v1500 = v1496 - v1298;
-        const V v1501 = v1498 - v1302;
-        const V v1502 = w[1] * v1500;
-        s481 += v1502;
-        const V v1503 = w[1] * v1501;
-        s483 += v1503;
-        const V v1504 = v625 * v1240;
-        const V v1505 = v1212 + v1504;
-        const V v1506 = v572 * v1465;
-        const V v1507 = v1297 + v1506;
-        const V v1508 = v572 * v1467;
-        const V v1509 = v1303 + v1508;
-        const V v1510 = w[1] * v1507;
-        s489 += v1510;
-        const V v1511 = w[1] * v1509;
-        s492 += v1511;
-        const V v1512 = v572 * v1489;
-        const V v1513 = v1298 + v1512;
-        const V v1514 = v572 * v1491;
-        const V v1515 = v1302 + v1514;
-        const V v1516 = w[1] * v1513;
-        s497 += v1516;
-        const V v1517 = w[1] * v1515;
-        s499 += v1517;
-        const V v1518 = v351 * v1252;
-        const V v1519 = v1518 + v1505;
-        const V v1520 = w[1] * v1519;
-        s467 += v1520;
-        const V v1521 = v351 * v1251;
-        const V v1522 = v1521 + v1232;
-        const V v1523 = v351 * v1279;
-        const V v1524 = v1523 + v1435;
-        const V v1525 = v340 * v1251;
-        const V v1526 = v1525 + v1229;
-        const V v1527 = v340 * v1252;
-        const V v1528 = v1527 + v1202;
-        const V v1529 = v344 * v1251;
-        const V v1530 = v1529 + v1231;
-        const V v1531 = v344 * v1252;
-        const V v1532 = v1531 + v1209;
-        const V v1533 = v344 * v1279;
-        const V v1534 = v1533 + v1433;
-        const V v1535 = v624 * v1240;
-        const V v1536 = v1522 + v1535;
-        const V v1537 = v629 * v1240;
-        const V v1538 = v1524 + v1537;
-        const V v1539 = v624 * v1234;
-        const V v1540 = v1526 + v1539;
-        const V v1541 = v625 * v1234;
-        const V v1542 = v1528 + v1541;
-        const V v1543 = w[1] * v1536;
-        s459 += v1543;
-        const V v1544 = v624 * v1238;
-        const V v1545 = v1530 + v1544;
-        const V v1546 = v625 * v1238;
-        const V v1547 = v1532 + v1546;
-        const V v1548 = v629 * v1238;
-        const V v1549 = v1534 + v1548;
-        const V v1550 = w[1] * v1540;
-        s456 += v1550;
-        const V v1551 = w[1] * v1542;
-        s464 += v1551;
-        const V v1552 = w[1] * v1545;
-        s458 += v1552;
-        const V v1553 = w[1] * v1547;
-        s466 += v1553;
-        const V v1554 = v571 * v1538;
-        const V v1555 = v571 * v1549;
-        const V v1556 = v1554 - v1301;
-        const V v1557 = w[1] * v1556;
-        s475 += v1557;
-        const V v1558 = v1555 - v1299;
-        const V v1559 = w[1] * v1558;
-        s474 += v1559;
-        const V v1560 = v357 * v1252;
-        const V v1561 = v1560 + v1218;
-        const V v1562 = v357 * v1249;
-        const V v1563 = v1562 + v1216;
-        const V v1564 = v358 * v1249;
-        const V v1565 = v1564 + v1219;
-        const V v1566 = v361 * v1249;
-        const V v1567 = v1566 + v1220;
-        const V v1568 = v358 * v1252;
-        const V v1569 = v1568 + v1223;
-        const V v1570 = v361 * v1252;
-        const V v1571 = v1570 + v1224;
-        const V v1572 = v357 * v1250;
-        const V v1573 = v1572 + v1217;
-        const V v1574 = v358 * v1250;
-        const V v1575 = v1574 + v1221;
-        const V v1576 = v361 * v1250;
-        const V v1577 = v1576 + v1222;
-        const V v1578 = v361 * v1251;
-        const V v1579 = v1578 + v1228;
-        const V v1580 = v357 * v1251;
-        const V v1581 = v1580 + v1226;
-        const V v1582 = v358 * v1251;
-        const V v1583 = v1582 + v1227;
-        const V v1584 = v1101 * v624;
-        const V v1585 = v1563 + v1584;
-        const V v1586 = v1101 * v625;
-        const V v1587 = v1573 + v1586;
-        const V v1588 = v1103 * v624;
-        const V v1589 = v1565 + v1588;
-        const V v1590 = v1103 * v625;
-        const V v1591 = v1575 + v1590;
-        const V v1592 = v1105 * v624;
-        const V v1593 = v1567 + v1592;
-        const V v1594 = v1105 * v625;
-        const V v1595 = v1577 + v1594;
-        const V v1596 = v624 * v1246;
-        const V v1597 = v1581 + v1596;
-        const V v1598 = w[1] * v1585;
-        s445 += v1598;
-        const V v1599 = w[1] * v1587;
-        s453 += v1599;
-        const V v1600 = w[1] * v1589;
-        s446 += v1600;
-        const V v1601 = w[1] * v1591;
-        s454 += v1601;
-        const V v1602 = w[1] * v1593;
-        s447 += v1602;
-        const V v1603 = w[1] * v1595;
-        s455 += v1603;
-        const V v1604 = w[1] * v1597;
-        s461 += v1604;
-        const V v1605 = v624 * v1248;
-        const V v1606 = v1583 + v1605;
-        const V v1607 = v624 * v1242;
-        const V v1608 = v1579 + v1607;
-        const V v1609 = v625 * v1242;
-        const V v1610 = v1571 + v1609;
-        const V v1611 = w[1] * v1606;
-        s462 += v1611;
-        const V v1612 = w[1] * v1608;
-        s463 += v1612;
-        const V v1613 = w[1] * v1610;
-        s471 += v1613;
-        const V v1614 = v625 * v1246;
-        const V v1615 = v1561 + v1614;
-        const V v1616 = v625 * v1248;
-        const V v1617 = v1569 + v1616;
-        const V v1618 = w[1] * v1615;
-        s469 += v1618;
-        const V v1619 = w[1] * v1617;
-        s470 += v1619;
-        const V v1620 = v629 * v1246;
-        const V v1621 = v1111 + v1620;
-        const V v1622 = v629 * v1248;
-        const V v1623 = v1112 + v1622;
-        const V v1624 = v572 * v1549;
-        const V v1625 = v1299 + v1624;
-        const V v1626 = w[1] * v1625;
-        s490 += v1626;
-        const V v1627 = v572 * v1538;
-        const V v1628 = v1301 + v1627;
-        const V v1629 = w[1] * v1628;
-        s491 += v1629;
-        const V v1630 = v572 * v1354;
-        const V v1631 = v1309 + v1630;
-        const V v1632 = w[1] * v1631;
-        s495 += v1632;
-        const V v1633 = v357 * v1279;
-        const V v1634 = v1633 + v1621;
-        const V v1635 = v358 * v1279;
-        const V v1636 = v1635 + v1623;
-        const V v1637 = v357 * v1280;
-        const V v1638 = v1637 + v1270;
-        const V v1639 = v358 * v1280;
-        const V v1640 = v1639 + v1272;
-        const V v1641 = v572 * v1425;
-        const V v1642 = v1300 + v1641;
-        const V v1643 = w[1] * v1642;
-        s498 += v1643;
-        const V v1644 = v539 * v1281;
-        const V v1645 = v1644 + v1634;
-        const V v1646 = v541 * v1281;
-        const V v1647 = v1646 + v1636;
-        const V v1648 = v539 * v1282;
-        const V v1649 = v1648 + v1638;
-        const V v1650 = v541 * v1282;
-        const V v1651 = v1650 + v1640;
-        const V v1652 = v572 * v1437;
-        const V v1653 = v1304 + v1652;
-        const V v1654 = w[1] * v1653;
-        s500 += v1654;
-        const V v1655 = v572 * v1645;
-        const V v1656 = v1305 + v1655;
-        const V v1657 = v571 * v1645;
-        const V v1658 = v571 * v1647;
-        const V v1659 = v571 * v1649;
-        const V v1660 = v571 * v1651;
-        const V v1661 = v1657 - v1305;
-        const V v1662 = w[1] * v1656;
-        s493 += v1662;
-        const V v1663 = v1658 - v1307;
-        const V v1664 = v1659 - v1306;
-        const V v1665 = w[1] * v1661;
-        s477 += v1665;
-        const V v1666 = v1660 - v1308;
-        const V v1667 = w[1] * v1663;
-        s478 += v1667;
-        const V v1668 = w[1] * v1664;
-        s485 += v1668;
-        const V v1669 = w[1] * v1666;
-        s486 += v1669;
-        const V v1670 = v572 * v1647;
-        const V v1671 = v1307 + v1670;
-        const V v1672 = v572 * v1649;
-        const V v1673 = v1306 + v1672;
-        const V v1674 = v572 * v1651;
-        const V v1675 = v1308 + v1674;
-        const V v1676 = w[1] * v1671;
-        s494 += v1676;
-        const V v1677 = w[1] * v1673;
-        s501 += v1677;
-        const V v1678 = w[1] * v1675;
-        s502 += v1678;
-        const V v1679 = v657 * v1645;
-        const V v1680 = v1321 - v1679;
-        const V v1681 = v657 * v1647;
-        const V v1682 = v1323 - v1681;
-        const V v1683 = w[1] * v1680;
-        s509 += v1683;
-        const V v1684 = w[1] * v1682;
-        s510 += v1684;
-        const V v1685 = v657 * v1649;
-        const V v1686 = v1322 - v1685;
-        const V v1687 = v657 * v1651;
-        const V v1688 = v1324 - v1687;
-        const V v1689 = w[1] * v1686;
-        s517 += v1689;
-        const V v1690 = w[1] * v1688;
-        s518 += v1690;
-        const V v1691 = v658 * v1645;
-        const V v1692 = v1321 + v1691;
-        const V v1693 = v658 * v1647;
-        const V v1694 = v1323 + v1693;
-        const V v1695 = v658 * v1649;
-        const V v1696 = v1322 + v1695;
-        const V v1697 = v658 * v1651;
-        const V v1698 = v1324 + v1697;
-        const V v1699 = w[1] * v1692;
-        s525 += v1699;
-        const V v1700 = w[1] * v1694;
-        s526 += v1700;
-        const V v1701 = w[1] * v1696;
-        s533 += v1701;
-        const V v1702 = w[1] * v1698;
-        s534 += v1702;
-        const V v1703 = v657 * v1356;
-        const V v1704 = v1311 - v1703;
-        const V v1705 = v658 * v1356;
-        const V v1706 = v1311 + v1705;
-        const V v1707 = w[1] * v1704;
-        s504 += v1707;
-        const V v1708 = w[1] * v1706;
-        s520 += v1708;
-        const V v1709 = v657 * v1465;
-        const V v1710 = v1313 - v1709;
-        const V v1711 = v658 * v1465;
-        const V v1712 = v1313 + v1711;
-        const V v1713 = w[1] * v1710;
-        s505 += v1713;
-        const V v1714 = w[1] * v1712;
-        s521 += v1714;
-        const V v1715 = v657 * v1549;
-        const V v1716 = v1315 - v1715;
-        const V v1717 = v658 * v1549;
-        const V v1718 = v1315 + v1717;
-        const V v1719 = w[1] * v1716;
-        s506 += v1719;
-        const V v1720 = w[1] * v1718;
-        s522 += v1720;
-        const V v1721 = v657 * v1538;
-        const V v1722 = v1317 - v1721;
-        const V v1723 = v658 * v1538;
-        const V v1724 = v1317 + v1723;
-        const V v1725 = w[1] * v1722;
-        s507 += v1725;
-        const V v1726 = w[1] * v1724;
-        s523 += v1726;
-        const V v1727 = v657 * v1467;
-        const V v1728 = v1319 - v1727;
-        const V v1729 = v658 * v1467;
-        const V v1730 = v1319 + v1729;
-        const V v1731 = w[1] * v1728;
-        s508 += v1731;
-        const V v1732 = w[1] * v1730;
-        s524 += v1732;
-        const V v1733 = v657 * v1354;
-        const V v1734 = v1325 - v1733;
-        const V v1735 = v658 * v1354;
-        const V v1736 = v1325 + v1735;
-        const V v1737 = w[1] * v1734;
-        s511 += v1737;
-        const V v1738 = w[1] * v1736;
-        s527 += v1738;
-        const V v1739 = v657 * v1366;
-        const V v1740 = v1312 - v1739;
-        const V v1741 = v658 * v1366;
-        const V v1742 = v1312 + v1741;
-        const V v1743 = w[1] * v1740;
-        s512 += v1743;
-        const V v1744 = w[1] * v1742;
-        s528 += v1744;
-        const V v1745 = v657 * v1489;
-        const V v1746 = v1314 - v1745;
-        const V v1747 = v658 * v1489;
-        const V v1748 = v1314 + v1747;
-        const V v1749 = w[1] * v1746;
-        s513 += v1749;
-        const V v1750 = w[1] * v1748;
-        s529 += v1750;
-        const V v1751 = v657 * v1425;
-        const V v1752 = v1316 - v1751;
-        const V v1753 = v658 * v1425;
-        const V v1754 = v1316 + v1753;
-        const V v1755 = w[1] * v1752;
-        s514 += v1755;
-        const V v1756 = w[1] * v1754;
-        s530 += v1756;
-        const V v1757 = v657 * v1491;
-        const V v1758 = v1318 - v1757;
-        const V v1759 = v658 * v1491;
-        const V v1760 = v1318 + v1759;
-        const V v1761 = w[1] * v1758;
-        s515 += v1761;
-        const V v1762 = w[1] * v1760;
-        s531 += v1762;
-        const V v1763 = v657 * v1437;
-        const V v1764 = v1320 - v1763;
-        const V v1765 = v658 * v1437;
-        const V v1766 = v1320 + v1765;
-        const V v1767 = w[1] * v1764;
-        s516 += v1767;
-        const V v1768 = w[1] * v1766;
-        s532 += v1768;
-    }
-    softehl_store4(K + 104, 144, s386, softehl_splat(0.0), s387, softehl_splat(0.0));
-    softehl_store4(K + 128, 144, s388, softehl_splat(0.0), s389, softehl_splat(0.0));
-    softehl_store4(R + 8, 12, s385, s391, s384, s390);
-    softehl_store4(R + 0, 12, s419, s418, s417, s416);
-    softehl_store4(K + 116, 144, s420, s408, s421, s409);
-    softehl_store4(K + 140, 144, s422, s410, s423, s411);
-    softehl_store4(K + 8, 144, s424, s392, s425, s393);
-    softehl_store4(K + 20, 144, s426, s394, s427, s395);
-    softehl_store4(K + 32, 144, s428, s396, s429, s397);
-    softehl_store4(K + 44, 144, s430, s398, s431, s399);
-    softehl_store4(K + 96, 144, s440, s441, s442, s443);
-    softehl_store4(K + 100, 144, s444, s445, s446, s447);
-    softehl_store4(K + 120, 144, s448, s449, s450, s451);
-    softehl_store4(K + 124, 144, s452, s453, s454, s455);
-    softehl_store4(K + 108, 144, s456, s457, s458, s459);
-    softehl_store4(K + 112, 144, s460, s461, s462, s463);
-    softehl_store4(K + 132, 144, s464, s465, s466, s467);
-    softehl_store4(K + 136, 144, s468, s469, s470, s471);
-    softehl_store4(K + 0, 144, s472, s473, s474, s475);
-    softehl_store4(K + 4, 144, s476, s477, s478, s479);
-    softehl_store4(K + 12, 144, s480, s481, s482, s483);
-    softehl_store4(K + 16, 144, s484, s485, s486, s487);
-    softehl_store4(K + 24, 144, s488, s489, s490, s491);
-    softehl_store4(K + 28, 144, s492, s493, s494, s495);
-    softehl_store4(K + 36, 144, s496, s497, s498, s499);
-    softehl_store4(K + 40, 144, s500, s501, s502, s503);
-    softehl_store4(K + 48, 144, s504, s505, s506, s507);
-    softehl_store4(K + 52, 144, s508, s509, s510, s511);
-    softehl_store4(K + 60, 144, s512, s513, s514, s515);
-    softehl_store4(K + 64, 144, s516, s517, s518, s519);
-    const V v1769 = -s412;
-    const V v1770 = -s413;
-    const V v1771 = -s414;
-    const V v1772 = -s415;
-    softehl_store4(R + 4, 12, v1772, v1771, v1770, v1769);
-    const V v1773 = -s432;
-    const V v1774 = -s433;
-    softehl_store4(K + 56, 144, v1773, s400, v1774, s401);
-    const V v1775 = -s434;
-    const V v1776 = -s435;
-    softehl_store4(K + 68, 144, v1775, s402, v1776, s403);
-    const V v1777 = -s436;
-    const V v1778 = -s437;
-    softehl_store4(K + 80, 144, v1777, s404, v1778, s405);
-    const V v1779 = -s438;
-    const V v1780 = -s439;
-    softehl_store4(K + 92, 144, v1779, s406, v1780, s407);
-    const V v1781 = -s520;
-    const V v1782 = -s521;
-    const V v1783 = -s522;
-    const V v1784 = -s523;
-    softehl_store4(K + 72, 144, v1781, v1782, v1783, v1784);
-    const V v1785 = -s524;
-    const V v1786 = -s525;
-    const V v1787 = -s526;
-    const V v1788 = -s527;
-    softehl_store4(K + 76, 144, v1785, v1786, v1787, v1788);
-    const V v1789 = -s528;
-    const V v1790 = -s529;
-    const V v1791 = -s530;
-    const V v1792 = -s531;
-    softehl_store4(K + 84, 144, v1789, v1790, v1791, v1792);
-    const V v1793 = -s532;
-    const V v1794 = -s533;
-    const V v1795 = -s534;
-    const V v1796 = -s535;
-    softehl_store4(K + 88, 144, v1793, v1794, v1795, v1796);
-}
-
-void softehl_mortar_22_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mortar_22_tangent_group(points, modes, coordinates + 8 * e, dofs + 12 * e, data + 13 * e, 0, parameters, rule, basis, values + 12 * e, tangent + (12 * 12) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mortar_22_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 12 * (n - SOFTEHL_LANES), data + 13 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 12 * (n - SOFTEHL_LANES), tangent + (12 * 12) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 12];
-    softehl_pad(d, dofs, 12, n);
-    double a[SOFTEHL_LANES * 13];
-    softehl_pad(a, data, 13, n);
-    double R[SOFTEHL_LANES * 12];
-    double K[SOFTEHL_LANES * (12 * 12)];
-    softehl_mortar_22_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 12 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (12 * 12) * n; ++i) tangent[i] = K[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_mortar_22_tangent, 8, 12, 13, 0, 12, (12 * 12))

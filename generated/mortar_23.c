@@ -34,3420 +34,1005 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_mortar_23_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_mortar_23_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 10, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 10, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8, X9;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8, X9;
+    softehl_load4(X + 0, 10, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 10, &X4, &X5, &X6, &X7);
     softehl_load2(X + 8, 10, &X8, &X9);
-    (void)X8; (void)X9;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 14, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 14, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
-    softehl_load4(d + 8, 14, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13;
-    softehl_load2(d + 12, 14, &d12, &d13);
-    (void)d12; (void)d13;
-    V a0, a1, a2, a3;
-    softehl_load4(a + 0, 15, &a0, &a1, &a2, &a3);
-    (void)a0; (void)a1; (void)a2; (void)a3;
-    V a4, a5, a6, a7;
-    softehl_load4(a + 4, 15, &a4, &a5, &a6, &a7);
-    (void)a4; (void)a5; (void)a6; (void)a7;
-    V a8, a9, a10, a11;
-    softehl_load4(a + 8, 15, &a8, &a9, &a10, &a11);
-    (void)a8; (void)a9; (void)a10; (void)a11;
-    V a12, a13, a14;
-    softehl_load3(a + 12, 15, &a12, &a13, &a14);
-    (void)a12; (void)a13; (void)a14;
-    const V v1 = X0 + d0;
-    const V v2 = X2 + d2;
-    const V v3 = X4 + d4;
-    const V v4 = X2 - X0;
-    const V v5 = X0 + a0;
-    const V v6 = X2 + a1;
-    const V v7 = X6 + d6;
-    const V v8 = X4 + a2;
-    const V v9 = 0.5 * v4;
-    const V v10 = X1 + d1;
-    const V v11 = X6 + a3;
-    const V v12 = X3 + d3;
-    const V v13 = X1 + a5;
-    const V v14 = X3 - X1;
-    const V v15 = v9 * v9;
-    const V v16 = X8 + d8;
-    const V v17 = X3 + a6;
-    const V v18 = 0.5 * v14;
-    const V v19 = 1.0 / a10;
-    const V v20 = X8 + a4;
-    const V v21 = v18 * v18;
-    const V v22 = v15 + v21;
-    const V v23 = X9 + d9;
-    const V v24 = X9 + a9;
-    const V v25 = X5 + a7;
-    const V v26 = X5 + d5;
-    const V v27 = X7 + a8;
-    const V v28 = X7 + d7;
-    const V v29 = v7 - v3;
-    const V v30 = v7 + v3;
-    const V v31 = 0.5 * v30;
-    const V v32 = v28 - v26;
-    const V v33 = v28 + v26;
-    const V v34 = v10 + v12;
-    const V v35 = v12 - v10;
-    const V v36 = 0.5 * v34;
-    const V v37 = 0.5 * v33;
-    const V v38 = 0.5 * v35;
-    const V v39 = v31 - v16;
-    const V v40 = v37 - v23;
-    const V v41 = v1 + v2;
-    const V v42 = v2 - v1;
-    const V v43 = 0.5 * v41;
-    const V v44 = v28 - v36;
-    const V v45 = v26 - v36;
-    const V v46 = 0.5 * v42;
-    const V v47 = v38 * v38;
-    const V v48 = v38 * v44;
-    const V v49 = v38 * v45;
-    const V v50 = v7 - v43;
-    const V v51 = v3 - v43;
-    const V v52 = v46 * v46;
-    const V v53 = v52 + v47;
-    const V v54 = v46 * v50;
-    const V v55 = v54 + v48;
-    const V v56 = v46 * v51;
-    const V v57 = v56 + v49;
-    const V v58 = 1.0 / v53;
-    const V v59 = v55 * v58;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13;
+    softehl_load4(d + 0, 14, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 14, &d4, &d5, &d6, &d7);
+    softehl_load4(d + 8, 14, &d8, &d9, &d10, &d11); softehl_load2(d + 12, 14, &d12, &d13);
+    V a0, a1, a2, a3, a4, a5, a6, a7, a8, a9, a10, a11, a12, a13, a14;
+    softehl_load4(a + 0, 15, &a0, &a1, &a2, &a3); softehl_load4(a + 4, 15, &a4, &a5, &a6, &a7);
+    softehl_load4(a + 8, 15, &a8, &a9, &a10, &a11); softehl_load3(a + 12, 15, &a12, &a13, &a14);
+    const V v1 = X0 + d0, v2 = X2 + d2, v3 = X4 + d4, v4 = X0 + a0, v5 = X2 + a1, v6 = X6 + d6,
+        v7 = X4 + a2, v8 = 0.5 * (X2 - X0), v9 = X1 + d1, v10 = X6 + a3, v11 = X3 + d3,
+        v12 = X1 + a5, v13 = X8 + d8, v14 = X3 + a6, v15 = 0.5 * (X3 - X1), v16 = 1.0 / a10,
+        v17 = X8 + a4, v18 = X9 + d9, v19 = X9 + a9, v20 = X5 + a7, v21 = X5 + d5, v22 = X7 + a8,
+        v23 = X7 + d7, v24 = 0.5 * (v9 + v11), v25 = 0.5 * (v11 - v9), v26 = 0.5 * (v1 + v2),
+        v27 = 0.5 * (v2 - v1), v28 = v27 * v27 + v25 * v25, v29 = 1.0 / v28,
+        v30 = (v27 * (v6 - v26) + v25 * (v23 - v24)) * v29;
+    const M v31 = softehl_lt(softehl_splat(1.0), v30);
+    const V v32 = softehl_blend(v31, softehl_splat(1.0), v30); const M v33 = softehl_eq(v32, v32);
+    const V v34 = (v27 * (v3 - v26) + v25 * (v21 - v24)) * v29;
+    const M v35 = softehl_lt(softehl_splat(1.0), v34);
+    const V v36 = softehl_blend(v35, softehl_splat(1.0), v34); const M v37 = softehl_eq(v36, v36);
+    const V v38 = softehl_vsqrt(v8 * v8 + v15 * v15), v39 = softehl_vsqrt(v28), v40 = 1.0 / v39,
+        v41 = v27 * v40, v42 = v25 * v40;
+    V v43 = softehl_splat(0.0); const M m44 = v33;
+    if (softehl_any(m44)) {
+        const M v45 = softehl_lt(softehl_splat((-1.0)), v32);
+        const V v46 = softehl_blend(v45, v32, softehl_splat((-1.0)));
+        v43 = softehl_blend(m44, v46, v43);
+    }
+    const M m47 = ~v33;
+    if (softehl_any(m47)) {
+        const V v48 = (-1.0) - v32, v49 = v48 * (v48 * v48);
+        v43 = softehl_blend(m47, v49, v43);
+    }
+    V v50 = softehl_splat(0.0); const M m51 = v37;
+    if (softehl_any(m51)) {
+        const M v52 = softehl_lt(softehl_splat((-1.0)), v36);
+        const V v53 = softehl_blend(v52, v36, softehl_splat((-1.0)));
+        v50 = softehl_blend(m51, v53, v50);
+    }
+    const M m54 = ~v37;
+    if (softehl_any(m54)) {
+        const V v55 = (-1.0) - v36, v56 = v55 * (v55 * v55);
+        v50 = softehl_blend(m54, v56, v50);
+    }
+    const V v57 = 4.0 * ((0.5 * (v6 + v3) - v13) * v41 + (0.5 * (v23 + v21) - v18) * v42),
+        v58 = v50 - v43;
+    const M v59 = softehl_eq(v58, v58); V v60 = softehl_splat(0.0); const M m61 = v59;
+    if (softehl_any(m61)) {
+        const M v62 = softehl_lt(softehl_splat(0.0), v58);
+        const V v63 = softehl_blend(v62, v58, softehl_splat(0.0));
+        v60 = softehl_blend(m61, v63, v60);
+    }
+    const M m64 = ~v59;
+    if (softehl_any(m64)) {
+        const V v65 = v43 - v50, v66 = v65 * (v65 * v65);
+        v60 = softehl_blend(m64, v66, v60);
+    }
+    const V v67 = 0.5 * v60, v68 = v38 * v67, v69 = 0.5 * (v43 + v50),
+        v70 = 0.5 * ((v6 - v3) * v41 + (v23 - v21) * v42), v71 = v70 * v70, v72 = 0.01 * v71;
+    V s73 = {0}, s74 = {0}, s75 = {0}, s76 = {0}, s77 = {0}, s78 = {0}, s79 = {0}, s80 = {0},
+        s81 = {0}, s82 = {0}, s83 = {0}, s84 = {0}, s85 = {0}, s86 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q; (void)w;
+        const V v87 = 0.5 * (w[0] * v67 + v69), v88 = 0.5 - v87, v89 = 0.5 + v87,
+            v90 = v1 * v88 + v2 * v89, v91 = v9 * v88 + v11 * v89,
+            v92 = v41 * (v13 - v90) + v42 * (v18 - v91), v93 = v71 - v57 * v92;
+        const M v94 = softehl_eq(v93, v93); V v95 = softehl_splat(0.0); const M m96 = v94;
+        if (softehl_any(m96)) {
+            const M v97 = softehl_lt(v72, v93); const V v98 = softehl_blend(v97, v93, v72);
+            v95 = softehl_blend(m96, v98, v95);
+        }
+        const M m99 = ~v94;
+        if (softehl_any(m99)) {
+            const V v100 = v72 - v93, v101 = v100 * (v100 * v100);
+            v95 = softehl_blend(m99, v101, v95);
+        }
+        const V v102 = softehl_vsqrt(v95), v103 = d10 * v88 + d12 * v89,
+            v104 = 2.0 * v92 * (1.0 / (v70 - v102)), v105 = 1.0 - v104 * v104, v106 = 0.5 * v104,
+            v107 = v106 * ((-1.0) - v104), v108 = v106 * (1.0 - v104),
+            v109 = v42 * (v13 * v105 - v90 - v3 * v107 - v6 * v108) - v41 * (v18 * v105 - v91 - v21 * v107 - v23 * v108),
+            v110 = a10 * v109, v111 = v103 - v110;
+        const M v112 = softehl_eq(v111, v111);
+        V v113 = softehl_splat(0.0), v114 = softehl_splat(0.0);
+        const M m115 = v112;
+        if (softehl_any(m115)) {
+            const M v116 = softehl_le(softehl_splat(0.0), v111);
+            V v117 = softehl_splat(0.0), v118 = softehl_splat(0.0);
+            const M m119 = v116 & m115;
+            if (softehl_any(m119)) {
+                const V v120 = (a12 + v109) * (v109 - a13); const M v121 = softehl_eq(v120, v120);
+                V v122 = softehl_splat(0.0); const M m123 = v121 & m119;
+                if (softehl_any(m123)) {
+                    const M v124 = softehl_lt(v120, softehl_splat(0.0));
+                    const V v125 = softehl_blend(v124, v111, softehl_splat(0.0));
+                    v122 = softehl_blend(m123, v125, v122);
+                }
+                const M m126 = ~v121 & m119;
+                if (softehl_any(m126)) {
+                    const V v127 = v120 * (v120 * v120); v122 = softehl_blend(m126, v127, v122);
+                }
+                const V v128 = a11 * v122; const M v129 = softehl_eq(v128, v128);
+                const V v130 = v41 * (v17 * v105 - v4 * v88 - v5 * v89 - v7 * v107 - v10 * v108),
+                    v131 = v42 * (v19 * v105 - v12 * v88 - v14 * v89 - v20 * v107 - v22 * v108),
+                    v132 = d11 * v88 + d13 * v89 + a10 * (v130 + v131);
+                const M v133 = softehl_eq(v132, v132), v134 = v129 & v133;
+                V v135 = softehl_splat(0.0); const M m136 = v134 & m119;
+                if (softehl_any(m136)) {
+                    const M v137 = softehl_lt(v128, v132); V v138 = v128;
+                    const M m139 = ~v137 & m136;
+                    if (softehl_any(m139)) {
+                        V v140 = softehl_splat(0.0); const M m141 = v129 & m139;
+                        if (softehl_any(m141)) {
+                            const M v142 = softehl_lt(v128, -v132); V v143 = v132;
+                            const M m144 = v142 & m141;
+                            if (softehl_any(m144)) {
+                                const V v145 = -v128; v143 = softehl_blend(m144, v145, v143);
+                            }
+                            v140 = softehl_blend(m141, v143, v140);
+                        }
+                        const M m146 = ~v129 & m139;
+                        if (softehl_any(m146)) {
+                            const V v147 = v132 + v128, v148 = v147 * (v147 * v147);
+                            v140 = softehl_blend(m146, v148, v140);
+                        }
+                        v138 = softehl_blend(m139, v140, v138);
+                    }
+                    v135 = softehl_blend(m136, v138, v135);
+                }
+                const M m149 = ~v134 & m119;
+                if (softehl_any(m149)) {
+                    const V v150 = v128 - v132, v151 = v150 * (v150 * v150);
+                    v135 = softehl_blend(m149, v151, v135);
+                }
+                v117 = softehl_blend(m119, v122, v117); v118 = softehl_blend(m119, v135, v118);
+            }
+            v113 = softehl_blend(m115, v117, v113); v114 = softehl_blend(m115, v118, v114);
+        }
+        const M m152 = ~v112;
+        if (softehl_any(m152)) {
+            const V v153 = v110 - v103, v154 = v153 * (v153 * v153);
+            v113 = softehl_blend(m152, v154, v113); v114 = softehl_blend(m152, v154, v114);
+        }
+        const V v155 = v16 * w[1], v156 = w[1] * v105, v157 = w[1] * v108, v158 = w[1] * v107,
+            v159 = w[1] * v89, v160 = w[1] * v88, v161 = v155 * v88, v162 = v155 * v89,
+            v163 = v68 * (1.0 + a14 * ((-1.0) + 6.283185307179586 * (X1 * v88 + X3 * v89))),
+            v164 = v113 * v163, v165 = v114 * v163, v166 = (v42 * v113 + v41 * v114) * v163,
+            v167 = (v42 * v114 - v41 * v113) * v163;
+        s73 += v162 * v164; s74 += v161 * v164; s75 += v162 * v165; s76 += v161 * v165;
+        s77 += v156 * v167; s78 += v156 * v166; s79 += v157 * v167; s80 += v157 * v166;
+        s81 += v158 * v167; s82 += v158 * v166; s83 += v159 * v167; s85 += v160 * v167;
+        s84 += v159 * v166; s86 += v160 * v166;
+    }
+    softehl_store2(R + 12, 14, s73, s75); softehl_store4(R + 4, 14, s82, s81, s80, s79);
+    softehl_store4(R + 0, 14, s86, s85, s84, s83); softehl_store4(R + 8, 14, -s78, -s77, s74, s76);
+}
+SOFTEHL_BATCH(softehl_mortar_23_residual, 10, 14, 15, 0, 14, 0)
+
+SOFTEHL_GROUP(softehl_mortar_23_tangent)
+{
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8, X9;
+    softehl_load4(X + 0, 10, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 10, &X4, &X5, &X6, &X7);
+    softehl_load2(X + 8, 10, &X8, &X9);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13;
+    softehl_load4(d + 0, 14, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 14, &d4, &d5, &d6, &d7);
+    softehl_load4(d + 8, 14, &d8, &d9, &d10, &d11); softehl_load2(d + 12, 14, &d12, &d13);
+    V a0, a1, a2, a3, a4, a5, a6, a7, a8, a9, a10, a11, a12, a13, a14;
+    softehl_load4(a + 0, 15, &a0, &a1, &a2, &a3); softehl_load4(a + 4, 15, &a4, &a5, &a6, &a7);
+    softehl_load4(a + 8, 15, &a8, &a9, &a10, &a11); softehl_load3(a + 12, 15, &a12, &a13, &a14);
+    const V v1 = X2 + d2, v2 = X4 + d4, v3 = X6 + d6, v4 = X2 + a1, v5 = X8 + d8, v6 = X4 + a2,
+        v7 = X6 + a3, v8 = X8 + a4, v9 = 0.5 * (X2 - X0), v10 = X3 + d3, v11 = X0 + a0,
+        v12 = X0 + d0, v13 = X3 + a6, v14 = X1 + a5, v15 = X5 + a7, v16 = X5 + d5,
+        v17 = 0.5 * (X3 - X1), v18 = X1 + d1, v19 = -a11, v20 = X7 + a8, v21 = X7 + d7,
+        v22 = X9 + a9, v23 = X9 + d9, v24 = softehl_vsqrt(v9 * v9 + v17 * v17),
+        v25 = 0.5 * (v21 - v16), v26 = 0.5 * (v18 + v10), v27 = 0.5 * (v21 + v16) - v23,
+        v28 = v10 - X1, v29 = 0.5 * (v10 - v18), v30 = 0.5 * (d10 - d12), v31 = v21 - v26,
+        v32 = v16 - v26, v33 = 0.5 * (d12 - d10), v34 = 1.0 / a10, v35 = -a10, v36 = v28 - d1,
+        v37 = 0.5 * v32, v38 = 0.5 * v31, v39 = 0.5 * v36, v40 = 0.25 * v36,
+        v41 = 0.5 * (d11 - d13), v42 = 0.5 * (d13 - d11), v43 = 0.5 * (v3 - v2), v44 = v1 - X0,
+        v45 = 0.5 * (v12 + v1), v46 = 0.5 * (v1 - v12), v47 = 0.5 * (v3 + v2) - v5, v48 = v3 - v45,
+        v49 = v2 - v45, v50 = v44 - d0, v51 = 0.5 * v50, v52 = 0.25 * v50, v53 = 0.5 * v49,
+        v54 = v49 * v51 + v32 * v39, v55 = 0.5 * v48, v56 = v48 * v51 + v31 * v39,
+        v57 = v51 * v51 + v39 * v39, v58 = 1.0 / v57, v59 = v56 * v58;
     const M v60 = softehl_lt(softehl_splat(1.0), v59);
-    const V v61 = softehl_blend(v60, softehl_splat(1.0), v59);
-    const M v62 = softehl_eq(v61, v61);
-    const V v63 = v57 * v58;
-    const M v64 = softehl_lt(softehl_splat(1.0), v63);
-    const V v65 = softehl_blend(v64, softehl_splat(1.0), v63);
-    const M v66 = softehl_eq(v65, v65);
-    const V v67 = softehl_vsqrt(v22);
-    const V v68 = softehl_vsqrt(v53);
-    const V v69 = 1.0 / v68;
-    const V v70 = v46 * v69;
-    const V v71 = v38 * v69;
-    const V v72 = v39 * v70;
-    const V v73 = v40 * v71;
-    const V v74 = v72 + v73;
-    V v75 = softehl_splat(0.0);
-    const M m76 = v62;
-    if (softehl_any(m76)) {
-        const M v77 = softehl_lt(softehl_splat((-1.0)), v61);
-        const V v78 = softehl_blend(v77, v61, softehl_splat((-1.0)));
-        v75 = softehl_blend(m76, v78, v75);
+    const V v61 = softehl_blend(v60, softehl_splat(1.0), v59); const M v62 = softehl_eq(v61, v61);
+    const V v63 = v54 * v58; const M v64 = softehl_lt(softehl_splat(1.0), v63);
+    const V v65 = softehl_blend(v64, softehl_splat(1.0), v63); const M v66 = softehl_eq(v65, v65);
+    const V v67 = softehl_vsqrt(v57), v68 = v58 * v58, v69 = (v53 - v52) * v58,
+        v70 = (v55 - v52) * v58, v71 = (v37 - v40) * v58, v72 = (v38 - v40) * v58,
+        v73 = 0.5 * (d0 - v44) * v68, v74 = 0.5 * (d1 - v28) * v68, v75 = softehl_vsqrt(v58),
+        v76 = v51 * v68, v77 = v39 * v68, v78 = v51 * v58, v79 = v39 * v58,
+        v80 = v54 * v73 + (v53 + v52) * v58, v81 = (v55 + v52) * v58 + v56 * v73,
+        v82 = v54 * v74 + (v37 + v40) * v58, v83 = (v38 + v40) * v58 + v56 * v74, v84 = v54 * v76,
+        v85 = v56 * v76, v86 = v54 * v77, v87 = v56 * v77, v88 = 0.5 * v75, v89 = 1.0 / v67,
+        v90 = v51 * v89, v91 = v39 * v89, v92 = v89 * v89, v93 = 0.5 * v89, v94 = 2.0 * v90,
+        v95 = 2.0 * v91, v96 = 0.5 * v90, v97 = 0.5 * v91, v98 = v88 * (v51 * v92),
+        v99 = v88 * (v39 * v92), v100 = v39 * v98, v101 = v51 * v98, v102 = v39 * v99,
+        v103 = v51 * v99, v104 = v93 - v101, v105 = v101 - v93, v106 = v93 - v102,
+        v107 = v102 - v93, v108 = v43 * v103, v109 = v47 * v103, v110 = v43 * v90 + v25 * v91,
+        v111 = v47 * v90 + v27 * v91, v112 = v25 * v100, v113 = v27 * v100;
+    V v114 = softehl_splat(0.0), v115 = softehl_splat(0.0), v116 = softehl_splat(0.0),
+        v117 = softehl_splat(0.0), v118 = softehl_splat(0.0), v119 = softehl_splat(0.0),
+        v120 = softehl_splat(0.0);
+    const M m121 = v62;
+    if (softehl_any(m121)) {
+        const M v122 = softehl_lt(softehl_splat((-1.0)), v61);
+        V v123 = softehl_splat((-1.0)), v124 = softehl_splat(0.0), v125 = softehl_splat(0.0),
+            v126 = softehl_splat(0.0), v127 = softehl_splat(0.0), v128 = softehl_splat(0.0),
+            v129 = softehl_splat(0.0);
+        const M m130 = v122 & m121;
+        if (softehl_any(m130)) {
+            V v131 = softehl_splat(0.0), v132 = softehl_splat(0.0), v133 = softehl_splat(0.0),
+                v134 = softehl_splat(0.0), v135 = softehl_splat(0.0), v136 = softehl_splat(0.0);
+            const M m137 = ~v60 & m130;
+            if (softehl_any(m137)) {
+                const V v138 = -v81, v139 = -v83, v140 = v70 - v85, v141 = v72 - v87;
+                v131 = softehl_blend(m137, v78, v131); v132 = softehl_blend(m137, v79, v132);
+                v133 = softehl_blend(m137, v138, v133); v134 = softehl_blend(m137, v139, v134);
+                v135 = softehl_blend(m137, v140, v135); v136 = softehl_blend(m137, v141, v136);
+            }
+            v123 = softehl_blend(m130, v61, v123); v124 = softehl_blend(m130, v131, v124);
+            v125 = softehl_blend(m130, v132, v125); v126 = softehl_blend(m130, v133, v126);
+            v127 = softehl_blend(m130, v134, v127); v128 = softehl_blend(m130, v135, v128);
+            v129 = softehl_blend(m130, v136, v129);
+        }
+        v114 = softehl_blend(m121, v123, v114); v115 = softehl_blend(m121, v126, v115);
+        v116 = softehl_blend(m121, v127, v116); v117 = softehl_blend(m121, v128, v117);
+        v118 = softehl_blend(m121, v129, v118); v119 = softehl_blend(m121, v124, v119);
+        v120 = softehl_blend(m121, v125, v120);
     }
-    const M m79 = ~v62;
-    if (softehl_any(m79)) {
-        const V v80 = (-1.0) - v61;
-        const V v81 = v80 * v80;
-        const V v82 = v80 * v81;
-        v75 = softehl_blend(m79, v82, v75);
+    const M m142 = ~v62;
+    if (softehl_any(m142)) {
+        const V v143 = (-1.0) - v61, v144 = v143 * (v143 * v143);
+        V v145 = softehl_splat(0.0), v146 = softehl_splat(0.0), v147 = softehl_splat(0.0),
+            v148 = softehl_splat(0.0), v149 = softehl_splat(0.0), v150 = softehl_splat(0.0);
+        const M m151 = ~v60 & m142;
+        if (softehl_any(m151)) {
+            const V v152 = (-1.0) - v59, v153 = v152 * (3.0 * v152), v154 = (v85 - v70) * v153,
+                v155 = (v87 - v72) * v153, v156 = v81 * v153, v157 = v83 * v153,
+                v158 = -(v78 * v153), v159 = -(v79 * v153);
+            v145 = softehl_blend(m151, v156, v145); v146 = softehl_blend(m151, v157, v146);
+            v147 = softehl_blend(m151, v154, v147); v148 = softehl_blend(m151, v155, v148);
+            v149 = softehl_blend(m151, v158, v149); v150 = softehl_blend(m151, v159, v150);
+        }
+        v114 = softehl_blend(m142, v144, v114); v115 = softehl_blend(m142, v145, v115);
+        v116 = softehl_blend(m142, v146, v116); v117 = softehl_blend(m142, v147, v117);
+        v118 = softehl_blend(m142, v148, v118); v119 = softehl_blend(m142, v149, v119);
+        v120 = softehl_blend(m142, v150, v120);
     }
-    V v83 = softehl_splat(0.0);
-    const M m84 = v66;
-    if (softehl_any(m84)) {
-        const M v85 = softehl_lt(softehl_splat((-1.0)), v65);
-        const V v86 = softehl_blend(v85, v65, softehl_splat((-1.0)));
-        v83 = softehl_blend(m84, v86, v83);
+    V v160 = softehl_splat(0.0), v161 = softehl_splat(0.0), v162 = softehl_splat(0.0),
+        v163 = softehl_splat(0.0), v164 = softehl_splat(0.0), v165 = softehl_splat(0.0),
+        v166 = softehl_splat(0.0);
+    const M m167 = v66;
+    if (softehl_any(m167)) {
+        const M v168 = softehl_lt(softehl_splat((-1.0)), v65);
+        V v169 = softehl_splat((-1.0)), v170 = softehl_splat(0.0), v171 = softehl_splat(0.0),
+            v172 = softehl_splat(0.0), v173 = softehl_splat(0.0), v174 = softehl_splat(0.0),
+            v175 = softehl_splat(0.0);
+        const M m176 = v168 & m167;
+        if (softehl_any(m176)) {
+            V v177 = softehl_splat(0.0), v178 = softehl_splat(0.0), v179 = softehl_splat(0.0),
+                v180 = softehl_splat(0.0), v181 = softehl_splat(0.0), v182 = softehl_splat(0.0);
+            const M m183 = ~v64 & m176;
+            if (softehl_any(m183)) {
+                const V v184 = -v80, v185 = -v82, v186 = v69 - v84, v187 = v71 - v86;
+                v177 = softehl_blend(m183, v78, v177); v178 = softehl_blend(m183, v79, v178);
+                v179 = softehl_blend(m183, v184, v179); v180 = softehl_blend(m183, v185, v180);
+                v181 = softehl_blend(m183, v186, v181); v182 = softehl_blend(m183, v187, v182);
+            }
+            v169 = softehl_blend(m176, v65, v169); v170 = softehl_blend(m176, v177, v170);
+            v171 = softehl_blend(m176, v178, v171); v172 = softehl_blend(m176, v179, v172);
+            v173 = softehl_blend(m176, v180, v173); v174 = softehl_blend(m176, v181, v174);
+            v175 = softehl_blend(m176, v182, v175);
+        }
+        v160 = softehl_blend(m167, v169, v160); v161 = softehl_blend(m167, v172, v161);
+        v162 = softehl_blend(m167, v173, v162); v163 = softehl_blend(m167, v174, v163);
+        v164 = softehl_blend(m167, v175, v164); v165 = softehl_blend(m167, v170, v165);
+        v166 = softehl_blend(m167, v171, v166);
     }
-    const M m87 = ~v66;
-    if (softehl_any(m87)) {
-        const V v88 = (-1.0) - v65;
-        const V v89 = v88 * v88;
-        const V v90 = v88 * v89;
-        v83 = softehl_blend(m87, v90, v83);
+    const M m188 = ~v66;
+    if (softehl_any(m188)) {
+        const V v189 = (-1.0) - v65, v190 = v189 * (v189 * v189);
+        V v191 = softehl_splat(0.0), v192 = softehl_splat(0.0), v193 = softehl_splat(0.0),
+            v194 = softehl_splat(0.0), v195 = softehl_splat(0.0), v196 = softehl_splat(0.0);
+        const M m197 = ~v64 & m188;
+        if (softehl_any(m197)) {
+            const V v198 = (-1.0) - v63, v199 = v198 * (3.0 * v198), v200 = (v84 - v69) * v199,
+                v201 = (v86 - v71) * v199, v202 = v80 * v199, v203 = v82 * v199,
+                v204 = -(v78 * v199), v205 = -(v79 * v199);
+            v191 = softehl_blend(m197, v202, v191); v192 = softehl_blend(m197, v203, v192);
+            v193 = softehl_blend(m197, v200, v193); v194 = softehl_blend(m197, v201, v194);
+            v195 = softehl_blend(m197, v204, v195); v196 = softehl_blend(m197, v205, v196);
+        }
+        v160 = softehl_blend(m188, v190, v160); v161 = softehl_blend(m188, v191, v161);
+        v162 = softehl_blend(m188, v192, v162); v163 = softehl_blend(m188, v193, v163);
+        v164 = softehl_blend(m188, v194, v164); v165 = softehl_blend(m188, v195, v165);
+        v166 = softehl_blend(m188, v196, v166);
     }
-    const V v91 = 4.0 * v74;
-    const V v92 = v83 - v75;
-    const M v93 = softehl_eq(v92, v92);
-    V v94 = softehl_splat(0.0);
-    const M m95 = v93;
-    if (softehl_any(m95)) {
-        const M v96 = softehl_lt(softehl_splat(0.0), v92);
-        const V v97 = softehl_blend(v96, v92, softehl_splat(0.0));
-        v94 = softehl_blend(m95, v97, v94);
+    const V v206 = v110 * v110, v207 = 2.0 * v110, v208 = v160 - v114, v209 = 0.01 * v206,
+        v210 = 4.0 * v111, v211 = 4.0 * v90 * v111, v212 = 4.0 * v91 * v111;
+    const M v213 = softehl_eq(v208, v208);
+    const V v214 = v96 * v207, v215 = v97 * v207, v216 = -v211, v217 = -v212,
+        v218 = v112 + v43 * v105, v219 = v113 + v47 * v105, v220 = v47 * v104 - v113,
+        v221 = v43 * v104 - v112, v222 = v108 + v25 * v107, v223 = v109 + v27 * v107,
+        v224 = v25 * v106 - v108, v225 = v27 * v106 - v109;
+    V v226 = softehl_splat(0.0), v227 = softehl_splat(0.0), v228 = softehl_splat(0.0),
+        v229 = softehl_splat(0.0), v230 = softehl_splat(0.0), v231 = softehl_splat(0.0),
+        v232 = softehl_splat(0.0), v233 = softehl_splat(0.0), v234 = softehl_splat(0.0);
+    const M m235 = v213;
+    if (softehl_any(m235)) {
+        const M v236 = softehl_lt(softehl_splat(0.0), v208);
+        V v237 = softehl_splat(0.0), v238 = softehl_splat(0.0), v239 = softehl_splat(0.0),
+            v240 = softehl_splat(0.0), v241 = softehl_splat(0.0), v242 = softehl_splat(0.0),
+            v243 = softehl_splat(0.0), v244 = softehl_splat(0.0), v245 = softehl_splat(0.0);
+        const M m246 = v236 & m235;
+        if (softehl_any(m246)) {
+            const V v247 = -v119, v248 = v161 - v115, v249 = -v120, v250 = v162 - v116,
+                v251 = v163 - v117, v252 = v164 - v118;
+            v237 = softehl_blend(m246, v208, v237); v238 = softehl_blend(m246, v248, v238);
+            v239 = softehl_blend(m246, v250, v239); v240 = softehl_blend(m246, v251, v240);
+            v241 = softehl_blend(m246, v252, v241); v242 = softehl_blend(m246, v165, v242);
+            v243 = softehl_blend(m246, v166, v243); v244 = softehl_blend(m246, v247, v244);
+            v245 = softehl_blend(m246, v249, v245);
+        }
+        v226 = softehl_blend(m235, v237, v226); v227 = softehl_blend(m235, v238, v227);
+        v228 = softehl_blend(m235, v239, v228); v229 = softehl_blend(m235, v240, v229);
+        v230 = softehl_blend(m235, v241, v230); v231 = softehl_blend(m235, v242, v231);
+        v232 = softehl_blend(m235, v243, v232); v233 = softehl_blend(m235, v244, v233);
+        v234 = softehl_blend(m235, v245, v234);
     }
-    const M m98 = ~v93;
-    if (softehl_any(m98)) {
-        const V v99 = v75 - v83;
-        const V v100 = v99 * v99;
-        const V v101 = v99 * v100;
-        v94 = softehl_blend(m98, v101, v94);
+    const M m253 = ~v213;
+    if (softehl_any(m253)) {
+        const V v254 = v114 - v160, v255 = v254 * v254, v256 = v254 * v255, v257 = 3.0 * v255,
+            v258 = (v115 - v161) * v257, v259 = (v116 - v162) * v257, v260 = (v117 - v163) * v257,
+            v261 = (v118 - v164) * v257, v262 = -(v165 * v257), v263 = -(v166 * v257),
+            v264 = v119 * v257, v265 = v120 * v257;
+        v226 = softehl_blend(m253, v256, v226); v227 = softehl_blend(m253, v258, v227);
+        v228 = softehl_blend(m253, v259, v228); v229 = softehl_blend(m253, v260, v229);
+        v230 = softehl_blend(m253, v261, v230); v231 = softehl_blend(m253, v262, v231);
+        v232 = softehl_blend(m253, v263, v232); v233 = softehl_blend(m253, v264, v233);
+        v234 = softehl_blend(m253, v265, v234);
     }
-    const V v102 = 0.5 * v94;
-    const V v103 = v29 * v70;
-    const V v104 = v67 * v102;
-    const V v105 = v75 + v83;
-    const V v106 = 0.5 * v105;
-    const V v107 = v32 * v71;
-    const V v108 = v103 + v107;
-    const V v109 = 0.5 * v108;
-    const V v110 = v109 * v109;
-    const V v111 = 0.01 * v110;
-    V s112 = softehl_splat(0.0);
-    V s113 = softehl_splat(0.0);
-    V s114 = softehl_splat(0.0);
-    V s115 = softehl_splat(0.0);
-    V s116 = softehl_splat(0.0);
-    V s117 = softehl_splat(0.0);
-    V s118 = softehl_splat(0.0);
-    V s119 = softehl_splat(0.0);
-    V s120 = softehl_splat(0.0);
-    V s121 = softehl_splat(0.0);
-    V s122 = softehl_splat(0.0);
-    V s123 = softehl_splat(0.0);
-    V s124 = softehl_splat(0.0);
-    V s125 = softehl_splat(0.0);
+    const V v266 = 0.5 * v226, v267 = 0.5 * v227, v268 = 0.5 * v228, v269 = 0.5 * v229,
+        v270 = v24 * v266, v271 = v24 * v267, v272 = v24 * v268, v273 = v24 * v269,
+        v274 = 0.5 * (v114 + v160), v275 = 0.5 * v230, v276 = 0.5 * (v161 + v115),
+        v277 = 0.5 * v231, v278 = 0.5 * (v162 + v116), v279 = v24 * v275, v280 = v24 * v277,
+        v281 = 0.5 * v232, v282 = 0.5 * v233, v283 = 0.5 * v234, v284 = 0.5 * (v163 + v117),
+        v285 = v24 * v281, v286 = v24 * v282, v287 = v24 * v283, v288 = 0.5 * (v164 + v118),
+        v289 = 0.5 * v165, v290 = 0.5 * v166, v291 = 0.5 * v119, v292 = 0.5 * v120,
+        v293 = v270 * (6.283185307179586 * (a14 * v17)),
+        v294 = 0.5 * ((v11 - v4) * v90 + (v14 - v13) * v91);
+    V s295 = {0}, s296 = {0}, s297 = {0}, s298 = {0}, s299 = {0}, s300 = {0}, s301 = {0},
+        s302 = {0}, s303 = {0}, s304 = {0}, s305 = {0}, s306 = {0}, s307 = {0}, s308 = {0},
+        s309 = {0}, s310 = {0}, s311 = {0}, s312 = {0}, s313 = {0}, s314 = {0}, s315 = {0},
+        s316 = {0}, s317 = {0}, s318 = {0}, s319 = {0}, s320 = {0}, s321 = {0}, s322 = {0},
+        s323 = {0}, s324 = {0}, s325 = {0}, s326 = {0}, s327 = {0}, s328 = {0}, s329 = {0},
+        s330 = {0}, s331 = {0}, s332 = {0}, s333 = {0}, s334 = {0}, s335 = {0}, s336 = {0},
+        s337 = {0}, s338 = {0}, s339 = {0}, s340 = {0}, s341 = {0}, s342 = {0}, s343 = {0},
+        s344 = {0}, s345 = {0}, s346 = {0}, s347 = {0}, s348 = {0}, s349 = {0}, s350 = {0},
+        s351 = {0}, s352 = {0}, s353 = {0}, s354 = {0}, s355 = {0}, s356 = {0}, s357 = {0},
+        s358 = {0}, s359 = {0}, s360 = {0}, s361 = {0}, s362 = {0}, s363 = {0}, s364 = {0},
+        s365 = {0}, s366 = {0}, s367 = {0}, s368 = {0}, s369 = {0}, s370 = {0}, s371 = {0},
+        s372 = {0}, s373 = {0}, s374 = {0}, s375 = {0}, s376 = {0}, s377 = {0}, s378 = {0},
+        s379 = {0}, s380 = {0}, s381 = {0}, s382 = {0}, s383 = {0}, s384 = {0}, s385 = {0},
+        s386 = {0}, s387 = {0}, s388 = {0}, s389 = {0}, s390 = {0}, s391 = {0}, s392 = {0},
+        s393 = {0}, s394 = {0}, s395 = {0}, s396 = {0}, s397 = {0}, s398 = {0}, s399 = {0},
+        s400 = {0}, s401 = {0}, s402 = {0}, s403 = {0}, s404 = {0}, s405 = {0}, s406 = {0},
+        s407 = {0}, s408 = {0}, s409 = {0}, s410 = {0}, s411 = {0}, s412 = {0}, s413 = {0},
+        s414 = {0}, s415 = {0}, s416 = {0}, s417 = {0}, s418 = {0}, s419 = {0}, s420 = {0},
+        s421 = {0}, s422 = {0}, s423 = {0}, s424 = {0}, s425 = {0}, s426 = {0}, s427 = {0},
+        s428 = {0}, s429 = {0}, s430 = {0}, s431 = {0}, s432 = {0}, s433 = {0}, s434 = {0},
+        s435 = {0}, s436 = {0}, s437 = {0}, s438 = {0}, s439 = {0}, s440 = {0}, s441 = {0},
+        s442 = {0}, s443 = {0}, s444 = {0}, s445 = {0}, s446 = {0}, s447 = {0}, s448 = {0},
+        s449 = {0}, s450 = {0}, s451 = {0}, s452 = {0}, s453 = {0}, s454 = {0}, s455 = {0},
+        s456 = {0}, s457 = {0}, s458 = {0}, s459 = {0}, s460 = {0}, s461 = {0}, s462 = {0},
+        s463 = {0}, s464 = {0}, s465 = {0}, s466 = {0}, s467 = {0}, s468 = {0}, s469 = {0},
+        s470 = {0}, s471 = {0}, s472 = {0}, s473 = {0}, s474 = {0}, s475 = {0}, s476 = {0},
+        s477 = {0}, s478 = {0}, s479 = {0}, s480 = {0}, s481 = {0}, s482 = {0}, s483 = {0},
+        s484 = {0}, s485 = {0}, s486 = {0}, s487 = {0}, s488 = {0}, s489 = {0}, s490 = {0},
+        s491 = {0}, s492 = {0}, s493 = {0}, s494 = {0}, s495 = {0}, s496 = {0}, s497 = {0},
+        s498 = {0}, s499 = {0}, s500 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const V v126 = w[0] * v102;
-        const V v127 = v126 + v106;
-        const V v128 = 0.5 * v127;
-        const V v129 = 0.5 - v128;
-        const V v130 = 0.5 + v128;
-        const V v131 = v1 * v129;
-        const V v132 = v10 * v129;
-        const V v133 = v2 * v130;
-        const V v134 = v131 + v133;
-        const V v135 = v12 * v130;
-        const V v136 = v132 + v135;
-        const V v137 = v16 - v134;
-        const V v138 = v23 - v136;
-        const V v139 = v70 * v137;
-        const V v140 = v71 * v138;
-        const V v141 = v139 + v140;
-        const V v142 = v91 * v141;
-        const V v143 = v110 - v142;
-        const M v144 = softehl_eq(v143, v143);
-        V v145 = softehl_splat(0.0);
-        const M m146 = v144;
-        if (softehl_any(m146)) {
-            const M v147 = softehl_lt(v111, v143);
-            const V v148 = softehl_blend(v147, v143, v111);
-            v145 = softehl_blend(m146, v148, v145);
+        const double *restrict w = rule + 2 * q; (void)w;
+        const V v501 = 0.5 * (w[0] * v266 + v274), v502 = 0.5 - v501, v503 = 0.5 + v501,
+            v504 = v12 * v502 + v1 * v503, v505 = v18 * v502 + v10 * v503, v506 = v5 - v504,
+            v507 = v23 - v505, v508 = v90 * v506 + v91 * v507, v509 = 4.0 * v508,
+            v510 = v206 - v111 * v509;
+        const M v511 = softehl_eq(v510, v510);
+        const V v512 = v210 * v506, v513 = v210 * v507;
+        V v514 = softehl_splat(0.0), v515 = softehl_splat(0.0), v516 = softehl_splat(0.0),
+            v517 = softehl_splat(0.0), v518 = softehl_splat(0.0), v519 = softehl_splat(0.0),
+            v520 = softehl_splat(0.0), v521 = softehl_splat(0.0), v522 = softehl_splat(0.0),
+            v523 = softehl_splat(0.0);
+        const M m524 = v511;
+        if (softehl_any(m524)) {
+            const M v525 = softehl_lt(v209, v510);
+            V v526 = v209, v527 = softehl_splat(0.0), v528 = softehl_splat(0.0),
+                v529 = softehl_splat(0.0), v530 = softehl_splat(0.0), v531 = softehl_splat(0.0),
+                v532 = softehl_splat(0.0), v533 = softehl_splat(0.0), v534 = softehl_splat(1.0),
+                v535 = softehl_splat(0.0);
+            const M m536 = v525 & m524;
+            if (softehl_any(m536)) {
+                const V v537 = -v512, v538 = -v513, v539 = -v509;
+                v526 = softehl_blend(m536, v510, v526); v527 = softehl_blend(m536, v539, v527);
+                v528 = softehl_blend(m536, v216, v528); v529 = softehl_blend(m536, v217, v529);
+                v530 = softehl_blend(m536, v212, v530); v531 = softehl_blend(m536, v211, v531);
+                v532 = softehl_blend(m536, v537, v532); v533 = softehl_blend(m536, v538, v533);
+                v534 = softehl_blend(m536, softehl_splat(0.0), v534);
+                v535 = softehl_blend(m536, softehl_splat(1.0), v535);
+            }
+            v514 = softehl_blend(m524, v526, v514); v515 = softehl_blend(m524, v527, v515);
+            v516 = softehl_blend(m524, v528, v516); v517 = softehl_blend(m524, v529, v517);
+            v518 = softehl_blend(m524, v530, v518); v519 = softehl_blend(m524, v531, v519);
+            v520 = softehl_blend(m524, v532, v520); v521 = softehl_blend(m524, v533, v521);
+            v522 = softehl_blend(m524, v534, v522); v523 = softehl_blend(m524, v535, v523);
         }
-        const M m149 = ~v144;
-        if (softehl_any(m149)) {
-            const V v150 = v111 - v143;
-            const V v151 = v150 * v150;
-            const V v152 = v150 * v151;
-            v145 = softehl_blend(m149, v152, v145);
+        const M m540 = ~v511;
+        if (softehl_any(m540)) {
+            const V v541 = v209 - v510, v542 = v541 * v541, v543 = v541 * v542, v544 = 3.0 * v542,
+                v545 = -v544, v546 = v509 * v544, v547 = v211 * v544, v548 = -v547,
+                v549 = v212 * v544, v550 = -v549, v551 = v512 * v544, v552 = v513 * v544;
+            v514 = softehl_blend(m540, v543, v514); v515 = softehl_blend(m540, v546, v515);
+            v516 = softehl_blend(m540, v547, v516); v517 = softehl_blend(m540, v549, v517);
+            v518 = softehl_blend(m540, v550, v518); v519 = softehl_blend(m540, v548, v519);
+            v520 = softehl_blend(m540, v551, v520); v521 = softehl_blend(m540, v552, v521);
+            v522 = softehl_blend(m540, v544, v522); v523 = softehl_blend(m540, v545, v523);
         }
-        const V v153 = 2.0 * v141;
-        const V v154 = softehl_vsqrt(v145);
-        const V v155 = d10 * v129;
-        const V v156 = d12 * v130;
-        const V v157 = v155 + v156;
-        const V v158 = v109 - v154;
-        const V v159 = 1.0 / v158;
-        const V v160 = v153 * v159;
-        const V v161 = (-1.0) - v160;
-        const V v162 = 1.0 - v160;
-        const V v163 = v160 * v160;
-        const V v164 = 1.0 - v163;
-        const V v165 = 0.5 * v160;
-        const V v166 = v165 * v161;
-        const V v167 = v165 * v162;
-        const V v168 = v16 * v164;
-        const V v169 = v23 * v164;
-        const V v170 = v168 - v134;
-        const V v171 = v169 - v136;
-        const V v172 = v3 * v166;
-        const V v173 = v170 - v172;
-        const V v174 = v26 * v166;
-        const V v175 = v171 - v174;
-        const V v176 = v7 * v167;
-        const V v177 = v173 - v176;
-        const V v178 = v28 * v167;
-        const V v179 = v175 - v178;
-        const V v180 = v71 * v177;
-        const V v181 = v70 * v179;
-        const V v182 = v180 - v181;
-        const V v183 = a10 * v182;
-        const V v184 = v157 - v183;
-        const M v185 = softehl_eq(v184, v184);
-        V v186 = softehl_splat(0.0);
-        V v187 = softehl_splat(0.0);
-        const M m188 = v185;
-        if (softehl_any(m188)) {
-            const M v189 = softehl_le(softehl_splat(0.0), v184);
-            V v190 = softehl_splat(0.0);
-            V v191 = softehl_splat(0.0);
-            const M m192 = v189 & m188;
-            if (softehl_any(m192)) {
-                const V v193 = a12 + v182;
-                const V v194 = v182 - a13;
-                const V v195 = v193 * v194;
-                const M v196 = softehl_eq(v195, v195);
-                V v197 = softehl_splat(0.0);
-                const M m198 = v196 & m192;
-                if (softehl_any(m198)) {
-                    const M v199 = softehl_lt(v195, softehl_splat(0.0));
-                    const V v200 = softehl_blend(v199, v184, softehl_splat(0.0));
-                    v197 = softehl_blend(m198, v200, v197);
+        const V v553 = 2.0 * v508, v554 = w[0] * v281 + v290, v555 = w[0] * v282 + v291,
+            v556 = w[0] * v267 + v276, v557 = w[0] * v283 + v292, v558 = w[0] * v268 + v278,
+            v559 = w[0] * v269 + v284, v560 = w[0] * v275 + v288, v561 = v501 - 0.5,
+            v562 = w[0] * v277 + v289, v563 = v46 * v554, v564 = v29 * v554, v565 = v29 * v556,
+            v566 = v46 * v558, v567 = v29 * v559, v568 = v46 * v560, v569 = v46 * v562,
+            v570 = v29 * v562, v571 = v46 * v557, v572 = v29 * v557, v573 = v46 * v555,
+            v574 = v29 * v555, v575 = v46 * v556 + v502, v576 = v29 * v558 + v502,
+            v577 = w[1] * v502, v578 = v34 * v502, v579 = v34 * v503,
+            v580 = d10 * v502 + d12 * v503, v581 = w[1] * v503, v582 = v46 * v559 + v503,
+            v583 = v29 * v560 + v503, v584 = softehl_vsqrt(v514),
+            v585 = 1.0 + a14 * ((-1.0) + 6.283185307179586 * (X1 * v502 + X3 * v503)),
+            v586 = v270 * v585, v587 = softehl_vsqrt(1.0 / v514), v588 = 0.5 * v587,
+            v589 = v91 * v586, v590 = v90 * v586, v591 = v578 * v586, v592 = v579 * v586,
+            v593 = 1.0 / (v110 - v584), v594 = v553 * v593, v595 = 0.5 * v594, v596 = 2.0 * v594,
+            v597 = v593 * v593, v598 = v553 * v597, v599 = v553 * v588 * v597,
+            v600 = v588 * (v553 * v523) * v597 + 0.01 * (v588 * (v553 * v522) * v597),
+            v601 = v94 * v593, v602 = v95 * v593, v603 = v588 * (v553 * v515) * v597,
+            v604 = 2.0 * v506 * v593 + v520 * v599, v605 = 2.0 * v507 * v593 + v521 * v599,
+            v606 = v601 - v588 * (v553 * v519) * v597, v607 = v602 - v588 * (v553 * v518) * v597,
+            v608 = v598 - v207 * v600, v609 = v214 * v600 - v96 * v598, v610 = v96 * v603,
+            v611 = v215 * v600 - v97 * v598, v612 = v97 * v603,
+            v613 = v609 + (v569 * v606 + v570 * v607 - v610),
+            v614 = v573 * v606 + v574 * v607 - v610 - v609,
+            v615 = v563 * v606 + (v611 + (v564 * v607 - v612)),
+            v616 = v571 * v606 + (v572 * v607 - v612 - v611),
+            v617 = v90 * v603 - v601 - v588 * (v553 * v516) * v597,
+            v618 = v91 * v603 - v602 - v588 * (v553 * v517) * v597, v619 = (-1.0) - v594,
+            v620 = 0.5 * (v619 - v594), v621 = v595 * v619, v622 = 1.0 - v594, v623 = v595 * v622,
+            v624 = 1.0 - v594 * v594, v625 = 0.5 * (v622 - v594), v626 = w[1] * v624,
+            v627 = w[1] * v623, v628 = w[1] * v621, v629 = v100 * v605, v630 = v103 * v604,
+            v631 = v583 * v607 + (v568 * v606 + (v224 * v608 - v225 * v603)) - v106 * v605,
+            v632 = v630 + v631, v633 = v5 * v624 - v504 - v2 * v621 - v3 * v623, v634 = v100 * v633,
+            v635 = v23 * v624 - v505 - v16 * v621 - v21 * v623, v636 = v103 * v635,
+            v637 = v222 * v608 + (v576 * v607 + (v566 * v606 - v223 * v603)) - v630 - v107 * v605,
+            v638 = v91 * (v3 * v625 + (v5 * v596 + v2 * v620)) - v90 * (v21 * v625 + (v23 * v596 + v16 * v620)),
+            v639 = v91 * v633 - v90 * v635,
+            v640 = v636 + (v106 * v633 + (v90 * v583 - v91 * v568)) + v638 * v632,
+            v641 = a10 * v639, v642 = v107 * v633 + (v90 * v576 - v91 * v566) - v636 + v638 * v637,
+            v643 = v90 * (v564 + v621) - v91 * v563 + v638 * v615,
+            v644 = v90 * (v572 + v623) - v91 * v571 + v638 * v616, v645 = v618 * v638 - v90 * v624,
+            v646 = v91 * v624 + v617 * v638, v647 = v90 * v570 - v91 * (v569 + v621) + v638 * v613,
+            v648 = v580 - v641, v649 = v638 * v614 + (v90 * v574 - v91 * (v573 + v623));
+        const M v650 = softehl_eq(v648, v648);
+        const V v651 = v629 + (v221 * v608 + (v567 * v607 + (v582 * v606 - v220 * v603))),
+            v652 = v218 * v608 + (v565 * v607 + (v575 * v606 - v219 * v603)) - v629 - v105 * v604,
+            v653 = v651 - v104 * v604,
+            v654 = v634 + (v90 * v565 - v91 * v575) - v105 * v635 + v638 * v652,
+            v655 = v90 * v567 - v91 * v582 - v634 - v104 * v635 + v638 * v653;
+        V v656 = softehl_splat(0.0), v657 = softehl_splat(0.0), v658 = softehl_splat(0.0),
+            v659 = softehl_splat(0.0), v660 = softehl_splat(0.0), v661 = softehl_splat(0.0),
+            v662 = softehl_splat(0.0), v663 = softehl_splat(0.0), v664 = softehl_splat(0.0),
+            v665 = softehl_splat(0.0), v666 = softehl_splat(0.0), v667 = softehl_splat(0.0),
+            v668 = softehl_splat(0.0), v669 = softehl_splat(0.0), v670 = softehl_splat(0.0),
+            v671 = softehl_splat(0.0), v672 = softehl_splat(0.0), v673 = softehl_splat(0.0),
+            v674 = softehl_splat(0.0), v675 = softehl_splat(0.0), v676 = softehl_splat(0.0),
+            v677 = softehl_splat(0.0), v678 = softehl_splat(0.0), v679 = softehl_splat(0.0),
+            v680 = softehl_splat(0.0), v681 = softehl_splat(0.0), v682 = softehl_splat(0.0),
+            v683 = softehl_splat(0.0), v684 = softehl_splat(0.0), v685 = softehl_splat(0.0),
+            v686 = softehl_splat(0.0), v687 = softehl_splat(0.0), v688 = softehl_splat(0.0),
+            v689 = softehl_splat(0.0), v690 = softehl_splat(0.0), v691 = softehl_splat(0.0),
+            v692 = softehl_splat(0.0), v693 = softehl_splat(0.0), v694 = softehl_splat(0.0),
+            v695 = softehl_splat(0.0), v696 = softehl_splat(0.0), v697 = softehl_splat(0.0),
+            v698 = softehl_splat(0.0), v699 = softehl_splat(0.0), v700 = softehl_splat(0.0),
+            v701 = softehl_splat(0.0), v702 = softehl_splat(0.0), v703 = softehl_splat(0.0),
+            v704 = softehl_splat(0.0), v705 = softehl_splat(0.0), v706 = softehl_splat(0.0),
+            v707 = softehl_splat(0.0), v708 = softehl_splat(0.0), v709 = softehl_splat(0.0),
+            v710 = softehl_splat(0.0);
+        const M m711 = v650;
+        if (softehl_any(m711)) {
+            const M v712 = softehl_le(softehl_splat(0.0), v648);
+            V v713 = softehl_splat(0.0), v714 = softehl_splat(0.0), v715 = softehl_splat(0.0),
+                v716 = softehl_splat(0.0), v717 = softehl_splat(0.0), v718 = softehl_splat(0.0),
+                v719 = softehl_splat(0.0), v720 = softehl_splat(0.0), v721 = softehl_splat(0.0),
+                v722 = softehl_splat(0.0), v723 = softehl_splat(0.0), v724 = softehl_splat(0.0),
+                v725 = softehl_splat(0.0), v726 = softehl_splat(0.0), v727 = softehl_splat(0.0),
+                v728 = softehl_splat(0.0), v729 = softehl_splat(0.0), v730 = softehl_splat(0.0),
+                v731 = softehl_splat(0.0), v732 = softehl_splat(0.0), v733 = softehl_splat(0.0),
+                v734 = softehl_splat(0.0), v735 = softehl_splat(0.0), v736 = softehl_splat(0.0),
+                v737 = softehl_splat(0.0), v738 = softehl_splat(0.0), v739 = softehl_splat(0.0),
+                v740 = softehl_splat(0.0), v741 = softehl_splat(0.0), v742 = softehl_splat(0.0),
+                v743 = softehl_splat(0.0), v744 = softehl_splat(0.0), v745 = softehl_splat(0.0),
+                v746 = softehl_splat(0.0), v747 = softehl_splat(0.0), v748 = softehl_splat(0.0),
+                v749 = softehl_splat(0.0), v750 = softehl_splat(0.0), v751 = softehl_splat(0.0),
+                v752 = softehl_splat(0.0), v753 = softehl_splat(0.0), v754 = softehl_splat(0.0),
+                v755 = softehl_splat(0.0);
+            const M m756 = v712 & m711;
+            if (softehl_any(m756)) {
+                const V v757 = a12 + v639, v758 = v639 - a13, v759 = v757 * v758;
+                const M v760 = softehl_eq(v759, v759);
+                V v761 = softehl_splat(0.0), v762 = softehl_splat(0.0), v763 = softehl_splat(0.0),
+                    v764 = softehl_splat(0.0), v765 = softehl_splat(0.0);
+                const M m766 = v760 & m756;
+                if (softehl_any(m766)) {
+                    const M v767 = softehl_lt(v759, softehl_splat(0.0));
+                    const V v768 = softehl_blend(v767, v648, softehl_splat(0.0)),
+                        v769 = softehl_blend(v767, v502, softehl_splat(0.0)),
+                        v770 = softehl_blend(v767, v503, softehl_splat(0.0)),
+                        v771 = softehl_blend(v767, v35, softehl_splat(0.0)),
+                        v772 = softehl_blend(v767, v33, softehl_splat(0.0));
+                    v761 = softehl_blend(m766, v768, v761); v762 = softehl_blend(m766, v769, v762);
+                    v763 = softehl_blend(m766, v770, v763); v764 = softehl_blend(m766, v771, v764);
+                    v765 = softehl_blend(m766, v772, v765);
                 }
-                const M m201 = ~v196 & m192;
-                if (softehl_any(m201)) {
-                    const V v202 = v195 * v195;
-                    const V v203 = v195 * v202;
-                    v197 = softehl_blend(m201, v203, v197);
+                const M m773 = ~v760 & m756;
+                if (softehl_any(m773)) {
+                    const V v774 = v759 * v759, v775 = v759 * v774,
+                        v776 = 3.0 * v774 * (v757 + v758);
+                    v761 = softehl_blend(m773, v775, v761);
+                    v762 = softehl_blend(m773, softehl_splat(0.0), v762);
+                    v763 = softehl_blend(m773, softehl_splat(0.0), v763);
+                    v764 = softehl_blend(m773, v776, v764);
+                    v765 = softehl_blend(m773, softehl_splat(0.0), v765);
                 }
-                const V v204 = a11 * v197;
-                const V v205 = d11 * v129;
-                const M v206 = softehl_eq(v204, v204);
-                const V v207 = v20 * v164;
-                const V v208 = v24 * v164;
-                const V v209 = v5 * v129;
-                const V v210 = v207 - v209;
-                const V v211 = v13 * v129;
-                const V v212 = v208 - v211;
-                const V v213 = d13 * v130;
-                const V v214 = v205 + v213;
-                const V v215 = v6 * v130;
-                const V v216 = v210 - v215;
-                const V v217 = v17 * v130;
-                const V v218 = v212 - v217;
-                const V v219 = v8 * v166;
-                const V v220 = v216 - v219;
-                const V v221 = v25 * v166;
-                const V v222 = v218 - v221;
-                const V v223 = v11 * v167;
-                const V v224 = v220 - v223;
-                const V v225 = v27 * v167;
-                const V v226 = v222 - v225;
-                const V v227 = v70 * v224;
-                const V v228 = v71 * v226;
-                const V v229 = v227 + v228;
-                const V v230 = a10 * v229;
-                const V v231 = v214 + v230;
-                const M v232 = softehl_eq(v231, v231);
-                const M v233 = v206 & v232;
-                V v234 = softehl_splat(0.0);
-                const M m235 = v233 & m192;
-                if (softehl_any(m235)) {
-                    const M v236 = softehl_lt(v204, v231);
-                    V v237 = v204;
-                    const M m238 = ~v236 & m235;
-                    if (softehl_any(m238)) {
-                        V v239 = softehl_splat(0.0);
-                        const M m240 = v206 & m238;
-                        if (softehl_any(m240)) {
-                            const V v241 = -v231;
-                            const M v242 = softehl_lt(v204, v241);
-                            V v243 = v231;
-                            const M m244 = v242 & m240;
-                            if (softehl_any(m244)) {
-                                const V v245 = -v204;
-                                v243 = softehl_blend(m244, v245, v243);
+                const V v777 = a11 * v761; const M v778 = softehl_eq(v777, v777);
+                const V v779 = v8 * v624 - v11 * v502 - v4 * v503 - v6 * v621 - v7 * v623,
+                    v780 = v22 * v624 - v14 * v502 - v13 * v503 - v15 * v621 - v20 * v623,
+                    v781 = a10 * (v90 * v779 + v91 * v780) + (d11 * v502 + d13 * v503);
+                const M v782 = softehl_eq(v781, v781), v783 = v778 & v782;
+                V v784 = softehl_splat(0.0), v785 = softehl_splat(0.0), v786 = softehl_splat(0.0),
+                    v787 = softehl_splat(0.0), v788 = softehl_splat(0.0), v789 = softehl_splat(0.0);
+                const M m790 = v783 & m756;
+                if (softehl_any(m790)) {
+                    const M v791 = softehl_lt(v777, v781);
+                    V v792 = v777, v793 = softehl_splat(0.0), v794 = softehl_splat(0.0), v795 = a11,
+                        v796 = softehl_splat(0.0), v797 = softehl_splat(0.0);
+                    const M m798 = ~v791 & m790;
+                    if (softehl_any(m798)) {
+                        V v799 = softehl_splat(0.0), v800 = softehl_splat(0.0),
+                            v801 = softehl_splat(0.0), v802 = softehl_splat(0.0),
+                            v803 = softehl_splat(0.0), v804 = softehl_splat(0.0);
+                        const M m805 = v778 & m798;
+                        if (softehl_any(m805)) {
+                            const M v806 = softehl_lt(v777, -v781);
+                            V v807 = v781, v808 = v502, v809 = v503, v810 = softehl_splat(0.0),
+                                v811 = a10, v812 = v42;
+                            const M m813 = v806 & m805;
+                            if (softehl_any(m813)) {
+                                const V v814 = -v777; v807 = softehl_blend(m813, v814, v807);
+                                v808 = softehl_blend(m813, softehl_splat(0.0), v808);
+                                v809 = softehl_blend(m813, softehl_splat(0.0), v809);
+                                v810 = softehl_blend(m813, v19, v810);
+                                v811 = softehl_blend(m813, softehl_splat(0.0), v811);
+                                v812 = softehl_blend(m813, softehl_splat(0.0), v812);
                             }
-                            v239 = softehl_blend(m240, v243, v239);
+                            v799 = softehl_blend(m805, v807, v799);
+                            v800 = softehl_blend(m805, v808, v800);
+                            v801 = softehl_blend(m805, v809, v801);
+                            v802 = softehl_blend(m805, v810, v802);
+                            v803 = softehl_blend(m805, v811, v803);
+                            v804 = softehl_blend(m805, v812, v804);
                         }
-                        const M m246 = ~v206 & m238;
-                        if (softehl_any(m246)) {
-                            const V v247 = v231 + v204;
-                            const V v248 = v247 * v247;
-                            const V v249 = v247 * v248;
-                            v239 = softehl_blend(m246, v249, v239);
+                        const M m815 = ~v778 & m798;
+                        if (softehl_any(m815)) {
+                            const V v816 = v781 + v777, v817 = v816 * v816, v818 = v816 * v817,
+                                v819 = 3.0 * v817, v820 = v42 * v819, v821 = a11 * v819,
+                                v822 = a10 * v819, v823 = v502 * v819, v824 = v503 * v819;
+                            v799 = softehl_blend(m815, v818, v799);
+                            v800 = softehl_blend(m815, v823, v800);
+                            v801 = softehl_blend(m815, v824, v801);
+                            v802 = softehl_blend(m815, v821, v802);
+                            v803 = softehl_blend(m815, v822, v803);
+                            v804 = softehl_blend(m815, v820, v804);
                         }
-                        v237 = softehl_blend(m238, v239, v237);
+                        v792 = softehl_blend(m798, v799, v792);
+                        v793 = softehl_blend(m798, v800, v793);
+                        v794 = softehl_blend(m798, v801, v794);
+                        v795 = softehl_blend(m798, v802, v795);
+                        v796 = softehl_blend(m798, v803, v796);
+                        v797 = softehl_blend(m798, v804, v797);
                     }
-                    v234 = softehl_blend(m235, v237, v234);
+                    v784 = softehl_blend(m790, v792, v784); v785 = softehl_blend(m790, v793, v785);
+                    v786 = softehl_blend(m790, v794, v786); v787 = softehl_blend(m790, v795, v787);
+                    v788 = softehl_blend(m790, v796, v788); v789 = softehl_blend(m790, v797, v789);
                 }
-                const M m250 = ~v233 & m192;
-                if (softehl_any(m250)) {
-                    const V v251 = v204 - v231;
-                    const V v252 = v251 * v251;
-                    const V v253 = v251 * v252;
-                    v234 = softehl_blend(m250, v253, v234);
+                const M m825 = ~v783 & m756;
+                if (softehl_any(m825)) {
+                    const V v826 = v777 - v781, v827 = v826 * v826, v828 = v826 * v827,
+                        v829 = 3.0 * v827, v830 = v41 * v829, v831 = a11 * v829,
+                        v832 = -(a10 * v829), v833 = v561 * v829, v834 = -(v503 * v829);
+                    v784 = softehl_blend(m825, v828, v784); v785 = softehl_blend(m825, v833, v785);
+                    v786 = softehl_blend(m825, v834, v786); v787 = softehl_blend(m825, v831, v787);
+                    v788 = softehl_blend(m825, v832, v788); v789 = softehl_blend(m825, v830, v789);
                 }
-                v190 = softehl_blend(m192, v197, v190);
-                v191 = softehl_blend(m192, v234, v191);
+                const V v835 = v100 * v780, v836 = v103 * v779, v837 = v762 * v787,
+                    v838 = v763 * v787, v839 = v764 * v787,
+                    v840 = v90 * (v7 * v625 + (v8 * v596 + v6 * v620)) + v91 * (v20 * v625 + (v22 * v596 + v15 * v620)),
+                    v841 = w[1] * v785, v842 = w[1] * v786, v843 = v785 * v590, v844 = v786 * v590,
+                    v845 = v785 * v589, v846 = v786 * v589, v847 = v841 * v591, v848 = v842 * v591,
+                    v849 = v841 * v592, v850 = v842 * v592, v851 = v840 * v788,
+                    v852 = v788 * (v562 * v294 + v840 * v613) + v787 * (v562 * v765 + v764 * v647),
+                    v853 = v788 * (v557 * v294 + v840 * v616) + v787 * (v557 * v765 + v764 * v644),
+                    v854 = v787 * (v556 * v765 + v764 * v654) + v788 * (v840 * v652 + (v556 * v294 + (v105 * v779 + v835))),
+                    v855 = v787 * (v558 * v765 + v764 * v642) + v788 * (v840 * v637 + (v558 * v294 + (v836 + v107 * v780))),
+                    v856 = v787 * (v559 * v765 + v764 * v655) + v788 * (v840 * v653 + (v559 * v294 + (v104 * v779 - v835))),
+                    v857 = v787 * (v560 * v765 + v764 * v640) + v788 * (v840 * v632 + (v560 * v294 + (v106 * v780 - v836))),
+                    v858 = v788 * (v554 * v294 + v840 * v615) + v787 * (v554 * v765 + v764 * v643),
+                    v859 = v788 * (v555 * v294 + v840 * v614) + v787 * (v555 * v765 + v764 * v649),
+                    v860 = v646 * v839 + v617 * v851, v861 = v645 * v839 + v618 * v851,
+                    v862 = v577 * v846, v863 = v577 * v843, v864 = v577 * v844, v865 = v577 * v845,
+                    v866 = v581 * v843, v867 = v581 * v844, v868 = v581 * v845, v869 = v581 * v846,
+                    v870 = v628 * v843, v871 = v628 * v844, v872 = v628 * v845, v873 = v628 * v846,
+                    v874 = v627 * v843, v875 = v627 * v844, v876 = v627 * v845, v877 = v627 * v846,
+                    v878 = -(v626 * v843), v879 = -(v626 * v844), v880 = -(v626 * v845),
+                    v881 = -(v626 * v846);
+                v713 = softehl_blend(m756, v761, v713); v714 = softehl_blend(m756, v762, v714);
+                v715 = softehl_blend(m756, v763, v715); v716 = softehl_blend(m756, v784, v716);
+                v717 = softehl_blend(m756, v764, v717); v718 = softehl_blend(m756, v863, v718);
+                v719 = softehl_blend(m756, v864, v719); v720 = softehl_blend(m756, v865, v720);
+                v721 = softehl_blend(m756, v862, v721); v722 = softehl_blend(m756, v866, v722);
+                v723 = softehl_blend(m756, v867, v723); v724 = softehl_blend(m756, v868, v724);
+                v725 = softehl_blend(m756, v869, v725); v726 = softehl_blend(m756, v870, v726);
+                v727 = softehl_blend(m756, v871, v727); v728 = softehl_blend(m756, v872, v728);
+                v729 = softehl_blend(m756, v873, v729); v730 = softehl_blend(m756, v874, v730);
+                v731 = softehl_blend(m756, v875, v731); v732 = softehl_blend(m756, v876, v732);
+                v733 = softehl_blend(m756, v877, v733); v734 = softehl_blend(m756, v878, v734);
+                v735 = softehl_blend(m756, v879, v735); v736 = softehl_blend(m756, v880, v736);
+                v737 = softehl_blend(m756, v881, v737); v738 = softehl_blend(m756, v847, v738);
+                v739 = softehl_blend(m756, v848, v739); v740 = softehl_blend(m756, v849, v740);
+                v741 = softehl_blend(m756, v850, v741); v742 = softehl_blend(m756, v837, v742);
+                v743 = softehl_blend(m756, v838, v743); v744 = softehl_blend(m756, v860, v744);
+                v745 = softehl_blend(m756, v861, v745); v746 = softehl_blend(m756, v765, v746);
+                v747 = softehl_blend(m756, v854, v747); v748 = softehl_blend(m756, v789, v748);
+                v749 = softehl_blend(m756, v855, v749); v750 = softehl_blend(m756, v856, v750);
+                v751 = softehl_blend(m756, v857, v751); v752 = softehl_blend(m756, v852, v752);
+                v753 = softehl_blend(m756, v858, v753); v754 = softehl_blend(m756, v859, v754);
+                v755 = softehl_blend(m756, v853, v755);
             }
-            v186 = softehl_blend(m188, v190, v186);
-            v187 = softehl_blend(m188, v191, v187);
+            v656 = softehl_blend(m711, v713, v656); v657 = softehl_blend(m711, v714, v657);
+            v658 = softehl_blend(m711, v715, v658); v659 = softehl_blend(m711, v716, v659);
+            v660 = softehl_blend(m711, v717, v660); v661 = softehl_blend(m711, v718, v661);
+            v662 = softehl_blend(m711, v719, v662); v663 = softehl_blend(m711, v720, v663);
+            v664 = softehl_blend(m711, v721, v664); v665 = softehl_blend(m711, v722, v665);
+            v666 = softehl_blend(m711, v723, v666); v667 = softehl_blend(m711, v724, v667);
+            v668 = softehl_blend(m711, v725, v668); v669 = softehl_blend(m711, v726, v669);
+            v670 = softehl_blend(m711, v727, v670); v671 = softehl_blend(m711, v728, v671);
+            v672 = softehl_blend(m711, v729, v672); v673 = softehl_blend(m711, v730, v673);
+            v674 = softehl_blend(m711, v731, v674); v675 = softehl_blend(m711, v732, v675);
+            v676 = softehl_blend(m711, v733, v676); v677 = softehl_blend(m711, v734, v677);
+            v678 = softehl_blend(m711, v735, v678); v679 = softehl_blend(m711, v736, v679);
+            v680 = softehl_blend(m711, v737, v680); v681 = softehl_blend(m711, v738, v681);
+            v682 = softehl_blend(m711, v739, v682); v683 = softehl_blend(m711, v740, v683);
+            v684 = softehl_blend(m711, v741, v684); v685 = softehl_blend(m711, v742, v685);
+            v686 = softehl_blend(m711, softehl_splat(0.0), v686);
+            v687 = softehl_blend(m711, v743, v687);
+            v688 = softehl_blend(m711, softehl_splat(0.0), v688);
+            v689 = softehl_blend(m711, v744, v689);
+            v690 = softehl_blend(m711, softehl_splat(0.0), v690);
+            v691 = softehl_blend(m711, v745, v691);
+            v692 = softehl_blend(m711, softehl_splat(0.0), v692);
+            v693 = softehl_blend(m711, v746, v693); v694 = softehl_blend(m711, v747, v694);
+            v695 = softehl_blend(m711, v748, v695);
+            v696 = softehl_blend(m711, softehl_splat(0.0), v696);
+            v697 = softehl_blend(m711, v749, v697);
+            v698 = softehl_blend(m711, softehl_splat(0.0), v698);
+            v699 = softehl_blend(m711, v750, v699);
+            v700 = softehl_blend(m711, softehl_splat(0.0), v700);
+            v701 = softehl_blend(m711, v751, v701);
+            v702 = softehl_blend(m711, softehl_splat(0.0), v702);
+            v703 = softehl_blend(m711, v752, v703);
+            v704 = softehl_blend(m711, softehl_splat(0.0), v704);
+            v705 = softehl_blend(m711, v753, v705);
+            v706 = softehl_blend(m711, softehl_splat(0.0), v706);
+            v707 = softehl_blend(m711, v754, v707);
+            v708 = softehl_blend(m711, softehl_splat(0.0), v708);
+            v709 = softehl_blend(m711, v755, v709);
+            v710 = softehl_blend(m711, softehl_splat(0.0), v710);
         }
-        const M m254 = ~v185;
-        if (softehl_any(m254)) {
-            const V v255 = v183 - v157;
-            const V v256 = v255 * v255;
-            const V v257 = v255 * v256;
-            v186 = softehl_blend(m254, v257, v186);
-            v187 = softehl_blend(m254, v257, v187);
+        const M m882 = ~v650;
+        if (softehl_any(m882)) {
+            const V v883 = v641 - v580, v884 = v883 * v883, v885 = v883 * v884, v886 = 3.0 * v884,
+                v887 = v561 * v886, v888 = v30 * v886, v889 = -(v503 * v886), v890 = a10 * v886,
+                v891 = v890 * v646, v892 = v890 * v645, v893 = v890 * v654, v894 = v890 * v642,
+                v895 = v890 * v655, v896 = v890 * v640, v897 = v890 * v647, v898 = v890 * v643,
+                v899 = v890 * v649, v900 = v890 * v644;
+            v656 = softehl_blend(m882, v885, v656); v657 = softehl_blend(m882, v887, v657);
+            v658 = softehl_blend(m882, v889, v658); v659 = softehl_blend(m882, v885, v659);
+            v660 = softehl_blend(m882, v890, v660);
+            v661 = softehl_blend(m882, softehl_splat(0.0), v661);
+            v662 = softehl_blend(m882, softehl_splat(0.0), v662);
+            v663 = softehl_blend(m882, softehl_splat(0.0), v663);
+            v664 = softehl_blend(m882, softehl_splat(0.0), v664);
+            v665 = softehl_blend(m882, softehl_splat(0.0), v665);
+            v666 = softehl_blend(m882, softehl_splat(0.0), v666);
+            v667 = softehl_blend(m882, softehl_splat(0.0), v667);
+            v668 = softehl_blend(m882, softehl_splat(0.0), v668);
+            v669 = softehl_blend(m882, softehl_splat(0.0), v669);
+            v670 = softehl_blend(m882, softehl_splat(0.0), v670);
+            v671 = softehl_blend(m882, softehl_splat(0.0), v671);
+            v672 = softehl_blend(m882, softehl_splat(0.0), v672);
+            v673 = softehl_blend(m882, softehl_splat(0.0), v673);
+            v674 = softehl_blend(m882, softehl_splat(0.0), v674);
+            v675 = softehl_blend(m882, softehl_splat(0.0), v675);
+            v676 = softehl_blend(m882, softehl_splat(0.0), v676);
+            v677 = softehl_blend(m882, softehl_splat(0.0), v677);
+            v678 = softehl_blend(m882, softehl_splat(0.0), v678);
+            v679 = softehl_blend(m882, softehl_splat(0.0), v679);
+            v680 = softehl_blend(m882, softehl_splat(0.0), v680);
+            v681 = softehl_blend(m882, softehl_splat(0.0), v681);
+            v682 = softehl_blend(m882, softehl_splat(0.0), v682);
+            v683 = softehl_blend(m882, softehl_splat(0.0), v683);
+            v684 = softehl_blend(m882, softehl_splat(0.0), v684);
+            v685 = softehl_blend(m882, softehl_splat(0.0), v685);
+            v686 = softehl_blend(m882, v887, v686);
+            v687 = softehl_blend(m882, softehl_splat(0.0), v687);
+            v688 = softehl_blend(m882, v889, v688);
+            v689 = softehl_blend(m882, softehl_splat(0.0), v689);
+            v690 = softehl_blend(m882, v891, v690);
+            v691 = softehl_blend(m882, softehl_splat(0.0), v691);
+            v692 = softehl_blend(m882, v892, v692); v693 = softehl_blend(m882, v888, v693);
+            v694 = softehl_blend(m882, softehl_splat(0.0), v694);
+            v695 = softehl_blend(m882, v888, v695); v696 = softehl_blend(m882, v893, v696);
+            v697 = softehl_blend(m882, softehl_splat(0.0), v697);
+            v698 = softehl_blend(m882, v894, v698);
+            v699 = softehl_blend(m882, softehl_splat(0.0), v699);
+            v700 = softehl_blend(m882, v895, v700);
+            v701 = softehl_blend(m882, softehl_splat(0.0), v701);
+            v702 = softehl_blend(m882, v896, v702);
+            v703 = softehl_blend(m882, softehl_splat(0.0), v703);
+            v704 = softehl_blend(m882, v897, v704);
+            v705 = softehl_blend(m882, softehl_splat(0.0), v705);
+            v706 = softehl_blend(m882, v898, v706);
+            v707 = softehl_blend(m882, softehl_splat(0.0), v707);
+            v708 = softehl_blend(m882, v899, v708);
+            v709 = softehl_blend(m882, softehl_splat(0.0), v709);
+            v710 = softehl_blend(m882, v900, v710);
         }
-        const V v258 = v19 * w[1];
-        const V v259 = w[1] * v164;
-        const V v260 = w[1] * v167;
-        const V v261 = w[1] * v166;
-        const V v262 = w[1] * v130;
-        const V v263 = w[1] * v129;
-        const V v264 = X1 * v129;
-        const V v265 = v258 * v129;
-        const V v266 = v258 * v130;
-        const V v267 = X3 * v130;
-        const V v268 = v264 + v267;
-        const V v269 = 6.283185307179586 * v268;
-        const V v270 = (-1.0) + v269;
-        const V v271 = a14 * v270;
-        const V v272 = 1.0 + v271;
-        const V v273 = v71 * v186;
-        const V v274 = v71 * v187;
-        const V v275 = v70 * v187;
-        const V v276 = v273 + v275;
-        const V v277 = v70 * v186;
-        const V v278 = v274 - v277;
-        const V v279 = v104 * v272;
-        const V v280 = v186 * v279;
-        const V v281 = v187 * v279;
-        const V v282 = v276 * v279;
-        const V v283 = v278 * v279;
-        const V v284 = v266 * v280;
-        s112 += v284;
-        const V v285 = v265 * v280;
-        s113 += v285;
-        const V v286 = v266 * v281;
-        s114 += v286;
-        const V v287 = v265 * v281;
-        s115 += v287;
-        const V v288 = v259 * v283;
-        s116 += v288;
-        const V v289 = v259 * v282;
-        s117 += v289;
-        const V v290 = v260 * v283;
-        s118 += v290;
-        const V v291 = v260 * v282;
-        s119 += v291;
-        const V v292 = v261 * v283;
-        s120 += v292;
-        const V v293 = v261 * v282;
-        s121 += v293;
-        const V v294 = v262 * v283;
-        s122 += v294;
-        const V v295 = v263 * v283;
-        s124 += v295;
-        const V v296 = v262 * v282;
-        s123 += v296;
-        const V v297 = v263 * v282;
-        s125 += v297;
+        s307 += v661; s308 += v662; s309 += v663; s310 += v664; s311 += v665; s312 += v666;
+        s313 += v667; s314 += v668; s315 += v669; s316 += v670; s317 += v671; s318 += v672;
+        s319 += v673; s320 += v674; s321 += v675; s322 += v676; s323 += v677; s324 += v678;
+        s325 += v679; s326 += v680; s327 += v681; s328 += v682; s329 += v683; s330 += v684;
+        const V v901 = v686 + v685, v902 = v688 + v687, v903 = v690 + v689, v904 = v692 + v691,
+            v905 = v646 * v660, v906 = v645 * v660, v907 = w[1] * v905, v908 = w[1] * v906,
+            v909 = v34 * w[1], v910 = w[1] * v657, v911 = w[1] * v658, v912 = w[1] * v901,
+            v913 = w[1] * v902, v914 = w[1] * v591;
+        s303 += v907 * v591; s304 += v908 * v591; s305 += v907 * v592; s306 += v908 * v592;
+        const V v915 = w[1] * v592; s297 += v910 * v591; s299 += v910 * v592; s298 += v911 * v591;
+        s300 += v911 * v592; s341 += v912 * v591; s343 += v912 * v592; s342 += v913 * v591;
+        s344 += v913 * v592; s367 += v903 * v915; s368 += v904 * v915; s365 += v903 * v914;
+        s366 += v904 * v914;
+        const V v916 = v905 * v589 + v903 * v590, v917 = v903 * v589 - v905 * v590,
+            v918 = v906 * v589 + v904 * v590, v919 = v904 * v589 - v906 * v590,
+            v920 = v657 * v589 + v901 * v590, v921 = v901 * v589 - v657 * v590,
+            v922 = v658 * v589 + v902 * v590, v923 = v902 * v589 - v658 * v590;
+        s369 += v577 * v916; s370 += v577 * v918; s345 += v577 * v920; s371 += v577 * v917;
+        s347 += v577 * v921; s346 += v577 * v922; s348 += v577 * v923; s349 += v581 * v920;
+        s350 += v581 * v922; s351 += v581 * v921; s352 += v581 * v923; s375 += v581 * v917;
+        s353 += v628 * v920; s354 += v628 * v922; s355 += v628 * v921; s356 += v628 * v923;
+        s357 += v627 * v920; s358 += v627 * v922; s359 += v627 * v921; s360 += v627 * v923;
+        s361 += v626 * v920; s362 += v626 * v922; s363 += v626 * v921; s364 += v626 * v923;
+        const V v924 = v909 * v503, v925 = v909 * v502, v926 = v656 * v586, v927 = v656 * v585,
+            v928 = v656 * v293, v929 = v659 * v586, v930 = v659 * v585, v931 = v659 * v293,
+            v932 = 0.5 * v926;
+        s295 += v924 * v926; s301 += v924 * v929; s296 += v925 * v926; s302 += v925 * v929;
+        const V v933 = 0.5 * v929, v934 = v100 * v926, v935 = v100 * v929, v936 = v103 * v926,
+            v937 = v103 * v929, v938 = v34 * (v932 + v503 * v928),
+            v939 = v34 * (v933 + v503 * v931), v940 = v34 * (v502 * v928 - v932),
+            v941 = v34 * (v502 * v931 - v933), v942 = v578 * v927, v943 = v579 * v927,
+            v944 = v578 * v930, v945 = v579 * v930, v946 = v560 * v693 + v660 * v640,
+            v947 = v562 * v693 + v660 * v647, v948 = v555 * v693 + v660 * v649,
+            v949 = v554 * v693 + v660 * v643, v950 = v556 * v693 + v660 * v654,
+            v951 = v558 * v693 + v660 * v642;
+        s400 += w[1] * (v279 * v943 + v560 * v938 + v946 * v592);
+        const V v952 = v559 * v693 + v660 * v655, v953 = v557 * v693 + v660 * v644,
+            v954 = v558 * v695 + (v698 + v697), v955 = v559 * v695 + (v700 + v699),
+            v956 = v557 * v695 + (v710 + v709), v957 = v556 * v695 + (v696 + v694),
+            v958 = v560 * v695 + (v702 + v701), v959 = v562 * v695 + (v704 + v703),
+            v960 = v554 * v695 + (v706 + v705), v961 = v555 * v695 + (v708 + v707),
+            v962 = v91 * v656 + v90 * v659, v963 = v91 * v659 - v90 * v656;
+        s372 += v577 * v919; s376 += v581 * v919; s373 += v581 * v916; s374 += v581 * v918;
+        const V v964 = v962 * v586, v965 = v963 * v586, v966 = v962 * v585, v967 = v963 * v585,
+            v968 = v962 * v293, v969 = v963 * v293, v970 = 0.5 * v964;
+        s338 += v581 * v964; s337 += v581 * v965;
+        const V v971 = 0.5 * v965, v972 = v620 * v964, v973 = v620 * v965, v974 = v625 * v964,
+            v975 = v625 * v965, v976 = v596 * v964, v977 = v596 * v965;
+        s331 += v626 * v965; s332 += v626 * v964; s333 += v627 * v965; s334 += v627 * v964;
+        s335 += v628 * v965; s336 += v628 * v964; s339 += v577 * v965; s340 += v577 * v964;
+        const V v978 = v556 * v971, v979 = v556 * v970, v980 = v558 * v970, v981 = v558 * v971,
+            v982 = v559 * v970, v983 = v559 * v971, v984 = v560 * v970, v985 = v560 * v971,
+            v986 = v562 * v970, v987 = v562 * v971, v988 = v554 * v970, v989 = v554 * v971,
+            v990 = v555 * v970, v991 = v557 * v970, v992 = v555 * v971, v993 = v557 * v971;
+        s377 += w[1] * (v617 * v972 - v621 * v916); s378 += w[1] * (v618 * v972 - v621 * v918);
+        s379 += w[1] * (v617 * v973 - v621 * v917); s380 += w[1] * (v618 * v973 - v621 * v919);
+        s381 += w[1] * (v617 * v974 - v623 * v916); s382 += w[1] * (v618 * v974 - v623 * v918);
+        s383 += w[1] * (v617 * v975 - v623 * v917); s384 += w[1] * (v618 * v975 - v623 * v919);
+        s385 += w[1] * (v617 * v976 + v624 * v916); s386 += w[1] * (v618 * v976 + v624 * v918);
+        s387 += w[1] * (v617 * v977 + v624 * v917); s388 += w[1] * (v618 * v977 + v624 * v919);
+        s389 += w[1] * (v271 * v942 + v556 * v940 + v950 * v591);
+        s390 += w[1] * (v272 * v942 + v558 * v940 + v951 * v591);
+        s391 += w[1] * (v273 * v942 + v559 * v940 + v952 * v591);
+        s392 += w[1] * (v279 * v942 + v560 * v940 + v946 * v591);
+        const V v994 = w[1] * (v559 * v938 + (v273 * v943 + v952 * v592)); s399 += v994;
+        const V v995 = w[1] * (v271 * v943 + (v556 * v938 + v950 * v592)); s397 += v995;
+        const V v996 = w[1] * (v272 * v943 + (v558 * v938 + v951 * v592)); s398 += v996;
+        s393 += w[1] * (v280 * v942 + v562 * v940 + v947 * v591);
+        const V v997 = w[1] * (v562 * v938 + (v280 * v943 + v947 * v592)); s401 += v997;
+        const V v998 = v280 * v967 + (v562 * v969 + (v589 * v959 - v947 * v590)),
+            v999 = v280 * v966 + (v562 * v968 + (v947 * v589 + v590 * v959)),
+            v1000 = v279 * v966 + (v560 * v968 + (v946 * v589 + (v106 * v926 - v937))),
+            v1001 = v285 * v966 + (v554 * v968 + (v949 * v589 + v590 * v960)),
+            v1002 = w[1] * (v502 * v998 - v987);
+        s433 += v1002; const V v1003 = w[1] * (v502 * v999 - v986); s425 += v1003;
+        const V v1004 = v285 * v967 + (v554 * v969 + v589 * v960) - v949 * v590;
+        s402 += w[1] * (v285 * v943 + v554 * v938 + v949 * v592);
+        s394 += w[1] * (v285 * v942 + v554 * v940 + v949 * v591);
+        const V v1005 = w[1] * (v502 * v1001 - v988); s426 += v1005;
+        const V v1006 = w[1] * (v502 * v1004 - v989); s434 += v1006;
+        s395 += w[1] * (v286 * v942 + v555 * v940 + v948 * v591);
+        s396 += w[1] * (v287 * v942 + v557 * v940 + v953 * v591);
+        const V v1007 = v1000 + v590 * v958,
+            v1008 = w[1] * (v279 * v944 + v560 * v941 + v591 * v958);
+        s408 += v1008; const V v1009 = w[1] * (v279 * v945 + v560 * v939 + v592 * v958);
+        s416 += v1009;
+        const V v1010 = v279 * v967 + (v560 * v969 + (v936 + v106 * v929 - v946 * v590)) + v589 * v958,
+            v1011 = w[1] * (v555 * v938 + (v286 * v943 + v948 * v592));
+        s403 += v1011; const V v1012 = w[1] * (v557 * v938 + (v287 * v943 + v953 * v592));
+        s404 += v1012; const V v1013 = w[1] * (v502 * v1007 - v984); s424 += v1013;
+        const V v1014 = w[1] * (v502 * v1010 - v985); s432 += v1014;
+        const V v1015 = v286 * v967 + (v555 * v969 + (v589 * v961 - v948 * v590)),
+            v1016 = v287 * v967 + (v557 * v969 + (v589 * v956 - v953 * v590)),
+            v1017 = v557 * v968 + (v287 * v966 + (v953 * v589 + v590 * v956)),
+            v1018 = v555 * v968 + (v286 * v966 + (v948 * v589 + v590 * v961)),
+            v1019 = w[1] * (v502 * v1015 - v992);
+        s435 += v1019; const V v1020 = w[1] * (v502 * v1016 - v993); s436 += v1020;
+        const V v1021 = w[1] * (v502 * v1017 - v991); s428 += v1021;
+        const V v1022 = w[1] * (v502 * v1018 - v990); s427 += v1022;
+        const V v1023 = w[1] * (v287 * v945 + v557 * v939 + v592 * v956); s420 += v1023;
+        const V v1024 = w[1] * (v287 * v944 + v557 * v941 + v591 * v956); s412 += v1024;
+        const V v1025 = w[1] * (v273 * v945 + v559 * v939 + v592 * v955); s415 += v1025;
+        const V v1026 = w[1] * (v273 * v944 + v559 * v941 + v591 * v955); s407 += v1026;
+        const V v1027 = v273 * v966 + (v559 * v968 + (v952 * v589 + (v104 * v929 - v934) + v590 * v955)),
+            v1028 = v273 * v967 + (v559 * v969 + (v589 * v955 - v104 * v926 - v935 - v952 * v590)),
+            v1029 = w[1] * (v280 * v944 + v562 * v941 + v591 * v959);
+        s409 += v1029; const V v1030 = w[1] * (v280 * v945 + v562 * v939 + v592 * v959);
+        s417 += v1030; const V v1031 = w[1] * (v502 * v1027 - v982); s423 += v1031;
+        const V v1032 = w[1] * (v502 * v1028 - v983); s431 += v1032;
+        const V v1033 = w[1] * (v285 * v944 + v554 * v941 + v591 * v960); s410 += v1033;
+        const V v1034 = w[1] * (v285 * v945 + v554 * v939 + v592 * v960); s418 += v1034;
+        const V v1035 = w[1] * (v286 * v944 + v555 * v941 + v591 * v961); s411 += v1035;
+        const V v1036 = w[1] * (v286 * v945 + v555 * v939 + v592 * v961); s419 += v1036;
+        const V v1037 = w[1] * (v982 + v503 * v1027); s439 += v1037;
+        const V v1038 = w[1] * (v983 + v503 * v1028); s447 += v1038;
+        const V v1039 = w[1] * (v984 + v503 * v1007); s440 += v1039;
+        const V v1040 = w[1] * (v986 + v503 * v999); s441 += v1040;
+        const V v1041 = w[1] * (v988 + v503 * v1001); s442 += v1041;
+        const V v1042 = w[1] * (v990 + v503 * v1018); s443 += v1042;
+        const V v1043 = w[1] * (v991 + v503 * v1017); s444 += v1043;
+        const V v1044 = w[1] * (v985 + v503 * v1010); s448 += v1044;
+        const V v1045 = w[1] * (v987 + v503 * v998); s449 += v1045;
+        const V v1046 = w[1] * (v989 + v503 * v1004); s450 += v1046;
+        const V v1047 = w[1] * (v992 + v503 * v1015); s451 += v1047;
+        const V v1048 = w[1] * (v993 + v503 * v1016); s452 += v1048;
+        const V v1049 = w[1] * (v614 * v972 - v621 * v1018); s459 += v1049;
+        const V v1050 = w[1] * (v632 * v973 - v621 * v1010); s464 += v1050;
+        const V v1051 = w[1] * (v613 * v973 - v621 * v998); s465 += v1051;
+        const V v1052 = w[1] * (v615 * v973 - v621 * v1004); s466 += v1052;
+        const V v1053 = w[1] * (v614 * v973 - v621 * v1015); s467 += v1053;
+        const V v1054 = w[1] * (v616 * v973 - v621 * v1016); s468 += v1054;
+        const V v1055 = w[1] * (v653 * v972 - v621 * v1027); s455 += v1055;
+        const V v1056 = w[1] * (v632 * v972 - v621 * v1007); s456 += v1056;
+        const V v1057 = w[1] * (v613 * v972 - v621 * v999); s457 += v1057;
+        const V v1058 = w[1] * (v615 * v972 - v621 * v1001); s458 += v1058;
+        const V v1059 = w[1] * (v616 * v972 - v621 * v1017); s460 += v1059;
+        const V v1060 = w[1] * (v653 * v973 - v621 * v1028); s463 += v1060;
+        const V v1061 = w[1] * (v653 * v974 - v623 * v1027); s471 += v1061;
+        const V v1062 = w[1] * (v632 * v974 - v623 * v1007); s472 += v1062;
+        const V v1063 = w[1] * (v613 * v974 - v623 * v999); s473 += v1063;
+        const V v1064 = w[1] * (v615 * v974 - v623 * v1001); s474 += v1064;
+        const V v1065 = w[1] * (v616 * v974 - v623 * v1017); s476 += v1065;
+        const V v1066 = w[1] * (v653 * v975 - v623 * v1028); s479 += v1066;
+        const V v1067 = w[1] * (v653 * v976 + v624 * v1027); s487 += v1067;
+        const V v1068 = w[1] * (v632 * v976 + v624 * v1007); s488 += v1068;
+        const V v1069 = w[1] * (v613 * v976 + v624 * v999); s489 += v1069;
+        const V v1070 = w[1] * (v615 * v976 + v624 * v1001); s490 += v1070;
+        const V v1071 = w[1] * (v616 * v976 + v624 * v1017); s492 += v1071;
+        const V v1072 = w[1] * (v653 * v977 + v624 * v1028); s495 += v1072;
+        const V v1073 = w[1] * (v614 * v974 - v623 * v1018); s475 += v1073;
+        const V v1074 = w[1] * (v614 * v976 + v624 * v1018); s491 += v1074;
+        const V v1075 = w[1] * (v632 * v975 - v623 * v1010); s480 += v1075;
+        const V v1076 = w[1] * (v632 * v977 + v624 * v1010); s496 += v1076;
+        const V v1077 = w[1] * (v613 * v975 - v623 * v998); s481 += v1077;
+        const V v1078 = w[1] * (v613 * v977 + v624 * v998); s497 += v1078;
+        const V v1079 = w[1] * (v615 * v975 - v623 * v1004); s482 += v1079;
+        const V v1080 = w[1] * (v615 * v977 + v624 * v1004); s498 += v1080;
+        const V v1081 = w[1] * (v614 * v975 - v623 * v1015); s483 += v1081;
+        const V v1082 = w[1] * (v614 * v977 + v624 * v1015); s499 += v1082;
+        const V v1083 = w[1] * (v616 * v975 - v623 * v1016); s484 += v1083;
+        const V v1084 = w[1] * (v616 * v977 + v624 * v1016); s500 += v1084;
+        const V v1085 = w[1] * (v271 * v945 + v556 * v939 + v592 * v957); s413 += v1085;
+        const V v1086 = w[1] * (v272 * v945 + v558 * v939 + v592 * v954); s414 += v1086;
+        const V v1087 = v556 * v968 + (v950 * v589 + (v271 * v966 + (v934 + v105 * v929) + v590 * v957)),
+            v1088 = v558 * v968 + (v951 * v589 + (v272 * v966 + (v107 * v926 + v937) + v590 * v954)),
+            v1089 = v556 * v969 + (v271 * v967 + (v935 - v105 * v926) - v950 * v590 + v589 * v957),
+            v1090 = v558 * v969 + (v272 * v967 + (v107 * v929 - v936) - v951 * v590 + v589 * v954),
+            v1091 = w[1] * (v556 * v941 + (v271 * v944 + v591 * v957));
+        s405 += v1091; const V v1092 = w[1] * (v558 * v941 + (v272 * v944 + v591 * v954));
+        s406 += v1092; const V v1093 = w[1] * (v652 * v974 - v623 * v1087); s469 += v1093;
+        const V v1094 = w[1] * (v637 * v974 - v623 * v1088); s470 += v1094;
+        const V v1095 = w[1] * (v652 * v975 - v623 * v1089); s477 += v1095;
+        const V v1096 = w[1] * (v637 * v975 - v623 * v1090); s478 += v1096;
+        const V v1097 = w[1] * (v652 * v976 + v624 * v1087); s485 += v1097;
+        const V v1098 = w[1] * (v637 * v976 + v624 * v1088); s486 += v1098;
+        const V v1099 = w[1] * (v652 * v977 + v624 * v1089); s493 += v1099;
+        const V v1100 = w[1] * (v637 * v977 + v624 * v1090); s494 += v1100;
+        const V v1101 = w[1] * (v502 * v1087 - v979); s421 += v1101;
+        const V v1102 = w[1] * (v502 * v1088 - v980); s422 += v1102;
+        const V v1103 = w[1] * (v502 * v1089 - v978); s429 += v1103;
+        const V v1104 = w[1] * (v502 * v1090 - v981); s430 += v1104;
+        const V v1105 = w[1] * (v979 + v503 * v1087); s437 += v1105;
+        const V v1106 = w[1] * (v980 + v503 * v1088); s438 += v1106;
+        const V v1107 = w[1] * (v978 + v503 * v1089); s445 += v1107;
+        const V v1108 = w[1] * (v981 + v503 * v1090); s446 += v1108;
+        const V v1109 = w[1] * (v652 * v972 - v621 * v1087); s453 += v1109;
+        const V v1110 = w[1] * (v637 * v972 - v621 * v1088); s454 += v1110;
+        const V v1111 = w[1] * (v652 * v973 - v621 * v1089); s461 += v1111;
+        const V v1112 = w[1] * (v637 * v973 - v621 * v1090); s462 += v1112;
     }
-    softehl_store2(R + 12, 14, s112, s114);
-    softehl_store4(R + 4, 14, s121, s120, s119, s118);
-    softehl_store4(R + 0, 14, s125, s124, s123, s122);
-    const V v298 = -s116;
-    const V v299 = -s117;
-    softehl_store4(R + 8, 14, v299, v298, s113, s115);
+    softehl_store2(R + 12, 14, s295, s301);
+    softehl_store4(K + 148, 196, s303, s304, s297, softehl_splat(0.0));
+    softehl_store4(K + 176, 196, s305, s306, s299, softehl_splat(0.0));
+    softehl_store4(R + 4, 14, s336, s335, s334, s333);
+    softehl_store4(R + 0, 14, s340, s339, s338, s337);
+    softehl_store4(K + 164, 196, s341, s327, s342, s328);
+    softehl_store4(K + 192, 196, s343, s329, s344, s330);
+    softehl_store4(K + 24, 196, s347, s309, s348, s310);
+    softehl_store4(K + 52, 196, s351, s313, s352, s314);
+    softehl_store4(K + 80, 196, s355, s317, s356, s318);
+    softehl_store4(K + 108, 196, s359, s321, s360, s322);
+    softehl_store4(K + 8, 196, s369, s370, s345, s307);
+    softehl_store4(K + 36, 196, s373, s374, s349, s311);
+    softehl_store4(K + 140, 196, s389, s390, s391, s392);
+    softehl_store4(K + 144, 196, s393, s394, s395, s396);
+    softehl_store4(K + 168, 196, s397, s398, s399, s400);
+    softehl_store4(K + 172, 196, s401, s402, s403, s404);
+    softehl_store4(K + 152, 196, s298, softehl_splat(0.0), s405, s406);
+    softehl_store4(K + 156, 196, s407, s408, s409, s410);
+    softehl_store4(K + 160, 196, s411, s412, s365, s366);
+    softehl_store4(K + 180, 196, s300, softehl_splat(0.0), s413, s414);
+    softehl_store4(K + 184, 196, s415, s416, s417, s418);
+    softehl_store4(K + 188, 196, s419, s420, s367, s368);
+    softehl_store4(K + 0, 196, s421, s422, s423, s424);
+    softehl_store4(K + 4, 196, s425, s426, s427, s428);
+    softehl_store4(K + 12, 196, s346, s308, s429, s430);
+    softehl_store4(K + 16, 196, s431, s432, s433, s434);
+    softehl_store4(K + 20, 196, s435, s436, s371, s372);
+    softehl_store4(K + 28, 196, s437, s438, s439, s440);
+    softehl_store4(K + 32, 196, s441, s442, s443, s444);
+    softehl_store4(K + 40, 196, s350, s312, s445, s446);
+    softehl_store4(K + 44, 196, s447, s448, s449, s450);
+    softehl_store4(K + 48, 196, s451, s452, s375, s376);
+    softehl_store4(R + 8, 14, -s332, -s331, s296, s302);
+    softehl_store4(K + 136, 196, -s363, s325, -s364, s326);
+    softehl_store4(K + 64, 196, -s377, -s378, s353, s315);
+    softehl_store4(K + 92, 196, -s381, -s382, s357, s319);
+    softehl_store4(K + 120, 196, -s385, -s386, -s361, s323);
+    softehl_store4(K + 56, 196, -s453, -s454, -s455, -s456);
+    softehl_store4(K + 60, 196, -s457, -s458, -s459, -s460);
+    softehl_store4(K + 68, 196, s354, s316, -s461, -s462);
+    softehl_store4(K + 72, 196, -s463, -s464, -s465, -s466);
+    softehl_store4(K + 76, 196, -s467, -s468, -s379, -s380);
+    softehl_store4(K + 84, 196, -s469, -s470, -s471, -s472);
+    softehl_store4(K + 88, 196, -s473, -s474, -s475, -s476);
+    softehl_store4(K + 96, 196, s358, s320, -s477, -s478);
+    softehl_store4(K + 100, 196, -s479, -s480, -s481, -s482);
+    softehl_store4(K + 104, 196, -s483, -s484, -s383, -s384);
+    softehl_store4(K + 112, 196, -s485, -s486, -s487, -s488);
+    softehl_store4(K + 116, 196, -s489, -s490, -s491, -s492);
+    softehl_store4(K + 124, 196, -s362, s324, -s493, -s494);
+    softehl_store4(K + 128, 196, -s495, -s496, -s497, -s498);
+    softehl_store4(K + 132, 196, -s499, -s500, -s387, -s388);
 }
-
-void softehl_mortar_23_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mortar_23_residual_group(points, modes, coordinates + 10 * e, dofs + 14 * e, data + 15 * e, 0, parameters, rule, basis, values + 14 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mortar_23_residual_group(points, modes, coordinates + 10 * (n - SOFTEHL_LANES), dofs + 14 * (n - SOFTEHL_LANES), data + 15 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 14 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 10];
-    softehl_pad(X, coordinates, 10, n);
-    double d[SOFTEHL_LANES * 14];
-    softehl_pad(d, dofs, 14, n);
-    double a[SOFTEHL_LANES * 15];
-    softehl_pad(a, data, 15, n);
-    double R[SOFTEHL_LANES * 14];
-    softehl_mortar_23_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 14 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_mortar_23_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 10, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 10, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8, X9;
-    softehl_load2(X + 8, 10, &X8, &X9);
-    (void)X8; (void)X9;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 14, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 14, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
-    softehl_load4(d + 8, 14, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13;
-    softehl_load2(d + 12, 14, &d12, &d13);
-    (void)d12; (void)d13;
-    V a0, a1, a2, a3;
-    softehl_load4(a + 0, 15, &a0, &a1, &a2, &a3);
-    (void)a0; (void)a1; (void)a2; (void)a3;
-    V a4, a5, a6, a7;
-    softehl_load4(a + 4, 15, &a4, &a5, &a6, &a7);
-    (void)a4; (void)a5; (void)a6; (void)a7;
-    V a8, a9, a10, a11;
-    softehl_load4(a + 8, 15, &a8, &a9, &a10, &a11);
-    (void)a8; (void)a9; (void)a10; (void)a11;
-    V a12, a13, a14;
-    softehl_load3(a + 12, 15, &a12, &a13, &a14);
-    (void)a12; (void)a13; (void)a14;
-    const V v1 = X2 + d2;
-    const V v2 = X4 + d4;
-    const V v3 = X6 + d6;
-    const V v4 = X2 + a1;
-    const V v5 = X8 + d8;
-    const V v6 = X4 + a2;
-    const V v7 = X2 - X0;
-    const V v8 = X6 + a3;
-    const V v9 = X8 + a4;
-    const V v10 = 0.5 * v7;
-    const V v11 = X3 + d3;
-    const V v12 = X0 + a0;
-    const V v13 = X0 + d0;
-    const V v14 = X3 + a6;
-    const V v15 = v10 * v10;
-    const V v16 = X3 - X1;
-    const V v17 = X1 + a5;
-    const V v18 = X5 + a7;
-    const V v19 = X5 + d5;
-    const V v20 = 0.5 * v16;
-    const V v21 = v12 - v4;
-    const V v22 = X1 + d1;
-    const V v23 = v17 - v14;
-    const V v24 = -a11;
-    const V v25 = v20 * v20;
-    const V v26 = v15 + v25;
-    const V v27 = a14 * v20;
-    const V v28 = X7 + a8;
-    const V v29 = X7 + d7;
-    const V v30 = X9 + a9;
-    const V v31 = X9 + d9;
-    const V v32 = softehl_vsqrt(v26);
-    const V v33 = v29 + v19;
-    const V v34 = v29 - v19;
-    const V v35 = 0.5 * v34;
-    const V v36 = 0.5 * v33;
-    const V v37 = v22 + v11;
-    const V v38 = v11 - v22;
-    const V v39 = 0.5 * v37;
-    const V v40 = d10 - d12;
-    const V v41 = v36 - v31;
-    const V v42 = v11 - X1;
-    const V v43 = 0.5 * v38;
-    const V v44 = d12 - d10;
-    const V v45 = 0.5 * v40;
-    const V v46 = v29 - v39;
-    const V v47 = v19 - v39;
-    const V v48 = 0.5 * v44;
-    const V v49 = d1 - v42;
-    const V v50 = 1.0 / a10;
-    const V v51 = -a10;
-    const V v52 = v42 - d1;
-    const V v53 = 0.5 * v49;
-    const V v54 = 0.5 * v47;
-    const V v55 = 0.5 * v46;
-    const V v56 = d11 - d13;
-    const V v57 = d13 - d11;
-    const V v58 = 0.5 * v52;
-    const V v59 = 0.25 * v52;
-    const V v60 = 0.5 * v56;
-    const V v61 = 0.5 * v57;
-    const V v62 = v46 * v58;
-    const V v63 = v47 * v58;
-    const V v64 = v58 * v58;
-    const V v65 = v54 + v59;
-    const V v66 = v54 - v59;
-    const V v67 = v55 + v59;
-    const V v68 = v55 - v59;
-    const V v69 = v3 - v2;
-    const V v70 = v3 + v2;
-    const V v71 = 0.5 * v69;
-    const V v72 = 0.5 * v70;
-    const V v73 = v13 + v1;
-    const V v74 = v1 - v13;
-    const V v75 = v1 - X0;
-    const V v76 = 0.5 * v73;
-    const V v77 = 0.5 * v74;
-    const V v78 = v72 - v5;
-    const V v79 = d0 - v75;
-    const V v80 = v3 - v76;
-    const V v81 = v2 - v76;
-    const V v82 = v75 - d0;
-    const V v83 = 0.5 * v79;
-    const V v84 = 0.5 * v82;
-    const V v85 = 0.25 * v82;
-    const V v86 = 0.5 * v81;
-    const V v87 = v81 * v84;
-    const V v88 = v87 + v63;
-    const V v89 = 0.5 * v80;
-    const V v90 = v80 * v84;
-    const V v91 = v90 + v62;
-    const V v92 = v84 * v84;
-    const V v93 = v92 + v64;
-    const V v94 = 1.0 / v93;
-    const V v95 = v91 * v94;
-    const V v96 = v86 + v85;
-    const V v97 = v89 + v85;
-    const M v98 = softehl_lt(softehl_splat(1.0), v95);
-    const V v99 = v86 - v85;
-    const V v100 = v89 - v85;
-    const V v101 = softehl_blend(v98, softehl_splat(1.0), v95);
-    const M v102 = softehl_eq(v101, v101);
-    const V v103 = v88 * v94;
-    const M v104 = softehl_lt(softehl_splat(1.0), v103);
-    const V v105 = softehl_blend(v104, softehl_splat(1.0), v103);
-    const M v106 = softehl_eq(v105, v105);
-    const V v107 = softehl_vsqrt(v93);
-    const V v108 = v94 * v94;
-    const V v109 = v99 * v94;
-    const V v110 = v100 * v94;
-    const V v111 = v66 * v94;
-    const V v112 = v68 * v94;
-    const V v113 = v96 * v94;
-    const V v114 = v97 * v94;
-    const V v115 = v83 * v108;
-    const V v116 = v53 * v108;
-    const V v117 = softehl_vsqrt(v94);
-    const V v118 = v65 * v94;
-    const V v119 = v67 * v94;
-    const V v120 = v84 * v108;
-    const V v121 = v58 * v108;
-    const V v122 = v84 * v94;
-    const V v123 = v58 * v94;
-    const V v124 = v88 * v115;
-    const V v125 = v124 + v113;
-    const V v126 = v91 * v115;
-    const V v127 = v114 + v126;
-    const V v128 = v88 * v116;
-    const V v129 = v128 + v118;
-    const V v130 = v91 * v116;
-    const V v131 = v119 + v130;
-    const V v132 = v88 * v120;
-    const V v133 = v91 * v120;
-    const V v134 = v88 * v121;
-    const V v135 = v91 * v121;
-    const V v136 = 0.5 * v117;
-    const V v137 = 1.0 / v107;
-    const V v138 = v84 * v137;
-    const V v139 = v58 * v137;
-    const V v140 = v137 * v137;
-    const V v141 = 0.5 * v137;
-    const V v142 = 2.0 * v138;
-    const V v143 = 2.0 * v139;
-    const V v144 = 4.0 * v138;
-    const V v145 = 4.0 * v139;
-    const V v146 = 0.5 * v138;
-    const V v147 = 0.5 * v139;
-    const V v148 = v84 * v140;
-    const V v149 = v136 * v148;
-    const V v150 = v58 * v140;
-    const V v151 = v136 * v150;
-    const V v152 = v58 * v149;
-    const V v153 = v84 * v149;
-    const V v154 = v58 * v151;
-    const V v155 = v84 * v151;
-    const V v156 = v141 - v153;
-    const V v157 = v153 - v141;
-    const V v158 = v141 - v154;
-    const V v159 = v154 - v141;
-    const V v160 = v71 * v138;
-    const V v161 = v71 * v155;
-    const V v162 = v78 * v138;
-    const V v163 = v78 * v155;
-    const V v164 = v35 * v139;
-    const V v165 = v160 + v164;
-    const V v166 = v41 * v139;
-    const V v167 = v162 + v166;
-    const V v168 = v35 * v152;
-    const V v169 = v41 * v152;
-    V v170 = softehl_splat(0.0);
-    V v171 = softehl_splat(0.0);
-    V v172 = softehl_splat(0.0);
-    V v173 = softehl_splat(0.0);
-    V v174 = softehl_splat(0.0);
-    V v175 = softehl_splat(0.0);
-    V v176 = softehl_splat(0.0);
-    const M m177 = v102;
-    if (softehl_any(m177)) {
-        const M v178 = softehl_lt(softehl_splat((-1.0)), v101);
-        V v179 = softehl_splat((-1.0));
-        V v180 = softehl_splat(0.0);
-        V v181 = softehl_splat(0.0);
-        V v182 = softehl_splat(0.0);
-        V v183 = softehl_splat(0.0);
-        V v184 = softehl_splat(0.0);
-        V v185 = softehl_splat(0.0);
-        const M m186 = v178 & m177;
-        if (softehl_any(m186)) {
-            V v187 = softehl_splat(0.0);
-            V v188 = softehl_splat(0.0);
-            V v189 = softehl_splat(0.0);
-            V v190 = softehl_splat(0.0);
-            V v191 = softehl_splat(0.0);
-            V v192 = softehl_splat(0.0);
-            const M m193 = ~v98 & m186;
-            if (softehl_any(m193)) {
-                const V v194 = -v127;
-                const V v195 = -v131;
-                const V v196 = v110 - v133;
-                const V v197 = v112 - v135;
-                v187 = softehl_blend(m193, v122, v187);
-                v188 = softehl_blend(m193, v123, v188);
-                v189 = softehl_blend(m193, v194, v189);
-                v190 = softehl_blend(m193, v195, v190);
-                v191 = softehl_blend(m193, v196, v191);
-                v192 = softehl_blend(m193, v197, v192);
-            }
-            v179 = softehl_blend(m186, v101, v179);
-            v180 = softehl_blend(m186, v187, v180);
-            v181 = softehl_blend(m186, v188, v181);
-            v182 = softehl_blend(m186, v189, v182);
-            v183 = softehl_blend(m186, v190, v183);
-            v184 = softehl_blend(m186, v191, v184);
-            v185 = softehl_blend(m186, v192, v185);
-        }
-        v170 = softehl_blend(m177, v179, v170);
-        v171 = softehl_blend(m177, v182, v171);
-        v172 = softehl_blend(m177, v183, v172);
-        v173 = softehl_blend(m177, v184, v173);
-        v174 = softehl_blend(m177, v185, v174);
-        v175 = softehl_blend(m177, v180, v175);
-        v176 = softehl_blend(m177, v181, v176);
-    }
-    const M m198 = ~v102;
-    if (softehl_any(m198)) {
-        const V v199 = (-1.0) - v101;
-        const V v200 = v199 * v199;
-        const V v201 = v199 * v200;
-        V v202 = softehl_splat(0.0);
-        V v203 = softehl_splat(0.0);
-        V v204 = softehl_splat(0.0);
-        V v205 = softehl_splat(0.0);
-        V v206 = softehl_splat(0.0);
-        V v207 = softehl_splat(0.0);
-        const M m208 = ~v98 & m198;
-        if (softehl_any(m208)) {
-            const V v209 = (-1.0) - v95;
-            const V v210 = v133 - v110;
-            const V v211 = v135 - v112;
-            const V v212 = 3.0 * v209;
-            const V v213 = v209 * v212;
-            const V v214 = v210 * v213;
-            const V v215 = v211 * v213;
-            const V v216 = v127 * v213;
-            const V v217 = v131 * v213;
-            const V v218 = v122 * v213;
-            const V v219 = -v218;
-            const V v220 = v123 * v213;
-            const V v221 = -v220;
-            v202 = softehl_blend(m208, v216, v202);
-            v203 = softehl_blend(m208, v217, v203);
-            v204 = softehl_blend(m208, v214, v204);
-            v205 = softehl_blend(m208, v215, v205);
-            v206 = softehl_blend(m208, v219, v206);
-            v207 = softehl_blend(m208, v221, v207);
-        }
-        v170 = softehl_blend(m198, v201, v170);
-        v171 = softehl_blend(m198, v202, v171);
-        v172 = softehl_blend(m198, v203, v172);
-        v173 = softehl_blend(m198, v204, v173);
-        v174 = softehl_blend(m198, v205, v174);
-        v175 = softehl_blend(m198, v206, v175);
-        v176 = softehl_blend(m198, v207, v176);
-    }
-    V v222 = softehl_splat(0.0);
-    V v223 = softehl_splat(0.0);
-    V v224 = softehl_splat(0.0);
-    V v225 = softehl_splat(0.0);
-    V v226 = softehl_splat(0.0);
-    V v227 = softehl_splat(0.0);
-    V v228 = softehl_splat(0.0);
-    const M m229 = v106;
-    if (softehl_any(m229)) {
-        const M v230 = softehl_lt(softehl_splat((-1.0)), v105);
-        V v231 = softehl_splat((-1.0));
-        V v232 = softehl_splat(0.0);
-        V v233 = softehl_splat(0.0);
-        V v234 = softehl_splat(0.0);
-        V v235 = softehl_splat(0.0);
-        V v236 = softehl_splat(0.0);
-        V v237 = softehl_splat(0.0);
-        const M m238 = v230 & m229;
-        if (softehl_any(m238)) {
-            V v239 = softehl_splat(0.0);
-            V v240 = softehl_splat(0.0);
-            V v241 = softehl_splat(0.0);
-            V v242 = softehl_splat(0.0);
-            V v243 = softehl_splat(0.0);
-            V v244 = softehl_splat(0.0);
-            const M m245 = ~v104 & m238;
-            if (softehl_any(m245)) {
-                const V v246 = -v125;
-                const V v247 = -v129;
-                const V v248 = v109 - v132;
-                const V v249 = v111 - v134;
-                v239 = softehl_blend(m245, v122, v239);
-                v240 = softehl_blend(m245, v123, v240);
-                v241 = softehl_blend(m245, v246, v241);
-                v242 = softehl_blend(m245, v247, v242);
-                v243 = softehl_blend(m245, v248, v243);
-                v244 = softehl_blend(m245, v249, v244);
-            }
-            v231 = softehl_blend(m238, v105, v231);
-            v232 = softehl_blend(m238, v239, v232);
-            v233 = softehl_blend(m238, v240, v233);
-            v234 = softehl_blend(m238, v241, v234);
-            v235 = softehl_blend(m238, v242, v235);
-            v236 = softehl_blend(m238, v243, v236);
-            v237 = softehl_blend(m238, v244, v237);
-        }
-        v222 = softehl_blend(m229, v231, v222);
-        v223 = softehl_blend(m229, v234, v223);
-        v224 = softehl_blend(m229, v235, v224);
-        v225 = softehl_blend(m229, v236, v225);
-        v226 = softehl_blend(m229, v237, v226);
-        v227 = softehl_blend(m229, v232, v227);
-        v228 = softehl_blend(m229, v233, v228);
-    }
-    const M m250 = ~v106;
-    if (softehl_any(m250)) {
-        const V v251 = (-1.0) - v105;
-        const V v252 = v251 * v251;
-        const V v253 = v251 * v252;
-        V v254 = softehl_splat(0.0);
-        V v255 = softehl_splat(0.0);
-        V v256 = softehl_splat(0.0);
-        V v257 = softehl_splat(0.0);
-        V v258 = softehl_splat(0.0);
-        V v259 = softehl_splat(0.0);
-        const M m260 = ~v104 & m250;
-        if (softehl_any(m260)) {
-            const V v261 = (-1.0) - v103;
-            const V v262 = v132 - v109;
-            const V v263 = v134 - v111;
-            const V v264 = 3.0 * v261;
-            const V v265 = v261 * v264;
-            const V v266 = v262 * v265;
-            const V v267 = v263 * v265;
-            const V v268 = v125 * v265;
-            const V v269 = v129 * v265;
-            const V v270 = v122 * v265;
-            const V v271 = -v270;
-            const V v272 = v123 * v265;
-            const V v273 = -v272;
-            v254 = softehl_blend(m260, v268, v254);
-            v255 = softehl_blend(m260, v269, v255);
-            v256 = softehl_blend(m260, v266, v256);
-            v257 = softehl_blend(m260, v267, v257);
-            v258 = softehl_blend(m260, v271, v258);
-            v259 = softehl_blend(m260, v273, v259);
-        }
-        v222 = softehl_blend(m250, v253, v222);
-        v223 = softehl_blend(m250, v254, v223);
-        v224 = softehl_blend(m250, v255, v224);
-        v225 = softehl_blend(m250, v256, v225);
-        v226 = softehl_blend(m250, v257, v226);
-        v227 = softehl_blend(m250, v258, v227);
-        v228 = softehl_blend(m250, v259, v228);
-    }
-    const V v274 = v165 * v165;
-    const V v275 = 2.0 * v165;
-    const V v276 = v222 - v170;
-    const V v277 = 0.01 * v274;
-    const V v278 = 4.0 * v167;
-    const V v279 = v144 * v167;
-    const V v280 = v145 * v167;
-    const M v281 = softehl_eq(v276, v276);
-    const V v282 = v146 * v275;
-    const V v283 = v147 * v275;
-    const V v284 = -v279;
-    const V v285 = -v280;
-    const V v286 = v71 * v157;
-    const V v287 = v168 + v286;
-    const V v288 = v78 * v157;
-    const V v289 = v169 + v288;
-    const V v290 = v71 * v156;
-    const V v291 = v78 * v156;
-    const V v292 = v291 - v169;
-    const V v293 = v290 - v168;
-    const V v294 = v35 * v159;
-    const V v295 = v161 + v294;
-    const V v296 = v41 * v159;
-    const V v297 = v163 + v296;
-    const V v298 = v35 * v158;
-    const V v299 = v41 * v158;
-    const V v300 = v298 - v161;
-    const V v301 = v299 - v163;
-    V v302 = softehl_splat(0.0);
-    V v303 = softehl_splat(0.0);
-    V v304 = softehl_splat(0.0);
-    V v305 = softehl_splat(0.0);
-    V v306 = softehl_splat(0.0);
-    V v307 = softehl_splat(0.0);
-    V v308 = softehl_splat(0.0);
-    V v309 = softehl_splat(0.0);
-    V v310 = softehl_splat(0.0);
-    const M m311 = v281;
-    if (softehl_any(m311)) {
-        const M v312 = softehl_lt(softehl_splat(0.0), v276);
-        V v313 = softehl_splat(0.0);
-        V v314 = softehl_splat(0.0);
-        V v315 = softehl_splat(0.0);
-        V v316 = softehl_splat(0.0);
-        V v317 = softehl_splat(0.0);
-        V v318 = softehl_splat(0.0);
-        V v319 = softehl_splat(0.0);
-        V v320 = softehl_splat(0.0);
-        V v321 = softehl_splat(0.0);
-        const M m322 = v312 & m311;
-        if (softehl_any(m322)) {
-            const V v323 = -v175;
-            const V v324 = v223 - v171;
-            const V v325 = -v176;
-            const V v326 = v224 - v172;
-            const V v327 = v225 - v173;
-            const V v328 = v226 - v174;
-            v313 = softehl_blend(m322, v276, v313);
-            v314 = softehl_blend(m322, v324, v314);
-            v315 = softehl_blend(m322, v326, v315);
-            v316 = softehl_blend(m322, v327, v316);
-            v317 = softehl_blend(m322, v328, v317);
-            v318 = softehl_blend(m322, v227, v318);
-            v319 = softehl_blend(m322, v228, v319);
-            v320 = softehl_blend(m322, v323, v320);
-            v321 = softehl_blend(m322, v325, v321);
-        }
-        v302 = softehl_blend(m311, v313, v302);
-        v303 = softehl_blend(m311, v314, v303);
-        v304 = softehl_blend(m311, v315, v304);
-        v305 = softehl_blend(m311, v316, v305);
-        v306 = softehl_blend(m311, v317, v306);
-        v307 = softehl_blend(m311, v318, v307);
-        v308 = softehl_blend(m311, v319, v308);
-        v309 = softehl_blend(m311, v320, v309);
-        v310 = softehl_blend(m311, v321, v310);
-    }
-    const M m329 = ~v281;
-    if (softehl_any(m329)) {
-        const V v330 = v170 - v222;
-        const V v331 = v171 - v223;
-        const V v332 = v172 - v224;
-        const V v333 = v173 - v225;
-        const V v334 = v174 - v226;
-        const V v335 = v330 * v330;
-        const V v336 = v330 * v335;
-        const V v337 = 3.0 * v335;
-        const V v338 = v331 * v337;
-        const V v339 = v332 * v337;
-        const V v340 = v333 * v337;
-        const V v341 = v334 * v337;
-        const V v342 = v227 * v337;
-        const V v343 = -v342;
-        const V v344 = v228 * v337;
-        const V v345 = -v344;
-        const V v346 = v175 * v337;
-        const V v347 = v176 * v337;
-        v302 = softehl_blend(m329, v336, v302);
-        v303 = softehl_blend(m329, v338, v303);
-        v304 = softehl_blend(m329, v339, v304);
-        v305 = softehl_blend(m329, v340, v305);
-        v306 = softehl_blend(m329, v341, v306);
-        v307 = softehl_blend(m329, v343, v307);
-        v308 = softehl_blend(m329, v345, v308);
-        v309 = softehl_blend(m329, v346, v309);
-        v310 = softehl_blend(m329, v347, v310);
-    }
-    const V v348 = 0.5 * v302;
-    const V v349 = 0.5 * v303;
-    const V v350 = 0.5 * v304;
-    const V v351 = 0.5 * v305;
-    const V v352 = v170 + v222;
-    const V v353 = v32 * v348;
-    const V v354 = v32 * v349;
-    const V v355 = v32 * v350;
-    const V v356 = v223 + v171;
-    const V v357 = v32 * v351;
-    const V v358 = v224 + v172;
-    const V v359 = 0.5 * v352;
-    const V v360 = 0.5 * v306;
-    const V v361 = 0.5 * v356;
-    const V v362 = 0.5 * v307;
-    const V v363 = 0.5 * v358;
-    const V v364 = v32 * v360;
-    const V v365 = v225 + v173;
-    const V v366 = v32 * v362;
-    const V v367 = 0.5 * v308;
-    const V v368 = 0.5 * v309;
-    const V v369 = v226 + v174;
-    const V v370 = 0.5 * v310;
-    const V v371 = 0.5 * v365;
-    const V v372 = v32 * v367;
-    const V v373 = v32 * v368;
-    const V v374 = v32 * v370;
-    const V v375 = 0.5 * v369;
-    const V v376 = 0.5 * v227;
-    const V v377 = 0.5 * v228;
-    const V v378 = 0.5 * v175;
-    const V v379 = 0.5 * v176;
-    const V v380 = 6.283185307179586 * v27;
-    const V v381 = v21 * v138;
-    const V v382 = v353 * v380;
-    const V v383 = v23 * v139;
-    const V v384 = v381 + v383;
-    const V v385 = 0.5 * v384;
-    V s386 = softehl_splat(0.0);
-    V s387 = softehl_splat(0.0);
-    V s388 = softehl_splat(0.0);
-    V s389 = softehl_splat(0.0);
-    V s390 = softehl_splat(0.0);
-    V s391 = softehl_splat(0.0);
-    V s392 = softehl_splat(0.0);
-    V s393 = softehl_splat(0.0);
-    V s394 = softehl_splat(0.0);
-    V s395 = softehl_splat(0.0);
-    V s396 = softehl_splat(0.0);
-    V s397 = softehl_splat(0.0);
-    V s398 = softehl_splat(0.0);
-    V s399 = softehl_splat(0.0);
-    V s400 = softehl_splat(0.0);
-    V s401 = softehl_splat(0.0);
-    V s402 = softehl_splat(0.0);
-    V s403 = softehl_splat(0.0);
-    V s404 = softehl_splat(0.0);
-    V s405 = softehl_splat(0.0);
-    V s406 = softehl_splat(0.0);
-    V s407 = softehl_splat(0.0);
-    V s408 = softehl_splat(0.0);
-    V s409 = softehl_splat(0.0);
-    V s410 = softehl_splat(0.0);
-    V s411 = softehl_splat(0.0);
-    V s412 = softehl_splat(0.0);
-    V s413 = softehl_splat(0.0);
-    V s414 = softehl_splat(0.0);
-    V s415 = softehl_splat(0.0);
-    V s416 = softehl_splat(0.0);
-    V s417 = softehl_splat(0.0);
-    V s418 = softehl_splat(0.0);
-    V s419 = softehl_splat(0.0);
-    V s420 = softehl_splat(0.0);
-    V s421 = softehl_splat(0.0);
-    V s422 = softehl_splat(0.0);
-    V s423 = softehl_splat(0.0);
-    V s424 = softehl_splat(0.0);
-    V s425 = softehl_splat(0.0);
-    V s426 = softehl_splat(0.0);
-    V s427 = softehl_splat(0.0);
-    V s428 = softehl_splat(0.0);
-    V s429 = softehl_splat(0.0);
-    V s430 = softehl_splat(0.0);
-    V s431 = softehl_splat(0.0);
-    V s432 = softehl_splat(0.0);
-    V s433 = softehl_splat(0.0);
-    V s434 = softehl_splat(0.0);
-    V s435 = softehl_splat(0.0);
-    V s436 = softehl_splat(0.0);
-    V s437 = softehl_splat(0.0);
-    V s438 = softehl_splat(0.0);
-    V s439 = softehl_splat(0.0);
-    V s440 = softehl_splat(0.0);
-    V s441 = softehl_splat(0.0);
-    V s442 = softehl_splat(0.0);
-    V s443 = softehl_splat(0.0);
-    V s444 = softehl_splat(0.0);
-    V s445 = softehl_splat(0.0);
-    V s446 = softehl_splat(0.0);
-    V s447 = softehl_splat(0.0);
-    V s448 = softehl_splat(0.0);
-    V s449 = softehl_splat(0.0);
-    V s450 = softehl_splat(0.0);
-    V s451 = softehl_splat(0.0);
-    V s452 = softehl_splat(0.0);
-    V s453 = softehl_splat(0.0);
-    V s454 = softehl_splat(0.0);
-    V s455 = softehl_splat(0.0);
-    V s456 = softehl_splat(0.0);
-    V s457 = softehl_splat(0.0);
-    V s458 = softehl_splat(0.0);
-    V s459 = softehl_splat(0.0);
-    V s460 = softehl_splat(0.0);
-    V s461 = softehl_splat(0.0);
-    V s462 = softehl_splat(0.0);
-    V s463 = softehl_splat(0.0);
-    V s464 = softehl_splat(0.0);
-    V s465 = softehl_splat(0.0);
-    V s466 = softehl_splat(0.0);
-    V s467 = softehl_splat(0.0);
-    V s468 = softehl_splat(0.0);
-    V s469 = softehl_splat(0.0);
-    V s470 = softehl_splat(0.0);
-    V s471 = softehl_splat(0.0);
-    V s472 = softehl_splat(0.0);
-    V s473 = softehl_splat(0.0);
-    V s474 = softehl_splat(0.0);
-    V s475 = softehl_splat(0.0);
-    V s476 = softehl_splat(0.0);
-    V s477 = softehl_splat(0.0);
-    V s478 = softehl_splat(0.0);
-    V s479 = softehl_splat(0.0);
-    V s480 = softehl_splat(0.0);
-    V s481 = softehl_splat(0.0);
-    V s482 = softehl_splat(0.0);
-    V s483 = softehl_splat(0.0);
-    V s484 = softehl_splat(0.0);
-    V s485 = softehl_splat(0.0);
-    V s486 = softehl_splat(0.0);
-    V s487 = softehl_splat(0.0);
-    V s488 = softehl_splat(0.0);
-    V s489 = softehl_splat(0.0);
-    V s490 = softehl_splat(0.0);
-    V s491 = softehl_splat(0.0);
-    V s492 = softehl_splat(0.0);
-    V s493 = softehl_splat(0.0);
-    V s494 = softehl_splat(0.0);
-    V s495 = softehl_splat(0.0);
-    V s496 = softehl_splat(0.0);
-    V s497 = softehl_splat(0.0);
-    V s498 = softehl_splat(0.0);
-    V s499 = softehl_splat(0.0);
-    V s500 = softehl_splat(0.0);
-    V s501 = softehl_splat(0.0);
-    V s502 = softehl_splat(0.0);
-    V s503 = softehl_splat(0.0);
-    V s504 = softehl_splat(0.0);
-    V s505 = softehl_splat(0.0);
-    V s506 = softehl_splat(0.0);
-    V s507 = softehl_splat(0.0);
-    V s508 = softehl_splat(0.0);
-    V s509 = softehl_splat(0.0);
-    V s510 = softehl_splat(0.0);
-    V s511 = softehl_splat(0.0);
-    V s512 = softehl_splat(0.0);
-    V s513 = softehl_splat(0.0);
-    V s514 = softehl_splat(0.0);
-    V s515 = softehl_splat(0.0);
-    V s516 = softehl_splat(0.0);
-    V s517 = softehl_splat(0.0);
-    V s518 = softehl_splat(0.0);
-    V s519 = softehl_splat(0.0);
-    V s520 = softehl_splat(0.0);
-    V s521 = softehl_splat(0.0);
-    V s522 = softehl_splat(0.0);
-    V s523 = softehl_splat(0.0);
-    V s524 = softehl_splat(0.0);
-    V s525 = softehl_splat(0.0);
-    V s526 = softehl_splat(0.0);
-    V s527 = softehl_splat(0.0);
-    V s528 = softehl_splat(0.0);
-    V s529 = softehl_splat(0.0);
-    V s530 = softehl_splat(0.0);
-    V s531 = softehl_splat(0.0);
-    V s532 = softehl_splat(0.0);
-    V s533 = softehl_splat(0.0);
-    V s534 = softehl_splat(0.0);
-    V s535 = softehl_splat(0.0);
-    V s536 = softehl_splat(0.0);
-    V s537 = softehl_splat(0.0);
-    V s538 = softehl_splat(0.0);
-    V s539 = softehl_splat(0.0);
-    V s540 = softehl_splat(0.0);
-    V s541 = softehl_splat(0.0);
-    V s542 = softehl_splat(0.0);
-    V s543 = softehl_splat(0.0);
-    V s544 = softehl_splat(0.0);
-    V s545 = softehl_splat(0.0);
-    V s546 = softehl_splat(0.0);
-    V s547 = softehl_splat(0.0);
-    V s548 = softehl_splat(0.0);
-    V s549 = softehl_splat(0.0);
-    V s550 = softehl_splat(0.0);
-    V s551 = softehl_splat(0.0);
-    V s552 = softehl_splat(0.0);
-    V s553 = softehl_splat(0.0);
-    V s554 = softehl_splat(0.0);
-    V s555 = softehl_splat(0.0);
-    V s556 = softehl_splat(0.0);
-    V s557 = softehl_splat(0.0);
-    V s558 = softehl_splat(0.0);
-    V s559 = softehl_splat(0.0);
-    V s560 = softehl_splat(0.0);
-    V s561 = softehl_splat(0.0);
-    V s562 = softehl_splat(0.0);
-    V s563 = softehl_splat(0.0);
-    V s564 = softehl_splat(0.0);
-    V s565 = softehl_splat(0.0);
-    V s566 = softehl_splat(0.0);
-    V s567 = softehl_splat(0.0);
-    V s568 = softehl_splat(0.0);
-    V s569 = softehl_splat(0.0);
-    V s570 = softehl_splat(0.0);
-    V s571 = softehl_splat(0.0);
-    V s572 = softehl_splat(0.0);
-    V s573 = softehl_splat(0.0);
-    V s574 = softehl_splat(0.0);
-    V s575 = softehl_splat(0.0);
-    V s576 = softehl_splat(0.0);
-    V s577 = softehl_splat(0.0);
-    V s578 = softehl_splat(0.0);
-    V s579 = softehl_splat(0.0);
-    V s580 = softehl_splat(0.0);
-    V s581 = softehl_splat(0.0);
-    V s582 = softehl_splat(0.0);
-    V s583 = softehl_splat(0.0);
-    V s584 = softehl_splat(0.0);
-    V s585 = softehl_splat(0.0);
-    V s586 = softehl_splat(0.0);
-    V s587 = softehl_splat(0.0);
-    V s588 = softehl_splat(0.0);
-    V s589 = softehl_splat(0.0);
-    V s590 = softehl_splat(0.0);
-    V s591 = softehl_splat(0.0);
-    for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const V v592 = w[0] * v348;
-        const V v593 = v592 + v359;
-        const V v594 = 0.5 * v593;
-        const V v595 = 0.5 - v594;
-        const V v596 = 0.5 + v594;
-        const V v597 = v13 * v595;
-        const V v598 = v22 * v595;
-        const V v599 = v1 * v596;
-        const V v600 = v597 + v599;
-        const V v601 = v11 * v596;
-        const V v602 = v598 + v601;
-        const V v603 = v5 - v600;
-        const V v604 = v31 - v602;
-        const V v605 = v138 * v603;
-        const V v606 = v139 * v604;
-        const V v607 = v605 + v606;
-        const V v608 = 4.0 * v607;
-        const V v609 = v167 * v608;
-        const V v610 = v274 - v609;
-        const M v611 = softehl_eq(v610, v610);
-        const V v612 = v278 * v603;
-        const V v613 = v278 * v604;
-        V v614 = softehl_splat(0.0);
-        V v615 = softehl_splat(0.0);
-        V v616 = softehl_splat(0.0);
-        V v617 = softehl_splat(0.0);
-        V v618 = softehl_splat(0.0);
-        V v619 = softehl_splat(0.0);
-        V v620 = softehl_splat(0.0);
-        V v621 = softehl_splat(0.0);
-        V v622 = softehl_splat(0.0);
-        V v623 = softehl_splat(0.0);
-        const M m624 = v611;
-        if (softehl_any(m624)) {
-            const M v625 = softehl_lt(v277, v610);
-            V v626 = v277;
-            V v627 = softehl_splat(0.0);
-            V v628 = softehl_splat(0.0);
-            V v629 = softehl_splat(0.0);
-            V v630 = softehl_splat(0.0);
-            V v631 = softehl_splat(0.0);
-            V v632 = softehl_splat(0.0);
-            V v633 = softehl_splat(0.0);
-            V v634 = softehl_splat(1.0);
-            V v635 = softehl_splat(0.0);
-            const M m636 = v625 & m624;
-            if (softehl_any(m636)) {
-                const V v637 = -v612;
-                const V v638 = -v613;
-                const V v639 = -v608;
-                v626 = softehl_blend(m636, v610, v626);
-                v627 = softehl_blend(m636, v639, v627);
-                v628 = softehl_blend(m636, v284, v628);
-                v629 = softehl_blend(m636, v285, v629);
-                v630 = softehl_blend(m636, v280, v630);
-                v631 = softehl_blend(m636, v279, v631);
-                v632 = softehl_blend(m636, v637, v632);
-                v633 = softehl_blend(m636, v638, v633);
-                v634 = softehl_blend(m636, softehl_splat(0.0), v634);
-                v635 = softehl_blend(m636, softehl_splat(1.0), v635);
-            }
-            v614 = softehl_blend(m624, v626, v614);
-            v615 = softehl_blend(m624, v627, v615);
-            v616 = softehl_blend(m624, v628, v616);
-            v617 = softehl_blend(m624, v629, v617);
-            v618 = softehl_blend(m624, v630, v618);
-            v619 = softehl_blend(m624, v631, v619);
-            v620 = softehl_blend(m624, v632, v620);
-            v621 = softehl_blend(m624, v633, v621);
-            v622 = softehl_blend(m624, v634, v622);
-            v623 = softehl_blend(m624, v635, v623);
-        }
-        const M m640 = ~v611;
-        if (softehl_any(m640)) {
-            const V v641 = v277 - v610;
-            const V v642 = v641 * v641;
-            const V v643 = v641 * v642;
-            const V v644 = 3.0 * v642;
-            const V v645 = -v644;
-            const V v646 = v608 * v644;
-            const V v647 = v279 * v644;
-            const V v648 = -v647;
-            const V v649 = v280 * v644;
-            const V v650 = -v649;
-            const V v651 = v612 * v644;
-            const V v652 = v613 * v644;
-            v614 = softehl_blend(m640, v643, v614);
-            v615 = softehl_blend(m640, v646, v615);
-            v616 = softehl_blend(m640, v647, v616);
-            v617 = softehl_blend(m640, v649, v617);
-            v618 = softehl_blend(m640, v650, v618);
-            v619 = softehl_blend(m640, v648, v619);
-            v620 = softehl_blend(m640, v651, v620);
-            v621 = softehl_blend(m640, v652, v621);
-            v622 = softehl_blend(m640, v644, v622);
-            v623 = softehl_blend(m640, v645, v623);
-        }
-        const V v653 = 2.0 * v603;
-        const V v654 = 2.0 * v604;
-        const V v655 = 2.0 * v607;
-        const V v656 = v655 * v623;
-        const V v657 = v655 * v615;
-        const V v658 = v655 * v616;
-        const V v659 = v655 * v619;
-        const V v660 = v655 * v617;
-        const V v661 = v655 * v618;
-        const V v662 = v655 * v622;
-        const V v663 = w[0] * v367;
-        const V v664 = v663 + v377;
-        const V v665 = w[0] * v368;
-        const V v666 = v665 + v378;
-        const V v667 = w[0] * v349;
-        const V v668 = v667 + v361;
-        const V v669 = w[0] * v370;
-        const V v670 = v669 + v379;
-        const V v671 = w[0] * v350;
-        const V v672 = v671 + v363;
-        const V v673 = w[0] * v351;
-        const V v674 = v673 + v371;
-        const V v675 = w[0] * v360;
-        const V v676 = v675 + v375;
-        const V v677 = v594 - 0.5;
-        const V v678 = w[0] * v362;
-        const V v679 = v678 + v376;
-        const V v680 = v77 * v664;
-        const V v681 = v43 * v664;
-        const V v682 = v43 * v668;
-        const V v683 = v77 * v668;
-        const V v684 = v77 * v672;
-        const V v685 = v43 * v672;
-        const V v686 = v43 * v674;
-        const V v687 = v77 * v674;
-        const V v688 = v77 * v676;
-        const V v689 = v43 * v676;
-        const V v690 = v77 * v679;
-        const V v691 = v43 * v679;
-        const V v692 = v77 * v670;
-        const V v693 = v43 * v670;
-        const V v694 = v77 * v666;
-        const V v695 = v43 * v666;
-        const V v696 = v683 + v595;
-        const V v697 = v685 + v595;
-        const V v698 = d10 * v595;
-        const V v699 = X1 * v595;
-        const V v700 = w[1] * v595;
-        const V v701 = v50 * v595;
-        const V v702 = v50 * v596;
-        const V v703 = d12 * v596;
-        const V v704 = v698 + v703;
-        const V v705 = w[1] * v596;
-        const V v706 = X3 * v596;
-        const V v707 = v699 + v706;
-        const V v708 = v687 + v596;
-        const V v709 = v689 + v596;
-        const V v710 = softehl_vsqrt(v614);
-        const V v711 = 1.0 / v614;
-        const V v712 = 6.283185307179586 * v707;
-        const V v713 = (-1.0) + v712;
-        const V v714 = v138 * v682;
-        const V v715 = v138 * v686;
-        const V v716 = v138 * v709;
-        const V v717 = v138 * v691;
-        const V v718 = v138 * v695;
-        const V v719 = v138 * v697;
-        const V v720 = a14 * v713;
-        const V v721 = 1.0 + v720;
-        const V v722 = v139 * v696;
-        const V v723 = v714 - v722;
-        const V v724 = v139 * v708;
-        const V v725 = v715 - v724;
-        const V v726 = v139 * v688;
-        const V v727 = v716 - v726;
-        const V v728 = v139 * v684;
-        const V v729 = v719 - v728;
-        const V v730 = v353 * v721;
-        const V v731 = softehl_vsqrt(v711);
-        const V v732 = 0.5 * v731;
-        const V v733 = v732 * v656;
-        const V v734 = v732 * v657;
-        const V v735 = v139 * v730;
-        const V v736 = v138 * v730;
-        const V v737 = v701 * v730;
-        const V v738 = v702 * v730;
-        const V v739 = v732 * v658;
-        const V v740 = v732 * v659;
-        const V v741 = v732 * v660;
-        const V v742 = v732 * v661;
-        const V v743 = v732 * v662;
-        const V v744 = v655 * v732;
-        const V v745 = v165 - v710;
-        const V v746 = 1.0 / v745;
-        const V v747 = v655 * v746;
-        const V v748 = 0.5 * v747;
-        const V v749 = 2.0 * v747;
-        const V v750 = v746 * v746;
-        const V v751 = v655 * v750;
-        const V v752 = v744 * v750;
-        const V v753 = v743 * v750;
-        const V v754 = 0.01 * v753;
-        const V v755 = v733 * v750;
-        const V v756 = v755 + v754;
-        const V v757 = v142 * v746;
-        const V v758 = v143 * v746;
-        const V v759 = v734 * v750;
-        const V v760 = v653 * v746;
-        const V v761 = v654 * v746;
-        const V v762 = v620 * v752;
-        const V v763 = v760 + v762;
-        const V v764 = v621 * v752;
-        const V v765 = v761 + v764;
-        const V v766 = v740 * v750;
-        const V v767 = v757 - v766;
-        const V v768 = v742 * v750;
-        const V v769 = v758 - v768;
-        const V v770 = v275 * v756;
-        const V v771 = v751 - v770;
-        const V v772 = v696 * v767;
-        const V v773 = v289 * v759;
-        const V v774 = v772 - v773;
-        const V v775 = v682 * v769;
-        const V v776 = v775 + v774;
-        const V v777 = v287 * v771;
-        const V v778 = v777 + v776;
-        const V v779 = v684 * v767;
-        const V v780 = v297 * v759;
-        const V v781 = v779 - v780;
-        const V v782 = v697 * v769;
-        const V v783 = v782 + v781;
-        const V v784 = v295 * v771;
-        const V v785 = v784 + v783;
-        const V v786 = v708 * v767;
-        const V v787 = v292 * v759;
-        const V v788 = v786 - v787;
-        const V v789 = v686 * v769;
-        const V v790 = v789 + v788;
-        const V v791 = v293 * v771;
-        const V v792 = v791 + v790;
-        const V v793 = v300 * v771;
-        const V v794 = v301 * v759;
-        const V v795 = v793 - v794;
-        const V v796 = v688 * v767;
-        const V v797 = v796 + v795;
-        const V v798 = v709 * v769;
-        const V v799 = v798 + v797;
-        const V v800 = v690 * v767;
-        const V v801 = v691 * v769;
-        const V v802 = v800 + v801;
-        const V v803 = v681 * v769;
-        const V v804 = v694 * v767;
-        const V v805 = v695 * v769;
-        const V v806 = v804 + v805;
-        const V v807 = v693 * v769;
-        const V v808 = v282 * v756;
-        const V v809 = v283 * v756;
-        const V v810 = v146 * v751;
-        const V v811 = v808 - v810;
-        const V v812 = v146 * v759;
-        const V v813 = v147 * v751;
-        const V v814 = v809 - v813;
-        const V v815 = v147 * v759;
-        const V v816 = v802 - v812;
-        const V v817 = v806 - v812;
-        const V v818 = v811 + v816;
-        const V v819 = v817 - v811;
-        const V v820 = v803 - v815;
-        const V v821 = v807 - v815;
-        const V v822 = v814 + v820;
-        const V v823 = v821 - v814;
-        const V v824 = v680 * v767;
-        const V v825 = v824 + v822;
-        const V v826 = v692 * v767;
-        const V v827 = v826 + v823;
-        const V v828 = v138 * v759;
-        const V v829 = v828 - v757;
-        const V v830 = v739 * v750;
-        const V v831 = v829 - v830;
-        const V v832 = v139 * v759;
-        const V v833 = v832 - v758;
-        const V v834 = v741 * v750;
-        const V v835 = v833 - v834;
-        const V v836 = (-1.0) - v747;
-        const V v837 = v836 - v747;
-        const V v838 = 0.5 * v837;
-        const V v839 = v748 * v836;
-        const V v840 = 1.0 - v747;
-        const V v841 = v748 * v840;
-        const V v842 = v840 - v747;
-        const V v843 = v747 * v747;
-        const V v844 = 1.0 - v843;
-        const V v845 = 0.5 * v842;
-        const V v846 = v139 * v844;
-        const V v847 = v690 + v839;
-        const V v848 = v139 * v847;
-        const V v849 = v717 - v848;
-        const V v850 = w[1] * v844;
-        const V v851 = w[1] * v841;
-        const V v852 = w[1] * v839;
-        const V v853 = v5 * v844;
-        const V v854 = v5 * v749;
-        const V v855 = v31 * v749;
-        const V v856 = v31 * v844;
-        const V v857 = v853 - v600;
-        const V v858 = v856 - v602;
-        const V v859 = v681 + v839;
-        const V v860 = v694 + v841;
-        const V v861 = v693 + v841;
-        const V v862 = v2 * v839;
-        const V v863 = v857 - v862;
-        const V v864 = v19 * v839;
-        const V v865 = v858 - v864;
-        const V v866 = v2 * v838;
-        const V v867 = v854 + v866;
-        const V v868 = v19 * v838;
-        const V v869 = v855 + v868;
-        const V v870 = v152 * v765;
-        const V v871 = v155 * v763;
-        const V v872 = v158 * v765;
-        const V v873 = v799 - v872;
-        const V v874 = v871 + v873;
-        const V v875 = v3 * v841;
-        const V v876 = v863 - v875;
-        const V v877 = v152 * v876;
-        const V v878 = v29 * v841;
-        const V v879 = v865 - v878;
-        const V v880 = v3 * v845;
-        const V v881 = v880 + v867;
-        const V v882 = v29 * v845;
-        const V v883 = v882 + v869;
-        const V v884 = v155 * v879;
-        const V v885 = v138 * v861;
-        const V v886 = v138 * v859;
-        const V v887 = v785 - v871;
-        const V v888 = v158 * v876;
-        const V v889 = v888 + v727;
-        const V v890 = v139 * v881;
-        const V v891 = v139 * v876;
-        const V v892 = v139 * v680;
-        const V v893 = v886 - v892;
-        const V v894 = v139 * v692;
-        const V v895 = v885 - v894;
-        const V v896 = v159 * v765;
-        const V v897 = v887 - v896;
-        const V v898 = v159 * v876;
-        const V v899 = v898 + v729;
-        const V v900 = v138 * v883;
-        const V v901 = v890 - v900;
-        const V v902 = v138 * v879;
-        const V v903 = v891 - v902;
-        const V v904 = v884 + v889;
-        const V v905 = v899 - v884;
-        const V v906 = v901 * v874;
-        const V v907 = v904 + v906;
-        const V v908 = a10 * v903;
-        const V v909 = v901 * v897;
-        const V v910 = v905 + v909;
-        const V v911 = v901 * v825;
-        const V v912 = v893 + v911;
-        const V v913 = v901 * v827;
-        const V v914 = v895 + v913;
-        const V v915 = v835 * v901;
-        const V v916 = v138 * v844;
-        const V v917 = v915 - v916;
-        const V v918 = v139 * v860;
-        const V v919 = v718 - v918;
-        const V v920 = v831 * v901;
-        const V v921 = v846 + v920;
-        const V v922 = v901 * v818;
-        const V v923 = v849 + v922;
-        const V v924 = v704 - v908;
-        const V v925 = v901 * v819;
-        const V v926 = v925 + v919;
-        const V v927 = v877 + v723;
-        const V v928 = v725 - v877;
-        const M v929 = softehl_eq(v924, v924);
-        const V v930 = v778 - v870;
-        const V v931 = v870 + v792;
-        const V v932 = v157 * v879;
-        const V v933 = v927 - v932;
-        const V v934 = v157 * v763;
-        const V v935 = v930 - v934;
-        const V v936 = v156 * v879;
-        const V v937 = v928 - v936;
-        const V v938 = v156 * v763;
-        const V v939 = v931 - v938;
-        const V v940 = v901 * v935;
-        const V v941 = v933 + v940;
-        const V v942 = v901 * v939;
-        const V v943 = v937 + v942;
-        V v944 = softehl_splat(0.0);
-        V v945 = softehl_splat(0.0);
-        V v946 = softehl_splat(0.0);
-        V v947 = softehl_splat(0.0);
-        V v948 = softehl_splat(0.0);
-        V v949 = softehl_splat(0.0);
-        V v950 = softehl_splat(0.0);
-        V v951 = softehl_splat(0.0);
-        V v952 = softehl_splat(0.0);
-        V v953 = softehl_splat(0.0);
-        V v954 = softehl_splat(0.0);
-        V v955 = softehl_splat(0.0);
-        V v956 = softehl_splat(0.0);
-        V v957 = softehl_splat(0.0);
-        V v958 = softehl_splat(0.0);
-        V v959 = softehl_splat(0.0);
-        V v960 = softehl_splat(0.0);
-        V v961 = softehl_splat(0.0);
-        V v962 = softehl_splat(0.0);
-        V v963 = softehl_splat(0.0);
-        V v964 = softehl_splat(0.0);
-        V v965 = softehl_splat(0.0);
-        V v966 = softehl_splat(0.0);
-        V v967 = softehl_splat(0.0);
-        V v968 = softehl_splat(0.0);
-        V v969 = softehl_splat(0.0);
-        V v970 = softehl_splat(0.0);
-        V v971 = softehl_splat(0.0);
-        V v972 = softehl_splat(0.0);
-        V v973 = softehl_splat(0.0);
-        V v974 = softehl_splat(0.0);
-        V v975 = softehl_splat(0.0);
-        V v976 = softehl_splat(0.0);
-        V v977 = softehl_splat(0.0);
-        V v978 = softehl_splat(0.0);
-        V v979 = softehl_splat(0.0);
-        V v980 = softehl_splat(0.0);
-        V v981 = softehl_splat(0.0);
-        V v982 = softehl_splat(0.0);
-        V v983 = softehl_splat(0.0);
-        V v984 = softehl_splat(0.0);
-        V v985 = softehl_splat(0.0);
-        V v986 = softehl_splat(0.0);
-        V v987 = softehl_splat(0.0);
-        V v988 = softehl_splat(0.0);
-        V v989 = softehl_splat(0.0);
-        V v990 = softehl_splat(0.0);
-        V v991 = softehl_splat(0.0);
-        V v992 = softehl_splat(0.0);
-        V v993 = softehl_splat(0.0);
-        V v994 = softehl_splat(0.0);
-        V v995 = softehl_splat(0.0);
-        V v996 = softehl_splat(0.0);
-        V v997 = softehl_splat(0.0);
-        V v998 = softehl_splat(0.0);
-        const M m999 = v929;
-        if (softehl_any(m999)) {
-            const M v1000 = softehl_le(softehl_splat(0.0), v924);
-            V v1001 = softehl_splat(0.0);
-            V v1002 = softehl_splat(0.0);
-            V v1003 = softehl_splat(0.0);
-            V v1004 = softehl_splat(0.0);
-            V v1005 = softehl_splat(0.0);
-            V v1006 = softehl_splat(0.0);
-            V v1007 = softehl_splat(0.0);
-            V v1008 = softehl_splat(0.0);
-            V v1009 = softehl_splat(0.0);
-            V v1010 = softehl_splat(0.0);
-            V v1011 = softehl_splat(0.0);
-            V v1012 = softehl_splat(0.0);
-            V v1013 = softehl_splat(0.0);
-            V v1014 = softehl_splat(0.0);
-            V v1015 = softehl_splat(0.0);
-            V v1016 = softehl_splat(0.0);
-            V v1017 = softehl_splat(0.0);
-            V v1018 = softehl_splat(0.0);
-            V v1019 = softehl_splat(0.0);
-            V v1020 = softehl_splat(0.0);
-            V v1021 = softehl_splat(0.0);
-            V v1022 = softehl_splat(0.0);
-            V v1023 = softehl_splat(0.0);
-            V v1024 = softehl_splat(0.0);
-            V v1025 = softehl_splat(0.0);
-            V v1026 = softehl_splat(0.0);
-            V v1027 = softehl_splat(0.0);
-            V v1028 = softehl_splat(0.0);
-            V v1029 = softehl_splat(0.0);
-            V v1030 = softehl_splat(0.0);
-            V v1031 = softehl_splat(0.0);
-            V v1032 = softehl_splat(0.0);
-            V v1033 = softehl_splat(0.0);
-            V v1034 = softehl_splat(0.0);
-            V v1035 = softehl_splat(0.0);
-            V v1036 = softehl_splat(0.0);
-            V v1037 = softehl_splat(0.0);
-            V v1038 = softehl_splat(0.0);
-            V v1039 = softehl_splat(0.0);
-            V v1040 = softehl_splat(0.0);
-            V v1041 = softehl_splat(0.0);
-            V v1042 = softehl_splat(0.0);
-            V v1043 = softehl_splat(0.0);
-            const M m1044 = v1000 & m999;
-            if (softehl_any(m1044)) {
-                const V v1045 = a12 + v903;
-                const V v1046 = v903 - a13;
-                const V v1047 = v1045 * v1046;
-                const M v1048 = softehl_eq(v1047, v1047);
-                V v1049 = softehl_splat(0.0);
-                V v1050 = softehl_splat(0.0);
-                V v1051 = softehl_splat(0.0);
-                V v1052 = softehl_splat(0.0);
-                V v1053 = softehl_splat(0.0);
-                const M m1054 = v1048 & m1044;
-                if (softehl_any(m1054)) {
-                    const M v1055 = softehl_lt(v1047, softehl_splat(0.0));
-                    const V v1056 = softehl_blend(v1055, v924, softehl_splat(0.0));
-                    const V v1057 = softehl_blend(v1055, v595, softehl_splat(0.0));
-                    const V v1058 = softehl_blend(v1055, v596, softehl_splat(0.0));
-                    const V v1059 = softehl_blend(v1055, v51, softehl_splat(0.0));
-                    const V v1060 = softehl_blend(v1055, v48, softehl_splat(0.0));
-                    v1049 = softehl_blend(m1054, v1056, v1049);
-                    v1050 = softehl_blend(m1054, v1057, v1050);
-                    v1051 = softehl_blend(m1054, v1058, v1051);
-                    v1052 = softehl_blend(m1054, v1059, v1052);
-                    v1053 = softehl_blend(m1054, v1060, v1053);
-                }
-                const M m1061 = ~v1048 & m1044;
-                if (softehl_any(m1061)) {
-                    const V v1062 = v1047 * v1047;
-                    const V v1063 = v1045 + v1046;
-                    const V v1064 = v1047 * v1062;
-                    const V v1065 = 3.0 * v1062;
-                    const V v1066 = v1065 * v1063;
-                    v1049 = softehl_blend(m1061, v1064, v1049);
-                    v1050 = softehl_blend(m1061, softehl_splat(0.0), v1050);
-                    v1051 = softehl_blend(m1061, softehl_splat(0.0), v1051);
-                    v1052 = softehl_blend(m1061, v1066, v1052);
-                    v1053 = softehl_blend(m1061, softehl_splat(0.0), v1053);
-                }
-                const V v1067 = a11 * v1049;
-                const V v1068 = d11 * v595;
-                const M v1069 = softehl_eq(v1067, v1067);
-                const V v1070 = v9 * v844;
-                const V v1071 = v30 * v844;
-                const V v1072 = v12 * v595;
-                const V v1073 = v1070 - v1072;
-                const V v1074 = v17 * v595;
-                const V v1075 = v1071 - v1074;
-                const V v1076 = d13 * v596;
-                const V v1077 = v1068 + v1076;
-                const V v1078 = v4 * v596;
-                const V v1079 = v1073 - v1078;
-                const V v1080 = v14 * v596;
-                const V v1081 = v1075 - v1080;
-                const V v1082 = v6 * v839;
-                const V v1083 = v1079 - v1082;
-                const V v1084 = v18 * v839;
-                const V v1085 = v1081 - v1084;
-                const V v1086 = v8 * v841;
-                const V v1087 = v1083 - v1086;
-                const V v1088 = v28 * v841;
-                const V v1089 = v1085 - v1088;
-                const V v1090 = v138 * v1087;
-                const V v1091 = v139 * v1089;
-                const V v1092 = v1090 + v1091;
-                const V v1093 = a10 * v1092;
-                const V v1094 = v1093 + v1077;
-                const M v1095 = softehl_eq(v1094, v1094);
-                const M v1096 = v1069 & v1095;
-                V v1097 = softehl_splat(0.0);
-                V v1098 = softehl_splat(0.0);
-                V v1099 = softehl_splat(0.0);
-                V v1100 = softehl_splat(0.0);
-                V v1101 = softehl_splat(0.0);
-                V v1102 = softehl_splat(0.0);
-                const M m1103 = v1096 & m1044;
-                if (softehl_any(m1103)) {
-                    const M v1104 = softehl_lt(v1067, v1094);
-                    V v1105 = v1067;
-                    V v1106 = softehl_splat(0.0);
-                    V v1107 = softehl_splat(0.0);
-                    V v1108 = a11;
-                    V v1109 = softehl_splat(0.0);
-                    V v1110 = softehl_splat(0.0);
-                    const M m1111 = ~v1104 & m1103;
-                    if (softehl_any(m1111)) {
-                        V v1112 = softehl_splat(0.0);
-                        V v1113 = softehl_splat(0.0);
-                        V v1114 = softehl_splat(0.0);
-                        V v1115 = softehl_splat(0.0);
-                        V v1116 = softehl_splat(0.0);
-                        V v1117 = softehl_splat(0.0);
-                        const M m1118 = v1069 & m1111;
-                        if (softehl_any(m1118)) {
-                            const V v1119 = -v1094;
-                            const M v1120 = softehl_lt(v1067, v1119);
-                            V v1121 = v1094;
-                            V v1122 = v595;
-                            V v1123 = v596;
-                            V v1124 = softehl_splat(0.0);
-                            V v1125 = a10;
-                            V v1126 = v61;
-                            const M m1127 = v1120 & m1118;
-                            if (softehl_any(m1127)) {
-                                const V v1128 = -v1067;
-                                v1121 = softehl_blend(m1127, v1128, v1121);
-                                v1122 = softehl_blend(m1127, softehl_splat(0.0), v1122);
-                                v1123 = softehl_blend(m1127, softehl_splat(0.0), v1123);
-                                v1124 = softehl_blend(m1127, v24, v1124);
-                                v1125 = softehl_blend(m1127, softehl_splat(0.0), v1125);
-                                v1126 = softehl_blend(m1127, softehl_splat(0.0), v1126);
-                            }
-                            v1112 = softehl_blend(m1118, v1121, v1112);
-                            v1113 = softehl_blend(m1118, v1122, v1113);
-                            v1114 = softehl_blend(m1118, v1123, v1114);
-                            v1115 = softehl_blend(m1118, v1124, v1115);
-                            v1116 = softehl_blend(m1118, v1125, v1116);
-                            v1117 = softehl_blend(m1118, v1126, v1117);
-                        }
-                        const M m1129 = ~v1069 & m1111;
-                        if (softehl_any(m1129)) {
-                            const V v1130 = v1094 + v1067;
-                            const V v1131 = v1130 * v1130;
-                            const V v1132 = v1130 * v1131;
-                            const V v1133 = 3.0 * v1131;
-                            const V v1134 = v61 * v1133;
-                            const V v1135 = a11 * v1133;
-                            const V v1136 = a10 * v1133;
-                            const V v1137 = v595 * v1133;
-                            const V v1138 = v596 * v1133;
-                            v1112 = softehl_blend(m1129, v1132, v1112);
-                            v1113 = softehl_blend(m1129, v1137, v1113);
-                            v1114 = softehl_blend(m1129, v1138, v1114);
-                            v1115 = softehl_blend(m1129, v1135, v1115);
-                            v1116 = softehl_blend(m1129, v1136, v1116);
-                            v1117 = softehl_blend(m1129, v1134, v1117);
-                        }
-                        v1105 = softehl_blend(m1111, v1112, v1105);
-                        v1106 = softehl_blend(m1111, v1113, v1106);
-                        v1107 = softehl_blend(m1111, v1114, v1107);
-                        v1108 = softehl_blend(m1111, v1115, v1108);
-                        v1109 = softehl_blend(m1111, v1116, v1109);
-                        v1110 = softehl_blend(m1111, v1117, v1110);
-                    }
-                    v1097 = softehl_blend(m1103, v1105, v1097);
-                    v1098 = softehl_blend(m1103, v1106, v1098);
-                    v1099 = softehl_blend(m1103, v1107, v1099);
-                    v1100 = softehl_blend(m1103, v1108, v1100);
-                    v1101 = softehl_blend(m1103, v1109, v1101);
-                    v1102 = softehl_blend(m1103, v1110, v1102);
-                }
-                const M m1139 = ~v1096 & m1044;
-                if (softehl_any(m1139)) {
-                    const V v1140 = v1067 - v1094;
-                    const V v1141 = v1140 * v1140;
-                    const V v1142 = v1140 * v1141;
-                    const V v1143 = 3.0 * v1141;
-                    const V v1144 = v60 * v1143;
-                    const V v1145 = a11 * v1143;
-                    const V v1146 = a10 * v1143;
-                    const V v1147 = -v1146;
-                    const V v1148 = v677 * v1143;
-                    const V v1149 = v596 * v1143;
-                    const V v1150 = -v1149;
-                    v1097 = softehl_blend(m1139, v1142, v1097);
-                    v1098 = softehl_blend(m1139, v1148, v1098);
-                    v1099 = softehl_blend(m1139, v1150, v1099);
-                    v1100 = softehl_blend(m1139, v1145, v1100);
-                    v1101 = softehl_blend(m1139, v1147, v1101);
-                    v1102 = softehl_blend(m1139, v1144, v1102);
-                }
-                const V v1151 = v152 * v1089;
-                const V v1152 = v159 * v1089;
-                const V v1153 = v158 * v1089;
-                const V v1154 = v155 * v1087;
-                const V v1155 = v157 * v1087;
-                const V v1156 = v156 * v1087;
-                const V v1157 = v1050 * v1100;
-                const V v1158 = v1051 * v1100;
-                const V v1159 = v1154 + v1152;
-                const V v1160 = v1153 - v1154;
-                const V v1161 = v1155 + v1151;
-                const V v1162 = v1156 - v1151;
-                const V v1163 = v1052 * v1100;
-                const V v1164 = v1052 * v941;
-                const V v1165 = v1052 * v910;
-                const V v1166 = v1052 * v943;
-                const V v1167 = v1052 * v907;
-                const V v1168 = v1052 * v923;
-                const V v1169 = v1052 * v912;
-                const V v1170 = v921 * v1163;
-                const V v1171 = v917 * v1163;
-                const V v1172 = v1052 * v926;
-                const V v1173 = v1052 * v914;
-                const V v1174 = v9 * v749;
-                const V v1175 = v30 * v749;
-                const V v1176 = v668 * v1053;
-                const V v1177 = v1176 + v1164;
-                const V v1178 = v672 * v1053;
-                const V v1179 = v1178 + v1165;
-                const V v1180 = v674 * v1053;
-                const V v1181 = v1180 + v1166;
-                const V v1182 = v676 * v1053;
-                const V v1183 = v1182 + v1167;
-                const V v1184 = v664 * v1053;
-                const V v1185 = v1184 + v1169;
-                const V v1186 = v664 * v385;
-                const V v1187 = v666 * v1053;
-                const V v1188 = v1187 + v1172;
-                const V v1189 = v666 * v385;
-                const V v1190 = v668 * v385;
-                const V v1191 = v1190 + v1161;
-                const V v1192 = v672 * v385;
-                const V v1193 = v1192 + v1159;
-                const V v1194 = v674 * v385;
-                const V v1195 = v1194 + v1162;
-                const V v1196 = v676 * v385;
-                const V v1197 = v1196 + v1160;
-                const V v1198 = v1100 * v1177;
-                const V v1199 = v1100 * v1179;
-                const V v1200 = v1100 * v1181;
-                const V v1201 = v1100 * v1183;
-                const V v1202 = v1100 * v1185;
-                const V v1203 = v1100 * v1188;
-                const V v1204 = v18 * v838;
-                const V v1205 = v1175 + v1204;
-                const V v1206 = v6 * v838;
-                const V v1207 = v1174 + v1206;
-                const V v1208 = v679 * v385;
-                const V v1209 = v670 * v385;
-                const V v1210 = v679 * v1053;
-                const V v1211 = v1210 + v1168;
-                const V v1212 = v670 * v1053;
-                const V v1213 = v1212 + v1173;
-                const V v1214 = v28 * v845;
-                const V v1215 = v1214 + v1205;
-                const V v1216 = v8 * v845;
-                const V v1217 = v1216 + v1207;
-                const V v1218 = v1100 * v1211;
-                const V v1219 = v1100 * v1213;
-                const V v1220 = v139 * v1215;
-                const V v1221 = v138 * v1217;
-                const V v1222 = v1221 + v1220;
-                const V v1223 = w[1] * v1098;
-                const V v1224 = w[1] * v1099;
-                const V v1225 = v1098 * v736;
-                const V v1226 = v1099 * v736;
-                const V v1227 = v1098 * v735;
-                const V v1228 = v1099 * v735;
-                const V v1229 = v1222 * v818;
-                const V v1230 = v1208 + v1229;
-                const V v1231 = v1222 * v827;
-                const V v1232 = v1209 + v1231;
-                const V v1233 = v1223 * v737;
-                const V v1234 = v1224 * v737;
-                const V v1235 = v1223 * v738;
-                const V v1236 = v1224 * v738;
-                const V v1237 = v1222 * v1101;
-                const V v1238 = v1101 * v1230;
-                const V v1239 = v1238 + v1218;
-                const V v1240 = v1101 * v1232;
-                const V v1241 = v1240 + v1219;
-                const V v1242 = v1222 * v935;
-                const V v1243 = v1242 + v1191;
-                const V v1244 = v1222 * v897;
-                const V v1245 = v1244 + v1193;
-                const V v1246 = v1222 * v939;
-                const V v1247 = v1246 + v1195;
-                const V v1248 = v1222 * v874;
-                const V v1249 = v1248 + v1197;
-                const V v1250 = v1222 * v825;
-                const V v1251 = v1186 + v1250;
-                const V v1252 = v1222 * v819;
-                const V v1253 = v1189 + v1252;
-                const V v1254 = v1101 * v1243;
-                const V v1255 = v1198 + v1254;
-                const V v1256 = v1101 * v1245;
-                const V v1257 = v1199 + v1256;
-                const V v1258 = v1101 * v1247;
-                const V v1259 = v1200 + v1258;
-                const V v1260 = v1101 * v1249;
-                const V v1261 = v1201 + v1260;
-                const V v1262 = v1101 * v1251;
-                const V v1263 = v1262 + v1202;
-                const V v1264 = v1101 * v1253;
-                const V v1265 = v1264 + v1203;
-                const V v1266 = v831 * v1237;
-                const V v1267 = v1170 + v1266;
-                const V v1268 = v835 * v1237;
-                const V v1269 = v1171 + v1268;
-                const V v1270 = v700 * v1228;
-                const V v1271 = v700 * v1225;
-                const V v1272 = v700 * v1226;
-                const V v1273 = v700 * v1227;
-                const V v1274 = v705 * v1225;
-                const V v1275 = v705 * v1226;
-                const V v1276 = v705 * v1227;
-                const V v1277 = v705 * v1228;
-                const V v1278 = v852 * v1225;
-                const V v1279 = v852 * v1226;
-                const V v1280 = v852 * v1227;
-                const V v1281 = v852 * v1228;
-                const V v1282 = v851 * v1225;
-                const V v1283 = v851 * v1226;
-                const V v1284 = v851 * v1227;
-                const V v1285 = v851 * v1228;
-                const V v1286 = v850 * v1225;
-                const V v1287 = v850 * v1226;
-                const V v1288 = v850 * v1227;
-                const V v1289 = v850 * v1228;
-                const V v1290 = -v1286;
-                const V v1291 = -v1287;
-                const V v1292 = -v1288;
-                const V v1293 = -v1289;
-                v1001 = softehl_blend(m1044, v1049, v1001);
-                v1002 = softehl_blend(m1044, v1050, v1002);
-                v1003 = softehl_blend(m1044, v1051, v1003);
-                v1004 = softehl_blend(m1044, v1097, v1004);
-                v1005 = softehl_blend(m1044, v1052, v1005);
-                v1006 = softehl_blend(m1044, v1271, v1006);
-                v1007 = softehl_blend(m1044, v1272, v1007);
-                v1008 = softehl_blend(m1044, v1273, v1008);
-                v1009 = softehl_blend(m1044, v1270, v1009);
-                v1010 = softehl_blend(m1044, v1274, v1010);
-                v1011 = softehl_blend(m1044, v1275, v1011);
-                v1012 = softehl_blend(m1044, v1276, v1012);
-                v1013 = softehl_blend(m1044, v1277, v1013);
-                v1014 = softehl_blend(m1044, v1278, v1014);
-                v1015 = softehl_blend(m1044, v1279, v1015);
-                v1016 = softehl_blend(m1044, v1280, v1016);
-                v1017 = softehl_blend(m1044, v1281, v1017);
-                v1018 = softehl_blend(m1044, v1282, v1018);
-                v1019 = softehl_blend(m1044, v1283, v1019);
-                v1020 = softehl_blend(m1044, v1284, v1020);
-                v1021 = softehl_blend(m1044, v1285, v1021);
-                v1022 = softehl_blend(m1044, v1290, v1022);
-                v1023 = softehl_blend(m1044, v1291, v1023);
-                v1024 = softehl_blend(m1044, v1292, v1024);
-                v1025 = softehl_blend(m1044, v1293, v1025);
-                v1026 = softehl_blend(m1044, v1233, v1026);
-                v1027 = softehl_blend(m1044, v1234, v1027);
-                v1028 = softehl_blend(m1044, v1235, v1028);
-                v1029 = softehl_blend(m1044, v1236, v1029);
-                v1030 = softehl_blend(m1044, v1157, v1030);
-                v1031 = softehl_blend(m1044, v1158, v1031);
-                v1032 = softehl_blend(m1044, v1267, v1032);
-                v1033 = softehl_blend(m1044, v1269, v1033);
-                v1034 = softehl_blend(m1044, v1053, v1034);
-                v1035 = softehl_blend(m1044, v1255, v1035);
-                v1036 = softehl_blend(m1044, v1102, v1036);
-                v1037 = softehl_blend(m1044, v1257, v1037);
-                v1038 = softehl_blend(m1044, v1259, v1038);
-                v1039 = softehl_blend(m1044, v1261, v1039);
-                v1040 = softehl_blend(m1044, v1239, v1040);
-                v1041 = softehl_blend(m1044, v1263, v1041);
-                v1042 = softehl_blend(m1044, v1265, v1042);
-                v1043 = softehl_blend(m1044, v1241, v1043);
-            }
-            v944 = softehl_blend(m999, v1001, v944);
-            v945 = softehl_blend(m999, v1002, v945);
-            v946 = softehl_blend(m999, v1003, v946);
-            v947 = softehl_blend(m999, v1004, v947);
-            v948 = softehl_blend(m999, v1005, v948);
-            v949 = softehl_blend(m999, v1006, v949);
-            v950 = softehl_blend(m999, v1007, v950);
-            v951 = softehl_blend(m999, v1008, v951);
-            v952 = softehl_blend(m999, v1009, v952);
-            v953 = softehl_blend(m999, v1010, v953);
-            v954 = softehl_blend(m999, v1011, v954);
-            v955 = softehl_blend(m999, v1012, v955);
-            v956 = softehl_blend(m999, v1013, v956);
-            v957 = softehl_blend(m999, v1014, v957);
-            v958 = softehl_blend(m999, v1015, v958);
-            v959 = softehl_blend(m999, v1016, v959);
-            v960 = softehl_blend(m999, v1017, v960);
-            v961 = softehl_blend(m999, v1018, v961);
-            v962 = softehl_blend(m999, v1019, v962);
-            v963 = softehl_blend(m999, v1020, v963);
-            v964 = softehl_blend(m999, v1021, v964);
-            v965 = softehl_blend(m999, v1022, v965);
-            v966 = softehl_blend(m999, v1023, v966);
-            v967 = softehl_blend(m999, v1024, v967);
-            v968 = softehl_blend(m999, v1025, v968);
-            v969 = softehl_blend(m999, v1026, v969);
-            v970 = softehl_blend(m999, v1027, v970);
-            v971 = softehl_blend(m999, v1028, v971);
-            v972 = softehl_blend(m999, v1029, v972);
-            v973 = softehl_blend(m999, v1030, v973);
-            v974 = softehl_blend(m999, softehl_splat(0.0), v974);
-            v975 = softehl_blend(m999, v1031, v975);
-            v976 = softehl_blend(m999, softehl_splat(0.0), v976);
-            v977 = softehl_blend(m999, v1032, v977);
-            v978 = softehl_blend(m999, softehl_splat(0.0), v978);
-            v979 = softehl_blend(m999, v1033, v979);
-            v980 = softehl_blend(m999, softehl_splat(0.0), v980);
-            v981 = softehl_blend(m999, v1034, v981);
-            v982 = softehl_blend(m999, v1035, v982);
-            v983 = softehl_blend(m999, v1036, v983);
-            v984 = softehl_blend(m999, softehl_splat(0.0), v984);
-            v985 = softehl_blend(m999, v1037, v985);
-            v986 = softehl_blend(m999, softehl_splat(0.0), v986);
-            v987 = softehl_blend(m999, v1038, v987);
-            v988 = softehl_blend(m999, softehl_splat(0.0), v988);
-            v989 = softehl_blend(m999, v1039, v989);
-            v990 = softehl_blend(m999, softehl_splat(0.0), v990);
-            v991 = softehl_blend(m999, v1040, v991);
-            v992 = softehl_blend(m999, softehl_splat(0.0), v992);
-            v993 = softehl_blend(m999, v1041, v993);
-            v994 = softehl_blend(m999, softehl_splat(0.0), v994);
-            v995 = softehl_blend(m999, v1042, v995);
-            v996 = softehl_blend(m999, softehl_splat(0.0), v996);
-            v997 = softehl_blend(m999, v1043, v997);
-            v998 = softehl_blend(m999, softehl_splat(0.0), v998);
-        }
-        const M m1294 = ~v929;
-        if (softehl_any(m1294)) {
-            const V v1295 = v908 - v704;
-            const V v1296 = v1295 * v1295;
-            const V v1297 = v1295 * v1296;
-            const V v1298 = 3.0 * v1296;
-            const V v1299 = v677 * v1298;
-            const V v1300 = v45 * v1298;
-            const V v1301 = v596 * v1298;
-            const V v1302 = -v1301;
-            const V v1303 = a10 * v1298;
-            const V v1304 = v1303 * v921;
-            const V v1305 = v1303 * v917;
-            const V v1306 = v1303 * v941;
-            const V v1307 = v1303 * v910;
-            const V v1308 = v1303 * v943;
-            const V v1309 = v1303 * v907;
-            const V v1310 = v1303 * v923;
-            const V v1311 = v1303 * v912;
-            const V v1312 = v1303 * v926;
-            const V v1313 = v1303 * v914;
-            v944 = softehl_blend(m1294, v1297, v944);
-            v945 = softehl_blend(m1294, v1299, v945);
-            v946 = softehl_blend(m1294, v1302, v946);
-            v947 = softehl_blend(m1294, v1297, v947);
-            v948 = softehl_blend(m1294, v1303, v948);
-            v949 = softehl_blend(m1294, softehl_splat(0.0), v949);
-            v950 = softehl_blend(m1294, softehl_splat(0.0), v950);
-            v951 = softehl_blend(m1294, softehl_splat(0.0), v951);
-            v952 = softehl_blend(m1294, softehl_splat(0.0), v952);
-            v953 = softehl_blend(m1294, softehl_splat(0.0), v953);
-            v954 = softehl_blend(m1294, softehl_splat(0.0), v954);
-            v955 = softehl_blend(m1294, softehl_splat(0.0), v955);
-            v956 = softehl_blend(m1294, softehl_splat(0.0), v956);
-            v957 = softehl_blend(m1294, softehl_splat(0.0), v957);
-            v958 = softehl_blend(m1294, softehl_splat(0.0), v958);
-            v959 = softehl_blend(m1294, softehl_splat(0.0), v959);
-            v960 = softehl_blend(m1294, softehl_splat(0.0), v960);
-            v961 = softehl_blend(m1294, softehl_splat(0.0), v961);
-            v962 = softehl_blend(m1294, softehl_splat(0.0), v962);
-            v963 = softehl_blend(m1294, softehl_splat(0.0), v963);
-            v964 = softehl_blend(m1294, softehl_splat(0.0), v964);
-            v965 = softehl_blend(m1294, softehl_splat(0.0), v965);
-            v966 = softehl_blend(m1294, softehl_splat(0.0), v966);
-            v967 = softehl_blend(m1294, softehl_splat(0.0), v967);
-            v968 = softehl_blend(m1294, softehl_splat(0.0), v968);
-            v969 = softehl_blend(m1294, softehl_splat(0.0), v969);
-            v970 = softehl_blend(m1294, softehl_splat(0.0), v970);
-            v971 = softehl_blend(m1294, softehl_splat(0.0), v971);
-            v972 = softehl_blend(m1294, softehl_splat(0.0), v972);
-            v973 = softehl_blend(m1294, softehl_splat(0.0), v973);
-            v974 = softehl_blend(m1294, v1299, v974);
-            v975 = softehl_blend(m1294, softehl_splat(0.0), v975);
-            v976 = softehl_blend(m1294, v1302, v976);
-            v977 = softehl_blend(m1294, softehl_splat(0.0), v977);
-            v978 = softehl_blend(m1294, v1304, v978);
-            v979 = softehl_blend(m1294, softehl_splat(0.0), v979);
-            v980 = softehl_blend(m1294, v1305, v980);
-            v981 = softehl_blend(m1294, v1300, v981);
-            v982 = softehl_blend(m1294, softehl_splat(0.0), v982);
-            v983 = softehl_blend(m1294, v1300, v983);
-            v984 = softehl_blend(m1294, v1306, v984);
-            v985 = softehl_blend(m1294, softehl_splat(0.0), v985);
-            v986 = softehl_blend(m1294, v1307, v986);
-            v987 = softehl_blend(m1294, softehl_splat(0.0), v987);
-            v988 = softehl_blend(m1294, v1308, v988);
-            v989 = softehl_blend(m1294, softehl_splat(0.0), v989);
-            v990 = softehl_blend(m1294, v1309, v990);
-            v991 = softehl_blend(m1294, softehl_splat(0.0), v991);
-            v992 = softehl_blend(m1294, v1310, v992);
-            v993 = softehl_blend(m1294, softehl_splat(0.0), v993);
-            v994 = softehl_blend(m1294, v1311, v994);
-            v995 = softehl_blend(m1294, softehl_splat(0.0), v995);
-            v996 = softehl_blend(m1294, v1312, v996);
-            v997 = softehl_blend(m1294, softehl_splat(0.0), v997);
-            v998 = softehl_blend(m1294, v1313, v998);
-        }
-        s398 += v949;
-        s399 += v950;
-        s400 += v951;
-        s401 += v952;
-        s402 += v953;
-        s403 += v954;
-        s404 += v955;
-        s405 += v956;
-        s406 += v957;
-        s407 += v958;
-        s408 += v959;
-        s409 += v960;
-        s410 += v961;
-        s411 += v962;
-        s412 += v963;
-        s413 += v964;
-        s414 += v965;
-        s415 += v966;
-        s416 += v967;
-        s417 += v968;
-        s418 += v969;
-        s419 += v970;
-        s420 += v971;
-        s421 += v972;
-        const V v1314 = v974 + v973;
-        const V v1315 = v976 + v975;
-        const V v1316 = v978 + v977;
-        const V v1317 = v980 + v979;
-        const V v1318 = v984 + v982;
-        const V v1319 = v986 + v985;
-        const V v1320 = v988 + v987;
-        const V v1321 = v990 + v989;
-        const V v1322 = v992 + v991;
-        const V v1323 = v994 + v993;
-        const V v1324 = v996 + v995;
-        const V v1325 = v998 + v997;
-        const V v1326 = v921 * v948;
-        const V v1327 = v917 * v948;
-        const V v1328 = v948 * v941;
-        const V v1329 = v948 * v910;
-        const V v1330 = v948 * v943;
-        const V v1331 = v948 * v907;
-        const V v1332 = v948 * v923;
-        const V v1333 = v948 * v912;
-        const V v1334 = v948 * v926;
-        const V v1335 = v948 * v914;
-        const V v1336 = w[1] * v1326;
-        const V v1337 = w[1] * v1327;
-        const V v1338 = v50 * w[1];
-        const V v1339 = w[1] * v945;
-        const V v1340 = w[1] * v946;
-        const V v1341 = w[1] * v1314;
-        const V v1342 = w[1] * v1315;
-        const V v1343 = w[1] * v737;
-        const V v1344 = v1336 * v737;
-        s394 += v1344;
-        const V v1345 = v1337 * v737;
-        s395 += v1345;
-        const V v1346 = v1336 * v738;
-        s396 += v1346;
-        const V v1347 = v1337 * v738;
-        s397 += v1347;
-        const V v1348 = w[1] * v738;
-        const V v1349 = v1339 * v737;
-        s388 += v1349;
-        const V v1350 = v1339 * v738;
-        s390 += v1350;
-        const V v1351 = v1340 * v737;
-        s389 += v1351;
-        const V v1352 = v1340 * v738;
-        s391 += v1352;
-        const V v1353 = v1341 * v737;
-        s432 += v1353;
-        const V v1354 = v1341 * v738;
-        s434 += v1354;
-        const V v1355 = v1342 * v737;
-        s433 += v1355;
-        const V v1356 = v1342 * v738;
-        s435 += v1356;
-        const V v1357 = v1316 * v1348;
-        s458 += v1357;
-        const V v1358 = v1317 * v1348;
-        s459 += v1358;
-        const V v1359 = v1316 * v1343;
-        s456 += v1359;
-        const V v1360 = v1317 * v1343;
-        s457 += v1360;
-        const V v1361 = v1316 * v736;
-        const V v1362 = v1317 * v736;
-        const V v1363 = v1316 * v735;
-        const V v1364 = v1317 * v735;
-        const V v1365 = v945 * v735;
-        const V v1366 = v946 * v735;
-        const V v1367 = v1326 * v735;
-        const V v1368 = v1367 + v1361;
-        const V v1369 = v1326 * v736;
-        const V v1370 = v1363 - v1369;
-        const V v1371 = v1327 * v735;
-        const V v1372 = v1371 + v1362;
-        const V v1373 = v1327 * v736;
-        const V v1374 = v1364 - v1373;
-        const V v1375 = v1314 * v736;
-        const V v1376 = v1365 + v1375;
-        const V v1377 = v1314 * v735;
-        const V v1378 = v945 * v736;
-        const V v1379 = v1377 - v1378;
-        const V v1380 = v1315 * v736;
-        const V v1381 = v1366 + v1380;
-        const V v1382 = v1315 * v735;
-        const V v1383 = v946 * v736;
-        const V v1384 = v1382 - v1383;
-        const V v1385 = v700 * v1368;
-        s460 += v1385;
-        const V v1386 = v700 * v1372;
-        s461 += v1386;
-        const V v1387 = v700 * v1376;
-        s436 += v1387;
-        const V v1388 = v700 * v1370;
-        s462 += v1388;
-        const V v1389 = v700 * v1379;
-        s438 += v1389;
-        const V v1390 = v700 * v1381;
-        s437 += v1390;
-        const V v1391 = v700 * v1384;
-        s439 += v1391;
-        const V v1392 = v705 * v1376;
-        s440 += v1392;
-        const V v1393 = v705 * v1381;
-        s441 += v1393;
-        const V v1394 = v705 * v1379;
-        s442 += v1394;
-        const V v1395 = v705 * v1384;
-        s443 += v1395;
-        const V v1396 = v705 * v1370;
-        s466 += v1396;
-        const V v1397 = v852 * v1376;
-        s444 += v1397;
-        const V v1398 = v852 * v1381;
-        s445 += v1398;
-        const V v1399 = v852 * v1379;
-        s446 += v1399;
-        const V v1400 = v852 * v1384;
-        s447 += v1400;
-        const V v1401 = v851 * v1376;
-        s448 += v1401;
-        const V v1402 = v851 * v1381;
-        s449 += v1402;
-        const V v1403 = v851 * v1379;
-        s450 += v1403;
-        const V v1404 = v851 * v1384;
-        s451 += v1404;
-        const V v1405 = v850 * v1376;
-        s452 += v1405;
-        const V v1406 = v850 * v1381;
-        s453 += v1406;
-        const V v1407 = v850 * v1379;
-        s454 += v1407;
-        const V v1408 = v850 * v1384;
-        s455 += v1408;
-        const V v1409 = v1338 * v596;
-        const V v1410 = v1338 * v595;
-        const V v1411 = v944 * v730;
-        const V v1412 = v944 * v721;
-        const V v1413 = v944 * v382;
-        const V v1414 = v947 * v730;
-        const V v1415 = v947 * v721;
-        const V v1416 = v947 * v382;
-        const V v1417 = 0.5 * v1411;
-        const V v1418 = v1409 * v1411;
-        s386 += v1418;
-        const V v1419 = v1409 * v1414;
-        s392 += v1419;
-        const V v1420 = v1410 * v1411;
-        s387 += v1420;
-        const V v1421 = v1410 * v1414;
-        s393 += v1421;
-        const V v1422 = 0.5 * v1414;
-        const V v1423 = v152 * v1411;
-        const V v1424 = v152 * v1414;
-        const V v1425 = v155 * v1411;
-        const V v1426 = v155 * v1414;
-        const V v1427 = v158 * v1411;
-        const V v1428 = v1427 - v1426;
-        const V v1429 = v158 * v1414;
-        const V v1430 = v1425 + v1429;
-        const V v1431 = v156 * v1414;
-        const V v1432 = v1431 - v1423;
-        const V v1433 = v157 * v1414;
-        const V v1434 = v1423 + v1433;
-        const V v1435 = v157 * v1411;
-        const V v1436 = v1424 - v1435;
-        const V v1437 = v159 * v1414;
-        const V v1438 = v159 * v1411;
-        const V v1439 = v1438 + v1426;
-        const V v1440 = v1437 - v1425;
-        const V v1441 = v596 * v1413;
-        const V v1442 = v1417 + v1441;
-        const V v1443 = v595 * v1413;
-        const V v1444 = v596 * v1416;
-        const V v1445 = v1422 + v1444;
-        const V v1446 = v595 * v1416;
-        const V v1447 = v1443 - v1417;
-        const V v1448 = v50 * v1442;
-        const V v1449 = v50 * v1445;
-        const V v1450 = v50 * v1447;
-        const V v1451 = v1446 - v1422;
-        const V v1452 = v50 * v1451;
-        const V v1453 = v701 * v1412;
-        const V v1454 = v702 * v1412;
-        const V v1455 = v701 * v1415;
-        const V v1456 = v702 * v1415;
-        const V v1457 = v668 * v1448;
-        const V v1458 = v668 * v1449;
-        const V v1459 = v672 * v1448;
-        const V v1460 = v672 * v1449;
-        const V v1461 = v668 * v1450;
-        const V v1462 = v672 * v1450;
-        const V v1463 = v357 * v1453;
-        const V v1464 = v357 * v1455;
-        const V v1465 = v364 * v1453;
-        const V v1466 = v364 * v1455;
-        const V v1467 = v366 * v1453;
-        const V v1468 = v366 * v1455;
-        const V v1469 = v372 * v1453;
-        const V v1470 = v372 * v1455;
-        const V v1471 = v355 * v1453;
-        const V v1472 = v1471 + v1462;
-        const V v1473 = v355 * v1455;
-        const V v1474 = v373 * v1453;
-        const V v1475 = v373 * v1455;
-        const V v1476 = v374 * v1453;
-        const V v1477 = v374 * v1455;
-        const V v1478 = v354 * v1455;
-        const V v1479 = v354 * v1453;
-        const V v1480 = v1479 + v1461;
-        const V v1481 = v372 * v1454;
-        const V v1482 = v373 * v1454;
-        const V v1483 = v374 * v1454;
-        const V v1484 = v357 * v1454;
-        const V v1485 = v364 * v1454;
-        const V v1486 = v366 * v1454;
-        const V v1487 = v357 * v1456;
-        const V v1488 = v364 * v1456;
-        const V v1489 = v366 * v1456;
-        const V v1490 = v373 * v1456;
-        const V v1491 = v374 * v1456;
-        const V v1492 = v372 * v1456;
-        const V v1493 = v676 * v1448;
-        const V v1494 = v1485 + v1493;
-        const V v1495 = v676 * v981;
-        const V v1496 = v1495 + v1331;
-        const V v1497 = v676 * v1449;
-        const V v1498 = v1488 + v1497;
-        const V v1499 = v679 * v1449;
-        const V v1500 = v1489 + v1499;
-        const V v1501 = v679 * v981;
-        const V v1502 = v1501 + v1332;
-        const V v1503 = v666 * v1449;
-        const V v1504 = v1490 + v1503;
-        const V v1505 = v666 * v981;
-        const V v1506 = v1505 + v1334;
-        const V v1507 = v664 * v1449;
-        const V v1508 = v1492 + v1507;
-        const V v1509 = v664 * v981;
-        const V v1510 = v1509 + v1333;
-        const V v1511 = v1496 * v738;
-        const V v1512 = v1494 + v1511;
-        const V v1513 = v668 * v981;
-        const V v1514 = v1513 + v1328;
-        const V v1515 = v672 * v981;
-        const V v1516 = v1515 + v1329;
-        const V v1517 = v1502 * v735;
-        const V v1518 = v1506 * v735;
-        const V v1519 = v1510 * v735;
-        const V v1520 = w[1] * v1512;
-        s491 += v1520;
-        const V v1521 = v674 * v981;
-        const V v1522 = v1521 + v1330;
-        const V v1523 = v670 * v981;
-        const V v1524 = v1523 + v1335;
-        const V v1525 = v672 * v983;
-        const V v1526 = v1525 + v1319;
-        const V v1527 = v674 * v983;
-        const V v1528 = v1527 + v1320;
-        const V v1529 = v670 * v983;
-        const V v1530 = v1529 + v1325;
-        const V v1531 = v668 * v983;
-        const V v1532 = v1531 + v1318;
-        const V v1533 = v1524 * v735;
-        const V v1534 = v676 * v983;
-        const V v1535 = v1534 + v1321;
-        const V v1536 = v735 * v1528;
-        const V v1537 = v735 * v1530;
-        const V v1538 = v679 * v983;
-        const V v1539 = v1538 + v1322;
-        const V v1540 = v664 * v983;
-        const V v1541 = v1540 + v1323;
-        const V v1542 = v666 * v983;
-        const V v1543 = v1542 + v1324;
-        const V v1544 = v156 * v1411;
-        const V v1545 = v1536 - v1544;
-        const V v1546 = v735 * v1539;
-        const V v1547 = v1545 - v1424;
-        const V v1548 = v735 * v1541;
-        const V v1549 = v736 * v1530;
-        const V v1550 = v1533 + v1549;
-        const V v1551 = v735 * v1543;
-        const V v1552 = v1524 * v736;
-        const V v1553 = v1537 - v1552;
-        const V v1554 = v736 * v1539;
-        const V v1555 = v1517 + v1554;
-        const V v1556 = v1522 * v736;
-        const V v1557 = v1547 - v1556;
-        const V v1558 = v1522 * v735;
-        const V v1559 = v1558 + v1432;
-        const V v1560 = v736 * v1541;
-        const V v1561 = v1519 + v1560;
-        const V v1562 = v736 * v1543;
-        const V v1563 = v1518 + v1562;
-        const V v1564 = v139 * v944;
-        const V v1565 = v139 * v947;
-        const V v1566 = v138 * v947;
-        const V v1567 = v1564 + v1566;
-        const V v1568 = v138 * v944;
-        const V v1569 = v1565 - v1568;
-        const V v1570 = v736 * v1528;
-        const V v1571 = v1559 + v1570;
-        const V v1572 = v700 * v1374;
-        s463 += v1572;
-        const V v1573 = v705 * v1374;
-        s467 += v1573;
-        const V v1574 = v705 * v1368;
-        s464 += v1574;
-        const V v1575 = v705 * v1372;
-        s465 += v1575;
-        const V v1576 = v1567 * v730;
-        const V v1577 = v1569 * v730;
-        const V v1578 = v1567 * v721;
-        const V v1579 = v1569 * v721;
-        const V v1580 = v1567 * v382;
-        const V v1581 = v1569 * v382;
-        const V v1582 = 0.5 * v1576;
-        const V v1583 = v705 * v1576;
-        s429 += v1583;
-        const V v1584 = v705 * v1577;
-        s428 += v1584;
-        const V v1585 = 0.5 * v1577;
-        const V v1586 = v838 * v1576;
-        const V v1587 = v838 * v1577;
-        const V v1588 = v845 * v1576;
-        const V v1589 = v845 * v1577;
-        const V v1590 = v749 * v1576;
-        const V v1591 = v749 * v1577;
-        const V v1592 = v850 * v1577;
-        s422 += v1592;
-        const V v1593 = v850 * v1576;
-        s423 += v1593;
-        const V v1594 = v851 * v1577;
-        s424 += v1594;
-        const V v1595 = v851 * v1576;
-        s425 += v1595;
-        const V v1596 = v852 * v1577;
-        s426 += v1596;
-        const V v1597 = v852 * v1576;
-        s427 += v1597;
-        const V v1598 = v700 * v1577;
-        s430 += v1598;
-        const V v1599 = v700 * v1576;
-        s431 += v1599;
-        const V v1600 = v668 * v1585;
-        const V v1601 = v668 * v1582;
-        const V v1602 = v672 * v1582;
-        const V v1603 = v672 * v1585;
-        const V v1604 = v674 * v1582;
-        const V v1605 = v674 * v1585;
-        const V v1606 = v676 * v1582;
-        const V v1607 = v676 * v1585;
-        const V v1608 = v679 * v1582;
-        const V v1609 = v679 * v1585;
-        const V v1610 = v664 * v1582;
-        const V v1611 = v664 * v1585;
-        const V v1612 = v666 * v1582;
-        const V v1613 = v670 * v1582;
-        const V v1614 = v666 * v1585;
-        const V v1615 = v670 * v1585;
-        const V v1616 = v666 * v1450;
-        const V v1617 = v1474 + v1616;
-        const V v1618 = v670 * v1450;
-        const V v1619 = v1476 + v1618;
-        const V v1620 = v674 * v1450;
-        const V v1621 = v1463 + v1620;
-        const V v1622 = v676 * v1450;
-        const V v1623 = v1465 + v1622;
-        const V v1624 = v679 * v1450;
-        const V v1625 = v1467 + v1624;
-        const V v1626 = v664 * v1450;
-        const V v1627 = v1469 + v1626;
-        const V v1628 = v831 * v1586;
-        const V v1629 = v835 * v1586;
-        const V v1630 = v831 * v1587;
-        const V v1631 = v835 * v1587;
-        const V v1632 = v831 * v1588;
-        const V v1633 = v835 * v1588;
-        const V v1634 = v831 * v1589;
-        const V v1635 = v835 * v1589;
-        const V v1636 = v831 * v1590;
-        const V v1637 = v835 * v1590;
-        const V v1638 = v831 * v1591;
-        const V v1639 = v835 * v1591;
-        const V v1640 = v935 * v1587;
-        const V v1641 = v935 * v1588;
-        const V v1642 = v935 * v1589;
-        const V v1643 = v935 * v1590;
-        const V v1644 = v935 * v1591;
-        const V v1645 = v935 * v1586;
-        const V v1646 = v897 * v1586;
-        const V v1647 = v897 * v1587;
-        const V v1648 = v897 * v1588;
-        const V v1649 = v897 * v1589;
-        const V v1650 = v897 * v1590;
-        const V v1651 = v897 * v1591;
-        const V v1652 = v939 * v1586;
-        const V v1653 = v939 * v1587;
-        const V v1654 = v939 * v1588;
-        const V v1655 = v939 * v1589;
-        const V v1656 = v939 * v1590;
-        const V v1657 = v939 * v1591;
-        const V v1658 = v874 * v1586;
-        const V v1659 = v874 * v1587;
-        const V v1660 = v874 * v1588;
-        const V v1661 = v874 * v1589;
-        const V v1662 = v874 * v1590;
-        const V v1663 = v874 * v1591;
-        const V v1664 = v818 * v1586;
-        const V v1665 = v818 * v1587;
-        const V v1666 = v818 * v1588;
-        const V v1667 = v818 * v1589;
-        const V v1668 = v818 * v1590;
-        const V v1669 = v818 * v1591;
-        const V v1670 = v825 * v1586;
-        const V v1671 = v825 * v1587;
-        const V v1672 = v825 * v1588;
-        const V v1673 = v825 * v1589;
-        const V v1674 = v825 * v1590;
-        const V v1675 = v825 * v1591;
-        const V v1676 = v819 * v1586;
-        const V v1677 = v827 * v1586;
-        const V v1678 = v819 * v1587;
-        const V v1679 = v827 * v1587;
-        const V v1680 = v819 * v1588;
-        const V v1681 = v827 * v1588;
-        const V v1682 = v819 * v1589;
-        const V v1683 = v827 * v1589;
-        const V v1684 = v819 * v1590;
-        const V v1685 = v827 * v1590;
-        const V v1686 = v819 * v1591;
-        const V v1687 = v827 * v1591;
-        const V v1688 = v839 * v1368;
-        const V v1689 = v1628 - v1688;
-        const V v1690 = v839 * v1372;
-        const V v1691 = v1629 - v1690;
-        const V v1692 = w[1] * v1689;
-        s468 += v1692;
-        const V v1693 = w[1] * v1691;
-        s469 += v1693;
-        const V v1694 = v839 * v1370;
-        const V v1695 = v1630 - v1694;
-        const V v1696 = w[1] * v1695;
-        s470 += v1696;
-        const V v1697 = v839 * v1374;
-        const V v1698 = v1631 - v1697;
-        const V v1699 = w[1] * v1698;
-        s471 += v1699;
-        const V v1700 = v841 * v1368;
-        const V v1701 = v1632 - v1700;
-        const V v1702 = v841 * v1372;
-        const V v1703 = v1633 - v1702;
-        const V v1704 = w[1] * v1701;
-        s472 += v1704;
-        const V v1705 = w[1] * v1703;
-        s473 += v1705;
-        const V v1706 = v841 * v1370;
-        const V v1707 = v1634 - v1706;
-        const V v1708 = v841 * v1374;
-        const V v1709 = v1635 - v1708;
-        const V v1710 = w[1] * v1707;
-        s474 += v1710;
-        const V v1711 = w[1] * v1709;
-        s475 += v1711;
-        const V v1712 = v844 * v1368;
-        const V v1713 = v1636 + v1712;
-        const V v1714 = v844 * v1372;
-        const V v1715 = v1637 + v1714;
-        const V v1716 = v844 * v1370;
-        const V v1717 = v1638 + v1716;
-        const V v1718 = v844 * v1374;
-        const V v1719 = v1639 + v1718;
-        const V v1720 = w[1] * v1713;
-        s476 += v1720;
-        const V v1721 = w[1] * v1715;
-        s477 += v1721;
-        const V v1722 = w[1] * v1717;
-        s478 += v1722;
-        const V v1723 = w[1] * v1719;
-        s479 += v1723;
-        const V v1724 = v1514 * v737;
-        const V v1725 = v1480 + v1724;
-        const V v1726 = w[1] * v1725;
-        s480 += v1726;
-        const V v1727 = v1516 * v737;
-        const V v1728 = v1472 + v1727;
-        const V v1729 = w[1] * v1728;
-        s481 += v1729;
-        const V v1730 = v1522 * v737;
-        const V v1731 = v1621 + v1730;
-        const V v1732 = w[1] * v1731;
-        s482 += v1732;
-        const V v1733 = v1522 * v738;
-        const V v1734 = v1484 + v1733;
-        const V v1735 = v1514 * v738;
-        const V v1736 = v1457 + v1735;
-        const V v1737 = v1516 * v738;
-        const V v1738 = v1459 + v1737;
-        const V v1739 = v1496 * v737;
-        const V v1740 = v1623 + v1739;
-        const V v1741 = w[1] * v1740;
-        s483 += v1741;
-        const V v1742 = v674 * v1448;
-        const V v1743 = v1742 + v1734;
-        const V v1744 = w[1] * v1743;
-        s490 += v1744;
-        const V v1745 = v354 * v1454;
-        const V v1746 = v1745 + v1736;
-        const V v1747 = v355 * v1454;
-        const V v1748 = v1747 + v1738;
-        const V v1749 = w[1] * v1746;
-        s488 += v1749;
-        const V v1750 = w[1] * v1748;
-        s489 += v1750;
-        const V v1751 = v1502 * v737;
-        const V v1752 = v1625 + v1751;
-        const V v1753 = w[1] * v1752;
-        s484 += v1753;
-        const V v1754 = v1502 * v738;
-        const V v1755 = v1486 + v1754;
-        const V v1756 = v1502 * v736;
-        const V v1757 = v1546 - v1756;
-        const V v1758 = v1496 * v736;
-        const V v1759 = v1430 - v1758;
-        const V v1760 = v1496 * v735;
-        const V v1761 = v1760 + v1428;
-        const V v1762 = v679 * v1448;
-        const V v1763 = v1762 + v1755;
-        const V v1764 = w[1] * v1763;
-        s492 += v1764;
-        const V v1765 = v679 * v1581;
-        const V v1766 = v1765 + v1757;
-        const V v1767 = v676 * v1581;
-        const V v1768 = v1767 + v1759;
-        const V v1769 = v676 * v1580;
-        const V v1770 = v1769 + v1761;
-        const V v1771 = v679 * v1580;
-        const V v1772 = v1771 + v1555;
-        const V v1773 = v676 * v1452;
-        const V v1774 = v1466 + v1773;
-        const V v1775 = v679 * v1452;
-        const V v1776 = v1468 + v1775;
-        const V v1777 = v366 * v1579;
-        const V v1778 = v1777 + v1766;
-        const V v1779 = v366 * v1578;
-        const V v1780 = v1779 + v1772;
-        const V v1781 = v364 * v1579;
-        const V v1782 = v1781 + v1768;
-        const V v1783 = v364 * v1578;
-        const V v1784 = v1783 + v1770;
-        const V v1785 = v664 * v1448;
-        const V v1786 = v1481 + v1785;
-        const V v1787 = v664 * v1580;
-        const V v1788 = v1787 + v1561;
-        const V v1789 = v664 * v1581;
-        const V v1790 = v1789 + v1548;
-        const V v1791 = v664 * v1452;
-        const V v1792 = v1470 + v1791;
-        const V v1793 = v595 * v1778;
-        const V v1794 = v595 * v1780;
-        const V v1795 = v1793 - v1609;
-        const V v1796 = v372 * v1578;
-        const V v1797 = v1796 + v1788;
-        const V v1798 = v372 * v1579;
-        const V v1799 = v1798 + v1790;
-        const V v1800 = v1794 - v1608;
-        const V v1801 = w[1] * v1795;
-        s524 += v1801;
-        const V v1802 = w[1] * v1800;
-        s516 += v1802;
-        const V v1803 = v595 * v1797;
-        const V v1804 = v1510 * v738;
-        const V v1805 = v1786 + v1804;
-        const V v1806 = v1510 * v736;
-        const V v1807 = v1799 - v1806;
-        const V v1808 = w[1] * v1805;
-        s493 += v1808;
-        const V v1809 = v1510 * v737;
-        const V v1810 = v1627 + v1809;
-        const V v1811 = v1803 - v1610;
-        const V v1812 = w[1] * v1810;
-        s485 += v1812;
-        const V v1813 = w[1] * v1811;
-        s517 += v1813;
-        const V v1814 = v595 * v1807;
-        const V v1815 = v1814 - v1611;
-        const V v1816 = w[1] * v1815;
-        s525 += v1816;
-        const V v1817 = v1506 * v737;
-        const V v1818 = v1617 + v1817;
-        const V v1819 = w[1] * v1818;
-        s486 += v1819;
-        const V v1820 = v1506 * v736;
-        const V v1821 = v1551 - v1820;
-        const V v1822 = v1506 * v738;
-        const V v1823 = v1482 + v1822;
-        const V v1824 = v1524 * v737;
-        const V v1825 = v1619 + v1824;
-        const V v1826 = v1524 * v738;
-        const V v1827 = v1483 + v1826;
-        const V v1828 = w[1] * v1825;
-        s487 += v1828;
-        const V v1829 = v736 * v1535;
-        const V v1830 = v1784 + v1829;
-        const V v1831 = v737 * v1535;
-        const V v1832 = v1774 + v1831;
-        const V v1833 = v738 * v1535;
-        const V v1834 = v1498 + v1833;
-        const V v1835 = w[1] * v1832;
-        s499 += v1835;
-        const V v1836 = w[1] * v1834;
-        s507 += v1836;
-        const V v1837 = v735 * v1535;
-        const V v1838 = v1782 + v1837;
-        const V v1839 = v666 * v1448;
-        const V v1840 = v1839 + v1823;
-        const V v1841 = v670 * v1448;
-        const V v1842 = v1841 + v1827;
-        const V v1843 = v666 * v1581;
-        const V v1844 = v1843 + v1821;
-        const V v1845 = w[1] * v1840;
-        s494 += v1845;
-        const V v1846 = w[1] * v1842;
-        s495 += v1846;
-        const V v1847 = v670 * v1581;
-        const V v1848 = v1847 + v1553;
-        const V v1849 = v595 * v1830;
-        const V v1850 = v595 * v1838;
-        const V v1851 = v1849 - v1606;
-        const V v1852 = v1850 - v1607;
-        const V v1853 = w[1] * v1851;
-        s515 += v1853;
-        const V v1854 = w[1] * v1852;
-        s523 += v1854;
-        const V v1855 = v373 * v1579;
-        const V v1856 = v1855 + v1844;
-        const V v1857 = v374 * v1579;
-        const V v1858 = v1857 + v1848;
-        const V v1859 = v373 * v1578;
-        const V v1860 = v1859 + v1563;
-        const V v1861 = v374 * v1578;
-        const V v1862 = v1861 + v1550;
-        const V v1863 = v595 * v1856;
-        const V v1864 = v595 * v1858;
-        const V v1865 = v670 * v1580;
-        const V v1866 = v1865 + v1862;
-        const V v1867 = v666 * v1580;
-        const V v1868 = v1867 + v1860;
-        const V v1869 = v666 * v1452;
-        const V v1870 = v1475 + v1869;
-        const V v1871 = v670 * v1452;
-        const V v1872 = v1477 + v1871;
-        const V v1873 = v1863 - v1614;
-        const V v1874 = v1864 - v1615;
-        const V v1875 = v595 * v1866;
-        const V v1876 = v595 * v1868;
-        const V v1877 = v670 * v1449;
-        const V v1878 = v1491 + v1877;
-        const V v1879 = w[1] * v1873;
-        s526 += v1879;
-        const V v1880 = w[1] * v1874;
-        s527 += v1880;
-        const V v1881 = v1875 - v1613;
-        const V v1882 = v1876 - v1612;
-        const V v1883 = w[1] * v1881;
-        s519 += v1883;
-        const V v1884 = w[1] * v1882;
-        s518 += v1884;
-        const V v1885 = v674 * v1449;
-        const V v1886 = v1487 + v1885;
-        const V v1887 = v674 * v1580;
-        const V v1888 = v1887 + v1571;
-        const V v1889 = v674 * v1452;
-        const V v1890 = v1464 + v1889;
-        const V v1891 = v674 * v1581;
-        const V v1892 = v1891 + v1557;
-        const V v1893 = v738 * v1530;
-        const V v1894 = v1878 + v1893;
-        const V v1895 = v737 * v1530;
-        const V v1896 = v1872 + v1895;
-        const V v1897 = w[1] * v1894;
-        s511 += v1897;
-        const V v1898 = v738 * v1528;
-        const V v1899 = v1886 + v1898;
-        const V v1900 = v737 * v1528;
-        const V v1901 = v1890 + v1900;
-        const V v1902 = w[1] * v1896;
-        s503 += v1902;
-        const V v1903 = w[1] * v1899;
-        s506 += v1903;
-        const V v1904 = w[1] * v1901;
-        s498 += v1904;
-        const V v1905 = v357 * v1578;
-        const V v1906 = v1905 + v1888;
-        const V v1907 = v357 * v1579;
-        const V v1908 = v1907 + v1892;
-        const V v1909 = v737 * v1539;
-        const V v1910 = v1776 + v1909;
-        const V v1911 = v738 * v1539;
-        const V v1912 = v1500 + v1911;
-        const V v1913 = w[1] * v1910;
-        s500 += v1913;
-        const V v1914 = w[1] * v1912;
-        s508 += v1914;
-        const V v1915 = v595 * v1906;
-        const V v1916 = v595 * v1908;
-        const V v1917 = v1915 - v1604;
-        const V v1918 = w[1] * v1917;
-        s514 += v1918;
-        const V v1919 = v1916 - v1605;
-        const V v1920 = w[1] * v1919;
-        s522 += v1920;
-        const V v1921 = v737 * v1541;
-        const V v1922 = v1792 + v1921;
-        const V v1923 = v738 * v1541;
-        const V v1924 = v1508 + v1923;
-        const V v1925 = w[1] * v1922;
-        s501 += v1925;
-        const V v1926 = w[1] * v1924;
-        s509 += v1926;
-        const V v1927 = v737 * v1543;
-        const V v1928 = v1870 + v1927;
-        const V v1929 = v738 * v1543;
-        const V v1930 = v1504 + v1929;
-        const V v1931 = w[1] * v1928;
-        s502 += v1931;
-        const V v1932 = w[1] * v1930;
-        s510 += v1932;
-        const V v1933 = v596 * v1906;
-        const V v1934 = v1604 + v1933;
-        const V v1935 = v596 * v1908;
-        const V v1936 = v1605 + v1935;
-        const V v1937 = w[1] * v1934;
-        s530 += v1937;
-        const V v1938 = w[1] * v1936;
-        s538 += v1938;
-        const V v1939 = v596 * v1830;
-        const V v1940 = v1606 + v1939;
-        const V v1941 = w[1] * v1940;
-        s531 += v1941;
-        const V v1942 = v596 * v1780;
-        const V v1943 = v1608 + v1942;
-        const V v1944 = w[1] * v1943;
-        s532 += v1944;
-        const V v1945 = v596 * v1797;
-        const V v1946 = v1610 + v1945;
-        const V v1947 = w[1] * v1946;
-        s533 += v1947;
-        const V v1948 = v596 * v1868;
-        const V v1949 = v1612 + v1948;
-        const V v1950 = w[1] * v1949;
-        s534 += v1950;
-        const V v1951 = v596 * v1866;
-        const V v1952 = v1613 + v1951;
-        const V v1953 = w[1] * v1952;
-        s535 += v1953;
-        const V v1954 = v596 * v1838;
-        const V v1955 = v1607 + v1954;
-        const V v1956 = w[1] * v1955;
-        s539 += v1956;
-        const V v1957 = v596 * v1778;
-        const V v1958 = v1609 + v1957;
-        const V v1959 = w[1] * v1958;
-        s540 += v1959;
-        const V v1960 = v596 * v1807;
-        const V v1961 = v1611 + v1960;
-        const V v1962 = w[1] * v1961;
-        s541 += v1962;
-        const V v1963 = v596 * v1856;
-        const V v1964 = v1614 + v1963;
-        const V v1965 = w[1] * v1964;
-        s542 += v1965;
-        const V v1966 = v596 * v1858;
-        const V v1967 = v1615 + v1966;
-        const V v1968 = w[1] * v1967;
-        s543 += v1968;
-        const V v1969 = v839 * v1868;
-        const V v1970 = v1676 - v1969;
-        const V v1971 = v839 * v1838;
-        const V v1972 = v1659 - v1971;
-        const V v1973 = w[1] * v1970;
-        s550 += v1973;
-        const V v1974 = w[1] * v1972;
-        s555 += v1974;
-        const V v1975 = v839 * v1778;
-        const V v1976 = v1665 - v1975;
-        const V v1977 = v839 * v1807;
-        const V v1978 = v1671 - v1977;
-        const V v1979 = w[1] * v1976;
-        s556 += v1979;
-        const V v1980 = w[1] * v1978;
-        s557 += v1980;
-        const V v1981 = v839 * v1856;
-        const V v1982 = v1678 - v1981;
-        const V v1983 = v839 * v1858;
-        const V v1984 = v1679 - v1983;
-        const V v1985 = w[1] * v1982;
-        s558 += v1985;
-        const V v1986 = w[1] * v1984;
-        s559 += v1986;
-        const V v1987 = v839 * v1906;
-        const V v1988 = v1652 - v1987;
-        const V v1989 = w[1] * v1988;
-        s546 += v1989;
-        const V v1990 = v839 * v1830;
-        const V v1991 = v1658 - v1990;
-        const V v1992 = w[1] * v1991;
-        s547 += v1992;
-        const V v1993 = v839 * v1780;
-        const V v1994 = v1664 - v1993;
-        const V v1995 = w[1] * v1994;
-        s548 += v1995;
-        const V v1996 = v839 * v1797;
-        const V v1997 = v1670 - v1996;
-        const V v1998 = w[1] * v1997;
-        s549 += v1998;
-        const V v1999 = v839 * v1866;
-        const V v2000 = v1677 - v1999;
-        const V v2001 = w[1] * v2000;
-        s551 += v2001;
-        const V v2002 = v839 * v1908;
-        const V v2003 = v1653 - v2002;
-        const V v2004 = w[1] * v2003;
-        s554 += v2004;
-        const V v2005 = v841 * v1906;
-        const V v2006 = v1654 - v2005;
-        const V v2007 = v841 * v1830;
-        const V v2008 = v1660 - v2007;
-        const V v2009 = w[1] * v2006;
-        s562 += v2009;
-        const V v2010 = w[1] * v2008;
-        s563 += v2010;
-        const V v2011 = v841 * v1780;
-        const V v2012 = v1666 - v2011;
-        const V v2013 = v841 * v1797;
-        const V v2014 = v1672 - v2013;
-        const V v2015 = w[1] * v2012;
-        s564 += v2015;
-        const V v2016 = w[1] * v2014;
-        s565 += v2016;
-        const V v2017 = v841 * v1866;
-        const V v2018 = v1681 - v2017;
-        const V v2019 = v841 * v1908;
-        const V v2020 = v1655 - v2019;
-        const V v2021 = w[1] * v2018;
-        s567 += v2021;
-        const V v2022 = w[1] * v2020;
-        s570 += v2022;
-        const V v2023 = v844 * v1906;
-        const V v2024 = v1656 + v2023;
-        const V v2025 = v844 * v1830;
-        const V v2026 = v1662 + v2025;
-        const V v2027 = v844 * v1780;
-        const V v2028 = v1668 + v2027;
-        const V v2029 = v844 * v1797;
-        const V v2030 = v1674 + v2029;
-        const V v2031 = v844 * v1866;
-        const V v2032 = v1685 + v2031;
-        const V v2033 = v844 * v1908;
-        const V v2034 = v1657 + v2033;
-        const V v2035 = w[1] * v2024;
-        s578 += v2035;
-        const V v2036 = w[1] * v2026;
-        s579 += v2036;
-        const V v2037 = w[1] * v2028;
-        s580 += v2037;
-        const V v2038 = w[1] * v2030;
-        s581 += v2038;
-        const V v2039 = w[1] * v2032;
-        s583 += v2039;
-        const V v2040 = w[1] * v2034;
-        s586 += v2040;
-        const V v2041 = v841 * v1868;
-        const V v2042 = v1680 - v2041;
-        const V v2043 = v844 * v1868;
-        const V v2044 = v1684 + v2043;
-        const V v2045 = w[1] * v2042;
-        s566 += v2045;
-        const V v2046 = w[1] * v2044;
-        s582 += v2046;
-        const V v2047 = v841 * v1838;
-        const V v2048 = v1661 - v2047;
-        const V v2049 = v844 * v1838;
-        const V v2050 = v1663 + v2049;
-        const V v2051 = w[1] * v2048;
-        s571 += v2051;
-        const V v2052 = w[1] * v2050;
-        s587 += v2052;
-        const V v2053 = v841 * v1778;
-        const V v2054 = v1667 - v2053;
-        const V v2055 = v844 * v1778;
-        const V v2056 = v1669 + v2055;
-        const V v2057 = w[1] * v2054;
-        s572 += v2057;
-        const V v2058 = w[1] * v2056;
-        s588 += v2058;
-        const V v2059 = v841 * v1807;
-        const V v2060 = v1673 - v2059;
-        const V v2061 = v844 * v1807;
-        const V v2062 = v1675 + v2061;
-        const V v2063 = w[1] * v2060;
-        s573 += v2063;
-        const V v2064 = w[1] * v2062;
-        s589 += v2064;
-        const V v2065 = v841 * v1856;
-        const V v2066 = v1682 - v2065;
-        const V v2067 = v844 * v1856;
-        const V v2068 = v1686 + v2067;
-        const V v2069 = w[1] * v2066;
-        s574 += v2069;
-        const V v2070 = w[1] * v2068;
-        s590 += v2070;
-        const V v2071 = v841 * v1858;
-        const V v2072 = v1683 - v2071;
-        const V v2073 = v844 * v1858;
-        const V v2074 = v1687 + v2073;
-        const V v2075 = w[1] * v2072;
-        s575 += v2075;
-        const V v2076 = w[1] * v2074;
-        s591 += v2076;
-        const V v2077 = v354 * v1456;
-        const V v2078 = v2077 + v1458;
-        const V v2079 = v355 * v1456;
-        const V v2080 = v2079 + v1460;
-        const V v2081 = v354 * v1578;
-        const V v2082 = v2081 + v1434;
-        const V v2083 = v355 * v1578;
-        const V v2084 = v2083 + v1439;
-        const V v2085 = v354 * v1579;
-        const V v2086 = v2085 + v1436;
-        const V v2087 = v355 * v1579;
-        const V v2088 = v2087 + v1440;
-        const V v2089 = v738 * v1532;
-        const V v2090 = v2078 + v2089;
-        const V v2091 = v738 * v1526;
-        const V v2092 = v2080 + v2091;
-        const V v2093 = w[1] * v2090;
-        s504 += v2093;
-        const V v2094 = w[1] * v2092;
-        s505 += v2094;
-        const V v2095 = v736 * v1532;
-        const V v2096 = v2082 + v2095;
-        const V v2097 = v736 * v1526;
-        const V v2098 = v2084 + v2097;
-        const V v2099 = v1514 * v736;
-        const V v2100 = v2086 - v2099;
-        const V v2101 = v1516 * v736;
-        const V v2102 = v2088 - v2101;
-        const V v2103 = v1514 * v735;
-        const V v2104 = v2103 + v2096;
-        const V v2105 = v1516 * v735;
-        const V v2106 = v2105 + v2098;
-        const V v2107 = v735 * v1532;
-        const V v2108 = v2100 + v2107;
-        const V v2109 = v735 * v1526;
-        const V v2110 = v2102 + v2109;
-        const V v2111 = v737 * v1532;
-        const V v2112 = v1478 + v2111;
-        const V v2113 = v737 * v1526;
-        const V v2114 = v1473 + v2113;
-        const V v2115 = v668 * v1580;
-        const V v2116 = v2115 + v2104;
-        const V v2117 = v672 * v1580;
-        const V v2118 = v2117 + v2106;
-        const V v2119 = v668 * v1581;
-        const V v2120 = v2119 + v2108;
-        const V v2121 = v672 * v1581;
-        const V v2122 = v2121 + v2110;
-        const V v2123 = v668 * v1452;
-        const V v2124 = v2123 + v2112;
-        const V v2125 = v672 * v1452;
-        const V v2126 = v2125 + v2114;
-        const V v2127 = w[1] * v2124;
-        s496 += v2127;
-        const V v2128 = w[1] * v2126;
-        s497 += v2128;
-        const V v2129 = v841 * v2116;
-        const V v2130 = v1641 - v2129;
-        const V v2131 = v841 * v2118;
-        const V v2132 = v1648 - v2131;
-        const V v2133 = w[1] * v2130;
-        s560 += v2133;
-        const V v2134 = w[1] * v2132;
-        s561 += v2134;
-        const V v2135 = v841 * v2120;
-        const V v2136 = v1642 - v2135;
-        const V v2137 = v841 * v2122;
-        const V v2138 = v1649 - v2137;
-        const V v2139 = w[1] * v2136;
-        s568 += v2139;
-        const V v2140 = w[1] * v2138;
-        s569 += v2140;
-        const V v2141 = v844 * v2116;
-        const V v2142 = v1643 + v2141;
-        const V v2143 = v844 * v2118;
-        const V v2144 = v1650 + v2143;
-        const V v2145 = w[1] * v2142;
-        s576 += v2145;
-        const V v2146 = w[1] * v2144;
-        s577 += v2146;
-        const V v2147 = v844 * v2120;
-        const V v2148 = v1644 + v2147;
-        const V v2149 = v844 * v2122;
-        const V v2150 = v1651 + v2149;
-        const V v2151 = w[1] * v2148;
-        s584 += v2151;
-        const V v2152 = w[1] * v2150;
-        s585 += v2152;
-        const V v2153 = v595 * v2116;
-        const V v2154 = v595 * v2118;
-        const V v2155 = v595 * v2120;
-        const V v2156 = v595 * v2122;
-        const V v2157 = v2153 - v1601;
-        const V v2158 = v2154 - v1602;
-        const V v2159 = v2155 - v1600;
-        const V v2160 = v2156 - v1603;
-        const V v2161 = w[1] * v2157;
-        s512 += v2161;
-        const V v2162 = w[1] * v2158;
-        s513 += v2162;
-        const V v2163 = w[1] * v2159;
-        s520 += v2163;
-        const V v2164 = w[1] * v2160;
-        s521 += v2164;
-        const V v2165 = v596 * v2116;
-        const V v2166 = v1601 + v2165;
-        const V v2167 = v596 * v2118;
-        const V v2168 = v1602 + v2167;
-        const V v2169 = w[1] * v2166;
-        s528 += v2169;
-        const V v2170 = w[1] * v2168;
-        s529 += v2170;
-        const V v2171 = v596 * v2120;
-        const V v2172 = v1600 + v2171;
-        const V v2173 = v596 * v2122;
-        const V v2174 = v1603 + v2173;
-        const V v2175 = w[1] * v2172;
-        s536 += v2175;
-        const V v2176 = w[1] * v2174;
-        s537 += v2176;
-        const V v2177 = v839 * v2116;
-        const V v2178 = v1645 - v2177;
-        const V v2179 = v839 * v2118;
-        const V v2180 = v1646 - v2179;
-        const V v2181 = v839 * v2120;
-        const V v2182 = v1640 - v2181;
-        const V v2183 = v839 * v2122;
-        const V v2184 = v1647 - v2183;
-        const V v2185 = w[1] * v2178;
-        s544 += v2185;
-        const V v2186 = w[1] * v2180;
-        s545 += v2186;
-        const V v2187 = w[1] * v2182;
-        s552 += v2187;
-        const V v2188 = w[1] * v2184;
-        s553 += v2188;
-    }
-    softehl_store2(R + 12, 14, s386, s392);
-    softehl_store4(K + 148, 196, s394, s395, s388, softehl_splat(0.0));
-    softehl_store4(K + 176, 196, s396, s397, s390, softehl_splat(0.0));
-    softehl_store4(R + 4, 14, s427, s426, s425, s424);
-    softehl_store4(R + 0, 14, s431, s430, s429, s428);
-    softehl_store4(K + 164, 196, s432, s418, s433, s419);
-    softehl_store4(K + 192, 196, s434, s420, s435, s421);
-    softehl_store4(K + 24, 196, s438, s400, s439, s401);
-    softehl_store4(K + 52, 196, s442, s404, s443, s405);
-    softehl_store4(K + 80, 196, s446, s408, s447, s409);
-    softehl_store4(K + 108, 196, s450, s412, s451, s413);
-    softehl_store4(K + 8, 196, s460, s461, s436, s398);
-    softehl_store4(K + 36, 196, s464, s465, s440, s402);
-    softehl_store4(K + 140, 196, s480, s481, s482, s483);
-    softehl_store4(K + 144, 196, s484, s485, s486, s487);
-    softehl_store4(K + 168, 196, s488, s489, s490, s491);
-    softehl_store4(K + 172, 196, s492, s493, s494, s495);
-    softehl_store4(K + 152, 196, s389, softehl_splat(0.0), s496, s497);
-    softehl_store4(K + 156, 196, s498, s499, s500, s501);
-    softehl_store4(K + 160, 196, s502, s503, s456, s457);
-    softehl_store4(K + 180, 196, s391, softehl_splat(0.0), s504, s505);
-    softehl_store4(K + 184, 196, s506, s507, s508, s509);
-    softehl_store4(K + 188, 196, s510, s511, s458, s459);
-    softehl_store4(K + 0, 196, s512, s513, s514, s515);
-    softehl_store4(K + 4, 196, s516, s517, s518, s519);
-    softehl_store4(K + 12, 196, s437, s399, s520, s521);
-    softehl_store4(K + 16, 196, s522, s523, s524, s525);
-    softehl_store4(K + 20, 196, s526, s527, s462, s463);
-    softehl_store4(K + 28, 196, s528, s529, s530, s531);
-    softehl_store4(K + 32, 196, s532, s533, s534, s535);
-    softehl_store4(K + 40, 196, s441, s403, s536, s537);
-    softehl_store4(K + 44, 196, s538, s539, s540, s541);
-    softehl_store4(K + 48, 196, s542, s543, s466, s467);
-    const V v2189 = -s422;
-    const V v2190 = -s423;
-    softehl_store4(R + 8, 14, v2190, v2189, s387, s393);
-    const V v2191 = -s452;
-    const V v2192 = -s453;
-    const V v2193 = -s454;
-    const V v2194 = -s455;
-    softehl_store4(K + 136, 196, v2193, s416, v2194, s417);
-    const V v2195 = -s468;
-    const V v2196 = -s469;
-    softehl_store4(K + 64, 196, v2195, v2196, s444, s406);
-    const V v2197 = -s470;
-    const V v2198 = -s471;
-    const V v2199 = -s472;
-    const V v2200 = -s473;
-    softehl_store4(K + 92, 196, v2199, v2200, s448, s410);
-    const V v2201 = -s474;
-    const V v2202 = -s475;
-    const V v2203 = -s476;
-    const V v2204 = -s477;
-    softehl_store4(K + 120, 196, v2203, v2204, v2191, s414);
-    const V v2205 = -s478;
-    const V v2206 = -s479;
-    const V v2207 = -s544;
-    const V v2208 = -s545;
-    const V v2209 = -s546;
-    const V v2210 = -s547;
-    softehl_store4(K + 56, 196, v2207, v2208, v2209, v2210);
-    const V v2211 = -s548;
-    const V v2212 = -s549;
-    const V v2213 = -s550;
-    const V v2214 = -s551;
-    softehl_store4(K + 60, 196, v2211, v2212, v2213, v2214);
-    const V v2215 = -s552;
-    const V v2216 = -s553;
-    softehl_store4(K + 68, 196, s445, s407, v2215, v2216);
-    const V v2217 = -s554;
-    const V v2218 = -s555;
-    const V v2219 = -s556;
-    const V v2220 = -s557;
-    softehl_store4(K + 72, 196, v2217, v2218, v2219, v2220);
-    const V v2221 = -s558;
-    const V v2222 = -s559;
-    softehl_store4(K + 76, 196, v2221, v2222, v2197, v2198);
-    const V v2223 = -s560;
-    const V v2224 = -s561;
-    const V v2225 = -s562;
-    const V v2226 = -s563;
-    softehl_store4(K + 84, 196, v2223, v2224, v2225, v2226);
-    const V v2227 = -s564;
-    const V v2228 = -s565;
-    const V v2229 = -s566;
-    const V v2230 = -s567;
-    softehl_store4(K + 88, 196, v2227, v2228, v2229, v2230);
-    const V v2231 = -s568;
-    const V v2232 = -s569;
-    softehl_store4(K + 96, 196, s449, s411, v2231, v2232);
-    const V v2233 = -s570;
-    const V v2234 = -s571;
-    const V v2235 = -s572;
-    const V v2236 = -s573;
-    softehl_store4(K + 100, 196, v2233, v2234, v2235, v2236);
-    const V v2237 = -s574;
-    const V v2238 = -s575;
-    softehl_store4(K + 104, 196, v2237, v2238, v2201, v2202);
-    const V v2239 = -s576;
-    const V v2240 = -s577;
-    const V v2241 = -s578;
-    const V v2242 = -s579;
-    softehl_store4(K + 112, 196, v2239, v2240, v2241, v2242);
-    const V v2243 = -s580;
-    const V v2244 = -s581;
-    const V v2245 = -s582;
-    const V v2246 = -s583;
-    softehl_store4(K + 116, 196, v2243, v2244, v2245, v2246);
-    const V v2247 = -s584;
-    const V v2248 = -s585;
-    softehl_store4(K + 124, 196, v2192, s415, v2247, v2248);
-    const V v2249 = -s586;
-    const V v2250 = -s587;
-    const V v2251 = -s588;
-    const V v2252 = -s589;
-    softehl_store4(K + 128, 196, v2249, v2250, v2251, v2252);
-    const V v2253 = -s590;
-    const V v2254 = -s591;
-    softehl_store4(K + 132, 196, v2253, v2254, v2205, v2206);
-}
-
-void softehl_mortar_23_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mortar_23_tangent_group(points, modes, coordinates + 10 * e, dofs + 14 * e, data + 15 * e, 0, parameters, rule, basis, values + 14 * e, tangent + (14 * 14) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mortar_23_tangent_group(points, modes, coordinates + 10 * (n - SOFTEHL_LANES), dofs + 14 * (n - SOFTEHL_LANES), data + 15 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 14 * (n - SOFTEHL_LANES), tangent + (14 * 14) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 10];
-    softehl_pad(X, coordinates, 10, n);
-    double d[SOFTEHL_LANES * 14];
-    softehl_pad(d, dofs, 14, n);
-    double a[SOFTEHL_LANES * 15];
-    softehl_pad(a, data, 15, n);
-    double R[SOFTEHL_LANES * 14];
-    double K[SOFTEHL_LANES * (14 * 14)];
-    softehl_mortar_23_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 14 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (14 * 14) * n; ++i) tangent[i] = K[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_mortar_23_tangent, 10, 14, 15, 0, 14, (14 * 14))

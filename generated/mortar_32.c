@@ -34,4526 +34,1277 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_mortar_32_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_mortar_32_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 10, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 10, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8, X9;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8, X9;
+    softehl_load4(X + 0, 10, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 10, &X4, &X5, &X6, &X7);
     softehl_load2(X + 8, 10, &X8, &X9);
-    (void)X8; (void)X9;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 14, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 14, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
-    softehl_load4(d + 8, 14, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13;
-    softehl_load2(d + 12, 14, &d12, &d13);
-    (void)d12; (void)d13;
-    V a0, a1, a2, a3;
-    softehl_load4(a + 0, 15, &a0, &a1, &a2, &a3);
-    (void)a0; (void)a1; (void)a2; (void)a3;
-    V a4, a5, a6, a7;
-    softehl_load4(a + 4, 15, &a4, &a5, &a6, &a7);
-    (void)a4; (void)a5; (void)a6; (void)a7;
-    V a8, a9, a10, a11;
-    softehl_load4(a + 8, 15, &a8, &a9, &a10, &a11);
-    (void)a8; (void)a9; (void)a10; (void)a11;
-    V a12, a13, a14;
-    softehl_load3(a + 12, 15, &a12, &a13, &a14);
-    (void)a12; (void)a13; (void)a14;
-    const V v1 = X0 + d0;
-    const V v2 = X2 + d2;
-    const V v3 = X4 + d4;
-    const V v4 = 2.0 * X4;
-    const V v5 = X0 + a0;
-    const V v6 = X8 + d8;
-    const V v7 = X2 + a1;
-    const V v8 = X4 + a2;
-    const V v9 = X1 + d1;
-    const V v10 = X3 + d3;
-    const V v11 = X8 + a4;
-    const V v12 = X5 + d5;
-    const V v13 = 2.0 * X5;
-    const V v14 = X1 + a5;
-    const V v15 = X3 + a6;
-    const V v16 = 1.0 / a10;
-    const V v17 = X5 + a7;
-    const V v18 = X6 + a3;
-    const V v19 = v6 - X6;
-    const V v20 = X7 + a8;
-    const V v21 = X9 + a9;
-    const V v22 = X9 + d9;
-    const V v23 = v10 + v9;
-    const V v24 = v10 - v9;
-    const V v25 = X6 + d6;
-    const V v26 = v19 - d6;
-    const V v27 = 0.5 * v23;
-    const V v28 = X7 + d7;
-    const V v29 = 0.5 * v24;
-    const V v30 = v22 - X7;
-    const V v31 = v30 - d7;
-    const V v32 = v22 - v27;
-    const V v33 = v28 - v27;
-    const V v34 = v29 * v29;
-    const V v35 = v29 * v32;
-    const V v36 = v29 * v33;
-    const V v37 = v2 + v1;
-    const V v38 = v2 - v1;
-    const V v39 = 0.5 * v37;
-    const V v40 = 0.5 * v38;
-    const V v41 = v6 - v39;
-    const V v42 = v25 - v39;
-    const V v43 = v40 * v41;
-    const V v44 = v43 + v35;
-    const V v45 = v40 * v42;
-    const V v46 = v45 + v36;
-    const V v47 = v40 * v40;
-    const V v48 = v47 + v34;
-    const V v49 = 1.0 / v48;
-    const V v50 = v44 * v49;
-    const M v51 = softehl_lt(softehl_splat(1.0), v50);
-    const V v52 = softehl_blend(v51, softehl_splat(1.0), v50);
-    const M v53 = softehl_eq(v52, v52);
-    const V v54 = v46 * v49;
-    const M v55 = softehl_lt(softehl_splat(1.0), v54);
-    const V v56 = softehl_blend(v55, softehl_splat(1.0), v54);
-    const M v57 = softehl_eq(v56, v56);
-    V v58 = softehl_splat(0.0);
-    const M m59 = v53;
-    if (softehl_any(m59)) {
-        const M v60 = softehl_lt(softehl_splat((-1.0)), v52);
-        const V v61 = softehl_blend(v60, v52, softehl_splat((-1.0)));
-        v58 = softehl_blend(m59, v61, v58);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13;
+    softehl_load4(d + 0, 14, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 14, &d4, &d5, &d6, &d7);
+    softehl_load4(d + 8, 14, &d8, &d9, &d10, &d11); softehl_load2(d + 12, 14, &d12, &d13);
+    V a0, a1, a2, a3, a4, a5, a6, a7, a8, a9, a10, a11, a12, a13, a14;
+    softehl_load4(a + 0, 15, &a0, &a1, &a2, &a3); softehl_load4(a + 4, 15, &a4, &a5, &a6, &a7);
+    softehl_load4(a + 8, 15, &a8, &a9, &a10, &a11); softehl_load3(a + 12, 15, &a12, &a13, &a14);
+    const V v1 = X0 + d0, v2 = X2 + d2, v3 = X4 + d4, v4 = 2.0 * X4, v5 = X0 + a0, v6 = X8 + d8,
+        v7 = X2 + a1, v8 = X4 + a2, v9 = X1 + d1, v10 = X3 + d3, v11 = X8 + a4, v12 = X5 + d5,
+        v13 = 2.0 * X5, v14 = X1 + a5, v15 = X3 + a6, v16 = 1.0 / a10, v17 = X5 + a7, v18 = X6 + a3,
+        v19 = X7 + a8, v20 = X9 + a9, v21 = X9 + d9, v22 = X6 + d6, v23 = v6 - X6 - d6,
+        v24 = 0.5 * (v10 + v9), v25 = X7 + d7, v26 = 0.5 * (v10 - v9), v27 = v21 - X7 - d7,
+        v28 = 0.5 * (v2 + v1), v29 = 0.5 * (v2 - v1), v30 = 1.0 / (v29 * v29 + v26 * v26),
+        v31 = (v29 * (v6 - v28) + v26 * (v21 - v24)) * v30;
+    const M v32 = softehl_lt(softehl_splat(1.0), v31);
+    const V v33 = softehl_blend(v32, softehl_splat(1.0), v31); const M v34 = softehl_eq(v33, v33);
+    const V v35 = (v29 * (v22 - v28) + v26 * (v25 - v24)) * v30;
+    const M v36 = softehl_lt(softehl_splat(1.0), v35);
+    const V v37 = softehl_blend(v36, softehl_splat(1.0), v35); const M v38 = softehl_eq(v37, v37);
+    V v39 = softehl_splat(0.0); const M m40 = v34;
+    if (softehl_any(m40)) {
+        const M v41 = softehl_lt(softehl_splat((-1.0)), v33);
+        const V v42 = softehl_blend(v41, v33, softehl_splat((-1.0)));
+        v39 = softehl_blend(m40, v42, v39);
     }
-    const M m62 = ~v53;
-    if (softehl_any(m62)) {
-        const V v63 = (-1.0) - v52;
-        const V v64 = v63 * v63;
-        const V v65 = v63 * v64;
-        v58 = softehl_blend(m62, v65, v58);
+    const M m43 = ~v34;
+    if (softehl_any(m43)) {
+        const V v44 = (-1.0) - v33, v45 = v44 * (v44 * v44);
+        v39 = softehl_blend(m43, v45, v39);
     }
-    V v66 = softehl_splat(0.0);
-    const M m67 = v57;
-    if (softehl_any(m67)) {
-        const M v68 = softehl_lt(softehl_splat((-1.0)), v56);
-        const V v69 = softehl_blend(v68, v56, softehl_splat((-1.0)));
-        v66 = softehl_blend(m67, v69, v66);
+    V v46 = softehl_splat(0.0); const M m47 = v38;
+    if (softehl_any(m47)) {
+        const M v48 = softehl_lt(softehl_splat((-1.0)), v37);
+        const V v49 = softehl_blend(v48, v37, softehl_splat((-1.0)));
+        v46 = softehl_blend(m47, v49, v46);
     }
-    const M m70 = ~v57;
-    if (softehl_any(m70)) {
-        const V v71 = (-1.0) - v56;
-        const V v72 = v71 * v71;
-        const V v73 = v71 * v72;
-        v66 = softehl_blend(m70, v73, v66);
+    const M m50 = ~v38;
+    if (softehl_any(m50)) {
+        const V v51 = (-1.0) - v37, v52 = v51 * (v51 * v51);
+        v46 = softehl_blend(m50, v52, v46);
     }
-    const V v74 = 1.0 + v58;
-    const V v75 = 0.5 + v58;
-    const V v76 = 2.0 * v58;
-    const V v77 = 0.5 * v58;
-    const V v78 = v58 * v58;
-    const V v79 = v77 * v74;
-    const V v80 = v58 - 0.5;
-    const V v81 = v58 - 1.0;
-    const V v82 = v77 * v81;
-    const V v83 = v78 - 1.0;
-    const V v84 = 0.5 + v66;
-    const V v85 = 1.0 + v66;
-    const V v86 = 2.0 * v66;
-    const V v87 = 0.5 * v66;
-    const V v88 = v66 * v66;
-    const V v89 = v87 * v85;
-    const V v90 = v66 - 0.5;
-    const V v91 = v66 - 1.0;
-    const V v92 = v88 - 1.0;
-    const V v93 = v87 * v91;
-    const V v94 = v2 * v75;
-    const V v95 = v10 * v75;
-    const V v96 = v2 * v84;
-    const V v97 = v10 * v84;
-    const V v98 = v2 * v79;
-    const V v99 = v6 - v98;
-    const V v100 = v10 * v79;
-    const V v101 = v22 - v100;
-    const V v102 = v2 * v89;
-    const V v103 = v25 - v102;
-    const V v104 = v10 * v89;
-    const V v105 = v28 - v104;
-    const V v106 = v3 * v86;
-    const V v107 = v96 - v106;
-    const V v108 = v12 * v86;
-    const V v109 = v97 - v108;
-    const V v110 = v3 * v83;
-    const V v111 = v110 + v99;
-    const V v112 = v12 * v83;
-    const V v113 = v112 + v101;
-    const V v114 = v3 * v92;
-    const V v115 = v114 + v103;
-    const V v116 = v3 * v76;
-    const V v117 = v94 - v116;
-    const V v118 = v12 * v76;
-    const V v119 = v95 - v118;
-    const V v120 = v12 * v92;
-    const V v121 = v120 + v105;
-    const V v122 = v1 * v90;
-    const V v123 = v122 + v107;
-    const V v124 = v9 * v90;
-    const V v125 = v124 + v109;
-    const V v126 = v1 * v93;
-    const V v127 = v115 - v126;
-    const V v128 = v9 * v93;
-    const V v129 = v121 - v128;
-    const V v130 = v1 * v82;
-    const V v131 = v111 - v130;
-    const V v132 = v9 * v82;
-    const V v133 = v113 - v132;
-    const V v134 = v1 * v80;
-    const V v135 = v134 + v117;
-    const V v136 = v9 * v80;
-    const V v137 = v136 + v119;
-    const V v138 = v123 * v127;
-    const V v139 = v123 * v123;
-    const V v140 = v131 * v135;
-    const V v141 = v135 * v135;
-    const V v142 = v125 * v129;
-    const V v143 = v138 + v142;
-    const V v144 = v125 * v125;
-    const V v145 = v139 + v144;
-    const V v146 = v133 * v137;
-    const V v147 = v140 + v146;
-    const V v148 = v137 * v137;
-    const V v149 = v141 + v148;
-    const V v150 = 1.0 / v145;
-    const V v151 = 1.0 / v149;
-    const V v152 = v143 * v150;
-    const V v153 = v66 + v152;
-    const V v154 = v147 * v151;
-    const V v155 = v58 + v154;
-    const M v156 = softehl_lt(softehl_splat(1.0), v155);
-    const V v157 = softehl_blend(v156, softehl_splat(1.0), v155);
-    const M v158 = softehl_eq(v157, v157);
-    const M v159 = softehl_lt(softehl_splat(1.0), v153);
-    const V v160 = softehl_blend(v159, softehl_splat(1.0), v153);
-    const M v161 = softehl_eq(v160, v160);
-    V v162 = softehl_splat(0.0);
-    const M m163 = v158;
-    if (softehl_any(m163)) {
-        const M v164 = softehl_lt(softehl_splat((-1.0)), v157);
-        const V v165 = softehl_blend(v164, v157, softehl_splat((-1.0)));
-        v162 = softehl_blend(m163, v165, v162);
+    const V v53 = 0.5 + v39, v54 = 2.0 * v39, v55 = 0.5 * v39, v56 = v55 * (1.0 + v39),
+        v57 = v39 - 0.5, v58 = v55 * (v39 - 1.0), v59 = v39 * v39 - 1.0, v60 = 0.5 + v46,
+        v61 = 2.0 * v46, v62 = 0.5 * v46, v63 = v62 * (1.0 + v46), v64 = v46 - 0.5,
+        v65 = v46 * v46 - 1.0, v66 = v62 * (v46 - 1.0), v67 = v1 * v64 + (v2 * v60 - v3 * v61),
+        v68 = v9 * v64 + (v10 * v60 - v12 * v61), v69 = v1 * v57 + (v2 * v53 - v3 * v54),
+        v70 = v9 * v57 + (v10 * v53 - v12 * v54),
+        v71 = v67 * (v3 * v65 + (v22 - v2 * v63) - v1 * v66) + v68 * (v12 * v65 + (v25 - v10 * v63) - v9 * v66),
+        v72 = (v3 * v59 + (v6 - v2 * v56) - v1 * v58) * v69 + (v12 * v59 + (v21 - v10 * v56) - v9 * v58) * v70,
+        v73 = v46 + v71 * (1.0 / (v67 * v67 + v68 * v68)),
+        v74 = v39 + v72 * (1.0 / (v69 * v69 + v70 * v70));
+    const M v75 = softehl_lt(softehl_splat(1.0), v74);
+    const V v76 = softehl_blend(v75, softehl_splat(1.0), v74);
+    const M v77 = softehl_eq(v76, v76), v78 = softehl_lt(softehl_splat(1.0), v73);
+    const V v79 = softehl_blend(v78, softehl_splat(1.0), v73); const M v80 = softehl_eq(v79, v79);
+    V v81 = softehl_splat(0.0); const M m82 = v77;
+    if (softehl_any(m82)) {
+        const M v83 = softehl_lt(softehl_splat((-1.0)), v76);
+        const V v84 = softehl_blend(v83, v76, softehl_splat((-1.0)));
+        v81 = softehl_blend(m82, v84, v81);
     }
-    const M m166 = ~v158;
-    if (softehl_any(m166)) {
-        const V v167 = (-1.0) - v157;
-        const V v168 = v167 * v167;
-        const V v169 = v167 * v168;
-        v162 = softehl_blend(m166, v169, v162);
+    const M m85 = ~v77;
+    if (softehl_any(m85)) {
+        const V v86 = (-1.0) - v76, v87 = v86 * (v86 * v86);
+        v81 = softehl_blend(m85, v87, v81);
     }
-    V v170 = softehl_splat(0.0);
-    const M m171 = v161;
-    if (softehl_any(m171)) {
-        const M v172 = softehl_lt(softehl_splat((-1.0)), v160);
-        const V v173 = softehl_blend(v172, v160, softehl_splat((-1.0)));
-        v170 = softehl_blend(m171, v173, v170);
+    V v88 = softehl_splat(0.0); const M m89 = v80;
+    if (softehl_any(m89)) {
+        const M v90 = softehl_lt(softehl_splat((-1.0)), v79);
+        const V v91 = softehl_blend(v90, v79, softehl_splat((-1.0)));
+        v88 = softehl_blend(m89, v91, v88);
     }
-    const M m174 = ~v161;
+    const M m92 = ~v80;
+    if (softehl_any(m92)) {
+        const V v93 = (-1.0) - v79, v94 = v93 * (v93 * v93);
+        v88 = softehl_blend(m92, v94, v88);
+    }
+    const V v95 = v88 - v81; const M v96 = softehl_eq(v95, v95); V v97 = softehl_splat(0.0);
+    const M m98 = v96;
+    if (softehl_any(m98)) {
+        const M v99 = softehl_lt(softehl_splat(0.0), v95);
+        const V v100 = softehl_blend(v99, v95, softehl_splat(0.0));
+        v97 = softehl_blend(m98, v100, v97);
+    }
+    const M m101 = ~v96;
+    if (softehl_any(m101)) {
+        const V v102 = v81 - v88, v103 = v102 * (v102 * v102);
+        v97 = softehl_blend(m101, v103, v97);
+    }
+    const V v104 = 0.5 * v97, v105 = 0.5 * (v81 + v88), v106 = 0.5 * (d8 + (d6 + (X6 + X8))),
+        v107 = 0.5 * (d9 + (d7 + (X7 + X9)));
+    V s108 = {0}, s109 = {0}, s110 = {0}, s111 = {0}, s112 = {0}, s113 = {0}, s114 = {0},
+        s115 = {0}, s116 = {0}, s117 = {0}, s118 = {0}, s119 = {0}, s120 = {0}, s121 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q; (void)w;
+        const V v122 = w[0] * v104 + v105, v123 = (-1.0) + v122, v124 = 1.0 + v122,
+            v125 = 0.5 + v122, v126 = (-0.5) + v122, v127 = 1.0 - v122 * v122, v128 = 0.5 * v122,
+            v129 = 2.0 * v122, v130 = v128 * v123, v131 = v128 * v124, v132 = 0.5 - v128,
+            v133 = 0.5 + v128, v134 = v1 * v126 + (v2 * v125 - v3 * v129),
+            v135 = v9 * v126 + (v10 * v125 - v12 * v129),
+            v136 = v1 * v130 + (v2 * v131 + v3 * v127),
+            v137 = v9 * v130 + (v10 * v131 + v12 * v127), v138 = d10 * v132 + d12 * v133,
+            v139 = softehl_vsqrt(v134 * v134 + v135 * v135), v140 = 1.0 / v139, v141 = v134 * v140,
+            v142 = v135 * v140,
+            v143 = 0.5 * ((v136 - v106) * v141 + (v137 - v107) * v142) * (1.0 / (0.5 * (v23 * v141 + v27 * v142))),
+            v144 = 0.5 - v143, v145 = 0.5 + v143,
+            v146 = v142 * (v22 * v144 - v136 + v6 * v145) - v141 * (v25 * v144 - v137 + v21 * v145),
+            v147 = a10 * v146, v148 = v138 - v147;
+        const M v149 = softehl_eq(v148, v148);
+        V v150 = softehl_splat(0.0), v151 = softehl_splat(0.0);
+        const M m152 = v149;
+        if (softehl_any(m152)) {
+            const M v153 = softehl_le(softehl_splat(0.0), v148);
+            V v154 = softehl_splat(0.0), v155 = softehl_splat(0.0);
+            const M m156 = v153 & m152;
+            if (softehl_any(m156)) {
+                const V v157 = (a12 + v146) * (v146 - a13); const M v158 = softehl_eq(v157, v157);
+                V v159 = softehl_splat(0.0); const M m160 = v158 & m156;
+                if (softehl_any(m160)) {
+                    const M v161 = softehl_lt(v157, softehl_splat(0.0));
+                    const V v162 = softehl_blend(v161, v148, softehl_splat(0.0));
+                    v159 = softehl_blend(m160, v162, v159);
+                }
+                const M m163 = ~v158 & m156;
+                if (softehl_any(m163)) {
+                    const V v164 = v157 * (v157 * v157); v159 = softehl_blend(m163, v164, v159);
+                }
+                const V v165 = a11 * v159; const M v166 = softehl_eq(v165, v165);
+                const V v167 = v141 * (v11 * v145 + (v18 * v144 - v5 * v130 - v7 * v131 - v8 * v127)),
+                    v168 = v142 * (v20 * v145 + (v19 * v144 - v14 * v130 - v15 * v131 - v17 * v127)),
+                    v169 = d11 * v132 + d13 * v133 + a10 * (v167 + v168);
+                const M v170 = softehl_eq(v169, v169), v171 = v166 & v170;
+                V v172 = softehl_splat(0.0); const M m173 = v171 & m156;
+                if (softehl_any(m173)) {
+                    const M v174 = softehl_lt(v165, v169); V v175 = v165;
+                    const M m176 = ~v174 & m173;
+                    if (softehl_any(m176)) {
+                        V v177 = softehl_splat(0.0); const M m178 = v166 & m176;
+                        if (softehl_any(m178)) {
+                            const M v179 = softehl_lt(v165, -v169); V v180 = v169;
+                            const M m181 = v179 & m178;
+                            if (softehl_any(m181)) {
+                                const V v182 = -v165; v180 = softehl_blend(m181, v182, v180);
+                            }
+                            v177 = softehl_blend(m178, v180, v177);
+                        }
+                        const M m183 = ~v166 & m176;
+                        if (softehl_any(m183)) {
+                            const V v184 = v169 + v165, v185 = v184 * (v184 * v184);
+                            v177 = softehl_blend(m183, v185, v177);
+                        }
+                        v175 = softehl_blend(m176, v177, v175);
+                    }
+                    v172 = softehl_blend(m173, v175, v172);
+                }
+                const M m186 = ~v171 & m156;
+                if (softehl_any(m186)) {
+                    const V v187 = v165 - v169, v188 = v187 * (v187 * v187);
+                    v172 = softehl_blend(m186, v188, v172);
+                }
+                v154 = softehl_blend(m156, v159, v154); v155 = softehl_blend(m156, v172, v155);
+            }
+            v150 = softehl_blend(m152, v154, v150); v151 = softehl_blend(m152, v155, v151);
+        }
+        const M m189 = ~v149;
+        if (softehl_any(m189)) {
+            const V v190 = v147 - v138, v191 = v190 * (v190 * v190);
+            v150 = softehl_blend(m189, v191, v150); v151 = softehl_blend(m189, v191, v151);
+        }
+        const V v192 = v16 * w[1], v193 = w[1] * v131, v194 = w[1] * v130, v195 = w[1] * v145,
+            v196 = w[1] * v144, v197 = w[1] * v127, v198 = v192 * v133, v199 = v192 * v132,
+            v200 = X3 * v125 + (X1 * v126 - v13 * v122), v201 = X2 * v125 + (X0 * v126 - v4 * v122),
+            v202 = softehl_vsqrt(v200 * v200 + v201 * v201),
+            v203 = 6.283185307179586 * (X5 * v127 + v122 * (0.5 * (X1 * v123 + X3 * v124))),
+            v204 = (1.0 + a14 * ((-1.0) + v203)) * (v104 * v202), v205 = v150 * v204,
+            v206 = v151 * v204, v207 = (v142 * v150 + v141 * v151) * v204,
+            v208 = (v142 * v151 - v141 * v150) * v204, v209 = v198 * v205;
+        s108 += v209; const V v210 = v199 * v205; s109 += v210; const V v211 = v198 * v206;
+        s110 += v211; const V v212 = v199 * v206; s111 += v212; const V v213 = v195 * v208;
+        s112 += v213; const V v214 = v195 * v207; s113 += v214; const V v215 = v196 * v208;
+        s114 += v215; const V v216 = v196 * v207; s115 += v216; const V v217 = v197 * v208;
+        s116 += v217; const V v218 = v197 * v207; s117 += v218; const V v219 = v193 * v208;
+        s118 += v219; const V v220 = v194 * v208; s120 += v220; const V v221 = v193 * v207;
+        s119 += v221; const V v222 = v194 * v207; s121 += v222;
+    }
+    softehl_store2(R + 12, 14, s108, s110); softehl_store4(R + 0, 14, s121, s120, s119, s118);
+    softehl_store4(R + 8, 14, -s113, -s112, s109, s111);
+    softehl_store4(R + 4, 14, s117, s116, -s115, -s114);
+}
+SOFTEHL_BATCH(softehl_mortar_32_residual, 10, 14, 15, 0, 14, 0)
+
+SOFTEHL_GROUP(softehl_mortar_32_tangent)
+{
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8, X9;
+    softehl_load4(X + 0, 10, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 10, &X4, &X5, &X6, &X7);
+    softehl_load2(X + 8, 10, &X8, &X9);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13;
+    softehl_load4(d + 0, 14, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 14, &d4, &d5, &d6, &d7);
+    softehl_load4(d + 8, 14, &d8, &d9, &d10, &d11); softehl_load2(d + 12, 14, &d12, &d13);
+    V a0, a1, a2, a3, a4, a5, a6, a7, a8, a9, a10, a11, a12, a13, a14;
+    softehl_load4(a + 0, 15, &a0, &a1, &a2, &a3); softehl_load4(a + 4, 15, &a4, &a5, &a6, &a7);
+    softehl_load4(a + 8, 15, &a8, &a9, &a10, &a11); softehl_load3(a + 12, 15, &a12, &a13, &a14);
+    const V v1 = -a11, v2 = X4 + d4, v3 = 2.0 * X4, v4 = X4 + a2, v5 = X0 + a0, v6 = X2 + a1,
+        v7 = X0 + X2, v8 = X6 + a3, v9 = X8 + a4, v10 = X0 + d0, v11 = v9 - v8, v12 = X1 + a5,
+        v13 = 0.5 * X1, v14 = X3 + a6, v15 = v7 - v3, v16 = 0.5 * X3, v17 = X1 + X3, v18 = X5 + a7,
+        v19 = 2.0 * X5, v20 = X5 + d5, v21 = X7 + a8, v22 = X1 + d1, v23 = X3 + d3, v24 = X7 + d7,
+        v25 = X9 + a9, v26 = v17 - v19, v27 = v23 + v22, v28 = 0.5 * (d1 + d3 + v17),
+        v29 = v23 - X1, v30 = v25 - v21, v31 = X9 + d9, v32 = v24 - v28, v33 = v27 - 2.0 * v20,
+        v34 = 0.5 * (d9 + (X9 + v24)), v35 = v29 - d1, v36 = v31 - v24, v37 = v31 - v28,
+        v38 = 0.5 * v32, v39 = 0.5 * v35, v40 = 0.25 * v35, v41 = 0.5 * (v31 - X7 - d7),
+        v42 = 0.5 * v37, v43 = 1.0 / a10, v44 = -a10, v45 = 0.5 * (d10 - d12),
+        v46 = 0.5 * (d12 - d10), v47 = 0.5 * (d11 - d13), v48 = 0.5 * (d13 - d11), v49 = X2 + d2,
+        v50 = 0.5 * (d2 + (d0 + v7)), v51 = X6 + d6, v52 = v49 + v10, v53 = v49 - X0, v54 = X8 + d8,
+        v55 = 0.5 * (d8 + (d6 + (X6 + X8))), v56 = v51 - v50, v57 = v54 - v51, v58 = v53 - d0,
+        v59 = v54 - v50, v60 = v52 - 2.0 * v2, v61 = 0.5 * v56, v62 = 0.5 * v58, v63 = 0.25 * v58,
+        v64 = 0.5 * v59, v65 = 0.5 * (v54 - d6 - X6), v66 = v37 * v39 + v62 * v59,
+        v67 = v32 * v39 + v62 * v56, v68 = v63 + v64, v69 = v63 + v61, v70 = v61 - v63,
+        v71 = v64 - v63, v72 = 1.0 / (v62 * v62 + v39 * v39), v73 = v72 * v66;
+    const M v74 = softehl_lt(softehl_splat(1.0), v73);
+    const V v75 = softehl_blend(v74, softehl_splat(1.0), v73); const M v76 = softehl_eq(v75, v75);
+    const V v77 = v67 * v72; const M v78 = softehl_lt(softehl_splat(1.0), v77);
+    const V v79 = softehl_blend(v78, softehl_splat(1.0), v77); const M v80 = softehl_eq(v79, v79);
+    const V v81 = v72 * v72, v82 = v70 * v72, v83 = v71 * v72, v84 = 0.5 * (d0 - v53) * v81,
+        v85 = 0.5 * (d1 - v29) * v81, v86 = (v38 - v40) * v72, v87 = (v42 - v40) * v72,
+        v88 = v62 * v81, v89 = v62 * v72, v90 = v39 * v81, v91 = v39 * v72,
+        v92 = v67 * v84 + v69 * v72, v93 = v68 * v72 + v66 * v84,
+        v94 = v67 * v85 + (v38 + v40) * v72, v95 = (v42 + v40) * v72 + v66 * v85, v96 = v67 * v88,
+        v97 = v66 * v88, v98 = v67 * v90, v99 = v66 * v90;
+    V v100 = softehl_splat(0.0), v101 = softehl_splat(0.0), v102 = softehl_splat(0.0),
+        v103 = softehl_splat(0.0), v104 = softehl_splat(0.0), v105 = softehl_splat(0.0),
+        v106 = softehl_splat(0.0);
+    const M m107 = v76;
+    if (softehl_any(m107)) {
+        const M v108 = softehl_lt(softehl_splat((-1.0)), v75);
+        V v109 = softehl_splat((-1.0)), v110 = softehl_splat(0.0), v111 = softehl_splat(0.0),
+            v112 = softehl_splat(0.0), v113 = softehl_splat(0.0), v114 = softehl_splat(0.0),
+            v115 = softehl_splat(0.0);
+        const M m116 = v108 & m107;
+        if (softehl_any(m116)) {
+            V v117 = softehl_splat(0.0), v118 = softehl_splat(0.0), v119 = softehl_splat(0.0),
+                v120 = softehl_splat(0.0), v121 = softehl_splat(0.0), v122 = softehl_splat(0.0);
+            const M m123 = ~v74 & m116;
+            if (softehl_any(m123)) {
+                const V v124 = -v93, v125 = -v95, v126 = v83 - v97, v127 = v87 - v99;
+                v117 = softehl_blend(m123, v89, v117); v118 = softehl_blend(m123, v91, v118);
+                v119 = softehl_blend(m123, v124, v119); v120 = softehl_blend(m123, v125, v120);
+                v121 = softehl_blend(m123, v126, v121); v122 = softehl_blend(m123, v127, v122);
+            }
+            v109 = softehl_blend(m116, v75, v109); v110 = softehl_blend(m116, v117, v110);
+            v111 = softehl_blend(m116, v118, v111); v112 = softehl_blend(m116, v119, v112);
+            v113 = softehl_blend(m116, v120, v113); v114 = softehl_blend(m116, v121, v114);
+            v115 = softehl_blend(m116, v122, v115);
+        }
+        v100 = softehl_blend(m107, v109, v100); v101 = softehl_blend(m107, v112, v101);
+        v102 = softehl_blend(m107, v113, v102); v103 = softehl_blend(m107, v114, v103);
+        v104 = softehl_blend(m107, v115, v104); v105 = softehl_blend(m107, v110, v105);
+        v106 = softehl_blend(m107, v111, v106);
+    }
+    const M m128 = ~v76;
+    if (softehl_any(m128)) {
+        const V v129 = (-1.0) - v75, v130 = v129 * (v129 * v129);
+        V v131 = softehl_splat(0.0), v132 = softehl_splat(0.0), v133 = softehl_splat(0.0),
+            v134 = softehl_splat(0.0), v135 = softehl_splat(0.0), v136 = softehl_splat(0.0);
+        const M m137 = ~v74 & m128;
+        if (softehl_any(m137)) {
+            const V v138 = (-1.0) - v73, v139 = v138 * (3.0 * v138), v140 = (v97 - v83) * v139,
+                v141 = (v99 - v87) * v139, v142 = v93 * v139, v143 = v95 * v139,
+                v144 = -(v89 * v139), v145 = -(v91 * v139);
+            v131 = softehl_blend(m137, v142, v131); v132 = softehl_blend(m137, v143, v132);
+            v133 = softehl_blend(m137, v140, v133); v134 = softehl_blend(m137, v141, v134);
+            v135 = softehl_blend(m137, v144, v135); v136 = softehl_blend(m137, v145, v136);
+        }
+        v100 = softehl_blend(m128, v130, v100); v101 = softehl_blend(m128, v131, v101);
+        v102 = softehl_blend(m128, v132, v102); v103 = softehl_blend(m128, v133, v103);
+        v104 = softehl_blend(m128, v134, v104); v105 = softehl_blend(m128, v135, v105);
+        v106 = softehl_blend(m128, v136, v106);
+    }
+    V v146 = softehl_splat(0.0), v147 = softehl_splat(0.0), v148 = softehl_splat(0.0),
+        v149 = softehl_splat(0.0), v150 = softehl_splat(0.0), v151 = softehl_splat(0.0),
+        v152 = softehl_splat(0.0);
+    const M m153 = v80;
+    if (softehl_any(m153)) {
+        const M v154 = softehl_lt(softehl_splat((-1.0)), v79);
+        V v155 = softehl_splat((-1.0)), v156 = softehl_splat(0.0), v157 = softehl_splat(0.0),
+            v158 = softehl_splat(0.0), v159 = softehl_splat(0.0), v160 = softehl_splat(0.0),
+            v161 = softehl_splat(0.0);
+        const M m162 = v154 & m153;
+        if (softehl_any(m162)) {
+            V v163 = softehl_splat(0.0), v164 = softehl_splat(0.0), v165 = softehl_splat(0.0),
+                v166 = softehl_splat(0.0), v167 = softehl_splat(0.0), v168 = softehl_splat(0.0);
+            const M m169 = ~v78 & m162;
+            if (softehl_any(m169)) {
+                const V v170 = -v92, v171 = -v94, v172 = v82 - v96, v173 = v86 - v98;
+                v163 = softehl_blend(m169, v89, v163); v164 = softehl_blend(m169, v91, v164);
+                v165 = softehl_blend(m169, v170, v165); v166 = softehl_blend(m169, v171, v166);
+                v167 = softehl_blend(m169, v172, v167); v168 = softehl_blend(m169, v173, v168);
+            }
+            v155 = softehl_blend(m162, v79, v155); v156 = softehl_blend(m162, v163, v156);
+            v157 = softehl_blend(m162, v164, v157); v158 = softehl_blend(m162, v165, v158);
+            v159 = softehl_blend(m162, v166, v159); v160 = softehl_blend(m162, v167, v160);
+            v161 = softehl_blend(m162, v168, v161);
+        }
+        v146 = softehl_blend(m153, v155, v146); v147 = softehl_blend(m153, v158, v147);
+        v148 = softehl_blend(m153, v159, v148); v149 = softehl_blend(m153, v160, v149);
+        v150 = softehl_blend(m153, v161, v150); v151 = softehl_blend(m153, v156, v151);
+        v152 = softehl_blend(m153, v157, v152);
+    }
+    const M m174 = ~v80;
     if (softehl_any(m174)) {
-        const V v175 = (-1.0) - v160;
-        const V v176 = v175 * v175;
-        const V v177 = v175 * v176;
-        v170 = softehl_blend(m174, v177, v170);
+        const V v175 = (-1.0) - v79, v176 = v175 * (v175 * v175);
+        V v177 = softehl_splat(0.0), v178 = softehl_splat(0.0), v179 = softehl_splat(0.0),
+            v180 = softehl_splat(0.0), v181 = softehl_splat(0.0), v182 = softehl_splat(0.0);
+        const M m183 = ~v78 & m174;
+        if (softehl_any(m183)) {
+            const V v184 = (-1.0) - v77, v185 = v184 * (3.0 * v184), v186 = (v96 - v82) * v185,
+                v187 = (v98 - v86) * v185, v188 = v92 * v185, v189 = v94 * v185,
+                v190 = -(v89 * v185), v191 = -(v91 * v185);
+            v177 = softehl_blend(m183, v188, v177); v178 = softehl_blend(m183, v189, v178);
+            v179 = softehl_blend(m183, v186, v179); v180 = softehl_blend(m183, v187, v180);
+            v181 = softehl_blend(m183, v190, v181); v182 = softehl_blend(m183, v191, v182);
+        }
+        v146 = softehl_blend(m174, v176, v146); v147 = softehl_blend(m174, v177, v147);
+        v148 = softehl_blend(m174, v178, v148); v149 = softehl_blend(m174, v179, v149);
+        v150 = softehl_blend(m174, v180, v150); v151 = softehl_blend(m174, v181, v151);
+        v152 = softehl_blend(m174, v182, v152);
     }
-    const V v178 = v170 - v162;
-    const M v179 = softehl_eq(v178, v178);
-    V v180 = softehl_splat(0.0);
-    const M m181 = v179;
-    if (softehl_any(m181)) {
-        const M v182 = softehl_lt(softehl_splat(0.0), v178);
-        const V v183 = softehl_blend(v182, v178, softehl_splat(0.0));
-        v180 = softehl_blend(m181, v183, v180);
+    const V v192 = 1.0 + v100, v193 = 0.5 + v100, v194 = 2.0 * v100, v195 = 0.5 * v100,
+        v196 = 0.5 + v146, v197 = 2.0 * v146, v198 = 0.5 * v146, v199 = v100 - 0.5,
+        v200 = v100 - 1.0, v201 = v100 * v100 - 1.0, v202 = 1.0 + v146, v203 = v146 - 0.5,
+        v204 = v146 - 1.0, v205 = v195 * v192, v206 = v146 * v146 - 1.0, v207 = v195 * v200,
+        v208 = v198 * v202, v209 = v198 * v204, v210 = 2.0 * v147, v211 = 0.5 * v147,
+        v212 = v198 * v147, v213 = 2.0 * v101, v214 = 0.5 * v101, v215 = 2.0 * v148,
+        v216 = 0.5 * v148, v217 = v198 * v148, v218 = 2.0 * v102, v219 = 0.5 * v102,
+        v220 = 2.0 * v149, v221 = 0.5 * v149, v222 = v198 * v149, v223 = 2.0 * v103,
+        v224 = 0.5 * v103, v225 = 2.0 * v150, v226 = 0.5 * v150, v227 = v198 * v150,
+        v228 = 2.0 * v104, v229 = 0.5 * v104, v230 = 2.0 * v151, v231 = 0.5 * v151,
+        v232 = v198 * v151, v233 = v198 * v152, v234 = 2.0 * v152, v235 = 0.5 * v152,
+        v236 = 2.0 * v105, v237 = 0.5 * v105, v238 = 2.0 * v106, v239 = 0.5 * v106,
+        v240 = v197 * v151, v241 = v197 * v147, v242 = v197 * v148, v243 = v197 * v149,
+        v244 = v197 * v150, v245 = v197 * v152, v246 = v194 * v106, v247 = v194 * v101,
+        v248 = v195 * v101, v249 = v195 * v106, v250 = v194 * v102, v251 = v195 * v102,
+        v252 = v194 * v103, v253 = v195 * v103, v254 = v194 * v104, v255 = v195 * v104,
+        v256 = v195 * v105, v257 = v194 * v105, v258 = v27 * v103 - v20 * v223,
+        v259 = v52 * v104 - v2 * v228, v260 = v52 * v105 - v2 * v236,
+        v261 = v27 * v105 - v20 * v236, v262 = v193 + (v52 * v103 - v2 * v223),
+        v263 = v193 + (v27 * v104 - v20 * v228), v264 = v52 * v149 + (v196 - v2 * v220),
+        v265 = v27 * v149 - v20 * v220, v266 = v27 * v150 + (v196 - v20 * v225),
+        v267 = v52 * v150 - v2 * v225, v268 = v27 * v147 - v20 * v210,
+        v269 = v52 * v147 + v203 - v2 * v210, v270 = v27 * v101 - v20 * v213,
+        v271 = v52 * v101 + v199 - v2 * v213, v272 = v52 * v148 - v2 * v215,
+        v273 = v27 * v148 + v203 - v20 * v215, v274 = v52 * v102 - v2 * v218,
+        v275 = v27 * v102 + v199 - v20 * v218, v276 = v52 * v151 - v2 * v230,
+        v277 = v27 * v151 - v20 * v230, v278 = v52 * v152 - v2 * v234,
+        v279 = v27 * v152 - v20 * v234, v280 = v52 * v106 - v2 * v238,
+        v281 = v27 * v106 - v20 * v238, v282 = v10 * v199 + (v49 * v193 - v2 * v194),
+        v283 = v22 * v199 + (v23 * v193 - v20 * v194), v284 = 2.0 * v282, v285 = 2.0 * v283,
+        v286 = 1.0 / (v282 * v282 + v283 * v283), v287 = v54 + v2 * v201 - v10 * v207 - v49 * v205,
+        v288 = v31 + v20 * v201 - v22 * v207 - v23 * v205,
+        v289 = v51 + v2 * v206 - v10 * v209 - v49 * v208,
+        v290 = v24 + v20 * v206 - v22 * v209 - v23 * v208, v291 = v282 * v287 + v283 * v288,
+        v292 = v286 * v286, v293 = v194 * v291 * v292, v294 = v291 * v292,
+        v295 = v100 + v286 * v291, v296 = v286 * (v201 * v282 - v194 * v287) + v284 * v293,
+        v297 = v286 * (v201 * v283 - v194 * v288) + v285 * v293,
+        v298 = (v259 * v284 + v263 * v285) * v294, v299 = (v260 * v284 + v261 * v285) * v294,
+        v300 = (v280 * v284 + v281 * v285) * v294;
+    const M v301 = softehl_lt(softehl_splat(1.0), v295);
+    const V v302 = (v274 * v284 + v275 * v285) * v294, v303 = (v262 * v284 + v258 * v285) * v294,
+        v304 = v294 * (v271 * v284 + v270 * v285), v305 = v10 * v203 + (v49 * v196 - v2 * v197),
+        v306 = v22 * v203 + (v23 * v196 - v20 * v197), v307 = 2.0 * v305, v308 = 2.0 * v306,
+        v309 = 1.0 / (v305 * v305 + v306 * v306), v310 = v289 * v305 + v290 * v306,
+        v311 = v212 + v211 * v202, v312 = v212 + v211 * v204, v313 = v217 + v216 * v202,
+        v314 = v217 + v216 * v204, v315 = v222 + v221 * v202, v316 = v222 + v221 * v204,
+        v317 = v227 + v226 * v202, v318 = v227 + v226 * v204, v319 = v232 + v231 * v202,
+        v320 = v232 + v231 * v204, v321 = v233 + v235 * v202, v322 = v233 + v235 * v204,
+        v323 = v309 * v309, v324 = v146 + v309 * v310, v325 = v310 * v323,
+        v326 = v197 * v310 * v323, v327 = (v206 * v305 - v197 * v289) * v309 + v307 * v326,
+        v328 = v309 * (v206 * v306 - v197 * v290) + v308 * v326,
+        v329 = (v269 * v307 + v268 * v308) * v325, v330 = (v272 * v307 + v273 * v308) * v325,
+        v331 = (v264 * v307 + v265 * v308) * v325, v332 = (v267 * v307 + v266 * v308) * v325,
+        v333 = (v276 * v307 + v277 * v308) * v325, v334 = (v278 * v307 + v279 * v308) * v325,
+        v335 = v269 * v289 + v268 * v290 + v305 * (v2 * v241 - v209 - v10 * v312 - v49 * v311),
+        v336 = v264 * v289 + v265 * v290 + v305 * (v2 * v243 - v208 - v10 * v316 - v49 * v315),
+        v337 = v335 + v306 * (v20 * v241 - v22 * v312 - v23 * v311),
+        v338 = v336 + v306 * (v20 * v243 - v22 * v316 - v23 * v315),
+        v339 = v272 * v289 + v273 * v290 + (v2 * v242 - v49 * v313 - v10 * v314) * v305,
+        v340 = v339 + (v20 * v242 - v209 - v23 * v313 - v22 * v314) * v306,
+        v341 = v267 * v289 + v266 * v290 + (v2 * v244 - v49 * v317 - v10 * v318) * v305,
+        v342 = v341 + (v20 * v244 - v208 - v23 * v317 - v22 * v318) * v306,
+        v343 = v276 * v289 + v277 * v290 + (1.0 + v2 * v240 - v49 * v319 - v10 * v320) * v305,
+        v344 = v343 + (v20 * v240 - v23 * v319 - v22 * v320) * v306,
+        v345 = v278 * v289 + v279 * v290 + (v2 * v245 - v49 * v321 - v10 * v322) * v305,
+        v346 = v345 + (1.0 + v20 * v245 - v23 * v321 - v22 * v322) * v306,
+        v347 = v248 + v214 * v192, v348 = v248 + v214 * v200, v349 = v251 + v219 * v192,
+        v350 = v251 + v219 * v200, v351 = v253 + v224 * v192, v352 = v253 + v224 * v200,
+        v353 = v255 + v229 * v192, v354 = v255 + v229 * v200,
+        v355 = v271 * v287 + v270 * v288 + (v2 * v247 - v207 - v49 * v347 - v10 * v348) * v282,
+        v356 = v274 * v287 + v275 * v288 + (v2 * v250 - v49 * v349 - v10 * v350) * v282,
+        v357 = v262 * v287 + v258 * v288 + (v2 * v252 - v205 - v49 * v351 - v10 * v352) * v282,
+        v358 = v355 + (v20 * v247 - v23 * v347 - v22 * v348) * v283,
+        v359 = v356 + (v20 * v250 - v207 - v23 * v349 - v22 * v350) * v283,
+        v360 = v357 + (v20 * v252 - v23 * v351 - v22 * v352) * v283,
+        v361 = v259 * v287 + v263 * v288 + (v2 * v254 - v49 * v353 - v10 * v354) * v282,
+        v362 = v361 + (v20 * v254 - v205 - v23 * v353 - v22 * v354) * v283,
+        v363 = v256 + v237 * v192, v364 = v256 + v237 * v200, v365 = v249 + v239 * v192,
+        v366 = v249 + v239 * v200,
+        v367 = v260 * v287 + v261 * v288 + (1.0 + v2 * v257 - v49 * v363 - v10 * v364) * v282,
+        v368 = v280 * v287 + v281 * v288 + (v2 * v246 - v49 * v365 - v10 * v366) * v282,
+        v369 = v367 + (v20 * v257 - v23 * v363 - v22 * v364) * v283,
+        v370 = v368 + (1.0 + v20 * v246 - v23 * v365 - v22 * v366) * v283,
+        v371 = softehl_blend(v301, softehl_splat(1.0), v295);
+    const M v372 = softehl_eq(v371, v371), v373 = softehl_lt(softehl_splat(1.0), v324);
+    const V v374 = softehl_blend(v373, softehl_splat(1.0), v324);
+    const M v375 = softehl_eq(v374, v374);
+    const V v376 = v309 * v337 + (v147 - v329), v377 = v309 * v340 + (v148 - v330),
+        v378 = v309 * v338 + (v149 - v331), v379 = v309 * v342 + (v150 - v332),
+        v380 = v286 * v358 + (v101 - v304), v381 = v286 * v359 + (v102 - v302),
+        v382 = v286 * v360 + (v103 - v303), v383 = v286 * v362 + (v104 - v298),
+        v384 = v309 * v344 + (v151 - v333), v385 = v309 * v346 + (v152 - v334),
+        v386 = v286 * v369 + (v105 - v299), v387 = v286 * v370 + (v106 - v300);
+    V v388 = softehl_splat(0.0), v389 = softehl_splat(0.0), v390 = softehl_splat(0.0),
+        v391 = softehl_splat(0.0), v392 = softehl_splat(0.0), v393 = softehl_splat(0.0),
+        v394 = softehl_splat(0.0), v395 = softehl_splat(0.0), v396 = softehl_splat(0.0);
+    const M m397 = v372;
+    if (softehl_any(m397)) {
+        const M v398 = softehl_lt(softehl_splat((-1.0)), v371);
+        V v399 = softehl_splat((-1.0)), v400 = softehl_splat(0.0), v401 = softehl_splat(0.0),
+            v402 = softehl_splat(0.0), v403 = softehl_splat(0.0), v404 = softehl_splat(0.0),
+            v405 = softehl_splat(0.0), v406 = softehl_splat(0.0), v407 = softehl_splat(0.0);
+        const M m408 = v398 & m397;
+        if (softehl_any(m408)) {
+            const V v409 = softehl_blend(v301, softehl_splat(0.0), v296),
+                v410 = softehl_blend(v301, softehl_splat(0.0), v297),
+                v411 = softehl_blend(v301, softehl_splat(0.0), v380),
+                v412 = softehl_blend(v301, softehl_splat(0.0), v381),
+                v413 = softehl_blend(v301, softehl_splat(0.0), v382),
+                v414 = softehl_blend(v301, softehl_splat(0.0), v383),
+                v415 = softehl_blend(v301, softehl_splat(0.0), v386),
+                v416 = softehl_blend(v301, softehl_splat(0.0), v387);
+            v399 = softehl_blend(m408, v371, v399); v400 = softehl_blend(m408, v409, v400);
+            v401 = softehl_blend(m408, v410, v401); v402 = softehl_blend(m408, v411, v402);
+            v403 = softehl_blend(m408, v412, v403); v404 = softehl_blend(m408, v413, v404);
+            v405 = softehl_blend(m408, v414, v405); v406 = softehl_blend(m408, v415, v406);
+            v407 = softehl_blend(m408, v416, v407);
+        }
+        v388 = softehl_blend(m397, v399, v388); v389 = softehl_blend(m397, v400, v389);
+        v390 = softehl_blend(m397, v401, v390); v391 = softehl_blend(m397, v402, v391);
+        v392 = softehl_blend(m397, v403, v392); v393 = softehl_blend(m397, v404, v393);
+        v394 = softehl_blend(m397, v405, v394); v395 = softehl_blend(m397, v406, v395);
+        v396 = softehl_blend(m397, v407, v396);
     }
-    const M m184 = ~v179;
-    if (softehl_any(m184)) {
-        const V v185 = v162 - v170;
-        const V v186 = v185 * v185;
-        const V v187 = v185 * v186;
-        v180 = softehl_blend(m184, v187, v180);
+    const M m417 = ~v372;
+    if (softehl_any(m417)) {
+        const V v418 = (-1.0) - v371, v419 = v418 * (v418 * v418);
+        V v420 = softehl_splat(0.0), v421 = softehl_splat(0.0), v422 = softehl_splat(0.0),
+            v423 = softehl_splat(0.0), v424 = softehl_splat(0.0), v425 = softehl_splat(0.0),
+            v426 = softehl_splat(0.0), v427 = softehl_splat(0.0);
+        const M m428 = ~v301 & m417;
+        if (softehl_any(m428)) {
+            const V v429 = (-1.0) - v295, v430 = v429 * (3.0 * v429), v431 = -(v296 * v430),
+                v432 = -(v297 * v430), v433 = -(v380 * v430), v434 = -(v381 * v430),
+                v435 = -(v382 * v430), v436 = -(v383 * v430), v437 = -(v386 * v430),
+                v438 = -(v387 * v430);
+            v420 = softehl_blend(m428, v431, v420); v421 = softehl_blend(m428, v432, v421);
+            v422 = softehl_blend(m428, v433, v422); v423 = softehl_blend(m428, v434, v423);
+            v424 = softehl_blend(m428, v435, v424); v425 = softehl_blend(m428, v436, v425);
+            v426 = softehl_blend(m428, v437, v426); v427 = softehl_blend(m428, v438, v427);
+        }
+        v388 = softehl_blend(m417, v419, v388); v389 = softehl_blend(m417, v420, v389);
+        v390 = softehl_blend(m417, v421, v390); v391 = softehl_blend(m417, v422, v391);
+        v392 = softehl_blend(m417, v423, v392); v393 = softehl_blend(m417, v424, v393);
+        v394 = softehl_blend(m417, v425, v394); v395 = softehl_blend(m417, v426, v395);
+        v396 = softehl_blend(m417, v427, v396);
     }
-    const V v188 = 0.5 * v180;
-    const V v189 = X6 + X8;
-    const V v190 = X7 + X9;
-    const V v191 = v162 + v170;
-    const V v192 = d6 + v189;
-    const V v193 = 0.5 * v191;
-    const V v194 = d7 + v190;
-    const V v195 = d8 + v192;
-    const V v196 = d9 + v194;
-    const V v197 = 0.5 * v195;
-    const V v198 = 0.5 * v196;
-    V s199 = softehl_splat(0.0);
-    V s200 = softehl_splat(0.0);
-    V s201 = softehl_splat(0.0);
-    V s202 = softehl_splat(0.0);
-    V s203 = softehl_splat(0.0);
-    V s204 = softehl_splat(0.0);
-    V s205 = softehl_splat(0.0);
-    V s206 = softehl_splat(0.0);
-    V s207 = softehl_splat(0.0);
-    V s208 = softehl_splat(0.0);
-    V s209 = softehl_splat(0.0);
-    V s210 = softehl_splat(0.0);
-    V s211 = softehl_splat(0.0);
-    V s212 = softehl_splat(0.0);
+    V v439 = softehl_splat(0.0), v440 = softehl_splat(0.0), v441 = softehl_splat(0.0),
+        v442 = softehl_splat(0.0), v443 = softehl_splat(0.0), v444 = softehl_splat(0.0),
+        v445 = softehl_splat(0.0), v446 = softehl_splat(0.0), v447 = softehl_splat(0.0);
+    const M m448 = v375;
+    if (softehl_any(m448)) {
+        const M v449 = softehl_lt(softehl_splat((-1.0)), v374);
+        V v450 = softehl_splat((-1.0)), v451 = softehl_splat(0.0), v452 = softehl_splat(0.0),
+            v453 = softehl_splat(0.0), v454 = softehl_splat(0.0), v455 = softehl_splat(0.0),
+            v456 = softehl_splat(0.0), v457 = softehl_splat(0.0), v458 = softehl_splat(0.0);
+        const M m459 = v449 & m448;
+        if (softehl_any(m459)) {
+            const V v460 = softehl_blend(v373, softehl_splat(0.0), v327),
+                v461 = softehl_blend(v373, softehl_splat(0.0), v328),
+                v462 = softehl_blend(v373, softehl_splat(0.0), v376),
+                v463 = softehl_blend(v373, softehl_splat(0.0), v377),
+                v464 = softehl_blend(v373, softehl_splat(0.0), v378),
+                v465 = softehl_blend(v373, softehl_splat(0.0), v379),
+                v466 = softehl_blend(v373, softehl_splat(0.0), v384),
+                v467 = softehl_blend(v373, softehl_splat(0.0), v385);
+            v450 = softehl_blend(m459, v374, v450); v451 = softehl_blend(m459, v460, v451);
+            v452 = softehl_blend(m459, v461, v452); v453 = softehl_blend(m459, v462, v453);
+            v454 = softehl_blend(m459, v463, v454); v455 = softehl_blend(m459, v464, v455);
+            v456 = softehl_blend(m459, v465, v456); v457 = softehl_blend(m459, v466, v457);
+            v458 = softehl_blend(m459, v467, v458);
+        }
+        v439 = softehl_blend(m448, v450, v439); v440 = softehl_blend(m448, v451, v440);
+        v441 = softehl_blend(m448, v452, v441); v442 = softehl_blend(m448, v453, v442);
+        v443 = softehl_blend(m448, v454, v443); v444 = softehl_blend(m448, v455, v444);
+        v445 = softehl_blend(m448, v456, v445); v446 = softehl_blend(m448, v457, v446);
+        v447 = softehl_blend(m448, v458, v447);
+    }
+    const M m468 = ~v375;
+    if (softehl_any(m468)) {
+        const V v469 = (-1.0) - v374, v470 = v469 * (v469 * v469);
+        V v471 = softehl_splat(0.0), v472 = softehl_splat(0.0), v473 = softehl_splat(0.0),
+            v474 = softehl_splat(0.0), v475 = softehl_splat(0.0), v476 = softehl_splat(0.0),
+            v477 = softehl_splat(0.0), v478 = softehl_splat(0.0);
+        const M m479 = ~v373 & m468;
+        if (softehl_any(m479)) {
+            const V v480 = (-1.0) - v324, v481 = v480 * (3.0 * v480), v482 = -(v327 * v481),
+                v483 = -(v328 * v481), v484 = -(v376 * v481), v485 = -(v377 * v481),
+                v486 = -(v378 * v481), v487 = -(v379 * v481), v488 = -(v384 * v481),
+                v489 = -(v385 * v481);
+            v471 = softehl_blend(m479, v482, v471); v472 = softehl_blend(m479, v483, v472);
+            v473 = softehl_blend(m479, v484, v473); v474 = softehl_blend(m479, v485, v474);
+            v475 = softehl_blend(m479, v486, v475); v476 = softehl_blend(m479, v487, v476);
+            v477 = softehl_blend(m479, v488, v477); v478 = softehl_blend(m479, v489, v478);
+        }
+        v439 = softehl_blend(m468, v470, v439); v440 = softehl_blend(m468, v471, v440);
+        v441 = softehl_blend(m468, v472, v441); v442 = softehl_blend(m468, v473, v442);
+        v443 = softehl_blend(m468, v474, v443); v444 = softehl_blend(m468, v475, v444);
+        v445 = softehl_blend(m468, v476, v445); v446 = softehl_blend(m468, v477, v446);
+        v447 = softehl_blend(m468, v478, v447);
+    }
+    const V v490 = v439 - v388; const M v491 = softehl_eq(v490, v490);
+    V v492 = softehl_splat(0.0), v493 = softehl_splat(0.0), v494 = softehl_splat(0.0),
+        v495 = softehl_splat(0.0), v496 = softehl_splat(0.0), v497 = softehl_splat(0.0),
+        v498 = softehl_splat(0.0), v499 = softehl_splat(0.0), v500 = softehl_splat(0.0),
+        v501 = softehl_splat(0.0), v502 = softehl_splat(0.0);
+    const M m503 = v491;
+    if (softehl_any(m503)) {
+        const M v504 = softehl_lt(softehl_splat(0.0), v490);
+        V v505 = softehl_splat(0.0), v506 = softehl_splat(0.0), v507 = softehl_splat(0.0),
+            v508 = softehl_splat(0.0), v509 = softehl_splat(0.0), v510 = softehl_splat(0.0),
+            v511 = softehl_splat(0.0), v512 = softehl_splat(0.0), v513 = softehl_splat(0.0),
+            v514 = softehl_splat(0.0), v515 = softehl_splat(0.0);
+        const M m516 = v504 & m503;
+        if (softehl_any(m516)) {
+            const V v517 = v440 - v389, v518 = -v395, v519 = v441 - v390, v520 = v442 - v391,
+                v521 = v443 - v392, v522 = -v396, v523 = v444 - v393, v524 = v445 - v394;
+            v505 = softehl_blend(m516, v490, v505); v506 = softehl_blend(m516, v517, v506);
+            v507 = softehl_blend(m516, v519, v507); v508 = softehl_blend(m516, v520, v508);
+            v509 = softehl_blend(m516, v521, v509); v510 = softehl_blend(m516, v523, v510);
+            v511 = softehl_blend(m516, v524, v511); v512 = softehl_blend(m516, v446, v512);
+            v513 = softehl_blend(m516, v447, v513); v514 = softehl_blend(m516, v518, v514);
+            v515 = softehl_blend(m516, v522, v515);
+        }
+        v492 = softehl_blend(m503, v505, v492); v493 = softehl_blend(m503, v506, v493);
+        v494 = softehl_blend(m503, v507, v494); v495 = softehl_blend(m503, v508, v495);
+        v496 = softehl_blend(m503, v509, v496); v497 = softehl_blend(m503, v510, v497);
+        v498 = softehl_blend(m503, v511, v498); v499 = softehl_blend(m503, v512, v499);
+        v500 = softehl_blend(m503, v513, v500); v501 = softehl_blend(m503, v514, v501);
+        v502 = softehl_blend(m503, v515, v502);
+    }
+    const M m525 = ~v491;
+    if (softehl_any(m525)) {
+        const V v526 = v388 - v439, v527 = v526 * v526, v528 = v526 * v527, v529 = 3.0 * v527,
+            v530 = (v389 - v440) * v529, v531 = (v390 - v441) * v529, v532 = (v391 - v442) * v529,
+            v533 = (v392 - v443) * v529, v534 = (v393 - v444) * v529, v535 = (v394 - v445) * v529,
+            v536 = v395 * v529, v537 = v396 * v529, v538 = -(v446 * v529), v539 = -(v447 * v529);
+        v492 = softehl_blend(m525, v528, v492); v493 = softehl_blend(m525, v530, v493);
+        v494 = softehl_blend(m525, v531, v494); v495 = softehl_blend(m525, v532, v495);
+        v496 = softehl_blend(m525, v533, v496); v497 = softehl_blend(m525, v534, v497);
+        v498 = softehl_blend(m525, v535, v498); v499 = softehl_blend(m525, v538, v499);
+        v500 = softehl_blend(m525, v539, v500); v501 = softehl_blend(m525, v536, v501);
+        v502 = softehl_blend(m525, v537, v502);
+    }
+    const V v540 = 0.5 * v493, v541 = 0.5 * v494, v542 = 0.5 * v495, v543 = 0.5 * v496,
+        v544 = 0.5 * (v388 + v439), v545 = 0.5 * (v440 + v389), v546 = 0.5 * (v441 + v390),
+        v547 = 0.5 * v497, v548 = 0.5 * v498, v549 = 0.5 * (v442 + v391), v550 = 0.5 * v499,
+        v551 = 0.5 * v500, v552 = 0.5 * v501, v553 = 0.5 * (v443 + v392), v554 = 0.5 * v502,
+        v555 = 0.5 * v446, v556 = 0.5 * v447, v557 = 0.5 * v395, v558 = 0.5 * (v444 + v393),
+        v559 = 0.5 * v396, v560 = 0.5 * (v445 + v394), v561 = 6.283185307179586 * a14,
+        v562 = 0.5 * v492, v563 = 0.25 * v492;
+    V s564 = {0}, s565 = {0}, s566 = {0}, s567 = {0}, s568 = {0}, s569 = {0}, s570 = {0},
+        s571 = {0}, s572 = {0}, s573 = {0}, s574 = {0}, s575 = {0}, s576 = {0}, s577 = {0},
+        s578 = {0}, s579 = {0}, s580 = {0}, s581 = {0}, s582 = {0}, s583 = {0}, s584 = {0},
+        s585 = {0}, s586 = {0}, s587 = {0}, s588 = {0}, s589 = {0}, s590 = {0}, s591 = {0},
+        s592 = {0}, s593 = {0}, s594 = {0}, s595 = {0}, s596 = {0}, s597 = {0}, s598 = {0},
+        s599 = {0}, s600 = {0}, s601 = {0}, s602 = {0}, s603 = {0}, s604 = {0}, s605 = {0},
+        s606 = {0}, s607 = {0}, s608 = {0}, s609 = {0}, s610 = {0}, s611 = {0}, s612 = {0},
+        s613 = {0}, s614 = {0}, s615 = {0}, s616 = {0}, s617 = {0}, s618 = {0}, s619 = {0},
+        s620 = {0}, s621 = {0}, s622 = {0}, s623 = {0}, s624 = {0}, s625 = {0}, s626 = {0},
+        s627 = {0}, s628 = {0}, s629 = {0}, s630 = {0}, s631 = {0}, s632 = {0}, s633 = {0},
+        s634 = {0}, s635 = {0}, s636 = {0}, s637 = {0}, s638 = {0}, s639 = {0}, s640 = {0},
+        s641 = {0}, s642 = {0}, s643 = {0}, s644 = {0}, s645 = {0}, s646 = {0}, s647 = {0},
+        s648 = {0}, s649 = {0}, s650 = {0}, s651 = {0}, s652 = {0}, s653 = {0}, s654 = {0},
+        s655 = {0}, s656 = {0}, s657 = {0}, s658 = {0}, s659 = {0}, s660 = {0}, s661 = {0},
+        s662 = {0}, s663 = {0}, s664 = {0}, s665 = {0}, s666 = {0}, s667 = {0}, s668 = {0},
+        s669 = {0}, s670 = {0}, s671 = {0}, s672 = {0}, s673 = {0}, s674 = {0}, s675 = {0},
+        s676 = {0}, s677 = {0}, s678 = {0}, s679 = {0}, s680 = {0}, s681 = {0}, s682 = {0},
+        s683 = {0}, s684 = {0}, s685 = {0}, s686 = {0}, s687 = {0}, s688 = {0}, s689 = {0},
+        s690 = {0}, s691 = {0}, s692 = {0}, s693 = {0}, s694 = {0}, s695 = {0}, s696 = {0},
+        s697 = {0}, s698 = {0}, s699 = {0}, s700 = {0}, s701 = {0}, s702 = {0}, s703 = {0},
+        s704 = {0}, s705 = {0}, s706 = {0}, s707 = {0}, s708 = {0}, s709 = {0}, s710 = {0},
+        s711 = {0}, s712 = {0}, s713 = {0}, s714 = {0}, s715 = {0}, s716 = {0}, s717 = {0},
+        s718 = {0}, s719 = {0}, s720 = {0}, s721 = {0}, s722 = {0}, s723 = {0}, s724 = {0},
+        s725 = {0}, s726 = {0}, s727 = {0}, s728 = {0}, s729 = {0}, s730 = {0}, s731 = {0},
+        s732 = {0}, s733 = {0}, s734 = {0}, s735 = {0}, s736 = {0}, s737 = {0}, s738 = {0},
+        s739 = {0}, s740 = {0}, s741 = {0}, s742 = {0}, s743 = {0}, s744 = {0}, s745 = {0},
+        s746 = {0}, s747 = {0}, s748 = {0}, s749 = {0}, s750 = {0}, s751 = {0}, s752 = {0},
+        s753 = {0}, s754 = {0}, s755 = {0}, s756 = {0}, s757 = {0}, s758 = {0}, s759 = {0},
+        s760 = {0}, s761 = {0}, s762 = {0}, s763 = {0}, s764 = {0}, s765 = {0}, s766 = {0},
+        s767 = {0}, s768 = {0}, s769 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const V v213 = w[0] * v188;
-        const V v214 = v213 + v193;
-        const V v215 = (-1.0) + v214;
-        const V v216 = 1.0 + v214;
-        const V v217 = 0.5 + v214;
-        const V v218 = (-0.5) + v214;
-        const V v219 = v214 * v214;
-        const V v220 = 1.0 - v219;
-        const V v221 = 0.5 * v214;
-        const V v222 = 2.0 * v214;
-        const V v223 = v221 * v215;
-        const V v224 = v221 * v216;
-        const V v225 = 0.5 - v221;
-        const V v226 = 0.5 + v221;
-        const V v227 = v3 * v220;
-        const V v228 = v12 * v220;
-        const V v229 = v2 * v217;
-        const V v230 = v10 * v217;
-        const V v231 = v3 * v222;
-        const V v232 = v229 - v231;
-        const V v233 = v12 * v222;
-        const V v234 = v230 - v233;
-        const V v235 = v2 * v224;
-        const V v236 = v235 + v227;
-        const V v237 = v10 * v224;
-        const V v238 = v237 + v228;
-        const V v239 = d10 * v225;
-        const V v240 = v1 * v218;
-        const V v241 = v240 + v232;
-        const V v242 = v9 * v218;
-        const V v243 = v242 + v234;
-        const V v244 = v1 * v223;
-        const V v245 = v244 + v236;
-        const V v246 = v9 * v223;
-        const V v247 = v246 + v238;
-        const V v248 = d12 * v226;
-        const V v249 = v239 + v248;
-        const V v250 = v241 * v241;
-        const V v251 = v243 * v243;
-        const V v252 = v250 + v251;
-        const V v253 = softehl_vsqrt(v252);
-        const V v254 = v245 - v197;
-        const V v255 = v247 - v198;
-        const V v256 = 1.0 / v253;
-        const V v257 = v241 * v256;
-        const V v258 = v243 * v256;
-        const V v259 = v254 * v257;
-        const V v260 = v255 * v258;
-        const V v261 = v259 + v260;
-        const V v262 = 0.5 * v261;
-        const V v263 = v26 * v257;
-        const V v264 = v31 * v258;
-        const V v265 = v263 + v264;
-        const V v266 = 0.5 * v265;
-        const V v267 = 1.0 / v266;
-        const V v268 = v262 * v267;
-        const V v269 = 0.5 - v268;
-        const V v270 = 0.5 + v268;
-        const V v271 = v25 * v269;
-        const V v272 = v271 - v245;
-        const V v273 = v28 * v269;
-        const V v274 = v273 - v247;
-        const V v275 = v6 * v270;
-        const V v276 = v272 + v275;
-        const V v277 = v258 * v276;
-        const V v278 = v22 * v270;
-        const V v279 = v274 + v278;
-        const V v280 = v257 * v279;
-        const V v281 = v277 - v280;
-        const V v282 = a10 * v281;
-        const V v283 = v249 - v282;
-        const M v284 = softehl_eq(v283, v283);
-        V v285 = softehl_splat(0.0);
-        V v286 = softehl_splat(0.0);
-        const M m287 = v284;
-        if (softehl_any(m287)) {
-            const M v288 = softehl_le(softehl_splat(0.0), v283);
-            V v289 = softehl_splat(0.0);
-            V v290 = softehl_splat(0.0);
-            const M m291 = v288 & m287;
-            if (softehl_any(m291)) {
-                const V v292 = a12 + v281;
-                const V v293 = v281 - a13;
-                const V v294 = v292 * v293;
-                const M v295 = softehl_eq(v294, v294);
-                V v296 = softehl_splat(0.0);
-                const M m297 = v295 & m291;
-                if (softehl_any(m297)) {
-                    const M v298 = softehl_lt(v294, softehl_splat(0.0));
-                    const V v299 = softehl_blend(v298, v283, softehl_splat(0.0));
-                    v296 = softehl_blend(m297, v299, v296);
+        const double *restrict w = rule + 2 * q; (void)w;
+        const V v770 = w[0] * v550 + v555, v771 = w[0] * v551 + v556, v772 = w[0] * v542 + v549,
+            v773 = w[0] * v543 + v553, v774 = w[0] * v547 + v558, v775 = w[0] * v548 + v560,
+            v776 = w[0] * v540 + v545, v777 = w[0] * v541 + v546, v778 = w[0] * v552 + v557,
+            v779 = w[0] * v554 + v559, v780 = w[0] * v562 + v544, v781 = v33 * v772,
+            v782 = v33 * v774, v783 = v33 * v770, v784 = v33 * v776, v785 = v33 * v778,
+            v786 = v33 * v779, v787 = 0.5 * v780, v788 = 2.0 * v780, v789 = v13 * v780,
+            v790 = v16 * v780, v791 = (-1.0) + v780, v792 = 1.0 + v780, v793 = 0.5 + v780,
+            v794 = (-0.5) + v780, v795 = v787 * v791, v796 = v787 - 0.5, v797 = v787 * v792,
+            v798 = 0.5 * (v780 + v791), v799 = 0.5 * (v780 + v792), v800 = v33 * v773 + v794,
+            v801 = w[1] * v797, v802 = w[1] * v795, v803 = 1.0 - v780 * v780,
+            v804 = X2 * v793 + (X0 * v794 - v3 * v780), v805 = X3 * v793 + (X1 * v794 - v19 * v780),
+            v806 = w[1] * v803, v807 = v2 * v803 + (v10 * v795 + v49 * v797), v808 = v2 * v788,
+            v809 = v804 * v804 + v805 * v805, v810 = v20 * v803 + (v22 * v795 + v23 * v797),
+            v811 = v20 * v788, v812 = v49 * v793 + v10 * v794 - v808,
+            v813 = v10 * v798 + v49 * v799 - v808, v814 = softehl_vsqrt(v809),
+            v815 = v23 * v793 + v22 * v794 - v811, v816 = v22 * v798 + v23 * v799 - v811,
+            v817 = (-1.0) + 6.283185307179586 * (X5 * v803 + (v789 * v791 + v790 * v792)),
+            v818 = v807 - v55, v819 = v810 - v34, v820 = v803 + v776 * v813, v821 = v776 * v816,
+            v822 = v812 * v812 + v815 * v815, v823 = 1.0 + a14 * v817, v824 = v60 * v773,
+            v825 = v773 * v813, v826 = v795 + v773 * v816, v827 = v60 * v775, v828 = v775 * v813,
+            v829 = v60 * v776 - v788, v830 = softehl_vsqrt(v822), v831 = v60 * v777,
+            v832 = v777 * v813, v833 = v60 * v770, v834 = v770 * v813, v835 = v770 * v816,
+            v836 = v60 * v771, v837 = v771 * v813, v838 = v771 * v816, v839 = v33 * v771,
+            v840 = v803 + v777 * v816, v841 = v33 * v775 + v793, v842 = v797 + v775 * v816,
+            v843 = v33 * v777 - v788, v844 = v60 * v778, v845 = v778 * v813, v846 = v778 * v816,
+            v847 = v562 * v814, v848 = v60 * v779, v849 = v779 * v813, v850 = v779 * v816,
+            v851 = v823 * v847, v852 = softehl_vsqrt(1.0 / v822), v853 = v772 * v816,
+            v854 = v774 * v816, v855 = v60 * v772 + v794, v856 = v60 * v774 + v793,
+            v857 = v795 + v772 * v813, v858 = v797 + v774 * v813, v859 = 0.5 - v787,
+            v860 = 0.5 + v787, v861 = 1.0 / v830, v862 = v43 * v859, v863 = v43 * v860,
+            v864 = d10 * v859 + d12 * v860, v865 = v862 * v851, v866 = v863 * v851,
+            v867 = 0.5 * v852, v868 = v861 * v861, v869 = 2.0 * v812 * v867 * v868,
+            v870 = 2.0 * v815 * v867 * v868, v871 = w[1] * v865, v872 = w[1] * v866,
+            v873 = v861 - v812 * v869, v874 = v812 * v861, v875 = v812 * v870, v876 = v815 * v861,
+            v877 = v861 - v815 * v870, v878 = v815 * v869, v879 = v876 * v851, v880 = v874 * v851,
+            v881 = 0.5 * (v57 * v876 - v36 * v874), v882 = 1.0 / (v65 * v874 + v41 * v876),
+            v883 = v818 * v874 + v819 * v876, v884 = v882 * (0.5 * v883), v885 = v882 * v882,
+            v886 = v885 * (0.5 * v874 * v883), v887 = v885 * (0.5 * v876 * v883),
+            v888 = v876 * v882,
+            v889 = v882 * (v818 * v873 - v819 * v878) - v885 * (v883 * (v65 * v873 - v41 * v878)),
+            v890 = v882 * (v819 * v877 - v818 * v875) - v885 * (v883 * (v41 * v877 - v65 * v875)),
+            v891 = v874 * v882, v892 = 0.5 * v891, v893 = 0.5 * v888, v894 = 0.5 - v884,
+            v895 = 0.5 + v884, v896 = v54 * v895 + (v51 * v894 - v807), v897 = w[1] * v894,
+            v898 = w[1] * v895, v899 = v31 * v895 + (v24 * v894 - v810),
+            v900 = v876 * v896 - v874 * v899, v901 = v878 * v896 + v873 * v899,
+            v902 = v877 * v896 + v875 * v899, v903 = a10 * v900, v904 = v864 - v903,
+            v905 = v783 * v890 + (v833 * v889 + (v834 * v891 + (v835 * v888 + (v886 - v892))));
+        const M v906 = softehl_eq(v904, v904);
+        const V v907 = v843 * v890 + (v831 * v889 + (v832 * v891 + v840 * v888)),
+            v908 = v874 * v835 + v876 * (v894 - v834) - v833 * v901 + v783 * v902 + v881 * v905,
+            v909 = v907 * v881 + (v874 * v840 - v876 * v832 - v831 * v901 + v843 * v902),
+            v910 = v836 * v889 + (v839 * v890 + (v887 + (v837 * v891 + (v838 * v888 - v893)))),
+            v911 = v874 * (v838 - v894) - v876 * v837 + v839 * v902 - v836 * v901 + v881 * v910,
+            v912 = v786 * v890 + (v848 * v889 + (v849 * v891 + (v850 * v888 - v893) - v887)),
+            v913 = v874 * (v850 - v895) - v876 * v849 - v848 * v901 + v786 * v902 + v881 * v912,
+            v914 = v844 * v889 + (v785 * v890 + (v845 * v891 + (v846 * v888 - v892 - v886))),
+            v915 = v874 * v846 + v876 * (v895 - v845) + v785 * v902 - v844 * v901 + v881 * v914,
+            v916 = v781 * v890 + (v855 * v889 + (v857 * v891 + v853 * v888)),
+            v917 = v916 * v881 + (v874 * v853 - v876 * v857 - v855 * v901 + v781 * v902),
+            v918 = v800 * v890 + (v824 * v889 + (v825 * v891 + v826 * v888)),
+            v919 = v918 * v881 + (v874 * v826 - v876 * v825 - v824 * v901 + v800 * v902),
+            v920 = v782 * v890 + (v856 * v889 + (v858 * v891 + v854 * v888)),
+            v921 = v920 * v881 + (v874 * v854 - v876 * v858 - v856 * v901 + v782 * v902),
+            v922 = v841 * v890 + (v827 * v889 + (v828 * v891 + v842 * v888)),
+            v923 = v784 * v890 + (v829 * v889 + (v820 * v891 + v821 * v888)),
+            v924 = v922 * v881 + (v874 * v842 - v876 * v828 - v827 * v901 + v841 * v902),
+            v925 = v923 * v881 + (v874 * v821 - v876 * v820 - v829 * v901 + v784 * v902);
+        V v926 = softehl_splat(0.0), v927 = softehl_splat(0.0), v928 = softehl_splat(0.0),
+            v929 = softehl_splat(0.0), v930 = softehl_splat(0.0), v931 = softehl_splat(0.0),
+            v932 = softehl_splat(0.0), v933 = softehl_splat(0.0), v934 = softehl_splat(0.0),
+            v935 = softehl_splat(0.0), v936 = softehl_splat(0.0), v937 = softehl_splat(0.0),
+            v938 = softehl_splat(0.0), v939 = softehl_splat(0.0), v940 = softehl_splat(0.0),
+            v941 = softehl_splat(0.0), v942 = softehl_splat(0.0), v943 = softehl_splat(0.0),
+            v944 = softehl_splat(0.0), v945 = softehl_splat(0.0), v946 = softehl_splat(0.0),
+            v947 = softehl_splat(0.0), v948 = softehl_splat(0.0), v949 = softehl_splat(0.0),
+            v950 = softehl_splat(0.0), v951 = softehl_splat(0.0), v952 = softehl_splat(0.0),
+            v953 = softehl_splat(0.0), v954 = softehl_splat(0.0), v955 = softehl_splat(0.0),
+            v956 = softehl_splat(0.0), v957 = softehl_splat(0.0), v958 = softehl_splat(0.0),
+            v959 = softehl_splat(0.0), v960 = softehl_splat(0.0), v961 = softehl_splat(0.0),
+            v962 = softehl_splat(0.0), v963 = softehl_splat(0.0), v964 = softehl_splat(0.0),
+            v965 = softehl_splat(0.0), v966 = softehl_splat(0.0), v967 = softehl_splat(0.0),
+            v968 = softehl_splat(0.0), v969 = softehl_splat(0.0), v970 = softehl_splat(0.0),
+            v971 = softehl_splat(0.0), v972 = softehl_splat(0.0), v973 = softehl_splat(0.0),
+            v974 = softehl_splat(0.0), v975 = softehl_splat(0.0), v976 = softehl_splat(0.0),
+            v977 = softehl_splat(0.0), v978 = softehl_splat(0.0), v979 = softehl_splat(0.0),
+            v980 = softehl_splat(0.0);
+        const M m981 = v906;
+        if (softehl_any(m981)) {
+            const M v982 = softehl_le(softehl_splat(0.0), v904);
+            V v983 = softehl_splat(0.0), v984 = softehl_splat(0.0), v985 = softehl_splat(0.0),
+                v986 = softehl_splat(0.0), v987 = softehl_splat(0.0), v988 = softehl_splat(0.0),
+                v989 = softehl_splat(0.0), v990 = softehl_splat(0.0), v991 = softehl_splat(0.0),
+                v992 = softehl_splat(0.0), v993 = softehl_splat(0.0), v994 = softehl_splat(0.0),
+                v995 = softehl_splat(0.0), v996 = softehl_splat(0.0), v997 = softehl_splat(0.0),
+                v998 = softehl_splat(0.0), v999 = softehl_splat(0.0), v1000 = softehl_splat(0.0),
+                v1001 = softehl_splat(0.0), v1002 = softehl_splat(0.0), v1003 = softehl_splat(0.0),
+                v1004 = softehl_splat(0.0), v1005 = softehl_splat(0.0), v1006 = softehl_splat(0.0),
+                v1007 = softehl_splat(0.0), v1008 = softehl_splat(0.0), v1009 = softehl_splat(0.0),
+                v1010 = softehl_splat(0.0), v1011 = softehl_splat(0.0), v1012 = softehl_splat(0.0),
+                v1013 = softehl_splat(0.0), v1014 = softehl_splat(0.0), v1015 = softehl_splat(0.0),
+                v1016 = softehl_splat(0.0), v1017 = softehl_splat(0.0), v1018 = softehl_splat(0.0),
+                v1019 = softehl_splat(0.0), v1020 = softehl_splat(0.0), v1021 = softehl_splat(0.0),
+                v1022 = softehl_splat(0.0), v1023 = softehl_splat(0.0), v1024 = softehl_splat(0.0),
+                v1025 = softehl_splat(0.0);
+            const M m1026 = v982 & m981;
+            if (softehl_any(m1026)) {
+                const V v1027 = a12 + v900, v1028 = v900 - a13, v1029 = v1027 * v1028;
+                const M v1030 = softehl_eq(v1029, v1029);
+                V v1031 = softehl_splat(0.0), v1032 = softehl_splat(0.0),
+                    v1033 = softehl_splat(0.0), v1034 = softehl_splat(0.0),
+                    v1035 = softehl_splat(0.0);
+                const M m1036 = v1030 & m1026;
+                if (softehl_any(m1036)) {
+                    const M v1037 = softehl_lt(v1029, softehl_splat(0.0));
+                    const V v1038 = softehl_blend(v1037, v904, softehl_splat(0.0)),
+                        v1039 = softehl_blend(v1037, v859, softehl_splat(0.0)),
+                        v1040 = softehl_blend(v1037, v860, softehl_splat(0.0)),
+                        v1041 = softehl_blend(v1037, v44, softehl_splat(0.0)),
+                        v1042 = softehl_blend(v1037, v46, softehl_splat(0.0));
+                    v1031 = softehl_blend(m1036, v1038, v1031);
+                    v1032 = softehl_blend(m1036, v1039, v1032);
+                    v1033 = softehl_blend(m1036, v1040, v1033);
+                    v1034 = softehl_blend(m1036, v1041, v1034);
+                    v1035 = softehl_blend(m1036, v1042, v1035);
                 }
-                const M m300 = ~v295 & m291;
-                if (softehl_any(m300)) {
-                    const V v301 = v294 * v294;
-                    const V v302 = v294 * v301;
-                    v296 = softehl_blend(m300, v302, v296);
+                const M m1043 = ~v1030 & m1026;
+                if (softehl_any(m1043)) {
+                    const V v1044 = v1029 * v1029, v1045 = v1029 * v1044,
+                        v1046 = 3.0 * v1044 * (v1027 + v1028);
+                    v1031 = softehl_blend(m1043, v1045, v1031);
+                    v1032 = softehl_blend(m1043, softehl_splat(0.0), v1032);
+                    v1033 = softehl_blend(m1043, softehl_splat(0.0), v1033);
+                    v1034 = softehl_blend(m1043, v1046, v1034);
+                    v1035 = softehl_blend(m1043, softehl_splat(0.0), v1035);
                 }
-                const V v303 = d11 * v225;
-                const V v304 = a11 * v296;
-                const V v305 = v18 * v269;
-                const V v306 = v20 * v269;
-                const M v307 = softehl_eq(v304, v304);
-                const V v308 = d13 * v226;
-                const V v309 = v303 + v308;
-                const V v310 = v5 * v223;
-                const V v311 = v305 - v310;
-                const V v312 = v14 * v223;
-                const V v313 = v306 - v312;
-                const V v314 = v7 * v224;
-                const V v315 = v311 - v314;
-                const V v316 = v15 * v224;
-                const V v317 = v313 - v316;
-                const V v318 = v8 * v220;
-                const V v319 = v315 - v318;
-                const V v320 = v17 * v220;
-                const V v321 = v317 - v320;
-                const V v322 = v11 * v270;
-                const V v323 = v322 + v319;
-                const V v324 = v21 * v270;
-                const V v325 = v324 + v321;
-                const V v326 = v257 * v323;
-                const V v327 = v258 * v325;
-                const V v328 = v326 + v327;
-                const V v329 = a10 * v328;
-                const V v330 = v309 + v329;
-                const M v331 = softehl_eq(v330, v330);
-                const M v332 = v307 & v331;
-                V v333 = softehl_splat(0.0);
-                const M m334 = v332 & m291;
-                if (softehl_any(m334)) {
-                    const M v335 = softehl_lt(v304, v330);
-                    V v336 = v304;
-                    const M m337 = ~v335 & m334;
-                    if (softehl_any(m337)) {
-                        V v338 = softehl_splat(0.0);
-                        const M m339 = v307 & m337;
-                        if (softehl_any(m339)) {
-                            const V v340 = -v330;
-                            const M v341 = softehl_lt(v304, v340);
-                            V v342 = v330;
-                            const M m343 = v341 & m339;
-                            if (softehl_any(m343)) {
-                                const V v344 = -v304;
-                                v342 = softehl_blend(m343, v344, v342);
+                const V v1047 = a11 * v1031; const M v1048 = softehl_eq(v1047, v1047);
+                const V v1049 = v9 * v895 + (v8 * v894 - v5 * v795 - v6 * v797 - v4 * v803),
+                    v1050 = v25 * v895 + (v21 * v894 - v12 * v795 - v14 * v797 - v18 * v803),
+                    v1051 = d11 * v859 + d13 * v860 + a10 * (v874 * v1049 + v876 * v1050);
+                const M v1052 = softehl_eq(v1051, v1051), v1053 = v1048 & v1052;
+                V v1054 = softehl_splat(0.0), v1055 = softehl_splat(0.0),
+                    v1056 = softehl_splat(0.0), v1057 = softehl_splat(0.0),
+                    v1058 = softehl_splat(0.0), v1059 = softehl_splat(0.0);
+                const M m1060 = v1053 & m1026;
+                if (softehl_any(m1060)) {
+                    const M v1061 = softehl_lt(v1047, v1051);
+                    V v1062 = v1047, v1063 = softehl_splat(0.0), v1064 = softehl_splat(0.0),
+                        v1065 = a11, v1066 = softehl_splat(0.0), v1067 = softehl_splat(0.0);
+                    const M m1068 = ~v1061 & m1060;
+                    if (softehl_any(m1068)) {
+                        V v1069 = softehl_splat(0.0), v1070 = softehl_splat(0.0),
+                            v1071 = softehl_splat(0.0), v1072 = softehl_splat(0.0),
+                            v1073 = softehl_splat(0.0), v1074 = softehl_splat(0.0);
+                        const M m1075 = v1048 & m1068;
+                        if (softehl_any(m1075)) {
+                            const M v1076 = softehl_lt(v1047, -v1051);
+                            V v1077 = v1051, v1078 = v859, v1079 = v860, v1080 = softehl_splat(0.0),
+                                v1081 = a10, v1082 = v48;
+                            const M m1083 = v1076 & m1075;
+                            if (softehl_any(m1083)) {
+                                const V v1084 = -v1047; v1077 = softehl_blend(m1083, v1084, v1077);
+                                v1078 = softehl_blend(m1083, softehl_splat(0.0), v1078);
+                                v1079 = softehl_blend(m1083, softehl_splat(0.0), v1079);
+                                v1080 = softehl_blend(m1083, v1, v1080);
+                                v1081 = softehl_blend(m1083, softehl_splat(0.0), v1081);
+                                v1082 = softehl_blend(m1083, softehl_splat(0.0), v1082);
                             }
-                            v338 = softehl_blend(m339, v342, v338);
+                            v1069 = softehl_blend(m1075, v1077, v1069);
+                            v1070 = softehl_blend(m1075, v1078, v1070);
+                            v1071 = softehl_blend(m1075, v1079, v1071);
+                            v1072 = softehl_blend(m1075, v1080, v1072);
+                            v1073 = softehl_blend(m1075, v1081, v1073);
+                            v1074 = softehl_blend(m1075, v1082, v1074);
                         }
-                        const M m345 = ~v307 & m337;
-                        if (softehl_any(m345)) {
-                            const V v346 = v330 + v304;
-                            const V v347 = v346 * v346;
-                            const V v348 = v346 * v347;
-                            v338 = softehl_blend(m345, v348, v338);
+                        const M m1085 = ~v1048 & m1068;
+                        if (softehl_any(m1085)) {
+                            const V v1086 = v1051 + v1047, v1087 = v1086 * v1086,
+                                v1088 = v1086 * v1087, v1089 = 3.0 * v1087, v1090 = v48 * v1089,
+                                v1091 = a11 * v1089, v1092 = a10 * v1089, v1093 = v859 * v1089,
+                                v1094 = v860 * v1089;
+                            v1069 = softehl_blend(m1085, v1088, v1069);
+                            v1070 = softehl_blend(m1085, v1093, v1070);
+                            v1071 = softehl_blend(m1085, v1094, v1071);
+                            v1072 = softehl_blend(m1085, v1091, v1072);
+                            v1073 = softehl_blend(m1085, v1092, v1073);
+                            v1074 = softehl_blend(m1085, v1090, v1074);
                         }
-                        v336 = softehl_blend(m337, v338, v336);
+                        v1062 = softehl_blend(m1068, v1069, v1062);
+                        v1063 = softehl_blend(m1068, v1070, v1063);
+                        v1064 = softehl_blend(m1068, v1071, v1064);
+                        v1065 = softehl_blend(m1068, v1072, v1065);
+                        v1066 = softehl_blend(m1068, v1073, v1066);
+                        v1067 = softehl_blend(m1068, v1074, v1067);
                     }
-                    v333 = softehl_blend(m334, v336, v333);
+                    v1054 = softehl_blend(m1060, v1062, v1054);
+                    v1055 = softehl_blend(m1060, v1063, v1055);
+                    v1056 = softehl_blend(m1060, v1064, v1056);
+                    v1057 = softehl_blend(m1060, v1065, v1057);
+                    v1058 = softehl_blend(m1060, v1066, v1058);
+                    v1059 = softehl_blend(m1060, v1067, v1059);
                 }
-                const M m349 = ~v332 & m291;
-                if (softehl_any(m349)) {
-                    const V v350 = v304 - v330;
-                    const V v351 = v350 * v350;
-                    const V v352 = v350 * v351;
-                    v333 = softehl_blend(m349, v352, v333);
+                const M m1095 = ~v1053 & m1026;
+                if (softehl_any(m1095)) {
+                    const V v1096 = v1047 - v1051, v1097 = v1096 * v1096, v1098 = v1096 * v1097,
+                        v1099 = 3.0 * v1097, v1100 = v47 * v1099, v1101 = a11 * v1099,
+                        v1102 = -(a10 * v1099), v1103 = v796 * v1099, v1104 = -(v860 * v1099);
+                    v1054 = softehl_blend(m1095, v1098, v1054);
+                    v1055 = softehl_blend(m1095, v1103, v1055);
+                    v1056 = softehl_blend(m1095, v1104, v1056);
+                    v1057 = softehl_blend(m1095, v1101, v1057);
+                    v1058 = softehl_blend(m1095, v1102, v1058);
+                    v1059 = softehl_blend(m1095, v1100, v1059);
                 }
-                v289 = softehl_blend(m291, v296, v289);
-                v290 = softehl_blend(m291, v333, v290);
+                const V v1105 = v1032 * v1057, v1106 = v1033 * v1057,
+                    v1107 = v873 * v1049 - v878 * v1050, v1108 = v877 * v1050 - v875 * v1049,
+                    v1109 = (v4 * v788 - v5 * v798 - v6 * v799) * v874 + (v18 * v788 - v12 * v798 - v14 * v799) * v876,
+                    v1110 = 0.5 * (v11 * v874 + v30 * v876),
+                    v1111 = v1058 * (v916 * v1110 + (v772 * v1109 + (v855 * v1107 + v781 * v1108))),
+                    v1112 = v1058 * (v905 * v1110 + (v770 * v1109 + (v833 * v1107 + v783 * v1108))),
+                    v1113 = v1058 * (v918 * v1110 + (v773 * v1109 + (v824 * v1107 + v800 * v1108))),
+                    v1114 = v1058 * (v779 * v1109 + (v912 * v1110 + (v848 * v1107 + v786 * v1108))),
+                    v1115 = v1058 * (v922 * v1110 + (v775 * v1109 + (v827 * v1107 + v841 * v1108))),
+                    v1116 = v1057 * (v772 * v1035 + v1034 * v917) + v1111,
+                    v1117 = v1057 * (v770 * v1035 + v1034 * v908) + v1112,
+                    v1118 = v1057 * (v773 * v1035 + v1034 * v919) + v1113,
+                    v1119 = v1057 * (v779 * v1035 + v1034 * v913) + v1114,
+                    v1120 = v1057 * (v775 * v1035 + v1034 * v924) + v1115,
+                    v1121 = v1058 * (v910 * v1110 + (v771 * v1109 + (v836 * v1107 + v839 * v1108))),
+                    v1122 = v1057 * (v771 * v1035 + v1034 * v911) + v1121,
+                    v1123 = v1058 * (v774 * v1109 + (v920 * v1110 + (v856 * v1107 + v782 * v1108))),
+                    v1124 = v1058 * (v776 * v1109 + (v923 * v1110 + (v829 * v1107 + v784 * v1108))),
+                    v1125 = v1058 * (v777 * v1109 + (v907 * v1110 + (v831 * v1107 + v843 * v1108))),
+                    v1126 = v1058 * (v778 * v1109 + (v914 * v1110 + (v844 * v1107 + v785 * v1108))),
+                    v1127 = v1057 * (v774 * v1035 + v1034 * v921) + v1123,
+                    v1128 = v1057 * (v776 * v1035 + v1034 * v925) + v1124,
+                    v1129 = v1057 * (v777 * v1035 + v1034 * v909) + v1125,
+                    v1130 = v1057 * (v778 * v1035 + v1034 * v915) + v1126, v1131 = v1055 * v880,
+                    v1132 = v1056 * v880, v1133 = v1055 * v879, v1134 = v1056 * v879,
+                    v1135 = v1055 * v871, v1136 = v1056 * v871, v1137 = v1055 * v872,
+                    v1138 = v1056 * v872, v1139 = v802 * v1131, v1140 = v802 * v1132,
+                    v1141 = v802 * v1133, v1142 = v802 * v1134, v1143 = v801 * v1131,
+                    v1144 = v801 * v1132, v1145 = v801 * v1133, v1146 = v801 * v1134,
+                    v1147 = v806 * v1131, v1148 = v806 * v1132, v1149 = v806 * v1133,
+                    v1150 = v806 * v1134, v1151 = -(v897 * v1131), v1152 = -(v897 * v1132),
+                    v1153 = -(v897 * v1133), v1154 = -(v897 * v1134), v1155 = -(v898 * v1131),
+                    v1156 = -(v898 * v1132), v1157 = -(v898 * v1133), v1158 = -(v898 * v1134);
+                v983 = softehl_blend(m1026, v1031, v983); v984 = softehl_blend(m1026, v1032, v984);
+                v985 = softehl_blend(m1026, v1033, v985); v986 = softehl_blend(m1026, v1054, v986);
+                v987 = softehl_blend(m1026, v1139, v987); v988 = softehl_blend(m1026, v1140, v988);
+                v989 = softehl_blend(m1026, v1141, v989); v990 = softehl_blend(m1026, v1142, v990);
+                v991 = softehl_blend(m1026, v1143, v991); v992 = softehl_blend(m1026, v1144, v992);
+                v993 = softehl_blend(m1026, v1145, v993); v994 = softehl_blend(m1026, v1146, v994);
+                v995 = softehl_blend(m1026, v1147, v995); v996 = softehl_blend(m1026, v1148, v996);
+                v997 = softehl_blend(m1026, v1149, v997); v998 = softehl_blend(m1026, v1150, v998);
+                v999 = softehl_blend(m1026, v1151, v999);
+                v1000 = softehl_blend(m1026, v1152, v1000);
+                v1001 = softehl_blend(m1026, v1153, v1001);
+                v1002 = softehl_blend(m1026, v1154, v1002);
+                v1003 = softehl_blend(m1026, v1155, v1003);
+                v1004 = softehl_blend(m1026, v1156, v1004);
+                v1005 = softehl_blend(m1026, v1157, v1005);
+                v1006 = softehl_blend(m1026, v1158, v1006);
+                v1007 = softehl_blend(m1026, v1135, v1007);
+                v1008 = softehl_blend(m1026, v1136, v1008);
+                v1009 = softehl_blend(m1026, v1137, v1009);
+                v1010 = softehl_blend(m1026, v1138, v1010);
+                v1011 = softehl_blend(m1026, v1105, v1011);
+                v1012 = softehl_blend(m1026, v1106, v1012);
+                v1013 = softehl_blend(m1026, v1034, v1013);
+                v1014 = softehl_blend(m1026, v1035, v1014);
+                v1015 = softehl_blend(m1026, v1116, v1015);
+                v1016 = softehl_blend(m1026, v1059, v1016);
+                v1017 = softehl_blend(m1026, v1118, v1017);
+                v1018 = softehl_blend(m1026, v1127, v1018);
+                v1019 = softehl_blend(m1026, v1120, v1019);
+                v1020 = softehl_blend(m1026, v1128, v1020);
+                v1021 = softehl_blend(m1026, v1129, v1021);
+                v1022 = softehl_blend(m1026, v1117, v1022);
+                v1023 = softehl_blend(m1026, v1122, v1023);
+                v1024 = softehl_blend(m1026, v1130, v1024);
+                v1025 = softehl_blend(m1026, v1119, v1025);
             }
-            v285 = softehl_blend(m287, v289, v285);
-            v286 = softehl_blend(m287, v290, v286);
+            v926 = softehl_blend(m981, v983, v926); v927 = softehl_blend(m981, v984, v927);
+            v928 = softehl_blend(m981, v985, v928); v929 = softehl_blend(m981, v986, v929);
+            v930 = softehl_blend(m981, v987, v930); v931 = softehl_blend(m981, v988, v931);
+            v932 = softehl_blend(m981, v989, v932); v933 = softehl_blend(m981, v990, v933);
+            v934 = softehl_blend(m981, v991, v934); v935 = softehl_blend(m981, v992, v935);
+            v936 = softehl_blend(m981, v993, v936); v937 = softehl_blend(m981, v994, v937);
+            v938 = softehl_blend(m981, v995, v938); v939 = softehl_blend(m981, v996, v939);
+            v940 = softehl_blend(m981, v997, v940); v941 = softehl_blend(m981, v998, v941);
+            v942 = softehl_blend(m981, v999, v942); v943 = softehl_blend(m981, v1000, v943);
+            v944 = softehl_blend(m981, v1001, v944); v945 = softehl_blend(m981, v1002, v945);
+            v946 = softehl_blend(m981, v1003, v946); v947 = softehl_blend(m981, v1004, v947);
+            v948 = softehl_blend(m981, v1005, v948); v949 = softehl_blend(m981, v1006, v949);
+            v950 = softehl_blend(m981, v1007, v950); v951 = softehl_blend(m981, v1008, v951);
+            v952 = softehl_blend(m981, v1009, v952); v953 = softehl_blend(m981, v1010, v953);
+            v954 = softehl_blend(m981, v1011, v954);
+            v955 = softehl_blend(m981, softehl_splat(0.0), v955);
+            v956 = softehl_blend(m981, v1012, v956);
+            v957 = softehl_blend(m981, softehl_splat(0.0), v957);
+            v958 = softehl_blend(m981, v1013, v958); v959 = softehl_blend(m981, v1014, v959);
+            v960 = softehl_blend(m981, v1015, v960); v961 = softehl_blend(m981, v1016, v961);
+            v962 = softehl_blend(m981, softehl_splat(0.0), v962);
+            v963 = softehl_blend(m981, v1017, v963);
+            v964 = softehl_blend(m981, softehl_splat(0.0), v964);
+            v965 = softehl_blend(m981, v1018, v965);
+            v966 = softehl_blend(m981, softehl_splat(0.0), v966);
+            v967 = softehl_blend(m981, v1019, v967);
+            v968 = softehl_blend(m981, softehl_splat(0.0), v968);
+            v969 = softehl_blend(m981, v1020, v969);
+            v970 = softehl_blend(m981, softehl_splat(0.0), v970);
+            v971 = softehl_blend(m981, v1021, v971);
+            v972 = softehl_blend(m981, softehl_splat(0.0), v972);
+            v973 = softehl_blend(m981, v1022, v973);
+            v974 = softehl_blend(m981, softehl_splat(0.0), v974);
+            v975 = softehl_blend(m981, v1023, v975);
+            v976 = softehl_blend(m981, softehl_splat(0.0), v976);
+            v977 = softehl_blend(m981, v1024, v977);
+            v978 = softehl_blend(m981, softehl_splat(0.0), v978);
+            v979 = softehl_blend(m981, v1025, v979);
+            v980 = softehl_blend(m981, softehl_splat(0.0), v980);
         }
-        const M m353 = ~v284;
-        if (softehl_any(m353)) {
-            const V v354 = v282 - v249;
-            const V v355 = v354 * v354;
-            const V v356 = v354 * v355;
-            v285 = softehl_blend(m353, v356, v285);
-            v286 = softehl_blend(m353, v356, v286);
+        const M m1159 = ~v906;
+        if (softehl_any(m1159)) {
+            const V v1160 = v903 - v864, v1161 = v1160 * v1160, v1162 = v1160 * v1161,
+                v1163 = 3.0 * v1161, v1164 = v796 * v1163, v1165 = v45 * v1163,
+                v1166 = -(v860 * v1163), v1167 = a10 * v1163, v1168 = v1167 * v917,
+                v1169 = v1167 * v919, v1170 = v1167 * v921, v1171 = v1167 * v924,
+                v1172 = v1167 * v925, v1173 = v1167 * v909, v1174 = v1167 * v908,
+                v1175 = v1167 * v911, v1176 = v1167 * v915, v1177 = v1167 * v913;
+            v926 = softehl_blend(m1159, v1162, v926); v927 = softehl_blend(m1159, v1164, v927);
+            v928 = softehl_blend(m1159, v1166, v928); v929 = softehl_blend(m1159, v1162, v929);
+            v930 = softehl_blend(m1159, softehl_splat(0.0), v930);
+            v931 = softehl_blend(m1159, softehl_splat(0.0), v931);
+            v932 = softehl_blend(m1159, softehl_splat(0.0), v932);
+            v933 = softehl_blend(m1159, softehl_splat(0.0), v933);
+            v934 = softehl_blend(m1159, softehl_splat(0.0), v934);
+            v935 = softehl_blend(m1159, softehl_splat(0.0), v935);
+            v936 = softehl_blend(m1159, softehl_splat(0.0), v936);
+            v937 = softehl_blend(m1159, softehl_splat(0.0), v937);
+            v938 = softehl_blend(m1159, softehl_splat(0.0), v938);
+            v939 = softehl_blend(m1159, softehl_splat(0.0), v939);
+            v940 = softehl_blend(m1159, softehl_splat(0.0), v940);
+            v941 = softehl_blend(m1159, softehl_splat(0.0), v941);
+            v942 = softehl_blend(m1159, softehl_splat(0.0), v942);
+            v943 = softehl_blend(m1159, softehl_splat(0.0), v943);
+            v944 = softehl_blend(m1159, softehl_splat(0.0), v944);
+            v945 = softehl_blend(m1159, softehl_splat(0.0), v945);
+            v946 = softehl_blend(m1159, softehl_splat(0.0), v946);
+            v947 = softehl_blend(m1159, softehl_splat(0.0), v947);
+            v948 = softehl_blend(m1159, softehl_splat(0.0), v948);
+            v949 = softehl_blend(m1159, softehl_splat(0.0), v949);
+            v950 = softehl_blend(m1159, softehl_splat(0.0), v950);
+            v951 = softehl_blend(m1159, softehl_splat(0.0), v951);
+            v952 = softehl_blend(m1159, softehl_splat(0.0), v952);
+            v953 = softehl_blend(m1159, softehl_splat(0.0), v953);
+            v954 = softehl_blend(m1159, softehl_splat(0.0), v954);
+            v955 = softehl_blend(m1159, v1164, v955);
+            v956 = softehl_blend(m1159, softehl_splat(0.0), v956);
+            v957 = softehl_blend(m1159, v1166, v957); v958 = softehl_blend(m1159, v1167, v958);
+            v959 = softehl_blend(m1159, v1165, v959);
+            v960 = softehl_blend(m1159, softehl_splat(0.0), v960);
+            v961 = softehl_blend(m1159, v1165, v961); v962 = softehl_blend(m1159, v1168, v962);
+            v963 = softehl_blend(m1159, softehl_splat(0.0), v963);
+            v964 = softehl_blend(m1159, v1169, v964);
+            v965 = softehl_blend(m1159, softehl_splat(0.0), v965);
+            v966 = softehl_blend(m1159, v1170, v966);
+            v967 = softehl_blend(m1159, softehl_splat(0.0), v967);
+            v968 = softehl_blend(m1159, v1171, v968);
+            v969 = softehl_blend(m1159, softehl_splat(0.0), v969);
+            v970 = softehl_blend(m1159, v1172, v970);
+            v971 = softehl_blend(m1159, softehl_splat(0.0), v971);
+            v972 = softehl_blend(m1159, v1173, v972);
+            v973 = softehl_blend(m1159, softehl_splat(0.0), v973);
+            v974 = softehl_blend(m1159, v1174, v974);
+            v975 = softehl_blend(m1159, softehl_splat(0.0), v975);
+            v976 = softehl_blend(m1159, v1175, v976);
+            v977 = softehl_blend(m1159, softehl_splat(0.0), v977);
+            v978 = softehl_blend(m1159, v1176, v978);
+            v979 = softehl_blend(m1159, softehl_splat(0.0), v979);
+            v980 = softehl_blend(m1159, v1177, v980);
         }
-        const V v357 = v16 * w[1];
-        const V v358 = w[1] * v224;
-        const V v359 = w[1] * v223;
-        const V v360 = w[1] * v270;
-        const V v361 = w[1] * v269;
-        const V v362 = w[1] * v220;
-        const V v363 = X5 * v220;
-        const V v364 = v357 * v226;
-        const V v365 = v357 * v225;
-        const V v366 = X0 * v218;
-        const V v367 = X1 * v218;
-        const V v368 = X1 * v215;
-        const V v369 = v4 * v214;
-        const V v370 = v366 - v369;
-        const V v371 = v13 * v214;
-        const V v372 = v367 - v371;
-        const V v373 = X3 * v216;
-        const V v374 = v368 + v373;
-        const V v375 = X3 * v217;
-        const V v376 = v375 + v372;
-        const V v377 = X2 * v217;
-        const V v378 = v377 + v370;
-        const V v379 = 0.5 * v374;
-        const V v380 = v376 * v376;
-        const V v381 = v214 * v379;
-        const V v382 = v363 + v381;
-        const V v383 = v378 * v378;
-        const V v384 = v380 + v383;
-        const V v385 = softehl_vsqrt(v384);
-        const V v386 = 6.283185307179586 * v382;
-        const V v387 = (-1.0) + v386;
-        const V v388 = a14 * v387;
-        const V v389 = 1.0 + v388;
-        const V v390 = v258 * v285;
-        const V v391 = v258 * v286;
-        const V v392 = v257 * v286;
-        const V v393 = v390 + v392;
-        const V v394 = v257 * v285;
-        const V v395 = v391 - v394;
-        const V v396 = v188 * v385;
-        const V v397 = v389 * v396;
-        const V v398 = v285 * v397;
-        const V v399 = v286 * v397;
-        const V v400 = v393 * v397;
-        const V v401 = v395 * v397;
-        const V v402 = v364 * v398;
-        s199 += v402;
-        const V v403 = v365 * v398;
-        s200 += v403;
-        const V v404 = v364 * v399;
-        s201 += v404;
-        const V v405 = v365 * v399;
-        s202 += v405;
-        const V v406 = v360 * v401;
-        s203 += v406;
-        const V v407 = v360 * v400;
-        s204 += v407;
-        const V v408 = v361 * v401;
-        s205 += v408;
-        const V v409 = v361 * v400;
-        s206 += v409;
-        const V v410 = v362 * v401;
-        s207 += v410;
-        const V v411 = v362 * v400;
-        s208 += v411;
-        const V v412 = v358 * v401;
-        s209 += v412;
-        const V v413 = v359 * v401;
-        s211 += v413;
-        const V v414 = v358 * v400;
-        s210 += v414;
-        const V v415 = v359 * v400;
-        s212 += v415;
+        s572 += v930; s573 += v931; s574 += v932; s575 += v933; s576 += v934; s577 += v935;
+        s578 += v936; s579 += v937; s580 += v938; s581 += v939; s582 += v940; s583 += v941;
+        s584 += v942; s585 += v943; s586 += v944; s587 += v945; s588 += v946; s589 += v947;
+        s590 += v948; s591 += v949; s592 += v950; s593 += v951; s594 += v952; s595 += v953;
+        const V v1178 = v955 + v954, v1179 = v957 + v956, v1180 = softehl_vsqrt(1.0 / v809),
+            v1181 = v814 * v823,
+            v1182 = (v16 * v792 + (v13 * v791 + (v789 + v790)) - X5 * v788) * (v847 * v561),
+            v1183 = v926 * v1181, v1184 = v926 * v851, v1185 = v929 * v851, v1186 = v929 * v1181,
+            v1187 = 0.5 * v1184, v1188 = 0.5 * v1185, v1189 = v862 * v1183, v1190 = v862 * v1186,
+            v1191 = v863 * v1183, v1192 = v863 * v1186, v1193 = v876 * v926 + v874 * v929,
+            v1194 = v876 * v929 - v874 * v926, v1195 = v1193 * v1181, v1196 = v1194 * v1181,
+            v1197 = v1193 * v851, v1198 = v1194 * v851,
+            v1199 = v1182 + 2.0 * (v15 * v804 + v26 * v805) * (v1180 * (v563 * v823)),
+            v1200 = 0.5 * v1197, v1201 = v1193 * v1199, v1202 = (v877 * v926 - v875 * v929) * v851,
+            v1203 = v1194 * v1199, v1204 = (v875 * v926 + v877 * v929) * v851, v1205 = v926 * v1199,
+            v1206 = v929 * v1199, v1207 = 0.5 * v1198, v1208 = (v873 * v929 - v878 * v926) * v851,
+            v1209 = (v873 * v926 + v878 * v929) * v851;
+        s596 += v898 * v1198; s597 += v898 * v1197; s598 += v897 * v1198; s599 += v897 * v1197;
+        s600 += v806 * v1198; s601 += v806 * v1197; s602 += v801 * v1198; s603 += v801 * v1197;
+        s604 += v802 * v1198; s605 += v802 * v1197;
+        const V v1210 = v798 * v1197, v1211 = v798 * v1198, v1212 = v799 * v1197,
+            v1213 = v799 * v1198, v1214 = v788 * v1197, v1215 = v788 * v1198, v1216 = v43 * w[1],
+            v1217 = w[1] * v927, v1218 = w[1] * v928, v1219 = v1216 * v860, v1220 = v1216 * v859,
+            v1221 = v43 * (v1187 + v860 * v1205), v1222 = v43 * (v859 * v1205 - v1187),
+            v1223 = v43 * (v1188 + v860 * v1206), v1224 = v43 * (v859 * v1206 - v1188);
+        s564 += v1219 * v1184; s565 += v1220 * v1184; s570 += v1219 * v1185; s571 += v1220 * v1185;
+        const V v1225 = v772 * v959 + v958 * v917, v1226 = v774 * v959 + v958 * v921,
+            v1227 = v775 * v959 + v958 * v924, v1228 = v771 * v959 + v958 * v911,
+            v1229 = v778 * v959 + v958 * v915, v1230 = v779 * v959 + v958 * v913,
+            v1231 = v773 * v959 + v958 * v919, v1232 = v776 * v959 + v958 * v925,
+            v1233 = v777 * v959 + v958 * v909, v1234 = v770 * v959 + v958 * v908,
+            v1235 = v773 * v961 + (v964 + v963), v1236 = v776 * v961 + (v970 + v969),
+            v1237 = v777 * v961 + (v972 + v971), v1238 = v770 * v961 + (v974 + v973),
+            v1239 = v779 * v961 + (v980 + v979), v1240 = v772 * v961 + (v962 + v960),
+            v1241 = v774 * v961 + (v966 + v965), v1242 = v775 * v961 + (v968 + v967),
+            v1243 = v771 * v961 + (v976 + v975), v1244 = v778 * v961 + (v978 + v977);
+        s566 += v1217 * v865; s568 += v1217 * v866; s567 += v1218 * v865; s569 += v1218 * v866;
+        const V v1245 = w[1] * (v542 * v1190 + (v772 * v1224 + v865 * v1240)); s650 += v1245;
+        const V v1246 = w[1] * (v547 * v1190 + (v774 * v1224 + v865 * v1241)); s652 += v1246;
+        const V v1247 = w[1] * (v548 * v1190 + (v775 * v1224 + v865 * v1242)); s653 += v1247;
+        const V v1248 = w[1] * (v551 * v1190 + (v771 * v1224 + v865 * v1243)); s657 += v1248;
+        const V v1249 = w[1] * (v552 * v1190 + (v778 * v1224 + v865 * v1244)); s658 += v1249;
+        const V v1250 = w[1] * (v542 * v1192 + (v772 * v1223 + v866 * v1240)); s660 += v1250;
+        const V v1251 = w[1] * (v547 * v1192 + (v774 * v1223 + v866 * v1241)); s662 += v1251;
+        const V v1252 = v916 * v1200, v1253 = v916 * v1207, v1254 = v918 * v1200,
+            v1255 = v918 * v1207, v1256 = v920 * v1200, v1257 = v920 * v1207, v1258 = v922 * v1200,
+            v1259 = v922 * v1207, v1260 = v923 * v1200, v1261 = v923 * v1207, v1262 = v907 * v1200,
+            v1263 = v907 * v1207, v1264 = v905 * v1200, v1265 = v905 * v1207, v1266 = v910 * v1200,
+            v1267 = v910 * v1207, v1268 = v914 * v1200, v1269 = v914 * v1207, v1270 = v912 * v1200,
+            v1271 = v912 * v1207;
+        s606 += v1178 * v871; s607 += v1179 * v871; s608 += v1178 * v872; s609 += v1179 * v872;
+        const V v1272 = v927 * v879 + v1178 * v880, v1273 = v928 * v879 + v1179 * v880,
+            v1274 = v1178 * v879 - v927 * v880, v1275 = v1179 * v879 - v928 * v880;
+        s610 += v802 * v1272; s611 += v802 * v1273; s612 += v802 * v1274; s613 += v802 * v1275;
+        s614 += v801 * v1272; s615 += v801 * v1273; s616 += v801 * v1274; s617 += v801 * v1275;
+        s618 += v806 * v1272; s619 += v806 * v1273; s620 += v806 * v1274; s621 += v806 * v1275;
+        s622 += v897 * v1272; s623 += v897 * v1273; s624 += v897 * v1274; s625 += v897 * v1275;
+        s626 += v898 * v1272; s627 += v898 * v1273; s628 += v898 * v1274; s629 += v898 * v1275;
+        s630 += w[1] * (v542 * v1189 + v772 * v1222 + v1225 * v865);
+        s631 += w[1] * (v543 * v1189 + v773 * v1222 + v1231 * v865);
+        s632 += w[1] * (v547 * v1189 + v774 * v1222 + v1226 * v865);
+        s633 += w[1] * (v548 * v1189 + v775 * v1222 + v1227 * v865);
+        s634 += w[1] * (v540 * v1189 + v776 * v1222 + v1232 * v865);
+        s635 += w[1] * (v541 * v1189 + v777 * v1222 + v1233 * v865);
+        s636 += w[1] * (v550 * v1189 + v770 * v1222 + v1234 * v865);
+        s641 += w[1] * (v543 * v1191 + v773 * v1221 + v1231 * v866);
+        s645 += w[1] * (v541 * v1191 + v777 * v1221 + v1233 * v866);
+        s646 += w[1] * (v550 * v1191 + v770 * v1221 + v1234 * v866);
+        s642 += w[1] * (v547 * v1191 + v774 * v1221 + v1226 * v866);
+        s643 += w[1] * (v548 * v1191 + v775 * v1221 + v1227 * v866);
+        const V v1276 = v800 * v1204 + (v543 * v1196 + v773 * v1203 - v1231 * v880) - v824 * v1209,
+            v1277 = v824 * v1208 + (v800 * v1202 + (v543 * v1195 + (v773 * v1201 + v1231 * v879))),
+            v1278 = v782 * v1204 + (v547 * v1196 + v774 * v1203 - v1226 * v880) - v856 * v1209,
+            v1279 = v856 * v1208 + (v782 * v1202 + (v547 * v1195 + (v774 * v1201 + v1226 * v879))),
+            v1280 = v841 * v1204 + (v548 * v1196 + v775 * v1203 - v1227 * v880) - v827 * v1209,
+            v1281 = v827 * v1208 + (v841 * v1202 + (v548 * v1195 + (v775 * v1201 + v1227 * v879))),
+            v1282 = v843 * v1204 + (v541 * v1196 + v777 * v1203 - v1233 * v880) - v831 * v1209,
+            v1283 = v831 * v1208 + (v843 * v1202 + (v541 * v1195 + (v777 * v1201 + v1233 * v879))),
+            v1284 = v1276 + v879 * v1235, v1285 = v1277 + v880 * v1235,
+            v1286 = v1278 + v879 * v1241, v1287 = v1279 + v880 * v1241,
+            v1288 = v1280 + v879 * v1242, v1289 = v1281 + v880 * v1242,
+            v1290 = v1282 + v879 * v1237, v1291 = v1283 + v880 * v1237,
+            v1292 = w[1] * (v548 * v1192 + v775 * v1223 + v866 * v1242);
+        s663 += v1292; const V v1293 = w[1] * (v803 * v1285 - v773 * v1214); s711 += v1293;
+        const V v1294 = w[1] * (v803 * v1287 - v774 * v1214); s712 += v1294;
+        const V v1295 = w[1] * (v803 * v1284 - v773 * v1215); s721 += v1295;
+        const V v1296 = w[1] * (v803 * v1288 - v775 * v1215); s723 += v1296;
+        const V v1297 = w[1] * (v803 * v1289 - v775 * v1214); s713 += v1297;
+        const V v1298 = w[1] * (v803 * v1291 - v777 * v1214); s715 += v1298;
+        const V v1299 = w[1] * (v803 * v1290 - v777 * v1215); s725 += v1299;
+        const V v1300 = w[1] * (v803 * v1286 - v774 * v1215); s722 += v1300;
+        const V v1301 = w[1] * (v775 * v1210 + v795 * v1289); s673 += v1301;
+        const V v1302 = w[1] * (v774 * v1211 + v795 * v1286); s682 += v1302;
+        const V v1303 = w[1] * (v773 * v1210 + v795 * v1285); s671 += v1303;
+        const V v1304 = w[1] * (v774 * v1210 + v795 * v1287); s672 += v1304;
+        const V v1305 = w[1] * (v777 * v1210 + v795 * v1291); s675 += v1305;
+        const V v1306 = w[1] * (v773 * v1211 + v795 * v1284); s681 += v1306;
+        const V v1307 = w[1] * (v775 * v1211 + v795 * v1288); s683 += v1307;
+        const V v1308 = w[1] * (v777 * v1211 + v795 * v1290); s685 += v1308;
+        const V v1309 = w[1] * (v773 * v1212 + v797 * v1285); s691 += v1309;
+        const V v1310 = w[1] * (v774 * v1212 + v797 * v1287); s692 += v1310;
+        const V v1311 = w[1] * (v777 * v1212 + v797 * v1291); s695 += v1311;
+        const V v1312 = w[1] * (v773 * v1213 + v797 * v1284); s701 += v1312;
+        const V v1313 = w[1] * (v775 * v1213 + v797 * v1288); s703 += v1313;
+        const V v1314 = w[1] * (v777 * v1213 + v797 * v1290); s705 += v1314;
+        const V v1315 = w[1] * (v775 * v1212 + v797 * v1289); s693 += v1315;
+        const V v1316 = w[1] * (v774 * v1213 + v797 * v1286); s702 += v1316;
+        const V v1317 = w[1] * (v1258 - v894 * v1289); s733 += v1317;
+        const V v1318 = w[1] * (v1262 - v894 * v1291); s735 += v1318;
+        const V v1319 = w[1] * (v1257 - v894 * v1286); s742 += v1319;
+        const V v1320 = w[1] * (v1259 - v894 * v1288); s743 += v1320;
+        const V v1321 = w[1] * (v1263 - v894 * v1290); s745 += v1321;
+        const V v1322 = w[1] * (v1258 + v895 * v1289); s753 += v1322;
+        const V v1323 = w[1] * (v1262 + v895 * v1291); s755 += v1323;
+        const V v1324 = w[1] * (v1257 + v895 * v1286); s762 += v1324;
+        const V v1325 = w[1] * (v1259 + v895 * v1288); s763 += v1325;
+        const V v1326 = w[1] * (v1263 + v895 * v1290); s765 += v1326;
+        const V v1327 = w[1] * (v1254 - v894 * v1285); s731 += v1327;
+        const V v1328 = w[1] * (v1254 + v895 * v1285); s751 += v1328;
+        const V v1329 = w[1] * (v1256 - v894 * v1287); s732 += v1329;
+        const V v1330 = w[1] * (v1256 + v895 * v1287); s752 += v1330;
+        const V v1331 = w[1] * (v1255 - v894 * v1284); s741 += v1331;
+        const V v1332 = w[1] * (v1255 + v895 * v1284); s761 += v1332;
+        s640 += w[1] * (v542 * v1191 + v772 * v1221 + v1225 * v866);
+        const V v1333 = w[1] * (v551 * v1192 + v771 * v1223 + v866 * v1243); s667 += v1333;
+        const V v1334 = v781 * v1204 + (v542 * v1196 + v772 * v1203 - v1225 * v880 + v879 * v1240),
+            v1335 = v781 * v1202 + (v542 * v1195 + (v772 * v1201 + v1225 * v879) + v880 * v1240),
+            v1336 = v1334 - v855 * v1209, v1337 = v855 * v1208 + v1335,
+            v1338 = w[1] * (v551 * v1191 + (v771 * v1221 + v1228 * v866));
+        s647 += v1338; const V v1339 = w[1] * (v551 * v1189 + (v771 * v1222 + v1228 * v865));
+        s637 += v1339;
+        const V v1340 = v551 * v1195 + (v839 * v1202 + (v1228 * v879 + (v771 * v1201 + v880 * v1243))),
+            v1341 = v551 * v1196 + (v839 * v1204 + (v771 * v1203 + v879 * v1243 - v1228 * v880)),
+            v1342 = v836 * v1208 + v1340, v1343 = v1341 - v836 * v1209,
+            v1344 = w[1] * (v772 * v1210 + v795 * v1337);
+        s670 += v1344; const V v1345 = w[1] * (v772 * v1211 + v795 * v1336); s680 += v1345;
+        const V v1346 = w[1] * (v771 * v1210 + v795 * v1342); s677 += v1346;
+        const V v1347 = w[1] * (v771 * v1211 + v795 * v1343); s687 += v1347;
+        const V v1348 = w[1] * (v803 * v1336 - v772 * v1215); s720 += v1348;
+        const V v1349 = w[1] * (v803 * v1337 - v772 * v1214); s710 += v1349;
+        const V v1350 = w[1] * (v803 * v1343 - v771 * v1215); s727 += v1350;
+        const V v1351 = w[1] * (v803 * v1342 - v771 * v1214); s717 += v1351;
+        const V v1352 = w[1] * (v772 * v1212 + v797 * v1337); s690 += v1352;
+        const V v1353 = w[1] * (v771 * v1213 + v797 * v1343); s707 += v1353;
+        const V v1354 = w[1] * (v771 * v1212 + v797 * v1342); s697 += v1354;
+        const V v1355 = w[1] * (v772 * v1213 + v797 * v1336); s700 += v1355;
+        const V v1356 = w[1] * (v1252 - v894 * v1337); s730 += v1356;
+        const V v1357 = w[1] * (v1266 - v894 * v1342); s737 += v1357;
+        const V v1358 = w[1] * (v1253 - v894 * v1336); s740 += v1358;
+        const V v1359 = w[1] * (v1267 - v894 * v1343); s747 += v1359;
+        const V v1360 = w[1] * (v1252 + v895 * v1337); s750 += v1360;
+        const V v1361 = w[1] * (v1266 + v895 * v1342); s757 += v1361;
+        const V v1362 = w[1] * (v1253 + v895 * v1336); s760 += v1362;
+        const V v1363 = w[1] * (v1267 + v895 * v1343); s767 += v1363;
+        s638 += w[1] * (v552 * v1189 + v778 * v1222 + v1229 * v865);
+        s639 += w[1] * (v554 * v1189 + v779 * v1222 + v1230 * v865);
+        s648 += w[1] * (v552 * v1191 + v778 * v1221 + v1229 * v866);
+        s649 += w[1] * (v554 * v1191 + v779 * v1221 + v1230 * v866);
+        s644 += w[1] * (v540 * v1191 + v776 * v1221 + v1232 * v866);
+        const V v1364 = w[1] * (v540 * v1190 + v776 * v1224 + v865 * v1236); s654 += v1364;
+        const V v1365 = w[1] * (v554 * v1190 + v779 * v1224 + v865 * v1239); s659 += v1365;
+        const V v1366 = w[1] * (v540 * v1192 + (v776 * v1223 + v866 * v1236)); s664 += v1366;
+        const V v1367 = w[1] * (v554 * v1192 + (v779 * v1223 + v866 * v1239)); s669 += v1367;
+        const V v1368 = v784 * v1202 + (v540 * v1195 + (v776 * v1201 + v1232 * v879 + v880 * v1236)),
+            v1369 = v784 * v1204 + (v540 * v1196 + (v776 * v1203 - v1232 * v880 + v879 * v1236)),
+            v1370 = v786 * v1202 + (v1230 * v879 + (v554 * v1195 + (v779 * v1201 + v880 * v1239))),
+            v1371 = v786 * v1204 + (v554 * v1196 + (v779 * v1203 + v879 * v1239) - v1230 * v880),
+            v1372 = v829 * v1208 + v1368, v1373 = v1369 - v829 * v1209,
+            v1374 = v848 * v1208 + v1370, v1375 = v1371 - v848 * v1209,
+            v1376 = v833 * v1208 + (v783 * v1202 + (v550 * v1195 + (v770 * v1201 + v1234 * v879))),
+            v1377 = v783 * v1204 + (v550 * v1196 + v770 * v1203 - v1234 * v880) - v833 * v1209,
+            v1378 = v844 * v1208 + (v785 * v1202 + (v552 * v1195 + v778 * v1201)) + v1229 * v879,
+            v1379 = v785 * v1204 + (v552 * v1196 + v778 * v1203) - v844 * v1209 - v1229 * v880,
+            v1380 = v1376 + v880 * v1238, v1381 = v1377 + v879 * v1238,
+            v1382 = v1378 + v880 * v1244, v1383 = v1379 + v879 * v1244,
+            v1384 = w[1] * (v552 * v1192 + v778 * v1223 + v866 * v1244);
+        s668 += v1384; const V v1385 = w[1] * (v803 * v1372 - v776 * v1214); s714 += v1385;
+        const V v1386 = w[1] * (v803 * v1374 - v779 * v1214); s719 += v1386;
+        const V v1387 = w[1] * (v803 * v1373 - v776 * v1215); s724 += v1387;
+        const V v1388 = w[1] * (v803 * v1375 - v779 * v1215); s729 += v1388;
+        const V v1389 = w[1] * (v803 * v1380 - v770 * v1214); s716 += v1389;
+        const V v1390 = w[1] * (v803 * v1382 - v778 * v1214); s718 += v1390;
+        const V v1391 = w[1] * (v803 * v1381 - v770 * v1215); s726 += v1391;
+        const V v1392 = w[1] * (v803 * v1383 - v778 * v1215); s728 += v1392;
+        const V v1393 = w[1] * (v770 * v1210 + v795 * v1380); s676 += v1393;
+        const V v1394 = w[1] * (v778 * v1210 + v795 * v1382); s678 += v1394;
+        const V v1395 = w[1] * (v778 * v1211 + v795 * v1383); s688 += v1395;
+        const V v1396 = w[1] * (v776 * v1210 + v795 * v1372); s674 += v1396;
+        const V v1397 = w[1] * (v779 * v1210 + v795 * v1374); s679 += v1397;
+        const V v1398 = w[1] * (v776 * v1211 + v795 * v1373); s684 += v1398;
+        const V v1399 = w[1] * (v770 * v1211 + v795 * v1381); s686 += v1399;
+        const V v1400 = w[1] * (v779 * v1211 + v795 * v1375); s689 += v1400;
+        const V v1401 = w[1] * (v776 * v1212 + v797 * v1372); s694 += v1401;
+        const V v1402 = w[1] * (v779 * v1212 + v797 * v1374); s699 += v1402;
+        const V v1403 = w[1] * (v776 * v1213 + v797 * v1373); s704 += v1403;
+        const V v1404 = w[1] * (v770 * v1213 + v797 * v1381); s706 += v1404;
+        const V v1405 = w[1] * (v779 * v1213 + v797 * v1375); s709 += v1405;
+        const V v1406 = w[1] * (v770 * v1212 + v797 * v1380); s696 += v1406;
+        const V v1407 = w[1] * (v778 * v1212 + v797 * v1382); s698 += v1407;
+        const V v1408 = w[1] * (v778 * v1213 + v797 * v1383); s708 += v1408;
+        const V v1409 = w[1] * (v1264 - v894 * v1380); s736 += v1409;
+        const V v1410 = w[1] * (v1268 - v894 * v1382); s738 += v1410;
+        const V v1411 = w[1] * (v1261 - v894 * v1373); s744 += v1411;
+        const V v1412 = w[1] * (v1269 - v894 * v1383); s748 += v1412;
+        const V v1413 = w[1] * (v1271 - v894 * v1375); s749 += v1413;
+        const V v1414 = w[1] * (v1264 + v895 * v1380); s756 += v1414;
+        const V v1415 = w[1] * (v1268 + v895 * v1382); s758 += v1415;
+        const V v1416 = w[1] * (v1261 + v895 * v1373); s764 += v1416;
+        const V v1417 = w[1] * (v1269 + v895 * v1383); s768 += v1417;
+        const V v1418 = w[1] * (v1271 + v895 * v1375); s769 += v1418;
+        const V v1419 = w[1] * (v1260 - v894 * v1372); s734 += v1419;
+        const V v1420 = w[1] * (v1260 + v895 * v1372); s754 += v1420;
+        const V v1421 = w[1] * (v1270 - v894 * v1374); s739 += v1421;
+        const V v1422 = w[1] * (v1270 + v895 * v1374); s759 += v1422;
+        const V v1423 = w[1] * (v1265 - v894 * v1381); s746 += v1423;
+        const V v1424 = w[1] * (v1265 + v895 * v1381); s766 += v1424;
+        const V v1425 = w[1] * (v543 * v1190 + v773 * v1224 + v865 * v1235); s651 += v1425;
+        const V v1426 = w[1] * (v543 * v1192 + v773 * v1223 + v866 * v1235); s661 += v1426;
+        const V v1427 = w[1] * (v541 * v1190 + v777 * v1224 + v865 * v1237); s655 += v1427;
+        const V v1428 = w[1] * (v541 * v1192 + v777 * v1223 + v866 * v1237); s665 += v1428;
+        const V v1429 = w[1] * (v550 * v1190 + v770 * v1224 + v865 * v1238); s656 += v1429;
+        const V v1430 = w[1] * (v550 * v1192 + v770 * v1223 + v866 * v1238); s666 += v1430;
     }
-    softehl_store2(R + 12, 14, s199, s201);
-    softehl_store4(R + 0, 14, s212, s211, s210, s209);
-    const V v416 = -s203;
-    const V v417 = -s204;
-    softehl_store4(R + 8, 14, v417, v416, s200, s202);
-    const V v418 = -s205;
-    const V v419 = -s206;
-    softehl_store4(R + 4, 14, s208, s207, v419, v418);
+    softehl_store2(R + 12, 14, s564, s570); softehl_store4(R + 0, 14, s605, s604, s603, s602);
+    softehl_store4(K + 164, 196, s606, s592, s607, s593);
+    softehl_store4(K + 192, 196, s608, s594, s609, s595);
+    softehl_store4(K + 24, 196, s612, s574, s613, s575);
+    softehl_store4(K + 52, 196, s616, s578, s617, s579);
+    softehl_store4(K + 80, 196, s620, s582, s621, s583);
+    softehl_store4(K + 140, 196, s630, s631, s632, s633);
+    softehl_store4(K + 144, 196, s634, s635, s636, s637);
+    softehl_store4(K + 148, 196, s638, s639, s566, softehl_splat(0.0));
+    softehl_store4(K + 168, 196, s640, s641, s642, s643);
+    softehl_store4(K + 172, 196, s644, s645, s646, s647);
+    softehl_store4(K + 176, 196, s648, s649, s568, softehl_splat(0.0));
+    softehl_store4(K + 152, 196, s567, softehl_splat(0.0), s650, s651);
+    softehl_store4(K + 156, 196, s652, s653, s654, s655);
+    softehl_store4(K + 160, 196, s656, s657, s658, s659);
+    softehl_store4(K + 180, 196, s569, softehl_splat(0.0), s660, s661);
+    softehl_store4(K + 184, 196, s662, s663, s664, s665);
+    softehl_store4(K + 188, 196, s666, s667, s668, s669);
+    softehl_store4(K + 0, 196, s670, s671, s672, s673);
+    softehl_store4(K + 4, 196, s674, s675, s676, s677);
+    softehl_store4(K + 8, 196, s678, s679, s610, s572);
+    softehl_store4(K + 12, 196, s611, s573, s680, s681);
+    softehl_store4(K + 16, 196, s682, s683, s684, s685);
+    softehl_store4(K + 20, 196, s686, s687, s688, s689);
+    softehl_store4(K + 28, 196, s690, s691, s692, s693);
+    softehl_store4(K + 32, 196, s694, s695, s696, s697);
+    softehl_store4(K + 36, 196, s698, s699, s614, s576);
+    softehl_store4(K + 40, 196, s615, s577, s700, s701);
+    softehl_store4(K + 44, 196, s702, s703, s704, s705);
+    softehl_store4(K + 48, 196, s706, s707, s708, s709);
+    softehl_store4(K + 56, 196, s710, s711, s712, s713);
+    softehl_store4(K + 60, 196, s714, s715, s716, s717);
+    softehl_store4(K + 64, 196, s718, s719, s618, s580);
+    softehl_store4(K + 68, 196, s619, s581, s720, s721);
+    softehl_store4(K + 72, 196, s722, s723, s724, s725);
+    softehl_store4(K + 76, 196, s726, s727, s728, s729);
+    softehl_store4(K + 84, 196, s730, s731, s732, s733);
+    softehl_store4(K + 88, 196, s734, s735, s736, s737);
+    softehl_store4(K + 100, 196, s742, s743, s744, s745);
+    softehl_store4(K + 104, 196, s746, s747, s748, s749);
+    softehl_store4(R + 8, 14, -s597, -s596, s565, s571);
+    softehl_store4(R + 4, 14, s601, s600, -s599, -s598);
+    softehl_store4(K + 92, 196, s738, s739, -s622, s584);
+    softehl_store4(K + 96, 196, -s623, s585, s740, s741);
+    softehl_store4(K + 108, 196, -s624, s586, -s625, s587);
+    softehl_store4(K + 136, 196, -s628, s590, -s629, s591);
+    softehl_store4(K + 112, 196, -s750, -s751, -s752, -s753);
+    softehl_store4(K + 116, 196, -s754, -s755, -s756, -s757);
+    softehl_store4(K + 120, 196, -s758, -s759, -s626, s588);
+    softehl_store4(K + 124, 196, -s627, s589, -s760, -s761);
+    softehl_store4(K + 128, 196, -s762, -s763, -s764, -s765);
+    softehl_store4(K + 132, 196, -s766, -s767, -s768, -s769);
 }
-
-void softehl_mortar_32_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mortar_32_residual_group(points, modes, coordinates + 10 * e, dofs + 14 * e, data + 15 * e, 0, parameters, rule, basis, values + 14 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mortar_32_residual_group(points, modes, coordinates + 10 * (n - SOFTEHL_LANES), dofs + 14 * (n - SOFTEHL_LANES), data + 15 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 14 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 10];
-    softehl_pad(X, coordinates, 10, n);
-    double d[SOFTEHL_LANES * 14];
-    softehl_pad(d, dofs, 14, n);
-    double a[SOFTEHL_LANES * 15];
-    softehl_pad(a, data, 15, n);
-    double R[SOFTEHL_LANES * 14];
-    softehl_mortar_32_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 14 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_mortar_32_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 10, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 10, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8, X9;
-    softehl_load2(X + 8, 10, &X8, &X9);
-    (void)X8; (void)X9;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 14, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 14, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
-    softehl_load4(d + 8, 14, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13;
-    softehl_load2(d + 12, 14, &d12, &d13);
-    (void)d12; (void)d13;
-    V a0, a1, a2, a3;
-    softehl_load4(a + 0, 15, &a0, &a1, &a2, &a3);
-    (void)a0; (void)a1; (void)a2; (void)a3;
-    V a4, a5, a6, a7;
-    softehl_load4(a + 4, 15, &a4, &a5, &a6, &a7);
-    (void)a4; (void)a5; (void)a6; (void)a7;
-    V a8, a9, a10, a11;
-    softehl_load4(a + 8, 15, &a8, &a9, &a10, &a11);
-    (void)a8; (void)a9; (void)a10; (void)a11;
-    V a12, a13, a14;
-    softehl_load3(a + 12, 15, &a12, &a13, &a14);
-    (void)a12; (void)a13; (void)a14;
-    const V v1 = -a11;
-    const V v2 = X4 + d4;
-    const V v3 = 2.0 * X4;
-    const V v4 = X4 + a2;
-    const V v5 = X0 + a0;
-    const V v6 = X2 + a1;
-    const V v7 = X0 + X2;
-    const V v8 = X6 + a3;
-    const V v9 = X8 + a4;
-    const V v10 = X6 + X8;
-    const V v11 = X0 + d0;
-    const V v12 = v9 - v8;
-    const V v13 = d0 + v7;
-    const V v14 = X1 + a5;
-    const V v15 = 0.5 * X1;
-    const V v16 = X3 + a6;
-    const V v17 = v7 - v3;
-    const V v18 = 0.5 * X3;
-    const V v19 = X1 + X3;
-    const V v20 = X5 + a7;
-    const V v21 = 2.0 * X5;
-    const V v22 = X5 + d5;
-    const V v23 = X7 + a8;
-    const V v24 = X1 + d1;
-    const V v25 = X3 + d3;
-    const V v26 = d1 + d3;
-    const V v27 = X7 + d7;
-    const V v28 = v26 + v19;
-    const V v29 = X9 + a9;
-    const V v30 = X9 + v27;
-    const V v31 = v19 - v21;
-    const V v32 = v25 + v24;
-    const V v33 = 0.5 * v28;
-    const V v34 = v25 - X1;
-    const V v35 = v29 - v23;
-    const V v36 = X9 + d9;
-    const V v37 = d9 + v30;
-    const V v38 = v27 - v33;
-    const V v39 = 2.0 * v22;
-    const V v40 = v32 - v39;
-    const V v41 = d1 - v34;
-    const V v42 = 0.5 * v37;
-    const V v43 = v34 - d1;
-    const V v44 = 0.5 * v41;
-    const V v45 = v36 - X7;
-    const V v46 = v36 - v27;
-    const V v47 = v36 - v33;
-    const V v48 = v45 - d7;
-    const V v49 = 0.5 * v38;
-    const V v50 = 0.5 * v43;
-    const V v51 = 0.25 * v43;
-    const V v52 = 0.5 * v48;
-    const V v53 = 0.5 * v47;
-    const V v54 = v47 * v50;
-    const V v55 = v38 * v50;
-    const V v56 = v50 * v50;
-    const V v57 = 1.0 / a10;
-    const V v58 = -a10;
-    const V v59 = v49 + v51;
-    const V v60 = v53 + v51;
-    const V v61 = v49 - v51;
-    const V v62 = v53 - v51;
-    const V v63 = d10 - d12;
-    const V v64 = d12 - d10;
-    const V v65 = 0.5 * v63;
-    const V v66 = 0.5 * v64;
-    const V v67 = d11 - d13;
-    const V v68 = d13 - d11;
-    const V v69 = 0.5 * v67;
-    const V v70 = 0.5 * v68;
-    const V v71 = X2 + d2;
-    const V v72 = d2 + v13;
-    const V v73 = 0.5 * v72;
-    const V v74 = X6 + d6;
-    const V v75 = d6 + v10;
-    const V v76 = v71 + v11;
-    const V v77 = v71 - X0;
-    const V v78 = d8 + v75;
-    const V v79 = X8 + d8;
-    const V v80 = 0.5 * v78;
-    const V v81 = d0 - v77;
-    const V v82 = v74 - v73;
-    const V v83 = v79 - v74;
-    const V v84 = v77 - d0;
-    const V v85 = v79 - v73;
-    const V v86 = 0.5 * v81;
-    const V v87 = v79 - d6;
-    const V v88 = 2.0 * v2;
-    const V v89 = v76 - v88;
-    const V v90 = 0.5 * v82;
-    const V v91 = v87 - X6;
-    const V v92 = 0.5 * v84;
-    const V v93 = 0.25 * v84;
-    const V v94 = 0.5 * v85;
-    const V v95 = 0.5 * v91;
-    const V v96 = v92 * v85;
-    const V v97 = v54 + v96;
-    const V v98 = v92 * v82;
-    const V v99 = v55 + v98;
-    const V v100 = v92 * v92;
-    const V v101 = v100 + v56;
-    const V v102 = v93 + v94;
-    const V v103 = v93 + v90;
-    const V v104 = v90 - v93;
-    const V v105 = v94 - v93;
-    const V v106 = 1.0 / v101;
-    const V v107 = v106 * v97;
-    const M v108 = softehl_lt(softehl_splat(1.0), v107);
-    const V v109 = softehl_blend(v108, softehl_splat(1.0), v107);
-    const M v110 = softehl_eq(v109, v109);
-    const V v111 = v99 * v106;
-    const M v112 = softehl_lt(softehl_splat(1.0), v111);
-    const V v113 = softehl_blend(v112, softehl_splat(1.0), v111);
-    const M v114 = softehl_eq(v113, v113);
-    const V v115 = v106 * v106;
-    const V v116 = v103 * v106;
-    const V v117 = v102 * v106;
-    const V v118 = v104 * v106;
-    const V v119 = v105 * v106;
-    const V v120 = v59 * v106;
-    const V v121 = v86 * v115;
-    const V v122 = v44 * v115;
-    const V v123 = v60 * v106;
-    const V v124 = v61 * v106;
-    const V v125 = v62 * v106;
-    const V v126 = v92 * v115;
-    const V v127 = v92 * v106;
-    const V v128 = v50 * v115;
-    const V v129 = v50 * v106;
-    const V v130 = v99 * v121;
-    const V v131 = v130 + v116;
-    const V v132 = v97 * v121;
-    const V v133 = v117 + v132;
-    const V v134 = v99 * v122;
-    const V v135 = v134 + v120;
-    const V v136 = v97 * v122;
-    const V v137 = v123 + v136;
-    const V v138 = v99 * v126;
-    const V v139 = v97 * v126;
-    const V v140 = v99 * v128;
-    const V v141 = v97 * v128;
-    V v142 = softehl_splat(0.0);
-    V v143 = softehl_splat(0.0);
-    V v144 = softehl_splat(0.0);
-    V v145 = softehl_splat(0.0);
-    V v146 = softehl_splat(0.0);
-    V v147 = softehl_splat(0.0);
-    V v148 = softehl_splat(0.0);
-    const M m149 = v110;
-    if (softehl_any(m149)) {
-        const M v150 = softehl_lt(softehl_splat((-1.0)), v109);
-        V v151 = softehl_splat((-1.0));
-        V v152 = softehl_splat(0.0);
-        V v153 = softehl_splat(0.0);
-        V v154 = softehl_splat(0.0);
-        V v155 = softehl_splat(0.0);
-        V v156 = softehl_splat(0.0);
-        V v157 = softehl_splat(0.0);
-        const M m158 = v150 & m149;
-        if (softehl_any(m158)) {
-            V v159 = softehl_splat(0.0);
-            V v160 = softehl_splat(0.0);
-            V v161 = softehl_splat(0.0);
-            V v162 = softehl_splat(0.0);
-            V v163 = softehl_splat(0.0);
-            V v164 = softehl_splat(0.0);
-            const M m165 = ~v108 & m158;
-            if (softehl_any(m165)) {
-                const V v166 = -v133;
-                const V v167 = -v137;
-                const V v168 = v119 - v139;
-                const V v169 = v125 - v141;
-                v159 = softehl_blend(m165, v127, v159);
-                v160 = softehl_blend(m165, v129, v160);
-                v161 = softehl_blend(m165, v166, v161);
-                v162 = softehl_blend(m165, v167, v162);
-                v163 = softehl_blend(m165, v168, v163);
-                v164 = softehl_blend(m165, v169, v164);
-            }
-            v151 = softehl_blend(m158, v109, v151);
-            v152 = softehl_blend(m158, v159, v152);
-            v153 = softehl_blend(m158, v160, v153);
-            v154 = softehl_blend(m158, v161, v154);
-            v155 = softehl_blend(m158, v162, v155);
-            v156 = softehl_blend(m158, v163, v156);
-            v157 = softehl_blend(m158, v164, v157);
-        }
-        v142 = softehl_blend(m149, v151, v142);
-        v143 = softehl_blend(m149, v154, v143);
-        v144 = softehl_blend(m149, v155, v144);
-        v145 = softehl_blend(m149, v156, v145);
-        v146 = softehl_blend(m149, v157, v146);
-        v147 = softehl_blend(m149, v152, v147);
-        v148 = softehl_blend(m149, v153, v148);
-    }
-    const M m170 = ~v110;
-    if (softehl_any(m170)) {
-        const V v171 = (-1.0) - v109;
-        const V v172 = v171 * v171;
-        const V v173 = v171 * v172;
-        V v174 = softehl_splat(0.0);
-        V v175 = softehl_splat(0.0);
-        V v176 = softehl_splat(0.0);
-        V v177 = softehl_splat(0.0);
-        V v178 = softehl_splat(0.0);
-        V v179 = softehl_splat(0.0);
-        const M m180 = ~v108 & m170;
-        if (softehl_any(m180)) {
-            const V v181 = (-1.0) - v107;
-            const V v182 = v139 - v119;
-            const V v183 = v141 - v125;
-            const V v184 = 3.0 * v181;
-            const V v185 = v181 * v184;
-            const V v186 = v182 * v185;
-            const V v187 = v183 * v185;
-            const V v188 = v133 * v185;
-            const V v189 = v137 * v185;
-            const V v190 = v127 * v185;
-            const V v191 = -v190;
-            const V v192 = v129 * v185;
-            const V v193 = -v192;
-            v174 = softehl_blend(m180, v188, v174);
-            v175 = softehl_blend(m180, v189, v175);
-            v176 = softehl_blend(m180, v186, v176);
-            v177 = softehl_blend(m180, v187, v177);
-            v178 = softehl_blend(m180, v191, v178);
-            v179 = softehl_blend(m180, v193, v179);
-        }
-        v142 = softehl_blend(m170, v173, v142);
-        v143 = softehl_blend(m170, v174, v143);
-        v144 = softehl_blend(m170, v175, v144);
-        v145 = softehl_blend(m170, v176, v145);
-        v146 = softehl_blend(m170, v177, v146);
-        v147 = softehl_blend(m170, v178, v147);
-        v148 = softehl_blend(m170, v179, v148);
-    }
-    V v194 = softehl_splat(0.0);
-    V v195 = softehl_splat(0.0);
-    V v196 = softehl_splat(0.0);
-    V v197 = softehl_splat(0.0);
-    V v198 = softehl_splat(0.0);
-    V v199 = softehl_splat(0.0);
-    V v200 = softehl_splat(0.0);
-    const M m201 = v114;
-    if (softehl_any(m201)) {
-        const M v202 = softehl_lt(softehl_splat((-1.0)), v113);
-        V v203 = softehl_splat((-1.0));
-        V v204 = softehl_splat(0.0);
-        V v205 = softehl_splat(0.0);
-        V v206 = softehl_splat(0.0);
-        V v207 = softehl_splat(0.0);
-        V v208 = softehl_splat(0.0);
-        V v209 = softehl_splat(0.0);
-        const M m210 = v202 & m201;
-        if (softehl_any(m210)) {
-            V v211 = softehl_splat(0.0);
-            V v212 = softehl_splat(0.0);
-            V v213 = softehl_splat(0.0);
-            V v214 = softehl_splat(0.0);
-            V v215 = softehl_splat(0.0);
-            V v216 = softehl_splat(0.0);
-            const M m217 = ~v112 & m210;
-            if (softehl_any(m217)) {
-                const V v218 = -v131;
-                const V v219 = -v135;
-                const V v220 = v118 - v138;
-                const V v221 = v124 - v140;
-                v211 = softehl_blend(m217, v127, v211);
-                v212 = softehl_blend(m217, v129, v212);
-                v213 = softehl_blend(m217, v218, v213);
-                v214 = softehl_blend(m217, v219, v214);
-                v215 = softehl_blend(m217, v220, v215);
-                v216 = softehl_blend(m217, v221, v216);
-            }
-            v203 = softehl_blend(m210, v113, v203);
-            v204 = softehl_blend(m210, v211, v204);
-            v205 = softehl_blend(m210, v212, v205);
-            v206 = softehl_blend(m210, v213, v206);
-            v207 = softehl_blend(m210, v214, v207);
-            v208 = softehl_blend(m210, v215, v208);
-            v209 = softehl_blend(m210, v216, v209);
-        }
-        v194 = softehl_blend(m201, v203, v194);
-        v195 = softehl_blend(m201, v206, v195);
-        v196 = softehl_blend(m201, v207, v196);
-        v197 = softehl_blend(m201, v208, v197);
-        v198 = softehl_blend(m201, v209, v198);
-        v199 = softehl_blend(m201, v204, v199);
-        v200 = softehl_blend(m201, v205, v200);
-    }
-    const M m222 = ~v114;
-    if (softehl_any(m222)) {
-        const V v223 = (-1.0) - v113;
-        const V v224 = v223 * v223;
-        const V v225 = v223 * v224;
-        V v226 = softehl_splat(0.0);
-        V v227 = softehl_splat(0.0);
-        V v228 = softehl_splat(0.0);
-        V v229 = softehl_splat(0.0);
-        V v230 = softehl_splat(0.0);
-        V v231 = softehl_splat(0.0);
-        const M m232 = ~v112 & m222;
-        if (softehl_any(m232)) {
-            const V v233 = (-1.0) - v111;
-            const V v234 = v138 - v118;
-            const V v235 = v140 - v124;
-            const V v236 = 3.0 * v233;
-            const V v237 = v233 * v236;
-            const V v238 = v234 * v237;
-            const V v239 = v235 * v237;
-            const V v240 = v131 * v237;
-            const V v241 = v135 * v237;
-            const V v242 = v127 * v237;
-            const V v243 = -v242;
-            const V v244 = v129 * v237;
-            const V v245 = -v244;
-            v226 = softehl_blend(m232, v240, v226);
-            v227 = softehl_blend(m232, v241, v227);
-            v228 = softehl_blend(m232, v238, v228);
-            v229 = softehl_blend(m232, v239, v229);
-            v230 = softehl_blend(m232, v243, v230);
-            v231 = softehl_blend(m232, v245, v231);
-        }
-        v194 = softehl_blend(m222, v225, v194);
-        v195 = softehl_blend(m222, v226, v195);
-        v196 = softehl_blend(m222, v227, v196);
-        v197 = softehl_blend(m222, v228, v197);
-        v198 = softehl_blend(m222, v229, v198);
-        v199 = softehl_blend(m222, v230, v199);
-        v200 = softehl_blend(m222, v231, v200);
-    }
-    const V v246 = 1.0 + v142;
-    const V v247 = 0.5 + v142;
-    const V v248 = 2.0 * v142;
-    const V v249 = 0.5 * v142;
-    const V v250 = v142 * v142;
-    const V v251 = 0.5 + v194;
-    const V v252 = 2.0 * v194;
-    const V v253 = 0.5 * v194;
-    const V v254 = v142 - 0.5;
-    const V v255 = v142 - 1.0;
-    const V v256 = v250 - 1.0;
-    const V v257 = v194 * v194;
-    const V v258 = 1.0 + v194;
-    const V v259 = v194 - 0.5;
-    const V v260 = v194 - 1.0;
-    const V v261 = v249 * v246;
-    const V v262 = v257 - 1.0;
-    const V v263 = v249 * v255;
-    const V v264 = v253 * v258;
-    const V v265 = v253 * v260;
-    const V v266 = 2.0 * v195;
-    const V v267 = 0.5 * v195;
-    const V v268 = v253 * v195;
-    const V v269 = 2.0 * v143;
-    const V v270 = 0.5 * v143;
-    const V v271 = 2.0 * v196;
-    const V v272 = 0.5 * v196;
-    const V v273 = v253 * v196;
-    const V v274 = 2.0 * v144;
-    const V v275 = 0.5 * v144;
-    const V v276 = 2.0 * v197;
-    const V v277 = 0.5 * v197;
-    const V v278 = v253 * v197;
-    const V v279 = 2.0 * v145;
-    const V v280 = 0.5 * v145;
-    const V v281 = 2.0 * v198;
-    const V v282 = 0.5 * v198;
-    const V v283 = v253 * v198;
-    const V v284 = 2.0 * v146;
-    const V v285 = 0.5 * v146;
-    const V v286 = 2.0 * v199;
-    const V v287 = 0.5 * v199;
-    const V v288 = v253 * v199;
-    const V v289 = v253 * v200;
-    const V v290 = 2.0 * v200;
-    const V v291 = 0.5 * v200;
-    const V v292 = 2.0 * v147;
-    const V v293 = 0.5 * v147;
-    const V v294 = 2.0 * v148;
-    const V v295 = 0.5 * v148;
-    const V v296 = v252 * v199;
-    const V v297 = v252 * v195;
-    const V v298 = v252 * v196;
-    const V v299 = v252 * v197;
-    const V v300 = v252 * v198;
-    const V v301 = v252 * v200;
-    const V v302 = v248 * v148;
-    const V v303 = v248 * v143;
-    const V v304 = v249 * v143;
-    const V v305 = v249 * v148;
-    const V v306 = v248 * v144;
-    const V v307 = v249 * v144;
-    const V v308 = v248 * v145;
-    const V v309 = v249 * v145;
-    const V v310 = v248 * v146;
-    const V v311 = v249 * v146;
-    const V v312 = v249 * v147;
-    const V v313 = v248 * v147;
-    const V v314 = v32 * v145;
-    const V v315 = v32 * v147;
-    const V v316 = v76 * v147;
-    const V v317 = v76 * v145;
-    const V v318 = v76 * v146;
-    const V v319 = v32 * v146;
-    const V v320 = v2 * v310;
-    const V v321 = v22 * v310;
-    const V v322 = v22 * v279;
-    const V v323 = v314 - v322;
-    const V v324 = v2 * v279;
-    const V v325 = v317 - v324;
-    const V v326 = v2 * v284;
-    const V v327 = v318 - v326;
-    const V v328 = v22 * v284;
-    const V v329 = v319 - v328;
-    const V v330 = v2 * v292;
-    const V v331 = v316 - v330;
-    const V v332 = v22 * v292;
-    const V v333 = v315 - v332;
-    const V v334 = v2 * v297;
-    const V v335 = v22 * v297;
-    const V v336 = v247 + v325;
-    const V v337 = v247 + v329;
-    const V v338 = v321 - v261;
-    const V v339 = v2 * v303;
-    const V v340 = v22 * v303;
-    const V v341 = v2 * v298;
-    const V v342 = v22 * v298;
-    const V v343 = v334 - v265;
-    const V v344 = v2 * v306;
-    const V v345 = v22 * v306;
-    const V v346 = v2 * v299;
-    const V v347 = v22 * v299;
-    const V v348 = v342 - v265;
-    const V v349 = v339 - v263;
-    const V v350 = v345 - v263;
-    const V v351 = v2 * v308;
-    const V v352 = v22 * v308;
-    const V v353 = v2 * v300;
-    const V v354 = v22 * v300;
-    const V v355 = v346 - v264;
-    const V v356 = v22 * v296;
-    const V v357 = v2 * v296;
-    const V v358 = 1.0 + v357;
-    const V v359 = v2 * v301;
-    const V v360 = v22 * v301;
-    const V v361 = 1.0 + v360;
-    const V v362 = v354 - v264;
-    const V v363 = v351 - v261;
-    const V v364 = v22 * v313;
-    const V v365 = v2 * v313;
-    const V v366 = 1.0 + v365;
-    const V v367 = v2 * v302;
-    const V v368 = v22 * v302;
-    const V v369 = 1.0 + v368;
-    const V v370 = v71 * v251;
-    const V v371 = v25 * v251;
-    const V v372 = v71 * v247;
-    const V v373 = v25 * v247;
-    const V v374 = v2 * v276;
-    const V v375 = v251 - v374;
-    const V v376 = v22 * v281;
-    const V v377 = v251 - v376;
-    const V v378 = v2 * v252;
-    const V v379 = v370 - v378;
-    const V v380 = v22 * v252;
-    const V v381 = v371 - v380;
-    const V v382 = v2 * v248;
-    const V v383 = v372 - v382;
-    const V v384 = v22 * v248;
-    const V v385 = v373 - v384;
-    const V v386 = v76 * v197;
-    const V v387 = v386 + v375;
-    const V v388 = v32 * v197;
-    const V v389 = v22 * v276;
-    const V v390 = v388 - v389;
-    const V v391 = v32 * v198;
-    const V v392 = v391 + v377;
-    const V v393 = v76 * v198;
-    const V v394 = v2 * v281;
-    const V v395 = v393 - v394;
-    const V v396 = v32 * v195;
-    const V v397 = v76 * v195;
-    const V v398 = v397 + v259;
-    const V v399 = v32 * v143;
-    const V v400 = v76 * v143;
-    const V v401 = v400 + v254;
-    const V v402 = v76 * v196;
-    const V v403 = v32 * v196;
-    const V v404 = v403 + v259;
-    const V v405 = v22 * v266;
-    const V v406 = v396 - v405;
-    const V v407 = v2 * v266;
-    const V v408 = v398 - v407;
-    const V v409 = v22 * v269;
-    const V v410 = v399 - v409;
-    const V v411 = v2 * v269;
-    const V v412 = v401 - v411;
-    const V v413 = v2 * v271;
-    const V v414 = v402 - v413;
-    const V v415 = v22 * v271;
-    const V v416 = v404 - v415;
-    const V v417 = v76 * v144;
-    const V v418 = v32 * v144;
-    const V v419 = v418 + v254;
-    const V v420 = v76 * v199;
-    const V v421 = v32 * v199;
-    const V v422 = v76 * v200;
-    const V v423 = v32 * v200;
-    const V v424 = v76 * v148;
-    const V v425 = v32 * v148;
-    const V v426 = v2 * v274;
-    const V v427 = v417 - v426;
-    const V v428 = v22 * v274;
-    const V v429 = v419 - v428;
-    const V v430 = v2 * v286;
-    const V v431 = v420 - v430;
-    const V v432 = v22 * v286;
-    const V v433 = v421 - v432;
-    const V v434 = v2 * v290;
-    const V v435 = v422 - v434;
-    const V v436 = v22 * v290;
-    const V v437 = v423 - v436;
-    const V v438 = v2 * v294;
-    const V v439 = v424 - v438;
-    const V v440 = v22 * v294;
-    const V v441 = v425 - v440;
-    const V v442 = v2 * v256;
-    const V v443 = v79 + v442;
-    const V v444 = v22 * v256;
-    const V v445 = v36 + v444;
-    const V v446 = v2 * v262;
-    const V v447 = v74 + v446;
-    const V v448 = v22 * v262;
-    const V v449 = v27 + v448;
-    const V v450 = v11 * v254;
-    const V v451 = v450 + v383;
-    const V v452 = v24 * v254;
-    const V v453 = v452 + v385;
-    const V v454 = v11 * v263;
-    const V v455 = v443 - v454;
-    const V v456 = v24 * v263;
-    const V v457 = v445 - v456;
-    const V v458 = 2.0 * v451;
-    const V v459 = v451 * v451;
-    const V v460 = 2.0 * v453;
-    const V v461 = v256 * v451;
-    const V v462 = v256 * v453;
-    const V v463 = v11 * v265;
-    const V v464 = v447 - v463;
-    const V v465 = v24 * v265;
-    const V v466 = v449 - v465;
-    const V v467 = v453 * v453;
-    const V v468 = v459 + v467;
-    const V v469 = 1.0 / v468;
-    const V v470 = v71 * v261;
-    const V v471 = v455 - v470;
-    const V v472 = v25 * v261;
-    const V v473 = v457 - v472;
-    const V v474 = v71 * v264;
-    const V v475 = v464 - v474;
-    const V v476 = v25 * v264;
-    const V v477 = v466 - v476;
-    const V v478 = v412 * v458;
-    const V v479 = v412 * v471;
-    const V v480 = v451 * v471;
-    const V v481 = v248 * v473;
-    const V v482 = v462 - v481;
-    const V v483 = v248 * v471;
-    const V v484 = v461 - v483;
-    const V v485 = v427 * v471;
-    const V v486 = v427 * v458;
-    const V v487 = v408 * v475;
-    const V v488 = v414 * v475;
-    const V v489 = v453 * v473;
-    const V v490 = v480 + v489;
-    const V v491 = v248 * v490;
-    const V v492 = v387 * v475;
-    const V v493 = v429 * v473;
-    const V v494 = v485 + v493;
-    const V v495 = v429 * v460;
-    const V v496 = v486 + v495;
-    const V v497 = v336 * v471;
-    const V v498 = v336 * v458;
-    const V v499 = v395 * v475;
-    const V v500 = v327 * v471;
-    const V v501 = v327 * v458;
-    const V v502 = v431 * v475;
-    const V v503 = v435 * v475;
-    const V v504 = v323 * v460;
-    const V v505 = v498 + v504;
-    const V v506 = v323 * v473;
-    const V v507 = v497 + v506;
-    const V v508 = v331 * v471;
-    const V v509 = v331 * v458;
-    const V v510 = v439 * v471;
-    const V v511 = v439 * v458;
-    const V v512 = v337 * v460;
-    const V v513 = v501 + v512;
-    const V v514 = v337 * v473;
-    const V v515 = v500 + v514;
-    const V v516 = v469 * v469;
-    const V v517 = v469 * v484;
-    const V v518 = v469 * v482;
-    const V v519 = v333 * v460;
-    const V v520 = v509 + v519;
-    const V v521 = v333 * v473;
-    const V v522 = v508 + v521;
-    const V v523 = v441 * v460;
-    const V v524 = v511 + v523;
-    const V v525 = v441 * v473;
-    const V v526 = v510 + v525;
-    const V v527 = v491 * v516;
-    const V v528 = v490 * v516;
-    const V v529 = v469 * v490;
-    const V v530 = v142 + v529;
-    const V v531 = v458 * v527;
-    const V v532 = v517 + v531;
-    const V v533 = v460 * v527;
-    const V v534 = v518 + v533;
-    const V v535 = v513 * v528;
-    const V v536 = v520 * v528;
-    const V v537 = v524 * v528;
-    const M v538 = softehl_lt(softehl_splat(1.0), v530);
-    const V v539 = v496 * v528;
-    const V v540 = v505 * v528;
-    const V v541 = v410 * v460;
-    const V v542 = v478 + v541;
-    const V v543 = v410 * v473;
-    const V v544 = v479 + v543;
-    const V v545 = v528 * v542;
-    const V v546 = v11 * v259;
-    const V v547 = v546 + v379;
-    const V v548 = v24 * v259;
-    const V v549 = v548 + v381;
-    const V v550 = 2.0 * v547;
-    const V v551 = v547 * v547;
-    const V v552 = 2.0 * v549;
-    const V v553 = v475 * v547;
-    const V v554 = v262 * v547;
-    const V v555 = v262 * v549;
-    const V v556 = v549 * v549;
-    const V v557 = v551 + v556;
-    const V v558 = v252 * v475;
-    const V v559 = v554 - v558;
-    const V v560 = 1.0 / v557;
-    const V v561 = v408 * v550;
-    const V v562 = v414 * v550;
-    const V v563 = v387 * v550;
-    const V v564 = v477 * v549;
-    const V v565 = v553 + v564;
-    const V v566 = v252 * v477;
-    const V v567 = v555 - v566;
-    const V v568 = v395 * v550;
-    const V v569 = v431 * v550;
-    const V v570 = v252 * v565;
-    const V v571 = v435 * v550;
-    const V v572 = v406 * v552;
-    const V v573 = v561 + v572;
-    const V v574 = v406 * v477;
-    const V v575 = v487 + v574;
-    const V v576 = v416 * v552;
-    const V v577 = v562 + v576;
-    const V v578 = v416 * v477;
-    const V v579 = v488 + v578;
-    const V v580 = v390 * v552;
-    const V v581 = v563 + v580;
-    const V v582 = v390 * v477;
-    const V v583 = v492 + v582;
-    const V v584 = v392 * v552;
-    const V v585 = v568 + v584;
-    const V v586 = v392 * v477;
-    const V v587 = v499 + v586;
-    const V v588 = v433 * v552;
-    const V v589 = v569 + v588;
-    const V v590 = v433 * v477;
-    const V v591 = v502 + v590;
-    const V v592 = v437 * v552;
-    const V v593 = v571 + v592;
-    const V v594 = v437 * v477;
-    const V v595 = v503 + v594;
-    const V v596 = v267 * v258;
-    const V v597 = v268 + v596;
-    const V v598 = v267 * v260;
-    const V v599 = v268 + v598;
-    const V v600 = v272 * v258;
-    const V v601 = v273 + v600;
-    const V v602 = v272 * v260;
-    const V v603 = v273 + v602;
-    const V v604 = v277 * v258;
-    const V v605 = v278 + v604;
-    const V v606 = v277 * v260;
-    const V v607 = v278 + v606;
-    const V v608 = v282 * v258;
-    const V v609 = v283 + v608;
-    const V v610 = v282 * v260;
-    const V v611 = v283 + v610;
-    const V v612 = v287 * v258;
-    const V v613 = v288 + v612;
-    const V v614 = v287 * v260;
-    const V v615 = v288 + v614;
-    const V v616 = v291 * v258;
-    const V v617 = v289 + v616;
-    const V v618 = v291 * v260;
-    const V v619 = v289 + v618;
-    const V v620 = v560 * v560;
-    const V v621 = v559 * v560;
-    const V v622 = v560 * v567;
-    const V v623 = v560 * v565;
-    const V v624 = v194 + v623;
-    const V v625 = v565 * v620;
-    const V v626 = v570 * v620;
-    const V v627 = v11 * v599;
-    const V v628 = v343 - v627;
-    const V v629 = v24 * v599;
-    const V v630 = v335 - v629;
-    const V v631 = v11 * v607;
-    const V v632 = v355 - v631;
-    const V v633 = v24 * v607;
-    const V v634 = v347 - v633;
-    const V v635 = v550 * v626;
-    const V v636 = v621 + v635;
-    const V v637 = v552 * v626;
-    const V v638 = v622 + v637;
-    const V v639 = v573 * v625;
-    const V v640 = v577 * v625;
-    const V v641 = v581 * v625;
-    const V v642 = v585 * v625;
-    const V v643 = v589 * v625;
-    const V v644 = v593 * v625;
-    const V v645 = v71 * v597;
-    const V v646 = v628 - v645;
-    const V v647 = v25 * v597;
-    const V v648 = v630 - v647;
-    const V v649 = v71 * v605;
-    const V v650 = v632 - v649;
-    const V v651 = v25 * v605;
-    const V v652 = v634 - v651;
-    const V v653 = v71 * v601;
-    const V v654 = v341 - v653;
-    const V v655 = v25 * v601;
-    const V v656 = v348 - v655;
-    const V v657 = v547 * v646;
-    const V v658 = v575 + v657;
-    const V v659 = v547 * v650;
-    const V v660 = v583 + v659;
-    const V v661 = v549 * v648;
-    const V v662 = v658 + v661;
-    const V v663 = v549 * v652;
-    const V v664 = v660 + v663;
-    const V v665 = v11 * v603;
-    const V v666 = v654 - v665;
-    const V v667 = v24 * v603;
-    const V v668 = v656 - v667;
-    const V v669 = v71 * v609;
-    const V v670 = v353 - v669;
-    const V v671 = v25 * v609;
-    const V v672 = v362 - v671;
-    const V v673 = v666 * v547;
-    const V v674 = v579 + v673;
-    const V v675 = v11 * v611;
-    const V v676 = v670 - v675;
-    const V v677 = v24 * v611;
-    const V v678 = v672 - v677;
-    const V v679 = v668 * v549;
-    const V v680 = v674 + v679;
-    const V v681 = v676 * v547;
-    const V v682 = v587 + v681;
-    const V v683 = v678 * v549;
-    const V v684 = v682 + v683;
-    const V v685 = v71 * v613;
-    const V v686 = v358 - v685;
-    const V v687 = v25 * v613;
-    const V v688 = v356 - v687;
-    const V v689 = v11 * v615;
-    const V v690 = v686 - v689;
-    const V v691 = v24 * v615;
-    const V v692 = v688 - v691;
-    const V v693 = v71 * v617;
-    const V v694 = v359 - v693;
-    const V v695 = v25 * v617;
-    const V v696 = v361 - v695;
-    const V v697 = v690 * v547;
-    const V v698 = v591 + v697;
-    const V v699 = v11 * v619;
-    const V v700 = v694 - v699;
-    const V v701 = v24 * v619;
-    const V v702 = v696 - v701;
-    const V v703 = v692 * v549;
-    const V v704 = v698 + v703;
-    const V v705 = v700 * v547;
-    const V v706 = v595 + v705;
-    const V v707 = v702 * v549;
-    const V v708 = v706 + v707;
-    const V v709 = v270 * v246;
-    const V v710 = v304 + v709;
-    const V v711 = v270 * v255;
-    const V v712 = v304 + v711;
-    const V v713 = v275 * v246;
-    const V v714 = v307 + v713;
-    const V v715 = v275 * v255;
-    const V v716 = v307 + v715;
-    const V v717 = v280 * v246;
-    const V v718 = v309 + v717;
-    const V v719 = v280 * v255;
-    const V v720 = v309 + v719;
-    const V v721 = v285 * v246;
-    const V v722 = v311 + v721;
-    const V v723 = v285 * v255;
-    const V v724 = v311 + v723;
-    const V v725 = v71 * v710;
-    const V v726 = v349 - v725;
-    const V v727 = v25 * v710;
-    const V v728 = v340 - v727;
-    const V v729 = v71 * v714;
-    const V v730 = v344 - v729;
-    const V v731 = v25 * v714;
-    const V v732 = v350 - v731;
-    const V v733 = v71 * v718;
-    const V v734 = v363 - v733;
-    const V v735 = v25 * v718;
-    const V v736 = v352 - v735;
-    const V v737 = v11 * v712;
-    const V v738 = v726 - v737;
-    const V v739 = v24 * v712;
-    const V v740 = v728 - v739;
-    const V v741 = v11 * v716;
-    const V v742 = v730 - v741;
-    const V v743 = v24 * v716;
-    const V v744 = v732 - v743;
-    const V v745 = v11 * v720;
-    const V v746 = v734 - v745;
-    const V v747 = v24 * v720;
-    const V v748 = v736 - v747;
-    const V v749 = v71 * v722;
-    const V v750 = v320 - v749;
-    const V v751 = v25 * v722;
-    const V v752 = v338 - v751;
-    const V v753 = v11 * v724;
-    const V v754 = v750 - v753;
-    const V v755 = v24 * v724;
-    const V v756 = v752 - v755;
-    const V v757 = v738 * v451;
-    const V v758 = v544 + v757;
-    const V v759 = v742 * v451;
-    const V v760 = v494 + v759;
-    const V v761 = v746 * v451;
-    const V v762 = v507 + v761;
-    const V v763 = v740 * v453;
-    const V v764 = v758 + v763;
-    const V v765 = v744 * v453;
-    const V v766 = v760 + v765;
-    const V v767 = v748 * v453;
-    const V v768 = v762 + v767;
-    const V v769 = v754 * v451;
-    const V v770 = v515 + v769;
-    const V v771 = v756 * v453;
-    const V v772 = v770 + v771;
-    const V v773 = v293 * v246;
-    const V v774 = v312 + v773;
-    const V v775 = v293 * v255;
-    const V v776 = v312 + v775;
-    const V v777 = v295 * v246;
-    const V v778 = v305 + v777;
-    const V v779 = v295 * v255;
-    const V v780 = v305 + v779;
-    const V v781 = v71 * v774;
-    const V v782 = v366 - v781;
-    const V v783 = v25 * v774;
-    const V v784 = v364 - v783;
-    const V v785 = v71 * v778;
-    const V v786 = v367 - v785;
-    const V v787 = v25 * v778;
-    const V v788 = v369 - v787;
-    const V v789 = v11 * v776;
-    const V v790 = v782 - v789;
-    const V v791 = v24 * v776;
-    const V v792 = v784 - v791;
-    const V v793 = v11 * v780;
-    const V v794 = v786 - v793;
-    const V v795 = v24 * v780;
-    const V v796 = v788 - v795;
-    const V v797 = v790 * v451;
-    const V v798 = v522 + v797;
-    const V v799 = v794 * v451;
-    const V v800 = v526 + v799;
-    const V v801 = v792 * v453;
-    const V v802 = v798 + v801;
-    const V v803 = v796 * v453;
-    const V v804 = v800 + v803;
-    const V v805 = softehl_blend(v538, softehl_splat(1.0), v530);
-    const M v806 = softehl_eq(v805, v805);
-    const M v807 = softehl_lt(softehl_splat(1.0), v624);
-    const V v808 = softehl_blend(v807, softehl_splat(1.0), v624);
-    const V v809 = v195 - v639;
-    const V v810 = v143 - v545;
-    const V v811 = v196 - v640;
-    const V v812 = v144 - v539;
-    const V v813 = v197 - v641;
-    const V v814 = v145 - v540;
-    const V v815 = v198 - v642;
-    const V v816 = v146 - v535;
-    const M v817 = softehl_eq(v808, v808);
-    const V v818 = v560 * v662;
-    const V v819 = v818 + v809;
-    const V v820 = v560 * v680;
-    const V v821 = v820 + v811;
-    const V v822 = v560 * v664;
-    const V v823 = v822 + v813;
-    const V v824 = v560 * v684;
-    const V v825 = v824 + v815;
-    const V v826 = v199 - v643;
-    const V v827 = v200 - v644;
-    const V v828 = v147 - v536;
-    const V v829 = v148 - v537;
-    const V v830 = v469 * v764;
-    const V v831 = v830 + v810;
-    const V v832 = v469 * v766;
-    const V v833 = v832 + v812;
-    const V v834 = v469 * v768;
-    const V v835 = v834 + v814;
-    const V v836 = v469 * v772;
-    const V v837 = v836 + v816;
-    const V v838 = v560 * v704;
-    const V v839 = v838 + v826;
-    const V v840 = v560 * v708;
-    const V v841 = v840 + v827;
-    const V v842 = v469 * v802;
-    const V v843 = v842 + v828;
-    const V v844 = v469 * v804;
-    const V v845 = v844 + v829;
-    V v846 = softehl_splat(0.0);
-    V v847 = softehl_splat(0.0);
-    V v848 = softehl_splat(0.0);
-    V v849 = softehl_splat(0.0);
-    V v850 = softehl_splat(0.0);
-    V v851 = softehl_splat(0.0);
-    V v852 = softehl_splat(0.0);
-    V v853 = softehl_splat(0.0);
-    V v854 = softehl_splat(0.0);
-    const M m855 = v806;
-    if (softehl_any(m855)) {
-        const M v856 = softehl_lt(softehl_splat((-1.0)), v805);
-        V v857 = softehl_splat((-1.0));
-        V v858 = softehl_splat(0.0);
-        V v859 = softehl_splat(0.0);
-        V v860 = softehl_splat(0.0);
-        V v861 = softehl_splat(0.0);
-        V v862 = softehl_splat(0.0);
-        V v863 = softehl_splat(0.0);
-        V v864 = softehl_splat(0.0);
-        V v865 = softehl_splat(0.0);
-        const M m866 = v856 & m855;
-        if (softehl_any(m866)) {
-            const V v867 = softehl_blend(v538, softehl_splat(0.0), v532);
-            const V v868 = softehl_blend(v538, softehl_splat(0.0), v534);
-            const V v869 = softehl_blend(v538, softehl_splat(0.0), v831);
-            const V v870 = softehl_blend(v538, softehl_splat(0.0), v833);
-            const V v871 = softehl_blend(v538, softehl_splat(0.0), v835);
-            const V v872 = softehl_blend(v538, softehl_splat(0.0), v837);
-            const V v873 = softehl_blend(v538, softehl_splat(0.0), v843);
-            const V v874 = softehl_blend(v538, softehl_splat(0.0), v845);
-            v857 = softehl_blend(m866, v805, v857);
-            v858 = softehl_blend(m866, v867, v858);
-            v859 = softehl_blend(m866, v868, v859);
-            v860 = softehl_blend(m866, v869, v860);
-            v861 = softehl_blend(m866, v870, v861);
-            v862 = softehl_blend(m866, v871, v862);
-            v863 = softehl_blend(m866, v872, v863);
-            v864 = softehl_blend(m866, v873, v864);
-            v865 = softehl_blend(m866, v874, v865);
-        }
-        v846 = softehl_blend(m855, v857, v846);
-        v847 = softehl_blend(m855, v858, v847);
-        v848 = softehl_blend(m855, v859, v848);
-        v849 = softehl_blend(m855, v860, v849);
-        v850 = softehl_blend(m855, v861, v850);
-        v851 = softehl_blend(m855, v862, v851);
-        v852 = softehl_blend(m855, v863, v852);
-        v853 = softehl_blend(m855, v864, v853);
-        v854 = softehl_blend(m855, v865, v854);
-    }
-    const M m875 = ~v806;
-    if (softehl_any(m875)) {
-        const V v876 = (-1.0) - v805;
-        const V v877 = v876 * v876;
-        const V v878 = v876 * v877;
-        V v879 = softehl_splat(0.0);
-        V v880 = softehl_splat(0.0);
-        V v881 = softehl_splat(0.0);
-        V v882 = softehl_splat(0.0);
-        V v883 = softehl_splat(0.0);
-        V v884 = softehl_splat(0.0);
-        V v885 = softehl_splat(0.0);
-        V v886 = softehl_splat(0.0);
-        const M m887 = ~v538 & m875;
-        if (softehl_any(m887)) {
-            const V v888 = (-1.0) - v530;
-            const V v889 = 3.0 * v888;
-            const V v890 = v888 * v889;
-            const V v891 = v532 * v890;
-            const V v892 = -v891;
-            const V v893 = v534 * v890;
-            const V v894 = -v893;
-            const V v895 = v831 * v890;
-            const V v896 = -v895;
-            const V v897 = v833 * v890;
-            const V v898 = -v897;
-            const V v899 = v835 * v890;
-            const V v900 = -v899;
-            const V v901 = v837 * v890;
-            const V v902 = -v901;
-            const V v903 = v843 * v890;
-            const V v904 = v845 * v890;
-            const V v905 = -v903;
-            const V v906 = -v904;
-            v879 = softehl_blend(m887, v892, v879);
-            v880 = softehl_blend(m887, v894, v880);
-            v881 = softehl_blend(m887, v896, v881);
-            v882 = softehl_blend(m887, v898, v882);
-            v883 = softehl_blend(m887, v900, v883);
-            v884 = softehl_blend(m887, v902, v884);
-            v885 = softehl_blend(m887, v905, v885);
-            v886 = softehl_blend(m887, v906, v886);
-        }
-        v846 = softehl_blend(m875, v878, v846);
-        v847 = softehl_blend(m875, v879, v847);
-        v848 = softehl_blend(m875, v880, v848);
-        v849 = softehl_blend(m875, v881, v849);
-        v850 = softehl_blend(m875, v882, v850);
-        v851 = softehl_blend(m875, v883, v851);
-        v852 = softehl_blend(m875, v884, v852);
-        v853 = softehl_blend(m875, v885, v853);
-        v854 = softehl_blend(m875, v886, v854);
-    }
-    V v907 = softehl_splat(0.0);
-    V v908 = softehl_splat(0.0);
-    V v909 = softehl_splat(0.0);
-    V v910 = softehl_splat(0.0);
-    V v911 = softehl_splat(0.0);
-    V v912 = softehl_splat(0.0);
-    V v913 = softehl_splat(0.0);
-    V v914 = softehl_splat(0.0);
-    V v915 = softehl_splat(0.0);
-    const M m916 = v817;
-    if (softehl_any(m916)) {
-        const M v917 = softehl_lt(softehl_splat((-1.0)), v808);
-        V v918 = softehl_splat((-1.0));
-        V v919 = softehl_splat(0.0);
-        V v920 = softehl_splat(0.0);
-        V v921 = softehl_splat(0.0);
-        V v922 = softehl_splat(0.0);
-        V v923 = softehl_splat(0.0);
-        V v924 = softehl_splat(0.0);
-        V v925 = softehl_splat(0.0);
-        V v926 = softehl_splat(0.0);
-        const M m927 = v917 & m916;
-        if (softehl_any(m927)) {
-            const V v928 = softehl_blend(v807, softehl_splat(0.0), v636);
-            const V v929 = softehl_blend(v807, softehl_splat(0.0), v638);
-            const V v930 = softehl_blend(v807, softehl_splat(0.0), v819);
-            const V v931 = softehl_blend(v807, softehl_splat(0.0), v821);
-            const V v932 = softehl_blend(v807, softehl_splat(0.0), v823);
-            const V v933 = softehl_blend(v807, softehl_splat(0.0), v825);
-            const V v934 = softehl_blend(v807, softehl_splat(0.0), v839);
-            const V v935 = softehl_blend(v807, softehl_splat(0.0), v841);
-            v918 = softehl_blend(m927, v808, v918);
-            v919 = softehl_blend(m927, v928, v919);
-            v920 = softehl_blend(m927, v929, v920);
-            v921 = softehl_blend(m927, v930, v921);
-            v922 = softehl_blend(m927, v931, v922);
-            v923 = softehl_blend(m927, v932, v923);
-            v924 = softehl_blend(m927, v933, v924);
-            v925 = softehl_blend(m927, v934, v925);
-            v926 = softehl_blend(m927, v935, v926);
-        }
-        v907 = softehl_blend(m916, v918, v907);
-        v908 = softehl_blend(m916, v919, v908);
-        v909 = softehl_blend(m916, v920, v909);
-        v910 = softehl_blend(m916, v921, v910);
-        v911 = softehl_blend(m916, v922, v911);
-        v912 = softehl_blend(m916, v923, v912);
-        v913 = softehl_blend(m916, v924, v913);
-        v914 = softehl_blend(m916, v925, v914);
-        v915 = softehl_blend(m916, v926, v915);
-    }
-    const M m936 = ~v817;
-    if (softehl_any(m936)) {
-        const V v937 = (-1.0) - v808;
-        const V v938 = v937 * v937;
-        const V v939 = v937 * v938;
-        V v940 = softehl_splat(0.0);
-        V v941 = softehl_splat(0.0);
-        V v942 = softehl_splat(0.0);
-        V v943 = softehl_splat(0.0);
-        V v944 = softehl_splat(0.0);
-        V v945 = softehl_splat(0.0);
-        V v946 = softehl_splat(0.0);
-        V v947 = softehl_splat(0.0);
-        const M m948 = ~v807 & m936;
-        if (softehl_any(m948)) {
-            const V v949 = (-1.0) - v624;
-            const V v950 = 3.0 * v949;
-            const V v951 = v949 * v950;
-            const V v952 = v636 * v951;
-            const V v953 = -v952;
-            const V v954 = v638 * v951;
-            const V v955 = -v954;
-            const V v956 = v819 * v951;
-            const V v957 = -v956;
-            const V v958 = v821 * v951;
-            const V v959 = -v958;
-            const V v960 = v823 * v951;
-            const V v961 = -v960;
-            const V v962 = v825 * v951;
-            const V v963 = -v962;
-            const V v964 = v839 * v951;
-            const V v965 = v841 * v951;
-            const V v966 = -v964;
-            const V v967 = -v965;
-            v940 = softehl_blend(m948, v953, v940);
-            v941 = softehl_blend(m948, v955, v941);
-            v942 = softehl_blend(m948, v957, v942);
-            v943 = softehl_blend(m948, v959, v943);
-            v944 = softehl_blend(m948, v961, v944);
-            v945 = softehl_blend(m948, v963, v945);
-            v946 = softehl_blend(m948, v966, v946);
-            v947 = softehl_blend(m948, v967, v947);
-        }
-        v907 = softehl_blend(m936, v939, v907);
-        v908 = softehl_blend(m936, v940, v908);
-        v909 = softehl_blend(m936, v941, v909);
-        v910 = softehl_blend(m936, v942, v910);
-        v911 = softehl_blend(m936, v943, v911);
-        v912 = softehl_blend(m936, v944, v912);
-        v913 = softehl_blend(m936, v945, v913);
-        v914 = softehl_blend(m936, v946, v914);
-        v915 = softehl_blend(m936, v947, v915);
-    }
-    const V v968 = v907 - v846;
-    const M v969 = softehl_eq(v968, v968);
-    V v970 = softehl_splat(0.0);
-    V v971 = softehl_splat(0.0);
-    V v972 = softehl_splat(0.0);
-    V v973 = softehl_splat(0.0);
-    V v974 = softehl_splat(0.0);
-    V v975 = softehl_splat(0.0);
-    V v976 = softehl_splat(0.0);
-    V v977 = softehl_splat(0.0);
-    V v978 = softehl_splat(0.0);
-    V v979 = softehl_splat(0.0);
-    V v980 = softehl_splat(0.0);
-    const M m981 = v969;
-    if (softehl_any(m981)) {
-        const M v982 = softehl_lt(softehl_splat(0.0), v968);
-        V v983 = softehl_splat(0.0);
-        V v984 = softehl_splat(0.0);
-        V v985 = softehl_splat(0.0);
-        V v986 = softehl_splat(0.0);
-        V v987 = softehl_splat(0.0);
-        V v988 = softehl_splat(0.0);
-        V v989 = softehl_splat(0.0);
-        V v990 = softehl_splat(0.0);
-        V v991 = softehl_splat(0.0);
-        V v992 = softehl_splat(0.0);
-        V v993 = softehl_splat(0.0);
-        const M m994 = v982 & m981;
-        if (softehl_any(m994)) {
-            const V v995 = v908 - v847;
-            const V v996 = -v853;
-            const V v997 = v909 - v848;
-            const V v998 = v910 - v849;
-            const V v999 = v911 - v850;
-            const V v1000 = -v854;
-            const V v1001 = v912 - v851;
-            const V v1002 = v913 - v852;
-            v983 = softehl_blend(m994, v968, v983);
-            v984 = softehl_blend(m994, v995, v984);
-            v985 = softehl_blend(m994, v997, v985);
-            v986 = softehl_blend(m994, v998, v986);
-            v987 = softehl_blend(m994, v999, v987);
-            v988 = softehl_blend(m994, v1001, v988);
-            v989 = softehl_blend(m994, v1002, v989);
-            v990 = softehl_blend(m994, v914, v990);
-            v991 = softehl_blend(m994, v915, v991);
-            v992 = softehl_blend(m994, v996, v992);
-            v993 = softehl_blend(m994, v1000, v993);
-        }
-        v970 = softehl_blend(m981, v983, v970);
-        v971 = softehl_blend(m981, v984, v971);
-        v972 = softehl_blend(m981, v985, v972);
-        v973 = softehl_blend(m981, v986, v973);
-        v974 = softehl_blend(m981, v987, v974);
-        v975 = softehl_blend(m981, v988, v975);
-        v976 = softehl_blend(m981, v989, v976);
-        v977 = softehl_blend(m981, v990, v977);
-        v978 = softehl_blend(m981, v991, v978);
-        v979 = softehl_blend(m981, v992, v979);
-        v980 = softehl_blend(m981, v993, v980);
-    }
-    const M m1003 = ~v969;
-    if (softehl_any(m1003)) {
-        const V v1004 = v846 - v907;
-        const V v1005 = v847 - v908;
-        const V v1006 = v848 - v909;
-        const V v1007 = v849 - v910;
-        const V v1008 = v850 - v911;
-        const V v1009 = v1004 * v1004;
-        const V v1010 = v851 - v912;
-        const V v1011 = v852 - v913;
-        const V v1012 = v1004 * v1009;
-        const V v1013 = 3.0 * v1009;
-        const V v1014 = v1005 * v1013;
-        const V v1015 = v1006 * v1013;
-        const V v1016 = v1007 * v1013;
-        const V v1017 = v1008 * v1013;
-        const V v1018 = v1010 * v1013;
-        const V v1019 = v1011 * v1013;
-        const V v1020 = v914 * v1013;
-        const V v1021 = v915 * v1013;
-        const V v1022 = v853 * v1013;
-        const V v1023 = v854 * v1013;
-        const V v1024 = -v1020;
-        const V v1025 = -v1021;
-        v970 = softehl_blend(m1003, v1012, v970);
-        v971 = softehl_blend(m1003, v1014, v971);
-        v972 = softehl_blend(m1003, v1015, v972);
-        v973 = softehl_blend(m1003, v1016, v973);
-        v974 = softehl_blend(m1003, v1017, v974);
-        v975 = softehl_blend(m1003, v1018, v975);
-        v976 = softehl_blend(m1003, v1019, v976);
-        v977 = softehl_blend(m1003, v1024, v977);
-        v978 = softehl_blend(m1003, v1025, v978);
-        v979 = softehl_blend(m1003, v1022, v979);
-        v980 = softehl_blend(m1003, v1023, v980);
-    }
-    const V v1026 = 0.5 * v971;
-    const V v1027 = 0.5 * v972;
-    const V v1028 = v846 + v907;
-    const V v1029 = v908 + v847;
-    const V v1030 = v909 + v848;
-    const V v1031 = 0.5 * v973;
-    const V v1032 = 0.5 * v974;
-    const V v1033 = 0.5 * v1028;
-    const V v1034 = v910 + v849;
-    const V v1035 = 0.5 * v1029;
-    const V v1036 = 0.5 * v1030;
-    const V v1037 = 0.5 * v975;
-    const V v1038 = 0.5 * v976;
-    const V v1039 = 0.5 * v1034;
-    const V v1040 = v911 + v850;
-    const V v1041 = 0.5 * v977;
-    const V v1042 = 0.5 * v978;
-    const V v1043 = 0.5 * v979;
-    const V v1044 = 0.5 * v1040;
-    const V v1045 = v912 + v851;
-    const V v1046 = 0.5 * v980;
-    const V v1047 = 0.5 * v914;
-    const V v1048 = v913 + v852;
-    const V v1049 = 0.5 * v915;
-    const V v1050 = 0.5 * v853;
-    const V v1051 = 0.5 * v1045;
-    const V v1052 = 0.5 * v854;
-    const V v1053 = 0.5 * v1048;
-    const V v1054 = 6.283185307179586 * a14;
-    const V v1055 = 0.5 * v970;
-    const V v1056 = 0.25 * v970;
-    V s1057 = softehl_splat(0.0);
-    V s1058 = softehl_splat(0.0);
-    V s1059 = softehl_splat(0.0);
-    V s1060 = softehl_splat(0.0);
-    V s1061 = softehl_splat(0.0);
-    V s1062 = softehl_splat(0.0);
-    V s1063 = softehl_splat(0.0);
-    V s1064 = softehl_splat(0.0);
-    V s1065 = softehl_splat(0.0);
-    V s1066 = softehl_splat(0.0);
-    V s1067 = softehl_splat(0.0);
-    V s1068 = softehl_splat(0.0);
-    V s1069 = softehl_splat(0.0);
-    V s1070 = softehl_splat(0.0);
-    V s1071 = softehl_splat(0.0);
-    V s1072 = softehl_splat(0.0);
-    V s1073 = softehl_splat(0.0);
-    V s1074 = softehl_splat(0.0);
-    V s1075 = softehl_splat(0.0);
-    V s1076 = softehl_splat(0.0);
-    V s1077 = softehl_splat(0.0);
-    V s1078 = softehl_splat(0.0);
-    V s1079 = softehl_splat(0.0);
-    V s1080 = softehl_splat(0.0);
-    V s1081 = softehl_splat(0.0);
-    V s1082 = softehl_splat(0.0);
-    V s1083 = softehl_splat(0.0);
-    V s1084 = softehl_splat(0.0);
-    V s1085 = softehl_splat(0.0);
-    V s1086 = softehl_splat(0.0);
-    V s1087 = softehl_splat(0.0);
-    V s1088 = softehl_splat(0.0);
-    V s1089 = softehl_splat(0.0);
-    V s1090 = softehl_splat(0.0);
-    V s1091 = softehl_splat(0.0);
-    V s1092 = softehl_splat(0.0);
-    V s1093 = softehl_splat(0.0);
-    V s1094 = softehl_splat(0.0);
-    V s1095 = softehl_splat(0.0);
-    V s1096 = softehl_splat(0.0);
-    V s1097 = softehl_splat(0.0);
-    V s1098 = softehl_splat(0.0);
-    V s1099 = softehl_splat(0.0);
-    V s1100 = softehl_splat(0.0);
-    V s1101 = softehl_splat(0.0);
-    V s1102 = softehl_splat(0.0);
-    V s1103 = softehl_splat(0.0);
-    V s1104 = softehl_splat(0.0);
-    V s1105 = softehl_splat(0.0);
-    V s1106 = softehl_splat(0.0);
-    V s1107 = softehl_splat(0.0);
-    V s1108 = softehl_splat(0.0);
-    V s1109 = softehl_splat(0.0);
-    V s1110 = softehl_splat(0.0);
-    V s1111 = softehl_splat(0.0);
-    V s1112 = softehl_splat(0.0);
-    V s1113 = softehl_splat(0.0);
-    V s1114 = softehl_splat(0.0);
-    V s1115 = softehl_splat(0.0);
-    V s1116 = softehl_splat(0.0);
-    V s1117 = softehl_splat(0.0);
-    V s1118 = softehl_splat(0.0);
-    V s1119 = softehl_splat(0.0);
-    V s1120 = softehl_splat(0.0);
-    V s1121 = softehl_splat(0.0);
-    V s1122 = softehl_splat(0.0);
-    V s1123 = softehl_splat(0.0);
-    V s1124 = softehl_splat(0.0);
-    V s1125 = softehl_splat(0.0);
-    V s1126 = softehl_splat(0.0);
-    V s1127 = softehl_splat(0.0);
-    V s1128 = softehl_splat(0.0);
-    V s1129 = softehl_splat(0.0);
-    V s1130 = softehl_splat(0.0);
-    V s1131 = softehl_splat(0.0);
-    V s1132 = softehl_splat(0.0);
-    V s1133 = softehl_splat(0.0);
-    V s1134 = softehl_splat(0.0);
-    V s1135 = softehl_splat(0.0);
-    V s1136 = softehl_splat(0.0);
-    V s1137 = softehl_splat(0.0);
-    V s1138 = softehl_splat(0.0);
-    V s1139 = softehl_splat(0.0);
-    V s1140 = softehl_splat(0.0);
-    V s1141 = softehl_splat(0.0);
-    V s1142 = softehl_splat(0.0);
-    V s1143 = softehl_splat(0.0);
-    V s1144 = softehl_splat(0.0);
-    V s1145 = softehl_splat(0.0);
-    V s1146 = softehl_splat(0.0);
-    V s1147 = softehl_splat(0.0);
-    V s1148 = softehl_splat(0.0);
-    V s1149 = softehl_splat(0.0);
-    V s1150 = softehl_splat(0.0);
-    V s1151 = softehl_splat(0.0);
-    V s1152 = softehl_splat(0.0);
-    V s1153 = softehl_splat(0.0);
-    V s1154 = softehl_splat(0.0);
-    V s1155 = softehl_splat(0.0);
-    V s1156 = softehl_splat(0.0);
-    V s1157 = softehl_splat(0.0);
-    V s1158 = softehl_splat(0.0);
-    V s1159 = softehl_splat(0.0);
-    V s1160 = softehl_splat(0.0);
-    V s1161 = softehl_splat(0.0);
-    V s1162 = softehl_splat(0.0);
-    V s1163 = softehl_splat(0.0);
-    V s1164 = softehl_splat(0.0);
-    V s1165 = softehl_splat(0.0);
-    V s1166 = softehl_splat(0.0);
-    V s1167 = softehl_splat(0.0);
-    V s1168 = softehl_splat(0.0);
-    V s1169 = softehl_splat(0.0);
-    V s1170 = softehl_splat(0.0);
-    V s1171 = softehl_splat(0.0);
-    V s1172 = softehl_splat(0.0);
-    V s1173 = softehl_splat(0.0);
-    V s1174 = softehl_splat(0.0);
-    V s1175 = softehl_splat(0.0);
-    V s1176 = softehl_splat(0.0);
-    V s1177 = softehl_splat(0.0);
-    V s1178 = softehl_splat(0.0);
-    V s1179 = softehl_splat(0.0);
-    V s1180 = softehl_splat(0.0);
-    V s1181 = softehl_splat(0.0);
-    V s1182 = softehl_splat(0.0);
-    V s1183 = softehl_splat(0.0);
-    V s1184 = softehl_splat(0.0);
-    V s1185 = softehl_splat(0.0);
-    V s1186 = softehl_splat(0.0);
-    V s1187 = softehl_splat(0.0);
-    V s1188 = softehl_splat(0.0);
-    V s1189 = softehl_splat(0.0);
-    V s1190 = softehl_splat(0.0);
-    V s1191 = softehl_splat(0.0);
-    V s1192 = softehl_splat(0.0);
-    V s1193 = softehl_splat(0.0);
-    V s1194 = softehl_splat(0.0);
-    V s1195 = softehl_splat(0.0);
-    V s1196 = softehl_splat(0.0);
-    V s1197 = softehl_splat(0.0);
-    V s1198 = softehl_splat(0.0);
-    V s1199 = softehl_splat(0.0);
-    V s1200 = softehl_splat(0.0);
-    V s1201 = softehl_splat(0.0);
-    V s1202 = softehl_splat(0.0);
-    V s1203 = softehl_splat(0.0);
-    V s1204 = softehl_splat(0.0);
-    V s1205 = softehl_splat(0.0);
-    V s1206 = softehl_splat(0.0);
-    V s1207 = softehl_splat(0.0);
-    V s1208 = softehl_splat(0.0);
-    V s1209 = softehl_splat(0.0);
-    V s1210 = softehl_splat(0.0);
-    V s1211 = softehl_splat(0.0);
-    V s1212 = softehl_splat(0.0);
-    V s1213 = softehl_splat(0.0);
-    V s1214 = softehl_splat(0.0);
-    V s1215 = softehl_splat(0.0);
-    V s1216 = softehl_splat(0.0);
-    V s1217 = softehl_splat(0.0);
-    V s1218 = softehl_splat(0.0);
-    V s1219 = softehl_splat(0.0);
-    V s1220 = softehl_splat(0.0);
-    V s1221 = softehl_splat(0.0);
-    V s1222 = softehl_splat(0.0);
-    V s1223 = softehl_splat(0.0);
-    V s1224 = softehl_splat(0.0);
-    V s1225 = softehl_splat(0.0);
-    V s1226 = softehl_splat(0.0);
-    V s1227 = softehl_splat(0.0);
-    V s1228 = softehl_splat(0.0);
-    V s1229 = softehl_splat(0.0);
-    V s1230 = softehl_splat(0.0);
-    V s1231 = softehl_splat(0.0);
-    V s1232 = softehl_splat(0.0);
-    V s1233 = softehl_splat(0.0);
-    V s1234 = softehl_splat(0.0);
-    V s1235 = softehl_splat(0.0);
-    V s1236 = softehl_splat(0.0);
-    V s1237 = softehl_splat(0.0);
-    V s1238 = softehl_splat(0.0);
-    V s1239 = softehl_splat(0.0);
-    V s1240 = softehl_splat(0.0);
-    V s1241 = softehl_splat(0.0);
-    V s1242 = softehl_splat(0.0);
-    V s1243 = softehl_splat(0.0);
-    V s1244 = softehl_splat(0.0);
-    V s1245 = softehl_splat(0.0);
-    V s1246 = softehl_splat(0.0);
-    V s1247 = softehl_splat(0.0);
-    V s1248 = softehl_splat(0.0);
-    V s1249 = softehl_splat(0.0);
-    V s1250 = softehl_splat(0.0);
-    V s1251 = softehl_splat(0.0);
-    V s1252 = softehl_splat(0.0);
-    V s1253 = softehl_splat(0.0);
-    V s1254 = softehl_splat(0.0);
-    V s1255 = softehl_splat(0.0);
-    V s1256 = softehl_splat(0.0);
-    V s1257 = softehl_splat(0.0);
-    V s1258 = softehl_splat(0.0);
-    V s1259 = softehl_splat(0.0);
-    V s1260 = softehl_splat(0.0);
-    V s1261 = softehl_splat(0.0);
-    V s1262 = softehl_splat(0.0);
-    for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const V v1263 = w[0] * v1041;
-        const V v1264 = v1263 + v1047;
-        const V v1265 = w[0] * v1042;
-        const V v1266 = v1265 + v1049;
-        const V v1267 = w[0] * v1031;
-        const V v1268 = v1267 + v1039;
-        const V v1269 = w[0] * v1032;
-        const V v1270 = v1269 + v1044;
-        const V v1271 = w[0] * v1037;
-        const V v1272 = v1271 + v1051;
-        const V v1273 = w[0] * v1038;
-        const V v1274 = v1273 + v1053;
-        const V v1275 = w[0] * v1026;
-        const V v1276 = v1275 + v1035;
-        const V v1277 = w[0] * v1027;
-        const V v1278 = v1277 + v1036;
-        const V v1279 = w[0] * v1043;
-        const V v1280 = v1279 + v1050;
-        const V v1281 = w[0] * v1046;
-        const V v1282 = v1281 + v1052;
-        const V v1283 = w[0] * v1055;
-        const V v1284 = v1283 + v1033;
-        const V v1285 = v40 * v1268;
-        const V v1286 = v40 * v1272;
-        const V v1287 = v40 * v1264;
-        const V v1288 = v40 * v1276;
-        const V v1289 = v40 * v1270;
-        const V v1290 = v40 * v1280;
-        const V v1291 = v40 * v1282;
-        const V v1292 = 0.5 * v1284;
-        const V v1293 = 2.0 * v1284;
-        const V v1294 = v15 * v1284;
-        const V v1295 = v18 * v1284;
-        const V v1296 = (-1.0) + v1284;
-        const V v1297 = 1.0 + v1284;
-        const V v1298 = 0.5 + v1284;
-        const V v1299 = (-0.5) + v1284;
-        const V v1300 = v1294 * v1296;
-        const V v1301 = v1284 + v1296;
-        const V v1302 = v1292 * v1296;
-        const V v1303 = v1292 - 0.5;
-        const V v1304 = v1284 + v1297;
-        const V v1305 = v1292 * v1297;
-        const V v1306 = v1295 * v1297;
-        const V v1307 = v1300 + v1306;
-        const V v1308 = 0.5 * v1301;
-        const V v1309 = 0.5 * v1304;
-        const V v1310 = X0 * v1299;
-        const V v1311 = X1 * v1299;
-        const V v1312 = v1289 + v1299;
-        const V v1313 = w[1] * v1305;
-        const V v1314 = w[1] * v1302;
-        const V v1315 = v11 * v1302;
-        const V v1316 = v24 * v1302;
-        const V v1317 = v11 * v1299;
-        const V v1318 = v24 * v1299;
-        const V v1319 = v11 * v1308;
-        const V v1320 = v24 * v1308;
-        const V v1321 = v3 * v1284;
-        const V v1322 = v1310 - v1321;
-        const V v1323 = v21 * v1284;
-        const V v1324 = v1311 - v1323;
-        const V v1325 = v1284 * v1284;
-        const V v1326 = 1.0 - v1325;
-        const V v1327 = v71 * v1305;
-        const V v1328 = v1315 + v1327;
-        const V v1329 = v25 * v1305;
-        const V v1330 = v1316 + v1329;
-        const V v1331 = v71 * v1298;
-        const V v1332 = v1331 + v1317;
-        const V v1333 = v25 * v1298;
-        const V v1334 = v1333 + v1318;
-        const V v1335 = X2 * v1298;
-        const V v1336 = v1335 + v1322;
-        const V v1337 = X3 * v1298;
-        const V v1338 = v1337 + v1324;
-        const V v1339 = v71 * v1309;
-        const V v1340 = v1319 + v1339;
-        const V v1341 = v25 * v1309;
-        const V v1342 = v1320 + v1341;
-        const V v1343 = w[1] * v1326;
-        const V v1344 = v1336 * v1336;
-        const V v1345 = v2 * v1326;
-        const V v1346 = v1345 + v1328;
-        const V v1347 = v2 * v1293;
-        const V v1348 = v1338 * v1338;
-        const V v1349 = v1344 + v1348;
-        const V v1350 = v22 * v1326;
-        const V v1351 = v1350 + v1330;
-        const V v1352 = v22 * v1293;
-        const V v1353 = X5 * v1326;
-        const V v1354 = v1353 + v1307;
-        const V v1355 = v1332 - v1347;
-        const V v1356 = v1340 - v1347;
-        const V v1357 = softehl_vsqrt(v1349);
-        const V v1358 = v1334 - v1352;
-        const V v1359 = v1342 - v1352;
-        const V v1360 = 6.283185307179586 * v1354;
-        const V v1361 = (-1.0) + v1360;
-        const V v1362 = v1346 - v80;
-        const V v1363 = 2.0 * v1355;
-        const V v1364 = v1351 - v42;
-        const V v1365 = v1355 * v1355;
-        const V v1366 = 2.0 * v1358;
-        const V v1367 = v1276 * v1356;
-        const V v1368 = v1326 + v1367;
-        const V v1369 = v1276 * v1359;
-        const V v1370 = v89 * v1276;
-        const V v1371 = v1358 * v1358;
-        const V v1372 = v1365 + v1371;
-        const V v1373 = a14 * v1361;
-        const V v1374 = 1.0 + v1373;
-        const V v1375 = v89 * v1270;
-        const V v1376 = v1270 * v1356;
-        const V v1377 = v1270 * v1359;
-        const V v1378 = v1302 + v1377;
-        const V v1379 = v89 * v1274;
-        const V v1380 = v1274 * v1356;
-        const V v1381 = v1370 - v1293;
-        const V v1382 = softehl_vsqrt(v1372);
-        const V v1383 = 1.0 / v1372;
-        const V v1384 = v89 * v1278;
-        const V v1385 = v1278 * v1356;
-        const V v1386 = v89 * v1264;
-        const V v1387 = v1264 * v1356;
-        const V v1388 = v1264 * v1359;
-        const V v1389 = v89 * v1266;
-        const V v1390 = v1266 * v1356;
-        const V v1391 = v1266 * v1359;
-        const V v1392 = v40 * v1266;
-        const V v1393 = v40 * v1278;
-        const V v1394 = v1278 * v1359;
-        const V v1395 = v1326 + v1394;
-        const V v1396 = v40 * v1274;
-        const V v1397 = v1396 + v1298;
-        const V v1398 = v1274 * v1359;
-        const V v1399 = v1305 + v1398;
-        const V v1400 = v1393 - v1293;
-        const V v1401 = v89 * v1280;
-        const V v1402 = v1280 * v1356;
-        const V v1403 = v1280 * v1359;
-        const V v1404 = v1055 * v1357;
-        const V v1405 = v89 * v1282;
-        const V v1406 = v1282 * v1356;
-        const V v1407 = v1282 * v1359;
-        const V v1408 = v1374 * v1404;
-        const V v1409 = softehl_vsqrt(v1383);
-        const V v1410 = v1268 * v1359;
-        const V v1411 = v1272 * v1359;
-        const V v1412 = v89 * v1268;
-        const V v1413 = v1412 + v1299;
-        const V v1414 = v89 * v1272;
-        const V v1415 = v1414 + v1298;
-        const V v1416 = v1268 * v1356;
-        const V v1417 = v1302 + v1416;
-        const V v1418 = v1272 * v1356;
-        const V v1419 = v1305 + v1418;
-        const V v1420 = 0.5 - v1292;
-        const V v1421 = 0.5 + v1292;
-        const V v1422 = 1.0 / v1382;
-        const V v1423 = d10 * v1420;
-        const V v1424 = v57 * v1420;
-        const V v1425 = v57 * v1421;
-        const V v1426 = d12 * v1421;
-        const V v1427 = v1423 + v1426;
-        const V v1428 = v1424 * v1408;
-        const V v1429 = v1425 * v1408;
-        const V v1430 = 0.5 * v1409;
-        const V v1431 = v1363 * v1430;
-        const V v1432 = v1366 * v1430;
-        const V v1433 = v1422 * v1422;
-        const V v1434 = v1431 * v1433;
-        const V v1435 = v1432 * v1433;
-        const V v1436 = w[1] * v1428;
-        const V v1437 = w[1] * v1429;
-        const V v1438 = v1355 * v1434;
-        const V v1439 = v1422 - v1438;
-        const V v1440 = v1355 * v1422;
-        const V v1441 = v1355 * v1435;
-        const V v1442 = v1358 * v1422;
-        const V v1443 = v1358 * v1435;
-        const V v1444 = v1422 - v1443;
-        const V v1445 = v1358 * v1434;
-        const V v1446 = 0.5 * v1440;
-        const V v1447 = 0.5 * v1442;
-        const V v1448 = v1442 * v1408;
-        const V v1449 = v1440 * v1408;
-        const V v1450 = v83 * v1442;
-        const V v1451 = v46 * v1440;
-        const V v1452 = v1450 - v1451;
-        const V v1453 = 0.5 * v1452;
-        const V v1454 = v95 * v1440;
-        const V v1455 = v1362 * v1440;
-        const V v1456 = v1440 * v1410;
-        const V v1457 = v1440 * v1411;
-        const V v1458 = v1440 * v1369;
-        const V v1459 = v1440 * v1388;
-        const V v1460 = v1440 * v1403;
-        const V v1461 = v1440 * v1378;
-        const V v1462 = v1440 * v1399;
-        const V v1463 = v1440 * v1395;
-        const V v1464 = v1442 * v1376;
-        const V v1465 = v1461 - v1464;
-        const V v1466 = v1442 * v1380;
-        const V v1467 = v1462 - v1466;
-        const V v1468 = v1442 * v1368;
-        const V v1469 = v1458 - v1468;
-        const V v1470 = v1442 * v1385;
-        const V v1471 = v1463 - v1470;
-        const V v1472 = v52 * v1442;
-        const V v1473 = v1454 + v1472;
-        const V v1474 = 1.0 / v1473;
-        const V v1475 = v1364 * v1442;
-        const V v1476 = v1455 + v1475;
-        const V v1477 = 0.5 * v1476;
-        const V v1478 = v1446 * v1476;
-        const V v1479 = v1447 * v1476;
-        const V v1480 = v1442 * v1417;
-        const V v1481 = v1456 - v1480;
-        const V v1482 = v1442 * v1419;
-        const V v1483 = v1457 - v1482;
-        const V v1484 = v1474 * v1477;
-        const V v1485 = v1474 * v1474;
-        const V v1486 = v1485 * v1478;
-        const V v1487 = v1485 * v1479;
-        const V v1488 = v52 * v1444;
-        const V v1489 = v1364 * v1444;
-        const V v1490 = v1442 * v1474;
-        const V v1491 = v95 * v1439;
-        const V v1492 = v1362 * v1439;
-        const V v1493 = v95 * v1441;
-        const V v1494 = v1488 - v1493;
-        const V v1495 = v1362 * v1441;
-        const V v1496 = v1489 - v1495;
-        const V v1497 = v52 * v1445;
-        const V v1498 = v1491 - v1497;
-        const V v1499 = v1364 * v1445;
-        const V v1500 = v1492 - v1499;
-        const V v1501 = v1476 * v1498;
-        const V v1502 = v1476 * v1494;
-        const V v1503 = v1474 * v1500;
-        const V v1504 = v1485 * v1501;
-        const V v1505 = v1503 - v1504;
-        const V v1506 = v1474 * v1496;
-        const V v1507 = v1485 * v1502;
-        const V v1508 = v1506 - v1507;
-        const V v1509 = v1440 * v1474;
-        const V v1510 = 0.5 * v1509;
-        const V v1511 = 0.5 * v1490;
-        const V v1512 = v1486 - v1510;
-        const V v1513 = v1417 * v1509;
-        const V v1514 = v1376 * v1509;
-        const V v1515 = v1419 * v1509;
-        const V v1516 = v1380 * v1509;
-        const V v1517 = v1368 * v1509;
-        const V v1518 = v1385 * v1509;
-        const V v1519 = v1391 * v1490;
-        const V v1520 = v1403 * v1490;
-        const V v1521 = v1407 * v1490;
-        const V v1522 = v1520 - v1510;
-        const V v1523 = 0.5 - v1484;
-        const V v1524 = 0.5 + v1484;
-        const V v1525 = v1519 - v1511;
-        const V v1526 = v1521 - v1511;
-        const V v1527 = v1410 * v1490;
-        const V v1528 = v1513 + v1527;
-        const V v1529 = v1378 * v1490;
-        const V v1530 = v1514 + v1529;
-        const V v1531 = v1411 * v1490;
-        const V v1532 = v1515 + v1531;
-        const V v1533 = v1399 * v1490;
-        const V v1534 = v1516 + v1533;
-        const V v1535 = v1369 * v1490;
-        const V v1536 = v1517 + v1535;
-        const V v1537 = v1395 * v1490;
-        const V v1538 = v1518 + v1537;
-        const V v1539 = v1388 * v1490;
-        const V v1540 = v1539 + v1512;
-        const V v1541 = v74 * v1523;
-        const V v1542 = v27 * v1523;
-        const V v1543 = v1522 - v1486;
-        const V v1544 = v1523 - v1387;
-        const V v1545 = v1541 - v1346;
-        const V v1546 = v1387 * v1509;
-        const V v1547 = v1546 + v1540;
-        const V v1548 = v1524 - v1402;
-        const V v1549 = v1402 * v1509;
-        const V v1550 = v1549 + v1543;
-        const V v1551 = v1542 - v1351;
-        const V v1552 = v79 * v1524;
-        const V v1553 = v1552 + v1545;
-        const V v1554 = v1391 - v1523;
-        const V v1555 = w[1] * v1523;
-        const V v1556 = w[1] * v1524;
-        const V v1557 = v36 * v1524;
-        const V v1558 = v1557 + v1551;
-        const V v1559 = v1407 - v1524;
-        const V v1560 = v1444 * v1553;
-        const V v1561 = v1445 * v1553;
-        const V v1562 = v1442 * v1553;
-        const V v1563 = v1440 * v1554;
-        const V v1564 = v1440 * v1559;
-        const V v1565 = v1440 * v1558;
-        const V v1566 = v1562 - v1565;
-        const V v1567 = v1442 * v1544;
-        const V v1568 = v1459 + v1567;
-        const V v1569 = v1439 * v1558;
-        const V v1570 = v1561 + v1569;
-        const V v1571 = v1441 * v1558;
-        const V v1572 = v1560 + v1571;
-        const V v1573 = v1442 * v1548;
-        const V v1574 = v1460 + v1573;
-        const V v1575 = a10 * v1566;
-        const V v1576 = v1442 * v1390;
-        const V v1577 = v1563 - v1576;
-        const V v1578 = v1390 * v1509;
-        const V v1579 = v1578 + v1525;
-        const V v1580 = v1442 * v1406;
-        const V v1581 = v1564 - v1580;
-        const V v1582 = v1406 * v1509;
-        const V v1583 = v1582 + v1526;
-        const V v1584 = v1386 * v1570;
-        const V v1585 = v1568 - v1584;
-        const V v1586 = v1386 * v1505;
-        const V v1587 = v1586 + v1547;
-        const V v1588 = v1384 * v1505;
-        const V v1589 = v1588 + v1538;
-        const V v1590 = v1384 * v1570;
-        const V v1591 = v1471 - v1590;
-        const V v1592 = v1427 - v1575;
-        const V v1593 = v1487 + v1579;
-        const V v1594 = v1583 - v1487;
-        const V v1595 = v1392 * v1572;
-        const V v1596 = v1577 + v1595;
-        const V v1597 = v1287 * v1572;
-        const V v1598 = v1585 + v1597;
-        const V v1599 = v1287 * v1508;
-        const V v1600 = v1599 + v1587;
-        const V v1601 = v1392 * v1508;
-        const V v1602 = v1601 + v1593;
-        const M v1603 = softehl_eq(v1592, v1592);
-        const V v1604 = v1400 * v1508;
-        const V v1605 = v1604 + v1589;
-        const V v1606 = v1400 * v1572;
-        const V v1607 = v1591 + v1606;
-        const V v1608 = v1453 * v1600;
-        const V v1609 = v1598 + v1608;
-        const V v1610 = v1605 * v1453;
-        const V v1611 = v1610 + v1607;
-        const V v1612 = v1405 * v1505;
-        const V v1613 = v1612 + v1594;
-        const V v1614 = v1405 * v1570;
-        const V v1615 = v1581 - v1614;
-        const V v1616 = v1389 * v1505;
-        const V v1617 = v1616 + v1602;
-        const V v1618 = v1389 * v1570;
-        const V v1619 = v1596 - v1618;
-        const V v1620 = v1453 * v1617;
-        const V v1621 = v1619 + v1620;
-        const V v1622 = v1290 * v1572;
-        const V v1623 = v1574 + v1622;
-        const V v1624 = v1290 * v1508;
-        const V v1625 = v1624 + v1550;
-        const V v1626 = v1291 * v1508;
-        const V v1627 = v1626 + v1613;
-        const V v1628 = v1291 * v1572;
-        const V v1629 = v1615 + v1628;
-        const V v1630 = v1453 * v1627;
-        const V v1631 = v1629 + v1630;
-        const V v1632 = v1401 * v1505;
-        const V v1633 = v1632 + v1625;
-        const V v1634 = v1401 * v1570;
-        const V v1635 = v1623 - v1634;
-        const V v1636 = v1453 * v1633;
-        const V v1637 = v1635 + v1636;
-        const V v1638 = v1413 * v1505;
-        const V v1639 = v1638 + v1528;
-        const V v1640 = v1413 * v1570;
-        const V v1641 = v1481 - v1640;
-        const V v1642 = v1285 * v1508;
-        const V v1643 = v1642 + v1639;
-        const V v1644 = v1285 * v1572;
-        const V v1645 = v1641 + v1644;
-        const V v1646 = v1643 * v1453;
-        const V v1647 = v1646 + v1645;
-        const V v1648 = v1375 * v1505;
-        const V v1649 = v1648 + v1530;
-        const V v1650 = v1375 * v1570;
-        const V v1651 = v1465 - v1650;
-        const V v1652 = v1312 * v1508;
-        const V v1653 = v1652 + v1649;
-        const V v1654 = v1312 * v1572;
-        const V v1655 = v1651 + v1654;
-        const V v1656 = v1653 * v1453;
-        const V v1657 = v1656 + v1655;
-        const V v1658 = v1415 * v1505;
-        const V v1659 = v1658 + v1532;
-        const V v1660 = v1415 * v1570;
-        const V v1661 = v1483 - v1660;
-        const V v1662 = v1286 * v1508;
-        const V v1663 = v1662 + v1659;
-        const V v1664 = v1286 * v1572;
-        const V v1665 = v1661 + v1664;
-        const V v1666 = v1663 * v1453;
-        const V v1667 = v1666 + v1665;
-        const V v1668 = v1379 * v1505;
-        const V v1669 = v1668 + v1534;
-        const V v1670 = v1379 * v1570;
-        const V v1671 = v1467 - v1670;
-        const V v1672 = v1381 * v1505;
-        const V v1673 = v1672 + v1536;
-        const V v1674 = v1381 * v1570;
-        const V v1675 = v1469 - v1674;
-        const V v1676 = v1397 * v1508;
-        const V v1677 = v1676 + v1669;
-        const V v1678 = v1397 * v1572;
-        const V v1679 = v1671 + v1678;
-        const V v1680 = v1288 * v1508;
-        const V v1681 = v1680 + v1673;
-        const V v1682 = v1288 * v1572;
-        const V v1683 = v1675 + v1682;
-        const V v1684 = v1677 * v1453;
-        const V v1685 = v1684 + v1679;
-        const V v1686 = v1681 * v1453;
-        const V v1687 = v1686 + v1683;
-        V v1688 = softehl_splat(0.0);
-        V v1689 = softehl_splat(0.0);
-        V v1690 = softehl_splat(0.0);
-        V v1691 = softehl_splat(0.0);
-        V v1692 = softehl_splat(0.0);
-        V v1693 = softehl_splat(0.0);
-        V v1694 = softehl_splat(0.0);
-        V v1695 = softehl_splat(0.0);
-        V v1696 = softehl_splat(0.0);
-        V v1697 = softehl_splat(0.0);
-        V v1698 = softehl_splat(0.0);
-        V v1699 = softehl_splat(0.0);
-        V v1700 = softehl_splat(0.0);
-        V v1701 = softehl_splat(0.0);
-        V v1702 = softehl_splat(0.0);
-        V v1703 = softehl_splat(0.0);
-        V v1704 = softehl_splat(0.0);
-        V v1705 = softehl_splat(0.0);
-        V v1706 = softehl_splat(0.0);
-        V v1707 = softehl_splat(0.0);
-        V v1708 = softehl_splat(0.0);
-        V v1709 = softehl_splat(0.0);
-        V v1710 = softehl_splat(0.0);
-        V v1711 = softehl_splat(0.0);
-        V v1712 = softehl_splat(0.0);
-        V v1713 = softehl_splat(0.0);
-        V v1714 = softehl_splat(0.0);
-        V v1715 = softehl_splat(0.0);
-        V v1716 = softehl_splat(0.0);
-        V v1717 = softehl_splat(0.0);
-        V v1718 = softehl_splat(0.0);
-        V v1719 = softehl_splat(0.0);
-        V v1720 = softehl_splat(0.0);
-        V v1721 = softehl_splat(0.0);
-        V v1722 = softehl_splat(0.0);
-        V v1723 = softehl_splat(0.0);
-        V v1724 = softehl_splat(0.0);
-        V v1725 = softehl_splat(0.0);
-        V v1726 = softehl_splat(0.0);
-        V v1727 = softehl_splat(0.0);
-        V v1728 = softehl_splat(0.0);
-        V v1729 = softehl_splat(0.0);
-        V v1730 = softehl_splat(0.0);
-        V v1731 = softehl_splat(0.0);
-        V v1732 = softehl_splat(0.0);
-        V v1733 = softehl_splat(0.0);
-        V v1734 = softehl_splat(0.0);
-        V v1735 = softehl_splat(0.0);
-        V v1736 = softehl_splat(0.0);
-        V v1737 = softehl_splat(0.0);
-        V v1738 = softehl_splat(0.0);
-        V v1739 = softehl_splat(0.0);
-        V v1740 = softehl_splat(0.0);
-        V v1741 = softehl_splat(0.0);
-        V v1742 = softehl_splat(0.0);
-        const M m1743 = v1603;
-        if (softehl_any(m1743)) {
-            const M v1744 = softehl_le(softehl_splat(0.0), v1592);
-            V v1745 = softehl_splat(0.0);
-            V v1746 = softehl_splat(0.0);
-            V v1747 = softehl_splat(0.0);
-            V v1748 = softehl_splat(0.0);
-            V v1749 = softehl_splat(0.0);
-            V v1750 = softehl_splat(0.0);
-            V v1751 = softehl_splat(0.0);
-            V v1752 = softehl_splat(0.0);
-            V v1753 = softehl_splat(0.0);
-            V v1754 = softehl_splat(0.0);
-            V v1755 = softehl_splat(0.0);
-            V v1756 = softehl_splat(0.0);
-            V v1757 = softehl_splat(0.0);
-            V v1758 = softehl_splat(0.0);
-            V v1759 = softehl_splat(0.0);
-            V v1760 = softehl_splat(0.0);
-            V v1761 = softehl_splat(0.0);
-            V v1762 = softehl_splat(0.0);
-            V v1763 = softehl_splat(0.0);
-            V v1764 = softehl_splat(0.0);
-            V v1765 = softehl_splat(0.0);
-            V v1766 = softehl_splat(0.0);
-            V v1767 = softehl_splat(0.0);
-            V v1768 = softehl_splat(0.0);
-            V v1769 = softehl_splat(0.0);
-            V v1770 = softehl_splat(0.0);
-            V v1771 = softehl_splat(0.0);
-            V v1772 = softehl_splat(0.0);
-            V v1773 = softehl_splat(0.0);
-            V v1774 = softehl_splat(0.0);
-            V v1775 = softehl_splat(0.0);
-            V v1776 = softehl_splat(0.0);
-            V v1777 = softehl_splat(0.0);
-            V v1778 = softehl_splat(0.0);
-            V v1779 = softehl_splat(0.0);
-            V v1780 = softehl_splat(0.0);
-            V v1781 = softehl_splat(0.0);
-            V v1782 = softehl_splat(0.0);
-            V v1783 = softehl_splat(0.0);
-            V v1784 = softehl_splat(0.0);
-            V v1785 = softehl_splat(0.0);
-            V v1786 = softehl_splat(0.0);
-            V v1787 = softehl_splat(0.0);
-            const M m1788 = v1744 & m1743;
-            if (softehl_any(m1788)) {
-                const V v1789 = a12 + v1566;
-                const V v1790 = v1566 - a13;
-                const V v1791 = v1789 * v1790;
-                const M v1792 = softehl_eq(v1791, v1791);
-                V v1793 = softehl_splat(0.0);
-                V v1794 = softehl_splat(0.0);
-                V v1795 = softehl_splat(0.0);
-                V v1796 = softehl_splat(0.0);
-                V v1797 = softehl_splat(0.0);
-                const M m1798 = v1792 & m1788;
-                if (softehl_any(m1798)) {
-                    const M v1799 = softehl_lt(v1791, softehl_splat(0.0));
-                    const V v1800 = softehl_blend(v1799, v1592, softehl_splat(0.0));
-                    const V v1801 = softehl_blend(v1799, v1420, softehl_splat(0.0));
-                    const V v1802 = softehl_blend(v1799, v1421, softehl_splat(0.0));
-                    const V v1803 = softehl_blend(v1799, v58, softehl_splat(0.0));
-                    const V v1804 = softehl_blend(v1799, v66, softehl_splat(0.0));
-                    v1793 = softehl_blend(m1798, v1800, v1793);
-                    v1794 = softehl_blend(m1798, v1801, v1794);
-                    v1795 = softehl_blend(m1798, v1802, v1795);
-                    v1796 = softehl_blend(m1798, v1803, v1796);
-                    v1797 = softehl_blend(m1798, v1804, v1797);
-                }
-                const M m1805 = ~v1792 & m1788;
-                if (softehl_any(m1805)) {
-                    const V v1806 = v1791 * v1791;
-                    const V v1807 = v1789 + v1790;
-                    const V v1808 = v1791 * v1806;
-                    const V v1809 = 3.0 * v1806;
-                    const V v1810 = v1809 * v1807;
-                    v1793 = softehl_blend(m1805, v1808, v1793);
-                    v1794 = softehl_blend(m1805, softehl_splat(0.0), v1794);
-                    v1795 = softehl_blend(m1805, softehl_splat(0.0), v1795);
-                    v1796 = softehl_blend(m1805, v1810, v1796);
-                    v1797 = softehl_blend(m1805, softehl_splat(0.0), v1797);
-                }
-                const V v1811 = d11 * v1420;
-                const V v1812 = a11 * v1793;
-                const V v1813 = v8 * v1523;
-                const V v1814 = v23 * v1523;
-                const M v1815 = softehl_eq(v1812, v1812);
-                const V v1816 = d13 * v1421;
-                const V v1817 = v1811 + v1816;
-                const V v1818 = v5 * v1302;
-                const V v1819 = v1813 - v1818;
-                const V v1820 = v14 * v1302;
-                const V v1821 = v1814 - v1820;
-                const V v1822 = v6 * v1305;
-                const V v1823 = v1819 - v1822;
-                const V v1824 = v16 * v1305;
-                const V v1825 = v1821 - v1824;
-                const V v1826 = v4 * v1326;
-                const V v1827 = v1823 - v1826;
-                const V v1828 = v20 * v1326;
-                const V v1829 = v1825 - v1828;
-                const V v1830 = v9 * v1524;
-                const V v1831 = v1830 + v1827;
-                const V v1832 = v29 * v1524;
-                const V v1833 = v1832 + v1829;
-                const V v1834 = v1440 * v1831;
-                const V v1835 = v1442 * v1833;
-                const V v1836 = v1834 + v1835;
-                const V v1837 = a10 * v1836;
-                const V v1838 = v1817 + v1837;
-                const M v1839 = softehl_eq(v1838, v1838);
-                const M v1840 = v1815 & v1839;
-                V v1841 = softehl_splat(0.0);
-                V v1842 = softehl_splat(0.0);
-                V v1843 = softehl_splat(0.0);
-                V v1844 = softehl_splat(0.0);
-                V v1845 = softehl_splat(0.0);
-                V v1846 = softehl_splat(0.0);
-                const M m1847 = v1840 & m1788;
-                if (softehl_any(m1847)) {
-                    const M v1848 = softehl_lt(v1812, v1838);
-                    V v1849 = v1812;
-                    V v1850 = softehl_splat(0.0);
-                    V v1851 = softehl_splat(0.0);
-                    V v1852 = a11;
-                    V v1853 = softehl_splat(0.0);
-                    V v1854 = softehl_splat(0.0);
-                    const M m1855 = ~v1848 & m1847;
-                    if (softehl_any(m1855)) {
-                        V v1856 = softehl_splat(0.0);
-                        V v1857 = softehl_splat(0.0);
-                        V v1858 = softehl_splat(0.0);
-                        V v1859 = softehl_splat(0.0);
-                        V v1860 = softehl_splat(0.0);
-                        V v1861 = softehl_splat(0.0);
-                        const M m1862 = v1815 & m1855;
-                        if (softehl_any(m1862)) {
-                            const V v1863 = -v1838;
-                            const M v1864 = softehl_lt(v1812, v1863);
-                            V v1865 = v1838;
-                            V v1866 = v1420;
-                            V v1867 = v1421;
-                            V v1868 = softehl_splat(0.0);
-                            V v1869 = a10;
-                            V v1870 = v70;
-                            const M m1871 = v1864 & m1862;
-                            if (softehl_any(m1871)) {
-                                const V v1872 = -v1812;
-                                v1865 = softehl_blend(m1871, v1872, v1865);
-                                v1866 = softehl_blend(m1871, softehl_splat(0.0), v1866);
-                                v1867 = softehl_blend(m1871, softehl_splat(0.0), v1867);
-                                v1868 = softehl_blend(m1871, v1, v1868);
-                                v1869 = softehl_blend(m1871, softehl_splat(0.0), v1869);
-                                v1870 = softehl_blend(m1871, softehl_splat(0.0), v1870);
-                            }
-                            v1856 = softehl_blend(m1862, v1865, v1856);
-                            v1857 = softehl_blend(m1862, v1866, v1857);
-                            v1858 = softehl_blend(m1862, v1867, v1858);
-                            v1859 = softehl_blend(m1862, v1868, v1859);
-                            v1860 = softehl_blend(m1862, v1869, v1860);
-                            v1861 = softehl_blend(m1862, v1870, v1861);
-                        }
-                        const M m1873 = ~v1815 & m1855;
-                        if (softehl_any(m1873)) {
-                            const V v1874 = v1838 + v1812;
-                            const V v1875 = v1874 * v1874;
-                            const V v1876 = v1874 * v1875;
-                            const V v1877 = 3.0 * v1875;
-                            const V v1878 = v70 * v1877;
-                            const V v1879 = a11 * v1877;
-                            const V v1880 = a10 * v1877;
-                            const V v1881 = v1420 * v1877;
-                            const V v1882 = v1421 * v1877;
-                            v1856 = softehl_blend(m1873, v1876, v1856);
-                            v1857 = softehl_blend(m1873, v1881, v1857);
-                            v1858 = softehl_blend(m1873, v1882, v1858);
-                            v1859 = softehl_blend(m1873, v1879, v1859);
-                            v1860 = softehl_blend(m1873, v1880, v1860);
-                            v1861 = softehl_blend(m1873, v1878, v1861);
-                        }
-                        v1849 = softehl_blend(m1855, v1856, v1849);
-                        v1850 = softehl_blend(m1855, v1857, v1850);
-                        v1851 = softehl_blend(m1855, v1858, v1851);
-                        v1852 = softehl_blend(m1855, v1859, v1852);
-                        v1853 = softehl_blend(m1855, v1860, v1853);
-                        v1854 = softehl_blend(m1855, v1861, v1854);
-                    }
-                    v1841 = softehl_blend(m1847, v1849, v1841);
-                    v1842 = softehl_blend(m1847, v1850, v1842);
-                    v1843 = softehl_blend(m1847, v1851, v1843);
-                    v1844 = softehl_blend(m1847, v1852, v1844);
-                    v1845 = softehl_blend(m1847, v1853, v1845);
-                    v1846 = softehl_blend(m1847, v1854, v1846);
-                }
-                const M m1883 = ~v1840 & m1788;
-                if (softehl_any(m1883)) {
-                    const V v1884 = v1812 - v1838;
-                    const V v1885 = v1884 * v1884;
-                    const V v1886 = v1884 * v1885;
-                    const V v1887 = 3.0 * v1885;
-                    const V v1888 = v69 * v1887;
-                    const V v1889 = a11 * v1887;
-                    const V v1890 = a10 * v1887;
-                    const V v1891 = -v1890;
-                    const V v1892 = v1303 * v1887;
-                    const V v1893 = v1421 * v1887;
-                    const V v1894 = -v1893;
-                    v1841 = softehl_blend(m1883, v1886, v1841);
-                    v1842 = softehl_blend(m1883, v1892, v1842);
-                    v1843 = softehl_blend(m1883, v1894, v1843);
-                    v1844 = softehl_blend(m1883, v1889, v1844);
-                    v1845 = softehl_blend(m1883, v1891, v1845);
-                    v1846 = softehl_blend(m1883, v1888, v1846);
-                }
-                const V v1895 = v4 * v1293;
-                const V v1896 = v20 * v1293;
-                const V v1897 = v1794 * v1844;
-                const V v1898 = v1795 * v1844;
-                const V v1899 = v1439 * v1831;
-                const V v1900 = v1444 * v1833;
-                const V v1901 = v1445 * v1833;
-                const V v1902 = v1899 - v1901;
-                const V v1903 = v1441 * v1831;
-                const V v1904 = v1900 - v1903;
-                const V v1905 = v5 * v1308;
-                const V v1906 = v1895 - v1905;
-                const V v1907 = v14 * v1308;
-                const V v1908 = v1896 - v1907;
-                const V v1909 = v1413 * v1902;
-                const V v1910 = v1375 * v1902;
-                const V v1911 = v1415 * v1902;
-                const V v1912 = v1379 * v1902;
-                const V v1913 = v1381 * v1902;
-                const V v1914 = v1384 * v1902;
-                const V v1915 = v6 * v1309;
-                const V v1916 = v1906 - v1915;
-                const V v1917 = v16 * v1309;
-                const V v1918 = v1908 - v1917;
-                const V v1919 = v1386 * v1902;
-                const V v1920 = v1389 * v1902;
-                const V v1921 = v1401 * v1902;
-                const V v1922 = v1405 * v1902;
-                const V v1923 = v1285 * v1904;
-                const V v1924 = v1909 + v1923;
-                const V v1925 = v1312 * v1904;
-                const V v1926 = v1910 + v1925;
-                const V v1927 = v1286 * v1904;
-                const V v1928 = v1911 + v1927;
-                const V v1929 = v1397 * v1904;
-                const V v1930 = v1912 + v1929;
-                const V v1931 = v1288 * v1904;
-                const V v1932 = v1913 + v1931;
-                const V v1933 = v1400 * v1904;
-                const V v1934 = v1914 + v1933;
-                const V v1935 = v1287 * v1904;
-                const V v1936 = v1919 + v1935;
-                const V v1937 = v1392 * v1904;
-                const V v1938 = v1920 + v1937;
-                const V v1939 = v1290 * v1904;
-                const V v1940 = v1921 + v1939;
-                const V v1941 = v1291 * v1904;
-                const V v1942 = v1922 + v1941;
-                const V v1943 = v1916 * v1440;
-                const V v1944 = v12 * v1440;
-                const V v1945 = v1918 * v1442;
-                const V v1946 = v1943 + v1945;
-                const V v1947 = v35 * v1442;
-                const V v1948 = v1944 + v1947;
-                const V v1949 = 0.5 * v1948;
-                const V v1950 = v1796 * v1647;
-                const V v1951 = v1796 * v1657;
-                const V v1952 = v1796 * v1667;
-                const V v1953 = v1796 * v1685;
-                const V v1954 = v1796 * v1687;
-                const V v1955 = v1796 * v1611;
-                const V v1956 = v1796 * v1609;
-                const V v1957 = v1796 * v1621;
-                const V v1958 = v1796 * v1637;
-                const V v1959 = v1796 * v1631;
-                const V v1960 = v1264 * v1946;
-                const V v1961 = v1960 + v1936;
-                const V v1962 = v1264 * v1797;
-                const V v1963 = v1962 + v1956;
-                const V v1964 = v1268 * v1797;
-                const V v1965 = v1964 + v1950;
-                const V v1966 = v1268 * v1946;
-                const V v1967 = v1966 + v1924;
-                const V v1968 = v1627 * v1949;
-                const V v1969 = v1968 + v1942;
-                const V v1970 = v1270 * v1797;
-                const V v1971 = v1970 + v1951;
-                const V v1972 = v1270 * v1946;
-                const V v1973 = v1972 + v1926;
-                const V v1974 = v1600 * v1949;
-                const V v1975 = v1974 + v1961;
-                const V v1976 = v1643 * v1949;
-                const V v1977 = v1976 + v1967;
-                const V v1978 = v1274 * v1797;
-                const V v1979 = v1978 + v1953;
-                const V v1980 = v1274 * v1946;
-                const V v1981 = v1980 + v1930;
-                const V v1982 = v1653 * v1949;
-                const V v1983 = v1982 + v1973;
-                const V v1984 = v1282 * v1946;
-                const V v1985 = v1984 + v1969;
-                const V v1986 = v1282 * v1797;
-                const V v1987 = v1986 + v1959;
-                const V v1988 = v1266 * v1797;
-                const V v1989 = v1988 + v1957;
-                const V v1990 = v1266 * v1946;
-                const V v1991 = v1990 + v1938;
-                const V v1992 = v1677 * v1949;
-                const V v1993 = v1992 + v1981;
-                const V v1994 = v1845 * v1977;
-                const V v1995 = v1845 * v1975;
-                const V v1996 = v1845 * v1983;
-                const V v1997 = v1845 * v1985;
-                const V v1998 = v1617 * v1949;
-                const V v1999 = v1998 + v1991;
-                const V v2000 = v1845 * v1993;
-                const V v2001 = v1844 * v1965;
-                const V v2002 = v2001 + v1994;
-                const V v2003 = v1844 * v1963;
-                const V v2004 = v2003 + v1995;
-                const V v2005 = v1844 * v1971;
-                const V v2006 = v2005 + v1996;
-                const V v2007 = v1844 * v1987;
-                const V v2008 = v2007 + v1997;
-                const V v2009 = v1844 * v1989;
-                const V v2010 = v1844 * v1979;
-                const V v2011 = v2010 + v2000;
-                const V v2012 = v1845 * v1999;
-                const V v2013 = v2009 + v2012;
-                const V v2014 = v1663 * v1949;
-                const V v2015 = v2014 + v1928;
-                const V v2016 = v1681 * v1949;
-                const V v2017 = v2016 + v1932;
-                const V v2018 = v1605 * v1949;
-                const V v2019 = v2018 + v1934;
-                const V v2020 = v1633 * v1949;
-                const V v2021 = v2020 + v1940;
-                const V v2022 = v1272 * v1946;
-                const V v2023 = v2022 + v2015;
-                const V v2024 = v1272 * v1797;
-                const V v2025 = v2024 + v1952;
-                const V v2026 = v1276 * v1946;
-                const V v2027 = v2026 + v2017;
-                const V v2028 = v1276 * v1797;
-                const V v2029 = v2028 + v1954;
-                const V v2030 = v1845 * v2023;
-                const V v2031 = v1278 * v1946;
-                const V v2032 = v2031 + v2019;
-                const V v2033 = v1280 * v1946;
-                const V v2034 = v2033 + v2021;
-                const V v2035 = v1278 * v1797;
-                const V v2036 = v2035 + v1955;
-                const V v2037 = v1280 * v1797;
-                const V v2038 = v2037 + v1958;
-                const V v2039 = v1845 * v2027;
-                const V v2040 = v1845 * v2032;
-                const V v2041 = v1845 * v2034;
-                const V v2042 = v1844 * v2025;
-                const V v2043 = v2042 + v2030;
-                const V v2044 = v1844 * v2029;
-                const V v2045 = v2044 + v2039;
-                const V v2046 = v1844 * v2036;
-                const V v2047 = v2046 + v2040;
-                const V v2048 = v1844 * v2038;
-                const V v2049 = v2048 + v2041;
-                const V v2050 = v1842 * v1449;
-                const V v2051 = v1843 * v1449;
-                const V v2052 = v1842 * v1448;
-                const V v2053 = v1843 * v1448;
-                const V v2054 = v1842 * v1436;
-                const V v2055 = v1843 * v1436;
-                const V v2056 = v1842 * v1437;
-                const V v2057 = v1843 * v1437;
-                const V v2058 = v1314 * v2050;
-                const V v2059 = v1314 * v2051;
-                const V v2060 = v1314 * v2052;
-                const V v2061 = v1314 * v2053;
-                const V v2062 = v1313 * v2050;
-                const V v2063 = v1313 * v2051;
-                const V v2064 = v1313 * v2052;
-                const V v2065 = v1313 * v2053;
-                const V v2066 = v1343 * v2050;
-                const V v2067 = v1343 * v2051;
-                const V v2068 = v1343 * v2052;
-                const V v2069 = v1343 * v2053;
-                const V v2070 = v1555 * v2050;
-                const V v2071 = v1555 * v2051;
-                const V v2072 = v1555 * v2052;
-                const V v2073 = v1555 * v2053;
-                const V v2074 = v1556 * v2050;
-                const V v2075 = v1556 * v2051;
-                const V v2076 = v1556 * v2052;
-                const V v2077 = v1556 * v2053;
-                const V v2078 = -v2070;
-                const V v2079 = -v2071;
-                const V v2080 = -v2072;
-                const V v2081 = -v2073;
-                const V v2082 = -v2074;
-                const V v2083 = -v2075;
-                const V v2084 = -v2076;
-                const V v2085 = -v2077;
-                v1745 = softehl_blend(m1788, v1793, v1745);
-                v1746 = softehl_blend(m1788, v1794, v1746);
-                v1747 = softehl_blend(m1788, v1795, v1747);
-                v1748 = softehl_blend(m1788, v1841, v1748);
-                v1749 = softehl_blend(m1788, v2058, v1749);
-                v1750 = softehl_blend(m1788, v2059, v1750);
-                v1751 = softehl_blend(m1788, v2060, v1751);
-                v1752 = softehl_blend(m1788, v2061, v1752);
-                v1753 = softehl_blend(m1788, v2062, v1753);
-                v1754 = softehl_blend(m1788, v2063, v1754);
-                v1755 = softehl_blend(m1788, v2064, v1755);
-                v1756 = softehl_blend(m1788, v2065, v1756);
-                v1757 = softehl_blend(m1788, v2066, v1757);
-                v1758 = softehl_blend(m1788, v2067, v1758);
-                v1759 = softehl_blend(m1788, v2068, v1759);
-                v1760 = softehl_blend(m1788, v2069, v1760);
-                v1761 = softehl_blend(m1788, v2078, v1761);
-                v1762 = softehl_blend(m1788, v2079, v1762);
-                v1763 = softehl_blend(m1788, v2080, v1763);
-                v1764 = softehl_blend(m1788, v2081, v1764);
-                v1765 = softehl_blend(m1788, v2082, v1765);
-                v1766 = softehl_blend(m1788, v2083, v1766);
-                v1767 = softehl_blend(m1788, v2084, v1767);
-                v1768 = softehl_blend(m1788, v2085, v1768);
-                v1769 = softehl_blend(m1788, v2054, v1769);
-                v1770 = softehl_blend(m1788, v2055, v1770);
-                v1771 = softehl_blend(m1788, v2056, v1771);
-                v1772 = softehl_blend(m1788, v2057, v1772);
-                v1773 = softehl_blend(m1788, v1897, v1773);
-                v1774 = softehl_blend(m1788, v1898, v1774);
-                v1775 = softehl_blend(m1788, v1796, v1775);
-                v1776 = softehl_blend(m1788, v1797, v1776);
-                v1777 = softehl_blend(m1788, v2002, v1777);
-                v1778 = softehl_blend(m1788, v1846, v1778);
-                v1779 = softehl_blend(m1788, v2006, v1779);
-                v1780 = softehl_blend(m1788, v2043, v1780);
-                v1781 = softehl_blend(m1788, v2011, v1781);
-                v1782 = softehl_blend(m1788, v2045, v1782);
-                v1783 = softehl_blend(m1788, v2047, v1783);
-                v1784 = softehl_blend(m1788, v2004, v1784);
-                v1785 = softehl_blend(m1788, v2013, v1785);
-                v1786 = softehl_blend(m1788, v2049, v1786);
-                v1787 = softehl_blend(m1788, v2008, v1787);
-            }
-            v1688 = softehl_blend(m1743, v1745, v1688);
-            v1689 = softehl_blend(m1743, v1746, v1689);
-            v1690 = softehl_blend(m1743, v1747, v1690);
-            v1691 = softehl_blend(m1743, v1748, v1691);
-            v1692 = softehl_blend(m1743, v1749, v1692);
-            v1693 = softehl_blend(m1743, v1750, v1693);
-            v1694 = softehl_blend(m1743, v1751, v1694);
-            v1695 = softehl_blend(m1743, v1752, v1695);
-            v1696 = softehl_blend(m1743, v1753, v1696);
-            v1697 = softehl_blend(m1743, v1754, v1697);
-            v1698 = softehl_blend(m1743, v1755, v1698);
-            v1699 = softehl_blend(m1743, v1756, v1699);
-            v1700 = softehl_blend(m1743, v1757, v1700);
-            v1701 = softehl_blend(m1743, v1758, v1701);
-            v1702 = softehl_blend(m1743, v1759, v1702);
-            v1703 = softehl_blend(m1743, v1760, v1703);
-            v1704 = softehl_blend(m1743, v1761, v1704);
-            v1705 = softehl_blend(m1743, v1762, v1705);
-            v1706 = softehl_blend(m1743, v1763, v1706);
-            v1707 = softehl_blend(m1743, v1764, v1707);
-            v1708 = softehl_blend(m1743, v1765, v1708);
-            v1709 = softehl_blend(m1743, v1766, v1709);
-            v1710 = softehl_blend(m1743, v1767, v1710);
-            v1711 = softehl_blend(m1743, v1768, v1711);
-            v1712 = softehl_blend(m1743, v1769, v1712);
-            v1713 = softehl_blend(m1743, v1770, v1713);
-            v1714 = softehl_blend(m1743, v1771, v1714);
-            v1715 = softehl_blend(m1743, v1772, v1715);
-            v1716 = softehl_blend(m1743, v1773, v1716);
-            v1717 = softehl_blend(m1743, softehl_splat(0.0), v1717);
-            v1718 = softehl_blend(m1743, v1774, v1718);
-            v1719 = softehl_blend(m1743, softehl_splat(0.0), v1719);
-            v1720 = softehl_blend(m1743, v1775, v1720);
-            v1721 = softehl_blend(m1743, v1776, v1721);
-            v1722 = softehl_blend(m1743, v1777, v1722);
-            v1723 = softehl_blend(m1743, v1778, v1723);
-            v1724 = softehl_blend(m1743, softehl_splat(0.0), v1724);
-            v1725 = softehl_blend(m1743, v1779, v1725);
-            v1726 = softehl_blend(m1743, softehl_splat(0.0), v1726);
-            v1727 = softehl_blend(m1743, v1780, v1727);
-            v1728 = softehl_blend(m1743, softehl_splat(0.0), v1728);
-            v1729 = softehl_blend(m1743, v1781, v1729);
-            v1730 = softehl_blend(m1743, softehl_splat(0.0), v1730);
-            v1731 = softehl_blend(m1743, v1782, v1731);
-            v1732 = softehl_blend(m1743, softehl_splat(0.0), v1732);
-            v1733 = softehl_blend(m1743, v1783, v1733);
-            v1734 = softehl_blend(m1743, softehl_splat(0.0), v1734);
-            v1735 = softehl_blend(m1743, v1784, v1735);
-            v1736 = softehl_blend(m1743, softehl_splat(0.0), v1736);
-            v1737 = softehl_blend(m1743, v1785, v1737);
-            v1738 = softehl_blend(m1743, softehl_splat(0.0), v1738);
-            v1739 = softehl_blend(m1743, v1786, v1739);
-            v1740 = softehl_blend(m1743, softehl_splat(0.0), v1740);
-            v1741 = softehl_blend(m1743, v1787, v1741);
-            v1742 = softehl_blend(m1743, softehl_splat(0.0), v1742);
-        }
-        const M m2086 = ~v1603;
-        if (softehl_any(m2086)) {
-            const V v2087 = v1575 - v1427;
-            const V v2088 = v2087 * v2087;
-            const V v2089 = v2087 * v2088;
-            const V v2090 = 3.0 * v2088;
-            const V v2091 = v1303 * v2090;
-            const V v2092 = v65 * v2090;
-            const V v2093 = v1421 * v2090;
-            const V v2094 = -v2093;
-            const V v2095 = a10 * v2090;
-            const V v2096 = v2095 * v1647;
-            const V v2097 = v2095 * v1657;
-            const V v2098 = v2095 * v1667;
-            const V v2099 = v2095 * v1685;
-            const V v2100 = v2095 * v1687;
-            const V v2101 = v2095 * v1611;
-            const V v2102 = v2095 * v1609;
-            const V v2103 = v2095 * v1621;
-            const V v2104 = v2095 * v1637;
-            const V v2105 = v2095 * v1631;
-            v1688 = softehl_blend(m2086, v2089, v1688);
-            v1689 = softehl_blend(m2086, v2091, v1689);
-            v1690 = softehl_blend(m2086, v2094, v1690);
-            v1691 = softehl_blend(m2086, v2089, v1691);
-            v1692 = softehl_blend(m2086, softehl_splat(0.0), v1692);
-            v1693 = softehl_blend(m2086, softehl_splat(0.0), v1693);
-            v1694 = softehl_blend(m2086, softehl_splat(0.0), v1694);
-            v1695 = softehl_blend(m2086, softehl_splat(0.0), v1695);
-            v1696 = softehl_blend(m2086, softehl_splat(0.0), v1696);
-            v1697 = softehl_blend(m2086, softehl_splat(0.0), v1697);
-            v1698 = softehl_blend(m2086, softehl_splat(0.0), v1698);
-            v1699 = softehl_blend(m2086, softehl_splat(0.0), v1699);
-            v1700 = softehl_blend(m2086, softehl_splat(0.0), v1700);
-            v1701 = softehl_blend(m2086, softehl_splat(0.0), v1701);
-            v1702 = softehl_blend(m2086, softehl_splat(0.0), v1702);
-            v1703 = softehl_blend(m2086, softehl_splat(0.0), v1703);
-            v1704 = softehl_blend(m2086, softehl_splat(0.0), v1704);
-            v1705 = softehl_blend(m2086, softehl_splat(0.0), v1705);
-            v1706 = softehl_blend(m2086, softehl_splat(0.0), v1706);
-            v1707 = softehl_blend(m2086, softehl_splat(0.0), v1707);
-            v1708 = softehl_blend(m2086, softehl_splat(0.0), v1708);
-            v1709 = softehl_blend(m2086, softehl_splat(0.0), v1709);
-            v1710 = softehl_blend(m2086, softehl_splat(0.0), v1710);
-            v1711 = softehl_blend(m2086, softehl_splat(0.0), v1711);
-            v1712 = softehl_blend(m2086, softehl_splat(0.0), v1712);
-            v1713 = softehl_blend(m2086, softehl_splat(0.0), v1713);
-            v1714 = softehl_blend(m2086, softehl_splat(0.0), v1714);
-            v1715 = softehl_blend(m2086, softehl_splat(0.0), v1715);
-            v1716 = softehl_blend(m2086, softehl_splat(0.0), v1716);
-            v1717 = softehl_blend(m2086, v2091, v1717);
-            v1718 = softehl_blend(m2086, softehl_splat(0.0), v1718);
-            v1719 = softehl_blend(m2086, v2094, v1719);
-            v1720 = softehl_blend(m2086, v2095, v1720);
-            v1721 = softehl_blend(m2086, v2092, v1721);
-            v1722 = softehl_blend(m2086, softehl_splat(0.0), v1722);
-            v1723 = softehl_blend(m2086, v2092, v1723);
-            v1724 = softehl_blend(m2086, v2096, v1724);
-            v1725 = softehl_blend(m2086, softehl_splat(0.0), v1725);
-            v1726 = softehl_blend(m2086, v2097, v1726);
-            v1727 = softehl_blend(m2086, softehl_splat(0.0), v1727);
-            v1728 = softehl_blend(m2086, v2098, v1728);
-            v1729 = softehl_blend(m2086, softehl_splat(0.0), v1729);
-            v1730 = softehl_blend(m2086, v2099, v1730);
-            v1731 = softehl_blend(m2086, softehl_splat(0.0), v1731);
-            v1732 = softehl_blend(m2086, v2100, v1732);
-            v1733 = softehl_blend(m2086, softehl_splat(0.0), v1733);
-            v1734 = softehl_blend(m2086, v2101, v1734);
-            v1735 = softehl_blend(m2086, softehl_splat(0.0), v1735);
-            v1736 = softehl_blend(m2086, v2102, v1736);
-            v1737 = softehl_blend(m2086, softehl_splat(0.0), v1737);
-            v1738 = softehl_blend(m2086, v2103, v1738);
-            v1739 = softehl_blend(m2086, softehl_splat(0.0), v1739);
-            v1740 = softehl_blend(m2086, v2104, v1740);
-            v1741 = softehl_blend(m2086, softehl_splat(0.0), v1741);
-            v1742 = softehl_blend(m2086, v2105, v1742);
-        }
-        s1065 += v1692;
-        s1066 += v1693;
-        s1067 += v1694;
-        s1068 += v1695;
-        s1069 += v1696;
-        s1070 += v1697;
-        s1071 += v1698;
-        s1072 += v1699;
-        s1073 += v1700;
-        s1074 += v1701;
-        s1075 += v1702;
-        s1076 += v1703;
-        s1077 += v1704;
-        s1078 += v1705;
-        s1079 += v1706;
-        s1080 += v1707;
-        s1081 += v1708;
-        s1082 += v1709;
-        s1083 += v1710;
-        s1084 += v1711;
-        s1085 += v1712;
-        s1086 += v1713;
-        s1087 += v1714;
-        s1088 += v1715;
-        const V v2106 = 1.0 / v1349;
-        const V v2107 = v1404 * v1054;
-        const V v2108 = v17 * v1336;
-        const V v2109 = v31 * v1338;
-        const V v2110 = v2108 + v2109;
-        const V v2111 = v1294 + v1295;
-        const V v2112 = v1717 + v1716;
-        const V v2113 = v1719 + v1718;
-        const V v2114 = 2.0 * v2110;
-        const V v2115 = v1724 + v1722;
-        const V v2116 = v1726 + v1725;
-        const V v2117 = v1728 + v1727;
-        const V v2118 = v15 * v1296;
-        const V v2119 = v2118 + v2111;
-        const V v2120 = softehl_vsqrt(v2106);
-        const V v2121 = v18 * v1297;
-        const V v2122 = v2121 + v2119;
-        const V v2123 = v1730 + v1729;
-        const V v2124 = v1732 + v1731;
-        const V v2125 = v1734 + v1733;
-        const V v2126 = v1736 + v1735;
-        const V v2127 = v1738 + v1737;
-        const V v2128 = v1740 + v1739;
-        const V v2129 = X5 * v1293;
-        const V v2130 = v2122 - v2129;
-        const V v2131 = v1357 * v1374;
-        const V v2132 = v1056 * v1374;
-        const V v2133 = v1742 + v1741;
-        const V v2134 = v2130 * v2107;
-        const V v2135 = v1720 * v1647;
-        const V v2136 = v1720 * v1657;
-        const V v2137 = v1720 * v1667;
-        const V v2138 = v1720 * v1685;
-        const V v2139 = v1720 * v1687;
-        const V v2140 = v1720 * v1611;
-        const V v2141 = v1720 * v1609;
-        const V v2142 = v1720 * v1621;
-        const V v2143 = v1720 * v1637;
-        const V v2144 = v1720 * v1631;
-        const V v2145 = v1688 * v2131;
-        const V v2146 = v1688 * v1408;
-        const V v2147 = v1691 * v1408;
-        const V v2148 = v1691 * v2131;
-        const V v2149 = v1442 * v1688;
-        const V v2150 = v1442 * v1691;
-        const V v2151 = 0.5 * v2146;
-        const V v2152 = 0.5 * v2147;
-        const V v2153 = v1424 * v2145;
-        const V v2154 = v1424 * v2148;
-        const V v2155 = v1425 * v2145;
-        const V v2156 = v1425 * v2148;
-        const V v2157 = v1440 * v1691;
-        const V v2158 = v2149 + v2157;
-        const V v2159 = v1440 * v1688;
-        const V v2160 = v2150 - v2159;
-        const V v2161 = v2120 * v2132;
-        const V v2162 = v2158 * v2131;
-        const V v2163 = v2160 * v2131;
-        const V v2164 = v1444 * v1688;
-        const V v2165 = v1444 * v1691;
-        const V v2166 = v2158 * v1408;
-        const V v2167 = v2160 * v1408;
-        const V v2168 = v2114 * v2161;
-        const V v2169 = v2134 + v2168;
-        const V v2170 = v1439 * v1688;
-        const V v2171 = v1439 * v1691;
-        const V v2172 = v1441 * v1691;
-        const V v2173 = v2164 - v2172;
-        const V v2174 = v1441 * v1688;
-        const V v2175 = v2174 + v2165;
-        const V v2176 = 0.5 * v2166;
-        const V v2177 = v2158 * v2169;
-        const V v2178 = v2173 * v1408;
-        const V v2179 = v2160 * v2169;
-        const V v2180 = v2175 * v1408;
-        const V v2181 = v1688 * v2169;
-        const V v2182 = v1691 * v2169;
-        const V v2183 = v1445 * v1688;
-        const V v2184 = v2171 - v2183;
-        const V v2185 = v1445 * v1691;
-        const V v2186 = v2170 + v2185;
-        const V v2187 = 0.5 * v2167;
-        const V v2188 = v2184 * v1408;
-        const V v2189 = v2186 * v1408;
-        const V v2190 = v1556 * v2167;
-        s1089 += v2190;
-        const V v2191 = v1556 * v2166;
-        s1090 += v2191;
-        const V v2192 = v1555 * v2167;
-        s1091 += v2192;
-        const V v2193 = v1555 * v2166;
-        s1092 += v2193;
-        const V v2194 = v1343 * v2167;
-        s1093 += v2194;
-        const V v2195 = v1343 * v2166;
-        s1094 += v2195;
-        const V v2196 = v1313 * v2167;
-        s1095 += v2196;
-        const V v2197 = v1313 * v2166;
-        s1096 += v2197;
-        const V v2198 = v1314 * v2167;
-        s1097 += v2198;
-        const V v2199 = v1314 * v2166;
-        s1098 += v2199;
-        const V v2200 = v1308 * v2166;
-        const V v2201 = v1308 * v2167;
-        const V v2202 = v1309 * v2166;
-        const V v2203 = v1309 * v2167;
-        const V v2204 = v1293 * v2166;
-        const V v2205 = v1293 * v2167;
-        const V v2206 = v57 * w[1];
-        const V v2207 = w[1] * v1689;
-        const V v2208 = w[1] * v1690;
-        const V v2209 = v1689 * v1448;
-        const V v2210 = v1690 * v1448;
-        const V v2211 = v1268 * v2200;
-        const V v2212 = v1268 * v2203;
-        const V v2213 = v2206 * v1421;
-        const V v2214 = v2206 * v1420;
-        const V v2215 = v1420 * v2181;
-        const V v2216 = v1421 * v2181;
-        const V v2217 = v2151 + v2216;
-        const V v2218 = v1420 * v2182;
-        const V v2219 = v1421 * v2182;
-        const V v2220 = v2152 + v2219;
-        const V v2221 = v2215 - v2151;
-        const V v2222 = v2218 - v2152;
-        const V v2223 = v57 * v2217;
-        const V v2224 = v57 * v2221;
-        const V v2225 = v57 * v2220;
-        const V v2226 = v57 * v2222;
-        const V v2227 = v2213 * v2146;
-        s1057 += v2227;
-        const V v2228 = v2214 * v2146;
-        s1058 += v2228;
-        const V v2229 = v2213 * v2147;
-        s1063 += v2229;
-        const V v2230 = v2214 * v2147;
-        s1064 += v2230;
-        const V v2231 = v1268 * v2223;
-        const V v2232 = v1268 * v2177;
-        const V v2233 = v1270 * v2200;
-        const V v2234 = v1270 * v2223;
-        const V v2235 = v1270 * v2177;
-        const V v2236 = v1268 * v2225;
-        const V v2237 = v1270 * v2225;
-        const V v2238 = v1268 * v2224;
-        const V v2239 = v1270 * v2224;
-        const V v2240 = v1272 * v2224;
-        const V v2241 = v1272 * v2223;
-        const V v2242 = v1272 * v2177;
-        const V v2243 = v1272 * v2225;
-        const V v2244 = v1274 * v2224;
-        const V v2245 = v1274 * v2223;
-        const V v2246 = v1274 * v2177;
-        const V v2247 = v1274 * v2225;
-        const V v2248 = v1276 * v2224;
-        const V v2249 = v1276 * v2223;
-        const V v2250 = v1276 * v2177;
-        const V v2251 = v1276 * v2225;
-        const V v2252 = v1278 * v2224;
-        const V v2253 = v1278 * v2223;
-        const V v2254 = v1278 * v2177;
-        const V v2255 = v1278 * v2225;
-        const V v2256 = v1264 * v2224;
-        const V v2257 = v1264 * v2223;
-        const V v2258 = v1264 * v2177;
-        const V v2259 = v1264 * v2225;
-        const V v2260 = v1266 * v2224;
-        const V v2261 = v1266 * v2223;
-        const V v2262 = v1266 * v2177;
-        const V v2263 = v1266 * v2225;
-        const V v2264 = v1280 * v2224;
-        const V v2265 = v1282 * v2224;
-        const V v2266 = v1280 * v2223;
-        const V v2267 = v1282 * v2223;
-        const V v2268 = v1280 * v2177;
-        const V v2269 = v1282 * v2177;
-        const V v2270 = v1280 * v2225;
-        const V v2271 = v1282 * v2225;
-        const V v2272 = v1266 * v2200;
-        const V v2273 = v1280 * v2200;
-        const V v2274 = v1282 * v2200;
-        const V v2275 = v1272 * v2200;
-        const V v2276 = v1274 * v2200;
-        const V v2277 = v1276 * v2200;
-        const V v2278 = v1278 * v2200;
-        const V v2279 = v1264 * v2200;
-        const V v2280 = v1272 * v2201;
-        const V v2281 = v1274 * v2201;
-        const V v2282 = v1276 * v2201;
-        const V v2283 = v1278 * v2201;
-        const V v2284 = v1264 * v2201;
-        const V v2285 = v1268 * v2201;
-        const V v2286 = v1268 * v2179;
-        const V v2287 = v1272 * v2179;
-        const V v2288 = v1274 * v2179;
-        const V v2289 = v1276 * v2179;
-        const V v2290 = v1278 * v2179;
-        const V v2291 = v1264 * v2179;
-        const V v2292 = v1270 * v2201;
-        const V v2293 = v1270 * v2179;
-        const V v2294 = v1266 * v2201;
-        const V v2295 = v1266 * v2179;
-        const V v2296 = v1280 * v2201;
-        const V v2297 = v1280 * v2179;
-        const V v2298 = v1282 * v2201;
-        const V v2299 = v1282 * v2179;
-        const V v2300 = v1270 * v2202;
-        const V v2301 = v1264 * v2202;
-        const V v2302 = v1266 * v2202;
-        const V v2303 = v1280 * v2202;
-        const V v2304 = v1282 * v2202;
-        const V v2305 = v1268 * v2202;
-        const V v2306 = v1272 * v2202;
-        const V v2307 = v1274 * v2202;
-        const V v2308 = v1276 * v2202;
-        const V v2309 = v1278 * v2202;
-        const V v2310 = v1272 * v2203;
-        const V v2311 = v1274 * v2203;
-        const V v2312 = v1276 * v2203;
-        const V v2313 = v1278 * v2203;
-        const V v2314 = v1270 * v2203;
-        const V v2315 = v1264 * v2203;
-        const V v2316 = v1266 * v2203;
-        const V v2317 = v1280 * v2203;
-        const V v2318 = v1282 * v2203;
-        const V v2319 = v1270 * v2226;
-        const V v2320 = v1276 * v2226;
-        const V v2321 = v1278 * v2226;
-        const V v2322 = v1264 * v2226;
-        const V v2323 = v1266 * v2226;
-        const V v2324 = v1280 * v2226;
-        const V v2325 = v1282 * v2226;
-        const V v2326 = v1268 * v2226;
-        const V v2327 = v1272 * v2226;
-        const V v2328 = v1274 * v2226;
-        const V v2329 = v1268 * v1721;
-        const V v2330 = v2329 + v2135;
-        const V v2331 = v1272 * v1721;
-        const V v2332 = v2331 + v2137;
-        const V v2333 = v1274 * v1721;
-        const V v2334 = v2333 + v2138;
-        const V v2335 = v1266 * v1721;
-        const V v2336 = v2335 + v2142;
-        const V v2337 = v1280 * v1721;
-        const V v2338 = v2337 + v2143;
-        const V v2339 = v1282 * v1721;
-        const V v2340 = v2339 + v2144;
-        const V v2341 = v1270 * v1721;
-        const V v2342 = v2341 + v2136;
-        const V v2343 = v1276 * v1721;
-        const V v2344 = v2343 + v2139;
-        const V v2345 = v1278 * v1721;
-        const V v2346 = v2345 + v2140;
-        const V v2347 = v1264 * v1721;
-        const V v2348 = v2347 + v2141;
-        const V v2349 = v1270 * v1723;
-        const V v2350 = v2349 + v2116;
-        const V v2351 = v1276 * v1723;
-        const V v2352 = v2351 + v2124;
-        const V v2353 = v1278 * v1723;
-        const V v2354 = v2353 + v2125;
-        const V v2355 = v1264 * v1723;
-        const V v2356 = v2355 + v2126;
-        const V v2357 = v1282 * v1723;
-        const V v2358 = v2357 + v2133;
-        const V v2359 = v1268 * v1723;
-        const V v2360 = v2359 + v2115;
-        const V v2361 = v1272 * v1723;
-        const V v2362 = v2361 + v2117;
-        const V v2363 = v1274 * v1723;
-        const V v2364 = v2363 + v2123;
-        const V v2365 = v1266 * v1723;
-        const V v2366 = v2365 + v2127;
-        const V v2367 = v1280 * v1723;
-        const V v2368 = v2367 + v2128;
-        const V v2369 = v2207 * v1428;
-        s1059 += v2369;
-        const V v2370 = v2207 * v1429;
-        s1061 += v2370;
-        const V v2371 = v2208 * v1428;
-        s1060 += v2371;
-        const V v2372 = v2208 * v1429;
-        s1062 += v2372;
-        const V v2373 = v1428 * v2360;
-        const V v2374 = v2326 + v2373;
-        const V v2375 = v1428 * v2362;
-        const V v2376 = v2327 + v2375;
-        const V v2377 = v1428 * v2364;
-        const V v2378 = v2328 + v2377;
-        const V v2379 = v1428 * v2366;
-        const V v2380 = v2323 + v2379;
-        const V v2381 = v1428 * v2368;
-        const V v2382 = v2324 + v2381;
-        const V v2383 = v1429 * v2360;
-        const V v2384 = v2236 + v2383;
-        const V v2385 = v1429 * v2362;
-        const V v2386 = v2243 + v2385;
-        const V v2387 = v1031 * v2154;
-        const V v2388 = v2387 + v2374;
-        const V v2389 = v1037 * v2154;
-        const V v2390 = v2389 + v2376;
-        const V v2391 = v1038 * v2154;
-        const V v2392 = v2391 + v2378;
-        const V v2393 = v1042 * v2154;
-        const V v2394 = v2393 + v2380;
-        const V v2395 = v1043 * v2154;
-        const V v2396 = v2395 + v2382;
-        const V v2397 = v1031 * v2156;
-        const V v2398 = v2397 + v2384;
-        const V v2399 = v1037 * v2156;
-        const V v2400 = v2399 + v2386;
-        const V v2401 = w[1] * v2388;
-        s1143 += v2401;
-        const V v2402 = w[1] * v2390;
-        s1145 += v2402;
-        const V v2403 = w[1] * v2392;
-        s1146 += v2403;
-        const V v2404 = w[1] * v2394;
-        s1150 += v2404;
-        const V v2405 = w[1] * v2396;
-        s1151 += v2405;
-        const V v2406 = w[1] * v2398;
-        s1153 += v2406;
-        const V v2407 = w[1] * v2400;
-        s1155 += v2407;
-        const V v2408 = v1038 * v2156;
-        const V v2409 = v2408 + v2247;
-        const V v2410 = v1042 * v2156;
-        const V v2411 = v2410 + v2263;
-        const V v2412 = v1643 * v2176;
-        const V v2413 = v1643 * v2187;
-        const V v2414 = v1653 * v2176;
-        const V v2415 = v1653 * v2187;
-        const V v2416 = v1663 * v2176;
-        const V v2417 = v1663 * v2187;
-        const V v2418 = v1677 * v2176;
-        const V v2419 = v1677 * v2187;
-        const V v2420 = v1681 * v2176;
-        const V v2421 = v1681 * v2187;
-        const V v2422 = v1605 * v2176;
-        const V v2423 = v1605 * v2187;
-        const V v2424 = v1600 * v2176;
-        const V v2425 = v1600 * v2187;
-        const V v2426 = v1617 * v2176;
-        const V v2427 = v1617 * v2187;
-        const V v2428 = v1633 * v2176;
-        const V v2429 = v1633 * v2187;
-        const V v2430 = v1627 * v2176;
-        const V v2431 = v1627 * v2187;
-        const V v2432 = v2112 * v1436;
-        s1099 += v2432;
-        const V v2433 = v2113 * v1436;
-        s1100 += v2433;
-        const V v2434 = v2112 * v1437;
-        s1101 += v2434;
-        const V v2435 = v2113 * v1437;
-        s1102 += v2435;
-        const V v2436 = v2112 * v1448;
-        const V v2437 = v2113 * v1448;
-        const V v2438 = v2112 * v1449;
-        const V v2439 = v2209 + v2438;
-        const V v2440 = v2113 * v1449;
-        const V v2441 = v2210 + v2440;
-        const V v2442 = v1689 * v1449;
-        const V v2443 = v2436 - v2442;
-        const V v2444 = v1690 * v1449;
-        const V v2445 = v2437 - v2444;
-        const V v2446 = v1314 * v2439;
-        s1103 += v2446;
-        const V v2447 = v1314 * v2441;
-        s1104 += v2447;
-        const V v2448 = v1314 * v2443;
-        s1105 += v2448;
-        const V v2449 = v1314 * v2445;
-        s1106 += v2449;
-        const V v2450 = v1313 * v2439;
-        s1107 += v2450;
-        const V v2451 = v1313 * v2441;
-        s1108 += v2451;
-        const V v2452 = v1313 * v2443;
-        s1109 += v2452;
-        const V v2453 = v1313 * v2445;
-        s1110 += v2453;
-        const V v2454 = v1343 * v2439;
-        s1111 += v2454;
-        const V v2455 = v1343 * v2441;
-        s1112 += v2455;
-        const V v2456 = v1343 * v2443;
-        s1113 += v2456;
-        const V v2457 = v1343 * v2445;
-        s1114 += v2457;
-        const V v2458 = v1555 * v2439;
-        s1115 += v2458;
-        const V v2459 = v1555 * v2441;
-        s1116 += v2459;
-        const V v2460 = v1555 * v2443;
-        s1117 += v2460;
-        const V v2461 = v1555 * v2445;
-        s1118 += v2461;
-        const V v2462 = v1556 * v2439;
-        s1119 += v2462;
-        const V v2463 = v1556 * v2441;
-        s1120 += v2463;
-        const V v2464 = v1556 * v2443;
-        s1121 += v2464;
-        const V v2465 = v1556 * v2445;
-        s1122 += v2465;
-        const V v2466 = v1031 * v2153;
-        const V v2467 = v2466 + v2238;
-        const V v2468 = v1032 * v2153;
-        const V v2469 = v2468 + v2239;
-        const V v2470 = v1037 * v2153;
-        const V v2471 = v2470 + v2240;
-        const V v2472 = v1038 * v2153;
-        const V v2473 = v2472 + v2244;
-        const V v2474 = v1026 * v2153;
-        const V v2475 = v2474 + v2248;
-        const V v2476 = v1027 * v2153;
-        const V v2477 = v2476 + v2252;
-        const V v2478 = v1041 * v2153;
-        const V v2479 = v2478 + v2256;
-        const V v2480 = v2330 * v1428;
-        const V v2481 = v2467 + v2480;
-        const V v2482 = v2342 * v1428;
-        const V v2483 = v2469 + v2482;
-        const V v2484 = v2332 * v1428;
-        const V v2485 = v2471 + v2484;
-        const V v2486 = v2334 * v1428;
-        const V v2487 = v2473 + v2486;
-        const V v2488 = v2344 * v1428;
-        const V v2489 = v2475 + v2488;
-        const V v2490 = v2346 * v1428;
-        const V v2491 = v2477 + v2490;
-        const V v2492 = w[1] * v2481;
-        s1123 += v2492;
-        const V v2493 = w[1] * v2483;
-        s1124 += v2493;
-        const V v2494 = w[1] * v2485;
-        s1125 += v2494;
-        const V v2495 = w[1] * v2487;
-        s1126 += v2495;
-        const V v2496 = w[1] * v2489;
-        s1127 += v2496;
-        const V v2497 = w[1] * v2491;
-        s1128 += v2497;
-        const V v2498 = v2348 * v1428;
-        const V v2499 = v2479 + v2498;
-        const V v2500 = w[1] * v2499;
-        s1129 += v2500;
-        const V v2501 = v2330 * v1448;
-        const V v2502 = v2232 + v2501;
-        const V v2503 = v2334 * v1448;
-        const V v2504 = v2246 + v2503;
-        const V v2505 = v2346 * v1448;
-        const V v2506 = v2254 + v2505;
-        const V v2507 = v2348 * v1448;
-        const V v2508 = v2258 + v2507;
-        const V v2509 = v2342 * v1448;
-        const V v2510 = v2235 + v2509;
-        const V v2511 = v2332 * v1448;
-        const V v2512 = v2242 + v2511;
-        const V v2513 = v1031 * v2162;
-        const V v2514 = v2513 + v2502;
-        const V v2515 = v1038 * v2162;
-        const V v2516 = v2515 + v2504;
-        const V v2517 = v1027 * v2162;
-        const V v2518 = v2517 + v2506;
-        const V v2519 = v1041 * v2162;
-        const V v2520 = v2519 + v2508;
-        const V v2521 = v1032 * v2162;
-        const V v2522 = v2521 + v2510;
-        const V v2523 = v1037 * v2162;
-        const V v2524 = v2523 + v2512;
-        const V v2525 = v1031 * v2155;
-        const V v2526 = v2525 + v2231;
-        const V v2527 = v1032 * v2155;
-        const V v2528 = v2527 + v2234;
-        const V v2529 = v1037 * v2155;
-        const V v2530 = v2529 + v2241;
-        const V v2531 = v1038 * v2155;
-        const V v2532 = v2531 + v2245;
-        const V v2533 = v1027 * v2155;
-        const V v2534 = v2533 + v2253;
-        const V v2535 = v1041 * v2155;
-        const V v2536 = v2535 + v2257;
-        const V v2537 = v1031 * v2163;
-        const V v2538 = v2537 + v2286;
-        const V v2539 = v1037 * v2163;
-        const V v2540 = v2539 + v2287;
-        const V v2541 = v1038 * v2163;
-        const V v2542 = v2541 + v2288;
-        const V v2543 = v1032 * v2163;
-        const V v2544 = v2543 + v2293;
-        const V v2545 = v1027 * v2163;
-        const V v2546 = v2545 + v2290;
-        const V v2547 = v1041 * v2163;
-        const V v2548 = v2547 + v2291;
-        const V v2549 = v2342 * v1429;
-        const V v2550 = v2528 + v2549;
-        const V v2551 = v2346 * v1429;
-        const V v2552 = v2534 + v2551;
-        const V v2553 = v2348 * v1429;
-        const V v2554 = v2536 + v2553;
-        const V v2555 = v2342 * v1449;
-        const V v2556 = v2544 - v2555;
-        const V v2557 = v2346 * v1449;
-        const V v2558 = v2546 - v2557;
-        const V v2559 = v2348 * v1449;
-        const V v2560 = v2548 - v2559;
-        const V v2561 = w[1] * v2550;
-        s1134 += v2561;
-        const V v2562 = w[1] * v2552;
-        s1138 += v2562;
-        const V v2563 = w[1] * v2554;
-        s1139 += v2563;
-        const V v2564 = v2332 * v1449;
-        const V v2565 = v2540 - v2564;
-        const V v2566 = v2332 * v1429;
-        const V v2567 = v2530 + v2566;
-        const V v2568 = v2334 * v1449;
-        const V v2569 = v2542 - v2568;
-        const V v2570 = v2334 * v1429;
-        const V v2571 = v2532 + v2570;
-        const V v2572 = w[1] * v2567;
-        s1135 += v2572;
-        const V v2573 = w[1] * v2571;
-        s1136 += v2573;
-        const V v2574 = v1312 * v2180;
-        const V v2575 = v2574 + v2556;
-        const V v2576 = v1400 * v2180;
-        const V v2577 = v2576 + v2558;
-        const V v2578 = v1286 * v2180;
-        const V v2579 = v2578 + v2565;
-        const V v2580 = v1397 * v2180;
-        const V v2581 = v2580 + v2569;
-        const V v2582 = v1312 * v2178;
-        const V v2583 = v2582 + v2522;
-        const V v2584 = v1286 * v2178;
-        const V v2585 = v2584 + v2524;
-        const V v2586 = v1397 * v2178;
-        const V v2587 = v2586 + v2516;
-        const V v2588 = v1400 * v2178;
-        const V v2589 = v2588 + v2518;
-        const V v2590 = v1375 * v2189;
-        const V v2591 = v2575 - v2590;
-        const V v2592 = v1375 * v2188;
-        const V v2593 = v2592 + v2583;
-        const V v2594 = v1415 * v2189;
-        const V v2595 = v2579 - v2594;
-        const V v2596 = v1415 * v2188;
-        const V v2597 = v2596 + v2585;
-        const V v2598 = v1379 * v2189;
-        const V v2599 = v2581 - v2598;
-        const V v2600 = v1379 * v2188;
-        const V v2601 = v2600 + v2587;
-        const V v2602 = v1384 * v2189;
-        const V v2603 = v2577 - v2602;
-        const V v2604 = v1384 * v2188;
-        const V v2605 = v2604 + v2589;
-        const V v2606 = v1448 * v2350;
-        const V v2607 = v2591 + v2606;
-        const V v2608 = v1449 * v2350;
-        const V v2609 = v2593 + v2608;
-        const V v2610 = v1448 * v2362;
-        const V v2611 = v2595 + v2610;
-        const V v2612 = v1449 * v2362;
-        const V v2613 = v2597 + v2612;
-        const V v2614 = v1448 * v2364;
-        const V v2615 = v2599 + v2614;
-        const V v2616 = v1449 * v2364;
-        const V v2617 = v2601 + v2616;
-        const V v2618 = v1448 * v2354;
-        const V v2619 = v2603 + v2618;
-        const V v2620 = v1449 * v2354;
-        const V v2621 = v2605 + v2620;
-        const V v2622 = v1429 * v2364;
-        const V v2623 = v2409 + v2622;
-        const V v2624 = v1326 * v2609;
-        const V v2625 = v1326 * v2607;
-        const V v2626 = v1326 * v2613;
-        const V v2627 = v1326 * v2615;
-        const V v2628 = v1326 * v2619;
-        const V v2629 = v1326 * v2621;
-        const V v2630 = w[1] * v2623;
-        s1156 += v2630;
-        const V v2631 = v1326 * v2617;
-        const V v2632 = v1270 * v2204;
-        const V v2633 = v2624 - v2632;
-        const V v2634 = v1272 * v2204;
-        const V v2635 = v2626 - v2634;
-        const V v2636 = v1270 * v2205;
-        const V v2637 = v2625 - v2636;
-        const V v2638 = v1274 * v2205;
-        const V v2639 = v2627 - v2638;
-        const V v2640 = v1274 * v2204;
-        const V v2641 = v2631 - v2640;
-        const V v2642 = w[1] * v2633;
-        s1204 += v2642;
-        const V v2643 = w[1] * v2635;
-        s1205 += v2643;
-        const V v2644 = w[1] * v2637;
-        s1214 += v2644;
-        const V v2645 = w[1] * v2639;
-        s1216 += v2645;
-        const V v2646 = w[1] * v2641;
-        s1206 += v2646;
-        const V v2647 = v1278 * v2204;
-        const V v2648 = v2629 - v2647;
-        const V v2649 = v1278 * v2205;
-        const V v2650 = v2628 - v2649;
-        const V v2651 = w[1] * v2648;
-        s1208 += v2651;
-        const V v2652 = w[1] * v2650;
-        s1218 += v2652;
-        const V v2653 = v1326 * v2611;
-        const V v2654 = v1272 * v2205;
-        const V v2655 = v2653 - v2654;
-        const V v2656 = w[1] * v2655;
-        s1215 += v2656;
-        const V v2657 = v1302 * v2617;
-        const V v2658 = v2276 + v2657;
-        const V v2659 = v1302 * v2611;
-        const V v2660 = v2280 + v2659;
-        const V v2661 = w[1] * v2658;
-        s1166 += v2661;
-        const V v2662 = w[1] * v2660;
-        s1175 += v2662;
-        const V v2663 = v1302 * v2609;
-        const V v2664 = v2233 + v2663;
-        const V v2665 = w[1] * v2664;
-        s1164 += v2665;
-        const V v2666 = v1302 * v2613;
-        const V v2667 = v2275 + v2666;
-        const V v2668 = w[1] * v2667;
-        s1165 += v2668;
-        const V v2669 = v1302 * v2621;
-        const V v2670 = v2278 + v2669;
-        const V v2671 = w[1] * v2670;
-        s1168 += v2671;
-        const V v2672 = v1302 * v2607;
-        const V v2673 = v2292 + v2672;
-        const V v2674 = w[1] * v2673;
-        s1174 += v2674;
-        const V v2675 = v1302 * v2615;
-        const V v2676 = v2281 + v2675;
-        const V v2677 = w[1] * v2676;
-        s1176 += v2677;
-        const V v2678 = v1302 * v2619;
-        const V v2679 = v2283 + v2678;
-        const V v2680 = w[1] * v2679;
-        s1178 += v2680;
-        const V v2681 = v1305 * v2609;
-        const V v2682 = v2300 + v2681;
-        const V v2683 = v1305 * v2613;
-        const V v2684 = v2306 + v2683;
-        const V v2685 = w[1] * v2682;
-        s1184 += v2685;
-        const V v2686 = w[1] * v2684;
-        s1185 += v2686;
-        const V v2687 = v1305 * v2621;
-        const V v2688 = v2309 + v2687;
-        const V v2689 = v1305 * v2607;
-        const V v2690 = v2314 + v2689;
-        const V v2691 = w[1] * v2688;
-        s1188 += v2691;
-        const V v2692 = w[1] * v2690;
-        s1194 += v2692;
-        const V v2693 = v1305 * v2615;
-        const V v2694 = v2311 + v2693;
-        const V v2695 = v1305 * v2619;
-        const V v2696 = v2313 + v2695;
-        const V v2697 = w[1] * v2694;
-        s1196 += v2697;
-        const V v2698 = w[1] * v2696;
-        s1198 += v2698;
-        const V v2699 = v1305 * v2617;
-        const V v2700 = v2307 + v2699;
-        const V v2701 = w[1] * v2700;
-        s1186 += v2701;
-        const V v2702 = v1305 * v2611;
-        const V v2703 = v2310 + v2702;
-        const V v2704 = w[1] * v2703;
-        s1195 += v2704;
-        const V v2705 = v1523 * v2617;
-        const V v2706 = v2418 - v2705;
-        const V v2707 = v1523 * v2621;
-        const V v2708 = v2422 - v2707;
-        const V v2709 = w[1] * v2706;
-        s1226 += v2709;
-        const V v2710 = w[1] * v2708;
-        s1228 += v2710;
-        const V v2711 = v1523 * v2611;
-        const V v2712 = v2417 - v2711;
-        const V v2713 = v1523 * v2615;
-        const V v2714 = v2419 - v2713;
-        const V v2715 = w[1] * v2712;
-        s1235 += v2715;
-        const V v2716 = w[1] * v2714;
-        s1236 += v2716;
-        const V v2717 = v1523 * v2619;
-        const V v2718 = v2423 - v2717;
-        const V v2719 = v1524 * v2617;
-        const V v2720 = v2418 + v2719;
-        const V v2721 = v1524 * v2621;
-        const V v2722 = v2422 + v2721;
-        const V v2723 = v1524 * v2611;
-        const V v2724 = v2417 + v2723;
-        const V v2725 = v1524 * v2615;
-        const V v2726 = v2419 + v2725;
-        const V v2727 = v1524 * v2619;
-        const V v2728 = v2423 + v2727;
-        const V v2729 = w[1] * v2718;
-        s1238 += v2729;
-        const V v2730 = w[1] * v2720;
-        s1246 += v2730;
-        const V v2731 = w[1] * v2722;
-        s1248 += v2731;
-        const V v2732 = w[1] * v2724;
-        s1255 += v2732;
-        const V v2733 = w[1] * v2726;
-        s1256 += v2733;
-        const V v2734 = w[1] * v2728;
-        s1258 += v2734;
-        const V v2735 = v1523 * v2609;
-        const V v2736 = v2414 - v2735;
-        const V v2737 = v1524 * v2609;
-        const V v2738 = v2414 + v2737;
-        const V v2739 = w[1] * v2736;
-        s1224 += v2739;
-        const V v2740 = w[1] * v2738;
-        s1244 += v2740;
-        const V v2741 = v1523 * v2613;
-        const V v2742 = v2416 - v2741;
-        const V v2743 = v1524 * v2613;
-        const V v2744 = v2416 + v2743;
-        const V v2745 = w[1] * v2742;
-        s1225 += v2745;
-        const V v2746 = w[1] * v2744;
-        s1245 += v2746;
-        const V v2747 = v1523 * v2607;
-        const V v2748 = v2415 - v2747;
-        const V v2749 = v1524 * v2607;
-        const V v2750 = v2415 + v2749;
-        const V v2751 = w[1] * v2748;
-        s1234 += v2751;
-        const V v2752 = w[1] * v2750;
-        s1254 += v2752;
-        const V v2753 = v2330 * v1429;
-        const V v2754 = v2526 + v2753;
-        const V v2755 = w[1] * v2754;
-        s1133 += v2755;
-        const V v2756 = v2330 * v1449;
-        const V v2757 = v2538 - v2756;
-        const V v2758 = v1429 * v2366;
-        const V v2759 = v2411 + v2758;
-        const V v2760 = w[1] * v2759;
-        s1160 += v2760;
-        const V v2761 = v1449 * v2366;
-        const V v2762 = v2262 + v2761;
-        const V v2763 = v1448 * v2366;
-        const V v2764 = v2295 + v2763;
-        const V v2765 = v1448 * v2360;
-        const V v2766 = v2757 + v2765;
-        const V v2767 = v1449 * v2360;
-        const V v2768 = v2514 + v2767;
-        const V v2769 = v2336 * v1448;
-        const V v2770 = v2769 + v2762;
-        const V v2771 = v2336 * v1449;
-        const V v2772 = v2764 - v2771;
-        const V v2773 = v2336 * v1429;
-        const V v2774 = v2261 + v2773;
-        const V v2775 = v2336 * v1428;
-        const V v2776 = v2260 + v2775;
-        const V v2777 = v1285 * v2180;
-        const V v2778 = v2777 + v2766;
-        const V v2779 = v1285 * v2178;
-        const V v2780 = v2779 + v2768;
-        const V v2781 = v1392 * v2178;
-        const V v2782 = v2781 + v2770;
-        const V v2783 = v1392 * v2180;
-        const V v2784 = v2783 + v2772;
-        const V v2785 = v1042 * v2155;
-        const V v2786 = v2785 + v2774;
-        const V v2787 = v1042 * v2153;
-        const V v2788 = v2787 + v2776;
-        const V v2789 = v1413 * v2189;
-        const V v2790 = v2778 - v2789;
-        const V v2791 = v1413 * v2188;
-        const V v2792 = v2791 + v2780;
-        const V v2793 = w[1] * v2786;
-        s1140 += v2793;
-        const V v2794 = w[1] * v2788;
-        s1130 += v2794;
-        const V v2795 = v1042 * v2162;
-        const V v2796 = v2795 + v2782;
-        const V v2797 = v1042 * v2163;
-        const V v2798 = v2797 + v2784;
-        const V v2799 = v1389 * v2188;
-        const V v2800 = v2799 + v2796;
-        const V v2801 = v1389 * v2189;
-        const V v2802 = v2798 - v2801;
-        const V v2803 = v1326 * v2790;
-        const V v2804 = v1326 * v2792;
-        const V v2805 = v1326 * v2800;
-        const V v2806 = v1326 * v2802;
-        const V v2807 = v1302 * v2792;
-        const V v2808 = v2211 + v2807;
-        const V v2809 = v1302 * v2790;
-        const V v2810 = v2285 + v2809;
-        const V v2811 = v1302 * v2800;
-        const V v2812 = v2272 + v2811;
-        const V v2813 = v1302 * v2802;
-        const V v2814 = v2294 + v2813;
-        const V v2815 = v1268 * v2205;
-        const V v2816 = v2803 - v2815;
-        const V v2817 = v1268 * v2204;
-        const V v2818 = v2804 - v2817;
-        const V v2819 = w[1] * v2808;
-        s1163 += v2819;
-        const V v2820 = w[1] * v2810;
-        s1173 += v2820;
-        const V v2821 = w[1] * v2812;
-        s1170 += v2821;
-        const V v2822 = w[1] * v2814;
-        s1180 += v2822;
-        const V v2823 = w[1] * v2816;
-        s1213 += v2823;
-        const V v2824 = w[1] * v2818;
-        s1203 += v2824;
-        const V v2825 = v1266 * v2205;
-        const V v2826 = v2806 - v2825;
-        const V v2827 = v1266 * v2204;
-        const V v2828 = v2805 - v2827;
-        const V v2829 = w[1] * v2826;
-        s1220 += v2829;
-        const V v2830 = w[1] * v2828;
-        s1210 += v2830;
-        const V v2831 = v1305 * v2792;
-        const V v2832 = v2305 + v2831;
-        const V v2833 = v1305 * v2802;
-        const V v2834 = v2316 + v2833;
-        const V v2835 = w[1] * v2832;
-        s1183 += v2835;
-        const V v2836 = w[1] * v2834;
-        s1200 += v2836;
-        const V v2837 = v1305 * v2800;
-        const V v2838 = v2302 + v2837;
-        const V v2839 = w[1] * v2838;
-        s1190 += v2839;
-        const V v2840 = v1305 * v2790;
-        const V v2841 = v2212 + v2840;
-        const V v2842 = w[1] * v2841;
-        s1193 += v2842;
-        const V v2843 = v1523 * v2792;
-        const V v2844 = v2412 - v2843;
-        const V v2845 = v1523 * v2800;
-        const V v2846 = v2426 - v2845;
-        const V v2847 = w[1] * v2844;
-        s1223 += v2847;
-        const V v2848 = w[1] * v2846;
-        s1230 += v2848;
-        const V v2849 = v1523 * v2790;
-        const V v2850 = v2413 - v2849;
-        const V v2851 = v1523 * v2802;
-        const V v2852 = v2427 - v2851;
-        const V v2853 = w[1] * v2850;
-        s1233 += v2853;
-        const V v2854 = w[1] * v2852;
-        s1240 += v2854;
-        const V v2855 = v1524 * v2792;
-        const V v2856 = v2412 + v2855;
-        const V v2857 = v1524 * v2800;
-        const V v2858 = v2426 + v2857;
-        const V v2859 = v1524 * v2790;
-        const V v2860 = v2413 + v2859;
-        const V v2861 = v1524 * v2802;
-        const V v2862 = v2427 + v2861;
-        const V v2863 = w[1] * v2856;
-        s1243 += v2863;
-        const V v2864 = w[1] * v2858;
-        s1250 += v2864;
-        const V v2865 = w[1] * v2860;
-        s1253 += v2865;
-        const V v2866 = w[1] * v2862;
-        s1260 += v2866;
-        const V v2867 = v1043 * v2153;
-        const V v2868 = v2867 + v2264;
-        const V v2869 = v1046 * v2153;
-        const V v2870 = v2869 + v2265;
-        const V v2871 = v1043 * v2155;
-        const V v2872 = v2871 + v2266;
-        const V v2873 = v1046 * v2155;
-        const V v2874 = v2873 + v2267;
-        const V v2875 = v1026 * v2155;
-        const V v2876 = v2875 + v2249;
-        const V v2877 = v1026 * v2154;
-        const V v2878 = v2877 + v2320;
-        const V v2879 = v1046 * v2154;
-        const V v2880 = v2879 + v2325;
-        const V v2881 = v2338 * v1428;
-        const V v2882 = v2868 + v2881;
-        const V v2883 = v2340 * v1428;
-        const V v2884 = v2870 + v2883;
-        const V v2885 = v2338 * v1429;
-        const V v2886 = v2872 + v2885;
-        const V v2887 = v2340 * v1429;
-        const V v2888 = v2874 + v2887;
-        const V v2889 = v2344 * v1429;
-        const V v2890 = v2876 + v2889;
-        const V v2891 = v1428 * v2352;
-        const V v2892 = v2878 + v2891;
-        const V v2893 = w[1] * v2882;
-        s1131 += v2893;
-        const V v2894 = w[1] * v2884;
-        s1132 += v2894;
-        const V v2895 = w[1] * v2886;
-        s1141 += v2895;
-        const V v2896 = w[1] * v2888;
-        s1142 += v2896;
-        const V v2897 = w[1] * v2890;
-        s1137 += v2897;
-        const V v2898 = w[1] * v2892;
-        s1147 += v2898;
-        const V v2899 = v1428 * v2358;
-        const V v2900 = v2880 + v2899;
-        const V v2901 = w[1] * v2900;
-        s1152 += v2901;
-        const V v2902 = v1429 * v2352;
-        const V v2903 = v2251 + v2902;
-        const V v2904 = v1429 * v2358;
-        const V v2905 = v2271 + v2904;
-        const V v2906 = v2344 * v1448;
-        const V v2907 = v2250 + v2906;
-        const V v2908 = v2344 * v1449;
-        const V v2909 = v2289 - v2908;
-        const V v2910 = v1449 * v2358;
-        const V v2911 = v2269 + v2910;
-        const V v2912 = v1448 * v2358;
-        const V v2913 = v2299 + v2912;
-        const V v2914 = v1449 * v2352;
-        const V v2915 = v2907 + v2914;
-        const V v2916 = v1448 * v2352;
-        const V v2917 = v2909 + v2916;
-        const V v2918 = v1026 * v2156;
-        const V v2919 = v2918 + v2903;
-        const V v2920 = v1046 * v2156;
-        const V v2921 = v2920 + v2905;
-        const V v2922 = w[1] * v2919;
-        s1157 += v2922;
-        const V v2923 = v1046 * v2162;
-        const V v2924 = v2923 + v2911;
-        const V v2925 = v1046 * v2163;
-        const V v2926 = v2925 + v2913;
-        const V v2927 = v1026 * v2162;
-        const V v2928 = v2927 + v2915;
-        const V v2929 = v1026 * v2163;
-        const V v2930 = v2929 + v2917;
-        const V v2931 = w[1] * v2921;
-        s1162 += v2931;
-        const V v2932 = v1043 * v2162;
-        const V v2933 = v2932 + v2268;
-        const V v2934 = v1043 * v2163;
-        const V v2935 = v2934 + v2297;
-        const V v2936 = v1043 * v2156;
-        const V v2937 = v2936 + v2270;
-        const V v2938 = v2340 * v1448;
-        const V v2939 = v2938 + v2924;
-        const V v2940 = v2340 * v1449;
-        const V v2941 = v2926 - v2940;
-        const V v2942 = v1288 * v2178;
-        const V v2943 = v2942 + v2928;
-        const V v2944 = v1288 * v2180;
-        const V v2945 = v2944 + v2930;
-        const V v2946 = v1290 * v2178;
-        const V v2947 = v2946 + v2933;
-        const V v2948 = v1290 * v2180;
-        const V v2949 = v2948 + v2935;
-        const V v2950 = v1291 * v2178;
-        const V v2951 = v2950 + v2939;
-        const V v2952 = v1291 * v2180;
-        const V v2953 = v2952 + v2941;
-        const V v2954 = v1287 * v2178;
-        const V v2955 = v2954 + v2520;
-        const V v2956 = v1287 * v2180;
-        const V v2957 = v2956 + v2560;
-        const V v2958 = v1381 * v2188;
-        const V v2959 = v2958 + v2943;
-        const V v2960 = v1381 * v2189;
-        const V v2961 = v2945 - v2960;
-        const V v2962 = v1401 * v2188;
-        const V v2963 = v2962 + v2947;
-        const V v2964 = v1401 * v2189;
-        const V v2965 = v2949 - v2964;
-        const V v2966 = v1405 * v2188;
-        const V v2967 = v2966 + v2951;
-        const V v2968 = v1405 * v2189;
-        const V v2969 = v2953 - v2968;
-        const V v2970 = v1386 * v2188;
-        const V v2971 = v2970 + v2955;
-        const V v2972 = v1386 * v2189;
-        const V v2973 = v2957 - v2972;
-        const V v2974 = v1326 * v2959;
-        const V v2975 = v1326 * v2961;
-        const V v2976 = v2338 * v1448;
-        const V v2977 = v2963 + v2976;
-        const V v2978 = v2338 * v1449;
-        const V v2979 = v2965 - v2978;
-        const V v2980 = v1326 * v2967;
-        const V v2981 = v1326 * v2969;
-        const V v2982 = v1449 * v2356;
-        const V v2983 = v2971 + v2982;
-        const V v2984 = v1448 * v2356;
-        const V v2985 = v2973 + v2984;
-        const V v2986 = v1449 * v2368;
-        const V v2987 = v2977 + v2986;
-        const V v2988 = v1448 * v2368;
-        const V v2989 = v2979 + v2988;
-        const V v2990 = v1429 * v2368;
-        const V v2991 = v2937 + v2990;
-        const V v2992 = v1276 * v2204;
-        const V v2993 = v2974 - v2992;
-        const V v2994 = v1276 * v2205;
-        const V v2995 = v2975 - v2994;
-        const V v2996 = v1282 * v2204;
-        const V v2997 = v2980 - v2996;
-        const V v2998 = v1282 * v2205;
-        const V v2999 = v2981 - v2998;
-        const V v3000 = v1326 * v2983;
-        const V v3001 = v1326 * v2987;
-        const V v3002 = v1326 * v2985;
-        const V v3003 = v1326 * v2989;
-        const V v3004 = w[1] * v2991;
-        s1161 += v3004;
-        const V v3005 = w[1] * v2993;
-        s1207 += v3005;
-        const V v3006 = w[1] * v2997;
-        s1212 += v3006;
-        const V v3007 = w[1] * v2995;
-        s1217 += v3007;
-        const V v3008 = w[1] * v2999;
-        s1222 += v3008;
-        const V v3009 = v1264 * v2204;
-        const V v3010 = v3000 - v3009;
-        const V v3011 = v1280 * v2204;
-        const V v3012 = v3001 - v3011;
-        const V v3013 = v1264 * v2205;
-        const V v3014 = v3002 - v3013;
-        const V v3015 = v1280 * v2205;
-        const V v3016 = v3003 - v3015;
-        const V v3017 = w[1] * v3010;
-        s1209 += v3017;
-        const V v3018 = w[1] * v3012;
-        s1211 += v3018;
-        const V v3019 = w[1] * v3014;
-        s1219 += v3019;
-        const V v3020 = w[1] * v3016;
-        s1221 += v3020;
-        const V v3021 = v1302 * v2983;
-        const V v3022 = v2279 + v3021;
-        const V v3023 = v1302 * v2987;
-        const V v3024 = v2273 + v3023;
-        const V v3025 = w[1] * v3022;
-        s1169 += v3025;
-        const V v3026 = w[1] * v3024;
-        s1171 += v3026;
-        const V v3027 = v1302 * v2989;
-        const V v3028 = v2296 + v3027;
-        const V v3029 = w[1] * v3028;
-        s1181 += v3029;
-        const V v3030 = v1302 * v2959;
-        const V v3031 = v2277 + v3030;
-        const V v3032 = w[1] * v3031;
-        s1167 += v3032;
-        const V v3033 = v1302 * v2967;
-        const V v3034 = v2274 + v3033;
-        const V v3035 = w[1] * v3034;
-        s1172 += v3035;
-        const V v3036 = v1302 * v2961;
-        const V v3037 = v2282 + v3036;
-        const V v3038 = w[1] * v3037;
-        s1177 += v3038;
-        const V v3039 = v1302 * v2985;
-        const V v3040 = v2284 + v3039;
-        const V v3041 = v1302 * v2969;
-        const V v3042 = v2298 + v3041;
-        const V v3043 = w[1] * v3040;
-        s1179 += v3043;
-        const V v3044 = w[1] * v3042;
-        s1182 += v3044;
-        const V v3045 = v1305 * v2959;
-        const V v3046 = v2308 + v3045;
-        const V v3047 = v1305 * v2967;
-        const V v3048 = v2304 + v3047;
-        const V v3049 = w[1] * v3046;
-        s1187 += v3049;
-        const V v3050 = w[1] * v3048;
-        s1192 += v3050;
-        const V v3051 = v1305 * v2961;
-        const V v3052 = v2312 + v3051;
-        const V v3053 = v1305 * v2985;
-        const V v3054 = v2315 + v3053;
-        const V v3055 = w[1] * v3052;
-        s1197 += v3055;
-        const V v3056 = w[1] * v3054;
-        s1199 += v3056;
-        const V v3057 = v1305 * v2969;
-        const V v3058 = v2318 + v3057;
-        const V v3059 = w[1] * v3058;
-        s1202 += v3059;
-        const V v3060 = v1305 * v2983;
-        const V v3061 = v2301 + v3060;
-        const V v3062 = w[1] * v3061;
-        s1189 += v3062;
-        const V v3063 = v1305 * v2987;
-        const V v3064 = v2303 + v3063;
-        const V v3065 = v1305 * v2989;
-        const V v3066 = v2317 + v3065;
-        const V v3067 = w[1] * v3064;
-        s1191 += v3067;
-        const V v3068 = w[1] * v3066;
-        s1201 += v3068;
-        const V v3069 = v1523 * v2983;
-        const V v3070 = v2424 - v3069;
-        const V v3071 = v1523 * v2987;
-        const V v3072 = v2428 - v3071;
-        const V v3073 = w[1] * v3070;
-        s1229 += v3073;
-        const V v3074 = w[1] * v3072;
-        s1231 += v3074;
-        const V v3075 = v1523 * v2961;
-        const V v3076 = v2421 - v3075;
-        const V v3077 = v1523 * v2989;
-        const V v3078 = v2429 - v3077;
-        const V v3079 = w[1] * v3076;
-        s1237 += v3079;
-        const V v3080 = w[1] * v3078;
-        s1241 += v3080;
-        const V v3081 = v1523 * v2969;
-        const V v3082 = v2431 - v3081;
-        const V v3083 = v1524 * v2983;
-        const V v3084 = v2424 + v3083;
-        const V v3085 = v1524 * v2987;
-        const V v3086 = v2428 + v3085;
-        const V v3087 = v1524 * v2961;
-        const V v3088 = v2421 + v3087;
-        const V v3089 = v1524 * v2989;
-        const V v3090 = v2429 + v3089;
-        const V v3091 = v1524 * v2969;
-        const V v3092 = v2431 + v3091;
-        const V v3093 = w[1] * v3082;
-        s1242 += v3093;
-        const V v3094 = w[1] * v3084;
-        s1249 += v3094;
-        const V v3095 = w[1] * v3086;
-        s1251 += v3095;
-        const V v3096 = w[1] * v3088;
-        s1257 += v3096;
-        const V v3097 = w[1] * v3090;
-        s1261 += v3097;
-        const V v3098 = w[1] * v3092;
-        s1262 += v3098;
-        const V v3099 = v1523 * v2959;
-        const V v3100 = v2420 - v3099;
-        const V v3101 = v1524 * v2959;
-        const V v3102 = v2420 + v3101;
-        const V v3103 = w[1] * v3100;
-        s1227 += v3103;
-        const V v3104 = w[1] * v3102;
-        s1247 += v3104;
-        const V v3105 = v1523 * v2967;
-        const V v3106 = v2430 - v3105;
-        const V v3107 = v1524 * v2967;
-        const V v3108 = v2430 + v3107;
-        const V v3109 = w[1] * v3106;
-        s1232 += v3109;
-        const V v3110 = w[1] * v3108;
-        s1252 += v3110;
-        const V v3111 = v1523 * v2985;
-        const V v3112 = v2425 - v3111;
-        const V v3113 = v1524 * v2985;
-        const V v3114 = v2425 + v3113;
-        const V v3115 = w[1] * v3112;
-        s1239 += v3115;
-        const V v3116 = w[1] * v3114;
-        s1259 += v3116;
-        const V v3117 = v1032 * v2154;
-        const V v3118 = v3117 + v2319;
-        const V v3119 = v1032 * v2156;
-        const V v3120 = v3119 + v2237;
-        const V v3121 = v1027 * v2154;
-        const V v3122 = v3121 + v2321;
-        const V v3123 = v1027 * v2156;
-        const V v3124 = v3123 + v2255;
-        const V v3125 = v1041 * v2154;
-        const V v3126 = v3125 + v2322;
-        const V v3127 = v1041 * v2156;
-        const V v3128 = v3127 + v2259;
-        const V v3129 = v1428 * v2350;
-        const V v3130 = v3118 + v3129;
-        const V v3131 = v1429 * v2350;
-        const V v3132 = v3120 + v3131;
-        const V v3133 = w[1] * v3130;
-        s1144 += v3133;
-        const V v3134 = v1428 * v2354;
-        const V v3135 = v3122 + v3134;
-        const V v3136 = v1429 * v2354;
-        const V v3137 = v3124 + v3136;
-        const V v3138 = v1428 * v2356;
-        const V v3139 = v3126 + v3138;
-        const V v3140 = v1429 * v2356;
-        const V v3141 = v3128 + v3140;
-        const V v3142 = w[1] * v3132;
-        s1154 += v3142;
-        const V v3143 = w[1] * v3135;
-        s1148 += v3143;
-        const V v3144 = w[1] * v3137;
-        s1158 += v3144;
-        const V v3145 = w[1] * v3139;
-        s1149 += v3145;
-        const V v3146 = w[1] * v3141;
-        s1159 += v3146;
-    }
-    softehl_store2(R + 12, 14, s1057, s1063);
-    softehl_store4(R + 0, 14, s1098, s1097, s1096, s1095);
-    softehl_store4(K + 164, 196, s1099, s1085, s1100, s1086);
-    softehl_store4(K + 192, 196, s1101, s1087, s1102, s1088);
-    softehl_store4(K + 24, 196, s1105, s1067, s1106, s1068);
-    softehl_store4(K + 52, 196, s1109, s1071, s1110, s1072);
-    softehl_store4(K + 80, 196, s1113, s1075, s1114, s1076);
-    softehl_store4(K + 140, 196, s1123, s1124, s1125, s1126);
-    softehl_store4(K + 144, 196, s1127, s1128, s1129, s1130);
-    softehl_store4(K + 148, 196, s1131, s1132, s1059, softehl_splat(0.0));
-    softehl_store4(K + 168, 196, s1133, s1134, s1135, s1136);
-    softehl_store4(K + 172, 196, s1137, s1138, s1139, s1140);
-    softehl_store4(K + 176, 196, s1141, s1142, s1061, softehl_splat(0.0));
-    softehl_store4(K + 152, 196, s1060, softehl_splat(0.0), s1143, s1144);
-    softehl_store4(K + 156, 196, s1145, s1146, s1147, s1148);
-    softehl_store4(K + 160, 196, s1149, s1150, s1151, s1152);
-    softehl_store4(K + 180, 196, s1062, softehl_splat(0.0), s1153, s1154);
-    softehl_store4(K + 184, 196, s1155, s1156, s1157, s1158);
-    softehl_store4(K + 188, 196, s1159, s1160, s1161, s1162);
-    softehl_store4(K + 0, 196, s1163, s1164, s1165, s1166);
-    softehl_store4(K + 4, 196, s1167, s1168, s1169, s1170);
-    softehl_store4(K + 8, 196, s1171, s1172, s1103, s1065);
-    softehl_store4(K + 12, 196, s1104, s1066, s1173, s1174);
-    softehl_store4(K + 16, 196, s1175, s1176, s1177, s1178);
-    softehl_store4(K + 20, 196, s1179, s1180, s1181, s1182);
-    softehl_store4(K + 28, 196, s1183, s1184, s1185, s1186);
-    softehl_store4(K + 32, 196, s1187, s1188, s1189, s1190);
-    softehl_store4(K + 36, 196, s1191, s1192, s1107, s1069);
-    softehl_store4(K + 40, 196, s1108, s1070, s1193, s1194);
-    softehl_store4(K + 44, 196, s1195, s1196, s1197, s1198);
-    softehl_store4(K + 48, 196, s1199, s1200, s1201, s1202);
-    softehl_store4(K + 56, 196, s1203, s1204, s1205, s1206);
-    softehl_store4(K + 60, 196, s1207, s1208, s1209, s1210);
-    softehl_store4(K + 64, 196, s1211, s1212, s1111, s1073);
-    softehl_store4(K + 68, 196, s1112, s1074, s1213, s1214);
-    softehl_store4(K + 72, 196, s1215, s1216, s1217, s1218);
-    softehl_store4(K + 76, 196, s1219, s1220, s1221, s1222);
-    softehl_store4(K + 84, 196, s1223, s1224, s1225, s1226);
-    softehl_store4(K + 88, 196, s1227, s1228, s1229, s1230);
-    softehl_store4(K + 100, 196, s1235, s1236, s1237, s1238);
-    softehl_store4(K + 104, 196, s1239, s1240, s1241, s1242);
-    const V v3147 = -s1089;
-    const V v3148 = -s1090;
-    softehl_store4(R + 8, 14, v3148, v3147, s1058, s1064);
-    const V v3149 = -s1091;
-    const V v3150 = -s1092;
-    softehl_store4(R + 4, 14, s1094, s1093, v3150, v3149);
-    const V v3151 = -s1115;
-    softehl_store4(K + 92, 196, s1231, s1232, v3151, s1077);
-    const V v3152 = -s1116;
-    softehl_store4(K + 96, 196, v3152, s1078, s1233, s1234);
-    const V v3153 = -s1117;
-    const V v3154 = -s1118;
-    softehl_store4(K + 108, 196, v3153, s1079, v3154, s1080);
-    const V v3155 = -s1119;
-    const V v3156 = -s1120;
-    const V v3157 = -s1121;
-    const V v3158 = -s1122;
-    softehl_store4(K + 136, 196, v3157, s1083, v3158, s1084);
-    const V v3159 = -s1243;
-    const V v3160 = -s1244;
-    const V v3161 = -s1245;
-    const V v3162 = -s1246;
-    softehl_store4(K + 112, 196, v3159, v3160, v3161, v3162);
-    const V v3163 = -s1247;
-    const V v3164 = -s1248;
-    const V v3165 = -s1249;
-    const V v3166 = -s1250;
-    softehl_store4(K + 116, 196, v3163, v3164, v3165, v3166);
-    const V v3167 = -s1251;
-    const V v3168 = -s1252;
-    softehl_store4(K + 120, 196, v3167, v3168, v3155, s1081);
-    const V v3169 = -s1253;
-    const V v3170 = -s1254;
-    softehl_store4(K + 124, 196, v3156, s1082, v3169, v3170);
-    const V v3171 = -s1255;
-    const V v3172 = -s1256;
-    const V v3173 = -s1257;
-    const V v3174 = -s1258;
-    softehl_store4(K + 128, 196, v3171, v3172, v3173, v3174);
-    const V v3175 = -s1259;
-    const V v3176 = -s1260;
-    const V v3177 = -s1261;
-    const V v3178 = -s1262;
-    softehl_store4(K + 132, 196, v3175, v3176, v3177, v3178);
-}
-
-void softehl_mortar_32_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mortar_32_tangent_group(points, modes, coordinates + 10 * e, dofs + 14 * e, data + 15 * e, 0, parameters, rule, basis, values + 14 * e, tangent + (14 * 14) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mortar_32_tangent_group(points, modes, coordinates + 10 * (n - SOFTEHL_LANES), dofs + 14 * (n - SOFTEHL_LANES), data + 15 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 14 * (n - SOFTEHL_LANES), tangent + (14 * 14) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 10];
-    softehl_pad(X, coordinates, 10, n);
-    double d[SOFTEHL_LANES * 14];
-    softehl_pad(d, dofs, 14, n);
-    double a[SOFTEHL_LANES * 15];
-    softehl_pad(a, data, 15, n);
-    double R[SOFTEHL_LANES * 14];
-    double K[SOFTEHL_LANES * (14 * 14)];
-    softehl_mortar_32_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 14 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (14 * 14) * n; ++i) tangent[i] = K[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_mortar_32_tangent, 10, 14, 15, 0, 14, (14 * 14))

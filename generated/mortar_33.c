@@ -38,5157 +38,1452 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_mortar_33_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_mortar_33_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8, X9, X10, X11;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8, X9, X10, X11;
+    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
     softehl_load4(X + 8, 12, &X8, &X9, &X10, &X11);
-    (void)X8; (void)X9; (void)X10; (void)X11;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 16, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 16, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15;
+    softehl_load4(d + 0, 16, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 16, &d4, &d5, &d6, &d7);
     softehl_load4(d + 8, 16, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13, d14, d15;
     softehl_load4(d + 12, 16, &d12, &d13, &d14, &d15);
-    (void)d12; (void)d13; (void)d14; (void)d15;
-    V a0, a1, a2, a3;
-    softehl_load4(a + 0, 17, &a0, &a1, &a2, &a3);
-    (void)a0; (void)a1; (void)a2; (void)a3;
-    V a4, a5, a6, a7;
-    softehl_load4(a + 4, 17, &a4, &a5, &a6, &a7);
-    (void)a4; (void)a5; (void)a6; (void)a7;
-    V a8, a9, a10, a11;
+    V a0, a1, a2, a3, a4, a5, a6, a7, a8, a9, a10, a11, a12, a13, a14, a15, a16;
+    softehl_load4(a + 0, 17, &a0, &a1, &a2, &a3); softehl_load4(a + 4, 17, &a4, &a5, &a6, &a7);
     softehl_load4(a + 8, 17, &a8, &a9, &a10, &a11);
-    (void)a8; (void)a9; (void)a10; (void)a11;
-    V a12, a13, a14, a15;
-    softehl_load4(a + 12, 17, &a12, &a13, &a14, &a15);
-    (void)a12; (void)a13; (void)a14; (void)a15;
-    V a16;
-    softehl_load1(a + 16, 17, &a16);
-    (void)a16;
-    const V v1 = X0 + d0;
-    const V v2 = X2 + d2;
-    const V v3 = X4 + d4;
-    const V v4 = 2.0 * X4;
-    const V v5 = X0 + a0;
-    const V v6 = X6 + d6;
-    const V v7 = X2 + a1;
-    const V v8 = X4 + a2;
-    const V v9 = X1 + d1;
-    const V v10 = X6 + a3;
-    const V v11 = X3 + d3;
-    const V v12 = X1 + a6;
-    const V v13 = X8 + d8;
-    const V v14 = X3 + a7;
-    const V v15 = X9 + d9;
-    const V v16 = X10 + d10;
-    const V v17 = X10 + a5;
-    const V v18 = X8 + a4;
-    const V v19 = X11 + d11;
-    const V v20 = X9 + a10;
-    const V v21 = 1.0 / a12;
-    const V v22 = X11 + a11;
-    const V v23 = X5 + a8;
-    const V v24 = 2.0 * X5;
-    const V v25 = X5 + d5;
-    const V v26 = X7 + a9;
-    const V v27 = X7 + d7;
-    const V v28 = v13 - v6;
-    const V v29 = v13 + v6;
-    const V v30 = v15 - v27;
-    const V v31 = v15 + v27;
-    const V v32 = 0.5 * v29;
-    const V v33 = 0.5 * v31;
-    const V v34 = v32 - v16;
-    const V v35 = v2 + v1;
-    const V v36 = v2 - v1;
-    const V v37 = 0.5 * v35;
-    const V v38 = 0.5 * v36;
-    const V v39 = v33 - v19;
-    const V v40 = v11 + v9;
-    const V v41 = v11 - v9;
-    const V v42 = 0.5 * v40;
-    const V v43 = 0.5 * v41;
-    const V v44 = v6 - v37;
-    const V v45 = v13 - v37;
-    const V v46 = v38 * v38;
-    const V v47 = v15 - v42;
-    const V v48 = v27 - v42;
-    const V v49 = v38 * v45;
-    const V v50 = v38 * v44;
-    const V v51 = v43 * v47;
-    const V v52 = v49 + v51;
-    const V v53 = v43 * v43;
-    const V v54 = v46 + v53;
-    const V v55 = v43 * v48;
-    const V v56 = v50 + v55;
-    const V v57 = 1.0 / v54;
-    const V v58 = v52 * v57;
-    const M v59 = softehl_lt(softehl_splat(1.0), v58);
-    const V v60 = softehl_blend(v59, softehl_splat(1.0), v58);
-    const M v61 = softehl_eq(v60, v60);
-    const V v62 = v56 * v57;
-    const M v63 = softehl_lt(softehl_splat(1.0), v62);
-    const V v64 = softehl_blend(v63, softehl_splat(1.0), v62);
-    const M v65 = softehl_eq(v64, v64);
-    V v66 = softehl_splat(0.0);
-    const M m67 = v61;
-    if (softehl_any(m67)) {
-        const M v68 = softehl_lt(softehl_splat((-1.0)), v60);
-        const V v69 = softehl_blend(v68, v60, softehl_splat((-1.0)));
-        v66 = softehl_blend(m67, v69, v66);
+    softehl_load4(a + 12, 17, &a12, &a13, &a14, &a15); softehl_load1(a + 16, 17, &a16);
+    const V v1 = X0 + d0, v2 = X2 + d2, v3 = X4 + d4, v4 = 2.0 * X4, v5 = X0 + a0, v6 = X6 + d6,
+        v7 = X2 + a1, v8 = X4 + a2, v9 = X1 + d1, v10 = X6 + a3, v11 = X3 + d3, v12 = X1 + a6,
+        v13 = X8 + d8, v14 = X3 + a7, v15 = X9 + d9, v16 = X10 + d10, v17 = X10 + a5, v18 = X8 + a4,
+        v19 = X11 + d11, v20 = X9 + a10, v21 = 1.0 / a12, v22 = X11 + a11, v23 = X5 + a8,
+        v24 = 2.0 * X5, v25 = X5 + d5, v26 = X7 + a9, v27 = X7 + d7, v28 = v13 - v6,
+        v29 = v15 - v27, v30 = 0.5 * (v13 + v6) - v16, v31 = 0.5 * (v2 + v1), v32 = 0.5 * (v2 - v1),
+        v33 = 0.5 * (v15 + v27) - v19, v34 = 0.5 * (v11 + v9), v35 = 0.5 * (v11 - v9),
+        v36 = 1.0 / (v32 * v32 + v35 * v35), v37 = (v32 * (v13 - v31) + v35 * (v15 - v34)) * v36;
+    const M v38 = softehl_lt(softehl_splat(1.0), v37);
+    const V v39 = softehl_blend(v38, softehl_splat(1.0), v37); const M v40 = softehl_eq(v39, v39);
+    const V v41 = (v32 * (v6 - v31) + v35 * (v27 - v34)) * v36;
+    const M v42 = softehl_lt(softehl_splat(1.0), v41);
+    const V v43 = softehl_blend(v42, softehl_splat(1.0), v41); const M v44 = softehl_eq(v43, v43);
+    V v45 = softehl_splat(0.0); const M m46 = v40;
+    if (softehl_any(m46)) {
+        const M v47 = softehl_lt(softehl_splat((-1.0)), v39);
+        const V v48 = softehl_blend(v47, v39, softehl_splat((-1.0)));
+        v45 = softehl_blend(m46, v48, v45);
     }
-    const M m70 = ~v61;
-    if (softehl_any(m70)) {
-        const V v71 = (-1.0) - v60;
-        const V v72 = v71 * v71;
-        const V v73 = v71 * v72;
-        v66 = softehl_blend(m70, v73, v66);
+    const M m49 = ~v40;
+    if (softehl_any(m49)) {
+        const V v50 = (-1.0) - v39, v51 = v50 * (v50 * v50);
+        v45 = softehl_blend(m49, v51, v45);
     }
-    V v74 = softehl_splat(0.0);
-    const M m75 = v65;
-    if (softehl_any(m75)) {
-        const M v76 = softehl_lt(softehl_splat((-1.0)), v64);
-        const V v77 = softehl_blend(v76, v64, softehl_splat((-1.0)));
-        v74 = softehl_blend(m75, v77, v74);
+    V v52 = softehl_splat(0.0); const M m53 = v44;
+    if (softehl_any(m53)) {
+        const M v54 = softehl_lt(softehl_splat((-1.0)), v43);
+        const V v55 = softehl_blend(v54, v43, softehl_splat((-1.0)));
+        v52 = softehl_blend(m53, v55, v52);
     }
-    const M m78 = ~v65;
-    if (softehl_any(m78)) {
-        const V v79 = (-1.0) - v64;
-        const V v80 = v79 * v79;
-        const V v81 = v79 * v80;
-        v74 = softehl_blend(m78, v81, v74);
+    const M m56 = ~v44;
+    if (softehl_any(m56)) {
+        const V v57 = (-1.0) - v43, v58 = v57 * (v57 * v57);
+        v52 = softehl_blend(m56, v58, v52);
     }
-    const V v82 = 1.0 + v66;
-    const V v83 = 0.5 + v66;
-    const V v84 = 2.0 * v66;
-    const V v85 = 0.5 * v66;
-    const V v86 = v66 * v66;
-    const V v87 = v85 * v82;
-    const V v88 = v66 - 0.5;
-    const V v89 = v66 - 1.0;
-    const V v90 = v85 * v89;
-    const V v91 = v86 - 1.0;
-    const V v92 = 0.5 + v74;
-    const V v93 = 1.0 + v74;
-    const V v94 = 2.0 * v74;
-    const V v95 = 0.5 * v74;
-    const V v96 = v74 * v74;
-    const V v97 = v95 * v93;
-    const V v98 = v74 - 0.5;
-    const V v99 = v74 - 1.0;
-    const V v100 = v96 - 1.0;
-    const V v101 = v95 * v99;
-    const V v102 = v2 * v83;
-    const V v103 = v11 * v83;
-    const V v104 = v2 * v92;
-    const V v105 = v11 * v92;
-    const V v106 = v2 * v87;
-    const V v107 = v13 - v106;
-    const V v108 = v11 * v87;
-    const V v109 = v15 - v108;
-    const V v110 = v2 * v97;
-    const V v111 = v6 - v110;
-    const V v112 = v11 * v97;
-    const V v113 = v27 - v112;
-    const V v114 = v3 * v94;
-    const V v115 = v104 - v114;
-    const V v116 = v25 * v94;
-    const V v117 = v105 - v116;
-    const V v118 = v3 * v91;
-    const V v119 = v118 + v107;
-    const V v120 = v25 * v91;
-    const V v121 = v120 + v109;
-    const V v122 = v3 * v100;
-    const V v123 = v122 + v111;
-    const V v124 = v3 * v84;
-    const V v125 = v102 - v124;
-    const V v126 = v25 * v84;
-    const V v127 = v103 - v126;
-    const V v128 = v25 * v100;
-    const V v129 = v128 + v113;
-    const V v130 = v1 * v98;
-    const V v131 = v130 + v115;
-    const V v132 = v9 * v98;
-    const V v133 = v132 + v117;
-    const V v134 = v1 * v101;
-    const V v135 = v123 - v134;
-    const V v136 = v9 * v101;
-    const V v137 = v129 - v136;
-    const V v138 = v1 * v90;
-    const V v139 = v119 - v138;
-    const V v140 = v9 * v90;
-    const V v141 = v121 - v140;
-    const V v142 = v1 * v88;
-    const V v143 = v142 + v125;
-    const V v144 = v9 * v88;
-    const V v145 = v144 + v127;
-    const V v146 = v131 * v135;
-    const V v147 = v131 * v131;
-    const V v148 = v139 * v143;
-    const V v149 = v143 * v143;
-    const V v150 = v133 * v137;
-    const V v151 = v146 + v150;
-    const V v152 = v133 * v133;
-    const V v153 = v147 + v152;
-    const V v154 = v141 * v145;
-    const V v155 = v148 + v154;
-    const V v156 = v145 * v145;
-    const V v157 = v149 + v156;
-    const V v158 = 1.0 / v153;
-    const V v159 = 1.0 / v157;
-    const V v160 = v151 * v158;
-    const V v161 = v74 + v160;
-    const V v162 = v155 * v159;
-    const V v163 = v66 + v162;
-    const M v164 = softehl_lt(softehl_splat(1.0), v163);
-    const V v165 = softehl_blend(v164, softehl_splat(1.0), v163);
-    const M v166 = softehl_eq(v165, v165);
-    const M v167 = softehl_lt(softehl_splat(1.0), v161);
-    const V v168 = softehl_blend(v167, softehl_splat(1.0), v161);
-    const M v169 = softehl_eq(v168, v168);
-    V v170 = softehl_splat(0.0);
-    const M m171 = v166;
-    if (softehl_any(m171)) {
-        const M v172 = softehl_lt(softehl_splat((-1.0)), v165);
-        const V v173 = softehl_blend(v172, v165, softehl_splat((-1.0)));
-        v170 = softehl_blend(m171, v173, v170);
+    const V v59 = 0.5 + v45, v60 = 2.0 * v45, v61 = 0.5 * v45, v62 = v61 * (1.0 + v45),
+        v63 = v45 - 0.5, v64 = v61 * (v45 - 1.0), v65 = v45 * v45 - 1.0, v66 = 0.5 + v52,
+        v67 = 2.0 * v52, v68 = 0.5 * v52, v69 = v68 * (1.0 + v52), v70 = v52 - 0.5,
+        v71 = v52 * v52 - 1.0, v72 = v68 * (v52 - 1.0), v73 = v1 * v70 + (v2 * v66 - v3 * v67),
+        v74 = v9 * v70 + (v11 * v66 - v25 * v67), v75 = v1 * v63 + (v2 * v59 - v3 * v60),
+        v76 = v9 * v63 + (v11 * v59 - v25 * v60),
+        v77 = v73 * (v3 * v71 + (v6 - v2 * v69) - v1 * v72) + v74 * (v25 * v71 + (v27 - v11 * v69) - v9 * v72),
+        v78 = (v3 * v65 + (v13 - v2 * v62) - v1 * v64) * v75 + (v25 * v65 + (v15 - v11 * v62) - v9 * v64) * v76,
+        v79 = v52 + v77 * (1.0 / (v73 * v73 + v74 * v74)),
+        v80 = v45 + v78 * (1.0 / (v75 * v75 + v76 * v76));
+    const M v81 = softehl_lt(softehl_splat(1.0), v80);
+    const V v82 = softehl_blend(v81, softehl_splat(1.0), v80);
+    const M v83 = softehl_eq(v82, v82), v84 = softehl_lt(softehl_splat(1.0), v79);
+    const V v85 = softehl_blend(v84, softehl_splat(1.0), v79); const M v86 = softehl_eq(v85, v85);
+    V v87 = softehl_splat(0.0); const M m88 = v83;
+    if (softehl_any(m88)) {
+        const M v89 = softehl_lt(softehl_splat((-1.0)), v82);
+        const V v90 = softehl_blend(v89, v82, softehl_splat((-1.0)));
+        v87 = softehl_blend(m88, v90, v87);
     }
-    const M m174 = ~v166;
-    if (softehl_any(m174)) {
-        const V v175 = (-1.0) - v165;
-        const V v176 = v175 * v175;
-        const V v177 = v175 * v176;
-        v170 = softehl_blend(m174, v177, v170);
+    const M m91 = ~v83;
+    if (softehl_any(m91)) {
+        const V v92 = (-1.0) - v82, v93 = v92 * (v92 * v92);
+        v87 = softehl_blend(m91, v93, v87);
     }
-    V v178 = softehl_splat(0.0);
-    const M m179 = v169;
-    if (softehl_any(m179)) {
-        const M v180 = softehl_lt(softehl_splat((-1.0)), v168);
-        const V v181 = softehl_blend(v180, v168, softehl_splat((-1.0)));
-        v178 = softehl_blend(m179, v181, v178);
+    V v94 = softehl_splat(0.0); const M m95 = v86;
+    if (softehl_any(m95)) {
+        const M v96 = softehl_lt(softehl_splat((-1.0)), v85);
+        const V v97 = softehl_blend(v96, v85, softehl_splat((-1.0)));
+        v94 = softehl_blend(m95, v97, v94);
     }
-    const M m182 = ~v169;
-    if (softehl_any(m182)) {
-        const V v183 = (-1.0) - v168;
-        const V v184 = v183 * v183;
-        const V v185 = v183 * v184;
-        v178 = softehl_blend(m182, v185, v178);
+    const M m98 = ~v86;
+    if (softehl_any(m98)) {
+        const V v99 = (-1.0) - v85, v100 = v99 * (v99 * v99);
+        v94 = softehl_blend(m98, v100, v94);
     }
-    const V v186 = v178 - v170;
-    const M v187 = softehl_eq(v186, v186);
-    V v188 = softehl_splat(0.0);
-    const M m189 = v187;
-    if (softehl_any(m189)) {
-        const M v190 = softehl_lt(softehl_splat(0.0), v186);
-        const V v191 = softehl_blend(v190, v186, softehl_splat(0.0));
-        v188 = softehl_blend(m189, v191, v188);
+    const V v101 = v94 - v87; const M v102 = softehl_eq(v101, v101); V v103 = softehl_splat(0.0);
+    const M m104 = v102;
+    if (softehl_any(m104)) {
+        const M v105 = softehl_lt(softehl_splat(0.0), v101);
+        const V v106 = softehl_blend(v105, v101, softehl_splat(0.0));
+        v103 = softehl_blend(m104, v106, v103);
     }
-    const M m192 = ~v187;
-    if (softehl_any(m192)) {
-        const V v193 = v170 - v178;
-        const V v194 = v193 * v193;
-        const V v195 = v193 * v194;
-        v188 = softehl_blend(m192, v195, v188);
+    const M m107 = ~v102;
+    if (softehl_any(m107)) {
+        const V v108 = v87 - v94, v109 = v108 * (v108 * v108);
+        v103 = softehl_blend(m107, v109, v103);
     }
-    const V v196 = 0.5 * v188;
-    const V v197 = v170 + v178;
-    const V v198 = 0.5 * v197;
-    V s199 = softehl_splat(0.0);
-    V s200 = softehl_splat(0.0);
-    V s201 = softehl_splat(0.0);
-    V s202 = softehl_splat(0.0);
-    V s203 = softehl_splat(0.0);
-    V s204 = softehl_splat(0.0);
-    V s205 = softehl_splat(0.0);
-    V s206 = softehl_splat(0.0);
-    V s207 = softehl_splat(0.0);
-    V s208 = softehl_splat(0.0);
-    V s209 = softehl_splat(0.0);
-    V s210 = softehl_splat(0.0);
-    V s211 = softehl_splat(0.0);
-    V s212 = softehl_splat(0.0);
-    V s213 = softehl_splat(0.0);
-    V s214 = softehl_splat(0.0);
+    const V v110 = 0.5 * v103, v111 = 0.5 * (v87 + v94);
+    V s112 = {0}, s113 = {0}, s114 = {0}, s115 = {0}, s116 = {0}, s117 = {0}, s118 = {0},
+        s119 = {0}, s120 = {0}, s121 = {0}, s122 = {0}, s123 = {0}, s124 = {0}, s125 = {0},
+        s126 = {0}, s127 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const V v215 = w[0] * v196;
-        const V v216 = v215 + v198;
-        const V v217 = (-1.0) + v216;
-        const V v218 = 1.0 + v216;
-        const V v219 = 0.5 + v216;
-        const V v220 = (-0.5) + v216;
-        const V v221 = v216 * v216;
-        const V v222 = 1.0 - v221;
-        const V v223 = 0.5 * v216;
-        const V v224 = 2.0 * v216;
-        const V v225 = v223 * v217;
-        const V v226 = v223 * v218;
-        const V v227 = v3 * v222;
-        const V v228 = v25 * v222;
-        const V v229 = v2 * v219;
-        const V v230 = v11 * v219;
-        const V v231 = v3 * v224;
-        const V v232 = v229 - v231;
-        const V v233 = v25 * v224;
-        const V v234 = v230 - v233;
-        const V v235 = v2 * v226;
-        const V v236 = v235 + v227;
-        const V v237 = v11 * v226;
-        const V v238 = v237 + v228;
-        const V v239 = v1 * v220;
-        const V v240 = v239 + v232;
-        const V v241 = v9 * v220;
-        const V v242 = v241 + v234;
-        const V v243 = v1 * v225;
-        const V v244 = v243 + v236;
-        const V v245 = v9 * v225;
-        const V v246 = v245 + v238;
-        const V v247 = v16 - v244;
-        const V v248 = v19 - v246;
-        const V v249 = v240 * v240;
-        const V v250 = v242 * v242;
-        const V v251 = v249 + v250;
-        const V v252 = softehl_vsqrt(v251);
-        const V v253 = 1.0 / v252;
-        const V v254 = v240 * v253;
-        const V v255 = v242 * v253;
-        const V v256 = v247 * v254;
-        const V v257 = v248 * v255;
-        const V v258 = v256 + v257;
-        const V v259 = v34 * v254;
-        const V v260 = v28 * v254;
-        const V v261 = v39 * v255;
-        const V v262 = v259 + v261;
-        const V v263 = v30 * v255;
-        const V v264 = v260 + v263;
-        const V v265 = 4.0 * v262;
-        const V v266 = 0.5 * v264;
-        const V v267 = v266 * v266;
-        const V v268 = 0.01 * v267;
-        const V v269 = v258 * v265;
-        const V v270 = v267 - v269;
-        const M v271 = softehl_lt(v268, v270);
-        const V v272 = softehl_blend(v271, v270, v268);
-        const V v273 = 2.0 * v258;
-        const V v274 = softehl_vsqrt(v272);
-        const V v275 = 0.5 - v223;
-        const V v276 = 0.5 + v223;
-        const V v277 = d12 * v275;
-        const V v278 = d14 * v276;
-        const V v279 = v277 + v278;
-        const V v280 = v266 - v274;
-        const V v281 = 1.0 / v280;
-        const V v282 = v273 * v281;
-        const V v283 = (-1.0) - v282;
-        const V v284 = 1.0 - v282;
-        const V v285 = v282 * v282;
-        const V v286 = 1.0 - v285;
-        const V v287 = 0.5 * v282;
-        const V v288 = v287 * v283;
-        const V v289 = v287 * v284;
-        const V v290 = v16 * v286;
-        const V v291 = v19 * v286;
-        const V v292 = v290 - v244;
-        const V v293 = v291 - v246;
-        const V v294 = v6 * v288;
-        const V v295 = v292 - v294;
-        const V v296 = v27 * v288;
-        const V v297 = v293 - v296;
-        const V v298 = v13 * v289;
-        const V v299 = v295 - v298;
-        const V v300 = v15 * v289;
-        const V v301 = v297 - v300;
-        const V v302 = v255 * v299;
-        const V v303 = v254 * v301;
-        const V v304 = v302 - v303;
-        const V v305 = a12 * v304;
-        const V v306 = v279 - v305;
-        const M v307 = softehl_eq(v306, v306);
-        V v308 = softehl_splat(0.0);
-        V v309 = softehl_splat(0.0);
-        const M m310 = v307;
-        if (softehl_any(m310)) {
-            const M v311 = softehl_le(softehl_splat(0.0), v306);
-            V v312 = softehl_splat(0.0);
-            V v313 = softehl_splat(0.0);
-            const M m314 = v311 & m310;
-            if (softehl_any(m314)) {
-                const V v315 = a14 + v304;
-                const V v316 = v304 - a15;
-                const V v317 = v315 * v316;
-                const M v318 = softehl_eq(v317, v317);
-                V v319 = softehl_splat(0.0);
-                const M m320 = v318 & m314;
-                if (softehl_any(m320)) {
-                    const M v321 = softehl_lt(v317, softehl_splat(0.0));
-                    const V v322 = softehl_blend(v321, v306, softehl_splat(0.0));
-                    v319 = softehl_blend(m320, v322, v319);
+        const double *restrict w = rule + 2 * q; (void)w;
+        const V v128 = w[0] * v110 + v111, v129 = (-1.0) + v128, v130 = 1.0 + v128,
+            v131 = 0.5 + v128, v132 = (-0.5) + v128, v133 = 1.0 - v128 * v128, v134 = 0.5 * v128,
+            v135 = 2.0 * v128, v136 = v134 * v129, v137 = v134 * v130,
+            v138 = v1 * v132 + (v2 * v131 - v3 * v135),
+            v139 = v9 * v132 + (v11 * v131 - v25 * v135),
+            v140 = v1 * v136 + (v2 * v137 + v3 * v133),
+            v141 = v9 * v136 + (v11 * v137 + v25 * v133),
+            v142 = softehl_vsqrt(v138 * v138 + v139 * v139), v143 = 1.0 / v142, v144 = v138 * v143,
+            v145 = v139 * v143, v146 = (v16 - v140) * v144 + (v19 - v141) * v145,
+            v147 = 0.5 * (v28 * v144 + v29 * v145), v148 = v147 * v147, v149 = 0.01 * v148,
+            v150 = v148 - v146 * (4.0 * (v30 * v144 + v33 * v145));
+        const M v151 = softehl_lt(v149, v150);
+        const V v152 = softehl_blend(v151, v150, v149), v153 = softehl_vsqrt(v152),
+            v154 = 0.5 - v134, v155 = 0.5 + v134, v156 = d12 * v154 + d14 * v155,
+            v157 = 2.0 * v146 * (1.0 / (v147 - v153)), v158 = 1.0 - v157 * v157, v159 = 0.5 * v157,
+            v160 = v159 * ((-1.0) - v157), v161 = v159 * (1.0 - v157),
+            v162 = v145 * (v16 * v158 - v140 - v6 * v160 - v13 * v161) - v144 * (v19 * v158 - v141 - v27 * v160 - v15 * v161),
+            v163 = a12 * v162, v164 = v156 - v163;
+        const M v165 = softehl_eq(v164, v164);
+        V v166 = softehl_splat(0.0), v167 = softehl_splat(0.0);
+        const M m168 = v165;
+        if (softehl_any(m168)) {
+            const M v169 = softehl_le(softehl_splat(0.0), v164);
+            V v170 = softehl_splat(0.0), v171 = softehl_splat(0.0);
+            const M m172 = v169 & m168;
+            if (softehl_any(m172)) {
+                const V v173 = (a14 + v162) * (v162 - a15); const M v174 = softehl_eq(v173, v173);
+                V v175 = softehl_splat(0.0); const M m176 = v174 & m172;
+                if (softehl_any(m176)) {
+                    const M v177 = softehl_lt(v173, softehl_splat(0.0));
+                    const V v178 = softehl_blend(v177, v164, softehl_splat(0.0));
+                    v175 = softehl_blend(m176, v178, v175);
                 }
-                const M m323 = ~v318 & m314;
-                if (softehl_any(m323)) {
-                    const V v324 = v317 * v317;
-                    const V v325 = v317 * v324;
-                    v319 = softehl_blend(m323, v325, v319);
+                const M m179 = ~v174 & m172;
+                if (softehl_any(m179)) {
+                    const V v180 = v173 * (v173 * v173); v175 = softehl_blend(m179, v180, v175);
                 }
-                const V v326 = d13 * v275;
-                const V v327 = a13 * v319;
-                const V v328 = v17 * v286;
-                const V v329 = v22 * v286;
-                const M v330 = softehl_eq(v327, v327);
-                const V v331 = d15 * v276;
-                const V v332 = v326 + v331;
-                const V v333 = v5 * v225;
-                const V v334 = v328 - v333;
-                const V v335 = v12 * v225;
-                const V v336 = v329 - v335;
-                const V v337 = v7 * v226;
-                const V v338 = v334 - v337;
-                const V v339 = v14 * v226;
-                const V v340 = v336 - v339;
-                const V v341 = v8 * v222;
-                const V v342 = v338 - v341;
-                const V v343 = v23 * v222;
-                const V v344 = v340 - v343;
-                const V v345 = v10 * v288;
-                const V v346 = v342 - v345;
-                const V v347 = v26 * v288;
-                const V v348 = v344 - v347;
-                const V v349 = v18 * v289;
-                const V v350 = v346 - v349;
-                const V v351 = v20 * v289;
-                const V v352 = v348 - v351;
-                const V v353 = v254 * v350;
-                const V v354 = v255 * v352;
-                const V v355 = v353 + v354;
-                const V v356 = a12 * v355;
-                const V v357 = v332 + v356;
-                const M v358 = softehl_eq(v357, v357);
-                const M v359 = v330 & v358;
-                V v360 = softehl_splat(0.0);
-                const M m361 = v359 & m314;
-                if (softehl_any(m361)) {
-                    const M v362 = softehl_lt(v327, v357);
-                    V v363 = v327;
-                    const M m364 = ~v362 & m361;
-                    if (softehl_any(m364)) {
-                        V v365 = softehl_splat(0.0);
-                        const M m366 = v330 & m364;
-                        if (softehl_any(m366)) {
-                            const V v367 = -v357;
-                            const M v368 = softehl_lt(v327, v367);
-                            V v369 = v357;
-                            const M m370 = v368 & m366;
-                            if (softehl_any(m370)) {
-                                const V v371 = -v327;
-                                v369 = softehl_blend(m370, v371, v369);
+                const V v181 = a13 * v175; const M v182 = softehl_eq(v181, v181);
+                const V v183 = v17 * v158 - v5 * v136 - v7 * v137 - v8 * v133 - v10 * v160 - v18 * v161,
+                    v184 = v22 * v158 - v12 * v136 - v14 * v137 - v23 * v133 - v26 * v160 - v20 * v161,
+                    v185 = d13 * v154 + d15 * v155 + a12 * (v144 * v183 + v145 * v184);
+                const M v186 = softehl_eq(v185, v185), v187 = v182 & v186;
+                V v188 = softehl_splat(0.0); const M m189 = v187 & m172;
+                if (softehl_any(m189)) {
+                    const M v190 = softehl_lt(v181, v185); V v191 = v181;
+                    const M m192 = ~v190 & m189;
+                    if (softehl_any(m192)) {
+                        V v193 = softehl_splat(0.0); const M m194 = v182 & m192;
+                        if (softehl_any(m194)) {
+                            const M v195 = softehl_lt(v181, -v185); V v196 = v185;
+                            const M m197 = v195 & m194;
+                            if (softehl_any(m197)) {
+                                const V v198 = -v181; v196 = softehl_blend(m197, v198, v196);
                             }
-                            v365 = softehl_blend(m366, v369, v365);
+                            v193 = softehl_blend(m194, v196, v193);
                         }
-                        const M m372 = ~v330 & m364;
-                        if (softehl_any(m372)) {
-                            const V v373 = v357 + v327;
-                            const V v374 = v373 * v373;
-                            const V v375 = v373 * v374;
-                            v365 = softehl_blend(m372, v375, v365);
+                        const M m199 = ~v182 & m192;
+                        if (softehl_any(m199)) {
+                            const V v200 = v185 + v181, v201 = v200 * (v200 * v200);
+                            v193 = softehl_blend(m199, v201, v193);
                         }
-                        v363 = softehl_blend(m364, v365, v363);
+                        v191 = softehl_blend(m192, v193, v191);
                     }
-                    v360 = softehl_blend(m361, v363, v360);
+                    v188 = softehl_blend(m189, v191, v188);
                 }
-                const M m376 = ~v359 & m314;
-                if (softehl_any(m376)) {
-                    const V v377 = v327 - v357;
-                    const V v378 = v377 * v377;
-                    const V v379 = v377 * v378;
-                    v360 = softehl_blend(m376, v379, v360);
+                const M m202 = ~v187 & m172;
+                if (softehl_any(m202)) {
+                    const V v203 = v181 - v185, v204 = v203 * (v203 * v203);
+                    v188 = softehl_blend(m202, v204, v188);
                 }
-                v312 = softehl_blend(m314, v319, v312);
-                v313 = softehl_blend(m314, v360, v313);
+                v170 = softehl_blend(m172, v175, v170); v171 = softehl_blend(m172, v188, v171);
             }
-            v308 = softehl_blend(m310, v312, v308);
-            v309 = softehl_blend(m310, v313, v309);
+            v166 = softehl_blend(m168, v170, v166); v167 = softehl_blend(m168, v171, v167);
         }
-        const M m380 = ~v307;
-        if (softehl_any(m380)) {
-            const V v381 = v305 - v279;
-            const V v382 = v381 * v381;
-            const V v383 = v381 * v382;
-            v308 = softehl_blend(m380, v383, v308);
-            v309 = softehl_blend(m380, v383, v309);
+        const M m205 = ~v165;
+        if (softehl_any(m205)) {
+            const V v206 = v163 - v156, v207 = v206 * (v206 * v206);
+            v166 = softehl_blend(m205, v207, v166); v167 = softehl_blend(m205, v207, v167);
         }
-        const V v384 = v21 * w[1];
-        const V v385 = w[1] * v226;
-        const V v386 = w[1] * v225;
-        const V v387 = w[1] * v288;
-        const V v388 = w[1] * v286;
-        const V v389 = w[1] * v289;
-        const V v390 = w[1] * v222;
-        const V v391 = X5 * v222;
-        const V v392 = v384 * v276;
-        const V v393 = v384 * v275;
-        const V v394 = X0 * v220;
-        const V v395 = X1 * v220;
-        const V v396 = X1 * v217;
-        const V v397 = v4 * v216;
-        const V v398 = v394 - v397;
-        const V v399 = v24 * v216;
-        const V v400 = v395 - v399;
-        const V v401 = X3 * v218;
-        const V v402 = v396 + v401;
-        const V v403 = X3 * v219;
-        const V v404 = v403 + v400;
-        const V v405 = X2 * v219;
-        const V v406 = v405 + v398;
-        const V v407 = 0.5 * v402;
-        const V v408 = v404 * v404;
-        const V v409 = v216 * v407;
-        const V v410 = v391 + v409;
-        const V v411 = v406 * v406;
-        const V v412 = v408 + v411;
-        const V v413 = softehl_vsqrt(v412);
-        const V v414 = 6.283185307179586 * v410;
-        const V v415 = (-1.0) + v414;
-        const V v416 = a16 * v415;
-        const V v417 = 1.0 + v416;
-        const V v418 = v255 * v308;
-        const V v419 = v255 * v309;
-        const V v420 = v254 * v309;
-        const V v421 = v418 + v420;
-        const V v422 = v254 * v308;
-        const V v423 = v419 - v422;
-        const V v424 = v196 * v413;
-        const V v425 = v417 * v424;
-        const V v426 = v308 * v425;
-        const V v427 = v309 * v425;
-        const V v428 = v421 * v425;
-        const V v429 = v423 * v425;
-        const V v430 = v392 * v426;
-        s199 += v430;
-        const V v431 = v393 * v426;
-        s200 += v431;
-        const V v432 = v392 * v427;
-        s201 += v432;
-        const V v433 = v393 * v427;
-        s202 += v433;
-        const V v434 = v387 * v429;
-        s207 += v434;
-        const V v435 = v387 * v428;
-        s208 += v435;
-        const V v436 = v390 * v429;
-        s209 += v436;
-        const V v437 = v390 * v428;
-        s210 += v437;
-        const V v438 = v385 * v429;
-        s211 += v438;
-        const V v439 = v385 * v428;
-        s212 += v439;
-        const V v440 = v386 * v429;
-        s213 += v440;
-        const V v441 = v386 * v428;
-        s214 += v441;
-        const V v442 = v388 * v428;
-        s204 += v442;
-        const V v443 = v388 * v429;
-        s203 += v443;
-        const V v444 = v389 * v428;
-        s206 += v444;
-        const V v445 = v389 * v429;
-        s205 += v445;
+        const V v208 = v21 * w[1], v209 = w[1] * v137, v210 = w[1] * v136, v211 = w[1] * v160,
+            v212 = w[1] * v158, v213 = w[1] * v161, v214 = w[1] * v133, v215 = v208 * v155,
+            v216 = v208 * v154, v217 = X3 * v131 + (X1 * v132 - v24 * v128),
+            v218 = X2 * v131 + (X0 * v132 - v4 * v128),
+            v219 = softehl_vsqrt(v217 * v217 + v218 * v218),
+            v220 = 6.283185307179586 * (X5 * v133 + v128 * (0.5 * (X1 * v129 + X3 * v130))),
+            v221 = (1.0 + a16 * ((-1.0) + v220)) * (v110 * v219), v222 = v166 * v221,
+            v223 = v167 * v221, v224 = (v145 * v166 + v144 * v167) * v221,
+            v225 = (v145 * v167 - v144 * v166) * v221, v226 = v215 * v222;
+        s112 += v226; const V v227 = v216 * v222; s113 += v227; const V v228 = v215 * v223;
+        s114 += v228; const V v229 = v216 * v223; s115 += v229; const V v230 = v211 * v225;
+        s120 += v230; const V v231 = v211 * v224; s121 += v231; const V v232 = v214 * v225;
+        s122 += v232; const V v233 = v214 * v224; s123 += v233; const V v234 = v209 * v225;
+        s124 += v234; const V v235 = v209 * v224; s125 += v235; const V v236 = v210 * v225;
+        s126 += v236; const V v237 = v210 * v224; s127 += v237; const V v238 = v212 * v224;
+        s117 += v238; const V v239 = v212 * v225; s116 += v239; const V v240 = v213 * v224;
+        s119 += v240; const V v241 = v213 * v225; s118 += v241;
     }
-    softehl_store4(R + 12, 16, s200, s202, s199, s201);
-    softehl_store4(R + 4, 16, s210, s209, s208, s207);
-    softehl_store4(R + 0, 16, s214, s213, s212, s211);
-    const V v446 = -s203;
-    const V v447 = -s204;
-    softehl_store4(R + 8, 16, s206, s205, v447, v446);
+    softehl_store4(R + 12, 16, s113, s115, s112, s114);
+    softehl_store4(R + 4, 16, s123, s122, s121, s120);
+    softehl_store4(R + 0, 16, s127, s126, s125, s124);
+    softehl_store4(R + 8, 16, s119, s118, -s117, -s116);
 }
+SOFTEHL_BATCH(softehl_mortar_33_residual, 12, 16, 17, 0, 16, 0)
 
-void softehl_mortar_33_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_mortar_33_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mortar_33_residual_group(points, modes, coordinates + 12 * e, dofs + 16 * e, data + 17 * e, 0, parameters, rule, basis, values + 16 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mortar_33_residual_group(points, modes, coordinates + 12 * (n - SOFTEHL_LANES), dofs + 16 * (n - SOFTEHL_LANES), data + 17 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 16 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 12];
-    softehl_pad(X, coordinates, 12, n);
-    double d[SOFTEHL_LANES * 16];
-    softehl_pad(d, dofs, 16, n);
-    double a[SOFTEHL_LANES * 17];
-    softehl_pad(a, data, 17, n);
-    double R[SOFTEHL_LANES * 16];
-    softehl_mortar_33_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 16 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_mortar_33_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8, X9, X10, X11;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8, X9, X10, X11;
+    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
     softehl_load4(X + 8, 12, &X8, &X9, &X10, &X11);
-    (void)X8; (void)X9; (void)X10; (void)X11;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 16, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 16, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15;
+    softehl_load4(d + 0, 16, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 16, &d4, &d5, &d6, &d7);
     softehl_load4(d + 8, 16, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13, d14, d15;
     softehl_load4(d + 12, 16, &d12, &d13, &d14, &d15);
-    (void)d12; (void)d13; (void)d14; (void)d15;
-    V a0, a1, a2, a3;
-    softehl_load4(a + 0, 17, &a0, &a1, &a2, &a3);
-    (void)a0; (void)a1; (void)a2; (void)a3;
-    V a4, a5, a6, a7;
-    softehl_load4(a + 4, 17, &a4, &a5, &a6, &a7);
-    (void)a4; (void)a5; (void)a6; (void)a7;
-    V a8, a9, a10, a11;
+    V a0, a1, a2, a3, a4, a5, a6, a7, a8, a9, a10, a11, a12, a13, a14, a15, a16;
+    softehl_load4(a + 0, 17, &a0, &a1, &a2, &a3); softehl_load4(a + 4, 17, &a4, &a5, &a6, &a7);
     softehl_load4(a + 8, 17, &a8, &a9, &a10, &a11);
-    (void)a8; (void)a9; (void)a10; (void)a11;
-    V a12, a13, a14, a15;
-    softehl_load4(a + 12, 17, &a12, &a13, &a14, &a15);
-    (void)a12; (void)a13; (void)a14; (void)a15;
-    V a16;
-    softehl_load1(a + 16, 17, &a16);
-    (void)a16;
-    const V v1 = X4 + d4;
-    const V v2 = 2.0 * X4;
-    const V v3 = X6 + d6;
-    const V v4 = X8 + d8;
-    const V v5 = X4 + a2;
-    const V v6 = X10 + d10;
-    const V v7 = X6 + a3;
-    const V v8 = X5 + d5;
-    const V v9 = 2.0 * X5;
-    const V v10 = X8 + a4;
-    const V v11 = X10 + a5;
-    const V v12 = X7 + d7;
-    const V v13 = X5 + a8;
-    const V v14 = X9 + d9;
-    const V v15 = X7 + a9;
-    const V v16 = -a13;
-    const V v17 = X9 + a10;
-    const V v18 = X0 + a0;
-    const V v19 = X2 + a1;
-    const V v20 = X0 + X2;
-    const V v21 = X1 + a6;
-    const V v22 = 0.5 * X1;
-    const V v23 = X3 + a7;
-    const V v24 = 0.5 * X3;
-    const V v25 = X1 + X3;
-    const V v26 = X11 + a11;
-    const V v27 = X11 + d11;
-    const V v28 = X0 + d0;
-    const V v29 = X1 + d1;
-    const V v30 = X3 + d3;
-    const V v31 = d1 + d3;
-    const V v32 = v31 + v25;
-    const V v33 = d0 + d2;
-    const V v34 = X2 + d2;
-    const V v35 = v30 + v29;
-    const V v36 = 0.5 * v32;
-    const V v37 = v25 - v9;
-    const V v38 = v34 + v28;
-    const V v39 = v30 - X1;
-    const V v40 = v33 + v20;
-    const V v41 = v34 - X0;
-    const V v42 = d1 - v39;
-    const V v43 = 0.5 * v40;
-    const V v44 = v20 - v2;
-    const V v45 = 2.0 * v8;
-    const V v46 = v35 - v45;
-    const V v47 = v39 - d1;
-    const V v48 = d0 - v41;
-    const V v49 = 0.5 * v42;
-    const V v50 = v41 - d0;
-    const V v51 = 2.0 * v1;
-    const V v52 = v38 - v51;
-    const V v53 = 0.5 * v48;
-    const V v54 = 0.5 * v47;
-    const V v55 = 0.25 * v47;
-    const V v56 = 1.0 / a12;
-    const V v57 = -a12;
-    const V v58 = 0.5 * v50;
-    const V v59 = 0.25 * v50;
-    const V v60 = v54 * v54;
-    const V v61 = d12 - d14;
-    const V v62 = d14 - d12;
-    const V v63 = d13 - d15;
-    const V v64 = v58 * v58;
-    const V v65 = v64 + v60;
-    const V v66 = d15 - d13;
-    const V v67 = 0.5 * v61;
-    const V v68 = 0.5 * v62;
-    const V v69 = 0.5 * v63;
-    const V v70 = 1.0 / v65;
-    const V v71 = 0.5 * v66;
-    const V v72 = v4 - v3;
-    const V v73 = v4 + v3;
-    const V v74 = 0.5 * v72;
-    const V v75 = v4 - v43;
-    const V v76 = v3 - v43;
-    const V v77 = 0.5 * v73;
-    const V v78 = v14 - v12;
-    const V v79 = v14 + v12;
-    const V v80 = 0.5 * v78;
-    const V v81 = 0.5 * v75;
-    const V v82 = 0.5 * v76;
-    const V v83 = 0.5 * v79;
-    const V v84 = v77 - v6;
-    const V v85 = v75 * v58;
-    const V v86 = v76 * v58;
-    const V v87 = v81 + v59;
-    const V v88 = v82 + v59;
-    const V v89 = v83 - v27;
-    const V v90 = v14 - v36;
-    const V v91 = v12 - v36;
-    const V v92 = v81 - v59;
-    const V v93 = v82 - v59;
-    const V v94 = 0.5 * v90;
-    const V v95 = v90 * v54;
-    const V v96 = v85 + v95;
-    const V v97 = v91 * v54;
-    const V v98 = v86 + v97;
-    const V v99 = 0.5 * v91;
-    const V v100 = v96 * v70;
-    const V v101 = v94 + v55;
-    const V v102 = v99 + v55;
-    const M v103 = softehl_lt(softehl_splat(1.0), v100);
-    const V v104 = v94 - v55;
-    const V v105 = v99 - v55;
-    const V v106 = softehl_blend(v103, softehl_splat(1.0), v100);
-    const M v107 = softehl_eq(v106, v106);
-    const V v108 = v98 * v70;
-    const M v109 = softehl_lt(softehl_splat(1.0), v108);
-    const V v110 = softehl_blend(v109, softehl_splat(1.0), v108);
-    const M v111 = softehl_eq(v110, v110);
-    const V v112 = v70 * v70;
-    const V v113 = v88 * v70;
-    const V v114 = v87 * v70;
-    const V v115 = v93 * v70;
-    const V v116 = v92 * v70;
-    const V v117 = v102 * v70;
-    const V v118 = v53 * v112;
-    const V v119 = v49 * v112;
-    const V v120 = v101 * v70;
-    const V v121 = v105 * v70;
-    const V v122 = v104 * v70;
-    const V v123 = v58 * v112;
-    const V v124 = v58 * v70;
-    const V v125 = v54 * v112;
-    const V v126 = v54 * v70;
-    const V v127 = v98 * v118;
-    const V v128 = v127 + v113;
-    const V v129 = v96 * v118;
-    const V v130 = v114 + v129;
-    const V v131 = v98 * v119;
-    const V v132 = v131 + v117;
-    const V v133 = v96 * v119;
-    const V v134 = v120 + v133;
-    const V v135 = v98 * v123;
-    const V v136 = v96 * v123;
-    const V v137 = v98 * v125;
-    const V v138 = v96 * v125;
-    V v139 = softehl_splat(0.0);
-    V v140 = softehl_splat(0.0);
-    V v141 = softehl_splat(0.0);
-    V v142 = softehl_splat(0.0);
-    V v143 = softehl_splat(0.0);
-    V v144 = softehl_splat(0.0);
-    V v145 = softehl_splat(0.0);
-    const M m146 = v107;
-    if (softehl_any(m146)) {
-        const M v147 = softehl_lt(softehl_splat((-1.0)), v106);
-        V v148 = softehl_splat((-1.0));
-        V v149 = softehl_splat(0.0);
-        V v150 = softehl_splat(0.0);
-        V v151 = softehl_splat(0.0);
-        V v152 = softehl_splat(0.0);
-        V v153 = softehl_splat(0.0);
-        V v154 = softehl_splat(0.0);
-        const M m155 = v147 & m146;
-        if (softehl_any(m155)) {
-            V v156 = softehl_splat(0.0);
-            V v157 = softehl_splat(0.0);
-            V v158 = softehl_splat(0.0);
-            V v159 = softehl_splat(0.0);
-            V v160 = softehl_splat(0.0);
-            V v161 = softehl_splat(0.0);
-            const M m162 = ~v103 & m155;
-            if (softehl_any(m162)) {
-                const V v163 = -v130;
-                const V v164 = -v134;
-                const V v165 = v116 - v136;
-                const V v166 = v122 - v138;
-                v156 = softehl_blend(m162, v124, v156);
-                v157 = softehl_blend(m162, v126, v157);
-                v158 = softehl_blend(m162, v163, v158);
-                v159 = softehl_blend(m162, v164, v159);
-                v160 = softehl_blend(m162, v165, v160);
-                v161 = softehl_blend(m162, v166, v161);
+    softehl_load4(a + 12, 17, &a12, &a13, &a14, &a15); softehl_load1(a + 16, 17, &a16);
+    const V v1 = X4 + d4, v2 = 2.0 * X4, v3 = X6 + d6, v4 = X8 + d8, v5 = X4 + a2, v6 = X10 + d10,
+        v7 = X6 + a3, v8 = X5 + d5, v9 = 2.0 * X5, v10 = X8 + a4, v11 = X10 + a5, v12 = X7 + d7,
+        v13 = X5 + a8, v14 = X9 + d9, v15 = X7 + a9, v16 = -a13, v17 = X9 + a10, v18 = X0 + a0,
+        v19 = X2 + a1, v20 = X0 + X2, v21 = X1 + a6, v22 = 0.5 * X1, v23 = X3 + a7, v24 = 0.5 * X3,
+        v25 = X1 + X3, v26 = X11 + a11, v27 = X11 + d11, v28 = X0 + d0, v29 = X1 + d1,
+        v30 = X3 + d3, v31 = X2 + d2, v32 = v30 + v29, v33 = 0.5 * (d1 + d3 + v25), v34 = v25 - v9,
+        v35 = v31 + v28, v36 = v30 - X1, v37 = v31 - X0, v38 = 0.5 * (d0 + d2 + v20),
+        v39 = v20 - v2, v40 = v32 - 2.0 * v8, v41 = v36 - d1, v42 = v37 - d0, v43 = v35 - 2.0 * v1,
+        v44 = 0.5 * v41, v45 = 0.25 * v41, v46 = 1.0 / a12, v47 = -a12, v48 = 0.5 * v42,
+        v49 = 0.25 * v42, v50 = 0.5 * (d12 - d14), v51 = 0.5 * (d14 - d12), v52 = 0.5 * (d13 - d15),
+        v53 = 1.0 / (v48 * v48 + v44 * v44), v54 = 0.5 * (d15 - d13), v55 = 0.5 * (v4 - v3),
+        v56 = v4 - v38, v57 = v3 - v38, v58 = 0.5 * (v14 - v12), v59 = 0.5 * v56, v60 = 0.5 * v57,
+        v61 = 0.5 * (v4 + v3) - v6, v62 = 0.5 * (v14 + v12) - v27, v63 = v14 - v33, v64 = v12 - v33,
+        v65 = 0.5 * v63, v66 = v56 * v48 + v63 * v44, v67 = v57 * v48 + v64 * v44, v68 = 0.5 * v64,
+        v69 = v66 * v53;
+    const M v70 = softehl_lt(softehl_splat(1.0), v69);
+    const V v71 = softehl_blend(v70, softehl_splat(1.0), v69); const M v72 = softehl_eq(v71, v71);
+    const V v73 = v67 * v53; const M v74 = softehl_lt(softehl_splat(1.0), v73);
+    const V v75 = softehl_blend(v74, softehl_splat(1.0), v73); const M v76 = softehl_eq(v75, v75);
+    const V v77 = v53 * v53, v78 = (v60 - v49) * v53, v79 = (v59 - v49) * v53,
+        v80 = 0.5 * (d0 - v37) * v77, v81 = 0.5 * (d1 - v36) * v77, v82 = (v68 - v45) * v53,
+        v83 = (v65 - v45) * v53, v84 = v48 * v77, v85 = v48 * v53, v86 = v44 * v77, v87 = v44 * v53,
+        v88 = v67 * v80 + (v60 + v49) * v53, v89 = (v59 + v49) * v53 + v66 * v80,
+        v90 = v67 * v81 + (v68 + v45) * v53, v91 = (v65 + v45) * v53 + v66 * v81, v92 = v67 * v84,
+        v93 = v66 * v84, v94 = v67 * v86, v95 = v66 * v86;
+    V v96 = softehl_splat(0.0), v97 = softehl_splat(0.0), v98 = softehl_splat(0.0),
+        v99 = softehl_splat(0.0), v100 = softehl_splat(0.0), v101 = softehl_splat(0.0),
+        v102 = softehl_splat(0.0);
+    const M m103 = v72;
+    if (softehl_any(m103)) {
+        const M v104 = softehl_lt(softehl_splat((-1.0)), v71);
+        V v105 = softehl_splat((-1.0)), v106 = softehl_splat(0.0), v107 = softehl_splat(0.0),
+            v108 = softehl_splat(0.0), v109 = softehl_splat(0.0), v110 = softehl_splat(0.0),
+            v111 = softehl_splat(0.0);
+        const M m112 = v104 & m103;
+        if (softehl_any(m112)) {
+            V v113 = softehl_splat(0.0), v114 = softehl_splat(0.0), v115 = softehl_splat(0.0),
+                v116 = softehl_splat(0.0), v117 = softehl_splat(0.0), v118 = softehl_splat(0.0);
+            const M m119 = ~v70 & m112;
+            if (softehl_any(m119)) {
+                const V v120 = -v89, v121 = -v91, v122 = v79 - v93, v123 = v83 - v95;
+                v113 = softehl_blend(m119, v85, v113); v114 = softehl_blend(m119, v87, v114);
+                v115 = softehl_blend(m119, v120, v115); v116 = softehl_blend(m119, v121, v116);
+                v117 = softehl_blend(m119, v122, v117); v118 = softehl_blend(m119, v123, v118);
             }
-            v148 = softehl_blend(m155, v106, v148);
-            v149 = softehl_blend(m155, v156, v149);
-            v150 = softehl_blend(m155, v157, v150);
-            v151 = softehl_blend(m155, v158, v151);
-            v152 = softehl_blend(m155, v159, v152);
-            v153 = softehl_blend(m155, v160, v153);
-            v154 = softehl_blend(m155, v161, v154);
+            v105 = softehl_blend(m112, v71, v105); v106 = softehl_blend(m112, v113, v106);
+            v107 = softehl_blend(m112, v114, v107); v108 = softehl_blend(m112, v115, v108);
+            v109 = softehl_blend(m112, v116, v109); v110 = softehl_blend(m112, v117, v110);
+            v111 = softehl_blend(m112, v118, v111);
         }
-        v139 = softehl_blend(m146, v148, v139);
-        v140 = softehl_blend(m146, v151, v140);
-        v141 = softehl_blend(m146, v152, v141);
-        v142 = softehl_blend(m146, v153, v142);
-        v143 = softehl_blend(m146, v154, v143);
-        v144 = softehl_blend(m146, v149, v144);
-        v145 = softehl_blend(m146, v150, v145);
+        v96 = softehl_blend(m103, v105, v96); v97 = softehl_blend(m103, v108, v97);
+        v98 = softehl_blend(m103, v109, v98); v99 = softehl_blend(m103, v110, v99);
+        v100 = softehl_blend(m103, v111, v100); v101 = softehl_blend(m103, v106, v101);
+        v102 = softehl_blend(m103, v107, v102);
     }
-    const M m167 = ~v107;
-    if (softehl_any(m167)) {
-        const V v168 = (-1.0) - v106;
-        const V v169 = v168 * v168;
-        const V v170 = v168 * v169;
-        V v171 = softehl_splat(0.0);
-        V v172 = softehl_splat(0.0);
-        V v173 = softehl_splat(0.0);
-        V v174 = softehl_splat(0.0);
-        V v175 = softehl_splat(0.0);
-        V v176 = softehl_splat(0.0);
-        const M m177 = ~v103 & m167;
-        if (softehl_any(m177)) {
-            const V v178 = (-1.0) - v100;
-            const V v179 = v136 - v116;
-            const V v180 = v138 - v122;
-            const V v181 = 3.0 * v178;
-            const V v182 = v178 * v181;
-            const V v183 = v179 * v182;
-            const V v184 = v180 * v182;
-            const V v185 = v130 * v182;
-            const V v186 = v134 * v182;
-            const V v187 = v124 * v182;
-            const V v188 = -v187;
-            const V v189 = v126 * v182;
-            const V v190 = -v189;
-            v171 = softehl_blend(m177, v185, v171);
-            v172 = softehl_blend(m177, v186, v172);
-            v173 = softehl_blend(m177, v183, v173);
-            v174 = softehl_blend(m177, v184, v174);
-            v175 = softehl_blend(m177, v188, v175);
-            v176 = softehl_blend(m177, v190, v176);
+    const M m124 = ~v72;
+    if (softehl_any(m124)) {
+        const V v125 = (-1.0) - v71, v126 = v125 * (v125 * v125);
+        V v127 = softehl_splat(0.0), v128 = softehl_splat(0.0), v129 = softehl_splat(0.0),
+            v130 = softehl_splat(0.0), v131 = softehl_splat(0.0), v132 = softehl_splat(0.0);
+        const M m133 = ~v70 & m124;
+        if (softehl_any(m133)) {
+            const V v134 = (-1.0) - v69, v135 = v134 * (3.0 * v134), v136 = (v93 - v79) * v135,
+                v137 = (v95 - v83) * v135, v138 = v89 * v135, v139 = v91 * v135,
+                v140 = -(v85 * v135), v141 = -(v87 * v135);
+            v127 = softehl_blend(m133, v138, v127); v128 = softehl_blend(m133, v139, v128);
+            v129 = softehl_blend(m133, v136, v129); v130 = softehl_blend(m133, v137, v130);
+            v131 = softehl_blend(m133, v140, v131); v132 = softehl_blend(m133, v141, v132);
         }
-        v139 = softehl_blend(m167, v170, v139);
-        v140 = softehl_blend(m167, v171, v140);
-        v141 = softehl_blend(m167, v172, v141);
-        v142 = softehl_blend(m167, v173, v142);
-        v143 = softehl_blend(m167, v174, v143);
-        v144 = softehl_blend(m167, v175, v144);
-        v145 = softehl_blend(m167, v176, v145);
+        v96 = softehl_blend(m124, v126, v96); v97 = softehl_blend(m124, v127, v97);
+        v98 = softehl_blend(m124, v128, v98); v99 = softehl_blend(m124, v129, v99);
+        v100 = softehl_blend(m124, v130, v100); v101 = softehl_blend(m124, v131, v101);
+        v102 = softehl_blend(m124, v132, v102);
     }
-    V v191 = softehl_splat(0.0);
-    V v192 = softehl_splat(0.0);
-    V v193 = softehl_splat(0.0);
-    V v194 = softehl_splat(0.0);
-    V v195 = softehl_splat(0.0);
-    V v196 = softehl_splat(0.0);
-    V v197 = softehl_splat(0.0);
-    const M m198 = v111;
-    if (softehl_any(m198)) {
-        const M v199 = softehl_lt(softehl_splat((-1.0)), v110);
-        V v200 = softehl_splat((-1.0));
-        V v201 = softehl_splat(0.0);
-        V v202 = softehl_splat(0.0);
-        V v203 = softehl_splat(0.0);
-        V v204 = softehl_splat(0.0);
-        V v205 = softehl_splat(0.0);
-        V v206 = softehl_splat(0.0);
-        const M m207 = v199 & m198;
-        if (softehl_any(m207)) {
-            V v208 = softehl_splat(0.0);
-            V v209 = softehl_splat(0.0);
-            V v210 = softehl_splat(0.0);
-            V v211 = softehl_splat(0.0);
-            V v212 = softehl_splat(0.0);
-            V v213 = softehl_splat(0.0);
-            const M m214 = ~v109 & m207;
-            if (softehl_any(m214)) {
-                const V v215 = -v128;
-                const V v216 = -v132;
-                const V v217 = v115 - v135;
-                const V v218 = v121 - v137;
-                v208 = softehl_blend(m214, v124, v208);
-                v209 = softehl_blend(m214, v126, v209);
-                v210 = softehl_blend(m214, v215, v210);
-                v211 = softehl_blend(m214, v216, v211);
-                v212 = softehl_blend(m214, v217, v212);
-                v213 = softehl_blend(m214, v218, v213);
+    V v142 = softehl_splat(0.0), v143 = softehl_splat(0.0), v144 = softehl_splat(0.0),
+        v145 = softehl_splat(0.0), v146 = softehl_splat(0.0), v147 = softehl_splat(0.0),
+        v148 = softehl_splat(0.0);
+    const M m149 = v76;
+    if (softehl_any(m149)) {
+        const M v150 = softehl_lt(softehl_splat((-1.0)), v75);
+        V v151 = softehl_splat((-1.0)), v152 = softehl_splat(0.0), v153 = softehl_splat(0.0),
+            v154 = softehl_splat(0.0), v155 = softehl_splat(0.0), v156 = softehl_splat(0.0),
+            v157 = softehl_splat(0.0);
+        const M m158 = v150 & m149;
+        if (softehl_any(m158)) {
+            V v159 = softehl_splat(0.0), v160 = softehl_splat(0.0), v161 = softehl_splat(0.0),
+                v162 = softehl_splat(0.0), v163 = softehl_splat(0.0), v164 = softehl_splat(0.0);
+            const M m165 = ~v74 & m158;
+            if (softehl_any(m165)) {
+                const V v166 = -v88, v167 = -v90, v168 = v78 - v92, v169 = v82 - v94;
+                v159 = softehl_blend(m165, v85, v159); v160 = softehl_blend(m165, v87, v160);
+                v161 = softehl_blend(m165, v166, v161); v162 = softehl_blend(m165, v167, v162);
+                v163 = softehl_blend(m165, v168, v163); v164 = softehl_blend(m165, v169, v164);
             }
-            v200 = softehl_blend(m207, v110, v200);
-            v201 = softehl_blend(m207, v208, v201);
-            v202 = softehl_blend(m207, v209, v202);
-            v203 = softehl_blend(m207, v210, v203);
-            v204 = softehl_blend(m207, v211, v204);
-            v205 = softehl_blend(m207, v212, v205);
-            v206 = softehl_blend(m207, v213, v206);
+            v151 = softehl_blend(m158, v75, v151); v152 = softehl_blend(m158, v159, v152);
+            v153 = softehl_blend(m158, v160, v153); v154 = softehl_blend(m158, v161, v154);
+            v155 = softehl_blend(m158, v162, v155); v156 = softehl_blend(m158, v163, v156);
+            v157 = softehl_blend(m158, v164, v157);
         }
-        v191 = softehl_blend(m198, v200, v191);
-        v192 = softehl_blend(m198, v203, v192);
-        v193 = softehl_blend(m198, v204, v193);
-        v194 = softehl_blend(m198, v205, v194);
-        v195 = softehl_blend(m198, v206, v195);
-        v196 = softehl_blend(m198, v201, v196);
-        v197 = softehl_blend(m198, v202, v197);
+        v142 = softehl_blend(m149, v151, v142); v143 = softehl_blend(m149, v154, v143);
+        v144 = softehl_blend(m149, v155, v144); v145 = softehl_blend(m149, v156, v145);
+        v146 = softehl_blend(m149, v157, v146); v147 = softehl_blend(m149, v152, v147);
+        v148 = softehl_blend(m149, v153, v148);
     }
-    const M m219 = ~v111;
-    if (softehl_any(m219)) {
-        const V v220 = (-1.0) - v110;
-        const V v221 = v220 * v220;
-        const V v222 = v220 * v221;
-        V v223 = softehl_splat(0.0);
-        V v224 = softehl_splat(0.0);
-        V v225 = softehl_splat(0.0);
-        V v226 = softehl_splat(0.0);
-        V v227 = softehl_splat(0.0);
-        V v228 = softehl_splat(0.0);
-        const M m229 = ~v109 & m219;
-        if (softehl_any(m229)) {
-            const V v230 = (-1.0) - v108;
-            const V v231 = v135 - v115;
-            const V v232 = v137 - v121;
-            const V v233 = 3.0 * v230;
-            const V v234 = v230 * v233;
-            const V v235 = v231 * v234;
-            const V v236 = v232 * v234;
-            const V v237 = v128 * v234;
-            const V v238 = v132 * v234;
-            const V v239 = v124 * v234;
-            const V v240 = -v239;
-            const V v241 = v126 * v234;
-            const V v242 = -v241;
-            v223 = softehl_blend(m229, v237, v223);
-            v224 = softehl_blend(m229, v238, v224);
-            v225 = softehl_blend(m229, v235, v225);
-            v226 = softehl_blend(m229, v236, v226);
-            v227 = softehl_blend(m229, v240, v227);
-            v228 = softehl_blend(m229, v242, v228);
+    const M m170 = ~v76;
+    if (softehl_any(m170)) {
+        const V v171 = (-1.0) - v75, v172 = v171 * (v171 * v171);
+        V v173 = softehl_splat(0.0), v174 = softehl_splat(0.0), v175 = softehl_splat(0.0),
+            v176 = softehl_splat(0.0), v177 = softehl_splat(0.0), v178 = softehl_splat(0.0);
+        const M m179 = ~v74 & m170;
+        if (softehl_any(m179)) {
+            const V v180 = (-1.0) - v73, v181 = v180 * (3.0 * v180), v182 = (v92 - v78) * v181,
+                v183 = (v94 - v82) * v181, v184 = v88 * v181, v185 = v90 * v181,
+                v186 = -(v85 * v181), v187 = -(v87 * v181);
+            v173 = softehl_blend(m179, v184, v173); v174 = softehl_blend(m179, v185, v174);
+            v175 = softehl_blend(m179, v182, v175); v176 = softehl_blend(m179, v183, v176);
+            v177 = softehl_blend(m179, v186, v177); v178 = softehl_blend(m179, v187, v178);
         }
-        v191 = softehl_blend(m219, v222, v191);
-        v192 = softehl_blend(m219, v223, v192);
-        v193 = softehl_blend(m219, v224, v193);
-        v194 = softehl_blend(m219, v225, v194);
-        v195 = softehl_blend(m219, v226, v195);
-        v196 = softehl_blend(m219, v227, v196);
-        v197 = softehl_blend(m219, v228, v197);
+        v142 = softehl_blend(m170, v172, v142); v143 = softehl_blend(m170, v173, v143);
+        v144 = softehl_blend(m170, v174, v144); v145 = softehl_blend(m170, v175, v145);
+        v146 = softehl_blend(m170, v176, v146); v147 = softehl_blend(m170, v177, v147);
+        v148 = softehl_blend(m170, v178, v148);
     }
-    const V v243 = 1.0 + v139;
-    const V v244 = 0.5 + v139;
-    const V v245 = 2.0 * v139;
-    const V v246 = 0.5 * v139;
-    const V v247 = v139 * v139;
-    const V v248 = 0.5 + v191;
-    const V v249 = 2.0 * v191;
-    const V v250 = 0.5 * v191;
-    const V v251 = v139 - 0.5;
-    const V v252 = v139 - 1.0;
-    const V v253 = v247 - 1.0;
-    const V v254 = v191 * v191;
-    const V v255 = 1.0 + v191;
-    const V v256 = v191 - 0.5;
-    const V v257 = v191 - 1.0;
-    const V v258 = v246 * v243;
-    const V v259 = v254 - 1.0;
-    const V v260 = v246 * v252;
-    const V v261 = v250 * v255;
-    const V v262 = v250 * v257;
-    const V v263 = 2.0 * v192;
-    const V v264 = 0.5 * v192;
-    const V v265 = v250 * v192;
-    const V v266 = 2.0 * v140;
-    const V v267 = 0.5 * v140;
-    const V v268 = 2.0 * v193;
-    const V v269 = 0.5 * v193;
-    const V v270 = v250 * v193;
-    const V v271 = 2.0 * v141;
-    const V v272 = 0.5 * v141;
-    const V v273 = 2.0 * v194;
-    const V v274 = 0.5 * v194;
-    const V v275 = v250 * v194;
-    const V v276 = 2.0 * v142;
-    const V v277 = 0.5 * v142;
-    const V v278 = 2.0 * v195;
-    const V v279 = 0.5 * v195;
-    const V v280 = v250 * v195;
-    const V v281 = 2.0 * v143;
-    const V v282 = 0.5 * v143;
-    const V v283 = 2.0 * v196;
-    const V v284 = 0.5 * v196;
-    const V v285 = v250 * v196;
-    const V v286 = v250 * v197;
-    const V v287 = 2.0 * v197;
-    const V v288 = 0.5 * v197;
-    const V v289 = 2.0 * v144;
-    const V v290 = 0.5 * v144;
-    const V v291 = 2.0 * v145;
-    const V v292 = 0.5 * v145;
-    const V v293 = v249 * v196;
-    const V v294 = v249 * v192;
-    const V v295 = v249 * v193;
-    const V v296 = v249 * v194;
-    const V v297 = v249 * v195;
-    const V v298 = v249 * v197;
-    const V v299 = v245 * v145;
-    const V v300 = v245 * v140;
-    const V v301 = v246 * v140;
-    const V v302 = v246 * v145;
-    const V v303 = v245 * v141;
-    const V v304 = v246 * v141;
-    const V v305 = v245 * v142;
-    const V v306 = v246 * v142;
-    const V v307 = v245 * v143;
-    const V v308 = v246 * v143;
-    const V v309 = v246 * v144;
-    const V v310 = v245 * v144;
-    const V v311 = v35 * v142;
-    const V v312 = v35 * v144;
-    const V v313 = v38 * v144;
-    const V v314 = v38 * v142;
-    const V v315 = v38 * v143;
-    const V v316 = v35 * v143;
-    const V v317 = v1 * v307;
-    const V v318 = v8 * v307;
-    const V v319 = v8 * v276;
-    const V v320 = v311 - v319;
-    const V v321 = v1 * v276;
-    const V v322 = v314 - v321;
-    const V v323 = v1 * v281;
-    const V v324 = v315 - v323;
-    const V v325 = v8 * v281;
-    const V v326 = v316 - v325;
-    const V v327 = v1 * v289;
-    const V v328 = v313 - v327;
-    const V v329 = v8 * v289;
-    const V v330 = v312 - v329;
-    const V v331 = v1 * v294;
-    const V v332 = v8 * v294;
-    const V v333 = v244 + v322;
-    const V v334 = v244 + v326;
-    const V v335 = v318 - v258;
-    const V v336 = v1 * v300;
-    const V v337 = v8 * v300;
-    const V v338 = v1 * v295;
-    const V v339 = v8 * v295;
-    const V v340 = v331 - v262;
-    const V v341 = v1 * v303;
-    const V v342 = v8 * v303;
-    const V v343 = v1 * v296;
-    const V v344 = v8 * v296;
-    const V v345 = v339 - v262;
-    const V v346 = v336 - v260;
-    const V v347 = v342 - v260;
-    const V v348 = v1 * v305;
-    const V v349 = v8 * v305;
-    const V v350 = v1 * v297;
-    const V v351 = v8 * v297;
-    const V v352 = v343 - v261;
-    const V v353 = v8 * v293;
-    const V v354 = v1 * v293;
-    const V v355 = 1.0 + v354;
-    const V v356 = v1 * v298;
-    const V v357 = v8 * v298;
-    const V v358 = 1.0 + v357;
-    const V v359 = v351 - v261;
-    const V v360 = v348 - v258;
-    const V v361 = v8 * v310;
-    const V v362 = v1 * v310;
-    const V v363 = 1.0 + v362;
-    const V v364 = v1 * v299;
-    const V v365 = v8 * v299;
-    const V v366 = 1.0 + v365;
-    const V v367 = v34 * v248;
-    const V v368 = v30 * v248;
-    const V v369 = v34 * v244;
-    const V v370 = v30 * v244;
-    const V v371 = v1 * v273;
-    const V v372 = v248 - v371;
-    const V v373 = v8 * v278;
-    const V v374 = v248 - v373;
-    const V v375 = v1 * v249;
-    const V v376 = v367 - v375;
-    const V v377 = v8 * v249;
-    const V v378 = v368 - v377;
-    const V v379 = v1 * v245;
-    const V v380 = v369 - v379;
-    const V v381 = v8 * v245;
-    const V v382 = v370 - v381;
-    const V v383 = v38 * v194;
-    const V v384 = v383 + v372;
-    const V v385 = v35 * v194;
-    const V v386 = v8 * v273;
-    const V v387 = v385 - v386;
-    const V v388 = v35 * v195;
-    const V v389 = v388 + v374;
-    const V v390 = v38 * v195;
-    const V v391 = v1 * v278;
-    const V v392 = v390 - v391;
-    const V v393 = v35 * v192;
-    const V v394 = v38 * v192;
-    const V v395 = v394 + v256;
-    const V v396 = v35 * v140;
-    const V v397 = v38 * v140;
-    const V v398 = v397 + v251;
-    const V v399 = v38 * v193;
-    const V v400 = v35 * v193;
-    const V v401 = v400 + v256;
-    const V v402 = v8 * v263;
-    const V v403 = v393 - v402;
-    const V v404 = v1 * v263;
-    const V v405 = v395 - v404;
-    const V v406 = v8 * v266;
-    const V v407 = v396 - v406;
-    const V v408 = v1 * v266;
-    const V v409 = v398 - v408;
-    const V v410 = v1 * v268;
-    const V v411 = v399 - v410;
-    const V v412 = v8 * v268;
-    const V v413 = v401 - v412;
-    const V v414 = v38 * v141;
-    const V v415 = v35 * v141;
-    const V v416 = v415 + v251;
-    const V v417 = v38 * v196;
-    const V v418 = v35 * v196;
-    const V v419 = v38 * v197;
-    const V v420 = v35 * v197;
-    const V v421 = v38 * v145;
-    const V v422 = v35 * v145;
-    const V v423 = v1 * v271;
-    const V v424 = v414 - v423;
-    const V v425 = v8 * v271;
-    const V v426 = v416 - v425;
-    const V v427 = v1 * v283;
-    const V v428 = v417 - v427;
-    const V v429 = v8 * v283;
-    const V v430 = v418 - v429;
-    const V v431 = v1 * v287;
-    const V v432 = v419 - v431;
-    const V v433 = v8 * v287;
-    const V v434 = v420 - v433;
-    const V v435 = v1 * v291;
-    const V v436 = v421 - v435;
-    const V v437 = v8 * v291;
-    const V v438 = v422 - v437;
-    const V v439 = v1 * v253;
-    const V v440 = v4 + v439;
-    const V v441 = v8 * v253;
-    const V v442 = v14 + v441;
-    const V v443 = v1 * v259;
-    const V v444 = v3 + v443;
-    const V v445 = v8 * v259;
-    const V v446 = v12 + v445;
-    const V v447 = v28 * v251;
-    const V v448 = v447 + v380;
-    const V v449 = v29 * v251;
-    const V v450 = v449 + v382;
-    const V v451 = v28 * v260;
-    const V v452 = v440 - v451;
-    const V v453 = v29 * v260;
-    const V v454 = v442 - v453;
-    const V v455 = 2.0 * v448;
-    const V v456 = v448 * v448;
-    const V v457 = 2.0 * v450;
-    const V v458 = v253 * v448;
-    const V v459 = v253 * v450;
-    const V v460 = v28 * v262;
-    const V v461 = v444 - v460;
-    const V v462 = v29 * v262;
-    const V v463 = v446 - v462;
-    const V v464 = v450 * v450;
-    const V v465 = v456 + v464;
-    const V v466 = 1.0 / v465;
-    const V v467 = v34 * v258;
-    const V v468 = v452 - v467;
-    const V v469 = v30 * v258;
-    const V v470 = v454 - v469;
-    const V v471 = v34 * v261;
-    const V v472 = v461 - v471;
-    const V v473 = v30 * v261;
-    const V v474 = v463 - v473;
-    const V v475 = v409 * v455;
-    const V v476 = v409 * v468;
-    const V v477 = v448 * v468;
-    const V v478 = v245 * v470;
-    const V v479 = v459 - v478;
-    const V v480 = v245 * v468;
-    const V v481 = v458 - v480;
-    const V v482 = v424 * v468;
-    const V v483 = v424 * v455;
-    const V v484 = v405 * v472;
-    const V v485 = v411 * v472;
-    const V v486 = v450 * v470;
-    const V v487 = v477 + v486;
-    const V v488 = v245 * v487;
-    const V v489 = v384 * v472;
-    const V v490 = v426 * v470;
-    const V v491 = v482 + v490;
-    const V v492 = v426 * v457;
-    const V v493 = v483 + v492;
-    const V v494 = v333 * v468;
-    const V v495 = v333 * v455;
-    const V v496 = v392 * v472;
-    const V v497 = v324 * v468;
-    const V v498 = v324 * v455;
-    const V v499 = v428 * v472;
-    const V v500 = v432 * v472;
-    const V v501 = v320 * v457;
-    const V v502 = v495 + v501;
-    const V v503 = v320 * v470;
-    const V v504 = v494 + v503;
-    const V v505 = v328 * v468;
-    const V v506 = v328 * v455;
-    const V v507 = v436 * v468;
-    const V v508 = v436 * v455;
-    const V v509 = v334 * v457;
-    const V v510 = v498 + v509;
-    const V v511 = v334 * v470;
-    const V v512 = v497 + v511;
-    const V v513 = v466 * v466;
-    const V v514 = v466 * v481;
-    const V v515 = v466 * v479;
-    const V v516 = v330 * v457;
-    const V v517 = v506 + v516;
-    const V v518 = v330 * v470;
-    const V v519 = v505 + v518;
-    const V v520 = v438 * v457;
-    const V v521 = v508 + v520;
-    const V v522 = v438 * v470;
-    const V v523 = v507 + v522;
-    const V v524 = v488 * v513;
-    const V v525 = v487 * v513;
-    const V v526 = v466 * v487;
-    const V v527 = v139 + v526;
-    const V v528 = v455 * v524;
-    const V v529 = v514 + v528;
-    const V v530 = v457 * v524;
-    const V v531 = v515 + v530;
-    const V v532 = v510 * v525;
-    const V v533 = v517 * v525;
-    const V v534 = v521 * v525;
-    const M v535 = softehl_lt(softehl_splat(1.0), v527);
-    const V v536 = v493 * v525;
-    const V v537 = v502 * v525;
-    const V v538 = v407 * v457;
-    const V v539 = v475 + v538;
-    const V v540 = v407 * v470;
-    const V v541 = v476 + v540;
-    const V v542 = v525 * v539;
-    const V v543 = v28 * v256;
-    const V v544 = v543 + v376;
-    const V v545 = v29 * v256;
-    const V v546 = v545 + v378;
-    const V v547 = 2.0 * v544;
-    const V v548 = v544 * v544;
-    const V v549 = 2.0 * v546;
-    const V v550 = v472 * v544;
-    const V v551 = v259 * v544;
-    const V v552 = v259 * v546;
-    const V v553 = v546 * v546;
-    const V v554 = v548 + v553;
-    const V v555 = v249 * v472;
-    const V v556 = v551 - v555;
-    const V v557 = 1.0 / v554;
-    const V v558 = v405 * v547;
-    const V v559 = v411 * v547;
-    const V v560 = v384 * v547;
-    const V v561 = v474 * v546;
-    const V v562 = v550 + v561;
-    const V v563 = v249 * v474;
-    const V v564 = v552 - v563;
-    const V v565 = v392 * v547;
-    const V v566 = v428 * v547;
-    const V v567 = v249 * v562;
-    const V v568 = v432 * v547;
-    const V v569 = v403 * v549;
-    const V v570 = v558 + v569;
-    const V v571 = v403 * v474;
-    const V v572 = v484 + v571;
-    const V v573 = v413 * v549;
-    const V v574 = v559 + v573;
-    const V v575 = v413 * v474;
-    const V v576 = v485 + v575;
-    const V v577 = v387 * v549;
-    const V v578 = v560 + v577;
-    const V v579 = v387 * v474;
-    const V v580 = v489 + v579;
-    const V v581 = v389 * v549;
-    const V v582 = v565 + v581;
-    const V v583 = v389 * v474;
-    const V v584 = v496 + v583;
-    const V v585 = v430 * v549;
-    const V v586 = v566 + v585;
-    const V v587 = v430 * v474;
-    const V v588 = v499 + v587;
-    const V v589 = v434 * v549;
-    const V v590 = v568 + v589;
-    const V v591 = v434 * v474;
-    const V v592 = v500 + v591;
-    const V v593 = v264 * v255;
-    const V v594 = v265 + v593;
-    const V v595 = v264 * v257;
-    const V v596 = v265 + v595;
-    const V v597 = v269 * v255;
-    const V v598 = v270 + v597;
-    const V v599 = v269 * v257;
-    const V v600 = v270 + v599;
-    const V v601 = v274 * v255;
-    const V v602 = v275 + v601;
-    const V v603 = v274 * v257;
-    const V v604 = v275 + v603;
-    const V v605 = v279 * v255;
-    const V v606 = v280 + v605;
-    const V v607 = v279 * v257;
-    const V v608 = v280 + v607;
-    const V v609 = v284 * v255;
-    const V v610 = v285 + v609;
-    const V v611 = v284 * v257;
-    const V v612 = v285 + v611;
-    const V v613 = v288 * v255;
-    const V v614 = v286 + v613;
-    const V v615 = v288 * v257;
-    const V v616 = v286 + v615;
-    const V v617 = v557 * v557;
-    const V v618 = v556 * v557;
-    const V v619 = v557 * v564;
-    const V v620 = v557 * v562;
-    const V v621 = v191 + v620;
-    const V v622 = v562 * v617;
-    const V v623 = v567 * v617;
-    const V v624 = v28 * v596;
-    const V v625 = v340 - v624;
-    const V v626 = v29 * v596;
-    const V v627 = v332 - v626;
-    const V v628 = v28 * v604;
-    const V v629 = v352 - v628;
-    const V v630 = v29 * v604;
-    const V v631 = v344 - v630;
-    const V v632 = v547 * v623;
-    const V v633 = v618 + v632;
-    const V v634 = v549 * v623;
-    const V v635 = v619 + v634;
-    const V v636 = v570 * v622;
-    const V v637 = v574 * v622;
-    const V v638 = v578 * v622;
-    const V v639 = v582 * v622;
-    const V v640 = v586 * v622;
-    const V v641 = v590 * v622;
-    const V v642 = v34 * v594;
-    const V v643 = v625 - v642;
-    const V v644 = v30 * v594;
-    const V v645 = v627 - v644;
-    const V v646 = v34 * v602;
-    const V v647 = v629 - v646;
-    const V v648 = v30 * v602;
-    const V v649 = v631 - v648;
-    const V v650 = v34 * v598;
-    const V v651 = v338 - v650;
-    const V v652 = v30 * v598;
-    const V v653 = v345 - v652;
-    const V v654 = v544 * v643;
-    const V v655 = v572 + v654;
-    const V v656 = v544 * v647;
-    const V v657 = v580 + v656;
-    const V v658 = v546 * v645;
-    const V v659 = v655 + v658;
-    const V v660 = v546 * v649;
-    const V v661 = v657 + v660;
-    const V v662 = v28 * v600;
-    const V v663 = v651 - v662;
-    const V v664 = v29 * v600;
-    const V v665 = v653 - v664;
-    const V v666 = v34 * v606;
-    const V v667 = v350 - v666;
-    const V v668 = v30 * v606;
-    const V v669 = v359 - v668;
-    const V v670 = v663 * v544;
-    const V v671 = v576 + v670;
-    const V v672 = v28 * v608;
-    const V v673 = v667 - v672;
-    const V v674 = v29 * v608;
-    const V v675 = v669 - v674;
-    const V v676 = v665 * v546;
-    const V v677 = v671 + v676;
-    const V v678 = v673 * v544;
-    const V v679 = v584 + v678;
-    const V v680 = v675 * v546;
-    const V v681 = v679 + v680;
-    const V v682 = v34 * v610;
-    const V v683 = v355 - v682;
-    const V v684 = v30 * v610;
-    const V v685 = v353 - v684;
-    const V v686 = v28 * v612;
-    const V v687 = v683 - v686;
-    const V v688 = v29 * v612;
-    const V v689 = v685 - v688;
-    const V v690 = v34 * v614;
-    const V v691 = v356 - v690;
-    const V v692 = v30 * v614;
-    const V v693 = v358 - v692;
-    const V v694 = v687 * v544;
-    const V v695 = v588 + v694;
-    const V v696 = v28 * v616;
-    const V v697 = v691 - v696;
-    const V v698 = v29 * v616;
-    const V v699 = v693 - v698;
-    const V v700 = v689 * v546;
-    const V v701 = v695 + v700;
-    const V v702 = v697 * v544;
-    const V v703 = v592 + v702;
-    const V v704 = v699 * v546;
-    const V v705 = v703 + v704;
-    const V v706 = v267 * v243;
-    const V v707 = v301 + v706;
-    const V v708 = v267 * v252;
-    const V v709 = v301 + v708;
-    const V v710 = v272 * v243;
-    const V v711 = v304 + v710;
-    const V v712 = v272 * v252;
-    const V v713 = v304 + v712;
-    const V v714 = v277 * v243;
-    const V v715 = v306 + v714;
-    const V v716 = v277 * v252;
-    const V v717 = v306 + v716;
-    const V v718 = v282 * v243;
-    const V v719 = v308 + v718;
-    const V v720 = v282 * v252;
-    const V v721 = v308 + v720;
-    const V v722 = v34 * v707;
-    const V v723 = v346 - v722;
-    const V v724 = v30 * v707;
-    const V v725 = v337 - v724;
-    const V v726 = v34 * v711;
-    const V v727 = v341 - v726;
-    const V v728 = v30 * v711;
-    const V v729 = v347 - v728;
-    const V v730 = v34 * v715;
-    const V v731 = v360 - v730;
-    const V v732 = v30 * v715;
-    const V v733 = v349 - v732;
-    const V v734 = v28 * v709;
-    const V v735 = v723 - v734;
-    const V v736 = v29 * v709;
-    const V v737 = v725 - v736;
-    const V v738 = v28 * v713;
-    const V v739 = v727 - v738;
-    const V v740 = v29 * v713;
-    const V v741 = v729 - v740;
-    const V v742 = v28 * v717;
-    const V v743 = v731 - v742;
-    const V v744 = v29 * v717;
-    const V v745 = v733 - v744;
-    const V v746 = v34 * v719;
-    const V v747 = v317 - v746;
-    const V v748 = v30 * v719;
-    const V v749 = v335 - v748;
-    const V v750 = v28 * v721;
-    const V v751 = v747 - v750;
-    const V v752 = v29 * v721;
-    const V v753 = v749 - v752;
-    const V v754 = v735 * v448;
-    const V v755 = v541 + v754;
-    const V v756 = v739 * v448;
-    const V v757 = v491 + v756;
-    const V v758 = v743 * v448;
-    const V v759 = v504 + v758;
-    const V v760 = v737 * v450;
-    const V v761 = v755 + v760;
-    const V v762 = v741 * v450;
-    const V v763 = v757 + v762;
-    const V v764 = v745 * v450;
-    const V v765 = v759 + v764;
-    const V v766 = v751 * v448;
-    const V v767 = v512 + v766;
-    const V v768 = v753 * v450;
-    const V v769 = v767 + v768;
-    const V v770 = v290 * v243;
-    const V v771 = v309 + v770;
-    const V v772 = v290 * v252;
-    const V v773 = v309 + v772;
-    const V v774 = v292 * v243;
-    const V v775 = v302 + v774;
-    const V v776 = v292 * v252;
-    const V v777 = v302 + v776;
-    const V v778 = v34 * v771;
-    const V v779 = v363 - v778;
-    const V v780 = v30 * v771;
-    const V v781 = v361 - v780;
-    const V v782 = v34 * v775;
-    const V v783 = v364 - v782;
-    const V v784 = v30 * v775;
-    const V v785 = v366 - v784;
-    const V v786 = v28 * v773;
-    const V v787 = v779 - v786;
-    const V v788 = v29 * v773;
-    const V v789 = v781 - v788;
-    const V v790 = v28 * v777;
-    const V v791 = v783 - v790;
-    const V v792 = v29 * v777;
-    const V v793 = v785 - v792;
-    const V v794 = v787 * v448;
-    const V v795 = v519 + v794;
-    const V v796 = v791 * v448;
-    const V v797 = v523 + v796;
-    const V v798 = v789 * v450;
-    const V v799 = v795 + v798;
-    const V v800 = v793 * v450;
-    const V v801 = v797 + v800;
-    const V v802 = softehl_blend(v535, softehl_splat(1.0), v527);
-    const M v803 = softehl_eq(v802, v802);
-    const M v804 = softehl_lt(softehl_splat(1.0), v621);
-    const V v805 = softehl_blend(v804, softehl_splat(1.0), v621);
-    const V v806 = v192 - v636;
-    const V v807 = v140 - v542;
-    const V v808 = v193 - v637;
-    const V v809 = v141 - v536;
-    const V v810 = v194 - v638;
-    const V v811 = v142 - v537;
-    const V v812 = v195 - v639;
-    const V v813 = v143 - v532;
-    const M v814 = softehl_eq(v805, v805);
-    const V v815 = v557 * v659;
-    const V v816 = v815 + v806;
-    const V v817 = v557 * v677;
-    const V v818 = v817 + v808;
-    const V v819 = v557 * v661;
-    const V v820 = v819 + v810;
-    const V v821 = v557 * v681;
-    const V v822 = v821 + v812;
-    const V v823 = v196 - v640;
-    const V v824 = v197 - v641;
-    const V v825 = v144 - v533;
-    const V v826 = v145 - v534;
-    const V v827 = v466 * v761;
-    const V v828 = v827 + v807;
-    const V v829 = v466 * v763;
-    const V v830 = v829 + v809;
-    const V v831 = v466 * v765;
-    const V v832 = v831 + v811;
-    const V v833 = v466 * v769;
-    const V v834 = v833 + v813;
-    const V v835 = v557 * v701;
-    const V v836 = v835 + v823;
-    const V v837 = v557 * v705;
-    const V v838 = v837 + v824;
-    const V v839 = v466 * v799;
-    const V v840 = v839 + v825;
-    const V v841 = v466 * v801;
-    const V v842 = v841 + v826;
-    V v843 = softehl_splat(0.0);
-    V v844 = softehl_splat(0.0);
-    V v845 = softehl_splat(0.0);
-    V v846 = softehl_splat(0.0);
-    V v847 = softehl_splat(0.0);
-    V v848 = softehl_splat(0.0);
-    V v849 = softehl_splat(0.0);
-    V v850 = softehl_splat(0.0);
-    V v851 = softehl_splat(0.0);
-    const M m852 = v803;
-    if (softehl_any(m852)) {
-        const M v853 = softehl_lt(softehl_splat((-1.0)), v802);
-        V v854 = softehl_splat((-1.0));
-        V v855 = softehl_splat(0.0);
-        V v856 = softehl_splat(0.0);
-        V v857 = softehl_splat(0.0);
-        V v858 = softehl_splat(0.0);
-        V v859 = softehl_splat(0.0);
-        V v860 = softehl_splat(0.0);
-        V v861 = softehl_splat(0.0);
-        V v862 = softehl_splat(0.0);
-        const M m863 = v853 & m852;
-        if (softehl_any(m863)) {
-            const V v864 = softehl_blend(v535, softehl_splat(0.0), v529);
-            const V v865 = softehl_blend(v535, softehl_splat(0.0), v531);
-            const V v866 = softehl_blend(v535, softehl_splat(0.0), v828);
-            const V v867 = softehl_blend(v535, softehl_splat(0.0), v830);
-            const V v868 = softehl_blend(v535, softehl_splat(0.0), v832);
-            const V v869 = softehl_blend(v535, softehl_splat(0.0), v834);
-            const V v870 = softehl_blend(v535, softehl_splat(0.0), v840);
-            const V v871 = softehl_blend(v535, softehl_splat(0.0), v842);
-            v854 = softehl_blend(m863, v802, v854);
-            v855 = softehl_blend(m863, v864, v855);
-            v856 = softehl_blend(m863, v865, v856);
-            v857 = softehl_blend(m863, v866, v857);
-            v858 = softehl_blend(m863, v867, v858);
-            v859 = softehl_blend(m863, v868, v859);
-            v860 = softehl_blend(m863, v869, v860);
-            v861 = softehl_blend(m863, v870, v861);
-            v862 = softehl_blend(m863, v871, v862);
+    const V v188 = 1.0 + v96, v189 = 0.5 + v96, v190 = 2.0 * v96, v191 = 0.5 * v96,
+        v192 = 0.5 + v142, v193 = 2.0 * v142, v194 = 0.5 * v142, v195 = v96 - 0.5, v196 = v96 - 1.0,
+        v197 = v96 * v96 - 1.0, v198 = 1.0 + v142, v199 = v142 - 0.5, v200 = v142 - 1.0,
+        v201 = v191 * v188, v202 = v142 * v142 - 1.0, v203 = v191 * v196, v204 = v194 * v198,
+        v205 = v194 * v200, v206 = 2.0 * v143, v207 = 0.5 * v143, v208 = v194 * v143,
+        v209 = 2.0 * v97, v210 = 0.5 * v97, v211 = 2.0 * v144, v212 = 0.5 * v144,
+        v213 = v194 * v144, v214 = 2.0 * v98, v215 = 0.5 * v98, v216 = 2.0 * v145,
+        v217 = 0.5 * v145, v218 = v194 * v145, v219 = 2.0 * v99, v220 = 0.5 * v99,
+        v221 = 2.0 * v146, v222 = 0.5 * v146, v223 = v194 * v146, v224 = 2.0 * v100,
+        v225 = 0.5 * v100, v226 = 2.0 * v147, v227 = 0.5 * v147, v228 = v194 * v147,
+        v229 = v194 * v148, v230 = 2.0 * v148, v231 = 0.5 * v148, v232 = 2.0 * v101,
+        v233 = 0.5 * v101, v234 = 2.0 * v102, v235 = 0.5 * v102, v236 = v193 * v147,
+        v237 = v193 * v143, v238 = v193 * v144, v239 = v193 * v145, v240 = v193 * v146,
+        v241 = v193 * v148, v242 = v190 * v102, v243 = v190 * v97, v244 = v191 * v97,
+        v245 = v191 * v102, v246 = v190 * v98, v247 = v191 * v98, v248 = v190 * v99,
+        v249 = v191 * v99, v250 = v190 * v100, v251 = v191 * v100, v252 = v191 * v101,
+        v253 = v190 * v101, v254 = v32 * v99 - v8 * v219, v255 = v35 * v100 - v1 * v224,
+        v256 = v35 * v101 - v1 * v232, v257 = v32 * v101 - v8 * v232,
+        v258 = v189 + (v35 * v99 - v1 * v219), v259 = v189 + (v32 * v100 - v8 * v224),
+        v260 = v35 * v145 + (v192 - v1 * v216), v261 = v32 * v145 - v8 * v216,
+        v262 = v32 * v146 + (v192 - v8 * v221), v263 = v35 * v146 - v1 * v221,
+        v264 = v32 * v143 - v8 * v206, v265 = v35 * v143 + v199 - v1 * v206,
+        v266 = v32 * v97 - v8 * v209, v267 = v35 * v97 + v195 - v1 * v209,
+        v268 = v35 * v144 - v1 * v211, v269 = v32 * v144 + v199 - v8 * v211,
+        v270 = v35 * v98 - v1 * v214, v271 = v32 * v98 + v195 - v8 * v214,
+        v272 = v35 * v147 - v1 * v226, v273 = v32 * v147 - v8 * v226, v274 = v35 * v148 - v1 * v230,
+        v275 = v32 * v148 - v8 * v230, v276 = v35 * v102 - v1 * v234, v277 = v32 * v102 - v8 * v234,
+        v278 = v28 * v195 + (v31 * v189 - v1 * v190), v279 = v29 * v195 + (v30 * v189 - v8 * v190),
+        v280 = 2.0 * v278, v281 = 2.0 * v279, v282 = 1.0 / (v278 * v278 + v279 * v279),
+        v283 = v4 + v1 * v197 - v28 * v203 - v31 * v201,
+        v284 = v14 + v8 * v197 - v29 * v203 - v30 * v201,
+        v285 = v3 + v1 * v202 - v28 * v205 - v31 * v204,
+        v286 = v12 + v8 * v202 - v29 * v205 - v30 * v204, v287 = v278 * v283 + v279 * v284,
+        v288 = v282 * v282, v289 = v190 * v287 * v288, v290 = v287 * v288, v291 = v96 + v282 * v287,
+        v292 = v282 * (v197 * v278 - v190 * v283) + v280 * v289,
+        v293 = v282 * (v197 * v279 - v190 * v284) + v281 * v289,
+        v294 = (v255 * v280 + v259 * v281) * v290, v295 = (v256 * v280 + v257 * v281) * v290,
+        v296 = (v276 * v280 + v277 * v281) * v290;
+    const M v297 = softehl_lt(softehl_splat(1.0), v291);
+    const V v298 = (v270 * v280 + v271 * v281) * v290, v299 = (v258 * v280 + v254 * v281) * v290,
+        v300 = v290 * (v267 * v280 + v266 * v281), v301 = v28 * v199 + (v31 * v192 - v1 * v193),
+        v302 = v29 * v199 + (v30 * v192 - v8 * v193), v303 = 2.0 * v301, v304 = 2.0 * v302,
+        v305 = 1.0 / (v301 * v301 + v302 * v302), v306 = v285 * v301 + v286 * v302,
+        v307 = v208 + v207 * v198, v308 = v208 + v207 * v200, v309 = v213 + v212 * v198,
+        v310 = v213 + v212 * v200, v311 = v218 + v217 * v198, v312 = v218 + v217 * v200,
+        v313 = v223 + v222 * v198, v314 = v223 + v222 * v200, v315 = v228 + v227 * v198,
+        v316 = v228 + v227 * v200, v317 = v229 + v231 * v198, v318 = v229 + v231 * v200,
+        v319 = v305 * v305, v320 = v142 + v305 * v306, v321 = v306 * v319,
+        v322 = v193 * v306 * v319, v323 = (v202 * v301 - v193 * v285) * v305 + v303 * v322,
+        v324 = v305 * (v202 * v302 - v193 * v286) + v304 * v322,
+        v325 = (v265 * v303 + v264 * v304) * v321, v326 = (v268 * v303 + v269 * v304) * v321,
+        v327 = (v260 * v303 + v261 * v304) * v321, v328 = (v263 * v303 + v262 * v304) * v321,
+        v329 = (v272 * v303 + v273 * v304) * v321, v330 = (v274 * v303 + v275 * v304) * v321,
+        v331 = v265 * v285 + v264 * v286 + v301 * (v1 * v237 - v205 - v28 * v308 - v31 * v307),
+        v332 = v260 * v285 + v261 * v286 + v301 * (v1 * v239 - v204 - v28 * v312 - v31 * v311),
+        v333 = v331 + v302 * (v8 * v237 - v29 * v308 - v30 * v307),
+        v334 = v332 + v302 * (v8 * v239 - v29 * v312 - v30 * v311),
+        v335 = v268 * v285 + v269 * v286 + (v1 * v238 - v31 * v309 - v28 * v310) * v301,
+        v336 = v335 + (v8 * v238 - v205 - v30 * v309 - v29 * v310) * v302,
+        v337 = v263 * v285 + v262 * v286 + (v1 * v240 - v31 * v313 - v28 * v314) * v301,
+        v338 = v337 + (v8 * v240 - v204 - v30 * v313 - v29 * v314) * v302,
+        v339 = v272 * v285 + v273 * v286 + (1.0 + v1 * v236 - v31 * v315 - v28 * v316) * v301,
+        v340 = v339 + (v8 * v236 - v30 * v315 - v29 * v316) * v302,
+        v341 = v274 * v285 + v275 * v286 + (v1 * v241 - v31 * v317 - v28 * v318) * v301,
+        v342 = v341 + (1.0 + v8 * v241 - v30 * v317 - v29 * v318) * v302, v343 = v244 + v210 * v188,
+        v344 = v244 + v210 * v196, v345 = v247 + v215 * v188, v346 = v247 + v215 * v196,
+        v347 = v249 + v220 * v188, v348 = v249 + v220 * v196, v349 = v251 + v225 * v188,
+        v350 = v251 + v225 * v196,
+        v351 = v267 * v283 + v266 * v284 + (v1 * v243 - v203 - v31 * v343 - v28 * v344) * v278,
+        v352 = v270 * v283 + v271 * v284 + (v1 * v246 - v31 * v345 - v28 * v346) * v278,
+        v353 = v258 * v283 + v254 * v284 + (v1 * v248 - v201 - v31 * v347 - v28 * v348) * v278,
+        v354 = v351 + (v8 * v243 - v30 * v343 - v29 * v344) * v279,
+        v355 = v352 + (v8 * v246 - v203 - v30 * v345 - v29 * v346) * v279,
+        v356 = v353 + (v8 * v248 - v30 * v347 - v29 * v348) * v279,
+        v357 = v255 * v283 + v259 * v284 + (v1 * v250 - v31 * v349 - v28 * v350) * v278,
+        v358 = v357 + (v8 * v250 - v201 - v30 * v349 - v29 * v350) * v279,
+        v359 = v252 + v233 * v188, v360 = v252 + v233 * v196, v361 = v245 + v235 * v188,
+        v362 = v245 + v235 * v196,
+        v363 = v256 * v283 + v257 * v284 + (1.0 + v1 * v253 - v31 * v359 - v28 * v360) * v278,
+        v364 = v276 * v283 + v277 * v284 + (v1 * v242 - v31 * v361 - v28 * v362) * v278,
+        v365 = v363 + (v8 * v253 - v30 * v359 - v29 * v360) * v279,
+        v366 = v364 + (1.0 + v8 * v242 - v30 * v361 - v29 * v362) * v279,
+        v367 = softehl_blend(v297, softehl_splat(1.0), v291);
+    const M v368 = softehl_eq(v367, v367), v369 = softehl_lt(softehl_splat(1.0), v320);
+    const V v370 = softehl_blend(v369, softehl_splat(1.0), v320);
+    const M v371 = softehl_eq(v370, v370);
+    const V v372 = v305 * v333 + (v143 - v325), v373 = v305 * v336 + (v144 - v326),
+        v374 = v305 * v334 + (v145 - v327), v375 = v305 * v338 + (v146 - v328),
+        v376 = v282 * v354 + (v97 - v300), v377 = v282 * v355 + (v98 - v298),
+        v378 = v282 * v356 + (v99 - v299), v379 = v282 * v358 + (v100 - v294),
+        v380 = v305 * v340 + (v147 - v329), v381 = v305 * v342 + (v148 - v330),
+        v382 = v282 * v365 + (v101 - v295), v383 = v282 * v366 + (v102 - v296);
+    V v384 = softehl_splat(0.0), v385 = softehl_splat(0.0), v386 = softehl_splat(0.0),
+        v387 = softehl_splat(0.0), v388 = softehl_splat(0.0), v389 = softehl_splat(0.0),
+        v390 = softehl_splat(0.0), v391 = softehl_splat(0.0), v392 = softehl_splat(0.0);
+    const M m393 = v368;
+    if (softehl_any(m393)) {
+        const M v394 = softehl_lt(softehl_splat((-1.0)), v367);
+        V v395 = softehl_splat((-1.0)), v396 = softehl_splat(0.0), v397 = softehl_splat(0.0),
+            v398 = softehl_splat(0.0), v399 = softehl_splat(0.0), v400 = softehl_splat(0.0),
+            v401 = softehl_splat(0.0), v402 = softehl_splat(0.0), v403 = softehl_splat(0.0);
+        const M m404 = v394 & m393;
+        if (softehl_any(m404)) {
+            const V v405 = softehl_blend(v297, softehl_splat(0.0), v292),
+                v406 = softehl_blend(v297, softehl_splat(0.0), v293),
+                v407 = softehl_blend(v297, softehl_splat(0.0), v376),
+                v408 = softehl_blend(v297, softehl_splat(0.0), v377),
+                v409 = softehl_blend(v297, softehl_splat(0.0), v378),
+                v410 = softehl_blend(v297, softehl_splat(0.0), v379),
+                v411 = softehl_blend(v297, softehl_splat(0.0), v382),
+                v412 = softehl_blend(v297, softehl_splat(0.0), v383);
+            v395 = softehl_blend(m404, v367, v395); v396 = softehl_blend(m404, v405, v396);
+            v397 = softehl_blend(m404, v406, v397); v398 = softehl_blend(m404, v407, v398);
+            v399 = softehl_blend(m404, v408, v399); v400 = softehl_blend(m404, v409, v400);
+            v401 = softehl_blend(m404, v410, v401); v402 = softehl_blend(m404, v411, v402);
+            v403 = softehl_blend(m404, v412, v403);
         }
-        v843 = softehl_blend(m852, v854, v843);
-        v844 = softehl_blend(m852, v855, v844);
-        v845 = softehl_blend(m852, v856, v845);
-        v846 = softehl_blend(m852, v857, v846);
-        v847 = softehl_blend(m852, v858, v847);
-        v848 = softehl_blend(m852, v859, v848);
-        v849 = softehl_blend(m852, v860, v849);
-        v850 = softehl_blend(m852, v861, v850);
-        v851 = softehl_blend(m852, v862, v851);
+        v384 = softehl_blend(m393, v395, v384); v385 = softehl_blend(m393, v396, v385);
+        v386 = softehl_blend(m393, v397, v386); v387 = softehl_blend(m393, v398, v387);
+        v388 = softehl_blend(m393, v399, v388); v389 = softehl_blend(m393, v400, v389);
+        v390 = softehl_blend(m393, v401, v390); v391 = softehl_blend(m393, v402, v391);
+        v392 = softehl_blend(m393, v403, v392);
     }
-    const M m872 = ~v803;
-    if (softehl_any(m872)) {
-        const V v873 = (-1.0) - v802;
-        const V v874 = v873 * v873;
-        const V v875 = v873 * v874;
-        V v876 = softehl_splat(0.0);
-        V v877 = softehl_splat(0.0);
-        V v878 = softehl_splat(0.0);
-        V v879 = softehl_splat(0.0);
-        V v880 = softehl_splat(0.0);
-        V v881 = softehl_splat(0.0);
-        V v882 = softehl_splat(0.0);
-        V v883 = softehl_splat(0.0);
-        const M m884 = ~v535 & m872;
-        if (softehl_any(m884)) {
-            const V v885 = (-1.0) - v527;
-            const V v886 = 3.0 * v885;
-            const V v887 = v885 * v886;
-            const V v888 = v529 * v887;
-            const V v889 = -v888;
-            const V v890 = v531 * v887;
-            const V v891 = -v890;
-            const V v892 = v828 * v887;
-            const V v893 = -v892;
-            const V v894 = v830 * v887;
-            const V v895 = -v894;
-            const V v896 = v832 * v887;
-            const V v897 = -v896;
-            const V v898 = v834 * v887;
-            const V v899 = -v898;
-            const V v900 = v840 * v887;
-            const V v901 = v842 * v887;
-            const V v902 = -v900;
-            const V v903 = -v901;
-            v876 = softehl_blend(m884, v889, v876);
-            v877 = softehl_blend(m884, v891, v877);
-            v878 = softehl_blend(m884, v893, v878);
-            v879 = softehl_blend(m884, v895, v879);
-            v880 = softehl_blend(m884, v897, v880);
-            v881 = softehl_blend(m884, v899, v881);
-            v882 = softehl_blend(m884, v902, v882);
-            v883 = softehl_blend(m884, v903, v883);
+    const M m413 = ~v368;
+    if (softehl_any(m413)) {
+        const V v414 = (-1.0) - v367, v415 = v414 * (v414 * v414);
+        V v416 = softehl_splat(0.0), v417 = softehl_splat(0.0), v418 = softehl_splat(0.0),
+            v419 = softehl_splat(0.0), v420 = softehl_splat(0.0), v421 = softehl_splat(0.0),
+            v422 = softehl_splat(0.0), v423 = softehl_splat(0.0);
+        const M m424 = ~v297 & m413;
+        if (softehl_any(m424)) {
+            const V v425 = (-1.0) - v291, v426 = v425 * (3.0 * v425), v427 = -(v292 * v426),
+                v428 = -(v293 * v426), v429 = -(v376 * v426), v430 = -(v377 * v426),
+                v431 = -(v378 * v426), v432 = -(v379 * v426), v433 = -(v382 * v426),
+                v434 = -(v383 * v426);
+            v416 = softehl_blend(m424, v427, v416); v417 = softehl_blend(m424, v428, v417);
+            v418 = softehl_blend(m424, v429, v418); v419 = softehl_blend(m424, v430, v419);
+            v420 = softehl_blend(m424, v431, v420); v421 = softehl_blend(m424, v432, v421);
+            v422 = softehl_blend(m424, v433, v422); v423 = softehl_blend(m424, v434, v423);
         }
-        v843 = softehl_blend(m872, v875, v843);
-        v844 = softehl_blend(m872, v876, v844);
-        v845 = softehl_blend(m872, v877, v845);
-        v846 = softehl_blend(m872, v878, v846);
-        v847 = softehl_blend(m872, v879, v847);
-        v848 = softehl_blend(m872, v880, v848);
-        v849 = softehl_blend(m872, v881, v849);
-        v850 = softehl_blend(m872, v882, v850);
-        v851 = softehl_blend(m872, v883, v851);
+        v384 = softehl_blend(m413, v415, v384); v385 = softehl_blend(m413, v416, v385);
+        v386 = softehl_blend(m413, v417, v386); v387 = softehl_blend(m413, v418, v387);
+        v388 = softehl_blend(m413, v419, v388); v389 = softehl_blend(m413, v420, v389);
+        v390 = softehl_blend(m413, v421, v390); v391 = softehl_blend(m413, v422, v391);
+        v392 = softehl_blend(m413, v423, v392);
     }
-    V v904 = softehl_splat(0.0);
-    V v905 = softehl_splat(0.0);
-    V v906 = softehl_splat(0.0);
-    V v907 = softehl_splat(0.0);
-    V v908 = softehl_splat(0.0);
-    V v909 = softehl_splat(0.0);
-    V v910 = softehl_splat(0.0);
-    V v911 = softehl_splat(0.0);
-    V v912 = softehl_splat(0.0);
-    const M m913 = v814;
-    if (softehl_any(m913)) {
-        const M v914 = softehl_lt(softehl_splat((-1.0)), v805);
-        V v915 = softehl_splat((-1.0));
-        V v916 = softehl_splat(0.0);
-        V v917 = softehl_splat(0.0);
-        V v918 = softehl_splat(0.0);
-        V v919 = softehl_splat(0.0);
-        V v920 = softehl_splat(0.0);
-        V v921 = softehl_splat(0.0);
-        V v922 = softehl_splat(0.0);
-        V v923 = softehl_splat(0.0);
-        const M m924 = v914 & m913;
-        if (softehl_any(m924)) {
-            const V v925 = softehl_blend(v804, softehl_splat(0.0), v633);
-            const V v926 = softehl_blend(v804, softehl_splat(0.0), v635);
-            const V v927 = softehl_blend(v804, softehl_splat(0.0), v816);
-            const V v928 = softehl_blend(v804, softehl_splat(0.0), v818);
-            const V v929 = softehl_blend(v804, softehl_splat(0.0), v820);
-            const V v930 = softehl_blend(v804, softehl_splat(0.0), v822);
-            const V v931 = softehl_blend(v804, softehl_splat(0.0), v836);
-            const V v932 = softehl_blend(v804, softehl_splat(0.0), v838);
-            v915 = softehl_blend(m924, v805, v915);
-            v916 = softehl_blend(m924, v925, v916);
-            v917 = softehl_blend(m924, v926, v917);
-            v918 = softehl_blend(m924, v927, v918);
-            v919 = softehl_blend(m924, v928, v919);
-            v920 = softehl_blend(m924, v929, v920);
-            v921 = softehl_blend(m924, v930, v921);
-            v922 = softehl_blend(m924, v931, v922);
-            v923 = softehl_blend(m924, v932, v923);
+    V v435 = softehl_splat(0.0), v436 = softehl_splat(0.0), v437 = softehl_splat(0.0),
+        v438 = softehl_splat(0.0), v439 = softehl_splat(0.0), v440 = softehl_splat(0.0),
+        v441 = softehl_splat(0.0), v442 = softehl_splat(0.0), v443 = softehl_splat(0.0);
+    const M m444 = v371;
+    if (softehl_any(m444)) {
+        const M v445 = softehl_lt(softehl_splat((-1.0)), v370);
+        V v446 = softehl_splat((-1.0)), v447 = softehl_splat(0.0), v448 = softehl_splat(0.0),
+            v449 = softehl_splat(0.0), v450 = softehl_splat(0.0), v451 = softehl_splat(0.0),
+            v452 = softehl_splat(0.0), v453 = softehl_splat(0.0), v454 = softehl_splat(0.0);
+        const M m455 = v445 & m444;
+        if (softehl_any(m455)) {
+            const V v456 = softehl_blend(v369, softehl_splat(0.0), v323),
+                v457 = softehl_blend(v369, softehl_splat(0.0), v324),
+                v458 = softehl_blend(v369, softehl_splat(0.0), v372),
+                v459 = softehl_blend(v369, softehl_splat(0.0), v373),
+                v460 = softehl_blend(v369, softehl_splat(0.0), v374),
+                v461 = softehl_blend(v369, softehl_splat(0.0), v375),
+                v462 = softehl_blend(v369, softehl_splat(0.0), v380),
+                v463 = softehl_blend(v369, softehl_splat(0.0), v381);
+            v446 = softehl_blend(m455, v370, v446); v447 = softehl_blend(m455, v456, v447);
+            v448 = softehl_blend(m455, v457, v448); v449 = softehl_blend(m455, v458, v449);
+            v450 = softehl_blend(m455, v459, v450); v451 = softehl_blend(m455, v460, v451);
+            v452 = softehl_blend(m455, v461, v452); v453 = softehl_blend(m455, v462, v453);
+            v454 = softehl_blend(m455, v463, v454);
         }
-        v904 = softehl_blend(m913, v915, v904);
-        v905 = softehl_blend(m913, v916, v905);
-        v906 = softehl_blend(m913, v917, v906);
-        v907 = softehl_blend(m913, v918, v907);
-        v908 = softehl_blend(m913, v919, v908);
-        v909 = softehl_blend(m913, v920, v909);
-        v910 = softehl_blend(m913, v921, v910);
-        v911 = softehl_blend(m913, v922, v911);
-        v912 = softehl_blend(m913, v923, v912);
+        v435 = softehl_blend(m444, v446, v435); v436 = softehl_blend(m444, v447, v436);
+        v437 = softehl_blend(m444, v448, v437); v438 = softehl_blend(m444, v449, v438);
+        v439 = softehl_blend(m444, v450, v439); v440 = softehl_blend(m444, v451, v440);
+        v441 = softehl_blend(m444, v452, v441); v442 = softehl_blend(m444, v453, v442);
+        v443 = softehl_blend(m444, v454, v443);
     }
-    const M m933 = ~v814;
-    if (softehl_any(m933)) {
-        const V v934 = (-1.0) - v805;
-        const V v935 = v934 * v934;
-        const V v936 = v934 * v935;
-        V v937 = softehl_splat(0.0);
-        V v938 = softehl_splat(0.0);
-        V v939 = softehl_splat(0.0);
-        V v940 = softehl_splat(0.0);
-        V v941 = softehl_splat(0.0);
-        V v942 = softehl_splat(0.0);
-        V v943 = softehl_splat(0.0);
-        V v944 = softehl_splat(0.0);
-        const M m945 = ~v804 & m933;
-        if (softehl_any(m945)) {
-            const V v946 = (-1.0) - v621;
-            const V v947 = 3.0 * v946;
-            const V v948 = v946 * v947;
-            const V v949 = v633 * v948;
-            const V v950 = -v949;
-            const V v951 = v635 * v948;
-            const V v952 = -v951;
-            const V v953 = v816 * v948;
-            const V v954 = -v953;
-            const V v955 = v818 * v948;
-            const V v956 = -v955;
-            const V v957 = v820 * v948;
-            const V v958 = -v957;
-            const V v959 = v822 * v948;
-            const V v960 = -v959;
-            const V v961 = v836 * v948;
-            const V v962 = v838 * v948;
-            const V v963 = -v961;
-            const V v964 = -v962;
-            v937 = softehl_blend(m945, v950, v937);
-            v938 = softehl_blend(m945, v952, v938);
-            v939 = softehl_blend(m945, v954, v939);
-            v940 = softehl_blend(m945, v956, v940);
-            v941 = softehl_blend(m945, v958, v941);
-            v942 = softehl_blend(m945, v960, v942);
-            v943 = softehl_blend(m945, v963, v943);
-            v944 = softehl_blend(m945, v964, v944);
+    const M m464 = ~v371;
+    if (softehl_any(m464)) {
+        const V v465 = (-1.0) - v370, v466 = v465 * (v465 * v465);
+        V v467 = softehl_splat(0.0), v468 = softehl_splat(0.0), v469 = softehl_splat(0.0),
+            v470 = softehl_splat(0.0), v471 = softehl_splat(0.0), v472 = softehl_splat(0.0),
+            v473 = softehl_splat(0.0), v474 = softehl_splat(0.0);
+        const M m475 = ~v369 & m464;
+        if (softehl_any(m475)) {
+            const V v476 = (-1.0) - v320, v477 = v476 * (3.0 * v476), v478 = -(v323 * v477),
+                v479 = -(v324 * v477), v480 = -(v372 * v477), v481 = -(v373 * v477),
+                v482 = -(v374 * v477), v483 = -(v375 * v477), v484 = -(v380 * v477),
+                v485 = -(v381 * v477);
+            v467 = softehl_blend(m475, v478, v467); v468 = softehl_blend(m475, v479, v468);
+            v469 = softehl_blend(m475, v480, v469); v470 = softehl_blend(m475, v481, v470);
+            v471 = softehl_blend(m475, v482, v471); v472 = softehl_blend(m475, v483, v472);
+            v473 = softehl_blend(m475, v484, v473); v474 = softehl_blend(m475, v485, v474);
         }
-        v904 = softehl_blend(m933, v936, v904);
-        v905 = softehl_blend(m933, v937, v905);
-        v906 = softehl_blend(m933, v938, v906);
-        v907 = softehl_blend(m933, v939, v907);
-        v908 = softehl_blend(m933, v940, v908);
-        v909 = softehl_blend(m933, v941, v909);
-        v910 = softehl_blend(m933, v942, v910);
-        v911 = softehl_blend(m933, v943, v911);
-        v912 = softehl_blend(m933, v944, v912);
+        v435 = softehl_blend(m464, v466, v435); v436 = softehl_blend(m464, v467, v436);
+        v437 = softehl_blend(m464, v468, v437); v438 = softehl_blend(m464, v469, v438);
+        v439 = softehl_blend(m464, v470, v439); v440 = softehl_blend(m464, v471, v440);
+        v441 = softehl_blend(m464, v472, v441); v442 = softehl_blend(m464, v473, v442);
+        v443 = softehl_blend(m464, v474, v443);
     }
-    const V v965 = v904 - v843;
-    const M v966 = softehl_eq(v965, v965);
-    V v967 = softehl_splat(0.0);
-    V v968 = softehl_splat(0.0);
-    V v969 = softehl_splat(0.0);
-    V v970 = softehl_splat(0.0);
-    V v971 = softehl_splat(0.0);
-    V v972 = softehl_splat(0.0);
-    V v973 = softehl_splat(0.0);
-    V v974 = softehl_splat(0.0);
-    V v975 = softehl_splat(0.0);
-    V v976 = softehl_splat(0.0);
-    V v977 = softehl_splat(0.0);
-    const M m978 = v966;
-    if (softehl_any(m978)) {
-        const M v979 = softehl_lt(softehl_splat(0.0), v965);
-        V v980 = softehl_splat(0.0);
-        V v981 = softehl_splat(0.0);
-        V v982 = softehl_splat(0.0);
-        V v983 = softehl_splat(0.0);
-        V v984 = softehl_splat(0.0);
-        V v985 = softehl_splat(0.0);
-        V v986 = softehl_splat(0.0);
-        V v987 = softehl_splat(0.0);
-        V v988 = softehl_splat(0.0);
-        V v989 = softehl_splat(0.0);
-        V v990 = softehl_splat(0.0);
-        const M m991 = v979 & m978;
-        if (softehl_any(m991)) {
-            const V v992 = v905 - v844;
-            const V v993 = -v850;
-            const V v994 = v906 - v845;
-            const V v995 = v907 - v846;
-            const V v996 = v908 - v847;
-            const V v997 = -v851;
-            const V v998 = v909 - v848;
-            const V v999 = v910 - v849;
-            v980 = softehl_blend(m991, v965, v980);
-            v981 = softehl_blend(m991, v992, v981);
-            v982 = softehl_blend(m991, v994, v982);
-            v983 = softehl_blend(m991, v995, v983);
-            v984 = softehl_blend(m991, v996, v984);
-            v985 = softehl_blend(m991, v998, v985);
-            v986 = softehl_blend(m991, v999, v986);
-            v987 = softehl_blend(m991, v911, v987);
-            v988 = softehl_blend(m991, v912, v988);
-            v989 = softehl_blend(m991, v993, v989);
-            v990 = softehl_blend(m991, v997, v990);
+    const V v486 = v435 - v384; const M v487 = softehl_eq(v486, v486);
+    V v488 = softehl_splat(0.0), v489 = softehl_splat(0.0), v490 = softehl_splat(0.0),
+        v491 = softehl_splat(0.0), v492 = softehl_splat(0.0), v493 = softehl_splat(0.0),
+        v494 = softehl_splat(0.0), v495 = softehl_splat(0.0), v496 = softehl_splat(0.0),
+        v497 = softehl_splat(0.0), v498 = softehl_splat(0.0);
+    const M m499 = v487;
+    if (softehl_any(m499)) {
+        const M v500 = softehl_lt(softehl_splat(0.0), v486);
+        V v501 = softehl_splat(0.0), v502 = softehl_splat(0.0), v503 = softehl_splat(0.0),
+            v504 = softehl_splat(0.0), v505 = softehl_splat(0.0), v506 = softehl_splat(0.0),
+            v507 = softehl_splat(0.0), v508 = softehl_splat(0.0), v509 = softehl_splat(0.0),
+            v510 = softehl_splat(0.0), v511 = softehl_splat(0.0);
+        const M m512 = v500 & m499;
+        if (softehl_any(m512)) {
+            const V v513 = v436 - v385, v514 = -v391, v515 = v437 - v386, v516 = v438 - v387,
+                v517 = v439 - v388, v518 = -v392, v519 = v440 - v389, v520 = v441 - v390;
+            v501 = softehl_blend(m512, v486, v501); v502 = softehl_blend(m512, v513, v502);
+            v503 = softehl_blend(m512, v515, v503); v504 = softehl_blend(m512, v516, v504);
+            v505 = softehl_blend(m512, v517, v505); v506 = softehl_blend(m512, v519, v506);
+            v507 = softehl_blend(m512, v520, v507); v508 = softehl_blend(m512, v442, v508);
+            v509 = softehl_blend(m512, v443, v509); v510 = softehl_blend(m512, v514, v510);
+            v511 = softehl_blend(m512, v518, v511);
         }
-        v967 = softehl_blend(m978, v980, v967);
-        v968 = softehl_blend(m978, v981, v968);
-        v969 = softehl_blend(m978, v982, v969);
-        v970 = softehl_blend(m978, v983, v970);
-        v971 = softehl_blend(m978, v984, v971);
-        v972 = softehl_blend(m978, v985, v972);
-        v973 = softehl_blend(m978, v986, v973);
-        v974 = softehl_blend(m978, v987, v974);
-        v975 = softehl_blend(m978, v988, v975);
-        v976 = softehl_blend(m978, v989, v976);
-        v977 = softehl_blend(m978, v990, v977);
+        v488 = softehl_blend(m499, v501, v488); v489 = softehl_blend(m499, v502, v489);
+        v490 = softehl_blend(m499, v503, v490); v491 = softehl_blend(m499, v504, v491);
+        v492 = softehl_blend(m499, v505, v492); v493 = softehl_blend(m499, v506, v493);
+        v494 = softehl_blend(m499, v507, v494); v495 = softehl_blend(m499, v508, v495);
+        v496 = softehl_blend(m499, v509, v496); v497 = softehl_blend(m499, v510, v497);
+        v498 = softehl_blend(m499, v511, v498);
     }
-    const M m1000 = ~v966;
-    if (softehl_any(m1000)) {
-        const V v1001 = v843 - v904;
-        const V v1002 = v844 - v905;
-        const V v1003 = v845 - v906;
-        const V v1004 = v846 - v907;
-        const V v1005 = v847 - v908;
-        const V v1006 = v1001 * v1001;
-        const V v1007 = v848 - v909;
-        const V v1008 = v849 - v910;
-        const V v1009 = v1001 * v1006;
-        const V v1010 = 3.0 * v1006;
-        const V v1011 = v1002 * v1010;
-        const V v1012 = v1003 * v1010;
-        const V v1013 = v1004 * v1010;
-        const V v1014 = v1005 * v1010;
-        const V v1015 = v1007 * v1010;
-        const V v1016 = v1008 * v1010;
-        const V v1017 = v911 * v1010;
-        const V v1018 = v912 * v1010;
-        const V v1019 = v850 * v1010;
-        const V v1020 = v851 * v1010;
-        const V v1021 = -v1017;
-        const V v1022 = -v1018;
-        v967 = softehl_blend(m1000, v1009, v967);
-        v968 = softehl_blend(m1000, v1011, v968);
-        v969 = softehl_blend(m1000, v1012, v969);
-        v970 = softehl_blend(m1000, v1013, v970);
-        v971 = softehl_blend(m1000, v1014, v971);
-        v972 = softehl_blend(m1000, v1015, v972);
-        v973 = softehl_blend(m1000, v1016, v973);
-        v974 = softehl_blend(m1000, v1021, v974);
-        v975 = softehl_blend(m1000, v1022, v975);
-        v976 = softehl_blend(m1000, v1019, v976);
-        v977 = softehl_blend(m1000, v1020, v977);
+    const M m521 = ~v487;
+    if (softehl_any(m521)) {
+        const V v522 = v384 - v435, v523 = v522 * v522, v524 = v522 * v523, v525 = 3.0 * v523,
+            v526 = (v385 - v436) * v525, v527 = (v386 - v437) * v525, v528 = (v387 - v438) * v525,
+            v529 = (v388 - v439) * v525, v530 = (v389 - v440) * v525, v531 = (v390 - v441) * v525,
+            v532 = v391 * v525, v533 = v392 * v525, v534 = -(v442 * v525), v535 = -(v443 * v525);
+        v488 = softehl_blend(m521, v524, v488); v489 = softehl_blend(m521, v526, v489);
+        v490 = softehl_blend(m521, v527, v490); v491 = softehl_blend(m521, v528, v491);
+        v492 = softehl_blend(m521, v529, v492); v493 = softehl_blend(m521, v530, v493);
+        v494 = softehl_blend(m521, v531, v494); v495 = softehl_blend(m521, v534, v495);
+        v496 = softehl_blend(m521, v535, v496); v497 = softehl_blend(m521, v532, v497);
+        v498 = softehl_blend(m521, v533, v498);
     }
-    const V v1023 = 0.5 * v968;
-    const V v1024 = 0.5 * v969;
-    const V v1025 = v843 + v904;
-    const V v1026 = v905 + v844;
-    const V v1027 = v906 + v845;
-    const V v1028 = 0.5 * v970;
-    const V v1029 = 0.5 * v971;
-    const V v1030 = 0.5 * v1025;
-    const V v1031 = v907 + v846;
-    const V v1032 = 0.5 * v1026;
-    const V v1033 = 0.5 * v1027;
-    const V v1034 = 0.5 * v972;
-    const V v1035 = 0.5 * v973;
-    const V v1036 = 0.5 * v1031;
-    const V v1037 = v908 + v847;
-    const V v1038 = 0.5 * v974;
-    const V v1039 = 0.5 * v975;
-    const V v1040 = 0.5 * v976;
-    const V v1041 = 0.5 * v1037;
-    const V v1042 = v909 + v848;
-    const V v1043 = 0.5 * v977;
-    const V v1044 = 0.5 * v911;
-    const V v1045 = v910 + v849;
-    const V v1046 = 0.5 * v912;
-    const V v1047 = 0.5 * v850;
-    const V v1048 = 0.5 * v1042;
-    const V v1049 = 0.5 * v851;
-    const V v1050 = 0.5 * v1045;
-    const V v1051 = 6.283185307179586 * a16;
-    const V v1052 = 0.5 * v967;
-    const V v1053 = 0.25 * v967;
-    V s1054 = softehl_splat(0.0);
-    V s1055 = softehl_splat(0.0);
-    V s1056 = softehl_splat(0.0);
-    V s1057 = softehl_splat(0.0);
-    V s1058 = softehl_splat(0.0);
-    V s1059 = softehl_splat(0.0);
-    V s1060 = softehl_splat(0.0);
-    V s1061 = softehl_splat(0.0);
-    V s1062 = softehl_splat(0.0);
-    V s1063 = softehl_splat(0.0);
-    V s1064 = softehl_splat(0.0);
-    V s1065 = softehl_splat(0.0);
-    V s1066 = softehl_splat(0.0);
-    V s1067 = softehl_splat(0.0);
-    V s1068 = softehl_splat(0.0);
-    V s1069 = softehl_splat(0.0);
-    V s1070 = softehl_splat(0.0);
-    V s1071 = softehl_splat(0.0);
-    V s1072 = softehl_splat(0.0);
-    V s1073 = softehl_splat(0.0);
-    V s1074 = softehl_splat(0.0);
-    V s1075 = softehl_splat(0.0);
-    V s1076 = softehl_splat(0.0);
-    V s1077 = softehl_splat(0.0);
-    V s1078 = softehl_splat(0.0);
-    V s1079 = softehl_splat(0.0);
-    V s1080 = softehl_splat(0.0);
-    V s1081 = softehl_splat(0.0);
-    V s1082 = softehl_splat(0.0);
-    V s1083 = softehl_splat(0.0);
-    V s1084 = softehl_splat(0.0);
-    V s1085 = softehl_splat(0.0);
-    V s1086 = softehl_splat(0.0);
-    V s1087 = softehl_splat(0.0);
-    V s1088 = softehl_splat(0.0);
-    V s1089 = softehl_splat(0.0);
-    V s1090 = softehl_splat(0.0);
-    V s1091 = softehl_splat(0.0);
-    V s1092 = softehl_splat(0.0);
-    V s1093 = softehl_splat(0.0);
-    V s1094 = softehl_splat(0.0);
-    V s1095 = softehl_splat(0.0);
-    V s1096 = softehl_splat(0.0);
-    V s1097 = softehl_splat(0.0);
-    V s1098 = softehl_splat(0.0);
-    V s1099 = softehl_splat(0.0);
-    V s1100 = softehl_splat(0.0);
-    V s1101 = softehl_splat(0.0);
-    V s1102 = softehl_splat(0.0);
-    V s1103 = softehl_splat(0.0);
-    V s1104 = softehl_splat(0.0);
-    V s1105 = softehl_splat(0.0);
-    V s1106 = softehl_splat(0.0);
-    V s1107 = softehl_splat(0.0);
-    V s1108 = softehl_splat(0.0);
-    V s1109 = softehl_splat(0.0);
-    V s1110 = softehl_splat(0.0);
-    V s1111 = softehl_splat(0.0);
-    V s1112 = softehl_splat(0.0);
-    V s1113 = softehl_splat(0.0);
-    V s1114 = softehl_splat(0.0);
-    V s1115 = softehl_splat(0.0);
-    V s1116 = softehl_splat(0.0);
-    V s1117 = softehl_splat(0.0);
-    V s1118 = softehl_splat(0.0);
-    V s1119 = softehl_splat(0.0);
-    V s1120 = softehl_splat(0.0);
-    V s1121 = softehl_splat(0.0);
-    V s1122 = softehl_splat(0.0);
-    V s1123 = softehl_splat(0.0);
-    V s1124 = softehl_splat(0.0);
-    V s1125 = softehl_splat(0.0);
-    V s1126 = softehl_splat(0.0);
-    V s1127 = softehl_splat(0.0);
-    V s1128 = softehl_splat(0.0);
-    V s1129 = softehl_splat(0.0);
-    V s1130 = softehl_splat(0.0);
-    V s1131 = softehl_splat(0.0);
-    V s1132 = softehl_splat(0.0);
-    V s1133 = softehl_splat(0.0);
-    V s1134 = softehl_splat(0.0);
-    V s1135 = softehl_splat(0.0);
-    V s1136 = softehl_splat(0.0);
-    V s1137 = softehl_splat(0.0);
-    V s1138 = softehl_splat(0.0);
-    V s1139 = softehl_splat(0.0);
-    V s1140 = softehl_splat(0.0);
-    V s1141 = softehl_splat(0.0);
-    V s1142 = softehl_splat(0.0);
-    V s1143 = softehl_splat(0.0);
-    V s1144 = softehl_splat(0.0);
-    V s1145 = softehl_splat(0.0);
-    V s1146 = softehl_splat(0.0);
-    V s1147 = softehl_splat(0.0);
-    V s1148 = softehl_splat(0.0);
-    V s1149 = softehl_splat(0.0);
-    V s1150 = softehl_splat(0.0);
-    V s1151 = softehl_splat(0.0);
-    V s1152 = softehl_splat(0.0);
-    V s1153 = softehl_splat(0.0);
-    V s1154 = softehl_splat(0.0);
-    V s1155 = softehl_splat(0.0);
-    V s1156 = softehl_splat(0.0);
-    V s1157 = softehl_splat(0.0);
-    V s1158 = softehl_splat(0.0);
-    V s1159 = softehl_splat(0.0);
-    V s1160 = softehl_splat(0.0);
-    V s1161 = softehl_splat(0.0);
-    V s1162 = softehl_splat(0.0);
-    V s1163 = softehl_splat(0.0);
-    V s1164 = softehl_splat(0.0);
-    V s1165 = softehl_splat(0.0);
-    V s1166 = softehl_splat(0.0);
-    V s1167 = softehl_splat(0.0);
-    V s1168 = softehl_splat(0.0);
-    V s1169 = softehl_splat(0.0);
-    V s1170 = softehl_splat(0.0);
-    V s1171 = softehl_splat(0.0);
-    V s1172 = softehl_splat(0.0);
-    V s1173 = softehl_splat(0.0);
-    V s1174 = softehl_splat(0.0);
-    V s1175 = softehl_splat(0.0);
-    V s1176 = softehl_splat(0.0);
-    V s1177 = softehl_splat(0.0);
-    V s1178 = softehl_splat(0.0);
-    V s1179 = softehl_splat(0.0);
-    V s1180 = softehl_splat(0.0);
-    V s1181 = softehl_splat(0.0);
-    V s1182 = softehl_splat(0.0);
-    V s1183 = softehl_splat(0.0);
-    V s1184 = softehl_splat(0.0);
-    V s1185 = softehl_splat(0.0);
-    V s1186 = softehl_splat(0.0);
-    V s1187 = softehl_splat(0.0);
-    V s1188 = softehl_splat(0.0);
-    V s1189 = softehl_splat(0.0);
-    V s1190 = softehl_splat(0.0);
-    V s1191 = softehl_splat(0.0);
-    V s1192 = softehl_splat(0.0);
-    V s1193 = softehl_splat(0.0);
-    V s1194 = softehl_splat(0.0);
-    V s1195 = softehl_splat(0.0);
-    V s1196 = softehl_splat(0.0);
-    V s1197 = softehl_splat(0.0);
-    V s1198 = softehl_splat(0.0);
-    V s1199 = softehl_splat(0.0);
-    V s1200 = softehl_splat(0.0);
-    V s1201 = softehl_splat(0.0);
-    V s1202 = softehl_splat(0.0);
-    V s1203 = softehl_splat(0.0);
-    V s1204 = softehl_splat(0.0);
-    V s1205 = softehl_splat(0.0);
-    V s1206 = softehl_splat(0.0);
-    V s1207 = softehl_splat(0.0);
-    V s1208 = softehl_splat(0.0);
-    V s1209 = softehl_splat(0.0);
-    V s1210 = softehl_splat(0.0);
-    V s1211 = softehl_splat(0.0);
-    V s1212 = softehl_splat(0.0);
-    V s1213 = softehl_splat(0.0);
-    V s1214 = softehl_splat(0.0);
-    V s1215 = softehl_splat(0.0);
-    V s1216 = softehl_splat(0.0);
-    V s1217 = softehl_splat(0.0);
-    V s1218 = softehl_splat(0.0);
-    V s1219 = softehl_splat(0.0);
-    V s1220 = softehl_splat(0.0);
-    V s1221 = softehl_splat(0.0);
-    V s1222 = softehl_splat(0.0);
-    V s1223 = softehl_splat(0.0);
-    V s1224 = softehl_splat(0.0);
-    V s1225 = softehl_splat(0.0);
-    V s1226 = softehl_splat(0.0);
-    V s1227 = softehl_splat(0.0);
-    V s1228 = softehl_splat(0.0);
-    V s1229 = softehl_splat(0.0);
-    V s1230 = softehl_splat(0.0);
-    V s1231 = softehl_splat(0.0);
-    V s1232 = softehl_splat(0.0);
-    V s1233 = softehl_splat(0.0);
-    V s1234 = softehl_splat(0.0);
-    V s1235 = softehl_splat(0.0);
-    V s1236 = softehl_splat(0.0);
-    V s1237 = softehl_splat(0.0);
-    V s1238 = softehl_splat(0.0);
-    V s1239 = softehl_splat(0.0);
-    V s1240 = softehl_splat(0.0);
-    V s1241 = softehl_splat(0.0);
-    V s1242 = softehl_splat(0.0);
-    V s1243 = softehl_splat(0.0);
-    V s1244 = softehl_splat(0.0);
-    V s1245 = softehl_splat(0.0);
-    V s1246 = softehl_splat(0.0);
-    V s1247 = softehl_splat(0.0);
-    V s1248 = softehl_splat(0.0);
-    V s1249 = softehl_splat(0.0);
-    V s1250 = softehl_splat(0.0);
-    V s1251 = softehl_splat(0.0);
-    V s1252 = softehl_splat(0.0);
-    V s1253 = softehl_splat(0.0);
-    V s1254 = softehl_splat(0.0);
-    V s1255 = softehl_splat(0.0);
-    V s1256 = softehl_splat(0.0);
-    V s1257 = softehl_splat(0.0);
-    V s1258 = softehl_splat(0.0);
-    V s1259 = softehl_splat(0.0);
-    V s1260 = softehl_splat(0.0);
-    V s1261 = softehl_splat(0.0);
-    V s1262 = softehl_splat(0.0);
-    V s1263 = softehl_splat(0.0);
-    V s1264 = softehl_splat(0.0);
-    V s1265 = softehl_splat(0.0);
-    V s1266 = softehl_splat(0.0);
-    V s1267 = softehl_splat(0.0);
-    V s1268 = softehl_splat(0.0);
-    V s1269 = softehl_splat(0.0);
-    V s1270 = softehl_splat(0.0);
-    V s1271 = softehl_splat(0.0);
-    V s1272 = softehl_splat(0.0);
-    V s1273 = softehl_splat(0.0);
-    V s1274 = softehl_splat(0.0);
-    V s1275 = softehl_splat(0.0);
-    V s1276 = softehl_splat(0.0);
-    V s1277 = softehl_splat(0.0);
-    V s1278 = softehl_splat(0.0);
-    V s1279 = softehl_splat(0.0);
-    V s1280 = softehl_splat(0.0);
-    V s1281 = softehl_splat(0.0);
-    V s1282 = softehl_splat(0.0);
-    V s1283 = softehl_splat(0.0);
-    V s1284 = softehl_splat(0.0);
-    V s1285 = softehl_splat(0.0);
-    V s1286 = softehl_splat(0.0);
-    V s1287 = softehl_splat(0.0);
-    V s1288 = softehl_splat(0.0);
-    V s1289 = softehl_splat(0.0);
-    V s1290 = softehl_splat(0.0);
-    V s1291 = softehl_splat(0.0);
-    V s1292 = softehl_splat(0.0);
-    V s1293 = softehl_splat(0.0);
-    V s1294 = softehl_splat(0.0);
-    V s1295 = softehl_splat(0.0);
-    V s1296 = softehl_splat(0.0);
-    V s1297 = softehl_splat(0.0);
-    V s1298 = softehl_splat(0.0);
-    V s1299 = softehl_splat(0.0);
-    V s1300 = softehl_splat(0.0);
-    V s1301 = softehl_splat(0.0);
-    V s1302 = softehl_splat(0.0);
-    V s1303 = softehl_splat(0.0);
-    V s1304 = softehl_splat(0.0);
-    V s1305 = softehl_splat(0.0);
-    V s1306 = softehl_splat(0.0);
-    V s1307 = softehl_splat(0.0);
-    V s1308 = softehl_splat(0.0);
-    V s1309 = softehl_splat(0.0);
-    V s1310 = softehl_splat(0.0);
-    V s1311 = softehl_splat(0.0);
-    V s1312 = softehl_splat(0.0);
-    V s1313 = softehl_splat(0.0);
-    V s1314 = softehl_splat(0.0);
-    V s1315 = softehl_splat(0.0);
-    V s1316 = softehl_splat(0.0);
-    V s1317 = softehl_splat(0.0);
-    V s1318 = softehl_splat(0.0);
-    V s1319 = softehl_splat(0.0);
-    V s1320 = softehl_splat(0.0);
-    V s1321 = softehl_splat(0.0);
+    const V v536 = 0.5 * v489, v537 = 0.5 * v490, v538 = 0.5 * v491, v539 = 0.5 * v492,
+        v540 = 0.5 * (v384 + v435), v541 = 0.5 * (v436 + v385), v542 = 0.5 * (v437 + v386),
+        v543 = 0.5 * v493, v544 = 0.5 * v494, v545 = 0.5 * (v438 + v387), v546 = 0.5 * v495,
+        v547 = 0.5 * v496, v548 = 0.5 * v497, v549 = 0.5 * (v439 + v388), v550 = 0.5 * v498,
+        v551 = 0.5 * v442, v552 = 0.5 * v443, v553 = 0.5 * v391, v554 = 0.5 * (v440 + v389),
+        v555 = 0.5 * v392, v556 = 0.5 * (v441 + v390), v557 = 6.283185307179586 * a16,
+        v558 = 0.5 * v488, v559 = 0.25 * v488;
+    V s560 = {0}, s561 = {0}, s562 = {0}, s563 = {0}, s564 = {0}, s565 = {0}, s566 = {0},
+        s567 = {0}, s568 = {0}, s569 = {0}, s570 = {0}, s571 = {0}, s572 = {0}, s573 = {0},
+        s574 = {0}, s575 = {0}, s576 = {0}, s577 = {0}, s578 = {0}, s579 = {0}, s580 = {0},
+        s581 = {0}, s582 = {0}, s583 = {0}, s584 = {0}, s585 = {0}, s586 = {0}, s587 = {0},
+        s588 = {0}, s589 = {0}, s590 = {0}, s591 = {0}, s592 = {0}, s593 = {0}, s594 = {0},
+        s595 = {0}, s596 = {0}, s597 = {0}, s598 = {0}, s599 = {0}, s600 = {0}, s601 = {0},
+        s602 = {0}, s603 = {0}, s604 = {0}, s605 = {0}, s606 = {0}, s607 = {0}, s608 = {0},
+        s609 = {0}, s610 = {0}, s611 = {0}, s612 = {0}, s613 = {0}, s614 = {0}, s615 = {0},
+        s616 = {0}, s617 = {0}, s618 = {0}, s619 = {0}, s620 = {0}, s621 = {0}, s622 = {0},
+        s623 = {0}, s624 = {0}, s625 = {0}, s626 = {0}, s627 = {0}, s628 = {0}, s629 = {0},
+        s630 = {0}, s631 = {0}, s632 = {0}, s633 = {0}, s634 = {0}, s635 = {0}, s636 = {0},
+        s637 = {0}, s638 = {0}, s639 = {0}, s640 = {0}, s641 = {0}, s642 = {0}, s643 = {0},
+        s644 = {0}, s645 = {0}, s646 = {0}, s647 = {0}, s648 = {0}, s649 = {0}, s650 = {0},
+        s651 = {0}, s652 = {0}, s653 = {0}, s654 = {0}, s655 = {0}, s656 = {0}, s657 = {0},
+        s658 = {0}, s659 = {0}, s660 = {0}, s661 = {0}, s662 = {0}, s663 = {0}, s664 = {0},
+        s665 = {0}, s666 = {0}, s667 = {0}, s668 = {0}, s669 = {0}, s670 = {0}, s671 = {0},
+        s672 = {0}, s673 = {0}, s674 = {0}, s675 = {0}, s676 = {0}, s677 = {0}, s678 = {0},
+        s679 = {0}, s680 = {0}, s681 = {0}, s682 = {0}, s683 = {0}, s684 = {0}, s685 = {0},
+        s686 = {0}, s687 = {0}, s688 = {0}, s689 = {0}, s690 = {0}, s691 = {0}, s692 = {0},
+        s693 = {0}, s694 = {0}, s695 = {0}, s696 = {0}, s697 = {0}, s698 = {0}, s699 = {0},
+        s700 = {0}, s701 = {0}, s702 = {0}, s703 = {0}, s704 = {0}, s705 = {0}, s706 = {0},
+        s707 = {0}, s708 = {0}, s709 = {0}, s710 = {0}, s711 = {0}, s712 = {0}, s713 = {0},
+        s714 = {0}, s715 = {0}, s716 = {0}, s717 = {0}, s718 = {0}, s719 = {0}, s720 = {0},
+        s721 = {0}, s722 = {0}, s723 = {0}, s724 = {0}, s725 = {0}, s726 = {0}, s727 = {0},
+        s728 = {0}, s729 = {0}, s730 = {0}, s731 = {0}, s732 = {0}, s733 = {0}, s734 = {0},
+        s735 = {0}, s736 = {0}, s737 = {0}, s738 = {0}, s739 = {0}, s740 = {0}, s741 = {0},
+        s742 = {0}, s743 = {0}, s744 = {0}, s745 = {0}, s746 = {0}, s747 = {0}, s748 = {0},
+        s749 = {0}, s750 = {0}, s751 = {0}, s752 = {0}, s753 = {0}, s754 = {0}, s755 = {0},
+        s756 = {0}, s757 = {0}, s758 = {0}, s759 = {0}, s760 = {0}, s761 = {0}, s762 = {0},
+        s763 = {0}, s764 = {0}, s765 = {0}, s766 = {0}, s767 = {0}, s768 = {0}, s769 = {0},
+        s770 = {0}, s771 = {0}, s772 = {0}, s773 = {0}, s774 = {0}, s775 = {0}, s776 = {0},
+        s777 = {0}, s778 = {0}, s779 = {0}, s780 = {0}, s781 = {0}, s782 = {0}, s783 = {0},
+        s784 = {0}, s785 = {0}, s786 = {0}, s787 = {0}, s788 = {0}, s789 = {0}, s790 = {0},
+        s791 = {0}, s792 = {0}, s793 = {0}, s794 = {0}, s795 = {0}, s796 = {0}, s797 = {0},
+        s798 = {0}, s799 = {0}, s800 = {0}, s801 = {0}, s802 = {0}, s803 = {0}, s804 = {0},
+        s805 = {0}, s806 = {0}, s807 = {0}, s808 = {0}, s809 = {0}, s810 = {0}, s811 = {0},
+        s812 = {0}, s813 = {0}, s814 = {0}, s815 = {0}, s816 = {0}, s817 = {0}, s818 = {0},
+        s819 = {0}, s820 = {0}, s821 = {0}, s822 = {0}, s823 = {0}, s824 = {0}, s825 = {0},
+        s826 = {0}, s827 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const V v1322 = w[0] * v1052;
-        const V v1323 = v1322 + v1030;
-        const V v1324 = (-1.0) + v1323;
-        const V v1325 = 1.0 + v1323;
-        const V v1326 = 0.5 + v1323;
-        const V v1327 = (-0.5) + v1323;
-        const V v1328 = v1323 * v1323;
-        const V v1329 = 1.0 - v1328;
-        const V v1330 = 0.5 * v1323;
-        const V v1331 = 2.0 * v1323;
-        const V v1332 = v1330 * v1324;
-        const V v1333 = v1330 * v1325;
-        const V v1334 = v1 * v1331;
-        const V v1335 = v1 * v1329;
-        const V v1336 = v8 * v1331;
-        const V v1337 = v8 * v1329;
-        const V v1338 = v34 * v1326;
-        const V v1339 = v30 * v1326;
-        const V v1340 = v1338 - v1334;
-        const V v1341 = v1339 - v1336;
-        const V v1342 = v34 * v1333;
-        const V v1343 = v1342 + v1335;
-        const V v1344 = v30 * v1333;
-        const V v1345 = v1344 + v1337;
-        const V v1346 = v28 * v1332;
-        const V v1347 = v1346 + v1343;
-        const V v1348 = v28 * v1327;
-        const V v1349 = v1348 + v1340;
-        const V v1350 = v6 - v1347;
-        const V v1351 = 2.0 * v1349;
-        const V v1352 = v29 * v1332;
-        const V v1353 = v1352 + v1345;
-        const V v1354 = v29 * v1327;
-        const V v1355 = v1354 + v1341;
-        const V v1356 = v27 - v1353;
-        const V v1357 = v1349 * v1349;
-        const V v1358 = 2.0 * v1355;
-        const V v1359 = v1355 * v1355;
-        const V v1360 = v1357 + v1359;
-        const V v1361 = softehl_vsqrt(v1360);
-        const V v1362 = 1.0 / v1360;
-        const V v1363 = 1.0 / v1361;
-        const V v1364 = softehl_vsqrt(v1362);
-        const V v1365 = 0.5 * v1364;
-        const V v1366 = v1351 * v1365;
-        const V v1367 = v1358 * v1365;
-        const V v1368 = v1349 * v1363;
-        const V v1369 = v1355 * v1363;
-        const V v1370 = v1363 * v1363;
-        const V v1371 = v1366 * v1370;
-        const V v1372 = v1367 * v1370;
-        const V v1373 = v1349 * v1372;
-        const V v1374 = v1355 * v1371;
-        const V v1375 = v1349 * v1371;
-        const V v1376 = v1363 - v1375;
-        const V v1377 = v1355 * v1372;
-        const V v1378 = v1363 - v1377;
-        const V v1379 = v84 * v1368;
-        const V v1380 = v89 * v1369;
-        const V v1381 = v1379 + v1380;
-        const V v1382 = v1350 * v1368;
-        const V v1383 = v1356 * v1369;
-        const V v1384 = v1382 + v1383;
-        const V v1385 = 2.0 * v1384;
-        const V v1386 = 4.0 * v1384;
-        const V v1387 = v1350 * v1376;
-        const V v1388 = v1356 * v1374;
-        const V v1389 = v1387 - v1388;
-        const V v1390 = v1356 * v1378;
-        const V v1391 = v1350 * v1373;
-        const V v1392 = v1390 - v1391;
-        const V v1393 = v74 * v1376;
-        const V v1394 = v80 * v1374;
-        const V v1395 = v1393 - v1394;
-        const V v1396 = v80 * v1378;
-        const V v1397 = v74 * v1373;
-        const V v1398 = v1396 - v1397;
-        const V v1399 = v74 * v1368;
-        const V v1400 = v80 * v1369;
-        const V v1401 = v1399 + v1400;
-        const V v1402 = v1401 * v1401;
-        const V v1403 = 2.0 * v1401;
-        const V v1404 = v1368 * v1403;
-        const V v1405 = v1369 * v1403;
-        const V v1406 = v1395 * v1403;
-        const V v1407 = v1398 * v1403;
-        const V v1408 = 0.01 * v1402;
-        const V v1409 = v1381 * v1386;
-        const V v1410 = v1402 - v1409;
-        const M v1411 = softehl_lt(v1408, v1410);
-        V v1412 = softehl_splat(0.0);
-        V v1413 = softehl_splat(0.0);
-        V v1414 = softehl_splat(0.0);
-        V v1415 = softehl_splat(0.0);
-        V v1416 = softehl_splat(0.0);
-        V v1417 = softehl_splat(0.0);
-        V v1418 = softehl_splat(0.0);
-        V v1419 = softehl_splat(0.0);
-        V v1420 = softehl_splat(0.0);
-        V v1421 = softehl_splat(0.0);
-        V v1422 = softehl_splat(0.0);
-        V v1423 = softehl_splat(0.0);
-        V v1424 = softehl_splat(0.0);
-        const M m1425 = v1411;
-        if (softehl_any(m1425)) {
-            const V v1426 = 4.0 * v1368;
-            const V v1427 = v1368 * v1385;
-            const V v1428 = 4.0 * v1369;
-            const V v1429 = v1369 * v1385;
-            const V v1430 = 4.0 * v1381;
-            const V v1431 = v1426 * v1381;
-            const V v1432 = v1428 * v1381;
-            const V v1433 = v1386 * v1427;
-            const V v1434 = v1386 * v1429;
-            const V v1435 = v1385 * v1431;
-            const V v1436 = v1385 * v1432;
-            const V v1437 = v1430 * v1389;
-            const V v1438 = v1406 - v1437;
-            const V v1439 = v1430 * v1392;
-            const V v1440 = v1407 - v1439;
-            const V v1441 = v84 * v1376;
-            const V v1442 = v89 * v1378;
-            const V v1443 = v89 * v1374;
-            const V v1444 = v1441 - v1443;
-            const V v1445 = v84 * v1373;
-            const V v1446 = v1442 - v1445;
-            const V v1447 = v1386 * v1444;
-            const V v1448 = v1438 - v1447;
-            const V v1449 = v1386 * v1446;
-            const V v1450 = v1440 - v1449;
-            const V v1451 = 1.0 / v1410;
-            const V v1452 = softehl_vsqrt(v1410);
-            const V v1453 = v1401 - v1452;
-            const V v1454 = softehl_vsqrt(v1451);
-            const V v1455 = 0.5 * v1454;
-            const V v1456 = v1433 * v1455;
-            const V v1457 = v1434 * v1455;
-            const V v1458 = v1435 * v1455;
-            const V v1459 = v1436 * v1455;
-            const V v1460 = 1.0 / v1453;
-            const V v1461 = v1460 * v1460;
-            const V v1462 = v1456 * v1461;
-            const V v1463 = v1457 * v1461;
-            const V v1464 = v1458 * v1461;
-            const V v1465 = v1459 * v1461;
-            const V v1466 = -v1464;
-            const V v1467 = -v1465;
-            const V v1468 = -v1462;
-            const V v1469 = 0.5 * v1462;
-            const V v1470 = -v1463;
-            const V v1471 = 0.5 * v1463;
-            v1412 = softehl_blend(m1425, v1410, v1412);
-            v1413 = softehl_blend(m1425, v1468, v1413);
-            v1414 = softehl_blend(m1425, v1466, v1414);
-            v1415 = softehl_blend(m1425, v1470, v1415);
-            v1416 = softehl_blend(m1425, v1467, v1416);
-            v1417 = softehl_blend(m1425, v1465, v1417);
-            v1418 = softehl_blend(m1425, v1464, v1418);
-            v1419 = softehl_blend(m1425, v1448, v1419);
-            v1420 = softehl_blend(m1425, v1450, v1420);
-            v1421 = softehl_blend(m1425, v1469, v1421);
-            v1422 = softehl_blend(m1425, v1404, v1422);
-            v1423 = softehl_blend(m1425, v1471, v1423);
-            v1424 = softehl_blend(m1425, v1405, v1424);
+        const double *restrict w = rule + 2 * q; (void)w;
+        const V v828 = w[0] * v558 + v540, v829 = (-1.0) + v828, v830 = 1.0 + v828,
+            v831 = 0.5 + v828, v832 = (-0.5) + v828, v833 = 1.0 - v828 * v828, v834 = 0.5 * v828,
+            v835 = 2.0 * v828, v836 = v834 * v829, v837 = v834 * v830, v838 = v1 * v835,
+            v839 = v8 * v835, v840 = v28 * v836 + (v31 * v837 + v1 * v833),
+            v841 = v28 * v832 + (v31 * v831 - v838), v842 = v6 - v840,
+            v843 = v29 * v836 + (v30 * v837 + v8 * v833), v844 = v29 * v832 + (v30 * v831 - v839),
+            v845 = v27 - v843, v846 = v841 * v841 + v844 * v844, v847 = softehl_vsqrt(v846),
+            v848 = 1.0 / v847, v849 = softehl_vsqrt(1.0 / v846), v850 = 0.5 * v849,
+            v851 = v841 * v848, v852 = v844 * v848, v853 = v848 * v848,
+            v854 = 2.0 * v841 * v850 * v853, v855 = 2.0 * v844 * v850 * v853, v856 = v841 * v855,
+            v857 = v844 * v854, v858 = v848 - v841 * v854, v859 = v848 - v844 * v855,
+            v860 = v61 * v851 + v62 * v852, v861 = v842 * v851 + v845 * v852, v862 = 2.0 * v861,
+            v863 = 4.0 * v861, v864 = v842 * v858 - v845 * v857, v865 = v845 * v859 - v842 * v856,
+            v866 = v55 * v858 - v58 * v857, v867 = v58 * v859 - v55 * v856,
+            v868 = v55 * v851 + v58 * v852, v869 = v868 * v868, v870 = 2.0 * v868,
+            v871 = v851 * v870, v872 = v852 * v870, v873 = v866 * v870, v874 = v867 * v870,
+            v875 = 0.01 * v869, v876 = v869 - v860 * v863;
+        const M v877 = softehl_lt(v875, v876);
+        V v878 = softehl_splat(0.0), v879 = softehl_splat(0.0), v880 = softehl_splat(0.0),
+            v881 = softehl_splat(0.0), v882 = softehl_splat(0.0), v883 = softehl_splat(0.0),
+            v884 = softehl_splat(0.0), v885 = softehl_splat(0.0), v886 = softehl_splat(0.0),
+            v887 = softehl_splat(0.0), v888 = softehl_splat(0.0), v889 = softehl_splat(0.0),
+            v890 = softehl_splat(0.0);
+        const M m891 = v877;
+        if (softehl_any(m891)) {
+            const V v892 = 4.0 * v860, v893 = v873 - v892 * v864 - v863 * (v61 * v858 - v62 * v857),
+                v894 = v874 - v892 * v865 - v863 * (v62 * v859 - v61 * v856),
+                v895 = softehl_vsqrt(v876), v896 = softehl_vsqrt(1.0 / v876), v897 = 0.5 * v896,
+                v898 = 1.0 / (v868 - v895), v899 = v898 * v898,
+                v900 = v863 * (v851 * v862) * v897 * v899,
+                v901 = v863 * (v852 * v862) * v897 * v899,
+                v902 = v862 * (4.0 * v851 * v860) * v897 * v899,
+                v903 = v862 * (4.0 * v852 * v860) * v897 * v899, v904 = -v902, v905 = -v903,
+                v906 = -v900, v907 = 0.5 * v900, v908 = -v901, v909 = 0.5 * v901;
+            v878 = softehl_blend(m891, v876, v878); v879 = softehl_blend(m891, v906, v879);
+            v880 = softehl_blend(m891, v904, v880); v881 = softehl_blend(m891, v908, v881);
+            v882 = softehl_blend(m891, v905, v882); v883 = softehl_blend(m891, v903, v883);
+            v884 = softehl_blend(m891, v902, v884); v885 = softehl_blend(m891, v893, v885);
+            v886 = softehl_blend(m891, v894, v886); v887 = softehl_blend(m891, v907, v887);
+            v888 = softehl_blend(m891, v871, v888); v889 = softehl_blend(m891, v909, v889);
+            v890 = softehl_blend(m891, v872, v890);
         }
-        const M m1472 = ~v1411;
-        if (softehl_any(m1472)) {
-            const V v1473 = 0.01 * v1404;
-            const V v1474 = 0.01 * v1405;
-            const V v1475 = 0.01 * v1406;
-            const V v1476 = 0.01 * v1407;
-            v1412 = softehl_blend(m1472, v1408, v1412);
-            v1413 = softehl_blend(m1472, softehl_splat(0.0), v1413);
-            v1414 = softehl_blend(m1472, softehl_splat(0.0), v1414);
-            v1415 = softehl_blend(m1472, softehl_splat(0.0), v1415);
-            v1416 = softehl_blend(m1472, softehl_splat(0.0), v1416);
-            v1417 = softehl_blend(m1472, softehl_splat(0.0), v1417);
-            v1418 = softehl_blend(m1472, softehl_splat(0.0), v1418);
-            v1419 = softehl_blend(m1472, v1475, v1419);
-            v1420 = softehl_blend(m1472, v1476, v1420);
-            v1421 = softehl_blend(m1472, softehl_splat(0.0), v1421);
-            v1422 = softehl_blend(m1472, v1473, v1422);
-            v1423 = softehl_blend(m1472, softehl_splat(0.0), v1423);
-            v1424 = softehl_blend(m1472, v1474, v1424);
+        const M m910 = ~v877;
+        if (softehl_any(m910)) {
+            const V v911 = 0.01 * v871, v912 = 0.01 * v872, v913 = 0.01 * v873, v914 = 0.01 * v874;
+            v878 = softehl_blend(m910, v875, v878);
+            v879 = softehl_blend(m910, softehl_splat(0.0), v879);
+            v880 = softehl_blend(m910, softehl_splat(0.0), v880);
+            v881 = softehl_blend(m910, softehl_splat(0.0), v881);
+            v882 = softehl_blend(m910, softehl_splat(0.0), v882);
+            v883 = softehl_blend(m910, softehl_splat(0.0), v883);
+            v884 = softehl_blend(m910, softehl_splat(0.0), v884);
+            v885 = softehl_blend(m910, v913, v885); v886 = softehl_blend(m910, v914, v886);
+            v887 = softehl_blend(m910, softehl_splat(0.0), v887);
+            v888 = softehl_blend(m910, v911, v888);
+            v889 = softehl_blend(m910, softehl_splat(0.0), v889);
+            v890 = softehl_blend(m910, v912, v890);
         }
-        const V v1477 = w[0] * v1038;
-        const V v1478 = v1477 + v1044;
-        const V v1479 = w[0] * v1039;
-        const V v1480 = v1479 + v1046;
-        const V v1481 = w[0] * v1028;
-        const V v1482 = v1481 + v1036;
-        const V v1483 = w[0] * v1029;
-        const V v1484 = v1483 + v1041;
-        const V v1485 = w[0] * v1034;
-        const V v1486 = v1485 + v1048;
-        const V v1487 = w[0] * v1035;
-        const V v1488 = v1487 + v1050;
-        const V v1489 = w[0] * v1023;
-        const V v1490 = v1489 + v1032;
-        const V v1491 = w[0] * v1024;
-        const V v1492 = v1491 + v1033;
-        const V v1493 = w[0] * v1040;
-        const V v1494 = v1493 + v1047;
-        const V v1495 = w[0] * v1043;
-        const V v1496 = v1495 + v1049;
-        const V v1497 = 0.5 - v1330;
-        const V v1498 = 0.5 + v1330;
-        const V v1499 = v1330 - 0.5;
-        const V v1500 = d12 * v1497;
-        const V v1501 = v56 * v1497;
-        const V v1502 = v56 * v1498;
-        const V v1503 = d14 * v1498;
-        const V v1504 = v1500 + v1503;
-        const V v1505 = v22 * v1323;
-        const V v1506 = v24 * v1323;
-        const V v1507 = v1413 - v1414;
-        const V v1508 = v1415 - v1416;
-        const V v1509 = v1505 * v1324;
-        const V v1510 = v1323 + v1324;
-        const V v1511 = v46 * v1496;
-        const V v1512 = 0.5 * v1510;
-        const V v1513 = v1323 + v1325;
-        const V v1514 = v1506 * v1325;
-        const V v1515 = v1509 + v1514;
-        const V v1516 = 0.5 * v1513;
-        const V v1517 = v46 * v1482;
-        const V v1518 = v46 * v1486;
-        const V v1519 = v46 * v1490;
-        const V v1520 = v46 * v1478;
-        const V v1521 = v52 * v1478;
-        const V v1522 = v52 * v1496;
-        const V v1523 = v52 * v1482;
-        const V v1524 = v52 * v1486;
-        const V v1525 = v52 * v1490;
-        const V v1526 = v52 * v1484;
-        const V v1527 = v46 * v1484;
-        const V v1528 = v52 * v1488;
-        const V v1529 = v46 * v1488;
-        const V v1530 = v1523 + v1327;
-        const V v1531 = X0 * v1327;
-        const V v1532 = X1 * v1327;
-        const V v1533 = v1527 + v1327;
-        const V v1534 = v1525 - v1331;
-        const V v1535 = v1524 + v1326;
-        const V v1536 = v1529 + v1326;
-        const V v1537 = X2 * v1326;
-        const V v1538 = v1531 + v1537;
-        const V v1539 = X3 * v1326;
-        const V v1540 = v1532 + v1539;
-        const V v1541 = v52 * v1492;
-        const V v1542 = v46 * v1492;
-        const V v1543 = v1542 - v1331;
-        const V v1544 = v46 * v1480;
-        const V v1545 = v52 * v1480;
-        const V v1546 = v46 * v1494;
-        const V v1547 = v52 * v1494;
-        const V v1548 = v2 * v1323;
-        const V v1549 = v1538 - v1548;
-        const V v1550 = v9 * v1323;
-        const V v1551 = v1540 - v1550;
-        const V v1552 = 2.0 * v1368;
-        const V v1553 = v1549 * v1549;
-        const V v1554 = 2.0 * v1369;
-        const V v1555 = softehl_vsqrt(v1412);
-        const V v1556 = 1.0 / v1412;
-        const V v1557 = v1551 * v1551;
-        const V v1558 = v1553 + v1557;
-        const V v1559 = softehl_vsqrt(v1558);
-        const V v1560 = X5 * v1329;
-        const V v1561 = v1560 + v1515;
-        const V v1562 = w[1] * v1329;
-        const V v1563 = w[1] * v1333;
-        const V v1564 = w[1] * v1332;
-        const V v1565 = 6.283185307179586 * v1561;
-        const V v1566 = (-1.0) + v1565;
-        const V v1567 = v28 * v1512;
-        const V v1568 = v29 * v1512;
-        const V v1569 = v1567 - v1334;
-        const V v1570 = v1568 - v1336;
-        const V v1571 = a16 * v1566;
-        const V v1572 = 1.0 + v1571;
-        const V v1573 = softehl_vsqrt(v1556);
-        const V v1574 = v34 * v1516;
-        const V v1575 = v1574 + v1569;
-        const V v1576 = v30 * v1516;
-        const V v1577 = v1576 + v1570;
-        const V v1578 = v1482 * v1575;
-        const V v1579 = v1332 + v1578;
-        const V v1580 = v1482 * v1577;
-        const V v1581 = v1486 * v1575;
-        const V v1582 = v1333 + v1581;
-        const V v1583 = v1486 * v1577;
-        const V v1584 = v1484 * v1577;
-        const V v1585 = v1332 + v1584;
-        const V v1586 = v1484 * v1575;
-        const V v1587 = v1488 * v1575;
-        const V v1588 = v1488 * v1577;
-        const V v1589 = v1333 + v1588;
-        const V v1590 = v1490 * v1577;
-        const V v1591 = v1490 * v1575;
-        const V v1592 = v1329 + v1591;
-        const V v1593 = v1492 * v1575;
-        const V v1594 = v1492 * v1577;
-        const V v1595 = v1329 + v1594;
-        const V v1596 = v1478 * v1575;
-        const V v1597 = v1478 * v1577;
-        const V v1598 = v1480 * v1575;
-        const V v1599 = v1480 * v1577;
-        const V v1600 = v1494 * v1575;
-        const V v1601 = v1494 * v1577;
-        const V v1602 = v1496 * v1575;
-        const V v1603 = v1496 * v1577;
-        const V v1604 = v1052 * v1559;
-        const V v1605 = v1401 - v1555;
-        const V v1606 = v1604 * v1572;
-        const V v1607 = v1368 * v1597;
-        const V v1608 = v1368 * v1601;
-        const V v1609 = v1368 * v1580;
-        const V v1610 = v1368 * v1583;
-        const V v1611 = v1368 * v1590;
-        const V v1612 = v1368 * v1585;
-        const V v1613 = v1368 * v1589;
-        const V v1614 = v1368 * v1595;
-        const V v1615 = 0.5 * v1573;
-        const V v1616 = v1369 * v1579;
-        const V v1617 = v1609 - v1616;
-        const V v1618 = v1369 * v1582;
-        const V v1619 = v1610 - v1618;
-        const V v1620 = v1369 * v1592;
-        const V v1621 = v1611 - v1620;
-        const V v1622 = v1369 * v1586;
-        const V v1623 = v1612 - v1622;
-        const V v1624 = v1369 * v1587;
-        const V v1625 = v1613 - v1624;
-        const V v1626 = v1369 * v1593;
-        const V v1627 = v1614 - v1626;
-        const V v1628 = v1369 * v1606;
-        const V v1629 = v1501 * v1606;
-        const V v1630 = v1502 * v1606;
-        const V v1631 = v1368 * v1606;
-        const V v1632 = v1422 * v1615;
-        const V v1633 = v1368 - v1632;
-        const V v1634 = v1424 * v1615;
-        const V v1635 = v1369 - v1634;
-        const V v1636 = v1615 * v1419;
-        const V v1637 = v1395 - v1636;
-        const V v1638 = v1615 * v1420;
-        const V v1639 = v1398 - v1638;
-        const V v1640 = v1384 * v1633;
-        const V v1641 = v1384 * v1635;
-        const V v1642 = 1.0 / v1605;
-        const V v1643 = v1642 * v1642;
-        const V v1644 = v1643 * v1640;
-        const V v1645 = v1643 * v1641;
-        const V v1646 = v1552 * v1642;
-        const V v1647 = v1554 * v1642;
-        const V v1648 = 2.0 * v1642;
-        const V v1649 = v1385 * v1642;
-        const V v1650 = v1385 * v1643;
-        const V v1651 = v1650 * v1637;
-        const V v1652 = v1650 * v1639;
-        const V v1653 = v1389 * v1648;
-        const V v1654 = v1651 - v1653;
-        const V v1655 = v1392 * v1648;
-        const V v1656 = v1652 - v1655;
-        const V v1657 = 0.5 * v1649;
-        const V v1658 = 2.0 * v1649;
-        const V v1659 = v1646 - v1418;
-        const V v1660 = v1659 * v1579;
-        const V v1661 = v1659 * v1586;
-        const V v1662 = v1659 * v1582;
-        const V v1663 = v1659 * v1587;
-        const V v1664 = v1659 * v1592;
-        const V v1665 = v1659 * v1593;
-        const V v1666 = v1659 * v1596;
-        const V v1667 = v1421 + v1666;
-        const V v1668 = v1659 * v1600;
-        const V v1669 = v1421 + v1668;
-        const V v1670 = v1659 * v1598;
-        const V v1671 = v1423 + v1670;
-        const V v1672 = v1659 * v1602;
-        const V v1673 = v1423 + v1672;
-        const V v1674 = v1507 - v1646;
-        const V v1675 = (-1.0) - v1649;
-        const V v1676 = v1675 - v1649;
-        const V v1677 = 0.5 * v1676;
-        const V v1678 = v1657 * v1675;
-        const V v1679 = 1.0 - v1649;
-        const V v1680 = v1657 * v1679;
-        const V v1681 = v1679 - v1649;
-        const V v1682 = v1649 * v1649;
-        const V v1683 = 1.0 - v1682;
-        const V v1684 = 0.5 * v1681;
-        const V v1685 = v1508 - v1647;
-        const V v1686 = v1647 - v1417;
-        const V v1687 = v1686 * v1590;
-        const V v1688 = v1664 + v1687;
-        const V v1689 = v1686 * v1595;
-        const V v1690 = v1665 + v1689;
-        const V v1691 = v1686 * v1597;
-        const V v1692 = v1667 + v1691;
-        const V v1693 = v1686 * v1599;
-        const V v1694 = v1671 + v1693;
-        const V v1695 = v1686 * v1603;
-        const V v1696 = v1673 + v1695;
-        const V v1697 = v1686 * v1580;
-        const V v1698 = v1660 + v1697;
-        const V v1699 = v1686 * v1585;
-        const V v1700 = v1661 + v1699;
-        const V v1701 = v1686 * v1583;
-        const V v1702 = v1662 + v1701;
-        const V v1703 = v1686 * v1589;
-        const V v1704 = v1663 + v1703;
-        const V v1705 = v1686 * v1601;
-        const V v1706 = v1669 + v1705;
-        const V v1707 = w[1] * v1683;
-        const V v1708 = v6 * v1683;
-        const V v1709 = v6 * v1658;
-        const V v1710 = v27 * v1658;
-        const V v1711 = v27 * v1683;
-        const V v1712 = v1692 - v1644;
-        const V v1713 = v1644 + v1706;
-        const V v1714 = v1708 - v1347;
-        const V v1715 = v1711 - v1353;
-        const V v1716 = v1694 - v1645;
-        const V v1717 = v1645 + v1696;
-        const V v1718 = w[1] * v1678;
-        const V v1719 = w[1] * v1680;
-        const V v1720 = v1678 + v1596;
-        const V v1721 = v1678 + v1599;
-        const V v1722 = v1680 + v1600;
-        const V v1723 = v1680 + v1603;
-        const V v1724 = v3 * v1678;
-        const V v1725 = v1714 - v1724;
-        const V v1726 = v12 * v1678;
-        const V v1727 = v1715 - v1726;
-        const V v1728 = v1368 * v1721;
-        const V v1729 = v1368 * v1723;
-        const V v1730 = v3 * v1677;
-        const V v1731 = v1709 + v1730;
-        const V v1732 = v12 * v1677;
-        const V v1733 = v1710 + v1732;
-        const V v1734 = v4 * v1680;
-        const V v1735 = v1725 - v1734;
-        const V v1736 = v14 * v1680;
-        const V v1737 = v1727 - v1736;
-        const V v1738 = v4 * v1684;
-        const V v1739 = v1738 + v1731;
-        const V v1740 = v14 * v1684;
-        const V v1741 = v1740 + v1733;
-        const V v1742 = v1378 * v1735;
-        const V v1743 = v1374 * v1735;
-        const V v1744 = v1369 * v1735;
-        const V v1745 = v1369 * v1598;
-        const V v1746 = v1728 - v1745;
-        const V v1747 = v1369 * v1602;
-        const V v1748 = v1729 - v1747;
-        const V v1749 = v1369 * v1739;
-        const V v1750 = v1369 * v1720;
-        const V v1751 = v1607 - v1750;
-        const V v1752 = v1369 * v1722;
-        const V v1753 = v1608 - v1752;
-        const V v1754 = v1369 * v1683;
-        const V v1755 = v1368 * v1741;
-        const V v1756 = v1749 - v1755;
-        const V v1757 = v1368 * v1737;
-        const V v1758 = v1744 - v1757;
-        const V v1759 = v1376 * v1737;
-        const V v1760 = v1743 + v1759;
-        const V v1761 = v1373 * v1737;
-        const V v1762 = v1742 + v1761;
-        const V v1763 = a12 * v1758;
-        const V v1764 = v1756 * v1674;
-        const V v1765 = v1754 + v1764;
-        const V v1766 = v1756 * v1685;
-        const V v1767 = v1368 * v1683;
-        const V v1768 = v1766 - v1767;
-        const V v1769 = v1521 * v1760;
-        const V v1770 = v1751 - v1769;
-        const V v1771 = v1545 * v1760;
-        const V v1772 = v1746 - v1771;
-        const V v1773 = v1547 * v1760;
-        const V v1774 = v1753 - v1773;
-        const V v1775 = v1511 * v1762;
-        const V v1776 = v1775 + v1748;
-        const V v1777 = v1521 * v1654;
-        const V v1778 = v1777 + v1712;
-        const V v1779 = v1545 * v1654;
-        const V v1780 = v1779 + v1716;
-        const V v1781 = v1547 * v1654;
-        const V v1782 = v1781 + v1713;
-        const V v1783 = v1504 - v1763;
-        const V v1784 = v1511 * v1656;
-        const V v1785 = v1784 + v1717;
-        const V v1786 = v1520 * v1762;
-        const V v1787 = v1786 + v1770;
-        const V v1788 = v1520 * v1656;
-        const V v1789 = v1788 + v1778;
-        const V v1790 = v1756 * v1789;
-        const V v1791 = v1787 + v1790;
-        const M v1792 = softehl_eq(v1783, v1783);
-        const V v1793 = v1544 * v1656;
-        const V v1794 = v1793 + v1780;
-        const V v1795 = v1544 * v1762;
-        const V v1796 = v1795 + v1772;
-        const V v1797 = v1546 * v1656;
-        const V v1798 = v1797 + v1782;
-        const V v1799 = v1546 * v1762;
-        const V v1800 = v1799 + v1774;
-        const V v1801 = v1756 * v1794;
-        const V v1802 = v1796 + v1801;
-        const V v1803 = v1756 * v1798;
-        const V v1804 = v1800 + v1803;
-        const V v1805 = v1522 * v1654;
-        const V v1806 = v1805 + v1785;
-        const V v1807 = v1522 * v1760;
-        const V v1808 = v1776 - v1807;
-        const V v1809 = v1756 * v1806;
-        const V v1810 = v1808 + v1809;
-        const V v1811 = v1530 * v1654;
-        const V v1812 = v1811 + v1698;
-        const V v1813 = v1530 * v1760;
-        const V v1814 = v1617 - v1813;
-        const V v1815 = v1517 * v1656;
-        const V v1816 = v1815 + v1812;
-        const V v1817 = v1517 * v1762;
-        const V v1818 = v1817 + v1814;
-        const V v1819 = v1756 * v1816;
-        const V v1820 = v1818 + v1819;
-        const V v1821 = v1526 * v1654;
-        const V v1822 = v1821 + v1700;
-        const V v1823 = v1526 * v1760;
-        const V v1824 = v1623 - v1823;
-        const V v1825 = v1533 * v1656;
-        const V v1826 = v1825 + v1822;
-        const V v1827 = v1533 * v1762;
-        const V v1828 = v1827 + v1824;
-        const V v1829 = v1756 * v1826;
-        const V v1830 = v1828 + v1829;
-        const V v1831 = v1535 * v1654;
-        const V v1832 = v1831 + v1702;
-        const V v1833 = v1535 * v1760;
-        const V v1834 = v1619 - v1833;
-        const V v1835 = v1518 * v1656;
-        const V v1836 = v1835 + v1832;
-        const V v1837 = v1518 * v1762;
-        const V v1838 = v1837 + v1834;
-        const V v1839 = v1756 * v1836;
-        const V v1840 = v1838 + v1839;
-        const V v1841 = v1528 * v1654;
-        const V v1842 = v1841 + v1704;
-        const V v1843 = v1528 * v1760;
-        const V v1844 = v1625 - v1843;
-        const V v1845 = v1536 * v1656;
-        const V v1846 = v1845 + v1842;
-        const V v1847 = v1536 * v1762;
-        const V v1848 = v1847 + v1844;
-        const V v1849 = v1756 * v1846;
-        const V v1850 = v1848 + v1849;
-        const V v1851 = v1534 * v1654;
-        const V v1852 = v1851 + v1688;
-        const V v1853 = v1534 * v1760;
-        const V v1854 = v1621 - v1853;
-        const V v1855 = v1541 * v1654;
-        const V v1856 = v1855 + v1690;
-        const V v1857 = v1541 * v1760;
-        const V v1858 = v1627 - v1857;
-        const V v1859 = v1519 * v1656;
-        const V v1860 = v1859 + v1852;
-        const V v1861 = v1519 * v1762;
-        const V v1862 = v1861 + v1854;
-        const V v1863 = v1543 * v1656;
-        const V v1864 = v1863 + v1856;
-        const V v1865 = v1543 * v1762;
-        const V v1866 = v1865 + v1858;
-        const V v1867 = v1756 * v1860;
-        const V v1868 = v1862 + v1867;
-        const V v1869 = v1756 * v1864;
-        const V v1870 = v1866 + v1869;
-        V v1871 = softehl_splat(0.0);
-        V v1872 = softehl_splat(0.0);
-        V v1873 = softehl_splat(0.0);
-        V v1874 = softehl_splat(0.0);
-        V v1875 = softehl_splat(0.0);
-        V v1876 = softehl_splat(0.0);
-        V v1877 = softehl_splat(0.0);
-        V v1878 = softehl_splat(0.0);
-        V v1879 = softehl_splat(0.0);
-        V v1880 = softehl_splat(0.0);
-        V v1881 = softehl_splat(0.0);
-        V v1882 = softehl_splat(0.0);
-        V v1883 = softehl_splat(0.0);
-        V v1884 = softehl_splat(0.0);
-        V v1885 = softehl_splat(0.0);
-        V v1886 = softehl_splat(0.0);
-        V v1887 = softehl_splat(0.0);
-        V v1888 = softehl_splat(0.0);
-        V v1889 = softehl_splat(0.0);
-        V v1890 = softehl_splat(0.0);
-        V v1891 = softehl_splat(0.0);
-        V v1892 = softehl_splat(0.0);
-        V v1893 = softehl_splat(0.0);
-        V v1894 = softehl_splat(0.0);
-        V v1895 = softehl_splat(0.0);
-        V v1896 = softehl_splat(0.0);
-        V v1897 = softehl_splat(0.0);
-        V v1898 = softehl_splat(0.0);
-        V v1899 = softehl_splat(0.0);
-        V v1900 = softehl_splat(0.0);
-        V v1901 = softehl_splat(0.0);
-        V v1902 = softehl_splat(0.0);
-        V v1903 = softehl_splat(0.0);
-        V v1904 = softehl_splat(0.0);
-        V v1905 = softehl_splat(0.0);
-        V v1906 = softehl_splat(0.0);
-        V v1907 = softehl_splat(0.0);
-        V v1908 = softehl_splat(0.0);
-        V v1909 = softehl_splat(0.0);
-        V v1910 = softehl_splat(0.0);
-        V v1911 = softehl_splat(0.0);
-        V v1912 = softehl_splat(0.0);
-        V v1913 = softehl_splat(0.0);
-        V v1914 = softehl_splat(0.0);
-        V v1915 = softehl_splat(0.0);
-        V v1916 = softehl_splat(0.0);
-        V v1917 = softehl_splat(0.0);
-        V v1918 = softehl_splat(0.0);
-        V v1919 = softehl_splat(0.0);
-        V v1920 = softehl_splat(0.0);
-        V v1921 = softehl_splat(0.0);
-        V v1922 = softehl_splat(0.0);
-        V v1923 = softehl_splat(0.0);
-        V v1924 = softehl_splat(0.0);
-        V v1925 = softehl_splat(0.0);
-        V v1926 = softehl_splat(0.0);
-        V v1927 = softehl_splat(0.0);
-        V v1928 = softehl_splat(0.0);
-        V v1929 = softehl_splat(0.0);
-        V v1930 = softehl_splat(0.0);
-        V v1931 = softehl_splat(0.0);
-        V v1932 = softehl_splat(0.0);
-        V v1933 = softehl_splat(0.0);
-        const M m1934 = v1792;
-        if (softehl_any(m1934)) {
-            const M v1935 = softehl_le(softehl_splat(0.0), v1783);
-            V v1936 = softehl_splat(0.0);
-            V v1937 = softehl_splat(0.0);
-            V v1938 = softehl_splat(0.0);
-            V v1939 = softehl_splat(0.0);
-            V v1940 = softehl_splat(0.0);
-            V v1941 = softehl_splat(0.0);
-            V v1942 = softehl_splat(0.0);
-            V v1943 = softehl_splat(0.0);
-            V v1944 = softehl_splat(0.0);
-            V v1945 = softehl_splat(0.0);
-            V v1946 = softehl_splat(0.0);
-            V v1947 = softehl_splat(0.0);
-            V v1948 = softehl_splat(0.0);
-            V v1949 = softehl_splat(0.0);
-            V v1950 = softehl_splat(0.0);
-            V v1951 = softehl_splat(0.0);
-            V v1952 = softehl_splat(0.0);
-            V v1953 = softehl_splat(0.0);
-            V v1954 = softehl_splat(0.0);
-            V v1955 = softehl_splat(0.0);
-            V v1956 = softehl_splat(0.0);
-            V v1957 = softehl_splat(0.0);
-            V v1958 = softehl_splat(0.0);
-            V v1959 = softehl_splat(0.0);
-            V v1960 = softehl_splat(0.0);
-            V v1961 = softehl_splat(0.0);
-            V v1962 = softehl_splat(0.0);
-            V v1963 = softehl_splat(0.0);
-            V v1964 = softehl_splat(0.0);
-            V v1965 = softehl_splat(0.0);
-            V v1966 = softehl_splat(0.0);
-            V v1967 = softehl_splat(0.0);
-            V v1968 = softehl_splat(0.0);
-            V v1969 = softehl_splat(0.0);
-            V v1970 = softehl_splat(0.0);
-            V v1971 = softehl_splat(0.0);
-            V v1972 = softehl_splat(0.0);
-            V v1973 = softehl_splat(0.0);
-            V v1974 = softehl_splat(0.0);
-            V v1975 = softehl_splat(0.0);
-            V v1976 = softehl_splat(0.0);
-            V v1977 = softehl_splat(0.0);
-            V v1978 = softehl_splat(0.0);
-            V v1979 = softehl_splat(0.0);
-            V v1980 = softehl_splat(0.0);
-            V v1981 = softehl_splat(0.0);
-            V v1982 = softehl_splat(0.0);
-            V v1983 = softehl_splat(0.0);
-            V v1984 = softehl_splat(0.0);
-            const M m1985 = v1935 & m1934;
-            if (softehl_any(m1985)) {
-                const V v1986 = a14 + v1758;
-                const V v1987 = v1758 - a15;
-                const V v1988 = v1986 * v1987;
-                const M v1989 = softehl_eq(v1988, v1988);
-                V v1990 = softehl_splat(0.0);
-                V v1991 = softehl_splat(0.0);
-                V v1992 = softehl_splat(0.0);
-                V v1993 = softehl_splat(0.0);
-                V v1994 = softehl_splat(0.0);
-                const M m1995 = v1989 & m1985;
-                if (softehl_any(m1995)) {
-                    const M v1996 = softehl_lt(v1988, softehl_splat(0.0));
-                    const V v1997 = softehl_blend(v1996, v1783, softehl_splat(0.0));
-                    const V v1998 = softehl_blend(v1996, v1497, softehl_splat(0.0));
-                    const V v1999 = softehl_blend(v1996, v1498, softehl_splat(0.0));
-                    const V v2000 = softehl_blend(v1996, v57, softehl_splat(0.0));
-                    const V v2001 = softehl_blend(v1996, v68, softehl_splat(0.0));
-                    v1990 = softehl_blend(m1995, v1997, v1990);
-                    v1991 = softehl_blend(m1995, v1998, v1991);
-                    v1992 = softehl_blend(m1995, v1999, v1992);
-                    v1993 = softehl_blend(m1995, v2000, v1993);
-                    v1994 = softehl_blend(m1995, v2001, v1994);
+        const V v915 = w[0] * v546 + v551, v916 = w[0] * v547 + v552, v917 = w[0] * v538 + v545,
+            v918 = w[0] * v539 + v549, v919 = w[0] * v543 + v554, v920 = w[0] * v544 + v556,
+            v921 = w[0] * v536 + v541, v922 = w[0] * v537 + v542, v923 = w[0] * v548 + v553,
+            v924 = w[0] * v550 + v555, v925 = 0.5 - v834, v926 = 0.5 + v834, v927 = v834 - 0.5,
+            v928 = v46 * v925, v929 = v46 * v926, v930 = d12 * v925 + d14 * v926, v931 = v22 * v828,
+            v932 = v24 * v828, v933 = v40 * v924, v934 = 0.5 * (v828 + v829),
+            v935 = 0.5 * (v828 + v830), v936 = v40 * v917, v937 = v40 * v919, v938 = v40 * v921,
+            v939 = v40 * v915, v940 = v43 * v915, v941 = v43 * v924, v942 = v43 * v918,
+            v943 = v43 * v920, v944 = v43 * v917 + v832, v945 = v40 * v918 + v832,
+            v946 = v43 * v921 - v835, v947 = v43 * v919 + v831, v948 = v40 * v920 + v831,
+            v949 = v43 * v922, v950 = v40 * v922 - v835, v951 = v40 * v916, v952 = v43 * v916,
+            v953 = v40 * v923, v954 = v43 * v923, v955 = X0 * v832 + X2 * v831 - v2 * v828,
+            v956 = X1 * v832 + X3 * v831 - v9 * v828, v957 = softehl_vsqrt(v878),
+            v958 = v955 * v955 + v956 * v956, v959 = softehl_vsqrt(v958), v960 = w[1] * v833,
+            v961 = w[1] * v837, v962 = w[1] * v836,
+            v963 = (-1.0) + 6.283185307179586 * (X5 * v833 + (v931 * v829 + v932 * v830)),
+            v964 = 1.0 + a16 * v963, v965 = softehl_vsqrt(1.0 / v878),
+            v966 = v31 * v935 + (v28 * v934 - v838), v967 = v30 * v935 + (v29 * v934 - v839),
+            v968 = v836 + v917 * v966, v969 = v917 * v967, v970 = v837 + v919 * v966,
+            v971 = v919 * v967, v972 = v836 + v918 * v967, v973 = v918 * v966, v974 = v920 * v966,
+            v975 = v837 + v920 * v967, v976 = v921 * v967, v977 = v833 + v921 * v966,
+            v978 = v922 * v966, v979 = v833 + v922 * v967, v980 = v915 * v966, v981 = v915 * v967,
+            v982 = v916 * v966, v983 = v916 * v967, v984 = v923 * v966, v985 = v923 * v967,
+            v986 = v924 * v966, v987 = v924 * v967, v988 = v558 * v959, v989 = v988 * v964,
+            v990 = 0.5 * v965, v991 = v852 * v989, v992 = v928 * v989, v993 = v929 * v989,
+            v994 = v851 * v989, v995 = 1.0 / (v868 - v957), v996 = v995 * v995,
+            v997 = v996 * (v861 * (v851 - v888 * v990)),
+            v998 = v996 * (v861 * (v852 - v890 * v990)), v999 = 2.0 * v851 * v995,
+            v1000 = 2.0 * v852 * v995, v1001 = 2.0 * v995, v1002 = v862 * v995, v1003 = v862 * v996,
+            v1004 = v1003 * (v866 - v990 * v885) - v864 * v1001,
+            v1005 = v1003 * (v867 - v990 * v886) - v865 * v1001, v1006 = 0.5 * v1002,
+            v1007 = 2.0 * v1002, v1008 = v999 - v884, v1009 = v879 - v880 - v999,
+            v1010 = (-1.0) - v1002, v1011 = 0.5 * (v1010 - v1002), v1012 = v1006 * v1010,
+            v1013 = 1.0 - v1002, v1014 = v1006 * v1013, v1015 = 1.0 - v1002 * v1002,
+            v1016 = 0.5 * (v1013 - v1002), v1017 = v881 - v882 - v1000, v1018 = v1000 - v883,
+            v1019 = w[1] * v1015, v1020 = w[1] * v1012, v1021 = w[1] * v1014,
+            v1022 = v6 * v1015 - v840 - v3 * v1012 - v4 * v1014,
+            v1023 = v27 * v1015 - v843 - v12 * v1012 - v14 * v1014,
+            v1024 = v852 * (v4 * v1016 + (v6 * v1007 + v3 * v1011)) - v851 * (v14 * v1016 + (v27 * v1007 + v12 * v1011)),
+            v1025 = v852 * v1022 - v851 * v1023, v1026 = v857 * v1022 + v858 * v1023,
+            v1027 = v859 * v1022 + v856 * v1023, v1028 = a12 * v1025,
+            v1029 = v852 * v1015 + v1024 * v1009, v1030 = v1024 * v1017 - v851 * v1015,
+            v1031 = v930 - v1028,
+            v1032 = v939 * v1027 + (v851 * v981 - v852 * (v1012 + v980) - v940 * v1026),
+            v1033 = v939 * v1005 + (v940 * v1004 + (v887 + v1008 * v980 + v1018 * v981 - v997)),
+            v1034 = v1032 + v1024 * v1033;
+        const M v1035 = softehl_eq(v1031, v1031);
+        const V v1036 = v951 * v1005 + (v952 * v1004 + (v889 + v1008 * v982 + v1018 * v983 - v998)),
+            v1037 = v951 * v1027 + (v851 * (v1012 + v983) - v852 * v982 - v952 * v1026),
+            v1038 = v953 * v1005 + (v954 * v1004 + (v997 + (v887 + v1008 * v984 + v1018 * v985))),
+            v1039 = v953 * v1027 + (v851 * v985 - v852 * (v1014 + v984) - v954 * v1026),
+            v1040 = v1037 + v1024 * v1036, v1041 = v1039 + v1024 * v1038,
+            v1042 = v941 * v1004 + (v933 * v1005 + (v998 + (v889 + v1008 * v986 + v1018 * v987))),
+            v1043 = v933 * v1027 + (v851 * (v1014 + v987) - v852 * v986) - v941 * v1026,
+            v1044 = v1043 + v1024 * v1042,
+            v1045 = v936 * v1005 + (v944 * v1004 + (v1008 * v968 + v1018 * v969)),
+            v1046 = v936 * v1027 + (v851 * v969 - v852 * v968 - v944 * v1026) + v1024 * v1045,
+            v1047 = v945 * v1005 + (v942 * v1004 + (v1008 * v973 + v1018 * v972)),
+            v1048 = v945 * v1027 + (v851 * v972 - v852 * v973 - v942 * v1026) + v1024 * v1047,
+            v1049 = v937 * v1005 + (v947 * v1004 + (v1008 * v970 + v1018 * v971)),
+            v1050 = v937 * v1027 + (v851 * v971 - v852 * v970 - v947 * v1026) + v1024 * v1049,
+            v1051 = v948 * v1005 + (v943 * v1004 + (v1008 * v974 + v1018 * v975)),
+            v1052 = v948 * v1027 + (v851 * v975 - v852 * v974 - v943 * v1026) + v1024 * v1051,
+            v1053 = v938 * v1005 + (v946 * v1004 + (v1008 * v977 + v1018 * v976)),
+            v1054 = v950 * v1005 + (v949 * v1004 + (v1008 * v978 + v1018 * v979)),
+            v1055 = v938 * v1027 + (v851 * v976 - v852 * v977 - v946 * v1026) + v1024 * v1053,
+            v1056 = v950 * v1027 + (v851 * v979 - v852 * v978 - v949 * v1026) + v1024 * v1054;
+        V v1057 = softehl_splat(0.0), v1058 = softehl_splat(0.0), v1059 = softehl_splat(0.0),
+            v1060 = softehl_splat(0.0), v1061 = softehl_splat(0.0), v1062 = softehl_splat(0.0),
+            v1063 = softehl_splat(0.0), v1064 = softehl_splat(0.0), v1065 = softehl_splat(0.0),
+            v1066 = softehl_splat(0.0), v1067 = softehl_splat(0.0), v1068 = softehl_splat(0.0),
+            v1069 = softehl_splat(0.0), v1070 = softehl_splat(0.0), v1071 = softehl_splat(0.0),
+            v1072 = softehl_splat(0.0), v1073 = softehl_splat(0.0), v1074 = softehl_splat(0.0),
+            v1075 = softehl_splat(0.0), v1076 = softehl_splat(0.0), v1077 = softehl_splat(0.0),
+            v1078 = softehl_splat(0.0), v1079 = softehl_splat(0.0), v1080 = softehl_splat(0.0),
+            v1081 = softehl_splat(0.0), v1082 = softehl_splat(0.0), v1083 = softehl_splat(0.0),
+            v1084 = softehl_splat(0.0), v1085 = softehl_splat(0.0), v1086 = softehl_splat(0.0),
+            v1087 = softehl_splat(0.0), v1088 = softehl_splat(0.0), v1089 = softehl_splat(0.0),
+            v1090 = softehl_splat(0.0), v1091 = softehl_splat(0.0), v1092 = softehl_splat(0.0),
+            v1093 = softehl_splat(0.0), v1094 = softehl_splat(0.0), v1095 = softehl_splat(0.0),
+            v1096 = softehl_splat(0.0), v1097 = softehl_splat(0.0), v1098 = softehl_splat(0.0),
+            v1099 = softehl_splat(0.0), v1100 = softehl_splat(0.0), v1101 = softehl_splat(0.0),
+            v1102 = softehl_splat(0.0), v1103 = softehl_splat(0.0), v1104 = softehl_splat(0.0),
+            v1105 = softehl_splat(0.0), v1106 = softehl_splat(0.0), v1107 = softehl_splat(0.0),
+            v1108 = softehl_splat(0.0), v1109 = softehl_splat(0.0), v1110 = softehl_splat(0.0),
+            v1111 = softehl_splat(0.0), v1112 = softehl_splat(0.0), v1113 = softehl_splat(0.0),
+            v1114 = softehl_splat(0.0), v1115 = softehl_splat(0.0), v1116 = softehl_splat(0.0),
+            v1117 = softehl_splat(0.0), v1118 = softehl_splat(0.0), v1119 = softehl_splat(0.0);
+        const M m1120 = v1035;
+        if (softehl_any(m1120)) {
+            const M v1121 = softehl_le(softehl_splat(0.0), v1031);
+            V v1122 = softehl_splat(0.0), v1123 = softehl_splat(0.0), v1124 = softehl_splat(0.0),
+                v1125 = softehl_splat(0.0), v1126 = softehl_splat(0.0), v1127 = softehl_splat(0.0),
+                v1128 = softehl_splat(0.0), v1129 = softehl_splat(0.0), v1130 = softehl_splat(0.0),
+                v1131 = softehl_splat(0.0), v1132 = softehl_splat(0.0), v1133 = softehl_splat(0.0),
+                v1134 = softehl_splat(0.0), v1135 = softehl_splat(0.0), v1136 = softehl_splat(0.0),
+                v1137 = softehl_splat(0.0), v1138 = softehl_splat(0.0), v1139 = softehl_splat(0.0),
+                v1140 = softehl_splat(0.0), v1141 = softehl_splat(0.0), v1142 = softehl_splat(0.0),
+                v1143 = softehl_splat(0.0), v1144 = softehl_splat(0.0), v1145 = softehl_splat(0.0),
+                v1146 = softehl_splat(0.0), v1147 = softehl_splat(0.0), v1148 = softehl_splat(0.0),
+                v1149 = softehl_splat(0.0), v1150 = softehl_splat(0.0), v1151 = softehl_splat(0.0),
+                v1152 = softehl_splat(0.0), v1153 = softehl_splat(0.0), v1154 = softehl_splat(0.0),
+                v1155 = softehl_splat(0.0), v1156 = softehl_splat(0.0), v1157 = softehl_splat(0.0),
+                v1158 = softehl_splat(0.0), v1159 = softehl_splat(0.0), v1160 = softehl_splat(0.0),
+                v1161 = softehl_splat(0.0), v1162 = softehl_splat(0.0), v1163 = softehl_splat(0.0),
+                v1164 = softehl_splat(0.0), v1165 = softehl_splat(0.0), v1166 = softehl_splat(0.0),
+                v1167 = softehl_splat(0.0), v1168 = softehl_splat(0.0), v1169 = softehl_splat(0.0),
+                v1170 = softehl_splat(0.0);
+            const M m1171 = v1121 & m1120;
+            if (softehl_any(m1171)) {
+                const V v1172 = a14 + v1025, v1173 = v1025 - a15, v1174 = v1172 * v1173;
+                const M v1175 = softehl_eq(v1174, v1174);
+                V v1176 = softehl_splat(0.0), v1177 = softehl_splat(0.0),
+                    v1178 = softehl_splat(0.0), v1179 = softehl_splat(0.0),
+                    v1180 = softehl_splat(0.0);
+                const M m1181 = v1175 & m1171;
+                if (softehl_any(m1181)) {
+                    const M v1182 = softehl_lt(v1174, softehl_splat(0.0));
+                    const V v1183 = softehl_blend(v1182, v1031, softehl_splat(0.0)),
+                        v1184 = softehl_blend(v1182, v925, softehl_splat(0.0)),
+                        v1185 = softehl_blend(v1182, v926, softehl_splat(0.0)),
+                        v1186 = softehl_blend(v1182, v47, softehl_splat(0.0)),
+                        v1187 = softehl_blend(v1182, v51, softehl_splat(0.0));
+                    v1176 = softehl_blend(m1181, v1183, v1176);
+                    v1177 = softehl_blend(m1181, v1184, v1177);
+                    v1178 = softehl_blend(m1181, v1185, v1178);
+                    v1179 = softehl_blend(m1181, v1186, v1179);
+                    v1180 = softehl_blend(m1181, v1187, v1180);
                 }
-                const M m2002 = ~v1989 & m1985;
-                if (softehl_any(m2002)) {
-                    const V v2003 = v1988 * v1988;
-                    const V v2004 = v1986 + v1987;
-                    const V v2005 = v1988 * v2003;
-                    const V v2006 = 3.0 * v2003;
-                    const V v2007 = v2006 * v2004;
-                    v1990 = softehl_blend(m2002, v2005, v1990);
-                    v1991 = softehl_blend(m2002, softehl_splat(0.0), v1991);
-                    v1992 = softehl_blend(m2002, softehl_splat(0.0), v1992);
-                    v1993 = softehl_blend(m2002, v2007, v1993);
-                    v1994 = softehl_blend(m2002, softehl_splat(0.0), v1994);
+                const M m1188 = ~v1175 & m1171;
+                if (softehl_any(m1188)) {
+                    const V v1189 = v1174 * v1174, v1190 = v1174 * v1189,
+                        v1191 = 3.0 * v1189 * (v1172 + v1173);
+                    v1176 = softehl_blend(m1188, v1190, v1176);
+                    v1177 = softehl_blend(m1188, softehl_splat(0.0), v1177);
+                    v1178 = softehl_blend(m1188, softehl_splat(0.0), v1178);
+                    v1179 = softehl_blend(m1188, v1191, v1179);
+                    v1180 = softehl_blend(m1188, softehl_splat(0.0), v1180);
                 }
-                const V v2008 = d13 * v1497;
-                const V v2009 = a13 * v1990;
-                const V v2010 = v11 * v1683;
-                const V v2011 = v26 * v1683;
-                const M v2012 = softehl_eq(v2009, v2009);
-                const V v2013 = d15 * v1498;
-                const V v2014 = v2008 + v2013;
-                const V v2015 = v18 * v1332;
-                const V v2016 = v2010 - v2015;
-                const V v2017 = v21 * v1332;
-                const V v2018 = v2011 - v2017;
-                const V v2019 = v19 * v1333;
-                const V v2020 = v2016 - v2019;
-                const V v2021 = v23 * v1333;
-                const V v2022 = v2018 - v2021;
-                const V v2023 = v5 * v1329;
-                const V v2024 = v2020 - v2023;
-                const V v2025 = v13 * v1329;
-                const V v2026 = v2022 - v2025;
-                const V v2027 = v7 * v1678;
-                const V v2028 = v2024 - v2027;
-                const V v2029 = v15 * v1678;
-                const V v2030 = v2026 - v2029;
-                const V v2031 = v10 * v1680;
-                const V v2032 = v2028 - v2031;
-                const V v2033 = v17 * v1680;
-                const V v2034 = v2030 - v2033;
-                const V v2035 = v1368 * v2032;
-                const V v2036 = v1369 * v2034;
-                const V v2037 = v2035 + v2036;
-                const V v2038 = a12 * v2037;
-                const V v2039 = v2038 + v2014;
-                const M v2040 = softehl_eq(v2039, v2039);
-                const M v2041 = v2012 & v2040;
-                V v2042 = softehl_splat(0.0);
-                V v2043 = softehl_splat(0.0);
-                V v2044 = softehl_splat(0.0);
-                V v2045 = softehl_splat(0.0);
-                V v2046 = softehl_splat(0.0);
-                V v2047 = softehl_splat(0.0);
-                const M m2048 = v2041 & m1985;
-                if (softehl_any(m2048)) {
-                    const M v2049 = softehl_lt(v2009, v2039);
-                    V v2050 = v2009;
-                    V v2051 = softehl_splat(0.0);
-                    V v2052 = softehl_splat(0.0);
-                    V v2053 = a13;
-                    V v2054 = softehl_splat(0.0);
-                    V v2055 = softehl_splat(0.0);
-                    const M m2056 = ~v2049 & m2048;
-                    if (softehl_any(m2056)) {
-                        V v2057 = softehl_splat(0.0);
-                        V v2058 = softehl_splat(0.0);
-                        V v2059 = softehl_splat(0.0);
-                        V v2060 = softehl_splat(0.0);
-                        V v2061 = softehl_splat(0.0);
-                        V v2062 = softehl_splat(0.0);
-                        const M m2063 = v2012 & m2056;
-                        if (softehl_any(m2063)) {
-                            const V v2064 = -v2039;
-                            const M v2065 = softehl_lt(v2009, v2064);
-                            V v2066 = v2039;
-                            V v2067 = v1497;
-                            V v2068 = v1498;
-                            V v2069 = softehl_splat(0.0);
-                            V v2070 = a12;
-                            V v2071 = v71;
-                            const M m2072 = v2065 & m2063;
-                            if (softehl_any(m2072)) {
-                                const V v2073 = -v2009;
-                                v2066 = softehl_blend(m2072, v2073, v2066);
-                                v2067 = softehl_blend(m2072, softehl_splat(0.0), v2067);
-                                v2068 = softehl_blend(m2072, softehl_splat(0.0), v2068);
-                                v2069 = softehl_blend(m2072, v16, v2069);
-                                v2070 = softehl_blend(m2072, softehl_splat(0.0), v2070);
-                                v2071 = softehl_blend(m2072, softehl_splat(0.0), v2071);
+                const V v1192 = a13 * v1176; const M v1193 = softehl_eq(v1192, v1192);
+                const V v1194 = v11 * v1015 - v18 * v836 - v19 * v837 - v5 * v833 - v7 * v1012 - v10 * v1014,
+                    v1195 = v26 * v1015 - v21 * v836 - v23 * v837 - v13 * v833 - v15 * v1012 - v17 * v1014,
+                    v1196 = a12 * (v851 * v1194 + v852 * v1195) + (d13 * v925 + d15 * v926);
+                const M v1197 = softehl_eq(v1196, v1196), v1198 = v1193 & v1197;
+                V v1199 = softehl_splat(0.0), v1200 = softehl_splat(0.0),
+                    v1201 = softehl_splat(0.0), v1202 = softehl_splat(0.0),
+                    v1203 = softehl_splat(0.0), v1204 = softehl_splat(0.0);
+                const M m1205 = v1198 & m1171;
+                if (softehl_any(m1205)) {
+                    const M v1206 = softehl_lt(v1192, v1196);
+                    V v1207 = v1192, v1208 = softehl_splat(0.0), v1209 = softehl_splat(0.0),
+                        v1210 = a13, v1211 = softehl_splat(0.0), v1212 = softehl_splat(0.0);
+                    const M m1213 = ~v1206 & m1205;
+                    if (softehl_any(m1213)) {
+                        V v1214 = softehl_splat(0.0), v1215 = softehl_splat(0.0),
+                            v1216 = softehl_splat(0.0), v1217 = softehl_splat(0.0),
+                            v1218 = softehl_splat(0.0), v1219 = softehl_splat(0.0);
+                        const M m1220 = v1193 & m1213;
+                        if (softehl_any(m1220)) {
+                            const M v1221 = softehl_lt(v1192, -v1196);
+                            V v1222 = v1196, v1223 = v925, v1224 = v926, v1225 = softehl_splat(0.0),
+                                v1226 = a12, v1227 = v54;
+                            const M m1228 = v1221 & m1220;
+                            if (softehl_any(m1228)) {
+                                const V v1229 = -v1192; v1222 = softehl_blend(m1228, v1229, v1222);
+                                v1223 = softehl_blend(m1228, softehl_splat(0.0), v1223);
+                                v1224 = softehl_blend(m1228, softehl_splat(0.0), v1224);
+                                v1225 = softehl_blend(m1228, v16, v1225);
+                                v1226 = softehl_blend(m1228, softehl_splat(0.0), v1226);
+                                v1227 = softehl_blend(m1228, softehl_splat(0.0), v1227);
                             }
-                            v2057 = softehl_blend(m2063, v2066, v2057);
-                            v2058 = softehl_blend(m2063, v2067, v2058);
-                            v2059 = softehl_blend(m2063, v2068, v2059);
-                            v2060 = softehl_blend(m2063, v2069, v2060);
-                            v2061 = softehl_blend(m2063, v2070, v2061);
-                            v2062 = softehl_blend(m2063, v2071, v2062);
+                            v1214 = softehl_blend(m1220, v1222, v1214);
+                            v1215 = softehl_blend(m1220, v1223, v1215);
+                            v1216 = softehl_blend(m1220, v1224, v1216);
+                            v1217 = softehl_blend(m1220, v1225, v1217);
+                            v1218 = softehl_blend(m1220, v1226, v1218);
+                            v1219 = softehl_blend(m1220, v1227, v1219);
                         }
-                        const M m2074 = ~v2012 & m2056;
-                        if (softehl_any(m2074)) {
-                            const V v2075 = v2039 + v2009;
-                            const V v2076 = v2075 * v2075;
-                            const V v2077 = v2075 * v2076;
-                            const V v2078 = 3.0 * v2076;
-                            const V v2079 = v71 * v2078;
-                            const V v2080 = a13 * v2078;
-                            const V v2081 = a12 * v2078;
-                            const V v2082 = v1497 * v2078;
-                            const V v2083 = v1498 * v2078;
-                            v2057 = softehl_blend(m2074, v2077, v2057);
-                            v2058 = softehl_blend(m2074, v2082, v2058);
-                            v2059 = softehl_blend(m2074, v2083, v2059);
-                            v2060 = softehl_blend(m2074, v2080, v2060);
-                            v2061 = softehl_blend(m2074, v2081, v2061);
-                            v2062 = softehl_blend(m2074, v2079, v2062);
+                        const M m1230 = ~v1193 & m1213;
+                        if (softehl_any(m1230)) {
+                            const V v1231 = v1196 + v1192, v1232 = v1231 * v1231,
+                                v1233 = v1231 * v1232, v1234 = 3.0 * v1232, v1235 = v54 * v1234,
+                                v1236 = a13 * v1234, v1237 = a12 * v1234, v1238 = v925 * v1234,
+                                v1239 = v926 * v1234;
+                            v1214 = softehl_blend(m1230, v1233, v1214);
+                            v1215 = softehl_blend(m1230, v1238, v1215);
+                            v1216 = softehl_blend(m1230, v1239, v1216);
+                            v1217 = softehl_blend(m1230, v1236, v1217);
+                            v1218 = softehl_blend(m1230, v1237, v1218);
+                            v1219 = softehl_blend(m1230, v1235, v1219);
                         }
-                        v2050 = softehl_blend(m2056, v2057, v2050);
-                        v2051 = softehl_blend(m2056, v2058, v2051);
-                        v2052 = softehl_blend(m2056, v2059, v2052);
-                        v2053 = softehl_blend(m2056, v2060, v2053);
-                        v2054 = softehl_blend(m2056, v2061, v2054);
-                        v2055 = softehl_blend(m2056, v2062, v2055);
+                        v1207 = softehl_blend(m1213, v1214, v1207);
+                        v1208 = softehl_blend(m1213, v1215, v1208);
+                        v1209 = softehl_blend(m1213, v1216, v1209);
+                        v1210 = softehl_blend(m1213, v1217, v1210);
+                        v1211 = softehl_blend(m1213, v1218, v1211);
+                        v1212 = softehl_blend(m1213, v1219, v1212);
                     }
-                    v2042 = softehl_blend(m2048, v2050, v2042);
-                    v2043 = softehl_blend(m2048, v2051, v2043);
-                    v2044 = softehl_blend(m2048, v2052, v2044);
-                    v2045 = softehl_blend(m2048, v2053, v2045);
-                    v2046 = softehl_blend(m2048, v2054, v2046);
-                    v2047 = softehl_blend(m2048, v2055, v2047);
+                    v1199 = softehl_blend(m1205, v1207, v1199);
+                    v1200 = softehl_blend(m1205, v1208, v1200);
+                    v1201 = softehl_blend(m1205, v1209, v1201);
+                    v1202 = softehl_blend(m1205, v1210, v1202);
+                    v1203 = softehl_blend(m1205, v1211, v1203);
+                    v1204 = softehl_blend(m1205, v1212, v1204);
                 }
-                const M m2084 = ~v2041 & m1985;
-                if (softehl_any(m2084)) {
-                    const V v2085 = v2009 - v2039;
-                    const V v2086 = v2085 * v2085;
-                    const V v2087 = v2085 * v2086;
-                    const V v2088 = 3.0 * v2086;
-                    const V v2089 = v69 * v2088;
-                    const V v2090 = a13 * v2088;
-                    const V v2091 = a12 * v2088;
-                    const V v2092 = -v2091;
-                    const V v2093 = v1499 * v2088;
-                    const V v2094 = v1498 * v2088;
-                    const V v2095 = -v2094;
-                    v2042 = softehl_blend(m2084, v2087, v2042);
-                    v2043 = softehl_blend(m2084, v2093, v2043);
-                    v2044 = softehl_blend(m2084, v2095, v2044);
-                    v2045 = softehl_blend(m2084, v2090, v2045);
-                    v2046 = softehl_blend(m2084, v2092, v2046);
-                    v2047 = softehl_blend(m2084, v2089, v2047);
+                const M m1240 = ~v1198 & m1171;
+                if (softehl_any(m1240)) {
+                    const V v1241 = v1192 - v1196, v1242 = v1241 * v1241, v1243 = v1241 * v1242,
+                        v1244 = 3.0 * v1242, v1245 = v52 * v1244, v1246 = a13 * v1244,
+                        v1247 = -(a12 * v1244), v1248 = v927 * v1244, v1249 = -(v926 * v1244);
+                    v1199 = softehl_blend(m1240, v1243, v1199);
+                    v1200 = softehl_blend(m1240, v1248, v1200);
+                    v1201 = softehl_blend(m1240, v1249, v1201);
+                    v1202 = softehl_blend(m1240, v1246, v1202);
+                    v1203 = softehl_blend(m1240, v1247, v1203);
+                    v1204 = softehl_blend(m1240, v1245, v1204);
                 }
-                const V v2096 = v5 * v1331;
-                const V v2097 = v13 * v1331;
-                const V v2098 = v11 * v1658;
-                const V v2099 = v26 * v1658;
-                const V v2100 = v1376 * v2032;
-                const V v2101 = v1378 * v2034;
-                const V v2102 = v1374 * v2034;
-                const V v2103 = v2100 - v2102;
-                const V v2104 = v1373 * v2032;
-                const V v2105 = v2101 - v2104;
-                const V v2106 = v18 * v1512;
-                const V v2107 = v2096 - v2106;
-                const V v2108 = v21 * v1512;
-                const V v2109 = v2097 - v2108;
-                const V v2110 = v7 * v1677;
-                const V v2111 = v2098 + v2110;
-                const V v2112 = v15 * v1677;
-                const V v2113 = v2099 + v2112;
-                const V v2114 = v1530 * v2103;
-                const V v2115 = v1526 * v2103;
-                const V v2116 = v1535 * v2103;
-                const V v2117 = v1528 * v2103;
-                const V v2118 = v19 * v1516;
-                const V v2119 = v2107 - v2118;
-                const V v2120 = v23 * v1516;
-                const V v2121 = v2109 - v2120;
-                const V v2122 = v1534 * v2103;
-                const V v2123 = v1541 * v2103;
-                const V v2124 = v1521 * v2103;
-                const V v2125 = v1517 * v2105;
-                const V v2126 = v2114 + v2125;
-                const V v2127 = v1533 * v2105;
-                const V v2128 = v2115 + v2127;
-                const V v2129 = v1518 * v2105;
-                const V v2130 = v2116 + v2129;
-                const V v2131 = v1536 * v2105;
-                const V v2132 = v2117 + v2131;
-                const V v2133 = v2119 * v1368;
-                const V v2134 = v1519 * v2105;
-                const V v2135 = v2122 + v2134;
-                const V v2136 = v1543 * v2105;
-                const V v2137 = v2123 + v2136;
-                const V v2138 = v1520 * v2105;
-                const V v2139 = v2124 + v2138;
-                const V v2140 = v1545 * v2103;
-                const V v2141 = v2121 * v1369;
-                const V v2142 = v2133 + v2141;
-                const V v2143 = v1547 * v2103;
-                const V v2144 = v1522 * v2103;
-                const V v2145 = v17 * v1684;
-                const V v2146 = v2145 + v2113;
-                const V v2147 = v10 * v1684;
-                const V v2148 = v2147 + v2111;
-                const V v2149 = v1369 * v2146;
-                const V v2150 = v1544 * v2105;
-                const V v2151 = v2140 + v2150;
-                const V v2152 = v1546 * v2105;
-                const V v2153 = v2143 + v2152;
-                const V v2154 = v1511 * v2105;
-                const V v2155 = v2144 + v2154;
-                const V v2156 = v1368 * v2148;
-                const V v2157 = v2156 + v2149;
-                const V v2158 = v1484 * v2142;
-                const V v2159 = v2158 + v2128;
-                const V v2160 = v1484 * v1994;
-                const V v2161 = v1486 * v2142;
-                const V v2162 = v2161 + v2130;
-                const V v2163 = v1486 * v1994;
-                const V v2164 = v1488 * v2142;
-                const V v2165 = v2164 + v2132;
-                const V v2166 = v1488 * v1994;
-                const V v2167 = v1826 * v2157;
-                const V v2168 = v2167 + v2159;
-                const V v2169 = v1836 * v2157;
-                const V v2170 = v2169 + v2162;
-                const V v2171 = v1860 * v2157;
-                const V v2172 = v2171 + v2135;
-                const V v2173 = v1864 * v2157;
-                const V v2174 = v2173 + v2137;
-                const V v2175 = v1789 * v2157;
-                const V v2176 = v2175 + v2139;
-                const V v2177 = v1846 * v2157;
-                const V v2178 = v2177 + v2165;
-                const V v2179 = v1794 * v2157;
-                const V v2180 = v2179 + v2151;
-                const V v2181 = v1798 * v2157;
-                const V v2182 = v2181 + v2153;
-                const V v2183 = v1806 * v2157;
-                const V v2184 = v2183 + v2155;
-                const V v2185 = v1830 * v1993;
-                const V v2186 = v2160 + v2185;
-                const V v2187 = v1840 * v1993;
-                const V v2188 = v2163 + v2187;
-                const V v2189 = v1850 * v1993;
-                const V v2190 = v2166 + v2189;
-                const V v2191 = v1490 * v2142;
-                const V v2192 = v2191 + v2172;
-                const V v2193 = v1492 * v2142;
-                const V v2194 = v2193 + v2174;
-                const V v2195 = v1478 * v2142;
-                const V v2196 = v2195 + v2176;
-                const V v2197 = v1480 * v2142;
-                const V v2198 = v2197 + v2180;
-                const V v2199 = v1494 * v2142;
-                const V v2200 = v2199 + v2182;
-                const V v2201 = v1496 * v2142;
-                const V v2202 = v2201 + v2184;
-                const V v2203 = v1490 * v1994;
-                const V v2204 = v1492 * v1994;
-                const V v2205 = v1478 * v1994;
-                const V v2206 = v1480 * v1994;
-                const V v2207 = v1494 * v1994;
-                const V v2208 = v1496 * v1994;
-                const V v2209 = v1868 * v1993;
-                const V v2210 = v2203 + v2209;
-                const V v2211 = v1482 * v1994;
-                const V v2212 = v1482 * v2142;
-                const V v2213 = v2212 + v2126;
-                const V v2214 = v1870 * v1993;
-                const V v2215 = v2204 + v2214;
-                const V v2216 = v1791 * v1993;
-                const V v2217 = v2205 + v2216;
-                const V v2218 = v1802 * v1993;
-                const V v2219 = v2206 + v2218;
-                const V v2220 = v1804 * v1993;
-                const V v2221 = v2207 + v2220;
-                const V v2222 = v1810 * v1993;
-                const V v2223 = v2208 + v2222;
-                const V v2224 = v1820 * v1993;
-                const V v2225 = v2211 + v2224;
-                const V v2226 = v1993 * v2045;
-                const V v2227 = v2045 * v2210;
-                const V v2228 = v2045 * v2215;
-                const V v2229 = v2045 * v2217;
-                const V v2230 = v2045 * v2219;
-                const V v2231 = v2045 * v2221;
-                const V v2232 = v2045 * v2223;
-                const V v2233 = v2045 * v2225;
-                const V v2234 = v2046 * v2192;
-                const V v2235 = v2227 + v2234;
-                const V v2236 = v2046 * v2194;
-                const V v2237 = v2228 + v2236;
-                const V v2238 = v2046 * v2196;
-                const V v2239 = v2229 + v2238;
-                const V v2240 = v2046 * v2198;
-                const V v2241 = v2230 + v2240;
-                const V v2242 = v2046 * v2200;
-                const V v2243 = v2231 + v2242;
-                const V v2244 = v2046 * v2202;
-                const V v2245 = v2232 + v2244;
-                const V v2246 = v1991 * v2045;
-                const V v2247 = v1992 * v2045;
-                const V v2248 = v2046 * v2168;
-                const V v2249 = v2046 * v2170;
-                const V v2250 = v2046 * v2178;
-                const V v2251 = v1816 * v2157;
-                const V v2252 = v2251 + v2213;
-                const V v2253 = v2157 * v2046;
-                const V v2254 = v2046 * v2252;
-                const V v2255 = v2233 + v2254;
-                const V v2256 = v2045 * v2186;
-                const V v2257 = v2256 + v2248;
-                const V v2258 = v2045 * v2188;
-                const V v2259 = v2258 + v2249;
-                const V v2260 = v2045 * v2190;
-                const V v2261 = v2260 + v2250;
-                const V v2262 = v1674 * v2253;
-                const V v2263 = v1685 * v2253;
-                const V v2264 = w[1] * v2043;
-                const V v2265 = w[1] * v2044;
-                const V v2266 = v2043 * v1631;
-                const V v2267 = v2044 * v1631;
-                const V v2268 = v2043 * v1628;
-                const V v2269 = v2044 * v1628;
-                const V v2270 = v1765 * v2226;
-                const V v2271 = v2270 + v2262;
-                const V v2272 = v1768 * v2226;
-                const V v2273 = v2272 + v2263;
-                const V v2274 = v2264 * v1629;
-                const V v2275 = v2265 * v1629;
-                const V v2276 = v2264 * v1630;
-                const V v2277 = v2265 * v1630;
-                const V v2278 = v1564 * v2266;
-                const V v2279 = v1564 * v2267;
-                const V v2280 = v1564 * v2268;
-                const V v2281 = v1564 * v2269;
-                const V v2282 = v1563 * v2266;
-                const V v2283 = v1563 * v2267;
-                const V v2284 = v1563 * v2268;
-                const V v2285 = v1563 * v2269;
-                const V v2286 = v1562 * v2266;
-                const V v2287 = v1562 * v2267;
-                const V v2288 = v1562 * v2268;
-                const V v2289 = v1562 * v2269;
-                const V v2290 = v1718 * v2266;
-                const V v2291 = v1718 * v2267;
-                const V v2292 = v1718 * v2268;
-                const V v2293 = v1718 * v2269;
-                const V v2294 = v1719 * v2266;
-                const V v2295 = v1719 * v2267;
-                const V v2296 = v1719 * v2268;
-                const V v2297 = v1719 * v2269;
-                const V v2298 = v1707 * v2266;
-                const V v2299 = v1707 * v2267;
-                const V v2300 = v1707 * v2268;
-                const V v2301 = v1707 * v2269;
-                const V v2302 = -v2298;
-                const V v2303 = -v2299;
-                const V v2304 = -v2300;
-                const V v2305 = -v2301;
-                v1936 = softehl_blend(m1985, v1990, v1936);
-                v1937 = softehl_blend(m1985, v1991, v1937);
-                v1938 = softehl_blend(m1985, v1992, v1938);
-                v1939 = softehl_blend(m1985, v2042, v1939);
-                v1940 = softehl_blend(m1985, v2278, v1940);
-                v1941 = softehl_blend(m1985, v2279, v1941);
-                v1942 = softehl_blend(m1985, v2280, v1942);
-                v1943 = softehl_blend(m1985, v2281, v1943);
-                v1944 = softehl_blend(m1985, v2282, v1944);
-                v1945 = softehl_blend(m1985, v2283, v1945);
-                v1946 = softehl_blend(m1985, v2284, v1946);
-                v1947 = softehl_blend(m1985, v2285, v1947);
-                v1948 = softehl_blend(m1985, v2286, v1948);
-                v1949 = softehl_blend(m1985, v2287, v1949);
-                v1950 = softehl_blend(m1985, v2288, v1950);
-                v1951 = softehl_blend(m1985, v2289, v1951);
-                v1952 = softehl_blend(m1985, v2290, v1952);
-                v1953 = softehl_blend(m1985, v2291, v1953);
-                v1954 = softehl_blend(m1985, v2292, v1954);
-                v1955 = softehl_blend(m1985, v2293, v1955);
-                v1956 = softehl_blend(m1985, v2294, v1956);
-                v1957 = softehl_blend(m1985, v2295, v1957);
-                v1958 = softehl_blend(m1985, v2296, v1958);
-                v1959 = softehl_blend(m1985, v2297, v1959);
-                v1960 = softehl_blend(m1985, v2302, v1960);
-                v1961 = softehl_blend(m1985, v2303, v1961);
-                v1962 = softehl_blend(m1985, v2304, v1962);
-                v1963 = softehl_blend(m1985, v2305, v1963);
-                v1964 = softehl_blend(m1985, v1993, v1964);
-                v1965 = softehl_blend(m1985, v2274, v1965);
-                v1966 = softehl_blend(m1985, v2275, v1966);
-                v1967 = softehl_blend(m1985, v2276, v1967);
-                v1968 = softehl_blend(m1985, v2277, v1968);
-                v1969 = softehl_blend(m1985, v2246, v1969);
-                v1970 = softehl_blend(m1985, v2247, v1970);
-                v1971 = softehl_blend(m1985, v1994, v1971);
-                v1972 = softehl_blend(m1985, v2271, v1972);
-                v1973 = softehl_blend(m1985, v2273, v1973);
-                v1974 = softehl_blend(m1985, v2255, v1974);
-                v1975 = softehl_blend(m1985, v2047, v1975);
-                v1976 = softehl_blend(m1985, v2257, v1976);
-                v1977 = softehl_blend(m1985, v2259, v1977);
-                v1978 = softehl_blend(m1985, v2261, v1978);
-                v1979 = softehl_blend(m1985, v2235, v1979);
-                v1980 = softehl_blend(m1985, v2237, v1980);
-                v1981 = softehl_blend(m1985, v2239, v1981);
-                v1982 = softehl_blend(m1985, v2241, v1982);
-                v1983 = softehl_blend(m1985, v2243, v1983);
-                v1984 = softehl_blend(m1985, v2245, v1984);
+                const V v1250 = v858 * v1194 - v857 * v1195, v1251 = v859 * v1195 - v856 * v1194,
+                    v1252 = (v5 * v835 - v18 * v934 - v19 * v935) * v851 + (v13 * v835 - v21 * v934 - v23 * v935) * v852,
+                    v1253 = v851 * (v10 * v1016 + (v11 * v1007 + v7 * v1011)) + v852 * (v17 * v1016 + (v26 * v1007 + v15 * v1011)),
+                    v1254 = v1179 * v1202,
+                    v1255 = v1203 * (v921 * v1252 + (v1053 * v1253 + (v946 * v1250 + v938 * v1251))),
+                    v1256 = v1202 * (v921 * v1180 + v1055 * v1179) + v1255,
+                    v1257 = v1203 * (v922 * v1252 + (v1054 * v1253 + (v949 * v1250 + v950 * v1251))),
+                    v1258 = v1202 * (v922 * v1180 + v1056 * v1179) + v1257,
+                    v1259 = v1203 * (v915 * v1252 + (v1033 * v1253 + (v940 * v1250 + v939 * v1251))),
+                    v1260 = v1202 * (v915 * v1180 + v1034 * v1179) + v1259,
+                    v1261 = v1203 * (v916 * v1252 + (v1036 * v1253 + (v952 * v1250 + v951 * v1251))),
+                    v1262 = v1202 * (v916 * v1180 + v1040 * v1179) + v1261,
+                    v1263 = v1203 * (v923 * v1252 + (v1038 * v1253 + (v954 * v1250 + v953 * v1251))),
+                    v1264 = v1202 * (v923 * v1180 + v1041 * v1179) + v1263,
+                    v1265 = v1203 * (v924 * v1252 + (v1042 * v1253 + (v941 * v1250 + v933 * v1251))),
+                    v1266 = v1202 * (v924 * v1180 + v1044 * v1179) + v1265, v1267 = v1177 * v1202,
+                    v1268 = v1178 * v1202,
+                    v1269 = v1203 * (v1047 * v1253 + (v918 * v1252 + (v942 * v1250 + v945 * v1251))),
+                    v1270 = v1203 * (v1049 * v1253 + (v919 * v1252 + (v947 * v1250 + v937 * v1251))),
+                    v1271 = v1203 * (v1051 * v1253 + (v920 * v1252 + (v943 * v1250 + v948 * v1251))),
+                    v1272 = v1253 * v1203,
+                    v1273 = v1203 * (v1045 * v1253 + (v917 * v1252 + (v944 * v1250 + v936 * v1251))),
+                    v1274 = v1202 * (v917 * v1180 + v1046 * v1179) + v1273,
+                    v1275 = v1202 * (v918 * v1180 + v1048 * v1179) + v1269,
+                    v1276 = v1202 * (v919 * v1180 + v1050 * v1179) + v1270,
+                    v1277 = v1202 * (v920 * v1180 + v1052 * v1179) + v1271, v1278 = w[1] * v1200,
+                    v1279 = w[1] * v1201, v1280 = v1200 * v994, v1281 = v1201 * v994,
+                    v1282 = v1200 * v991, v1283 = v1201 * v991,
+                    v1284 = v1029 * v1254 + v1009 * v1272, v1285 = v1030 * v1254 + v1017 * v1272,
+                    v1286 = v1278 * v992, v1287 = v1279 * v992, v1288 = v1278 * v993,
+                    v1289 = v1279 * v993, v1290 = v962 * v1280, v1291 = v962 * v1281,
+                    v1292 = v962 * v1282, v1293 = v962 * v1283, v1294 = v961 * v1280,
+                    v1295 = v961 * v1281, v1296 = v961 * v1282, v1297 = v961 * v1283,
+                    v1298 = v960 * v1280, v1299 = v960 * v1281, v1300 = v960 * v1282,
+                    v1301 = v960 * v1283, v1302 = v1020 * v1280, v1303 = v1020 * v1281,
+                    v1304 = v1020 * v1282, v1305 = v1020 * v1283, v1306 = v1021 * v1280,
+                    v1307 = v1021 * v1281, v1308 = v1021 * v1282, v1309 = v1021 * v1283,
+                    v1310 = -(v1019 * v1280), v1311 = -(v1019 * v1281), v1312 = -(v1019 * v1282),
+                    v1313 = -(v1019 * v1283);
+                v1122 = softehl_blend(m1171, v1176, v1122);
+                v1123 = softehl_blend(m1171, v1177, v1123);
+                v1124 = softehl_blend(m1171, v1178, v1124);
+                v1125 = softehl_blend(m1171, v1199, v1125);
+                v1126 = softehl_blend(m1171, v1290, v1126);
+                v1127 = softehl_blend(m1171, v1291, v1127);
+                v1128 = softehl_blend(m1171, v1292, v1128);
+                v1129 = softehl_blend(m1171, v1293, v1129);
+                v1130 = softehl_blend(m1171, v1294, v1130);
+                v1131 = softehl_blend(m1171, v1295, v1131);
+                v1132 = softehl_blend(m1171, v1296, v1132);
+                v1133 = softehl_blend(m1171, v1297, v1133);
+                v1134 = softehl_blend(m1171, v1298, v1134);
+                v1135 = softehl_blend(m1171, v1299, v1135);
+                v1136 = softehl_blend(m1171, v1300, v1136);
+                v1137 = softehl_blend(m1171, v1301, v1137);
+                v1138 = softehl_blend(m1171, v1302, v1138);
+                v1139 = softehl_blend(m1171, v1303, v1139);
+                v1140 = softehl_blend(m1171, v1304, v1140);
+                v1141 = softehl_blend(m1171, v1305, v1141);
+                v1142 = softehl_blend(m1171, v1306, v1142);
+                v1143 = softehl_blend(m1171, v1307, v1143);
+                v1144 = softehl_blend(m1171, v1308, v1144);
+                v1145 = softehl_blend(m1171, v1309, v1145);
+                v1146 = softehl_blend(m1171, v1310, v1146);
+                v1147 = softehl_blend(m1171, v1311, v1147);
+                v1148 = softehl_blend(m1171, v1312, v1148);
+                v1149 = softehl_blend(m1171, v1313, v1149);
+                v1150 = softehl_blend(m1171, v1179, v1150);
+                v1151 = softehl_blend(m1171, v1286, v1151);
+                v1152 = softehl_blend(m1171, v1287, v1152);
+                v1153 = softehl_blend(m1171, v1288, v1153);
+                v1154 = softehl_blend(m1171, v1289, v1154);
+                v1155 = softehl_blend(m1171, v1267, v1155);
+                v1156 = softehl_blend(m1171, v1268, v1156);
+                v1157 = softehl_blend(m1171, v1180, v1157);
+                v1158 = softehl_blend(m1171, v1284, v1158);
+                v1159 = softehl_blend(m1171, v1285, v1159);
+                v1160 = softehl_blend(m1171, v1274, v1160);
+                v1161 = softehl_blend(m1171, v1204, v1161);
+                v1162 = softehl_blend(m1171, v1275, v1162);
+                v1163 = softehl_blend(m1171, v1276, v1163);
+                v1164 = softehl_blend(m1171, v1277, v1164);
+                v1165 = softehl_blend(m1171, v1256, v1165);
+                v1166 = softehl_blend(m1171, v1258, v1166);
+                v1167 = softehl_blend(m1171, v1260, v1167);
+                v1168 = softehl_blend(m1171, v1262, v1168);
+                v1169 = softehl_blend(m1171, v1264, v1169);
+                v1170 = softehl_blend(m1171, v1266, v1170);
             }
-            v1871 = softehl_blend(m1934, v1936, v1871);
-            v1872 = softehl_blend(m1934, v1937, v1872);
-            v1873 = softehl_blend(m1934, v1938, v1873);
-            v1874 = softehl_blend(m1934, v1939, v1874);
-            v1875 = softehl_blend(m1934, v1940, v1875);
-            v1876 = softehl_blend(m1934, v1941, v1876);
-            v1877 = softehl_blend(m1934, v1942, v1877);
-            v1878 = softehl_blend(m1934, v1943, v1878);
-            v1879 = softehl_blend(m1934, v1944, v1879);
-            v1880 = softehl_blend(m1934, v1945, v1880);
-            v1881 = softehl_blend(m1934, v1946, v1881);
-            v1882 = softehl_blend(m1934, v1947, v1882);
-            v1883 = softehl_blend(m1934, v1948, v1883);
-            v1884 = softehl_blend(m1934, v1949, v1884);
-            v1885 = softehl_blend(m1934, v1950, v1885);
-            v1886 = softehl_blend(m1934, v1951, v1886);
-            v1887 = softehl_blend(m1934, v1952, v1887);
-            v1888 = softehl_blend(m1934, v1953, v1888);
-            v1889 = softehl_blend(m1934, v1954, v1889);
-            v1890 = softehl_blend(m1934, v1955, v1890);
-            v1891 = softehl_blend(m1934, v1956, v1891);
-            v1892 = softehl_blend(m1934, v1957, v1892);
-            v1893 = softehl_blend(m1934, v1958, v1893);
-            v1894 = softehl_blend(m1934, v1959, v1894);
-            v1895 = softehl_blend(m1934, v1960, v1895);
-            v1896 = softehl_blend(m1934, v1961, v1896);
-            v1897 = softehl_blend(m1934, v1962, v1897);
-            v1898 = softehl_blend(m1934, v1963, v1898);
-            v1899 = softehl_blend(m1934, v1964, v1899);
-            v1900 = softehl_blend(m1934, v1965, v1900);
-            v1901 = softehl_blend(m1934, v1966, v1901);
-            v1902 = softehl_blend(m1934, v1967, v1902);
-            v1903 = softehl_blend(m1934, v1968, v1903);
-            v1904 = softehl_blend(m1934, v1969, v1904);
-            v1905 = softehl_blend(m1934, softehl_splat(0.0), v1905);
-            v1906 = softehl_blend(m1934, v1970, v1906);
-            v1907 = softehl_blend(m1934, softehl_splat(0.0), v1907);
-            v1908 = softehl_blend(m1934, v1971, v1908);
-            v1909 = softehl_blend(m1934, v1972, v1909);
-            v1910 = softehl_blend(m1934, softehl_splat(0.0), v1910);
-            v1911 = softehl_blend(m1934, v1973, v1911);
-            v1912 = softehl_blend(m1934, softehl_splat(0.0), v1912);
-            v1913 = softehl_blend(m1934, v1974, v1913);
-            v1914 = softehl_blend(m1934, v1975, v1914);
-            v1915 = softehl_blend(m1934, softehl_splat(0.0), v1915);
-            v1916 = softehl_blend(m1934, v1976, v1916);
-            v1917 = softehl_blend(m1934, softehl_splat(0.0), v1917);
-            v1918 = softehl_blend(m1934, v1977, v1918);
-            v1919 = softehl_blend(m1934, softehl_splat(0.0), v1919);
-            v1920 = softehl_blend(m1934, v1978, v1920);
-            v1921 = softehl_blend(m1934, softehl_splat(0.0), v1921);
-            v1922 = softehl_blend(m1934, v1979, v1922);
-            v1923 = softehl_blend(m1934, softehl_splat(0.0), v1923);
-            v1924 = softehl_blend(m1934, v1980, v1924);
-            v1925 = softehl_blend(m1934, softehl_splat(0.0), v1925);
-            v1926 = softehl_blend(m1934, v1981, v1926);
-            v1927 = softehl_blend(m1934, softehl_splat(0.0), v1927);
-            v1928 = softehl_blend(m1934, v1982, v1928);
-            v1929 = softehl_blend(m1934, softehl_splat(0.0), v1929);
-            v1930 = softehl_blend(m1934, v1983, v1930);
-            v1931 = softehl_blend(m1934, softehl_splat(0.0), v1931);
-            v1932 = softehl_blend(m1934, v1984, v1932);
-            v1933 = softehl_blend(m1934, softehl_splat(0.0), v1933);
+            v1057 = softehl_blend(m1120, v1122, v1057); v1058 = softehl_blend(m1120, v1123, v1058);
+            v1059 = softehl_blend(m1120, v1124, v1059); v1060 = softehl_blend(m1120, v1125, v1060);
+            v1061 = softehl_blend(m1120, v1126, v1061); v1062 = softehl_blend(m1120, v1127, v1062);
+            v1063 = softehl_blend(m1120, v1128, v1063); v1064 = softehl_blend(m1120, v1129, v1064);
+            v1065 = softehl_blend(m1120, v1130, v1065); v1066 = softehl_blend(m1120, v1131, v1066);
+            v1067 = softehl_blend(m1120, v1132, v1067); v1068 = softehl_blend(m1120, v1133, v1068);
+            v1069 = softehl_blend(m1120, v1134, v1069); v1070 = softehl_blend(m1120, v1135, v1070);
+            v1071 = softehl_blend(m1120, v1136, v1071); v1072 = softehl_blend(m1120, v1137, v1072);
+            v1073 = softehl_blend(m1120, v1138, v1073); v1074 = softehl_blend(m1120, v1139, v1074);
+            v1075 = softehl_blend(m1120, v1140, v1075); v1076 = softehl_blend(m1120, v1141, v1076);
+            v1077 = softehl_blend(m1120, v1142, v1077); v1078 = softehl_blend(m1120, v1143, v1078);
+            v1079 = softehl_blend(m1120, v1144, v1079); v1080 = softehl_blend(m1120, v1145, v1080);
+            v1081 = softehl_blend(m1120, v1146, v1081); v1082 = softehl_blend(m1120, v1147, v1082);
+            v1083 = softehl_blend(m1120, v1148, v1083); v1084 = softehl_blend(m1120, v1149, v1084);
+            v1085 = softehl_blend(m1120, v1150, v1085); v1086 = softehl_blend(m1120, v1151, v1086);
+            v1087 = softehl_blend(m1120, v1152, v1087); v1088 = softehl_blend(m1120, v1153, v1088);
+            v1089 = softehl_blend(m1120, v1154, v1089); v1090 = softehl_blend(m1120, v1155, v1090);
+            v1091 = softehl_blend(m1120, softehl_splat(0.0), v1091);
+            v1092 = softehl_blend(m1120, v1156, v1092);
+            v1093 = softehl_blend(m1120, softehl_splat(0.0), v1093);
+            v1094 = softehl_blend(m1120, v1157, v1094); v1095 = softehl_blend(m1120, v1158, v1095);
+            v1096 = softehl_blend(m1120, softehl_splat(0.0), v1096);
+            v1097 = softehl_blend(m1120, v1159, v1097);
+            v1098 = softehl_blend(m1120, softehl_splat(0.0), v1098);
+            v1099 = softehl_blend(m1120, v1160, v1099); v1100 = softehl_blend(m1120, v1161, v1100);
+            v1101 = softehl_blend(m1120, softehl_splat(0.0), v1101);
+            v1102 = softehl_blend(m1120, v1162, v1102);
+            v1103 = softehl_blend(m1120, softehl_splat(0.0), v1103);
+            v1104 = softehl_blend(m1120, v1163, v1104);
+            v1105 = softehl_blend(m1120, softehl_splat(0.0), v1105);
+            v1106 = softehl_blend(m1120, v1164, v1106);
+            v1107 = softehl_blend(m1120, softehl_splat(0.0), v1107);
+            v1108 = softehl_blend(m1120, v1165, v1108);
+            v1109 = softehl_blend(m1120, softehl_splat(0.0), v1109);
+            v1110 = softehl_blend(m1120, v1166, v1110);
+            v1111 = softehl_blend(m1120, softehl_splat(0.0), v1111);
+            v1112 = softehl_blend(m1120, v1167, v1112);
+            v1113 = softehl_blend(m1120, softehl_splat(0.0), v1113);
+            v1114 = softehl_blend(m1120, v1168, v1114);
+            v1115 = softehl_blend(m1120, softehl_splat(0.0), v1115);
+            v1116 = softehl_blend(m1120, v1169, v1116);
+            v1117 = softehl_blend(m1120, softehl_splat(0.0), v1117);
+            v1118 = softehl_blend(m1120, v1170, v1118);
+            v1119 = softehl_blend(m1120, softehl_splat(0.0), v1119);
         }
-        const M m2306 = ~v1792;
-        if (softehl_any(m2306)) {
-            const V v2307 = v1763 - v1504;
-            const V v2308 = v2307 * v2307;
-            const V v2309 = v2307 * v2308;
-            const V v2310 = 3.0 * v2308;
-            const V v2311 = v1499 * v2310;
-            const V v2312 = v67 * v2310;
-            const V v2313 = v1498 * v2310;
-            const V v2314 = -v2313;
-            const V v2315 = a12 * v2310;
-            const V v2316 = v2315 * v1820;
-            const V v2317 = v2315 * v1830;
-            const V v2318 = v2315 * v1840;
-            const V v2319 = v2315 * v1850;
-            const V v2320 = v2315 * v1868;
-            const V v2321 = v2315 * v1870;
-            const V v2322 = v2315 * v1791;
-            const V v2323 = v2315 * v1802;
-            const V v2324 = v2315 * v1804;
-            const V v2325 = v2315 * v1810;
-            const V v2326 = v2315 * v1765;
-            const V v2327 = v2315 * v1768;
-            v1871 = softehl_blend(m2306, v2309, v1871);
-            v1872 = softehl_blend(m2306, v2311, v1872);
-            v1873 = softehl_blend(m2306, v2314, v1873);
-            v1874 = softehl_blend(m2306, v2309, v1874);
-            v1875 = softehl_blend(m2306, softehl_splat(0.0), v1875);
-            v1876 = softehl_blend(m2306, softehl_splat(0.0), v1876);
-            v1877 = softehl_blend(m2306, softehl_splat(0.0), v1877);
-            v1878 = softehl_blend(m2306, softehl_splat(0.0), v1878);
-            v1879 = softehl_blend(m2306, softehl_splat(0.0), v1879);
-            v1880 = softehl_blend(m2306, softehl_splat(0.0), v1880);
-            v1881 = softehl_blend(m2306, softehl_splat(0.0), v1881);
-            v1882 = softehl_blend(m2306, softehl_splat(0.0), v1882);
-            v1883 = softehl_blend(m2306, softehl_splat(0.0), v1883);
-            v1884 = softehl_blend(m2306, softehl_splat(0.0), v1884);
-            v1885 = softehl_blend(m2306, softehl_splat(0.0), v1885);
-            v1886 = softehl_blend(m2306, softehl_splat(0.0), v1886);
-            v1887 = softehl_blend(m2306, softehl_splat(0.0), v1887);
-            v1888 = softehl_blend(m2306, softehl_splat(0.0), v1888);
-            v1889 = softehl_blend(m2306, softehl_splat(0.0), v1889);
-            v1890 = softehl_blend(m2306, softehl_splat(0.0), v1890);
-            v1891 = softehl_blend(m2306, softehl_splat(0.0), v1891);
-            v1892 = softehl_blend(m2306, softehl_splat(0.0), v1892);
-            v1893 = softehl_blend(m2306, softehl_splat(0.0), v1893);
-            v1894 = softehl_blend(m2306, softehl_splat(0.0), v1894);
-            v1895 = softehl_blend(m2306, softehl_splat(0.0), v1895);
-            v1896 = softehl_blend(m2306, softehl_splat(0.0), v1896);
-            v1897 = softehl_blend(m2306, softehl_splat(0.0), v1897);
-            v1898 = softehl_blend(m2306, softehl_splat(0.0), v1898);
-            v1899 = softehl_blend(m2306, v2315, v1899);
-            v1900 = softehl_blend(m2306, softehl_splat(0.0), v1900);
-            v1901 = softehl_blend(m2306, softehl_splat(0.0), v1901);
-            v1902 = softehl_blend(m2306, softehl_splat(0.0), v1902);
-            v1903 = softehl_blend(m2306, softehl_splat(0.0), v1903);
-            v1904 = softehl_blend(m2306, softehl_splat(0.0), v1904);
-            v1905 = softehl_blend(m2306, v2311, v1905);
-            v1906 = softehl_blend(m2306, softehl_splat(0.0), v1906);
-            v1907 = softehl_blend(m2306, v2314, v1907);
-            v1908 = softehl_blend(m2306, v2312, v1908);
-            v1909 = softehl_blend(m2306, softehl_splat(0.0), v1909);
-            v1910 = softehl_blend(m2306, v2326, v1910);
-            v1911 = softehl_blend(m2306, softehl_splat(0.0), v1911);
-            v1912 = softehl_blend(m2306, v2327, v1912);
-            v1913 = softehl_blend(m2306, softehl_splat(0.0), v1913);
-            v1914 = softehl_blend(m2306, v2312, v1914);
-            v1915 = softehl_blend(m2306, v2316, v1915);
-            v1916 = softehl_blend(m2306, softehl_splat(0.0), v1916);
-            v1917 = softehl_blend(m2306, v2317, v1917);
-            v1918 = softehl_blend(m2306, softehl_splat(0.0), v1918);
-            v1919 = softehl_blend(m2306, v2318, v1919);
-            v1920 = softehl_blend(m2306, softehl_splat(0.0), v1920);
-            v1921 = softehl_blend(m2306, v2319, v1921);
-            v1922 = softehl_blend(m2306, softehl_splat(0.0), v1922);
-            v1923 = softehl_blend(m2306, v2320, v1923);
-            v1924 = softehl_blend(m2306, softehl_splat(0.0), v1924);
-            v1925 = softehl_blend(m2306, v2321, v1925);
-            v1926 = softehl_blend(m2306, softehl_splat(0.0), v1926);
-            v1927 = softehl_blend(m2306, v2322, v1927);
-            v1928 = softehl_blend(m2306, softehl_splat(0.0), v1928);
-            v1929 = softehl_blend(m2306, v2323, v1929);
-            v1930 = softehl_blend(m2306, softehl_splat(0.0), v1930);
-            v1931 = softehl_blend(m2306, v2324, v1931);
-            v1932 = softehl_blend(m2306, softehl_splat(0.0), v1932);
-            v1933 = softehl_blend(m2306, v2325, v1933);
+        const M m1314 = ~v1035;
+        if (softehl_any(m1314)) {
+            const V v1315 = v1028 - v930, v1316 = v1315 * v1315, v1317 = v1315 * v1316,
+                v1318 = 3.0 * v1316, v1319 = v927 * v1318, v1320 = v50 * v1318,
+                v1321 = -(v926 * v1318), v1322 = a12 * v1318, v1323 = v1322 * v1046,
+                v1324 = v1322 * v1048, v1325 = v1322 * v1050, v1326 = v1322 * v1052,
+                v1327 = v1322 * v1055, v1328 = v1322 * v1056, v1329 = v1322 * v1034,
+                v1330 = v1322 * v1040, v1331 = v1322 * v1041, v1332 = v1322 * v1044,
+                v1333 = v1322 * v1029, v1334 = v1322 * v1030;
+            v1057 = softehl_blend(m1314, v1317, v1057); v1058 = softehl_blend(m1314, v1319, v1058);
+            v1059 = softehl_blend(m1314, v1321, v1059); v1060 = softehl_blend(m1314, v1317, v1060);
+            v1061 = softehl_blend(m1314, softehl_splat(0.0), v1061);
+            v1062 = softehl_blend(m1314, softehl_splat(0.0), v1062);
+            v1063 = softehl_blend(m1314, softehl_splat(0.0), v1063);
+            v1064 = softehl_blend(m1314, softehl_splat(0.0), v1064);
+            v1065 = softehl_blend(m1314, softehl_splat(0.0), v1065);
+            v1066 = softehl_blend(m1314, softehl_splat(0.0), v1066);
+            v1067 = softehl_blend(m1314, softehl_splat(0.0), v1067);
+            v1068 = softehl_blend(m1314, softehl_splat(0.0), v1068);
+            v1069 = softehl_blend(m1314, softehl_splat(0.0), v1069);
+            v1070 = softehl_blend(m1314, softehl_splat(0.0), v1070);
+            v1071 = softehl_blend(m1314, softehl_splat(0.0), v1071);
+            v1072 = softehl_blend(m1314, softehl_splat(0.0), v1072);
+            v1073 = softehl_blend(m1314, softehl_splat(0.0), v1073);
+            v1074 = softehl_blend(m1314, softehl_splat(0.0), v1074);
+            v1075 = softehl_blend(m1314, softehl_splat(0.0), v1075);
+            v1076 = softehl_blend(m1314, softehl_splat(0.0), v1076);
+            v1077 = softehl_blend(m1314, softehl_splat(0.0), v1077);
+            v1078 = softehl_blend(m1314, softehl_splat(0.0), v1078);
+            v1079 = softehl_blend(m1314, softehl_splat(0.0), v1079);
+            v1080 = softehl_blend(m1314, softehl_splat(0.0), v1080);
+            v1081 = softehl_blend(m1314, softehl_splat(0.0), v1081);
+            v1082 = softehl_blend(m1314, softehl_splat(0.0), v1082);
+            v1083 = softehl_blend(m1314, softehl_splat(0.0), v1083);
+            v1084 = softehl_blend(m1314, softehl_splat(0.0), v1084);
+            v1085 = softehl_blend(m1314, v1322, v1085);
+            v1086 = softehl_blend(m1314, softehl_splat(0.0), v1086);
+            v1087 = softehl_blend(m1314, softehl_splat(0.0), v1087);
+            v1088 = softehl_blend(m1314, softehl_splat(0.0), v1088);
+            v1089 = softehl_blend(m1314, softehl_splat(0.0), v1089);
+            v1090 = softehl_blend(m1314, softehl_splat(0.0), v1090);
+            v1091 = softehl_blend(m1314, v1319, v1091);
+            v1092 = softehl_blend(m1314, softehl_splat(0.0), v1092);
+            v1093 = softehl_blend(m1314, v1321, v1093); v1094 = softehl_blend(m1314, v1320, v1094);
+            v1095 = softehl_blend(m1314, softehl_splat(0.0), v1095);
+            v1096 = softehl_blend(m1314, v1333, v1096);
+            v1097 = softehl_blend(m1314, softehl_splat(0.0), v1097);
+            v1098 = softehl_blend(m1314, v1334, v1098);
+            v1099 = softehl_blend(m1314, softehl_splat(0.0), v1099);
+            v1100 = softehl_blend(m1314, v1320, v1100); v1101 = softehl_blend(m1314, v1323, v1101);
+            v1102 = softehl_blend(m1314, softehl_splat(0.0), v1102);
+            v1103 = softehl_blend(m1314, v1324, v1103);
+            v1104 = softehl_blend(m1314, softehl_splat(0.0), v1104);
+            v1105 = softehl_blend(m1314, v1325, v1105);
+            v1106 = softehl_blend(m1314, softehl_splat(0.0), v1106);
+            v1107 = softehl_blend(m1314, v1326, v1107);
+            v1108 = softehl_blend(m1314, softehl_splat(0.0), v1108);
+            v1109 = softehl_blend(m1314, v1327, v1109);
+            v1110 = softehl_blend(m1314, softehl_splat(0.0), v1110);
+            v1111 = softehl_blend(m1314, v1328, v1111);
+            v1112 = softehl_blend(m1314, softehl_splat(0.0), v1112);
+            v1113 = softehl_blend(m1314, v1329, v1113);
+            v1114 = softehl_blend(m1314, softehl_splat(0.0), v1114);
+            v1115 = softehl_blend(m1314, v1330, v1115);
+            v1116 = softehl_blend(m1314, softehl_splat(0.0), v1116);
+            v1117 = softehl_blend(m1314, v1331, v1117);
+            v1118 = softehl_blend(m1314, softehl_splat(0.0), v1118);
+            v1119 = softehl_blend(m1314, v1332, v1119);
         }
-        s1062 += v1875;
-        s1063 += v1876;
-        s1064 += v1877;
-        s1065 += v1878;
-        s1066 += v1879;
-        s1067 += v1880;
-        s1068 += v1881;
-        s1069 += v1882;
-        s1070 += v1883;
-        s1071 += v1884;
-        s1072 += v1885;
-        s1073 += v1886;
-        s1074 += v1887;
-        s1075 += v1888;
-        s1076 += v1889;
-        s1077 += v1890;
-        s1078 += v1891;
-        s1079 += v1892;
-        s1080 += v1893;
-        s1081 += v1894;
-        s1082 += v1895;
-        s1083 += v1896;
-        s1084 += v1897;
-        s1085 += v1898;
-        s1088 += v1900;
-        s1089 += v1901;
-        s1092 += v1902;
-        s1093 += v1903;
-        const V v2328 = 1.0 / v1558;
-        const V v2329 = v1604 * v1051;
-        const V v2330 = v44 * v1549;
-        const V v2331 = v37 * v1551;
-        const V v2332 = v2330 + v2331;
-        const V v2333 = v1505 + v1506;
-        const V v2334 = v1905 + v1904;
-        const V v2335 = v1907 + v1906;
-        const V v2336 = 2.0 * v2332;
-        const V v2337 = v1915 + v1913;
-        const V v2338 = v1917 + v1916;
-        const V v2339 = v1919 + v1918;
-        const V v2340 = v22 * v1324;
-        const V v2341 = v2340 + v2333;
-        const V v2342 = softehl_vsqrt(v2328);
-        const V v2343 = v24 * v1325;
-        const V v2344 = v2343 + v2341;
-        const V v2345 = v1921 + v1920;
-        const V v2346 = v1923 + v1922;
-        const V v2347 = v1925 + v1924;
-        const V v2348 = v1927 + v1926;
-        const V v2349 = v1929 + v1928;
-        const V v2350 = v1931 + v1930;
-        const V v2351 = X5 * v1331;
-        const V v2352 = v2344 - v2351;
-        const V v2353 = v1933 + v1932;
-        const V v2354 = v1910 + v1909;
-        const V v2355 = v1912 + v1911;
-        const V v2356 = v2352 * v2329;
-        const V v2357 = v1765 * v1899;
-        const V v2358 = v1768 * v1899;
-        const V v2359 = v1820 * v1899;
-        const V v2360 = v1830 * v1899;
-        const V v2361 = v1840 * v1899;
-        const V v2362 = v1850 * v1899;
-        const V v2363 = v1868 * v1899;
-        const V v2364 = v1870 * v1899;
-        const V v2365 = v1791 * v1899;
-        const V v2366 = v1802 * v1899;
-        const V v2367 = v1804 * v1899;
-        const V v2368 = v1810 * v1899;
-        const V v2369 = v1559 * v1572;
-        const V v2370 = v1053 * v1572;
-        const V v2371 = v2357 * v1628;
-        const V v2372 = v2358 * v1628;
-        const V v2373 = v1872 * v1628;
-        const V v2374 = w[1] * v1872;
-        const V v2375 = v56 * w[1];
-        const V v2376 = w[1] * v1873;
-        const V v2377 = v1873 * v1628;
-        const V v2378 = v2342 * v2370;
-        const V v2379 = w[1] * v2334;
-        const V v2380 = v2334 * v1628;
-        const V v2381 = v2334 * v1631;
-        const V v2382 = v2373 + v2381;
-        const V v2383 = v1872 * v1631;
-        const V v2384 = v2380 - v2383;
-        const V v2385 = v2375 * v1498;
-        const V v2386 = v2375 * v1497;
-        const V v2387 = v2335 * v1631;
-        const V v2388 = v2377 + v2387;
-        const V v2389 = w[1] * v2335;
-        const V v2390 = v2335 * v1628;
-        const V v2391 = v1873 * v1631;
-        const V v2392 = v2390 - v2391;
-        const V v2393 = v2336 * v2378;
-        const V v2394 = v2356 + v2393;
-        const V v2395 = w[1] * v1629;
-        const V v2396 = v2379 * v1629;
-        s1106 += v2396;
-        const V v2397 = v2379 * v1630;
-        s1108 += v2397;
-        const V v2398 = w[1] * v1630;
-        const V v2399 = v2389 * v1629;
-        s1107 += v2399;
-        const V v2400 = v2389 * v1630;
-        s1109 += v2400;
-        const V v2401 = v2374 * v1629;
-        s1056 += v2401;
-        const V v2402 = v2374 * v1630;
-        s1058 += v2402;
-        const V v2403 = v2376 * v1629;
-        s1057 += v2403;
-        const V v2404 = v2376 * v1630;
-        s1059 += v2404;
-        const V v2405 = v1871 * v2394;
-        const V v2406 = v1871 * v1606;
-        const V v2407 = v1871 * v2369;
-        const V v2408 = v1874 * v1606;
-        const V v2409 = v1874 * v2369;
-        const V v2410 = v1874 * v2394;
-        const V v2411 = 0.5 * v2406;
-        const V v2412 = v1369 * v1871;
-        const V v2413 = v1369 * v1874;
-        const V v2414 = 0.5 * v2408;
-        const V v2415 = v2385 * v2406;
-        s1054 += v2415;
-        const V v2416 = v2385 * v2408;
-        s1060 += v2416;
-        const V v2417 = v2386 * v2406;
-        s1055 += v2417;
-        const V v2418 = v2386 * v2408;
-        s1061 += v2418;
-        const V v2419 = v1368 * v1874;
-        const V v2420 = v2412 + v2419;
-        const V v2421 = v1368 * v1871;
-        const V v2422 = v2413 - v2421;
-        const V v2423 = v1501 * v2409;
-        const V v2424 = v1501 * v2407;
-        const V v2425 = v1502 * v2407;
-        const V v2426 = v1502 * v2409;
-        const V v2427 = v2420 * v1606;
-        const V v2428 = v2422 * v1606;
-        const V v2429 = v2420 * v2369;
-        const V v2430 = v2422 * v2369;
-        const V v2431 = v2420 * v2394;
-        const V v2432 = v2422 * v2394;
-        const V v2433 = v1028 * v2424;
-        const V v2434 = v1028 * v2425;
-        const V v2435 = v1028 * v2423;
-        const V v2436 = v1028 * v2426;
-        const V v2437 = v1028 * v2429;
-        const V v2438 = v1028 * v2430;
-        const V v2439 = v1512 * v2428;
-        const V v2440 = v1512 * v2427;
-        const V v2441 = v1516 * v2427;
-        const V v2442 = v1516 * v2428;
-        const V v2443 = v1331 * v2427;
-        const V v2444 = v1331 * v2428;
-        const V v2445 = v1677 * v2427;
-        const V v2446 = v1677 * v2428;
-        const V v2447 = v1684 * v2427;
-        const V v2448 = v1684 * v2428;
-        const V v2449 = v1658 * v2427;
-        const V v2450 = v1658 * v2428;
-        const V v2451 = v1718 * v2428;
-        s1098 += v2451;
-        const V v2452 = v1718 * v2427;
-        s1099 += v2452;
-        const V v2453 = v1562 * v2428;
-        s1100 += v2453;
-        const V v2454 = v1562 * v2427;
-        s1101 += v2454;
-        const V v2455 = v1563 * v2428;
-        s1102 += v2455;
-        const V v2456 = v1563 * v2427;
-        s1103 += v2456;
-        const V v2457 = v1564 * v2428;
-        s1104 += v2457;
-        const V v2458 = v1564 * v2427;
-        s1105 += v2458;
-        const V v2459 = v1707 * v2427;
-        s1095 += v2459;
-        const V v2460 = v1719 * v2427;
-        s1097 += v2460;
-        const V v2461 = v1707 * v2428;
-        s1094 += v2461;
-        const V v2462 = v1719 * v2428;
-        s1096 += v2462;
-        const V v2463 = v1564 * v2382;
-        s1110 += v2463;
-        const V v2464 = v1563 * v2382;
-        s1114 += v2464;
-        const V v2465 = v1719 * v2382;
-        s1126 += v2465;
-        const V v2466 = v1707 * v2382;
-        s1130 += v2466;
-        const V v2467 = v1564 * v2388;
-        s1111 += v2467;
-        const V v2468 = v1563 * v2388;
-        s1115 += v2468;
-        const V v2469 = v1719 * v2388;
-        s1127 += v2469;
-        const V v2470 = v1707 * v2388;
-        s1131 += v2470;
-        const V v2471 = v1564 * v2384;
-        s1112 += v2471;
-        const V v2472 = v1563 * v2384;
-        s1116 += v2472;
-        const V v2473 = v1719 * v2384;
-        s1128 += v2473;
-        const V v2474 = v1719 * v2392;
-        s1129 += v2474;
-        const V v2475 = v1564 * v2392;
-        s1113 += v2475;
-        const V v2476 = v1563 * v2392;
-        s1117 += v2476;
-        const V v2477 = v1707 * v2384;
-        s1132 += v2477;
-        const V v2478 = v1707 * v2392;
-        s1133 += v2478;
-        const V v2479 = v1562 * v2388;
-        s1119 += v2479;
-        const V v2480 = v1562 * v2384;
-        s1120 += v2480;
-        const V v2481 = v1562 * v2392;
-        s1121 += v2481;
-        const V v2482 = v1718 * v2388;
-        s1123 += v2482;
-        const V v2483 = v1718 * v2384;
-        s1124 += v2483;
-        const V v2484 = v1718 * v2392;
-        s1125 += v2484;
-        const V v2485 = v1718 * v2382;
-        s1122 += v2485;
-        const V v2486 = v1562 * v2382;
-        s1118 += v2486;
-        const V v2487 = v2357 * v2395;
-        s1086 += v2487;
-        const V v2488 = v2358 * v2395;
-        s1087 += v2488;
-        const V v2489 = v2357 * v2398;
-        s1090 += v2489;
-        const V v2490 = v2358 * v2398;
-        s1091 += v2490;
-        const V v2491 = v2354 * v2395;
-        s1144 += v2491;
-        const V v2492 = v2355 * v2395;
-        s1145 += v2492;
-        const V v2493 = v2354 * v2398;
-        s1156 += v2493;
-        const V v2494 = v2355 * v2398;
-        s1157 += v2494;
-        const V v2495 = v2354 * v1628;
-        const V v2496 = v2355 * v1628;
-        const V v2497 = v2357 * v1631;
-        const V v2498 = v2495 - v2497;
-        const V v2499 = v2358 * v1631;
-        const V v2500 = v2496 - v2499;
-        const V v2501 = v2354 * v1631;
-        const V v2502 = v2371 + v2501;
-        const V v2503 = v2355 * v1631;
-        const V v2504 = v2372 + v2503;
-        const V v2505 = v1378 * v1871;
-        const V v2506 = v1378 * v1874;
-        const V v2507 = v1376 * v1871;
-        const V v2508 = v1376 * v1874;
-        const V v2509 = v1564 * v2498;
-        s1160 += v2509;
-        const V v2510 = v1564 * v2500;
-        s1161 += v2510;
-        const V v2511 = v1564 * v2502;
-        s1158 += v2511;
-        const V v2512 = v1564 * v2504;
-        s1159 += v2512;
-        const V v2513 = v1373 * v1874;
-        const V v2514 = v2505 - v2513;
-        const V v2515 = v1373 * v1871;
-        const V v2516 = v2515 + v2506;
-        const V v2517 = v1374 * v1874;
-        const V v2518 = v2507 + v2517;
-        const V v2519 = v1374 * v1871;
-        const V v2520 = v2508 - v2519;
-        const V v2521 = v2514 * v1606;
-        const V v2522 = v2516 * v1606;
-        const V v2523 = v2518 * v1606;
-        const V v2524 = v2520 * v1606;
-        const V v2525 = v1563 * v2502;
-        s1162 += v2525;
-        const V v2526 = v1563 * v2504;
-        s1163 += v2526;
-        const V v2527 = v1563 * v2498;
-        s1164 += v2527;
-        const V v2528 = v1563 * v2500;
-        s1165 += v2528;
-        const V v2529 = v1562 * v2502;
-        s1166 += v2529;
-        const V v2530 = v1562 * v2504;
-        s1167 += v2530;
-        const V v2531 = v1562 * v2498;
-        s1168 += v2531;
-        const V v2532 = v1562 * v2500;
-        s1169 += v2532;
-        const V v2533 = v1533 * v2521;
-        const V v2534 = v1533 * v2522;
-        const V v2535 = v1518 * v2521;
-        const V v2536 = v1518 * v2522;
-        const V v2537 = v1536 * v2521;
-        const V v2538 = v1536 * v2522;
-        const V v2539 = v1519 * v2521;
-        const V v2540 = v1519 * v2522;
-        const V v2541 = v1543 * v2521;
-        const V v2542 = v1543 * v2522;
-        const V v2543 = v1520 * v2521;
-        const V v2544 = v1520 * v2522;
-        const V v2545 = v1544 * v2521;
-        const V v2546 = v1544 * v2522;
-        const V v2547 = v1546 * v2521;
-        const V v2548 = v1546 * v2522;
-        const V v2549 = v1511 * v2521;
-        const V v2550 = v1511 * v2522;
-        const V v2551 = v1517 * v2521;
-        const V v2552 = v2437 + v2551;
-        const V v2553 = v1517 * v2522;
-        const V v2554 = v2438 + v2553;
-        const V v2555 = v1023 * v2429;
-        const V v2556 = v2555 + v2539;
-        const V v2557 = v1024 * v2429;
-        const V v2558 = v2557 + v2541;
-        const V v2559 = v1038 * v2429;
-        const V v2560 = v2559 + v2543;
-        const V v2561 = v1039 * v2429;
-        const V v2562 = v2561 + v2545;
-        const V v2563 = v1040 * v2429;
-        const V v2564 = v2563 + v2547;
-        const V v2565 = v1043 * v2429;
-        const V v2566 = v2565 + v2549;
-        const V v2567 = v1043 * v2430;
-        const V v2568 = v2567 + v2550;
-        const V v2569 = v1023 * v2424;
-        const V v2570 = v1024 * v2424;
-        const V v2571 = v1038 * v2424;
-        const V v2572 = v1039 * v2424;
-        const V v2573 = v1040 * v2424;
-        const V v2574 = v1043 * v2424;
-        const V v2575 = v1029 * v2424;
-        const V v2576 = v1034 * v2424;
-        const V v2577 = v1035 * v2424;
-        const V v2578 = v1029 * v2425;
-        const V v2579 = v1034 * v2425;
-        const V v2580 = v1035 * v2425;
-        const V v2581 = v1039 * v2425;
-        const V v2582 = v1040 * v2425;
-        const V v2583 = v1043 * v2425;
-        const V v2584 = v1023 * v2425;
-        const V v2585 = v1024 * v2425;
-        const V v2586 = v1038 * v2425;
-        const V v2587 = v1034 * v2423;
-        const V v2588 = v1023 * v2423;
-        const V v2589 = v1024 * v2423;
-        const V v2590 = v1038 * v2423;
-        const V v2591 = v1040 * v2423;
-        const V v2592 = v1043 * v2423;
-        const V v2593 = v1043 * v2426;
-        const V v2594 = v1034 * v2426;
-        const V v2595 = v1023 * v2426;
-        const V v2596 = v1024 * v2426;
-        const V v2597 = v1038 * v2426;
-        const V v2598 = v1040 * v2426;
-        const V v2599 = v1029 * v2423;
-        const V v2600 = v1029 * v2426;
-        const V v2601 = v1035 * v2423;
-        const V v2602 = v1039 * v2423;
-        const V v2603 = v1035 * v2426;
-        const V v2604 = v1039 * v2426;
-        const V v2605 = v1024 * v2430;
-        const V v2606 = v2605 + v2542;
-        const V v2607 = v1038 * v2430;
-        const V v2608 = v2607 + v2544;
-        const V v2609 = v1039 * v2430;
-        const V v2610 = v2609 + v2546;
-        const V v2611 = v1040 * v2430;
-        const V v2612 = v2611 + v2548;
-        const V v2613 = v1029 * v2430;
-        const V v2614 = v2613 + v2534;
-        const V v2615 = v1029 * v2429;
-        const V v2616 = v2615 + v2533;
-        const V v2617 = v1035 * v2429;
-        const V v2618 = v2617 + v2537;
-        const V v2619 = v1035 * v2430;
-        const V v2620 = v2619 + v2538;
-        const V v2621 = v1034 * v2429;
-        const V v2622 = v2621 + v2535;
-        const V v2623 = v1034 * v2430;
-        const V v2624 = v2623 + v2536;
-        const V v2625 = v1023 * v2430;
-        const V v2626 = v2625 + v2540;
-        const V v2627 = v1492 * v2432;
-        const V v2628 = v2627 + v2606;
-        const V v2629 = v1484 * v2432;
-        const V v2630 = v2629 + v2614;
-        const V v2631 = v1484 * v2431;
-        const V v2632 = v2631 + v2616;
-        const V v2633 = v1488 * v2431;
-        const V v2634 = v2633 + v2618;
-        const V v2635 = v1488 * v2432;
-        const V v2636 = v2635 + v2620;
-        const V v2637 = v1486 * v2431;
-        const V v2638 = v2637 + v2622;
-        const V v2639 = v1486 * v2432;
-        const V v2640 = v2639 + v2624;
-        const V v2641 = v1490 * v2432;
-        const V v2642 = v2641 + v2626;
-        const V v2643 = v1494 * v2432;
-        const V v2644 = v2643 + v2612;
-        const V v2645 = v1484 * v2440;
-        const V v2646 = v1486 * v2440;
-        const V v2647 = v1488 * v2440;
-        const V v2648 = v1490 * v2440;
-        const V v2649 = v1494 * v2440;
-        const V v2650 = v1482 * v2440;
-        const V v2651 = v1492 * v2440;
-        const V v2652 = v1478 * v2440;
-        const V v2653 = v1480 * v2440;
-        const V v2654 = v1496 * v2440;
-        const V v2655 = v1482 * v2439;
-        const V v2656 = v1490 * v2439;
-        const V v2657 = v1492 * v2439;
-        const V v2658 = v1478 * v2439;
-        const V v2659 = v1480 * v2439;
-        const V v2660 = v1496 * v2439;
-        const V v2661 = v1484 * v2439;
-        const V v2662 = v1486 * v2439;
-        const V v2663 = v1488 * v2439;
-        const V v2664 = v1494 * v2439;
-        const V v2665 = v1484 * v2441;
-        const V v2666 = v1486 * v2441;
-        const V v2667 = v1488 * v2441;
-        const V v2668 = v1480 * v2441;
-        const V v2669 = v1494 * v2441;
-        const V v2670 = v1482 * v2441;
-        const V v2671 = v1490 * v2441;
-        const V v2672 = v1492 * v2441;
-        const V v2673 = v1478 * v2441;
-        const V v2674 = v1496 * v2441;
-        const V v2675 = v1482 * v2442;
-        const V v2676 = v1490 * v2442;
-        const V v2677 = v1492 * v2442;
-        const V v2678 = v1478 * v2442;
-        const V v2679 = v1496 * v2442;
-        const V v2680 = v1484 * v2442;
-        const V v2681 = v1486 * v2442;
-        const V v2682 = v1488 * v2442;
-        const V v2683 = v1480 * v2442;
-        const V v2684 = v1494 * v2442;
-        const V v2685 = v1484 * v1908;
-        const V v2686 = v2685 + v2360;
-        const V v2687 = v1486 * v1908;
-        const V v2688 = v2687 + v2361;
-        const V v2689 = v1488 * v1908;
-        const V v2690 = v2689 + v2362;
-        const V v2691 = v1480 * v1908;
-        const V v2692 = v2691 + v2366;
-        const V v2693 = v1494 * v1908;
-        const V v2694 = v2693 + v2367;
-        const V v2695 = v1482 * v1908;
-        const V v2696 = v2695 + v2359;
-        const V v2697 = v1490 * v1908;
-        const V v2698 = v2697 + v2363;
-        const V v2699 = v1492 * v1908;
-        const V v2700 = v2699 + v2364;
-        const V v2701 = v1478 * v1908;
-        const V v2702 = v2701 + v2365;
-        const V v2703 = v1496 * v1908;
-        const V v2704 = v2703 + v2368;
-        const V v2705 = v1482 * v1914;
-        const V v2706 = v2705 + v2337;
-        const V v2707 = v1490 * v1914;
-        const V v2708 = v2707 + v2346;
-        const V v2709 = v1492 * v1914;
-        const V v2710 = v2709 + v2347;
-        const V v2711 = v1478 * v1914;
-        const V v2712 = v2711 + v2348;
-        const V v2713 = v1496 * v1914;
-        const V v2714 = v2713 + v2353;
-        const V v2715 = v1484 * v1914;
-        const V v2716 = v2715 + v2338;
-        const V v2717 = v1486 * v1914;
-        const V v2718 = v2717 + v2339;
-        const V v2719 = v1488 * v1914;
-        const V v2720 = v2719 + v2345;
-        const V v2721 = v1480 * v1914;
-        const V v2722 = v2721 + v2349;
-        const V v2723 = v1494 * v1914;
-        const V v2724 = v2723 + v2350;
-        const V v2725 = v1497 * v2405;
-        const V v2726 = v1497 * v2410;
-        const V v2727 = v1498 * v2405;
-        const V v2728 = v2411 + v2727;
-        const V v2729 = v1498 * v2410;
-        const V v2730 = v2414 + v2729;
-        const V v2731 = v2725 - v2411;
-        const V v2732 = v2726 - v2414;
-        const V v2733 = v56 * v2728;
-        const V v2734 = v56 * v2731;
-        const V v2735 = v56 * v2730;
-        const V v2736 = v56 * v2732;
-        const V v2737 = v1816 * v2445;
-        const V v2738 = v1826 * v2445;
-        const V v2739 = v1836 * v2445;
-        const V v2740 = v1846 * v2445;
-        const V v2741 = v1860 * v2445;
-        const V v2742 = v1864 * v2445;
-        const V v2743 = v1789 * v2445;
-        const V v2744 = v1794 * v2445;
-        const V v2745 = v1798 * v2445;
-        const V v2746 = v1806 * v2445;
-        const V v2747 = v1674 * v2445;
-        const V v2748 = v1685 * v2445;
-        const V v2749 = v1860 * v2446;
-        const V v2750 = v1789 * v2446;
-        const V v2751 = v1794 * v2446;
-        const V v2752 = v1798 * v2446;
-        const V v2753 = v1806 * v2446;
-        const V v2754 = v1674 * v2446;
-        const V v2755 = v1685 * v2446;
-        const V v2756 = v1816 * v2446;
-        const V v2757 = v1826 * v2446;
-        const V v2758 = v1836 * v2446;
-        const V v2759 = v1846 * v2446;
-        const V v2760 = v1864 * v2446;
-        const V v2761 = v1816 * v2447;
-        const V v2762 = v1826 * v2447;
-        const V v2763 = v1836 * v2447;
-        const V v2764 = v1846 * v2447;
-        const V v2765 = v1864 * v2447;
-        const V v2766 = v1860 * v2447;
-        const V v2767 = v1789 * v2447;
-        const V v2768 = v1794 * v2447;
-        const V v2769 = v1798 * v2447;
-        const V v2770 = v1806 * v2447;
-        const V v2771 = v1674 * v2447;
-        const V v2772 = v1685 * v2447;
-        const V v2773 = v1860 * v2448;
-        const V v2774 = v1789 * v2448;
-        const V v2775 = v1794 * v2448;
-        const V v2776 = v1798 * v2448;
-        const V v2777 = v1806 * v2448;
-        const V v2778 = v1674 * v2448;
-        const V v2779 = v1685 * v2448;
-        const V v2780 = v1816 * v2448;
-        const V v2781 = v1826 * v2448;
-        const V v2782 = v1836 * v2448;
-        const V v2783 = v1846 * v2448;
-        const V v2784 = v1864 * v2448;
-        const V v2785 = v1816 * v2449;
-        const V v2786 = v1826 * v2449;
-        const V v2787 = v1836 * v2449;
-        const V v2788 = v1846 * v2449;
-        const V v2789 = v1864 * v2449;
-        const V v2790 = v1816 * v2450;
-        const V v2791 = v1826 * v2450;
-        const V v2792 = v1836 * v2450;
-        const V v2793 = v1846 * v2450;
-        const V v2794 = v1864 * v2450;
-        const V v2795 = v1860 * v2449;
-        const V v2796 = v1860 * v2450;
-        const V v2797 = v1789 * v2449;
-        const V v2798 = v1789 * v2450;
-        const V v2799 = v1794 * v2449;
-        const V v2800 = v1794 * v2450;
-        const V v2801 = v1798 * v2449;
-        const V v2802 = v1798 * v2450;
-        const V v2803 = v1806 * v2449;
-        const V v2804 = v1806 * v2450;
-        const V v2805 = v1674 * v2449;
-        const V v2806 = v1674 * v2450;
-        const V v2807 = v1685 * v2449;
-        const V v2808 = v1685 * v2450;
-        const V v2809 = v1683 * v2502;
-        const V v2810 = v2805 + v2809;
-        const V v2811 = v1683 * v2498;
-        const V v2812 = v2806 + v2811;
-        const V v2813 = v1683 * v2504;
-        const V v2814 = v2807 + v2813;
-        const V v2815 = w[1] * v2810;
-        s1178 += v2815;
-        const V v2816 = w[1] * v2812;
-        s1180 += v2816;
-        const V v2817 = w[1] * v2814;
-        s1179 += v2817;
-        const V v2818 = v1683 * v2500;
-        const V v2819 = v2808 + v2818;
-        const V v2820 = w[1] * v2819;
-        s1181 += v2820;
-        const V v2821 = v1678 * v2502;
-        const V v2822 = v2747 - v2821;
-        const V v2823 = v1678 * v2504;
-        const V v2824 = v2748 - v2823;
-        const V v2825 = w[1] * v2822;
-        s1170 += v2825;
-        const V v2826 = w[1] * v2824;
-        s1171 += v2826;
-        const V v2827 = v1678 * v2498;
-        const V v2828 = v2754 - v2827;
-        const V v2829 = v1678 * v2500;
-        const V v2830 = v2755 - v2829;
-        const V v2831 = w[1] * v2828;
-        s1172 += v2831;
-        const V v2832 = w[1] * v2830;
-        s1173 += v2832;
-        const V v2833 = v1680 * v2502;
-        const V v2834 = v2771 - v2833;
-        const V v2835 = v1680 * v2504;
-        const V v2836 = v2772 - v2835;
-        const V v2837 = v1680 * v2498;
-        const V v2838 = v2778 - v2837;
-        const V v2839 = v1680 * v2500;
-        const V v2840 = v2779 - v2839;
-        const V v2841 = w[1] * v2834;
-        s1174 += v2841;
-        const V v2842 = w[1] * v2836;
-        s1175 += v2842;
-        const V v2843 = w[1] * v2838;
-        s1176 += v2843;
-        const V v2844 = w[1] * v2840;
-        s1177 += v2844;
-        const V v2845 = v1482 * v2734;
-        const V v2846 = v2433 + v2845;
-        const V v2847 = v1484 * v2734;
-        const V v2848 = v2575 + v2847;
-        const V v2849 = v1486 * v2734;
-        const V v2850 = v2576 + v2849;
-        const V v2851 = v1488 * v2734;
-        const V v2852 = v2577 + v2851;
-        const V v2853 = v1490 * v2734;
-        const V v2854 = v2569 + v2853;
-        const V v2855 = v1492 * v2734;
-        const V v2856 = v2570 + v2855;
-        const V v2857 = v2696 * v1629;
-        const V v2858 = v2857 + v2846;
-        const V v2859 = v2686 * v1629;
-        const V v2860 = v2859 + v2848;
-        const V v2861 = v2688 * v1629;
-        const V v2862 = v2861 + v2850;
-        const V v2863 = v2690 * v1629;
-        const V v2864 = v2863 + v2852;
-        const V v2865 = v2698 * v1629;
-        const V v2866 = v2865 + v2854;
-        const V v2867 = w[1] * v2858;
-        s1134 += v2867;
-        const V v2868 = w[1] * v2860;
-        s1135 += v2868;
-        const V v2869 = w[1] * v2862;
-        s1136 += v2869;
-        const V v2870 = w[1] * v2864;
-        s1137 += v2870;
-        const V v2871 = w[1] * v2866;
-        s1138 += v2871;
-        const V v2872 = v2700 * v1629;
-        const V v2873 = v2872 + v2856;
-        const V v2874 = w[1] * v2873;
-        s1139 += v2874;
-        const V v2875 = v1478 * v2734;
-        const V v2876 = v2571 + v2875;
-        const V v2877 = v1480 * v2734;
-        const V v2878 = v2572 + v2877;
-        const V v2879 = v1494 * v2734;
-        const V v2880 = v2573 + v2879;
-        const V v2881 = v1496 * v2734;
-        const V v2882 = v2574 + v2881;
-        const V v2883 = v2702 * v1629;
-        const V v2884 = v2883 + v2876;
-        const V v2885 = w[1] * v2884;
-        s1140 += v2885;
-        const V v2886 = v2692 * v1629;
-        const V v2887 = v2886 + v2878;
-        const V v2888 = w[1] * v2887;
-        s1141 += v2888;
-        const V v2889 = v2694 * v1629;
-        const V v2890 = v2889 + v2880;
-        const V v2891 = v2704 * v1629;
-        const V v2892 = v2891 + v2882;
-        const V v2893 = w[1] * v2890;
-        s1142 += v2893;
-        const V v2894 = w[1] * v2892;
-        s1143 += v2894;
-        const V v2895 = v1478 * v2733;
-        const V v2896 = v2586 + v2895;
-        const V v2897 = v1480 * v2733;
-        const V v2898 = v2581 + v2897;
-        const V v2899 = v1496 * v2733;
-        const V v2900 = v2583 + v2899;
-        const V v2901 = v1482 * v2733;
-        const V v2902 = v2434 + v2901;
-        const V v2903 = v1484 * v2733;
-        const V v2904 = v2578 + v2903;
-        const V v2905 = v2704 * v1630;
-        const V v2906 = v2905 + v2900;
-        const V v2907 = v2702 * v1630;
-        const V v2908 = v2907 + v2896;
-        const V v2909 = w[1] * v2906;
-        s1155 += v2909;
-        const V v2910 = v2692 * v1630;
-        const V v2911 = v2910 + v2898;
-        const V v2912 = w[1] * v2908;
-        s1152 += v2912;
-        const V v2913 = v2696 * v1630;
-        const V v2914 = v2913 + v2902;
-        const V v2915 = w[1] * v2911;
-        s1153 += v2915;
-        const V v2916 = v2686 * v1630;
-        const V v2917 = v2916 + v2904;
-        const V v2918 = w[1] * v2914;
-        s1146 += v2918;
-        const V v2919 = w[1] * v2917;
-        s1147 += v2919;
-        const V v2920 = v1486 * v2733;
-        const V v2921 = v2579 + v2920;
-        const V v2922 = v1488 * v2733;
-        const V v2923 = v2580 + v2922;
-        const V v2924 = v1490 * v2733;
-        const V v2925 = v2584 + v2924;
-        const V v2926 = v2688 * v1630;
-        const V v2927 = v2926 + v2921;
-        const V v2928 = w[1] * v2927;
-        s1148 += v2928;
-        const V v2929 = v2690 * v1630;
-        const V v2930 = v2929 + v2923;
-        const V v2931 = w[1] * v2930;
-        s1149 += v2931;
-        const V v2932 = v2698 * v1630;
-        const V v2933 = v2932 + v2925;
-        const V v2934 = w[1] * v2933;
-        s1150 += v2934;
-        const V v2935 = v1492 * v2733;
-        const V v2936 = v2585 + v2935;
-        const V v2937 = v1494 * v2733;
-        const V v2938 = v2582 + v2937;
-        const V v2939 = v2688 * v1628;
-        const V v2940 = v2939 + v2638;
-        const V v2941 = v2690 * v1628;
-        const V v2942 = v2941 + v2634;
-        const V v2943 = v2698 * v1628;
-        const V v2944 = v2943 + v2556;
-        const V v2945 = v2688 * v1631;
-        const V v2946 = v2640 - v2945;
-        const V v2947 = v2690 * v1631;
-        const V v2948 = v2636 - v2947;
-        const V v2949 = v2698 * v1631;
-        const V v2950 = v2642 - v2949;
-        const V v2951 = v2700 * v1630;
-        const V v2952 = v2951 + v2936;
-        const V v2953 = v2694 * v1630;
-        const V v2954 = v2953 + v2938;
-        const V v2955 = v1631 * v2718;
-        const V v2956 = v2940 + v2955;
-        const V v2957 = v1628 * v2718;
-        const V v2958 = v2946 + v2957;
-        const V v2959 = v1631 * v2720;
-        const V v2960 = v2942 + v2959;
-        const V v2961 = v1628 * v2720;
-        const V v2962 = v2948 + v2961;
-        const V v2963 = w[1] * v2952;
-        s1151 += v2963;
-        const V v2964 = w[1] * v2954;
-        s1154 += v2964;
-        const V v2965 = v1631 * v2708;
-        const V v2966 = v2944 + v2965;
-        const V v2967 = v2700 * v1628;
-        const V v2968 = v2967 + v2558;
-        const V v2969 = v2700 * v1631;
-        const V v2970 = v2628 - v2969;
-        const V v2971 = v1535 * v2524;
-        const V v2972 = v2971 + v2956;
-        const V v2973 = v1535 * v2523;
-        const V v2974 = v2958 - v2973;
-        const V v2975 = v1528 * v2524;
-        const V v2976 = v2975 + v2960;
-        const V v2977 = v1528 * v2523;
-        const V v2978 = v2962 - v2977;
-        const V v2979 = v1534 * v2524;
-        const V v2980 = v2979 + v2966;
-        const V v2981 = v1534 * v2523;
-        const V v2982 = v2950 - v2981;
-        const V v2983 = v1541 * v2524;
-        const V v2984 = v2983 + v2968;
-        const V v2985 = v1541 * v2523;
-        const V v2986 = v2970 - v2985;
-        const V v2987 = v1628 * v2708;
-        const V v2988 = v2982 + v2987;
-        const V v2989 = v1329 * v2972;
-        const V v2990 = v1329 * v2976;
-        const V v2991 = v1329 * v2974;
-        const V v2992 = v1329 * v2978;
-        const V v2993 = v1628 * v2710;
-        const V v2994 = v2986 + v2993;
-        const V v2995 = v1631 * v2710;
-        const V v2996 = v2984 + v2995;
-        const V v2997 = v1329 * v2988;
-        const V v2998 = v1486 * v2443;
-        const V v2999 = v2989 - v2998;
-        const V v3000 = v1488 * v2443;
-        const V v3001 = v2990 - v3000;
-        const V v3002 = v1486 * v2444;
-        const V v3003 = v2991 - v3002;
-        const V v3004 = v1488 * v2444;
-        const V v3005 = v2992 - v3004;
-        const V v3006 = v1329 * v2994;
-        const V v3007 = w[1] * v2999;
-        s1244 += v3007;
-        const V v3008 = w[1] * v3001;
-        s1245 += v3008;
-        const V v3009 = w[1] * v3003;
-        s1254 += v3009;
-        const V v3010 = w[1] * v3005;
-        s1255 += v3010;
-        const V v3011 = v1490 * v2444;
-        const V v3012 = v2997 - v3011;
-        const V v3013 = v1492 * v2431;
-        const V v3014 = v3013 + v2996;
-        const V v3015 = v1492 * v2444;
-        const V v3016 = v3006 - v3015;
-        const V v3017 = v1490 * v2431;
-        const V v3018 = v3017 + v2980;
-        const V v3019 = w[1] * v3012;
-        s1256 += v3019;
-        const V v3020 = w[1] * v3016;
-        s1257 += v3020;
-        const V v3021 = v1329 * v3014;
-        const V v3022 = v1329 * v3018;
-        const V v3023 = v1482 * v2431;
-        const V v3024 = v3023 + v2552;
-        const V v3025 = v1332 * v3014;
-        const V v3026 = v2651 + v3025;
-        const V v3027 = w[1] * v3026;
-        s1207 += v3027;
-        const V v3028 = v1332 * v3018;
-        const V v3029 = v2648 + v3028;
-        const V v3030 = w[1] * v3029;
-        s1206 += v3030;
-        const V v3031 = v1332 * v2972;
-        const V v3032 = v2646 + v3031;
-        const V v3033 = w[1] * v3032;
-        s1204 += v3033;
-        const V v3034 = v1492 * v2443;
-        const V v3035 = v3021 - v3034;
-        const V v3036 = v1490 * v2443;
-        const V v3037 = v3022 - v3036;
-        const V v3038 = w[1] * v3035;
-        s1247 += v3038;
-        const V v3039 = w[1] * v3037;
-        s1246 += v3039;
-        const V v3040 = v1530 * v2524;
-        const V v3041 = v3040 + v3024;
-        const V v3042 = v1530 * v2523;
-        const V v3043 = v2554 - v3042;
-        const V v3044 = v1332 * v2976;
-        const V v3045 = v2647 + v3044;
-        const V v3046 = w[1] * v3045;
-        s1205 += v3046;
-        const V v3047 = v1332 * v2974;
-        const V v3048 = v2662 + v3047;
-        const V v3049 = w[1] * v3048;
-        s1214 += v3049;
-        const V v3050 = v1332 * v2978;
-        const V v3051 = v2663 + v3050;
-        const V v3052 = w[1] * v3051;
-        s1215 += v3052;
-        const V v3053 = v2696 * v1628;
-        const V v3054 = v3053 + v3041;
-        const V v3055 = v2696 * v1631;
-        const V v3056 = v3043 - v3055;
-        const V v3057 = v1332 * v2988;
-        const V v3058 = v2656 + v3057;
-        const V v3059 = w[1] * v3058;
-        s1216 += v3059;
-        const V v3060 = v1631 * v2706;
-        const V v3061 = v3054 + v3060;
-        const V v3062 = v1628 * v2706;
-        const V v3063 = v3056 + v3062;
-        const V v3064 = v1332 * v2994;
-        const V v3065 = v2657 + v3064;
-        const V v3066 = w[1] * v3065;
-        s1217 += v3066;
-        const V v3067 = v1333 * v2974;
-        const V v3068 = v2681 + v3067;
-        const V v3069 = v1333 * v2978;
-        const V v3070 = v2682 + v3069;
-        const V v3071 = w[1] * v3068;
-        s1234 += v3071;
-        const V v3072 = w[1] * v3070;
-        s1235 += v3072;
-        const V v3073 = v1332 * v3061;
-        const V v3074 = v2650 + v3073;
-        const V v3075 = v1333 * v3061;
-        const V v3076 = v2670 + v3075;
-        const V v3077 = w[1] * v3074;
-        s1202 += v3077;
-        const V v3078 = w[1] * v3076;
-        s1222 += v3078;
-        const V v3079 = v1333 * v2994;
-        const V v3080 = v2677 + v3079;
-        const V v3081 = v1482 * v2432;
-        const V v3082 = v3081 + v3063;
-        const V v3083 = w[1] * v3080;
-        s1237 += v3083;
-        const V v3084 = v1329 * v3061;
-        const V v3085 = v1329 * v3082;
-        const V v3086 = v1482 * v2443;
-        const V v3087 = v3084 - v3086;
-        const V v3088 = w[1] * v3087;
-        s1242 += v3088;
-        const V v3089 = v1332 * v3082;
-        const V v3090 = v2655 + v3089;
-        const V v3091 = v1333 * v3082;
-        const V v3092 = v2675 + v3091;
-        const V v3093 = w[1] * v3090;
-        s1212 += v3093;
-        const V v3094 = w[1] * v3092;
-        s1232 += v3094;
-        const V v3095 = v1333 * v2972;
-        const V v3096 = v2666 + v3095;
-        const V v3097 = w[1] * v3096;
-        s1224 += v3097;
-        const V v3098 = v1482 * v2444;
-        const V v3099 = v3085 - v3098;
-        const V v3100 = w[1] * v3099;
-        s1252 += v3100;
-        const V v3101 = v1333 * v2976;
-        const V v3102 = v2667 + v3101;
-        const V v3103 = w[1] * v3102;
-        s1225 += v3103;
-        const V v3104 = v1333 * v3018;
-        const V v3105 = v2671 + v3104;
-        const V v3106 = w[1] * v3105;
-        s1226 += v3106;
-        const V v3107 = v1333 * v3014;
-        const V v3108 = v2672 + v3107;
-        const V v3109 = w[1] * v3108;
-        s1227 += v3109;
-        const V v3110 = v1333 * v2988;
-        const V v3111 = v2676 + v3110;
-        const V v3112 = w[1] * v3111;
-        s1236 += v3112;
-        const V v3113 = v1678 * v2972;
-        const V v3114 = v2739 - v3113;
-        const V v3115 = v1678 * v2976;
-        const V v3116 = v2740 - v3115;
-        const V v3117 = w[1] * v3114;
-        s1264 += v3117;
-        const V v3118 = w[1] * v3116;
-        s1265 += v3118;
-        const V v3119 = v1678 * v3018;
-        const V v3120 = v2741 - v3119;
-        const V v3121 = v1678 * v3014;
-        const V v3122 = v2742 - v3121;
-        const V v3123 = w[1] * v3120;
-        s1266 += v3123;
-        const V v3124 = w[1] * v3122;
-        s1267 += v3124;
-        const V v3125 = v1678 * v2988;
-        const V v3126 = v2749 - v3125;
-        const V v3127 = w[1] * v3126;
-        s1276 += v3127;
-        const V v3128 = v1678 * v3061;
-        const V v3129 = v2737 - v3128;
-        const V v3130 = w[1] * v3129;
-        s1262 += v3130;
-        const V v3131 = v1678 * v3082;
-        const V v3132 = v2756 - v3131;
-        const V v3133 = w[1] * v3132;
-        s1272 += v3133;
-        const V v3134 = v1678 * v2974;
-        const V v3135 = v2758 - v3134;
-        const V v3136 = w[1] * v3135;
-        s1274 += v3136;
-        const V v3137 = v1678 * v2978;
-        const V v3138 = v2759 - v3137;
-        const V v3139 = w[1] * v3138;
-        s1275 += v3139;
-        const V v3140 = v1678 * v2994;
-        const V v3141 = v2760 - v3140;
-        const V v3142 = w[1] * v3141;
-        s1277 += v3142;
-        const V v3143 = v1680 * v3061;
-        const V v3144 = v2761 - v3143;
-        const V v3145 = v1680 * v3082;
-        const V v3146 = v2780 - v3145;
-        const V v3147 = w[1] * v3144;
-        s1282 += v3147;
-        const V v3148 = w[1] * v3146;
-        s1292 += v3148;
-        const V v3149 = v1680 * v2974;
-        const V v3150 = v2782 - v3149;
-        const V v3151 = v1680 * v2978;
-        const V v3152 = v2783 - v3151;
-        const V v3153 = w[1] * v3150;
-        s1294 += v3153;
-        const V v3154 = w[1] * v3152;
-        s1295 += v3154;
-        const V v3155 = v1680 * v2994;
-        const V v3156 = v2784 - v3155;
-        const V v3157 = v1683 * v3061;
-        const V v3158 = v2785 + v3157;
-        const V v3159 = v1683 * v3082;
-        const V v3160 = v2790 + v3159;
-        const V v3161 = v1683 * v2974;
-        const V v3162 = v2792 + v3161;
-        const V v3163 = v1683 * v2978;
-        const V v3164 = v2793 + v3163;
-        const V v3165 = v1683 * v2994;
-        const V v3166 = v2794 + v3165;
-        const V v3167 = w[1] * v3156;
-        s1297 += v3167;
-        const V v3168 = w[1] * v3158;
-        s1302 += v3168;
-        const V v3169 = w[1] * v3160;
-        s1312 += v3169;
-        const V v3170 = w[1] * v3162;
-        s1314 += v3170;
-        const V v3171 = w[1] * v3164;
-        s1315 += v3171;
-        const V v3172 = w[1] * v3166;
-        s1317 += v3172;
-        const V v3173 = v1680 * v2972;
-        const V v3174 = v2763 - v3173;
-        const V v3175 = v1683 * v2972;
-        const V v3176 = v2787 + v3175;
-        const V v3177 = w[1] * v3174;
-        s1284 += v3177;
-        const V v3178 = w[1] * v3176;
-        s1304 += v3178;
-        const V v3179 = v1680 * v2976;
-        const V v3180 = v2764 - v3179;
-        const V v3181 = v1683 * v2976;
-        const V v3182 = v2788 + v3181;
-        const V v3183 = w[1] * v3180;
-        s1285 += v3183;
-        const V v3184 = w[1] * v3182;
-        s1305 += v3184;
-        const V v3185 = v1680 * v3018;
-        const V v3186 = v2766 - v3185;
-        const V v3187 = v1683 * v3018;
-        const V v3188 = v2795 + v3187;
-        const V v3189 = w[1] * v3186;
-        s1286 += v3189;
-        const V v3190 = w[1] * v3188;
-        s1306 += v3190;
-        const V v3191 = v1680 * v3014;
-        const V v3192 = v2765 - v3191;
-        const V v3193 = v1683 * v3014;
-        const V v3194 = v2789 + v3193;
-        const V v3195 = w[1] * v3192;
-        s1287 += v3195;
-        const V v3196 = w[1] * v3194;
-        s1307 += v3196;
-        const V v3197 = v1680 * v2988;
-        const V v3198 = v2773 - v3197;
-        const V v3199 = v1683 * v2988;
-        const V v3200 = v2796 + v3199;
-        const V v3201 = w[1] * v3198;
-        s1296 += v3201;
-        const V v3202 = w[1] * v3200;
-        s1316 += v3202;
-        const V v3203 = v1526 * v2524;
-        const V v3204 = v3203 + v2632;
-        const V v3205 = v1526 * v2523;
-        const V v3206 = v2630 - v3205;
-        const V v3207 = v1521 * v2524;
-        const V v3208 = v3207 + v2560;
-        const V v3209 = v1521 * v2523;
-        const V v3210 = v2608 - v3209;
-        const V v3211 = v1545 * v2524;
-        const V v3212 = v3211 + v2562;
-        const V v3213 = v1545 * v2523;
-        const V v3214 = v2610 - v3213;
-        const V v3215 = v1547 * v2524;
-        const V v3216 = v3215 + v2564;
-        const V v3217 = v1547 * v2523;
-        const V v3218 = v2644 - v3217;
-        const V v3219 = v1522 * v2524;
-        const V v3220 = v3219 + v2566;
-        const V v3221 = v1522 * v2523;
-        const V v3222 = v2568 - v3221;
-        const V v3223 = v2686 * v1628;
-        const V v3224 = v3223 + v3204;
-        const V v3225 = v2686 * v1631;
-        const V v3226 = v3206 - v3225;
-        const V v3227 = v2702 * v1628;
-        const V v3228 = v3227 + v3208;
-        const V v3229 = v2702 * v1631;
-        const V v3230 = v3210 - v3229;
-        const V v3231 = v2692 * v1628;
-        const V v3232 = v3231 + v3212;
-        const V v3233 = v2692 * v1631;
-        const V v3234 = v3214 - v3233;
-        const V v3235 = v2694 * v1628;
-        const V v3236 = v3235 + v3216;
-        const V v3237 = v2694 * v1631;
-        const V v3238 = v3218 - v3237;
-        const V v3239 = v1631 * v2716;
-        const V v3240 = v3224 + v3239;
-        const V v3241 = v1628 * v2716;
-        const V v3242 = v3226 + v3241;
-        const V v3243 = v2704 * v1628;
-        const V v3244 = v3243 + v3220;
-        const V v3245 = v2704 * v1631;
-        const V v3246 = v3222 - v3245;
-        const V v3247 = v1631 * v2712;
-        const V v3248 = v3228 + v3247;
-        const V v3249 = v1628 * v2712;
-        const V v3250 = v3230 + v3249;
-        const V v3251 = v1628 * v2724;
-        const V v3252 = v3238 + v3251;
-        const V v3253 = v1631 * v2724;
-        const V v3254 = v3236 + v3253;
-        const V v3255 = v1631 * v2722;
-        const V v3256 = v3232 + v3255;
-        const V v3257 = v1628 * v2722;
-        const V v3258 = v3234 + v3257;
-        const V v3259 = v1631 * v2714;
-        const V v3260 = v3244 + v3259;
-        const V v3261 = v1628 * v2714;
-        const V v3262 = v3246 + v3261;
-        const V v3263 = v1478 * v2431;
-        const V v3264 = v3263 + v3248;
-        const V v3265 = v1478 * v2432;
-        const V v3266 = v3265 + v3250;
-        const V v3267 = v1494 * v2431;
-        const V v3268 = v3267 + v3254;
-        const V v3269 = v1480 * v2431;
-        const V v3270 = v3269 + v3256;
-        const V v3271 = v1480 * v2432;
-        const V v3272 = v3271 + v3258;
-        const V v3273 = v1496 * v2431;
-        const V v3274 = v3273 + v3260;
-        const V v3275 = v1496 * v2432;
-        const V v3276 = v3275 + v3262;
-        const V v3277 = v1329 * v3252;
-        const V v3278 = v1329 * v3264;
-        const V v3279 = v1329 * v3266;
-        const V v3280 = v1329 * v3268;
-        const V v3281 = v1329 * v3270;
-        const V v3282 = v1329 * v3272;
-        const V v3283 = v1329 * v3274;
-        const V v3284 = v1329 * v3276;
-        const V v3285 = v1494 * v2444;
-        const V v3286 = v3277 - v3285;
-        const V v3287 = v1478 * v2444;
-        const V v3288 = v3279 - v3287;
-        const V v3289 = v1494 * v2443;
-        const V v3290 = v3280 - v3289;
-        const V v3291 = v1480 * v2443;
-        const V v3292 = v3281 - v3291;
-        const V v3293 = v1480 * v2444;
-        const V v3294 = v3282 - v3293;
-        const V v3295 = v1496 * v2443;
-        const V v3296 = v3283 - v3295;
-        const V v3297 = v1496 * v2444;
-        const V v3298 = v3284 - v3297;
-        const V v3299 = w[1] * v3286;
-        s1260 += v3299;
-        const V v3300 = w[1] * v3288;
-        s1258 += v3300;
-        const V v3301 = w[1] * v3290;
-        s1250 += v3301;
-        const V v3302 = w[1] * v3292;
-        s1249 += v3302;
-        const V v3303 = w[1] * v3294;
-        s1259 += v3303;
-        const V v3304 = w[1] * v3296;
-        s1251 += v3304;
-        const V v3305 = w[1] * v3298;
-        s1261 += v3305;
-        const V v3306 = v1478 * v2443;
-        const V v3307 = v3278 - v3306;
-        const V v3308 = w[1] * v3307;
-        s1248 += v3308;
-        const V v3309 = v1332 * v3276;
-        const V v3310 = v2660 + v3309;
-        const V v3311 = w[1] * v3310;
-        s1221 += v3311;
-        const V v3312 = v1332 * v3240;
-        const V v3313 = v2645 + v3312;
-        const V v3314 = w[1] * v3313;
-        s1203 += v3314;
-        const V v3315 = v1329 * v3240;
-        const V v3316 = v1329 * v3242;
-        const V v3317 = v1332 * v3242;
-        const V v3318 = v2661 + v3317;
-        const V v3319 = v1484 * v2443;
-        const V v3320 = v3315 - v3319;
-        const V v3321 = v1484 * v2444;
-        const V v3322 = v3316 - v3321;
-        const V v3323 = w[1] * v3318;
-        s1213 += v3323;
-        const V v3324 = w[1] * v3320;
-        s1243 += v3324;
-        const V v3325 = w[1] * v3322;
-        s1253 += v3325;
-        const V v3326 = v1332 * v3264;
-        const V v3327 = v2652 + v3326;
-        const V v3328 = w[1] * v3327;
-        s1208 += v3328;
-        const V v3329 = v1332 * v3270;
-        const V v3330 = v2653 + v3329;
-        const V v3331 = w[1] * v3330;
-        s1209 += v3331;
-        const V v3332 = v1332 * v3268;
-        const V v3333 = v2649 + v3332;
-        const V v3334 = w[1] * v3333;
-        s1210 += v3334;
-        const V v3335 = v1332 * v3274;
-        const V v3336 = v2654 + v3335;
-        const V v3337 = w[1] * v3336;
-        s1211 += v3337;
-        const V v3338 = v1332 * v3266;
-        const V v3339 = v2658 + v3338;
-        const V v3340 = w[1] * v3339;
-        s1218 += v3340;
-        const V v3341 = v1332 * v3272;
-        const V v3342 = v2659 + v3341;
-        const V v3343 = v1332 * v3252;
-        const V v3344 = v2664 + v3343;
-        const V v3345 = w[1] * v3342;
-        s1219 += v3345;
-        const V v3346 = w[1] * v3344;
-        s1220 += v3346;
-        const V v3347 = v1333 * v3264;
-        const V v3348 = v2673 + v3347;
-        const V v3349 = v1333 * v3270;
-        const V v3350 = v2668 + v3349;
-        const V v3351 = w[1] * v3348;
-        s1228 += v3351;
-        const V v3352 = w[1] * v3350;
-        s1229 += v3352;
-        const V v3353 = v1333 * v3268;
-        const V v3354 = v2669 + v3353;
-        const V v3355 = v1333 * v3274;
-        const V v3356 = v2674 + v3355;
-        const V v3357 = w[1] * v3354;
-        s1230 += v3357;
-        const V v3358 = w[1] * v3356;
-        s1231 += v3358;
-        const V v3359 = v1333 * v3266;
-        const V v3360 = v2678 + v3359;
-        const V v3361 = v1333 * v3272;
-        const V v3362 = v2683 + v3361;
-        const V v3363 = w[1] * v3360;
-        s1238 += v3363;
-        const V v3364 = w[1] * v3362;
-        s1239 += v3364;
-        const V v3365 = v1333 * v3240;
-        const V v3366 = v2665 + v3365;
-        const V v3367 = w[1] * v3366;
-        s1223 += v3367;
-        const V v3368 = v1333 * v3242;
-        const V v3369 = v2680 + v3368;
-        const V v3370 = w[1] * v3369;
-        s1233 += v3370;
-        const V v3371 = v1333 * v3252;
-        const V v3372 = v2684 + v3371;
-        const V v3373 = v1333 * v3276;
-        const V v3374 = v2679 + v3373;
-        const V v3375 = w[1] * v3372;
-        s1240 += v3375;
-        const V v3376 = w[1] * v3374;
-        s1241 += v3376;
-        const V v3377 = v1678 * v3240;
-        const V v3378 = v2738 - v3377;
-        const V v3379 = v1678 * v3242;
-        const V v3380 = v2757 - v3379;
-        const V v3381 = w[1] * v3378;
-        s1263 += v3381;
-        const V v3382 = w[1] * v3380;
-        s1273 += v3382;
-        const V v3383 = v1678 * v3266;
-        const V v3384 = v2750 - v3383;
-        const V v3385 = v1678 * v3252;
-        const V v3386 = v2752 - v3385;
-        const V v3387 = w[1] * v3384;
-        s1278 += v3387;
-        const V v3388 = w[1] * v3386;
-        s1280 += v3388;
-        const V v3389 = v1678 * v3276;
-        const V v3390 = v2753 - v3389;
-        const V v3391 = w[1] * v3390;
-        s1281 += v3391;
-        const V v3392 = v1678 * v3264;
-        const V v3393 = v2743 - v3392;
-        const V v3394 = w[1] * v3393;
-        s1268 += v3394;
-        const V v3395 = v1678 * v3270;
-        const V v3396 = v2744 - v3395;
-        const V v3397 = w[1] * v3396;
-        s1269 += v3397;
-        const V v3398 = v1678 * v3268;
-        const V v3399 = v2745 - v3398;
-        const V v3400 = w[1] * v3399;
-        s1270 += v3400;
-        const V v3401 = v1678 * v3274;
-        const V v3402 = v2746 - v3401;
-        const V v3403 = v1678 * v3272;
-        const V v3404 = v2751 - v3403;
-        const V v3405 = w[1] * v3402;
-        s1271 += v3405;
-        const V v3406 = w[1] * v3404;
-        s1279 += v3406;
-        const V v3407 = v1680 * v3264;
-        const V v3408 = v2767 - v3407;
-        const V v3409 = v1680 * v3270;
-        const V v3410 = v2768 - v3409;
-        const V v3411 = w[1] * v3408;
-        s1288 += v3411;
-        const V v3412 = w[1] * v3410;
-        s1289 += v3412;
-        const V v3413 = v1680 * v3268;
-        const V v3414 = v2769 - v3413;
-        const V v3415 = v1680 * v3274;
-        const V v3416 = v2770 - v3415;
-        const V v3417 = w[1] * v3414;
-        s1290 += v3417;
-        const V v3418 = w[1] * v3416;
-        s1291 += v3418;
-        const V v3419 = v1680 * v3272;
-        const V v3420 = v2775 - v3419;
-        const V v3421 = v1683 * v3264;
-        const V v3422 = v2797 + v3421;
-        const V v3423 = v1683 * v3270;
-        const V v3424 = v2799 + v3423;
-        const V v3425 = v1683 * v3268;
-        const V v3426 = v2801 + v3425;
-        const V v3427 = v1683 * v3274;
-        const V v3428 = v2803 + v3427;
-        const V v3429 = v1683 * v3272;
-        const V v3430 = v2800 + v3429;
-        const V v3431 = w[1] * v3420;
-        s1299 += v3431;
-        const V v3432 = w[1] * v3422;
-        s1308 += v3432;
-        const V v3433 = w[1] * v3424;
-        s1309 += v3433;
-        const V v3434 = w[1] * v3426;
-        s1310 += v3434;
-        const V v3435 = w[1] * v3428;
-        s1311 += v3435;
-        const V v3436 = w[1] * v3430;
-        s1319 += v3436;
-        const V v3437 = v1680 * v3240;
-        const V v3438 = v2762 - v3437;
-        const V v3439 = v1683 * v3240;
-        const V v3440 = v2786 + v3439;
-        const V v3441 = w[1] * v3438;
-        s1283 += v3441;
-        const V v3442 = w[1] * v3440;
-        s1303 += v3442;
-        const V v3443 = v1680 * v3242;
-        const V v3444 = v2781 - v3443;
-        const V v3445 = v1683 * v3242;
-        const V v3446 = v2791 + v3445;
-        const V v3447 = w[1] * v3444;
-        s1293 += v3447;
-        const V v3448 = w[1] * v3446;
-        s1313 += v3448;
-        const V v3449 = v1680 * v3266;
-        const V v3450 = v2774 - v3449;
-        const V v3451 = v1683 * v3266;
-        const V v3452 = v2798 + v3451;
-        const V v3453 = w[1] * v3450;
-        s1298 += v3453;
-        const V v3454 = w[1] * v3452;
-        s1318 += v3454;
-        const V v3455 = v1680 * v3252;
-        const V v3456 = v2776 - v3455;
-        const V v3457 = v1683 * v3252;
-        const V v3458 = v2802 + v3457;
-        const V v3459 = w[1] * v3456;
-        s1300 += v3459;
-        const V v3460 = w[1] * v3458;
-        s1320 += v3460;
-        const V v3461 = v1680 * v3276;
-        const V v3462 = v2777 - v3461;
-        const V v3463 = v1683 * v3276;
-        const V v3464 = v2804 + v3463;
-        const V v3465 = w[1] * v3462;
-        s1301 += v3465;
-        const V v3466 = w[1] * v3464;
-        s1321 += v3466;
-        const V v3467 = v1482 * v2736;
-        const V v3468 = v2435 + v3467;
-        const V v3469 = v1482 * v2735;
-        const V v3470 = v2436 + v3469;
-        const V v3471 = v1484 * v2736;
-        const V v3472 = v2599 + v3471;
-        const V v3473 = v1484 * v2735;
-        const V v3474 = v2600 + v3473;
-        const V v3475 = v1486 * v2736;
-        const V v3476 = v2587 + v3475;
-        const V v3477 = v1486 * v2735;
-        const V v3478 = v2594 + v3477;
-        const V v3479 = v1629 * v2706;
-        const V v3480 = v3468 + v3479;
-        const V v3481 = v1630 * v2706;
-        const V v3482 = v3470 + v3481;
-        const V v3483 = w[1] * v3480;
-        s1182 += v3483;
-        const V v3484 = v1629 * v2716;
-        const V v3485 = v3472 + v3484;
-        const V v3486 = v1630 * v2716;
-        const V v3487 = v3474 + v3486;
-        const V v3488 = w[1] * v3482;
-        s1192 += v3488;
-        const V v3489 = v1629 * v2718;
-        const V v3490 = v3476 + v3489;
-        const V v3491 = v1630 * v2718;
-        const V v3492 = v3478 + v3491;
-        const V v3493 = w[1] * v3485;
-        s1183 += v3493;
-        const V v3494 = w[1] * v3487;
-        s1193 += v3494;
-        const V v3495 = w[1] * v3490;
-        s1184 += v3495;
-        const V v3496 = w[1] * v3492;
-        s1194 += v3496;
-        const V v3497 = v1488 * v2736;
-        const V v3498 = v2601 + v3497;
-        const V v3499 = v1488 * v2735;
-        const V v3500 = v2603 + v3499;
-        const V v3501 = v1629 * v2720;
-        const V v3502 = v3498 + v3501;
-        const V v3503 = v1630 * v2720;
-        const V v3504 = v3500 + v3503;
-        const V v3505 = w[1] * v3502;
-        s1185 += v3505;
-        const V v3506 = w[1] * v3504;
-        s1195 += v3506;
-        const V v3507 = v1490 * v2736;
-        const V v3508 = v2588 + v3507;
-        const V v3509 = v1490 * v2735;
-        const V v3510 = v2595 + v3509;
-        const V v3511 = v1629 * v2708;
-        const V v3512 = v3508 + v3511;
-        const V v3513 = v1630 * v2708;
-        const V v3514 = v3510 + v3513;
-        const V v3515 = w[1] * v3512;
-        s1186 += v3515;
-        const V v3516 = w[1] * v3514;
-        s1196 += v3516;
-        const V v3517 = v1492 * v2736;
-        const V v3518 = v2589 + v3517;
-        const V v3519 = v1492 * v2735;
-        const V v3520 = v2596 + v3519;
-        const V v3521 = v1629 * v2710;
-        const V v3522 = v3518 + v3521;
-        const V v3523 = v1630 * v2710;
-        const V v3524 = v3520 + v3523;
-        const V v3525 = w[1] * v3522;
-        s1187 += v3525;
-        const V v3526 = w[1] * v3524;
-        s1197 += v3526;
-        const V v3527 = v1478 * v2736;
-        const V v3528 = v2590 + v3527;
-        const V v3529 = v1478 * v2735;
-        const V v3530 = v2597 + v3529;
-        const V v3531 = v1629 * v2712;
-        const V v3532 = v3528 + v3531;
-        const V v3533 = v1630 * v2712;
-        const V v3534 = v3530 + v3533;
-        const V v3535 = w[1] * v3532;
-        s1188 += v3535;
-        const V v3536 = w[1] * v3534;
-        s1198 += v3536;
-        const V v3537 = v1480 * v2736;
-        const V v3538 = v2602 + v3537;
-        const V v3539 = v1480 * v2735;
-        const V v3540 = v2604 + v3539;
-        const V v3541 = v1629 * v2722;
-        const V v3542 = v3538 + v3541;
-        const V v3543 = v1630 * v2722;
-        const V v3544 = v3540 + v3543;
-        const V v3545 = w[1] * v3542;
-        s1189 += v3545;
-        const V v3546 = w[1] * v3544;
-        s1199 += v3546;
-        const V v3547 = v1494 * v2736;
-        const V v3548 = v2591 + v3547;
-        const V v3549 = v1494 * v2735;
-        const V v3550 = v2598 + v3549;
-        const V v3551 = v1496 * v2736;
-        const V v3552 = v2592 + v3551;
-        const V v3553 = v1496 * v2735;
-        const V v3554 = v2593 + v3553;
-        const V v3555 = v1629 * v2724;
-        const V v3556 = v3548 + v3555;
-        const V v3557 = v1630 * v2724;
-        const V v3558 = v3550 + v3557;
-        const V v3559 = v1629 * v2714;
-        const V v3560 = v3552 + v3559;
-        const V v3561 = v1630 * v2714;
-        const V v3562 = v3554 + v3561;
-        const V v3563 = w[1] * v3556;
-        s1190 += v3563;
-        const V v3564 = w[1] * v3558;
-        s1200 += v3564;
-        const V v3565 = w[1] * v3560;
-        s1191 += v3565;
-        const V v3566 = w[1] * v3562;
-        s1201 += v3566;
+        s568 += v1061; s569 += v1062; s570 += v1063; s571 += v1064; s572 += v1065; s573 += v1066;
+        s574 += v1067; s575 += v1068; s576 += v1069; s577 += v1070; s578 += v1071; s579 += v1072;
+        s580 += v1073; s581 += v1074; s582 += v1075; s583 += v1076; s584 += v1077; s585 += v1078;
+        s586 += v1079; s587 += v1080; s588 += v1081; s589 += v1082; s590 += v1083; s591 += v1084;
+        s594 += v1086; s595 += v1087; s598 += v1088; s599 += v1089;
+        const V v1335 = v1091 + v1090, v1336 = v1093 + v1092, v1337 = softehl_vsqrt(1.0 / v958),
+            v1338 = v1096 + v1095, v1339 = v1098 + v1097,
+            v1340 = (v24 * v830 + (v22 * v829 + (v931 + v932)) - X5 * v835) * (v988 * v557),
+            v1341 = v1029 * v1085, v1342 = v1030 * v1085, v1343 = v959 * v964, v1344 = w[1] * v1058,
+            v1345 = v46 * w[1], v1346 = w[1] * v1059, v1347 = w[1] * v1335,
+            v1348 = v1058 * v991 + v1335 * v994, v1349 = v1335 * v991 - v1058 * v994,
+            v1350 = v1345 * v926, v1351 = v1345 * v925, v1352 = v1059 * v991 + v1336 * v994,
+            v1353 = w[1] * v1336, v1354 = v1336 * v991 - v1059 * v994,
+            v1355 = v1340 + 2.0 * (v39 * v955 + v34 * v956) * (v1337 * (v559 * v964)),
+            v1356 = w[1] * v992;
+        s612 += v1347 * v992; s614 += v1347 * v993; const V v1357 = w[1] * v993;
+        s613 += v1353 * v992; s615 += v1353 * v993; s562 += v1344 * v992; s564 += v1344 * v993;
+        s563 += v1346 * v992; s565 += v1346 * v993;
+        const V v1358 = v1057 * v1355, v1359 = v1057 * v989, v1360 = v1057 * v1343,
+            v1361 = v1060 * v989, v1362 = v1060 * v1343, v1363 = v1060 * v1355, v1364 = 0.5 * v1359,
+            v1365 = 0.5 * v1361;
+        s560 += v1350 * v1359; s566 += v1350 * v1361; s561 += v1351 * v1359; s567 += v1351 * v1361;
+        const V v1366 = v852 * v1057 + v851 * v1060, v1367 = v852 * v1060 - v851 * v1057,
+            v1368 = v928 * v1362, v1369 = v928 * v1360, v1370 = v929 * v1360, v1371 = v929 * v1362,
+            v1372 = v1366 * v989, v1373 = v1367 * v989, v1374 = v1366 * v1343,
+            v1375 = v1367 * v1343, v1376 = v1366 * v1355, v1377 = v1367 * v1355,
+            v1378 = v934 * v1373, v1379 = v934 * v1372, v1380 = v935 * v1372, v1381 = v935 * v1373,
+            v1382 = v835 * v1372, v1383 = v835 * v1373, v1384 = v1011 * v1372,
+            v1385 = v1011 * v1373, v1386 = v1016 * v1372, v1387 = v1016 * v1373,
+            v1388 = v1007 * v1372, v1389 = v1007 * v1373;
+        s604 += v1020 * v1373; s605 += v1020 * v1372; s606 += v960 * v1373; s607 += v960 * v1372;
+        s608 += v961 * v1373; s609 += v961 * v1372; s610 += v962 * v1373; s611 += v962 * v1372;
+        s601 += v1019 * v1372; s603 += v1021 * v1372; s600 += v1019 * v1373; s602 += v1021 * v1373;
+        s616 += v962 * v1348; s620 += v961 * v1348; s632 += v1021 * v1348; s636 += v1019 * v1348;
+        s617 += v962 * v1352; s621 += v961 * v1352; s633 += v1021 * v1352; s637 += v1019 * v1352;
+        s618 += v962 * v1349; s622 += v961 * v1349; s634 += v1021 * v1349; s635 += v1021 * v1354;
+        s619 += v962 * v1354; s623 += v961 * v1354; s638 += v1019 * v1349; s639 += v1019 * v1354;
+        s625 += v960 * v1352; s626 += v960 * v1349; s627 += v960 * v1354; s629 += v1020 * v1352;
+        s630 += v1020 * v1349; s631 += v1020 * v1354; s628 += v1020 * v1348; s624 += v960 * v1348;
+        s592 += v1341 * v1356; s593 += v1342 * v1356; s596 += v1341 * v1357; s597 += v1342 * v1357;
+        s650 += v1338 * v1356; s651 += v1339 * v1356; s662 += v1338 * v1357; s663 += v1339 * v1357;
+        const V v1390 = v1338 * v991 - v1341 * v994, v1391 = v1339 * v991 - v1342 * v994,
+            v1392 = v1341 * v991 + v1338 * v994, v1393 = v1342 * v991 + v1339 * v994;
+        s666 += v962 * v1390; s667 += v962 * v1391; s664 += v962 * v1392; s665 += v962 * v1393;
+        const V v1394 = (v859 * v1057 - v856 * v1060) * v989,
+            v1395 = (v856 * v1057 + v859 * v1060) * v989,
+            v1396 = (v858 * v1057 + v857 * v1060) * v989,
+            v1397 = (v858 * v1060 - v857 * v1057) * v989;
+        s668 += v961 * v1392; s669 += v961 * v1393; s670 += v961 * v1390; s671 += v961 * v1391;
+        s672 += v960 * v1392; s673 += v960 * v1393; s674 += v960 * v1390; s675 += v960 * v1391;
+        const V v1398 = v918 * v1094 + v1048 * v1085, v1399 = v919 * v1094 + v1050 * v1085,
+            v1400 = v920 * v1094 + v1052 * v1085, v1401 = v916 * v1094 + v1040 * v1085,
+            v1402 = v923 * v1094 + v1041 * v1085, v1403 = v917 * v1094 + v1046 * v1085,
+            v1404 = v921 * v1094 + v1055 * v1085, v1405 = v922 * v1094 + v1056 * v1085,
+            v1406 = v915 * v1094 + v1034 * v1085, v1407 = v924 * v1094 + v1044 * v1085,
+            v1408 = v917 * v1100 + (v1101 + v1099), v1409 = v921 * v1100 + (v1109 + v1108),
+            v1410 = v922 * v1100 + (v1111 + v1110), v1411 = v915 * v1100 + (v1113 + v1112),
+            v1412 = v924 * v1100 + (v1119 + v1118), v1413 = v918 * v1100 + (v1103 + v1102),
+            v1414 = v919 * v1100 + (v1105 + v1104), v1415 = v920 * v1100 + (v1107 + v1106),
+            v1416 = v916 * v1100 + (v1115 + v1114), v1417 = v923 * v1100 + (v1117 + v1116),
+            v1418 = v46 * (v1364 + v926 * v1358), v1419 = v46 * (v925 * v1358 - v1364),
+            v1420 = v46 * (v1365 + v926 * v1363), v1421 = v46 * (v925 * v1363 - v1365);
+        s684 += w[1] * (v1009 * v1388 + v1015 * v1392);
+        s686 += w[1] * (v1009 * v1389 + v1015 * v1390);
+        s685 += w[1] * (v1017 * v1388 + v1015 * v1393);
+        s687 += w[1] * (v1017 * v1389 + v1015 * v1391);
+        s676 += w[1] * (v1009 * v1384 - v1012 * v1392);
+        s677 += w[1] * (v1017 * v1384 - v1012 * v1393);
+        s678 += w[1] * (v1009 * v1385 - v1012 * v1390);
+        s679 += w[1] * (v1017 * v1385 - v1012 * v1391);
+        s680 += w[1] * (v1009 * v1386 - v1014 * v1392);
+        s681 += w[1] * (v1017 * v1386 - v1014 * v1393);
+        s682 += w[1] * (v1009 * v1387 - v1014 * v1390);
+        s683 += w[1] * (v1017 * v1387 - v1014 * v1391);
+        s640 += w[1] * (v1403 * v992 + (v538 * v1369 + v917 * v1419));
+        s641 += w[1] * (v1398 * v992 + (v539 * v1369 + v918 * v1419));
+        s642 += w[1] * (v1399 * v992 + (v543 * v1369 + v919 * v1419));
+        s643 += w[1] * (v1400 * v992 + (v544 * v1369 + v920 * v1419));
+        s644 += w[1] * (v1404 * v992 + (v536 * v1369 + v921 * v1419));
+        s645 += w[1] * (v1405 * v992 + (v537 * v1369 + v922 * v1419));
+        s646 += w[1] * (v1406 * v992 + (v546 * v1369 + v915 * v1419));
+        s647 += w[1] * (v1401 * v992 + (v547 * v1369 + v916 * v1419));
+        s648 += w[1] * (v1402 * v992 + (v548 * v1369 + v923 * v1419));
+        s649 += w[1] * (v1407 * v992 + (v550 * v1369 + v924 * v1419));
+        s661 += w[1] * (v1407 * v993 + (v550 * v1370 + v924 * v1418));
+        s658 += w[1] * (v1406 * v993 + (v546 * v1370 + v915 * v1418));
+        s659 += w[1] * (v1401 * v993 + (v547 * v1370 + v916 * v1418));
+        s652 += w[1] * (v1403 * v993 + (v538 * v1370 + v917 * v1418));
+        s653 += w[1] * (v1398 * v993 + (v539 * v1370 + v918 * v1418));
+        s654 += w[1] * (v1399 * v993 + (v543 * v1370 + v919 * v1418));
+        s655 += w[1] * (v1400 * v993 + (v544 * v1370 + v920 * v1418));
+        s656 += w[1] * (v1404 * v993 + (v536 * v1370 + v921 * v1418));
+        const V v1422 = v1399 * v991 + (v919 * v1376 + (v543 * v1374 + v937 * v1394)) + v994 * v1414,
+            v1423 = v919 * v1377 + (v543 * v1375 + v937 * v1395) - v1399 * v994 + v991 * v1414,
+            v1424 = v1400 * v991 + (v920 * v1376 + (v544 * v1374 + v948 * v1394)) + v994 * v1415,
+            v1425 = v920 * v1377 + (v544 * v1375 + v948 * v1395) - v1400 * v994 + v991 * v1415;
+        s657 += w[1] * (v1405 * v993 + (v537 * v1370 + v922 * v1418));
+        s660 += w[1] * (v1402 * v993 + (v548 * v1370 + v923 * v1418));
+        const V v1426 = v947 * v1397 + v1422, v1427 = v1423 - v947 * v1396,
+            v1428 = v943 * v1397 + v1424, v1429 = v1425 - v943 * v1396,
+            v1430 = v946 * v1397 + (v1404 * v991 + (v536 * v1374 + v938 * v1394) + v994 * v1409),
+            v1431 = v921 * v1377 + (v536 * v1375 + v938 * v1395) - v1404 * v994 - v946 * v1396,
+            v1432 = v922 * v1377 + (v537 * v1375 + v950 * v1395) - v1405 * v994 - v949 * v1396,
+            v1433 = v1431 + v991 * v1409, v1434 = v1432 + v991 * v1410,
+            v1435 = v949 * v1397 + (v1405 * v991 + (v537 * v1374 + v950 * v1394)) + v994 * v1410,
+            v1436 = w[1] * (v833 * v1426 - v919 * v1382);
+        s750 += v1436; const V v1437 = w[1] * (v833 * v1428 - v920 * v1382); s751 += v1437;
+        const V v1438 = w[1] * (v833 * v1427 - v919 * v1383); s760 += v1438;
+        const V v1439 = w[1] * (v833 * v1429 - v920 * v1383); s761 += v1439;
+        const V v1440 = v922 * v1376 + v1435, v1441 = v921 * v1376 + v1430,
+            v1442 = w[1] * (v833 * v1433 - v921 * v1383);
+        s762 += v1442; const V v1443 = w[1] * (v833 * v1434 - v922 * v1383); s763 += v1443;
+        const V v1444 = w[1] * (v922 * v1379 + v836 * v1440); s713 += v1444;
+        const V v1445 = w[1] * (v921 * v1379 + v836 * v1441); s712 += v1445;
+        const V v1446 = w[1] * (v919 * v1379 + v836 * v1426); s710 += v1446;
+        const V v1447 = w[1] * (v833 * v1440 - v922 * v1382); s753 += v1447;
+        const V v1448 = w[1] * (v833 * v1441 - v921 * v1382); s752 += v1448;
+        const V v1449 = w[1] * (v920 * v1379 + v836 * v1428); s711 += v1449;
+        const V v1450 = w[1] * (v919 * v1378 + v836 * v1427); s720 += v1450;
+        const V v1451 = w[1] * (v920 * v1378 + v836 * v1429); s721 += v1451;
+        const V v1452 = v1403 * v991 + (v944 * v1397 + (v917 * v1376 + (v538 * v1374 + v936 * v1394))),
+            v1453 = w[1] * (v921 * v1378 + v836 * v1433);
+        s722 += v1453;
+        const V v1454 = v1452 + v994 * v1408,
+            v1455 = v538 * v1375 + v936 * v1395 - v944 * v1396 - v1403 * v994 + v991 * v1408,
+            v1456 = w[1] * (v922 * v1378 + v836 * v1434);
+        s723 += v1456; const V v1457 = w[1] * (v919 * v1381 + v837 * v1427); s740 += v1457;
+        const V v1458 = w[1] * (v920 * v1381 + v837 * v1429); s741 += v1458;
+        const V v1459 = w[1] * (v917 * v1379 + v836 * v1454); s708 += v1459;
+        const V v1460 = w[1] * (v917 * v1380 + v837 * v1454); s728 += v1460;
+        const V v1461 = v917 * v1377 + v1455, v1462 = w[1] * (v922 * v1381 + v837 * v1434);
+        s743 += v1462; const V v1463 = w[1] * (v833 * v1454 - v917 * v1382); s748 += v1463;
+        const V v1464 = w[1] * (v917 * v1378 + v836 * v1461); s718 += v1464;
+        const V v1465 = w[1] * (v917 * v1381 + v837 * v1461); s738 += v1465;
+        const V v1466 = w[1] * (v919 * v1380 + v837 * v1426); s730 += v1466;
+        const V v1467 = w[1] * (v833 * v1461 - v917 * v1383); s758 += v1467;
+        const V v1468 = w[1] * (v920 * v1380 + v837 * v1428); s731 += v1468;
+        const V v1469 = w[1] * (v921 * v1380 + v837 * v1441); s732 += v1469;
+        const V v1470 = w[1] * (v922 * v1380 + v837 * v1440); s733 += v1470;
+        const V v1471 = w[1] * (v921 * v1381 + v837 * v1433); s742 += v1471;
+        const V v1472 = w[1] * (v1049 * v1384 - v1012 * v1426); s770 += v1472;
+        const V v1473 = w[1] * (v1051 * v1384 - v1012 * v1428); s771 += v1473;
+        const V v1474 = w[1] * (v1053 * v1384 - v1012 * v1441); s772 += v1474;
+        const V v1475 = w[1] * (v1054 * v1384 - v1012 * v1440); s773 += v1475;
+        const V v1476 = w[1] * (v1053 * v1385 - v1012 * v1433); s782 += v1476;
+        const V v1477 = w[1] * (v1045 * v1384 - v1012 * v1454); s768 += v1477;
+        const V v1478 = w[1] * (v1045 * v1385 - v1012 * v1461); s778 += v1478;
+        const V v1479 = w[1] * (v1049 * v1385 - v1012 * v1427); s780 += v1479;
+        const V v1480 = w[1] * (v1051 * v1385 - v1012 * v1429); s781 += v1480;
+        const V v1481 = w[1] * (v1054 * v1385 - v1012 * v1434); s783 += v1481;
+        const V v1482 = w[1] * (v1045 * v1386 - v1014 * v1454); s788 += v1482;
+        const V v1483 = w[1] * (v1045 * v1387 - v1014 * v1461); s798 += v1483;
+        const V v1484 = w[1] * (v1049 * v1387 - v1014 * v1427); s800 += v1484;
+        const V v1485 = w[1] * (v1051 * v1387 - v1014 * v1429); s801 += v1485;
+        const V v1486 = w[1] * (v1054 * v1387 - v1014 * v1434); s803 += v1486;
+        const V v1487 = w[1] * (v1045 * v1388 + v1015 * v1454); s808 += v1487;
+        const V v1488 = w[1] * (v1045 * v1389 + v1015 * v1461); s818 += v1488;
+        const V v1489 = w[1] * (v1049 * v1389 + v1015 * v1427); s820 += v1489;
+        const V v1490 = w[1] * (v1051 * v1389 + v1015 * v1429); s821 += v1490;
+        const V v1491 = w[1] * (v1054 * v1389 + v1015 * v1434); s823 += v1491;
+        const V v1492 = w[1] * (v1049 * v1386 - v1014 * v1426); s790 += v1492;
+        const V v1493 = w[1] * (v1049 * v1388 + v1015 * v1426); s810 += v1493;
+        const V v1494 = w[1] * (v1051 * v1386 - v1014 * v1428); s791 += v1494;
+        const V v1495 = w[1] * (v1051 * v1388 + v1015 * v1428); s811 += v1495;
+        const V v1496 = w[1] * (v1053 * v1386 - v1014 * v1441); s792 += v1496;
+        const V v1497 = w[1] * (v1053 * v1388 + v1015 * v1441); s812 += v1497;
+        const V v1498 = w[1] * (v1054 * v1386 - v1014 * v1440); s793 += v1498;
+        const V v1499 = w[1] * (v1054 * v1388 + v1015 * v1440); s813 += v1499;
+        const V v1500 = w[1] * (v1053 * v1387 - v1014 * v1433); s802 += v1500;
+        const V v1501 = w[1] * (v1053 * v1389 + v1015 * v1433); s822 += v1501;
+        const V v1502 = v1398 * v991 + (v942 * v1397 + (v918 * v1376 + (v539 * v1374 + v945 * v1394))),
+            v1503 = v918 * v1377 + (v539 * v1375 + v945 * v1395) - v942 * v1396 - v1398 * v994,
+            v1504 = v923 * v1377 + (v548 * v1375 + v953 * v1395) - v954 * v1396 - v1402 * v994,
+            v1505 = v1502 + v994 * v1413, v1506 = v1503 + v991 * v1413,
+            v1507 = v1406 * v991 + (v940 * v1397 + (v546 * v1374 + v939 * v1394)) + v994 * v1411,
+            v1508 = v546 * v1375 + v939 * v1395 - v940 * v1396 - v1406 * v994 + v991 * v1411,
+            v1509 = v1504 + v991 * v1417,
+            v1510 = v1402 * v991 + (v954 * v1397 + (v548 * v1374 + v953 * v1394)) + v994 * v1417,
+            v1511 = v1401 * v991 + (v952 * v1397 + (v547 * v1374 + v951 * v1394)) + v994 * v1416,
+            v1512 = v547 * v1375 + v951 * v1395 - v952 * v1396 - v1401 * v994 + v991 * v1416,
+            v1513 = v1407 * v991 + (v941 * v1397 + (v550 * v1374 + v933 * v1394)) + v994 * v1412,
+            v1514 = v550 * v1375 + v933 * v1395 - v941 * v1396 - v1407 * v994 + v991 * v1412,
+            v1515 = v915 * v1376 + v1507, v1516 = v915 * v1377 + v1508,
+            v1517 = v923 * v1376 + v1510, v1518 = v916 * v1376 + v1511,
+            v1519 = v916 * v1377 + v1512, v1520 = v924 * v1376 + v1513,
+            v1521 = v924 * v1377 + v1514, v1522 = w[1] * (v833 * v1509 - v923 * v1383);
+        s766 += v1522; const V v1523 = w[1] * (v833 * v1516 - v915 * v1383); s764 += v1523;
+        const V v1524 = w[1] * (v833 * v1517 - v923 * v1382); s756 += v1524;
+        const V v1525 = w[1] * (v833 * v1518 - v916 * v1382); s755 += v1525;
+        const V v1526 = w[1] * (v833 * v1519 - v916 * v1383); s765 += v1526;
+        const V v1527 = w[1] * (v833 * v1520 - v924 * v1382); s757 += v1527;
+        const V v1528 = w[1] * (v833 * v1521 - v924 * v1383); s767 += v1528;
+        const V v1529 = w[1] * (v833 * v1515 - v915 * v1382); s754 += v1529;
+        const V v1530 = w[1] * (v924 * v1378 + v836 * v1521); s727 += v1530;
+        const V v1531 = w[1] * (v918 * v1379 + v836 * v1505); s709 += v1531;
+        const V v1532 = w[1] * (v918 * v1378 + v836 * v1506); s719 += v1532;
+        const V v1533 = w[1] * (v833 * v1505 - v918 * v1382); s749 += v1533;
+        const V v1534 = w[1] * (v833 * v1506 - v918 * v1383); s759 += v1534;
+        const V v1535 = w[1] * (v915 * v1379 + v836 * v1515); s714 += v1535;
+        const V v1536 = w[1] * (v916 * v1379 + v836 * v1518); s715 += v1536;
+        const V v1537 = w[1] * (v923 * v1379 + v836 * v1517); s716 += v1537;
+        const V v1538 = w[1] * (v924 * v1379 + v836 * v1520); s717 += v1538;
+        const V v1539 = w[1] * (v915 * v1378 + v836 * v1516); s724 += v1539;
+        const V v1540 = w[1] * (v916 * v1378 + v836 * v1519); s725 += v1540;
+        const V v1541 = w[1] * (v923 * v1378 + v836 * v1509); s726 += v1541;
+        const V v1542 = w[1] * (v915 * v1380 + v837 * v1515); s734 += v1542;
+        const V v1543 = w[1] * (v916 * v1380 + v837 * v1518); s735 += v1543;
+        const V v1544 = w[1] * (v923 * v1380 + v837 * v1517); s736 += v1544;
+        const V v1545 = w[1] * (v924 * v1380 + v837 * v1520); s737 += v1545;
+        const V v1546 = w[1] * (v915 * v1381 + v837 * v1516); s744 += v1546;
+        const V v1547 = w[1] * (v916 * v1381 + v837 * v1519); s745 += v1547;
+        const V v1548 = w[1] * (v918 * v1380 + v837 * v1505); s729 += v1548;
+        const V v1549 = w[1] * (v918 * v1381 + v837 * v1506); s739 += v1549;
+        const V v1550 = w[1] * (v923 * v1381 + v837 * v1509); s746 += v1550;
+        const V v1551 = w[1] * (v924 * v1381 + v837 * v1521); s747 += v1551;
+        const V v1552 = w[1] * (v1047 * v1384 - v1012 * v1505); s769 += v1552;
+        const V v1553 = w[1] * (v1047 * v1385 - v1012 * v1506); s779 += v1553;
+        const V v1554 = w[1] * (v1033 * v1385 - v1012 * v1516); s784 += v1554;
+        const V v1555 = w[1] * (v1038 * v1385 - v1012 * v1509); s786 += v1555;
+        const V v1556 = w[1] * (v1042 * v1385 - v1012 * v1521); s787 += v1556;
+        const V v1557 = w[1] * (v1033 * v1384 - v1012 * v1515); s774 += v1557;
+        const V v1558 = w[1] * (v1036 * v1384 - v1012 * v1518); s775 += v1558;
+        const V v1559 = w[1] * (v1038 * v1384 - v1012 * v1517); s776 += v1559;
+        const V v1560 = w[1] * (v1042 * v1384 - v1012 * v1520); s777 += v1560;
+        const V v1561 = w[1] * (v1036 * v1385 - v1012 * v1519); s785 += v1561;
+        const V v1562 = w[1] * (v1033 * v1386 - v1014 * v1515); s794 += v1562;
+        const V v1563 = w[1] * (v1036 * v1386 - v1014 * v1518); s795 += v1563;
+        const V v1564 = w[1] * (v1038 * v1386 - v1014 * v1517); s796 += v1564;
+        const V v1565 = w[1] * (v1042 * v1386 - v1014 * v1520); s797 += v1565;
+        const V v1566 = w[1] * (v1036 * v1387 - v1014 * v1519); s805 += v1566;
+        const V v1567 = w[1] * (v1033 * v1388 + v1015 * v1515); s814 += v1567;
+        const V v1568 = w[1] * (v1036 * v1388 + v1015 * v1518); s815 += v1568;
+        const V v1569 = w[1] * (v1038 * v1388 + v1015 * v1517); s816 += v1569;
+        const V v1570 = w[1] * (v1042 * v1388 + v1015 * v1520); s817 += v1570;
+        const V v1571 = w[1] * (v1036 * v1389 + v1015 * v1519); s825 += v1571;
+        const V v1572 = w[1] * (v1047 * v1386 - v1014 * v1505); s789 += v1572;
+        const V v1573 = w[1] * (v1047 * v1388 + v1015 * v1505); s809 += v1573;
+        const V v1574 = w[1] * (v1047 * v1387 - v1014 * v1506); s799 += v1574;
+        const V v1575 = w[1] * (v1047 * v1389 + v1015 * v1506); s819 += v1575;
+        const V v1576 = w[1] * (v1033 * v1387 - v1014 * v1516); s804 += v1576;
+        const V v1577 = w[1] * (v1033 * v1389 + v1015 * v1516); s824 += v1577;
+        const V v1578 = w[1] * (v1038 * v1387 - v1014 * v1509); s806 += v1578;
+        const V v1579 = w[1] * (v1038 * v1389 + v1015 * v1509); s826 += v1579;
+        const V v1580 = w[1] * (v1042 * v1387 - v1014 * v1521); s807 += v1580;
+        const V v1581 = w[1] * (v1042 * v1389 + v1015 * v1521); s827 += v1581;
+        const V v1582 = w[1] * (v538 * v1368 + v917 * v1421 + v992 * v1408); s688 += v1582;
+        const V v1583 = w[1] * (v538 * v1371 + v917 * v1420 + v993 * v1408); s698 += v1583;
+        const V v1584 = w[1] * (v539 * v1368 + v918 * v1421 + v992 * v1413); s689 += v1584;
+        const V v1585 = w[1] * (v539 * v1371 + v918 * v1420 + v993 * v1413); s699 += v1585;
+        const V v1586 = w[1] * (v543 * v1368 + v919 * v1421 + v992 * v1414); s690 += v1586;
+        const V v1587 = w[1] * (v543 * v1371 + v919 * v1420 + v993 * v1414); s700 += v1587;
+        const V v1588 = w[1] * (v544 * v1368 + v920 * v1421 + v992 * v1415); s691 += v1588;
+        const V v1589 = w[1] * (v544 * v1371 + v920 * v1420 + v993 * v1415); s701 += v1589;
+        const V v1590 = w[1] * (v536 * v1368 + v921 * v1421 + v992 * v1409); s692 += v1590;
+        const V v1591 = w[1] * (v536 * v1371 + v921 * v1420 + v993 * v1409); s702 += v1591;
+        const V v1592 = w[1] * (v537 * v1368 + v922 * v1421 + v992 * v1410); s693 += v1592;
+        const V v1593 = w[1] * (v537 * v1371 + v922 * v1420 + v993 * v1410); s703 += v1593;
+        const V v1594 = w[1] * (v546 * v1368 + v915 * v1421 + v992 * v1411); s694 += v1594;
+        const V v1595 = w[1] * (v546 * v1371 + v915 * v1420 + v993 * v1411); s704 += v1595;
+        const V v1596 = w[1] * (v547 * v1368 + v916 * v1421 + v992 * v1416); s695 += v1596;
+        const V v1597 = w[1] * (v547 * v1371 + v916 * v1420 + v993 * v1416); s705 += v1597;
+        const V v1598 = w[1] * (v548 * v1368 + v923 * v1421 + v992 * v1417); s696 += v1598;
+        const V v1599 = w[1] * (v548 * v1371 + v923 * v1420 + v993 * v1417); s706 += v1599;
+        const V v1600 = w[1] * (v550 * v1368 + v924 * v1421 + v992 * v1412); s697 += v1600;
+        const V v1601 = w[1] * (v550 * v1371 + v924 * v1420 + v993 * v1412); s707 += v1601;
     }
-    softehl_store4(K + 204, 256, s1056, softehl_splat(0.0), s1057, softehl_splat(0.0));
-    softehl_store4(K + 236, 256, s1058, softehl_splat(0.0), s1059, softehl_splat(0.0));
-    softehl_store4(R + 12, 16, s1055, s1061, s1054, s1060);
-    softehl_store4(R + 4, 16, s1101, s1100, s1099, s1098);
-    softehl_store4(R + 0, 16, s1105, s1104, s1103, s1102);
-    softehl_store4(K + 220, 256, s1106, s1088, s1107, s1089);
-    softehl_store4(K + 252, 256, s1108, s1092, s1109, s1093);
-    softehl_store4(K + 12, 256, s1110, s1062, s1111, s1063);
-    softehl_store4(K + 28, 256, s1112, s1064, s1113, s1065);
-    softehl_store4(K + 44, 256, s1114, s1066, s1115, s1067);
-    softehl_store4(K + 60, 256, s1116, s1068, s1117, s1069);
-    softehl_store4(K + 76, 256, s1118, s1070, s1119, s1071);
-    softehl_store4(K + 92, 256, s1120, s1072, s1121, s1073);
-    softehl_store4(K + 108, 256, s1122, s1074, s1123, s1075);
-    softehl_store4(K + 124, 256, s1124, s1076, s1125, s1077);
-    softehl_store4(K + 140, 256, s1126, s1078, s1127, s1079);
-    softehl_store4(K + 156, 256, s1128, s1080, s1129, s1081);
-    softehl_store4(K + 192, 256, s1134, s1135, s1136, s1137);
-    softehl_store4(K + 196, 256, s1138, s1139, s1140, s1141);
-    softehl_store4(K + 200, 256, s1142, s1143, s1086, s1087);
-    softehl_store4(K + 224, 256, s1146, s1147, s1148, s1149);
-    softehl_store4(K + 228, 256, s1150, s1151, s1152, s1153);
-    softehl_store4(K + 232, 256, s1154, s1155, s1090, s1091);
-    softehl_store4(K + 208, 256, s1182, s1183, s1184, s1185);
-    softehl_store4(K + 212, 256, s1186, s1187, s1188, s1189);
-    softehl_store4(K + 216, 256, s1190, s1191, s1144, s1145);
-    softehl_store4(K + 240, 256, s1192, s1193, s1194, s1195);
-    softehl_store4(K + 244, 256, s1196, s1197, s1198, s1199);
-    softehl_store4(K + 248, 256, s1200, s1201, s1156, s1157);
-    softehl_store4(K + 0, 256, s1202, s1203, s1204, s1205);
-    softehl_store4(K + 4, 256, s1206, s1207, s1208, s1209);
-    softehl_store4(K + 8, 256, s1210, s1211, s1158, s1159);
-    softehl_store4(K + 16, 256, s1212, s1213, s1214, s1215);
-    softehl_store4(K + 20, 256, s1216, s1217, s1218, s1219);
-    softehl_store4(K + 24, 256, s1220, s1221, s1160, s1161);
-    softehl_store4(K + 32, 256, s1222, s1223, s1224, s1225);
-    softehl_store4(K + 36, 256, s1226, s1227, s1228, s1229);
-    softehl_store4(K + 40, 256, s1230, s1231, s1162, s1163);
-    softehl_store4(K + 48, 256, s1232, s1233, s1234, s1235);
-    softehl_store4(K + 52, 256, s1236, s1237, s1238, s1239);
-    softehl_store4(K + 56, 256, s1240, s1241, s1164, s1165);
-    softehl_store4(K + 64, 256, s1242, s1243, s1244, s1245);
-    softehl_store4(K + 68, 256, s1246, s1247, s1248, s1249);
-    softehl_store4(K + 72, 256, s1250, s1251, s1166, s1167);
-    softehl_store4(K + 80, 256, s1252, s1253, s1254, s1255);
-    softehl_store4(K + 84, 256, s1256, s1257, s1258, s1259);
-    softehl_store4(K + 88, 256, s1260, s1261, s1168, s1169);
-    const V v3567 = -s1094;
-    const V v3568 = -s1095;
-    softehl_store4(R + 8, 16, s1097, s1096, v3568, v3567);
-    const V v3569 = -s1130;
-    const V v3570 = -s1131;
-    softehl_store4(K + 172, 256, v3569, s1082, v3570, s1083);
-    const V v3571 = -s1132;
-    const V v3572 = -s1133;
-    softehl_store4(K + 188, 256, v3571, s1084, v3572, s1085);
-    const V v3573 = -s1170;
-    const V v3574 = -s1171;
-    const V v3575 = -s1172;
-    const V v3576 = -s1173;
-    const V v3577 = -s1174;
-    const V v3578 = -s1175;
-    const V v3579 = -s1176;
-    const V v3580 = -s1177;
-    const V v3581 = -s1178;
-    const V v3582 = -s1179;
-    const V v3583 = -s1180;
-    const V v3584 = -s1181;
-    const V v3585 = -s1262;
-    const V v3586 = -s1263;
-    const V v3587 = -s1264;
-    const V v3588 = -s1265;
-    softehl_store4(K + 96, 256, v3585, v3586, v3587, v3588);
-    const V v3589 = -s1266;
-    const V v3590 = -s1267;
-    const V v3591 = -s1268;
-    const V v3592 = -s1269;
-    softehl_store4(K + 100, 256, v3589, v3590, v3591, v3592);
-    const V v3593 = -s1270;
-    const V v3594 = -s1271;
-    softehl_store4(K + 104, 256, v3593, v3594, v3573, v3574);
-    const V v3595 = -s1272;
-    const V v3596 = -s1273;
-    const V v3597 = -s1274;
-    const V v3598 = -s1275;
-    softehl_store4(K + 112, 256, v3595, v3596, v3597, v3598);
-    const V v3599 = -s1276;
-    const V v3600 = -s1277;
-    const V v3601 = -s1278;
-    const V v3602 = -s1279;
-    softehl_store4(K + 116, 256, v3599, v3600, v3601, v3602);
-    const V v3603 = -s1280;
-    const V v3604 = -s1281;
-    softehl_store4(K + 120, 256, v3603, v3604, v3575, v3576);
-    const V v3605 = -s1282;
-    const V v3606 = -s1283;
-    const V v3607 = -s1284;
-    const V v3608 = -s1285;
-    softehl_store4(K + 128, 256, v3605, v3606, v3607, v3608);
-    const V v3609 = -s1286;
-    const V v3610 = -s1287;
-    const V v3611 = -s1288;
-    const V v3612 = -s1289;
-    softehl_store4(K + 132, 256, v3609, v3610, v3611, v3612);
-    const V v3613 = -s1290;
-    const V v3614 = -s1291;
-    softehl_store4(K + 136, 256, v3613, v3614, v3577, v3578);
-    const V v3615 = -s1292;
-    const V v3616 = -s1293;
-    const V v3617 = -s1294;
-    const V v3618 = -s1295;
-    softehl_store4(K + 144, 256, v3615, v3616, v3617, v3618);
-    const V v3619 = -s1296;
-    const V v3620 = -s1297;
-    const V v3621 = -s1298;
-    const V v3622 = -s1299;
-    softehl_store4(K + 148, 256, v3619, v3620, v3621, v3622);
-    const V v3623 = -s1300;
-    const V v3624 = -s1301;
-    softehl_store4(K + 152, 256, v3623, v3624, v3579, v3580);
-    const V v3625 = -s1302;
-    const V v3626 = -s1303;
-    const V v3627 = -s1304;
-    const V v3628 = -s1305;
-    softehl_store4(K + 160, 256, v3625, v3626, v3627, v3628);
-    const V v3629 = -s1306;
-    const V v3630 = -s1307;
-    const V v3631 = -s1308;
-    const V v3632 = -s1309;
-    softehl_store4(K + 164, 256, v3629, v3630, v3631, v3632);
-    const V v3633 = -s1310;
-    const V v3634 = -s1311;
-    softehl_store4(K + 168, 256, v3633, v3634, v3581, v3582);
-    const V v3635 = -s1312;
-    const V v3636 = -s1313;
-    const V v3637 = -s1314;
-    const V v3638 = -s1315;
-    softehl_store4(K + 176, 256, v3635, v3636, v3637, v3638);
-    const V v3639 = -s1316;
-    const V v3640 = -s1317;
-    const V v3641 = -s1318;
-    const V v3642 = -s1319;
-    softehl_store4(K + 180, 256, v3639, v3640, v3641, v3642);
-    const V v3643 = -s1320;
-    const V v3644 = -s1321;
-    softehl_store4(K + 184, 256, v3643, v3644, v3583, v3584);
+    softehl_store4(K + 204, 256, s562, softehl_splat(0.0), s563, softehl_splat(0.0));
+    softehl_store4(K + 236, 256, s564, softehl_splat(0.0), s565, softehl_splat(0.0));
+    softehl_store4(R + 12, 16, s561, s567, s560, s566);
+    softehl_store4(R + 4, 16, s607, s606, s605, s604);
+    softehl_store4(R + 0, 16, s611, s610, s609, s608);
+    softehl_store4(K + 220, 256, s612, s594, s613, s595);
+    softehl_store4(K + 252, 256, s614, s598, s615, s599);
+    softehl_store4(K + 12, 256, s616, s568, s617, s569);
+    softehl_store4(K + 28, 256, s618, s570, s619, s571);
+    softehl_store4(K + 44, 256, s620, s572, s621, s573);
+    softehl_store4(K + 60, 256, s622, s574, s623, s575);
+    softehl_store4(K + 76, 256, s624, s576, s625, s577);
+    softehl_store4(K + 92, 256, s626, s578, s627, s579);
+    softehl_store4(K + 108, 256, s628, s580, s629, s581);
+    softehl_store4(K + 124, 256, s630, s582, s631, s583);
+    softehl_store4(K + 140, 256, s632, s584, s633, s585);
+    softehl_store4(K + 156, 256, s634, s586, s635, s587);
+    softehl_store4(K + 192, 256, s640, s641, s642, s643);
+    softehl_store4(K + 196, 256, s644, s645, s646, s647);
+    softehl_store4(K + 200, 256, s648, s649, s592, s593);
+    softehl_store4(K + 224, 256, s652, s653, s654, s655);
+    softehl_store4(K + 228, 256, s656, s657, s658, s659);
+    softehl_store4(K + 232, 256, s660, s661, s596, s597);
+    softehl_store4(K + 208, 256, s688, s689, s690, s691);
+    softehl_store4(K + 212, 256, s692, s693, s694, s695);
+    softehl_store4(K + 216, 256, s696, s697, s650, s651);
+    softehl_store4(K + 240, 256, s698, s699, s700, s701);
+    softehl_store4(K + 244, 256, s702, s703, s704, s705);
+    softehl_store4(K + 248, 256, s706, s707, s662, s663);
+    softehl_store4(K + 0, 256, s708, s709, s710, s711);
+    softehl_store4(K + 4, 256, s712, s713, s714, s715);
+    softehl_store4(K + 8, 256, s716, s717, s664, s665);
+    softehl_store4(K + 16, 256, s718, s719, s720, s721);
+    softehl_store4(K + 20, 256, s722, s723, s724, s725);
+    softehl_store4(K + 24, 256, s726, s727, s666, s667);
+    softehl_store4(K + 32, 256, s728, s729, s730, s731);
+    softehl_store4(K + 36, 256, s732, s733, s734, s735);
+    softehl_store4(K + 40, 256, s736, s737, s668, s669);
+    softehl_store4(K + 48, 256, s738, s739, s740, s741);
+    softehl_store4(K + 52, 256, s742, s743, s744, s745);
+    softehl_store4(K + 56, 256, s746, s747, s670, s671);
+    softehl_store4(K + 64, 256, s748, s749, s750, s751);
+    softehl_store4(K + 68, 256, s752, s753, s754, s755);
+    softehl_store4(K + 72, 256, s756, s757, s672, s673);
+    softehl_store4(K + 80, 256, s758, s759, s760, s761);
+    softehl_store4(K + 84, 256, s762, s763, s764, s765);
+    softehl_store4(K + 88, 256, s766, s767, s674, s675);
+    softehl_store4(R + 8, 16, s603, s602, -s601, -s600);
+    softehl_store4(K + 172, 256, -s636, s588, -s637, s589);
+    softehl_store4(K + 188, 256, -s638, s590, -s639, s591);
+    softehl_store4(K + 96, 256, -s768, -s769, -s770, -s771);
+    softehl_store4(K + 100, 256, -s772, -s773, -s774, -s775);
+    softehl_store4(K + 104, 256, -s776, -s777, -s676, -s677);
+    softehl_store4(K + 112, 256, -s778, -s779, -s780, -s781);
+    softehl_store4(K + 116, 256, -s782, -s783, -s784, -s785);
+    softehl_store4(K + 120, 256, -s786, -s787, -s678, -s679);
+    softehl_store4(K + 128, 256, -s788, -s789, -s790, -s791);
+    softehl_store4(K + 132, 256, -s792, -s793, -s794, -s795);
+    softehl_store4(K + 136, 256, -s796, -s797, -s680, -s681);
+    softehl_store4(K + 144, 256, -s798, -s799, -s800, -s801);
+    softehl_store4(K + 148, 256, -s802, -s803, -s804, -s805);
+    softehl_store4(K + 152, 256, -s806, -s807, -s682, -s683);
+    softehl_store4(K + 160, 256, -s808, -s809, -s810, -s811);
+    softehl_store4(K + 164, 256, -s812, -s813, -s814, -s815);
+    softehl_store4(K + 168, 256, -s816, -s817, -s684, -s685);
+    softehl_store4(K + 176, 256, -s818, -s819, -s820, -s821);
+    softehl_store4(K + 180, 256, -s822, -s823, -s824, -s825);
+    softehl_store4(K + 184, 256, -s826, -s827, -s686, -s687);
 }
-
-void softehl_mortar_33_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mortar_33_tangent_group(points, modes, coordinates + 12 * e, dofs + 16 * e, data + 17 * e, 0, parameters, rule, basis, values + 16 * e, tangent + (16 * 16) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mortar_33_tangent_group(points, modes, coordinates + 12 * (n - SOFTEHL_LANES), dofs + 16 * (n - SOFTEHL_LANES), data + 17 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 16 * (n - SOFTEHL_LANES), tangent + (16 * 16) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 12];
-    softehl_pad(X, coordinates, 12, n);
-    double d[SOFTEHL_LANES * 16];
-    softehl_pad(d, dofs, 16, n);
-    double a[SOFTEHL_LANES * 17];
-    softehl_pad(a, data, 17, n);
-    double R[SOFTEHL_LANES * 16];
-    double K[SOFTEHL_LANES * (16 * 16)];
-    softehl_mortar_33_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 16 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (16 * 16) * n; ++i) tangent[i] = K[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_mortar_33_tangent, 12, 16, 17, 0, 16, (16 * 16))

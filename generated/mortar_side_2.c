@@ -20,129 +20,42 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_mortar_side_2_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_mortar_side_2_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
     (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
     softehl_store4(R + 0, 8, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v1 = 1.0 / a0;
-    const V v2 = X2 - X0;
-    const V v3 = X3 - X1;
-    const V v4 = 0.5 * v2;
-    const V v5 = 0.5 * v3;
-    const V v6 = v4 * v4;
-    const V v7 = v5 * v5;
-    const V v8 = v6 + v7;
-    const V v9 = softehl_vsqrt(v8);
-    V s10 = softehl_splat(0.0);
-    V s11 = softehl_splat(0.0);
-    V s12 = softehl_splat(0.0);
-    V s13 = softehl_splat(0.0);
+    const V v1 = 1.0 / a0, v2 = 0.5 * (X2 - X0), v3 = 0.5 * (X3 - X1),
+        v4 = softehl_vsqrt(v2 * v2 + v3 * v3);
+    V s5 = {0}, s6 = {0}, s7 = {0}, s8 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const double v14 = 0.5 * w[0];
-        const double v15 = 0.5 - v14;
-        const double v16 = 0.5 + v14;
-        const V v17 = X1 * v15;
-        const V v18 = d4 * v15;
-        const V v19 = d5 * v15;
-        const V v20 = v15 * v1;
-        const V v21 = v16 * v1;
-        const V v22 = X3 * v16;
-        const V v23 = v17 + v22;
-        const V v24 = 6.283185307179586 * v23;
-        const V v25 = (-1.0) + v24;
-        const V v26 = a1 * v25;
-        const V v27 = 1.0 + v26;
-        const V v28 = d6 * v16;
-        const V v29 = v18 + v28;
-        const V v30 = d7 * v16;
-        const V v31 = v19 + v30;
-        const V v32 = w[1] * v21;
-        const V v33 = w[1] * v20;
-        const V v34 = v9 * v27;
-        const V v35 = v29 * v34;
-        const V v36 = v31 * v34;
-        const V v37 = v32 * v36;
-        s10 += v37;
-        const V v38 = v33 * v36;
-        s12 += v38;
-        const V v39 = v32 * v35;
-        s11 += v39;
-        const V v40 = v33 * v35;
-        s13 += v40;
+        const double *restrict w = rule + 2 * q; (void)w;
+        const double v9 = 0.5 * w[0], v10 = 0.5 - v9, v11 = 0.5 + v9;
+        const V v12 = w[1] * (v11 * v1), v13 = w[1] * (v10 * v1),
+            v14 = v4 * (1.0 + a1 * ((-1.0) + 6.283185307179586 * (X1 * v10 + X3 * v11))),
+            v15 = (d4 * v10 + d6 * v11) * v14, v16 = (d5 * v10 + d7 * v11) * v14;
+        s5 += v12 * v16; s7 += v13 * v16; s6 += v12 * v15; s8 += v13 * v15;
     }
-    const V v41 = -s10;
-    const V v42 = -s11;
-    const V v43 = -s12;
-    const V v44 = -s13;
-    softehl_store4(R + 4, 8, v44, v43, v42, v41);
+    softehl_store4(R + 4, 8, -s8, -s7, -s6, -s5);
 }
+SOFTEHL_BATCH(softehl_mortar_side_2_residual, 4, 8, 2, 0, 8, 0)
 
-void softehl_mortar_side_2_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_mortar_side_2_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mortar_side_2_residual_group(points, modes, coordinates + 4 * e, dofs + 8 * e, data + 2 * e, 0, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mortar_side_2_residual_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_mortar_side_2_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_mortar_side_2_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
     (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
     softehl_store4(R + 0, 8, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 0, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 4, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
@@ -156,222 +69,51 @@ static void softehl_mortar_side_2_tangent_group(
     softehl_store4(K + 40, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 48, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 56, 64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v1 = 1.0 / a0;
-    const V v2 = X2 - X0;
-    const V v3 = X3 - X1;
-    const V v4 = 0.5 * v2;
-    const V v5 = 0.5 * v3;
-    const V v6 = v4 * v4;
-    const V v7 = v5 * v5;
-    const V v8 = v6 + v7;
-    const V v9 = softehl_vsqrt(v8);
-    V s10 = softehl_splat(0.0);
-    V s11 = softehl_splat(0.0);
-    V s12 = softehl_splat(0.0);
-    V s13 = softehl_splat(0.0);
-    V s14 = softehl_splat(0.0);
-    V s15 = softehl_splat(0.0);
-    V s16 = softehl_splat(0.0);
-    V s17 = softehl_splat(0.0);
+    const V v1 = 1.0 / a0, v2 = 0.5 * (X2 - X0), v3 = 0.5 * (X3 - X1),
+        v4 = softehl_vsqrt(v2 * v2 + v3 * v3);
+    V s5 = {0}, s6 = {0}, s7 = {0}, s8 = {0}, s9 = {0}, s10 = {0}, s11 = {0}, s12 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const double v18 = 0.5 * w[0];
-        const double v19 = 0.5 - v18;
-        const double v20 = 0.5 + v18;
-        const V v21 = X1 * v19;
-        const V v22 = d4 * v19;
-        const V v23 = d5 * v19;
-        const V v24 = v19 * v1;
-        const V v25 = v20 * v1;
-        const V v26 = X3 * v20;
-        const V v27 = v21 + v26;
-        const V v28 = 6.283185307179586 * v27;
-        const V v29 = (-1.0) + v28;
-        const V v30 = a1 * v29;
-        const V v31 = 1.0 + v30;
-        const V v32 = d6 * v20;
-        const V v33 = v22 + v32;
-        const V v34 = d7 * v20;
-        const V v35 = v23 + v34;
-        const V v36 = w[1] * v25;
-        const V v37 = w[1] * v24;
-        const V v38 = v9 * v31;
-        const V v39 = v33 * v38;
-        const V v40 = v35 * v38;
-        const V v41 = v19 * v38;
-        const V v42 = v20 * v38;
-        const V v43 = v36 * v40;
-        s10 += v43;
-        const V v44 = v37 * v40;
-        s12 += v44;
-        const V v45 = v36 * v39;
-        s11 += v45;
-        const V v46 = v37 * v39;
-        s13 += v46;
-        const V v47 = v37 * v41;
-        s14 += v47;
-        const V v48 = v37 * v42;
-        s15 += v48;
-        const V v49 = v36 * v41;
-        s16 += v49;
-        const V v50 = v36 * v42;
-        s17 += v50;
+        const double *restrict w = rule + 2 * q; (void)w;
+        const double v13 = 0.5 * w[0], v14 = 0.5 - v13, v15 = 0.5 + v13;
+        const V v16 = w[1] * (v15 * v1), v17 = w[1] * (v14 * v1),
+            v18 = v4 * (1.0 + a1 * ((-1.0) + 6.283185307179586 * (X1 * v14 + X3 * v15))),
+            v19 = (d4 * v14 + d6 * v15) * v18, v20 = (d5 * v14 + d7 * v15) * v18, v21 = v14 * v18,
+            v22 = v15 * v18;
+        s5 += v16 * v20; s7 += v17 * v20; s6 += v16 * v19; s8 += v17 * v19; s9 += v17 * v21;
+        s10 += v17 * v22; s11 += v16 * v21; s12 += v16 * v22;
     }
-    const V v51 = -s10;
-    const V v52 = -s11;
-    const V v53 = -s12;
-    const V v54 = -s13;
-    softehl_store4(R + 4, 8, v54, v53, v52, v51);
-    const V v55 = -s14;
-    const V v56 = -s15;
-    softehl_store4(K + 36, 64, v55, softehl_splat(0.0), v56, softehl_splat(0.0));
-    softehl_store4(K + 44, 64, softehl_splat(0.0), v55, softehl_splat(0.0), v56);
-    const V v57 = -s16;
-    const V v58 = -s17;
-    softehl_store4(K + 52, 64, v57, softehl_splat(0.0), v58, softehl_splat(0.0));
-    softehl_store4(K + 60, 64, softehl_splat(0.0), v57, softehl_splat(0.0), v58);
+    softehl_store4(R + 4, 8, -s8, -s7, -s6, -s5);
+    const V v23 = -s9, v24 = -s10;
+    softehl_store4(K + 36, 64, v23, softehl_splat(0.0), v24, softehl_splat(0.0));
+    softehl_store4(K + 44, 64, softehl_splat(0.0), v23, softehl_splat(0.0), v24);
+    const V v25 = -s11, v26 = -s12;
+    softehl_store4(K + 52, 64, v25, softehl_splat(0.0), v26, softehl_splat(0.0));
+    softehl_store4(K + 60, 64, softehl_splat(0.0), v25, softehl_splat(0.0), v26);
 }
+SOFTEHL_BATCH(softehl_mortar_side_2_tangent, 4, 8, 2, 0, 8, (8 * 8))
 
-void softehl_mortar_side_2_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_mortar_side_2_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mortar_side_2_tangent_group(points, modes, coordinates + 4 * e, dofs + 8 * e, data + 2 * e, 0, parameters, rule, basis, values + 8 * e, tangent + (8 * 8) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mortar_side_2_tangent_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), tangent + (8 * 8) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * 8];
-    double K[SOFTEHL_LANES * (8 * 8)];
-    softehl_mortar_side_2_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (8 * 8) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_mortar_side_2_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1, X2, X3;
     softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
     V a0, a1;
-    softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
-    const V v1 = X2 - X0;
-    const V v2 = X3 - X1;
-    const V v3 = X0 + d0;
-    const V v4 = X2 + d2;
-    const V v5 = 0.5 * v1;
-    const V v6 = X1 + d1;
-    const V v7 = d2 - d0;
-    const V v8 = 0.5 * v2;
-    const V v9 = v1 + v7;
-    const V v10 = v5 * v5;
-    const V v11 = v2 - d1;
-    const V v12 = X3 + d3;
-    const V v13 = d3 + v11;
-    const V v14 = 0.5 * v9;
-    const V v15 = v8 * v8;
-    const V v16 = v10 + v15;
-    const V v17 = 0.5 * v13;
-    const V v18 = softehl_vsqrt(v16);
-    const V v19 = v14 * v14;
-    const V v20 = v17 * v17;
-    const V v21 = v19 + v20;
-    const V v22 = softehl_vsqrt(v21);
+    softehl_load2(a + 0, 2, &a0, &a1); (void)a0;
+    const V v1 = X2 - X0, v2 = X3 - X1, v3 = X0 + d0, v4 = X2 + d2, v5 = 0.5 * v1, v6 = X1 + d1,
+        v7 = 0.5 * v2, v8 = X3 + d3, v9 = 0.5 * (v1 + (d2 - d0)), v10 = 0.5 * (d3 + (v2 - d1)),
+        v11 = softehl_vsqrt(v5 * v5 + v7 * v7), v12 = softehl_vsqrt(v9 * v9 + v10 * v10);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const double v23 = 0.5 * w[0];
-        const double v24 = 0.5 - v23;
-        const double v25 = 0.5 + v23;
-        const V v26 = X1 * v24;
-        const V v27 = v25 * v12;
-        const V v28 = d4 * v24;
-        const V v29 = d5 * v24;
-        const V v30 = v25 * v4;
-        const V v31 = X3 * v25;
-        const V v32 = v26 + v31;
-        const V v33 = 6.283185307179586 * v32;
-        const V v34 = (-1.0) + v33;
-        const V v35 = v24 * v6;
-        const V v36 = v27 + v35;
-        const V v37 = v24 * v3;
-        const V v38 = v30 + v37;
-        const V v39 = 6.283185307179586 * v36;
-        const V v40 = (-1.0) + v39;
-        const V v41 = d6 * v25;
-        const V v42 = v28 + v41;
-        const V v43 = d7 * v25;
-        const V v44 = v29 + v43;
-        const V v45 = a1 * v34;
-        const V v46 = 1.0 + v45;
-        const V v47 = a1 * v40;
-        const V v48 = 1.0 + v47;
-        const V v49 = v18 * v46;
-        const V v50 = v42 * v49;
-        const V v51 = v44 * v49;
-        const V v52 = v22 * v48;
-        const V v53 = 1.0 / v52;
-        const V v54 = v50 * v53;
-        const V v55 = v51 * v53;
-        const V v56 = w[1] * v52;
-        softehl_store4(R + 5 * q + 0, (5 * points), v54, v55, v38, v36);
-        softehl_store1(R + 5 * q + 4, (5 * points), v56);
+        const double *restrict w = rule + 2 * q; (void)w;
+        const double v13 = 0.5 * w[0], v14 = 0.5 - v13, v15 = 0.5 + v13;
+        const V v16 = v15 * v8 + v14 * v6, v17 = v15 * v4 + v14 * v3,
+            v18 = v11 * (1.0 + a1 * ((-1.0) + 6.283185307179586 * (X1 * v14 + X3 * v15))),
+            v19 = v12 * (1.0 + a1 * ((-1.0) + 6.283185307179586 * v16)), v20 = 1.0 / v19,
+            v21 = (d4 * v14 + d6 * v15) * v18 * v20, v22 = (d5 * v14 + d7 * v15) * v18 * v20,
+            v23 = w[1] * v19;
+        softehl_store4(R + 5 * q + 0, (5 * points), v21, v22, v17, v16);
+        softehl_store1(R + 5 * q + 4, (5 * points), v23);
     }
 }
-
-void softehl_mortar_side_2_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mortar_side_2_fields_group(points, modes, coordinates + 4 * e, dofs + 8 * e, data + 2 * e, 0, parameters, rule, basis, values + (5 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mortar_side_2_fields_group(points, modes, coordinates + 4 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (5 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 4];
-    softehl_pad(X, coordinates, 4, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * (5 * points)];
-    softehl_mortar_side_2_fields(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (5 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_mortar_side_2_fields, 4, 8, 2, 0, (5 * points), 0)

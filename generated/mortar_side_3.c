@@ -22,160 +22,46 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_mortar_side_3_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_mortar_side_3_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5;
-    softehl_load2(X + 4, 6, &X4, &X5);
-    (void)X4; (void)X5;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 10, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 10, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9;
-    softehl_load2(d + 8, 10, &d8, &d9);
-    (void)d8; (void)d9;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5;
+    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3); softehl_load2(X + 4, 6, &X4, &X5);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9;
+    softehl_load4(d + 0, 10, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 10, &d4, &d5, &d6, &d7);
+    softehl_load2(d + 8, 10, &d8, &d9); (void)d0; (void)d1; (void)d2; (void)d3; (void)d4; (void)d5;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
     softehl_store4(R + 0, 10, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v1 = 2.0 * X4;
-    const V v2 = 2.0 * X5;
-    const V v3 = 1.0 / a0;
-    V s4 = softehl_splat(0.0);
-    V s5 = softehl_splat(0.0);
-    V s6 = softehl_splat(0.0);
-    V s7 = softehl_splat(0.0);
+    const V v1 = 2.0 * X4, v2 = 2.0 * X5, v3 = 1.0 / a0;
+    V s4 = {0}, s5 = {0}, s6 = {0}, s7 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const double v8 = 1.0 + w[0];
-        const double v9 = w[0] * w[0];
-        const double v10 = 1.0 - v9;
-        const double v11 = w[0] + (-0.5);
-        const double v12 = w[0] + 0.5;
-        const double v13 = 0.5 * w[0];
-        const double v14 = w[0] + (-1.0);
-        const V v15 = X5 * v10;
-        const V v16 = X3 * v8;
-        const V v17 = X3 * v12;
-        const V v18 = X2 * v12;
-        const double v19 = 0.5 - v13;
-        const double v20 = 0.5 + v13;
-        const V v21 = X1 * v14;
-        const V v22 = v16 + v21;
-        const V v23 = X1 * v11;
-        const V v24 = v23 + v17;
-        const V v25 = X0 * v11;
-        const V v26 = v25 + v18;
-        const V v27 = 0.5 * v22;
-        const V v28 = w[0] * v2;
-        const V v29 = v24 - v28;
-        const V v30 = w[0] * v1;
-        const V v31 = v26 - v30;
-        const V v32 = d6 * v19;
-        const V v33 = d7 * v19;
-        const V v34 = w[0] * v27;
-        const V v35 = v15 + v34;
-        const V v36 = v19 * v3;
-        const V v37 = v20 * v3;
-        const V v38 = v29 * v29;
-        const V v39 = d8 * v20;
-        const V v40 = v32 + v39;
-        const V v41 = d9 * v20;
-        const V v42 = v33 + v41;
-        const V v43 = v31 * v31;
-        const V v44 = v43 + v38;
-        const V v45 = w[1] * v36;
-        const V v46 = w[1] * v37;
-        const V v47 = softehl_vsqrt(v44);
-        const V v48 = 6.283185307179586 * v35;
-        const V v49 = (-1.0) + v48;
-        const V v50 = a1 * v49;
-        const V v51 = 1.0 + v50;
-        const V v52 = v47 * v51;
-        const V v53 = v40 * v52;
-        const V v54 = v42 * v52;
-        const V v55 = v46 * v54;
-        s4 += v55;
-        const V v56 = v45 * v54;
-        s6 += v56;
-        const V v57 = v46 * v53;
-        s5 += v57;
-        const V v58 = v45 * v53;
-        s7 += v58;
+        const double *restrict w = rule + 2 * q; (void)w;
+        const double v8 = w[0] + (-0.5), v9 = w[0] + 0.5, v10 = 0.5 * w[0], v11 = 0.5 - v10,
+            v12 = 0.5 + v10;
+        const V v13 = X1 * v8 + X3 * v9 - w[0] * v2, v14 = X0 * v8 + X2 * v9 - w[0] * v1,
+            v15 = X5 * (1.0 - w[0] * w[0]) + w[0] * (0.5 * (X3 * (1.0 + w[0]) + X1 * (w[0] + (-1.0)))),
+            v16 = w[1] * (v11 * v3), v17 = w[1] * (v12 * v3),
+            v18 = softehl_vsqrt(v14 * v14 + v13 * v13),
+            v19 = v18 * (1.0 + a1 * ((-1.0) + 6.283185307179586 * v15)),
+            v20 = (d6 * v11 + d8 * v12) * v19, v21 = (d7 * v11 + d9 * v12) * v19;
+        s4 += v17 * v21; s6 += v16 * v21; s5 += v17 * v20; s7 += v16 * v20;
     }
-    const V v59 = -s4;
-    const V v60 = -s5;
-    softehl_store2(R + 8, 10, v60, v59);
-    const V v61 = -s6;
-    const V v62 = -s7;
-    softehl_store4(R + 4, 10, softehl_splat(0.0), softehl_splat(0.0), v62, v61);
+    softehl_store2(R + 8, 10, -s5, -s4);
+    softehl_store4(R + 4, 10, softehl_splat(0.0), softehl_splat(0.0), -s7, -s6);
 }
+SOFTEHL_BATCH(softehl_mortar_side_3_residual, 6, 10, 2, 0, 10, 0)
 
-void softehl_mortar_side_3_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_mortar_side_3_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mortar_side_3_residual_group(points, modes, coordinates + 6 * e, dofs + 10 * e, data + 2 * e, 0, parameters, rule, basis, values + 10 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mortar_side_3_residual_group(points, modes, coordinates + 6 * (n - SOFTEHL_LANES), dofs + 10 * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 10 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 6];
-    softehl_pad(X, coordinates, 6, n);
-    double d[SOFTEHL_LANES * 10];
-    softehl_pad(d, dofs, 10, n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * 10];
-    softehl_mortar_side_3_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 10 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_mortar_side_3_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5;
-    softehl_load2(X + 4, 6, &X4, &X5);
-    (void)X4; (void)X5;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 10, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 10, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9;
-    softehl_load2(d + 8, 10, &d8, &d9);
-    (void)d8; (void)d9;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5;
+    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3); softehl_load2(X + 4, 6, &X4, &X5);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9;
+    softehl_load4(d + 0, 10, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 10, &d4, &d5, &d6, &d7);
+    softehl_load2(d + 8, 10, &d8, &d9); (void)d0; (void)d1; (void)d2; (void)d3; (void)d4; (void)d5;
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
     softehl_store4(R + 0, 10, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 0, 100, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 4, 100, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
@@ -196,280 +82,63 @@ static void softehl_mortar_side_3_tangent_group(
     softehl_store4(K + 72, 100, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 80, 100, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 92, 100, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v1 = 2.0 * X4;
-    const V v2 = 2.0 * X5;
-    const V v3 = 1.0 / a0;
-    V s4 = softehl_splat(0.0);
-    V s5 = softehl_splat(0.0);
-    V s6 = softehl_splat(0.0);
-    V s7 = softehl_splat(0.0);
-    V s8 = softehl_splat(0.0);
-    V s9 = softehl_splat(0.0);
-    V s10 = softehl_splat(0.0);
-    V s11 = softehl_splat(0.0);
+    const V v1 = 2.0 * X4, v2 = 2.0 * X5, v3 = 1.0 / a0;
+    V s4 = {0}, s5 = {0}, s6 = {0}, s7 = {0}, s8 = {0}, s9 = {0}, s10 = {0}, s11 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const double v12 = 1.0 + w[0];
-        const double v13 = w[0] * w[0];
-        const double v14 = 1.0 - v13;
-        const double v15 = w[0] + (-0.5);
-        const double v16 = w[0] + 0.5;
-        const double v17 = 0.5 * w[0];
-        const double v18 = w[0] + (-1.0);
-        const V v19 = X5 * v14;
-        const V v20 = X3 * v12;
-        const V v21 = X3 * v16;
-        const V v22 = X2 * v16;
-        const double v23 = 0.5 - v17;
-        const double v24 = 0.5 + v17;
-        const V v25 = X1 * v18;
-        const V v26 = v20 + v25;
-        const V v27 = X1 * v15;
-        const V v28 = v27 + v21;
-        const V v29 = X0 * v15;
-        const V v30 = v29 + v22;
-        const V v31 = 0.5 * v26;
-        const V v32 = w[0] * v2;
-        const V v33 = v28 - v32;
-        const V v34 = w[0] * v1;
-        const V v35 = v30 - v34;
-        const V v36 = d6 * v23;
-        const V v37 = d7 * v23;
-        const V v38 = w[0] * v31;
-        const V v39 = v19 + v38;
-        const V v40 = v33 * v33;
-        const V v41 = d8 * v24;
-        const V v42 = v36 + v41;
-        const V v43 = d9 * v24;
-        const V v44 = v37 + v43;
-        const V v45 = v35 * v35;
-        const V v46 = v45 + v40;
-        const V v47 = v23 * v3;
-        const V v48 = v24 * v3;
-        const V v49 = softehl_vsqrt(v46);
-        const V v50 = 6.283185307179586 * v39;
-        const V v51 = (-1.0) + v50;
-        const V v52 = w[1] * v47;
-        const V v53 = w[1] * v48;
-        const V v54 = a1 * v51;
-        const V v55 = 1.0 + v54;
-        const V v56 = v49 * v55;
-        const V v57 = v42 * v56;
-        const V v58 = v44 * v56;
-        const V v59 = v23 * v56;
-        const V v60 = v24 * v56;
-        const V v61 = v53 * v58;
-        s4 += v61;
-        const V v62 = v52 * v58;
-        s6 += v62;
-        const V v63 = v53 * v57;
-        s5 += v63;
-        const V v64 = v52 * v57;
-        s7 += v64;
-        const V v65 = v52 * v59;
-        s8 += v65;
-        const V v66 = v52 * v60;
-        s9 += v66;
-        const V v67 = v53 * v59;
-        s10 += v67;
-        const V v68 = v53 * v60;
-        s11 += v68;
+        const double *restrict w = rule + 2 * q; (void)w;
+        const double v12 = w[0] + (-0.5), v13 = w[0] + 0.5, v14 = 0.5 * w[0], v15 = 0.5 - v14,
+            v16 = 0.5 + v14;
+        const V v17 = X1 * v12 + X3 * v13 - w[0] * v2, v18 = X0 * v12 + X2 * v13 - w[0] * v1,
+            v19 = X5 * (1.0 - w[0] * w[0]) + w[0] * (0.5 * (X3 * (1.0 + w[0]) + X1 * (w[0] + (-1.0)))),
+            v20 = softehl_vsqrt(v18 * v18 + v17 * v17), v21 = w[1] * (v15 * v3),
+            v22 = w[1] * (v16 * v3), v23 = v20 * (1.0 + a1 * ((-1.0) + 6.283185307179586 * v19)),
+            v24 = (d6 * v15 + d8 * v16) * v23, v25 = (d7 * v15 + d9 * v16) * v23, v26 = v15 * v23,
+            v27 = v16 * v23;
+        s4 += v22 * v25; s6 += v21 * v25; s5 += v22 * v24; s7 += v21 * v24; s8 += v21 * v26;
+        s9 += v21 * v27; s10 += v22 * v26; s11 += v22 * v27;
     }
-    const V v69 = -s4;
-    const V v70 = -s5;
-    softehl_store2(R + 8, 10, v70, v69);
-    const V v71 = -s6;
-    const V v72 = -s7;
-    softehl_store4(R + 4, 10, softehl_splat(0.0), softehl_splat(0.0), v72, v71);
-    const V v73 = -s8;
-    softehl_store4(K + 64, 100, softehl_splat(0.0), softehl_splat(0.0), v73, softehl_splat(0.0));
-    const V v74 = -s9;
-    softehl_store4(K + 68, 100, v74, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 76, 100, softehl_splat(0.0), v73, softehl_splat(0.0), v74);
-    const V v75 = -s10;
-    softehl_store4(K + 84, 100, softehl_splat(0.0), softehl_splat(0.0), v75, softehl_splat(0.0));
-    const V v76 = -s11;
-    softehl_store4(K + 88, 100, v76, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 96, 100, softehl_splat(0.0), v75, softehl_splat(0.0), v76);
+    softehl_store2(R + 8, 10, -s5, -s4);
+    softehl_store4(R + 4, 10, softehl_splat(0.0), softehl_splat(0.0), -s7, -s6); const V v28 = -s8;
+    softehl_store4(K + 64, 100, softehl_splat(0.0), softehl_splat(0.0), v28, softehl_splat(0.0));
+    const V v29 = -s9;
+    softehl_store4(K + 68, 100, v29, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 76, 100, softehl_splat(0.0), v28, softehl_splat(0.0), v29);
+    const V v30 = -s10;
+    softehl_store4(K + 84, 100, softehl_splat(0.0), softehl_splat(0.0), v30, softehl_splat(0.0));
+    const V v31 = -s11;
+    softehl_store4(K + 88, 100, v31, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 96, 100, softehl_splat(0.0), v30, softehl_splat(0.0), v31);
 }
+SOFTEHL_BATCH(softehl_mortar_side_3_tangent, 6, 10, 2, 0, 10, (10 * 10))
 
-void softehl_mortar_side_3_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_mortar_side_3_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mortar_side_3_tangent_group(points, modes, coordinates + 6 * e, dofs + 10 * e, data + 2 * e, 0, parameters, rule, basis, values + 10 * e, tangent + (10 * 10) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mortar_side_3_tangent_group(points, modes, coordinates + 6 * (n - SOFTEHL_LANES), dofs + 10 * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 10 * (n - SOFTEHL_LANES), tangent + (10 * 10) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 6];
-    softehl_pad(X, coordinates, 6, n);
-    double d[SOFTEHL_LANES * 10];
-    softehl_pad(d, dofs, 10, n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * 10];
-    double K[SOFTEHL_LANES * (10 * 10)];
-    softehl_mortar_side_3_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 10 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (10 * 10) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_mortar_side_3_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5;
-    softehl_load2(X + 4, 6, &X4, &X5);
-    (void)X4; (void)X5;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 10, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 10, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5;
+    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3); softehl_load2(X + 4, 6, &X4, &X5);
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9;
+    softehl_load4(d + 0, 10, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 10, &d4, &d5, &d6, &d7);
     softehl_load2(d + 8, 10, &d8, &d9);
-    (void)d8; (void)d9;
     V a0, a1;
-    softehl_load2(a + 0, 2, &a0, &a1);
-    (void)a0; (void)a1;
-    const V v1 = X0 + d0;
-    const V v2 = X2 + d2;
-    const V v3 = X1 + d1;
-    const V v4 = X3 + d3;
-    const V v5 = X4 + d4;
-    const V v6 = 2.0 * X4;
-    const V v7 = 2.0 * X5;
-    const V v8 = X5 + d5;
+    softehl_load2(a + 0, 2, &a0, &a1); (void)a0;
+    const V v1 = X0 + d0, v2 = X2 + d2, v3 = X1 + d1, v4 = X3 + d3, v5 = X4 + d4, v6 = 2.0 * X4,
+        v7 = 2.0 * X5, v8 = X5 + d5;
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 2 * q;
-        (void)w;
-        const double v9 = 1.0 + w[0];
-        const double v10 = w[0] + (-0.5);
-        const double v11 = w[0] + 0.5;
-        const double v12 = w[0] * w[0];
-        const double v13 = 1.0 - v12;
-        const double v14 = w[0] + (-1.0);
-        const double v15 = 2.0 * w[0];
-        const double v16 = 0.5 * w[0];
-        const V v17 = X0 * v10;
-        const double v18 = 0.5 - v16;
-        const double v19 = 0.5 + v16;
-        const V v20 = X5 * v13;
-        const double v21 = v9 * v16;
-        const double v22 = v14 * v16;
-        const V v23 = X3 * v9;
-        const V v24 = X3 * v11;
-        const V v25 = X2 * v11;
-        const V v26 = v17 + v25;
-        const V v27 = v11 * v2;
-        const V v28 = v11 * v4;
-        const V v29 = v4 * v21;
-        const V v30 = v2 * v21;
-        const V v31 = X1 * v14;
-        const V v32 = v23 + v31;
-        const V v33 = X1 * v10;
-        const V v34 = v33 + v24;
-        const V v35 = w[0] * v6;
-        const V v36 = v26 - v35;
-        const V v37 = d6 * v18;
-        const V v38 = d7 * v18;
-        const V v39 = 0.5 * v32;
-        const V v40 = w[0] * v7;
-        const V v41 = v34 - v40;
-        const V v42 = v36 * v36;
-        const V v43 = w[0] * v39;
-        const V v44 = v20 + v43;
-        const V v45 = d8 * v19;
-        const V v46 = v37 + v45;
-        const V v47 = d9 * v19;
-        const V v48 = v38 + v47;
-        const V v49 = v41 * v41;
-        const V v50 = v42 + v49;
-        const V v51 = v10 * v1;
-        const V v52 = v27 + v51;
-        const V v53 = v1 * v22;
-        const V v54 = v30 + v53;
-        const V v55 = v10 * v3;
-        const V v56 = v28 + v55;
-        const V v57 = v3 * v22;
-        const V v58 = v29 + v57;
-        const V v59 = softehl_vsqrt(v50);
-        const V v60 = v5 * v13;
-        const V v61 = v60 + v54;
-        const V v62 = v15 * v5;
-        const V v63 = v52 - v62;
-        const V v64 = v15 * v8;
-        const V v65 = v56 - v64;
-        const V v66 = v8 * v13;
-        const V v67 = v66 + v58;
-        const V v68 = v63 * v63;
-        const V v69 = 6.283185307179586 * v44;
-        const V v70 = (-1.0) + v69;
-        const V v71 = 6.283185307179586 * v67;
-        const V v72 = (-1.0) + v71;
-        const V v73 = v65 * v65;
-        const V v74 = v68 + v73;
-        const V v75 = softehl_vsqrt(v74);
-        const V v76 = a1 * v70;
-        const V v77 = 1.0 + v76;
-        const V v78 = v59 * v77;
-        const V v79 = a1 * v72;
-        const V v80 = 1.0 + v79;
-        const V v81 = v75 * v80;
-        const V v82 = v46 * v78;
-        const V v83 = v48 * v78;
-        const V v84 = 1.0 / v81;
-        const V v85 = w[1] * v81;
-        const V v86 = v82 * v84;
-        const V v87 = v83 * v84;
-        softehl_store4(R + 5 * q + 0, (5 * points), v86, v87, v61, v67);
-        softehl_store1(R + 5 * q + 4, (5 * points), v85);
+        const double *restrict w = rule + 2 * q; (void)w;
+        const double v9 = 1.0 + w[0], v10 = w[0] + (-0.5), v11 = w[0] + 0.5,
+            v12 = 1.0 - w[0] * w[0], v13 = w[0] + (-1.0), v14 = 2.0 * w[0], v15 = 0.5 * w[0],
+            v16 = 0.5 - v15, v17 = 0.5 + v15, v18 = v9 * v15, v19 = v13 * v15;
+        const V v20 = X0 * v10 + X2 * v11 - w[0] * v6, v21 = X1 * v10 + X3 * v11 - w[0] * v7,
+            v22 = softehl_vsqrt(v20 * v20 + v21 * v21), v23 = v5 * v12 + (v2 * v18 + v1 * v19),
+            v24 = v11 * v2 + v10 * v1 - v14 * v5, v25 = v11 * v4 + v10 * v3 - v14 * v8,
+            v26 = v8 * v12 + (v4 * v18 + v3 * v19),
+            v27 = 6.283185307179586 * (X5 * v12 + w[0] * (0.5 * (X3 * v9 + X1 * v13))),
+            v28 = softehl_vsqrt(v24 * v24 + v25 * v25), v29 = v22 * (1.0 + a1 * ((-1.0) + v27)),
+            v30 = v28 * (1.0 + a1 * ((-1.0) + 6.283185307179586 * v26)), v31 = 1.0 / v30,
+            v32 = w[1] * v30, v33 = (d6 * v16 + d8 * v17) * v29 * v31,
+            v34 = (d7 * v16 + d9 * v17) * v29 * v31;
+        softehl_store4(R + 5 * q + 0, (5 * points), v33, v34, v23, v26);
+        softehl_store1(R + 5 * q + 4, (5 * points), v32);
     }
 }
-
-void softehl_mortar_side_3_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_mortar_side_3_fields_group(points, modes, coordinates + 6 * e, dofs + 10 * e, data + 2 * e, 0, parameters, rule, basis, values + (5 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_mortar_side_3_fields_group(points, modes, coordinates + 6 * (n - SOFTEHL_LANES), dofs + 10 * (n - SOFTEHL_LANES), data + 2 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (5 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 6];
-    softehl_pad(X, coordinates, 6, n);
-    double d[SOFTEHL_LANES * 10];
-    softehl_pad(d, dofs, 10, n);
-    double a[SOFTEHL_LANES * 2];
-    softehl_pad(a, data, 2, n);
-    double R[SOFTEHL_LANES * (5 * points)];
-    softehl_mortar_side_3_fields(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (5 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_mortar_side_3_fields, 6, 10, 2, 0, (5 * points), 0)

@@ -9,13 +9,7 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_sheet_arruda_boyce_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_arruda_boyce_energy)
 {
     (void)points;
     (void)modes;
@@ -25,62 +19,23 @@ void softehl_sheet_arruda_boyce_energy(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
         (void)X; (void)d;
-        const double v1 = exp(d[1]);
-        const double v2 = v1 * v1;
-        const double v3 = exp(d[0]);
-        const double v4 = v3 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = d[0] + d[1];
-        const double v7 = -v6;
-        const double v8 = exp(v7);
-        const double v9 = v8 * v8;
-        const double v10 = v5 + v9;
-        const double v11 = v10 * v10;
-        const double v12 = v11 * v11;
-        const double v13 = 0.0027142857142857142 * v12;
-        const double v14 = v13 - 0.21985714285714286;
-        const double v15 = parameters[1] * parameters[1];
-        const double v16 = parameters[1] * v15;
-        const double v17 = v16 * v16;
-        const double v18 = 1.0 / v17;
-        const double v19 = v18 * v14;
-        const double v20 = 0.05 * v11;
-        const double v21 = v20 - 0.45;
-        const double v22 = 1.0 / v15;
-        const double v23 = v22 * v21;
-        const double v24 = v19 + v23;
-        const double v25 = 0.0007703153988868275 * v10;
-        const double v26 = v12 * v25;
-        const double v27 = v26 - 0.18718664192949908;
-        const double v28 = v15 * v15;
-        const double v29 = v28 * v28;
-        const double v30 = 1.0 / v29;
-        const double v31 = v30 * v27;
-        const double v32 = v31 + v24;
-        const double v33 = 0.010476190476190476 * v10;
-        const double v34 = v11 * v33;
-        const double v35 = v34 - 0.28285714285714286;
-        const double v36 = 1.0 / v28;
-        const double v37 = v36 * v35;
-        const double v38 = v37 + v32;
-        const double v39 = v38 - 1.5;
-        const double v40 = 0.5 * v10;
-        const double v41 = v40 + v39;
-        const double v42 = parameters[0] * v41;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 * v10,
+            v12 = v11 * v11, v13 = 0.0027142857142857142 * v12, v14 = v13 - 0.21985714285714286,
+            v15 = parameters[1] * parameters[1], v16 = parameters[1] * v15, v17 = v16 * v16,
+            v18 = 1.0 / v17, v19 = v18 * v14, v20 = 0.05 * v11, v21 = v20 - 0.45, v22 = 1.0 / v15,
+            v23 = v22 * v21, v24 = v19 + v23, v25 = 0.0007703153988868275 * v10, v26 = v12 * v25,
+            v27 = v26 - 0.18718664192949908, v28 = v15 * v15, v29 = v28 * v28, v30 = 1.0 / v29,
+            v31 = v30 * v27, v32 = v31 + v24, v33 = 0.010476190476190476 * v10, v34 = v11 * v33,
+            v35 = v34 - 0.28285714285714286, v36 = 1.0 / v28, v37 = v36 * v35, v38 = v37 + v32,
+            v39 = v38 - 1.5, v40 = 0.5 * v10, v41 = v40 + v39, v42 = parameters[0] * v41;
         values[e] = v42;
     }
 }
 
-void softehl_sheet_arruda_boyce_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_arruda_boyce_residual)
 {
     (void)points;
     (void)modes;
@@ -90,202 +45,51 @@ void softehl_sheet_arruda_boyce_residual(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[1]);
-        const double v2 = v1 * v1;
-        const double v3 = exp(d[0]);
-        const double v4 = v3 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = d[0] + d[1];
-        const double v7 = -v6;
-        const double v8 = exp(v7);
-        const double v9 = v8 * v8;
-        const double v10 = v5 + v9;
-        const double v11 = v10 * v10;
-        const double v12 = parameters[1] * parameters[1];
-        const double v13 = v12 * v12;
-        const double v14 = v13 * v13;
-        const double v15 = 1.0 / v14;
-        const double v16 = 0.0038515769944341373 * v15;
-        const double v17 = v11 * v16;
-        const double v18 = parameters[1] * v12;
-        const double v19 = v18 * v18;
-        const double v20 = 1.0 / v19;
-        const double v21 = 0.010857142857142857 * v20;
-        const double v22 = v10 * v21;
-        const double v23 = v22 + v17;
-        const double v24 = 1.0 / v13;
-        const double v25 = 0.03142857142857143 * v24;
-        const double v26 = v25 + v23;
-        const double v27 = v11 * v26;
-        const double v28 = 1.0 / v12;
-        const double v29 = 0.1 * v28;
-        const double v30 = v10 * v29;
-        const double v31 = 0.5 + v30;
-        const double v32 = v31 + v27;
-        const double v33 = parameters[0] * v32;
-        const double v34 = 2.0 * v3;
-        const double v35 = v3 * v34;
-        const double v36 = v35 * v33;
-        const double v37 = 2.0 * v8;
-        const double v38 = v8 * v37;
-        const double v39 = v38 * v33;
-        const double v40 = v36 - v39;
-        const double v41 = 2.0 * v1;
-        const double v42 = v1 * v41;
-        const double v43 = v42 * v33;
-        const double v44 = v43 - v39;
-        R[0] = v40;
-        R[1] = v44;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 * v10,
+            v12 = parameters[1] * parameters[1], v13 = v12 * v12, v14 = v13 * v13, v15 = 1.0 / v14,
+            v16 = 0.0038515769944341373 * v15, v17 = v11 * v16, v18 = parameters[1] * v12,
+            v19 = v18 * v18, v20 = 1.0 / v19, v21 = 0.010857142857142857 * v20, v22 = v10 * v21,
+            v23 = v22 + v17, v24 = 1.0 / v13, v25 = 0.03142857142857143 * v24, v26 = v25 + v23,
+            v27 = v11 * v26, v28 = 1.0 / v12, v29 = 0.1 * v28, v30 = v10 * v29, v31 = 0.5 + v30,
+            v32 = v31 + v27, v33 = parameters[0] * v32, v34 = 2.0 * v3, v35 = v3 * v34,
+            v36 = v35 * v33, v37 = 2.0 * v8, v38 = v8 * v37, v39 = v38 * v33, v40 = v36 - v39,
+            v41 = 2.0 * v1, v42 = v1 * v41, v43 = v42 * v33, v44 = v43 - v39;
+        R[0] = v40; R[1] = v44;
     }
 }
 
-static void softehl_sheet_arruda_boyce_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_sheet_arruda_boyce_tangent)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
     V d0, d1;
     softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const V v1 = softehl_vexp(d0);
-    const V v2 = softehl_vexp(d1);
-    const V v3 = d0 + d1;
-    const double v4 = parameters[1] * parameters[1];
-    const V v5 = -v3;
-    const double v6 = parameters[1] * v4;
-    const double v7 = 0.5 * parameters[0];
-    const double v8 = v4 * v4;
-    const double v9 = 1.0 / v4;
-    const V v10 = softehl_vexp(v5);
-    const double v11 = v6 * v6;
-    const double v12 = v8 * v8;
-    const double v13 = 1.0 / v8;
-    const double v14 = 1.0 / v12;
-    const double v15 = 1.0 / v11;
-    const double v16 = parameters[0] * v9;
-    const double v17 = parameters[0] * v13;
-    const double v18 = parameters[0] * v15;
-    const double v19 = parameters[0] * v14;
-    const V v20 = 2.0 * v10;
-    const V v21 = 2.0 * v2;
-    const V v22 = 2.0 * v1;
-    const double v23 = 0.05 * v16;
-    const double v24 = 0.1 * v16;
-    const double v25 = 0.010476190476190476 * v17;
-    const double v26 = 0.03142857142857143 * v17;
-    const double v27 = 0.0027142857142857142 * v18;
-    const double v28 = 0.010857142857142857 * v18;
-    const V v29 = v10 * v20;
-    const V v30 = v1 * v22;
-    const V v31 = v1 * v1;
-    const V v32 = v2 * v2;
-    const V v33 = v31 + v32;
-    const V v34 = v10 * v10;
-    const V v35 = v33 + v34;
-    const V v36 = v35 * v35;
-    const V v37 = 2.0 * v35;
-    const V v38 = v37 * v26;
-    const V v39 = v24 + v38;
-    const V v40 = 4.0 * v35;
-    const V v41 = v36 * v40;
-    const V v42 = v23 * v37;
-    const V v43 = v7 + v42;
-    const V v44 = v27 * v41;
-    const V v45 = v44 + v43;
-    const V v46 = 3.0 * v36;
-    const V v47 = v25 * v46;
-    const V v48 = v47 + v45;
-    const V v49 = v46 * v28;
-    const V v50 = v39 + v49;
-    const V v51 = 0.0038515769944341373 * v36;
-    const V v52 = v36 * v51;
-    const V v53 = v19 * v52;
-    const V v54 = v53 + v48;
-    const double v55 = 0.0038515769944341373 * v19;
-    const V v56 = v55 * v41;
-    const V v57 = v50 + v56;
-    const V v58 = v20 * v54;
-    const V v59 = v22 * v54;
-    const V v60 = v21 * v54;
-    const V v61 = v10 * v58;
-    const V v62 = v2 * v21;
-    const V v63 = v62 - v29;
-    const V v64 = v63 * v57;
-    const V v65 = v21 * v64;
-    const V v66 = v65 + v60;
-    const V v67 = v2 * v60;
-    const V v68 = v2 * v66;
-    const V v69 = v30 - v29;
-    const V v70 = v69 * v57;
-    const V v71 = v22 * v70;
-    const V v72 = v20 * v70;
-    const V v73 = v72 - v58;
-    const V v74 = v71 + v59;
-    const V v75 = v1 * v59;
-    const V v76 = v1 * v74;
-    const V v77 = v10 * v73;
-    const V v78 = v76 - v77;
-    const V v79 = v30 * v64;
-    const V v80 = v20 * v64;
-    const V v81 = v80 - v58;
-    const V v82 = v61 + v78;
-    const V v83 = v75 + v82;
-    const V v84 = v75 - v61;
-    const V v85 = v67 + v68;
-    const V v86 = v67 - v61;
-    softehl_store2(R + 0, 2, v84, v86);
-    const V v87 = v10 * v81;
-    const V v88 = v61 - v87;
-    const V v89 = v79 + v88;
-    const V v90 = v85 + v88;
-    softehl_store4(K + 0, 4, v83, v89, v89, v90);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1);
+    const double v3 = parameters[1] * parameters[1], v4 = parameters[1] * v3, v5 = v3 * v3;
+    const V v6 = softehl_vexp(-(d0 + d1));
+    const double v7 = parameters[0] * (1.0 / v3), v8 = parameters[0] * (1.0 / v5),
+        v9 = parameters[0] * (1.0 / (v4 * v4)), v10 = parameters[0] * (1.0 / (v5 * v5));
+    const V v11 = 2.0 * v6, v12 = 2.0 * v2, v13 = 2.0 * v1, v14 = v6 * v11, v15 = v1 * v13,
+        v16 = v1 * v1 + v2 * v2 + v6 * v6, v17 = v16 * v16, v18 = 2.0 * v16,
+        v19 = v17 * (4.0 * v16),
+        v20 = 0.0027142857142857142 * v9 * v19 + (0.5 * parameters[0] + 0.05 * v7 * v18),
+        v21 = 3.0 * v17,
+        v22 = 0.1 * v7 + v18 * (0.03142857142857143 * v8) + v21 * (0.010857142857142857 * v9),
+        v23 = v10 * (v17 * (0.0038515769944341373 * v17)) + (0.010476190476190476 * v8 * v21 + v20),
+        v24 = v22 + 0.0038515769944341373 * v10 * v19, v25 = v11 * v23, v26 = v13 * v23,
+        v27 = v12 * v23, v28 = v6 * v25, v29 = (v2 * v12 - v14) * v24, v30 = v2 * v27,
+        v31 = (v15 - v14) * v24, v32 = v1 * v26;
+    softehl_store2(R + 0, 2, v32 - v28, v30 - v28);
+    const V v33 = v28 - v6 * (v11 * v29 - v25), v34 = v15 * v29 + v33;
+    softehl_store4(K + 0, 4, v32 + (v28 + (v1 * (v13 * v31 + v26) - v6 * (v11 * v31 - v25))), v34, v34, v30 + v2 * (v12 * v29 + v27) + v33);
 }
+SOFTEHL_BATCH(softehl_sheet_arruda_boyce_tangent, 2, 2, 0, 0, 2, (2 * 2))
 
-void softehl_sheet_arruda_boyce_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_arruda_boyce_tangent_group(points, modes, coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters, rule, basis, values + 2 * e, tangent + (2 * 2) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_sheet_arruda_boyce_tangent_group(points, modes, coordinates + 2 * (n - SOFTEHL_LANES), dofs + 2 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 2 * (n - SOFTEHL_LANES), tangent + (2 * 2) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates, 2, n);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs, 2, n);
-    double R[SOFTEHL_LANES * 2];
-    double K[SOFTEHL_LANES * (2 * 2)];
-    softehl_sheet_arruda_boyce_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 2 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (2 * 2) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-void softehl_sheet_arruda_boyce_d_mu(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_arruda_boyce_d_mu)
 {
     (void)points;
     (void)modes;
@@ -295,65 +99,23 @@ void softehl_sheet_arruda_boyce_d_mu(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[1]);
-        const double v2 = v1 * v1;
-        const double v3 = exp(d[0]);
-        const double v4 = v3 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = d[0] + d[1];
-        const double v7 = -v6;
-        const double v8 = exp(v7);
-        const double v9 = v8 * v8;
-        const double v10 = v5 + v9;
-        const double v11 = v10 * v10;
-        const double v12 = parameters[1] * parameters[1];
-        const double v13 = v12 * v12;
-        const double v14 = v13 * v13;
-        const double v15 = 1.0 / v14;
-        const double v16 = 0.0038515769944341373 * v15;
-        const double v17 = v11 * v16;
-        const double v18 = parameters[1] * v12;
-        const double v19 = v18 * v18;
-        const double v20 = 1.0 / v19;
-        const double v21 = 0.010857142857142857 * v20;
-        const double v22 = v10 * v21;
-        const double v23 = v22 + v17;
-        const double v24 = 1.0 / v13;
-        const double v25 = 0.03142857142857143 * v24;
-        const double v26 = v25 + v23;
-        const double v27 = v11 * v26;
-        const double v28 = 1.0 / v12;
-        const double v29 = 0.1 * v28;
-        const double v30 = v10 * v29;
-        const double v31 = 0.5 + v30;
-        const double v32 = v31 + v27;
-        const double v33 = 2.0 * v3;
-        const double v34 = v3 * v33;
-        const double v35 = v34 * v32;
-        const double v36 = 2.0 * v8;
-        const double v37 = v8 * v36;
-        const double v38 = v37 * v32;
-        const double v39 = v35 - v38;
-        const double v40 = 2.0 * v1;
-        const double v41 = v1 * v40;
-        const double v42 = v41 * v32;
-        const double v43 = v42 - v38;
-        R[0] = v39;
-        R[1] = v43;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 * v10,
+            v12 = parameters[1] * parameters[1], v13 = v12 * v12, v14 = v13 * v13, v15 = 1.0 / v14,
+            v16 = 0.0038515769944341373 * v15, v17 = v11 * v16, v18 = parameters[1] * v12,
+            v19 = v18 * v18, v20 = 1.0 / v19, v21 = 0.010857142857142857 * v20, v22 = v10 * v21,
+            v23 = v22 + v17, v24 = 1.0 / v13, v25 = 0.03142857142857143 * v24, v26 = v25 + v23,
+            v27 = v11 * v26, v28 = 1.0 / v12, v29 = 0.1 * v28, v30 = v10 * v29, v31 = 0.5 + v30,
+            v32 = v31 + v27, v33 = 2.0 * v3, v34 = v3 * v33, v35 = v34 * v32, v36 = 2.0 * v8,
+            v37 = v8 * v36, v38 = v37 * v32, v39 = v35 - v38, v40 = 2.0 * v1, v41 = v1 * v40,
+            v42 = v41 * v32, v43 = v42 - v38;
+        R[0] = v39; R[1] = v43;
     }
 }
 
-void softehl_sheet_arruda_boyce_d_lambda_m(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_arruda_boyce_d_lambda_m)
 {
     (void)points;
     (void)modes;
@@ -363,63 +125,20 @@ void softehl_sheet_arruda_boyce_d_lambda_m(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = parameters[1] * parameters[1];
-        const double v2 = v1 * v1;
-        const double v3 = v2 * v2;
-        const double v4 = 1.0 / v3;
-        const double v5 = 0.030812615955473098 * v4;
-        const double v6 = v4 * v5;
-        const double v7 = parameters[1] * v1;
-        const double v8 = v7 * v7;
-        const double v9 = v8 * v6;
-        const double v10 = exp(d[1]);
-        const double v11 = v10 * v10;
-        const double v12 = exp(d[0]);
-        const double v13 = v12 * v12;
-        const double v14 = v13 + v11;
-        const double v15 = d[0] + d[1];
-        const double v16 = -v15;
-        const double v17 = exp(v16);
-        const double v18 = v17 * v17;
-        const double v19 = v14 + v18;
-        const double v20 = v19 * v19;
-        const double v21 = v20 * v9;
-        const double v22 = v20 * v21;
-        const double v23 = 0.06514285714285714 * v2;
-        const double v24 = 1.0 / v8;
-        const double v25 = v24 * v23;
-        const double v26 = v24 * v25;
-        const double v27 = v20 * v26;
-        const double v28 = 1.0 / v1;
-        const double v29 = 0.2 * v28;
-        const double v30 = v28 * v29;
-        const double v31 = v30 + v27;
-        const double v32 = v19 * v31;
-        const double v33 = v32 + v22;
-        const double v34 = parameters[1] * v33;
-        const double v35 = 1.0 / v2;
-        const double v36 = 0.12571428571428572 * v7;
-        const double v37 = v35 * v36;
-        const double v38 = v35 * v37;
-        const double v39 = v20 * v38;
-        const double v40 = v39 + v34;
-        const double v41 = parameters[0] * v40;
-        const double v42 = 2.0 * v12;
-        const double v43 = v12 * v42;
-        const double v44 = v43 * v41;
-        const double v45 = 2.0 * v17;
-        const double v46 = v17 * v45;
-        const double v47 = v46 * v41;
-        const double v48 = v47 - v44;
-        const double v49 = 2.0 * v10;
-        const double v50 = v10 * v49;
-        const double v51 = v50 * v41;
-        const double v52 = v47 - v51;
-        R[0] = v48;
-        R[1] = v52;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = parameters[1] * parameters[1], v2 = v1 * v1, v3 = v2 * v2, v4 = 1.0 / v3,
+            v5 = 0.030812615955473098 * v4, v6 = v4 * v5, v7 = parameters[1] * v1, v8 = v7 * v7,
+            v9 = v8 * v6, v10 = exp(d[1]), v11 = v10 * v10, v12 = exp(d[0]), v13 = v12 * v12,
+            v14 = v13 + v11, v15 = d[0] + d[1], v16 = -v15, v17 = exp(v16), v18 = v17 * v17,
+            v19 = v14 + v18, v20 = v19 * v19, v21 = v20 * v9, v22 = v20 * v21,
+            v23 = 0.06514285714285714 * v2, v24 = 1.0 / v8, v25 = v24 * v23, v26 = v24 * v25,
+            v27 = v20 * v26, v28 = 1.0 / v1, v29 = 0.2 * v28, v30 = v28 * v29, v31 = v30 + v27,
+            v32 = v19 * v31, v33 = v32 + v22, v34 = parameters[1] * v33, v35 = 1.0 / v2,
+            v36 = 0.12571428571428572 * v7, v37 = v35 * v36, v38 = v35 * v37, v39 = v20 * v38,
+            v40 = v39 + v34, v41 = parameters[0] * v40, v42 = 2.0 * v12, v43 = v12 * v42,
+            v44 = v43 * v41, v45 = 2.0 * v17, v46 = v17 * v45, v47 = v46 * v41, v48 = v47 - v44,
+            v49 = 2.0 * v10, v50 = v10 * v49, v51 = v50 * v41, v52 = v47 - v51;
+        R[0] = v48; R[1] = v52;
     }
 }

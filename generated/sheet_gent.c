@@ -9,13 +9,7 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_sheet_gent_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_gent_energy)
 {
     (void)points;
     (void)modes;
@@ -25,39 +19,17 @@ void softehl_sheet_gent_energy(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
         (void)X; (void)d;
-        const double v1 = exp(d[1]);
-        const double v2 = v1 * v1;
-        const double v3 = exp(d[0]);
-        const double v4 = v3 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = d[0] + d[1];
-        const double v7 = -v6;
-        const double v8 = exp(v7);
-        const double v9 = v8 * v8;
-        const double v10 = v5 + v9;
-        const double v11 = v10 - 3.0;
-        const double v12 = 1.0 / parameters[1];
-        const double v13 = v12 * v11;
-        const double v14 = 1.0 - v13;
-        const double v15 = log(v14);
-        const double v16 = 0.5 * parameters[0];
-        const double v17 = parameters[1] * v16;
-        const double v18 = v17 * v15;
-        const double v19 = -v18;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = 1.0 / parameters[1], v13 = v12 * v11, v14 = 1.0 - v13, v15 = log(v14),
+            v16 = 0.5 * parameters[0], v17 = parameters[1] * v16, v18 = v17 * v15, v19 = -v18;
         values[e] = v19;
     }
 }
 
-void softehl_sheet_gent_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_gent_residual)
 {
     (void)points;
     (void)modes;
@@ -67,52 +39,20 @@ void softehl_sheet_gent_residual(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[1]);
-        const double v2 = v1 * v1;
-        const double v3 = exp(d[0]);
-        const double v4 = v3 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = d[0] + d[1];
-        const double v7 = -v6;
-        const double v8 = exp(v7);
-        const double v9 = v8 * v8;
-        const double v10 = v5 + v9;
-        const double v11 = v10 - 3.0;
-        const double v12 = 1.0 / parameters[1];
-        const double v13 = v12 * v11;
-        const double v14 = 1.0 - v13;
-        const double v15 = 1.0 / v14;
-        const double v16 = 0.5 * parameters[0];
-        const double v17 = parameters[1] * v16;
-        const double v18 = v12 * v17;
-        const double v19 = v18 * v15;
-        const double v20 = 2.0 * v3;
-        const double v21 = v3 * v20;
-        const double v22 = v21 * v19;
-        const double v23 = 2.0 * v8;
-        const double v24 = v8 * v23;
-        const double v25 = v24 * v19;
-        const double v26 = v22 - v25;
-        const double v27 = 2.0 * v1;
-        const double v28 = v1 * v27;
-        const double v29 = v28 * v19;
-        const double v30 = v29 - v25;
-        R[0] = v26;
-        R[1] = v30;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = 1.0 / parameters[1], v13 = v12 * v11, v14 = 1.0 - v13, v15 = 1.0 / v14,
+            v16 = 0.5 * parameters[0], v17 = parameters[1] * v16, v18 = v12 * v17, v19 = v18 * v15,
+            v20 = 2.0 * v3, v21 = v3 * v20, v22 = v21 * v19, v23 = 2.0 * v8, v24 = v8 * v23,
+            v25 = v24 * v19, v26 = v22 - v25, v27 = 2.0 * v1, v28 = v1 * v27, v29 = v28 * v19,
+            v30 = v29 - v25;
+        R[0] = v26; R[1] = v30;
     }
 }
 
-void softehl_sheet_gent_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_gent_tangent)
 {
     (void)points;
     (void)modes;
@@ -121,89 +61,27 @@ void softehl_sheet_gent_tangent(
     (void)rule;
     (void)basis;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        double *restrict K = tangent + 2 * 2 * e;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; double *restrict K = tangent + 2 * 2 * e;
         (void)X; (void)d;
-        const double v1 = exp(d[1]);
-        const double v2 = v1 * v1;
-        const double v3 = exp(d[0]);
-        const double v4 = v3 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = d[0] + d[1];
-        const double v7 = -v6;
-        const double v8 = exp(v7);
-        const double v9 = v8 * v8;
-        const double v10 = v5 + v9;
-        const double v11 = v10 - 3.0;
-        const double v12 = 1.0 / parameters[1];
-        const double v13 = v12 * v11;
-        const double v14 = 1.0 - v13;
-        const double v15 = 1.0 / v14;
-        const double v16 = 0.5 * parameters[0];
-        const double v17 = parameters[1] * v16;
-        const double v18 = v12 * v17;
-        const double v19 = v18 * v15;
-        const double v20 = 2.0 * v3;
-        const double v21 = v20 * v19;
-        const double v22 = v3 * v21;
-        const double v23 = 2.0 * v8;
-        const double v24 = v23 * v19;
-        const double v25 = v8 * v24;
-        const double v26 = v22 - v25;
-        const double v27 = 2.0 * v1;
-        const double v28 = v27 * v19;
-        const double v29 = v1 * v28;
-        const double v30 = v29 - v25;
-        const double v31 = v25 + v22;
-        const double v32 = v15 * v15;
-        const double v33 = v3 * v20;
-        const double v34 = v8 * v23;
-        const double v35 = v33 - v34;
-        const double v36 = v12 * v12;
-        const double v37 = v17 * v36;
-        const double v38 = v35 * v37;
-        const double v39 = v38 * v32;
-        const double v40 = v20 * v39;
-        const double v41 = v21 + v40;
-        const double v42 = v3 * v41;
-        const double v43 = v42 + v31;
-        const double v44 = v23 * v39;
-        const double v45 = v44 - v24;
-        const double v46 = v8 * v45;
-        const double v47 = v43 - v46;
-        const double v48 = v1 * v27;
-        const double v49 = v48 - v34;
-        const double v50 = v49 * v37;
-        const double v51 = v50 * v32;
-        const double v52 = v23 * v51;
-        const double v53 = v52 - v24;
-        const double v54 = v8 * v53;
-        const double v55 = v25 - v54;
-        const double v56 = v33 * v51;
-        const double v57 = v56 + v55;
-        const double v58 = v27 * v51;
-        const double v59 = v28 + v58;
-        const double v60 = v1 * v59;
-        const double v61 = v29 + v60;
-        const double v62 = v55 + v61;
-        R[0] = v26;
-        R[1] = v30;
-        K[0] = v47;
-        K[1] = v57;
-        K[2] = v57;
-        K[3] = v62;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = 1.0 / parameters[1], v13 = v12 * v11, v14 = 1.0 - v13, v15 = 1.0 / v14,
+            v16 = 0.5 * parameters[0], v17 = parameters[1] * v16, v18 = v12 * v17, v19 = v18 * v15,
+            v20 = 2.0 * v3, v21 = v20 * v19, v22 = v3 * v21, v23 = 2.0 * v8, v24 = v23 * v19,
+            v25 = v8 * v24, v26 = v22 - v25, v27 = 2.0 * v1, v28 = v27 * v19, v29 = v1 * v28,
+            v30 = v29 - v25, v31 = v25 + v22, v32 = v15 * v15, v33 = v3 * v20, v34 = v8 * v23,
+            v35 = v33 - v34, v36 = v12 * v12, v37 = v17 * v36, v38 = v35 * v37, v39 = v38 * v32,
+            v40 = v20 * v39, v41 = v21 + v40, v42 = v3 * v41, v43 = v42 + v31, v44 = v23 * v39,
+            v45 = v44 - v24, v46 = v8 * v45, v47 = v43 - v46, v48 = v1 * v27, v49 = v48 - v34,
+            v50 = v49 * v37, v51 = v50 * v32, v52 = v23 * v51, v53 = v52 - v24, v54 = v8 * v53,
+            v55 = v25 - v54, v56 = v33 * v51, v57 = v56 + v55, v58 = v27 * v51, v59 = v28 + v58,
+            v60 = v1 * v59, v61 = v29 + v60, v62 = v55 + v61;
+        R[0] = v26; R[1] = v30; K[0] = v47; K[1] = v57; K[2] = v57; K[3] = v62;
     }
 }
 
-void softehl_sheet_gent_d_mu(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_gent_d_mu)
 {
     (void)points;
     (void)modes;
@@ -213,51 +91,19 @@ void softehl_sheet_gent_d_mu(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[1]);
-        const double v2 = v1 * v1;
-        const double v3 = exp(d[0]);
-        const double v4 = v3 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = d[0] + d[1];
-        const double v7 = -v6;
-        const double v8 = exp(v7);
-        const double v9 = v8 * v8;
-        const double v10 = v5 + v9;
-        const double v11 = v10 - 3.0;
-        const double v12 = 1.0 / parameters[1];
-        const double v13 = v12 * v11;
-        const double v14 = 1.0 - v13;
-        const double v15 = 1.0 / v14;
-        const double v16 = 0.5 * parameters[1];
-        const double v17 = v16 * v12;
-        const double v18 = v15 * v17;
-        const double v19 = 2.0 * v3;
-        const double v20 = v3 * v19;
-        const double v21 = v20 * v18;
-        const double v22 = 2.0 * v8;
-        const double v23 = v8 * v22;
-        const double v24 = v23 * v18;
-        const double v25 = v21 - v24;
-        const double v26 = 2.0 * v1;
-        const double v27 = v1 * v26;
-        const double v28 = v27 * v18;
-        const double v29 = v28 - v24;
-        R[0] = v25;
-        R[1] = v29;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = 1.0 / parameters[1], v13 = v12 * v11, v14 = 1.0 - v13, v15 = 1.0 / v14,
+            v16 = 0.5 * parameters[1], v17 = v16 * v12, v18 = v15 * v17, v19 = 2.0 * v3,
+            v20 = v3 * v19, v21 = v20 * v18, v22 = 2.0 * v8, v23 = v8 * v22, v24 = v23 * v18,
+            v25 = v21 - v24, v26 = 2.0 * v1, v27 = v1 * v26, v28 = v27 * v18, v29 = v28 - v24;
+        R[0] = v25; R[1] = v29;
     }
 }
 
-void softehl_sheet_gent_d_J_m(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_gent_d_J_m)
 {
     (void)points;
     (void)modes;
@@ -267,48 +113,16 @@ void softehl_sheet_gent_d_J_m(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[1]);
-        const double v2 = v1 * v1;
-        const double v3 = exp(d[0]);
-        const double v4 = v3 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = d[0] + d[1];
-        const double v7 = -v6;
-        const double v8 = exp(v7);
-        const double v9 = v8 * v8;
-        const double v10 = v5 + v9;
-        const double v11 = v10 - 3.0;
-        const double v12 = 0.5 * parameters[0];
-        const double v13 = parameters[1] * v12;
-        const double v14 = v13 * v11;
-        const double v15 = 1.0 / parameters[1];
-        const double v16 = v15 * v11;
-        const double v17 = 1.0 - v16;
-        const double v18 = 1.0 / v17;
-        const double v19 = v18 * v14;
-        const double v20 = v15 * v15;
-        const double v21 = v20 * v19;
-        const double v22 = v12 - v21;
-        const double v23 = v15 * v22;
-        const double v24 = v13 * v20;
-        const double v25 = v23 - v24;
-        const double v26 = v18 * v25;
-        const double v27 = 2.0 * v3;
-        const double v28 = v3 * v27;
-        const double v29 = v28 * v26;
-        const double v30 = 2.0 * v8;
-        const double v31 = v8 * v30;
-        const double v32 = v31 * v26;
-        const double v33 = v29 - v32;
-        const double v34 = 2.0 * v1;
-        const double v35 = v1 * v34;
-        const double v36 = v35 * v26;
-        const double v37 = v36 - v32;
-        R[0] = v33;
-        R[1] = v37;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = 0.5 * parameters[0], v13 = parameters[1] * v12, v14 = v13 * v11,
+            v15 = 1.0 / parameters[1], v16 = v15 * v11, v17 = 1.0 - v16, v18 = 1.0 / v17,
+            v19 = v18 * v14, v20 = v15 * v15, v21 = v20 * v19, v22 = v12 - v21, v23 = v15 * v22,
+            v24 = v13 * v20, v25 = v23 - v24, v26 = v18 * v25, v27 = 2.0 * v3, v28 = v3 * v27,
+            v29 = v28 * v26, v30 = 2.0 * v8, v31 = v8 * v30, v32 = v31 * v26, v33 = v29 - v32,
+            v34 = 2.0 * v1, v35 = v1 * v34, v36 = v35 * v26, v37 = v36 - v32;
+        R[0] = v33; R[1] = v37;
     }
 }

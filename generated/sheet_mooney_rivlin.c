@@ -9,13 +9,7 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_sheet_mooney_rivlin_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_mooney_rivlin_energy)
 {
     (void)points;
     (void)modes;
@@ -25,44 +19,18 @@ void softehl_sheet_mooney_rivlin_energy(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
         (void)X; (void)d;
-        const double v1 = exp(d[1]);
-        const double v2 = 1.0 / v1;
-        const double v3 = v2 * v2;
-        const double v4 = exp(d[0]);
-        const double v5 = 1.0 / v4;
-        const double v6 = v5 * v5;
-        const double v7 = v6 + v3;
-        const double v8 = d[0] + d[1];
-        const double v9 = -v8;
-        const double v10 = exp(v9);
-        const double v11 = 1.0 / v10;
-        const double v12 = v11 * v11;
-        const double v13 = v7 + v12;
-        const double v14 = v13 - 3.0;
-        const double v15 = parameters[1] * v14;
-        const double v16 = v1 * v1;
-        const double v17 = v4 * v4;
-        const double v18 = v17 + v16;
-        const double v19 = v10 * v10;
-        const double v20 = v18 + v19;
-        const double v21 = v20 - 3.0;
-        const double v22 = parameters[0] * v21;
-        const double v23 = v22 + v15;
-        const double v24 = 0.5 * v23;
+        const double v1 = exp(d[1]), v2 = 1.0 / v1, v3 = v2 * v2, v4 = exp(d[0]), v5 = 1.0 / v4,
+            v6 = v5 * v5, v7 = v6 + v3, v8 = d[0] + d[1], v9 = -v8, v10 = exp(v9), v11 = 1.0 / v10,
+            v12 = v11 * v11, v13 = v7 + v12, v14 = v13 - 3.0, v15 = parameters[1] * v14,
+            v16 = v1 * v1, v17 = v4 * v4, v18 = v17 + v16, v19 = v10 * v10, v20 = v18 + v19,
+            v21 = v20 - 3.0, v22 = parameters[0] * v21, v23 = v22 + v15, v24 = 0.5 * v23;
         values[e] = v24;
     }
 }
 
-void softehl_sheet_mooney_rivlin_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_mooney_rivlin_residual)
 {
     (void)points;
     (void)modes;
@@ -72,55 +40,20 @@ void softehl_sheet_mooney_rivlin_residual(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[0]);
-        const double v2 = 1.0 / v1;
-        const double v3 = 0.5 * parameters[1];
-        const double v4 = v3 * v2;
-        const double v5 = v2 * v4;
-        const double v6 = v2 * v5;
-        const double v7 = 0.5 * parameters[0];
-        const double v8 = v1 * v7;
-        const double v9 = v8 - v6;
-        const double v10 = 2.0 * v1;
-        const double v11 = v10 * v9;
-        const double v12 = d[0] + d[1];
-        const double v13 = -v12;
-        const double v14 = exp(v13);
-        const double v15 = 1.0 / v14;
-        const double v16 = v3 * v15;
-        const double v17 = v15 * v16;
-        const double v18 = v15 * v17;
-        const double v19 = v14 * v7;
-        const double v20 = v19 - v18;
-        const double v21 = 2.0 * v14;
-        const double v22 = v21 * v20;
-        const double v23 = v11 - v22;
-        const double v24 = exp(d[1]);
-        const double v25 = 1.0 / v24;
-        const double v26 = v3 * v25;
-        const double v27 = v25 * v26;
-        const double v28 = v25 * v27;
-        const double v29 = v24 * v7;
-        const double v30 = v29 - v28;
-        const double v31 = 2.0 * v24;
-        const double v32 = v31 * v30;
-        const double v33 = v32 - v22;
-        R[0] = v23;
-        R[1] = v33;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = exp(d[0]), v2 = 1.0 / v1, v3 = 0.5 * parameters[1], v4 = v3 * v2,
+            v5 = v2 * v4, v6 = v2 * v5, v7 = 0.5 * parameters[0], v8 = v1 * v7, v9 = v8 - v6,
+            v10 = 2.0 * v1, v11 = v10 * v9, v12 = d[0] + d[1], v13 = -v12, v14 = exp(v13),
+            v15 = 1.0 / v14, v16 = v3 * v15, v17 = v15 * v16, v18 = v15 * v17, v19 = v14 * v7,
+            v20 = v19 - v18, v21 = 2.0 * v14, v22 = v21 * v20, v23 = v11 - v22, v24 = exp(d[1]),
+            v25 = 1.0 / v24, v26 = v3 * v25, v27 = v25 * v26, v28 = v25 * v27, v29 = v24 * v7,
+            v30 = v29 - v28, v31 = 2.0 * v24, v32 = v31 * v30, v33 = v32 - v22;
+        R[0] = v23; R[1] = v33;
     }
 }
 
-void softehl_sheet_mooney_rivlin_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_mooney_rivlin_tangent)
 {
     (void)points;
     (void)modes;
@@ -129,83 +62,26 @@ void softehl_sheet_mooney_rivlin_tangent(
     (void)rule;
     (void)basis;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        double *restrict K = tangent + 2 * 2 * e;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; double *restrict K = tangent + 2 * 2 * e;
         (void)X; (void)d;
-        const double v1 = exp(d[0]);
-        const double v2 = 1.0 / v1;
-        const double v3 = v2 * v2;
-        const double v4 = parameters[1] * v2;
-        const double v5 = v3 * v4;
-        const double v6 = 2.0 * v1;
-        const double v7 = 0.5 * parameters[0];
-        const double v8 = v7 * v6;
-        const double v9 = v8 - v5;
-        const double v10 = v1 * v9;
-        const double v11 = d[0] + d[1];
-        const double v12 = -v11;
-        const double v13 = exp(v12);
-        const double v14 = 1.0 / v13;
-        const double v15 = v14 * v14;
-        const double v16 = parameters[1] * v14;
-        const double v17 = v15 * v16;
-        const double v18 = 2.0 * v13;
-        const double v19 = v7 * v18;
-        const double v20 = v19 - v17;
-        const double v21 = v13 * v20;
-        const double v22 = v10 - v21;
-        const double v23 = exp(d[1]);
-        const double v24 = 1.0 / v23;
-        const double v25 = v24 * v24;
-        const double v26 = parameters[1] * v24;
-        const double v27 = v25 * v26;
-        const double v28 = 2.0 * v23;
-        const double v29 = v7 * v28;
-        const double v30 = v29 - v27;
-        const double v31 = v23 * v30;
-        const double v32 = v31 - v21;
-        const double v33 = 6.0 * v13;
-        const double v34 = 0.5 * parameters[1];
-        const double v35 = v34 * v33;
-        const double v36 = v15 * v35;
-        const double v37 = v15 * v36;
-        const double v38 = v19 + v37;
-        const double v39 = v13 * v38;
-        const double v40 = v21 + v39;
-        const double v41 = 6.0 * v1;
-        const double v42 = v34 * v41;
-        const double v43 = v3 * v42;
-        const double v44 = v3 * v43;
-        const double v45 = v8 + v44;
-        const double v46 = v1 * v45;
-        const double v47 = v10 + v46;
-        const double v48 = v47 + v40;
-        const double v49 = v31 + v40;
-        const double v50 = 6.0 * v23;
-        const double v51 = v34 * v50;
-        const double v52 = v25 * v51;
-        const double v53 = v25 * v52;
-        const double v54 = v29 + v53;
-        const double v55 = v23 * v54;
-        const double v56 = v55 + v49;
-        R[0] = v22;
-        R[1] = v32;
-        K[0] = v48;
-        K[1] = v40;
-        K[2] = v40;
-        K[3] = v56;
+        const double v1 = exp(d[0]), v2 = 1.0 / v1, v3 = v2 * v2, v4 = parameters[1] * v2,
+            v5 = v3 * v4, v6 = 2.0 * v1, v7 = 0.5 * parameters[0], v8 = v7 * v6, v9 = v8 - v5,
+            v10 = v1 * v9, v11 = d[0] + d[1], v12 = -v11, v13 = exp(v12), v14 = 1.0 / v13,
+            v15 = v14 * v14, v16 = parameters[1] * v14, v17 = v15 * v16, v18 = 2.0 * v13,
+            v19 = v7 * v18, v20 = v19 - v17, v21 = v13 * v20, v22 = v10 - v21, v23 = exp(d[1]),
+            v24 = 1.0 / v23, v25 = v24 * v24, v26 = parameters[1] * v24, v27 = v25 * v26,
+            v28 = 2.0 * v23, v29 = v7 * v28, v30 = v29 - v27, v31 = v23 * v30, v32 = v31 - v21,
+            v33 = 6.0 * v13, v34 = 0.5 * parameters[1], v35 = v34 * v33, v36 = v15 * v35,
+            v37 = v15 * v36, v38 = v19 + v37, v39 = v13 * v38, v40 = v21 + v39, v41 = 6.0 * v1,
+            v42 = v34 * v41, v43 = v3 * v42, v44 = v3 * v43, v45 = v8 + v44, v46 = v1 * v45,
+            v47 = v10 + v46, v48 = v47 + v40, v49 = v31 + v40, v50 = 6.0 * v23, v51 = v34 * v50,
+            v52 = v25 * v51, v53 = v25 * v52, v54 = v29 + v53, v55 = v23 * v54, v56 = v55 + v49;
+        R[0] = v22; R[1] = v32; K[0] = v48; K[1] = v40; K[2] = v40; K[3] = v56;
     }
 }
 
-void softehl_sheet_mooney_rivlin_d_mu_1(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_mooney_rivlin_d_mu_1)
 {
     (void)points;
     (void)modes;
@@ -216,32 +92,15 @@ void softehl_sheet_mooney_rivlin_d_mu_1(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = d[0] + d[1];
-        const double v2 = -v1;
-        const double v3 = exp(v2);
-        const double v4 = v3 * v3;
-        const double v5 = exp(d[0]);
-        const double v6 = v5 * v5;
-        const double v7 = v6 - v4;
-        const double v8 = exp(d[1]);
-        const double v9 = v8 * v8;
-        const double v10 = v9 - v4;
-        R[0] = v7;
-        R[1] = v10;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = d[0] + d[1], v2 = -v1, v3 = exp(v2), v4 = v3 * v3, v5 = exp(d[0]),
+            v6 = v5 * v5, v7 = v6 - v4, v8 = exp(d[1]), v9 = v8 * v8, v10 = v9 - v4;
+        R[0] = v7; R[1] = v10;
     }
 }
 
-void softehl_sheet_mooney_rivlin_d_mu_2(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_mooney_rivlin_d_mu_2)
 {
     (void)points;
     (void)modes;
@@ -252,24 +111,11 @@ void softehl_sheet_mooney_rivlin_d_mu_2(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = d[0] + d[1];
-        const double v2 = -v1;
-        const double v3 = exp(v2);
-        const double v4 = 1.0 / v3;
-        const double v5 = v4 * v4;
-        const double v6 = exp(d[0]);
-        const double v7 = 1.0 / v6;
-        const double v8 = v7 * v7;
-        const double v9 = v5 - v8;
-        const double v10 = exp(d[1]);
-        const double v11 = 1.0 / v10;
-        const double v12 = v11 * v11;
-        const double v13 = v5 - v12;
-        R[0] = v9;
-        R[1] = v13;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = d[0] + d[1], v2 = -v1, v3 = exp(v2), v4 = 1.0 / v3, v5 = v4 * v4,
+            v6 = exp(d[0]), v7 = 1.0 / v6, v8 = v7 * v7, v9 = v5 - v8, v10 = exp(d[1]),
+            v11 = 1.0 / v10, v12 = v11 * v11, v13 = v5 - v12;
+        R[0] = v9; R[1] = v13;
     }
 }

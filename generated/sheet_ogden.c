@@ -13,13 +13,7 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_sheet_ogden_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_ogden_energy)
 {
     (void)points;
     (void)modes;
@@ -29,62 +23,23 @@ void softehl_sheet_ogden_energy(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
         (void)X; (void)d;
-        const double v1 = d[1] * parameters[3];
-        const double v2 = exp(v1);
-        const double v3 = d[0] * parameters[3];
-        const double v4 = exp(v3);
-        const double v5 = v4 + v2;
-        const double v6 = d[0] + d[1];
-        const double v7 = parameters[3] * v6;
-        const double v8 = -v7;
-        const double v9 = exp(v8);
-        const double v10 = v9 + v5;
-        const double v11 = v10 - 3.0;
-        const double v12 = 1.0 / parameters[3];
-        const double v13 = parameters[2] * v12;
-        const double v14 = v13 * v11;
-        const double v15 = d[1] * parameters[1];
-        const double v16 = exp(v15);
-        const double v17 = d[0] * parameters[1];
-        const double v18 = exp(v17);
-        const double v19 = v18 + v16;
-        const double v20 = parameters[1] * v6;
-        const double v21 = -v20;
-        const double v22 = exp(v21);
-        const double v23 = v22 + v19;
-        const double v24 = v23 - 3.0;
-        const double v25 = 1.0 / parameters[1];
-        const double v26 = parameters[0] * v25;
-        const double v27 = v26 * v24;
-        const double v28 = v27 + v14;
-        const double v29 = d[1] * parameters[5];
-        const double v30 = exp(v29);
-        const double v31 = d[0] * parameters[5];
-        const double v32 = exp(v31);
-        const double v33 = v32 + v30;
-        const double v34 = parameters[5] * v6;
-        const double v35 = -v34;
-        const double v36 = exp(v35);
-        const double v37 = v36 + v33;
-        const double v38 = v37 - 3.0;
-        const double v39 = 1.0 / parameters[5];
-        const double v40 = parameters[4] * v39;
-        const double v41 = v40 * v38;
-        const double v42 = v41 + v28;
+        const double v1 = d[1] * parameters[3], v2 = exp(v1), v3 = d[0] * parameters[3],
+            v4 = exp(v3), v5 = v4 + v2, v6 = d[0] + d[1], v7 = parameters[3] * v6, v8 = -v7,
+            v9 = exp(v8), v10 = v9 + v5, v11 = v10 - 3.0, v12 = 1.0 / parameters[3],
+            v13 = parameters[2] * v12, v14 = v13 * v11, v15 = d[1] * parameters[1], v16 = exp(v15),
+            v17 = d[0] * parameters[1], v18 = exp(v17), v19 = v18 + v16, v20 = parameters[1] * v6,
+            v21 = -v20, v22 = exp(v21), v23 = v22 + v19, v24 = v23 - 3.0, v25 = 1.0 / parameters[1],
+            v26 = parameters[0] * v25, v27 = v26 * v24, v28 = v27 + v14, v29 = d[1] * parameters[5],
+            v30 = exp(v29), v31 = d[0] * parameters[5], v32 = exp(v31), v33 = v32 + v30,
+            v34 = parameters[5] * v6, v35 = -v34, v36 = exp(v35), v37 = v36 + v33, v38 = v37 - 3.0,
+            v39 = 1.0 / parameters[5], v40 = parameters[4] * v39, v41 = v40 * v38, v42 = v41 + v28;
         values[e] = v42;
     }
 }
 
-void softehl_sheet_ogden_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_ogden_residual)
 {
     (void)points;
     (void)modes;
@@ -94,193 +49,54 @@ void softehl_sheet_ogden_residual(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = d[0] * parameters[3];
-        const double v2 = exp(v1);
-        const double v3 = parameters[3] * v2;
-        const double v4 = 1.0 / parameters[3];
-        const double v5 = parameters[2] * v4;
-        const double v6 = v5 * v3;
-        const double v7 = d[0] * parameters[5];
-        const double v8 = exp(v7);
-        const double v9 = parameters[5] * v8;
-        const double v10 = 1.0 / parameters[5];
-        const double v11 = parameters[4] * v10;
-        const double v12 = v11 * v9;
-        const double v13 = v12 + v6;
-        const double v14 = d[0] * parameters[1];
-        const double v15 = exp(v14);
-        const double v16 = parameters[1] * v15;
-        const double v17 = 1.0 / parameters[1];
-        const double v18 = parameters[0] * v17;
-        const double v19 = v18 * v16;
-        const double v20 = v13 + v19;
-        const double v21 = d[0] + d[1];
-        const double v22 = parameters[3] * v21;
-        const double v23 = -v22;
-        const double v24 = exp(v23);
-        const double v25 = parameters[3] * v24;
-        const double v26 = v5 * v25;
-        const double v27 = parameters[5] * v21;
-        const double v28 = -v27;
-        const double v29 = exp(v28);
-        const double v30 = parameters[5] * v29;
-        const double v31 = v11 * v30;
-        const double v32 = v31 + v26;
-        const double v33 = parameters[1] * v21;
-        const double v34 = -v33;
-        const double v35 = exp(v34);
-        const double v36 = parameters[1] * v35;
-        const double v37 = v18 * v36;
-        const double v38 = v32 + v37;
-        const double v39 = v20 - v38;
-        const double v40 = d[1] * parameters[3];
-        const double v41 = exp(v40);
-        const double v42 = parameters[3] * v41;
-        const double v43 = v5 * v42;
-        const double v44 = d[1] * parameters[5];
-        const double v45 = exp(v44);
-        const double v46 = parameters[5] * v45;
-        const double v47 = v11 * v46;
-        const double v48 = v47 + v43;
-        const double v49 = d[1] * parameters[1];
-        const double v50 = exp(v49);
-        const double v51 = parameters[1] * v50;
-        const double v52 = v18 * v51;
-        const double v53 = v48 + v52;
-        const double v54 = v53 - v38;
-        R[0] = v39;
-        R[1] = v54;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = d[0] * parameters[3], v2 = exp(v1), v3 = parameters[3] * v2,
+            v4 = 1.0 / parameters[3], v5 = parameters[2] * v4, v6 = v5 * v3,
+            v7 = d[0] * parameters[5], v8 = exp(v7), v9 = parameters[5] * v8,
+            v10 = 1.0 / parameters[5], v11 = parameters[4] * v10, v12 = v11 * v9, v13 = v12 + v6,
+            v14 = d[0] * parameters[1], v15 = exp(v14), v16 = parameters[1] * v15,
+            v17 = 1.0 / parameters[1], v18 = parameters[0] * v17, v19 = v18 * v16, v20 = v13 + v19,
+            v21 = d[0] + d[1], v22 = parameters[3] * v21, v23 = -v22, v24 = exp(v23),
+            v25 = parameters[3] * v24, v26 = v5 * v25, v27 = parameters[5] * v21, v28 = -v27,
+            v29 = exp(v28), v30 = parameters[5] * v29, v31 = v11 * v30, v32 = v31 + v26,
+            v33 = parameters[1] * v21, v34 = -v33, v35 = exp(v34), v36 = parameters[1] * v35,
+            v37 = v18 * v36, v38 = v32 + v37, v39 = v20 - v38, v40 = d[1] * parameters[3],
+            v41 = exp(v40), v42 = parameters[3] * v41, v43 = v5 * v42, v44 = d[1] * parameters[5],
+            v45 = exp(v44), v46 = parameters[5] * v45, v47 = v11 * v46, v48 = v47 + v43,
+            v49 = d[1] * parameters[1], v50 = exp(v49), v51 = parameters[1] * v50, v52 = v18 * v51,
+            v53 = v48 + v52, v54 = v53 - v38;
+        R[0] = v39; R[1] = v54;
     }
 }
 
-static void softehl_sheet_ogden_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_sheet_ogden_tangent)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     V X0, X1;
-    softehl_load2(X + 0, 2, &X0, &X1);
-    (void)X0; (void)X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
     V d0, d1;
     softehl_load2(d + 0, 2, &d0, &d1);
-    (void)d0; (void)d1;
-    const double v1 = 1.0 / parameters[1];
-    const double v2 = 1.0 / parameters[3];
-    const double v3 = 1.0 / parameters[5];
-    const V v4 = d0 * parameters[1];
-    const V v5 = d0 * parameters[3];
-    const V v6 = d0 * parameters[5];
-    const V v7 = softehl_vexp(v4);
-    const V v8 = softehl_vexp(v5);
-    const V v9 = softehl_vexp(v6);
-    const V v10 = d1 * parameters[1];
-    const V v11 = d1 * parameters[3];
-    const V v12 = d0 + d1;
-    const V v13 = d1 * parameters[5];
-    const V v14 = softehl_vexp(v10);
-    const V v15 = softehl_vexp(v11);
-    const V v16 = softehl_vexp(v13);
-    const V v17 = parameters[1] * v12;
-    const V v18 = parameters[3] * v12;
-    const V v19 = parameters[5] * v12;
-    const double v20 = parameters[0] * v1;
-    const double v21 = parameters[2] * v2;
-    const V v22 = -v17;
-    const V v23 = -v18;
-    const V v24 = -v19;
-    const double v25 = parameters[4] * v3;
-    const V v26 = softehl_vexp(v22);
-    const V v27 = softehl_vexp(v23);
-    const V v28 = softehl_vexp(v24);
-    const V v29 = parameters[5] * v28;
-    const V v30 = v25 * v29;
-    const V v31 = parameters[5] * v16;
-    const V v32 = v25 * v31;
-    const V v33 = parameters[5] * v9;
-    const V v34 = v25 * v33;
-    const V v35 = parameters[3] * v27;
-    const V v36 = v21 * v35;
-    const V v37 = parameters[3] * v15;
-    const V v38 = v21 * v37;
-    const V v39 = parameters[3] * v8;
-    const V v40 = v21 * v39;
-    const V v41 = parameters[1] * v26;
-    const V v42 = v20 * v41;
-    const V v43 = parameters[1] * v14;
-    const V v44 = v20 * v43;
-    const V v45 = parameters[1] * v7;
-    const V v46 = v20 * v45;
-    const V v47 = parameters[5] * v30;
-    const V v48 = v30 + v36;
-    const V v49 = parameters[3] * v36;
-    const V v50 = v47 + v49;
-    const V v51 = v48 + v42;
-    const V v52 = parameters[1] * v42;
-    const V v53 = v50 + v52;
-    const V v54 = parameters[5] * v32;
-    const V v55 = parameters[5] * v34;
-    const V v56 = v32 + v38;
-    const V v57 = parameters[3] * v38;
-    const V v58 = v54 + v57;
-    const V v59 = parameters[3] * v40;
-    const V v60 = v55 + v59;
-    const V v61 = v34 + v40;
-    const V v62 = v56 - v51;
-    const V v63 = v61 - v51;
-    const V v64 = v44 + v62;
-    const V v65 = parameters[1] * v44;
-    const V v66 = v58 + v65;
-    const V v67 = parameters[1] * v46;
-    const V v68 = v60 + v67;
-    const V v69 = v46 + v63;
-    softehl_store2(R + 0, 2, v69, v64);
-    const V v70 = v68 + v53;
-    const V v71 = v53 + v66;
-    softehl_store4(K + 0, 4, v70, v53, v53, v71);
+    const V v1 = softehl_vexp(d0 * parameters[1]), v2 = softehl_vexp(d0 * parameters[3]),
+        v3 = softehl_vexp(d0 * parameters[5]), v4 = d0 + d1, v5 = softehl_vexp(d1 * parameters[1]),
+        v6 = softehl_vexp(d1 * parameters[3]), v7 = softehl_vexp(d1 * parameters[5]);
+    const double v8 = parameters[0] * (1.0 / parameters[1]),
+        v9 = parameters[2] * (1.0 / parameters[3]), v10 = parameters[4] * (1.0 / parameters[5]);
+    const V v11 = softehl_vexp(-(parameters[1] * v4)), v12 = softehl_vexp(-(parameters[3] * v4)),
+        v13 = softehl_vexp(-(parameters[5] * v4)), v14 = v10 * (parameters[5] * v13),
+        v15 = v10 * (parameters[5] * v7), v16 = v10 * (parameters[5] * v3),
+        v17 = v9 * (parameters[3] * v12), v18 = v9 * (parameters[3] * v6),
+        v19 = v9 * (parameters[3] * v2), v20 = v8 * (parameters[1] * v11),
+        v21 = v8 * (parameters[1] * v5), v22 = v8 * (parameters[1] * v1), v23 = v14 + v17 + v20,
+        v24 = parameters[5] * v14 + parameters[3] * v17 + parameters[1] * v20;
+    softehl_store2(R + 0, 2, v22 + (v16 + v19 - v23), v21 + (v15 + v18 - v23));
+    const V v25 = parameters[5] * v16 + parameters[3] * v19 + parameters[1] * v22 + v24,
+        v26 = v24 + (parameters[5] * v15 + parameters[3] * v18 + parameters[1] * v21);
+    softehl_store4(K + 0, 4, v25, v24, v24, v26);
 }
+SOFTEHL_BATCH(softehl_sheet_ogden_tangent, 2, 2, 0, 0, 2, (2 * 2))
 
-void softehl_sheet_ogden_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_sheet_ogden_tangent_group(points, modes, coordinates + 2 * e, dofs + 2 * e, 0, 0, parameters, rule, basis, values + 2 * e, tangent + (2 * 2) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_sheet_ogden_tangent_group(points, modes, coordinates + 2 * (n - SOFTEHL_LANES), dofs + 2 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 2 * (n - SOFTEHL_LANES), tangent + (2 * 2) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 2];
-    softehl_pad(X, coordinates, 2, n);
-    double d[SOFTEHL_LANES * 2];
-    softehl_pad(d, dofs, 2, n);
-    double R[SOFTEHL_LANES * 2];
-    double K[SOFTEHL_LANES * (2 * 2)];
-    softehl_sheet_ogden_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 2 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (2 * 2) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-void softehl_sheet_ogden_d_mu_1(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_ogden_d_mu_1)
 {
     (void)points;
     (void)modes;
@@ -290,32 +106,16 @@ void softehl_sheet_ogden_d_mu_1(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = d[0] + d[1];
-        const double v2 = parameters[1] * v1;
-        const double v3 = -v2;
-        const double v4 = exp(v3);
-        const double v5 = d[0] * parameters[1];
-        const double v6 = exp(v5);
-        const double v7 = v6 - v4;
-        const double v8 = d[1] * parameters[1];
-        const double v9 = exp(v8);
-        const double v10 = v9 - v4;
-        R[0] = v7;
-        R[1] = v10;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = d[0] + d[1], v2 = parameters[1] * v1, v3 = -v2, v4 = exp(v3),
+            v5 = d[0] * parameters[1], v6 = exp(v5), v7 = v6 - v4, v8 = d[1] * parameters[1],
+            v9 = exp(v8), v10 = v9 - v4;
+        R[0] = v7; R[1] = v10;
     }
 }
 
-void softehl_sheet_ogden_d_alpha_1(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_ogden_d_alpha_1)
 {
     (void)points;
     (void)modes;
@@ -325,50 +125,20 @@ void softehl_sheet_ogden_d_alpha_1(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = 1.0 / parameters[1];
-        const double v2 = parameters[0] * v1;
-        const double v3 = v1 * v2;
-        const double v4 = d[0] + d[1];
-        const double v5 = v4 * v2;
-        const double v6 = v5 + v3;
-        const double v7 = parameters[1] * v6;
-        const double v8 = v2 - v7;
-        const double v9 = parameters[1] * v4;
-        const double v10 = -v9;
-        const double v11 = exp(v10);
-        const double v12 = v11 * v8;
-        const double v13 = d[0] * v2;
-        const double v14 = v13 - v3;
-        const double v15 = parameters[1] * v14;
-        const double v16 = v2 + v15;
-        const double v17 = d[0] * parameters[1];
-        const double v18 = exp(v17);
-        const double v19 = v18 * v16;
-        const double v20 = v19 - v12;
-        const double v21 = d[1] * v2;
-        const double v22 = v21 - v3;
-        const double v23 = parameters[1] * v22;
-        const double v24 = v2 + v23;
-        const double v25 = d[1] * parameters[1];
-        const double v26 = exp(v25);
-        const double v27 = v26 * v24;
-        const double v28 = v27 - v12;
-        R[0] = v20;
-        R[1] = v28;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = 1.0 / parameters[1], v2 = parameters[0] * v1, v3 = v1 * v2,
+            v4 = d[0] + d[1], v5 = v4 * v2, v6 = v5 + v3, v7 = parameters[1] * v6, v8 = v2 - v7,
+            v9 = parameters[1] * v4, v10 = -v9, v11 = exp(v10), v12 = v11 * v8, v13 = d[0] * v2,
+            v14 = v13 - v3, v15 = parameters[1] * v14, v16 = v2 + v15, v17 = d[0] * parameters[1],
+            v18 = exp(v17), v19 = v18 * v16, v20 = v19 - v12, v21 = d[1] * v2, v22 = v21 - v3,
+            v23 = parameters[1] * v22, v24 = v2 + v23, v25 = d[1] * parameters[1], v26 = exp(v25),
+            v27 = v26 * v24, v28 = v27 - v12;
+        R[0] = v20; R[1] = v28;
     }
 }
 
-void softehl_sheet_ogden_d_mu_2(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_ogden_d_mu_2)
 {
     (void)points;
     (void)modes;
@@ -378,32 +148,16 @@ void softehl_sheet_ogden_d_mu_2(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = d[0] + d[1];
-        const double v2 = parameters[3] * v1;
-        const double v3 = -v2;
-        const double v4 = exp(v3);
-        const double v5 = d[0] * parameters[3];
-        const double v6 = exp(v5);
-        const double v7 = v6 - v4;
-        const double v8 = d[1] * parameters[3];
-        const double v9 = exp(v8);
-        const double v10 = v9 - v4;
-        R[0] = v7;
-        R[1] = v10;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = d[0] + d[1], v2 = parameters[3] * v1, v3 = -v2, v4 = exp(v3),
+            v5 = d[0] * parameters[3], v6 = exp(v5), v7 = v6 - v4, v8 = d[1] * parameters[3],
+            v9 = exp(v8), v10 = v9 - v4;
+        R[0] = v7; R[1] = v10;
     }
 }
 
-void softehl_sheet_ogden_d_alpha_2(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_ogden_d_alpha_2)
 {
     (void)points;
     (void)modes;
@@ -413,50 +167,20 @@ void softehl_sheet_ogden_d_alpha_2(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = 1.0 / parameters[3];
-        const double v2 = parameters[2] * v1;
-        const double v3 = v1 * v2;
-        const double v4 = d[0] + d[1];
-        const double v5 = v4 * v2;
-        const double v6 = v5 + v3;
-        const double v7 = parameters[3] * v6;
-        const double v8 = v2 - v7;
-        const double v9 = parameters[3] * v4;
-        const double v10 = -v9;
-        const double v11 = exp(v10);
-        const double v12 = v11 * v8;
-        const double v13 = d[0] * v2;
-        const double v14 = v13 - v3;
-        const double v15 = parameters[3] * v14;
-        const double v16 = v2 + v15;
-        const double v17 = d[0] * parameters[3];
-        const double v18 = exp(v17);
-        const double v19 = v18 * v16;
-        const double v20 = v19 - v12;
-        const double v21 = d[1] * v2;
-        const double v22 = v21 - v3;
-        const double v23 = parameters[3] * v22;
-        const double v24 = v2 + v23;
-        const double v25 = d[1] * parameters[3];
-        const double v26 = exp(v25);
-        const double v27 = v26 * v24;
-        const double v28 = v27 - v12;
-        R[0] = v20;
-        R[1] = v28;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = 1.0 / parameters[3], v2 = parameters[2] * v1, v3 = v1 * v2,
+            v4 = d[0] + d[1], v5 = v4 * v2, v6 = v5 + v3, v7 = parameters[3] * v6, v8 = v2 - v7,
+            v9 = parameters[3] * v4, v10 = -v9, v11 = exp(v10), v12 = v11 * v8, v13 = d[0] * v2,
+            v14 = v13 - v3, v15 = parameters[3] * v14, v16 = v2 + v15, v17 = d[0] * parameters[3],
+            v18 = exp(v17), v19 = v18 * v16, v20 = v19 - v12, v21 = d[1] * v2, v22 = v21 - v3,
+            v23 = parameters[3] * v22, v24 = v2 + v23, v25 = d[1] * parameters[3], v26 = exp(v25),
+            v27 = v26 * v24, v28 = v27 - v12;
+        R[0] = v20; R[1] = v28;
     }
 }
 
-void softehl_sheet_ogden_d_mu_3(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_ogden_d_mu_3)
 {
     (void)points;
     (void)modes;
@@ -466,32 +190,16 @@ void softehl_sheet_ogden_d_mu_3(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = d[0] + d[1];
-        const double v2 = parameters[5] * v1;
-        const double v3 = -v2;
-        const double v4 = exp(v3);
-        const double v5 = d[0] * parameters[5];
-        const double v6 = exp(v5);
-        const double v7 = v6 - v4;
-        const double v8 = d[1] * parameters[5];
-        const double v9 = exp(v8);
-        const double v10 = v9 - v4;
-        R[0] = v7;
-        R[1] = v10;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = d[0] + d[1], v2 = parameters[5] * v1, v3 = -v2, v4 = exp(v3),
+            v5 = d[0] * parameters[5], v6 = exp(v5), v7 = v6 - v4, v8 = d[1] * parameters[5],
+            v9 = exp(v8), v10 = v9 - v4;
+        R[0] = v7; R[1] = v10;
     }
 }
 
-void softehl_sheet_ogden_d_alpha_3(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_ogden_d_alpha_3)
 {
     (void)points;
     (void)modes;
@@ -501,39 +209,15 @@ void softehl_sheet_ogden_d_alpha_3(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = 1.0 / parameters[5];
-        const double v2 = parameters[4] * v1;
-        const double v3 = v1 * v2;
-        const double v4 = d[0] + d[1];
-        const double v5 = v4 * v2;
-        const double v6 = v5 + v3;
-        const double v7 = parameters[5] * v6;
-        const double v8 = v2 - v7;
-        const double v9 = parameters[5] * v4;
-        const double v10 = -v9;
-        const double v11 = exp(v10);
-        const double v12 = v11 * v8;
-        const double v13 = d[0] * v2;
-        const double v14 = v13 - v3;
-        const double v15 = parameters[5] * v14;
-        const double v16 = v2 + v15;
-        const double v17 = d[0] * parameters[5];
-        const double v18 = exp(v17);
-        const double v19 = v18 * v16;
-        const double v20 = v19 - v12;
-        const double v21 = d[1] * v2;
-        const double v22 = v21 - v3;
-        const double v23 = parameters[5] * v22;
-        const double v24 = v2 + v23;
-        const double v25 = d[1] * parameters[5];
-        const double v26 = exp(v25);
-        const double v27 = v26 * v24;
-        const double v28 = v27 - v12;
-        R[0] = v20;
-        R[1] = v28;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = 1.0 / parameters[5], v2 = parameters[4] * v1, v3 = v1 * v2,
+            v4 = d[0] + d[1], v5 = v4 * v2, v6 = v5 + v3, v7 = parameters[5] * v6, v8 = v2 - v7,
+            v9 = parameters[5] * v4, v10 = -v9, v11 = exp(v10), v12 = v11 * v8, v13 = d[0] * v2,
+            v14 = v13 - v3, v15 = parameters[5] * v14, v16 = v2 + v15, v17 = d[0] * parameters[5],
+            v18 = exp(v17), v19 = v18 * v16, v20 = v19 - v12, v21 = d[1] * v2, v22 = v21 - v3,
+            v23 = parameters[5] * v22, v24 = v2 + v23, v25 = d[1] * parameters[5], v26 = exp(v25),
+            v27 = v26 * v24, v28 = v27 - v12;
+        R[0] = v20; R[1] = v28;
     }
 }

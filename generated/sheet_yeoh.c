@@ -10,13 +10,7 @@
  */
 #include "softehl_kernels.h"
 
-void softehl_sheet_yeoh_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_yeoh_energy)
 {
     (void)points;
     (void)modes;
@@ -26,37 +20,17 @@ void softehl_sheet_yeoh_energy(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
         (void)X; (void)d;
-        const double v1 = exp(d[1]);
-        const double v2 = v1 * v1;
-        const double v3 = exp(d[0]);
-        const double v4 = v3 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = d[0] + d[1];
-        const double v7 = -v6;
-        const double v8 = exp(v7);
-        const double v9 = v8 * v8;
-        const double v10 = v5 + v9;
-        const double v11 = v10 - 3.0;
-        const double v12 = v11 * v11;
-        const double v13 = parameters[2] * v12;
-        const double v14 = parameters[0] + v13;
-        const double v15 = v11 * v14;
-        const double v16 = parameters[1] * v12;
-        const double v17 = v16 + v15;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = v11 * v11, v13 = parameters[2] * v12, v14 = parameters[0] + v13, v15 = v11 * v14,
+            v16 = parameters[1] * v12, v17 = v16 + v15;
         values[e] = v17;
     }
 }
 
-void softehl_sheet_yeoh_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_yeoh_residual)
 {
     (void)points;
     (void)modes;
@@ -66,50 +40,19 @@ void softehl_sheet_yeoh_residual(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[1]);
-        const double v2 = v1 * v1;
-        const double v3 = exp(d[0]);
-        const double v4 = v3 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = d[0] + d[1];
-        const double v7 = -v6;
-        const double v8 = exp(v7);
-        const double v9 = v8 * v8;
-        const double v10 = v5 + v9;
-        const double v11 = v10 - 3.0;
-        const double v12 = 3.0 * parameters[2];
-        const double v13 = v11 * v12;
-        const double v14 = 2.0 * parameters[1];
-        const double v15 = v14 + v13;
-        const double v16 = v11 * v15;
-        const double v17 = parameters[0] + v16;
-        const double v18 = 2.0 * v3;
-        const double v19 = v3 * v18;
-        const double v20 = v19 * v17;
-        const double v21 = 2.0 * v8;
-        const double v22 = v8 * v21;
-        const double v23 = v22 * v17;
-        const double v24 = v20 - v23;
-        const double v25 = 2.0 * v1;
-        const double v26 = v1 * v25;
-        const double v27 = v26 * v17;
-        const double v28 = v27 - v23;
-        R[0] = v24;
-        R[1] = v28;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = 3.0 * parameters[2], v13 = v11 * v12, v14 = 2.0 * parameters[1], v15 = v14 + v13,
+            v16 = v11 * v15, v17 = parameters[0] + v16, v18 = 2.0 * v3, v19 = v3 * v18,
+            v20 = v19 * v17, v21 = 2.0 * v8, v22 = v8 * v21, v23 = v22 * v17, v24 = v20 - v23,
+            v25 = 2.0 * v1, v26 = v1 * v25, v27 = v26 * v17, v28 = v27 - v23;
+        R[0] = v24; R[1] = v28;
     }
 }
 
-void softehl_sheet_yeoh_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_yeoh_tangent)
 {
     (void)points;
     (void)modes;
@@ -118,86 +61,27 @@ void softehl_sheet_yeoh_tangent(
     (void)rule;
     (void)basis;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        double *restrict K = tangent + 2 * 2 * e;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; double *restrict K = tangent + 2 * 2 * e;
         (void)X; (void)d;
-        const double v1 = exp(d[1]);
-        const double v2 = v1 * v1;
-        const double v3 = exp(d[0]);
-        const double v4 = v3 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = d[0] + d[1];
-        const double v7 = -v6;
-        const double v8 = exp(v7);
-        const double v9 = v8 * v8;
-        const double v10 = v5 + v9;
-        const double v11 = v10 - 3.0;
-        const double v12 = 3.0 * parameters[2];
-        const double v13 = v11 * v12;
-        const double v14 = v11 * v13;
-        const double v15 = 2.0 * v11;
-        const double v16 = parameters[1] * v15;
-        const double v17 = parameters[0] + v16;
-        const double v18 = v14 + v17;
-        const double v19 = 2.0 * v3;
-        const double v20 = v19 * v18;
-        const double v21 = v3 * v20;
-        const double v22 = 2.0 * v8;
-        const double v23 = v22 * v18;
-        const double v24 = v8 * v23;
-        const double v25 = v21 - v24;
-        const double v26 = 2.0 * v1;
-        const double v27 = v26 * v18;
-        const double v28 = v1 * v27;
-        const double v29 = v28 - v24;
-        const double v30 = v24 + v21;
-        const double v31 = v12 * v15;
-        const double v32 = 2.0 * parameters[1];
-        const double v33 = v32 + v31;
-        const double v34 = v3 * v19;
-        const double v35 = v8 * v22;
-        const double v36 = v34 - v35;
-        const double v37 = v36 * v33;
-        const double v38 = v19 * v37;
-        const double v39 = v38 + v20;
-        const double v40 = v3 * v39;
-        const double v41 = v40 + v30;
-        const double v42 = v22 * v37;
-        const double v43 = v42 - v23;
-        const double v44 = v8 * v43;
-        const double v45 = v41 - v44;
-        const double v46 = v1 * v26;
-        const double v47 = v46 - v35;
-        const double v48 = v47 * v33;
-        const double v49 = v22 * v48;
-        const double v50 = v49 - v23;
-        const double v51 = v8 * v50;
-        const double v52 = v24 - v51;
-        const double v53 = v34 * v48;
-        const double v54 = v53 + v52;
-        const double v55 = v26 * v48;
-        const double v56 = v55 + v27;
-        const double v57 = v1 * v56;
-        const double v58 = v28 + v57;
-        const double v59 = v52 + v58;
-        R[0] = v25;
-        R[1] = v29;
-        K[0] = v45;
-        K[1] = v54;
-        K[2] = v54;
-        K[3] = v59;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = 3.0 * parameters[2], v13 = v11 * v12, v14 = v11 * v13, v15 = 2.0 * v11,
+            v16 = parameters[1] * v15, v17 = parameters[0] + v16, v18 = v14 + v17, v19 = 2.0 * v3,
+            v20 = v19 * v18, v21 = v3 * v20, v22 = 2.0 * v8, v23 = v22 * v18, v24 = v8 * v23,
+            v25 = v21 - v24, v26 = 2.0 * v1, v27 = v26 * v18, v28 = v1 * v27, v29 = v28 - v24,
+            v30 = v24 + v21, v31 = v12 * v15, v32 = 2.0 * parameters[1], v33 = v32 + v31,
+            v34 = v3 * v19, v35 = v8 * v22, v36 = v34 - v35, v37 = v36 * v33, v38 = v19 * v37,
+            v39 = v38 + v20, v40 = v3 * v39, v41 = v40 + v30, v42 = v22 * v37, v43 = v42 - v23,
+            v44 = v8 * v43, v45 = v41 - v44, v46 = v1 * v26, v47 = v46 - v35, v48 = v47 * v33,
+            v49 = v22 * v48, v50 = v49 - v23, v51 = v8 * v50, v52 = v24 - v51, v53 = v34 * v48,
+            v54 = v53 + v52, v55 = v26 * v48, v56 = v55 + v27, v57 = v1 * v56, v58 = v28 + v57,
+            v59 = v52 + v58;
+        R[0] = v25; R[1] = v29; K[0] = v45; K[1] = v54; K[2] = v54; K[3] = v59;
     }
 }
 
-void softehl_sheet_yeoh_d_c_1(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_yeoh_d_c_1)
 {
     (void)points;
     (void)modes;
@@ -208,35 +92,16 @@ void softehl_sheet_yeoh_d_c_1(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[0]);
-        const double v2 = 2.0 * v1;
-        const double v3 = v1 * v2;
-        const double v4 = d[0] + d[1];
-        const double v5 = -v4;
-        const double v6 = exp(v5);
-        const double v7 = 2.0 * v6;
-        const double v8 = v6 * v7;
-        const double v9 = v3 - v8;
-        const double v10 = exp(d[1]);
-        const double v11 = 2.0 * v10;
-        const double v12 = v10 * v11;
-        const double v13 = v12 - v8;
-        R[0] = v9;
-        R[1] = v13;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = exp(d[0]), v2 = 2.0 * v1, v3 = v1 * v2, v4 = d[0] + d[1], v5 = -v4,
+            v6 = exp(v5), v7 = 2.0 * v6, v8 = v6 * v7, v9 = v3 - v8, v10 = exp(d[1]),
+            v11 = 2.0 * v10, v12 = v10 * v11, v13 = v12 - v8;
+        R[0] = v9; R[1] = v13;
     }
 }
 
-void softehl_sheet_yeoh_d_c_2(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_yeoh_d_c_2)
 {
     (void)points;
     (void)modes;
@@ -247,45 +112,18 @@ void softehl_sheet_yeoh_d_c_2(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[1]);
-        const double v2 = v1 * v1;
-        const double v3 = exp(d[0]);
-        const double v4 = v3 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = d[0] + d[1];
-        const double v7 = -v6;
-        const double v8 = exp(v7);
-        const double v9 = v8 * v8;
-        const double v10 = v5 + v9;
-        const double v11 = v10 - 3.0;
-        const double v12 = 2.0 * v11;
-        const double v13 = 2.0 * v3;
-        const double v14 = v3 * v13;
-        const double v15 = v14 * v12;
-        const double v16 = 2.0 * v8;
-        const double v17 = v8 * v16;
-        const double v18 = v17 * v12;
-        const double v19 = v15 - v18;
-        const double v20 = 2.0 * v1;
-        const double v21 = v1 * v20;
-        const double v22 = v21 * v12;
-        const double v23 = v22 - v18;
-        R[0] = v19;
-        R[1] = v23;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = 2.0 * v11, v13 = 2.0 * v3, v14 = v3 * v13, v15 = v14 * v12, v16 = 2.0 * v8,
+            v17 = v8 * v16, v18 = v17 * v12, v19 = v15 - v18, v20 = 2.0 * v1, v21 = v1 * v20,
+            v22 = v21 * v12, v23 = v22 - v18;
+        R[0] = v19; R[1] = v23;
     }
 }
 
-void softehl_sheet_yeoh_d_c_3(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_KERNEL(softehl_sheet_yeoh_d_c_3)
 {
     (void)points;
     (void)modes;
@@ -296,35 +134,13 @@ void softehl_sheet_yeoh_d_c_3(
     (void)basis;
     (void)tangent;
     for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e;
-        const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[1]);
-        const double v2 = v1 * v1;
-        const double v3 = exp(d[0]);
-        const double v4 = v3 * v3;
-        const double v5 = v4 + v2;
-        const double v6 = d[0] + d[1];
-        const double v7 = -v6;
-        const double v8 = exp(v7);
-        const double v9 = v8 * v8;
-        const double v10 = v5 + v9;
-        const double v11 = v10 - 3.0;
-        const double v12 = 3.0 * v11;
-        const double v13 = v11 * v12;
-        const double v14 = 2.0 * v3;
-        const double v15 = v3 * v14;
-        const double v16 = v15 * v13;
-        const double v17 = 2.0 * v8;
-        const double v18 = v8 * v17;
-        const double v19 = v18 * v13;
-        const double v20 = v16 - v19;
-        const double v21 = 2.0 * v1;
-        const double v22 = v1 * v21;
-        const double v23 = v22 * v13;
-        const double v24 = v23 - v19;
-        R[0] = v20;
-        R[1] = v24;
+        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
+        double *restrict R = values + 2 * e; (void)X; (void)d;
+        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
+            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
+            v12 = 3.0 * v11, v13 = v11 * v12, v14 = 2.0 * v3, v15 = v3 * v14, v16 = v15 * v13,
+            v17 = 2.0 * v8, v18 = v8 * v17, v19 = v18 * v13, v20 = v16 - v19, v21 = 2.0 * v1,
+            v22 = v1 * v21, v23 = v22 * v13, v24 = v23 - v19;
+        R[0] = v20; R[1] = v24;
     }
 }

@@ -6,7 +6,18 @@
 
 #if defined(__cplusplus) && !defined(SOFTEHL_SOURCE)
 extern "C" {
-#else
+#endif
+
+/* The type of every kernel.  No two arrays of a call overlap. */
+typedef void softehl_kernel(
+    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
+    const double *coordinates, const double *dofs,
+    const double *data, const double *parameters,
+    const double *direction,
+    const double *rule, const double *basis,
+    double *values, double *tangent);
+
+#if !defined(__cplusplus) || defined(SOFTEHL_SOURCE)
 #include <math.h>
 
 /* One lane per element: 8 with AVX-512, else 4.  Without vector extensions a group is one element.
@@ -373,1185 +384,258 @@ static inline void softehl_pad(double *to, const double *from, ptrdiff_t width, 
         for (ptrdiff_t k = 0; k < width; ++k)
             to[e * width + k] = from[(e < count ? e : count - 1) * width + k];
 }
+
+#define SOFTEHL_KERNEL(NAME)                                                        \
+    void NAME(ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,                       \
+        const double *restrict coordinates, const double *restrict dofs,            \
+        const double *restrict data, const double *restrict parameters,             \
+        const double *restrict direction, const double *restrict rule,              \
+        const double *restrict basis, double *restrict values, double *restrict tangent)
+
+/* What computes as many elements as there are lanes: never printed into the loop over groups. */
+#ifdef __GNUC__
+#define SOFTEHL_APART static __attribute__((noinline))
+#else
+#define SOFTEHL_APART static
+#endif
+#define SOFTEHL_GROUP(NAME)                                                         \
+    SOFTEHL_APART void NAME##_group(ptrdiff_t points, ptrdiff_t modes,              \
+        const double *restrict X, const double *restrict d, const double *restrict a, \
+        const double *restrict t, const double *restrict parameters,                \
+        const double *restrict rule, const double *restrict basis,                  \
+        double *restrict R, double *restrict K)
+#define SOFTEHL_IDLE                                                                \
+    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t,                  \
+    (void)parameters, (void)rule, (void)basis, (void)R, (void)K
+
+/* The kernel of a batch around the function of a group: values of an element in its arrays.
+   A wide one has its room for tangents apart from the stack. */
+#define SOFTEHL_BATCH(NAME, ...) SOFTEHL_BATCH_IN(0, NAME, __VA_ARGS__)
+#define SOFTEHL_WIDE_BATCH(NAME, X, D, A, T, R, K)                                  \
+    static _Thread_local double NAME##_room[SOFTEHL_LANES * K];                     \
+    SOFTEHL_BATCH_IN(NAME##_room, NAME, X, D, A, T, R, K)
+#define SOFTEHL_BATCH_IN(ROOM, NAME, ...)                                           \
+    SOFTEHL_KERNEL(NAME)                                                            \
+    {                                                                               \
+        const softehl_widths wide = {__VA_ARGS__};                                  \
+        softehl_batch(NAME##_group, ROOM, wide, n, points, modes, coordinates, dofs, data, \
+            parameters, direction, rule, basis, values, tangent);                   \
+    }
+
+typedef struct {
+    ptrdiff_t X, d, a, t, R, K;
+} softehl_widths;
+
+typedef void softehl_group(
+    ptrdiff_t points, ptrdiff_t modes, const double *X, const double *d, const double *a,
+    const double *t, const double *parameters, const double *rule, const double *basis, double *R,
+    double *K);
+
+/* Full groups, the last one moved back so that it ends with the batch (the same values are written
+   again); a batch smaller than a group is filled up with its last element. */
+#ifdef __GNUC__
+__attribute__((always_inline))
+#endif
+static inline void softehl_batch(
+    softehl_group *group, double *room, softehl_widths wide, ptrdiff_t n, ptrdiff_t points,
+    ptrdiff_t modes, const double *coordinates, const double *dofs, const double *data,
+    const double *parameters, const double *direction, const double *rule, const double *basis,
+    double *values, double *tangent)
+{
+#define SOFTEHL_AT(p, w) ((w) ? (p) + (w) * e : 0)
+    (void)room;
+    if (n < 1) return;
+    for (ptrdiff_t next = 0; n >= SOFTEHL_LANES && next < n; next += SOFTEHL_LANES) {
+        const ptrdiff_t e = next + SOFTEHL_LANES <= n ? next : n - SOFTEHL_LANES;
+        group(points, modes, SOFTEHL_AT(coordinates, wide.X), SOFTEHL_AT(dofs, wide.d),
+            SOFTEHL_AT(data, wide.a), SOFTEHL_AT(direction, wide.t), parameters, rule, basis,
+            SOFTEHL_AT(values, wide.R), SOFTEHL_AT(tangent, wide.K));
+    }
+#undef SOFTEHL_AT
+#if SOFTEHL_LANES > 1
+    if (n >= SOFTEHL_LANES) return;
+#define SOFTEHL_ROOM(w) SOFTEHL_LANES * (w) + 1
+    double X[SOFTEHL_ROOM(wide.X)], d[SOFTEHL_ROOM(wide.d)], a[SOFTEHL_ROOM(wide.a)];
+    double t[SOFTEHL_ROOM(wide.t)], R[SOFTEHL_ROOM(wide.R)], stack[SOFTEHL_ROOM(room ? 0 : wide.K)];
+#undef SOFTEHL_ROOM
+    double *const K = room ? room : stack;
+    softehl_pad(X, coordinates, wide.X, n), softehl_pad(d, dofs, wide.d, n);
+    softehl_pad(a, data, wide.a, n), softehl_pad(t, direction, wide.t, n);
+    group(points, modes, X, d, a, t, parameters, rule, basis, R, K);
+    for (ptrdiff_t i = 0; i < wide.R * n; ++i) values[i] = R[i];
+    for (ptrdiff_t i = 0; i < wide.K * n; ++i) tangent[i] = K[i];
+#endif
+}
 #endif
 
-/* No two arrays of a call overlap. */
-void softehl_solid_q4_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_q4_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_q4_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_q4_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_q4_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_fbar_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_fbar_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_fbar_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_fbar_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_yeoh_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_yeoh_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_yeoh_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_yeoh_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_yeoh_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_ogden_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_ogden_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_ogden_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_ogden_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_ogden_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_arruda_boyce_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_arruda_boyce_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_arruda_boyce_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_arruda_boyce_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_arruda_boyce_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_gent_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_gent_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_gent_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_gent_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_solid_taylor_mean_gent_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_follower_pressure_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_follower_pressure_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_follower_pressure_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_contact_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_contact_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_contact_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_contact_friction_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_contact_friction_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_contact_corner_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_contact_corner_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_contact_corner_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mortar_22_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mortar_22_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mortar_23_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mortar_23_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mortar_32_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mortar_32_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mortar_33_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mortar_33_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mortar_side_2_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mortar_side_2_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mortar_side_2_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mortar_side_3_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mortar_side_3_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mortar_side_3_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_touch_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_touch_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_touch_side_3_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_touch_side_3_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_touch_side_3_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_touch_side_4_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_touch_side_4_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_touch_side_4_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_upwind_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_upwind_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_upwind_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_facet_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_facet_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_facet_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_facet_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_facet_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_rough_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_rough_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_rough_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_rough_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_rough_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_upwind_rough_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_upwind_rough_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_upwind_rough_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_void_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_void_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_void_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_eyring_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_eyring_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_eyring_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_eyring_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_eyring_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_carreau_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_carreau_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_carreau_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_carreau_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_carreau_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_eyring_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_eyring_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_eyring_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_eyring_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_eyring_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_carreau_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_carreau_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_carreau_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_carreau_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_conserving_carreau_fields_rate(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_squeeze_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_squeeze_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_squeeze_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_squeeze_rough_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_squeeze_rough_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_film_squeeze_rough_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mean_rotation_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mean_rotation_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mean_rotation_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mean_rotation_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mean_axial_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mean_axial_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mean_axial_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_mean_axial_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_axial_spring_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_axial_spring_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_axial_spring_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_mooney_rivlin_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_mooney_rivlin_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_mooney_rivlin_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_mooney_rivlin_d_mu_1(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_mooney_rivlin_d_mu_2(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_yeoh_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_yeoh_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_yeoh_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_yeoh_d_c_1(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_yeoh_d_c_2(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_yeoh_d_c_3(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_ogden_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_ogden_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_ogden_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_ogden_d_mu_1(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_ogden_d_alpha_1(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_ogden_d_mu_2(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_ogden_d_alpha_2(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_ogden_d_mu_3(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_ogden_d_alpha_3(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_arruda_boyce_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_arruda_boyce_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_arruda_boyce_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_arruda_boyce_d_mu(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_arruda_boyce_d_lambda_m(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_gent_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_gent_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_gent_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_gent_d_mu(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
-void softehl_sheet_gent_d_J_m(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *coordinates, const double *dofs,
-    const double *data, const double *parameters,
-    const double *direction,
-    const double *rule, const double *basis,
-    double *values, double *tangent);
+softehl_kernel softehl_solid_q4_energy;
+softehl_kernel softehl_solid_q4_residual;
+softehl_kernel softehl_solid_q4_tangent;
+softehl_kernel softehl_solid_q4_fields;
+softehl_kernel softehl_solid_q4_pseudo_load;
+softehl_kernel softehl_solid_fbar_residual;
+softehl_kernel softehl_solid_fbar_tangent;
+softehl_kernel softehl_solid_fbar_fields;
+softehl_kernel softehl_solid_fbar_pseudo_load;
+softehl_kernel softehl_solid_taylor_energy;
+softehl_kernel softehl_solid_taylor_residual;
+softehl_kernel softehl_solid_taylor_tangent;
+softehl_kernel softehl_solid_taylor_fields;
+softehl_kernel softehl_solid_taylor_pseudo_load;
+softehl_kernel softehl_solid_taylor_mean_energy;
+softehl_kernel softehl_solid_taylor_mean_residual;
+softehl_kernel softehl_solid_taylor_mean_tangent;
+softehl_kernel softehl_solid_taylor_mean_fields;
+softehl_kernel softehl_solid_taylor_mean_pseudo_load;
+softehl_kernel softehl_solid_taylor_mean_yeoh_energy;
+softehl_kernel softehl_solid_taylor_mean_yeoh_residual;
+softehl_kernel softehl_solid_taylor_mean_yeoh_tangent;
+softehl_kernel softehl_solid_taylor_mean_yeoh_fields;
+softehl_kernel softehl_solid_taylor_mean_yeoh_pseudo_load;
+softehl_kernel softehl_solid_taylor_mean_ogden_energy;
+softehl_kernel softehl_solid_taylor_mean_ogden_residual;
+softehl_kernel softehl_solid_taylor_mean_ogden_tangent;
+softehl_kernel softehl_solid_taylor_mean_ogden_fields;
+softehl_kernel softehl_solid_taylor_mean_ogden_pseudo_load;
+softehl_kernel softehl_solid_taylor_mean_arruda_boyce_energy;
+softehl_kernel softehl_solid_taylor_mean_arruda_boyce_residual;
+softehl_kernel softehl_solid_taylor_mean_arruda_boyce_tangent;
+softehl_kernel softehl_solid_taylor_mean_arruda_boyce_fields;
+softehl_kernel softehl_solid_taylor_mean_arruda_boyce_pseudo_load;
+softehl_kernel softehl_solid_taylor_mean_gent_energy;
+softehl_kernel softehl_solid_taylor_mean_gent_residual;
+softehl_kernel softehl_solid_taylor_mean_gent_tangent;
+softehl_kernel softehl_solid_taylor_mean_gent_fields;
+softehl_kernel softehl_solid_taylor_mean_gent_pseudo_load;
+softehl_kernel softehl_follower_pressure_residual;
+softehl_kernel softehl_follower_pressure_tangent;
+softehl_kernel softehl_follower_pressure_pseudo_load;
+softehl_kernel softehl_contact_residual;
+softehl_kernel softehl_contact_tangent;
+softehl_kernel softehl_contact_pseudo_load;
+softehl_kernel softehl_contact_friction_residual;
+softehl_kernel softehl_contact_friction_tangent;
+softehl_kernel softehl_contact_corner_energy;
+softehl_kernel softehl_contact_corner_residual;
+softehl_kernel softehl_contact_corner_tangent;
+softehl_kernel softehl_mortar_22_residual;
+softehl_kernel softehl_mortar_22_tangent;
+softehl_kernel softehl_mortar_23_residual;
+softehl_kernel softehl_mortar_23_tangent;
+softehl_kernel softehl_mortar_32_residual;
+softehl_kernel softehl_mortar_32_tangent;
+softehl_kernel softehl_mortar_33_residual;
+softehl_kernel softehl_mortar_33_tangent;
+softehl_kernel softehl_mortar_side_2_residual;
+softehl_kernel softehl_mortar_side_2_tangent;
+softehl_kernel softehl_mortar_side_2_fields;
+softehl_kernel softehl_mortar_side_3_residual;
+softehl_kernel softehl_mortar_side_3_tangent;
+softehl_kernel softehl_mortar_side_3_fields;
+softehl_kernel softehl_touch_residual;
+softehl_kernel softehl_touch_tangent;
+softehl_kernel softehl_touch_side_3_residual;
+softehl_kernel softehl_touch_side_3_tangent;
+softehl_kernel softehl_touch_side_3_fields;
+softehl_kernel softehl_touch_side_4_residual;
+softehl_kernel softehl_touch_side_4_tangent;
+softehl_kernel softehl_touch_side_4_fields;
+softehl_kernel softehl_film_residual;
+softehl_kernel softehl_film_tangent;
+softehl_kernel softehl_film_fields;
+softehl_kernel softehl_film_pseudo_load;
+softehl_kernel softehl_film_fields_rate;
+softehl_kernel softehl_film_upwind_residual;
+softehl_kernel softehl_film_upwind_tangent;
+softehl_kernel softehl_film_upwind_pseudo_load;
+softehl_kernel softehl_film_facet_residual;
+softehl_kernel softehl_film_facet_tangent;
+softehl_kernel softehl_film_facet_fields;
+softehl_kernel softehl_film_facet_pseudo_load;
+softehl_kernel softehl_film_facet_fields_rate;
+softehl_kernel softehl_film_conserving_residual;
+softehl_kernel softehl_film_conserving_tangent;
+softehl_kernel softehl_film_conserving_fields;
+softehl_kernel softehl_film_conserving_pseudo_load;
+softehl_kernel softehl_film_conserving_fields_rate;
+softehl_kernel softehl_film_rough_residual;
+softehl_kernel softehl_film_rough_tangent;
+softehl_kernel softehl_film_rough_fields;
+softehl_kernel softehl_film_rough_pseudo_load;
+softehl_kernel softehl_film_rough_fields_rate;
+softehl_kernel softehl_film_upwind_rough_residual;
+softehl_kernel softehl_film_upwind_rough_tangent;
+softehl_kernel softehl_film_upwind_rough_pseudo_load;
+softehl_kernel softehl_film_void_residual;
+softehl_kernel softehl_film_void_tangent;
+softehl_kernel softehl_film_void_pseudo_load;
+softehl_kernel softehl_film_eyring_residual;
+softehl_kernel softehl_film_eyring_tangent;
+softehl_kernel softehl_film_eyring_fields;
+softehl_kernel softehl_film_eyring_pseudo_load;
+softehl_kernel softehl_film_eyring_fields_rate;
+softehl_kernel softehl_film_carreau_residual;
+softehl_kernel softehl_film_carreau_tangent;
+softehl_kernel softehl_film_carreau_fields;
+softehl_kernel softehl_film_carreau_pseudo_load;
+softehl_kernel softehl_film_carreau_fields_rate;
+softehl_kernel softehl_film_conserving_eyring_residual;
+softehl_kernel softehl_film_conserving_eyring_tangent;
+softehl_kernel softehl_film_conserving_eyring_fields;
+softehl_kernel softehl_film_conserving_eyring_pseudo_load;
+softehl_kernel softehl_film_conserving_eyring_fields_rate;
+softehl_kernel softehl_film_conserving_carreau_residual;
+softehl_kernel softehl_film_conserving_carreau_tangent;
+softehl_kernel softehl_film_conserving_carreau_fields;
+softehl_kernel softehl_film_conserving_carreau_pseudo_load;
+softehl_kernel softehl_film_conserving_carreau_fields_rate;
+softehl_kernel softehl_film_squeeze_residual;
+softehl_kernel softehl_film_squeeze_tangent;
+softehl_kernel softehl_film_squeeze_fields;
+softehl_kernel softehl_film_squeeze_rough_residual;
+softehl_kernel softehl_film_squeeze_rough_tangent;
+softehl_kernel softehl_film_squeeze_rough_fields;
+softehl_kernel softehl_mean_rotation_energy;
+softehl_kernel softehl_mean_rotation_residual;
+softehl_kernel softehl_mean_rotation_tangent;
+softehl_kernel softehl_mean_rotation_pseudo_load;
+softehl_kernel softehl_mean_axial_energy;
+softehl_kernel softehl_mean_axial_residual;
+softehl_kernel softehl_mean_axial_tangent;
+softehl_kernel softehl_mean_axial_pseudo_load;
+softehl_kernel softehl_axial_spring_energy;
+softehl_kernel softehl_axial_spring_residual;
+softehl_kernel softehl_axial_spring_tangent;
+softehl_kernel softehl_sheet_mooney_rivlin_energy;
+softehl_kernel softehl_sheet_mooney_rivlin_residual;
+softehl_kernel softehl_sheet_mooney_rivlin_tangent;
+softehl_kernel softehl_sheet_mooney_rivlin_d_mu_1;
+softehl_kernel softehl_sheet_mooney_rivlin_d_mu_2;
+softehl_kernel softehl_sheet_yeoh_energy;
+softehl_kernel softehl_sheet_yeoh_residual;
+softehl_kernel softehl_sheet_yeoh_tangent;
+softehl_kernel softehl_sheet_yeoh_d_c_1;
+softehl_kernel softehl_sheet_yeoh_d_c_2;
+softehl_kernel softehl_sheet_yeoh_d_c_3;
+softehl_kernel softehl_sheet_ogden_energy;
+softehl_kernel softehl_sheet_ogden_residual;
+softehl_kernel softehl_sheet_ogden_tangent;
+softehl_kernel softehl_sheet_ogden_d_mu_1;
+softehl_kernel softehl_sheet_ogden_d_alpha_1;
+softehl_kernel softehl_sheet_ogden_d_mu_2;
+softehl_kernel softehl_sheet_ogden_d_alpha_2;
+softehl_kernel softehl_sheet_ogden_d_mu_3;
+softehl_kernel softehl_sheet_ogden_d_alpha_3;
+softehl_kernel softehl_sheet_arruda_boyce_energy;
+softehl_kernel softehl_sheet_arruda_boyce_residual;
+softehl_kernel softehl_sheet_arruda_boyce_tangent;
+softehl_kernel softehl_sheet_arruda_boyce_d_mu;
+softehl_kernel softehl_sheet_arruda_boyce_d_lambda_m;
+softehl_kernel softehl_sheet_gent_energy;
+softehl_kernel softehl_sheet_gent_residual;
+softehl_kernel softehl_sheet_gent_tangent;
+softehl_kernel softehl_sheet_gent_d_mu;
+softehl_kernel softehl_sheet_gent_d_J_m;
 
 const char *softehl_signature(void);
 

@@ -23,3983 +23,704 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_solid_fbar_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_fbar_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 0.25 * parameters[2];
-    const V v4 = X4 - X2;
-    const V v5 = X4 - X6;
-    const V v6 = X2 - X0;
-    const V v7 = X6 - X0;
-    const V v8 = 0.10566243270259355 * v4;
-    const V v9 = 0.39433756729740643 * v4;
-    const V v10 = v4 + v7;
-    const V v11 = v5 + v6;
-    const V v12 = 0.39433756729740643 * v6;
-    const V v13 = 0.10566243270259355 * v6;
-    const V v14 = 0.39433756729740643 * v7;
-    const V v15 = v14 + v8;
-    const V v16 = 0.10566243270259355 * v7;
-    const V v17 = v16 + v9;
-    const V v18 = 0.10566243270259355 * v5;
-    const V v19 = v12 + v18;
-    const V v20 = 0.39433756729740643 * v5;
-    const V v21 = v13 + v20;
-    const V v22 = 0.0625 * v10;
-    const V v23 = 0.0625 * v11;
-    const V v24 = 0.25 * v15;
-    const V v25 = 0.25 * v17;
-    const V v26 = 0.25 * v19;
-    const V v27 = 0.25 * v21;
-    const V v28 = 1.5773502691896257 * X1;
-    const V v29 = 0.4226497308103742 * X1;
-    const V v30 = X1 + X3;
-    const V v31 = 0.4226497308103742 * X3;
-    const V v32 = v28 + v31;
-    const V v33 = 1.5773502691896257 * X3;
-    const V v34 = v29 + v33;
-    const V v35 = X3 - X1;
-    const V v36 = X5 - X3;
-    const V v37 = 0.39433756729740643 * v32;
-    const V v38 = 0.10566243270259355 * v32;
-    const V v39 = 0.39433756729740643 * v34;
-    const V v40 = 0.10566243270259355 * v34;
-    const V v41 = 0.4226497308103742 * X5;
-    const V v42 = 1.5773502691896257 * X5;
-    const V v43 = 0.39433756729740643 * v35;
-    const V v44 = 0.10566243270259355 * v35;
-    const V v45 = 0.10566243270259355 * v36;
-    const V v46 = 0.39433756729740643 * v36;
-    const V v47 = X5 - X7;
-    const V v48 = X5 + X7;
-    const V v49 = 1.5773502691896257 * X7;
-    const V v50 = v41 + v49;
-    const V v51 = 0.4226497308103742 * X7;
-    const V v52 = v42 + v51;
-    const V v53 = v47 + v35;
-    const V v54 = 0.10566243270259355 * v47;
-    const V v55 = v43 + v54;
-    const V v56 = 0.39433756729740643 * v47;
-    const V v57 = v44 + v56;
-    const V v58 = v30 + v48;
-    const V v59 = 0.10566243270259355 * v50;
-    const V v60 = v37 + v59;
-    const V v61 = 0.39433756729740643 * v50;
-    const V v62 = v38 + v61;
-    const V v63 = X7 - X1;
-    const V v64 = 0.10566243270259355 * v52;
-    const V v65 = v39 + v64;
-    const V v66 = 0.39433756729740643 * v52;
-    const V v67 = v40 + v66;
-    const V v68 = v48 - v30;
-    const V v69 = 0.25 * v58;
-    const V v70 = 0.25 * v55;
-    const V v71 = 1.0 / v60;
-    const V v72 = 0.39433756729740643 * v63;
-    const V v73 = v72 + v45;
-    const V v74 = 0.10566243270259355 * v63;
-    const V v75 = v74 + v46;
-    const V v76 = 1.0 / v62;
-    const V v77 = 1.0 / v65;
-    const V v78 = 1.0 / v69;
-    const V v79 = 1.0 / v67;
-    const V v80 = 0.25 * v57;
-    const V v81 = 0.0625 * v68;
-    const V v82 = v68 * v11;
-    const V v83 = 0.25 * v73;
-    const V v84 = 0.25 * v75;
-    const V v85 = v10 * v53;
-    const V v86 = v82 - v85;
-    const V v87 = 0.0625 * v53;
-    const V v88 = d0 - d2;
-    const V v89 = d0 + d2;
-    const V v90 = 0.0625 * v86;
-    const V v91 = d1 - d3;
-    const V v92 = d1 + d3;
-    const V v93 = v89 - d4;
-    const V v94 = 1.0 / v90;
-    const V v95 = 0.25 * v78;
-    const V v96 = d4 - d6;
-    const V v97 = v93 - d6;
-    const V v98 = 0.25 * v71;
-    const V v99 = 0.5 * v71;
-    const V v100 = v88 - v96;
-    const V v101 = v88 + v96;
-    const V v102 = 0.25 * v76;
-    const V v103 = 0.5 * v76;
-    const V v104 = 0.5773502691896257 * v101;
-    const V v105 = 0.25 * v77;
-    const V v106 = 0.5 * v77;
-    const V v107 = 0.25 * v79;
-    const V v108 = 0.5 * v79;
-    const V v109 = v100 + v104;
-    const V v110 = v100 - v104;
-    const V v111 = v97 + v104;
-    const V v112 = v97 - v104;
-    const V v113 = d5 + d7;
-    const V v114 = d5 - d7;
-    const V v115 = v87 * v94;
-    const V v116 = v81 * v94;
-    const V v117 = v22 * v94;
-    const V v118 = v23 * v94;
-    const V v119 = v92 - v113;
-    const V v120 = v92 + v113;
-    const V v121 = v91 - v114;
-    const V v122 = v91 + v114;
-    const V v123 = v100 * v117;
-    const V v124 = v100 * v116;
-    const V v125 = 1.0 - v124;
-    const V v126 = 0.5773502691896257 * v119;
-    const V v127 = v120 * v95;
-    const V v128 = 1.0 + v127;
-    const V v129 = 0.5773502691896257 * v122;
-    const V v130 = 0.3333333333333333 * v122;
-    const V v131 = 0.5773502691896257 * v121;
-    const V v132 = v119 + v129;
-    const V v133 = v119 - v129;
-    const V v134 = v120 + v131;
-    const V v135 = v120 - v131;
-    const V v136 = v121 + v129;
-    const V v137 = v121 - v129;
-    const V v138 = v126 + v130;
-    const V v139 = v126 - v130;
-    const V v140 = v119 * v115;
-    const V v141 = v97 * v115;
-    const V v142 = v125 + v141;
-    const V v143 = v134 + v138;
-    const V v144 = v134 - v138;
-    const V v145 = v135 + v139;
-    const V v146 = v135 - v139;
-    const V v147 = v121 * v116;
-    const V v148 = v140 - v147;
-    const V v149 = v121 * v117;
-    const V v150 = 1.0 + v149;
-    const V v151 = v98 * v143;
-    const V v152 = 1.0 + v151;
-    const V v153 = v102 * v144;
-    const V v154 = 1.0 + v153;
-    const V v155 = v105 * v145;
-    const V v156 = 1.0 + v155;
-    const V v157 = v107 * v146;
-    const V v158 = 1.0 + v157;
-    const V v159 = v119 * v118;
-    const V v160 = v150 - v159;
-    const V v161 = v97 * v118;
-    const V v162 = v123 - v161;
-    const V v163 = v142 * v160;
-    const V v164 = v152 * v152;
-    const V v165 = v99 * v152;
-    const V v166 = v154 * v154;
-    const V v167 = v103 * v154;
-    const V v168 = v148 * v162;
-    const V v169 = v163 - v168;
-    const V v170 = v156 * v156;
-    const V v171 = v158 * v158;
-    const V v172 = v106 * v156;
-    const V v173 = v108 * v158;
-    const V v174 = v128 * v169;
-    const V v175 = v19 * v73;
-    const V v176 = v21 * v73;
-    const V v177 = v19 * v75;
-    const V v178 = v21 * v75;
-    const V v179 = v15 * v55;
-    const V v180 = v175 - v179;
-    const V v181 = v15 * v57;
-    const V v182 = v176 - v181;
-    const V v183 = v17 * v55;
-    const V v184 = v177 - v183;
-    const V v185 = v17 * v57;
-    const V v186 = v178 - v185;
-    const V v187 = 1.0 / v180;
-    const V v188 = 6.283185307179586 * v180;
-    const V v189 = 1.0 / v182;
-    const V v190 = 6.283185307179586 * v182;
-    const V v191 = 1.0 / v184;
-    const V v192 = 6.283185307179586 * v184;
-    const V v193 = 1.0 / v186;
-    const V v194 = 6.283185307179586 * v186;
-    const V v195 = v60 * v188;
-    const V v196 = v62 * v190;
-    const V v197 = v65 * v192;
-    const V v198 = v67 * v194;
-    const V v199 = v83 * v187;
-    const V v200 = v83 * v189;
-    const V v201 = v84 * v191;
-    const V v202 = v84 * v193;
-    const V v203 = v70 * v187;
-    const V v204 = v70 * v191;
-    const V v205 = v80 * v189;
-    const V v206 = v80 * v193;
-    const V v207 = v26 * v187;
-    const V v208 = v26 * v191;
-    const V v209 = v24 * v187;
-    const V v210 = v24 * v189;
-    const V v211 = v27 * v189;
-    const V v212 = v27 * v193;
-    const V v213 = v25 * v191;
-    const V v214 = v25 * v193;
-    const V v215 = v209 * v109;
-    const V v216 = v213 * v109;
-    const V v217 = v203 * v132;
-    const V v218 = v205 * v132;
-    const V v219 = v207 * v132;
-    const V v220 = 1.0 - v219;
-    const V v221 = v211 * v132;
-    const V v222 = 1.0 - v221;
-    const V v223 = v210 * v110;
-    const V v224 = v214 * v110;
-    const V v225 = v199 * v109;
-    const V v226 = 1.0 - v225;
-    const V v227 = v201 * v109;
-    const V v228 = 1.0 - v227;
-    const V v229 = v200 * v110;
-    const V v230 = 1.0 - v229;
-    const V v231 = v202 * v110;
-    const V v232 = 1.0 - v231;
-    const V v233 = v204 * v133;
-    const V v234 = v206 * v133;
-    const V v235 = v204 * v112;
-    const V v236 = v235 + v228;
-    const V v237 = v206 * v112;
-    const V v238 = v237 + v232;
-    const V v239 = v201 * v136;
-    const V v240 = v233 - v239;
-    const V v241 = v199 * v136;
-    const V v242 = v217 - v241;
-    const V v243 = 2.0 * v236;
-    const V v244 = v202 * v137;
-    const V v245 = v234 - v244;
-    const V v246 = v236 * v236;
-    const V v247 = 2.0 * v238;
-    const V v248 = v238 * v238;
-    const V v249 = 2.0 * v240;
-    const V v250 = 2.0 * v242;
-    const V v251 = v242 * v242;
-    const V v252 = 2.0 * v245;
-    const V v253 = v240 * v240;
-    const V v254 = v253 + v246;
-    const V v255 = v245 * v245;
-    const V v256 = v255 + v248;
-    const V v257 = v200 * v137;
-    const V v258 = v218 - v257;
-    const V v259 = v210 * v137;
-    const V v260 = v259 + v222;
-    const V v261 = v214 * v137;
-    const V v262 = 1.0 + v261;
-    const V v263 = 2.0 * v258;
-    const V v264 = v258 * v258;
-    const V v265 = 2.0 * v260;
-    const V v266 = v212 * v133;
-    const V v267 = v262 - v266;
-    const V v268 = v208 * v133;
-    const V v269 = 1.0 - v268;
-    const V v270 = v267 * v267;
-    const V v271 = v270 + v256;
-    const V v272 = 2.0 * v267;
-    const V v273 = v260 * v260;
-    const V v274 = v264 + v273;
-    const V v275 = v208 * v112;
-    const V v276 = v216 - v275;
-    const V v277 = v212 * v112;
-    const V v278 = v224 - v277;
-    const V v279 = v267 * v238;
-    const V v280 = 2.0 * v276;
-    const V v281 = v213 * v136;
-    const V v282 = v281 + v269;
-    const V v283 = v209 * v136;
-    const V v284 = v283 + v220;
-    const V v285 = 2.0 * v278;
-    const V v286 = 2.0 * v282;
-    const V v287 = v278 * v245;
-    const V v288 = v279 - v287;
-    const V v289 = 2.0 * v284;
-    const V v290 = v278 * v278;
-    const V v291 = v290 + v271;
-    const V v292 = v276 * v276;
-    const V v293 = v292 + v254;
-    const V v294 = v236 * v282;
-    const V v295 = v158 * v288;
-    const V v296 = v282 * v282;
-    const V v297 = v293 + v296;
-    const V v298 = v288 * v288;
-    const V v299 = v284 * v284;
-    const V v300 = v251 + v299;
-    const V v301 = v171 + v291;
-    const V v302 = v276 * v240;
-    const V v303 = v294 - v302;
-    const V v304 = 1.0 / v295;
-    const V v305 = 0.3333333333333333 * v301;
-    const V v306 = v170 + v297;
-    const V v307 = v156 * v303;
-    const V v308 = v171 * v291;
-    const V v309 = v298 + v308;
-    const V v310 = 0.3333333333333333 * v306;
-    const V v311 = v303 * v303;
-    const V v312 = 0.6666666666666666 * v309;
-    const V v313 = 1.0 / v307;
-    const V v314 = v170 * v297;
-    const V v315 = v311 + v314;
-    const V v316 = 0.6666666666666666 * v315;
-    const V v317 = v203 * v111;
-    const V v318 = v317 + v226;
-    const V v319 = v205 * v111;
-    const V v320 = v319 + v230;
-    const V v321 = 2.0 * v318;
-    const V v322 = 2.0 * v320;
-    const V v323 = v207 * v111;
-    const V v324 = v215 - v323;
-    const V v325 = v211 * v111;
-    const V v326 = v223 - v325;
-    const V v327 = 2.0 * v324;
-    const V v328 = v284 * v318;
-    const V v329 = v318 * v318;
-    const V v330 = v300 + v329;
-    const V v331 = 2.0 * v326;
-    const V v332 = v260 * v320;
-    const V v333 = v324 * v324;
-    const V v334 = v333 + v330;
-    const V v335 = v320 * v320;
-    const V v336 = v274 + v335;
-    const V v337 = v324 * v242;
-    const V v338 = v328 - v337;
-    const V v339 = v326 * v326;
-    const V v340 = v339 + v336;
-    const V v341 = v326 * v258;
-    const V v342 = v332 - v341;
-    const V v343 = v152 * v338;
-    const V v344 = v338 * v338;
-    const V v345 = v154 * v342;
-    const V v346 = v164 + v334;
-    const V v347 = v342 * v342;
-    const V v348 = v174 * v304;
-    const V v349 = 0.3333333333333333 * v346;
-    const V v350 = 1.0 / v343;
-    const V v351 = v166 + v340;
-    const V v352 = 1.0 / v345;
-    const V v353 = 0.3333333333333333 * v351;
-    const V v354 = softehl_vrcbrt(v348);
-    const V v355 = v174 * v313;
-    const V v356 = v164 * v334;
-    const V v357 = v344 + v356;
-    const V v358 = v166 * v340;
-    const V v359 = v347 + v358;
-    const V v360 = 0.6666666666666666 * v357;
-    const V v361 = 0.6666666666666666 * v359;
-    const V v362 = softehl_vrcbrt(v355);
-    const V v363 = v174 * v350;
-    const V v364 = v174 * v352;
-    const V v365 = softehl_vrcbrt(v363);
-    const V v366 = softehl_vrcbrt(v364);
-    const V v367 = v365 * v365;
-    const V v368 = v195 * v365;
-    const V v369 = v367 * v368;
-    const V v370 = v363 * v367;
-    const V v371 = v363 * v370;
-    const V v372 = v370 * v370;
-    const V v373 = v366 * v366;
-    const V v374 = v196 * v366;
-    const V v375 = v373 * v374;
-    const V v376 = v364 * v373;
-    const V v377 = v364 * v376;
-    const V v378 = v376 * v376;
-    const V v379 = v362 * v362;
-    const V v380 = v197 * v362;
-    const V v381 = v379 * v380;
-    const V v382 = v355 * v379;
-    const V v383 = v355 * v382;
-    const V v384 = v382 * v382;
-    const V v385 = v354 * v354;
-    const V v386 = v198 * v354;
-    const V v387 = v385 * v386;
-    const V v388 = v348 * v385;
-    const V v389 = v348 * v388;
-    const V v390 = v388 * v388;
-    const V v391 = v166 * v378;
-    const V v392 = v378 * v391;
-    const V v393 = v349 * v372;
-    const V v394 = v353 * v378;
-    const V v395 = v310 * v384;
-    const V v396 = v305 * v390;
-    const V v397 = v164 * v372;
-    const V v398 = v372 * v397;
-    const V v399 = v170 * v384;
-    const V v400 = v384 * v399;
-    const V v401 = v171 * v390;
-    const V v402 = v390 * v401;
-    const V v403 = v338 * v372;
-    const V v404 = v398 * v403;
-    const V v405 = v403 * v403;
-    const V v406 = v397 * v405;
-    const V v407 = softehl_vrcbrt(v406);
-    const V v408 = v372 * v405;
-    const V v409 = v372 * v407;
-    const V v410 = v407 * v407;
-    const V v411 = v410 * v410;
-    const V v412 = v360 * v407;
-    const V v413 = v407 * v410;
-    const V v414 = 1.0 - v413;
-    const V v415 = v303 * v384;
-    const V v416 = v400 * v415;
-    const V v417 = v415 * v415;
-    const V v418 = v399 * v417;
-    const V v419 = softehl_vrcbrt(v418);
-    const V v420 = v384 * v417;
-    const V v421 = v384 * v419;
-    const V v422 = v419 * v419;
-    const V v423 = v422 * v422;
-    const V v424 = v316 * v419;
-    const V v425 = v419 * v422;
-    const V v426 = 1.0 - v425;
-    const V v427 = v2 * v387;
-    const V v428 = v1 * v387;
-    const V v429 = v3 * v387;
-    const V v430 = v396 * v428;
-    const V v431 = v2 * v369;
-    const V v432 = v1 * v369;
-    const V v433 = v3 * v369;
-    const V v434 = v414 * v433;
-    const V v435 = v410 * v431;
-    const V v436 = v412 * v431;
-    const V v437 = v2 * v381;
-    const V v438 = v1 * v381;
-    const V v439 = v3 * v381;
-    const V v440 = v426 * v439;
-    const V v441 = v422 * v437;
-    const V v442 = v288 * v390;
-    const V v443 = v442 * v442;
-    const V v444 = v402 * v442;
-    const V v445 = v424 * v437;
-    const V v446 = v401 * v443;
-    const V v447 = softehl_vrcbrt(v446);
-    const V v448 = v390 * v443;
-    const V v449 = v390 * v447;
-    const V v450 = v428 * v449;
-    const V v451 = v395 * v438;
-    const V v452 = v421 * v438;
-    const V v453 = v383 * v445;
-    const V v454 = v451 + v453;
-    const V v455 = v383 * v441;
-    const V v456 = v423 * v454;
-    const V v457 = v440 - v456;
-    const V v458 = v447 * v447;
-    const V v459 = v458 * v458;
-    const V v460 = v312 * v447;
-    const V v461 = v447 * v458;
-    const V v462 = 1.0 - v461;
-    const V v463 = v429 * v462;
-    const V v464 = v2 * v375;
-    const V v465 = v1 * v375;
-    const V v466 = v3 * v375;
-    const V v467 = v427 * v458;
-    const V v468 = v427 * v460;
-    const V v469 = v389 * v467;
-    const V v470 = v389 * v468;
-    const V v471 = v430 + v470;
-    const V v472 = v459 * v471;
-    const V v473 = v463 - v472;
-    const V v474 = v288 * v469;
-    const V v475 = v444 * v473;
-    const V v476 = v474 + v475;
-    const V v477 = v448 * v473;
-    const V v478 = 2.0 * v476;
-    const V v479 = v450 + v477;
-    const V v480 = v291 * v469;
-    const V v481 = v479 + v480;
-    const V v482 = v171 * v469;
-    const V v483 = v450 + v482;
-    const V v484 = v173 * v481;
-    const V v485 = v342 * v378;
-    const V v486 = v485 * v485;
-    const V v487 = v392 * v485;
-    const V v488 = v394 * v465;
-    const V v489 = v393 * v432;
-    const V v490 = v409 * v432;
-    const V v491 = v391 * v486;
-    const V v492 = v378 * v486;
-    const V v493 = softehl_vrcbrt(v491);
-    const V v494 = v378 * v493;
-    const V v495 = v465 * v494;
-    const V v496 = v493 * v493;
-    const V v497 = v496 * v496;
-    const V v498 = v361 * v493;
-    const V v499 = v464 * v498;
-    const V v500 = v464 * v496;
-    const V v501 = v493 * v496;
-    const V v502 = 1.0 - v501;
-    const V v503 = v466 * v502;
-    const V v504 = v377 * v499;
-    const V v505 = v488 + v504;
-    const V v506 = v497 * v505;
-    const V v507 = v503 - v506;
-    const V v508 = v377 * v500;
-    const V v509 = v342 * v508;
-    const V v510 = v487 * v507;
-    const V v511 = v509 + v510;
-    const V v512 = v492 * v507;
-    const V v513 = 2.0 * v511;
-    const V v514 = v495 + v512;
-    const V v515 = v340 * v508;
-    const V v516 = v514 + v515;
-    const V v517 = v166 * v508;
-    const V v518 = v495 + v517;
-    const V v519 = v167 * v516;
-    const V v520 = v265 * v518;
-    const V v521 = v320 * v513;
-    const V v522 = v520 + v521;
-    const V v523 = v272 * v483;
-    const V v524 = v238 * v478;
-    const V v525 = v523 + v524;
-    const V v526 = v263 * v518;
-    const V v527 = v326 * v513;
-    const V v528 = v526 - v527;
-    const V v529 = v252 * v483;
-    const V v530 = v278 * v478;
-    const V v531 = v529 - v530;
-    const V v532 = v331 * v518;
-    const V v533 = v322 * v518;
-    const V v534 = v258 * v513;
-    const V v535 = v532 - v534;
-    const V v536 = v260 * v513;
-    const V v537 = v533 + v536;
-    const V v538 = v285 * v483;
-    const V v539 = v247 * v483;
-    const V v540 = v245 * v478;
-    const V v541 = v538 - v540;
-    const V v542 = v267 * v478;
-    const V v543 = v539 + v542;
-    const V v544 = v371 * v436;
-    const V v545 = v489 + v544;
-    const V v546 = v371 * v435;
-    const V v547 = v164 * v546;
-    const V v548 = v490 + v547;
-    const V v549 = v334 * v546;
-    const V v550 = v490 + v549;
-    const V v551 = v338 * v546;
-    const V v552 = v411 * v545;
-    const V v553 = v434 - v552;
-    const V v554 = v404 * v553;
-    const V v555 = v551 + v554;
-    const V v556 = v408 * v553;
-    const V v557 = v550 + v556;
-    const V v558 = 2.0 * v555;
-    const V v559 = v165 * v557;
-    const V v560 = v519 + v559;
-    const V v561 = v559 - v519;
-    const V v562 = v484 + v560;
-    const V v563 = v560 - v484;
-    const V v564 = v289 * v548;
-    const V v565 = v318 * v558;
-    const V v566 = v564 + v565;
-    const V v567 = v250 * v548;
-    const V v568 = v324 * v558;
-    const V v569 = v567 - v568;
-    const V v570 = v170 * v455;
-    const V v571 = v452 + v570;
-    const V v572 = v297 * v455;
-    const V v573 = v452 + v572;
-    const V v574 = v303 * v455;
-    const V v575 = v286 * v571;
-    const V v576 = v249 * v571;
-    const V v577 = v327 * v548;
-    const V v578 = v321 * v548;
-    const V v579 = v242 * v558;
-    const V v580 = v577 - v579;
-    const V v581 = v284 * v558;
-    const V v582 = v578 + v581;
-    const V v583 = v280 * v571;
-    const V v584 = v243 * v571;
-    const V v585 = v416 * v457;
-    const V v586 = v574 + v585;
-    const V v587 = v420 * v457;
-    const V v588 = v573 + v587;
-    const V v589 = 2.0 * v586;
-    const V v590 = v172 * v588;
-    const V v591 = v240 * v589;
-    const V v592 = v583 - v591;
-    const V v593 = v276 * v589;
-    const V v594 = v576 - v593;
-    const V v595 = v282 * v589;
-    const V v596 = v584 + v595;
-    const V v597 = v236 * v589;
-    const V v598 = v575 + v597;
-    const V v599 = v562 + v590;
-    const V v600 = v563 - v590;
-    const V v601 = v590 - v484;
-    const V v602 = 0.5773502691896257 * v600;
-    const V v603 = v561 + v601;
-    const V v604 = v561 - v601;
-    const V v605 = 0.3333333333333333 * v604;
-    const V v606 = v206 * v543;
-    const V v607 = v206 * v531;
-    const V v608 = 0.5773502691896257 * v603;
-    const V v609 = v214 * v525;
-    const V v610 = v214 * v541;
-    const V v611 = v212 * v525;
-    const V v612 = v607 - v611;
-    const V v613 = v212 * v541;
-    const V v614 = v606 - v613;
-    const V v615 = v202 * v531;
-    const V v616 = v609 - v615;
-    const V v617 = v202 * v543;
-    const V v618 = v610 - v617;
-    const V v619 = v208 * v598;
-    const V v620 = v612 - v619;
-    const V v621 = v208 * v592;
-    const V v622 = v614 - v621;
-    const V v623 = v213 * v598;
-    const V v624 = v213 * v592;
-    const V v625 = v204 * v594;
-    const V v626 = v620 + v625;
-    const V v627 = v204 * v596;
-    const V v628 = v622 + v627;
-    const V v629 = v201 * v594;
-    const V v630 = v623 - v629;
-    const V v631 = v201 * v596;
-    const V v632 = v624 - v631;
-    const V v633 = v608 + v626;
-    const V v634 = v209 * v566;
-    const V v635 = v630 + v634;
-    const V v636 = v209 * v580;
-    const V v637 = v632 + v636;
-    const V v638 = v199 * v569;
-    const V v639 = v635 - v638;
-    const V v640 = v199 * v582;
-    const V v641 = v637 - v640;
-    const V v642 = v602 + v639;
-    const V v643 = v639 - v626;
-    const V v644 = v203 * v569;
-    const V v645 = v203 * v582;
-    const V v646 = v207 * v566;
-    const V v647 = v644 - v646;
-    const V v648 = v207 * v580;
-    const V v649 = v645 - v648;
-    const V v650 = v628 - v641;
-    const V v651 = v210 * v522;
-    const V v652 = v616 + v651;
-    const V v653 = v210 * v535;
-    const V v654 = v618 + v653;
-    const V v655 = v211 * v522;
-    const V v656 = v647 - v655;
-    const V v657 = v211 * v535;
-    const V v658 = v649 - v657;
-    const V v659 = v205 * v528;
-    const V v660 = v656 + v659;
-    const V v661 = v200 * v528;
-    const V v662 = v652 - v661;
-    const V v663 = v205 * v537;
-    const V v664 = v658 + v663;
-    const V v665 = v200 * v537;
-    const V v666 = v654 - v665;
-    const V v667 = v633 + v660;
-    const V v668 = v643 + v660;
-    const V v669 = v628 + v664;
-    const V v670 = v650 - v664;
-    const V v671 = v642 + v662;
-    const V v672 = v668 - v662;
-    const V v673 = 0.5773502691896257 * v672;
-    const V v674 = v605 + v673;
-    const V v675 = v641 + v666;
-    const V v676 = v666 + v670;
-    const V v677 = v599 - v667;
-    const V v678 = v599 + v667;
-    const V v679 = 0.5773502691896257 * v676;
-    const V v680 = v669 + v675;
-    const V v681 = v669 - v675;
-    const V v682 = v671 + v674;
-    const V v683 = v675 + v679;
-    const V v684 = v680 - v679;
-    const V v685 = v679 + v681;
-    const V v686 = v674 - v671;
-    const V v687 = v669 + v683;
-    const V v688 = v677 + v686;
-    const V v689 = v677 - v686;
-    const V v690 = v678 + v682;
-    const V v691 = v678 - v682;
-    softehl_store4(R + 0, 8, v684, v690, v685, v691);
-    const V v692 = v683 - v669;
-    const V v693 = -v687;
-    softehl_store4(R + 4, 8, v693, v688, v692, v689);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1], v3 = 0.25 * parameters[2];
+    const V v4 = X4 - X2, v5 = X4 - X6, v6 = X2 - X0, v7 = X6 - X0, v8 = v4 + v7, v9 = v5 + v6,
+        v10 = 0.39433756729740643 * v7 + 0.10566243270259355 * v4,
+        v11 = 0.10566243270259355 * v7 + 0.39433756729740643 * v4,
+        v12 = 0.39433756729740643 * v6 + 0.10566243270259355 * v5,
+        v13 = 0.10566243270259355 * v6 + 0.39433756729740643 * v5, v14 = 0.25 * v10,
+        v15 = 0.25 * v11, v16 = 0.25 * v12, v17 = 0.25 * v13, v18 = X1 + X3,
+        v19 = 1.5773502691896257 * X1 + 0.4226497308103742 * X3,
+        v20 = 0.4226497308103742 * X1 + 1.5773502691896257 * X3, v21 = X3 - X1, v22 = X5 - X3,
+        v23 = X5 - X7, v24 = X5 + X7, v25 = 0.4226497308103742 * X5 + 1.5773502691896257 * X7,
+        v26 = 1.5773502691896257 * X5 + 0.4226497308103742 * X7, v27 = v23 + v21,
+        v28 = 0.39433756729740643 * v21 + 0.10566243270259355 * v23,
+        v29 = 0.10566243270259355 * v21 + 0.39433756729740643 * v23,
+        v30 = 0.39433756729740643 * v19 + 0.10566243270259355 * v25,
+        v31 = 0.10566243270259355 * v19 + 0.39433756729740643 * v25, v32 = X7 - X1,
+        v33 = 0.39433756729740643 * v20 + 0.10566243270259355 * v26,
+        v34 = 0.10566243270259355 * v20 + 0.39433756729740643 * v26, v35 = v24 - v18,
+        v36 = 0.25 * v28, v37 = 1.0 / v30,
+        v38 = 0.39433756729740643 * v32 + 0.10566243270259355 * v22,
+        v39 = 0.10566243270259355 * v32 + 0.39433756729740643 * v22, v40 = 1.0 / v31,
+        v41 = 1.0 / v33, v42 = 1.0 / v34, v43 = 0.25 * v29, v44 = 0.25 * v38, v45 = 0.25 * v39,
+        v46 = d0 - d2, v47 = d1 - d3, v48 = d1 + d3, v49 = 1.0 / (0.0625 * (v35 * v9 - v8 * v27)),
+        v50 = d4 - d6, v51 = d0 + d2 - d4 - d6, v52 = v46 - v50,
+        v53 = 0.5773502691896257 * (v46 + v50), v54 = v52 + v53, v55 = v52 - v53, v56 = v51 + v53,
+        v57 = v51 - v53, v58 = d5 + d7, v59 = d5 - d7, v60 = 0.0625 * v27 * v49,
+        v61 = 0.0625 * v35 * v49, v62 = 0.0625 * v8 * v49, v63 = 0.0625 * v9 * v49, v64 = v48 - v58,
+        v65 = v48 + v58, v66 = v47 - v59, v67 = v47 + v59, v68 = 0.5773502691896257 * v64,
+        v69 = 0.5773502691896257 * v67, v70 = 0.3333333333333333 * v67,
+        v71 = 0.5773502691896257 * v66, v72 = v64 + v69, v73 = v64 - v69, v74 = v65 + v71,
+        v75 = v65 - v71, v76 = v66 + v69, v77 = v66 - v69, v78 = v68 + v70, v79 = v68 - v70,
+        v80 = 1.0 + 0.25 * v37 * (v74 + v78), v81 = 1.0 + 0.25 * v40 * (v74 - v78),
+        v82 = 1.0 + 0.25 * v41 * (v75 + v79), v83 = 1.0 + 0.25 * v42 * (v75 - v79), v84 = v80 * v80,
+        v85 = v81 * v81,
+        v86 = (1.0 - v52 * v61 + v51 * v60) * (1.0 + v66 * v62 - v64 * v63) - (v64 * v60 - v66 * v61) * (v52 * v62 - v51 * v63),
+        v87 = v82 * v82, v88 = v83 * v83,
+        v89 = (1.0 + v65 * (0.25 * (1.0 / (0.25 * (v18 + v24))))) * v86,
+        v90 = v12 * v38 - v10 * v28, v91 = v13 * v38 - v10 * v29, v92 = v12 * v39 - v11 * v28,
+        v93 = v13 * v39 - v11 * v29, v94 = 1.0 / v90, v95 = 1.0 / v91, v96 = 1.0 / v92,
+        v97 = 1.0 / v93, v98 = v44 * v94, v99 = v44 * v95, v100 = v45 * v96, v101 = v45 * v97,
+        v102 = v36 * v94, v103 = v36 * v96, v104 = v43 * v95, v105 = v43 * v97, v106 = v16 * v94,
+        v107 = v16 * v96, v108 = v14 * v94, v109 = v14 * v95, v110 = v17 * v95, v111 = v17 * v97,
+        v112 = v15 * v96, v113 = v15 * v97, v114 = v103 * v57 + (1.0 - v100 * v54),
+        v115 = v105 * v57 + (1.0 - v101 * v55), v116 = v103 * v73 - v100 * v76,
+        v117 = v102 * v72 - v98 * v76, v118 = v105 * v73 - v101 * v77,
+        v119 = v104 * v72 - v99 * v77, v120 = v109 * v77 + (1.0 - v110 * v72),
+        v121 = 1.0 + v113 * v77 - v111 * v73, v122 = v112 * v54 - v107 * v57,
+        v123 = v113 * v55 - v111 * v57, v124 = v112 * v76 + (1.0 - v107 * v73),
+        v125 = v108 * v76 + (1.0 - v106 * v72), v126 = v121 * v115 - v123 * v118,
+        v127 = v123 * v123 + (v121 * v121 + (v118 * v118 + v115 * v115)),
+        v128 = v122 * v122 + (v116 * v116 + v114 * v114) + v124 * v124,
+        v129 = v114 * v124 - v122 * v116, v130 = v102 * v56 + (1.0 - v98 * v54),
+        v131 = v104 * v56 + (1.0 - v99 * v55), v132 = v108 * v54 - v106 * v56,
+        v133 = v109 * v55 - v110 * v56,
+        v134 = v132 * v132 + (v117 * v117 + v125 * v125 + v130 * v130),
+        v135 = v125 * v130 - v132 * v117,
+        v136 = v133 * v133 + (v119 * v119 + v120 * v120 + v131 * v131),
+        v137 = v120 * v131 - v133 * v119, v138 = v89 * (1.0 / (v83 * v126)),
+        v139 = softehl_vrcbrt(v138), v140 = v89 * (1.0 / (v82 * v129)), v141 = softehl_vrcbrt(v140),
+        v142 = v89 * (1.0 / (v80 * v135)), v143 = v89 * (1.0 / (v81 * v137)),
+        v144 = softehl_vrcbrt(v142), v145 = softehl_vrcbrt(v143), v146 = v144 * v144,
+        v147 = v146 * (v30 * (6.283185307179586 * v90) * v144), v148 = v142 * v146,
+        v149 = v142 * v148, v150 = v148 * v148, v151 = v145 * v145,
+        v152 = v151 * (v31 * (6.283185307179586 * v91) * v145), v153 = v143 * v151,
+        v154 = v143 * v153, v155 = v153 * v153, v156 = v141 * v141,
+        v157 = v156 * (v33 * (6.283185307179586 * v92) * v141), v158 = v140 * v156,
+        v159 = v140 * v158, v160 = v158 * v158, v161 = v139 * v139,
+        v162 = v161 * (v34 * (6.283185307179586 * v93) * v139), v163 = v138 * v161,
+        v164 = v138 * v163, v165 = v163 * v163, v166 = v85 * v155, v167 = v84 * v150,
+        v168 = v87 * v160, v169 = v88 * v165, v170 = v135 * v150, v171 = v170 * v170,
+        v172 = softehl_vrcbrt(v167 * v171), v173 = v172 * v172, v174 = v129 * v160,
+        v175 = v174 * v174, v176 = softehl_vrcbrt(v168 * v175), v177 = v176 * v176,
+        v178 = v2 * v162, v179 = v1 * v162, v180 = v2 * v147, v181 = v1 * v147, v182 = v2 * v157,
+        v183 = v1 * v157, v184 = v126 * v165, v185 = v184 * v184,
+        v186 = softehl_vrcbrt(v169 * v185), v187 = v179 * (v165 * v186), v188 = v160 * v176 * v183,
+        v189 = v159 * (0.6666666666666666 * (v129 * v129 + v87 * v128) * v176 * v182),
+        v190 = v159 * (v177 * v182),
+        v191 = v177 * v177 * (0.3333333333333333 * (v87 + v128) * v160 * v183 + v189),
+        v192 = (1.0 - v176 * v177) * (v3 * v157) - v191, v193 = v186 * v186, v194 = v2 * v152,
+        v195 = v1 * v152, v196 = v164 * (v178 * v193),
+        v197 = v164 * (v178 * (0.6666666666666666 * (v126 * v126 + v88 * v127) * v186)),
+        v198 = v193 * v193 * (0.3333333333333333 * (v88 + v127) * v165 * v179 + v197),
+        v199 = v3 * v162 * (1.0 - v186 * v193) - v198,
+        v200 = 2.0 * (v126 * v196 + v165 * v169 * v184 * v199), v201 = v187 + v88 * v196,
+        v202 = 0.5 * v42 * v83 * (v187 + v165 * v185 * v199 + v127 * v196), v203 = v137 * v155,
+        v204 = v203 * v203, v205 = v150 * v172 * v181, v206 = softehl_vrcbrt(v166 * v204),
+        v207 = v195 * (v155 * v206), v208 = v206 * v206,
+        v209 = v154 * (v194 * (0.6666666666666666 * (v137 * v137 + v85 * v136) * v206)),
+        v210 = v208 * v208 * (0.3333333333333333 * (v85 + v136) * v155 * v195 + v209),
+        v211 = v3 * v152 * (1.0 - v206 * v208) - v210, v212 = v154 * (v194 * v208),
+        v213 = 2.0 * (v137 * v212 + v155 * v166 * v203 * v211), v214 = v207 + v85 * v212,
+        v215 = 0.5 * v40 * v81 * (v207 + v155 * v204 * v211 + v136 * v212),
+        v216 = 2.0 * v120 * v214 + v131 * v213, v217 = 2.0 * v121 * v201 + v115 * v200,
+        v218 = 2.0 * v119 * v214 - v133 * v213, v219 = 2.0 * v118 * v201 - v123 * v200,
+        v220 = 2.0 * v133 * v214 - v119 * v213, v221 = 2.0 * v131 * v214 + v120 * v213,
+        v222 = 2.0 * v123 * v201 - v118 * v200, v223 = 2.0 * v115 * v201 + v121 * v200,
+        v224 = v149 * (0.6666666666666666 * (v135 * v135 + v84 * v134) * v172 * v180),
+        v225 = v149 * (v173 * v180), v226 = v205 + v84 * v225,
+        v227 = v173 * v173 * (0.3333333333333333 * (v84 + v134) * v150 * v181 + v224),
+        v228 = (1.0 - v172 * v173) * (v3 * v147) - v227,
+        v229 = 2.0 * (v135 * v225 + v150 * v167 * v170 * v228),
+        v230 = 0.5 * v37 * v80 * (v205 + v134 * v225 + v150 * v171 * v228), v231 = v215 + v230,
+        v232 = v230 - v215, v233 = 2.0 * v125 * v226 + v130 * v229,
+        v234 = 2.0 * v117 * v226 - v132 * v229, v235 = v188 + v87 * v190,
+        v236 = 2.0 * v132 * v226 - v117 * v229, v237 = 2.0 * v130 * v226 + v125 * v229,
+        v238 = 2.0 * (v129 * v190 + v160 * v168 * v174 * v192),
+        v239 = 0.5 * v41 * v82 * (v188 + v128 * v190 + v160 * v175 * v192),
+        v240 = 2.0 * v122 * v235 - v116 * v238, v241 = 2.0 * v116 * v235 - v122 * v238,
+        v242 = 2.0 * v114 * v235 + v124 * v238, v243 = 2.0 * v124 * v235 + v114 * v238,
+        v244 = v202 + v231 + v239, v245 = v239 - v202,
+        v246 = v105 * v219 - v111 * v217 - v107 * v243 + v103 * v241,
+        v247 = v105 * v223 - v111 * v222 - v107 * v240 + v103 * v242,
+        v248 = v112 * v243 - v100 * v241 + v108 * v233 - v98 * v234,
+        v249 = v112 * v240 - v100 * v242 + v108 * v236 - v98 * v237,
+        v250 = v102 * v234 - v106 * v233 - v110 * v216 + v104 * v218,
+        v251 = v113 * v217 - v101 * v219 + v109 * v216 - v99 * v218,
+        v252 = v102 * v237 - v106 * v236 - v110 * v220 + v104 * v221,
+        v253 = v113 * v222 - v101 * v223 + v109 * v220 - v99 * v221,
+        v254 = 0.5773502691896257 * (v232 + v245) + v246 + v250, v255 = v247 + v252,
+        v256 = 0.5773502691896257 * (v231 - v202 - v239) + v248 + v251,
+        v257 = 0.3333333333333333 * (v232 - v245) + 0.5773502691896257 * (v248 - v246 + v250 - v251),
+        v258 = v249 + v253, v259 = v244 - v254, v260 = v244 + v254,
+        v261 = 0.5773502691896257 * (v253 + (v247 - v249 - v252)), v262 = v256 + v257,
+        v263 = v258 + v261, v264 = v257 - v256;
+    softehl_store4(R + 0, 8, v255 + v258 - v261, v260 + v262, v261 + (v255 - v258), v260 - v262);
+    softehl_store4(R + 4, 8, -(v255 + v263), v259 + v264, v263 - v255, v259 - v264);
 }
+SOFTEHL_BATCH(softehl_solid_fbar_residual, 8, 8, 0, 0, 8, 0)
 
-void softehl_solid_fbar_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_fbar_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_fbar_residual_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_fbar_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_fbar_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1], v3 = 0.25 * parameters[2];
+    const V v4 = X4 - X2, v5 = X4 - X6, v6 = X2 - X0, v7 = X6 - X0, v8 = v4 + v7, v9 = v5 + v6,
+        v10 = 0.39433756729740643 * v7 + 0.10566243270259355 * v4,
+        v11 = 0.10566243270259355 * v7 + 0.39433756729740643 * v4,
+        v12 = 0.39433756729740643 * v6 + 0.10566243270259355 * v5,
+        v13 = 0.10566243270259355 * v6 + 0.39433756729740643 * v5, v14 = X1 + X3,
+        v15 = 1.5773502691896257 * X1 + 0.4226497308103742 * X3,
+        v16 = 0.4226497308103742 * X1 + 1.5773502691896257 * X3, v17 = X3 - X1, v18 = X5 - X3,
+        v19 = X5 - X7, v20 = X5 + X7, v21 = 0.4226497308103742 * X5 + 1.5773502691896257 * X7,
+        v22 = 1.5773502691896257 * X5 + 0.4226497308103742 * X7, v23 = v19 + v17,
+        v24 = 0.39433756729740643 * v17 + 0.10566243270259355 * v19,
+        v25 = 0.10566243270259355 * v17 + 0.39433756729740643 * v19, v26 = X7 - X1,
+        v27 = 0.39433756729740643 * v15 + 0.10566243270259355 * v21,
+        v28 = 0.10566243270259355 * v15 + 0.39433756729740643 * v21,
+        v29 = 0.39433756729740643 * v16 + 0.10566243270259355 * v22,
+        v30 = 0.10566243270259355 * v16 + 0.39433756729740643 * v22,
+        v31 = 0.39433756729740643 * v26 + 0.10566243270259355 * v18,
+        v32 = 0.10566243270259355 * v26 + 0.39433756729740643 * v18, v33 = v20 - v14, v34 = d0 - d2,
+        v35 = 1.0 / (0.0625 * (v33 * v9 - v8 * v23)), v36 = d1 - d3, v37 = d1 + d3, v38 = d4 - d6,
+        v39 = d2 + (d0 - d4) - d6, v40 = 0.25 * (1.0 / v28), v41 = 0.25 * (1.0 / v27),
+        v42 = 0.25 * (1.0 / v29), v43 = 0.25 * (1.0 / v30),
+        v44 = 0.25 * (1.0 / (0.25 * (v14 + v20))), v45 = v34 - v38,
+        v46 = 0.5773502691896257 * (v34 + v38), v47 = v45 + v46, v48 = v45 - v46, v49 = v39 - v46,
+        v50 = v46 + v39, v51 = d5 + d7, v52 = d5 - d7, v53 = 0.0625 * v23 * v35,
+        v54 = 0.0625 * v33 * v35, v55 = 0.0625 * v8 * v35, v56 = 0.0625 * v9 * v35, v57 = v37 - v51,
+        v58 = v37 + v51, v59 = v36 - v52, v60 = v36 + v52, v61 = 0.5773502691896257 * v57,
+        v62 = 0.5773502691896257 * v60, v63 = 0.3333333333333333 * v60,
+        v64 = 0.5773502691896257 * v59, v65 = v57 + v62, v66 = v57 - v62, v67 = v58 + v64,
+        v68 = v58 - v64, v69 = v59 + v62, v70 = v59 - v62, v71 = v61 + v63, v72 = v61 - v63,
+        v73 = 1.0 + v58 * v44, v74 = 1.0 - v45 * v54 + v53 * v39, v75 = v45 * v55 - v56 * v39,
+        v76 = 1.0 + v41 * (v67 + v71), v77 = 1.0 + v40 * (v67 - v71), v78 = 1.0 + v42 * (v68 + v72),
+        v79 = 1.0 + v43 * (v68 - v72), v80 = v76 * v76, v81 = v77 * v77, v82 = 2.0 * v76,
+        v83 = 2.0 * v77, v84 = v78 * v78, v85 = 2.0 * v78, v86 = v79 * v79, v87 = 2.0 * v79,
+        v88 = v40 * v83, v89 = v43 * v87, v90 = v57 * v53 - v59 * v54,
+        v91 = v59 * v55 + (1.0 - v57 * v56), v92 = v73 * (v55 * v74 + v54 * v75),
+        v93 = v74 * v91 - v90 * v75, v94 = v73 * (v56 * v74 + v53 * v75),
+        v95 = v73 * (v55 * v90 + v54 * v91), v96 = v73 * (v56 * v90 + v53 * v91), v97 = v73 * v93,
+        v98 = v44 * v93, v99 = v41 * v82, v100 = v42 * v85, v101 = v76 * v97, v102 = v77 * v97,
+        v103 = v78 * v97, v104 = v79 * v97, v105 = v13 * v31 - v10 * v25,
+        v106 = v13 * v32 - v11 * v25, v107 = 1.0 / v105, v108 = 1.0 / v106,
+        v109 = v12 * v31 - v10 * v24, v110 = v12 * v32 - v11 * v24,
+        v111 = v28 * (6.283185307179586 * v105), v112 = v30 * (6.283185307179586 * v106),
+        v113 = 1.0 / v109, v114 = 1.0 / v110, v115 = v27 * (6.283185307179586 * v109),
+        v116 = v29 * (6.283185307179586 * v110), v117 = v24 * v113, v118 = v24 * v114,
+        v119 = v25 * v107, v120 = v25 * v108, v121 = 0.25 * v117, v122 = 0.5 * v117,
+        v123 = 0.25 * v119, v124 = 0.5 * v119, v125 = v10 * v107, v126 = v10 * v113,
+        v127 = v31 * v107, v128 = v13 * v107, v129 = v13 * v108, v130 = v31 * v113,
+        v131 = v32 * v108, v132 = v11 * v108, v133 = v12 * v113, v134 = v32 * v114,
+        v135 = v12 * v114, v136 = v11 * v114, v137 = 0.25 * v127, v138 = 0.25 * v128,
+        v139 = 0.5 * v128, v140 = 0.25 * v125, v141 = 0.25 * v131, v142 = 0.25 * v129,
+        v143 = 0.5 * v129, v144 = 0.25 * v132, v145 = 0.25 * v120, v146 = 0.5 * v120,
+        v147 = 0.25 * v135, v148 = 0.5 * v135, v149 = 0.25 * v130, v150 = 0.25 * v134,
+        v151 = 0.25 * v118, v152 = 0.5 * v118, v153 = 0.25 * v133, v154 = 0.5 * v133,
+        v155 = 0.25 * v126, v156 = 0.25 * v136, v157 = v65 * v123 - v70 * v137,
+        v158 = v65 * v121 - v69 * v149, v159 = v66 * v151 - v69 * v150, v160 = 2.0 * v157,
+        v161 = v66 * v145 - v70 * v141, v162 = 2.0 * v158, v163 = 2.0 * v159, v164 = 2.0 * v161,
+        v165 = v48 * v140 - v138 * v50, v166 = v47 * v155 - v153 * v50, v167 = 2.0 * v165,
+        v168 = 2.0 * v166, v169 = v47 * v156 - v147 * v49, v170 = v48 * v144 - v142 * v49,
+        v171 = 2.0 * v169, v172 = 2.0 * v170, v173 = 1.0 + v151 * v49 - v47 * v150,
+        v174 = 2.0 * v173, v175 = v151 * v169 + v147 * v173, v176 = v150 * v169 + v156 * v173,
+        v177 = 1.0 - v47 * v149 + v121 * v50, v178 = 2.0 * v177, v179 = v156 * v171 - v150 * v174,
+        v180 = v151 * v174 - v147 * v171, v181 = 1.0 + v123 * v50 - v48 * v137,
+        v182 = 1.0 + v145 * v49 - v48 * v141, v183 = 2.0 * v181, v184 = 2.0 * v182,
+        v185 = v121 * v166 + v153 * v177, v186 = v149 * v166 + v155 * v177,
+        v187 = v123 * v165 + v138 * v181, v188 = v145 * v170 + v142 * v182,
+        v189 = v137 * v165 + v140 * v181, v190 = v141 * v170 + v144 * v182,
+        v191 = v155 * v168 - v149 * v178, v192 = v144 * v172 - v141 * v184,
+        v193 = v121 * v178 - v153 * v168, v194 = v140 * v167 - v137 * v183,
+        v195 = v145 * v184 - v142 * v172, v196 = v123 * v183 - v138 * v167,
+        v197 = v69 * v155 + (1.0 - v65 * v153), v198 = v69 * v156 + (1.0 - v66 * v147),
+        v199 = 2.0 * v197, v200 = 2.0 * v198, v201 = v70 * v140 + (1.0 - v65 * v138),
+        v202 = v70 * v144 + (1.0 - v66 * v142),
+        v203 = v158 * v158 + v166 * v166 + v177 * v177 + v197 * v197,
+        v204 = v159 * v159 + v169 * v169 + v173 * v173 + v198 * v198, v205 = 2.0 * v201,
+        v206 = 2.0 * v202, v207 = v177 * v197 - v158 * v166, v208 = v173 * v198 - v159 * v169,
+        v209 = v121 * v162 - v153 * v199, v210 = v181 * v201 - v157 * v165,
+        v211 = v123 * v160 - v138 * v205, v212 = v145 * v164 - v142 * v206,
+        v213 = v182 * v202 - v161 * v170, v214 = 2.0 * v207, v215 = 1.0 / (v76 * v207),
+        v216 = 2.0 * v210, v217 = 1.0 / (v78 * v208), v218 = 2.0 * v208, v219 = 1.0 / (v77 * v210),
+        v220 = 2.0 * v213, v221 = 1.0 / (v79 * v213), v222 = v151 * v163 - v147 * v200,
+        v223 = v208 * v208 + v84 * v204, v224 = v84 + v204, v225 = v156 * v200 - v150 * v163,
+        v226 = v156 * v159 + v150 * v198, v227 = v147 * v159 + v151 * v198, v228 = v215 * v215,
+        v229 = v97 * v215, v230 = v217 * v217, v231 = v97 * v217, v232 = v219 * v219,
+        v233 = v97 * v219, v234 = softehl_vrcbrt(v229), v235 = v97 * v221, v236 = v221 * v221,
+        v237 = softehl_vrcbrt(v231), v238 = softehl_vrcbrt(v233), v239 = softehl_vrcbrt(v235),
+        v240 = v157 * v157 + v165 * v165 + v181 * v181 + v201 * v201,
+        v241 = v138 * v157 + v123 * v201, v242 = v140 * v157 + v137 * v201,
+        v243 = v140 * v205 - v137 * v160,
+        v244 = v161 * v161 + v170 * v170 + v182 * v182 + v202 * v202,
+        v245 = v142 * v161 + v145 * v202, v246 = v144 * v161 + v141 * v202,
+        v247 = v144 * v206 - v141 * v164, v248 = v81 + v240, v249 = v86 + v244,
+        v250 = v153 * v158 + v121 * v197, v251 = v155 * v158 + v149 * v197,
+        v252 = v155 * v199 - v149 * v162, v253 = v80 + v203, v254 = v207 * v207 + v80 * v203,
+        v255 = v210 * v210 + v81 * v240, v256 = v213 * v213 + v86 * v244, v257 = v234 * v234,
+        v258 = v234 * v257, v259 = 0.3333333333333333 * v257, v260 = v228 * (v101 * v251) * v259,
+        v261 = v228 * (v101 * v250) * v259, v262 = v237 * v237, v263 = v237 * v262,
+        v264 = v238 * v238, v265 = v238 * v264, v266 = v229 * v257, v267 = v229 * v266,
+        v268 = 0.3333333333333333 * v262, v269 = v231 * v262, v270 = 0.3333333333333333 * v264,
+        v271 = v233 * v264, v272 = v239 * v239, v273 = v239 * v272, v274 = v231 * v269,
+        v275 = v266 * v266, v276 = v215 * v259, v277 = 2.0 * v266,
+        v278 = v41 * (v97 * v207) * v228 * v259, v279 = v101 * v185 * v228 * v259,
+        v280 = v101 * v186 * v228 * v259, v281 = v233 * v271, v282 = 0.3333333333333333 * v272,
+        v283 = v235 * v272, v284 = v269 * v269, v285 = 2.0 * v269, v286 = v271 * v271,
+        v287 = 2.0 * v271, v288 = v235 * v283, v289 = 0.5773502691896257 * v278, v290 = v283 * v283,
+        v291 = v221 * v282, v292 = 2.0 * v283, v293 = 3.0 * v286, v294 = 3.0 * v284,
+        v295 = v43 * (v97 * v213) * v236 * v282, v296 = v236 * (v104 * v246) * v282,
+        v297 = 3.0 * v290, v298 = v236 * (v104 * v245) * v282, v299 = v104 * v188 * v236 * v282,
+        v300 = v104 * v190 * v236 * v282, v301 = 0.5773502691896257 * v295,
+        v302 = v235 + v283 * v297, v303 = v81 * v286, v304 = v86 * v290, v305 = v210 * v286,
+        v306 = v210 * v287, v307 = 0.5773502691896257 * (v298 - v296), v308 = v213 * v290,
+        v309 = v213 * v292, v310 = v305 * v305, v311 = 2.0 * v305, v312 = v308 * v308,
+        v313 = 2.0 * v308, v314 = 0.5773502691896257 * (v300 - v299) - 0.3333333333333333 * v295,
+        v315 = v306 * v311, v316 = v309 * v313, v317 = v286 * v310, v318 = v286 * v311,
+        v319 = v290 * v312, v320 = v290 * v313, v321 = v303 * v318,
+        v322 = softehl_vrcbrt(v303 * v310), v323 = v304 * v320, v324 = softehl_vrcbrt(v304 * v312),
+        v325 = v219 * v270, v326 = v40 * (v97 * v210) * v232 * v270,
+        v327 = v232 * (v102 * v242) * v270, v328 = v232 * (v102 * v241) * v270,
+        v329 = v102 * v187 * v232 * v270, v330 = v102 * v189 * v232 * v270,
+        v331 = 0.5773502691896257 * v326, v332 = v217 * v268,
+        v333 = v42 * (v97 * v208) * v230 * v268, v334 = v230 * (v103 * v226) * v268,
+        v335 = v230 * (v103 * v227) * v268, v336 = v103 * v175 * v230 * v268,
+        v337 = v103 * v176 * v230 * v268, v338 = 0.5773502691896257 * v333,
+        v339 = 0.5773502691896257 * (v327 + v328),
+        v340 = 0.3333333333333333 * v326 + 0.5773502691896257 * (v329 + v330),
+        v341 = 0.5773502691896257 * (v334 + v335), v342 = 3.0 * v275,
+        v343 = v336 - v338 - v94 * v332, v344 = v80 * v275, v345 = v207 * v275, v346 = v207 * v277,
+        v347 = v80 * v277, v348 = v338 - v337 + v92 * v332, v349 = v345 * v345, v350 = 2.0 * v345,
+        v351 = v82 * v275, v352 = v115 * v258, v353 = v346 * v350, v354 = v275 * v349,
+        v355 = v275 * v350, v356 = v349 * v351, v357 = softehl_vrcbrt(v344 * v349),
+        v358 = v111 * v265, v359 = v344 * v355, v360 = v322 * v322, v361 = v324 * v324,
+        v362 = v360 * v360, v363 = v322 * v360, v364 = v361 * v361, v365 = v324 * v361,
+        v366 = 0.6666666666666666 * v322 * v362, v367 = v116 * v263,
+        v368 = 0.6666666666666666 * v324 * v364, v369 = 0.3333333333333333 * v362,
+        v370 = 0.3333333333333333 * v364, v371 = v294 * (v116 * (v263 * v263)),
+        v372 = v231 + v269 * v294, v373 = v112 * v273, v374 = v286 * v369, v375 = v83 * v286,
+        v376 = v3 * v373, v377 = v297 * (v112 * (v273 * v273)), v378 = v310 * v375,
+        v379 = v81 * v287, v380 = v248 * v286, v381 = v255 * v281,
+        v382 = v342 * (v115 * (v258 * v258)), v383 = v229 + v266 * v342,
+        v384 = v293 * (v111 * (v265 * v265)), v385 = v233 + v271 * v293, v386 = v357 * v357,
+        v387 = v386 * v386, v388 = v357 * v386, v389 = v254 * v267,
+        v390 = 0.6666666666666666 * v357 * v387, v391 = 0.3333333333333333 * v387,
+        v392 = v275 * v391, v393 = v253 * v275, v394 = v3 * v352, v395 = v2 * v352,
+        v396 = v1 * v352, v397 = v2 * v358, v398 = v1 * v358, v399 = v3 * v358, v400 = v2 * v382,
+        v401 = v1 * v382, v402 = v374 * v398, v403 = v390 * (v267 * v359 * v395),
+        v404 = v366 * (v281 * v321 * v397), v405 = v402 + v366 * (v81 * v281 * v397),
+        v406 = v386 * v395, v407 = v389 * v395, v408 = v286 * v303 * v311 * v405,
+        v409 = v360 * v397, v410 = v267 * v406, v411 = v322 * v398, v412 = v203 * v395,
+        v413 = v281 * v409, v414 = v240 * v397, v415 = v381 * v397,
+        v416 = 0.3333333333333333 * v278 + 0.5773502691896257 * (v280 - v279),
+        v417 = 0.5773502691896257 * (v260 - v261), v418 = v88 * (v413 - v317 * v405),
+        v419 = v2 * v377, v420 = v1 * v377, v421 = v2 * v367, v422 = v1 * v367, v423 = v3 * v367,
+        v424 = v2 * v373, v425 = v1 * v373, v426 = v2 * v384, v427 = v1 * v384, v428 = v2 * v371,
+        v429 = v1 * v371, v430 = v204 * v421, v431 = v361 * v424, v432 = v244 * v424,
+        v433 = v380 * v398, v434 = v84 * v284, v435 = v208 * v284, v436 = v208 * v285,
+        v437 = v84 * v285, v438 = v85 * v284, v439 = v435 * v435, v440 = 2.0 * v435,
+        v441 = v436 * v440, v442 = v284 * v439, v443 = v284 * v440,
+        v444 = softehl_vrcbrt(v434 * v439), v445 = v438 * v439, v446 = v434 * v443,
+        v447 = v224 * v284, v448 = v87 * v290, v449 = v290 * v370, v450 = v86 * v292,
+        v451 = v312 * v448, v452 = v425 * v449, v453 = v256 * v288, v454 = v288 * v431,
+        v455 = v368 * (v424 * (v288 * v323)), v456 = v368 * (v424 * (v86 * v288)) + v452,
+        v457 = v424 * v453, v458 = v290 * v304 * v313 * v456, v459 = v324 * v425,
+        v460 = v3 * (v365 - 1.0) * v377 - v368 * (v424 * (v256 * v302) - v419 * v453),
+        v461 = v290 * v459, v462 = v89 * (v454 - v319 * v456), v463 = v249 * v290,
+        v464 = v425 * v463, v465 = v212 * v462, v466 = v245 * v458, v467 = v188 * v458,
+        v468 = v190 * v458, v469 = v444 * v444, v470 = v422 * v444, v471 = v422 * v447,
+        v472 = v469 * v469, v473 = v444 * v469, v474 = v421 * v469,
+        v475 = 0.6666666666666666 * v444 * v472, v476 = 0.3333333333333333 * v472,
+        v477 = v284 * v476, v478 = v274 * v474, v479 = v223 * v274, v480 = v422 * v477,
+        v481 = v421 * v479, v482 = v421 * (v84 * v274) * v475 + v480,
+        v483 = v371 * (v3 * (v473 - 1.0)) - (v422 * (v224 * v285) - v429 * v447) * v476,
+        v484 = v475 * (v421 * (v274 * v446)), v485 = v284 * v434 * v440 * v482,
+        v486 = v423 * (1.0 - v473) - v471 * v476 - v475 * v481,
+        v487 = (v423 + 0.4444444444444444 * v444 * v471) * (v473 * v473) + v472 * (1.1111111111111112 * v472) * v481,
+        v488 = v100 * (v478 - v442 * v482), v489 = v439 * v486, v490 = v434 * v486,
+        v491 = v437 * v439 + v434 * v441, v492 = v227 * v485, v493 = v175 * v485,
+        v494 = v176 * v485, v495 = v440 * v490,
+        v496 = v483 - v475 * (v421 * (v223 * v372) - v428 * v479) + v487 * v491,
+        v497 = v446 * v487 - v421 * (v218 * v274) * v475,
+        v498 = v372 * v474 - v274 * (v428 * v469 + v475 * (v421 * v491)),
+        v499 = v442 * (v445 * v487 - v422 * (v438 * v476) - v430 * (v85 * v274 * v475)),
+        v500 = v284 * v470, v501 = v285 * v470 - v284 * (v429 * v444 + v422 * (v476 * v491)),
+        v502 = v218 * v478 + v284 * v495,
+        v503 = v284 * (2.0 * v436 * v490 + v440 * (v437 * v486 + v434 * v496)) + v285 * v495,
+        v504 = v84 * v498 + v501, v505 = v500 + (v204 * v478 + v284 * v489),
+        v506 = v84 * v478 + v500, v507 = (v150 * v147 - v151 * v156) * v502,
+        v508 = v503 + v218 * v498,
+        v509 = 2.0 * v478 + v284 * (2.0 * v284 * v490 + v434 * v440 * v497) - v218 * v484,
+        v510 = v284 * (v443 * v486 + v439 * v497) - v422 * (v446 * v477) - v204 * v484,
+        v511 = v501 + (v284 * (v441 * v486 + v439 * v496) + v285 * v489) + v204 * v498,
+        v512 = v100 * v505, v513 = 0.5 * (v134 * v150 + v136 * v156) * v506,
+        v514 = (v150 * v152 + v156 * v148) * v506, v515 = (v151 * v152 + v147 * v148) * v506,
+        v516 = v100 * v510, v517 = v100 * v511,
+        v518 = v42 * v42 * (v85 * (v499 - v445 * (v430 * (v274 * v475) + v480)) + 2.0 * v505),
+        v519 = 0.5773502691896257 * v517, v520 = 0.5773502691896257 * v518, v521 = v175 * v516,
+        v522 = v222 * v488, v523 = v522 - v521, v524 = v180 * v488 + v227 * v516,
+        v525 = v180 * v504 + v227 * v508, v526 = v225 * v504 + v176 * v508,
+        v527 = v225 * v488 + v176 * v516, v528 = v526 - v519, v529 = v527 - v520,
+        v530 = v179 * v488 - v226 * v516, v531 = v520 + v523, v532 = v524 - v530,
+        v533 = 0.5773502691896257 * (v527 - v523) - 0.3333333333333333 * v518, v534 = v392 * v396,
+        v535 = v357 * v396, v536 = v393 * v396, v537 = v390 * (v80 * v267 * v395) + v534,
+        v538 = v275 * v535,
+        v539 = v382 * (v3 * (v388 - 1.0)) - v391 * (v253 * v277 * v396 - v393 * v401),
+        v540 = v275 * v344 * v350 * v537,
+        v541 = v387 * (1.1111111111111112 * v387) * v407 + v388 * v388 * (v394 + 0.4444444444444444 * v357 * v536),
+        v542 = (1.0 - v388) * v394 - v391 * v536 - v390 * v407, v543 = v99 * (v410 - v354 * v537),
+        v544 = v250 * v540, v545 = v185 * v540, v546 = v186 * v540, v547 = v349 * v542,
+        v548 = v344 * v542, v549 = v344 * v353 + v347 * v349,
+        v550 = v359 * v541 - v390 * (v214 * v267 * v395), v551 = v350 * v548,
+        v552 = v539 - v390 * (v254 * v383 * v395 - v389 * v400) + v541 * v549,
+        v553 = v277 * v535 - v275 * (v357 * v401 + v396 * (v391 * v549)),
+        v554 = v383 * v406 - v267 * (v386 * v400 + v390 * (v395 * v549)),
+        v555 = v354 * (v356 * v541 - v351 * v391 * v396 - v390 * (v82 * v267) * v412),
+        v556 = v277 * v551 + v275 * (2.0 * v346 * v548 + v350 * (v347 * v542 + v344 * v552)),
+        v557 = v203 * v410 + v538 + v275 * v547, v558 = v209 * v543, v559 = v553 + v80 * v554,
+        v560 = v553 + v275 * (v353 * v542 + v349 * v552) + v277 * v547 + v203 * v554,
+        v561 = v556 + v214 * v554,
+        v562 = 2.0 * v410 + v275 * (2.0 * v275 * v548 + v344 * v350 * v550) - v214 * v403,
+        v563 = v275 * (v355 * v542 + v349 * v550) - v396 * (v359 * v392) - v203 * v403,
+        v564 = v99 * v560, v565 = v99 * v563, v566 = v99 * v557, v567 = v538 + v80 * v410,
+        v568 = v275 * v551 + v214 * v410,
+        v569 = v41 * v41 * (v82 * (v555 - v356 * (v267 * v390 * v412 + v534)) + 2.0 * v557),
+        v570 = v193 * v559 + v250 * v561, v571 = 0.5773502691896257 * v564,
+        v572 = 0.5 * (v130 * v149 + v126 * v155) * v567, v573 = (v149 * v122 + v155 * v154) * v567,
+        v574 = (v121 * v122 + v153 * v154) * v567, v575 = (v149 * v153 - v121 * v155) * v568,
+        v576 = 0.5773502691896257 * v569, v577 = v209 * v540 + v185 * v562, v578 = v185 * v565,
+        v579 = v191 * v543 - v251 * v565, v580 = v252 * v559 + v186 * v561,
+        v581 = v186 * v562 - v252 * v540, v582 = v571 + v580, v583 = v250 * v562 - v193 * v540,
+        v584 = v513 + v226 * (2.0 * (v179 * v485) + v226 * v509) + v572 + v251 * (2.0 * (v191 * v540) + v251 * v562),
+        v585 = v558 - v578, v586 = v191 * v544 + v573 + v251 * v583, v587 = v576 + v585,
+        v588 = v250 * v581 - v193 * v546 - v575, v589 = v191 * v545 + v575 + v251 * v577,
+        v590 = v572 - v252 * v546 + v186 * v581, v591 = v573 - v252 * v545 + v186 * v577,
+        v592 = v252 * v543 + v186 * v565, v593 = v193 * v543 + v250 * v565, v594 = v579 + v593,
+        v595 = v576 + v592, v596 = v592 - v527,
+        v597 = 0.3333333333333333 * v569 + 0.5773502691896257 * (v585 + v592),
+        v598 = v209 * v545 + v574 + v185 * v577, v599 = v209 * v559 - v185 * v561,
+        v600 = v191 * v559 - v251 * v561, v601 = v571 + v599,
+        v602 = 0.5773502691896257 * (v570 + v600),
+        v603 = 0.3333333333333333 * v564 + 0.5773502691896257 * (v580 + v599),
+        v604 = 0.5773502691896257 * (v336 + v337) - 0.3333333333333333 * v333, v605 = v286 * v411,
+        v606 = v241 * v408, v607 = v187 * v408, v608 = v189 * v408, v609 = v211 * v418,
+        v610 = v3 * (v363 - 1.0) * v384 - v369 * (v248 * v287 * v398 - v380 * v427),
+        v611 = v362 * (1.1111111111111112 * v362) * v415 + v363 * v363 * (v399 + 0.4444444444444444 * v322 * v433),
+        v612 = (1.0 - v363) * v399 - v369 * v433 - v366 * v415,
+        v613 = (1.0 - v365) * v376 - v368 * v457 - v370 * v464,
+        v614 = v364 * (1.1111111111111112 * v364) * v457 + v365 * v365 * (v376 + 0.4444444444444444 * v324 * v464),
+        v615 = v310 * v612, v616 = v303 * v612, v617 = v312 * v613, v618 = v304 * v613,
+        v619 = v312 * v450 + v304 * v316, v620 = v311 * v616,
+        v621 = v321 * v611 - v366 * (v216 * v281 * v397), v622 = v313 * v618,
+        v623 = v460 - v370 * (v425 * (v249 * v292) - v420 * v463) + v614 * v619,
+        v624 = v310 * v379 + v303 * v315, v625 = v323 * v614 - v368 * (v424 * (v220 * v288)),
+        v626 = v451 * v614 - v432 * (v368 * (v87 * v288)) - v425 * (v370 * v448),
+        v627 = v302 * v431 - v288 * (v361 * v419 + v368 * (v424 * v619)),
+        v628 = v610 - v366 * (v255 * v385 * v397 - v381 * v426) + v611 * v624,
+        v629 = v292 * v459 - v290 * (v324 * v420 + v425 * (v370 * v619)),
+        v630 = v287 * v411 - v286 * (v322 * v427 + v398 * (v369 * v624)),
+        v631 = v385 * v409 - v281 * (v360 * v426 + v366 * (v397 * v624)),
+        v632 = v317 * (v378 * v611 - v369 * v375 * v398 - v366 * (v83 * v281) * v414),
+        v633 = 2.0 * v454 - v220 * v455 + v290 * (2.0 * v290 * v618 + v304 * v313 * v625),
+        v634 = v629 + v86 * v627, v635 = v630 + v81 * v631, v636 = v605 + v81 * v413,
+        v637 = v461 + v86 * v454,
+        v638 = v286 * (2.0 * v306 * v616 + v311 * (v379 * v612 + v303 * v628)) + v216 * v631,
+        v639 = 0.5 * (v127 * v137 + v125 * v140) * v636, v640 = (v137 * v124 + v140 * v139) * v636,
+        v641 = (v123 * v124 + v138 * v139) * v636, v642 = 0.5 * (v131 * v141 + v132 * v144) * v637,
+        v643 = (v141 * v146 + v144 * v143) * v637, v644 = (v145 * v146 + v142 * v143) * v637,
+        v645 = v216 * v413 + v286 * v620, v646 = v638 + v287 * v620,
+        v647 = v630 + v286 * (v315 * v612 + v310 * v628) + v240 * v631 + v287 * v615,
+        v648 = v240 * v413 + v605 + v286 * v615, v649 = (v137 * v138 - v123 * v140) * v645,
+        v650 = v88 * v647, v651 = v88 * v648,
+        v652 = v40 * v40 * (v83 * (v632 - v378 * (v402 + v281 * v366 * v414)) + 2.0 * v648),
+        v653 = 0.5773502691896257 * v650, v654 = v566 + v651, v655 = v566 - v651,
+        v656 = 0.5773502691896257 * v652, v657 = v243 * v635 + v189 * v646,
+        v658 = v211 * v635 - v187 * v646,
+        v659 = v209 * v567 - v185 * v568 + v211 * v636 - v187 * v645,
+        v660 = v250 * v568 + v193 * v567 + v196 * v636 + v241 * v645,
+        v661 = v196 * v635 + v241 * v646, v662 = v194 * v635 - v242 * v646, v663 = v658 - v653,
+        v664 = v653 + v657, v665 = 0.5773502691896257 * (v662 - v661),
+        v666 = 0.5773502691896257 * (v658 - v657) - 0.3333333333333333 * v650,
+        v667 = 2.0 * v413 + v286 * (2.0 * v286 * v616 + v303 * v311 * v621) - v216 * v404,
+        v668 = v286 * (v318 * v612 + v310 * v621) - v321 * v374 * v398 - v240 * v404,
+        v669 = v88 * v668, v670 = v220 * v454 + v290 * v622,
+        v671 = v220 * v627 + v292 * v622 + v290 * (2.0 * v309 * v618 + v313 * (v450 * v613 + v304 * v623)),
+        v672 = v461 + v244 * v454 + v290 * v617,
+        v673 = v629 + v244 * v627 + v290 * (v316 * v613 + v312 * v623) + v292 * v617,
+        v674 = (v141 * v142 - v145 * v144) * v670, v675 = v241 * v667 - v196 * v408,
+        v676 = v189 * v667 - v243 * v408,
+        v677 = v290 * (v320 * v613 + v312 * v625) - v425 * (v323 * v449) - v244 * v455,
+        v678 = v89 * v673, v679 = v89 * v672, v680 = v89 * v677,
+        v681 = v87 * (v319 * v626 - v451 * (v432 * (v288 * v368) + v452)) + 2.0 * v672,
+        v682 = v43 * v43 * v681, v683 = 0.5773502691896257 * v678, v684 = v512 - v679,
+        v685 = v512 + v679, v686 = v639 - v243 * v608 + v189 * v676, v687 = v188 * v680,
+        v688 = 0.5773502691896257 * v682, v689 = v241 * v676 - v196 * v608 - v649,
+        v690 = v465 - v687, v691 = v95 * v276 - v260, v692 = v95 * v325 - v327,
+        v693 = v95 * v332 - v334, v694 = v95 * v291 - v296, v695 = v690 - v688,
+        v696 = v96 * v276 - v261, v697 = v96 * v325 - v328, v698 = v96 * v332 - v335,
+        v699 = v96 * v291 - v298, v700 = v98 * v332 - v333, v701 = v98 * v276 - v278,
+        v702 = v301 - v300 + v92 * v291, v703 = v98 * v325 - v326, v704 = v98 * v291 - v295,
+        v705 = v299 + v301 - v94 * v291, v706 = v92 * v276 - v280 - v289,
+        v707 = v279 - v94 * v276 - v289, v708 = v92 * v325 - v330 - v331,
+        v709 = v331 + (v329 - v94 * v325), v710 = v654 + v685, v711 = v187 * v669,
+        v712 = v211 * v408 + v187 * v667, v713 = v194 * v418 - v242 * v669,
+        v714 = v196 * v418 + v241 * v669, v715 = v243 * v418 + v189 * v669,
+        v716 = v640 - v243 * v607 + v189 * v712, v717 = v609 - v711,
+        v718 = v522 - v465 - v521 + v531 + v558 - v578 + v587 - v609 + v687 + v711,
+        v719 = v579 - v713, v720 = v713 - v714, v721 = v641 + (v211 * v607 + v187 * v712),
+        v722 = v717 - v656, v723 = v593 + v714, v724 = v593 - v714, v725 = v656 + v715,
+        v726 = 0.5773502691896257 * (v717 - v715) - 0.3333333333333333 * v652,
+        v727 = v695 + (v531 + v587 + v722), v728 = v594 + v720, v729 = v595 + v725,
+        v730 = v595 - v725, v731 = v597 - v726,
+        v732 = v716 + (v591 + 0.5773502691896257 * (v578 - v558 - v717)),
+        v733 = 0.3333333333333333 * (v585 - v717) + 0.5773502691896257 * (v716 + (v598 - v591 + v721)),
+        v734 = v222 * v485 + v175 * v509,
+        v735 = v225 * v506 + v252 * v567 + v186 * v568 + v176 * v502,
+        v736 = v179 * v506 + v191 * v567 - v251 * v568 - v226 * v502,
+        v737 = v227 * v509 - v180 * v485, v738 = v176 * v509 - v225 * v485,
+        v739 = v514 - v225 * v493 + v176 * v734, v740 = v515 + v222 * v493 + v175 * v734,
+        v741 = v222 * v504 - v175 * v508, v742 = v179 * v504 - v226 * v508,
+        v743 = v179 * v494 + v191 * v546 + v251 * v581 + v226 * v738,
+        v744 = v179 * v492 + v514 + v226 * v737, v745 = v513 + v176 * v738 - v225 * v494,
+        v746 = v507 + (v179 * v493 + v226 * v734), v747 = v227 * v738 - v180 * v494 - v507,
+        v748 = v586 - v584 - v744, v749 = v747 + (v743 - v588), v750 = v588 + v747,
+        v751 = v590 + 0.5773502691896257 * v596 + v745, v752 = 0.5773502691896257 * (v525 - v742),
+        v753 = v519 + v741, v754 = v180 * v506 + v195 * v637 + v227 * v502 + v245 * v670,
+        v755 = v243 * v636 + v247 * v637 + v189 * v645 + v190 * v670,
+        v756 = v194 * v636 + v192 * v637 - v242 * v645 - v246 * v670,
+        v757 = v222 * v506 + v212 * v637 - v175 * v502 - v188 * v670,
+        v758 = v212 * v458 + v188 * v633, v759 = v660 + v754,
+        v760 = v639 + v642 + v242 * (2.0 * (v194 * v408) + v242 * v667) + v246 * (2.0 * (v192 * v458) + v246 * v633),
+        v761 = v736 + v756, v762 = v659 + 0.5773502691896257 * (v655 + v684) + v757,
+        v763 = v180 * v493 + v195 * v467 - v227 * v734 - v245 * v758,
+        v764 = 0.5773502691896257 * (v754 + v756 - v736 - v660),
+        v765 = v735 + (0.5773502691896257 * (v654 - v685) + v755),
+        v766 = 0.3333333333333333 * (v655 - v684) + 0.5773502691896257 * (v735 + (v659 - v757 - v755)),
+        v767 = v761 + v764, v768 = v765 + v766, v769 = v766 - v765, v770 = v710 - v762,
+        v771 = v710 + v762;
+    softehl_store4(R + 4, 8, -(v759 + v767), v769 + v770, v767 - v759, v770 - v769);
+    softehl_store4(R + 0, 8, v759 + v761 - v764, v768 + v771, v759 - v761 + v764, v771 - v768);
+    const V v772 = 0.5773502691896257 * (v526 - v741) - 0.3333333333333333 * v517,
+        v773 = v192 * v467 + v674 + v246 * v758, v774 = v746 + v773, v775 = v763 - v746 + v773,
+        v776 = v652 + (v518 + v569 + v682) + v564 * v701 + v650 * v703 + v517 * v700,
+        v777 = v776 + v678 * v704,
+        v778 = v727 + (v343 * v517 + v564 * v707 + v650 * v709) + v678 * v705, v779 = v777 - v778,
+        v780 = v777 + v778,
+        v781 = v721 + (v598 + 0.5773502691896257 * (v718 - v722 - v695)) + v740 + v601 * v707,
+        v782 = v245 * v633 - v195 * v458, v783 = v190 * v633 - v247 * v458,
+        v784 = v642 - v247 * v468 + v190 * v783, v785 = v247 * v462 + v190 * v680,
+        v786 = v192 * v462 - v246 * v680, v787 = v195 * v462 + v245 * v680,
+        v788 = v192 * v468 + v194 * v608 + v242 * v676 + v246 * v783,
+        v789 = v245 * v783 - v195 * v468 - v674, v790 = v713 + (v530 + v579) + v786,
+        v791 = v530 - v786, v792 = v785 - v688, v793 = v786 + v787, v794 = v524 - v787,
+        v795 = v524 + v723 + v787,
+        v796 = v788 + (v743 + 0.5773502691896257 * (v530 - v579 - v713 + v786)),
+        v797 = 0.3333333333333333 * v682 - 0.5773502691896257 * (v690 + v785),
+        v798 = v689 + v788 - v789, v799 = v689 + v789,
+        v800 = v340 * v666 - v416 * v603 - v604 * v772 + 0.19245008972987526 * (v596 + v715 - v785),
+        v801 = v750 + 0.5773502691896257 * (v723 - v524 - v787) + v799,
+        v802 = v564 * v691 + v650 * v692 + v517 * v693 + v678 * v694 - v790,
+        v803 = v784 + (v686 + 0.5773502691896257 * (v715 - v785)), v804 = v529 + v792,
+        v805 = v533 + v597 + v726 + v797, v806 = v533 - v797,
+        v807 = v340 * v650 - v416 * v564 - v517 * v604 + v314 * v678 + v805, v808 = v729 + v804,
+        v809 = v348 * v528 + v751 + v582 * v706 + v664 * v708 + v803 + 0.5773502691896257 * (v729 - v804),
+        v810 = v348 * v517 + v564 * v706 + v650 * v708 + v678 * v702 + v808, v811 = v807 + v810,
+        v812 = v532 - v793, v813 = 0.5773502691896257 * (v532 - v594 + v720 + v793),
+        v814 = 0.5773502691896257 * (v749 - v798) + 0.3333333333333333 * (v720 - v594 - v532 - v793),
+        v815 = v810 - v807, v816 = v779 - v815, v817 = v779 + v815, v818 = v780 + v811,
+        v819 = v780 - v811, v820 = v341 * v517 + v417 * v564 - v339 * v650 + v307 * v678 - v813,
+        v821 = v802 + v820, v822 = v820 - v802,
+        v823 = v564 * v696 + v650 * v697 + v517 * v698 + v678 * v699 + v795, v824 = v822 + v823,
+        v825 = v821 - v823, v826 = v821 + v823, v827 = v823 - v822,
+        v828 = v194 * v606 + v640 + v242 * v675, v829 = v194 * v607 + v649 + v242 * v712,
+        v830 = v574 - v193 * v544 + v250 * v583 - v196 * v606 + v641 + v241 * v675,
+        v831 = v193 * v545 - v250 * v577 + v196 * v607 - v241 * v712, v832 = v589 + v829,
+        v833 = v763 + 0.5773502691896257 * (v724 + v794) + v831, v834 = v831 + (v589 - v829),
+        v835 = v586 - v828 - v830,
+        v836 = 0.3333333333333333 * (v724 - v794) + 0.5773502691896257 * (v750 - v763 - v799 + v831),
+        v837 = v774 + 0.5773502691896257 * (v719 + v791) + v832,
+        v838 = 0.3333333333333333 * (v719 - v791) + 0.5773502691896257 * (v788 - v743 - v774 + v832),
+        v839 = 0.3333333333333333 * (v812 - v728) + 0.5773502691896257 * (v775 - v834),
+        v840 = 0.3333333333333333 * (v749 - v775 + v798 - v834) - 0.19245008972987526 * (v728 + v812),
+        v841 = v192 * v466 + v643 + v246 * v782,
+        v842 = v515 - v180 * v492 + v644 - v195 * v466 + v227 * v737 + v245 * v782,
+        v843 = v192 * v634 - v246 * v671, v844 = v195 * v634 + v245 * v671,
+        v845 = v247 * v634 + v190 * v671, v846 = v643 - v247 * v467 + v190 * v758,
+        v847 = v644 + v212 * v467 + v188 * v758, v848 = v212 * v634 - v188 * v671,
+        v849 = v340 * v662 - v416 * v600 - v604 * v742 + v838 + v314 * v843,
+        v850 = v586 + v744 + v828 + v841, v851 = v760 + v828 - v841,
+        v852 = 0.5773502691896257 * (v843 + v844), v853 = v845 - v683, v854 = v848 - v683,
+        v855 = 0.3333333333333333 * v678 - 0.5773502691896257 * (v845 + v848),
+        v856 = v842 + (v744 - v841), v857 = 0.5773502691896257 * (v748 + v851),
+        v858 = 0.5773502691896257 * (v523 + v690) + v739 + v846,
+        v859 = v739 + (v716 + (v590 - v591 + v686 + v731) + v745) + v784 - v806 - v846,
+        v860 = v570 * v696 + v661 * v697 + v525 * v698 + v830 + v842 + v699 * v844,
+        v861 = 0.5773502691896257 * (v835 + v856),
+        v862 = 0.3333333333333333 * (v523 - v690) + 0.5773502691896257 * (v847 + (v739 + v740 - v846)),
+        v863 = v339 * v665 + v417 * v602 - v341 * v752 + 0.3333333333333333 * (v856 + (v851 - v748) - v835),
+        v864 = v732 + 0.5773502691896257 * (v792 - v529 - v730) + v858,
+        v865 = v781 + v663 * v709 + v343 * v753 + v847 + v705 * v854,
+        v866 = 0.3333333333333333 * (v730 - v529 + v792) + 0.5773502691896257 * (v751 - v732 - v803 + v858),
+        v867 = v733 + 0.5773502691896257 * (v731 + v806) - v862, v868 = v863 - v307 * v852,
+        v869 = v665 * v709 - v602 * v707 + v343 * v752 + v839 + v705 * v852,
+        v870 = v417 * v601 + v341 * v753 - v339 * v663 - v839 + v307 * v854,
+        v871 = v417 * v600 + v341 * v742 - v339 * v662 - v857 + v307 * v843,
+        v872 = v600 * v707 + v662 * v709 + v343 * v742 + v837 + v705 * v843,
+        v873 = v800 + 0.3333333333333333 * v859 + 0.5773502691896257 * (v733 + v862),
+        v874 = v873 + v314 * v855,
+        v875 = v340 * v661 - v525 * v604 - v416 * v570 + v836 + v314 * v844,
+        v876 = v343 * v525 + v570 * v707 + v661 * v709 + v833 + v705 * v844,
+        v877 = v867 + (v603 * v707 + v666 * v709 + v343 * v772 + v705 * v855),
+        v878 = v343 * v528 + v582 * v707 + v664 * v709 + v705 * v853 - v864,
+        v879 = v340 * v663 - v416 * v601 - v604 * v753 + v867 + v314 * v854,
+        v880 = v340 * v665 + v416 * v602 - v604 * v752 + v840 + v314 * v852,
+        v881 = v601 * v706 + v348 * v753 + v663 * v708 - v864 + v702 * v854,
+        v882 = v665 * v708 - v602 * v706 + v348 * v752 + v814 + v702 * v852,
+        v883 = v809 + v702 * v853,
+        v884 = v866 + (v340 * v664 - v416 * v582 - v528 * v604 + v314 * v853), v885 = v879 + v881,
+        v886 = v880 + v882, v887 = v881 - v879, v888 = v882 - v880,
+        v889 = v603 * v706 + v348 * v772 + v666 * v708 + v866 + v702 * v855, v890 = v883 - v884,
+        v891 = v883 + v884, v892 = v874 - v889, v893 = v874 + v889,
+        v894 = v600 * v696 + v662 * v697 + v698 * v742 - v850 + v699 * v843,
+        v895 = v584 + v760 - v600 * v691 - v662 * v692 - v693 * v742 - v694 * v843,
+        v896 = v570 * v691 + v661 * v692 + v525 * v693 + v850 + v694 * v844,
+        v897 = v665 * v697 - v602 * v696 + v698 * v752 + v861 + v699 * v852,
+        v898 = v665 * v692 - v602 * v691 + v693 * v752 + v694 * v852,
+        v899 = v665 * v703 - v602 * v701 + v700 * v752 + v813 + v704 * v852,
+        v900 = v341 * v525 - v339 * v661 + v417 * v570 - v861 + v307 * v844, v901 = v896 - v900,
+        v902 = v896 + v900, v903 = v570 * v701 + v661 * v703 + v525 * v700 + v795 + v704 * v844,
+        v904 = v348 * v525 + v570 * v706 + v661 * v708 + v801 + v702 * v844,
+        v905 = v600 * v706 + v348 * v742 + v662 * v708 - v796 + v702 * v843,
+        v906 = v600 * v701 + v662 * v703 + v700 * v742 + v790 + v704 * v843, v907 = v876 + v903,
+        v908 = v875 + v904, v909 = v849 + v905, v910 = v872 + v906, v911 = v903 - v876,
+        v912 = v904 - v875, v913 = v905 - v849, v914 = v906 - v872, v915 = v909 + v910,
+        v916 = v907 + v908, v917 = v910 - v909, v918 = v913 + v914, v919 = v914 - v913,
+        v920 = v907 - v908, v921 = v911 - v912, v922 = v911 + v912, v923 = v902 - v860,
+        v924 = v871 + v895, v925 = v871 - v895, v926 = v868 - v857 + v898,
+        v927 = v857 + v868 - v898, v928 = v894 + v924, v929 = v894 - v924, v930 = v894 - v925,
+        v931 = v894 + v925, v932 = v897 + v926, v933 = v897 + v927, v934 = v897 - v927,
+        v935 = v926 - v897, v936 = v929 + v932, v937 = v930 + v933, v938 = v932 - v929,
+        v939 = v931 + v934, v940 = v933 - v930, v941 = v928 + v935, v942 = v934 - v931,
+        v943 = v935 - v928, v944 = v869 + v899, v945 = v869 + v888 - v899,
+        v946 = v869 - v888 - v899, v947 = v860 - v901, v948 = v860 + v901, v949 = v886 + v944,
+        v950 = v886 - v944, v951 = v919 - v945, v952 = v919 + v945, v953 = v918 - v946,
+        v954 = v918 + v946, v955 = v915 - v949, v956 = v915 + v949, v957 = v917 - v950,
+        v958 = v917 + v950;
+    softehl_store4(K + 32, 64, v943 - v947, -(v916 + v956), -(v936 + v948), v908 - v907 - v957);
+    softehl_store4(K + 48, 64, v901 - v860 - v943, v956 - v916, v936 - v948, v957 - v920);
+    softehl_store4(K + 0, 64, v941 + v947, v916 + v955, v948 - v938, v920 + v958);
+    softehl_store4(K + 16, 64, v947 - v941, v916 - v955, v938 + v948, v920 - v958);
+    const V v959 = v860 - v902, v960 = v860 + v902;
+    softehl_store4(K + 4, 64, v923 + v940, v921 + v952, v942 - v960, v922 + v954);
+    softehl_store4(K + 36, 64, v937 + v959, v912 - v911 - v951, v939 + v960, -(v922 + v953));
+    softehl_store4(K + 20, 64, v923 - v940, v921 - v952, -(v942 + v960), v922 - v954);
+    softehl_store4(K + 52, 64, v959 - v937, v951 - v921, v960 - v939, v953 - v922);
+    const V v961 = v582 * v691 + v528 * v693 + v664 * v692 + v796 + v694 * v853,
+        v962 = v341 * v528 + v417 * v582 - v339 * v664 - v814 + v307 * v853,
+        v963 = v417 * v603 + v341 * v772 - v339 * v666 - v840 + v307 * v855,
+        v964 = v838 - v603 * v691 - v666 * v692 - v693 * v772 - v694 * v855,
+        v965 = v837 - v601 * v691 - v663 * v692 - v693 * v753 - v694 * v854, v966 = v961 - v962,
+        v967 = v961 + v962, v968 = v870 + v965, v969 = v870 - v965, v970 = v963 + v964,
+        v971 = v963 - v964, v972 = v582 * v696 + v528 * v698 + v664 * v697 + v801 + v699 * v853,
+        v973 = v582 * v701 + v528 * v700 + v664 * v703 + v808 + v704 * v853, v974 = v966 + v972,
+        v975 = v967 + v972, v976 = v878 + v973, v977 = v972 - v966, v978 = v972 - v967,
+        v979 = v973 - v878, v980 = v891 + v976, v981 = v890 + v979, v982 = v976 - v891,
+        v983 = v979 - v890, v984 = v603 * v696 + v698 * v772 + v666 * v697 + v836 + v699 * v855,
+        v985 = v603 * v701 + v700 * v772 + v666 * v703 + v805 + v704 * v855,
+        v986 = v601 * v696 + v698 * v753 + v663 * v697 + v833 + v699 * v854,
+        v987 = v601 * v701 + v727 + v663 * v703 + v700 * v753 + v704 * v854, v988 = v877 + v985,
+        v989 = v865 + v987, v990 = v970 + v984, v991 = v984 - v970, v992 = v985 - v877,
+        v993 = v986 - v968, v994 = v986 - v969, v995 = v987 - v865, v996 = v893 + v988,
+        v997 = v885 + v989, v998 = v892 + v992, v999 = v988 - v893, v1000 = v887 + v995,
+        v1001 = v989 - v885, v1002 = v992 - v892, v1003 = v983 - v998, v1004 = v983 + v998,
+        v1005 = v995 - v887, v1006 = v971 - v984, v1007 = v971 + v984, v1008 = v968 + v986,
+        v1009 = v969 + v986, v1010 = v825 + v994, v1011 = v825 - v994, v1012 = v978 + v1006,
+        v1013 = v826 + v1009, v1014 = v1006 - v978, v1015 = v1009 - v826, v1016 = v816 - v1005,
+        v1017 = v816 + v1005, v1018 = v975 + v1007, v1019 = v975 - v1007, v1020 = v981 - v1002,
+        v1021 = v981 + v1002, v1022 = v817 - v1000, v1023 = v817 + v1000;
+    softehl_store4(K + 60, 64, v1010 - v1012, v1003 + v1016, v1015 - v1019, v1020 + v1022);
+    softehl_store4(K + 12, 64, v1011 + v1014, v1004 + v1017, -(v1013 + v1018), v1021 + v1023);
+    softehl_store4(K + 44, 64, v1010 + v1012, v1016 - v1003, v1015 + v1019, v1022 - v1020);
+    softehl_store4(K + 28, 64, v1011 - v1014, v1017 - v1004, v1018 - v1013, v1023 - v1021);
+    const V v1024 = v977 - v990, v1025 = v977 + v990, v1026 = v974 - v991, v1027 = v974 + v991,
+        v1028 = v980 - v996, v1029 = v980 + v996, v1030 = v982 - v999, v1031 = v982 + v999,
+        v1032 = v824 - v1008, v1033 = v824 + v1008, v1034 = v827 - v993, v1035 = v827 + v993,
+        v1036 = v818 - v997, v1037 = v818 + v997, v1038 = v819 - v1001, v1039 = v819 + v1001;
+    softehl_store4(K + 8, 64, v1025 + v1033, v1029 + v1037, v1027 + v1035, v1031 + v1039);
+    softehl_store4(K + 56, 64, v1024 + v1032, v1028 + v1036, v1026 + v1034, v1030 + v1038);
+    softehl_store4(K + 40, 64, v1032 - v1024, v1036 - v1028, v1034 - v1026, v1038 - v1030);
+    softehl_store4(K + 24, 64, v1033 - v1025, v1037 - v1029, v1035 - v1027, v1039 - v1031);
 }
+SOFTEHL_BATCH(softehl_solid_fbar_tangent, 8, 8, 0, 0, 8, (8 * 8))
 
-static void softehl_solid_fbar_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_fbar_fields)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 0.25 * parameters[2];
-    const V v4 = X4 - X2;
-    const V v5 = X4 - X6;
-    const V v6 = X2 - X0;
-    const V v7 = X6 - X0;
-    const V v8 = 0.10566243270259355 * v4;
-    const V v9 = 0.39433756729740643 * v4;
-    const V v10 = v4 + v7;
-    const V v11 = v5 + v6;
-    const V v12 = 0.39433756729740643 * v6;
-    const V v13 = 0.10566243270259355 * v6;
-    const V v14 = 0.39433756729740643 * v7;
-    const V v15 = v14 + v8;
-    const V v16 = 0.10566243270259355 * v7;
-    const V v17 = v16 + v9;
-    const V v18 = 0.0625 * v10;
-    const V v19 = 0.10566243270259355 * v5;
-    const V v20 = v12 + v19;
-    const V v21 = 0.39433756729740643 * v5;
-    const V v22 = v13 + v21;
-    const V v23 = 0.0625 * v11;
-    const V v24 = 1.5773502691896257 * X1;
-    const V v25 = 0.4226497308103742 * X1;
-    const V v26 = X1 + X3;
-    const V v27 = 0.4226497308103742 * X3;
-    const V v28 = v24 + v27;
-    const V v29 = 1.5773502691896257 * X3;
-    const V v30 = v25 + v29;
-    const V v31 = X3 - X1;
-    const V v32 = 0.39433756729740643 * v28;
-    const V v33 = 0.10566243270259355 * v28;
-    const V v34 = 0.39433756729740643 * v30;
-    const V v35 = 0.10566243270259355 * v30;
-    const V v36 = 0.39433756729740643 * v31;
-    const V v37 = 0.10566243270259355 * v31;
-    const V v38 = X5 - X3;
-    const V v39 = 0.4226497308103742 * X5;
-    const V v40 = 1.5773502691896257 * X5;
-    const V v41 = X5 - X7;
-    const V v42 = X5 + X7;
-    const V v43 = 1.5773502691896257 * X7;
-    const V v44 = v39 + v43;
-    const V v45 = 0.4226497308103742 * X7;
-    const V v46 = v40 + v45;
-    const V v47 = 0.10566243270259355 * v38;
-    const V v48 = 0.39433756729740643 * v38;
-    const V v49 = v41 + v31;
-    const V v50 = 0.10566243270259355 * v41;
-    const V v51 = v36 + v50;
-    const V v52 = 0.39433756729740643 * v41;
-    const V v53 = v37 + v52;
-    const V v54 = X7 - X1;
-    const V v55 = 0.10566243270259355 * v44;
-    const V v56 = v32 + v55;
-    const V v57 = 0.39433756729740643 * v44;
-    const V v58 = v33 + v57;
-    const V v59 = 0.10566243270259355 * v46;
-    const V v60 = v34 + v59;
-    const V v61 = 0.39433756729740643 * v46;
-    const V v62 = v35 + v61;
-    const V v63 = v26 + v42;
-    const V v64 = 0.39433756729740643 * v54;
-    const V v65 = v64 + v47;
-    const V v66 = 0.10566243270259355 * v54;
-    const V v67 = v66 + v48;
-    const V v68 = 1.0 / v56;
-    const V v69 = v42 - v26;
-    const V v70 = 0.25 * v63;
-    const V v71 = 1.0 / v58;
-    const V v72 = 1.0 / v60;
-    const V v73 = 1.0 / v62;
-    const V v74 = 0.0625 * v49;
-    const V v75 = 1.0 / v70;
-    const V v76 = 0.0625 * v69;
-    const V v77 = v69 * v11;
-    const V v78 = v10 * v49;
-    const V v79 = v77 - v78;
-    const V v80 = 0.0625 * v79;
-    const V v81 = d0 - d4;
-    const V v82 = d0 - d2;
-    const V v83 = d2 + v81;
-    const V v84 = 1.0 / v80;
-    const V v85 = d1 - d3;
-    const V v86 = d1 + d3;
-    const V v87 = d4 - d6;
-    const V v88 = v83 - d6;
-    const V v89 = 0.25 * v71;
-    const V v90 = 0.25 * v68;
-    const V v91 = 0.25 * v72;
-    const V v92 = 0.25 * v73;
-    const V v93 = v90 * v90;
-    const V v94 = 0.25 * v75;
-    const V v95 = v82 - v87;
-    const V v96 = v82 + v87;
-    const V v97 = v89 * v89;
-    const V v98 = v91 * v91;
-    const V v99 = v92 * v92;
-    const V v100 = 0.5773502691896257 * v96;
-    const V v101 = v95 + v100;
-    const V v102 = v95 - v100;
-    const V v103 = v88 - v100;
-    const V v104 = v100 + v88;
-    const V v105 = d5 + d7;
-    const V v106 = d5 - d7;
-    const V v107 = v74 * v84;
-    const V v108 = v76 * v84;
-    const V v109 = v18 * v84;
-    const V v110 = v23 * v84;
-    const V v111 = v86 - v105;
-    const V v112 = v86 + v105;
-    const V v113 = v85 - v106;
-    const V v114 = v85 + v106;
-    const V v115 = v95 * v109;
-    const V v116 = v95 * v108;
-    const V v117 = 1.0 - v116;
-    const V v118 = 0.5773502691896257 * v111;
-    const V v119 = 0.5773502691896257 * v114;
-    const V v120 = 0.3333333333333333 * v114;
-    const V v121 = 0.5773502691896257 * v113;
-    const V v122 = v111 + v119;
-    const V v123 = v111 - v119;
-    const V v124 = v112 + v121;
-    const V v125 = v112 - v121;
-    const V v126 = v113 + v119;
-    const V v127 = v113 - v119;
-    const V v128 = v118 + v120;
-    const V v129 = v118 - v120;
-    const V v130 = v112 * v94;
-    const V v131 = 1.0 + v130;
-    const V v132 = v124 + v128;
-    const V v133 = v124 - v128;
-    const V v134 = v125 + v129;
-    const V v135 = v125 - v129;
-    const V v136 = v111 * v107;
-    const V v137 = v107 * v88;
-    const V v138 = v117 + v137;
-    const V v139 = v110 * v88;
-    const V v140 = v115 - v139;
-    const V v141 = v111 * v110;
-    const V v142 = 1.0 - v141;
-    const V v143 = v90 * v132;
-    const V v144 = 1.0 + v143;
-    const V v145 = v89 * v133;
-    const V v146 = 1.0 + v145;
-    const V v147 = v91 * v134;
-    const V v148 = 1.0 + v147;
-    const V v149 = v110 * v138;
-    const V v150 = v92 * v135;
-    const V v151 = 1.0 + v150;
-    const V v152 = v144 * v144;
-    const V v153 = v146 * v146;
-    const V v154 = 2.0 * v144;
-    const V v155 = 2.0 * v146;
-    const V v156 = v148 * v148;
-    const V v157 = 2.0 * v148;
-    const V v158 = v151 * v151;
-    const V v159 = 2.0 * v151;
-    const V v160 = v109 * v138;
-    const V v161 = v89 * v155;
-    const V v162 = v92 * v159;
-    const V v163 = v108 * v140;
-    const V v164 = v160 + v163;
-    const V v165 = v113 * v108;
-    const V v166 = v136 - v165;
-    const V v167 = v113 * v109;
-    const V v168 = v167 + v142;
-    const V v169 = v109 * v166;
-    const V v170 = v131 * v164;
-    const V v171 = v110 * v166;
-    const V v172 = v138 * v168;
-    const V v173 = v108 * v168;
-    const V v174 = v169 + v173;
-    const V v175 = v166 * v140;
-    const V v176 = v172 - v175;
-    const V v177 = v107 * v140;
-    const V v178 = v149 + v177;
-    const V v179 = v107 * v168;
-    const V v180 = v171 + v179;
-    const V v181 = v131 * v178;
-    const V v182 = v131 * v174;
-    const V v183 = v131 * v180;
-    const V v184 = v131 * v176;
-    const V v185 = v94 * v176;
-    const V v186 = v90 * v154;
-    const V v187 = v91 * v157;
-    const V v188 = v20 * v65;
-    const V v189 = v22 * v65;
-    const V v190 = v20 * v67;
-    const V v191 = v22 * v67;
-    const V v192 = v144 * v184;
-    const V v193 = v146 * v184;
-    const V v194 = v148 * v184;
-    const V v195 = v151 * v184;
-    const V v196 = v15 * v53;
-    const V v197 = v189 - v196;
-    const V v198 = v17 * v53;
-    const V v199 = v191 - v198;
-    const V v200 = 1.0 / v197;
-    const V v201 = 6.283185307179586 * v197;
-    const V v202 = 1.0 / v199;
-    const V v203 = 6.283185307179586 * v199;
-    const V v204 = v15 * v51;
-    const V v205 = v188 - v204;
-    const V v206 = v17 * v51;
-    const V v207 = v190 - v206;
-    const V v208 = v58 * v201;
-    const V v209 = v62 * v203;
-    const V v210 = 1.0 / v205;
-    const V v211 = 6.283185307179586 * v205;
-    const V v212 = 1.0 / v207;
-    const V v213 = 6.283185307179586 * v207;
-    const V v214 = v56 * v211;
-    const V v215 = v60 * v213;
-    const V v216 = v51 * v210;
-    const V v217 = v51 * v212;
-    const V v218 = v53 * v200;
-    const V v219 = v53 * v202;
-    const V v220 = 0.25 * v216;
-    const V v221 = 0.5 * v216;
-    const V v222 = 0.25 * v218;
-    const V v223 = 0.5 * v218;
-    const V v224 = v15 * v200;
-    const V v225 = v15 * v210;
-    const V v226 = v65 * v200;
-    const V v227 = v22 * v200;
-    const V v228 = v22 * v202;
-    const V v229 = v65 * v210;
-    const V v230 = v67 * v202;
-    const V v231 = v17 * v202;
-    const V v232 = v20 * v210;
-    const V v233 = v67 * v212;
-    const V v234 = v20 * v212;
-    const V v235 = v17 * v212;
-    const V v236 = 0.25 * v226;
-    const V v237 = 0.25 * v227;
-    const V v238 = 0.5 * v227;
-    const V v239 = 0.25 * v224;
-    const V v240 = 0.25 * v230;
-    const V v241 = 0.25 * v228;
-    const V v242 = 0.5 * v228;
-    const V v243 = 0.25 * v231;
-    const V v244 = 0.25 * v219;
-    const V v245 = 0.5 * v219;
-    const V v246 = v226 * v236;
-    const V v247 = v230 * v240;
-    const V v248 = 0.25 * v234;
-    const V v249 = 0.5 * v234;
-    const V v250 = v236 * v237;
-    const V v251 = v240 * v241;
-    const V v252 = v243 * v242;
-    const V v253 = v241 * v242;
-    const V v254 = v231 * v243;
-    const V v255 = v247 + v254;
-    const V v256 = v244 * v243;
-    const V v257 = v251 - v256;
-    const V v258 = v248 * v249;
-    const V v259 = v240 * v245;
-    const V v260 = v259 + v252;
-    const V v261 = v244 * v245;
-    const V v262 = v261 + v253;
-    const V v263 = 0.5 * v255;
-    const V v264 = v224 * v239;
-    const V v265 = v246 + v264;
-    const V v266 = v222 * v239;
-    const V v267 = v250 - v266;
-    const V v268 = 0.5 * v265;
-    const V v269 = 0.25 * v229;
-    const V v270 = 0.25 * v233;
-    const V v271 = 0.25 * v217;
-    const V v272 = 0.5 * v217;
-    const V v273 = v229 * v269;
-    const V v274 = v233 * v270;
-    const V v275 = 0.25 * v232;
-    const V v276 = 0.5 * v232;
-    const V v277 = 0.25 * v225;
-    const V v278 = v225 * v277;
-    const V v279 = v273 + v278;
-    const V v280 = v270 * v272;
-    const V v281 = v271 * v272;
-    const V v282 = v281 + v258;
-    const V v283 = v269 * v275;
-    const V v284 = v275 * v276;
-    const V v285 = v277 * v276;
-    const V v286 = 0.25 * v235;
-    const V v287 = v235 * v286;
-    const V v288 = v274 + v287;
-    const V v289 = 0.5 * v279;
-    const V v290 = v286 * v249;
-    const V v291 = v280 + v290;
-    const V v292 = v270 * v248;
-    const V v293 = v220 * v277;
-    const V v294 = v283 - v293;
-    const V v295 = v220 * v221;
-    const V v296 = v295 + v284;
-    const V v297 = v269 * v221;
-    const V v298 = v297 + v285;
-    const V v299 = v101 * v277;
-    const V v300 = v101 * v286;
-    const V v301 = 0.5 * v288;
-    const V v302 = v271 * v286;
-    const V v303 = v292 - v302;
-    const V v304 = v122 * v220;
-    const V v305 = v122 * v222;
-    const V v306 = v222 * v223;
-    const V v307 = v236 * v223;
-    const V v308 = v123 * v271;
-    const V v309 = v123 * v244;
-    const V v310 = v127 * v236;
-    const V v311 = v305 - v310;
-    const V v312 = v126 * v269;
-    const V v313 = v304 - v312;
-    const V v314 = v126 * v270;
-    const V v315 = v308 - v314;
-    const V v316 = 2.0 * v311;
-    const V v317 = v127 * v240;
-    const V v318 = v309 - v317;
-    const V v319 = v311 * v311;
-    const V v320 = 2.0 * v313;
-    const V v321 = v313 * v313;
-    const V v322 = 2.0 * v315;
-    const V v323 = v315 * v315;
-    const V v324 = 2.0 * v318;
-    const V v325 = v318 * v318;
-    const V v326 = v277 * v313;
-    const V v327 = v239 * v311;
-    const V v328 = v102 * v239;
-    const V v329 = v102 * v243;
-    const V v330 = v243 * v318;
-    const V v331 = v286 * v315;
-    const V v332 = v275 * v313;
-    const V v333 = v237 * v311;
-    const V v334 = v237 * v104;
-    const V v335 = v328 - v334;
-    const V v336 = v275 * v104;
-    const V v337 = v299 - v336;
-    const V v338 = v248 * v315;
-    const V v339 = v241 * v318;
-    const V v340 = 2.0 * v335;
-    const V v341 = 2.0 * v337;
-    const V v342 = v222 * v335;
-    const V v343 = v222 * v316;
-    const V v344 = v236 * v335;
-    const V v345 = v220 * v337;
-    const V v346 = v269 * v337;
-    const V v347 = v220 * v320;
-    const V v348 = v337 * v337;
-    const V v349 = v321 + v348;
-    const V v350 = v335 * v335;
-    const V v351 = v319 + v350;
-    const V v352 = v271 * v322;
-    const V v353 = v244 * v324;
-    const V v354 = v239 * v340;
-    const V v355 = v239 * v238;
-    const V v356 = v307 + v355;
-    const V v357 = v237 * v238;
-    const V v358 = v306 + v357;
-    const V v359 = v277 * v341;
-    const V v360 = v271 * v103;
-    const V v361 = 1.0 + v360;
-    const V v362 = v244 * v103;
-    const V v363 = 1.0 + v362;
-    const V v364 = v248 * v103;
-    const V v365 = v300 - v364;
-    const V v366 = v241 * v103;
-    const V v367 = v329 - v366;
-    const V v368 = 2.0 * v365;
-    const V v369 = 2.0 * v367;
-    const V v370 = v271 * v365;
-    const V v371 = v244 * v367;
-    const V v372 = v101 * v270;
-    const V v373 = v361 - v372;
-    const V v374 = v270 * v365;
-    const V v375 = v101 * v269;
-    const V v376 = 1.0 - v375;
-    const V v377 = v240 * v367;
-    const V v378 = 2.0 * v373;
-    const V v379 = v365 * v365;
-    const V v380 = v323 + v379;
-    const V v381 = v367 * v367;
-    const V v382 = v325 + v381;
-    const V v383 = v248 * v373;
-    const V v384 = v370 + v383;
-    const V v385 = v286 * v373;
-    const V v386 = v374 + v385;
-    const V v387 = v373 * v373;
-    const V v388 = v380 + v387;
-    const V v389 = v286 * v368;
-    const V v390 = v220 * v104;
-    const V v391 = v376 + v390;
-    const V v392 = v222 * v104;
-    const V v393 = 1.0 + v392;
-    const V v394 = 2.0 * v391;
-    const V v395 = v194 * v384;
-    const V v396 = v194 * v386;
-    const V v397 = v270 * v378;
-    const V v398 = v389 - v397;
-    const V v399 = v271 * v378;
-    const V v400 = v248 * v368;
-    const V v401 = v399 - v400;
-    const V v402 = v391 * v391;
-    const V v403 = v349 + v402;
-    const V v404 = v102 * v236;
-    const V v405 = v393 - v404;
-    const V v406 = v102 * v240;
-    const V v407 = v363 - v406;
-    const V v408 = 2.0 * v405;
-    const V v409 = 2.0 * v407;
-    const V v410 = v275 * v391;
-    const V v411 = v345 + v410;
-    const V v412 = v277 * v391;
-    const V v413 = v346 + v412;
-    const V v414 = v405 * v405;
-    const V v415 = v351 + v414;
-    const V v416 = v407 * v407;
-    const V v417 = v382 + v416;
-    const V v418 = v237 * v405;
-    const V v419 = v342 + v418;
-    const V v420 = v241 * v407;
-    const V v421 = v371 + v420;
-    const V v422 = v192 * v411;
-    const V v423 = v192 * v413;
-    const V v424 = v239 * v405;
-    const V v425 = v344 + v424;
-    const V v426 = v243 * v407;
-    const V v427 = v377 + v426;
-    const V v428 = v243 * v369;
-    const V v429 = v193 * v419;
-    const V v430 = v193 * v425;
-    const V v431 = v195 * v421;
-    const V v432 = v195 * v427;
-    const V v433 = v220 * v394;
-    const V v434 = v269 * v394;
-    const V v435 = v359 - v434;
-    const V v436 = v240 * v409;
-    const V v437 = v428 - v436;
-    const V v438 = v244 * v409;
-    const V v439 = v275 * v341;
-    const V v440 = v433 - v439;
-    const V v441 = v222 * v408;
-    const V v442 = v236 * v408;
-    const V v443 = v354 - v442;
-    const V v444 = v241 * v369;
-    const V v445 = v438 - v444;
-    const V v446 = v237 * v340;
-    const V v447 = v441 - v446;
-    const V v448 = v122 * v275;
-    const V v449 = 1.0 - v448;
-    const V v450 = v122 * v237;
-    const V v451 = 1.0 - v450;
-    const V v452 = v123 * v241;
-    const V v453 = 1.0 - v452;
-    const V v454 = v123 * v248;
-    const V v455 = 1.0 - v454;
-    const V v456 = v126 * v277;
-    const V v457 = v456 + v449;
-    const V v458 = v126 * v286;
-    const V v459 = v458 + v455;
-    const V v460 = 2.0 * v457;
-    const V v461 = v391 * v457;
-    const V v462 = 2.0 * v459;
-    const V v463 = v127 * v239;
-    const V v464 = v463 + v451;
-    const V v465 = v127 * v243;
-    const V v466 = v465 + v453;
-    const V v467 = v373 * v459;
-    const V v468 = v457 * v457;
-    const V v469 = v403 + v468;
-    const V v470 = v459 * v459;
-    const V v471 = v388 + v470;
-    const V v472 = 2.0 * v464;
-    const V v473 = v277 * v460;
-    const V v474 = v405 * v464;
-    const V v475 = 2.0 * v466;
-    const V v476 = v313 * v337;
-    const V v477 = v461 - v476;
-    const V v478 = v315 * v365;
-    const V v479 = v467 - v478;
-    const V v480 = v275 * v460;
-    const V v481 = v347 - v480;
-    const V v482 = v407 * v466;
-    const V v483 = v239 * v472;
-    const V v484 = v311 * v335;
-    const V v485 = v474 - v484;
-    const V v486 = v243 * v475;
-    const V v487 = v237 * v472;
-    const V v488 = v343 - v487;
-    const V v489 = v241 * v475;
-    const V v490 = v353 - v489;
-    const V v491 = v144 * v477;
-    const V v492 = v318 * v367;
-    const V v493 = v482 - v492;
-    const V v494 = v148 * v479;
-    const V v495 = 2.0 * v477;
-    const V v496 = v146 * v485;
-    const V v497 = 1.0 / v491;
-    const V v498 = 2.0 * v485;
-    const V v499 = 1.0 / v494;
-    const V v500 = 2.0 * v479;
-    const V v501 = 1.0 / v496;
-    const V v502 = v151 * v493;
-    const V v503 = 2.0 * v493;
-    const V v504 = v477 * v477;
-    const V v505 = v485 * v485;
-    const V v506 = 1.0 / v502;
-    const V v507 = v479 * v479;
-    const V v508 = v493 * v493;
-    const V v509 = v184 * v477;
-    const V v510 = v184 * v485;
-    const V v511 = v184 * v479;
-    const V v512 = v184 * v493;
-    const V v513 = v90 * v509;
-    const V v514 = v89 * v510;
-    const V v515 = v91 * v511;
-    const V v516 = v92 * v512;
-    const V v517 = v286 * v462;
-    const V v518 = v248 * v462;
-    const V v519 = v352 - v518;
-    const V v520 = v156 * v471;
-    const V v521 = v507 + v520;
-    const V v522 = v156 + v471;
-    const V v523 = v270 * v322;
-    const V v524 = v517 - v523;
-    const V v525 = v270 * v459;
-    const V v526 = v331 + v525;
-    const V v527 = v271 * v459;
-    const V v528 = v338 + v527;
-    const V v529 = v497 * v497;
-    const V v530 = v184 * v497;
-    const V v531 = v513 * v529;
-    const V v532 = v499 * v499;
-    const V v533 = v184 * v499;
-    const V v534 = v501 * v501;
-    const V v535 = v184 * v501;
-    const V v536 = softehl_vrcbrt(v530);
-    const V v537 = v422 * v529;
-    const V v538 = v423 * v529;
-    const V v539 = v184 * v506;
-    const V v540 = v506 * v506;
-    const V v541 = softehl_vrcbrt(v533);
-    const V v542 = softehl_vrcbrt(v535);
-    const V v543 = v514 * v534;
-    const V v544 = v429 * v534;
-    const V v545 = v430 * v534;
-    const V v546 = softehl_vrcbrt(v539);
-    const V v547 = v516 * v540;
-    const V v548 = v431 * v540;
-    const V v549 = v432 * v540;
-    const V v550 = v515 * v532;
-    const V v551 = v395 * v532;
-    const V v552 = v396 * v532;
-    const V v553 = v464 * v464;
-    const V v554 = v415 + v553;
-    const V v555 = v222 * v464;
-    const V v556 = v333 + v555;
-    const V v557 = v236 * v464;
-    const V v558 = v327 + v557;
-    const V v559 = v236 * v316;
-    const V v560 = v483 - v559;
-    const V v561 = v466 * v466;
-    const V v562 = v417 + v561;
-    const V v563 = v244 * v466;
-    const V v564 = v339 + v563;
-    const V v565 = v240 * v466;
-    const V v566 = v330 + v565;
-    const V v567 = v240 * v324;
-    const V v568 = v486 - v567;
-    const V v569 = v153 + v554;
-    const V v570 = v193 * v556;
-    const V v571 = v193 * v558;
-    const V v572 = v158 + v562;
-    const V v573 = v195 * v564;
-    const V v574 = v195 * v566;
-    const V v575 = v534 * v570;
-    const V v576 = v534 * v571;
-    const V v577 = v540 * v573;
-    const V v578 = v540 * v574;
-    const V v579 = v220 * v457;
-    const V v580 = v332 + v579;
-    const V v581 = v269 * v457;
-    const V v582 = v326 + v581;
-    const V v583 = v269 * v320;
-    const V v584 = v473 - v583;
-    const V v585 = v152 + v469;
-    const V v586 = v152 * v469;
-    const V v587 = v504 + v586;
-    const V v588 = v192 * v580;
-    const V v589 = v192 * v582;
-    const V v590 = v194 * v526;
-    const V v591 = v194 * v528;
-    const V v592 = v532 * v590;
-    const V v593 = v532 * v591;
-    const V v594 = v529 * v588;
-    const V v595 = v529 * v589;
-    const V v596 = v153 * v554;
-    const V v597 = v505 + v596;
-    const V v598 = v158 * v562;
-    const V v599 = v508 + v598;
-    const V v600 = v536 * v536;
-    const V v601 = v536 * v600;
-    const V v602 = 0.3333333333333333 * v600;
-    const V v603 = v595 * v602;
-    const V v604 = v594 * v602;
-    const V v605 = v541 * v541;
-    const V v606 = v541 * v605;
-    const V v607 = v542 * v542;
-    const V v608 = v542 * v607;
-    const V v609 = v530 * v600;
-    const V v610 = v530 * v609;
-    const V v611 = 0.3333333333333333 * v605;
-    const V v612 = v533 * v605;
-    const V v613 = 0.3333333333333333 * v607;
-    const V v614 = v535 * v607;
-    const V v615 = v546 * v546;
-    const V v616 = v546 * v615;
-    const V v617 = v533 * v612;
-    const V v618 = v609 * v609;
-    const V v619 = v497 * v602;
-    const V v620 = 2.0 * v609;
-    const V v621 = v531 * v602;
-    const V v622 = v537 * v602;
-    const V v623 = v538 * v602;
-    const V v624 = v535 * v614;
-    const V v625 = 0.3333333333333333 * v615;
-    const V v626 = v539 * v615;
-    const V v627 = v612 * v612;
-    const V v628 = 2.0 * v612;
-    const V v629 = v614 * v614;
-    const V v630 = 2.0 * v614;
-    const V v631 = v539 * v626;
-    const V v632 = 0.5773502691896257 * v621;
-    const V v633 = v626 * v626;
-    const V v634 = v506 * v625;
-    const V v635 = 2.0 * v627;
-    const V v636 = 2.0 * v629;
-    const V v637 = 2.0 * v626;
-    const V v638 = 3.0 * v629;
-    const V v639 = 3.0 * v627;
-    const V v640 = v547 * v625;
-    const V v641 = v578 * v625;
-    const V v642 = 2.0 * v633;
-    const V v643 = 3.0 * v633;
-    const V v644 = v577 * v625;
-    const V v645 = v548 * v625;
-    const V v646 = v549 * v625;
-    const V v647 = 0.5773502691896257 * v640;
-    const V v648 = v626 * v643;
-    const V v649 = v539 + v648;
-    const V v650 = v153 * v629;
-    const V v651 = v158 * v633;
-    const V v652 = v629 * v650;
-    const V v653 = v646 - v645;
-    const V v654 = v645 + v647;
-    const V v655 = v647 - v646;
-    const V v656 = v633 * v651;
-    const V v657 = 0.5773502691896257 * v653;
-    const V v658 = v644 - v641;
-    const V v659 = v485 * v629;
-    const V v660 = v485 * v630;
-    const V v661 = 0.5773502691896257 * v658;
-    const V v662 = v493 * v633;
-    const V v663 = v493 * v637;
-    const V v664 = v659 * v659;
-    const V v665 = 2.0 * v659;
-    const V v666 = 2.0 * v660;
-    const V v667 = v662 * v662;
-    const V v668 = 2.0 * v662;
-    const V v669 = 0.3333333333333333 * v640;
-    const V v670 = v657 - v669;
-    const V v671 = 2.0 * v663;
-    const V v672 = v660 * v665;
-    const V v673 = v663 * v668;
-    const V v674 = v629 * v664;
-    const V v675 = v629 * v665;
-    const V v676 = v652 * v665;
-    const V v677 = v633 * v667;
-    const V v678 = v633 * v668;
-    const V v679 = v656 * v668;
-    const V v680 = v650 * v664;
-    const V v681 = v650 * v665;
-    const V v682 = v650 * v675;
-    const V v683 = softehl_vrcbrt(v680);
-    const V v684 = v651 * v667;
-    const V v685 = v651 * v668;
-    const V v686 = v651 * v678;
-    const V v687 = softehl_vrcbrt(v684);
-    const V v688 = v501 * v613;
-    const V v689 = v543 * v613;
-    const V v690 = v576 * v613;
-    const V v691 = v575 * v613;
-    const V v692 = v544 * v613;
-    const V v693 = v545 * v613;
-    const V v694 = 0.5773502691896257 * v689;
-    const V v695 = 0.3333333333333333 * v689;
-    const V v696 = v499 * v611;
-    const V v697 = v550 * v611;
-    const V v698 = v592 * v611;
-    const V v699 = v593 * v611;
-    const V v700 = v551 * v611;
-    const V v701 = v552 * v611;
-    const V v702 = v690 + v691;
-    const V v703 = 0.5773502691896257 * v697;
-    const V v704 = 0.5773502691896257 * v702;
-    const V v705 = v692 + v693;
-    const V v706 = v698 + v699;
-    const V v707 = 0.5773502691896257 * v705;
-    const V v708 = v695 + v707;
-    const V v709 = v700 - v703;
-    const V v710 = v700 + v701;
-    const V v711 = 0.5773502691896257 * v706;
-    const V v712 = v703 - v701;
-    const V v713 = 0.5773502691896257 * v710;
-    const V v714 = 2.0 * v618;
-    const V v715 = 3.0 * v618;
-    const V v716 = v181 * v696;
-    const V v717 = v709 - v716;
-    const V v718 = v152 * v618;
-    const V v719 = v477 * v618;
-    const V v720 = v477 * v620;
-    const V v721 = v152 * v620;
-    const V v722 = v170 * v696;
-    const V v723 = v712 + v722;
-    const V v724 = v618 * v718;
-    const V v725 = v719 * v719;
-    const V v726 = 2.0 * v719;
-    const V v727 = 2.0 * v720;
-    const V v728 = v154 * v618;
-    const V v729 = v601 * v601;
-    const V v730 = v214 * v601;
-    const V v731 = v214 * v729;
-    const V v732 = v720 * v726;
-    const V v733 = v724 * v726;
-    const V v734 = v718 * v725;
-    const V v735 = v618 * v725;
-    const V v736 = v618 * v726;
-    const V v737 = v725 * v728;
-    const V v738 = v718 * v726;
-    const V v739 = softehl_vrcbrt(v734);
-    const V v740 = v608 * v608;
-    const V v741 = v208 * v608;
-    const V v742 = v208 * v740;
-    const V v743 = v718 * v736;
-    const V v744 = v718 * v732;
-    const V v745 = v683 * v683;
-    const V v746 = 0.6666666666666666 * v683;
-    const V v747 = 0.4444444444444444 * v683;
-    const V v748 = v687 * v687;
-    const V v749 = 0.6666666666666666 * v687;
-    const V v750 = 0.4444444444444444 * v687;
-    const V v751 = v745 * v745;
-    const V v752 = v683 * v745;
-    const V v753 = v748 * v748;
-    const V v754 = v687 * v748;
-    const V v755 = v746 * v751;
-    const V v756 = v606 * v606;
-    const V v757 = v215 * v606;
-    const V v758 = v215 * v756;
-    const V v759 = v749 * v753;
-    const V v760 = 0.3333333333333333 * v751;
-    const V v761 = v752 * v752;
-    const V v762 = 1.1111111111111112 * v751;
-    const V v763 = v751 * v762;
-    const V v764 = 0.3333333333333333 * v753;
-    const V v765 = v754 * v754;
-    const V v766 = 1.1111111111111112 * v753;
-    const V v767 = v753 * v766;
-    const V v768 = 1.0 - v752;
-    const V v769 = 1.0 - v754;
-    const V v770 = v639 * v758;
-    const V v771 = v612 * v639;
-    const V v772 = v533 + v771;
-    const V v773 = v752 - 1.0;
-    const V v774 = v754 - 1.0;
-    const V v775 = v616 * v616;
-    const V v776 = v209 * v616;
-    const V v777 = v209 * v775;
-    const V v778 = v3 * v773;
-    const V v779 = v3 * v774;
-    const V v780 = v629 * v760;
-    const V v781 = v155 * v629;
-    const V v782 = v3 * v776;
-    const V v783 = v155 * v624;
-    const V v784 = v153 * v624;
-    const V v785 = v643 * v777;
-    const V v786 = v760 * v781;
-    const V v787 = v664 * v781;
-    const V v788 = v755 * v783;
-    const V v789 = v624 * v755;
-    const V v790 = v153 * v630;
-    const V v791 = v769 * v782;
-    const V v792 = v624 * v682;
-    const V v793 = v498 * v624;
-    const V v794 = v682 * v780;
-    const V v795 = v569 * v630;
-    const V v796 = v569 * v629;
-    const V v797 = v597 * v624;
-    const V v798 = v715 * v731;
-    const V v799 = v609 * v715;
-    const V v800 = v530 + v799;
-    const V v801 = v638 * v742;
-    const V v802 = v614 * v638;
-    const V v803 = v535 + v802;
-    const V v804 = v739 * v739;
-    const V v805 = 0.6666666666666666 * v739;
-    const V v806 = 0.4444444444444444 * v739;
-    const V v807 = v597 * v803;
-    const V v808 = v778 * v801;
-    const V v809 = v804 * v804;
-    const V v810 = v739 * v804;
-    const V v811 = v587 * v800;
-    const V v812 = v587 * v610;
-    const V v813 = v152 * v610;
-    const V v814 = v805 * v809;
-    const V v815 = v610 * v743;
-    const V v816 = v495 * v610;
-    const V v817 = 0.3333333333333333 * v809;
-    const V v818 = v810 * v810;
-    const V v819 = 1.1111111111111112 * v809;
-    const V v820 = 1.0 - v810;
-    const V v821 = v809 * v819;
-    const V v822 = v810 - 1.0;
-    const V v823 = v154 * v610;
-    const V v824 = v728 * v817;
-    const V v825 = v610 * v814;
-    const V v826 = v814 * v823;
-    const V v827 = v3 * v822;
-    const V v828 = v618 * v817;
-    const V v829 = v585 * v618;
-    const V v830 = v585 * v620;
-    const V v831 = v3 * v730;
-    const V v832 = v2 * v730;
-    const V v833 = v1 * v730;
-    const V v834 = v2 * v741;
-    const V v835 = v1 * v741;
-    const V v836 = v3 * v741;
-    const V v837 = v830 * v833;
-    const V v838 = v798 * v827;
-    const V v839 = v2 * v798;
-    const V v840 = v1 * v798;
-    const V v841 = v815 * v832;
-    const V v842 = v792 * v834;
-    const V v843 = v780 * v835;
-    const V v844 = v813 * v832;
-    const V v845 = v784 * v834;
-    const V v846 = v816 * v832;
-    const V v847 = v793 * v834;
-    const V v848 = v814 * v841;
-    const V v849 = v814 * v844;
-    const V v850 = v755 * v842;
-    const V v851 = v755 * v845;
-    const V v852 = v795 * v835;
-    const V v853 = v811 * v832;
-    const V v854 = v843 + v851;
-    const V v855 = v807 * v834;
-    const V v856 = v804 * v832;
-    const V v857 = v804 * v839;
-    const V v858 = v812 * v839;
-    const V v859 = v853 - v858;
-    const V v860 = v812 * v832;
-    const V v861 = v676 * v854;
-    const V v862 = v745 * v834;
-    const V v863 = v800 * v856;
-    const V v864 = v610 * v856;
-    const V v865 = v683 * v835;
-    const V v866 = v821 * v860;
-    const V v867 = v469 * v832;
-    const V v868 = v803 * v862;
-    const V v869 = v624 * v862;
-    const V v870 = v554 * v834;
-    const V v871 = v469 * v864;
-    const V v872 = 2.0 * v864;
-    const V v873 = v825 * v867;
-    const V v874 = v797 * v834;
-    const V v875 = v554 * v869;
-    const V v876 = 2.0 * v869;
-    const V v877 = v789 * v870;
-    const V v878 = v843 + v877;
-    const V v879 = v763 * v874;
-    const V v880 = 0.3333333333333333 * v621;
-    const V v881 = v674 * v854;
-    const V v882 = v869 - v881;
-    const V v883 = v623 - v622;
-    const V v884 = 0.5773502691896257 * v883;
-    const V v885 = v880 + v884;
-    const V v886 = v603 - v604;
-    const V v887 = 0.5773502691896257 * v886;
-    const V v888 = v161 * v882;
-    const V v889 = v820 * v831;
-    const V v890 = v768 * v836;
-    const V v891 = v779 * v785;
-    const V v892 = v2 * v785;
-    const V v893 = v1 * v785;
-    const V v894 = v2 * v757;
-    const V v895 = v1 * v757;
-    const V v896 = v3 * v757;
-    const V v897 = v2 * v776;
-    const V v898 = v1 * v776;
-    const V v899 = v2 * v801;
-    const V v900 = v1 * v801;
-    const V v901 = v2 * v770;
-    const V v902 = v1 * v770;
-    const V v903 = v471 * v894;
-    const V v904 = v745 * v899;
-    const V v905 = v797 * v899;
-    const V v906 = v855 - v905;
-    const V v907 = v683 * v900;
-    const V v908 = v748 * v897;
-    const V v909 = v748 * v892;
-    const V v910 = v562 * v897;
-    const V v911 = v796 * v900;
-    const V v912 = v852 - v911;
-    const V v913 = v796 * v835;
-    const V v914 = v156 * v627;
-    const V v915 = v479 * v627;
-    const V v916 = v479 * v628;
-    const V v917 = v156 * v628;
-    const V v918 = v157 * v627;
-    const V v919 = v627 * v914;
-    const V v920 = v915 * v915;
-    const V v921 = 2.0 * v915;
-    const V v922 = 2.0 * v916;
-    const V v923 = v156 * v617;
-    const V v924 = v157 * v617;
-    const V v925 = v916 * v921;
-    const V v926 = v919 * v921;
-    const V v927 = v500 * v617;
-    const V v928 = v914 * v920;
-    const V v929 = v627 * v920;
-    const V v930 = v627 * v921;
-    const V v931 = v914 * v921;
-    const V v932 = v894 * v923;
-    const V v933 = v894 * v927;
-    const V v934 = softehl_vrcbrt(v928);
-    const V v935 = v918 * v920;
-    const V v936 = v914 * v930;
-    const V v937 = v522 * v627;
-    const V v938 = v522 * v628;
-    const V v939 = v917 * v920;
-    const V v940 = v159 * v633;
-    const V v941 = v633 * v764;
-    const V v942 = v159 * v631;
-    const V v943 = v158 * v631;
-    const V v944 = v158 * v637;
-    const V v945 = v895 * v938;
-    const V v946 = v764 * v940;
-    const V v947 = v667 * v940;
-    const V v948 = v759 * v942;
-    const V v949 = v631 * v759;
-    const V v950 = v897 * v943;
-    const V v951 = v667 * v944;
-    const V v952 = v631 * v686;
-    const V v953 = v503 * v631;
-    const V v954 = v897 * v952;
-    const V v955 = v759 * v950;
-    const V v956 = v897 * v953;
-    const V v957 = v910 * v949;
-    const V v958 = v686 * v941;
-    const V v959 = v898 * v941;
-    const V v960 = v599 * v631;
-    const V v961 = v599 * v649;
-    const V v962 = v649 * v908;
-    const V v963 = v631 * v908;
-    const V v964 = v759 * v954;
-    const V v965 = v955 + v959;
-    const V v966 = v957 + v959;
-    const V v967 = v897 * v961;
-    const V v968 = v897 * v960;
-    const V v969 = v892 * v960;
-    const V v970 = v967 - v969;
-    const V v971 = 2.0 * v963;
-    const V v972 = v679 * v965;
-    const V v973 = v687 * v898;
-    const V v974 = v687 * v893;
-    const V v975 = v767 * v968;
-    const V v976 = v677 * v965;
-    const V v977 = v963 - v976;
-    const V v978 = v759 * v968;
-    const V v979 = v791 - v978;
-    const V v980 = v759 * v970;
-    const V v981 = v891 - v980;
-    const V v982 = v503 * v964;
-    const V v983 = v971 - v982;
-    const V v984 = v503 * v963;
-    const V v985 = v633 * v973;
-    const V v986 = v637 * v973;
-    const V v987 = v162 * v977;
-    const V v988 = v572 * v633;
-    const V v989 = v572 * v637;
-    const V v990 = v898 * v989;
-    const V v991 = v898 * v988;
-    const V v992 = v490 * v987;
-    const V v993 = v490 * v972;
-    const V v994 = v564 * v972;
-    const V v995 = v893 * v988;
-    const V v996 = v990 - v995;
-    const V v997 = v421 * v972;
-    const V v998 = v427 * v972;
-    const V v999 = v437 * v972;
-    const V v1000 = v437 * v987;
-    const V v1001 = v437 * v994;
-    const V v1002 = 2.0 * v999;
-    const V v1003 = v437 * v997;
-    const V v1004 = v437 * v998;
-    const V v1005 = v934 * v934;
-    const V v1006 = 0.6666666666666666 * v934;
-    const V v1007 = 0.4444444444444444 * v934;
-    const V v1008 = v895 * v934;
-    const V v1009 = v895 * v937;
-    const V v1010 = v1005 * v1005;
-    const V v1011 = v934 * v1005;
-    const V v1012 = v902 * v934;
-    const V v1013 = v902 * v937;
-    const V v1014 = v945 - v1013;
-    const V v1015 = v894 * v1005;
-    const V v1016 = v901 * v1005;
-    const V v1017 = v1006 * v1010;
-    const V v1018 = v1007 * v1009;
-    const V v1019 = v896 + v1018;
-    const V v1020 = 0.3333333333333333 * v1010;
-    const V v1021 = v1011 * v1011;
-    const V v1022 = 1.1111111111111112 * v1010;
-    const V v1023 = 1.0 - v1011;
-    const V v1024 = v1010 * v1022;
-    const V v1025 = v1019 * v1021;
-    const V v1026 = v1011 - 1.0;
-    const V v1027 = v896 * v1023;
-    const V v1028 = v918 * v1020;
-    const V v1029 = v924 * v1017;
-    const V v1030 = v3 * v1026;
-    const V v1031 = v932 * v1017;
-    const V v1032 = v627 * v1020;
-    const V v1033 = v1009 * v1020;
-    const V v1034 = v1027 - v1033;
-    const V v1035 = v617 * v1017;
-    const V v1036 = v617 * v1015;
-    const V v1037 = v772 * v1015;
-    const V v1038 = v521 * v772;
-    const V v1039 = v521 * v617;
-    const V v1040 = v770 * v1030;
-    const V v1041 = v903 * v1035;
-    const V v1042 = 2.0 * v1036;
-    const V v1043 = v617 * v936;
-    const V v1044 = v936 * v1032;
-    const V v1045 = v895 * v1032;
-    const V v1046 = v894 * v1038;
-    const V v1047 = v894 * v1039;
-    const V v1048 = v894 * v1043;
-    const V v1049 = v901 * v1039;
-    const V v1050 = v1046 - v1049;
-    const V v1051 = v1041 + v1045;
-    const V v1052 = v1031 + v1045;
-    const V v1053 = v1014 * v1020;
-    const V v1054 = v1040 - v1053;
-    const V v1055 = v471 * v1036;
-    const V v1056 = v156 * v1036;
-    const V v1057 = v500 * v1036;
-    const V v1058 = v1017 * v1048;
-    const V v1059 = v1017 * v1050;
-    const V v1060 = v1054 - v1059;
-    const V v1061 = v926 * v1052;
-    const V v1062 = v1017 * v1047;
-    const V v1063 = v1034 - v1062;
-    const V v1064 = v1024 * v1047;
-    const V v1065 = v1025 + v1064;
-    const V v1066 = v929 * v1052;
-    const V v1067 = v1036 - v1066;
-    const V v1068 = v917 * v1063;
-    const V v1069 = v930 * v1063;
-    const V v1070 = v187 * v1067;
-    const V v1071 = v936 * v1065;
-    const V v1072 = v920 * v1063;
-    const V v1073 = v914 * v1063;
-    const V v1074 = v925 * v1063;
-    const V v1075 = v914 * v925;
-    const V v1076 = v939 + v1075;
-    const V v1077 = v528 * v1061;
-    const V v1078 = v384 * v1061;
-    const V v1079 = v386 * v1061;
-    const V v1080 = v635 * v1073;
-    const V v1081 = v922 * v1073;
-    const V v1082 = v921 * v1073;
-    const V v1083 = v1020 * v1076;
-    const V v1084 = v894 * v1076;
-    const V v1085 = v398 * v1061;
-    const V v1086 = v398 * v1077;
-    const V v1087 = v398 * v1078;
-    const V v1088 = v398 * v1079;
-    const V v1089 = 2.0 * v1085;
-    const V v1090 = v1065 * v1076;
-    const V v1091 = v1060 + v1090;
-    const V v1092 = v935 * v1065;
-    const V v1093 = v1017 * v1084;
-    const V v1094 = v1016 + v1093;
-    const V v1095 = v933 * v1017;
-    const V v1096 = v1071 - v1095;
-    const V v1097 = v895 * v1083;
-    const V v1098 = v1012 + v1097;
-    const V v1099 = v895 * v1028;
-    const V v1100 = v1092 - v1099;
-    const V v1101 = v617 * v1094;
-    const V v1102 = v1037 - v1101;
-    const V v1103 = v903 * v1029;
-    const V v1104 = v1100 - v1103;
-    const V v1105 = v914 * v1091;
-    const V v1106 = v1068 + v1105;
-    const V v1107 = v920 * v1091;
-    const V v1108 = v1074 + v1107;
-    const V v1109 = v920 * v1096;
-    const V v1110 = v1069 + v1109;
-    const V v1111 = v931 * v1096;
-    const V v1112 = v1080 + v1111;
-    const V v1113 = v929 * v1104;
-    const V v1114 = v921 * v1106;
-    const V v1115 = v1081 + v1114;
-    const V v1116 = v935 * v1051;
-    const V v1117 = v1113 - v1116;
-    const V v1118 = v627 * v1108;
-    const V v1119 = v627 * v1110;
-    const V v1120 = v156 * v1102;
-    const V v1121 = v157 * v1117;
-    const V v1122 = v627 * v1112;
-    const V v1123 = v1042 + v1122;
-    const V v1124 = v627 * v1115;
-    const V v1125 = v895 * v1044;
-    const V v1126 = v1119 - v1125;
-    const V v1127 = v627 * v1008;
-    const V v1128 = v628 * v1008;
-    const V v1129 = v627 * v1098;
-    const V v1130 = v1128 - v1129;
-    const V v1131 = v628 * v1072;
-    const V v1132 = v1118 + v1131;
-    const V v1133 = v627 * v1072;
-    const V v1134 = v1055 + v1133;
-    const V v1135 = v627 * v1082;
-    const V v1136 = v1057 + v1135;
-    const V v1137 = v628 * v1082;
-    const V v1138 = v1124 + v1137;
-    const V v1139 = v1120 + v1130;
-    const V v1140 = v1130 + v1132;
-    const V v1141 = v1127 + v1134;
-    const V v1142 = v1056 + v1127;
-    const V v1143 = v303 * v1136;
-    const V v1144 = 2.0 * v1141;
-    const V v1145 = v1121 + v1144;
-    const V v1146 = v500 * v1102;
-    const V v1147 = v1138 + v1146;
-    const V v1148 = v500 * v1058;
-    const V v1149 = v1123 - v1148;
-    const V v1150 = v471 * v1058;
-    const V v1151 = v1126 - v1150;
-    const V v1152 = v471 * v1102;
-    const V v1153 = v1140 + v1152;
-    const V v1154 = v187 * v1141;
-    const V v1155 = v301 * v1142;
-    const V v1156 = v291 * v1142;
-    const V v1157 = v282 * v1142;
-    const V v1158 = v187 * v1151;
-    const V v1159 = v187 * v1153;
-    const V v1160 = v98 * v1145;
-    const V v1161 = v526 * v1149;
-    const V v1162 = v1089 + v1161;
-    const V v1163 = 0.5773502691896257 * v1159;
-    const V v1164 = v526 * v1162;
-    const V v1165 = v1155 + v1164;
-    const V v1166 = 0.5773502691896257 * v1160;
-    const V v1167 = v1086 + v1156;
-    const V v1168 = v384 * v1158;
-    const V v1169 = v401 * v1077;
-    const V v1170 = v1157 - v1169;
-    const V v1171 = v401 * v1142;
-    const V v1172 = v398 * v1142;
-    const V v1173 = v519 * v1142;
-    const V v1174 = v524 * v1142;
-    const V v1175 = v519 * v1070;
-    const V v1176 = v398 * v1070;
-    const V v1177 = v401 * v1070;
-    const V v1178 = v524 * v1070;
-    const V v1179 = v398 * v1139;
-    const V v1180 = v401 * v1139;
-    const V v1181 = v524 * v1139;
-    const V v1182 = v519 * v1139;
-    const V v1183 = v519 * v1061;
-    const V v1184 = v401 * v1078;
-    const V v1185 = v519 * v1078;
-    const V v1186 = v1157 + v1185;
-    const V v1187 = v524 * v1078;
-    const V v1188 = v1156 - v1187;
-    const V v1189 = v1175 - v992;
-    const V v1190 = v1175 - v1168;
-    const V v1191 = v1189 - v1168;
-    const V v1192 = v528 * v1158;
-    const V v1193 = v1177 + v1192;
-    const V v1194 = v528 * v1147;
-    const V v1195 = v1180 + v1194;
-    const V v1196 = v386 * v1147;
-    const V v1197 = v1181 + v1196;
-    const V v1198 = v386 * v1158;
-    const V v1199 = v1178 + v1198;
-    const V v1200 = v1197 - v1163;
-    const V v1201 = v1199 - v1166;
-    const V v1202 = v526 * v1158;
-    const V v1203 = v1176 - v1202;
-    const V v1204 = v1199 - v1190;
-    const V v1205 = v1166 + v1190;
-    const V v1206 = v1193 - v1203;
-    const V v1207 = 0.5773502691896257 * v1204;
-    const V v1208 = v1191 + v1205;
-    const V v1209 = 0.3333333333333333 * v1160;
-    const V v1210 = v1207 - v1209;
-    const V v1211 = v711 * v1195;
-    const V v1212 = v711 * v1200;
-    const V v1213 = v711 * v1159;
-    const V v1214 = v723 * v1159;
-    const V v1215 = v723 * v1195;
-    const V v1216 = v723 * v1200;
-    const V v1217 = v717 * v1159;
-    const V v1218 = v717 * v1195;
-    const V v1219 = v717 * v1200;
-    const V v1220 = v743 * v828;
-    const V v1221 = v828 * v833;
-    const V v1222 = v739 * v833;
-    const V v1223 = v739 * v840;
-    const V v1224 = v829 * v833;
-    const V v1225 = v829 * v840;
-    const V v1226 = v837 - v1225;
-    const V v1227 = v849 + v1221;
-    const V v1228 = v873 + v1221;
-    const V v1229 = v618 * v1222;
-    const V v1230 = v620 * v1222;
-    const V v1231 = v806 * v1224;
-    const V v1232 = v831 + v1231;
-    const V v1233 = v817 * v1224;
-    const V v1234 = v889 - v1233;
-    const V v1235 = v817 * v1226;
-    const V v1236 = v838 - v1235;
-    const V v1237 = v733 * v1227;
-    const V v1238 = v871 + v1229;
-    const V v1239 = v818 * v1232;
-    const V v1240 = v866 + v1239;
-    const V v1241 = v735 * v1227;
-    const V v1242 = v864 - v1241;
-    const V v1243 = v814 * v860;
-    const V v1244 = v1234 - v1243;
-    const V v1245 = v814 * v859;
-    const V v1246 = v1236 - v1245;
-    const V v1247 = v186 * v1242;
-    const V v1248 = v732 * v1244;
-    const V v1249 = v736 * v1244;
-    const V v1250 = v580 * v1237;
-    const V v1251 = v411 * v1237;
-    const V v1252 = v413 * v1237;
-    const V v1253 = v743 * v1240;
-    const V v1254 = v435 * v1237;
-    const V v1255 = v725 * v1244;
-    const V v1256 = v718 * v1244;
-    const V v1257 = v721 * v1244;
-    const V v1258 = v721 * v725;
-    const V v1259 = v744 + v1258;
-    const V v1260 = 2.0 * v1254;
-    const V v1261 = v435 * v1250;
-    const V v1262 = v435 * v1251;
-    const V v1263 = v814 * v846;
-    const V v1264 = v1253 - v1263;
-    const V v1265 = v714 * v1256;
-    const V v1266 = v727 * v1256;
-    const V v1267 = v726 * v1256;
-    const V v1268 = v817 * v1259;
-    const V v1269 = v832 * v1259;
-    const V v1270 = v738 * v1264;
-    const V v1271 = v1265 + v1270;
-    const V v1272 = v725 * v1264;
-    const V v1273 = v1249 + v1272;
-    const V v1274 = v814 * v1269;
-    const V v1275 = v857 + v1274;
-    const V v1276 = v1240 * v1259;
-    const V v1277 = v1246 + v1276;
-    const V v1278 = v737 * v1240;
-    const V v1279 = v833 * v1268;
-    const V v1280 = v1223 + v1279;
-    const V v1281 = v440 * v1251;
-    const V v1282 = v725 * v1277;
-    const V v1283 = v1248 + v1282;
-    const V v1284 = v718 * v1277;
-    const V v1285 = v1257 + v1284;
-    const V v1286 = v726 * v1285;
-    const V v1287 = v1266 + v1286;
-    const V v1288 = v618 * v1273;
-    const V v1289 = v824 * v833;
-    const V v1290 = v1278 - v1289;
-    const V v1291 = v618 * v1267;
-    const V v1292 = v618 * v1280;
-    const V v1293 = v1230 - v1292;
-    const V v1294 = v833 * v1220;
-    const V v1295 = v1288 - v1294;
-    const V v1296 = v610 * v1275;
-    const V v1297 = v863 - v1296;
-    const V v1298 = v618 * v1283;
-    const V v1299 = v826 * v867;
-    const V v1300 = v1290 - v1299;
-    const V v1301 = v620 * v1267;
-    const V v1302 = v618 * v1271;
-    const V v1303 = v872 + v1302;
-    const V v1304 = v735 * v1300;
-    const V v1305 = v1293 + v1298;
-    const V v1306 = v618 * v1287;
-    const V v1307 = v1301 + v1306;
-    const V v1308 = v618 * v1255;
-    const V v1309 = v1238 + v1308;
-    const V v1310 = v620 * v1255;
-    const V v1311 = v1305 + v1310;
-    const V v1312 = v737 * v1228;
-    const V v1313 = v1304 - v1312;
-    const V v1314 = v481 * v1251;
-    const V v1315 = v481 * v1247;
-    const V v1316 = v440 * v1247;
-    const V v1317 = v152 * v1297;
-    const V v1318 = v1293 + v1317;
-    const V v1319 = v154 * v1313;
-    const V v1320 = v469 * v1297;
-    const V v1321 = v1311 + v1320;
-    const V v1322 = v495 * v1297;
-    const V v1323 = v1307 + v1322;
-    const V v1324 = v495 * v848;
-    const V v1325 = v1303 - v1324;
-    const V v1326 = v469 * v848;
-    const V v1327 = v1295 - v1326;
-    const V v1328 = v440 * v1318;
-    const V v1329 = v481 * v1318;
-    const V v1330 = v186 * v1321;
-    const V v1331 = v186 * v1327;
-    const V v1332 = v186 * v1309;
-    const V v1333 = 2.0 * v1309;
-    const V v1334 = v1319 + v1333;
-    const V v1335 = v152 * v864;
-    const V v1336 = v1229 + v1335;
-    const V v1337 = v495 * v864;
-    const V v1338 = v1291 + v1337;
-    const V v1339 = v93 * v1334;
-    const V v1340 = v580 * v1323;
-    const V v1341 = v1328 + v1340;
-    const V v1342 = 0.5773502691896257 * v1330;
-    const V v1343 = 0.3333333333333333 * v1330;
-    const V v1344 = v289 * v1336;
-    const V v1345 = v298 * v1336;
-    const V v1346 = v296 * v1336;
-    const V v1347 = v294 * v1338;
-    const V v1348 = v580 * v1338;
-    const V v1349 = v1165 + v1344;
-    const V v1350 = v1261 + v1345;
-    const V v1351 = v1314 + v1346;
-    const V v1352 = v440 * v1336;
-    const V v1353 = v1348 + v1352;
-    const V v1354 = v440 * v1250;
-    const V v1355 = v1346 - v1354;
-    const V v1356 = 0.5773502691896257 * v1339;
-    const V v1357 = 0.3333333333333333 * v1339;
-    const V v1358 = v1160 + v1339;
-    const V v1359 = v584 * v1251;
-    const V v1360 = v1345 - v1359;
-    const V v1361 = v584 * v1252;
-    const V v1362 = v1344 - v1361;
-    const V v1363 = v481 * v1336;
-    const V v1364 = v481 * v1237;
-    const V v1365 = v584 * v1247;
-    const V v1366 = v435 * v1247;
-    const V v1367 = v435 * v1318;
-    const V v1368 = v584 * v1318;
-    const V v1369 = v435 * v1336;
-    const V v1370 = v1172 + v1369;
-    const V v1371 = v584 * v1336;
-    const V v1372 = v1174 + v1371;
-    const V v1373 = v435 * v1252;
-    const V v1374 = v1088 + v1373;
-    const V v1375 = v411 * v1325;
-    const V v1376 = v1364 + v1375;
-    const V v1377 = v411 * v1338;
-    const V v1378 = v1363 - v1377;
-    const V v1379 = v411 * v1331;
-    const V v1380 = v582 * v1331;
-    const V v1381 = v1366 - v1380;
-    const V v1382 = v582 * v1338;
-    const V v1383 = v1370 - v1382;
-    const V v1384 = v413 * v1338;
-    const V v1385 = v1372 + v1384;
-    const V v1386 = v413 * v1325;
-    const V v1387 = v413 * v1323;
-    const V v1388 = v1368 + v1387;
-    const V v1389 = v582 * v1325;
-    const V v1390 = v1260 + v1389;
-    const V v1391 = v580 * v1325;
-    const V v1392 = v584 * v1237;
-    const V v1393 = v1386 - v1392;
-    const V v1394 = v1342 + v1388;
-    const V v1395 = v440 * v1237;
-    const V v1396 = v1391 - v1395;
-    const V v1397 = v582 * v1390;
-    const V v1398 = v1349 + v1397;
-    const V v1399 = v1379 - v1315;
-    const V v1400 = v1208 + v1315;
-    const V v1401 = v580 * v1393;
-    const V v1402 = v1315 - v1379;
-    const V v1403 = v1400 - v1379;
-    const V v1404 = v440 * v1252;
-    const V v1405 = v1401 - v1404;
-    const V v1406 = v582 * v1396;
-    const V v1407 = v1350 + v1406;
-    const V v1408 = v580 * v1396;
-    const V v1409 = v1355 + v1408;
-    const V v1410 = v1356 + v1402;
-    const V v1411 = v1405 - v1347;
-    const V v1412 = v1262 + v1347;
-    const V v1413 = v1403 + v1410;
-    const V v1414 = v1407 - v1398;
-    const V v1415 = v1205 + v1410;
-    const V v1416 = v582 * v1376;
-    const V v1417 = v1412 + v1416;
-    const V v1418 = v582 * v1393;
-    const V v1419 = v1374 + v1418;
-    const V v1420 = v413 * v1393;
-    const V v1421 = v1362 + v1420;
-    const V v1422 = v413 * v1376;
-    const V v1423 = v1360 + v1422;
-    const V v1424 = v413 * v1331;
-    const V v1425 = v1365 + v1424;
-    const V v1426 = v580 * v1331;
-    const V v1427 = v1316 + v1426;
-    const V v1428 = v580 * v1376;
-    const V v1429 = v1281 - v1428;
-    const V v1430 = v1381 + v1427;
-    const V v1431 = v1421 - v1423;
-    const V v1432 = v1356 + v1425;
-    const V v1433 = v1402 + v1425;
-    const V v1434 = v1425 - v1199;
-    const V v1435 = 0.5773502691896257 * v1434;
-    const V v1436 = v1421 + v1435;
-    const V v1437 = 0.5773502691896257 * v1433;
-    const V v1438 = v1357 + v1437;
-    const V v1439 = v411 * v1376;
-    const V v1440 = v1351 + v1439;
-    const V v1441 = v411 * v1323;
-    const V v1442 = v1329 - v1441;
-    const V v1443 = v582 * v1323;
-    const V v1444 = v1367 - v1443;
-    const V v1445 = v1206 - v1430;
-    const V v1446 = v1210 + v1438;
-    const V v1447 = v1342 + v1442;
-    const V v1448 = v1388 + v1442;
-    const V v1449 = v1440 - v1423;
-    const V v1450 = v1341 + v1444;
-    const V v1451 = 0.5773502691896257 * v1450;
-    const V v1452 = 0.5773502691896257 * v1448;
-    const V v1453 = v1343 + v1452;
-    const V v1454 = v887 * v1444;
-    const V v1455 = v887 * v1447;
-    const V v1456 = 0.3333333333333333 * v697;
-    const V v1457 = v713 - v1456;
-    const V v1458 = v629 * v865;
-    const V v1459 = v630 * v865;
-    const V v1460 = v556 * v861;
-    const V v1461 = v419 * v861;
-    const V v1462 = v425 * v861;
-    const V v1463 = v443 * v861;
-    const V v1464 = v875 + v1458;
-    const V v1465 = v443 * v1460;
-    const V v1466 = 2.0 * v1463;
-    const V v1467 = v443 * v1461;
-    const V v1468 = v488 * v861;
-    const V v1469 = v488 * v1461;
-    const V v1470 = v488 * v888;
-    const V v1471 = v443 * v888;
-    const V v1472 = v447 * v888;
-    const V v1473 = v560 * v888;
-    const V v1474 = v447 * v1460;
-    const V v1475 = v1409 - v1474;
-    const V v1476 = v1413 - v1470;
-    const V v1477 = v447 * v1461;
-    const V v1478 = v1429 + v1477;
-    const V v1479 = v747 * v913;
-    const V v1480 = v836 + v1479;
-    const V v1481 = v760 * v913;
-    const V v1482 = v890 - v1481;
-    const V v1483 = v760 * v912;
-    const V v1484 = v808 - v1483;
-    const V v1485 = v761 * v1480;
-    const V v1486 = v879 + v1485;
-    const V v1487 = v755 * v874;
-    const V v1488 = v1482 - v1487;
-    const V v1489 = v755 * v906;
-    const V v1490 = v1484 - v1489;
-    const V v1491 = v750 * v991;
-    const V v1492 = v782 + v1491;
-    const V v1493 = v764 * v991;
-    const V v1494 = v979 - v1493;
-    const V v1495 = v764 * v996;
-    const V v1496 = v981 - v1495;
-    const V v1497 = v675 * v1488;
-    const V v1498 = v765 * v1492;
-    const V v1499 = v975 + v1498;
-    const V v1500 = v664 * v1488;
-    const V v1501 = v650 * v1488;
-    const V v1502 = v944 * v1494;
-    const V v1503 = v678 * v1494;
-    const V v1504 = v682 * v1486;
-    const V v1505 = v667 * v1494;
-    const V v1506 = v651 * v1494;
-    const V v1507 = v673 * v1494;
-    const V v1508 = v651 * v673;
-    const V v1509 = v951 + v1508;
-    const V v1510 = v636 * v1501;
-    const V v1511 = v666 * v1501;
-    const V v1512 = v665 * v1501;
-    const V v1513 = v755 * v847;
-    const V v1514 = v1504 - v1513;
-    const V v1515 = v642 * v1506;
-    const V v1516 = v671 * v1506;
-    const V v1517 = v668 * v1506;
-    const V v1518 = v764 * v1509;
-    const V v1519 = v897 * v1509;
-    const V v1520 = v681 * v1514;
-    const V v1521 = v1510 + v1520;
-    const V v1522 = v1499 * v1509;
-    const V v1523 = v1496 + v1522;
-    const V v1524 = v686 * v1499;
-    const V v1525 = v947 * v1499;
-    const V v1526 = v664 * v1514;
-    const V v1527 = v1497 + v1526;
-    const V v1528 = v664 * v790;
-    const V v1529 = v790 * v1488;
-    const V v1530 = v672 * v1488;
-    const V v1531 = v650 * v672;
-    const V v1532 = v1528 + v1531;
-    const V v1533 = v910 * v948;
-    const V v1534 = v1525 - v1533;
-    const V v1535 = v759 * v956;
-    const V v1536 = v1524 - v1535;
-    const V v1537 = v759 * v1519;
-    const V v1538 = v909 + v1537;
-    const V v1539 = v629 * v1527;
-    const V v1540 = v629 * v1521;
-    const V v1541 = v876 + v1540;
-    const V v1542 = v760 * v1532;
-    const V v1543 = v834 * v1532;
-    const V v1544 = v898 * v946;
-    const V v1545 = v1534 - v1544;
-    const V v1546 = v631 * v1538;
-    const V v1547 = v962 - v1546;
-    const V v1548 = v898 * v1518;
-    const V v1549 = v974 + v1548;
-    const V v1550 = v677 * v1545;
-    const V v1551 = v794 * v835;
-    const V v1552 = v1539 - v1551;
-    const V v1553 = v755 * v1543;
-    const V v1554 = v904 + v1553;
-    const V v1555 = v835 * v1542;
-    const V v1556 = v907 + v1555;
-    const V v1557 = v1486 * v1532;
-    const V v1558 = v1490 + v1557;
-    const V v1559 = v787 * v1486;
-    const V v1560 = v503 * v1547;
-    const V v1561 = v786 * v835;
-    const V v1562 = v1559 - v1561;
-    const V v1563 = v947 * v966;
-    const V v1564 = v1550 - v1563;
-    const V v1565 = v633 * v1549;
-    const V v1566 = v986 - v1565;
-    const V v1567 = v629 * v1556;
-    const V v1568 = v1459 - v1567;
-    const V v1569 = v624 * v1554;
-    const V v1570 = v868 - v1569;
-    const V v1571 = v788 * v870;
-    const V v1572 = v1562 - v1571;
-    const V v1573 = v159 * v1564;
-    const V v1574 = v685 * v1536;
-    const V v1575 = v1515 + v1574;
-    const V v1576 = v674 * v1572;
-    const V v1577 = v650 * v1558;
-    const V v1578 = v1529 + v1577;
-    const V v1579 = v664 * v1558;
-    const V v1580 = v1530 + v1579;
-    const V v1581 = v633 * v1575;
-    const V v1582 = v983 + v1581;
-    const V v1583 = v787 * v878;
-    const V v1584 = v1576 - v1583;
-    const V v1585 = v629 * v1580;
-    const V v1586 = v1568 + v1585;
-    const V v1587 = v665 * v1578;
-    const V v1588 = v1511 + v1587;
-    const V v1589 = v158 * v1547;
-    const V v1590 = v1566 + v1589;
-    const V v1591 = v562 * v1547;
-    const V v1592 = v1566 + v1591;
-    const V v1593 = v155 * v1584;
-    const V v1594 = v153 * v1570;
-    const V v1595 = v1568 + v1594;
-    const V v1596 = v629 * v1588;
-    const V v1597 = v153 * v869;
-    const V v1598 = v1458 + v1597;
-    const V v1599 = v498 * v869;
-    const V v1600 = v158 * v963;
-    const V v1601 = v985 + v1600;
-    const V v1602 = v562 * v963;
-    const V v1603 = v985 + v1602;
-    const V v1604 = v554 * v1570;
-    const V v1605 = v1586 + v1604;
-    const V v1606 = v498 * v1570;
-    const V v1607 = v1596 + v1606;
-    const V v1608 = v268 * v1598;
-    const V v1609 = v356 * v1598;
-    const V v1610 = v358 * v1598;
-    const V v1611 = v263 * v1601;
-    const V v1612 = v260 * v1601;
-    const V v1613 = v262 * v1601;
-    const V v1614 = v629 * v1512;
-    const V v1615 = v1599 + v1614;
-    const V v1616 = v630 * v1512;
-    const V v1617 = v1607 + v1616;
-    const V v1618 = v630 * v1500;
-    const V v1619 = v1605 + v1618;
-    const V v1620 = v629 * v1500;
-    const V v1621 = v1464 + v1620;
-    const V v1622 = v267 * v1615;
-    const V v1623 = v1608 + v1611;
-    const V v1624 = v161 * v1619;
-    const V v1625 = v161 * v1621;
-    const V v1626 = 2.0 * v1621;
-    const V v1627 = v1593 + v1626;
-    const V v1628 = v1465 + v1609;
-    const V v1629 = v97 * v1627;
-    const V v1630 = 0.5773502691896257 * v1624;
-    const V v1631 = v1001 + v1612;
-    const V v1632 = v1170 + v1613;
-    const V v1633 = v560 * v1461;
-    const V v1634 = v1609 - v1633;
-    const V v1635 = v1332 + v1625;
-    const V v1636 = v1332 - v1625;
-    const V v1637 = v560 * v1598;
-    const V v1638 = 0.5773502691896257 * v1629;
-    const V v1639 = v443 * v1598;
-    const V v1640 = v445 * v994;
-    const V v1641 = v1632 - v1640;
-    const V v1642 = v445 * v987;
-    const V v1643 = v568 * v987;
-    const V v1644 = v443 * v1595;
-    const V v1645 = v447 * v1595;
-    const V v1646 = v445 * v1590;
-    const V v1647 = v568 * v1590;
-    const V v1648 = v437 * v1590;
-    const V v1649 = v490 * v1590;
-    const V v1650 = v560 * v1595;
-    const V v1651 = v488 * v1595;
-    const V v1652 = v437 * v1601;
-    const V v1653 = v1639 + v1652;
-    const V v1654 = v445 * v1601;
-    const V v1655 = v1171 + v1654;
-    const V v1656 = v488 * v1598;
-    const V v1657 = v1378 + v1656;
-    const V v1658 = v447 * v1598;
-    const V v1659 = v1353 + v1658;
-    const V v1660 = v490 * v1601;
-    const V v1661 = v1173 + v1660;
-    const V v1662 = v568 * v1601;
-    const V v1663 = v1637 + v1662;
-    const V v1664 = v490 * v997;
-    const V v1665 = v1613 + v1664;
-    const V v1666 = v445 * v997;
-    const V v1667 = v1184 + v1666;
-    const V v1668 = v568 * v997;
-    const V v1669 = v1612 - v1668;
-    const V v1670 = v425 * v1617;
-    const V v1671 = v1650 + v1670;
-    const V v1672 = v419 * v1617;
-    const V v1673 = v1651 - v1672;
-    const V v1674 = v419 * v1615;
-    const V v1675 = v1657 - v1674;
-    const V v1676 = v425 * v1615;
-    const V v1677 = v1663 + v1676;
-    const V v1678 = v556 * v1615;
-    const V v1679 = v1659 + v1678;
-    const V v1680 = v556 * v1617;
-    const V v1681 = v1645 + v1680;
-    const V v1682 = v558 * v1617;
-    const V v1683 = v1644 - v1682;
-    const V v1684 = v558 * v1615;
-    const V v1685 = v1653 - v1684;
-    const V v1686 = v1673 - v1630;
-    const V v1687 = v1673 - v1671;
-    const V v1688 = v1630 + v1671;
-    const V v1689 = v1683 - v1681;
-    const V v1690 = 0.5773502691896257 * v1687;
-    const V v1691 = 0.5773502691896257 * v1689;
-    const V v1692 = v708 * v1683;
-    const V v1693 = v708 * v1681;
-    const V v1694 = v708 * v1686;
-    const V v1695 = v708 * v1688;
-    const V v1696 = v708 * v1624;
-    const V v1697 = 0.3333333333333333 * v1624;
-    const V v1698 = v1690 - v1697;
-    const V v1699 = v498 * v850;
-    const V v1700 = v1541 - v1699;
-    const V v1701 = v554 * v850;
-    const V v1702 = v1552 - v1701;
-    const V v1703 = v161 * v1702;
-    const V v1704 = v708 * v1691;
-    const V v1705 = v708 * v1698;
-    const V v1706 = v651 * v1523;
-    const V v1707 = v1502 + v1706;
-    const V v1708 = v667 * v1523;
-    const V v1709 = v1507 + v1708;
-    const V v1710 = v667 * v1536;
-    const V v1711 = v1503 + v1710;
-    const V v1712 = v556 * v1700;
-    const V v1713 = v668 * v1707;
-    const V v1714 = v1516 + v1713;
-    const V v1715 = v425 * v1700;
-    const V v1716 = v633 * v1711;
-    const V v1717 = v633 * v1709;
-    const V v1718 = v1592 + v1717;
-    const V v1719 = v704 * v1691;
-    const V v1720 = v633 * v1517;
-    const V v1721 = v984 + v1720;
-    const V v1722 = v637 * v1517;
-    const V v1723 = v1560 + v1722;
-    const V v1724 = v633 * v1714;
-    const V v1725 = v1723 + v1724;
-    const V v1726 = v633 * v1505;
-    const V v1727 = v1603 + v1726;
-    const V v1728 = v637 * v1505;
-    const V v1729 = v1718 + v1728;
-    const V v1730 = v257 * v1721;
-    const V v1731 = v898 * v958;
-    const V v1732 = v1716 - v1731;
-    const V v1733 = v447 * v861;
-    const V v1734 = v1712 - v1733;
-    const V v1735 = v560 * v861;
-    const V v1736 = v1715 - v1735;
-    const V v1737 = v562 * v964;
-    const V v1738 = v1732 - v1737;
-    const V v1739 = v162 * v1729;
-    const V v1740 = v162 * v1727;
-    const V v1741 = v162 * v1738;
-    const V v1742 = 2.0 * v1727;
-    const V v1743 = v1573 + v1742;
-    const V v1744 = v99 * v1743;
-    const V v1745 = v560 * v1462;
-    const V v1746 = v1608 - v1745;
-    const V v1747 = 0.5773502691896257 * v1739;
-    const V v1748 = 0.3333333333333333 * v1739;
-    const V v1749 = v1154 - v1740;
-    const V v1750 = v1154 + v1740;
-    const V v1751 = v443 * v1462;
-    const V v1752 = v1004 + v1751;
-    const V v1753 = v425 * v1736;
-    const V v1754 = v1746 + v1753;
-    const V v1755 = v556 * v1736;
-    const V v1756 = v447 * v1462;
-    const V v1757 = v1755 - v1756;
-    const V v1758 = v558 * v1736;
-    const V v1759 = v1752 + v1758;
-    const V v1760 = v421 * v1741;
-    const V v1761 = 0.5773502691896257 * v1744;
-    const V v1762 = v1636 + v1749;
-    const V v1763 = v1636 - v1749;
-    const V v1764 = 0.3333333333333333 * v1744;
-    const V v1765 = v1757 - v1622;
-    const V v1766 = v1467 + v1622;
-    const V v1767 = 0.3333333333333333 * v1763;
-    const V v1768 = v1358 + v1744;
-    const V v1769 = 0.5773502691896257 * v1762;
-    const V v1770 = v1675 + v1769;
-    const V v1771 = v1431 + v1754;
-    const V v1772 = v992 - v1760;
-    const V v1773 = v1476 + v1760;
-    const V v1774 = v1629 + v1768;
-    const V v1775 = v1190 + v1772;
-    const V v1776 = v1190 - v1772;
-    const V v1777 = v182 * v619;
-    const V v1778 = v182 * v688;
-    const V v1779 = v182 * v696;
-    const V v1780 = v182 * v634;
-    const V v1781 = v1777 - v603;
-    const V v1782 = v1778 - v690;
-    const V v1783 = 0.5773502691896257 * v1775;
-    const V v1784 = 0.3333333333333333 * v1776;
-    const V v1785 = v1779 - v698;
-    const V v1786 = v1780 - v641;
-    const V v1787 = v1772 - v1761;
-    const V v1788 = v183 * v619;
-    const V v1789 = v183 * v688;
-    const V v1790 = v183 * v696;
-    const V v1791 = v183 * v634;
-    const V v1792 = v185 * v696;
-    const V v1793 = v185 * v619;
-    const V v1794 = v1788 - v604;
-    const V v1795 = v1789 - v691;
-    const V v1796 = v1790 - v699;
-    const V v1797 = v1791 - v644;
-    const V v1798 = v1792 - v697;
-    const V v1799 = v1793 - v621;
-    const V v1800 = v185 * v688;
-    const V v1801 = v185 * v634;
-    const V v1802 = v170 * v619;
-    const V v1803 = v170 * v688;
-    const V v1804 = v170 * v634;
-    const V v1805 = v655 + v1804;
-    const V v1806 = v1800 - v689;
-    const V v1807 = v1801 - v640;
-    const V v1808 = v1802 - v623;
-    const V v1809 = v1803 - v693;
-    const V v1810 = v181 * v634;
-    const V v1811 = v654 - v1810;
-    const V v1812 = v181 * v619;
-    const V v1813 = v622 - v1812;
-    const V v1814 = v181 * v688;
-    const V v1815 = v692 - v1814;
-    const V v1816 = v1808 - v632;
-    const V v1817 = v1813 - v632;
-    const V v1818 = v1809 - v694;
-    const V v1819 = v694 + v1815;
-    const V v1820 = v1330 * v1794;
-    const V v1821 = v1330 * v1781;
-    const V v1822 = v1444 * v1794;
-    const V v1823 = v1444 * v1799;
-    const V v1824 = v1444 * v1816;
-    const V v1825 = v1444 * v1817;
-    const V v1826 = v1341 * v1781;
-    const V v1827 = v1341 * v1794;
-    const V v1828 = v1341 * v1799;
-    const V v1829 = v1330 * v1816;
-    const V v1830 = v1214 + v1829;
-    const V v1831 = v1330 * v1817;
-    const V v1832 = v1217 + v1831;
-    const V v1833 = v1394 * v1781;
-    const V v1834 = v1394 * v1794;
-    const V v1835 = v1394 * v1799;
-    const V v1836 = v1330 * v1799;
-    const V v1837 = v1774 + v1836;
-    const V v1838 = v1453 * v1794;
-    const V v1839 = v1453 * v1816;
-    const V v1840 = v1453 * v1817;
-    const V v1841 = v1453 * v1799;
-    const V v1842 = v887 * v1453;
-    const V v1843 = v887 * v1330;
-    const V v1844 = v1213 + v1843;
-    const V v1845 = v885 * v1330;
-    const V v1846 = v1696 - v1845;
-    const V v1847 = v1447 * v1794;
-    const V v1848 = v1447 * v1816;
-    const V v1849 = v1447 * v1799;
-    const V v1850 = v885 * v1453;
-    const V v1851 = v1705 - v1850;
-    const V v1852 = v885 * v1447;
-    const V v1853 = v1694 - v1852;
-    const V v1854 = v1635 + v1750;
-    const V v1855 = v1635 - v1750;
-    const V v1856 = 0.5773502691896257 * v1855;
-    const V v1857 = v704 * v1624;
-    const V v1858 = v1844 - v1857;
-    const V v1859 = v419 * v1703;
-    const V v1860 = v419 * v1700;
-    const V v1861 = v1468 + v1860;
-    const V v1862 = v558 * v1700;
-    const V v1863 = v1466 + v1862;
-    const V v1864 = v558 * v1703;
-    const V v1865 = v1471 - v1864;
-    const V v1866 = v556 * v1703;
-    const V v1867 = v1472 + v1866;
-    const V v1868 = v425 * v1703;
-    const V v1869 = v1473 + v1868;
-    const V v1870 = v425 * v1861;
-    const V v1871 = v1634 + v1870;
-    const V v1872 = v419 * v1861;
-    const V v1873 = v1469 + v1872;
-    const V v1874 = v1470 - v1859;
-    const V v1875 = v1773 + v1859;
-    const V v1876 = v558 * v1863;
-    const V v1877 = v1623 + v1876;
-    const V v1878 = v1381 - v1865;
-    const V v1879 = v1865 - v1867;
-    const V v1880 = v1610 + v1873;
-    const V v1881 = v1475 + v1610;
-    const V v1882 = v1874 - v1638;
-    const V v1883 = v1874 - v1869;
-    const V v1884 = v1875 - v1882;
-    const V v1885 = 0.5773502691896257 * v1883;
-    const V v1886 = v1415 + v1882;
-    const V v1887 = v1427 + v1867;
-    const V v1888 = v1427 - v1867;
-    const V v1889 = v1879 - v1430;
-    const V v1890 = v1638 + v1869;
-    const V v1891 = v1434 + v1869;
-    const V v1892 = v1399 - v1874;
-    const V v1893 = v1402 - v1874;
-    const V v1894 = 0.3333333333333333 * v1629;
-    const V v1895 = v1885 - v1894;
-    const V v1896 = v1889 - v1206;
-    const V v1897 = 0.3333333333333333 * v1893;
-    const V v1898 = v1193 + v1887;
-    const V v1899 = v1787 + v1886;
-    const V v1900 = v1884 - v1787;
-    const V v1901 = v1887 - v1193;
-    const V v1902 = 0.5773502691896257 * v1892;
-    const V v1903 = v1423 + v1902;
-    const V v1904 = v1430 + v1879;
-    const V v1905 = v1445 + v1879;
-    const V v1906 = v1432 + v1890;
-    const V v1907 = v1432 - v1890;
-    const V v1908 = 0.5773502691896257 * v1900;
-    const V v1909 = v1440 + v1908;
-    const V v1910 = v1438 - v1895;
-    const V v1911 = v1446 + v1895;
-    const V v1912 = v1871 + v1903;
-    const V v1913 = v1771 + v1910;
-    const V v1914 = v1880 + v1909;
-    const V v1915 = v1449 + v1880;
-    const V v1916 = v1871 + v1913;
-    const V v1917 = v1871 + v1915;
-    const V v1918 = v1907 - v1201;
-    const V v1919 = 0.5773502691896257 * v1917;
-    const V v1920 = v1897 + v1919;
-    const V v1921 = v528 * v1149;
-    const V v1922 = v386 * v1149;
-    const V v1923 = v384 * v1149;
-    const V v1924 = v1183 + v1923;
-    const V v1925 = v386 * v1136;
-    const V v1926 = v1385 + v1925;
-    const V v1927 = v528 * v1136;
-    const V v1928 = v1655 + v1927;
-    const V v1929 = v384 * v1136;
-    const V v1930 = v1661 - v1929;
-    const V v1931 = v526 * v1136;
-    const V v1932 = v1383 - v1931;
-    const V v1933 = v401 * v1061;
-    const V v1934 = v1921 - v1933;
-    const V v1935 = v524 * v1061;
-    const V v1936 = v1922 - v1935;
-    const V v1937 = v386 * v1924;
-    const V v1938 = v1188 + v1937;
-    const V v1939 = v384 * v1924;
-    const V v1940 = v1186 + v1939;
-    const V v1941 = v384 * v1147;
-    const V v1942 = v1182 - v1941;
-    const V v1943 = v526 * v1147;
-    const V v1944 = v1179 - v1943;
-    const V v1945 = v528 * v1936;
-    const V v1946 = v386 * v1936;
-    const V v1947 = v1155 + v1946;
-    const V v1948 = v526 * v1936;
-    const V v1949 = v1419 + v1948;
-    const V v1950 = v526 * v1934;
-    const V v1951 = v1167 + v1950;
-    const V v1952 = v526 * v1924;
-    const V v1953 = v1087 + v1952;
-    const V v1954 = v528 * v1934;
-    const V v1955 = v1641 + v1954;
-    const V v1956 = v528 * v1924;
-    const V v1957 = v1667 - v1956;
-    const V v1958 = v524 * v1079;
-    const V v1959 = v1947 - v1958;
-    const V v1960 = v401 * v1079;
-    const V v1961 = v1945 - v1960;
-    const V v1962 = v1938 + v1940;
-    const V v1963 = v1143 + v1953;
-    const V v1964 = v1961 - v1143;
-    const V v1965 = v1914 + v1940;
-    const V v1966 = v1949 - v1411;
-    const V v1967 = v1414 - v1951;
-    const V v1968 = v1407 + v1951;
-    const V v1969 = v1964 + v1966;
-    const V v1970 = v1411 + v1964;
-    const V v1971 = v1436 + v1959;
-    const V v1972 = v1916 + v1959;
-    const V v1973 = v1216 + v1971;
-    const V v1974 = v1938 + v1972;
-    const V v1975 = v1783 + v1938;
-    const V v1976 = v1971 - v1912;
-    const V v1977 = v1195 - v1944;
-    const V v1978 = 0.5773502691896257 * v1977;
-    const V v1979 = v1163 + v1942;
-    const V v1980 = v1197 - v1942;
-    const V v1981 = 0.5773502691896257 * v1980;
-    const V v1982 = v1394 * v1816;
-    const V v1983 = v1973 + v1982;
-    const V v1984 = v564 * v1582;
-    const V v1985 = v427 * v1582;
-    const V v1986 = v564 * v1721;
-    const V v1987 = v1928 + v1986;
-    const V v1988 = v427 * v1721;
-    const V v1989 = v1677 + v1988;
-    const V v1990 = v566 * v1721;
-    const V v1991 = v1685 - v1990;
-    const V v1992 = v421 * v1721;
-    const V v1993 = v1930 - v1992;
-    const V v1994 = v566 * v1582;
-    const V v1995 = v1002 + v1994;
-    const V v1996 = v421 * v1582;
-    const V v1997 = v993 + v1996;
-    const V v1998 = v1679 + v1987;
-    const V v1999 = v566 * v1995;
-    const V v2000 = v1877 + v1999;
-    const V v2001 = v1932 + v1991;
-    const V v2002 = v1987 + v1991;
-    const V v2003 = v1770 + v1993;
-    const V v2004 = v1675 - v1993;
-    const V v2005 = v564 * v1997;
-    const V v2006 = v1957 - v2005;
-    const V v2007 = v2002 - v1932;
-    const V v2008 = v2004 - v1989;
-    const V v2009 = v1856 + v1989;
-    const V v2010 = v2007 - v1679;
-    const V v2011 = v1998 + v2001;
-    const V v2012 = v1998 - v2001;
-    const V v2013 = 0.5773502691896257 * v2010;
-    const V v2014 = v1926 + v2008;
-    const V v2015 = v1926 + v2009;
-    const V v2016 = v1398 + v2000;
-    const V v2017 = v1970 - v2006;
-    const V v2018 = v2006 - v1963;
-    const V v2019 = 0.5773502691896257 * v2014;
-    const V v2020 = v1767 + v2019;
-    const V v2021 = v2001 + v2013;
-    const V v2022 = v2011 - v2013;
-    const V v2023 = v2012 + v2013;
-    const V v2024 = v2015 + v2020;
-    const V v2025 = v1998 + v2021;
-    const V v2026 = v2020 - v2015;
-    const V v2027 = v2021 - v1998;
-    const V v2028 = v1854 - v2003;
-    const V v2029 = v1854 + v2003;
-    const V v2030 = -v2025;
-    const V v2031 = v2026 + v2028;
-    const V v2032 = v2024 + v2029;
-    const V v2033 = v2028 - v2026;
-    softehl_store4(R + 4, 8, v2030, v2031, v2027, v2033);
-    const V v2034 = v2029 - v2024;
-    softehl_store4(R + 0, 8, v2022, v2032, v2023, v2034);
-    const V v2035 = v1444 * v1781;
-    const V v2036 = v2016 - v2035;
-    const V v2037 = v885 * v1444;
-    const V v2038 = v1692 - v2037;
-    const V v2039 = 0.3333333333333333 * v1159;
-    const V v2040 = v1981 - v2039;
-    const V v2041 = v1003 + v1730;
-    const V v2042 = v1691 * v1782;
-    const V v2043 = v1691 * v1795;
-    const V v2044 = v1691 * v1818;
-    const V v2045 = v1683 * v1782;
-    const V v2046 = v2036 - v2045;
-    const V v2047 = v1691 * v1819;
-    const V v2048 = v1691 * v1806;
-    const V v2049 = v1683 * v1795;
-    const V v2050 = v1822 + v2049;
-    const V v2051 = v566 * v1997;
-    const V v2052 = v2041 + v2051;
-    const V v2053 = v1451 * v1794;
-    const V v2054 = v2043 - v2053;
-    const V v2055 = v1451 * v1799;
-    const V v2056 = v2048 - v2055;
-    const V v2057 = v1451 * v1816;
-    const V v2058 = v2044 - v2057;
-    const V v2059 = v1451 * v1817;
-    const V v2060 = v2047 - v2059;
-    const V v2061 = v1683 * v1819;
-    const V v2062 = v1825 + v2061;
-    const V v2063 = v1683 * v1806;
-    const V v2064 = v1823 + v2063;
-    const V v2065 = v1963 + v2052;
-    const V v2066 = v2018 + v2052;
-    const V v2067 = v1341 * v1816;
-    const V v2068 = v1215 + v2067;
-    const V v2069 = v1341 * v1817;
-    const V v2070 = v1218 + v2069;
-    const V v2071 = v1969 - v2066;
-    const V v2072 = v717 * v1944;
-    const V v2073 = v2062 + v2072;
-    const V v2074 = v1798 * v1944;
-    const V v2075 = v2064 + v2074;
-    const V v2076 = v1681 * v1819;
-    const V v2077 = v2070 + v2076;
-    const V v2078 = v1681 * v1818;
-    const V v2079 = v2068 + v2078;
-    const V v2080 = v1624 * v1818;
-    const V v2081 = v1830 + v2080;
-    const V v2082 = v1624 * v1819;
-    const V v2083 = v1832 + v2082;
-    const V v2084 = v1624 * v1795;
-    const V v2085 = v1820 + v2084;
-    const V v2086 = v1681 * v1795;
-    const V v2087 = v1827 + v2086;
-    const V v2088 = v1624 * v1806;
-    const V v2089 = v1837 + v2088;
-    const V v2090 = v1624 * v1782;
-    const V v2091 = v1821 + v2090;
-    const V v2092 = v1681 * v1782;
-    const V v2093 = v1826 + v2092;
-    const V v2094 = v1681 * v1806;
-    const V v2095 = v1828 + v2094;
-    const V v2096 = v1899 + v2083;
-    const V v2097 = v1849 + v1899;
-    const V v2098 = v704 * v1681;
-    const V v2099 = v1211 - v2098;
-    const V v2100 = v1159 * v1796;
-    const V v2101 = v2085 + v2100;
-    const V v2102 = v1159 * v1798;
-    const V v2103 = v2089 + v2102;
-    const V v2104 = v1159 * v1785;
-    const V v2105 = v2091 + v2104;
-    const V v2106 = v1195 * v1785;
-    const V v2107 = v2093 + v2106;
-    const V v2108 = v1195 * v1798;
-    const V v2109 = v2095 + v2108;
-    const V v2110 = v1159 * v1457;
-    const V v2111 = v1846 - v2110;
-    const V v2112 = v1686 * v1806;
-    const V v2113 = v2097 + v2112;
-    const V v2114 = v1195 * v1796;
-    const V v2115 = v2087 + v2114;
-    const V v2116 = v1195 * v1457;
-    const V v2117 = v1693 - v2116;
-    const V v2118 = v1739 * v1807;
-    const V v2119 = v2103 + v2118;
-    const V v2120 = v1739 * v1786;
-    const V v2121 = v2105 + v2120;
-    const V v2122 = v670 * v1739;
-    const V v2123 = v2111 + v2122;
-    const V v2124 = v1739 * v1811;
-    const V v2125 = v2096 + v2124;
-    const V v2126 = v1798 * v1979;
-    const V v2127 = v2113 + v2126;
-    const V v2128 = v1457 * v1979;
-    const V v2129 = v1853 - v2128;
-    const V v2130 = v2119 - v2125;
-    const V v2131 = v2119 + v2125;
-    const V v2132 = v885 * v1341;
-    const V v2133 = v2117 - v2132;
-    const V v2134 = v887 * v1341;
-    const V v2135 = v2099 + v2134;
-    const V v2136 = v661 * v1739;
-    const V v2137 = v1858 + v2136;
-    const V v2138 = v1739 * v1797;
-    const V v2139 = v2101 + v2138;
-    const V v2140 = v1739 * v1805;
-    const V v2141 = v2081 + v2140;
-    const V v2142 = v1203 + v1381;
-    const V v2143 = v1203 - v1381;
-    const V v2144 = v887 * v1451;
-    const V v2145 = v1719 + v2144;
-    const V v2146 = v887 * v1394;
-    const V v2147 = v1212 + v2146;
-    const V v2148 = v1865 + v2142;
-    const V v2149 = v2143 - v1865;
-    const V v2150 = v1451 * v1781;
-    const V v2151 = v2042 - v2150;
-    const V v2152 = v885 * v1451;
-    const V v2153 = v1704 + v2152;
-    const V v2154 = v885 * v1394;
-    const V v2155 = v1695 - v2154;
-    const V v2156 = v1394 * v1817;
-    const V v2157 = v1219 + v2156;
-    const V v2158 = v1447 * v1817;
-    const V v2159 = v1965 + v2158;
-    const V v2160 = v711 * v1978;
-    const V v2161 = v2145 - v2160;
-    const V v2162 = v1785 * v1978;
-    const V v2163 = v2151 + v2162;
-    const V v2164 = v1457 * v1978;
-    const V v2165 = v2153 - v2164;
-    const V v2166 = v1200 * v1457;
-    const V v2167 = v2155 - v2166;
-    const V v2168 = v1200 * v1785;
-    const V v2169 = v1833 + v2168;
-    const V v2170 = v1688 * v1819;
-    const V v2171 = v2157 + v2170;
-    const V v2172 = v1686 * v1819;
-    const V v2173 = v2159 + v2172;
-    const V v2174 = v1698 * v1819;
-    const V v2175 = v1840 + v2174;
-    const V v2176 = v1688 * v1782;
-    const V v2177 = v2169 + v2176;
-    const V v2178 = v1785 * v1944;
-    const V v2179 = v2046 - v2178;
-    const V v2180 = v1457 * v1944;
-    const V v2181 = v2038 - v2180;
-    const V v2182 = v1457 * v2040;
-    const V v2183 = v1851 - v2182;
-    const V v2184 = v717 * v2040;
-    const V v2185 = v2175 + v2184;
-    const V v2186 = v717 * v1979;
-    const V v2187 = v2173 + v2186;
-    const V v2188 = v717 * v1978;
-    const V v2189 = v2060 + v2188;
-    const V v2190 = v711 * v1944;
-    const V v2191 = v1454 + v2190;
-    const V v2192 = v711 * v2040;
-    const V v2193 = v1842 + v2192;
-    const V v2194 = v711 * v1979;
-    const V v2195 = v1455 + v2194;
-    const V v2196 = v1796 * v1944;
-    const V v2197 = v2050 + v2196;
-    const V v2198 = v723 * v1944;
-    const V v2199 = v1824 + v2198;
-    const V v2200 = v1796 * v1978;
-    const V v2201 = v2054 + v2200;
-    const V v2202 = v723 * v1978;
-    const V v2203 = v2058 + v2202;
-    const V v2204 = v1798 * v1978;
-    const V v2205 = v2056 + v2204;
-    const V v2206 = v1796 * v2040;
-    const V v2207 = v1838 + v2206;
-    const V v2208 = v723 * v2040;
-    const V v2209 = v1839 + v2208;
-    const V v2210 = v723 * v1979;
-    const V v2211 = v1848 + v2210;
-    const V v2212 = v1798 * v2040;
-    const V v2213 = v1841 + v2212;
-    const V v2214 = v1200 * v1798;
-    const V v2215 = v1835 + v2214;
-    const V v2216 = v1200 * v1796;
-    const V v2217 = v1834 + v2216;
-    const V v2218 = v1796 * v1979;
-    const V v2219 = v1847 + v2218;
-    const V v2220 = v1683 * v1818;
-    const V v2221 = v2199 + v2220;
-    const V v2222 = v1698 * v1818;
-    const V v2223 = v2209 + v2222;
-    const V v2224 = v1698 * v1795;
-    const V v2225 = v2207 + v2224;
-    const V v2226 = v1686 * v1818;
-    const V v2227 = v2211 + v2226;
-    const V v2228 = v1686 * v1795;
-    const V v2229 = v2219 + v2228;
-    const V v2230 = v1688 * v1795;
-    const V v2231 = v2217 + v2230;
-    const V v2232 = v1688 * v1818;
-    const V v2233 = v1983 + v2232;
-    const V v2234 = v1688 * v1806;
-    const V v2235 = v2215 + v2234;
-    const V v2236 = v1698 * v1806;
-    const V v2237 = v2213 + v2236;
-    const V v2238 = v704 * v1683;
-    const V v2239 = v2191 - v2238;
-    const V v2240 = v704 * v1688;
-    const V v2241 = v2147 - v2240;
-    const V v2242 = v704 * v1698;
-    const V v2243 = v2193 - v2242;
-    const V v2244 = v704 * v1686;
-    const V v2245 = v2195 - v2244;
-    const V v2246 = v445 * v972;
-    const V v2247 = v1984 - v2246;
-    const V v2248 = v568 * v972;
-    const V v2249 = v1985 - v2248;
-    const V v2250 = v568 * v998;
-    const V v2251 = v1611 - v2250;
-    const V v2252 = v427 * v2249;
-    const V v2253 = v2251 + v2252;
-    const V v2254 = v427 * v1741;
-    const V v2255 = v1643 + v2254;
-    const V v2256 = v566 * v1741;
-    const V v2257 = v1000 - v2256;
-    const V v2258 = v564 * v1741;
-    const V v2259 = v1642 + v2258;
-    const V v2260 = v564 * v2249;
-    const V v2261 = v566 * v2249;
-    const V v2262 = v1759 + v2261;
-    const V v2263 = v445 * v998;
-    const V v2264 = v2260 - v2263;
-    const V v2265 = v2264 - v1730;
-    const V v2266 = v2148 + v2257;
-    const V v2267 = v1203 - v2257;
-    const V v2268 = v2149 + v2257;
-    const V v2269 = v2255 - v1761;
-    const V v2270 = v2257 + v2259;
-    const V v2271 = v1193 - v2259;
-    const V v2272 = v1898 + v2259;
-    const V v2273 = v1901 - v2259;
-    const V v2274 = 0.5773502691896257 * v2268;
-    const V v2275 = v1949 + v2274;
-    const V v2276 = v2262 - v1949;
-    const V v2277 = v1772 + v2255;
-    const V v2278 = v1869 - v2255;
-    const V v2279 = v1891 - v2255;
-    const V v2280 = v2262 + v2275;
-    const V v2281 = v1765 + v2262;
-    const V v2282 = v2269 - v1201;
-    const V v2283 = v2276 - v2065;
-    const V v2284 = 0.5773502691896257 * v2277;
-    const V v2285 = v1764 - v2284;
-    const V v2286 = 0.5773502691896257 * v2273;
-    const V v2287 = v1970 + v2286;
-    const V v2288 = v2281 - v2265;
-    const V v2289 = v1765 + v2265;
-    const V v2290 = v2282 - v1907;
-    const V v2291 = 0.5773502691896257 * v2278;
-    const V v2292 = v1754 + v2291;
-    const V v2293 = 0.19245008972987526 * v2279;
-    const V v2294 = v2183 + v2293;
-    const V v2295 = v2287 + v2289;
-    const V v2296 = v2121 - v2266;
-    const V v2297 = v2075 + v2266;
-    const V v2298 = v2017 - v2289;
-    const V v2299 = 0.5773502691896257 * v2290;
-    const V v2300 = v1912 + v2299;
-    const V v2301 = v2253 + v2292;
-    const V v2302 = v1974 + v2253;
-    const V v2303 = v1201 + v2269;
-    const V v2304 = v1918 + v2269;
-    const V v2305 = v1911 + v2285;
-    const V v2306 = v1210 - v2285;
-    const V v2307 = 0.3333333333333333 * v2304;
-    const V v2308 = v1969 - v2288;
-    const V v2309 = v2071 + v2288;
-    const V v2310 = 0.5773502691896257 * v2308;
-    const V v2311 = v2302 - v2306;
-    const V v2312 = v1910 + v2306;
-    const V v2313 = v2123 + v2305;
-    const V v2314 = v2237 + v2305;
-    const V v2315 = v1906 + v2303;
-    const V v2316 = v1906 - v2303;
-    const V v2317 = v1976 - v2301;
-    const V v2318 = v2233 + v2301;
-    const V v2319 = 0.5773502691896257 * v2316;
-    const V v2320 = v2318 + v2319;
-    const V v2321 = 0.5773502691896257 * v2312;
-    const V v2322 = v1920 + v2321;
-    const V v2323 = v2141 + v2315;
-    const V v2324 = v2235 + v2315;
-    const V v2325 = v2313 + v2323;
-    const V v2326 = v1905 + v2270;
-    const V v2327 = v1206 - v2270;
-    const V v2328 = v1896 - v2270;
-    const V v2329 = 0.5773502691896257 * v2326;
-    const V v2330 = 0.3333333333333333 * v2328;
-    const V v2331 = v2310 + v2330;
-    const V v2332 = v2323 - v2313;
-    const V v2333 = v1904 + v2327;
-    const V v2334 = v1878 - v2267;
-    const V v2335 = v1878 + v2267;
-    const V v2336 = 0.3333333333333333 * v2334;
-    const V v2337 = v2327 - v1904;
-    const V v2338 = v2130 - v2332;
-    const V v2339 = v2130 + v2332;
-    const V v2340 = 0.3333333333333333 * v2337;
-    const V v2341 = v2131 + v2325;
-    const V v2342 = v2131 - v2325;
-    const V v2343 = 0.5773502691896257 * v2335;
-    const V v2344 = v2065 + v2343;
-    const V v2345 = v2137 - v2329;
-    const V v2346 = v2205 + v2329;
-    const V v2347 = v2296 + v2345;
-    const V v2348 = v2345 - v2296;
-    const V v2349 = v2203 + v2331;
-    const V v2350 = v2241 - v2331;
-    const V v2351 = v1888 - v2271;
-    const V v2352 = v1888 + v2271;
-    const V v2353 = 0.3333333333333333 * v2351;
-    const V v2354 = v2139 + v2272;
-    const V v2355 = v2109 + v2272;
-    const V v2356 = v2348 + v2354;
-    const V v2357 = v2347 - v2354;
-    const V v2358 = v2347 + v2354;
-    const V v2359 = 0.5773502691896257 * v2352;
-    const V v2360 = v2006 + v2359;
-    const V v2361 = v2354 - v2348;
-    const V v2362 = v2221 - v2280;
-    const V v2363 = v2177 + v2280;
-    const V v2364 = v2079 + v2295;
-    const V v2365 = v2231 + v2295;
-    const V v2366 = v558 * v1734;
-    const V v2367 = v1628 + v2366;
-    const V v2368 = v558 * v1861;
-    const V v2369 = v1766 + v2368;
-    const V v2370 = v556 * v1734;
-    const V v2371 = v1881 + v2370;
-    const V v2372 = v556 * v1861;
-    const V v2373 = v1478 - v2372;
-    const V v2374 = v1417 + v2369;
-    const V v2375 = v1417 - v2369;
-    const V v2376 = v1968 + v2367;
-    const V v2377 = v2000 + v2367;
-    const V v2378 = v1407 - v2367;
-    const V v2379 = v2298 + v2373;
-    const V v2380 = v2360 + v2373;
-    const V v2381 = v2373 + v2375;
-    const V v2382 = v2378 - v2371;
-    const V v2383 = v2115 + v2371;
-    const V v2384 = 0.5773502691896257 * v2379;
-    const V v2385 = v2353 + v2384;
-    const V v2386 = v2283 + v2374;
-    const V v2387 = v2344 + v2374;
-    const V v2388 = v2309 - v2381;
-    const V v2389 = v2066 - v2381;
-    const V v2390 = 0.3333333333333333 * v2388;
-    const V v2391 = 0.5773502691896257 * v2386;
-    const V v2392 = v2336 + v2391;
-    const V v2393 = v2073 + v2387;
-    const V v2394 = 0.5773502691896257 * v2389;
-    const V v2395 = v2340 + v2394;
-    const V v2396 = v2077 + v2380;
-    const V v2397 = v2229 + v2380;
-    const V v2398 = v2133 + v2385;
-    const V v2399 = v2225 + v2385;
-    const V v2400 = 0.19245008972987526 * v2333;
-    const V v2401 = v2390 - v2400;
-    const V v2402 = v2181 + v2392;
-    const V v2403 = v1447 * v1781;
-    const V v2404 = v2387 - v2403;
-    const V v2405 = v1453 * v1781;
-    const V v2406 = v2392 - v2405;
-    const V v2407 = v2189 + v2395;
-    const V v2408 = v2245 - v2395;
-    const V v2409 = v2165 + v2401;
-    const V v2410 = v2243 - v2401;
-    const V v2411 = v1686 * v1782;
-    const V v2412 = v2404 - v2411;
-    const V v2413 = v1698 * v1782;
-    const V v2414 = v2406 - v2413;
-    const V v2415 = v1785 * v1979;
-    const V v2416 = v2412 - v2415;
-    const V v2417 = v1785 * v2040;
-    const V v2418 = v2414 - v2417;
-    const V v2419 = v566 * v2247;
-    const V v2420 = v1631 + v2419;
-    const V v2421 = v564 * v2247;
-    const V v2422 = v1955 + v2421;
-    const V v2423 = v566 * v1725;
-    const V v2424 = v1648 - v2423;
-    const V v2425 = v564 * v1725;
-    const V v2426 = v1646 + v2425;
-    const V v2427 = v427 * v1725;
-    const V v2428 = v1647 + v2427;
-    const V v2429 = v427 * v1997;
-    const V v2430 = v1669 + v2429;
-    const V v2431 = v421 * v1997;
-    const V v2432 = v1665 + v2431;
-    const V v2433 = v421 * v1725;
-    const V v2434 = v1649 - v2433;
-    const V v2435 = v670 * v2424;
-    const V v2436 = v2402 + v2435;
-    const V v2437 = v2376 + v2420;
-    const V v2438 = v2428 + v2434;
-    const V v2439 = v2424 + v2426;
-    const V v2440 = v2377 - v2420;
-    const V v2441 = v1951 - v2420;
-    const V v2442 = 0.5773502691896257 * v2439;
-    const V v2443 = v2428 - v1747;
-    const V v2444 = v2434 - v1747;
-    const V v2445 = 0.5773502691896257 * v2438;
-    const V v2446 = v1748 - v2445;
-    const V v2447 = v2422 + v2441;
-    const V v2448 = v1967 + v2440;
-    const V v2449 = v2383 + v2422;
-    const V v2450 = 0.5773502691896257 * v2448;
-    const V v2451 = v1975 + v2430;
-    const V v2452 = v2440 - v1967;
-    const V v2453 = v2311 - v2430;
-    const V v2454 = v1962 - v2430;
-    const V v2455 = v2382 + v2447;
-    const V v2456 = v2447 + v2452;
-    const V v2457 = v1797 * v2426;
-    const V v2458 = v2449 + v2457;
-    const V v2459 = 0.5773502691896257 * v2455;
-    const V v2460 = v2456 - v2382;
-    const V v2461 = 0.3333333333333333 * v2453;
-    const V v2462 = v2294 + v2461;
-    const V v2463 = v2432 + v2454;
-    const V v2464 = v2187 + v2432;
-    const V v2465 = 0.5773502691896257 * v2463;
-    const V v2466 = v1784 + v2465;
-    const V v2467 = 0.3333333333333333 * v2460;
-    const V v2468 = v2161 + v2467;
-    const V v2469 = v2317 + v2451;
-    const V v2470 = v2300 + v2451;
-    const V v2471 = v1811 * v2444;
-    const V v2472 = v2464 + v2471;
-    const V v2473 = 0.5773502691896257 * v2469;
-    const V v2474 = v2307 + v2473;
-    const V v2475 = v2239 - v2450;
-    const V v2476 = v1920 + v2466;
-    const V v2477 = v2322 - v2466;
-    const V v2478 = v661 * v2442;
-    const V v2479 = v2468 - v2478;
-    const V v2480 = v1811 * v2442;
-    const V v2481 = v2407 + v2480;
-    const V v2482 = v661 * v2444;
-    const V v2483 = v2408 + v2482;
-    const V v2484 = v661 * v2424;
-    const V v2485 = v2475 + v2484;
-    const V v2486 = v1811 * v2424;
-    const V v2487 = v2393 + v2486;
-    const V v2488 = 0.5773502691896257 * v2476;
-    const V v2489 = v2462 + v2488;
-    const V v2490 = v2450 + v2479;
-    const V v2491 = v2479 - v2450;
-    const V v2492 = v670 * v2446;
-    const V v2493 = v2489 + v2492;
-    const V v2494 = v1811 * v2446;
-    const V v2495 = v2185 + v2494;
-    const V v2496 = v670 * v2426;
-    const V v2497 = v2398 + v2496;
-    const V v2498 = v1811 * v2426;
-    const V v2499 = v2396 + v2498;
-    const V v2500 = v1811 * v2443;
-    const V v2501 = v2171 + v2500;
-    const V v2502 = v2477 + v2495;
-    const V v2503 = v2129 + v2477;
-    const V v2504 = v2501 - v2470;
-    const V v2505 = v2227 - v2470;
-    const V v2506 = v670 * v2444;
-    const V v2507 = v2503 + v2506;
-    const V v2508 = v670 * v2443;
-    const V v2509 = v2167 + v2508;
-    const V v2510 = v670 * v2442;
-    const V v2511 = v2409 + v2510;
-    const V v2512 = v1805 * v2444;
-    const V v2513 = v2505 + v2512;
-    const V v2514 = v1805 * v2442;
-    const V v2515 = v2349 + v2514;
-    const V v2516 = v1805 * v2443;
-    const V v2517 = v2320 + v2516;
-    const V v2518 = v2474 + v2509;
-    const V v2519 = v2223 + v2474;
-    const V v2520 = v2507 + v2513;
-    const V v2521 = v2511 + v2515;
-    const V v2522 = v2513 - v2507;
-    const V v2523 = v2515 - v2511;
-    const V v2524 = v1805 * v2446;
-    const V v2525 = v2519 + v2524;
-    const V v2526 = v2517 - v2518;
-    const V v2527 = v2517 + v2518;
-    const V v2528 = v2493 - v2525;
-    const V v2529 = v2493 + v2525;
-    const V v2530 = v2481 + v2523;
-    const V v2531 = v2481 - v2523;
-    const V v2532 = v2197 - v2437;
-    const V v2533 = v2107 + v2437;
-    const V v2534 = v2201 + v2459;
-    const V v2535 = v2135 - v2459;
-    const V v2536 = v1797 * v2424;
-    const V v2537 = v2532 + v2536;
-    const V v2538 = v1786 * v2424;
-    const V v2539 = v2179 - v2538;
-    const V v2540 = v1786 * v2426;
-    const V v2541 = v2533 + v2540;
-    const V v2542 = v1797 * v2442;
-    const V v2543 = v2534 + v2542;
-    const V v2544 = v1786 * v2442;
-    const V v2545 = v2163 + v2544;
-    const V v2546 = v1807 * v2442;
-    const V v2547 = v2346 + v2546;
-    const V v2548 = v661 * v2426;
-    const V v2549 = v2535 + v2548;
-    const V v2550 = v2541 - v2549;
-    const V v2551 = v2541 + v2549;
-    const V v2552 = v1807 * v2426;
-    const V v2553 = v2355 + v2552;
-    const V v2554 = v1805 * v2426;
-    const V v2555 = v2364 + v2554;
-    const V v2556 = v1805 * v2424;
-    const V v2557 = v2362 + v2556;
-    const V v2558 = v1807 * v2424;
-    const V v2559 = v2297 + v2558;
-    const V v2560 = v2499 + v2553;
-    const V v2561 = v2497 + v2555;
-    const V v2562 = v2436 + v2557;
-    const V v2563 = v2487 + v2559;
-    const V v2564 = v2553 - v2499;
-    const V v2565 = v2555 - v2497;
-    const V v2566 = v2557 - v2436;
-    const V v2567 = v2559 - v2487;
-    const V v2568 = v2562 + v2563;
-    const V v2569 = v2560 + v2561;
-    const V v2570 = v2563 - v2562;
-    const V v2571 = v2566 + v2567;
-    const V v2572 = v2561 - v2560;
-    const V v2573 = v2567 - v2566;
-    const V v2574 = v2560 - v2561;
-    const V v2575 = v2564 - v2565;
-    const V v2576 = v2564 + v2565;
-    const V v2577 = v2565 - v2564;
-    const V v2578 = v2551 - v2458;
-    const V v2579 = v2550 - v2458;
-    const V v2580 = v2485 + v2539;
-    const V v2581 = v2485 - v2539;
-    const V v2582 = v2491 + v2545;
-    const V v2583 = v2490 - v2545;
-    const V v2584 = v2537 + v2580;
-    const V v2585 = v2537 - v2580;
-    const V v2586 = v2537 - v2581;
-    const V v2587 = v2537 + v2581;
-    const V v2588 = v2543 + v2582;
-    const V v2589 = v2543 + v2583;
-    const V v2590 = v2543 - v2583;
-    const V v2591 = v2582 - v2543;
-    const V v2592 = v2585 + v2588;
-    const V v2593 = v2586 + v2589;
-    const V v2594 = v2588 - v2585;
-    const V v2595 = v2587 + v2590;
-    const V v2596 = v2589 - v2586;
-    const V v2597 = v2584 + v2591;
-    const V v2598 = v2590 - v2587;
-    const V v2599 = v2591 - v2584;
-    const V v2600 = v2578 + v2596;
-    const V v2601 = v2578 - v2596;
-    const V v2602 = v2579 - v2599;
-    const V v2603 = v2481 + v2547;
-    const V v2604 = v2530 - v2547;
-    const V v2605 = v2531 - v2547;
-    const V v2606 = v2458 - v2550;
-    const V v2607 = v2458 + v2550;
-    const V v2608 = v2599 - v2606;
-    const V v2609 = v2597 + v2606;
-    const V v2610 = v2594 + v2607;
-    const V v2611 = v2592 + v2607;
-    const V v2612 = v2592 - v2607;
-    const V v2613 = v2606 - v2597;
-    const V v2614 = v2521 + v2603;
-    const V v2615 = v2521 - v2603;
-    const V v2616 = -v2611;
-    const V v2617 = v2607 - v2594;
-    const V v2618 = v2573 - v2604;
-    const V v2619 = v2573 + v2604;
-    const V v2620 = v2571 - v2605;
-    const V v2621 = v2571 + v2605;
-    const V v2622 = v2568 - v2614;
-    const V v2623 = v2568 + v2614;
-    const V v2624 = v2577 - v2618;
-    const V v2625 = v2576 + v2620;
-    const V v2626 = v2570 - v2615;
-    const V v2627 = v2570 + v2615;
-    const V v2628 = v2569 + v2623;
-    const V v2629 = v2618 - v2575;
-    const V v2630 = -v2625;
-    const V v2631 = v2620 - v2576;
-    const V v2632 = -v2628;
-    const V v2633 = v2572 - v2626;
-    softehl_store4(K + 32, 64, v2608, v2632, v2616, v2633);
-    const V v2634 = v2623 - v2569;
-    const V v2635 = v2626 - v2574;
-    softehl_store4(K + 48, 64, v2602, v2634, v2612, v2635);
-    const V v2636 = v2575 + v2619;
-    const V v2637 = v2575 - v2619;
-    const V v2638 = v2576 + v2621;
-    const V v2639 = v2576 - v2621;
-    const V v2640 = v2569 + v2622;
-    const V v2641 = v2569 - v2622;
-    const V v2642 = v2574 + v2627;
-    softehl_store4(K + 0, 64, v2609, v2640, v2617, v2642);
-    const V v2643 = v2574 - v2627;
-    softehl_store4(K + 16, 64, v2613, v2641, v2610, v2643);
-    const V v2644 = v2458 - v2551;
-    const V v2645 = v2458 + v2551;
-    const V v2646 = v2593 + v2644;
-    const V v2647 = v2598 - v2645;
-    softehl_store4(K + 4, 64, v2600, v2636, v2647, v2638);
-    const V v2648 = v2598 + v2645;
-    const V v2649 = v2595 + v2645;
-    softehl_store4(K + 36, 64, v2646, v2624, v2649, v2630);
-    const V v2650 = -v2648;
-    softehl_store4(K + 20, 64, v2601, v2637, v2650, v2639);
-    const V v2651 = v2644 - v2593;
-    const V v2652 = v2645 - v2595;
-    softehl_store4(K + 52, 64, v2651, v2629, v2652, v2631);
-    const V v2653 = v1786 * v2443;
-    const V v2654 = v2363 + v2653;
-    const V v2655 = v661 * v2443;
-    const V v2656 = v2350 + v2655;
-    const V v2657 = v661 * v2446;
-    const V v2658 = v2410 + v2657;
-    const V v2659 = v1786 * v2446;
-    const V v2660 = v2418 - v2659;
-    const V v2661 = v1786 * v2444;
-    const V v2662 = v2416 - v2661;
-    const V v2663 = v2654 - v2656;
-    const V v2664 = v2654 + v2656;
-    const V v2665 = v2483 + v2662;
-    const V v2666 = v2483 - v2662;
-    const V v2667 = v2658 + v2660;
-    const V v2668 = v2658 - v2660;
-    const V v2669 = v1797 * v2443;
-    const V v2670 = v2365 + v2669;
-    const V v2671 = v1807 * v2443;
-    const V v2672 = v2324 + v2671;
-    const V v2673 = v2663 + v2670;
-    const V v2674 = v2664 + v2670;
-    const V v2675 = v2504 + v2672;
-    const V v2676 = v2670 - v2663;
-    const V v2677 = v2670 - v2664;
-    const V v2678 = v2672 - v2504;
-    const V v2679 = v2527 + v2675;
-    const V v2680 = v2526 + v2678;
-    const V v2681 = v2675 - v2527;
-    const V v2682 = v2678 - v2526;
-    const V v2683 = v1797 * v2446;
-    const V v2684 = v2399 + v2683;
-    const V v2685 = v1807 * v2446;
-    const V v2686 = v2314 + v2685;
-    const V v2687 = v1797 * v2444;
-    const V v2688 = v2397 + v2687;
-    const V v2689 = v1807 * v2444;
-    const V v2690 = v2127 + v2689;
-    const V v2691 = v2502 + v2686;
-    const V v2692 = v2472 + v2690;
-    const V v2693 = v2667 + v2684;
-    const V v2694 = v2684 - v2667;
-    const V v2695 = v2686 - v2502;
-    const V v2696 = v2688 - v2665;
-    const V v2697 = v2688 - v2666;
-    const V v2698 = v2690 - v2472;
-    const V v2699 = v2529 + v2691;
-    const V v2700 = v2520 + v2692;
-    const V v2701 = v2528 + v2695;
-    const V v2702 = v2691 - v2529;
-    const V v2703 = v2522 + v2698;
-    const V v2704 = v2692 - v2520;
-    const V v2705 = v2695 - v2528;
-    const V v2706 = v2682 - v2701;
-    const V v2707 = v2682 + v2701;
-    const V v2708 = v2698 - v2522;
-    const V v2709 = v2668 - v2684;
-    const V v2710 = v2668 + v2684;
-    const V v2711 = v2665 + v2688;
-    const V v2712 = v2666 + v2688;
-    const V v2713 = v2357 + v2697;
-    const V v2714 = v2357 - v2697;
-    const V v2715 = v2677 + v2709;
-    const V v2716 = v2358 + v2712;
-    const V v2717 = v2709 - v2677;
-    const V v2718 = v2713 + v2715;
-    const V v2719 = v2713 - v2715;
-    const V v2720 = v2714 + v2717;
-    const V v2721 = v2714 - v2717;
-    const V v2722 = v2712 - v2358;
-    const V v2723 = v2338 - v2708;
-    const V v2724 = v2338 + v2708;
-    const V v2725 = v2674 + v2710;
-    const V v2726 = v2674 - v2710;
-    const V v2727 = v2706 + v2723;
-    const V v2728 = v2707 + v2724;
-    const V v2729 = v2716 + v2725;
-    const V v2730 = v2722 + v2726;
-    const V v2731 = v2722 - v2726;
-    const V v2732 = v2723 - v2706;
-    const V v2733 = v2724 - v2707;
-    const V v2734 = v2725 - v2716;
-    const V v2735 = -v2729;
-    const V v2736 = v2680 - v2705;
-    const V v2737 = v2680 + v2705;
-    const V v2738 = v2339 - v2703;
-    const V v2739 = v2339 + v2703;
-    const V v2740 = v2736 + v2738;
-    softehl_store4(K + 60, 64, v2719, v2727, v2731, v2740);
-    const V v2741 = v2737 + v2739;
-    softehl_store4(K + 12, 64, v2720, v2728, v2735, v2741);
-    const V v2742 = v2738 - v2736;
-    softehl_store4(K + 44, 64, v2718, v2732, v2730, v2742);
-    const V v2743 = v2739 - v2737;
-    softehl_store4(K + 28, 64, v2721, v2733, v2734, v2743);
-    const V v2744 = v2676 - v2693;
-    const V v2745 = v2676 + v2693;
-    const V v2746 = v2673 - v2694;
-    const V v2747 = v2673 + v2694;
-    const V v2748 = v2679 - v2699;
-    const V v2749 = v2679 + v2699;
-    const V v2750 = v2681 - v2702;
-    const V v2751 = v2681 + v2702;
-    const V v2752 = v2356 - v2711;
-    const V v2753 = v2356 + v2711;
-    const V v2754 = v2745 + v2753;
-    const V v2755 = v2744 + v2752;
-    const V v2756 = v2361 - v2696;
-    const V v2757 = v2361 + v2696;
-    const V v2758 = v2747 + v2757;
-    const V v2759 = v2752 - v2744;
-    const V v2760 = v2746 + v2756;
-    const V v2761 = v2753 - v2745;
-    const V v2762 = v2756 - v2746;
-    const V v2763 = v2757 - v2747;
-    const V v2764 = v2341 - v2700;
-    const V v2765 = v2341 + v2700;
-    const V v2766 = v2749 + v2765;
-    const V v2767 = v2748 + v2764;
-    const V v2768 = v2342 - v2704;
-    const V v2769 = v2342 + v2704;
-    const V v2770 = v2751 + v2769;
-    softehl_store4(K + 8, 64, v2754, v2766, v2758, v2770);
-    const V v2771 = v2764 - v2748;
-    const V v2772 = v2750 + v2768;
-    softehl_store4(K + 56, 64, v2755, v2767, v2760, v2772);
-    const V v2773 = v2765 - v2749;
-    const V v2774 = v2768 - v2750;
-    softehl_store4(K + 40, 64, v2759, v2771, v2762, v2774);
-    const V v2775 = v2769 - v2751;
-    softehl_store4(K + 24, 64, v2761, v2773, v2763, v2775);
-}
-
-void softehl_solid_fbar_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_fbar_tangent_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, tangent + (8 * 8) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_fbar_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), tangent + (8 * 8) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    double K[SOFTEHL_LANES * (8 * 8)];
-    softehl_solid_fbar_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (8 * 8) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_solid_fbar_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 0.25 * parameters[2];
-    const V v4 = X4 - X2;
-    const V v5 = X0 + d0;
-    const V v6 = X2 - X6;
-    const V v7 = X4 - X6;
-    const V v8 = X4 - X0;
-    const V v9 = X2 + d2;
-    const V v10 = X4 + d4;
-    const V v11 = v6 + v8;
-    const V v12 = v8 - v6;
-    const V v13 = X6 + d6;
-    const V v14 = d2 - d6;
-    const V v15 = d6 - d2;
-    const V v16 = X1 + X3;
-    const V v17 = v11 - v12;
-    const V v18 = X3 - X1;
-    const V v19 = v12 + v11;
-    const V v20 = v12 - v11;
-    const V v21 = X1 + d1;
-    const V v22 = 0.0625 * v17;
-    const V v23 = 0.0625 * v19;
-    const V v24 = 0.0625 * v20;
-    const V v25 = X3 + d3;
-    const V v26 = d1 + d3;
-    const V v27 = X5 + v18;
-    const V v28 = d3 - d7;
-    const V v29 = d7 + v26;
-    const V v30 = X5 - X3;
-    const V v31 = d7 - d3;
-    const V v32 = X5 - X7;
-    const V v33 = X5 + X7;
-    const V v34 = v27 - X7;
-    const V v35 = X7 + d7;
-    const V v36 = X5 + d5;
-    const V v37 = d5 + v29;
-    const V v38 = v16 + v33;
-    const V v39 = v33 - v16;
-    const V v40 = 0.25 * v38;
-    const V v41 = v34 - v39;
-    const V v42 = v39 + v34;
-    const V v43 = v39 * v11;
-    const V v44 = 1.0 / v40;
-    const V v45 = v44 * v37;
-    const V v46 = 0.0625 * v41;
-    const V v47 = 0.0625 * v42;
-    const V v48 = v39 - v34;
-    const V v49 = v12 * v34;
-    const V v50 = v43 - v49;
-    const V v51 = 0.0625 * v48;
-    const V v52 = 0.0625 * v50;
-    const V v53 = 1.0 / v52;
-    const V v54 = v46 * v53;
-    const V v55 = v24 * v53;
-    const V v56 = v47 * v53;
-    const V v57 = v51 * v53;
-    const V v58 = v28 * v56;
-    const V v59 = 0.25 * v45;
-    const V v60 = 1.0 + v59;
-    const V v61 = v23 * v53;
-    const V v62 = v22 * v53;
-    const V v63 = d5 * v57;
-    const V v64 = v58 + v63;
-    const V v65 = v15 * v61;
-    const V v66 = v31 * v61;
-    const V v67 = 1.0 + v66;
-    const V v68 = d5 * v62;
-    const V v69 = v67 + v68;
-    const V v70 = d4 * v62;
-    const V v71 = v65 + v70;
-    const V v72 = d4 * v57;
-    const V v73 = 1.0 + v72;
-    const V v74 = v14 * v56;
-    const V v75 = v73 + v74;
-    const V v76 = d0 * v54;
-    const V v77 = v75 + v76;
-    const V v78 = d0 * v55;
-    const V v79 = v71 + v78;
-    const V v80 = d1 * v54;
-    const V v81 = v64 + v80;
-    const V v82 = d1 * v55;
-    const V v83 = v69 + v82;
-    const V v84 = v77 * v83;
-    const V v85 = v79 * v81;
-    const V v86 = v84 - v85;
-    const V v87 = v60 * v86;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1], v3 = 0.25 * parameters[2];
+    const V v4 = X4 - X2, v5 = X0 + d0, v6 = X2 - X6, v7 = X4 - X6, v8 = X4 - X0, v9 = X2 + d2,
+        v10 = X4 + d4, v11 = v6 + v8, v12 = v8 - v6, v13 = X6 + d6, v14 = X1 + X3, v15 = X1 + d1,
+        v16 = X3 + d3, v17 = X5 - X3, v18 = X5 - X7, v19 = X5 + X7, v20 = X5 + (X3 - X1) - X7,
+        v21 = X7 + d7, v22 = X5 + d5, v23 = v19 - v14,
+        v24 = 1.0 / (0.0625 * (v23 * v11 - v12 * v20)), v25 = 0.0625 * (v20 - v23) * v24,
+        v26 = 0.0625 * (v12 - v11) * v24, v27 = 0.0625 * (v23 + v20) * v24,
+        v28 = 0.0625 * (v23 - v20) * v24,
+        v29 = 1.0 + 0.25 * (1.0 / (0.25 * (v14 + v19)) * (d5 + (d7 + (d1 + d3)))),
+        v30 = 0.0625 * (v12 + v11) * v24, v31 = 0.0625 * (v11 - v12) * v24,
+        v32 = (1.0 + d4 * v28 + (d2 - d6) * v27 + d0 * v25) * (1.0 + (d7 - d3) * v30 + d5 * v31 + d1 * v26),
+        v33 = ((d6 - d2) * v30 + d4 * v31 + d0 * v26) * ((d3 - d7) * v27 + d5 * v28 + d1 * v25),
+        v34 = v29 * (v32 - v33);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v88 = 1.0 - w[0];
-        const double v89 = 1.0 + w[0];
-        const double v90 = 0.25 * w[0];
-        const double v91 = 1.0 - w[1];
-        const double v92 = 1.0 + w[1];
-        const double v93 = 0.25 * w[1];
-        const double v94 = 0.25 * v91;
-        const double v95 = 0.25 + v90;
-        const double v96 = 0.25 - v90;
-        const double v97 = 0.25 * v92;
-        const double v98 = 0.25 - v93;
-        const double v99 = 0.25 + v93;
-        const double v100 = v90 - 0.25;
-        const double v101 = v94 * v88;
-        const double v102 = v94 * v89;
-        const double v103 = v89 * v97;
-        const double v104 = v88 * v97;
-        const double v105 = v93 - 0.25;
-        const V v106 = X6 * v96;
-        const V v107 = X2 * v98;
-        const V v108 = v99 * v32;
-        const V v109 = v95 * v30;
-        const V v110 = v101 * v5;
-        const V v111 = v101 * v21;
-        const V v112 = v95 * v4;
-        const V v113 = v106 + v112;
-        const V v114 = X5 * v103;
-        const V v115 = v99 * v7;
-        const V v116 = v107 + v115;
-        const V v117 = X3 * v98;
-        const V v118 = v117 + v108;
-        const V v119 = X7 * v96;
-        const V v120 = v119 + v109;
-        const V v121 = v103 * v10;
-        const V v122 = v110 + v121;
-        const V v123 = v103 * v36;
-        const V v124 = v111 + v123;
-        const V v125 = d5 * v103;
-        const V v126 = X7 * v104;
-        const V v127 = v114 + v126;
-        const V v128 = v104 * v13;
-        const V v129 = v128 + v122;
-        const V v130 = v104 * v35;
-        const V v131 = v130 + v124;
-        const V v132 = d7 * v104;
-        const V v133 = v125 + v132;
-        const V v134 = X3 * v102;
-        const V v135 = v134 + v127;
-        const V v136 = v9 * v102;
-        const V v137 = v136 + v129;
-        const V v138 = v25 * v102;
-        const V v139 = v138 + v131;
-        const V v140 = d3 * v102;
-        const V v141 = v140 + v133;
-        const V v142 = X0 * v105;
-        const V v143 = v142 + v116;
-        const V v144 = X0 * v100;
-        const V v145 = v144 + v113;
-        const V v146 = X1 * v105;
-        const V v147 = v146 + v118;
-        const V v148 = X1 * v100;
-        const V v149 = v148 + v120;
-        const V v150 = X1 * v101;
-        const V v151 = v150 + v135;
-        const V v152 = d1 * v101;
-        const V v153 = v152 + v141;
-        const V v154 = 1.0 / v151;
-        const V v155 = v100 * v143;
-        const V v156 = v96 * v143;
-        const V v157 = v96 * v147;
-        const V v158 = v143 * v149;
-        const V v159 = v95 * v143;
-        const V v160 = v95 * v147;
-        const V v161 = v105 * v149;
-        const V v162 = v105 * v145;
-        const V v163 = v155 - v162;
-        const V v164 = v100 * v147;
-        const V v165 = v161 - v164;
-        const V v166 = v145 * v147;
-        const V v167 = v158 - v166;
-        const V v168 = 1.0 / v167;
-        const V v169 = v99 * v149;
-        const V v170 = v99 * v145;
-        const V v171 = v98 * v145;
-        const V v172 = v159 + v171;
-        const V v173 = v98 * v149;
-        const V v174 = v160 + v173;
-        const V v175 = v157 + v169;
-        const V v176 = v159 - v170;
-        const V v177 = v156 + v170;
-        const V v178 = v169 - v160;
-        const V v179 = v153 * v154;
-        const V v180 = 1.0 + v179;
-        const V v181 = v165 * v168;
-        const V v182 = v163 * v168;
-        const V v183 = v168 * v174;
-        const V v184 = v168 * v172;
-        const V v185 = v168 * v178;
-        const V v186 = v168 * v176;
-        const V v187 = v168 * v175;
-        const V v188 = v168 * v177;
-        const V v189 = d1 * v181;
-        const V v190 = d1 * v182;
-        const V v191 = 1.0 + v190;
-        const V v192 = d0 * v182;
-        const V v193 = d0 * v181;
-        const V v194 = 1.0 + v193;
-        const V v195 = d2 * v183;
-        const V v196 = v194 + v195;
-        const V v197 = d2 * v184;
-        const V v198 = v192 - v197;
-        const V v199 = d3 * v183;
-        const V v200 = v189 + v199;
-        const V v201 = d3 * v184;
-        const V v202 = v191 - v201;
-        const V v203 = d4 * v185;
-        const V v204 = v196 + v203;
-        const V v205 = d4 * v186;
-        const V v206 = v198 + v205;
-        const V v207 = d5 * v185;
-        const V v208 = v200 + v207;
-        const V v209 = d5 * v186;
-        const V v210 = v202 + v209;
-        const V v211 = d6 * v187;
-        const V v212 = v204 - v211;
-        const V v213 = d6 * v188;
-        const V v214 = v206 + v213;
-        const V v215 = d7 * v187;
-        const V v216 = v208 - v215;
-        const V v217 = d7 * v188;
-        const V v218 = v210 + v217;
-        const V v219 = v212 * v218;
-        const V v220 = v214 * v216;
-        const V v221 = v219 - v220;
-        const V v222 = v180 * v221;
-        const V v223 = 1.0 / v222;
-        const V v224 = v87 * v223;
-        const M v225 = softehl_eq(v224, softehl_splat(0.0));
-        V v226 = softehl_splat(0.0);
-        const M m227 = ~v225;
-        if (softehl_any(m227)) {
-            const V v228 = softehl_vrcbrt(v224);
-            const V v229 = v224 * v228;
-            const V v230 = v228 * v229;
-            v226 = softehl_blend(m227, v230, v226);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v35 = 1.0 - w[0], v36 = 1.0 + w[0], v37 = 0.25 * w[0], v38 = 0.25 * w[1],
+            v39 = 0.25 * (1.0 - w[1]), v40 = 0.25 + v37, v41 = 0.25 - v37,
+            v42 = 0.25 * (1.0 + w[1]), v43 = 0.25 - v38, v44 = 0.25 + v38, v45 = v37 - 0.25,
+            v46 = v39 * v35, v47 = v39 * v36, v48 = v36 * v42, v49 = v35 * v42, v50 = v38 - 0.25;
+        const V v51 = v9 * v47 + (v49 * v13 + (v46 * v5 + v48 * v10)),
+            v52 = v16 * v47 + (v49 * v21 + (v46 * v15 + v48 * v22)),
+            v53 = X0 * v50 + (X2 * v43 + v44 * v7), v54 = X0 * v45 + (X6 * v41 + v40 * v4),
+            v55 = X1 * v50 + (X3 * v43 + v44 * v18), v56 = X1 * v45 + (X7 * v41 + v40 * v17),
+            v57 = v40 * v53, v58 = v40 * v55, v59 = 1.0 / (v53 * v56 - v54 * v55), v60 = v44 * v56,
+            v61 = v44 * v54,
+            v62 = (d1 * v46 + (d3 * v47 + (d5 * v48 + d7 * v49))) * (1.0 / (X1 * v46 + (X3 * v47 + (X5 * v48 + X7 * v49)))),
+            v63 = 1.0 + v62, v64 = (v50 * v56 - v45 * v55) * v59,
+            v65 = (v45 * v53 - v50 * v54) * v59, v66 = v59 * (v58 + v43 * v56),
+            v67 = v59 * (v57 + v43 * v54), v68 = v59 * (v60 - v58), v69 = v59 * (v57 - v61),
+            v70 = v59 * (v41 * v55 + v60), v71 = v59 * (v41 * v53 + v61),
+            v72 = 1.0 + d0 * v64 + d2 * v66 + d4 * v68 - d6 * v70,
+            v73 = d0 * v65 - d2 * v67 + d4 * v69 + d6 * v71,
+            v74 = d1 * v64 + d3 * v66 + d5 * v68 - d7 * v70,
+            v75 = 1.0 + d1 * v65 - d3 * v67 + d5 * v69 + d7 * v71,
+            v76 = v34 * (1.0 / (v63 * (v72 * v75 - v73 * v74)));
+        const M v77 = softehl_eq(v76, softehl_splat(0.0)); V v78 = softehl_splat(0.0);
+        const M m79 = ~v77;
+        if (softehl_any(m79)) {
+            const V v80 = softehl_vrcbrt(v76), v81 = v80 * (v76 * v80);
+            v78 = softehl_blend(m79, v81, v78);
         }
-        const V v231 = v212 * v226;
-        const V v232 = v214 * v226;
-        const V v233 = v216 * v226;
-        const V v234 = v218 * v226;
-        const V v235 = v180 * v226;
-        const V v236 = 2.0 * v231;
-        const V v237 = v231 * v231;
-        const V v238 = 2.0 * v232;
-        const V v239 = 2.0 * v233;
-        const V v240 = v233 * v233;
-        const V v241 = v231 * v233;
-        const V v242 = 2.0 * v234;
-        const V v243 = v235 * v235;
-        const V v244 = 2.0 * v235;
-        const V v245 = v232 * v232;
-        const V v246 = v237 + v245;
-        const V v247 = v231 * v234;
-        const V v248 = v234 * v234;
-        const V v249 = v240 + v248;
-        const V v250 = v232 * v234;
-        const V v251 = v241 + v250;
-        const V v252 = v235 * v244;
-        const V v253 = 2.0 * v243;
-        const V v254 = v232 * v233;
-        const V v255 = v247 - v254;
-        const V v256 = 2.0 * v246;
-        const V v257 = 2.0 * v249;
-        const V v258 = 2.0 * v251;
-        const V v259 = v235 * v255;
-        const V v260 = v243 + v246;
-        const V v261 = v255 * v255;
-        const V v262 = v253 * v255;
-        const V v263 = v249 + v260;
-        const V v264 = 1.0 / v259;
-        const V v265 = v243 * v261;
-        const V v266 = 2.0 * v263;
-        const V v267 = v263 * v263;
-        const V v268 = v1 * v263;
-        const V v269 = v243 * v243;
-        const V v270 = v267 - v269;
-        const V v271 = v246 * v246;
-        const V v272 = v270 - v271;
-        const V v273 = v249 * v249;
-        const V v274 = v272 - v273;
-        const V v275 = 0.5 * v274;
-        const V v276 = softehl_vrcbrt(v265);
-        const V v277 = 1.0 / v265;
-        const V v278 = v251 * v251;
-        const V v279 = v275 - v278;
-        const V v280 = v1 * v276;
-        const V v281 = v276 * v276;
-        const V v282 = parameters[1] * v276;
-        const V v283 = v282 * v279;
-        const V v284 = v268 + v283;
-        const V v285 = v2 * v281;
-        const V v286 = v285 * v258;
-        const V v287 = 0.5 * v285;
-        const V v288 = v287 * v266;
-        const V v289 = v280 + v288;
-        const V v290 = 1.0 - v277;
-        const V v291 = v3 * v290;
-        const V v292 = 0.3333333333333333 * v281;
-        const V v293 = v281 * v292;
-        const V v294 = v293 * v284;
-        const V v295 = v291 - v294;
-        const V v296 = v262 * v295;
-        const V v297 = v261 * v295;
-        const V v298 = v253 * v287;
-        const V v299 = v297 - v298;
-        const V v300 = v289 + v299;
-        const V v301 = v252 * v300;
-        const V v302 = v264 * v301;
-        const V v303 = v287 * v256;
-        const V v304 = v289 - v303;
-        const V v305 = v287 * v257;
-        const V v306 = v289 - v305;
-        const V v307 = v242 * v306;
-        const V v308 = v239 * v306;
-        const V v309 = v238 * v304;
-        const V v310 = v236 * v304;
-        const V v311 = v234 * v286;
-        const V v312 = v309 - v311;
-        const V v313 = v234 * v296;
-        const V v314 = v310 + v313;
-        const V v315 = v233 * v286;
-        const V v316 = v314 - v315;
-        const V v317 = v233 * v296;
-        const V v318 = v312 - v317;
-        const V v319 = v233 * v316;
-        const V v320 = v234 * v318;
-        const V v321 = v319 + v320;
-        const V v322 = v264 * v321;
-        const V v323 = v231 * v316;
-        const V v324 = v232 * v318;
-        const V v325 = v323 + v324;
-        const V v326 = v264 * v325;
-        const V v327 = v232 * v286;
-        const V v328 = v307 - v327;
-        const V v329 = v231 * v286;
-        const V v330 = v308 - v329;
-        const V v331 = v232 * v296;
-        const V v332 = v330 - v331;
-        const V v333 = v231 * v296;
-        const V v334 = v333 + v328;
-        const V v335 = v233 * v332;
-        const V v336 = v234 * v334;
-        const V v337 = v335 + v336;
-        const V v338 = v264 * v337;
-        softehl_store4(R + 7 * q + 0, (7 * points), v137, v139, v259, v326);
-        softehl_store3(R + 7 * q + 4, (7 * points), v338, v302, v322);
+        const V v82 = v72 * v78, v83 = v73 * v78, v84 = v74 * v78, v85 = v75 * v78, v86 = v63 * v78,
+            v87 = v86 * v86, v88 = v82 * v82 + v83 * v83, v89 = v84 * v84 + v85 * v85,
+            v90 = v82 * v84 + v83 * v85, v91 = 2.0 * v87, v92 = v82 * v85 - v83 * v84,
+            v93 = v86 * v92, v94 = v92 * v92, v95 = v89 + (v87 + v88), v96 = 1.0 / v93,
+            v97 = v87 * v94, v98 = softehl_vrcbrt(v97),
+            v99 = 0.5 * (v95 * v95 - v87 * v87 - v88 * v88 - v89 * v89) - v90 * v90,
+            v100 = v98 * v98, v101 = v2 * v100, v102 = v101 * (2.0 * v90), v103 = 0.5 * v101,
+            v104 = v1 * v98 + v103 * (2.0 * v95),
+            v105 = v100 * (0.3333333333333333 * v100) * (v1 * v95 + parameters[1] * v98 * v99),
+            v106 = v3 * (1.0 - 1.0 / v97) - v105, v107 = v91 * v92 * v106,
+            v108 = v96 * (v86 * (2.0 * v86) * (v104 + (v94 * v106 - v91 * v103))),
+            v109 = v104 - v103 * (2.0 * v88), v110 = v104 - v103 * (2.0 * v89),
+            v111 = 2.0 * v82 * v109 + v85 * v107 - v84 * v102,
+            v112 = 2.0 * v83 * v109 - v85 * v102 - v84 * v107,
+            v113 = v96 * (v84 * v111 + v85 * v112), v114 = v96 * (v82 * v111 + v83 * v112),
+            v115 = v84 * (2.0 * v84 * v110 - v82 * v102 - v83 * v107) + v85 * (v82 * v107 + (2.0 * v85 * v110 - v83 * v102)),
+            v116 = v96 * v115;
+        softehl_store4(R + 7 * q + 0, (7 * points), v51, v52, v93, v114);
+        softehl_store3(R + 7 * q + 4, (7 * points), v116, v108, v113);
     }
 }
-
-void softehl_solid_fbar_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_fbar_fields_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + (7 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_fbar_fields_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (7 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * (7 * points)];
-    softehl_solid_fbar_fields(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (7 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_solid_fbar_fields, 8, 8, 0, 0, (7 * points), 0)

@@ -23,705 +23,124 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_solid_fbar_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_fbar_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10;
+    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
     softehl_load3(t + 8, 11, &t8, &t9, &t10);
-    (void)t8; (void)t9; (void)t10;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 0.25 * parameters[2];
-    const V v4 = 0.5 * t8;
-    const V v5 = 0.5 * t9;
-    const V v6 = X4 - X2;
-    const V v7 = X2 - X6;
-    const V v8 = X4 - X6;
-    const V v9 = X3 - X1;
-    const V v10 = X4 - X0;
-    const V v11 = X1 + X3;
-    const V v12 = X5 + v9;
-    const V v13 = X5 - X3;
-    const V v14 = v7 + v10;
-    const V v15 = v10 - v7;
-    const V v16 = X5 - X7;
-    const V v17 = X5 + X7;
-    const V v18 = v12 - X7;
-    const V v19 = 0.25 * v14;
-    const V v20 = 0.0625 * v14;
-    const V v21 = 0.25 * v15;
-    const V v22 = 0.0625 * v15;
-    const V v23 = v11 + v17;
-    const V v24 = 0.25 * v18;
-    const V v25 = 0.0625 * v18;
-    const V v26 = v17 - v11;
-    const V v27 = 0.25 * v23;
-    const V v28 = 0.25 * v26;
-    const V v29 = 0.0625 * v26;
-    const V v30 = 1.0 / v27;
-    const V v31 = d0 - d2;
-    const V v32 = d0 + d2;
-    const V v33 = d1 - d3;
-    const V v34 = d1 + d3;
-    const V v35 = v32 - d4;
-    const V v36 = v28 * v19;
-    const V v37 = v35 - d6;
-    const V v38 = d4 - d6;
-    const V v39 = v21 * v24;
-    const V v40 = v36 - v39;
-    const V v41 = 1.0 / v40;
-    const V v42 = v31 - v38;
-    const V v43 = v31 + v38;
-    const V v44 = d5 + d7;
-    const V v45 = d5 - d7;
-    const V v46 = v34 - v44;
-    const V v47 = v34 + v44;
-    const V v48 = v33 - v45;
-    const V v49 = v33 + v45;
-    const V v50 = 0.25 * v30;
-    const V v51 = t1 + t3;
-    const V v52 = t3 - t1;
-    const V v53 = v30 * v50;
-    const V v54 = v47 * v50;
-    const V v55 = 1.0 + v54;
-    const V v56 = t4 - t2;
-    const V v57 = v47 * v53;
-    const V v58 = t2 - t6;
-    const V v59 = t4 - t6;
-    const V v60 = t4 - t0;
-    const V v61 = t5 + v52;
-    const V v62 = v58 + v60;
-    const V v63 = v60 - v58;
-    const V v64 = t5 - t3;
-    const V v65 = 0.25 * v62;
-    const V v66 = v61 - t7;
-    const V v67 = t5 + t7;
-    const V v68 = t5 - t7;
-    const V v69 = 0.25 * v63;
-    const V v70 = 0.25 * v66;
-    const V v71 = v51 + v67;
-    const V v72 = v41 * v41;
-    const V v73 = 0.25 * v41;
-    const V v74 = v67 - v51;
-    const V v75 = v28 * v65;
-    const V v76 = 0.25 * v74;
-    const V v77 = 0.25 * v71;
-    const V v78 = v65 * v73;
-    const V v79 = v25 * v41;
-    const V v80 = v70 * v73;
-    const V v81 = v21 * v70;
-    const V v82 = v75 - v81;
-    const V v83 = v69 * v73;
-    const V v84 = v69 * v24;
-    const V v85 = v82 - v84;
-    const V v86 = v29 * v41;
-    const V v87 = v76 * v73;
-    const V v88 = v76 * v19;
-    const V v89 = v85 + v88;
-    const V v90 = v22 * v41;
-    const V v91 = v20 * v41;
-    const V v92 = v72 * v89;
-    const V v93 = v46 * v79;
-    const V v94 = v37 * v79;
-    const V v95 = 1.0 + v94;
-    const V v96 = v25 * v92;
-    const V v97 = v80 - v96;
-    const V v98 = v42 * v90;
-    const V v99 = v42 * v86;
-    const V v100 = v95 - v99;
-    const V v101 = v48 * v86;
-    const V v102 = v93 - v101;
-    const V v103 = v48 * v90;
-    const V v104 = 1.0 + v103;
-    const V v105 = v29 * v92;
-    const V v106 = v87 - v105;
-    const V v107 = v22 * v92;
-    const V v108 = v83 - v107;
-    const V v109 = v37 * v91;
-    const V v110 = v98 - v109;
-    const V v111 = v46 * v91;
-    const V v112 = v104 - v111;
-    const V v113 = v20 * v92;
-    const V v114 = v78 - v113;
-    const V v115 = v100 * v112;
-    const V v116 = v102 * v110;
-    const V v117 = v115 - v116;
-    const V v118 = v37 * v97;
-    const V v119 = v46 * v97;
-    const V v120 = v42 * v108;
-    const V v121 = v48 * v108;
-    const V v122 = v42 * v106;
-    const V v123 = v118 - v122;
-    const V v124 = v48 * v106;
-    const V v125 = v119 - v124;
-    const V v126 = v57 * v117;
-    const V v127 = v55 * v117;
-    const V v128 = v112 * v123;
-    const V v129 = v37 * v114;
-    const V v130 = v120 - v129;
-    const V v131 = v46 * v114;
-    const V v132 = v121 - v131;
-    const V v133 = v100 * v132;
-    const V v134 = v128 + v133;
-    const V v135 = v102 * v130;
-    const V v136 = v134 - v135;
-    const V v137 = v110 * v125;
-    const V v138 = v136 - v137;
-    const V v139 = v55 * v138;
-    const V v140 = v77 * v126;
-    const V v141 = v139 - v140;
-    V s142 = softehl_splat(0.0);
-    V s143 = softehl_splat(0.0);
-    V s144 = softehl_splat(0.0);
-    V s145 = softehl_splat(0.0);
-    V s146 = softehl_splat(0.0);
-    V s147 = softehl_splat(0.0);
-    V s148 = softehl_splat(0.0);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1], v3 = 0.25 * parameters[2];
+    const V v4 = 0.5 * t8, v5 = 0.5 * t9, v6 = X4 - X2, v7 = X2 - X6, v8 = X4 - X6, v9 = X4 - X0,
+        v10 = X1 + X3, v11 = X5 - X3, v12 = v7 + v9, v13 = v9 - v7, v14 = X5 - X7, v15 = X5 + X7,
+        v16 = X5 + (X3 - X1) - X7, v17 = 0.25 * v12, v18 = 0.0625 * v12, v19 = 0.25 * v13,
+        v20 = 0.0625 * v13, v21 = 0.25 * v16, v22 = 0.0625 * v16, v23 = v15 - v10, v24 = 0.25 * v23,
+        v25 = 0.0625 * v23, v26 = 1.0 / (0.25 * (v10 + v15)), v27 = d0 - d2, v28 = d1 - d3,
+        v29 = d1 + d3, v30 = d0 + d2 - d4 - d6, v31 = d4 - d6, v32 = 1.0 / (v24 * v17 - v19 * v21),
+        v33 = v27 - v31, v34 = v27 + v31, v35 = d5 + d7, v36 = d5 - d7, v37 = v29 - v35,
+        v38 = v29 + v35, v39 = v28 - v36, v40 = v28 + v36, v41 = 0.25 * v26, v42 = t1 + t3,
+        v43 = 1.0 + v38 * v41, v44 = t4 - t2, v45 = t2 - t6, v46 = t4 - t6, v47 = t4 - t0,
+        v48 = t5 - t3, v49 = 0.25 * (v45 + v47), v50 = t5 + t7, v51 = t5 - t7,
+        v52 = 0.25 * (v47 - v45), v53 = 0.25 * (t5 + (t3 - t1) - t7), v54 = 0.25 * v32,
+        v55 = 0.25 * (v50 - v42), v56 = v22 * v32, v57 = v25 * v32, v58 = v20 * v32,
+        v59 = v18 * v32, v60 = v32 * v32 * (v24 * v49 - v19 * v53 - v52 * v21 + v55 * v17),
+        v61 = v53 * v54 - v22 * v60, v62 = 1.0 + v30 * v56 - v33 * v57, v63 = v37 * v56 - v39 * v57,
+        v64 = v55 * v54 - v25 * v60, v65 = v52 * v54 - v20 * v60, v66 = v33 * v58 - v30 * v59,
+        v67 = 1.0 + v39 * v58 - v37 * v59, v68 = v49 * v54 - v18 * v60, v69 = v62 * v67 - v63 * v66,
+        v70 = v43 * v69,
+        v71 = v67 * (v30 * v61 - v33 * v64) + v62 * (v39 * v65 - v37 * v68) - v63 * (v33 * v65 - v30 * v68),
+        v72 = v43 * (v71 - v66 * (v37 * v61 - v39 * v64)) - 0.25 * (v42 + v50) * (v38 * (v26 * v41) * v69);
+    V s73 = {0}, s74 = {0}, s75 = {0}, s76 = {0}, s77 = {0}, s78 = {0}, s79 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v149 = 1.0 - w[0];
-        const double v150 = 1.0 + w[0];
-        const double v151 = 0.25 * w[0];
-        const double v152 = 1.0 + w[1];
-        const double v153 = 0.25 * w[1];
-        const double v154 = w[0] * w[1];
-        const double v155 = 0.25 * v152;
-        const double v156 = 0.25 + v151;
-        const double v157 = 0.25 - v151;
-        const double v158 = 0.25 - v153;
-        const double v159 = 0.25 + v153;
-        const V v160 = w[1] * v43;
-        const V v161 = v42 - v160;
-        const V v162 = w[0] * v43;
-        const V v163 = v37 - v162;
-        const double v164 = v151 - 0.25;
-        const double v165 = v150 * v155;
-        const double v166 = v149 * v155;
-        const double v167 = v153 - 0.25;
-        const V v168 = X2 * v158;
-        const V v169 = X6 * v157;
-        const V v170 = v159 * v16;
-        const V v171 = v158 * t2;
-        const V v172 = v157 * t6;
-        const V v173 = v159 * v68;
-        const V v174 = X5 * v165;
-        const V v175 = v165 * t5;
-        const V v176 = v159 * v8;
-        const V v177 = v168 + v176;
-        const V v178 = v159 * v59;
-        const V v179 = v171 + v178;
-        const V v180 = X3 * v158;
-        const V v181 = v180 + v170;
-        const V v182 = v158 * t3;
-        const V v183 = v182 + v173;
-        const V v184 = v156 * v6;
-        const V v185 = v169 + v184;
-        const V v186 = v156 * v56;
-        const V v187 = v172 + v186;
-        const V v188 = v156 * v13;
-        const V v189 = v156 * v64;
-        const V v190 = X0 * v167;
-        const V v191 = v190 + v177;
-        const V v192 = X0 * v164;
-        const V v193 = v192 + v185;
-        const V v194 = X1 * v167;
-        const V v195 = v194 + v181;
-        const V v196 = v167 * t0;
-        const V v197 = v196 + v179;
-        const V v198 = v164 * t0;
-        const V v199 = v198 + v187;
-        const V v200 = v167 * t1;
-        const V v201 = v200 + v183;
-        const V v202 = X1 * v164;
-        const V v203 = v202 + v188;
-        const V v204 = v164 * t1;
-        const V v205 = v204 + v189;
-        const V v206 = 0.25 * v191;
-        const V v207 = 0.25 * v193;
-        const V v208 = 0.25 * v195;
-        const V v209 = w[0] * v48;
-        const V v210 = v47 - v209;
-        const V v211 = X7 * v157;
-        const V v212 = v211 + v203;
-        const V v213 = v157 * t7;
-        const V v214 = v213 + v205;
-        const V v215 = X7 * v166;
-        const V v216 = v174 + v215;
-        const V v217 = v166 * t7;
-        const V v218 = v175 + v217;
-        const V v219 = w[1] * v46;
-        const V v220 = v210 - v219;
-        const V v221 = w[1] * v49;
-        const V v222 = v48 - v221;
-        const V v223 = w[0] * v49;
-        const V v224 = v46 - v223;
-        const V v225 = 0.25 * v212;
-        const V v226 = v154 * v49;
-        const V v227 = v226 + v220;
-        const double v228 = 1.0 - w[1];
-        const double v229 = 0.25 * v228;
-        const V v230 = v191 * v212;
-        const V v231 = v191 * v214;
-        const V v232 = v197 * v212;
-        const V v233 = v231 + v232;
-        const V v234 = v193 * v195;
-        const V v235 = v230 - v234;
-        const V v236 = 1.0 / v235;
-        const V v237 = 6.283185307179586 * v235;
-        const V v238 = w[2] * v235;
-        const double v239 = v229 * v149;
-        const double v240 = v229 * v150;
-        const V v241 = v195 * v199;
-        const V v242 = v233 - v241;
-        const V v243 = v193 * v201;
-        const V v244 = v242 - v243;
-        const V v245 = v214 * v236;
-        const V v246 = v201 * v236;
-        const V v247 = v197 * v236;
-        const V v248 = v199 * v236;
-        const V v249 = X1 * v239;
-        const V v250 = v249 + v216;
-        const V v251 = v239 * t1;
-        const V v252 = v251 + v218;
-        const V v253 = X3 * v240;
-        const V v254 = v253 + v250;
-        const V v255 = v240 * t3;
-        const V v256 = v255 + v252;
-        const V v257 = v237 * v256;
-        const V v258 = 1.0 / v254;
-        const V v259 = 6.283185307179586 * v254;
-        const V v260 = v238 * v259;
-        const V v261 = v244 * v259;
-        const V v262 = v257 + v261;
-        const V v263 = w[2] * v262;
-        const V v264 = 0.25 * v258;
-        const V v265 = v258 * v264;
-        const V v266 = v256 * v265;
-        const V v267 = v236 * v236;
-        const V v268 = v244 * v267;
-        const V v269 = v212 * v268;
-        const V v270 = v245 - v269;
-        const V v271 = v225 * v236;
-        const V v272 = v208 * v236;
-        const V v273 = v206 * v236;
-        const V v274 = v207 * v236;
-        const V v275 = v195 * v268;
-        const V v276 = v246 - v275;
-        const V v277 = v191 * v268;
-        const V v278 = v247 - v277;
-        const V v279 = v193 * v268;
-        const V v280 = v248 - v279;
-        const V v281 = 0.25 * v270;
-        const V v282 = 3.0 * v260;
-        const V v283 = 0.25 * v276;
-        const V v284 = v161 * v274;
-        const V v285 = v224 * v272;
-        const V v286 = v161 * v271;
-        const V v287 = 1.0 - v286;
-        const V v288 = v224 * v273;
-        const V v289 = 1.0 - v288;
-        const V v290 = 0.25 * v278;
-        const V v291 = v163 * v272;
-        const V v292 = v287 + v291;
-        const V v293 = v163 * v273;
-        const V v294 = v284 - v293;
-        const V v295 = 2.0 * v292;
-        const V v296 = v222 * v271;
-        const V v297 = v285 - v296;
-        const V v298 = v222 * v274;
-        const V v299 = v289 + v298;
-        const V v300 = v292 * v292;
-        const V v301 = 2.0 * v294;
-        const V v302 = 2.0 * v297;
-        const V v303 = 2.0 * v299;
-        const V v304 = v292 * v299;
-        const V v305 = 0.25 * v280;
-        const V v306 = v294 * v294;
-        const V v307 = v300 + v306;
-        const V v308 = v294 * v297;
-        const V v309 = v304 - v308;
-        const V v310 = v297 * v297;
-        const V v311 = v307 + v310;
-        const V v312 = v299 * v299;
-        const V v313 = v311 + v312;
-        const V v314 = 2.0 * v309;
-        const V v315 = v309 * v309;
-        const V v316 = v222 * v305;
-        const V v317 = v161 * v305;
-        const V v318 = v227 * v264;
-        const V v319 = 1.0 + v318;
-        const V v320 = v319 * v319;
-        const V v321 = 2.0 * v319;
-        const V v322 = v309 * v319;
-        const V v323 = v163 * v283;
-        const V v324 = v163 * v290;
-        const V v325 = v317 - v324;
-        const V v326 = v161 * v281;
-        const V v327 = v323 - v326;
-        const V v328 = v224 * v283;
-        const V v329 = v224 * v290;
-        const V v330 = v316 - v329;
-        const V v331 = 1.0 / v322;
-        const V v332 = 2.0 * v325;
-        const V v333 = v222 * v281;
-        const V v334 = v328 - v333;
-        const V v335 = v227 * v266;
-        const V v336 = 2.0 * v327;
-        const V v337 = 2.0 * v330;
-        const V v338 = 2.0 * v334;
-        const V v339 = v299 * v327;
-        const V v340 = 2.0 * v335;
-        const V v341 = v295 * v327;
-        const V v342 = v321 * v335;
-        const V v343 = v313 + v320;
-        const V v344 = v292 * v330;
-        const V v345 = v339 + v344;
-        const V v346 = v313 * v320;
-        const V v347 = v315 + v346;
-        const V v348 = v303 * v330;
-        const V v349 = v341 + v348;
-        const V v350 = v297 * v325;
-        const V v351 = v345 - v350;
-        const V v352 = v301 * v325;
-        const V v353 = v349 + v352;
-        const V v354 = v294 * v334;
-        const V v355 = v351 - v354;
-        const V v356 = v302 * v334;
-        const V v357 = v353 + v356;
-        const V v358 = v319 * v355;
-        const V v359 = v320 * v357;
-        const V v360 = v309 * v335;
-        const V v361 = v358 - v360;
-        const V v362 = v357 - v342;
-        const V v363 = v127 * v331;
-        const V v364 = 1.0 / v363;
-        const V v365 = v313 * v342;
-        const V v366 = v359 - v365;
-        const V v367 = v314 * v355;
-        const V v368 = v366 + v367;
-        const V v369 = softehl_vrcbrt(v363);
-        const V v370 = v369 * v369;
-        const V v371 = v361 * v363;
-        const V v372 = v141 - v371;
-        const V v373 = v331 * v372;
-        const V v374 = v363 * v370;
-        const V v375 = 0.3333333333333333 * v370;
-        const V v376 = v373 * v375;
-        const V v377 = v374 * v374;
-        const V v378 = v362 * v377;
-        const V v379 = v320 * v377;
-        const V v380 = v309 * v377;
-        const V v381 = v380 * v380;
-        const V v382 = 2.0 * v380;
-        const V v383 = v379 * v381;
-        const V v384 = softehl_vrcbrt(v383);
-        const V v385 = 1.0 / v383;
-        const V v386 = v384 * v384;
-        const V v387 = v374 * v377;
-        const V v388 = v374 * v387;
-        const V v389 = v368 * v388;
-        const V v390 = v376 * v387;
-        const V v391 = v386 * v386;
-        const V v392 = 0.6666666666666666 * v384;
-        const V v393 = v391 * v392;
-        const V v394 = 0.3333333333333333 * v391;
-        const V v395 = v384 * v386;
-        const V v396 = 2.0 * v374;
-        const V v397 = v376 * v396;
-        const V v398 = 0.4444444444444444 * v384;
-        const V v399 = v309 * v397;
-        const V v400 = v260 * v364;
-        const V v401 = v282 * v364;
-        const V v402 = v3 * v400;
-        const V v403 = v377 * v401;
-        const V v404 = v376 * v403;
-        const V v405 = v263 - v404;
-        const V v406 = v364 * v405;
-        const V v407 = v376 * v377;
-        const V v408 = v374 * v397;
-        const V v409 = v407 + v408;
-        const V v410 = v374 * v409;
-        const V v411 = v390 + v410;
-        const V v412 = v5 * v400;
-        const V v413 = v4 * v400;
-        const V v414 = t10 * v400;
-        const V v415 = v2 * v400;
-        const V v416 = v1 * v400;
-        const V v417 = v2 * v406;
-        const V v418 = v412 + v417;
-        const V v419 = v1 * v406;
-        const V v420 = v413 + v419;
-        const V v421 = parameters[2] * v406;
-        const V v422 = v414 + v421;
-        const V v423 = 0.25 * v422;
-        const V v424 = v384 * v416;
-        const V v425 = v384 * v420;
-        const V v426 = v385 * v402;
-        const V v427 = v402 - v426;
-        const V v428 = v385 * v426;
-        const V v429 = 1.0 - v385;
-        const V v430 = v423 * v429;
-        const V v431 = v377 * v424;
-        const V v432 = v397 * v424;
-        const V v433 = v355 * v377;
-        const V v434 = v399 + v433;
-        const V v435 = v343 * v377;
-        const V v436 = v420 * v435;
-        const V v437 = v416 * v435;
-        const V v438 = v343 * v397;
-        const V v439 = v378 + v438;
-        const V v440 = v416 * v439;
-        const V v441 = v436 + v440;
-        const V v442 = v394 * v416;
-        const V v443 = v394 * v441;
-        const V v444 = v430 - v443;
-        const V v445 = v394 * v437;
-        const V v446 = v427 - v445;
-        const V v447 = v398 * v437;
-        const V v448 = v395 * v447;
-        const V v449 = v395 * v448;
-        const V v450 = v428 + v449;
-        const V v451 = v382 * v434;
-        const V v452 = v320 * v397;
-        const V v453 = v342 * v377;
-        const V v454 = v452 - v453;
-        const V v455 = v381 * v454;
-        const V v456 = v379 * v451;
-        const V v457 = v455 + v456;
-        const V v458 = v442 * v457;
-        const V v459 = v425 - v458;
-        const V v460 = v377 * v459;
-        const V v461 = v432 + v460;
-        const V v462 = v347 * v388;
-        const V v463 = v347 * v411;
-        const V v464 = v389 + v463;
-        const V v465 = v415 * v464;
-        const V v466 = v415 * v462;
-        const V v467 = v418 * v462;
-        const V v468 = v465 + v467;
-        const V v469 = 1.1111111111111112 * v466;
-        const V v470 = v391 * v469;
-        const V v471 = v391 * v470;
-        const V v472 = v450 + v471;
-        const V v473 = v386 * v418;
-        const V v474 = v386 * v415;
-        const V v475 = v411 * v474;
-        const V v476 = v388 * v474;
-        const V v477 = v393 * v415;
-        const V v478 = v457 * v477;
-        const V v479 = v473 - v478;
-        const V v480 = v388 * v479;
-        const V v481 = v475 + v480;
-        const V v482 = v457 * v472;
-        const V v483 = v444 + v482;
-        const V v484 = v393 * v468;
-        const V v485 = v483 - v484;
-        const V v486 = v393 * v466;
-        const V v487 = v446 - v486;
-        const V v488 = v451 * v487;
-        const V v489 = v454 * v487;
-        const V v490 = v379 * v485;
-        const V v491 = v489 + v490;
-        const V v492 = v379 * v487;
-        const V v493 = v381 * v485;
-        const V v494 = v488 + v493;
-        const V v495 = v381 * v487;
-        const V v496 = v377 * v494;
-        const V v497 = v461 + v496;
-        const V v498 = v342 * v476;
-        const V v499 = v461 - v498;
-        const V v500 = 2.0 * v476;
-        const V v501 = v355 * v500;
-        const V v502 = v357 * v476;
-        const V v503 = v497 + v502;
-        const V v504 = 2.0 * v492;
-        const V v505 = v434 * v504;
-        const V v506 = v382 * v491;
-        const V v507 = v505 + v506;
-        const V v508 = v382 * v492;
-        const V v509 = v377 * v507;
-        const V v510 = v501 + v509;
-        const V v511 = v377 * v508;
-        const V v512 = v397 * v508;
-        const V v513 = v510 + v512;
-        const V v514 = v397 * v495;
-        const V v515 = v503 + v514;
-        const V v516 = v377 * v495;
-        const V v517 = v431 + v516;
-        const V v518 = v313 * v476;
-        const V v519 = v517 + v518;
-        const V v520 = v313 * v481;
-        const V v521 = v515 + v520;
-        const V v522 = v314 * v476;
-        const V v523 = v511 + v522;
-        const V v524 = v314 * v481;
-        const V v525 = v513 + v524;
-        const V v526 = v320 * v481;
-        const V v527 = v499 + v526;
-        const V v528 = v320 * v476;
-        const V v529 = v431 + v528;
-        const V v530 = v337 * v529;
-        const V v531 = v327 * v523;
-        const V v532 = v530 + v531;
-        const V v533 = v338 * v529;
-        const V v534 = v325 * v523;
-        const V v535 = v533 - v534;
-        const V v536 = v332 * v529;
-        const V v537 = v334 * v523;
-        const V v538 = v536 - v537;
-        const V v539 = v336 * v529;
-        const V v540 = v330 * v523;
-        const V v541 = v539 + v540;
-        const V v542 = v321 * v521;
-        const V v543 = v321 * v519;
-        const V v544 = v340 * v519;
-        const V v545 = v542 - v544;
-        const V v546 = v264 * v545;
-        const V v547 = v266 * v543;
-        const V v548 = v546 - v547;
-        s142 += v548;
-        const V v549 = v154 * v548;
-        const V v550 = v303 * v527;
-        const V v551 = v532 + v550;
-        const V v552 = v303 * v529;
-        const V v553 = v292 * v523;
-        const V v554 = v552 + v553;
-        const V v555 = v292 * v525;
-        const V v556 = v551 + v555;
-        const V v557 = v302 * v527;
-        const V v558 = v535 + v557;
-        const V v559 = v302 * v529;
-        const V v560 = v294 * v523;
-        const V v561 = v559 - v560;
-        const V v562 = v294 * v525;
-        const V v563 = v558 - v562;
-        const V v564 = v301 * v527;
-        const V v565 = v538 + v564;
-        const V v566 = v301 * v529;
-        const V v567 = v295 * v527;
-        const V v568 = v541 + v567;
-        const V v569 = v295 * v529;
-        const V v570 = v297 * v523;
-        const V v571 = v566 - v570;
-        const V v572 = v297 * v525;
-        const V v573 = v565 - v572;
-        const V v574 = v299 * v523;
-        const V v575 = v569 + v574;
-        const V v576 = v299 * v525;
-        const V v577 = v568 + v576;
-        const V v578 = v305 * v554;
-        const V v579 = v305 * v571;
-        const V v580 = v281 * v561;
-        const V v581 = v578 - v580;
-        const V v582 = v281 * v575;
-        const V v583 = v579 - v582;
-        const V v584 = v283 * v561;
-        const V v585 = v283 * v575;
-        const V v586 = v290 * v554;
-        const V v587 = v584 - v586;
-        const V v588 = v290 * v571;
-        const V v589 = v585 - v588;
-        const V v590 = v274 * v556;
-        const V v591 = v581 + v590;
-        const V v592 = v274 * v573;
-        const V v593 = v583 + v592;
-        const V v594 = v273 * v556;
-        const V v595 = v587 - v594;
-        const V v596 = v273 * v573;
-        const V v597 = v589 - v596;
-        const V v598 = v272 * v563;
-        const V v599 = v595 + v598;
-        const V v600 = v272 * v577;
-        const V v601 = v597 + v600;
-        s143 += v601;
-        const V v602 = v271 * v563;
-        const V v603 = v591 - v602;
-        const V v604 = v271 * v577;
-        const V v605 = v593 - v604;
-        s144 += v605;
-        const V v606 = w[0] * v599;
-        s146 += v549;
-        s146 -= v606;
-        const V v607 = w[0] * v601;
-        const V v608 = w[1] * v605;
-        s148 += v607;
-        s148 += v608;
-        const V v609 = w[1] * v548;
-        s145 += v599;
-        s145 -= v609;
-        const V v610 = w[1] * v603;
-        s146 -= v610;
-        const V v611 = w[0] * v548;
-        s147 += v603;
-        s147 -= v611;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v80 = 1.0 - w[0], v81 = 1.0 + w[0], v82 = 0.25 * w[0], v83 = 0.25 * w[1],
+            v84 = w[0] * w[1], v85 = 0.25 * (1.0 + w[1]), v86 = 0.25 + v82, v87 = 0.25 - v82,
+            v88 = 0.25 - v83, v89 = 0.25 + v83;
+        const V v90 = v33 - w[1] * v34, v91 = v30 - w[0] * v34;
+        const double v92 = v82 - 0.25, v93 = v81 * v85, v94 = v80 * v85, v95 = v83 - 0.25;
+        const V v96 = X0 * v95 + (X2 * v88 + v89 * v8), v97 = X0 * v92 + (X6 * v87 + v86 * v6),
+            v98 = X1 * v95 + (X3 * v88 + v89 * v14), v99 = v95 * t0 + (v88 * t2 + v89 * v46),
+            v100 = v92 * t0 + (v87 * t6 + v86 * v44), v101 = v95 * t1 + (v88 * t3 + v89 * v51),
+            v102 = X7 * v87 + (X1 * v92 + v86 * v11), v103 = v87 * t7 + (v92 * t1 + v86 * v48),
+            v104 = v39 - w[1] * v40, v105 = v37 - w[0] * v40,
+            v106 = v84 * v40 + (v38 - w[0] * v39 - w[1] * v37);
+        const double v107 = 0.25 * (1.0 - w[1]);
+        const V v108 = v96 * v102 - v97 * v98, v109 = 1.0 / v108;
+        const double v110 = v107 * v80, v111 = v107 * v81;
+        const V v112 = v96 * v103 + v99 * v102 - v98 * v100 - v97 * v101,
+            v113 = X3 * v111 + (X1 * v110 + (X5 * v93 + X7 * v94)),
+            v114 = v111 * t3 + (v110 * t1 + (v93 * t5 + v94 * t7)), v115 = 1.0 / v113,
+            v116 = 6.283185307179586 * v113, v117 = w[2] * v108 * v116, v118 = 0.25 * v115,
+            v119 = v114 * (v115 * v118), v120 = v112 * (v109 * v109), v121 = 0.25 * v102 * v109,
+            v122 = 0.25 * v98 * v109, v123 = 0.25 * v96 * v109, v124 = 0.25 * v97 * v109,
+            v125 = 0.25 * (v103 * v109 - v102 * v120), v126 = 0.25 * (v101 * v109 - v98 * v120),
+            v127 = 0.25 * (v99 * v109 - v96 * v120), v128 = 1.0 - v90 * v121 + v91 * v122,
+            v129 = v90 * v124 - v91 * v123, v130 = 2.0 * v128, v131 = v105 * v122 - v104 * v121,
+            v132 = 1.0 - v105 * v123 + v104 * v124, v133 = 2.0 * v129, v134 = 2.0 * v131,
+            v135 = 2.0 * v132, v136 = 0.25 * (v100 * v109 - v97 * v120),
+            v137 = v128 * v132 - v129 * v131,
+            v138 = v128 * v128 + v129 * v129 + v131 * v131 + v132 * v132, v139 = 2.0 * v137,
+            v140 = 1.0 + v106 * v118, v141 = v140 * v140, v142 = 2.0 * v140,
+            v143 = v90 * v136 - v91 * v127, v144 = v91 * v126 - v90 * v125,
+            v145 = v104 * v136 - v105 * v127, v146 = 1.0 / (v137 * v140),
+            v147 = v105 * v126 - v104 * v125, v148 = v106 * v119, v149 = v142 * v148,
+            v150 = v138 + v141, v151 = v137 * v137 + v138 * v141,
+            v152 = v132 * v144 + v128 * v145 - v131 * v143 - v129 * v147,
+            v153 = v130 * v144 + v135 * v145 + v133 * v143 + v134 * v147, v154 = v70 * v146,
+            v155 = 1.0 / v154, v156 = softehl_vrcbrt(v154), v157 = v156 * v156, v158 = v154 * v157,
+            v159 = v146 * (v72 - (v140 * v152 - v137 * v148) * v154) * (0.3333333333333333 * v157),
+            v160 = v158 * v158, v161 = v141 * v160, v162 = v137 * v160, v163 = v162 * v162,
+            v164 = 2.0 * v162, v165 = v161 * v163, v166 = softehl_vrcbrt(v165), v167 = 1.0 / v165,
+            v168 = v166 * v166, v169 = v158 * v160, v170 = v158 * v169, v171 = v168 * v168,
+            v172 = v171 * (0.6666666666666666 * v166), v173 = 0.3333333333333333 * v171,
+            v174 = v166 * v168, v175 = v159 * (2.0 * v158), v176 = v117 * v155, v177 = v3 * v176,
+            v178 = w[2] * (6.283185307179586 * v108 * v114 + v112 * v116) - v159 * (v160 * (3.0 * v117 * v155)),
+            v179 = v155 * v178, v180 = v159 * v169 + v158 * (v159 * v160 + v158 * v175),
+            v181 = v2 * v176, v182 = v1 * v176, v183 = v5 * v176 + v2 * v179,
+            v184 = v4 * v176 + v1 * v179, v185 = v166 * v182, v186 = v167 * v177,
+            v187 = v160 * v185, v188 = v137 * v175 + v152 * v160, v189 = v150 * v160,
+            v190 = v182 * v189,
+            v191 = v173 * (v184 * v189 + v182 * ((v153 - v149) * v160 + v150 * v175)),
+            v192 = v164 * v188, v193 = v141 * v175 - v149 * v160, v194 = v163 * v193 + v161 * v192,
+            v195 = v175 * v185 + v160 * (v166 * v184 - v173 * v182 * v194), v196 = v151 * v170,
+            v197 = v181 * ((v141 * v153 - v138 * v149 + v139 * v152) * v170 + v151 * v180),
+            v198 = v181 * v196,
+            v199 = v167 * v186 + v174 * (v174 * (0.4444444444444444 * v166 * v190)) + v171 * (v171 * (1.1111111111111112 * v198)),
+            v200 = v168 * v181, v201 = v170 * v200,
+            v202 = v180 * v200 + v170 * (v168 * v183 - v194 * (v172 * v181)),
+            v203 = 0.25 * (t10 * v176 + parameters[2] * v179) * (1.0 - v167) - v191 + v194 * v199,
+            v204 = v203 - v172 * (v197 + v183 * v196),
+            v205 = v177 - v186 - v173 * v190 - v172 * v198, v206 = v161 * v205, v207 = v163 * v205,
+            v208 = v164 * v206,
+            v209 = v160 * (v188 * (2.0 * v206) + v164 * (v193 * v205 + v161 * v204)),
+            v210 = v195 + v160 * (v192 * v205 + v163 * v204) + v153 * v201 + v175 * v207,
+            v211 = v187 + v160 * v207 + v138 * v201, v212 = v160 * v208 + v139 * v201,
+            v213 = v152 * (2.0 * v201) + v209 + v175 * v208 + v139 * v202,
+            v214 = v195 - v149 * v201 + v141 * v202, v215 = v187 + v141 * v201,
+            v216 = v118 * (v142 * (v210 + v138 * v202) - 2.0 * v148 * v211) - v119 * (v142 * v211);
+        s73 += v216;
+        const V v217 = v135 * v215 + v128 * v212,
+            v218 = 2.0 * v145 * v215 + v144 * v212 + v135 * v214 + v128 * v213,
+            v219 = v134 * v215 - v129 * v212,
+            v220 = 2.0 * v147 * v215 - v143 * v212 + v134 * v214 - v129 * v213,
+            v221 = v133 * v215 - v131 * v212,
+            v222 = 2.0 * v143 * v215 - v147 * v212 + v133 * v214 - v131 * v213,
+            v223 = v130 * v215 + v132 * v212,
+            v224 = 2.0 * v144 * v215 + v145 * v212 + v130 * v214 + v132 * v213,
+            v225 = v126 * v219 - v127 * v217 - v123 * v218 + v122 * v220,
+            v226 = v126 * v223 - v127 * v221 - v123 * v222 + v122 * v224;
+        s74 += v226;
+        const V v227 = v136 * v217 - v125 * v219 + v124 * v218 - v121 * v220,
+            v228 = v136 * v221 - v125 * v223 + v124 * v222 - v121 * v224;
+        s75 += v228; s77 += v84 * v216; s77 -= w[0] * v225; s79 += w[0] * v226; s79 += w[1] * v228;
+        s76 += v225; s76 -= w[1] * v216; s77 -= w[1] * v227; s78 += v227; s78 -= w[0] * v216;
     }
-    const V v612 = s142 - s145;
-    const V v613 = s142 + s145;
-    const V v614 = s144 - s148;
-    const V v615 = s144 + s148;
-    const V v616 = s143 + v614;
-    const V v617 = s143 - v614;
-    const V v618 = s146 - s147;
-    const V v619 = s146 + s147;
-    const V v620 = s143 + v615;
-    const V v621 = v615 - s143;
-    const V v622 = v612 + v618;
-    const V v623 = v612 - v618;
-    const V v624 = -v620;
-    softehl_store4(R + 4, 8, v624, v622, v621, v623);
-    const V v625 = v619 + v613;
-    const V v626 = v613 - v619;
-    softehl_store4(R + 0, 8, v616, v625, v617, v626);
+    const V v229 = s73 - s76, v230 = s73 + s76, v231 = s75 - s79, v232 = s75 + s79,
+        v233 = s77 - s78, v234 = s77 + s78;
+    softehl_store4(R + 4, 8, -(s74 + v232), v229 + v233, v232 - s74, v229 - v233);
+    softehl_store4(R + 0, 8, s74 + v231, v234 + v230, s74 - v231, v230 - v234);
 }
-
-void softehl_solid_fbar_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_fbar_pseudo_load_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, direction + 11 * e, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_fbar_pseudo_load_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, direction + 11 * (n - SOFTEHL_LANES), parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double t[SOFTEHL_LANES * 11];
-    softehl_pad(t, direction, 11, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_fbar_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_solid_fbar_pseudo_load, 8, 8, 0, 11, 8, 0)

@@ -23,3103 +23,571 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_solid_q4_energy_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_q4_energy)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const V v1 = X4 - X2;
-    const V v2 = X4 - X6;
-    const V v3 = X2 - X0;
-    const V v4 = X6 - X0;
-    const V v5 = 0.6220084679281462 * X1;
-    const V v6 = 0.04465819873852045 * X1;
-    const V v7 = 0.10566243270259355 * v1;
-    const V v8 = 0.39433756729740643 * v1;
-    const V v9 = 0.10566243270259355 * v2;
-    const V v10 = 0.39433756729740643 * v2;
-    const V v11 = 0.39433756729740643 * v4;
-    const V v12 = v11 + v7;
-    const V v13 = 0.10566243270259355 * v4;
-    const V v14 = v13 + v8;
-    const V v15 = X1 + X5;
-    const V v16 = 0.04465819873852045 * X5;
-    const V v17 = v5 + v16;
-    const V v18 = 0.6220084679281462 * X5;
-    const V v19 = v6 + v18;
-    const V v20 = 0.39433756729740643 * v3;
-    const V v21 = v20 + v9;
-    const V v22 = 0.10566243270259355 * v3;
-    const V v23 = v22 + v10;
-    const V v24 = 0.16666666666666666 * v15;
-    const V v25 = 0.39433756729740643 * v12;
-    const V v26 = 0.10566243270259355 * v12;
-    const V v27 = 0.39433756729740643 * v14;
-    const V v28 = 0.39433756729740643 * v21;
-    const V v29 = 0.39433756729740643 * v23;
-    const V v30 = 0.10566243270259355 * v21;
-    const V v31 = 0.10566243270259355 * v23;
-    const V v32 = 0.10566243270259355 * v14;
-    const V v33 = v21 - v12;
-    const V v34 = v21 + v14;
-    const V v35 = v23 - v14;
-    const V v36 = v23 + v12;
-    const V v37 = v12 - v21;
-    const V v38 = v14 - v23;
-    const V v39 = 0.39433756729740643 * v33;
-    const V v40 = 0.39433756729740643 * v34;
-    const V v41 = 0.10566243270259355 * v35;
-    const V v42 = 0.10566243270259355 * v36;
-    const V v43 = 0.39433756729740643 * v37;
-    const V v44 = 0.10566243270259355 * v38;
-    const V v45 = 0.04465819873852045 * X3;
-    const V v46 = 0.6220084679281462 * X3;
-    const V v47 = X5 - X3;
-    const V v48 = v28 + v26;
-    const V v49 = v31 - v25;
-    const V v50 = v26 - v29;
-    const V v51 = X3 - X1;
-    const V v52 = X3 + X7;
-    const V v53 = 0.6220084679281462 * X7;
-    const V v54 = v45 + v53;
-    const V v55 = 0.04465819873852045 * X7;
-    const V v56 = v46 + v55;
-    const V v57 = X5 - X7;
-    const V v58 = 0.16666666666666666 * v52;
-    const V v59 = X7 - X1;
-    const V v60 = 0.39433756729740643 * v51;
-    const V v61 = 0.10566243270259355 * v51;
-    const V v62 = 0.10566243270259355 * v47;
-    const V v63 = 0.39433756729740643 * v47;
-    const V v64 = v54 + v24;
-    const V v65 = v56 + v24;
-    const V v66 = 0.10566243270259355 * v57;
-    const V v67 = v60 + v66;
-    const V v68 = 0.39433756729740643 * v57;
-    const V v69 = v61 + v68;
-    const V v70 = 0.39433756729740643 * v59;
-    const V v71 = v70 + v62;
-    const V v72 = 0.10566243270259355 * v59;
-    const V v73 = v72 + v63;
-    const V v74 = v30 + v25;
-    const V v75 = 1.0 / v64;
-    const V v76 = 1.0 / v65;
-    const V v77 = 0.39433756729740643 * v67;
-    const V v78 = 0.10566243270259355 * v67;
-    const V v79 = 0.39433756729740643 * v69;
-    const V v80 = 0.39433756729740643 * v71;
-    const V v81 = 0.10566243270259355 * v71;
-    const V v82 = 0.39433756729740643 * v73;
-    const V v83 = 0.10566243270259355 * v73;
-    const V v84 = 0.10566243270259355 * v69;
-    const V v85 = v67 - v71;
-    const V v86 = v67 + v73;
-    const V v87 = v69 - v73;
-    const V v88 = v69 + v71;
-    const V v89 = v71 - v67;
-    const V v90 = v73 - v69;
-    const V v91 = 0.39433756729740643 * v85;
-    const V v92 = 0.39433756729740643 * v86;
-    const V v93 = 0.10566243270259355 * v87;
-    const V v94 = 0.10566243270259355 * v88;
-    const V v95 = 0.39433756729740643 * v89;
-    const V v96 = 0.10566243270259355 * v90;
-    const V v97 = 0.6220084679281462 * d1;
-    const V v98 = 0.04465819873852045 * d1;
-    const V v99 = v80 + v78;
-    const V v100 = v81 + v77;
-    const V v101 = v83 - v77;
-    const V v102 = v83 + v79;
-    const V v103 = d1 + d5;
-    const V v104 = 0.04465819873852045 * d5;
-    const V v105 = v97 + v104;
-    const V v106 = 0.6220084679281462 * d5;
-    const V v107 = v98 + v106;
-    const V v108 = v79 - v81;
-    const V v109 = 0.16666666666666666 * v103;
-    const V v110 = v78 - v82;
-    const V v111 = v80 - v84;
-    const V v112 = v82 + v84;
-    const V v113 = 0.04465819873852045 * d3;
-    const V v114 = 0.6220084679281462 * d3;
-    const V v115 = v31 + v27;
-    const V v116 = v113 + v109;
-    const V v117 = v114 + v109;
-    const V v118 = d3 + d7;
-    const V v119 = v27 - v30;
-    const V v120 = 0.16666666666666666 * v118;
-    const V v121 = 0.6220084679281462 * d7;
-    const V v122 = v121 + v116;
-    const V v123 = 0.04465819873852045 * d7;
-    const V v124 = v123 + v117;
-    const V v125 = v75 * v122;
-    const V v126 = 1.0 + v125;
-    const V v127 = v76 * v124;
-    const V v128 = 1.0 + v127;
-    const V v129 = v17 + v58;
-    const V v130 = v19 + v58;
-    const V v131 = v105 + v120;
-    const V v132 = v107 + v120;
-    const V v133 = 1.0 / v129;
-    const V v134 = 1.0 / v130;
-    const V v135 = v126 * v126;
-    const V v136 = v128 * v128;
-    const V v137 = v29 + v32;
-    const V v138 = v28 - v32;
-    const V v139 = v21 * v71;
-    const V v140 = v23 * v71;
-    const V v141 = v21 * v73;
-    const V v142 = v23 * v73;
-    const V v143 = v12 * v67;
-    const V v144 = v139 - v143;
-    const V v145 = v12 * v69;
-    const V v146 = v140 - v145;
-    const V v147 = v14 * v67;
-    const V v148 = v141 - v147;
-    const V v149 = v14 * v69;
-    const V v150 = v142 - v149;
-    const V v151 = v129 * v144;
-    const V v152 = 1.0 / v144;
-    const V v153 = 1.0 / v146;
-    const V v154 = v64 * v146;
-    const V v155 = v130 * v150;
-    const V v156 = 1.0 / v150;
-    const V v157 = 1.0 / v148;
-    const V v158 = v65 * v148;
-    const V v159 = v132 * v134;
-    const V v160 = 1.0 + v159;
-    const V v161 = v131 * v133;
-    const V v162 = 1.0 + v161;
-    const V v163 = v137 * v156;
-    const V v164 = v162 * v162;
-    const V v165 = v160 * v160;
-    const V v166 = v138 * v157;
-    const V v167 = v91 * v152;
-    const V v168 = v108 * v153;
-    const V v169 = v110 * v157;
-    const V v170 = v93 * v156;
-    const V v171 = v43 * v152;
-    const V v172 = v99 * v152;
-    const V v173 = v74 * v152;
-    const V v174 = v100 * v152;
-    const V v175 = v48 * v152;
-    const V v176 = v96 * v152;
-    const V v177 = v41 * v152;
-    const V v178 = v50 * v153;
-    const V v179 = v111 * v153;
-    const V v180 = v49 * v153;
-    const V v181 = v119 * v157;
-    const V v182 = v44 * v156;
-    const V v183 = v102 * v156;
-    const V v184 = v101 * v157;
-    const V v185 = v112 * v156;
-    const V v186 = v115 * v156;
-    const V v187 = v95 * v156;
-    const V v188 = v39 * v156;
-    const V v189 = v94 * v153;
-    const V v190 = v94 * v157;
-    const V v191 = v92 * v157;
-    const V v192 = v92 * v153;
-    const V v193 = v42 * v153;
-    const V v194 = v42 * v157;
-    const V v195 = v40 * v157;
-    const V v196 = v40 * v153;
-    const V v197 = d0 * v182;
-    const V v198 = d0 * v171;
-    const V v199 = d0 * v178;
-    const V v200 = d0 * v181;
-    const V v201 = d3 * v191;
-    const V v202 = d3 * v172;
-    const V v203 = d3 * v189;
-    const V v204 = d3 * v183;
-    const V v205 = d2 * v172;
-    const V v206 = 1.0 + v205;
-    const V v207 = d2 * v189;
-    const V v208 = 1.0 + v207;
-    const V v209 = d2 * v191;
-    const V v210 = 1.0 + v209;
-    const V v211 = d2 * v183;
-    const V v212 = 1.0 + v211;
-    const V v213 = d2 * v195;
-    const V v214 = v200 - v213;
-    const V v215 = d3 * v195;
-    const V v216 = 1.0 - v215;
-    const V v217 = d1 * v167;
-    const V v218 = v217 + v202;
-    const V v219 = d0 * v167;
-    const V v220 = v219 + v206;
-    const V v221 = d0 * v168;
-    const V v222 = v221 + v208;
-    const V v223 = d1 * v168;
-    const V v224 = v223 + v203;
-    const V v225 = d1 * v181;
-    const V v226 = v225 + v216;
-    const V v227 = d0 * v169;
-    const V v228 = v227 + v210;
-    const V v229 = d0 * v170;
-    const V v230 = v229 + v212;
-    const V v231 = d1 * v169;
-    const V v232 = v231 + v201;
-    const V v233 = d1 * v170;
-    const V v234 = v233 + v204;
-    const V v235 = d1 * v171;
-    const V v236 = 1.0 + v235;
-    const V v237 = d1 * v178;
-    const V v238 = 1.0 + v237;
-    const V v239 = d1 * v182;
-    const V v240 = 1.0 + v239;
-    const V v241 = d4 * v179;
-    const V v242 = v241 + v222;
-    const V v243 = d5 * v179;
-    const V v244 = v243 + v224;
-    const V v245 = d4 * v184;
-    const V v246 = v245 + v228;
-    const V v247 = d5 * v184;
-    const V v248 = v247 + v232;
-    const V v249 = d5 * v166;
-    const V v250 = v249 + v226;
-    const V v251 = d4 * v166;
-    const V v252 = v251 + v214;
-    const V v253 = d3 * v173;
-    const V v254 = v236 - v253;
-    const V v255 = d3 * v193;
-    const V v256 = v238 - v255;
-    const V v257 = d3 * v163;
-    const V v258 = v240 - v257;
-    const V v259 = d4 * v187;
-    const V v260 = v259 + v230;
-    const V v261 = d5 * v187;
-    const V v262 = v261 + v234;
-    const V v263 = d2 * v173;
-    const V v264 = v198 - v263;
-    const V v265 = d2 * v193;
-    const V v266 = v199 - v265;
-    const V v267 = d2 * v163;
-    const V v268 = v197 - v267;
-    const V v269 = d5 * v177;
-    const V v270 = v269 + v254;
-    const V v271 = d4 * v177;
-    const V v272 = v271 + v264;
-    const V v273 = d5 * v180;
-    const V v274 = v273 + v256;
-    const V v275 = d4 * v180;
-    const V v276 = v275 + v266;
-    const V v277 = d5 * v188;
-    const V v278 = v277 + v258;
-    const V v279 = d4 * v188;
-    const V v280 = v279 + v268;
-    const V v281 = d6 * v185;
-    const V v282 = v260 - v281;
-    const V v283 = d7 * v185;
-    const V v284 = v262 - v283;
-    const V v285 = d7 * v175;
-    const V v286 = v285 + v270;
-    const V v287 = d6 * v175;
-    const V v288 = v287 + v272;
-    const V v289 = d6 * v194;
-    const V v290 = v289 + v252;
-    const V v291 = d7 * v194;
-    const V v292 = v291 + v250;
-    const V v293 = d7 * v186;
-    const V v294 = v293 + v278;
-    const V v295 = d6 * v186;
-    const V v296 = v295 + v280;
-    const V v297 = v282 * v282;
-    const V v298 = v284 * v282;
-    const V v299 = v284 * v284;
-    const V v300 = v282 * v294;
-    const V v301 = v286 * v288;
-    const V v302 = v290 * v292;
-    const V v303 = v296 * v296;
-    const V v304 = v297 + v303;
-    const V v305 = v294 * v296;
-    const V v306 = v298 + v305;
-    const V v307 = v294 * v294;
-    const V v308 = v299 + v307;
-    const V v309 = v284 * v296;
-    const V v310 = v300 - v309;
-    const V v311 = v288 * v288;
-    const V v312 = v290 * v290;
-    const V v313 = v286 * v286;
-    const V v314 = v292 * v292;
-    const V v315 = v165 + v304;
-    const V v316 = v165 * v310;
-    const V v317 = v310 * v316;
-    const V v318 = v308 + v315;
-    const V v319 = d4 * v176;
-    const V v320 = v319 + v220;
-    const V v321 = d5 * v176;
-    const V v322 = v321 + v218;
-    const V v323 = v318 * v318;
-    const V v324 = v165 * v165;
-    const V v325 = v323 - v324;
-    const V v326 = v304 * v304;
-    const V v327 = v325 - v326;
-    const V v328 = v308 * v308;
-    const V v329 = v327 - v328;
-    const V v330 = 0.5 * v329;
-    const V v331 = d6 * v174;
-    const V v332 = v320 - v331;
-    const V v333 = d7 * v174;
-    const V v334 = v322 - v333;
-    const V v335 = v286 * v332;
-    const V v336 = v332 * v332;
-    const V v337 = v311 + v336;
-    const V v338 = v334 * v334;
-    const V v339 = v338 + v313;
-    const V v340 = softehl_vrcbrt(v317);
-    const V v341 = softehl_vlog(v317);
-    const V v342 = v334 * v332;
-    const V v343 = v301 + v342;
-    const V v344 = v334 * v288;
-    const V v345 = v335 - v344;
-    const V v346 = v306 * v306;
-    const V v347 = v330 - v346;
-    const V v348 = d6 * v192;
-    const V v349 = v242 - v348;
-    const V v350 = d7 * v192;
-    const V v351 = v244 - v350;
-    const V v352 = d6 * v190;
-    const V v353 = v246 - v352;
-    const V v354 = d7 * v190;
-    const V v355 = v248 - v354;
-    const V v356 = d6 * v196;
-    const V v357 = v356 + v276;
-    const V v358 = d7 * v196;
-    const V v359 = v358 + v274;
-    const V v360 = v349 * v349;
-    const V v361 = v351 * v349;
-    const V v362 = v351 * v351;
-    const V v363 = v349 * v359;
-    const V v364 = v292 * v353;
-    const V v365 = v355 * v353;
-    const V v366 = v302 + v365;
-    const V v367 = v353 * v353;
-    const V v368 = v312 + v367;
-    const V v369 = v357 * v357;
-    const V v370 = v360 + v369;
-    const V v371 = v357 * v359;
-    const V v372 = v361 + v371;
-    const V v373 = v359 * v359;
-    const V v374 = v362 + v373;
-    const V v375 = v351 * v357;
-    const V v376 = v363 - v375;
-    const V v377 = v355 * v290;
-    const V v378 = v364 - v377;
-    const V v379 = v355 * v355;
-    const V v380 = v379 + v314;
-    const V v381 = v164 * v345;
-    const V v382 = v345 * v381;
-    const V v383 = v135 + v370;
-    const V v384 = v136 + v368;
-    const V v385 = v374 + v383;
-    const V v386 = v135 * v376;
-    const V v387 = v376 * v386;
-    const V v388 = v380 + v384;
-    const V v389 = v136 * v378;
-    const V v390 = v378 * v389;
-    const V v391 = v385 * v385;
-    const V v392 = v135 * v135;
-    const V v393 = v391 - v392;
-    const V v394 = v370 * v370;
-    const V v395 = v393 - v394;
-    const V v396 = v374 * v374;
-    const V v397 = v395 - v396;
-    const V v398 = softehl_vrcbrt(v382);
-    const V v399 = softehl_vlog(v382);
-    const V v400 = v388 * v388;
-    const V v401 = 0.5 * v397;
-    const V v402 = v136 * v136;
-    const V v403 = v400 - v402;
-    const V v404 = softehl_vrcbrt(v387);
-    const V v405 = softehl_vlog(v387);
-    const V v406 = v368 * v368;
-    const V v407 = v403 - v406;
-    const V v408 = v372 * v372;
-    const V v409 = v401 - v408;
-    const V v410 = softehl_vrcbrt(v390);
-    const V v411 = v380 * v380;
-    const V v412 = v407 - v411;
-    const V v413 = softehl_vlog(v390);
-    const V v414 = 0.5 * v412;
-    const V v415 = v366 * v366;
-    const V v416 = v414 - v415;
-    const V v417 = v382 - v399;
-    const V v418 = v387 - v405;
-    const V v419 = v390 - v413;
-    const V v420 = v340 * v347;
-    const V v421 = v318 * v340;
-    const V v422 = v340 * v420;
-    const V v423 = v421 - 3.0;
-    const V v424 = v164 + v337;
-    const V v425 = parameters[0] * v423;
-    const V v426 = v339 + v424;
-    const V v427 = v426 * v426;
-    const V v428 = v337 * v337;
-    const V v429 = v427 - v428;
-    const V v430 = v339 * v339;
-    const V v431 = v429 - v430;
-    const V v432 = v164 * v164;
-    const V v433 = v431 - v432;
-    const V v434 = 0.5 * v433;
-    const V v435 = v422 - 3.0;
-    const V v436 = parameters[1] * v435;
-    const V v437 = v425 + v436;
-    const V v438 = v404 * v409;
-    const V v439 = v410 * v416;
-    const V v440 = v343 * v343;
-    const V v441 = v434 - v440;
-    const V v442 = v398 * v441;
-    const V v443 = v398 * v426;
-    const V v444 = v398 * v442;
-    const V v445 = v388 * v410;
-    const V v446 = v410 * v439;
-    const V v447 = v404 * v438;
-    const V v448 = v385 * v404;
-    const V v449 = v443 - 3.0;
-    const V v450 = parameters[0] * v449;
-    const V v451 = v448 - 3.0;
-    const V v452 = parameters[0] * v451;
-    const V v453 = v445 - 3.0;
-    const V v454 = parameters[0] * v453;
-    const V v455 = v444 - 3.0;
-    const V v456 = parameters[1] * v455;
-    const V v457 = v450 + v456;
-    const V v458 = v447 - 3.0;
-    const V v459 = parameters[1] * v458;
-    const V v460 = v452 + v459;
-    const V v461 = v446 - 3.0;
-    const V v462 = parameters[1] * v461;
-    const V v463 = v454 + v462;
-    const V v464 = v317 - v341;
-    const V v465 = 0.5 * v417;
-    const V v466 = (-0.5) + v465;
-    const V v467 = parameters[2] * v466;
-    const V v468 = v457 + v467;
-    const V v469 = v151 * v468;
-    const V v470 = 0.5 * v418;
-    const V v471 = (-0.5) + v470;
-    const V v472 = parameters[2] * v471;
-    const V v473 = v460 + v472;
-    const V v474 = v154 * v473;
-    const V v475 = v469 + v474;
-    const V v476 = 0.5 * v419;
-    const V v477 = (-0.5) + v476;
-    const V v478 = parameters[2] * v477;
-    const V v479 = v463 + v478;
-    const V v480 = v158 * v479;
-    const V v481 = v475 + v480;
-    const V v482 = 0.5 * v464;
-    const V v483 = (-0.5) + v482;
-    const V v484 = parameters[2] * v483;
-    const V v485 = v437 + v484;
-    const V v486 = v155 * v485;
-    const V v487 = v481 + v486;
-    const V v488 = 3.141592653589793 * v487;
-    softehl_store1(R + 0, 1, v488);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const V v1 = X4 - X2, v2 = X4 - X6, v3 = X2 - X0, v4 = X6 - X0,
+        v5 = 0.39433756729740643 * v4 + 0.10566243270259355 * v1,
+        v6 = 0.10566243270259355 * v4 + 0.39433756729740643 * v1,
+        v7 = 0.39433756729740643 * v3 + 0.10566243270259355 * v2,
+        v8 = 0.10566243270259355 * v3 + 0.39433756729740643 * v2,
+        v9 = 0.16666666666666666 * (X1 + X5), v10 = 0.39433756729740643 * v5,
+        v11 = 0.10566243270259355 * v5, v12 = 0.39433756729740643 * v6,
+        v13 = 0.39433756729740643 * v7, v14 = 0.39433756729740643 * v8,
+        v15 = 0.10566243270259355 * v7, v16 = 0.10566243270259355 * v8,
+        v17 = 0.10566243270259355 * v6, v18 = 0.39433756729740643 * (v7 + v6),
+        v19 = 0.10566243270259355 * (v8 + v5), v20 = X5 - X3, v21 = X3 - X1, v22 = X5 - X7,
+        v23 = 0.16666666666666666 * (X3 + X7), v24 = X7 - X1,
+        v25 = 0.04465819873852045 * X3 + 0.6220084679281462 * X7 + v9,
+        v26 = 0.6220084679281462 * X3 + 0.04465819873852045 * X7 + v9,
+        v27 = 0.39433756729740643 * v21 + 0.10566243270259355 * v22,
+        v28 = 0.10566243270259355 * v21 + 0.39433756729740643 * v22,
+        v29 = 0.39433756729740643 * v24 + 0.10566243270259355 * v20,
+        v30 = 0.10566243270259355 * v24 + 0.39433756729740643 * v20,
+        v31 = 0.39433756729740643 * v27, v32 = 0.10566243270259355 * v27,
+        v33 = 0.39433756729740643 * v28, v34 = 0.39433756729740643 * v29,
+        v35 = 0.10566243270259355 * v29, v36 = 0.39433756729740643 * v30,
+        v37 = 0.10566243270259355 * v30, v38 = 0.10566243270259355 * v28,
+        v39 = 0.39433756729740643 * (v27 + v30), v40 = 0.10566243270259355 * (v28 + v29),
+        v41 = 0.16666666666666666 * (d1 + d5), v42 = 0.16666666666666666 * (d3 + d7),
+        v43 = 1.0 / v25 * (0.6220084679281462 * d7 + (0.04465819873852045 * d3 + v41)),
+        v44 = 1.0 + v43,
+        v45 = 1.0 / v26 * (0.04465819873852045 * d7 + (0.6220084679281462 * d3 + v41)),
+        v46 = 1.0 + v45, v47 = 0.6220084679281462 * X1 + 0.04465819873852045 * X5 + v23,
+        v48 = 0.04465819873852045 * X1 + 0.6220084679281462 * X5 + v23, v49 = v44 * v44,
+        v50 = v46 * v46, v51 = v7 * v29 - v5 * v27, v52 = v8 * v29 - v5 * v28,
+        v53 = v7 * v30 - v6 * v27, v54 = v8 * v30 - v6 * v28, v55 = 1.0 / v51, v56 = 1.0 / v52,
+        v57 = 1.0 / v54, v58 = 1.0 / v53,
+        v59 = (0.04465819873852045 * d1 + 0.6220084679281462 * d5 + v42) * (1.0 / v48),
+        v60 = 1.0 + v59,
+        v61 = (0.6220084679281462 * d1 + 0.04465819873852045 * d5 + v42) * (1.0 / v47),
+        v62 = 1.0 + v61, v63 = (v14 + v17) * v57, v64 = v62 * v62, v65 = v60 * v60,
+        v66 = (v13 - v17) * v58, v67 = 0.39433756729740643 * (v27 - v29) * v55,
+        v68 = (v33 - v35) * v56, v69 = (v32 - v36) * v58,
+        v70 = 0.10566243270259355 * (v28 - v30) * v57, v71 = 0.39433756729740643 * (v5 - v7) * v55,
+        v72 = (v34 + v32) * v55, v73 = (v15 + v10) * v55, v74 = (v35 + v31) * v55,
+        v75 = (v13 + v11) * v55, v76 = 0.10566243270259355 * (v30 - v28) * v55,
+        v77 = 0.10566243270259355 * (v8 - v6) * v55, v78 = (v11 - v14) * v56,
+        v79 = (v34 - v38) * v56, v80 = (v16 - v10) * v56, v81 = (v12 - v15) * v58,
+        v82 = 0.10566243270259355 * (v6 - v8) * v57, v83 = (v37 + v33) * v57,
+        v84 = (v37 - v31) * v58, v85 = (v36 + v38) * v57, v86 = (v16 + v12) * v57,
+        v87 = 0.39433756729740643 * (v29 - v27) * v57, v88 = 0.39433756729740643 * (v7 - v5) * v57,
+        v89 = v40 * v56, v90 = v40 * v58, v91 = v39 * v58, v92 = v39 * v56, v93 = v19 * v56,
+        v94 = v19 * v58, v95 = v18 * v58, v96 = v18 * v56,
+        v97 = d4 * v87 + (d0 * v70 + (1.0 + d2 * v83)) - d6 * v85,
+        v98 = d5 * v87 + (d1 * v70 + d3 * v83) - d7 * v85,
+        v99 = d7 * v75 + (d5 * v77 + (1.0 + d1 * v71 - d3 * v73)),
+        v100 = d6 * v75 + (d4 * v77 + (d0 * v71 - d2 * v73)),
+        v101 = d6 * v94 + (d4 * v66 + (d0 * v81 - d2 * v95)),
+        v102 = d7 * v94 + (d5 * v66 + (d1 * v81 + (1.0 - d3 * v95))),
+        v103 = d7 * v86 + (d5 * v88 + (1.0 + d1 * v82 - d3 * v63)),
+        v104 = d6 * v86 + (d4 * v88 + (d0 * v82 - d2 * v63)), v105 = v97 * v97 + v104 * v104,
+        v106 = v98 * v97 + v103 * v104, v107 = v98 * v98 + v103 * v103,
+        v108 = v97 * v103 - v98 * v104, v109 = v108 * (v65 * v108), v110 = v107 + (v65 + v105),
+        v111 = d4 * v76 + (d0 * v67 + (1.0 + d2 * v72)) - d6 * v74,
+        v112 = d5 * v76 + (d1 * v67 + d3 * v72) - d7 * v74, v113 = v100 * v100 + v111 * v111,
+        v114 = v112 * v112 + v99 * v99, v115 = softehl_vrcbrt(v109), v116 = softehl_vlog(v109),
+        v117 = v99 * v100 + v112 * v111, v118 = v99 * v111 - v112 * v100,
+        v119 = 0.5 * (v110 * v110 - v65 * v65 - v105 * v105 - v107 * v107) - v106 * v106,
+        v120 = d4 * v79 + (d0 * v68 + (1.0 + d2 * v89)) - d6 * v92,
+        v121 = d5 * v79 + (d1 * v68 + d3 * v89) - d7 * v92,
+        v122 = d4 * v84 + (d0 * v69 + (1.0 + d2 * v91)) - d6 * v90,
+        v123 = d5 * v84 + (d1 * v69 + d3 * v91) - d7 * v90,
+        v124 = d6 * v96 + (d4 * v80 + (d0 * v78 - d2 * v93)),
+        v125 = d7 * v96 + (d5 * v80 + (1.0 + d1 * v78 - d3 * v93)),
+        v126 = v101 * v102 + v123 * v122, v127 = v101 * v101 + v122 * v122,
+        v128 = v120 * v120 + v124 * v124, v129 = v121 * v120 + v124 * v125,
+        v130 = v121 * v121 + v125 * v125, v131 = v120 * v125 - v121 * v124,
+        v132 = v102 * v122 - v123 * v101, v133 = v123 * v123 + v102 * v102,
+        v134 = v118 * (v64 * v118), v135 = v130 + (v49 + v128), v136 = v131 * (v49 * v131),
+        v137 = v133 + (v50 + v127), v138 = v132 * (v50 * v132), v139 = softehl_vrcbrt(v134),
+        v140 = softehl_vlog(v134), v141 = softehl_vrcbrt(v136), v142 = softehl_vlog(v136),
+        v143 = 0.5 * (v135 * v135 - v49 * v49 - v128 * v128 - v130 * v130) - v129 * v129,
+        v144 = softehl_vrcbrt(v138), v145 = softehl_vlog(v138),
+        v146 = 0.5 * (v137 * v137 - v50 * v50 - v127 * v127 - v133 * v133) - v126 * v126,
+        v147 = v114 + (v64 + v113),
+        v148 = parameters[0] * (v110 * v115 - 3.0) + parameters[1] * (v115 * (v115 * v119) - 3.0),
+        v149 = 0.5 * (v147 * v147 - v113 * v113 - v114 * v114 - v64 * v64) - v117 * v117,
+        v150 = parameters[0] * (v139 * v147 - 3.0) + parameters[1] * (v139 * (v139 * v149) - 3.0),
+        v151 = parameters[0] * (v135 * v141 - 3.0) + parameters[1] * (v141 * (v141 * v143) - 3.0),
+        v152 = parameters[0] * (v137 * v144 - 3.0) + parameters[1] * (v144 * (v144 * v146) - 3.0),
+        v153 = v47 * v51 * (v150 + parameters[2] * ((-0.5) + 0.5 * (v134 - v140))),
+        v154 = v25 * v52 * (v151 + parameters[2] * ((-0.5) + 0.5 * (v136 - v142))),
+        v155 = v26 * v53 * (v152 + parameters[2] * ((-0.5) + 0.5 * (v138 - v145))),
+        v156 = v48 * v54 * (v148 + parameters[2] * ((-0.5) + 0.5 * (v109 - v116)));
+    softehl_store1(R + 0, 1, 3.141592653589793 * (v153 + v154 + v155 + v156));
 }
+SOFTEHL_BATCH(softehl_solid_q4_energy, 8, 8, 0, 0, 1, 0)
 
-void softehl_solid_q4_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_q4_residual)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_q4_energy_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 1 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_q4_energy_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 1 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 1];
-    softehl_solid_q4_energy(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 1 * n; ++i) values[i] = R[i];
-#endif
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1], v3 = 0.25 * parameters[2];
+    const V v4 = X4 - X2, v5 = X4 - X6, v6 = X2 - X0, v7 = X6 - X0,
+        v8 = 0.39433756729740643 * v7 + 0.10566243270259355 * v4,
+        v9 = 0.10566243270259355 * v7 + 0.39433756729740643 * v4,
+        v10 = 0.39433756729740643 * v6 + 0.10566243270259355 * v5,
+        v11 = 0.10566243270259355 * v6 + 0.39433756729740643 * v5, v12 = X3 - X1,
+        v13 = 1.5773502691896257 * X1 + 0.4226497308103742 * X3,
+        v14 = 0.4226497308103742 * X1 + 1.5773502691896257 * X3, v15 = 0.25 * v8, v16 = 0.25 * v9,
+        v17 = 0.25 * v10, v18 = 0.25 * v11, v19 = X5 - X3, v20 = X5 - X7,
+        v21 = 0.4226497308103742 * X5 + 1.5773502691896257 * X7,
+        v22 = 1.5773502691896257 * X5 + 0.4226497308103742 * X7, v23 = X7 - X1,
+        v24 = 0.39433756729740643 * v12 + 0.10566243270259355 * v20,
+        v25 = 0.10566243270259355 * v12 + 0.39433756729740643 * v20,
+        v26 = 0.39433756729740643 * v13 + 0.10566243270259355 * v21,
+        v27 = 0.10566243270259355 * v13 + 0.39433756729740643 * v21,
+        v28 = 0.39433756729740643 * v14 + 0.10566243270259355 * v22,
+        v29 = 0.10566243270259355 * v14 + 0.39433756729740643 * v22,
+        v30 = 0.39433756729740643 * v23 + 0.10566243270259355 * v19,
+        v31 = 0.10566243270259355 * v23 + 0.39433756729740643 * v19, v32 = 0.25 * v24,
+        v33 = 0.25 * v25, v34 = 1.0 / v26, v35 = 1.0 / v27, v36 = 1.0 / v28, v37 = 1.0 / v29,
+        v38 = 0.25 * v30, v39 = 0.25 * v31, v40 = d0 - d2, v41 = d1 - d3, v42 = d1 + d3,
+        v43 = d4 - d6, v44 = d2 + (d0 - d4) - d6, v45 = v40 - v43,
+        v46 = 0.5773502691896257 * (v40 + v43), v47 = v45 + v46, v48 = v45 - v46, v49 = v46 + v44,
+        v50 = v44 - v46, v51 = d5 + d7, v52 = d5 - d7, v53 = v42 + v51, v54 = v42 - v51,
+        v55 = v41 - v52, v56 = v41 + v52, v57 = 0.5773502691896257 * v54,
+        v58 = v10 * v30 - v8 * v24, v59 = v11 * v30 - v8 * v25, v60 = v10 * v31 - v9 * v24,
+        v61 = v11 * v31 - v9 * v25, v62 = 0.5773502691896257 * v56, v63 = 0.3333333333333333 * v56,
+        v64 = 1.0 / v58, v65 = 1.0 / v59, v66 = 1.0 / v60, v67 = v54 + v62, v68 = v54 - v62,
+        v69 = v26 * (6.283185307179586 * v58), v70 = 1.0 / v61,
+        v71 = v27 * (6.283185307179586 * v59), v72 = v28 * (6.283185307179586 * v60),
+        v73 = 0.5773502691896257 * v55, v74 = v29 * (6.283185307179586 * v61), v75 = v55 + v62,
+        v76 = v55 - v62, v77 = v53 + v73, v78 = v53 - v73, v79 = v57 + v63, v80 = v57 - v63,
+        v81 = v66 * v39, v82 = v70 * v39, v83 = v66 * v32, v84 = v64 * v32, v85 = v64 * v38,
+        v86 = v65 * v38, v87 = 1.0 + 0.25 * v34 * (v77 + v79), v88 = 1.0 + 0.25 * v35 * (v77 - v79),
+        v89 = 1.0 + 0.25 * v36 * (v78 + v80), v90 = 1.0 + 0.25 * v37 * (v78 - v80), v91 = v65 * v33,
+        v92 = v70 * v33, v93 = v64 * v17, v94 = v66 * v17, v95 = v64 * v15, v96 = v65 * v15,
+        v97 = v65 * v18, v98 = v70 * v18, v99 = v66 * v16, v100 = v70 * v16, v101 = v87 * v87,
+        v102 = v88 * v88, v103 = v90 * v90, v104 = v89 * v89, v105 = v2 * v69, v106 = v2 * v71,
+        v107 = v2 * v72, v108 = v2 * v74, v109 = v1 * v69, v110 = v1 * v71, v111 = v1 * v72,
+        v112 = v1 * v74, v113 = v95 * v47 - v93 * v49, v114 = v96 * v48 - v97 * v49,
+        v115 = v91 * v67 - v86 * v76, v116 = v92 * v68 - v82 * v76,
+        v117 = 1.0 + v91 * v49 - v86 * v48, v118 = 1.0 - v82 * v48 + v92 * v50,
+        v119 = v99 * v47 - v94 * v50, v120 = v100 * v48 - v98 * v50,
+        v121 = 1.0 + v83 * v50 - v81 * v47, v122 = 1.0 + v84 * v49 - v85 * v47,
+        v123 = v99 * v75 + (1.0 - v94 * v68), v124 = v84 * v67 - v85 * v75,
+        v125 = v83 * v68 - v81 * v75, v126 = 1.0 + v95 * v75 - v93 * v67,
+        v127 = v126 * v126 + (v124 * v124 + (v113 * v113 + v122 * v122)),
+        v128 = v121 * v123 - v125 * v119,
+        v129 = v125 * v125 + (v119 * v119 + v121 * v121) + v123 * v123,
+        v130 = v96 * v76 + (1.0 - v97 * v67), v131 = v100 * v76 + (1.0 - v98 * v68),
+        v132 = v128 * v128, v133 = v115 * v115 + (v114 * v114 + v117 * v117) + v130 * v130,
+        v134 = v116 * v116 + v118 * v118 + v120 * v120 + v131 * v131,
+        v135 = softehl_vrcbrt(v104 * v132), v136 = v117 * v130 - v115 * v114, v137 = v136 * v136,
+        v138 = v118 * v131 - v116 * v120, v139 = v138 * v138, v140 = softehl_vrcbrt(v102 * v137),
+        v141 = softehl_vrcbrt(v103 * v139), v142 = v126 * v122 - v124 * v113, v143 = v142 * v142,
+        v144 = softehl_vrcbrt(v101 * v143), v145 = v144 * v144, v146 = v140 * v140,
+        v147 = v141 * v141, v148 = v105 * v145, v149 = v106 * v146, v150 = v108 * v147,
+        v151 = v109 * v144,
+        v152 = 0.3333333333333333 * v109 * (v101 + v127) + 0.6666666666666666 * v105 * (v101 * v127 + v143) * v144,
+        v153 = v3 * v69 * (1.0 - v144 * v145) - v145 * v145 * v152,
+        v154 = 2.0 * v142 * (v148 + v101 * v153), v155 = v151 + v101 * v148,
+        v156 = 0.5 * v34 * v87 * (v151 + (v143 * v153 + v127 * v148)), v157 = v135 * v135,
+        v158 = v111 * v135,
+        v159 = 0.3333333333333333 * v111 * (v104 + v129) + v135 * (0.6666666666666666 * v107 * (v132 + v104 * v129)),
+        v160 = v107 * v157, v161 = v3 * v72 * (1.0 - v135 * v157) - v159 * (v157 * v157),
+        v162 = 0.5 * v36 * v89 * (v158 + v129 * v160 + v132 * v161), v163 = v158 + v104 * v160,
+        v164 = 2.0 * v128 * (v160 + v104 * v161), v165 = v110 * v140, v166 = v112 * v141,
+        v167 = 0.3333333333333333 * v110 * (v102 + v133) + v140 * (0.6666666666666666 * v106 * (v102 * v133 + v137)),
+        v168 = v3 * v71 * (1.0 - v140 * v146) - v146 * v146 * v167,
+        v169 = 2.0 * v119 * v163 - v125 * v164, v170 = 2.0 * v125 * v163 - v119 * v164,
+        v171 = 2.0 * v121 * v163 + v123 * v164, v172 = 2.0 * v123 * v163 + v121 * v164,
+        v173 = 0.3333333333333333 * v112 * (v103 + v134) + v141 * (0.6666666666666666 * v108 * (v103 * v134 + v139)),
+        v174 = v3 * v74 * (1.0 - v141 * v147) - v147 * v147 * v173, v175 = v166 + v103 * v150,
+        v176 = 2.0 * v138 * (v150 + v103 * v174),
+        v177 = 0.5 * v37 * v90 * (v166 + v134 * v150 + v139 * v174), v178 = v165 + v102 * v149,
+        v179 = 0.5 * v35 * v88 * (v165 + v137 * v168 + v133 * v149),
+        v180 = 2.0 * v136 * (v149 + v102 * v168), v181 = 2.0 * v117 * v178 + v130 * v180,
+        v182 = v156 + v179, v183 = v156 - v179, v184 = 2.0 * v114 * v178 - v115 * v180,
+        v185 = 2.0 * v120 * v175 - v116 * v176, v186 = 2.0 * v116 * v175 - v120 * v176,
+        v187 = 2.0 * v118 * v175 + v131 * v176, v188 = 2.0 * v131 * v175 + v118 * v176,
+        v189 = 2.0 * v113 * v155 - v124 * v154, v190 = 2.0 * v124 * v155 - v113 * v154,
+        v191 = 2.0 * v122 * v155 + v126 * v154, v192 = 2.0 * v126 * v155 + v122 * v154,
+        v193 = 2.0 * v115 * v178 - v114 * v180, v194 = 2.0 * v130 * v178 + v117 * v180,
+        v195 = v177 + (v162 + v182), v196 = v162 - v177,
+        v197 = v99 * v172 - v81 * v170 - v85 * v190 + v95 * v192,
+        v198 = v99 * v169 - v81 * v171 - v85 * v191 + v95 * v189,
+        v199 = v83 * v170 - v94 * v172 - v98 * v188 + v92 * v186,
+        v200 = v83 * v171 - v94 * v169 - v98 * v185 + v92 * v187,
+        v201 = v84 * v190 - v97 * v194 - v93 * v192 + v91 * v193,
+        v202 = v100 * v188 + v96 * v194 - v82 * v186 - v86 * v193,
+        v203 = v84 * v191 - v97 * v184 - v93 * v189 + v91 * v181,
+        v204 = v100 * v185 + v96 * v184 - v82 * v187 - v86 * v181,
+        v205 = 0.5773502691896257 * (v183 + v196) + v199 + v201,
+        v206 = 0.5773502691896257 * (v182 - v162 - v177) + v197 + v202, v207 = v200 + v203,
+        v208 = v198 + v204,
+        v209 = 0.3333333333333333 * (v183 - v196) + 0.5773502691896257 * (v197 - v199 + v201 - v202),
+        v210 = v195 - v205, v211 = v195 + v205,
+        v212 = 0.5773502691896257 * (v204 + (v200 - v198 - v203)), v213 = v206 + v209,
+        v214 = v208 + v212, v215 = v209 - v206;
+    softehl_store4(R + 0, 8, v207 + v208 - v212, v211 + v213, v212 + (v207 - v208), v211 - v213);
+    softehl_store4(R + 4, 8, -(v207 + v214), v210 + v215, v214 - v207, v210 - v215);
 }
+SOFTEHL_BATCH(softehl_solid_q4_residual, 8, 8, 0, 0, 8, 0)
 
-static void softehl_solid_q4_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_q4_tangent)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 0.25 * parameters[2];
-    const V v4 = X4 - X2;
-    const V v5 = X4 - X6;
-    const V v6 = X2 - X0;
-    const V v7 = X6 - X0;
-    const V v8 = 0.10566243270259355 * v4;
-    const V v9 = 0.39433756729740643 * v4;
-    const V v10 = 0.10566243270259355 * v5;
-    const V v11 = 0.39433756729740643 * v5;
-    const V v12 = 0.4226497308103742 * X3;
-    const V v13 = 1.5773502691896257 * X3;
-    const V v14 = 0.39433756729740643 * v7;
-    const V v15 = v14 + v8;
-    const V v16 = 0.10566243270259355 * v7;
-    const V v17 = v16 + v9;
-    const V v18 = 0.39433756729740643 * v6;
-    const V v19 = v18 + v10;
-    const V v20 = 0.10566243270259355 * v6;
-    const V v21 = v20 + v11;
-    const V v22 = X3 - X1;
-    const V v23 = 1.5773502691896257 * X1;
-    const V v24 = v23 + v12;
-    const V v25 = 0.4226497308103742 * X1;
-    const V v26 = v25 + v13;
-    const V v27 = 0.25 * v15;
-    const V v28 = 0.25 * v17;
-    const V v29 = 0.25 * v19;
-    const V v30 = 0.25 * v21;
-    const V v31 = 0.39433756729740643 * v22;
-    const V v32 = 0.10566243270259355 * v22;
-    const V v33 = 0.39433756729740643 * v24;
-    const V v34 = 0.10566243270259355 * v24;
-    const V v35 = 0.39433756729740643 * v26;
-    const V v36 = 0.10566243270259355 * v26;
-    const V v37 = 0.4226497308103742 * X5;
-    const V v38 = 1.5773502691896257 * X5;
-    const V v39 = X5 - X3;
-    const V v40 = X5 - X7;
-    const V v41 = 1.5773502691896257 * X7;
-    const V v42 = v37 + v41;
-    const V v43 = 0.4226497308103742 * X7;
-    const V v44 = v38 + v43;
-    const V v45 = X7 - X1;
-    const V v46 = 0.10566243270259355 * v40;
-    const V v47 = v31 + v46;
-    const V v48 = 0.39433756729740643 * v40;
-    const V v49 = v32 + v48;
-    const V v50 = 0.10566243270259355 * v39;
-    const V v51 = 0.39433756729740643 * v39;
-    const V v52 = 0.10566243270259355 * v42;
-    const V v53 = v33 + v52;
-    const V v54 = 0.39433756729740643 * v42;
-    const V v55 = v34 + v54;
-    const V v56 = 0.10566243270259355 * v44;
-    const V v57 = v35 + v56;
-    const V v58 = 0.39433756729740643 * v44;
-    const V v59 = v36 + v58;
-    const V v60 = 0.39433756729740643 * v45;
-    const V v61 = v60 + v50;
-    const V v62 = 0.10566243270259355 * v45;
-    const V v63 = v62 + v51;
-    const V v64 = 0.25 * v47;
-    const V v65 = 0.25 * v49;
-    const V v66 = 1.0 / v53;
-    const V v67 = 1.0 / v55;
-    const V v68 = 1.0 / v57;
-    const V v69 = 1.0 / v59;
-    const V v70 = 0.25 * v61;
-    const V v71 = 0.25 * v63;
-    const V v72 = d0 - d4;
-    const V v73 = d0 - d2;
-    const V v74 = d2 + v72;
-    const V v75 = d1 - d3;
-    const V v76 = d1 + d3;
-    const V v77 = d4 - d6;
-    const V v78 = v74 - d6;
-    const V v79 = v73 - v77;
-    const V v80 = v73 + v77;
-    const V v81 = 0.25 * v68;
-    const V v82 = 0.5 * v68;
-    const V v83 = 0.25 * v69;
-    const V v84 = 0.5 * v69;
-    const V v85 = 0.5773502691896257 * v80;
-    const V v86 = 0.25 * v66;
-    const V v87 = 0.5 * v66;
-    const V v88 = 0.25 * v67;
-    const V v89 = 0.5 * v67;
-    const V v90 = v79 + v85;
-    const V v91 = v79 - v85;
-    const V v92 = v85 + v78;
-    const V v93 = v78 - v85;
-    const V v94 = d5 + d7;
-    const V v95 = d5 - d7;
-    const V v96 = v76 + v94;
-    const V v97 = v76 - v94;
-    const V v98 = v19 * v61;
-    const V v99 = v21 * v61;
-    const V v100 = v19 * v63;
-    const V v101 = v21 * v63;
-    const V v102 = v75 - v95;
-    const V v103 = v75 + v95;
-    const V v104 = 0.5773502691896257 * v97;
-    const V v105 = v15 * v47;
-    const V v106 = v98 - v105;
-    const V v107 = v15 * v49;
-    const V v108 = v99 - v107;
-    const V v109 = v17 * v47;
-    const V v110 = v100 - v109;
-    const V v111 = v17 * v49;
-    const V v112 = v101 - v111;
-    const V v113 = 0.5773502691896257 * v103;
-    const V v114 = 0.3333333333333333 * v103;
-    const V v115 = 1.0 / v106;
-    const V v116 = 6.283185307179586 * v106;
-    const V v117 = 1.0 / v108;
-    const V v118 = 6.283185307179586 * v108;
-    const V v119 = 1.0 / v110;
-    const V v120 = 6.283185307179586 * v110;
-    const V v121 = v97 + v113;
-    const V v122 = v97 - v113;
-    const V v123 = v53 * v116;
-    const V v124 = 1.0 / v112;
-    const V v125 = 6.283185307179586 * v112;
-    const V v126 = v55 * v118;
-    const V v127 = v57 * v120;
-    const V v128 = 0.5773502691896257 * v102;
-    const V v129 = v59 * v125;
-    const V v130 = v102 + v113;
-    const V v131 = v102 - v113;
-    const V v132 = v96 + v128;
-    const V v133 = v96 - v128;
-    const V v134 = v104 + v114;
-    const V v135 = v104 - v114;
-    const V v136 = v119 * v71;
-    const V v137 = v124 * v71;
-    const V v138 = v119 * v64;
-    const V v139 = v115 * v64;
-    const V v140 = v132 + v134;
-    const V v141 = v132 - v134;
-    const V v142 = v133 + v135;
-    const V v143 = v133 - v135;
-    const V v144 = v115 * v70;
-    const V v145 = v117 * v70;
-    const V v146 = v86 * v140;
-    const V v147 = 1.0 + v146;
-    const V v148 = v88 * v141;
-    const V v149 = 1.0 + v148;
-    const V v150 = v81 * v142;
-    const V v151 = 1.0 + v150;
-    const V v152 = v83 * v143;
-    const V v153 = 1.0 + v152;
-    const V v154 = v117 * v65;
-    const V v155 = v124 * v65;
-    const V v156 = v115 * v29;
-    const V v157 = v119 * v29;
-    const V v158 = v115 * v27;
-    const V v159 = v117 * v27;
-    const V v160 = v117 * v30;
-    const V v161 = v124 * v30;
-    const V v162 = v119 * v28;
-    const V v163 = v124 * v28;
-    const V v164 = v147 * v147;
-    const V v165 = v87 * v147;
-    const V v166 = v149 * v149;
-    const V v167 = v89 * v149;
-    const V v168 = v153 * v153;
-    const V v169 = v84 * v153;
-    const V v170 = v151 * v151;
-    const V v171 = v82 * v151;
-    const V v172 = v159 * v91;
-    const V v173 = v163 * v91;
-    const V v174 = v2 * v123;
-    const V v175 = v2 * v126;
-    const V v176 = v2 * v127;
-    const V v177 = v2 * v129;
-    const V v178 = v1 * v123;
-    const V v179 = v1 * v126;
-    const V v180 = v1 * v127;
-    const V v181 = v1 * v129;
-    const V v182 = v3 * v123;
-    const V v183 = v3 * v126;
-    const V v184 = v3 * v127;
-    const V v185 = v3 * v129;
-    const V v186 = 0.6666666666666666 * v174;
-    const V v187 = 0.6666666666666666 * v175;
-    const V v188 = 0.6666666666666666 * v176;
-    const V v189 = 0.6666666666666666 * v177;
-    const V v190 = 0.3333333333333333 * v178;
-    const V v191 = 0.3333333333333333 * v180;
-    const V v192 = 0.3333333333333333 * v179;
-    const V v193 = 0.3333333333333333 * v181;
-    const V v194 = v158 * v90;
-    const V v195 = v162 * v90;
-    const V v196 = v139 * v121;
-    const V v197 = v154 * v121;
-    const V v198 = v138 * v122;
-    const V v199 = v155 * v122;
-    const V v200 = v156 * v92;
-    const V v201 = v194 - v200;
-    const V v202 = v139 * v92;
-    const V v203 = 1.0 + v202;
-    const V v204 = v154 * v92;
-    const V v205 = 1.0 + v204;
-    const V v206 = v160 * v92;
-    const V v207 = v172 - v206;
-    const V v208 = 2.0 * v201;
-    const V v209 = v201 * v201;
-    const V v210 = v145 * v131;
-    const V v211 = v197 - v210;
-    const V v212 = v137 * v131;
-    const V v213 = v199 - v212;
-    const V v214 = 2.0 * v207;
-    const V v215 = v145 * v91;
-    const V v216 = v205 - v215;
-    const V v217 = v137 * v91;
-    const V v218 = 1.0 - v217;
-    const V v219 = v207 * v207;
-    const V v220 = 2.0 * v211;
-    const V v221 = 2.0 * v213;
-    const V v222 = v213 * v213;
-    const V v223 = 2.0 * v216;
-    const V v224 = v216 * v216;
-    const V v225 = v219 + v224;
-    const V v226 = v155 * v93;
-    const V v227 = v218 + v226;
-    const V v228 = v157 * v93;
-    const V v229 = v195 - v228;
-    const V v230 = v227 * v227;
-    const V v231 = v222 + v230;
-    const V v232 = v211 * v211;
-    const V v233 = v232 + v225;
-    const V v234 = 2.0 * v227;
-    const V v235 = 2.0 * v229;
-    const V v236 = v229 * v229;
-    const V v237 = v161 * v93;
-    const V v238 = v173 - v237;
-    const V v239 = v138 * v93;
-    const V v240 = 1.0 + v239;
-    const V v241 = 2.0 * v238;
-    const V v242 = v238 * v238;
-    const V v243 = v231 + v242;
-    const V v244 = v157 * v122;
-    const V v245 = 1.0 - v244;
-    const V v246 = v161 * v122;
-    const V v247 = 1.0 - v246;
-    const V v248 = v136 * v90;
-    const V v249 = v240 - v248;
-    const V v250 = v144 * v90;
-    const V v251 = v203 - v250;
-    const V v252 = v249 * v249;
-    const V v253 = v236 + v252;
-    const V v254 = 2.0 * v249;
-    const V v255 = 2.0 * v251;
-    const V v256 = v162 * v130;
-    const V v257 = v256 + v245;
-    const V v258 = v144 * v130;
-    const V v259 = v196 - v258;
-    const V v260 = v136 * v130;
-    const V v261 = v198 - v260;
-    const V v262 = v158 * v130;
-    const V v263 = 1.0 + v262;
-    const V v264 = 2.0 * v257;
-    const V v265 = v249 * v257;
-    const V v266 = 2.0 * v259;
-    const V v267 = 2.0 * v261;
-    const V v268 = v251 * v251;
-    const V v269 = v209 + v268;
-    const V v270 = v156 * v121;
-    const V v271 = v263 - v270;
-    const V v272 = v160 * v121;
-    const V v273 = 1.0 - v272;
-    const V v274 = v259 * v259;
-    const V v275 = v274 + v269;
-    const V v276 = v261 * v261;
-    const V v277 = v276 + v253;
-    const V v278 = 2.0 * v271;
-    const V v279 = v271 * v271;
-    const V v280 = v279 + v275;
-    const V v281 = v261 * v229;
-    const V v282 = v265 - v281;
-    const V v283 = v271 * v251;
-    const V v284 = v257 * v257;
-    const V v285 = v277 + v284;
-    const V v286 = v159 * v131;
-    const V v287 = v286 + v273;
-    const V v288 = v163 * v131;
-    const V v289 = v288 + v247;
-    const V v290 = v282 * v282;
-    const V v291 = 2.0 * v282;
-    const V v292 = 2.0 * v287;
-    const V v293 = 2.0 * v289;
-    const V v294 = v164 + v280;
-    const V v295 = v170 + v285;
-    const V v296 = v287 * v287;
-    const V v297 = v233 + v296;
-    const V v298 = v289 * v289;
-    const V v299 = v243 + v298;
-    const V v300 = v190 * v294;
-    const V v301 = v191 * v295;
-    const V v302 = v170 * v290;
-    const V v303 = softehl_vrcbrt(v302);
-    const V v304 = v216 * v287;
-    const V v305 = v166 + v297;
-    const V v306 = v170 * v285;
-    const V v307 = v290 + v306;
-    const V v308 = v168 + v299;
-    const V v309 = v188 * v307;
-    const V v310 = v192 * v305;
-    const V v311 = v193 * v308;
-    const V v312 = v227 * v289;
-    const V v313 = v166 * v297;
-    const V v314 = v168 * v299;
-    const V v315 = v211 * v207;
-    const V v316 = v304 - v315;
-    const V v317 = v316 * v316;
-    const V v318 = 2.0 * v316;
-    const V v319 = v213 * v238;
-    const V v320 = v312 - v319;
-    const V v321 = v320 * v320;
-    const V v322 = 2.0 * v320;
-    const V v323 = v164 * v280;
-    const V v324 = v313 + v317;
-    const V v325 = v166 * v317;
-    const V v326 = v314 + v321;
-    const V v327 = softehl_vrcbrt(v325);
-    const V v328 = v168 * v321;
-    const V v329 = softehl_vrcbrt(v328);
-    const V v330 = v187 * v324;
-    const V v331 = v189 * v326;
-    const V v332 = v259 * v201;
-    const V v333 = v283 - v332;
-    const V v334 = v333 * v333;
-    const V v335 = 2.0 * v333;
-    const V v336 = v323 + v334;
-    const V v337 = v186 * v336;
-    const V v338 = v164 * v334;
-    const V v339 = softehl_vrcbrt(v338);
-    const V v340 = v339 * v339;
-    const V v341 = v327 * v327;
-    const V v342 = v329 * v329;
-    const V v343 = v340 * v340;
-    const V v344 = v341 * v341;
-    const V v345 = v342 * v342;
-    const V v346 = v174 * v340;
-    const V v347 = v339 * v340;
-    const V v348 = 1.0 - v347;
-    const V v349 = v182 * v348;
-    const V v350 = v175 * v341;
-    const V v351 = v327 * v341;
-    const V v352 = 1.0 - v351;
-    const V v353 = v183 * v352;
-    const V v354 = v177 * v342;
-    const V v355 = v329 * v342;
-    const V v356 = 1.0 - v355;
-    const V v357 = v185 * v356;
-    const V v358 = v178 * v339;
-    const V v359 = v337 * v339;
-    const V v360 = v300 + v359;
-    const V v361 = v343 * v360;
-    const V v362 = v349 - v361;
-    const V v363 = v334 * v362;
-    const V v364 = v164 * v362;
-    const V v365 = v164 * v346;
-    const V v366 = v346 + v364;
-    const V v367 = v280 * v346;
-    const V v368 = v363 + v367;
-    const V v369 = v335 * v366;
-    const V v370 = v358 + v365;
-    const V v371 = v358 + v368;
-    const V v372 = v165 * v371;
-    const V v373 = v303 * v303;
-    const V v374 = v180 * v303;
-    const V v375 = v303 * v309;
-    const V v376 = v301 + v375;
-    const V v377 = v373 * v373;
-    const V v378 = v303 * v373;
-    const V v379 = 1.0 - v378;
-    const V v380 = v176 * v373;
-    const V v381 = v184 * v379;
-    const V v382 = v376 * v377;
-    const V v383 = v381 - v382;
-    const V v384 = v285 * v380;
-    const V v385 = v374 + v384;
-    const V v386 = v290 * v383;
-    const V v387 = v385 + v386;
-    const V v388 = v171 * v387;
-    const V v389 = v170 * v380;
-    const V v390 = v374 + v389;
-    const V v391 = v170 * v383;
-    const V v392 = v380 + v391;
-    const V v393 = v291 * v392;
-    const V v394 = v179 * v327;
-    const V v395 = v181 * v329;
-    const V v396 = v327 * v330;
-    const V v397 = v310 + v396;
-    const V v398 = v344 * v397;
-    const V v399 = v353 - v398;
-    const V v400 = v264 * v390;
-    const V v401 = v267 * v390;
-    const V v402 = v235 * v390;
-    const V v403 = v254 * v390;
-    const V v404 = v261 * v393;
-    const V v405 = v402 - v404;
-    const V v406 = v229 * v393;
-    const V v407 = v401 - v406;
-    const V v408 = v257 * v393;
-    const V v409 = v403 + v408;
-    const V v410 = v249 * v393;
-    const V v411 = v400 + v410;
-    const V v412 = v329 * v331;
-    const V v413 = v311 + v412;
-    const V v414 = v345 * v413;
-    const V v415 = v357 - v414;
-    const V v416 = v317 * v399;
-    const V v417 = v394 + v416;
-    const V v418 = v299 * v354;
-    const V v419 = v395 + v418;
-    const V v420 = v168 * v354;
-    const V v421 = v395 + v420;
-    const V v422 = v168 * v415;
-    const V v423 = v354 + v422;
-    const V v424 = v321 * v415;
-    const V v425 = v419 + v424;
-    const V v426 = v322 * v423;
-    const V v427 = v169 * v425;
-    const V v428 = v166 * v350;
-    const V v429 = v394 + v428;
-    const V v430 = v166 * v399;
-    const V v431 = v350 + v430;
-    const V v432 = v297 * v350;
-    const V v433 = v417 + v432;
-    const V v434 = v167 * v433;
-    const V v435 = v318 * v431;
-    const V v436 = v162 * v411;
-    const V v437 = v162 * v405;
-    const V v438 = v138 * v407;
-    const V v439 = v138 * v409;
-    const V v440 = v292 * v429;
-    const V v441 = v220 * v429;
-    const V v442 = v214 * v429;
-    const V v443 = v223 * v429;
-    const V v444 = v157 * v411;
-    const V v445 = v438 - v444;
-    const V v446 = v157 * v405;
-    const V v447 = v439 - v446;
-    const V v448 = v136 * v407;
-    const V v449 = v436 - v448;
-    const V v450 = v136 * v409;
-    const V v451 = v437 - v450;
-    const V v452 = v293 * v421;
-    const V v453 = v221 * v421;
-    const V v454 = v241 * v421;
-    const V v455 = v234 * v421;
-    const V v456 = v278 * v370;
-    const V v457 = v266 * v370;
-    const V v458 = v208 * v370;
-    const V v459 = v255 * v370;
-    const V v460 = v287 * v435;
-    const V v461 = v443 + v460;
-    const V v462 = v372 + v434;
-    const V v463 = v372 - v434;
-    const V v464 = v211 * v435;
-    const V v465 = v442 - v464;
-    const V v466 = v213 * v426;
-    const V v467 = v454 - v466;
-    const V v468 = v238 * v426;
-    const V v469 = v453 - v468;
-    const V v470 = v289 * v426;
-    const V v471 = v455 + v470;
-    const V v472 = v227 * v426;
-    const V v473 = v452 + v472;
-    const V v474 = v259 * v369;
-    const V v475 = v458 - v474;
-    const V v476 = v201 * v369;
-    const V v477 = v457 - v476;
-    const V v478 = v271 * v369;
-    const V v479 = v459 + v478;
-    const V v480 = v251 * v369;
-    const V v481 = v456 + v480;
-    const V v482 = v388 + v462;
-    const V v483 = v462 - v388;
-    const V v484 = v207 * v435;
-    const V v485 = v441 - v484;
-    const V v486 = v216 * v435;
-    const V v487 = v440 + v486;
-    const V v488 = v163 * v473;
-    const V v489 = v163 * v467;
-    const V v490 = v427 + v482;
-    const V v491 = v483 - v427;
-    const V v492 = v388 - v427;
-    const V v493 = 0.5773502691896257 * v491;
-    const V v494 = v139 * v477;
-    const V v495 = v139 * v479;
-    const V v496 = v463 + v492;
-    const V v497 = v463 - v492;
-    const V v498 = v159 * v487;
-    const V v499 = v488 + v498;
-    const V v500 = v159 * v465;
-    const V v501 = v489 + v500;
-    const V v502 = v160 * v487;
-    const V v503 = v494 - v502;
-    const V v504 = v160 * v465;
-    const V v505 = v495 - v504;
-    const V v506 = 0.5773502691896257 * v496;
-    const V v507 = 0.3333333333333333 * v497;
-    const V v508 = v161 * v473;
-    const V v509 = v445 - v508;
-    const V v510 = v161 * v467;
-    const V v511 = v447 - v510;
-    const V v512 = v144 * v477;
-    const V v513 = v449 - v512;
-    const V v514 = v144 * v479;
-    const V v515 = v451 - v514;
-    const V v516 = v156 * v481;
-    const V v517 = v503 - v516;
-    const V v518 = v156 * v475;
-    const V v519 = v505 - v518;
-    const V v520 = v158 * v481;
-    const V v521 = v513 + v520;
-    const V v522 = v158 * v475;
-    const V v523 = v515 + v522;
-    const V v524 = v155 * v469;
-    const V v525 = v509 + v524;
-    const V v526 = v155 * v471;
-    const V v527 = v511 + v526;
-    const V v528 = v137 * v469;
-    const V v529 = v499 - v528;
-    const V v530 = v137 * v471;
-    const V v531 = v501 - v530;
-    const V v532 = v493 + v521;
-    const V v533 = v506 + v525;
-    const V v534 = v521 - v525;
-    const V v535 = v527 - v523;
-    const V v536 = v154 * v485;
-    const V v537 = v517 + v536;
-    const V v538 = v145 * v485;
-    const V v539 = v529 - v538;
-    const V v540 = v154 * v461;
-    const V v541 = v519 + v540;
-    const V v542 = v145 * v461;
-    const V v543 = v531 - v542;
-    const V v544 = v533 + v537;
-    const V v545 = v534 + v537;
-    const V v546 = v532 + v539;
-    const V v547 = v527 + v541;
-    const V v548 = v535 - v541;
-    const V v549 = v523 + v543;
-    const V v550 = v545 - v539;
-    const V v551 = v543 + v548;
-    const V v552 = 0.5773502691896257 * v550;
-    const V v553 = v507 + v552;
-    const V v554 = v490 - v544;
-    const V v555 = v490 + v544;
-    const V v556 = 0.5773502691896257 * v551;
-    const V v557 = v546 + v553;
-    const V v558 = v547 + v549;
-    const V v559 = v547 - v549;
-    const V v560 = v549 + v556;
-    const V v561 = v553 - v546;
-    const V v562 = v558 - v556;
-    const V v563 = v556 + v559;
-    const V v564 = v547 + v560;
-    const V v565 = v554 + v561;
-    const V v566 = v554 - v561;
-    const V v567 = v555 + v557;
-    const V v568 = v555 - v557;
-    softehl_store4(R + 0, 8, v562, v567, v563, v568);
-    const V v569 = v560 - v547;
-    const V v570 = -v564;
-    softehl_store4(R + 4, 8, v570, v565, v569, v566);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1], v3 = 0.25 * parameters[2];
+    const V v4 = X4 - X2, v5 = X4 - X6, v6 = X2 - X0, v7 = X6 - X0,
+        v8 = 0.39433756729740643 * v7 + 0.10566243270259355 * v4,
+        v9 = 0.10566243270259355 * v7 + 0.39433756729740643 * v4,
+        v10 = 0.39433756729740643 * v6 + 0.10566243270259355 * v5,
+        v11 = 0.10566243270259355 * v6 + 0.39433756729740643 * v5, v12 = X3 - X1,
+        v13 = 1.5773502691896257 * X1 + 0.4226497308103742 * X3,
+        v14 = 0.4226497308103742 * X1 + 1.5773502691896257 * X3, v15 = X5 - X3, v16 = X5 - X7,
+        v17 = 0.4226497308103742 * X5 + 1.5773502691896257 * X7,
+        v18 = 1.5773502691896257 * X5 + 0.4226497308103742 * X7, v19 = X7 - X1,
+        v20 = 0.39433756729740643 * v12 + 0.10566243270259355 * v16,
+        v21 = 0.10566243270259355 * v12 + 0.39433756729740643 * v16,
+        v22 = 0.39433756729740643 * v13 + 0.10566243270259355 * v17,
+        v23 = 0.10566243270259355 * v13 + 0.39433756729740643 * v17,
+        v24 = 0.39433756729740643 * v14 + 0.10566243270259355 * v18,
+        v25 = 0.10566243270259355 * v14 + 0.39433756729740643 * v18,
+        v26 = 0.39433756729740643 * v19 + 0.10566243270259355 * v15,
+        v27 = 0.10566243270259355 * v19 + 0.39433756729740643 * v15, v28 = d0 - d2, v29 = d1 - d3,
+        v30 = d1 + d3, v31 = d4 - d6, v32 = d2 + (d0 - d4) - d6, v33 = 0.25 * (1.0 / v22),
+        v34 = v28 - v31, v35 = 0.25 * (1.0 / v23), v36 = 0.25 * (1.0 / v24),
+        v37 = 0.25 * (1.0 / v25), v38 = 0.5773502691896257 * (v28 + v31), v39 = v34 + v38,
+        v40 = v34 - v38, v41 = v38 + v32, v42 = v32 - v38, v43 = d5 + d7, v44 = d5 - d7,
+        v45 = v30 + v43, v46 = v30 - v43, v47 = v29 - v44, v48 = v29 + v44,
+        v49 = v10 * v26 - v8 * v20, v50 = v11 * v26 - v8 * v21, v51 = 1.0 / v49, v52 = 1.0 / v50,
+        v53 = 0.5773502691896257 * v46, v54 = 0.5773502691896257 * v48,
+        v55 = 0.3333333333333333 * v48, v56 = v22 * (6.283185307179586 * v49),
+        v57 = v23 * (6.283185307179586 * v50), v58 = 0.5773502691896257 * v47, v59 = v46 + v54,
+        v60 = v46 - v54, v61 = v45 + v58, v62 = v45 - v58, v63 = v47 + v54, v64 = v47 - v54,
+        v65 = v53 + v55, v66 = v53 - v55, v67 = v2 * v56, v68 = v2 * v57, v69 = v1 * v56,
+        v70 = v1 * v57, v71 = v3 * v56, v72 = v3 * v57, v73 = 1.0 + v33 * (v61 + v65),
+        v74 = 1.0 + v35 * (v61 - v65), v75 = 1.0 + v36 * (v62 + v66), v76 = 1.0 + v37 * (v62 - v66),
+        v77 = v73 * v73, v78 = 2.0 * v73, v79 = v74 * v74, v80 = 2.0 * v74, v81 = v75 * v75,
+        v82 = 2.0 * v75, v83 = v76 * v76, v84 = 2.0 * v76, v85 = v33 * v78, v86 = v35 * v80,
+        v87 = v36 * v82, v88 = v37 * v84, v89 = v26 * v51, v90 = v26 * v52, v91 = v20 * v51,
+        v92 = v21 * v52, v93 = v10 * v51, v94 = v8 * v51, v95 = v8 * v52, v96 = v11 * v52,
+        v97 = 0.25 * v89, v98 = 0.25 * v90, v99 = 0.25 * v91, v100 = 0.5 * v91, v101 = 0.25 * v92,
+        v102 = 0.5 * v92, v103 = 0.25 * v93, v104 = 0.5 * v93, v105 = 0.25 * v96, v106 = 0.5 * v96,
+        v107 = 0.25 * v94, v108 = 0.25 * v95, v109 = v39 * v107 - v41 * v103,
+        v110 = v40 * v108 - v41 * v105, v111 = v64 * v108 + (1.0 - v59 * v105),
+        v112 = v59 * v101 - v64 * v98, v113 = 2.0 * v109, v114 = 2.0 * v110, v115 = 2.0 * v111,
+        v116 = 2.0 * v112, v117 = v108 * v112 + v98 * v111, v118 = v108 * v115 - v98 * v116,
+        v119 = v105 * v112 + v101 * v111, v120 = v101 * v116 - v105 * v115,
+        v121 = 1.0 + v41 * v101 - v40 * v98,
+        v122 = v112 * v112 + v110 * v110 + v111 * v111 + v121 * v121,
+        v123 = v101 * v110 + v105 * v121, v124 = 2.0 * v121, v125 = v98 * v110 + v108 * v121,
+        v126 = v111 * v121 - v112 * v110, v127 = v108 * v114 - v98 * v124,
+        v128 = v101 * v124 - v105 * v114, v129 = v126 * v126, v130 = 2.0 * v126, v131 = v79 * v130,
+        v132 = v70 * (v79 + v122), v133 = v80 * v129, v134 = softehl_vrcbrt(v79 * v129),
+        v135 = v68 * (v129 + v79 * v122), v136 = 1.0 + v41 * v99 - v39 * v97,
+        v137 = v59 * v99 - v63 * v97, v138 = 2.0 * v136, v139 = 2.0 * v137,
+        v140 = v97 * v109 + v107 * v136, v141 = v63 * v107 + (1.0 - v59 * v103), v142 = 2.0 * v141,
+        v143 = v99 * v109 + v103 * v136, v144 = v136 * v141 - v137 * v109,
+        v145 = v107 * v113 - v97 * v138, v146 = v107 * v137 + v97 * v141,
+        v147 = v103 * v137 + v99 * v141,
+        v148 = v137 * v137 + (v109 * v109 + v136 * v136) + v141 * v141,
+        v149 = v99 * v138 - v103 * v113, v150 = v144 * v144, v151 = 2.0 * v144,
+        v152 = v107 * v142 - v97 * v139, v153 = v99 * v139 - v103 * v142, v154 = v77 * v151,
+        v155 = v69 * (v77 + v148), v156 = softehl_vrcbrt(v77 * v150), v157 = v78 * v150,
+        v158 = v67 * (v150 + v77 * v148), v159 = v10 * v27 - v9 * v20, v160 = v11 * v27 - v9 * v21,
+        v161 = 1.0 / v159, v162 = 1.0 / v160, v163 = v24 * (6.283185307179586 * v159),
+        v164 = v25 * (6.283185307179586 * v160), v165 = v20 * v161, v166 = v21 * v162,
+        v167 = 0.25 * v165, v168 = 0.5 * v165, v169 = 0.25 * v166, v170 = 0.5 * v166,
+        v171 = v10 * v161, v172 = v11 * v162, v173 = v2 * v163, v174 = v2 * v164, v175 = v1 * v163,
+        v176 = v1 * v164, v177 = v3 * v163, v178 = v3 * v164, v179 = v134 * v134, v180 = v70 * v134,
+        v181 = v134 * v179, v182 = v179 * v179, v183 = v68 * v179,
+        v184 = 0.6666666666666666 * v134 * v182, v185 = 0.3333333333333333 * v182,
+        v186 = v180 + v79 * v183, v187 = 0.25 * v171, v188 = 0.5 * v171, v189 = v70 * v185,
+        v190 = v68 * v131 * v184, v191 = 0.5 * (v90 * v98 + v95 * v108) * v186,
+        v192 = (v98 * v102 + v108 * v106) * v186, v193 = (v101 * v102 + v105 * v106) * v186,
+        v194 = (v72 + v132 * (0.4444444444444444 * v134)) * (v181 * v181) + v135 * (v182 * (1.1111111111111112 * v182)),
+        v195 = v72 * (1.0 - v181) - v132 * v185 - v135 * v184, v196 = v189 + v79 * v68 * v184,
+        v197 = v189 + v68 * v122 * v184, v198 = 0.25 * v172, v199 = 0.5 * v172, v200 = v156 * v156,
+        v201 = v69 * v156, v202 = v156 * v200, v203 = v200 * v200, v204 = v67 * v200,
+        v205 = 0.6666666666666666 * v156 * v203, v206 = 0.3333333333333333 * v203,
+        v207 = v69 * v206, v208 = v201 + v77 * v204, v209 = v67 * v154 * v205,
+        v210 = 0.5 * (v89 * v97 + v94 * v107) * v208, v211 = (v97 * v100 + v107 * v104) * v208,
+        v212 = (v99 * v100 + v103 * v104) * v208,
+        v213 = (v71 + v155 * (0.4444444444444444 * v156)) * (v202 * v202) + v158 * (v203 * (1.1111111111111112 * v203)),
+        v214 = v71 * (1.0 - v202) - v155 * v206 - v158 * v205, v215 = v207 + v77 * v67 * v205,
+        v216 = v207 + v67 * v148 * v205, v217 = v204 + v77 * v214,
+        v218 = v201 + v148 * v204 + v150 * v214, v219 = v154 * v215, v220 = v151 * v217,
+        v221 = v85 * v218, v222 = v85 * (v204 - v150 * v215),
+        v223 = v154 * v213 - v67 * v151 * v205, v224 = (v97 * v103 - v99 * v107) * v220,
+        v225 = v147 * v219, v226 = v85 * (v151 * v214 - v154 * v207 - v148 * v209 + v150 * v223),
+        v227 = 2.0 * v217 + v151 * (v77 * v223 - v209), v228 = v143 * v219, v229 = v140 * v219,
+        v230 = v143 * v226, v231 = v153 * v222, v232 = v140 * v226 + v152 * v222,
+        v233 = v145 * v222 - v146 * v226, v234 = v149 * v222 + v147 * v226, v235 = v231 - v230,
+        v236 = v233 + v234, v237 = v27 * v161, v238 = v27 * v162, v239 = v9 * v161,
+        v240 = v9 * v162, v241 = 0.25 * v237, v242 = 0.25 * v238, v243 = 0.25 * v239,
+        v244 = 0.25 * v240, v245 = v143 * v227 + v153 * v219, v246 = v147 * v227 - v149 * v219,
+        v247 = v140 * v227 - v152 * v219, v248 = v39 * v243 - v42 * v187,
+        v249 = 1.0 - v39 * v241 + v42 * v167, v250 = v60 * v169 - v64 * v242,
+        v251 = v60 * v167 - v63 * v241, v252 = 2.0 * v248, v253 = 2.0 * v249, v254 = 2.0 * v250,
+        v255 = 2.0 * v251, v256 = v40 * v244 - v42 * v198, v257 = v243 * v252 - v241 * v253,
+        v258 = v187 * v249 + v167 * v248, v259 = 1.0 - v40 * v242 + v42 * v169, v260 = 2.0 * v256,
+        v261 = v243 * v249 + v241 * v248, v262 = v167 * v253 - v187 * v252, v263 = 2.0 * v259,
+        v264 = v242 * v256 + v244 * v259, v265 = v244 * v260 - v242 * v263,
+        v266 = v169 * v263 - v198 * v260, v267 = v169 * v256 + v198 * v259,
+        v268 = 1.0 + v64 * v244 - v60 * v198, v269 = 1.0 + v63 * v243 - v60 * v187,
+        v270 = v268 * v268 + (v250 * v250 + v259 * v259 + v256 * v256), v271 = 2.0 * v268,
+        v272 = 2.0 * v269, v273 = v167 * v269 + v187 * v251, v274 = v268 * v259 - v250 * v256,
+        v275 = v269 * v269 + (v251 * v251 + (v248 * v248 + v249 * v249)),
+        v276 = v241 * v269 + v243 * v251, v277 = v169 * v268 + v198 * v250,
+        v278 = v269 * v249 - v251 * v248, v279 = v169 * v254 - v198 * v271, v280 = v274 * v274,
+        v281 = 2.0 * v274, v282 = v167 * v255 - v187 * v272, v283 = v278 * v278, v284 = 2.0 * v278,
+        v285 = v243 * v272 - v241 * v255, v286 = v244 * v271 - v242 * v254,
+        v287 = v242 * v268 + v244 * v250, v288 = v83 * v281, v289 = softehl_vrcbrt(v83 * v280),
+        v290 = v81 * v284, v291 = v175 * (v81 + v275), v292 = softehl_vrcbrt(v81 * v283),
+        v293 = v82 * v283, v294 = v84 * v280, v295 = v173 * (v283 + v81 * v275),
+        v296 = v176 * (v83 + v270), v297 = v174 * (v280 + v83 * v270), v298 = v131 * v196,
+        v299 = v131 * v194 - v68 * v130 * v184, v300 = v86 * (v183 - v129 * v196),
+        v301 = v119 * v298, v302 = v123 * v298, v303 = v125 * v298, v304 = v183 + v79 * v195,
+        v305 = v180 + v122 * v183 + v129 * v195, v306 = v130 * v304,
+        v307 = 2.0 * v304 + v130 * (v79 * v299 - v190), v308 = v86 * v305,
+        v309 = v86 * (v129 * v299 - v131 * v189 - v122 * v190 + v130 * v195),
+        v310 = (v98 * v105 - v101 * v108) * v306, v311 = v120 * v300, v312 = v221 + v308,
+        v313 = v221 - v308, v314 = v125 * v307 - v118 * v298, v315 = v289 * v289,
+        v316 = v176 * v289, v317 = v289 * v315, v318 = v292 * v292, v319 = v315 * v315,
+        v320 = v174 * v315, v321 = v318 * v318, v322 = v292 * v318, v323 = v173 * v318,
+        v324 = 0.6666666666666666 * v289 * v319, v325 = v175 * v292,
+        v326 = 0.3333333333333333 * v319, v327 = 0.6666666666666666 * v292 * v321,
+        v328 = 0.3333333333333333 * v321, v329 = v175 * v328, v330 = v176 * v326,
+        v331 = v173 * v290 * v327, v332 = v174 * v288 * v324, v333 = v329 + v81 * v173 * v327,
+        v334 = v329 + v173 * v275 * v327, v335 = v177 * (1.0 - v322) - v291 * v328 - v295 * v327,
+        v336 = v330 + v83 * v174 * v324,
+        v337 = v322 * v322 * (v177 + v291 * (0.4444444444444444 * v292)) + v295 * (v321 * (1.1111111111111112 * v321)),
+        v338 = v330 + v174 * v270 * v324, v339 = v178 * (1.0 - v317) - v296 * v326 - v297 * v324,
+        v340 = v317 * v317 * (v178 + v296 * (0.4444444444444444 * v289)) + v297 * (v319 * (1.1111111111111112 * v319)),
+        v341 = v290 * v333, v342 = v290 * v337 - v173 * v284 * v327,
+        v343 = v87 * (v323 - v283 * v333), v344 = v288 * v336,
+        v345 = v288 * v340 - v174 * v281 * v324, v346 = v277 * v344, v347 = v267 * v344,
+        v348 = v264 * v344, v349 = v325 + v81 * v323, v350 = v325 + v283 * v335 + v275 * v323,
+        v351 = 0.5 * (v237 * v241 + v239 * v243) * v349, v352 = (v241 * v168 + v243 * v188) * v349,
+        v353 = (v167 * v168 + v187 * v188) * v349, v354 = v87 * v350, v355 = v323 + v81 * v335,
+        v356 = v87 * (v283 * v342 - v290 * v329 - v275 * v331 + v284 * v335), v357 = v284 * v355,
+        v358 = v284 * (v81 * v342 - v331) + 2.0 * v355, v359 = (v241 * v187 - v167 * v243) * v357,
+        v360 = v88 * (v320 - v280 * v336), v361 = v316 + v83 * v320, v362 = v320 + v83 * v339,
+        v363 = 0.5 * (v238 * v242 + v240 * v244) * v361, v364 = (v242 * v170 + v244 * v199) * v361,
+        v365 = (v169 * v170 + v198 * v199) * v361, v366 = v316 + v270 * v320 + v280 * v339,
+        v367 = v281 * v362, v368 = v88 * (v280 * v345 - v288 * v330 - v270 * v332 + v281 * v339),
+        v369 = v88 * v366, v370 = v281 * (v83 * v345 - v332) + 2.0 * v362,
+        v371 = (v242 * v198 - v169 * v244) * v367, v372 = v354 - v369, v373 = v354 + v369,
+        v374 = v267 * v368, v375 = v279 * v344 + v267 * v370, v376 = v277 * v368 + v266 * v360,
+        v377 = v277 * v370 - v266 * v344, v378 = v364 - v286 * v347 + v264 * v375,
+        v379 = v264 * v370 - v286 * v344, v380 = v279 * v360, v381 = v265 * v360 - v287 * v368,
+        v382 = v286 * v360 + v264 * v368, v383 = v376 + v381, v384 = v380 - v374,
+        v385 = v125 * v306 + v118 * v186 + v264 * v367 + v286 * v361,
+        v386 = v363 - v286 * v348 + v264 * v379, v387 = v277 * v379 - v266 * v348 - v371,
+        v388 = v127 * v303 + v265 * v348 + v287 * v379 + v117 * v314,
+        v389 = v120 * v298 + v123 * v307, v390 = v123 * v309, v391 = v119 * v307 - v128 * v298,
+        v392 = v191 + v363 + v287 * (2.0 * (v265 * v344) + v287 * v370) + v117 * (2.0 * (v127 * v298) + v117 * v307),
+        v393 = v127 * v300 - v117 * v309, v394 = v128 * v300 + v119 * v309,
+        v395 = v118 * v300 + v125 * v309, v396 = v311 - v390,
+        v397 = v119 * v314 - v128 * v303 - v310, v398 = v393 - v394, v399 = v233 - v393,
+        v400 = v234 + v394, v401 = v234 - v394, v402 = v236 + v398, v403 = v273 * v341,
+        v404 = v258 * v341, v405 = v261 * v341, v406 = v258 * v356, v407 = v282 * v343,
+        v408 = v273 * v356 + v262 * v343, v409 = v261 * v356 + v285 * v343,
+        v410 = v257 * v343 - v276 * v356, v411 = v282 * v341 + v258 * v358, v412 = v408 - v410,
+        v413 = v408 - v376,
+        v414 = v210 + v146 * (2.0 * (v145 * v219) + v146 * v227) + v351 + v276 * (2.0 * (v257 * v341) + v276 * v358),
+        v415 = v407 - v406, v416 = v410 - v381, v417 = v412 - v383,
+        v418 = v393 + (v410 + (v233 + v381)),
+        v419 = 0.5773502691896257 * (v383 - v236 + v398 + v412), v420 = v418 + v419,
+        v421 = v376 + v400 + v408, v422 = v387 + v397, v423 = v388 - v387 + v397,
+        v424 = v420 - v421, v425 = v312 + v373, v426 = v392 + v414,
+        v427 = v273 * v358 - v262 * v341, v428 = v261 * v358 - v285 * v341,
+        v429 = v211 + v145 * v225 + v146 * v246,
+        v430 = v193 + v212 - v149 * v225 - v128 * v301 + v147 * v246 + v119 * v391,
+        v431 = v192 + v127 * v301 + v117 * v391, v432 = v147 * v247 - v224 - v149 * v229,
+        v433 = v210 - v152 * v229 + v140 * v247, v434 = v429 - v430 - v431,
+        v435 = v211 - v152 * v228 + v140 * v245,
+        v436 = v145 * v229 + v146 * v247 + v276 * v428 + v257 * v405,
+        v437 = v273 * v428 - v359 - v262 * v405, v438 = v432 + v437,
+        v439 = v388 + 0.5773502691896257 * (v381 - v233 + v410 - v393) + v436,
+        v440 = v351 - v285 * v405 + v261 * v428, v441 = v436 + (v437 - v432),
+        v442 = 0.5773502691896257 * (v400 - v376 - v408) + v422 + v438,
+        v443 = v433 + (0.5773502691896257 * (v232 - v409) + v440),
+        v444 = 0.3333333333333333 * (v398 - v236 - v383 - v412) + 0.5773502691896257 * (v441 - v423),
+        v445 = v444 - v439, v446 = v442 - v445, v447 = v191 - v118 * v303 + v125 * v314,
+        v448 = v192 - v118 * v302 + v125 * v389,
+        v449 = v386 + 0.5773502691896257 * (v395 - v382) + v447,
+        v450 = v127 * v302 + v310 + v117 * v389,
+        v451 = v127 * v186 + v265 * v361 - v287 * v367 - v117 * v306,
+        v452 = 0.5773502691896257 * (v230 - v231 - v396) + v435 + v448,
+        v453 = v147 * v220 + v149 * v208 + v119 * v306 + v128 * v186,
+        v454 = v149 * v228 - v147 * v245 - v119 * v389 + v128 * v302,
+        v455 = v153 * v208 - v123 * v306 + v120 * v186 - v143 * v220,
+        v456 = v212 + (v193 + v153 * v228) + v123 * v389 + v120 * v302 + v143 * v245,
+        v457 = v224 + v145 * v228 + v146 * v245, v458 = v457 + (v454 - v450), v459 = v450 + v457,
+        v460 = 0.3333333333333333 * (v235 - v396) + 0.5773502691896257 * (v448 - v435 + v456),
+        v461 = v145 * v208 - v146 * v220 + v257 * v349 - v276 * v357,
+        v462 = v266 * v361 + v277 * v367 + v262 * v349 + v273 * v357,
+        v463 = v279 * v361 - v267 * v367 + v282 * v349 - v258 * v357,
+        v464 = v140 * v220 + v152 * v208 + v285 * v349 + v261 * v357,
+        v465 = v352 - v285 * v404 + v261 * v411,
+        v466 = v353 + v279 * v347 + v365 + v267 * v375 + v282 * v404 + v258 * v411,
+        v467 = v359 + v257 * v404 + v276 * v411, v468 = v352 + v257 * v403 + v276 * v427,
+        v469 = v451 + v461, v470 = v378 + 0.5773502691896257 * (v384 + v415) + v465,
+        v471 = v453 + v462, v472 = 0.5773502691896257 * (v462 + (v451 - v453 - v461)),
+        v473 = v429 - v414 - v468,
+        v474 = 0.3333333333333333 * (v415 - v384) + 0.5773502691896257 * (v466 + (v465 - v378)),
+        v475 = v469 + v472, v476 = 0.5773502691896257 * (v313 + v372) + v455 + v463,
+        v477 = 0.19245008972987526 * (v232 + v395 - v382 - v409) + 0.5773502691896257 * (v460 + v474),
+        v478 = v385 + 0.5773502691896257 * (v312 - v373) + v464, v479 = v425 - v476,
+        v480 = v425 + v476,
+        v481 = 0.3333333333333333 * (v313 - v372) + 0.5773502691896257 * (v464 + (v455 - v385 - v463)),
+        v482 = v478 + v481, v483 = v481 - v478;
+    softehl_store4(R + 4, 8, -(v471 + v475), v479 + v483, v475 - v471, v479 - v483);
+    softehl_store4(R + 0, 8, v469 + v471 - v472, v480 + v482, v472 + (v471 - v469), v480 - v482);
+    const V v484 = 2.0 * v218 + v78 * (v150 * (v157 * v213 - v78 * v216) - v157 * v216),
+        v485 = v33 * v33 * v484,
+        v486 = 2.0 * v305 + v80 * (v129 * (v133 * v194 - v80 * v197) - v133 * v197),
+        v487 = v35 * v35 * v486,
+        v488 = 2.0 * v350 + v82 * (v283 * (v293 * v337 - v82 * v334) - v293 * v334),
+        v489 = v36 * v36 * v488,
+        v490 = 2.0 * v366 + v84 * (v280 * (v294 * v340 - v84 * v338) - v294 * v338),
+        v491 = 0.5773502691896257 * v485,
+        v492 = 0.5773502691896257 * (v232 + v235) + 0.3333333333333333 * v485,
+        v493 = v37 * v37 * v490, v494 = 0.5773502691896257 * v487,
+        v495 = 0.5773502691896257 * (v396 - v395) - 0.3333333333333333 * v487,
+        v496 = 0.5773502691896257 * v489, v497 = v232 + v491, v498 = v235 + v491,
+        v499 = 0.5773502691896257 * (v409 - v415) - 0.3333333333333333 * v489, v500 = v492 - v495,
+        v501 = 0.5773502691896257 * v493, v502 = v493 + (v489 + (v485 + v487)), v503 = v395 + v494,
+        v504 = v396 - v494, v505 = 0.3333333333333333 * v493 - 0.5773502691896257 * (v382 + v384),
+        v506 = v497 + v503, v507 = v499 + (v492 + v495) + v505, v508 = v499 - v505,
+        v509 = v448 + (v433 + (v440 + (v386 - v435)) - v378 + v447) + v465 + v500,
+        v510 = v409 - v496, v511 = v415 + v496, v512 = v382 - v501, v513 = v384 - v501,
+        v514 = v460 - v474 + 0.5773502691896257 * (v500 + v508),
+        v515 = v477 + 0.3333333333333333 * (v509 - v508),
+        v516 = v374 + (v235 - v311 - v380) + v390 + v407 - v406 + v498 - v504 + v511,
+        v517 = v507 - v514, v518 = v510 - v512, v519 = v512 + (v506 + v510),
+        v520 = v513 + (v498 + v504 + v511), v521 = v507 + v519,
+        v522 = v443 + v449 + 0.5773502691896257 * (v506 - v510 - v512), v523 = v502 - v520,
+        v524 = v456 + v466 + 0.5773502691896257 * (v516 - v513),
+        v525 = 0.5773502691896257 * (v443 - v452 - v449 + v470) + 0.3333333333333333 * (v497 - v503 - v518),
+        v526 = v452 + v470 + 0.5773502691896257 * (v503 - v497 - v518), v527 = v520 - v524,
+        v528 = v502 + v524, v529 = v515 + v522 + 2.0 * v525, v530 = v522 - v525, v531 = v525 - v515,
+        v532 = v519 + v526, v533 = v519 - v507, v534 = v530 + v532, v535 = v526 - v514,
+        v536 = v514 + v526, v537 = v523 + v533, v538 = v532 - v530, v539 = v514 - v526,
+        v540 = v523 - v533, v541 = v521 - v529 - v535, v542 = v527 + v536, v543 = v527 - v536,
+        v544 = v528 + (2.0 * v520 - v521) - v539, v545 = v537 + v543, v546 = v537 - v543,
+        v547 = v540 + v542, v548 = v541 + v544, v549 = v517 + v531, v550 = v517 - v531,
+        v551 = v534 + v549, v552 = v534 - v549, v553 = v538 + v550, v554 = v545 + v551,
+        v555 = v545 - v551, v556 = v546 - v552, v557 = v547 + v553, v558 = v547 - v553,
+        v559 = v265 * v346 + v364 + v287 * v377, v560 = v265 * v347 + v371 + v287 * v375,
+        v561 = v353 - v266 * v346 + v365 - v262 * v403 + v273 * v427 + v277 * v377,
+        v562 = v266 * v347 + v262 * v404 - v273 * v411 - v277 * v375, v563 = v467 + v560,
+        v564 = v429 + v431 + v468 + v559, v565 = v392 + v431 - v559, v566 = v430 + v561,
+        v567 = v561 + (v468 - v559), v568 = 0.5773502691896257 * (v401 + v413) + v454 + v562,
+        v569 = v473 + v565,
+        v570 = 0.3333333333333333 * (v401 - v413) + 0.5773502691896257 * (v438 - v422 + v454 - v562),
+        v571 = v560 + v562 - v467, v572 = 0.5773502691896257 * v569,
+        v573 = 1.1547005383792515 * v569, v574 = 0.5773502691896257 * (v399 + v416) + v459 + v563,
+        v575 = v426 + v572,
+        v576 = 0.3333333333333333 * (v399 - v416) + 0.5773502691896257 * (v388 - v436 + v459 - v563),
+        v577 = 0.3333333333333333 * (v417 - v402) + 0.5773502691896257 * (v571 - v458),
+        v578 = 0.3333333333333333 * (v423 + v441 - v458 - v571) - 0.19245008972987526 * (v402 + v417),
+        v579 = v564 + v575, v580 = v574 + v577, v581 = v444 + v577, v582 = v576 + v578,
+        v583 = v575 - v564, v584 = v582 - v570, v585 = v576 - v439 - v578 - v444,
+        v586 = v581 - v578 - v419, v587 = v574 - (v577 - v418) - v419,
+        v588 = v577 + v578 - v444 - v419, v589 = v587 - v585, v590 = v584 - v446,
+        v591 = v439 + v576, v592 = v442 - v570, v593 = v442 + v570, v594 = v421 - v568,
+        v595 = v570 + (v578 + (v439 + (v419 - v418 + v442) + v581)) - v576 - v574,
+        v596 = v418 - v574, v597 = v421 + v568, v598 = v568 + (v424 + v446 + v584) - v580,
+        v599 = v592 + v594, v600 = v591 + v596, v601 = v594 - v592, v602 = v595 + v597,
+        v603 = v596 - v591, v604 = v597 - v593, v605 = v593 + (v585 + v587 + v597);
+    softehl_store4(K + 8, 64, v605, v539 + (v528 + (v529 + 2.0 * (v520 + v521)) - v535), v602, v548);
+    const V v606 = v445 + v582 + v593, v607 = v588 + v603, v608 = v589 + v604, v609 = v603 - v588,
+        v610 = v599 + v607, v611 = v599 - v607;
+    softehl_store4(K + 56, 64, v610, v554, v611, v555); const V v612 = v604 - v589;
+    softehl_store4(K + 24, 64, v608, v548, v612, v544 - v541);
+    const V v613 = v609 - v599, v614 = -(v599 + v609);
+    softehl_store4(K + 60, 64, v614, v556, v613, v546 + v552);
+    const V v615 = v586 + v600, v616 = v586 - v601 - v600;
+    softehl_store4(K + 44, 64, v616, v540 - v538 - v542 + v550, v598, v556);
+    const V v617 = v601 + v615, v618 = v601 - v615;
+    softehl_store4(K + 40, 64, v617, v557, v618, v558);
+    const V v619 = 0.3333333333333333 * (v567 + (v565 - v473 - v434)),
+        v620 = 0.5773502691896257 * (v434 + v567), v621 = v580 + (v420 + v421 + v568),
+        v622 = v580 + (v424 - v568), v623 = v606 - v621, v624 = v590 + v622, v625 = v620 - v564,
+        v626 = -(v606 + v621);
+    softehl_store4(K + 12, 64, v626, v557, v624, v554); const V v627 = v622 - v590;
+    softehl_store4(K + 28, 64, v623, v558, v627, v555);
+    const V v628 = v572 + v619, v629 = v620 + v628, v630 = v620 - v628,
+        v631 = v573 - v426 - v564 - v619 - v620, v632 = v564 + v620, v633 = v625 - v566,
+        v634 = v566 - v625, v635 = v566 + v625, v636 = v566 + v632, v637 = v631 + v636;
+    softehl_store4(K + 0, 64, v619 + (v566 + (v426 - v573 - v564)) - v620 - v632, v605, v637, v608);
+    const V v638 = v583 - v629; softehl_store4(K + 16, 64, v637, v602, v636 - v631, v612);
+    const V v639 = v579 - v630, v640 = v579 + v630, v641 = v634 - v639;
+    softehl_store4(K + 36, 64, v635 + (v583 + v629), v616, v641, v614);
+    softehl_store4(K + 52, 64, v641, v598, v634 + v639, v613);
+    const V v642 = v633 + v640, v643 = v633 - v640;
+    softehl_store4(K + 48, 64, v642, v624, v643, v627); const V v644 = v638 - v635;
+    softehl_store4(K + 20, 64, v644, v618, v643, v611); const V v645 = -(v635 + v638);
+    softehl_store4(K + 4, 64, v645, v617, v642, v610);
+    softehl_store4(K + 32, 64, v645, v626, v644, v623);
 }
+SOFTEHL_BATCH(softehl_solid_q4_tangent, 8, 8, 0, 0, 8, (8 * 8))
 
-void softehl_solid_q4_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_q4_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_q4_residual_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_q4_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_q4_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_solid_q4_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 0.25 * parameters[2];
-    const V v4 = X4 - X2;
-    const V v5 = X4 - X6;
-    const V v6 = X2 - X0;
-    const V v7 = X6 - X0;
-    const V v8 = 0.10566243270259355 * v4;
-    const V v9 = 0.39433756729740643 * v4;
-    const V v10 = 0.10566243270259355 * v5;
-    const V v11 = 0.39433756729740643 * v5;
-    const V v12 = 0.4226497308103742 * X3;
-    const V v13 = 1.5773502691896257 * X3;
-    const V v14 = 0.39433756729740643 * v7;
-    const V v15 = v14 + v8;
-    const V v16 = 0.10566243270259355 * v7;
-    const V v17 = v16 + v9;
-    const V v18 = 0.39433756729740643 * v6;
-    const V v19 = v18 + v10;
-    const V v20 = 0.10566243270259355 * v6;
-    const V v21 = v20 + v11;
-    const V v22 = X3 - X1;
-    const V v23 = 1.5773502691896257 * X1;
-    const V v24 = v23 + v12;
-    const V v25 = 0.4226497308103742 * X1;
-    const V v26 = v25 + v13;
-    const V v27 = 0.4226497308103742 * X5;
-    const V v28 = 1.5773502691896257 * X5;
-    const V v29 = X5 - X3;
-    const V v30 = 0.39433756729740643 * v22;
-    const V v31 = 0.10566243270259355 * v22;
-    const V v32 = 0.39433756729740643 * v24;
-    const V v33 = 0.10566243270259355 * v24;
-    const V v34 = 0.39433756729740643 * v26;
-    const V v35 = 0.10566243270259355 * v26;
-    const V v36 = X5 - X7;
-    const V v37 = 1.5773502691896257 * X7;
-    const V v38 = v27 + v37;
-    const V v39 = 0.4226497308103742 * X7;
-    const V v40 = v28 + v39;
-    const V v41 = 0.10566243270259355 * v29;
-    const V v42 = 0.39433756729740643 * v29;
-    const V v43 = X7 - X1;
-    const V v44 = 0.10566243270259355 * v36;
-    const V v45 = v30 + v44;
-    const V v46 = 0.39433756729740643 * v36;
-    const V v47 = v31 + v46;
-    const V v48 = 0.10566243270259355 * v38;
-    const V v49 = v32 + v48;
-    const V v50 = 0.39433756729740643 * v38;
-    const V v51 = v33 + v50;
-    const V v52 = 0.10566243270259355 * v40;
-    const V v53 = v34 + v52;
-    const V v54 = 0.39433756729740643 * v40;
-    const V v55 = v35 + v54;
-    const V v56 = 0.39433756729740643 * v43;
-    const V v57 = v56 + v41;
-    const V v58 = 0.10566243270259355 * v43;
-    const V v59 = v58 + v42;
-    const V v60 = 1.0 / v49;
-    const V v61 = 1.0 / v51;
-    const V v62 = 1.0 / v53;
-    const V v63 = 1.0 / v55;
-    const V v64 = v19 * v57;
-    const V v65 = v21 * v57;
-    const V v66 = v19 * v59;
-    const V v67 = v21 * v59;
-    const V v68 = d0 - d4;
-    const V v69 = d0 - d2;
-    const V v70 = d2 + v68;
-    const V v71 = d1 - d3;
-    const V v72 = d1 + d3;
-    const V v73 = d4 - d6;
-    const V v74 = v70 - d6;
-    const V v75 = 0.25 * v60;
-    const V v76 = v69 - v73;
-    const V v77 = v69 + v73;
-    const V v78 = 0.25 * v61;
-    const V v79 = 0.25 * v62;
-    const V v80 = 0.25 * v63;
-    const V v81 = 0.5773502691896257 * v77;
-    const V v82 = v75 * v75;
-    const V v83 = v78 * v78;
-    const V v84 = v79 * v79;
-    const V v85 = v80 * v80;
-    const V v86 = v76 + v81;
-    const V v87 = v76 - v81;
-    const V v88 = v81 + v74;
-    const V v89 = v74 - v81;
-    const V v90 = d5 + d7;
-    const V v91 = d5 - d7;
-    const V v92 = v72 + v90;
-    const V v93 = v72 - v90;
-    const V v94 = v71 - v91;
-    const V v95 = v71 + v91;
-    const V v96 = v15 * v45;
-    const V v97 = v64 - v96;
-    const V v98 = v15 * v47;
-    const V v99 = v65 - v98;
-    const V v100 = 1.0 / v97;
-    const V v101 = 6.283185307179586 * v97;
-    const V v102 = 1.0 / v99;
-    const V v103 = 6.283185307179586 * v99;
-    const V v104 = 0.5773502691896257 * v93;
-    const V v105 = 0.5773502691896257 * v95;
-    const V v106 = 0.3333333333333333 * v95;
-    const V v107 = v49 * v101;
-    const V v108 = v51 * v103;
-    const V v109 = 0.5773502691896257 * v94;
-    const V v110 = v93 + v105;
-    const V v111 = v93 - v105;
-    const V v112 = v92 + v109;
-    const V v113 = v92 - v109;
-    const V v114 = v94 + v105;
-    const V v115 = v94 - v105;
-    const V v116 = v104 + v106;
-    const V v117 = v104 - v106;
-    const V v118 = v2 * v107;
-    const V v119 = v2 * v108;
-    const V v120 = v112 + v116;
-    const V v121 = v112 - v116;
-    const V v122 = v113 + v117;
-    const V v123 = v113 - v117;
-    const V v124 = v1 * v107;
-    const V v125 = v1 * v108;
-    const V v126 = v3 * v107;
-    const V v127 = v3 * v108;
-    const V v128 = v75 * v120;
-    const V v129 = 1.0 + v128;
-    const V v130 = v78 * v121;
-    const V v131 = 1.0 + v130;
-    const V v132 = v79 * v122;
-    const V v133 = 1.0 + v132;
-    const V v134 = v80 * v123;
-    const V v135 = 1.0 + v134;
-    const V v136 = v129 * v129;
-    const V v137 = 2.0 * v129;
-    const V v138 = v131 * v131;
-    const V v139 = 2.0 * v131;
-    const V v140 = v133 * v133;
-    const V v141 = 2.0 * v133;
-    const V v142 = v135 * v135;
-    const V v143 = 2.0 * v135;
-    const V v144 = v75 * v137;
-    const V v145 = v78 * v139;
-    const V v146 = v79 * v141;
-    const V v147 = v80 * v143;
-    const V v148 = v136 * v118;
-    const V v149 = v138 * v119;
-    const V v150 = v57 * v100;
-    const V v151 = v57 * v102;
-    const V v152 = v45 * v100;
-    const V v153 = v47 * v102;
-    const V v154 = v19 * v100;
-    const V v155 = v15 * v100;
-    const V v156 = v15 * v102;
-    const V v157 = v21 * v102;
-    const V v158 = 0.25 * v150;
-    const V v159 = 0.25 * v151;
-    const V v160 = 0.25 * v152;
-    const V v161 = 0.5 * v152;
-    const V v162 = 0.25 * v153;
-    const V v163 = 0.5 * v153;
-    const V v164 = v150 * v158;
-    const V v165 = v151 * v159;
-    const V v166 = 0.25 * v154;
-    const V v167 = 0.5 * v154;
-    const V v168 = 0.25 * v157;
-    const V v169 = 0.5 * v157;
-    const V v170 = 0.25 * v155;
-    const V v171 = 0.25 * v156;
-    const V v172 = v158 * v161;
-    const V v173 = v155 * v170;
-    const V v174 = v164 + v173;
-    const V v175 = v156 * v171;
-    const V v176 = v165 + v175;
-    const V v177 = v158 * v166;
-    const V v178 = v159 * v168;
-    const V v179 = v159 * v163;
-    const V v180 = v170 * v167;
-    const V v181 = v172 + v180;
-    const V v182 = v166 * v167;
-    const V v183 = v162 * v163;
-    const V v184 = v162 * v171;
-    const V v185 = v178 - v184;
-    const V v186 = 0.5 * v174;
-    const V v187 = 0.5 * v176;
-    const V v188 = v160 * v161;
-    const V v189 = v188 + v182;
-    const V v190 = v160 * v170;
-    const V v191 = v177 - v190;
-    const V v192 = v171 * v169;
-    const V v193 = v179 + v192;
-    const V v194 = v168 * v169;
-    const V v195 = v183 + v194;
-    const V v196 = v86 * v170;
-    const V v197 = v87 * v171;
-    const V v198 = v110 * v160;
-    const V v199 = v110 * v162;
-    const V v200 = v110 * v168;
-    const V v201 = 1.0 - v200;
-    const V v202 = v110 * v166;
-    const V v203 = 1.0 - v202;
-    const V v204 = v88 * v166;
-    const V v205 = v196 - v204;
-    const V v206 = v88 * v168;
-    const V v207 = v197 - v206;
-    const V v208 = v88 * v160;
-    const V v209 = 1.0 + v208;
-    const V v210 = v88 * v162;
-    const V v211 = 1.0 + v210;
-    const V v212 = v115 * v171;
-    const V v213 = v212 + v201;
-    const V v214 = v115 * v159;
-    const V v215 = v199 - v214;
-    const V v216 = 2.0 * v205;
-    const V v217 = v205 * v205;
-    const V v218 = 2.0 * v207;
-    const V v219 = v207 * v207;
-    const V v220 = v160 * v205;
-    const V v221 = 2.0 * v213;
-    const V v222 = 2.0 * v215;
-    const V v223 = v159 * v213;
-    const V v224 = v159 * v207;
-    const V v225 = v215 * v215;
-    const V v226 = v225 + v219;
-    const V v227 = v162 * v213;
-    const V v228 = v162 * v207;
-    const V v229 = v162 * v222;
-    const V v230 = v171 * v215;
-    const V v231 = v230 + v223;
-    const V v232 = v171 * v221;
-    const V v233 = v213 * v213;
-    const V v234 = v226 + v233;
-    const V v235 = v159 * v222;
-    const V v236 = v232 - v235;
-    const V v237 = v168 * v215;
-    const V v238 = v237 + v227;
-    const V v239 = v168 * v221;
-    const V v240 = v229 - v239;
-    const V v241 = v171 * v218;
-    const V v242 = v87 * v159;
-    const V v243 = v211 - v242;
-    const V v244 = v213 * v243;
-    const V v245 = v243 * v243;
-    const V v246 = v234 + v245;
-    const V v247 = v168 * v243;
-    const V v248 = v228 + v247;
-    const V v249 = 2.0 * v243;
-    const V v250 = v171 * v243;
-    const V v251 = v224 + v250;
-    const V v252 = v215 * v207;
-    const V v253 = v244 - v252;
-    const V v254 = v159 * v249;
-    const V v255 = v241 - v254;
-    const V v256 = v162 * v249;
-    const V v257 = v168 * v218;
-    const V v258 = v256 - v257;
-    const V v259 = v253 * v253;
-    const V v260 = 2.0 * v253;
-    const V v261 = v138 + v246;
-    const V v262 = v119 * v246;
-    const V v263 = v138 * v246;
-    const V v264 = v138 * v259;
-    const V v265 = v138 * v260;
-    const V v266 = v119 * v260;
-    const V v267 = v259 + v263;
-    const V v268 = v125 * v261;
-    const V v269 = v139 * v259;
-    const V v270 = softehl_vrcbrt(v264);
-    const V v271 = v119 * v267;
-    const V v272 = v119 * v265;
-    const V v273 = v158 * v205;
-    const V v274 = v86 * v158;
-    const V v275 = v209 - v274;
-    const V v276 = v114 * v158;
-    const V v277 = v198 - v276;
-    const V v278 = 2.0 * v275;
-    const V v279 = 2.0 * v277;
-    const V v280 = v170 * v275;
-    const V v281 = v273 + v280;
-    const V v282 = v114 * v170;
-    const V v283 = v282 + v203;
-    const V v284 = v170 * v277;
-    const V v285 = v170 * v216;
-    const V v286 = v275 * v275;
-    const V v287 = v217 + v286;
-    const V v288 = 2.0 * v283;
-    const V v289 = v275 * v283;
-    const V v290 = v166 * v275;
-    const V v291 = v220 + v290;
-    const V v292 = v166 * v277;
-    const V v293 = v277 * v277;
-    const V v294 = v293 + v287;
-    const V v295 = v277 * v205;
-    const V v296 = v289 - v295;
-    const V v297 = v158 * v278;
-    const V v298 = v285 - v297;
-    const V v299 = v158 * v283;
-    const V v300 = v284 + v299;
-    const V v301 = v160 * v278;
-    const V v302 = v160 * v283;
-    const V v303 = v292 + v302;
-    const V v304 = v283 * v283;
-    const V v305 = v294 + v304;
-    const V v306 = v170 * v288;
-    const V v307 = v166 * v216;
-    const V v308 = v301 - v307;
-    const V v309 = v296 * v296;
-    const V v310 = 2.0 * v296;
-    const V v311 = v160 * v279;
-    const V v312 = v158 * v279;
-    const V v313 = v306 - v312;
-    const V v314 = v166 * v288;
-    const V v315 = v311 - v314;
-    const V v316 = v136 + v305;
-    const V v317 = v118 * v305;
-    const V v318 = v118 * v310;
-    const V v319 = v136 * v309;
-    const V v320 = v136 * v310;
-    const V v321 = v124 * v316;
-    const V v322 = softehl_vrcbrt(v319);
-    const V v323 = v136 * v305;
-    const V v324 = v309 + v323;
-    const V v325 = v137 * v309;
-    const V v326 = v118 * v324;
-    const V v327 = v118 * v320;
-    const V v328 = v17 * v45;
-    const V v329 = v66 - v328;
-    const V v330 = v17 * v47;
-    const V v331 = v67 - v330;
-    const V v332 = 1.0 / v329;
-    const V v333 = 6.283185307179586 * v329;
-    const V v334 = 1.0 / v331;
-    const V v335 = 6.283185307179586 * v331;
-    const V v336 = v53 * v333;
-    const V v337 = v55 * v335;
-    const V v338 = v45 * v332;
-    const V v339 = v47 * v334;
-    const V v340 = 0.25 * v338;
-    const V v341 = 0.5 * v338;
-    const V v342 = 0.25 * v339;
-    const V v343 = 0.5 * v339;
-    const V v344 = v19 * v332;
-    const V v345 = v21 * v334;
-    const V v346 = v2 * v336;
-    const V v347 = v2 * v337;
-    const V v348 = v1 * v336;
-    const V v349 = v1 * v337;
-    const V v350 = v3 * v336;
-    const V v351 = v3 * v337;
-    const V v352 = v270 * v270;
-    const V v353 = 0.6666666666666666 * v270;
-    const V v354 = 0.4444444444444444 * v270;
-    const V v355 = v125 * v270;
-    const V v356 = v270 * v352;
-    const V v357 = v352 * v352;
-    const V v358 = v119 * v352;
-    const V v359 = v140 * v346;
-    const V v360 = v268 * v354;
-    const V v361 = v127 + v360;
-    const V v362 = v353 * v357;
-    const V v363 = 0.3333333333333333 * v357;
-    const V v364 = v356 * v356;
-    const V v365 = 1.0 - v356;
-    const V v366 = 1.1111111111111112 * v357;
-    const V v367 = v357 * v366;
-    const V v368 = v138 * v358;
-    const V v369 = v355 + v368;
-    const V v370 = v246 * v358;
-    const V v371 = v355 + v370;
-    const V v372 = v361 * v364;
-    const V v373 = v127 * v365;
-    const V v374 = 0.25 * v344;
-    const V v375 = 0.5 * v344;
-    const V v376 = v125 * v363;
-    const V v377 = v272 * v362;
-    const V v378 = v187 * v369;
-    const V v379 = v193 * v369;
-    const V v380 = v195 * v369;
-    const V v381 = v268 * v363;
-    const V v382 = v373 - v381;
-    const V v383 = v149 * v362;
-    const V v384 = v374 * v375;
-    const V v385 = v262 * v362;
-    const V v386 = v271 * v367;
-    const V v387 = v372 + v386;
-    const V v388 = v271 * v362;
-    const V v389 = v382 - v388;
-    const V v390 = v376 + v383;
-    const V v391 = v376 + v385;
-    const V v392 = 0.25 * v345;
-    const V v393 = 0.5 * v345;
-    const V v394 = v322 * v322;
-    const V v395 = 0.6666666666666666 * v322;
-    const V v396 = 0.4444444444444444 * v322;
-    const V v397 = v124 * v322;
-    const V v398 = v322 * v394;
-    const V v399 = v392 * v393;
-    const V v400 = v394 * v394;
-    const V v401 = v118 * v394;
-    const V v402 = v395 * v400;
-    const V v403 = v321 * v396;
-    const V v404 = v126 + v403;
-    const V v405 = 0.3333333333333333 * v400;
-    const V v406 = v398 * v398;
-    const V v407 = 1.0 - v398;
-    const V v408 = 1.1111111111111112 * v400;
-    const V v409 = v400 * v408;
-    const V v410 = v404 * v406;
-    const V v411 = v124 * v405;
-    const V v412 = v126 * v407;
-    const V v413 = v136 * v401;
-    const V v414 = v397 + v413;
-    const V v415 = v305 * v401;
-    const V v416 = v397 + v415;
-    const V v417 = v327 * v402;
-    const V v418 = v321 * v405;
-    const V v419 = v412 - v418;
-    const V v420 = v148 * v402;
-    const V v421 = v317 * v402;
-    const V v422 = v186 * v414;
-    const V v423 = v181 * v414;
-    const V v424 = v189 * v414;
-    const V v425 = v326 * v409;
-    const V v426 = v410 + v425;
-    const V v427 = v326 * v402;
-    const V v428 = v419 - v427;
-    const V v429 = v411 + v420;
-    const V v430 = v411 + v421;
-    const V v431 = v136 * v428;
-    const V v432 = v401 + v431;
-    const V v433 = v309 * v428;
-    const V v434 = v416 + v433;
-    const V v435 = v310 * v428;
-    const V v436 = v320 * v429;
-    const V v437 = v309 * v429;
-    const V v438 = v401 - v437;
-    const V v439 = v320 * v411;
-    const V v440 = v435 - v439;
-    const V v441 = v320 * v426;
-    const V v442 = v325 * v426;
-    const V v443 = v310 * v432;
-    const V v444 = 2.0 * v432;
-    const V v445 = 2.0 * v434;
-    const V v446 = v144 * v434;
-    const V v447 = v144 * v438;
-    const V v448 = v318 * v402;
-    const V v449 = v441 - v448;
-    const V v450 = v305 * v417;
-    const V v451 = v440 - v450;
-    const V v452 = v191 * v443;
-    const V v453 = v303 * v436;
-    const V v454 = v303 * v443;
-    const V v455 = v136 * v449;
-    const V v456 = v309 * v449;
-    const V v457 = v451 + v456;
-    const V v458 = v144 * v457;
-    const V v459 = v455 - v417;
-    const V v460 = v310 * v459;
-    const V v461 = v444 + v460;
-    const V v462 = v291 * v436;
-    const V v463 = v281 * v436;
-    const V v464 = v281 * v443;
-    const V v465 = v298 * v436;
-    const V v466 = v298 * v462;
-    const V v467 = v452 + v466;
-    const V v468 = 2.0 * v465;
-    const V v469 = v298 * v463;
-    const V v470 = v298 * v414;
-    const V v471 = v291 * v458;
-    const V v472 = v281 * v458;
-    const V v473 = v313 * v414;
-    const V v474 = v464 + v473;
-    const V v475 = v315 * v414;
-    const V v476 = v315 * v447;
-    const V v477 = v298 * v447;
-    const V v478 = v313 * v447;
-    const V v479 = v472 + v478;
-    const V v480 = v308 * v447;
-    const V v481 = v308 * v414;
-    const V v482 = v454 + v481;
-    const V v483 = v300 * v458;
-    const V v484 = v477 - v483;
-    const V v485 = v303 * v458;
-    const V v486 = v480 + v485;
-    const V v487 = v476 - v471;
-    const V v488 = v471 - v476;
-    const V v489 = v479 + v487;
-    const V v490 = v484 + v486;
-    const V v491 = 0.5773502691896257 * v489;
-    const V v492 = v303 * v461;
-    const V v493 = v291 * v461;
-    const V v494 = v281 * v461;
-    const V v495 = v300 * v461;
-    const V v496 = v468 + v495;
-    const V v497 = v142 * v347;
-    const V v498 = v59 * v332;
-    const V v499 = v59 * v334;
-    const V v500 = v17 * v332;
-    const V v501 = v17 * v334;
-    const V v502 = 0.25 * v498;
-    const V v503 = 0.25 * v499;
-    const V v504 = v300 * v496;
-    const V v505 = v422 + v504;
-    const V v506 = 0.25 * v500;
-    const V v507 = 0.25 * v501;
-    const V v508 = v498 * v502;
-    const V v509 = v499 * v503;
-    const V v510 = v315 * v436;
-    const V v511 = v493 + v510;
-    const V v512 = v315 * v462;
-    const V v513 = v380 + v512;
-    const V v514 = v308 * v462;
-    const V v515 = v308 * v436;
-    const V v516 = v492 - v515;
-    const V v517 = v506 * v375;
-    const V v518 = v500 * v506;
-    const V v519 = v508 + v518;
-    const V v520 = v507 * v393;
-    const V v521 = v501 * v507;
-    const V v522 = v509 + v521;
-    const V v523 = 0.5 * v519;
-    const V v524 = 0.5 * v522;
-    const V v525 = v313 * v436;
-    const V v526 = v494 - v525;
-    const V v527 = v313 * v462;
-    const V v528 = v423 - v527;
-    const V v529 = v424 + v513;
-    const V v530 = v380 + v424;
-    const V v531 = v503 * v343;
-    const V v532 = v531 + v520;
-    const V v533 = v342 * v343;
-    const V v534 = v533 + v399;
-    const V v535 = v503 * v392;
-    const V v536 = v86 * v506;
-    const V v537 = v111 * v342;
-    const V v538 = v111 * v340;
-    const V v539 = v86 * v502;
-    const V v540 = 1.0 - v539;
-    const V v541 = v502 * v374;
-    const V v542 = v342 * v507;
-    const V v543 = v535 - v542;
-    const V v544 = v89 * v374;
-    const V v545 = v536 - v544;
-    const V v546 = v89 * v340;
-    const V v547 = v540 + v546;
-    const V v548 = v340 * v506;
-    const V v549 = v541 - v548;
-    const V v550 = v115 * v503;
-    const V v551 = v537 - v550;
-    const V v552 = v114 * v502;
-    const V v553 = v538 - v552;
-    const V v554 = v114 * v506;
-    const V v555 = 1.0 + v554;
-    const V v556 = v115 * v507;
-    const V v557 = 1.0 + v556;
-    const V v558 = 2.0 * v545;
-    const V v559 = v545 * v545;
-    const V v560 = 2.0 * v547;
-    const V v561 = 2.0 * v551;
-    const V v562 = v551 * v551;
-    const V v563 = 2.0 * v553;
-    const V v564 = v506 * v547;
-    const V v565 = v506 * v553;
-    const V v566 = v547 * v547;
-    const V v567 = v559 + v566;
-    const V v568 = v507 * v551;
-    const V v569 = v506 * v558;
-    const V v570 = v87 * v507;
-    const V v571 = v553 * v553;
-    const V v572 = v571 + v567;
-    const V v573 = v374 * v547;
-    const V v574 = v374 * v553;
-    const V v575 = v392 * v551;
-    const V v576 = v89 * v392;
-    const V v577 = v570 - v576;
-    const V v578 = v87 * v503;
-    const V v579 = 1.0 - v578;
-    const V v580 = v502 * v560;
-    const V v581 = v569 - v580;
-    const V v582 = v340 * v560;
-    const V v583 = v340 * v545;
-    const V v584 = v573 + v583;
-    const V v585 = v89 * v342;
-    const V v586 = v579 + v585;
-    const V v587 = 2.0 * v577;
-    const V v588 = v342 * v577;
-    const V v589 = v503 * v577;
-    const V v590 = v502 * v545;
-    const V v591 = v564 + v590;
-    const V v592 = v374 * v558;
-    const V v593 = v582 - v592;
-    const V v594 = 2.0 * v586;
-    const V v595 = v340 * v563;
-    const V v596 = v342 * v561;
-    const V v597 = v507 * v586;
-    const V v598 = v589 + v597;
-    const V v599 = v586 * v586;
-    const V v600 = v562 + v599;
-    const V v601 = v507 * v587;
-    const V v602 = v342 * v594;
-    const V v603 = v503 * v594;
-    const V v604 = v601 - v603;
-    const V v605 = v340 * v341;
-    const V v606 = v605 + v384;
-    const V v607 = v502 * v341;
-    const V v608 = v607 + v517;
-    const V v609 = v577 * v577;
-    const V v610 = v600 + v609;
-    const V v611 = v392 * v587;
-    const V v612 = v602 - v611;
-    const V v613 = v392 * v586;
-    const V v614 = v588 + v613;
-    const V v615 = v111 * v392;
-    const V v616 = v557 - v615;
-    const V v617 = v111 * v374;
-    const V v618 = v555 - v617;
-    const V v619 = v616 * v586;
-    const V v620 = v616 * v616;
-    const V v621 = v620 + v610;
-    const V v622 = 2.0 * v616;
-    const V v623 = 2.0 * v618;
-    const V v624 = v340 * v618;
-    const V v625 = v624 + v574;
-    const V v626 = v618 * v547;
-    const V v627 = v551 * v577;
-    const V v628 = v619 - v627;
-    const V v629 = v618 * v618;
-    const V v630 = v629 + v572;
-    const V v631 = v502 * v618;
-    const V v632 = v631 + v565;
-    const V v633 = v342 * v616;
-    const V v634 = v633 + v575;
-    const V v635 = v553 * v545;
-    const V v636 = v626 - v635;
-    const V v637 = v392 * v622;
-    const V v638 = v596 - v637;
-    const V v639 = v507 * v622;
-    const V v640 = v628 * v628;
-    const V v641 = 2.0 * v628;
-    const V v642 = v374 * v623;
-    const V v643 = v595 - v642;
-    const V v644 = v506 * v623;
-    const V v645 = v636 * v636;
-    const V v646 = 2.0 * v636;
-    const V v647 = v502 * v563;
-    const V v648 = v644 - v647;
-    const V v649 = v503 * v561;
-    const V v650 = v639 - v649;
-    const V v651 = v503 * v616;
-    const V v652 = v651 + v568;
-    const V v653 = v140 + v630;
-    const V v654 = v142 * v640;
-    const V v655 = v142 * v641;
-    const V v656 = softehl_vrcbrt(v654);
-    const V v657 = v140 * v645;
-    const V v658 = v140 * v646;
-    const V v659 = v348 * v653;
-    const V v660 = v140 * v630;
-    const V v661 = v645 + v660;
-    const V v662 = softehl_vrcbrt(v657);
-    const V v663 = v141 * v645;
-    const V v664 = v143 * v640;
-    const V v665 = v346 * v646;
-    const V v666 = v346 * v661;
-    const V v667 = v346 * v630;
-    const V v668 = v346 * v658;
-    const V v669 = v142 + v621;
-    const V v670 = v347 * v621;
-    const V v671 = v347 * v641;
-    const V v672 = v347 * v655;
-    const V v673 = v349 * v669;
-    const V v674 = v142 * v621;
-    const V v675 = v640 + v674;
-    const V v676 = v347 * v675;
-    const V v677 = v265 * v390;
-    const V v678 = v259 * v390;
-    const V v679 = v358 - v678;
-    const V v680 = v265 * v387;
-    const V v681 = v269 * v387;
-    const V v682 = v266 * v362;
-    const V v683 = v680 - v682;
-    const V v684 = v145 * v679;
-    const V v685 = v238 * v677;
-    const V v686 = v248 * v677;
-    const V v687 = v251 * v677;
-    const V v688 = v255 * v677;
-    const V v689 = v259 * v683;
-    const V v690 = v138 * v683;
-    const V v691 = 2.0 * v688;
-    const V v692 = v138 * v389;
-    const V v693 = v358 + v692;
-    const V v694 = v255 * v686;
-    const V v695 = v255 * v687;
-    const V v696 = v259 * v389;
-    const V v697 = v371 + v696;
-    const V v698 = v265 * v376;
-    const V v699 = v689 - v698;
-    const V v700 = v690 - v377;
-    const V v701 = v246 * v377;
-    const V v702 = v699 - v701;
-    const V v703 = 2.0 * v693;
-    const V v704 = v260 * v693;
-    const V v705 = v260 * v389;
-    const V v706 = v702 + v705;
-    const V v707 = v260 * v700;
-    const V v708 = v703 + v707;
-    const V v709 = 2.0 * v697;
-    const V v710 = v145 * v697;
-    const V v711 = v145 * v706;
-    const V v712 = v185 * v704;
-    const V v713 = v251 * v704;
-    const V v714 = v255 * v369;
-    const V v715 = v255 * v684;
-    const V v716 = v240 * v684;
-    const V v717 = v251 * v708;
-    const V v718 = v446 + v710;
-    const V v719 = v446 - v710;
-    const V v720 = v240 * v677;
-    const V v721 = v236 * v369;
-    const V v722 = v713 + v721;
-    const V v723 = v236 * v684;
-    const V v724 = v258 * v684;
-    const V v725 = v236 * v677;
-    const V v726 = v717 - v725;
-    const V v727 = v487 - v716;
-    const V v728 = v656 * v656;
-    const V v729 = 0.6666666666666666 * v656;
-    const V v730 = 0.4444444444444444 * v656;
-    const V v731 = v349 * v656;
-    const V v732 = v656 * v728;
-    const V v733 = v662 * v662;
-    const V v734 = 0.6666666666666666 * v662;
-    const V v735 = 0.4444444444444444 * v662;
-    const V v736 = v728 * v728;
-    const V v737 = v347 * v728;
-    const V v738 = v733 * v733;
-    const V v739 = v662 * v733;
-    const V v740 = v346 * v733;
-    const V v741 = v729 * v736;
-    const V v742 = v348 * v662;
-    const V v743 = 0.3333333333333333 * v736;
-    const V v744 = v734 * v738;
-    const V v745 = v732 * v732;
-    const V v746 = 1.0 - v732;
-    const V v747 = 0.3333333333333333 * v738;
-    const V v748 = v739 * v739;
-    const V v749 = 1.0 - v739;
-    const V v750 = 1.1111111111111112 * v738;
-    const V v751 = 1.1111111111111112 * v736;
-    const V v752 = v738 * v750;
-    const V v753 = v348 * v747;
-    const V v754 = v351 * v746;
-    const V v755 = v736 * v751;
-    const V v756 = v350 * v749;
-    const V v757 = v349 * v743;
-    const V v758 = v668 * v744;
-    const V v759 = v672 * v741;
-    const V v760 = v673 * v743;
-    const V v761 = v754 - v760;
-    const V v762 = v673 * v730;
-    const V v763 = v351 + v762;
-    const V v764 = v359 * v744;
-    const V v765 = v659 * v747;
-    const V v766 = v756 - v765;
-    const V v767 = v659 * v735;
-    const V v768 = v350 + v767;
-    const V v769 = v497 * v741;
-    const V v770 = v745 * v763;
-    const V v771 = v753 + v764;
-    const V v772 = v670 * v741;
-    const V v773 = v748 * v768;
-    const V v774 = v667 * v744;
-    const V v775 = v753 + v774;
-    const V v776 = v666 * v744;
-    const V v777 = v766 - v776;
-    const V v778 = v757 + v769;
-    const V v779 = v666 * v752;
-    const V v780 = v773 + v779;
-    const V v781 = v757 + v772;
-    const V v782 = v676 * v741;
-    const V v783 = v761 - v782;
-    const V v784 = v676 * v755;
-    const V v785 = v770 + v784;
-    const V v786 = v645 * v771;
-    const V v787 = v740 - v786;
-    const V v788 = v658 * v771;
-    const V v789 = v645 * v777;
-    const V v790 = v658 * v780;
-    const V v791 = v663 * v780;
-    const V v792 = v665 * v744;
-    const V v793 = v790 - v792;
-    const V v794 = v146 * v787;
-    const V v795 = v655 * v778;
-    const V v796 = v655 * v785;
-    const V v797 = v664 * v785;
-    const V v798 = v742 + v789;
-    const V v799 = v671 * v741;
-    const V v800 = v796 - v799;
-    const V v801 = v645 * v793;
-    const V v802 = v140 * v793;
-    const V v803 = v634 * v795;
-    const V v804 = v614 * v795;
-    const V v805 = v598 * v795;
-    const V v806 = v140 * v740;
-    const V v807 = v742 + v806;
-    const V v808 = v630 * v740;
-    const V v809 = v798 + v808;
-    const V v810 = v658 * v753;
-    const V v811 = v801 - v810;
-    const V v812 = v802 - v758;
-    const V v813 = v630 * v758;
-    const V v814 = v811 - v813;
-    const V v815 = v523 * v807;
-    const V v816 = v608 * v807;
-    const V v817 = v606 * v807;
-    const V v818 = 2.0 * v809;
-    const V v819 = v146 * v809;
-    const V v820 = v646 * v812;
-    const V v821 = v646 * v777;
-    const V v822 = v814 + v821;
-    const V v823 = v140 * v777;
-    const V v824 = v740 + v823;
-    const V v825 = v146 * v822;
-    const V v826 = v646 * v824;
-    const V v827 = 2.0 * v824;
-    const V v828 = v820 + v827;
-    const V v829 = v505 + v815;
-    const V v830 = v604 * v795;
-    const V v831 = v549 * v826;
-    const V v832 = 2.0 * v830;
-    const V v833 = v638 * v795;
-    const V v834 = v638 * v804;
-    const V v835 = v817 + v834;
-    const V v836 = v604 * v804;
-    const V v837 = v640 * v778;
-    const V v838 = v737 - v837;
-    const V v839 = v604 * v803;
-    const V v840 = v612 * v804;
-    const V v841 = v612 * v803;
-    const V v842 = v817 - v841;
-    const V v843 = v147 * v838;
-    const V v844 = v640 * v800;
-    const V v845 = v142 * v800;
-    const V v846 = v655 * v757;
-    const V v847 = v844 - v846;
-    const V v848 = v142 * v737;
-    const V v849 = v731 + v848;
-    const V v850 = v142 * v783;
-    const V v851 = v737 + v850;
-    const V v852 = v621 * v737;
-    const V v853 = v731 + v852;
-    const V v854 = v621 * v759;
-    const V v855 = v847 - v854;
-    const V v856 = v845 - v759;
-    const V v857 = v524 * v849;
-    const V v858 = v532 * v849;
-    const V v859 = v534 * v849;
-    const V v860 = v640 * v783;
-    const V v861 = v853 + v860;
-    const V v862 = v641 * v783;
-    const V v863 = v855 + v862;
-    const V v864 = v641 * v856;
-    const V v865 = v641 * v851;
-    const V v866 = v612 * v849;
-    const V v867 = v147 * v863;
-    const V v868 = v147 * v861;
-    const V v869 = 2.0 * v861;
-    const V v870 = 2.0 * v851;
-    const V v871 = v864 + v870;
-    const V v872 = v842 + v859;
-    const V v873 = v543 * v865;
-    const V v874 = v378 + v857;
-    const V v875 = v839 + v858;
-    const V v876 = v835 + v859;
-    const V v877 = v819 - v868;
-    const V v878 = v819 + v868;
-    const V v879 = v634 * v865;
-    const V v880 = v866 + v879;
-    const V v881 = v634 * v867;
-    const V v882 = v634 * v871;
-    const V v883 = v650 * v804;
-    const V v884 = v858 - v883;
-    const V v885 = v614 * v867;
-    const V v886 = v614 * v871;
-    const V v887 = v833 + v886;
-    const V v888 = v719 + v877;
-    const V v889 = v719 - v877;
-    const V v890 = 0.5773502691896257 * v888;
-    const V v891 = 0.3333333333333333 * v889;
-    const V v892 = v614 * v887;
-    const V v893 = v876 + v892;
-    const V v894 = v650 * v843;
-    const V v895 = v612 * v843;
-    const V v896 = v881 + v895;
-    const V v897 = v612 * v795;
-    const V v898 = v882 - v897;
-    const V v899 = v598 * v887;
-    const V v900 = v884 + v899;
-    const V v901 = v598 * v871;
-    const V v902 = v650 * v795;
-    const V v903 = v901 - v902;
-    const V v904 = v638 * v843;
-    const V v905 = v638 * v849;
-    const V v906 = v604 * v843;
-    const V v907 = v727 - v904;
-    const V v908 = v652 * v871;
-    const V v909 = v832 + v908;
-    const V v910 = v652 * v867;
-    const V v911 = v906 - v910;
-    const V v912 = v614 * v865;
-    const V v913 = v905 - v912;
-    const V v914 = v598 * v867;
-    const V v915 = v894 + v914;
-    const V v916 = v896 + v911;
-    const V v917 = v604 * v849;
-    const V v918 = v714 + v917;
-    const V v919 = v904 - v885;
-    const V v920 = v885 + v907;
-    const V v921 = v652 * v909;
-    const V v922 = v874 + v921;
-    const V v923 = v652 * v865;
-    const V v924 = v918 - v923;
-    const V v925 = v598 * v865;
-    const V v926 = v722 + v925;
-    const V v927 = v911 - v484;
-    const V v928 = v915 + v919;
-    const V v929 = v650 * v849;
-    const V v930 = v926 + v929;
-    const V v931 = v650 * v805;
-    const V v932 = v857 - v931;
-    const V v933 = v604 * v805;
-    const V v934 = v695 + v933;
-    const V v935 = v598 * v903;
-    const V v936 = v932 + v935;
-    const V v937 = v634 * v903;
-    const V v938 = v652 * v903;
-    const V v939 = v934 + v938;
-    const V v940 = v612 * v805;
-    const V v941 = v937 - v940;
-    const V v942 = v916 - v490;
-    const V v943 = v941 - v873;
-    const V v944 = v836 + v873;
-    const V v945 = v231 * v726;
-    const V v946 = v939 + v945;
-    const V v947 = v238 * v726;
-    const V v948 = v238 * v708;
-    const V v949 = v231 * v708;
-    const V v950 = v691 + v949;
-    const V v951 = v248 * v708;
-    const V v952 = v720 + v951;
-    const V v953 = v248 * v711;
-    const V v954 = v258 * v677;
-    const V v955 = v948 - v954;
-    const V v956 = v231 * v950;
-    const V v957 = v922 + v956;
-    const V v958 = v946 - v943;
-    const V v959 = v258 * v687;
-    const V v960 = v947 - v959;
-    const V v961 = v231 * v711;
-    const V v962 = v715 - v961;
-    const V v963 = v238 * v711;
-    const V v964 = v724 + v963;
-    const V v965 = v251 * v711;
-    const V v966 = v723 + v965;
-    const V v967 = v716 - v953;
-    const V v968 = v920 + v953;
-    const V v969 = v960 - v712;
-    const V v970 = v694 + v712;
-    const V v971 = v962 - v964;
-    const V v972 = v484 - v962;
-    const V v973 = v967 - v966;
-    const V v974 = v479 + v966;
-    const V v975 = v966 - v915;
-    const V v976 = v974 - v915;
-    const V v977 = 0.5773502691896257 * v973;
-    const V v978 = v486 + v964;
-    const V v979 = v486 - v964;
-    const V v980 = 0.5773502691896257 * v975;
-    const V v981 = v936 + v980;
-    const V v982 = v971 - v490;
-    const V v983 = v488 - v967;
-    const V v984 = v487 - v967;
-    const V v985 = v896 + v978;
-    const V v986 = 0.5773502691896257 * v983;
-    const V v987 = 0.3333333333333333 * v984;
-    const V v988 = v490 + v971;
-    const V v989 = v942 + v971;
-    const V v990 = v982 - v916;
-    const V v991 = v978 - v896;
-    const V v992 = v625 * v788;
-    const V v993 = v584 * v788;
-    const V v994 = v591 * v788;
-    const V v995 = v581 * v788;
-    const V v996 = v584 * v825;
-    const V v997 = v625 * v825;
-    const V v998 = v591 * v825;
-    const V v999 = 2.0 * v995;
-    const V v1000 = v643 * v788;
-    const V v1001 = v643 * v794;
-    const V v1002 = v581 * v794;
-    const V v1003 = v593 * v794;
-    const V v1004 = v997 + v1003;
-    const V v1005 = v648 * v794;
-    const V v1006 = v998 + v1005;
-    const V v1007 = v632 * v825;
-    const V v1008 = v1002 - v1007;
-    const V v1009 = v968 + v1001;
-    const V v1010 = v632 * v828;
-    const V v1011 = v999 + v1010;
-    const V v1012 = v584 * v828;
-    const V v1013 = v1000 + v1012;
-    const V v1014 = v1004 - v1008;
-    const V v1015 = v1004 - v896;
-    const V v1016 = v632 * v1011;
-    const V v1017 = v829 + v1016;
-    const V v1018 = v1001 - v996;
-    const V v1019 = v1009 - v996;
-    const V v1020 = v1008 - v911;
-    const V v1021 = v484 + v911;
-    const V v1022 = v1006 - v1018;
-    const V v1023 = v919 + v1018;
-    const V v1024 = v1008 + v1021;
-    const V v1025 = v1014 - v916;
-    const V v1026 = v927 + v1008;
-    const V v1027 = 0.5773502691896257 * v1022;
-    const V v1028 = v1018 - v919;
-    const V v1029 = v479 - v1006;
-    const V v1030 = v976 - v1006;
-    const V v1031 = 0.5773502691896257 * v1023;
-    const V v1032 = v900 + v1031;
-    const V v1033 = v962 + v1024;
-    const V v1034 = v1026 - v962;
-    const V v1035 = 0.3333333333333333 * v1028;
-    const V v1036 = 0.5773502691896257 * v1029;
-    const V v1037 = 0.19245008972987526 * v1030;
-    const V v1038 = v988 + v1025;
-    const V v1039 = 0.5773502691896257 * v1034;
-    const V v1040 = v946 + v1039;
-    const V v1041 = v1025 - v988;
-    const V v1042 = v989 + v1014;
-    const V v1043 = v990 - v1014;
-    const V v1044 = 0.5773502691896257 * v1042;
-    const V v1045 = 0.3333333333333333 * v1041;
-    const V v1046 = 0.3333333333333333 * v1043;
-    const V v1047 = v972 - v1020;
-    const V v1048 = v972 + v1020;
-    const V v1049 = 0.3333333333333333 * v1047;
-    const V v1050 = 0.5773502691896257 * v1048;
-    const V v1051 = v1033 + v1044;
-    const V v1052 = v991 - v1004;
-    const V v1053 = v985 + v1004;
-    const V v1054 = 0.5773502691896257 * v1052;
-    const V v1055 = v943 + v969;
-    const V v1056 = v958 + v969;
-    const V v1057 = v1051 + v1053;
-    const V v1058 = v1054 + v1055;
-    const V v1059 = v1044 - v1033;
-    const V v1060 = v1051 - v1053;
-    const V v1061 = v979 + v1015;
-    const V v1062 = v979 - v1015;
-    const V v1063 = 0.5773502691896257 * v1061;
-    const V v1064 = 0.3333333333333333 * v1062;
-    const V v1065 = v718 + v878;
-    const V v1066 = v718 - v878;
-    const V v1067 = v957 + v1017;
-    const V v1068 = 0.5773502691896257 * v1066;
-    const V v1069 = v930 + v1068;
-    const V v1070 = v625 * v828;
-    const V v1071 = v591 * v828;
-    const V v1072 = v298 * v453;
-    const V v1073 = v423 + v1072;
-    const V v1074 = v308 * v453;
-    const V v1075 = v530 - v1074;
-    const V v1076 = v255 * v685;
-    const V v1077 = v379 + v1076;
-    const V v1078 = v258 * v685;
-    const V v1079 = v1075 - v1078;
-    const V v1080 = v593 * v788;
-    const V v1081 = v1070 - v1080;
-    const V v1082 = v648 * v788;
-    const V v1083 = v1071 - v1082;
-    const V v1084 = v300 * v516;
-    const V v1085 = v1073 + v1084;
-    const V v1086 = v303 * v516;
-    const V v1087 = v1079 + v1086;
-    const V v1088 = v303 * v526;
-    const V v1089 = v300 * v526;
-    const V v1090 = v469 + v1089;
-    const V v1091 = v625 * v1083;
-    const V v1092 = v1088 - v452;
-    const V v1093 = v238 * v955;
-    const V v1094 = v1087 + v1093;
-    const V v1095 = v231 * v955;
-    const V v1096 = v1077 + v1095;
-    const V v1097 = v632 * v1083;
-    const V v1098 = v1090 + v1097;
-    const V v1099 = v1091 - v831;
-    const V v1100 = v1085 - v1017;
-    const V v1101 = v308 * v463;
-    const V v1102 = v1092 - v1101;
-    const V v1103 = v313 * v463;
-    const V v1104 = v422 - v1103;
-    const V v1105 = v1085 - v1094;
-    const V v1106 = v1085 + v1096;
-    const V v1107 = v281 * v526;
-    const V v1108 = v1104 + v1107;
-    const V v1109 = v1105 - v1096;
-    const V v1110 = v957 + v1096;
-    const V v1111 = v281 * v511;
-    const V v1112 = v528 + v1111;
-    const V v1113 = v581 * v994;
-    const V v1114 = v1098 + v1113;
-    const V v1115 = v593 * v994;
-    const V v1116 = v1099 - v1115;
-    const V v1117 = v648 * v994;
-    const V v1118 = v815 - v1117;
-    const V v1119 = v1102 + v1116;
-    const V v1120 = v303 * v511;
-    const V v1121 = v514 - v1120;
-    const V v1122 = v1040 + v1114;
-    const V v1123 = v591 * v1083;
-    const V v1124 = v1118 + v1123;
-    const V v1125 = v1116 - v1102;
-    const V v1126 = v986 + v1112;
-    const V v1127 = v1114 + v1125;
-    const V v1128 = v946 - v1114;
-    const V v1129 = v1058 + v1119;
-    const V v1130 = v1056 + v1127;
-    const V v1131 = v936 - v1112;
-    const V v1132 = v1036 + v1124;
-    const V v1133 = v1124 + v1131;
-    const V v1134 = v1119 - v1055;
-    const V v1135 = v1127 - v1056;
-    const V v1136 = v1059 + v1129;
-    const V v1137 = v1108 + v1132;
-    const V v1138 = v1108 + v1133;
-    const V v1139 = 0.5773502691896257 * v1135;
-    const V v1140 = v1046 + v1139;
-    const V v1141 = v1122 + v1136;
-    const V v1142 = v1138 - v900;
-    const V v1143 = v236 * v687;
-    const V v1144 = v378 - v1143;
-    const V v1145 = v236 * v686;
-    const V v1146 = v379 - v1145;
-    const V v1147 = v1140 - v1122;
-    const V v1148 = v1129 - v1147;
-    const V v1149 = v251 * v726;
-    const V v1150 = v1144 + v1149;
-    const V v1151 = v251 * v952;
-    const V v1152 = v1146 + v1151;
-    const V v1153 = v1142 + v1150;
-    const V v1154 = v981 + v1150;
-    const V v1155 = v231 * v952;
-    const V v1156 = v970 + v1155;
-    const V v1157 = v231 * v704;
-    const V v1158 = v924 - v1157;
-    const V v1159 = v1126 + v1152;
-    const V v1160 = v1152 + v1153;
-    const V v1161 = v1152 - v1112;
-    const V v1162 = v1137 - v1159;
-    const V v1163 = v1060 + v1148;
-    const V v1164 = v1137 + v1154;
-    const V v1165 = v1162 - v1154;
-    const V v1166 = v238 * v704;
-    const V v1167 = v482 + v1166;
-    const V v1168 = v238 * v952;
-    const V v1169 = v1121 - v1168;
-    const V v1170 = v248 * v704;
-    const V v1171 = v475 - v1170;
-    const V v1172 = v248 * v952;
-    const V v1173 = v529 + v1172;
-    const V v1174 = v258 * v369;
-    const V v1175 = v1167 + v1174;
-    const V v1176 = v258 * v686;
-    const V v1177 = v1169 + v1176;
-    const V v1178 = v240 * v369;
-    const V v1179 = v1171 + v1178;
-    const V v1180 = v240 * v686;
-    const V v1181 = v1173 + v1180;
-    const V v1182 = v1158 - v1175;
-    const V v1183 = v1134 + v1177;
-    const V v1184 = v1063 + v1177;
-    const V v1185 = v291 * v443;
-    const V v1186 = v1179 - v1185;
-    const V v1187 = v291 * v511;
-    const V v1188 = v1181 + v1187;
-    const V v1189 = v300 * v511;
-    const V v1190 = v467 + v1189;
-    const V v1191 = v300 * v443;
-    const V v1192 = v470 - v1191;
-    const V v1193 = v1161 + v1188;
-    const V v1194 = v1177 - v1156;
-    const V v1195 = v890 + v1186;
-    const V v1196 = v1190 + v1194;
-    const V v1197 = v1156 + v1190;
-    const V v1198 = v1186 - v930;
-    const V v1199 = v581 * v807;
-    const V v1200 = v1192 + v1199;
-    const V v1201 = 0.5773502691896257 * v1193;
-    const V v1202 = v987 + v1201;
-    const V v1203 = v593 * v807;
-    const V v1204 = v880 + v1203;
-    const V v1205 = v643 * v807;
-    const V v1206 = v913 + v1205;
-    const V v1207 = v648 * v807;
-    const V v1208 = v474 + v1207;
-    const V v1209 = v648 * v993;
-    const V v1210 = v816 - v1209;
-    const V v1211 = v643 * v993;
-    const V v1212 = v893 + v1211;
-    const V v1213 = v581 * v993;
-    const V v1214 = v831 + v1213;
-    const V v1215 = v593 * v993;
-    const V v1216 = v840 + v1215;
-    const V v1217 = v581 * v992;
-    const V v1218 = v816 + v1217;
-    const V v1219 = v593 * v992;
-    const V v1220 = v872 - v1219;
-    const V v1221 = v632 * v826;
-    const V v1222 = v1200 - v1221;
-    const V v1223 = v625 * v826;
-    const V v1224 = v1204 + v1223;
-    const V v1225 = v584 * v826;
-    const V v1226 = v1206 - v1225;
-    const V v1227 = v591 * v826;
-    const V v1228 = v1208 + v1227;
-    const V v1229 = v591 * v1013;
-    const V v1230 = v1210 + v1229;
-    const V v1231 = v584 * v1013;
-    const V v1232 = v1212 + v1231;
-    const V v1233 = v632 * v1013;
-    const V v1234 = v1214 + v1233;
-    const V v1235 = v625 * v1013;
-    const V v1236 = v1216 - v1235;
-    const V v1237 = v632 * v1081;
-    const V v1238 = v1218 + v1237;
-    const V v1239 = v625 * v1081;
-    const V v1240 = v1220 + v1239;
-    const V v1241 = v1158 + v1222;
-    const V v1242 = v1182 - v1222;
-    const V v1243 = v1032 + v1230;
-    const V v1244 = v1160 + v1230;
-    const V v1245 = v1224 + v1242;
-    const V v1246 = v1175 + v1224;
-    const V v1247 = v1230 - v900;
-    const V v1248 = 0.5773502691896257 * v1245;
-    const V v1249 = v1232 + v1247;
-    const V v1250 = v1188 + v1232;
-    const V v1251 = v1100 - v1238;
-    const V v1252 = v1106 + v1238;
-    const V v1253 = v1241 + v1246;
-    const V v1254 = v1246 - v1241;
-    const V v1255 = 0.5773502691896257 * v1249;
-    const V v1256 = v1035 + v1255;
-    const V v1257 = v1241 + v1248;
-    const V v1258 = v1253 - v1248;
-    const V v1259 = v1248 + v1254;
-    const V v1260 = v1165 + v1243;
-    const V v1261 = v1159 + v1243;
-    const V v1262 = v1246 + v1257;
-    const V v1263 = 0.5773502691896257 * v1260;
-    const V v1264 = v1257 - v1246;
-    const V v1265 = v1202 + v1256;
-    const V v1266 = v1202 - v1256;
-    const V v1267 = -v1262;
-    const V v1268 = v1195 + v1226;
-    const V v1269 = v1198 - v1226;
-    const V v1270 = 0.5773502691896257 * v1265;
-    const V v1271 = v1037 + v1270;
-    const V v1272 = v1069 + v1228;
-    const V v1273 = v1228 + v1269;
-    const V v1274 = v1065 - v1268;
-    const V v1275 = v1065 + v1268;
-    const V v1276 = 0.5773502691896257 * v1273;
-    const V v1277 = v891 + v1276;
-    const V v1278 = v1128 + v1197;
-    const V v1279 = v1050 + v1197;
-    const V v1280 = v1272 + v1277;
-    const V v1281 = v1277 - v1272;
-    const V v1282 = v1274 + v1281;
-    const V v1283 = v1274 - v1281;
-    softehl_store4(R + 4, 8, v1267, v1282, v1264, v1283);
-    const V v1284 = v1275 + v1280;
-    const V v1285 = v1275 - v1280;
-    softehl_store4(R + 0, 8, v1258, v1284, v1259, v1285);
-    const V v1286 = v1130 - v1196;
-    const V v1287 = v137 * v430;
-    const V v1288 = v442 - v1287;
-    const V v1289 = v309 * v1288;
-    const V v1290 = v325 * v430;
-    const V v1291 = v1289 - v1290;
-    const V v1292 = v137 * v1291;
-    const V v1293 = v445 + v1292;
-    const V v1294 = v82 * v1293;
-    const V v1295 = v139 * v391;
-    const V v1296 = v681 - v1295;
-    const V v1297 = v259 * v1296;
-    const V v1298 = v269 * v391;
-    const V v1299 = v1297 - v1298;
-    const V v1300 = v139 * v1299;
-    const V v1301 = v709 + v1300;
-    const V v1302 = v83 * v1301;
-    const V v1303 = v141 * v775;
-    const V v1304 = v791 - v1303;
-    const V v1305 = v645 * v1304;
-    const V v1306 = v663 * v775;
-    const V v1307 = v1305 - v1306;
-    const V v1308 = v141 * v1307;
-    const V v1309 = v818 + v1308;
-    const V v1310 = v84 * v1309;
-    const V v1311 = v143 * v781;
-    const V v1312 = v797 - v1311;
-    const V v1313 = v640 * v1312;
-    const V v1314 = v664 * v781;
-    const V v1315 = v1313 - v1314;
-    const V v1316 = v143 * v1315;
-    const V v1317 = v869 + v1316;
-    const V v1318 = 0.5773502691896257 * v1294;
-    const V v1319 = 0.3333333333333333 * v1294;
-    const V v1320 = v491 + v1319;
-    const V v1321 = v85 * v1317;
-    const V v1322 = 0.5773502691896257 * v1302;
-    const V v1323 = v1294 + v1302;
-    const V v1324 = 0.3333333333333333 * v1302;
-    const V v1325 = v977 - v1324;
-    const V v1326 = 0.5773502691896257 * v1310;
-    const V v1327 = v479 + v1318;
-    const V v1328 = v487 + v1318;
-    const V v1329 = v1310 + v1323;
-    const V v1330 = 0.3333333333333333 * v1310;
-    const V v1331 = v1027 - v1330;
-    const V v1332 = v1320 - v1325;
-    const V v1333 = v1320 + v1325;
-    const V v1334 = 0.5773502691896257 * v1321;
-    const V v1335 = 0.3333333333333333 * v1321;
-    const V v1336 = v1321 + v1329;
-    const V v1337 = v966 + v1322;
-    const V v1338 = v967 - v1322;
-    const V v1339 = v1019 + v1328;
-    const V v1340 = v1331 + v1333;
-    const V v1341 = 0.5773502691896257 * v928;
-    const V v1342 = v1335 - v1341;
-    const V v1343 = v1327 + v1337;
-    const V v1344 = v1327 - v1337;
-    const V v1345 = v1328 + v1338;
-    const V v1346 = v1339 - v1338;
-    const V v1347 = v1337 - v1327;
-    const V v1348 = v1340 + v1342;
-    const V v1349 = v1331 - v1342;
-    const V v1350 = v1244 + v1332;
-    const V v1351 = v1332 + v1349;
-    const V v1352 = v1350 - v1349;
-    const V v1353 = v1006 - v1326;
-    const V v1354 = v1018 + v1326;
-    const V v1355 = v915 - v1334;
-    const V v1356 = v919 - v1334;
-    const V v1357 = 0.5773502691896257 * v1351;
-    const V v1358 = v1266 + v1357;
-    const V v1359 = 0.3333333333333333 * v1352;
-    const V v1360 = v1271 + v1359;
-    const V v1361 = v1343 - v1353;
-    const V v1362 = v1343 + v1353;
-    const V v1363 = v1345 + v1354;
-    const V v1364 = v1346 + v1354;
-    const V v1365 = v1348 - v1358;
-    const V v1366 = v1353 - v1355;
-    const V v1367 = v1361 - v1355;
-    const V v1368 = v1355 + v1362;
-    const V v1369 = v1356 + v1363;
-    const V v1370 = v1364 - v1356;
-    const V v1371 = v1347 - v1366;
-    const V v1372 = v1344 - v1366;
-    const V v1373 = v1348 + v1368;
-    const V v1374 = 0.5773502691896257 * v1367;
-    const V v1375 = v1164 + v1374;
-    const V v1376 = v1336 - v1369;
-    const V v1377 = 0.5773502691896257 * v1370;
-    const V v1378 = v1250 + v1377;
-    const V v1379 = 2.0 * v1369;
-    const V v1380 = 0.3333333333333333 * v1372;
-    const V v1381 = v1263 + v1380;
-    const V v1382 = 0.5773502691896257 * v1371;
-    const V v1383 = v1261 + v1382;
-    const V v1384 = v1360 + v1375;
-    const V v1385 = v1369 - v1378;
-    const V v1386 = v1336 + v1378;
-    const V v1387 = v1369 + v1373;
-    const V v1388 = v1379 - v1373;
-    const V v1389 = 2.0 * v1381;
-    const V v1390 = v1384 + v1389;
-    const V v1391 = v1375 - v1381;
-    const V v1392 = 2.0 * v1387;
-    const V v1393 = v1381 - v1360;
-    const V v1394 = v1386 + v1388;
-    const V v1395 = v1373 - v1390;
-    const V v1396 = v1390 + v1392;
-    const V v1397 = v1386 + v1396;
-    const V v1398 = v1368 + v1383;
-    const V v1399 = v1368 - v1348;
-    const V v1400 = v1391 + v1398;
-    const V v1401 = v1383 - v1358;
-    const V v1402 = v1358 + v1383;
-    const V v1403 = v1376 + v1399;
-    const V v1404 = v1398 - v1391;
-    const V v1405 = v1358 - v1383;
-    const V v1406 = v1376 - v1399;
-    const V v1407 = v1395 - v1401;
-    const V v1408 = v1397 - v1401;
-    const V v1409 = v1385 + v1402;
-    const V v1410 = v1385 - v1402;
-    const V v1411 = v1394 - v1405;
-    const V v1412 = v1405 + v1408;
-    const V v1413 = v1403 + v1410;
-    const V v1414 = v1403 - v1410;
-    const V v1415 = v1406 - v1404;
-    const V v1416 = v1406 + v1409;
-    const V v1417 = v1415 - v1409;
-    const V v1418 = v1407 + v1411;
-    const V v1419 = v1411 - v1407;
-    const V v1420 = v1365 + v1393;
-    const V v1421 = v1365 - v1393;
-    const V v1422 = v1400 + v1420;
-    const V v1423 = v1400 - v1420;
-    const V v1424 = v1404 + v1421;
-    const V v1425 = v1417 + v1421;
-    const V v1426 = v1413 + v1422;
-    const V v1427 = v1413 - v1422;
-    const V v1428 = v1414 - v1423;
-    const V v1429 = v1414 + v1423;
-    const V v1430 = v1416 + v1424;
-    const V v1431 = v1416 - v1424;
-    const V v1432 = v652 * v898;
-    const V v1433 = v875 + v1432;
-    const V v1434 = v652 * v887;
-    const V v1435 = v944 + v1434;
-    const V v1436 = v634 * v898;
-    const V v1437 = v1240 + v1436;
-    const V v1438 = v634 * v887;
-    const V v1439 = v1236 - v1438;
-    const V v1440 = v1234 + v1435;
-    const V v1441 = v1252 + v1433;
-    const V v1442 = v1110 - v1433;
-    const V v1443 = v1238 - v1433;
-    const V v1444 = v1094 + v1437;
-    const V v1445 = v1437 + v1443;
-    const V v1446 = v1183 - v1439;
-    const V v1447 = v1184 + v1439;
-    const V v1448 = v1435 + v1439;
-    const V v1449 = v1251 + v1442;
-    const V v1450 = 0.5773502691896257 * v1446;
-    const V v1451 = v1064 + v1450;
-    const V v1452 = v1448 - v1234;
-    const V v1453 = v1442 - v1251;
-    const V v1454 = 0.5773502691896257 * v1449;
-    const V v1455 = 1.1547005383792515 * v1449;
-    const V v1456 = v1286 - v1452;
-    const V v1457 = v1278 - v1440;
-    const V v1458 = v1279 + v1440;
-    const V v1459 = v1453 - v1109;
-    const V v1460 = 0.3333333333333333 * v1456;
-    const V v1461 = v1452 - v1196;
-    const V v1462 = v1067 + v1454;
-    const V v1463 = 0.5773502691896257 * v1457;
-    const V v1464 = v1049 + v1463;
-    const V v1465 = 0.5773502691896257 * v1461;
-    const V v1466 = v1045 + v1465;
-    const V v1467 = 0.19245008972987526 * v1038;
-    const V v1468 = v1460 - v1467;
-    const V v1469 = v1441 + v1462;
-    const V v1470 = v1455 - v1067;
-    const V v1471 = v1458 + v1466;
-    const V v1472 = v1140 + v1466;
-    const V v1473 = v1464 + v1468;
-    const V v1474 = v1462 - v1441;
-    const V v1475 = v1470 - v1441;
-    const V v1476 = v1466 - v1033;
-    const V v1477 = v1464 - v1122;
-    const V v1478 = v1466 + v1468;
-    const V v1479 = v1458 - v1476;
-    const V v1480 = v1477 - v1468;
-    const V v1481 = v1141 + v1472;
-    const V v1482 = v1472 - v1468;
-    const V v1483 = v1147 + v1473;
-    const V v1484 = v1473 - v1451;
-    const V v1485 = v1468 + v1481;
-    const V v1486 = v1480 - v1140;
-    const V v1487 = v1478 - v1140;
-    const V v1488 = v1482 - v1044;
-    const V v1489 = v1479 - v1044;
-    const V v1490 = v1451 + v1485;
-    const V v1491 = v1487 - v1044;
-    const V v1492 = v1489 - v1486;
-    const V v1493 = v1486 + v1489;
-    const V v1494 = v1484 - v1148;
-    const V v1495 = v1163 + v1484;
-    const V v1496 = v1490 - v1464;
-    const V v1497 = v1122 + v1464;
-    const V v1498 = v1129 - v1451;
-    const V v1499 = v1129 + v1451;
-    const V v1500 = v1447 + v1495;
-    const V v1501 = v1053 - v1447;
-    const V v1502 = v1496 - v1458;
-    const V v1503 = v1033 - v1458;
-    const V v1504 = v1053 + v1447;
-    const V v1505 = v1500 - v1471;
-    const V v1506 = v1498 + v1501;
-    const V v1507 = v1497 + v1503;
-    const V v1508 = v1501 - v1498;
-    const V v1509 = v1502 + v1504;
-    const V v1510 = v1503 - v1497;
-    const V v1511 = v1493 + v1504;
-    const V v1512 = v1504 - v1499;
-    const V v1513 = v1499 + v1511;
-    softehl_store4(K + 8, 64, v1513, v1412, v1509, v1418);
-    const V v1514 = v1483 + v1499;
-    const V v1515 = v1491 + v1510;
-    const V v1516 = v1492 + v1512;
-    const V v1517 = v1510 - v1491;
-    const V v1518 = v1506 + v1515;
-    const V v1519 = v1506 - v1515;
-    softehl_store4(K + 56, 64, v1518, v1426, v1519, v1427);
-    const V v1520 = v1512 - v1492;
-    softehl_store4(K + 24, 64, v1516, v1418, v1520, v1419);
-    const V v1521 = v1506 + v1517;
-    const V v1522 = v1488 - v1508;
-    const V v1523 = v1517 - v1506;
-    const V v1524 = -v1521;
-    softehl_store4(K + 60, 64, v1524, v1428, v1523, v1429);
-    const V v1525 = v1488 + v1507;
-    const V v1526 = v1522 - v1507;
-    softehl_store4(K + 44, 64, v1526, v1425, v1505, v1428);
-    const V v1527 = v1508 + v1525;
-    const V v1528 = v1508 - v1525;
-    softehl_store4(K + 40, 64, v1527, v1430, v1528, v1431);
-    const V v1529 = v1067 - v1455;
-    const V v1530 = v1445 + v1459;
-    const V v1531 = v1109 + v1445;
-    const V v1532 = 0.3333333333333333 * v1530;
-    const V v1533 = 0.5773502691896257 * v1531;
-    const V v1534 = v1529 - v1441;
-    const V v1535 = v1057 + v1447;
-    const V v1536 = v1060 - v1447;
-    const V v1537 = v1471 + v1535;
-    const V v1538 = v1471 + v1536;
-    const V v1539 = v1514 + v1537;
-    const V v1540 = v1514 - v1537;
-    const V v1541 = v1444 + v1534;
-    const V v1542 = v1494 + v1538;
-    const V v1543 = v1532 + v1541;
-    const V v1544 = v1533 - v1441;
-    const V v1545 = -v1539;
-    softehl_store4(K + 12, 64, v1545, v1430, v1542, v1426);
-    const V v1546 = v1538 - v1494;
-    softehl_store4(K + 28, 64, v1540, v1431, v1546, v1427);
-    const V v1547 = v1454 + v1532;
-    const V v1548 = v1475 - v1532;
-    const V v1549 = v1543 - v1533;
-    const V v1550 = v1533 + v1547;
-    const V v1551 = v1533 - v1547;
-    const V v1552 = v1548 - v1533;
-    const V v1553 = v1441 + v1533;
-    const V v1554 = v1544 - v1444;
-    const V v1555 = v1444 - v1544;
-    const V v1556 = v1444 + v1544;
-    const V v1557 = v1549 - v1553;
-    const V v1558 = v1444 + v1553;
-    const V v1559 = v1552 + v1558;
-    softehl_store4(K + 0, 64, v1557, v1513, v1559, v1516);
-    const V v1560 = v1474 - v1550;
-    const V v1561 = v1474 + v1550;
-    const V v1562 = v1558 - v1552;
-    softehl_store4(K + 16, 64, v1559, v1509, v1562, v1520);
-    const V v1563 = v1469 - v1551;
-    const V v1564 = v1469 + v1551;
-    const V v1565 = v1556 + v1560;
-    const V v1566 = v1556 + v1561;
-    const V v1567 = v1555 - v1563;
-    softehl_store4(K + 36, 64, v1566, v1526, v1567, v1524);
-    const V v1568 = v1555 + v1563;
-    softehl_store4(K + 52, 64, v1567, v1505, v1568, v1523);
-    const V v1569 = v1554 + v1564;
-    const V v1570 = v1554 - v1564;
-    softehl_store4(K + 48, 64, v1569, v1542, v1570, v1546);
-    const V v1571 = v1560 - v1556;
-    softehl_store4(K + 20, 64, v1571, v1528, v1570, v1519);
-    const V v1572 = -v1565;
-    softehl_store4(K + 4, 64, v1572, v1527, v1569, v1518);
-    softehl_store4(K + 32, 64, v1572, v1545, v1571, v1540);
-}
-
-void softehl_solid_q4_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_q4_tangent_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, tangent + (8 * 8) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_q4_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), tangent + (8 * 8) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    double K[SOFTEHL_LANES * (8 * 8)];
-    softehl_solid_q4_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (8 * 8) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_solid_q4_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 0.25 * parameters[2];
-    const V v4 = X0 + d0;
-    const V v5 = X1 + d1;
-    const V v6 = X2 + d2;
-    const V v7 = X3 + d3;
-    const V v8 = X4 + d4;
-    const V v9 = X4 - X2;
-    const V v10 = X6 + d6;
-    const V v11 = X4 - X6;
-    const V v12 = X5 + d5;
-    const V v13 = X5 - X3;
-    const V v14 = X7 + d7;
-    const V v15 = X5 - X7;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1], v3 = 0.25 * parameters[2];
+    const V v4 = X0 + d0, v5 = X1 + d1, v6 = X2 + d2, v7 = X3 + d3, v8 = X4 + d4, v9 = X4 - X2,
+        v10 = X6 + d6, v11 = X4 - X6, v12 = X5 + d5, v13 = X5 - X3, v14 = X7 + d7, v15 = X5 - X7;
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v16 = 1.0 - w[0];
-        const double v17 = 1.0 + w[0];
-        const double v18 = 0.25 * w[0];
-        const double v19 = 1.0 - w[1];
-        const double v20 = 1.0 + w[1];
-        const double v21 = 0.25 * w[1];
-        const double v22 = 0.25 * v19;
-        const double v23 = 0.25 + v18;
-        const double v24 = 0.25 - v18;
-        const double v25 = 0.25 * v20;
-        const double v26 = 0.25 - v21;
-        const double v27 = 0.25 + v21;
-        const double v28 = v18 - 0.25;
-        const double v29 = v22 * v16;
-        const double v30 = v22 * v17;
-        const double v31 = v17 * v25;
-        const double v32 = v16 * v25;
-        const double v33 = v21 - 0.25;
-        const V v34 = X6 * v24;
-        const V v35 = X2 * v26;
-        const V v36 = v27 * v15;
-        const V v37 = v23 * v13;
-        const V v38 = v29 * v4;
-        const V v39 = v29 * v5;
-        const V v40 = v23 * v9;
-        const V v41 = v34 + v40;
-        const V v42 = X5 * v31;
-        const V v43 = v27 * v11;
-        const V v44 = v35 + v43;
-        const V v45 = X3 * v26;
-        const V v46 = v45 + v36;
-        const V v47 = X7 * v24;
-        const V v48 = v47 + v37;
-        const V v49 = v31 * v8;
-        const V v50 = v38 + v49;
-        const V v51 = v31 * v12;
-        const V v52 = v39 + v51;
-        const V v53 = d5 * v31;
-        const V v54 = X7 * v32;
-        const V v55 = v42 + v54;
-        const V v56 = v32 * v10;
-        const V v57 = v56 + v50;
-        const V v58 = v32 * v14;
-        const V v59 = v58 + v52;
-        const V v60 = d7 * v32;
-        const V v61 = v53 + v60;
-        const V v62 = X3 * v30;
-        const V v63 = v62 + v55;
-        const V v64 = v6 * v30;
-        const V v65 = v64 + v57;
-        const V v66 = v7 * v30;
-        const V v67 = v66 + v59;
-        const V v68 = d3 * v30;
-        const V v69 = v68 + v61;
-        const V v70 = X0 * v33;
-        const V v71 = v70 + v44;
-        const V v72 = X0 * v28;
-        const V v73 = v72 + v41;
-        const V v74 = X1 * v33;
-        const V v75 = v74 + v46;
-        const V v76 = X1 * v28;
-        const V v77 = v76 + v48;
-        const V v78 = X1 * v29;
-        const V v79 = v78 + v63;
-        const V v80 = d1 * v29;
-        const V v81 = v80 + v69;
-        const V v82 = 1.0 / v79;
-        const V v83 = v28 * v71;
-        const V v84 = v24 * v71;
-        const V v85 = v24 * v75;
-        const V v86 = v71 * v77;
-        const V v87 = v23 * v71;
-        const V v88 = v23 * v75;
-        const V v89 = v33 * v77;
-        const V v90 = v33 * v73;
-        const V v91 = v83 - v90;
-        const V v92 = v28 * v75;
-        const V v93 = v89 - v92;
-        const V v94 = v73 * v75;
-        const V v95 = v86 - v94;
-        const V v96 = 1.0 / v95;
-        const V v97 = v27 * v77;
-        const V v98 = v27 * v73;
-        const V v99 = v26 * v73;
-        const V v100 = v87 + v99;
-        const V v101 = v26 * v77;
-        const V v102 = v88 + v101;
-        const V v103 = v85 + v97;
-        const V v104 = v87 - v98;
-        const V v105 = v84 + v98;
-        const V v106 = v97 - v88;
-        const V v107 = v81 * v82;
-        const V v108 = 1.0 + v107;
-        const V v109 = v93 * v96;
-        const V v110 = v91 * v96;
-        const V v111 = v96 * v102;
-        const V v112 = v96 * v100;
-        const V v113 = v96 * v106;
-        const V v114 = v96 * v104;
-        const V v115 = v108 * v108;
-        const V v116 = 2.0 * v108;
-        const V v117 = v96 * v103;
-        const V v118 = v96 * v105;
-        const V v119 = v108 * v116;
-        const V v120 = 2.0 * v115;
-        const V v121 = d1 * v109;
-        const V v122 = d1 * v110;
-        const V v123 = 1.0 + v122;
-        const V v124 = d0 * v110;
-        const V v125 = d0 * v109;
-        const V v126 = 1.0 + v125;
-        const V v127 = d2 * v111;
-        const V v128 = v126 + v127;
-        const V v129 = d2 * v112;
-        const V v130 = v124 - v129;
-        const V v131 = d3 * v111;
-        const V v132 = v121 + v131;
-        const V v133 = d3 * v112;
-        const V v134 = v123 - v133;
-        const V v135 = d4 * v113;
-        const V v136 = v128 + v135;
-        const V v137 = d4 * v114;
-        const V v138 = v130 + v137;
-        const V v139 = d5 * v113;
-        const V v140 = v132 + v139;
-        const V v141 = d5 * v114;
-        const V v142 = v134 + v141;
-        const V v143 = d6 * v117;
-        const V v144 = v136 - v143;
-        const V v145 = d6 * v118;
-        const V v146 = v138 + v145;
-        const V v147 = d7 * v117;
-        const V v148 = v140 - v147;
-        const V v149 = d7 * v118;
-        const V v150 = v142 + v149;
-        const V v151 = 2.0 * v148;
-        const V v152 = 2.0 * v146;
-        const V v153 = 2.0 * v144;
-        const V v154 = v144 * v148;
-        const V v155 = v144 * v144;
-        const V v156 = v148 * v148;
-        const V v157 = 2.0 * v150;
-        const V v158 = v144 * v150;
-        const V v159 = v146 * v150;
-        const V v160 = v154 + v159;
-        const V v161 = v146 * v146;
-        const V v162 = v155 + v161;
-        const V v163 = v150 * v150;
-        const V v164 = v156 + v163;
-        const V v165 = v146 * v148;
-        const V v166 = v158 - v165;
-        const V v167 = 2.0 * v160;
-        const V v168 = v115 + v162;
-        const V v169 = 2.0 * v162;
-        const V v170 = 2.0 * v164;
-        const V v171 = v166 * v166;
-        const V v172 = 2.0 * v166;
-        const V v173 = v108 * v166;
-        const V v174 = v164 + v168;
-        const V v175 = 1.0 / v173;
-        const V v176 = v115 * v172;
-        const V v177 = v115 * v171;
-        const V v178 = 2.0 * v174;
-        const V v179 = v174 * v174;
-        const V v180 = v1 * v174;
-        const V v181 = v115 * v115;
-        const V v182 = v179 - v181;
-        const V v183 = v162 * v162;
-        const V v184 = v182 - v183;
-        const V v185 = v164 * v164;
-        const V v186 = v184 - v185;
-        const V v187 = 0.5 * v186;
-        const V v188 = softehl_vrcbrt(v177);
-        const V v189 = 1.0 / v177;
-        const V v190 = v160 * v160;
-        const V v191 = v187 - v190;
-        const V v192 = v1 * v188;
-        const V v193 = v188 * v188;
-        const V v194 = parameters[1] * v188;
-        const V v195 = v191 * v194;
-        const V v196 = v180 + v195;
-        const V v197 = v2 * v193;
-        const V v198 = v167 * v197;
-        const V v199 = 0.5 * v197;
-        const V v200 = v178 * v199;
-        const V v201 = v192 + v200;
-        const V v202 = 1.0 - v189;
-        const V v203 = v3 * v202;
-        const V v204 = v119 * v175;
-        const V v205 = 0.3333333333333333 * v193;
-        const V v206 = v193 * v205;
-        const V v207 = v196 * v206;
-        const V v208 = v203 - v207;
-        const V v209 = v176 * v208;
-        const V v210 = v171 * v208;
-        const V v211 = v120 * v199;
-        const V v212 = v210 - v211;
-        const V v213 = v201 + v212;
-        const V v214 = v204 * v213;
-        const V v215 = v169 * v199;
-        const V v216 = v201 - v215;
-        const V v217 = v170 * v199;
-        const V v218 = v201 - v217;
-        const V v219 = v157 * v218;
-        const V v220 = v151 * v218;
-        const V v221 = v152 * v216;
-        const V v222 = v153 * v216;
-        const V v223 = v148 * v198;
-        const V v224 = v222 - v223;
-        const V v225 = v148 * v209;
-        const V v226 = v221 - v225;
-        const V v227 = v150 * v198;
-        const V v228 = v226 - v227;
-        const V v229 = v150 * v209;
-        const V v230 = v224 + v229;
-        const V v231 = v148 * v230;
-        const V v232 = v150 * v228;
-        const V v233 = v231 + v232;
-        const V v234 = v175 * v233;
-        const V v235 = v144 * v230;
-        const V v236 = v146 * v228;
-        const V v237 = v235 + v236;
-        const V v238 = v175 * v237;
-        const V v239 = v146 * v198;
-        const V v240 = v219 - v239;
-        const V v241 = v144 * v198;
-        const V v242 = v220 - v241;
-        const V v243 = v146 * v209;
-        const V v244 = v242 - v243;
-        const V v245 = v144 * v209;
-        const V v246 = v240 + v245;
-        const V v247 = v148 * v244;
-        const V v248 = v150 * v246;
-        const V v249 = v247 + v248;
-        const V v250 = v175 * v249;
-        softehl_store4(R + 7 * q + 0, (7 * points), v65, v67, v173, v238);
-        softehl_store3(R + 7 * q + 4, (7 * points), v250, v214, v234);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v16 = 1.0 - w[0], v17 = 1.0 + w[0], v18 = 0.25 * w[0], v19 = 0.25 * w[1],
+            v20 = 0.25 * (1.0 - w[1]), v21 = 0.25 + v18, v22 = 0.25 - v18,
+            v23 = 0.25 * (1.0 + w[1]), v24 = 0.25 - v19, v25 = 0.25 + v19, v26 = v18 - 0.25,
+            v27 = v20 * v16, v28 = v20 * v17, v29 = v17 * v23, v30 = v16 * v23, v31 = v19 - 0.25;
+        const V v32 = v6 * v28 + (v30 * v10 + (v27 * v4 + v29 * v8)),
+            v33 = v7 * v28 + (v30 * v14 + (v27 * v5 + v29 * v12)),
+            v34 = X0 * v31 + (X2 * v24 + v25 * v11), v35 = X0 * v26 + (X6 * v22 + v21 * v9),
+            v36 = X1 * v31 + (X3 * v24 + v25 * v15), v37 = X1 * v26 + (X7 * v22 + v21 * v13),
+            v38 = v21 * v34, v39 = v21 * v36, v40 = 1.0 / (v34 * v37 - v35 * v36), v41 = v25 * v37,
+            v42 = v25 * v35,
+            v43 = (d1 * v27 + (d3 * v28 + (d5 * v29 + d7 * v30))) * (1.0 / (X1 * v27 + (X3 * v28 + (X5 * v29 + X7 * v30)))),
+            v44 = 1.0 + v43, v45 = (v31 * v37 - v26 * v36) * v40,
+            v46 = (v26 * v34 - v31 * v35) * v40, v47 = v40 * (v39 + v24 * v37),
+            v48 = v40 * (v38 + v24 * v35), v49 = v40 * (v41 - v39), v50 = v40 * (v38 - v42),
+            v51 = v44 * v44, v52 = v40 * (v22 * v36 + v41), v53 = v40 * (v22 * v34 + v42),
+            v54 = 1.0 + d0 * v45 + d2 * v47 + d4 * v49 - d6 * v52,
+            v55 = d0 * v46 - d2 * v48 + d4 * v50 + d6 * v53,
+            v56 = d1 * v45 + d3 * v47 + d5 * v49 - d7 * v52,
+            v57 = 1.0 + d1 * v46 - d3 * v48 + d5 * v50 + d7 * v53, v58 = v54 * v56 + v55 * v57,
+            v59 = v54 * v54 + v55 * v55, v60 = v56 * v56 + v57 * v57, v61 = v54 * v57 - v55 * v56,
+            v62 = v61 * v61, v63 = v44 * v61, v64 = v60 + (v51 + v59), v65 = 1.0 / v63,
+            v66 = v51 * v62, v67 = softehl_vrcbrt(v66),
+            v68 = 0.5 * (v64 * v64 - v51 * v51 - v59 * v59 - v60 * v60) - v58 * v58,
+            v69 = v67 * v67, v70 = v2 * v69, v71 = 2.0 * v58 * v70, v72 = 0.5 * v70,
+            v73 = v1 * v67 + 2.0 * v64 * v72,
+            v74 = (v1 * v64 + v68 * (parameters[1] * v67)) * (v69 * (0.3333333333333333 * v69)),
+            v75 = v3 * (1.0 - 1.0 / v66) - v74, v76 = v51 * (2.0 * v61) * v75,
+            v77 = v44 * (2.0 * v44) * v65 * (v73 + (v62 * v75 - 2.0 * v51 * v72)),
+            v78 = v73 - 2.0 * v59 * v72, v79 = v73 - 2.0 * v60 * v72,
+            v80 = 2.0 * v55 * v78 - v56 * v76 - v57 * v71,
+            v81 = 2.0 * v54 * v78 - v56 * v71 + v57 * v76, v82 = v65 * (v56 * v81 + v57 * v80),
+            v83 = v65 * (v54 * v81 + v55 * v80),
+            v84 = v56 * (2.0 * v56 * v79 - v54 * v71 - v55 * v76) + v57 * (2.0 * v57 * v79 - v55 * v71 + v54 * v76),
+            v85 = v65 * v84;
+        softehl_store4(R + 7 * q + 0, (7 * points), v32, v33, v63, v83);
+        softehl_store3(R + 7 * q + 4, (7 * points), v85, v77, v82);
     }
 }
-
-void softehl_solid_q4_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_q4_fields_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + (7 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_q4_fields_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (7 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * (7 * points)];
-    softehl_solid_q4_fields(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (7 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_solid_q4_fields, 8, 8, 0, 0, (7 * points), 0)

@@ -23,521 +23,94 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_solid_q4_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_q4_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10;
+    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
     softehl_load3(t + 8, 11, &t8, &t9, &t10);
-    (void)t8; (void)t9; (void)t10;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 0.25 * parameters[2];
-    const V v4 = 0.5 * t8;
-    const V v5 = 0.5 * t9;
-    const V v6 = X4 - X6;
-    const V v7 = X4 - X2;
-    const V v8 = X5 - X7;
-    const V v9 = X5 - X3;
-    const V v10 = d0 - d4;
-    const V v11 = d0 - d2;
-    const V v12 = d2 + v10;
-    const V v13 = d1 - d3;
-    const V v14 = d1 + d3;
-    const V v15 = d4 + v11;
-    const V v16 = v12 - d6;
-    const V v17 = v11 - d4;
-    const V v18 = d5 + v14;
-    const V v19 = v15 - d6;
-    const V v20 = d6 + v17;
-    const V v21 = v14 - d5;
-    const V v22 = d5 - d7;
-    const V v23 = d7 + v18;
-    const V v24 = v21 - d7;
-    const V v25 = v13 - v22;
-    const V v26 = v13 + v22;
-    const V v27 = t4 - t6;
-    const V v28 = t4 - t2;
-    const V v29 = t5 - t7;
-    const V v30 = t5 - t3;
-    V s31 = softehl_splat(0.0);
-    V s32 = softehl_splat(0.0);
-    V s33 = softehl_splat(0.0);
-    V s34 = softehl_splat(0.0);
-    V s35 = softehl_splat(0.0);
-    V s36 = softehl_splat(0.0);
-    V s37 = softehl_splat(0.0);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1], v3 = 0.25 * parameters[2];
+    const V v4 = 0.5 * t8, v5 = 0.5 * t9, v6 = X4 - X6, v7 = X4 - X2, v8 = X5 - X7, v9 = X5 - X3,
+        v10 = d0 - d2, v11 = d1 - d3, v12 = d1 + d3, v13 = d2 + (d0 - d4) - d6, v14 = d4 + v10 - d6,
+        v15 = d6 + (v10 - d4), v16 = d5 - d7, v17 = d7 + (d5 + v12), v18 = v12 - d5 - d7,
+        v19 = v11 - v16, v20 = v11 + v16, v21 = t4 - t6, v22 = t4 - t2, v23 = t5 - t7,
+        v24 = t5 - t3;
+    V s25 = {0}, s26 = {0}, s27 = {0}, s28 = {0}, s29 = {0}, s30 = {0}, s31 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v38 = 1.0 - w[0];
-        const double v39 = 1.0 + w[0];
-        const double v40 = 0.25 * w[0];
-        const double v41 = 1.0 - w[1];
-        const double v42 = 0.25 * w[1];
-        const double v43 = w[0] * w[1];
-        const double v44 = 0.25 * v41;
-        const double v45 = 0.25 + v40;
-        const double v46 = 0.25 - v40;
-        const double v47 = 0.25 - v42;
-        const double v48 = 0.25 + v42;
-        const V v49 = w[0] * v19;
-        const V v50 = v16 - v49;
-        const V v51 = w[1] * v19;
-        const V v52 = v20 - v51;
-        const double v53 = v40 - 0.25;
-        const double v54 = v42 - 0.25;
-        const double v55 = v44 * v38;
-        const double v56 = v44 * v39;
-        const V v57 = X2 * v47;
-        const V v58 = X6 * v46;
-        const V v59 = v48 * v8;
-        const V v60 = v47 * t2;
-        const V v61 = v46 * t6;
-        const V v62 = v48 * v29;
-        const V v63 = v48 * v6;
-        const V v64 = v57 + v63;
-        const V v65 = v48 * v27;
-        const V v66 = v60 + v65;
-        const V v67 = X7 * v46;
-        const V v68 = v46 * t7;
-        const V v69 = X3 * v47;
-        const V v70 = v69 + v59;
-        const V v71 = X3 * v56;
-        const V v72 = v47 * t3;
-        const V v73 = v72 + v62;
-        const V v74 = v56 * t3;
-        const V v75 = v45 * v7;
-        const V v76 = v58 + v75;
-        const V v77 = v45 * v28;
-        const V v78 = v61 + v77;
-        const V v79 = v45 * v9;
-        const V v80 = v67 + v79;
-        const V v81 = v45 * v30;
-        const V v82 = v68 + v81;
-        const V v83 = X1 * v55;
-        const V v84 = v83 + v71;
-        const V v85 = X1 * v54;
-        const V v86 = v85 + v70;
-        const V v87 = v55 * t1;
-        const V v88 = v87 + v74;
-        const V v89 = v54 * t1;
-        const V v90 = v89 + v73;
-        const V v91 = X1 * v53;
-        const V v92 = v91 + v80;
-        const V v93 = v53 * t1;
-        const V v94 = v93 + v82;
-        const V v95 = X0 * v54;
-        const V v96 = v95 + v64;
-        const V v97 = X0 * v53;
-        const V v98 = v97 + v76;
-        const V v99 = v54 * t0;
-        const V v100 = v99 + v66;
-        const V v101 = v53 * t0;
-        const V v102 = v101 + v78;
-        const V v103 = 0.25 * v86;
-        const V v104 = 0.25 * v92;
-        const V v105 = 0.25 * v96;
-        const V v106 = v96 * v92;
-        const V v107 = v96 * v94;
-        const V v108 = 0.25 * v98;
-        const V v109 = v98 * v86;
-        const V v110 = v106 - v109;
-        const V v111 = v86 * v102;
-        const V v112 = v107 - v111;
-        const V v113 = w[1] * v24;
-        const V v114 = v23 - v113;
-        const double v115 = 1.0 + w[1];
-        const V v116 = 1.0 / v110;
-        const double v117 = 0.25 * v115;
-        const V v118 = 6.283185307179586 * v110;
-        const V v119 = w[2] * v110;
-        const V v120 = w[1] * v26;
-        const V v121 = v25 - v120;
-        const V v122 = w[0] * v25;
-        const V v123 = v114 - v122;
-        const V v124 = w[0] * v26;
-        const V v125 = v24 - v124;
-        const V v126 = v98 * v90;
-        const V v127 = v112 - v126;
-        const V v128 = v43 * v26;
-        const V v129 = v128 + v123;
-        const double v130 = v39 * v117;
-        const double v131 = v38 * v117;
-        const V v132 = v92 * v100;
-        const V v133 = v127 + v132;
-        const V v134 = v116 * v90;
-        const V v135 = v116 * v100;
-        const V v136 = v116 * v116;
-        const V v137 = v133 * v136;
-        const V v138 = v86 * v137;
-        const V v139 = v134 - v138;
-        const V v140 = 0.25 * v139;
-        const V v141 = X5 * v130;
-        const V v142 = v141 + v84;
-        const V v143 = v130 * t5;
-        const V v144 = v143 + v88;
-        const V v145 = X7 * v131;
-        const V v146 = v145 + v142;
-        const V v147 = v131 * t7;
-        const V v148 = v147 + v144;
-        const V v149 = v116 * v104;
-        const V v150 = v116 * v103;
-        const V v151 = v116 * v105;
-        const V v152 = v116 * v108;
-        const V v153 = v116 * v94;
-        const V v154 = v116 * v102;
-        const V v155 = 1.0 / v146;
-        const V v156 = 6.283185307179586 * v146;
-        const V v157 = v148 * v118;
-        const V v158 = v133 * v156;
-        const V v159 = v157 + v158;
-        const V v160 = v119 * v156;
-        const V v161 = v92 * v137;
-        const V v162 = v153 - v161;
-        const V v163 = v52 * v152;
-        const V v164 = v125 * v150;
-        const V v165 = v52 * v149;
-        const V v166 = 1.0 - v165;
-        const V v167 = v125 * v151;
-        const V v168 = 1.0 - v167;
-        const V v169 = w[2] * v159;
-        const V v170 = v50 * v150;
-        const V v171 = v166 + v170;
-        const V v172 = v50 * v151;
-        const V v173 = v163 - v172;
-        const V v174 = v121 * v149;
-        const V v175 = v164 - v174;
-        const V v176 = v121 * v152;
-        const V v177 = v168 + v176;
-        const V v178 = 2.0 * v171;
-        const V v179 = v171 * v171;
-        const V v180 = 2.0 * v173;
-        const V v181 = 2.0 * v175;
-        const V v182 = 2.0 * v177;
-        const V v183 = v171 * v177;
-        const V v184 = 0.25 * v162;
-        const V v185 = v3 * v160;
-        const V v186 = v5 * v160;
-        const V v187 = v4 * v160;
-        const V v188 = t10 * v160;
-        const V v189 = v173 * v173;
-        const V v190 = v179 + v189;
-        const V v191 = v173 * v175;
-        const V v192 = v183 - v191;
-        const V v193 = 0.25 * v155;
-        const V v194 = v155 * v193;
-        const V v195 = v175 * v175;
-        const V v196 = v190 + v195;
-        const V v197 = v192 * v192;
-        const V v198 = 2.0 * v192;
-        const V v199 = parameters[2] * v169;
-        const V v200 = v188 + v199;
-        const V v201 = v2 * v169;
-        const V v202 = v186 + v201;
-        const V v203 = v2 * v160;
-        const V v204 = v1 * v169;
-        const V v205 = v187 + v204;
-        const V v206 = v1 * v160;
-        const V v207 = 0.25 * v200;
-        const V v208 = v148 * v194;
-        const V v209 = v177 * v177;
-        const V v210 = v196 + v209;
-        const V v211 = v193 * v129;
-        const V v212 = 1.0 + v211;
-        const V v213 = v208 * v129;
-        const V v214 = v212 * v212;
-        const V v215 = 2.0 * v212;
-        const V v216 = v96 * v137;
-        const V v217 = v135 - v216;
-        const V v218 = v98 * v137;
-        const V v219 = v154 - v218;
-        const V v220 = 0.25 * v217;
-        const V v221 = 0.25 * v219;
-        const V v222 = v210 + v214;
-        const V v223 = v210 * v214;
-        const V v224 = v197 + v223;
-        const V v225 = v197 * v214;
-        const V v226 = 2.0 * v213;
-        const V v227 = v213 * v215;
-        const V v228 = v50 * v140;
-        const V v229 = v125 * v140;
-        const V v230 = softehl_vrcbrt(v225);
-        const V v231 = 1.0 / v225;
-        const V v232 = v52 * v221;
-        const V v233 = v52 * v184;
-        const V v234 = v228 - v233;
-        const V v235 = v121 * v184;
-        const V v236 = v229 - v235;
-        const V v237 = v121 * v221;
-        const V v238 = 2.0 * v234;
-        const V v239 = 2.0 * v236;
-        const V v240 = v50 * v220;
-        const V v241 = v232 - v240;
-        const V v242 = v125 * v220;
-        const V v243 = v237 - v242;
-        const V v244 = v177 * v234;
-        const V v245 = v178 * v234;
-        const V v246 = 2.0 * v241;
-        const V v247 = 2.0 * v243;
-        const V v248 = v203 * v224;
-        const V v249 = v202 * v224;
-        const V v250 = v171 * v243;
-        const V v251 = v244 + v250;
-        const V v252 = v180 * v241;
-        const V v253 = v245 + v252;
-        const V v254 = 1.1111111111111112 * v248;
-        const V v255 = v206 * v222;
-        const V v256 = v205 * v222;
-        const V v257 = 0.4444444444444444 * v255;
-        const V v258 = v175 * v241;
-        const V v259 = v251 - v258;
-        const V v260 = v182 * v243;
-        const V v261 = v253 + v260;
-        const V v262 = v173 * v236;
-        const V v263 = v259 - v262;
-        const V v264 = 2.0 * v263;
-        const V v265 = v198 * v263;
-        const V v266 = v181 * v236;
-        const V v267 = v261 + v266;
-        const V v268 = v185 * v231;
-        const V v269 = 1.0 - v231;
-        const V v270 = v214 * v267;
-        const V v271 = v231 * v268;
-        const V v272 = v214 * v265;
-        const V v273 = v265 + v270;
-        const V v274 = v267 - v227;
-        const V v275 = v185 - v268;
-        const V v276 = v206 * v274;
-        const V v277 = v256 + v276;
-        const V v278 = v207 * v269;
-        const V v279 = v210 * v227;
-        const V v280 = v273 - v279;
-        const V v281 = v197 * v227;
-        const V v282 = v272 - v281;
-        const V v283 = v203 * v280;
-        const V v284 = v249 + v283;
-        const V v285 = v230 * v230;
-        const V v286 = v285 * v285;
-        const V v287 = 0.6666666666666666 * v230;
-        const V v288 = v286 * v287;
-        const V v289 = v284 * v288;
-        const V v290 = v278 - v289;
-        const V v291 = 0.3333333333333333 * v286;
-        const V v292 = v277 * v291;
-        const V v293 = v290 - v292;
-        const V v294 = v230 * v285;
-        const V v295 = v203 * v285;
-        const V v296 = v203 * v288;
-        const V v297 = v248 * v288;
-        const V v298 = v275 - v297;
-        const V v299 = v202 * v285;
-        const V v300 = v282 * v296;
-        const V v301 = v299 - v300;
-        const V v302 = v255 * v291;
-        const V v303 = v298 - v302;
-        const V v304 = v206 * v291;
-        const V v305 = v206 * v230;
-        const V v306 = v265 * v303;
-        const V v307 = v230 * v257;
-        const V v308 = v205 * v230;
-        const V v309 = v282 * v304;
-        const V v310 = v308 - v309;
-        const V v311 = v294 * v307;
-        const V v312 = v294 * v311;
-        const V v313 = v271 + v312;
-        const V v314 = v267 * v295;
-        const V v315 = v306 + v314;
-        const V v316 = v210 * v295;
-        const V v317 = v305 + v316;
-        const V v318 = v210 * v301;
-        const V v319 = v315 + v318;
-        const V v320 = v197 * v303;
-        const V v321 = v317 + v320;
-        const V v322 = v254 * v286;
-        const V v323 = v286 * v322;
-        const V v324 = v313 + v323;
-        const V v325 = v282 * v324;
-        const V v326 = v293 + v325;
-        const V v327 = v197 * v326;
-        const V v328 = v319 + v327;
-        const V v329 = v310 + v328;
-        const V v330 = v214 * v295;
-        const V v331 = v305 + v330;
-        const V v332 = v227 * v295;
-        const V v333 = v310 - v332;
-        const V v334 = v214 * v326;
-        const V v335 = v227 * v303;
-        const V v336 = v334 - v335;
-        const V v337 = v214 * v303;
-        const V v338 = v295 + v337;
-        const V v339 = v214 * v301;
-        const V v340 = v333 + v339;
-        const V v341 = v301 + v336;
-        const V v342 = v247 * v331;
-        const V v343 = v239 * v331;
-        const V v344 = v246 * v331;
-        const V v345 = v238 * v331;
-        const V v346 = v182 * v331;
-        const V v347 = v181 * v331;
-        const V v348 = v180 * v331;
-        const V v349 = v178 * v331;
-        const V v350 = v182 * v340;
-        const V v351 = v342 + v350;
-        const V v352 = v181 * v340;
-        const V v353 = v343 + v352;
-        const V v354 = v180 * v340;
-        const V v355 = v344 + v354;
-        const V v356 = v178 * v340;
-        const V v357 = v345 + v356;
-        const V v358 = v264 * v338;
-        const V v359 = v198 * v341;
-        const V v360 = v358 + v359;
-        const V v361 = v198 * v338;
-        const V v362 = v236 * v361;
-        const V v363 = v355 - v362;
-        const V v364 = v241 * v361;
-        const V v365 = v353 - v364;
-        const V v366 = v243 * v361;
-        const V v367 = v357 + v366;
-        const V v368 = v234 * v361;
-        const V v369 = v351 + v368;
-        const V v370 = v215 * v321;
-        const V v371 = v215 * v329;
-        const V v372 = v226 * v321;
-        const V v373 = v371 - v372;
-        const V v374 = v193 * v373;
-        const V v375 = v208 * v370;
-        const V v376 = v374 - v375;
-        s31 += v376;
-        const V v377 = v175 * v361;
-        const V v378 = v348 - v377;
-        const V v379 = v175 * v360;
-        const V v380 = v363 - v379;
-        const V v381 = v173 * v361;
-        const V v382 = v347 - v381;
-        const V v383 = v177 * v361;
-        const V v384 = v349 + v383;
-        const V v385 = v171 * v361;
-        const V v386 = v346 + v385;
-        const V v387 = v173 * v360;
-        const V v388 = v365 - v387;
-        const V v389 = v177 * v360;
-        const V v390 = v367 + v389;
-        const V v391 = v171 * v360;
-        const V v392 = v369 + v391;
-        const V v393 = v43 * v376;
-        const V v394 = v221 * v386;
-        const V v395 = v221 * v378;
-        const V v396 = v140 * v382;
-        const V v397 = v140 * v384;
-        const V v398 = v220 * v386;
-        const V v399 = v396 - v398;
-        const V v400 = v220 * v378;
-        const V v401 = v397 - v400;
-        const V v402 = v184 * v382;
-        const V v403 = v394 - v402;
-        const V v404 = v184 * v384;
-        const V v405 = v395 - v404;
-        const V v406 = v152 * v392;
-        const V v407 = v403 + v406;
-        const V v408 = v152 * v380;
-        const V v409 = v405 + v408;
-        const V v410 = v151 * v392;
-        const V v411 = v399 - v410;
-        const V v412 = v151 * v380;
-        const V v413 = v401 - v412;
-        const V v414 = v150 * v388;
-        const V v415 = v411 + v414;
-        const V v416 = v150 * v390;
-        const V v417 = v413 + v416;
-        s32 += v417;
-        const V v418 = v149 * v388;
-        const V v419 = v407 - v418;
-        const V v420 = v149 * v390;
-        const V v421 = v409 - v420;
-        s33 += v421;
-        const V v422 = w[0] * v415;
-        s35 += v393;
-        s35 -= v422;
-        const V v423 = w[0] * v417;
-        const V v424 = w[0] * v376;
-        s36 += v419;
-        s36 -= v424;
-        const V v425 = w[1] * v376;
-        s34 += v415;
-        s34 -= v425;
-        const V v426 = w[1] * v419;
-        s35 -= v426;
-        const V v427 = w[1] * v421;
-        s37 += v423;
-        s37 += v427;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v32 = 1.0 - w[0], v33 = 1.0 + w[0], v34 = 0.25 * w[0], v35 = 0.25 * w[1],
+            v36 = w[0] * w[1], v37 = 0.25 * (1.0 - w[1]), v38 = 0.25 + v34, v39 = 0.25 - v34,
+            v40 = 0.25 - v35, v41 = 0.25 + v35;
+        const V v42 = v13 - w[0] * v14, v43 = v15 - w[1] * v14;
+        const double v44 = v34 - 0.25, v45 = v35 - 0.25, v46 = v37 * v32, v47 = v37 * v33;
+        const V v48 = X1 * v45 + (X3 * v40 + v41 * v8), v49 = v45 * t1 + (v40 * t3 + v41 * v23),
+            v50 = X1 * v44 + (X7 * v39 + v38 * v9), v51 = v44 * t1 + (v39 * t7 + v38 * v24),
+            v52 = X0 * v45 + (X2 * v40 + v41 * v6), v53 = X0 * v44 + (X6 * v39 + v38 * v7),
+            v54 = v45 * t0 + (v40 * t2 + v41 * v21), v55 = v44 * t0 + (v39 * t6 + v38 * v22),
+            v56 = v52 * v50 - v53 * v48, v57 = 1.0 / v56;
+        const double v58 = 0.25 * (1.0 + w[1]);
+        const V v59 = v19 - w[1] * v20, v60 = v18 - w[0] * v20,
+            v61 = v36 * v20 + (v17 - w[1] * v18 - w[0] * v19);
+        const double v62 = v33 * v58, v63 = v32 * v58;
+        const V v64 = v52 * v51 - v48 * v55 - v53 * v49 + v50 * v54, v65 = v64 * (v57 * v57),
+            v66 = 0.25 * (v57 * v49 - v48 * v65),
+            v67 = X7 * v63 + (X5 * v62 + (X1 * v46 + X3 * v47)),
+            v68 = v63 * t7 + (v62 * t5 + (v46 * t1 + v47 * t3)), v69 = v57 * (0.25 * v50),
+            v70 = v57 * (0.25 * v48), v71 = v57 * (0.25 * v52), v72 = v57 * (0.25 * v53),
+            v73 = 1.0 / v67, v74 = 6.283185307179586 * v67, v75 = w[2] * v56 * v74,
+            v76 = w[2] * (v68 * (6.283185307179586 * v56) + v64 * v74),
+            v77 = 1.0 - v43 * v69 + v42 * v70, v78 = v43 * v72 - v42 * v71,
+            v79 = v60 * v70 - v59 * v69, v80 = 1.0 - v60 * v71 + v59 * v72, v81 = 2.0 * v77,
+            v82 = 2.0 * v78, v83 = 2.0 * v79, v84 = 2.0 * v80, v85 = 0.25 * (v57 * v51 - v50 * v65),
+            v86 = v3 * v75, v87 = v77 * v80 - v78 * v79, v88 = 0.25 * v73, v89 = v87 * v87,
+            v90 = 2.0 * v87, v91 = v5 * v75 + v2 * v76, v92 = v2 * v75, v93 = v4 * v75 + v1 * v76,
+            v94 = v1 * v75, v95 = v68 * (v73 * v88),
+            v96 = v77 * v77 + v78 * v78 + v79 * v79 + v80 * v80, v97 = 1.0 + v88 * v61,
+            v98 = v95 * v61, v99 = v97 * v97, v100 = 2.0 * v97,
+            v101 = 0.25 * (v57 * v54 - v52 * v65), v102 = 0.25 * (v57 * v55 - v53 * v65),
+            v103 = v96 + v99, v104 = v89 + v96 * v99, v105 = v89 * v99, v106 = v98 * v100,
+            v107 = softehl_vrcbrt(v105), v108 = 1.0 / v105, v109 = v42 * v66 - v43 * v85,
+            v110 = v60 * v66 - v59 * v85, v111 = v43 * v102 - v42 * v101,
+            v112 = v59 * v102 - v60 * v101, v113 = v92 * v104, v114 = v94 * v103,
+            v115 = v80 * v109 + v77 * v112 - v79 * v111 - v78 * v110, v116 = v90 * v115,
+            v117 = v81 * v109 + v82 * v111 + v84 * v112 + v83 * v110, v118 = v86 * v108,
+            v119 = v99 * v116 - v89 * v106, v120 = v107 * v107, v121 = v120 * v120,
+            v122 = v121 * (0.6666666666666666 * v107),
+            v123 = 0.25 * (t10 * v75 + parameters[2] * v76) * (1.0 - v108) - (v91 * v104 + v92 * (v116 + v99 * v117 - v96 * v106)) * v122,
+            v124 = 0.3333333333333333 * v121, v125 = v107 * v120, v126 = v92 * v120,
+            v127 = v91 * v120 - v119 * (v92 * v122), v128 = v86 - v118 - v113 * v122 - v114 * v124,
+            v129 = v94 * v107, v130 = v93 * v107 - v119 * (v94 * v124),
+            v131 = v108 * v118 + v125 * (v125 * (v107 * (0.4444444444444444 * v114))),
+            v132 = v129 + v96 * v126 + v89 * v128,
+            v133 = v123 - (v93 * v103 + v94 * (v117 - v106)) * v124 + v119 * (v131 + v121 * (1.1111111111111112 * v113 * v121)),
+            v134 = v129 + v99 * v126, v135 = v126 + v99 * v128,
+            v136 = v130 - v106 * v126 + v99 * v127,
+            v137 = 2.0 * v115 * v135 + v90 * (v127 + (v99 * v133 - v106 * v128)), v138 = v90 * v135,
+            v139 = v100 * (v130 + (v116 * v128 + v117 * v126 + v96 * v127 + v89 * v133)),
+            v140 = v88 * (v139 - 2.0 * v98 * v132) - v95 * (v100 * v132);
+        s25 += v140;
+        const V v141 = v82 * v134 - v79 * v138,
+            v142 = 2.0 * v111 * v134 + v82 * v136 - v110 * v138 - v79 * v137,
+            v143 = v83 * v134 - v78 * v138, v144 = v81 * v134 + v80 * v138,
+            v145 = v84 * v134 + v77 * v138,
+            v146 = 2.0 * v110 * v134 + v83 * v136 - v111 * v138 - v78 * v137,
+            v147 = 2.0 * v109 * v134 + v81 * v136 + v112 * v138 + v80 * v137,
+            v148 = 2.0 * v112 * v134 + v84 * v136 + v109 * v138 + v77 * v137,
+            v149 = v66 * v143 - v101 * v145 - v71 * v148 + v70 * v146,
+            v150 = v66 * v144 - v101 * v141 - v71 * v142 + v70 * v147;
+        s26 += v150;
+        const V v151 = v102 * v145 - v85 * v143 + v72 * v148 - v69 * v146,
+            v152 = v102 * v141 - v85 * v144 + v72 * v142 - v69 * v147;
+        s27 += v152; s29 += v36 * v140; s29 -= w[0] * v149; s30 += v151; s30 -= w[0] * v140;
+        s28 += v149; s28 -= w[1] * v140; s29 -= w[1] * v151; s31 += w[0] * v150; s31 += w[1] * v152;
     }
-    const V v428 = s31 - s34;
-    const V v429 = s31 + s34;
-    const V v430 = s33 - s37;
-    const V v431 = s33 + s37;
-    const V v432 = s32 + v430;
-    const V v433 = s32 - v430;
-    const V v434 = s35 - s36;
-    const V v435 = s35 + s36;
-    const V v436 = s32 + v431;
-    const V v437 = v431 - s32;
-    const V v438 = v428 + v434;
-    const V v439 = v428 - v434;
-    const V v440 = -v436;
-    softehl_store4(R + 4, 8, v440, v438, v437, v439);
-    const V v441 = v435 + v429;
-    const V v442 = v429 - v435;
-    softehl_store4(R + 0, 8, v432, v441, v433, v442);
+    const V v153 = s25 - s28, v154 = s25 + s28, v155 = s27 - s31, v156 = s27 + s31,
+        v157 = s29 - s30, v158 = s29 + s30;
+    softehl_store4(R + 4, 8, -(s26 + v156), v153 + v157, v156 - s26, v153 - v157);
+    softehl_store4(R + 0, 8, s26 + v155, v158 + v154, s26 - v155, v154 - v158);
 }
-
-void softehl_solid_q4_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_q4_pseudo_load_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, direction + 11 * e, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_q4_pseudo_load_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, direction + 11 * (n - SOFTEHL_LANES), parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double t[SOFTEHL_LANES * 11];
-    softehl_pad(t, direction, 11, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_q4_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_solid_q4_pseudo_load, 8, 8, 0, 11, 8, 0)

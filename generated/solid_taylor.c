@@ -23,3845 +23,644 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_solid_taylor_energy_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_taylor_energy)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 12.566370614359172 * parameters[2];
-    const V v2 = X4 - X0;
-    const V v3 = 0.39433756729740643 * X1;
-    const V v4 = 0.10566243270259355 * X1;
-    const V v5 = X0 - X2;
-    const V v6 = v2 - X2;
-    const V v7 = X4 - X6;
-    const V v8 = X6 + v6;
-    const V v9 = X1 - X3;
-    const V v10 = X1 + X3;
-    const V v11 = 0.10566243270259355 * X3;
-    const V v12 = v11 + v3;
-    const V v13 = 0.39433756729740643 * X3;
-    const V v14 = v13 + v4;
-    const V v15 = v5 + v7;
-    const V v16 = 0.25 * v8;
-    const V v17 = v7 - v5;
-    const V v18 = 1.5773502691896257 * v12;
-    const V v19 = 0.4226497308103742 * v12;
-    const V v20 = 1.5773502691896257 * v14;
-    const V v21 = 0.4226497308103742 * v14;
-    const V v22 = 0.25 * v15;
-    const V v23 = 0.25 * v17;
-    const V v24 = v8 - v17;
-    const V v25 = v17 + v8;
-    const V v26 = v17 + v15;
-    const V v27 = 0.0625 * v24;
-    const V v28 = v17 - v15;
-    const V v29 = v15 + v8;
-    const V v30 = v8 - v15;
-    const V v31 = 0.0625 * v25;
-    const V v32 = 0.0625 * v26;
-    const V v33 = 0.0625 * v28;
-    const V v34 = 0.0625 * v29;
-    const V v35 = 0.0625 * v30;
-    const V v36 = 0.10566243270259355 * X5;
-    const V v37 = 0.39433756729740643 * X5;
-    const V v38 = 0.5386751345948129 * d1;
-    const V v39 = X5 - X7;
-    const V v40 = X5 + X7;
-    const V v41 = 0.39433756729740643 * X7;
-    const V v42 = v36 + v41;
-    const V v43 = 0.10566243270259355 * X7;
-    const V v44 = v37 + v43;
-    const V v45 = d0 - d4;
-    const V v46 = d1 + d5;
-    const V v47 = d1 - d5;
-    const V v48 = 0.03867513459481288 * d5;
-    const V v49 = v38 - v48;
-    const V v50 = 0.5386751345948129 * d5;
-    const V v51 = v9 + v39;
-    const V v52 = 0.25 * v46;
-    const V v53 = v39 - v9;
-    const V v54 = 0.03867513459481288 * d1;
-    const V v55 = v50 - v54;
-    const V v56 = 0.25 * v51;
-    const V v57 = 0.25 * v53;
-    const V v58 = v53 + v51;
-    const V v59 = v51 - v53;
-    const V v60 = 0.0625 * v58;
-    const V v61 = 0.0625 * v59;
-    const V v62 = v40 - v10;
-    const V v63 = v10 + v40;
-    const V v64 = 0.25 * v63;
-    const V v65 = v53 - v62;
-    const V v66 = v53 + v62;
-    const V v67 = v51 + v62;
-    const V v68 = v51 - v62;
-    const V v69 = 0.25 * v62;
-    const V v70 = 0.03867513459481288 * d3;
-    const V v71 = v52 - v70;
-    const V v72 = 0.5386751345948129 * d3;
-    const V v73 = v72 + v52;
-    const V v74 = 0.0625 * v65;
-    const V v75 = 0.0625 * v66;
-    const V v76 = 0.0625 * v67;
-    const V v77 = 0.0625 * v68;
-    const V v78 = 1.0 / v64;
-    const V v79 = v64 * v1;
-    const V v80 = d3 - d7;
-    const V v81 = d3 + d7;
-    const V v82 = 0.5386751345948129 * d7;
-    const V v83 = v82 + v71;
-    const V v84 = 0.03867513459481288 * d7;
-    const V v85 = v73 - v84;
-    const V v86 = 0.25 * v81;
-    const V v87 = v46 + v81;
-    const V v88 = d7 - d3;
-    const V v89 = d2 - d6;
-    const V v90 = d6 - d2;
-    const V v91 = 0.4226497308103742 * v42;
-    const V v92 = v18 + v91;
-    const V v93 = 1.5773502691896257 * v42;
-    const V v94 = v19 + v93;
-    const V v95 = 1.0 / v92;
-    const V v96 = v49 + v86;
-    const V v97 = v55 + v86;
-    const V v98 = 1.0 / v94;
-    const V v99 = 0.4226497308103742 * v44;
-    const V v100 = v20 + v99;
-    const V v101 = 1.5773502691896257 * v44;
-    const V v102 = v21 + v101;
-    const V v103 = 0.25 * v78;
-    const V v104 = 1.0 / v100;
-    const V v105 = 1.0 / v102;
-    const V v106 = v23 * v56;
-    const V v107 = v23 * v69;
-    const V v108 = v22 * v69;
-    const V v109 = v57 * v22;
-    const V v110 = v106 - v109;
-    const V v111 = v57 * v16;
-    const V v112 = v107 - v111;
-    const V v113 = v56 * v16;
-    const V v114 = v108 - v113;
-    const V v115 = v87 * v103;
-    const V v116 = 1.0 + v115;
-    const V v117 = 1.0 / v112;
-    const V v118 = 3.141592653589793 * v112;
-    const V v119 = v79 * v112;
-    const V v120 = v110 * v117;
-    const V v121 = v114 * v117;
-    const V v122 = v95 * v96;
-    const V v123 = 1.0 + v122;
-    const V v124 = v105 * v97;
-    const V v125 = 1.0 + v124;
-    const V v126 = v123 * v123;
-    const V v127 = v125 * v125;
-    const V v128 = v98 * v83;
-    const V v129 = 1.0 + v128;
-    const V v130 = v129 * v129;
-    const V v131 = v74 * v117;
-    const V v132 = v104 * v85;
-    const V v133 = 1.0 + v132;
-    const V v134 = v133 * v133;
-    const V v135 = v27 * v117;
-    const V v136 = v75 * v117;
-    const V v137 = v31 * v117;
-    const V v138 = v60 * v117;
-    const V v139 = v120 * v131;
-    const V v140 = v76 * v117;
-    const V v141 = v32 * v117;
-    const V v142 = v34 * v117;
-    const V v143 = v77 * v117;
-    const V v144 = v35 * v117;
-    const V v145 = v61 * v117;
-    const V v146 = v33 * v117;
-    const V v147 = v120 * v135;
-    const V v148 = v121 * v131;
-    const V v149 = v121 * v135;
-    const V v150 = v121 * v136;
-    const V v151 = v121 * v137;
-    const V v152 = v90 * v137;
-    const V v153 = v80 * v136;
-    const V v154 = v120 * v136;
-    const V v155 = v120 * v137;
-    const V v156 = v148 - v143;
-    const V v157 = v142 + v149;
-    const V v158 = v143 - v150;
-    const V v159 = 0.5773502691896257 * v156;
-    const V v160 = v142 - v151;
-    const V v161 = 0.5773502691896257 * v157;
-    const V v162 = 0.5773502691896257 * v158;
-    const V v163 = 0.5773502691896257 * v160;
-    const V v164 = v150 - v140;
-    const V v165 = v154 - v145;
-    const V v166 = v140 - v148;
-    const V v167 = 0.5773502691896257 * v164;
-    const V v168 = v131 + v159;
-    const V v169 = 0.5773502691896257 * v165;
-    const V v170 = 0.5773502691896257 * v166;
-    const V v171 = v155 - v141;
-    const V v172 = v144 + v151;
-    const V v173 = v149 - v144;
-    const V v174 = 0.5773502691896257 * v171;
-    const V v175 = v159 - v131;
-    const V v176 = 0.5773502691896257 * v172;
-    const V v177 = 0.5773502691896257 * v173;
-    const V v178 = v136 + v167;
-    const V v179 = v141 - v147;
-    const V v180 = v169 + v178;
-    const V v181 = v169 - v178;
-    const V v182 = 0.5773502691896257 * v179;
-    const V v183 = v137 + v176;
-    const V v184 = v167 - v136;
-    const V v185 = v146 + v147;
-    const V v186 = v146 + v155;
-    const V v187 = v174 + v183;
-    const V v188 = v174 - v183;
-    const V v189 = 0.5773502691896257 * v185;
-    const V v190 = v169 + v184;
-    const V v191 = 0.5773502691896257 * v186;
-    const V v192 = v176 - v137;
-    const V v193 = v89 * v136;
-    const V v194 = 1.0 + v193;
-    const V v195 = v88 * v137;
-    const V v196 = 1.0 + v195;
-    const V v197 = v184 - v169;
-    const V v198 = v174 + v192;
-    const V v199 = v192 - v174;
-    const V v200 = v135 + v177;
-    const V v201 = v138 - v154;
-    const V v202 = 0.5773502691896257 * v201;
-    const V v203 = v138 + v139;
-    const V v204 = v139 + v145;
-    const V v205 = v189 + v200;
-    const V v206 = v189 - v200;
-    const V v207 = 0.5773502691896257 * v203;
-    const V v208 = 0.5773502691896257 * v204;
-    const V v209 = v177 - v135;
-    const V v210 = v47 * v135;
-    const V v211 = v196 + v210;
-    const V v212 = v45 * v135;
-    const V v213 = v152 + v212;
-    const V v214 = v189 + v209;
-    const V v215 = v168 + v208;
-    const V v216 = v209 - v189;
-    const V v217 = v45 * v131;
-    const V v218 = v194 + v217;
-    const V v219 = v47 * v131;
-    const V v220 = v153 + v219;
-    const V v221 = v211 * v218;
-    const V v222 = v208 - v168;
-    const V v223 = v175 + v208;
-    const V v224 = v175 - v208;
-    const V v225 = v213 * v220;
-    const V v226 = v221 - v225;
-    const V v227 = d4 * v216;
-    const V v228 = d4 * v214;
-    const V v229 = v226 * v226;
-    const V v230 = d4 * v206;
-    const V v231 = d5 * v222;
-    const V v232 = d5 * v223;
-    const V v233 = d5 * v224;
-    const V v234 = d4 * v224;
-    const V v235 = 1.0 + v234;
-    const V v236 = d4 * v222;
-    const V v237 = 1.0 + v236;
-    const V v238 = d4 * v223;
-    const V v239 = 1.0 + v238;
-    const V v240 = d5 * v216;
-    const V v241 = 1.0 + v240;
-    const V v242 = d5 * v206;
-    const V v243 = 1.0 + v242;
-    const V v244 = d5 * v214;
-    const V v245 = 1.0 + v244;
-    const V v246 = v116 * v229;
-    const V v247 = v116 * v246;
-    const V v248 = v131 - v170;
-    const V v249 = v131 + v170;
-    const V v250 = v135 + v161;
-    const V v251 = v135 - v161;
-    const V v252 = v207 + v248;
-    const V v253 = v207 + v249;
-    const V v254 = v182 + v250;
-    const V v255 = v182 + v251;
-    const V v256 = softehl_vlog(v247);
-    const V v257 = v248 - v207;
-    const V v258 = v249 - v207;
-    const V v259 = v250 - v182;
-    const V v260 = v251 - v182;
-    const V v261 = d1 * v252;
-    const V v262 = d0 * v252;
-    const V v263 = 1.0 + v262;
-    const V v264 = d0 * v253;
-    const V v265 = v235 + v264;
-    const V v266 = d1 * v253;
-    const V v267 = v233 + v266;
-    const V v268 = d0 * v259;
-    const V v269 = d1 * v259;
-    const V v270 = 1.0 + v269;
-    const V v271 = d0 * v257;
-    const V v272 = v237 + v271;
-    const V v273 = d1 * v257;
-    const V v274 = v231 + v273;
-    const V v275 = d0 * v258;
-    const V v276 = v239 + v275;
-    const V v277 = d1 * v258;
-    const V v278 = v232 + v277;
-    const V v279 = d0 * v260;
-    const V v280 = v227 + v279;
-    const V v281 = d1 * v260;
-    const V v282 = v241 + v281;
-    const V v283 = v136 - v162;
-    const V v284 = v136 + v162;
-    const V v285 = v137 - v163;
-    const V v286 = v137 + v163;
-    const V v287 = v202 + v283;
-    const V v288 = v202 + v284;
-    const V v289 = v191 + v285;
-    const V v290 = v191 + v286;
-    const V v291 = v283 - v202;
-    const V v292 = v284 - v202;
-    const V v293 = v285 - v191;
-    const V v294 = v286 - v191;
-    const V v295 = d3 * v287;
-    const V v296 = v274 + v295;
-    const V v297 = d3 * v288;
-    const V v298 = v278 + v297;
-    const V v299 = d2 * v288;
-    const V v300 = v276 + v299;
-    const V v301 = d2 * v287;
-    const V v302 = v272 + v301;
-    const V v303 = d2 * v199;
-    const V v304 = v280 + v303;
-    const V v305 = d3 * v199;
-    const V v306 = v282 + v305;
-    const V v307 = d2 * v291;
-    const V v308 = v263 + v307;
-    const V v309 = d3 * v291;
-    const V v310 = v261 + v309;
-    const V v311 = d2 * v292;
-    const V v312 = v265 + v311;
-    const V v313 = d3 * v292;
-    const V v314 = v267 + v313;
-    const V v315 = d6 * v290;
-    const V v316 = v304 + v315;
-    const V v317 = d7 * v290;
-    const V v318 = v306 + v317;
-    const V v319 = d6 * v181;
-    const V v320 = v302 + v319;
-    const V v321 = d7 * v181;
-    const V v322 = v296 + v321;
-    const V v323 = d6 * v190;
-    const V v324 = v300 + v323;
-    const V v325 = d7 * v190;
-    const V v326 = v298 + v325;
-    const V v327 = d6 * v197;
-    const V v328 = v312 + v327;
-    const V v329 = d7 * v197;
-    const V v330 = v314 + v329;
-    const V v331 = v316 * v316;
-    const V v332 = v316 * v318;
-    const V v333 = v320 * v320;
-    const V v334 = v320 * v322;
-    const V v335 = v324 * v324;
-    const V v336 = v324 * v326;
-    const V v337 = v328 * v328;
-    const V v338 = v331 + v337;
-    const V v339 = v328 * v330;
-    const V v340 = v332 + v339;
-    const V v341 = v318 * v328;
-    const V v342 = v318 * v318;
-    const V v343 = v316 * v330;
-    const V v344 = v341 - v343;
-    const V v345 = v330 * v330;
-    const V v346 = v342 + v345;
-    const V v347 = v322 * v322;
-    const V v348 = v326 * v326;
-    const V v349 = v130 + v338;
-    const V v350 = v346 + v349;
-    const V v351 = v130 * v344;
-    const V v352 = v344 * v351;
-    const V v353 = softehl_vrcbrt(v352);
-    const V v354 = v350 * v350;
-    const V v355 = v338 * v338;
-    const V v356 = v354 - v355;
-    const V v357 = v346 * v346;
-    const V v358 = v356 - v357;
-    const V v359 = v130 * v130;
-    const V v360 = v358 - v359;
-    const V v361 = 0.5 * v360;
-    const V v362 = v340 * v340;
-    const V v363 = v361 - v362;
-    const V v364 = v353 * v363;
-    const V v365 = v350 * v353;
-    const V v366 = v353 * v364;
-    const V v367 = v365 - 3.0;
-    const V v368 = parameters[0] * v367;
-    const V v369 = v366 - 3.0;
-    const V v370 = parameters[1] * v369;
-    const V v371 = v368 + v370;
-    const V v372 = v94 * v371;
-    const V v373 = d0 * v254;
-    const V v374 = v230 + v373;
-    const V v375 = d0 * v255;
-    const V v376 = v228 + v375;
-    const V v377 = d1 * v254;
-    const V v378 = v243 + v377;
-    const V v379 = d1 * v255;
-    const V v380 = v245 + v379;
-    const V v381 = d2 * v188;
-    const V v382 = v374 + v381;
-    const V v383 = d3 * v188;
-    const V v384 = v378 + v383;
-    const V v385 = d2 * v198;
-    const V v386 = v376 + v385;
-    const V v387 = d3 * v198;
-    const V v388 = v380 + v387;
-    const V v389 = d2 * v187;
-    const V v390 = v268 - v389;
-    const V v391 = d3 * v187;
-    const V v392 = v270 - v391;
-    const V v393 = d6 * v293;
-    const V v394 = v382 + v393;
-    const V v395 = d7 * v293;
-    const V v396 = v384 + v395;
-    const V v397 = d6 * v294;
-    const V v398 = v386 + v397;
-    const V v399 = d7 * v294;
-    const V v400 = v388 + v399;
-    const V v401 = v396 * v396;
-    const V v402 = v347 + v401;
-    const V v403 = d6 * v289;
-    const V v404 = v390 + v403;
-    const V v405 = d7 * v289;
-    const V v406 = v392 + v405;
-    const V v407 = v400 * v400;
-    const V v408 = v348 + v407;
-    const V v409 = v320 * v396;
-    const V v410 = v394 * v396;
-    const V v411 = v334 + v410;
-    const V v412 = v324 * v400;
-    const V v413 = v398 * v400;
-    const V v414 = v336 + v413;
-    const V v415 = v326 * v398;
-    const V v416 = v412 - v415;
-    const V v417 = v398 * v398;
-    const V v418 = v335 + v417;
-    const V v419 = v322 * v394;
-    const V v420 = v409 - v419;
-    const V v421 = v394 * v394;
-    const V v422 = v333 + v421;
-    const V v423 = v247 - v256;
-    const V v424 = d6 * v180;
-    const V v425 = v308 - v424;
-    const V v426 = d7 * v180;
-    const V v427 = v310 - v426;
-    const V v428 = d4 * v205;
-    const V v429 = v404 - v428;
-    const V v430 = d5 * v205;
-    const V v431 = v406 - v430;
-    const V v432 = d4 * v215;
-    const V v433 = v425 - v432;
-    const V v434 = d5 * v215;
-    const V v435 = v427 - v434;
-    const V v436 = v134 * v420;
-    const V v437 = v420 * v436;
-    const V v438 = v429 * v429;
-    const V v439 = v429 * v431;
-    const V v440 = v431 * v431;
-    const V v441 = v431 * v433;
-    const V v442 = v429 * v435;
-    const V v443 = v441 - v442;
-    const V v444 = v433 * v433;
-    const V v445 = v438 + v444;
-    const V v446 = v433 * v435;
-    const V v447 = v439 + v446;
-    const V v448 = v435 * v435;
-    const V v449 = v440 + v448;
-    const V v450 = softehl_vrcbrt(v437);
-    const V v451 = v127 * v416;
-    const V v452 = v416 * v451;
-    const V v453 = v134 + v422;
-    const V v454 = v126 * v443;
-    const V v455 = v443 * v454;
-    const V v456 = v126 + v445;
-    const V v457 = v127 + v418;
-    const V v458 = v449 + v456;
-    const V v459 = v402 + v453;
-    const V v460 = softehl_vrcbrt(v452);
-    const V v461 = v408 + v457;
-    const V v462 = v458 * v458;
-    const V v463 = softehl_vrcbrt(v455);
-    const V v464 = v459 * v459;
-    const V v465 = v461 * v461;
-    const V v466 = v445 * v445;
-    const V v467 = v462 - v466;
-    const V v468 = v449 * v449;
-    const V v469 = v467 - v468;
-    const V v470 = v126 * v126;
-    const V v471 = v469 - v470;
-    const V v472 = v422 * v422;
-    const V v473 = v464 - v472;
-    const V v474 = v418 * v418;
-    const V v475 = v465 - v474;
-    const V v476 = v402 * v402;
-    const V v477 = v473 - v476;
-    const V v478 = 0.5 * v471;
-    const V v479 = v408 * v408;
-    const V v480 = v475 - v479;
-    const V v481 = v127 * v127;
-    const V v482 = v480 - v481;
-    const V v483 = v134 * v134;
-    const V v484 = v477 - v483;
-    const V v485 = 0.5 * v482;
-    const V v486 = 0.5 * v484;
-    const V v487 = v447 * v447;
-    const V v488 = v478 - v487;
-    const V v489 = v463 * v488;
-    const V v490 = v414 * v414;
-    const V v491 = v485 - v490;
-    const V v492 = v411 * v411;
-    const V v493 = v486 - v492;
-    const V v494 = v460 * v491;
-    const V v495 = v458 * v463;
-    const V v496 = v463 * v489;
-    const V v497 = v460 * v461;
-    const V v498 = v460 * v494;
-    const V v499 = v495 - 3.0;
-    const V v500 = parameters[0] * v499;
-    const V v501 = v497 - 3.0;
-    const V v502 = parameters[0] * v501;
-    const V v503 = v496 - 3.0;
-    const V v504 = parameters[1] * v503;
-    const V v505 = v500 + v504;
-    const V v506 = v498 - 3.0;
-    const V v507 = parameters[1] * v506;
-    const V v508 = v502 + v507;
-    const V v509 = v450 * v493;
-    const V v510 = v450 * v459;
-    const V v511 = v450 * v509;
-    const V v512 = v510 - 3.0;
-    const V v513 = parameters[0] * v512;
-    const V v514 = v92 * v505;
-    const V v515 = v372 + v514;
-    const V v516 = v102 * v508;
-    const V v517 = v515 + v516;
-    const V v518 = v511 - 3.0;
-    const V v519 = parameters[1] * v518;
-    const V v520 = v513 + v519;
-    const V v521 = v100 * v520;
-    const V v522 = v517 + v521;
-    const V v523 = v118 * v522;
-    const V v524 = 0.5 * v423;
-    const V v525 = (-0.5) + v524;
-    const V v526 = v119 * v525;
-    const V v527 = v523 + v526;
-    softehl_store1(R + 0, 1, v527);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const V v1 = X0 - X2, v2 = X4 - X6, v3 = X6 + (X4 - X0 - X2), v4 = X1 - X3, v5 = X1 + X3,
+        v6 = 0.10566243270259355 * X3 + 0.39433756729740643 * X1,
+        v7 = 0.39433756729740643 * X3 + 0.10566243270259355 * X1, v8 = v1 + v2, v9 = 0.25 * v3,
+        v10 = v2 - v1, v11 = 0.25 * v8, v12 = 0.25 * v10, v13 = X5 - X7, v14 = X5 + X7,
+        v15 = 0.10566243270259355 * X5 + 0.39433756729740643 * X7,
+        v16 = 0.39433756729740643 * X5 + 0.10566243270259355 * X7, v17 = d0 - d4, v18 = d1 + d5,
+        v19 = d1 - d5, v20 = v4 + v13, v21 = 0.25 * v18, v22 = v13 - v4, v23 = 0.25 * v20,
+        v24 = 0.25 * v22, v25 = v14 - v5, v26 = 0.25 * (v5 + v14), v27 = 0.25 * v25, v28 = d3 + d7,
+        v29 = 0.25 * v28, v30 = 1.5773502691896257 * v6 + 0.4226497308103742 * v15,
+        v31 = 0.4226497308103742 * v6 + 1.5773502691896257 * v15,
+        v32 = 1.5773502691896257 * v7 + 0.4226497308103742 * v16,
+        v33 = 0.4226497308103742 * v7 + 1.5773502691896257 * v16, v34 = v12 * v27 - v24 * v9,
+        v35 = 1.0 + (v18 + v28) * (0.25 * (1.0 / v26)), v36 = 1.0 / v34,
+        v37 = (v12 * v23 - v24 * v11) * v36, v38 = (v11 * v27 - v23 * v9) * v36,
+        v39 = 1.0 / v30 * (0.5386751345948129 * d1 - 0.03867513459481288 * d5 + v29),
+        v40 = 1.0 + v39,
+        v41 = 1.0 / v33 * (0.5386751345948129 * d5 - 0.03867513459481288 * d1 + v29),
+        v42 = 1.0 + v41, v43 = v40 * v40, v44 = v42 * v42,
+        v45 = 1.0 / v31 * (0.5386751345948129 * d7 + (v21 - 0.03867513459481288 * d3)),
+        v46 = 1.0 + v45, v47 = v46 * v46, v48 = 0.0625 * (v22 - v25) * v36,
+        v49 = 1.0 / v32 * (0.5386751345948129 * d3 + v21 - 0.03867513459481288 * d7),
+        v50 = 1.0 + v49, v51 = v50 * v50, v52 = 0.0625 * (v3 - v10) * v36,
+        v53 = 0.0625 * (v22 + v25) * v36, v54 = 0.0625 * (v10 + v3) * v36,
+        v55 = 0.0625 * (v22 + v20) * v36, v56 = v37 * v48, v57 = 0.0625 * (v20 + v25) * v36,
+        v58 = 0.0625 * (v10 + v8) * v36, v59 = 0.0625 * (v8 + v3) * v36,
+        v60 = 0.0625 * (v20 - v25) * v36, v61 = 0.0625 * (v3 - v8) * v36,
+        v62 = 0.0625 * (v20 - v22) * v36, v63 = 0.0625 * (v10 - v8) * v36, v64 = v37 * v52,
+        v65 = v38 * v48, v66 = v38 * v52, v67 = v38 * v53, v68 = v38 * v54, v69 = v37 * v53,
+        v70 = v37 * v54, v71 = 0.5773502691896257 * (v65 - v60),
+        v72 = 0.5773502691896257 * (v59 + v66), v73 = 0.5773502691896257 * (v60 - v67),
+        v74 = 0.5773502691896257 * (v59 - v68), v75 = 0.5773502691896257 * (v67 - v57),
+        v76 = v48 + v71, v77 = 0.5773502691896257 * (v69 - v62),
+        v78 = 0.5773502691896257 * (v57 - v65), v79 = 0.5773502691896257 * (v70 - v58),
+        v80 = v71 - v48, v81 = 0.5773502691896257 * (v61 + v68),
+        v82 = 0.5773502691896257 * (v66 - v61), v83 = v53 + v75, v84 = v77 + v83, v85 = v77 - v83,
+        v86 = 0.5773502691896257 * (v58 - v64), v87 = v54 + v81, v88 = v75 - v53, v89 = v79 + v87,
+        v90 = v79 - v87, v91 = 0.5773502691896257 * (v63 + v64), v92 = v77 + v88,
+        v93 = 0.5773502691896257 * (v63 + v70), v94 = v81 - v54, v95 = v88 - v77, v96 = v79 + v94,
+        v97 = v94 - v79, v98 = v52 + v82, v99 = 0.5773502691896257 * (v55 - v69), v100 = v91 + v98,
+        v101 = v91 - v98, v102 = 0.5773502691896257 * (v55 + v56),
+        v103 = 0.5773502691896257 * (v56 + v62), v104 = v82 - v52, v105 = v91 + v104,
+        v106 = v76 + v103, v107 = v104 - v91,
+        v108 = (1.0 + (d7 - d3) * v54 + v19 * v52) * (1.0 + (d2 - d6) * v53 + v17 * v48),
+        v109 = v103 - v76, v110 = v80 + v103, v111 = v80 - v103,
+        v112 = v108 - ((d6 - d2) * v54 + v17 * v52) * ((d3 - d7) * v53 + v19 * v48),
+        v113 = v35 * (v35 * (v112 * v112)), v114 = v48 - v78, v115 = v48 + v78, v116 = v52 + v72,
+        v117 = v52 - v72, v118 = v102 + v114, v119 = v102 + v115, v120 = v86 + v116,
+        v121 = v86 + v117, v122 = softehl_vlog(v113), v123 = v114 - v102, v124 = v115 - v102,
+        v125 = v116 - v86, v126 = v117 - v86, v127 = v53 - v73, v128 = v53 + v73, v129 = v54 - v74,
+        v130 = v54 + v74, v131 = v99 + v127, v132 = v99 + v128, v133 = v93 + v129,
+        v134 = v93 + v130, v135 = v127 - v99, v136 = v128 - v99, v137 = v129 - v93,
+        v138 = v130 - v93, v139 = d4 * v107 + d0 * v126 + d2 * v97 + d6 * v134,
+        v140 = 1.0 + d5 * v107 + d1 * v126 + d3 * v97 + d7 * v134,
+        v141 = 1.0 + d4 * v109 + d0 * v123 + d2 * v131 + d6 * v85,
+        v142 = d5 * v109 + d1 * v123 + d3 * v131 + d7 * v85,
+        v143 = 1.0 + d4 * v110 + d0 * v124 + d2 * v132 + d6 * v92,
+        v144 = d5 * v110 + d1 * v124 + d3 * v132 + d7 * v92,
+        v145 = 1.0 + d4 * v111 + d0 * v119 + d2 * v136 + d6 * v95,
+        v146 = d5 * v111 + d1 * v119 + d3 * v136 + d7 * v95, v147 = v139 * v139 + v145 * v145,
+        v148 = v139 * v140 + v145 * v146, v149 = v140 * v145 - v139 * v146,
+        v150 = v140 * v140 + v146 * v146, v151 = v150 + (v47 + v147),
+        v152 = softehl_vrcbrt(v149 * (v47 * v149)),
+        v153 = 0.5 * (v151 * v151 - v147 * v147 - v150 * v150 - v47 * v47) - v148 * v148,
+        v154 = parameters[0] * (v151 * v152 - 3.0) + parameters[1] * (v152 * (v152 * v153) - 3.0),
+        v155 = d4 * v101 + d0 * v120 + d2 * v90 + d6 * v137,
+        v156 = 1.0 + d5 * v101 + d1 * v120 + d3 * v90 + d7 * v137,
+        v157 = d4 * v105 + d0 * v121 + d2 * v96 + d6 * v138,
+        v158 = 1.0 + d5 * v105 + d1 * v121 + d3 * v96 + d7 * v138, v159 = v142 * v142 + v156 * v156,
+        v160 = v144 * v144 + v158 * v158, v161 = v141 * v142 + v155 * v156,
+        v162 = v143 * v144 + v157 * v158, v163 = v143 * v158 - v144 * v157,
+        v164 = v143 * v143 + v157 * v157, v165 = v141 * v156 - v142 * v155,
+        v166 = v141 * v141 + v155 * v155, v167 = d0 * v125 - d2 * v89 + d6 * v133 - d4 * v100,
+        v168 = 1.0 + d1 * v125 - d3 * v89 + d7 * v133 - d5 * v100,
+        v169 = 1.0 + d0 * v118 + d2 * v135 - d6 * v84 - d4 * v106,
+        v170 = d1 * v118 + d3 * v135 - d7 * v84 - d5 * v106, v171 = v168 * v169 - v167 * v170,
+        v172 = v167 * v167 + v169 * v169, v173 = v167 * v168 + v169 * v170,
+        v174 = v168 * v168 + v170 * v170, v175 = softehl_vrcbrt(v165 * (v51 * v165)),
+        v176 = v174 + (v43 + v172), v177 = v159 + (v51 + v166),
+        v178 = softehl_vrcbrt(v163 * (v44 * v163)), v179 = v160 + (v44 + v164),
+        v180 = softehl_vrcbrt(v171 * (v43 * v171)),
+        v181 = 0.5 * (v176 * v176 - v172 * v172 - v174 * v174 - v43 * v43) - v173 * v173,
+        v182 = 0.5 * (v179 * v179 - v164 * v164 - v160 * v160 - v44 * v44) - v162 * v162,
+        v183 = 0.5 * (v177 * v177 - v166 * v166 - v159 * v159 - v51 * v51) - v161 * v161,
+        v184 = parameters[0] * (v176 * v180 - 3.0) + parameters[1] * (v180 * (v180 * v181) - 3.0),
+        v185 = parameters[0] * (v178 * v179 - 3.0) + parameters[1] * (v178 * (v178 * v182) - 3.0),
+        v186 = parameters[0] * (v175 * v177 - 3.0) + parameters[1] * (v175 * (v175 * v183) - 3.0),
+        v187 = 3.141592653589793 * v34 * (v31 * v154 + v30 * v184 + v33 * v185 + v32 * v186),
+        v188 = v26 * (12.566370614359172 * parameters[2]) * v34 * ((-0.5) + 0.5 * (v113 - v122));
+    softehl_store1(R + 0, 1, v187 + v188);
 }
+SOFTEHL_BATCH(softehl_solid_taylor_energy, 8, 8, 0, 0, 1, 0)
 
-void softehl_solid_taylor_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_residual)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_energy_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 1 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_energy_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 1 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 1];
-    softehl_solid_taylor_energy(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 1 * n; ++i) values[i] = R[i];
-#endif
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1];
+    const V v3 = X0 - X2, v4 = X4 - X6, v5 = X6 + (X4 - X0 - X2), v6 = X1 - X3, v7 = X1 + X3,
+        v8 = 0.10566243270259355 * X3 + 0.39433756729740643 * X1,
+        v9 = 0.39433756729740643 * X3 + 0.10566243270259355 * X1, v10 = v3 + v4, v11 = 0.25 * v5,
+        v12 = v4 - v3, v13 = 0.25 * v10, v14 = 0.25 * v12, v15 = X5 - X7, v16 = X5 + X7,
+        v17 = 0.10566243270259355 * X5 + 0.39433756729740643 * X7,
+        v18 = 0.39433756729740643 * X5 + 0.10566243270259355 * X7, v19 = v6 + v15,
+        v20 = 0.4226497308103742 * v9 + 1.5773502691896257 * v18, v21 = d0 - d2,
+        v22 = 1.5773502691896257 * v9 + 0.4226497308103742 * v18, v23 = v15 - v6, v24 = v16 - v7,
+        v25 = 0.25 * (v7 + v16), v26 = 0.25 * v19, v27 = 1.0 / v22, v28 = 1.0 / v20,
+        v29 = 0.25 * v23, v30 = 0.25 * v24, v31 = 1.0 / v25, v32 = d0 + d2 - d4 - d6, v33 = d4 - d6,
+        v34 = d1 + d3, v35 = d1 - d3, v36 = d5 + d7, v37 = d5 - d7, v38 = v14 * v30 - v29 * v11,
+        v39 = v34 + v36, v40 = v34 - v36, v41 = v35 + v37, v42 = v35 - v37, v43 = 1.0 / v38,
+        v44 = 1.0 + 0.25 * v31 * v39, v45 = 6.283185307179586 * v38, v46 = v44 * v44,
+        v47 = v22 * v45, v48 = v20 * v45, v49 = 0.25 * v27, v50 = 0.14433756729740643 * v27,
+        v51 = 0.25 * v28, v52 = 0.14433756729740643 * v28, v53 = v2 * v47, v54 = v2 * v48,
+        v55 = v1 * v47, v56 = v1 * v48, v57 = 0.0625 * v23 * v43, v58 = 0.0625 * v24 * v43,
+        v59 = v43 * (0.0625 * v5), v60 = 0.0625 * v12 * v43,
+        v61 = v43 * (0.03608439182435161 * v19), v62 = v43 * (0.03608439182435161 * v10),
+        v63 = 0.5773502691896257 * v43, v64 = (v13 * v30 - v26 * v11) * v63,
+        v65 = (v14 * v26 - v29 * v13) * v63, v66 = 0.5773502691896257 * (v57 - v58),
+        v67 = 0.5773502691896257 * (v57 + v58), v68 = 0.5773502691896257 * (v58 - v57),
+        v69 = 0.5773502691896257 * (v59 - v60), v70 = 0.5773502691896257 * (v59 + v60),
+        v71 = v41 * v67, v72 = v41 * v66, v73 = 0.5773502691896257 * (v60 - v59), v74 = v41 * v69,
+        v75 = v41 * v70, v76 = 1.5773502691896257 * v8 + 0.4226497308103742 * v17,
+        v77 = 0.4226497308103742 * v8 + 1.5773502691896257 * v17, v78 = 1.0 / v76, v79 = 1.0 / v77,
+        v80 = v76 * v45, v81 = v77 * v45, v82 = v21 + v33, v83 = v21 - v33, v84 = v82 * v69,
+        v85 = 1.0 + v64, v86 = 1.0 - v64, v87 = v2 * v80, v88 = v2 * v81, v89 = v1 * v80,
+        v90 = v1 * v81, v91 = v65 - v85, v92 = v65 + v85, v93 = v85 - v65, v94 = v86 - v65,
+        v95 = v65 - v86, v96 = v65 + v86, v97 = 0.25 * v78, v98 = 0.14433756729740643 * v78,
+        v99 = 0.25 * v79, v100 = 0.14433756729740643 * v79, v101 = v57 * v92 - v61,
+        v102 = v57 * v93 - v61, v103 = v61 + v57 * v96, v104 = v61 + v57 * v94,
+        v105 = v62 + v59 * v93, v106 = v62 + v59 * v94, v107 = v59 * v92 - v62,
+        v108 = v59 * v96 - v62, v109 = v83 * v59 - v32 * v60, v110 = v60 * v95 - v62,
+        v111 = v62 + v60 * v91, v112 = v83 * v106 - v84 + v32 * v110, v113 = v58 * v95 - v61,
+        v114 = v58 * v91 - v61, v115 = v40 * v57 - v42 * v58, v116 = 1.0 - v83 * v58 + v32 * v57,
+        v117 = v40 * v104 - v72 + v42 * v113, v118 = v82 * v66, v119 = v82 * v67, v120 = v82 * v70,
+        v121 = v40 * v102 - v71 + v42 * v114, v122 = v83 * v105 + v32 * v111 + v120,
+        v123 = 1.0 + v83 * v113 - v118 + v32 * v104, v124 = 1.0 + v83 * v114 - v119 + v32 * v102,
+        v125 = v62 - v60 * v92, v126 = v61 - v58 * v92, v127 = v61 - v58 * v96,
+        v128 = v62 + v60 * v96, v129 = v72 + v40 * v101 + v42 * v126,
+        v130 = 1.0 - v40 * v60 + v42 * v59, v131 = v71 + v40 * v103 + v42 * v127,
+        v132 = 1.0 - v75 + v42 * v108 - v40 * v128, v133 = 1.0 + v118 + v32 * v101 + v83 * v126,
+        v134 = 1.0 + v119 + v32 * v103 + v83 * v127, v135 = 1.0 + v74 + v40 * v125 + v42 * v107,
+        v136 = v97 * v39 + (1.0 + v98 * (v40 + v42)), v137 = v99 * v39 + (1.0 + v100 * (v42 - v40)),
+        v138 = v49 * v39 + (1.0 + v50 * (v40 - v42)),
+        v139 = v51 * v39 + (1.0 + v52 * (v36 - v34 - v42)), v140 = v136 * v136, v141 = v137 * v137,
+        v142 = v138 * v138, v143 = v139 * v139, v144 = v116 * v130 - v109 * v115,
+        v145 = v144 * v144, v146 = v84 + v83 * v107 + v32 * v125,
+        v147 = v83 * v108 - v120 - v32 * v128,
+        v148 = v133 * v133 + v135 * v135 + v129 * v129 + v146 * v146,
+        v149 = v134 * v134 + v132 * v132 + v131 * v131 + v147 * v147,
+        v150 = v133 * v135 - v129 * v146, v151 = v132 * v134 - v131 * v147, v152 = v150 * v150,
+        v153 = v151 * v151, v154 = softehl_vrcbrt(v140 * v152), v155 = softehl_vrcbrt(v141 * v153),
+        v156 = 0.3333333333333333 * v89 * (v140 + v148) + v154 * (0.6666666666666666 * v87 * (v152 + v140 * v148)),
+        v157 = 0.3333333333333333 * v90 * (v141 + v149) + v155 * (0.6666666666666666 * v88 * (v153 + v141 * v149)),
+        v158 = 1.0 + v75 + v42 * v105 + v40 * v111, v159 = 1.0 - v74 + v42 * v106 + v40 * v110,
+        v160 = v121 * v121 + v122 * v122 + v124 * v124 + v158 * v158,
+        v161 = v112 * v112 + v117 * v117 + v123 * v123 + v159 * v159,
+        v162 = v25 * (v38 * (6.283185307179586 * parameters[2])) * (1.0 - 1.0 / (v46 * v145)),
+        v163 = v124 * v158 - v121 * v122, v164 = v163 * v163, v165 = v123 * v159 - v112 * v117,
+        v166 = v165 * v165, v167 = softehl_vrcbrt(v142 * v164),
+        v168 = 0.3333333333333333 * v55 * (v142 + v160) + v167 * (0.6666666666666666 * v53 * (v142 * v160 + v164)),
+        v169 = softehl_vrcbrt(v143 * v166),
+        v170 = 0.3333333333333333 * v56 * (v143 + v161) + v169 * (0.6666666666666666 * v54 * (v143 * v161 + v166)),
+        v171 = v167 * v167, v172 = v55 * v167, v173 = v169 * v169, v174 = v56 * v169,
+        v175 = v168 * (v171 * v171), v176 = v53 * v171, v177 = v170 * (v173 * v173),
+        v178 = v54 * v173, v179 = 2.0 * v46 * v144 * v162, v180 = v115 * v179, v181 = v109 * v179,
+        v182 = v130 * v179, v183 = v116 * v179, v184 = 2.0 * v163 * (v176 - v142 * v175),
+        v185 = v154 * v154, v186 = v89 * v154, v187 = v155 * v155, v188 = v90 * v155,
+        v189 = v87 * v185, v190 = v58 * v182, v191 = v88 * v187, v192 = v156 * (v185 * v185),
+        v193 = v157 * (v187 * v187), v194 = v186 + v140 * v189, v195 = v188 + v141 * v191,
+        v196 = 2.0 * v150 * (v189 - v140 * v192),
+        v197 = 2.0 * v136 * (v186 + v148 * v189 - v152 * v192),
+        v198 = 2.0 * v151 * (v191 - v141 * v193),
+        v199 = 2.0 * v137 * (v188 + v149 * v191 - v153 * v193),
+        v200 = 2.0 * v146 * v194 - v129 * v196, v201 = 2.0 * v129 * v194 - v146 * v196,
+        v202 = 2.0 * v133 * v194 + v135 * v196, v203 = 2.0 * v135 * v194 + v133 * v196,
+        v204 = 2.0 * v147 * v195 - v131 * v198, v205 = 2.0 * v131 * v195 - v147 * v198,
+        v206 = 2.0 * v132 * v195 + v134 * v198, v207 = 2.0 * v134 * v195 + v132 * v198,
+        v208 = v174 + v143 * v178, v209 = 2.0 * v165 * (v178 - v143 * v177),
+        v210 = 2.0 * v139 * (v174 + v161 * v178 - v166 * v177),
+        v211 = 2.0 * v112 * v208 - v117 * v209, v212 = 2.0 * v117 * v208 - v112 * v209,
+        v213 = 2.0 * v123 * v208 + v159 * v209, v214 = 2.0 * v159 * v208 + v123 * v209,
+        v215 = v98 * v197 - v52 * v210,
+        v216 = 0.5 * v31 * v44 * v145 * v162 + v97 * v197 + v99 * v199 + v51 * v210,
+        v217 = v172 + v142 * v176, v218 = 2.0 * v138 * (v172 + (v160 * v176 - v164 * v175)),
+        v219 = v124 * v184 + 2.0 * v158 * v217, v220 = v158 * v184 + 2.0 * v124 * v217,
+        v221 = v57 * v182 + v125 * v200 + v103 * v207 + v60 * v180 + v110 * v211,
+        v222 = v125 * v203 - v57 * v181 + v103 * v205 - v60 * v183 + v215 + v110 * v214,
+        v223 = 2.0 * v122 * v217 - v121 * v184, v224 = 2.0 * v121 * v217 - v122 * v184,
+        v225 = v216 + v49 * v218, v226 = v100 * v199 - v50 * v218,
+        v227 = v58 * v181 + v107 * v203 + v127 * v205 + v59 * v183 + v215 + v105 * v219,
+        v228 = v107 * v200 + v127 * v207 - v59 * v180 + v105 * v223 + v108 * v204,
+        v229 = v222 + v111 * v219 - v226 - v128 * v206 + v102 * v224 + v101 * v201,
+        v230 = v69 * v203 + v70 * (v219 - v206) + v67 * (v205 - v224) + v66 * v201,
+        v231 = v69 * v200 + v70 * (v223 - v204) + v67 * (v207 - v220) + v66 * v202,
+        v232 = v221 + v111 * v223 - v128 * v204 + v102 * v220 + v101 * v202 + v104 * v213,
+        v233 = v229 + v104 * v212,
+        v234 = v226 + v227 + v108 * v206 + v114 * v224 + v126 * v201 + v113 * v212,
+        v235 = v228 + v114 * v220 + v126 * v202 + v113 * v213 + v106 * v211,
+        v236 = v234 + v106 * v214, v237 = v230 + v68 * v212 + v73 * v214,
+        v238 = v231 + v68 * v213 + v73 * v211, v239 = v225 - v236, v240 = v225 + v236,
+        v241 = v233 + v237, v242 = v232 + v238, v243 = v237 - v233, v244 = v235 - v190,
+        v245 = v238 - v232;
+    softehl_store4(R + 0, 8, v242 + v244, v240 + v241, v190 - v235 - v245, v239 - v243);
+    softehl_store4(R + 4, 8, v245 - v244, v239 + v243, v244 - v242, v240 - v241);
 }
+SOFTEHL_BATCH(softehl_solid_taylor_residual, 8, 8, 0, 0, 8, 0)
 
-static void softehl_solid_taylor_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_taylor_tangent)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 6.283185307179586 * parameters[2];
-    const V v4 = X4 - X0;
-    const V v5 = 0.39433756729740643 * X1;
-    const V v6 = 0.10566243270259355 * X1;
-    const V v7 = X0 - X2;
-    const V v8 = v4 - X2;
-    const V v9 = X4 - X6;
-    const V v10 = X6 + v8;
-    const V v11 = X1 - X3;
-    const V v12 = X1 + X3;
-    const V v13 = 0.10566243270259355 * X3;
-    const V v14 = v13 + v5;
-    const V v15 = 0.39433756729740643 * X3;
-    const V v16 = v15 + v6;
-    const V v17 = v7 + v9;
-    const V v18 = 0.25 * v10;
-    const V v19 = 0.0625 * v10;
-    const V v20 = v9 - v7;
-    const V v21 = 1.5773502691896257 * v14;
-    const V v22 = 0.4226497308103742 * v14;
-    const V v23 = 1.5773502691896257 * v16;
-    const V v24 = 0.4226497308103742 * v16;
-    const V v25 = 0.25 * v17;
-    const V v26 = 0.03608439182435161 * v17;
-    const V v27 = 0.25 * v20;
-    const V v28 = 0.0625 * v20;
-    const V v29 = 0.10566243270259355 * X5;
-    const V v30 = 0.39433756729740643 * X5;
-    const V v31 = X5 - X7;
-    const V v32 = X5 + X7;
-    const V v33 = 0.39433756729740643 * X7;
-    const V v34 = v29 + v33;
-    const V v35 = 0.10566243270259355 * X7;
-    const V v36 = v30 + v35;
-    const V v37 = v11 + v31;
-    const V v38 = v12 + v32;
-    const V v39 = 1.5773502691896257 * v36;
-    const V v40 = v24 + v39;
-    const V v41 = d0 - d2;
-    const V v42 = d0 + d2;
-    const V v43 = 0.4226497308103742 * v36;
-    const V v44 = v23 + v43;
-    const V v45 = v31 - v11;
-    const V v46 = v32 - v12;
-    const V v47 = 0.25 * v38;
-    const V v48 = 0.25 * v37;
-    const V v49 = 0.03608439182435161 * v37;
-    const V v50 = 1.0 / v44;
-    const V v51 = 1.0 / v40;
-    const V v52 = 0.25 * v45;
-    const V v53 = 0.0625 * v45;
-    const V v54 = 0.25 * v46;
-    const V v55 = 0.0625 * v46;
-    const V v56 = 1.0 / v47;
-    const V v57 = v42 - d4;
-    const V v58 = v57 - d6;
-    const V v59 = d4 - d6;
-    const V v60 = d1 + d3;
-    const V v61 = d1 - d3;
-    const V v62 = d5 + d7;
-    const V v63 = d5 - d7;
-    const V v64 = v27 * v54;
-    const V v65 = v27 * v48;
-    const V v66 = v25 * v54;
-    const V v67 = v52 * v25;
-    const V v68 = v65 - v67;
-    const V v69 = v52 * v18;
-    const V v70 = v64 - v69;
-    const V v71 = v48 * v18;
-    const V v72 = v66 - v71;
-    const V v73 = v60 + v62;
-    const V v74 = v60 - v62;
-    const V v75 = 0.25 * v56;
-    const V v76 = 0.5 * v56;
-    const V v77 = v61 + v63;
-    const V v78 = v61 - v63;
-    const V v79 = v62 - v60;
-    const V v80 = 1.0 / v70;
-    const V v81 = v75 * v73;
-    const V v82 = 1.0 + v81;
-    const V v83 = v79 - v78;
-    const V v84 = 6.283185307179586 * v70;
-    const V v85 = v70 * v3;
-    const V v86 = v74 + v78;
-    const V v87 = v76 * v82;
-    const V v88 = v82 * v82;
-    const V v89 = v74 - v78;
-    const V v90 = v47 * v85;
-    const V v91 = v44 * v84;
-    const V v92 = v40 * v84;
-    const V v93 = v78 - v74;
-    const V v94 = 2.0 * v88;
-    const V v95 = 0.25 * v50;
-    const V v96 = 0.14433756729740643 * v50;
-    const V v97 = 0.25 * v51;
-    const V v98 = 0.14433756729740643 * v51;
-    const V v99 = v2 * v91;
-    const V v100 = v2 * v92;
-    const V v101 = v1 * v91;
-    const V v102 = v1 * v92;
-    const V v103 = v53 * v80;
-    const V v104 = v55 * v80;
-    const V v105 = v80 * v19;
-    const V v106 = v28 * v80;
-    const V v107 = v80 * v49;
-    const V v108 = v80 * v26;
-    const V v109 = 0.5773502691896257 * v80;
-    const V v110 = 0.6666666666666666 * v99;
-    const V v111 = 0.6666666666666666 * v100;
-    const V v112 = v72 * v109;
-    const V v113 = v68 * v109;
-    const V v114 = v103 - v104;
-    const V v115 = v103 + v104;
-    const V v116 = v104 - v103;
-    const V v117 = 0.5773502691896257 * v114;
-    const V v118 = 0.5773502691896257 * v115;
-    const V v119 = 0.5773502691896257 * v116;
-    const V v120 = v105 - v106;
-    const V v121 = v105 + v106;
-    const V v122 = 0.5773502691896257 * v120;
-    const V v123 = 0.5773502691896257 * v121;
-    const V v124 = v77 * v118;
-    const V v125 = v106 - v105;
-    const V v126 = v77 * v117;
-    const V v127 = 0.5773502691896257 * v125;
-    const V v128 = v77 * v122;
-    const V v129 = v77 * v123;
-    const V v130 = 0.3333333333333333 * v101;
-    const V v131 = 0.3333333333333333 * v102;
-    const V v132 = 0.4226497308103742 * v34;
-    const V v133 = v21 + v132;
-    const V v134 = 1.5773502691896257 * v34;
-    const V v135 = v22 + v134;
-    const V v136 = 1.0 / v133;
-    const V v137 = 1.0 / v135;
-    const V v138 = v133 * v84;
-    const V v139 = v135 * v84;
-    const V v140 = 1.0 + v128;
-    const V v141 = 1.0 - v128;
-    const V v142 = 1.0 - v129;
-    const V v143 = 1.0 + v129;
-    const V v144 = v41 + v59;
-    const V v145 = v41 - v59;
-    const V v146 = v144 * v122;
-    const V v147 = 1.0 + v112;
-    const V v148 = 1.0 - v112;
-    const V v149 = v2 * v138;
-    const V v150 = v2 * v139;
-    const V v151 = v1 * v138;
-    const V v152 = v1 * v139;
-    const V v153 = v113 - v147;
-    const V v154 = v113 + v147;
-    const V v155 = 0.6666666666666666 * v149;
-    const V v156 = 0.6666666666666666 * v150;
-    const V v157 = 0.3333333333333333 * v151;
-    const V v158 = 0.3333333333333333 * v152;
-    const V v159 = v147 - v113;
-    const V v160 = v148 - v113;
-    const V v161 = v113 - v148;
-    const V v162 = v113 + v148;
-    const V v163 = v103 * v154;
-    const V v164 = 0.25 * v136;
-    const V v165 = 0.14433756729740643 * v136;
-    const V v166 = v103 * v159;
-    const V v167 = 0.25 * v137;
-    const V v168 = 0.14433756729740643 * v137;
-    const V v169 = v163 - v107;
-    const V v170 = v166 - v107;
-    const V v171 = v103 * v162;
-    const V v172 = v107 + v171;
-    const V v173 = v103 * v160;
-    const V v174 = v107 + v173;
-    const V v175 = v105 * v159;
-    const V v176 = v108 + v175;
-    const V v177 = v105 * v160;
-    const V v178 = v108 + v177;
-    const V v179 = v105 * v154;
-    const V v180 = v105 * v162;
-    const V v181 = v145 * v105;
-    const V v182 = v74 * v103;
-    const V v183 = v74 * v170;
-    const V v184 = v74 * v174;
-    const V v185 = v145 * v176;
-    const V v186 = v179 - v108;
-    const V v187 = v180 - v108;
-    const V v188 = v183 - v124;
-    const V v189 = v184 - v126;
-    const V v190 = v145 * v178;
-    const V v191 = v58 * v106;
-    const V v192 = v181 - v191;
-    const V v193 = v145 * v187;
-    const V v194 = v106 * v161;
-    const V v195 = v104 * v161;
-    const V v196 = v194 - v108;
-    const V v197 = v190 - v146;
-    const V v198 = v104 * v153;
-    const V v199 = v106 * v153;
-    const V v200 = v108 + v199;
-    const V v201 = v58 * v196;
-    const V v202 = v197 + v201;
-    const V v203 = v195 - v107;
-    const V v204 = v198 - v107;
-    const V v205 = v145 * v104;
-    const V v206 = 1.0 - v205;
-    const V v207 = v78 * v104;
-    const V v208 = v182 - v207;
-    const V v209 = v78 * v187;
-    const V v210 = v142 + v209;
-    const V v211 = v58 * v200;
-    const V v212 = v185 + v211;
-    const V v213 = v58 * v103;
-    const V v214 = v206 + v213;
-    const V v215 = 2.0 * v202;
-    const V v216 = v78 * v203;
-    const V v217 = v189 + v216;
-    const V v218 = v202 * v202;
-    const V v219 = v145 * v203;
-    const V v220 = 1.0 + v219;
-    const V v221 = 2.0 * v217;
-    const V v222 = v144 * v117;
-    const V v223 = v144 * v118;
-    const V v224 = v144 * v123;
-    const V v225 = v217 * v217;
-    const V v226 = v218 + v225;
-    const V v227 = v220 - v222;
-    const V v228 = 1.0 + v222;
-    const V v229 = v78 * v204;
-    const V v230 = v188 + v229;
-    const V v231 = v145 * v204;
-    const V v232 = 1.0 + v231;
-    const V v233 = v212 + v224;
-    const V v234 = v193 - v224;
-    const V v235 = 2.0 * v230;
-    const V v236 = v232 - v223;
-    const V v237 = 1.0 + v223;
-    const V v238 = v230 * v230;
-    const V v239 = 2.0 * v233;
-    const V v240 = v58 * v174;
-    const V v241 = v227 + v240;
-    const V v242 = v58 * v169;
-    const V v243 = v228 + v242;
-    const V v244 = v58 * v170;
-    const V v245 = v236 + v244;
-    const V v246 = v233 * v233;
-    const V v247 = v238 + v246;
-    const V v248 = 2.0 * v241;
-    const V v249 = v58 * v172;
-    const V v250 = v237 + v249;
-    const V v251 = 2.0 * v245;
-    const V v252 = v245 * v245;
-    const V v253 = v247 + v252;
-    const V v254 = v241 * v241;
-    const V v255 = v226 + v254;
-    const V v256 = v74 * v169;
-    const V v257 = v126 + v256;
-    const V v258 = v74 * v172;
-    const V v259 = v124 + v258;
-    const V v260 = v74 * v106;
-    const V v261 = 1.0 - v260;
-    const V v262 = v106 * v154;
-    const V v263 = v108 - v262;
-    const V v264 = v104 * v154;
-    const V v265 = v107 - v264;
-    const V v266 = v104 * v162;
-    const V v267 = v107 - v266;
-    const V v268 = v106 * v162;
-    const V v269 = v108 + v268;
-    const V v270 = v78 * v265;
-    const V v271 = v257 + v270;
-    const V v272 = v78 * v105;
-    const V v273 = v261 + v272;
-    const V v274 = v78 * v267;
-    const V v275 = v259 + v274;
-    const V v276 = v74 * v263;
-    const V v277 = v140 + v276;
-    const V v278 = v74 * v269;
-    const V v279 = v210 - v278;
-    const V v280 = v145 * v265;
-    const V v281 = v243 + v280;
-    const V v282 = v145 * v267;
-    const V v283 = v250 + v282;
-    const V v284 = v145 * v186;
-    const V v285 = v146 + v284;
-    const V v286 = v78 * v186;
-    const V v287 = v277 + v286;
-    const V v288 = v214 * v273;
-    const V v289 = 2.0 * v281;
-    const V v290 = v281 * v281;
-    const V v291 = 2.0 * v283;
-    const V v292 = v283 * v283;
-    const V v293 = 2.0 * v279;
-    const V v294 = v279 * v283;
-    const V v295 = 2.0 * v287;
-    const V v296 = v281 * v287;
-    const V v297 = v287 * v287;
-    const V v298 = v290 + v297;
-    const V v299 = v279 * v279;
-    const V v300 = v292 + v299;
-    const V v301 = 2.0 * v271;
-    const V v302 = 2.0 * v275;
-    const V v303 = v271 * v271;
-    const V v304 = v298 + v303;
-    const V v305 = v275 * v275;
-    const V v306 = v300 + v305;
-    const V v307 = v165 * v86;
-    const V v308 = 1.0 + v307;
-    const V v309 = v168 * v93;
-    const V v310 = 1.0 + v309;
-    const V v311 = v96 * v89;
-    const V v312 = 1.0 + v311;
-    const V v313 = v98 * v83;
-    const V v314 = 1.0 + v313;
-    const V v315 = v164 * v73;
-    const V v316 = v315 + v308;
-    const V v317 = v167 * v73;
-    const V v318 = v317 + v310;
-    const V v319 = v95 * v73;
-    const V v320 = v319 + v312;
-    const V v321 = v97 * v73;
-    const V v322 = v321 + v314;
-    const V v323 = v316 * v316;
-    const V v324 = 2.0 * v316;
-    const V v325 = v318 * v318;
-    const V v326 = 2.0 * v318;
-    const V v327 = v320 * v320;
-    const V v328 = 2.0 * v320;
-    const V v329 = v322 * v322;
-    const V v330 = 2.0 * v322;
-    const V v331 = v192 * v208;
-    const V v332 = v288 - v331;
-    const V v333 = v332 * v332;
-    const V v334 = v94 * v332;
-    const V v335 = v58 * v263;
-    const V v336 = v285 + v335;
-    const V v337 = v58 * v269;
-    const V v338 = v234 - v337;
-    const V v339 = 2.0 * v336;
-    const V v340 = 2.0 * v338;
-    const V v341 = v336 * v336;
-    const V v342 = v304 + v341;
-    const V v343 = v338 * v338;
-    const V v344 = v306 + v343;
-    const V v345 = v88 * v333;
-    const V v346 = v87 * v333;
-    const V v347 = v271 * v336;
-    const V v348 = v296 - v347;
-    const V v349 = v275 * v338;
-    const V v350 = v294 - v349;
-    const V v351 = v348 * v348;
-    const V v352 = 2.0 * v348;
-    const V v353 = v350 * v350;
-    const V v354 = 2.0 * v350;
-    const V v355 = 1.0 / v345;
-    const V v356 = v323 + v342;
-    const V v357 = v325 + v344;
-    const V v358 = v323 * v342;
-    const V v359 = v157 * v356;
-    const V v360 = v351 + v358;
-    const V v361 = v158 * v357;
-    const V v362 = v323 * v351;
-    const V v363 = v325 * v353;
-    const V v364 = softehl_vrcbrt(v362);
-    const V v365 = v155 * v360;
-    const V v366 = softehl_vrcbrt(v363);
-    const V v367 = v325 * v344;
-    const V v368 = v353 + v367;
-    const V v369 = v156 * v368;
-    const V v370 = v364 * v365;
-    const V v371 = v359 + v370;
-    const V v372 = v366 * v369;
-    const V v373 = v361 + v372;
-    const V v374 = v78 * v176;
-    const V v375 = v143 + v374;
-    const V v376 = v78 * v178;
-    const V v377 = v141 + v376;
-    const V v378 = v74 * v200;
-    const V v379 = v375 + v378;
-    const V v380 = v74 * v196;
-    const V v381 = v377 + v380;
-    const V v382 = 2.0 * v379;
-    const V v383 = 2.0 * v381;
-    const V v384 = v379 * v379;
-    const V v385 = v253 + v384;
-    const V v386 = v245 * v379;
-    const V v387 = v381 * v381;
-    const V v388 = v255 + v387;
-    const V v389 = v241 * v381;
-    const V v390 = 1.0 - v355;
-    const V v391 = v90 * v390;
-    const V v392 = v327 + v385;
-    const V v393 = v329 + v388;
-    const V v394 = v327 * v385;
-    const V v395 = v230 * v233;
-    const V v396 = v386 - v395;
-    const V v397 = v396 * v396;
-    const V v398 = 2.0 * v396;
-    const V v399 = v329 * v388;
-    const V v400 = v202 * v217;
-    const V v401 = v389 - v400;
-    const V v402 = v130 * v392;
-    const V v403 = v131 * v393;
-    const V v404 = v401 * v401;
-    const V v405 = 2.0 * v401;
-    const V v406 = v394 + v397;
-    const V v407 = v327 * v397;
-    const V v408 = v399 + v404;
-    const V v409 = v329 * v404;
-    const V v410 = softehl_vrcbrt(v407);
-    const V v411 = v110 * v406;
-    const V v412 = v410 * v411;
-    const V v413 = v402 + v412;
-    const V v414 = softehl_vrcbrt(v409);
-    const V v415 = v111 * v408;
-    const V v416 = v414 * v415;
-    const V v417 = v403 + v416;
-    const V v418 = v410 * v410;
-    const V v419 = v101 * v410;
-    const V v420 = v414 * v414;
-    const V v421 = v102 * v414;
-    const V v422 = v418 * v418;
-    const V v423 = v413 * v422;
-    const V v424 = v99 * v418;
-    const V v425 = v420 * v420;
-    const V v426 = v417 * v425;
-    const V v427 = v100 * v420;
-    const V v428 = v334 * v391;
-    const V v429 = v346 * v391;
-    const V v430 = v208 * v428;
-    const V v431 = v192 * v428;
-    const V v432 = v273 * v428;
-    const V v433 = v214 * v428;
-    const V v434 = v327 * v423;
-    const V v435 = v424 - v434;
-    const V v436 = v398 * v435;
-    const V v437 = v327 * v424;
-    const V v438 = v385 * v424;
-    const V v439 = v397 * v423;
-    const V v440 = v438 - v439;
-    const V v441 = v364 * v364;
-    const V v442 = v151 * v364;
-    const V v443 = v366 * v366;
-    const V v444 = v152 * v366;
-    const V v445 = v441 * v441;
-    const V v446 = v149 * v441;
-    const V v447 = v104 * v432;
-    const V v448 = v104 * v431;
-    const V v449 = v103 * v432;
-    const V v450 = v443 * v443;
-    const V v451 = v150 * v443;
-    const V v452 = v371 * v445;
-    const V v453 = v373 * v450;
-    const V v454 = v342 * v446;
-    const V v455 = v442 + v454;
-    const V v456 = v323 * v446;
-    const V v457 = v442 + v456;
-    const V v458 = v344 * v451;
-    const V v459 = v444 + v458;
-    const V v460 = v325 * v451;
-    const V v461 = v444 + v460;
-    const V v462 = v323 * v452;
-    const V v463 = v446 - v462;
-    const V v464 = v351 * v452;
-    const V v465 = v455 - v464;
-    const V v466 = v325 * v453;
-    const V v467 = v451 - v466;
-    const V v468 = v353 * v453;
-    const V v469 = v459 - v468;
-    const V v470 = v295 * v457;
-    const V v471 = v301 * v457;
-    const V v472 = v339 * v457;
-    const V v473 = v289 * v457;
-    const V v474 = v293 * v461;
-    const V v475 = v352 * v463;
-    const V v476 = v324 * v465;
-    const V v477 = v354 * v467;
-    const V v478 = v326 * v469;
-    const V v479 = v302 * v461;
-    const V v480 = v340 * v461;
-    const V v481 = v291 * v461;
-    const V v482 = v271 * v475;
-    const V v483 = v472 - v482;
-    const V v484 = v336 * v475;
-    const V v485 = v471 - v484;
-    const V v486 = v287 * v475;
-    const V v487 = v473 + v486;
-    const V v488 = v281 * v475;
-    const V v489 = v470 + v488;
-    const V v490 = v275 * v477;
-    const V v491 = v480 - v490;
-    const V v492 = v338 * v477;
-    const V v493 = v479 - v492;
-    const V v494 = v283 * v477;
-    const V v495 = v474 + v494;
-    const V v496 = v279 * v477;
-    const V v497 = v481 + v496;
-    const V v498 = v165 * v476;
-    const V v499 = v168 * v478;
-    const V v500 = v164 * v476;
-    const V v501 = v429 + v500;
-    const V v502 = v167 * v478;
-    const V v503 = v501 + v502;
-    const V v504 = v263 * v483;
-    const V v505 = v449 + v504;
-    const V v506 = v263 * v489;
-    const V v507 = v122 * v489;
-    const V v508 = v122 * v483;
-    const V v509 = v186 * v483;
-    const V v510 = v186 * v489;
-    const V v511 = v448 + v510;
-    const V v512 = v103 * v431;
-    const V v513 = v506 - v512;
-    const V v514 = v172 * v497;
-    const V v515 = v505 + v514;
-    const V v516 = v172 * v493;
-    const V v517 = v513 + v516;
-    const V v518 = v388 * v427;
-    const V v519 = v421 + v518;
-    const V v520 = v329 * v427;
-    const V v521 = v421 + v520;
-    const V v522 = v267 * v497;
-    const V v523 = v509 + v522;
-    const V v524 = v267 * v493;
-    const V v525 = v511 + v524;
-    const V v526 = v329 * v426;
-    const V v527 = v427 - v526;
-    const V v528 = v404 * v426;
-    const V v529 = v519 - v528;
-    const V v530 = v405 * v527;
-    const V v531 = v330 * v529;
-    const V v532 = v383 * v521;
-    const V v533 = v221 * v521;
-    const V v534 = v215 * v521;
-    const V v535 = v248 * v521;
-    const V v536 = v106 * v433;
-    const V v537 = v517 - v536;
-    const V v538 = v105 * v433;
-    const V v539 = v525 + v538;
-    const V v540 = v106 * v430;
-    const V v541 = v515 + v540;
-    const V v542 = v105 * v430;
-    const V v543 = v523 - v542;
-    const V v544 = v217 * v530;
-    const V v545 = v534 - v544;
-    const V v546 = v202 * v530;
-    const V v547 = v533 - v546;
-    const V v548 = v381 * v530;
-    const V v549 = v535 + v548;
-    const V v550 = v241 * v530;
-    const V v551 = v532 + v550;
-    const V v552 = v379 * v436;
-    const V v553 = v245 * v436;
-    const V v554 = v98 * v531;
-    const V v555 = v498 - v554;
-    const V v556 = v97 * v531;
-    const V v557 = v503 + v556;
-    const V v558 = v419 + v437;
-    const V v559 = v419 + v440;
-    const V v560 = v328 * v559;
-    const V v561 = v382 * v558;
-    const V v562 = v553 + v561;
-    const V v563 = v251 * v558;
-    const V v564 = v552 + v563;
-    const V v565 = v539 + v555;
-    const V v566 = v537 + v555;
-    const V v567 = v235 * v558;
-    const V v568 = v239 * v558;
-    const V v569 = v196 * v545;
-    const V v570 = v541 + v569;
-    const V v571 = v196 * v551;
-    const V v572 = v566 + v571;
-    const V v573 = v230 * v436;
-    const V v574 = v568 - v573;
-    const V v575 = v233 * v436;
-    const V v576 = v567 - v575;
-    const V v577 = v95 * v560;
-    const V v578 = v557 + v577;
-    const V v579 = v96 * v560;
-    const V v580 = v499 - v579;
-    const V v581 = v497 - v564;
-    const V v582 = v200 * v562;
-    const V v583 = v572 + v582;
-    const V v584 = v200 * v574;
-    const V v585 = v570 + v584;
-    const V v586 = v176 * v562;
-    const V v587 = v565 + v586;
-    const V v588 = v176 * v574;
-    const V v589 = v543 + v588;
-    const V v590 = v493 - v576;
-    const V v591 = v562 - v495;
-    const V v592 = v583 - v580;
-    const V v593 = v580 + v587;
-    const V v594 = v574 - v491;
-    const V v595 = v269 * v491;
-    const V v596 = v585 - v595;
-    const V v597 = v187 * v491;
-    const V v598 = v589 + v597;
-    const V v599 = v269 * v495;
-    const V v600 = v592 - v599;
-    const V v601 = v187 * v495;
-    const V v602 = v593 + v601;
-    const V v603 = v123 * v591;
-    const V v604 = v507 + v603;
-    const V v605 = v123 * v594;
-    const V v606 = v508 + v605;
-    const V v607 = v170 * v564;
-    const V v608 = v596 + v607;
-    const V v609 = v170 * v576;
-    const V v610 = v600 + v609;
-    const V v611 = v204 * v564;
-    const V v612 = v598 + v611;
-    const V v613 = v204 * v576;
-    const V v614 = v602 + v613;
-    const V v615 = v118 * v590;
-    const V v616 = v604 + v615;
-    const V v617 = v118 * v581;
-    const V v618 = v606 + v617;
-    const V v619 = v169 * v487;
-    const V v620 = v608 + v619;
-    const V v621 = v169 * v485;
-    const V v622 = v610 + v621;
-    const V v623 = v265 * v487;
-    const V v624 = v612 + v623;
-    const V v625 = v265 * v485;
-    const V v626 = v614 + v625;
-    const V v627 = v117 * v485;
-    const V v628 = v616 + v627;
-    const V v629 = v117 * v487;
-    const V v630 = v618 + v629;
-    const V v631 = v174 * v549;
-    const V v632 = v620 + v631;
-    const V v633 = v174 * v547;
-    const V v634 = v622 + v633;
-    const V v635 = v203 * v549;
-    const V v636 = v624 + v635;
-    const V v637 = v203 * v547;
-    const V v638 = v626 + v637;
-    const V v639 = v119 * v547;
-    const V v640 = v628 + v639;
-    const V v641 = v119 * v549;
-    const V v642 = v630 + v641;
-    const V v643 = v178 * v545;
-    const V v644 = v636 + v643;
-    const V v645 = v178 * v551;
-    const V v646 = v638 + v645;
-    const V v647 = v127 * v551;
-    const V v648 = v640 + v647;
-    const V v649 = v127 * v545;
-    const V v650 = v642 + v649;
-    const V v651 = v578 - v646;
-    const V v652 = v578 + v646;
-    const V v653 = v634 + v648;
-    const V v654 = v632 + v650;
-    const V v655 = v447 - v644;
-    const V v656 = v648 - v634;
-    const V v657 = v644 - v447;
-    const V v658 = v650 - v632;
-    const V v659 = v655 - v658;
-    const V v660 = v651 - v656;
-    const V v661 = v651 + v656;
-    const V v662 = v652 + v653;
-    const V v663 = v652 - v653;
-    const V v664 = v657 - v654;
-    const V v665 = v654 + v657;
-    softehl_store4(R + 0, 8, v665, v662, v659, v660);
-    const V v666 = v658 - v657;
-    softehl_store4(R + 4, 8, v666, v661, v664, v663);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1];
+    const V v3 = X0 - X2, v4 = X4 - X6, v5 = X6 + (X4 - X0 - X2), v6 = X1 - X3, v7 = X1 + X3,
+        v8 = 0.10566243270259355 * X3 + 0.39433756729740643 * X1,
+        v9 = 0.39433756729740643 * X3 + 0.10566243270259355 * X1, v10 = v3 + v4, v11 = 0.25 * v5,
+        v12 = v4 - v3, v13 = 0.25 * v10, v14 = 0.25 * v12, v15 = X5 - X7, v16 = X5 + X7,
+        v17 = 0.10566243270259355 * X5 + 0.39433756729740643 * X7,
+        v18 = 0.39433756729740643 * X5 + 0.10566243270259355 * X7, v19 = v6 + v15,
+        v20 = 0.4226497308103742 * v9 + 1.5773502691896257 * v18, v21 = d0 - d2,
+        v22 = 1.5773502691896257 * v9 + 0.4226497308103742 * v18, v23 = v15 - v6, v24 = v16 - v7,
+        v25 = 0.25 * (v7 + v16), v26 = 0.25 * v19, v27 = 1.0 / v22, v28 = 1.0 / v20,
+        v29 = 0.25 * v23, v30 = 0.25 * v24, v31 = 1.0 / v25, v32 = d0 + d2 - d4 - d6, v33 = d4 - d6,
+        v34 = d1 + d3, v35 = d1 - d3, v36 = d5 + d7, v37 = d5 - d7, v38 = v14 * v30 - v29 * v11,
+        v39 = v34 + v36, v40 = v34 - v36, v41 = 0.25 * v31, v42 = v35 + v37, v43 = v35 - v37,
+        v44 = 1.0 / v38, v45 = 6.283185307179586 * v38,
+        v46 = v25 * (v38 * (6.283185307179586 * parameters[2])), v47 = v22 * v45, v48 = v20 * v45,
+        v49 = 0.25 * v27, v50 = 0.14433756729740643 * v27, v51 = 0.25 * v28,
+        v52 = 0.14433756729740643 * v28, v53 = v2 * v47, v54 = v2 * v48, v55 = v1 * v47,
+        v56 = v1 * v48, v57 = 0.0625 * v23 * v44, v58 = 0.0625 * v24 * v44,
+        v59 = v44 * (0.0625 * v5), v60 = 0.0625 * v12 * v44,
+        v61 = v44 * (0.03608439182435161 * v19), v62 = v44 * (0.03608439182435161 * v10),
+        v63 = 0.5773502691896257 * v44, v64 = v49 * v39 + (1.0 + v50 * (v40 - v43)),
+        v65 = (v13 * v30 - v26 * v11) * v63, v66 = (v14 * v26 - v29 * v13) * v63, v67 = v57 - v58,
+        v68 = v57 + v58, v69 = v59 - v60, v70 = v59 + v60, v71 = 0.5773502691896257 * (v58 - v57),
+        v72 = v64 * v64, v73 = 2.0 * v64, v74 = 0.5773502691896257 * v67,
+        v75 = 1.1547005383792515 * v67, v76 = 0.5773502691896257 * (v60 - v59),
+        v77 = 0.5773502691896257 * v68, v78 = 1.1547005383792515 * v68,
+        v79 = 0.5773502691896257 * v69, v80 = 1.1547005383792515 * v69,
+        v81 = 0.5773502691896257 * v70, v82 = 1.1547005383792515 * v70, v83 = v42 * v74,
+        v84 = v42 * v77, v85 = v42 * v79, v86 = v42 * v81,
+        v87 = 1.5773502691896257 * v8 + 0.4226497308103742 * v17,
+        v88 = 0.4226497308103742 * v8 + 1.5773502691896257 * v17, v89 = 1.0 / v87, v90 = v87 * v45,
+        v91 = v88 * v45, v92 = 1.0 / v88, v93 = v21 + v33, v94 = v21 - v33, v95 = 1.0 + v65,
+        v96 = 1.0 - v65, v97 = v66 - v95, v98 = v66 + v95, v99 = v66 - v96, v100 = v66 + v96,
+        v101 = v93 * v74, v102 = v93 * v77, v103 = v93 * v79, v104 = v93 * v81, v105 = v96 - v66,
+        v106 = v95 - v66, v107 = v61 + v57 * v100, v108 = v62 + v59 * v106, v109 = v59 * v98 - v62,
+        v110 = v59 * v100 - v62, v111 = v61 + v57 * v105, v112 = v62 + v59 * v105,
+        v113 = v57 * v98 - v61, v114 = v57 * v106 - v61, v115 = 2.0 * v109, v116 = 2.0 * v110,
+        v117 = 2.0 * v108, v118 = 2.0 * v112, v119 = 0.25 * v89, v120 = 0.14433756729740643 * v89,
+        v121 = 0.25 * v92, v122 = 0.14433756729740643 * v92,
+        v123 = v119 * v39 + (1.0 + v120 * (v40 + v43)),
+        v124 = v121 * v39 + (1.0 + v122 * (v43 - v40)), v125 = v123 * v123, v126 = 2.0 * v123,
+        v127 = v124 * v124, v128 = 2.0 * v124, v129 = v40 * v57 - v43 * v58, v130 = v62 + v60 * v97,
+        v131 = v60 * v99 - v62, v132 = v58 * v97 - v61, v133 = v58 * v99 - v61,
+        v134 = v40 * v114 - v84 + v43 * v132, v135 = 2.0 * v132, v136 = 2.0 * v133,
+        v137 = v40 * v111 - v83 + v43 * v133, v138 = 2.0 * v134, v139 = 2.0 * v137,
+        v140 = v94 * v112 - v103 + v32 * v131, v141 = 2.0 * v140, v142 = v79 * v113,
+        v143 = v2 * v90, v144 = v2 * v91, v145 = v1 * v90, v146 = v1 * v91,
+        v147 = 1.0 + v43 * v59 - v40 * v60, v148 = v94 * v59 - v32 * v60,
+        v149 = v94 * v133 + (v32 * v111 + (1.0 - v101)),
+        v150 = v94 * v132 + (v32 * v114 + (1.0 - v102)), v151 = 2.0 * v149, v152 = 2.0 * v150,
+        v153 = v94 * v108 + (v32 * v130 + v104), v154 = 2.0 * v153,
+        v155 = 1.0 - v94 * v58 + v32 * v57, v156 = v108 * v150 - v132 * v153,
+        v157 = v130 * v150 - v114 * v153, v158 = v60 * v129 + v57 * v147,
+        v159 = v114 * v152 + v130 * v154, v160 = v132 * v152 + v108 * v154,
+        v161 = v81 * v154 - v77 * v152, v162 = v76 * v141 + v71 * v151,
+        v163 = v155 * v147 - v148 * v129, v164 = v163 * v163, v165 = 2.0 * v163,
+        v166 = v131 * v141 + v111 * v151, v167 = v112 * v141 + v133 * v151,
+        v168 = v131 * v149 - v111 * v140, v169 = v112 * v149 - v140 * v133,
+        v170 = v43 * v112 + (1.0 - v85 + v40 * v131), v171 = 2.0 * v170,
+        v172 = v140 * v140 + v137 * v137 + v149 * v149 + v170 * v170,
+        v173 = v51 * v39 + (1.0 + v52 * (v36 - v34 - v43)), v174 = 1.0 + v41 * v39,
+        v175 = v173 * v173, v176 = 2.0 * v173, v177 = v174 * v174, v178 = 2.0 * v174,
+        v179 = v149 * v170 - v140 * v137, v180 = v133 * v170 - v112 * v137,
+        v181 = v133 * v139 + v112 * v171, v182 = v111 * v170 - v131 * v137,
+        v183 = v111 * v139 + v131 * v171, v184 = v71 * v139 + v76 * v171, v185 = v179 * v179,
+        v186 = 2.0 * v179, v187 = v41 * v178, v188 = v175 * v186, v189 = 1.0 / (v177 * v164),
+        v190 = v56 * (v175 + v172), v191 = softehl_vrcbrt(v175 * v185),
+        v192 = v54 * (v185 + v175 * v172), v193 = v176 * v185, v194 = v61 - v58 * v98,
+        v195 = v62 - v60 * v98, v196 = v61 - v58 * v100, v197 = v62 + v60 * v100, v198 = 2.0 * v194,
+        v199 = 2.0 * v196, v200 = v74 * v195, v201 = v142 - v200, v202 = v189 * v189,
+        v203 = v187 * (v46 * v164) * v202, v204 = 1.0 + v102 + v32 * v107 + v94 * v196,
+        v205 = 1.0 + v101 + v32 * v113 + v94 * v194, v206 = 2.0 * v204, v207 = 2.0 * v205,
+        v208 = v79 * v205, v209 = v46 * (1.0 - v189), v210 = v94 * v110 - v104 - v32 * v197,
+        v211 = v103 + v94 * v109 + v32 * v195, v212 = 2.0 * v210, v213 = 2.0 * v211,
+        v214 = v197 * v204 + v107 * v210, v215 = v164 * v209, v216 = v177 * v209, v217 = v74 * v211,
+        v218 = v81 * v204 + v77 * v210, v219 = v110 * v204 - v196 * v210, v220 = v191 * v191,
+        v221 = v208 - v217, v222 = v220 * v220, v223 = v191 * v220, v224 = v56 * v191,
+        v225 = v54 * v220, v226 = v217 - v208, v227 = 0.6666666666666666 * v191 * v222,
+        v228 = 0.3333333333333333 * v222, v229 = v56 * v228, v230 = v224 + v175 * v225,
+        v231 = v190 * v228 + v192 * v227,
+        v232 = v223 * (v223 * (v190 * (0.4444444444444444 * v191))) + v192 * (v222 * (1.1111111111111112 * v222)),
+        v233 = v229 + v54 * v175 * v227, v234 = v188 * (v54 * v227),
+        v235 = v229 + v54 * v172 * v227, v236 = v225 - v175 * v231,
+        v237 = v54 * v186 * v227 - v188 * v232, v238 = v188 * v233,
+        v239 = v224 + v172 * v225 - v185 * v231, v240 = v186 * v236,
+        v241 = 2.0 * v236 - v186 * (v234 + v175 * v237), v242 = v176 * (v225 - v185 * v233),
+        v243 = v176 * v239, v244 = v176 * (v188 * v229 + v172 * v234 + v186 * v231 + v185 * v237),
+        v245 = 2.0 * v239 - v176 * (v193 * v235 + v185 * (v176 * v235 - v193 * v232)),
+        v246 = v182 * v238, v247 = v180 * v238, v248 = v226 * v238,
+        v249 = v182 * v241 - v166 * v238, v250 = v180 * v241 - v167 * v238,
+        v251 = v226 * v241 - v184 * v238, v252 = v52 * v245, v253 = v52 * v242, v254 = v52 * v244,
+        v255 = v168 * v238 + v253, v256 = v166 * v242 - v182 * v244,
+        v257 = v167 * v242 - v180 * v244, v258 = v183 * v242 - v252 - v168 * v244,
+        v259 = v181 * v242 - v252 - v169 * v244, v260 = v184 * v242 - v226 * v244,
+        v261 = v165 * v216, v262 = v46 * (v165 * (v177 * v177 * v165)) * v202 + 2.0 * v216,
+        v263 = v165 * (v177 * v203 + v187 * v209), v264 = v129 * v261, v265 = v148 * v261,
+        v266 = v147 * v261, v267 = v155 * v261, v268 = v57 * v148 + v60 * v155, v269 = v147 * v263,
+        v270 = v155 * v263, v271 = v262 * v268, v272 = v262 * (v58 * v148 + v59 * v155),
+        v273 = v129 * v263, v274 = v148 * v263, v275 = v148 * v272, v276 = v155 * v272,
+        v277 = v57 * v261 - v129 * v271, v278 = v60 * v261 + v147 * v271,
+        v279 = v59 * v261 + v147 * v272, v280 = v60 * v270 + v57 * v274,
+        v281 = v129 * v272 - v58 * v261, v282 = v59 * v273 + v58 * v269,
+        v283 = v58 * v279 + v59 * v281, v284 = v60 * v276 + v57 * v275,
+        v285 = v169 * (v254 - v181 * v238 + v169 * v241) + v59 * v276 + v58 * v275,
+        v286 = v262 * (v59 * v129 + v58 * v147), v287 = v147 * v286, v288 = v129 * v286,
+        v289 = v59 * v264 + v58 * v266, v290 = v83 + v40 * v113 + v43 * v194,
+        v291 = v84 + v40 * v107 + v43 * v196, v292 = v194 * v207 + v109 * v213,
+        v293 = v113 * v207 + v195 * v213, v294 = v74 * v207 + v79 * v213, v295 = 2.0 * v290,
+        v296 = v79 * v290, v297 = 2.0 * v291, v298 = v40 * v195 + (1.0 + v85 + v43 * v109),
+        v299 = 1.0 - v86 + v43 * v110 - v40 * v197, v300 = 1.0 + v86 + v43 * v108 + v40 * v130,
+        v301 = 2.0 * v298, v302 = 2.0 * v299, v303 = 2.0 * v300, v304 = v197 * v291 + v107 * v299,
+        v305 = v300 * v300 + (v134 * v134 + v150 * v150 + v153 * v153), v306 = v74 * v298,
+        v307 = v300 * v150 - v134 * v153, v308 = v79 * v301 + v74 * v295,
+        v309 = v114 * v300 - v130 * v134, v310 = v132 * v300 - v108 * v134,
+        v311 = v132 * v138 + v108 * v303, v312 = v114 * v138 + v130 * v303, v313 = v307 * v307,
+        v314 = 2.0 * v307, v315 = v296 - v306, v316 = v306 - v296, v317 = v81 * v303 - v77 * v138,
+        v318 = v55 * (v72 + v305), v319 = v72 * v314, v320 = softehl_vrcbrt(v72 * v313),
+        v321 = v53 * (v313 + v72 * v305), v322 = v73 * v313, v323 = v238 * v315,
+        v324 = v241 * v315 - v162 * v238, v325 = v254 + v168 * v241 - v183 * v238,
+        v326 = v162 * v242 - v244 * v315, v327 = v195 * v205 - v113 * v211,
+        v328 = v109 * v205 - v194 * v211, v329 = v205 * v298 - v290 * v211,
+        v330 = v194 * v298 - v109 * v290, v331 = v194 * v295 + v109 * v301,
+        v332 = v113 * v295 + v195 * v301, v333 = v113 * v298 - v195 * v290,
+        v334 = v290 * v290 + (v211 * v211 + (v205 * v205 + v298 * v298)), v335 = v329 * v329,
+        v336 = 2.0 * v329, v337 = v57 * v287 + v60 * v288, v338 = v320 * v320, v339 = v338 * v338,
+        v340 = v320 * v338, v341 = v55 * v320, v342 = v53 * v338, v343 = v145 * (v125 + v334),
+        v344 = 0.6666666666666666 * v320 * v339, v345 = softehl_vrcbrt(v125 * v335),
+        v346 = 0.3333333333333333 * v339, v347 = v143 * (v335 + v125 * v334), v348 = v55 * v346,
+        v349 = v318 * v346 + v321 * v344,
+        v350 = v340 * (v340 * (v318 * (0.4444444444444444 * v320))) + v321 * (v339 * (1.1111111111111112 * v339)),
+        v351 = v319 * (v53 * v344), v352 = v348 + v53 * v72 * v344, v353 = v348 + v53 * v305 * v344,
+        v354 = v125 * v336, v355 = v53 * v314 * v344 - v319 * v350, v356 = v319 * v352,
+        v357 = v341 + v72 * v342, v358 = v342 - v72 * v349, v359 = v341 + v305 * v342 - v313 * v349,
+        v360 = v314 * v358, v361 = 2.0 * v358 - v314 * (v351 + v72 * v355),
+        v362 = v73 * (v342 - v313 * v352), v363 = v73 * v359,
+        v364 = v73 * (v319 * v348 + v305 * v351 + v313 * v355 + v314 * v349),
+        v365 = (v130 * v82 - v114 * v78) * v357 - (v131 * v80 + v111 * v75) * v230,
+        v366 = v309 * v356, v367 = v310 * v356, v368 = v218 * v356,
+        v369 = v309 * v361 - v159 * v356, v370 = v310 * v361 - v160 * v356,
+        v371 = v218 * v361 - v317 * v356, v372 = v345 * v345, v373 = v372 * v372,
+        v374 = v345 * v372, v375 = v145 * v345, v376 = v143 * v372,
+        v377 = 0.6666666666666666 * v345 * v373, v378 = 0.3333333333333333 * v373,
+        v379 = v145 * v378, v380 = v375 + v125 * v376, v381 = v343 * v378 + v347 * v377,
+        v382 = v374 * (v374 * (v343 * (0.4444444444444444 * v345))) + v347 * (v373 * (1.1111111111111112 * v373)),
+        v383 = v354 * (v143 * v377), v384 = v379 + v143 * v125 * v377,
+        v385 = v379 + v143 * v334 * v377, v386 = v376 - v125 * v381,
+        v387 = v375 + v334 * v376 - v335 * v381, v388 = v143 * v336 * v377 - v354 * v382,
+        v389 = v354 * v384, v390 = v336 * v386, v391 = v126 * v387,
+        v392 = v126 * (v376 - v335 * v384), v393 = 2.0 * v386 - v336 * (v383 + v125 * v388),
+        v394 = v126 * v335, v395 = v126 * (v354 * v379 + v334 * v383 + v336 * v381 + v335 * v388),
+        v396 = v333 * v389, v397 = v316 * v389, v398 = v330 * v389, v399 = v221 * v389,
+        v400 = 2.0 * v359 - v73 * (v322 * v353 + v313 * (v73 * v353 - v322 * v350)),
+        v401 = v333 * v393 - v293 * v389, v402 = v316 * v393 - v294 * v389,
+        v403 = v330 * v393 - v292 * v389, v404 = v221 * v393 - v308 * v389, v405 = v50 * v400,
+        v406 = v51 * v51 * v245 + v41 * (v178 * v164 * v203 + 0.5 * v31 * v215) + v49 * v49 * v400,
+        v407 = v50 * v362,
+        v408 = 2.0 * v387 - v126 * (v385 * v394 + v335 * (v126 * v385 - v382 * v394)),
+        v409 = v50 * v364, v410 = v157 * v356 - v407, v411 = v120 * v408,
+        v412 = v159 * v362 - v309 * v364, v413 = v120 * v392, v414 = v120 * v395,
+        v415 = v157 * v361 - v409 - v312 * v356, v416 = v327 * v389 - v413,
+        v417 = v285 - v181 * (v169 * v238 + v253) - v52 * v259 + v328 * (v328 * v393 - v331 * v389 - v414),
+        v418 = v327 * v393 - v414 - v332 * v389, v419 = v411 - v327 * v395 + v332 * v392,
+        v420 = v411 - v328 * v395 + v331 * v392, v421 = v160 * v362 - v310 * v364,
+        v422 = v293 * v392 - v333 * v395, v423 = v292 * v392 - v330 * v395,
+        v424 = v308 * v392 - v221 * v395, v425 = v120 * v391 - v52 * v243,
+        v426 = v120 * v419 - v52 * v258, v427 = v294 * v392 - v316 * v395,
+        v428 = v120 * v422 - v52 * v256, v429 = v120 * v423 - v52 * v257,
+        v430 = v120 * v427 - v52 * v326,
+        v431 = v181 * v230 + v169 * v240 + v58 * v265 + v59 * v267 + v425 + v331 * v380,
+        v432 = v183 * v230 + v168 * v240 - v57 * v265 - v60 * v267 + v425 + v332 * v380,
+        v433 = v169 * v251 - v181 * v248 - v52 * v260 + v120 * v424 - v331 * v399,
+        v434 = (v131 * v118 + v111 * v136) * v230 + (v195 * v115 + v113 * v198) * v380,
+        v435 = v169 * v249 + v57 * v279 + v60 * v281 - v181 * v246 + v428 - v331 * v396,
+        v436 = v168 * v249 - v183 * v246 - v57 * v278 + v428 + v60 * v277 - v332 * v396,
+        v437 = (v76 * v118 + v71 * v136) * v230 + (v79 * v115 + v74 * v198) * v380,
+        v438 = v168 * v250 - v183 * v247 + v58 * v278 - v59 * v277 - v332 * v398,
+        v439 = (v112 * v118 + v133 * v136) * v230 + (v108 * v117 + v132 * v135) * v357,
+        v440 = (v111 * v111 + v131 * v131) * v230 + (v113 * v113 + v195 * v195) * v380,
+        v441 = v81 * v291 + v77 * v299, v442 = v196 * v299 - v110 * v291,
+        v443 = v196 * v297 + v110 * v302, v444 = v107 * v297 - v197 * v302,
+        v445 = v77 * v297 - v81 * v302, v446 = v299 * v204 - v291 * v210,
+        v447 = v204 * v204 + v299 * v299 + v291 * v291 + v210 * v210,
+        v448 = v196 * v206 + v110 * v212, v449 = v77 * v206 - v81 * v212,
+        v450 = v107 * v206 - v197 * v212, v451 = v446 * v446, v452 = 2.0 * v446, v453 = v356 * v441,
+        v454 = v127 * v452, v455 = v146 * (v127 + v447), v456 = softehl_vrcbrt(v127 * v451),
+        v457 = v144 * (v451 + v127 * v447), v458 = v128 * v451,
+        v459 = v417 - v331 * (v328 * v389 - v413) + v120 * v420 - v311 * (v407 + v156 * v356),
+        v460 = v311 * v362 - v405 - v156 * v364, v461 = v161 * v362 + v364 * v441,
+        v462 = v405 + v312 * v362 - v157 * v364, v463 = v317 * v362 - v218 * v364,
+        v464 = v161 * v356 + v361 * v441,
+        v465 = v268 * v271 + v168 * v325 - v183 * v255 + v157 * v415 - v312 * v410,
+        v466 = (v111 * v112 - v131 * v133) * v240 + (v114 * v108 - v130 * v132) * v360,
+        v467 = v182 * v240 + v166 * v230 + v60 * v264 + v57 * v266 + v159 * v357,
+        v468 = v180 * v250 - v167 * v247 + v58 * v287 + v59 * v288 - v160 * v367,
+        v469 = v182 * v249 - v166 * v246 + v158 * v158 * v262 - v159 * v366 + v333 * v401,
+        v470 = v226 * v240 + v184 * v230 + v317 * v357 + v308 * v380 + v221 * v390,
+        v471 = v226 * v251 - v184 * v248 - v317 * v368 - v308 * v399 + v221 * v404,
+        v472 = v430 + (v169 * v324 - v181 * v323 + v311 * v453 - v156 * v464) + v328 * v402,
+        v473 = v426 + (v169 * v325 - v181 * v255 - v311 * v410 + v156 * v415) + v328 * v418,
+        v474 = v430 + (v168 * v324 - v183 * v323 - v157 * v464 + v312 * v453) + v327 * v402,
+        v475 = v169 * v250 - v181 * v247 - v311 * v367 + v328 * v403 + v156 * v370,
+        v476 = v456 * v456, v477 = v146 * v456, v478 = v456 * v476, v479 = v476 * v476,
+        v480 = v144 * v476, v481 = v479 * (0.6666666666666666 * v456),
+        v482 = 0.3333333333333333 * v479, v483 = v477 + v127 * v480, v484 = v146 * v482,
+        v485 = v484 + v144 * v127 * v481, v486 = v455 * v482 + v457 * v481,
+        v487 = v478 * (v478 * (v455 * (0.4444444444444444 * v456))) + v457 * (v479 * (1.1111111111111112 * v479)),
+        v488 = v484 + v144 * v447 * v481, v489 = v454 * (v144 * v481), v490 = v480 - v127 * v486,
+        v491 = (v74 * v75 + v79 * v80) * (v230 + v380) + (v77 * v78 + v81 * v82) * (v483 + v357),
+        v492 = v144 * v452 * v481 - v454 * v487, v493 = v454 * v485,
+        v494 = v477 + v447 * v480 - v451 * v486, v495 = v452 * v490,
+        v496 = 2.0 * v490 - v452 * (v489 + v127 * v492), v497 = v128 * (v480 - v451 * v485),
+        v498 = v128 * v494, v499 = v128 * (v454 * v484 + v447 * v489 + v452 * v486 + v451 * v492),
+        v500 = 2.0 * v494 - v128 * (v458 * v488 + v451 * (v128 * v488 - v458 * v487)),
+        v501 = v365 + (v113 * v75 + v195 * v80) * v380 + v483 * (v107 * v78 + v197 * v82),
+        v502 = v434 + (v130 * v117 + v114 * v135) * v357 + v483 * (v107 * v199 - v197 * v116),
+        v503 = v304 * v493, v504 = v495 - v360,
+        v505 = v437 + (v81 * v117 - v77 * v135) * v357 + v483 * (v77 * v199 - v81 * v116),
+        v506 = v449 * v493, v507 = v441 * v493, v508 = v441 * v496,
+        v509 = v439 + (v109 * v115 + v194 * v198) * v380 + v483 * (v110 * v116 + v196 * v199),
+        v510 = v442 * v493, v511 = v304 * v496 - v450 * v493, v512 = v218 * v493,
+        v513 = v508 - v506, v514 = v442 * v496 - v448 * v493, v515 = v218 * v496 + v445 * v493,
+        v516 = v122 * v497, v517 = v122 * v499, v518 = v122 * v500,
+        v519 = v406 + v119 * v119 * v408 + v121 * v121 * v500,
+        v520 = v518 + (v443 * v497 - v219 * v499),
+        v521 = v433 + v156 * v371 - v311 * v368 + v328 * v404 - v219 * v515 + v443 * v512,
+        v522 = v459 + v156 * (v409 - v311 * v356 + v156 * v361) - v443 * (v219 * v493 - v516),
+        v523 = v516 - v214 * v493, v524 = v517 - v214 * v496 - v444 * v493,
+        v525 = v180 * v324 - v167 * v323 + v160 * v453 + v330 * v402 + v505 - v448 * v507,
+        v526 = v226 * v324 - v184 * v323 + v317 * v453 + v221 * v402 - v445 * v507,
+        v527 = v449 * v497 - v441 * v499, v528 = v448 * v497 - v442 * v499,
+        v529 = v445 * v497 + v218 * v499,
+        v530 = v315 * v324 - v162 * v323 + v161 * v453 - v449 * v507 + v441 * (v464 + v513),
+        v531 = v509 + (v522 + v122 * v520 + v219 * (v219 * v496 - v443 * v493 - v517)),
+        v532 = v491 + (v471 + v445 * v512 + v218 * (v371 + v515)),
+        v533 = v526 + v218 * (v506 - v508 - v464) - v308 * v397,
+        v534 = v491 + (v530 + v316 * v402) - v294 * v397, v535 = v122 * v528 - v50 * v421,
+        v536 = v470 + v218 * (v360 - v495) + v483 * v445,
+        v537 = v440 + (v114 * v114 + v130 * v130) * v357 + v483 * (v107 * v107 + v197 * v197),
+        v538 = v51 * v257 + v119 * v423 + v49 * v421 + v121 * v528, v539 = 2.0 * v537,
+        v540 = v282 - v538, v541 = v51 * v326 + v119 * v427 + v121 * v527 + v49 * v461,
+        v542 = v122 * v527 - v50 * v461, v543 = v538 - v282, v544 = v122 * v498 - v50 * v363,
+        v545 = v51 * v243 + v187 * v215 + v119 * v391 + v121 * v498 + v49 * v363,
+        v546 = v429 + (v438 + v157 * v370 - v312 * v367 + v327 * v403) - v535 - v444 * v510,
+        v547 = v466 + (v113 * v109 - v195 * v194) * v390 + (v107 * v110 + v196 * v197) * v495,
+        v548 = v431 + v156 * v360 + v311 * v357 + v328 * v390 + v544 + v483 * v443,
+        v549 = v432 + v312 * v357 + v157 * v360 + v327 * v390 - v544 + v483 * v444,
+        v550 = v226 * v250 - v184 * v247 - v317 * v367 + v221 * v403 - v308 * v398,
+        v551 = v226 * v325 - v184 * v255 - v317 * v410 + v221 * v418 - v308 * v416,
+        v552 = v226 * v249 - v184 * v246 - v317 * v366 + v221 * v401 - v308 * v396,
+        v553 = v180 * v249 - v167 * v246 - v160 * v366 + v330 * v401 - v292 * v396,
+        v554 = v180 * v240 + v167 * v230 + v160 * v357 + v330 * v390 + v292 * v380,
+        v555 = v501 + (v551 + v218 * (v415 - v524) - v445 * v523),
+        v556 = v468 + v330 * v403 + v509 + v310 * v370 - v292 * v398 - v448 * v510,
+        v557 = v555 - v532,
+        v558 = v547 + (v435 + v156 * v369 - v311 * v366 + v328 * v401 - v443 * v503),
+        v559 = v249 * v315 - v162 * v246 - v161 * v366 + v501 - v449 * v503 + v316 * v401,
+        v560 = v162 * v230 + v240 * v315 + v161 * v357 + v483 * v449 + v316 * v390,
+        v561 = (v200 - v142) * v240 + v201 * v390, v562 = v201 * v504, v563 = v532 + v555,
+        v564 = v561 + v562, v565 = v562 - v561, v566 = v560 + v441 * v504 + v294 * v380,
+        v567 = v559 + v441 * (v511 - v369) - v294 * v396,
+        v568 = v502 + (v553 + v310 * v369 - v448 * v503) + v442 * v511,
+        v569 = v550 + v218 * (v370 - v514) - v445 * v510 - v564,
+        v570 = v469 + v539 - v450 * v503 + v309 * v369 - v293 * v396 + v304 * v511,
+        v571 = v467 + v333 * v390 + v483 * v450 + v309 * v360 + v293 * v380 + v304 * v495,
+        v572 = v337 - v568, v573 = v567 + v570, v574 = v566 + v571, v575 = v566 - v571,
+        v576 = v568 - v337, v577 = v570 - v567, v578 = v576 - v573, v579 = v572 + v577,
+        v580 = v572 - v577, v581 = v534 + v567, v582 = v534 - v567,
+        v583 = v450 * v497 - v304 * v499, v584 = v444 * v497 - v518 + v214 * v499,
+        v585 = v436 + v157 * v369 - v312 * v366 + v327 * v401 - v444 * v503 - v214 * v511,
+        v586 = v549 - v214 * v495, v587 = v554 + v310 * v360 + v483 * v448 + v442 * v495,
+        v588 = v548 + v219 * v495, v589 = v122 * v583 - v50 * v412,
+        v590 = v51 * v256 + v60 * v273 + v57 * v269 + v119 * v422 + v121 * v583 + v49 * v412,
+        v591 = v122 * v584 - v50 * v462, v592 = v51 * v258 + v119 * v419 + v121 * v584 + v49 * v462,
+        v593 = v505 + v521 + v122 * v529 - v50 * v463,
+        v594 = v51 * v260 + v119 * v424 + v121 * v529 + v49 * v463, v595 = v585 - v589,
+        v596 = v289 - v587, v597 = v558 + v219 * v511 + v589, v598 = v587 - v289,
+        v599 = v590 - v597, v600 = v590 + v597, v601 = v594 - v593, v602 = v593 + v594,
+        v603 = v601 - v557, v604 = v543 - v541 - v590, v605 = v592 - v280, v606 = v602 - v563,
+        v607 = v594 - v605, v608 = v545 - v588, v609 = v545 + v588, v610 = v536 - v586,
+        v611 = v536 + v586;
+    softehl_store4(R + 0, 8, v574 + v598, v609 + v611, v596 - v575, v608 - v610);
+    softehl_store4(R + 4, 8, v575 + v596, v608 + v610, v598 - v574, v609 - v611);
+    const V v612 = v531 - v50 * v460,
+        v613 = v59 * v270 + v58 * v274 + v51 * v259 + v119 * v420 + v121 * v520 + v49 * v460,
+        v614 = v552 + v218 * (v369 - v511) - v445 * v503 - v565, v615 = v593 - v612,
+        v616 = v280 + v519 - v594 - v592 + v613, v617 = v519 - v613, v618 = v595 + v614,
+        v619 = v595 - v614, v620 = v607 + v617, v621 = v600 - v618, v622 = v599 + v619,
+        v623 = v599 - v619, v624 = v569 - v614 - v533,
+        v625 = v539 + (v426 + v465 + v327 * v418 - v332 * v416 - v444 * v523) - v591,
+        v626 = v502 + (v473 - v331 * v416 - v443 * v523) + v591 + v219 * v524,
+        v627 = v625 - v214 * v524,
+        v628 = v474 - v542 - v444 * v507 - v332 * v397 + v565 - v214 * v513,
+        v629 = v472 + v542 - v443 * v507 - v331 * v397 + v564 + v219 * v513,
+        v630 = v525 - v292 * v397 - v310 * v464 + v442 * v513, v631 = v556 + v442 * v514,
+        v632 = v546 - v547 - v214 * v514,
+        v633 = v429 + v475 + v535 - v443 * v510 - v331 * v398 + v219 * v514, v634 = v284 - v626,
+        v635 = v533 + v628, v636 = v626 - v284, v637 = v628 - v533, v638 = v283 - v633,
+        v639 = v628 - v632, v640 = v633 - v283, v641 = v630 + v631, v642 = v630 - v576,
+        v643 = v543 + v638, v644 = v630 - v581, v645 = v631 - v642, v646 = v632 - v569,
+        v647 = v638 - v569, v648 = v543 + v640, v649 = v580 - v582 + v630, v650 = v643 - v646,
+        v651 = v631 + (v572 - v630), v652 = v645 + v649, v653 = v578 + v644, v654 = v578 - v644,
+        v655 = v555 + v627, v656 = v651 + v653, v657 = v627 - v555, v658 = v654 - v651,
+        v659 = -(v651 + v654), v660 = v541 - v629, v661 = v541 + v629, v662 = v597 + v629,
+        v663 = v636 + (v605 - v655), v664 = v646 + (v637 + v643) + v660, v665 = v613 + v636,
+        v666 = v613 + v615 - v636, v667 = v647 + (v533 - v597 - v614 + v629), v668 = v606 + v663,
+        v669 = v660 - v637, v670 = v661 - v635, v671 = v663 - v606, v672 = v623 - v669,
+        v673 = v601 + (v557 - v593) - v612 + v665, v674 = v621 - v670, v675 = v621 + v670,
+        v676 = v647 + (v540 + v600 + v618 - v661 - v635) - v632, v677 = v569 + v632,
+        v678 = v646 - v643 - v672, v679 = v650 + (v623 + v669), v680 = v672 - v650,
+        v681 = v648 - v677, v682 = v661 + (v635 + (v600 + v618 + v648)) + v677, v683 = v674 - v681;
+    softehl_store4(K + 20, 64, v652, v680, v658, v683);
+    const V v684 = v675 + v681, v685 = v677 - v674 - v648;
+    softehl_store4(K + 36, 64, v645 - v649, v678, v659, v685);
+    const V v686 = v681 - v675, v687 = v589 - v585 - v639, v688 = v540 + v541 - v595 - v590 + v639,
+        v689 = v605 + v634, v690 = v613 - v615 + v634, v691 = v667 + v688, v692 = v687 - v624,
+        v693 = v616 - v690, v694 = v616 + v690, v695 = v688 - v667, v696 = v689 - v657,
+        v697 = v657 + (v617 - v607 + v689), v698 = v671 + v693, v699 = v668 + v694;
+    softehl_store4(K + 56, 64, v684, v699, v683, v698);
+    const V v700 = v662 + (v604 - v640), v701 = v640 + (v604 + v624 + v687) - v662,
+        v702 = v693 - v671, v703 = v673 + v697;
+    softehl_store4(K + 8, 64, v682, v519 + v563 + v612 + v655 + 2.0 * (v602 + v605 + v665), v676, v703);
+    softehl_store4(K + 60, 64, v685, v702, v686, v694 - v668); const V v704 = v692 + v700;
+    softehl_store4(K + 48, 64, v656, v701, v658, v704); const V v705 = v700 - v692;
+    softehl_store4(K + 52, 64, v659, v705, v651 - v653, v686);
+    const V v706 = v603 - v696, v707 = v622 + v664, v708 = v622 - v664;
+    softehl_store4(K + 24, 64, v707, v703, v708, v697 - v673);
+    const V v709 = v666 + (v603 + v620 + v696); softehl_store4(K + 12, 64, v691, v709, v701, v699);
+    const V v710 = v620 - v666, v711 = v710 - v706;
+    softehl_store4(K + 28, 64, v695, v711, v704, v698);
+    softehl_store4(K + 40, 64, v679, v709, v680, v711);
+    softehl_store4(K + 44, 64, v678, v706 + v710, v705, v702);
+    const V v712 = v642 + (v582 + v641), v713 = v642 + (v580 + v582 - v641);
+    softehl_store4(K + 4, 64, v713, v679, v656, v684);
+    softehl_store4(K + 32, 64, v713, v691, v652, v695); const V v714 = v579 - v712;
+    softehl_store4(K + 0, 64, v631 + (v573 + v581 + 2.0 * (v576 + v630)), v682, v714, v707);
+    softehl_store4(K + 16, 64, v714, v676, v579 + v712, v708);
 }
+SOFTEHL_BATCH(softehl_solid_taylor_tangent, 8, 8, 0, 0, 8, (8 * 8))
 
-void softehl_solid_taylor_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_residual_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_taylor_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_solid_taylor_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 6.283185307179586 * parameters[2];
-    const V v4 = X4 - X0;
-    const V v5 = 0.39433756729740643 * X1;
-    const V v6 = 0.10566243270259355 * X1;
-    const V v7 = X0 - X2;
-    const V v8 = v4 - X2;
-    const V v9 = X4 - X6;
-    const V v10 = X6 + v8;
-    const V v11 = X1 - X3;
-    const V v12 = X1 + X3;
-    const V v13 = 0.10566243270259355 * X3;
-    const V v14 = v13 + v5;
-    const V v15 = 0.39433756729740643 * X3;
-    const V v16 = v15 + v6;
-    const V v17 = v7 + v9;
-    const V v18 = 0.25 * v10;
-    const V v19 = 0.0625 * v10;
-    const V v20 = v9 - v7;
-    const V v21 = 1.5773502691896257 * v14;
-    const V v22 = 0.4226497308103742 * v14;
-    const V v23 = 1.5773502691896257 * v16;
-    const V v24 = 0.4226497308103742 * v16;
-    const V v25 = 0.25 * v17;
-    const V v26 = 0.03608439182435161 * v17;
-    const V v27 = 0.25 * v20;
-    const V v28 = 0.0625 * v20;
-    const V v29 = 0.10566243270259355 * X5;
-    const V v30 = 0.39433756729740643 * X5;
-    const V v31 = X5 - X7;
-    const V v32 = X5 + X7;
-    const V v33 = 0.39433756729740643 * X7;
-    const V v34 = v29 + v33;
-    const V v35 = 0.10566243270259355 * X7;
-    const V v36 = v30 + v35;
-    const V v37 = v11 + v31;
-    const V v38 = v12 + v32;
-    const V v39 = 1.5773502691896257 * v36;
-    const V v40 = v24 + v39;
-    const V v41 = d0 - d2;
-    const V v42 = d0 + d2;
-    const V v43 = 0.4226497308103742 * v36;
-    const V v44 = v23 + v43;
-    const V v45 = v31 - v11;
-    const V v46 = v32 - v12;
-    const V v47 = 0.25 * v38;
-    const V v48 = 0.25 * v37;
-    const V v49 = 0.03608439182435161 * v37;
-    const V v50 = 1.0 / v44;
-    const V v51 = 1.0 / v40;
-    const V v52 = 0.25 * v45;
-    const V v53 = 0.0625 * v45;
-    const V v54 = 0.25 * v46;
-    const V v55 = 0.0625 * v46;
-    const V v56 = 1.0 / v47;
-    const V v57 = v42 - d4;
-    const V v58 = v57 - d6;
-    const V v59 = d4 - d6;
-    const V v60 = d1 + d3;
-    const V v61 = d1 - d3;
-    const V v62 = d5 + d7;
-    const V v63 = d5 - d7;
-    const V v64 = v27 * v54;
-    const V v65 = v27 * v48;
-    const V v66 = v25 * v54;
-    const V v67 = v52 * v25;
-    const V v68 = v65 - v67;
-    const V v69 = v52 * v18;
-    const V v70 = v64 - v69;
-    const V v71 = v48 * v18;
-    const V v72 = v66 - v71;
-    const V v73 = v60 + v62;
-    const V v74 = v60 - v62;
-    const V v75 = 0.25 * v56;
-    const V v76 = 0.5 * v56;
-    const V v77 = v61 + v63;
-    const V v78 = v61 - v63;
-    const V v79 = v62 - v60;
-    const V v80 = 1.0 / v70;
-    const V v81 = 6.283185307179586 * v70;
-    const V v82 = v70 * v3;
-    const V v83 = v47 * v82;
-    const V v84 = v79 - v78;
-    const V v85 = v44 * v81;
-    const V v86 = v40 * v81;
-    const V v87 = v74 + v78;
-    const V v88 = v74 - v78;
-    const V v89 = v78 - v74;
-    const V v90 = 0.25 * v50;
-    const V v91 = 0.14433756729740643 * v50;
-    const V v92 = 0.25 * v51;
-    const V v93 = 0.14433756729740643 * v51;
-    const V v94 = v2 * v85;
-    const V v95 = v2 * v86;
-    const V v96 = v1 * v85;
-    const V v97 = v1 * v86;
-    const V v98 = v90 * v90;
-    const V v99 = v92 * v92;
-    const V v100 = v91 * v88;
-    const V v101 = 1.0 + v100;
-    const V v102 = v53 * v80;
-    const V v103 = v55 * v80;
-    const V v104 = v80 * v19;
-    const V v105 = v28 * v80;
-    const V v106 = v80 * v49;
-    const V v107 = v80 * v26;
-    const V v108 = 0.5773502691896257 * v80;
-    const V v109 = v90 * v73;
-    const V v110 = v109 + v101;
-    const V v111 = v72 * v108;
-    const V v112 = v68 * v108;
-    const V v113 = v103 - v102;
-    const V v114 = v102 - v103;
-    const V v115 = v102 + v103;
-    const V v116 = v104 - v105;
-    const V v117 = v104 + v105;
-    const V v118 = v105 - v104;
-    const V v119 = 0.5773502691896257 * v113;
-    const V v120 = v110 * v110;
-    const V v121 = 2.0 * v110;
-    const V v122 = 0.5773502691896257 * v114;
-    const V v123 = 1.1547005383792515 * v114;
-    const V v124 = 0.5773502691896257 * v118;
-    const V v125 = 0.5773502691896257 * v115;
-    const V v126 = 1.1547005383792515 * v115;
-    const V v127 = 0.5773502691896257 * v116;
-    const V v128 = 1.1547005383792515 * v116;
-    const V v129 = 0.5773502691896257 * v117;
-    const V v130 = 1.1547005383792515 * v117;
-    const V v131 = v122 * v123;
-    const V v132 = v125 * v126;
-    const V v133 = v77 * v122;
-    const V v134 = v77 * v125;
-    const V v135 = v77 * v127;
-    const V v136 = v77 * v129;
-    const V v137 = v127 * v128;
-    const V v138 = v131 + v137;
-    const V v139 = v129 * v130;
-    const V v140 = v132 + v139;
-    const V v141 = 0.4226497308103742 * v34;
-    const V v142 = v21 + v141;
-    const V v143 = 1.5773502691896257 * v34;
-    const V v144 = v22 + v143;
-    const V v145 = 1.0 / v142;
-    const V v146 = v142 * v81;
-    const V v147 = v144 * v81;
-    const V v148 = 1.0 / v144;
-    const V v149 = v41 + v59;
-    const V v150 = v41 - v59;
-    const V v151 = 1.0 + v111;
-    const V v152 = 1.0 - v111;
-    const V v153 = v112 - v151;
-    const V v154 = v112 + v151;
-    const V v155 = v112 - v152;
-    const V v156 = v112 + v152;
-    const V v157 = v149 * v122;
-    const V v158 = v149 * v125;
-    const V v159 = v149 * v127;
-    const V v160 = v149 * v129;
-    const V v161 = v150 * v104;
-    const V v162 = v104 * v154;
-    const V v163 = v104 * v156;
-    const V v164 = v152 - v112;
-    const V v165 = v151 - v112;
-    const V v166 = v102 * v154;
-    const V v167 = v102 * v156;
-    const V v168 = v106 + v167;
-    const V v169 = v102 * v165;
-    const V v170 = v104 * v165;
-    const V v171 = v107 + v170;
-    const V v172 = v162 - v107;
-    const V v173 = v163 - v107;
-    const V v174 = v102 * v164;
-    const V v175 = v106 + v174;
-    const V v176 = v104 * v164;
-    const V v177 = v107 + v176;
-    const V v178 = v166 - v106;
-    const V v179 = v168 * v168;
-    const V v180 = v169 - v106;
-    const V v181 = 2.0 * v172;
-    const V v182 = 2.0 * v173;
-    const V v183 = 2.0 * v171;
-    const V v184 = v168 * v173;
-    const V v185 = 2.0 * v177;
-    const V v186 = v178 * v172;
-    const V v187 = v178 * v178;
-    const V v188 = v180 * v171;
-    const V v189 = v180 * v180;
-    const V v190 = v172 * v181;
-    const V v191 = v171 * v183;
-    const V v192 = 0.25 * v145;
-    const V v193 = 0.14433756729740643 * v145;
-    const V v194 = v177 * v185;
-    const V v195 = 0.25 * v148;
-    const V v196 = 0.14433756729740643 * v148;
-    const V v197 = v192 * v192;
-    const V v198 = v150 * v177;
-    const V v199 = v150 * v173;
-    const V v200 = v195 * v195;
-    const V v201 = v198 - v159;
-    const V v202 = v199 - v160;
-    const V v203 = v193 * v87;
-    const V v204 = 1.0 + v203;
-    const V v205 = v196 * v89;
-    const V v206 = 1.0 + v205;
-    const V v207 = v175 * v177;
-    const V v208 = v175 * v175;
-    const V v209 = v74 * v175;
-    const V v210 = v74 * v102;
-    const V v211 = v74 * v180;
-    const V v212 = v209 - v133;
-    const V v213 = v192 * v73;
-    const V v214 = v213 + v204;
-    const V v215 = v195 * v73;
-    const V v216 = v215 + v206;
-    const V v217 = v211 - v134;
-    const V v218 = v214 * v214;
-    const V v219 = 2.0 * v214;
-    const V v220 = v216 * v216;
-    const V v221 = 2.0 * v216;
-    const V v222 = v78 * v103;
-    const V v223 = v210 - v222;
-    const V v224 = v103 * v153;
-    const V v225 = v105 * v153;
-    const V v226 = v107 + v225;
-    const V v227 = v103 * v155;
-    const V v228 = v105 * v155;
-    const V v229 = v105 * v223;
-    const V v230 = v228 - v107;
-    const V v231 = v224 - v106;
-    const V v232 = v227 - v106;
-    const V v233 = v78 * v231;
-    const V v234 = v217 + v233;
-    const V v235 = v226 * v226;
-    const V v236 = v189 + v235;
-    const V v237 = 2.0 * v231;
-    const V v238 = 2.0 * v232;
-    const V v239 = v230 * v230;
-    const V v240 = v208 + v239;
-    const V v241 = v78 * v232;
-    const V v242 = v212 + v241;
-    const V v243 = v226 * v231;
-    const V v244 = v188 - v243;
-    const V v245 = v230 * v232;
-    const V v246 = v207 - v245;
-    const V v247 = 2.0 * v234;
-    const V v248 = v234 * v234;
-    const V v249 = 2.0 * v242;
-    const V v250 = v242 * v242;
-    const V v251 = v226 * v183;
-    const V v252 = v129 * v183;
-    const V v253 = v230 * v185;
-    const V v254 = v124 * v185;
-    const V v255 = v226 * v130;
-    const V v256 = v230 * v128;
-    const V v257 = v58 * v230;
-    const V v258 = v201 + v257;
-    const V v259 = v58 * v226;
-    const V v260 = v259 + v160;
-    const V v261 = v258 * v258;
-    const V v262 = v261 + v250;
-    const V v263 = 2.0 * v258;
-    const V v264 = v175 * v238;
-    const V v265 = v253 + v264;
-    const V v266 = v119 * v238;
-    const V v267 = v254 + v266;
-    const V v268 = v175 * v123;
-    const V v269 = v256 + v268;
-    const V v270 = v178 * v123;
-    const V v271 = v127 * v178;
-    const V v272 = v232 * v238;
-    const V v273 = v194 + v272;
-    const V v274 = v175 * v249;
-    const V v275 = v119 * v249;
-    const V v276 = v232 * v249;
-    const V v277 = v127 * v181;
-    const V v278 = v2 * v146;
-    const V v279 = v2 * v147;
-    const V v280 = v1 * v146;
-    const V v281 = v1 * v147;
-    const V v282 = v94 * v120;
-    const V v283 = v278 * v218;
-    const V v284 = v279 * v220;
-    const V v285 = v177 * v263;
-    const V v286 = v124 * v263;
-    const V v287 = v230 * v263;
-    const V v288 = v180 * v247;
-    const V v289 = v231 * v247;
-    const V v290 = v180 * v126;
-    const V v291 = v255 - v290;
-    const V v292 = v168 * v126;
-    const V v293 = v180 * v237;
-    const V v294 = v251 + v293;
-    const V v295 = v231 * v237;
-    const V v296 = v191 + v295;
-    const V v297 = v125 * v237;
-    const V v298 = v252 - v297;
-    const V v299 = 1.0 + v157;
-    const V v300 = 1.0 - v157;
-    const V v301 = v104 * v223;
-    const V v302 = v78 * v104;
-    const V v303 = 1.0 + v302;
-    const V v304 = 1.0 + v158;
-    const V v305 = 1.0 - v158;
-    const V v306 = 1.0 + v135;
-    const V v307 = 1.0 - v135;
-    const V v308 = v58 * v178;
-    const V v309 = v299 + v308;
-    const V v310 = v58 * v175;
-    const V v311 = v310 + v300;
-    const V v312 = v58 * v168;
-    const V v313 = v304 + v312;
-    const V v314 = v74 * v105;
-    const V v315 = v303 - v314;
-    const V v316 = v58 * v105;
-    const V v317 = v161 - v316;
-    const V v318 = v58 * v180;
-    const V v319 = v318 + v305;
-    const V v320 = v74 * v230;
-    const V v321 = v307 + v320;
-    const V v322 = v74 * v178;
-    const V v323 = v133 + v322;
-    const V v324 = v74 * v168;
-    const V v325 = v134 + v324;
-    const V v326 = v150 * v232;
-    const V v327 = v326 + v311;
-    const V v328 = v150 * v231;
-    const V v329 = v328 + v319;
-    const V v330 = v102 * v317;
-    const V v331 = v103 * v317;
-    const V v332 = 2.0 * v327;
-    const V v333 = 2.0 * v329;
-    const V v334 = v150 * v103;
-    const V v335 = 1.0 - v334;
-    const V v336 = v177 * v327;
-    const V v337 = v230 * v327;
-    const V v338 = v171 * v329;
-    const V v339 = v150 * v171;
-    const V v340 = v339 + v260;
-    const V v341 = v226 * v329;
-    const V v342 = v329 * v329;
-    const V v343 = v248 + v342;
-    const V v344 = v327 * v327;
-    const V v345 = v262 + v344;
-    const V v346 = 2.0 * v340;
-    const V v347 = v58 * v102;
-    const V v348 = v335 + v347;
-    const V v349 = v340 * v340;
-    const V v350 = v343 + v349;
-    const V v351 = v231 * v340;
-    const V v352 = v338 - v351;
-    const V v353 = v180 * v340;
-    const V v354 = v341 - v353;
-    const V v355 = v180 * v333;
-    const V v356 = v231 * v333;
-    const V v357 = v348 * v315;
-    const V v358 = v102 * v315;
-    const V v359 = v229 + v358;
-    const V v360 = v359 * v359;
-    const V v361 = v226 * v346;
-    const V v362 = v355 + v361;
-    const V v363 = v171 * v346;
-    const V v364 = v356 + v363;
-    const V v365 = v129 * v346;
-    const V v366 = v125 * v333;
-    const V v367 = v365 - v366;
-    const V v368 = v119 * v332;
-    const V v369 = v286 + v368;
-    const V v370 = v317 * v223;
-    const V v371 = v357 - v370;
-    const V v372 = v371 * v371;
-    const V v373 = 2.0 * v371;
-    const V v374 = v175 * v332;
-    const V v375 = v287 + v374;
-    const V v376 = v232 * v332;
-    const V v377 = v285 + v376;
-    const V v378 = v175 * v258;
-    const V v379 = v337 - v378;
-    const V v380 = v258 * v232;
-    const V v381 = v336 - v380;
-    const V v382 = 1.0 - v136;
-    const V v383 = 1.0 + v136;
-    const V v384 = v93 * v84;
-    const V v385 = 1.0 + v384;
-    const V v386 = v173 * v182;
-    const V v387 = v78 * v173;
-    const V v388 = v382 + v387;
-    const V v389 = v78 * v177;
-    const V v390 = v389 + v321;
-    const V v391 = v175 * v390;
-    const V v392 = v232 * v390;
-    const V v393 = v78 * v171;
-    const V v394 = v383 + v393;
-    const V v395 = 2.0 * v390;
-    const V v396 = v327 * v390;
-    const V v397 = v390 * v390;
-    const V v398 = v345 + v397;
-    const V v399 = v92 * v73;
-    const V v400 = v399 + v385;
-    const V v401 = v75 * v73;
-    const V v402 = 1.0 + v401;
-    const V v403 = v400 * v400;
-    const V v404 = 2.0 * v400;
-    const V v405 = v402 * v402;
-    const V v406 = 2.0 * v402;
-    const V v407 = v258 * v242;
-    const V v408 = v396 - v407;
-    const V v409 = v177 * v242;
-    const V v410 = v392 - v409;
-    const V v411 = v177 * v395;
-    const V v412 = v276 + v411;
-    const V v413 = v230 * v242;
-    const V v414 = v391 - v413;
-    const V v415 = v230 * v395;
-    const V v416 = v274 + v415;
-    const V v417 = v124 * v395;
-    const V v418 = v275 + v417;
-    const V v419 = v408 * v408;
-    const V v420 = 2.0 * v408;
-    const V v421 = v403 + v398;
-    const V v422 = v403 * v398;
-    const V v423 = v75 * v406;
-    const V v424 = v405 * v405;
-    const V v425 = v406 * v372;
-    const V v426 = v405 * v372;
-    const V v427 = v419 + v422;
-    const V v428 = v403 * v419;
-    const V v429 = v403 * v420;
-    const V v430 = 1.0 / v426;
-    const V v431 = v97 * v421;
-    const V v432 = v424 * v373;
-    const V v433 = softehl_vrcbrt(v428);
-    const V v434 = v373 * v432;
-    const V v435 = v95 * v427;
-    const V v436 = v95 * v420;
-    const V v437 = v95 * v403;
-    const V v438 = v404 * v419;
-    const V v439 = v95 * v398;
-    const V v440 = v83 * v372;
-    const V v441 = v83 * v434;
-    const V v442 = v423 * v440;
-    const V v443 = v103 * v154;
-    const V v444 = v106 - v443;
-    const V v445 = v105 * v154;
-    const V v446 = v107 - v445;
-    const V v447 = v103 * v156;
-    const V v448 = v106 - v447;
-    const V v449 = v105 * v156;
-    const V v450 = v107 + v449;
-    const V v451 = 2.0 * v444;
-    const V v452 = 2.0 * v448;
-    const V v453 = v446 * v181;
-    const V v454 = v122 * v446;
-    const V v455 = v446 * v444;
-    const V v456 = v186 - v455;
-    const V v457 = v446 * v128;
-    const V v458 = v270 + v457;
-    const V v459 = v446 * v446;
-    const V v460 = v187 + v459;
-    const V v461 = v448 * v450;
-    const V v462 = v184 + v461;
-    const V v463 = v450 * v130;
-    const V v464 = v292 + v463;
-    const V v465 = v450 * v450;
-    const V v466 = v179 + v465;
-    const V v467 = v271 - v454;
-    const V v468 = v178 * v451;
-    const V v469 = v453 + v468;
-    const V v470 = v430 * v430;
-    const V v471 = 1.0 - v430;
-    const V v472 = v454 - v271;
-    const V v473 = v442 * v470;
-    const V v474 = v441 * v470;
-    const V v475 = v150 * v448;
-    const V v476 = v313 + v475;
-    const V v477 = v150 * v444;
-    const V v478 = v309 + v477;
-    const V v479 = v444 * v451;
-    const V v480 = v190 + v479;
-    const V v481 = v122 * v451;
-    const V v482 = v277 + v481;
-    const V v483 = 2.0 * v476;
-    const V v484 = v476 * v476;
-    const V v485 = 2.0 * v478;
-    const V v486 = v478 * v478;
-    const V v487 = v425 * v473;
-    const V v488 = v405 * v473;
-    const V v489 = v127 * v478;
-    const V v490 = v172 * v478;
-    const V v491 = v173 * v476;
-    const V v492 = v129 * v476;
-    const V v493 = v446 * v478;
-    const V v494 = v450 * v476;
-    const V v495 = v150 * v172;
-    const V v496 = v159 + v495;
-    const V v497 = v83 * v471;
-    const V v498 = v58 * v450;
-    const V v499 = v202 - v498;
-    const V v500 = v58 * v446;
-    const V v501 = v496 + v500;
-    const V v502 = 2.0 * v499;
-    const V v503 = 2.0 * v501;
-    const V v504 = v168 * v499;
-    const V v505 = v494 + v504;
-    const V v506 = v168 * v483;
-    const V v507 = v125 * v483;
-    const V v508 = v448 * v483;
-    const V v509 = v372 * v497;
-    const V v510 = v405 * v497;
-    const V v511 = v122 * v501;
-    const V v512 = v125 * v499;
-    const V v513 = v492 + v512;
-    const V v514 = v448 * v499;
-    const V v515 = v491 - v514;
-    const V v516 = v433 * v433;
-    const V v517 = 0.6666666666666666 * v433;
-    const V v518 = 0.4444444444444444 * v433;
-    const V v519 = v489 - v511;
-    const V v520 = v516 * v516;
-    const V v521 = v433 * v516;
-    const V v522 = v97 * v433;
-    const V v523 = v95 * v516;
-    const V v524 = v431 * v518;
-    const V v525 = v511 - v489;
-    const V v526 = v517 * v520;
-    const V v527 = v521 * v524;
-    const V v528 = 0.3333333333333333 * v520;
-    const V v529 = 1.1111111111111112 * v520;
-    const V v530 = v520 * v529;
-    const V v531 = v521 * v527;
-    const V v532 = v95 * v526;
-    const V v533 = v97 * v528;
-    const V v534 = v431 * v528;
-    const V v535 = v436 * v526;
-    const V v536 = v437 * v526;
-    const V v537 = v439 * v526;
-    const V v538 = v403 * v523;
-    const V v539 = v522 + v538;
-    const V v540 = v398 * v523;
-    const V v541 = v522 + v540;
-    const V v542 = v435 * v526;
-    const V v543 = v534 + v542;
-    const V v544 = v435 * v530;
-    const V v545 = v531 + v544;
-    const V v546 = v533 + v536;
-    const V v547 = v429 * v532;
-    const V v548 = v533 + v537;
-    const V v549 = v429 * v533;
-    const V v550 = v403 * v543;
-    const V v551 = v523 - v550;
-    const V v552 = v265 * v539;
-    const V v553 = v429 * v545;
-    const V v554 = v535 - v553;
-    const V v555 = v429 * v546;
-    const V v556 = v419 * v546;
-    const V v557 = v523 - v556;
-    const V v558 = v398 * v547;
-    const V v559 = v549 + v558;
-    const V v560 = v419 * v543;
-    const V v561 = v541 - v560;
-    const V v562 = v403 * v554;
-    const V v563 = v547 + v562;
-    const V v564 = 2.0 * v551;
-    const V v565 = v420 * v551;
-    const V v566 = v420 * v543;
-    const V v567 = v559 + v566;
-    const V v568 = v420 * v563;
-    const V v569 = v564 - v568;
-    const V v570 = v404 * v557;
-    const V v571 = v419 * v554;
-    const V v572 = v567 + v571;
-    const V v573 = v404 * v561;
-    const V v574 = 2.0 * v561;
-    const V v575 = v404 * v548;
-    const V v576 = v438 * v548;
-    const V v577 = v438 * v545;
-    const V v578 = v575 - v577;
-    const V v579 = v419 * v578;
-    const V v580 = v576 + v579;
-    const V v581 = v404 * v572;
-    const V v582 = v267 * v539;
-    const V v583 = v273 * v539;
-    const V v584 = v246 * v565;
-    const V v585 = v472 * v565;
-    const V v586 = v404 * v580;
-    const V v587 = v574 - v586;
-    const V v588 = v240 * v539;
-    const V v589 = v414 * v555;
-    const V v590 = v414 * v565;
-    const V v591 = v414 * v569;
-    const V v592 = v410 * v555;
-    const V v593 = v410 * v565;
-    const V v594 = v410 * v569;
-    const V v595 = v525 * v555;
-    const V v596 = v525 * v565;
-    const V v597 = v525 * v569;
-    const V v598 = v375 * v555;
-    const V v599 = v591 - v598;
-    const V v600 = v375 * v539;
-    const V v601 = v590 + v600;
-    const V v602 = v369 * v539;
-    const V v603 = v377 * v539;
-    const V v604 = v593 + v603;
-    const V v605 = v377 * v555;
-    const V v606 = v594 - v605;
-    const V v607 = v416 * v539;
-    const V v608 = v418 * v539;
-    const V v609 = v596 + v608;
-    const V v610 = v418 * v555;
-    const V v611 = v597 - v610;
-    const V v612 = v412 * v539;
-    const V v613 = v379 * v555;
-    const V v614 = v379 * v606;
-    const V v615 = v381 * v555;
-    const V v616 = v381 * v606;
-    const V v617 = v379 * v565;
-    const V v618 = v607 + v617;
-    const V v619 = v381 * v565;
-    const V v620 = v612 + v619;
-    const V v621 = v381 * v611;
-    const V v622 = v525 * v611;
-    const V v623 = v525 * v606;
-    const V v624 = v410 * v606;
-    const V v625 = v99 * v587;
-    const V v626 = v93 * v587;
-    const V v627 = v93 * v570;
-    const V v628 = v93 * v581;
-    const V v629 = v375 * v570;
-    const V v630 = v369 * v570;
-    const V v631 = v377 * v570;
-    const V v632 = v377 * v592;
-    const V v633 = v624 - v632;
-    const V v634 = v613 + v627;
-    const V v635 = v615 + v627;
-    const V v636 = v414 * v581;
-    const V v637 = v629 - v636;
-    const V v638 = v414 * v599;
-    const V v639 = v410 * v581;
-    const V v640 = v631 - v639;
-    const V v641 = v410 * v599;
-    const V v642 = v416 * v570;
-    const V v643 = v418 * v570;
-    const V v644 = v412 * v570;
-    const V v645 = v412 * v555;
-    const V v646 = v628 - v645;
-    const V v647 = v375 * v589;
-    const V v648 = v638 - v647;
-    const V v649 = v92 * v637;
-    const V v650 = v92 * v573;
-    const V v651 = v377 * v589;
-    const V v652 = v641 - v651;
-    const V v653 = v642 - v626;
-    const V v654 = v644 - v626;
-    const V v655 = v92 * v640;
-    const V v656 = v381 * v569;
-    const V v657 = v646 + v656;
-    const V v658 = v381 * v599;
-    const V v659 = v381 * v657;
-    const V v660 = v379 * v599;
-    const V v661 = v379 * v581;
-    const V v662 = v653 - v661;
-    const V v663 = v381 * v581;
-    const V v664 = v654 - v663;
-    const V v665 = v525 * v599;
-    const V v666 = v525 * v581;
-    const V v667 = v643 - v666;
-    const V v668 = v379 * v569;
-    const V v669 = v628 + v668;
-    const V v670 = v373 * v510;
-    const V v671 = 2.0 * v510;
-    const V v672 = v474 + v671;
-    const V v673 = v423 * v497;
-    const V v674 = v488 + v673;
-    const V v675 = v373 * v674;
-    const V v676 = v423 * v509;
-    const V v677 = v650 + v676;
-    const V v678 = v76 * v509;
-    const V v679 = v487 + v678;
-    const V v680 = v223 * v670;
-    const V v681 = v317 * v670;
-    const V v682 = v315 * v670;
-    const V v683 = v348 * v670;
-    const V v684 = v105 * v670;
-    const V v685 = v105 * v348;
-    const V v686 = v330 + v685;
-    const V v687 = v75 * v679;
-    const V v688 = v625 + v687;
-    const V v689 = v102 * v670;
-    const V v690 = v104 * v670;
-    const V v691 = v104 * v680;
-    const V v692 = v105 * v680;
-    const V v693 = v601 + v692;
-    const V v694 = v104 * v348;
-    const V v695 = v331 + v694;
-    const V v696 = v315 * v675;
-    const V v697 = v348 * v675;
-    const V v698 = v672 * v686;
-    const V v699 = v672 * v695;
-    const V v700 = v223 * v675;
-    const V v701 = v317 * v675;
-    const V v702 = v686 * v698;
-    const V v703 = v105 * v697;
-    const V v704 = v104 * v697;
-    const V v705 = v317 * v699;
-    const V v706 = v348 * v699;
-    const V v707 = v104 * v700;
-    const V v708 = v105 * v700;
-    const V v709 = v649 + v708;
-    const V v710 = v223 * v699;
-    const V v711 = v223 * v698;
-    const V v712 = v689 - v711;
-    const V v713 = v315 * v698;
-    const V v714 = v684 + v713;
-    const V v715 = v315 * v699;
-    const V v716 = v690 + v715;
-    const V v717 = v102 * v701;
-    const V v718 = v703 + v717;
-    const V v719 = v103 * v701;
-    const V v720 = v704 + v719;
-    const V v721 = v103 * v670;
-    const V v722 = v710 - v721;
-    const V v723 = v103 * v696;
-    const V v724 = v707 + v723;
-    const V v725 = v102 * v696;
-    const V v726 = v709 + v725;
-    const V v727 = v105 * v706;
-    const V v728 = v104 * v706;
-    const V v729 = v659 + v728;
-    const V v730 = v103 * v716;
-    const V v731 = v102 * v716;
-    const V v732 = v658 + v731;
-    const V v733 = v104 * v722;
-    const V v734 = v730 + v733;
-    const V v735 = v105 * v722;
-    const V v736 = v732 + v735;
-    const V v737 = v102 * v705;
-    const V v738 = v727 + v737;
-    const V v739 = v103 * v705;
-    const V v740 = v729 + v739;
-    const V v741 = v103 * v315;
-    const V v742 = v301 + v741;
-    const V v743 = v672 * v742;
-    const V v744 = v360 * v672;
-    const V v745 = v648 + v744;
-    const V v746 = v412 * v635;
-    const V v747 = v740 - v746;
-    const V v748 = v412 * v589;
-    const V v749 = v736 - v748;
-    const V v750 = v315 * v743;
-    const V v751 = v223 * v743;
-    const V v752 = v103 * v682;
-    const V v753 = v691 + v752;
-    const V v754 = v102 * v682;
-    const V v755 = v693 + v754;
-    const V v756 = v178 * v485;
-    const V v757 = v122 * v485;
-    const V v758 = v444 * v485;
-    const V v759 = v78 * v444;
-    const V v760 = v323 + v759;
-    const V v761 = v78 * v448;
-    const V v762 = v325 + v761;
-    const V v763 = v78 * v172;
-    const V v764 = v306 + v763;
-    const V v765 = v172 * v503;
-    const V v766 = v758 + v765;
-    const V v767 = v446 * v503;
-    const V v768 = v756 + v767;
-    const V v769 = v127 * v503;
-    const V v770 = v757 + v769;
-    const V v771 = 2.0 * v760;
-    const V v772 = v127 * v760;
-    const V v773 = 2.0 * v762;
-    const V v774 = v74 * v446;
-    const V v775 = v774 + v764;
-    const V v776 = v129 * v762;
-    const V v777 = v450 * v762;
-    const V v778 = v74 * v450;
-    const V v779 = v388 - v778;
-    const V v780 = v74 * v226;
-    const V v781 = v394 + v780;
-    const V v782 = 2.0 * v775;
-    const V v783 = v478 * v775;
-    const V v784 = 2.0 * v779;
-    const V v785 = v779 * v476;
-    const V v786 = 2.0 * v781;
-    const V v787 = v168 * v779;
-    const V v788 = v777 + v787;
-    const V v789 = v781 * v329;
-    const V v790 = v180 * v781;
-    const V v791 = v231 * v781;
-    const V v792 = v781 * v781;
-    const V v793 = v792 + v350;
-    const V v794 = v127 * v782;
-    const V v795 = v122 * v775;
-    const V v796 = v234 * v340;
-    const V v797 = v789 - v796;
-    const V v798 = v122 * v771;
-    const V v799 = v794 + v798;
-    const V v800 = v226 * v234;
-    const V v801 = v790 - v800;
-    const V v802 = v171 * v234;
-    const V v803 = v791 - v802;
-    const V v804 = v171 * v786;
-    const V v805 = v289 + v804;
-    const V v806 = v226 * v786;
-    const V v807 = v288 + v806;
-    const V v808 = v129 * v786;
-    const V v809 = v797 * v797;
-    const V v810 = 2.0 * v797;
-    const V v811 = v772 - v795;
-    const V v812 = v120 + v793;
-    const V v813 = v795 - v772;
-    const V v814 = v125 * v247;
-    const V v815 = v808 - v814;
-    const V v816 = v94 * v793;
-    const V v817 = v94 * v810;
-    const V v818 = v96 * v812;
-    const V v819 = v569 * v811;
-    const V v820 = v599 * v811;
-    const V v821 = v120 * v809;
-    const V v822 = v120 * v810;
-    const V v823 = v120 * v793;
-    const V v824 = v809 + v823;
-    const V v825 = softehl_vrcbrt(v821);
-    const V v826 = v94 * v824;
-    const V v827 = v121 * v809;
-    const V v828 = v555 * v811;
-    const V v829 = v369 * v555;
-    const V v830 = v819 - v829;
-    const V v831 = v369 * v589;
-    const V v832 = v820 - v831;
-    const V v833 = v416 * v555;
-    const V v834 = v669 - v833;
-    const V v835 = v581 * v811;
-    const V v836 = v630 - v835;
-    const V v837 = v416 * v589;
-    const V v838 = v660 - v837;
-    const V v839 = v811 * v830;
-    const V v840 = v565 * v811;
-    const V v841 = v602 + v840;
-    const V v842 = v410 * v830;
-    const V v843 = v369 * v828;
-    const V v844 = v839 - v843;
-    const V v845 = v418 * v589;
-    const V v846 = v665 - v845;
-    const V v847 = v379 * v830;
-    const V v848 = v379 * v834;
-    const V v849 = v702 + v848;
-    const V v850 = v377 * v828;
-    const V v851 = v842 - v850;
-    const V v852 = v92 * v836;
-    const V v853 = v416 * v828;
-    const V v854 = v847 - v853;
-    const V v855 = v92 * v667;
-    const V v856 = v525 * v830;
-    const V v857 = v525 * v834;
-    const V v858 = v381 * v830;
-    const V v859 = v381 * v834;
-    const V v860 = v416 * v634;
-    const V v861 = v849 - v860;
-    const V v862 = v416 * v592;
-    const V v863 = v614 - v862;
-    const V v864 = v92 * v662;
-    const V v865 = v418 * v828;
-    const V v866 = v856 - v865;
-    const V v867 = v418 * v634;
-    const V v868 = v857 - v867;
-    const V v869 = v412 * v828;
-    const V v870 = v858 - v869;
-    const V v871 = v412 * v634;
-    const V v872 = v859 - v871;
-    const V v873 = v418 * v592;
-    const V v874 = v623 - v873;
-    const V v875 = v412 * v592;
-    const V v876 = v616 - v875;
-    const V v877 = v418 * v595;
-    const V v878 = v622 - v877;
-    const V v879 = v412 * v595;
-    const V v880 = v621 - v879;
-    const V v881 = v92 * v664;
-    const V v882 = v720 + v881;
-    const V v883 = v93 * v664;
-    const V v884 = v747 - v883;
-    const V v885 = v93 * v667;
-    const V v886 = v880 - v885;
-    const V v887 = v103 * v714;
-    const V v888 = v863 + v887;
-    const V v889 = v102 * v714;
-    const V v890 = v838 - v889;
-    const V v891 = v102 * v750;
-    const V v892 = v103 * v750;
-    const V v893 = v633 + v892;
-    const V v894 = v103 * v681;
-    const V v895 = v620 + v894;
-    const V v896 = v102 * v681;
-    const V v897 = v618 - v896;
-    const V v898 = v178 * v775;
-    const V v899 = v444 * v775;
-    const V v900 = v775 * v775;
-    const V v901 = v486 + v900;
-    const V v902 = v178 * v771;
-    const V v903 = v444 * v771;
-    const V v904 = v178 * v501;
-    const V v905 = v493 - v904;
-    const V v906 = v444 * v501;
-    const V v907 = v490 - v906;
-    const V v908 = v501 * v501;
-    const V v909 = v908 + v901;
-    const V v910 = v760 * v501;
-    const V v911 = v783 - v910;
-    const V v912 = v172 * v760;
-    const V v913 = v899 - v912;
-    const V v914 = v172 * v782;
-    const V v915 = v903 + v914;
-    const V v916 = v446 * v782;
-    const V v917 = v902 + v916;
-    const V v918 = v446 * v760;
-    const V v919 = v898 - v918;
-    const V v920 = v760 * v760;
-    const V v921 = v920 + v909;
-    const V v922 = v911 * v911;
-    const V v923 = 2.0 * v911;
-    const V v924 = v105 * v751;
-    const V v925 = v891 + v924;
-    const V v926 = v104 * v751;
-    const V v927 = v893 + v926;
-    const V v928 = v105 * v683;
-    const V v929 = v897 - v928;
-    const V v930 = v104 * v683;
-    const V v931 = v895 + v930;
-    const V v932 = v218 + v921;
-    const V v933 = v825 * v825;
-    const V v934 = 0.6666666666666666 * v825;
-    const V v935 = 0.4444444444444444 * v825;
-    const V v936 = v933 * v933;
-    const V v937 = v825 * v933;
-    const V v938 = v96 * v825;
-    const V v939 = v94 * v933;
-    const V v940 = v280 * v932;
-    const V v941 = v818 * v935;
-    const V v942 = v218 * v921;
-    const V v943 = v922 + v942;
-    const V v944 = v218 * v922;
-    const V v945 = v937 * v941;
-    const V v946 = v934 * v936;
-    const V v947 = softehl_vrcbrt(v944);
-    const V v948 = 0.3333333333333333 * v936;
-    const V v949 = 1.1111111111111112 * v936;
-    const V v950 = v278 * v943;
-    const V v951 = v936 * v949;
-    const V v952 = v937 * v945;
-    const V v953 = v278 * v921;
-    const V v954 = v818 * v948;
-    const V v955 = v96 * v948;
-    const V v956 = v94 * v946;
-    const V v957 = v817 * v946;
-    const V v958 = v282 * v946;
-    const V v959 = v816 * v946;
-    const V v960 = v826 * v946;
-    const V v961 = v954 + v960;
-    const V v962 = v826 * v951;
-    const V v963 = v952 + v962;
-    const V v964 = v822 * v956;
-    const V v965 = v955 + v958;
-    const V v966 = v955 + v959;
-    const V v967 = v822 * v955;
-    const V v968 = v278 * v923;
-    const V v969 = v218 * v923;
-    const V v970 = v822 * v963;
-    const V v971 = v957 - v970;
-    const V v972 = v822 * v965;
-    const V v973 = v793 * v964;
-    const V v974 = v967 + v973;
-    const V v975 = v793 * v939;
-    const V v976 = v938 + v975;
-    const V v977 = v120 * v939;
-    const V v978 = v938 + v977;
-    const V v979 = v120 * v971;
-    const V v980 = v964 + v979;
-    const V v981 = v120 * v961;
-    const V v982 = v939 - v981;
-    const V v983 = v809 * v965;
-    const V v984 = v939 - v983;
-    const V v985 = v809 * v971;
-    const V v986 = v974 + v985;
-    const V v987 = v809 * v961;
-    const V v988 = v976 - v987;
-    const V v989 = v291 * v978;
-    const V v990 = 2.0 * v982;
-    const V v991 = v810 * v982;
-    const V v992 = v810 * v961;
-    const V v993 = v986 + v992;
-    const V v994 = v810 * v980;
-    const V v995 = v990 - v994;
-    const V v996 = v121 * v984;
-    const V v997 = v121 * v988;
-    const V v998 = 2.0 * v988;
-    const V v999 = v121 * v993;
-    const V v1000 = v269 * v539;
-    const V v1001 = v989 - v1000;
-    const V v1002 = v801 * v972;
-    const V v1003 = v803 * v972;
-    const V v1004 = v513 * v972;
-    const V v1005 = v801 * v995;
-    const V v1006 = v803 * v995;
-    const V v1007 = v513 * v995;
-    const V v1008 = v121 * v966;
-    const V v1009 = v827 * v966;
-    const V v1010 = v827 * v963;
-    const V v1011 = v1008 - v1010;
-    const V v1012 = v809 * v1011;
-    const V v1013 = v1009 + v1012;
-    const V v1014 = v362 * v972;
-    const V v1015 = v1005 - v1014;
-    const V v1016 = v364 * v972;
-    const V v1017 = v1006 - v1016;
-    const V v1018 = v815 * v972;
-    const V v1019 = v1007 - v1018;
-    const V v1020 = v367 * v972;
-    const V v1021 = v354 * v972;
-    const V v1022 = v354 * v995;
-    const V v1023 = v947 * v947;
-    const V v1024 = 0.6666666666666666 * v947;
-    const V v1025 = 0.4444444444444444 * v947;
-    const V v1026 = v1023 * v1023;
-    const V v1027 = v947 * v1023;
-    const V v1028 = v280 * v947;
-    const V v1029 = v278 * v1023;
-    const V v1030 = v940 * v1025;
-    const V v1031 = v1024 * v1026;
-    const V v1032 = v1027 * v1030;
-    const V v1033 = 0.3333333333333333 * v1026;
-    const V v1034 = 1.1111111111111112 * v1026;
-    const V v1035 = v1026 * v1034;
-    const V v1036 = v1027 * v1032;
-    const V v1037 = v278 * v1031;
-    const V v1038 = v280 * v1033;
-    const V v1039 = v940 * v1033;
-    const V v1040 = v218 * v1029;
-    const V v1041 = v1028 + v1040;
-    const V v1042 = v921 * v1029;
-    const V v1043 = v1028 + v1042;
-    const V v1044 = v968 * v1031;
-    const V v1045 = v283 * v1031;
-    const V v1046 = v953 * v1031;
-    const V v1047 = v950 * v1031;
-    const V v1048 = v1039 + v1047;
-    const V v1049 = v950 * v1035;
-    const V v1050 = v1036 + v1049;
-    const V v1051 = v969 * v1037;
-    const V v1052 = v1038 + v1045;
-    const V v1053 = v1038 + v1046;
-    const V v1054 = v969 * v1038;
-    const V v1055 = v218 * v1048;
-    const V v1056 = v1029 - v1055;
-    const V v1057 = v922 * v1048;
-    const V v1058 = v1043 - v1057;
-    const V v1059 = v921 * v1051;
-    const V v1060 = v1054 + v1059;
-    const V v1061 = v969 * v1050;
-    const V v1062 = v1044 - v1061;
-    const V v1063 = v969 * v1052;
-    const V v1064 = v922 * v1052;
-    const V v1065 = v1029 - v1064;
-    const V v1066 = v218 * v1062;
-    const V v1067 = v1051 + v1066;
-    const V v1068 = v539 + v1041;
-    const V v1069 = 2.0 * v1056;
-    const V v1070 = v923 * v1056;
-    const V v1071 = v923 * v1048;
-    const V v1072 = v1060 + v1071;
-    const V v1073 = 2.0 * v1058;
-    const V v1074 = v219 * v1058;
-    const V v1075 = v219 * v1065;
-    const V v1076 = v923 * v1067;
-    const V v1077 = v1069 - v1076;
-    const V v1078 = v922 * v1062;
-    const V v1079 = v1072 + v1078;
-    const V v1080 = v138 * v1068;
-    const V v1081 = v219 * v922;
-    const V v1082 = v219 * v1053;
-    const V v1083 = v219 * v1079;
-    const V v1084 = v1050 * v1081;
-    const V v1085 = v1082 - v1084;
-    const V v1086 = v1053 * v1081;
-    const V v1087 = v922 * v1085;
-    const V v1088 = v1086 + v1087;
-    const V v1089 = v919 * v1063;
-    const V v1090 = v813 * v1063;
-    const V v1091 = v913 * v1063;
-    const V v1092 = v519 * v1063;
-    const V v1093 = v919 * v1077;
-    const V v1094 = v813 * v1077;
-    const V v1095 = v913 * v1077;
-    const V v1096 = v519 * v1077;
-    const V v1097 = v121 * v1013;
-    const V v1098 = v998 - v1097;
-    const V v1099 = v905 * v1063;
-    const V v1100 = v905 * v1077;
-    const V v1101 = v907 * v1077;
-    const V v1102 = v907 * v1063;
-    const V v1103 = v768 * v1063;
-    const V v1104 = v1093 - v1103;
-    const V v1105 = v770 * v1063;
-    const V v1106 = v1094 - v1105;
-    const V v1107 = v766 * v1063;
-    const V v1108 = v1095 - v1107;
-    const V v1109 = v799 * v1063;
-    const V v1110 = v1096 - v1109;
-    const V v1111 = v91 * v1098;
-    const V v1112 = v98 * v1098;
-    const V v1113 = v688 + v1112;
-    const V v1114 = v915 * v1063;
-    const V v1115 = v1101 - v1114;
-    const V v1116 = v91 * v996;
-    const V v1117 = v219 * v1088;
-    const V v1118 = v1073 - v1117;
-    const V v1119 = v91 * v999;
-    const V v1120 = v362 * v996;
-    const V v1121 = v1021 - v1116;
-    const V v1122 = v197 * v1118;
-    const V v1123 = v1113 + v1122;
-    const V v1124 = v193 * v1118;
-    const V v1125 = v1022 - v1119;
-    const V v1126 = v801 * v999;
-    const V v1127 = v1120 - v1126;
-    const V v1128 = v193 * v1075;
-    const V v1129 = v807 * v996;
-    const V v1130 = v1111 + v1129;
-    const V v1131 = v193 * v1083;
-    const V v1132 = v807 * v972;
-    const V v1133 = v1125 - v1132;
-    const V v1134 = v805 * v972;
-    const V v1135 = v1119 - v1134;
-    const V v1136 = v805 * v996;
-    const V v1137 = v1099 - v1128;
-    const V v1138 = v1102 - v1128;
-    const V v1139 = v1115 - v1131;
-    const V v1140 = v1100 - v1131;
-    const V v1141 = v1136 - v1111;
-    const V v1142 = v905 * v1083;
-    const V v1143 = v1124 - v1142;
-    const V v1144 = v907 * v1083;
-    const V v1145 = v1124 - v1144;
-    const V v1146 = v907 * v1139;
-    const V v1147 = v884 + v1146;
-    const V v1148 = v917 * v1063;
-    const V v1149 = v1140 - v1148;
-    const V v1150 = v367 * v996;
-    const V v1151 = v364 * v996;
-    const V v1152 = v815 * v996;
-    const V v1153 = v917 * v1075;
-    const V v1154 = v1143 + v1153;
-    const V v1155 = v915 * v1075;
-    const V v1156 = v1145 + v1155;
-    const V v1157 = v915 * v1138;
-    const V v1158 = v1147 - v1157;
-    const V v1159 = v768 * v1075;
-    const V v1160 = v770 * v1075;
-    const V v1161 = v766 * v1075;
-    const V v1162 = v799 * v1075;
-    const V v1163 = v803 * v999;
-    const V v1164 = v1151 - v1163;
-    const V v1165 = v193 * v1154;
-    const V v1166 = v193 * v1074;
-    const V v1167 = v192 * v1074;
-    const V v1168 = v677 + v1167;
-    const V v1169 = v192 * v1154;
-    const V v1170 = v864 + v1169;
-    const V v1171 = v919 * v1083;
-    const V v1172 = v1159 - v1171;
-    const V v1173 = v913 * v1083;
-    const V v1174 = v1161 - v1173;
-    const V v1175 = v519 * v1083;
-    const V v1176 = v1162 - v1175;
-    const V v1177 = v93 * v573;
-    const V v1178 = v1166 - v1177;
-    const V v1179 = v93 * v662;
-    const V v1180 = v1165 - v1179;
-    const V v1181 = v813 * v1083;
-    const V v1182 = v1160 - v1181;
-    const V v1183 = v193 * v1172;
-    const V v1184 = v192 * v1172;
-    const V v1185 = v726 + v1184;
-    const V v1186 = v193 * v1174;
-    const V v1187 = v192 * v1174;
-    const V v1188 = v655 + v1187;
-    const V v1189 = v193 * v1182;
-    const V v1190 = v93 * v637;
-    const V v1191 = v1183 - v1190;
-    const V v1192 = v192 * v1182;
-    const V v1193 = v852 + v1192;
-    const V v1194 = v93 * v640;
-    const V v1195 = v1186 - v1194;
-    const V v1196 = v93 * v836;
-    const V v1197 = v1189 - v1196;
-    const V v1198 = v931 + v1178;
-    const V v1199 = v929 + v1178;
-    const V v1200 = v193 * v1176;
-    const V v1201 = v886 + v1200;
-    const V v1202 = v192 * v1176;
-    const V v1203 = v855 + v1202;
-    const V v1204 = v193 * v1156;
-    const V v1205 = v1158 + v1204;
-    const V v1206 = v192 * v1156;
-    const V v1207 = v882 + v1206;
-    const V v1208 = v890 + v1191;
-    const V v1209 = v749 + v1191;
-    const V v1210 = v915 * v1041;
-    const V v1211 = v1198 + v1210;
-    const V v1212 = v917 * v1041;
-    const V v1213 = v1199 + v1212;
-    const V v1214 = v915 * v1092;
-    const V v1215 = v1201 - v1214;
-    const V v1216 = v458 * v1041;
-    const V v1217 = v1001 + v1216;
-    const V v1218 = v469 * v1041;
-    const V v1219 = v552 + v1218;
-    const V v1220 = v105 * v712;
-    const V v1221 = v1208 + v1220;
-    const V v1222 = v104 * v712;
-    const V v1223 = v888 - v1222;
-    const V v1224 = v915 * v1089;
-    const V v1225 = v1209 - v1224;
-    const V v1226 = v917 * v1089;
-    const V v1227 = v1221 - v1226;
-    const V v1228 = v482 * v1041;
-    const V v1229 = v582 + v1228;
-    const V v1230 = v352 * v1019;
-    const V v1231 = v1215 + v1230;
-    const V v1232 = v352 * v991;
-    const V v1233 = v1211 + v1232;
-    const V v1234 = v294 * v978;
-    const V v1235 = v1219 + v1234;
-    const V v1236 = v298 * v978;
-    const V v1237 = v1229 + v1236;
-    const V v1238 = v917 * v1091;
-    const V v1239 = v1223 - v1238;
-    const V v1240 = v352 * v1015;
-    const V v1241 = v1225 + v1240;
-    const V v1242 = v354 * v1015;
-    const V v1243 = v1227 + v1242;
-    const V v1244 = v805 * v978;
-    const V v1245 = v1233 + v1244;
-    const V v1246 = v805 * v1004;
-    const V v1247 = v1231 - v1246;
-    const V v1248 = v296 * v978;
-    const V v1249 = v583 + v1248;
-    const V v1250 = v815 * v1004;
-    const V v1251 = v878 - v1250;
-    const V v1252 = v815 * v978;
-    const V v1253 = v609 + v1252;
-    const V v1254 = v354 * v1017;
-    const V v1255 = v1239 + v1254;
-    const V v1256 = v805 * v1002;
-    const V v1257 = v1241 - v1256;
-    const V v1258 = v807 * v1002;
-    const V v1259 = v1243 - v1258;
-    const V v1260 = v807 * v978;
-    const V v1261 = v1213 + v1260;
-    const V v1262 = v480 * v1041;
-    const V v1263 = v1249 + v1262;
-    const V v1264 = v799 * v1092;
-    const V v1265 = v1251 - v1264;
-    const V v1266 = v799 * v1041;
-    const V v1267 = v1253 + v1266;
-    const V v1268 = v807 * v1003;
-    const V v1269 = v1255 - v1268;
-    const V v1270 = v805 * v1003;
-    const V v1271 = v876 - v1270;
-    const V v1272 = v460 * v1041;
-    const V v1273 = v588 + v1272;
-    const V v1274 = v448 * v779;
-    const V v1275 = v448 * v773;
-    const V v1276 = v448 * v452;
-    const V v1277 = v386 + v1276;
-    const V v1278 = v168 * v773;
-    const V v1279 = v168 * v452;
-    const V v1280 = v125 * v773;
-    const V v1281 = v125 * v452;
-    const V v1282 = v125 * v779;
-    const V v1283 = v776 + v1282;
-    const V v1284 = v779 * v779;
-    const V v1285 = v484 + v1284;
-    const V v1286 = v173 * v762;
-    const V v1287 = v1274 - v1286;
-    const V v1288 = v173 * v784;
-    const V v1289 = v1275 + v1288;
-    const V v1290 = v450 * v784;
-    const V v1291 = v1278 - v1290;
-    const V v1292 = v129 * v784;
-    const V v1293 = v1280 - v1292;
-    const V v1294 = v450 * v182;
-    const V v1295 = v1279 - v1294;
-    const V v1296 = v129 * v182;
-    const V v1297 = v1281 - v1296;
-    const V v1298 = v762 * v762;
-    const V v1299 = v1285 + v1298;
-    const V v1300 = v762 * v499;
-    const V v1301 = v785 - v1300;
-    const V v1302 = v499 * v499;
-    const V v1303 = v1299 + v1302;
-    const V v1304 = v173 * v502;
-    const V v1305 = v508 + v1304;
-    const V v1306 = v129 * v502;
-    const V v1307 = v507 - v1306;
-    const V v1308 = v450 * v502;
-    const V v1309 = v506 - v1308;
-    const V v1310 = v1301 * v1301;
-    const V v1311 = 2.0 * v1301;
-    const V v1312 = v972 * v1283;
-    const V v1313 = v220 + v1303;
-    const V v1314 = v279 * v1303;
-    const V v1315 = v220 * v1303;
-    const V v1316 = v352 * v972;
-    const V v1317 = v1116 + v1316;
-    const V v1318 = v220 * v1310;
-    const V v1319 = v1310 + v1315;
-    const V v1320 = v220 * v1311;
-    const V v1321 = v279 * v1311;
-    const V v1322 = v281 * v1313;
-    const V v1323 = softehl_vrcbrt(v1318);
-    const V v1324 = v279 * v1319;
-    const V v1325 = v221 * v1310;
-    const V v1326 = v805 * v1317;
-    const V v1327 = v1205 - v1326;
-    const V v1328 = v352 * v999;
-    const V v1329 = v1141 - v1328;
-    const V v1330 = v999 * v1283;
-    const V v1331 = v1150 + v1330;
-    const V v1332 = v354 * v999;
-    const V v1333 = v1130 - v1332;
-    const V v1334 = v513 * v999;
-    const V v1335 = v1152 - v1334;
-    const V v1336 = v995 * v1283;
-    const V v1337 = v1020 + v1336;
-    const V v1338 = v352 * v995;
-    const V v1339 = v1135 + v1338;
-    const V v1340 = v352 * v1339;
-    const V v1341 = v1327 + v1340;
-    const V v1342 = v805 * v1312;
-    const V v1343 = v870 + v1342;
-    const V v1344 = v805 * v1121;
-    const V v1345 = v872 - v1344;
-    const V v1346 = v352 * v1337;
-    const V v1347 = v1343 - v1346;
-    const V v1348 = v354 * v1337;
-    const V v1349 = v854 - v1348;
-    const V v1350 = v367 * v1312;
-    const V v1351 = v844 + v1350;
-    const V v1352 = v367 * v978;
-    const V v1353 = v841 + v1352;
-    const V v1354 = v367 * v1002;
-    const V v1355 = v832 - v1354;
-    const V v1356 = v236 * v978;
-    const V v1357 = v1273 + v1356;
-    const V v1358 = v352 * v1133;
-    const V v1359 = v1345 + v1358;
-    const V v1360 = v354 * v1133;
-    const V v1361 = v861 + v1360;
-    const V v1362 = v354 * v991;
-    const V v1363 = v1261 + v1362;
-    const V v1364 = v807 * v1312;
-    const V v1365 = v1349 + v1364;
-    const V v1366 = v1197 + v1347;
-    const V v1367 = v1197 + v1365;
-    const V v1368 = v807 * v1121;
-    const V v1369 = v1361 - v1368;
-    const V v1370 = v1180 + v1359;
-    const V v1371 = v1180 + v1369;
-    const V v1372 = v244 * v991;
-    const V v1373 = v584 + v1372;
-    const V v1374 = v815 * v1121;
-    const V v1375 = v868 - v1374;
-    const V v1376 = v815 * v1002;
-    const V v1377 = v846 - v1376;
-    const V v1378 = v815 * v1312;
-    const V v1379 = v866 + v1378;
-    const V v1380 = v364 * v1312;
-    const V v1381 = v851 + v1380;
-    const V v1382 = v364 * v1002;
-    const V v1383 = v652 - v1382;
-    const V v1384 = v362 * v1002;
-    const V v1385 = v745 - v1384;
-    const V v1386 = v362 * v978;
-    const V v1387 = v755 + v1386;
-    const V v1388 = v364 * v978;
-    const V v1389 = v604 + v1388;
-    const V v1390 = v456 * v1070;
-    const V v1391 = v1373 + v1390;
-    const V v1392 = v364 * v1003;
-    const V v1393 = v927 - v1392;
-    const V v1394 = v815 * v1003;
-    const V v1395 = v874 - v1394;
-    const V v1396 = v919 * v1070;
-    const V v1397 = v1387 + v1396;
-    const V v1398 = v919 * v1104;
-    const V v1399 = v1385 + v1398;
-    const V v1400 = v913 * v1104;
-    const V v1401 = v1383 + v1400;
-    const V v1402 = v913 * v1070;
-    const V v1403 = v1389 + v1402;
-    const V v1404 = v519 * v1104;
-    const V v1405 = v1377 + v1404;
-    const V v1406 = v913 * v1106;
-    const V v1407 = v1381 + v1406;
-    const V v1408 = v519 * v1106;
-    const V v1409 = v1379 + v1408;
-    const V v1410 = v913 * v1108;
-    const V v1411 = v1393 + v1410;
-    const V v1412 = v519 * v1108;
-    const V v1413 = v1395 + v1412;
-    const V v1414 = v519 * v1149;
-    const V v1415 = v1375 + v1414;
-    const V v1416 = v519 * v1070;
-    const V v1417 = v1267 + v1416;
-    const V v1418 = v519 * v1110;
-    const V v1419 = v1265 + v1418;
-    const V v1420 = v907 * v1110;
-    const V v1421 = v1247 + v1420;
-    const V v1422 = v907 * v1070;
-    const V v1423 = v1245 + v1422;
-    const V v1424 = v907 * v1104;
-    const V v1425 = v1257 + v1424;
-    const V v1426 = v907 * v1106;
-    const V v1427 = v1366 + v1426;
-    const V v1428 = v907 * v1108;
-    const V v1429 = v1271 + v1428;
-    const V v1430 = v907 * v1149;
-    const V v1431 = v1370 + v1430;
-    const V v1432 = v905 * v1108;
-    const V v1433 = v1269 + v1432;
-    const V v1434 = v905 * v1149;
-    const V v1435 = v1371 + v1434;
-    const V v1436 = v905 * v1070;
-    const V v1437 = v1363 + v1436;
-    const V v1438 = v905 * v1104;
-    const V v1439 = v1259 + v1438;
-    const V v1440 = v905 * v1106;
-    const V v1441 = v1367 + v1440;
-    const V v1442 = v352 * v1017;
-    const V v1443 = v1429 + v1442;
-    const V v1444 = v1323 * v1323;
-    const V v1445 = 0.6666666666666666 * v1323;
-    const V v1446 = 0.4444444444444444 * v1323;
-    const V v1447 = v281 * v1323;
-    const V v1448 = v1323 * v1444;
-    const V v1449 = v1444 * v1444;
-    const V v1450 = v279 * v1444;
-    const V v1451 = v1322 * v1446;
-    const V v1452 = v1449 * v1445;
-    const V v1453 = v1448 * v1451;
-    const V v1454 = v1195 + v1443;
-    const V v1455 = v1195 + v1433;
-    const V v1456 = 0.3333333333333333 * v1449;
-    const V v1457 = 1.1111111111111112 * v1449;
-    const V v1458 = v1449 * v1457;
-    const V v1459 = v220 * v1450;
-    const V v1460 = v1447 + v1459;
-    const V v1461 = v1303 * v1450;
-    const V v1462 = v1447 + v1461;
-    const V v1463 = v1448 * v1453;
-    const V v1464 = v279 * v1452;
-    const V v1465 = v1322 * v1456;
-    const V v1466 = v281 * v1456;
-    const V v1467 = v1321 * v1452;
-    const V v1468 = v284 * v1452;
-    const V v1469 = v1314 * v1452;
-    const V v1470 = v1460 + v978;
-    const V v1471 = v1466 + v1468;
-    const V v1472 = v1324 * v1452;
-    const V v1473 = v1465 + v1472;
-    const V v1474 = v1324 * v1458;
-    const V v1475 = v1463 + v1474;
-    const V v1476 = v1466 + v1469;
-    const V v1477 = v1320 * v1464;
-    const V v1478 = v1320 * v1466;
-    const V v1479 = v220 * v1473;
-    const V v1480 = v1450 - v1479;
-    const V v1481 = v140 * v1470;
-    const V v1482 = v1080 + v1481;
-    const V v1483 = v1303 * v1477;
-    const V v1484 = v1478 + v1483;
-    const V v1485 = v1320 * v1475;
-    const V v1486 = v1467 - v1485;
-    const V v1487 = v1320 * v1471;
-    const V v1488 = v1310 * v1471;
-    const V v1489 = v1450 - v1488;
-    const V v1490 = v1310 * v1473;
-    const V v1491 = v1462 - v1490;
-    const V v1492 = v220 * v1486;
-    const V v1493 = v1477 + v1492;
-    const V v1494 = 2.0 * v1480;
-    const V v1495 = v1311 * v1480;
-    const V v1496 = v1311 * v1473;
-    const V v1497 = v1484 + v1496;
-    const V v1498 = v1310 * v1486;
-    const V v1499 = v1497 + v1498;
-    const V v1500 = v1311 * v1493;
-    const V v1501 = v1494 - v1500;
-    const V v1502 = v221 * v1489;
-    const V v1503 = v221 * v1491;
-    const V v1504 = 2.0 * v1491;
-    const V v1505 = v221 * v1476;
-    const V v1506 = v1325 * v1476;
-    const V v1507 = v1325 * v1475;
-    const V v1508 = v1505 - v1507;
-    const V v1509 = v1310 * v1508;
-    const V v1510 = v1506 + v1509;
-    const V v1511 = v221 * v1499;
-    const V v1512 = v991 - v1495;
-    const V v1513 = v221 * v1510;
-    const V v1514 = v1504 - v1513;
-    const V v1515 = v1460 * v464;
-    const V v1516 = v1217 + v1515;
-    const V v1517 = v1460 * v1295;
-    const V v1518 = v1235 + v1517;
-    const V v1519 = v788 * v1487;
-    const V v1520 = v1495 - v991;
-    const V v1521 = v1460 * v1297;
-    const V v1522 = v1237 + v1521;
-    const V v1523 = v788 * v1501;
-    const V v1524 = v1307 * v1487;
-    const V v1525 = v1283 * v1487;
-    const V v1526 = v1283 * v1501;
-    const V v1527 = v1460 * v1277;
-    const V v1528 = v1263 + v1527;
-    const V v1529 = v1287 * v1487;
-    const V v1530 = v1287 * v1501;
-    const V v1531 = v1309 * v1487;
-    const V v1532 = v1523 - v1531;
-    const V v1533 = v513 * v1487;
-    const V v1534 = v513 * v1501;
-    const V v1535 = v1526 - v1524;
-    const V v1536 = v1524 - v1526;
-    const V v1537 = v1305 * v1487;
-    const V v1538 = v1530 - v1537;
-    const V v1539 = v1293 * v1487;
-    const V v1540 = v1534 + v1539;
-    const V v1541 = v1015 - v1532;
-    const V v1542 = v515 * v1487;
-    const V v1543 = v515 * v1501;
-    const V v1544 = v1536 - v1337;
-    const V v1545 = v1337 + v1535;
-    const V v1546 = v1017 - v1538;
-    const V v1547 = v1532 - v1015;
-    const V v1548 = v1019 + v1540;
-    const V v1549 = v515 * v1540;
-    const V v1550 = v1421 - v1549;
-    const V v1551 = v1289 * v1487;
-    const V v1552 = v1543 - v1551;
-    const V v1553 = v1289 * v1502;
-    const V v1554 = v196 * v1502;
-    const V v1555 = v196 * v1511;
-    const V v1556 = v196 * v1514;
-    const V v1557 = v200 * v1514;
-    const V v1558 = v1123 + v1557;
-    const V v1559 = v515 * v1511;
-    const V v1560 = v1553 - v1559;
-    const V v1561 = v1552 - v1555;
-    const V v1562 = v1542 - v1554;
-    const V v1563 = v1556 + v1560;
-    const V v1564 = v718 + v1558;
-    const V v1565 = v1289 * v1533;
-    const V v1566 = v1550 + v1565;
-    const V v1567 = v1289 * v1562;
-    const V v1568 = v1341 - v1567;
-    const V v1569 = v196 * v1503;
-    const V v1570 = v195 * v1503;
-    const V v1571 = v1168 + v1570;
-    const V v1572 = v505 * v1501;
-    const V v1573 = v1555 - v1572;
-    const V v1574 = v505 * v1487;
-    const V v1575 = v1554 - v1574;
-    const V v1576 = v1291 * v1487;
-    const V v1577 = v1573 - v1576;
-    const V v1578 = v1291 * v1502;
-    const V v1579 = v1522 + v1566;
-    const V v1580 = v1407 + v1522;
-    const V v1581 = v1309 * v1502;
-    const V v1582 = v196 * v1563;
-    const V v1583 = v1568 + v1582;
-    const V v1584 = v195 * v1563;
-    const V v1585 = v1207 + v1584;
-    const V v1586 = v1578 - v1556;
-    const V v1587 = v1133 - v1577;
-    const V v1588 = v1307 * v1502;
-    const V v1589 = v1305 * v1502;
-    const V v1590 = v1293 * v1502;
-    const V v1591 = v1305 * v1525;
-    const V v1592 = v1580 - v1591;
-    const V v1593 = v515 * v1561;
-    const V v1594 = v1583 + v1593;
-    const V v1595 = v1307 * v1525;
-    const V v1596 = v1351 - v1595;
-    const V v1597 = v1293 * v1525;
-    const V v1598 = v1409 - v1597;
-    const V v1599 = v1293 * v1533;
-    const V v1600 = v1419 + v1599;
-    const V v1601 = v1283 * v1511;
-    const V v1602 = v1588 - v1601;
-    const V v1603 = v1287 * v1511;
-    const V v1604 = v1589 - v1603;
-    const V v1605 = v513 * v1511;
-    const V v1606 = v1590 + v1605;
-    const V v1607 = v1283 * v1545;
-    const V v1608 = v1596 + v1607;
-    const V v1609 = v513 * v1544;
-    const V v1610 = v1598 + v1609;
-    const V v1611 = v513 * v1548;
-    const V v1612 = v1600 + v1611;
-    const V v1613 = v1528 + v1594;
-    const V v1614 = v1411 + v1528;
-    const V v1615 = v196 * v1602;
-    const V v1616 = v196 * v1604;
-    const V v1617 = v813 * v1106;
-    const V v1618 = v1608 + v1617;
-    const V v1619 = v1482 + v1612;
-    const V v1620 = v1482 + v1618;
-    const V v1621 = v799 * v1090;
-    const V v1622 = v1610 - v1621;
-    const V v1623 = v803 * v1017;
-    const V v1624 = v1614 + v1623;
-    const V v1625 = v513 * v1512;
-    const V v1626 = v1417 + v1625;
-    const V v1627 = v770 * v1090;
-    const V v1628 = v1620 - v1627;
-    const V v1629 = v91 * v1164;
-    const V v1630 = v1616 - v1629;
-    const V v1631 = v90 * v1164;
-    const V v1632 = v1188 + v1631;
-    const V v1633 = v1460 * v1293;
-    const V v1634 = v1626 + v1633;
-    const V v1635 = v1460 * v466;
-    const V v1636 = v1357 + v1635;
-    const V v1637 = v195 * v1604;
-    const V v1638 = v1632 + v1637;
-    const V v1639 = 2.0 * v1636;
-    const V v1640 = v195 * v1602;
-    const V v1641 = v1193 + v1640;
-    const V v1642 = v724 - v1638;
-    const V v1643 = v90 * v1331;
-    const V v1644 = v1641 + v1643;
-    const V v1645 = v91 * v1331;
-    const V v1646 = v1615 - v1645;
-    const V v1647 = v1638 - v724;
-    const V v1648 = v1454 + v1630;
-    const V v1649 = v1455 - v1630;
-    const V v1650 = v1642 + v1644;
-    const V v1651 = v1647 - v1644;
-    const V v1652 = v1441 - v1646;
-    const V v1653 = v1427 + v1646;
-    const V v1654 = v91 * v997;
-    const V v1655 = v1569 - v1654;
-    const V v1656 = v90 * v997;
-    const V v1657 = v1571 + v1656;
-    const V v1658 = v1291 * v1529;
-    const V v1659 = v1649 - v1658;
-    const V v1660 = v1291 * v1525;
-    const V v1661 = v1652 - v1660;
-    const V v1662 = v1289 * v1525;
-    const V v1663 = v1653 - v1662;
-    const V v1664 = v1289 * v1529;
-    const V v1665 = v1648 - v1664;
-    const V v1666 = v1423 + v1655;
-    const V v1667 = v1437 - v1655;
-    const V v1668 = v462 * v1495;
-    const V v1669 = v1391 + v1668;
-    const V v1670 = v917 * v1090;
-    const V v1671 = v1661 - v1670;
-    const V v1672 = v915 * v1090;
-    const V v1673 = v1663 - v1672;
-    const V v1674 = v766 * v1090;
-    const V v1675 = v1592 - v1674;
-    const V v1676 = v915 * v1091;
-    const V v1677 = v1665 - v1676;
-    const V v1678 = v1460 * v1289;
-    const V v1679 = v1666 + v1678;
-    const V v1680 = v1460 * v1291;
-    const V v1681 = v1667 + v1680;
-    const V v1682 = v766 * v1091;
-    const V v1683 = v1624 - v1682;
-    const V v1684 = v799 * v1091;
-    const V v1685 = v1413 - v1684;
-    const V v1686 = v917 * v1137;
-    const V v1687 = v1435 - v1686;
-    const V v1688 = v915 * v1137;
-    const V v1689 = v1431 - v1688;
-    const V v1690 = v799 * v1137;
-    const V v1691 = v1415 - v1690;
-    const V v1692 = v803 * v1337;
-    const V v1693 = v1675 - v1692;
-    const V v1694 = v799 * v1089;
-    const V v1695 = v1405 - v1694;
-    const V v1696 = v766 * v1089;
-    const V v1697 = v1401 - v1696;
-    const V v1698 = v766 * v1041;
-    const V v1699 = v1403 + v1698;
-    const V v1700 = v513 * v1546;
-    const V v1701 = v1685 + v1700;
-    const V v1702 = v513 * v1587;
-    const V v1703 = v1691 + v1702;
-    const V v1704 = v513 * v1541;
-    const V v1705 = v1695 + v1704;
-    const V v1706 = v1291 * v1575;
-    const V v1707 = v1687 - v1706;
-    const V v1708 = v1289 * v1575;
-    const V v1709 = v1689 - v1708;
-    const V v1710 = v1293 * v1575;
-    const V v1711 = v1703 - v1710;
-    const V v1712 = v803 * v1015;
-    const V v1713 = v1697 + v1712;
-    const V v1714 = v803 * v991;
-    const V v1715 = v1699 + v1714;
-    const V v1716 = v1293 * v1529;
-    const V v1717 = v1701 - v1716;
-    const V v1718 = v1293 * v1519;
-    const V v1719 = v1705 - v1718;
-    const V v1720 = v1291 * v1519;
-    const V v1721 = v1439 - v1720;
-    const V v1722 = v1289 * v1519;
-    const V v1723 = v1425 - v1722;
-    const V v1724 = v1516 + v1711;
-    const V v1725 = v1355 + v1516;
-    const V v1726 = v1305 * v1519;
-    const V v1727 = v1713 - v1726;
-    const V v1728 = v1305 * v1529;
-    const V v1729 = v1683 - v1728;
-    const V v1730 = v1460 * v1305;
-    const V v1731 = v1715 + v1730;
-    const V v1732 = v1639 + v1707;
-    const V v1733 = v1399 + v1639;
-    const V v1734 = v1307 * v1519;
-    const V v1735 = v1725 - v1734;
-    const V v1736 = v1460 * v1307;
-    const V v1737 = v1353 + v1736;
-    const V v1738 = v1309 * v1519;
-    const V v1739 = v1733 - v1738;
-    const V v1740 = v1460 * v1309;
-    const V v1741 = v1397 + v1740;
-    const V v1742 = v1724 - v1619;
-    const V v1743 = v1518 + v1727;
-    const V v1744 = v1518 + v1709;
-    const V v1745 = v1669 + v1723;
-    const V v1746 = v1659 - v1669;
-    const V v1747 = v813 * v1104;
-    const V v1748 = v1735 + v1747;
-    const V v1749 = v813 * v1070;
-    const V v1750 = v1737 + v1749;
-    const V v1751 = v801 * v991;
-    const V v1752 = v1741 + v1751;
-    const V v1753 = v801 * v1015;
-    const V v1754 = v1739 + v1753;
-    const V v1755 = v467 * v1070;
-    const V v1756 = v585 + v1755;
-    const V v1757 = v467 * v1520;
-    const V v1758 = v1283 * v1520;
-    const V v1759 = v1750 + v1758;
-    const V v1760 = v1283 * v1547;
-    const V v1761 = v1748 + v1760;
-    const V v1762 = v1619 + v1724;
-    const V v1763 = v1756 + v1757;
-    const V v1764 = v1757 - v1756;
-    const V v1765 = v770 * v1041;
-    const V v1766 = v1759 + v1765;
-    const V v1767 = v768 * v1041;
-    const V v1768 = v1752 + v1767;
-    const V v1769 = v770 * v1089;
-    const V v1770 = v1761 - v1769;
-    const V v1771 = v768 * v1089;
-    const V v1772 = v1754 - v1771;
-    const V v1773 = v1287 * v1532;
-    const V v1774 = v1743 + v1773;
-    const V v1775 = v515 * v1532;
-    const V v1776 = v1745 + v1775;
-    const V v1777 = v1717 - v1763;
-    const V v1778 = v1673 + v1763;
-    const V v1779 = v788 * v1532;
-    const V v1780 = v1772 + v1779;
-    const V v1781 = v788 * v1495;
-    const V v1782 = v1768 + v1781;
-    const V v1783 = v925 - v1774;
-    const V v1784 = v1770 + v1780;
-    const V v1785 = v1766 + v1782;
-    const V v1786 = v1766 - v1782;
-    const V v1787 = v1774 - v925;
-    const V v1788 = v1780 - v1770;
-    const V v1789 = v1787 - v1784;
-    const V v1790 = v1783 + v1788;
-    const V v1791 = v1783 - v1788;
-    const V v1792 = v1628 + v1770;
-    const V v1793 = v1628 - v1770;
-    const V v1794 = v1784 + v1792;
-    const V v1795 = v788 * v1511;
-    const V v1796 = v1581 - v1795;
-    const V v1797 = v505 * v1511;
-    const V v1798 = v1586 + v1797;
-    const V v1799 = v505 * v1532;
-    const V v1800 = v1721 - v1799;
-    const V v1801 = v1791 - v1793;
-    const V v1802 = v1791 + v1793;
-    const V v1803 = v196 * v1796;
-    const V v1804 = v196 * v1798;
-    const V v1805 = v195 * v1796;
-    const V v1806 = v1185 + v1805;
-    const V v1807 = v195 * v1798;
-    const V v1808 = v1170 + v1807;
-    const V v1809 = v196 * v1606;
-    const V v1810 = v1579 + v1809;
-    const V v1811 = v195 * v1606;
-    const V v1812 = v1203 + v1811;
-    const V v1813 = v505 * v1495;
-    const V v1814 = v1681 - v1813;
-    const V v1815 = v1287 * v1495;
-    const V v1816 = v1731 + v1815;
-    const V v1817 = v515 * v1495;
-    const V v1818 = v1679 + v1817;
-    const V v1819 = v91 * v1127;
-    const V v1820 = v1803 - v1819;
-    const V v1821 = v90 * v1127;
-    const V v1822 = v1806 + v1821;
-    const V v1823 = v91 * v1333;
-    const V v1824 = v1804 - v1823;
-    const V v1825 = v90 * v1333;
-    const V v1826 = v1808 + v1825;
-    const V v1827 = v91 * v1335;
-    const V v1828 = v1810 - v1827;
-    const V v1829 = v90 * v1335;
-    const V v1830 = v1812 + v1829;
-    const V v1831 = v1800 - v1820;
-    const V v1832 = v753 - v1816;
-    const V v1833 = v1776 + v1820;
-    const V v1834 = v1816 - v753;
-    const V v1835 = v1786 + v1832;
-    const V v1836 = v1822 - v1833;
-    const V v1837 = v1822 + v1833;
-    const V v1838 = v1820 - v1800;
-    const V v1839 = v1830 - v1828;
-    const V v1840 = v1832 - v1786;
-    const V v1841 = v1785 + v1834;
-    const V v1842 = v1834 - v1785;
-    const V v1843 = v1828 + v1830;
-    const V v1844 = v1564 - v1830;
-    const V v1845 = v1650 - v1831;
-    const V v1846 = v1622 - v1833;
-    const V v1847 = v1742 - v1828;
-    const V v1848 = v1839 - v1742;
-    const V v1849 = v1839 + v1847;
-    const V v1850 = v1844 - v1826;
-    const V v1851 = v1845 - v1822;
-    const V v1852 = v1651 - v1822;
-    const V v1853 = v1826 - v718;
-    const V v1854 = v1843 - v1762;
-    const V v1855 = v1558 + v1762;
-    const V v1856 = v1843 + v1853;
-    const V v1857 = v1830 - v1853;
-    const V v1858 = v1642 + v1837;
-    const V v1859 = v1657 - v1818;
-    const V v1860 = v1657 + v1818;
-    const V v1861 = v1634 - v1814;
-    const V v1862 = v1634 + v1814;
-    const V v1863 = v1859 - v1861;
-    const V v1864 = v1859 + v1861;
-    const V v1865 = v1860 + v1862;
-    softehl_store4(R + 0, 8, v1841, v1865, v1840, v1863);
-    const V v1866 = v1860 - v1862;
-    softehl_store4(R + 4, 8, v1835, v1864, v1842, v1866);
-    const V v1867 = v91 * v1329;
-    const V v1868 = v1613 - v1867;
-    const V v1869 = v90 * v1329;
-    const V v1870 = v1585 + v1869;
-    const V v1871 = v1719 - v1764;
-    const V v1872 = v1671 + v1764;
-    const V v1873 = v1828 - v1868;
-    const V v1874 = v1850 + v1870;
-    const V v1875 = v1558 - v1870;
-    const V v1876 = v1831 + v1871;
-    const V v1877 = v1831 - v1871;
-    const V v1878 = v1857 + v1875;
-    const V v1879 = v1870 + v1873;
-    const V v1880 = v1870 - v1873;
-    const V v1881 = v1837 - v1876;
-    const V v1882 = v1836 + v1877;
-    const V v1883 = v1836 - v1877;
-    const V v1884 = v1875 - v1857;
-    const V v1885 = v1848 + v1878;
-    const V v1886 = v1777 - v1871;
-    const V v1887 = v1846 - v1871;
-    const V v1888 = v1858 + v1876;
-    const V v1889 = v1837 + v1876;
-    const V v1890 = v1886 - v1622;
-    const V v1891 = v1744 + v1824;
-    const V v1892 = v1732 - v1824;
-    const V v1893 = v1849 - v1868;
-    const V v1894 = v1855 + v1868;
-    const V v1895 = v1852 + v1890;
-    const V v1896 = v515 * v1577;
-    const V v1897 = v1891 + v1896;
-    const V v1898 = v505 * v1577;
-    const V v1899 = v1892 - v1898;
-    const V v1900 = v505 * v1535;
-    const V v1901 = v1872 - v1900;
-    const V v1902 = v515 * v1535;
-    const V v1903 = v1778 + v1902;
-    const V v1904 = v1287 * v1535;
-    const V v1905 = v1693 + v1904;
-    const V v1906 = v1287 * v1538;
-    const V v1907 = v1729 + v1906;
-    const V v1908 = v505 * v1538;
-    const V v1909 = v1746 - v1908;
-    const V v1910 = v515 * v1538;
-    const V v1911 = v1677 + v1910;
-    const V v1912 = v738 - v1897;
-    const V v1913 = v1622 + v1901;
-    const V v1914 = v1897 - v738;
-    const V v1915 = v1901 - v1622;
-    const V v1916 = v734 - v1911;
-    const V v1917 = v1901 - v1909;
-    const V v1918 = v1911 - v734;
-    const V v1919 = v1905 + v1907;
-    const V v1920 = v1905 - v1787;
-    const V v1921 = v1647 + v1916;
-    const V v1922 = v1905 - v1792;
-    const V v1923 = v1907 - v1920;
-    const V v1924 = v1909 - v1777;
-    const V v1925 = v1916 - v1777;
-    const V v1926 = v1915 + v1921;
-    const V v1927 = v1647 + v1918;
-    const V v1928 = v1787 + v1905;
-    const V v1929 = v1801 + v1905;
-    const V v1930 = v1783 - v1905;
-    const V v1931 = v1921 - v1924;
-    const V v1932 = v1924 + v1926;
-    const V v1933 = v1924 - v1921;
-    const V v1934 = 2.0 * v1928;
-    const V v1935 = v1794 + v1934;
-    const V v1936 = v1907 + v1930;
-    const V v1937 = v1923 + v1929;
-    const V v1938 = v1923 - v1929;
-    const V v1939 = v1907 + v1935;
-    const V v1940 = v1789 + v1922;
-    const V v1941 = v1789 - v1922;
-    const V v1942 = v1724 + v1899;
-    const V v1943 = v1936 + v1941;
-    const V v1944 = v1936 + v1940;
-    const V v1945 = v1936 - v1940;
-    const V v1946 = v1899 - v1724;
-    const V v1947 = v1941 - v1936;
-    const V v1948 = -v1943;
-    const V v1949 = v1889 + v1927;
-    const V v1950 = v1853 - v1942;
-    const V v1951 = v1894 + v1942;
-    const V v1952 = v1644 - v1903;
-    const V v1953 = v1644 + v1903;
-    const V v1954 = v1833 + v1903;
-    const V v1955 = v1887 + v1903;
-    const V v1956 = v1914 + v1950;
-    const V v1957 = v1913 + v1949;
-    const V v1958 = v1932 + v1952;
-    const V v1959 = v1870 + v1914;
-    const V v1960 = v1879 - v1914;
-    const V v1961 = v1925 + v1955;
-    const V v1962 = v1953 + v1957;
-    const V v1963 = v1854 + v1956;
-    const V v1964 = v1952 - v1915;
-    const V v1965 = v1953 - v1913;
-    const V v1966 = v1888 - v1953;
-    const V v1967 = v1956 - v1854;
-    const V v1968 = v1966 - v1913;
-    const V v1969 = v1925 + v1968;
-    const V v1970 = v1883 - v1964;
-    const V v1971 = v1883 + v1964;
-    const V v1972 = v1856 + v1959;
-    const V v1973 = v1893 + v1959;
-    const V v1974 = v1881 - v1965;
-    const V v1975 = v1881 + v1965;
-    const V v1976 = v1969 - v1909;
-    const V v1977 = v1777 + v1909;
-    const V v1978 = v1933 - v1970;
-    const V v1979 = 2.0 * v1972;
-    const V v1980 = v1951 + v1979;
-    const V v1981 = v1931 + v1971;
-    const V v1982 = v1970 - v1931;
-    const V v1983 = v1927 - v1977;
-    const V v1984 = v1962 + v1977;
-    const V v1985 = v1977 - v1974;
-    const V v1986 = v1974 - v1983;
-    softehl_store4(K + 20, 64, v1937, v1982, v1947, v1986);
-    const V v1987 = v1975 + v1983;
-    const V v1988 = v1985 - v1927;
-    softehl_store4(K + 36, 64, v1938, v1978, v1948, v1988);
-    const V v1989 = v1983 - v1975;
-    const V v1990 = v1838 - v1917;
-    const V v1991 = v1851 + v1917;
-    const V v1992 = v1853 + v1912;
-    const V v1993 = v1880 + v1912;
-    const V v1994 = v1895 + v1990;
-    const V v1995 = v1961 + v1991;
-    const V v1996 = v1884 + v1992;
-    const V v1997 = v1990 - v1890;
-    const V v1998 = v1874 - v1993;
-    const V v1999 = v1874 + v1993;
-    const V v2000 = v1991 - v1961;
-    const V v2001 = v1918 + v1994;
-    const V v2002 = v1852 - v1918;
-    const V v2003 = v1992 - v1946;
-    const V v2004 = v1946 + v1996;
-    const V v2005 = v1967 + v1998;
-    const V v2006 = v1963 + v1999;
-    softehl_store4(K + 56, 64, v1987, v2006, v1986, v2005);
-    const V v2007 = v1954 + v2002;
-    const V v2008 = v2001 - v1954;
-    const V v2009 = v1998 - v1967;
-    const V v2010 = v1973 + v2004;
-    softehl_store4(K + 8, 64, v1984, v1980, v1976, v2010);
-    const V v2011 = v1999 - v1963;
-    softehl_store4(K + 60, 64, v1988, v2009, v1989, v2011);
-    const V v2012 = v1997 + v2007;
-    softehl_store4(K + 48, 64, v1944, v2008, v1947, v2012);
-    const V v2013 = v2004 - v1973;
-    const V v2014 = v2007 - v1997;
-    softehl_store4(K + 52, 64, v1948, v2014, v1945, v1989);
-    const V v2015 = v1848 - v2003;
-    const V v2016 = v1885 + v2003;
-    const V v2017 = v1882 + v1958;
-    const V v2018 = v1882 - v1958;
-    softehl_store4(K + 24, 64, v2017, v2010, v2018, v2013);
-    const V v2019 = v1960 + v2016;
-    softehl_store4(K + 12, 64, v1995, v2019, v2008, v2006);
-    const V v2020 = v1878 - v1960;
-    const V v2021 = v2020 - v2015;
-    softehl_store4(K + 28, 64, v2000, v2021, v2012, v2005);
-    softehl_store4(K + 40, 64, v1981, v2019, v1982, v2021);
-    const V v2022 = v2015 + v2020;
-    softehl_store4(K + 44, 64, v1978, v2022, v2014, v2009);
-    const V v2023 = v1793 + v1919;
-    const V v2024 = v1802 - v1919;
-    const V v2025 = v1920 + v2023;
-    const V v2026 = v1920 + v2024;
-    softehl_store4(K + 4, 64, v2026, v1981, v1944, v1987);
-    softehl_store4(K + 32, 64, v2026, v1995, v1937, v2000);
-    const V v2027 = v1790 - v2025;
-    softehl_store4(K + 0, 64, v1939, v1984, v2027, v2017);
-    const V v2028 = v1790 + v2025;
-    softehl_store4(K + 16, 64, v2027, v1976, v2028, v2018);
-}
-
-void softehl_solid_taylor_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_tangent_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, tangent + (8 * 8) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), tangent + (8 * 8) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    double K[SOFTEHL_LANES * (8 * 8)];
-    softehl_solid_taylor_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (8 * 8) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_solid_taylor_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 0.25 * parameters[2];
-    const V v4 = X0 - X2;
-    const V v5 = X0 + d0;
-    const V v6 = X4 - X0;
-    const V v7 = X2 + d2;
-    const V v8 = v6 - X2;
-    const V v9 = X4 - X6;
-    const V v10 = X6 + v8;
-    const V v11 = X4 + d4;
-    const V v12 = v4 + v9;
-    const V v13 = d2 - d6;
-    const V v14 = X6 + d6;
-    const V v15 = d6 - d2;
-    const V v16 = 0.25 * v10;
-    const V v17 = v9 - v4;
-    const V v18 = 0.25 * v12;
-    const V v19 = v10 - v17;
-    const V v20 = v17 + v10;
-    const V v21 = 0.25 * v17;
-    const V v22 = v12 + v10;
-    const V v23 = v10 - v12;
-    const V v24 = v17 + v12;
-    const V v25 = 0.0625 * v19;
-    const V v26 = 0.0625 * v20;
-    const V v27 = 0.0625 * v22;
-    const V v28 = 0.0625 * v23;
-    const V v29 = 0.0625 * v24;
-    const V v30 = v17 - v12;
-    const V v31 = 0.0625 * v30;
-    const V v32 = v12 - v17;
-    const V v33 = v17 - v10;
-    const V v34 = v12 - v10;
-    const V v35 = 0.0625 * v32;
-    const V v36 = 0.0625 * v33;
-    const V v37 = 0.0625 * v34;
-    const V v38 = X1 + d1;
-    const V v39 = X1 - X3;
-    const V v40 = X1 + X3;
-    const V v41 = d1 + d3;
-    const V v42 = X3 + d3;
-    const V v43 = X5 + d5;
-    const V v44 = X5 - X7;
-    const V v45 = X5 + X7;
-    const V v46 = d5 + v41;
-    const V v47 = v39 + v44;
-    const V v48 = d3 - d7;
-    const V v49 = v40 + v45;
-    const V v50 = X7 + d7;
-    const V v51 = d7 + v46;
-    const V v52 = d7 - d3;
-    const V v53 = v44 - v39;
-    const V v54 = v45 - v40;
-    const V v55 = 0.25 * v49;
-    const V v56 = 0.25 * v47;
-    const V v57 = 0.25 * v53;
-    const V v58 = 1.0 / v55;
-    const V v59 = v53 + v47;
-    const V v60 = v47 - v53;
-    const V v61 = 0.25 * v54;
-    const V v62 = v47 + v54;
-    const V v63 = v47 - v54;
-    const V v64 = 0.0625 * v59;
-    const V v65 = 0.0625 * v60;
-    const V v66 = 0.0625 * v62;
-    const V v67 = 0.0625 * v63;
-    const V v68 = v53 - v54;
-    const V v69 = v54 - v53;
-    const V v70 = v53 + v54;
-    const V v71 = v53 - v47;
-    const V v72 = v54 - v47;
-    const V v73 = 0.0625 * v68;
-    const V v74 = 0.0625 * v69;
-    const V v75 = 0.0625 * v70;
-    const V v76 = 0.0625 * v71;
-    const V v77 = 0.0625 * v72;
-    const V v78 = v51 * v58;
-    const V v79 = v21 * v56;
-    const V v80 = v21 * v61;
-    const V v81 = v18 * v61;
-    const V v82 = v57 * v18;
-    const V v83 = v79 - v82;
-    const V v84 = v57 * v16;
-    const V v85 = v80 - v84;
-    const V v86 = v56 * v16;
-    const V v87 = v81 - v86;
-    const V v88 = 1.0 / v85;
-    const V v89 = 0.25 * v78;
-    const V v90 = 1.0 + v89;
-    const V v91 = v73 * v88;
-    const V v92 = v75 * v88;
-    const V v93 = v83 * v88;
-    const V v94 = v87 * v88;
-    const V v95 = v64 * v88;
-    const V v96 = v66 * v88;
-    const V v97 = v88 * v74;
-    const V v98 = v67 * v88;
-    const V v99 = v65 * v88;
-    const V v100 = v88 * v77;
-    const V v101 = v88 * v76;
-    const V v102 = v93 * v97;
-    const V v103 = v99 - v102;
-    const V v104 = v94 * v97;
-    const V v105 = v100 - v104;
-    const V v106 = v25 * v88;
-    const V v107 = v26 * v88;
-    const V v108 = v29 * v88;
-    const V v109 = v27 * v88;
-    const V v110 = v93 * v92;
-    const V v111 = v110 + v101;
-    const V v112 = v88 * v36;
-    const V v113 = v28 * v88;
-    const V v114 = v31 * v88;
-    const V v115 = v88 * v37;
-    const V v116 = v88 * v35;
-    const V v117 = v93 * v112;
-    const V v118 = v114 - v117;
-    const V v119 = v94 * v112;
-    const V v120 = v115 - v119;
-    const V v121 = v94 * v92;
-    const V v122 = v93 * v107;
-    const V v123 = v94 * v107;
-    const V v124 = v15 * v107;
-    const V v125 = v48 * v92;
-    const V v126 = v13 * v92;
-    const V v127 = 1.0 + v126;
-    const V v128 = v52 * v107;
-    const V v129 = 1.0 + v128;
-    const V v130 = v95 - v110;
-    const V v131 = v109 - v123;
-    const V v132 = v113 + v123;
-    const V v133 = v116 - v122;
-    const V v134 = v94 * v91;
-    const V v135 = v96 - v134;
-    const V v136 = v94 * v106;
-    const V v137 = v109 + v136;
-    const V v138 = v93 * v91;
-    const V v139 = v95 + v138;
-    const V v140 = v93 * v106;
-    const V v141 = v108 - v140;
-    const V v142 = d0 * v91;
-    const V v143 = v127 + v142;
-    const V v144 = d1 * v91;
-    const V v145 = v125 + v144;
-    const V v146 = d1 * v106;
-    const V v147 = v129 + v146;
-    const V v148 = d0 * v106;
-    const V v149 = v124 + v148;
-    const V v150 = v122 - v108;
-    const V v151 = v98 - v121;
-    const V v152 = v121 - v96;
-    const V v153 = d4 * v97;
-    const V v154 = v143 + v153;
-    const V v155 = d5 * v97;
-    const V v156 = v145 + v155;
-    const V v157 = d5 * v112;
-    const V v158 = v147 + v157;
-    const V v159 = d4 * v112;
-    const V v160 = v149 + v159;
-    const V v161 = v154 * v158;
-    const V v162 = v156 * v160;
-    const V v163 = v161 - v162;
-    const V v164 = v90 * v163;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1], v3 = 0.25 * parameters[2];
+    const V v4 = X0 - X2, v5 = X0 + d0, v6 = X2 + d2, v7 = X4 - X6, v8 = X6 + (X4 - X0 - X2),
+        v9 = X4 + d4, v10 = v4 + v7, v11 = X6 + d6, v12 = 0.25 * v8, v13 = v7 - v4,
+        v14 = 0.25 * v10, v15 = 0.25 * v13, v16 = X1 + d1, v17 = X1 - X3, v18 = X1 + X3,
+        v19 = X3 + d3, v20 = X5 + d5, v21 = X5 - X7, v22 = X5 + X7, v23 = v17 + v21, v24 = X7 + d7,
+        v25 = v21 - v17, v26 = v22 - v18, v27 = 0.25 * v23, v28 = 0.25 * v25, v29 = 0.25 * v26,
+        v30 = 1.0 / (v15 * v29 - v28 * v12),
+        v31 = 1.0 + 0.25 * ((d7 + (d5 + (d1 + d3))) * (1.0 / (0.25 * (v18 + v22)))),
+        v32 = 0.0625 * (v25 - v26) * v30, v33 = 0.0625 * (v25 + v26) * v30,
+        v34 = (v15 * v27 - v28 * v14) * v30, v35 = (v14 * v29 - v27 * v12) * v30,
+        v36 = 0.0625 * (v25 + v23) * v30, v37 = 0.0625 * (v23 + v26) * v30,
+        v38 = v30 * (0.0625 * (v26 - v25)), v39 = 0.0625 * (v23 - v25) * v30 - v34 * v38,
+        v40 = v30 * (0.0625 * (v26 - v23)) - v35 * v38, v41 = 0.0625 * (v8 - v13) * v30,
+        v42 = 0.0625 * (v13 + v8) * v30, v43 = 0.0625 * (v13 + v10) * v30,
+        v44 = 0.0625 * (v10 + v8) * v30, v45 = v34 * v33, v46 = v45 + v30 * (0.0625 * (v25 - v23)),
+        v47 = v30 * (0.0625 * (v13 - v8)), v48 = 0.0625 * (v13 - v10) * v30 - v34 * v47,
+        v49 = v30 * (0.0625 * (v10 - v8)) - v35 * v47, v50 = v35 * v33, v51 = v34 * v42,
+        v52 = v35 * v42, v53 = v36 - v45, v54 = v44 - v52, v55 = 0.0625 * (v8 - v10) * v30 + v52,
+        v56 = v30 * (0.0625 * (v10 - v13)) - v51, v57 = v37 - v35 * v32, v58 = v44 + v35 * v41,
+        v59 = v36 + v34 * v32, v60 = v43 - v34 * v41, v61 = v51 - v43,
+        v62 = 0.0625 * (v23 - v26) * v30 - v50, v63 = v50 - v37,
+        v64 = (1.0 + (d2 - d6) * v33 + d0 * v32 + d4 * v38) * (1.0 + (d7 - d3) * v42 + d1 * v41 + d5 * v47),
+        v65 = ((d3 - d7) * v33 + d1 * v32 + d5 * v38) * ((d6 - d2) * v42 + d0 * v41 + d4 * v47),
+        v66 = v31 * (v64 - v65);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v165 = 1.0 - w[0];
-        const double v166 = 1.0 + w[0];
-        const double v167 = 0.25 * w[0];
-        const double v168 = 1.0 - w[1];
-        const double v169 = 1.0 + w[1];
-        const double v170 = w[1] + v166;
-        const double v171 = 0.25 * v169;
-        const double v172 = w[1] + v165;
-        const double v173 = 0.25 * v168;
-        const V v174 = w[1] * v135;
-        const V v175 = v91 + v174;
-        const V v176 = w[1] * v137;
-        const V v177 = v106 - v176;
-        const double v178 = 0.25 * v170;
-        const V v179 = w[1] * v105;
-        const V v180 = v97 + v179;
-        const double v181 = v166 * v171;
-        const double v182 = v165 * v171;
-        const double v183 = 0.25 * v172;
-        const double v184 = v167 + v173;
-        const V v185 = w[0] * v139;
-        const V v186 = v175 - v185;
-        const V v187 = w[0] * v141;
-        const V v188 = v187 + v177;
-        const double v189 = v165 * v173;
-        const V v190 = w[0] * v103;
-        const V v191 = v190 + v180;
-        const double v192 = v166 * v173;
-        const V v193 = v181 * v11;
-        const V v194 = v181 * v43;
-        const V v195 = w[1] * v151;
-        const double v196 = v173 - v167;
-        const V v197 = w[1] * v132;
-        const V v198 = w[1] * v152;
-        const V v199 = v189 * v5;
-        const V v200 = v193 + v199;
-        const V v201 = v189 * v38;
-        const V v202 = v194 + v201;
-        const V v203 = w[1] * v120;
-        const V v204 = v112 + v203;
-        const V v205 = w[1] * v131;
-        const V v206 = w[0] * v130;
-        const V v207 = v195 + v206;
-        const V v208 = w[0] * v150;
-        const V v209 = v197 + v208;
-        const V v210 = w[0] * v111;
-        const V v211 = v198 + v210;
-        const V v212 = v7 * v192;
-        const V v213 = v212 + v200;
-        const V v214 = v42 * v192;
-        const V v215 = v214 + v202;
-        const V v216 = w[0] * v118;
-        const V v217 = v216 + v204;
-        const V v218 = w[0] * v133;
-        const V v219 = v205 + v218;
-        const V v220 = d1 * v196;
-        const V v221 = v92 + v207;
-        const V v222 = v211 - v92;
-        const V v223 = v209 - v107;
-        const V v224 = v107 + v219;
-        const V v225 = v182 * v14;
-        const V v226 = v225 + v213;
-        const V v227 = v182 * v50;
-        const V v228 = v227 + v215;
-        const V v229 = X3 * v166;
-        const V v230 = X5 * v166;
-        const V v231 = d3 * v184;
-        const V v232 = v220 + v231;
-        const V v233 = d3 * v221;
-        const V v234 = d3 * v223;
-        const V v235 = 1.0 + v234;
-        const V v236 = d2 * v223;
-        const V v237 = d2 * v221;
-        const V v238 = 1.0 + v237;
-        const V v239 = X1 * v165;
-        const V v240 = v229 + v239;
-        const V v241 = X7 * v165;
-        const V v242 = v230 + v241;
-        const V v243 = 0.25 * v240;
-        const V v244 = 0.25 * v242;
-        const V v245 = d1 * v186;
-        const V v246 = v245 + v233;
-        const V v247 = d1 * v188;
-        const V v248 = v235 + v247;
-        const V v249 = d0 * v188;
-        const V v250 = v236 + v249;
-        const V v251 = d0 * v186;
-        const V v252 = v251 + v238;
-        const V v253 = d5 * v178;
-        const V v254 = v232 + v253;
-        const V v255 = d5 * v191;
-        const V v256 = v255 + v246;
-        const V v257 = d5 * v217;
-        const V v258 = v257 + v248;
-        const V v259 = d4 * v217;
-        const V v260 = v259 + v250;
-        const V v261 = d4 * v191;
-        const V v262 = v261 + v252;
-        const V v263 = v168 * v243;
-        const V v264 = d7 * v183;
-        const V v265 = v254 + v264;
-        const V v266 = d7 * v222;
-        const V v267 = v256 + v266;
-        const V v268 = d7 * v224;
-        const V v269 = v258 + v268;
-        const V v270 = d6 * v224;
-        const V v271 = v260 + v270;
-        const V v272 = d6 * v222;
-        const V v273 = v262 + v272;
-        const V v274 = v169 * v244;
-        const V v275 = v263 + v274;
-        const V v276 = v269 * v273;
-        const V v277 = 1.0 / v275;
-        const V v278 = v267 * v271;
-        const V v279 = v276 - v278;
-        const V v280 = v277 * v265;
-        const V v281 = 1.0 + v280;
-        const V v282 = v279 * v281;
-        const V v283 = 1.0 / v282;
-        const V v284 = v164 * v283;
-        const M v285 = softehl_eq(v284, softehl_splat(0.0));
-        V v286 = softehl_splat(0.0);
-        const M m287 = ~v285;
-        if (softehl_any(m287)) {
-            const V v288 = softehl_vrcbrt(v284);
-            const V v289 = v284 * v288;
-            const V v290 = v288 * v289;
-            v286 = softehl_blend(m287, v290, v286);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v67 = 1.0 - w[0], v68 = 1.0 + w[0], v69 = 0.25 * w[0], v70 = 1.0 - w[1],
+            v71 = 1.0 + w[1], v72 = 0.25 * v71, v73 = 0.25 * v70, v74 = v68 * v72, v75 = v67 * v72;
+        const V v76 = v32 + w[1] * v57 - w[0] * v59, v77 = w[0] * v60 + (v41 - w[1] * v58);
+        const double v78 = v67 * v73; const V v79 = w[0] * v39 + (v38 + w[1] * v40);
+        const double v80 = v68 * v73;
+        const V v81 = w[0] * v48 + (v47 + w[1] * v49), v82 = v33 + (w[1] * v62 + w[0] * v53),
+            v83 = w[1] * v63 + w[0] * v46 - v33, v84 = w[1] * v55 + w[0] * v61 - v42,
+            v85 = v42 + (w[1] * v54 + w[0] * v56),
+            v86 = v75 * v11 + (v6 * v80 + (v74 * v9 + v78 * v5)),
+            v87 = v75 * v24 + (v19 * v80 + (v74 * v20 + v78 * v16)),
+            v88 = d1 * (v73 - v69) + d3 * (v69 + v73) + d5 * (0.25 * (w[1] + v68)) + d7 * (0.25 * (w[1] + v67)),
+            v89 = d5 * v79 + (d1 * v76 + d3 * v82) + d7 * v83,
+            v90 = d5 * v81 + (1.0 + d3 * v84 + d1 * v77) + d7 * v85,
+            v91 = d4 * v81 + (d2 * v84 + d0 * v77) + d6 * v85,
+            v92 = d4 * v79 + (d0 * v76 + (1.0 + d2 * v82)) + d6 * v83,
+            v93 = v70 * (0.25 * (X3 * v68 + X1 * v67)) + v71 * (0.25 * (X5 * v68 + X7 * v67)),
+            v94 = 1.0 + 1.0 / v93 * v88, v95 = v66 * (1.0 / ((v90 * v92 - v89 * v91) * v94));
+        const M v96 = softehl_eq(v95, softehl_splat(0.0)); V v97 = softehl_splat(0.0);
+        const M m98 = ~v96;
+        if (softehl_any(m98)) {
+            const V v99 = softehl_vrcbrt(v95), v100 = v99 * (v95 * v99);
+            v97 = softehl_blend(m98, v100, v97);
         }
-        const V v291 = v273 * v286;
-        const V v292 = v271 * v286;
-        const V v293 = v267 * v286;
-        const V v294 = v269 * v286;
-        const V v295 = v281 * v286;
-        const V v296 = 2.0 * v291;
-        const V v297 = v291 * v291;
-        const V v298 = 2.0 * v292;
-        const V v299 = 2.0 * v293;
-        const V v300 = v293 * v293;
-        const V v301 = v291 * v293;
-        const V v302 = 2.0 * v294;
-        const V v303 = v295 * v295;
-        const V v304 = 2.0 * v295;
-        const V v305 = v292 * v292;
-        const V v306 = v297 + v305;
-        const V v307 = v291 * v294;
-        const V v308 = v294 * v294;
-        const V v309 = v300 + v308;
-        const V v310 = v292 * v294;
-        const V v311 = v301 + v310;
-        const V v312 = v295 * v304;
-        const V v313 = 2.0 * v303;
-        const V v314 = v292 * v293;
-        const V v315 = v307 - v314;
-        const V v316 = 2.0 * v306;
-        const V v317 = 2.0 * v309;
-        const V v318 = 2.0 * v311;
-        const V v319 = v295 * v315;
-        const V v320 = v303 + v306;
-        const V v321 = v315 * v315;
-        const V v322 = v313 * v315;
-        const V v323 = v309 + v320;
-        const V v324 = 1.0 / v319;
-        const V v325 = v303 * v321;
-        const V v326 = 2.0 * v323;
-        const V v327 = v323 * v323;
-        const V v328 = v1 * v323;
-        const V v329 = v303 * v303;
-        const V v330 = v327 - v329;
-        const V v331 = v306 * v306;
-        const V v332 = v330 - v331;
-        const V v333 = v309 * v309;
-        const V v334 = v332 - v333;
-        const V v335 = 0.5 * v334;
-        const V v336 = softehl_vrcbrt(v325);
-        const V v337 = 1.0 / v325;
-        const V v338 = v311 * v311;
-        const V v339 = v335 - v338;
-        const V v340 = v1 * v336;
-        const V v341 = v336 * v336;
-        const V v342 = parameters[1] * v336;
-        const V v343 = v342 * v339;
-        const V v344 = v328 + v343;
-        const V v345 = v2 * v341;
-        const V v346 = v345 * v318;
-        const V v347 = 0.5 * v345;
-        const V v348 = v347 * v326;
-        const V v349 = v340 + v348;
-        const V v350 = 1.0 - v337;
-        const V v351 = v3 * v350;
-        const V v352 = 0.3333333333333333 * v341;
-        const V v353 = v341 * v352;
-        const V v354 = v353 * v344;
-        const V v355 = v351 - v354;
-        const V v356 = v322 * v355;
-        const V v357 = v321 * v355;
-        const V v358 = v313 * v347;
-        const V v359 = v357 - v358;
-        const V v360 = v349 + v359;
-        const V v361 = v312 * v360;
-        const V v362 = v324 * v361;
-        const V v363 = v347 * v316;
-        const V v364 = v349 - v363;
-        const V v365 = v347 * v317;
-        const V v366 = v349 - v365;
-        const V v367 = v302 * v366;
-        const V v368 = v299 * v366;
-        const V v369 = v298 * v364;
-        const V v370 = v296 * v364;
-        const V v371 = v294 * v346;
-        const V v372 = v369 - v371;
-        const V v373 = v294 * v356;
-        const V v374 = v370 + v373;
-        const V v375 = v293 * v346;
-        const V v376 = v374 - v375;
-        const V v377 = v293 * v356;
-        const V v378 = v372 - v377;
-        const V v379 = v293 * v376;
-        const V v380 = v294 * v378;
-        const V v381 = v379 + v380;
-        const V v382 = v324 * v381;
-        const V v383 = v291 * v376;
-        const V v384 = v292 * v378;
-        const V v385 = v383 + v384;
-        const V v386 = v324 * v385;
-        const V v387 = v292 * v346;
-        const V v388 = v367 - v387;
-        const V v389 = v291 * v346;
-        const V v390 = v368 - v389;
-        const V v391 = v292 * v356;
-        const V v392 = v390 - v391;
-        const V v393 = v291 * v356;
-        const V v394 = v393 + v388;
-        const V v395 = v293 * v392;
-        const V v396 = v294 * v394;
-        const V v397 = v395 + v396;
-        const V v398 = v324 * v397;
-        softehl_store4(R + 7 * q + 0, (7 * points), v226, v228, v319, v386);
-        softehl_store3(R + 7 * q + 4, (7 * points), v398, v362, v382);
+        const V v101 = v92 * v97, v102 = v91 * v97, v103 = v89 * v97, v104 = v90 * v97,
+            v105 = v94 * v97, v106 = v105 * v105, v107 = v101 * v101 + v102 * v102,
+            v108 = v103 * v103 + v104 * v104, v109 = v101 * v103 + v102 * v104, v110 = 2.0 * v106,
+            v111 = v101 * v104 - v102 * v103, v112 = v105 * v111, v113 = v111 * v111,
+            v114 = v108 + (v106 + v107), v115 = 1.0 / v112, v116 = v106 * v113,
+            v117 = softehl_vrcbrt(v116),
+            v118 = 0.5 * (v114 * v114 - v106 * v106 - v107 * v107 - v108 * v108) - v109 * v109,
+            v119 = v117 * v117, v120 = v2 * v119, v121 = v120 * (2.0 * v109), v122 = 0.5 * v120,
+            v123 = v1 * v117 + v122 * (2.0 * v114),
+            v124 = v119 * (0.3333333333333333 * v119) * (v1 * v114 + parameters[1] * v117 * v118),
+            v125 = v3 * (1.0 - 1.0 / v116) - v124, v126 = v110 * v111 * v125,
+            v127 = v115 * (v105 * (2.0 * v105) * (v123 + (v113 * v125 - v110 * v122))),
+            v128 = v123 - v122 * (2.0 * v107), v129 = v123 - v122 * (2.0 * v108),
+            v130 = 2.0 * v101 * v128 + v104 * v126 - v103 * v121,
+            v131 = 2.0 * v102 * v128 - v104 * v121 - v103 * v126,
+            v132 = v115 * (v103 * v130 + v104 * v131), v133 = v115 * (v101 * v130 + v102 * v131),
+            v134 = v103 * (2.0 * v103 * v129 - v101 * v121 - v102 * v126) + v104 * (v101 * v126 + (2.0 * v104 * v129 - v102 * v121)),
+            v135 = v115 * v134;
+        softehl_store4(R + 7 * q + 0, (7 * points), v86, v87, v112, v133);
+        softehl_store3(R + 7 * q + 4, (7 * points), v135, v127, v132);
     }
 }
-
-void softehl_solid_taylor_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_fields_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + (7 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_fields_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (7 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * (7 * points)];
-    softehl_solid_taylor_fields(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (7 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_solid_taylor_fields, 8, 8, 0, 0, (7 * points), 0)

@@ -23,770 +23,134 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_solid_taylor_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_taylor_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10;
+    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
     softehl_load3(t + 8, 11, &t8, &t9, &t10);
-    (void)t8; (void)t9; (void)t10;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const V v3 = 0.5 * t8;
-    const V v4 = 0.5 * t9;
-    const double v5 = 0.5 * parameters[2];
-    const V v6 = X4 - X0;
-    const V v7 = X0 - X2;
-    const V v8 = v6 - X2;
-    const V v9 = X4 - X6;
-    const V v10 = X6 + v8;
-    const V v11 = X1 - X3;
-    const V v12 = X1 + X3;
-    const V v13 = v7 + v9;
-    const V v14 = 0.25 * v10;
-    const V v15 = 0.0625 * v10;
-    const V v16 = v9 - v7;
-    const V v17 = 0.25 * v13;
-    const V v18 = 0.0625 * v13;
-    const V v19 = 0.25 * v16;
-    const V v20 = 0.0625 * v16;
-    const V v21 = X5 - X7;
-    const V v22 = X5 + X7;
-    const V v23 = v11 + v21;
-    const V v24 = v12 + v22;
-    const V v25 = v21 - v11;
-    const V v26 = v22 - v12;
-    const V v27 = d0 - d2;
-    const V v28 = d0 + d2;
-    const V v29 = 0.25 * v25;
-    const V v30 = 0.0625 * v25;
-    const V v31 = 0.25 * v23;
-    const V v32 = 0.0625 * v23;
-    const V v33 = 0.25 * v26;
-    const V v34 = 0.0625 * v26;
-    const V v35 = 0.25 * v24;
-    const V v36 = 3.141592653589793 * v24;
-    const V v37 = 1.0 / v35;
-    const V v38 = v19 * v31;
-    const V v39 = v19 * v33;
-    const V v40 = d1 + d3;
-    const V v41 = d1 - d3;
-    const V v42 = v28 - d4;
-    const V v43 = d4 - d6;
-    const V v44 = v42 - d6;
-    const V v45 = d5 + d7;
-    const V v46 = d5 - d7;
-    const V v47 = v27 - v43;
-    const V v48 = v27 + v43;
-    const V v49 = v40 + v45;
-    const V v50 = v40 - v45;
-    const V v51 = v41 + v46;
-    const V v52 = v41 - v46;
-    const V v53 = v17 * v33;
-    const V v54 = v29 * v17;
-    const V v55 = v38 - v54;
-    const V v56 = v29 * v14;
-    const V v57 = v39 - v56;
-    const V v58 = v31 * v14;
-    const V v59 = v53 - v58;
-    const V v60 = 1.0 / v57;
-    const V v61 = 6.283185307179586 * v57;
-    const V v62 = 12.566370614359172 * v57;
-    const V v63 = v57 * v36;
-    const V v64 = t0 - t2;
-    const V v65 = t1 - t3;
-    const V v66 = t1 + t3;
-    const V v67 = 0.25 * v37;
-    const V v68 = v37 * v67;
-    const V v69 = v5 * v63;
-    const V v70 = t10 * v63;
-    const V v71 = t4 - t2;
-    const V v72 = t4 - t6;
-    const V v73 = t6 + v71;
-    const V v74 = v64 + v72;
-    const V v75 = v73 - t0;
-    const V v76 = t5 - t7;
-    const V v77 = t5 + t7;
-    const V v78 = 0.25 * v75;
-    const V v79 = v72 - v64;
-    const V v80 = v65 + v76;
-    const V v81 = v66 + v77;
-    const V v82 = 0.25 * v79;
-    const V v83 = 0.25 * v74;
-    const V v84 = v76 - v65;
-    const V v85 = v77 - v66;
-    const V v86 = 0.25 * v80;
-    const V v87 = 0.25 * v81;
-    const V v88 = 0.25 * v84;
-    const V v89 = 0.25 * v85;
-    const V v90 = v60 * v60;
-    const V v91 = 0.25 * v60;
-    const V v92 = v55 * v60;
-    const V v93 = v59 * v60;
-    const V v94 = v30 * v60;
-    const V v95 = v34 * v60;
-    const V v96 = v60 * v15;
-    const V v97 = v87 * v68;
-    const V v98 = v87 * v62;
-    const V v99 = v89 * v91;
-    const V v100 = v20 * v60;
-    const V v101 = v32 * v60;
-    const V v102 = v18 * v60;
-    const V v103 = v82 * v91;
-    const V v104 = v47 * v96;
-    const V v105 = v31 * v82;
-    const V v106 = v33 * v82;
-    const V v107 = v33 * v83;
-    const V v108 = v83 * v91;
-    const V v109 = v29 * v83;
-    const V v110 = v105 - v109;
-    const V v111 = v29 * v78;
-    const V v112 = v106 - v111;
-    const V v113 = v31 * v78;
-    const V v114 = v107 - v113;
-    const V v115 = v78 * v91;
-    const V v116 = v44 * v100;
-    const V v117 = v104 - v116;
-    const V v118 = v88 * v91;
-    const V v119 = v86 * v91;
-    const V v120 = v19 * v86;
-    const V v121 = v120 + v110;
-    const V v122 = v19 * v89;
-    const V v123 = v122 + v112;
-    const V v124 = v14 * v86;
-    const V v125 = v114 - v124;
-    const V v126 = v14 * v88;
-    const V v127 = v123 - v126;
-    const V v128 = v17 * v88;
-    const V v129 = v121 - v128;
-    const V v130 = v17 * v89;
-    const V v131 = v130 + v125;
-    const V v132 = v90 * v127;
-    const V v133 = v36 * v127;
-    const V v134 = v98 + v133;
-    const V v135 = v60 * v129;
-    const V v136 = v60 * v131;
-    const V v137 = v30 * v132;
-    const V v138 = v118 - v137;
-    const V v139 = v32 * v132;
-    const V v140 = v119 - v139;
-    const V v141 = v15 * v132;
-    const V v142 = v115 - v141;
-    const V v143 = v18 * v132;
-    const V v144 = v108 - v143;
-    const V v145 = v55 * v132;
-    const V v146 = v135 - v145;
-    const V v147 = v34 * v132;
-    const V v148 = v20 * v132;
-    const V v149 = v59 * v132;
-    const V v150 = v136 - v149;
-    const V v151 = parameters[2] * v134;
-    const V v152 = v70 + v151;
-    const V v153 = 0.5 * v152;
-    const V v154 = v99 - v147;
-    const V v155 = v103 - v148;
-    const V v156 = v100 * v150;
-    const V v157 = v100 * v146;
-    const V v158 = v156 - v144;
-    const V v159 = v147 - v99;
-    const V v160 = v148 - v103;
-    const V v161 = v95 * v150;
-    const V v162 = v95 * v146;
-    const V v163 = v162 - v140;
-    const V v164 = v92 * v155;
-    const V v165 = v157 + v164;
-    const V v166 = v93 * v155;
-    const V v167 = v158 + v166;
-    const V v168 = v96 * v146;
-    const V v169 = v144 - v168;
-    const V v170 = v94 * v146;
-    const V v171 = v96 * v150;
-    const V v172 = v94 * v150;
-    const V v173 = v140 - v172;
-    const V v174 = v93 * v154;
-    const V v175 = v161 + v174;
-    const V v176 = v92 * v154;
-    const V v177 = v163 + v176;
-    const V v178 = v50 * v94;
-    const V v179 = v92 * v142;
-    const V v180 = v169 - v179;
-    const V v181 = v92 * v138;
-    const V v182 = v170 + v181;
-    const V v183 = v93 * v142;
-    const V v184 = v171 + v183;
-    const V v185 = v93 * v138;
-    const V v186 = v173 - v185;
-    const V v187 = v50 * v138;
-    const V v188 = v44 * v138;
-    const V v189 = v44 * v94;
-    const V v190 = 1.0 + v189;
-    const V v191 = v52 * v95;
-    const V v192 = v178 - v191;
-    const V v193 = v52 * v142;
-    const V v194 = v47 * v142;
-    const V v195 = v47 * v95;
-    const V v196 = v190 - v195;
-    const V v197 = v47 * v154;
-    const V v198 = v188 - v197;
-    const V v199 = v52 * v154;
-    const V v200 = v187 - v199;
-    const V v201 = v44 * v155;
-    const V v202 = v194 - v201;
-    const V v203 = v50 * v155;
-    const V v204 = v193 - v203;
-    const V v205 = v52 * v96;
-    const V v206 = 1.0 + v205;
-    const V v207 = v50 * v100;
-    const V v208 = v206 - v207;
-    const V v209 = v49 * v97;
-    const V v210 = v67 * v49;
-    const V v211 = 1.0 + v210;
-    const V v212 = v196 * v204;
-    const V v213 = v208 * v196;
-    const V v214 = v211 * v211;
-    const V v215 = 2.0 * v211;
-    const V v216 = v208 * v198;
-    const V v217 = v212 + v216;
-    const V v218 = v215 * v209;
-    const V v219 = v192 * v202;
-    const V v220 = v217 - v219;
-    const V v221 = v117 * v192;
-    const V v222 = v213 - v221;
-    const V v223 = v222 * v222;
-    const V v224 = 2.0 * v222;
-    const V v225 = v117 * v200;
-    const V v226 = v220 - v225;
-    const V v227 = v214 * v223;
-    const V v228 = 1.0 / v227;
-    const V v229 = v224 * v226;
-    const V v230 = v214 * v229;
-    const V v231 = v218 * v223;
-    const V v232 = v230 - v231;
-    const V v233 = 1.0 - v228;
-    const V v234 = v69 * v233;
-    const V v235 = v69 * v228;
-    const V v236 = v232 * v235;
-    const V v237 = v229 * v234;
-    const V v238 = v236 - v153;
-    const V v239 = v228 * v238;
-    const V v240 = v153 + v239;
-    const V v241 = v223 * v240;
-    const V v242 = v237 + v241;
-    const V v243 = v223 * v234;
-    const V v244 = v214 * v240;
-    const V v245 = v218 * v234;
-    const V v246 = v244 - v245;
-    const V v247 = v214 * v234;
-    const V v248 = v224 * v246;
-    const V v249 = v224 * v247;
-    const V v250 = 2.0 * v247;
-    const V v251 = v226 * v250;
-    const V v252 = v248 + v251;
-    const V v253 = v200 * v249;
-    const V v254 = v202 * v249;
-    const V v255 = v215 * v242;
-    const V v256 = v215 * v243;
-    const V v257 = 2.0 * v243;
-    const V v258 = v209 * v257;
-    const V v259 = v255 - v258;
-    const V v260 = v97 * v256;
-    const V v261 = v67 * v259;
-    const V v262 = v192 * v252;
-    const V v263 = v253 + v262;
-    const V v264 = v192 * v249;
-    const V v265 = v117 * v252;
-    const V v266 = v254 + v265;
-    const V v267 = v117 * v249;
-    const V v268 = v204 * v249;
-    const V v269 = v198 * v249;
-    const V v270 = v208 * v252;
-    const V v271 = v268 + v270;
-    const V v272 = v208 * v249;
-    const V v273 = v196 * v252;
-    const V v274 = v269 + v273;
-    const V v275 = v196 * v249;
-    const V v276 = v155 * v275;
-    const V v277 = v155 * v264;
-    const V v278 = v142 * v264;
-    const V v279 = v142 * v275;
-    const V v280 = v154 * v267;
-    const V v281 = v279 + v280;
-    const V v282 = v154 * v272;
-    const V v283 = v138 * v267;
-    const V v284 = v138 * v272;
-    const V v285 = v277 + v284;
-    const V v286 = v100 * v274;
-    const V v287 = v100 * v263;
-    const V v288 = v285 + v287;
-    const V v289 = v96 * v274;
-    const V v290 = v281 + v289;
-    const V v291 = v96 * v263;
-    const V v292 = v95 * v266;
-    const V v293 = v290 + v292;
-    const V v294 = v95 * v271;
-    const V v295 = v94 * v271;
-    const V v296 = v288 + v295;
-    const V v297 = v94 * v266;
-    V s298 = softehl_splat(0.0);
-    V s299 = softehl_splat(0.0);
-    V s300 = softehl_splat(0.0);
-    V s301 = softehl_splat(0.0);
-    V s302 = softehl_splat(0.0);
-    V s303 = softehl_splat(0.0);
-    V s304 = softehl_splat(0.0);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1];
+    const V v3 = 0.5 * t8, v4 = 0.5 * t9, v5 = X0 - X2, v6 = X4 - X6, v7 = X6 + (X4 - X0 - X2),
+        v8 = X1 - X3, v9 = X1 + X3, v10 = v5 + v6, v11 = 0.25 * v7, v12 = 0.0625 * v7,
+        v13 = v6 - v5, v14 = 0.25 * v10, v15 = 0.0625 * v10, v16 = 0.25 * v13, v17 = 0.0625 * v13,
+        v18 = X5 - X7, v19 = X5 + X7, v20 = v8 + v18, v21 = v9 + v19, v22 = v18 - v8,
+        v23 = v19 - v9, v24 = d0 - d2, v25 = 0.25 * v22, v26 = 0.0625 * v22, v27 = 0.25 * v20,
+        v28 = 0.0625 * v20, v29 = 0.25 * v23, v30 = 0.0625 * v23, v31 = 3.141592653589793 * v21,
+        v32 = 1.0 / (0.25 * v21), v33 = d1 + d3, v34 = d1 - d3, v35 = d4 - d6,
+        v36 = d0 + d2 - d4 - d6, v37 = d5 + d7, v38 = d5 - d7, v39 = v24 - v35, v40 = v24 + v35,
+        v41 = v33 + v37, v42 = v33 - v37, v43 = v34 + v38, v44 = v34 - v38,
+        v45 = v16 * v27 - v25 * v14, v46 = v16 * v29 - v25 * v11, v47 = v14 * v29 - v27 * v11,
+        v48 = 1.0 / v46, v49 = 6.283185307179586 * v46, v50 = v46 * v31, v51 = t0 - t2,
+        v52 = t1 - t3, v53 = t1 + t3, v54 = 0.25 * v32, v55 = 0.5 * parameters[2] * v50,
+        v56 = t4 - t6, v57 = t5 - t7, v58 = t5 + t7, v59 = 0.25 * (t6 + (t4 - t2) - t0),
+        v60 = 0.25 * (v56 - v51), v61 = 0.25 * (v51 + v56), v62 = 0.25 * (v52 + v57),
+        v63 = 0.25 * (v53 + v58), v64 = 0.25 * (v57 - v52), v65 = 0.25 * (v58 - v53),
+        v66 = 0.25 * v48, v67 = v45 * v48, v68 = v47 * v48, v69 = v26 * v48, v70 = v30 * v48,
+        v71 = v48 * v12, v72 = v63 * (v32 * v54), v73 = v65 * v66, v74 = v17 * v48, v75 = v28 * v48,
+        v76 = v15 * v48, v77 = v60 * v66, v78 = v39 * v71 - v36 * v74,
+        v79 = v16 * v65 + (v29 * v60 - v25 * v59) - v11 * v64, v80 = v48 * v48 * v79,
+        v81 = v64 * v66 - v26 * v80, v82 = v62 * v66 - v28 * v80, v83 = v59 * v66 - v12 * v80,
+        v84 = v61 * v66 - v15 * v80,
+        v85 = v48 * (v16 * v62 + (v27 * v60 - v25 * v61) - v14 * v64) - v45 * v80, v86 = v30 * v80,
+        v87 = v17 * v80, v88 = v48 * (v14 * v65 + (v29 * v61 - v27 * v59 - v11 * v62)) - v47 * v80,
+        v89 = t10 * v50 + parameters[2] * (v63 * (12.566370614359172 * v46) + v31 * v79),
+        v90 = 0.5 * v89, v91 = v73 - v86, v92 = v77 - v87, v93 = v86 - v73, v94 = v87 - v77,
+        v95 = v74 * v85 + v67 * v92, v96 = v74 * v88 - v84 + v68 * v92, v97 = v70 * v88 + v68 * v91,
+        v98 = v70 * v85 - v82 + v67 * v91, v99 = v84 - v71 * v85 - v67 * v83,
+        v100 = v69 * v85 + v67 * v81, v101 = v71 * v88 + v68 * v83,
+        v102 = v82 - v69 * v88 - v68 * v81, v103 = v42 * v69 - v44 * v70,
+        v104 = 1.0 + v36 * v69 - v39 * v70, v105 = v36 * v81 - v39 * v91,
+        v106 = v42 * v81 - v44 * v91, v107 = v39 * v83 - v36 * v92, v108 = v44 * v83 - v42 * v92,
+        v109 = 1.0 + v44 * v71 - v42 * v74, v110 = v41 * v72, v111 = 1.0 + v54 * v41,
+        v112 = v111 * v111, v113 = 2.0 * v111, v114 = v113 * v110, v115 = v109 * v104 - v78 * v103,
+        v116 = v115 * v115, v117 = 2.0 * v115,
+        v118 = v104 * v108 + v109 * v105 - v103 * v107 - v78 * v106, v119 = 1.0 / (v112 * v116),
+        v120 = v117 * v118, v121 = v55 * (1.0 - v119),
+        v122 = v90 + v119 * ((v112 * v120 - v114 * v116) * (v55 * v119) - v90), v123 = v116 * v121,
+        v124 = v112 * v121, v125 = v117 * v124,
+        v126 = v117 * (v112 * v122 - v114 * v121) + v118 * (2.0 * v124), v127 = v72 * (v113 * v123),
+        v128 = v54 * (v113 * (v120 * v121 + v116 * v122) - v110 * (2.0 * v123)),
+        v129 = v106 * v125 + v103 * v126, v130 = v103 * v125, v131 = v107 * v125 + v78 * v126,
+        v132 = v78 * v125, v133 = v108 * v125 + v109 * v126, v134 = v109 * v125,
+        v135 = v105 * v125 + v104 * v126, v136 = v104 * v125, v137 = v92 * v136, v138 = v83 * v130,
+        v139 = v91 * v134, v140 = v81 * v132, v141 = v74 * v135, v142 = v71 * v129,
+        v143 = v83 * v136 + v91 * v132 + v71 * v135 + v70 * v131, v144 = v70 * v133,
+        v145 = v92 * v130 + v81 * v134 + v74 * v129 + v69 * v133, v146 = v69 * v131;
+    V s147 = {0}, s148 = {0}, s149 = {0}, s150 = {0}, s151 = {0}, s152 = {0}, s153 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v305 = 1.0 - w[1];
-        const double v306 = 0.25 * w[1];
-        const double v307 = 1.0 + w[1];
-        const V v308 = w[1] * v93;
-        const V v309 = 1.0 - v308;
-        const V v310 = w[1] * v154;
-        const double v311 = 1.0 - w[0];
-        const double v312 = 1.0 + w[0];
-        const double v313 = 0.25 * w[0];
-        const V v314 = w[0] * v92;
-        const V v315 = w[0] * v155;
-        const V v316 = w[1] * v175;
-        const V v317 = w[0] * v165;
-        const V v318 = X1 * v311;
-        const V v319 = X5 * v312;
-        const V v320 = w[1] * v186;
-        const V v321 = v309 - v314;
-        const V v322 = w[0] * v177;
-        const V v323 = v316 + v322;
-        const V v324 = v314 - v309;
-        const V v325 = X3 * v312;
-        const V v326 = v325 + v318;
-        const V v327 = X7 * v311;
-        const V v328 = v319 + v327;
-        const V v329 = w[1] * v167;
-        const V v330 = v317 + v329;
-        const V v331 = w[0] * v182;
-        const V v332 = v320 - v331;
-        const V v333 = 0.25 * v326;
-        const V v334 = v159 + v323;
-        const V v335 = 0.25 * v328;
-        const V v336 = w[0] * v180;
-        const V v337 = v160 + v330;
-        const V v338 = w[0] * v138;
-        const V v339 = v310 - v338;
-        const V v340 = v138 + v332;
-        const V v341 = w[1] * v142;
-        const V v342 = v315 - v341;
-        const V v343 = v142 + v336;
-        const V v344 = v312 * t3;
-        const V v345 = v312 * t5;
-        const V v346 = v305 * v333;
-        const V v347 = w[1] * v184;
-        const V v348 = v343 - v347;
-        const V v349 = v311 * t1;
-        const V v350 = v344 + v349;
-        const V v351 = v311 * t7;
-        const V v352 = v345 + v351;
-        const V v353 = v307 * v335;
-        const V v354 = v346 + v353;
-        const V v355 = 0.25 * v350;
-        const V v356 = 0.25 * v352;
-        const V v357 = w[2] * v57;
-        const V v358 = 1.0 / v354;
-        const V v359 = 6.283185307179586 * v354;
-        const V v360 = v305 * v355;
-        const V v361 = w[1] * v101;
-        const V v362 = w[1] * v95;
-        const V v363 = v95 * v324;
-        const V v364 = v100 * v324;
-        const V v365 = w[0] * v100;
-        const V v366 = w[0] * v101;
-        const V v367 = v363 - v366;
-        const V v368 = v357 * v359;
-        const V v369 = v307 * v356;
-        const V v370 = v360 + v369;
-        const V v371 = v127 * v359;
-        const V v372 = w[0] * v94;
-        const V v373 = v362 - v372;
-        const V v374 = v94 * v321;
-        const V v375 = v361 + v374;
-        const V v376 = w[0] * v102;
-        const V v377 = w[1] * v102;
-        const V v378 = v364 - v377;
-        const V v379 = w[1] * v96;
-        const V v380 = v365 - v379;
-        const V v381 = v96 * v321;
-        const V v382 = v376 + v381;
-        const V v383 = v61 * v370;
-        const V v384 = v371 + v383;
-        const V v385 = w[2] * v384;
-        const V v386 = v4 * v368;
-        const V v387 = v3 * v368;
-        const V v388 = v51 * v373;
-        const V v389 = v44 * v378;
-        const V v390 = v51 * v339;
-        const V v391 = v48 * v339;
-        const V v392 = v48 * v342;
-        const V v393 = v51 * v342;
-        const V v394 = v2 * v368;
-        const V v395 = v1 * v368;
-        const V v396 = 0.25 * v358;
-        const V v397 = v358 * v358;
-        const V v398 = v48 * v380;
-        const V v399 = v398 + v389;
-        const V v400 = v51 * v380;
-        const V v401 = 1.0 + v400;
-        const V v402 = v370 * v397;
-        const V v403 = v306 * v358;
-        const V v404 = v313 * v358;
-        const V v405 = v2 * v385;
-        const V v406 = v386 + v405;
-        const V v407 = v1 * v385;
-        const V v408 = v387 + v407;
-        const V v409 = v48 * v373;
-        const V v410 = 1.0 + v409;
-        const V v411 = v306 * v402;
-        const V v412 = v313 * v402;
-        const V v413 = 0.25 * v402;
-        const V v414 = v47 * v382;
-        const V v415 = v414 + v399;
-        const V v416 = v52 * v382;
-        const V v417 = v416 + v401;
-        const V v418 = v47 * v367;
-        const V v419 = v418 + v410;
-        const V v420 = v52 * v367;
-        const V v421 = v388 + v420;
-        const V v422 = 2.0 * v415;
-        const V v423 = v415 * v415;
-        const V v424 = v52 * v412;
-        const V v425 = v50 * v378;
-        const V v426 = v425 + v417;
-        const V v427 = v50 * v375;
-        const V v428 = v427 + v421;
-        const V v429 = v44 * v375;
-        const V v430 = v429 + v419;
-        const V v431 = 2.0 * v426;
-        const V v432 = v428 * v428;
-        const V v433 = v423 + v432;
-        const V v434 = 2.0 * v428;
-        const V v435 = 2.0 * v430;
-        const V v436 = v426 * v430;
-        const V v437 = v415 * v428;
-        const V v438 = v436 - v437;
-        const V v439 = v50 * v411;
-        const V v440 = v439 + v424;
-        const V v441 = v430 * v430;
-        const V v442 = v433 + v441;
-        const V v443 = v426 * v426;
-        const V v444 = v443 + v442;
-        const V v445 = v438 * v438;
-        const V v446 = 2.0 * v438;
-        const V v447 = v49 * v413;
-        const V v448 = v440 - v447;
-        const V v449 = v49 * v396;
-        const V v450 = 1.0 + v449;
-        const V v451 = 2.0 * v448;
-        const V v452 = v50 * v340;
-        const V v453 = v390 + v452;
-        const V v454 = v50 * v403;
-        const V v455 = v450 - v454;
-        const V v456 = v50 * v337;
-        const V v457 = v393 + v456;
-        const V v458 = v44 * v340;
-        const V v459 = v391 + v458;
-        const V v460 = v44 * v337;
-        const V v461 = v392 + v460;
-        const V v462 = v52 * v334;
-        const V v463 = v453 + v462;
-        const V v464 = v52 * v404;
-        const V v465 = v455 - v464;
-        const V v466 = v52 * v348;
-        const V v467 = v466 + v457;
-        const V v468 = v47 * v334;
-        const V v469 = v459 + v468;
-        const V v470 = v47 * v348;
-        const V v471 = v470 + v461;
-        const V v472 = v465 * v465;
-        const V v473 = 2.0 * v465;
-        const V v474 = v434 * v463;
-        const V v475 = v430 * v467;
-        const V v476 = v448 * v473;
-        const V v477 = v435 * v469;
-        const V v478 = v474 + v477;
-        const V v479 = v472 + v444;
-        const V v480 = v472 * v445;
-        const V v481 = v426 * v469;
-        const V v482 = v475 + v481;
-        const V v483 = softehl_vrcbrt(v480);
-        const V v484 = v422 * v471;
-        const V v485 = v478 + v484;
-        const V v486 = v472 * v444;
-        const V v487 = v445 + v486;
-        const V v488 = v428 * v471;
-        const V v489 = v482 - v488;
-        const V v490 = v476 * v444;
-        const V v491 = v476 * v445;
-        const V v492 = v431 * v467;
-        const V v493 = v485 + v492;
-        const V v494 = v394 * v487;
-        const V v495 = v406 * v487;
-        const V v496 = v415 * v463;
-        const V v497 = v489 - v496;
-        const V v498 = v476 + v493;
-        const V v499 = 2.0 * v497;
-        const V v500 = v446 * v497;
-        const V v501 = 1.1111111111111112 * v494;
-        const V v502 = v395 * v479;
-        const V v503 = v408 * v479;
-        const V v504 = v395 * v498;
-        const V v505 = v503 + v504;
-        const V v506 = 0.4444444444444444 * v502;
-        const V v507 = v472 * v493;
-        const V v508 = v490 + v507;
-        const V v509 = v500 + v508;
-        const V v510 = v472 * v500;
-        const V v511 = v491 + v510;
-        const V v512 = v483 * v506;
-        const V v513 = v408 * v483;
-        const V v514 = v483 * v483;
-        const V v515 = v514 * v514;
-        const V v516 = v501 * v515;
-        const V v517 = v515 * v516;
-        const V v518 = v394 * v509;
-        const V v519 = v495 + v518;
-        const V v520 = 0.6666666666666666 * v483;
-        const V v521 = v515 * v520;
-        const V v522 = 0.3333333333333333 * v515;
-        const V v523 = v502 * v522;
-        const V v524 = v519 * v521;
-        const V v525 = v505 * v522;
-        const V v526 = v524 + v525;
-        const V v527 = v395 * v522;
-        const V v528 = v511 * v527;
-        const V v529 = v513 - v528;
-        const V v530 = v395 * v483;
-        const V v531 = v483 * v514;
-        const V v532 = v512 * v531;
-        const V v533 = v531 * v532;
-        const V v534 = v517 + v533;
-        const V v535 = v511 * v534;
-        const V v536 = v526 - v535;
-        const V v537 = v494 * v521;
-        const V v538 = v523 + v537;
-        const V v539 = v394 * v521;
-        const V v540 = v394 * v514;
-        const V v541 = v406 * v514;
-        const V v542 = v511 * v539;
-        const V v543 = v541 - v542;
-        const V v544 = v493 * v540;
-        const V v545 = v500 * v538;
-        const V v546 = v544 - v545;
-        const V v547 = v529 + v546;
-        const V v548 = v472 * v543;
-        const V v549 = v529 + v548;
-        const V v550 = v472 * v538;
-        const V v551 = v540 - v550;
-        const V v552 = v472 * v540;
-        const V v553 = v530 + v552;
-        const V v554 = 2.0 * v553;
-        const V v555 = v472 * v536;
-        const V v556 = v543 - v555;
-        const V v557 = v444 * v543;
-        const V v558 = v547 + v557;
-        const V v559 = v444 * v540;
-        const V v560 = v530 + v559;
-        const V v561 = v476 * v540;
-        const V v562 = v549 + v561;
-        const V v563 = v476 * v538;
-        const V v564 = v556 - v563;
-        const V v565 = v445 * v538;
-        const V v566 = v560 - v565;
-        const V v567 = v445 * v536;
-        const V v568 = v558 - v567;
-        const V v569 = v499 * v551;
-        const V v570 = v446 * v564;
-        const V v571 = v569 + v570;
-        const V v572 = v446 * v551;
-        const V v573 = v451 * v566;
-        const V v574 = v473 * v568;
-        const V v575 = v573 + v574;
-        const V v576 = v473 * v566;
-        const V v577 = v412 * v576;
-        const V v578 = v404 * v575;
-        s299 += v577;
-        s299 -= v578;
-        const V v579 = v411 * v576;
-        const V v580 = v403 * v575;
-        s301 += v579;
-        s301 -= v580;
-        const V v581 = v396 * v575;
-        const V v582 = v413 * v576;
-        s298 += v581;
-        s298 -= v582;
-        const V v583 = v431 * v553;
-        const V v584 = v431 * v562;
-        const V v585 = v434 * v553;
-        const V v586 = v434 * v562;
-        const V v587 = v422 * v553;
-        const V v588 = v435 * v553;
-        const V v589 = v422 * v562;
-        const V v590 = v435 * v562;
-        const V v591 = v428 * v572;
-        const V v592 = v587 - v591;
-        const V v593 = v428 * v571;
-        const V v594 = v589 - v593;
-        const V v595 = v415 * v572;
-        const V v596 = v585 - v595;
-        const V v597 = v415 * v571;
-        const V v598 = v586 - v597;
-        const V v599 = v426 * v572;
-        const V v600 = v588 + v599;
-        const V v601 = v426 * v571;
-        const V v602 = v590 + v601;
-        const V v603 = v430 * v571;
-        const V v604 = v584 + v603;
-        const V v605 = v430 * v572;
-        const V v606 = v583 + v605;
-        const V v607 = v467 * v554;
-        const V v608 = v604 + v607;
-        const V v609 = v467 * v572;
-        const V v610 = v602 + v609;
-        const V v611 = v469 * v554;
-        const V v612 = v610 + v611;
-        const V v613 = v469 * v572;
-        const V v614 = v608 + v613;
-        const V v615 = v367 * v612;
-        const V v616 = v373 * v612;
-        const V v617 = v375 * v612;
-        const V v618 = v463 * v554;
-        const V v619 = v598 + v618;
-        const V v620 = v463 * v572;
-        const V v621 = v594 - v620;
-        const V v622 = v471 * v554;
-        const V v623 = v621 + v622;
-        const V v624 = v471 * v572;
-        const V v625 = v619 - v624;
-        const V v626 = v373 * v625;
-        const V v627 = v378 * v623;
-        s304 += v617;
-        s304 += v627;
-        const V v628 = v380 * v623;
-        s303 += v616;
-        s303 += v628;
-        const V v629 = v382 * v623;
-        s302 += v615;
-        s302 += v629;
-        const V v630 = v380 * v614;
-        s300 += v626;
-        s300 += v630;
-        const V v631 = v378 * v614;
-        s301 += v631;
-        const V v632 = v375 * v625;
-        s301 += v632;
-        const V v633 = v382 * v614;
-        s299 += v633;
-        const V v634 = v367 * v625;
-        s299 += v634;
-        const V v635 = v337 * v606;
-        s301 += v635;
-        const V v636 = v337 * v592;
-        s304 += v636;
-        const V v637 = v340 * v596;
-        s301 += v637;
-        const V v638 = v340 * v600;
-        s304 += v638;
-        const V v639 = v342 * v592;
-        s303 += v639;
-        const V v640 = v348 * v592;
-        s302 += v640;
-        const V v641 = v342 * v606;
-        s300 += v641;
-        const V v642 = v348 * v606;
-        s299 += v642;
-        const V v643 = v334 * v596;
-        s299 += v643;
-        const V v644 = v334 * v600;
-        s302 += v644;
-        const V v645 = v339 * v596;
-        s300 += v645;
-        const V v646 = v339 * v600;
-        s303 += v646;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v154 = 1.0 - w[1], v155 = 0.25 * w[1], v156 = 1.0 + w[1];
+        const V v157 = 1.0 - w[1] * v68;
+        const double v158 = 1.0 - w[0], v159 = 1.0 + w[0], v160 = 0.25 * w[0];
+        const V v161 = w[0] * v67, v162 = v157 - v161, v163 = v161 - v157,
+            v164 = v93 + (w[1] * v97 + w[0] * v98), v165 = v94 + (w[0] * v95 + w[1] * v96),
+            v166 = w[1] * v91 - w[0] * v81, v167 = v81 + (w[1] * v102 - w[0] * v100),
+            v168 = w[0] * v92 - w[1] * v83, v169 = v83 + w[0] * v99 - w[1] * v101,
+            v170 = v154 * (0.25 * (X3 * v159 + X1 * v158)) + v156 * (0.25 * (X5 * v159 + X7 * v158)),
+            v171 = 1.0 / v170, v172 = 6.283185307179586 * v170, v173 = v70 * v163 - w[0] * v75,
+            v174 = w[2] * v46 * v172,
+            v175 = v154 * (0.25 * (v159 * t3 + v158 * t1)) + v156 * (0.25 * (v159 * t5 + v158 * t7)),
+            v176 = w[1] * v70 - w[0] * v69, v177 = w[1] * v75 + v69 * v162,
+            v178 = v74 * v163 - w[1] * v76, v179 = w[0] * v74 - w[1] * v71,
+            v180 = w[0] * v76 + v71 * v162, v181 = w[2] * (v79 * v172 + v49 * v175),
+            v182 = v2 * v174, v183 = v1 * v174, v184 = 0.25 * v171, v185 = v175 * (v171 * v171),
+            v186 = v155 * v171, v187 = v160 * v171, v188 = v4 * v174 + v2 * v181,
+            v189 = v3 * v174 + v1 * v181, v190 = v155 * v185, v191 = v160 * v185,
+            v192 = 0.25 * v185, v193 = v39 * v180 + (v40 * v179 + v36 * v178), v194 = 2.0 * v193,
+            v195 = v42 * v178 + (v44 * v180 + (1.0 + v43 * v179)),
+            v196 = v42 * v177 + (v43 * v176 + v44 * v173),
+            v197 = v36 * v177 + (v39 * v173 + (1.0 + v40 * v176)), v198 = 2.0 * v195,
+            v199 = 2.0 * v196, v200 = 2.0 * v197, v201 = v195 * v197 - v193 * v196,
+            v202 = v195 * v195 + (v193 * v193 + v196 * v196 + v197 * v197), v203 = v201 * v201,
+            v204 = 2.0 * v201, v205 = v42 * v190 + v44 * v191 - v41 * v192,
+            v206 = v43 * v166 + v42 * v167 + v44 * v164,
+            v207 = 1.0 + v41 * v184 - v42 * v186 - v44 * v187,
+            v208 = v44 * v169 + (v43 * v168 + v42 * v165),
+            v209 = v40 * v166 + v36 * v167 + v39 * v164,
+            v210 = v39 * v169 + (v40 * v168 + v36 * v165), v211 = v207 * v207, v212 = 2.0 * v207,
+            v213 = v205 * v212, v214 = v211 + v202, v215 = softehl_vrcbrt(v211 * v203),
+            v216 = v203 + v211 * v202, v217 = v199 * v206 + v200 * v209 + v194 * v210 + v198 * v208,
+            v218 = v182 * v216, v219 = v197 * v208 + v195 * v209 - v196 * v210 - v193 * v206,
+            v220 = v204 * v219, v221 = v183 * v214, v222 = v213 * v203 + v211 * v220,
+            v223 = v215 * v215, v224 = v223 * v223, v225 = v224 * (0.6666666666666666 * v215),
+            v226 = 0.3333333333333333 * v224,
+            v227 = (v188 * v216 + v182 * (v220 + (v213 * v202 + v211 * v217))) * v225,
+            v228 = v189 * v215 - v222 * (v183 * v226), v229 = v183 * v215, v230 = v215 * v223,
+            v231 = v224 * (1.1111111111111112 * v218 * v224) + v230 * (v215 * (0.4444444444444444 * v221) * v230),
+            v232 = v227 + (v189 * v214 + v183 * (v213 + v217)) * v226 - v222 * v231,
+            v233 = v221 * v226 + v218 * v225, v234 = v182 * v223,
+            v235 = v188 * v223 - v222 * (v182 * v225), v236 = v234 - v211 * v233,
+            v237 = v229 + v211 * v234, v238 = 2.0 * v237, v239 = v228 + v211 * v235 + v213 * v234,
+            v240 = v229 + v202 * v234 - v203 * v233,
+            v241 = 2.0 * v219 * v236 + v204 * (v235 - v211 * v232 - v213 * v233),
+            v242 = v204 * v236,
+            v243 = v212 * (v228 + (v217 * v234 - v220 * v233) + v202 * v235 - v203 * v232),
+            v244 = 2.0 * v205 * v240 + v243, v245 = v212 * v240;
+        s148 += v191 * v245; s148 -= v187 * v244; s150 += v190 * v245; s150 -= v186 * v244;
+        s147 += v184 * v244; s147 -= v192 * v245;
+        const V v246 = v194 * v237 - v196 * v242, v247 = v199 * v237 - v193 * v242,
+            v248 = v200 * v237 + v195 * v242, v249 = v198 * v237 + v197 * v242,
+            v250 = v200 * v239 + v195 * v241 + v208 * v242 + v209 * v238,
+            v251 = v198 * v239 + v197 * v241 + v208 * v238 + v209 * v242,
+            v252 = v194 * v239 - v196 * v241 - v206 * v242 + v210 * v238,
+            v253 = v199 * v239 - v193 * v241 + v206 * v238 - v210 * v242;
+        s153 += v177 * v250; s153 += v178 * v252; s152 += v176 * v250; s152 += v179 * v252;
+        s151 += v173 * v250; s151 += v180 * v252; s149 += v176 * v253; s149 += v179 * v251;
+        s150 += v178 * v251; s150 += v177 * v253; s148 += v180 * v251; s148 += v173 * v253;
+        s150 += v165 * v249; s153 += v165 * v246; s150 += v167 * v247; s153 += v167 * v248;
+        s152 += v168 * v246; s151 += v169 * v246; s149 += v168 * v249; s148 += v169 * v249;
+        s148 += v164 * v247; s151 += v164 * v248; s149 += v166 * v247; s152 += v166 * v248;
     }
-    const V v647 = v261 - v260;
-    const V v648 = v293 + s299;
-    const V v649 = v296 + s304;
-    const V v650 = s301 - v276;
-    const V v651 = s302 - v278;
-    const V v652 = s298 + v647;
-    const V v653 = v650 - v283;
-    const V v654 = v651 - v282;
-    const V v655 = v648 + v652;
-    const V v656 = v653 - v286;
-    const V v657 = v654 - v291;
-    const V v658 = v652 - v648;
-    const V v659 = v656 - v297;
-    const V v660 = s303 + v649;
-    const V v661 = s303 - v649;
-    const V v662 = v294 - v657;
-    const V v663 = v657 - v294;
-    const V v664 = v662 - v661;
-    const V v665 = v663 + v660;
-    const V v666 = v661 - v663;
-    const V v667 = s300 + v659;
-    const V v668 = v663 - v660;
-    const V v669 = s300 - v659;
-    const V v670 = v667 + v655;
-    const V v671 = v655 - v667;
-    const V v672 = v658 - v669;
-    softehl_store4(R + 0, 8, v665, v670, v664, v672);
-    const V v673 = v669 + v658;
-    softehl_store4(R + 4, 8, v666, v673, v668, v671);
+    const V v254 = v143 + s148, v255 = v145 + s153, v256 = s147 + (v128 - v127), v257 = v254 + v256,
+        v258 = s151 - v138 - v139 - v142, v259 = v256 - v254,
+        v260 = s150 - v137 - v140 - v141 - v146, v261 = s152 + v255, v262 = s152 - v255,
+        v263 = v258 - v144, v264 = s149 + v260, v265 = s149 - v260, v266 = v264 + v257,
+        v267 = v257 - v264, v268 = v259 - v265;
+    softehl_store4(R + 0, 8, v263 + v261, v266, v144 - v258 - v262, v268);
+    const V v269 = v265 + v259; softehl_store4(R + 4, 8, v262 - v263, v269, v263 - v261, v267);
 }
-
-void softehl_solid_taylor_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_pseudo_load_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, direction + 11 * e, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_pseudo_load_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, direction + 11 * (n - SOFTEHL_LANES), parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double t[SOFTEHL_LANES * 11];
-    softehl_pad(t, direction, 11, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_taylor_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_solid_taylor_pseudo_load, 8, 8, 0, 11, 8, 0)

@@ -23,5199 +23,857 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_solid_taylor_mean_energy_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_energy)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const V v1 = X0 - X2;
-    const V v2 = X2 - X0;
-    const V v3 = X4 - X2;
-    const V v4 = 0.39433756729740643 * v2;
-    const V v5 = 0.10566243270259355 * v2;
-    const V v6 = X4 - X6;
-    const V v7 = 0.10566243270259355 * v3;
-    const V v8 = 0.39433756729740643 * v3;
-    const V v9 = v1 + v6;
-    const V v10 = X6 + v3;
-    const V v11 = X6 - X0;
-    const V v12 = 0.10566243270259355 * v6;
-    const V v13 = v4 + v12;
-    const V v14 = 0.39433756729740643 * v6;
-    const V v15 = v5 + v14;
-    const V v16 = v10 - X0;
-    const V v17 = v6 - v1;
-    const V v18 = 0.39433756729740643 * v11;
-    const V v19 = v18 + v7;
-    const V v20 = 0.10566243270259355 * v11;
-    const V v21 = v20 + v8;
-    const V v22 = 0.25 * v16;
-    const V v23 = 0.25 * v17;
-    const V v24 = v13 - v19;
-    const V v25 = v15 + v19;
-    const V v26 = v16 - v17;
-    const V v27 = v17 + v16;
-    const V v28 = 0.5773502691896257 * v25;
-    const V v29 = v19 - v13;
-    const V v30 = 0.0625 * v26;
-    const V v31 = 0.0625 * v27;
-    const V v32 = 1.5773502691896257 * X1;
-    const V v33 = 0.4226497308103742 * X1;
-    const V v34 = X1 - X3;
-    const V v35 = X1 + X3;
-    const V v36 = 0.4226497308103742 * X3;
-    const V v37 = v32 + v36;
-    const V v38 = 1.5773502691896257 * X3;
-    const V v39 = v33 + v38;
-    const V v40 = X3 - X1;
-    const V v41 = 0.39433756729740643 * v37;
-    const V v42 = 0.10566243270259355 * v37;
-    const V v43 = 0.39433756729740643 * v39;
-    const V v44 = 0.10566243270259355 * v39;
-    const V v45 = 0.39433756729740643 * v40;
-    const V v46 = 0.10566243270259355 * v40;
-    const V v47 = X5 - X3;
-    const V v48 = 0.4226497308103742 * X5;
-    const V v49 = 1.5773502691896257 * X5;
-    const V v50 = X5 - X7;
-    const V v51 = X5 + X7;
-    const V v52 = 1.5773502691896257 * X7;
-    const V v53 = v48 + v52;
-    const V v54 = 0.4226497308103742 * X7;
-    const V v55 = v49 + v54;
-    const V v56 = 0.10566243270259355 * v47;
-    const V v57 = 0.39433756729740643 * v47;
-    const V v58 = v34 + v50;
-    const V v59 = 0.10566243270259355 * v50;
-    const V v60 = v45 + v59;
-    const V v61 = X7 - X1;
-    const V v62 = 0.39433756729740643 * v50;
-    const V v63 = v46 + v62;
-    const V v64 = 0.10566243270259355 * v53;
-    const V v65 = v41 + v64;
-    const V v66 = 0.39433756729740643 * v53;
-    const V v67 = v42 + v66;
-    const V v68 = 0.10566243270259355 * v55;
-    const V v69 = v43 + v68;
-    const V v70 = 0.39433756729740643 * v55;
-    const V v71 = v44 + v70;
-    const V v72 = v35 + v51;
-    const V v73 = 0.39433756729740643 * v61;
-    const V v74 = v73 + v56;
-    const V v75 = 0.10566243270259355 * v61;
-    const V v76 = v75 + v57;
-    const V v77 = v50 - v34;
-    const V v78 = v51 - v35;
-    const V v79 = 0.25 * v72;
-    const V v80 = 0.25 * v77;
-    const V v81 = v67 - v69;
-    const V v82 = v69 - v67;
-    const V v83 = v60 - v74;
-    const V v84 = v63 + v74;
-    const V v85 = 0.25 * v78;
-    const V v86 = v77 - v78;
-    const V v87 = v77 + v78;
-    const V v88 = 1.0 / v79;
-    const V v89 = v79 * v79;
-    const V v90 = v28 * v82;
-    const V v91 = 0.5773502691896257 * v84;
-    const V v92 = 0.0625 * v86;
-    const V v93 = 0.0625 * v87;
-    const V v94 = 1.0 / v89;
-    const V v95 = v91 * v81;
-    const V v96 = v65 * v83;
-    const V v97 = v65 * v29;
-    const V v98 = v13 * v74;
-    const V v99 = v15 * v74;
-    const V v100 = v13 * v76;
-    const V v101 = v15 * v76;
-    const V v102 = v74 - v60;
-    const V v103 = v71 * v24;
-    const V v104 = v103 + v97;
-    const V v105 = v71 * v102;
-    const V v106 = v105 + v96;
-    const V v107 = 0.5773502691896257 * v104;
-    const V v108 = v107 + v90;
-    const V v109 = v19 * v60;
-    const V v110 = v98 - v109;
-    const V v111 = v19 * v63;
-    const V v112 = v99 - v111;
-    const V v113 = v21 * v60;
-    const V v114 = v100 - v113;
-    const V v115 = v21 * v63;
-    const V v116 = v101 - v115;
-    const V v117 = 0.25 * v88;
-    const V v118 = v65 * v110;
-    const V v119 = 0.5773502691896257 * v106;
-    const V v120 = v119 + v95;
-    const V v121 = v71 * v116;
-    const V v122 = v67 * v112;
-    const V v123 = v69 * v114;
-    const V v124 = v110 - v116;
-    const V v125 = 0.25 * v94;
-    const V v126 = v112 - v114;
-    const V v127 = v114 - v112;
-    const V v128 = v118 + v122;
-    const V v129 = v126 - v124;
-    const V v130 = v127 - v124;
-    const V v131 = v122 - v118;
-    const V v132 = v123 + v121;
-    const V v133 = 0.14433756729740643 * v129;
-    const V v134 = 0.14433756729740643 * v130;
-    const V v135 = v131 - v123;
-    const V v136 = v128 + v132;
-    const V v137 = v121 + v135;
-    const V v138 = v132 - v128;
-    const V v139 = 0.5773502691896257 * v137;
-    const V v140 = 0.5773502691896257 * v138;
-    const V v141 = 1.0 / v136;
-    const V v142 = parameters[2] * v136;
-    const V v143 = v23 * v85;
-    const V v144 = v140 * v141;
-    const V v145 = v141 * v139;
-    const V v146 = v134 * v141;
-    const V v147 = v133 * v141;
-    const V v148 = v80 * v22;
-    const V v149 = v143 - v148;
-    const V v150 = 1.0 / v149;
-    const V v151 = v141 * v149;
-    const V v152 = v141 * v120;
-    const V v153 = v141 * v108;
-    const V v154 = v92 * v150;
-    const V v155 = v30 * v150;
-    const V v156 = v93 * v150;
-    const V v157 = v31 * v150;
-    const V v158 = v147 - v151;
-    const V v159 = v147 + v151;
-    const V v160 = (-0.5773502691896257) - v144;
-    const V v161 = 0.5773502691896257 - v144;
-    const V v162 = (-0.5773502691896257) - v145;
-    const V v163 = 0.5773502691896257 - v145;
-    const V v164 = v146 + v159;
-    const V v165 = v146 + v158;
-    const V v166 = v146 - v158;
-    const V v167 = v80 * v160;
-    const V v168 = v80 * v161;
-    const V v169 = v159 - v146;
-    const V v170 = v85 * v162;
-    const V v171 = v85 * v163;
-    const V v172 = v23 * v160;
-    const V v173 = v23 * v161;
-    const V v174 = v167 + v170;
-    const V v175 = v168 + v170;
-    const V v176 = v167 + v171;
-    const V v177 = v168 + v171;
-    const V v178 = v170 - v167;
-    const V v179 = v171 - v167;
-    const V v180 = v170 - v168;
-    const V v181 = v171 - v168;
-    const V v182 = v117 * v160;
-    const V v183 = v146 + v182;
-    const V v184 = v117 * v161;
-    const V v185 = v146 + v184;
-    const V v186 = v117 * v163;
-    const V v187 = v147 + v186;
-    const V v188 = v22 * v163;
-    const V v189 = v22 * v162;
-    const V v190 = v117 * v162;
-    const V v191 = v147 + v190;
-    const V v192 = v172 - v188;
-    const V v193 = v173 - v188;
-    const V v194 = v172 - v189;
-    const V v195 = v173 - v189;
-    const V v196 = v150 * v194;
-    const V v197 = v153 + v196;
-    const V v198 = v150 * v192;
-    const V v199 = v153 + v198;
-    const V v200 = v150 * v195;
-    const V v201 = v153 + v200;
-    const V v202 = v150 * v193;
-    const V v203 = v153 + v202;
-    const V v204 = v150 * v178;
-    const V v205 = v152 + v204;
-    const V v206 = v150 * v179;
-    const V v207 = v152 + v206;
-    const V v208 = v150 * v180;
-    const V v209 = v152 + v208;
-    const V v210 = v150 * v181;
-    const V v211 = v152 + v210;
-    const V v212 = v58 * v155;
-    const V v213 = v58 * v157;
-    const V v214 = v125 * v174;
-    const V v215 = v151 - v214;
-    const V v216 = v125 * v176;
-    const V v217 = v151 - v216;
-    const V v218 = v125 * v175;
-    const V v219 = v151 - v218;
-    const V v220 = v125 * v177;
-    const V v221 = v151 - v220;
-    const V v222 = v9 * v156;
-    const V v223 = v213 - v222;
-    const V v224 = v9 * v154;
-    const V v225 = v212 + v224;
-    const V v226 = 0.25 * v223;
-    const V v227 = v191 - v215;
-    const V v228 = v191 + v215;
-    const V v229 = v187 - v217;
-    const V v230 = v187 + v217;
-    const V v231 = v191 - v219;
-    const V v232 = v191 + v219;
-    const V v233 = 1.0 - v225;
-    const V v234 = 1.0 + v225;
-    const V v235 = v183 + v228;
-    const V v236 = 0.25 * v233;
-    const V v237 = 0.25 * v234;
-    const V v238 = v183 + v230;
-    const V v239 = (-0.25) - v226;
-    const V v240 = v185 + v232;
-    const V v241 = v226 - 0.25;
-    const V v242 = v228 - v183;
-    const V v243 = v230 - v183;
-    const V v244 = v183 + v227;
-    const V v245 = v183 - v227;
-    const V v246 = v232 - v185;
-    const V v247 = v183 + v229;
-    const V v248 = v183 - v229;
-    const V v249 = v185 + v231;
-    const V v250 = v185 - v231;
-    const V v251 = v152 * v237;
-    const V v252 = v152 * v239;
-    const V v253 = v152 * v241;
-    const V v254 = v156 + v253;
-    const V v255 = v152 * v236;
-    const V v256 = v154 + v255;
-    const V v257 = v153 * v237;
-    const V v258 = v153 * v241;
-    const V v259 = v153 * v236;
-    const V v260 = v155 + v259;
-    const V v261 = v153 * v239;
-    const V v262 = v157 + v261;
-    const V v263 = v251 - v154;
-    const V v264 = v252 - v156;
-    const V v265 = v257 - v155;
-    const V v266 = v258 - v157;
-    const V v267 = d1 * v256;
-    const V v268 = v241 * v197;
-    const V v269 = v239 * v197;
-    const V v270 = v157 + v269;
-    const V v271 = v268 - v157;
-    const V v272 = v237 * v197;
-    const V v273 = v236 * v197;
-    const V v274 = v155 + v273;
-    const V v275 = v272 - v155;
-    const V v276 = d4 * v265;
-    const V v277 = v237 * v205;
-    const V v278 = v239 * v205;
-    const V v279 = v236 * v205;
-    const V v280 = v154 + v279;
-    const V v281 = v241 * v205;
-    const V v282 = v156 + v281;
-    const V v283 = d4 * v275;
-    const V v284 = v277 - v154;
-    const V v285 = v278 - v156;
-    const V v286 = v237 * v207;
-    const V v287 = v239 * v207;
-    const V v288 = v236 * v207;
-    const V v289 = v154 + v288;
-    const V v290 = v241 * v207;
-    const V v291 = v156 + v290;
-    const V v292 = v286 - v154;
-    const V v293 = v287 - v156;
-    const V v294 = v237 * v209;
-    const V v295 = v239 * v209;
-    const V v296 = v236 * v209;
-    const V v297 = v154 + v296;
-    const V v298 = v241 * v209;
-    const V v299 = v156 + v298;
-    const V v300 = v294 - v154;
-    const V v301 = v295 - v156;
-    const V v302 = v237 * v211;
-    const V v303 = v239 * v211;
-    const V v304 = v302 - v154;
-    const V v305 = v303 - v156;
-    const V v306 = v236 * v211;
-    const V v307 = v154 + v306;
-    const V v308 = v241 * v211;
-    const V v309 = v156 + v308;
-    const V v310 = v237 * v199;
-    const V v311 = v241 * v199;
-    const V v312 = v236 * v199;
-    const V v313 = v155 + v312;
-    const V v314 = v239 * v199;
-    const V v315 = v157 + v314;
-    const V v316 = v237 * v201;
-    const V v317 = v237 * v203;
-    const V v318 = v241 * v201;
-    const V v319 = v241 * v203;
-    const V v320 = v310 - v155;
-    const V v321 = v316 - v155;
-    const V v322 = v317 - v155;
-    const V v323 = v311 - v157;
-    const V v324 = v318 - v157;
-    const V v325 = v319 - v157;
-    const V v326 = v236 * v201;
-    const V v327 = v155 + v326;
-    const V v328 = v236 * v203;
-    const V v329 = v155 + v328;
-    const V v330 = v239 * v201;
-    const V v331 = v157 + v330;
-    const V v332 = v239 * v203;
-    const V v333 = v157 + v332;
-    const V v334 = d0 * v313;
-    const V v335 = d0 * v327;
-    const V v336 = d0 * v329;
-    const V v337 = d0 * v256;
-    const V v338 = 1.0 + v337;
-    const V v339 = d1 * v313;
-    const V v340 = 1.0 + v339;
-    const V v341 = d1 * v327;
-    const V v342 = 1.0 + v341;
-    const V v343 = d1 * v329;
-    const V v344 = 1.0 + v343;
-    const V v345 = d1 * v280;
-    const V v346 = d0 * v280;
-    const V v347 = 1.0 + v346;
-    const V v348 = d2 * v323;
-    const V v349 = v334 + v348;
-    const V v350 = d3 * v323;
-    const V v351 = v340 + v350;
-    const V v352 = d2 * v254;
-    const V v353 = v352 + v338;
-    const V v354 = d3 * v254;
-    const V v355 = v267 + v354;
-    const V v356 = d2 * v324;
-    const V v357 = v335 + v356;
-    const V v358 = d3 * v324;
-    const V v359 = v342 + v358;
-    const V v360 = d2 * v325;
-    const V v361 = v336 + v360;
-    const V v362 = d3 * v325;
-    const V v363 = v344 + v362;
-    const V v364 = d2 * v282;
-    const V v365 = v347 + v364;
-    const V v366 = d3 * v282;
-    const V v367 = v345 + v366;
-    const V v368 = d1 * v289;
-    const V v369 = d0 * v289;
-    const V v370 = 1.0 + v369;
-    const V v371 = d1 * v297;
-    const V v372 = d0 * v297;
-    const V v373 = 1.0 + v372;
-    const V v374 = d1 * v307;
-    const V v375 = d0 * v307;
-    const V v376 = 1.0 + v375;
-    const V v377 = d1 * v165;
-    const V v378 = 1.0 - v377;
-    const V v379 = d3 * v291;
-    const V v380 = v368 + v379;
-    const V v381 = d2 * v291;
-    const V v382 = v370 + v381;
-    const V v383 = d3 * v299;
-    const V v384 = v371 + v383;
-    const V v385 = d2 * v299;
-    const V v386 = v373 + v385;
-    const V v387 = d3 * v166;
-    const V v388 = v387 + v378;
-    const V v389 = d3 * v309;
-    const V v390 = v374 + v389;
-    const V v391 = d2 * v309;
-    const V v392 = v376 + v391;
-    const V v393 = d1 * v244;
-    const V v394 = 1.0 - v393;
-    const V v395 = d1 * v247;
-    const V v396 = 1.0 - v395;
-    const V v397 = d1 * v249;
-    const V v398 = 1.0 - v397;
-    const V v399 = d5 * v164;
-    const V v400 = v399 + v388;
-    const V v401 = d5 * v292;
-    const V v402 = v380 + v401;
-    const V v403 = d4 * v292;
-    const V v404 = v382 + v403;
-    const V v405 = d3 * v245;
-    const V v406 = v394 + v405;
-    const V v407 = d3 * v248;
-    const V v408 = v396 + v407;
-    const V v409 = d3 * v250;
-    const V v410 = v398 + v409;
-    const V v411 = d7 * v169;
-    const V v412 = v411 + v400;
-    const V v413 = d4 * v300;
-    const V v414 = v386 + v413;
-    const V v415 = d5 * v300;
-    const V v416 = v384 + v415;
-    const V v417 = v412 * v412;
-    const V v418 = d5 * v235;
-    const V v419 = v406 + v418;
-    const V v420 = d5 * v238;
-    const V v421 = v408 + v420;
-    const V v422 = d5 * v240;
-    const V v423 = v410 + v422;
-    const V v424 = d7 * v293;
-    const V v425 = v402 + v424;
-    const V v426 = d6 * v293;
-    const V v427 = v404 + v426;
-    const V v428 = d7 * v242;
-    const V v429 = v419 + v428;
-    const V v430 = d7 * v243;
-    const V v431 = v421 + v430;
-    const V v432 = d7 * v246;
-    const V v433 = v423 + v432;
-    const V v434 = d6 * v301;
-    const V v435 = v414 + v434;
-    const V v436 = d7 * v301;
-    const V v437 = v416 + v436;
-    const V v438 = v429 * v429;
-    const V v439 = v431 * v431;
-    const V v440 = v433 * v433;
-    const V v441 = v425 * v427;
-    const V v442 = v427 * v427;
-    const V v443 = v425 * v425;
-    const V v444 = v435 * v435;
-    const V v445 = v435 * v437;
-    const V v446 = v437 * v437;
-    const V v447 = v187 - v221;
-    const V v448 = v187 + v221;
-    const V v449 = d5 * v265;
-    const V v450 = 1.0 + v449;
-    const V v451 = d5 * v275;
-    const V v452 = 1.0 + v451;
-    const V v453 = v185 + v448;
-    const V v454 = v185 + v447;
-    const V v455 = v185 - v447;
-    const V v456 = v448 - v185;
-    const V v457 = d1 * v260;
-    const V v458 = v457 + v450;
-    const V v459 = d1 * v274;
-    const V v460 = v452 + v459;
-    const V v461 = d1 * v454;
-    const V v462 = 1.0 - v461;
-    const V v463 = d0 * v260;
-    const V v464 = v463 + v276;
-    const V v465 = d0 * v274;
-    const V v466 = v283 + v465;
-    const V v467 = d5 * v453;
-    const V v468 = v462 + v467;
-    const V v469 = d5 * v263;
-    const V v470 = v469 + v355;
-    const V v471 = d4 * v263;
-    const V v472 = v471 + v353;
-    const V v473 = d3 * v266;
-    const V v474 = v473 + v458;
-    const V v475 = d2 * v266;
-    const V v476 = v475 + v464;
-    const V v477 = d2 * v271;
-    const V v478 = v466 + v477;
-    const V v479 = d3 * v271;
-    const V v480 = v460 + v479;
-    const V v481 = d3 * v455;
-    const V v482 = v468 + v481;
-    const V v483 = d7 * v264;
-    const V v484 = v483 + v470;
-    const V v485 = d6 * v264;
-    const V v486 = v485 + v472;
-    const V v487 = d7 * v456;
-    const V v488 = v482 + v487;
-    const V v489 = d7 * v262;
-    const V v490 = v489 + v474;
-    const V v491 = d6 * v262;
-    const V v492 = v491 + v476;
-    const V v493 = v486 * v490;
-    const V v494 = v488 * v488;
-    const V v495 = d6 * v270;
-    const V v496 = v478 + v495;
-    const V v497 = d7 * v270;
-    const V v498 = v480 + v497;
-    const V v499 = v492 * v484;
-    const V v500 = v493 - v499;
-    const V v501 = v496 * v496;
-    const V v502 = v496 * v498;
-    const V v503 = v498 * v498;
-    const V v504 = v417 * v500;
-    const V v505 = v500 * v504;
-    const V v506 = d4 * v284;
-    const V v507 = v365 + v506;
-    const V v508 = d5 * v284;
-    const V v509 = v367 + v508;
-    const V v510 = d6 * v285;
-    const V v511 = v507 + v510;
-    const V v512 = d7 * v285;
-    const V v513 = v509 + v512;
-    const V v514 = v498 * v511;
-    const V v515 = v511 * v511;
-    const V v516 = v501 + v515;
-    const V v517 = v511 * v513;
-    const V v518 = v502 + v517;
-    const V v519 = v513 * v513;
-    const V v520 = v503 + v519;
-    const V v521 = v496 * v513;
-    const V v522 = v514 - v521;
-    const V v523 = v522 * v522;
-    const V v524 = d4 * v304;
-    const V v525 = v392 + v524;
-    const V v526 = d5 * v304;
-    const V v527 = v390 + v526;
-    const V v528 = d6 * v305;
-    const V v529 = v525 + v528;
-    const V v530 = d7 * v305;
-    const V v531 = v527 + v530;
-    const V v532 = softehl_vlog(v505);
-    const V v533 = v529 * v529;
-    const V v534 = v529 * v531;
-    const V v535 = v531 * v531;
-    const V v536 = v438 + v516;
-    const V v537 = v520 + v536;
-    const V v538 = v438 * v523;
-    const V v539 = v505 - v532;
-    const V v540 = v537 * v537;
-    const V v541 = softehl_vrcbrt(v538);
-    const V v542 = v438 * v438;
-    const V v543 = v540 - v542;
-    const V v544 = v516 * v516;
-    const V v545 = v543 - v544;
-    const V v546 = v520 * v520;
-    const V v547 = v545 - v546;
-    const V v548 = 0.5 * v547;
-    const V v549 = d4 * v320;
-    const V v550 = v349 + v549;
-    const V v551 = d5 * v320;
-    const V v552 = v351 + v551;
-    const V v553 = d6 * v315;
-    const V v554 = v550 + v553;
-    const V v555 = d7 * v315;
-    const V v556 = v552 + v555;
-    const V v557 = d4 * v321;
-    const V v558 = v357 + v557;
-    const V v559 = d5 * v321;
-    const V v560 = v359 + v559;
-    const V v561 = d4 * v322;
-    const V v562 = v361 + v561;
-    const V v563 = d5 * v322;
-    const V v564 = v363 + v563;
-    const V v565 = v427 * v556;
-    const V v566 = v518 * v518;
-    const V v567 = v548 - v566;
-    const V v568 = v554 * v554;
-    const V v569 = v442 + v568;
-    const V v570 = d6 * v331;
-    const V v571 = v558 + v570;
-    const V v572 = d7 * v331;
-    const V v573 = v560 + v572;
-    const V v574 = d6 * v333;
-    const V v575 = v562 + v574;
-    const V v576 = d7 * v333;
-    const V v577 = v564 + v576;
-    const V v578 = v425 * v554;
-    const V v579 = v565 - v578;
-    const V v580 = v554 * v556;
-    const V v581 = v441 + v580;
-    const V v582 = v556 * v556;
-    const V v583 = v443 + v582;
-    const V v584 = v579 * v579;
-    const V v585 = v577 * v577;
-    const V v586 = v535 + v585;
-    const V v587 = v435 * v573;
-    const V v588 = v529 * v577;
-    const V v589 = v575 * v577;
-    const V v590 = v534 + v589;
-    const V v591 = v571 * v573;
-    const V v592 = v445 + v591;
-    const V v593 = v573 * v573;
-    const V v594 = v446 + v593;
-    const V v595 = v437 * v571;
-    const V v596 = v587 - v595;
-    const V v597 = v571 * v571;
-    const V v598 = v444 + v597;
-    const V v599 = v531 * v575;
-    const V v600 = v588 - v599;
-    const V v601 = v575 * v575;
-    const V v602 = v533 + v601;
-    const V v603 = v596 * v596;
-    const V v604 = v439 * v584;
-    const V v605 = v600 * v600;
-    const V v606 = softehl_vrcbrt(v604);
-    const V v607 = v439 + v569;
-    const V v608 = v440 + v598;
-    const V v609 = v583 + v607;
-    const V v610 = v594 + v608;
-    const V v611 = v440 * v603;
-    const V v612 = v494 + v602;
-    const V v613 = v494 * v605;
-    const V v614 = v609 * v609;
-    const V v615 = v610 * v610;
-    const V v616 = softehl_vrcbrt(v611);
-    const V v617 = v586 + v612;
-    const V v618 = softehl_vrcbrt(v613);
-    const V v619 = v569 * v569;
-    const V v620 = v614 - v619;
-    const V v621 = v440 * v440;
-    const V v622 = v615 - v621;
-    const V v623 = v583 * v583;
-    const V v624 = v620 - v623;
-    const V v625 = v598 * v598;
-    const V v626 = v622 - v625;
-    const V v627 = v594 * v594;
-    const V v628 = v626 - v627;
-    const V v629 = v617 * v617;
-    const V v630 = v439 * v439;
-    const V v631 = v624 - v630;
-    const V v632 = 0.5 * v628;
-    const V v633 = v494 * v494;
-    const V v634 = v629 - v633;
-    const V v635 = 0.5 * v631;
-    const V v636 = v602 * v602;
-    const V v637 = v634 - v636;
-    const V v638 = v586 * v586;
-    const V v639 = v637 - v638;
-    const V v640 = 0.5 * v639;
-    const V v641 = v592 * v592;
-    const V v642 = v632 - v641;
-    const V v643 = v581 * v581;
-    const V v644 = v635 - v643;
-    const V v645 = v541 * v541;
-    const V v646 = v537 * v541;
-    const V v647 = v590 * v590;
-    const V v648 = v640 - v647;
-    const V v649 = v646 - 3.0;
-    const V v650 = v567 * v645;
-    const V v651 = parameters[0] * v649;
-    const V v652 = v650 - 3.0;
-    const V v653 = v606 * v609;
-    const V v654 = v653 - 3.0;
-    const V v655 = parameters[0] * v654;
-    const V v656 = parameters[1] * v652;
-    const V v657 = v651 + v656;
-    const V v658 = v606 * v606;
-    const V v659 = v644 * v658;
-    const V v660 = v118 * v657;
-    const V v661 = v659 - 3.0;
-    const V v662 = parameters[1] * v661;
-    const V v663 = v655 + v662;
-    const V v664 = v122 * v663;
-    const V v665 = v660 + v664;
-    const V v666 = v610 * v616;
-    const V v667 = v666 - 3.0;
-    const V v668 = parameters[0] * v667;
-    const V v669 = v616 * v616;
-    const V v670 = v642 * v669;
-    const V v671 = v670 - 3.0;
-    const V v672 = parameters[1] * v671;
-    const V v673 = v668 + v672;
-    const V v674 = v123 * v673;
-    const V v675 = v665 + v674;
-    const V v676 = v617 * v618;
-    const V v677 = v676 - 3.0;
-    const V v678 = parameters[0] * v677;
-    const V v679 = v618 * v618;
-    const V v680 = v648 * v679;
-    const V v681 = v680 - 3.0;
-    const V v682 = parameters[1] * v681;
-    const V v683 = v678 + v682;
-    const V v684 = v121 * v683;
-    const V v685 = v675 + v684;
-    const V v686 = 0.5 * v539;
-    const V v687 = (-0.5) + v686;
-    const V v688 = v142 * v687;
-    const V v689 = v685 + v688;
-    const V v690 = 3.141592653589793 * v689;
-    softehl_store1(R + 0, 1, v690);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const V v1 = X0 - X2, v2 = X2 - X0, v3 = X4 - X2, v4 = X4 - X6, v5 = v1 + v4, v6 = X6 - X0,
+        v7 = 0.39433756729740643 * v2 + 0.10566243270259355 * v4,
+        v8 = 0.10566243270259355 * v2 + 0.39433756729740643 * v4, v9 = X6 + v3 - X0, v10 = v4 - v1,
+        v11 = 0.39433756729740643 * v6 + 0.10566243270259355 * v3,
+        v12 = 0.10566243270259355 * v6 + 0.39433756729740643 * v3, v13 = 0.25 * v9,
+        v14 = 0.25 * v10, v15 = X1 - X3, v16 = X1 + X3,
+        v17 = 1.5773502691896257 * X1 + 0.4226497308103742 * X3,
+        v18 = 0.4226497308103742 * X1 + 1.5773502691896257 * X3, v19 = X3 - X1, v20 = X5 - X3,
+        v21 = X5 - X7, v22 = X5 + X7, v23 = 0.4226497308103742 * X5 + 1.5773502691896257 * X7,
+        v24 = 1.5773502691896257 * X5 + 0.4226497308103742 * X7, v25 = v15 + v21,
+        v26 = 0.39433756729740643 * v19 + 0.10566243270259355 * v21, v27 = X7 - X1,
+        v28 = 0.10566243270259355 * v19 + 0.39433756729740643 * v21,
+        v29 = 0.39433756729740643 * v17 + 0.10566243270259355 * v23,
+        v30 = 0.10566243270259355 * v17 + 0.39433756729740643 * v23,
+        v31 = 0.39433756729740643 * v18 + 0.10566243270259355 * v24,
+        v32 = 0.10566243270259355 * v18 + 0.39433756729740643 * v24,
+        v33 = 0.39433756729740643 * v27 + 0.10566243270259355 * v20,
+        v34 = 0.10566243270259355 * v27 + 0.39433756729740643 * v20, v35 = v21 - v15,
+        v36 = v22 - v16, v37 = 0.25 * (v16 + v22), v38 = 0.25 * v35, v39 = 0.25 * v36,
+        v40 = 0.5773502691896257 * (v32 * (v7 - v11) + v29 * (v11 - v7)) + 0.5773502691896257 * (v8 + v11) * (v31 - v30),
+        v41 = v7 * v33 - v11 * v26, v42 = v8 * v33 - v11 * v28, v43 = v7 * v34 - v12 * v26,
+        v44 = v8 * v34 - v12 * v28, v45 = 0.25 * (1.0 / v37), v46 = v29 * v41,
+        v47 = 0.5773502691896257 * (v32 * (v33 - v26) + v29 * (v26 - v33)) + 0.5773502691896257 * (v28 + v33) * (v30 - v31),
+        v48 = v32 * v44, v49 = v30 * v42, v50 = v31 * v43, v51 = v41 - v44,
+        v52 = 0.25 * (1.0 / (v37 * v37)), v53 = v46 + v49, v54 = v50 + v48, v55 = v53 + v54,
+        v56 = 1.0 / v55, v57 = 0.5773502691896257 * (v54 - v53) * v56,
+        v58 = v56 * (0.5773502691896257 * (v48 + (v49 - v46 - v50))),
+        v59 = 0.14433756729740643 * (v43 - v42 - v51) * v56,
+        v60 = 0.14433756729740643 * (v42 - v43 - v51) * v56, v61 = v14 * v39 - v38 * v13,
+        v62 = 1.0 / v61, v63 = v56 * v61, v64 = v56 * v47, v65 = v56 * v40,
+        v66 = 0.0625 * (v35 - v36) * v62, v67 = 0.0625 * (v9 - v10) * v62,
+        v68 = 0.0625 * (v35 + v36) * v62, v69 = 0.0625 * (v10 + v9) * v62, v70 = v60 - v63,
+        v71 = v60 + v63, v72 = (-0.5773502691896257) - v57, v73 = 0.5773502691896257 - v57,
+        v74 = (-0.5773502691896257) - v58, v75 = 0.5773502691896257 - v58, v76 = v38 * v72,
+        v77 = v38 * v73, v78 = v39 * v74, v79 = v39 * v75, v80 = v14 * v72, v81 = v14 * v73,
+        v82 = v59 + v45 * v72, v83 = v59 + v45 * v73, v84 = v60 + v45 * v75, v85 = v13 * v75,
+        v86 = v13 * v74, v87 = v60 + v45 * v74, v88 = v65 + v62 * (v80 - v86),
+        v89 = v65 + v62 * (v80 - v85), v90 = v65 + v62 * (v81 - v86), v91 = v65 + v62 * (v81 - v85),
+        v92 = v64 + v62 * (v78 - v76), v93 = v64 + v62 * (v79 - v76), v94 = v64 + v62 * (v78 - v77),
+        v95 = v64 + v62 * (v79 - v77), v96 = v63 - v52 * (v76 + v78), v97 = v63 - v52 * (v76 + v79),
+        v98 = v63 - v52 * (v77 + v78), v99 = v63 - v52 * (v77 + v79), v100 = v25 * v67 + v5 * v66,
+        v101 = 0.25 * (v25 * v69 - v5 * v68), v102 = v87 - v96, v103 = v87 + v96, v104 = v84 - v97,
+        v105 = v84 + v97, v106 = v87 - v98, v107 = v87 + v98, v108 = 0.25 * (1.0 - v100),
+        v109 = 0.25 * (1.0 + v100), v110 = (-0.25) - v101, v111 = v101 - 0.25,
+        v112 = v68 + v64 * v111, v113 = v66 + v64 * v108, v114 = v67 + v65 * v108,
+        v115 = v69 + v65 * v110, v116 = v64 * v109 - v66, v117 = v64 * v110 - v68,
+        v118 = v65 * v109 - v67, v119 = v65 * v111 - v69, v120 = v69 + v110 * v88,
+        v121 = v111 * v88 - v69, v122 = v67 + v108 * v88, v123 = v109 * v88 - v67,
+        v124 = v66 + v108 * v92, v125 = v68 + v111 * v92, v126 = v109 * v92 - v66,
+        v127 = v110 * v92 - v68, v128 = v66 + v108 * v93, v129 = v68 + v111 * v93,
+        v130 = v109 * v93 - v66, v131 = v110 * v93 - v68, v132 = v66 + v108 * v94,
+        v133 = v68 + v111 * v94, v134 = v109 * v94 - v66, v135 = v110 * v94 - v68,
+        v136 = v109 * v95 - v66, v137 = v110 * v95 - v68, v138 = v66 + v108 * v95,
+        v139 = v68 + v111 * v95, v140 = v67 + v108 * v89, v141 = v69 + v110 * v89,
+        v142 = v109 * v89 - v67, v143 = v109 * v90 - v67, v144 = v109 * v91 - v67,
+        v145 = v111 * v89 - v69, v146 = v111 * v90 - v69, v147 = v111 * v91 - v69,
+        v148 = v67 + v108 * v90, v149 = v67 + v108 * v91, v150 = v69 + v110 * v90,
+        v151 = v69 + v110 * v91,
+        v152 = d7 * (v71 - v59) + (d5 * (v59 + v71) + (d3 * (v59 - v70) + (1.0 - d1 * (v59 + v70)))),
+        v153 = d1 * v128 + d3 * v129 + d5 * v130 + d7 * v131,
+        v154 = 1.0 + d0 * v128 + d2 * v129 + d4 * v130 + d6 * v131,
+        v155 = 1.0 - d1 * (v82 + v102) + d3 * (v82 - v102) + d5 * (v82 + v103) + d7 * (v103 - v82),
+        v156 = 1.0 - d1 * (v82 + v104) + d3 * (v82 - v104) + d5 * (v82 + v105) + d7 * (v105 - v82),
+        v157 = 1.0 - d1 * (v83 + v106) + d3 * (v83 - v106) + d5 * (v83 + v107) + d7 * (v107 - v83),
+        v158 = 1.0 + d0 * v132 + d2 * v133 + d4 * v134 + d6 * v135,
+        v159 = d1 * v132 + d3 * v133 + d5 * v134 + d7 * v135, v160 = v155 * v155,
+        v161 = v156 * v156, v162 = v157 * v157, v163 = v84 - v99, v164 = v84 + v99,
+        v165 = 1.0 - d1 * (v83 + v163) + d5 * (v83 + v164) + d3 * (v83 - v163) + d7 * (v164 - v83),
+        v166 = (d6 * v117 + (d4 * v116 + (d2 * v112 + (1.0 + d0 * v113)))) * (d7 * v115 + (d3 * v119 + (d1 * v114 + (1.0 + d5 * v118)))),
+        v167 = v165 * v165, v168 = d4 * v123 + d0 * v122 + d2 * v121 + d6 * v120,
+        v169 = 1.0 + d5 * v123 + d1 * v122 + d3 * v121 + d7 * v120,
+        v170 = (d6 * v115 + (d2 * v119 + (d0 * v114 + d4 * v118))) * (d7 * v117 + (d5 * v116 + (d1 * v113 + d3 * v112))),
+        v171 = v166 - v170, v172 = v171 * (v152 * v152 * v171),
+        v173 = 1.0 + d0 * v124 + d2 * v125 + d4 * v126 + d6 * v127,
+        v174 = d1 * v124 + d3 * v125 + d5 * v126 + d7 * v127, v175 = v168 * v168 + v173 * v173,
+        v176 = v168 * v169 + v173 * v174, v177 = v169 * v169 + v174 * v174,
+        v178 = v169 * v173 - v168 * v174,
+        v179 = 1.0 + d0 * v138 + d2 * v139 + d4 * v136 + d6 * v137,
+        v180 = d1 * v138 + d3 * v139 + d5 * v136 + d7 * v137, v181 = softehl_vlog(v172),
+        v182 = v177 + (v160 + v175), v183 = softehl_vrcbrt(v160 * (v178 * v178)),
+        v184 = d0 * v140 + d2 * v145 + d4 * v142 + d6 * v141,
+        v185 = 1.0 + d1 * v140 + d3 * v145 + d5 * v142 + d7 * v141,
+        v186 = 0.5 * (v182 * v182 - v160 * v160 - v175 * v175 - v177 * v177) - v176 * v176,
+        v187 = v154 * v154 + v184 * v184, v188 = d0 * v148 + d2 * v146 + d4 * v143 + d6 * v150,
+        v189 = 1.0 + d1 * v148 + d3 * v146 + d5 * v143 + d7 * v150,
+        v190 = d0 * v149 + d2 * v147 + d4 * v144 + d6 * v151,
+        v191 = 1.0 + d1 * v149 + d3 * v147 + d5 * v144 + d7 * v151,
+        v192 = v154 * v185 - v153 * v184, v193 = v153 * v154 + v184 * v185,
+        v194 = v153 * v153 + v185 * v185, v195 = v180 * v180 + v191 * v191,
+        v196 = v179 * v180 + v190 * v191, v197 = v158 * v159 + v188 * v189,
+        v198 = v159 * v159 + v189 * v189, v199 = v158 * v189 - v159 * v188,
+        v200 = v158 * v158 + v188 * v188, v201 = v179 * v191 - v180 * v190,
+        v202 = v179 * v179 + v190 * v190, v203 = softehl_vrcbrt(v161 * (v192 * v192)),
+        v204 = v194 + (v161 + v187), v205 = v198 + (v162 + v200),
+        v206 = softehl_vrcbrt(v162 * (v199 * v199)), v207 = v195 + (v167 + v202),
+        v208 = softehl_vrcbrt(v167 * (v201 * v201)),
+        v209 = 0.5 * (v205 * v205 - v162 * v162 - v200 * v200 - v198 * v198) - v197 * v197,
+        v210 = 0.5 * (v204 * v204 - v187 * v187 - v194 * v194 - v161 * v161) - v193 * v193,
+        v211 = 0.5 * (v207 * v207 - v167 * v167 - v202 * v202 - v195 * v195) - v196 * v196,
+        v212 = parameters[0] * (v182 * v183 - 3.0) + parameters[1] * (v186 * (v183 * v183) - 3.0),
+        v213 = parameters[0] * (v203 * v204 - 3.0) + parameters[1] * (v210 * (v203 * v203) - 3.0),
+        v214 = parameters[0] * (v205 * v206 - 3.0) + parameters[1] * (v209 * (v206 * v206) - 3.0),
+        v215 = parameters[0] * (v207 * v208 - 3.0) + parameters[1] * (v211 * (v208 * v208) - 3.0),
+        v216 = v46 * v212 + v49 * v213 + v50 * v214 + v48 * v215 + parameters[2] * v55 * ((-0.5) + 0.5 * (v172 - v181));
+    softehl_store1(R + 0, 1, 3.141592653589793 * v216);
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_energy, 8, 8, 0, 0, 1, 0)
 
-void softehl_solid_taylor_mean_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_residual)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_energy_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 1 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_energy_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 1 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 1];
-    softehl_solid_taylor_mean_energy(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 1 * n; ++i) values[i] = R[i];
-#endif
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1];
+    const V v3 = X0 - X2, v4 = X2 - X0, v5 = X4 - X2, v6 = X4 - X6, v7 = v3 + v6, v8 = X6 - X0,
+        v9 = 0.39433756729740643 * v4 + 0.10566243270259355 * v6,
+        v10 = 0.10566243270259355 * v4 + 0.39433756729740643 * v6, v11 = X6 + v5 - X0,
+        v12 = v6 - v3, v13 = 0.39433756729740643 * v8 + 0.10566243270259355 * v5,
+        v14 = 0.10566243270259355 * v8 + 0.39433756729740643 * v5, v15 = 0.25 * v11,
+        v16 = 0.0625 * v11, v17 = 0.25 * v12, v18 = 0.0625 * v12, v19 = X1 - X3, v20 = X1 + X3,
+        v21 = 1.5773502691896257 * X1 + 0.4226497308103742 * X3,
+        v22 = 0.4226497308103742 * X1 + 1.5773502691896257 * X3, v23 = X3 - X1, v24 = X5 - X3,
+        v25 = X5 - X7, v26 = X5 + X7, v27 = 0.4226497308103742 * X5 + 1.5773502691896257 * X7,
+        v28 = 1.5773502691896257 * X5 + 0.4226497308103742 * X7,
+        v29 = 0.39433756729740643 * v23 + 0.10566243270259355 * v25, v30 = X7 - X1,
+        v31 = 0.10566243270259355 * v23 + 0.39433756729740643 * v25,
+        v32 = 0.39433756729740643 * v21 + 0.10566243270259355 * v27,
+        v33 = 0.10566243270259355 * v21 + 0.39433756729740643 * v27,
+        v34 = 0.39433756729740643 * v22 + 0.10566243270259355 * v28,
+        v35 = 0.10566243270259355 * v22 + 0.39433756729740643 * v28,
+        v36 = 0.39433756729740643 * v30 + 0.10566243270259355 * v24,
+        v37 = 0.10566243270259355 * v30 + 0.39433756729740643 * v24, v38 = v25 - v19,
+        v39 = v26 - v20, v40 = 0.25 * (v20 + v26), v41 = 0.25 * v38, v42 = 0.0625 * v38,
+        v43 = 0.25 * v39, v44 = 0.0625 * v39,
+        v45 = 0.5773502691896257 * (v35 * (v9 - v13) + v32 * (v13 - v9)) + 0.5773502691896257 * (v10 + v13) * (v34 - v33),
+        v46 = 0.5773502691896257 * (v35 * (v36 - v29) + v32 * (v29 - v36)) + 0.5773502691896257 * (v31 + v36) * (v33 - v34),
+        v47 = 0.25 * (1.0 / v40), v48 = d0 - d2, v49 = d1 + d3, v50 = d1 - d3, v51 = d4 - d6,
+        v52 = d2 + (d0 - d4) - d6, v53 = 0.25 * (1.0 / (v40 * v40)), v54 = v48 - v51,
+        v55 = v48 + v51, v56 = d5 + d7, v57 = d5 - d7, v58 = v49 - v56, v59 = v49 + v56,
+        v60 = v50 - v57, v61 = v50 + v57, v62 = v9 * v36 - v13 * v29, v63 = v10 * v36 - v13 * v31,
+        v64 = v9 * v37 - v14 * v29, v65 = v10 * v37 - v14 * v31, v66 = v32 * v62, v67 = v33 * v63,
+        v68 = v34 * v64, v69 = v35 * v65, v70 = v62 - v65, v71 = 6.283185307179586 * v66,
+        v72 = 6.283185307179586 * v67, v73 = v66 + v67, v74 = v68 + v69,
+        v75 = 6.283185307179586 * v68, v76 = 6.283185307179586 * v69, v77 = v73 + v74,
+        v78 = v2 * v71, v79 = v2 * v72, v80 = v2 * v75, v81 = v2 * v76, v82 = 1.0 / v77,
+        v83 = v1 * v71, v84 = v1 * v72, v85 = v1 * v75, v86 = v1 * v76, v87 = v17 * v43 - v41 * v15,
+        v88 = 1.0 / v87, v89 = v82 * v87, v90 = 0.5773502691896257 * (v74 - v73) * v82,
+        v91 = v82 * (0.5773502691896257 * (v69 + (v67 - v66 - v68))),
+        v92 = 0.14433756729740643 * (v64 - v63 - v70) * v82,
+        v93 = 0.14433756729740643 * (v63 - v64 - v70) * v82, v94 = v82 * v46, v95 = v82 * v45,
+        v96 = 0.25 * v94, v97 = 0.25 * v95, v98 = (-0.5773502691896257) - v90,
+        v99 = 0.5773502691896257 - v90, v100 = (-0.5773502691896257) - v91,
+        v101 = 0.5773502691896257 - v91, v102 = v42 * v88, v103 = v44 * v88,
+        v104 = (v19 + v25) * v88, v105 = v88 * (v7 * v42), v106 = v88 * (v7 * v44),
+        v107 = v41 * v98, v108 = v41 * v99, v109 = v43 * v100, v110 = v43 * v101, v111 = v17 * v98,
+        v112 = v17 * v99, v113 = v92 + v47 * v99, v114 = v92 + v47 * v98,
+        v115 = v89 - v53 * (v107 + v109), v116 = v89 - v53 * (v107 + v110),
+        v117 = v89 - v53 * (v108 + v109), v118 = v89 - v53 * (v108 + v110),
+        v119 = 0.25 * (v94 + v88 * (v109 - v107)), v120 = 0.25 * (v94 + v88 * (v110 - v107)),
+        v121 = 0.25 * (v94 + v88 * (v109 - v108)), v122 = 0.25 * (v94 + v88 * (v110 - v108)),
+        v123 = v114 * v60, v124 = v113 * v60, v125 = v88 * v16, v126 = v16 * v104,
+        v127 = v18 * v104, v128 = v18 * v88, v129 = v106 - v126, v130 = v96 * v126,
+        v131 = v96 * v127, v132 = v97 * v126, v133 = v97 * v127, v134 = v127 - v105,
+        v135 = v96 * v105, v136 = v97 * v105, v137 = v131 - v135, v138 = v133 - v136,
+        v139 = v96 * v106, v140 = v97 * v106, v141 = v134 * v119, v142 = v134 * v120,
+        v143 = v134 * v121, v144 = v134 * v122, v145 = v129 * v119, v146 = v129 * v120,
+        v147 = v129 * v121, v148 = v129 * v122, v149 = v139 - v130, v150 = v140 - v132,
+        v151 = v15 * v100, v152 = v15 * v101, v153 = v93 + v47 * v100, v154 = v93 + v47 * v101,
+        v155 = 1.0 - v153 * v58, v156 = 1.0 - v154 * v58, v157 = 0.25 * (v95 + v88 * (v111 - v151)),
+        v158 = v116 * v59 - v123 + v156, v159 = 0.25 * (v95 + v88 * (v112 - v151)),
+        v160 = 0.25 * (v95 + v88 * (v111 - v152)), v161 = 0.25 * (v95 + v88 * (v112 - v152)),
+        v162 = v115 * v59 - v123 + v155, v163 = v117 * v59 - v124 + v155, v164 = v158 * v158,
+        v165 = v162 * v162, v166 = v163 * v163, v167 = v134 * v157, v168 = v134 * v160,
+        v169 = v134 * v159, v170 = v134 * v161, v171 = v129 * v157, v172 = v129 * v160,
+        v173 = v129 * v159, v174 = v129 * v161, v175 = v58 * v102 - v60 * v103,
+        v176 = 1.0 + v60 * v125 - v58 * v128, v177 = v54 * v125 - v128 * v52,
+        v178 = 1.0 - v54 * v103 + v102 * v52, v179 = v176 + (v61 * v157 + v60 * v171 + v58 * v167),
+        v180 = v176 + (v61 * v160 + v60 * v172 + v58 * v168),
+        v181 = v176 + (v61 * v159 + v60 * v173 + v58 * v169),
+        v182 = v55 * v157 + v54 * v171 + v177 + v52 * v167,
+        v183 = v55 * v160 + v54 * v172 + v177 + v52 * v168,
+        v184 = v55 * v159 + v54 * v173 + v177 + v52 * v169,
+        v185 = v55 * v161 + v54 * v174 + v177 + v52 * v170,
+        v186 = v55 * v122 + v178 + v52 * v144 + v54 * v148,
+        v187 = v55 * v120 + v178 + v52 * v142 + v54 * v146,
+        v188 = v55 * v121 + v178 + v52 * v143 + v54 * v147,
+        v189 = v175 + (v61 * v120 + v58 * v142) + v60 * v146,
+        v190 = v180 * v180 + v183 * v183 + v187 * v187 + v189 * v189,
+        v191 = v180 * v187 - v183 * v189, v192 = v175 + (v61 * v121 + v58 * v143 + v60 * v147),
+        v193 = v175 + (v61 * v119 + v58 * v141) + v60 * v145, v194 = v181 * v188 - v184 * v192,
+        v195 = v191 * v191, v196 = v181 * v181 + v184 * v184 + v188 * v188 + v192 * v192,
+        v197 = v194 * v194, v198 = v175 + v61 * v122 + v60 * v148 + v58 * v144,
+        v199 = softehl_vrcbrt(v164 * v195), v200 = softehl_vrcbrt(v166 * v197),
+        v201 = v176 + (v61 * v161 + v60 * v174) + v58 * v170,
+        v202 = v185 * v185 + v186 * v186 + v198 * v198 + v201 * v201,
+        v203 = v60 * v150 + (v176 + (v61 * v97 + v58 * v138)),
+        v204 = v60 * v149 + (v58 * v137 + (v61 * v96 + v175)),
+        v205 = v54 * v149 + (v55 * v96 + v178 + v137 * v52),
+        v206 = v54 * v150 + (v55 * v97 + v177 + v138 * v52),
+        v207 = v55 * v119 + v178 + v52 * v141 + v54 * v145,
+        v208 = v89 * v59 + (1.0 - v93 * v58 - v92 * v60), v209 = v156 - v124 + v118 * v59,
+        v210 = v208 * v208, v211 = v209 * v209,
+        v212 = v179 * v179 + v182 * v182 + v193 * v193 + v207 * v207,
+        v213 = v203 * v205 - v204 * v206, v214 = v213 * v213, v215 = v179 * v207 - v182 * v193,
+        v216 = v215 * v215, v217 = softehl_vrcbrt(v165 * v216), v218 = v186 * v201 - v185 * v198,
+        v219 = v218 * v218,
+        v220 = v77 * (1.5707963267948966 * parameters[2]) * (1.0 - 1.0 / (v210 * v214)),
+        v221 = 2.0 * v210 * v213 * v220, v222 = 2.0 * v208 * v214 * v220, v223 = v199 * v199,
+        v224 = v84 * v199, v225 = v79 * v223, v226 = v200 * v200, v227 = v85 * v200,
+        v228 = 0.3333333333333333 * v84 * (v164 + v190) + (v195 + v164 * v190) * (0.6666666666666666 * v79 * v199),
+        v229 = softehl_vrcbrt(v211 * v219), v230 = v223 * v223 * v228, v231 = v80 * v226,
+        v232 = 0.3333333333333333 * v85 * (v166 + v196) + (v197 + v166 * v196) * (0.6666666666666666 * v80 * v200),
+        v233 = v226 * v226 * v232, v234 = v224 + v164 * v225, v235 = v227 + v166 * v231,
+        v236 = 2.0 * v191 * (v225 - v164 * v230),
+        v237 = 2.0 * v158 * (v224 + v190 * v225 - v195 * v230),
+        v238 = 2.0 * v194 * (v231 - v166 * v233),
+        v239 = 2.0 * v163 * (v227 + v196 * v231 - v197 * v233),
+        v240 = 2.0 * v183 * v234 - v189 * v236, v241 = 2.0 * v189 * v234 - v183 * v236,
+        v242 = 2.0 * v187 * v234 + v180 * v236, v243 = 2.0 * v180 * v234 + v187 * v236,
+        v244 = 2.0 * v184 * v235 - v192 * v238, v245 = 2.0 * v192 * v235 - v184 * v238,
+        v246 = 2.0 * v188 * v235 + v181 * v238, v247 = 2.0 * v181 * v235 + v188 * v238,
+        v248 = v217 * v217, v249 = v83 * v217, v250 = v204 * v221, v251 = v206 * v221,
+        v252 = v203 * v221, v253 = v205 * v221, v254 = v78 * v248,
+        v255 = 0.3333333333333333 * v83 * (v165 + v212) + (v165 * v212 + v216) * (0.6666666666666666 * v78 * v217),
+        v256 = v248 * v248 * v255, v257 = v97 * v250, v258 = v249 + v165 * v254,
+        v259 = 2.0 * v162 * (v249 + v212 * v254 - v216 * v256),
+        v260 = 2.0 * v215 * (v254 - v165 * v256), v261 = v229 * v229, v262 = v86 * v229,
+        v263 = v81 * v261, v264 = 2.0 * v179 * v258 + v207 * v260,
+        v265 = 0.3333333333333333 * v86 * (v202 + v211) + (v202 * v211 + v219) * (0.6666666666666666 * v81 * v229),
+        v266 = 2.0 * v193 * v258 - v182 * v260, v267 = v261 * v261 * v265,
+        v268 = 2.0 * v182 * v258 - v193 * v260, v269 = 2.0 * v207 * v258 + v179 * v260,
+        v270 = v262 + v211 * v263,
+        v271 = v168 * v243 + (v135 - v131) * v251 + v138 * v253 - v153 * (v239 + v259),
+        v272 = 2.0 * v218 * (v263 - v211 * v267),
+        v273 = 2.0 * v209 * (v262 + v202 * v263 - v219 * v267),
+        v274 = v150 * v253 + (v130 - v139) * v251 - v114 * (v237 + v259) - v92 * v222,
+        v275 = 2.0 * v185 * v270 - v198 * v272, v276 = 2.0 * v198 * v270 - v185 * v272,
+        v277 = 2.0 * v186 * v270 + v201 * v272, v278 = 2.0 * v201 * v270 + v186 * v272,
+        v279 = v116 * v237 + v117 * v239 + v115 * v259 + v89 * v222 + v118 * v273,
+        v280 = v240 + v244 - v250 + v268 + v275, v281 = v278 + (v243 + v247 + v253 + v264),
+        v282 = v276 + (v241 + v245 + v266 - v251),
+        v283 = v271 - v93 * v222 - v154 * (v237 + v273) + v167 * v264 + v170 * v278,
+        v284 = v168 * v240 + (v136 - v133) * v250 + v137 * v252 + v167 * v268 + v170 * v275,
+        v285 = v277 + (v252 + (v242 + v246 + v269)),
+        v286 = v97 * v253 + v157 * v264 + v161 * v278 - v96 * v251 + v119 * v266,
+        v287 = v274 - v113 * (v239 + v273) + v171 * v264 + v174 * v278 + v145 * v266,
+        v288 = (v132 - v140) * v250 + v149 * v252 + v171 * v268 + v174 * v275 + v145 * v269,
+        v289 = v157 * v268 + v161 * v275 + v96 * v252 + v119 * v269 + v122 * v277,
+        v290 = v283 + v141 * v266 + v144 * v276 - v128 * v281 + v102 * v282 + v169 * v247,
+        v291 = v284 + v141 * v269 + v144 * v277 - v128 * v280 + v102 * v285 + v169 * v244,
+        v292 = v287 + v148 * v276 + v125 * v281 + v172 * v243 - v103 * v282 + v173 * v247,
+        v293 = v288 + v148 * v277 + v125 * v280 + v172 * v240 - v103 * v285 + v173 * v244,
+        v294 = v286 + v122 * v276 + v160 * v243 + v159 * v247 + v120 * v241 + v121 * v245,
+        v295 = v289 + v160 * v240 + v159 * v244 + v120 * v242 + v121 * v246,
+        v296 = v290 + v142 * v241 + v143 * v245, v297 = v291 + v142 * v242 + v143 * v246,
+        v298 = v292 + v146 * v241 + v147 * v245, v299 = v293 + v146 * v242 + v147 * v246,
+        v300 = v296 + v298, v301 = v297 + v299, v302 = v295 - v257, v303 = v298 - v296,
+        v304 = v299 - v297, v305 = v279 - v294, v306 = v279 + v294;
+    softehl_store4(R + 0, 8, v301 + v302, v300 + v306, v257 - v295 - v304, v305 - v303);
+    softehl_store4(R + 4, 8, v302 - v301, v306 - v300, v304 - v302, v303 + v305);
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_residual, 8, 8, 0, 0, 8, 0)
 
-static void softehl_solid_taylor_mean_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_tangent)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 1.5707963267948966 * parameters[2];
-    const V v4 = X0 - X2;
-    const V v5 = X2 - X0;
-    const V v6 = X4 - X2;
-    const V v7 = 0.39433756729740643 * v5;
-    const V v8 = 0.10566243270259355 * v5;
-    const V v9 = X4 - X6;
-    const V v10 = 0.10566243270259355 * v6;
-    const V v11 = 0.39433756729740643 * v6;
-    const V v12 = v4 + v9;
-    const V v13 = X6 + v6;
-    const V v14 = X6 - X0;
-    const V v15 = 0.10566243270259355 * v9;
-    const V v16 = v7 + v15;
-    const V v17 = 0.39433756729740643 * v9;
-    const V v18 = v8 + v17;
-    const V v19 = v13 - X0;
-    const V v20 = v9 - v4;
-    const V v21 = 0.39433756729740643 * v14;
-    const V v22 = v21 + v10;
-    const V v23 = 0.10566243270259355 * v14;
-    const V v24 = v23 + v11;
-    const V v25 = 0.25 * v19;
-    const V v26 = 0.0625 * v19;
-    const V v27 = 0.25 * v20;
-    const V v28 = 0.0625 * v20;
-    const V v29 = v16 - v22;
-    const V v30 = v18 + v22;
-    const V v31 = 0.5773502691896257 * v30;
-    const V v32 = 1.5773502691896257 * X1;
-    const V v33 = 0.4226497308103742 * X1;
-    const V v34 = v22 - v16;
-    const V v35 = X1 - X3;
-    const V v36 = X1 + X3;
-    const V v37 = 0.4226497308103742 * X3;
-    const V v38 = v32 + v37;
-    const V v39 = 1.5773502691896257 * X3;
-    const V v40 = v33 + v39;
-    const V v41 = X3 - X1;
-    const V v42 = 0.39433756729740643 * v38;
-    const V v43 = 0.10566243270259355 * v38;
-    const V v44 = 0.39433756729740643 * v40;
-    const V v45 = 0.10566243270259355 * v40;
-    const V v46 = 0.39433756729740643 * v41;
-    const V v47 = 0.10566243270259355 * v41;
-    const V v48 = X5 - X3;
-    const V v49 = 0.4226497308103742 * X5;
-    const V v50 = 1.5773502691896257 * X5;
-    const V v51 = X5 - X7;
-    const V v52 = X5 + X7;
-    const V v53 = 1.5773502691896257 * X7;
-    const V v54 = v49 + v53;
-    const V v55 = 0.4226497308103742 * X7;
-    const V v56 = v50 + v55;
-    const V v57 = 0.10566243270259355 * v48;
-    const V v58 = 0.39433756729740643 * v48;
-    const V v59 = v35 + v51;
-    const V v60 = 0.10566243270259355 * v51;
-    const V v61 = v46 + v60;
-    const V v62 = X7 - X1;
-    const V v63 = 0.39433756729740643 * v51;
-    const V v64 = v47 + v63;
-    const V v65 = 0.10566243270259355 * v54;
-    const V v66 = v42 + v65;
-    const V v67 = 0.39433756729740643 * v54;
-    const V v68 = v43 + v67;
-    const V v69 = 0.10566243270259355 * v56;
-    const V v70 = v44 + v69;
-    const V v71 = 0.39433756729740643 * v56;
-    const V v72 = v45 + v71;
-    const V v73 = v36 + v52;
-    const V v74 = 0.39433756729740643 * v62;
-    const V v75 = v74 + v57;
-    const V v76 = 0.10566243270259355 * v62;
-    const V v77 = v76 + v58;
-    const V v78 = v51 - v35;
-    const V v79 = v52 - v36;
-    const V v80 = 0.25 * v73;
-    const V v81 = 0.25 * v78;
-    const V v82 = 0.0625 * v78;
-    const V v83 = 0.25 * v79;
-    const V v84 = 0.0625 * v79;
-    const V v85 = v68 - v70;
-    const V v86 = v70 - v68;
-    const V v87 = v61 - v75;
-    const V v88 = v64 + v75;
-    const V v89 = 1.0 / v80;
-    const V v90 = v80 * v80;
-    const V v91 = v31 * v86;
-    const V v92 = 0.5773502691896257 * v88;
-    const V v93 = 1.0 / v90;
-    const V v94 = v66 * v87;
-    const V v95 = v66 * v34;
-    const V v96 = v92 * v85;
-    const V v97 = v75 - v61;
-    const V v98 = v12 * v82;
-    const V v99 = v12 * v84;
-    const V v100 = v72 * v97;
-    const V v101 = v100 + v94;
-    const V v102 = v72 * v29;
-    const V v103 = v102 + v95;
-    const V v104 = 0.5773502691896257 * v103;
-    const V v105 = v104 + v91;
-    const V v106 = 0.5773502691896257 * v101;
-    const V v107 = v106 + v96;
-    const V v108 = 0.25 * v89;
-    const V v109 = d0 - d4;
-    const V v110 = d0 - d2;
-    const V v111 = d2 + v109;
-    const V v112 = d1 + d3;
-    const V v113 = d1 - d3;
-    const V v114 = d4 - d6;
-    const V v115 = v111 - d6;
-    const V v116 = 0.25 * v93;
-    const V v117 = v110 - v114;
-    const V v118 = v110 + v114;
-    const V v119 = d5 + d7;
-    const V v120 = d5 - d7;
-    const V v121 = v112 - v119;
-    const V v122 = v112 + v119;
-    const V v123 = v113 - v120;
-    const V v124 = v113 + v120;
-    const V v125 = v16 * v75;
-    const V v126 = v18 * v75;
-    const V v127 = v16 * v77;
-    const V v128 = v18 * v77;
-    const V v129 = v27 * v83;
-    const V v130 = v22 * v61;
-    const V v131 = v125 - v130;
-    const V v132 = v22 * v64;
-    const V v133 = v126 - v132;
-    const V v134 = v24 * v61;
-    const V v135 = v127 - v134;
-    const V v136 = v24 * v64;
-    const V v137 = v128 - v136;
-    const V v138 = v66 * v131;
-    const V v139 = v68 * v133;
-    const V v140 = v70 * v135;
-    const V v141 = v72 * v137;
-    const V v142 = v131 - v137;
-    const V v143 = v133 - v135;
-    const V v144 = v135 - v133;
-    const V v145 = 6.283185307179586 * v138;
-    const V v146 = v143 - v142;
-    const V v147 = v144 - v142;
-    const V v148 = 6.283185307179586 * v139;
-    const V v149 = v138 + v139;
-    const V v150 = v139 - v138;
-    const V v151 = 0.14433756729740643 * v147;
-    const V v152 = 0.14433756729740643 * v146;
-    const V v153 = v140 + v141;
-    const V v154 = 6.283185307179586 * v140;
-    const V v155 = v150 - v140;
-    const V v156 = 6.283185307179586 * v141;
-    const V v157 = v141 + v155;
-    const V v158 = 0.5773502691896257 * v157;
-    const V v159 = v149 + v153;
-    const V v160 = v153 - v149;
-    const V v161 = 0.5773502691896257 * v160;
-    const V v162 = v2 * v145;
-    const V v163 = v2 * v148;
-    const V v164 = v2 * v154;
-    const V v165 = v2 * v156;
-    const V v166 = 1.0 / v159;
-    const V v167 = v159 * v3;
-    const V v168 = v1 * v145;
-    const V v169 = v1 * v148;
-    const V v170 = v1 * v154;
-    const V v171 = v1 * v156;
-    const V v172 = 0.6666666666666666 * v162;
-    const V v173 = 0.6666666666666666 * v163;
-    const V v174 = 0.6666666666666666 * v164;
-    const V v175 = 0.6666666666666666 * v165;
-    const V v176 = 0.3333333333333333 * v168;
-    const V v177 = 0.3333333333333333 * v169;
-    const V v178 = 0.3333333333333333 * v170;
-    const V v179 = 0.3333333333333333 * v171;
-    const V v180 = v81 * v25;
-    const V v181 = v129 - v180;
-    const V v182 = 1.0 / v181;
-    const V v183 = v166 * v181;
-    const V v184 = v161 * v166;
-    const V v185 = v166 * v158;
-    const V v186 = v151 * v166;
-    const V v187 = v152 * v166;
-    const V v188 = v166 * v107;
-    const V v189 = v166 * v105;
-    const V v190 = 0.25 * v188;
-    const V v191 = 0.25 * v189;
-    const V v192 = (-0.5773502691896257) - v184;
-    const V v193 = 0.5773502691896257 - v184;
-    const V v194 = (-0.5773502691896257) - v185;
-    const V v195 = 0.5773502691896257 - v185;
-    const V v196 = v82 * v182;
-    const V v197 = v84 * v182;
-    const V v198 = v59 * v182;
-    const V v199 = v182 * v98;
-    const V v200 = v182 * v99;
-    const V v201 = v81 * v192;
-    const V v202 = v81 * v193;
-    const V v203 = v83 * v194;
-    const V v204 = v83 * v195;
-    const V v205 = v27 * v192;
-    const V v206 = v27 * v193;
-    const V v207 = v201 + v203;
-    const V v208 = v202 + v203;
-    const V v209 = v201 + v204;
-    const V v210 = v203 - v201;
-    const V v211 = v204 - v201;
-    const V v212 = v203 - v202;
-    const V v213 = v204 - v202;
-    const V v214 = v202 + v204;
-    const V v215 = v108 * v193;
-    const V v216 = v186 + v215;
-    const V v217 = v108 * v192;
-    const V v218 = v186 + v217;
-    const V v219 = v116 * v207;
-    const V v220 = v183 - v219;
-    const V v221 = v116 * v209;
-    const V v222 = v183 - v221;
-    const V v223 = v116 * v208;
-    const V v224 = v183 - v223;
-    const V v225 = v116 * v214;
-    const V v226 = v183 - v225;
-    const V v227 = v182 * v210;
-    const V v228 = v188 + v227;
-    const V v229 = v182 * v211;
-    const V v230 = v188 + v229;
-    const V v231 = v182 * v212;
-    const V v232 = v188 + v231;
-    const V v233 = v182 * v213;
-    const V v234 = v188 + v233;
-    const V v235 = 0.25 * v228;
-    const V v236 = 0.25 * v230;
-    const V v237 = 0.25 * v232;
-    const V v238 = 0.25 * v234;
-    const V v239 = v218 * v123;
-    const V v240 = v216 * v123;
-    const V v241 = v182 * v26;
-    const V v242 = v26 * v198;
-    const V v243 = v28 * v198;
-    const V v244 = v28 * v182;
-    const V v245 = v224 * v122;
-    const V v246 = v220 * v122;
-    const V v247 = v222 * v122;
-    const V v248 = v245 - v240;
-    const V v249 = v200 - v242;
-    const V v250 = v190 * v242;
-    const V v251 = v190 * v243;
-    const V v252 = v191 * v242;
-    const V v253 = v191 * v243;
-    const V v254 = v246 - v239;
-    const V v255 = v247 - v239;
-    const V v256 = v243 - v199;
-    const V v257 = v190 * v199;
-    const V v258 = v191 * v199;
-    const V v259 = v251 - v257;
-    const V v260 = v253 - v258;
-    const V v261 = v257 - v251;
-    const V v262 = v258 - v253;
-    const V v263 = v190 * v200;
-    const V v264 = v191 * v200;
-    const V v265 = v256 * v235;
-    const V v266 = v250 - v263;
-    const V v267 = v252 - v264;
-    const V v268 = v256 * v236;
-    const V v269 = v256 * v237;
-    const V v270 = v256 * v238;
-    const V v271 = v249 * v235;
-    const V v272 = v249 * v236;
-    const V v273 = v249 * v237;
-    const V v274 = v249 * v238;
-    const V v275 = v263 - v250;
-    const V v276 = v264 - v252;
-    const V v277 = v118 * v235;
-    const V v278 = v118 * v236;
-    const V v279 = v118 * v237;
-    const V v280 = v118 * v238;
-    const V v281 = v118 * v190;
-    const V v282 = v118 * v191;
-    const V v283 = v124 * v190;
-    const V v284 = v124 * v191;
-    const V v285 = v124 * v235;
-    const V v286 = v124 * v236;
-    const V v287 = v124 * v237;
-    const V v288 = v124 * v238;
-    const V v289 = v25 * v194;
-    const V v290 = v25 * v195;
-    const V v291 = v108 * v194;
-    const V v292 = v187 + v291;
-    const V v293 = v108 * v195;
-    const V v294 = v187 + v293;
-    const V v295 = v121 * v260;
-    const V v296 = v284 + v295;
-    const V v297 = v121 * v265;
-    const V v298 = v285 + v297;
-    const V v299 = v121 * v268;
-    const V v300 = v286 + v299;
-    const V v301 = v121 * v269;
-    const V v302 = v287 + v301;
-    const V v303 = v205 - v289;
-    const V v304 = v206 - v289;
-    const V v305 = v205 - v290;
-    const V v306 = v206 - v290;
-    const V v307 = v292 * v121;
-    const V v308 = 1.0 - v307;
-    const V v309 = v294 * v121;
-    const V v310 = 1.0 - v309;
-    const V v311 = v121 * v196;
-    const V v312 = v182 * v303;
-    const V v313 = v189 + v312;
-    const V v314 = v182 * v304;
-    const V v315 = v189 + v314;
-    const V v316 = v182 * v305;
-    const V v317 = v189 + v316;
-    const V v318 = v182 * v306;
-    const V v319 = v189 + v318;
-    const V v320 = 0.25 * v313;
-    const V v321 = v255 + v310;
-    const V v322 = 0.25 * v315;
-    const V v323 = 0.25 * v317;
-    const V v324 = 0.25 * v319;
-    const V v325 = v254 + v308;
-    const V v326 = v248 + v308;
-    const V v327 = v310 - v240;
-    const V v328 = v321 * v321;
-    const V v329 = 2.0 * v321;
-    const V v330 = v325 * v325;
-    const V v331 = 2.0 * v325;
-    const V v332 = v326 * v326;
-    const V v333 = 2.0 * v326;
-    const V v334 = v256 * v320;
-    const V v335 = v256 * v323;
-    const V v336 = v256 * v322;
-    const V v337 = v256 * v324;
-    const V v338 = v249 * v320;
-    const V v339 = v249 * v323;
-    const V v340 = v249 * v322;
-    const V v341 = v249 * v324;
-    const V v342 = v118 * v320;
-    const V v343 = v118 * v323;
-    const V v344 = v118 * v322;
-    const V v345 = v118 * v324;
-    const V v346 = v124 * v320;
-    const V v347 = v124 * v323;
-    const V v348 = v124 * v322;
-    const V v349 = v124 * v324;
-    const V v350 = v117 * v338;
-    const V v351 = v342 + v350;
-    const V v352 = v117 * v340;
-    const V v353 = v344 + v352;
-    const V v354 = v117 * v341;
-    const V v355 = v345 + v354;
-    const V v356 = v117 * v339;
-    const V v357 = v343 + v356;
-    const V v358 = v123 * v338;
-    const V v359 = v346 + v358;
-    const V v360 = v123 * v339;
-    const V v361 = v347 + v360;
-    const V v362 = v123 * v340;
-    const V v363 = v348 + v362;
-    const V v364 = v123 * v341;
-    const V v365 = v349 + v364;
-    const V v366 = v117 * v241;
-    const V v367 = v123 * v241;
-    const V v368 = 1.0 + v367;
-    const V v369 = v123 * v197;
-    const V v370 = v311 - v369;
-    const V v371 = v117 * v197;
-    const V v372 = 1.0 - v371;
-    const V v373 = v121 * v334;
-    const V v374 = v359 + v373;
-    const V v375 = v121 * v335;
-    const V v376 = v361 + v375;
-    const V v377 = v121 * v336;
-    const V v378 = v363 + v377;
-    const V v379 = v121 * v244;
-    const V v380 = v368 - v379;
-    const V v381 = v244 * v115;
-    const V v382 = v366 - v381;
-    const V v383 = v196 * v115;
-    const V v384 = v372 + v383;
-    const V v385 = v380 + v374;
-    const V v386 = v380 + v376;
-    const V v387 = v380 + v378;
-    const V v388 = v283 + v370;
-    const V v389 = v370 + v298;
-    const V v390 = v370 + v300;
-    const V v391 = v282 + v382;
-    const V v392 = v281 + v384;
-    const V v393 = v277 + v384;
-    const V v394 = 2.0 * v385;
-    const V v395 = 2.0 * v386;
-    const V v396 = 2.0 * v387;
-    const V v397 = v385 * v385;
-    const V v398 = v386 * v386;
-    const V v399 = v387 * v387;
-    const V v400 = v278 + v384;
-    const V v401 = v279 + v384;
-    const V v402 = v280 + v384;
-    const V v403 = v351 + v382;
-    const V v404 = v357 + v382;
-    const V v405 = v353 + v382;
-    const V v406 = v355 + v382;
-    const V v407 = v115 * v268;
-    const V v408 = v400 + v407;
-    const V v409 = v115 * v269;
-    const V v410 = v401 + v409;
-    const V v411 = v115 * v334;
-    const V v412 = v403 + v411;
-    const V v413 = v115 * v270;
-    const V v414 = v402 + v413;
-    const V v415 = v115 * v335;
-    const V v416 = v404 + v415;
-    const V v417 = v115 * v336;
-    const V v418 = v405 + v417;
-    const V v419 = v115 * v337;
-    const V v420 = v406 + v419;
-    const V v421 = 2.0 * v412;
-    const V v422 = 2.0 * v416;
-    const V v423 = 2.0 * v418;
-    const V v424 = 2.0 * v420;
-    const V v425 = v420 * v420;
-    const V v426 = v117 * v274;
-    const V v427 = v414 + v426;
-    const V v428 = v412 * v412;
-    const V v429 = v397 + v428;
-    const V v430 = v416 * v416;
-    const V v431 = v398 + v430;
-    const V v432 = v418 * v418;
-    const V v433 = v399 + v432;
-    const V v434 = 2.0 * v427;
-    const V v435 = v427 * v427;
-    const V v436 = v425 + v435;
-    const V v437 = v117 * v272;
-    const V v438 = v408 + v437;
-    const V v439 = v117 * v273;
-    const V v440 = v410 + v439;
-    const V v441 = v438 * v438;
-    const V v442 = v431 + v441;
-    const V v443 = 2.0 * v438;
-    const V v444 = v440 * v440;
-    const V v445 = v433 + v444;
-    const V v446 = 2.0 * v440;
-    const V v447 = v386 * v438;
-    const V v448 = v387 * v440;
-    const V v449 = v123 * v272;
-    const V v450 = v390 + v449;
-    const V v451 = v123 * v273;
-    const V v452 = v302 + v451;
-    const V v453 = v450 * v450;
-    const V v454 = v442 + v453;
-    const V v455 = 2.0 * v450;
-    const V v456 = v416 * v450;
-    const V v457 = v447 - v456;
-    const V v458 = v370 + v452;
-    const V v459 = v370 + v288;
-    const V v460 = 2.0 * v458;
-    const V v461 = v123 * v271;
-    const V v462 = v389 + v461;
-    const V v463 = v418 * v458;
-    const V v464 = v448 - v463;
-    const V v465 = 2.0 * v462;
-    const V v466 = v457 * v457;
-    const V v467 = 2.0 * v457;
-    const V v468 = v458 * v458;
-    const V v469 = v445 + v468;
-    const V v470 = v123 * v274;
-    const V v471 = v459 + v470;
-    const V v472 = v462 * v462;
-    const V v473 = v429 + v472;
-    const V v474 = v464 * v464;
-    const V v475 = 2.0 * v464;
-    const V v476 = v332 + v469;
-    const V v477 = v332 * v469;
-    const V v478 = v121 * v270;
-    const V v479 = v471 + v478;
-    const V v480 = v178 * v476;
-    const V v481 = v474 + v477;
-    const V v482 = v328 * v466;
-    const V v483 = softehl_vrcbrt(v482);
-    const V v484 = 2.0 * v479;
-    const V v485 = v332 * v474;
-    const V v486 = softehl_vrcbrt(v485);
-    const V v487 = v328 * v454;
-    const V v488 = v466 + v487;
-    const V v489 = v328 + v454;
-    const V v490 = v479 * v479;
-    const V v491 = v436 + v490;
-    const V v492 = v177 * v489;
-    const V v493 = v187 * v121;
-    const V v494 = 1.0 - v493;
-    const V v495 = v380 + v296;
-    const V v496 = v380 + v365;
-    const V v497 = v121 * v259;
-    const V v498 = v497 + v388;
-    const V v499 = v121 * v337;
-    const V v500 = v496 + v499;
-    const V v501 = v500 * v500;
-    const V v502 = v491 + v501;
-    const V v503 = 2.0 * v500;
-    const V v504 = v123 * v276;
-    const V v505 = v504 + v495;
-    const V v506 = v186 * v123;
-    const V v507 = v494 - v506;
-    const V v508 = v123 * v275;
-    const V v509 = v508 + v498;
-    const V v510 = v427 * v500;
-    const V v511 = v259 * v115;
-    const V v512 = v392 + v511;
-    const V v513 = v260 * v115;
-    const V v514 = v391 + v513;
-    const V v515 = v115 * v265;
-    const V v516 = v393 + v515;
-    const V v517 = v117 * v275;
-    const V v518 = v517 + v512;
-    const V v519 = v117 * v276;
-    const V v520 = v519 + v514;
-    const V v521 = v117 * v271;
-    const V v522 = v516 + v521;
-    const V v523 = v183 * v122;
-    const V v524 = v523 + v507;
-    const V v525 = v226 * v122;
-    const V v526 = v327 + v525;
-    const V v527 = 2.0 * v522;
-    const V v528 = 2.0 * v524;
-    const V v529 = v524 * v524;
-    const V v530 = v526 * v526;
-    const V v531 = 2.0 * v526;
-    const V v532 = v522 * v522;
-    const V v533 = v473 + v532;
-    const V v534 = v505 * v518;
-    const V v535 = v385 * v522;
-    const V v536 = v502 + v530;
-    const V v537 = 2.0 * v529;
-    const V v538 = v502 * v530;
-    const V v539 = v330 + v533;
-    const V v540 = v330 * v533;
-    const V v541 = v509 * v520;
-    const V v542 = v534 - v541;
-    const V v543 = v537 * v542;
-    const V v544 = v542 * v542;
-    const V v545 = v176 * v539;
-    const V v546 = v179 * v536;
-    const V v547 = v412 * v462;
-    const V v548 = v535 - v547;
-    const V v549 = v529 * v544;
-    const V v550 = v528 * v544;
-    const V v551 = v548 * v548;
-    const V v552 = 2.0 * v548;
-    const V v553 = 1.0 / v549;
-    const V v554 = v540 + v551;
-    const V v555 = v330 * v551;
-    const V v556 = softehl_vrcbrt(v555);
-    const V v557 = v420 * v479;
-    const V v558 = v510 - v557;
-    const V v559 = v558 * v558;
-    const V v560 = 2.0 * v558;
-    const V v561 = 1.0 - v553;
-    const V v562 = v167 * v561;
-    const V v563 = v543 * v562;
-    const V v564 = v550 * v562;
-    const V v565 = v483 * v483;
-    const V v566 = v169 * v483;
-    const V v567 = v173 * v483;
-    const V v568 = v538 + v559;
-    const V v569 = v530 * v559;
-    const V v570 = v565 * v565;
-    const V v571 = v163 * v565;
-    const V v572 = v486 * v486;
-    const V v573 = v170 * v486;
-    const V v574 = v174 * v486;
-    const V v575 = v488 * v567;
-    const V v576 = v492 + v575;
-    const V v577 = softehl_vrcbrt(v569);
-    const V v578 = v570 * v576;
-    const V v579 = v572 * v572;
-    const V v580 = v164 * v572;
-    const V v581 = v481 * v574;
-    const V v582 = v480 + v581;
-    const V v583 = v579 * v582;
-    const V v584 = v454 * v571;
-    const V v585 = v566 + v584;
-    const V v586 = v328 * v571;
-    const V v587 = v566 + v586;
-    const V v588 = v328 * v578;
-    const V v589 = v571 - v588;
-    const V v590 = v466 * v578;
-    const V v591 = v585 - v590;
-    const V v592 = v469 * v580;
-    const V v593 = v573 + v592;
-    const V v594 = v332 * v580;
-    const V v595 = v573 + v594;
-    const V v596 = v332 * v583;
-    const V v597 = v580 - v596;
-    const V v598 = v474 * v583;
-    const V v599 = v593 - v598;
-    const V v600 = v395 * v587;
-    const V v601 = v455 * v587;
-    const V v602 = v467 * v589;
-    const V v603 = v329 * v591;
-    const V v604 = v422 * v587;
-    const V v605 = v443 * v587;
-    const V v606 = v396 * v595;
-    const V v607 = v475 * v597;
-    const V v608 = v333 * v599;
-    const V v609 = v460 * v595;
-    const V v610 = v423 * v595;
-    const V v611 = v446 * v595;
-    const V v612 = v450 * v602;
-    const V v613 = v604 - v612;
-    const V v614 = v416 * v602;
-    const V v615 = v601 - v614;
-    const V v616 = v386 * v602;
-    const V v617 = v605 + v616;
-    const V v618 = v438 * v602;
-    const V v619 = v600 + v618;
-    const V v620 = v458 * v607;
-    const V v621 = v610 - v620;
-    const V v622 = v418 * v607;
-    const V v623 = v609 - v622;
-    const V v624 = v387 * v607;
-    const V v625 = v611 + v624;
-    const V v626 = v440 * v607;
-    const V v627 = v606 + v626;
-    const V v628 = v222 * v603;
-    const V v629 = v224 * v608;
-    const V v630 = v628 + v629;
-    const V v631 = v613 + v621;
-    const V v632 = v615 + v623;
-    const V v633 = v617 + v625;
-    const V v634 = v619 + v627;
-    const V v635 = v335 * v619;
-    const V v636 = v335 * v613;
-    const V v637 = v556 * v556;
-    const V v638 = v168 * v556;
-    const V v639 = v172 * v556;
-    const V v640 = v509 * v563;
-    const V v641 = v520 * v563;
-    const V v642 = v505 * v563;
-    const V v643 = v518 * v563;
-    const V v644 = v637 * v637;
-    const V v645 = v162 * v637;
-    const V v646 = v554 * v639;
-    const V v647 = v545 + v646;
-    const V v648 = v261 * v641;
-    const V v649 = v635 + v648;
-    const V v650 = v644 * v647;
-    const V v651 = v634 + v643;
-    const V v652 = v262 * v640;
-    const V v653 = v636 + v652;
-    const V v654 = v276 * v643;
-    const V v655 = v267 * v640;
-    const V v656 = v533 * v645;
-    const V v657 = v638 + v656;
-    const V v658 = v260 * v643;
-    const V v659 = v649 + v658;
-    const V v660 = v191 * v643;
-    const V v661 = v191 * v640;
-    const V v662 = v259 * v642;
-    const V v663 = v653 + v662;
-    const V v664 = v266 * v641;
-    const V v665 = v654 + v664;
-    const V v666 = v275 * v642;
-    const V v667 = v655 + v666;
-    const V v668 = v551 * v650;
-    const V v669 = v657 - v668;
-    const V v670 = v330 * v645;
-    const V v671 = v638 + v670;
-    const V v672 = v330 * v650;
-    const V v673 = v645 - v672;
-    const V v674 = v631 - v640;
-    const V v675 = v331 * v669;
-    const V v676 = v552 * v673;
-    const V v677 = v577 * v577;
-    const V v678 = v171 * v577;
-    const V v679 = v175 * v577;
-    const V v680 = v394 * v671;
-    const V v681 = v465 * v671;
-    const V v682 = v421 * v671;
-    const V v683 = v527 * v671;
-    const V v684 = v677 * v677;
-    const V v685 = v165 * v677;
-    const V v686 = v522 * v676;
-    const V v687 = v680 + v686;
-    const V v688 = v568 * v679;
-    const V v689 = v546 + v688;
-    const V v690 = v412 * v676;
-    const V v691 = v681 - v690;
-    const V v692 = v684 * v689;
-    const V v693 = v462 * v676;
-    const V v694 = v682 - v693;
-    const V v695 = v385 * v676;
-    const V v696 = v683 + v695;
-    const V v697 = v674 + v694;
-    const V v698 = v603 + v675;
-    const V v699 = v608 + v675;
-    const V v700 = v220 * v675;
-    const V v701 = v630 + v700;
-    const V v702 = v502 * v685;
-    const V v703 = v678 + v702;
-    const V v704 = v530 * v685;
-    const V v705 = v678 + v704;
-    const V v706 = v530 * v692;
-    const V v707 = v685 - v706;
-    const V v708 = v559 * v692;
-    const V v709 = v703 - v708;
-    const V v710 = v218 * v698;
-    const V v711 = v665 - v710;
-    const V v712 = v292 * v699;
-    const V v713 = v659 - v712;
-    const V v714 = v560 * v707;
-    const V v715 = v531 * v709;
-    const V v716 = v503 * v705;
-    const V v717 = v484 * v705;
-    const V v718 = v424 * v705;
-    const V v719 = v434 * v705;
-    const V v720 = v183 * v564;
-    const V v721 = v701 + v720;
-    const V v722 = v186 * v564;
-    const V v723 = v711 - v722;
-    const V v724 = v187 * v564;
-    const V v725 = v713 - v724;
-    const V v726 = v479 * v714;
-    const V v727 = v718 - v726;
-    const V v728 = v420 * v714;
-    const V v729 = v717 - v728;
-    const V v730 = v500 * v714;
-    const V v731 = v719 + v730;
-    const V v732 = v427 * v714;
-    const V v733 = v716 + v732;
-    const V v734 = v226 * v715;
-    const V v735 = v721 + v734;
-    const V v736 = v608 + v715;
-    const V v737 = v603 + v715;
-    const V v738 = v216 * v736;
-    const V v739 = v723 - v738;
-    const V v740 = v294 * v737;
-    const V v741 = v725 - v740;
-    const V v742 = v697 + v727;
-    const V v743 = v320 * v694;
-    const V v744 = v320 * v687;
-    const V v745 = v660 + v744;
-    const V v746 = v632 + v691;
-    const V v747 = v633 + v696;
-    const V v748 = v651 + v687;
-    const V v749 = v733 + v748;
-    const V v750 = v324 * v727;
-    const V v751 = v743 + v750;
-    const V v752 = v324 * v733;
-    const V v753 = v745 + v752;
-    const V v754 = v746 - v641;
-    const V v755 = v334 * v687;
-    const V v756 = v741 + v755;
-    const V v757 = v334 * v694;
-    const V v758 = v663 + v757;
-    const V v759 = v642 + v747;
-    const V v760 = v190 * v642;
-    const V v761 = v751 + v760;
-    const V v762 = v190 * v641;
-    const V v763 = v753 - v762;
-    const V v764 = v729 + v754;
-    const V v765 = v338 * v687;
-    const V v766 = v739 + v765;
-    const V v767 = v338 * v694;
-    const V v768 = v667 + v767;
-    const V v769 = v337 * v733;
-    const V v770 = v756 + v769;
-    const V v771 = v337 * v727;
-    const V v772 = v758 + v771;
-    const V v773 = v731 + v759;
-    const V v774 = v341 * v733;
-    const V v775 = v766 + v774;
-    const V v776 = v341 * v727;
-    const V v777 = v768 + v776;
-    const V v778 = v235 * v691;
-    const V v779 = v763 + v778;
-    const V v780 = v235 * v696;
-    const V v781 = v761 + v780;
-    const V v782 = v265 * v691;
-    const V v783 = v770 + v782;
-    const V v784 = v265 * v696;
-    const V v785 = v772 + v784;
-    const V v786 = v271 * v691;
-    const V v787 = v775 + v786;
-    const V v788 = v271 * v696;
-    const V v789 = v777 + v788;
-    const V v790 = v238 * v729;
-    const V v791 = v779 + v790;
-    const V v792 = v238 * v731;
-    const V v793 = v781 + v792;
-    const V v794 = v270 * v729;
-    const V v795 = v783 + v794;
-    const V v796 = v270 * v731;
-    const V v797 = v785 + v796;
-    const V v798 = v274 * v729;
-    const V v799 = v787 + v798;
-    const V v800 = v274 * v731;
-    const V v801 = v789 + v800;
-    const V v802 = v244 * v749;
-    const V v803 = v795 - v802;
-    const V v804 = v244 * v742;
-    const V v805 = v797 - v804;
-    const V v806 = v241 * v749;
-    const V v807 = v799 + v806;
-    const V v808 = v241 * v742;
-    const V v809 = v801 + v808;
-    const V v810 = v323 * v619;
-    const V v811 = v791 + v810;
-    const V v812 = v323 * v613;
-    const V v813 = v793 + v812;
-    const V v814 = v339 * v619;
-    const V v815 = v807 + v814;
-    const V v816 = v339 * v613;
-    const V v817 = v809 + v816;
-    const V v818 = v196 * v764;
-    const V v819 = v803 + v818;
-    const V v820 = v196 * v773;
-    const V v821 = v805 + v820;
-    const V v822 = v197 * v764;
-    const V v823 = v815 - v822;
-    const V v824 = v197 * v773;
-    const V v825 = v817 - v824;
-    const V v826 = v322 * v627;
-    const V v827 = v811 + v826;
-    const V v828 = v322 * v621;
-    const V v829 = v813 + v828;
-    const V v830 = v336 * v627;
-    const V v831 = v819 + v830;
-    const V v832 = v336 * v621;
-    const V v833 = v821 + v832;
-    const V v834 = v340 * v627;
-    const V v835 = v823 + v834;
-    const V v836 = v340 * v621;
-    const V v837 = v825 + v836;
-    const V v838 = v236 * v615;
-    const V v839 = v827 + v838;
-    const V v840 = v236 * v617;
-    const V v841 = v829 + v840;
-    const V v842 = v268 * v615;
-    const V v843 = v831 + v842;
-    const V v844 = v268 * v617;
-    const V v845 = v833 + v844;
-    const V v846 = v272 * v615;
-    const V v847 = v835 + v846;
-    const V v848 = v272 * v617;
-    const V v849 = v837 + v848;
-    const V v850 = v237 * v623;
-    const V v851 = v839 + v850;
-    const V v852 = v237 * v625;
-    const V v853 = v841 + v852;
-    const V v854 = v269 * v623;
-    const V v855 = v843 + v854;
-    const V v856 = v269 * v625;
-    const V v857 = v845 + v856;
-    const V v858 = v273 * v623;
-    const V v859 = v847 + v858;
-    const V v860 = v273 * v625;
-    const V v861 = v849 + v860;
-    const V v862 = v661 - v853;
-    const V v863 = v855 + v859;
-    const V v864 = v857 + v861;
-    const V v865 = v853 - v661;
-    const V v866 = v859 - v855;
-    const V v867 = v861 - v857;
-    const V v868 = v735 - v851;
-    const V v869 = v735 + v851;
-    const V v870 = v862 - v867;
-    const V v871 = v865 - v864;
-    const V v872 = v863 + v869;
-    const V v873 = v866 + v868;
-    const V v874 = v868 - v866;
-    const V v875 = v864 + v865;
-    softehl_store4(R + 0, 8, v875, v872, v870, v874);
-    const V v876 = v867 - v865;
-    const V v877 = v869 - v863;
-    softehl_store4(R + 4, 8, v871, v877, v876, v873);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1];
+    const V v3 = X0 - X2, v4 = X2 - X0, v5 = X4 - X2, v6 = X4 - X6, v7 = v3 + v6, v8 = X6 - X0,
+        v9 = 0.39433756729740643 * v4 + 0.10566243270259355 * v6,
+        v10 = 0.10566243270259355 * v4 + 0.39433756729740643 * v6, v11 = X6 + v5 - X0,
+        v12 = v6 - v3, v13 = 0.39433756729740643 * v8 + 0.10566243270259355 * v5,
+        v14 = 0.10566243270259355 * v8 + 0.39433756729740643 * v5, v15 = 0.25 * v11,
+        v16 = 0.0625 * v11, v17 = 0.25 * v12, v18 = 0.0625 * v12, v19 = X1 - X3, v20 = X1 + X3,
+        v21 = 1.5773502691896257 * X1 + 0.4226497308103742 * X3,
+        v22 = 0.4226497308103742 * X1 + 1.5773502691896257 * X3, v23 = X3 - X1, v24 = X5 - X3,
+        v25 = X5 - X7, v26 = X5 + X7, v27 = 0.4226497308103742 * X5 + 1.5773502691896257 * X7,
+        v28 = 1.5773502691896257 * X5 + 0.4226497308103742 * X7,
+        v29 = 0.39433756729740643 * v23 + 0.10566243270259355 * v25, v30 = X7 - X1,
+        v31 = 0.10566243270259355 * v23 + 0.39433756729740643 * v25,
+        v32 = 0.39433756729740643 * v21 + 0.10566243270259355 * v27,
+        v33 = 0.10566243270259355 * v21 + 0.39433756729740643 * v27,
+        v34 = 0.39433756729740643 * v22 + 0.10566243270259355 * v28,
+        v35 = 0.10566243270259355 * v22 + 0.39433756729740643 * v28,
+        v36 = 0.39433756729740643 * v30 + 0.10566243270259355 * v24,
+        v37 = 0.10566243270259355 * v30 + 0.39433756729740643 * v24, v38 = v25 - v19,
+        v39 = v26 - v20, v40 = 0.25 * (v20 + v26), v41 = 0.25 * v38, v42 = 0.0625 * v38,
+        v43 = 0.25 * v39, v44 = 0.0625 * v39,
+        v45 = 0.5773502691896257 * (v35 * (v9 - v13) + v32 * (v13 - v9)) + 0.5773502691896257 * (v10 + v13) * (v34 - v33),
+        v46 = 0.5773502691896257 * (v35 * (v36 - v29) + v32 * (v29 - v36)) + 0.5773502691896257 * (v31 + v36) * (v33 - v34),
+        v47 = d0 - d2, v48 = 0.25 * (1.0 / v40), v49 = d1 + d3, v50 = d1 - d3,
+        v51 = 0.25 * (1.0 / (v40 * v40)), v52 = d4 - d6, v53 = d0 + d2 - d4 - d6, v54 = v47 - v52,
+        v55 = v47 + v52, v56 = d5 + d7, v57 = d5 - d7, v58 = v49 - v56, v59 = v49 + v56,
+        v60 = v50 - v57, v61 = v50 + v57, v62 = v9 * v36 - v13 * v29, v63 = v10 * v36 - v13 * v31,
+        v64 = v9 * v37 - v14 * v29, v65 = v10 * v37 - v14 * v31, v66 = v32 * v62, v67 = v33 * v63,
+        v68 = v34 * v64, v69 = v35 * v65, v70 = v62 - v65, v71 = 6.283185307179586 * v66,
+        v72 = 6.283185307179586 * v67, v73 = v66 + v67, v74 = 6.283185307179586 * v68,
+        v75 = 6.283185307179586 * v69, v76 = v68 + v69, v77 = v73 + v76, v78 = v2 * v71,
+        v79 = v2 * v72, v80 = v2 * v74, v81 = v2 * v75, v82 = v1 * v71, v83 = v1 * v72,
+        v84 = v1 * v74, v85 = v1 * v75, v86 = 1.0 / v77,
+        v87 = v77 * (1.5707963267948966 * parameters[2]), v88 = v17 * v43 - v41 * v15,
+        v89 = 1.0 / v88, v90 = 0.5773502691896257 * (v76 - v73) * v86,
+        v91 = v86 * (0.5773502691896257 * (v69 + (v67 - v66 - v68))), v92 = v86 * v88,
+        v93 = 0.14433756729740643 * (v64 - v63 - v70) * v86,
+        v94 = 0.14433756729740643 * (v63 - v64 - v70) * v86, v95 = v86 * v46, v96 = v86 * v45,
+        v97 = 0.25 * v95, v98 = 0.25 * v96, v99 = v42 * v89, v100 = v44 * v89,
+        v101 = (v19 + v25) * v89, v102 = v89 * (v7 * v42), v103 = v89 * (v7 * v44),
+        v104 = v97 * v102, v105 = v97 * v103, v106 = v98 * v102, v107 = v98 * v103,
+        v108 = (-0.5773502691896257) - v90, v109 = 0.5773502691896257 - v90,
+        v110 = v58 * v99 - v60 * v100, v111 = v41 * v108, v112 = v41 * v109, v113 = v17 * v108,
+        v114 = v17 * v109, v115 = v93 + v48 * v109, v116 = v93 + v48 * v108,
+        v117 = (-0.5773502691896257) - v91, v118 = 0.5773502691896257 - v91, v119 = v16 * v101,
+        v120 = v18 * v101, v121 = v89 * v16, v122 = v18 * v89, v123 = v115 * v60, v124 = v116 * v60,
+        v125 = v43 * v117, v126 = v43 * v118, v127 = v92 - v51 * (v111 + v125),
+        v128 = v92 - v51 * (v112 + v125), v129 = v92 - v51 * (v111 + v126),
+        v130 = v92 - v51 * (v112 + v126), v131 = v15 * v118, v132 = v15 * v117,
+        v133 = v94 + v48 * v117, v134 = v94 + v48 * v118, v135 = 0.25 * (v95 + v89 * (v125 - v112)),
+        v136 = 0.25 * (v96 + v89 * (v113 - v131)), v137 = 0.25 * (v96 + v89 * (v114 - v131)),
+        v138 = 0.25 * (v96 + v89 * (v113 - v132)), v139 = 0.25 * (v96 + v89 * (v114 - v132)),
+        v140 = 0.25 * (v95 + v89 * (v125 - v111)), v141 = 0.25 * (v95 + v89 * (v126 - v111)),
+        v142 = 0.25 * (v95 + v89 * (v126 - v112)), v143 = v119 * v135, v144 = v119 * v136,
+        v145 = v119 * v137, v146 = v119 * v138, v147 = v119 * v139, v148 = v97 * v119,
+        v149 = v97 * v120, v150 = v120 * v135, v151 = v120 * v138, v152 = v120 * v139,
+        v153 = v105 - v148, v154 = v104 - v149, v155 = v148 - v105, v156 = v149 - v104,
+        v157 = v98 * v120, v158 = v98 * v119, v159 = v119 * v140, v160 = v120 * v140,
+        v161 = v119 * v141, v162 = v119 * v142, v163 = v120 * v141, v164 = v120 * v142,
+        v165 = v106 - v157, v166 = v107 - v158, v167 = v157 - v106, v168 = v158 - v107,
+        v169 = v121 - v168, v170 = v54 * v121 - v53 * v122, v171 = v167 - v122, v172 = v99 + v156,
+        v173 = v102 * v140, v174 = v102 * v141, v175 = v102 * v135, v176 = v102 * v137,
+        v177 = v160 - v173, v178 = v163 - v174, v179 = v150 - v175, v180 = v102 * v142,
+        v181 = v103 * v142, v182 = v103 * v137, v183 = v103 * v140, v184 = v103 * v141,
+        v185 = v164 - v180, v186 = v145 - v182, v187 = v181 - v162, v188 = v182 - v145,
+        v189 = v183 - v159, v190 = v184 - v161, v191 = v103 * v135, v192 = v120 * v137,
+        v193 = v120 * v136, v194 = v103 * v136, v195 = v176 - v192, v196 = v144 - v194,
+        v197 = v191 - v143, v198 = v192 - v176, v199 = v189 - v100, v200 = v190 - v100,
+        v201 = v187 - v100, v202 = v194 - v144, v203 = v197 - v100, v204 = 1.0 - v133 * v58,
+        v205 = v121 + v202, v206 = v198 - v122, v207 = v121 + v188, v208 = v99 + v179,
+        v209 = 1.0 - v134 * v58, v210 = v60 * v121 + (1.0 - v58 * v122),
+        v211 = v127 * v59 + (v204 - v124), v212 = v128 * v59 + (v204 - v123),
+        v213 = v129 * v59 + (v209 - v124), v214 = v209 - v123 + v130 * v59, v215 = v211 * v211,
+        v216 = 2.0 * v211, v217 = v212 * v212, v218 = 2.0 * v212, v219 = v213 * v213,
+        v220 = 2.0 * v213, v221 = v214 * v214, v222 = 2.0 * v214, v223 = v100 + v155,
+        v224 = v102 * v138, v225 = v102 * v136, v226 = v102 * v139, v227 = v103 * v138,
+        v228 = v103 * v139, v229 = v151 - v224, v230 = v193 - v225, v231 = v152 - v226,
+        v232 = v146 - v227, v233 = v147 - v228, v234 = v224 - v151, v235 = v225 - v193,
+        v236 = v226 - v152, v237 = v227 - v146, v238 = v228 - v147, v239 = v229 - v122,
+        v240 = v230 - v122, v241 = v231 - v122, v242 = v121 + v237, v243 = v121 + v238,
+        v244 = v99 + v177, v245 = v99 + v178, v246 = v99 + v185,
+        v247 = 1.0 + v53 * v99 - v54 * v100, v248 = v247 + (v55 * v140 + v53 * v177 + v54 * v189),
+        v249 = v247 + (v55 * v141 + v53 * v178 + v54 * v190),
+        v250 = v247 + (v55 * v142 + v53 * v185 + v54 * v187),
+        v251 = v247 + (v55 * v97 + (v53 * v156 + v54 * v153)), v252 = 2.0 * v248, v253 = 2.0 * v249,
+        v254 = 2.0 * v250, v255 = v247 + (v55 * v135 + v53 * v179) + v54 * v197,
+        v256 = v55 * v138 + (v170 + v53 * v229 + v54 * v237),
+        v257 = v55 * v136 + (v170 + v53 * v230 + v54 * v202), v258 = 2.0 * v255, v259 = 2.0 * v256,
+        v260 = 2.0 * v257, v261 = v55 * v98 + (v170 + (v53 * v167 + v54 * v166)),
+        v262 = v98 * v251 - v97 * v261, v263 = v171 * v251 - v172 * v261,
+        v264 = v169 * v251 + v223 * v261, v265 = v61 * v135 + (v110 + v60 * v197 + v58 * v179),
+        v266 = v61 * v137 + (v58 * v198 + v60 * v188 + v210), v267 = 2.0 * v265, v268 = 2.0 * v266,
+        v269 = v60 * v166 + (v61 * v98 + (v58 * v167 + v210)),
+        v270 = v60 * v153 + (v58 * v156 + (v61 * v97 + v110)),
+        v271 = 1.0 + v92 * v59 - v94 * v58 - v93 * v60, v272 = 2.0 * v271, v273 = v271 * v271,
+        v274 = v251 * v269 - v270 * v261, v275 = v274 * v274, v276 = 2.0 * v274,
+        v277 = v170 + v55 * v137 + v53 * v198 + v54 * v188,
+        v278 = v170 + v55 * v139 + v53 * v231 + v54 * v238, v279 = 2.0 * v277, v280 = 2.0 * v278,
+        v281 = v94 * v272, v282 = 1.0 / (v273 * v275), v283 = v93 * v272, v284 = v92 * v272,
+        v285 = v263 * v276, v286 = v264 * v276, v287 = v262 * v276,
+        v288 = v61 * v136 + (v60 * v202 + v210) + v58 * v230, v289 = 2.0 * v288, v290 = v282 * v282,
+        v291 = v110 + v61 * v140 + v58 * v177 + v60 * v189,
+        v292 = v110 + v61 * v141 + v58 * v178 + v60 * v190,
+        v293 = v110 + v61 * v142 + v58 * v185 + v60 * v187,
+        v294 = v61 * v138 + v210 + v58 * v229 + v60 * v237,
+        v295 = v61 * v139 + v210 + v58 * v231 + v60 * v238, v296 = 2.0 * v291,
+        v297 = v273 * v87 * v287 * v290, v298 = v284 * (v87 * v275) * v290, v299 = 2.0 * v292,
+        v300 = 2.0 * v293, v301 = 2.0 * v294, v302 = 2.0 * v295, v303 = v87 * v290,
+        v304 = (v273 * v285 - v281 * v275) * v303, v305 = (v273 * v286 - v283 * v275) * v303,
+        v306 = v87 * (1.0 - v282), v307 = v255 * v255 + v265 * v265 + v278 * v278 + v295 * v295,
+        v308 = v275 * v306, v309 = v273 * v306,
+        v310 = v248 * v248 + v256 * v256 + v294 * v294 + v291 * v291,
+        v311 = v248 * v294 - v256 * v291, v312 = v311 * v311, v313 = 2.0 * v311, v314 = 2.0 * v309,
+        v315 = v276 * v309, v316 = v276 * (v273 * v298 + v284 * v306),
+        v317 = v272 * (v275 * v297 + v287 * v306), v318 = v272 * v308,
+        v319 = v276 * (v273 * v304 - v281 * v306) + v263 * v314,
+        v320 = v276 * (v273 * v305 - v283 * v306) + v264 * v314,
+        v321 = v272 * (v275 * v305 + v286 * v306) - 2.0 * v93 * v308,
+        v322 = v272 * v275 * v298 + 2.0 * v92 * v308, v323 = softehl_vrcbrt(v215 * v312),
+        v324 = v172 * v315 + v270 * v319, v325 = v270 * v315, v326 = v171 * v315 + v269 * v319,
+        v327 = v269 * v315, v328 = v78 * (v312 + v215 * v310), v329 = v82 * (v215 + v310),
+        v330 = v215 * v313, v331 = v261 * v315, v332 = v251 * v315, v333 = v251 * v316,
+        v334 = v261 * v316, v335 = v270 * v316, v336 = v269 * v316, v337 = v251 * v319,
+        v338 = v261 * v319, v339 = v251 * v320, v340 = v261 * v320,
+        v341 = v169 * v315 + v269 * v320, v342 = v98 * v325,
+        v343 = v167 * v337 - v94 * (v272 * (v275 * v304 + v285 * v306) - 2.0 * v94 * v308),
+        v344 = v270 * v320 - v223 * v315, v345 = v323 * v323, v346 = v82 * v323, v347 = v323 * v345,
+        v348 = v345 * v345, v349 = v78 * v345, v350 = 0.6666666666666666 * v323 * v348,
+        v351 = 0.3333333333333333 * v348, v352 = v216 * v312, v353 = v346 + v215 * v349,
+        v354 = v78 * v350, v355 = v82 * v351, v356 = 2.0 * v353, v357 = v329 * v351 + v328 * v350,
+        v358 = v347 * (v347 * (v329 * (0.4444444444444444 * v323))) + v328 * (v348 * (1.1111111111111112 * v348)),
+        v359 = v352 * v354, v360 = v352 * v355, v361 = v346 + v310 * v349 - v312 * v357,
+        v362 = v330 * (v355 + v78 * v215 * v350),
+        v363 = v216 * (v355 + v78 * v310 * v350) - v352 * v358, v364 = v216 * v361,
+        v365 = v349 - v215 * v357, v366 = v216 * v349 - v215 * v359 - v360,
+        v367 = 2.0 * v361 - v216 * (v360 + (v310 * v359 + v312 * v363)),
+        v368 = v313 * (v359 + v215 * v363 + v216 * v357), v369 = v313 * v365,
+        v370 = 2.0 * v365 - v313 * (v330 * v354 + v215 * (v78 * v313 * v350 - v330 * v358)),
+        v371 = v248 * v362, v372 = v291 * v362, v373 = v252 * v372, v374 = v356 + v259 * v372,
+        v375 = v291 * v370 + v259 * v362, v376 = v259 * v371, v377 = v291 * v368 + v259 * v366,
+        v378 = v252 * v366, v379 = v248 * v369 + v301 * v353, v380 = v248 * v370 - v301 * v362,
+        v381 = v301 * v366 - v248 * v368, v382 = v296 * v366 + v256 * v368, v383 = v294 * v368,
+        v384 = v356 - v301 * v371 + v248 * v380, v385 = v369 - v252 * v371 + v294 * v380,
+        v386 = v373 + v256 * v380, v387 = v378 - v383, v388 = v383 - v378,
+        v389 = v138 * v384 - v140 * v386, v390 = v138 * v377 + v140 * v387, v391 = v133 * v382,
+        v392 = v133 * v381, v393 = v133 * v367, v394 = v116 * v381, v395 = v116 * v382,
+        v396 = v116 * v367, v397 = v229 * v381 + v177 * v382, v398 = v237 * v381 + v189 * v382,
+        v399 = v393 - v397, v400 = (v159 - v183) * v386 - v394 + v237 * v384,
+        v401 = v250 * v250 + v266 * v266 + v277 * v277 + v293 * v293,
+        v402 = v250 * v266 - v277 * v293, v403 = v402 * v402, v404 = 2.0 * v402,
+        v405 = v84 * (v217 + v307), v406 = v85 * (v221 + v401), v407 = v221 * v404,
+        v408 = v222 * v403, v409 = softehl_vrcbrt(v221 * v403), v410 = v81 * (v403 + v221 * v401),
+        v411 = v276 * (v87 * (v273 * v273) * v276) * v290 + v314,
+        v412 = v273 * v276 * v297 + v262 * v314, v413 = (v172 * v269 - v270 * v171) * v411,
+        v414 = (v270 * v169 + v223 * v269) * v411, v415 = (v97 * v269 - v98 * v270) * v411,
+        v416 = v251 * v412, v417 = v261 * v412, v418 = v97 * v315 + v270 * v412,
+        v419 = v98 * v315 + v269 * v412, v420 = v270 * v413, v421 = v269 * v413, v422 = v270 * v414,
+        v423 = v269 * v414, v424 = v270 * v415, v425 = v269 * v415,
+        v426 = v249 * v249 + v257 * v257 + v288 * v288 + v292 * v292,
+        v427 = v249 * v288 - v257 * v292, v428 = v427 * v427, v429 = 2.0 * v427,
+        v430 = v83 * (v219 + v426), v431 = v219 * v429, v432 = v220 * v428,
+        v433 = softehl_vrcbrt(v219 * v428), v434 = v79 * (v428 + v219 * v426),
+        v435 = v376 + v291 * v380, v436 = v259 * v353 - v291 * v369,
+        v437 = v296 * v353 - v256 * v369, v438 = v252 * v353 + v294 * v369,
+        v439 = v296 * v362 + v256 * v370, v440 = v138 * v435, v441 = v374 + v256 * v439,
+        v442 = v356 + v294 * (v294 * v370 - 2.0 * (v252 * v362)),
+        v443 = v256 * v259 * v362 - v369 + v291 * v439, v444 = v376 - v294 * v439,
+        v445 = v409 * v409, v446 = v85 * v409, v447 = v409 * v445, v448 = v445 * v445,
+        v449 = v81 * v445, v450 = 0.6666666666666666 * v409 * v448,
+        v451 = 0.3333333333333333 * v448, v452 = v81 * v450, v453 = v85 * v451,
+        v454 = v446 + v221 * v449, v455 = 2.0 * v454, v456 = v406 * v451 + v410 * v450,
+        v457 = v447 * (v447 * (v406 * (0.4444444444444444 * v409))) + v410 * (v448 * (1.1111111111111112 * v448)),
+        v458 = v408 * v453, v459 = v408 * v452, v460 = v407 * (v453 + v81 * v221 * v450),
+        v461 = v222 * (v453 + v81 * v401 * v450) - v408 * v457,
+        v462 = v222 * v449 - v458 - v221 * v459, v463 = v446 + v401 * v449 - v403 * v456,
+        v464 = v449 - v221 * v456, v465 = v433 * v433, v466 = v222 * v463,
+        v467 = 2.0 * v463 - v222 * (v458 + v401 * v459 + v403 * v461),
+        v468 = v404 * (v459 + v222 * v456 + v221 * v461), v469 = v404 * v464,
+        v470 = 2.0 * v464 - v404 * (v407 * v452 + v221 * (v81 * v404 * v450 - v407 * v457)),
+        v471 = v465 * v465, v472 = v433 * v465, v473 = v79 * v465, v474 = v83 * v433,
+        v475 = 0.6666666666666666 * v433 * v471, v476 = 0.3333333333333333 * v471,
+        v477 = v79 * v475, v478 = v83 * v476, v479 = v430 * v476 + v434 * v475,
+        v480 = v472 * (v472 * (v430 * (0.4444444444444444 * v433))) + v434 * (v471 * (1.1111111111111112 * v471)),
+        v481 = v432 * v478, v482 = v432 * v477, v483 = v431 * (v478 + v79 * v219 * v475),
+        v484 = v474 + v219 * v473, v485 = v473 - v219 * v479,
+        v486 = v220 * (v478 + v79 * v426 * v475) - v432 * v480, v487 = 2.0 * v484,
+        v488 = v429 * v485, v489 = v220 * v473 - v481 - v219 * v482,
+        v490 = 2.0 * v485 - v429 * (v431 * v477 + v219 * (v79 * v429 * v475 - v431 * v480)),
+        v491 = v474 + v426 * v473 - v428 * v479, v492 = v429 * (v482 + v219 * v486 + v220 * v479),
+        v493 = v249 * v483, v494 = v220 * v491,
+        v495 = 2.0 * v491 - v220 * (v481 + v426 * v482 + v428 * v486), v496 = v292 * v483,
+        v497 = v249 * v490 - v289 * v483, v498 = v249 * v488 + v289 * v484, v499 = v253 * v496,
+        v500 = v253 * v489, v501 = v292 * v490 + v260 * v483, v502 = v260 * v493,
+        v503 = v487 + v260 * v496, v504 = v299 * v484 - v257 * v488, v505 = v499 + v257 * v497,
+        v506 = v503 + v292 * v501, v507 = v499 - v288 * v501, v508 = v260 * v484 - v292 * v488,
+        v509 = v253 * v484 + v288 * v488, v510 = v288 * v492, v511 = v260 * v489 + v292 * v492,
+        v512 = v502 + v292 * v497, v513 = v488 - v253 * v493 + v288 * v497,
+        v514 = v487 - v289 * v493 + v249 * v497, v515 = v289 * v489 - v249 * v492,
+        v516 = v500 - v510, v517 = v299 * v489 + v257 * v492, v518 = v136 * v512,
+        v519 = v134 * v515, v520 = v134 * v517, v521 = v136 * v511 + v141 * v516,
+        v522 = v134 * v495, v523 = v136 * v514 - v141 * v505, v524 = v116 * v515,
+        v525 = v116 * v517, v526 = v230 * v506 + v178 * v507, v527 = v230 * v511 + v178 * v516,
+        v528 = v202 * v511 + v190 * v516, v529 = v202 * v506 + v190 * v507,
+        v530 = v230 * v515 + v178 * v517, v531 = v530 - v522, v532 = v141 * v507 + v136 * v506,
+        v533 = v141 * v513 - v518,
+        v534 = v98 * v333 + v127 * (v138 * v381 + v140 * v382) + v129 * (v136 * v515 + v141 * v517),
+        v535 = v167 * v333 - v94 * v322 + v127 * (v397 - v393) + v129 * v531 + v154 * v334,
+        v536 = v250 * v460, v537 = v293 * v460, v538 = v254 * v537, v539 = v279 * v536,
+        v540 = v455 + v279 * v537, v541 = v279 * v462 + v293 * v468,
+        v542 = v254 * v462 - v266 * v468, v543 = v268 * v462 - v250 * v468,
+        v544 = v300 * v462 + v277 * v468, v545 = v250 * v470 - v268 * v460,
+        v546 = v469 - v254 * v536 + v266 * v545, v547 = v455 - v268 * v536 + v250 * v545,
+        v548 = v268 * v454 + v250 * v469, v549 = v279 * v454 - v293 * v469,
+        v550 = v455 + v266 * (v266 * v470 - 2.0 * (v254 * v460)), v551 = v300 * v454 - v277 * v469,
+        v552 = v254 * v454 + v266 * v469, v553 = v279 * v460 + v293 * v470,
+        v554 = v300 * v460 + v277 * v470, v555 = v539 + v293 * v545, v556 = v538 + v277 * v545,
+        v557 = v540 + v277 * v554, v558 = v540 + v293 * v553,
+        v559 = v277 * v279 * v460 - v469 + v293 * v554, v560 = v538 - v266 * v553,
+        v561 = v539 - v266 * v554, v562 = v142 * v561, v563 = v198 * v558 + v185 * v560,
+        v564 = v198 * v559 + v185 * v561, v565 = v188 * v558 + v187 * v560,
+        v566 = v198 * v560 + v185 * v550, v567 = v188 * v560 + v187 * v550,
+        v568 = v188 * v559 + v187 * v561, v569 = v198 * v541 + v185 * v542,
+        v570 = v188 * v541 + v187 * v542, v571 = v134 * v544, v572 = v134 * v543,
+        v573 = v115 * v543, v574 = v115 * v544, v575 = v185 * v544 - v134 * v467 + v198 * v543,
+        v576 = v198 * v547 + (v180 - v164) * v556 - v572, v577 = v137 * v555,
+        v578 = v188 * v547 + (v162 - v181) * v556 - v573, v579 = v195 * v555 + v185 * v546,
+        v580 = v186 * v555 + v187 * v546, v581 = v195 * v556 - v571 + v185 * v557,
+        v582 = v186 * v556 - v574 + v187 * v557, v583 = v562 + v137 * v559,
+        v584 = v142 * v557 - v137 * v556, v585 = v142 * v546 - v577, v586 = v140 * v385 - v440,
+        v587 = v137 * v547 - v142 * v556,
+        v588 = v138 * v389 - v97 * v417 + v98 * v416 + v136 * v523 + v137 * v587,
+        v589 = v167 * v339 - v94 * v321 + v154 * v340 + v116 * (v399 - v531) + v207 * v576,
+        v590 = v167 * v416 + v154 * v417 - v94 * v317 + v137 * v576 + v142 * v581,
+        v591 = v153 * v326 - v134 * (v528 + v570) + v206 * v580 + v168 * v324 + v246 * v568,
+        v592 = v343 + v154 * v338 + v134 * (v522 - v530 - v575) + v206 * v576 + v246 * v581,
+        v593 = v156 * v326 - v134 * (v527 + v569) + v206 * v579 + v165 * v324 + v246 * v564,
+        v594 = v237 * v443 + v189 * v444, v595 = v229 * v443 + v177 * v444, v596 = v140 * v444,
+        v597 = v138 * v443 + v596,
+        v598 = v97 * v419 - v98 * v418 + v142 * v583 + v138 * v586 + v140 * v597,
+        v599 = v153 * v327 + v168 * v325 + v237 * v436 + v189 * v438 + v190 * v509,
+        v600 = v229 * v377 + v177 * v387, v601 = v237 * v377 + v189 * v387,
+        v602 = v166 * v332 + v155 * v331 - v93 * v318 - v116 * (v364 + v494) + v187 * v551,
+        v603 = v189 * v441 - v395 + v232 * v386, v604 = v189 * v385 + v232 * v435,
+        v605 = v156 * v336 + v129 * v527 + v165 * v335 + v127 * v600 + v130 * v569,
+        v606 = v153 * v336 + v129 * v528 + v168 * v335 + v127 * v601 + v130 * v570,
+        v607 = v156 * v341 + v207 * v579 + v165 * v344 + v201 * v564 - v116 * (v527 + v600),
+        v608 = v153 * v341 + v207 * v580 + v168 * v344 + v201 * v568 - v116 * (v528 + v601),
+        v609 = v202 * v515 + v190 * v517 - v116 * v495, v610 = v374 + v291 * v375,
+        v611 = v373 - v294 * v375,
+        v612 = v166 * v333 - v93 * v322 + v127 * (v398 - v396) + v155 * v334 + v129 * v609,
+        v613 = v189 * v442 + v237 * v611,
+        v614 = v92 * v322 + v127 * v127 * v367 + v129 * v129 * v495 + v130 * v130 * v467,
+        v615 = v166 * v339 - v93 * v321 + v242 * v400 + v155 * v340 + v116 * (v396 - v398 - v609),
+        v616 = v177 * v442 + v229 * v611, v617 = v237 * v610 + v189 * v611,
+        v618 = v140 * v442 + v138 * v611, v619 = v229 * v610 + v177 * v611,
+        v620 = v167 * v332 + v154 * v331 - v94 * v318 - v134 * (v466 + v494) + v177 * v437,
+        v621 = v138 * v610 + v140 * v611,
+        v622 = v602 + v190 * v504 + v237 * v379 + v202 * v498 + v189 * v437 + v188 * v548,
+        v623 = v156 * v327 + v165 * v325 + v229 * v436 + v177 * v438 + v198 * v549,
+        v624 = v97 * v425 - v98 * v424 + v136 * v532 + v140 * v618 + v138 * v621,
+        v625 = v98 * v332 - v97 * v331 + v140 * v437 + v137 * v548 + v138 * v379,
+        v626 = v97 * v327 + v138 * v436 + v140 * v438 + v137 * v549 + v136 * v508,
+        v627 = (v173 - v160) * v386 - v392 + v229 * v384,
+        v628 = v165 * v424 + v156 * v425 + v140 * v616 + v137 * v563 + v138 * v619,
+        v629 = v337 - v572 - v392 - v519 - v246 * v556 + v239 * v384 + v240 * v514,
+        v630 = (v174 - v163) * v505 - v519 + v230 * v514,
+        v631 = v620 + v198 * v548 + v229 * v379 + v230 * v498 + v178 * v504 + v185 * v551,
+        v632 = v165 * v420 + v156 * v421 + v239 * v619 + v240 * v526 + v246 * v566,
+        v633 = v205 * v526 - v156 * v423 - v165 * v422 + v242 * v619 + v201 * v566,
+        v634 = v339 - v394 + v242 * v384 - v573 - v524 - v201 * v556 + v207 * v547,
+        v635 = v299 * v483 + v257 * v490, v636 = v503 + v257 * v635,
+        v637 = v487 + v288 * (v288 * v490 - 2.0 * (v253 * v483)), v638 = v502 - v288 * v635,
+        v639 = v257 * v260 * v483 - v488 + v292 * v635, v640 = v177 * v441 - v391 + v234 * v386,
+        v641 = v177 * v385 + v234 * v435, v642 = v141 * v638, v643 = v136 * v507 + v141 * v637,
+        v644 = (v161 - v184) * v505 - v524 + v202 * v514, v645 = v642 + v136 * v639,
+        v646 = v230 * v639 + v178 * v638, v647 = v230 * v507 + v178 * v637,
+        v648 = v202 * v639 + v190 * v638, v649 = v202 * v507 + v190 * v637,
+        v650 = v141 * v636 - v136 * v505, v651 = v178 * v636 - v520 + v235 * v505,
+        v652 = v178 * v513 + v235 * v512, v653 = v190 * v636 - v525 + v196 * v505,
+        v654 = v190 * v513 + v196 * v512,
+        v655 = v165 * v418 + v156 * v419 + v137 * v579 + v142 * v564 + v136 * v652,
+        v656 = v153 * v419 + v168 * v418 + v137 * v580 + v142 * v568 + v136 * v654,
+        v657 = v201 * v557 - v574 - v340 - v395 - v525 - v207 * v556 - v205 * v505,
+        v658 = v246 * v557 - v338 - v571 - v391 - v520 - v206 * v556 - v240 * v505,
+        v659 = v140 * v441 - v138 * v386,
+        v660 = v153 * v425 + v168 * v424 + v136 * v529 + v141 * v649 + v138 * v617,
+        v661 = v205 * v529 - v153 * v423 - v168 * v422 + v200 * v649 + v242 * v617,
+        v662 = v187 * v544 - v115 * v467 + v188 * v543, v663 = v142 * v542 + v137 * v541,
+        v664 = v142 * v560 + v137 * v558,
+        v665 = v97 * v336 + v127 * v390 + v129 * v521 - v98 * v335 + v130 * v663,
+        v666 = v142 * v550 + v137 * v560,
+        v667 = v240 * v506 - v420 + v245 * v507 + v239 * v610 + v206 * v558 + v246 * v560,
+        v668 = v97 * v326 - v98 * v324 + v246 * v583 - v134 * (v521 + v663) + v206 * v585,
+        v669 = v138 * v385 + v419 + v562 + v596 + v642 + v136 * v513 + v137 * v546,
+        v670 = v97 * v341 - v116 * (v390 + v521) - v98 * v344 + v201 * v583 + v207 * v585,
+        v671 = v138 * v400 + v155 * v417 + v166 * v416 - v93 * v317 + v137 * v578,
+        v672 = v326 + v134 * (v510 - v500 - v542) + v246 * v561 + v206 * v546 + v244 * v444,
+        v673 = v341 + v116 * (v388 - v516) + v201 * v561 + v207 * v546 + v199 * v444,
+        v674 = v205 * v507 - v423 + v207 * v560 + v201 * v550 + v199 * v442 + v200 * v637,
+        v675 = v246 * v559 - v324 - v134 * (v511 + v541) - v206 * v555 + v245 * v639,
+        v676 = v201 * v559 - v344 - v116 * (v377 + v511) - v207 * v555 + v200 * v639,
+        v677 = v422 + v205 * v506 + v242 * v610 + v207 * v558 + v201 * v560 + v200 * v507,
+        v678 = v421 + v206 * v560 + v246 * v550 + v244 * v442 + v245 * v637 + v240 * v507,
+        v679 = v142 * v559 - v418 - v518 - v577 - v440 + v141 * v639 + v140 * v443,
+        v680 = v589 + v201 * v581 + v200 * v651 + v205 * v630 + v242 * v627 + v199 * v640,
+        v681 = v255 * v295 - v265 * v278, v682 = v681 * v681, v683 = 2.0 * v681,
+        v684 = v615 + v207 * v578 + v199 * v603 + v200 * v653 + v205 * v644 + v201 * v582,
+        v685 = v217 * v683, v686 = v218 * v682, v687 = softehl_vrcbrt(v217 * v682),
+        v688 = v80 * (v217 * v307 + v682), v689 = v687 * v687, v690 = v689 * v689,
+        v691 = v690 * (0.6666666666666666 * v687), v692 = 0.3333333333333333 * v690,
+        v693 = v687 * v689, v694 = v80 * v689, v695 = v80 * v691, v696 = v84 * v687,
+        v697 = v84 * v692, v698 = v688 * v691 + v405 * v692,
+        v699 = v688 * (v690 * (1.1111111111111112 * v690)) + v693 * (v693 * (v405 * (0.4444444444444444 * v687))),
+        v700 = v686 * v695, v701 = v686 * v697, v702 = v694 - v217 * v698, v703 = v683 * v702,
+        v704 = 2.0 * v702 - v683 * (v685 * v695 + v217 * (v80 * v683 * v691 - v685 * v699)),
+        v705 = v696 + v217 * v694, v706 = 2.0 * v705, v707 = v685 * (v697 + v80 * v217 * v691),
+        v708 = v218 * (v697 + v80 * v307 * v691) - v686 * v699,
+        v709 = v683 * (v700 + v217 * v708 + v218 * v698), v710 = v696 - v682 * v698 + v307 * v694,
+        v711 = v218 * v694 - v217 * v700 - v701, v712 = v218 * v710,
+        v713 = 2.0 * v710 - v218 * (v701 + v682 * v708 + v307 * v700), v714 = v255 * v707,
+        v715 = v255 * v703 + v302 * v705, v716 = v302 * v711 - v255 * v709, v717 = v265 * v707,
+        v718 = v265 * v709 + v280 * v711, v719 = v280 * v714, v720 = v706 + v280 * v717,
+        v721 = v258 * v717, v722 = v258 * v711, v723 = v548 + (v498 + (v332 + v379)) + v715,
+        v724 = v92 * v318 + v127 * v364 + v129 * v494 + v130 * v466 + v128 * v712,
+        v725 = v133 * v716, v726 = v115 * v716, v727 = v133 * v713, v728 = v115 * v713,
+        v729 = v614 + v128 * v128 * v713, v730 = v295 * v709, v731 = v258 * v705 + v295 * v703,
+        v732 = v280 * v705 - v265 * v703, v733 = v267 * v705 - v278 * v703,
+        v734 = v267 * v711 + v278 * v709, v735 = v133 * v734, v736 = v115 * v734,
+        v737 = v508 + (v436 - v325 + v549) + v732, v738 = v504 + (v437 - v331 + v551) + v733,
+        v739 = v552 + (v509 + (v327 + v438)) + v731,
+        v740 = v622 + v238 * v715 + v121 * v723 - v115 * (v466 + v712) + v197 * v733,
+        v741 = v722 - v730, v742 = v740 - v100 * v738,
+        v743 = v599 + v187 * v552 + v188 * v549 + v202 * v508 + v197 * v731 - v100 * v739,
+        v744 = v336 + v129 * v516 + v127 * v387 + v130 * v542 + v128 * v741,
+        v745 = v197 * v741 + v238 * v718,
+        v746 = v127 * v377 - v335 + v129 * v511 + v130 * v541 + v128 * v718,
+        v747 = v179 * v741 + v231 * v718, v748 = v135 * v741 + v139 * v718,
+        v749 = v675 - v240 * v512 - v239 * v435 + v244 * v443 - v133 * (v377 + v718),
+        v750 = v122 * v746,
+        v751 = v591 + v245 * v648 + v240 * v654 + v239 * v604 + v244 * v594 - v133 * (v601 + v745),
+        v752 = v665 + v128 * v748,
+        v753 = v593 + v245 * v646 + v240 * v652 + v244 * v595 + v239 * v641 - v133 * (v600 + v747),
+        v754 = v605 + v128 * v747 + v99 * v744,
+        v755 = v606 + v128 * v745 + v121 * v746 - v100 * v744,
+        v756 = v668 + v244 * v597 + v245 * v645 + v240 * v533 + v239 * v586 - v133 * (v390 + v748),
+        v757 = v755 - v752, v758 = v754 - v750,
+        v759 = v631 + v231 * v715 - v122 * v723 - v133 * (v364 + v712) + v99 * v738,
+        v760 = v757 - v758, v761 = v759 + v179 * v733,
+        v762 = v625 + v136 * v498 + v141 * v504 + v142 * v551 + v139 * v715 + v135 * v733,
+        v763 = v623 + v230 * v508 + v178 * v509 + v185 * v552 + v99 * v739 + v179 * v731,
+        v764 = v742 - v761, v765 = v742 + v761, v766 = v724 - v762, v767 = v724 + v762,
+        v768 = v626 + v141 * v509 + v142 * v552 + v135 * v731 + v139 * v732, v769 = v768 - v342,
+        v770 = v763 + v231 * v732 - v122 * v737, v771 = v743 + v238 * v732 + v121 * v737,
+        v772 = v770 + v771, v773 = v771 - v770;
+    softehl_store4(R + 0, 8, v769 + v772, v765 + v767, v342 - v768 - v773, v766 - v764);
+    const V v774 = v197 * v734 + v238 * v716,
+        v775 = v333 + v127 * v381 + v129 * v515 + v130 * v543 + v128 * v716;
+    softehl_store4(R + 4, 8, v769 - v772, v767 - v765, v773 - v769, v764 + v766);
+    const V v776 = v127 * v382 - v334 + v129 * v517 + v130 * v544 + v128 * v734,
+        v777 = v231 * v716 + v179 * v734,
+        v778 = v534 - v97 * v334 + v130 * (v142 * v544 + v137 * v543) + v128 * (v139 * v716 + v135 * v734),
+        v779 = v777 - v727,
+        v780 = v676 - v205 * v512 - v242 * v435 + v199 * v443 - v115 * (v541 + v718),
+        v781 = v729 - v778,
+        v782 = v612 + v130 * v662 + v121 * v775 + v128 * (v774 - v728) - v100 * v776,
+        v783 = v535 + v130 * v575 - v122 * v775 + v128 * v779 + v99 * v776,
+        v784 = v673 + v200 * v638 + v205 * v513 + v242 * v385 + v115 * (v730 - v722 - v542),
+        v785 = v782 + v783, v786 = v783 - v782, v787 = v729 + v778 - v785, v788 = v781 - v786,
+        v789 = v607 + v200 * v646 + v205 * v652 + v199 * v595 + v242 * v641 - v115 * (v569 + v747),
+        v790 = v608 + v200 * v648 + v205 * v654 + v242 * v604 + v199 * v594 - v115 * (v570 + v745),
+        v791 = v670 + v199 * v597 + v200 * v645 + v205 * v533 + v242 * v586 - v115 * (v663 + v748),
+        v792 = v255 * v704 - v302 * v707, v793 = v706 + v295 * (v295 * v704 - 2.0 * (v258 * v707)),
+        v794 = v706 - v302 * v714 + v255 * v792, v795 = v280 * v707 + v265 * v704,
+        v796 = v267 * v707 + v278 * v704, v797 = v719 + v265 * v792,
+        v798 = v703 - v258 * v714 + v295 * v792, v799 = v721 + v278 * v792,
+        v800 = v720 + v278 * v796, v801 = v720 + v265 * v795, v802 = v721 - v295 * v795,
+        v803 = v278 * v280 * v707 - v703 + v265 * v796, v804 = v719 - v295 * v796,
+        v805 = v139 * v797, v806 = v179 * v793 + v231 * v802, v807 = v179 * v798 + v236 * v797,
+        v808 = v135 * v804, v809 = v139 * v802 + v135 * v793, v810 = v135 * v800 - v139 * v799,
+        v811 = v135 * v802 + v139 * v801, v812 = v179 * v800 + v236 * v799 - v735,
+        v813 = v643 + (v425 + v618 + v666) + v809, v814 = v584 - v417 + v650 + v659 + v810,
+        v815 = v669 + v808 + v139 * v798, v816 = v808 + v139 * v803,
+        v817 = v238 * v801 + v197 * v802, v818 = v238 * v802 + v197 * v793,
+        v819 = v238 * v803 + v197 * v804, v820 = v135 * v798 - v805,
+        v821 = v139 * v794 - v135 * v799, v822 = (v143 - v191) * v799 + v238 * v794 - v726,
+        v823 = v679 - v805 + v135 * v803, v824 = v523 + (v389 + v416) + v587 + v821,
+        v825 = v197 * v800 - v736 + v233 * v799, v826 = v197 * v798 + v233 * v797,
+        v827 = v634 - v199 * v386 - v200 * v505 + v205 * v514 - v726 - v203 * v799,
+        v828 = v657 + v200 * v636 + v199 * v441 - v242 * v386 - v736 + v203 * v800,
+        v829 = v656 + v141 * v648 + v138 * v604 + v140 * v594 + v135 * v819 + v121 * v823,
+        v830 = v658 + v245 * v636 + v244 * v441 - v239 * v386 - v735 + v208 * v800,
+        v831 = v179 * v804 + v231 * v803, v832 = v828 - v243 * v799,
+        v833 = v780 + v203 * v803 - v243 * v797, v834 = v827 + v243 * v794,
+        v835 = v749 + v208 * v803 - v241 * v797,
+        v836 = v629 + v206 * v547 - v244 * v386 - v245 * v505 - v208 * v799 + v241 * v794,
+        v837 = v179 * v802 + v231 * v801, v838 = v122 * v835,
+        v839 = (v175 - v150) * v799 + v231 * v794 - v725,
+        v840 = v677 + v199 * v611 + v243 * v801 + v203 * v802,
+        v841 = v592 + v240 * v630 + v245 * v651 + v239 * v627 + v244 * v640 - v122 * (v836 - v725),
+        v842 = v632 + v206 * v563 + v244 * v616 + v245 * v647 - v122 * (v667 + v244 * v611 + v241 * v801 + v208 * v802),
+        v843 = v674 + v242 * v611 + v243 * v802 + v203 * v793,
+        v844 = v633 + v207 * v563 + v199 * v616 + v200 * v647 + v243 * v837 - v122 * v840,
+        v845 = v661 + v199 * v613 + v207 * v565 + v201 * v567 + v121 * v840 - v100 * v843,
+        v846 = v655 + v141 * v646 + v140 * v595 + v138 * v641 - v122 * v823 + v99 * v815,
+        v847 = v844 + v99 * v843 + v203 * v806,
+        v848 = v842 + v99 * (v678 + v239 * v611 + v241 * v802 + v208 * v793) + v241 * v837,
+        v849 = v841 + v241 * v839 + v99 * (v830 - v241 * v799) + v133 * (v399 - v779),
+        v850 = v672 + v245 * v638 + v240 * v513 + v239 * v385 + v133 * (v388 - v741),
+        v851 = v829 - v100 * v815 + v139 * v826, v852 = v755 + v851,
+        v853 = v850 + v241 * v798 + v208 * v804, v854 = v784 + v243 * v798 + v203 * v804,
+        v855 = v532 - v424 + v621 + v664 + v811,
+        v856 = v751 + v121 * v835 + v241 * v826 + v208 * v819 - v100 * v853,
+        v857 = v624 + v142 * v666 + v141 * v643 + v137 * v664 + v139 * v811 + v135 * v809,
+        v858 = v588 + v142 * v584 + v141 * v650 + v140 * v659 + v139 * v821 + v135 * v810,
+        v859 = v755 + v856, v860 = v778 - v858,
+        v861 = v790 + v243 * v826 + v203 * v819 - v100 * v854 + v121 * v833, v862 = v122 * v855,
+        v863 = v660 + v140 * v613 + v137 * v565 + v142 * v567 + v135 * v818 + v121 * v855,
+        v864 = v851 + v861, v865 = v856 + v861, v866 = v755 - v851 - v856 + v861,
+        v867 = v845 + v203 * v818 + v243 * v817, v868 = v852 - v865, v869 = v847 + v867,
+        v870 = v789 + v99 * v854 - v122 * v833 + v243 * v807 + v203 * v831,
+        v871 = v846 + v139 * v807 + v135 * v831,
+        v872 = v753 + v99 * v853 + v241 * v807 + v208 * v831, v873 = v861 - v870,
+        v874 = v870 + v871, v875 = v872 - v838, v876 = v851 - v871, v877 = v758 + v871,
+        v878 = v870 + v875, v879 = v758 + v870 - v871 - v875, v880 = v877 - v878,
+        v881 = v866 + v879, v882 = v758 + v875, v883 = v879 - v866, v884 = v868 + v880,
+        v885 = v882 - v874,
+        v886 = v590 + v141 * v651 + v136 * v630 + v138 * v627 + v140 * v640 + v139 * v839,
+        v887 = v671 + v140 * v603 + v141 * v653 + v136 * v644 + v142 * v582 + v139 * v822,
+        v888 = v756 + v241 * v820 + v208 * v816, v889 = v791 + v243 * v820 + v203 * v816,
+        v890 = v598 + v137 * v585 + v141 * v645 + v136 * v533 + v139 * v820 + v135 * v816,
+        v891 = v849 + v208 * v812, v892 = v888 + v889, v893 = v889 + v890,
+        v894 = v848 + v208 * v806,
+        v895 = v628 + v136 * v526 + v142 * v566 + v141 * v647 + v139 * v837 + v135 * v806,
+        v896 = v752 + v888, v897 = v856 - v888, v898 = v847 + v894, v899 = v889 + (v752 - v888),
+        v900 = v750 - v754 - v757 + v838 - v872 - v897, v901 = v894 - v847,
+        v902 = v890 - v883 - v899, v903 = v897 - v875, v904 = v752 + v890, v905 = v899 - v890,
+        v906 = v760 + v876 - v890, v907 = v873 - v889 + v903, v908 = v883 - v905,
+        v909 = v881 + v905, v910 = v904 - v892, v911 = v892 + (v878 + (v852 + v865 + v877) + v904),
+        v912 = v905 - v881, v913 = v906 + v907, v914 = v906 - v907,
+        v915 = v893 + (v760 - v873 - v876 + v903), v916 = v864 + v874 - v893,
+        v917 = v880 - v868 - v910, v918 = v884 + v910, v919 = v900 - v916, v920 = v900 + v916,
+        v921 = v910 - v884, v922 = v896 + (v859 - v864 - v893),
+        v923 = v882 + (v874 - v859 - v864) - v893 - v896, v924 = v885 + v922, v925 = v885 - v922,
+        v926 = v895 + v99 * v813, v927 = v863 + v139 * v817 - v100 * v813,
+        v928 = v862 - v901 - v926, v929 = v857 + v927, v930 = v847 - v867 + v927,
+        v931 = v926 - v862, v932 = v927 - v931, v933 = v927 + v931, v934 = v901 - v931,
+        v935 = v928 - v930, v936 = v928 + v930, v937 = v931 - v898, v938 = v927 - v869 + v937,
+        v939 = v932 - v857, v940 = v857 - v932, v941 = v869 + v933, v942 = v857 - v933,
+        v943 = v935 + v939, v944 = v929 + (v867 - v847 + v932), v945 = v936 + v940;
+    softehl_store4(K + 48, 64, v943, v913, v945, v915); const V v946 = v941 + (v937 - v929);
+    softehl_store4(K + 20, 64, v946, v917, v945, v908); const V v947 = v939 - v935;
+    softehl_store4(K + 52, 64, v947, v914, v940 - v936, v902); const V v948 = v934 - v944;
+    softehl_store4(K + 0, 64, v929 + (v898 + v931) + v941, v911, v948, v924);
+    softehl_store4(K + 16, 64, v948, v923, v934 + v944, v925); const V v949 = v938 + v942;
+    softehl_store4(K + 4, 64, v949, v918, v943, v909);
+    softehl_store4(K + 32, 64, v949, v919, v946, v920);
+    softehl_store4(K + 36, 64, v942 - v938, v921, v947, v912);
+    const V v950 = v684 + v115 * (v728 - v662 - v774) + v243 * v822 + v203 * v825 - v100 * v832,
+        v951 = v680 + v115 * (v727 - v575 - v777) + v243 * v839 + v203 * v812 + v99 * v832,
+        v952 = v950 + v121 * v834, v953 = v951 - v122 * v834,
+        v954 = v886 + v135 * v812 + v99 * v814 - v122 * v824,
+        v955 = v887 + v135 * v825 - v100 * v814 + v121 * v824, v956 = v953 - v952,
+        v957 = v891 + v953, v958 = v891 - v953, v959 = v952 + v953, v960 = v783 - v954,
+        v961 = v782 - v955, v962 = v954 - v955, v963 = v954 + v955, v964 = v783 + v954 - v957,
+        v965 = v957 + (v785 + (v782 + (v783 + (v729 + 2.0 * v778))) + v858 + v954),
+        v966 = v960 - v958, v967 = v958 + (v781 + v786 + v960), v968 = v961 - v956,
+        v969 = v962 + (v956 + (v860 + v961)), v970 = v860 - v962, v971 = v782 + v955 - v959,
+        v972 = v966 - v968, v973 = v966 + v968, v974 = v778 + v858 - v963, v975 = v964 + v971,
+        v976 = v967 + v969;
+    softehl_store4(K + 8, 64, v911, v963 + (v959 + (v955 + v965)), v923, v976);
+    softehl_store4(K + 24, 64, v924, v976, v925, v967 - v969);
+    const V v977 = v787 + v964 - v971 - v974, v978 = v787 + v974, v979 = v788 - v970,
+        v980 = v788 + v970, v981 = v972 + v979;
+    softehl_store4(K + 28, 64, v920, v977, v915, v981); const V v982 = v975 + v978;
+    softehl_store4(K + 40, 64, v918, v982, v917, v977); const V v983 = v973 + v980;
+    softehl_store4(K + 12, 64, v919, v982, v913, v983);
+    softehl_store4(K + 56, 64, v909, v983, v908, v981); const V v984 = v980 - v973;
+    softehl_store4(K + 44, 64, v921, v978 - v975, v914, v984);
+    softehl_store4(K + 60, 64, v912, v984, v902, v979 - v972);
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_tangent, 8, 8, 0, 0, 8, (8 * 8))
 
-void softehl_solid_taylor_mean_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_residual_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_taylor_mean_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_solid_taylor_mean_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 1.5707963267948966 * parameters[2];
-    const V v4 = X0 - X2;
-    const V v5 = X2 - X0;
-    const V v6 = X4 - X2;
-    const V v7 = 0.39433756729740643 * v5;
-    const V v8 = 0.10566243270259355 * v5;
-    const V v9 = X4 - X6;
-    const V v10 = 0.10566243270259355 * v6;
-    const V v11 = 0.39433756729740643 * v6;
-    const V v12 = v4 + v9;
-    const V v13 = X6 + v6;
-    const V v14 = X6 - X0;
-    const V v15 = 0.10566243270259355 * v9;
-    const V v16 = v7 + v15;
-    const V v17 = 0.39433756729740643 * v9;
-    const V v18 = v8 + v17;
-    const V v19 = v13 - X0;
-    const V v20 = v9 - v4;
-    const V v21 = 0.39433756729740643 * v14;
-    const V v22 = v21 + v10;
-    const V v23 = 0.10566243270259355 * v14;
-    const V v24 = v23 + v11;
-    const V v25 = 0.25 * v19;
-    const V v26 = 0.0625 * v19;
-    const V v27 = 0.25 * v20;
-    const V v28 = 0.0625 * v20;
-    const V v29 = v16 - v22;
-    const V v30 = v18 + v22;
-    const V v31 = 0.5773502691896257 * v30;
-    const V v32 = 1.5773502691896257 * X1;
-    const V v33 = 0.4226497308103742 * X1;
-    const V v34 = v22 - v16;
-    const V v35 = X1 - X3;
-    const V v36 = X1 + X3;
-    const V v37 = 0.4226497308103742 * X3;
-    const V v38 = v32 + v37;
-    const V v39 = 1.5773502691896257 * X3;
-    const V v40 = v33 + v39;
-    const V v41 = X3 - X1;
-    const V v42 = 0.39433756729740643 * v38;
-    const V v43 = 0.10566243270259355 * v38;
-    const V v44 = 0.39433756729740643 * v40;
-    const V v45 = 0.10566243270259355 * v40;
-    const V v46 = 0.39433756729740643 * v41;
-    const V v47 = 0.10566243270259355 * v41;
-    const V v48 = X5 - X3;
-    const V v49 = 0.4226497308103742 * X5;
-    const V v50 = 1.5773502691896257 * X5;
-    const V v51 = X5 - X7;
-    const V v52 = X5 + X7;
-    const V v53 = 1.5773502691896257 * X7;
-    const V v54 = v49 + v53;
-    const V v55 = 0.4226497308103742 * X7;
-    const V v56 = v50 + v55;
-    const V v57 = 0.10566243270259355 * v48;
-    const V v58 = 0.39433756729740643 * v48;
-    const V v59 = v35 + v51;
-    const V v60 = 0.10566243270259355 * v51;
-    const V v61 = v46 + v60;
-    const V v62 = X7 - X1;
-    const V v63 = 0.39433756729740643 * v51;
-    const V v64 = v47 + v63;
-    const V v65 = 0.10566243270259355 * v54;
-    const V v66 = v42 + v65;
-    const V v67 = 0.39433756729740643 * v54;
-    const V v68 = v43 + v67;
-    const V v69 = 0.10566243270259355 * v56;
-    const V v70 = v44 + v69;
-    const V v71 = 0.39433756729740643 * v56;
-    const V v72 = v45 + v71;
-    const V v73 = v36 + v52;
-    const V v74 = 0.39433756729740643 * v62;
-    const V v75 = v74 + v57;
-    const V v76 = 0.10566243270259355 * v62;
-    const V v77 = v76 + v58;
-    const V v78 = v51 - v35;
-    const V v79 = v52 - v36;
-    const V v80 = 0.25 * v73;
-    const V v81 = 0.25 * v78;
-    const V v82 = 0.0625 * v78;
-    const V v83 = 0.25 * v79;
-    const V v84 = 0.0625 * v79;
-    const V v85 = v68 - v70;
-    const V v86 = v70 - v68;
-    const V v87 = v61 - v75;
-    const V v88 = v64 + v75;
-    const V v89 = 1.0 / v80;
-    const V v90 = v80 * v80;
-    const V v91 = v31 * v86;
-    const V v92 = 0.5773502691896257 * v88;
-    const V v93 = 1.0 / v90;
-    const V v94 = v66 * v87;
-    const V v95 = v66 * v34;
-    const V v96 = v92 * v85;
-    const V v97 = v12 * v82;
-    const V v98 = v12 * v84;
-    const V v99 = v75 - v61;
-    const V v100 = v72 * v29;
-    const V v101 = v100 + v95;
-    const V v102 = v72 * v99;
-    const V v103 = v102 + v94;
-    const V v104 = 0.5773502691896257 * v101;
-    const V v105 = v104 + v91;
-    const V v106 = 0.5773502691896257 * v103;
-    const V v107 = v106 + v96;
-    const V v108 = d0 - d2;
-    const V v109 = d0 + d2;
-    const V v110 = 0.25 * v89;
-    const V v111 = d1 + d3;
-    const V v112 = d1 - d3;
-    const V v113 = v109 - d4;
-    const V v114 = 0.25 * v93;
-    const V v115 = d4 - d6;
-    const V v116 = v113 - d6;
-    const V v117 = v108 - v115;
-    const V v118 = v108 + v115;
-    const V v119 = d5 + d7;
-    const V v120 = d5 - d7;
-    const V v121 = v111 - v119;
-    const V v122 = v111 + v119;
-    const V v123 = v112 - v120;
-    const V v124 = v112 + v120;
-    const V v125 = v16 * v75;
-    const V v126 = v18 * v75;
-    const V v127 = v16 * v77;
-    const V v128 = v18 * v77;
-    const V v129 = v27 * v83;
-    const V v130 = v22 * v61;
-    const V v131 = v125 - v130;
-    const V v132 = v22 * v64;
-    const V v133 = v126 - v132;
-    const V v134 = v24 * v61;
-    const V v135 = v127 - v134;
-    const V v136 = v24 * v64;
-    const V v137 = v128 - v136;
-    const V v138 = v66 * v131;
-    const V v139 = v68 * v133;
-    const V v140 = v70 * v135;
-    const V v141 = v72 * v137;
-    const V v142 = v131 - v137;
-    const V v143 = v133 - v135;
-    const V v144 = v135 - v133;
-    const V v145 = 6.283185307179586 * v138;
-    const V v146 = 6.283185307179586 * v139;
-    const V v147 = v143 - v142;
-    const V v148 = v144 - v142;
-    const V v149 = v138 + v139;
-    const V v150 = 6.283185307179586 * v140;
-    const V v151 = v139 - v138;
-    const V v152 = 6.283185307179586 * v141;
-    const V v153 = 0.14433756729740643 * v148;
-    const V v154 = 0.14433756729740643 * v147;
-    const V v155 = v151 - v140;
-    const V v156 = v140 + v141;
-    const V v157 = v141 + v155;
-    const V v158 = 0.5773502691896257 * v157;
-    const V v159 = v149 + v156;
-    const V v160 = v2 * v145;
-    const V v161 = v2 * v146;
-    const V v162 = v2 * v150;
-    const V v163 = v2 * v152;
-    const V v164 = v1 * v145;
-    const V v165 = v1 * v146;
-    const V v166 = v1 * v150;
-    const V v167 = v1 * v152;
-    const V v168 = v156 - v149;
-    const V v169 = 1.0 / v159;
-    const V v170 = v159 * v3;
-    const V v171 = 0.5773502691896257 * v168;
-    const V v172 = v81 * v25;
-    const V v173 = v129 - v172;
-    const V v174 = 1.0 / v173;
-    const V v175 = v171 * v169;
-    const V v176 = v169 * v158;
-    const V v177 = v169 * v173;
-    const V v178 = v153 * v169;
-    const V v179 = v154 * v169;
-    const V v180 = v169 * v107;
-    const V v181 = v169 * v105;
-    const V v182 = 0.25 * v180;
-    const V v183 = 0.25 * v181;
-    const V v184 = v82 * v174;
-    const V v185 = v84 * v174;
-    const V v186 = v59 * v174;
-    const V v187 = v174 * v97;
-    const V v188 = v174 * v98;
-    const V v189 = v182 * v187;
-    const V v190 = v182 * v188;
-    const V v191 = v183 * v187;
-    const V v192 = v183 * v188;
-    const V v193 = 2.0 * v179;
-    const V v194 = 2.0 * v178;
-    const V v195 = 2.0 * v177;
-    const V v196 = v121 * v184;
-    const V v197 = (-0.5773502691896257) - v175;
-    const V v198 = 0.5773502691896257 - v175;
-    const V v199 = v123 * v185;
-    const V v200 = v196 - v199;
-    const V v201 = v81 * v197;
-    const V v202 = v81 * v198;
-    const V v203 = v27 * v197;
-    const V v204 = v27 * v198;
-    const V v205 = v110 * v198;
-    const V v206 = v178 + v205;
-    const V v207 = v110 * v197;
-    const V v208 = v178 + v207;
-    const V v209 = (-0.5773502691896257) - v176;
-    const V v210 = 0.5773502691896257 - v176;
-    const V v211 = v26 * v186;
-    const V v212 = v28 * v186;
-    const V v213 = v174 * v26;
-    const V v214 = v28 * v174;
-    const V v215 = v206 * v123;
-    const V v216 = v208 * v123;
-    const V v217 = v83 * v209;
-    const V v218 = v83 * v210;
-    const V v219 = v201 + v217;
-    const V v220 = v202 + v217;
-    const V v221 = v201 + v218;
-    const V v222 = v202 + v218;
-    const V v223 = v217 - v201;
-    const V v224 = v218 - v201;
-    const V v225 = v217 - v202;
-    const V v226 = v218 - v202;
-    const V v227 = v114 * v219;
-    const V v228 = v177 - v227;
-    const V v229 = v114 * v220;
-    const V v230 = v177 - v229;
-    const V v231 = v114 * v221;
-    const V v232 = v177 - v231;
-    const V v233 = v114 * v222;
-    const V v234 = v177 - v233;
-    const V v235 = v25 * v210;
-    const V v236 = v25 * v209;
-    const V v237 = v228 * v228;
-    const V v238 = v230 * v230;
-    const V v239 = v232 * v232;
-    const V v240 = v234 * v234;
-    const V v241 = v110 * v209;
-    const V v242 = v179 + v241;
-    const V v243 = v110 * v210;
-    const V v244 = v179 + v243;
-    const V v245 = v203 - v235;
-    const V v246 = v204 - v235;
-    const V v247 = v203 - v236;
-    const V v248 = v204 - v236;
-    const V v249 = v174 * v225;
-    const V v250 = v180 + v249;
-    const V v251 = v174 * v245;
-    const V v252 = v181 + v251;
-    const V v253 = 0.25 * v250;
-    const V v254 = v174 * v246;
-    const V v255 = v181 + v254;
-    const V v256 = v174 * v247;
-    const V v257 = v181 + v256;
-    const V v258 = v174 * v248;
-    const V v259 = v181 + v258;
-    const V v260 = 0.25 * v252;
-    const V v261 = 0.25 * v255;
-    const V v262 = 0.25 * v257;
-    const V v263 = 0.25 * v259;
-    const V v264 = v174 * v223;
-    const V v265 = v180 + v264;
-    const V v266 = v174 * v224;
-    const V v267 = v180 + v266;
-    const V v268 = v174 * v226;
-    const V v269 = v180 + v268;
-    const V v270 = 0.25 * v265;
-    const V v271 = 0.25 * v267;
-    const V v272 = 0.25 * v269;
-    const V v273 = v211 * v253;
-    const V v274 = v211 * v260;
-    const V v275 = v211 * v261;
-    const V v276 = v211 * v262;
-    const V v277 = v211 * v263;
-    const V v278 = v182 * v211;
-    const V v279 = v182 * v212;
-    const V v280 = v212 * v253;
-    const V v281 = v212 * v262;
-    const V v282 = v212 * v263;
-    const V v283 = v190 - v278;
-    const V v284 = v189 - v279;
-    const V v285 = v278 - v190;
-    const V v286 = v279 - v189;
-    const V v287 = v183 * v212;
-    const V v288 = v183 * v211;
-    const V v289 = v211 * v270;
-    const V v290 = v212 * v270;
-    const V v291 = v211 * v271;
-    const V v292 = v211 * v272;
-    const V v293 = v212 * v271;
-    const V v294 = v212 * v272;
-    const V v295 = v191 - v287;
-    const V v296 = v192 - v288;
-    const V v297 = v287 - v191;
-    const V v298 = v288 - v192;
-    const V v299 = v117 * v296;
-    const V v300 = v117 * v213;
-    const V v301 = v213 - v298;
-    const V v302 = v117 * v283;
-    const V v303 = v121 * v297;
-    const V v304 = v116 * v297;
-    const V v305 = v304 + v299;
-    const V v306 = v116 * v214;
-    const V v307 = v300 - v306;
-    const V v308 = v297 - v214;
-    const V v309 = v116 * v286;
-    const V v310 = v309 + v302;
-    const V v311 = v184 + v286;
-    const V v312 = v307 + v305;
-    const V v313 = v118 * v182;
-    const V v314 = v313 + v310;
-    const V v315 = v118 * v270;
-    const V v316 = v187 * v270;
-    const V v317 = v187 * v271;
-    const V v318 = v118 * v271;
-    const V v319 = v187 * v253;
-    const V v320 = v118 * v253;
-    const V v321 = v118 * v261;
-    const V v322 = v307 + v321;
-    const V v323 = v187 * v261;
-    const V v324 = v290 - v316;
-    const V v325 = v293 - v317;
-    const V v326 = v280 - v319;
-    const V v327 = v316 - v290;
-    const V v328 = v317 - v293;
-    const V v329 = v319 - v280;
-    const V v330 = v187 * v272;
-    const V v331 = v118 * v272;
-    const V v332 = v188 * v272;
-    const V v333 = v188 * v261;
-    const V v334 = v188 * v270;
-    const V v335 = v188 * v271;
-    const V v336 = v294 - v330;
-    const V v337 = v292 - v332;
-    const V v338 = v275 - v333;
-    const V v339 = v289 - v334;
-    const V v340 = v330 - v294;
-    const V v341 = v291 - v335;
-    const V v342 = v332 - v292;
-    const V v343 = v333 - v275;
-    const V v344 = v334 - v289;
-    const V v345 = v335 - v291;
-    const V v346 = v188 * v253;
-    const V v347 = v212 * v261;
-    const V v348 = v212 * v260;
-    const V v349 = v188 * v260;
-    const V v350 = v273 - v346;
-    const V v351 = v323 - v347;
-    const V v352 = v274 - v349;
-    const V v353 = v346 - v273;
-    const V v354 = v347 - v323;
-    const V v355 = v344 - v185;
-    const V v356 = v345 - v185;
-    const V v357 = v342 - v185;
-    const V v358 = v349 - v274;
-    const V v359 = v121 * v354;
-    const V v360 = v353 - v185;
-    const V v361 = v242 * v121;
-    const V v362 = 1.0 - v361;
-    const V v363 = v213 + v358;
-    const V v364 = v123 * v358;
-    const V v365 = v123 * v353;
-    const V v366 = v200 + v365;
-    const V v367 = v354 - v214;
-    const V v368 = v123 * v343;
-    const V v369 = v359 + v368;
-    const V v370 = v213 + v343;
-    const V v371 = v121 * v214;
-    const V v372 = 1.0 - v371;
-    const V v373 = v121 * v326;
-    const V v374 = v366 + v373;
-    const V v375 = v184 + v326;
-    const V v376 = v244 * v121;
-    const V v377 = 1.0 - v376;
-    const V v378 = v123 * v213;
-    const V v379 = v378 + v372;
-    const V v380 = v362 - v216;
-    const V v381 = v362 - v215;
-    const V v382 = v377 - v216;
-    const V v383 = v377 - v215;
-    const V v384 = v303 + v379;
-    const V v385 = v364 + v379;
-    const V v386 = v369 + v379;
-    const V v387 = v228 * v122;
-    const V v388 = v387 + v380;
-    const V v389 = v230 * v122;
-    const V v390 = v389 + v381;
-    const V v391 = v232 * v122;
-    const V v392 = v391 + v382;
-    const V v393 = v234 * v122;
-    const V v394 = v383 + v393;
-    const V v395 = v388 * v388;
-    const V v396 = 2.0 * v388;
-    const V v397 = v390 * v390;
-    const V v398 = 2.0 * v390;
-    const V v399 = v392 * v392;
-    const V v400 = 2.0 * v392;
-    const V v401 = v394 * v394;
-    const V v402 = 2.0 * v394;
-    const V v403 = v177 * v122;
-    const V v404 = 1.0 + v403;
-    const V v405 = v160 * v395;
-    const V v406 = v161 * v399;
-    const V v407 = v162 * v397;
-    const V v408 = v163 * v401;
-    const V v409 = v185 + v285;
-    const V v410 = v187 * v262;
-    const V v411 = v187 * v260;
-    const V v412 = v187 * v263;
-    const V v413 = v188 * v262;
-    const V v414 = v188 * v263;
-    const V v415 = v281 - v410;
-    const V v416 = v348 - v411;
-    const V v417 = v282 - v412;
-    const V v418 = v276 - v413;
-    const V v419 = v277 - v414;
-    const V v420 = v410 - v281;
-    const V v421 = v411 - v348;
-    const V v422 = v412 - v282;
-    const V v423 = v413 - v276;
-    const V v424 = v414 - v277;
-    const V v425 = v415 - v214;
-    const V v426 = v416 - v214;
-    const V v427 = v417 - v214;
-    const V v428 = v213 + v423;
-    const V v429 = v213 + v424;
-    const V v430 = v184 + v324;
-    const V v431 = v184 + v325;
-    const V v432 = v184 + v336;
-    const V v433 = v116 * v324;
-    const V v434 = v315 + v433;
-    const V v435 = v116 * v325;
-    const V v436 = v318 + v435;
-    const V v437 = v116 * v336;
-    const V v438 = v331 + v437;
-    const V v439 = v116 * v184;
-    const V v440 = 1.0 + v439;
-    const V v441 = v116 * v326;
-    const V v442 = v320 + v441;
-    const V v443 = v116 * v415;
-    const V v444 = v307 + v443;
-    const V v445 = v116 * v416;
-    const V v446 = v307 + v445;
-    const V v447 = v117 * v344;
-    const V v448 = v434 + v447;
-    const V v449 = v117 * v185;
-    const V v450 = v440 - v449;
-    const V v451 = v117 * v345;
-    const V v452 = v436 + v451;
-    const V v453 = v117 * v342;
-    const V v454 = v438 + v453;
-    const V v455 = v450 + v448;
-    const V v456 = v450 + v452;
-    const V v457 = v450 + v442;
-    const V v458 = v450 + v454;
-    const V v459 = v450 + v314;
-    const V v460 = v117 * v423;
-    const V v461 = v444 + v460;
-    const V v462 = v117 * v358;
-    const V v463 = v446 + v462;
-    const V v464 = 2.0 * v455;
-    const V v465 = 2.0 * v456;
-    const V v466 = 2.0 * v458;
-    const V v467 = v455 * v455;
-    const V v468 = v456 * v456;
-    const V v469 = v458 * v458;
-    const V v470 = v117 * v353;
-    const V v471 = v457 + v470;
-    const V v472 = v118 * v262;
-    const V v473 = v472 + v461;
-    const V v474 = v118 * v260;
-    const V v475 = v474 + v463;
-    const V v476 = 2.0 * v471;
-    const V v477 = v471 * v471;
-    const V v478 = v473 * v473;
-    const V v479 = v467 + v478;
-    const V v480 = 2.0 * v473;
-    const V v481 = v475 * v475;
-    const V v482 = v468 + v481;
-    const V v483 = 2.0 * v475;
-    const V v484 = v118 * v183;
-    const V v485 = v484 + v312;
-    const V v486 = v183 * v459;
-    const V v487 = v308 * v459;
-    const V v488 = v301 * v459;
-    const V v489 = v473 * v480;
-    const V v490 = v475 * v483;
-    const V v491 = v182 * v485;
-    const V v492 = v486 - v491;
-    const V v493 = v311 * v485;
-    const V v494 = v487 - v493;
-    const V v495 = v409 * v485;
-    const V v496 = v488 + v495;
-    const V v497 = v124 * v182;
-    const V v498 = v497 + v200;
-    const V v499 = v124 * v253;
-    const V v500 = v499 + v374;
-    const V v501 = v124 * v261;
-    const V v502 = v501 + v386;
-    const V v503 = 2.0 * v500;
-    const V v504 = 2.0 * v502;
-    const V v505 = v124 * v183;
-    const V v506 = v505 + v384;
-    const V v507 = v500 * v500;
-    const V v508 = v477 + v507;
-    const V v509 = v458 * v502;
-    const V v510 = v121 * v286;
-    const V v511 = v510 + v498;
-    const V v512 = v502 * v502;
-    const V v513 = v469 + v512;
-    const V v514 = v123 * v296;
-    const V v515 = v514 + v506;
-    const V v516 = v123 * v283;
-    const V v517 = v516 + v511;
-    const V v518 = v179 * v121;
-    const V v519 = v404 - v518;
-    const V v520 = v118 * v263;
-    const V v521 = v307 + v520;
-    const V v522 = v178 * v123;
-    const V v523 = v519 - v522;
-    const V v524 = 2.0 * v523;
-    const V v525 = v523 * v523;
-    const V v526 = v459 * v515;
-    const V v527 = v311 * v515;
-    const V v528 = v409 * v515;
-    const V v529 = v182 * v515;
-    const V v530 = v116 * v417;
-    const V v531 = v521 + v530;
-    const V v532 = v116 * v354;
-    const V v533 = v322 + v532;
-    const V v534 = v525 * v525;
-    const V v535 = v517 * v485;
-    const V v536 = v526 - v535;
-    const V v537 = v517 * v308;
-    const V v538 = v527 - v537;
-    const V v539 = v517 * v301;
-    const V v540 = v539 + v528;
-    const V v541 = v183 * v517;
-    const V v542 = v529 - v541;
-    const V v543 = v536 * v536;
-    const V v544 = 2.0 * v536;
-    const V v545 = v525 * v170;
-    const V v546 = v170 * v534;
-    const V v547 = v117 * v343;
-    const V v548 = v533 + v547;
-    const V v549 = v117 * v424;
-    const V v550 = v531 + v549;
-    const V v551 = v525 * v543;
-    const V v552 = v525 * v544;
-    const V v553 = 2.0 * v548;
-    const V v554 = v170 * v543;
-    const V v555 = 2.0 * v550;
-    const V v556 = v546 * v544;
-    const V v557 = v524 * v543;
-    const V v558 = v179 * v524;
-    const V v559 = 1.0 / v551;
-    const V v560 = v178 * v524;
-    const V v561 = v177 * v524;
-    const V v562 = v494 * v544;
-    const V v563 = v550 * v555;
-    const V v564 = v496 * v544;
-    const V v565 = v492 * v544;
-    const V v566 = v561 * v554;
-    const V v567 = v544 * v556;
-    const V v568 = v550 * v550;
-    const V v569 = v508 + v568;
-    const V v570 = v545 * v565;
-    const V v571 = v525 * v562;
-    const V v572 = v525 * v564;
-    const V v573 = v548 * v553;
-    const V v574 = v548 * v548;
-    const V v575 = v513 + v574;
-    const V v576 = v558 * v543;
-    const V v577 = v571 - v576;
-    const V v578 = v560 * v543;
-    const V v579 = v572 - v578;
-    const V v580 = v124 * v270;
-    const V v581 = v200 + v580;
-    const V v582 = v124 * v271;
-    const V v583 = v200 + v582;
-    const V v584 = v124 * v272;
-    const V v585 = v200 + v584;
-    const V v586 = v124 * v262;
-    const V v587 = v586 + v379;
-    const V v588 = v124 * v260;
-    const V v589 = v588 + v385;
-    const V v590 = v124 * v263;
-    const V v591 = v590 + v379;
-    const V v592 = v121 * v324;
-    const V v593 = v581 + v592;
-    const V v594 = v121 * v325;
-    const V v595 = v583 + v594;
-    const V v596 = v121 * v336;
-    const V v597 = v585 + v596;
-    const V v598 = v121 * v416;
-    const V v599 = v589 + v598;
-    const V v600 = v121 * v415;
-    const V v601 = v587 + v600;
-    const V v602 = v121 * v417;
-    const V v603 = v591 + v602;
-    const V v604 = 2.0 * v599;
-    const V v605 = v559 * v559;
-    const V v606 = 1.0 - v559;
-    const V v607 = v123 * v344;
-    const V v608 = v593 + v607;
-    const V v609 = v123 * v345;
-    const V v610 = v595 + v609;
-    const V v611 = v123 * v342;
-    const V v612 = v597 + v611;
-    const V v613 = v123 * v423;
-    const V v614 = v601 + v613;
-    const V v615 = v123 * v424;
-    const V v616 = v603 + v615;
-    const V v617 = 2.0 * v608;
-    const V v618 = v570 * v605;
-    const V v619 = v566 * v605;
-    const V v620 = 2.0 * v610;
-    const V v621 = 2.0 * v612;
-    const V v622 = 2.0 * v614;
-    const V v623 = 2.0 * v616;
-    const V v624 = v567 * v605;
-    const V v625 = v170 * v605;
-    const V v626 = v552 * v618;
-    const V v627 = v543 * v618;
-    const V v628 = v557 * v619;
-    const V v629 = v525 * v619;
-    const V v630 = v577 * v625;
-    const V v631 = v579 * v625;
-    const V v632 = v170 * v606;
-    const V v633 = v616 * v616;
-    const V v634 = v569 + v633;
-    const V v635 = v455 * v614;
-    const V v636 = v471 * v616;
-    const V v637 = v614 * v614;
-    const V v638 = v479 + v637;
-    const V v639 = v525 * v630;
-    const V v640 = v525 * v631;
-    const V v641 = v543 * v630;
-    const V v642 = v543 * v631;
-    const V v643 = v543 * v632;
-    const V v644 = v525 * v632;
-    const V v645 = v561 * v632;
-    const V v646 = v629 + v645;
-    const V v647 = v608 * v608;
-    const V v648 = v638 + v647;
-    const V v649 = v473 * v608;
-    const V v650 = v635 - v649;
-    const V v651 = v558 * v632;
-    const V v652 = v639 - v651;
-    const V v653 = v560 * v632;
-    const V v654 = v640 - v653;
-    const V v655 = v562 * v632;
-    const V v656 = v641 + v655;
-    const V v657 = v564 * v632;
-    const V v658 = v642 + v657;
-    const V v659 = v565 * v632;
-    const V v660 = v627 + v659;
-    const V v661 = v650 * v650;
-    const V v662 = 2.0 * v650;
-    const V v663 = 2.0 * v644;
-    const V v664 = v544 * v644;
-    const V v665 = v544 * v646;
-    const V v666 = v544 * v652;
-    const V v667 = v544 * v654;
-    const V v668 = v524 * v660;
-    const V v669 = v524 * v656;
-    const V v670 = v524 * v658;
-    const V v671 = v524 * v643;
-    const V v672 = v494 * v663;
-    const V v673 = v666 + v672;
-    const V v674 = v496 * v663;
-    const V v675 = v667 + v674;
-    const V v676 = v193 * v643;
-    const V v677 = v669 - v676;
-    const V v678 = v194 * v643;
-    const V v679 = v670 - v678;
-    const V v680 = v195 * v643;
-    const V v681 = v628 + v680;
-    const V v682 = v311 * v664;
-    const V v683 = v308 * v664;
-    const V v684 = v301 * v664;
-    const V v685 = v395 * v661;
-    const V v686 = v395 * v648;
-    const V v687 = v661 + v686;
-    const V v688 = softehl_vrcbrt(v685);
-    const V v689 = v395 + v648;
-    const V v690 = v517 * v673;
-    const V v691 = v682 + v690;
-    const V v692 = v517 * v664;
-    const V v693 = v515 * v673;
-    const V v694 = v683 + v693;
-    const V v695 = v515 * v664;
-    const V v696 = v160 * v687;
-    const V v697 = v160 * v648;
-    const V v698 = v164 * v689;
-    const V v699 = v395 * v662;
-    const V v700 = v160 * v662;
-    const V v701 = v485 * v664;
-    const V v702 = v459 * v664;
-    const V v703 = v459 * v665;
-    const V v704 = v485 * v665;
-    const V v705 = v517 * v665;
-    const V v706 = v515 * v665;
-    const V v707 = v459 * v673;
-    const V v708 = v485 * v673;
-    const V v709 = v459 * v675;
-    const V v710 = v485 * v675;
-    const V v711 = v517 * v675;
-    const V v712 = v515 * v675;
-    const V v713 = v684 + v712;
-    const V v714 = v297 * v707;
-    const V v715 = v297 * v703;
-    const V v716 = v297 * v709;
-    const V v717 = v296 * v709;
-    const V v718 = v296 * v703;
-    const V v719 = v183 * v703;
-    const V v720 = v183 * v692;
-    const V v721 = v179 * v677;
-    const V v722 = v714 - v721;
-    const V v723 = v179 * v681;
-    const V v724 = v715 - v723;
-    const V v725 = v179 * v679;
-    const V v726 = v716 - v725;
-    const V v727 = v178 * v679;
-    const V v728 = v717 - v727;
-    const V v729 = v178 * v681;
-    const V v730 = v718 - v729;
-    const V v731 = v177 * v681;
-    const V v732 = v177 * v671;
-    const V v733 = v183 * v702;
-    const V v734 = v297 * v702;
-    const V v735 = v296 * v702;
-    const V v736 = v183 * v664;
-    const V v737 = v409 * v664;
-    const V v738 = v711 - v737;
-    const V v739 = v182 * v664;
-    const V v740 = v182 * v695;
-    const V v741 = v182 * v701;
-    const V v742 = v733 - v741;
-    const V v743 = v284 * v701;
-    const V v744 = v734 + v743;
-    const V v745 = v285 * v701;
-    const V v746 = v735 + v745;
-    const V v747 = v286 * v695;
-    const V v748 = v283 * v695;
-    const V v749 = v286 * v706;
-    const V v750 = v283 * v706;
-    const V v751 = v182 * v706;
-    const V v752 = v286 * v694;
-    const V v753 = v283 * v694;
-    const V v754 = v182 * v694;
-    const V v755 = v286 * v713;
-    const V v756 = v283 * v713;
-    const V v757 = v182 * v713;
-    const V v758 = v688 * v688;
-    const V v759 = 0.6666666666666666 * v688;
-    const V v760 = 0.4444444444444444 * v688;
-    const V v761 = v164 * v688;
-    const V v762 = v688 * v758;
-    const V v763 = v758 * v758;
-    const V v764 = v160 * v758;
-    const V v765 = v698 * v760;
-    const V v766 = v759 * v763;
-    const V v767 = v762 * v765;
-    const V v768 = 0.3333333333333333 * v763;
-    const V v769 = 1.1111111111111112 * v763;
-    const V v770 = v763 * v769;
-    const V v771 = v396 * v764;
-    const V v772 = v396 * v661;
-    const V v773 = v762 * v767;
-    const V v774 = v395 * v764;
-    const V v775 = v761 + v774;
-    const V v776 = v648 * v764;
-    const V v777 = v761 + v776;
-    const V v778 = v160 * v766;
-    const V v779 = v698 * v768;
-    const V v780 = v164 * v768;
-    const V v781 = v700 * v766;
-    const V v782 = v405 * v766;
-    const V v783 = v697 * v766;
-    const V v784 = 2.0 * v775;
-    const V v785 = v696 * v766;
-    const V v786 = v779 + v785;
-    const V v787 = v696 * v770;
-    const V v788 = v773 + v787;
-    const V v789 = v780 + v782;
-    const V v790 = v772 * v778;
-    const V v791 = v772 * v780;
-    const V v792 = v780 + v783;
-    const V v793 = v661 * v786;
-    const V v794 = v777 - v793;
-    const V v795 = v699 * v778;
-    const V v796 = v699 * v789;
-    const V v797 = v699 * v788;
-    const V v798 = v781 - v797;
-    const V v799 = v648 * v790;
-    const V v800 = v396 * v792;
-    const V v801 = v772 * v788;
-    const V v802 = v800 - v801;
-    const V v803 = v396 * v794;
-    const V v804 = 2.0 * v794;
-    const V v805 = v395 * v798;
-    const V v806 = v795 + v805;
-    const V v807 = v661 * v802;
-    const V v808 = v799 + v807;
-    const V v809 = v395 * v802;
-    const V v810 = v790 + v809;
-    const V v811 = v489 * v796;
-    const V v812 = v395 * v790;
-    const V v813 = v771 - v812;
-    const V v814 = v395 * v786;
-    const V v815 = v764 - v814;
-    const V v816 = v396 * v786;
-    const V v817 = v810 + v816;
-    const V v818 = v791 + v808;
-    const V v819 = v813 - v791;
-    const V v820 = v396 * v818;
-    const V v821 = v804 - v820;
-    const V v822 = v662 * v817;
-    const V v823 = v662 * v815;
-    const V v824 = 2.0 * v815;
-    const V v825 = v662 * v806;
-    const V v826 = v824 - v825;
-    const V v827 = v455 * v796;
-    const V v828 = v608 * v796;
-    const V v829 = v811 - v823;
-    const V v830 = v455 * v823;
-    const V v831 = v608 * v822;
-    const V v832 = v455 * v826;
-    const V v833 = v608 * v826;
-    const V v834 = v464 * v796;
-    const V v835 = v464 * v828;
-    const V v836 = v480 * v828;
-    const V v837 = v784 + v836;
-    const V v838 = v480 * v796;
-    const V v839 = v833 + v838;
-    const V v840 = v480 * v827;
-    const V v841 = v480 * v819;
-    const V v842 = v831 + v841;
-    const V v843 = v464 * v819;
-    const V v844 = v480 * v775;
-    const V v845 = v464 * v775;
-    const V v846 = v617 * v775;
-    const V v847 = v622 * v775;
-    const V v848 = v830 + v847;
-    const V v849 = v617 * v796;
-    const V v850 = v622 * v796;
-    const V v851 = v832 - v850;
-    const V v852 = v617 * v819;
-    const V v853 = v622 * v819;
-    const V v854 = v415 * v842;
-    const V v855 = v228 * v842;
-    const V v856 = v423 * v842;
-    const V v857 = v262 * v842;
-    const V v858 = v622 * v827;
-    const V v859 = v784 - v858;
-    const V v860 = v464 * v827;
-    const V v861 = v823 - v860;
-    const V v862 = v228 * v803;
-    const V v863 = v732 + v862;
-    const V v864 = v855 - v705;
-    const V v865 = v455 * v822;
-    const V v866 = v853 - v865;
-    const V v867 = v473 * v822;
-    const V v868 = v852 + v867;
-    const V v869 = v614 * v822;
-    const V v870 = v455 * v851;
-    const V v871 = v859 + v870;
-    const V v872 = v614 * v851;
-    const V v873 = v861 + v872;
-    const V v874 = v473 * v851;
-    const V v875 = v835 + v874;
-    const V v876 = v262 * v866;
-    const V v877 = v228 * v868;
-    const V v878 = v843 - v869;
-    const V v879 = v262 * v871;
-    const V v880 = v262 * v873;
-    const V v881 = v327 * v875;
-    const V v882 = v339 * v875;
-    const V v883 = v869 - v843;
-    const V v884 = v270 * v868;
-    const V v885 = v876 + v884;
-    const V v886 = v270 * v873;
-    const V v887 = v270 * v875;
-    const V v888 = v879 - v887;
-    const V v889 = v877 - v704;
-    const V v890 = v270 * v878;
-    const V v891 = v857 + v890;
-    const V v892 = v242 * v868;
-    const V v893 = v242 * v866;
-    const V v894 = v262 * v888;
-    const V v895 = v242 * v821;
-    const V v896 = v208 * v866;
-    const V v897 = v208 * v868;
-    const V v898 = v208 * v821;
-    const V v899 = v237 * v821;
-    const V v900 = v731 + v899;
-    const V v901 = v415 * v866;
-    const V v902 = v423 * v866;
-    const V v903 = v709 - v896;
-    const V v904 = v882 - v896;
-    const V v905 = v324 * v868;
-    const V v906 = v901 + v905;
-    const V v907 = v344 * v868;
-    const V v908 = v902 + v907;
-    const V v909 = v895 - v906;
-    const V v910 = v324 * v873;
-    const V v911 = v344 * v873;
-    const V v912 = v898 - v908;
-    const V v913 = v423 * v871;
-    const V v914 = v904 + v913;
-    const V v915 = v908 - v898;
-    const V v916 = v428 * v871;
-    const V v917 = v903 + v916;
-    const V v918 = v906 - v895;
-    const V v919 = v228 * v866;
-    const V v920 = v703 + v919;
-    const V v921 = v228 * v915;
-    const V v922 = v730 + v921;
-    const V v923 = v228 * v918;
-    const V v924 = v724 + v923;
-    const V v925 = v228 * v891;
-    const V v926 = v751 + v925;
-    const V v927 = v228 * v885;
-    const V v928 = v719 + v927;
-    const V v929 = v262 * v914;
-    const V v930 = v428 * v914;
-    const V v931 = v728 + v930;
-    const V v932 = v612 * v612;
-    const V v933 = v575 + v932;
-    const V v934 = v548 * v612;
-    const V v935 = v509 - v934;
-    const V v936 = v397 + v634;
-    const V v937 = v162 * v634;
-    const V v938 = v397 * v634;
-    const V v939 = v935 * v935;
-    const V v940 = 2.0 * v935;
-    const V v941 = v166 * v936;
-    const V v942 = v401 + v933;
-    const V v943 = v163 * v933;
-    const V v944 = v401 * v933;
-    const V v945 = v939 + v944;
-    const V v946 = v167 * v942;
-    const V v947 = v401 * v939;
-    const V v948 = v401 * v940;
-    const V v949 = v163 * v940;
-    const V v950 = v402 * v939;
-    const V v951 = softehl_vrcbrt(v947);
-    const V v952 = v163 * v945;
-    const V v953 = v624 + v663;
-    const V v954 = v492 * v663;
-    const V v955 = v626 + v954;
-    const V v956 = v538 * v953;
-    const V v957 = v540 * v953;
-    const V v958 = v542 * v953;
-    const V v959 = v459 * v955;
-    const V v960 = v485 * v955;
-    const V v961 = v456 * v599;
-    const V v962 = v599 * v599;
-    const V v963 = v482 + v962;
-    const V v964 = v517 * v955;
-    const V v965 = v739 + v964;
-    const V v966 = v515 * v955;
-    const V v967 = v736 + v966;
-    const V v968 = v517 * v956;
-    const V v969 = v515 * v956;
-    const V v970 = v517 * v957;
-    const V v971 = v515 * v957;
-    const V v972 = v517 * v958;
-    const V v973 = v515 * v958;
-    const V v974 = v297 * v959;
-    const V v975 = v610 * v610;
-    const V v976 = v963 + v975;
-    const V v977 = v475 * v610;
-    const V v978 = v961 - v977;
-    const V v979 = v295 * v965;
-    const V v980 = v295 * v968;
-    const V v981 = v295 * v972;
-    const V v982 = v978 * v978;
-    const V v983 = 2.0 * v978;
-    const V v984 = v399 + v976;
-    const V v985 = v161 * v976;
-    const V v986 = v286 * v969;
-    const V v987 = v980 + v986;
-    const V v988 = v286 * v973;
-    const V v989 = v981 + v988;
-    const V v990 = v161 * v983;
-    const V v991 = v165 * v984;
-    const V v992 = v399 * v982;
-    const V v993 = v399 * v983;
-    const V v994 = v400 * v982;
-    const V v995 = softehl_vrcbrt(v992);
-    const V v996 = v283 * v973;
-    const V v997 = v182 * v973;
-    const V v998 = v399 * v976;
-    const V v999 = v982 + v998;
-    const V v1000 = v283 * v967;
-    const V v1001 = v182 * v967;
-    const V v1002 = v880 + v967;
-    const V v1003 = v161 * v999;
-    const V v1004 = v286 * v967;
-    const V v1005 = v979 + v1004;
-    const V v1006 = v298 * v972;
-    const V v1007 = v996 + v1006;
-    const V v1008 = v183 * v972;
-    const V v1009 = v997 - v1008;
-    const V v1010 = v298 * v965;
-    const V v1011 = v1000 + v1010;
-    const V v1012 = v183 * v965;
-    const V v1013 = v1001 - v1012;
-    const V v1014 = v608 * v851;
-    const V v1015 = v840 + v1014;
-    const V v1016 = v608 * v823;
-    const V v1017 = v844 - v1016;
-    const V v1018 = v473 * v823;
-    const V v1019 = v846 - v1018;
-    const V v1020 = v614 * v823;
-    const V v1021 = v845 + v1020;
-    const V v1022 = v614 * v826;
-    const V v1023 = v473 * v826;
-    const V v1024 = v849 + v1023;
-    const V v1025 = 2.0 * v834;
-    const V v1026 = v1022 - v1025;
-    const V v1027 = v262 * v1015;
-    const V v1028 = v473 * v1024;
-    const V v1029 = v837 + v1028;
-    const V v1030 = v614 * v1026;
-    const V v1031 = v784 + v1030;
-    const V v1032 = v608 * v1024;
-    const V v1033 = v829 + v1032;
-    const V v1034 = v614 * v1024;
-    const V v1035 = v840 - v1034;
-    const V v1036 = v1019 - v701;
-    const V v1037 = v951 * v951;
-    const V v1038 = 0.6666666666666666 * v951;
-    const V v1039 = 0.4444444444444444 * v951;
-    const V v1040 = v1017 - v692;
-    const V v1041 = v167 * v951;
-    const V v1042 = v951 * v1037;
-    const V v1043 = v1037 * v1037;
-    const V v1044 = v163 * v1037;
-    const V v1045 = v946 * v1039;
-    const V v1046 = v1038 * v1043;
-    const V v1047 = v1042 * v1045;
-    const V v1048 = 0.3333333333333333 * v1043;
-    const V v1049 = 1.1111111111111112 * v1043;
-    const V v1050 = v1043 * v1049;
-    const V v1051 = v1042 * v1047;
-    const V v1052 = v163 * v1046;
-    const V v1053 = v167 * v1048;
-    const V v1054 = v946 * v1048;
-    const V v1055 = v401 * v1044;
-    const V v1056 = v1041 + v1055;
-    const V v1057 = v949 * v1046;
-    const V v1058 = v408 * v1046;
-    const V v1059 = v943 * v1046;
-    const V v1060 = v933 * v1044;
-    const V v1061 = v1041 + v1060;
-    const V v1062 = v402 * v1044;
-    const V v1063 = 2.0 * v1056;
-    const V v1064 = v1053 + v1059;
-    const V v1065 = v1053 + v1058;
-    const V v1066 = v952 * v1046;
-    const V v1067 = v1054 + v1066;
-    const V v1068 = v952 * v1050;
-    const V v1069 = v1051 + v1068;
-    const V v1070 = v950 * v1053;
-    const V v1071 = v950 * v1052;
-    const V v1072 = v948 * v1052;
-    const V v1073 = v948 * v1065;
-    const V v1074 = v948 * v1069;
-    const V v1075 = v1057 - v1074;
-    const V v1076 = v402 * v1064;
-    const V v1077 = v933 * v1071;
-    const V v1078 = v950 * v1069;
-    const V v1079 = v1076 - v1078;
-    const V v1080 = v1062 - v1070;
-    const V v1081 = v1070 + v1077;
-    const V v1082 = v401 * v1071;
-    const V v1083 = v1080 - v1082;
-    const V v1084 = v401 * v1075;
-    const V v1085 = v1072 + v1084;
-    const V v1086 = v573 * v1073;
-    const V v1087 = v402 * v1067;
-    const V v1088 = v1071 + v1087;
-    const V v1089 = v939 * v1067;
-    const V v1090 = v1061 - v1089;
-    const V v1091 = v939 * v1079;
-    const V v1092 = v1081 + v1091;
-    const V v1093 = v401 * v1067;
-    const V v1094 = v1044 - v1093;
-    const V v1095 = v401 * v1079;
-    const V v1096 = v1088 + v1095;
-    const V v1097 = v995 * v995;
-    const V v1098 = 0.6666666666666666 * v995;
-    const V v1099 = 0.4444444444444444 * v995;
-    const V v1100 = v402 * v1090;
-    const V v1101 = 2.0 * v1090;
-    const V v1102 = v402 * v1092;
-    const V v1103 = v1101 - v1102;
-    const V v1104 = v940 * v1096;
-    const V v1105 = v940 * v1094;
-    const V v1106 = 2.0 * v1094;
-    const V v1107 = v940 * v1085;
-    const V v1108 = v1106 - v1107;
-    const V v1109 = v1097 * v1097;
-    const V v1110 = v995 * v1097;
-    const V v1111 = v161 * v1097;
-    const V v1112 = v165 * v995;
-    const V v1113 = v991 * v1099;
-    const V v1114 = v1098 * v1109;
-    const V v1115 = v1086 - v1105;
-    const V v1116 = 0.3333333333333333 * v1109;
-    const V v1117 = 1.1111111111111112 * v1109;
-    const V v1118 = v1110 * v1113;
-    const V v1119 = v1109 * v1117;
-    const V v1120 = v161 * v1114;
-    const V v1121 = v165 * v1116;
-    const V v1122 = v991 * v1116;
-    const V v1123 = v1110 * v1118;
-    const V v1124 = v990 * v1114;
-    const V v1125 = v406 * v1114;
-    const V v1126 = v985 * v1114;
-    const V v1127 = v1003 * v1114;
-    const V v1128 = v1122 + v1127;
-    const V v1129 = v1003 * v1119;
-    const V v1130 = v1123 + v1129;
-    const V v1131 = v1121 + v1125;
-    const V v1132 = v1121 + v1126;
-    const V v1133 = v994 * v1121;
-    const V v1134 = v994 * v1120;
-    const V v1135 = v993 * v1120;
-    const V v1136 = v993 * v1131;
-    const V v1137 = v993 * v1130;
-    const V v1138 = v1124 - v1137;
-    const V v1139 = v399 * v1111;
-    const V v1140 = v1112 + v1139;
-    const V v1141 = v399 * v1128;
-    const V v1142 = v1111 - v1141;
-    const V v1143 = v400 * v1132;
-    const V v1144 = v994 * v1130;
-    const V v1145 = v1143 - v1144;
-    const V v1146 = v399 * v1138;
-    const V v1147 = v1135 + v1146;
-    const V v1148 = v400 * v1111;
-    const V v1149 = 2.0 * v1140;
-    const V v1150 = v490 * v1136;
-    const V v1151 = v1148 - v1133;
-    const V v1152 = 2.0 * v1142;
-    const V v1153 = v983 * v1142;
-    const V v1154 = v399 * v1145;
-    const V v1155 = v1134 + v1154;
-    const V v1156 = v399 * v1134;
-    const V v1157 = v1151 - v1156;
-    const V v1158 = v983 * v1147;
-    const V v1159 = v1152 - v1158;
-    const V v1160 = v976 * v1134;
-    const V v1161 = v1133 + v1160;
-    const V v1162 = v976 * v1111;
-    const V v1163 = v1112 + v1162;
-    const V v1164 = v1150 - v1153;
-    const V v1165 = v982 * v1145;
-    const V v1166 = v1161 + v1165;
-    const V v1167 = v982 * v1128;
-    const V v1168 = v1163 - v1167;
-    const V v1169 = v400 * v1128;
-    const V v1170 = v1155 + v1169;
-    const V v1171 = v983 * v1170;
-    const V v1172 = v456 * v1136;
-    const V v1173 = v456 * v1153;
-    const V v1174 = v456 * v1159;
-    const V v1175 = v400 * v1168;
-    const V v1176 = 2.0 * v1168;
-    const V v1177 = v400 * v1166;
-    const V v1178 = v1176 - v1177;
-    const V v1179 = v610 * v1136;
-    const V v1180 = v610 * v1159;
-    const V v1181 = v465 * v1136;
-    const V v1182 = v465 * v1172;
-    const V v1183 = v1153 - v1182;
-    const V v1184 = v604 * v1136;
-    const V v1185 = v1174 - v1184;
-    const V v1186 = v604 * v1140;
-    const V v1187 = v1173 + v1186;
-    const V v1188 = v465 * v1140;
-    const V v1189 = v465 * v1179;
-    const V v1190 = v465 * v1157;
-    const V v1191 = v604 * v1157;
-    const V v1192 = v483 * v1136;
-    const V v1193 = v1180 + v1192;
-    const V v1194 = v483 * v1172;
-    const V v1195 = v604 * v1172;
-    const V v1196 = v1149 - v1195;
-    const V v1197 = v483 * v1179;
-    const V v1198 = v1149 + v1197;
-    const V v1199 = v483 * v1140;
-    const V v1200 = v483 * v1157;
-    const V v1201 = v620 * v1140;
-    const V v1202 = v620 * v1136;
-    const V v1203 = v620 * v1157;
-    const V v1204 = v803 + v1175;
-    const V v1205 = v1100 + v1175;
-    const V v1206 = v475 * v1153;
-    const V v1207 = v1201 - v1206;
-    const V v1208 = v475 * v1185;
-    const V v1209 = v1189 + v1208;
-    const V v1210 = v232 * v1175;
-    const V v1211 = v863 + v1210;
-    const V v1212 = v610 * v1193;
-    const V v1213 = v1198 + v1212;
-    const V v1214 = v599 * v1193;
-    const V v1215 = v1189 - v1214;
-    const V v1216 = v610 * v1153;
-    const V v1217 = v1199 - v1216;
-    const V v1218 = v599 * v1153;
-    const V v1219 = v1188 + v1218;
-    const V v1220 = v234 * v1100;
-    const V v1221 = v1211 + v1220;
-    const V v1222 = v328 * v1209;
-    const V v1223 = v341 * v1209;
-    const V v1224 = v599 * v1171;
-    const V v1225 = v610 * v1171;
-    const V v1226 = v1200 + v1225;
-    const V v1227 = v610 * v1185;
-    const V v1228 = v1194 + v1227;
-    const V v1229 = v599 * v1185;
-    const V v1230 = v1183 + v1229;
-    const V v1231 = v456 * v1185;
-    const V v1232 = v1196 + v1231;
-    const V v1233 = v456 * v1171;
-    const V v1234 = v1191 - v1233;
-    const V v1235 = v1190 - v1224;
-    const V v1236 = v475 * v1171;
-    const V v1237 = v1203 + v1236;
-    const V v1238 = v842 + v1226;
-    const V v1239 = v260 * v1228;
-    const V v1240 = v260 * v1226;
-    const V v1241 = v260 * v1234;
-    const V v1242 = v1224 - v1190;
-    const V v1243 = v260 * v1232;
-    const V v1244 = v883 - v1235;
-    const V v1245 = v244 * v1234;
-    const V v1246 = v244 * v1237;
-    const V v1247 = v271 * v1235;
-    const V v1248 = v1240 + v1247;
-    const V v1249 = v271 * v1237;
-    const V v1250 = v1241 + v1249;
-    const V v1251 = v244 * v1178;
-    const V v1252 = v271 * v1209;
-    const V v1253 = v1243 - v1252;
-    const V v1254 = v208 * v1234;
-    const V v1255 = v208 * v1237;
-    const V v1256 = v891 + v1248;
-    const V v1257 = v416 * v1234;
-    const V v1258 = v416 * v1226;
-    const V v1259 = v358 * v1226;
-    const V v1260 = v358 * v1234;
-    const V v1261 = v416 * v1213;
-    const V v1262 = v358 * v1213;
-    const V v1263 = v426 * v1213;
-    const V v1264 = v416 * v1215;
-    const V v1265 = v358 * v1215;
-    const V v1266 = v1263 - v968;
-    const V v1267 = v325 * v1215;
-    const V v1268 = v1261 + v1267;
-    const V v1269 = v325 * v1235;
-    const V v1270 = v1258 + v1269;
-    const V v1271 = v345 * v1235;
-    const V v1272 = v1259 + v1271;
-    const V v1273 = v345 * v1215;
-    const V v1274 = v1262 + v1273;
-    const V v1275 = v345 * v1237;
-    const V v1276 = v1260 + v1275;
-    const V v1277 = v325 * v1237;
-    const V v1278 = v1257 + v1277;
-    const V v1279 = v431 * v1215;
-    const V v1280 = v1266 + v1279;
-    const V v1281 = v1251 - v1278;
-    const V v1282 = v325 * v1230;
-    const V v1283 = v363 * v1215;
-    const V v1284 = v1278 - v1251;
-    const V v1285 = v271 * v1215;
-    const V v1286 = v271 * v1230;
-    const V v1287 = v260 * v1215;
-    const V v1288 = v345 * v1230;
-    const V v1289 = v1283 - v971;
-    const V v1290 = v260 * v1213;
-    const V v1291 = v1285 + v1290;
-    const V v1292 = v363 * v1213;
-    const V v1293 = v970 + v1292;
-    const V v1294 = v909 - v1284;
-    const V v1295 = v1286 - v1239;
-    const V v1296 = v363 * v1268;
-    const V v1297 = v260 * v1291;
-    const V v1298 = v1009 + v1297;
-    const V v1299 = v286 * v971;
-    const V v1300 = v1296 - v1299;
-    const V v1301 = v363 * v1274;
-    const V v1302 = v260 * v1274;
-    const V v1303 = v1007 + v1302;
-    const V v1304 = v283 * v971;
-    const V v1305 = v1301 - v1304;
-    const V v1306 = v1291 - v972;
-    const V v1307 = v232 * v1284;
-    const V v1308 = v924 + v1307;
-    const V v1309 = v232 * v1226;
-    const V v1310 = v864 + v1309;
-    const V v1311 = v232 * v1235;
-    const V v1312 = v706 + v1311;
-    const V v1313 = v232 * v1234;
-    const V v1314 = v920 + v1313;
-    const V v1315 = v232 * v1237;
-    const V v1316 = v889 + v1315;
-    const V v1317 = v232 * v1270;
-    const V v1318 = v749 + v1317;
-    const V v1319 = v232 * v1272;
-    const V v1320 = v750 + v1319;
-    const V v1321 = v232 * v1248;
-    const V v1322 = v926 + v1321;
-    const V v1323 = v232 * v1250;
-    const V v1324 = v928 + v1323;
-    const V v1325 = v295 * v970;
-    const V v1326 = v1300 - v1325;
-    const V v1327 = v298 * v970;
-    const V v1328 = v1305 - v1327;
-    const V v1329 = v295 * v705;
-    const V v1330 = v1318 + v1329;
-    const V v1331 = v298 * v705;
-    const V v1332 = v1320 + v1331;
-    const V v1333 = v183 * v705;
-    const V v1334 = v1322 - v1333;
-    const V v1335 = v284 * v704;
-    const V v1336 = v1308 + v1335;
-    const V v1337 = v182 * v704;
-    const V v1338 = v1324 - v1337;
-    const V v1339 = v285 * v704;
-    const V v1340 = v922 + v1339;
-    const V v1341 = v182 * v960;
-    const V v1342 = v894 - v1341;
-    const V v1343 = v284 * v960;
-    const V v1344 = v974 + v1343;
-    const V v1345 = v285 * v960;
-    const V v1346 = v929 + v1345;
-    const V v1347 = v285 * v710;
-    const V v1348 = v931 + v1347;
-    const V v1349 = v284 * v710;
-    const V v1350 = v726 + v1349;
-    const V v1351 = v284 * v708;
-    const V v1352 = v722 + v1351;
-    const V v1353 = v183 * v959;
-    const V v1354 = v1342 + v1353;
-    const V v1355 = v296 * v959;
-    const V v1356 = v1346 + v1355;
-    const V v1357 = v888 + v959;
-    const V v1358 = v179 * v668;
-    const V v1359 = v1344 - v1358;
-    const V v1360 = v179 * v671;
-    const V v1361 = v744 - v1360;
-    const V v1362 = v178 * v668;
-    const V v1363 = v1356 - v1362;
-    const V v1364 = v178 * v671;
-    const V v1365 = v746 - v1364;
-    const V v1366 = v208 * v1294;
-    const V v1367 = v1350 + v1366;
-    const V v1368 = v208 * v1244;
-    const V v1369 = v713 + v1368;
-    const V v1370 = v208 * v1204;
-    const V v1371 = v1365 - v1370;
-    const V v1372 = v1253 + v1357;
-    const V v1373 = v260 * v1253;
-    const V v1374 = v1354 + v1373;
-    const V v1375 = v244 * v1205;
-    const V v1376 = v1361 - v1375;
-    const V v1377 = v208 * v1256;
-    const V v1378 = v757 - v1377;
-    const V v1379 = v458 * v1073;
-    const V v1380 = v612 * v1073;
-    const V v1381 = v466 * v1073;
-    const V v1382 = v466 * v1056;
-    const V v1383 = v504 * v1056;
-    const V v1384 = v466 * v1380;
-    const V v1385 = v621 * v1056;
-    const V v1386 = v553 * v1056;
-    const V v1387 = v553 * v1379;
-    const V v1388 = v553 * v1380;
-    const V v1389 = v1063 + v1388;
-    const V v1390 = v553 * v1073;
-    const V v1391 = v621 * v1073;
-    const V v1392 = v553 * v1083;
-    const V v1393 = v621 * v1083;
-    const V v1394 = v466 * v1083;
-    const V v1395 = v504 * v1083;
-    const V v1396 = v466 * v1379;
-    const V v1397 = v1105 - v1396;
-    const V v1398 = v504 * v1379;
-    const V v1399 = v1063 - v1398;
-    const V v1400 = v612 * v1104;
-    const V v1401 = v1392 + v1400;
-    const V v1402 = v502 * v1104;
-    const V v1403 = v1394 - v1402;
-    const V v1404 = v458 * v1104;
-    const V v1405 = v1395 - v1404;
-    const V v1406 = v548 * v1104;
-    const V v1407 = v1393 + v1406;
-    const V v1408 = v502 * v1108;
-    const V v1409 = v458 * v1108;
-    const V v1410 = v504 * v1073;
-    const V v1411 = v1409 - v1410;
-    const V v1412 = 2.0 * v1381;
-    const V v1413 = v1408 - v1412;
-    const V v1414 = v1226 + v1401;
-    const V v1415 = v502 * v1411;
-    const V v1416 = v1397 + v1415;
-    const V v1417 = v458 * v1411;
-    const V v1418 = v1399 + v1417;
-    const V v1419 = v458 * v1105;
-    const V v1420 = v1383 + v1419;
-    const V v1421 = v612 * v1105;
-    const V v1422 = v1386 - v1421;
-    const V v1423 = v502 * v1413;
-    const V v1424 = v1063 + v1423;
-    const V v1425 = v548 * v1105;
-    const V v1426 = v1385 - v1425;
-    const V v1427 = v502 * v1105;
-    const V v1428 = v1382 + v1427;
-    const V v1429 = v612 * v1108;
-    const V v1430 = v1390 + v1429;
-    const V v1431 = v548 * v1108;
-    const V v1432 = v1391 + v1431;
-    const V v1433 = v612 * v1411;
-    const V v1434 = v1387 + v1433;
-    const V v1435 = v548 * v1411;
-    const V v1436 = v1384 + v1435;
-    const V v1437 = v354 * v1401;
-    const V v1438 = v354 * v1418;
-    const V v1439 = v548 * v1432;
-    const V v1440 = v1389 + v1439;
-    const V v1441 = v343 * v1401;
-    const V v1442 = v343 * v1418;
-    const V v1443 = v612 * v1430;
-    const V v1444 = v1389 + v1443;
-    const V v1445 = v612 * v1432;
-    const V v1446 = v1115 + v1445;
-    const V v1447 = v340 * v1436;
-    const V v1448 = v1438 + v1447;
-    const V v1449 = v502 * v1430;
-    const V v1450 = v1384 - v1449;
-    const V v1451 = v502 * v1432;
-    const V v1452 = v1387 - v1451;
-    const V v1453 = v337 * v1436;
-    const V v1454 = v1442 + v1453;
-    const V v1455 = v354 * v1444;
-    const V v1456 = v343 * v1444;
-    const V v1457 = v354 * v1446;
-    const V v1458 = v343 * v1446;
-    const V v1459 = v354 * v1450;
-    const V v1460 = v343 * v1450;
-    const V v1461 = v272 * v1452;
-    const V v1462 = v272 * v1450;
-    const V v1463 = v272 * v1446;
-    const V v1464 = v336 * v1450;
-    const V v1465 = v1455 + v1464;
-    const V v1466 = v336 * v1452;
-    const V v1467 = v1457 + v1466;
-    const V v1468 = v342 * v1450;
-    const V v1469 = v1456 + v1468;
-    const V v1470 = v336 * v1424;
-    const V v1471 = v1459 + v1470;
-    const V v1472 = v342 * v1424;
-    const V v1473 = v1460 + v1472;
-    const V v1474 = v1463 - v965;
-    const V v1475 = v272 * v1424;
-    const V v1476 = v1002 + v1461;
-    const V v1477 = v342 * v1452;
-    const V v1478 = v1458 + v1477;
-    const V v1479 = v1474 - v1239;
-    const V v1480 = v272 * v1403;
-    const V v1481 = v1242 - v1403;
-    const V v1482 = v336 * v1403;
-    const V v1483 = v1437 + v1482;
-    const V v1484 = v342 * v1403;
-    const V v1485 = v1441 + v1484;
-    const V v1486 = v336 * v1407;
-    const V v1487 = v342 * v1407;
-    const V v1488 = v272 * v1407;
-    const V v1489 = v244 * v1407;
-    const V v1490 = v244 * v1481;
-    const V v1491 = v694 + v1490;
-    const V v1492 = v244 * v1405;
-    const V v1493 = v244 * v1103;
-    const V v1494 = v1486 - v1493;
-    const V v1495 = v261 * v1405;
-    const V v1496 = v1488 + v1495;
-    const V v1497 = v206 * v1405;
-    const V v1498 = v206 * v1407;
-    const V v1499 = v1270 + v1483;
-    const V v1500 = v1272 + v1485;
-    const V v1501 = v354 * v1405;
-    const V v1502 = v1494 + v1501;
-    const V v1503 = v1448 - v1492;
-    const V v1504 = v707 - v1492;
-    const V v1505 = v261 * v1434;
-    const V v1506 = v1454 - v1497;
-    const V v1507 = v917 - v1497;
-    const V v1508 = v351 * v1434;
-    const V v1509 = v351 * v1436;
-    const V v1510 = v1281 - v1502;
-    const V v1511 = v1504 - v893;
-    const V v1512 = v881 - v893;
-    const V v1513 = v338 * v1434;
-    const V v1514 = v338 * v1436;
-    const V v1515 = v1507 - v1254;
-    const V v1516 = v1223 - v1254;
-    const V v1517 = v1509 - v1489;
-    const V v1518 = v1511 - v1245;
-    const V v1519 = v1222 - v1245;
-    const V v1520 = v336 * v1416;
-    const V v1521 = v1508 + v1520;
-    const V v1522 = v342 * v1416;
-    const V v1523 = v1513 + v1522;
-    const V v1524 = v1514 - v1498;
-    const V v1525 = v357 * v1436;
-    const V v1526 = v1515 - v1525;
-    const V v1527 = v336 * v1440;
-    const V v1528 = v1517 + v1527;
-    const V v1529 = v357 * v1440;
-    const V v1530 = v342 * v1440;
-    const V v1531 = v1524 + v1530;
-    const V v1532 = v1529 - v1498;
-    const V v1533 = v432 * v1436;
-    const V v1534 = v1518 - v1533;
-    const V v1535 = v432 * v1440;
-    const V v1536 = v272 * v1440;
-    const V v1537 = v272 * v1416;
-    const V v1538 = v1532 - v710;
-    const V v1539 = v1535 - v708;
-    const V v1540 = v432 * v1446;
-    const V v1541 = v357 * v1446;
-    const V v1542 = v261 * v1446;
-    const V v1543 = v1461 + v1542;
-    const V v1544 = v261 * v1436;
-    const V v1545 = v1536 - v1544;
-    const V v1546 = v1539 - v1489;
-    const V v1547 = v1537 - v1505;
-    const V v1548 = v1479 - v1505;
-    const V v1549 = v1538 - v897;
-    const V v1550 = v1540 - v691;
-    const V v1551 = v1541 - v738;
-    const V v1552 = v1546 - v892;
-    const V v1553 = v261 * v1418;
-    const V v1554 = v1548 - v1027;
-    const V v1555 = v886 - v1027;
-    const V v1556 = v1545 - v960;
-    const V v1557 = v1549 - v1255;
-    const V v1558 = v244 * v1414;
-    const V v1559 = v1550 - v1558;
-    const V v1560 = v208 * v1238;
-    const V v1561 = v1551 - v1560;
-    const V v1562 = v1552 - v1246;
-    const V v1563 = v272 * v1436;
-    const V v1564 = v1553 - v1563;
-    const V v1565 = v244 * v1499;
-    const V v1566 = v752 - v1565;
-    const V v1567 = v244 * v1500;
-    const V v1568 = v753 - v1567;
-    const V v1569 = v370 * v1436;
-    const V v1570 = v1557 - v1569;
-    const V v1571 = v367 * v1436;
-    const V v1572 = v1562 - v1571;
-    const V v1573 = v367 * v1434;
-    const V v1574 = v1559 - v1573;
-    const V v1575 = v370 * v1434;
-    const V v1576 = v1561 - v1575;
-    const V v1577 = v244 * v1510;
-    const V v1578 = v1352 + v1577;
-    const V v1579 = v367 * v1521;
-    const V v1580 = v1566 + v1579;
-    const V v1581 = v367 * v1523;
-    const V v1582 = v1568 + v1581;
-    const V v1583 = v1372 + v1564;
-    const V v1584 = v370 * v1521;
-    const V v1585 = v755 + v1584;
-    const V v1586 = v261 * v1521;
-    const V v1587 = v1005 + v1586;
-    const V v1588 = v261 * v1564;
-    const V v1589 = v1374 + v1588;
-    const V v1590 = v367 * v1503;
-    const V v1591 = v1578 + v1590;
-    const V v1592 = v370 * v1523;
-    const V v1593 = v756 + v1592;
-    const V v1594 = v261 * v1523;
-    const V v1595 = v1011 + v1594;
-    const V v1596 = v370 * v1503;
-    const V v1597 = v1367 + v1596;
-    const V v1598 = v261 * v1503;
-    const V v1599 = v1359 + v1598;
-    const V v1600 = v295 * v691;
-    const V v1601 = v1580 + v1600;
-    const V v1602 = v295 * v738;
-    const V v1603 = v1585 + v1602;
-    const V v1604 = v295 * v692;
-    const V v1605 = v747 + v1604;
-    const V v1606 = v298 * v738;
-    const V v1607 = v1593 + v1606;
-    const V v1608 = v298 * v692;
-    const V v1609 = v748 + v1608;
-    const V v1610 = v298 * v691;
-    const V v1611 = v1582 + v1610;
-    const V v1612 = v272 * v1545;
-    const V v1613 = v1589 + v1612;
-    const V v1614 = v272 * v1478;
-    const V v1615 = v1595 + v1614;
-    const V v1616 = v272 * v1528;
-    const V v1617 = v1599 + v1616;
-    const V v1618 = v357 * v1528;
-    const V v1619 = v1597 + v1618;
-    const V v1620 = v357 * v1478;
-    const V v1621 = v1607 + v1620;
-    const V v1622 = v432 * v1478;
-    const V v1623 = v1611 + v1622;
-    const V v1624 = v432 * v1528;
-    const V v1625 = v1591 + v1624;
-    const V v1626 = v357 * v1467;
-    const V v1627 = v1603 + v1626;
-    const V v1628 = v183 * v691;
-    const V v1629 = v754 - v1628;
-    const V v1630 = v183 * v738;
-    const V v1631 = v1378 - v1630;
-    const V v1632 = v432 * v1467;
-    const V v1633 = v1601 + v1632;
-    const V v1634 = v272 * v1467;
-    const V v1635 = v1587 + v1634;
-    const V v1636 = v423 * v1017;
-    const V v1637 = v1609 + v1636;
-    const V v1638 = v423 * v1033;
-    const V v1639 = v415 * v1033;
-    const V v1640 = v415 * v1017;
-    const V v1641 = v1605 + v1640;
-    const V v1642 = v432 * v1543;
-    const V v1643 = v1629 + v1642;
-    const V v1644 = v357 * v1543;
-    const V v1645 = v1631 + v1644;
-    const V v1646 = v272 * v1543;
-    const V v1647 = v1013 + v1646;
-    const V v1648 = v262 * v1017;
-    const V v1649 = v740 + v1648;
-    const V v1650 = v262 * v1033;
-    const V v1651 = v344 * v1035;
-    const V v1652 = v1638 + v1651;
-    const V v1653 = v324 * v1035;
-    const V v1654 = v1639 + v1653;
-    const V v1655 = v324 * v1021;
-    const V v1656 = v1641 + v1655;
-    const V v1657 = v270 * v1035;
-    const V v1658 = v270 * v1021;
-    const V v1659 = v1649 + v1658;
-    const V v1660 = v262 * v1555;
-    const V v1661 = v1647 + v1660;
-    const V v1662 = v1650 + v1657;
-    const V v1663 = v324 * v1031;
-    const V v1664 = v270 * v1031;
-    const V v1665 = v1476 + v1657;
-    const V v1666 = v695 + v1021;
-    const V v1667 = v344 * v1021;
-    const V v1668 = v1637 + v1667;
-    const V v1669 = v344 * v1031;
-    const V v1670 = v324 * v1029;
-    const V v1671 = v270 * v1029;
-    const V v1672 = v344 * v1029;
-    const V v1673 = v270 * v1662;
-    const V v1674 = v1661 + v1673;
-    const V v1675 = v1670 - v892;
-    const V v1676 = v1219 + v1666;
-    const V v1677 = v345 * v1219;
-    const V v1678 = v1668 + v1677;
-    const V v1679 = v1672 - v897;
-    const V v1680 = v324 * v878;
-    const V v1681 = v854 + v1680;
-    const V v1682 = v344 * v878;
-    const V v1683 = v856 + v1682;
-    const V v1684 = v228 * v878;
-    const V v1685 = v1312 + v1684;
-    const V v1686 = v1428 + v1676;
-    const V v1687 = v342 * v1428;
-    const V v1688 = v1678 + v1687;
-    const V v1689 = v1270 + v1681;
-    const V v1690 = v228 * v1681;
-    const V v1691 = v1330 + v1690;
-    const V v1692 = v228 * v1683;
-    const V v1693 = v1332 + v1692;
-    const V v1694 = v1272 + v1683;
-    const V v1695 = v342 * v1426;
-    const V v1696 = v1371 + v1695;
-    const V v1697 = v1036 + v1426;
-    const V v1698 = v418 * v875;
-    const V v1699 = v1679 + v1698;
-    const V v1700 = v418 * v1015;
-    const V v1701 = v911 + v1700;
-    const V v1702 = v234 * v1483;
-    const V v1703 = v1691 + v1702;
-    const V v1704 = v234 * v1485;
-    const V v1705 = v1693 + v1704;
-    const V v1706 = v234 * v1407;
-    const V v1707 = v1316 + v1706;
-    const V v1708 = v1207 + v1697;
-    const V v1709 = v345 * v1207;
-    const V v1710 = v1696 + v1709;
-    const V v1711 = v234 * v1496;
-    const V v1712 = v1338 + v1711;
-    const V v1713 = v208 * v1689;
-    const V v1714 = v1627 - v1713;
-    const V v1715 = v208 * v1694;
-    const V v1716 = v1621 - v1715;
-    const V v1717 = v208 * v1178;
-    const V v1718 = v1276 - v1717;
-    const V v1719 = v239 * v1178;
-    const V v1720 = v900 + v1719;
-    const V v1721 = v608 * v839;
-    const V v1722 = v837 + v1721;
-    const V v1723 = v614 * v839;
-    const V v1724 = v835 - v1723;
-    const V v1725 = v423 * v848;
-    const V v1726 = v1710 + v1725;
-    const V v1727 = v702 + v848;
-    const V v1728 = v912 - v1718;
-    const V v1729 = v232 * v1718;
-    const V v1730 = v1340 + v1729;
-    const V v1731 = v423 * v1722;
-    const V v1732 = v423 * v1724;
-    const V v1733 = v1669 + v1732;
-    const V v1734 = v240 * v1103;
-    const V v1735 = v1720 + v1734;
-    const V v1736 = v208 * v1728;
-    const V v1737 = v1348 + v1736;
-    const V v1738 = v1187 + v1727;
-    const V v1739 = v358 * v1187;
-    const V v1740 = v1726 + v1739;
-    const V v1741 = v415 * v1722;
-    const V v1742 = v415 * v1724;
-    const V v1743 = v1663 + v1742;
-    const V v1744 = v344 * v1724;
-    const V v1745 = v1731 + v1744;
-    const V v1746 = v344 * v1019;
-    const V v1747 = v1740 + v1746;
-    const V v1748 = v262 * v1722;
-    const V v1749 = v262 * v1724;
-    const V v1750 = v1664 + v1749;
-    const V v1751 = v1420 + v1738;
-    const V v1752 = v324 * v1724;
-    const V v1753 = v1741 + v1752;
-    const V v1754 = v324 * v1019;
-    const V v1755 = v1376 + v1754;
-    const V v1756 = v270 * v1019;
-    const V v1757 = v742 + v1756;
-    const V v1758 = v270 * v1724;
-    const V v1759 = v1748 + v1758;
-    const V v1760 = v343 * v1420;
-    const V v1761 = v1747 + v1760;
-    const V v1762 = v270 * v1743;
-    const V v1763 = v989 + v1762;
-    const V v1764 = v973 + v1750;
-    const V v1765 = v270 * v1750;
-    const V v1766 = v1298 + v1765;
-    const V v1767 = v354 * v1420;
-    const V v1768 = v1755 + v1767;
-    const V v1769 = v261 * v1420;
-    const V v1770 = v1757 + v1769;
-    const V v1771 = v354 * v1422;
-    const V v1772 = v1656 + v1771;
-    const V v1773 = v1040 + v1422;
-    const V v1774 = v343 * v1422;
-    const V v1775 = v1688 + v1774;
-    const V v1776 = v261 * v1422;
-    const V v1777 = v1659 + v1776;
-    const V v1778 = v261 * v1465;
-    const V v1779 = v1763 + v1778;
-    const V v1780 = v262 * v1759;
-    const V v1781 = v1766 + v1780;
-    const V v1782 = v1306 + v1759;
-    const V v1783 = v262 * v848;
-    const V v1784 = v1770 + v1783;
-    const V v1785 = v415 * v848;
-    const V v1786 = v1768 + v1785;
-    const V v1787 = v1217 + v1773;
-    const V v1788 = v416 * v1217;
-    const V v1789 = v1772 + v1788;
-    const V v1790 = v358 * v1217;
-    const V v1791 = v1775 + v1790;
-    const V v1792 = v260 * v1217;
-    const V v1793 = v1777 + v1792;
-    const V v1794 = v415 * v871;
-    const V v1795 = v1512 + v1794;
-    const V v1796 = v260 * v1187;
-    const V v1797 = v1784 + v1796;
-    const V v1798 = v416 * v1187;
-    const V v1799 = v1786 + v1798;
-    const V v1800 = v262 * v1753;
-    const V v1801 = v1779 + v1800;
-    const V v1802 = v425 * v871;
-    const V v1803 = v1534 + v1802;
-    const V v1804 = v425 * v1753;
-    const V v1805 = v987 + v1804;
-    const V v1806 = v428 * v1753;
-    const V v1807 = v1326 + v1806;
-    const V v1808 = v325 * v1219;
-    const V v1809 = v1789 + v1808;
-    const V v1810 = v271 * v1219;
-    const V v1811 = v1793 + v1810;
-    const V v1812 = v271 * v1207;
-    const V v1813 = v1797 + v1812;
-    const V v1814 = v325 * v1207;
-    const V v1815 = v1799 + v1814;
-    const V v1816 = v260 * v1268;
-    const V v1817 = v1801 + v1816;
-    const V v1818 = v426 * v1268;
-    const V v1819 = v1805 + v1818;
-    const V v1820 = v426 * v1232;
-    const V v1821 = v1803 + v1820;
-    const V v1822 = v416 * v1232;
-    const V v1823 = v1519 + v1822;
-    const V v1824 = v336 * v1428;
-    const V v1825 = v1809 + v1824;
-    const V v1826 = v272 * v1428;
-    const V v1827 = v1811 + v1826;
-    const V v1828 = v336 * v1426;
-    const V v1829 = v1815 + v1828;
-    const V v1830 = v272 * v1426;
-    const V v1831 = v1813 + v1830;
-    const V v1832 = v272 * v1471;
-    const V v1833 = v1817 + v1832;
-    const V v1834 = v432 * v1471;
-    const V v1835 = v1819 + v1834;
-    const V v1836 = v357 * v1471;
-    const V v1837 = v1807 + v1836;
-    const V v1838 = v426 * v1823;
-    const V v1839 = v1625 + v1838;
-    const V v1840 = v367 * v1418;
-    const V v1841 = v1821 + v1840;
-    const V v1842 = v370 * v1418;
-    const V v1843 = v1526 + v1842;
-    const V v1844 = v367 * v1465;
-    const V v1845 = v1835 + v1844;
-    const V v1846 = v370 * v1465;
-    const V v1847 = v1837 + v1846;
-    const V v1848 = v599 * v1159;
-    const V v1849 = v475 * v1159;
-    const V v1850 = v1202 + v1849;
-    const V v1851 = 2.0 * v1181;
-    const V v1852 = v1848 - v1851;
-    const V v1853 = v475 * v1850;
-    const V v1854 = v1198 + v1853;
-    const V v1855 = v599 * v1852;
-    const V v1856 = v1149 + v1855;
-    const V v1857 = v599 * v1850;
-    const V v1858 = v1194 - v1857;
-    const V v1859 = v610 * v1850;
-    const V v1860 = v1164 + v1859;
-    const V v1861 = v430 * v875;
-    const V v1862 = v1841 - v1861;
-    const V v1863 = v355 * v875;
-    const V v1864 = v1843 - v1863;
-    const V v1865 = v430 * v1743;
-    const V v1866 = v1845 + v1865;
-    const V v1867 = v355 * v1743;
-    const V v1868 = v1847 + v1867;
-    const V v1869 = v420 * v875;
-    const V v1870 = v1675 + v1869;
-    const V v1871 = v420 * v1015;
-    const V v1872 = v910 + v1871;
-    const V v1873 = v416 * v1860;
-    const V v1874 = v271 * v1858;
-    const V v1875 = v271 * v1856;
-    const V v1876 = v1287 + v1875;
-    const V v1877 = v358 * v1860;
-    const V v1878 = v358 * v1232;
-    const V v1879 = v1516 + v1878;
-    const V v1880 = v260 * v1860;
-    const V v1881 = v271 * v1854;
-    const V v1882 = v1874 + v1880;
-    const V v1883 = v325 * v1854;
-    const V v1884 = v325 * v1858;
-    const V v1885 = v1873 + v1884;
-    const V v1886 = v325 * v1856;
-    const V v1887 = v1264 + v1886;
-    const V v1888 = v1665 + v1874;
-    const V v1889 = v345 * v1858;
-    const V v1890 = v1877 + v1889;
-    const V v1891 = v345 * v1854;
-    const V v1892 = v345 * v1856;
-    const V v1893 = v1265 + v1892;
-    const V v1894 = v1883 - v1246;
-    const V v1895 = v260 * v1209;
-    const V v1896 = v1881 - v1895;
-    const V v1897 = v1891 - v1255;
-    const V v1898 = v271 * v1887;
-    const V v1899 = v1833 + v1898;
-    const V v1900 = v260 * v1230;
-    const V v1901 = v1888 + v1900;
-    const V v1902 = v421 * v1209;
-    const V v1903 = v1894 + v1902;
-    const V v1904 = v421 * v1228;
-    const V v1905 = v1282 + v1904;
-    const V v1906 = v352 * v1209;
-    const V v1907 = v1897 + v1906;
-    const V v1908 = v352 * v1228;
-    const V v1909 = v1288 + v1908;
-    const V v1910 = v1556 + v1896;
-    const V v1911 = v271 * v1896;
-    const V v1912 = v1613 + v1911;
-    const V v1913 = v271 * v1893;
-    const V v1914 = v1303 + v1913;
-    const V v1915 = v356 * v1893;
-    const V v1916 = v1328 + v1915;
-    const V v1917 = v356 * v1209;
-    const V v1918 = v1864 - v1917;
-    const V v1919 = v260 * v1905;
-    const V v1920 = v1635 + v1919;
-    const V v1921 = v356 * v1903;
-    const V v1922 = v1619 + v1921;
-    const V v1923 = v260 * v1909;
-    const V v1924 = v1615 + v1923;
-    const V v1925 = v271 * v1903;
-    const V v1926 = v1617 + v1925;
-    const V v1927 = v431 * v1903;
-    const V v1928 = v1839 + v1927;
-    const V v1929 = v431 * v1209;
-    const V v1930 = v1862 - v1929;
-    const V v1931 = v363 * v1232;
-    const V v1932 = v1918 + v1931;
-    const V v1933 = v271 * v1885;
-    const V v1934 = v1920 + v1933;
-    const V v1935 = v363 * v1823;
-    const V v1936 = v1922 + v1935;
-    const V v1937 = v260 * v1823;
-    const V v1938 = v1926 + v1937;
-    const V v1939 = v271 * v1890;
-    const V v1940 = v1924 + v1939;
-    const V v1941 = v363 * v1209;
-    const V v1942 = v1570 - v1941;
-    const V v1943 = v426 * v1209;
-    const V v1944 = v1572 - v1943;
-    const V v1945 = v431 * v1885;
-    const V v1946 = v1633 + v1945;
-    const V v1947 = v356 * v1885;
-    const V v1948 = v1714 + v1947;
-    const V v1949 = v431 * v1890;
-    const V v1950 = v1623 + v1949;
-    const V v1951 = v356 * v1890;
-    const V v1952 = v1716 + v1951;
-    const V v1953 = v356 * v1854;
-    const V v1954 = v1942 + v1953;
-    const V v1955 = v431 * v1854;
-    const V v1956 = v1944 + v1955;
-    const V v1957 = v426 * v1905;
-    const V v1958 = v1946 + v1957;
-    const V v1959 = v363 * v1905;
-    const V v1960 = v1948 + v1959;
-    const V v1961 = v426 * v1909;
-    const V v1962 = v1950 + v1961;
-    const V v1963 = v363 * v1909;
-    const V v1964 = v1952 + v1963;
-    const V v1965 = v262 * v1701;
-    const V v1966 = v1940 + v1965;
-    const V v1967 = v262 * v1795;
-    const V v1968 = v1938 + v1967;
-    const V v1969 = v355 * v1029;
-    const V v1970 = v1954 + v1969;
-    const V v1971 = v430 * v1029;
-    const V v1972 = v1956 + v1971;
-    const V v1973 = v430 * v1654;
-    const V v1974 = v1958 + v1973;
-    const V v1975 = v355 * v1654;
-    const V v1976 = v1960 + v1975;
-    const V v1977 = v425 * v1701;
-    const V v1978 = v1962 + v1977;
-    const V v1979 = v428 * v1701;
-    const V v1980 = v1964 + v1979;
-    const V v1981 = v270 * v1654;
-    const V v1982 = v1934 + v1981;
-    const V v1983 = v270 * v1652;
-    const V v1984 = v1966 + v1983;
-    const V v1985 = v428 * v875;
-    const V v1986 = v1970 - v1985;
-    const V v1987 = v425 * v875;
-    const V v1988 = v1972 - v1987;
-    const V v1989 = v430 * v1652;
-    const V v1990 = v1978 + v1989;
-    const V v1991 = v355 * v1652;
-    const V v1992 = v1980 + v1991;
-    const V v1993 = v262 * v875;
-    const V v1994 = v1671 - v1993;
-    const V v1995 = v425 * v1872;
-    const V v1996 = v1974 + v1995;
-    const V v1997 = v428 * v1872;
-    const V v1998 = v1976 + v1997;
-    const V v1999 = v262 * v1872;
-    const V v2000 = v1982 + v1999;
-    const V v2001 = v262 * v1745;
-    const V v2002 = v1914 + v2001;
-    const V v2003 = v428 * v1745;
-    const V v2004 = v1916 + v2003;
-    const V v2005 = v1910 + v1994;
-    const V v2006 = v270 * v1994;
-    const V v2007 = v1912 + v2006;
-    const V v2008 = v270 * v1733;
-    const V v2009 = v2002 + v2008;
-    const V v2010 = v355 * v1733;
-    const V v2011 = v2004 + v2010;
-    const V v2012 = v206 * v1103;
-    const V v2013 = v1487 - v2012;
-    const V v2014 = v425 * v1722;
-    const V v2015 = v1280 + v2014;
-    const V v2016 = v428 * v1722;
-    const V v2017 = v1293 + v2016;
-    const V v2018 = v343 * v1405;
-    const V v2019 = v2013 + v2018;
-    const V v2020 = v234 * v1405;
-    const V v2021 = v1314 + v2020;
-    const V v2022 = v234 * v1401;
-    const V v2023 = v1310 + v2022;
-    const V v2024 = v261 * v1401;
-    const V v2025 = v1480 + v2024;
-    const V v2026 = v261 * v1469;
-    const V v2027 = v2009 + v2026;
-    const V v2028 = v370 * v1469;
-    const V v2029 = v2011 + v2028;
-    const V v2030 = v370 * v1444;
-    const V v2031 = v2017 + v2030;
-    const V v2032 = v367 * v1444;
-    const V v2033 = v2015 + v2032;
-    const V v2034 = v261 * v1444;
-    const V v2035 = v1462 + v2034;
-    const V v2036 = v1248 + v2025;
-    const V v2037 = v234 * v2025;
-    const V v2038 = v1334 + v2037;
-    const V v2039 = v234 * v2019;
-    const V v2040 = v1730 + v2039;
-    const V v2041 = v261 * v1450;
-    const V v2042 = v1475 + v2041;
-    const V v2043 = v357 * v1450;
-    const V v2044 = v2031 + v2043;
-    const V v2045 = v432 * v1450;
-    const V v2046 = v2033 + v2045;
-    const V v2047 = v367 * v1450;
-    const V v2048 = v969 + v2047;
-    const V v2049 = v244 * v2036;
-    const V v2050 = v1643 - v2049;
-    const V v2051 = v370 * v1450;
-    const V v2052 = v1289 + v2051;
-    const V v2053 = v1764 + v2042;
-    const V v2054 = v272 * v2042;
-    const V v2055 = v1781 + v2054;
-    const V v2056 = v432 * v1424;
-    const V v2057 = v2048 + v2056;
-    const V v2058 = v357 * v1424;
-    const V v2059 = v2052 + v2058;
-    const V v2060 = v432 * v1452;
-    const V v2061 = v1491 + v2060;
-    const V v2062 = v357 * v1452;
-    const V v2063 = v1369 + v2062;
-    const V v2064 = v367 * v1547;
-    const V v2065 = v2050 + v2064;
-    const V v2066 = v367 * v1416;
-    const V v2067 = v2061 + v2066;
-    const V v2068 = v370 * v1416;
-    const V v2069 = v2063 + v2068;
-    const V v2070 = v261 * v1416;
-    const V v2071 = v1901 + v2070;
-    const V v2072 = v1876 + v2053;
-    const V v2073 = v271 * v1876;
-    const V v2074 = v2055 + v2073;
-    const V v2075 = v370 * v1547;
-    const V v2076 = v1645 + v2075;
-    const V v2077 = v261 * v1547;
-    const V v2078 = v1674 + v2077;
-    const V v2079 = v370 * v1506;
-    const V v2080 = v1737 + v2079;
-    const V v2081 = v261 * v1506;
-    const V v2082 = v1363 + v2081;
-    const V v2083 = v261 * v2035;
-    const V v2084 = v2074 + v2083;
-    const V v2085 = v1782 + v2035;
-    const V v2086 = v430 * v1031;
-    const V v2087 = v2057 + v2086;
-    const V v2088 = v430 * v1035;
-    const V v2089 = v2067 + v2088;
-    const V v2090 = v355 * v1035;
-    const V v2091 = v2069 + v2090;
-    const V v2092 = v355 * v1031;
-    const V v2093 = v2059 + v2092;
-    const V v2094 = v355 * v1662;
-    const V v2095 = v2076 + v2094;
-    const V v2096 = v430 * v1662;
-    const V v2097 = v2065 + v2096;
-    const V v2098 = v271 * v1882;
-    const V v2099 = v2078 + v2098;
-    const V v2100 = v355 * v1699;
-    const V v2101 = v2080 + v2100;
-    const V v2102 = v270 * v1699;
-    const V v2103 = v2082 + v2102;
-    const V v2104 = v431 * v1856;
-    const V v2105 = v2087 + v2104;
-    const V v2106 = v356 * v1856;
-    const V v2107 = v2093 + v2106;
-    const V v2108 = v356 * v1882;
-    const V v2109 = v2095 + v2108;
-    const V v2110 = v431 * v1882;
-    const V v2111 = v2097 + v2110;
-    const V v2112 = v356 * v1858;
-    const V v2113 = v2091 + v2112;
-    const V v2114 = v431 * v1858;
-    const V v2115 = v2089 + v2114;
-    const V v2116 = v356 * v1907;
-    const V v2117 = v2101 + v2116;
-    const V v2118 = v271 * v1907;
-    const V v2119 = v2103 + v2118;
-    const V v2120 = v271 * v1860;
-    const V v2121 = v1554 + v2120;
-    const V v2122 = v431 * v1860;
-    const V v2123 = v1574 + v2122;
-    const V v2124 = v356 * v1860;
-    const V v2125 = v1576 + v2124;
-    const V v2126 = v431 * v1887;
-    const V v2127 = v1866 + v2126;
-    const V v2128 = v356 * v1887;
-    const V v2129 = v1868 + v2128;
-    const V v2130 = v356 * v1215;
-    const V v2131 = v2044 + v2130;
-    const V v2132 = v426 * v1215;
-    const V v2133 = v2105 + v2132;
-    const V v2134 = v426 * v1230;
-    const V v2135 = v2115 + v2134;
-    const V v2136 = v363 * v1230;
-    const V v2137 = v2113 + v2136;
-    const V v2138 = v426 * v1228;
-    const V v2139 = v2123 - v2138;
-    const V v2140 = v363 * v1228;
-    const V v2141 = v2125 - v2140;
-    const V v2142 = v426 * v1295;
-    const V v2143 = v2111 + v2142;
-    const V v2144 = v363 * v1295;
-    const V v2145 = v2109 + v2144;
-    const V v2146 = v363 * v1879;
-    const V v2147 = v2117 + v2146;
-    const V v2148 = v260 * v1879;
-    const V v2149 = v2119 + v2148;
-    const V v2150 = v260 * v1295;
-    const V v2151 = v2099 + v2150;
-    const V v2152 = v425 * v1724;
-    const V v2153 = v2133 + v2152;
-    const V v2154 = v355 * v1724;
-    const V v2155 = v2131 + v2154;
-    const V v2156 = v425 * v1015;
-    const V v2157 = v2139 - v2156;
-    const V v2158 = v428 * v1015;
-    const V v2159 = v2141 - v2158;
-    const V v2160 = v425 * v873;
-    const V v2161 = v2135 + v2160;
-    const V v2162 = v428 * v873;
-    const V v2163 = v2137 + v2162;
-    const V v2164 = v425 * v1555;
-    const V v2165 = v2143 + v2164;
-    const V v2166 = v428 * v1555;
-    const V v2167 = v2145 + v2166;
-    const V v2168 = v428 * v1724;
-    const V v2169 = v2107 + v2168;
-    const V v2170 = v430 * v1724;
-    const V v2171 = v2046 + v2170;
-    const V v2172 = v430 * v1033;
-    const V v2173 = v2157 + v2172;
-    const V v2174 = v355 * v1033;
-    const V v2175 = v2159 + v2174;
-    const V v2176 = v270 * v1033;
-    const V v2177 = v2121 + v2176;
-    const V v2178 = v425 * v1795;
-    const V v2179 = v1928 + v2178;
-    const V v2180 = v428 * v1795;
-    const V v2181 = v1936 + v2180;
-    const V v2182 = v270 * v1870;
-    const V v2183 = v1968 + v2182;
-    const V v2184 = v430 * v1870;
-    const V v2185 = v2179 + v2184;
-    const V v2186 = v355 * v1870;
-    const V v2187 = v2181 + v2186;
-    const V v2188 = v500 * v550;
-    const V v2189 = v636 - v2188;
-    const V v2190 = v2189 * v2189;
-    const V v2191 = 2.0 * v2189;
-    const V v2192 = v234 * v1403;
-    const V v2193 = v1685 + v2192;
-    const V v2194 = v234 * v1502;
-    const V v2195 = v1336 + v2194;
-    const V v2196 = v357 * v1473;
-    const V v2197 = v2029 + v2196;
-    const V v2198 = v272 * v1473;
-    const V v2199 = v2027 + v2198;
-    const V v2200 = v357 * v1531;
-    const V v2201 = v2147 + v2200;
-    const V v2202 = v272 * v1531;
-    const V v2203 = v2149 + v2202;
-    const V v2204 = v938 + v2190;
-    const V v2205 = v397 * v2190;
-    const V v2206 = v397 * v2191;
-    const V v2207 = v398 * v2190;
-    const V v2208 = v162 * v2191;
-    const V v2209 = softehl_vrcbrt(v2205);
-    const V v2210 = v162 * v2204;
-    const V v2211 = v2209 * v2209;
-    const V v2212 = v2211 * v2211;
-    const V v2213 = 0.6666666666666666 * v2209;
-    const V v2214 = v2212 * v2213;
-    const V v2215 = v2208 * v2214;
-    const V v2216 = 0.3333333333333333 * v2212;
-    const V v2217 = v2209 * v2211;
-    const V v2218 = v162 * v2211;
-    const V v2219 = v162 * v2214;
-    const V v2220 = 1.1111111111111112 * v2212;
-    const V v2221 = v2212 * v2220;
-    const V v2222 = v2210 * v2221;
-    const V v2223 = v2210 * v2214;
-    const V v2224 = 0.4444444444444444 * v2209;
-    const V v2225 = v166 * v2209;
-    const V v2226 = v166 * v2216;
-    const V v2227 = v941 * v2216;
-    const V v2228 = v2223 + v2227;
-    const V v2229 = v941 * v2224;
-    const V v2230 = v2217 * v2229;
-    const V v2231 = v2217 * v2230;
-    const V v2232 = v2222 + v2231;
-    const V v2233 = v2206 * v2232;
-    const V v2234 = v2215 - v2233;
-    const V v2235 = v2207 * v2219;
-    const V v2236 = v2206 * v2219;
-    const V v2237 = v397 * v2234;
-    const V v2238 = v2236 + v2237;
-    const V v2239 = v2207 * v2226;
-    const V v2240 = v397 * v2228;
-    const V v2241 = v2218 - v2240;
-    const V v2242 = v2191 * v2241;
-    const V v2243 = 2.0 * v2241;
-    const V v2244 = v2191 * v2238;
-    const V v2245 = v2243 - v2244;
-    const V v2246 = v397 * v2218;
-    const V v2247 = v2225 + v2246;
-    const V v2248 = 2.0 * v2247;
-    const V v2249 = v407 * v2214;
-    const V v2250 = v2226 + v2249;
-    const V v2251 = v937 * v2214;
-    const V v2252 = v2226 + v2251;
-    const V v2253 = v2206 * v2250;
-    const V v2254 = v398 * v2252;
-    const V v2255 = v2207 * v2232;
-    const V v2256 = v2254 - v2255;
-    const V v2257 = v397 * v2256;
-    const V v2258 = v2235 + v2257;
-    const V v2259 = v2190 * v2256;
-    const V v2260 = v2239 + v2259;
-    const V v2261 = v2190 * v2228;
-    const V v2262 = v2225 - v2261;
-    const V v2263 = v398 * v2228;
-    const V v2264 = v2258 + v2263;
-    const V v2265 = v2191 * v2264;
-    const V v2266 = v563 * v2253;
-    const V v2267 = v2266 - v2242;
-    const V v2268 = v634 * v2235;
-    const V v2269 = v2260 + v2268;
-    const V v2270 = v634 * v2218;
-    const V v2271 = v2262 + v2270;
-    const V v2272 = v398 * v2218;
-    const V v2273 = v397 * v2235;
-    const V v2274 = v2272 - v2273;
-    const V v2275 = v2274 - v2239;
-    const V v2276 = v398 * v2271;
-    const V v2277 = 2.0 * v2271;
-    const V v2278 = v398 * v2269;
-    const V v2279 = v2277 - v2278;
-    const V v2280 = v471 * v2253;
-    const V v2281 = v471 * v2242;
-    const V v2282 = v623 * v2247;
-    const V v2283 = v2281 + v2282;
-    const V v2284 = v623 * v2280;
-    const V v2285 = v2248 - v2284;
-    const V v2286 = v623 * v2275;
-    const V v2287 = v471 * v2265;
-    const V v2288 = v2286 - v2287;
-    const V v2289 = v500 * v2253;
-    const V v2290 = v500 * v2265;
-    const V v2291 = v555 * v2275;
-    const V v2292 = v2290 + v2291;
-    const V v2293 = v555 * v2280;
-    const V v2294 = v555 * v2247;
-    const V v2295 = v555 * v2253;
-    const V v2296 = v555 * v2289;
-    const V v2297 = v2248 + v2296;
-    const V v2298 = v476 * v2289;
-    const V v2299 = v476 * v2247;
-    const V v2300 = v503 * v2247;
-    const V v2301 = v476 * v2253;
-    const V v2302 = v476 * v2275;
-    const V v2303 = v503 * v2275;
-    const V v2304 = v503 * v2253;
-    const V v2305 = v476 * v2280;
-    const V v2306 = v2242 - v2305;
-    const V v2307 = v1751 + v2283;
-    const V v2308 = v417 * v2283;
-    const V v2309 = v1829 + v2308;
-    const V v2310 = v424 * v2283;
-    const V v2311 = v1761 + v2310;
-    const V v2312 = v263 * v2283;
-    const V v2313 = v1831 + v2312;
-    const V v2314 = v214 * v2307;
-    const V v2315 = v2309 - v2314;
-    const V v2316 = v213 * v2307;
-    const V v2317 = v2311 + v2316;
-    const V v2318 = v1100 + v2276;
-    const V v2319 = v803 + v2276;
-    const V v2320 = v230 * v2276;
-    const V v2321 = v1221 + v2320;
-    const V v2322 = v206 * v2318;
-    const V v2323 = v2317 - v2322;
-    const V v2324 = v242 * v2319;
-    const V v2325 = v2315 - v2324;
-    const V v2326 = v242 * v2288;
-    const V v2327 = v206 * v2288;
-    const V v2328 = v417 * v2288;
-    const V v2329 = v263 * v2288;
-    const V v2330 = v242 * v2279;
-    const V v2331 = v206 * v2279;
-    const V v2332 = v238 * v2279;
-    const V v2333 = v1735 + v2332;
-    const V v2334 = v2330 - v1502;
-    const V v2335 = v616 * v2265;
-    const V v2336 = v616 * v2242;
-    const V v2337 = v2299 + v2336;
-    const V v2338 = v500 * v2242;
-    const V v2339 = v2294 - v2338;
-    const V v2340 = v550 * v2242;
-    const V v2341 = v2300 - v2340;
-    const V v2342 = v550 * v2265;
-    const V v2343 = v2303 + v2342;
-    const V v2344 = v242 * v2343;
-    const V v2345 = v206 * v2343;
-    const V v2346 = v1787 + v2339;
-    const V v2347 = v1708 + v2341;
-    const V v2348 = v1686 + v2337;
-    const V v2349 = v353 * v2343;
-    const V v2350 = v353 * v2341;
-    const V v2351 = v2323 + v2350;
-    const V v2352 = v353 * v2337;
-    const V v2353 = v1791 + v2352;
-    const V v2354 = v2335 - v2302;
-    const V v2355 = v2302 - v2335;
-    const V v2356 = v2354 - v1403;
-    const V v2357 = v185 * v2347;
-    const V v2358 = v2351 - v2357;
-    const V v2359 = v185 * v2348;
-    const V v2360 = v2353 - v2359;
-    const V v2361 = v353 * v2355;
-    const V v2362 = v883 - v2355;
-    const V v2363 = v2331 - v2019;
-    const V v2364 = v326 * v2355;
-    const V v2365 = v253 * v2355;
-    const V v2366 = v230 * v2355;
-    const V v2367 = v2193 + v2366;
-    const V v2368 = v424 * v2292;
-    const V v2369 = v2361 + v2368;
-    const V v2370 = v842 + v2292;
-    const V v2371 = v1401 + v2292;
-    const V v2372 = v230 * v2292;
-    const V v2373 = v2023 + v2372;
-    const V v2374 = v417 * v2292;
-    const V v2375 = v2364 + v2374;
-    const V v2376 = v263 * v2292;
-    const V v2377 = v2365 + v2376;
-    const V v2378 = v1683 + v2369;
-    const V v2379 = v1485 + v2369;
-    const V v2380 = v230 * v2369;
-    const V v2381 = v1705 + v2380;
-    const V v2382 = v242 * v2370;
-    const V v2383 = v2173 - v2382;
-    const V v2384 = v214 * v2373;
-    const V v2385 = v1681 + v2375;
-    const V v2386 = v1483 + v2375;
-    const V v2387 = v230 * v2375;
-    const V v2388 = v1703 + v2387;
-    const V v2389 = v213 * v2373;
-    const V v2390 = v2381 + v2389;
-    const V v2391 = v242 * v2378;
-    const V v2392 = v1990 - v2391;
-    const V v2393 = v891 + v2377;
-    const V v2394 = v2025 + v2377;
-    const V v2395 = v230 * v2377;
-    const V v2396 = v2038 + v2395;
-    const V v2397 = v242 * v2385;
-    const V v2398 = v1996 - v2397;
-    const V v2399 = v184 * v2367;
-    const V v2400 = v2388 + v2399;
-    const V v2401 = v185 * v2367;
-    const V v2402 = v2390 - v2401;
-    const V v2403 = v242 * v2393;
-    const V v2404 = v2165 - v2403;
-    const V v2405 = v2384 - v2400;
-    const V v2406 = v2402 - v2396;
-    const V v2407 = v2400 - v2384;
-    const V v2408 = v184 * v2347;
-    const V v2409 = v2325 + v2408;
-    const V v2410 = v184 * v2348;
-    const V v2411 = v1825 + v2410;
-    const V v2412 = v2405 - v2406;
-    const V v2413 = v2406 - v2407;
-    const V v2414 = v326 * v2341;
-    const V v2415 = v2409 + v2414;
-    const V v2416 = v253 * v2341;
-    const V v2417 = v2313 + v2416;
-    const V v2418 = v326 * v2337;
-    const V v2419 = v2411 + v2418;
-    const V v2420 = v253 * v2337;
-    const V v2421 = v1827 + v2420;
-    const V v2422 = v2358 - v2415;
-    const V v2423 = v2358 + v2415;
-    const V v2424 = v2321 - v2417;
-    const V v2425 = v2321 + v2417;
-    const V v2426 = v263 * v2339;
-    const V v2427 = v2421 + v2426;
-    const V v2428 = v417 * v2339;
-    const V v2429 = v2419 + v2428;
-    const V v2430 = v424 * v2339;
-    const V v2431 = v2360 + v2430;
-    const V v2432 = v2422 + v2424;
-    const V v2433 = v2423 + v2425;
-    const V v2434 = v2424 - v2422;
-    const V v2435 = v2425 - v2423;
-    const V v2436 = v2427 - v720;
-    const V v2437 = v720 - v2427;
-    const V v2438 = v214 * v2346;
-    const V v2439 = v2429 - v2438;
-    const V v2440 = v213 * v2346;
-    const V v2441 = v2431 + v2440;
-    const V v2442 = v2439 + v2441;
-    const V v2443 = v2441 - v2439;
-    const V v2444 = v2437 - v2443;
-    const V v2445 = v2436 + v2442;
-    softehl_store4(R + 0, 8, v2445, v2433, v2444, v2434);
-    const V v2446 = v2436 - v2442;
-    const V v2447 = v424 * v2288;
-    const V v2448 = v2349 + v2447;
-    const V v2449 = v230 * v2288;
-    const V v2450 = v2021 + v2449;
-    const V v2451 = v2443 - v2436;
-    softehl_store4(R + 4, 8, v2446, v2435, v2451, v2432);
-    const V v2452 = v2363 - v2448;
-    const V v2453 = v230 * v2343;
-    const V v2454 = v1707 + v2453;
-    const V v2455 = v326 * v2343;
-    const V v2456 = v2328 + v2455;
-    const V v2457 = v253 * v2343;
-    const V v2458 = v2329 + v2457;
-    const V v2459 = v214 * v2450;
-    const V v2460 = v2195 - v2459;
-    const V v2461 = v213 * v2450;
-    const V v2462 = v2040 + v2461;
-    const V v2463 = v2448 - v2331;
-    const V v2464 = v230 * v2463;
-    const V v2465 = v2462 + v2464;
-    const V v2466 = v2334 - v2456;
-    const V v2467 = v230 * v2458;
-    const V v2468 = v1712 + v2467;
-    const V v2469 = v2456 - v2330;
-    const V v2470 = v230 * v2469;
-    const V v2471 = v2460 + v2470;
-    const V v2472 = v206 * v2452;
-    const V v2473 = v2201 + v2472;
-    const V v2474 = v206 * v2371;
-    const V v2475 = v2175 - v2474;
-    const V v2476 = v909 - v2469;
-    const V v2477 = v206 * v2466;
-    const V v2478 = v2187 + v2477;
-    const V v2479 = v2333 - v2468;
-    const V v2480 = v185 * v2454;
-    const V v2481 = v2465 - v2480;
-    const V v2482 = v184 * v2454;
-    const V v2483 = v2471 + v2482;
-    const V v2484 = v206 * v2356;
-    const V v2485 = v2163 + v2484;
-    const V v2486 = v2333 + v2468;
-    const V v2487 = 2.0 * v2468;
-    const V v2488 = v2333 + v2487;
-    const V v2489 = v2483 + v2488;
-    const V v2490 = v2481 + v2483;
-    const V v2491 = v2483 - v2481;
-    const V v2492 = v2481 + v2489;
-    const V v2493 = v2486 - v2490;
-    const V v2494 = v2490 + v2492;
-    const V v2495 = v2479 - v2491;
-    const V v2496 = v2479 + v2491;
-    const V v2497 = v206 * v2386;
-    const V v2498 = v1998 - v2497;
-    const V v2499 = v206 * v2379;
-    const V v2500 = v1992 - v2499;
-    const V v2501 = v206 * v2394;
-    const V v2502 = v2167 - v2501;
-    const V v2503 = v616 * v2245;
-    const V v2504 = v471 * v2245;
-    const V v2505 = 2.0 * v2301;
-    const V v2506 = v2503 - v2505;
-    const V v2507 = v623 * v2253;
-    const V v2508 = v2504 - v2507;
-    const V v2509 = v616 * v2506;
-    const V v2510 = v2248 + v2509;
-    const V v2511 = v471 * v2508;
-    const V v2512 = v2285 + v2511;
-    const V v2513 = v500 * v2245;
-    const V v2514 = v2295 + v2513;
-    const V v2515 = v550 * v2245;
-    const V v2516 = v2304 + v2515;
-    const V v2517 = v500 * v2508;
-    const V v2518 = v2293 + v2517;
-    const V v2519 = v616 * v2508;
-    const V v2520 = v2306 + v2519;
-    const V v2521 = v550 * v2508;
-    const V v2522 = v2298 + v2521;
-    const V v2523 = v550 * v2516;
-    const V v2524 = v2297 + v2523;
-    const V v2525 = v500 * v2514;
-    const V v2526 = v2297 + v2525;
-    const V v2527 = v616 * v2514;
-    const V v2528 = v2298 - v2527;
-    const V v2529 = v500 * v2516;
-    const V v2530 = v2267 + v2529;
-    const V v2531 = v616 * v2516;
-    const V v2532 = v2293 - v2531;
-    const V v2533 = v329 * v2522;
-    const V v2534 = v350 * v2522;
-    const V v2535 = v326 * v2510;
-    const V v2536 = v326 * v2520;
-    const V v2537 = v326 * v2528;
-    const V v2538 = v326 * v2532;
-    const V v2539 = v326 * v2524;
-    const V v2540 = v263 * v2518;
-    const V v2541 = v263 * v2528;
-    const V v2542 = v417 * v2528;
-    const V v2543 = v2535 + v2542;
-    const V v2544 = v422 * v2518;
-    const V v2545 = v2536 + v2544;
-    const V v2546 = v253 * v2532;
-    const V v2547 = v253 * v2528;
-    const V v2548 = v253 * v2524;
-    const V v2549 = v422 * v2522;
-    const V v2550 = v2539 + v2549;
-    const V v2551 = v253 * v2510;
-    const V v2552 = v2541 + v2551;
-    const V v2553 = v263 * v2522;
-    const V v2554 = v2548 - v2553;
-    const V v2555 = v2071 + v2546;
-    const V v2556 = v263 * v2526;
-    const V v2557 = v2547 + v2556;
-    const V v2558 = v2550 - v2344;
-    const V v2559 = v1988 - v2344;
-    const V v2560 = v424 * v2526;
-    const V v2561 = v424 * v2528;
-    const V v2562 = v2072 + v2552;
-    const V v2563 = v2005 + v2554;
-    const V v2564 = v263 * v2520;
-    const V v2565 = v2555 + v2564;
-    const V v2566 = v263 * v2530;
-    const V v2567 = v2546 + v2566;
-    const V v2568 = v424 * v2530;
-    const V v2569 = v353 * v2528;
-    const V v2570 = v2560 + v2569;
-    const V v2571 = v353 * v2520;
-    const V v2572 = v353 * v2510;
-    const V v2573 = v2561 + v2572;
-    const V v2574 = v253 * v2520;
-    const V v2575 = v263 * v2512;
-    const V v2576 = v424 * v2512;
-    const V v2577 = v2534 + v2576;
-    const V v2578 = v353 * v2532;
-    const V v2579 = v2568 + v2578;
-    const V v2580 = v353 * v2524;
-    const V v2581 = v2574 - v2540;
-    const V v2582 = v2177 - v2540;
-    const V v2583 = v253 * v2522;
-    const V v2584 = v2575 - v2583;
-    const V v2585 = v2577 - v2327;
-    const V v2586 = v1932 - v2327;
-    const V v2587 = v2580 - v2345;
-    const V v2588 = v1986 - v2345;
-    const V v2589 = v253 * v2530;
-    const V v2590 = v2582 + v2589;
-    const V v2591 = v253 * v2579;
-    const V v2592 = v1984 + v2591;
-    const V v2593 = v1583 + v2584;
-    const V v2594 = v419 * v2522;
-    const V v2595 = v2587 + v2594;
-    const V v2596 = v419 * v2518;
-    const V v2597 = v2571 + v2596;
-    const V v2598 = v360 * v2522;
-    const V v2599 = v2586 - v2598;
-    const V v2600 = v360 * v2524;
-    const V v2601 = v2588 + v2600;
-    const V v2602 = v360 * v2530;
-    const V v2603 = v2475 + v2602;
-    const V v2604 = v213 * v2590;
-    const V v2605 = v2592 + v2604;
-    const V v2606 = v375 * v2524;
-    const V v2607 = v2559 + v2606;
-    const V v2608 = v375 * v2530;
-    const V v2609 = v2383 + v2608;
-    const V v2610 = v417 * v2530;
-    const V v2611 = v2538 + v2610;
-    const V v2612 = v429 * v2522;
-    const V v2613 = v2601 - v2612;
-    const V v2614 = v429 * v2518;
-    const V v2615 = v2603 - v2614;
-    const V v2616 = v429 * v2512;
-    const V v2617 = v2599 + v2616;
-    const V v2618 = v427 * v2518;
-    const V v2619 = v2609 - v2618;
-    const V v2620 = v427 * v2522;
-    const V v2621 = v2607 - v2620;
-    const V v2622 = v375 * v2522;
-    const V v2623 = v1930 - v2622;
-    const V v2624 = v417 * v2512;
-    const V v2625 = v2533 + v2624;
-    const V v2626 = v427 * v2512;
-    const V v2627 = v2623 + v2626;
-    const V v2628 = v417 * v2526;
-    const V v2629 = v2537 + v2628;
-    const V v2630 = v427 * v2526;
-    const V v2631 = v2171 + v2630;
-    const V v2632 = v429 * v2526;
-    const V v2633 = v2155 + v2632;
-    const V v2634 = v214 * v2619;
-    const V v2635 = v2625 - v2326;
-    const V v2636 = v2627 - v2326;
-    const V v2637 = v375 * v2528;
-    const V v2638 = v2631 + v2637;
-    const V v2639 = v360 * v2528;
-    const V v2640 = v2633 + v2639;
-    const V v2641 = v427 * v2528;
-    const V v2642 = v2153 + v2641;
-    const V v2643 = v429 * v2528;
-    const V v2644 = v2169 + v2643;
-    const V v2645 = v214 * v2636;
-    const V v2646 = v2185 - v2645;
-    const V v2647 = v214 * v2638;
-    const V v2648 = v2127 - v2647;
-    const V v2649 = v429 * v2629;
-    const V v2650 = v2129 + v2649;
-    const V v2651 = v375 * v2510;
-    const V v2652 = v2642 + v2651;
-    const V v2653 = v360 * v2510;
-    const V v2654 = v2644 + v2653;
-    const V v2655 = v214 * v2640;
-    const V v2656 = v2650 - v2655;
-    const V v2657 = v2412 + v2634;
-    const V v2658 = v427 * v2635;
-    const V v2659 = v2646 + v2658;
-    const V v2660 = v184 * v2652;
-    const V v2661 = v2648 + v2660;
-    const V v2662 = v184 * v2654;
-    const V v2663 = v2656 + v2662;
-    const V v2664 = v214 * v2590;
-    const V v2665 = v2000 - v2664;
-    const V v2666 = v184 * v2621;
-    const V v2667 = v2659 + v2666;
-    const V v2668 = v213 * v2640;
-    const V v2669 = v2197 + v2668;
-    const V v2670 = v213 * v2619;
-    const V v2671 = v2392 + v2670;
-    const V v2672 = v185 * v2654;
-    const V v2673 = v2669 - v2672;
-    const V v2674 = v184 * v2565;
-    const V v2675 = v2665 + v2674;
-    const V v2676 = v185 * v2565;
-    const V v2677 = v2605 - v2676;
-    const V v2678 = v360 * v2543;
-    const V v2679 = v2663 + v2678;
-    const V v2680 = v427 * v2629;
-    const V v2681 = v2661 + v2680;
-    const V v2682 = v242 * v2476;
-    const V v2683 = v2667 + v2682;
-    const V v2684 = v242 * v2362;
-    const V v2685 = v2161 + v2684;
-    const V v2686 = v427 * v2597;
-    const V v2687 = v2671 + v2686;
-    const V v2688 = v360 * v2573;
-    const V v2689 = v2673 + v2688;
-    const V v2690 = v263 * v2597;
-    const V v2691 = v2677 + v2690;
-    const V v2692 = v263 * v2629;
-    const V v2693 = v1899 + v2692;
-    const V v2694 = v427 * v2520;
-    const V v2695 = v2685 + v2694;
-    const V v2696 = v2402 + v2691;
-    const V v2697 = v2402 - v2691;
-    const V v2698 = v429 * v2520;
-    const V v2699 = v2485 + v2698;
-    const V v2700 = v429 * v2597;
-    const V v2701 = v2500 + v2700;
-    const V v2702 = v375 * v2532;
-    const V v2703 = v2695 + v2702;
-    const V v2704 = v360 * v2532;
-    const V v2705 = v2699 + v2704;
-    const V v2706 = v360 * v2579;
-    const V v2707 = v2701 + v2706;
-    const V v2708 = v375 * v2579;
-    const V v2709 = v2687 + v2708;
-    const V v2710 = v2085 + v2557;
-    const V v2711 = v263 * v2557;
-    const V v2712 = v2084 + v2711;
-    const V v2713 = v263 * v2584;
-    const V v2714 = v2007 + v2713;
-    const V v2715 = v185 * v2703;
-    const V v2716 = v2709 - v2715;
-    const V v2717 = v185 * v2705;
-    const V v2718 = v2707 - v2717;
-    const V v2719 = v184 * v2703;
-    const V v2720 = v2398 + v2719;
-    const V v2721 = v184 * v2705;
-    const V v2722 = v2498 + v2721;
-    const V v2723 = v253 * v2552;
-    const V v2724 = v2712 + v2723;
-    const V v2725 = v253 * v2554;
-    const V v2726 = v2714 + v2725;
-    const V v2727 = v2402 + v2716;
-    const V v2728 = v2697 - v2716;
-    const V v2729 = v2468 - v2726;
-    const V v2730 = v253 * v2573;
-    const V v2731 = v2199 + v2730;
-    const V v2732 = v2468 + v2726;
-    const V v2733 = v2494 + v2726;
-    const V v2734 = v214 * v2615;
-    const V v2735 = v2722 - v2734;
-    const V v2736 = v213 * v2615;
-    const V v2737 = v2718 + v2736;
-    const V v2738 = v214 * v2710;
-    const V v2739 = v213 * v2710;
-    const V v2740 = v2731 + v2739;
-    const V v2741 = v2691 + v2737;
-    const V v2742 = v2716 + v2737;
-    const V v2743 = v2728 + v2737;
-    const V v2744 = v429 * v2545;
-    const V v2745 = v2735 + v2744;
-    const V v2746 = v429 * v2570;
-    const V v2747 = v2689 + v2746;
-    const V v2748 = v263 * v2570;
-    const V v2749 = v2740 + v2748;
-    const V v2750 = v263 * v2545;
-    const V v2751 = v2675 + v2750;
-    const V v2752 = v427 * v2545;
-    const V v2753 = v2720 + v2752;
-    const V v2754 = v2696 - v2742;
-    const V v2755 = v2696 + v2742;
-    const V v2756 = v2679 + v2747;
-    const V v2757 = v2679 - v2747;
-    const V v2758 = v360 * v2611;
-    const V v2759 = v2745 + v2758;
-    const V v2760 = v253 * v2611;
-    const V v2761 = v2751 + v2760;
-    const V v2762 = v375 * v2611;
-    const V v2763 = v2753 + v2762;
-    const V v2764 = v2747 - v2679;
-    const V v2765 = v2657 - v2763;
-    const V v2766 = v2737 - v2759;
-    const V v2767 = v2407 + v2759;
-    const V v2768 = v2759 + v2761;
-    const V v2769 = v2763 - v2634;
-    const V v2770 = v2691 - v2761;
-    const V v2771 = v2407 + v2761;
-    const V v2772 = v2767 - v2761;
-    const V v2773 = v2759 + v2769;
-    const V v2774 = v2413 - v2766;
-    const V v2775 = v2772 - v2769;
-    const V v2776 = v2755 + v2771;
-    const V v2777 = v2774 - v2770;
-    const V v2778 = v2413 + v2770;
-    const V v2779 = v2768 - v2727;
-    const V v2780 = v2771 - v2773;
-    const V v2781 = v2773 + v2776;
-    const V v2782 = v2743 + v2775;
-    const V v2783 = v2407 + v2769;
-    const V v2784 = v2775 - v2743;
-    const V v2785 = v2779 - v2741;
-    const V v2786 = v2727 - v2741;
-    const V v2787 = v2754 + v2780;
-    const V v2788 = v2783 + v2785;
-    const V v2789 = v2780 - v2754;
-    const V v2790 = v2783 - v2768;
-    const V v2791 = v2741 + v2768;
-    const V v2792 = v427 * v2581;
-    const V v2793 = v2404 + v2792;
-    const V v2794 = v429 * v2581;
-    const V v2795 = v2502 + v2794;
-    const V v2796 = v263 * v2581;
-    const V v2797 = v2151 + v2796;
-    const V v2798 = v429 * v2635;
-    const V v2799 = v2478 + v2798;
-    const V v2800 = v263 * v2635;
-    const V v2801 = v2183 + v2800;
-    const V v2802 = v429 * v2585;
-    const V v2803 = v2473 + v2802;
-    const V v2804 = v263 * v2585;
-    const V v2805 = v2203 + v2804;
-    const V v2806 = v375 * v2567;
-    const V v2807 = v2793 + v2806;
-    const V v2808 = v360 * v2567;
-    const V v2809 = v2795 + v2808;
-    const V v2810 = v253 * v2567;
-    const V v2811 = v2797 + v2810;
-    const V v2812 = v360 * v2558;
-    const V v2813 = v2799 + v2812;
-    const V v2814 = v253 * v2558;
-    const V v2815 = v2801 + v2814;
-    const V v2816 = v375 * v2558;
-    const V v2817 = v2683 + v2816;
-    const V v2818 = v360 * v2595;
-    const V v2819 = v2803 + v2818;
-    const V v2820 = v253 * v2595;
-    const V v2821 = v2805 + v2820;
-    const V v2822 = v2807 + v2809;
-    const V v2823 = v2809 + v2811;
-    const V v2824 = v375 * v2543;
-    const V v2825 = v2681 + v2824;
-    const V v2826 = v253 * v2543;
-    const V v2827 = v2693 + v2826;
-    const V v2828 = v2811 - v2784;
-    const V v2829 = v2396 + v2807;
-    const V v2830 = v2716 - v2807;
-    const V v2831 = v2396 - v2807;
-    const V v2832 = v2679 + v2825;
-    const V v2833 = v2809 + v2831;
-    const V v2834 = v2766 - v2809;
-    const V v2835 = v2765 - v2830;
-    const V v2836 = v2825 - v2679;
-    const V v2837 = v2828 - v2833;
-    const V v2838 = v2830 - v2769;
-    const V v2839 = v2396 + v2811;
-    const V v2840 = v2833 - v2811;
-    const V v2841 = v2778 - v2811;
-    const V v2842 = v2834 + v2838;
-    const V v2843 = v2738 - v2836;
-    const V v2844 = v2781 + v2839;
-    const V v2845 = v2777 + v2838;
-    const V v2846 = v2784 - v2840;
-    const V v2847 = v2782 + v2840;
-    const V v2848 = v2839 - v2822;
-    const V v2849 = v2822 + v2844;
-    const V v2850 = v2840 - v2782;
-    const V v2851 = v2841 + v2842;
-    const V v2852 = v2841 - v2842;
-    const V v2853 = v2823 + v2845;
-    const V v2854 = v2791 - v2823;
-    const V v2855 = v2789 - v2848;
-    const V v2856 = v2787 + v2848;
-    const V v2857 = v2835 - v2854;
-    const V v2858 = v2835 + v2854;
-    const V v2859 = v2848 - v2787;
-    const V v2860 = v2786 - v2823;
-    const V v2861 = v2788 - v2823;
-    const V v2862 = v2829 + v2860;
-    const V v2863 = v2861 - v2829;
-    const V v2864 = v2790 + v2862;
-    const V v2865 = v2790 - v2862;
-    const V v2866 = v184 * v2562;
-    const V v2867 = v2827 + v2866;
-    const V v2868 = v185 * v2562;
-    const V v2869 = v2749 - v2868;
-    const V v2870 = v2843 - v2867;
-    const V v2871 = v2724 + v2869;
-    const V v2872 = v2757 + v2869;
-    const V v2873 = v2867 - v2738;
-    const V v2874 = v2869 - v2873;
-    const V v2875 = v2869 + v2873;
-    const V v2876 = v2869 - v2756;
-    const V v2877 = v2836 - v2873;
-    const V v2878 = v2832 + v2873;
-    const V v2879 = v2870 - v2872;
-    const V v2880 = v2870 + v2872;
-    const V v2881 = v2873 - v2832;
-    const V v2882 = v2871 + v2878;
-    const V v2883 = v2876 + v2881;
-    const V v2884 = v2874 - v2724;
-    const V v2885 = v2724 - v2874;
-    const V v2886 = v2764 + v2874;
-    const V v2887 = v2756 + v2875;
-    const V v2888 = v2724 - v2875;
-    const V v2889 = v2879 + v2884;
-    const V v2890 = v2881 - v2871;
-    const V v2891 = v2871 + v2886;
-    const V v2892 = v2880 + v2885;
-    softehl_store4(K + 48, 64, v2889, v2851, v2892, v2853);
-    const V v2893 = v2882 + v2887;
-    const V v2894 = v2887 + v2890;
-    softehl_store4(K + 20, 64, v2894, v2855, v2892, v2846);
-    const V v2895 = v2884 - v2879;
-    const V v2896 = v2885 - v2880;
-    softehl_store4(K + 52, 64, v2895, v2852, v2896, v2837);
-    const V v2897 = v2877 - v2891;
-    softehl_store4(K + 0, 64, v2893, v2849, v2897, v2864);
-    const V v2898 = v2877 + v2891;
-    softehl_store4(K + 16, 64, v2897, v2863, v2898, v2865);
-    const V v2899 = v2883 + v2888;
-    softehl_store4(K + 4, 64, v2899, v2856, v2889, v2847);
-    softehl_store4(K + 32, 64, v2899, v2857, v2894, v2858);
-    const V v2900 = v2888 - v2883;
-    softehl_store4(K + 36, 64, v2900, v2859, v2895, v2850);
-    const V v2901 = v185 * v2613;
-    const V v2902 = v2819 - v2901;
-    const V v2903 = v184 * v2613;
-    const V v2904 = v2813 + v2903;
-    const V v2905 = v184 * v2563;
-    const V v2906 = v2815 + v2905;
-    const V v2907 = v185 * v2563;
-    const V v2908 = v2821 - v2907;
-    const V v2909 = v213 * v2617;
-    const V v2910 = v2902 + v2909;
-    const V v2911 = v214 * v2617;
-    const V v2912 = v2904 - v2911;
-    const V v2913 = v214 * v2593;
-    const V v2914 = v2906 - v2913;
-    const V v2915 = v213 * v2593;
-    const V v2916 = v2908 + v2915;
-    const V v2917 = v2912 - v2910;
-    const V v2918 = v2817 + v2912;
-    const V v2919 = v2817 - v2912;
-    const V v2920 = v2910 + v2912;
-    const V v2921 = v2483 - v2914;
-    const V v2922 = v2481 - v2916;
-    const V v2923 = v2914 - v2916;
-    const V v2924 = v2914 + v2916;
-    const V v2925 = v2483 + v2914;
-    const V v2926 = v2733 + v2914;
-    const V v2927 = v2496 + v2921;
-    const V v2928 = v2925 - v2918;
-    const V v2929 = v2918 + v2926;
-    const V v2930 = v2729 + v2922;
-    const V v2931 = v2921 - v2919;
-    const V v2932 = v2919 + v2927;
-    const V v2933 = v2922 - v2917;
-    const V v2934 = v2917 + v2930;
-    const V v2935 = v2916 + v2929;
-    const V v2936 = v2481 + v2916;
-    const V v2937 = v2493 + v2928;
-    const V v2938 = v2923 + v2934;
-    const V v2939 = v2729 - v2923;
-    const V v2940 = v2920 + v2935;
-    const V v2941 = v2936 - v2920;
-    const V v2942 = v2931 - v2933;
-    const V v2943 = v2931 + v2933;
-    const V v2944 = v2924 + v2940;
-    const V v2945 = v2732 - v2924;
-    const V v2946 = v2928 + v2941;
-    const V v2947 = v2937 - v2941;
-    const V v2948 = v2932 + v2938;
-    softehl_store4(K + 8, 64, v2849, v2944, v2863, v2948);
-    const V v2949 = v2932 - v2938;
-    softehl_store4(K + 24, 64, v2864, v2948, v2865, v2949);
-    const V v2950 = v2947 - v2945;
-    const V v2951 = v2493 + v2945;
-    const V v2952 = v2495 - v2939;
-    const V v2953 = v2495 + v2939;
-    const V v2954 = v2942 + v2952;
-    softehl_store4(K + 28, 64, v2858, v2950, v2853, v2954);
-    const V v2955 = v2946 + v2951;
-    softehl_store4(K + 40, 64, v2856, v2955, v2855, v2950);
-    const V v2956 = v2943 + v2953;
-    softehl_store4(K + 12, 64, v2857, v2955, v2851, v2956);
-    softehl_store4(K + 56, 64, v2847, v2956, v2846, v2954);
-    const V v2957 = v2951 - v2946;
-    const V v2958 = v2952 - v2942;
-    const V v2959 = v2953 - v2943;
-    softehl_store4(K + 44, 64, v2859, v2957, v2852, v2959);
-    softehl_store4(K + 60, 64, v2850, v2959, v2837, v2958);
-}
-
-void softehl_solid_taylor_mean_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_tangent_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, tangent + (8 * 8) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), tangent + (8 * 8) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    double K[SOFTEHL_LANES * (8 * 8)];
-    softehl_solid_taylor_mean_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (8 * 8) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_solid_taylor_mean_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 0.25 * parameters[2];
-    const V v4 = X0 + d0;
-    const V v5 = X2 + d2;
-    const V v6 = X1 + d1;
-    const V v7 = X0 - X2;
-    const V v8 = X4 + d4;
-    const V v9 = X6 + d6;
-    const V v10 = X4 - X6;
-    const V v11 = X4 - X0;
-    const V v12 = X4 - X2;
-    const V v13 = v11 - X2;
-    const V v14 = X1 - X3;
-    const V v15 = X1 + X3;
-    const V v16 = X6 + v13;
-    const V v17 = v7 + v10;
-    const V v18 = v10 - v7;
-    const V v19 = 0.25 * v16;
-    const V v20 = 0.25 * v17;
-    const V v21 = 0.25 * v18;
-    const V v22 = X3 + d3;
-    const V v23 = v16 - v18;
-    const V v24 = v18 + v16;
-    const V v25 = v18 - v16;
-    const V v26 = 0.0625 * v23;
-    const V v27 = 0.0625 * v24;
-    const V v28 = 0.0625 * v25;
-    const V v29 = X5 + d5;
-    const V v30 = X5 - X3;
-    const V v31 = X5 - X7;
-    const V v32 = X5 + X7;
-    const V v33 = X7 + d7;
-    const V v34 = v14 + v31;
-    const V v35 = v15 + v32;
-    const V v36 = v31 - v14;
-    const V v37 = v32 - v15;
-    const V v38 = 0.25 * v34;
-    const V v39 = 0.25 * v35;
-    const V v40 = 0.25 * v36;
-    const V v41 = 0.25 * v37;
-    const V v42 = v37 - v36;
-    const V v43 = v36 - v37;
-    const V v44 = v36 + v37;
-    const V v45 = 0.0625 * v42;
-    const V v46 = v21 * v41;
-    const V v47 = 0.0625 * v43;
-    const V v48 = 0.0625 * v44;
-    const V v49 = 1.0 / v39;
-    const V v50 = v39 * v39;
-    const V v51 = v40 * v19;
-    const V v52 = v46 - v51;
-    const V v53 = 1.0 / v50;
-    const V v54 = 1.0 / v52;
-    const V v55 = 0.25 * v49;
-    const V v56 = 0.25 * v53;
-    const V v57 = v47 * v54;
-    const V v58 = v26 * v54;
-    const V v59 = v48 * v54;
-    const V v60 = v27 * v54;
-    const V v61 = v45 * v54;
-    const V v62 = v28 * v54;
-    const V v63 = v38 * v60;
-    const V v64 = v20 * v59;
-    const V v65 = v63 - v64;
-    const V v66 = v65 - 0.25;
-    const V v67 = (-0.25) - v65;
-    const V v68 = v38 * v58;
-    const V v69 = 0.25 - v68;
-    const V v70 = v20 * v57;
-    const V v71 = v69 - v70;
-    const V v72 = v38 * v62;
-    const V v73 = 0.25 - v72;
-    const V v74 = v20 * v61;
-    const V v75 = v73 - v74;
-    V s76 = softehl_splat(0.0);
-    V s77 = softehl_splat(0.0);
-    V s78 = softehl_splat(0.0);
-    V s79 = softehl_splat(0.0);
-    V s80 = softehl_splat(0.0);
-    V s81 = softehl_splat(0.0);
-    V s82 = softehl_splat(0.0);
-    V s83 = softehl_splat(0.0);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1], v3 = 0.25 * parameters[2];
+    const V v4 = X0 + d0, v5 = X2 + d2, v6 = X1 + d1, v7 = X0 - X2, v8 = X4 + d4, v9 = X6 + d6,
+        v10 = X4 - X6, v11 = X4 - X2, v12 = X1 - X3, v13 = X1 + X3, v14 = X6 + (X4 - X0 - X2),
+        v15 = v10 - v7, v16 = 0.25 * v14, v17 = 0.25 * (v7 + v10), v18 = 0.25 * v15, v19 = X3 + d3,
+        v20 = X5 + d5, v21 = X5 - X3, v22 = X5 - X7, v23 = X5 + X7, v24 = X7 + d7, v25 = v22 - v12,
+        v26 = v23 - v13, v27 = 0.25 * (v12 + v22), v28 = 0.25 * (v13 + v23), v29 = 0.25 * v25,
+        v30 = 0.25 * v26, v31 = 1.0 / (v18 * v30 - v29 * v16), v32 = 0.25 * (1.0 / v28),
+        v33 = 0.25 * (1.0 / (v28 * v28)), v34 = 0.0625 * (v25 - v26) * v31,
+        v35 = 0.0625 * (v14 - v15) * v31, v36 = 0.0625 * (v25 + v26) * v31,
+        v37 = 0.0625 * (v15 + v14) * v31, v38 = 0.0625 * (v26 - v25) * v31,
+        v39 = 0.0625 * (v15 - v14) * v31, v40 = v27 * v37 - v17 * v36, v41 = v40 - 0.25,
+        v42 = (-0.25) - v40, v43 = 0.25 - v27 * v35 - v17 * v34, v44 = 0.25 - v27 * v39 - v17 * v38;
+    V s45 = {0}, s46 = {0}, s47 = {0}, s48 = {0}, s49 = {0}, s50 = {0}, s51 = {0}, s52 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v84 = 1.0 - w[1];
-        const double v85 = 1.0 + w[1];
-        const double v86 = 0.25 * w[1];
-        const double v87 = 1.0 - w[0];
-        const double v88 = 1.0 + w[0];
-        const double v89 = 0.25 * v84;
-        const double v90 = 0.25 * v85;
-        const double v91 = 0.25 * w[0];
-        const double v92 = 0.25 - v86;
-        const double v93 = 0.25 + v86;
-        const double v94 = 0.25 + v91;
-        const double v95 = 0.25 - v91;
-        const double v96 = v89 * v87;
-        const double v97 = v87 * v90;
-        const double v98 = v88 * v90;
-        const double v99 = v89 * v88;
-        const double v100 = v86 - 0.25;
-        const V v101 = X2 * v92;
-        const double v102 = v91 - 0.25;
-        const V v103 = X3 * v92;
-        const V v104 = X3 * v99;
-        const V v105 = X6 * v95;
-        const V v106 = X7 * v95;
-        const V v107 = v96 * v4;
-        const V v108 = v96 * v6;
-        const V v109 = v93 * v10;
-        const V v110 = v101 + v109;
-        const V v111 = v93 * v31;
-        const V v112 = v103 + v111;
-        const V v113 = X7 * v97;
-        const V v114 = v113 + v104;
-        const V v115 = v98 * v8;
-        const V v116 = v107 + v115;
-        const V v117 = v98 * v29;
-        const V v118 = v108 + v117;
-        const V v119 = X5 * v98;
-        const V v120 = v119 + v114;
-        const V v121 = X0 * v102;
-        const V v122 = v105 + v121;
-        const V v123 = X0 * v100;
-        const V v124 = v123 + v110;
-        const V v125 = X1 * v100;
-        const V v126 = v125 + v112;
-        const V v127 = X1 * v102;
-        const V v128 = v106 + v127;
-        const V v129 = X1 * v96;
-        const V v130 = v129 + v120;
-        const V v131 = v97 * v9;
-        const V v132 = v131 + v116;
-        const V v133 = v97 * v33;
-        const V v134 = v133 + v118;
-        const V v135 = v94 * v12;
-        const V v136 = v135 + v122;
-        const V v137 = v94 * v30;
-        const V v138 = v137 + v128;
-        const V v139 = v5 * v99;
-        const V v140 = v139 + v132;
-        const V v141 = v22 * v99;
-        const V v142 = v141 + v134;
-        const V v143 = w[2] * v130;
-        const double v144 = w[1] * w[2];
-        const V v145 = v138 * v124;
-        const V v146 = w[1] * v138;
-        const V v147 = w[0] * v124;
-        const V v148 = w[1] * v136;
-        const V v149 = v147 - v148;
-        const V v150 = v136 * v126;
-        const V v151 = v145 - v150;
-        const V v152 = w[0] * v126;
-        const V v153 = v146 - v152;
-        const V v154 = v143 * v149;
-        s82 += v154;
-        const V v155 = v143 * v153;
-        s81 += v155;
-        const V v156 = v130 * v151;
-        const V v157 = 0.25 * v151;
-        const V v158 = w[2] * v157;
-        s76 += v158;
-        const V v159 = w[2] * v156;
-        s78 += v159;
-        const V v160 = v144 * v156;
-        s80 += v160;
-        const V v161 = v144 * v157;
-        s83 += v161;
-        const V v162 = w[0] * v158;
-        s77 += v162;
-        const V v163 = w[0] * v159;
-        s79 += v163;
-        softehl_store2(R + 7 * q + 0, (7 * points), v140, v142);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v53 = 0.25 * w[1], v54 = 1.0 - w[0], v55 = 1.0 + w[0],
+            v56 = 0.25 * (1.0 - w[1]), v57 = 0.25 * (1.0 + w[1]), v58 = 0.25 * w[0],
+            v59 = 0.25 - v53, v60 = 0.25 + v53, v61 = 0.25 + v58, v62 = 0.25 - v58, v63 = v56 * v54,
+            v64 = v54 * v57, v65 = v55 * v57, v66 = v56 * v55, v67 = v53 - 0.25, v68 = v58 - 0.25;
+        const V v69 = X0 * v67 + (X2 * v59 + v60 * v10), v70 = X1 * v67 + (X3 * v59 + v60 * v22),
+            v71 = X1 * v63 + (X5 * v65 + (X7 * v64 + X3 * v66)),
+            v72 = v61 * v11 + (X6 * v62 + X0 * v68), v73 = v61 * v21 + (X7 * v62 + X1 * v68),
+            v74 = v5 * v66 + (v64 * v9 + (v63 * v4 + v65 * v8)),
+            v75 = v19 * v66 + (v64 * v24 + (v63 * v6 + v65 * v20)), v76 = w[2] * v71;
+        const double v77 = w[1] * w[2];
+        const V v78 = v73 * v69 - v72 * v70, v79 = v76 * (w[0] * v69 - w[1] * v72);
+        s51 += v79; const V v80 = v76 * (w[1] * v73 - w[0] * v70); s50 += v80;
+        const V v81 = v71 * v78, v82 = 0.25 * v78, v83 = w[2] * v82;
+        s45 += v83; const V v84 = w[2] * v81; s47 += v84; const V v85 = v77 * v81; s49 += v85;
+        const V v86 = v77 * v82; s52 += v86; const V v87 = w[0] * v83; s46 += v87;
+        const V v88 = w[0] * v84; s48 += v88; softehl_store2(R + 7 * q + 0, (7 * points), v74, v75);
     }
-    const V v164 = 1.0 / s78;
-    const V v165 = s79 * v164;
-    const V v166 = v164 * s80;
-    const V v167 = v164 * s81;
-    const V v168 = v164 * s82;
-    const V v169 = s76 * v164;
-    const V v170 = s77 * v164;
-    const V v171 = v164 * s83;
-    const V v172 = v169 - v171;
-    const V v173 = v169 + v171;
-    const V v174 = v170 + v172;
-    const V v175 = v172 - v170;
-    const V v176 = v71 * v168;
-    const V v177 = v58 + v176;
-    const V v178 = v71 * v167;
-    const V v179 = v57 + v178;
-    const V v180 = v66 * v167;
-    const V v181 = v59 + v180;
-    const V v182 = v66 * v168;
-    const V v183 = v182 - v60;
-    const V v184 = v67 * v168;
-    const V v185 = v60 + v184;
-    const V v186 = v67 * v167;
-    const V v187 = v186 - v59;
-    const V v188 = v75 * v167;
-    const V v189 = v61 + v188;
-    const V v190 = v75 * v168;
-    const V v191 = v62 + v190;
-    const V v192 = v170 + v173;
-    const V v193 = d2 * v183;
-    const V v194 = d2 * v181;
-    const V v195 = 1.0 + v194;
-    const V v196 = d3 * v181;
-    const V v197 = d3 * v183;
-    const V v198 = 1.0 + v197;
-    const V v199 = v173 - v170;
-    const V v200 = d1 * v175;
-    const V v201 = 1.0 + v200;
-    const V v202 = d3 * v174;
-    const V v203 = v202 + v201;
-    const V v204 = d0 * v177;
-    const V v205 = v204 + v193;
-    const V v206 = d1 * v177;
-    const V v207 = v206 + v198;
-    const V v208 = d0 * v179;
-    const V v209 = v208 + v195;
-    const V v210 = d1 * v179;
-    const V v211 = v210 + v196;
-    const V v212 = d4 * v191;
-    const V v213 = v212 + v205;
-    const V v214 = d4 * v189;
-    const V v215 = v214 + v209;
-    const V v216 = d5 * v191;
-    const V v217 = v216 + v207;
-    const V v218 = d5 * v189;
-    const V v219 = v218 + v211;
-    const V v220 = d5 * v192;
-    const V v221 = v220 + v203;
-    const V v222 = d6 * v185;
-    const V v223 = v222 + v213;
-    const V v224 = d6 * v187;
-    const V v225 = v224 + v215;
-    const V v226 = d7 * v185;
-    const V v227 = v226 + v217;
-    const V v228 = d7 * v187;
-    const V v229 = v228 + v219;
-    const V v230 = d7 * v199;
-    const V v231 = v230 + v221;
-    const V v232 = v225 * v227;
-    const V v233 = v223 * v229;
-    const V v234 = v232 - v233;
-    const V v235 = v231 * v234;
+    const V v89 = 1.0 / s47, v90 = s48 * v89, v91 = v89 * s49, v92 = v89 * s50, v93 = v89 * s51,
+        v94 = s45 * v89, v95 = s46 * v89, v96 = v89 * s52, v97 = v94 - v96, v98 = v94 + v96,
+        v99 = v35 + v43 * v93, v100 = v34 + v43 * v92, v101 = v36 + v41 * v92,
+        v102 = v41 * v93 - v37, v103 = v37 + v42 * v93, v104 = v42 * v92 - v36,
+        v105 = v38 + v44 * v92, v106 = v39 + v44 * v93,
+        v107 = d7 * (v98 - v95) + (d5 * (v95 + v98) + (d3 * (v95 + v97) + (1.0 + d1 * (v97 - v95)))),
+        v108 = (d6 * v104 + (d4 * v105 + (d0 * v100 + (1.0 + d2 * v101)))) * (d7 * v103 + (d5 * v106 + (d1 * v99 + (1.0 + d3 * v102)))),
+        v109 = (d6 * v103 + (d4 * v106 + (d0 * v99 + d2 * v102))) * (d7 * v104 + (d5 * v105 + (d1 * v100 + d3 * v101))),
+        v110 = v107 * (v108 - v109);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v236 = w[0] - v165;
-        const V v237 = w[1] - v166;
-        const V v238 = v40 * v236;
-        const V v239 = v41 * v237;
-        const V v240 = v21 * v236;
-        const V v241 = v55 * v236;
-        const V v242 = v170 + v241;
-        const V v243 = v55 * v237;
-        const V v244 = v171 + v243;
-        const V v245 = v19 * v237;
-        const V v246 = v240 - v245;
-        const V v247 = v54 * v246;
-        const V v248 = v168 + v247;
-        const V v249 = v239 + v238;
-        const V v250 = v239 - v238;
-        const V v251 = v54 * v250;
-        const V v252 = v167 + v251;
-        const V v253 = v56 * v249;
-        const V v254 = v169 - v253;
-        const V v255 = v71 * v248;
-        const V v256 = v58 + v255;
-        const V v257 = v75 * v248;
-        const V v258 = v62 + v257;
-        const V v259 = v244 - v254;
-        const V v260 = v244 + v254;
-        const V v261 = v71 * v252;
-        const V v262 = v57 + v261;
-        const V v263 = v75 * v252;
-        const V v264 = v61 + v263;
-        const V v265 = v67 * v248;
-        const V v266 = v60 + v265;
-        const V v267 = v67 * v252;
-        const V v268 = v66 * v252;
-        const V v269 = v59 + v268;
-        const V v270 = v66 * v248;
-        const V v271 = v270 - v60;
-        const V v272 = v242 + v259;
-        const V v273 = v242 - v259;
-        const V v274 = v242 + v260;
-        const V v275 = v267 - v59;
-        const V v276 = v260 - v242;
-        const V v277 = d0 * v256;
-        const V v278 = d0 * v262;
-        const V v279 = 1.0 + v278;
-        const V v280 = d1 * v262;
-        const V v281 = d1 * v256;
-        const V v282 = 1.0 + v281;
-        const V v283 = d1 * v272;
-        const V v284 = 1.0 - v283;
-        const V v285 = d2 * v271;
-        const V v286 = v277 + v285;
-        const V v287 = d2 * v269;
-        const V v288 = v287 + v279;
-        const V v289 = d3 * v269;
-        const V v290 = v280 + v289;
-        const V v291 = d3 * v271;
-        const V v292 = v291 + v282;
-        const V v293 = d3 * v273;
-        const V v294 = v293 + v284;
-        const V v295 = d4 * v258;
-        const V v296 = v295 + v286;
-        const V v297 = d4 * v264;
-        const V v298 = v297 + v288;
-        const V v299 = d5 * v264;
-        const V v300 = v299 + v290;
-        const V v301 = d5 * v258;
-        const V v302 = v301 + v292;
-        const V v303 = d5 * v274;
-        const V v304 = v303 + v294;
-        const V v305 = d6 * v266;
-        const V v306 = v305 + v296;
-        const V v307 = d6 * v275;
-        const V v308 = v307 + v298;
-        const V v309 = d7 * v275;
-        const V v310 = v309 + v300;
-        const V v311 = d7 * v266;
-        const V v312 = v311 + v302;
-        const V v313 = d7 * v276;
-        const V v314 = v313 + v304;
-        const V v315 = v308 * v312;
-        const V v316 = v306 * v310;
-        const V v317 = v315 - v316;
-        const V v318 = v317 * v314;
-        const V v319 = 1.0 / v318;
-        const V v320 = v235 * v319;
-        const M v321 = softehl_eq(v320, softehl_splat(0.0));
-        V v322 = softehl_splat(0.0);
-        const M m323 = ~v321;
-        if (softehl_any(m323)) {
-            const V v324 = softehl_vrcbrt(v320);
-            const V v325 = v320 * v324;
-            const V v326 = v324 * v325;
-            v322 = softehl_blend(m323, v326, v322);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const V v111 = w[0] - v90, v112 = w[1] - v91, v113 = v29 * v111, v114 = v30 * v112,
+            v115 = v95 + v32 * v111, v116 = v96 + v32 * v112,
+            v117 = v93 + v31 * (v18 * v111 - v16 * v112), v118 = v92 + v31 * (v114 - v113),
+            v119 = v94 - v33 * (v114 + v113), v120 = v35 + v43 * v117, v121 = v39 + v44 * v117,
+            v122 = v116 - v119, v123 = v116 + v119, v124 = v34 + v43 * v118,
+            v125 = v38 + v44 * v118, v126 = v37 + v42 * v117, v127 = v36 + v41 * v118,
+            v128 = v41 * v117 - v37, v129 = v42 * v118 - v36,
+            v130 = d5 * (v115 + v123) + (d3 * (v115 - v122) + (1.0 - d1 * (v115 + v122))),
+            v131 = d6 * v126 + (d4 * v121 + (d0 * v120 + d2 * v128)),
+            v132 = d6 * v129 + (d4 * v125 + (d2 * v127 + (1.0 + d0 * v124))),
+            v133 = d7 * v129 + (d5 * v125 + (d1 * v124 + d3 * v127)),
+            v134 = d7 * v126 + (d5 * v121 + (d3 * v128 + (1.0 + d1 * v120))),
+            v135 = d7 * (v123 - v115) + v130,
+            v136 = v110 * (1.0 / ((v132 * v134 - v131 * v133) * v135));
+        const M v137 = softehl_eq(v136, softehl_splat(0.0)); V v138 = softehl_splat(0.0);
+        const M m139 = ~v137;
+        if (softehl_any(m139)) {
+            const V v140 = softehl_vrcbrt(v136), v141 = v140 * (v136 * v140);
+            v138 = softehl_blend(m139, v141, v138);
         }
-        const V v327 = v308 * v322;
-        const V v328 = v306 * v322;
-        const V v329 = v310 * v322;
-        const V v330 = v312 * v322;
-        const V v331 = v314 * v322;
-        const V v332 = 2.0 * v327;
-        const V v333 = v327 * v327;
-        const V v334 = 2.0 * v328;
-        const V v335 = 2.0 * v329;
-        const V v336 = v329 * v329;
-        const V v337 = v327 * v329;
-        const V v338 = 2.0 * v330;
-        const V v339 = v331 * v331;
-        const V v340 = 2.0 * v331;
-        const V v341 = v328 * v328;
-        const V v342 = v333 + v341;
-        const V v343 = v327 * v330;
-        const V v344 = v330 * v330;
-        const V v345 = v336 + v344;
-        const V v346 = v328 * v330;
-        const V v347 = v337 + v346;
-        const V v348 = v331 * v340;
-        const V v349 = 2.0 * v339;
-        const V v350 = v328 * v329;
-        const V v351 = v343 - v350;
-        const V v352 = 2.0 * v342;
-        const V v353 = 2.0 * v345;
-        const V v354 = 2.0 * v347;
-        const V v355 = v331 * v351;
-        const V v356 = v339 + v342;
-        const V v357 = v351 * v351;
-        const V v358 = v349 * v351;
-        const V v359 = v345 + v356;
-        const V v360 = 1.0 / v355;
-        const V v361 = v339 * v357;
-        const V v362 = 2.0 * v359;
-        const V v363 = v359 * v359;
-        const V v364 = v1 * v359;
-        const V v365 = v339 * v339;
-        const V v366 = v363 - v365;
-        const V v367 = v342 * v342;
-        const V v368 = v366 - v367;
-        const V v369 = v345 * v345;
-        const V v370 = v368 - v369;
-        const V v371 = 0.5 * v370;
-        const V v372 = softehl_vrcbrt(v361);
-        const V v373 = 1.0 / v361;
-        const V v374 = v347 * v347;
-        const V v375 = v371 - v374;
-        const V v376 = v1 * v372;
-        const V v377 = v372 * v372;
-        const V v378 = parameters[1] * v372;
-        const V v379 = v378 * v375;
-        const V v380 = v364 + v379;
-        const V v381 = v2 * v377;
-        const V v382 = v381 * v354;
-        const V v383 = 0.5 * v381;
-        const V v384 = v383 * v362;
-        const V v385 = v376 + v384;
-        const V v386 = 1.0 - v373;
-        const V v387 = v3 * v386;
-        const V v388 = 0.3333333333333333 * v377;
-        const V v389 = v377 * v388;
-        const V v390 = v389 * v380;
-        const V v391 = v387 - v390;
-        const V v392 = v358 * v391;
-        const V v393 = v357 * v391;
-        const V v394 = v349 * v383;
-        const V v395 = v393 - v394;
-        const V v396 = v385 + v395;
-        const V v397 = v348 * v396;
-        const V v398 = v360 * v397;
-        const V v399 = v383 * v352;
-        const V v400 = v385 - v399;
-        const V v401 = v383 * v353;
-        const V v402 = v385 - v401;
-        const V v403 = v338 * v402;
-        const V v404 = v335 * v402;
-        const V v405 = v334 * v400;
-        const V v406 = v332 * v400;
-        const V v407 = v330 * v382;
-        const V v408 = v405 - v407;
-        const V v409 = v330 * v392;
-        const V v410 = v406 + v409;
-        const V v411 = v329 * v382;
-        const V v412 = v410 - v411;
-        const V v413 = v329 * v392;
-        const V v414 = v408 - v413;
-        const V v415 = v329 * v412;
-        const V v416 = v330 * v414;
-        const V v417 = v415 + v416;
-        const V v418 = v360 * v417;
-        const V v419 = v327 * v412;
-        const V v420 = v328 * v414;
-        const V v421 = v419 + v420;
-        const V v422 = v360 * v421;
-        const V v423 = v328 * v382;
-        const V v424 = v403 - v423;
-        const V v425 = v327 * v382;
-        const V v426 = v404 - v425;
-        const V v427 = v328 * v392;
-        const V v428 = v426 - v427;
-        const V v429 = v327 * v392;
-        const V v430 = v429 + v424;
-        const V v431 = v329 * v428;
-        const V v432 = v330 * v430;
-        const V v433 = v431 + v432;
-        const V v434 = v360 * v433;
-        softehl_store4(R + 7 * q + 2, (7 * points), v355, v422, v434, v398);
-        softehl_store1(R + 7 * q + 6, (7 * points), v418);
+        const V v142 = v132 * v138, v143 = v131 * v138, v144 = v133 * v138, v145 = v134 * v138,
+            v146 = v135 * v138, v147 = v146 * v146, v148 = v142 * v142 + v143 * v143,
+            v149 = v144 * v144 + v145 * v145, v150 = v142 * v144 + v143 * v145, v151 = 2.0 * v147,
+            v152 = v142 * v145 - v143 * v144, v153 = v146 * v152, v154 = v152 * v152,
+            v155 = v149 + (v147 + v148), v156 = 1.0 / v153, v157 = v147 * v154,
+            v158 = softehl_vrcbrt(v157),
+            v159 = 0.5 * (v155 * v155 - v147 * v147 - v148 * v148 - v149 * v149) - v150 * v150,
+            v160 = v158 * v158, v161 = v2 * v160, v162 = v161 * (2.0 * v150), v163 = 0.5 * v161,
+            v164 = v1 * v158 + v163 * (2.0 * v155),
+            v165 = v160 * (0.3333333333333333 * v160) * (v1 * v155 + parameters[1] * v158 * v159),
+            v166 = v3 * (1.0 - 1.0 / v157) - v165, v167 = v151 * v152 * v166,
+            v168 = v156 * (v146 * (2.0 * v146) * (v164 + (v154 * v166 - v151 * v163))),
+            v169 = v164 - v163 * (2.0 * v148), v170 = v164 - v163 * (2.0 * v149),
+            v171 = 2.0 * v142 * v169 + v145 * v167 - v144 * v162,
+            v172 = 2.0 * v143 * v169 - v145 * v162 - v144 * v167,
+            v173 = v156 * (v144 * v171 + v145 * v172), v174 = v156 * (v142 * v171 + v143 * v172),
+            v175 = v144 * (2.0 * v144 * v170 - v142 * v162 - v143 * v167) + v145 * (v142 * v167 + (2.0 * v145 * v170 - v143 * v162)),
+            v176 = v156 * v175;
+        softehl_store4(R + 7 * q + 2, (7 * points), v153, v174, v176, v168);
+        softehl_store1(R + 7 * q + 6, (7 * points), v173);
     }
 }
-
-void softehl_solid_taylor_mean_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_fields_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + (7 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_fields_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (7 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * (7 * points)];
-    softehl_solid_taylor_mean_fields(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (7 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_solid_taylor_mean_fields, 8, 8, 0, 0, (7 * points), 0)

@@ -23,3366 +23,696 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_solid_taylor_mean_arruda_boyce_energy_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_arruda_boyce_energy)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[2];
-    const double v2 = parameters[1] * parameters[1];
-    const double v3 = parameters[1] * v2;
-    const V v4 = X4 - X0;
-    const double v5 = v2 * v2;
-    const double v6 = 1.0 / v2;
-    const V v7 = X0 - X2;
-    const V v8 = X4 - X2;
-    const V v9 = v4 - X2;
-    const double v10 = v3 * v3;
-    const V v11 = X4 - X6;
-    const V v12 = X6 + v9;
-    const double v13 = v5 * v5;
-    const double v14 = 1.0 / v5;
-    const double v15 = 1.0 / v13;
-    const double v16 = 1.0 / v10;
-    const V v17 = v7 + v11;
-    const V v18 = 0.25 * v12;
-    const V v19 = v11 - v7;
-    const V v20 = 0.25 * v17;
-    const V v21 = v12 - v19;
-    const V v22 = 0.25 * v19;
-    const V v23 = v19 + v12;
-    const V v24 = v19 - v12;
-    const V v25 = X1 - X3;
-    const V v26 = X1 + X3;
-    const V v27 = 0.0625 * v21;
-    const V v28 = 0.0625 * v23;
-    const V v29 = 0.0625 * v24;
-    const V v30 = X5 - X3;
-    const V v31 = X5 - X7;
-    const V v32 = X5 + X7;
-    const V v33 = v25 + v31;
-    const V v34 = v26 + v32;
-    const V v35 = v31 - v25;
-    const V v36 = v32 - v26;
-    const V v37 = 0.25 * v33;
-    const V v38 = 0.25 * v35;
-    const V v39 = 0.25 * v34;
-    const V v40 = 0.25 * v36;
-    const V v41 = v36 - v35;
-    const V v42 = v22 * v40;
-    const V v43 = 0.0625 * v41;
-    const V v44 = v35 - v36;
-    const V v45 = v35 + v36;
-    const V v46 = v38 * v18;
-    const V v47 = v42 - v46;
-    const V v48 = 0.0625 * v44;
-    const V v49 = 0.0625 * v45;
-    const V v50 = 1.0 / v39;
-    const V v51 = v39 * v39;
-    const V v52 = 1.0 / v47;
-    const V v53 = 1.0 / v51;
-    const V v54 = 0.25 * v50;
-    const V v55 = 0.25 * v53;
-    const V v56 = v48 * v52;
-    const V v57 = v27 * v52;
-    const V v58 = v49 * v52;
-    const V v59 = v28 * v52;
-    const V v60 = v43 * v52;
-    const V v61 = v29 * v52;
-    const V v62 = v37 * v59;
-    const V v63 = v20 * v58;
-    const V v64 = v62 - v63;
-    const V v65 = v64 - 0.25;
-    const V v66 = (-0.25) - v64;
-    const V v67 = v37 * v57;
-    const V v68 = 0.25 - v67;
-    const V v69 = v20 * v56;
-    const V v70 = v68 - v69;
-    const V v71 = v37 * v61;
-    const V v72 = 0.25 - v71;
-    const V v73 = v20 * v60;
-    const V v74 = v72 - v73;
-    V s75 = softehl_splat(0.0);
-    V s76 = softehl_splat(0.0);
-    V s77 = softehl_splat(0.0);
-    V s78 = softehl_splat(0.0);
-    V s79 = softehl_splat(0.0);
-    V s80 = softehl_splat(0.0);
-    V s81 = softehl_splat(0.0);
-    V s82 = softehl_splat(0.0);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[2], v2 = parameters[1] * parameters[1],
+        v3 = parameters[1] * v2, v4 = v2 * v2, v5 = 1.0 / v2;
+    const V v6 = X0 - X2, v7 = X4 - X2, v8 = X4 - X6, v9 = X6 + (X4 - X0 - X2);
+    const double v10 = 1.0 / v4, v11 = 1.0 / (v4 * v4), v12 = 1.0 / (v3 * v3);
+    const V v13 = 0.25 * v9, v14 = v8 - v6, v15 = 0.25 * (v6 + v8), v16 = 0.25 * v14, v17 = X1 - X3,
+        v18 = X1 + X3, v19 = X5 - X3, v20 = X5 - X7, v21 = X5 + X7, v22 = v20 - v17,
+        v23 = v21 - v18, v24 = 0.25 * (v17 + v20), v25 = 0.25 * v22, v26 = 0.25 * (v18 + v21),
+        v27 = 0.25 * v23, v28 = 1.0 / (v16 * v27 - v25 * v13), v29 = 0.25 * (1.0 / v26),
+        v30 = 0.25 * (1.0 / (v26 * v26)), v31 = 0.0625 * (v22 - v23) * v28,
+        v32 = 0.0625 * (v9 - v14) * v28, v33 = 0.0625 * (v22 + v23) * v28,
+        v34 = 0.0625 * (v14 + v9) * v28, v35 = 0.0625 * (v23 - v22) * v28,
+        v36 = 0.0625 * (v14 - v9) * v28, v37 = v24 * v34 - v15 * v33, v38 = v37 - 0.25,
+        v39 = (-0.25) - v37, v40 = 0.25 - v24 * v32 - v15 * v31, v41 = 0.25 - v24 * v36 - v15 * v35;
+    V s42 = {0}, s43 = {0}, s44 = {0}, s45 = {0}, s46 = {0}, s47 = {0}, s48 = {0}, s49 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v83 = 1.0 - w[1];
-        const double v84 = 1.0 + w[1];
-        const double v85 = 0.25 * w[1];
-        const double v86 = 1.0 - w[0];
-        const double v87 = 1.0 + w[0];
-        const double v88 = 0.25 * w[0];
-        const double v89 = 0.25 * v84;
-        const double v90 = 0.25 - v85;
-        const double v91 = 0.25 + v85;
-        const double v92 = 0.25 + v88;
-        const double v93 = 0.25 - v88;
-        const V v94 = X5 * v87;
-        const double v95 = v85 - 0.25;
-        const V v96 = X3 * v87;
-        const V v97 = X3 * v90;
-        const V v98 = X2 * v90;
-        const double v99 = v88 - 0.25;
-        const V v100 = X6 * v93;
-        const V v101 = X7 * v93;
-        const V v102 = X7 * v86;
-        const V v103 = v94 + v102;
-        const V v104 = X1 * v86;
-        const V v105 = v104 + v96;
-        const V v106 = v89 * v103;
-        const V v107 = X1 * v95;
-        const V v108 = v97 + v107;
-        const V v109 = X1 * v99;
-        const V v110 = v101 + v109;
-        const V v111 = X0 * v95;
-        const V v112 = v98 + v111;
-        const V v113 = X0 * v99;
-        const V v114 = v100 + v113;
-        const V v115 = 0.25 * v105;
-        const V v116 = v83 * v115;
-        const V v117 = v106 + v116;
-        const V v118 = v91 * v31;
-        const V v119 = v118 + v108;
-        const V v120 = v91 * v11;
-        const V v121 = v120 + v112;
-        const V v122 = v92 * v30;
-        const V v123 = v122 + v110;
-        const V v124 = v92 * v8;
-        const V v125 = v124 + v114;
-        const double v126 = w[1] * w[2];
-        const V v127 = w[0] * v121;
-        const V v128 = v121 * v123;
-        const V v129 = w[1] * v123;
-        const V v130 = w[1] * v125;
-        const V v131 = v127 - v130;
-        const V v132 = v125 * v119;
-        const V v133 = v128 - v132;
-        const V v134 = w[0] * v119;
-        const V v135 = v129 - v134;
-        const V v136 = w[2] * v117;
-        const V v137 = v117 * v133;
-        const V v138 = 0.25 * v133;
-        const V v139 = v136 * v135;
-        s81 += v139;
-        const V v140 = v136 * v131;
-        s82 += v140;
-        const V v141 = w[2] * v138;
-        s75 += v141;
-        const V v142 = v126 * v138;
-        s77 += v142;
-        const V v143 = w[2] * v137;
-        s78 += v143;
-        const V v144 = v126 * v137;
-        s80 += v144;
-        const V v145 = w[0] * v141;
-        s76 += v145;
-        const V v146 = w[0] * v143;
-        s79 += v146;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v50 = 1.0 - w[1], v51 = 1.0 + w[1], v52 = 0.25 * w[1], v53 = 1.0 - w[0],
+            v54 = 1.0 + w[0], v55 = 0.25 * w[0], v56 = 0.25 * v51, v57 = 0.25 - v52,
+            v58 = 0.25 + v52, v59 = 0.25 + v55, v60 = 0.25 - v55;
+        const V v61 = X5 * v54; const double v62 = v52 - 0.25;
+        const V v63 = X3 * v54, v64 = X3 * v57, v65 = X2 * v57;
+        const double v66 = v55 - 0.25;
+        const V v67 = X6 * v60, v68 = X7 * v60, v69 = X7 * v53, v70 = v61 + v69, v71 = X1 * v53,
+            v72 = v71 + v63, v73 = v56 * v70, v74 = X1 * v62, v75 = v64 + v74, v76 = X1 * v66,
+            v77 = v68 + v76, v78 = X0 * v62, v79 = v65 + v78, v80 = X0 * v66, v81 = v67 + v80,
+            v82 = 0.25 * v72, v83 = v50 * v82, v84 = v73 + v83, v85 = v58 * v20, v86 = v85 + v75,
+            v87 = v58 * v8, v88 = v87 + v79, v89 = v59 * v19, v90 = v89 + v77, v91 = v59 * v7,
+            v92 = v91 + v81;
+        const double v93 = w[1] * w[2];
+        const V v94 = v88 * v90, v95 = v92 * v86, v96 = v94 - v95, v97 = w[2] * v84,
+            v98 = v84 * v96, v99 = 0.25 * v96;
+        s48 += v97 * (w[1] * v90 - w[0] * v86); s49 += v97 * (w[0] * v88 - w[1] * v92);
+        const V v100 = w[2] * v99; s42 += v100; s44 += v93 * v99; const V v101 = w[2] * v98;
+        s45 += v101; s47 += v93 * v98; s43 += w[0] * v100; s46 += w[0] * v101;
     }
-    const V v147 = 1.0 / s78;
-    const V v148 = v1 * s78;
-    const V v149 = s79 * v147;
-    const V v150 = v147 * s80;
-    const V v151 = v147 * s81;
-    const V v152 = v147 * s82;
-    const V v153 = s75 * v147;
-    const V v154 = s76 * v147;
-    const V v155 = s77 * v147;
-    const V v156 = v153 - v155;
-    const V v157 = v153 + v155;
-    const V v158 = v154 + v156;
-    const V v159 = v156 - v154;
-    const V v160 = v154 + v157;
-    const V v161 = v157 - v154;
-    const V v162 = v65 * v151;
-    const V v163 = v58 + v162;
-    const V v164 = v65 * v152;
-    const V v165 = v164 - v59;
-    const V v166 = v74 * v151;
-    const V v167 = v60 + v166;
-    const V v168 = v74 * v152;
-    const V v169 = v61 + v168;
-    const V v170 = v66 * v152;
-    const V v171 = v59 + v170;
-    const V v172 = v66 * v151;
-    const V v173 = v172 - v58;
-    const V v174 = v70 * v151;
-    const V v175 = v56 + v174;
-    const V v176 = v70 * v152;
-    const V v177 = v57 + v176;
-    const V v178 = d2 * v165;
-    const V v179 = d3 * v165;
-    const V v180 = 1.0 + v179;
-    const V v181 = d7 * v173;
-    const V v182 = d7 * v171;
-    const V v183 = v182 + v180;
-    const V v184 = d7 * v161;
-    const V v185 = 1.0 + v184;
-    const V v186 = d6 * v171;
-    const V v187 = v178 + v186;
-    const V v188 = d6 * v173;
-    const V v189 = 1.0 + v188;
-    const V v190 = d2 * v163;
-    const V v191 = v190 + v189;
-    const V v192 = d3 * v163;
-    const V v193 = v192 + v181;
-    const V v194 = d3 * v158;
-    const V v195 = v194 + v185;
-    const V v196 = d0 * v175;
-    const V v197 = v196 + v191;
-    const V v198 = d0 * v177;
-    const V v199 = v198 + v187;
-    const V v200 = d1 * v175;
-    const V v201 = v200 + v193;
-    const V v202 = d1 * v177;
-    const V v203 = v202 + v183;
-    const V v204 = d1 * v159;
-    const V v205 = v204 + v195;
-    const V v206 = d4 * v167;
-    const V v207 = v206 + v197;
-    const V v208 = d4 * v169;
-    const V v209 = v208 + v199;
-    const V v210 = d5 * v167;
-    const V v211 = v210 + v201;
-    const V v212 = d5 * v169;
-    const V v213 = v212 + v203;
-    const V v214 = d5 * v160;
-    const V v215 = v214 + v205;
-    const V v216 = v207 * v213;
-    const V v217 = v215 * v215;
-    const V v218 = v209 * v211;
-    const V v219 = v216 - v218;
-    const V v220 = v217 * v219;
-    const V v221 = v219 * v220;
-    const V v222 = softehl_vlog(v221);
-    const V v223 = v221 - v222;
-    const V v224 = 0.5 * v223;
-    const V v225 = (-0.5) + v224;
-    const V v226 = v148 * v225;
-    V s227 = softehl_splat(0.0);
+    const V v102 = 1.0 / s45, v103 = s46 * v102, v104 = v102 * s47, v105 = v102 * s48,
+        v106 = v102 * s49, v107 = s42 * v102, v108 = s43 * v102, v109 = s44 * v102,
+        v110 = v107 - v109, v111 = v107 + v109, v112 = v33 + v38 * v105, v113 = v38 * v106 - v34,
+        v114 = v35 + v41 * v105, v115 = v36 + v41 * v106, v116 = v34 + v39 * v106,
+        v117 = v39 * v105 - v33, v118 = v31 + v40 * v105, v119 = v32 + v40 * v106,
+        v120 = d1 * (v110 - v108) + (d3 * (v108 + v110) + (1.0 + d7 * (v111 - v108))),
+        v121 = d5 * (v108 + v111) + v120,
+        v122 = (d4 * v114 + (d0 * v118 + (d2 * v112 + (1.0 + d6 * v117)))) * (d5 * v115 + (d1 * v119 + (d7 * v116 + (1.0 + d3 * v113)))),
+        v123 = (d4 * v115 + (d0 * v119 + (d2 * v113 + d6 * v116))) * (d5 * v114 + (d1 * v118 + (d3 * v112 + d7 * v117))),
+        v124 = v122 - v123, v125 = v124 * (v121 * v121 * v124), v126 = softehl_vlog(v125),
+        v127 = v1 * s45 * ((-0.5) + 0.5 * (v125 - v126));
+    V s128 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v228 = parameters[0] * w[2];
-        const double v229 = 1.0 - w[0];
-        const double v230 = 1.0 + w[0];
-        const double v231 = 0.25 * w[0];
-        const double v232 = 0.25 + v231;
-        const double v233 = 0.25 - v231;
-        const V v234 = w[0] - v149;
-        const V v235 = X5 * v230;
-        const V v236 = X3 * v230;
-        const double v237 = v231 - 0.25;
-        const V v238 = v38 * v234;
-        const V v239 = X6 * v233;
-        const V v240 = X7 * v233;
-        const V v241 = X7 * v229;
-        const V v242 = v235 + v241;
-        const V v243 = X1 * v229;
-        const V v244 = v243 + v236;
-        const V v245 = v22 * v234;
-        const V v246 = 0.25 * v244;
-        const V v247 = X1 * v237;
-        const V v248 = v240 + v247;
-        const V v249 = X0 * v237;
-        const V v250 = v239 + v249;
-        const V v251 = v54 * v234;
-        const V v252 = v154 + v251;
-        const double v253 = 0.25 * w[1];
-        const double v254 = 1.0 - w[1];
-        const double v255 = 1.0 + w[1];
-        const V v256 = v254 * v246;
-        const V v257 = v232 * v8;
-        const V v258 = v257 + v250;
-        const V v259 = v232 * v30;
-        const V v260 = v259 + v248;
-        const double v261 = 0.25 * v255;
-        const V v262 = w[1] - v150;
-        const V v263 = v261 * v242;
-        const V v264 = v263 + v256;
-        const V v265 = v54 * v262;
-        const V v266 = v155 + v265;
-        const double v267 = v253 - 0.25;
-        const V v268 = v18 * v262;
-        const V v269 = v245 - v268;
-        const V v270 = v40 * v262;
-        const V v271 = X0 * v267;
-        const V v272 = X1 * v267;
-        const double v273 = 0.25 - v253;
-        const double v274 = 0.25 + v253;
-        const V v275 = v270 + v238;
-        const V v276 = X2 * v273;
-        const V v277 = v276 + v271;
-        const V v278 = X3 * v273;
-        const V v279 = v278 + v272;
-        const V v280 = v270 - v238;
-        const V v281 = v55 * v275;
-        const V v282 = v153 - v281;
-        const V v283 = v52 * v269;
-        const V v284 = v152 + v283;
-        const V v285 = v52 * v280;
-        const V v286 = v151 + v285;
-        const V v287 = v274 * v11;
-        const V v288 = v287 + v277;
-        const V v289 = v274 * v31;
-        const V v290 = v289 + v279;
-        const V v291 = v288 * v260;
-        const V v292 = v266 - v282;
-        const V v293 = v266 + v282;
-        const V v294 = v258 * v290;
-        const V v295 = v291 - v294;
-        const V v296 = v264 * v295;
-        const V v297 = v65 * v284;
-        const V v298 = v65 * v286;
-        const V v299 = v58 + v298;
-        const V v300 = v297 - v59;
-        const V v301 = v252 + v292;
-        const V v302 = v252 - v292;
-        const V v303 = v252 + v293;
-        const V v304 = v66 * v284;
-        const V v305 = v59 + v304;
-        const V v306 = v66 * v286;
-        const V v307 = v293 - v252;
-        const V v308 = v306 - v58;
-        const V v309 = v228 * v296;
-        const V v310 = d2 * v300;
-        const V v311 = d2 * v299;
-        const V v312 = 1.0 + v311;
-        const V v313 = d3 * v299;
-        const V v314 = d3 * v300;
-        const V v315 = 1.0 + v314;
-        const V v316 = d3 * v302;
-        const V v317 = 1.0 + v316;
-        const V v318 = v70 * v286;
-        const V v319 = v56 + v318;
-        const V v320 = v70 * v284;
-        const V v321 = v57 + v320;
-        const V v322 = v74 * v286;
-        const V v323 = v60 + v322;
-        const V v324 = v74 * v284;
-        const V v325 = v61 + v324;
-        const V v326 = d1 * v301;
-        const V v327 = v317 - v326;
-        const V v328 = d1 * v319;
-        const V v329 = v328 + v313;
-        const V v330 = d1 * v321;
-        const V v331 = v330 + v315;
-        const V v332 = d0 * v319;
-        const V v333 = v332 + v312;
-        const V v334 = d0 * v321;
-        const V v335 = v334 + v310;
-        const V v336 = d5 * v303;
-        const V v337 = v336 + v327;
-        const V v338 = d7 * v307;
-        const V v339 = v338 + v337;
-        const V v340 = v339 * v339;
-        const V v341 = d5 * v323;
-        const V v342 = v341 + v329;
-        const V v343 = d5 * v325;
-        const V v344 = v343 + v331;
-        const V v345 = d4 * v323;
-        const V v346 = v345 + v333;
-        const V v347 = d4 * v325;
-        const V v348 = v347 + v335;
-        const V v349 = d7 * v308;
-        const V v350 = v349 + v342;
-        const V v351 = d7 * v305;
-        const V v352 = v351 + v344;
-        const V v353 = d6 * v308;
-        const V v354 = v353 + v346;
-        const V v355 = d6 * v305;
-        const V v356 = v355 + v348;
-        const V v357 = v350 * v350;
-        const V v358 = v352 * v354;
-        const V v359 = v354 * v354;
-        const V v360 = v357 + v359;
-        const V v361 = v356 * v350;
-        const V v362 = v358 - v361;
-        const V v363 = v356 * v356;
-        const V v364 = v363 + v360;
-        const V v365 = v352 * v352;
-        const V v366 = v364 + v365;
-        const V v367 = v340 + v366;
-        const V v368 = v362 * v362;
-        const V v369 = v340 * v368;
-        const V v370 = v367 * v367;
-        const V v371 = 0.010476190476190476 * v367;
-        const V v372 = v370 * v371;
-        const V v373 = v370 * v370;
-        const V v374 = 0.05 * v370;
-        const V v375 = softehl_vrcbrt(v369);
-        const V v376 = 1.0 / v369;
-        const V v377 = v372 * v376;
-        const V v378 = (-0.28285714285714286) + v377;
-        const V v379 = v375 * v375;
-        const V v380 = v379 * v379;
-        const V v381 = v374 * v379;
-        const V v382 = (-0.45) + v381;
-        const V v383 = 0.0027142857142857142 * v373;
-        const V v384 = 0.0007703153988868275 * v375;
-        const V v385 = 0.5 * v375;
-        const V v386 = v367 * v384;
-        const V v387 = v373 * v386;
-        const V v388 = v367 * v385;
-        const V v389 = (-1.5) + v388;
-        const V v390 = v14 * v378;
-        const V v391 = v389 + v390;
-        const V v392 = v6 * v382;
-        const V v393 = v391 + v392;
-        const V v394 = v380 * v387;
-        const V v395 = (-0.18718664192949908) + v394;
-        const V v396 = v380 * v383;
-        const V v397 = (-0.21985714285714286) + v396;
-        const V v398 = v15 * v395;
-        const V v399 = v393 + v398;
-        const V v400 = v16 * v397;
-        const V v401 = v399 + v400;
-        const V v402 = v309 * v401;
-        s227 += v402;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v129 = 1.0 - w[0], v130 = 1.0 + w[0], v131 = 0.25 * w[0], v132 = 0.25 + v131,
+            v133 = 0.25 - v131;
+        const V v134 = w[0] - v103, v135 = X5 * v130, v136 = X3 * v130;
+        const double v137 = v131 - 0.25;
+        const V v138 = v25 * v134, v139 = X6 * v133, v140 = X7 * v133, v141 = X7 * v129,
+            v142 = v135 + v141, v143 = X1 * v129, v144 = v143 + v136, v145 = 0.25 * v144,
+            v146 = X1 * v137, v147 = v140 + v146, v148 = X0 * v137, v149 = v139 + v148,
+            v150 = v108 + v29 * v134;
+        const double v151 = 0.25 * w[1], v152 = 1.0 - w[1], v153 = 1.0 + w[1];
+        const V v154 = v152 * v145, v155 = v132 * v7, v156 = v155 + v149, v157 = v132 * v19,
+            v158 = v157 + v147;
+        const double v159 = 0.25 * v153;
+        const V v160 = w[1] - v104, v161 = v159 * v142, v162 = v161 + v154,
+            v163 = v109 + v29 * v160;
+        const double v164 = v151 - 0.25;
+        const V v165 = v27 * v160, v166 = X0 * v164, v167 = X1 * v164;
+        const double v168 = 0.25 - v151, v169 = 0.25 + v151;
+        const V v170 = X2 * v168, v171 = v170 + v166, v172 = X3 * v168, v173 = v172 + v167,
+            v174 = v107 - v30 * (v165 + v138), v175 = v106 + v28 * (v16 * v134 - v13 * v160),
+            v176 = v105 + v28 * (v165 - v138), v177 = v169 * v8, v178 = v177 + v171,
+            v179 = v169 * v20, v180 = v179 + v173, v181 = v178 * v158, v182 = v163 - v174,
+            v183 = v163 + v174, v184 = v156 * v180, v185 = v181 - v184, v186 = v162 * v185,
+            v187 = v33 + v38 * v176, v188 = v38 * v175 - v34, v189 = v34 + v39 * v175,
+            v190 = v39 * v176 - v33, v191 = v31 + v40 * v176, v192 = v32 + v40 * v175,
+            v193 = v35 + v41 * v176, v194 = v36 + v41 * v175,
+            v195 = d5 * (v150 + v183) + (1.0 + d3 * (v150 - v182) - d1 * (v150 + v182)),
+            v196 = d7 * (v183 - v150) + v195, v197 = v196 * v196,
+            v198 = d7 * v190 + (d5 * v193 + (d1 * v191 + d3 * v187)),
+            v199 = d7 * v189 + (d5 * v194 + (d1 * v192 + (1.0 + d3 * v188))),
+            v200 = d6 * v190 + (d4 * v193 + (d0 * v191 + (1.0 + d2 * v187))),
+            v201 = d6 * v189 + (d4 * v194 + (d0 * v192 + d2 * v188)),
+            v202 = v199 * v200 - v201 * v198,
+            v203 = v197 + (v201 * v201 + (v198 * v198 + v200 * v200) + v199 * v199),
+            v204 = v197 * (v202 * v202), v205 = v203 * v203, v206 = v205 * v205,
+            v207 = softehl_vrcbrt(v204),
+            v208 = (-0.28285714285714286) + v205 * (0.010476190476190476 * v203) * (1.0 / v204),
+            v209 = v207 * v207, v210 = v209 * v209,
+            v211 = (-1.5) + v203 * (0.5 * v207) + v10 * v208 + v5 * ((-0.45) + 0.05 * v205 * v209),
+            v212 = (-0.18718664192949908) + v210 * (v206 * (v203 * (0.0007703153988868275 * v207))),
+            v213 = v12 * ((-0.21985714285714286) + v210 * (0.0027142857142857142 * v206)),
+            v214 = parameters[0] * w[2] * v186 * (v211 + v11 * v212 + v213);
+        s128 += v214;
     }
-    const V v403 = v226 + s227;
-    const V v404 = 6.283185307179586 * v403;
-    softehl_store1(R + 0, 1, v404);
+    softehl_store1(R + 0, 1, 6.283185307179586 * (v127 + s128));
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_arruda_boyce_energy, 8, 8, 0, 0, 1, 0)
 
-void softehl_solid_taylor_mean_arruda_boyce_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_arruda_boyce_residual)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_arruda_boyce_energy_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 1 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_arruda_boyce_energy_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 1 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 1];
-    softehl_solid_taylor_mean_arruda_boyce_energy(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 1 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_solid_taylor_mean_arruda_boyce_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 1.5707963267948966 * parameters[2];
-    const double v2 = 6.283185307179586 * parameters[0];
-    const double v3 = parameters[1] * parameters[1];
-    const double v4 = parameters[1] * v3;
-    const V v5 = X4 - X0;
-    const V v6 = X0 - X2;
-    const double v7 = v3 * v3;
-    const double v8 = 1.0 / v3;
-    const V v9 = X4 - X2;
-    const V v10 = v5 - X2;
-    const V v11 = X4 - X6;
-    const V v12 = X6 + v10;
-    const double v13 = v4 * v4;
-    const double v14 = v7 * v7;
-    const double v15 = 1.0 / v7;
-    const V v16 = v6 + v11;
-    const V v17 = 0.25 * v12;
-    const V v18 = 0.0625 * v12;
-    const double v19 = 1.0 / v14;
-    const double v20 = 1.0 / v13;
-    const V v21 = v11 - v6;
-    const V v22 = 0.25 * v21;
-    const V v23 = 0.0625 * v21;
-    const V v24 = X1 - X3;
-    const V v25 = X1 + X3;
-    const V v26 = X5 - X3;
-    const V v27 = X5 - X7;
-    const V v28 = X5 + X7;
-    const V v29 = v24 + v27;
-    const V v30 = v25 + v28;
-    const V v31 = v27 - v24;
-    const V v32 = d0 - d2;
-    const V v33 = d0 + d2;
-    const V v34 = v28 - v25;
-    const V v35 = 0.25 * v30;
-    const V v36 = 0.25 * v31;
-    const V v37 = 0.0625 * v31;
-    const V v38 = 0.25 * v34;
-    const V v39 = 0.0625 * v34;
-    const V v40 = v22 * v38;
-    const V v41 = 1.0 / v35;
-    const V v42 = v35 * v35;
-    const V v43 = d1 + d3;
-    const V v44 = d1 - d3;
-    const V v45 = 1.0 / v42;
-    const V v46 = v33 - d4;
-    const V v47 = v36 * v17;
-    const V v48 = v40 - v47;
-    const V v49 = 1.0 / v48;
-    const V v50 = v46 - d6;
-    const V v51 = d4 - d6;
-    const V v52 = d5 + d7;
-    const V v53 = d5 - d7;
-    const V v54 = v32 - v51;
-    const V v55 = v32 + v51;
-    const V v56 = 0.25 * v41;
-    const V v57 = v43 - v52;
-    const V v58 = v43 + v52;
-    const V v59 = v44 - v53;
-    const V v60 = v44 + v53;
-    const V v61 = v16 * v37;
-    const V v62 = v16 * v39;
-    const V v63 = 0.25 * v45;
-    const V v64 = v37 * v49;
-    const V v65 = v39 * v49;
-    const V v66 = v49 * v61;
-    const V v67 = v49 * v62;
-    const V v68 = v29 * v49;
-    const V v69 = 0.25 * v67;
-    const V v70 = v49 * v18;
-    const V v71 = v23 * v49;
-    const V v72 = v18 * v68;
-    const V v73 = v23 * v68;
-    const V v74 = 0.25 * v72;
-    const V v75 = v69 - v74;
-    const V v76 = 0.25 * v73;
-    const V v77 = 0.25 * v66;
-    const V v78 = v76 - v77;
-    const V v79 = v57 * v64;
-    const V v80 = v57 * v71;
-    const V v81 = 1.0 - v80;
-    const V v82 = v54 * v70;
-    const V v83 = v54 * v65;
-    const V v84 = 1.0 - v83;
-    const V v85 = v59 * v65;
-    const V v86 = v79 - v85;
-    const V v87 = v59 * v70;
-    const V v88 = v81 + v87;
-    const V v89 = v50 * v64;
-    const V v90 = v84 + v89;
-    const V v91 = v50 * v71;
-    const V v92 = v82 - v91;
-    V s93 = softehl_splat(0.0);
-    V s94 = softehl_splat(0.0);
-    V s95 = softehl_splat(0.0);
-    V s96 = softehl_splat(0.0);
-    V s97 = softehl_splat(0.0);
-    V s98 = softehl_splat(0.0);
-    V s99 = softehl_splat(0.0);
-    V s100 = softehl_splat(0.0);
-    for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v101 = 1.0 - w[1];
-        const double v102 = 1.0 + w[1];
-        const double v103 = 0.25 * w[1];
-        const double v104 = 1.0 - w[0];
-        const double v105 = 1.0 + w[0];
-        const double v106 = 0.25 * w[0];
-        const double v107 = 0.25 * v102;
-        const double v108 = 0.25 - v103;
-        const double v109 = 0.25 + v103;
-        const double v110 = 0.25 + v106;
-        const double v111 = 0.25 - v106;
-        const V v112 = X5 * v105;
-        const double v113 = v103 - 0.25;
-        const V v114 = X3 * v105;
-        const V v115 = X3 * v108;
-        const V v116 = X2 * v108;
-        const double v117 = v106 - 0.25;
-        const V v118 = X6 * v111;
-        const V v119 = X7 * v111;
-        const V v120 = X7 * v104;
-        const V v121 = v112 + v120;
-        const V v122 = X1 * v104;
-        const V v123 = v122 + v114;
-        const V v124 = v107 * v121;
-        const V v125 = X1 * v113;
-        const V v126 = v115 + v125;
-        const V v127 = X1 * v117;
-        const V v128 = v119 + v127;
-        const V v129 = X0 * v113;
-        const V v130 = v116 + v129;
-        const V v131 = X0 * v117;
-        const V v132 = v118 + v131;
-        const V v133 = 0.25 * v123;
-        const V v134 = v101 * v133;
-        const V v135 = v124 + v134;
-        const V v136 = v109 * v27;
-        const V v137 = v136 + v126;
-        const V v138 = v109 * v11;
-        const V v139 = v138 + v130;
-        const V v140 = v110 * v26;
-        const V v141 = v140 + v128;
-        const V v142 = v110 * v9;
-        const V v143 = v142 + v132;
-        const double v144 = w[1] * w[2];
-        const V v145 = w[0] * v139;
-        const V v146 = v139 * v141;
-        const V v147 = w[1] * v141;
-        const V v148 = w[1] * v143;
-        const V v149 = v145 - v148;
-        const V v150 = v143 * v137;
-        const V v151 = v146 - v150;
-        const V v152 = w[0] * v137;
-        const V v153 = v147 - v152;
-        const V v154 = w[2] * v135;
-        const V v155 = v135 * v151;
-        const V v156 = 0.25 * v151;
-        const V v157 = v154 * v153;
-        s99 += v157;
-        const V v158 = v154 * v149;
-        s100 += v158;
-        const V v159 = w[2] * v156;
-        s93 += v159;
-        const V v160 = v144 * v156;
-        s95 += v160;
-        const V v161 = w[2] * v155;
-        s96 += v161;
-        const V v162 = v144 * v155;
-        s98 += v162;
-        const V v163 = w[0] * v159;
-        s94 += v163;
-        const V v164 = w[0] * v161;
-        s97 += v164;
-    }
-    const V v165 = 1.0 / s96;
-    const V v166 = s96 * v1;
-    const V v167 = s97 * v165;
-    const V v168 = v165 * s98;
-    const V v169 = v165 * s99;
-    const V v170 = 0.25 * v169;
-    const V v171 = v165 * s100;
-    const V v172 = 0.25 * v171;
-    const V v173 = s93 * v165;
-    const V v174 = s94 * v165;
-    const V v175 = s95 * v165;
-    const V v176 = v173 * v58;
-    const V v177 = 1.0 + v176;
-    const V v178 = v72 * v170;
-    const V v179 = v72 * v172;
-    const V v180 = v73 * v170;
-    const V v181 = v73 * v172;
-    const V v182 = v66 * v170;
-    const V v183 = v66 * v172;
-    const V v184 = v180 - v182;
-    const V v185 = v182 - v180;
-    const V v186 = v181 - v183;
-    const V v187 = v183 - v181;
-    const V v188 = v67 * v170;
-    const V v189 = v67 * v172;
-    const V v190 = v178 - v188;
-    const V v191 = v188 - v178;
-    const V v192 = v179 - v189;
-    const V v193 = v189 - v179;
-    const V v194 = v175 * v57;
-    const V v195 = v177 - v194;
-    const V v196 = v174 * v59;
-    const V v197 = v195 - v196;
-    const V v198 = 2.0 * v197;
-    const V v199 = v197 * v197;
-    const V v200 = v55 * v170;
-    const V v201 = v90 + v200;
-    const V v202 = v55 * v172;
-    const V v203 = v92 + v202;
-    const V v204 = v60 * v170;
-    const V v205 = v86 + v204;
-    const V v206 = v60 * v172;
-    const V v207 = v88 + v206;
-    const V v208 = v59 * v191;
-    const V v209 = v208 + v205;
-    const V v210 = v59 * v193;
-    const V v211 = v210 + v207;
-    const V v212 = v57 * v184;
-    const V v213 = v212 + v209;
-    const V v214 = v57 * v186;
-    const V v215 = v214 + v211;
-    const V v216 = v50 * v184;
-    const V v217 = v216 + v201;
-    const V v218 = v50 * v186;
-    const V v219 = v218 + v203;
-    const V v220 = v54 * v191;
-    const V v221 = v220 + v217;
-    const V v222 = v54 * v193;
-    const V v223 = v222 + v219;
-    const V v224 = v221 * v215;
-    const V v225 = v223 * v213;
-    const V v226 = v224 - v225;
-    const V v227 = 2.0 * v226;
-    const V v228 = v226 * v226;
-    const V v229 = v199 * v227;
-    const V v230 = v199 * v228;
-    const V v231 = v198 * v228;
-    const V v232 = 1.0 / v230;
-    const V v233 = 1.0 - v232;
-    const V v234 = v166 * v233;
-    const V v235 = v229 * v234;
-    const V v236 = v231 * v234;
-    const V v237 = v213 * v235;
-    const V v238 = v223 * v235;
-    const V v239 = v215 * v235;
-    const V v240 = v221 * v235;
-    const V v241 = v174 * v236;
-    const V v242 = v175 * v236;
-    const V v243 = v173 * v236;
-    const V v244 = v186 * v240;
-    const V v245 = v193 * v240;
-    const V v246 = v172 * v240;
-    const V v247 = v172 * v237;
-    const V v248 = v184 * v239;
-    const V v249 = v191 * v239;
-    const V v250 = v170 * v239;
-    const V v251 = v170 * v238;
-    const V v252 = v185 * v238;
-    const V v253 = v244 + v252;
-    const V v254 = v190 * v238;
-    const V v255 = v245 + v254;
-    const V v256 = v187 * v237;
-    const V v257 = v248 + v256;
-    const V v258 = v192 * v237;
-    const V v259 = v249 + v258;
-    V s260 = softehl_splat(0.0);
-    V s261 = softehl_splat(0.0);
-    V s262 = softehl_splat(0.0);
-    V s263 = softehl_splat(0.0);
-    V s264 = softehl_splat(0.0);
-    V s265 = softehl_splat(0.0);
-    V s266 = softehl_splat(0.0);
-    V s267 = softehl_splat(0.0);
-    V s268 = softehl_splat(0.0);
-    V s269 = softehl_splat(0.0);
-    V s270 = softehl_splat(0.0);
-    for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v271 = 1.0 - w[0];
-        const double v272 = 1.0 + w[0];
-        const double v273 = 0.25 * w[0];
-        const double v274 = 1.0 - w[1];
-        const double v275 = 1.0 + w[1];
-        const double v276 = 0.25 * w[1];
-        const double v277 = 0.25 + v273;
-        const double v278 = 0.25 - v273;
-        const double v279 = 0.25 * v275;
-        const V v280 = w[0] - v167;
-        const double v281 = 0.25 - v276;
-        const double v282 = 0.25 + v276;
-        const V v283 = w[1] - v168;
-        const double v284 = v273 - 0.25;
-        const V v285 = X6 * v278;
-        const V v286 = X7 * v278;
-        const V v287 = X7 * v271;
-        const double v288 = v276 - 0.25;
-        const V v289 = v36 * v280;
-        const V v290 = X2 * v281;
-        const V v291 = v38 * v283;
-        const V v292 = X3 * v281;
-        const V v293 = v277 * v9;
-        const V v294 = v285 + v293;
-        const V v295 = v277 * v26;
-        const V v296 = v286 + v295;
-        const V v297 = X1 * v271;
-        const V v298 = v282 * v11;
-        const V v299 = v290 + v298;
-        const V v300 = v282 * v27;
-        const V v301 = v292 + v300;
-        const V v302 = X3 * v272;
-        const V v303 = v297 + v302;
-        const V v304 = X5 * v272;
-        const V v305 = v304 + v287;
-        const V v306 = X1 * v288;
-        const V v307 = v306 + v301;
-        const V v308 = X0 * v288;
-        const V v309 = v308 + v299;
-        const V v310 = X0 * v284;
-        const V v311 = v310 + v294;
-        const V v312 = X1 * v284;
-        const V v313 = v312 + v296;
-        const V v314 = 0.25 * v303;
-        const V v315 = v279 * v305;
-        const V v316 = v309 * v313;
-        const V v317 = v274 * v314;
-        const V v318 = v315 + v317;
-        const V v319 = v307 * v311;
-        const V v320 = v316 - v319;
-        const V v321 = v22 * v280;
-        const V v322 = v56 * v280;
-        const V v323 = v174 + v322;
-        const V v324 = v56 * v283;
-        const V v325 = v175 + v324;
-        const V v326 = v318 * v320;
-        const V v327 = v17 * v283;
-        const V v328 = v321 - v327;
-        const V v329 = v291 - v289;
-        const V v330 = v291 + v289;
-        const double v331 = w[2] * v2;
-        const V v332 = v63 * v330;
-        const V v333 = v173 - v332;
-        const V v334 = v49 * v328;
-        const V v335 = v171 + v334;
-        const V v336 = v49 * v329;
-        const V v337 = v169 + v336;
-        const V v338 = v331 * v326;
-        const V v339 = 0.25 * v335;
-        const V v340 = 0.25 * v337;
-        const V v341 = v335 * v78;
-        const V v342 = v337 * v78;
-        const V v343 = v335 * v75;
-        const V v344 = v337 * v75;
-        const V v345 = v8 * v338;
-        const V v346 = v15 * v338;
-        const V v347 = v20 * v338;
-        const V v348 = v19 * v338;
-        const V v349 = 0.5 * v338;
-        const V v350 = 0.16666666666666666 * v338;
-        const V v351 = v55 * v339;
-        const V v352 = v92 + v351;
-        const V v353 = v55 * v340;
-        const V v354 = v90 + v353;
-        const V v355 = v60 * v340;
-        const V v356 = v86 + v355;
-        const V v357 = v60 * v339;
-        const V v358 = v88 + v357;
-        const V v359 = 0.03333333333333333 * v345;
-        const V v360 = 0.1 * v345;
-        const V v361 = 0.010476190476190476 * v346;
-        const V v362 = 0.03142857142857143 * v346;
-        const V v363 = 0.003619047619047619 * v347;
-        const V v364 = 0.010857142857142857 * v347;
-        const V v365 = 0.0012838589981447124 * v348;
-        const V v366 = 0.0038515769944341373 * v348;
-        const V v367 = v50 * v342;
-        const V v368 = v367 + v354;
-        const V v369 = v50 * v341;
-        const V v370 = v369 + v352;
-        const V v371 = v57 * v342;
-        const V v372 = v371 + v356;
-        const V v373 = v57 * v341;
-        const V v374 = v373 + v358;
-        const V v375 = v325 * v57;
-        const V v376 = 1.0 - v375;
-        const V v377 = v54 * v344;
-        const V v378 = v377 + v368;
-        const V v379 = v54 * v343;
-        const V v380 = v379 + v370;
-        const V v381 = v59 * v344;
-        const V v382 = v381 + v372;
-        const V v383 = v59 * v343;
-        const V v384 = v383 + v374;
-        const V v385 = v323 * v59;
-        const V v386 = v376 - v385;
-        const V v387 = 2.0 * v378;
-        const V v388 = 2.0 * v380;
-        const V v389 = v378 * v378;
-        const V v390 = 2.0 * v382;
-        const V v391 = 2.0 * v384;
-        const V v392 = v378 * v384;
-        const V v393 = v333 * v58;
-        const V v394 = v393 + v386;
-        const V v395 = v380 * v380;
-        const V v396 = v389 + v395;
-        const V v397 = v380 * v382;
-        const V v398 = v392 - v397;
-        const V v399 = v394 * v394;
-        const V v400 = 2.0 * v394;
-        const V v401 = v382 * v382;
-        const V v402 = v401 + v396;
-        const V v403 = 2.0 * v398;
-        const V v404 = v398 * v398;
-        const V v405 = v384 * v384;
-        const V v406 = v405 + v402;
-        const V v407 = v399 + v406;
-        const V v408 = v403 * v399;
-        const V v409 = v404 * v399;
-        const V v410 = softehl_vrcbrt(v409);
-        const V v411 = 1.0 / v409;
-        const V v412 = v407 * v407;
-        const V v413 = v360 * v407;
-        const V v414 = v412 * v412;
-        const V v415 = v410 * v410;
-        const V v416 = v413 * v415;
-        const V v417 = v415 * v415;
-        const V v418 = v410 * v415;
-        const V v419 = v407 * v412;
-        const V v420 = v359 * v412;
-        const V v421 = v362 * v412;
-        const V v422 = v411 * v421;
-        const V v423 = v416 + v422;
-        const V v424 = v410 * v417;
-        const V v425 = v420 * v424;
-        const V v426 = v349 * v410;
-        const V v427 = v423 + v426;
-        const V v428 = v363 * v410;
-        const V v429 = v414 * v428;
-        const V v430 = v418 * v429;
-        const V v431 = v418 * v430;
-        const V v432 = v425 + v431;
-        const V v433 = v361 * v419;
-        const V v434 = v366 * v414;
-        const V v435 = v365 * v414;
-        const V v436 = v424 * v434;
-        const V v437 = v427 + v436;
-        const V v438 = v411 * v433;
-        const V v439 = v411 * v438;
-        const V v440 = v432 + v439;
-        const V v441 = v364 * v417;
-        const V v442 = v419 * v441;
-        const V v443 = v437 + v442;
-        const V v444 = v417 * v435;
-        const V v445 = v350 + v444;
-        const V v446 = v417 * v445;
-        const V v447 = v407 * v446;
-        const V v448 = v440 + v447;
-        const V v449 = v408 * v448;
-        const V v450 = v382 * v449;
-        const V v451 = v388 * v443;
-        const V v452 = v450 + v451;
-        s263 += v452;
-        const V v453 = v404 * v448;
-        const V v454 = v443 - v453;
-        const V v455 = v400 * v454;
-        const V v456 = v333 * v455;
-        s260 += v456;
-        const V v457 = v391 * v443;
-        const V v458 = v378 * v449;
-        const V v459 = v457 - v458;
-        s261 += v459;
-        const V v460 = v390 * v443;
-        const V v461 = v387 * v443;
-        const V v462 = v384 * v449;
-        const V v463 = v461 - v462;
-        s264 += v463;
-        const V v464 = v380 * v449;
-        const V v465 = v460 + v464;
-        s262 += v465;
-        const V v466 = v341 * v459;
-        const V v467 = v341 * v452;
-        const V v468 = v325 * v455;
-        s267 += v466;
-        s267 -= v468;
-        const V v469 = v342 * v465;
-        s267 += v469;
-        const V v470 = v342 * v463;
-        s270 += v467;
-        s270 += v470;
-        const V v471 = v343 * v459;
-        const V v472 = v323 * v455;
-        s266 += v471;
-        s266 -= v472;
-        const V v473 = v343 * v452;
-        const V v474 = v339 * v459;
-        const V v475 = v339 * v452;
-        const V v476 = v344 * v465;
-        s266 += v476;
-        const V v477 = v344 * v463;
-        s269 += v473;
-        s269 += v477;
-        const V v478 = v340 * v465;
-        s265 += v474;
-        s265 += v478;
-        const V v479 = v340 * v463;
-        s268 += v475;
-        s268 += v479;
-    }
-    const V v480 = v239 + s264;
-    const V v481 = v240 + s261;
-    const V v482 = v243 + s260;
-    const V v483 = s262 - v238;
-    const V v484 = v246 - v251;
-    const V v485 = v250 + s268;
-    const V v486 = s263 - v237;
-    const V v487 = s265 + v484;
-    const V v488 = s266 - v241;
-    const V v489 = s267 - v242;
-    const V v490 = v482 - v487;
-    const V v491 = v482 + v487;
-    const V v492 = v255 + v488;
-    const V v493 = s269 + v259;
-    const V v494 = v253 + v489;
-    const V v495 = s270 + v257;
-    const V v496 = v485 - v247;
-    const V v497 = v247 - v485;
-    const V v498 = v71 * v481;
-    const V v499 = v494 - v498;
-    const V v500 = v71 * v486;
-    const V v501 = v495 - v500;
-    const V v502 = v70 * v481;
-    const V v503 = v502 + v492;
-    const V v504 = v70 * v486;
-    const V v505 = v504 + v493;
-    const V v506 = v64 * v483;
-    const V v507 = v506 + v499;
-    const V v508 = v64 * v480;
-    const V v509 = v508 + v501;
-    const V v510 = v65 * v483;
-    const V v511 = v503 - v510;
-    const V v512 = v65 * v480;
-    const V v513 = v505 - v512;
-    const V v514 = v507 + v511;
-    const V v515 = v509 + v513;
-    const V v516 = v511 - v507;
-    const V v517 = v513 - v509;
-    const V v518 = v490 - v516;
-    const V v519 = v490 + v516;
-    const V v520 = v491 + v514;
-    const V v521 = v491 - v514;
-    const V v522 = v497 - v517;
-    const V v523 = v496 + v515;
-    softehl_store4(R + 0, 8, v523, v520, v522, v518);
-    const V v524 = v496 - v515;
-    const V v525 = v517 - v496;
-    softehl_store4(R + 4, 8, v524, v521, v525, v519);
-}
-
-void softehl_solid_taylor_mean_arruda_boyce_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_arruda_boyce_residual_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_arruda_boyce_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_taylor_mean_arruda_boyce_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_solid_taylor_mean_arruda_boyce_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 1.5707963267948966 * parameters[2];
-    const double v2 = 6.283185307179586 * parameters[0];
-    const double v3 = parameters[1] * parameters[1];
-    const double v4 = parameters[1] * v3;
-    const V v5 = X4 - X0;
-    const V v6 = X0 - X2;
-    const double v7 = v3 * v3;
-    const double v8 = 1.0 / v3;
-    const V v9 = X4 - X2;
-    const V v10 = v5 - X2;
-    const V v11 = X4 - X6;
-    const V v12 = X6 + v10;
-    const double v13 = v4 * v4;
-    const double v14 = v7 * v7;
-    const double v15 = 1.0 / v7;
-    const V v16 = v6 + v11;
-    const V v17 = 0.25 * v12;
-    const V v18 = 0.0625 * v12;
-    const double v19 = 1.0 / v14;
-    const double v20 = 1.0 / v13;
-    const V v21 = v11 - v6;
-    const V v22 = 0.25 * v21;
-    const V v23 = 0.0625 * v21;
-    const V v24 = X1 - X3;
-    const V v25 = X1 + X3;
-    const V v26 = X5 - X3;
-    const V v27 = X5 - X7;
-    const V v28 = X5 + X7;
-    const V v29 = v24 + v27;
-    const V v30 = v25 + v28;
-    const V v31 = v27 - v24;
-    const V v32 = d0 - d2;
-    const V v33 = d0 + d2;
-    const V v34 = v28 - v25;
-    const V v35 = 0.25 * v30;
-    const V v36 = 0.25 * v31;
-    const V v37 = 0.0625 * v31;
-    const V v38 = 0.25 * v34;
-    const V v39 = 0.0625 * v34;
-    const V v40 = v22 * v38;
-    const V v41 = 1.0 / v35;
-    const V v42 = v35 * v35;
-    const V v43 = d1 + d3;
-    const V v44 = d1 - d3;
-    const V v45 = 1.0 / v42;
-    const V v46 = v33 - d4;
-    const V v47 = v36 * v17;
-    const V v48 = v40 - v47;
-    const V v49 = 1.0 / v48;
-    const V v50 = v46 - d6;
-    const V v51 = d4 - d6;
-    const V v52 = d5 + d7;
-    const V v53 = d5 - d7;
-    const V v54 = v32 - v51;
-    const V v55 = v32 + v51;
-    const V v56 = 0.25 * v41;
-    const V v57 = v43 - v52;
-    const V v58 = v43 + v52;
-    const V v59 = v44 - v53;
-    const V v60 = v44 + v53;
-    const V v61 = v16 * v37;
-    const V v62 = v16 * v39;
-    const V v63 = 0.25 * v45;
-    const V v64 = v37 * v49;
-    const V v65 = v39 * v49;
-    const V v66 = v49 * v61;
-    const V v67 = v49 * v62;
-    const V v68 = v29 * v49;
-    const V v69 = 0.25 * v67;
-    const V v70 = v49 * v18;
-    const V v71 = v23 * v49;
-    const V v72 = v18 * v68;
-    const V v73 = v23 * v68;
-    const V v74 = 0.25 * v72;
-    const V v75 = v69 - v74;
-    const V v76 = 0.25 * v73;
-    const V v77 = 0.25 * v66;
-    const V v78 = v76 - v77;
-    const V v79 = v57 * v64;
-    const V v80 = v57 * v71;
-    const V v81 = 1.0 - v80;
-    const V v82 = v54 * v70;
-    const V v83 = v54 * v65;
-    const V v84 = 1.0 - v83;
-    const V v85 = v59 * v65;
-    const V v86 = v79 - v85;
-    const V v87 = v59 * v70;
-    const V v88 = v81 + v87;
-    const V v89 = v50 * v64;
-    const V v90 = v84 + v89;
-    const V v91 = v50 * v71;
-    const V v92 = v82 - v91;
-    V s93 = softehl_splat(0.0);
-    V s94 = softehl_splat(0.0);
-    V s95 = softehl_splat(0.0);
-    V s96 = softehl_splat(0.0);
-    V s97 = softehl_splat(0.0);
-    V s98 = softehl_splat(0.0);
-    V s99 = softehl_splat(0.0);
-    V s100 = softehl_splat(0.0);
-    for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v101 = 1.0 - w[1];
-        const double v102 = 1.0 + w[1];
-        const double v103 = 0.25 * w[1];
-        const double v104 = 1.0 - w[0];
-        const double v105 = 1.0 + w[0];
-        const double v106 = 0.25 * w[0];
-        const double v107 = 0.25 * v102;
-        const double v108 = 0.25 - v103;
-        const double v109 = 0.25 + v103;
-        const double v110 = 0.25 + v106;
-        const double v111 = 0.25 - v106;
-        const V v112 = X5 * v105;
-        const double v113 = v103 - 0.25;
-        const V v114 = X3 * v105;
-        const V v115 = X3 * v108;
-        const V v116 = X2 * v108;
-        const double v117 = v106 - 0.25;
-        const V v118 = X6 * v111;
-        const V v119 = X7 * v111;
-        const V v120 = X7 * v104;
-        const V v121 = v112 + v120;
-        const V v122 = X1 * v104;
-        const V v123 = v122 + v114;
-        const V v124 = v107 * v121;
-        const V v125 = X1 * v113;
-        const V v126 = v115 + v125;
-        const V v127 = X1 * v117;
-        const V v128 = v119 + v127;
-        const V v129 = X0 * v113;
-        const V v130 = v116 + v129;
-        const V v131 = X0 * v117;
-        const V v132 = v118 + v131;
-        const V v133 = 0.25 * v123;
-        const V v134 = v101 * v133;
-        const V v135 = v124 + v134;
-        const V v136 = v109 * v27;
-        const V v137 = v136 + v126;
-        const V v138 = v109 * v11;
-        const V v139 = v138 + v130;
-        const V v140 = v110 * v26;
-        const V v141 = v140 + v128;
-        const V v142 = v110 * v9;
-        const V v143 = v142 + v132;
-        const double v144 = w[1] * w[2];
-        const V v145 = w[0] * v139;
-        const V v146 = v139 * v141;
-        const V v147 = w[1] * v141;
-        const V v148 = w[1] * v143;
-        const V v149 = v145 - v148;
-        const V v150 = v143 * v137;
-        const V v151 = v146 - v150;
-        const V v152 = w[0] * v137;
-        const V v153 = v147 - v152;
-        const V v154 = w[2] * v135;
-        const V v155 = v135 * v151;
-        const V v156 = 0.25 * v151;
-        const V v157 = v154 * v153;
-        s99 += v157;
-        const V v158 = v154 * v149;
-        s100 += v158;
-        const V v159 = w[2] * v156;
-        s93 += v159;
-        const V v160 = v144 * v156;
-        s95 += v160;
-        const V v161 = w[2] * v155;
-        s96 += v161;
-        const V v162 = v144 * v155;
-        s98 += v162;
-        const V v163 = w[0] * v159;
-        s94 += v163;
-        const V v164 = w[0] * v161;
-        s97 += v164;
-    }
-    const V v165 = 1.0 / s96;
-    const V v166 = s96 * v1;
-    const V v167 = s97 * v165;
-    const V v168 = v165 * s98;
-    const V v169 = v165 * s99;
-    const V v170 = 0.25 * v169;
-    const V v171 = v165 * s100;
-    const V v172 = 0.25 * v171;
-    const V v173 = s93 * v165;
-    const V v174 = s94 * v165;
-    const V v175 = s95 * v165;
-    const V v176 = 2.0 * v175;
-    const V v177 = 2.0 * v174;
-    const V v178 = 2.0 * v173;
-    const V v179 = v72 * v170;
-    const V v180 = v72 * v172;
-    const V v181 = v73 * v170;
-    const V v182 = v73 * v172;
-    const V v183 = v66 * v170;
-    const V v184 = v66 * v172;
-    const V v185 = v181 - v183;
-    const V v186 = v183 - v181;
-    const V v187 = v182 - v184;
-    const V v188 = v184 - v182;
-    const V v189 = v173 * v58;
-    const V v190 = 1.0 + v189;
-    const V v191 = v187 - v71;
-    const V v192 = v67 * v170;
-    const V v193 = v67 * v172;
-    const V v194 = v179 - v192;
-    const V v195 = v192 - v179;
-    const V v196 = v180 - v193;
-    const V v197 = v193 - v180;
-    const V v198 = v175 * v57;
-    const V v199 = v190 - v198;
-    const V v200 = v55 * v170;
-    const V v201 = v90 + v200;
-    const V v202 = v55 * v172;
-    const V v203 = v92 + v202;
-    const V v204 = v60 * v170;
-    const V v205 = v86 + v204;
-    const V v206 = v60 * v172;
-    const V v207 = v88 + v206;
-    const V v208 = v174 * v59;
-    const V v209 = v199 - v208;
-    const V v210 = 2.0 * v209;
-    const V v211 = v209 * v209;
-    const V v212 = v59 * v195;
-    const V v213 = v212 + v205;
-    const V v214 = v59 * v197;
-    const V v215 = v214 + v207;
-    const V v216 = v65 + v194;
-    const V v217 = v70 - v196;
-    const V v218 = v54 * v195;
-    const V v219 = v218 + v201;
-    const V v220 = v54 * v197;
-    const V v221 = v220 + v203;
-    const V v222 = v174 * v210;
-    const V v223 = v64 + v185;
-    const V v224 = v175 * v210;
-    const V v225 = v173 * v210;
-    const V v226 = v50 * v185;
-    const V v227 = v226 + v219;
-    const V v228 = v50 * v187;
-    const V v229 = v228 + v221;
-    const V v230 = v217 * v227;
-    const V v231 = v211 * v166;
-    const V v232 = v191 * v227;
-    const V v233 = v172 * v227;
-    const V v234 = v57 * v185;
-    const V v235 = v234 + v213;
-    const V v236 = v57 * v187;
-    const V v237 = v236 + v215;
-    const V v238 = v235 * v217;
-    const V v239 = v237 * v227;
-    const V v240 = v237 * v223;
-    const V v241 = v223 * v229;
-    const V v242 = v232 - v241;
-    const V v243 = v170 * v229;
-    const V v244 = v233 - v243;
-    const V v245 = v170 * v237;
-    const V v246 = v235 * v229;
-    const V v247 = v239 - v246;
-    const V v248 = v172 * v235;
-    const V v249 = v245 - v248;
-    const V v250 = 2.0 * v247;
-    const V v251 = v247 * v247;
-    const V v252 = v237 * v216;
-    const V v253 = v238 + v252;
-    const V v254 = v216 * v229;
-    const V v255 = v230 + v254;
-    const V v256 = v235 * v191;
-    const V v257 = v240 - v256;
-    const V v258 = v242 * v250;
-    const V v259 = v250 * v255;
-    const V v260 = v211 * v251;
-    const V v261 = v211 * v250;
-    const V v262 = v210 * v251;
-    const V v263 = v244 * v250;
-    const V v264 = v166 * v250;
-    const V v265 = v166 * v251;
-    const V v266 = 1.0 / v260;
-    const V v267 = v250 * v264;
-    const V v268 = v231 * v263;
-    const V v269 = v225 * v265;
-    const V v270 = v211 * v259;
-    const V v271 = v211 * v258;
-    const V v272 = v211 * v267;
-    const V v273 = v211 * v272;
-    const V v274 = v224 * v251;
-    const V v275 = v271 - v274;
-    const V v276 = v222 * v251;
-    const V v277 = v270 - v276;
-    const V v278 = v266 * v266;
-    const V v279 = v268 * v278;
-    const V v280 = v269 * v278;
-    const V v281 = v273 * v278;
-    const V v282 = 1.0 - v266;
-    const V v283 = v166 * v282;
-    const V v284 = v166 * v278;
-    const V v285 = v275 * v284;
-    const V v286 = v277 * v284;
-    const V v287 = v225 * v283;
-    const V v288 = v258 * v283;
-    const V v289 = v259 * v283;
-    const V v290 = v263 * v283;
-    const V v291 = v211 * v280;
-    const V v292 = v287 + v291;
-    const V v293 = v262 * v280;
-    const V v294 = v251 * v279;
-    const V v295 = v290 + v294;
-    const V v296 = v261 * v279;
-    const V v297 = v251 * v285;
-    const V v298 = v288 + v297;
-    const V v299 = v211 * v285;
-    const V v300 = v224 * v283;
-    const V v301 = v299 - v300;
-    const V v302 = v251 * v286;
-    const V v303 = v289 + v302;
-    const V v304 = v251 * v283;
-    const V v305 = v211 * v286;
-    const V v306 = v222 * v283;
-    const V v307 = v305 - v306;
-    const V v308 = v211 * v283;
-    const V v309 = v178 * v304;
-    const V v310 = v293 + v309;
-    const V v311 = 2.0 * v308;
-    const V v312 = v281 + v311;
-    const V v313 = v244 * v311;
-    const V v314 = v296 + v313;
-    const V v315 = v250 * v308;
-    const V v316 = v250 * v292;
-    const V v317 = v250 * v301;
-    const V v318 = v250 * v307;
-    const V v319 = v242 * v311;
-    const V v320 = v317 + v319;
-    const V v321 = v255 * v311;
-    const V v322 = v318 + v321;
-    const V v323 = v257 * v312;
-    const V v324 = v253 * v312;
-    const V v325 = v249 * v312;
-    const V v326 = v210 * v295;
-    const V v327 = v210 * v298;
-    const V v328 = v210 * v303;
-    const V v329 = v210 * v304;
-    const V v330 = v176 * v304;
-    const V v331 = v327 - v330;
-    const V v332 = v177 * v304;
-    const V v333 = v328 - v332;
-    const V v334 = v223 * v315;
-    const V v335 = v191 * v315;
-    const V v336 = v217 * v315;
-    const V v337 = v175 * v331;
-    const V v338 = v175 * v326;
-    const V v339 = v174 * v326;
-    const V v340 = v174 * v329;
-    const V v341 = v175 * v329;
-    const V v342 = v173 * v329;
-    const V v343 = v235 * v316;
-    const V v344 = v237 * v316;
-    const V v345 = v227 * v316;
-    const V v346 = v229 * v316;
-    const V v347 = v172 * v343;
-    const V v348 = v172 * v345;
-    const V v349 = v170 * v344;
-    const V v350 = v170 * v346;
-    const V v351 = v188 * v343;
-    const V v352 = v196 * v343;
-    const V v353 = v187 * v345;
-    const V v354 = v197 * v345;
-    const V v355 = v185 * v344;
-    const V v356 = v351 + v355;
-    const V v357 = v195 * v344;
-    const V v358 = v352 + v357;
-    const V v359 = v186 * v346;
-    const V v360 = v353 + v359;
-    const V v361 = v194 * v346;
-    const V v362 = v354 + v361;
-    const V v363 = v173 * v310;
-    const V v364 = v175 * v310;
-    const V v365 = v174 * v310;
-    const V v366 = v175 * v333;
-    const V v367 = v174 * v333;
-    const V v368 = v235 * v315;
-    const V v369 = v229 * v315;
-    const V v370 = v237 * v315;
-    const V v371 = v227 * v315;
-    const V v372 = v170 * v315;
-    const V v373 = v170 * v369;
-    const V v374 = v170 * v370;
-    const V v375 = v172 * v315;
-    const V v376 = v172 * v368;
-    const V v377 = v172 * v371;
-    const V v378 = v227 * v314;
-    const V v379 = v235 * v314;
-    const V v380 = v372 + v379;
-    const V v381 = v229 * v314;
-    const V v382 = v237 * v314;
-    const V v383 = v375 + v382;
-    const V v384 = v187 * v371;
-    const V v385 = v197 * v371;
-    const V v386 = v172 * v378;
-    const V v387 = v187 * v378;
-    const V v388 = v197 * v378;
-    const V v389 = v172 * v380;
-    const V v390 = v235 * v323;
-    const V v391 = v237 * v323;
-    const V v392 = v235 * v324;
-    const V v393 = v237 * v324;
-    const V v394 = v235 * v325;
-    const V v395 = v237 * v325;
-    const V v396 = v188 * v390;
-    const V v397 = v188 * v380;
-    const V v398 = v196 * v380;
-    const V v399 = v188 * v392;
-    const V v400 = v196 * v392;
-    const V v401 = v172 * v394;
-    const V v402 = v188 * v394;
-    const V v403 = v196 * v394;
-    const V v404 = v185 * v391;
-    const V v405 = v396 + v404;
-    const V v406 = v185 * v393;
-    const V v407 = v195 * v393;
-    const V v408 = v185 * v395;
-    const V v409 = v402 + v408;
-    const V v410 = v195 * v395;
-    const V v411 = v403 + v410;
-    const V v412 = v170 * v395;
-    const V v413 = v195 * v383;
-    const V v414 = v398 + v413;
-    const V v415 = v170 * v383;
-    const V v416 = v185 * v383;
-    const V v417 = v397 + v416;
-    const V v418 = v188 * v368;
-    const V v419 = v196 * v368;
-    const V v420 = v170 * v381;
-    const V v421 = v185 * v370;
-    const V v422 = v418 + v421;
-    const V v423 = v195 * v370;
-    const V v424 = v419 + v423;
-    const V v425 = v186 * v381;
-    const V v426 = v387 + v425;
-    const V v427 = v194 * v381;
-    const V v428 = v388 + v427;
-    const V v429 = v186 * v369;
-    const V v430 = v384 + v429;
-    const V v431 = v194 * v369;
-    const V v432 = v385 + v431;
-    const V v433 = v227 * v320;
-    const V v434 = v227 * v322;
-    const V v435 = v229 * v320;
-    const V v436 = v229 * v322;
-    const V v437 = v186 * v435;
-    const V v438 = v186 * v436;
-    const V v439 = v194 * v436;
-    const V v440 = v235 * v322;
-    const V v441 = v235 * v320;
-    const V v442 = v334 + v441;
-    const V v443 = v237 * v320;
-    const V v444 = v335 + v443;
-    const V v445 = v237 * v322;
-    const V v446 = v336 + v445;
-    const V v447 = v216 * v315;
-    const V v448 = v440 - v447;
-    const V v449 = v187 * v433;
-    const V v450 = v437 + v449;
-    const V v451 = v187 * v434;
-    const V v452 = v438 + v451;
-    const V v453 = v197 * v434;
-    const V v454 = v439 + v453;
-    const V v455 = v195 * v444;
-    const V v456 = v195 * v446;
-    const V v457 = v172 * v442;
-    const V v458 = v172 * v448;
-    const V v459 = v170 * v444;
-    const V v460 = v170 * v446;
-    const V v461 = v185 * v444;
-    const V v462 = v185 * v446;
-    const V v463 = v196 * v442;
-    const V v464 = v455 + v463;
-    const V v465 = v196 * v448;
-    const V v466 = v456 + v465;
-    const V v467 = v188 * v442;
-    const V v468 = v461 + v467;
-    const V v469 = v188 * v448;
-    const V v470 = v462 + v469;
-    V s471 = softehl_splat(0.0);
-    V s472 = softehl_splat(0.0);
-    V s473 = softehl_splat(0.0);
-    V s474 = softehl_splat(0.0);
-    V s475 = softehl_splat(0.0);
-    V s476 = softehl_splat(0.0);
-    V s477 = softehl_splat(0.0);
-    V s478 = softehl_splat(0.0);
-    V s479 = softehl_splat(0.0);
-    V s480 = softehl_splat(0.0);
-    V s481 = softehl_splat(0.0);
-    V s482 = softehl_splat(0.0);
-    V s483 = softehl_splat(0.0);
-    V s484 = softehl_splat(0.0);
-    V s485 = softehl_splat(0.0);
-    V s486 = softehl_splat(0.0);
-    V s487 = softehl_splat(0.0);
-    V s488 = softehl_splat(0.0);
-    V s489 = softehl_splat(0.0);
-    V s490 = softehl_splat(0.0);
-    V s491 = softehl_splat(0.0);
-    V s492 = softehl_splat(0.0);
-    V s493 = softehl_splat(0.0);
-    V s494 = softehl_splat(0.0);
-    V s495 = softehl_splat(0.0);
-    V s496 = softehl_splat(0.0);
-    V s497 = softehl_splat(0.0);
-    V s498 = softehl_splat(0.0);
-    V s499 = softehl_splat(0.0);
-    V s500 = softehl_splat(0.0);
-    V s501 = softehl_splat(0.0);
-    V s502 = softehl_splat(0.0);
-    V s503 = softehl_splat(0.0);
-    V s504 = softehl_splat(0.0);
-    V s505 = softehl_splat(0.0);
-    V s506 = softehl_splat(0.0);
-    V s507 = softehl_splat(0.0);
-    V s508 = softehl_splat(0.0);
-    V s509 = softehl_splat(0.0);
-    V s510 = softehl_splat(0.0);
-    V s511 = softehl_splat(0.0);
-    V s512 = softehl_splat(0.0);
-    V s513 = softehl_splat(0.0);
-    V s514 = softehl_splat(0.0);
-    V s515 = softehl_splat(0.0);
-    V s516 = softehl_splat(0.0);
-    V s517 = softehl_splat(0.0);
-    V s518 = softehl_splat(0.0);
-    V s519 = softehl_splat(0.0);
-    V s520 = softehl_splat(0.0);
-    V s521 = softehl_splat(0.0);
-    V s522 = softehl_splat(0.0);
-    V s523 = softehl_splat(0.0);
-    V s524 = softehl_splat(0.0);
-    V s525 = softehl_splat(0.0);
-    V s526 = softehl_splat(0.0);
-    V s527 = softehl_splat(0.0);
-    V s528 = softehl_splat(0.0);
-    V s529 = softehl_splat(0.0);
-    V s530 = softehl_splat(0.0);
-    V s531 = softehl_splat(0.0);
-    for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v532 = 0.25 * w[1];
-        const double v533 = 0.25 - v532;
-        const double v534 = 0.25 + v532;
-        const double v535 = v532 - 0.25;
-        const V v536 = X1 * v535;
-        const V v537 = X3 * v533;
-        const V v538 = v537 + v536;
-        const V v539 = v534 * v27;
-        const V v540 = v539 + v538;
-        const double v541 = 0.25 * w[0];
-        const double v542 = 0.25 + v541;
-        const double v543 = 0.25 - v541;
-        const double v544 = v541 - 0.25;
-        const V v545 = X0 * v544;
-        const V v546 = X6 * v543;
-        const V v547 = v546 + v545;
-        const V v548 = v542 * v9;
-        const V v549 = v548 + v547;
-        const V v550 = X7 * v543;
-        const V v551 = X1 * v544;
-        const V v552 = v550 + v551;
-        const V v553 = v542 * v26;
-        const V v554 = v553 + v552;
-        const V v555 = X2 * v533;
-        const V v556 = X0 * v535;
-        const V v557 = v555 + v556;
-        const V v558 = v534 * v11;
-        const V v559 = v558 + v557;
-        const V v560 = v559 * v554;
-        const double v561 = 1.0 - w[1];
-        const double v562 = 1.0 + w[1];
-        const double v563 = 1.0 - w[0];
-        const double v564 = 1.0 + w[0];
-        const double v565 = 0.25 * v562;
-        const V v566 = v549 * v540;
-        const V v567 = v560 - v566;
-        const V v568 = X7 * v563;
-        const V v569 = X1 * v563;
-        const V v570 = X5 * v564;
-        const V v571 = v570 + v568;
-        const V v572 = v565 * v571;
-        const V v573 = X3 * v564;
-        const V v574 = v569 + v573;
-        const V v575 = 0.25 * v574;
-        const V v576 = v561 * v575;
-        const V v577 = v572 + v576;
-        const V v578 = v577 * v567;
-        const double v579 = w[2] * v2;
-        const V v580 = v578 * v579;
-        const V v581 = w[0] - v167;
-        const V v582 = w[1] - v168;
-        const V v583 = v36 * v581;
-        const V v584 = v8 * v580;
-        const V v585 = v38 * v582;
-        const V v586 = v15 * v580;
-        const V v587 = v20 * v580;
-        const V v588 = v19 * v580;
-        const V v589 = 0.5 * v580;
-        const V v590 = v22 * v581;
-        const V v591 = v56 * v581;
-        const V v592 = v174 + v591;
-        const V v593 = v56 * v582;
-        const V v594 = v175 + v593;
-        const V v595 = v17 * v582;
-        const V v596 = v590 - v595;
-        const V v597 = 0.1 * v584;
-        const V v598 = 0.010476190476190476 * v586;
-        const V v599 = 0.03142857142857143 * v586;
-        const V v600 = 0.010857142857142857 * v587;
-        const V v601 = 0.0027142857142857142 * v587;
-        const V v602 = 0.0038515769944341373 * v588;
-        const V v603 = 0.05 * v584;
-        const V v604 = 0.0007703153988868275 * v588;
-        const V v605 = 0.001540630797773655 * v588;
-        const V v606 = v49 * v596;
-        const V v607 = v171 + v606;
-        const V v608 = v585 - v583;
-        const V v609 = v585 + v583;
-        const V v610 = v49 * v608;
-        const V v611 = v169 + v610;
-        const V v612 = 0.25 * v607;
-        const V v613 = v63 * v609;
-        const V v614 = v173 - v613;
-        const V v615 = v607 * v78;
-        const V v616 = v607 * v75;
-        const V v617 = v611 * v78;
-        const V v618 = v611 * v75;
-        const V v619 = 0.25 * v611;
-        const V v620 = v614 * v614;
-        const V v621 = v60 * v612;
-        const V v622 = v88 + v621;
-        const V v623 = v614 * v58;
-        const V v624 = 1.0 + v623;
-        const V v625 = v55 * v612;
-        const V v626 = v92 + v625;
-        const V v627 = v55 * v619;
-        const V v628 = v90 + v627;
-        const V v629 = v60 * v619;
-        const V v630 = v86 + v629;
-        const V v631 = v50 * v615;
-        const V v632 = v631 + v626;
-        const V v633 = v50 * v617;
-        const V v634 = v633 + v628;
-        const V v635 = v54 * v616;
-        const V v636 = v635 + v632;
-        const V v637 = v54 * v618;
-        const V v638 = v637 + v634;
-        const V v639 = 2.0 * v636;
-        const V v640 = v57 * v615;
-        const V v641 = v640 + v622;
-        const V v642 = 4.0 * v636;
-        const V v643 = v636 * v636;
-        const V v644 = v594 * v57;
-        const V v645 = v624 - v644;
-        const V v646 = v57 * v617;
-        const V v647 = v646 + v630;
-        const V v648 = v59 * v616;
-        const V v649 = v648 + v641;
-        const V v650 = v59 * v618;
-        const V v651 = v650 + v647;
-        const V v652 = v592 * v59;
-        const V v653 = v645 - v652;
-        const V v654 = 2.0 * v638;
-        const V v655 = 4.0 * v638;
-        const V v656 = 2.0 * v649;
-        const V v657 = v638 * v638;
-        const V v658 = v657 + v643;
-        const V v659 = 4.0 * v649;
-        const V v660 = v638 * v649;
-        const V v661 = 2.0 * v651;
-        const V v662 = v653 * v653;
-        const V v663 = 2.0 * v653;
-        const V v664 = 4.0 * v651;
-        const V v665 = v651 * v651;
-        const V v666 = v665 + v658;
-        const V v667 = v636 * v651;
-        const V v668 = v660 - v667;
-        const V v669 = v663 * v663;
-        const V v670 = v662 + v666;
-        const V v671 = 2.0 * v668;
-        const V v672 = v668 * v668;
-        const V v673 = v649 * v649;
-        const V v674 = v673 + v670;
-        const V v675 = v674 * v674;
-        const V v676 = v597 * v674;
-        const V v677 = 2.0 * v674;
-        const V v678 = 12.0 * v674;
-        const V v679 = 6.0 * v674;
-        const V v680 = v662 * v672;
-        const V v681 = v662 * v671;
-        const V v682 = v649 * v671;
-        const V v683 = v651 * v671;
-        const V v684 = v589 * v674;
-        const V v685 = v638 * v671;
-        const V v686 = v636 * v671;
-        const V v687 = v662 * v682;
-        const V v688 = v662 * v685;
-        const V v689 = v662 * v683;
-        const V v690 = v662 * v686;
-        const V v691 = softehl_vrcbrt(v680);
-        const V v692 = 1.0 / v680;
-        const V v693 = 0.3333333333333333 * v684;
-        const V v694 = v675 * v675;
-        const V v695 = v674 * v675;
-        const V v696 = v599 * v675;
-        const V v697 = 3.0 * v675;
-        const V v698 = 24.0 * v675;
-        const V v699 = 12.0 * v675;
-        const V v700 = v603 * v675;
-        const V v701 = v604 * v674;
-        const V v702 = v602 * v694;
-        const V v703 = 4.0 * v695;
-        const V v704 = 5.0 * v694;
-        const V v705 = 40.0 * v695;
-        const V v706 = v694 * v701;
-        const V v707 = 20.0 * v695;
-        const V v708 = v601 * v694;
-        const V v709 = 0.6666666666666666 * v700;
-        const V v710 = v600 * v695;
-        const V v711 = v598 * v695;
-        const V v712 = v601 * v703;
-        const V v713 = v604 * v704;
-        const V v714 = v654 * v703;
-        const V v715 = 3.111111111111111 * v708;
-        const V v716 = v639 * v703;
-        const V v717 = v661 * v703;
-        const V v718 = v656 * v703;
-        const V v719 = v692 * v692;
-        const V v720 = 2.0 * v692;
-        const V v721 = v692 * v598;
-        const V v722 = v654 * v697;
-        const V v723 = v639 * v697;
-        const V v724 = v661 * v697;
-        const V v725 = v656 * v697;
-        const V v726 = v598 * v697;
-        const V v727 = v598 * v719;
-        const V v728 = 3.0 * v721;
-        const V v729 = v721 * v697;
-        const V v730 = v721 * v678;
-        const V v731 = v721 * v679;
-        const V v732 = v727 * v697;
-        const V v733 = v719 * v696;
-        const V v734 = v727 * v722;
-        const V v735 = v727 * v723;
-        const V v736 = v727 * v724;
-        const V v737 = v727 * v725;
-        const V v738 = v672 * v719;
-        const V v739 = v663 * v672;
-        const V v740 = v681 * v719;
-        const V v741 = v719 * v711;
-        const V v742 = v738 * v711;
-        const V v743 = v740 * v711;
-        const V v744 = v654 * v677;
-        const V v745 = v639 * v677;
-        const V v746 = v661 * v677;
-        const V v747 = v656 * v677;
-        const V v748 = v738 * v726;
-        const V v749 = v731 - v748;
-        const V v750 = v691 * v691;
-        const V v751 = 1.3333333333333333 * v691;
-        const V v752 = 4.444444444444445 * v691;
-        const V v753 = v728 * v744;
-        const V v754 = v728 * v745;
-        const V v755 = v728 * v746;
-        const V v756 = v728 * v747;
-        const V v757 = v750 * v750;
-        const V v758 = v691 * v750;
-        const V v759 = v750 * v584;
-        const V v760 = v720 * v743;
-        const V v761 = v720 * v742;
-        const V v762 = v733 - v761;
-        const V v763 = v752 * v706;
-        const V v764 = v715 + v763;
-        const V v765 = v691 * v757;
-        const V v766 = v691 * v589;
-        const V v767 = v766 + v729;
-        const V v768 = v758 * v751;
-        const V v769 = 1.6666666666666667 * v757;
-        const V v770 = 0.3333333333333333 * v757;
-        const V v771 = 0.05 * v759;
-        const V v772 = v758 * v768;
-        const V v773 = v757 * v601;
-        const V v774 = v757 * v769;
-        const V v775 = v589 * v770;
-        const V v776 = 0.6666666666666666 * v765;
-        const V v777 = v765 * v765;
-        const V v778 = v765 * v604;
-        const V v779 = 4.0 * v773;
-        const V v780 = v580 * v770;
-        const V v781 = v770 * v684;
-        const V v782 = v741 + v781;
-        const V v783 = v777 * v764;
-        const V v784 = v772 * v601;
-        const V v785 = v774 * v604;
-        const V v786 = v771 * v677;
-        const V v787 = v767 + v786;
-        const V v788 = v776 * v700;
-        const V v789 = v782 + v788;
-        const V v790 = v776 * v603;
-        const V v791 = 5.0 * v778;
-        const V v792 = v774 * v605;
-        const V v793 = v776 * v676;
-        const V v794 = v762 + v793;
-        const V v795 = v672 * v774;
-        const V v796 = v672 * v772;
-        const V v797 = v790 * v677;
-        const V v798 = v772 * v708;
-        const V v799 = v789 + v798;
-        const V v800 = v681 * v774;
-        const V v801 = v681 * v772;
-        const V v802 = v772 * v710;
-        const V v803 = v794 + v802;
-        const V v804 = v774 * v706;
-        const V v805 = v799 + v804;
-        const V v806 = v774 * v702;
-        const V v807 = v803 + v806;
-        const V v808 = v778 * v704;
-        const V v809 = v787 + v808;
-        const V v810 = v792 * v704;
-        const V v811 = v780 + v810;
-        const V v812 = v785 * v704;
-        const V v813 = v732 + v812;
-        const V v814 = v662 * v805;
-        const V v815 = v775 + v797;
-        const V v816 = v775 + v807;
-        const V v817 = v778 * v705;
-        const V v818 = v730 + v817;
-        const V v819 = v778 * v707;
-        const V v820 = v749 + v819;
-        const V v821 = v813 + v815;
-        const V v822 = v815 + v816;
-        const V v823 = v773 * v703;
-        const V v824 = v809 + v823;
-        const V v825 = v773 * v698;
-        const V v826 = v818 + v825;
-        const V v827 = v773 * v699;
-        const V v828 = v820 + v827;
-        const V v829 = v671 * v814;
-        const V v830 = v784 * v703;
-        const V v831 = v821 + v830;
-        const V v832 = 2.0 * v824;
-        const V v833 = 0.2 * v759;
-        const V v834 = v833 + v826;
-        const V v835 = 0.1 * v759;
-        const V v836 = v835 + v828;
-        const V v837 = v653 * v834;
-        const V v838 = v656 * v824;
-        const V v839 = v651 * v829;
-        const V v840 = v638 * v829;
-        const V v841 = v838 - v840;
-        s472 += v841;
-        const V v842 = v739 * v831;
-        const V v843 = v837 - v842;
-        const V v844 = v639 * v824;
-        const V v845 = v839 + v844;
-        s474 += v845;
-        const V v846 = v636 * v829;
-        const V v847 = v654 * v824;
-        const V v848 = v661 * v824;
-        const V v849 = v846 + v848;
-        s473 += v849;
-        const V v850 = v639 * v843;
-        const V v851 = v654 * v843;
-        const V v852 = v661 * v843;
-        const V v853 = v656 * v843;
-        const V v854 = v649 * v829;
-        const V v855 = v847 - v854;
-        s475 += v855;
-        const V v856 = v615 * v841;
-        const V v857 = v616 * v841;
-        const V v858 = v612 * v841;
-        const V v859 = v615 * v845;
-        const V v860 = v616 * v845;
-        const V v861 = v612 * v845;
-        const V v862 = v617 * v855;
-        s481 += v859;
-        s481 += v862;
-        const V v863 = v617 * v849;
-        s478 += v856;
-        s478 += v863;
-        const V v864 = v619 * v849;
-        s476 += v858;
-        s476 += v864;
-        const V v865 = v618 * v849;
-        s477 += v857;
-        s477 += v865;
-        const V v866 = v618 * v855;
-        s480 += v860;
-        s480 += v866;
-        const V v867 = v619 * v855;
-        s479 += v861;
-        s479 += v867;
-        const V v868 = v655 * v771;
-        const V v869 = v868 + v753;
-        const V v870 = v642 * v771;
-        const V v871 = v870 + v754;
-        const V v872 = v664 * v771;
-        const V v873 = v872 + v755;
-        const V v874 = v659 * v771;
-        const V v875 = v874 + v756;
-        const V v876 = v779 * v722;
-        const V v877 = v869 + v876;
-        const V v878 = v779 * v723;
-        const V v879 = v871 + v878;
-        const V v880 = v779 * v724;
-        const V v881 = v873 + v880;
-        const V v882 = v779 * v725;
-        const V v883 = v875 + v882;
-        const V v884 = v687 * v831;
-        const V v885 = v877 - v884;
-        const V v886 = v689 * v831;
-        const V v887 = v879 + v886;
-        const V v888 = v690 * v831;
-        const V v889 = v881 + v888;
-        const V v890 = v688 * v831;
-        const V v891 = v883 - v890;
-        const V v892 = v790 * v744;
-        const V v893 = v734 + v892;
-        const V v894 = v790 * v745;
-        const V v895 = v735 + v894;
-        const V v896 = v790 * v746;
-        const V v897 = v736 + v896;
-        const V v898 = v790 * v747;
-        const V v899 = v737 + v898;
-        const V v900 = v791 * v714;
-        const V v901 = v885 + v900;
-        const V v902 = v791 * v716;
-        const V v903 = v887 + v902;
-        const V v904 = v791 * v717;
-        const V v905 = v889 + v904;
-        const V v906 = v791 * v718;
-        const V v907 = v891 + v906;
-        const V v908 = v784 * v714;
-        const V v909 = v893 + v908;
-        const V v910 = v784 * v716;
-        const V v911 = v895 + v910;
-        const V v912 = v784 * v717;
-        const V v913 = v897 + v912;
-        const V v914 = v784 * v718;
-        const V v915 = v899 + v914;
-        const V v916 = v654 * v901;
-        const V v917 = v832 + v916;
-        const V v918 = v654 * v903;
-        const V v919 = v654 * v905;
-        const V v920 = v654 * v907;
-        const V v921 = v639 * v907;
-        const V v922 = v639 * v903;
-        const V v923 = v832 + v922;
-        const V v924 = v639 * v905;
-        const V v925 = v829 + v924;
-        const V v926 = v920 - v829;
-        const V v927 = v661 * v907;
-        const V v928 = v661 * v905;
-        const V v929 = v832 + v928;
-        const V v930 = v656 * v907;
-        const V v931 = v832 + v930;
-        const V v932 = v638 * v811;
-        const V v933 = v909 + v932;
-        const V v934 = v636 * v811;
-        const V v935 = v911 + v934;
-        const V v936 = v649 * v811;
-        const V v937 = v915 + v936;
-        const V v938 = v651 * v811;
-        const V v939 = v913 + v938;
-        const V v940 = v681 * v935;
-        const V v941 = v681 * v939;
-        const V v942 = v681 * v783;
-        const V v943 = v760 + v942;
-        const V v944 = v672 * v783;
-        const V v945 = v822 - v944;
-        const V v946 = v672 * v805;
-        const V v947 = v824 - v946;
-        const V v948 = 2.0 * v947;
-        const V v949 = v663 * v947;
-        const V v950 = v800 * v709;
-        const V v951 = v943 + v950;
-        const V v952 = v795 * v709;
-        const V v953 = v945 - v952;
-        const V v954 = v795 * v713;
-        const V v955 = v836 - v954;
-        const V v956 = v801 * v693;
-        const V v957 = v951 + v956;
-        const V v958 = v796 * v693;
-        const V v959 = v953 - v958;
-        const V v960 = v672 * v959;
-        const V v961 = v955 - v960;
-        const V v962 = v672 * v957;
-        const V v963 = v681 * v957;
-        const V v964 = v800 * v713;
-        const V v965 = v962 - v964;
-        const V v966 = v671 * v805;
-        const V v967 = v965 - v966;
-        const V v968 = v614 * v949;
-        s471 += v968;
-        const V v969 = v740 * v726;
-        const V v970 = v967 - v969;
-        const V v971 = 2.0 * v814;
-        const V v972 = v963 - v971;
-        const V v973 = v796 * v712;
-        const V v974 = v961 - v973;
-        const V v975 = v801 * v712;
-        const V v976 = v970 - v975;
-        const V v977 = v669 * v974;
-        const V v978 = v948 + v977;
-        const V v979 = v651 * v972;
-        const V v980 = v940 + v979;
-        const V v981 = v681 * v815;
-        const V v982 = v976 - v981;
-        const V v983 = v663 * v982;
-        const V v984 = v636 * v972;
-        const V v985 = v941 + v984;
-        const V v986 = v649 * v972;
-        const V v987 = v638 * v972;
-        const V v988 = v681 * v933;
-        const V v989 = v986 - v988;
-        const V v990 = v681 * v937;
-        const V v991 = v987 - v990;
-        const V v992 = v620 * v978;
-        s486 += v992;
-        const V v993 = v649 * v989;
-        const V v994 = v917 + v993;
-        const V v995 = v651 * v980;
-        const V v996 = v923 + v995;
-        const V v997 = v649 * v980;
-        const V v998 = v918 - v997;
-        const V v999 = v651 * v985;
-        const V v1000 = v925 + v999;
-        const V v1001 = v649 * v985;
-        const V v1002 = v919 - v1001;
-        const V v1003 = v636 * v985;
-        const V v1004 = v929 + v1003;
-        const V v1005 = v651 * v991;
-        const V v1006 = v921 - v1005;
-        const V v1007 = v651 * v983;
-        const V v1008 = v850 - v1007;
-        const V v1009 = v649 * v983;
-        const V v1010 = v851 + v1009;
-        const V v1011 = v649 * v991;
-        const V v1012 = v926 + v1011;
-        const V v1013 = v638 * v983;
-        const V v1014 = v853 + v1013;
-        const V v1015 = v636 * v983;
-        const V v1016 = v852 - v1015;
-        const V v1017 = v638 * v991;
-        const V v1018 = v931 + v1017;
-        const V v1019 = v636 * v991;
-        const V v1020 = v927 - v1019;
-        const V v1021 = v612 * v1006;
-        const V v1022 = v612 * v996;
-        const V v1023 = v612 * v1008;
-        const V v1024 = v612 * v1012;
-        const V v1025 = v612 * v1014;
-        const V v1026 = v612 * v1018;
-        const V v1027 = v612 * v1020;
-        const V v1028 = v614 * v1008;
-        s482 += v1028;
-        const V v1029 = v614 * v1014;
-        s484 += v1029;
-        const V v1030 = v614 * v1010;
-        s483 += v1030;
-        const V v1031 = v594 * v1014;
-        const V v1032 = v619 * v1020;
-        const V v1033 = v1026 + v1032;
-        s509 += v1033;
-        const V v1034 = v619 * v1004;
-        const V v1035 = v1027 + v1034;
-        s510 += v1035;
-        const V v1036 = v619 * v1000;
-        s503 += v1021;
-        s503 += v1036;
-        const V v1037 = v619 * v1010;
-        const V v1038 = v1023 + v1037;
-        const V v1039 = v619 * v1035;
-        const V v1040 = v614 * v1038;
-        s489 += v1040;
-        const V v1041 = v594 * v1016;
-        const V v1042 = v614 * v1016;
-        s485 += v1042;
-        const V v1043 = v592 * v1014;
-        const V v1044 = v592 * v1016;
-        const V v1045 = v619 * v1016;
-        const V v1046 = v1025 + v1045;
-        const V v1047 = v619 * v1002;
-        const V v1048 = v614 * v1046;
-        s492 += v1048;
-        const V v1049 = v617 * v1010;
-        const V v1050 = v618 * v1010;
-        const V v1051 = v617 * v1016;
-        const V v1052 = v618 * v1016;
-        const V v1053 = v617 * v1002;
-        const V v1054 = v618 * v1002;
-        s504 += v1024;
-        s504 += v1047;
-        const V v1055 = v617 * v1012;
-        const V v1056 = v618 * v1012;
-        const V v1057 = v619 * v1012;
-        const V v1058 = v1021 + v1057;
-        const V v1059 = v617 * v994;
-        const V v1060 = v619 * v994;
-        const V v1061 = v618 * v994;
-        const V v1062 = v617 * v998;
-        const V v1063 = v618 * v998;
-        const V v1064 = v619 * v998;
-        const V v1065 = v1022 + v1064;
-        s497 += v1065;
-        const V v1066 = v612 * v1058;
-        const V v1067 = v612 * v998;
-        const V v1068 = v1060 + v1067;
-        s498 += v1068;
-        const V v1069 = v615 * v998;
-        const V v1070 = v1059 + v1069;
-        const V v1071 = v616 * v998;
-        const V v1072 = v1061 + v1071;
-        const V v1073 = v612 * v1065;
-        const V v1074 = v615 * v1006;
-        const V v1075 = v1055 + v1074;
-        const V v1076 = v616 * v1006;
-        const V v1077 = v1056 + v1076;
-        const V v1078 = v619 * v1070;
-        const V v1079 = v619 * v1072;
-        const V v1080 = v619 * v1068;
-        s522 += v1073;
-        s522 += v1080;
-        const V v1081 = v612 * v1075;
-        const V v1082 = v612 * v1077;
-        const V v1083 = v615 * v996;
-        const V v1084 = v1062 + v1083;
-        const V v1085 = v616 * v996;
-        const V v1086 = v1063 + v1085;
-        const V v1087 = v612 * v1084;
-        s513 += v1078;
-        s513 += v1087;
-        const V v1088 = v612 * v1086;
-        s518 += v1079;
-        s518 += v1088;
-        const V v1089 = v612 * v1033;
-        s531 += v1039;
-        s531 += v1089;
-        const V v1090 = v615 * v1018;
-        const V v1091 = v616 * v1018;
-        const V v1092 = v615 * v1020;
-        const V v1093 = v616 * v1020;
-        const V v1094 = v1090 - v1031;
-        const V v1095 = v1091 - v1043;
-        const V v1096 = v1092 - v1041;
-        const V v1097 = v1093 - v1044;
-        const V v1098 = v617 * v1020;
-        const V v1099 = v1094 + v1098;
-        const V v1100 = v618 * v1020;
-        const V v1101 = v1095 + v1100;
-        const V v1102 = v617 * v1004;
-        const V v1103 = v1096 + v1102;
-        const V v1104 = v618 * v1004;
-        const V v1105 = v1097 + v1104;
-        const V v1106 = v612 * v1099;
-        const V v1107 = v612 * v1101;
-        const V v1108 = v612 * v1000;
-        const V v1109 = v1047 + v1108;
-        const V v1110 = v615 * v1000;
-        const V v1111 = v1053 + v1110;
-        const V v1112 = v616 * v1000;
-        const V v1113 = v1054 + v1112;
-        const V v1114 = v619 * v1111;
-        s516 += v1081;
-        s516 += v1114;
-        const V v1115 = v619 * v1113;
-        s521 += v1082;
-        s521 += v1115;
-        const V v1116 = v619 * v1103;
-        s528 += v1106;
-        s528 += v1116;
-        const V v1117 = v619 * v1105;
-        s530 += v1107;
-        s530 += v1117;
-        const V v1118 = v619 * v1109;
-        s525 += v1066;
-        s525 += v1118;
-        const V v1119 = v615 * v1008;
-        const V v1120 = v1049 + v1119;
-        const V v1121 = v616 * v1008;
-        const V v1122 = v1050 + v1121;
-        const V v1123 = v615 * v1014;
-        const V v1124 = v1051 + v1123;
-        const V v1125 = v616 * v1014;
-        const V v1126 = v1052 + v1125;
-        const V v1127 = v614 * v1120;
-        s487 += v1127;
-        const V v1128 = v614 * v1122;
-        s488 += v1128;
-        const V v1129 = v594 * v978;
-        const V v1130 = v1124 - v1129;
-        const V v1131 = v592 * v978;
-        const V v1132 = v1126 - v1131;
-        const V v1133 = v592 * v949;
-        s477 -= v1133;
-        const V v1134 = v594 * v949;
-        s478 -= v1134;
-        const V v1135 = v614 * v1130;
-        s490 += v1135;
-        const V v1136 = v614 * v1132;
-        s491 += v1136;
-        const V v1137 = v64 + v617;
-        const V v1138 = v615 - v71;
-        const V v1139 = v1137 * v994;
-        const V v1140 = v1137 * v1000;
-        const V v1141 = v1137 * v1002;
-        const V v1142 = v1138 * v996;
-        const V v1143 = v1137 * v1004;
-        const V v1144 = v1137 * v1070;
-        const V v1145 = v1137 * v1111;
-        const V v1146 = v1138 * v1018;
-        const V v1147 = v1138 * v1077;
-        const V v1148 = v1138 * v1058;
-        const V v1149 = v1137 * v1103;
-        s506 += v1143;
-        s506 -= v1041;
-        const V v1150 = v1138 * v1084;
-        s511 += v1144;
-        s511 += v1150;
-        const V v1151 = v1138 * v1006;
-        s499 += v1151;
-        s499 += v1140;
-        const V v1152 = v1138 * v1012;
-        s500 += v1152;
-        s500 += v1141;
-        s505 += v1146;
-        s505 -= v1031;
-        const V v1153 = v1137 * v998;
-        s493 += v1153;
-        s493 += v1142;
-        const V v1154 = v1138 * v998;
-        s494 += v1139;
-        s494 += v1154;
-        const V v1155 = v1138 * v1075;
-        s514 += v1155;
-        s514 += v1145;
-        const V v1156 = v1137 * v1113;
-        s519 += v1147;
-        s519 += v1156;
-        const V v1157 = v1137 * v1109;
-        s523 += v1148;
-        s523 += v1157;
-        const V v1158 = v594 * v1008;
-        s499 -= v1158;
-        const V v1159 = v594 * v1010;
-        s500 -= v1159;
-        const V v1160 = v1137 * v1020;
-        s505 += v1160;
-        const V v1161 = v1138 * v1020;
-        s506 += v1161;
-        const V v1162 = v1138 * v1099;
-        s526 += v1149;
-        s526 += v1162;
-        const V v1163 = v594 * v1120;
-        s514 -= v1163;
-        const V v1164 = v594 * v1122;
-        s519 -= v1164;
-        const V v1165 = v594 * v1038;
-        s523 -= v1165;
-        const V v1166 = v594 * v1130;
-        s526 -= v1166;
-        const V v1167 = v70 + v616;
-        const V v1168 = v618 - v65;
-        const V v1169 = v1167 * v996;
-        const V v1170 = v1167 * v1006;
-        const V v1171 = v1167 * v1012;
-        const V v1172 = v1167 * v1018;
-        const V v1173 = v1168 * v994;
-        const V v1174 = v1167 * v1084;
-        const V v1175 = v1167 * v1075;
-        const V v1176 = v1168 * v1004;
-        const V v1177 = v1168 * v1072;
-        const V v1178 = v1167 * v1077;
-        const V v1179 = v1167 * v1058;
-        const V v1180 = v1168 * v1070;
-        s512 += v1180;
-        s512 += v1174;
-        s507 += v1172;
-        s507 -= v1043;
-        const V v1181 = v1168 * v1000;
-        s501 += v1170;
-        s501 += v1181;
-        const V v1182 = v1168 * v1002;
-        s502 += v1171;
-        s502 += v1182;
-        s508 += v1176;
-        s508 -= v1044;
-        const V v1183 = v1167 * v1086;
-        s517 += v1177;
-        s517 += v1183;
-        const V v1184 = v1168 * v998;
-        s495 += v1184;
-        s495 += v1169;
-        const V v1185 = v1167 * v998;
-        s496 += v1173;
-        s496 += v1185;
-        const V v1186 = v1168 * v1111;
-        s515 += v1175;
-        s515 += v1186;
-        const V v1187 = v1168 * v1113;
-        s520 += v1178;
-        s520 += v1187;
-        const V v1188 = v592 * v1008;
-        s501 -= v1188;
-        const V v1189 = v592 * v1010;
-        s502 -= v1189;
-        const V v1190 = v592 * v1038;
-        s524 += v1179;
-        s524 -= v1190;
-        const V v1191 = v592 * v1120;
-        s515 -= v1191;
-        const V v1192 = v592 * v1122;
-        s520 -= v1192;
-        const V v1193 = v1168 * v1020;
-        s507 += v1193;
-        const V v1194 = v1167 * v1020;
-        s508 += v1194;
-        const V v1195 = v1168 * v1103;
-        const V v1196 = v1168 * v1109;
-        s524 += v1196;
-        const V v1197 = v1168 * v1105;
-        const V v1198 = v592 * v1130;
-        s527 += v1195;
-        s527 -= v1198;
-        const V v1199 = v592 * v1132;
-        s529 += v1197;
-        s529 -= v1199;
-        const V v1200 = v1167 * v1099;
-        s527 += v1200;
-        const V v1201 = v1167 * v1101;
-        s529 += v1201;
-    }
-    const V v1202 = v370 + s475;
-    const V v1203 = s474 - v368;
-    const V v1204 = v374 + s479;
-    const V v1205 = s480 + v424;
-    const V v1206 = v64 * v1202;
-    const V v1207 = v1206 + s481;
-    const V v1208 = v65 * v1202;
-    const V v1209 = v1205 - v1208;
-    const V v1210 = v376 - v1204;
-    const V v1211 = v1204 - v376;
-    const V v1212 = v70 * v1203;
-    const V v1213 = v1212 + v1209;
-    const V v1214 = v71 * v1203;
-    const V v1215 = v1207 - v1214;
-    const V v1216 = v422 + v1215;
-    const V v1217 = v1213 - v1216;
-    const V v1218 = v1213 + v1216;
-    const V v1219 = v1210 - v1217;
-    const V v1220 = v1211 + v1218;
-    const V v1221 = v1211 - v1218;
-    const V v1222 = v1217 - v1211;
-    const V v1223 = v371 + s472;
-    const V v1224 = v342 + s471;
-    const V v1225 = s473 - v369;
-    const V v1226 = v377 - v373;
-    const V v1227 = s477 - v340;
-    const V v1228 = s476 + v1226;
-    const V v1229 = s478 - v341;
-    const V v1230 = v70 * v1223;
-    const V v1231 = v1230 + v1227;
-    const V v1232 = v71 * v1223;
-    const V v1233 = v1229 - v1232;
-    const V v1234 = v1224 - v1228;
-    const V v1235 = v1224 + v1228;
-    const V v1236 = v65 * v1225;
-    const V v1237 = v1231 - v1236;
-    const V v1238 = v64 * v1225;
-    const V v1239 = v1238 + v1233;
-    const V v1240 = v432 + v1237;
-    const V v1241 = v430 + v1239;
-    const V v1242 = v1240 - v1241;
-    const V v1243 = v1240 + v1241;
-    const V v1244 = v1234 - v1242;
-    const V v1245 = v1234 + v1242;
-    const V v1246 = v1235 + v1243;
-    softehl_store4(R + 0, 8, v1220, v1246, v1219, v1244);
-    const V v1247 = v1235 - v1243;
-    softehl_store4(R + 4, 8, v1221, v1247, v1222, v1245);
-    const V v1248 = v391 + s494;
-    const V v1249 = v392 + s495;
-    const V v1250 = v395 + s498;
-    const V v1251 = s493 - v390;
-    const V v1252 = v412 - v401;
-    const V v1253 = s496 - v393;
-    const V v1254 = s522 + v1252;
-    const V v1255 = s497 - v394;
-    const V v1256 = v71 * v1251;
-    const V v1257 = s511 - v1256;
-    const V v1258 = s512 - v399;
-    const V v1259 = s513 + v409;
-    const V v1260 = s517 - v400;
-    const V v1261 = v64 * v1248;
-    const V v1262 = v1261 + v1257;
-    const V v1263 = s518 + v411;
-    const V v1264 = v1258 - v406;
-    const V v1265 = v71 * v1255;
-    const V v1266 = v1259 - v1265;
-    const V v1267 = v1260 - v407;
-    const V v1268 = v71 * v1249;
-    const V v1269 = v1264 - v1268;
-    const V v1270 = v405 + v1262;
-    const V v1271 = v70 * v1255;
-    const V v1272 = v1271 + v1263;
-    const V v1273 = v70 * v1249;
-    const V v1274 = v1273 + v1267;
-    const V v1275 = v64 * v1250;
-    const V v1276 = v1275 + v1266;
-    const V v1277 = v64 * v1253;
-    const V v1278 = v1277 + v1269;
-    const V v1279 = v65 * v1250;
-    const V v1280 = v1272 - v1279;
-    const V v1281 = v65 * v1253;
-    const V v1282 = v1274 - v1281;
-    const V v1283 = v1254 + v1280;
-    const V v1284 = v1270 + v1278;
-    const V v1285 = v1278 - v1270;
-    const V v1286 = v1270 - v1278;
-    const V v1287 = v1276 + v1280;
-    const V v1288 = v1276 - v1285;
-    const V v1289 = v1286 - v1276;
-    const V v1290 = v1254 - v1287;
-    const V v1291 = v1278 + v1282;
-    const V v1292 = v1276 - v1284;
-    const V v1293 = v1285 - v1276;
-    const V v1294 = v1276 + v1284;
-    const V v1295 = v1282 - v1278;
-    const V v1296 = v1284 - v1276;
-    const V v1297 = v1280 - v1276;
-    const V v1298 = v1295 - v1276;
-    const V v1299 = v1280 - v1295;
-    const V v1300 = v1291 + v1294;
-    const V v1301 = v1280 - v1291;
-    const V v1302 = v1290 + v1296;
-    const V v1303 = v1280 + v1298;
-    const V v1304 = v1295 - v1280;
-    const V v1305 = v1291 - v1280;
-    const V v1306 = v1290 + v1301;
-    const V v1307 = v1287 + v1300;
-    const V v1308 = v1254 - v1297;
-    const V v1309 = v1302 + v1305;
-    const V v1310 = v1292 + v1306;
-    const V v1311 = v1287 + v1292;
-    const V v1312 = v1297 - v1254;
-    const V v1313 = v1311 - v1254;
-    const V v1314 = v1293 + v1299;
-    const V v1315 = v1305 + v1313;
-    const V v1316 = v1308 + v1314;
-    const V v1317 = v1293 + v1304;
-    const V v1318 = v1304 + v1308;
-    const V v1319 = v1299 + v1312;
-    const V v1320 = v1312 + v1317;
-    const V v1321 = v1283 + v1303;
-    const V v1322 = v1283 + v1307;
-    const V v1323 = v1289 - v1321;
-    const V v1324 = v1289 + v1321;
-    const V v1325 = v1288 + v1318;
-    const V v1326 = v1288 + v1319;
-    const V v1327 = v344 + s483;
-    const V v1328 = v349 - v347;
-    const V v1329 = v383 + s504;
-    const V v1330 = v444 + s500;
-    const V v1331 = v415 - v389;
-    const V v1332 = v446 + s502;
-    const V v1333 = s489 + v1328;
-    const V v1334 = v459 - v457;
-    const V v1335 = s525 + v1331;
-    const V v1336 = v460 - v458;
-    const V v1337 = s482 - v343;
-    const V v1338 = s523 + v1334;
-    const V v1339 = s487 + v356;
-    const V v1340 = s524 + v1336;
-    const V v1341 = s488 + v358;
-    const V v1342 = v1333 + v1338;
-    const V v1343 = v1333 - v1338;
-    const V v1344 = s499 - v442;
-    const V v1345 = v1333 + v1335;
-    const V v1346 = s501 - v448;
-    const V v1347 = s503 - v380;
-    const V v1348 = v1340 + v1343;
-    const V v1349 = s514 + v468;
-    const V v1350 = s515 + v470;
-    const V v1351 = s516 + v417;
-    const V v1352 = s519 + v464;
-    const V v1353 = s520 + v466;
-    const V v1354 = s521 + v414;
-    const V v1355 = v1338 + v1340;
-    const V v1356 = v71 * v1347;
-    const V v1357 = v1351 - v1356;
-    const V v1358 = v70 * v1347;
-    const V v1359 = v1358 + v1354;
-    const V v1360 = v71 * v1337;
-    const V v1361 = v70 * v1337;
-    const V v1362 = v1361 + v1341;
-    const V v1363 = v1335 + v1340;
-    const V v1364 = v1348 - v1335;
-    const V v1365 = v1335 - v1348;
-    const V v1366 = v1360 + v1338;
-    const V v1367 = v65 * v1327;
-    const V v1368 = v1362 - v1367;
-    const V v1369 = v65 * v1329;
-    const V v1370 = v1359 - v1369;
-    const V v1371 = v64 * v1327;
-    const V v1372 = v1371 + v1339;
-    const V v1373 = v64 * v1329;
-    const V v1374 = v1373 + v1357;
-    const V v1375 = v1366 - v1372;
-    const V v1376 = v1372 - v1360;
-    const V v1377 = v1368 - v1333;
-    const V v1378 = v1368 + v1370;
-    const V v1379 = v1368 - v1370;
-    const V v1380 = v1375 - v1377;
-    const V v1381 = v1374 + v1376;
-    const V v1382 = v1377 - v1376;
-    const V v1383 = v1370 + v1374;
-    const V v1384 = v1376 - v1374;
-    const V v1385 = v1370 - v1374;
-    const V v1386 = v1338 + v1382;
-    const V v1387 = v1355 + v1381;
-    const V v1388 = v1383 - v1363;
-    const V v1389 = v1335 - v1385;
-    const V v1390 = v1378 + v1387;
-    const V v1391 = v1382 - v1338;
-    const V v1392 = v1385 - v1335;
-    const V v1393 = v1345 + v1390;
-    const V v1394 = v1345 - v1355;
-    const V v1395 = v1386 + v1392;
-    const V v1396 = v1342 - v1363;
-    const V v1397 = v1392 - v1340;
-    const V v1398 = v71 * v1344;
-    const V v1399 = v1349 - v1398;
-    const V v1400 = v71 * v1346;
-    const V v1401 = v1350 - v1400;
-    const V v1402 = v70 * v1344;
-    const V v1403 = v1402 + v1352;
-    const V v1404 = v70 * v1346;
-    const V v1405 = v1404 + v1353;
-    const V v1406 = v64 * v1330;
-    const V v1407 = v1406 + v1399;
-    const V v1408 = v64 * v1332;
-    const V v1409 = v1408 + v1401;
-    const V v1410 = v65 * v1330;
-    const V v1411 = v1403 - v1410;
-    const V v1412 = v65 * v1332;
-    const V v1413 = v1405 - v1412;
-    const V v1414 = v1376 + v1407;
-    const V v1415 = v1374 + v1409;
-    const V v1416 = v1368 + v1411;
-    const V v1417 = v1407 + v1409;
-    const V v1418 = v1370 + v1413;
-    const V v1419 = v1411 - v1407;
-    const V v1420 = v1411 + v1413;
-    const V v1421 = v1413 - v1409;
-    const V v1422 = v1384 - v1407;
-    const V v1423 = v1380 - v1407;
-    const V v1424 = v1414 - v1415;
-    const V v1425 = v1414 + v1415;
-    const V v1426 = v1397 + v1421;
-    const V v1427 = v1340 - v1421;
-    const V v1428 = v1409 + v1422;
-    const V v1429 = v1423 - v1411;
-    const V v1430 = v1388 + v1409;
-    const V v1431 = v1379 - v1411;
-    const V v1432 = v1425 - v1416;
-    const V v1433 = v1413 + v1430;
-    const V v1434 = v1413 + v1431;
-    const V v1435 = v1432 - v1418;
-    const V v1436 = v1396 + v1416;
-    const V v1437 = v1436 - v1418;
-    const V v1438 = v1428 - v1434;
-    const V v1439 = v1428 + v1434;
-    const V v1440 = v1435 - v1342;
-    const V v1441 = v1429 - v1433;
-    const V v1442 = v1429 + v1433;
-    softehl_store4(K + 32, 64, v1310, v1441, v1315, v1442);
-    const V v1443 = v1424 + v1437;
-    const V v1444 = v1424 - v1437;
-    const V v1445 = v1440 - v1363;
-    softehl_store4(K + 16, 64, v1323, v1445, v1324, v1444);
-    const V v1446 = v1365 - v1438;
-    const V v1447 = v1381 - v1417;
-    const V v1448 = v1393 + v1417;
-    const V v1449 = v1438 - v1364;
-    const V v1450 = v1378 - v1420;
-    const V v1451 = v1420 + v1448;
-    softehl_store4(K + 0, 64, v1322, v1451, v1323, v1443);
-    const V v1452 = v1391 + v1419;
-    const V v1453 = v1395 - v1419;
-    const V v1454 = v1426 + v1452;
-    const V v1455 = v1427 + v1453;
-    softehl_store4(K + 52, 64, v1326, v1455, v1325, v1446);
-    const V v1456 = v1389 + v1427;
-    const V v1457 = v1452 + v1456;
-    softehl_store4(K + 48, 64, v1320, v1454, v1316, v1457);
-    const V v1458 = v1447 + v1450;
-    const V v1459 = v1447 - v1450;
-    const V v1460 = v1364 + v1439;
-    const V v1461 = v1364 - v1439;
-    const V v1462 = v1459 - v1394;
-    softehl_store4(K + 20, 64, v1315, v1462, v1316, v1449);
-    const V v1463 = v1394 + v1458;
-    softehl_store4(K + 4, 64, v1310, v1463, v1320, v1460);
-    const V v1464 = v1394 - v1458;
-    softehl_store4(K + 36, 64, v1309, v1464, v1326, v1461);
-    const V v1465 = v378 + s509;
-    const V v1466 = v345 + s484;
-    const V v1467 = v386 - v420;
-    const V v1468 = v363 + s486;
-    const V v1469 = v348 - v350;
-    const V v1470 = v433 + s505;
-    const V v1471 = v434 + s507;
-    const V v1472 = s531 + v1467;
-    const V v1473 = s492 + v1469;
-    const V v1474 = s485 - v346;
-    const V v1475 = s490 - v364;
-    const V v1476 = v1468 - v1473;
-    const V v1477 = v1468 + v1473;
-    const V v1478 = 2.0 * v1473;
-    const V v1479 = v1468 + v1478;
-    const V v1480 = v360 + v1475;
-    const V v1481 = s491 - v365;
-    const V v1482 = v1473 - v1472;
-    const V v1483 = v1472 + v1473;
-    const V v1484 = v1472 + v1479;
-    const V v1485 = s506 - v435;
-    const V v1486 = v362 + v1481;
-    const V v1487 = s508 - v436;
-    const V v1488 = s510 - v381;
-    const V v1489 = s526 - v337;
-    const V v1490 = s527 - v366;
-    const V v1491 = s528 - v338;
-    const V v1492 = s529 - v367;
-    const V v1493 = s530 - v339;
-    const V v1494 = v64 * v1485;
-    const V v1495 = v1494 + v1489;
-    const V v1496 = v64 * v1487;
-    const V v1497 = v1496 + v1490;
-    const V v1498 = v64 * v1488;
-    const V v1499 = v1498 + v1491;
-    const V v1500 = v65 * v1487;
-    const V v1501 = v1492 - v1500;
-    const V v1502 = v65 * v1488;
-    const V v1503 = v1493 - v1502;
-    const V v1504 = v65 * v1474;
-    const V v1505 = v1486 - v1504;
-    const V v1506 = v64 * v1474;
-    const V v1507 = v1506 + v1480;
-    const V v1508 = v450 + v1495;
-    const V v1509 = v452 + v1497;
-    const V v1510 = v426 + v1499;
-    const V v1511 = v454 + v1501;
-    const V v1512 = v428 + v1503;
-    const V v1513 = v71 * v1470;
-    const V v1514 = v1508 - v1513;
-    const V v1515 = v71 * v1466;
-    const V v1516 = v1507 - v1515;
-    const V v1517 = v70 * v1466;
-    const V v1518 = v1517 + v1505;
-    const V v1519 = v71 * v1471;
-    const V v1520 = v1509 - v1519;
-    const V v1521 = v70 * v1471;
-    const V v1522 = v1521 + v1511;
-    const V v1523 = v71 * v1465;
-    const V v1524 = v1510 - v1523;
-    const V v1525 = v70 * v1465;
-    const V v1526 = v1525 + v1512;
-    const V v1527 = v1514 - v1520;
-    const V v1528 = v1514 + v1520;
-    const V v1529 = v1516 - v1518;
-    const V v1530 = v1516 + v1518;
-    const V v1531 = v1516 - v1524;
-    const V v1532 = v1516 + v1524;
-    const V v1533 = v1518 - v1526;
-    const V v1534 = v1518 + v1526;
-    const V v1535 = v1476 + v1527;
-    const V v1536 = v1531 + v1535;
-    const V v1537 = v1520 - v1522;
-    const V v1538 = v1520 + v1522;
-    const V v1539 = v1531 - v1527;
-    const V v1540 = v1524 - v1526;
-    const V v1541 = v1524 + v1526;
-    const V v1542 = v1529 + v1536;
-    const V v1543 = v1476 - v1529;
-    const V v1544 = v1533 - v1537;
-    const V v1545 = v1534 - v1538;
-    const V v1546 = v1539 - v1544;
-    const V v1547 = v1539 + v1544;
-    const V v1548 = v1482 + v1537;
-    const V v1549 = v1532 - v1528;
-    const V v1550 = v1484 + v1528;
-    const V v1551 = v1533 + v1548;
-    const V v1552 = v1538 + v1550;
-    const V v1553 = v1482 - v1540;
-    const V v1554 = v1540 + v1551;
-    const V v1555 = v1532 + v1552;
-    const V v1556 = v1545 + v1549;
-    const V v1557 = v1543 - v1553;
-    const V v1558 = v1543 + v1553;
-    const V v1559 = v1542 + v1554;
-    const V v1560 = v1542 - v1554;
-    softehl_store4(K + 24, 64, v1443, v1559, v1444, v1560);
-    const V v1561 = v1534 + v1555;
-    const V v1562 = v1549 - v1545;
-    const V v1563 = v1546 + v1557;
-    const V v1564 = v1547 + v1558;
-    softehl_store4(K + 56, 64, v1460, v1564, v1449, v1563);
-    const V v1565 = v1541 + v1561;
-    const V v1566 = v1483 - v1541;
-    const V v1567 = v1557 - v1546;
-    const V v1568 = v1558 - v1547;
-    softehl_store4(K + 60, 64, v1461, v1568, v1446, v1567);
-    const V v1569 = v1530 + v1565;
-    softehl_store4(K + 8, 64, v1451, v1569, v1445, v1559);
-    const V v1570 = v1477 - v1530;
-    const V v1571 = v1562 - v1566;
-    const V v1572 = v1570 + v1571;
-    softehl_store4(K + 28, 64, v1442, v1572, v1457, v1563);
-    const V v1573 = v1566 + v1570;
-    const V v1574 = v1556 + v1573;
-    softehl_store4(K + 12, 64, v1441, v1574, v1454, v1564);
-    softehl_store4(K + 40, 64, v1463, v1574, v1462, v1572);
-    const V v1575 = v1573 - v1556;
-    softehl_store4(K + 44, 64, v1464, v1575, v1455, v1568);
-}
-
-void softehl_solid_taylor_mean_arruda_boyce_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_arruda_boyce_tangent_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, tangent + (8 * 8) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_arruda_boyce_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), tangent + (8 * 8) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    double K[SOFTEHL_LANES * (8 * 8)];
-    softehl_solid_taylor_mean_arruda_boyce_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (8 * 8) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_solid_taylor_mean_arruda_boyce_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.25 * parameters[2];
-    const V v2 = X0 + d0;
-    const V v3 = X2 + d2;
-    const V v4 = X4 + d4;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 1.5707963267948966 * parameters[2], v2 = 6.283185307179586 * parameters[0],
+        v3 = parameters[1] * parameters[1], v4 = parameters[1] * v3;
     const V v5 = X0 - X2;
-    const V v6 = X4 - X0;
-    const V v7 = X6 + d6;
-    const V v8 = X4 - X6;
-    const V v9 = X4 - X2;
-    const V v10 = v6 - X2;
-    const V v11 = X1 + d1;
-    const V v12 = X6 + v10;
-    const V v13 = X5 + d5;
-    const V v14 = 0.25 * v12;
-    const V v15 = X1 - X3;
-    const V v16 = X1 + X3;
-    const V v17 = X5 - X3;
-    const V v18 = X3 + d3;
-    const V v19 = X5 - X7;
-    const V v20 = X5 + X7;
-    const V v21 = X7 + d7;
-    const V v22 = v5 + v8;
-    const V v23 = v15 + v19;
-    const V v24 = v8 - v5;
-    const V v25 = 0.25 * v22;
-    const V v26 = v16 + v20;
-    const V v27 = v19 - v15;
-    const V v28 = 0.25 * v23;
-    const V v29 = v20 - v16;
-    const V v30 = v12 - v24;
-    const V v31 = v24 + v12;
-    const V v32 = 0.25 * v26;
-    const V v33 = 0.25 * v24;
-    const V v34 = 0.25 * v27;
-    const V v35 = 0.0625 * v30;
-    const V v36 = 0.0625 * v31;
-    const V v37 = v24 - v12;
-    const V v38 = 0.25 * v29;
-    const V v39 = 1.0 / v32;
-    const V v40 = v32 * v32;
-    const V v41 = v33 * v38;
-    const V v42 = 0.0625 * v37;
-    const V v43 = v27 - v29;
-    const V v44 = 1.0 / v40;
-    const V v45 = v27 + v29;
-    const V v46 = v34 * v14;
-    const V v47 = v41 - v46;
-    const V v48 = v29 - v27;
-    const V v49 = 0.0625 * v43;
-    const V v50 = 0.0625 * v45;
-    const V v51 = 1.0 / v47;
-    const V v52 = 0.0625 * v48;
-    const double v53 = parameters[1] * parameters[1];
-    const double v54 = parameters[1] * v53;
-    const double v55 = v53 * v53;
-    const double v56 = 1.0 / v53;
-    const V v57 = 0.25 * v39;
-    const double v58 = v54 * v54;
-    const double v59 = 1.0 / v58;
-    const double v60 = v55 * v55;
-    const double v61 = 1.0 / v55;
-    const double v62 = 1.0 / v60;
-    const V v63 = 0.25 * v44;
-    const V v64 = v49 * v51;
-    const V v65 = v35 * v51;
-    const V v66 = v50 * v51;
-    const V v67 = v36 * v51;
-    const V v68 = v52 * v51;
-    const V v69 = v42 * v51;
-    const double v70 = 0.0038515769944341373 * v62;
-    const V v71 = v28 * v67;
-    const V v72 = v25 * v66;
-    const V v73 = v71 - v72;
-    const double v74 = parameters[0] * v56;
-    const double v75 = parameters[0] * v61;
-    const double v76 = parameters[0] * v59;
-    const double v77 = 0.1 * v74;
-    const double v78 = 0.03142857142857143 * v75;
-    const double v79 = 0.010857142857142857 * v76;
-    const V v80 = v28 * v65;
-    const V v81 = 0.25 - v80;
-    const V v82 = v25 * v64;
-    const V v83 = v81 - v82;
-    const V v84 = v28 * v69;
-    const V v85 = 0.25 - v84;
-    const V v86 = v25 * v68;
-    const V v87 = v85 - v86;
-    const V v88 = v73 - 0.25;
-    const V v89 = (-0.25) - v73;
-    V s90 = softehl_splat(0.0);
-    V s91 = softehl_splat(0.0);
-    V s92 = softehl_splat(0.0);
-    V s93 = softehl_splat(0.0);
-    V s94 = softehl_splat(0.0);
-    V s95 = softehl_splat(0.0);
-    V s96 = softehl_splat(0.0);
-    V s97 = softehl_splat(0.0);
+    const double v6 = v3 * v3, v7 = 1.0 / v3;
+    const V v8 = X4 - X2, v9 = X4 - X6, v10 = X6 + (X4 - X0 - X2);
+    const double v11 = 1.0 / v6;
+    const V v12 = v5 + v9, v13 = 0.25 * v10, v14 = 0.0625 * v10;
+    const double v15 = 1.0 / (v6 * v6), v16 = 1.0 / (v4 * v4);
+    const V v17 = v9 - v5, v18 = 0.25 * v17, v19 = 0.0625 * v17, v20 = X1 - X3, v21 = X1 + X3,
+        v22 = X5 - X3, v23 = X5 - X7, v24 = X5 + X7, v25 = v23 - v20, v26 = d0 - d2,
+        v27 = v24 - v21, v28 = 0.25 * (v21 + v24), v29 = 0.25 * v25, v30 = 0.0625 * v25,
+        v31 = 0.25 * v27, v32 = 0.0625 * v27, v33 = d1 + d3, v34 = d1 - d3,
+        v35 = 1.0 / (v18 * v31 - v29 * v13), v36 = d0 + d2 - d4 - d6, v37 = d4 - d6, v38 = d5 + d7,
+        v39 = d5 - d7, v40 = v26 - v37, v41 = v26 + v37, v42 = 0.25 * (1.0 / v28), v43 = v33 - v38,
+        v44 = v33 + v38, v45 = v34 - v39, v46 = v34 + v39, v47 = 0.25 * (1.0 / (v28 * v28)),
+        v48 = v30 * v35, v49 = v32 * v35, v50 = v35 * (v12 * v30), v51 = v35 * (v12 * v32),
+        v52 = (v20 + v23) * v35, v53 = v35 * v14, v54 = v19 * v35, v55 = v14 * v52, v56 = v19 * v52,
+        v57 = 0.25 * v51 - 0.25 * v55, v58 = 0.25 * v56 - 0.25 * v50, v59 = v43 * v48 - v45 * v49,
+        v60 = 1.0 - v43 * v54 + v45 * v53, v61 = 1.0 - v40 * v49 + v36 * v48,
+        v62 = v40 * v53 - v36 * v54;
+    V s63 = {0}, s64 = {0}, s65 = {0}, s66 = {0}, s67 = {0}, s68 = {0}, s69 = {0}, s70 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v98 = 1.0 - w[1];
-        const double v99 = 1.0 + w[1];
-        const double v100 = 0.25 * w[1];
-        const double v101 = 1.0 - w[0];
-        const double v102 = 1.0 + w[0];
-        const double v103 = 0.25 * v98;
-        const double v104 = 0.25 * v99;
-        const double v105 = 0.25 * w[0];
-        const double v106 = 0.25 - v100;
-        const double v107 = 0.25 + v100;
-        const double v108 = 0.25 + v105;
-        const double v109 = 0.25 - v105;
-        const double v110 = v103 * v101;
-        const double v111 = v103 * v102;
-        const double v112 = v102 * v104;
-        const double v113 = v101 * v104;
-        const double v114 = v100 - 0.25;
-        const V v115 = X2 * v106;
-        const double v116 = v105 - 0.25;
-        const V v117 = X3 * v106;
-        const V v118 = X3 * v111;
-        const V v119 = X6 * v109;
-        const V v120 = X7 * v109;
-        const V v121 = v110 * v2;
-        const V v122 = v107 * v8;
-        const V v123 = v115 + v122;
-        const V v124 = v107 * v19;
-        const V v125 = v117 + v124;
-        const V v126 = X7 * v113;
-        const V v127 = v126 + v118;
-        const V v128 = v110 * v11;
-        const V v129 = v108 * v9;
-        const V v130 = v119 + v129;
-        const V v131 = v108 * v17;
-        const V v132 = v120 + v131;
-        const V v133 = v112 * v4;
-        const V v134 = v121 + v133;
-        const V v135 = X0 * v114;
-        const V v136 = v135 + v123;
-        const V v137 = X0 * v116;
-        const V v138 = v137 + v130;
-        const V v139 = X1 * v114;
-        const V v140 = v139 + v125;
-        const V v141 = X1 * v110;
-        const V v142 = v141 + v127;
-        const V v143 = X1 * v116;
-        const V v144 = v143 + v132;
-        const V v145 = v112 * v13;
-        const V v146 = v128 + v145;
-        const V v147 = X5 * v112;
-        const V v148 = v147 + v142;
-        const V v149 = v113 * v7;
-        const V v150 = v149 + v134;
-        const V v151 = v113 * v21;
-        const V v152 = v151 + v146;
-        const V v153 = v136 * v144;
-        const V v154 = w[0] * v136;
-        const V v155 = w[1] * v144;
-        const V v156 = v3 * v111;
-        const V v157 = v156 + v150;
-        const V v158 = v18 * v111;
-        const V v159 = v158 + v152;
-        const V v160 = w[1] * v138;
-        const V v161 = v154 - v160;
-        const double v162 = w[1] * w[2];
-        const V v163 = v140 * v138;
-        const V v164 = v153 - v163;
-        const V v165 = w[0] * v140;
-        const V v166 = v155 - v165;
-        const V v167 = w[2] * v148;
-        const V v168 = v164 * v148;
-        const V v169 = 0.25 * v164;
-        const V v170 = v166 * v167;
-        s96 += v170;
-        const V v171 = v161 * v167;
-        s97 += v171;
-        const V v172 = w[2] * v169;
-        s90 += v172;
-        const V v173 = v162 * v169;
-        s92 += v173;
-        const V v174 = w[2] * v168;
-        s93 += v174;
-        const V v175 = v162 * v168;
-        s95 += v175;
-        const V v176 = w[0] * v172;
-        s91 += v176;
-        const V v177 = w[0] * v174;
-        s94 += v177;
-        softehl_store2(R + 7 * q + 0, (7 * points), v157, v159);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v71 = 1.0 - w[1], v72 = 1.0 + w[1], v73 = 0.25 * w[1], v74 = 1.0 - w[0],
+            v75 = 1.0 + w[0], v76 = 0.25 * w[0], v77 = 0.25 * v72, v78 = 0.25 - v73,
+            v79 = 0.25 + v73, v80 = 0.25 + v76, v81 = 0.25 - v76;
+        const V v82 = X5 * v75; const double v83 = v73 - 0.25;
+        const V v84 = X3 * v75, v85 = X3 * v78, v86 = X2 * v78;
+        const double v87 = v76 - 0.25;
+        const V v88 = X6 * v81, v89 = X7 * v81, v90 = X7 * v74, v91 = v82 + v90, v92 = X1 * v74,
+            v93 = v92 + v84, v94 = v77 * v91, v95 = X1 * v83, v96 = X1 * v87, v97 = X0 * v83,
+            v98 = X0 * v87, v99 = 0.25 * v93, v100 = v71 * v99, v101 = v94 + v100, v102 = v79 * v23,
+            v103 = v102 + (v85 + v95), v104 = v79 * v9, v105 = v104 + (v86 + v97), v106 = v80 * v22,
+            v107 = v106 + (v89 + v96), v108 = v80 * v8, v109 = v108 + (v88 + v98);
+        const double v110 = w[1] * w[2];
+        const V v111 = v105 * v107 - v109 * v103, v112 = w[2] * v101, v113 = v101 * v111,
+            v114 = 0.25 * v111;
+        s69 += v112 * (w[1] * v107 - w[0] * v103); s70 += v112 * (w[0] * v105 - w[1] * v109);
+        const V v115 = w[2] * v114; s63 += v115; s65 += v110 * v114; const V v116 = w[2] * v113;
+        s66 += v116; s68 += v110 * v113; s64 += w[0] * v115; s67 += w[0] * v116;
     }
-    const V v178 = 1.0 / s93;
-    const V v179 = s94 * v178;
-    const V v180 = v178 * s95;
-    const V v181 = v178 * s96;
-    const V v182 = v178 * s97;
-    const V v183 = s90 * v178;
-    const V v184 = s91 * v178;
-    const V v185 = s92 * v178;
-    const V v186 = v183 - v185;
-    const V v187 = v183 + v185;
-    const V v188 = v184 + v186;
-    const V v189 = v186 - v184;
-    const V v190 = v83 * v182;
-    const V v191 = v65 + v190;
-    const V v192 = v83 * v181;
-    const V v193 = v64 + v192;
-    const V v194 = v88 * v181;
-    const V v195 = v66 + v194;
-    const V v196 = v88 * v182;
-    const V v197 = v196 - v67;
-    const V v198 = v89 * v182;
-    const V v199 = v67 + v198;
-    const V v200 = v89 * v181;
-    const V v201 = v200 - v66;
-    const V v202 = v87 * v181;
-    const V v203 = v68 + v202;
-    const V v204 = v87 * v182;
-    const V v205 = v69 + v204;
-    const V v206 = v184 + v187;
-    const V v207 = d2 * v197;
-    const V v208 = d2 * v195;
-    const V v209 = 1.0 + v208;
-    const V v210 = d3 * v195;
-    const V v211 = d3 * v197;
-    const V v212 = 1.0 + v211;
-    const V v213 = v187 - v184;
-    const V v214 = d1 * v189;
-    const V v215 = 1.0 + v214;
-    const V v216 = d3 * v188;
-    const V v217 = v216 + v215;
-    const V v218 = d0 * v191;
-    const V v219 = v218 + v207;
-    const V v220 = d1 * v191;
-    const V v221 = v220 + v212;
-    const V v222 = d0 * v193;
-    const V v223 = v222 + v209;
-    const V v224 = d1 * v193;
-    const V v225 = v224 + v210;
-    const V v226 = d4 * v205;
-    const V v227 = v226 + v219;
-    const V v228 = d4 * v203;
-    const V v229 = v228 + v223;
-    const V v230 = d5 * v205;
-    const V v231 = v230 + v221;
-    const V v232 = d5 * v203;
-    const V v233 = v232 + v225;
-    const V v234 = d5 * v206;
-    const V v235 = v234 + v217;
-    const V v236 = d6 * v199;
-    const V v237 = v236 + v227;
-    const V v238 = d6 * v201;
-    const V v239 = v238 + v229;
-    const V v240 = d7 * v199;
-    const V v241 = v240 + v231;
-    const V v242 = d7 * v201;
-    const V v243 = v242 + v233;
-    const V v244 = d7 * v213;
-    const V v245 = v244 + v235;
-    const V v246 = v239 * v241;
-    const V v247 = v237 * v243;
-    const V v248 = v246 - v247;
-    const V v249 = v245 * v248;
+    const V v117 = 1.0 / s66, v118 = s67 * v117, v119 = v117 * s68, v120 = v117 * s69,
+        v121 = 0.25 * v120, v122 = v117 * s70, v123 = 0.25 * v122, v124 = s63 * v117,
+        v125 = s64 * v117, v126 = s65 * v117, v127 = v55 * v121, v128 = v55 * v123,
+        v129 = v56 * v121, v130 = v56 * v123, v131 = v50 * v121, v132 = v50 * v123,
+        v133 = v129 - v131, v134 = v130 - v132, v135 = v51 * v121, v136 = v51 * v123,
+        v137 = v135 - v127, v138 = v136 - v128, v139 = 1.0 + v124 * v44 - v126 * v43 - v125 * v45,
+        v140 = v139 * v139, v141 = v43 * v133 + (v45 * v137 + (v59 + v46 * v121)),
+        v142 = v43 * v134 + (v45 * v138 + (v60 + v46 * v123)),
+        v143 = v40 * v137 + (v36 * v133 + (v61 + v41 * v121)),
+        v144 = v40 * v138 + (v36 * v134 + (v62 + v41 * v123)), v145 = v143 * v142 - v144 * v141,
+        v146 = v145 * v145, v147 = s66 * v1 * (1.0 - 1.0 / (v140 * v146)),
+        v148 = v140 * (2.0 * v145) * v147, v149 = 2.0 * v139 * v146 * v147, v150 = v141 * v148,
+        v151 = v144 * v148, v152 = v142 * v148, v153 = v143 * v148, v154 = v125 * v149,
+        v155 = v126 * v149, v156 = v124 * v149, v157 = v123 * v153, v158 = v123 * v150,
+        v159 = v121 * v152, v160 = v121 * v151, v161 = v134 * v153 + (v131 - v129) * v151,
+        v162 = v138 * v153 + (v127 - v135) * v151, v163 = v133 * v152 + (v132 - v130) * v150,
+        v164 = v137 * v152 + (v128 - v136) * v150;
+    V s165 = {0}, s166 = {0}, s167 = {0}, s168 = {0}, s169 = {0}, s170 = {0}, s171 = {0},
+        s172 = {0}, s173 = {0}, s174 = {0}, s175 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v250 = w[0] - v179;
-        const V v251 = w[1] - v180;
-        const V v252 = v34 * v250;
-        const V v253 = v38 * v251;
-        const V v254 = v33 * v250;
-        const V v255 = v57 * v250;
-        const V v256 = v184 + v255;
-        const V v257 = v57 * v251;
-        const V v258 = v185 + v257;
-        const V v259 = v14 * v251;
-        const V v260 = v254 - v259;
-        const V v261 = v51 * v260;
-        const V v262 = v182 + v261;
-        const V v263 = v253 + v252;
-        const V v264 = v253 - v252;
-        const V v265 = v51 * v264;
-        const V v266 = v181 + v265;
-        const V v267 = v63 * v263;
-        const V v268 = v183 - v267;
-        const V v269 = v83 * v262;
-        const V v270 = v65 + v269;
-        const V v271 = v87 * v262;
-        const V v272 = v69 + v271;
-        const V v273 = v258 - v268;
-        const V v274 = v258 + v268;
-        const V v275 = v83 * v266;
-        const V v276 = v64 + v275;
-        const V v277 = v87 * v266;
-        const V v278 = v68 + v277;
-        const V v279 = v89 * v262;
-        const V v280 = v67 + v279;
-        const V v281 = v89 * v266;
-        const V v282 = v88 * v266;
-        const V v283 = v66 + v282;
-        const V v284 = v88 * v262;
-        const V v285 = v284 - v67;
-        const V v286 = v256 + v273;
-        const V v287 = v256 - v273;
-        const V v288 = v256 + v274;
-        const V v289 = v281 - v66;
-        const V v290 = v274 - v256;
-        const V v291 = d0 * v270;
-        const V v292 = d0 * v276;
-        const V v293 = 1.0 + v292;
-        const V v294 = d1 * v276;
-        const V v295 = d1 * v270;
-        const V v296 = 1.0 + v295;
-        const V v297 = d1 * v286;
-        const V v298 = 1.0 - v297;
-        const V v299 = d2 * v285;
-        const V v300 = v291 + v299;
-        const V v301 = d2 * v283;
-        const V v302 = v301 + v293;
-        const V v303 = d3 * v283;
-        const V v304 = v294 + v303;
-        const V v305 = d3 * v285;
-        const V v306 = v305 + v296;
-        const V v307 = d3 * v287;
-        const V v308 = v307 + v298;
-        const V v309 = d4 * v272;
-        const V v310 = v309 + v300;
-        const V v311 = d4 * v278;
-        const V v312 = v311 + v302;
-        const V v313 = d5 * v278;
-        const V v314 = v313 + v304;
-        const V v315 = d5 * v272;
-        const V v316 = v315 + v306;
-        const V v317 = d5 * v288;
-        const V v318 = v317 + v308;
-        const V v319 = d6 * v280;
-        const V v320 = v319 + v310;
-        const V v321 = d6 * v289;
-        const V v322 = v321 + v312;
-        const V v323 = d7 * v289;
-        const V v324 = v323 + v314;
-        const V v325 = d7 * v280;
-        const V v326 = v325 + v316;
-        const V v327 = d7 * v290;
-        const V v328 = v327 + v318;
-        const V v329 = v322 * v326;
-        const V v330 = v320 * v324;
-        const V v331 = v329 - v330;
-        const V v332 = v331 * v328;
-        const V v333 = 1.0 / v332;
-        const V v334 = v249 * v333;
-        const M v335 = softehl_eq(v334, softehl_splat(0.0));
-        V v336 = softehl_splat(0.0);
-        const M m337 = ~v335;
-        if (softehl_any(m337)) {
-            const V v338 = softehl_vrcbrt(v334);
-            const V v339 = v334 * v338;
-            const V v340 = v338 * v339;
-            v336 = softehl_blend(m337, v340, v336);
-        }
-        const V v341 = v322 * v336;
-        const V v342 = v320 * v336;
-        const V v343 = v324 * v336;
-        const V v344 = v326 * v336;
-        const V v345 = v328 * v336;
-        const V v346 = 2.0 * v341;
-        const V v347 = v341 * v341;
-        const V v348 = 2.0 * v342;
-        const V v349 = 2.0 * v343;
-        const V v350 = 2.0 * v344;
-        const V v351 = v345 * v345;
-        const V v352 = v341 * v344;
-        const V v353 = 2.0 * v345;
-        const V v354 = v342 * v342;
-        const V v355 = v347 + v354;
-        const V v356 = v345 * v353;
-        const V v357 = v342 * v343;
-        const V v358 = v352 - v357;
-        const V v359 = 2.0 * v351;
-        const V v360 = v343 * v343;
-        const V v361 = v360 + v355;
-        const V v362 = v345 * v358;
-        const V v363 = v358 * v358;
-        const V v364 = v359 * v358;
-        const V v365 = v344 * v344;
-        const V v366 = v365 + v361;
-        const V v367 = v351 + v366;
-        const V v368 = v351 * v363;
-        const V v369 = 1.0 / v362;
-        const V v370 = v367 * v367;
-        const V v371 = v77 * v367;
-        const V v372 = v370 * v370;
-        const V v373 = v367 * v370;
-        const V v374 = softehl_vrcbrt(v368);
-        const V v375 = 1.0 / v368;
-        const V v376 = v77 * v374;
-        const V v377 = v78 * v370;
-        const V v378 = v370 * v376;
-        const V v379 = v375 * v377;
-        const V v380 = v372 * v70;
-        const V v381 = v79 * v372;
-        const V v382 = v375 * v381;
-        const V v383 = v378 + v382;
-        const V v384 = v374 * v374;
-        const V v385 = v384 * v371;
-        const V v386 = v385 + v379;
-        const V v387 = v78 * v384;
-        const V v388 = v384 * v384;
-        const V v389 = v373 * v387;
-        const V v390 = v389 + v383;
-        const V v391 = v79 * v388;
-        const V v392 = v373 * v391;
-        const V v393 = v392 + v386;
-        const V v394 = 1.0 - v375;
-        const V v395 = v1 * v394;
-        const V v396 = 0.3333333333333333 * v388;
-        const V v397 = v388 * v380;
-        const V v398 = 0.5 + v397;
-        const V v399 = parameters[0] * v398;
-        const V v400 = v367 * v399;
-        const V v401 = v400 + v390;
-        const V v402 = v374 * v399;
-        const V v403 = v402 + v393;
-        const V v404 = v396 * v401;
-        const V v405 = v395 - v404;
-        const V v406 = v364 * v405;
-        const V v407 = v363 * v405;
-        const V v408 = v403 + v407;
-        const V v409 = v356 * v408;
-        const V v410 = v369 * v409;
-        const V v411 = v350 * v403;
-        const V v412 = v349 * v403;
-        const V v413 = v348 * v403;
-        const V v414 = v346 * v403;
-        const V v415 = v343 * v406;
-        const V v416 = v413 - v415;
-        const V v417 = v344 * v406;
-        const V v418 = v414 + v417;
-        const V v419 = v343 * v418;
-        const V v420 = v344 * v416;
-        const V v421 = v419 + v420;
-        const V v422 = v369 * v421;
-        const V v423 = v341 * v418;
-        const V v424 = v341 * v406;
-        const V v425 = v411 + v424;
-        const V v426 = v344 * v425;
-        const V v427 = v342 * v406;
-        const V v428 = v412 - v427;
-        const V v429 = v342 * v416;
-        const V v430 = v423 + v429;
-        const V v431 = v343 * v428;
-        const V v432 = v426 + v431;
-        const V v433 = v369 * v430;
-        const V v434 = v369 * v432;
-        softehl_store4(R + 7 * q + 2, (7 * points), v362, v433, v434, v410);
-        softehl_store1(R + 7 * q + 6, (7 * points), v422);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v176 = 1.0 - w[0], v177 = 1.0 + w[0], v178 = 0.25 * w[0], v179 = 1.0 - w[1],
+            v180 = 1.0 + w[1], v181 = 0.25 * w[1], v182 = 0.25 + v178, v183 = 0.25 - v178,
+            v184 = 0.25 * v180;
+        const V v185 = w[0] - v118;
+        const double v186 = 0.25 - v181, v187 = 0.25 + v181;
+        const V v188 = w[1] - v119; const double v189 = v178 - 0.25;
+        const V v190 = X6 * v183, v191 = X7 * v183, v192 = X7 * v176;
+        const double v193 = v181 - 0.25;
+        const V v194 = v29 * v185, v195 = X2 * v186, v196 = v31 * v188, v197 = X3 * v186,
+            v198 = v182 * v8, v199 = v182 * v22, v200 = X1 * v176, v201 = v187 * v9,
+            v202 = v187 * v23, v203 = X3 * v177, v204 = v200 + v203, v205 = X5 * v177,
+            v206 = v205 + v192, v207 = X1 * v193, v208 = v207 + (v197 + v202), v209 = X0 * v193,
+            v210 = v209 + (v195 + v201), v211 = X0 * v189, v212 = v211 + (v190 + v198),
+            v213 = X1 * v189, v214 = v213 + (v191 + v199), v215 = 0.25 * v204, v216 = v184 * v206,
+            v217 = v179 * v215, v218 = v216 + v217, v219 = v210 * v214 - v208 * v212,
+            v220 = v125 + v42 * v185, v221 = v126 + v42 * v188, v222 = v218 * v219,
+            v223 = v124 - v47 * (v196 + v194), v224 = v122 + v35 * (v18 * v185 - v13 * v188),
+            v225 = v120 + v35 * (v196 - v194), v226 = w[2] * v2 * v222, v227 = 0.25 * v224,
+            v228 = 0.25 * v225, v229 = v224 * v58, v230 = v225 * v58, v231 = v224 * v57,
+            v232 = v225 * v57, v233 = v7 * v226, v234 = v11 * v226, v235 = v16 * v226,
+            v236 = v15 * v226, v237 = v40 * v232 + (v36 * v230 + (v61 + v41 * v228)),
+            v238 = v40 * v231 + (v36 * v229 + (v62 + v41 * v227)),
+            v239 = v45 * v232 + (v43 * v230 + (v59 + v46 * v228)),
+            v240 = v45 * v231 + (v43 * v229 + (v60 + v46 * v227)),
+            v241 = v223 * v44 + (1.0 - v221 * v43 - v220 * v45), v242 = v237 * v240 - v238 * v239,
+            v243 = v241 * v241, v244 = v242 * v242,
+            v245 = v243 + (v240 * v240 + (v239 * v239 + (v237 * v237 + v238 * v238))),
+            v246 = v244 * v243, v247 = softehl_vrcbrt(v246), v248 = 1.0 / v246, v249 = v245 * v245,
+            v250 = v249 * v249, v251 = v247 * v247, v252 = v251 * v251, v253 = v247 * v251,
+            v254 = v245 * v249,
+            v255 = 0.1 * v233 * v245 * v251 + v248 * (0.03142857142857143 * v234 * v249),
+            v256 = v247 * v252,
+            v257 = 0.03333333333333333 * v233 * v249 * v256 + v253 * (v253 * (v250 * (0.003619047619047619 * v235 * v247))),
+            v258 = v255 + 0.5 * v226 * v247 + v256 * (0.0038515769944341373 * v236 * v250),
+            v259 = v258 + v254 * (0.010857142857142857 * v235 * v252),
+            v260 = 0.16666666666666666 * v226 + v252 * (0.0012838589981447124 * v236 * v250),
+            v261 = v257 + v248 * (v248 * (0.010476190476190476 * v234 * v254)) + v245 * (v252 * v260),
+            v262 = 2.0 * v242 * v243 * v261, v263 = v239 * v262 + 2.0 * v238 * v259;
+        s168 += v263;
+        const V v264 = 2.0 * v241 * (v259 - v244 * v261), v265 = v223 * v264;
+        s165 += v265; const V v266 = 2.0 * v240 * v259 - v237 * v262; s166 += v266;
+        const V v267 = 2.0 * v237 * v259 - v240 * v262; s169 += v267;
+        const V v268 = 2.0 * v239 * v259 + v238 * v262; s167 += v268; s172 += v229 * v266;
+        s172 -= v221 * v264; s172 += v230 * v268; s175 += v229 * v263; s175 += v230 * v267;
+        s171 += v231 * v266; s171 -= v220 * v264; s171 += v232 * v268; s174 += v231 * v263;
+        s174 += v232 * v267; s170 += v227 * v266; s170 += v228 * v268; s173 += v227 * v263;
+        s173 += v228 * v267;
     }
+    const V v269 = v152 + s169, v270 = v153 + s166, v271 = v156 + s165, v272 = s167 - v151,
+        v273 = v159 + s173, v274 = s168 - v150, v275 = s170 + (v157 - v160), v276 = v271 - v275,
+        v277 = v271 + v275, v278 = v273 - v158,
+        v279 = v48 * v272 + (v161 + (s172 - v155) - v54 * v270),
+        v280 = v48 * v269 + (s175 + v163 - v54 * v274),
+        v281 = v53 * v270 + (v162 + (s171 - v154)) - v49 * v272,
+        v282 = v53 * v274 + (s174 + v164) - v49 * v269, v283 = v279 + v281, v284 = v280 + v282,
+        v285 = v281 - v279, v286 = v282 - v280, v287 = v276 - v285, v288 = v276 + v285,
+        v289 = v277 + v283, v290 = v277 - v283, v291 = v158 - v273 - v286, v292 = v278 + v284;
+    softehl_store4(R + 0, 8, v292, v289, v291, v287);
+    const V v293 = v278 - v284, v294 = v286 - v278;
+    softehl_store4(R + 4, 8, v293, v290, v294, v288);
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_arruda_boyce_residual, 8, 8, 0, 0, 8, 0)
 
-void softehl_solid_taylor_mean_arruda_boyce_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_arruda_boyce_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_arruda_boyce_fields_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + (7 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_arruda_boyce_fields_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (7 * points) * (n - SOFTEHL_LANES), 0);
-        return;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 1.5707963267948966 * parameters[2], v2 = 6.283185307179586 * parameters[0],
+        v3 = parameters[1] * parameters[1], v4 = parameters[1] * v3;
+    const V v5 = X0 - X2;
+    const double v6 = v3 * v3, v7 = 1.0 / v3;
+    const V v8 = X4 - X2, v9 = X4 - X6, v10 = X6 + (X4 - X0 - X2);
+    const double v11 = 1.0 / v6;
+    const V v12 = v5 + v9, v13 = 0.25 * v10, v14 = 0.0625 * v10;
+    const double v15 = 1.0 / (v6 * v6), v16 = 1.0 / (v4 * v4);
+    const V v17 = v9 - v5, v18 = 0.25 * v17, v19 = 0.0625 * v17, v20 = X1 - X3, v21 = X1 + X3,
+        v22 = X5 - X3, v23 = X5 - X7, v24 = X5 + X7, v25 = v23 - v20, v26 = d0 - d2,
+        v27 = v24 - v21, v28 = 0.25 * (v21 + v24), v29 = 0.25 * v25, v30 = 0.0625 * v25,
+        v31 = 0.25 * v27, v32 = 0.0625 * v27, v33 = d1 + d3, v34 = d1 - d3,
+        v35 = 1.0 / (v18 * v31 - v29 * v13), v36 = d0 + d2 - d4 - d6, v37 = d4 - d6, v38 = d5 + d7,
+        v39 = d5 - d7, v40 = v26 - v37, v41 = v26 + v37, v42 = 0.25 * (1.0 / v28), v43 = v33 - v38,
+        v44 = v33 + v38, v45 = v34 - v39, v46 = v34 + v39, v47 = 0.25 * (1.0 / (v28 * v28)),
+        v48 = v30 * v35, v49 = v32 * v35, v50 = v35 * (v12 * v30), v51 = v35 * (v12 * v32),
+        v52 = (v20 + v23) * v35, v53 = v35 * v14, v54 = v19 * v35, v55 = v14 * v52, v56 = v19 * v52,
+        v57 = 0.25 * v51 - 0.25 * v55, v58 = 0.25 * v56 - 0.25 * v50, v59 = v43 * v48 - v45 * v49,
+        v60 = 1.0 - v43 * v54 + v45 * v53, v61 = 1.0 - v40 * v49 + v36 * v48,
+        v62 = v40 * v53 - v36 * v54;
+    V s63 = {0}, s64 = {0}, s65 = {0}, s66 = {0}, s67 = {0}, s68 = {0}, s69 = {0}, s70 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v71 = 1.0 - w[1], v72 = 1.0 + w[1], v73 = 0.25 * w[1], v74 = 1.0 - w[0],
+            v75 = 1.0 + w[0], v76 = 0.25 * w[0], v77 = 0.25 * v72, v78 = 0.25 - v73,
+            v79 = 0.25 + v73, v80 = 0.25 + v76, v81 = 0.25 - v76;
+        const V v82 = X5 * v75; const double v83 = v73 - 0.25;
+        const V v84 = X3 * v75, v85 = X3 * v78, v86 = X2 * v78;
+        const double v87 = v76 - 0.25;
+        const V v88 = X6 * v81, v89 = X7 * v81, v90 = X7 * v74, v91 = v82 + v90, v92 = X1 * v74,
+            v93 = v92 + v84, v94 = v77 * v91, v95 = X1 * v83, v96 = v85 + v95, v97 = X1 * v87,
+            v98 = v89 + v97, v99 = X0 * v83, v100 = v86 + v99, v101 = X0 * v87, v102 = v88 + v101,
+            v103 = 0.25 * v93, v104 = v71 * v103, v105 = v94 + v104, v106 = v79 * v23,
+            v107 = v106 + v96, v108 = v79 * v9, v109 = v108 + v100, v110 = v80 * v22,
+            v111 = v110 + v98, v112 = v80 * v8, v113 = v112 + v102;
+        const double v114 = w[1] * w[2];
+        const V v115 = v109 * v111, v116 = v113 * v107, v117 = v115 - v116, v118 = w[2] * v105,
+            v119 = v105 * v117, v120 = 0.25 * v117;
+        s69 += v118 * (w[1] * v111 - w[0] * v107); s70 += v118 * (w[0] * v109 - w[1] * v113);
+        const V v121 = w[2] * v120; s63 += v121; s65 += v114 * v120; const V v122 = w[2] * v119;
+        s66 += v122; s68 += v114 * v119; s64 += w[0] * v121; s67 += w[0] * v122;
     }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * (7 * points)];
-    softehl_solid_taylor_mean_arruda_boyce_fields(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (7 * points) * n; ++i) values[i] = R[i];
-#endif
+    const V v123 = 1.0 / s66, v124 = s66 * v1, v125 = s67 * v123, v126 = v123 * s68,
+        v127 = v123 * s69, v128 = 0.25 * v127, v129 = v123 * s70, v130 = 0.25 * v129,
+        v131 = s63 * v123, v132 = s64 * v123, v133 = s65 * v123, v134 = v55 * v128,
+        v135 = v55 * v130, v136 = v56 * v128, v137 = v56 * v130, v138 = v50 * v128,
+        v139 = v50 * v130, v140 = v136 - v138, v141 = v138 - v136, v142 = v137 - v139,
+        v143 = v139 - v137, v144 = v142 - v54, v145 = v51 * v128, v146 = v51 * v130,
+        v147 = v134 - v145, v148 = v145 - v134, v149 = v135 - v146, v150 = v146 - v135,
+        v151 = 1.0 + v131 * v44 - v133 * v43 - v132 * v45, v152 = 2.0 * v151, v153 = v151 * v151,
+        v154 = v49 + v147, v155 = v53 - v149, v156 = v132 * v152, v157 = v48 + v140,
+        v158 = v133 * v152, v159 = v131 * v152,
+        v160 = v36 * v140 + (v40 * v148 + (v61 + v41 * v128)),
+        v161 = v36 * v142 + (v40 * v150 + (v62 + v41 * v130)),
+        v162 = v43 * v140 + (v45 * v148 + (v59 + v46 * v128)),
+        v163 = v43 * v142 + (v45 * v150 + (v60 + v46 * v130)), v164 = v144 * v160 - v157 * v161,
+        v165 = v130 * v160 - v128 * v161, v166 = v163 * v160 - v162 * v161, v167 = 2.0 * v166,
+        v168 = v166 * v166, v169 = v155 * v160 + v154 * v161, v170 = v164 * v167,
+        v171 = v167 * v169, v172 = v165 * v167, v173 = 1.0 / (v153 * v168), v174 = v173 * v173,
+        v175 = v153 * v124 * v172 * v174, v176 = v159 * (v124 * v168) * v174,
+        v177 = v124 * (1.0 - v173), v178 = v124 * v174, v179 = (v153 * v170 - v158 * v168) * v178,
+        v180 = (v153 * v171 - v156 * v168) * v178, v181 = v168 * v177, v182 = v153 * v177,
+        v183 = v152 * v168 * v176 + 2.0 * v131 * v181, v184 = 2.0 * v182,
+        v185 = v153 * (v153 * (v167 * (v124 * v167))) * v174 + v184,
+        v186 = v153 * v167 * v175 + v165 * v184, v187 = v167 * v182,
+        v188 = v167 * (v159 * v177 + v153 * v176),
+        v189 = v167 * (v153 * v179 - v158 * v177) + v164 * v184,
+        v190 = v167 * (v153 * v180 - v156 * v177) + v169 * v184,
+        v191 = (v163 * v157 - v162 * v144) * v185, v192 = (v162 * v155 + v163 * v154) * v185,
+        v193 = (v128 * v163 - v130 * v162) * v185, v194 = v152 * (v172 * v177 + v168 * v175),
+        v195 = v152 * v181, v196 = v152 * (v171 * v177 + v168 * v180) - 2.0 * v132 * v181,
+        v197 = v133 * (v152 * (v170 * v177 + v168 * v179) - 2.0 * v133 * v181), v198 = v133 * v194,
+        v199 = v132 * v194, v200 = v132 * v195, v201 = v133 * v195, v202 = v131 * v195,
+        v203 = v162 * v188, v204 = v163 * v188, v205 = v160 * v188, v206 = v161 * v188,
+        v207 = v130 * v203, v208 = v130 * v205, v209 = v128 * v204, v210 = v128 * v206,
+        v211 = v143 * v203 + v140 * v204, v212 = v149 * v203 + v148 * v204,
+        v213 = v142 * v205 + v141 * v206, v214 = v150 * v205 + v147 * v206, v215 = v131 * v183,
+        v216 = v133 * v183, v217 = v132 * v183, v218 = v133 * v196, v219 = v132 * v196,
+        v220 = v162 * v187, v221 = v161 * v187, v222 = v163 * v187, v223 = v160 * v187,
+        v224 = v128 * v221, v225 = v128 * v222, v226 = v130 * v220, v227 = v130 * v223,
+        v228 = v160 * v186, v229 = v128 * v187 + v162 * v186, v230 = v161 * v186,
+        v231 = v130 * v187 + v163 * v186, v232 = v130 * v228, v233 = v130 * v229,
+        v234 = v162 * v191, v235 = v163 * v191, v236 = v162 * v192, v237 = v163 * v192,
+        v238 = v162 * v193, v239 = v163 * v193, v240 = v143 * v236, v241 = v149 * v236,
+        v242 = v130 * v238, v243 = v143 * v234 + v140 * v235, v244 = v140 * v237,
+        v245 = v148 * v237, v246 = v143 * v238 + v140 * v239, v247 = v149 * v238 + v148 * v239,
+        v248 = v128 * v239, v249 = v149 * v229 + v148 * v231, v250 = v128 * v231,
+        v251 = v143 * v229 + v140 * v231, v252 = v128 * v230, v253 = v143 * v220 + v140 * v222,
+        v254 = v149 * v220 + v148 * v222, v255 = v142 * v228 + v141 * v230,
+        v256 = v150 * v228 + v147 * v230, v257 = v142 * v223 + v141 * v221,
+        v258 = v150 * v223 + v147 * v221, v259 = v160 * v189, v260 = v160 * v190,
+        v261 = v161 * v189, v262 = v161 * v190, v263 = v157 * v187 + v162 * v189,
+        v264 = v144 * v187 + v163 * v189, v265 = v155 * v187 + v163 * v190,
+        v266 = v162 * v190 - v154 * v187, v267 = v141 * v261 + v142 * v259,
+        v268 = v141 * v262 + v142 * v260, v269 = v147 * v262 + v150 * v260, v270 = v130 * v263,
+        v271 = v130 * v266, v272 = v128 * v264, v273 = v128 * v265,
+        v274 = v148 * v264 + v149 * v263, v275 = v148 * v265 + v149 * v266,
+        v276 = v140 * v264 + v143 * v263, v277 = v140 * v265 + v143 * v266;
+    V s278 = {0}, s279 = {0}, s280 = {0}, s281 = {0}, s282 = {0}, s283 = {0}, s284 = {0},
+        s285 = {0}, s286 = {0}, s287 = {0}, s288 = {0}, s289 = {0}, s290 = {0}, s291 = {0},
+        s292 = {0}, s293 = {0}, s294 = {0}, s295 = {0}, s296 = {0}, s297 = {0}, s298 = {0},
+        s299 = {0}, s300 = {0}, s301 = {0}, s302 = {0}, s303 = {0}, s304 = {0}, s305 = {0},
+        s306 = {0}, s307 = {0}, s308 = {0}, s309 = {0}, s310 = {0}, s311 = {0}, s312 = {0},
+        s313 = {0}, s314 = {0}, s315 = {0}, s316 = {0}, s317 = {0}, s318 = {0}, s319 = {0},
+        s320 = {0}, s321 = {0}, s322 = {0}, s323 = {0}, s324 = {0}, s325 = {0}, s326 = {0},
+        s327 = {0}, s328 = {0}, s329 = {0}, s330 = {0}, s331 = {0}, s332 = {0}, s333 = {0},
+        s334 = {0}, s335 = {0}, s336 = {0}, s337 = {0}, s338 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v339 = 0.25 * w[1], v340 = 0.25 - v339, v341 = 0.25 + v339, v342 = v339 - 0.25;
+        const V v343 = X1 * v342, v344 = X3 * v340, v345 = v344 + v343, v346 = v341 * v23,
+            v347 = v346 + v345;
+        const double v348 = 0.25 * w[0], v349 = 0.25 + v348, v350 = 0.25 - v348, v351 = v348 - 0.25;
+        const V v352 = X0 * v351, v353 = X6 * v350, v354 = v353 + v352, v355 = v349 * v8,
+            v356 = v355 + v354, v357 = X7 * v350, v358 = X1 * v351, v359 = v357 + v358,
+            v360 = v349 * v22, v361 = v360 + v359, v362 = X2 * v340, v363 = X0 * v342,
+            v364 = v362 + v363, v365 = v341 * v9, v366 = v365 + v364, v367 = v366 * v361;
+        const double v368 = 1.0 - w[1], v369 = 1.0 + w[1], v370 = 1.0 - w[0], v371 = 1.0 + w[0],
+            v372 = 0.25 * v369;
+        const V v373 = v356 * v347, v374 = v367 - v373, v375 = X7 * v370, v376 = X1 * v370,
+            v377 = X5 * v371, v378 = v377 + v375, v379 = v372 * v378, v380 = X3 * v371,
+            v381 = v376 + v380, v382 = 0.25 * v381, v383 = v368 * v382, v384 = v379 + v383,
+            v385 = v384 * v374, v386 = v385 * (w[2] * v2), v387 = w[0] - v125, v388 = w[1] - v126,
+            v389 = v29 * v387, v390 = v7 * v386, v391 = v31 * v388, v392 = v11 * v386,
+            v393 = v16 * v386, v394 = v15 * v386, v395 = 0.5 * v386, v396 = v132 + v42 * v387,
+            v397 = v133 + v42 * v388, v398 = 0.010476190476190476 * v392,
+            v399 = 0.0027142857142857142 * v393, v400 = 0.05 * v390,
+            v401 = 0.0007703153988868275 * v394, v402 = v129 + v35 * (v18 * v387 - v13 * v388),
+            v403 = v127 + v35 * (v391 - v389), v404 = 0.25 * v402,
+            v405 = v131 - v47 * (v391 + v389), v406 = v402 * v58, v407 = v402 * v57,
+            v408 = v403 * v58, v409 = v403 * v57, v410 = 0.25 * v403,
+            v411 = v40 * v407 + (v36 * v406 + (v62 + v41 * v404)),
+            v412 = v40 * v409 + (v36 * v408 + (v61 + v41 * v410)), v413 = 2.0 * v411,
+            v414 = v45 * v407 + (v43 * v406 + (v60 + v46 * v404)),
+            v415 = v45 * v409 + (v43 * v408 + (v59 + v46 * v410)),
+            v416 = 1.0 + v405 * v44 - v397 * v43 - v396 * v45, v417 = 2.0 * v412, v418 = 2.0 * v414,
+            v419 = 2.0 * v415, v420 = v416 * v416, v421 = 2.0 * v416,
+            v422 = v412 * v414 - v411 * v415, v423 = 2.0 * v422, v424 = v422 * v422,
+            v425 = v414 * v414 + (v420 + (v415 * v415 + (v412 * v412 + v411 * v411))),
+            v426 = v425 * v425, v427 = 2.0 * v425, v428 = v420 * v424, v429 = v420 * v423,
+            v430 = v395 * v425, v431 = softehl_vrcbrt(v428), v432 = 1.0 / v428,
+            v433 = 0.3333333333333333 * v430, v434 = v426 * v426, v435 = v425 * v426,
+            v436 = 3.0 * v426, v437 = v400 * v426, v438 = 4.0 * v435, v439 = 5.0 * v434,
+            v440 = v434 * (v401 * v425), v441 = v399 * v434, v442 = 0.6666666666666666 * v437,
+            v443 = v398 * v435, v444 = v399 * v438, v445 = v401 * v439, v446 = v417 * v438,
+            v447 = v413 * v438, v448 = v419 * v438, v449 = v418 * v438, v450 = v432 * v432,
+            v451 = 2.0 * v432, v452 = v432 * v398, v453 = v417 * v436, v454 = v413 * v436,
+            v455 = v419 * v436, v456 = v418 * v436, v457 = v398 * v436, v458 = v398 * v450,
+            v459 = 3.0 * v452, v460 = v424 * v450, v461 = v429 * v450, v462 = v417 * v427,
+            v463 = v413 * v427, v464 = v419 * v427, v465 = v418 * v427, v466 = v431 * v431,
+            v467 = v466 * v466, v468 = v431 * v466, v469 = v466 * v390,
+            v470 = v450 * (0.03142857142857143 * v392 * v426) - v451 * (v460 * v443),
+            v471 = v431 * v467, v472 = 0.3333333333333333 * v467, v473 = 0.05 * v469,
+            v474 = v468 * (v468 * (1.3333333333333333 * v431)), v475 = v467 * v399,
+            v476 = v467 * (1.6666666666666667 * v467), v477 = v395 * v472,
+            v478 = 0.6666666666666666 * v471, v479 = v471 * v401, v480 = 4.0 * v475,
+            v481 = v471 * v471 * (3.111111111111111 * v441 + 4.444444444444445 * v431 * v440),
+            v482 = v474 * v399, v483 = v478 * v400, v484 = 5.0 * v479, v485 = v424 * v476,
+            v486 = v424 * v474, v487 = v429 * v476, v488 = v429 * v474,
+            v489 = v470 + v478 * (0.1 * v390 * v425) + v474 * (0.010857142857142857 * v393 * v435),
+            v490 = v450 * v443 + v472 * v430 + v478 * v437 + v474 * v441 + v476 * v440,
+            v491 = v386 * v472 + v476 * (0.001540630797773655 * v394) * v439, v492 = v420 * v490,
+            v493 = v477 + v483 * v427,
+            v494 = v493 + (v477 + (v489 + v476 * (0.0038515769944341373 * v394 * v434))),
+            v495 = v431 * v395 + v452 * v436 + v473 * v427 + v479 * v439 + v475 * v438,
+            v496 = v452 * (12.0 * v425) + v479 * (40.0 * v435) + v475 * (24.0 * v426),
+            v497 = v452 * (6.0 * v425) - v460 * v457 + v479 * (20.0 * v435) + v475 * (12.0 * v426),
+            v498 = v423 * v492, v499 = v458 * v436 + v476 * v401 * v439 + v493 + v482 * v438,
+            v500 = 2.0 * v495, v501 = v418 * v495 - v412 * v498;
+        s279 += v501;
+        const V v502 = v416 * (0.2 * v469 + v496) - v421 * v424 * v499,
+            v503 = v415 * v498 + v413 * v495;
+        s281 += v503; const V v504 = v411 * v498 + v419 * v495; s280 += v504;
+        const V v505 = v417 * v495 - v414 * v498; s282 += v505; s288 += v406 * v503;
+        s288 += v408 * v505; s285 += v406 * v501; s285 += v408 * v504; s283 += v404 * v501;
+        s283 += v410 * v504; s284 += v407 * v501; s284 += v409 * v504; s287 += v407 * v503;
+        s287 += v409 * v505; s286 += v404 * v503; s286 += v410 * v505;
+        const V v506 = 4.0 * v412 * v473 + v459 * v462 + v480 * v453 - v420 * (v414 * v423) * v499,
+            v507 = 4.0 * v411 * v473 + v459 * v463 + v480 * v454 + v420 * (v415 * v423) * v499,
+            v508 = 4.0 * v415 * v473 + v459 * v464 + v480 * v455 + v420 * (v411 * v423) * v499,
+            v509 = 4.0 * v414 * v473 + v459 * v465 + v480 * v456 - v420 * (v412 * v423) * v499,
+            v510 = v507 + v484 * v447, v511 = v508 + v484 * v448, v512 = v509 + v484 * v449,
+            v513 = v495 - v424 * v490, v514 = v421 * v513,
+            v515 = v451 * (v461 * v443) + v429 * v481 + v487 * v442 + v488 * v433,
+            v516 = 0.1 * v469 + v497 - v485 * v445 - v424 * (v494 - v424 * v481 - v485 * v442 - v486 * v433),
+            v517 = v405 * v514;
+        s278 += v517;
+        const V v518 = v429 * v515 - 2.0 * v492,
+            v519 = v424 * v515 - v487 * v445 - v423 * v490 - v461 * v457 - v488 * v444,
+            v520 = 2.0 * v513 + v421 * v421 * (v516 - v486 * v444),
+            v521 = v429 * (v458 * v454 + v483 * v463 + v482 * v447 + v411 * v491) + v415 * v518,
+            v522 = v421 * (v519 - v429 * v493),
+            v523 = v429 * (v458 * v455 + v483 * v464 + v482 * v448 + v415 * v491) + v411 * v518,
+            v524 = v414 * v518 - v429 * (v458 * v453 + v483 * v462 + v482 * v446 + v412 * v491),
+            v525 = v412 * v518 - v429 * (v458 * v456 + v483 * v465 + v482 * v449 + v414 * v491),
+            v526 = v405 * v405 * v520;
+        s293 += v526;
+        const V v527 = v500 + v417 * (v506 + v484 * v446) + v414 * v524,
+            v528 = v500 + v413 * v510 + v415 * v521, v529 = v417 * v510 - v414 * v521,
+            v530 = v498 + v413 * v511 + v415 * v523, v531 = v417 * v511 - v414 * v523,
+            v532 = v500 + v419 * v511 + v411 * v523, v533 = v413 * v512 - v415 * v525,
+            v534 = v413 * v502 - v415 * v522, v535 = v417 * v502 + v414 * v522,
+            v536 = v417 * v512 - v498 + v414 * v525, v537 = v418 * v502 + v412 * v522,
+            v538 = v419 * v502 - v411 * v522, v539 = v500 + v418 * v512 + v412 * v525,
+            v540 = v419 * v512 - v411 * v525, v541 = v404 * v533, v542 = v405 * v534;
+        s289 += v542; const V v543 = v405 * v537; s291 += v543; const V v544 = v405 * v535;
+        s290 += v544;
+        const V v545 = v397 * v537, v546 = v404 * v539 + v410 * v540;
+        s316 += v546; const V v547 = v404 * v540 + v410 * v532; s317 += v547; s310 += v541;
+        s310 += v410 * v530;
+        const V v548 = v404 * v534 + v410 * v535, v549 = v405 * v548;
+        s296 += v549;
+        const V v550 = v397 * v538, v551 = v405 * v538;
+        s292 += v551;
+        const V v552 = v396 * v537, v553 = v396 * v538, v554 = v410 * v531,
+            v555 = v405 * (v404 * v537 + v410 * v538);
+        s299 += v555; s311 += v404 * v536; s311 += v554;
+        const V v556 = v541 + v410 * v536, v557 = v404 * v528 + v410 * v529;
+        s304 += v557; const V v558 = v410 * v527 + v404 * v529; s305 += v558;
+        const V v559 = v408 * v527 + v406 * v529, v560 = v409 * v527 + v407 * v529,
+            v561 = v408 * v536 + v406 * v533, v562 = v409 * v536 + v407 * v533;
+        s329 += v404 * v557; s329 += v410 * v558;
+        const V v563 = v408 * v529 + v406 * v528, v564 = v409 * v529 + v407 * v528;
+        s320 += v410 * v559; s320 += v404 * v563; s325 += v410 * v560; s325 += v404 * v564;
+        s338 += v410 * v547; s338 += v404 * v546;
+        const V v565 = v406 * v539 - v545 + v408 * v540, v566 = v407 * v539 - v552 + v409 * v540,
+            v567 = v406 * v540 - v550 + v408 * v532, v568 = v407 * v540 - v553 + v409 * v532,
+            v569 = v554 + v404 * v530, v570 = v408 * v531 + v406 * v530,
+            v571 = v409 * v531 + v407 * v530;
+        s323 += v404 * v561; s323 += v410 * v570; s328 += v404 * v562; s328 += v410 * v571;
+        s335 += v404 * v565; s335 += v410 * v567; s337 += v404 * v566; s337 += v410 * v568;
+        s332 += v404 * v556; s332 += v410 * v569;
+        const V v572 = v408 * v535 + v406 * v534, v573 = v409 * v535 + v407 * v534,
+            v574 = v405 * v572;
+        s294 += v574; const V v575 = v405 * v573; s295 += v575;
+        const V v576 = v408 * v538 + v406 * v537 - v397 * v520,
+            v577 = v409 * v538 + v407 * v537 - v396 * v520;
+        s284 -= v396 * v514; s285 -= v397 * v514; const V v578 = v405 * v576; s297 += v578;
+        const V v579 = v405 * v577; s298 += v579;
+        const V v580 = v48 + v408, v581 = v406 - v54;
+        s313 += v580 * v532; s313 -= v550; s318 += v580 * v559; s318 += v581 * v563;
+        s306 += v581 * v533; s306 += v580 * v530; s307 += v581 * v536; s307 += v580 * v531;
+        s312 += v581 * v539; s312 -= v545; s300 += v580 * v529; s300 += v581 * v528;
+        s301 += v580 * v527; s301 += v581 * v529; s321 += v581 * v561; s321 += v580 * v570;
+        s326 += v581 * v562; s326 += v580 * v571; s330 += v581 * v556; s330 += v580 * v569;
+        s306 -= v397 * v534; s307 -= v397 * v535; s312 += v580 * v540; s313 += v581 * v540;
+        s333 += v580 * v567; s333 += v581 * v565; s321 -= v397 * v572; s326 -= v397 * v573;
+        s330 -= v397 * v548; s333 -= v397 * v576;
+        const V v582 = v53 + v407, v583 = v409 - v49;
+        s319 += v583 * v559; s319 += v582 * v563; s314 += v582 * v539; s314 -= v552;
+        s308 += v582 * v533; s308 += v583 * v530; s309 += v582 * v536; s309 += v583 * v531;
+        s315 += v583 * v532; s315 -= v553; s324 += v583 * v560; s324 += v582 * v564;
+        s302 += v583 * v529; s302 += v582 * v528; s303 += v583 * v527; s303 += v582 * v529;
+        s322 += v582 * v561; s322 += v583 * v570; s327 += v582 * v562; s327 += v583 * v571;
+        s308 -= v396 * v534; s309 -= v396 * v535; s331 += v582 * v556; s331 -= v396 * v548;
+        s322 -= v396 * v572; s327 -= v396 * v573; s314 += v583 * v540; s315 += v582 * v540;
+        s331 += v583 * v569; s334 += v583 * v567; s334 -= v396 * v576; s336 += v583 * v568;
+        s336 -= v396 * v577; s334 += v582 * v565; s336 += v582 * v566;
+    }
+    const V v584 = v222 + s282, v585 = s281 - v220, v586 = v225 + s286, v587 = v586 - v226,
+        v588 = v53 * v585 + (s287 + v254 - v49 * v584),
+        v589 = v253 + (v48 * v584 + s288 - v54 * v585), v590 = v588 - v589, v591 = v588 + v589,
+        v592 = v226 - v586 - v590, v593 = v587 + v591, v594 = v587 - v591, v595 = v590 - v587,
+        v596 = v223 + s279, v597 = v202 + s278, v598 = s280 - v221, v599 = s283 + (v227 - v224),
+        v600 = v597 - v599, v601 = v597 + v599,
+        v602 = v258 + (v53 * v596 + (s284 - v200) - v49 * v598),
+        v603 = v257 + (v48 * v598 + (s285 - v201 - v54 * v596)), v604 = v602 - v603,
+        v605 = v602 + v603, v606 = v600 - v604, v607 = v600 + v604, v608 = v601 + v605;
+    softehl_store4(R + 0, 8, v593, v608, v592, v606); const V v609 = v601 - v605;
+    softehl_store4(R + 4, 8, v594, v609, v595, v607);
+    const V v610 = v236 + s302, v611 = v239 + s305, v612 = s303 - v237, v613 = s329 + (v248 - v242),
+        v614 = s304 - v238, v615 = v243 + (v48 * (v235 + s301) + (s318 - v54 * (s300 - v234))),
+        v616 = v48 * v611 + (s320 + v246 - v54 * v614),
+        v617 = v48 * v612 + (s319 - v240 - v244 - v54 * v610),
+        v618 = v53 * v614 + (s325 + v247) - v49 * v611,
+        v619 = v53 * v610 + (s324 - v241 - v245) - v49 * v612, v620 = v613 + v618,
+        v621 = v615 + v617, v622 = v617 - v615, v623 = v616 + v618, v624 = v616 - v622,
+        v625 = v615 - v617 - v616, v626 = v613 - v623, v627 = v617 + v619, v628 = v616 - v621,
+        v629 = v622 - v616, v630 = v619 - v617, v631 = v618 - v616, v632 = v618 - v630,
+        v633 = v630 - v618, v634 = v627 - v618, v635 = v613 - v631,
+        v636 = v626 + (v621 - v616) + v634, v637 = v628 + (v626 + (v618 - v627)),
+        v638 = v631 - v613, v639 = v634 + (v623 + v628 - v613), v640 = v635 + (v629 + v632),
+        v641 = v638 + (v629 + v633), v642 = v620 + (v618 + (v630 - v616)),
+        v643 = v620 + (v623 + (v627 + (v616 + v621))), v644 = v625 - v642, v645 = v625 + v642,
+        v646 = v624 + (v633 + v635), v647 = v624 + (v632 + v638), v648 = v204 + s290,
+        v649 = v231 + s311, v650 = v264 + s307, v651 = v265 + s309, v652 = s296 + (v209 - v207),
+        v653 = s332 + (v250 - v233), v654 = s289 - v203, v655 = s330 + (v272 - v270),
+        v656 = s331 + (v273 - v271), v657 = v652 + v655, v658 = s306 - v263, v659 = v652 + v653,
+        v660 = s308 - v266, v661 = s310 - v229, v662 = v656 + (v652 - v655), v663 = v655 + v656,
+        v664 = v54 * v654, v665 = v653 + v656, v666 = v662 - v653,
+        v667 = v53 * v654 + (s295 + v212) - v49 * v648,
+        v668 = v53 * v661 + (s328 + v249) - v49 * v649, v669 = v48 * v648 + (s294 + v211),
+        v670 = v48 * v649 + (s323 + v251 - v54 * v661), v671 = v669 - v664, v672 = v667 - v652,
+        v673 = v667 + v668, v674 = v670 + v671, v675 = v672 - v671, v676 = v668 - v670,
+        v677 = v676 - v653, v678 = v659 - v663, v679 = v48 * v650 + (s321 + v276 - v54 * v658),
+        v680 = v48 * v651 + (s322 + v277 - v54 * v660),
+        v681 = v53 * v658 + (s326 + v274) - v49 * v650,
+        v682 = v53 * v660 + (s327 + v275) - v49 * v651, v683 = v671 + v679, v684 = v670 + v680,
+        v685 = v667 + v681, v686 = v679 + v680, v687 = v668 + v682, v688 = v681 - v679,
+        v689 = v681 + v682, v690 = v682 - v680, v691 = v683 - v684, v692 = v656 - v690,
+        v693 = v680 + (v671 - v670 - v679), v694 = v664 + v655 - v669 - v672 - v679 - v681,
+        v695 = v682 + (v668 + v670 - v665 + v680), v696 = v682 + (v667 - v668 - v681),
+        v697 = v657 - v665 + v685 - v687, v698 = v693 - v696, v699 = v693 + v696,
+        v700 = v694 - v695, v701 = v694 + v695;
+    softehl_store4(K + 32, 64, v637, v700, v639, v701);
+    const V v702 = v691 + v697, v703 = v691 - v697, v704 = v683 + v684 - v685 - v687 - v657 - v665;
+    softehl_store4(K + 16, 64, v644, v704, v645, v703);
+    const V v705 = v653 - v662 - v698, v706 = v674 - v686, v707 = v698 - v666, v708 = v673 - v689,
+        v709 = v689 + (v659 + (v673 + (v663 + v674)) + v686);
+    softehl_store4(K + 0, 64, v643, v709, v644, v702);
+    const V v710 = v675 - v655 + v688, v711 = v677 - v656 + v690 + v710,
+        v712 = v692 + (v655 + v675 + v677 - v688);
+    softehl_store4(K + 52, 64, v647, v712, v646, v705); const V v713 = v710 + (v653 - v676 + v692);
+    softehl_store4(K + 48, 64, v641, v711, v640, v713);
+    const V v714 = v706 + v708, v715 = v666 + v699, v716 = v666 - v699, v717 = v706 - v708 - v678;
+    softehl_store4(K + 20, 64, v639, v717, v640, v707); const V v718 = v678 + v714;
+    softehl_store4(K + 4, 64, v637, v718, v641, v715); const V v719 = v678 - v714;
+    softehl_store4(K + 36, 64, v636, v719, v647, v716);
+    const V v720 = v228 + s316, v721 = v205 + s291, v722 = v215 + s293, v723 = v260 + s314,
+        v724 = s338 + (v232 - v252), v725 = s299 + (v208 - v210), v726 = s292 - v206,
+        v727 = v722 - v725, v728 = v725 - v724, v729 = s315 - v262, v730 = s317 - v230,
+        v731 = v267 + (v48 * (s313 - v261) + (s333 - v197)) - v54 * (v259 + s312),
+        v732 = v48 * v726 + (v213 + (s297 - v216)) - v54 * v721,
+        v733 = v53 * v721 + (v214 + (s298 - v217) - v49 * v726),
+        v734 = v268 + (v48 * v729 + (s334 - v218)) - v54 * v723,
+        v735 = v53 * v723 + (v269 + (s336 - v219 - v49 * v729)),
+        v736 = v255 + (v48 * v730 + (s335 - v198)) - v54 * v720,
+        v737 = v53 * v720 + (v256 + (s337 - v199 - v49 * v730)), v738 = v731 - v734,
+        v739 = v731 + v734, v740 = v732 - v733, v741 = v732 + v733, v742 = v732 - v736,
+        v743 = v732 + v736, v744 = v733 - v737, v745 = v733 + v737, v746 = v734 - v735,
+        v747 = v734 + v735, v748 = v742 - v738, v749 = v736 - v737, v750 = v736 + v737,
+        v751 = v740 + (v742 + (v727 + v738)), v752 = v727 - v740, v753 = v744 - v746,
+        v754 = v745 - v747, v755 = v748 - v753, v756 = v748 + v753, v757 = v743 - v739,
+        v758 = v728 - v749, v759 = v749 + (v744 + (v728 + v746)), v760 = v754 + v757,
+        v761 = v752 - v758, v762 = v752 + v758, v763 = v751 + v759, v764 = v751 - v759;
+    softehl_store4(K + 24, 64, v702, v763, v703, v764);
+    const V v765 = v755 + v761, v766 = v756 + v762;
+    softehl_store4(K + 56, 64, v715, v766, v707, v765);
+    const V v767 = v750 + (v745 + (v743 + (v747 + (v724 + (v722 + 2.0 * v725) + v739)))),
+        v768 = v724 + v725 - v750, v769 = v761 - v755, v770 = v762 - v756;
+    softehl_store4(K + 60, 64, v716, v770, v705, v769); const V v771 = v741 + v767;
+    softehl_store4(K + 8, 64, v709, v771, v704, v763);
+    const V v772 = v722 + v725 - v741, v773 = v772 + (v757 - v754 - v768);
+    softehl_store4(K + 28, 64, v701, v773, v713, v765);
+    const V v774 = v768 + v772, v775 = v760 + v774;
+    softehl_store4(K + 12, 64, v700, v775, v711, v766);
+    softehl_store4(K + 40, 64, v718, v775, v717, v773); const V v776 = v774 - v760;
+    softehl_store4(K + 44, 64, v719, v776, v712, v770);
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_arruda_boyce_tangent, 8, 8, 0, 0, 8, (8 * 8))
+
+SOFTEHL_GROUP(softehl_solid_taylor_mean_arruda_boyce_fields)
+{
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.25 * parameters[2];
+    const V v2 = X0 + d0, v3 = X2 + d2, v4 = X4 + d4, v5 = X0 - X2, v6 = X6 + d6, v7 = X4 - X6,
+        v8 = X4 - X2, v9 = X1 + d1, v10 = X6 + (X4 - X0 - X2), v11 = X5 + d5, v12 = 0.25 * v10,
+        v13 = X1 - X3, v14 = X1 + X3, v15 = X5 - X3, v16 = X3 + d3, v17 = X5 - X7, v18 = X5 + X7,
+        v19 = X7 + d7, v20 = v7 - v5, v21 = 0.25 * (v5 + v7), v22 = v17 - v13,
+        v23 = 0.25 * (v13 + v17), v24 = v18 - v14, v25 = 0.25 * (v14 + v18), v26 = 0.25 * v20,
+        v27 = 0.25 * v22, v28 = 0.25 * v24, v29 = 1.0 / (v26 * v28 - v27 * v12);
+    const double v30 = parameters[1] * parameters[1], v31 = parameters[1] * v30, v32 = v30 * v30;
+    const V v33 = 0.25 * (1.0 / v25), v34 = 0.25 * (1.0 / (v25 * v25)),
+        v35 = 0.0625 * (v22 - v24) * v29, v36 = 0.0625 * (v10 - v20) * v29,
+        v37 = 0.0625 * (v22 + v24) * v29, v38 = 0.0625 * (v20 + v10) * v29,
+        v39 = 0.0625 * (v24 - v22) * v29, v40 = 0.0625 * (v20 - v10) * v29;
+    const double v41 = 0.0038515769944341373 * (1.0 / (v32 * v32));
+    const V v42 = v23 * v38 - v21 * v37;
+    const double v43 = 0.1 * (parameters[0] * (1.0 / v30)),
+        v44 = 0.03142857142857143 * (parameters[0] * (1.0 / v32)),
+        v45 = 0.010857142857142857 * (parameters[0] * (1.0 / (v31 * v31)));
+    const V v46 = 0.25 - v23 * v36 - v21 * v35, v47 = 0.25 - v23 * v40 - v21 * v39,
+        v48 = v42 - 0.25, v49 = (-0.25) - v42;
+    V s50 = {0}, s51 = {0}, s52 = {0}, s53 = {0}, s54 = {0}, s55 = {0}, s56 = {0}, s57 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v58 = 0.25 * w[1], v59 = 1.0 - w[0], v60 = 1.0 + w[0],
+            v61 = 0.25 * (1.0 - w[1]), v62 = 0.25 * (1.0 + w[1]), v63 = 0.25 * w[0],
+            v64 = 0.25 - v58, v65 = 0.25 + v58, v66 = 0.25 + v63, v67 = 0.25 - v63, v68 = v61 * v59,
+            v69 = v61 * v60, v70 = v60 * v62, v71 = v59 * v62, v72 = v58 - 0.25, v73 = v63 - 0.25;
+        const V v74 = X0 * v72 + (X2 * v64 + v65 * v7), v75 = X0 * v73 + (X6 * v67 + v66 * v8),
+            v76 = X1 * v72 + (X3 * v64 + v65 * v17), v77 = X1 * v73 + (X7 * v67 + v66 * v15),
+            v78 = X5 * v70 + (X1 * v68 + (X7 * v71 + X3 * v69)),
+            v79 = v3 * v69 + (v71 * v6 + (v68 * v2 + v70 * v4)),
+            v80 = v16 * v69 + (v71 * v19 + (v68 * v9 + v70 * v11));
+        const double v81 = w[1] * w[2];
+        const V v82 = v74 * v77 - v76 * v75, v83 = w[2] * v78, v84 = v82 * v78, v85 = 0.25 * v82,
+            v86 = (w[1] * v77 - w[0] * v76) * v83;
+        s56 += v86; const V v87 = (w[0] * v74 - w[1] * v75) * v83; s57 += v87;
+        const V v88 = w[2] * v85; s50 += v88; const V v89 = v81 * v85; s52 += v89;
+        const V v90 = w[2] * v84; s53 += v90; const V v91 = v81 * v84; s55 += v91;
+        const V v92 = w[0] * v88; s51 += v92; const V v93 = w[0] * v90; s54 += v93;
+        softehl_store2(R + 7 * q + 0, (7 * points), v79, v80);
+    }
+    const V v94 = 1.0 / s53, v95 = s54 * v94, v96 = v94 * s55, v97 = v94 * s56, v98 = v94 * s57,
+        v99 = s50 * v94, v100 = s51 * v94, v101 = s52 * v94, v102 = v99 - v101, v103 = v99 + v101,
+        v104 = v36 + v46 * v98, v105 = v35 + v46 * v97, v106 = v37 + v48 * v97,
+        v107 = v48 * v98 - v38, v108 = v38 + v49 * v98, v109 = v49 * v97 - v37,
+        v110 = v39 + v47 * v97, v111 = v40 + v47 * v98,
+        v112 = d5 * (v100 + v103) + (d3 * (v100 + v102) + (1.0 + d1 * (v102 - v100))),
+        v113 = (d6 * v109 + (d4 * v110 + (d0 * v105 + (1.0 + d2 * v106)))) * (d7 * v108 + (d5 * v111 + (d1 * v104 + (1.0 + d3 * v107)))),
+        v114 = (d6 * v108 + (d4 * v111 + (d0 * v104 + d2 * v107))) * (d7 * v109 + (d5 * v110 + (d1 * v105 + d3 * v106))),
+        v115 = (d7 * (v103 - v100) + v112) * (v113 - v114);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 3 * q; (void)w;
+        const V v116 = w[0] - v95, v117 = w[1] - v96, v118 = v27 * v116, v119 = v28 * v117,
+            v120 = v100 + v33 * v116, v121 = v101 + v33 * v117,
+            v122 = v98 + v29 * (v26 * v116 - v12 * v117), v123 = v97 + v29 * (v119 - v118),
+            v124 = v99 - v34 * (v119 + v118), v125 = v36 + v46 * v122, v126 = v40 + v47 * v122,
+            v127 = v121 - v124, v128 = v121 + v124, v129 = v35 + v46 * v123,
+            v130 = v39 + v47 * v123, v131 = v38 + v49 * v122, v132 = v37 + v48 * v123,
+            v133 = v48 * v122 - v38, v134 = v49 * v123 - v37,
+            v135 = d5 * (v120 + v128) + (d3 * (v120 - v127) + (1.0 - d1 * (v120 + v127))),
+            v136 = d6 * v131 + (d4 * v126 + (d0 * v125 + d2 * v133)),
+            v137 = d6 * v134 + (d4 * v130 + (d2 * v132 + (1.0 + d0 * v129))),
+            v138 = d7 * v134 + (d5 * v130 + (d1 * v129 + d3 * v132)),
+            v139 = d7 * v131 + (d5 * v126 + (d3 * v133 + (1.0 + d1 * v125))),
+            v140 = d7 * (v128 - v120) + v135,
+            v141 = v115 * (1.0 / ((v137 * v139 - v136 * v138) * v140));
+        const M v142 = softehl_eq(v141, softehl_splat(0.0)); V v143 = softehl_splat(0.0);
+        const M m144 = ~v142;
+        if (softehl_any(m144)) {
+            const V v145 = softehl_vrcbrt(v141), v146 = v145 * (v141 * v145);
+            v143 = softehl_blend(m144, v146, v143);
+        }
+        const V v147 = v137 * v143, v148 = v136 * v143, v149 = v138 * v143, v150 = v139 * v143,
+            v151 = v140 * v143, v152 = v151 * v151, v153 = v147 * v150 - v148 * v149,
+            v154 = v151 * v153, v155 = v153 * v153,
+            v156 = v152 + (v150 * v150 + (v149 * v149 + (v147 * v147 + v148 * v148))),
+            v157 = v152 * v155, v158 = 1.0 / v154, v159 = v156 * v156, v160 = v159 * v159,
+            v161 = v156 * v159, v162 = softehl_vrcbrt(v157), v163 = 1.0 / v157, v164 = v162 * v162,
+            v165 = v164 * v164,
+            v166 = v161 * (v44 * v164) + (v159 * (v43 * v162) + v163 * (v45 * v160)),
+            v167 = v161 * (v45 * v165) + (v164 * (v43 * v156) + v163 * (v44 * v159)),
+            v168 = parameters[0] * (0.5 + v165 * (v160 * v41)), v169 = v162 * v168 + v167,
+            v170 = v1 * (1.0 - v163) - 0.3333333333333333 * v165 * (v156 * v168 + v166),
+            v171 = 2.0 * v152 * v153 * v170,
+            v172 = v158 * (v151 * (2.0 * v151) * (v169 + v155 * v170)),
+            v173 = 2.0 * v148 * v169 - v149 * v171, v174 = 2.0 * v147 * v169 + v150 * v171,
+            v175 = v158 * (v149 * v174 + v150 * v173),
+            v176 = v150 * (2.0 * v150 * v169 + v147 * v171) + v149 * (2.0 * v149 * v169 - v148 * v171),
+            v177 = v158 * (v147 * v174 + v148 * v173), v178 = v158 * v176;
+        softehl_store4(R + 7 * q + 2, (7 * points), v154, v177, v178, v172);
+        softehl_store1(R + 7 * q + 6, (7 * points), v175);
+    }
+}
+SOFTEHL_BATCH(softehl_solid_taylor_mean_arruda_boyce_fields, 8, 8, 0, 0, (7 * points), 0)

@@ -23,1338 +23,263 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_solid_taylor_mean_arruda_boyce_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_arruda_boyce_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10;
+    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
     softehl_load3(t + 8, 11, &t8, &t9, &t10);
-    (void)t8; (void)t9; (void)t10;
-    const double v1 = 6.283185307179586 * parameters[0];
-    const double v2 = 0.5 * parameters[2];
-    const double v3 = 1.5707963267948966 * parameters[2];
-    const double v4 = parameters[1] * parameters[1];
-    const double v5 = 2.0 * parameters[1];
-    const double v6 = 8.0 * parameters[1];
-    const double v7 = 6.0 * parameters[1];
-    const double v8 = parameters[1] * v4;
-    const double v9 = v4 * v4;
-    const double v10 = 1.0 / v4;
-    const V v11 = X4 - X0;
-    const double v12 = v9 * v7;
-    const double v13 = v9 * v9;
-    const double v14 = 1.0 / v9;
-    const double v15 = v8 * v8;
-    const double v16 = 4.0 * v8;
-    const V v17 = X0 - X2;
-    const V v18 = X4 - X2;
-    const V v19 = v11 - X2;
-    const double v20 = 1.0 / v13;
-    const V v21 = X4 - X6;
-    const V v22 = X6 + v19;
-    const double v23 = 1.0 / v15;
-    const double v24 = v10 * v5;
-    const V v25 = v17 + v21;
-    const V v26 = 0.25 * v22;
-    const V v27 = 0.0625 * v22;
-    const V v28 = v21 - v17;
-    const V v29 = X1 - X3;
-    const V v30 = X1 + X3;
-    const double v31 = v14 * v16;
-    const V v32 = 0.25 * v28;
-    const V v33 = 0.0625 * v28;
-    const V v34 = X5 - X3;
-    const V v35 = X5 - X7;
-    const V v36 = X5 + X7;
-    const V v37 = t9 * v24;
-    const double v38 = v23 * v12;
-    const V v39 = t9 * v31;
-    const V v40 = v29 + v35;
-    const V v41 = v30 + v36;
-    const double v42 = v20 * v6;
-    const V v43 = v35 - v29;
-    const V v44 = v36 - v30;
-    const V v45 = t9 * v38;
-    const double v46 = v15 * v42;
-    const V v47 = 0.25 * v41;
-    const V v48 = 0.5 * v41;
-    const V v49 = 0.25 * v43;
-    const V v50 = 0.0625 * v43;
-    const V v51 = 0.25 * v44;
-    const V v52 = 0.0625 * v44;
-    const V v53 = t9 * v46;
-    const V v54 = 1.0 / v47;
-    const V v55 = v47 * v47;
-    const V v56 = 1.0 / v55;
-    const V v57 = d0 - d2;
-    const V v58 = d0 + d2;
-    const V v59 = v25 * v50;
-    const V v60 = v25 * v52;
-    const V v61 = d1 + d3;
-    const V v62 = d1 - d3;
-    const V v63 = v58 - d4;
-    const V v64 = v63 - d6;
-    const V v65 = d4 - d6;
-    const V v66 = v57 - v65;
-    const V v67 = v57 + v65;
-    const V v68 = d5 + d7;
-    const V v69 = d5 - d7;
-    const V v70 = 0.25 * v54;
-    const V v71 = v54 * v54;
-    const V v72 = v61 - v68;
-    const V v73 = v61 + v68;
-    const V v74 = v62 - v69;
-    const V v75 = v62 + v69;
-    const V v76 = t0 - t2;
-    const V v77 = v56 * v48;
-    const V v78 = t4 - t0;
-    const V v79 = t1 - t3;
-    const V v80 = t1 + t3;
-    const V v81 = t4 - t2;
-    const V v82 = v78 - t2;
-    const V v83 = t4 - t6;
-    const V v84 = t6 + v82;
-    const V v85 = v76 + v83;
-    const V v86 = 0.25 * v84;
-    const V v87 = 0.0625 * v84;
-    const V v88 = v83 - v76;
-    const V v89 = t5 - t3;
-    const V v90 = 0.25 * v88;
-    const V v91 = 0.0625 * v88;
-    const V v92 = t5 - t7;
-    const V v93 = t5 + t7;
-    const V v94 = v79 + v92;
-    const V v95 = v80 + v93;
-    const V v96 = v51 * v90;
-    const V v97 = v32 * v51;
-    const V v98 = v92 - v79;
-    const V v99 = v93 - v80;
-    const V v100 = 0.25 * v95;
-    const V v101 = v50 * v85;
-    const V v102 = v52 * v85;
-    const V v103 = 0.25 * v98;
-    const V v104 = 0.0625 * v98;
-    const V v105 = v49 * v86;
-    const V v106 = v96 - v105;
-    const V v107 = v49 * v26;
-    const V v108 = v97 - v107;
-    const V v109 = 0.25 * v99;
-    const V v110 = 0.0625 * v99;
-    const V v111 = v26 * v103;
-    const V v112 = v106 - v111;
-    const V v113 = 1.0 / v108;
-    const V v114 = v32 * v109;
-    const V v115 = v114 + v112;
-    const V v116 = v100 * v71;
-    const V v117 = v100 * v77;
-    const V v118 = v25 * v104;
-    const V v119 = v101 + v118;
-    const V v120 = v25 * v110;
-    const V v121 = v102 + v120;
-    const V v122 = v113 * v104;
-    const V v123 = v113 * v110;
-    const V v124 = v113 * v94;
-    const V v125 = v113 * v119;
-    const V v126 = v113 * v121;
-    const V v127 = v50 * v113;
-    const V v128 = v52 * v113;
-    const V v129 = v113 * v113;
-    const V v130 = v115 * v129;
-    const V v131 = v50 * v130;
-    const V v132 = v122 - v131;
-    const V v133 = v52 * v130;
-    const V v134 = v123 - v133;
-    const V v135 = v113 * v91;
-    const V v136 = v40 * v130;
-    const V v137 = v124 - v136;
-    const V v138 = v40 * v113;
-    const V v139 = v138 * v91;
-    const V v140 = v113 * v59;
-    const V v141 = v59 * v130;
-    const V v142 = v125 - v141;
-    const V v143 = v113 * v60;
-    const V v144 = v60 * v130;
-    const V v145 = v126 - v144;
-    const V v146 = v113 * v27;
-    const V v147 = v33 * v113;
-    const V v148 = v113 * v87;
-    const V v149 = v138 * v87;
-    const V v150 = v27 * v138;
-    const V v151 = v33 * v138;
-    const V v152 = 0.25 * v140;
-    const V v153 = 0.25 * v143;
-    const V v154 = v66 * v146;
-    const V v155 = v74 * v146;
-    const V v156 = 1.0 + v155;
-    const V v157 = v143 - v150;
-    const V v158 = 0.25 * v150;
-    const V v159 = v153 - v158;
-    const V v160 = 0.25 * v151;
-    const V v161 = v64 * v147;
-    const V v162 = v154 - v161;
-    const V v163 = v72 * v147;
-    const V v164 = v156 - v163;
-    const V v165 = v72 * v127;
-    const V v166 = v64 * v127;
-    const V v167 = 1.0 + v166;
-    const V v168 = v151 - v140;
-    const V v169 = v74 * v128;
-    const V v170 = v165 - v169;
-    const V v171 = v66 * v128;
-    const V v172 = v167 - v171;
-    const V v173 = v160 - v152;
-    const V v174 = v64 * v132;
-    const V v175 = v72 * v132;
-    const V v176 = v33 * v130;
-    const V v177 = v135 - v176;
-    const V v178 = v27 * v130;
-    const V v179 = v148 - v178;
-    const V v180 = v27 * v137;
-    const V v181 = v149 + v180;
-    const V v182 = v33 * v137;
-    const V v183 = v139 + v182;
-    const V v184 = v145 - v181;
-    const V v185 = v66 * v134;
-    const V v186 = v174 - v185;
-    const V v187 = v74 * v134;
-    const V v188 = v175 - v187;
-    const V v189 = v66 * v179;
-    const V v190 = v74 * v179;
-    const V v191 = v64 * v177;
-    const V v192 = v189 - v191;
-    const V v193 = v72 * v177;
-    const V v194 = v190 - v193;
-    const V v195 = v183 - v142;
-    V s196 = softehl_splat(0.0);
-    V s197 = softehl_splat(0.0);
-    V s198 = softehl_splat(0.0);
-    V s199 = softehl_splat(0.0);
-    V s200 = softehl_splat(0.0);
-    V s201 = softehl_splat(0.0);
-    V s202 = softehl_splat(0.0);
-    V s203 = softehl_splat(0.0);
-    V s204 = softehl_splat(0.0);
-    V s205 = softehl_splat(0.0);
-    V s206 = softehl_splat(0.0);
-    V s207 = softehl_splat(0.0);
-    V s208 = softehl_splat(0.0);
-    V s209 = softehl_splat(0.0);
-    V s210 = softehl_splat(0.0);
-    V s211 = softehl_splat(0.0);
+    const double v1 = 6.283185307179586 * parameters[0], v2 = 0.5 * parameters[2],
+        v3 = 1.5707963267948966 * parameters[2], v4 = parameters[1] * parameters[1],
+        v5 = parameters[1] * v4, v6 = v4 * v4, v7 = 1.0 / v4, v8 = 1.0 / v6, v9 = v5 * v5;
+    const V v10 = X0 - X2, v11 = X4 - X2;
+    const double v12 = 1.0 / (v6 * v6);
+    const V v13 = X4 - X6, v14 = X6 + (X4 - X0 - X2);
+    const double v15 = 1.0 / v9;
+    const V v16 = v10 + v13, v17 = 0.25 * v14, v18 = 0.0625 * v14, v19 = v13 - v10, v20 = X1 - X3,
+        v21 = X1 + X3, v22 = 0.25 * v19, v23 = 0.0625 * v19, v24 = X5 - X3, v25 = X5 - X7,
+        v26 = X5 + X7, v27 = t9 * (v7 * (2.0 * parameters[1])), v28 = t9 * (v8 * (4.0 * v5)),
+        v29 = v20 + v25, v30 = v21 + v26, v31 = v25 - v20, v32 = v26 - v21,
+        v33 = t9 * (v15 * (v6 * (6.0 * parameters[1]))), v34 = 0.25 * v30, v35 = 0.25 * v31,
+        v36 = 0.0625 * v31, v37 = 0.25 * v32, v38 = 0.0625 * v32,
+        v39 = t9 * (v9 * (v12 * (8.0 * parameters[1]))), v40 = 1.0 / v34, v41 = 1.0 / (v34 * v34),
+        v42 = d0 - d2, v43 = v16 * v36, v44 = v16 * v38, v45 = d1 + d3, v46 = d1 - d3,
+        v47 = d0 + d2 - d4 - d6, v48 = d4 - d6, v49 = v42 - v48, v50 = v42 + v48, v51 = d5 + d7,
+        v52 = d5 - d7, v53 = 0.25 * v40, v54 = v45 - v51, v55 = v45 + v51, v56 = v46 - v52,
+        v57 = v46 + v52, v58 = t0 - t2, v59 = t1 - t3, v60 = t1 + t3, v61 = t4 - t2, v62 = t4 - t6,
+        v63 = t6 + (t4 - t0 - t2), v64 = v58 + v62, v65 = 0.25 * v63, v66 = 0.0625 * v63,
+        v67 = v62 - v58, v68 = t5 - t3, v69 = 0.25 * v67, v70 = 0.0625 * v67, v71 = t5 - t7,
+        v72 = t5 + t7, v73 = v71 - v59, v74 = v72 - v60, v75 = 0.25 * (v60 + v72), v76 = 0.25 * v73,
+        v77 = 0.0625 * v73, v78 = 0.25 * v74, v79 = 0.0625 * v74,
+        v80 = 1.0 / (v22 * v37 - v35 * v17), v81 = v75 * (v40 * v40),
+        v82 = v75 * (v41 * (0.5 * v30)), v83 = v36 * v80, v84 = v38 * v80,
+        v85 = (v22 * v78 + (v37 * v69 - v35 * v65 - v17 * v76)) * (v80 * v80),
+        v86 = v80 * v77 - v36 * v85, v87 = v80 * v79 - v38 * v85,
+        v88 = v80 * (v59 + v71) - v29 * v85, v89 = v29 * v80, v90 = v80 * v43,
+        v91 = v80 * (v36 * v64 + v16 * v77) - v43 * v85, v92 = v80 * v44,
+        v93 = v80 * (v38 * v64 + v16 * v79) - v44 * v85, v94 = v80 * v18, v95 = v23 * v80,
+        v96 = v18 * v89, v97 = v23 * v89, v98 = 0.25 * v90, v99 = 0.25 * v92, v100 = v92 - v96,
+        v101 = 0.25 * v96, v102 = v99 - v101, v103 = 0.25 * v97, v104 = v49 * v94 - v47 * v95,
+        v105 = 1.0 + v56 * v94 - v54 * v95, v106 = v97 - v90, v107 = v54 * v83 - v56 * v84,
+        v108 = 1.0 + v47 * v83 - v49 * v84, v109 = v103 - v98, v110 = v80 * v70 - v23 * v85,
+        v111 = v80 * v66 - v18 * v85, v112 = v89 * v66 + v18 * v88, v113 = v89 * v70 + v23 * v88,
+        v114 = v93 - v112, v115 = v47 * v86 - v49 * v87, v116 = v54 * v86 - v56 * v87,
+        v117 = v49 * v111 - v47 * v110, v118 = v56 * v111 - v54 * v110, v119 = v113 - v91;
+    V s120 = {0}, s121 = {0}, s122 = {0}, s123 = {0}, s124 = {0}, s125 = {0}, s126 = {0},
+        s127 = {0}, s128 = {0}, s129 = {0}, s130 = {0}, s131 = {0}, s132 = {0}, s133 = {0},
+        s134 = {0}, s135 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v212 = 1.0 - w[1];
-        const double v213 = 1.0 + w[1];
-        const double v214 = 0.25 * w[1];
-        const double v215 = 1.0 - w[0];
-        const double v216 = 1.0 + w[0];
-        const double v217 = 0.25 * v212;
-        const double v218 = 0.25 * v213;
-        const double v219 = 0.25 * w[0];
-        const double v220 = 0.25 - v214;
-        const double v221 = 0.25 + v214;
-        const double v222 = 0.25 + v219;
-        const double v223 = 0.25 - v219;
-        const double v224 = v217 * v215;
-        const double v225 = v217 * v216;
-        const double v226 = v216 * v218;
-        const double v227 = v215 * v218;
-        const double v228 = v214 - 0.25;
-        const V v229 = X2 * v220;
-        const double v230 = v219 - 0.25;
-        const V v231 = v221 * v35;
-        const V v232 = X6 * v223;
-        const V v233 = v222 * v34;
-        const V v234 = X5 * v226;
-        const V v235 = v226 * t5;
-        const V v236 = v221 * v21;
-        const V v237 = v229 + v236;
-        const V v238 = v220 * t2;
-        const V v239 = v223 * t6;
-        const V v240 = v222 * v18;
-        const V v241 = v232 + v240;
-        const V v242 = v221 * v92;
-        const V v243 = v221 * v83;
-        const V v244 = v238 + v243;
-        const V v245 = v222 * v89;
-        const V v246 = v222 * v81;
-        const V v247 = v239 + v246;
-        const V v248 = X0 * v228;
-        const V v249 = v248 + v237;
-        const V v250 = X0 * v230;
-        const V v251 = v250 + v241;
-        const V v252 = X3 * v220;
-        const V v253 = v252 + v231;
-        const V v254 = X3 * v225;
-        const V v255 = v234 + v254;
-        const V v256 = v220 * t3;
-        const V v257 = v256 + v242;
-        const V v258 = v225 * t3;
-        const V v259 = v235 + v258;
-        const V v260 = v228 * t0;
-        const V v261 = v260 + v244;
-        const V v262 = v230 * t0;
-        const V v263 = v262 + v247;
-        const V v264 = X7 * v223;
-        const V v265 = v264 + v233;
-        const V v266 = X7 * v227;
-        const V v267 = v266 + v255;
-        const V v268 = v223 * t7;
-        const V v269 = v268 + v245;
-        const V v270 = v227 * t7;
-        const V v271 = v270 + v259;
-        const V v272 = X1 * v228;
-        const V v273 = v272 + v253;
-        const V v274 = v228 * t1;
-        const V v275 = v274 + v257;
-        const V v276 = X1 * v230;
-        const V v277 = v276 + v265;
-        const V v278 = v230 * t1;
-        const V v279 = v278 + v269;
-        const V v280 = X1 * v224;
-        const V v281 = v280 + v267;
-        const V v282 = v224 * t1;
-        const V v283 = v282 + v271;
-        const V v284 = w[0] * v249;
-        const V v285 = w[0] * v261;
-        const V v286 = v277 * v261;
-        const V v287 = v249 * v277;
-        const V v288 = w[1] * v277;
-        const V v289 = w[1] * v251;
-        const V v290 = v284 - v289;
-        const V v291 = w[1] * v279;
-        const V v292 = v249 * v279;
-        const V v293 = v286 + v292;
-        const V v294 = w[1] * v263;
-        const V v295 = v285 - v294;
-        const double v296 = w[1] * w[2];
-        const V v297 = v273 * v251;
-        const V v298 = v287 - v297;
-        const V v299 = w[0] * v273;
-        const V v300 = v288 - v299;
-        const V v301 = v273 * v263;
-        const V v302 = v293 - v301;
-        const V v303 = w[2] * v281;
-        const V v304 = w[0] * v275;
-        const V v305 = v291 - v304;
-        const V v306 = v251 * v275;
-        const V v307 = v302 - v306;
-        const V v308 = w[2] * v283;
-        const V v309 = v298 * v283;
-        const V v310 = 0.25 * v298;
-        const V v311 = v298 * v281;
-        const V v312 = v295 * v303;
-        const V v313 = v303 * v305;
-        const V v314 = v300 * v303;
-        s202 += v314;
-        const V v315 = v290 * v303;
-        s203 += v315;
-        const V v316 = v281 * v307;
-        const V v317 = v309 + v316;
-        const V v318 = 0.25 * v307;
-        const V v319 = v290 * v308;
-        s211 += v312;
-        s211 += v319;
-        const V v320 = v300 * v308;
-        s210 += v313;
-        s210 += v320;
-        const V v321 = w[2] * v310;
-        s196 += v321;
-        const V v322 = v296 * v310;
-        s198 += v322;
-        const V v323 = w[2] * v311;
-        s199 += v323;
-        const V v324 = v296 * v311;
-        s201 += v324;
-        const V v325 = w[0] * v321;
-        s197 += v325;
-        const V v326 = w[2] * v318;
-        s204 += v326;
-        const V v327 = v296 * v318;
-        s206 += v327;
-        const V v328 = w[2] * v317;
-        s207 += v328;
-        const V v329 = v296 * v317;
-        s209 += v329;
-        const V v330 = w[0] * v323;
-        s200 += v330;
-        const V v331 = w[0] * v326;
-        s205 += v331;
-        const V v332 = w[0] * v328;
-        s208 += v332;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v136 = 1.0 - w[1], v137 = 1.0 + w[1], v138 = 0.25 * w[1], v139 = 1.0 - w[0],
+            v140 = 1.0 + w[0], v141 = 0.25 * v136, v142 = 0.25 * v137, v143 = 0.25 * w[0],
+            v144 = 0.25 - v138, v145 = 0.25 + v138, v146 = 0.25 + v143, v147 = 0.25 - v143,
+            v148 = v141 * v139, v149 = v141 * v140, v150 = v140 * v142, v151 = v139 * v142,
+            v152 = v138 - 0.25;
+        const V v153 = X2 * v144; const double v154 = v143 - 0.25;
+        const V v155 = v145 * v25, v156 = X6 * v147, v157 = v146 * v24, v158 = X5 * v150,
+            v159 = v150 * t5, v160 = v145 * v13, v161 = v153 + v160, v162 = v144 * t2,
+            v163 = v147 * t6, v164 = v146 * v11, v165 = v145 * v71, v166 = v145 * v62,
+            v167 = v162 + v166, v168 = v146 * v68, v169 = v146 * v61, v170 = X0 * v152,
+            v171 = v170 + v161, v172 = X0 * v154, v173 = v172 + (v156 + v164), v174 = X3 * v144,
+            v175 = v174 + v155, v176 = X3 * v149, v177 = v158 + v176, v178 = v144 * t3,
+            v179 = v178 + v165, v180 = v149 * t3, v181 = v159 + v180, v182 = v152 * t0,
+            v183 = v182 + v167, v184 = v154 * t0, v185 = v184 + (v163 + v169), v186 = X7 * v147,
+            v187 = X7 * v151, v188 = v147 * t7, v189 = v151 * t7, v190 = X1 * v152,
+            v191 = v190 + v175, v192 = v152 * t1, v193 = v192 + v179, v194 = X1 * v154,
+            v195 = v194 + (v186 + v157), v196 = v154 * t1, v197 = v196 + (v188 + v168),
+            v198 = X1 * v148, v199 = v198 + (v187 + v177), v200 = v148 * t1,
+            v201 = v200 + (v189 + v181), v202 = w[0] * v171 - w[1] * v173;
+        const double v203 = w[1] * w[2];
+        const V v204 = v171 * v195 - v191 * v173, v205 = w[1] * v195 - w[0] * v191,
+            v206 = w[2] * v199, v207 = v195 * v183 + v171 * v197 - v191 * v185 - v173 * v193,
+            v208 = w[2] * v201, v209 = 0.25 * v204, v210 = v204 * v199, v211 = v205 * v206;
+        s126 += v211; const V v212 = v202 * v206; s127 += v212;
+        const V v213 = v204 * v201 + v199 * v207, v214 = 0.25 * v207;
+        s135 += (w[0] * v183 - w[1] * v185) * v206; s135 += v202 * v208;
+        s134 += v206 * (w[1] * v197 - w[0] * v193); s134 += v205 * v208; const V v215 = w[2] * v209;
+        s120 += v215; const V v216 = v203 * v209; s122 += v216; const V v217 = w[2] * v210;
+        s123 += v217; const V v218 = v203 * v210; s125 += v218; const V v219 = w[0] * v215;
+        s121 += v219; const V v220 = w[2] * v214; s128 += v220; const V v221 = v203 * v214;
+        s130 += v221; const V v222 = w[2] * v213; s131 += v222; const V v223 = v203 * v213;
+        s133 += v223; const V v224 = w[0] * v217; s124 += v224; const V v225 = w[0] * v220;
+        s129 += v225; const V v226 = w[0] * v222; s132 += v226;
     }
-    const V v333 = 1.0 / s199;
-    const V v334 = 0.5 * s199;
-    const V v335 = v3 * s199;
-    const V v336 = t10 * v334;
-    const V v337 = v333 * v333;
-    const V v338 = v337 * s207;
-    const V v339 = v2 * s207;
-    const V v340 = v336 + v339;
-    const V v341 = 3.141592653589793 * v340;
-    const V v342 = v333 * s204;
-    const V v343 = v333 * s205;
-    const V v344 = v333 * s206;
-    const V v345 = v333 * s210;
-    const V v346 = v333 * s211;
-    const V v347 = s202 * v338;
-    const V v348 = v345 - v347;
-    const V v349 = v333 * s202;
-    const V v350 = 0.25 * v349;
-    const V v351 = s200 * v333;
-    const V v352 = s200 * v338;
-    const V v353 = v333 * s201;
-    const V v354 = v333 * s203;
-    const V v355 = s203 * v338;
-    const V v356 = v346 - v355;
-    const V v357 = s196 * v333;
-    const V v358 = s197 * v333;
-    const V v359 = s198 * v333;
-    const V v360 = 0.25 * v354;
-    const V v361 = s201 * v338;
-    const V v362 = v158 * v354;
-    const V v363 = v158 * v349;
-    const V v364 = v160 * v349;
-    const V v365 = v160 * v354;
-    const V v366 = v152 * v349;
-    const V v367 = v152 * v354;
-    const V v368 = v153 * v349;
-    const V v369 = v153 * v354;
-    const V v370 = v349 * v142;
-    const V v371 = v354 * v142;
-    const V v372 = v349 * v145;
-    const V v373 = v354 * v145;
-    const V v374 = v368 - v363;
-    const V v375 = v366 - v364;
-    const V v376 = v364 - v366;
-    const V v377 = v363 - v368;
-    const V v378 = v367 - v365;
-    const V v379 = v365 - v367;
-    const V v380 = 0.25 * v348;
-    const V v381 = v140 * v348;
-    const V v382 = v370 + v381;
-    const V v383 = v143 * v348;
-    const V v384 = v372 + v383;
-    const V v385 = v143 * v356;
-    const V v386 = v373 + v385;
-    const V v387 = 0.25 * v356;
-    const V v388 = v140 * v356;
-    const V v389 = v371 + v388;
-    const V v390 = v362 - v369;
-    const V v391 = v369 - v362;
-    const V v392 = v150 * v348;
-    const V v393 = v150 * v356;
-    const V v394 = v151 * v348;
-    const V v395 = v151 * v356;
-    const V v396 = v333 * s208;
-    const V v397 = v352 - v396;
-    const V v398 = v333 * s209;
-    const V v399 = v361 - v398;
-    const V v400 = v49 * v397;
-    const V v401 = v51 * v399;
-    const V v402 = v32 * v397;
-    const V v403 = v70 * v397;
-    const V v404 = v70 * v399;
-    const V v405 = v26 * v399;
-    const V v406 = v402 - v405;
-    const V v407 = v349 * v181;
-    const V v408 = v392 + v407;
-    const V v409 = v349 * v183;
-    const V v410 = v394 + v409;
-    const V v411 = v354 * v181;
-    const V v412 = v393 + v411;
-    const V v413 = v354 * v183;
-    const V v414 = v395 + v413;
-    const V v415 = v384 - v408;
-    const V v416 = v386 - v412;
-    const V v417 = v389 - v414;
-    const V v418 = v382 - v410;
-    const V v419 = 0.25 * v415;
-    const V v420 = v412 - v386;
-    const V v421 = v414 - v389;
-    const V v422 = v408 - v384;
-    const V v423 = 0.25 * v416;
-    const V v424 = 0.25 * v418;
-    const V v425 = 0.25 * v417;
-    const V v426 = v410 - v382;
-    const V v427 = 0.25 * v420;
-    const V v428 = 0.25 * v421;
-    const V v429 = 0.25 * v422;
-    const V v430 = 0.25 * v426;
-    const V v431 = s196 * v338;
-    const V v432 = v342 - v431;
-    const V v433 = s197 * v338;
-    const V v434 = v343 - v433;
-    const V v435 = s198 * v338;
-    const V v436 = v344 - v435;
-    const V v437 = v434 + v403;
-    const V v438 = v436 + v404;
-    const V v439 = v73 * v432;
-    const V v440 = v73 * v357;
-    const V v441 = 1.0 + v440;
-    const V v442 = v66 * v419;
-    const V v443 = v186 + v442;
-    const V v444 = v66 * v374;
-    const V v445 = v172 + v444;
-    const V v446 = v66 * v391;
-    const V v447 = v162 + v446;
-    const V v448 = v66 * v423;
-    const V v449 = v192 + v448;
-    const V v450 = v74 * v374;
-    const V v451 = v170 + v450;
-    const V v452 = v74 * v358;
-    const V v453 = v441 - v452;
-    const V v454 = v74 * v391;
-    const V v455 = v164 + v454;
-    const V v456 = v74 * v434;
-    const V v457 = v439 - v456;
-    const V v458 = v74 * v419;
-    const V v459 = v188 + v458;
-    const V v460 = v74 * v423;
-    const V v461 = v194 + v460;
-    const V v462 = v67 * v350;
-    const V v463 = v462 + v445;
-    const V v464 = v67 * v387;
-    const V v465 = v464 + v449;
-    const V v466 = v75 * v350;
-    const V v467 = v466 + v451;
-    const V v468 = v75 * v360;
-    const V v469 = v468 + v455;
-    const V v470 = v75 * v387;
-    const V v471 = v470 + v461;
-    const V v472 = v75 * v380;
-    const V v473 = v472 + v459;
-    const V v474 = v67 * v360;
-    const V v475 = v474 + v447;
-    const V v476 = v67 * v380;
-    const V v477 = v476 + v443;
-    const V v478 = v64 * v376;
-    const V v479 = v478 + v463;
-    const V v480 = v72 * v376;
-    const V v481 = v480 + v467;
-    const V v482 = v64 * v428;
-    const V v483 = v482 + v465;
-    const V v484 = v72 * v428;
-    const V v485 = v484 + v471;
-    const V v486 = v72 * v379;
-    const V v487 = v486 + v469;
-    const V v488 = v64 * v379;
-    const V v489 = v488 + v475;
-    const V v490 = v64 * v430;
-    const V v491 = v490 + v477;
-    const V v492 = v72 * v430;
-    const V v493 = v492 + v473;
-    const V v494 = v479 * v485;
-    const V v495 = v479 * v487;
-    const V v496 = v72 * v359;
-    const V v497 = v453 - v496;
-    const V v498 = v72 * v436;
-    const V v499 = v457 - v498;
-    const V v500 = 2.0 * v497;
-    const V v501 = v497 * v497;
-    const V v502 = v487 * v491;
-    const V v503 = v494 + v502;
-    const V v504 = v481 * v489;
-    const V v505 = v495 - v504;
-    const V v506 = v489 * v493;
-    const V v507 = v503 - v506;
-    const V v508 = 2.0 * v505;
-    const V v509 = v505 * v505;
-    const V v510 = v499 * v500;
-    const V v511 = v481 * v483;
-    const V v512 = v507 - v511;
-    const V v513 = v501 * v509;
-    const V v514 = 1.0 / v513;
-    const V v515 = v508 * v512;
-    const V v516 = v509 * v510;
-    const V v517 = v501 * v515;
-    const V v518 = v516 + v517;
-    const V v519 = v335 * v514;
-    const V v520 = v514 * v519;
-    const V v521 = v518 * v520;
-    const V v522 = 1.0 - v514;
-    const V v523 = v341 * v522;
-    const V v524 = v521 + v523;
-    const V v525 = v335 - v519;
-    const V v526 = v510 * v525;
-    const V v527 = v515 * v525;
-    const V v528 = v509 * v524;
-    const V v529 = v527 + v528;
-    const V v530 = v501 * v524;
-    const V v531 = v526 + v530;
-    const V v532 = v509 * v525;
-    const V v533 = v501 * v525;
-    const V v534 = v508 * v531;
-    const V v535 = v508 * v533;
-    const V v536 = 2.0 * v533;
-    const V v537 = v512 * v536;
-    const V v538 = v534 + v537;
-    const V v539 = v493 * v535;
-    const V v540 = v483 * v535;
-    const V v541 = v500 * v529;
-    const V v542 = v500 * v532;
-    const V v543 = 2.0 * v532;
-    const V v544 = v499 * v543;
-    const V v545 = v541 + v544;
-    const V v546 = v481 * v538;
-    const V v547 = v539 + v546;
-    const V v548 = v481 * v535;
-    const V v549 = v489 * v538;
-    const V v550 = v540 + v549;
-    const V v551 = v489 * v535;
-    const V v552 = v434 * v542;
-    const V v553 = v436 * v542;
-    const V v554 = v432 * v542;
-    const V v555 = v357 * v545;
-    const V v556 = v554 + v555;
-    const V v557 = v358 * v545;
-    const V v558 = v359 * v545;
-    const V v559 = v375 * v550;
-    const V v560 = v377 * v550;
-    const V v561 = v350 * v550;
-    const V v562 = v378 * v547;
-    const V v563 = v390 * v547;
-    const V v564 = v360 * v547;
-    const V v565 = v424 * v551;
-    const V v566 = v429 * v551;
-    const V v567 = v380 * v551;
-    const V v568 = v425 * v548;
-    const V v569 = v427 * v548;
-    const V v570 = v387 * v548;
-    const V v571 = v485 * v535;
-    const V v572 = v491 * v535;
-    const V v573 = v487 * v535;
-    const V v574 = v380 * v573;
-    const V v575 = v430 * v573;
-    const V v576 = v568 + v575;
-    const V v577 = v419 * v573;
-    const V v578 = v569 + v577;
-    const V v579 = v487 * v538;
-    const V v580 = v571 + v579;
-    const V v581 = v479 * v538;
-    const V v582 = v572 + v581;
-    const V v583 = v479 * v535;
-    const V v584 = v387 * v583;
-    const V v585 = v360 * v582;
-    const V v586 = v584 + v585;
-    const V v587 = v428 * v583;
-    const V v588 = v565 + v587;
-    const V v589 = v423 * v583;
-    const V v590 = v566 + v589;
-    const V v591 = v350 * v580;
-    const V v592 = v574 + v591;
-    const V v593 = v379 * v582;
-    const V v594 = v391 * v582;
-    const V v595 = v376 * v580;
-    const V v596 = v374 * v580;
-    V s597 = softehl_splat(0.0);
-    V s598 = softehl_splat(0.0);
-    V s599 = softehl_splat(0.0);
-    V s600 = softehl_splat(0.0);
-    V s601 = softehl_splat(0.0);
-    V s602 = softehl_splat(0.0);
-    V s603 = softehl_splat(0.0);
-    V s604 = softehl_splat(0.0);
-    V s605 = softehl_splat(0.0);
-    V s606 = softehl_splat(0.0);
-    V s607 = softehl_splat(0.0);
-    V s608 = softehl_splat(0.0);
-    V s609 = softehl_splat(0.0);
-    V s610 = softehl_splat(0.0);
-    V s611 = softehl_splat(0.0);
+    const V v227 = 1.0 / s123, v228 = v3 * s123, v229 = v227 * v227 * s131,
+        v230 = v227 * s134 - s126 * v229, v231 = v227 * s126, v232 = 0.25 * v231,
+        v233 = s124 * v227, v234 = v227 * s125, v235 = v227 * s127,
+        v236 = v227 * s135 - s127 * v229, v237 = s120 * v227, v238 = s121 * v227,
+        v239 = s122 * v227, v240 = 0.25 * v235, v241 = v101 * v235, v242 = v101 * v231,
+        v243 = v103 * v231, v244 = v103 * v235, v245 = v98 * v231, v246 = v98 * v235,
+        v247 = v99 * v231, v248 = v99 * v235, v249 = v247 - v242, v250 = v243 - v245,
+        v251 = v244 - v246, v252 = 0.25 * v230, v253 = v231 * v91 + v90 * v230,
+        v254 = v231 * v93 + v92 * v230, v255 = v235 * v93 + v92 * v236, v256 = 0.25 * v236,
+        v257 = v235 * v91 + v90 * v236, v258 = v248 - v241, v259 = s124 * v229 - v227 * s132,
+        v260 = s125 * v229 - v227 * s133, v261 = v35 * v259, v262 = v37 * v260,
+        v263 = v22 * v259 - v17 * v260, v264 = v96 * v230 + v231 * v112,
+        v265 = v97 * v230 + v231 * v113, v266 = v96 * v236 + v235 * v112,
+        v267 = v97 * v236 + v235 * v113, v268 = 0.25 * (v254 - v264), v269 = 0.25 * (v255 - v266),
+        v270 = 0.25 * (v267 - v257), v271 = 0.25 * (v265 - v253), v272 = v227 * s128 - s120 * v229,
+        v273 = v227 * s129 - s121 * v229, v274 = v227 * s130 - s122 * v229,
+        v275 = v273 + v53 * v259, v276 = v274 + v53 * v260,
+        v277 = v47 * v250 + (v50 * v232 + (v108 + v49 * v249)),
+        v278 = v54 * v250 + (v57 * v232 + (v107 + v56 * v249)),
+        v279 = v47 * v270 + (v50 * v256 + (v117 + v49 * v269)),
+        v280 = v54 * v270 + (v57 * v256 + (v118 + v56 * v269)),
+        v281 = v54 * v251 + (v57 * v240 + (v105 + v56 * v258)),
+        v282 = v47 * v251 + (v50 * v240 + (v104 + v49 * v258)),
+        v283 = v47 * v271 + (v50 * v252 + (v115 + v49 * v268)),
+        v284 = v54 * v271 + (v57 * v252 + (v116 + v56 * v268)),
+        v285 = 1.0 + v55 * v237 - v56 * v238 - v54 * v239,
+        v286 = v55 * v272 - v56 * v273 - v54 * v274, v287 = 2.0 * v285, v288 = v285 * v285,
+        v289 = v277 * v281 - v278 * v282, v290 = 2.0 * v289, v291 = v289 * v289, v292 = v286 * v287,
+        v293 = v277 * v280 + v281 * v283 - v282 * v284 - v278 * v279, v294 = 1.0 / (v288 * v291),
+        v295 = v290 * v293, v296 = v228 * v294,
+        v297 = 3.141592653589793 * (t10 * (0.5 * s123) + v2 * s131) * (1.0 - v294),
+        v298 = (v291 * v292 + v288 * v295) * (v294 * v296) + v297, v299 = v228 - v296,
+        v300 = v291 * v299, v301 = v288 * v299, v302 = v290 * v301,
+        v303 = v290 * (v292 * v299 + v288 * v298) + v293 * (2.0 * v301), v304 = v287 * v300,
+        v305 = v287 * (v295 * v299 + v291 * v298) + v286 * (2.0 * v300),
+        v306 = v284 * v302 + v278 * v303, v307 = v278 * v302, v308 = v279 * v302 + v282 * v303,
+        v309 = v282 * v302, v310 = v273 * v304, v311 = v274 * v304,
+        v312 = v272 * v304 + v237 * v305, v313 = v238 * v305, v314 = v239 * v305,
+        v315 = (v245 - v243) * v308, v316 = (v242 - v247) * v308, v317 = v232 * v308,
+        v318 = (v246 - v244) * v306, v319 = (v241 - v248) * v306, v320 = v240 * v306,
+        v321 = v252 * v309, v322 = v256 * v307, v323 = v281 * v302,
+        v324 = 0.25 * (v257 - v267) * v307 + v271 * v323,
+        v325 = 0.25 * (v266 - v255) * v307 + v268 * v323, v326 = v280 * v302 + v281 * v303,
+        v327 = v283 * v302 + v277 * v303, v328 = v277 * v302, v329 = v256 * v328 + v240 * v327,
+        v330 = 0.25 * (v253 - v265) * v309 + v270 * v328,
+        v331 = 0.25 * (v264 - v254) * v309 + v269 * v328, v332 = v252 * v323 + v232 * v326,
+        v333 = v251 * v327, v334 = v258 * v327, v335 = v250 * v326, v336 = v249 * v326;
+    V s337 = {0}, s338 = {0}, s339 = {0}, s340 = {0}, s341 = {0}, s342 = {0}, s343 = {0},
+        s344 = {0}, s345 = {0}, s346 = {0}, s347 = {0}, s348 = {0}, s349 = {0}, s350 = {0},
+        s351 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v612 = 0.25 * w[1];
-        const double v613 = 1.0 - w[1];
-        const double v614 = 1.0 + w[1];
-        const double v615 = 0.25 * v613;
-        const V v616 = w[1] - v353;
-        const double v617 = 0.25 * v614;
-        const double v618 = 0.25 - v612;
-        const double v619 = 0.25 + v612;
-        const V v620 = v616 * v109;
-        const V v621 = v620 + v401;
-        const V v622 = v51 * v616;
-        const V v623 = 0.25 * v616;
-        const V v624 = v616 * v86;
-        const V v625 = v406 - v624;
-        const double v626 = v612 - 0.25;
-        const V v627 = X2 * v618;
-        const V v628 = v618 * t2;
-        const V v629 = v619 * v35;
-        const V v630 = v619 * v92;
-        const V v631 = v619 * v21;
-        const V v632 = v627 + v631;
-        const V v633 = v619 * v83;
-        const V v634 = v628 + v633;
-        const double v635 = 0.25 * w[0];
-        const double v636 = 1.0 - w[0];
-        const double v637 = 1.0 + w[0];
-        const V v638 = X3 * v618;
-        const V v639 = v638 + v629;
-        const V v640 = v618 * t3;
-        const V v641 = v640 + v630;
-        const V v642 = w[0] - v351;
-        const V v643 = X0 * v626;
-        const V v644 = v643 + v632;
-        const V v645 = v626 * t0;
-        const V v646 = v645 + v634;
-        const double v647 = v615 * v636;
-        const double v648 = v615 * v637;
-        const double v649 = v637 * v617;
-        const double v650 = v636 * v617;
-        const double v651 = v635 - 0.25;
-        const V v652 = v49 * v642;
-        const V v653 = 0.25 * v642;
-        const V v654 = v648 * t3;
-        const V v655 = X3 * v648;
-        const V v656 = X0 * v651;
-        const V v657 = v651 * t0;
-        const V v658 = v32 * v642;
-        const double v659 = 0.25 + v635;
-        const double v660 = 0.25 - v635;
-        const V v661 = X5 * v649;
-        const V v662 = v661 + v655;
-        const V v663 = v649 * t5;
-        const V v664 = v663 + v654;
-        const V v665 = v26 * v616;
-        const V v666 = v658 - v665;
-        const V v667 = v659 * v18;
-        const V v668 = v656 + v667;
-        const V v669 = v659 * v81;
-        const V v670 = v657 + v669;
-        const V v671 = v659 * v34;
-        const V v672 = v659 * v89;
-        const double v673 = w[2] * v1;
-        const double v674 = 6.283185307179586 * w[2];
-        const V v675 = X6 * v660;
-        const V v676 = v675 + v668;
-        const V v677 = v660 * t6;
-        const V v678 = v677 + v670;
-        const V v679 = X1 * v647;
-        const V v680 = v679 + v662;
-        const V v681 = v647 * t1;
-        const V v682 = v681 + v664;
-        const V v683 = X1 * v651;
-        const V v684 = v683 + v671;
-        const V v685 = v651 * t1;
-        const V v686 = v685 + v672;
-        const V v687 = X1 * v626;
-        const V v688 = v687 + v639;
-        const V v689 = v626 * t1;
-        const V v690 = v689 + v641;
-        const V v691 = v622 - v652;
-        const V v692 = v622 + v652;
-        const V v693 = X7 * v660;
-        const V v694 = v693 + v684;
-        const V v695 = X7 * v650;
-        const V v696 = v695 + v680;
-        const V v697 = v650 * t7;
-        const V v698 = v697 + v682;
-        const V v699 = v660 * t7;
-        const V v700 = v699 + v686;
-        const V v701 = 0.25 * v692;
-        const V v702 = v642 * v103;
-        const V v703 = v702 + v400;
-        const V v704 = v642 * v90;
-        const V v705 = v704 + v625;
-        const V v706 = v646 * v694;
-        const V v707 = v644 * v694;
-        const V v708 = v644 * v700;
-        const V v709 = v706 + v708;
-        const V v710 = v688 * v676;
-        const V v711 = v707 - v710;
-        const V v712 = v688 * v678;
-        const V v713 = v709 - v712;
-        const V v714 = v690 * v676;
-        const V v715 = v713 - v714;
-        const V v716 = v698 * v711;
-        const V v717 = v696 * v711;
-        const V v718 = v117 * v701;
-        const V v719 = v696 * v715;
-        const V v720 = v716 + v719;
-        const V v721 = v56 * v701;
-        const V v722 = v357 - v721;
-        const V v723 = v621 - v703;
-        const V v724 = v621 + v703;
-        const V v725 = 0.25 * v724;
-        const V v726 = v718 - v725;
-        const V v727 = v673 * v717;
-        const V v728 = t8 * v717;
-        const V v729 = v113 * v705;
-        const V v730 = v356 + v729;
-        const V v731 = v113 * v691;
-        const V v732 = v349 + v731;
-        const V v733 = v113 * v723;
-        const V v734 = v348 + v733;
-        const V v735 = parameters[0] * v720;
-        const V v736 = v728 + v735;
-        const V v737 = v113 * v666;
-        const V v738 = v354 + v737;
-        const V v739 = v666 * v130;
-        const V v740 = v730 - v739;
-        const V v741 = v691 * v130;
-        const V v742 = v734 - v741;
-        const V v743 = v674 * v736;
-        const V v744 = v56 * v726;
-        const V v745 = v432 + v744;
-        const V v746 = 0.25 * v732;
-        const V v747 = 0.25 * v738;
-        const V v748 = 0.5 * v727;
-        const V v749 = 0.25 * v740;
-        const V v750 = 0.25 * v742;
-        const V v751 = v173 * v732;
-        const V v752 = v173 * v738;
-        const V v753 = v159 * v732;
-        const V v754 = v159 * v738;
-        const V v755 = v10 * v727;
-        const V v756 = v14 * v727;
-        const V v757 = v23 * v727;
-        const V v758 = v20 * v727;
-        const V v759 = v738 * v195;
-        const V v760 = v732 * v195;
-        const V v761 = v738 * v184;
-        const V v762 = v732 * v184;
-        const V v763 = 0.05 * v755;
-        const V v764 = 0.010476190476190476 * v756;
-        const V v765 = 0.0027142857142857142 * v757;
-        const V v766 = 0.0007703153988868275 * v758;
-        const V v767 = v168 * v740;
-        const V v768 = v759 + v767;
-        const V v769 = v742 * v168;
-        const V v770 = v760 + v769;
-        const V v771 = v157 * v740;
-        const V v772 = v761 + v771;
-        const V v773 = v742 * v157;
-        const V v774 = v762 + v773;
-        const V v775 = 0.25 * v768;
-        const V v776 = 0.25 * v770;
-        const V v777 = 0.25 * v772;
-        const V v778 = 0.25 * v774;
-        const V v779 = v37 * v727;
-        const V v780 = v743 - v779;
-        const V v781 = v39 * v727;
-        const V v782 = v743 - v781;
-        const V v783 = v45 * v727;
-        const V v784 = v743 - v783;
-        const V v785 = v10 * v780;
-        const V v786 = v53 * v727;
-        const V v787 = v743 - v786;
-        const V v788 = v14 * v782;
-        const V v789 = v23 * v784;
-        const V v790 = v20 * v787;
-        const V v791 = v73 * v745;
-        const V v792 = v73 * v722;
-        const V v793 = 1.0 + v792;
-        const V v794 = v64 * v775;
-        const V v795 = v192 + v794;
-        const V v796 = v64 * v776;
-        const V v797 = v186 + v796;
-        const V v798 = v64 * v751;
-        const V v799 = v172 + v798;
-        const V v800 = v64 * v752;
-        const V v801 = v162 + v800;
-        const V v802 = v72 * v751;
-        const V v803 = v170 + v802;
-        const V v804 = v72 * v752;
-        const V v805 = v164 + v804;
-        const V v806 = v72 * v775;
-        const V v807 = v194 + v806;
-        const V v808 = v72 * v776;
-        const V v809 = v188 + v808;
-        const V v810 = v67 * v749;
-        const V v811 = v795 + v810;
-        const V v812 = v67 * v750;
-        const V v813 = v812 + v797;
-        const V v814 = v67 * v746;
-        const V v815 = v814 + v799;
-        const V v816 = v75 * v746;
-        const V v817 = v816 + v803;
-        const V v818 = v75 * v749;
-        const V v819 = v807 + v818;
-        const V v820 = v75 * v750;
-        const V v821 = v820 + v809;
-        const V v822 = v75 * v747;
-        const V v823 = v822 + v805;
-        const V v824 = v67 * v747;
-        const V v825 = v824 + v801;
-        const V v826 = v66 * v777;
-        const V v827 = v811 + v826;
-        const V v828 = v66 * v778;
-        const V v829 = v828 + v813;
-        const V v830 = v66 * v753;
-        const V v831 = v830 + v815;
-        const V v832 = v74 * v753;
-        const V v833 = v832 + v817;
-        const V v834 = v74 * v777;
-        const V v835 = v819 + v834;
-        const V v836 = v74 * v778;
-        const V v837 = v836 + v821;
-        const V v838 = v66 * v754;
-        const V v839 = v838 + v825;
-        const V v840 = v74 * v754;
-        const V v841 = v840 + v823;
-        const V v842 = 2.0 * v831;
-        const V v843 = 2.0 * v833;
-        const V v844 = v831 * v831;
-        const V v845 = v831 * v835;
-        const V v846 = 2.0 * v839;
-        const V v847 = 2.0 * v841;
-        const V v848 = v831 * v841;
-        const V v849 = v839 * v839;
-        const V v850 = v844 + v849;
-        const V v851 = v837 * v843;
-        const V v852 = v837 * v839;
-        const V v853 = v845 - v852;
-        const V v854 = v833 * v839;
-        const V v855 = v848 - v854;
-        const V v856 = v833 * v833;
-        const V v857 = v850 + v856;
-        const V v858 = 2.0 * v855;
-        const V v859 = v855 * v855;
-        const V v860 = v841 * v841;
-        const V v861 = v857 + v860;
-        const V v862 = v835 * v847;
-        const V v863 = v851 + v862;
-        const V v864 = v827 * v833;
-        const V v865 = v853 - v864;
-        const V v866 = v827 * v846;
-        const V v867 = v863 + v866;
-        const V v868 = v829 * v841;
-        const V v869 = v865 + v868;
-        const V v870 = v858 * v869;
-        const V v871 = v829 * v842;
-        const V v872 = v867 + v871;
-        const V v873 = v54 * v653;
-        const V v874 = v358 + v873;
-        const V v875 = v54 * v623;
-        const V v876 = v359 + v875;
-        const V v877 = v116 * v653;
-        const V v878 = v437 - v877;
-        const V v879 = v116 * v623;
-        const V v880 = v438 - v879;
-        const V v881 = v74 * v874;
-        const V v882 = v793 - v881;
-        const V v883 = v74 * v878;
-        const V v884 = v791 - v883;
-        const V v885 = v72 * v876;
-        const V v886 = v882 - v885;
-        const V v887 = v72 * v880;
-        const V v888 = v884 - v887;
-        const V v889 = v886 * v886;
-        const V v890 = 2.0 * v886;
-        const V v891 = v888 * v890;
-        const V v892 = v872 + v891;
-        const V v893 = v870 * v889;
-        const V v894 = v859 * v891;
-        const V v895 = v893 + v894;
-        const V v896 = v859 * v889;
-        const V v897 = softehl_vrcbrt(v896);
-        const V v898 = 1.0 / v896;
-        const V v899 = v861 + v889;
-        const V v900 = v899 * v899;
-        const V v901 = v900 * v900;
-        const V v902 = 0.0007703153988868275 * v899;
-        const V v903 = v901 * v902;
-        const V v904 = 0.5 * v899;
-        const V v905 = 2.0 * v899;
-        const V v906 = 0.1 * v899;
-        const V v907 = v899 * v900;
-        const V v908 = v897 * v897;
-        const V v909 = v908 * v908;
-        const V v910 = v897 * v909;
-        const V v911 = 0.0027142857142857142 * v901;
-        const V v912 = 0.05 * v900;
-        const V v913 = 3.0 * v900;
-        const V v914 = 0.03142857142857143 * v900;
-        const V v915 = v892 * v905;
-        const V v916 = v727 * v904;
-        const V v917 = v743 * v904;
-        const V v918 = v743 * v897;
-        const V v919 = 0.6666666666666666 * v910;
-        const V v920 = 5.0 * v901;
-        const V v921 = 0.0038515769944341373 * v901;
-        const V v922 = v892 * v913;
-        const V v923 = 0.3333333333333333 * v916;
-        const V v924 = v748 * v892;
-        const V v925 = v917 + v924;
-        const V v926 = 0.010476190476190476 * v907;
-        const V v927 = 4.0 * v907;
-        const V v928 = 0.010857142857142857 * v907;
-        const V v929 = v748 * v897;
-        const V v930 = v755 * v912;
-        const V v931 = v785 * v912;
-        const V v932 = v892 * v927;
-        const V v933 = 0.6666666666666666 * v930;
-        const V v934 = v756 * v926;
-        const V v935 = v788 * v926;
-        const V v936 = v788 * v898;
-        const V v937 = v898 * v898;
-        const V v938 = 2.0 * v898;
-        const V v939 = v764 * v898;
-        const V v940 = v763 * v915;
-        const V v941 = v931 + v940;
-        const V v942 = v764 * v922;
-        const V v943 = v935 + v942;
-        const V v944 = v934 * v938;
-        const V v945 = v934 * v937;
-        const V v946 = v937 * v943;
-        const V v947 = v895 * v937;
-        const V v948 = 3.0 * v939;
-        const V v949 = v915 * v948;
-        const V v950 = v765 * v932;
-        const V v951 = v756 * v947;
-        const V v952 = v936 - v951;
-        const V v953 = v944 * v947;
-        const V v954 = v946 - v953;
-        const V v955 = v757 * v911;
-        const V v956 = v789 * v911;
-        const V v957 = v950 + v956;
-        const V v958 = v758 * v903;
-        const V v959 = v790 * v903;
-        const V v960 = 3.111111111111111 * v955;
-        const V v961 = v766 * v920;
-        const V v962 = v892 * v961;
-        const V v963 = v959 + v962;
-        const V v964 = v914 * v952;
-        const V v965 = v949 + v964;
-        const V v966 = v765 * v909;
-        const V v967 = v789 * v909;
-        const V v968 = 1.6666666666666667 * v909;
-        const V v969 = v909 * v968;
-        const V v970 = 0.3333333333333333 * v909;
-        const V v971 = v766 * v910;
-        const V v972 = v790 * v910;
-        const V v973 = v910 * v910;
-        const V v974 = 1.3333333333333333 * v897;
-        const V v975 = 4.444444444444445 * v897;
-        const V v976 = v958 * v975;
-        const V v977 = v960 + v976;
-        const V v978 = v897 * v908;
-        const V v979 = v974 * v978;
-        const V v980 = v978 * v979;
-        const V v981 = v763 * v908;
-        const V v982 = v785 * v908;
-        const V v983 = v727 * v970;
-        const V v984 = 2.0 * v981;
-        const V v985 = v892 * v984;
-        const V v986 = v965 + v985;
-        const V v987 = v913 * v939;
-        const V v988 = v929 + v987;
-        const V v989 = v905 * v981;
-        const V v990 = v988 + v989;
-        const V v991 = v927 * v966;
-        const V v992 = v990 + v991;
-        const V v993 = 4.0 * v966;
-        const V v994 = v922 * v993;
-        const V v995 = v986 + v994;
-        const V v996 = v895 * v977;
-        const V v997 = v920 * v971;
-        const V v998 = v992 + v997;
-        const V v999 = 5.0 * v971;
-        const V v1000 = v932 * v999;
-        const V v1001 = v995 + v1000;
-        const V v1002 = v973 * v996;
-        const V v1003 = v954 - v1002;
-        const V v1004 = v895 * v969;
-        const V v1005 = v758 * v1004;
-        const V v1006 = v972 - v1005;
-        const V v1007 = v933 * v1004;
-        const V v1008 = v1003 - v1007;
-        const V v1009 = v921 * v1006;
-        const V v1010 = v1001 + v1009;
-        const V v1011 = v895 * v980;
-        const V v1012 = v757 * v1011;
-        const V v1013 = v967 - v1012;
-        const V v1014 = v923 * v1011;
-        const V v1015 = v1008 - v1014;
-        const V v1016 = v928 * v1013;
-        const V v1017 = v1010 + v1016;
-        const V v1018 = v916 * v970;
-        const V v1019 = v945 + v1018;
-        const V v1020 = v958 * v969;
-        const V v1021 = v1019 + v1020;
-        const V v1022 = v963 * v969;
-        const V v1023 = v1015 + v1022;
-        const V v1024 = v925 * v970;
-        const V v1025 = v1023 + v1024;
-        const V v1026 = v895 * v983;
-        const V v1027 = v918 - v1026;
-        const V v1028 = v957 * v980;
-        const V v1029 = v1025 + v1028;
-        const V v1030 = v955 * v980;
-        const V v1031 = v1021 + v1030;
-        const V v1032 = v755 * v919;
-        const V v1033 = v895 * v1032;
-        const V v1034 = v982 - v1033;
-        const V v1035 = v919 * v930;
-        const V v1036 = v1031 + v1035;
-        const V v1037 = v919 * v941;
-        const V v1038 = v1029 + v1037;
-        const V v1039 = 2.0 * v998;
-        const V v1040 = v891 * v1036;
-        const V v1041 = v906 * v1034;
-        const V v1042 = v1017 + v1041;
-        const V v1043 = 0.5 * v1027;
-        const V v1044 = v1042 + v1043;
-        const V v1045 = v889 * v1036;
-        const V v1046 = v889 * v1038;
-        const V v1047 = v1040 + v1046;
-        const V v1048 = v847 * v998;
-        const V v1049 = v843 * v998;
-        const V v1050 = v846 * v998;
-        const V v1051 = v842 * v998;
-        const V v1052 = v847 * v1044;
-        const V v1053 = v843 * v1044;
-        const V v1054 = v846 * v1044;
-        const V v1055 = v842 * v1044;
-        const V v1056 = 2.0 * v1045;
-        const V v1057 = v858 * v1045;
-        const V v1058 = v858 * v1047;
-        const V v1059 = v859 * v1036;
-        const V v1060 = v998 - v1059;
-        const V v1061 = v859 * v1038;
-        const V v1062 = v1044 - v1061;
-        const V v1063 = v869 * v1056;
-        const V v1064 = v1058 + v1063;
-        const V v1065 = v870 * v1036;
-        const V v1066 = v1062 - v1065;
-        const V v1067 = v833 * v1057;
-        const V v1068 = v1050 + v1067;
-        s599 += v1068;
-        const V v1069 = v839 * v1057;
-        const V v1070 = v1049 + v1069;
-        s598 += v1070;
-        const V v1071 = v841 * v1057;
-        const V v1072 = v1051 - v1071;
-        s600 += v1072;
-        const V v1073 = 2.0 * v1060;
-        const V v1074 = v890 * v1060;
-        const V v1075 = v890 * v1066;
-        const V v1076 = v833 * v1064;
-        const V v1077 = v1054 + v1076;
-        const V v1078 = v839 * v1064;
-        const V v1079 = v1053 + v1078;
-        const V v1080 = v841 * v1064;
-        const V v1081 = v1055 - v1080;
-        const V v1082 = v888 * v1073;
-        const V v1083 = v1075 + v1082;
-        const V v1084 = v831 * v1064;
-        const V v1085 = v1052 - v1084;
-        const V v1086 = v831 * v1057;
-        const V v1087 = v1048 - v1086;
-        s597 += v1087;
-        const V v1088 = v745 * v1074;
-        const V v1089 = v776 * v1070;
-        const V v1090 = v776 * v1072;
-        const V v1091 = v722 * v1083;
-        s605 += v1088;
-        s605 += v1091;
-        const V v1092 = v778 * v1070;
-        const V v1093 = v778 * v1072;
-        const V v1094 = v750 * v1070;
-        const V v1095 = v750 * v1072;
-        const V v1096 = v880 * v1074;
-        s608 += v1089;
-        s608 -= v1096;
-        const V v1097 = v878 * v1074;
-        s607 += v1092;
-        s607 -= v1097;
-        const V v1098 = v837 * v1057;
-        const V v1099 = v1077 + v1098;
-        const V v1100 = v837 * v1039;
-        const V v1101 = v1079 + v1100;
-        const V v1102 = v835 * v1057;
-        const V v1103 = v1081 - v1102;
-        const V v1104 = v835 * v1039;
-        const V v1105 = v1085 + v1104;
-        const V v1106 = v876 * v1083;
-        s608 -= v1106;
-        const V v1107 = v874 * v1083;
-        s607 -= v1107;
-        const V v1108 = v749 * v1087;
-        s606 += v1094;
-        s606 += v1108;
-        const V v1109 = v749 * v1068;
-        s609 += v1095;
-        s609 += v1109;
-        const V v1110 = v827 * v1039;
-        const V v1111 = v1099 + v1110;
-        s603 += v1111;
-        const V v1112 = v827 * v1057;
-        const V v1113 = v1101 + v1112;
-        s602 += v1113;
-        const V v1114 = v829 * v1039;
-        const V v1115 = v1103 + v1114;
-        s604 += v1115;
-        const V v1116 = v829 * v1057;
-        const V v1117 = v1105 - v1116;
-        s601 += v1117;
-        const V v1118 = v775 * v1087;
-        s608 += v1118;
-        const V v1119 = v775 * v1068;
-        s611 += v1090;
-        s611 += v1119;
-        const V v1120 = v777 * v1087;
-        s607 += v1120;
-        const V v1121 = v777 * v1068;
-        s610 += v1093;
-        s610 += v1121;
-        const V v1122 = v747 * v1111;
-        s609 += v1122;
-        const V v1123 = v747 * v1117;
-        s606 += v1123;
-        const V v1124 = v752 * v1117;
-        s608 += v1124;
-        const V v1125 = v752 * v1111;
-        s611 += v1125;
-        const V v1126 = v754 * v1117;
-        s607 += v1126;
-        const V v1127 = v754 * v1111;
-        s610 += v1127;
-        const V v1128 = v746 * v1115;
-        s609 += v1128;
-        const V v1129 = v746 * v1113;
-        s606 += v1129;
-        const V v1130 = v751 * v1113;
-        s608 += v1130;
-        const V v1131 = v751 * v1115;
-        s611 += v1131;
-        const V v1132 = v753 * v1113;
-        s607 += v1132;
-        const V v1133 = v753 * v1115;
-        s610 += v1133;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v352 = 0.25 * w[1], v353 = 1.0 - w[1], v354 = 1.0 + w[1], v355 = 0.25 * v353;
+        const V v356 = w[1] - v234;
+        const double v357 = 0.25 * v354, v358 = 0.25 - v352, v359 = 0.25 + v352;
+        const V v360 = v356 * v78 + v262, v361 = v37 * v356, v362 = 0.25 * v356;
+        const double v363 = v352 - 0.25;
+        const V v364 = X2 * v358, v365 = v358 * t2, v366 = v359 * v25, v367 = v359 * v71,
+            v368 = v359 * v13, v369 = v364 + v368, v370 = v359 * v62, v371 = v365 + v370;
+        const double v372 = 0.25 * w[0], v373 = 1.0 - w[0], v374 = 1.0 + w[0];
+        const V v375 = X3 * v358, v376 = v375 + v366, v377 = v358 * t3, v378 = v377 + v367,
+            v379 = w[0] - v233, v380 = X0 * v363, v381 = v380 + v369, v382 = v363 * t0,
+            v383 = v382 + v371;
+        const double v384 = v355 * v373, v385 = v355 * v374, v386 = v374 * v357, v387 = v373 * v357,
+            v388 = v372 - 0.25;
+        const V v389 = v35 * v379, v390 = 0.25 * v379, v391 = v385 * t3, v392 = X3 * v385,
+            v393 = X0 * v388, v394 = v388 * t0;
+        const double v395 = 0.25 + v372, v396 = 0.25 - v372;
+        const V v397 = X5 * v386, v398 = v397 + v392, v399 = v386 * t5, v400 = v399 + v391,
+            v401 = v22 * v379 - v17 * v356, v402 = v395 * v11, v403 = v395 * v61, v404 = v395 * v24,
+            v405 = v395 * v68, v406 = X6 * v396, v407 = v406 + (v393 + v402), v408 = v396 * t6,
+            v409 = v408 + (v394 + v403), v410 = X1 * v384, v411 = v384 * t1, v412 = X1 * v388,
+            v413 = v388 * t1, v414 = X1 * v363, v415 = v414 + v376, v416 = v363 * t1,
+            v417 = v416 + v378, v418 = v361 - v389, v419 = X7 * v396, v420 = v419 + (v412 + v404),
+            v421 = X7 * v387, v422 = v421 + (v410 + v398), v423 = v387 * t7,
+            v424 = v423 + (v411 + v400), v425 = v396 * t7, v426 = v425 + (v413 + v405),
+            v427 = 0.25 * (v361 + v389), v428 = v379 * v76 + v261, v429 = v381 * v420 - v415 * v407,
+            v430 = v383 * v420 + v381 * v426 - v415 * v409 - v417 * v407, v431 = v422 * v429,
+            v432 = v424 * v429 + v422 * v430, v433 = v237 - v41 * v427, v434 = w[2] * v1 * v431,
+            v435 = v231 + v80 * v418, v436 = v235 + v80 * v401,
+            v437 = v236 + v80 * (v379 * v69 + (v263 - v356 * v65)) - v401 * v85,
+            v438 = v230 + v80 * (v360 - v428) - v418 * v85,
+            v439 = 6.283185307179586 * w[2] * (t8 * v431 + parameters[0] * v432),
+            v440 = v272 + v41 * (v82 * v427 - 0.25 * (v360 + v428)), v441 = 0.25 * v435,
+            v442 = 0.25 * v436, v443 = 0.5 * v434, v444 = 0.25 * v437, v445 = 0.25 * v438,
+            v446 = v109 * v435, v447 = v109 * v436, v448 = v102 * v435, v449 = v102 * v436,
+            v450 = v7 * v434, v451 = v8 * v434, v452 = v15 * v434, v453 = v12 * v434,
+            v454 = 0.05 * v450, v455 = 0.010476190476190476 * v451,
+            v456 = 0.0027142857142857142 * v452, v457 = 0.0007703153988868275 * v453,
+            v458 = 0.25 * (v436 * v119 + v106 * v437), v459 = 0.25 * (v435 * v119 + v438 * v106),
+            v460 = 0.25 * (v436 * v114 + v100 * v437), v461 = 0.25 * (v435 * v114 + v438 * v100),
+            v462 = v7 * (v439 - v27 * v434), v463 = v8 * (v439 - v28 * v434),
+            v464 = v15 * (v439 - v33 * v434), v465 = v12 * (v439 - v39 * v434),
+            v466 = v117 + v47 * v458 + v50 * v444 + v49 * v460,
+            v467 = v49 * v461 + (v50 * v445 + (v115 + v47 * v459)),
+            v468 = v49 * v448 + (v50 * v441 + (v108 + v47 * v446)),
+            v469 = v56 * v448 + (v57 * v441 + (v107 + v54 * v446)),
+            v470 = v118 + v54 * v458 + v57 * v444 + v56 * v460,
+            v471 = v56 * v461 + (v57 * v445 + (v116 + v54 * v459)),
+            v472 = v49 * v449 + (v50 * v442 + (v104 + v47 * v447)),
+            v473 = v56 * v449 + (v57 * v442 + (v105 + v54 * v447)), v474 = 2.0 * v468,
+            v475 = 2.0 * v469, v476 = 2.0 * v472, v477 = 2.0 * v473,
+            v478 = v468 * v473 - v469 * v472, v479 = 2.0 * v478, v480 = v478 * v478,
+            v481 = v468 * v470 - v471 * v472 - v466 * v469 + v467 * v473, v482 = v479 * v481,
+            v483 = v238 + v40 * v390, v484 = v239 + v40 * v362, v485 = v275 - v81 * v390,
+            v486 = v276 - v81 * v362, v487 = 1.0 + v55 * v433 - v56 * v483 - v54 * v484,
+            v488 = v55 * v440 - v56 * v485 - v54 * v486, v489 = v487 * v487, v490 = 2.0 * v487,
+            v491 = v488 * v490, v492 = v471 * v475 + v470 * v477 + v466 * v476 + v467 * v474 + v491,
+            v493 = v482 * v489 + v480 * v491, v494 = v480 * v489, v495 = softehl_vrcbrt(v494),
+            v496 = 1.0 / v494, v497 = v468 * v468 + v472 * v472 + v469 * v469 + v473 * v473 + v489,
+            v498 = v497 * v497, v499 = v498 * v498, v500 = v499 * (0.0007703153988868275 * v497),
+            v501 = 0.5 * v497, v502 = 2.0 * v497, v503 = v497 * v498, v504 = v495 * v495,
+            v505 = v504 * v504, v506 = v495 * v505, v507 = 0.0027142857142857142 * v499,
+            v508 = 0.05 * v498, v509 = 3.0 * v498, v510 = v492 * v502, v511 = v434 * v501,
+            v512 = 0.6666666666666666 * v506, v513 = 5.0 * v499, v514 = v492 * v509,
+            v515 = 0.010476190476190476 * v503, v516 = 4.0 * v503, v517 = v450 * v508,
+            v518 = v492 * v516, v519 = v451 * v515, v520 = v496 * v496, v521 = v455 * v496,
+            v522 = v493 * v520, v523 = v452 * v507, v524 = v453 * v500,
+            v525 = v510 * (3.0 * v521) + 0.03142857142857143 * v498 * (v463 * v496 - v451 * v522),
+            v526 = v456 * v505, v527 = v505 * (1.6666666666666667 * v505),
+            v528 = 0.3333333333333333 * v505, v529 = v457 * v506, v530 = v495 * v504,
+            v531 = v530 * (1.3333333333333333 * v495 * v530), v532 = v454 * v504,
+            v533 = v493 * (3.111111111111111 * v523 + v524 * (4.444444444444445 * v495)),
+            v534 = v443 * v495 + v509 * v521 + v502 * v532 + v516 * v526 + v513 * v529,
+            v535 = v525 + v492 * (2.0 * v532) + v514 * (4.0 * v526) + v518 * (5.0 * v529),
+            v536 = v520 * (v463 * v515 + v455 * v514) - v519 * (2.0 * v496) * v522 - v506 * v506 * v533,
+            v537 = v493 * v527,
+            v538 = v535 + 0.0038515769944341373 * v499 * (v465 * v506 - v453 * v537),
+            v539 = v493 * v531,
+            v540 = v536 - 0.6666666666666666 * v517 * v537 - 0.3333333333333333 * v511 * v539,
+            v541 = v540 + (v465 * v500 + v492 * (v457 * v513)) * v527 + (v439 * v501 + v443 * v492) * v528,
+            v542 = v519 * v520 + v511 * v528 + v524 * v527 + v523 * v531 + v512 * v517,
+            v543 = v541 + (v456 * v518 + v464 * v507) * v531 + v512 * (v462 * v508 + v454 * v510),
+            v544 = 2.0 * v534,
+            v545 = v538 + 0.010857142857142857 * v503 * (v464 * v505 - v452 * v539) + 0.1 * v497 * (v462 * v504 - v493 * (v450 * v512)),
+            v546 = v545 + 0.5 * (v439 * v495 - v493 * (v434 * v528)), v547 = v489 * v542,
+            v548 = v479 * v547, v549 = v534 - v480 * v542,
+            v550 = v479 * (v491 * v542 + v489 * v543) + v481 * (2.0 * v547),
+            v551 = v476 * v534 + v469 * v548;
+        s339 += v551; const V v552 = v475 * v534 + v472 * v548; s338 += v552;
+        const V v553 = v474 * v534 - v473 * v548; s340 += v553;
+        const V v554 = v490 * v549,
+            v555 = v490 * (v546 - v480 * v543 - v482 * v542) + v488 * (2.0 * v549),
+            v556 = v477 * v534 - v468 * v548;
+        s337 += v556; s345 += v440 * v554; s345 += v433 * v555; s348 += v459 * v552;
+        s348 -= v486 * v554; s347 += v461 * v552; s347 -= v485 * v554; s348 -= v484 * v555;
+        s347 -= v483 * v555; s346 += v445 * v552; s346 += v444 * v556; s349 += v445 * v553;
+        s349 += v444 * v551; const V v557 = v476 * v546 + v469 * v550 + v471 * v548 + v466 * v544;
+        s343 += v557; const V v558 = v475 * v546 + v472 * v550 + v471 * v544 + v466 * v548;
+        s342 += v558; const V v559 = v474 * v546 - v473 * v550 - v470 * v548 + v467 * v544;
+        s344 += v559; const V v560 = v477 * v546 - v468 * v550 + v470 * v544 - v467 * v548;
+        s341 += v560; s348 += v458 * v556; s351 += v459 * v553; s351 += v458 * v551;
+        s347 += v460 * v556; s350 += v461 * v553; s350 += v460 * v551; s349 += v442 * v557;
+        s346 += v442 * v560; s348 += v447 * v560; s351 += v447 * v557; s347 += v449 * v560;
+        s350 += v449 * v557; s349 += v441 * v559; s346 += v441 * v558; s348 += v446 * v558;
+        s351 += v446 * v559; s347 += v448 * v558; s350 += v448 * v559;
     }
-    const V v1134 = v573 + s600;
-    const V v1135 = v583 + s597;
-    const V v1136 = s598 - v551;
-    const V v1137 = s599 - v548;
-    const V v1138 = v580 + s604;
-    const V v1139 = v582 + s601;
-    const V v1140 = v593 - v553;
-    const V v1141 = v594 - v552;
-    const V v1142 = v562 + v595;
-    const V v1143 = s602 - v550;
-    const V v1144 = v563 + v596;
-    const V v1145 = v1140 - v558;
-    const V v1146 = s603 - v547;
-    const V v1147 = v1141 - v557;
-    const V v1148 = s611 + v1142;
-    const V v1149 = s605 + v556;
-    const V v1150 = s610 + v1144;
-    const V v1151 = v559 + v1145;
-    const V v1152 = v560 + v1147;
-    const V v1153 = s606 - v567;
-    const V v1154 = v576 + v1148;
-    const V v1155 = s609 - v570;
-    const V v1156 = s608 + v1151;
-    const V v1157 = s607 + v1152;
-    const V v1158 = v1153 - v561;
-    const V v1159 = v578 + v1150;
-    const V v1160 = v592 + v1155;
-    const V v1161 = v177 * v1137;
-    const V v1162 = v1154 - v1161;
-    const V v1163 = v177 * v1135;
-    const V v1164 = v1156 - v1163;
-    const V v1165 = v179 * v1135;
-    const V v1166 = v1165 + v1157;
-    const V v1167 = v179 * v1137;
-    const V v1168 = v1167 + v1159;
-    const V v1169 = v586 + v1158;
-    const V v1170 = v588 + v1164;
-    const V v1171 = v590 + v1166;
-    const V v1172 = v1149 - v1169;
-    const V v1173 = v1149 + v1169;
-    const V v1174 = v147 * v1146;
-    const V v1175 = v1162 - v1174;
-    const V v1176 = v147 * v1139;
-    const V v1177 = v1170 - v1176;
-    const V v1178 = v146 * v1146;
-    const V v1179 = v1178 + v1168;
-    const V v1180 = v146 * v1139;
-    const V v1181 = v1180 + v1171;
-    const V v1182 = v1160 - v564;
-    const V v1183 = v564 - v1160;
-    const V v1184 = v132 * v1136;
-    const V v1185 = v1184 + v1177;
-    const V v1186 = v132 * v1134;
-    const V v1187 = v1186 + v1175;
-    const V v1188 = v134 * v1134;
-    const V v1189 = v1179 - v1188;
-    const V v1190 = v134 * v1136;
-    const V v1191 = v1181 - v1190;
-    const V v1192 = v127 * v1143;
-    const V v1193 = v1192 + v1185;
-    const V v1194 = v127 * v1138;
-    const V v1195 = v1194 + v1187;
-    const V v1196 = v128 * v1138;
-    const V v1197 = v1189 - v1196;
-    const V v1198 = v128 * v1143;
-    const V v1199 = v1191 - v1198;
-    const V v1200 = v1193 + v1199;
-    const V v1201 = v1195 + v1197;
-    const V v1202 = v1197 - v1195;
-    const V v1203 = v1199 - v1193;
-    const V v1204 = v1182 + v1201;
-    const V v1205 = v1182 - v1201;
-    const V v1206 = v1173 + v1200;
-    const V v1207 = v1173 - v1200;
-    const V v1208 = v1183 - v1202;
-    const V v1209 = v1172 - v1203;
-    softehl_store4(R + 0, 8, v1204, v1206, v1208, v1209);
-    const V v1210 = v1172 + v1203;
-    const V v1211 = v1202 - v1182;
-    softehl_store4(R + 4, 8, v1205, v1207, v1211, v1210);
+    const V v561 = v323 + s340, v562 = v328 + s337, v563 = s338 - v309, v564 = s339 - v307,
+        v565 = v326 + s344, v566 = v327 + s341, v567 = s342 - v308, v568 = s343 - v306,
+        v569 = s345 + v312, v570 = v332 + (s349 - v322), v571 = v329 + (s346 - v321 - v317),
+        v572 = v569 - v571, v573 = v569 + v571,
+        v574 = v330 + (s348 + (v315 + (v333 - v311 - v314)) - v110 * v562) - v95 * v566,
+        v575 = v94 * v566 + (v331 + (v111 * v562 + (s347 + (v316 + (v334 - v310 - v313))))),
+        v576 = v570 - v320,
+        v577 = v86 * v561 + (v324 + (s351 + (v318 + v335)) - v110 * v564 - v95 * v568),
+        v578 = v94 * v568 + (v111 * v564 + (v325 + (s350 + (v319 + v336)))) - v87 * v561,
+        v579 = v83 * v567 + (v86 * v563 + v574), v580 = v83 * v565 + v577, v581 = v578 - v84 * v565,
+        v582 = v575 - v87 * v563 - v84 * v567, v583 = v579 + v582, v584 = v580 + v581,
+        v585 = v581 - v580, v586 = v582 - v579, v587 = v576 + v584, v588 = v576 - v584,
+        v589 = v573 + v583, v590 = v573 - v583, v591 = v320 - v570 - v585, v592 = v572 - v586;
+    softehl_store4(R + 0, 8, v587, v589, v591, v592);
+    const V v593 = v572 + v586, v594 = v585 - v576;
+    softehl_store4(R + 4, 8, v588, v590, v594, v593);
 }
-
-void softehl_solid_taylor_mean_arruda_boyce_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_arruda_boyce_pseudo_load_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, direction + 11 * e, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_arruda_boyce_pseudo_load_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, direction + 11 * (n - SOFTEHL_LANES), parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double t[SOFTEHL_LANES * 11];
-    softehl_pad(t, direction, 11, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_taylor_mean_arruda_boyce_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_solid_taylor_mean_arruda_boyce_pseudo_load, 8, 8, 0, 11, 8, 0)

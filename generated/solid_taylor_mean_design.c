@@ -23,1218 +23,235 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_solid_taylor_mean_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10;
+    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
     softehl_load3(t + 8, 11, &t8, &t9, &t10);
-    (void)t8; (void)t9; (void)t10;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 0.5 * parameters[1];
-    const V v3 = 0.5 * t8;
-    const V v4 = 0.5 * t9;
-    const double v5 = 0.5 * parameters[2];
-    const double v6 = 1.5707963267948966 * parameters[2];
-    const V v7 = X4 - X0;
-    const V v8 = X0 - X2;
-    const V v9 = X4 - X2;
-    const V v10 = v7 - X2;
-    const V v11 = X4 - X6;
-    const V v12 = X6 + v10;
-    const V v13 = X1 - X3;
-    const V v14 = X1 + X3;
-    const V v15 = X5 - X3;
-    const V v16 = 0.25 * v12;
-    const V v17 = 0.0625 * v12;
-    const V v18 = v8 + v11;
-    const V v19 = v11 - v8;
-    const V v20 = X5 - X7;
-    const V v21 = X5 + X7;
-    const V v22 = 0.25 * v19;
-    const V v23 = 0.0625 * v19;
-    const V v24 = v13 + v20;
-    const V v25 = v14 + v21;
-    const V v26 = v20 - v13;
-    const V v27 = v21 - v14;
-    const V v28 = d0 - d2;
-    const V v29 = d0 + d2;
-    const V v30 = 0.25 * v25;
-    const V v31 = 0.5 * v25;
-    const V v32 = 0.25 * v26;
-    const V v33 = 0.0625 * v26;
-    const V v34 = 0.25 * v27;
-    const V v35 = 0.0625 * v27;
-    const V v36 = v29 - d4;
-    const V v37 = 1.0 / v30;
-    const V v38 = v30 * v30;
-    const V v39 = v18 * v33;
-    const V v40 = v18 * v35;
-    const V v41 = 1.0 / v38;
-    const V v42 = v36 - d6;
-    const V v43 = d4 - d6;
-    const V v44 = v28 - v43;
-    const V v45 = v28 + v43;
-    const V v46 = d1 + d3;
-    const V v47 = d1 - d3;
-    const V v48 = v22 * v34;
-    const V v49 = d5 + d7;
-    const V v50 = d5 - d7;
-    const V v51 = v46 - v49;
-    const V v52 = v46 + v49;
-    const V v53 = v47 - v50;
-    const V v54 = v47 + v50;
-    const V v55 = 0.25 * v37;
-    const V v56 = v37 * v37;
-    const V v57 = t0 - t2;
-    const V v58 = v41 * v31;
-    const V v59 = t4 - t0;
-    const V v60 = t1 - t3;
-    const V v61 = t1 + t3;
-    const V v62 = t4 - t2;
-    const V v63 = v59 - t2;
-    const V v64 = t4 - t6;
-    const V v65 = t6 + v63;
-    const V v66 = v57 + v64;
-    const V v67 = 0.25 * v65;
-    const V v68 = 0.0625 * v65;
-    const V v69 = v64 - v57;
-    const V v70 = t5 - t3;
-    const V v71 = 0.25 * v69;
-    const V v72 = 0.0625 * v69;
-    const V v73 = t5 - t7;
-    const V v74 = t5 + t7;
-    const V v75 = v60 + v73;
-    const V v76 = v34 * v71;
-    const V v77 = v61 + v74;
-    const V v78 = v73 - v60;
-    const V v79 = v74 - v61;
-    const V v80 = v33 * v66;
-    const V v81 = v35 * v66;
-    const V v82 = 0.25 * v77;
-    const V v83 = 0.25 * v78;
-    const V v84 = 0.0625 * v78;
-    const V v85 = 0.25 * v79;
-    const V v86 = 0.0625 * v79;
-    const V v87 = v32 * v67;
-    const V v88 = v76 - v87;
-    const V v89 = v32 * v16;
-    const V v90 = v48 - v89;
-    const V v91 = v16 * v83;
-    const V v92 = v88 - v91;
-    const V v93 = 1.0 / v90;
-    const V v94 = v18 * v84;
-    const V v95 = v80 + v94;
-    const V v96 = v18 * v86;
-    const V v97 = v81 + v96;
-    const V v98 = v82 * v56;
-    const V v99 = v82 * v58;
-    const V v100 = v22 * v85;
-    const V v101 = v100 + v92;
-    const V v102 = v93 * v84;
-    const V v103 = v93 * v86;
-    const V v104 = v93 * v75;
-    const V v105 = v93 * v95;
-    const V v106 = v93 * v97;
-    const V v107 = v33 * v93;
-    const V v108 = v35 * v93;
-    const V v109 = v93 * v93;
-    const V v110 = v101 * v109;
-    const V v111 = v33 * v110;
-    const V v112 = v102 - v111;
-    const V v113 = v35 * v110;
-    const V v114 = v103 - v113;
-    const V v115 = v93 * v72;
-    const V v116 = v24 * v110;
-    const V v117 = v104 - v116;
-    const V v118 = v24 * v93;
-    const V v119 = v72 * v118;
-    const V v120 = v39 * v110;
-    const V v121 = v105 - v120;
-    const V v122 = v39 * v93;
-    const V v123 = v40 * v93;
-    const V v124 = v40 * v110;
-    const V v125 = v106 - v124;
-    const V v126 = v93 * v17;
-    const V v127 = v23 * v93;
-    const V v128 = v93 * v68;
-    const V v129 = v68 * v118;
-    const V v130 = v17 * v118;
-    const V v131 = v23 * v118;
-    const V v132 = 0.25 * v122;
-    const V v133 = 0.25 * v123;
-    const V v134 = v44 * v126;
-    const V v135 = v53 * v126;
-    const V v136 = 1.0 + v135;
-    const V v137 = v123 - v130;
-    const V v138 = 0.25 * v130;
-    const V v139 = v133 - v138;
-    const V v140 = 0.25 * v131;
-    const V v141 = v42 * v127;
-    const V v142 = v134 - v141;
-    const V v143 = v51 * v127;
-    const V v144 = v136 - v143;
-    const V v145 = v51 * v107;
-    const V v146 = v42 * v107;
-    const V v147 = 1.0 + v146;
-    const V v148 = v131 - v122;
-    const V v149 = v53 * v108;
-    const V v150 = v145 - v149;
-    const V v151 = v44 * v108;
-    const V v152 = v147 - v151;
-    const V v153 = v17 * v110;
-    const V v154 = v128 - v153;
-    const V v155 = v23 * v110;
-    const V v156 = v115 - v155;
-    const V v157 = v17 * v117;
-    const V v158 = v129 + v157;
-    const V v159 = v23 * v117;
-    const V v160 = v119 + v159;
-    const V v161 = v44 * v154;
-    const V v162 = v53 * v154;
-    const V v163 = v42 * v112;
-    const V v164 = v51 * v112;
-    const V v165 = v42 * v156;
-    const V v166 = v161 - v165;
-    const V v167 = v51 * v156;
-    const V v168 = v162 - v167;
-    const V v169 = v140 - v132;
-    const V v170 = v44 * v114;
-    const V v171 = v163 - v170;
-    const V v172 = v53 * v114;
-    const V v173 = v164 - v172;
-    const V v174 = v125 - v158;
-    const V v175 = v160 - v121;
-    V s176 = softehl_splat(0.0);
-    V s177 = softehl_splat(0.0);
-    V s178 = softehl_splat(0.0);
-    V s179 = softehl_splat(0.0);
-    V s180 = softehl_splat(0.0);
-    V s181 = softehl_splat(0.0);
-    V s182 = softehl_splat(0.0);
-    V s183 = softehl_splat(0.0);
-    V s184 = softehl_splat(0.0);
-    V s185 = softehl_splat(0.0);
-    V s186 = softehl_splat(0.0);
-    V s187 = softehl_splat(0.0);
-    V s188 = softehl_splat(0.0);
-    V s189 = softehl_splat(0.0);
-    V s190 = softehl_splat(0.0);
-    V s191 = softehl_splat(0.0);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1];
+    const V v3 = 0.5 * t8, v4 = 0.5 * t9;
+    const double v5 = 0.5 * parameters[2], v6 = 1.5707963267948966 * parameters[2];
+    const V v7 = X0 - X2, v8 = X4 - X2, v9 = X4 - X6, v10 = X6 + (X4 - X0 - X2), v11 = X1 - X3,
+        v12 = X1 + X3, v13 = X5 - X3, v14 = 0.25 * v10, v15 = 0.0625 * v10, v16 = v7 + v9,
+        v17 = v9 - v7, v18 = X5 - X7, v19 = X5 + X7, v20 = 0.25 * v17, v21 = 0.0625 * v17,
+        v22 = v11 + v18, v23 = v12 + v19, v24 = v18 - v11, v25 = v19 - v12, v26 = d0 - d2,
+        v27 = 0.25 * v23, v28 = 0.25 * v24, v29 = 0.0625 * v24, v30 = 0.25 * v25,
+        v31 = 0.0625 * v25, v32 = 1.0 / v27, v33 = v16 * v29, v34 = v16 * v31,
+        v35 = 1.0 / (v27 * v27), v36 = d0 + d2 - d4 - d6, v37 = d4 - d6, v38 = v26 - v37,
+        v39 = v26 + v37, v40 = d1 + d3, v41 = d1 - d3, v42 = d5 + d7, v43 = d5 - d7,
+        v44 = v40 - v42, v45 = v40 + v42, v46 = v41 - v43, v47 = v41 + v43, v48 = 0.25 * v32,
+        v49 = t0 - t2, v50 = t1 - t3, v51 = t1 + t3, v52 = t4 - t2, v53 = t4 - t6,
+        v54 = t6 + (t4 - t0 - t2), v55 = v49 + v53, v56 = 0.25 * v54, v57 = 0.0625 * v54,
+        v58 = v53 - v49, v59 = t5 - t3, v60 = 0.25 * v58, v61 = 0.0625 * v58, v62 = t5 - t7,
+        v63 = t5 + t7, v64 = v62 - v50, v65 = v63 - v51, v66 = 0.25 * (v51 + v63), v67 = 0.25 * v64,
+        v68 = 0.0625 * v64, v69 = 0.25 * v65, v70 = 0.0625 * v65,
+        v71 = 1.0 / (v20 * v30 - v28 * v14), v72 = v66 * (v32 * v32),
+        v73 = v66 * (v35 * (0.5 * v23)), v74 = v29 * v71, v75 = v31 * v71,
+        v76 = (v20 * v69 + (v30 * v60 - v28 * v56 - v14 * v67)) * (v71 * v71),
+        v77 = v71 * v68 - v29 * v76, v78 = v71 * v70 - v31 * v76,
+        v79 = v71 * (v50 + v62) - v22 * v76, v80 = v22 * v71,
+        v81 = v71 * (v29 * v55 + v16 * v68) - v33 * v76, v82 = v33 * v71, v83 = v34 * v71,
+        v84 = v71 * (v31 * v55 + v16 * v70) - v34 * v76, v85 = v71 * v15, v86 = v21 * v71,
+        v87 = v15 * v80, v88 = v21 * v80, v89 = 0.25 * v82, v90 = 0.25 * v83, v91 = v83 - v87,
+        v92 = 0.25 * v87, v93 = v90 - v92, v94 = 0.25 * v88, v95 = v38 * v85 - v36 * v86,
+        v96 = 1.0 + v46 * v85 - v44 * v86, v97 = v88 - v82, v98 = v44 * v74 - v46 * v75,
+        v99 = 1.0 + v36 * v74 - v38 * v75, v100 = v71 * v57 - v15 * v76,
+        v101 = v71 * v61 - v21 * v76, v102 = v57 * v80 + v15 * v79, v103 = v61 * v80 + v21 * v79,
+        v104 = v38 * v100 - v36 * v101, v105 = v46 * v100 - v44 * v101, v106 = v94 - v89,
+        v107 = v36 * v77 - v38 * v78, v108 = v44 * v77 - v46 * v78, v109 = v84 - v102,
+        v110 = v103 - v81;
+    V s111 = {0}, s112 = {0}, s113 = {0}, s114 = {0}, s115 = {0}, s116 = {0}, s117 = {0},
+        s118 = {0}, s119 = {0}, s120 = {0}, s121 = {0}, s122 = {0}, s123 = {0}, s124 = {0},
+        s125 = {0}, s126 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v192 = 1.0 - w[1];
-        const double v193 = 1.0 + w[1];
-        const double v194 = 0.25 * w[1];
-        const double v195 = 1.0 - w[0];
-        const double v196 = 1.0 + w[0];
-        const double v197 = 0.25 * v192;
-        const double v198 = 0.25 * v193;
-        const double v199 = 0.25 * w[0];
-        const double v200 = 0.25 - v194;
-        const double v201 = 0.25 + v194;
-        const double v202 = 0.25 + v199;
-        const double v203 = 0.25 - v199;
-        const double v204 = v197 * v195;
-        const double v205 = v197 * v196;
-        const double v206 = v196 * v198;
-        const double v207 = v195 * v198;
-        const double v208 = v194 - 0.25;
-        const V v209 = X2 * v200;
-        const double v210 = v199 - 0.25;
-        const V v211 = v201 * v20;
-        const V v212 = X6 * v203;
-        const V v213 = v202 * v15;
-        const V v214 = X5 * v206;
-        const V v215 = v206 * t5;
-        const V v216 = v201 * v11;
-        const V v217 = v209 + v216;
-        const V v218 = v200 * t2;
-        const V v219 = v203 * t6;
-        const V v220 = v202 * v9;
-        const V v221 = v212 + v220;
-        const V v222 = v201 * v73;
-        const V v223 = v201 * v64;
-        const V v224 = v218 + v223;
-        const V v225 = v202 * v70;
-        const V v226 = v202 * v62;
-        const V v227 = v219 + v226;
-        const V v228 = X0 * v208;
-        const V v229 = v228 + v217;
-        const V v230 = X0 * v210;
-        const V v231 = v230 + v221;
-        const V v232 = X3 * v200;
-        const V v233 = v232 + v211;
-        const V v234 = X3 * v205;
-        const V v235 = v214 + v234;
-        const V v236 = v200 * t3;
-        const V v237 = v236 + v222;
-        const V v238 = v205 * t3;
-        const V v239 = v215 + v238;
-        const V v240 = v208 * t0;
-        const V v241 = v240 + v224;
-        const V v242 = v210 * t0;
-        const V v243 = v242 + v227;
-        const V v244 = X7 * v203;
-        const V v245 = v244 + v213;
-        const V v246 = X7 * v207;
-        const V v247 = v246 + v235;
-        const V v248 = v203 * t7;
-        const V v249 = v248 + v225;
-        const V v250 = v207 * t7;
-        const V v251 = v250 + v239;
-        const V v252 = X1 * v208;
-        const V v253 = v252 + v233;
-        const V v254 = v208 * t1;
-        const V v255 = v254 + v237;
-        const V v256 = X1 * v210;
-        const V v257 = v256 + v245;
-        const V v258 = v210 * t1;
-        const V v259 = v258 + v249;
-        const V v260 = X1 * v204;
-        const V v261 = v260 + v247;
-        const V v262 = v204 * t1;
-        const V v263 = v262 + v251;
-        const V v264 = w[0] * v229;
-        const V v265 = w[0] * v241;
-        const V v266 = v241 * v257;
-        const V v267 = v229 * v257;
-        const V v268 = w[1] * v257;
-        const V v269 = w[1] * v231;
-        const V v270 = v264 - v269;
-        const V v271 = w[1] * v259;
-        const V v272 = v229 * v259;
-        const V v273 = v266 + v272;
-        const V v274 = w[1] * v243;
-        const V v275 = v265 - v274;
-        const double v276 = w[1] * w[2];
-        const V v277 = w[2] * v261;
-        const V v278 = v253 * v231;
-        const V v279 = v267 - v278;
-        const V v280 = w[0] * v253;
-        const V v281 = v268 - v280;
-        const V v282 = v253 * v243;
-        const V v283 = v273 - v282;
-        const V v284 = w[0] * v255;
-        const V v285 = v271 - v284;
-        const V v286 = v231 * v255;
-        const V v287 = v283 - v286;
-        const V v288 = w[2] * v263;
-        const V v289 = v275 * v277;
-        const V v290 = v263 * v279;
-        const V v291 = 0.25 * v279;
-        const V v292 = v261 * v279;
-        const V v293 = v277 * v285;
-        const V v294 = v277 * v281;
-        s181 += v294;
-        const V v295 = v270 * v277;
-        s182 += v295;
-        const V v296 = v270 * v288;
-        s191 += v289;
-        s191 += v296;
-        const V v297 = v281 * v288;
-        s190 += v293;
-        s190 += v297;
-        const V v298 = v261 * v287;
-        const V v299 = v290 + v298;
-        const V v300 = 0.25 * v287;
-        const V v301 = w[2] * v291;
-        s176 += v301;
-        const V v302 = v276 * v291;
-        s183 += v302;
-        const V v303 = w[2] * v292;
-        s178 += v303;
-        const V v304 = v276 * v292;
-        s180 += v304;
-        const V v305 = w[0] * v301;
-        s177 += v305;
-        const V v306 = w[0] * v303;
-        s179 += v306;
-        const V v307 = w[2] * v299;
-        s187 += v307;
-        const V v308 = w[2] * v300;
-        s184 += v308;
-        const V v309 = v276 * v300;
-        s186 += v309;
-        const V v310 = v276 * v299;
-        s189 += v310;
-        const V v311 = w[0] * v307;
-        s188 += v311;
-        const V v312 = w[0] * v308;
-        s185 += v312;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v127 = 1.0 - w[1], v128 = 1.0 + w[1], v129 = 0.25 * w[1], v130 = 1.0 - w[0],
+            v131 = 1.0 + w[0], v132 = 0.25 * v127, v133 = 0.25 * v128, v134 = 0.25 * w[0],
+            v135 = 0.25 - v129, v136 = 0.25 + v129, v137 = 0.25 + v134, v138 = 0.25 - v134,
+            v139 = v132 * v130, v140 = v132 * v131, v141 = v131 * v133, v142 = v130 * v133,
+            v143 = v129 - 0.25;
+        const V v144 = X2 * v135; const double v145 = v134 - 0.25;
+        const V v146 = v136 * v18, v147 = X6 * v138, v148 = v137 * v13, v149 = X5 * v141,
+            v150 = v141 * t5, v151 = v136 * v9, v152 = v144 + v151, v153 = v135 * t2,
+            v154 = v138 * t6, v155 = v137 * v8, v156 = v147 + v155, v157 = v136 * v62,
+            v158 = v136 * v53, v159 = v153 + v158, v160 = v137 * v59, v161 = v137 * v52,
+            v162 = v154 + v161, v163 = X0 * v143, v164 = v163 + v152, v165 = X0 * v145,
+            v166 = v165 + v156, v167 = X3 * v135, v168 = X3 * v140, v169 = v135 * t3,
+            v170 = v140 * t3, v171 = v143 * t0, v172 = v171 + v159, v173 = v145 * t0,
+            v174 = v173 + v162, v175 = X7 * v138, v176 = X7 * v142, v177 = v138 * t7,
+            v178 = v142 * t7, v179 = X1 * v143, v180 = v179 + (v167 + v146), v181 = v143 * t1,
+            v182 = v181 + (v169 + v157), v183 = X1 * v145, v184 = v183 + (v175 + v148),
+            v185 = v145 * t1, v186 = v185 + (v177 + v160), v187 = X1 * v139,
+            v188 = v187 + (v176 + (v149 + v168)), v189 = v139 * t1,
+            v190 = v189 + (v178 + (v150 + v170)), v191 = w[0] * v164 - w[1] * v166;
+        const double v192 = w[1] * w[2];
+        const V v193 = w[2] * v188, v194 = v164 * v184 - v180 * v166,
+            v195 = w[1] * v184 - w[0] * v180,
+            v196 = v172 * v184 + v164 * v186 - v180 * v174 - v166 * v182, v197 = w[2] * v190,
+            v198 = 0.25 * v194, v199 = v188 * v194, v200 = v193 * v195;
+        s116 += v200; const V v201 = v191 * v193; s117 += v201;
+        s126 += (w[0] * v172 - w[1] * v174) * v193; s126 += v191 * v197;
+        s125 += v193 * (w[1] * v186 - w[0] * v182); s125 += v195 * v197;
+        const V v202 = v190 * v194 + v188 * v196, v203 = 0.25 * v196, v204 = w[2] * v198;
+        s111 += v204; const V v205 = v192 * v198; s118 += v205; const V v206 = w[2] * v199;
+        s113 += v206; const V v207 = v192 * v199; s115 += v207; const V v208 = w[0] * v204;
+        s112 += v208; const V v209 = w[0] * v206; s114 += v209; const V v210 = w[2] * v202;
+        s122 += v210; const V v211 = w[2] * v203; s119 += v211; const V v212 = v192 * v203;
+        s121 += v212; const V v213 = v192 * v202; s124 += v213; const V v214 = w[0] * v210;
+        s123 += v214; const V v215 = w[0] * v211; s120 += v215;
     }
-    const V v313 = 1.0 / s178;
-    const V v314 = 0.5 * s178;
-    const V v315 = v6 * s178;
-    const V v316 = t10 * v314;
-    const V v317 = v313 * v313;
-    const V v318 = v317 * s187;
-    const V v319 = v5 * s187;
-    const V v320 = v316 + v319;
-    const V v321 = 3.141592653589793 * v320;
-    const V v322 = v313 * s184;
-    const V v323 = v313 * s185;
-    const V v324 = v313 * s186;
-    const V v325 = v313 * s190;
-    const V v326 = v313 * s191;
-    const V v327 = s181 * v318;
-    const V v328 = v325 - v327;
-    const V v329 = v313 * s181;
-    const V v330 = 0.25 * v329;
-    const V v331 = s179 * v313;
-    const V v332 = s179 * v318;
-    const V v333 = v313 * s180;
-    const V v334 = v313 * s182;
-    const V v335 = s182 * v318;
-    const V v336 = v326 - v335;
-    const V v337 = s176 * v313;
-    const V v338 = s177 * v313;
-    const V v339 = v313 * s183;
-    const V v340 = 0.25 * v334;
-    const V v341 = s180 * v318;
-    const V v342 = v334 * v138;
-    const V v343 = v329 * v138;
-    const V v344 = v329 * v140;
-    const V v345 = v334 * v140;
-    const V v346 = v329 * v132;
-    const V v347 = v334 * v132;
-    const V v348 = v329 * v133;
-    const V v349 = v334 * v133;
-    const V v350 = v329 * v121;
-    const V v351 = v334 * v121;
-    const V v352 = v329 * v125;
-    const V v353 = v334 * v125;
-    const V v354 = v348 - v343;
-    const V v355 = v346 - v344;
-    const V v356 = v344 - v346;
-    const V v357 = v343 - v348;
-    const V v358 = v347 - v345;
-    const V v359 = v345 - v347;
-    const V v360 = 0.25 * v328;
-    const V v361 = v122 * v328;
-    const V v362 = v350 + v361;
-    const V v363 = v123 * v328;
-    const V v364 = v352 + v363;
-    const V v365 = v123 * v336;
-    const V v366 = v353 + v365;
-    const V v367 = 0.25 * v336;
-    const V v368 = v122 * v336;
-    const V v369 = v351 + v368;
-    const V v370 = v342 - v349;
-    const V v371 = v349 - v342;
-    const V v372 = v130 * v328;
-    const V v373 = v130 * v336;
-    const V v374 = v131 * v328;
-    const V v375 = v131 * v336;
-    const V v376 = v313 * s188;
-    const V v377 = v332 - v376;
-    const V v378 = v313 * s189;
-    const V v379 = v341 - v378;
-    const V v380 = v32 * v377;
-    const V v381 = v34 * v379;
-    const V v382 = v22 * v377;
-    const V v383 = v55 * v377;
-    const V v384 = v55 * v379;
-    const V v385 = v16 * v379;
-    const V v386 = v382 - v385;
-    const V v387 = v329 * v158;
-    const V v388 = v372 + v387;
-    const V v389 = v329 * v160;
-    const V v390 = v374 + v389;
-    const V v391 = v334 * v158;
-    const V v392 = v373 + v391;
-    const V v393 = v334 * v160;
-    const V v394 = v375 + v393;
-    const V v395 = v364 - v388;
-    const V v396 = v366 - v392;
-    const V v397 = v369 - v394;
-    const V v398 = v362 - v390;
-    const V v399 = 0.25 * v395;
-    const V v400 = v392 - v366;
-    const V v401 = v394 - v369;
-    const V v402 = v388 - v364;
-    const V v403 = 0.25 * v396;
-    const V v404 = 0.25 * v398;
-    const V v405 = 0.25 * v397;
-    const V v406 = v390 - v362;
-    const V v407 = 0.25 * v400;
-    const V v408 = 0.25 * v401;
-    const V v409 = 0.25 * v402;
-    const V v410 = 0.25 * v406;
-    const V v411 = s176 * v318;
-    const V v412 = v322 - v411;
-    const V v413 = s177 * v318;
-    const V v414 = v323 - v413;
-    const V v415 = s183 * v318;
-    const V v416 = v324 - v415;
-    const V v417 = v414 + v383;
-    const V v418 = v416 + v384;
-    const V v419 = v52 * v412;
-    const V v420 = v52 * v337;
-    const V v421 = 1.0 + v420;
-    const V v422 = v44 * v399;
-    const V v423 = v171 + v422;
-    const V v424 = v44 * v354;
-    const V v425 = v152 + v424;
-    const V v426 = v44 * v371;
-    const V v427 = v142 + v426;
-    const V v428 = v44 * v403;
-    const V v429 = v166 + v428;
-    const V v430 = v53 * v354;
-    const V v431 = v150 + v430;
-    const V v432 = v53 * v338;
-    const V v433 = v421 - v432;
-    const V v434 = v53 * v371;
-    const V v435 = v144 + v434;
-    const V v436 = v53 * v414;
-    const V v437 = v419 - v436;
-    const V v438 = v53 * v399;
-    const V v439 = v173 + v438;
-    const V v440 = v53 * v403;
-    const V v441 = v168 + v440;
-    const V v442 = v45 * v330;
-    const V v443 = v442 + v425;
-    const V v444 = v45 * v367;
-    const V v445 = v444 + v429;
-    const V v446 = v54 * v330;
-    const V v447 = v446 + v431;
-    const V v448 = v54 * v340;
-    const V v449 = v448 + v435;
-    const V v450 = v54 * v367;
-    const V v451 = v450 + v441;
-    const V v452 = v54 * v360;
-    const V v453 = v452 + v439;
-    const V v454 = v45 * v340;
-    const V v455 = v454 + v427;
-    const V v456 = v45 * v360;
-    const V v457 = v456 + v423;
-    const V v458 = v42 * v356;
-    const V v459 = v458 + v443;
-    const V v460 = v51 * v356;
-    const V v461 = v460 + v447;
-    const V v462 = v42 * v408;
-    const V v463 = v462 + v445;
-    const V v464 = v51 * v408;
-    const V v465 = v464 + v451;
-    const V v466 = v51 * v359;
-    const V v467 = v466 + v449;
-    const V v468 = v42 * v359;
-    const V v469 = v468 + v455;
-    const V v470 = v42 * v410;
-    const V v471 = v470 + v457;
-    const V v472 = v51 * v410;
-    const V v473 = v472 + v453;
-    const V v474 = v459 * v465;
-    const V v475 = v459 * v467;
-    const V v476 = v51 * v339;
-    const V v477 = v433 - v476;
-    const V v478 = v51 * v416;
-    const V v479 = v437 - v478;
-    const V v480 = 2.0 * v477;
-    const V v481 = v477 * v477;
-    const V v482 = v467 * v471;
-    const V v483 = v474 + v482;
-    const V v484 = v461 * v469;
-    const V v485 = v475 - v484;
-    const V v486 = v469 * v473;
-    const V v487 = v483 - v486;
-    const V v488 = 2.0 * v485;
-    const V v489 = v485 * v485;
-    const V v490 = v479 * v480;
-    const V v491 = v461 * v463;
-    const V v492 = v487 - v491;
-    const V v493 = v481 * v489;
-    const V v494 = 1.0 / v493;
-    const V v495 = v488 * v492;
-    const V v496 = v489 * v490;
-    const V v497 = v481 * v495;
-    const V v498 = v496 + v497;
-    const V v499 = v315 * v494;
-    const V v500 = v494 * v499;
-    const V v501 = v498 * v500;
-    const V v502 = 1.0 - v494;
-    const V v503 = v321 * v502;
-    const V v504 = v501 + v503;
-    const V v505 = v315 - v499;
-    const V v506 = v490 * v505;
-    const V v507 = v495 * v505;
-    const V v508 = v489 * v504;
-    const V v509 = v507 + v508;
-    const V v510 = v481 * v504;
-    const V v511 = v506 + v510;
-    const V v512 = v489 * v505;
-    const V v513 = v481 * v505;
-    const V v514 = v488 * v511;
-    const V v515 = v488 * v513;
-    const V v516 = 2.0 * v513;
-    const V v517 = v492 * v516;
-    const V v518 = v514 + v517;
-    const V v519 = v473 * v515;
-    const V v520 = v463 * v515;
-    const V v521 = v480 * v509;
-    const V v522 = v480 * v512;
-    const V v523 = 2.0 * v512;
-    const V v524 = v479 * v523;
-    const V v525 = v521 + v524;
-    const V v526 = v461 * v518;
-    const V v527 = v519 + v526;
-    const V v528 = v461 * v515;
-    const V v529 = v469 * v518;
-    const V v530 = v520 + v529;
-    const V v531 = v469 * v515;
-    const V v532 = v414 * v522;
-    const V v533 = v416 * v522;
-    const V v534 = v412 * v522;
-    const V v535 = v337 * v525;
-    const V v536 = v534 + v535;
-    const V v537 = v338 * v525;
-    const V v538 = v339 * v525;
-    const V v539 = v404 * v531;
-    const V v540 = v355 * v530;
-    const V v541 = v539 + v540;
-    const V v542 = v409 * v531;
-    const V v543 = v360 * v531;
-    const V v544 = v357 * v530;
-    const V v545 = v542 + v544;
-    const V v546 = v330 * v530;
-    const V v547 = v405 * v528;
-    const V v548 = v358 * v527;
-    const V v549 = v547 + v548;
-    const V v550 = v407 * v528;
-    const V v551 = v367 * v528;
-    const V v552 = v370 * v527;
-    const V v553 = v550 + v552;
-    const V v554 = v340 * v527;
-    const V v555 = v465 * v515;
-    const V v556 = v471 * v515;
-    const V v557 = v467 * v515;
-    const V v558 = v360 * v557;
-    const V v559 = v467 * v518;
-    const V v560 = v555 + v559;
-    const V v561 = v330 * v560;
-    const V v562 = v558 + v561;
-    const V v563 = v459 * v518;
-    const V v564 = v556 + v563;
-    const V v565 = v459 * v515;
-    const V v566 = v367 * v565;
-    const V v567 = v340 * v564;
-    const V v568 = v566 + v567;
-    const V v569 = v403 * v565;
-    const V v570 = v545 + v569;
-    const V v571 = v371 * v564;
-    const V v572 = v570 + v571;
-    const V v573 = v410 * v557;
-    const V v574 = v549 + v573;
-    const V v575 = v399 * v557;
-    const V v576 = v553 + v575;
-    const V v577 = v356 * v560;
-    const V v578 = v574 + v577;
-    const V v579 = v354 * v560;
-    const V v580 = v576 + v579;
-    const V v581 = v408 * v565;
-    const V v582 = v541 + v581;
-    const V v583 = v359 * v564;
-    const V v584 = v582 + v583;
-    V s585 = softehl_splat(0.0);
-    V s586 = softehl_splat(0.0);
-    V s587 = softehl_splat(0.0);
-    V s588 = softehl_splat(0.0);
-    V s589 = softehl_splat(0.0);
-    V s590 = softehl_splat(0.0);
-    V s591 = softehl_splat(0.0);
-    V s592 = softehl_splat(0.0);
-    V s593 = softehl_splat(0.0);
-    V s594 = softehl_splat(0.0);
-    V s595 = softehl_splat(0.0);
-    V s596 = softehl_splat(0.0);
-    V s597 = softehl_splat(0.0);
-    V s598 = softehl_splat(0.0);
-    V s599 = softehl_splat(0.0);
+    const V v216 = 1.0 / s113, v217 = v6 * s113, v218 = v216 * v216 * s122,
+        v219 = v216 * s125 - s116 * v218, v220 = v216 * s116, v221 = 0.25 * v220,
+        v222 = s114 * v216, v223 = v216 * s115, v224 = v216 * s117,
+        v225 = v216 * s126 - s117 * v218, v226 = s111 * v216, v227 = s112 * v216,
+        v228 = v216 * s118, v229 = 0.25 * v224, v230 = v224 * v92, v231 = v220 * v92,
+        v232 = v220 * v94, v233 = v224 * v94, v234 = v220 * v89, v235 = v224 * v89,
+        v236 = v220 * v90, v237 = v224 * v90, v238 = v236 - v231, v239 = v232 - v234,
+        v240 = v233 - v235, v241 = 0.25 * v219, v242 = v220 * v81 + v82 * v219,
+        v243 = v220 * v84 + v83 * v219, v244 = v224 * v84 + v83 * v225, v245 = 0.25 * v225,
+        v246 = v224 * v81 + v82 * v225, v247 = v237 - v230, v248 = s114 * v218 - v216 * s123,
+        v249 = s115 * v218 - v216 * s124, v250 = v28 * v248, v251 = v30 * v249,
+        v252 = v20 * v248 - v14 * v249, v253 = v87 * v219 + v220 * v102,
+        v254 = v88 * v219 + v220 * v103, v255 = v87 * v225 + v224 * v102,
+        v256 = v88 * v225 + v224 * v103, v257 = 0.25 * (v243 - v253), v258 = 0.25 * (v244 - v255),
+        v259 = 0.25 * (v256 - v246), v260 = 0.25 * (v254 - v242), v261 = v216 * s119 - s111 * v218,
+        v262 = v216 * s120 - s112 * v218, v263 = v216 * s121 - s118 * v218,
+        v264 = v262 + v48 * v248, v265 = v263 + v48 * v249,
+        v266 = v36 * v239 + (v39 * v221 + (v99 + v38 * v238)),
+        v267 = v44 * v239 + (v47 * v221 + (v98 + v46 * v238)),
+        v268 = v36 * v259 + (v39 * v245 + (v104 + v38 * v258)),
+        v269 = v44 * v259 + (v47 * v245 + (v105 + v46 * v258)),
+        v270 = v44 * v240 + (v47 * v229 + (v96 + v46 * v247)),
+        v271 = v36 * v240 + (v39 * v229 + (v95 + v38 * v247)),
+        v272 = v36 * v260 + (v39 * v241 + (v107 + v38 * v257)),
+        v273 = v44 * v260 + (v47 * v241 + (v108 + v46 * v257)),
+        v274 = 1.0 + v45 * v226 - v46 * v227 - v44 * v228,
+        v275 = v45 * v261 - v46 * v262 - v44 * v263, v276 = 2.0 * v274, v277 = v274 * v274,
+        v278 = v266 * v270 - v267 * v271, v279 = 2.0 * v278, v280 = v278 * v278, v281 = v275 * v276,
+        v282 = v266 * v269 + v270 * v272 - v271 * v273 - v267 * v268, v283 = 1.0 / (v277 * v280),
+        v284 = v279 * v282, v285 = v217 * v283,
+        v286 = 3.141592653589793 * (t10 * (0.5 * s113) + v5 * s122) * (1.0 - v283),
+        v287 = (v280 * v281 + v277 * v284) * (v283 * v285) + v286, v288 = v217 - v285,
+        v289 = v280 * v288, v290 = v277 * v288, v291 = v279 * v290,
+        v292 = v279 * (v281 * v288 + v277 * v287) + v282 * (2.0 * v290), v293 = v276 * v289,
+        v294 = v276 * (v284 * v288 + v280 * v287) + v275 * (2.0 * v289),
+        v295 = v273 * v291 + v267 * v292, v296 = v267 * v291, v297 = v268 * v291 + v271 * v292,
+        v298 = v271 * v291, v299 = v262 * v293, v300 = v263 * v293,
+        v301 = v261 * v293 + v226 * v294, v302 = v227 * v294, v303 = v228 * v294,
+        v304 = v241 * v298, v305 = v221 * v297, v306 = v245 * v296, v307 = v229 * v295,
+        v308 = v270 * v291, v309 = v269 * v291 + v270 * v292, v310 = v241 * v308 + v221 * v309,
+        v311 = v272 * v291 + v266 * v292, v312 = v266 * v291, v313 = v245 * v312 + v229 * v311,
+        v314 = 0.25 * (v253 - v243) * v298 + (v231 - v236) * v297 + v258 * v312 + v247 * v311,
+        v315 = 0.25 * (v246 - v256) * v296 + (v235 - v233) * v295 + v260 * v308 + v239 * v309,
+        v316 = 0.25 * (v255 - v244) * v296 + (v230 - v237) * v295 + v257 * v308 + v238 * v309,
+        v317 = 0.25 * (v242 - v254) * v298 + (v234 - v232) * v297 + v259 * v312 + v240 * v311;
+    V s318 = {0}, s319 = {0}, s320 = {0}, s321 = {0}, s322 = {0}, s323 = {0}, s324 = {0},
+        s325 = {0}, s326 = {0}, s327 = {0}, s328 = {0}, s329 = {0}, s330 = {0}, s331 = {0},
+        s332 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v600 = 1.0 - w[0];
-        const double v601 = 1.0 + w[0];
-        const double v602 = 0.25 * w[0];
-        const double v603 = 1.0 - w[1];
-        const double v604 = 0.25 * w[1];
-        const double v605 = 1.0 + w[1];
-        const double v606 = 0.25 + v602;
-        const double v607 = 0.25 - v602;
-        const double v608 = 0.25 * v603;
-        const V v609 = w[0] - v331;
-        const double v610 = 0.25 + v604;
-        const double v611 = 0.25 * v605;
-        const V v612 = w[1] - v333;
-        const double v613 = v602 - 0.25;
-        const double v614 = 0.25 - v604;
-        const double v615 = v608 * v600;
-        const double v616 = v608 * v601;
-        const double v617 = v601 * v611;
-        const double v618 = v600 * v611;
-        const double v619 = v604 - 0.25;
-        const V v620 = v34 * v612;
-        const V v621 = v32 * v609;
-        const V v622 = 0.25 * v609;
-        const V v623 = 0.25 * v612;
-        const V v624 = X2 * v614;
-        const V v625 = X6 * v607;
-        const V v626 = v22 * v609;
-        const V v627 = X5 * v617;
-        const V v628 = v617 * t5;
-        const V v629 = v614 * t2;
-        const V v630 = v16 * v612;
-        const V v631 = v626 - v630;
-        const V v632 = v607 * t6;
-        const V v633 = v612 * v85;
-        const V v634 = v633 + v381;
-        const V v635 = v612 * v67;
-        const V v636 = v386 - v635;
-        const V v637 = v609 * v83;
-        const V v638 = v637 + v380;
-        const V v639 = v609 * v71;
-        const V v640 = v639 + v636;
-        const V v641 = v610 * v20;
-        const V v642 = v610 * v73;
-        const V v643 = v93 * v640;
-        const V v644 = v336 + v643;
-        const V v645 = v634 - v638;
-        const V v646 = v634 + v638;
-        const V v647 = v606 * v15;
-        const V v648 = v606 * v70;
-        const V v649 = v93 * v645;
-        const V v650 = v328 + v649;
-        const V v651 = v610 * v11;
-        const V v652 = v624 + v651;
-        const V v653 = v610 * v64;
-        const V v654 = v629 + v653;
-        const V v655 = v606 * v9;
-        const V v656 = v625 + v655;
-        const V v657 = v606 * v62;
-        const V v658 = v632 + v657;
-        const V v659 = v98 * v622;
-        const V v660 = v417 - v659;
-        const V v661 = v98 * v623;
-        const V v662 = v418 - v661;
-        const V v663 = v37 * v622;
-        const V v664 = v338 + v663;
-        const V v665 = v37 * v623;
-        const V v666 = v339 + v665;
-        const V v667 = X0 * v619;
-        const V v668 = v667 + v652;
-        const V v669 = X0 * v613;
-        const V v670 = v669 + v656;
-        const V v671 = v619 * t0;
-        const V v672 = v671 + v654;
-        const V v673 = v613 * t0;
-        const V v674 = v673 + v658;
-        const V v675 = X1 * v613;
-        const V v676 = v675 + v647;
-        const V v677 = v613 * t1;
-        const V v678 = v677 + v648;
-        const V v679 = X1 * v619;
-        const V v680 = v679 + v641;
-        const V v681 = v619 * t1;
-        const V v682 = v681 + v642;
-        const V v683 = X1 * v615;
-        const V v684 = v683 + v627;
-        const V v685 = v615 * t1;
-        const V v686 = v685 + v628;
-        const V v687 = v620 - v621;
-        const V v688 = v620 + v621;
-        const V v689 = 0.25 * v688;
-        const V v690 = X7 * v607;
-        const V v691 = v690 + v676;
-        const V v692 = v607 * t7;
-        const V v693 = v692 + v678;
-        const V v694 = X7 * v618;
-        const V v695 = v694 + v684;
-        const V v696 = v618 * t7;
-        const V v697 = v696 + v686;
-        const V v698 = v672 * v691;
-        const V v699 = v668 * v691;
-        const V v700 = v668 * v693;
-        const V v701 = v698 + v700;
-        const V v702 = X3 * v614;
-        const V v703 = v702 + v680;
-        const V v704 = v614 * t3;
-        const V v705 = v704 + v682;
-        const V v706 = X3 * v616;
-        const V v707 = v706 + v695;
-        const V v708 = v616 * t3;
-        const V v709 = v708 + v697;
-        const V v710 = v674 * v703;
-        const V v711 = v701 - v710;
-        const V v712 = v670 * v703;
-        const V v713 = v699 - v712;
-        const V v714 = v670 * v705;
-        const V v715 = v711 - v714;
-        const V v716 = v99 * v689;
-        const V v717 = v41 * v689;
-        const V v718 = v337 - v717;
-        const V v719 = v709 * v713;
-        const V v720 = v707 * v713;
-        const V v721 = 0.25 * v646;
-        const V v722 = v716 - v721;
-        const V v723 = v707 * v715;
-        const V v724 = v719 + v723;
-        const V v725 = v41 * v722;
-        const V v726 = v412 + v725;
-        const V v727 = v93 * v687;
-        const V v728 = v329 + v727;
-        const V v729 = v93 * v631;
-        const V v730 = v334 + v729;
-        const V v731 = v687 * v110;
-        const V v732 = v650 - v731;
-        const V v733 = v631 * v110;
-        const V v734 = v644 - v733;
-        const V v735 = 0.25 * v728;
-        const V v736 = 0.25 * v730;
-        const V v737 = w[2] * v720;
-        const V v738 = w[2] * v724;
-        const V v739 = 0.25 * v732;
-        const V v740 = 0.25 * v734;
-        const V v741 = v728 * v169;
-        const V v742 = v730 * v169;
-        const V v743 = v728 * v139;
-        const V v744 = v730 * v139;
-        const V v745 = 6.283185307179586 * v737;
-        const V v746 = 6.283185307179586 * v738;
-        const V v747 = v730 * v175;
-        const V v748 = v728 * v175;
-        const V v749 = v730 * v174;
-        const V v750 = v728 * v174;
-        const V v751 = v148 * v734;
-        const V v752 = v747 + v751;
-        const V v753 = v732 * v148;
-        const V v754 = v748 + v753;
-        const V v755 = v137 * v734;
-        const V v756 = v749 + v755;
-        const V v757 = v732 * v137;
-        const V v758 = v750 + v757;
-        const V v759 = 0.25 * v752;
-        const V v760 = 0.25 * v754;
-        const V v761 = 0.25 * v756;
-        const V v762 = 0.25 * v758;
-        const V v763 = v4 * v745;
-        const V v764 = v3 * v745;
-        const V v765 = v2 * v745;
-        const V v766 = v1 * v745;
-        const V v767 = v2 * v746;
-        const V v768 = v763 + v767;
-        const V v769 = v1 * v746;
-        const V v770 = v764 + v769;
-        const V v771 = v52 * v726;
-        const V v772 = v52 * v718;
-        const V v773 = 1.0 + v772;
-        const V v774 = v42 * v741;
-        const V v775 = v152 + v774;
-        const V v776 = v42 * v759;
-        const V v777 = v166 + v776;
-        const V v778 = v42 * v760;
-        const V v779 = v171 + v778;
-        const V v780 = v42 * v742;
-        const V v781 = v142 + v780;
-        const V v782 = v51 * v741;
-        const V v783 = v150 + v782;
-        const V v784 = v51 * v662;
-        const V v785 = v771 - v784;
-        const V v786 = v51 * v666;
-        const V v787 = v773 - v786;
-        const V v788 = v51 * v742;
-        const V v789 = v144 + v788;
-        const V v790 = v51 * v759;
-        const V v791 = v168 + v790;
-        const V v792 = v51 * v760;
-        const V v793 = v173 + v792;
-        const V v794 = v45 * v735;
-        const V v795 = v794 + v775;
-        const V v796 = v45 * v736;
-        const V v797 = v796 + v781;
-        const V v798 = v54 * v735;
-        const V v799 = v798 + v783;
-        const V v800 = v54 * v736;
-        const V v801 = v800 + v789;
-        const V v802 = v53 * v664;
-        const V v803 = v787 - v802;
-        const V v804 = v54 * v740;
-        const V v805 = v791 + v804;
-        const V v806 = v54 * v739;
-        const V v807 = v806 + v793;
-        const V v808 = v53 * v743;
-        const V v809 = v808 + v799;
-        const V v810 = v44 * v743;
-        const V v811 = v810 + v795;
-        const V v812 = v44 * v744;
-        const V v813 = v812 + v797;
-        const V v814 = v53 * v744;
-        const V v815 = v814 + v801;
-        const V v816 = v803 * v803;
-        const V v817 = 2.0 * v803;
-        const V v818 = v53 * v761;
-        const V v819 = v805 + v818;
-        const V v820 = 2.0 * v809;
-        const V v821 = v809 * v809;
-        const V v822 = 2.0 * v811;
-        const V v823 = 2.0 * v813;
-        const V v824 = 2.0 * v815;
-        const V v825 = v811 * v815;
-        const V v826 = v811 * v819;
-        const V v827 = v811 * v811;
-        const V v828 = v821 + v827;
-        const V v829 = v809 * v813;
-        const V v830 = v825 - v829;
-        const V v831 = v819 * v824;
-        const V v832 = v813 * v813;
-        const V v833 = v828 + v832;
-        const V v834 = v830 * v830;
-        const V v835 = 2.0 * v830;
-        const V v836 = v815 * v815;
-        const V v837 = v833 + v836;
-        const V v838 = v816 + v837;
-        const V v839 = v816 * v837;
-        const V v840 = v816 * v834;
-        const V v841 = softehl_vrcbrt(v840);
-        const V v842 = v834 + v839;
-        const V v843 = v53 * v660;
-        const V v844 = v785 - v843;
-        const V v845 = v53 * v762;
-        const V v846 = v845 + v807;
-        const V v847 = 2.0 * v844;
-        const V v848 = v817 * v844;
-        const V v849 = v44 * v762;
-        const V v850 = v849 + v779;
-        const V v851 = v44 * v761;
-        const V v852 = v777 + v851;
-        const V v853 = v766 * v838;
-        const V v854 = v770 * v838;
-        const V v855 = v45 * v739;
-        const V v856 = v855 + v850;
-        const V v857 = v45 * v740;
-        const V v858 = v852 + v857;
-        const V v859 = v765 * v842;
-        const V v860 = v768 * v842;
-        const V v861 = v848 * v834;
-        const V v862 = v848 * v837;
-        const V v863 = 1.1111111111111112 * v859;
-        const V v864 = v815 * v856;
-        const V v865 = v826 + v864;
-        const V v866 = v823 * v858;
-        const V v867 = v831 + v866;
-        const V v868 = v809 * v858;
-        const V v869 = v865 - v868;
-        const V v870 = v822 * v856;
-        const V v871 = v867 + v870;
-        const V v872 = v813 * v846;
-        const V v873 = v869 - v872;
-        const V v874 = 2.0 * v873;
-        const V v875 = v835 * v873;
-        const V v876 = v820 * v846;
-        const V v877 = v871 + v876;
-        const V v878 = v848 + v877;
-        const V v879 = v816 * v877;
-        const V v880 = v862 + v879;
-        const V v881 = v875 + v880;
-        const V v882 = v816 * v875;
-        const V v883 = v861 + v882;
-        const V v884 = v766 * v878;
-        const V v885 = v854 + v884;
-        const V v886 = v841 * v841;
-        const V v887 = v886 * v886;
-        const V v888 = 0.6666666666666666 * v841;
-        const V v889 = v887 * v888;
-        const V v890 = 0.3333333333333333 * v887;
-        const V v891 = v885 * v890;
-        const V v892 = v841 * v886;
-        const V v893 = v765 * v881;
-        const V v894 = v860 + v893;
-        const V v895 = v889 * v894;
-        const V v896 = v891 + v895;
-        const V v897 = 0.4444444444444444 * v841;
-        const V v898 = v765 * v886;
-        const V v899 = v765 * v889;
-        const V v900 = v768 * v886;
-        const V v901 = v883 * v899;
-        const V v902 = v900 - v901;
-        const V v903 = v859 * v889;
-        const V v904 = v877 * v898;
-        const V v905 = v766 * v841;
-        const V v906 = v766 * v890;
-        const V v907 = v770 * v841;
-        const V v908 = v883 * v906;
-        const V v909 = v907 - v908;
-        const V v910 = v853 * v890;
-        const V v911 = v903 + v910;
-        const V v912 = v853 * v897;
-        const V v913 = v892 * v912;
-        const V v914 = v892 * v913;
-        const V v915 = v875 * v911;
-        const V v916 = v904 - v915;
-        const V v917 = v863 * v887;
-        const V v918 = v887 * v917;
-        const V v919 = v914 + v918;
-        const V v920 = v883 * v919;
-        const V v921 = v896 - v920;
-        const V v922 = v909 + v916;
-        const V v923 = v816 * v902;
-        const V v924 = v909 + v923;
-        const V v925 = v816 * v911;
-        const V v926 = v898 - v925;
-        const V v927 = v816 * v898;
-        const V v928 = v905 + v927;
-        const V v929 = 2.0 * v928;
-        const V v930 = v846 * v929;
-        const V v931 = v874 * v926;
-        const V v932 = v835 * v926;
-        const V v933 = v816 * v921;
-        const V v934 = v902 - v933;
-        const V v935 = v837 * v902;
-        const V v936 = v922 + v935;
-        const V v937 = v837 * v898;
-        const V v938 = v905 + v937;
-        const V v939 = v848 * v898;
-        const V v940 = v924 + v939;
-        const V v941 = v848 * v911;
-        const V v942 = v934 - v941;
-        const V v943 = v835 * v942;
-        const V v944 = v931 + v943;
-        const V v945 = v834 * v911;
-        const V v946 = v938 - v945;
-        const V v947 = v834 * v921;
-        const V v948 = v936 - v947;
-        const V v949 = v847 * v946;
-        const V v950 = v817 * v948;
-        const V v951 = v949 + v950;
-        const V v952 = v817 * v946;
-        const V v953 = v824 * v928;
-        const V v954 = v824 * v940;
-        const V v955 = v820 * v928;
-        const V v956 = v820 * v940;
-        const V v957 = v930 + v956;
-        const V v958 = v823 * v928;
-        const V v959 = v822 * v928;
-        const V v960 = v823 * v940;
-        const V v961 = v822 * v940;
-        const V v962 = v846 * v932;
-        const V v963 = v960 - v962;
-        const V v964 = v726 * v952;
-        const V v965 = v718 * v951;
-        s589 += v964;
-        s589 += v965;
-        const V v966 = v809 * v932;
-        const V v967 = v958 - v966;
-        s587 += v967;
-        const V v968 = v809 * v944;
-        const V v969 = v963 - v968;
-        const V v970 = v858 * v929;
-        const V v971 = v969 + v970;
-        s592 += v971;
-        const V v972 = v858 * v932;
-        const V v973 = v957 - v972;
-        const V v974 = v819 * v929;
-        const V v975 = v954 + v974;
-        const V v976 = v856 * v929;
-        const V v977 = v961 + v976;
-        const V v978 = v819 * v932;
-        const V v979 = v977 + v978;
-        const V v980 = v856 * v932;
-        const V v981 = v975 + v980;
-        const V v982 = v742 * v971;
-        const V v983 = v744 * v971;
-        const V v984 = v736 * v971;
-        const V v985 = v815 * v932;
-        const V v986 = v959 + v985;
-        s588 += v986;
-        const V v987 = v815 * v944;
-        const V v988 = v979 + v987;
-        s593 += v988;
-        const V v989 = v813 * v944;
-        const V v990 = v973 - v989;
-        s591 += v990;
-        const V v991 = v811 * v944;
-        const V v992 = v981 + v991;
-        s590 += v992;
-        const V v993 = v742 * v992;
-        const V v994 = v744 * v992;
-        const V v995 = v736 * v992;
-        const V v996 = v813 * v932;
-        const V v997 = v955 - v996;
-        s586 += v997;
-        const V v998 = v811 * v932;
-        const V v999 = v953 + v998;
-        s585 += v999;
-        const V v1000 = v664 * v951;
-        s595 += v994;
-        s595 -= v1000;
-        const V v1001 = v666 * v951;
-        s596 += v993;
-        s596 -= v1001;
-        const V v1002 = v660 * v952;
-        s595 -= v1002;
-        const V v1003 = v662 * v952;
-        s596 -= v1003;
-        const V v1004 = v759 * v999;
-        s596 += v1004;
-        const V v1005 = v759 * v967;
-        s599 += v982;
-        s599 += v1005;
-        const V v1006 = v761 * v999;
-        s595 += v1006;
-        const V v1007 = v761 * v967;
-        s598 += v983;
-        s598 += v1007;
-        const V v1008 = v740 * v967;
-        s597 += v984;
-        s597 += v1008;
-        const V v1009 = v740 * v999;
-        s594 += v995;
-        s594 += v1009;
-        const V v1010 = v760 * v997;
-        s596 += v1010;
-        const V v1011 = v760 * v986;
-        s599 += v1011;
-        const V v1012 = v741 * v990;
-        s596 += v1012;
-        const V v1013 = v741 * v988;
-        s599 += v1013;
-        const V v1014 = v762 * v997;
-        s595 += v1014;
-        const V v1015 = v762 * v986;
-        s598 += v1015;
-        const V v1016 = v739 * v997;
-        s594 += v1016;
-        const V v1017 = v739 * v986;
-        s597 += v1017;
-        const V v1018 = v743 * v990;
-        s595 += v1018;
-        const V v1019 = v743 * v988;
-        s598 += v1019;
-        const V v1020 = v735 * v990;
-        s594 += v1020;
-        const V v1021 = v735 * v988;
-        s597 += v1021;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v333 = 1.0 - w[0], v334 = 1.0 + w[0], v335 = 0.25 * w[0], v336 = 1.0 - w[1],
+            v337 = 0.25 * w[1], v338 = 1.0 + w[1], v339 = 0.25 + v335, v340 = 0.25 - v335,
+            v341 = 0.25 * v336;
+        const V v342 = w[0] - v222;
+        const double v343 = 0.25 + v337, v344 = 0.25 * v338;
+        const V v345 = w[1] - v223;
+        const double v346 = v335 - 0.25, v347 = 0.25 - v337, v348 = v341 * v333, v349 = v341 * v334,
+            v350 = v334 * v344, v351 = v333 * v344, v352 = v337 - 0.25;
+        const V v353 = v30 * v345, v354 = v28 * v342, v355 = 0.25 * v342, v356 = 0.25 * v345,
+            v357 = X2 * v347, v358 = X6 * v340, v359 = X5 * v350, v360 = v350 * t5,
+            v361 = v347 * t2, v362 = v20 * v342 - v14 * v345, v363 = v340 * t6,
+            v364 = v345 * v69 + v251, v365 = v342 * v67 + v250, v366 = v343 * v18,
+            v367 = v343 * v62, v368 = v339 * v13, v369 = v339 * v59, v370 = v343 * v9,
+            v371 = v357 + v370, v372 = v343 * v53, v373 = v361 + v372, v374 = v339 * v8,
+            v375 = v358 + v374, v376 = v339 * v52, v377 = v363 + v376, v378 = v264 - v72 * v355,
+            v379 = v265 - v72 * v356, v380 = v227 + v32 * v355, v381 = v228 + v32 * v356,
+            v382 = X0 * v352, v383 = v382 + v371, v384 = X0 * v346, v385 = v384 + v375,
+            v386 = v352 * t0, v387 = v386 + v373, v388 = v346 * t0, v389 = v388 + v377,
+            v390 = X1 * v346, v391 = v346 * t1, v392 = X1 * v352, v393 = v352 * t1,
+            v394 = X1 * v348, v395 = v348 * t1, v396 = v353 - v354, v397 = 0.25 * (v353 + v354),
+            v398 = X7 * v340, v399 = v398 + (v390 + v368), v400 = v340 * t7,
+            v401 = v400 + (v391 + v369), v402 = X7 * v351, v403 = v351 * t7, v404 = X3 * v347,
+            v405 = v404 + (v392 + v366), v406 = v347 * t3, v407 = v406 + (v393 + v367),
+            v408 = X3 * v349, v409 = v408 + (v402 + (v394 + v359)), v410 = v349 * t3,
+            v411 = v410 + (v403 + (v395 + v360)), v412 = v383 * v399 - v385 * v405,
+            v413 = v387 * v399 + v383 * v401 - v389 * v405 - v385 * v407, v414 = v226 - v35 * v397,
+            v415 = v409 * v412, v416 = v411 * v412 + v409 * v413,
+            v417 = v261 + v35 * (v73 * v397 - 0.25 * (v364 + v365)), v418 = v220 + v71 * v396,
+            v419 = v224 + v71 * v362, v420 = v219 + v71 * (v364 - v365) - v396 * v76,
+            v421 = v225 + v71 * (v342 * v60 + (v252 - v345 * v56)) - v362 * v76, v422 = 0.25 * v418,
+            v423 = 0.25 * v419, v424 = w[2] * v415, v425 = w[2] * v416, v426 = 0.25 * v420,
+            v427 = 0.25 * v421, v428 = v418 * v106, v429 = v419 * v106, v430 = v418 * v93,
+            v431 = v419 * v93, v432 = 6.283185307179586 * v424, v433 = 6.283185307179586 * v425,
+            v434 = 0.25 * (v419 * v110 + v97 * v421), v435 = 0.25 * (v418 * v110 + v420 * v97),
+            v436 = 0.25 * (v419 * v109 + v91 * v421), v437 = 0.25 * (v418 * v109 + v420 * v91),
+            v438 = v2 * v432, v439 = v1 * v432, v440 = v4 * v432 + v2 * v433,
+            v441 = v3 * v432 + v1 * v433, v442 = 1.0 + v45 * v414 - v44 * v381 - v46 * v380,
+            v443 = v46 * v430 + (v47 * v422 + (v98 + v44 * v428)),
+            v444 = v38 * v430 + (v39 * v422 + (v99 + v36 * v428)),
+            v445 = v38 * v431 + (v39 * v423 + (v95 + v36 * v429)),
+            v446 = v46 * v431 + (v47 * v423 + (v96 + v44 * v429)), v447 = v442 * v442,
+            v448 = 2.0 * v442, v449 = v105 + v44 * v434 + v47 * v427 + v46 * v436,
+            v450 = 2.0 * v443, v451 = 2.0 * v444, v452 = 2.0 * v445, v453 = 2.0 * v446,
+            v454 = v444 * v446 - v443 * v445, v455 = v454 * v454, v456 = 2.0 * v454,
+            v457 = v443 * v443 + v444 * v444 + v445 * v445 + v446 * v446, v458 = v447 + v457,
+            v459 = softehl_vrcbrt(v447 * v455), v460 = v455 + v447 * v457,
+            v461 = v45 * v417 - v44 * v379 - v46 * v378,
+            v462 = v46 * v437 + (v47 * v426 + (v108 + v44 * v435)), v463 = v448 * v461,
+            v464 = v439 * v458, v465 = v39 * v426 + (v38 * v437 + (v107 + v36 * v435)),
+            v466 = v104 + v36 * v434 + v38 * v436 + v39 * v427, v467 = v438 * v460,
+            v468 = v444 * v449 + v446 * v465 - v443 * v466 - v445 * v462, v469 = v456 * v468,
+            v470 = v449 * v453 + v452 * v466 + v451 * v465 + v450 * v462,
+            v471 = v463 * v455 + v447 * v469, v472 = v459 * v459, v473 = v472 * v472,
+            v474 = v473 * (0.6666666666666666 * v459), v475 = 0.3333333333333333 * v473,
+            v476 = v459 * v472,
+            v477 = v474 * (v440 * v460 + v438 * (v469 + (v463 * v457 + v447 * v470))),
+            v478 = v438 * v472, v479 = v440 * v472 - v471 * (v438 * v474), v480 = v439 * v459,
+            v481 = v441 * v459 - v471 * (v439 * v475), v482 = v467 * v474 + v464 * v475,
+            v483 = v476 * (v476 * (v464 * (0.4444444444444444 * v459))) + v473 * (1.1111111111111112 * v467 * v473),
+            v484 = (v441 * v458 + v439 * (v463 + v470)) * v475 + v477 - v471 * v483,
+            v485 = v478 - v447 * v482, v486 = v480 + v447 * v478, v487 = 2.0 * v486,
+            v488 = v456 * v485, v489 = v481 + v447 * v479 + v463 * v478,
+            v490 = 2.0 * v468 * v485 + v456 * (v479 - v447 * v484 - v463 * v482),
+            v491 = v480 + v457 * v478 - v455 * v482,
+            v492 = v448 * (v481 + (v470 * v478 - v469 * v482) + v457 * v479 - v455 * v484),
+            v493 = 2.0 * v461 * v491 + v492, v494 = v448 * v491;
+        s322 += v417 * v494; s322 += v414 * v493; const V v495 = v452 * v486 - v443 * v488;
+        s320 += v495; const V v496 = v452 * v489 - v462 * v488 - v443 * v490 + v466 * v487;
+        s325 += v496; const V v497 = v451 * v486 + v446 * v488; s321 += v497;
+        const V v498 = v451 * v489 + v465 * v487 + v449 * v488 + v446 * v490; s326 += v498;
+        const V v499 = v462 * v487 + v450 * v489 - v466 * v488 - v445 * v490; s324 += v499;
+        const V v500 = v453 * v489 + v449 * v487 + v465 * v488 + v444 * v490; s323 += v500;
+        const V v501 = v450 * v486 - v445 * v488; s319 += v501;
+        const V v502 = v453 * v486 + v444 * v488; s318 += v502; s328 += v431 * v500;
+        s328 -= v380 * v493; s329 += v429 * v500; s329 -= v381 * v493; s328 -= v378 * v494;
+        s329 -= v379 * v494; s329 += v434 * v502; s332 += v429 * v496; s332 += v434 * v495;
+        s328 += v436 * v502; s331 += v431 * v496; s331 += v436 * v495; s330 += v423 * v496;
+        s330 += v427 * v495; s327 += v423 * v500; s327 += v427 * v502; s329 += v435 * v501;
+        s332 += v435 * v497; s329 += v428 * v499; s332 += v428 * v498; s328 += v437 * v501;
+        s331 += v437 * v497; s327 += v426 * v501; s330 += v426 * v497; s328 += v430 * v499;
+        s331 += v430 * v498; s327 += v422 * v499; s330 += v422 * v498;
     }
-    const V v1022 = v557 + s588;
-    const V v1023 = v565 + s585;
-    const V v1024 = s586 - v531;
-    const V v1025 = s587 - v528;
-    const V v1026 = v560 + s593;
-    const V v1027 = v564 + s590;
-    const V v1028 = s589 + v536;
-    const V v1029 = s591 - v530;
-    const V v1030 = s592 - v527;
-    const V v1031 = s594 - v543;
-    const V v1032 = s595 - v532;
-    const V v1033 = s596 - v533;
-    const V v1034 = v1031 - v546;
-    const V v1035 = v1032 - v537;
-    const V v1036 = s597 - v551;
-    const V v1037 = s598 + v580;
-    const V v1038 = v1033 - v538;
-    const V v1039 = v568 + v1034;
-    const V v1040 = v562 + v1036;
-    const V v1041 = v572 + v1035;
-    const V v1042 = s599 + v578;
-    const V v1043 = v1028 - v1039;
-    const V v1044 = v1028 + v1039;
-    const V v1045 = v584 + v1038;
-    const V v1046 = v154 * v1025;
-    const V v1047 = v1046 + v1037;
-    const V v1048 = v154 * v1023;
-    const V v1049 = v1048 + v1041;
-    const V v1050 = v156 * v1025;
-    const V v1051 = v1042 - v1050;
-    const V v1052 = v156 * v1023;
-    const V v1053 = v1045 - v1052;
-    const V v1054 = v1040 - v554;
-    const V v1055 = v554 - v1040;
-    const V v1056 = v114 * v1024;
-    const V v1057 = v1049 - v1056;
-    const V v1058 = v112 * v1024;
-    const V v1059 = v1058 + v1053;
-    const V v1060 = v114 * v1022;
-    const V v1061 = v1047 - v1060;
-    const V v1062 = v112 * v1022;
-    const V v1063 = v1062 + v1051;
-    const V v1064 = v126 * v1027;
-    const V v1065 = v1064 + v1057;
-    const V v1066 = v126 * v1030;
-    const V v1067 = v1066 + v1061;
-    const V v1068 = v127 * v1027;
-    const V v1069 = v1059 - v1068;
-    const V v1070 = v127 * v1030;
-    const V v1071 = v1063 - v1070;
-    const V v1072 = v108 * v1029;
-    const V v1073 = v1065 - v1072;
-    const V v1074 = v108 * v1026;
-    const V v1075 = v1067 - v1074;
-    const V v1076 = v107 * v1029;
-    const V v1077 = v1076 + v1069;
-    const V v1078 = v107 * v1026;
-    const V v1079 = v1078 + v1071;
-    const V v1080 = v1073 - v1077;
-    const V v1081 = v1073 + v1077;
-    const V v1082 = v1075 - v1079;
-    const V v1083 = v1075 + v1079;
-    const V v1084 = v1043 - v1080;
-    const V v1085 = v1043 + v1080;
-    const V v1086 = v1044 + v1081;
-    const V v1087 = v1044 - v1081;
-    const V v1088 = v1055 - v1082;
-    const V v1089 = v1054 + v1083;
-    softehl_store4(R + 0, 8, v1089, v1086, v1088, v1084);
-    const V v1090 = v1054 - v1083;
-    const V v1091 = v1082 - v1054;
-    softehl_store4(R + 4, 8, v1090, v1087, v1091, v1085);
+    const V v503 = v308 + s321, v504 = v312 + s318, v505 = s319 - v298, v506 = s320 - v296,
+        v507 = v309 + s326, v508 = v311 + s323, v509 = s322 + v301, v510 = s324 - v297,
+        v511 = s325 - v295, v512 = v313 + (s327 - v304 - v305), v513 = v310 + (s330 - v306),
+        v514 = v509 - v512, v515 = v509 + v512, v516 = v513 - v307,
+        v517 = v85 * v508 + (v100 * v504 + (v314 + (s328 - v299 - v302)) - v78 * v505),
+        v518 = v77 * v505 + (v317 + (s329 - v300 - v303) - v101 * v504) - v86 * v508,
+        v519 = v517 - v75 * v510,
+        v520 = v85 * v511 + (v100 * v506 + (s331 + v316) - v78 * v503) - v75 * v507,
+        v521 = v74 * v510 + v518,
+        v522 = v74 * v507 + (v77 * v503 + (s332 + v315 - v101 * v506) - v86 * v511),
+        v523 = v519 - v521, v524 = v519 + v521, v525 = v520 - v522, v526 = v520 + v522,
+        v527 = v514 - v523, v528 = v514 + v523, v529 = v515 + v524, v530 = v515 - v524,
+        v531 = v307 - v513 - v525, v532 = v516 + v526;
+    softehl_store4(R + 0, 8, v532, v529, v531, v527);
+    const V v533 = v516 - v526, v534 = v525 - v516;
+    softehl_store4(R + 4, 8, v533, v530, v534, v528);
 }
-
-void softehl_solid_taylor_mean_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_pseudo_load_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, direction + 11 * e, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_pseudo_load_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, direction + 11 * (n - SOFTEHL_LANES), parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double t[SOFTEHL_LANES * 11];
-    softehl_pad(t, direction, 11, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_taylor_mean_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_solid_taylor_mean_pseudo_load, 8, 8, 0, 11, 8, 0)

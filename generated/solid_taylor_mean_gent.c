@@ -23,3110 +23,620 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_solid_taylor_mean_gent_energy_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_gent_energy)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[2];
-    const double v2 = 0.5 * parameters[0];
-    const double v3 = 1.0 / parameters[1];
-    const double v4 = parameters[1] * v2;
-    const V v5 = X4 - X0;
-    const V v6 = X0 - X2;
-    const V v7 = X4 - X2;
-    const V v8 = v5 - X2;
-    const V v9 = X4 - X6;
-    const V v10 = X6 + v8;
-    const V v11 = X1 - X3;
-    const V v12 = X1 + X3;
-    const V v13 = v6 + v9;
-    const V v14 = X5 - X3;
-    const V v15 = v9 - v6;
-    const V v16 = 0.25 * v10;
-    const V v17 = 0.25 * v13;
-    const V v18 = X5 - X7;
-    const V v19 = X5 + X7;
-    const V v20 = 0.25 * v15;
-    const V v21 = v11 + v18;
-    const V v22 = v15 - v10;
-    const V v23 = v10 - v15;
-    const V v24 = v15 + v10;
-    const V v25 = v18 - v11;
-    const V v26 = 0.25 * v21;
-    const V v27 = 0.0625 * v22;
-    const V v28 = 0.0625 * v23;
-    const V v29 = 0.0625 * v24;
-    const V v30 = 0.25 * v25;
-    const V v31 = v12 + v19;
-    const V v32 = v19 - v12;
-    const V v33 = 0.25 * v31;
-    const V v34 = v25 - v32;
-    const V v35 = 0.25 * v32;
-    const V v36 = v25 + v32;
-    const V v37 = v32 - v25;
-    const V v38 = v20 * v35;
-    const V v39 = 0.0625 * v34;
-    const V v40 = 0.0625 * v36;
-    const V v41 = 0.0625 * v37;
-    const V v42 = 1.0 / v33;
-    const V v43 = v33 * v33;
-    const V v44 = v30 * v16;
-    const V v45 = v38 - v44;
-    const V v46 = 1.0 / v43;
-    const V v47 = 1.0 / v45;
-    const V v48 = 0.25 * v42;
-    const V v49 = 0.25 * v46;
-    const V v50 = v39 * v47;
-    const V v51 = v28 * v47;
-    const V v52 = v40 * v47;
-    const V v53 = v29 * v47;
-    const V v54 = v41 * v47;
-    const V v55 = v27 * v47;
-    const V v56 = v26 * v53;
-    const V v57 = v17 * v52;
-    const V v58 = v56 - v57;
-    const V v59 = v58 - 0.25;
-    const V v60 = (-0.25) - v58;
-    const V v61 = v26 * v51;
-    const V v62 = 0.25 - v61;
-    const V v63 = v17 * v50;
-    const V v64 = v62 - v63;
-    const V v65 = v26 * v55;
-    const V v66 = 0.25 - v65;
-    const V v67 = v17 * v54;
-    const V v68 = v66 - v67;
-    V s69 = softehl_splat(0.0);
-    V s70 = softehl_splat(0.0);
-    V s71 = softehl_splat(0.0);
-    V s72 = softehl_splat(0.0);
-    V s73 = softehl_splat(0.0);
-    V s74 = softehl_splat(0.0);
-    V s75 = softehl_splat(0.0);
-    V s76 = softehl_splat(0.0);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[2], v2 = 1.0 / parameters[1],
+        v3 = parameters[1] * (0.5 * parameters[0]);
+    const V v4 = X0 - X2, v5 = X4 - X2, v6 = X4 - X6, v7 = X6 + (X4 - X0 - X2), v8 = X1 - X3,
+        v9 = X1 + X3, v10 = X5 - X3, v11 = v6 - v4, v12 = 0.25 * v7, v13 = 0.25 * (v4 + v6),
+        v14 = X5 - X7, v15 = X5 + X7, v16 = 0.25 * v11, v17 = v14 - v8, v18 = 0.25 * (v8 + v14),
+        v19 = 0.25 * v17, v20 = v15 - v9, v21 = 0.25 * (v9 + v15), v22 = 0.25 * v20,
+        v23 = 1.0 / (v16 * v22 - v19 * v12), v24 = 0.25 * (1.0 / v21),
+        v25 = 0.25 * (1.0 / (v21 * v21)), v26 = 0.0625 * (v17 - v20) * v23,
+        v27 = 0.0625 * (v7 - v11) * v23, v28 = 0.0625 * (v17 + v20) * v23,
+        v29 = 0.0625 * (v11 + v7) * v23, v30 = 0.0625 * (v20 - v17) * v23,
+        v31 = 0.0625 * (v11 - v7) * v23, v32 = v18 * v29 - v13 * v28, v33 = v32 - 0.25,
+        v34 = (-0.25) - v32, v35 = 0.25 - v18 * v27 - v13 * v26, v36 = 0.25 - v18 * v31 - v13 * v30;
+    V s37 = {0}, s38 = {0}, s39 = {0}, s40 = {0}, s41 = {0}, s42 = {0}, s43 = {0}, s44 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v77 = 1.0 - w[1];
-        const double v78 = 1.0 + w[1];
-        const double v79 = 0.25 * w[1];
-        const double v80 = 1.0 - w[0];
-        const double v81 = 1.0 + w[0];
-        const double v82 = 0.25 * w[0];
-        const double v83 = 0.25 * v78;
-        const double v84 = 0.25 - v79;
-        const double v85 = 0.25 + v79;
-        const double v86 = 0.25 + v82;
-        const double v87 = 0.25 - v82;
-        const V v88 = X5 * v81;
-        const double v89 = v79 - 0.25;
-        const V v90 = X3 * v81;
-        const V v91 = X3 * v84;
-        const V v92 = X2 * v84;
-        const double v93 = v82 - 0.25;
-        const V v94 = X6 * v87;
-        const V v95 = X7 * v87;
-        const V v96 = X7 * v80;
-        const V v97 = v88 + v96;
-        const V v98 = X1 * v80;
-        const V v99 = v98 + v90;
-        const V v100 = v83 * v97;
-        const V v101 = X1 * v89;
-        const V v102 = v91 + v101;
-        const V v103 = X1 * v93;
-        const V v104 = v95 + v103;
-        const V v105 = X0 * v89;
-        const V v106 = v92 + v105;
-        const V v107 = X0 * v93;
-        const V v108 = v94 + v107;
-        const V v109 = 0.25 * v99;
-        const V v110 = v77 * v109;
-        const V v111 = v100 + v110;
-        const V v112 = v85 * v18;
-        const V v113 = v112 + v102;
-        const V v114 = v85 * v9;
-        const V v115 = v114 + v106;
-        const V v116 = v86 * v14;
-        const V v117 = v116 + v104;
-        const V v118 = v86 * v7;
-        const V v119 = v118 + v108;
-        const double v120 = w[1] * w[2];
-        const V v121 = w[0] * v115;
-        const V v122 = v115 * v117;
-        const V v123 = w[1] * v117;
-        const V v124 = w[1] * v119;
-        const V v125 = v121 - v124;
-        const V v126 = v119 * v113;
-        const V v127 = v122 - v126;
-        const V v128 = w[0] * v113;
-        const V v129 = v123 - v128;
-        const V v130 = w[2] * v111;
-        const V v131 = v111 * v127;
-        const V v132 = 0.25 * v127;
-        const V v133 = v130 * v129;
-        s75 += v133;
-        const V v134 = v130 * v125;
-        s76 += v134;
-        const V v135 = w[2] * v132;
-        s69 += v135;
-        const V v136 = v120 * v132;
-        s71 += v136;
-        const V v137 = w[2] * v131;
-        s72 += v137;
-        const V v138 = v120 * v131;
-        s74 += v138;
-        const V v139 = w[0] * v135;
-        s70 += v139;
-        const V v140 = w[0] * v137;
-        s73 += v140;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v45 = 1.0 - w[1], v46 = 1.0 + w[1], v47 = 0.25 * w[1], v48 = 1.0 - w[0],
+            v49 = 1.0 + w[0], v50 = 0.25 * w[0], v51 = 0.25 * v46, v52 = 0.25 - v47,
+            v53 = 0.25 + v47, v54 = 0.25 + v50, v55 = 0.25 - v50;
+        const V v56 = X5 * v49; const double v57 = v47 - 0.25;
+        const V v58 = X3 * v49, v59 = X3 * v52, v60 = X2 * v52;
+        const double v61 = v50 - 0.25;
+        const V v62 = X6 * v55, v63 = X7 * v55, v64 = X7 * v48, v65 = v56 + v64, v66 = X1 * v48,
+            v67 = v66 + v58, v68 = v51 * v65, v69 = X1 * v57, v70 = X1 * v61, v71 = X0 * v57,
+            v72 = X0 * v61, v73 = 0.25 * v67, v74 = v45 * v73, v75 = v68 + v74, v76 = v53 * v14,
+            v77 = v76 + (v59 + v69), v78 = v53 * v6, v79 = v78 + (v60 + v71), v80 = v54 * v10,
+            v81 = v80 + (v63 + v70), v82 = v54 * v5, v83 = v82 + (v62 + v72);
+        const double v84 = w[1] * w[2];
+        const V v85 = v79 * v81 - v83 * v77, v86 = w[2] * v75, v87 = v75 * v85, v88 = 0.25 * v85;
+        s43 += v86 * (w[1] * v81 - w[0] * v77); s44 += v86 * (w[0] * v79 - w[1] * v83);
+        const V v89 = w[2] * v88; s37 += v89; s39 += v84 * v88; const V v90 = w[2] * v87;
+        s40 += v90; s42 += v84 * v87; s38 += w[0] * v89; s41 += w[0] * v90;
     }
-    const V v141 = 1.0 / s72;
-    const V v142 = v1 * s72;
-    const V v143 = s73 * v141;
-    const V v144 = v141 * s74;
-    const V v145 = v141 * s75;
-    const V v146 = v141 * s76;
-    const V v147 = s69 * v141;
-    const V v148 = s70 * v141;
-    const V v149 = s71 * v141;
-    const V v150 = v147 - v149;
-    const V v151 = v147 + v149;
-    const V v152 = v148 + v150;
-    const V v153 = v150 - v148;
-    const V v154 = v148 + v151;
-    const V v155 = v151 - v148;
-    const V v156 = v59 * v145;
-    const V v157 = v52 + v156;
-    const V v158 = v59 * v146;
-    const V v159 = v158 - v53;
-    const V v160 = v68 * v145;
-    const V v161 = v54 + v160;
-    const V v162 = v68 * v146;
-    const V v163 = v55 + v162;
-    const V v164 = v60 * v146;
-    const V v165 = v53 + v164;
-    const V v166 = v60 * v145;
-    const V v167 = v166 - v52;
-    const V v168 = v64 * v145;
-    const V v169 = v50 + v168;
-    const V v170 = v64 * v146;
-    const V v171 = v51 + v170;
-    const V v172 = d2 * v159;
-    const V v173 = d3 * v159;
-    const V v174 = 1.0 + v173;
-    const V v175 = d7 * v167;
-    const V v176 = d7 * v165;
-    const V v177 = v176 + v174;
-    const V v178 = d7 * v155;
-    const V v179 = 1.0 + v178;
-    const V v180 = d6 * v165;
-    const V v181 = v172 + v180;
-    const V v182 = d6 * v167;
-    const V v183 = 1.0 + v182;
-    const V v184 = d2 * v157;
-    const V v185 = v184 + v183;
-    const V v186 = d3 * v157;
-    const V v187 = v186 + v175;
-    const V v188 = d3 * v152;
-    const V v189 = v188 + v179;
-    const V v190 = d0 * v169;
-    const V v191 = v190 + v185;
-    const V v192 = d0 * v171;
-    const V v193 = v192 + v181;
-    const V v194 = d1 * v169;
-    const V v195 = v194 + v187;
-    const V v196 = d1 * v171;
-    const V v197 = v196 + v177;
-    const V v198 = d1 * v153;
-    const V v199 = v198 + v189;
-    const V v200 = d4 * v161;
-    const V v201 = v200 + v191;
-    const V v202 = d4 * v163;
-    const V v203 = v202 + v193;
-    const V v204 = d5 * v161;
-    const V v205 = v204 + v195;
-    const V v206 = d5 * v163;
-    const V v207 = v206 + v197;
-    const V v208 = d5 * v154;
-    const V v209 = v208 + v199;
-    const V v210 = v201 * v207;
-    const V v211 = v209 * v209;
-    const V v212 = v203 * v205;
-    const V v213 = v210 - v212;
-    const V v214 = v211 * v213;
-    const V v215 = v213 * v214;
-    const V v216 = softehl_vlog(v215);
-    const V v217 = v215 - v216;
-    const V v218 = 0.5 * v217;
-    const V v219 = (-0.5) + v218;
-    const V v220 = v142 * v219;
-    V s221 = softehl_splat(0.0);
+    const V v91 = 1.0 / s40, v92 = s41 * v91, v93 = v91 * s42, v94 = v91 * s43, v95 = v91 * s44,
+        v96 = s37 * v91, v97 = s38 * v91, v98 = s39 * v91, v99 = v96 - v98, v100 = v96 + v98,
+        v101 = v28 + v33 * v94, v102 = v33 * v95 - v29, v103 = v30 + v36 * v94,
+        v104 = v31 + v36 * v95, v105 = v29 + v34 * v95, v106 = v34 * v94 - v28,
+        v107 = v26 + v35 * v94, v108 = v27 + v35 * v95,
+        v109 = d1 * (v99 - v97) + (d3 * (v97 + v99) + (1.0 + d7 * (v100 - v97))),
+        v110 = d5 * (v97 + v100) + v109,
+        v111 = (d4 * v103 + (d0 * v107 + (d2 * v101 + (1.0 + d6 * v106)))) * (d5 * v104 + (d1 * v108 + (d7 * v105 + (1.0 + d3 * v102)))),
+        v112 = (d4 * v104 + (d0 * v108 + (d2 * v102 + d6 * v105))) * (d5 * v103 + (d1 * v107 + (d3 * v101 + d7 * v106))),
+        v113 = v111 - v112, v114 = v113 * (v110 * v110 * v113), v115 = softehl_vlog(v114),
+        v116 = v1 * s40 * ((-0.5) + 0.5 * (v114 - v115));
+    V s117 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v222 = w[2] * v4;
-        const double v223 = 1.0 - w[0];
-        const double v224 = 1.0 + w[0];
-        const double v225 = 0.25 * w[0];
-        const double v226 = 1.0 - w[1];
-        const double v227 = 1.0 + w[1];
-        const double v228 = 0.25 * w[1];
-        const double v229 = 0.25 + v225;
-        const double v230 = 0.25 - v225;
-        const double v231 = 0.25 * v227;
-        const V v232 = w[0] - v143;
-        const double v233 = 0.25 - v228;
-        const double v234 = 0.25 + v228;
-        const V v235 = w[1] - v144;
-        const double v236 = v225 - 0.25;
-        const V v237 = X6 * v230;
-        const V v238 = X7 * v230;
-        const V v239 = X7 * v223;
-        const double v240 = v228 - 0.25;
-        const V v241 = X2 * v233;
-        const V v242 = v30 * v232;
-        const V v243 = v35 * v235;
-        const V v244 = X3 * v233;
-        const V v245 = v229 * v7;
-        const V v246 = v237 + v245;
-        const V v247 = v229 * v14;
-        const V v248 = v238 + v247;
-        const V v249 = v234 * v9;
-        const V v250 = v241 + v249;
-        const V v251 = v234 * v18;
-        const V v252 = v244 + v251;
-        const V v253 = X1 * v223;
-        const V v254 = X3 * v224;
-        const V v255 = v253 + v254;
-        const V v256 = X5 * v224;
-        const V v257 = v256 + v239;
-        const V v258 = X1 * v240;
-        const V v259 = v258 + v252;
-        const V v260 = X0 * v240;
-        const V v261 = v260 + v250;
-        const V v262 = X1 * v236;
-        const V v263 = v262 + v248;
-        const V v264 = X0 * v236;
-        const V v265 = v264 + v246;
-        const V v266 = 0.25 * v255;
-        const V v267 = v231 * v257;
-        const V v268 = v261 * v263;
-        const V v269 = v226 * v266;
-        const V v270 = v267 + v269;
-        const V v271 = v259 * v265;
-        const V v272 = v268 - v271;
-        const V v273 = v270 * v272;
-        const V v274 = v20 * v232;
-        const V v275 = v48 * v232;
-        const V v276 = v148 + v275;
-        const V v277 = v48 * v235;
-        const V v278 = v149 + v277;
-        const V v279 = v16 * v235;
-        const V v280 = v274 - v279;
-        const V v281 = v243 - v242;
-        const V v282 = v243 + v242;
-        const V v283 = v49 * v282;
-        const V v284 = v147 - v283;
-        const V v285 = v47 * v280;
-        const V v286 = v146 + v285;
-        const V v287 = v47 * v281;
-        const V v288 = v145 + v287;
-        const V v289 = v222 * v273;
-        const V v290 = v278 - v284;
-        const V v291 = v278 + v284;
-        const V v292 = v68 * v286;
-        const V v293 = v55 + v292;
-        const V v294 = v68 * v288;
-        const V v295 = v54 + v294;
-        const V v296 = v60 * v286;
-        const V v297 = v53 + v296;
-        const V v298 = v60 * v288;
-        const V v299 = v298 - v52;
-        const V v300 = v59 * v288;
-        const V v301 = v52 + v300;
-        const V v302 = v59 * v286;
-        const V v303 = v302 - v53;
-        const V v304 = v276 + v290;
-        const V v305 = v276 - v290;
-        const V v306 = v276 + v291;
-        const V v307 = v291 - v276;
-        const V v308 = v64 * v288;
-        const V v309 = v50 + v308;
-        const V v310 = v64 * v286;
-        const V v311 = v51 + v310;
-        const V v312 = d2 * v303;
-        const V v313 = d2 * v301;
-        const V v314 = 1.0 + v313;
-        const V v315 = d3 * v301;
-        const V v316 = d3 * v303;
-        const V v317 = 1.0 + v316;
-        const V v318 = d3 * v305;
-        const V v319 = 1.0 + v318;
-        const V v320 = d0 * v311;
-        const V v321 = v320 + v312;
-        const V v322 = d0 * v309;
-        const V v323 = v322 + v314;
-        const V v324 = d1 * v309;
-        const V v325 = v324 + v315;
-        const V v326 = d1 * v311;
-        const V v327 = v326 + v317;
-        const V v328 = d1 * v304;
-        const V v329 = v319 - v328;
-        const V v330 = d4 * v295;
-        const V v331 = v330 + v323;
-        const V v332 = d4 * v293;
-        const V v333 = v332 + v321;
-        const V v334 = d5 * v295;
-        const V v335 = v334 + v325;
-        const V v336 = d5 * v293;
-        const V v337 = v336 + v327;
-        const V v338 = d5 * v306;
-        const V v339 = v338 + v329;
-        const V v340 = d6 * v299;
-        const V v341 = v340 + v331;
-        const V v342 = d6 * v297;
-        const V v343 = v342 + v333;
-        const V v344 = d7 * v299;
-        const V v345 = v344 + v335;
-        const V v346 = d7 * v297;
-        const V v347 = v346 + v337;
-        const V v348 = d7 * v307;
-        const V v349 = v348 + v339;
-        const V v350 = v349 * v349;
-        const V v351 = v341 * v341;
-        const V v352 = v341 * v347;
-        const V v353 = v347 * v347;
-        const V v354 = v351 + v353;
-        const V v355 = v343 * v345;
-        const V v356 = v352 - v355;
-        const V v357 = v356 * v356;
-        const V v358 = v343 * v343;
-        const V v359 = v358 + v354;
-        const V v360 = v345 * v345;
-        const V v361 = v360 + v359;
-        const V v362 = v350 + v361;
-        const V v363 = v350 * v357;
-        const V v364 = softehl_vrcbrt(v363);
-        const V v365 = v362 * v364;
-        const V v366 = (-3.0) + v365;
-        const V v367 = v3 * v366;
-        const V v368 = 1.0 - v367;
-        const V v369 = softehl_vlog(v368);
-        const V v370 = v289 * v369;
-        s221 += v370;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v118 = 1.0 - w[0], v119 = 1.0 + w[0], v120 = 0.25 * w[0], v121 = 1.0 - w[1],
+            v122 = 1.0 + w[1], v123 = 0.25 * w[1], v124 = 0.25 + v120, v125 = 0.25 - v120,
+            v126 = 0.25 * v122;
+        const V v127 = w[0] - v92;
+        const double v128 = 0.25 - v123, v129 = 0.25 + v123;
+        const V v130 = w[1] - v93; const double v131 = v120 - 0.25;
+        const V v132 = X6 * v125, v133 = X7 * v125, v134 = X7 * v118;
+        const double v135 = v123 - 0.25;
+        const V v136 = X2 * v128, v137 = v19 * v127, v138 = v22 * v130, v139 = X3 * v128,
+            v140 = v124 * v5, v141 = v124 * v10, v142 = v129 * v6, v143 = v129 * v14,
+            v144 = X1 * v118, v145 = X3 * v119, v146 = v144 + v145, v147 = X5 * v119,
+            v148 = v147 + v134, v149 = X1 * v135, v150 = v149 + (v139 + v143), v151 = X0 * v135,
+            v152 = v151 + (v136 + v142), v153 = X1 * v131, v154 = v153 + (v133 + v141),
+            v155 = X0 * v131, v156 = v155 + (v132 + v140), v157 = 0.25 * v146, v158 = v126 * v148,
+            v159 = v121 * v157, v160 = v158 + v159, v161 = v152 * v154 - v150 * v156,
+            v162 = v160 * v161, v163 = v97 + v24 * v127, v164 = v98 + v24 * v130,
+            v165 = v96 - v25 * (v138 + v137), v166 = v95 + v23 * (v16 * v127 - v12 * v130),
+            v167 = v94 + v23 * (v138 - v137), v168 = v164 - v165, v169 = v164 + v165,
+            v170 = v31 + v36 * v166, v171 = v30 + v36 * v167, v172 = v29 + v34 * v166,
+            v173 = v34 * v167 - v28, v174 = v28 + v33 * v167, v175 = v33 * v166 - v29,
+            v176 = v26 + v35 * v167, v177 = v27 + v35 * v166,
+            v178 = d5 * (v163 + v169) + (1.0 + d3 * (v163 - v168) - d1 * (v163 + v168)),
+            v179 = d6 * v173 + (d4 * v171 + (d0 * v176 + (1.0 + d2 * v174))),
+            v180 = d6 * v172 + (d4 * v170 + (d0 * v177 + d2 * v175)),
+            v181 = d7 * v173 + (d5 * v171 + (d1 * v176 + d3 * v174)),
+            v182 = d7 * v172 + (d5 * v170 + (d1 * v177 + (1.0 + d3 * v175))),
+            v183 = d7 * (v169 - v163) + v178, v184 = v183 * v183, v185 = v179 * v182 - v180 * v181,
+            v186 = v184 + (v181 * v181 + (v180 * v180 + (v179 * v179 + v182 * v182))),
+            v187 = softehl_vrcbrt(v184 * (v185 * v185)),
+            v188 = softehl_vlog(1.0 - v2 * ((-3.0) + v186 * v187)), v189 = w[2] * v3 * v162 * v188;
+        s117 += v189;
     }
-    const V v371 = v220 - s221;
-    const V v372 = 6.283185307179586 * v371;
-    softehl_store1(R + 0, 1, v372);
+    softehl_store1(R + 0, 1, 6.283185307179586 * (v116 - s117));
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_gent_energy, 8, 8, 0, 0, 1, 0)
 
-void softehl_solid_taylor_mean_gent_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_gent_residual)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_gent_energy_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 1 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_gent_energy_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 1 * (n - SOFTEHL_LANES), 0);
-        return;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 1.5707963267948966 * parameters[2], v2 = 1.0 / parameters[1];
+    const V v3 = X0 - X2, v4 = X4 - X2, v5 = X4 - X6, v6 = X6 + (X4 - X0 - X2), v7 = v3 + v5,
+        v8 = 0.25 * v6, v9 = 0.0625 * v6, v10 = v5 - v3, v11 = X1 - X3, v12 = X1 + X3,
+        v13 = X5 - X3, v14 = X5 - X7, v15 = X5 + X7, v16 = 0.25 * v10, v17 = 0.0625 * v10;
+    const double v18 = 6.283185307179586 * (v2 * (parameters[1] * (0.5 * parameters[0])));
+    const V v19 = v14 - v11, v20 = v15 - v12, v21 = 0.25 * (v12 + v15), v22 = 0.25 * v19,
+        v23 = 0.0625 * v19, v24 = 0.25 * v20, v25 = 0.0625 * v20, v26 = d0 - d2,
+        v27 = 1.0 / (v16 * v24 - v22 * v8), v28 = d0 + d2 - d4 - d6, v29 = d4 - d6, v30 = d1 + d3,
+        v31 = d1 - d3, v32 = d5 + d7, v33 = d5 - d7, v34 = v26 - v29, v35 = v26 + v29,
+        v36 = 0.25 * (1.0 / v21), v37 = v30 - v32, v38 = v30 + v32, v39 = v31 - v33,
+        v40 = v31 + v33, v41 = 0.25 * (1.0 / (v21 * v21)), v42 = v23 * v27, v43 = v25 * v27,
+        v44 = v27 * (v7 * v23), v45 = v27 * (v7 * v25), v46 = (v11 + v14) * v27, v47 = v27 * v9,
+        v48 = v17 * v27, v49 = v9 * v46, v50 = v17 * v46, v51 = 0.25 * v45 - 0.25 * v49,
+        v52 = v37 * v42 - v39 * v43, v53 = 1.0 - v37 * v48 + v39 * v47, v54 = v34 * v47 - v28 * v48,
+        v55 = 1.0 - v34 * v43 + v28 * v42, v56 = 0.25 * v50 - 0.25 * v44;
+    V s57 = {0}, s58 = {0}, s59 = {0}, s60 = {0}, s61 = {0}, s62 = {0}, s63 = {0}, s64 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v65 = 1.0 - w[1], v66 = 1.0 + w[1], v67 = 0.25 * w[1], v68 = 1.0 - w[0],
+            v69 = 1.0 + w[0], v70 = 0.25 * w[0], v71 = 0.25 * v66, v72 = 0.25 - v67,
+            v73 = 0.25 + v67, v74 = 0.25 + v70, v75 = 0.25 - v70;
+        const V v76 = X5 * v69; const double v77 = v67 - 0.25;
+        const V v78 = X3 * v69, v79 = X3 * v72, v80 = X2 * v72;
+        const double v81 = v70 - 0.25;
+        const V v82 = X6 * v75, v83 = X7 * v75, v84 = X7 * v68, v85 = v76 + v84, v86 = X1 * v68,
+            v87 = v86 + v78, v88 = v71 * v85, v89 = X1 * v77, v90 = X1 * v81, v91 = X0 * v77,
+            v92 = X0 * v81, v93 = 0.25 * v87, v94 = v65 * v93, v95 = v88 + v94, v96 = v73 * v14,
+            v97 = v96 + (v79 + v89), v98 = v73 * v5, v99 = v98 + (v80 + v91), v100 = v74 * v13,
+            v101 = v100 + (v83 + v90), v102 = v74 * v4, v103 = v102 + (v82 + v92);
+        const double v104 = w[1] * w[2];
+        const V v105 = v99 * v101 - v103 * v97, v106 = w[2] * v95, v107 = v95 * v105,
+            v108 = 0.25 * v105;
+        s63 += v106 * (w[1] * v101 - w[0] * v97); s64 += v106 * (w[0] * v99 - w[1] * v103);
+        const V v109 = w[2] * v108; s57 += v109; s59 += v104 * v108; const V v110 = w[2] * v107;
+        s60 += v110; s62 += v104 * v107; s58 += w[0] * v109; s61 += w[0] * v110;
     }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 1];
-    softehl_solid_taylor_mean_gent_energy(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 1 * n; ++i) values[i] = R[i];
-#endif
+    const V v111 = 1.0 / s60, v112 = s61 * v111, v113 = v111 * s62, v114 = v111 * s63,
+        v115 = 0.25 * v114, v116 = v111 * s64, v117 = 0.25 * v116, v118 = s57 * v111,
+        v119 = s58 * v111, v120 = s59 * v111, v121 = v49 * v115, v122 = v49 * v117,
+        v123 = v50 * v115, v124 = v50 * v117, v125 = v44 * v115, v126 = v44 * v117,
+        v127 = v123 - v125, v128 = v124 - v126, v129 = v45 * v115, v130 = v45 * v117,
+        v131 = v129 - v121, v132 = v130 - v122, v133 = 1.0 + v118 * v38 - v120 * v37 - v119 * v39,
+        v134 = v133 * v133, v135 = v37 * v127 + (v39 * v131 + (v52 + v40 * v115)),
+        v136 = v37 * v128 + (v39 * v132 + (v53 + v40 * v117)),
+        v137 = v34 * v131 + (v28 * v127 + (v55 + v35 * v115)),
+        v138 = v34 * v132 + (v28 * v128 + (v54 + v35 * v117)), v139 = v137 * v136 - v138 * v135,
+        v140 = v139 * v139, v141 = s60 * v1 * (1.0 - 1.0 / (v134 * v140)),
+        v142 = v134 * (2.0 * v139) * v141, v143 = 2.0 * v133 * v140 * v141, v144 = v135 * v142,
+        v145 = v138 * v142, v146 = v136 * v142, v147 = v137 * v142, v148 = v119 * v143,
+        v149 = v120 * v143, v150 = v118 * v143, v151 = v117 * v147, v152 = v117 * v144,
+        v153 = v115 * v146, v154 = v115 * v145, v155 = v128 * v147 + (v125 - v123) * v145,
+        v156 = v132 * v147 + (v121 - v129) * v145, v157 = v127 * v146 + (v126 - v124) * v144,
+        v158 = v131 * v146 + (v122 - v130) * v144;
+    V s159 = {0}, s160 = {0}, s161 = {0}, s162 = {0}, s163 = {0}, s164 = {0}, s165 = {0},
+        s166 = {0}, s167 = {0}, s168 = {0}, s169 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v170 = 1.0 - w[0], v171 = 1.0 + w[0], v172 = 0.25 * w[0], v173 = 1.0 - w[1],
+            v174 = 1.0 + w[1], v175 = 0.25 * w[1], v176 = 0.25 + v172, v177 = 0.25 - v172,
+            v178 = 0.25 * v174;
+        const V v179 = w[0] - v112;
+        const double v180 = 0.25 - v175, v181 = 0.25 + v175;
+        const V v182 = w[1] - v113; const double v183 = v172 - 0.25;
+        const V v184 = X6 * v177, v185 = X7 * v177, v186 = X7 * v170;
+        const double v187 = v175 - 0.25;
+        const V v188 = v22 * v179, v189 = X2 * v180, v190 = v24 * v182, v191 = X3 * v180,
+            v192 = v176 * v4, v193 = v176 * v13, v194 = X1 * v170, v195 = v181 * v5,
+            v196 = v181 * v14, v197 = X3 * v171, v198 = v194 + v197, v199 = X5 * v171,
+            v200 = v199 + v186, v201 = X1 * v187, v202 = v201 + (v191 + v196), v203 = X1 * v183,
+            v204 = v203 + (v185 + v193), v205 = X0 * v187, v206 = v205 + (v189 + v195),
+            v207 = X0 * v183, v208 = v207 + (v184 + v192), v209 = 0.25 * v198, v210 = v178 * v200,
+            v211 = v206 * v204 - v202 * v208, v212 = v173 * v209, v213 = v210 + v212,
+            v214 = v119 + v36 * v179, v215 = v120 + v36 * v182, v216 = v213 * v211,
+            v217 = v118 - v41 * (v190 + v188), v218 = v116 + v27 * (v16 * v179 - v8 * v182),
+            v219 = v114 + v27 * (v190 - v188), v220 = 0.25 * v218, v221 = 0.25 * v219,
+            v222 = v218 * v56, v223 = v219 * v56, v224 = v218 * v51, v225 = v219 * v51,
+            v226 = 1.0 + v217 * v38 - v215 * v37 - v214 * v39,
+            v227 = v39 * v224 + (v37 * v222 + (v53 + v40 * v220)),
+            v228 = v39 * v225 + (v37 * v223 + (v52 + v40 * v221)), v229 = v226 * v226,
+            v230 = v34 * v224 + (v28 * v222 + (v54 + v35 * v220)),
+            v231 = v34 * v225 + (v28 * v223 + (v55 + v35 * v221)), v232 = v231 * v227 - v230 * v228,
+            v233 = v232 * v232,
+            v234 = v228 * v228 + (v230 * v230 + (v231 * v231 + (v229 + v227 * v227))),
+            v235 = softehl_vrcbrt(v229 * v233), v236 = v235 * v235,
+            v237 = v216 * (w[2] * v18) * (1.0 / (1.0 - v2 * ((-3.0) + v235 * v234))),
+            v238 = v235 * v237, v239 = v236 * (v236 * (0.3333333333333333 * v234 * v237)),
+            v240 = v229 * (2.0 * v232) * v239, v241 = v228 * v240 + 2.0 * v230 * v238;
+        s162 += v241; const V v242 = v230 * v240 + 2.0 * v228 * v238; s161 += v242;
+        const V v243 = 2.0 * v231 * v238 - v227 * v240; s163 += v243;
+        const V v244 = 2.0 * v226 * (v238 - v233 * v239), v245 = 2.0 * v227 * v238 - v231 * v240;
+        s160 += v245; const V v246 = v217 * v244; s159 += v246; s168 += v224 * v241;
+        s168 += v225 * v243; s165 += v224 * v245; s165 += v225 * v242; s165 -= v214 * v244;
+        s166 += v222 * v245; s166 -= v215 * v244; s166 += v223 * v242; s169 += v222 * v241;
+        s169 += v223 * v243; s164 += v220 * v245; s164 += v221 * v242; s167 += v220 * v241;
+        s167 += v221 * v243;
+    }
+    const V v247 = v146 + s163, v248 = v147 + s160, v249 = v150 + s159, v250 = s161 - v145,
+        v251 = v153 + s167, v252 = s162 - v144, v253 = s164 + (v151 - v154), v254 = v249 - v253,
+        v255 = v249 + v253, v256 = v251 - v152,
+        v257 = v42 * v250 + (v155 + (s166 - v149) - v48 * v248),
+        v258 = v42 * v247 + (s169 + v157 - v48 * v252),
+        v259 = v47 * v248 + (v156 + (s165 - v148)) - v43 * v250,
+        v260 = v47 * v252 + (s168 + v158) - v43 * v247, v261 = v257 + v259, v262 = v258 + v260,
+        v263 = v259 - v257, v264 = v260 - v258, v265 = v254 - v263, v266 = v254 + v263,
+        v267 = v255 + v261, v268 = v255 - v261, v269 = v152 - v251 - v264, v270 = v256 + v262;
+    softehl_store4(R + 0, 8, v270, v267, v269, v265);
+    const V v271 = v256 - v262, v272 = v264 - v256;
+    softehl_store4(R + 4, 8, v271, v268, v272, v266);
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_gent_residual, 8, 8, 0, 0, 8, 0)
 
-static void softehl_solid_taylor_mean_gent_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_gent_tangent)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 1.5707963267948966 * parameters[2];
-    const double v3 = 1.0 / parameters[1];
-    const double v4 = parameters[1] * v1;
-    const V v5 = X4 - X0;
-    const V v6 = X0 - X2;
-    const V v7 = X4 - X2;
-    const V v8 = v5 - X2;
-    const V v9 = X4 - X6;
-    const V v10 = X6 + v8;
-    const V v11 = v6 + v9;
-    const V v12 = 0.25 * v10;
-    const V v13 = 0.0625 * v10;
-    const V v14 = v9 - v6;
-    const double v15 = v3 * v4;
-    const V v16 = X1 - X3;
-    const V v17 = X1 + X3;
-    const V v18 = X5 - X3;
-    const V v19 = X5 - X7;
-    const V v20 = X5 + X7;
-    const V v21 = 0.25 * v14;
-    const V v22 = 0.0625 * v14;
-    const double v23 = 6.283185307179586 * v15;
-    const V v24 = v16 + v19;
-    const V v25 = v17 + v20;
-    const V v26 = v19 - v16;
-    const V v27 = v20 - v17;
-    const V v28 = 0.25 * v25;
-    const V v29 = 0.25 * v26;
-    const V v30 = 0.0625 * v26;
-    const V v31 = 0.25 * v27;
-    const V v32 = 0.0625 * v27;
-    const V v33 = v21 * v31;
-    const V v34 = d0 - d2;
-    const V v35 = d0 + d2;
-    const V v36 = 1.0 / v28;
-    const V v37 = v28 * v28;
-    const V v38 = v29 * v12;
-    const V v39 = v33 - v38;
-    const V v40 = v11 * v30;
-    const V v41 = v11 * v32;
-    const V v42 = 1.0 / v37;
-    const V v43 = 1.0 / v39;
-    const V v44 = v35 - d4;
-    const V v45 = v44 - d6;
-    const V v46 = d4 - d6;
-    const V v47 = d1 + d3;
-    const V v48 = d1 - d3;
-    const V v49 = d5 + d7;
-    const V v50 = d5 - d7;
-    const V v51 = v34 - v46;
-    const V v52 = v34 + v46;
-    const V v53 = 0.25 * v36;
-    const V v54 = v47 - v49;
-    const V v55 = v47 + v49;
-    const V v56 = v48 - v50;
-    const V v57 = v48 + v50;
-    const V v58 = 0.25 * v42;
-    const V v59 = v30 * v43;
-    const V v60 = v32 * v43;
-    const V v61 = v43 * v40;
-    const V v62 = v43 * v41;
-    const V v63 = v24 * v43;
-    const V v64 = v43 * v13;
-    const V v65 = v22 * v43;
-    const V v66 = v13 * v63;
-    const V v67 = v22 * v63;
-    const V v68 = 0.25 * v62;
-    const V v69 = v54 * v59;
-    const V v70 = v54 * v65;
-    const V v71 = 1.0 - v70;
-    const V v72 = 0.25 * v66;
-    const V v73 = v68 - v72;
-    const V v74 = v51 * v64;
-    const V v75 = v51 * v60;
-    const V v76 = 1.0 - v75;
-    const V v77 = v56 * v60;
-    const V v78 = v69 - v77;
-    const V v79 = v56 * v64;
-    const V v80 = v71 + v79;
-    const V v81 = 0.25 * v67;
-    const V v82 = v45 * v65;
-    const V v83 = v74 - v82;
-    const V v84 = v45 * v59;
-    const V v85 = v76 + v84;
-    const V v86 = 0.25 * v61;
-    const V v87 = v81 - v86;
-    V s88 = softehl_splat(0.0);
-    V s89 = softehl_splat(0.0);
-    V s90 = softehl_splat(0.0);
-    V s91 = softehl_splat(0.0);
-    V s92 = softehl_splat(0.0);
-    V s93 = softehl_splat(0.0);
-    V s94 = softehl_splat(0.0);
-    V s95 = softehl_splat(0.0);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 1.5707963267948966 * parameters[2], v2 = 1.0 / parameters[1];
+    const V v3 = X0 - X2, v4 = X4 - X2, v5 = X4 - X6, v6 = X6 + (X4 - X0 - X2);
+    const double v7 = 6.283185307179586 * (parameters[1] * (0.5 * parameters[0]));
+    const V v8 = v3 + v5, v9 = 0.25 * v6, v10 = 0.0625 * v6, v11 = v5 - v3, v12 = X1 - X3,
+        v13 = X1 + X3;
+    const double v14 = v2 * v2;
+    const V v15 = X5 - X3, v16 = 0.25 * v11, v17 = 0.0625 * v11, v18 = X5 - X7, v19 = X5 + X7,
+        v20 = v18 - v12, v21 = d0 - d2, v22 = v19 - v13, v23 = 0.25 * (v13 + v19), v24 = 0.25 * v20,
+        v25 = 0.0625 * v20, v26 = 0.25 * v22, v27 = 0.0625 * v22, v28 = d1 + d3, v29 = d1 - d3,
+        v30 = 1.0 / (v16 * v26 - v24 * v9), v31 = d0 + d2 - d4 - d6, v32 = d4 - d6, v33 = v21 + v32,
+        v34 = v21 - v32, v35 = d5 + d7, v36 = d5 - d7, v37 = v28 - v35, v38 = v28 + v35,
+        v39 = v29 - v36, v40 = v29 + v36, v41 = 0.25 * (1.0 / v23),
+        v42 = 0.25 * (1.0 / (v23 * v23)), v43 = v25 * v30, v44 = v27 * v30, v45 = v30 * (v8 * v25),
+        v46 = v30 * (v8 * v27), v47 = (v12 + v18) * v30, v48 = v30 * v10, v49 = v17 * v30,
+        v50 = v10 * v47, v51 = v17 * v47, v52 = 0.25 * v46 - 0.25 * v50,
+        v53 = v37 * v43 - v39 * v44, v54 = 1.0 + v39 * v48 - v37 * v49,
+        v55 = 0.25 * v51 - 0.25 * v45, v56 = 1.0 - v34 * v44 + v31 * v43,
+        v57 = v34 * v48 - v31 * v49;
+    V s58 = {0}, s59 = {0}, s60 = {0}, s61 = {0}, s62 = {0}, s63 = {0}, s64 = {0}, s65 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v96 = 1.0 - w[1];
-        const double v97 = 1.0 + w[1];
-        const double v98 = 0.25 * w[1];
-        const double v99 = 1.0 - w[0];
-        const double v100 = 1.0 + w[0];
-        const double v101 = 0.25 * w[0];
-        const double v102 = 0.25 * v97;
-        const double v103 = 0.25 - v98;
-        const double v104 = 0.25 + v98;
-        const double v105 = 0.25 + v101;
-        const double v106 = 0.25 - v101;
-        const V v107 = X5 * v100;
-        const double v108 = v98 - 0.25;
-        const V v109 = X3 * v100;
-        const V v110 = X3 * v103;
-        const V v111 = X2 * v103;
-        const double v112 = v101 - 0.25;
-        const V v113 = X6 * v106;
-        const V v114 = X7 * v106;
-        const V v115 = X7 * v99;
-        const V v116 = v107 + v115;
-        const V v117 = X1 * v99;
-        const V v118 = v117 + v109;
-        const V v119 = v102 * v116;
-        const V v120 = X1 * v108;
-        const V v121 = v110 + v120;
-        const V v122 = X1 * v112;
-        const V v123 = v114 + v122;
-        const V v124 = X0 * v108;
-        const V v125 = v111 + v124;
-        const V v126 = X0 * v112;
-        const V v127 = v113 + v126;
-        const V v128 = 0.25 * v118;
-        const V v129 = v96 * v128;
-        const V v130 = v119 + v129;
-        const V v131 = v104 * v19;
-        const V v132 = v131 + v121;
-        const V v133 = v104 * v9;
-        const V v134 = v133 + v125;
-        const V v135 = v105 * v18;
-        const V v136 = v135 + v123;
-        const V v137 = v105 * v7;
-        const V v138 = v137 + v127;
-        const double v139 = w[1] * w[2];
-        const V v140 = w[0] * v134;
-        const V v141 = v134 * v136;
-        const V v142 = w[1] * v136;
-        const V v143 = w[1] * v138;
-        const V v144 = v140 - v143;
-        const V v145 = v138 * v132;
-        const V v146 = v141 - v145;
-        const V v147 = w[0] * v132;
-        const V v148 = v142 - v147;
-        const V v149 = w[2] * v130;
-        const V v150 = v130 * v146;
-        const V v151 = 0.25 * v146;
-        const V v152 = v149 * v148;
-        s94 += v152;
-        const V v153 = v149 * v144;
-        s95 += v153;
-        const V v154 = w[2] * v151;
-        s88 += v154;
-        const V v155 = v139 * v151;
-        s90 += v155;
-        const V v156 = w[2] * v150;
-        s91 += v156;
-        const V v157 = v139 * v150;
-        s93 += v157;
-        const V v158 = w[0] * v154;
-        s89 += v158;
-        const V v159 = w[0] * v156;
-        s92 += v159;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v66 = 1.0 - w[1], v67 = 1.0 + w[1], v68 = 0.25 * w[1], v69 = 1.0 - w[0],
+            v70 = 1.0 + w[0], v71 = 0.25 * w[0], v72 = 0.25 * v67, v73 = 0.25 - v68,
+            v74 = 0.25 + v68, v75 = 0.25 + v71, v76 = 0.25 - v71;
+        const V v77 = X5 * v70; const double v78 = v68 - 0.25;
+        const V v79 = X3 * v70, v80 = X3 * v73, v81 = X2 * v73;
+        const double v82 = v71 - 0.25;
+        const V v83 = X6 * v76, v84 = X7 * v76, v85 = X7 * v69, v86 = v77 + v85, v87 = X1 * v69,
+            v88 = v87 + v79, v89 = v72 * v86, v90 = X1 * v78, v91 = X1 * v82, v92 = v84 + v91,
+            v93 = X0 * v78, v94 = X0 * v82, v95 = v83 + v94, v96 = 0.25 * v88, v97 = v66 * v96,
+            v98 = v89 + v97, v99 = v74 * v18, v100 = v99 + (v80 + v90), v101 = v74 * v5,
+            v102 = v101 + (v81 + v93), v103 = v75 * v15, v104 = v103 + v92, v105 = v75 * v4,
+            v106 = v105 + v95;
+        const double v107 = w[1] * w[2];
+        const V v108 = v102 * v104 - v106 * v100, v109 = w[2] * v98, v110 = v98 * v108,
+            v111 = 0.25 * v108;
+        s64 += v109 * (w[1] * v104 - w[0] * v100); s65 += v109 * (w[0] * v102 - w[1] * v106);
+        const V v112 = w[2] * v111; s58 += v112; s60 += v107 * v111; const V v113 = w[2] * v110;
+        s61 += v113; s63 += v107 * v110; s59 += w[0] * v112; s62 += w[0] * v113;
     }
-    const V v160 = 1.0 / s91;
-    const V v161 = s91 * v2;
-    const V v162 = s92 * v160;
-    const V v163 = v160 * s93;
-    const V v164 = v160 * s94;
-    const V v165 = 0.25 * v164;
-    const V v166 = v160 * s95;
-    const V v167 = 0.25 * v166;
-    const V v168 = s88 * v160;
-    const V v169 = s89 * v160;
-    const V v170 = s90 * v160;
-    const V v171 = v168 * v55;
-    const V v172 = 1.0 + v171;
-    const V v173 = v66 * v165;
-    const V v174 = v66 * v167;
-    const V v175 = v67 * v165;
-    const V v176 = v67 * v167;
-    const V v177 = v61 * v165;
-    const V v178 = v61 * v167;
-    const V v179 = v175 - v177;
-    const V v180 = v177 - v175;
-    const V v181 = v176 - v178;
-    const V v182 = v178 - v176;
-    const V v183 = v62 * v165;
-    const V v184 = v62 * v167;
-    const V v185 = v173 - v183;
-    const V v186 = v183 - v173;
-    const V v187 = v174 - v184;
-    const V v188 = v184 - v174;
-    const V v189 = v170 * v54;
-    const V v190 = v172 - v189;
-    const V v191 = v169 * v56;
-    const V v192 = v190 - v191;
-    const V v193 = 2.0 * v192;
-    const V v194 = v192 * v192;
-    const V v195 = v52 * v165;
-    const V v196 = v85 + v195;
-    const V v197 = v52 * v167;
-    const V v198 = v83 + v197;
-    const V v199 = v57 * v165;
-    const V v200 = v78 + v199;
-    const V v201 = v57 * v167;
-    const V v202 = v80 + v201;
-    const V v203 = v56 * v186;
-    const V v204 = v203 + v200;
-    const V v205 = v56 * v188;
-    const V v206 = v205 + v202;
-    const V v207 = v54 * v179;
-    const V v208 = v207 + v204;
-    const V v209 = v54 * v181;
-    const V v210 = v209 + v206;
-    const V v211 = v45 * v179;
-    const V v212 = v211 + v196;
-    const V v213 = v45 * v181;
-    const V v214 = v213 + v198;
-    const V v215 = v51 * v186;
-    const V v216 = v215 + v212;
-    const V v217 = v51 * v188;
-    const V v218 = v217 + v214;
-    const V v219 = v216 * v210;
-    const V v220 = v218 * v208;
-    const V v221 = v219 - v220;
-    const V v222 = 2.0 * v221;
-    const V v223 = v221 * v221;
-    const V v224 = v194 * v222;
-    const V v225 = v194 * v223;
-    const V v226 = v193 * v223;
-    const V v227 = 1.0 / v225;
-    const V v228 = 1.0 - v227;
-    const V v229 = v161 * v228;
-    const V v230 = v224 * v229;
-    const V v231 = v226 * v229;
-    const V v232 = v208 * v230;
-    const V v233 = v218 * v230;
-    const V v234 = v210 * v230;
-    const V v235 = v216 * v230;
-    const V v236 = v169 * v231;
-    const V v237 = v170 * v231;
-    const V v238 = v168 * v231;
-    const V v239 = v181 * v235;
-    const V v240 = v188 * v235;
-    const V v241 = v167 * v235;
-    const V v242 = v167 * v232;
-    const V v243 = v179 * v234;
-    const V v244 = v186 * v234;
-    const V v245 = v165 * v234;
-    const V v246 = v165 * v233;
-    const V v247 = v180 * v233;
-    const V v248 = v239 + v247;
-    const V v249 = v185 * v233;
-    const V v250 = v240 + v249;
-    const V v251 = v182 * v232;
-    const V v252 = v243 + v251;
-    const V v253 = v187 * v232;
-    const V v254 = v244 + v253;
-    V s255 = softehl_splat(0.0);
-    V s256 = softehl_splat(0.0);
-    V s257 = softehl_splat(0.0);
-    V s258 = softehl_splat(0.0);
-    V s259 = softehl_splat(0.0);
-    V s260 = softehl_splat(0.0);
-    V s261 = softehl_splat(0.0);
-    V s262 = softehl_splat(0.0);
-    V s263 = softehl_splat(0.0);
-    V s264 = softehl_splat(0.0);
-    V s265 = softehl_splat(0.0);
+    const V v114 = 1.0 / s61, v115 = s61 * v1, v116 = s62 * v114, v117 = v114 * s63,
+        v118 = v114 * s64, v119 = 0.25 * v118, v120 = v114 * s65, v121 = 0.25 * v120,
+        v122 = s58 * v114, v123 = s59 * v114, v124 = s60 * v114, v125 = v50 * v119,
+        v126 = v50 * v121, v127 = v51 * v119, v128 = v51 * v121, v129 = v45 * v119,
+        v130 = v45 * v121, v131 = v127 - v129, v132 = v129 - v127, v133 = v128 - v130,
+        v134 = v130 - v128, v135 = v133 - v49, v136 = v46 * v119, v137 = v46 * v121,
+        v138 = v125 - v136, v139 = v136 - v125, v140 = v126 - v137, v141 = v137 - v126,
+        v142 = 1.0 + v122 * v38 - v124 * v37 - v123 * v39, v143 = 2.0 * v142, v144 = v142 * v142,
+        v145 = v44 + v138, v146 = v48 - v140, v147 = v123 * v143, v148 = v43 + v131,
+        v149 = v124 * v143, v150 = v122 * v143,
+        v151 = v31 * v131 + (v34 * v139 + (v56 + v33 * v119)),
+        v152 = v31 * v133 + (v34 * v141 + (v57 + v33 * v121)),
+        v153 = v37 * v131 + (v39 * v139 + (v53 + v40 * v119)),
+        v154 = v37 * v133 + (v39 * v141 + (v54 + v40 * v121)), v155 = v135 * v151 - v148 * v152,
+        v156 = v121 * v151 - v119 * v152, v157 = v154 * v151 - v153 * v152, v158 = 2.0 * v157,
+        v159 = v157 * v157, v160 = v146 * v151 + v145 * v152, v161 = v155 * v158,
+        v162 = v158 * v160, v163 = v156 * v158, v164 = 1.0 / (v144 * v159), v165 = v164 * v164,
+        v166 = v144 * v115 * v163 * v165, v167 = v150 * (v115 * v159) * v165,
+        v168 = v115 * (1.0 - v164), v169 = v115 * v165, v170 = (v144 * v161 - v149 * v159) * v169,
+        v171 = (v144 * v162 - v147 * v159) * v169, v172 = v159 * v168, v173 = v144 * v168,
+        v174 = v143 * v159 * v167 + 2.0 * v122 * v172, v175 = 2.0 * v173,
+        v176 = v144 * (v144 * (v158 * (v115 * v158))) * v165 + v175,
+        v177 = v144 * v158 * v166 + v156 * v175, v178 = v158 * v173,
+        v179 = v158 * (v150 * v168 + v144 * v167),
+        v180 = v158 * (v144 * v170 - v149 * v168) + v155 * v175,
+        v181 = v158 * (v144 * v171 - v147 * v168) + v160 * v175,
+        v182 = (v154 * v148 - v153 * v135) * v176, v183 = (v153 * v146 + v154 * v145) * v176,
+        v184 = (v119 * v154 - v121 * v153) * v176, v185 = v143 * (v163 * v168 + v159 * v166),
+        v186 = v143 * v172, v187 = v143 * (v162 * v168 + v159 * v171) - 2.0 * v123 * v172,
+        v188 = v124 * (v143 * (v161 * v168 + v159 * v170) - 2.0 * v124 * v172), v189 = v124 * v185,
+        v190 = v123 * v185, v191 = v123 * v186, v192 = v124 * v186, v193 = v122 * v186,
+        v194 = v153 * v179, v195 = v154 * v179, v196 = v151 * v179, v197 = v152 * v179,
+        v198 = v121 * v194, v199 = v121 * v196, v200 = v119 * v195, v201 = v119 * v197,
+        v202 = v134 * v194 + v131 * v195, v203 = v140 * v194 + v139 * v195,
+        v204 = v133 * v196 + v132 * v197, v205 = v141 * v196 + v138 * v197, v206 = v122 * v174,
+        v207 = v124 * v174, v208 = v123 * v174, v209 = v124 * v187, v210 = v123 * v187,
+        v211 = v153 * v178, v212 = v152 * v178, v213 = v154 * v178, v214 = v151 * v178,
+        v215 = v119 * v212, v216 = v119 * v213, v217 = v121 * v211, v218 = v121 * v214,
+        v219 = v151 * v177, v220 = v119 * v178 + v153 * v177, v221 = v152 * v177,
+        v222 = v121 * v178 + v154 * v177, v223 = v121 * v219, v224 = v121 * v220,
+        v225 = v153 * v182, v226 = v154 * v182, v227 = v153 * v183, v228 = v154 * v183,
+        v229 = v153 * v184, v230 = v154 * v184, v231 = v134 * v227, v232 = v140 * v227,
+        v233 = v121 * v229, v234 = v134 * v225 + v131 * v226, v235 = v131 * v228,
+        v236 = v139 * v228, v237 = v134 * v229 + v131 * v230, v238 = v140 * v229 + v139 * v230,
+        v239 = v119 * v230, v240 = v140 * v220 + v139 * v222, v241 = v119 * v222,
+        v242 = v134 * v220 + v131 * v222, v243 = v119 * v221, v244 = v134 * v211 + v131 * v213,
+        v245 = v140 * v211 + v139 * v213, v246 = v133 * v219 + v132 * v221,
+        v247 = v141 * v219 + v138 * v221, v248 = v133 * v214 + v132 * v212,
+        v249 = v141 * v214 + v138 * v212, v250 = v151 * v180, v251 = v151 * v181,
+        v252 = v152 * v180, v253 = v152 * v181, v254 = v148 * v178 + v153 * v180,
+        v255 = v135 * v178 + v154 * v180, v256 = v146 * v178 + v154 * v181,
+        v257 = v153 * v181 - v145 * v178, v258 = v132 * v252 + v133 * v250,
+        v259 = v132 * v253 + v133 * v251, v260 = v138 * v253 + v141 * v251, v261 = v121 * v254,
+        v262 = v121 * v257, v263 = v119 * v255, v264 = v119 * v256,
+        v265 = v139 * v255 + v140 * v254, v266 = v139 * v256 + v140 * v257,
+        v267 = v131 * v255 + v134 * v254, v268 = v131 * v256 + v134 * v257;
+    V s269 = {0}, s270 = {0}, s271 = {0}, s272 = {0}, s273 = {0}, s274 = {0}, s275 = {0},
+        s276 = {0}, s277 = {0}, s278 = {0}, s279 = {0}, s280 = {0}, s281 = {0}, s282 = {0},
+        s283 = {0}, s284 = {0}, s285 = {0}, s286 = {0}, s287 = {0}, s288 = {0}, s289 = {0},
+        s290 = {0}, s291 = {0}, s292 = {0}, s293 = {0}, s294 = {0}, s295 = {0}, s296 = {0},
+        s297 = {0}, s298 = {0}, s299 = {0}, s300 = {0}, s301 = {0}, s302 = {0}, s303 = {0},
+        s304 = {0}, s305 = {0}, s306 = {0}, s307 = {0}, s308 = {0}, s309 = {0}, s310 = {0},
+        s311 = {0}, s312 = {0}, s313 = {0}, s314 = {0}, s315 = {0}, s316 = {0}, s317 = {0},
+        s318 = {0}, s319 = {0}, s320 = {0}, s321 = {0}, s322 = {0}, s323 = {0}, s324 = {0},
+        s325 = {0}, s326 = {0}, s327 = {0}, s328 = {0}, s329 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v266 = 1.0 - w[0];
-        const double v267 = 1.0 + w[0];
-        const double v268 = 0.25 * w[0];
-        const double v269 = 1.0 - w[1];
-        const double v270 = 1.0 + w[1];
-        const double v271 = 0.25 * w[1];
-        const double v272 = 0.25 + v268;
-        const double v273 = 0.25 - v268;
-        const double v274 = 0.25 * v270;
-        const V v275 = w[0] - v162;
-        const double v276 = 0.25 - v271;
-        const double v277 = 0.25 + v271;
-        const V v278 = w[1] - v163;
-        const double v279 = v268 - 0.25;
-        const V v280 = X6 * v273;
-        const V v281 = X7 * v273;
-        const V v282 = X7 * v266;
-        const double v283 = v271 - 0.25;
-        const V v284 = v29 * v275;
-        const V v285 = X2 * v276;
-        const V v286 = v31 * v278;
-        const V v287 = X3 * v276;
-        const V v288 = v272 * v7;
-        const V v289 = v280 + v288;
-        const V v290 = v272 * v18;
-        const V v291 = v281 + v290;
-        const V v292 = X1 * v266;
-        const V v293 = v277 * v9;
-        const V v294 = v285 + v293;
-        const V v295 = v277 * v19;
-        const V v296 = v287 + v295;
-        const V v297 = X3 * v267;
-        const V v298 = v292 + v297;
-        const V v299 = X5 * v267;
-        const V v300 = v299 + v282;
-        const V v301 = X1 * v283;
-        const V v302 = v301 + v296;
-        const V v303 = X1 * v279;
-        const V v304 = v303 + v291;
-        const V v305 = X0 * v283;
-        const V v306 = v305 + v294;
-        const V v307 = X0 * v279;
-        const V v308 = v307 + v289;
-        const V v309 = 0.25 * v298;
-        const V v310 = v306 * v304;
-        const V v311 = v274 * v300;
-        const V v312 = v302 * v308;
-        const V v313 = v310 - v312;
-        const V v314 = v269 * v309;
-        const V v315 = v311 + v314;
-        const V v316 = v21 * v275;
-        const V v317 = v53 * v275;
-        const V v318 = v169 + v317;
-        const V v319 = v53 * v278;
-        const V v320 = v170 + v319;
-        const V v321 = v315 * v313;
-        const V v322 = v12 * v278;
-        const V v323 = v316 - v322;
-        const V v324 = v286 - v284;
-        const V v325 = v286 + v284;
-        const V v326 = v58 * v325;
-        const V v327 = v168 - v326;
-        const V v328 = v43 * v323;
-        const V v329 = v166 + v328;
-        const V v330 = v43 * v324;
-        const V v331 = v164 + v330;
-        const double v332 = w[2] * v23;
-        const V v333 = v321 * v332;
-        const V v334 = 0.25 * v329;
-        const V v335 = 0.25 * v331;
-        const V v336 = v329 * v87;
-        const V v337 = v331 * v87;
-        const V v338 = v329 * v73;
-        const V v339 = v331 * v73;
-        const V v340 = v327 * v55;
-        const V v341 = 1.0 + v340;
-        const V v342 = v52 * v334;
-        const V v343 = v83 + v342;
-        const V v344 = v52 * v335;
-        const V v345 = v85 + v344;
-        const V v346 = v57 * v334;
-        const V v347 = v80 + v346;
-        const V v348 = v57 * v335;
-        const V v349 = v78 + v348;
-        const V v350 = v320 * v54;
-        const V v351 = v341 - v350;
-        const V v352 = v54 * v336;
-        const V v353 = v352 + v347;
-        const V v354 = v54 * v337;
-        const V v355 = v354 + v349;
-        const V v356 = v318 * v56;
-        const V v357 = v351 - v356;
-        const V v358 = v56 * v338;
-        const V v359 = v358 + v353;
-        const V v360 = v56 * v339;
-        const V v361 = v360 + v355;
-        const V v362 = v357 * v357;
-        const V v363 = 2.0 * v357;
-        const V v364 = 2.0 * v359;
-        const V v365 = v45 * v336;
-        const V v366 = v365 + v343;
-        const V v367 = v45 * v337;
-        const V v368 = v367 + v345;
-        const V v369 = 2.0 * v361;
-        const V v370 = v359 * v359;
-        const V v371 = v51 * v338;
-        const V v372 = v371 + v366;
-        const V v373 = v51 * v339;
-        const V v374 = v373 + v368;
-        const V v375 = v362 + v370;
-        const V v376 = 2.0 * v372;
-        const V v377 = 2.0 * v374;
-        const V v378 = v374 * v359;
-        const V v379 = v374 * v374;
-        const V v380 = v379 + v375;
-        const V v381 = v372 * v361;
-        const V v382 = v378 - v381;
-        const V v383 = 2.0 * v382;
-        const V v384 = v382 * v382;
-        const V v385 = v372 * v372;
-        const V v386 = v385 + v380;
-        const V v387 = v361 * v361;
-        const V v388 = v387 + v386;
-        const V v389 = 0.3333333333333333 * v388;
-        const V v390 = v362 * v383;
-        const V v391 = v362 * v384;
-        const V v392 = softehl_vrcbrt(v391);
-        const V v393 = v392 * v388;
-        const V v394 = (-3.0) + v393;
-        const V v395 = v392 * v392;
-        const V v396 = v3 * v394;
-        const V v397 = 1.0 - v396;
-        const V v398 = 1.0 / v397;
-        const V v399 = v333 * v398;
-        const V v400 = v392 * v399;
-        const V v401 = v389 * v399;
-        const V v402 = v395 * v401;
-        const V v403 = v395 * v402;
-        const V v404 = v390 * v403;
-        const V v405 = v361 * v404;
-        const V v406 = v376 * v400;
-        const V v407 = v405 + v406;
-        s258 += v407;
-        const V v408 = v372 * v404;
-        const V v409 = v369 * v400;
-        const V v410 = v408 + v409;
-        s257 += v410;
-        const V v411 = v377 * v400;
-        const V v412 = v359 * v404;
-        const V v413 = v411 - v412;
-        s259 += v413;
-        const V v414 = v384 * v403;
-        const V v415 = v400 - v414;
-        const V v416 = v363 * v415;
-        const V v417 = v364 * v400;
-        const V v418 = v374 * v404;
-        const V v419 = v417 - v418;
-        s256 += v419;
-        const V v420 = v327 * v416;
-        s255 += v420;
-        const V v421 = v338 * v419;
-        const V v422 = v338 * v407;
-        const V v423 = v339 * v413;
-        s264 += v422;
-        s264 += v423;
-        const V v424 = v339 * v410;
-        s261 += v421;
-        s261 += v424;
-        const V v425 = v318 * v416;
-        s261 -= v425;
-        const V v426 = v336 * v419;
-        const V v427 = v320 * v416;
-        s262 += v426;
-        s262 -= v427;
-        const V v428 = v336 * v407;
-        const V v429 = v334 * v419;
-        const V v430 = v334 * v407;
-        const V v431 = v337 * v410;
-        s262 += v431;
-        const V v432 = v337 * v413;
-        s265 += v428;
-        s265 += v432;
-        const V v433 = v335 * v410;
-        s260 += v429;
-        s260 += v433;
-        const V v434 = v335 * v413;
-        s263 += v430;
-        s263 += v434;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v330 = 0.25 * w[1], v331 = 1.0 - w[1], v332 = 1.0 + w[1], v333 = 0.25 * w[0];
+        const V v334 = w[1] - v117; const double v335 = 0.25 * v332; const V v336 = w[0] - v116;
+        const double v337 = 1.0 - w[0], v338 = 1.0 + w[0];
+        const V v339 = v26 * v334; const double v340 = v330 - 0.25; const V v341 = v24 * v336;
+        const double v342 = v333 - 0.25;
+        const V v343 = X5 * v338, v344 = X3 * v338;
+        const double v345 = 0.25 - v330, v346 = 0.25 + v330, v347 = 0.25 + v333, v348 = 0.25 - v333;
+        const V v349 = X3 * v345, v350 = X2 * v345, v351 = X7 * v337, v352 = v343 + v351,
+            v353 = X1 * v337, v354 = v353 + v344, v355 = X7 * v348, v356 = X6 * v348,
+            v357 = v122 - v42 * (v339 + v341), v358 = v335 * v352, v359 = 0.25 * v354,
+            v360 = v346 * v5, v361 = v346 * v18, v362 = X1 * v342, v363 = v355 + v362,
+            v364 = X0 * v342, v365 = v356 + v364, v366 = v331 * v359, v367 = v358 + v366,
+            v368 = X0 * v340, v369 = v368 + (v350 + v360), v370 = X1 * v340,
+            v371 = v370 + (v349 + v361), v372 = v347 * v15, v373 = v372 + v363, v374 = v347 * v4,
+            v375 = v374 + v365, v376 = v123 + v41 * v336, v377 = v124 + v41 * v334,
+            v378 = v373 * v369 - v375 * v371, v379 = v118 + v30 * (v339 - v341),
+            v380 = v120 + v30 * (v16 * v336 - v9 * v334), v381 = v367 * v378, v382 = 0.25 * v379,
+            v383 = 0.25 * v380, v384 = v379 * v55, v385 = v380 * v55, v386 = v379 * v52,
+            v387 = v380 * v52, v388 = w[2] * v7 * v381, v389 = v43 + v384,
+            v390 = 1.0 + v357 * v38 - v377 * v37 - v376 * v39, v391 = v48 + v387, v392 = v386 - v44,
+            v393 = v390 * v390, v394 = 2.0 * v390, v395 = v385 - v49, v396 = v14 * v388,
+            v397 = v40 * v382 + (v39 * v386 + (v53 + v37 * v384)),
+            v398 = v40 * v383 + (v39 * v387 + (v54 + v37 * v385)), v399 = 2.0 * v397,
+            v400 = 2.0 * v398, v401 = v31 * v385 + (v34 * v387 + (v57 + v33 * v383)),
+            v402 = v31 * v384 + (v34 * v386 + (v56 + v33 * v382)), v403 = 2.0 * v401,
+            v404 = 2.0 * v402, v405 = v393 + v397 * v397 + v398 * v398 + v401 * v401 + v402 * v402,
+            v406 = v398 * v402 - v397 * v401, v407 = 2.0 * v406, v408 = v406 * v406,
+            v409 = v396 * v405, v410 = v393 * v407, v411 = softehl_vrcbrt(v393 * v408),
+            v412 = v411 * v411, v413 = v412 * (0.3333333333333333 * v412),
+            v414 = v394 * v408 * v413, v415 = v393 * (v398 * v407) * v413,
+            v416 = v393 * (v402 * v407) * v413, v417 = v393 * (v397 * v407) * v413,
+            v418 = v393 * (v401 * v407) * v413, v419 = v411 * v412, v420 = v408 * v413,
+            v421 = v410 * v413, v422 = v419 * (v419 * (1.3333333333333333 * v411)),
+            v423 = 1.0 / (1.0 - v2 * ((-3.0) + v405 * v411)), v424 = v423 * v423,
+            v425 = v2 * v388 * v423, v426 = v405 * v425, v427 = v411 * v425, v428 = v413 * v426,
+            v429 = v393 * v428, v430 = 2.0 * v427, v431 = v427 - v408 * v428, v432 = v394 * v431,
+            v433 = v407 * v429, v434 = v357 * v432;
+        s269 += v434; const V v435 = v401 * v433 + v399 * v427; s271 += v435;
+        const V v436 = v397 * v433 + v403 * v427; s272 += v436;
+        const V v437 = v403 * v411, v438 = v399 * v411, v439 = v404 * v411, v440 = v400 * v411,
+            v441 = v396 * v411, v442 = (v411 - v405 * v420) * (v396 * v424),
+            v443 = v417 * v425 + v424 * ((v405 * v417 + v437) * v441),
+            v444 = v418 * v425 + v424 * (v441 * (v405 * v418 + v438)), v445 = v421 * (v409 * v424),
+            v446 = v424 * ((v394 * v411 - v405 * v414) * v441) - v414 * v425,
+            v447 = v413 * (v425 + v405 * v442) - v422 * (0.3333333333333333 * v408 * v426),
+            v448 = 2.0 * v431 + v394 * v394 * (v411 * v442 - v420 * v425 - v408 * v447),
+            v449 = v424 * (v441 * (v440 - v405 * v416)) - v416 * v425, v450 = v357 * v357 * v448;
+        s288 += v450;
+        const V v451 = v430 + v404 * (v424 * (v441 * (v439 - v405 * v415)) - v415 * v425),
+            v452 = v404 * v427 - v398 * v433;
+        s273 += v452; const V v453 = v400 * v427 - v402 * v433; s270 += v453; s279 += v385 * v436;
+        s279 += v384 * v452; s278 += v387 * v436; s278 += v386 * v452; s277 += v383 * v436;
+        s277 += v382 * v452;
+        const V v454 = v422 * (0.3333333333333333 * v410 * v426) + v405 * v413 * v445,
+            v455 = v394 * (v408 * v454 - v411 * v445 - v421 * v425 - v407 * v428),
+            v456 = v410 * v454 - 2.0 * v429,
+            v457 = v421 * (v424 * (v409 * v437) + v403 * v425) + v397 * v456,
+            v458 = v430 + v403 * v443 + v397 * v457,
+            v459 = v421 * (v424 * (v409 * v438) + v399 * v425) + v401 * v456,
+            v460 = v433 + v403 * v444 + v397 * v459, v461 = v430 + v399 * v444 + v401 * v459,
+            v462 = v403 * v446 - v397 * v455, v463 = v404 * v446 + v398 * v455,
+            v464 = v400 * v446 + v402 * v455, v465 = v399 * v446 - v401 * v455,
+            v466 = v402 * v456 - v421 * (v424 * (v409 * v440) + v400 * v425),
+            v467 = v398 * (v398 * v456 - v421 * (v424 * (v409 * v439) + v404 * v425)),
+            v468 = v451 + v467, v469 = v404 * v443 - v398 * v457, v470 = v404 * v444 - v398 * v459,
+            v471 = v403 * v449 - v397 * v466, v472 = v404 * v449 - v433 + v398 * v466,
+            v473 = v430 + v400 * v449 + v402 * v466, v474 = v399 * v449 - v401 * v466,
+            v475 = v357 * v462;
+        s280 += v475; const V v476 = v357 * v463; s281 += v476; const V v477 = v357 * v464;
+        s282 += v477; const V v478 = v357 * v465; s283 += v478;
+        const V v479 = v377 * v464, v480 = v377 * v465, v481 = v376 * v464, v482 = v376 * v465,
+            v483 = v383 * v471, v484 = v385 * v462 + v384 * v463, v485 = v383 * v462 + v382 * v463,
+            v486 = v385 * v471 + v384 * v472, v487 = v387 * v471 + v386 * v472,
+            v488 = v357 * (v383 * v464 + v382 * v465);
+        s287 += v488; const V v489 = v357 * v484; s284 += v489; const V v490 = v357 * v485;
+        s286 += v490; const V v491 = v483 + v382 * v472; s299 += v483; s299 += v382 * v460;
+        const V v492 = v382 * v470, v493 = v386 * v470 + v387 * v460,
+            v494 = v385 * v460 + v384 * v470, v495 = v385 * v469 + v384 * v468,
+            v496 = v386 * v469 + v387 * v458, v497 = v387 * v469 + v386 * v468,
+            v498 = v492 + v383 * v460, v499 = v382 * v469 + v383 * v458;
+        s293 += v499; const V v500 = v384 * v469 + v385 * v458; s291 += v391 * v458;
+        s291 += v392 * v469; s289 += v395 * v458; s289 += v389 * v469; s315 += v391 * v496;
+        s315 += v392 * v497; s316 += v383 * v496; s316 += v382 * v497; s290 += v395 * v469;
+        s290 += v389 * v468; s292 += v391 * v469; s292 += v392 * v468;
+        const V v501 = v383 * v469 + v382 * v468; s294 += v501; s309 += v395 * v500;
+        s309 += v389 * v495; s310 += v391 * v500; s310 += v392 * v495; s311 += v383 * v500;
+        s311 += v382 * v495; s320 += v383 * v499; s320 += v382 * v501; s295 += v389 * v460;
+        s295 += v395 * v471; s297 += v392 * v460; s297 += v391 * v471; s296 += v389 * v470;
+        s296 += v395 * v472; s298 += v392 * v470; s298 += v391 * v472; s301 += v389 * v474;
+        s301 -= v479; s303 += v392 * v474; s303 -= v481; s302 += v395 * v474; s302 -= v480;
+        s300 += v492; s300 += v383 * v472; s304 += v391 * v474; s304 -= v482; s301 += v395 * v473;
+        s303 += v391 * v473; const V v502 = v382 * v474 + v383 * v473; s305 += v502;
+        const V v503 = v385 * v473 - v479 + v384 * v474, v504 = v387 * v473 - v481 + v386 * v474,
+            v505 = v387 * v474 - v482 + v386 * v461, v506 = v385 * v474 - v480 + v384 * v461;
+        s276 += v385 * v453; s276 += v384 * v435; s275 += v387 * v453; s275 += v386 * v435;
+        s274 += v383 * v453; s274 += v382 * v435; s314 += v383 * v486; s314 += v382 * v494;
+        const V v507 = v387 * v462 + v386 * v463; s275 -= v376 * v432; s276 -= v377 * v432;
+        s296 -= v377 * v463; s298 -= v376 * v463; s326 += v383 * v503; s326 += v382 * v506;
+        s328 += v382 * v505; s328 += v383 * v504; s327 += v392 * v505; s327 += v391 * v504;
+        const V v508 = v357 * v507; s285 += v508; s319 += v383 * v487; s319 += v382 * v493;
+        s318 += v391 * v487; s318 -= v376 * v507; s317 += v395 * v487; s317 -= v377 * v507;
+        s321 += v395 * v491; s321 -= v377 * v485; s322 += v391 * v491; s322 -= v376 * v485;
+        s323 += v383 * v491; s323 += v382 * v498; s318 += v392 * v493; s317 += v389 * v493;
+        s321 += v389 * v498; s322 += v392 * v498; s295 -= v377 * v462; s297 -= v376 * v462;
+        s302 += v389 * v461; s304 += v392 * v461; const V v509 = v383 * v474 + v382 * v461;
+        s306 += v509; s329 += v383 * v502; s329 += v382 * v509;
+        const V v510 = v385 * v464 + v384 * v465 - v377 * v448,
+            v511 = v387 * v464 + v386 * v465 - v376 * v448;
+        s312 += v395 * v486; s312 -= v377 * v484; s313 += v391 * v486; s313 -= v376 * v484;
+        s324 += v395 * v503; s324 -= v377 * v510; const V v512 = v357 * v510; s307 += v512;
+        const V v513 = v357 * v511; s308 += v513; s327 -= v376 * v511; s325 += v391 * v503;
+        s325 -= v376 * v510; s312 += v389 * v494; s313 += v392 * v494; s324 += v389 * v506;
+        s325 += v392 * v506;
     }
-    const V v435 = v234 + s259;
-    const V v436 = v235 + s256;
-    const V v437 = v238 + s255;
-    const V v438 = s257 - v233;
-    const V v439 = v241 - v246;
-    const V v440 = v245 + s263;
-    const V v441 = s258 - v232;
-    const V v442 = s260 + v439;
-    const V v443 = s261 - v236;
-    const V v444 = s262 - v237;
-    const V v445 = v437 - v442;
-    const V v446 = v437 + v442;
-    const V v447 = v250 + v443;
-    const V v448 = s264 + v254;
-    const V v449 = v248 + v444;
-    const V v450 = s265 + v252;
-    const V v451 = v440 - v242;
-    const V v452 = v242 - v440;
-    const V v453 = v65 * v436;
-    const V v454 = v449 - v453;
-    const V v455 = v65 * v441;
-    const V v456 = v450 - v455;
-    const V v457 = v64 * v436;
-    const V v458 = v457 + v447;
-    const V v459 = v64 * v441;
-    const V v460 = v459 + v448;
-    const V v461 = v59 * v438;
-    const V v462 = v461 + v454;
-    const V v463 = v59 * v435;
-    const V v464 = v463 + v456;
-    const V v465 = v60 * v438;
-    const V v466 = v458 - v465;
-    const V v467 = v60 * v435;
-    const V v468 = v460 - v467;
-    const V v469 = v462 + v466;
-    const V v470 = v464 + v468;
-    const V v471 = v466 - v462;
-    const V v472 = v468 - v464;
-    const V v473 = v445 - v471;
-    const V v474 = v445 + v471;
-    const V v475 = v446 + v469;
-    const V v476 = v446 - v469;
-    const V v477 = v452 - v472;
-    const V v478 = v451 + v470;
-    softehl_store4(R + 0, 8, v478, v475, v477, v473);
-    const V v479 = v451 - v470;
-    const V v480 = v472 - v451;
-    softehl_store4(R + 4, 8, v479, v476, v480, v474);
+    const V v514 = v213 + s273, v515 = s272 - v211, v516 = v216 + s277, v517 = v516 - v217,
+        v518 = v48 * v515 + (s278 + v245 - v44 * v514),
+        v519 = v244 + (v43 * v514 + s279 - v49 * v515), v520 = v518 - v519, v521 = v518 + v519,
+        v522 = v217 - v516 - v520, v523 = v517 + v521, v524 = v517 - v521, v525 = v520 - v517,
+        v526 = v214 + s270, v527 = v193 + s269, v528 = s271 - v212, v529 = s274 + (v218 - v215),
+        v530 = v527 - v529, v531 = v527 + v529,
+        v532 = v249 + (v48 * v526 + (s275 - v191) - v44 * v528),
+        v533 = v248 + (v43 * v528 + (s276 - v192 - v49 * v526)), v534 = v532 - v533,
+        v535 = v532 + v533, v536 = v530 - v534, v537 = v530 + v534, v538 = v531 + v535;
+    softehl_store4(R + 0, 8, v523, v538, v522, v536); const V v539 = v531 - v535;
+    softehl_store4(R + 4, 8, v524, v539, v525, v537);
+    const V v540 = v227 + s291, v541 = v230 + s294, v542 = s292 - v228, v543 = s320 + (v239 - v233),
+        v544 = s293 - v229, v545 = v234 + (v43 * (v226 + s290) + (s309 - v49 * (s289 - v225))),
+        v546 = v43 * v541 + (s311 + v237 - v49 * v544),
+        v547 = v43 * v542 + (s310 - v231 - v235 - v49 * v540),
+        v548 = v48 * v544 + (s316 + v238) - v44 * v541,
+        v549 = v48 * v540 + (s315 - v232 - v236) - v44 * v542, v550 = v543 + v548,
+        v551 = v545 + v547, v552 = v547 - v545, v553 = v546 + v548, v554 = v546 - v552,
+        v555 = v545 - v547 - v546, v556 = v543 - v553, v557 = v547 + v549, v558 = v546 - v551,
+        v559 = v552 - v546, v560 = v549 - v547, v561 = v548 - v546, v562 = v548 - v560,
+        v563 = v560 - v548, v564 = v557 - v548, v565 = v543 - v561,
+        v566 = v556 + (v551 - v546) + v564, v567 = v558 + (v556 + (v548 - v557)),
+        v568 = v561 - v543, v569 = v564 + (v553 + v558 - v543), v570 = v565 + (v559 + v562),
+        v571 = v568 + (v559 + v563), v572 = v550 + (v548 + (v560 - v546)),
+        v573 = v550 + (v553 + (v557 + (v546 + v551))), v574 = v555 - v572, v575 = v555 + v572,
+        v576 = v554 + (v563 + v565), v577 = v554 + (v562 + v568), v578 = v195 + s281,
+        v579 = v222 + s300, v580 = v255 + s296, v581 = v256 + s298, v582 = s286 + (v200 - v198),
+        v583 = s323 + (v241 - v224), v584 = s280 - v194, v585 = s321 + (v263 - v261),
+        v586 = s322 + (v264 - v262), v587 = v582 + v585, v588 = s295 - v254, v589 = v582 + v583,
+        v590 = s297 - v257, v591 = s299 - v220, v592 = v586 + (v582 - v585), v593 = v585 + v586,
+        v594 = v49 * v584, v595 = v583 + v586, v596 = v592 - v583,
+        v597 = v48 * v584 + (s285 + v203) - v44 * v578,
+        v598 = v48 * v591 + (s319 + v240) - v44 * v579, v599 = v43 * v578 + (s284 + v202),
+        v600 = v43 * v579 + (s314 + v242 - v49 * v591), v601 = v599 - v594, v602 = v597 - v582,
+        v603 = v597 + v598, v604 = v600 + v601, v605 = v602 - v601, v606 = v598 - v600,
+        v607 = v606 - v583, v608 = v589 - v593, v609 = v43 * v580 + (s312 + v267 - v49 * v588),
+        v610 = v43 * v581 + (s313 + v268 - v49 * v590),
+        v611 = v48 * v588 + (s317 + v265) - v44 * v580,
+        v612 = v48 * v590 + (s318 + v266) - v44 * v581, v613 = v601 + v609, v614 = v600 + v610,
+        v615 = v597 + v611, v616 = v609 + v610, v617 = v598 + v612, v618 = v611 - v609,
+        v619 = v611 + v612, v620 = v612 - v610, v621 = v613 - v614, v622 = v586 - v620,
+        v623 = v610 + (v601 - v600 - v609), v624 = v594 + v585 - v599 - v602 - v609 - v611,
+        v625 = v612 + (v598 + v600 - v595 + v610), v626 = v612 + (v597 - v598 - v611),
+        v627 = v587 - v595 + v615 - v617, v628 = v623 - v626, v629 = v623 + v626,
+        v630 = v624 - v625, v631 = v624 + v625;
+    softehl_store4(K + 32, 64, v567, v630, v569, v631);
+    const V v632 = v621 + v627, v633 = v621 - v627, v634 = v613 + v614 - v615 - v617 - v587 - v595;
+    softehl_store4(K + 16, 64, v574, v634, v575, v633);
+    const V v635 = v583 - v592 - v628, v636 = v604 - v616, v637 = v628 - v596, v638 = v603 - v619,
+        v639 = v619 + (v589 + (v603 + (v593 + v604)) + v616);
+    softehl_store4(K + 0, 64, v573, v639, v574, v632);
+    const V v640 = v605 - v585 + v618, v641 = v607 - v586 + v620 + v640,
+        v642 = v622 + (v585 + v605 + v607 - v618);
+    softehl_store4(K + 52, 64, v577, v642, v576, v635); const V v643 = v640 + (v583 - v606 + v622);
+    softehl_store4(K + 48, 64, v571, v641, v570, v643);
+    const V v644 = v636 + v638, v645 = v596 + v629, v646 = v596 - v629, v647 = v636 - v638 - v608;
+    softehl_store4(K + 20, 64, v569, v647, v570, v637); const V v648 = v608 + v644;
+    softehl_store4(K + 4, 64, v567, v648, v571, v645); const V v649 = v608 - v644;
+    softehl_store4(K + 36, 64, v566, v649, v577, v646);
+    const V v650 = v219 + s305, v651 = v196 + s282, v652 = v206 + s288, v653 = v251 + s303,
+        v654 = s329 + (v223 - v243), v655 = s287 + (v199 - v201), v656 = s283 - v197,
+        v657 = v652 - v655, v658 = s304 - v253, v659 = v655 - v654, v660 = s306 - v221,
+        v661 = v43 * v656 + (v204 + (s307 - v207)) - v49 * v651,
+        v662 = v48 * v651 + (v205 + (s308 - v208) - v44 * v656),
+        v663 = v258 + (s324 + (v43 * (s302 - v252) - v188)) - v49 * (v250 + s301),
+        v664 = v259 + (s325 + (v43 * v658 - v209)) - v49 * v653,
+        v665 = v48 * v653 + (v260 + (s327 - v210 - v44 * v658)),
+        v666 = v246 + (v43 * v660 + (s326 - v189)) - v49 * v650,
+        v667 = v48 * v650 + (v247 + (s328 - v190 - v44 * v660)), v668 = v661 - v662,
+        v669 = v661 + v662, v670 = v661 - v666, v671 = v661 + v666, v672 = v662 - v667,
+        v673 = v662 + v667, v674 = v652 + v655 - v669, v675 = v663 - v664, v676 = v663 + v664,
+        v677 = v664 - v665, v678 = v664 + v665, v679 = v672 - v677, v680 = v671 - v676,
+        v681 = v666 - v667, v682 = v666 + v667, v683 = v670 - v675,
+        v684 = v677 + (v659 + v672) + v681, v685 = v659 - v681, v686 = v679 + v683,
+        v687 = v673 + (v678 + (v676 + (v671 + (v654 + (v652 + 2.0 * v655) + v669)))),
+        v688 = v673 - v678, v689 = v683 - v679, v690 = v682 + v687, v691 = v654 + v655 - v682,
+        v692 = v680 + v688, v693 = v674 + v691, v694 = v674 + v680 - v688 - v691,
+        v695 = v668 + (v670 + (v657 + v675)), v696 = v657 - v668, v697 = v684 + v695;
+    softehl_store4(K + 8, 64, v639, v690, v634, v697); const V v698 = v692 + v693;
+    softehl_store4(K + 40, 64, v648, v698, v647, v694);
+    const V v699 = v685 + v696, v700 = v693 - v692, v701 = v695 - v684;
+    softehl_store4(K + 24, 64, v632, v697, v633, v701);
+    const V v702 = v696 - v685, v703 = v686 + v699;
+    softehl_store4(K + 12, 64, v630, v698, v641, v703); const V v704 = v689 + v702;
+    softehl_store4(K + 28, 64, v631, v694, v643, v704);
+    softehl_store4(K + 56, 64, v645, v703, v637, v704); const V v705 = v699 - v686;
+    softehl_store4(K + 44, 64, v649, v700, v642, v705); const V v706 = v702 - v689;
+    softehl_store4(K + 60, 64, v646, v705, v635, v706);
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_gent_tangent, 8, 8, 0, 0, 8, (8 * 8))
 
-void softehl_solid_taylor_mean_gent_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_gent_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_gent_residual_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_gent_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_taylor_mean_gent_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_solid_taylor_mean_gent_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[0];
-    const double v2 = 1.5707963267948966 * parameters[2];
-    const double v3 = 1.0 / parameters[1];
-    const double v4 = parameters[1] * v1;
-    const V v5 = X4 - X0;
-    const V v6 = X0 - X2;
-    const V v7 = X4 - X2;
-    const V v8 = v5 - X2;
-    const V v9 = X4 - X6;
-    const V v10 = X6 + v8;
-    const double v11 = 6.283185307179586 * v4;
-    const V v12 = v6 + v9;
-    const V v13 = 0.25 * v10;
-    const V v14 = 0.0625 * v10;
-    const V v15 = v9 - v6;
-    const V v16 = X1 - X3;
-    const V v17 = X1 + X3;
-    const double v18 = v3 * v3;
-    const V v19 = X5 - X3;
-    const V v20 = 0.25 * v15;
-    const V v21 = 0.0625 * v15;
-    const V v22 = X5 - X7;
-    const V v23 = X5 + X7;
-    const V v24 = v16 + v22;
-    const V v25 = v17 + v23;
-    const V v26 = v22 - v16;
-    const V v27 = d0 - d2;
-    const V v28 = d0 + d2;
-    const V v29 = v23 - v17;
-    const V v30 = 0.25 * v25;
-    const V v31 = 0.25 * v26;
-    const V v32 = 0.0625 * v26;
-    const V v33 = 0.25 * v29;
-    const V v34 = 0.0625 * v29;
-    const V v35 = v20 * v33;
-    const V v36 = d1 + d3;
-    const V v37 = d1 - d3;
-    const V v38 = 1.0 / v30;
-    const V v39 = v30 * v30;
-    const V v40 = v28 - d4;
-    const V v41 = v31 * v13;
-    const V v42 = v35 - v41;
-    const V v43 = 1.0 / v39;
-    const V v44 = 1.0 / v42;
-    const V v45 = v40 - d6;
-    const V v46 = d4 - d6;
-    const V v47 = v12 * v32;
-    const V v48 = v12 * v34;
-    const V v49 = v27 + v46;
-    const V v50 = v27 - v46;
-    const V v51 = d5 + d7;
-    const V v52 = d5 - d7;
-    const V v53 = v36 - v51;
-    const V v54 = v36 + v51;
-    const V v55 = v37 - v52;
-    const V v56 = v37 + v52;
-    const V v57 = 0.25 * v38;
-    const V v58 = 0.25 * v43;
-    const V v59 = v32 * v44;
-    const V v60 = v34 * v44;
-    const V v61 = v44 * v47;
-    const V v62 = v44 * v48;
-    const V v63 = v24 * v44;
-    const V v64 = v44 * v14;
-    const V v65 = v21 * v44;
-    const V v66 = v14 * v63;
-    const V v67 = v21 * v63;
-    const V v68 = 0.25 * v62;
-    const V v69 = 0.25 * v66;
-    const V v70 = v68 - v69;
-    const V v71 = v50 * v64;
-    const V v72 = v53 * v59;
-    const V v73 = v50 * v60;
-    const V v74 = 1.0 - v73;
-    const V v75 = v55 * v64;
-    const V v76 = 1.0 + v75;
-    const V v77 = v55 * v60;
-    const V v78 = v72 - v77;
-    const V v79 = v53 * v65;
-    const V v80 = v76 - v79;
-    const V v81 = 0.25 * v67;
-    const V v82 = 0.25 * v61;
-    const V v83 = v81 - v82;
-    const V v84 = v45 * v59;
-    const V v85 = v74 + v84;
-    const V v86 = v45 * v65;
-    const V v87 = v71 - v86;
-    V s88 = softehl_splat(0.0);
-    V s89 = softehl_splat(0.0);
-    V s90 = softehl_splat(0.0);
-    V s91 = softehl_splat(0.0);
-    V s92 = softehl_splat(0.0);
-    V s93 = softehl_splat(0.0);
-    V s94 = softehl_splat(0.0);
-    V s95 = softehl_splat(0.0);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.25 * parameters[2], v2 = 1.0 / parameters[1];
+    const V v3 = X0 + d0, v4 = X2 + d2, v5 = X4 + d4, v6 = X0 - X2, v7 = X6 + d6, v8 = X4 - X6,
+        v9 = X4 - X2, v10 = X1 + d1, v11 = X6 + (X4 - X0 - X2);
+    const double v12 = v2 * (parameters[1] * (0.5 * parameters[0]));
+    const V v13 = 0.25 * v11, v14 = X1 - X3, v15 = X1 + X3, v16 = X7 + d7, v17 = X3 + d3,
+        v18 = X5 + X7, v19 = X5 + d5, v20 = X5 - X7, v21 = 0.25 * (v6 + v8), v22 = X5 - X3,
+        v23 = v8 - v6, v24 = v18 - v15, v25 = 0.25 * (v15 + v18), v26 = v20 - v14,
+        v27 = 0.25 * (v14 + v20), v28 = 0.25 * v23, v29 = 0.25 * v24, v30 = 0.25 * v26,
+        v31 = 1.0 / (v28 * v29 - v30 * v13), v32 = 0.25 * (1.0 / v25),
+        v33 = 0.25 * (1.0 / (v25 * v25)), v34 = 0.0625 * (v26 - v24) * v31,
+        v35 = 0.0625 * (v11 - v23) * v31, v36 = 0.0625 * (v26 + v24) * v31,
+        v37 = 0.0625 * (v23 + v11) * v31, v38 = 0.0625 * (v24 - v26) * v31,
+        v39 = 0.0625 * (v23 - v11) * v31, v40 = v27 * v37 - v21 * v36, v41 = v40 - 0.25,
+        v42 = (-0.25) - v40, v43 = 0.25 - v27 * v35 - v21 * v34, v44 = 0.25 - v27 * v39 - v21 * v38;
+    V s45 = {0}, s46 = {0}, s47 = {0}, s48 = {0}, s49 = {0}, s50 = {0}, s51 = {0}, s52 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v96 = 1.0 - w[1];
-        const double v97 = 1.0 + w[1];
-        const double v98 = 0.25 * w[1];
-        const double v99 = 1.0 - w[0];
-        const double v100 = 1.0 + w[0];
-        const double v101 = 0.25 * w[0];
-        const double v102 = 0.25 * v97;
-        const double v103 = 0.25 - v98;
-        const double v104 = 0.25 + v98;
-        const double v105 = 0.25 + v101;
-        const double v106 = 0.25 - v101;
-        const V v107 = X5 * v100;
-        const double v108 = v98 - 0.25;
-        const V v109 = X3 * v100;
-        const V v110 = X3 * v103;
-        const V v111 = X2 * v103;
-        const double v112 = v101 - 0.25;
-        const V v113 = X6 * v106;
-        const V v114 = X7 * v106;
-        const V v115 = X7 * v99;
-        const V v116 = v107 + v115;
-        const V v117 = X1 * v99;
-        const V v118 = v117 + v109;
-        const V v119 = v102 * v116;
-        const V v120 = X1 * v108;
-        const V v121 = v110 + v120;
-        const V v122 = X1 * v112;
-        const V v123 = v114 + v122;
-        const V v124 = X0 * v108;
-        const V v125 = v111 + v124;
-        const V v126 = X0 * v112;
-        const V v127 = v113 + v126;
-        const V v128 = 0.25 * v118;
-        const V v129 = v96 * v128;
-        const V v130 = v119 + v129;
-        const V v131 = v104 * v22;
-        const V v132 = v131 + v121;
-        const V v133 = v104 * v9;
-        const V v134 = v133 + v125;
-        const V v135 = v105 * v19;
-        const V v136 = v135 + v123;
-        const V v137 = v105 * v7;
-        const V v138 = v137 + v127;
-        const double v139 = w[1] * w[2];
-        const V v140 = w[0] * v134;
-        const V v141 = v134 * v136;
-        const V v142 = w[1] * v136;
-        const V v143 = w[1] * v138;
-        const V v144 = v140 - v143;
-        const V v145 = v138 * v132;
-        const V v146 = v141 - v145;
-        const V v147 = w[0] * v132;
-        const V v148 = v142 - v147;
-        const V v149 = w[2] * v130;
-        const V v150 = v130 * v146;
-        const V v151 = 0.25 * v146;
-        const V v152 = v149 * v148;
-        s94 += v152;
-        const V v153 = v149 * v144;
-        s95 += v153;
-        const V v154 = w[2] * v151;
-        s88 += v154;
-        const V v155 = v139 * v151;
-        s90 += v155;
-        const V v156 = w[2] * v150;
-        s91 += v156;
-        const V v157 = v139 * v150;
-        s93 += v157;
-        const V v158 = w[0] * v154;
-        s89 += v158;
-        const V v159 = w[0] * v156;
-        s92 += v159;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v53 = 0.25 * w[1], v54 = 1.0 - w[0], v55 = 1.0 + w[0],
+            v56 = 0.25 * (1.0 - w[1]), v57 = 0.25 * (1.0 + w[1]), v58 = 0.25 * w[0],
+            v59 = 0.25 - v53, v60 = 0.25 + v53, v61 = 0.25 + v58, v62 = 0.25 - v58, v63 = v56 * v54,
+            v64 = v56 * v55, v65 = v55 * v57, v66 = v54 * v57, v67 = v53 - 0.25, v68 = v58 - 0.25;
+        const V v69 = X0 * v67 + (X2 * v59 + v60 * v8), v70 = X0 * v68 + (X6 * v62 + v61 * v9),
+            v71 = X1 * v67 + (X3 * v59 + v60 * v20), v72 = X1 * v68 + (X7 * v62 + v61 * v22),
+            v73 = X5 * v65 + (X1 * v63 + (X7 * v66 + X3 * v64)),
+            v74 = v4 * v64 + (v66 * v7 + (v63 * v3 + v65 * v5)),
+            v75 = v17 * v64 + (v66 * v16 + (v63 * v10 + v65 * v19));
+        const double v76 = w[1] * w[2];
+        const V v77 = v69 * v72 - v71 * v70, v78 = w[2] * v73, v79 = v77 * v73, v80 = 0.25 * v77,
+            v81 = (w[1] * v72 - w[0] * v71) * v78;
+        s51 += v81; const V v82 = (w[0] * v69 - w[1] * v70) * v78; s52 += v82;
+        const V v83 = w[2] * v80; s45 += v83; const V v84 = v76 * v80; s47 += v84;
+        const V v85 = w[2] * v79; s48 += v85; const V v86 = v76 * v79; s50 += v86;
+        const V v87 = w[0] * v83; s46 += v87; const V v88 = w[0] * v85; s49 += v88;
+        softehl_store2(R + 7 * q + 0, (7 * points), v74, v75);
     }
-    const V v160 = 1.0 / s91;
-    const V v161 = s91 * v2;
-    const V v162 = s92 * v160;
-    const V v163 = v160 * s93;
-    const V v164 = v160 * s94;
-    const V v165 = 0.25 * v164;
-    const V v166 = v160 * s95;
-    const V v167 = 0.25 * v166;
-    const V v168 = s88 * v160;
-    const V v169 = s89 * v160;
-    const V v170 = s90 * v160;
-    const V v171 = 2.0 * v170;
-    const V v172 = 2.0 * v169;
-    const V v173 = 2.0 * v168;
-    const V v174 = v66 * v165;
-    const V v175 = v66 * v167;
-    const V v176 = v67 * v165;
-    const V v177 = v67 * v167;
-    const V v178 = v61 * v165;
-    const V v179 = v61 * v167;
-    const V v180 = v176 - v178;
-    const V v181 = v178 - v176;
-    const V v182 = v177 - v179;
-    const V v183 = v179 - v177;
-    const V v184 = v168 * v54;
-    const V v185 = 1.0 + v184;
-    const V v186 = v182 - v65;
-    const V v187 = v62 * v165;
-    const V v188 = v62 * v167;
-    const V v189 = v174 - v187;
-    const V v190 = v187 - v174;
-    const V v191 = v175 - v188;
-    const V v192 = v188 - v175;
-    const V v193 = v170 * v53;
-    const V v194 = v185 - v193;
-    const V v195 = v49 * v165;
-    const V v196 = v85 + v195;
-    const V v197 = v49 * v167;
-    const V v198 = v87 + v197;
-    const V v199 = v56 * v165;
-    const V v200 = v78 + v199;
-    const V v201 = v56 * v167;
-    const V v202 = v80 + v201;
-    const V v203 = v169 * v55;
-    const V v204 = v194 - v203;
-    const V v205 = 2.0 * v204;
-    const V v206 = v204 * v204;
-    const V v207 = v55 * v190;
-    const V v208 = v207 + v200;
-    const V v209 = v55 * v192;
-    const V v210 = v209 + v202;
-    const V v211 = v60 + v189;
-    const V v212 = v64 - v191;
-    const V v213 = v50 * v190;
-    const V v214 = v213 + v196;
-    const V v215 = v50 * v192;
-    const V v216 = v215 + v198;
-    const V v217 = v169 * v205;
-    const V v218 = v59 + v180;
-    const V v219 = v170 * v205;
-    const V v220 = v168 * v205;
-    const V v221 = v45 * v180;
-    const V v222 = v221 + v214;
-    const V v223 = v45 * v182;
-    const V v224 = v223 + v216;
-    const V v225 = v212 * v222;
-    const V v226 = v206 * v161;
-    const V v227 = v186 * v222;
-    const V v228 = v167 * v222;
-    const V v229 = v53 * v180;
-    const V v230 = v229 + v208;
-    const V v231 = v53 * v182;
-    const V v232 = v231 + v210;
-    const V v233 = v230 * v212;
-    const V v234 = v232 * v222;
-    const V v235 = v232 * v218;
-    const V v236 = v218 * v224;
-    const V v237 = v227 - v236;
-    const V v238 = v165 * v224;
-    const V v239 = v228 - v238;
-    const V v240 = v165 * v232;
-    const V v241 = v230 * v224;
-    const V v242 = v234 - v241;
-    const V v243 = v167 * v230;
-    const V v244 = v240 - v243;
-    const V v245 = 2.0 * v242;
-    const V v246 = v242 * v242;
-    const V v247 = v232 * v211;
-    const V v248 = v233 + v247;
-    const V v249 = v211 * v224;
-    const V v250 = v225 + v249;
-    const V v251 = v230 * v186;
-    const V v252 = v235 - v251;
-    const V v253 = v237 * v245;
-    const V v254 = v245 * v250;
-    const V v255 = v206 * v246;
-    const V v256 = v206 * v245;
-    const V v257 = v205 * v246;
-    const V v258 = v239 * v245;
-    const V v259 = v161 * v245;
-    const V v260 = v161 * v246;
-    const V v261 = 1.0 / v255;
-    const V v262 = v245 * v259;
-    const V v263 = v226 * v258;
-    const V v264 = v220 * v260;
-    const V v265 = v206 * v254;
-    const V v266 = v206 * v253;
-    const V v267 = v206 * v262;
-    const V v268 = v206 * v267;
-    const V v269 = v219 * v246;
-    const V v270 = v266 - v269;
-    const V v271 = v217 * v246;
-    const V v272 = v265 - v271;
-    const V v273 = v261 * v261;
-    const V v274 = v263 * v273;
-    const V v275 = v264 * v273;
-    const V v276 = v268 * v273;
-    const V v277 = 1.0 - v261;
-    const V v278 = v161 * v277;
-    const V v279 = v161 * v273;
-    const V v280 = v270 * v279;
-    const V v281 = v272 * v279;
-    const V v282 = v220 * v278;
-    const V v283 = v253 * v278;
-    const V v284 = v254 * v278;
-    const V v285 = v258 * v278;
-    const V v286 = v206 * v275;
-    const V v287 = v282 + v286;
-    const V v288 = v257 * v275;
-    const V v289 = v246 * v274;
-    const V v290 = v285 + v289;
-    const V v291 = v256 * v274;
-    const V v292 = v246 * v280;
-    const V v293 = v283 + v292;
-    const V v294 = v206 * v280;
-    const V v295 = v219 * v278;
-    const V v296 = v294 - v295;
-    const V v297 = v246 * v281;
-    const V v298 = v284 + v297;
-    const V v299 = v246 * v278;
-    const V v300 = v206 * v281;
-    const V v301 = v217 * v278;
-    const V v302 = v300 - v301;
-    const V v303 = v206 * v278;
-    const V v304 = v173 * v299;
-    const V v305 = v288 + v304;
-    const V v306 = 2.0 * v303;
-    const V v307 = v276 + v306;
-    const V v308 = v239 * v306;
-    const V v309 = v291 + v308;
-    const V v310 = v245 * v303;
-    const V v311 = v245 * v287;
-    const V v312 = v245 * v296;
-    const V v313 = v245 * v302;
-    const V v314 = v237 * v306;
-    const V v315 = v312 + v314;
-    const V v316 = v250 * v306;
-    const V v317 = v313 + v316;
-    const V v318 = v252 * v307;
-    const V v319 = v248 * v307;
-    const V v320 = v244 * v307;
-    const V v321 = v205 * v290;
-    const V v322 = v205 * v293;
-    const V v323 = v205 * v298;
-    const V v324 = v205 * v299;
-    const V v325 = v171 * v299;
-    const V v326 = v322 - v325;
-    const V v327 = v172 * v299;
-    const V v328 = v323 - v327;
-    const V v329 = v218 * v310;
-    const V v330 = v186 * v310;
-    const V v331 = v212 * v310;
-    const V v332 = v170 * v326;
-    const V v333 = v170 * v321;
-    const V v334 = v169 * v321;
-    const V v335 = v169 * v324;
-    const V v336 = v170 * v324;
-    const V v337 = v168 * v324;
-    const V v338 = v230 * v311;
-    const V v339 = v232 * v311;
-    const V v340 = v222 * v311;
-    const V v341 = v224 * v311;
-    const V v342 = v167 * v338;
-    const V v343 = v167 * v340;
-    const V v344 = v165 * v339;
-    const V v345 = v165 * v341;
-    const V v346 = v183 * v338;
-    const V v347 = v191 * v338;
-    const V v348 = v182 * v340;
-    const V v349 = v192 * v340;
-    const V v350 = v180 * v339;
-    const V v351 = v346 + v350;
-    const V v352 = v190 * v339;
-    const V v353 = v347 + v352;
-    const V v354 = v181 * v341;
-    const V v355 = v348 + v354;
-    const V v356 = v189 * v341;
-    const V v357 = v349 + v356;
-    const V v358 = v168 * v305;
-    const V v359 = v170 * v305;
-    const V v360 = v169 * v305;
-    const V v361 = v170 * v328;
-    const V v362 = v169 * v328;
-    const V v363 = v230 * v310;
-    const V v364 = v224 * v310;
-    const V v365 = v232 * v310;
-    const V v366 = v222 * v310;
-    const V v367 = v165 * v310;
-    const V v368 = v165 * v364;
-    const V v369 = v165 * v365;
-    const V v370 = v167 * v310;
-    const V v371 = v167 * v363;
-    const V v372 = v167 * v366;
-    const V v373 = v222 * v309;
-    const V v374 = v230 * v309;
-    const V v375 = v367 + v374;
-    const V v376 = v224 * v309;
-    const V v377 = v232 * v309;
-    const V v378 = v370 + v377;
-    const V v379 = v182 * v366;
-    const V v380 = v192 * v366;
-    const V v381 = v167 * v373;
-    const V v382 = v182 * v373;
-    const V v383 = v192 * v373;
-    const V v384 = v167 * v375;
-    const V v385 = v230 * v318;
-    const V v386 = v232 * v318;
-    const V v387 = v230 * v319;
-    const V v388 = v232 * v319;
-    const V v389 = v230 * v320;
-    const V v390 = v232 * v320;
-    const V v391 = v183 * v385;
-    const V v392 = v183 * v375;
-    const V v393 = v191 * v375;
-    const V v394 = v183 * v387;
-    const V v395 = v191 * v387;
-    const V v396 = v167 * v389;
-    const V v397 = v183 * v389;
-    const V v398 = v191 * v389;
-    const V v399 = v180 * v386;
-    const V v400 = v391 + v399;
-    const V v401 = v180 * v388;
-    const V v402 = v190 * v388;
-    const V v403 = v180 * v390;
-    const V v404 = v397 + v403;
-    const V v405 = v190 * v390;
-    const V v406 = v398 + v405;
-    const V v407 = v165 * v390;
-    const V v408 = v190 * v378;
-    const V v409 = v393 + v408;
-    const V v410 = v165 * v378;
-    const V v411 = v180 * v378;
-    const V v412 = v392 + v411;
-    const V v413 = v183 * v363;
-    const V v414 = v191 * v363;
-    const V v415 = v165 * v376;
-    const V v416 = v180 * v365;
-    const V v417 = v413 + v416;
-    const V v418 = v190 * v365;
-    const V v419 = v414 + v418;
-    const V v420 = v181 * v376;
-    const V v421 = v382 + v420;
-    const V v422 = v189 * v376;
-    const V v423 = v383 + v422;
-    const V v424 = v181 * v364;
-    const V v425 = v379 + v424;
-    const V v426 = v189 * v364;
-    const V v427 = v380 + v426;
-    const V v428 = v222 * v315;
-    const V v429 = v222 * v317;
-    const V v430 = v224 * v315;
-    const V v431 = v224 * v317;
-    const V v432 = v181 * v430;
-    const V v433 = v181 * v431;
-    const V v434 = v189 * v431;
-    const V v435 = v230 * v317;
-    const V v436 = v230 * v315;
-    const V v437 = v329 + v436;
-    const V v438 = v232 * v315;
-    const V v439 = v330 + v438;
-    const V v440 = v232 * v317;
-    const V v441 = v331 + v440;
-    const V v442 = v211 * v310;
-    const V v443 = v435 - v442;
-    const V v444 = v182 * v428;
-    const V v445 = v432 + v444;
-    const V v446 = v182 * v429;
-    const V v447 = v433 + v446;
-    const V v448 = v192 * v429;
-    const V v449 = v434 + v448;
-    const V v450 = v190 * v439;
-    const V v451 = v190 * v441;
-    const V v452 = v167 * v437;
-    const V v453 = v167 * v443;
-    const V v454 = v165 * v439;
-    const V v455 = v165 * v441;
-    const V v456 = v180 * v439;
-    const V v457 = v180 * v441;
-    const V v458 = v191 * v437;
-    const V v459 = v450 + v458;
-    const V v460 = v191 * v443;
-    const V v461 = v451 + v460;
-    const V v462 = v183 * v437;
-    const V v463 = v456 + v462;
-    const V v464 = v183 * v443;
-    const V v465 = v457 + v464;
-    V s466 = softehl_splat(0.0);
-    V s467 = softehl_splat(0.0);
-    V s468 = softehl_splat(0.0);
-    V s469 = softehl_splat(0.0);
-    V s470 = softehl_splat(0.0);
-    V s471 = softehl_splat(0.0);
-    V s472 = softehl_splat(0.0);
-    V s473 = softehl_splat(0.0);
-    V s474 = softehl_splat(0.0);
-    V s475 = softehl_splat(0.0);
-    V s476 = softehl_splat(0.0);
-    V s477 = softehl_splat(0.0);
-    V s478 = softehl_splat(0.0);
-    V s479 = softehl_splat(0.0);
-    V s480 = softehl_splat(0.0);
-    V s481 = softehl_splat(0.0);
-    V s482 = softehl_splat(0.0);
-    V s483 = softehl_splat(0.0);
-    V s484 = softehl_splat(0.0);
-    V s485 = softehl_splat(0.0);
-    V s486 = softehl_splat(0.0);
-    V s487 = softehl_splat(0.0);
-    V s488 = softehl_splat(0.0);
-    V s489 = softehl_splat(0.0);
-    V s490 = softehl_splat(0.0);
-    V s491 = softehl_splat(0.0);
-    V s492 = softehl_splat(0.0);
-    V s493 = softehl_splat(0.0);
-    V s494 = softehl_splat(0.0);
-    V s495 = softehl_splat(0.0);
-    V s496 = softehl_splat(0.0);
-    V s497 = softehl_splat(0.0);
-    V s498 = softehl_splat(0.0);
-    V s499 = softehl_splat(0.0);
-    V s500 = softehl_splat(0.0);
-    V s501 = softehl_splat(0.0);
-    V s502 = softehl_splat(0.0);
-    V s503 = softehl_splat(0.0);
-    V s504 = softehl_splat(0.0);
-    V s505 = softehl_splat(0.0);
-    V s506 = softehl_splat(0.0);
-    V s507 = softehl_splat(0.0);
-    V s508 = softehl_splat(0.0);
-    V s509 = softehl_splat(0.0);
-    V s510 = softehl_splat(0.0);
-    V s511 = softehl_splat(0.0);
-    V s512 = softehl_splat(0.0);
-    V s513 = softehl_splat(0.0);
-    V s514 = softehl_splat(0.0);
-    V s515 = softehl_splat(0.0);
-    V s516 = softehl_splat(0.0);
-    V s517 = softehl_splat(0.0);
-    V s518 = softehl_splat(0.0);
-    V s519 = softehl_splat(0.0);
-    V s520 = softehl_splat(0.0);
-    V s521 = softehl_splat(0.0);
-    V s522 = softehl_splat(0.0);
-    V s523 = softehl_splat(0.0);
-    V s524 = softehl_splat(0.0);
-    V s525 = softehl_splat(0.0);
-    V s526 = softehl_splat(0.0);
+    const V v89 = 1.0 / s48, v90 = s49 * v89, v91 = v89 * s50, v92 = v89 * s51, v93 = v89 * s52,
+        v94 = s45 * v89, v95 = s46 * v89, v96 = s47 * v89, v97 = v94 - v96, v98 = v94 + v96,
+        v99 = v35 + v43 * v93, v100 = v34 + v43 * v92, v101 = v36 + v41 * v92,
+        v102 = v41 * v93 - v37, v103 = v37 + v42 * v93, v104 = v42 * v92 - v36,
+        v105 = v38 + v44 * v92, v106 = v39 + v44 * v93,
+        v107 = d7 * (v98 - v95) + (d5 * (v95 + v98) + (d3 * (v95 + v97) + (1.0 + d1 * (v97 - v95)))),
+        v108 = (d6 * v104 + (d4 * v105 + (d0 * v100 + (1.0 + d2 * v101)))) * (d7 * v103 + (d5 * v106 + (d1 * v99 + (1.0 + d3 * v102)))),
+        v109 = (d6 * v103 + (d4 * v106 + (d0 * v99 + d2 * v102))) * (d7 * v104 + (d5 * v105 + (d1 * v100 + d3 * v101))),
+        v110 = v107 * (v108 - v109);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v527 = w[2] * v11;
-        const double v528 = 0.25 * w[1];
-        const double v529 = 1.0 - w[1];
-        const double v530 = 1.0 + w[1];
-        const double v531 = 0.25 * w[0];
-        const V v532 = w[1] - v163;
-        const double v533 = 0.25 * v530;
-        const V v534 = w[0] - v162;
-        const double v535 = 1.0 - w[0];
-        const double v536 = 1.0 + w[0];
-        const V v537 = v33 * v532;
-        const double v538 = v528 - 0.25;
-        const V v539 = v31 * v534;
-        const double v540 = v531 - 0.25;
-        const V v541 = v20 * v534;
-        const V v542 = X5 * v536;
-        const V v543 = X3 * v536;
-        const V v544 = v13 * v532;
-        const V v545 = v541 - v544;
-        const double v546 = 0.25 - v528;
-        const double v547 = 0.25 + v528;
-        const double v548 = 0.25 + v531;
-        const double v549 = 0.25 - v531;
-        const V v550 = v537 - v539;
-        const V v551 = v537 + v539;
-        const V v552 = X3 * v546;
-        const V v553 = X2 * v546;
-        const V v554 = X7 * v535;
-        const V v555 = v542 + v554;
-        const V v556 = X1 * v535;
-        const V v557 = v556 + v543;
-        const V v558 = X7 * v549;
-        const V v559 = X6 * v549;
-        const V v560 = v58 * v551;
-        const V v561 = v168 - v560;
-        const V v562 = v533 * v555;
-        const V v563 = 0.25 * v557;
-        const V v564 = v547 * v9;
-        const V v565 = v553 + v564;
-        const V v566 = v547 * v22;
-        const V v567 = v552 + v566;
-        const V v568 = X1 * v540;
-        const V v569 = v558 + v568;
-        const V v570 = X0 * v540;
-        const V v571 = v559 + v570;
-        const V v572 = v529 * v563;
-        const V v573 = v562 + v572;
-        const V v574 = X0 * v538;
-        const V v575 = v574 + v565;
-        const V v576 = X1 * v538;
-        const V v577 = v576 + v567;
-        const V v578 = v561 * v561;
-        const V v579 = v548 * v19;
-        const V v580 = v579 + v569;
-        const V v581 = v548 * v7;
-        const V v582 = v581 + v571;
-        const V v583 = v580 * v575;
-        const V v584 = v57 * v534;
-        const V v585 = v169 + v584;
-        const V v586 = v57 * v532;
-        const V v587 = v170 + v586;
-        const V v588 = v582 * v577;
-        const V v589 = v583 - v588;
-        const V v590 = v44 * v550;
-        const V v591 = v164 + v590;
-        const V v592 = v44 * v545;
-        const V v593 = v166 + v592;
-        const V v594 = v573 * v589;
-        const V v595 = 0.25 * v591;
-        const V v596 = 0.25 * v593;
-        const V v597 = v561 * v54;
-        const V v598 = 1.0 + v597;
-        const V v599 = v591 * v83;
-        const V v600 = v593 * v83;
-        const V v601 = v591 * v70;
-        const V v602 = v593 * v70;
-        const V v603 = v587 * v53;
-        const V v604 = v598 - v603;
-        const V v605 = v527 * v594;
-        const V v606 = v59 + v599;
-        const V v607 = v585 * v55;
-        const V v608 = v604 - v607;
-        const V v609 = v64 + v602;
-        const V v610 = v53 * v599;
-        const V v611 = v78 + v610;
-        const V v612 = v53 * v600;
-        const V v613 = v80 + v612;
-        const V v614 = v601 - v60;
-        const V v615 = v608 * v608;
-        const V v616 = 2.0 * v608;
-        const V v617 = v600 - v65;
-        const V v618 = v55 * v601;
-        const V v619 = v618 + v611;
-        const V v620 = v55 * v602;
-        const V v621 = v620 + v613;
-        const V v622 = v18 * v605;
-        const V v623 = v3 * v605;
-        const V v624 = v616 * v616;
-        const V v625 = v56 * v595;
-        const V v626 = v625 + v619;
-        const V v627 = v56 * v596;
-        const V v628 = v627 + v621;
-        const V v629 = 2.0 * v626;
-        const V v630 = 2.0 * v628;
-        const V v631 = v626 * v626;
-        const V v632 = v615 + v631;
-        const V v633 = v49 * v595;
-        const V v634 = v85 + v633;
-        const V v635 = v49 * v596;
-        const V v636 = v87 + v635;
-        const V v637 = v628 * v628;
-        const V v638 = v632 + v637;
-        const V v639 = v50 * v602;
-        const V v640 = v639 + v636;
-        const V v641 = v50 * v601;
-        const V v642 = v641 + v634;
-        const V v643 = v45 * v600;
-        const V v644 = v643 + v640;
-        const V v645 = v45 * v599;
-        const V v646 = v645 + v642;
-        const V v647 = 2.0 * v644;
-        const V v648 = v644 * v644;
-        const V v649 = v638 + v648;
-        const V v650 = 2.0 * v646;
-        const V v651 = v628 * v646;
-        const V v652 = v646 * v646;
-        const V v653 = v649 + v652;
-        const V v654 = v626 * v644;
-        const V v655 = v651 - v654;
-        const V v656 = 2.0 * v655;
-        const V v657 = v655 * v655;
-        const V v658 = v622 * v653;
-        const V v659 = v628 * v656;
-        const V v660 = v646 * v656;
-        const V v661 = v626 * v656;
-        const V v662 = v644 * v656;
-        const V v663 = 0.3333333333333333 * v657;
-        const V v664 = v615 * v657;
-        const V v665 = v615 * v656;
-        const V v666 = softehl_vrcbrt(v664);
-        const V v667 = v616 * v657;
-        const V v668 = v615 * v659;
-        const V v669 = v615 * v660;
-        const V v670 = v615 * v661;
-        const V v671 = v615 * v662;
-        const V v672 = 0.3333333333333333 * v665;
-        const V v673 = v666 * v666;
-        const V v674 = 0.3333333333333333 * v673;
-        const V v675 = v673 * v674;
-        const V v676 = v667 * v675;
-        const V v677 = v668 * v675;
-        const V v678 = v669 * v675;
-        const V v679 = v670 * v675;
-        const V v680 = v671 * v675;
-        const V v681 = v666 * v673;
-        const V v682 = v657 * v675;
-        const V v683 = v665 * v675;
-        const V v684 = 1.3333333333333333 * v666;
-        const V v685 = v681 * v684;
-        const V v686 = v681 * v685;
-        const V v687 = v616 * v666;
-        const V v688 = v653 * v676;
-        const V v689 = v687 - v688;
-        const V v690 = v653 * v682;
-        const V v691 = v666 - v690;
-        const V v692 = v653 * v675;
-        const V v693 = v653 * v679;
-        const V v694 = v653 * v680;
-        const V v695 = v653 * v666;
-        const V v696 = (-3.0) + v695;
-        const V v697 = v3 * v696;
-        const V v698 = 1.0 - v697;
-        const V v699 = 1.0 / v698;
-        const V v700 = v699 * v699;
-        const V v701 = v623 * v699;
-        const V v702 = v679 * v701;
-        const V v703 = v680 * v701;
-        const V v704 = v653 * v701;
-        const V v705 = v666 * v701;
-        const V v706 = v675 * v704;
-        const V v707 = v615 * v706;
-        const V v708 = v663 * v704;
-        const V v709 = v672 * v704;
-        const V v710 = 2.0 * v705;
-        const V v711 = v686 * v709;
-        const V v712 = v657 * v706;
-        const V v713 = v705 - v712;
-        const V v714 = 2.0 * v713;
-        const V v715 = v616 * v713;
-        const V v716 = v656 * v707;
-        const V v717 = v561 * v715;
-        s466 += v717;
-        const V v718 = v626 * v716;
-        const V v719 = v644 * v716;
-        const V v720 = v629 * v705;
-        const V v721 = v719 + v720;
-        s468 += v721;
-        const V v722 = v647 * v705;
-        const V v723 = v718 + v722;
-        s469 += v723;
-        const V v724 = v647 * v666;
-        const V v725 = v629 * v666;
-        const V v726 = v650 * v666;
-        const V v727 = v658 * v726;
-        const V v728 = v658 * v724;
-        const V v729 = v693 + v724;
-        const V v730 = v630 * v666;
-        const V v731 = v622 * v666;
-        const V v732 = v729 * v731;
-        const V v733 = v658 * v725;
-        const V v734 = v694 + v725;
-        const V v735 = v731 * v734;
-        const V v736 = v658 * v730;
-        const V v737 = v689 * v731;
-        const V v738 = v622 * v700;
-        const V v739 = v691 * v738;
-        const V v740 = v658 * v700;
-        const V v741 = v700 * v737;
-        const V v742 = v700 * v727;
-        const V v743 = v700 * v728;
-        const V v744 = v700 * v733;
-        const V v745 = v700 * v736;
-        const V v746 = v700 * v732;
-        const V v747 = v702 + v746;
-        const V v748 = v700 * v735;
-        const V v749 = v703 + v748;
-        const V v750 = v683 * v740;
-        const V v751 = v666 * v739;
-        const V v752 = v676 * v701;
-        const V v753 = v741 - v752;
-        const V v754 = v682 * v701;
-        const V v755 = v751 - v754;
-        const V v756 = v650 * v701;
-        const V v757 = v742 + v756;
-        const V v758 = v650 * v753;
-        const V v759 = v650 * v747;
-        const V v760 = v650 * v749;
-        const V v761 = v630 * v701;
-        const V v762 = v745 + v761;
-        const V v763 = v630 * v753;
-        const V v764 = v653 * v739;
-        const V v765 = v701 + v764;
-        const V v766 = v675 * v765;
-        const V v767 = v686 * v708;
-        const V v768 = v766 - v767;
-        const V v769 = v657 * v768;
-        const V v770 = v755 - v769;
-        const V v771 = v624 * v770;
-        const V v772 = v714 + v771;
-        const V v773 = v653 * v677;
-        const V v774 = v726 - v773;
-        const V v775 = v653 * v678;
-        const V v776 = v730 - v775;
-        const V v777 = v731 * v774;
-        const V v778 = v731 * v776;
-        const V v779 = v700 * v777;
-        const V v780 = v700 * v778;
-        const V v781 = v677 * v701;
-        const V v782 = v779 - v781;
-        const V v783 = v678 * v701;
-        const V v784 = v780 - v783;
-        const V v785 = v650 * v784;
-        const V v786 = v578 * v772;
-        s485 += v786;
-        const V v787 = v650 * v782;
-        const V v788 = v710 + v787;
-        const V v789 = v650 * v705;
-        const V v790 = v630 * v705;
-        const V v791 = v630 * v784;
-        const V v792 = v710 + v791;
-        const V v793 = v785 - v716;
-        const V v794 = v628 * v716;
-        const V v795 = v789 - v794;
-        s470 += v795;
-        const V v796 = v646 * v716;
-        const V v797 = v790 - v796;
-        s467 += v797;
-        const V v798 = v600 * v797;
-        const V v799 = v602 * v797;
-        const V v800 = v596 * v797;
-        const V v801 = v600 * v723;
-        const V v802 = v602 * v723;
-        const V v803 = v596 * v723;
-        const V v804 = v647 * v784;
-        const V v805 = v629 * v784;
-        const V v806 = v647 * v753;
-        const V v807 = v629 * v753;
-        const V v808 = v647 * v701;
-        const V v809 = v743 + v808;
-        const V v810 = v629 * v701;
-        const V v811 = v744 + v810;
-        const V v812 = v683 * v809;
-        const V v813 = v683 * v811;
-        const V v814 = v599 * v795;
-        s476 += v801;
-        s476 += v814;
-        const V v815 = v601 * v795;
-        s475 += v802;
-        s475 += v815;
-        const V v816 = v595 * v795;
-        s474 += v803;
-        s474 += v816;
-        const V v817 = v647 * v747;
-        const V v818 = v710 + v817;
-        const V v819 = v647 * v749;
-        const V v820 = v716 + v819;
-        const V v821 = v629 * v749;
-        const V v822 = v710 + v821;
-        const V v823 = v692 * v750;
-        const V v824 = v711 + v823;
-        const V v825 = v665 * v824;
-        const V v826 = v657 * v824;
-        const V v827 = v666 * v750;
-        const V v828 = v826 - v827;
-        const V v829 = v683 * v701;
-        const V v830 = v828 - v829;
-        const V v831 = v656 * v706;
-        const V v832 = v830 - v831;
-        const V v833 = v616 * v832;
-        const V v834 = 2.0 * v707;
-        const V v835 = v825 - v834;
-        const V v836 = v626 * v835;
-        const V v837 = v812 + v836;
-        const V v838 = v626 * v837;
-        const V v839 = v818 + v838;
-        const V v840 = v644 * v835;
-        const V v841 = v813 + v840;
-        const V v842 = v626 * v841;
-        const V v843 = v820 + v842;
-        const V v844 = v644 * v841;
-        const V v845 = v822 + v844;
-        const V v846 = v628 * v835;
-        const V v847 = v646 * v835;
-        const V v848 = v626 * v833;
-        const V v849 = v806 - v848;
-        const V v850 = v628 * v833;
-        const V v851 = v758 + v850;
-        const V v852 = v646 * v833;
-        const V v853 = v763 + v852;
-        const V v854 = v644 * v833;
-        const V v855 = v807 - v854;
-        const V v856 = v683 * v757;
-        const V v857 = v846 - v856;
-        const V v858 = v683 * v762;
-        const V v859 = v847 - v858;
-        const V v860 = v628 * v857;
-        const V v861 = v788 + v860;
-        const V v862 = v628 * v837;
-        const V v863 = v759 - v862;
-        const V v864 = v628 * v841;
-        const V v865 = v760 - v864;
-        const V v866 = v626 * v859;
-        const V v867 = v804 - v866;
-        const V v868 = v628 * v859;
-        const V v869 = v793 + v868;
-        const V v870 = v646 * v859;
-        const V v871 = v792 + v870;
-        const V v872 = v644 * v859;
-        const V v873 = v805 - v872;
-        const V v874 = v561 * v849;
-        s477 += v874;
-        const V v875 = v561 * v851;
-        s478 += v875;
-        const V v876 = v561 * v853;
-        s479 += v876;
-        const V v877 = v561 * v855;
-        s480 += v877;
-        const V v878 = v587 * v853;
-        const V v879 = v587 * v855;
-        const V v880 = v585 * v853;
-        const V v881 = v585 * v855;
-        const V v882 = v600 * v849;
-        const V v883 = v600 * v853;
-        const V v884 = v602 * v849;
-        const V v885 = v602 * v853;
-        const V v886 = v596 * v853;
-        const V v887 = v596 * v849;
-        const V v888 = v596 * v867;
-        const V v889 = v600 * v867;
-        const V v890 = v602 * v867;
-        const V v891 = v599 * v855;
-        const V v892 = v883 + v891;
-        const V v893 = v599 * v851;
-        const V v894 = v882 + v893;
-        const V v895 = v595 * v855;
-        const V v896 = v886 + v895;
-        const V v897 = v595 * v851;
-        const V v898 = v887 + v897;
-        const V v899 = v599 * v869;
-        const V v900 = v889 + v899;
-        const V v901 = v601 * v869;
-        const V v902 = v890 + v901;
-        const V v903 = v601 * v855;
-        const V v904 = v885 + v903;
-        const V v905 = v561 * v896;
-        s484 += v905;
-        const V v906 = v561 * v894;
-        s481 += v906;
-        const V v907 = v561 * v898;
-        s483 += v907;
-        const V v908 = v595 * v869;
-        const V v909 = v888 + v908;
-        const V v910 = v595 * v843;
-        s496 += v888;
-        s496 += v910;
-        const V v911 = v595 * v865;
-        const V v912 = v601 * v865;
-        const V v913 = v600 * v843;
-        const V v914 = v600 * v863;
-        const V v915 = v595 * v863;
-        const V v916 = v601 * v863;
-        const V v917 = v602 * v843;
-        const V v918 = v912 + v917;
-        const V v919 = v602 * v863;
-        const V v920 = v599 * v865;
-        const V v921 = v913 + v920;
-        const V v922 = v599 * v863;
-        const V v923 = v599 * v861;
-        const V v924 = v914 + v923;
-        const V v925 = v602 * v839;
-        const V v926 = v916 + v925;
-        const V v927 = v601 * v861;
-        const V v928 = v919 + v927;
-        const V v929 = v596 * v843;
-        const V v930 = v911 + v929;
-        const V v931 = v596 * v863;
-        const V v932 = v596 * v839;
-        const V v933 = v915 + v932;
-        s490 += v933;
-        const V v934 = v600 * v839;
-        const V v935 = v922 + v934;
-        const V v936 = v596 * v926;
-        const V v937 = v609 * v926;
-        const V v938 = v609 * v839;
-        const V v939 = v617 * v839;
-        const V v940 = v596 * v933;
-        const V v941 = v617 * v863;
-        const V v942 = v609 * v863;
-        const V v943 = v617 * v935;
-        const V v944 = v609 * v935;
-        const V v945 = v596 * v935;
-        const V v946 = v614 * v863;
-        s488 += v938;
-        s488 += v946;
-        const V v947 = v606 * v863;
-        s486 += v939;
-        s486 += v947;
-        const V v948 = v614 * v928;
-        s512 += v937;
-        s512 += v948;
-        const V v949 = v595 * v928;
-        s513 += v936;
-        s513 += v949;
-        const V v950 = v606 * v861;
-        s487 += v941;
-        s487 += v950;
-        const V v951 = v614 * v861;
-        s489 += v942;
-        s489 += v951;
-        const V v952 = v595 * v861;
-        const V v953 = v931 + v952;
-        s491 += v953;
-        const V v954 = v606 * v924;
-        s506 += v943;
-        s506 += v954;
-        const V v955 = v614 * v924;
-        s507 += v944;
-        s507 += v955;
-        const V v956 = v595 * v924;
-        s508 += v945;
-        s508 += v956;
-        const V v957 = v606 * v843;
-        const V v958 = v614 * v843;
-        const V v959 = v595 * v953;
-        s517 += v940;
-        s517 += v959;
-        const V v960 = v606 * v865;
-        const V v961 = v614 * v865;
-        const V v962 = v606 * v873;
-        const V v963 = v614 * v873;
-        const V v964 = v595 * v873;
-        const V v965 = v617 * v873;
-        const V v966 = v617 * v867;
-        s492 += v957;
-        s492 += v966;
-        const V v967 = v609 * v867;
-        s494 += v958;
-        s494 += v967;
-        const V v968 = v609 * v873;
-        const V v969 = v617 * v869;
-        s493 += v960;
-        s493 += v969;
-        const V v970 = v609 * v869;
-        s495 += v961;
-        s495 += v970;
-        s498 += v962;
-        s498 -= v878;
-        s500 += v963;
-        s500 -= v880;
-        s499 += v965;
-        s499 -= v879;
-        const V v971 = v596 * v869;
-        s497 += v911;
-        s497 += v971;
-        const V v972 = v596 * v873;
-        s501 += v968;
-        s501 -= v881;
-        const V v973 = v617 * v871;
-        s498 += v973;
-        const V v974 = v609 * v871;
-        s500 += v974;
-        const V v975 = v596 * v871;
-        const V v976 = v964 + v975;
-        s502 += v976;
-        const V v977 = v600 * v871;
-        const V v978 = v600 * v873;
-        const V v979 = v602 * v871;
-        const V v980 = v602 * v873;
-        const V v981 = v596 * v976;
-        const V v982 = v980 - v881;
-        const V v983 = v977 - v878;
-        const V v984 = v978 - v879;
-        const V v985 = v979 - v880;
-        const V v986 = v617 * v900;
-        const V v987 = v609 * v900;
-        const V v988 = v596 * v900;
-        const V v989 = v599 * v873;
-        const V v990 = v983 + v989;
-        const V v991 = v601 * v873;
-        const V v992 = v985 + v991;
-        const V v993 = v601 * v845;
-        const V v994 = v982 + v993;
-        const V v995 = v599 * v845;
-        const V v996 = v984 + v995;
-        const V v997 = v599 * v721;
-        s473 += v798;
-        s473 += v997;
-        const V v998 = v601 * v721;
-        s472 += v799;
-        s472 += v998;
-        const V v999 = v595 * v721;
-        s471 += v800;
-        s471 += v999;
-        const V v1000 = v595 * v921;
-        s511 += v988;
-        s511 += v1000;
-        const V v1001 = v609 * v990;
-        const V v1002 = v596 * v990;
-        const V v1003 = v617 * v990;
-        const V v1004 = v595 * v994;
-        const V v1005 = v614 * v994;
-        const V v1006 = v601 * v851;
-        const V v1007 = v884 + v1006;
-        const V v1008 = v585 * v715;
-        s472 -= v1008;
-        const V v1009 = v587 * v715;
-        s473 -= v1009;
-        const V v1010 = v587 * v851;
-        s493 -= v1010;
-        const V v1011 = v585 * v851;
-        s495 -= v1011;
-        const V v1012 = v595 * v996;
-        s523 += v1002;
-        s523 += v1012;
-        const V v1013 = v596 * v992;
-        s525 += v1004;
-        s525 += v1013;
-        const V v1014 = v609 * v992;
-        s524 += v1005;
-        s524 += v1014;
-        const V v1015 = v561 * v1007;
-        s482 += v1015;
-        const V v1016 = v609 * v902;
-        const V v1017 = v596 * v902;
-        const V v1018 = v617 * v902;
-        const V v1019 = v617 * v909;
-        const V v1020 = v609 * v909;
-        const V v1021 = v596 * v909;
-        const V v1022 = v595 * v918;
-        s516 += v1017;
-        s516 += v1022;
-        const V v1023 = v585 * v1007;
-        s515 += v1016;
-        s515 -= v1023;
-        const V v1024 = v587 * v1007;
-        s514 += v1018;
-        s514 -= v1024;
-        const V v1025 = v587 * v898;
-        s518 += v1019;
-        s518 -= v1025;
-        const V v1026 = v585 * v898;
-        s519 += v1020;
-        s519 -= v1026;
-        const V v1027 = v595 * v930;
-        s520 += v1021;
-        s520 += v1027;
-        const V v1028 = v614 * v918;
-        s515 += v1028;
-        const V v1029 = v606 * v918;
-        s514 += v1029;
-        const V v1030 = v606 * v930;
-        s518 += v1030;
-        const V v1031 = v614 * v930;
-        s519 += v1031;
-        const V v1032 = v587 * v849;
-        s492 -= v1032;
-        const V v1033 = v585 * v849;
-        s494 -= v1033;
-        const V v1034 = v606 * v845;
-        s499 += v1034;
-        const V v1035 = v614 * v845;
-        s501 += v1035;
-        const V v1036 = v595 * v845;
-        const V v1037 = v972 + v1036;
-        s503 += v1037;
-        const V v1038 = v595 * v1037;
-        s526 += v981;
-        s526 += v1038;
-        const V v1039 = v587 * v772;
-        const V v1040 = v892 - v1039;
-        const V v1041 = v585 * v772;
-        const V v1042 = v904 - v1041;
-        const V v1043 = v587 * v894;
-        s509 += v986;
-        s509 -= v1043;
-        const V v1044 = v585 * v894;
-        s510 += v987;
-        s510 -= v1044;
-        const V v1045 = v587 * v1040;
-        s521 += v1003;
-        s521 -= v1045;
-        const V v1046 = v561 * v1040;
-        s504 += v1046;
-        const V v1047 = v561 * v1042;
-        s505 += v1047;
-        const V v1048 = v585 * v1042;
-        s524 -= v1048;
-        const V v1049 = v585 * v1040;
-        s522 += v1001;
-        s522 -= v1049;
-        const V v1050 = v606 * v921;
-        s509 += v1050;
-        const V v1051 = v614 * v921;
-        s510 += v1051;
-        const V v1052 = v606 * v996;
-        s521 += v1052;
-        const V v1053 = v614 * v996;
-        s522 += v1053;
-    }
-    const V v1054 = v365 + s470;
-    const V v1055 = s469 - v363;
-    const V v1056 = v369 + s474;
-    const V v1057 = s475 + v419;
-    const V v1058 = v59 * v1054;
-    const V v1059 = v1058 + s476;
-    const V v1060 = v60 * v1054;
-    const V v1061 = v1057 - v1060;
-    const V v1062 = v371 - v1056;
-    const V v1063 = v1056 - v371;
-    const V v1064 = v64 * v1055;
-    const V v1065 = v1064 + v1061;
-    const V v1066 = v65 * v1055;
-    const V v1067 = v1059 - v1066;
-    const V v1068 = v417 + v1067;
-    const V v1069 = v1065 - v1068;
-    const V v1070 = v1065 + v1068;
-    const V v1071 = v1062 - v1069;
-    const V v1072 = v1063 + v1070;
-    const V v1073 = v1063 - v1070;
-    const V v1074 = v1069 - v1063;
-    const V v1075 = v366 + s467;
-    const V v1076 = v337 + s466;
-    const V v1077 = s468 - v364;
-    const V v1078 = v372 - v368;
-    const V v1079 = s472 - v335;
-    const V v1080 = s471 + v1078;
-    const V v1081 = s473 - v336;
-    const V v1082 = v64 * v1075;
-    const V v1083 = v1082 + v1079;
-    const V v1084 = v65 * v1075;
-    const V v1085 = v1081 - v1084;
-    const V v1086 = v1076 - v1080;
-    const V v1087 = v1076 + v1080;
-    const V v1088 = v60 * v1077;
-    const V v1089 = v1083 - v1088;
-    const V v1090 = v59 * v1077;
-    const V v1091 = v1090 + v1085;
-    const V v1092 = v427 + v1089;
-    const V v1093 = v425 + v1091;
-    const V v1094 = v1092 - v1093;
-    const V v1095 = v1092 + v1093;
-    const V v1096 = v1086 - v1094;
-    const V v1097 = v1086 + v1094;
-    const V v1098 = v1087 + v1095;
-    softehl_store4(R + 0, 8, v1072, v1098, v1071, v1096);
-    const V v1099 = v1087 - v1095;
-    softehl_store4(R + 4, 8, v1073, v1099, v1074, v1097);
-    const V v1100 = v386 + s487;
-    const V v1101 = v387 + s488;
-    const V v1102 = v390 + s491;
-    const V v1103 = s486 - v385;
-    const V v1104 = v407 - v396;
-    const V v1105 = s489 - v388;
-    const V v1106 = s517 + v1104;
-    const V v1107 = s490 - v389;
-    const V v1108 = v65 * v1103;
-    const V v1109 = s506 - v1108;
-    const V v1110 = s507 - v394;
-    const V v1111 = s508 + v404;
-    const V v1112 = s512 - v395;
-    const V v1113 = v59 * v1100;
-    const V v1114 = v1113 + v1109;
-    const V v1115 = s513 + v406;
-    const V v1116 = v1110 - v401;
-    const V v1117 = v65 * v1107;
-    const V v1118 = v1111 - v1117;
-    const V v1119 = v1112 - v402;
-    const V v1120 = v65 * v1101;
-    const V v1121 = v1116 - v1120;
-    const V v1122 = v400 + v1114;
-    const V v1123 = v64 * v1107;
-    const V v1124 = v1123 + v1115;
-    const V v1125 = v64 * v1101;
-    const V v1126 = v1125 + v1119;
-    const V v1127 = v59 * v1102;
-    const V v1128 = v1127 + v1118;
-    const V v1129 = v59 * v1105;
-    const V v1130 = v1129 + v1121;
-    const V v1131 = v60 * v1102;
-    const V v1132 = v1124 - v1131;
-    const V v1133 = v60 * v1105;
-    const V v1134 = v1126 - v1133;
-    const V v1135 = v1106 + v1132;
-    const V v1136 = v1122 + v1130;
-    const V v1137 = v1130 - v1122;
-    const V v1138 = v1122 - v1130;
-    const V v1139 = v1128 + v1132;
-    const V v1140 = v1128 - v1137;
-    const V v1141 = v1138 - v1128;
-    const V v1142 = v1106 - v1139;
-    const V v1143 = v1130 + v1134;
-    const V v1144 = v1128 - v1136;
-    const V v1145 = v1137 - v1128;
-    const V v1146 = v1128 + v1136;
-    const V v1147 = v1134 - v1130;
-    const V v1148 = v1136 - v1128;
-    const V v1149 = v1132 - v1128;
-    const V v1150 = v1147 - v1128;
-    const V v1151 = v1132 - v1147;
-    const V v1152 = v1143 + v1146;
-    const V v1153 = v1132 - v1143;
-    const V v1154 = v1142 + v1148;
-    const V v1155 = v1132 + v1150;
-    const V v1156 = v1147 - v1132;
-    const V v1157 = v1143 - v1132;
-    const V v1158 = v1142 + v1153;
-    const V v1159 = v1139 + v1152;
-    const V v1160 = v1106 - v1149;
-    const V v1161 = v1154 + v1157;
-    const V v1162 = v1144 + v1158;
-    const V v1163 = v1139 + v1144;
-    const V v1164 = v1149 - v1106;
-    const V v1165 = v1163 - v1106;
-    const V v1166 = v1145 + v1151;
-    const V v1167 = v1157 + v1165;
-    const V v1168 = v1160 + v1166;
-    const V v1169 = v1145 + v1156;
-    const V v1170 = v1156 + v1160;
-    const V v1171 = v1151 + v1164;
-    const V v1172 = v1164 + v1169;
-    const V v1173 = v1135 + v1155;
-    const V v1174 = v1135 + v1159;
-    const V v1175 = v1141 - v1173;
-    const V v1176 = v1141 + v1173;
-    const V v1177 = v1140 + v1170;
-    const V v1178 = v1140 + v1171;
-    const V v1179 = v339 + s478;
-    const V v1180 = v344 - v342;
-    const V v1181 = v378 + s497;
-    const V v1182 = v439 + s493;
-    const V v1183 = v410 - v384;
-    const V v1184 = v441 + s495;
-    const V v1185 = s483 + v1180;
-    const V v1186 = v454 - v452;
-    const V v1187 = s520 + v1183;
-    const V v1188 = v455 - v453;
-    const V v1189 = s477 - v338;
-    const V v1190 = s518 + v1186;
-    const V v1191 = s481 + v351;
-    const V v1192 = s519 + v1188;
-    const V v1193 = s482 + v353;
-    const V v1194 = v1185 + v1190;
-    const V v1195 = v1185 - v1190;
-    const V v1196 = s492 - v437;
-    const V v1197 = v1185 + v1187;
-    const V v1198 = s494 - v443;
-    const V v1199 = s496 - v375;
-    const V v1200 = v1192 + v1195;
-    const V v1201 = s509 + v463;
-    const V v1202 = s510 + v465;
-    const V v1203 = s511 + v412;
-    const V v1204 = s514 + v459;
-    const V v1205 = s515 + v461;
-    const V v1206 = s516 + v409;
-    const V v1207 = v1190 + v1192;
-    const V v1208 = v65 * v1199;
-    const V v1209 = v1203 - v1208;
-    const V v1210 = v64 * v1199;
-    const V v1211 = v1210 + v1206;
-    const V v1212 = v65 * v1189;
-    const V v1213 = v64 * v1189;
-    const V v1214 = v1213 + v1193;
-    const V v1215 = v1187 + v1192;
-    const V v1216 = v1200 - v1187;
-    const V v1217 = v1187 - v1200;
-    const V v1218 = v1212 + v1190;
-    const V v1219 = v60 * v1179;
-    const V v1220 = v1214 - v1219;
-    const V v1221 = v60 * v1181;
-    const V v1222 = v1211 - v1221;
-    const V v1223 = v59 * v1179;
-    const V v1224 = v1223 + v1191;
-    const V v1225 = v59 * v1181;
-    const V v1226 = v1225 + v1209;
-    const V v1227 = v1218 - v1224;
-    const V v1228 = v1224 - v1212;
-    const V v1229 = v1220 - v1185;
-    const V v1230 = v1220 + v1222;
-    const V v1231 = v1220 - v1222;
-    const V v1232 = v1227 - v1229;
-    const V v1233 = v1226 + v1228;
-    const V v1234 = v1229 - v1228;
-    const V v1235 = v1222 + v1226;
-    const V v1236 = v1228 - v1226;
-    const V v1237 = v1222 - v1226;
-    const V v1238 = v1190 + v1234;
-    const V v1239 = v1207 + v1233;
-    const V v1240 = v1235 - v1215;
-    const V v1241 = v1187 - v1237;
-    const V v1242 = v1230 + v1239;
-    const V v1243 = v1234 - v1190;
-    const V v1244 = v1237 - v1187;
-    const V v1245 = v1197 + v1242;
-    const V v1246 = v1197 - v1207;
-    const V v1247 = v1238 + v1244;
-    const V v1248 = v1194 - v1215;
-    const V v1249 = v1244 - v1192;
-    const V v1250 = v65 * v1196;
-    const V v1251 = v1201 - v1250;
-    const V v1252 = v65 * v1198;
-    const V v1253 = v1202 - v1252;
-    const V v1254 = v64 * v1196;
-    const V v1255 = v1254 + v1204;
-    const V v1256 = v64 * v1198;
-    const V v1257 = v1256 + v1205;
-    const V v1258 = v59 * v1182;
-    const V v1259 = v1258 + v1251;
-    const V v1260 = v59 * v1184;
-    const V v1261 = v1260 + v1253;
-    const V v1262 = v60 * v1182;
-    const V v1263 = v1255 - v1262;
-    const V v1264 = v60 * v1184;
-    const V v1265 = v1257 - v1264;
-    const V v1266 = v1228 + v1259;
-    const V v1267 = v1226 + v1261;
-    const V v1268 = v1220 + v1263;
-    const V v1269 = v1259 + v1261;
-    const V v1270 = v1222 + v1265;
-    const V v1271 = v1263 - v1259;
-    const V v1272 = v1263 + v1265;
-    const V v1273 = v1265 - v1261;
-    const V v1274 = v1236 - v1259;
-    const V v1275 = v1232 - v1259;
-    const V v1276 = v1266 - v1267;
-    const V v1277 = v1266 + v1267;
-    const V v1278 = v1249 + v1273;
-    const V v1279 = v1192 - v1273;
-    const V v1280 = v1261 + v1274;
-    const V v1281 = v1275 - v1263;
-    const V v1282 = v1240 + v1261;
-    const V v1283 = v1231 - v1263;
-    const V v1284 = v1277 - v1268;
-    const V v1285 = v1265 + v1282;
-    const V v1286 = v1265 + v1283;
-    const V v1287 = v1284 - v1270;
-    const V v1288 = v1248 + v1268;
-    const V v1289 = v1288 - v1270;
-    const V v1290 = v1280 - v1286;
-    const V v1291 = v1280 + v1286;
-    const V v1292 = v1287 - v1194;
-    const V v1293 = v1281 - v1285;
-    const V v1294 = v1281 + v1285;
-    softehl_store4(K + 32, 64, v1162, v1293, v1167, v1294);
-    const V v1295 = v1276 + v1289;
-    const V v1296 = v1276 - v1289;
-    const V v1297 = v1292 - v1215;
-    softehl_store4(K + 16, 64, v1175, v1297, v1176, v1296);
-    const V v1298 = v1217 - v1290;
-    const V v1299 = v1233 - v1269;
-    const V v1300 = v1245 + v1269;
-    const V v1301 = v1290 - v1216;
-    const V v1302 = v1230 - v1272;
-    const V v1303 = v1272 + v1300;
-    softehl_store4(K + 0, 64, v1174, v1303, v1175, v1295);
-    const V v1304 = v1243 + v1271;
-    const V v1305 = v1247 - v1271;
-    const V v1306 = v1278 + v1304;
-    const V v1307 = v1279 + v1305;
-    softehl_store4(K + 52, 64, v1178, v1307, v1177, v1298);
-    const V v1308 = v1241 + v1279;
-    const V v1309 = v1304 + v1308;
-    softehl_store4(K + 48, 64, v1172, v1306, v1168, v1309);
-    const V v1310 = v1299 + v1302;
-    const V v1311 = v1299 - v1302;
-    const V v1312 = v1216 + v1291;
-    const V v1313 = v1216 - v1291;
-    const V v1314 = v1311 - v1246;
-    softehl_store4(K + 20, 64, v1167, v1314, v1168, v1301);
-    const V v1315 = v1246 + v1310;
-    softehl_store4(K + 4, 64, v1162, v1315, v1172, v1312);
-    const V v1316 = v1246 - v1310;
-    softehl_store4(K + 36, 64, v1161, v1316, v1178, v1313);
-    const V v1317 = v373 + s502;
-    const V v1318 = v340 + s479;
-    const V v1319 = v381 - v415;
-    const V v1320 = v358 + s485;
-    const V v1321 = v343 - v345;
-    const V v1322 = v428 + s498;
-    const V v1323 = v429 + s500;
-    const V v1324 = s526 + v1319;
-    const V v1325 = s484 + v1321;
-    const V v1326 = s480 - v341;
-    const V v1327 = s499 - v430;
-    const V v1328 = v1320 - v1325;
-    const V v1329 = v1320 + v1325;
-    const V v1330 = 2.0 * v1325;
-    const V v1331 = v1320 + v1330;
-    const V v1332 = s501 - v431;
-    const V v1333 = v1325 - v1324;
-    const V v1334 = v1324 + v1325;
-    const V v1335 = v1324 + v1331;
-    const V v1336 = s503 - v376;
-    const V v1337 = v59 * v1327;
-    const V v1338 = s504 - v359;
-    const V v1339 = s505 - v360;
-    const V v1340 = v59 * v1332;
-    const V v1341 = v1337 - v332;
-    const V v1342 = v355 + v1338;
-    const V v1343 = v357 + v1339;
-    const V v1344 = v1340 - v361;
-    const V v1345 = s523 - v333;
-    const V v1346 = s524 - v362;
-    const V v1347 = s525 - v334;
-    const V v1348 = s521 + v1341;
-    const V v1349 = s522 + v1344;
-    const V v1350 = v59 * v1336;
-    const V v1351 = v1350 + v1345;
-    const V v1352 = v59 * v1326;
-    const V v1353 = v1352 + v1342;
-    const V v1354 = v60 * v1326;
-    const V v1355 = v1343 - v1354;
-    const V v1356 = v60 * v1332;
-    const V v1357 = v1346 - v1356;
-    const V v1358 = v60 * v1336;
-    const V v1359 = v1347 - v1358;
-    const V v1360 = v445 + v1348;
-    const V v1361 = v447 + v1349;
-    const V v1362 = v421 + v1351;
-    const V v1363 = v449 + v1357;
-    const V v1364 = v423 + v1359;
-    const V v1365 = v65 * v1318;
-    const V v1366 = v1353 - v1365;
-    const V v1367 = v64 * v1318;
-    const V v1368 = v1367 + v1355;
-    const V v1369 = v65 * v1322;
-    const V v1370 = v1360 - v1369;
-    const V v1371 = v65 * v1323;
-    const V v1372 = v1361 - v1371;
-    const V v1373 = v64 * v1323;
-    const V v1374 = v1373 + v1363;
-    const V v1375 = v65 * v1317;
-    const V v1376 = v1362 - v1375;
-    const V v1377 = v64 * v1317;
-    const V v1378 = v1377 + v1364;
-    const V v1379 = v1366 - v1368;
-    const V v1380 = v1366 + v1368;
-    const V v1381 = v1366 - v1376;
-    const V v1382 = v1366 + v1376;
-    const V v1383 = v1368 - v1378;
-    const V v1384 = v1368 + v1378;
-    const V v1385 = v1335 + v1380;
-    const V v1386 = v1329 - v1380;
-    const V v1387 = v1370 - v1372;
-    const V v1388 = v1370 + v1372;
-    const V v1389 = v1372 - v1374;
-    const V v1390 = v1372 + v1374;
-    const V v1391 = v1333 + v1383;
-    const V v1392 = v1382 + v1385;
-    const V v1393 = v1383 - v1389;
-    const V v1394 = v1389 + v1391;
-    const V v1395 = v1382 - v1388;
-    const V v1396 = v1388 + v1392;
-    const V v1397 = v1376 - v1378;
-    const V v1398 = v1376 + v1378;
-    const V v1399 = v1381 - v1387;
-    const V v1400 = v1394 + v1397;
-    const V v1401 = v1390 + v1396;
-    const V v1402 = v1333 - v1397;
-    const V v1403 = v1393 + v1399;
-    const V v1404 = v1384 + v1401;
-    const V v1405 = v1384 - v1390;
-    const V v1406 = v1399 - v1393;
-    const V v1407 = v1386 + v1395;
-    const V v1408 = v1398 + v1404;
-    const V v1409 = v1334 - v1398;
-    const V v1410 = v1328 + v1387;
-    const V v1411 = v1395 + v1405;
-    const V v1412 = v1407 - v1405;
-    const V v1413 = v1381 + v1410;
-    const V v1414 = v1386 + v1409;
-    const V v1415 = v1412 - v1409;
-    const V v1416 = v1379 + v1413;
-    const V v1417 = v1328 - v1379;
-    const V v1418 = v1400 + v1416;
-    softehl_store4(K + 8, 64, v1303, v1408, v1297, v1418);
-    const V v1419 = v1411 + v1414;
-    softehl_store4(K + 40, 64, v1315, v1419, v1314, v1415);
-    const V v1420 = v1402 + v1417;
-    const V v1421 = v1414 - v1411;
-    const V v1422 = v1416 - v1400;
-    softehl_store4(K + 24, 64, v1295, v1418, v1296, v1422);
-    const V v1423 = v1417 - v1402;
-    const V v1424 = v1403 + v1420;
-    softehl_store4(K + 12, 64, v1293, v1419, v1306, v1424);
-    const V v1425 = v1406 + v1423;
-    softehl_store4(K + 28, 64, v1294, v1415, v1309, v1425);
-    softehl_store4(K + 56, 64, v1312, v1424, v1301, v1425);
-    const V v1426 = v1420 - v1403;
-    softehl_store4(K + 44, 64, v1316, v1421, v1307, v1426);
-    const V v1427 = v1423 - v1406;
-    softehl_store4(K + 60, 64, v1313, v1426, v1298, v1427);
-}
-
-void softehl_solid_taylor_mean_gent_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_gent_tangent_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, tangent + (8 * 8) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_gent_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), tangent + (8 * 8) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    double K[SOFTEHL_LANES * (8 * 8)];
-    softehl_solid_taylor_mean_gent_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (8 * 8) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_solid_taylor_mean_gent_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.25 * parameters[2];
-    const double v2 = 0.5 * parameters[0];
-    const double v3 = parameters[1] * v2;
-    const double v4 = 1.0 / parameters[1];
-    const V v5 = X0 + d0;
-    const V v6 = X2 + d2;
-    const V v7 = X4 + d4;
-    const V v8 = X0 - X2;
-    const V v9 = X4 - X0;
-    const V v10 = X6 + d6;
-    const V v11 = X4 - X6;
-    const V v12 = X4 - X2;
-    const V v13 = v9 - X2;
-    const V v14 = X1 + d1;
-    const V v15 = X6 + v13;
-    const double v16 = v4 * v3;
-    const V v17 = 0.25 * v15;
-    const V v18 = X1 - X3;
-    const V v19 = X1 + X3;
-    const V v20 = X7 + d7;
-    const V v21 = X3 + d3;
-    const V v22 = v8 + v11;
-    const V v23 = X5 + X7;
-    const V v24 = X5 + d5;
-    const V v25 = X5 - X7;
-    const V v26 = 0.25 * v22;
-    const V v27 = X5 - X3;
-    const V v28 = v11 - v8;
-    const V v29 = v19 + v23;
-    const V v30 = v18 + v25;
-    const V v31 = v23 - v19;
-    const V v32 = v15 - v28;
-    const V v33 = v28 + v15;
-    const V v34 = 0.25 * v29;
-    const V v35 = v25 - v18;
-    const V v36 = 0.25 * v30;
-    const V v37 = 0.25 * v28;
-    const V v38 = 0.0625 * v32;
-    const V v39 = 0.0625 * v33;
-    const V v40 = v28 - v15;
-    const V v41 = 0.25 * v31;
-    const V v42 = 0.25 * v35;
-    const V v43 = 1.0 / v34;
-    const V v44 = v34 * v34;
-    const V v45 = v37 * v41;
-    const V v46 = 0.0625 * v40;
-    const V v47 = 1.0 / v44;
-    const V v48 = v42 * v17;
-    const V v49 = v45 - v48;
-    const V v50 = v31 - v35;
-    const V v51 = v35 - v31;
-    const V v52 = v35 + v31;
-    const V v53 = 1.0 / v49;
-    const V v54 = 0.0625 * v50;
-    const V v55 = 0.0625 * v51;
-    const V v56 = 0.0625 * v52;
-    const V v57 = 0.25 * v43;
-    const V v58 = 0.25 * v47;
-    const V v59 = v55 * v53;
-    const V v60 = v38 * v53;
-    const V v61 = v56 * v53;
-    const V v62 = v39 * v53;
-    const V v63 = v54 * v53;
-    const V v64 = v46 * v53;
-    const V v65 = v36 * v62;
-    const V v66 = v26 * v61;
-    const V v67 = v65 - v66;
-    const V v68 = v67 - 0.25;
-    const V v69 = (-0.25) - v67;
-    const V v70 = v36 * v60;
-    const V v71 = 0.25 - v70;
-    const V v72 = v26 * v59;
-    const V v73 = v71 - v72;
-    const V v74 = v36 * v64;
-    const V v75 = 0.25 - v74;
-    const V v76 = v26 * v63;
-    const V v77 = v75 - v76;
-    V s78 = softehl_splat(0.0);
-    V s79 = softehl_splat(0.0);
-    V s80 = softehl_splat(0.0);
-    V s81 = softehl_splat(0.0);
-    V s82 = softehl_splat(0.0);
-    V s83 = softehl_splat(0.0);
-    V s84 = softehl_splat(0.0);
-    V s85 = softehl_splat(0.0);
-    for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v86 = 1.0 - w[1];
-        const double v87 = 1.0 + w[1];
-        const double v88 = 0.25 * w[1];
-        const double v89 = 1.0 - w[0];
-        const double v90 = 1.0 + w[0];
-        const double v91 = 0.25 * v86;
-        const double v92 = 0.25 * v87;
-        const double v93 = 0.25 * w[0];
-        const double v94 = 0.25 - v88;
-        const double v95 = 0.25 + v88;
-        const double v96 = 0.25 + v93;
-        const double v97 = 0.25 - v93;
-        const double v98 = v91 * v89;
-        const double v99 = v91 * v90;
-        const double v100 = v90 * v92;
-        const double v101 = v89 * v92;
-        const double v102 = v88 - 0.25;
-        const V v103 = X2 * v94;
-        const double v104 = v93 - 0.25;
-        const V v105 = X3 * v94;
-        const V v106 = X3 * v99;
-        const V v107 = X6 * v97;
-        const V v108 = X7 * v97;
-        const V v109 = v98 * v5;
-        const V v110 = v95 * v11;
-        const V v111 = v103 + v110;
-        const V v112 = v95 * v25;
-        const V v113 = v105 + v112;
-        const V v114 = X7 * v101;
-        const V v115 = v114 + v106;
-        const V v116 = v98 * v14;
-        const V v117 = v96 * v12;
-        const V v118 = v107 + v117;
-        const V v119 = v96 * v27;
-        const V v120 = v108 + v119;
-        const V v121 = v100 * v7;
-        const V v122 = v109 + v121;
-        const V v123 = X0 * v102;
-        const V v124 = v123 + v111;
-        const V v125 = X0 * v104;
-        const V v126 = v125 + v118;
-        const V v127 = X1 * v102;
-        const V v128 = v127 + v113;
-        const V v129 = X1 * v98;
-        const V v130 = v129 + v115;
-        const V v131 = X1 * v104;
-        const V v132 = v131 + v120;
-        const V v133 = v100 * v24;
-        const V v134 = v116 + v133;
-        const V v135 = X5 * v100;
-        const V v136 = v135 + v130;
-        const V v137 = v101 * v10;
-        const V v138 = v137 + v122;
-        const V v139 = v101 * v20;
-        const V v140 = v139 + v134;
-        const V v141 = v124 * v132;
-        const V v142 = w[0] * v124;
-        const V v143 = w[1] * v132;
-        const V v144 = v6 * v99;
-        const V v145 = v144 + v138;
-        const V v146 = v21 * v99;
-        const V v147 = v146 + v140;
-        const V v148 = w[1] * v126;
-        const V v149 = v142 - v148;
-        const double v150 = w[1] * w[2];
-        const V v151 = v128 * v126;
-        const V v152 = v141 - v151;
-        const V v153 = w[0] * v128;
-        const V v154 = v143 - v153;
-        const V v155 = w[2] * v136;
-        const V v156 = v152 * v136;
-        const V v157 = 0.25 * v152;
-        const V v158 = v154 * v155;
-        s84 += v158;
-        const V v159 = v149 * v155;
-        s85 += v159;
-        const V v160 = w[2] * v157;
-        s78 += v160;
-        const V v161 = v150 * v157;
-        s80 += v161;
-        const V v162 = w[2] * v156;
-        s81 += v162;
-        const V v163 = v150 * v156;
-        s83 += v163;
-        const V v164 = w[0] * v160;
-        s79 += v164;
-        const V v165 = w[0] * v162;
-        s82 += v165;
-        softehl_store2(R + 7 * q + 0, (7 * points), v145, v147);
-    }
-    const V v166 = 1.0 / s81;
-    const V v167 = s82 * v166;
-    const V v168 = v166 * s83;
-    const V v169 = v166 * s84;
-    const V v170 = v166 * s85;
-    const V v171 = s78 * v166;
-    const V v172 = s79 * v166;
-    const V v173 = s80 * v166;
-    const V v174 = v171 - v173;
-    const V v175 = v171 + v173;
-    const V v176 = v172 + v174;
-    const V v177 = v174 - v172;
-    const V v178 = v73 * v170;
-    const V v179 = v60 + v178;
-    const V v180 = v73 * v169;
-    const V v181 = v59 + v180;
-    const V v182 = v68 * v169;
-    const V v183 = v61 + v182;
-    const V v184 = v68 * v170;
-    const V v185 = v184 - v62;
-    const V v186 = v69 * v170;
-    const V v187 = v62 + v186;
-    const V v188 = v69 * v169;
-    const V v189 = v188 - v61;
-    const V v190 = v77 * v169;
-    const V v191 = v63 + v190;
-    const V v192 = v77 * v170;
-    const V v193 = v64 + v192;
-    const V v194 = v172 + v175;
-    const V v195 = d2 * v185;
-    const V v196 = d2 * v183;
-    const V v197 = 1.0 + v196;
-    const V v198 = d3 * v183;
-    const V v199 = d3 * v185;
-    const V v200 = 1.0 + v199;
-    const V v201 = v175 - v172;
-    const V v202 = d1 * v177;
-    const V v203 = 1.0 + v202;
-    const V v204 = d3 * v176;
-    const V v205 = v204 + v203;
-    const V v206 = d0 * v179;
-    const V v207 = v206 + v195;
-    const V v208 = d1 * v179;
-    const V v209 = v208 + v200;
-    const V v210 = d0 * v181;
-    const V v211 = v210 + v197;
-    const V v212 = d1 * v181;
-    const V v213 = v212 + v198;
-    const V v214 = d4 * v193;
-    const V v215 = v214 + v207;
-    const V v216 = d4 * v191;
-    const V v217 = v216 + v211;
-    const V v218 = d5 * v193;
-    const V v219 = v218 + v209;
-    const V v220 = d5 * v191;
-    const V v221 = v220 + v213;
-    const V v222 = d5 * v194;
-    const V v223 = v222 + v205;
-    const V v224 = d6 * v187;
-    const V v225 = v224 + v215;
-    const V v226 = d6 * v189;
-    const V v227 = v226 + v217;
-    const V v228 = d7 * v187;
-    const V v229 = v228 + v219;
-    const V v230 = d7 * v189;
-    const V v231 = v230 + v221;
-    const V v232 = d7 * v201;
-    const V v233 = v232 + v223;
-    const V v234 = v227 * v229;
-    const V v235 = v225 * v231;
-    const V v236 = v234 - v235;
-    const V v237 = v233 * v236;
-    for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v238 = w[0] - v167;
-        const V v239 = w[1] - v168;
-        const V v240 = v42 * v238;
-        const V v241 = v41 * v239;
-        const V v242 = v37 * v238;
-        const V v243 = v57 * v238;
-        const V v244 = v172 + v243;
-        const V v245 = v57 * v239;
-        const V v246 = v173 + v245;
-        const V v247 = v17 * v239;
-        const V v248 = v242 - v247;
-        const V v249 = v53 * v248;
-        const V v250 = v170 + v249;
-        const V v251 = v241 + v240;
-        const V v252 = v241 - v240;
-        const V v253 = v53 * v252;
-        const V v254 = v169 + v253;
-        const V v255 = v58 * v251;
-        const V v256 = v171 - v255;
-        const V v257 = v73 * v250;
-        const V v258 = v60 + v257;
-        const V v259 = v77 * v250;
-        const V v260 = v64 + v259;
-        const V v261 = v246 - v256;
-        const V v262 = v246 + v256;
-        const V v263 = v73 * v254;
-        const V v264 = v59 + v263;
-        const V v265 = v77 * v254;
-        const V v266 = v63 + v265;
-        const V v267 = v69 * v250;
-        const V v268 = v62 + v267;
-        const V v269 = v69 * v254;
-        const V v270 = v68 * v254;
-        const V v271 = v61 + v270;
-        const V v272 = v68 * v250;
-        const V v273 = v272 - v62;
-        const V v274 = v244 + v261;
-        const V v275 = v244 - v261;
-        const V v276 = v244 + v262;
-        const V v277 = v269 - v61;
-        const V v278 = v262 - v244;
-        const V v279 = d0 * v258;
-        const V v280 = d0 * v264;
-        const V v281 = 1.0 + v280;
-        const V v282 = d1 * v264;
-        const V v283 = d1 * v258;
-        const V v284 = 1.0 + v283;
-        const V v285 = d1 * v274;
-        const V v286 = 1.0 - v285;
-        const V v287 = d2 * v273;
-        const V v288 = v279 + v287;
-        const V v289 = d2 * v271;
-        const V v290 = v289 + v281;
-        const V v291 = d3 * v271;
-        const V v292 = v282 + v291;
-        const V v293 = d3 * v273;
-        const V v294 = v293 + v284;
-        const V v295 = d3 * v275;
-        const V v296 = v295 + v286;
-        const V v297 = d4 * v260;
-        const V v298 = v297 + v288;
-        const V v299 = d4 * v266;
-        const V v300 = v299 + v290;
-        const V v301 = d5 * v266;
-        const V v302 = v301 + v292;
-        const V v303 = d5 * v260;
-        const V v304 = v303 + v294;
-        const V v305 = d5 * v276;
-        const V v306 = v305 + v296;
-        const V v307 = d6 * v268;
-        const V v308 = v307 + v298;
-        const V v309 = d6 * v277;
-        const V v310 = v309 + v300;
-        const V v311 = d7 * v277;
-        const V v312 = v311 + v302;
-        const V v313 = d7 * v268;
-        const V v314 = v313 + v304;
-        const V v315 = d7 * v278;
-        const V v316 = v315 + v306;
-        const V v317 = v310 * v314;
-        const V v318 = v308 * v312;
-        const V v319 = v317 - v318;
-        const V v320 = v319 * v316;
-        const V v321 = 1.0 / v320;
-        const V v322 = v237 * v321;
-        const M v323 = softehl_eq(v322, softehl_splat(0.0));
-        V v324 = softehl_splat(0.0);
-        const M m325 = ~v323;
-        if (softehl_any(m325)) {
-            const V v326 = softehl_vrcbrt(v322);
-            const V v327 = v322 * v326;
-            const V v328 = v326 * v327;
-            v324 = softehl_blend(m325, v328, v324);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const V v111 = w[0] - v90, v112 = w[1] - v91, v113 = v30 * v111, v114 = v29 * v112,
+            v115 = v95 + v32 * v111, v116 = v96 + v32 * v112,
+            v117 = v93 + v31 * (v28 * v111 - v13 * v112), v118 = v92 + v31 * (v114 - v113),
+            v119 = v94 - v33 * (v114 + v113), v120 = v35 + v43 * v117, v121 = v39 + v44 * v117,
+            v122 = v116 - v119, v123 = v116 + v119, v124 = v34 + v43 * v118,
+            v125 = v38 + v44 * v118, v126 = v37 + v42 * v117, v127 = v36 + v41 * v118,
+            v128 = v41 * v117 - v37, v129 = v42 * v118 - v36,
+            v130 = d5 * (v115 + v123) + (d3 * (v115 - v122) + (1.0 - d1 * (v115 + v122))),
+            v131 = d6 * v126 + (d4 * v121 + (d0 * v120 + d2 * v128)),
+            v132 = d6 * v129 + (d4 * v125 + (d2 * v127 + (1.0 + d0 * v124))),
+            v133 = d7 * v129 + (d5 * v125 + (d1 * v124 + d3 * v127)),
+            v134 = d7 * v126 + (d5 * v121 + (d3 * v128 + (1.0 + d1 * v120))),
+            v135 = d7 * (v123 - v115) + v130,
+            v136 = v110 * (1.0 / ((v132 * v134 - v131 * v133) * v135));
+        const M v137 = softehl_eq(v136, softehl_splat(0.0)); V v138 = softehl_splat(0.0);
+        const M m139 = ~v137;
+        if (softehl_any(m139)) {
+            const V v140 = softehl_vrcbrt(v136), v141 = v140 * (v136 * v140);
+            v138 = softehl_blend(m139, v141, v138);
         }
-        const V v329 = v310 * v324;
-        const V v330 = v308 * v324;
-        const V v331 = v312 * v324;
-        const V v332 = v314 * v324;
-        const V v333 = v316 * v324;
-        const V v334 = 2.0 * v329;
-        const V v335 = v329 * v329;
-        const V v336 = 2.0 * v330;
-        const V v337 = 2.0 * v331;
-        const V v338 = 2.0 * v332;
-        const V v339 = v333 * v333;
-        const V v340 = v329 * v332;
-        const V v341 = 2.0 * v333;
-        const V v342 = v330 * v330;
-        const V v343 = v335 + v342;
-        const V v344 = v333 * v341;
-        const V v345 = v330 * v331;
-        const V v346 = v340 - v345;
-        const V v347 = 2.0 * v339;
-        const V v348 = v333 * v346;
-        const V v349 = v331 * v331;
-        const V v350 = v349 + v343;
-        const V v351 = v346 * v346;
-        const V v352 = v347 * v346;
-        const V v353 = v332 * v332;
-        const V v354 = v353 + v350;
-        const V v355 = v339 + v354;
-        const V v356 = v339 * v351;
-        const V v357 = 1.0 / v348;
-        const V v358 = 0.3333333333333333 * v355;
-        const V v359 = softehl_vrcbrt(v356);
-        const V v360 = 1.0 / v356;
-        const V v361 = v355 * v359;
-        const V v362 = (-3.0) + v361;
-        const V v363 = 1.0 - v360;
-        const V v364 = v1 * v363;
-        const V v365 = v359 * v359;
-        const V v366 = v4 * v362;
-        const V v367 = 1.0 - v366;
-        const V v368 = 1.0 / v367;
-        const V v369 = v16 * v368;
-        const V v370 = v359 * v369;
-        const V v371 = v358 * v369;
-        const V v372 = v365 * v371;
-        const V v373 = v365 * v372;
-        const V v374 = v364 - v373;
-        const V v375 = v352 * v374;
-        const V v376 = v351 * v374;
-        const V v377 = v338 * v370;
-        const V v378 = v337 * v370;
-        const V v379 = v370 + v376;
-        const V v380 = v344 * v379;
-        const V v381 = v357 * v380;
-        const V v382 = v330 * v375;
-        const V v383 = v378 - v382;
-        const V v384 = v331 * v383;
-        const V v385 = v329 * v375;
-        const V v386 = v377 + v385;
-        const V v387 = v332 * v386;
-        const V v388 = v384 + v387;
-        const V v389 = v357 * v388;
-        const V v390 = v336 * v370;
-        const V v391 = v334 * v370;
-        const V v392 = v331 * v375;
-        const V v393 = v390 - v392;
-        const V v394 = v332 * v375;
-        const V v395 = v391 + v394;
-        const V v396 = v329 * v395;
-        const V v397 = v331 * v395;
-        const V v398 = v330 * v393;
-        const V v399 = v396 + v398;
-        const V v400 = v332 * v393;
-        const V v401 = v397 + v400;
-        const V v402 = v357 * v399;
-        const V v403 = v357 * v401;
-        softehl_store4(R + 7 * q + 2, (7 * points), v348, v402, v389, v381);
-        softehl_store1(R + 7 * q + 6, (7 * points), v403);
+        const V v142 = v132 * v138, v143 = v131 * v138, v144 = v133 * v138, v145 = v134 * v138,
+            v146 = v135 * v138, v147 = v146 * v146, v148 = v142 * v145 - v143 * v144,
+            v149 = v146 * v148, v150 = v148 * v148,
+            v151 = v147 + (v145 * v145 + (v144 * v144 + (v142 * v142 + v143 * v143))),
+            v152 = v147 * v150, v153 = 1.0 / v149, v154 = softehl_vrcbrt(v152), v155 = v154 * v154,
+            v156 = v12 * (1.0 / (1.0 - v2 * ((-3.0) + v151 * v154))), v157 = v154 * v156,
+            v158 = v1 * (1.0 - 1.0 / v152) - v155 * (v155 * (0.3333333333333333 * v151 * v156)),
+            v159 = 2.0 * v147 * v148 * v158,
+            v160 = v153 * (v146 * (2.0 * v146) * (v157 + v150 * v158)),
+            v161 = v144 * (2.0 * v144 * v157 - v143 * v159) + v145 * (2.0 * v145 * v157 + v142 * v159),
+            v162 = v153 * v161, v163 = 2.0 * v143 * v157 - v144 * v159,
+            v164 = 2.0 * v142 * v157 + v145 * v159, v165 = v153 * (v142 * v164 + v143 * v163),
+            v166 = v153 * (v144 * v164 + v145 * v163);
+        softehl_store4(R + 7 * q + 2, (7 * points), v149, v165, v162, v160);
+        softehl_store1(R + 7 * q + 6, (7 * points), v166);
     }
 }
-
-void softehl_solid_taylor_mean_gent_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_gent_fields_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + (7 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_gent_fields_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (7 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * (7 * points)];
-    softehl_solid_taylor_mean_gent_fields(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (7 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_solid_taylor_mean_gent_fields, 8, 8, 0, 0, (7 * points), 0)

@@ -23,1199 +23,233 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_solid_taylor_mean_gent_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_gent_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10;
+    softehl_load4(t + 0, 11, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 11, &t4, &t5, &t6, &t7);
     softehl_load3(t + 8, 11, &t8, &t9, &t10);
-    (void)t8; (void)t9; (void)t10;
-    const double v1 = 0.5 * parameters[1];
-    const double v2 = 1.0 / parameters[1];
-    const double v3 = 0.5 * parameters[2];
-    const double v4 = 1.5707963267948966 * parameters[2];
-    const double v5 = 0.5 * parameters[0];
-    const double v6 = parameters[0] * v1;
-    const V v7 = v1 * t8;
-    const V v8 = X4 - X0;
-    const double v9 = 6.283185307179586 * v6;
-    const V v10 = v5 * t9;
-    const V v11 = v7 + v10;
-    const V v12 = X0 - X2;
-    const V v13 = X4 - X2;
-    const V v14 = v8 - X2;
-    const V v15 = X4 - X6;
-    const V v16 = X6 + v14;
-    const double v17 = v2 * v2;
-    const V v18 = v12 + v15;
-    const V v19 = 0.25 * v16;
-    const V v20 = 0.0625 * v16;
-    const V v21 = v15 - v12;
-    const V v22 = X1 - X3;
-    const V v23 = X1 + X3;
-    const V v24 = v17 * t9;
-    const V v25 = 0.25 * v21;
-    const V v26 = 0.0625 * v21;
-    const V v27 = X5 - X3;
-    const V v28 = X5 - X7;
-    const V v29 = X5 + X7;
-    const V v30 = v22 + v28;
-    const V v31 = v23 + v29;
-    const V v32 = v28 - v22;
-    const V v33 = v29 - v23;
-    const V v34 = d0 - d2;
-    const V v35 = d0 + d2;
-    const V v36 = 0.25 * v32;
-    const V v37 = 0.0625 * v32;
-    const V v38 = 0.25 * v33;
-    const V v39 = 0.0625 * v33;
-    const V v40 = 0.25 * v31;
-    const V v41 = 0.5 * v31;
-    const V v42 = d1 + d3;
-    const V v43 = d1 - d3;
-    const V v44 = v25 * v38;
-    const V v45 = 1.0 / v40;
-    const V v46 = v40 * v40;
-    const V v47 = 1.0 / v46;
-    const V v48 = v36 * v19;
-    const V v49 = v44 - v48;
-    const V v50 = v18 * v37;
-    const V v51 = 1.0 / v49;
-    const V v52 = v18 * v39;
-    const V v53 = v35 - d4;
-    const V v54 = d4 - d6;
-    const V v55 = v53 - d6;
-    const V v56 = d5 + d7;
-    const V v57 = d5 - d7;
-    const V v58 = t0 - t2;
-    const V v59 = v34 - v54;
-    const V v60 = v34 + v54;
-    const V v61 = v42 - v56;
-    const V v62 = v42 + v56;
-    const V v63 = 0.25 * v45;
-    const V v64 = v45 * v45;
-    const V v65 = t1 - t3;
-    const V v66 = t1 + t3;
-    const V v67 = v43 - v57;
-    const V v68 = v43 + v57;
-    const V v69 = v47 * v41;
-    const V v70 = t5 - t3;
-    const V v71 = t4 - t0;
-    const V v72 = t4 - t6;
-    const V v73 = t4 - t2;
-    const V v74 = v71 - t2;
-    const V v75 = t5 - t7;
-    const V v76 = t5 + t7;
-    const V v77 = t6 + v74;
-    const V v78 = v58 + v72;
-    const V v79 = v65 + v75;
-    const V v80 = v66 + v76;
-    const V v81 = 0.25 * v77;
-    const V v82 = 0.0625 * v77;
-    const V v83 = v75 - v65;
-    const V v84 = v72 - v58;
-    const V v85 = v76 - v66;
-    const V v86 = 0.25 * v80;
-    const V v87 = v51 * v79;
-    const V v88 = v51 * v51;
-    const V v89 = 0.25 * v83;
-    const V v90 = 0.0625 * v83;
-    const V v91 = 0.25 * v84;
-    const V v92 = 0.0625 * v84;
-    const V v93 = 0.25 * v85;
-    const V v94 = 0.0625 * v85;
-    const V v95 = v86 * v69;
-    const V v96 = v86 * v64;
-    const V v97 = v38 * v91;
-    const V v98 = v51 * v82;
-    const V v99 = v51 * v90;
-    const V v100 = v18 * v90;
-    const V v101 = v18 * v94;
-    const V v102 = v51 * v94;
-    const V v103 = v51 * v92;
-    const V v104 = v19 * v89;
-    const V v105 = v97 - v104;
-    const V v106 = v37 * v51;
-    const V v107 = v39 * v51;
-    const V v108 = v30 * v51;
-    const V v109 = v37 * v78;
-    const V v110 = v109 + v100;
-    const V v111 = v39 * v78;
-    const V v112 = v111 + v101;
-    const V v113 = v36 * v81;
-    const V v114 = v105 - v113;
-    const V v115 = v108 * v92;
-    const V v116 = v51 * v110;
-    const V v117 = v51 * v112;
-    const V v118 = v51 * v50;
-    const V v119 = v108 * v82;
-    const V v120 = v25 * v93;
-    const V v121 = v120 + v114;
-    const V v122 = v20 * v108;
-    const V v123 = v26 * v108;
-    const V v124 = v51 * v20;
-    const V v125 = v26 * v51;
-    const V v126 = v51 * v52;
-    const V v127 = v88 * v121;
-    const V v128 = 0.25 * v118;
-    const V v129 = 0.25 * v122;
-    const V v130 = 0.25 * v123;
-    const V v131 = v52 * v127;
-    const V v132 = v117 - v131;
-    const V v133 = v123 - v118;
-    const V v134 = 0.25 * v126;
-    const V v135 = v126 - v122;
-    const V v136 = v50 * v127;
-    const V v137 = v116 - v136;
-    const V v138 = v130 - v128;
-    const V v139 = v134 - v129;
-    const V v140 = v59 * v124;
-    const V v141 = v37 * v127;
-    const V v142 = v99 - v141;
-    const V v143 = v39 * v127;
-    const V v144 = v102 - v143;
-    const V v145 = v30 * v127;
-    const V v146 = v87 - v145;
-    const V v147 = v20 * v127;
-    const V v148 = v98 - v147;
-    const V v149 = v55 * v125;
-    const V v150 = v140 - v149;
-    const V v151 = v26 * v127;
-    const V v152 = v103 - v151;
-    const V v153 = v55 * v142;
-    const V v154 = v61 * v142;
-    const V v155 = v61 * v125;
-    const V v156 = 1.0 - v155;
-    const V v157 = v20 * v146;
-    const V v158 = v119 + v157;
-    const V v159 = v26 * v146;
-    const V v160 = v115 + v159;
-    const V v161 = v59 * v148;
-    const V v162 = v67 * v124;
-    const V v163 = v156 + v162;
-    const V v164 = v67 * v148;
-    const V v165 = v132 - v158;
-    const V v166 = v59 * v144;
-    const V v167 = v153 - v166;
-    const V v168 = v67 * v144;
-    const V v169 = v154 - v168;
-    const V v170 = v55 * v152;
-    const V v171 = v161 - v170;
-    const V v172 = v61 * v152;
-    const V v173 = v164 - v172;
-    const V v174 = v61 * v106;
-    const V v175 = v55 * v106;
-    const V v176 = 1.0 + v175;
-    const V v177 = v160 - v137;
-    const V v178 = v67 * v107;
-    const V v179 = v174 - v178;
-    const V v180 = v59 * v107;
-    const V v181 = v176 - v180;
-    V s182 = softehl_splat(0.0);
-    V s183 = softehl_splat(0.0);
-    V s184 = softehl_splat(0.0);
-    V s185 = softehl_splat(0.0);
-    V s186 = softehl_splat(0.0);
-    V s187 = softehl_splat(0.0);
-    V s188 = softehl_splat(0.0);
-    V s189 = softehl_splat(0.0);
-    V s190 = softehl_splat(0.0);
-    V s191 = softehl_splat(0.0);
-    V s192 = softehl_splat(0.0);
-    V s193 = softehl_splat(0.0);
-    V s194 = softehl_splat(0.0);
-    V s195 = softehl_splat(0.0);
-    V s196 = softehl_splat(0.0);
-    V s197 = softehl_splat(0.0);
+    const double v1 = 0.5 * parameters[1], v2 = 1.0 / parameters[1], v3 = 0.5 * parameters[2],
+        v4 = 1.5707963267948966 * parameters[2], v5 = parameters[0] * v1,
+        v6 = 6.283185307179586 * v5;
+    const V v7 = v1 * t8 + 0.5 * parameters[0] * t9, v8 = X0 - X2, v9 = X4 - X2, v10 = X4 - X6,
+        v11 = X6 + (X4 - X0 - X2), v12 = v8 + v10, v13 = 0.25 * v11, v14 = 0.0625 * v11,
+        v15 = v10 - v8, v16 = X1 - X3, v17 = X1 + X3, v18 = v2 * v2 * t9, v19 = 0.25 * v15,
+        v20 = 0.0625 * v15, v21 = X5 - X3, v22 = X5 - X7, v23 = X5 + X7, v24 = v16 + v22,
+        v25 = v17 + v23, v26 = v22 - v16, v27 = v23 - v17, v28 = d0 - d2, v29 = 0.25 * v26,
+        v30 = 0.0625 * v26, v31 = 0.25 * v27, v32 = 0.0625 * v27, v33 = 0.25 * v25, v34 = d1 + d3,
+        v35 = d1 - d3, v36 = 1.0 / v33, v37 = 1.0 / (v33 * v33), v38 = v12 * v30,
+        v39 = 1.0 / (v19 * v31 - v29 * v13), v40 = v12 * v32, v41 = d4 - d6,
+        v42 = d0 + d2 - d4 - d6, v43 = d5 + d7, v44 = d5 - d7, v45 = t0 - t2, v46 = v28 - v41,
+        v47 = v28 + v41, v48 = v34 - v43, v49 = v34 + v43, v50 = 0.25 * v36, v51 = t1 - t3,
+        v52 = t1 + t3, v53 = v35 - v44, v54 = v35 + v44, v55 = t5 - t3, v56 = t4 - t6,
+        v57 = t4 - t2, v58 = t5 - t7, v59 = t5 + t7, v60 = t6 + (t4 - t0 - t2), v61 = v45 + v56,
+        v62 = 0.25 * v60, v63 = 0.0625 * v60, v64 = v58 - v51, v65 = v56 - v45, v66 = v59 - v52,
+        v67 = 0.25 * (v52 + v59), v68 = 0.25 * v64, v69 = 0.0625 * v64, v70 = 0.25 * v65,
+        v71 = 0.0625 * v65, v72 = 0.25 * v66, v73 = 0.0625 * v66, v74 = v67 * (v37 * (0.5 * v25)),
+        v75 = v67 * (v36 * v36), v76 = v30 * v39, v77 = v32 * v39, v78 = v24 * v39, v79 = v39 * v38,
+        v80 = v14 * v78, v81 = v20 * v78, v82 = v39 * v14, v83 = v20 * v39, v84 = v39 * v40,
+        v85 = v39 * v39 * (v19 * v72 + (v31 * v70 - v13 * v68 - v29 * v62)), v86 = 0.25 * v79,
+        v87 = 0.25 * v80, v88 = 0.25 * v81, v89 = v39 * (v32 * v61 + v12 * v73) - v40 * v85,
+        v90 = v81 - v79, v91 = 0.25 * v84, v92 = v84 - v80,
+        v93 = v39 * (v30 * v61 + v12 * v69) - v38 * v85, v94 = v88 - v86, v95 = v91 - v87,
+        v96 = v39 * v69 - v30 * v85, v97 = v39 * v73 - v32 * v85,
+        v98 = v39 * (v51 + v58) - v24 * v85, v99 = v39 * v63 - v14 * v85,
+        v100 = v46 * v82 - v42 * v83, v101 = v39 * v71 - v20 * v85, v102 = v78 * v63 + v14 * v98,
+        v103 = v78 * v71 + v20 * v98, v104 = 1.0 - v48 * v83 + v53 * v82, v105 = v89 - v102,
+        v106 = v42 * v96 - v46 * v97, v107 = v48 * v96 - v53 * v97, v108 = v46 * v99 - v42 * v101,
+        v109 = v53 * v99 - v48 * v101, v110 = v103 - v93, v111 = v48 * v76 - v53 * v77,
+        v112 = 1.0 + v42 * v76 - v46 * v77;
+    V s113 = {0}, s114 = {0}, s115 = {0}, s116 = {0}, s117 = {0}, s118 = {0}, s119 = {0},
+        s120 = {0}, s121 = {0}, s122 = {0}, s123 = {0}, s124 = {0}, s125 = {0}, s126 = {0},
+        s127 = {0}, s128 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v198 = 1.0 - w[1];
-        const double v199 = 1.0 + w[1];
-        const double v200 = 0.25 * w[1];
-        const double v201 = 1.0 - w[0];
-        const double v202 = 1.0 + w[0];
-        const double v203 = 0.25 * v198;
-        const double v204 = 0.25 * v199;
-        const double v205 = 0.25 * w[0];
-        const double v206 = 0.25 - v200;
-        const double v207 = 0.25 + v200;
-        const double v208 = 0.25 + v205;
-        const double v209 = 0.25 - v205;
-        const double v210 = v203 * v201;
-        const double v211 = v203 * v202;
-        const double v212 = v202 * v204;
-        const double v213 = v201 * v204;
-        const double v214 = v200 - 0.25;
-        const V v215 = X2 * v206;
-        const double v216 = v205 - 0.25;
-        const V v217 = v207 * v28;
-        const V v218 = X6 * v209;
-        const V v219 = v208 * v27;
-        const V v220 = X5 * v212;
-        const V v221 = v212 * t5;
-        const V v222 = v207 * v15;
-        const V v223 = v215 + v222;
-        const V v224 = v206 * t2;
-        const V v225 = v209 * t6;
-        const V v226 = v208 * v13;
-        const V v227 = v218 + v226;
-        const V v228 = v207 * v75;
-        const V v229 = v207 * v72;
-        const V v230 = v224 + v229;
-        const V v231 = v208 * v70;
-        const V v232 = v208 * v73;
-        const V v233 = v225 + v232;
-        const V v234 = X0 * v214;
-        const V v235 = v234 + v223;
-        const V v236 = X0 * v216;
-        const V v237 = v236 + v227;
-        const V v238 = X3 * v206;
-        const V v239 = v238 + v217;
-        const V v240 = X3 * v211;
-        const V v241 = v220 + v240;
-        const V v242 = v206 * t3;
-        const V v243 = v242 + v228;
-        const V v244 = v211 * t3;
-        const V v245 = v221 + v244;
-        const V v246 = v214 * t0;
-        const V v247 = v246 + v230;
-        const V v248 = v216 * t0;
-        const V v249 = v248 + v233;
-        const V v250 = X7 * v209;
-        const V v251 = v250 + v219;
-        const V v252 = X7 * v213;
-        const V v253 = v252 + v241;
-        const V v254 = v209 * t7;
-        const V v255 = v254 + v231;
-        const V v256 = v213 * t7;
-        const V v257 = v256 + v245;
-        const V v258 = X1 * v214;
-        const V v259 = v258 + v239;
-        const V v260 = v214 * t1;
-        const V v261 = v260 + v243;
-        const V v262 = X1 * v216;
-        const V v263 = v262 + v251;
-        const V v264 = v216 * t1;
-        const V v265 = v264 + v255;
-        const V v266 = X1 * v210;
-        const V v267 = v266 + v253;
-        const V v268 = v210 * t1;
-        const V v269 = v268 + v257;
-        const V v270 = w[0] * v235;
-        const V v271 = w[0] * v247;
-        const V v272 = v263 * v247;
-        const V v273 = v235 * v263;
-        const V v274 = w[1] * v263;
-        const V v275 = w[1] * v237;
-        const V v276 = v270 - v275;
-        const V v277 = w[1] * v265;
-        const V v278 = v235 * v265;
-        const V v279 = v272 + v278;
-        const V v280 = w[1] * v249;
-        const V v281 = v271 - v280;
-        const double v282 = w[1] * w[2];
-        const V v283 = v259 * v237;
-        const V v284 = v273 - v283;
-        const V v285 = w[0] * v259;
-        const V v286 = v274 - v285;
-        const V v287 = v259 * v249;
-        const V v288 = v279 - v287;
-        const V v289 = w[2] * v267;
-        const V v290 = w[0] * v261;
-        const V v291 = v277 - v290;
-        const V v292 = v237 * v261;
-        const V v293 = v288 - v292;
-        const V v294 = w[2] * v269;
-        const V v295 = v284 * v269;
-        const V v296 = 0.25 * v284;
-        const V v297 = v284 * v267;
-        const V v298 = v281 * v289;
-        const V v299 = v289 * v291;
-        const V v300 = v286 * v289;
-        s188 += v300;
-        const V v301 = v276 * v289;
-        s189 += v301;
-        const V v302 = v267 * v293;
-        const V v303 = v295 + v302;
-        const V v304 = 0.25 * v293;
-        const V v305 = v276 * v294;
-        s197 += v298;
-        s197 += v305;
-        const V v306 = v286 * v294;
-        s196 += v299;
-        s196 += v306;
-        const V v307 = w[2] * v296;
-        s182 += v307;
-        const V v308 = v282 * v296;
-        s184 += v308;
-        const V v309 = w[2] * v297;
-        s185 += v309;
-        const V v310 = v282 * v297;
-        s187 += v310;
-        const V v311 = w[0] * v307;
-        s183 += v311;
-        const V v312 = w[2] * v304;
-        s190 += v312;
-        const V v313 = v282 * v304;
-        s192 += v313;
-        const V v314 = w[2] * v303;
-        s193 += v314;
-        const V v315 = v282 * v303;
-        s195 += v315;
-        const V v316 = w[0] * v309;
-        s186 += v316;
-        const V v317 = w[0] * v312;
-        s191 += v317;
-        const V v318 = w[0] * v314;
-        s194 += v318;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v129 = 1.0 - w[1], v130 = 1.0 + w[1], v131 = 0.25 * w[1], v132 = 1.0 - w[0],
+            v133 = 1.0 + w[0], v134 = 0.25 * v129, v135 = 0.25 * v130, v136 = 0.25 * w[0],
+            v137 = 0.25 - v131, v138 = 0.25 + v131, v139 = 0.25 + v136, v140 = 0.25 - v136,
+            v141 = v134 * v132, v142 = v134 * v133, v143 = v133 * v135, v144 = v132 * v135,
+            v145 = v131 - 0.25;
+        const V v146 = X2 * v137; const double v147 = v136 - 0.25;
+        const V v148 = v138 * v22, v149 = X6 * v140, v150 = v139 * v21, v151 = X5 * v143,
+            v152 = v143 * t5, v153 = v138 * v10, v154 = v146 + v153, v155 = v137 * t2,
+            v156 = v140 * t6, v157 = v139 * v9, v158 = v138 * v58, v159 = v138 * v56,
+            v160 = v155 + v159, v161 = v139 * v55, v162 = v139 * v57, v163 = X0 * v145,
+            v164 = v163 + v154, v165 = X0 * v147, v166 = v165 + (v149 + v157), v167 = X3 * v137,
+            v168 = X3 * v142, v169 = v137 * t3, v170 = v142 * t3, v171 = v145 * t0,
+            v172 = v171 + v160, v173 = v147 * t0, v174 = v173 + (v156 + v162), v175 = X7 * v140,
+            v176 = X7 * v144, v177 = v140 * t7, v178 = v144 * t7, v179 = X1 * v145,
+            v180 = v179 + (v167 + v148), v181 = v145 * t1, v182 = v181 + (v169 + v158),
+            v183 = X1 * v147, v184 = v183 + (v175 + v150), v185 = v147 * t1,
+            v186 = v185 + (v177 + v161), v187 = X1 * v141, v188 = v187 + (v176 + (v151 + v168)),
+            v189 = v141 * t1, v190 = v189 + (v178 + (v152 + v170)),
+            v191 = w[0] * v164 - w[1] * v166;
+        const double v192 = w[1] * w[2];
+        const V v193 = v164 * v184 - v180 * v166, v194 = w[1] * v184 - w[0] * v180,
+            v195 = w[2] * v188, v196 = v184 * v172 + v164 * v186 - v180 * v174 - v166 * v182,
+            v197 = w[2] * v190, v198 = 0.25 * v193, v199 = v193 * v188, v200 = v194 * v195;
+        s119 += v200; const V v201 = v191 * v195; s120 += v201;
+        const V v202 = v193 * v190 + v188 * v196, v203 = 0.25 * v196;
+        s128 += (w[0] * v172 - w[1] * v174) * v195; s128 += v191 * v197;
+        s127 += v195 * (w[1] * v186 - w[0] * v182); s127 += v194 * v197; const V v204 = w[2] * v198;
+        s113 += v204; const V v205 = v192 * v198; s115 += v205; const V v206 = w[2] * v199;
+        s116 += v206; const V v207 = v192 * v199; s118 += v207; const V v208 = w[0] * v204;
+        s114 += v208; const V v209 = w[2] * v203; s121 += v209; const V v210 = v192 * v203;
+        s123 += v210; const V v211 = w[2] * v202; s124 += v211; const V v212 = v192 * v202;
+        s126 += v212; const V v213 = w[0] * v206; s117 += v213; const V v214 = w[0] * v209;
+        s122 += v214; const V v215 = w[0] * v211; s125 += v215;
     }
-    const V v319 = 1.0 / s185;
-    const V v320 = 0.5 * s185;
-    const V v321 = v4 * s185;
-    const V v322 = t10 * v320;
-    const V v323 = v319 * v319;
-    const V v324 = v323 * s193;
-    const V v325 = v3 * s193;
-    const V v326 = v322 + v325;
-    const V v327 = 3.141592653589793 * v326;
-    const V v328 = v319 * s190;
-    const V v329 = v319 * s191;
-    const V v330 = v319 * s192;
-    const V v331 = v319 * s196;
-    const V v332 = v319 * s197;
-    const V v333 = s188 * v324;
-    const V v334 = v331 - v333;
-    const V v335 = v319 * s188;
-    const V v336 = 0.25 * v335;
-    const V v337 = s186 * v319;
-    const V v338 = s186 * v324;
-    const V v339 = v319 * s187;
-    const V v340 = v319 * s189;
-    const V v341 = s189 * v324;
-    const V v342 = v332 - v341;
-    const V v343 = s182 * v319;
-    const V v344 = s183 * v319;
-    const V v345 = s184 * v319;
-    const V v346 = 0.25 * v340;
-    const V v347 = s187 * v324;
-    const V v348 = v129 * v340;
-    const V v349 = v129 * v335;
-    const V v350 = v130 * v335;
-    const V v351 = v130 * v340;
-    const V v352 = v128 * v335;
-    const V v353 = v128 * v340;
-    const V v354 = v134 * v335;
-    const V v355 = v134 * v340;
-    const V v356 = v335 * v137;
-    const V v357 = v340 * v137;
-    const V v358 = v335 * v132;
-    const V v359 = v340 * v132;
-    const V v360 = v354 - v349;
-    const V v361 = v352 - v350;
-    const V v362 = v350 - v352;
-    const V v363 = v349 - v354;
-    const V v364 = v353 - v351;
-    const V v365 = v351 - v353;
-    const V v366 = 0.25 * v334;
-    const V v367 = v118 * v334;
-    const V v368 = v356 + v367;
-    const V v369 = v126 * v334;
-    const V v370 = v358 + v369;
-    const V v371 = v126 * v342;
-    const V v372 = v359 + v371;
-    const V v373 = 0.25 * v342;
-    const V v374 = v118 * v342;
-    const V v375 = v357 + v374;
-    const V v376 = v348 - v355;
-    const V v377 = v355 - v348;
-    const V v378 = v122 * v334;
-    const V v379 = v122 * v342;
-    const V v380 = v123 * v334;
-    const V v381 = v123 * v342;
-    const V v382 = v319 * s194;
-    const V v383 = v338 - v382;
-    const V v384 = v319 * s195;
-    const V v385 = v347 - v384;
-    const V v386 = v36 * v383;
-    const V v387 = v38 * v385;
-    const V v388 = v25 * v383;
-    const V v389 = v63 * v383;
-    const V v390 = v63 * v385;
-    const V v391 = v19 * v385;
-    const V v392 = v388 - v391;
-    const V v393 = v335 * v158;
-    const V v394 = v378 + v393;
-    const V v395 = v335 * v160;
-    const V v396 = v380 + v395;
-    const V v397 = v340 * v158;
-    const V v398 = v379 + v397;
-    const V v399 = v340 * v160;
-    const V v400 = v381 + v399;
-    const V v401 = v370 - v394;
-    const V v402 = v372 - v398;
-    const V v403 = v375 - v400;
-    const V v404 = v368 - v396;
-    const V v405 = 0.25 * v401;
-    const V v406 = v398 - v372;
-    const V v407 = v400 - v375;
-    const V v408 = v394 - v370;
-    const V v409 = 0.25 * v402;
-    const V v410 = 0.25 * v404;
-    const V v411 = 0.25 * v403;
-    const V v412 = v396 - v368;
-    const V v413 = 0.25 * v406;
-    const V v414 = 0.25 * v407;
-    const V v415 = 0.25 * v408;
-    const V v416 = 0.25 * v412;
-    const V v417 = s182 * v324;
-    const V v418 = v328 - v417;
-    const V v419 = s183 * v324;
-    const V v420 = v329 - v419;
-    const V v421 = s184 * v324;
-    const V v422 = v330 - v421;
-    const V v423 = v420 + v389;
-    const V v424 = v422 + v390;
-    const V v425 = v62 * v418;
-    const V v426 = v62 * v343;
-    const V v427 = 1.0 + v426;
-    const V v428 = v59 * v405;
-    const V v429 = v167 + v428;
-    const V v430 = v59 * v360;
-    const V v431 = v181 + v430;
-    const V v432 = v59 * v377;
-    const V v433 = v150 + v432;
-    const V v434 = v59 * v409;
-    const V v435 = v171 + v434;
-    const V v436 = v67 * v360;
-    const V v437 = v179 + v436;
-    const V v438 = v67 * v344;
-    const V v439 = v427 - v438;
-    const V v440 = v67 * v377;
-    const V v441 = v163 + v440;
-    const V v442 = v67 * v420;
-    const V v443 = v425 - v442;
-    const V v444 = v67 * v405;
-    const V v445 = v169 + v444;
-    const V v446 = v67 * v409;
-    const V v447 = v173 + v446;
-    const V v448 = v60 * v336;
-    const V v449 = v448 + v431;
-    const V v450 = v60 * v373;
-    const V v451 = v450 + v435;
-    const V v452 = v68 * v336;
-    const V v453 = v452 + v437;
-    const V v454 = v68 * v346;
-    const V v455 = v454 + v441;
-    const V v456 = v68 * v373;
-    const V v457 = v456 + v447;
-    const V v458 = v68 * v366;
-    const V v459 = v458 + v445;
-    const V v460 = v60 * v346;
-    const V v461 = v460 + v433;
-    const V v462 = v60 * v366;
-    const V v463 = v462 + v429;
-    const V v464 = v55 * v362;
-    const V v465 = v464 + v449;
-    const V v466 = v61 * v362;
-    const V v467 = v466 + v453;
-    const V v468 = v55 * v414;
-    const V v469 = v468 + v451;
-    const V v470 = v61 * v414;
-    const V v471 = v470 + v457;
-    const V v472 = v61 * v365;
-    const V v473 = v472 + v455;
-    const V v474 = v55 * v365;
-    const V v475 = v474 + v461;
-    const V v476 = v55 * v416;
-    const V v477 = v476 + v463;
-    const V v478 = v61 * v416;
-    const V v479 = v478 + v459;
-    const V v480 = v465 * v471;
-    const V v481 = v465 * v473;
-    const V v482 = v61 * v345;
-    const V v483 = v439 - v482;
-    const V v484 = v61 * v422;
-    const V v485 = v443 - v484;
-    const V v486 = 2.0 * v483;
-    const V v487 = v483 * v483;
-    const V v488 = v473 * v477;
-    const V v489 = v480 + v488;
-    const V v490 = v467 * v475;
-    const V v491 = v481 - v490;
-    const V v492 = v475 * v479;
-    const V v493 = v489 - v492;
-    const V v494 = 2.0 * v491;
-    const V v495 = v491 * v491;
-    const V v496 = v485 * v486;
-    const V v497 = v467 * v469;
-    const V v498 = v493 - v497;
-    const V v499 = v487 * v495;
-    const V v500 = 1.0 / v499;
-    const V v501 = v494 * v498;
-    const V v502 = v495 * v496;
-    const V v503 = v487 * v501;
-    const V v504 = v502 + v503;
-    const V v505 = v321 * v500;
-    const V v506 = v500 * v505;
-    const V v507 = v504 * v506;
-    const V v508 = 1.0 - v500;
-    const V v509 = v327 * v508;
-    const V v510 = v507 + v509;
-    const V v511 = v321 - v505;
-    const V v512 = v496 * v511;
-    const V v513 = v501 * v511;
-    const V v514 = v495 * v510;
-    const V v515 = v513 + v514;
-    const V v516 = v487 * v510;
-    const V v517 = v512 + v516;
-    const V v518 = v495 * v511;
-    const V v519 = v487 * v511;
-    const V v520 = v494 * v517;
-    const V v521 = v494 * v519;
-    const V v522 = 2.0 * v519;
-    const V v523 = v498 * v522;
-    const V v524 = v520 + v523;
-    const V v525 = v479 * v521;
-    const V v526 = v469 * v521;
-    const V v527 = v486 * v515;
-    const V v528 = v486 * v518;
-    const V v529 = 2.0 * v518;
-    const V v530 = v485 * v529;
-    const V v531 = v527 + v530;
-    const V v532 = v467 * v524;
-    const V v533 = v525 + v532;
-    const V v534 = v467 * v521;
-    const V v535 = v475 * v524;
-    const V v536 = v526 + v535;
-    const V v537 = v475 * v521;
-    const V v538 = v420 * v528;
-    const V v539 = v422 * v528;
-    const V v540 = v418 * v528;
-    const V v541 = v343 * v531;
-    const V v542 = v540 + v541;
-    const V v543 = v344 * v531;
-    const V v544 = v345 * v531;
-    const V v545 = v361 * v536;
-    const V v546 = v363 * v536;
-    const V v547 = v336 * v536;
-    const V v548 = v364 * v533;
-    const V v549 = v376 * v533;
-    const V v550 = v346 * v533;
-    const V v551 = v410 * v537;
-    const V v552 = v415 * v537;
-    const V v553 = v366 * v537;
-    const V v554 = v411 * v534;
-    const V v555 = v413 * v534;
-    const V v556 = v373 * v534;
-    const V v557 = v471 * v521;
-    const V v558 = v477 * v521;
-    const V v559 = v473 * v521;
-    const V v560 = v366 * v559;
-    const V v561 = v416 * v559;
-    const V v562 = v554 + v561;
-    const V v563 = v405 * v559;
-    const V v564 = v555 + v563;
-    const V v565 = v473 * v524;
-    const V v566 = v557 + v565;
-    const V v567 = v465 * v524;
-    const V v568 = v558 + v567;
-    const V v569 = v465 * v521;
-    const V v570 = v373 * v569;
-    const V v571 = v346 * v568;
-    const V v572 = v570 + v571;
-    const V v573 = v414 * v569;
-    const V v574 = v551 + v573;
-    const V v575 = v409 * v569;
-    const V v576 = v552 + v575;
-    const V v577 = v336 * v566;
-    const V v578 = v560 + v577;
-    const V v579 = v365 * v568;
-    const V v580 = v377 * v568;
-    const V v581 = v362 * v566;
-    const V v582 = v360 * v566;
-    V s583 = softehl_splat(0.0);
-    V s584 = softehl_splat(0.0);
-    V s585 = softehl_splat(0.0);
-    V s586 = softehl_splat(0.0);
-    V s587 = softehl_splat(0.0);
-    V s588 = softehl_splat(0.0);
-    V s589 = softehl_splat(0.0);
-    V s590 = softehl_splat(0.0);
-    V s591 = softehl_splat(0.0);
-    V s592 = softehl_splat(0.0);
-    V s593 = softehl_splat(0.0);
-    V s594 = softehl_splat(0.0);
-    V s595 = softehl_splat(0.0);
-    V s596 = softehl_splat(0.0);
-    V s597 = softehl_splat(0.0);
+    const V v216 = 1.0 / s116, v217 = v4 * s116, v218 = v216 * v216 * s124,
+        v219 = v216 * s127 - s119 * v218, v220 = v216 * s119, v221 = 0.25 * v220,
+        v222 = s117 * v216, v223 = v216 * s118, v224 = v216 * s120,
+        v225 = v216 * s128 - s120 * v218, v226 = s113 * v216, v227 = s114 * v216,
+        v228 = s115 * v216, v229 = 0.25 * v224, v230 = v87 * v224, v231 = v87 * v220,
+        v232 = v88 * v220, v233 = v88 * v224, v234 = v86 * v220, v235 = v86 * v224,
+        v236 = v91 * v220, v237 = v91 * v224, v238 = v236 - v231, v239 = v232 - v234,
+        v240 = v233 - v235, v241 = 0.25 * v219, v242 = v220 * v93 + v79 * v219,
+        v243 = v220 * v89 + v84 * v219, v244 = v224 * v89 + v84 * v225, v245 = 0.25 * v225,
+        v246 = v224 * v93 + v79 * v225, v247 = v237 - v230, v248 = s117 * v218 - v216 * s125,
+        v249 = s118 * v218 - v216 * s126, v250 = v29 * v248, v251 = v31 * v249,
+        v252 = v19 * v248 - v13 * v249, v253 = v80 * v219 + v220 * v102,
+        v254 = v81 * v219 + v220 * v103, v255 = v80 * v225 + v224 * v102,
+        v256 = v81 * v225 + v224 * v103, v257 = 0.25 * (v243 - v253), v258 = 0.25 * (v244 - v255),
+        v259 = 0.25 * (v256 - v246), v260 = 0.25 * (v254 - v242), v261 = v216 * s121 - s113 * v218,
+        v262 = v216 * s122 - s114 * v218, v263 = v216 * s123 - s115 * v218,
+        v264 = v262 + v50 * v248, v265 = v263 + v50 * v249,
+        v266 = v42 * v239 + (v47 * v221 + (v112 + v46 * v238)),
+        v267 = v48 * v239 + (v54 * v221 + (v111 + v53 * v238)),
+        v268 = v42 * v259 + (v47 * v245 + (v108 + v46 * v258)),
+        v269 = v48 * v259 + (v54 * v245 + (v109 + v53 * v258)),
+        v270 = v48 * v240 + (v54 * v229 + (v104 + v53 * v247)),
+        v271 = v42 * v240 + (v47 * v229 + (v100 + v46 * v247)),
+        v272 = v42 * v260 + (v47 * v241 + (v106 + v46 * v257)),
+        v273 = v48 * v260 + (v54 * v241 + (v107 + v53 * v257)),
+        v274 = 1.0 + v49 * v226 - v53 * v227 - v48 * v228,
+        v275 = v49 * v261 - v53 * v262 - v48 * v263, v276 = 2.0 * v274, v277 = v274 * v274,
+        v278 = v266 * v270 - v267 * v271, v279 = 2.0 * v278, v280 = v278 * v278, v281 = v275 * v276,
+        v282 = v266 * v269 + v270 * v272 - v271 * v273 - v267 * v268, v283 = 1.0 / (v277 * v280),
+        v284 = v279 * v282, v285 = v217 * v283,
+        v286 = 3.141592653589793 * (t10 * (0.5 * s116) + v3 * s124) * (1.0 - v283),
+        v287 = (v280 * v281 + v277 * v284) * (v283 * v285) + v286, v288 = v217 - v285,
+        v289 = v280 * v288, v290 = v277 * v288, v291 = v279 * v290,
+        v292 = v279 * (v281 * v288 + v277 * v287) + v282 * (2.0 * v290), v293 = v276 * v289,
+        v294 = v276 * (v284 * v288 + v280 * v287) + v275 * (2.0 * v289),
+        v295 = v273 * v291 + v267 * v292, v296 = v267 * v291, v297 = v268 * v291 + v271 * v292,
+        v298 = v271 * v291, v299 = v262 * v293, v300 = v263 * v293,
+        v301 = v261 * v293 + v226 * v294, v302 = v227 * v294, v303 = v228 * v294,
+        v304 = (v234 - v232) * v297, v305 = (v231 - v236) * v297, v306 = v221 * v297,
+        v307 = (v235 - v233) * v295, v308 = (v230 - v237) * v295, v309 = v229 * v295,
+        v310 = v241 * v298, v311 = v245 * v296, v312 = v270 * v291,
+        v313 = 0.25 * (v246 - v256) * v296 + v260 * v312,
+        v314 = 0.25 * (v255 - v244) * v296 + v257 * v312, v315 = v269 * v291 + v270 * v292,
+        v316 = v272 * v291 + v266 * v292, v317 = v266 * v291, v318 = v245 * v317 + v229 * v316,
+        v319 = 0.25 * (v242 - v254) * v298 + v259 * v317,
+        v320 = 0.25 * (v253 - v243) * v298 + v258 * v317, v321 = v241 * v312 + v221 * v315,
+        v322 = v240 * v316, v323 = v247 * v316, v324 = v239 * v315, v325 = v238 * v315;
+    V s326 = {0}, s327 = {0}, s328 = {0}, s329 = {0}, s330 = {0}, s331 = {0}, s332 = {0},
+        s333 = {0}, s334 = {0}, s335 = {0}, s336 = {0}, s337 = {0}, s338 = {0}, s339 = {0},
+        s340 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v598 = 0.25 * w[1];
-        const double v599 = 1.0 - w[1];
-        const double v600 = 1.0 + w[1];
-        const double v601 = 0.25 * v599;
-        const double v602 = 0.25 * v600;
-        const V v603 = w[1] - v339;
-        const double v604 = 0.25 - v598;
-        const double v605 = 0.25 + v598;
-        const V v606 = v603 * v93;
-        const V v607 = v606 + v387;
-        const double v608 = v598 - 0.25;
-        const V v609 = v38 * v603;
-        const V v610 = 0.25 * v603;
-        const V v611 = v603 * v81;
-        const V v612 = v392 - v611;
-        const V v613 = X2 * v604;
-        const V v614 = v604 * t2;
-        const V v615 = v605 * v28;
-        const V v616 = v605 * v75;
-        const double v617 = 0.25 * w[0];
-        const V v618 = v605 * v15;
-        const V v619 = v613 + v618;
-        const V v620 = v605 * v72;
-        const V v621 = v614 + v620;
-        const V v622 = w[0] - v337;
-        const double v623 = 1.0 - w[0];
-        const double v624 = 1.0 + w[0];
-        const V v625 = v622 * v91;
-        const V v626 = v625 + v612;
-        const V v627 = X0 * v608;
-        const V v628 = v627 + v619;
-        const double v629 = v617 - 0.25;
-        const V v630 = v36 * v622;
-        const V v631 = 0.25 * v622;
-        const V v632 = v25 * v622;
-        const V v633 = v622 * v89;
-        const V v634 = v633 + v386;
-        const V v635 = X0 * v629;
-        const V v636 = v608 * t0;
-        const V v637 = v636 + v621;
-        const V v638 = v629 * t0;
-        const V v639 = v609 - v630;
-        const V v640 = v609 + v630;
-        const V v641 = v19 * v603;
-        const V v642 = v632 - v641;
-        const double v643 = v601 * v623;
-        const double v644 = v623 * v602;
-        const double v645 = v624 * v602;
-        const double v646 = v601 * v624;
-        const V v647 = 0.25 * v640;
-        const V v648 = X1 * v629;
-        const V v649 = v629 * t1;
-        const V v650 = X1 * v643;
-        const V v651 = v643 * t1;
-        const V v652 = v607 + v634;
-        const V v653 = v607 - v634;
-        const V v654 = v95 * v647;
-        const V v655 = X5 * v645;
-        const V v656 = v650 + v655;
-        const V v657 = v645 * t5;
-        const V v658 = v651 + v657;
-        const V v659 = 0.25 * v652;
-        const V v660 = v654 - v659;
-        const V v661 = v47 * v647;
-        const V v662 = v343 - v661;
-        const V v663 = X1 * v608;
-        const V v664 = v663 + v615;
-        const V v665 = v608 * t1;
-        const V v666 = v665 + v616;
-        const V v667 = v47 * v660;
-        const V v668 = v418 + v667;
-        const V v669 = X7 * v644;
-        const V v670 = v669 + v656;
-        const V v671 = v644 * t7;
-        const V v672 = v671 + v658;
-        const double v673 = w[2] * v9;
-        const double v674 = 6.283185307179586 * w[2];
-        const V v675 = X3 * v646;
-        const V v676 = v675 + v670;
-        const V v677 = X3 * v604;
-        const V v678 = v677 + v664;
-        const V v679 = v604 * t3;
-        const V v680 = v679 + v666;
-        const V v681 = v646 * t3;
-        const V v682 = v681 + v672;
-        const V v683 = v51 * v653;
-        const V v684 = v334 + v683;
-        const V v685 = v51 * v642;
-        const V v686 = v340 + v685;
-        const V v687 = v642 * v127;
-        const V v688 = v342 - v687;
-        const V v689 = v639 * v127;
-        const V v690 = v684 - v689;
-        const V v691 = v51 * v639;
-        const V v692 = v335 + v691;
-        const V v693 = v51 * v626;
-        const V v694 = v688 + v693;
-        const V v695 = 0.25 * v686;
-        const V v696 = 0.25 * v690;
-        const V v697 = 0.25 * v692;
-        const V v698 = v138 * v686;
-        const V v699 = v138 * v692;
-        const V v700 = 0.25 * v694;
-        const V v701 = v139 * v692;
-        const V v702 = v139 * v686;
-        const V v703 = v686 * v177;
-        const V v704 = v692 * v177;
-        const V v705 = v686 * v165;
-        const V v706 = v692 * v165;
-        const double v707 = 0.25 + v617;
-        const double v708 = 0.25 - v617;
-        const V v709 = v133 * v694;
-        const V v710 = v703 + v709;
-        const V v711 = v690 * v133;
-        const V v712 = v704 + v711;
-        const V v713 = v135 * v694;
-        const V v714 = v705 + v713;
-        const V v715 = v690 * v135;
-        const V v716 = v706 + v715;
-        const V v717 = 0.25 * v710;
-        const V v718 = 0.25 * v712;
-        const V v719 = 0.25 * v714;
-        const V v720 = 0.25 * v716;
-        const V v721 = X6 * v708;
-        const V v722 = v721 + v635;
-        const V v723 = X7 * v708;
-        const V v724 = v723 + v648;
-        const V v725 = v707 * v13;
-        const V v726 = v725 + v722;
-        const V v727 = v707 * v27;
-        const V v728 = v727 + v724;
-        const V v729 = v708 * t6;
-        const V v730 = v729 + v638;
-        const V v731 = v708 * t7;
-        const V v732 = v731 + v649;
-        const V v733 = v707 * v73;
-        const V v734 = v733 + v730;
-        const V v735 = v707 * v70;
-        const V v736 = v735 + v732;
-        const V v737 = v728 * v637;
-        const V v738 = v728 * v628;
-        const V v739 = v628 * v736;
-        const V v740 = v737 + v739;
-        const V v741 = v62 * v668;
-        const V v742 = v62 * v662;
-        const V v743 = 1.0 + v742;
-        const V v744 = v726 * v678;
-        const V v745 = v738 - v744;
-        const V v746 = v734 * v678;
-        const V v747 = v740 - v746;
-        const V v748 = v726 * v680;
-        const V v749 = v747 - v748;
-        const V v750 = v682 * v745;
-        const V v751 = v676 * v745;
-        const V v752 = v676 * v749;
-        const V v753 = v750 + v752;
-        const V v754 = v60 * v700;
-        const V v755 = v171 + v754;
-        const V v756 = v60 * v697;
-        const V v757 = v181 + v756;
-        const V v758 = v6 * v753;
-        const V v759 = v673 * v751;
-        const V v760 = v11 * v751;
-        const V v761 = v758 + v760;
-        const V v762 = v55 * v717;
-        const V v763 = v755 + v762;
-        const V v764 = v55 * v718;
-        const V v765 = v167 + v764;
-        const V v766 = v55 * v699;
-        const V v767 = v766 + v757;
-        const V v768 = v55 * v698;
-        const V v769 = v150 + v768;
-        const V v770 = v674 * v761;
-        const V v771 = v60 * v696;
-        const V v772 = v771 + v765;
-        const V v773 = v60 * v695;
-        const V v774 = v773 + v769;
-        const V v775 = v59 * v719;
-        const V v776 = v763 + v775;
-        const V v777 = v59 * v701;
-        const V v778 = v777 + v767;
-        const V v779 = v59 * v720;
-        const V v780 = v779 + v772;
-        const V v781 = v59 * v702;
-        const V v782 = v781 + v774;
-        const V v783 = 2.0 * v778;
-        const V v784 = v778 * v778;
-        const V v785 = 2.0 * v782;
-        const V v786 = v68 * v695;
-        const V v787 = v163 + v786;
-        const V v788 = v68 * v696;
-        const V v789 = v169 + v788;
-        const V v790 = v68 * v697;
-        const V v791 = v179 + v790;
-        const V v792 = v68 * v700;
-        const V v793 = v173 + v792;
-        const V v794 = v782 * v782;
-        const V v795 = v784 + v794;
-        const V v796 = v67 * v702;
-        const V v797 = v796 + v787;
-        const V v798 = v783 * v780;
-        const V v799 = v67 * v720;
-        const V v800 = v799 + v789;
-        const V v801 = v67 * v701;
-        const V v802 = v801 + v791;
-        const V v803 = v67 * v719;
-        const V v804 = v793 + v803;
-        const V v805 = v61 * v698;
-        const V v806 = v805 + v797;
-        const V v807 = v61 * v718;
-        const V v808 = v807 + v800;
-        const V v809 = v61 * v699;
-        const V v810 = v809 + v802;
-        const V v811 = 2.0 * v806;
-        const V v812 = v61 * v717;
-        const V v813 = v804 + v812;
-        const V v814 = v780 * v806;
-        const V v815 = 2.0 * v810;
-        const V v816 = v778 * v806;
-        const V v817 = v806 * v806;
-        const V v818 = v795 + v817;
-        const V v819 = v810 * v810;
-        const V v820 = v818 + v819;
-        const V v821 = v778 * v813;
-        const V v822 = v814 + v821;
-        const V v823 = v782 * v810;
-        const V v824 = v816 - v823;
-        const V v825 = 2.0 * v824;
-        const V v826 = v824 * v824;
-        const V v827 = v782 * v808;
-        const V v828 = v822 - v827;
-        const V v829 = v811 * v813;
-        const V v830 = v798 + v829;
-        const V v831 = v776 * v810;
-        const V v832 = v828 - v831;
-        const V v833 = v808 * v815;
-        const V v834 = v830 + v833;
-        const V v835 = v45 * v631;
-        const V v836 = v344 + v835;
-        const V v837 = v45 * v610;
-        const V v838 = v345 + v837;
-        const V v839 = v96 * v631;
-        const V v840 = v423 - v839;
-        const V v841 = v96 * v610;
-        const V v842 = v424 - v841;
-        const V v843 = v825 * v832;
-        const V v844 = v776 * v785;
-        const V v845 = v834 + v844;
-        const V v846 = v67 * v836;
-        const V v847 = v743 - v846;
-        const V v848 = v67 * v840;
-        const V v849 = v741 - v848;
-        const V v850 = v61 * v838;
-        const V v851 = v847 - v850;
-        const V v852 = v61 * v842;
-        const V v853 = v849 - v852;
-        const V v854 = v851 * v851;
-        const V v855 = 2.0 * v851;
-        const V v856 = v853 * v855;
-        const V v857 = v845 + v856;
-        const V v858 = v843 * v854;
-        const V v859 = v820 + v854;
-        const V v860 = v826 * v854;
-        const V v861 = softehl_vrcbrt(v860);
-        const V v862 = v826 * v856;
-        const V v863 = v858 + v862;
-        const V v864 = v861 * v861;
-        const V v865 = 0.3333333333333333 * v864;
-        const V v866 = v864 * v865;
-        const V v867 = v861 * v864;
-        const V v868 = 0.4444444444444444 * v861;
-        const V v869 = v863 * v866;
-        const V v870 = v857 * v861;
-        const V v871 = v859 * v869;
-        const V v872 = v870 - v871;
-        const V v873 = v859 * v861;
-        const V v874 = (-3.0) + v873;
-        const V v875 = v24 * v874;
-        const V v876 = v2 * v872;
-        const V v877 = v875 - v876;
-        const V v878 = v2 * v874;
-        const V v879 = 1.0 - v878;
-        const V v880 = 1.0 / v879;
-        const V v881 = v759 * v880;
-        const V v882 = v2 * v881;
-        const V v883 = v857 * v882;
-        const V v884 = v859 * v882;
-        const V v885 = v868 * v884;
-        const V v886 = v866 * v884;
-        const V v887 = v867 * v885;
-        const V v888 = v867 * v887;
-        const V v889 = v856 * v886;
-        const V v890 = v861 * v882;
-        const V v891 = 2.0 * v890;
-        const V v892 = v877 * v881;
-        const V v893 = v770 - v892;
-        const V v894 = v880 * v893;
-        const V v895 = v2 * v894;
-        const V v896 = v24 * v881;
-        const V v897 = v895 - v896;
-        const V v898 = v859 * v897;
-        const V v899 = v883 + v898;
-        const V v900 = v861 * v897;
-        const V v901 = v869 * v882;
-        const V v902 = v900 - v901;
-        const V v903 = v866 * v899;
-        const V v904 = v863 * v888;
-        const V v905 = v903 - v904;
-        const V v906 = v843 * v886;
-        const V v907 = v902 - v906;
-        const V v908 = v826 * v886;
-        const V v909 = v890 - v908;
-        const V v910 = v826 * v905;
-        const V v911 = v907 - v910;
-        const V v912 = v854 * v905;
-        const V v913 = v889 + v912;
-        const V v914 = v854 * v886;
-        const V v915 = 2.0 * v914;
-        const V v916 = v832 * v915;
-        const V v917 = v825 * v913;
-        const V v918 = v916 + v917;
-        const V v919 = v825 * v914;
-        const V v920 = 2.0 * v909;
-        const V v921 = v853 * v920;
-        const V v922 = v855 * v911;
-        const V v923 = v921 + v922;
-        const V v924 = v855 * v909;
-        const V v925 = v668 * v924;
-        const V v926 = v662 * v923;
-        s587 += v925;
-        s587 += v926;
-        const V v927 = v810 * v919;
-        const V v928 = v810 * v918;
-        const V v929 = v785 * v890;
-        const V v930 = v927 + v929;
-        s585 += v930;
-        const V v931 = v785 * v902;
-        const V v932 = v928 + v931;
-        const V v933 = v808 * v919;
-        const V v934 = v932 + v933;
-        const V v935 = v808 * v891;
-        const V v936 = v776 * v891;
-        const V v937 = v934 + v936;
-        s590 += v937;
-        const V v938 = v776 * v919;
-        const V v939 = v935 + v938;
-        const V v940 = v815 * v902;
-        const V v941 = v939 + v940;
-        const V v942 = v815 * v890;
-        const V v943 = v782 * v919;
-        const V v944 = v942 + v943;
-        s584 += v944;
-        const V v945 = v782 * v918;
-        const V v946 = v941 + v945;
-        s589 += v946;
-        const V v947 = v811 * v890;
-        const V v948 = v811 * v902;
-        const V v949 = v783 * v890;
-        const V v950 = v783 * v902;
-        const V v951 = v806 * v919;
-        const V v952 = v949 - v951;
-        s586 += v952;
-        const V v953 = v806 * v918;
-        const V v954 = v950 - v953;
-        const V v955 = v778 * v918;
-        const V v956 = v948 - v955;
-        const V v957 = v778 * v919;
-        const V v958 = v947 - v957;
-        s583 += v958;
-        const V v959 = v813 * v919;
-        const V v960 = v954 - v959;
-        const V v961 = v813 * v891;
-        const V v962 = v956 + v961;
-        const V v963 = v780 * v919;
-        const V v964 = v962 - v963;
-        s588 += v964;
-        const V v965 = v780 * v891;
-        const V v966 = v960 + v965;
-        s591 += v966;
-        const V v967 = v717 * v958;
-        const V v968 = v717 * v930;
-        const V v969 = v842 * v924;
-        s594 += v967;
-        s594 -= v969;
-        const V v970 = v838 * v923;
-        s594 -= v970;
-        const V v971 = v718 * v944;
-        s594 += v971;
-        const V v972 = v718 * v952;
-        s597 += v968;
-        s597 += v972;
-        const V v973 = v698 * v964;
-        s594 += v973;
-        const V v974 = v698 * v937;
-        s597 += v974;
-        const V v975 = v699 * v946;
-        s594 += v975;
-        const V v976 = v699 * v966;
-        s597 += v976;
-        const V v977 = v719 * v958;
-        const V v978 = v840 * v924;
-        s593 += v977;
-        s593 -= v978;
-        const V v979 = v836 * v923;
-        s593 -= v979;
-        const V v980 = v719 * v930;
-        const V v981 = v700 * v958;
-        const V v982 = v700 * v930;
-        const V v983 = v720 * v944;
-        s593 += v983;
-        const V v984 = v720 * v952;
-        s596 += v980;
-        s596 += v984;
-        const V v985 = v696 * v944;
-        s592 += v981;
-        s592 += v985;
-        const V v986 = v696 * v952;
-        s595 += v982;
-        s595 += v986;
-        const V v987 = v702 * v964;
-        s593 += v987;
-        const V v988 = v702 * v937;
-        s596 += v988;
-        const V v989 = v695 * v964;
-        s592 += v989;
-        const V v990 = v695 * v937;
-        s595 += v990;
-        const V v991 = v701 * v946;
-        s593 += v991;
-        const V v992 = v701 * v966;
-        s596 += v992;
-        const V v993 = v697 * v946;
-        s592 += v993;
-        const V v994 = v697 * v966;
-        s595 += v994;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v341 = 0.25 * w[1], v342 = 1.0 - w[1], v343 = 1.0 + w[1], v344 = 0.25 * v342,
+            v345 = 0.25 * v343;
+        const V v346 = w[1] - v223;
+        const double v347 = 0.25 - v341, v348 = 0.25 + v341;
+        const V v349 = v346 * v72 + v251; const double v350 = v341 - 0.25;
+        const V v351 = v31 * v346, v352 = 0.25 * v346, v353 = X2 * v347, v354 = v347 * t2,
+            v355 = v348 * v22, v356 = v348 * v58;
+        const double v357 = 0.25 * w[0];
+        const V v358 = v348 * v10, v359 = v353 + v358, v360 = v348 * v56, v361 = v354 + v360,
+            v362 = w[0] - v222;
+        const double v363 = 1.0 - w[0], v364 = 1.0 + w[0];
+        const V v365 = X0 * v350, v366 = v365 + v359;
+        const double v367 = v357 - 0.25;
+        const V v368 = v29 * v362, v369 = 0.25 * v362, v370 = v362 * v68 + v250, v371 = X0 * v367,
+            v372 = v350 * t0, v373 = v372 + v361, v374 = v367 * t0, v375 = v351 - v368,
+            v376 = v19 * v362 - v13 * v346;
+        const double v377 = v344 * v363, v378 = v363 * v345, v379 = v364 * v345, v380 = v344 * v364;
+        const V v381 = 0.25 * (v351 + v368), v382 = X1 * v367, v383 = v367 * t1, v384 = X1 * v377,
+            v385 = v377 * t1, v386 = X5 * v379, v387 = v379 * t5, v388 = v226 - v37 * v381,
+            v389 = X1 * v350, v390 = v350 * t1,
+            v391 = v261 + v37 * (v74 * v381 - 0.25 * (v349 + v370)), v392 = X7 * v378,
+            v393 = v378 * t7, v394 = X3 * v380, v395 = v394 + (v392 + (v384 + v386)),
+            v396 = X3 * v347, v397 = v396 + (v389 + v355), v398 = v347 * t3,
+            v399 = v398 + (v390 + v356), v400 = v380 * t3, v401 = v400 + (v393 + (v385 + v387)),
+            v402 = v224 + v39 * v376, v403 = v219 + v39 * (v349 - v370) - v375 * v85,
+            v404 = v220 + v39 * v375,
+            v405 = v225 - v376 * v85 + v39 * (v362 * v70 + (v252 - v346 * v62)), v406 = 0.25 * v402,
+            v407 = 0.25 * v403, v408 = 0.25 * v404, v409 = v94 * v402, v410 = v94 * v404,
+            v411 = 0.25 * v405, v412 = v95 * v404, v413 = v95 * v402;
+        const double v414 = 0.25 + v357, v415 = 0.25 - v357;
+        const V v416 = 0.25 * (v402 * v110 + v90 * v405), v417 = 0.25 * (v404 * v110 + v403 * v90),
+            v418 = 0.25 * (v402 * v105 + v92 * v405), v419 = 0.25 * (v404 * v105 + v403 * v92),
+            v420 = X6 * v415, v421 = X7 * v415, v422 = v414 * v9, v423 = v422 + (v420 + v371),
+            v424 = v414 * v21, v425 = v424 + (v421 + v382), v426 = v415 * t6, v427 = v415 * t7,
+            v428 = v414 * v57, v429 = v428 + (v426 + v374), v430 = v414 * v55,
+            v431 = v430 + (v427 + v383), v432 = v425 * v366 - v423 * v397,
+            v433 = v425 * v373 + v366 * v431 - v429 * v397 - v423 * v399, v434 = v395 * v432,
+            v435 = v401 * v432 + v395 * v433, v436 = v108 + v47 * v411 + v42 * v416 + v46 * v418,
+            v437 = v46 * v412 + (v42 * v410 + (v112 + v47 * v408)),
+            v438 = v46 * v419 + (v47 * v407 + (v106 + v42 * v417)),
+            v439 = v46 * v413 + (v47 * v406 + (v100 + v42 * v409)), v440 = 2.0 * v437,
+            v441 = 2.0 * v439, v442 = v48 * v409 + (v53 * v413 + (v104 + v54 * v406)),
+            v443 = v48 * v417 + (v53 * v419 + (v107 + v54 * v407)),
+            v444 = v48 * v410 + (v53 * v412 + (v111 + v54 * v408)), v445 = 2.0 * v442,
+            v446 = v109 + v54 * v411 + v53 * v418 + v48 * v416, v447 = 2.0 * v444,
+            v448 = v437 * v442 - v439 * v444, v449 = 2.0 * v448, v450 = v448 * v448,
+            v451 = v438 * v442 + v437 * v446 - v439 * v443 - v436 * v444, v452 = v227 + v36 * v369,
+            v453 = v228 + v36 * v352, v454 = v264 - v75 * v369, v455 = v265 - v75 * v352,
+            v456 = v449 * v451, v457 = 1.0 + v49 * v388 - v53 * v452 - v48 * v453,
+            v458 = v49 * v391 - v53 * v454 - v48 * v455, v459 = v457 * v457, v460 = 2.0 * v457,
+            v461 = v458 * v460, v462 = v440 * v438 + v445 * v446 + v443 * v447 + v436 * v441 + v461,
+            v463 = v437 * v437 + v439 * v439 + v442 * v442 + v444 * v444 + v459,
+            v464 = softehl_vrcbrt(v450 * v459), v465 = v456 * v459 + v450 * v461,
+            v466 = v464 * v464, v467 = v466 * (0.3333333333333333 * v466), v468 = v464 * v466,
+            v469 = v465 * v467, v470 = (-3.0) + v463 * v464, v471 = 1.0 / (1.0 - v2 * v470),
+            v472 = w[2] * v6 * v434 * v471, v473 = v2 * v472, v474 = v463 * v473,
+            v475 = v467 * v474, v476 = v464 * v473, v477 = 2.0 * v476,
+            v478 = 6.283185307179586 * w[2] * (v5 * v435 + v7 * v434) - (v18 * v470 - v2 * (v462 * v464 - v463 * v469)) * v472,
+            v479 = v2 * (v471 * v478) - v18 * v472, v480 = v464 * v479 - v469 * v473,
+            v481 = v467 * (v462 * v473 + v463 * v479) - v465 * (v468 * (v468 * (0.4444444444444444 * v464 * v474))),
+            v482 = v476 - v450 * v475, v483 = v459 * v475,
+            v484 = v451 * (2.0 * v483) + v449 * (v461 * v475 + v459 * v481), v485 = v449 * v483,
+            v486 = v458 * (2.0 * v482) + v460 * (v480 - v456 * v475 - v450 * v481),
+            v487 = v460 * v482;
+        s330 += v391 * v487; s330 += v388 * v486; const V v488 = v444 * v485 + v441 * v476;
+        s328 += v488; const V v489 = v444 * v484 + v441 * v480 + v443 * v485 + v436 * v477;
+        s333 += v489; const V v490 = v447 * v476 + v439 * v485; s327 += v490;
+        const V v491 = v443 * v477 + v436 * v485 + v447 * v480 + v439 * v484; s332 += v491;
+        const V v492 = v440 * v476 - v442 * v485; s329 += v492;
+        const V v493 = v445 * v476 - v437 * v485; s326 += v493;
+        const V v494 = v445 * v480 - v437 * v484 + v446 * v477 - v438 * v485; s331 += v494;
+        const V v495 = v440 * v480 - v442 * v484 - v446 * v485 + v438 * v477; s334 += v495;
+        s337 += v416 * v493; s337 -= v455 * v487; s337 -= v453 * v486; s337 += v417 * v490;
+        s340 += v416 * v488; s340 += v417 * v492; s337 += v409 * v494; s340 += v409 * v489;
+        s337 += v410 * v491; s340 += v410 * v495; s336 += v418 * v493; s336 -= v454 * v487;
+        s336 -= v452 * v486; s336 += v419 * v490; s339 += v418 * v488; s339 += v419 * v492;
+        s335 += v411 * v493; s335 += v407 * v490; s338 += v411 * v488; s338 += v407 * v492;
+        s336 += v413 * v494; s339 += v413 * v489; s335 += v406 * v494; s338 += v406 * v489;
+        s336 += v412 * v491; s339 += v412 * v495; s335 += v408 * v491; s338 += v408 * v495;
     }
-    const V v995 = v559 + s586;
-    const V v996 = v569 + s583;
-    const V v997 = s584 - v537;
-    const V v998 = s585 - v534;
-    const V v999 = v566 + s591;
-    const V v1000 = v568 + s588;
-    const V v1001 = v579 - v539;
-    const V v1002 = v580 - v538;
-    const V v1003 = v548 + v581;
-    const V v1004 = v549 + v582;
-    const V v1005 = s587 + v542;
-    const V v1006 = v1001 - v544;
-    const V v1007 = s589 - v536;
-    const V v1008 = v1002 - v543;
-    const V v1009 = s597 + v1003;
-    const V v1010 = s590 - v533;
-    const V v1011 = s596 + v1004;
-    const V v1012 = v545 + v1006;
-    const V v1013 = v546 + v1008;
-    const V v1014 = s592 - v553;
-    const V v1015 = v562 + v1009;
-    const V v1016 = v564 + v1011;
-    const V v1017 = s594 + v1012;
-    const V v1018 = s593 + v1013;
-    const V v1019 = v1014 - v547;
-    const V v1020 = s595 - v556;
-    const V v1021 = v152 * v998;
-    const V v1022 = v1015 - v1021;
-    const V v1023 = v152 * v996;
-    const V v1024 = v1017 - v1023;
-    const V v1025 = v148 * v998;
-    const V v1026 = v1025 + v1016;
-    const V v1027 = v148 * v996;
-    const V v1028 = v1027 + v1018;
-    const V v1029 = v572 + v1019;
-    const V v1030 = v578 + v1020;
-    const V v1031 = v574 + v1024;
-    const V v1032 = v1005 - v1029;
-    const V v1033 = v1005 + v1029;
-    const V v1034 = v576 + v1028;
-    const V v1035 = v125 * v1010;
-    const V v1036 = v1022 - v1035;
-    const V v1037 = v125 * v1000;
-    const V v1038 = v1031 - v1037;
-    const V v1039 = v124 * v1010;
-    const V v1040 = v1039 + v1026;
-    const V v1041 = v124 * v1000;
-    const V v1042 = v1041 + v1034;
-    const V v1043 = v1030 - v550;
-    const V v1044 = v550 - v1030;
-    const V v1045 = v142 * v997;
-    const V v1046 = v1045 + v1038;
-    const V v1047 = v142 * v995;
-    const V v1048 = v1047 + v1036;
-    const V v1049 = v144 * v995;
-    const V v1050 = v1040 - v1049;
-    const V v1051 = v144 * v997;
-    const V v1052 = v1042 - v1051;
-    const V v1053 = v106 * v1007;
-    const V v1054 = v1053 + v1046;
-    const V v1055 = v106 * v999;
-    const V v1056 = v1055 + v1048;
-    const V v1057 = v107 * v999;
-    const V v1058 = v1050 - v1057;
-    const V v1059 = v107 * v1007;
-    const V v1060 = v1052 - v1059;
-    const V v1061 = v1054 + v1060;
-    const V v1062 = v1056 + v1058;
-    const V v1063 = v1058 - v1056;
-    const V v1064 = v1060 - v1054;
-    const V v1065 = v1043 + v1062;
-    const V v1066 = v1043 - v1062;
-    const V v1067 = v1033 + v1061;
-    const V v1068 = v1033 - v1061;
-    const V v1069 = v1044 - v1063;
-    const V v1070 = v1032 - v1064;
-    softehl_store4(R + 0, 8, v1065, v1067, v1069, v1070);
-    const V v1071 = v1032 + v1064;
-    const V v1072 = v1063 - v1043;
-    softehl_store4(R + 4, 8, v1066, v1068, v1072, v1071);
+    const V v496 = v312 + s329, v497 = v317 + s326, v498 = s327 - v298, v499 = s328 - v296,
+        v500 = v315 + s334, v501 = v316 + s331, v502 = s330 + v301, v503 = s332 - v297,
+        v504 = s333 - v295, v505 = v318 + (s335 - v310 - v306), v506 = v321 + (s338 - v311),
+        v507 = v502 - v505, v508 = v502 + v505,
+        v509 = v319 + (s337 + (v304 + (v322 - v300 - v303)) - v101 * v497) - v83 * v501,
+        v510 = v82 * v501 + (v320 + (v99 * v497 + (s336 + (v305 + (v323 - v299 - v302))))),
+        v511 = v506 - v309,
+        v512 = v96 * v496 + (v313 + (s340 + (v307 + v324)) - v101 * v499 - v83 * v504),
+        v513 = v82 * v504 + (v99 * v499 + (v314 + (s339 + (v308 + v325)))) - v97 * v496,
+        v514 = v76 * v503 + (v96 * v498 + v509), v515 = v76 * v500 + v512, v516 = v513 - v77 * v500,
+        v517 = v510 - v97 * v498 - v77 * v503, v518 = v514 + v517, v519 = v515 + v516,
+        v520 = v516 - v515, v521 = v517 - v514, v522 = v511 + v519, v523 = v511 - v519,
+        v524 = v508 + v518, v525 = v508 - v518, v526 = v309 - v506 - v520, v527 = v507 - v521;
+    softehl_store4(R + 0, 8, v522, v524, v526, v527);
+    const V v528 = v507 + v521, v529 = v520 - v511;
+    softehl_store4(R + 4, 8, v523, v525, v529, v528);
 }
-
-void softehl_solid_taylor_mean_gent_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_gent_pseudo_load_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, direction + 11 * e, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_gent_pseudo_load_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, direction + 11 * (n - SOFTEHL_LANES), parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double t[SOFTEHL_LANES * 11];
-    softehl_pad(t, direction, 11, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_taylor_mean_gent_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_solid_taylor_mean_gent_pseudo_load, 8, 8, 0, 11, 8, 0)

@@ -64,45 +64,13 @@ static int softehl_solid_taylor_mean_ogden_isochoric_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = log(s[1]);
-    const double v2 = p[5] * v1;
-    const double v3 = exp(v2);
-    const double v4 = log(s[0]);
-    const double v5 = p[5] * v4;
-    const double v6 = exp(v5);
-    const double v7 = v6 + v3;
-    const double v8 = log(s[2]);
-    const double v9 = p[5] * v8;
-    const double v10 = exp(v9);
-    const double v11 = v10 + v7;
-    const double v12 = v11 - 3.0;
-    const double v13 = p[1] * p[6];
-    const double v14 = v13 * v12;
-    const double v15 = p[3] * v1;
-    const double v16 = exp(v15);
-    const double v17 = p[3] * v4;
-    const double v18 = exp(v17);
-    const double v19 = v18 + v16;
-    const double v20 = p[3] * v8;
-    const double v21 = exp(v20);
-    const double v22 = v21 + v19;
-    const double v23 = v22 - 3.0;
-    const double v24 = p[0] * p[4];
-    const double v25 = v24 * v23;
-    const double v26 = v25 + v14;
-    const double v27 = p[7] * v1;
-    const double v28 = exp(v27);
-    const double v29 = p[7] * v4;
-    const double v30 = exp(v29);
-    const double v31 = v30 + v28;
-    const double v32 = p[7] * v8;
-    const double v33 = exp(v32);
-    const double v34 = v33 + v31;
-    const double v35 = v34 - 3.0;
-    const double v36 = p[2] * p[8];
-    const double v37 = v36 * v35;
-    const double v38 = v37 + v26;
-    w[0] = v38;
+    const double v1 = log(s[1]), v2 = exp(p[5] * v1), v3 = log(s[0]), v4 = exp(p[5] * v3),
+        v5 = log(s[2]), v6 = exp(p[5] * v5), v7 = exp(p[3] * v1), v8 = exp(p[3] * v3),
+        v9 = exp(p[3] * v5),
+        v10 = p[0] * p[4] * (v9 + (v8 + v7) - 3.0) + p[1] * p[6] * (v6 + (v4 + v2) - 3.0),
+        v11 = exp(p[7] * v1), v12 = exp(p[7] * v3), v13 = exp(p[7] * v5),
+        v14 = p[2] * p[8] * (v13 + (v12 + v11) - 3.0) + v10;
+    w[0] = v14;
     return failed;
 }
 
@@ -136,63 +104,14 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = log(s[0]);
-    const double v2 = p[5] * v1;
-    const double v3 = exp(v2);
-    const double v4 = p[5] * v3;
-    const double v5 = p[1] * p[6];
-    const double v6 = v5 * v4;
-    const double v7 = p[7] * v1;
-    const double v8 = exp(v7);
-    const double v9 = p[7] * v8;
-    const double v10 = p[2] * p[8];
-    const double v11 = v10 * v9;
-    const double v12 = v11 + v6;
-    const double v13 = p[3] * v1;
-    const double v14 = exp(v13);
-    const double v15 = p[3] * v14;
-    const double v16 = p[0] * p[4];
-    const double v17 = v16 * v15;
-    const double v18 = v12 + v17;
-    const double v19 = 1.0 / s[0];
-    const double v20 = v19 * v18;
-    const double v21 = log(s[1]);
-    const double v22 = p[5] * v21;
-    const double v23 = exp(v22);
-    const double v24 = p[5] * v23;
-    const double v25 = v5 * v24;
-    const double v26 = p[7] * v21;
-    const double v27 = exp(v26);
-    const double v28 = p[7] * v27;
-    const double v29 = v10 * v28;
-    const double v30 = v29 + v25;
-    const double v31 = p[3] * v21;
-    const double v32 = exp(v31);
-    const double v33 = p[3] * v32;
-    const double v34 = v16 * v33;
-    const double v35 = v30 + v34;
-    const double v36 = 1.0 / s[1];
-    const double v37 = v36 * v35;
-    const double v38 = log(s[2]);
-    const double v39 = p[5] * v38;
-    const double v40 = exp(v39);
-    const double v41 = p[5] * v40;
-    const double v42 = v5 * v41;
-    const double v43 = p[7] * v38;
-    const double v44 = exp(v43);
-    const double v45 = p[7] * v44;
-    const double v46 = v10 * v45;
-    const double v47 = v46 + v42;
-    const double v48 = p[3] * v38;
-    const double v49 = exp(v48);
-    const double v50 = p[3] * v49;
-    const double v51 = v16 * v50;
-    const double v52 = v47 + v51;
-    const double v53 = 1.0 / s[2];
-    const double v54 = v53 * v52;
-    w[0] = v20;
-    w[1] = v37;
-    w[2] = v54;
+    const double v1 = log(s[0]), v2 = exp(p[5] * v1), v3 = p[1] * p[6], v4 = exp(p[7] * v1),
+        v5 = p[2] * p[8], v6 = exp(p[3] * v1), v7 = p[0] * p[4],
+        v8 = 1.0 / s[0] * (v5 * (p[7] * v4) + v3 * (p[5] * v2) + v7 * (p[3] * v6)), v9 = log(s[1]),
+        v10 = exp(p[5] * v9), v11 = exp(p[7] * v9), v12 = exp(p[3] * v9),
+        v13 = 1.0 / s[1] * (v5 * (p[7] * v11) + v3 * (p[5] * v10) + v7 * (p[3] * v12)),
+        v14 = log(s[2]), v15 = exp(p[5] * v14), v16 = exp(p[7] * v14), v17 = exp(p[3] * v14),
+        v18 = 1.0 / s[2] * (v5 * (p[7] * v16) + v3 * (p[5] * v15) + v7 * (p[3] * v17));
+    w[0] = v8; w[1] = v13; w[2] = v18;
     return failed;
 }
 
@@ -253,108 +172,19 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_2_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = log(s[0]);
-    const double v2 = p[5] * v1;
-    const double v3 = exp(v2);
-    const double v4 = p[5] * v3;
-    const double v5 = p[1] * p[6];
-    const double v6 = v5 * v4;
-    const double v7 = p[7] * v1;
-    const double v8 = exp(v7);
-    const double v9 = p[7] * v8;
-    const double v10 = p[2] * p[8];
-    const double v11 = v10 * v9;
-    const double v12 = v11 + v6;
-    const double v13 = p[3] * v1;
-    const double v14 = exp(v13);
-    const double v15 = p[3] * v14;
-    const double v16 = p[0] * p[4];
-    const double v17 = v16 * v15;
-    const double v18 = v12 + v17;
-    const double v19 = 1.0 / s[0];
-    const double v20 = v19 * v18;
-    const double v21 = log(s[1]);
-    const double v22 = p[5] * v21;
-    const double v23 = exp(v22);
-    const double v24 = p[5] * v23;
-    const double v25 = v5 * v24;
-    const double v26 = p[7] * v21;
-    const double v27 = exp(v26);
-    const double v28 = p[7] * v27;
-    const double v29 = v10 * v28;
-    const double v30 = v29 + v25;
-    const double v31 = p[3] * v21;
-    const double v32 = exp(v31);
-    const double v33 = p[3] * v32;
-    const double v34 = v16 * v33;
-    const double v35 = v30 + v34;
-    const double v36 = 1.0 / s[1];
-    const double v37 = v36 * v35;
-    const double v38 = log(s[2]);
-    const double v39 = p[5] * v38;
-    const double v40 = exp(v39);
-    const double v41 = p[5] * v40;
-    const double v42 = v5 * v41;
-    const double v43 = p[7] * v38;
-    const double v44 = exp(v43);
-    const double v45 = p[7] * v44;
-    const double v46 = v10 * v45;
-    const double v47 = v46 + v42;
-    const double v48 = p[3] * v38;
-    const double v49 = exp(v48);
-    const double v50 = p[3] * v49;
-    const double v51 = v16 * v50;
-    const double v52 = v47 + v51;
-    const double v53 = 1.0 / s[2];
-    const double v54 = v53 * v52;
-    const double v55 = v3 * v5;
-    const double v56 = p[5] * p[5];
-    const double v57 = v55 * v56;
-    const double v58 = v8 * v10;
-    const double v59 = p[7] * p[7];
-    const double v60 = v58 * v59;
-    const double v61 = v60 + v57;
-    const double v62 = v14 * v16;
-    const double v63 = p[3] * p[3];
-    const double v64 = v62 * v63;
-    const double v65 = v61 + v64;
-    const double v66 = v19 * v65;
-    const double v67 = v66 - v20;
-    const double v68 = v19 * v67;
-    const double v69 = v23 * v5;
-    const double v70 = v69 * v56;
-    const double v71 = v27 * v10;
-    const double v72 = v71 * v59;
-    const double v73 = v72 + v70;
-    const double v74 = v32 * v16;
-    const double v75 = v74 * v63;
-    const double v76 = v73 + v75;
-    const double v77 = v36 * v76;
-    const double v78 = v77 - v37;
-    const double v79 = v36 * v78;
-    const double v80 = v40 * v5;
-    const double v81 = v80 * v56;
-    const double v82 = v44 * v10;
-    const double v83 = v82 * v59;
-    const double v84 = v83 + v81;
-    const double v85 = v49 * v16;
-    const double v86 = v85 * v63;
-    const double v87 = v84 + v86;
-    const double v88 = v53 * v87;
-    const double v89 = v88 - v54;
-    const double v90 = v53 * v89;
-    w[0] = v20;
-    w[1] = v37;
-    w[2] = v54;
-    w[3] = v68;
-    w[4] = 0.0;
-    w[5] = 0.0;
-    w[6] = 0.0;
-    w[7] = v79;
-    w[8] = 0.0;
-    w[9] = 0.0;
-    w[10] = 0.0;
-    w[11] = v90;
+    const double v1 = log(s[0]), v2 = exp(p[5] * v1), v3 = p[1] * p[6], v4 = exp(p[7] * v1),
+        v5 = p[2] * p[8], v6 = exp(p[3] * v1), v7 = p[0] * p[4], v8 = 1.0 / s[0],
+        v9 = v8 * (v5 * (p[7] * v4) + v3 * (p[5] * v2) + v7 * (p[3] * v6)), v10 = log(s[1]),
+        v11 = exp(p[5] * v10), v12 = exp(p[7] * v10), v13 = exp(p[3] * v10), v14 = 1.0 / s[1],
+        v15 = v14 * (v5 * (p[7] * v12) + v3 * (p[5] * v11) + v7 * (p[3] * v13)), v16 = log(s[2]),
+        v17 = exp(p[5] * v16), v18 = exp(p[7] * v16), v19 = exp(p[3] * v16), v20 = 1.0 / s[2],
+        v21 = v20 * (v5 * (p[7] * v18) + v3 * (p[5] * v17) + v7 * (p[3] * v19)), v22 = p[5] * p[5],
+        v23 = p[7] * p[7], v24 = p[3] * p[3],
+        v25 = v8 * (v8 * (v4 * v5 * v23 + v2 * v3 * v22 + v6 * v7 * v24) - v9),
+        v26 = v14 * (v14 * (v12 * v5 * v23 + v11 * v3 * v22 + v13 * v7 * v24) - v15),
+        v27 = v20 * (v20 * (v18 * v5 * v23 + v17 * v3 * v22 + v19 * v7 * v24) - v21);
+    w[0] = v9; w[1] = v15; w[2] = v21; w[3] = v25; w[4] = 0.0; w[5] = 0.0; w[6] = 0.0; w[7] = v26;
+    w[8] = 0.0; w[9] = 0.0; w[10] = 0.0; w[11] = v27;
     return failed;
 }
 
@@ -407,63 +237,14 @@ static int softehl_solid_taylor_mean_ogden_isochoric_of_stress_1_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = log(s[0]);
-    const double v2 = p[5] * v1;
-    const double v3 = exp(v2);
-    const double v4 = p[5] * v3;
-    const double v5 = p[1] * p[6];
-    const double v6 = v5 * v4;
-    const double v7 = p[7] * v1;
-    const double v8 = exp(v7);
-    const double v9 = p[7] * v8;
-    const double v10 = p[2] * p[8];
-    const double v11 = v10 * v9;
-    const double v12 = v11 + v6;
-    const double v13 = p[3] * v1;
-    const double v14 = exp(v13);
-    const double v15 = p[3] * v14;
-    const double v16 = p[0] * p[4];
-    const double v17 = v16 * v15;
-    const double v18 = v12 + v17;
-    const double v19 = 1.0 / s[0];
-    const double v20 = v19 * v18;
-    const double v21 = log(s[1]);
-    const double v22 = p[5] * v21;
-    const double v23 = exp(v22);
-    const double v24 = p[5] * v23;
-    const double v25 = v5 * v24;
-    const double v26 = p[7] * v21;
-    const double v27 = exp(v26);
-    const double v28 = p[7] * v27;
-    const double v29 = v10 * v28;
-    const double v30 = v29 + v25;
-    const double v31 = p[3] * v21;
-    const double v32 = exp(v31);
-    const double v33 = p[3] * v32;
-    const double v34 = v16 * v33;
-    const double v35 = v30 + v34;
-    const double v36 = 1.0 / s[1];
-    const double v37 = v36 * v35;
-    const double v38 = log(s[2]);
-    const double v39 = p[5] * v38;
-    const double v40 = exp(v39);
-    const double v41 = p[5] * v40;
-    const double v42 = v5 * v41;
-    const double v43 = p[7] * v38;
-    const double v44 = exp(v43);
-    const double v45 = p[7] * v44;
-    const double v46 = v10 * v45;
-    const double v47 = v46 + v42;
-    const double v48 = p[3] * v38;
-    const double v49 = exp(v48);
-    const double v50 = p[3] * v49;
-    const double v51 = v16 * v50;
-    const double v52 = v47 + v51;
-    const double v53 = 1.0 / s[2];
-    const double v54 = v53 * v52;
-    w[0] = v20;
-    w[1] = v37;
-    w[2] = v54;
+    const double v1 = log(s[0]), v2 = exp(p[5] * v1), v3 = p[1] * p[6], v4 = exp(p[7] * v1),
+        v5 = p[2] * p[8], v6 = exp(p[3] * v1), v7 = p[0] * p[4],
+        v8 = 1.0 / s[0] * (v5 * (p[7] * v4) + v3 * (p[5] * v2) + v7 * (p[3] * v6)), v9 = log(s[1]),
+        v10 = exp(p[5] * v9), v11 = exp(p[7] * v9), v12 = exp(p[3] * v9),
+        v13 = 1.0 / s[1] * (v5 * (p[7] * v11) + v3 * (p[5] * v10) + v7 * (p[3] * v12)),
+        v14 = log(s[2]), v15 = exp(p[5] * v14), v16 = exp(p[7] * v14), v17 = exp(p[3] * v14),
+        v18 = 1.0 / s[2] * (v5 * (p[7] * v16) + v3 * (p[5] * v15) + v7 * (p[3] * v17));
+    w[0] = v8; w[1] = v13; w[2] = v18;
     return failed;
 }
 
@@ -496,3435 +277,1392 @@ static void softehl_solid_taylor_mean_ogden_isochoric_of_stress_1_lanes(
     }
 }
 
-static void softehl_solid_taylor_mean_ogden_energy_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+/* isochoric_1_by_0: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_0_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = p[3] * p[4], v2 = log(s[0]), v3 = exp(p[3] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[3] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[3] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_0(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_0_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_0_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_0(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_1: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_1_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = p[5] * p[6], v2 = log(s[0]), v3 = exp(p[5] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[5] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[5] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_1(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_1_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_1_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_1(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_2: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_2_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = p[7] * p[8], v2 = log(s[0]), v3 = exp(p[7] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[7] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[7] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_2(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_2_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_2_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_2(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_3: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_3_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = log(s[0]), v2 = p[3] * v1, v3 = p[0] * p[4], v4 = exp(v2),
+        v5 = 1.0 / s[0] * (v4 * (v3 * (1.0 + v2))), v6 = log(s[1]), v7 = p[3] * v6, v8 = exp(v7),
+        v9 = 1.0 / s[1] * (v8 * (v3 * (1.0 + v7))), v10 = log(s[2]), v11 = p[3] * v10,
+        v12 = exp(v11), v13 = 1.0 / s[2] * (v12 * (v3 * (1.0 + v11)));
+    w[0] = v5; w[1] = v9; w[2] = v13;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_3(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_3_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_3_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_3(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_4: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_4_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = p[0] * p[3], v2 = log(s[0]), v3 = exp(p[3] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[3] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[3] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_4(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_4_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_4_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_4(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_5: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_5_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = log(s[0]), v2 = p[5] * v1, v3 = p[1] * p[6], v4 = exp(v2),
+        v5 = 1.0 / s[0] * (v4 * (v3 * (1.0 + v2))), v6 = log(s[1]), v7 = p[5] * v6, v8 = exp(v7),
+        v9 = 1.0 / s[1] * (v8 * (v3 * (1.0 + v7))), v10 = log(s[2]), v11 = p[5] * v10,
+        v12 = exp(v11), v13 = 1.0 / s[2] * (v12 * (v3 * (1.0 + v11)));
+    w[0] = v5; w[1] = v9; w[2] = v13;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_5(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_5_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_5_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_5(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_6: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_6_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = p[1] * p[5], v2 = log(s[0]), v3 = exp(p[5] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[5] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[5] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_6(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_6_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_6_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_6(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_7: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_7_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = log(s[0]), v2 = p[7] * v1, v3 = p[2] * p[8], v4 = exp(v2),
+        v5 = 1.0 / s[0] * (v4 * (v3 * (1.0 + v2))), v6 = log(s[1]), v7 = p[7] * v6, v8 = exp(v7),
+        v9 = 1.0 / s[1] * (v8 * (v3 * (1.0 + v7))), v10 = log(s[2]), v11 = p[7] * v10,
+        v12 = exp(v11), v13 = 1.0 / s[2] * (v12 * (v3 * (1.0 + v11)));
+    w[0] = v5; w[1] = v9; w[2] = v13;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_7(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_7_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_7_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_7(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+/* isochoric_1_by_8: first derivatives by the eigenvalues */
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_8_of_eigenvalues(
+    const double *restrict s, const double *restrict p, double *restrict w)
+{
+    int failed = 0;
+    (void)s, (void)p;
+    const double v1 = p[2] * p[7], v2 = log(s[0]), v3 = exp(p[7] * v2), v4 = 1.0 / s[0] * (v3 * v1),
+        v5 = log(s[1]), v6 = exp(p[7] * v5), v7 = 1.0 / s[1] * (v6 * v1), v8 = log(s[2]),
+        v9 = exp(p[7] * v8), v10 = 1.0 / s[2] * (v9 * v1);
+    w[0] = v4; w[1] = v7; w[2] = v10;
+    return failed;
+}
+
+static int softehl_solid_taylor_mean_ogden_isochoric_1_by_8(const double *restrict p, double *restrict s)
+{
+    double c[3], Q[9], w[3];
+    if (softehl_eigenvalues(p, c, Q) || softehl_solid_taylor_mean_ogden_isochoric_1_by_8_of_eigenvalues(c, p + 6, w)) {
+        for (int k = 0; k < 6; ++k) s[k] = NAN;
+        return 1;
+    }
+    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+    for (int i = 0; i < 6; ++i) {
+        s[i] = 0.0;
+        for (int a = 0; a < 3; ++a) s[i] += w[a] * Q[3 * row[i] + a] * Q[3 * column[i] + a];
+        if (i > 2) s[i] *= 2.0;
+    }
+    return 0;
+}
+
+static void softehl_solid_taylor_mean_ogden_isochoric_1_by_8_lanes(
+    M active, const V *restrict p, V *restrict s, M *lost)
+{
+    for (int l = 0; l < SOFTEHL_LANES; ++l) {
+        double one[15], out[6];
+        for (int k = 0; k < 15; ++k) one[k] = softehl_lane(p[k], l);
+        for (int k = 0; k < 6; ++k) out[k] = NAN;
+        if (softehl_lane(active, l) && softehl_solid_taylor_mean_ogden_isochoric_1_by_8(one, out))
+            softehl_lane(*lost, l) = -1;
+        for (int k = 0; k < 6; ++k) softehl_lane(s[k], l) = out[k];
+    }
+}
+
+SOFTEHL_GROUP(softehl_solid_taylor_mean_ogden_energy)
+{
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 0.5 * parameters[6];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 1.0 / parameters[1];
-    const double v4 = 0.5 * parameters[3];
-    const double v5 = 1.0 / parameters[3];
-    const double v6 = 0.5 * parameters[5];
-    const double v7 = 1.0 / parameters[5];
-    const V v8 = X4 - X0;
-    const V v9 = X0 - X2;
-    const V v10 = X4 - X2;
-    const V v11 = v8 - X2;
-    const V v12 = X4 - X6;
-    const V v13 = X6 + v11;
-    const V v14 = v9 + v12;
-    const V v15 = 0.25 * v13;
-    const V v16 = v12 - v9;
-    const V v17 = X1 - X3;
-    const V v18 = X1 + X3;
-    const V v19 = X5 - X3;
-    const V v20 = 0.25 * v14;
-    const V v21 = X5 - X7;
-    const V v22 = X5 + X7;
-    const V v23 = 0.25 * v16;
-    const V v24 = v13 - v16;
-    const V v25 = v17 + v21;
-    const V v26 = v21 - v17;
-    const V v27 = v16 - v13;
-    const V v28 = v16 + v13;
-    const V v29 = 0.0625 * v24;
-    const V v30 = 0.25 * v25;
-    const V v31 = 0.0625 * v27;
-    const V v32 = 0.0625 * v28;
-    const V v33 = 0.25 * v26;
-    const V v34 = v18 + v22;
-    const V v35 = v22 - v18;
-    const V v36 = 0.25 * v34;
-    const V v37 = v26 - v35;
-    const V v38 = v26 + v35;
-    const V v39 = 0.25 * v35;
-    const V v40 = v35 - v26;
-    const V v41 = v23 * v39;
-    const V v42 = 0.0625 * v40;
-    const V v43 = v33 * v15;
-    const V v44 = v41 - v43;
-    const V v45 = 0.0625 * v37;
-    const V v46 = 0.0625 * v38;
-    const V v47 = 1.0 / v44;
-    const V v48 = 1.0 / v36;
-    const V v49 = v36 * v36;
-    const V v50 = 1.0 / v49;
-    const V v51 = 0.25 * v48;
-    const V v52 = 0.25 * v50;
-    const V v53 = v45 * v47;
-    const V v54 = v29 * v47;
-    const V v55 = v46 * v47;
-    const V v56 = v32 * v47;
-    const V v57 = v42 * v47;
-    const V v58 = v31 * v47;
-    const V v59 = v30 * v56;
-    const V v60 = v20 * v55;
-    const V v61 = v59 - v60;
-    const V v62 = v61 - 0.25;
-    const V v63 = (-0.25) - v61;
-    const V v64 = v30 * v54;
-    const V v65 = 0.25 - v64;
-    const V v66 = v20 * v53;
-    const V v67 = v65 - v66;
-    const V v68 = v30 * v58;
-    const V v69 = 0.25 - v68;
-    const V v70 = v20 * v57;
-    const V v71 = v69 - v70;
-    V s72 = softehl_splat(0.0);
-    V s73 = softehl_splat(0.0);
-    V s74 = softehl_splat(0.0);
-    V s75 = softehl_splat(0.0);
-    V s76 = softehl_splat(0.0);
-    V s77 = softehl_splat(0.0);
-    V s78 = softehl_splat(0.0);
-    V s79 = softehl_splat(0.0);
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 0.5 * parameters[6], v2 = 0.5 * parameters[1], v3 = 1.0 / parameters[1],
+        v4 = 0.5 * parameters[3], v5 = 1.0 / parameters[3], v6 = 0.5 * parameters[5],
+        v7 = 1.0 / parameters[5];
+    const V v8 = X0 - X2, v9 = X4 - X2, v10 = X4 - X6, v11 = X6 + (X4 - X0 - X2), v12 = 0.25 * v11,
+        v13 = v10 - v8, v14 = X1 - X3, v15 = X1 + X3, v16 = X5 - X3, v17 = 0.25 * (v8 + v10),
+        v18 = X5 - X7, v19 = X5 + X7, v20 = 0.25 * v13, v21 = v18 - v14, v22 = 0.25 * (v14 + v18),
+        v23 = 0.25 * v21, v24 = v19 - v15, v25 = 0.25 * (v15 + v19), v26 = 0.25 * v24,
+        v27 = 1.0 / (v20 * v26 - v23 * v12), v28 = 0.25 * (1.0 / v25),
+        v29 = 0.25 * (1.0 / (v25 * v25)), v30 = 0.0625 * (v21 - v24) * v27,
+        v31 = 0.0625 * (v11 - v13) * v27, v32 = 0.0625 * (v21 + v24) * v27,
+        v33 = 0.0625 * (v13 + v11) * v27, v34 = 0.0625 * (v24 - v21) * v27,
+        v35 = 0.0625 * (v13 - v11) * v27, v36 = v22 * v33 - v17 * v32, v37 = v36 - 0.25,
+        v38 = (-0.25) - v36, v39 = 0.25 - v22 * v31 - v17 * v30, v40 = 0.25 - v22 * v35 - v17 * v34;
+    V s41 = {0}, s42 = {0}, s43 = {0}, s44 = {0}, s45 = {0}, s46 = {0}, s47 = {0}, s48 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v80 = 1.0 - w[1];
-        const double v81 = 1.0 + w[1];
-        const double v82 = 0.25 * w[1];
-        const double v83 = 1.0 - w[0];
-        const double v84 = 1.0 + w[0];
-        const double v85 = 0.25 * w[0];
-        const double v86 = 0.25 * v81;
-        const double v87 = 0.25 - v82;
-        const double v88 = 0.25 + v82;
-        const double v89 = 0.25 + v85;
-        const double v90 = 0.25 - v85;
-        const V v91 = X5 * v84;
-        const double v92 = v82 - 0.25;
-        const V v93 = X3 * v84;
-        const V v94 = X3 * v87;
-        const V v95 = X2 * v87;
-        const double v96 = v85 - 0.25;
-        const V v97 = X6 * v90;
-        const V v98 = X7 * v90;
-        const V v99 = X7 * v83;
-        const V v100 = v91 + v99;
-        const V v101 = X1 * v83;
-        const V v102 = v101 + v93;
-        const V v103 = v86 * v100;
-        const V v104 = X1 * v92;
-        const V v105 = v94 + v104;
-        const V v106 = X1 * v96;
-        const V v107 = v98 + v106;
-        const V v108 = X0 * v92;
-        const V v109 = v95 + v108;
-        const V v110 = X0 * v96;
-        const V v111 = v97 + v110;
-        const V v112 = 0.25 * v102;
-        const V v113 = v80 * v112;
-        const V v114 = v103 + v113;
-        const V v115 = v88 * v21;
-        const V v116 = v115 + v105;
-        const V v117 = v88 * v12;
-        const V v118 = v117 + v109;
-        const V v119 = v89 * v19;
-        const V v120 = v119 + v107;
-        const V v121 = v89 * v10;
-        const V v122 = v121 + v111;
-        const double v123 = w[1] * w[2];
-        const V v124 = w[0] * v118;
-        const V v125 = v118 * v120;
-        const V v126 = w[1] * v120;
-        const V v127 = w[1] * v122;
-        const V v128 = v124 - v127;
-        const V v129 = v122 * v116;
-        const V v130 = v125 - v129;
-        const V v131 = w[0] * v116;
-        const V v132 = v126 - v131;
-        const V v133 = w[2] * v114;
-        const V v134 = v114 * v130;
-        const V v135 = 0.25 * v130;
-        const V v136 = v133 * v132;
-        s78 += v136;
-        const V v137 = v133 * v128;
-        s79 += v137;
-        const V v138 = w[2] * v135;
-        s72 += v138;
-        const V v139 = v123 * v135;
-        s74 += v139;
-        const V v140 = w[2] * v134;
-        s75 += v140;
-        const V v141 = v123 * v134;
-        s77 += v141;
-        const V v142 = w[0] * v138;
-        s73 += v142;
-        const V v143 = w[0] * v140;
-        s76 += v143;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v49 = 1.0 - w[1], v50 = 1.0 + w[1], v51 = 0.25 * w[1], v52 = 1.0 - w[0],
+            v53 = 1.0 + w[0], v54 = 0.25 * w[0], v55 = 0.25 * v50, v56 = 0.25 - v51,
+            v57 = 0.25 + v51, v58 = 0.25 + v54, v59 = 0.25 - v54;
+        const V v60 = X5 * v53; const double v61 = v51 - 0.25;
+        const V v62 = X3 * v53, v63 = X3 * v56, v64 = X2 * v56;
+        const double v65 = v54 - 0.25;
+        const V v66 = X6 * v59, v67 = X7 * v59, v68 = X7 * v52, v69 = v60 + v68, v70 = X1 * v52,
+            v71 = v70 + v62, v72 = v55 * v69, v73 = X1 * v61, v74 = v63 + v73, v75 = X1 * v65,
+            v76 = v67 + v75, v77 = X0 * v61, v78 = v64 + v77, v79 = X0 * v65, v80 = v66 + v79,
+            v81 = 0.25 * v71, v82 = v49 * v81, v83 = v72 + v82, v84 = v57 * v18, v85 = v84 + v74,
+            v86 = v57 * v10, v87 = v86 + v78, v88 = v58 * v16, v89 = v88 + v76, v90 = v58 * v9,
+            v91 = v90 + v80;
+        const double v92 = w[1] * w[2];
+        const V v93 = v87 * v89, v94 = v91 * v85, v95 = v93 - v94, v96 = w[2] * v83,
+            v97 = v83 * v95, v98 = 0.25 * v95;
+        s47 += v96 * (w[1] * v89 - w[0] * v85); s48 += v96 * (w[0] * v87 - w[1] * v91);
+        const V v99 = w[2] * v98; s41 += v99; s43 += v92 * v98; const V v100 = w[2] * v97;
+        s44 += v100; s46 += v92 * v97; s42 += w[0] * v99; s45 += w[0] * v100;
     }
-    const V v144 = 1.0 / s75;
-    const V v145 = v1 * s75;
-    const V v146 = s76 * v144;
-    const V v147 = v144 * s77;
-    const V v148 = v144 * s78;
-    const V v149 = v144 * s79;
-    const V v150 = s72 * v144;
-    const V v151 = s73 * v144;
-    const V v152 = s74 * v144;
-    const V v153 = v150 - v152;
-    const V v154 = v150 + v152;
-    const V v155 = v151 + v153;
-    const V v156 = v153 - v151;
-    const V v157 = v151 + v154;
-    const V v158 = v154 - v151;
-    const V v159 = v62 * v148;
-    const V v160 = v55 + v159;
-    const V v161 = v62 * v149;
-    const V v162 = v161 - v56;
-    const V v163 = v71 * v148;
-    const V v164 = v57 + v163;
-    const V v165 = v71 * v149;
-    const V v166 = v58 + v165;
-    const V v167 = v63 * v149;
-    const V v168 = v56 + v167;
-    const V v169 = v63 * v148;
-    const V v170 = v169 - v55;
-    const V v171 = v67 * v148;
-    const V v172 = v53 + v171;
-    const V v173 = v67 * v149;
-    const V v174 = v54 + v173;
-    const V v175 = d2 * v162;
-    const V v176 = d3 * v162;
-    const V v177 = 1.0 + v176;
-    const V v178 = d7 * v170;
-    const V v179 = d7 * v168;
-    const V v180 = v179 + v177;
-    const V v181 = d7 * v158;
-    const V v182 = 1.0 + v181;
-    const V v183 = d6 * v168;
-    const V v184 = v175 + v183;
-    const V v185 = d6 * v170;
-    const V v186 = 1.0 + v185;
-    const V v187 = d2 * v160;
-    const V v188 = v187 + v186;
-    const V v189 = d3 * v160;
-    const V v190 = v189 + v178;
-    const V v191 = d3 * v155;
-    const V v192 = v191 + v182;
-    const V v193 = d0 * v172;
-    const V v194 = v193 + v188;
-    const V v195 = d0 * v174;
-    const V v196 = v195 + v184;
-    const V v197 = d1 * v172;
-    const V v198 = v197 + v190;
-    const V v199 = d1 * v174;
-    const V v200 = v199 + v180;
-    const V v201 = d1 * v156;
-    const V v202 = v201 + v192;
-    const V v203 = d4 * v164;
-    const V v204 = v203 + v194;
-    const V v205 = d4 * v166;
-    const V v206 = v205 + v196;
-    const V v207 = d5 * v164;
-    const V v208 = v207 + v198;
-    const V v209 = d5 * v166;
-    const V v210 = v209 + v200;
-    const V v211 = d5 * v157;
-    const V v212 = v211 + v202;
-    const V v213 = v204 * v210;
-    const V v214 = v212 * v212;
-    const V v215 = v206 * v208;
-    const V v216 = v213 - v215;
-    const V v217 = v214 * v216;
-    const V v218 = v216 * v217;
-    const V v219 = softehl_vlog(v218);
-    const V v220 = v218 - v219;
-    const V v221 = 0.5 * v220;
-    const V v222 = (-0.5) + v221;
-    const V v223 = v145 * v222;
-    V s224 = softehl_splat(0.0);
+    const V v101 = 1.0 / s44, v102 = s45 * v101, v103 = v101 * s46, v104 = v101 * s47,
+        v105 = v101 * s48, v106 = s41 * v101, v107 = s42 * v101, v108 = s43 * v101,
+        v109 = v106 - v108, v110 = v106 + v108, v111 = v32 + v37 * v104, v112 = v37 * v105 - v33,
+        v113 = v34 + v40 * v104, v114 = v35 + v40 * v105, v115 = v33 + v38 * v105,
+        v116 = v38 * v104 - v32, v117 = v30 + v39 * v104, v118 = v31 + v39 * v105,
+        v119 = d1 * (v109 - v107) + (d3 * (v107 + v109) + (1.0 + d7 * (v110 - v107))),
+        v120 = d5 * (v107 + v110) + v119,
+        v121 = (d4 * v113 + (d0 * v117 + (d2 * v111 + (1.0 + d6 * v116)))) * (d5 * v114 + (d1 * v118 + (d7 * v115 + (1.0 + d3 * v112)))),
+        v122 = (d4 * v114 + (d0 * v118 + (d2 * v112 + d6 * v115))) * (d5 * v113 + (d1 * v117 + (d3 * v111 + d7 * v116))),
+        v123 = v121 - v122, v124 = v123 * (v120 * v120 * v123), v125 = softehl_vlog(v124),
+        v126 = v1 * s44 * ((-0.5) + 0.5 * (v124 - v125));
+    V s127 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v225 = w[0] - v146;
-        const V v226 = w[1] - v147;
-        const V v227 = v33 * v225;
-        const V v228 = v23 * v225;
-        const V v229 = v39 * v226;
-        const V v230 = v15 * v226;
-        const V v231 = v228 - v230;
-        const V v232 = v47 * v231;
-        const V v233 = v149 + v232;
-        const V v234 = v229 - v227;
-        const V v235 = v47 * v234;
-        const V v236 = v148 + v235;
-        const V v237 = v67 * v233;
-        const V v238 = v54 + v237;
-        const V v239 = v67 * v236;
-        const V v240 = v53 + v239;
-        const V v241 = v71 * v233;
-        const V v242 = v58 + v241;
-        const V v243 = v71 * v236;
-        const V v244 = v57 + v243;
-        const V v245 = v63 * v233;
-        const V v246 = v56 + v245;
-        const V v247 = v62 * v233;
-        const V v248 = v247 - v56;
-        const V v249 = v62 * v236;
-        const V v250 = v55 + v249;
-        const V v251 = v63 * v236;
-        const V v252 = v251 - v55;
-        const V v253 = d3 * v248;
-        const V v254 = 1.0 + v253;
-        const V v255 = d2 * v248;
-        const V v256 = d6 * v252;
-        const V v257 = 1.0 + v256;
-        const V v258 = d7 * v252;
-        const V v259 = d6 * v246;
-        const V v260 = v255 + v259;
-        const V v261 = d7 * v246;
-        const V v262 = v261 + v254;
-        const V v263 = d2 * v250;
-        const V v264 = v263 + v257;
-        const V v265 = d3 * v250;
-        const V v266 = v265 + v258;
-        const V v267 = d0 * v238;
-        const V v268 = v267 + v260;
-        const V v269 = d0 * v240;
-        const V v270 = v269 + v264;
-        const V v271 = d1 * v238;
-        const V v272 = v271 + v262;
-        const V v273 = d1 * v240;
-        const V v274 = v273 + v266;
-        const V v275 = d4 * v242;
-        const V v276 = v275 + v268;
-        const V v277 = d5 * v242;
-        const V v278 = v277 + v272;
-        const V v279 = d4 * v244;
-        const V v280 = v279 + v270;
-        const V v281 = d5 * v244;
-        const V v282 = v281 + v274;
-        const V v283 = v278 * v280;
-        const V v284 = v276 * v282;
-        const V v285 = v283 - v284;
-        const V v286 = v285 * v285;
-        const M v287 = softehl_eq(v286, softehl_splat(0.0));
-        V v288 = softehl_splat(0.0);
-        const M m289 = ~v287;
-        if (softehl_any(m289)) {
-            const V v290 = softehl_vrcbrt(v286);
-            const V v291 = v286 * v290;
-            const V v292 = v290 * v291;
-            v288 = softehl_blend(m289, v292, v288);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const V v128 = w[0] - v102, v129 = w[1] - v103, v130 = v23 * v128, v131 = v26 * v129,
+            v132 = v105 + v27 * (v20 * v128 - v12 * v129), v133 = v104 + v27 * (v131 - v130),
+            v134 = v31 + v39 * v132, v135 = v30 + v39 * v133, v136 = v35 + v40 * v132,
+            v137 = v34 + v40 * v133, v138 = v33 + v38 * v132, v139 = v37 * v132 - v33,
+            v140 = v32 + v37 * v133, v141 = v38 * v133 - v32,
+            v142 = d4 * v136 + (d0 * v134 + (d2 * v139 + d6 * v138)),
+            v143 = d5 * v136 + (d1 * v134 + (d7 * v138 + (1.0 + d3 * v139))),
+            v144 = d4 * v137 + (d0 * v135 + (d2 * v140 + (1.0 + d6 * v141))),
+            v145 = d5 * v137 + (d1 * v135 + (d3 * v140 + d7 * v141)),
+            v146 = v143 * v144 - v142 * v145, v147 = v146 * v146;
+        const M v148 = softehl_eq(v147, softehl_splat(0.0)); V v149 = softehl_splat(0.0);
+        const M m150 = ~v148;
+        if (softehl_any(m150)) {
+            const V v151 = softehl_vrcbrt(v147), v152 = v151 * (v147 * v151);
+            v149 = softehl_blend(m150, v152, v149);
         }
-        const V v293 = v229 + v227;
-        const V v294 = v52 * v293;
-        const V v295 = v150 - v294;
-        const V v296 = v51 * v225;
-        const V v297 = v151 + v296;
-        const V v298 = v51 * v226;
-        const V v299 = v152 + v298;
-        const V v300 = v299 - v295;
-        const V v301 = v299 + v295;
-        const V v302 = v297 + v300;
-        const V v303 = v297 - v300;
-        const V v304 = d1 * v302;
-        const V v305 = 1.0 - v304;
-        const V v306 = v297 + v301;
-        const V v307 = v301 - v297;
-        const V v308 = d3 * v303;
-        const V v309 = v308 + v305;
-        const V v310 = d5 * v306;
-        const V v311 = v310 + v309;
-        const V v312 = d7 * v307;
-        const V v313 = v312 + v311;
-        const V v314 = v313 * v313;
-        const M v315 = softehl_eq(v314, softehl_splat(0.0));
-        V v316 = softehl_splat(0.0);
-        const M m317 = ~v315;
-        if (softehl_any(m317)) {
-            const V v318 = softehl_vrcbrt(v314);
-            const V v319 = v314 * v318;
-            const V v320 = v318 * v319;
-            v316 = softehl_blend(m317, v320, v316);
+        const V v153 = v106 - v29 * (v131 + v130), v154 = v107 + v28 * v128,
+            v155 = v108 + v28 * v129, v156 = v155 - v153, v157 = v155 + v153,
+            v158 = d5 * (v154 + v157) + (d3 * (v154 - v156) + (1.0 - d1 * (v154 + v156))),
+            v159 = d7 * (v157 - v154) + v158, v160 = v159 * v159;
+        const M v161 = softehl_eq(v160, softehl_splat(0.0)); V v162 = softehl_splat(0.0);
+        const M m163 = ~v161;
+        if (softehl_any(m163)) {
+            const V v164 = softehl_vrcbrt(v160), v165 = v164 * (v160 * v164);
+            v162 = softehl_blend(m163, v165, v162);
         }
-        const V v321 = v316 * v288;
-        const V v322 = v280 * v280;
-        const V v323 = v280 * v276;
-        const V v324 = v276 * v276;
-        const V v325 = 1.0 / v321;
-        const V v326 = v282 * v282;
-        const V v327 = v322 + v326;
-        const V v328 = v282 * v278;
-        const V v329 = v323 + v328;
-        const V v330 = v278 * v278;
-        const V v331 = v324 + v330;
-        const V v332 = v327 * v325;
-        const V v333 = v329 * v325;
-        const V v334 = v331 * v325;
-        const V v335 = v314 * v325;
-        V v336[1];
-        softehl_solid_taylor_mean_ogden_isochoric_lanes(softehl_mask(1), (const V[]){v332, v334, v335, v333, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6), softehl_splat(v7)}, v336, &failed);
-        const double v337 = 1.0 - w[1];
-        const double v338 = 1.0 + w[1];
-        const double v339 = 0.25 * w[1];
-        const double v340 = 1.0 - w[0];
-        const double v341 = 1.0 + w[0];
-        const double v342 = 0.25 * w[0];
-        const double v343 = 0.25 * v338;
-        const double v344 = 0.25 - v339;
-        const double v345 = 0.25 + v339;
-        const double v346 = 0.25 + v342;
-        const double v347 = 0.25 - v342;
-        const V v348 = X5 * v341;
-        const double v349 = v339 - 0.25;
-        const V v350 = v336[0];
-        const V v351 = X3 * v341;
-        const V v352 = X3 * v344;
-        const V v353 = X2 * v344;
-        const double v354 = v342 - 0.25;
-        const V v355 = X6 * v347;
-        const V v356 = X7 * v347;
-        const V v357 = X7 * v340;
-        const V v358 = v348 + v357;
-        const V v359 = X1 * v340;
-        const V v360 = v359 + v351;
-        const V v361 = v343 * v358;
-        const V v362 = X1 * v349;
-        const V v363 = v352 + v362;
-        const V v364 = X1 * v354;
-        const V v365 = v356 + v364;
-        const V v366 = X0 * v349;
-        const V v367 = v353 + v366;
-        const V v368 = X0 * v354;
-        const V v369 = v355 + v368;
-        const V v370 = 0.25 * v360;
-        const V v371 = v337 * v370;
-        const V v372 = v361 + v371;
-        const V v373 = v345 * v21;
-        const V v374 = v373 + v363;
-        const V v375 = v345 * v12;
-        const V v376 = v375 + v367;
-        const V v377 = v346 * v19;
-        const V v378 = v377 + v365;
-        const V v379 = v346 * v10;
-        const V v380 = v379 + v369;
-        const V v381 = v376 * v378;
-        const V v382 = v380 * v374;
-        const V v383 = v381 - v382;
-        const V v384 = v372 * v383;
-        const V v385 = w[2] * v384;
-        const V v386 = v385 * v350;
-        s224 += v386;
+        const V v166 = 1.0 / (v162 * v149), v167 = (v144 * v144 + v145 * v145) * v166,
+            v168 = (v144 * v142 + v145 * v143) * v166, v169 = (v142 * v142 + v143 * v143) * v166,
+            v170 = v160 * v166;
+        V v171[1];
+        softehl_solid_taylor_mean_ogden_isochoric_lanes(softehl_mask(1), (const V[]){v167, v169, v170, v168, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6), softehl_splat(v7)}, v171, &failed);
+        const double v172 = 1.0 - w[1], v173 = 1.0 + w[1], v174 = 0.25 * w[1], v175 = 1.0 - w[0],
+            v176 = 1.0 + w[0], v177 = 0.25 * w[0], v178 = 0.25 * v173, v179 = 0.25 - v174,
+            v180 = 0.25 + v174, v181 = 0.25 + v177, v182 = 0.25 - v177;
+        const V v183 = X5 * v176; const double v184 = v174 - 0.25;
+        const V v185 = v171[0], v186 = X3 * v176, v187 = X3 * v179, v188 = X2 * v179;
+        const double v189 = v177 - 0.25;
+        const V v190 = X6 * v182, v191 = X7 * v182, v192 = X7 * v175, v193 = v183 + v192,
+            v194 = X1 * v175, v195 = v194 + v186, v196 = v178 * v193, v197 = X1 * v184,
+            v198 = v187 + v197, v199 = X1 * v189, v200 = v191 + v199, v201 = X0 * v184,
+            v202 = v188 + v201, v203 = X0 * v189, v204 = v190 + v203, v205 = 0.25 * v195,
+            v206 = v172 * v205, v207 = v196 + v206, v208 = v180 * v18, v209 = v208 + v198,
+            v210 = v180 * v10, v211 = v210 + v202, v212 = v181 * v16, v213 = v212 + v200,
+            v214 = v181 * v9, v215 = v214 + v204, v216 = v211 * v213, v217 = v215 * v209,
+            v218 = v216 - v217, v219 = v207 * v218, v220 = w[2] * v219;
+        s127 += v220 * v185;
     }
-    const V v387 = v223 + s224;
-    const V v388 = 6.283185307179586 * v387;
-    softehl_store1(R + 0, 1, v388);
+    softehl_store1(R + 0, 1, 6.283185307179586 * (v126 + s127));
     if (softehl_any(failed)) {
         softehl_spoil(failed, R, 1);
     }
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_ogden_energy, 8, 8, 0, 0, 1, 0)
 
-void softehl_solid_taylor_mean_ogden_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_ogden_residual)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_ogden_energy_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 1 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_ogden_energy_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 1 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 1];
-    softehl_solid_taylor_mean_ogden_energy(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 1 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_solid_taylor_mean_ogden_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 1.5707963267948966 * parameters[6];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 1.0 / parameters[1];
-    const V v4 = X4 - X0;
-    const V v5 = X0 - X2;
-    const V v6 = X4 - X2;
-    const V v7 = v4 - X2;
-    const V v8 = X4 - X6;
-    const V v9 = X6 + v7;
-    const double v10 = 0.5 * parameters[3];
-    const double v11 = 1.0 / parameters[3];
-    const double v12 = 0.5 * parameters[5];
-    const double v13 = 1.0 / parameters[5];
-    const V v14 = v5 + v8;
-    const V v15 = 0.25 * v9;
-    const V v16 = 0.0625 * v9;
-    const V v17 = v8 - v5;
-    const V v18 = 0.25 * v17;
-    const V v19 = 0.0625 * v17;
-    const V v20 = X1 - X3;
-    const V v21 = X1 + X3;
-    const V v22 = X5 - X3;
-    const V v23 = X5 - X7;
-    const V v24 = X5 + X7;
-    const V v25 = v20 + v23;
-    const V v26 = v21 + v24;
-    const V v27 = v23 - v20;
-    const V v28 = d0 - d2;
-    const V v29 = d0 + d2;
-    const V v30 = v24 - v21;
-    const V v31 = 0.25 * v26;
-    const V v32 = 0.25 * v27;
-    const V v33 = 0.0625 * v27;
-    const V v34 = 0.25 * v30;
-    const V v35 = 0.0625 * v30;
-    const V v36 = v18 * v34;
-    const V v37 = 1.0 / v31;
-    const V v38 = v31 * v31;
-    const V v39 = d1 + d3;
-    const V v40 = d1 - d3;
-    const V v41 = 1.0 / v38;
-    const V v42 = v29 - d4;
-    const V v43 = v32 * v15;
-    const V v44 = v36 - v43;
-    const V v45 = 1.0 / v44;
-    const V v46 = v42 - d6;
-    const V v47 = d4 - d6;
-    const V v48 = v14 * v33;
-    const V v49 = v14 * v35;
-    const V v50 = v28 + v47;
-    const V v51 = v28 - v47;
-    const V v52 = d5 + d7;
-    const V v53 = d5 - d7;
-    const V v54 = 0.25 * v37;
-    const V v55 = v39 - v52;
-    const V v56 = v39 + v52;
-    const V v57 = v40 - v53;
-    const V v58 = v40 + v53;
-    const V v59 = 0.25 * v41;
-    const V v60 = v33 * v45;
-    const V v61 = v35 * v45;
-    const V v62 = v45 * v48;
-    const V v63 = v45 * v49;
-    const V v64 = v25 * v45;
-    const V v65 = 0.25 * v63;
-    const V v66 = v45 * v16;
-    const V v67 = v19 * v45;
-    const V v68 = v16 * v64;
-    const V v69 = v19 * v64;
-    const V v70 = 0.25 * v68;
-    const V v71 = v65 - v70;
-    const V v72 = 0.25 * v69;
-    const V v73 = 0.25 * v62;
-    const V v74 = v72 - v73;
-    const V v75 = v51 * v66;
-    const V v76 = v55 * v60;
-    const V v77 = v51 * v61;
-    const V v78 = 1.0 - v77;
-    const V v79 = v57 * v66;
-    const V v80 = 1.0 + v79;
-    const V v81 = v57 * v61;
-    const V v82 = v76 - v81;
-    const V v83 = v55 * v67;
-    const V v84 = v80 - v83;
-    const V v85 = v46 * v60;
-    const V v86 = v78 + v85;
-    const V v87 = v46 * v67;
-    const V v88 = v75 - v87;
-    V s89 = softehl_splat(0.0);
-    V s90 = softehl_splat(0.0);
-    V s91 = softehl_splat(0.0);
-    V s92 = softehl_splat(0.0);
-    V s93 = softehl_splat(0.0);
-    V s94 = softehl_splat(0.0);
-    V s95 = softehl_splat(0.0);
-    V s96 = softehl_splat(0.0);
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 1.5707963267948966 * parameters[6], v2 = 0.5 * parameters[1],
+        v3 = 1.0 / parameters[1];
+    const V v4 = X0 - X2, v5 = X4 - X2, v6 = X4 - X6, v7 = X6 + (X4 - X0 - X2);
+    const double v8 = 0.5 * parameters[3], v9 = 1.0 / parameters[3], v10 = 0.5 * parameters[5],
+        v11 = 1.0 / parameters[5];
+    const V v12 = v4 + v6, v13 = 0.25 * v7, v14 = 0.0625 * v7, v15 = v6 - v4, v16 = 0.25 * v15,
+        v17 = 0.0625 * v15, v18 = X1 - X3, v19 = X1 + X3, v20 = X5 - X3, v21 = X5 - X7,
+        v22 = X5 + X7, v23 = v21 - v18, v24 = d0 - d2, v25 = v22 - v19, v26 = 0.25 * (v19 + v22),
+        v27 = 0.25 * v23, v28 = 0.0625 * v23, v29 = 0.25 * v25, v30 = 0.0625 * v25, v31 = d1 + d3,
+        v32 = d1 - d3, v33 = 1.0 / (v16 * v29 - v27 * v13), v34 = d0 + d2 - d4 - d6, v35 = d4 - d6,
+        v36 = v24 + v35, v37 = v24 - v35, v38 = d5 + d7, v39 = d5 - d7, v40 = 0.25 * (1.0 / v26),
+        v41 = v31 - v38, v42 = v31 + v38, v43 = v32 - v39, v44 = v32 + v39,
+        v45 = 0.25 * (1.0 / (v26 * v26)), v46 = v28 * v33, v47 = v30 * v33, v48 = v33 * (v12 * v28),
+        v49 = v33 * (v12 * v30), v50 = (v18 + v21) * v33, v51 = v33 * v14, v52 = v17 * v33,
+        v53 = v14 * v50, v54 = v17 * v50, v55 = 0.25 * v49 - 0.25 * v53,
+        v56 = 0.25 * v54 - 0.25 * v48, v57 = v41 * v46 - v43 * v47,
+        v58 = 1.0 + v43 * v51 - v41 * v52, v59 = 1.0 - v37 * v47 + v34 * v46,
+        v60 = v37 * v51 - v34 * v52;
+    V s61 = {0}, s62 = {0}, s63 = {0}, s64 = {0}, s65 = {0}, s66 = {0}, s67 = {0}, s68 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v97 = 1.0 - w[1];
-        const double v98 = 1.0 + w[1];
-        const double v99 = 0.25 * w[1];
-        const double v100 = 1.0 - w[0];
-        const double v101 = 1.0 + w[0];
-        const double v102 = 0.25 * w[0];
-        const double v103 = 0.25 * v98;
-        const double v104 = 0.25 - v99;
-        const double v105 = 0.25 + v99;
-        const double v106 = 0.25 + v102;
-        const double v107 = 0.25 - v102;
-        const V v108 = X5 * v101;
-        const double v109 = v99 - 0.25;
-        const V v110 = X3 * v101;
-        const V v111 = X3 * v104;
-        const V v112 = X2 * v104;
-        const double v113 = v102 - 0.25;
-        const V v114 = X6 * v107;
-        const V v115 = X7 * v107;
-        const V v116 = X7 * v100;
-        const V v117 = v108 + v116;
-        const V v118 = X1 * v100;
-        const V v119 = v118 + v110;
-        const V v120 = v103 * v117;
-        const V v121 = X1 * v109;
-        const V v122 = v111 + v121;
-        const V v123 = X1 * v113;
-        const V v124 = v115 + v123;
-        const V v125 = X0 * v109;
-        const V v126 = v112 + v125;
-        const V v127 = X0 * v113;
-        const V v128 = v114 + v127;
-        const V v129 = 0.25 * v119;
-        const V v130 = v97 * v129;
-        const V v131 = v120 + v130;
-        const V v132 = v105 * v23;
-        const V v133 = v132 + v122;
-        const V v134 = v105 * v8;
-        const V v135 = v134 + v126;
-        const V v136 = v106 * v22;
-        const V v137 = v136 + v124;
-        const V v138 = v106 * v6;
-        const V v139 = v138 + v128;
-        const double v140 = w[1] * w[2];
-        const V v141 = w[0] * v135;
-        const V v142 = v135 * v137;
-        const V v143 = w[1] * v137;
-        const V v144 = w[1] * v139;
-        const V v145 = v141 - v144;
-        const V v146 = v139 * v133;
-        const V v147 = v142 - v146;
-        const V v148 = w[0] * v133;
-        const V v149 = v143 - v148;
-        const V v150 = w[2] * v131;
-        const V v151 = v131 * v147;
-        const V v152 = 0.25 * v147;
-        const V v153 = v150 * v149;
-        s95 += v153;
-        const V v154 = v150 * v145;
-        s96 += v154;
-        const V v155 = w[2] * v152;
-        s89 += v155;
-        const V v156 = v140 * v152;
-        s91 += v156;
-        const V v157 = w[2] * v151;
-        s92 += v157;
-        const V v158 = v140 * v151;
-        s94 += v158;
-        const V v159 = w[0] * v155;
-        s90 += v159;
-        const V v160 = w[0] * v157;
-        s93 += v160;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v69 = 1.0 - w[1], v70 = 1.0 + w[1], v71 = 0.25 * w[1], v72 = 1.0 - w[0],
+            v73 = 1.0 + w[0], v74 = 0.25 * w[0], v75 = 0.25 * v70, v76 = 0.25 - v71,
+            v77 = 0.25 + v71, v78 = 0.25 + v74, v79 = 0.25 - v74;
+        const V v80 = X5 * v73; const double v81 = v71 - 0.25;
+        const V v82 = X3 * v73, v83 = X3 * v76, v84 = X2 * v76;
+        const double v85 = v74 - 0.25;
+        const V v86 = X6 * v79, v87 = X7 * v79, v88 = X7 * v72, v89 = v80 + v88, v90 = X1 * v72,
+            v91 = v90 + v82, v92 = v75 * v89, v93 = X1 * v81, v94 = X1 * v85, v95 = X0 * v81,
+            v96 = X0 * v85, v97 = 0.25 * v91, v98 = v69 * v97, v99 = v92 + v98, v100 = v77 * v21,
+            v101 = v100 + (v83 + v93), v102 = v77 * v6, v103 = v102 + (v84 + v95), v104 = v78 * v20,
+            v105 = v104 + (v87 + v94), v106 = v78 * v5, v107 = v106 + (v86 + v96);
+        const double v108 = w[1] * w[2];
+        const V v109 = v103 * v105 - v107 * v101, v110 = w[2] * v99, v111 = v99 * v109,
+            v112 = 0.25 * v109;
+        s67 += v110 * (w[1] * v105 - w[0] * v101); s68 += v110 * (w[0] * v103 - w[1] * v107);
+        const V v113 = w[2] * v112; s61 += v113; s63 += v108 * v112; const V v114 = w[2] * v111;
+        s64 += v114; s66 += v108 * v111; s62 += w[0] * v113; s65 += w[0] * v114;
     }
-    const V v161 = 1.0 / s92;
-    const V v162 = s92 * v1;
-    const V v163 = s93 * v161;
-    const V v164 = v161 * s94;
-    const V v165 = v161 * s95;
-    const V v166 = 0.25 * v165;
-    const V v167 = v161 * s96;
-    const V v168 = 0.25 * v167;
-    const V v169 = s89 * v161;
-    const V v170 = s90 * v161;
-    const V v171 = s91 * v161;
-    const V v172 = v169 * v56;
-    const V v173 = 1.0 + v172;
-    const V v174 = v68 * v166;
-    const V v175 = v68 * v168;
-    const V v176 = v69 * v166;
-    const V v177 = v69 * v168;
-    const V v178 = v62 * v166;
-    const V v179 = v62 * v168;
-    const V v180 = v176 - v178;
-    const V v181 = v178 - v176;
-    const V v182 = v177 - v179;
-    const V v183 = v179 - v177;
-    const V v184 = v63 * v166;
-    const V v185 = v63 * v168;
-    const V v186 = v174 - v184;
-    const V v187 = v184 - v174;
-    const V v188 = v175 - v185;
-    const V v189 = v185 - v175;
-    const V v190 = v171 * v55;
-    const V v191 = v173 - v190;
-    const V v192 = v170 * v57;
-    const V v193 = v191 - v192;
-    const V v194 = 2.0 * v193;
-    const V v195 = v193 * v193;
-    const V v196 = v50 * v166;
-    const V v197 = v86 + v196;
-    const V v198 = v50 * v168;
-    const V v199 = v88 + v198;
-    const V v200 = v58 * v166;
-    const V v201 = v82 + v200;
-    const V v202 = v58 * v168;
-    const V v203 = v84 + v202;
-    const V v204 = v57 * v187;
-    const V v205 = v204 + v201;
-    const V v206 = v57 * v189;
-    const V v207 = v206 + v203;
-    const V v208 = v55 * v180;
-    const V v209 = v208 + v205;
-    const V v210 = v55 * v182;
-    const V v211 = v210 + v207;
-    const V v212 = v46 * v180;
-    const V v213 = v212 + v197;
-    const V v214 = v46 * v182;
-    const V v215 = v214 + v199;
-    const V v216 = v51 * v187;
-    const V v217 = v216 + v213;
-    const V v218 = v51 * v189;
-    const V v219 = v218 + v215;
-    const V v220 = v217 * v211;
-    const V v221 = v219 * v209;
-    const V v222 = v220 - v221;
-    const V v223 = 2.0 * v222;
-    const V v224 = v222 * v222;
-    const V v225 = v195 * v223;
-    const V v226 = v195 * v224;
-    const V v227 = v194 * v224;
-    const V v228 = 1.0 / v226;
-    const V v229 = 1.0 - v228;
-    const V v230 = v162 * v229;
-    const V v231 = v225 * v230;
-    const V v232 = v227 * v230;
-    const V v233 = v209 * v231;
-    const V v234 = v219 * v231;
-    const V v235 = v211 * v231;
-    const V v236 = v217 * v231;
-    const V v237 = v170 * v232;
-    const V v238 = v171 * v232;
-    const V v239 = v169 * v232;
-    const V v240 = v182 * v236;
-    const V v241 = v189 * v236;
-    const V v242 = v168 * v236;
-    const V v243 = v168 * v233;
-    const V v244 = v180 * v235;
-    const V v245 = v187 * v235;
-    const V v246 = v166 * v235;
-    const V v247 = v166 * v234;
-    const V v248 = v181 * v234;
-    const V v249 = v240 + v248;
-    const V v250 = v186 * v234;
-    const V v251 = v241 + v250;
-    const V v252 = v183 * v233;
-    const V v253 = v244 + v252;
-    const V v254 = v188 * v233;
-    const V v255 = v245 + v254;
-    V s256 = softehl_splat(0.0);
-    V s257 = softehl_splat(0.0);
-    V s258 = softehl_splat(0.0);
-    V s259 = softehl_splat(0.0);
-    V s260 = softehl_splat(0.0);
-    V s261 = softehl_splat(0.0);
-    V s262 = softehl_splat(0.0);
-    V s263 = softehl_splat(0.0);
-    V s264 = softehl_splat(0.0);
-    V s265 = softehl_splat(0.0);
-    V s266 = softehl_splat(0.0);
+    const V v115 = 1.0 / s64, v116 = s65 * v115, v117 = v115 * s66, v118 = v115 * s67,
+        v119 = 0.25 * v118, v120 = v115 * s68, v121 = 0.25 * v120, v122 = s61 * v115,
+        v123 = s62 * v115, v124 = s63 * v115, v125 = v53 * v119, v126 = v53 * v121,
+        v127 = v54 * v119, v128 = v54 * v121, v129 = v48 * v119, v130 = v48 * v121,
+        v131 = v127 - v129, v132 = v128 - v130, v133 = v49 * v119, v134 = v49 * v121,
+        v135 = v133 - v125, v136 = v134 - v126, v137 = 1.0 + v122 * v42 - v124 * v41 - v123 * v43,
+        v138 = v137 * v137, v139 = v41 * v131 + (v43 * v135 + (v57 + v44 * v119)),
+        v140 = v41 * v132 + (v43 * v136 + (v58 + v44 * v121)),
+        v141 = v37 * v135 + (v34 * v131 + (v59 + v36 * v119)),
+        v142 = v37 * v136 + (v34 * v132 + (v60 + v36 * v121)), v143 = v141 * v140 - v142 * v139,
+        v144 = v143 * v143, v145 = s64 * v1 * (1.0 - 1.0 / (v138 * v144)),
+        v146 = v138 * (2.0 * v143) * v145, v147 = 2.0 * v137 * v144 * v145, v148 = v139 * v146,
+        v149 = v142 * v146, v150 = v140 * v146, v151 = v141 * v146, v152 = v123 * v147,
+        v153 = v124 * v147, v154 = v122 * v147, v155 = v121 * v151, v156 = v121 * v148,
+        v157 = v119 * v150, v158 = v119 * v149, v159 = v132 * v151 + (v129 - v127) * v149,
+        v160 = v136 * v151 + (v125 - v133) * v149, v161 = v131 * v150 + (v130 - v128) * v148,
+        v162 = v135 * v150 + (v126 - v134) * v148;
+    V s163 = {0}, s164 = {0}, s165 = {0}, s166 = {0}, s167 = {0}, s168 = {0}, s169 = {0},
+        s170 = {0}, s171 = {0}, s172 = {0}, s173 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v267 = w[0] - v163;
-        const V v268 = w[1] - v164;
-        const V v269 = v32 * v267;
-        const V v270 = v34 * v268;
-        const V v271 = v18 * v267;
-        const V v272 = v54 * v267;
-        const V v273 = v170 + v272;
-        const V v274 = v54 * v268;
-        const V v275 = v171 + v274;
-        const V v276 = v15 * v268;
-        const V v277 = v271 - v276;
-        const V v278 = v273 * v57;
-        const V v279 = 1.0 - v278;
-        const V v280 = v45 * v277;
-        const V v281 = v167 + v280;
-        const V v282 = v270 + v269;
-        const V v283 = v270 - v269;
-        const V v284 = v45 * v283;
-        const V v285 = v165 + v284;
-        const V v286 = v59 * v282;
-        const V v287 = v169 - v286;
-        const V v288 = v275 * v55;
-        const V v289 = v279 - v288;
-        const V v290 = 0.25 * v281;
-        const V v291 = v287 * v56;
-        const V v292 = v291 + v289;
-        const V v293 = v281 * v74;
-        const V v294 = v281 * v71;
-        const V v295 = v285 * v74;
-        const V v296 = v285 * v71;
-        const V v297 = 0.25 * v285;
-        const V v298 = v55 * v293;
-        const V v299 = v84 + v298;
-        const V v300 = v46 * v293;
-        const V v301 = v88 + v300;
-        const V v302 = v292 * v292;
-        const V v303 = v46 * v295;
-        const V v304 = v86 + v303;
-        const V v305 = v55 * v295;
-        const V v306 = v82 + v305;
-        const V v307 = v57 * v294;
-        const V v308 = v307 + v299;
-        const V v309 = v57 * v296;
-        const V v310 = v309 + v306;
-        const V v311 = v51 * v294;
-        const V v312 = v311 + v301;
-        const V v313 = v51 * v296;
-        const V v314 = v313 + v304;
-        const V v315 = v50 * v290;
-        const V v316 = v315 + v312;
-        const V v317 = v58 * v290;
-        const V v318 = v317 + v308;
-        const V v319 = v50 * v297;
-        const V v320 = v319 + v314;
-        const V v321 = v58 * v297;
-        const V v322 = v321 + v310;
-        const V v323 = v316 * v316;
-        const V v324 = softehl_vrcbrt(v302);
-        const V v325 = v318 * v320;
-        const V v326 = v316 * v320;
-        const V v327 = v320 * v320;
-        const V v328 = v318 * v318;
-        const V v329 = v323 + v328;
-        const V v330 = v316 * v322;
-        const V v331 = v325 - v330;
-        const V v332 = v318 * v322;
-        const V v333 = v326 + v332;
-        const V v334 = v322 * v322;
-        const V v335 = v327 + v334;
-        const V v336 = v331 * v331;
-        const V v337 = v324 * v324;
-        const V v338 = v302 * v337;
-        const V v339 = softehl_vrcbrt(v336);
-        const V v340 = v339 * v339;
-        const V v341 = v336 * v340;
-        const V v342 = v338 * v341;
-        const V v343 = 1.0 / v342;
-        const V v344 = v335 * v343;
-        const V v345 = v333 * v343;
-        const V v346 = v329 * v343;
-        const V v347 = v302 * v343;
-        V v348[6];
-        softehl_solid_taylor_mean_ogden_isochoric_1_lanes(softehl_mask(1), (const V[]){v344, v346, v347, v345, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v2), softehl_splat(v3), softehl_splat(v10), softehl_splat(v11), softehl_splat(v12), softehl_splat(v13)}, v348, &failed);
-        const V v349 = 2.0 * v292;
-        const V v350 = 0.3333333333333333 * v337;
-        const double v351 = 1.0 - w[0];
-        const double v352 = 1.0 + w[0];
-        const double v353 = 0.25 * w[0];
-        const V v354 = 0.6666666666666666 * v331;
-        const V v355 = v350 * v341;
-        const double v356 = 1.0 - w[1];
-        const double v357 = 1.0 + w[1];
-        const double v358 = 0.25 * w[1];
-        const double v359 = 0.25 + v353;
-        const double v360 = 0.25 - v353;
-        const V v361 = v338 * v354;
-        const double v362 = 0.25 * v357;
-        const double v363 = 0.25 - v358;
-        const double v364 = 0.25 + v358;
-        const double v365 = v353 - 0.25;
-        const V v366 = v340 * v361;
-        const V v367 = X6 * v360;
-        const V v368 = X7 * v360;
-        const V v369 = X7 * v351;
-        const double v370 = v358 - 0.25;
-        const double v371 = 6.283185307179586 * w[2];
-        const V v372 = X2 * v363;
-        const V v373 = X3 * v363;
-        const V v374 = X1 * v351;
-        const V v375 = v359 * v6;
-        const V v376 = v367 + v375;
-        const V v377 = v359 * v22;
-        const V v378 = v368 + v377;
-        const V v379 = X5 * v352;
-        const V v380 = v379 + v369;
-        const V v381 = X3 * v352;
-        const V v382 = v374 + v381;
-        const V v383 = v362 * v380;
-        const V v384 = v364 * v8;
-        const V v385 = v372 + v384;
-        const V v386 = v364 * v23;
-        const V v387 = v373 + v386;
-        const V v388 = X1 * v365;
-        const V v389 = v388 + v378;
-        const V v390 = X0 * v365;
-        const V v391 = v390 + v376;
-        const V v392 = 0.25 * v382;
-        const V v393 = X0 * v370;
-        const V v394 = v393 + v385;
-        const V v395 = X1 * v370;
-        const V v396 = v395 + v387;
-        const V v397 = v389 * v394;
-        const V v398 = v356 * v392;
-        const V v399 = v383 + v398;
-        const V v400 = 2.0 * v320;
-        const V v401 = v391 * v396;
-        const V v402 = v397 - v401;
-        const V v403 = 2.0 * v322;
-        const V v404 = v399 * v402;
-        const V v405 = 2.0 * v316;
-        const V v406 = 2.0 * v318;
-        const V v407 = v348[0];
-        const V v408 = v348[1];
-        const V v409 = v348[2];
-        const V v410 = v348[3];
-        const V v411 = v343 * v343;
-        const V v412 = v371 * v404;
-        const V v413 = v407 * v412;
-        const V v414 = v408 * v412;
-        const V v415 = v409 * v412;
-        const V v416 = v410 * v412;
-        const V v417 = v343 * v414;
-        const V v418 = v329 * v414;
-        const V v419 = v406 * v417;
-        const V v420 = v405 * v417;
-        const V v421 = v302 * v415;
-        const V v422 = v418 + v421;
-        const V v423 = v343 * v415;
-        const V v424 = v343 * v416;
-        const V v425 = v333 * v416;
-        const V v426 = v422 + v425;
-        const V v427 = v343 * v413;
-        const V v428 = v335 * v413;
-        const V v429 = v426 + v428;
-        const V v430 = v411 * v429;
-        const V v431 = v403 * v427;
-        const V v432 = v400 * v427;
-        const V v433 = v355 * v430;
-        const V v434 = v423 - v433;
-        const V v435 = v366 * v430;
-        const V v436 = v349 * v434;
-        const V v437 = v318 * v424;
-        const V v438 = v431 + v437;
-        const V v439 = v318 * v435;
-        const V v440 = v432 - v439;
-        const V v441 = v316 * v424;
-        const V v442 = v440 + v441;
-        s260 += v442;
-        const V v443 = v316 * v435;
-        const V v444 = v438 + v443;
-        s258 += v444;
-        const V v445 = v322 * v424;
-        const V v446 = v419 + v445;
-        const V v447 = v320 * v424;
-        const V v448 = v420 + v447;
-        const V v449 = v322 * v435;
-        const V v450 = v448 + v449;
-        s259 += v450;
-        const V v451 = v320 * v435;
-        const V v452 = v446 - v451;
-        s257 += v452;
-        const V v453 = v287 * v436;
-        s256 += v453;
-        const V v454 = v293 * v452;
-        const V v455 = v293 * v450;
-        const V v456 = v275 * v436;
-        s263 += v454;
-        s263 -= v456;
-        const V v457 = v296 * v442;
-        const V v458 = v296 * v444;
-        const V v459 = v273 * v436;
-        s262 += v458;
-        s262 -= v459;
-        const V v460 = v297 * v442;
-        const V v461 = v297 * v444;
-        const V v462 = v295 * v444;
-        s263 += v462;
-        const V v463 = v295 * v442;
-        s266 += v455;
-        s266 += v463;
-        const V v464 = v294 * v452;
-        s262 += v464;
-        const V v465 = v294 * v450;
-        s265 += v457;
-        s265 += v465;
-        const V v466 = v290 * v452;
-        s261 += v461;
-        s261 += v466;
-        const V v467 = v290 * v450;
-        s264 += v460;
-        s264 += v467;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const V v174 = w[0] - v116, v175 = w[1] - v117, v176 = v27 * v174, v177 = v29 * v175,
+            v178 = v123 + v40 * v174, v179 = v124 + v40 * v175,
+            v180 = v120 + v33 * (v16 * v174 - v13 * v175), v181 = v118 + v33 * (v177 - v176),
+            v182 = v122 - v45 * (v177 + v176), v183 = 0.25 * v180,
+            v184 = v182 * v42 + (1.0 - v178 * v43 - v179 * v41), v185 = v180 * v56,
+            v186 = v180 * v55, v187 = v181 * v56, v188 = v181 * v55, v189 = 0.25 * v181,
+            v190 = v184 * v184, v191 = v36 * v183 + (v37 * v186 + (v60 + v34 * v185)),
+            v192 = v44 * v183 + (v43 * v186 + (v58 + v41 * v185)),
+            v193 = v36 * v189 + (v37 * v188 + (v59 + v34 * v187)),
+            v194 = v44 * v189 + (v43 * v188 + (v57 + v41 * v187)), v195 = softehl_vrcbrt(v190),
+            v196 = v191 * v191 + v192 * v192, v197 = v192 * v193 - v191 * v194,
+            v198 = v191 * v193 + v192 * v194, v199 = v193 * v193 + v194 * v194, v200 = v197 * v197,
+            v201 = v195 * v195, v202 = v190 * v201, v203 = softehl_vrcbrt(v200), v204 = v203 * v203,
+            v205 = v200 * v204, v206 = 1.0 / (v202 * v205), v207 = v199 * v206, v208 = v198 * v206,
+            v209 = v196 * v206, v210 = v190 * v206;
+        V v211[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_lanes(softehl_mask(1), (const V[]){v207, v209, v210, v208, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v2), softehl_splat(v3), softehl_splat(v8), softehl_splat(v9), softehl_splat(v10), softehl_splat(v11)}, v211, &failed);
+        const double v212 = 1.0 - w[0], v213 = 1.0 + w[0], v214 = 0.25 * w[0], v215 = 1.0 - w[1],
+            v216 = 1.0 + w[1], v217 = 0.25 * w[1], v218 = 0.25 + v214, v219 = 0.25 - v214,
+            v220 = 0.25 * v216, v221 = 0.25 - v217, v222 = 0.25 + v217, v223 = v214 - 0.25;
+        const V v224 = X6 * v219, v225 = X7 * v219, v226 = X7 * v212;
+        const double v227 = v217 - 0.25;
+        const V v228 = X2 * v221, v229 = X3 * v221, v230 = X1 * v212, v231 = v218 * v5,
+            v232 = v218 * v20, v233 = X5 * v213, v234 = v233 + v226, v235 = X3 * v213,
+            v236 = v230 + v235, v237 = v220 * v234, v238 = v222 * v6, v239 = v222 * v21,
+            v240 = X1 * v223, v241 = v240 + (v225 + v232), v242 = X0 * v223,
+            v243 = v242 + (v224 + v231), v244 = 0.25 * v236, v245 = X0 * v227,
+            v246 = v245 + (v228 + v238), v247 = X1 * v227, v248 = v247 + (v229 + v239),
+            v249 = v215 * v244, v250 = v237 + v249, v251 = v241 * v246 - v243 * v248,
+            v252 = v250 * v251, v253 = v211[0], v254 = v211[1], v255 = v211[2], v256 = v211[3],
+            v257 = 6.283185307179586 * w[2] * v252, v258 = v253 * v257, v259 = v254 * v257,
+            v260 = v255 * v257, v261 = v256 * v257, v262 = v206 * v259, v263 = v206 * v261,
+            v264 = v206 * v258,
+            v265 = v206 * v206 * (v196 * v259 + v190 * v260 + v198 * v261 + v199 * v258),
+            v266 = v204 * (v202 * (0.6666666666666666 * v197)) * v265,
+            v267 = 2.0 * v184 * (v206 * v260 - 0.3333333333333333 * v201 * v205 * v265),
+            v268 = 2.0 * v193 * v264 - v192 * v266 + v191 * v263;
+        s167 += v268; const V v269 = 2.0 * v194 * v264 + v192 * v263 + v191 * v266; s165 += v269;
+        const V v270 = 2.0 * v191 * v262 + v193 * v263 + v194 * v266; s166 += v270;
+        const V v271 = 2.0 * v192 * v262 + v194 * v263 - v193 * v266; s164 += v271;
+        const V v272 = v182 * v267; s163 += v272; s170 += v185 * v271; s170 -= v179 * v267;
+        s169 += v188 * v269; s169 -= v178 * v267; s170 += v187 * v269; s173 += v185 * v270;
+        s173 += v187 * v268; s169 += v186 * v271; s172 += v188 * v268; s172 += v186 * v270;
+        s168 += v189 * v269; s168 += v183 * v271; s171 += v189 * v268; s171 += v183 * v270;
     }
-    const V v468 = v235 + s260;
-    const V v469 = v236 + s257;
-    const V v470 = v239 + s256;
-    const V v471 = s258 - v234;
-    const V v472 = v242 - v247;
-    const V v473 = v246 + s264;
-    const V v474 = s259 - v233;
-    const V v475 = s261 + v472;
-    const V v476 = s262 - v237;
-    const V v477 = s263 - v238;
-    const V v478 = v470 - v475;
-    const V v479 = v470 + v475;
-    const V v480 = v251 + v476;
-    const V v481 = s265 + v255;
-    const V v482 = v249 + v477;
-    const V v483 = s266 + v253;
-    const V v484 = v473 - v243;
-    const V v485 = v243 - v473;
-    const V v486 = v67 * v469;
-    const V v487 = v482 - v486;
-    const V v488 = v67 * v474;
-    const V v489 = v483 - v488;
-    const V v490 = v66 * v469;
-    const V v491 = v490 + v480;
-    const V v492 = v66 * v474;
-    const V v493 = v492 + v481;
-    const V v494 = v60 * v471;
-    const V v495 = v494 + v487;
-    const V v496 = v60 * v468;
-    const V v497 = v496 + v489;
-    const V v498 = v61 * v471;
-    const V v499 = v491 - v498;
-    const V v500 = v61 * v468;
-    const V v501 = v493 - v500;
-    const V v502 = v495 + v499;
-    const V v503 = v497 + v501;
-    const V v504 = v499 - v495;
-    const V v505 = v501 - v497;
-    const V v506 = v478 - v504;
-    const V v507 = v478 + v504;
-    const V v508 = v479 + v502;
-    const V v509 = v479 - v502;
-    const V v510 = v485 - v505;
-    const V v511 = v484 + v503;
-    softehl_store4(R + 0, 8, v511, v508, v510, v506);
-    const V v512 = v484 - v503;
-    const V v513 = v505 - v484;
-    softehl_store4(R + 4, 8, v512, v509, v513, v507);
+    const V v273 = v150 + s167, v274 = v151 + s164, v275 = v154 + s163, v276 = s165 - v149,
+        v277 = v157 + s171, v278 = s166 - v148, v279 = s168 + (v155 - v158), v280 = v275 - v279,
+        v281 = v275 + v279, v282 = v277 - v156,
+        v283 = v46 * v276 + (v159 + (s170 - v153) - v52 * v274),
+        v284 = v46 * v273 + (s173 + v161 - v52 * v278),
+        v285 = v51 * v274 + (v160 + (s169 - v152)) - v47 * v276,
+        v286 = v51 * v278 + (s172 + v162) - v47 * v273, v287 = v283 + v285, v288 = v284 + v286,
+        v289 = v285 - v283, v290 = v286 - v284, v291 = v280 - v289, v292 = v280 + v289,
+        v293 = v281 + v287, v294 = v281 - v287, v295 = v156 - v277 - v290, v296 = v282 + v288;
+    softehl_store4(R + 0, 8, v296, v293, v295, v291);
+    const V v297 = v282 - v288, v298 = v290 - v282;
+    softehl_store4(R + 4, 8, v297, v294, v298, v292);
     if (softehl_any(failed)) {
         softehl_spoil(failed, R, 8);
     }
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_ogden_residual, 8, 8, 0, 0, 8, 0)
 
-void softehl_solid_taylor_mean_ogden_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_ogden_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_ogden_residual_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_ogden_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_taylor_mean_ogden_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_solid_taylor_mean_ogden_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 1.5707963267948966 * parameters[6];
-    const double v2 = 0.5 * parameters[1];
-    const double v3 = 1.0 / parameters[1];
-    const V v4 = X4 - X0;
-    const V v5 = X0 - X2;
-    const V v6 = X4 - X2;
-    const V v7 = v4 - X2;
-    const V v8 = X4 - X6;
-    const V v9 = X6 + v7;
-    const double v10 = 0.5 * parameters[3];
-    const double v11 = 1.0 / parameters[3];
-    const double v12 = 0.5 * parameters[5];
-    const double v13 = 1.0 / parameters[5];
-    const V v14 = v5 + v8;
-    const V v15 = 0.25 * v9;
-    const V v16 = 0.0625 * v9;
-    const V v17 = v8 - v5;
-    const V v18 = 0.25 * v17;
-    const V v19 = 0.0625 * v17;
-    const V v20 = X1 - X3;
-    const V v21 = X1 + X3;
-    const V v22 = X5 - X3;
-    const V v23 = X5 - X7;
-    const V v24 = X5 + X7;
-    const V v25 = v20 + v23;
-    const V v26 = v21 + v24;
-    const V v27 = v23 - v20;
-    const V v28 = d0 - d2;
-    const V v29 = d0 + d2;
-    const V v30 = v24 - v21;
-    const V v31 = 0.25 * v26;
-    const V v32 = 0.25 * v27;
-    const V v33 = 0.0625 * v27;
-    const V v34 = 0.25 * v30;
-    const V v35 = 0.0625 * v30;
-    const V v36 = v18 * v34;
-    const V v37 = 1.0 / v31;
-    const V v38 = v31 * v31;
-    const V v39 = d1 + d3;
-    const V v40 = d1 - d3;
-    const V v41 = 1.0 / v38;
-    const V v42 = v29 - d4;
-    const V v43 = v32 * v15;
-    const V v44 = v36 - v43;
-    const V v45 = 1.0 / v44;
-    const V v46 = v42 - d6;
-    const V v47 = d4 - d6;
-    const V v48 = v14 * v33;
-    const V v49 = v14 * v35;
-    const V v50 = v28 + v47;
-    const V v51 = v28 - v47;
-    const V v52 = d5 + d7;
-    const V v53 = d5 - d7;
-    const V v54 = 0.25 * v37;
-    const V v55 = v39 - v52;
-    const V v56 = v39 + v52;
-    const V v57 = v40 - v53;
-    const V v58 = v40 + v53;
-    const V v59 = 0.25 * v41;
-    const V v60 = v33 * v45;
-    const V v61 = v35 * v45;
-    const V v62 = v45 * v48;
-    const V v63 = v45 * v49;
-    const V v64 = v25 * v45;
-    const V v65 = 0.25 * v63;
-    const V v66 = v45 * v16;
-    const V v67 = v19 * v45;
-    const V v68 = v16 * v64;
-    const V v69 = v19 * v64;
-    const V v70 = 0.25 * v68;
-    const V v71 = v65 - v70;
-    const V v72 = 0.25 * v69;
-    const V v73 = 0.25 * v62;
-    const V v74 = v72 - v73;
-    const V v75 = v51 * v66;
-    const V v76 = v55 * v60;
-    const V v77 = v51 * v61;
-    const V v78 = 1.0 - v77;
-    const V v79 = v57 * v66;
-    const V v80 = 1.0 + v79;
-    const V v81 = v57 * v61;
-    const V v82 = v76 - v81;
-    const V v83 = v55 * v67;
-    const V v84 = v80 - v83;
-    const V v85 = v46 * v60;
-    const V v86 = v78 + v85;
-    const V v87 = v46 * v67;
-    const V v88 = v75 - v87;
-    V s89 = softehl_splat(0.0);
-    V s90 = softehl_splat(0.0);
-    V s91 = softehl_splat(0.0);
-    V s92 = softehl_splat(0.0);
-    V s93 = softehl_splat(0.0);
-    V s94 = softehl_splat(0.0);
-    V s95 = softehl_splat(0.0);
-    V s96 = softehl_splat(0.0);
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 1.5707963267948966 * parameters[6], v2 = 0.5 * parameters[1],
+        v3 = 1.0 / parameters[1];
+    const V v4 = X0 - X2, v5 = X4 - X2, v6 = X4 - X6, v7 = X6 + (X4 - X0 - X2);
+    const double v8 = 0.5 * parameters[3], v9 = 1.0 / parameters[3], v10 = 0.5 * parameters[5],
+        v11 = 1.0 / parameters[5];
+    const V v12 = v4 + v6, v13 = 0.25 * v7, v14 = 0.0625 * v7, v15 = v6 - v4, v16 = 0.25 * v15,
+        v17 = 0.0625 * v15, v18 = X1 - X3, v19 = X1 + X3, v20 = X5 - X3, v21 = X5 - X7,
+        v22 = X5 + X7, v23 = v21 - v18, v24 = d0 - d2, v25 = v22 - v19, v26 = 0.25 * (v19 + v22),
+        v27 = 0.25 * v23, v28 = 0.0625 * v23, v29 = 0.25 * v25, v30 = 0.0625 * v25, v31 = d1 + d3,
+        v32 = d1 - d3, v33 = 1.0 / (v16 * v29 - v27 * v13), v34 = d0 + d2 - d4 - d6, v35 = d4 - d6,
+        v36 = v24 + v35, v37 = v24 - v35, v38 = d5 + d7, v39 = d5 - d7, v40 = 0.25 * (1.0 / v26),
+        v41 = v31 - v38, v42 = v31 + v38, v43 = v32 - v39, v44 = v32 + v39,
+        v45 = 0.25 * (1.0 / (v26 * v26)), v46 = v28 * v33, v47 = v30 * v33, v48 = v33 * (v12 * v28),
+        v49 = v33 * (v12 * v30), v50 = (v18 + v21) * v33, v51 = v33 * v14, v52 = v17 * v33,
+        v53 = v14 * v50, v54 = v17 * v50, v55 = 0.25 * v49 - 0.25 * v53,
+        v56 = 0.25 * v54 - 0.25 * v48, v57 = v41 * v46 - v43 * v47,
+        v58 = 1.0 + v43 * v51 - v41 * v52, v59 = 1.0 - v37 * v47 + v34 * v46,
+        v60 = v37 * v51 - v34 * v52;
+    V s61 = {0}, s62 = {0}, s63 = {0}, s64 = {0}, s65 = {0}, s66 = {0}, s67 = {0}, s68 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v97 = 1.0 - w[1];
-        const double v98 = 1.0 + w[1];
-        const double v99 = 0.25 * w[1];
-        const double v100 = 1.0 - w[0];
-        const double v101 = 1.0 + w[0];
-        const double v102 = 0.25 * w[0];
-        const double v103 = 0.25 * v98;
-        const double v104 = 0.25 - v99;
-        const double v105 = 0.25 + v99;
-        const double v106 = 0.25 + v102;
-        const double v107 = 0.25 - v102;
-        const V v108 = X5 * v101;
-        const double v109 = v99 - 0.25;
-        const V v110 = X3 * v101;
-        const V v111 = X3 * v104;
-        const V v112 = X2 * v104;
-        const double v113 = v102 - 0.25;
-        const V v114 = X6 * v107;
-        const V v115 = X7 * v107;
-        const V v116 = X7 * v100;
-        const V v117 = v108 + v116;
-        const V v118 = X1 * v100;
-        const V v119 = v118 + v110;
-        const V v120 = v103 * v117;
-        const V v121 = X1 * v109;
-        const V v122 = v111 + v121;
-        const V v123 = X1 * v113;
-        const V v124 = v115 + v123;
-        const V v125 = X0 * v109;
-        const V v126 = v112 + v125;
-        const V v127 = X0 * v113;
-        const V v128 = v114 + v127;
-        const V v129 = 0.25 * v119;
-        const V v130 = v97 * v129;
-        const V v131 = v120 + v130;
-        const V v132 = v105 * v23;
-        const V v133 = v132 + v122;
-        const V v134 = v105 * v8;
-        const V v135 = v134 + v126;
-        const V v136 = v106 * v22;
-        const V v137 = v136 + v124;
-        const V v138 = v106 * v6;
-        const V v139 = v138 + v128;
-        const double v140 = w[1] * w[2];
-        const V v141 = w[0] * v135;
-        const V v142 = v135 * v137;
-        const V v143 = w[1] * v137;
-        const V v144 = w[1] * v139;
-        const V v145 = v141 - v144;
-        const V v146 = v139 * v133;
-        const V v147 = v142 - v146;
-        const V v148 = w[0] * v133;
-        const V v149 = v143 - v148;
-        const V v150 = w[2] * v131;
-        const V v151 = v131 * v147;
-        const V v152 = 0.25 * v147;
-        const V v153 = v150 * v149;
-        s95 += v153;
-        const V v154 = v150 * v145;
-        s96 += v154;
-        const V v155 = w[2] * v152;
-        s89 += v155;
-        const V v156 = v140 * v152;
-        s91 += v156;
-        const V v157 = w[2] * v151;
-        s92 += v157;
-        const V v158 = v140 * v151;
-        s94 += v158;
-        const V v159 = w[0] * v155;
-        s90 += v159;
-        const V v160 = w[0] * v157;
-        s93 += v160;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v69 = 1.0 - w[1], v70 = 1.0 + w[1], v71 = 0.25 * w[1], v72 = 1.0 - w[0],
+            v73 = 1.0 + w[0], v74 = 0.25 * w[0], v75 = 0.25 * v70, v76 = 0.25 - v71,
+            v77 = 0.25 + v71, v78 = 0.25 + v74, v79 = 0.25 - v74;
+        const V v80 = X5 * v73; const double v81 = v71 - 0.25;
+        const V v82 = X3 * v73, v83 = X3 * v76, v84 = X2 * v76;
+        const double v85 = v74 - 0.25;
+        const V v86 = X6 * v79, v87 = X7 * v79, v88 = X7 * v72, v89 = v80 + v88, v90 = X1 * v72,
+            v91 = v90 + v82, v92 = v75 * v89, v93 = X1 * v81, v94 = v83 + v93, v95 = X1 * v85,
+            v96 = X0 * v81, v97 = v84 + v96, v98 = X0 * v85, v99 = 0.25 * v91, v100 = v69 * v99,
+            v101 = v92 + v100, v102 = v77 * v21, v103 = v102 + v94, v104 = v77 * v6,
+            v105 = v104 + v97, v106 = v78 * v20, v107 = v106 + (v87 + v95), v108 = v78 * v5,
+            v109 = v108 + (v86 + v98);
+        const double v110 = w[1] * w[2];
+        const V v111 = v105 * v107 - v109 * v103, v112 = w[2] * v101, v113 = v101 * v111,
+            v114 = 0.25 * v111;
+        s67 += v112 * (w[1] * v107 - w[0] * v103); s68 += v112 * (w[0] * v105 - w[1] * v109);
+        const V v115 = w[2] * v114; s61 += v115; s63 += v110 * v114; const V v116 = w[2] * v113;
+        s64 += v116; s66 += v110 * v113; s62 += w[0] * v115; s65 += w[0] * v116;
     }
-    const V v161 = 1.0 / s92;
-    const V v162 = s92 * v1;
-    const V v163 = s93 * v161;
-    const V v164 = v161 * s94;
-    const V v165 = v161 * s95;
-    const V v166 = 0.25 * v165;
-    const V v167 = v161 * s96;
-    const V v168 = 0.25 * v167;
-    const V v169 = s89 * v161;
-    const V v170 = s90 * v161;
-    const V v171 = s91 * v161;
-    const V v172 = 2.0 * v171;
-    const V v173 = 2.0 * v170;
-    const V v174 = 2.0 * v169;
-    const V v175 = v68 * v166;
-    const V v176 = v68 * v168;
-    const V v177 = v69 * v166;
-    const V v178 = v69 * v168;
-    const V v179 = v62 * v166;
-    const V v180 = v62 * v168;
-    const V v181 = v177 - v179;
-    const V v182 = v179 - v177;
-    const V v183 = v178 - v180;
-    const V v184 = v180 - v178;
-    const V v185 = v169 * v56;
-    const V v186 = 1.0 + v185;
-    const V v187 = v183 - v67;
-    const V v188 = v63 * v166;
-    const V v189 = v63 * v168;
-    const V v190 = v175 - v188;
-    const V v191 = v188 - v175;
-    const V v192 = v176 - v189;
-    const V v193 = v189 - v176;
-    const V v194 = v171 * v55;
-    const V v195 = v186 - v194;
-    const V v196 = v50 * v166;
-    const V v197 = v86 + v196;
-    const V v198 = v50 * v168;
-    const V v199 = v88 + v198;
-    const V v200 = v58 * v166;
-    const V v201 = v82 + v200;
-    const V v202 = v58 * v168;
-    const V v203 = v84 + v202;
-    const V v204 = v170 * v57;
-    const V v205 = v195 - v204;
-    const V v206 = 2.0 * v205;
-    const V v207 = v205 * v205;
-    const V v208 = v57 * v191;
-    const V v209 = v208 + v201;
-    const V v210 = v57 * v193;
-    const V v211 = v210 + v203;
-    const V v212 = v61 + v190;
-    const V v213 = v66 - v192;
-    const V v214 = v51 * v191;
-    const V v215 = v214 + v197;
-    const V v216 = v51 * v193;
-    const V v217 = v216 + v199;
-    const V v218 = v170 * v206;
-    const V v219 = v60 + v181;
-    const V v220 = v171 * v206;
-    const V v221 = v169 * v206;
-    const V v222 = v46 * v181;
-    const V v223 = v222 + v215;
-    const V v224 = v46 * v183;
-    const V v225 = v224 + v217;
-    const V v226 = v213 * v223;
-    const V v227 = v207 * v162;
-    const V v228 = v187 * v223;
-    const V v229 = v168 * v223;
-    const V v230 = v55 * v181;
-    const V v231 = v230 + v209;
-    const V v232 = v55 * v183;
-    const V v233 = v232 + v211;
-    const V v234 = v231 * v213;
-    const V v235 = v233 * v223;
-    const V v236 = v233 * v219;
-    const V v237 = v219 * v225;
-    const V v238 = v228 - v237;
-    const V v239 = v166 * v225;
-    const V v240 = v229 - v239;
-    const V v241 = v166 * v233;
-    const V v242 = v231 * v225;
-    const V v243 = v235 - v242;
-    const V v244 = v168 * v231;
-    const V v245 = v241 - v244;
-    const V v246 = 2.0 * v243;
-    const V v247 = v243 * v243;
-    const V v248 = v233 * v212;
-    const V v249 = v234 + v248;
-    const V v250 = v212 * v225;
-    const V v251 = v226 + v250;
-    const V v252 = v231 * v187;
-    const V v253 = v236 - v252;
-    const V v254 = v238 * v246;
-    const V v255 = v246 * v251;
-    const V v256 = v207 * v247;
-    const V v257 = v207 * v246;
-    const V v258 = v206 * v247;
-    const V v259 = v240 * v246;
-    const V v260 = v162 * v246;
-    const V v261 = v162 * v247;
-    const V v262 = 1.0 / v256;
-    const V v263 = v246 * v260;
-    const V v264 = v227 * v259;
-    const V v265 = v221 * v261;
-    const V v266 = v207 * v255;
-    const V v267 = v207 * v254;
-    const V v268 = v207 * v263;
-    const V v269 = v207 * v268;
-    const V v270 = v220 * v247;
-    const V v271 = v267 - v270;
-    const V v272 = v218 * v247;
-    const V v273 = v266 - v272;
-    const V v274 = v262 * v262;
-    const V v275 = v264 * v274;
-    const V v276 = v265 * v274;
-    const V v277 = v269 * v274;
-    const V v278 = 1.0 - v262;
-    const V v279 = v162 * v278;
-    const V v280 = v162 * v274;
-    const V v281 = v271 * v280;
-    const V v282 = v273 * v280;
-    const V v283 = v221 * v279;
-    const V v284 = v254 * v279;
-    const V v285 = v255 * v279;
-    const V v286 = v259 * v279;
-    const V v287 = v207 * v276;
-    const V v288 = v283 + v287;
-    const V v289 = v258 * v276;
-    const V v290 = v247 * v275;
-    const V v291 = v286 + v290;
-    const V v292 = v257 * v275;
-    const V v293 = v247 * v281;
-    const V v294 = v284 + v293;
-    const V v295 = v207 * v281;
-    const V v296 = v220 * v279;
-    const V v297 = v295 - v296;
-    const V v298 = v247 * v282;
-    const V v299 = v285 + v298;
-    const V v300 = v247 * v279;
-    const V v301 = v207 * v282;
-    const V v302 = v218 * v279;
-    const V v303 = v301 - v302;
-    const V v304 = v207 * v279;
-    const V v305 = v174 * v300;
-    const V v306 = v289 + v305;
-    const V v307 = 2.0 * v304;
-    const V v308 = v277 + v307;
-    const V v309 = v240 * v307;
-    const V v310 = v292 + v309;
-    const V v311 = v246 * v304;
-    const V v312 = v246 * v288;
-    const V v313 = v246 * v297;
-    const V v314 = v246 * v303;
-    const V v315 = v238 * v307;
-    const V v316 = v313 + v315;
-    const V v317 = v251 * v307;
-    const V v318 = v314 + v317;
-    const V v319 = v253 * v308;
-    const V v320 = v249 * v308;
-    const V v321 = v245 * v308;
-    const V v322 = v206 * v291;
-    const V v323 = v206 * v294;
-    const V v324 = v206 * v299;
-    const V v325 = v206 * v300;
-    const V v326 = v172 * v300;
-    const V v327 = v323 - v326;
-    const V v328 = v173 * v300;
-    const V v329 = v324 - v328;
-    const V v330 = v219 * v311;
-    const V v331 = v187 * v311;
-    const V v332 = v213 * v311;
-    const V v333 = v171 * v327;
-    const V v334 = v171 * v322;
-    const V v335 = v170 * v322;
-    const V v336 = v170 * v325;
-    const V v337 = v171 * v325;
-    const V v338 = v169 * v325;
-    const V v339 = v231 * v312;
-    const V v340 = v233 * v312;
-    const V v341 = v223 * v312;
-    const V v342 = v225 * v312;
-    const V v343 = v168 * v339;
-    const V v344 = v168 * v341;
-    const V v345 = v166 * v340;
-    const V v346 = v166 * v342;
-    const V v347 = v184 * v339;
-    const V v348 = v192 * v339;
-    const V v349 = v183 * v341;
-    const V v350 = v193 * v341;
-    const V v351 = v181 * v340;
-    const V v352 = v347 + v351;
-    const V v353 = v191 * v340;
-    const V v354 = v348 + v353;
-    const V v355 = v182 * v342;
-    const V v356 = v349 + v355;
-    const V v357 = v190 * v342;
-    const V v358 = v350 + v357;
-    const V v359 = v169 * v306;
-    const V v360 = v171 * v306;
-    const V v361 = v170 * v306;
-    const V v362 = v171 * v329;
-    const V v363 = v170 * v329;
-    const V v364 = v231 * v311;
-    const V v365 = v225 * v311;
-    const V v366 = v233 * v311;
-    const V v367 = v223 * v311;
-    const V v368 = v166 * v311;
-    const V v369 = v166 * v365;
-    const V v370 = v166 * v366;
-    const V v371 = v168 * v311;
-    const V v372 = v168 * v364;
-    const V v373 = v168 * v367;
-    const V v374 = v223 * v310;
-    const V v375 = v231 * v310;
-    const V v376 = v368 + v375;
-    const V v377 = v225 * v310;
-    const V v378 = v233 * v310;
-    const V v379 = v371 + v378;
-    const V v380 = v183 * v367;
-    const V v381 = v193 * v367;
-    const V v382 = v168 * v374;
-    const V v383 = v183 * v374;
-    const V v384 = v193 * v374;
-    const V v385 = v168 * v376;
-    const V v386 = v231 * v319;
-    const V v387 = v233 * v319;
-    const V v388 = v231 * v320;
-    const V v389 = v233 * v320;
-    const V v390 = v231 * v321;
-    const V v391 = v233 * v321;
-    const V v392 = v184 * v386;
-    const V v393 = v184 * v376;
-    const V v394 = v192 * v376;
-    const V v395 = v184 * v388;
-    const V v396 = v192 * v388;
-    const V v397 = v168 * v390;
-    const V v398 = v184 * v390;
-    const V v399 = v192 * v390;
-    const V v400 = v181 * v387;
-    const V v401 = v392 + v400;
-    const V v402 = v181 * v389;
-    const V v403 = v191 * v389;
-    const V v404 = v181 * v391;
-    const V v405 = v398 + v404;
-    const V v406 = v191 * v391;
-    const V v407 = v399 + v406;
-    const V v408 = v166 * v391;
-    const V v409 = v191 * v379;
-    const V v410 = v394 + v409;
-    const V v411 = v166 * v379;
-    const V v412 = v181 * v379;
-    const V v413 = v393 + v412;
-    const V v414 = v184 * v364;
-    const V v415 = v192 * v364;
-    const V v416 = v166 * v377;
-    const V v417 = v181 * v366;
-    const V v418 = v414 + v417;
-    const V v419 = v191 * v366;
-    const V v420 = v415 + v419;
-    const V v421 = v182 * v377;
-    const V v422 = v383 + v421;
-    const V v423 = v190 * v377;
-    const V v424 = v384 + v423;
-    const V v425 = v182 * v365;
-    const V v426 = v380 + v425;
-    const V v427 = v190 * v365;
-    const V v428 = v381 + v427;
-    const V v429 = v223 * v316;
-    const V v430 = v223 * v318;
-    const V v431 = v225 * v316;
-    const V v432 = v225 * v318;
-    const V v433 = v182 * v431;
-    const V v434 = v182 * v432;
-    const V v435 = v190 * v432;
-    const V v436 = v231 * v318;
-    const V v437 = v231 * v316;
-    const V v438 = v330 + v437;
-    const V v439 = v233 * v316;
-    const V v440 = v331 + v439;
-    const V v441 = v233 * v318;
-    const V v442 = v332 + v441;
-    const V v443 = v212 * v311;
-    const V v444 = v436 - v443;
-    const V v445 = v183 * v429;
-    const V v446 = v433 + v445;
-    const V v447 = v183 * v430;
-    const V v448 = v434 + v447;
-    const V v449 = v193 * v430;
-    const V v450 = v435 + v449;
-    const V v451 = v191 * v440;
-    const V v452 = v191 * v442;
-    const V v453 = v168 * v438;
-    const V v454 = v168 * v444;
-    const V v455 = v166 * v440;
-    const V v456 = v166 * v442;
-    const V v457 = v181 * v440;
-    const V v458 = v181 * v442;
-    const V v459 = v192 * v438;
-    const V v460 = v451 + v459;
-    const V v461 = v192 * v444;
-    const V v462 = v452 + v461;
-    const V v463 = v184 * v438;
-    const V v464 = v457 + v463;
-    const V v465 = v184 * v444;
-    const V v466 = v458 + v465;
-    V s467 = softehl_splat(0.0);
-    V s468 = softehl_splat(0.0);
-    V s469 = softehl_splat(0.0);
-    V s470 = softehl_splat(0.0);
-    V s471 = softehl_splat(0.0);
-    V s472 = softehl_splat(0.0);
-    V s473 = softehl_splat(0.0);
-    V s474 = softehl_splat(0.0);
-    V s475 = softehl_splat(0.0);
-    V s476 = softehl_splat(0.0);
-    V s477 = softehl_splat(0.0);
-    V s478 = softehl_splat(0.0);
-    V s479 = softehl_splat(0.0);
-    V s480 = softehl_splat(0.0);
-    V s481 = softehl_splat(0.0);
-    V s482 = softehl_splat(0.0);
-    V s483 = softehl_splat(0.0);
-    V s484 = softehl_splat(0.0);
-    V s485 = softehl_splat(0.0);
-    V s486 = softehl_splat(0.0);
-    V s487 = softehl_splat(0.0);
-    V s488 = softehl_splat(0.0);
-    V s489 = softehl_splat(0.0);
-    V s490 = softehl_splat(0.0);
-    V s491 = softehl_splat(0.0);
-    V s492 = softehl_splat(0.0);
-    V s493 = softehl_splat(0.0);
-    V s494 = softehl_splat(0.0);
-    V s495 = softehl_splat(0.0);
-    V s496 = softehl_splat(0.0);
-    V s497 = softehl_splat(0.0);
-    V s498 = softehl_splat(0.0);
-    V s499 = softehl_splat(0.0);
-    V s500 = softehl_splat(0.0);
-    V s501 = softehl_splat(0.0);
-    V s502 = softehl_splat(0.0);
-    V s503 = softehl_splat(0.0);
-    V s504 = softehl_splat(0.0);
-    V s505 = softehl_splat(0.0);
-    V s506 = softehl_splat(0.0);
-    V s507 = softehl_splat(0.0);
-    V s508 = softehl_splat(0.0);
-    V s509 = softehl_splat(0.0);
-    V s510 = softehl_splat(0.0);
-    V s511 = softehl_splat(0.0);
-    V s512 = softehl_splat(0.0);
-    V s513 = softehl_splat(0.0);
-    V s514 = softehl_splat(0.0);
-    V s515 = softehl_splat(0.0);
-    V s516 = softehl_splat(0.0);
-    V s517 = softehl_splat(0.0);
-    V s518 = softehl_splat(0.0);
-    V s519 = softehl_splat(0.0);
-    V s520 = softehl_splat(0.0);
-    V s521 = softehl_splat(0.0);
-    V s522 = softehl_splat(0.0);
-    V s523 = softehl_splat(0.0);
-    V s524 = softehl_splat(0.0);
-    V s525 = softehl_splat(0.0);
-    V s526 = softehl_splat(0.0);
-    V s527 = softehl_splat(0.0);
+    const V v117 = 1.0 / s64, v118 = s64 * v1, v119 = s65 * v117, v120 = v117 * s66,
+        v121 = v117 * s67, v122 = 0.25 * v121, v123 = v117 * s68, v124 = 0.25 * v123,
+        v125 = s61 * v117, v126 = s62 * v117, v127 = s63 * v117, v128 = v53 * v122,
+        v129 = v53 * v124, v130 = v54 * v122, v131 = v54 * v124, v132 = v48 * v122,
+        v133 = v48 * v124, v134 = v130 - v132, v135 = v132 - v130, v136 = v131 - v133,
+        v137 = v133 - v131, v138 = v136 - v52, v139 = v49 * v122, v140 = v49 * v124,
+        v141 = v128 - v139, v142 = v139 - v128, v143 = v129 - v140, v144 = v140 - v129,
+        v145 = 1.0 + v125 * v42 - v127 * v41 - v126 * v43, v146 = 2.0 * v145, v147 = v145 * v145,
+        v148 = v47 + v141, v149 = v51 - v143, v150 = v126 * v146, v151 = v46 + v134,
+        v152 = v127 * v146, v153 = v125 * v146,
+        v154 = v34 * v134 + (v37 * v142 + (v59 + v36 * v122)),
+        v155 = v34 * v136 + (v37 * v144 + (v60 + v36 * v124)),
+        v156 = v41 * v134 + (v43 * v142 + (v57 + v44 * v122)),
+        v157 = v41 * v136 + (v43 * v144 + (v58 + v44 * v124)), v158 = v138 * v154 - v151 * v155,
+        v159 = v124 * v154 - v122 * v155, v160 = v157 * v154 - v156 * v155, v161 = 2.0 * v160,
+        v162 = v160 * v160, v163 = v149 * v154 + v148 * v155, v164 = v158 * v161,
+        v165 = v161 * v163, v166 = v159 * v161, v167 = 1.0 / (v147 * v162), v168 = v167 * v167,
+        v169 = v147 * v118 * v166 * v168, v170 = v153 * (v118 * v162) * v168,
+        v171 = v118 * (1.0 - v167), v172 = v118 * v168, v173 = (v147 * v164 - v152 * v162) * v172,
+        v174 = (v147 * v165 - v150 * v162) * v172, v175 = v162 * v171, v176 = v147 * v171,
+        v177 = v146 * v162 * v170 + 2.0 * v125 * v175, v178 = 2.0 * v176,
+        v179 = v147 * (v147 * (v161 * (v118 * v161))) * v168 + v178,
+        v180 = v147 * v161 * v169 + v159 * v178, v181 = v161 * v176,
+        v182 = v161 * (v153 * v171 + v147 * v170),
+        v183 = v161 * (v147 * v173 - v152 * v171) + v158 * v178,
+        v184 = v161 * (v147 * v174 - v150 * v171) + v163 * v178,
+        v185 = (v157 * v151 - v156 * v138) * v179, v186 = (v156 * v149 + v157 * v148) * v179,
+        v187 = (v122 * v157 - v124 * v156) * v179, v188 = v146 * (v166 * v171 + v162 * v169),
+        v189 = v146 * v175, v190 = v146 * (v165 * v171 + v162 * v174) - 2.0 * v126 * v175,
+        v191 = v127 * (v146 * (v164 * v171 + v162 * v173) - 2.0 * v127 * v175), v192 = v127 * v188,
+        v193 = v126 * v188, v194 = v126 * v189, v195 = v127 * v189, v196 = v125 * v189,
+        v197 = v156 * v182, v198 = v157 * v182, v199 = v154 * v182, v200 = v155 * v182,
+        v201 = v124 * v197, v202 = v124 * v199, v203 = v122 * v198, v204 = v122 * v200,
+        v205 = v137 * v197 + v134 * v198, v206 = v143 * v197 + v142 * v198,
+        v207 = v136 * v199 + v135 * v200, v208 = v144 * v199 + v141 * v200, v209 = v125 * v177,
+        v210 = v127 * v177, v211 = v126 * v177, v212 = v127 * v190, v213 = v126 * v190,
+        v214 = v156 * v181, v215 = v155 * v181, v216 = v157 * v181, v217 = v154 * v181,
+        v218 = v122 * v215, v219 = v122 * v216, v220 = v124 * v214, v221 = v124 * v217,
+        v222 = v154 * v180, v223 = v122 * v181 + v156 * v180, v224 = v155 * v180,
+        v225 = v124 * v181 + v157 * v180, v226 = v124 * v222, v227 = v124 * v223,
+        v228 = v156 * v185, v229 = v157 * v185, v230 = v156 * v186, v231 = v157 * v186,
+        v232 = v156 * v187, v233 = v157 * v187, v234 = v137 * v230, v235 = v143 * v230,
+        v236 = v124 * v232, v237 = v137 * v228 + v134 * v229, v238 = v134 * v231,
+        v239 = v142 * v231, v240 = v137 * v232 + v134 * v233, v241 = v143 * v232 + v142 * v233,
+        v242 = v122 * v233, v243 = v143 * v223 + v142 * v225, v244 = v122 * v225,
+        v245 = v137 * v223 + v134 * v225, v246 = v122 * v224, v247 = v137 * v214 + v134 * v216,
+        v248 = v143 * v214 + v142 * v216, v249 = v136 * v222 + v135 * v224,
+        v250 = v144 * v222 + v141 * v224, v251 = v136 * v217 + v135 * v215,
+        v252 = v144 * v217 + v141 * v215, v253 = v154 * v183, v254 = v154 * v184,
+        v255 = v155 * v183, v256 = v155 * v184, v257 = v151 * v181 + v156 * v183,
+        v258 = v138 * v181 + v157 * v183, v259 = v149 * v181 + v157 * v184,
+        v260 = v156 * v184 - v148 * v181, v261 = v135 * v255 + v136 * v253,
+        v262 = v135 * v256 + v136 * v254, v263 = v141 * v256 + v144 * v254, v264 = v124 * v257,
+        v265 = v124 * v260, v266 = v122 * v258, v267 = v122 * v259,
+        v268 = v142 * v258 + v143 * v257, v269 = v142 * v259 + v143 * v260,
+        v270 = v134 * v258 + v137 * v257, v271 = v134 * v259 + v137 * v260;
+    V s272 = {0}, s273 = {0}, s274 = {0}, s275 = {0}, s276 = {0}, s277 = {0}, s278 = {0},
+        s279 = {0}, s280 = {0}, s281 = {0}, s282 = {0}, s283 = {0}, s284 = {0}, s285 = {0},
+        s286 = {0}, s287 = {0}, s288 = {0}, s289 = {0}, s290 = {0}, s291 = {0}, s292 = {0},
+        s293 = {0}, s294 = {0}, s295 = {0}, s296 = {0}, s297 = {0}, s298 = {0}, s299 = {0},
+        s300 = {0}, s301 = {0}, s302 = {0}, s303 = {0}, s304 = {0}, s305 = {0}, s306 = {0},
+        s307 = {0}, s308 = {0}, s309 = {0}, s310 = {0}, s311 = {0}, s312 = {0}, s313 = {0},
+        s314 = {0}, s315 = {0}, s316 = {0}, s317 = {0}, s318 = {0}, s319 = {0}, s320 = {0},
+        s321 = {0}, s322 = {0}, s323 = {0}, s324 = {0}, s325 = {0}, s326 = {0}, s327 = {0},
+        s328 = {0}, s329 = {0}, s330 = {0}, s331 = {0}, s332 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v528 = w[0] - v163;
-        const V v529 = w[1] - v164;
-        const V v530 = v32 * v528;
-        const V v531 = v34 * v529;
-        const V v532 = v18 * v528;
-        const V v533 = v54 * v528;
-        const V v534 = v170 + v533;
-        const V v535 = v54 * v529;
-        const V v536 = v171 + v535;
-        const V v537 = v15 * v529;
-        const V v538 = v532 - v537;
-        const V v539 = v534 * v57;
-        const V v540 = 1.0 - v539;
-        const V v541 = v45 * v538;
-        const V v542 = v167 + v541;
-        const V v543 = v531 + v530;
-        const V v544 = v531 - v530;
-        const V v545 = v45 * v544;
-        const V v546 = v165 + v545;
-        const V v547 = v59 * v543;
-        const V v548 = v169 - v547;
-        const V v549 = v536 * v55;
-        const V v550 = v540 - v549;
-        const V v551 = 0.25 * v542;
-        const V v552 = v548 * v56;
-        const V v553 = v552 + v550;
-        const V v554 = v542 * v74;
-        const V v555 = v542 * v71;
-        const V v556 = v546 * v74;
-        const V v557 = v546 * v71;
-        const V v558 = 0.25 * v546;
-        const V v559 = v55 * v554;
-        const V v560 = v84 + v559;
-        const V v561 = v46 * v554;
-        const V v562 = v88 + v561;
-        const V v563 = v553 * v553;
-        const V v564 = v46 * v556;
-        const V v565 = v86 + v564;
-        const V v566 = v55 * v556;
-        const V v567 = v82 + v566;
-        const V v568 = v57 * v555;
-        const V v569 = v568 + v560;
-        const V v570 = v57 * v557;
-        const V v571 = v570 + v567;
-        const V v572 = v51 * v555;
-        const V v573 = v572 + v562;
-        const V v574 = v51 * v557;
-        const V v575 = v574 + v565;
-        const V v576 = v50 * v551;
-        const V v577 = v576 + v573;
-        const V v578 = v58 * v551;
-        const V v579 = v578 + v569;
-        const V v580 = v50 * v558;
-        const V v581 = v580 + v575;
-        const V v582 = v58 * v558;
-        const V v583 = v582 + v571;
-        const V v584 = v577 * v577;
-        const V v585 = softehl_vrcbrt(v563);
-        const V v586 = v579 * v581;
-        const V v587 = v577 * v581;
-        const V v588 = v581 * v581;
-        const V v589 = v579 * v579;
-        const V v590 = v584 + v589;
-        const V v591 = v577 * v583;
-        const V v592 = v586 - v591;
-        const V v593 = v579 * v583;
-        const V v594 = v587 + v593;
-        const V v595 = v583 * v583;
-        const V v596 = v588 + v595;
-        const V v597 = v592 * v592;
-        const V v598 = v585 * v585;
-        const V v599 = v563 * v598;
-        const V v600 = softehl_vrcbrt(v597);
-        const V v601 = v600 * v600;
-        const V v602 = v597 * v601;
-        const V v603 = v599 * v602;
-        const V v604 = 1.0 / v603;
-        const V v605 = v596 * v604;
-        const V v606 = v594 * v604;
-        const V v607 = v590 * v604;
-        const V v608 = v563 * v604;
-        V v609[6];
-        softehl_solid_taylor_mean_ogden_isochoric_1_lanes(softehl_mask(1), (const V[]){v605, v607, v608, v606, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v2), softehl_splat(v3), softehl_splat(v10), softehl_splat(v11), softehl_splat(v12), softehl_splat(v13)}, v609, &failed);
-        const V v610 = 2.0 * v553;
-        const V v611 = 0.3333333333333333 * v598;
-        const double v612 = 6.283185307179586 * w[2];
-        const double v613 = 1.0 - w[0];
-        const double v614 = 1.0 + w[0];
-        const double v615 = 0.25 * w[0];
-        const double v616 = 1.0 - w[1];
-        const double v617 = 1.0 + w[1];
-        const double v618 = 0.25 * w[1];
-        const V v619 = 2.0 * v592;
-        const double v620 = 0.25 + v615;
-        const double v621 = 0.25 - v615;
-        const double v622 = 0.25 * v617;
-        const double v623 = 0.25 - v618;
-        const double v624 = 0.25 + v618;
-        const V v625 = X5 * v614;
-        const double v626 = v615 - 0.25;
-        const V v627 = X3 * v614;
-        const V v628 = X3 * v623;
-        const V v629 = X2 * v623;
-        const double v630 = v618 - 0.25;
-        const V v631 = X6 * v621;
-        const V v632 = X7 * v621;
-        const V v633 = X7 * v613;
-        const V v634 = v625 + v633;
-        const V v635 = X1 * v613;
-        const V v636 = v635 + v627;
-        const V v637 = v622 * v634;
-        const V v638 = 0.3333333333333333 * v601;
-        const V v639 = 0.25 * v636;
-        const V v640 = v620 * v6;
-        const V v641 = v631 + v640;
-        const V v642 = v620 * v22;
-        const V v643 = v632 + v642;
-        const V v644 = X1 * v630;
-        const V v645 = v628 + v644;
-        const V v646 = X0 * v630;
-        const V v647 = v629 + v646;
-        const V v648 = X0 * v626;
-        const V v649 = v648 + v641;
-        const V v650 = X1 * v626;
-        const V v651 = v650 + v643;
-        const V v652 = v616 * v639;
-        const V v653 = v637 + v652;
-        const V v654 = v624 * v23;
-        const V v655 = v654 + v645;
-        const V v656 = v624 * v8;
-        const V v657 = v656 + v647;
-        const V v658 = v657 * v651;
-        const V v659 = 2.0 * v581;
-        const V v660 = 2.0 * v583;
-        const V v661 = 2.0 * v577;
-        const V v662 = v655 * v649;
-        const V v663 = v658 - v662;
-        const V v664 = v653 * v663;
-        const V v665 = 2.0 * v579;
-        const V v666 = v609[0];
-        const V v667 = v609[1];
-        const V v668 = v609[2];
-        const V v669 = v609[3];
-        const V v670 = v604 * v604;
-        const V v671 = v612 * v664;
-        const V v672 = v666 * v671;
-        const V v673 = v667 * v671;
-        const V v674 = v668 * v671;
-        const V v675 = v669 * v671;
-        const V v676 = v604 * v673;
-        const V v677 = v590 * v673;
-        const V v678 = v665 * v676;
-        const V v679 = v661 * v676;
-        const V v680 = v563 * v674;
-        const V v681 = v677 + v680;
-        const V v682 = v604 * v674;
-        const V v683 = v604 * v675;
-        const V v684 = v594 * v675;
-        const V v685 = v681 + v684;
-        const V v686 = v604 * v672;
-        const V v687 = v596 * v672;
-        const V v688 = v685 + v687;
-        const V v689 = v670 * v688;
-        const V v690 = v660 * v686;
-        const V v691 = v659 * v686;
-        const V v692 = v579 * v683;
-        const V v693 = v690 + v692;
-        const V v694 = v583 * v683;
-        const V v695 = v678 + v694;
-        const V v696 = v577 * v683;
-        const V v697 = v691 + v696;
-        const V v698 = v581 * v683;
-        const V v699 = v679 + v698;
-        const V v700 = v602 * v689;
-        const V v701 = v611 * v700;
-        const V v702 = v682 - v701;
-        const V v703 = v599 * v689;
-        const V v704 = v638 * v703;
-        const V v705 = v619 * v704;
-        const V v706 = v583 * v705;
-        const V v707 = v699 + v706;
-        s470 += v707;
-        const V v708 = v577 * v705;
-        const V v709 = v693 + v708;
-        s469 += v709;
-        const V v710 = v579 * v705;
-        const V v711 = v697 - v710;
-        s471 += v711;
-        const V v712 = v581 * v705;
-        const V v713 = v695 - v712;
-        s468 += v713;
-        const V v714 = v610 * v702;
-        const V v715 = v548 * v714;
-        s467 += v715;
-        const V v716 = v554 * v713;
-        const V v717 = v554 * v707;
-        const V v718 = v536 * v714;
-        s474 += v716;
-        s474 -= v718;
-        const V v719 = v556 * v709;
-        s474 += v719;
-        const V v720 = v556 * v711;
-        s477 += v717;
-        s477 += v720;
-        const V v721 = v555 * v713;
-        const V v722 = v534 * v714;
-        s473 += v721;
-        s473 -= v722;
-        const V v723 = v555 * v707;
-        const V v724 = v551 * v713;
-        const V v725 = v551 * v707;
-        const V v726 = v557 * v709;
-        s473 += v726;
-        const V v727 = v557 * v711;
-        s476 += v723;
-        s476 += v727;
-        const V v728 = v558 * v709;
-        s472 += v724;
-        s472 += v728;
-        const V v729 = v558 * v711;
-        s475 += v725;
-        s475 += v729;
-        V v730[21];
-        softehl_solid_taylor_mean_ogden_isochoric_1_2_lanes(softehl_mask(1), (const V[]){v605, v607, v608, v606, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v2), softehl_splat(v3), softehl_splat(v10), softehl_splat(v11), softehl_splat(v12), softehl_splat(v13)}, v730, &failed);
-        const V v731 = 0.2222222222222222 * v585;
-        const V v732 = 0.4444444444444444 * v592;
-        const V v733 = 2.0 * v676;
-        const V v734 = v600 * v732;
-        const V v735 = v598 * v731;
-        const V v736 = v598 * v735;
-        const V v737 = 2.0 * v686;
-        const V v738 = v60 + v556;
-        const V v739 = v66 + v555;
-        const V v740 = v601 * v734;
-        const V v741 = v601 * v740;
-        const V v742 = 2.0 * v702;
-        const V v743 = v736 * v700;
-        const V v744 = v548 * v548;
-        const V v745 = v610 * v610;
-        const V v746 = v730[0];
-        const V v747 = v730[1];
-        const V v748 = v730[2];
-        const V v749 = v730[3];
-        const V v750 = v730[6];
-        const V v751 = v730[7];
-        const V v752 = v730[8];
-        const V v753 = v730[11];
-        const V v754 = v730[12];
-        const V v755 = v730[15];
-        const V v756 = v741 * v703;
-        const V v757 = 2.0 * v604;
-        const V v758 = v604 * v671;
-        const V v759 = v590 * v671;
-        const V v760 = v594 * v671;
-        const V v761 = v596 * v671;
-        const V v762 = v754 * v758;
-        const V v763 = v557 - v61;
-        const V v764 = v747 * v758;
-        const V v765 = v750 * v758;
-        const V v766 = v554 - v67;
-        const V v767 = v752 * v758;
-        const V v768 = v746 * v758;
-        const V v769 = v749 * v758;
-        const V v770 = v748 * v758;
-        const V v771 = v751 * v758;
-        const V v772 = v755 * v758;
-        const V v773 = v604 * v764;
-        const V v774 = v604 * v767;
-        const V v775 = v604 * v768;
-        const V v776 = v604 * v769;
-        const V v777 = v604 * v770;
-        const V v778 = v604 * v771;
-        const V v779 = v604 * v772;
-        const V v780 = v604 * v765;
-        const V v781 = v604 * v762;
-        const V v782 = v659 * v776;
-        const V v783 = v660 * v776;
-        const V v784 = v660 * v773;
-        const V v785 = v661 * v780;
-        const V v786 = v665 * v780;
-        const V v787 = v661 * v773;
-        const V v788 = v665 * v773;
-        const V v789 = v661 * v774;
-        const V v790 = v665 * v774;
-        const V v791 = v579 * v774;
-        const V v792 = v784 + v791;
-        const V v793 = v579 * v776;
-        const V v794 = v581 * v774;
-        const V v795 = v785 + v794;
-        const V v796 = v583 * v774;
-        const V v797 = v786 + v796;
-        const V v798 = v581 * v776;
-        const V v799 = v787 + v798;
-        const V v800 = v583 * v776;
-        const V v801 = v788 + v800;
-        const V v802 = v577 * v776;
-        const V v803 = v581 * v779;
-        const V v804 = v789 + v803;
-        const V v805 = v583 * v779;
-        const V v806 = v790 + v805;
-        const V v807 = v577 * v779;
-        const V v808 = v782 + v807;
-        const V v809 = v579 * v779;
-        const V v810 = v783 + v809;
-        const V v811 = v611 * v602;
-        const V v812 = v602 * v670;
-        const V v813 = v599 * v670;
-        const V v814 = v611 * v812;
-        const V v815 = v599 * v638;
-        const V v816 = v599 * v619;
-        const V v817 = v619 * v638;
-        const V v818 = v638 * v816;
-        const V v819 = v817 * v813;
-        const V v820 = v689 * v817;
-        const V v821 = v563 * v770;
-        const V v822 = v672 + v821;
-        const V v823 = v563 * v771;
-        const V v824 = v673 + v823;
-        const V v825 = v563 * v762;
-        const V v826 = v675 + v825;
-        const V v827 = v596 * v814;
-        const V v828 = v596 * v768;
-        const V v829 = v828 + v822;
-        const V v830 = v594 * v814;
-        const V v831 = v590 * v814;
-        const V v832 = v590 * v765;
-        const V v833 = v832 + v824;
-        const V v834 = v594 * v772;
-        const V v835 = v834 + v826;
-        const V v836 = v596 * v819;
-        const V v837 = v594 * v819;
-        const V v838 = v590 * v819;
-        const V v839 = v563 * v819;
-        const V v840 = v563 * v814;
-        const V v841 = v604 - v840;
-        const V v842 = v590 * v764;
-        const V v843 = v842 + v829;
-        const V v844 = v596 * v764;
-        const V v845 = v844 + v833;
-        const V v846 = v590 * v767;
-        const V v847 = v846 + v835;
-        const V v848 = v594 * v767;
-        const V v849 = v848 + v845;
-        const V v850 = v594 * v769;
-        const V v851 = v850 + v843;
-        const V v852 = v596 * v769;
-        const V v853 = v852 + v847;
-        const V v854 = v688 * v814;
-        const V v855 = v688 * v819;
-        const V v856 = v674 * v819;
-        const V v857 = v674 * v814;
-        const V v858 = v743 - v857;
-        const V v859 = v670 * v849;
-        const V v860 = v670 * v851;
-        const V v861 = v670 * v853;
-        const V v862 = v757 * v855;
-        const V v863 = v836 * v747;
-        const V v864 = v838 * v747;
-        const V v865 = v836 * v748;
-        const V v866 = v836 * v749;
-        const V v867 = v748 * v841;
-        const V v868 = v836 * v746;
-        const V v869 = v868 + v864;
-        const V v870 = v818 * v860;
-        const V v871 = v811 * v860;
-        const V v872 = v777 - v871;
-        const V v873 = v838 * v750;
-        const V v874 = v863 + v873;
-        const V v875 = v827 * v746;
-        const V v876 = v867 - v875;
-        const V v877 = v838 * v751;
-        const V v878 = v865 + v877;
-        const V v879 = v838 * v752;
-        const V v880 = v866 + v879;
-        const V v881 = v751 * v841;
-        const V v882 = v610 * v872;
-        const V v883 = v818 * v859;
-        const V v884 = v811 * v859;
-        const V v885 = v778 - v884;
-        const V v886 = v818 * v861;
-        const V v887 = v811 * v861;
-        const V v888 = v781 - v887;
-        const V v889 = v610 * v885;
-        const V v890 = v839 * v751;
-        const V v891 = v890 + v874;
-        const V v892 = v610 * v888;
-        const V v893 = v831 * v750;
-        const V v894 = v881 - v893;
-        const V v895 = v839 * v754;
-        const V v896 = v895 + v880;
-        const V v897 = v754 * v841;
-        const V v898 = v753 * v841;
-        const V v899 = v839 * v753;
-        const V v900 = v899 + v878;
-        const V v901 = v831 * v751;
-        const V v902 = v898 - v901;
-        const V v903 = v579 * v886;
-        const V v904 = v581 * v886;
-        const V v905 = v583 * v886;
-        const V v906 = v577 * v886;
-        const V v907 = v831 * v752;
-        const V v908 = v897 - v907;
-        const V v909 = v837 * v754;
-        const V v910 = v909 + v900;
-        const V v911 = v830 * v754;
-        const V v912 = v902 - v911;
-        const V v913 = v808 - v903;
-        const V v914 = v806 - v904;
-        const V v915 = v671 * v910;
-        const V v916 = v837 * v752;
-        const V v917 = v916 + v891;
-        const V v918 = v830 * v752;
-        const V v919 = v894 - v918;
-        const V v920 = v830 * v755;
-        const V v921 = v908 - v920;
-        const V v922 = v837 * v755;
-        const V v923 = v922 + v896;
-        const V v924 = v577 * v913;
-        const V v925 = v737 + v924;
-        const V v926 = v577 * v914;
-        const V v927 = v917 * v759;
-        const V v928 = v830 * v749;
-        const V v929 = v876 - v928;
-        const V v930 = v837 * v749;
-        const V v931 = v930 + v869;
-        const V v932 = v827 * v749;
-        const V v933 = v921 - v932;
-        const V v934 = v827 * v747;
-        const V v935 = v919 - v934;
-        const V v936 = v831 * v747;
-        const V v937 = v929 - v936;
-        const V v938 = v926 - v705;
-        const V v939 = v827 * v748;
-        const V v940 = v912 - v939;
-        const V v941 = v839 * v748;
-        const V v942 = v941 + v931;
-        const V v943 = v671 * v940;
-        const V v944 = v923 * v760;
-        const V v945 = v927 + v944;
-        const V v946 = v760 * v933;
-        const V v947 = v674 + v946;
-        const V v948 = v759 * v935;
-        const V v949 = v947 + v948;
-        const V v950 = v581 * v914;
-        const V v951 = v761 * v942;
-        const V v952 = v945 + v951;
-        const V v953 = v761 * v937;
-        const V v954 = v949 + v953;
-        const V v955 = v581 * v892;
-        const V v956 = v577 * v892;
-        const V v957 = v583 * v892;
-        const V v958 = v579 * v892;
-        const V v959 = v563 * v943;
-        const V v960 = v954 + v959;
-        const V v961 = v563 * v915;
-        const V v962 = v961 + v952;
-        const V v963 = v604 * v915;
-        const V v964 = v856 + v963;
-        const V v965 = v604 * v943;
-        const V v966 = v858 + v965;
-        const V v967 = v583 * v914;
-        const V v968 = v733 + v967;
-        const V v969 = v579 * v914;
-        const V v970 = v683 + v969;
-        const V v971 = v670 * v960;
-        const V v972 = v670 * v962;
-        const V v973 = v862 + v972;
-        const V v974 = v581 * v883;
-        const V v975 = v797 - v974;
-        const V v976 = v583 * v883;
-        const V v977 = v795 + v976;
-        const V v978 = v577 * v883;
-        const V v979 = v792 + v978;
-        const V v980 = v757 * v854;
-        const V v981 = v971 - v980;
-        const V v982 = v811 * v981;
-        const V v983 = v966 - v982;
-        const V v984 = v804 + v905;
-        const V v985 = v665 * v975;
-        const V v986 = v968 + v985;
-        const V v987 = v602 * v973;
-        const V v988 = v820 - v987;
-        const V v989 = v815 * v973;
-        const V v990 = v756 + v989;
-        const V v991 = v661 * v975;
-        const V v992 = v950 + v991;
-        const V v993 = v661 * v977;
-        const V v994 = v733 + v993;
-        const V v995 = v661 * v979;
-        const V v996 = v705 + v995;
-        const V v997 = v619 * v990;
-        const V v998 = v611 * v988;
-        const V v999 = v964 + v998;
-        const V v1000 = v581 * v984;
-        const V v1001 = v994 + v1000;
-        const V v1002 = v577 * v984;
-        const V v1003 = v683 + v1002;
-        const V v1004 = v745 * v983;
-        const V v1005 = v742 + v1004;
-        const V v1006 = v661 * v883;
-        const V v1007 = v904 + v1006;
-        const V v1008 = v610 * v999;
-        const V v1009 = 2.0 * v704;
-        const V v1010 = v997 - v1009;
-        const V v1011 = v661 * v889;
-        const V v1012 = v955 + v1011;
-        const V v1013 = v665 * v889;
-        const V v1014 = v957 + v1013;
-        const V v1015 = v744 * v1005;
-        s482 += v1015;
-        const V v1016 = v581 * v1010;
-        const V v1017 = v665 * v883;
-        const V v1018 = v1016 - v1017;
-        const V v1019 = v583 * v1010;
-        const V v1020 = v1007 + v1019;
-        const V v1021 = v1018 - v905;
-        const V v1022 = v579 * v1010;
-        const V v1023 = v577 * v1010;
-        const V v1024 = v903 + v1023;
-        const V v1025 = v583 * v1008;
-        const V v1026 = v1012 + v1025;
-        const V v1027 = v581 * v1008;
-        const V v1028 = v1014 - v1027;
-        const V v1029 = v583 * v1020;
-        const V v1030 = v1001 + v1029;
-        const V v1031 = v579 * v1020;
-        const V v1032 = v1003 - v1031;
-        const V v1033 = v583 * v1021;
-        const V v1034 = v992 - v1033;
-        const V v1035 = v581 * v1021;
-        const V v1036 = v986 + v1035;
-        const V v1037 = v1022 - v906;
-        const V v1038 = v810 + v906;
-        const V v1039 = v660 * v870;
-        const V v1040 = v1024 + v1039;
-        const V v1041 = v581 * v870;
-        const V v1042 = v801 - v1041;
-        const V v1043 = v583 * v870;
-        const V v1044 = v799 + v1043;
-        const V v1045 = v659 * v870;
-        const V v1046 = v1037 - v1045;
-        const V v1047 = v659 * v1044;
-        const V v1048 = v1032 + v1047;
-        const V v1049 = v581 * v1038;
-        const V v1050 = v996 + v1049;
-        const V v1051 = v551 * v1034;
-        const V v1052 = v551 * v1036;
-        const V v1053 = v583 * v1040;
-        const V v1054 = v1050 + v1053;
-        const V v1055 = v577 * v1038;
-        const V v1056 = v551 * v1026;
-        const V v1057 = v548 * v1026;
-        s478 += v1057;
-        const V v1058 = v548 * v1028;
-        s480 += v1058;
-        const V v1059 = v551 * v1028;
-        const V v1060 = v551 * v1054;
-        const V v1061 = v579 * v1040;
-        const V v1062 = v1055 - v1061;
-        const V v1063 = v579 * v1038;
-        const V v1064 = v737 + v1063;
-        const V v1065 = v536 * v1028;
-        const V v1066 = v534 * v1028;
-        const V v1067 = v554 * v1028;
-        const V v1068 = v555 * v1028;
-        const V v1069 = v554 * v1054;
-        const V v1070 = v555 * v1054;
-        const V v1071 = v577 * v1040;
-        const V v1072 = v1064 + v1071;
-        const V v1073 = v554 * v1026;
-        const V v1074 = v555 * v1026;
-        const V v1075 = v536 * v1005;
-        const V v1076 = v1067 - v1075;
-        const V v1077 = v534 * v1005;
-        const V v1078 = v1068 - v1077;
-        const V v1079 = v554 * v1048;
-        const V v1080 = v555 * v1048;
-        const V v1081 = v738 * v1048;
-        const V v1082 = v766 * v1048;
-        const V v1083 = v554 * v1034;
-        const V v1084 = v766 * v1034;
-        const V v1085 = v555 * v1034;
-        const V v1086 = v739 * v1034;
-        const V v1087 = v739 * v1048;
-        const V v1088 = v766 * v1030;
-        s489 += v1081;
-        s489 += v1088;
-        const V v1089 = v554 * v1030;
-        const V v1090 = v739 * v1030;
-        const V v1091 = v555 * v1030;
-        const V v1092 = v551 * v1030;
-        const V v1093 = v551 * v1048;
-        const V v1094 = v556 * v1048;
-        const V v1095 = v1089 + v1094;
-        const V v1096 = v763 * v1048;
-        s491 += v1090;
-        s491 += v1096;
-        const V v1097 = v763 * v1054;
-        s497 += v1086;
-        s497 += v1097;
-        const V v1098 = v557 * v1048;
-        const V v1099 = v1091 + v1098;
-        const V v1100 = v558 * v1048;
-        const V v1101 = v1092 + v1100;
-        s493 += v1101;
-        const V v1102 = v558 * v1054;
-        s499 += v1051;
-        s499 += v1102;
-        const V v1103 = v739 * v1095;
-        const V v1104 = v551 * v1095;
-        const V v1105 = v766 * v1095;
-        const V v1106 = v551 * v1101;
-        const V v1107 = v739 * v1099;
-        const V v1108 = v551 * v1099;
-        const V v1109 = v534 * v1026;
-        s497 -= v1109;
-        const V v1110 = v536 * v1026;
-        s495 += v1084;
-        s495 -= v1110;
-        const V v1111 = v766 * v1036;
-        const V v1112 = v739 * v1036;
-        const V v1113 = v554 * v1036;
-        const V v1114 = v555 * v1036;
-        const V v1115 = v738 * v1054;
-        s495 += v1115;
-        s501 += v1111;
-        s501 -= v1065;
-        const V v1116 = v1113 - v1065;
-        s503 += v1112;
-        s503 -= v1066;
-        const V v1117 = v1114 - v1066;
-        const V v1118 = v579 * v1046;
-        const V v1119 = v925 + v1118;
-        const V v1120 = v579 * v870;
-        const V v1121 = v802 - v1120;
-        const V v1122 = v577 * v870;
-        const V v1123 = v793 + v1122;
-        const V v1124 = v579 * v1008;
-        const V v1125 = v956 - v1124;
-        const V v1126 = v577 * v1008;
-        const V v1127 = v958 + v1126;
-        const V v1128 = v579 * v1021;
-        const V v1129 = v938 + v1128;
-        const V v1130 = v577 * v1021;
-        const V v1131 = v970 - v1130;
-        const V v1132 = v659 * v775;
-        const V v1133 = v1132 + v1121;
-        const V v1134 = v660 * v775;
-        const V v1135 = v1134 + v1123;
-        const V v1136 = v659 * v1133;
-        const V v1137 = v1119 + v1136;
-        const V v1138 = v659 * v882;
-        const V v1139 = v1125 + v1138;
-        const V v1140 = v660 * v882;
-        const V v1141 = v1127 + v1140;
-        const V v1142 = v659 * v1042;
-        const V v1143 = v1129 + v1142;
-        const V v1144 = v660 * v1042;
-        const V v1145 = v1131 + v1144;
-        const V v1146 = v659 * v1135;
-        const V v1147 = v1062 + v1146;
-        const V v1148 = v660 * v1135;
-        const V v1149 = v1072 + v1148;
-        const V v1150 = v555 * v1145;
-        const V v1151 = v738 * v1145;
-        s501 += v1151;
-        const V v1152 = v548 * v1139;
-        s479 += v1152;
-        const V v1153 = v548 * v1141;
-        s481 += v1153;
-        const V v1154 = v554 * v1145;
-        const V v1155 = v763 * v1145;
-        s503 += v1155;
-        const V v1156 = v536 * v1141;
-        const V v1157 = v738 * v1147;
-        const V v1158 = v763 * v1147;
-        const V v1159 = v534 * v1141;
-        const V v1160 = v558 * v1147;
-        const V v1161 = v1154 - v1156;
-        const V v1162 = v558 * v1141;
-        const V v1163 = v1059 + v1162;
-        const V v1164 = v558 * v1145;
-        const V v1165 = v1052 + v1164;
-        s505 += v1165;
-        const V v1166 = v766 * v1145;
-        s502 += v1166;
-        s502 -= v1156;
-        const V v1167 = v534 * v1139;
-        s498 += v1158;
-        s498 -= v1167;
-        const V v1168 = v1060 + v1160;
-        const V v1169 = v548 * v1163;
-        s488 += v1169;
-        const V v1170 = v551 * v1165;
-        const V v1171 = v551 * v1145;
-        const V v1172 = v558 * v1139;
-        const V v1173 = v1056 + v1172;
-        const V v1174 = v739 * v1145;
-        const V v1175 = v739 * v1143;
-        s498 += v1175;
-        const V v1176 = v551 * v1143;
-        s500 += v1160;
-        s500 += v1176;
-        const V v1177 = v558 * v1168;
-        const V v1178 = v548 * v1173;
-        s485 += v1178;
-        const V v1179 = v558 * v1149;
-        const V v1180 = v1171 + v1179;
-        s506 += v1180;
-        const V v1181 = v558 * v1143;
-        const V v1182 = v1051 + v1181;
-        s504 += v1174;
-        s504 -= v1159;
-        const V v1183 = v1150 - v1159;
-        const V v1184 = v551 * v1182;
-        s521 += v1177;
-        s521 += v1184;
-        const V v1185 = v558 * v1180;
-        s527 += v1170;
-        s527 += v1185;
-        const V v1186 = v739 * v1182;
-        const V v1187 = v766 * v1182;
-        const V v1188 = v763 * v1149;
-        s504 += v1188;
-        const V v1189 = v557 * v1149;
-        const V v1190 = v1183 + v1189;
-        const V v1191 = v557 * v1143;
-        const V v1192 = v1085 + v1191;
-        const V v1193 = v766 * v1143;
-        s496 += v1157;
-        s496 += v1193;
-        const V v1194 = v556 * v1143;
-        const V v1195 = v1083 + v1194;
-        const V v1196 = v556 * v1149;
-        const V v1197 = v1161 + v1196;
-        const V v1198 = v738 * v1149;
-        s502 += v1198;
-        const V v1199 = v763 * v1190;
-        const V v1200 = v558 * v1190;
-        const V v1201 = v766 * v1192;
-        const V v1202 = v766 * v1195;
-        const V v1203 = v738 * v1197;
-        const V v1204 = v763 * v1197;
-        const V v1205 = v558 * v1197;
-        const V v1206 = v536 * v1139;
-        s496 -= v1206;
-        const V v1207 = v739 * v1195;
-        const V v1208 = v551 * v1195;
-        const V v1209 = v739 * v1192;
-        const V v1210 = v551 * v1192;
-        const V v1211 = v556 * v1139;
-        const V v1212 = v1073 + v1211;
-        const V v1213 = v557 * v1139;
-        const V v1214 = v1074 + v1213;
-        const V v1215 = v556 * v1141;
-        const V v1216 = v1076 + v1215;
-        const V v1217 = v557 * v1141;
-        const V v1218 = v1078 + v1217;
-        const V v1219 = v556 * v1137;
-        const V v1220 = v1079 + v1219;
-        const V v1221 = v557 * v1137;
-        const V v1222 = v1080 + v1221;
-        const V v1223 = v534 * v1212;
-        s511 += v1207;
-        s511 -= v1223;
-        const V v1224 = v534 * v1214;
-        s516 += v1209;
-        s516 -= v1224;
-        const V v1225 = v548 * v1212;
-        s483 += v1225;
-        const V v1226 = v548 * v1214;
-        s484 += v1226;
-        const V v1227 = v548 * v1216;
-        s486 += v1227;
-        const V v1228 = v548 * v1218;
-        s487 += v1228;
-        const V v1229 = v534 * v1218;
-        s525 += v1199;
-        s525 -= v1229;
-        const V v1230 = v536 * v1212;
-        s510 += v1202;
-        s510 -= v1230;
-        const V v1231 = v536 * v1214;
-        s515 += v1201;
-        s515 -= v1231;
-        const V v1232 = v536 * v1216;
-        s522 += v1203;
-        s522 -= v1232;
-        const V v1233 = v534 * v1216;
-        s523 += v1204;
-        s523 -= v1233;
-        const V v1234 = v536 * v1173;
-        s519 += v1187;
-        s519 -= v1234;
-        const V v1235 = v534 * v1173;
-        s520 += v1186;
-        s520 -= v1235;
-        const V v1236 = v738 * v1137;
-        s490 += v1082;
-        s490 += v1236;
-        const V v1237 = v763 * v1137;
-        s492 += v1087;
-        s492 += v1237;
-        const V v1238 = v558 * v1137;
-        const V v1239 = v1093 + v1238;
-        s494 += v1239;
-        const V v1240 = v738 * v1168;
-        s519 += v1240;
-        const V v1241 = v763 * v1168;
-        s520 += v1241;
-        const V v1242 = v558 * v1239;
-        s518 += v1106;
-        s518 += v1242;
-        const V v1243 = v738 * v1220;
-        s507 += v1105;
-        s507 += v1243;
-        const V v1244 = v763 * v1220;
-        s508 += v1103;
-        s508 += v1244;
-        const V v1245 = v558 * v1220;
-        s509 += v1104;
-        s509 += v1245;
-        const V v1246 = v763 * v1222;
-        s513 += v1107;
-        s513 += v1246;
-        const V v1247 = v558 * v1222;
-        s514 += v1108;
-        s514 += v1247;
-        const V v1248 = v556 * v1147;
-        const V v1249 = v1069 + v1248;
-        const V v1250 = v557 * v1147;
-        const V v1251 = v1070 + v1250;
-        const V v1252 = v556 * v1145;
-        const V v1253 = v1116 + v1252;
-        const V v1254 = v557 * v1145;
-        const V v1255 = v1117 + v1254;
-        const V v1256 = v738 * v1249;
-        s510 += v1256;
-        const V v1257 = v738 * v1251;
-        s515 += v1257;
-        const V v1258 = v763 * v1249;
-        s511 += v1258;
-        const V v1259 = v558 * v1249;
-        s512 += v1208;
-        s512 += v1259;
-        const V v1260 = v763 * v1251;
-        s516 += v1260;
-        const V v1261 = v558 * v1251;
-        s517 += v1210;
-        s517 += v1261;
-        const V v1262 = v766 * v1253;
-        s522 += v1262;
-        const V v1263 = v739 * v1253;
-        s523 += v1263;
-        const V v1264 = v739 * v1255;
-        s525 += v1264;
-        const V v1265 = v551 * v1253;
-        s524 += v1205;
-        s524 += v1265;
-        const V v1266 = v551 * v1255;
-        s526 += v1200;
-        s526 += v1266;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const V v333 = w[0] - v119, v334 = w[1] - v120, v335 = v27 * v333, v336 = v29 * v334,
+            v337 = v126 + v40 * v333, v338 = v127 + v40 * v334,
+            v339 = v123 + v33 * (v16 * v333 - v13 * v334), v340 = v121 + v33 * (v336 - v335),
+            v341 = v125 - v45 * (v336 + v335), v342 = 0.25 * v339,
+            v343 = v341 * v42 + (1.0 - v337 * v43 - v338 * v41), v344 = v339 * v56,
+            v345 = v339 * v55, v346 = v340 * v56, v347 = v340 * v55, v348 = 0.25 * v340,
+            v349 = v343 * v343, v350 = v36 * v342 + (v37 * v345 + (v60 + v34 * v344)),
+            v351 = v44 * v342 + (v43 * v345 + (v58 + v41 * v344)),
+            v352 = v36 * v348 + (v37 * v347 + (v59 + v34 * v346)),
+            v353 = v44 * v348 + (v43 * v347 + (v57 + v41 * v346)), v354 = softehl_vrcbrt(v349),
+            v355 = v350 * v350 + v351 * v351, v356 = v351 * v352 - v350 * v353,
+            v357 = v350 * v352 + v351 * v353, v358 = v352 * v352 + v353 * v353, v359 = v356 * v356,
+            v360 = v354 * v354, v361 = v349 * v360, v362 = softehl_vrcbrt(v359), v363 = v362 * v362,
+            v364 = v359 * v363, v365 = 1.0 / (v361 * v364), v366 = v358 * v365, v367 = v357 * v365,
+            v368 = v355 * v365, v369 = v349 * v365;
+        V v370[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_lanes(softehl_mask(1), (const V[]){v366, v368, v369, v367, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v2), softehl_splat(v3), softehl_splat(v8), softehl_splat(v9), softehl_splat(v10), softehl_splat(v11)}, v370, &failed);
+        const V v371 = 2.0 * v343, v372 = 0.3333333333333333 * v360;
+        const double v373 = 1.0 - w[0], v374 = 1.0 + w[0], v375 = 0.25 * w[0], v376 = 1.0 - w[1],
+            v377 = 1.0 + w[1], v378 = 0.25 * w[1];
+        const V v379 = 2.0 * v356;
+        const double v380 = 0.25 + v375, v381 = 0.25 - v375, v382 = 0.25 * v377, v383 = 0.25 - v378,
+            v384 = 0.25 + v378;
+        const V v385 = X5 * v374; const double v386 = v375 - 0.25;
+        const V v387 = X3 * v374, v388 = X3 * v383, v389 = X2 * v383;
+        const double v390 = v378 - 0.25;
+        const V v391 = X6 * v381, v392 = X7 * v381, v393 = X7 * v373, v394 = v385 + v393,
+            v395 = X1 * v373, v396 = v395 + v387, v397 = v382 * v394,
+            v398 = 0.3333333333333333 * v363, v399 = 0.25 * v396, v400 = v380 * v5,
+            v401 = v380 * v20, v402 = X1 * v390, v403 = v388 + v402, v404 = X0 * v390,
+            v405 = v389 + v404, v406 = X0 * v386, v407 = v406 + (v391 + v400), v408 = X1 * v386,
+            v409 = v408 + (v392 + v401), v410 = v376 * v399, v411 = v397 + v410, v412 = v384 * v21,
+            v413 = v412 + v403, v414 = v384 * v6, v415 = v414 + v405, v416 = 2.0 * v352,
+            v417 = 2.0 * v353, v418 = 2.0 * v350, v419 = v415 * v409 - v413 * v407,
+            v420 = v411 * v419, v421 = 2.0 * v351, v422 = v370[0], v423 = v370[1], v424 = v370[2],
+            v425 = v370[3], v426 = v365 * v365, v427 = 6.283185307179586 * w[2] * v420,
+            v428 = v422 * v427, v429 = v423 * v427, v430 = v424 * v427, v431 = v425 * v427,
+            v432 = v365 * v429, v433 = v365 * v431, v434 = v365 * v428,
+            v435 = v355 * v429 + v349 * v430 + v357 * v431 + v358 * v428, v436 = v426 * v435,
+            v437 = v364 * v436, v438 = v365 * v430 - v372 * v437, v439 = v361 * v436,
+            v440 = v398 * v439, v441 = v379 * v440, v442 = v418 * v432 + v352 * v433 + v353 * v441;
+        s275 += v442; const V v443 = v417 * v434 + v351 * v433 + v350 * v441; s274 += v443;
+        const V v444 = v416 * v434 + v350 * v433 - v351 * v441; s276 += v444;
+        const V v445 = v421 * v432 + v353 * v433 - v352 * v441; s273 += v445;
+        const V v446 = v371 * v438, v447 = v341 * v446;
+        s272 += v447; s279 += v344 * v445; s279 -= v338 * v446; s279 += v346 * v443;
+        s282 += v344 * v442; s282 += v346 * v444; s278 += v345 * v445; s278 -= v337 * v446;
+        s278 += v347 * v443; s281 += v345 * v442; s281 += v347 * v444; s277 += v342 * v445;
+        s277 += v348 * v443; s280 += v342 * v442; s280 += v348 * v444; V v448[21];
+        softehl_solid_taylor_mean_ogden_isochoric_1_2_lanes(softehl_mask(1), (const V[]){v366, v368, v369, v367, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v2), softehl_splat(v3), softehl_splat(v8), softehl_splat(v9), softehl_splat(v10), softehl_splat(v11)}, v448, &failed);
+        const V v449 = 2.0 * v432, v450 = 2.0 * v434, v451 = v46 + v346, v452 = v51 + v345,
+            v453 = v448[0], v454 = v448[1], v455 = v448[2], v456 = v448[3], v457 = v448[6],
+            v458 = v448[7], v459 = v448[8], v460 = v448[11], v461 = v448[12], v462 = v448[15],
+            v463 = 2.0 * v365, v464 = v365 * v427, v465 = v355 * v427, v466 = v357 * v427,
+            v467 = v358 * v427, v468 = v461 * v464, v469 = v347 - v47, v470 = v454 * v464,
+            v471 = v457 * v464, v472 = v344 - v52, v473 = v459 * v464, v474 = v453 * v464,
+            v475 = v456 * v464, v476 = v455 * v464, v477 = v458 * v464, v478 = v462 * v464,
+            v479 = v365 * v470, v480 = v365 * v473, v481 = v365 * v474, v482 = v365 * v475,
+            v483 = v365 * v478, v484 = v365 * v471, v485 = v372 * v364, v486 = v372 * (v364 * v426),
+            v487 = v379 * v398, v488 = v398 * (v361 * v379), v489 = v487 * (v361 * v426),
+            v490 = v358 * v486, v491 = v357 * v486, v492 = v355 * v486, v493 = v358 * v489,
+            v494 = v357 * v489, v495 = v355 * v489, v496 = v349 * v489, v497 = v365 - v349 * v486,
+            v498 = v357 * v473 + (v358 * v470 + (v355 * v471 + (v429 + v349 * v477))),
+            v499 = v357 * v475 + (v355 * v470 + (v358 * v474 + (v428 + v349 * v476))),
+            v500 = v358 * v475 + (v355 * v473 + (v357 * v478 + (v431 + v349 * v468))),
+            v501 = v426 * v498, v502 = v426 * v499, v503 = v426 * v500, v504 = v488 * v502,
+            v505 = v371 * (v365 * v476 - v485 * v502), v506 = v488 * v501, v507 = v488 * v503,
+            v508 = v371 * (v365 * v477 - v485 * v501), v509 = v371 * (v365 * v468 - v485 * v503),
+            v510 = v351 * v507, v511 = v352 * v507, v512 = v353 * v507, v513 = v350 * v507,
+            v514 = v421 * v480 + v353 * v483 - v511,
+            v515 = v427 * (v494 * v461 + (v496 * v460 + (v493 * v455 + v495 * v458))),
+            v516 = (v494 * v459 + (v496 * v458 + (v493 * v454 + v495 * v457))) * v465,
+            v517 = v427 * (v460 * v497 - v492 * v458 - v491 * v461 - v490 * v455),
+            v518 = (v494 * v462 + (v496 * v461 + (v493 * v456 + v495 * v459))) * v466,
+            v519 = v430 + v466 * (v461 * v497 - v492 * v459 - v491 * v462 - v490 * v456),
+            v520 = v519 + v465 * (v458 * v497 - v492 * v457 - v491 * v459 - v490 * v454),
+            v521 = v467 * (v496 * v455 + (v494 * v456 + (v493 * v453 + v495 * v454))),
+            v522 = v520 + v467 * (v455 * v497 - v490 * v453 - v491 * v456 - v492 * v454),
+            v523 = v360 * (v360 * (0.2222222222222222 * v354)) * v437 - v430 * v486 + v365 * v517,
+            v524 = v463 * (v435 * v489) + v426 * (v349 * v515 + (v516 + v518 + v521)),
+            v525 = v421 * v484 + v353 * v480 - v352 * v506,
+            v526 = v523 - v485 * (v426 * (v522 + v349 * v517) - v463 * (v435 * v486)),
+            v527 = v418 * v480 + v352 * v483 + v512,
+            v528 = v363 * (v363 * (v362 * (0.4444444444444444 * v356))) * v439 + v361 * v398 * v524,
+            v529 = v449 + v418 * (v418 * v484 + v352 * v480 + v353 * v506) + v352 * v527,
+            v530 = 2.0 * v438 + v371 * v371 * v526,
+            v531 = v371 * (v430 * v489 + v365 * v515 + v372 * (v436 * v487 - v364 * v524)),
+            v532 = v379 * v528 - 2.0 * v440, v533 = v341 * v341 * v530;
+        s287 += v533;
+        const V v534 = v511 + v418 * v506 + v353 * v532, v535 = v352 * v532 - v421 * v506 - v512,
+            v536 = v352 * v509 + v418 * v508 + v353 * v531,
+            v537 = v353 * v509 + v421 * v508 - v352 * v531, v538 = v529 + v353 * v534,
+            v539 = v352 * v514 + v418 * v525 - v353 * v535,
+            v540 = v449 + v353 * v514 + v421 * v525 + v352 * v535,
+            v541 = v417 * v482 + v351 * v483 + v513, v542 = v510 + v350 * v532 + v417 * v504,
+            v543 = v421 * v479 + v353 * v482 - v352 * v504,
+            v544 = v433 + v350 * v527 - v351 * v534 + v416 * (v418 * v479 + v352 * v482 + v353 * v504),
+            v545 = v441 + v418 * (v417 * v479 + v351 * v480 + v350 * v506) + v352 * v541,
+            v546 = v342 * v539, v547 = v545 + v353 * v542, v548 = v341 * v536;
+        s283 += v548; const V v549 = v341 * v537; s285 += v549;
+        const V v550 = v338 * v537, v551 = v337 * v537;
+        s294 += v451 * v544; s294 += v472 * v538; const V v552 = v344 * v538 + v346 * v544;
+        s296 += v452 * v538; s296 += v469 * v544; s302 += v452 * v539; s302 += v469 * v547;
+        const V v553 = v345 * v538 + v347 * v544, v554 = v342 * v538 + v348 * v544;
+        s298 += v554; s304 += v546; s304 += v348 * v547; s302 -= v337 * v536; s300 += v472 * v539;
+        s300 -= v338 * v536; s300 += v451 * v547; s306 += v472 * v540; s306 -= v550;
+        s308 += v452 * v540; s308 -= v551;
+        const V v555 = v450 + v350 * (v416 * v482 + v350 * v483 - v510) + v351 * (v351 * v532 - v513 - v416 * v504),
+            v556 = v417 * v481 + (v351 * v482 + v350 * v504),
+            v557 = v555 + v416 * (v416 * v481 + (v350 * v482 - v351 * v504)),
+            v558 = v350 * v509 - v351 * v531 + v416 * v505,
+            v559 = v351 * v509 + v350 * v531 + v417 * v505,
+            v560 = v350 * v514 - v441 + v351 * v535 + v416 * v543,
+            v561 = v433 + v351 * v514 - v350 * v535 + v417 * v543,
+            v562 = v350 * v541 - v351 * v542 + v416 * v556,
+            v563 = v450 + v351 * v541 + v350 * v542 + v417 * v556;
+        s306 += v451 * v561; const V v564 = v341 * v558; s284 += v564; const V v565 = v341 * v559;
+        s286 += v565; s308 += v469 * v561;
+        const V v566 = v338 * v559, v567 = v337 * v559, v568 = v348 * v562,
+            v569 = v342 * v540 + v348 * v561;
+        s310 += v569; s307 += v472 * v561; s307 -= v566; s303 += v469 * v562; s303 -= v337 * v558;
+        const V v570 = v342 * v547 + v568, v571 = v341 * (v342 * v537 + v348 * v559);
+        s293 += v571; const V v572 = v342 * v536 + v348 * v558; s303 += v452 * v560; s305 += v568;
+        s305 += v342 * v560; const V v573 = v341 * v572; s290 += v573;
+        const V v574 = v342 * v561 + v348 * v563; s311 += v574; const V v575 = v546 + v348 * v560;
+        s309 += v452 * v561; s309 -= v567; s326 += v348 * v570; s326 += v342 * v575;
+        s332 += v342 * v569; s332 += v348 * v574; s309 += v469 * v563;
+        const V v576 = v345 * v561 - v567 + v347 * v563, v577 = v345 * v539 + v347 * v560;
+        s301 += v451 * v562; s301 += v472 * v560;
+        const V v578 = v344 * v539 + v346 * v560, v579 = v344 * v561 - v566 + v346 * v563;
+        s307 += v451 * v563; s301 -= v338 * v558;
+        const V v580 = v344 * v536 + v346 * v558, v581 = v345 * v536 + v347 * v558,
+            v582 = v344 * v537 - v338 * v530 + v346 * v559,
+            v583 = v345 * v537 - v337 * v530 + v347 * v559, v584 = v344 * v544 + v346 * v557,
+            v585 = v345 * v544 + v347 * v557;
+        s316 += v452 * v578; s316 -= v337 * v580; s321 += v452 * v577; s321 -= v337 * v581;
+        const V v586 = v341 * v580; s288 += v586; const V v587 = v341 * v581; s289 += v587;
+        const V v588 = v341 * v582; s291 += v588; const V v589 = v341 * v583; s292 += v589;
+        s330 += v469 * v576; s330 -= v337 * v583; s315 += v472 * v578; s315 -= v338 * v580;
+        s320 += v472 * v577; s320 -= v338 * v581; s327 += v451 * v579; s327 -= v338 * v582;
+        s328 += v469 * v579; s328 -= v337 * v582; s324 += v472 * v575; s324 -= v338 * v572;
+        s325 += v452 * v575; s325 -= v337 * v572; s295 += v472 * v544; s295 += v451 * v557;
+        s297 += v452 * v544; s297 += v469 * v557; const V v590 = v342 * v544 + v348 * v557;
+        s299 += v590; s324 += v451 * v570; s325 += v469 * v570; s323 += v342 * v554;
+        s323 += v348 * v590; s312 += v472 * v552; s312 += v451 * v584; s313 += v452 * v552;
+        s313 += v469 * v584; s314 += v342 * v552; s314 += v348 * v584; s318 += v452 * v553;
+        s318 += v469 * v585; s319 += v342 * v553; s319 += v348 * v585;
+        const V v591 = v344 * v547 + v346 * v562, v592 = v345 * v547 + v347 * v562,
+            v593 = v344 * v540 - v550 + v346 * v561, v594 = v345 * v540 - v551 + v347 * v561;
+        s315 += v451 * v591; s320 += v451 * v592; s316 += v469 * v591; s317 += v342 * v578;
+        s317 += v348 * v591; s321 += v469 * v592; s322 += v342 * v577; s322 += v348 * v592;
+        s327 += v472 * v593; s328 += v452 * v593; s330 += v452 * v594; s329 += v348 * v579;
+        s329 += v342 * v593; s331 += v348 * v576; s331 += v342 * v594;
     }
-    const V v1267 = v366 + s471;
-    const V v1268 = s470 - v364;
-    const V v1269 = v370 + s475;
-    const V v1270 = s476 + v420;
-    const V v1271 = v60 * v1267;
-    const V v1272 = v1271 + s477;
-    const V v1273 = v61 * v1267;
-    const V v1274 = v1270 - v1273;
-    const V v1275 = v372 - v1269;
-    const V v1276 = v1269 - v372;
-    const V v1277 = v66 * v1268;
-    const V v1278 = v1277 + v1274;
-    const V v1279 = v67 * v1268;
-    const V v1280 = v1272 - v1279;
-    const V v1281 = v418 + v1280;
-    const V v1282 = v1278 - v1281;
-    const V v1283 = v1278 + v1281;
-    const V v1284 = v1275 - v1282;
-    const V v1285 = v1276 + v1283;
-    const V v1286 = v1276 - v1283;
-    const V v1287 = v1282 - v1276;
-    const V v1288 = v367 + s468;
-    const V v1289 = v338 + s467;
-    const V v1290 = s469 - v365;
-    const V v1291 = v373 - v369;
-    const V v1292 = s473 - v336;
-    const V v1293 = s472 + v1291;
-    const V v1294 = s474 - v337;
-    const V v1295 = v66 * v1288;
-    const V v1296 = v1295 + v1292;
-    const V v1297 = v67 * v1288;
-    const V v1298 = v1294 - v1297;
-    const V v1299 = v1289 - v1293;
-    const V v1300 = v1289 + v1293;
-    const V v1301 = v61 * v1290;
-    const V v1302 = v1296 - v1301;
-    const V v1303 = v60 * v1290;
-    const V v1304 = v1303 + v1298;
-    const V v1305 = v428 + v1302;
-    const V v1306 = v426 + v1304;
-    const V v1307 = v1305 - v1306;
-    const V v1308 = v1305 + v1306;
-    const V v1309 = v1299 - v1307;
-    const V v1310 = v1299 + v1307;
-    const V v1311 = v1300 + v1308;
-    softehl_store4(R + 0, 8, v1285, v1311, v1284, v1309);
-    const V v1312 = v1300 - v1308;
-    softehl_store4(R + 4, 8, v1286, v1312, v1287, v1310);
-    const V v1313 = v387 + s490;
-    const V v1314 = v388 + s491;
-    const V v1315 = v391 + s494;
-    const V v1316 = s489 - v386;
-    const V v1317 = v408 - v397;
-    const V v1318 = s492 - v389;
-    const V v1319 = s518 + v1317;
-    const V v1320 = s493 - v390;
-    const V v1321 = v67 * v1316;
-    const V v1322 = s507 - v1321;
-    const V v1323 = s508 - v395;
-    const V v1324 = s509 + v405;
-    const V v1325 = s513 - v396;
-    const V v1326 = v60 * v1313;
-    const V v1327 = v1326 + v1322;
-    const V v1328 = s514 + v407;
-    const V v1329 = v1323 - v402;
-    const V v1330 = v67 * v1320;
-    const V v1331 = v1324 - v1330;
-    const V v1332 = v1325 - v403;
-    const V v1333 = v67 * v1314;
-    const V v1334 = v1329 - v1333;
-    const V v1335 = v401 + v1327;
-    const V v1336 = v66 * v1320;
-    const V v1337 = v1336 + v1328;
-    const V v1338 = v66 * v1314;
-    const V v1339 = v1338 + v1332;
-    const V v1340 = v60 * v1315;
-    const V v1341 = v1340 + v1331;
-    const V v1342 = v60 * v1318;
-    const V v1343 = v1342 + v1334;
-    const V v1344 = v61 * v1315;
-    const V v1345 = v1337 - v1344;
-    const V v1346 = v61 * v1318;
-    const V v1347 = v1339 - v1346;
-    const V v1348 = v1319 + v1345;
-    const V v1349 = v1335 + v1343;
-    const V v1350 = v1343 - v1335;
-    const V v1351 = v1335 - v1343;
-    const V v1352 = v1341 + v1345;
-    const V v1353 = v1341 - v1350;
-    const V v1354 = v1351 - v1341;
-    const V v1355 = v1319 - v1352;
-    const V v1356 = v1343 + v1347;
-    const V v1357 = v1341 - v1349;
-    const V v1358 = v1350 - v1341;
-    const V v1359 = v1341 + v1349;
-    const V v1360 = v1347 - v1343;
-    const V v1361 = v1349 - v1341;
-    const V v1362 = v1345 - v1341;
-    const V v1363 = v1360 - v1341;
-    const V v1364 = v1345 - v1360;
-    const V v1365 = v1356 + v1359;
-    const V v1366 = v1345 - v1356;
-    const V v1367 = v1355 + v1361;
-    const V v1368 = v1345 + v1363;
-    const V v1369 = v1360 - v1345;
-    const V v1370 = v1356 - v1345;
-    const V v1371 = v1355 + v1366;
-    const V v1372 = v1352 + v1365;
-    const V v1373 = v1319 - v1362;
-    const V v1374 = v1367 + v1370;
-    const V v1375 = v1357 + v1371;
-    const V v1376 = v1352 + v1357;
-    const V v1377 = v1362 - v1319;
-    const V v1378 = v1376 - v1319;
-    const V v1379 = v1358 + v1364;
-    const V v1380 = v1370 + v1378;
-    const V v1381 = v1373 + v1379;
-    const V v1382 = v1358 + v1369;
-    const V v1383 = v1369 + v1373;
-    const V v1384 = v1364 + v1377;
-    const V v1385 = v1377 + v1382;
-    const V v1386 = v1348 + v1368;
-    const V v1387 = v1348 + v1372;
-    const V v1388 = v1354 - v1386;
-    const V v1389 = v1354 + v1386;
-    const V v1390 = v1353 + v1383;
-    const V v1391 = v1353 + v1384;
-    const V v1392 = v340 + s479;
-    const V v1393 = v345 - v343;
-    const V v1394 = v379 + s500;
-    const V v1395 = v440 + s496;
-    const V v1396 = v411 - v385;
-    const V v1397 = v442 + s498;
-    const V v1398 = s485 + v1393;
-    const V v1399 = v455 - v453;
-    const V v1400 = s521 + v1396;
-    const V v1401 = v456 - v454;
-    const V v1402 = s478 - v339;
-    const V v1403 = s519 + v1399;
-    const V v1404 = s483 + v352;
-    const V v1405 = s520 + v1401;
-    const V v1406 = s484 + v354;
-    const V v1407 = v1398 + v1403;
-    const V v1408 = v1398 - v1403;
-    const V v1409 = s495 - v438;
-    const V v1410 = v1398 + v1400;
-    const V v1411 = s497 - v444;
-    const V v1412 = s499 - v376;
-    const V v1413 = v1405 + v1408;
-    const V v1414 = s510 + v464;
-    const V v1415 = s511 + v466;
-    const V v1416 = s512 + v413;
-    const V v1417 = s515 + v460;
-    const V v1418 = s516 + v462;
-    const V v1419 = s517 + v410;
-    const V v1420 = v1403 + v1405;
-    const V v1421 = v67 * v1412;
-    const V v1422 = v1416 - v1421;
-    const V v1423 = v66 * v1412;
-    const V v1424 = v1423 + v1419;
-    const V v1425 = v67 * v1402;
-    const V v1426 = v66 * v1402;
-    const V v1427 = v1426 + v1406;
-    const V v1428 = v1400 + v1405;
-    const V v1429 = v1413 - v1400;
-    const V v1430 = v1400 - v1413;
-    const V v1431 = v1425 + v1403;
-    const V v1432 = v61 * v1392;
-    const V v1433 = v1427 - v1432;
-    const V v1434 = v61 * v1394;
-    const V v1435 = v1424 - v1434;
-    const V v1436 = v60 * v1392;
-    const V v1437 = v1436 + v1404;
-    const V v1438 = v60 * v1394;
-    const V v1439 = v1438 + v1422;
-    const V v1440 = v1431 - v1437;
-    const V v1441 = v1437 - v1425;
-    const V v1442 = v1433 - v1398;
-    const V v1443 = v1433 + v1435;
-    const V v1444 = v1433 - v1435;
-    const V v1445 = v1440 - v1442;
-    const V v1446 = v1439 + v1441;
-    const V v1447 = v1442 - v1441;
-    const V v1448 = v1435 + v1439;
-    const V v1449 = v1441 - v1439;
-    const V v1450 = v1435 - v1439;
-    const V v1451 = v1403 + v1447;
-    const V v1452 = v1420 + v1446;
-    const V v1453 = v1448 - v1428;
-    const V v1454 = v1400 - v1450;
-    const V v1455 = v1443 + v1452;
-    const V v1456 = v1447 - v1403;
-    const V v1457 = v1450 - v1400;
-    const V v1458 = v1410 + v1455;
-    const V v1459 = v1410 - v1420;
-    const V v1460 = v1451 + v1457;
-    const V v1461 = v1407 - v1428;
-    const V v1462 = v1457 - v1405;
-    const V v1463 = v67 * v1409;
-    const V v1464 = v1414 - v1463;
-    const V v1465 = v67 * v1411;
-    const V v1466 = v1415 - v1465;
-    const V v1467 = v66 * v1409;
-    const V v1468 = v1467 + v1417;
-    const V v1469 = v66 * v1411;
-    const V v1470 = v1469 + v1418;
-    const V v1471 = v60 * v1395;
-    const V v1472 = v1471 + v1464;
-    const V v1473 = v60 * v1397;
-    const V v1474 = v1473 + v1466;
-    const V v1475 = v61 * v1395;
-    const V v1476 = v1468 - v1475;
-    const V v1477 = v61 * v1397;
-    const V v1478 = v1470 - v1477;
-    const V v1479 = v1441 + v1472;
-    const V v1480 = v1439 + v1474;
-    const V v1481 = v1433 + v1476;
-    const V v1482 = v1472 + v1474;
-    const V v1483 = v1435 + v1478;
-    const V v1484 = v1476 - v1472;
-    const V v1485 = v1476 + v1478;
-    const V v1486 = v1478 - v1474;
-    const V v1487 = v1449 - v1472;
-    const V v1488 = v1445 - v1472;
-    const V v1489 = v1479 - v1480;
-    const V v1490 = v1479 + v1480;
-    const V v1491 = v1462 + v1486;
-    const V v1492 = v1405 - v1486;
-    const V v1493 = v1474 + v1487;
-    const V v1494 = v1488 - v1476;
-    const V v1495 = v1453 + v1474;
-    const V v1496 = v1444 - v1476;
-    const V v1497 = v1490 - v1481;
-    const V v1498 = v1478 + v1495;
-    const V v1499 = v1478 + v1496;
-    const V v1500 = v1497 - v1483;
-    const V v1501 = v1461 + v1481;
-    const V v1502 = v1501 - v1483;
-    const V v1503 = v1493 - v1499;
-    const V v1504 = v1493 + v1499;
-    const V v1505 = v1500 - v1407;
-    const V v1506 = v1494 - v1498;
-    const V v1507 = v1494 + v1498;
-    softehl_store4(K + 32, 64, v1375, v1506, v1380, v1507);
-    const V v1508 = v1489 + v1502;
-    const V v1509 = v1489 - v1502;
-    const V v1510 = v1505 - v1428;
-    softehl_store4(K + 16, 64, v1388, v1510, v1389, v1509);
-    const V v1511 = v1430 - v1503;
-    const V v1512 = v1446 - v1482;
-    const V v1513 = v1458 + v1482;
-    const V v1514 = v1503 - v1429;
-    const V v1515 = v1443 - v1485;
-    const V v1516 = v1485 + v1513;
-    softehl_store4(K + 0, 64, v1387, v1516, v1388, v1508);
-    const V v1517 = v1456 + v1484;
-    const V v1518 = v1460 - v1484;
-    const V v1519 = v1491 + v1517;
-    const V v1520 = v1492 + v1518;
-    softehl_store4(K + 52, 64, v1391, v1520, v1390, v1511);
-    const V v1521 = v1454 + v1492;
-    const V v1522 = v1517 + v1521;
-    softehl_store4(K + 48, 64, v1385, v1519, v1381, v1522);
-    const V v1523 = v1512 + v1515;
-    const V v1524 = v1512 - v1515;
-    const V v1525 = v1429 + v1504;
-    const V v1526 = v1429 - v1504;
-    const V v1527 = v1524 - v1459;
-    softehl_store4(K + 20, 64, v1380, v1527, v1381, v1514);
-    const V v1528 = v1459 + v1523;
-    softehl_store4(K + 4, 64, v1375, v1528, v1385, v1525);
-    const V v1529 = v1459 - v1523;
-    softehl_store4(K + 36, 64, v1374, v1529, v1391, v1526);
-    const V v1530 = v374 + s505;
-    const V v1531 = v341 + s480;
-    const V v1532 = v382 - v416;
-    const V v1533 = v359 + s482;
-    const V v1534 = v344 - v346;
-    const V v1535 = v429 + s501;
-    const V v1536 = v430 + s503;
-    const V v1537 = s527 + v1532;
-    const V v1538 = s488 + v1534;
-    const V v1539 = s481 - v342;
-    const V v1540 = s486 - v360;
-    const V v1541 = v1533 - v1538;
-    const V v1542 = v1533 + v1538;
-    const V v1543 = 2.0 * v1538;
-    const V v1544 = v1533 + v1543;
-    const V v1545 = v356 + v1540;
-    const V v1546 = s487 - v361;
-    const V v1547 = v1538 - v1537;
-    const V v1548 = v1537 + v1538;
-    const V v1549 = v1537 + v1544;
-    const V v1550 = s502 - v431;
-    const V v1551 = v358 + v1546;
-    const V v1552 = s504 - v432;
-    const V v1553 = s506 - v377;
-    const V v1554 = s522 - v333;
-    const V v1555 = s523 - v362;
-    const V v1556 = s524 - v334;
-    const V v1557 = s525 - v363;
-    const V v1558 = s526 - v335;
-    const V v1559 = v60 * v1550;
-    const V v1560 = v1559 + v1554;
-    const V v1561 = v60 * v1552;
-    const V v1562 = v1561 + v1555;
-    const V v1563 = v60 * v1553;
-    const V v1564 = v1563 + v1556;
-    const V v1565 = v61 * v1552;
-    const V v1566 = v1557 - v1565;
-    const V v1567 = v61 * v1553;
-    const V v1568 = v1558 - v1567;
-    const V v1569 = v61 * v1539;
-    const V v1570 = v1551 - v1569;
-    const V v1571 = v60 * v1539;
-    const V v1572 = v1571 + v1545;
-    const V v1573 = v446 + v1560;
-    const V v1574 = v448 + v1562;
-    const V v1575 = v422 + v1564;
-    const V v1576 = v450 + v1566;
-    const V v1577 = v424 + v1568;
-    const V v1578 = v67 * v1535;
-    const V v1579 = v1573 - v1578;
-    const V v1580 = v67 * v1531;
-    const V v1581 = v1572 - v1580;
-    const V v1582 = v66 * v1531;
-    const V v1583 = v1582 + v1570;
-    const V v1584 = v67 * v1536;
-    const V v1585 = v1574 - v1584;
-    const V v1586 = v66 * v1536;
-    const V v1587 = v1586 + v1576;
-    const V v1588 = v67 * v1530;
-    const V v1589 = v1575 - v1588;
-    const V v1590 = v66 * v1530;
-    const V v1591 = v1590 + v1577;
-    const V v1592 = v1579 - v1585;
-    const V v1593 = v1579 + v1585;
-    const V v1594 = v1581 - v1583;
-    const V v1595 = v1581 + v1583;
-    const V v1596 = v1581 - v1589;
-    const V v1597 = v1581 + v1589;
-    const V v1598 = v1583 - v1591;
-    const V v1599 = v1583 + v1591;
-    const V v1600 = v1541 + v1592;
-    const V v1601 = v1596 + v1600;
-    const V v1602 = v1585 - v1587;
-    const V v1603 = v1585 + v1587;
-    const V v1604 = v1596 - v1592;
-    const V v1605 = v1589 - v1591;
-    const V v1606 = v1589 + v1591;
-    const V v1607 = v1594 + v1601;
-    const V v1608 = v1541 - v1594;
-    const V v1609 = v1598 - v1602;
-    const V v1610 = v1599 - v1603;
-    const V v1611 = v1604 - v1609;
-    const V v1612 = v1604 + v1609;
-    const V v1613 = v1547 + v1602;
-    const V v1614 = v1597 - v1593;
-    const V v1615 = v1549 + v1593;
-    const V v1616 = v1598 + v1613;
-    const V v1617 = v1603 + v1615;
-    const V v1618 = v1547 - v1605;
-    const V v1619 = v1605 + v1616;
-    const V v1620 = v1597 + v1617;
-    const V v1621 = v1610 + v1614;
-    const V v1622 = v1608 - v1618;
-    const V v1623 = v1608 + v1618;
-    const V v1624 = v1607 + v1619;
-    const V v1625 = v1607 - v1619;
-    softehl_store4(K + 24, 64, v1508, v1624, v1509, v1625);
-    const V v1626 = v1599 + v1620;
-    const V v1627 = v1614 - v1610;
-    const V v1628 = v1611 + v1622;
-    const V v1629 = v1612 + v1623;
-    softehl_store4(K + 56, 64, v1525, v1629, v1514, v1628);
-    const V v1630 = v1606 + v1626;
-    const V v1631 = v1548 - v1606;
-    const V v1632 = v1622 - v1611;
-    const V v1633 = v1623 - v1612;
-    softehl_store4(K + 60, 64, v1526, v1633, v1511, v1632);
-    const V v1634 = v1595 + v1630;
-    softehl_store4(K + 8, 64, v1516, v1634, v1510, v1624);
-    const V v1635 = v1542 - v1595;
-    const V v1636 = v1627 - v1631;
-    const V v1637 = v1635 + v1636;
-    softehl_store4(K + 28, 64, v1507, v1637, v1522, v1628);
-    const V v1638 = v1631 + v1635;
-    const V v1639 = v1621 + v1638;
-    softehl_store4(K + 12, 64, v1506, v1639, v1519, v1629);
-    softehl_store4(K + 40, 64, v1528, v1639, v1527, v1637);
-    const V v1640 = v1638 - v1621;
-    softehl_store4(K + 44, 64, v1529, v1640, v1520, v1633);
+    const V v595 = v216 + s276, v596 = s275 - v214, v597 = v219 + s280, v598 = v597 - v220,
+        v599 = v51 * v596 + (s281 + v248 - v47 * v595),
+        v600 = v247 + (v46 * v595 + s282 - v52 * v596), v601 = v599 - v600, v602 = v599 + v600,
+        v603 = v220 - v597 - v601, v604 = v598 + v602, v605 = v598 - v602, v606 = v601 - v598,
+        v607 = v217 + s273, v608 = v196 + s272, v609 = s274 - v215, v610 = s277 + (v221 - v218),
+        v611 = v608 - v610, v612 = v608 + v610,
+        v613 = v252 + (v51 * v607 + (s278 - v194) - v47 * v609),
+        v614 = v251 + (v46 * v609 + (s279 - v195 - v52 * v607)), v615 = v613 - v614,
+        v616 = v613 + v614, v617 = v611 - v615, v618 = v611 + v615, v619 = v612 + v616;
+    softehl_store4(R + 0, 8, v604, v619, v603, v617); const V v620 = v612 - v616;
+    softehl_store4(R + 4, 8, v605, v620, v606, v618);
+    const V v621 = v230 + s296, v622 = v233 + s299, v623 = s297 - v231, v624 = s323 + (v242 - v236),
+        v625 = s298 - v232, v626 = v237 + (v46 * (v229 + s295) + (s312 - v52 * (s294 - v228))),
+        v627 = v46 * v622 + (s314 + v240 - v52 * v625),
+        v628 = v46 * v623 + (s313 - v234 - v238 - v52 * v621),
+        v629 = v51 * v625 + (s319 + v241) - v47 * v622,
+        v630 = v51 * v621 + (s318 - v235 - v239) - v47 * v623, v631 = v624 + v629,
+        v632 = v626 + v628, v633 = v628 - v626, v634 = v627 + v629, v635 = v627 - v633,
+        v636 = v626 - v628 - v627, v637 = v624 - v634, v638 = v628 + v630, v639 = v627 - v632,
+        v640 = v633 - v627, v641 = v630 - v628, v642 = v629 - v627, v643 = v629 - v641,
+        v644 = v641 - v629, v645 = v638 - v629, v646 = v624 - v642,
+        v647 = v637 + (v632 - v627) + v645, v648 = v639 + (v637 + (v629 - v638)),
+        v649 = v642 - v624, v650 = v645 + (v634 + v639 - v624), v651 = v646 + (v640 + v643),
+        v652 = v649 + (v640 + v644), v653 = v631 + (v629 + (v641 - v627)),
+        v654 = v631 + (v634 + (v638 + (v627 + v632))), v655 = v636 - v653, v656 = v636 + v653,
+        v657 = v635 + (v644 + v646), v658 = v635 + (v643 + v649), v659 = v198 + s284,
+        v660 = v225 + s305, v661 = v258 + s301, v662 = v259 + s303, v663 = s290 + (v203 - v201),
+        v664 = s326 + (v244 - v227), v665 = s283 - v197, v666 = s324 + (v266 - v264),
+        v667 = s325 + (v267 - v265), v668 = v663 + v666, v669 = s300 - v257, v670 = v663 + v664,
+        v671 = s302 - v260, v672 = s304 - v223, v673 = v667 + (v663 - v666), v674 = v666 + v667,
+        v675 = v52 * v665, v676 = v664 + v667, v677 = v673 - v664,
+        v678 = v51 * v665 + (s289 + v206) - v47 * v659,
+        v679 = v51 * v672 + (s322 + v243) - v47 * v660, v680 = v46 * v659 + (s288 + v205),
+        v681 = v46 * v660 + (s317 + v245 - v52 * v672), v682 = v680 - v675, v683 = v678 - v663,
+        v684 = v678 + v679, v685 = v681 + v682, v686 = v683 - v682, v687 = v679 - v681,
+        v688 = v687 - v664, v689 = v670 - v674, v690 = v46 * v661 + (s315 + v270 - v52 * v669),
+        v691 = v46 * v662 + (s316 + v271 - v52 * v671),
+        v692 = v51 * v669 + (s320 + v268) - v47 * v661,
+        v693 = v51 * v671 + (s321 + v269) - v47 * v662, v694 = v682 + v690, v695 = v681 + v691,
+        v696 = v678 + v692, v697 = v690 + v691, v698 = v679 + v693, v699 = v692 - v690,
+        v700 = v692 + v693, v701 = v693 - v691, v702 = v694 - v695, v703 = v667 - v701,
+        v704 = v691 + (v682 - v681 - v690), v705 = v675 + v666 - v680 - v683 - v690 - v692,
+        v706 = v693 + (v679 + v681 - v676 + v691), v707 = v693 + (v678 - v679 - v692),
+        v708 = v668 - v676 + v696 - v698, v709 = v704 - v707, v710 = v704 + v707,
+        v711 = v705 - v706, v712 = v705 + v706;
+    softehl_store4(K + 32, 64, v648, v711, v650, v712);
+    const V v713 = v702 + v708, v714 = v702 - v708, v715 = v694 + v695 - v696 - v698 - v668 - v676;
+    softehl_store4(K + 16, 64, v655, v715, v656, v714);
+    const V v716 = v664 - v673 - v709, v717 = v685 - v697, v718 = v709 - v677, v719 = v684 - v700,
+        v720 = v700 + (v670 + (v684 + (v674 + v685)) + v697);
+    softehl_store4(K + 0, 64, v654, v720, v655, v713);
+    const V v721 = v686 - v666 + v699, v722 = v688 - v667 + v701 + v721,
+        v723 = v703 + (v666 + v686 + v688 - v699);
+    softehl_store4(K + 52, 64, v658, v723, v657, v716); const V v724 = v721 + (v664 - v687 + v703);
+    softehl_store4(K + 48, 64, v652, v722, v651, v724);
+    const V v725 = v717 + v719, v726 = v677 + v710, v727 = v677 - v710, v728 = v717 - v719 - v689;
+    softehl_store4(K + 20, 64, v650, v728, v651, v718); const V v729 = v689 + v725;
+    softehl_store4(K + 4, 64, v648, v729, v652, v726); const V v730 = v689 - v725;
+    softehl_store4(K + 36, 64, v647, v730, v658, v727);
+    const V v731 = v222 + s310, v732 = v199 + s285, v733 = v209 + s287, v734 = v254 + s308,
+        v735 = s332 + (v226 - v246), v736 = s293 + (v202 - v204), v737 = s286 - v200,
+        v738 = v733 - v736, v739 = v736 - v735, v740 = s309 - v256, v741 = s311 - v224,
+        v742 = v261 + (v46 * (s307 - v255) + (s327 - v191)) - v52 * (v253 + s306),
+        v743 = v46 * v737 + (v207 + (s291 - v210)) - v52 * v732,
+        v744 = v51 * v732 + (v208 + (s292 - v211) - v47 * v737),
+        v745 = v262 + (v46 * v740 + (s328 - v212)) - v52 * v734,
+        v746 = v51 * v734 + (v263 + (s330 - v213 - v47 * v740)),
+        v747 = v249 + (v46 * v741 + (s329 - v192)) - v52 * v731,
+        v748 = v51 * v731 + (v250 + (s331 - v193 - v47 * v741)), v749 = v742 - v745,
+        v750 = v742 + v745, v751 = v743 - v744, v752 = v743 + v744, v753 = v743 - v747,
+        v754 = v743 + v747, v755 = v744 - v748, v756 = v744 + v748, v757 = v745 - v746,
+        v758 = v745 + v746, v759 = v753 - v749, v760 = v747 - v748, v761 = v747 + v748,
+        v762 = v751 + (v753 + (v738 + v749)), v763 = v738 - v751, v764 = v755 - v757,
+        v765 = v756 - v758, v766 = v759 - v764, v767 = v759 + v764, v768 = v754 - v750,
+        v769 = v739 - v760, v770 = v760 + (v755 + (v739 + v757)), v771 = v765 + v768,
+        v772 = v763 - v769, v773 = v763 + v769, v774 = v762 + v770, v775 = v762 - v770;
+    softehl_store4(K + 24, 64, v713, v774, v714, v775);
+    const V v776 = v766 + v772, v777 = v767 + v773;
+    softehl_store4(K + 56, 64, v726, v777, v718, v776);
+    const V v778 = v761 + (v756 + (v754 + (v758 + (v735 + (v733 + 2.0 * v736) + v750)))),
+        v779 = v735 + v736 - v761, v780 = v772 - v766, v781 = v773 - v767;
+    softehl_store4(K + 60, 64, v727, v781, v716, v780); const V v782 = v752 + v778;
+    softehl_store4(K + 8, 64, v720, v782, v715, v774);
+    const V v783 = v733 + v736 - v752, v784 = v783 + (v768 - v765 - v779);
+    softehl_store4(K + 28, 64, v712, v784, v724, v776);
+    const V v785 = v779 + v783, v786 = v771 + v785;
+    softehl_store4(K + 12, 64, v711, v786, v722, v777);
+    softehl_store4(K + 40, 64, v729, v786, v728, v784); const V v787 = v785 - v771;
+    softehl_store4(K + 44, 64, v730, v787, v723, v781);
     if (softehl_any(failed)) {
-        softehl_spoil(failed, R, 8);
-        softehl_spoil(failed, K, (8 * 8));
+        softehl_spoil(failed, R, 8); softehl_spoil(failed, K, (8 * 8));
     }
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_ogden_tangent, 8, 8, 0, 0, 8, (8 * 8))
 
-void softehl_solid_taylor_mean_ogden_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_ogden_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_ogden_tangent_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, tangent + (8 * 8) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_ogden_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), tangent + (8 * 8) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    double K[SOFTEHL_LANES * (8 * 8)];
-    softehl_solid_taylor_mean_ogden_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (8 * 8) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_solid_taylor_mean_ogden_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
+    SOFTEHL_IDLE;
     M failed = softehl_mask(0);
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
     const double v1 = 0.25 * parameters[6];
-    const V v2 = X0 + d0;
-    const V v3 = X2 + d2;
-    const V v4 = X1 + d1;
-    const V v5 = X0 - X2;
-    const V v6 = X4 + d4;
-    const V v7 = X6 + d6;
-    const V v8 = X4 - X0;
-    const V v9 = X4 - X6;
-    const V v10 = X4 - X2;
-    const V v11 = v8 - X2;
-    const V v12 = X6 + v11;
-    const V v13 = X1 - X3;
-    const V v14 = X1 + X3;
-    const V v15 = X7 + d7;
-    const V v16 = 0.25 * v12;
-    const V v17 = v5 + v9;
-    const V v18 = v9 - v5;
-    const V v19 = X5 + X7;
-    const V v20 = 0.25 * v17;
-    const V v21 = X5 + d5;
-    const V v22 = X5 - X7;
-    const V v23 = v12 - v18;
-    const V v24 = 0.25 * v18;
-    const V v25 = X5 - X3;
-    const V v26 = X3 + d3;
-    const V v27 = v13 + v22;
-    const V v28 = 0.0625 * v23;
-    const V v29 = v22 - v13;
-    const V v30 = v18 - v12;
-    const V v31 = v18 + v12;
-    const V v32 = 0.25 * v27;
-    const V v33 = 0.0625 * v30;
-    const V v34 = 0.0625 * v31;
-    const V v35 = 0.25 * v29;
-    const V v36 = v14 + v19;
-    const V v37 = v19 - v14;
-    const V v38 = 0.25 * v36;
-    const double v39 = 0.5 * parameters[1];
-    const double v40 = 1.0 / parameters[1];
-    const double v41 = 0.5 * parameters[3];
-    const double v42 = 1.0 / parameters[3];
-    const V v43 = v29 - v37;
-    const V v44 = v29 + v37;
-    const V v45 = 0.25 * v37;
-    const V v46 = v37 - v29;
-    const V v47 = 0.0625 * v43;
-    const V v48 = 0.0625 * v44;
-    const V v49 = v24 * v45;
-    const V v50 = 1.0 / v38;
-    const V v51 = v38 * v38;
-    const V v52 = 0.0625 * v46;
-    const V v53 = v35 * v16;
-    const V v54 = v49 - v53;
-    const V v55 = 1.0 / v51;
-    const double v56 = 0.5 * parameters[5];
-    const double v57 = 1.0 / parameters[5];
-    const V v58 = 1.0 / v54;
-    const V v59 = 0.25 * v50;
-    const V v60 = 0.25 * v55;
-    const V v61 = v47 * v58;
-    const V v62 = v28 * v58;
-    const V v63 = v48 * v58;
-    const V v64 = v34 * v58;
-    const V v65 = v52 * v58;
-    const V v66 = v33 * v58;
-    const V v67 = v32 * v64;
-    const V v68 = v20 * v63;
-    const V v69 = v67 - v68;
-    const V v70 = v69 - 0.25;
-    const V v71 = (-0.25) - v69;
-    const V v72 = v32 * v62;
-    const V v73 = 0.25 - v72;
-    const V v74 = v20 * v61;
-    const V v75 = v73 - v74;
-    const V v76 = v32 * v66;
-    const V v77 = 0.25 - v76;
-    const V v78 = v20 * v65;
-    const V v79 = v77 - v78;
-    V s80 = softehl_splat(0.0);
-    V s81 = softehl_splat(0.0);
-    V s82 = softehl_splat(0.0);
-    V s83 = softehl_splat(0.0);
-    V s84 = softehl_splat(0.0);
-    V s85 = softehl_splat(0.0);
-    V s86 = softehl_splat(0.0);
-    V s87 = softehl_splat(0.0);
+    const V v2 = X0 + d0, v3 = X2 + d2, v4 = X1 + d1, v5 = X0 - X2, v6 = X4 + d4, v7 = X6 + d6,
+        v8 = X4 - X6, v9 = X4 - X2, v10 = X6 + (X4 - X0 - X2), v11 = X1 - X3, v12 = X1 + X3,
+        v13 = X7 + d7, v14 = 0.25 * v10, v15 = v8 - v5, v16 = X5 + X7, v17 = 0.25 * (v5 + v8),
+        v18 = X5 + d5, v19 = X5 - X7, v20 = 0.25 * v15, v21 = X5 - X3, v22 = X3 + d3,
+        v23 = v19 - v11, v24 = 0.25 * (v11 + v19), v25 = 0.25 * v23, v26 = v16 - v12,
+        v27 = 0.25 * (v12 + v16);
+    const double v28 = 0.5 * parameters[1], v29 = 1.0 / parameters[1], v30 = 0.5 * parameters[3],
+        v31 = 1.0 / parameters[3];
+    const V v32 = 0.25 * v26;
+    const double v33 = 0.5 * parameters[5], v34 = 1.0 / parameters[5];
+    const V v35 = 1.0 / (v20 * v32 - v25 * v14), v36 = 0.25 * (1.0 / v27),
+        v37 = 0.25 * (1.0 / (v27 * v27)), v38 = 0.0625 * (v23 - v26) * v35,
+        v39 = 0.0625 * (v10 - v15) * v35, v40 = 0.0625 * (v23 + v26) * v35,
+        v41 = 0.0625 * (v15 + v10) * v35, v42 = 0.0625 * (v26 - v23) * v35,
+        v43 = 0.0625 * (v15 - v10) * v35, v44 = v24 * v41 - v17 * v40, v45 = v44 - 0.25,
+        v46 = (-0.25) - v44, v47 = 0.25 - v24 * v39 - v17 * v38, v48 = 0.25 - v24 * v43 - v17 * v42;
+    V s49 = {0}, s50 = {0}, s51 = {0}, s52 = {0}, s53 = {0}, s54 = {0}, s55 = {0}, s56 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v88 = 1.0 - w[1];
-        const double v89 = 1.0 + w[1];
-        const double v90 = 0.25 * w[1];
-        const double v91 = 1.0 - w[0];
-        const double v92 = 1.0 + w[0];
-        const double v93 = 0.25 * v88;
-        const double v94 = 0.25 * v89;
-        const double v95 = 0.25 * w[0];
-        const double v96 = 0.25 - v90;
-        const double v97 = 0.25 + v90;
-        const double v98 = 0.25 + v95;
-        const double v99 = 0.25 - v95;
-        const double v100 = v93 * v91;
-        const double v101 = v93 * v92;
-        const double v102 = v92 * v94;
-        const double v103 = v91 * v94;
-        const double v104 = v90 - 0.25;
-        const V v105 = X2 * v96;
-        const double v106 = v95 - 0.25;
-        const V v107 = X3 * v96;
-        const V v108 = X3 * v101;
-        const V v109 = X6 * v99;
-        const V v110 = X7 * v99;
-        const V v111 = v100 * v2;
-        const V v112 = v97 * v9;
-        const V v113 = v105 + v112;
-        const V v114 = v97 * v22;
-        const V v115 = v107 + v114;
-        const V v116 = X7 * v103;
-        const V v117 = v116 + v108;
-        const V v118 = v100 * v4;
-        const V v119 = v98 * v10;
-        const V v120 = v109 + v119;
-        const V v121 = v98 * v25;
-        const V v122 = v110 + v121;
-        const V v123 = v102 * v6;
-        const V v124 = v111 + v123;
-        const V v125 = X0 * v104;
-        const V v126 = v125 + v113;
-        const V v127 = X0 * v106;
-        const V v128 = v127 + v120;
-        const V v129 = X1 * v104;
-        const V v130 = v129 + v115;
-        const V v131 = X1 * v100;
-        const V v132 = v131 + v117;
-        const V v133 = X1 * v106;
-        const V v134 = v133 + v122;
-        const V v135 = v102 * v21;
-        const V v136 = v118 + v135;
-        const V v137 = X5 * v102;
-        const V v138 = v137 + v132;
-        const V v139 = v103 * v7;
-        const V v140 = v139 + v124;
-        const V v141 = v103 * v15;
-        const V v142 = v141 + v136;
-        const V v143 = v134 * v126;
-        const V v144 = w[0] * v126;
-        const V v145 = w[1] * v134;
-        const V v146 = v3 * v101;
-        const V v147 = v146 + v140;
-        const V v148 = v26 * v101;
-        const V v149 = v148 + v142;
-        const V v150 = w[1] * v128;
-        const V v151 = v144 - v150;
-        const double v152 = w[1] * w[2];
-        const V v153 = v128 * v130;
-        const V v154 = v143 - v153;
-        const V v155 = w[0] * v130;
-        const V v156 = v145 - v155;
-        const V v157 = w[2] * v138;
-        const V v158 = v154 * v138;
-        const V v159 = 0.25 * v154;
-        const V v160 = v156 * v157;
-        s86 += v160;
-        const V v161 = v151 * v157;
-        s87 += v161;
-        const V v162 = w[2] * v159;
-        s80 += v162;
-        const V v163 = v152 * v159;
-        s82 += v163;
-        const V v164 = w[2] * v158;
-        s83 += v164;
-        const V v165 = v152 * v158;
-        s85 += v165;
-        const V v166 = w[0] * v162;
-        s81 += v166;
-        const V v167 = w[0] * v164;
-        s84 += v167;
-        softehl_store2(R + 7 * q + 0, (7 * points), v147, v149);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v57 = 0.25 * w[1], v58 = 1.0 - w[0], v59 = 1.0 + w[0],
+            v60 = 0.25 * (1.0 - w[1]), v61 = 0.25 * (1.0 + w[1]), v62 = 0.25 * w[0],
+            v63 = 0.25 - v57, v64 = 0.25 + v57, v65 = 0.25 + v62, v66 = 0.25 - v62, v67 = v60 * v58,
+            v68 = v60 * v59, v69 = v59 * v61, v70 = v58 * v61, v71 = v57 - 0.25, v72 = v62 - 0.25;
+        const V v73 = X0 * v71 + (X2 * v63 + v64 * v8), v74 = X0 * v72 + (X6 * v66 + v65 * v9),
+            v75 = X1 * v71 + (X3 * v63 + v64 * v19), v76 = X1 * v72 + (X7 * v66 + v65 * v21),
+            v77 = X5 * v69 + (X1 * v67 + (X7 * v70 + X3 * v68)),
+            v78 = v3 * v68 + (v70 * v7 + (v67 * v2 + v69 * v6)),
+            v79 = v22 * v68 + (v70 * v13 + (v67 * v4 + v69 * v18));
+        const double v80 = w[1] * w[2];
+        const V v81 = v76 * v73 - v74 * v75, v82 = w[2] * v77, v83 = v81 * v77, v84 = 0.25 * v81,
+            v85 = (w[1] * v76 - w[0] * v75) * v82;
+        s55 += v85; const V v86 = (w[0] * v73 - w[1] * v74) * v82; s56 += v86;
+        const V v87 = w[2] * v84; s49 += v87; const V v88 = v80 * v84; s51 += v88;
+        const V v89 = w[2] * v83; s52 += v89; const V v90 = v80 * v83; s54 += v90;
+        const V v91 = w[0] * v87; s50 += v91; const V v92 = w[0] * v89; s53 += v92;
+        softehl_store2(R + 7 * q + 0, (7 * points), v78, v79);
     }
-    const V v168 = 1.0 / s83;
-    const V v169 = s84 * v168;
-    const V v170 = v168 * s85;
-    const V v171 = v168 * s86;
-    const V v172 = v168 * s87;
-    const V v173 = s80 * v168;
-    const V v174 = s81 * v168;
-    const V v175 = s82 * v168;
-    const V v176 = v173 - v175;
-    const V v177 = v173 + v175;
-    const V v178 = v174 + v176;
-    const V v179 = v176 - v174;
-    const V v180 = v75 * v172;
-    const V v181 = v62 + v180;
-    const V v182 = v75 * v171;
-    const V v183 = v61 + v182;
-    const V v184 = v70 * v171;
-    const V v185 = v63 + v184;
-    const V v186 = v70 * v172;
-    const V v187 = v186 - v64;
-    const V v188 = v71 * v172;
-    const V v189 = v64 + v188;
-    const V v190 = v71 * v171;
-    const V v191 = v190 - v63;
-    const V v192 = v79 * v171;
-    const V v193 = v65 + v192;
-    const V v194 = v79 * v172;
-    const V v195 = v66 + v194;
-    const V v196 = v174 + v177;
-    const V v197 = d2 * v187;
-    const V v198 = d2 * v185;
-    const V v199 = 1.0 + v198;
-    const V v200 = d3 * v185;
-    const V v201 = d3 * v187;
-    const V v202 = 1.0 + v201;
-    const V v203 = v177 - v174;
-    const V v204 = d1 * v179;
-    const V v205 = 1.0 + v204;
-    const V v206 = d3 * v178;
-    const V v207 = v206 + v205;
-    const V v208 = d0 * v181;
-    const V v209 = v208 + v197;
-    const V v210 = d1 * v181;
-    const V v211 = v210 + v202;
-    const V v212 = d0 * v183;
-    const V v213 = v212 + v199;
-    const V v214 = d1 * v183;
-    const V v215 = v214 + v200;
-    const V v216 = d4 * v195;
-    const V v217 = v216 + v209;
-    const V v218 = d4 * v193;
-    const V v219 = v218 + v213;
-    const V v220 = d5 * v195;
-    const V v221 = v220 + v211;
-    const V v222 = d5 * v193;
-    const V v223 = v222 + v215;
-    const V v224 = d5 * v196;
-    const V v225 = v224 + v207;
-    const V v226 = d6 * v189;
-    const V v227 = v226 + v217;
-    const V v228 = d6 * v191;
-    const V v229 = v228 + v219;
-    const V v230 = d7 * v189;
-    const V v231 = v230 + v221;
-    const V v232 = d7 * v191;
-    const V v233 = v232 + v223;
-    const V v234 = d7 * v203;
-    const V v235 = v234 + v225;
-    const V v236 = v229 * v231;
-    const V v237 = v227 * v233;
-    const V v238 = v236 - v237;
-    const V v239 = v235 * v238;
+    const V v93 = 1.0 / s52, v94 = s53 * v93, v95 = v93 * s54, v96 = v93 * s55, v97 = v93 * s56,
+        v98 = s49 * v93, v99 = s50 * v93, v100 = s51 * v93, v101 = v98 - v100, v102 = v98 + v100,
+        v103 = v39 + v47 * v97, v104 = v38 + v47 * v96, v105 = v40 + v45 * v96,
+        v106 = v45 * v97 - v41, v107 = v41 + v46 * v97, v108 = v46 * v96 - v40,
+        v109 = v42 + v48 * v96, v110 = v43 + v48 * v97,
+        v111 = d5 * (v99 + v102) + (d3 * (v99 + v101) + (1.0 + d1 * (v101 - v99))),
+        v112 = (d6 * v108 + (d4 * v109 + (d0 * v104 + (1.0 + d2 * v105)))) * (d7 * v107 + (d5 * v110 + (d1 * v103 + (1.0 + d3 * v106)))),
+        v113 = (d6 * v107 + (d4 * v110 + (d0 * v103 + d2 * v106))) * (d7 * v108 + (d5 * v109 + (d1 * v104 + d3 * v105))),
+        v114 = (d7 * (v102 - v99) + v111) * (v112 - v113);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v240 = w[0] - v169;
-        const V v241 = w[1] - v170;
-        const V v242 = v35 * v240;
-        const V v243 = v45 * v241;
-        const V v244 = v24 * v240;
-        const V v245 = v59 * v240;
-        const V v246 = v174 + v245;
-        const V v247 = v59 * v241;
-        const V v248 = v175 + v247;
-        const V v249 = v16 * v241;
-        const V v250 = v244 - v249;
-        const V v251 = v58 * v250;
-        const V v252 = v172 + v251;
-        const V v253 = v243 + v242;
-        const V v254 = v243 - v242;
-        const V v255 = v58 * v254;
-        const V v256 = v171 + v255;
-        const V v257 = v60 * v253;
-        const V v258 = v173 - v257;
-        const V v259 = v75 * v252;
-        const V v260 = v62 + v259;
-        const V v261 = v79 * v252;
-        const V v262 = v66 + v261;
-        const V v263 = v248 - v258;
-        const V v264 = v248 + v258;
-        const V v265 = v75 * v256;
-        const V v266 = v61 + v265;
-        const V v267 = v79 * v256;
-        const V v268 = v65 + v267;
-        const V v269 = v71 * v252;
-        const V v270 = v64 + v269;
-        const V v271 = v71 * v256;
-        const V v272 = v70 * v256;
-        const V v273 = v63 + v272;
-        const V v274 = v70 * v252;
-        const V v275 = v274 - v64;
-        const V v276 = v246 + v263;
-        const V v277 = v246 - v263;
-        const V v278 = v246 + v264;
-        const V v279 = v271 - v63;
-        const V v280 = v264 - v246;
-        const V v281 = d0 * v260;
-        const V v282 = d0 * v266;
-        const V v283 = 1.0 + v282;
-        const V v284 = d1 * v266;
-        const V v285 = d1 * v260;
-        const V v286 = 1.0 + v285;
-        const V v287 = d1 * v276;
-        const V v288 = 1.0 - v287;
-        const V v289 = d2 * v275;
-        const V v290 = v281 + v289;
-        const V v291 = d2 * v273;
-        const V v292 = v291 + v283;
-        const V v293 = d3 * v273;
-        const V v294 = v284 + v293;
-        const V v295 = d3 * v275;
-        const V v296 = v295 + v286;
-        const V v297 = d3 * v277;
-        const V v298 = v297 + v288;
-        const V v299 = d4 * v262;
-        const V v300 = v299 + v290;
-        const V v301 = d4 * v268;
-        const V v302 = v301 + v292;
-        const V v303 = d5 * v268;
-        const V v304 = v303 + v294;
-        const V v305 = d5 * v262;
-        const V v306 = v305 + v296;
-        const V v307 = d5 * v278;
-        const V v308 = v307 + v298;
-        const V v309 = d6 * v270;
-        const V v310 = v309 + v300;
-        const V v311 = d6 * v279;
-        const V v312 = v311 + v302;
-        const V v313 = d7 * v279;
-        const V v314 = v313 + v304;
-        const V v315 = d7 * v270;
-        const V v316 = v315 + v306;
-        const V v317 = d7 * v280;
-        const V v318 = v317 + v308;
-        const V v319 = v312 * v316;
-        const V v320 = v310 * v314;
-        const V v321 = v319 - v320;
-        const V v322 = v321 * v318;
-        const V v323 = 1.0 / v322;
-        const V v324 = v239 * v323;
-        const M v325 = softehl_eq(v324, softehl_splat(0.0));
-        V v326 = softehl_splat(0.0);
-        const M m327 = ~v325;
-        if (softehl_any(m327)) {
-            const V v328 = softehl_vrcbrt(v324);
-            const V v329 = v324 * v328;
-            const V v330 = v328 * v329;
-            v326 = softehl_blend(m327, v330, v326);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const V v115 = w[0] - v94, v116 = w[1] - v95, v117 = v25 * v115, v118 = v32 * v116,
+            v119 = v99 + v36 * v115, v120 = v100 + v36 * v116,
+            v121 = v97 + v35 * (v20 * v115 - v14 * v116), v122 = v96 + v35 * (v118 - v117),
+            v123 = v98 - v37 * (v118 + v117), v124 = v39 + v47 * v121, v125 = v43 + v48 * v121,
+            v126 = v120 - v123, v127 = v120 + v123, v128 = v38 + v47 * v122,
+            v129 = v42 + v48 * v122, v130 = v41 + v46 * v121, v131 = v40 + v45 * v122,
+            v132 = v45 * v121 - v41, v133 = v46 * v122 - v40,
+            v134 = d5 * (v119 + v127) + (d3 * (v119 - v126) + (1.0 - d1 * (v119 + v126))),
+            v135 = d6 * v130 + (d4 * v125 + (d0 * v124 + d2 * v132)),
+            v136 = d6 * v133 + (d4 * v129 + (d2 * v131 + (1.0 + d0 * v128))),
+            v137 = d7 * v133 + (d5 * v129 + (d1 * v128 + d3 * v131)),
+            v138 = d7 * v130 + (d5 * v125 + (d3 * v132 + (1.0 + d1 * v124))),
+            v139 = d7 * (v127 - v119) + v134,
+            v140 = v114 * (1.0 / ((v136 * v138 - v135 * v137) * v139));
+        const M v141 = softehl_eq(v140, softehl_splat(0.0)); V v142 = softehl_splat(0.0);
+        const M m143 = ~v141;
+        if (softehl_any(m143)) {
+            const V v144 = softehl_vrcbrt(v140), v145 = v144 * (v140 * v144);
+            v142 = softehl_blend(m143, v145, v142);
         }
-        const V v331 = v312 * v326;
-        const V v332 = v310 * v326;
-        const V v333 = v314 * v326;
-        const V v334 = v316 * v326;
-        const V v335 = v318 * v326;
-        const V v336 = v331 * v331;
-        const V v337 = v332 * v332;
-        const V v338 = v331 * v332;
-        const V v339 = v331 * v334;
-        const V v340 = v335 * v335;
-        const V v341 = v333 * v333;
-        const V v342 = v336 + v341;
-        const V v343 = v332 * v333;
-        const V v344 = v339 - v343;
-        const V v345 = v333 * v334;
-        const V v346 = v338 + v345;
-        const V v347 = v334 * v334;
-        const V v348 = v337 + v347;
-        const V v349 = v335 * v344;
-        const V v350 = v344 * v344;
-        const V v351 = softehl_vrcbrt(v340);
-        const V v352 = v351 * v351;
-        const V v353 = v340 * v352;
-        const V v354 = softehl_vrcbrt(v350);
-        const V v355 = v354 * v354;
-        const V v356 = v350 * v355;
-        const V v357 = v353 * v356;
-        const V v358 = 1.0 / v357;
-        const V v359 = v342 * v358;
-        const V v360 = v346 * v358;
-        const V v361 = v348 * v358;
-        const V v362 = v340 * v358;
-        V v363[6];
-        softehl_solid_taylor_mean_ogden_isochoric_of_stress_1_lanes(softehl_mask(1), (const V[]){v359, v361, v362, v360, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v39), softehl_splat(v40), softehl_splat(v41), softehl_splat(v42), softehl_splat(v56), softehl_splat(v57)}, v363, &failed);
-        const V v364 = 0.3333333333333333 * v353;
-        const V v365 = 0.3333333333333333 * v352;
-        const V v366 = 2.0 * v344;
-        const V v367 = 1.0 / v349;
-        const V v368 = v364 * v355;
-        const V v369 = v365 * v356;
-        const V v370 = 2.0 * v335;
-        const V v371 = v335 * v370;
-        const V v372 = 2.0 * v334;
-        const V v373 = 2.0 * v333;
-        const V v374 = 2.0 * v332;
-        const V v375 = 2.0 * v331;
-        const V v376 = v363[0];
-        const V v377 = v363[1];
-        const V v378 = v363[2];
-        const V v379 = v363[3];
-        const V v380 = v358 * v358;
-        const V v381 = v358 * v376;
-        const V v382 = v342 * v376;
-        const V v383 = v358 * v377;
-        const V v384 = v358 * v378;
-        const V v385 = v358 * v379;
-        const V v386 = v348 * v377;
-        const V v387 = v386 + v382;
-        const V v388 = v373 * v381;
-        const V v389 = v375 * v381;
-        const V v390 = v346 * v379;
-        const V v391 = v390 + v387;
-        const V v392 = v374 * v383;
-        const V v393 = v372 * v383;
-        const V v394 = v340 * v378;
-        const V v395 = v394 + v391;
-        const V v396 = v380 * v395;
-        const V v397 = v340 * v350;
-        const V v398 = 1.0 / v397;
-        const V v399 = v332 * v385;
-        const V v400 = v399 + v389;
-        const V v401 = v333 * v385;
-        const V v402 = v401 + v393;
-        const V v403 = v331 * v385;
-        const V v404 = v403 + v392;
-        const V v405 = v334 * v385;
-        const V v406 = v405 + v388;
-        const V v407 = v369 * v396;
-        const V v408 = v384 - v407;
-        const V v409 = 1.0 - v398;
-        const V v410 = v1 * v409;
-        const V v411 = v350 * v410;
-        const V v412 = v411 + v408;
-        const V v413 = v340 * v410;
-        const V v414 = v368 * v396;
-        const V v415 = v413 - v414;
-        const V v416 = v366 * v415;
-        const V v417 = v371 * v412;
-        const V v418 = v333 * v416;
-        const V v419 = v404 - v418;
-        const V v420 = v332 * v416;
-        const V v421 = v406 - v420;
-        const V v422 = v332 * v419;
-        const V v423 = v333 * v421;
-        const V v424 = v334 * v419;
-        const V v425 = v334 * v416;
-        const V v426 = v400 + v425;
-        const V v427 = v331 * v416;
-        const V v428 = v402 + v427;
-        const V v429 = v334 * v428;
-        const V v430 = v423 + v429;
-        const V v431 = v331 * v426;
-        const V v432 = v422 + v431;
-        const V v433 = v333 * v426;
-        const V v434 = v424 + v433;
-        const V v435 = v367 * v417;
-        const V v436 = v367 * v432;
-        const V v437 = v367 * v430;
-        const V v438 = v367 * v434;
-        softehl_store4(R + 7 * q + 2, (7 * points), v349, v436, v437, v435);
-        softehl_store1(R + 7 * q + 6, (7 * points), v438);
+        const V v146 = v136 * v142, v147 = v135 * v142, v148 = v137 * v142, v149 = v138 * v142,
+            v150 = v139 * v142, v151 = v150 * v150, v152 = v146 * v146 + v148 * v148,
+            v153 = v146 * v149 - v147 * v148, v154 = v146 * v147 + v148 * v149,
+            v155 = v147 * v147 + v149 * v149, v156 = v150 * v153, v157 = v153 * v153,
+            v158 = softehl_vrcbrt(v151), v159 = v158 * v158, v160 = v151 * v159,
+            v161 = softehl_vrcbrt(v157), v162 = v161 * v161, v163 = v157 * v162,
+            v164 = 1.0 / (v160 * v163), v165 = v152 * v164, v166 = v154 * v164, v167 = v155 * v164,
+            v168 = v151 * v164;
+        V v169[6];
+        softehl_solid_taylor_mean_ogden_isochoric_of_stress_1_lanes(softehl_mask(1), (const V[]){v165, v167, v168, v166, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v28), softehl_splat(v29), softehl_splat(v30), softehl_splat(v31), softehl_splat(v33), softehl_splat(v34)}, v169, &failed);
+        const V v170 = 1.0 / v156, v171 = v169[0], v172 = v169[1], v173 = v169[2], v174 = v169[3],
+            v175 = v164 * v171, v176 = v164 * v172, v177 = v164 * v174,
+            v178 = v164 * v164 * (v151 * v173 + (v154 * v174 + (v155 * v172 + v152 * v171))),
+            v179 = v1 * (1.0 - 1.0 / (v151 * v157)),
+            v180 = v157 * v179 + (v164 * v173 - 0.3333333333333333 * v159 * v163 * v178),
+            v181 = 2.0 * v153 * (v151 * v179 - 0.3333333333333333 * v160 * v162 * v178),
+            v182 = v146 * v177 + 2.0 * v147 * v176 - v148 * v181,
+            v183 = v147 * v177 + 2.0 * v146 * v175 + v149 * v181,
+            v184 = v148 * (v149 * v177 + 2.0 * v148 * v175 - v147 * v181) + v149 * (v148 * v177 + 2.0 * v149 * v176 + v146 * v181),
+            v185 = v170 * (v150 * (2.0 * v150) * v180), v186 = v170 * (v147 * v182 + v146 * v183),
+            v187 = v170 * v184, v188 = v170 * (v149 * v182 + v148 * v183);
+        softehl_store4(R + 7 * q + 2, (7 * points), v156, v186, v187, v185);
+        softehl_store1(R + 7 * q + 6, (7 * points), v188);
     }
     if (softehl_any(failed)) {
         softehl_spoil(failed, R, (7 * points));
     }
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_ogden_fields, 8, 8, 0, 0, (7 * points), 0)
 
-void softehl_solid_taylor_mean_ogden_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_ogden_pseudo_load)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_ogden_fields_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + (7 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_ogden_fields_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (7 * points) * (n - SOFTEHL_LANES), 0);
-        return;
+    SOFTEHL_IDLE;
+    M failed = softehl_mask(0);
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11, t12, t13, t14;
+    softehl_load4(t + 0, 15, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 15, &t4, &t5, &t6, &t7);
+    softehl_load4(t + 8, 15, &t8, &t9, &t10, &t11); softehl_load3(t + 12, 15, &t12, &t13, &t14);
+    const double v1 = 0.5 * parameters[1], v2 = 1.0 / parameters[1], v3 = 0.5 * parameters[3],
+        v4 = 1.0 / parameters[3], v5 = 0.5 * parameters[5], v6 = 1.0 / parameters[5],
+        v7 = 0.5 * parameters[6], v8 = 1.5707963267948966 * parameters[6];
+    const V v9 = X0 - X2, v10 = X4 - X2, v11 = X4 - X6, v12 = X6 + (X4 - X0 - X2), v13 = X1 - X3,
+        v14 = X1 + X3, v15 = v9 + v11, v16 = 0.25 * v12, v17 = 0.0625 * v12, v18 = v11 - v9,
+        v19 = t9 * (v2 * v2), v20 = 0.5 * t9, v21 = 0.25 * v18, v22 = 0.0625 * v18,
+        v23 = t11 * (v4 * v4), v24 = 0.5 * t11, v25 = t13 * (v6 * v6), v26 = 0.5 * t13,
+        v27 = X5 - X3, v28 = X5 - X7, v29 = X5 + X7, v30 = d0 - d2, v31 = v13 + v28,
+        v32 = v14 + v29, v33 = d1 + d3, v34 = d1 - d3, v35 = v28 - v13, v36 = v29 - v14,
+        v37 = 0.25 * v32, v38 = 0.25 * v35, v39 = 0.0625 * v35, v40 = 0.25 * v36,
+        v41 = 0.0625 * v36, v42 = 1.0 / v37, v43 = 1.0 / (v37 * v37), v44 = v15 * v39,
+        v45 = v15 * v41, v46 = d0 + d2 - d4 - d6, v47 = d4 - d6, v48 = d5 + d7, v49 = d5 - d7,
+        v50 = v30 - v47, v51 = v30 + v47, v52 = v33 - v48, v53 = v33 + v48, v54 = t0 - t2,
+        v55 = t1 - t3, v56 = t1 + t3, v57 = v34 - v49, v58 = v34 + v49, v59 = 0.25 * v42,
+        v60 = t4 - t2, v61 = t4 - t6, v62 = v54 + v61, v63 = t6 + v60 - t0, v64 = t5 - t3,
+        v65 = v61 - v54, v66 = t5 - t7, v67 = t5 + t7, v68 = 0.25 * v63, v69 = 0.0625 * v63,
+        v70 = 0.25 * v65, v71 = 0.0625 * v65, v72 = v66 - v55, v73 = v67 - v56,
+        v74 = 0.25 * (v56 + v67), v75 = 0.25 * v72, v76 = 0.0625 * v72, v77 = 0.25 * v73,
+        v78 = 0.0625 * v73, v79 = v74 * (v42 * v42), v80 = v74 * (v43 * (0.5 * v32)),
+        v81 = 1.0 / (v21 * v40 - v38 * v16), v82 = v39 * v81, v83 = v41 * v81,
+        v84 = (v21 * v77 + (v40 * v70 - v38 * v68 - v16 * v75)) * (v81 * v81),
+        v85 = v81 * v76 - v39 * v84, v86 = v81 * v78 - v41 * v84,
+        v87 = v81 * (v55 + v66) - v31 * v84, v88 = v31 * v81, v89 = v81 * v44,
+        v90 = v81 * (v39 * v62 + v15 * v76) - v44 * v84, v91 = v81 * v45, v92 = v81 * v17,
+        v93 = v22 * v81, v94 = v81 * v69 - v17 * v84, v95 = v17 * v88, v96 = v22 * v88,
+        v97 = v88 * v69 + v17 * v87, v98 = 0.25 * v89, v99 = 0.25 * v91,
+        v100 = v88 * v71 + v22 * v87, v101 = v91 - v95, v102 = 0.25 * v95, v103 = v99 - v102,
+        v104 = 0.25 * v96, v105 = v81 * v71 - v22 * v84,
+        v106 = v81 * (v41 * v62 + v15 * v78) - v45 * v84, v107 = v96 - v89,
+        v108 = v50 * v92 - v46 * v93, v109 = 1.0 + v57 * v92 - v52 * v93,
+        v110 = v52 * v82 - v57 * v83, v111 = 1.0 + v46 * v82 - v50 * v83, v112 = v104 - v98,
+        v113 = v50 * v94 - v46 * v105, v114 = v57 * v94 - v52 * v105, v115 = v46 * v85 - v50 * v86,
+        v116 = v52 * v85 - v57 * v86, v117 = v106 - v97, v118 = v100 - v90;
+    V s119 = {0}, s120 = {0}, s121 = {0}, s122 = {0}, s123 = {0}, s124 = {0}, s125 = {0},
+        s126 = {0}, s127 = {0}, s128 = {0}, s129 = {0}, s130 = {0}, s131 = {0}, s132 = {0},
+        s133 = {0}, s134 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v135 = 1.0 - w[1], v136 = 1.0 + w[1], v137 = 0.25 * w[1], v138 = 1.0 - w[0],
+            v139 = 1.0 + w[0], v140 = 0.25 * v135, v141 = 0.25 * v136, v142 = 0.25 * w[0],
+            v143 = 0.25 - v137, v144 = 0.25 + v137, v145 = 0.25 + v142, v146 = 0.25 - v142,
+            v147 = v140 * v138, v148 = v140 * v139, v149 = v139 * v141, v150 = v138 * v141,
+            v151 = v137 - 0.25;
+        const V v152 = X2 * v143; const double v153 = v142 - 0.25;
+        const V v154 = v144 * v28, v155 = X6 * v146, v156 = v145 * v27, v157 = X5 * v149,
+            v158 = v149 * t5, v159 = v144 * v11, v160 = v152 + v159, v161 = v143 * t2,
+            v162 = v146 * t6, v163 = v145 * v10, v164 = v155 + v163, v165 = v144 * v66,
+            v166 = v144 * v61, v167 = v161 + v166, v168 = v145 * v64, v169 = v145 * v60,
+            v170 = v162 + v169, v171 = X0 * v151, v172 = v171 + v160, v173 = X0 * v153,
+            v174 = v173 + v164, v175 = X3 * v143, v176 = v175 + v154, v177 = X3 * v148,
+            v178 = v143 * t3, v179 = v178 + v165, v180 = v148 * t3, v181 = v151 * t0,
+            v182 = v181 + v167, v183 = v153 * t0, v184 = v183 + v170, v185 = X7 * v146,
+            v186 = v185 + v156, v187 = X7 * v150, v188 = v146 * t7, v189 = v188 + v168,
+            v190 = v150 * t7, v191 = X1 * v151, v192 = v191 + v176, v193 = v151 * t1,
+            v194 = v193 + v179, v195 = X1 * v153, v196 = v195 + v186, v197 = v153 * t1,
+            v198 = v197 + v189, v199 = X1 * v147, v200 = v199 + (v187 + (v157 + v177)),
+            v201 = v147 * t1, v202 = v201 + (v190 + (v158 + v180)), v203 = v196 * v172,
+            v204 = w[0] * v172 - w[1] * v174;
+        const double v205 = w[1] * w[2];
+        const V v206 = v174 * v192, v207 = v203 - v206, v208 = w[1] * v196 - w[0] * v192,
+            v209 = w[2] * v200, v210 = v196 * v182 + v172 * v198 - v192 * v184 - v174 * v194,
+            v211 = w[2] * v202, v212 = 0.25 * v207, v213 = v207 * v200, v214 = v208 * v209;
+        s125 += v214; const V v215 = v204 * v209; s126 += v215;
+        const V v216 = v207 * v202 + v200 * v210, v217 = 0.25 * v210;
+        s134 += (w[0] * v182 - w[1] * v184) * v209; s134 += v204 * v211;
+        s133 += v209 * (w[1] * v198 - w[0] * v194); s133 += v208 * v211; const V v218 = w[2] * v212;
+        s119 += v218; const V v219 = v205 * v212; s121 += v219; const V v220 = w[2] * v213;
+        s122 += v220; const V v221 = v205 * v213; s124 += v221; const V v222 = w[0] * v218;
+        s120 += v222; const V v223 = w[2] * v217; s127 += v223; const V v224 = v205 * v217;
+        s129 += v224; const V v225 = w[2] * v216; s130 += v225; const V v226 = v205 * v216;
+        s132 += v226; const V v227 = w[0] * v220; s123 += v227; const V v228 = w[0] * v223;
+        s128 += v228; const V v229 = w[0] * v225; s131 += v229;
     }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * (7 * points)];
-    softehl_solid_taylor_mean_ogden_fields(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (7 * points) * n; ++i) values[i] = R[i];
-#endif
+    const V v230 = 1.0 / s122, v231 = v8 * s122, v232 = v230 * v230 * s130,
+        v233 = v230 * s133 - s125 * v232, v234 = v230 * s125, v235 = 0.25 * v234,
+        v236 = s123 * v230, v237 = v230 * s124, v238 = v230 * s126,
+        v239 = v230 * s134 - s126 * v232, v240 = s119 * v230, v241 = s120 * v230,
+        v242 = s121 * v230, v243 = 0.25 * v238, v244 = v102 * v238, v245 = v102 * v234,
+        v246 = v104 * v234, v247 = v104 * v238, v248 = v98 * v234, v249 = v98 * v238,
+        v250 = v99 * v234, v251 = v99 * v238, v252 = v250 - v245, v253 = v246 - v248,
+        v254 = v247 - v249, v255 = 0.25 * v233, v256 = v234 * v90 + v89 * v233,
+        v257 = v234 * v106 + v91 * v233, v258 = v238 * v106 + v91 * v239, v259 = 0.25 * v239,
+        v260 = v238 * v90 + v89 * v239, v261 = v251 - v244, v262 = s123 * v232 - v230 * s131,
+        v263 = s124 * v232 - v230 * s132, v264 = v38 * v262, v265 = v40 * v263,
+        v266 = v21 * v262 - v16 * v263, v267 = v95 * v233 + v234 * v97,
+        v268 = v96 * v233 + v234 * v100, v269 = v95 * v239 + v238 * v97,
+        v270 = v96 * v239 + v238 * v100, v271 = 0.25 * (v257 - v267), v272 = 0.25 * (v258 - v269),
+        v273 = 0.25 * (v270 - v260), v274 = 0.25 * (v268 - v256), v275 = v230 * s127 - s119 * v232,
+        v276 = v230 * s128 - s120 * v232, v277 = v230 * s129 - s121 * v232,
+        v278 = v276 + v59 * v262, v279 = v277 + v59 * v263,
+        v280 = v46 * v253 + (v51 * v235 + (v111 + v50 * v252)),
+        v281 = v52 * v253 + (v58 * v235 + (v110 + v57 * v252)),
+        v282 = v46 * v273 + (v51 * v259 + (v113 + v50 * v272)),
+        v283 = v52 * v273 + (v58 * v259 + (v114 + v57 * v272)),
+        v284 = v52 * v254 + (v58 * v243 + (v109 + v57 * v261)),
+        v285 = v46 * v254 + (v51 * v243 + (v108 + v50 * v261)),
+        v286 = v46 * v274 + (v51 * v255 + (v115 + v50 * v271)),
+        v287 = v52 * v274 + (v58 * v255 + (v116 + v57 * v271)),
+        v288 = 1.0 + v53 * v240 - v57 * v241 - v52 * v242,
+        v289 = v53 * v275 - v57 * v276 - v52 * v277, v290 = 2.0 * v288, v291 = v288 * v288,
+        v292 = v280 * v284 - v281 * v285, v293 = 2.0 * v292, v294 = v292 * v292, v295 = v289 * v290,
+        v296 = v280 * v283 + v284 * v286 - v285 * v287 - v281 * v282, v297 = 1.0 / (v291 * v294),
+        v298 = v293 * v296, v299 = v231 * v297,
+        v300 = 3.141592653589793 * (t14 * (0.5 * s122) + v7 * s130) * (1.0 - v297),
+        v301 = (v294 * v295 + v291 * v298) * (v297 * v299) + v300, v302 = v231 - v299,
+        v303 = v294 * v302, v304 = v291 * v302, v305 = v293 * v304,
+        v306 = v293 * (v295 * v302 + v291 * v301) + v296 * (2.0 * v304), v307 = v290 * v303,
+        v308 = v290 * (v298 * v302 + v294 * v301) + v289 * (2.0 * v303),
+        v309 = v287 * v305 + v281 * v306, v310 = v281 * v305, v311 = v282 * v305 + v285 * v306,
+        v312 = v285 * v305, v313 = v276 * v307, v314 = v277 * v307,
+        v315 = v275 * v307 + v240 * v308, v316 = v241 * v308, v317 = v242 * v308,
+        v318 = (v248 - v246) * v311, v319 = (v245 - v250) * v311, v320 = v235 * v311,
+        v321 = (v249 - v247) * v309, v322 = (v244 - v251) * v309, v323 = v243 * v309,
+        v324 = v255 * v312, v325 = v259 * v310, v326 = v284 * v305,
+        v327 = 0.25 * (v260 - v270) * v310 + v274 * v326,
+        v328 = 0.25 * (v269 - v258) * v310 + v271 * v326, v329 = v283 * v305 + v284 * v306,
+        v330 = v286 * v305 + v280 * v306, v331 = v280 * v305, v332 = v259 * v331 + v243 * v330,
+        v333 = 0.25 * (v256 - v268) * v312 + v273 * v331,
+        v334 = 0.25 * (v267 - v257) * v312 + v272 * v331, v335 = v255 * v326 + v235 * v329,
+        v336 = v254 * v330, v337 = v261 * v330, v338 = v253 * v329, v339 = v252 * v329;
+    V s340 = {0}, s341 = {0}, s342 = {0}, s343 = {0}, s344 = {0}, s345 = {0}, s346 = {0},
+        s347 = {0}, s348 = {0}, s349 = {0}, s350 = {0}, s351 = {0}, s352 = {0}, s353 = {0},
+        s354 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 3 * q; (void)w;
+        const V v355 = w[0] - v236, v356 = w[1] - v237, v357 = v38 * v355, v358 = 0.25 * v355,
+            v359 = v40 * v356, v360 = 0.25 * v356, v361 = v21 * v355 - v16 * v356,
+            v362 = v241 + v42 * v358, v363 = v242 + v42 * v360, v364 = v238 + v81 * v361,
+            v365 = v359 - v357, v366 = v234 + v81 * v365, v367 = 0.25 * (v359 + v357),
+            v368 = 0.25 * v364, v369 = v240 - v43 * v367, v370 = v112 * v364, v371 = v103 * v364,
+            v372 = v112 * v366, v373 = v103 * v366, v374 = 0.25 * v366,
+            v375 = v53 * v369 + (1.0 - v57 * v362 - v52 * v363),
+            v376 = v58 * v368 + (v57 * v371 + (v109 + v52 * v370)),
+            v377 = v51 * v368 + (v50 * v371 + (v108 + v46 * v370)), v378 = v375 * v375,
+            v379 = v50 * v373 + (v51 * v374 + (v111 + v46 * v372)),
+            v380 = v57 * v373 + (v58 * v374 + (v110 + v52 * v372)),
+            v381 = v376 * v376 + v377 * v377, v382 = v376 * v380 + v377 * v379,
+            v383 = v376 * v379 - v377 * v380, v384 = v379 * v379 + v380 * v380, v385 = v383 * v383,
+            v386 = softehl_vrcbrt(v378), v387 = v386 * v386, v388 = v378 * v387,
+            v389 = softehl_vrcbrt(v385), v390 = v389 * v389, v391 = v385 * v390,
+            v392 = 1.0 / (v388 * v391), v393 = v384 * v392, v394 = v382 * v392, v395 = v381 * v392,
+            v396 = v378 * v392;
+        V v397[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v397, &failed);
+        const double v398 = 6.283185307179586 * w[2], v399 = 1.0 - w[0], v400 = 1.0 + w[0],
+            v401 = 0.25 * w[0], v402 = 1.0 - w[1], v403 = 1.0 + w[1], v404 = 0.25 * w[1];
+        const V v405 = 2.0 * v383;
+        const double v406 = 0.25 * v402, v407 = 0.25 * v403, v408 = 0.25 + v401, v409 = 0.25 - v401,
+            v410 = 0.25 - v404, v411 = 0.25 + v404;
+        const V v412 = 0.3333333333333333 * v390;
+        const double v413 = v401 - 0.25, v414 = v406 * v399, v415 = v406 * v400, v416 = v400 * v407,
+            v417 = v399 * v407, v418 = v404 - 0.25;
+        const V v419 = X2 * v410, v420 = X6 * v409, v421 = X3 * v410, v422 = X3 * v415,
+            v423 = X7 * v409, v424 = X7 * v417, v425 = v411 * v11, v426 = v419 + v425,
+            v427 = v411 * v28, v428 = v421 + v427, v429 = v408 * v10, v430 = v420 + v429,
+            v431 = v408 * v27, v432 = v423 + v431, v433 = X5 * v416, v434 = 2.0 * v379,
+            v435 = X0 * v418, v436 = v435 + v426, v437 = X0 * v413, v438 = v437 + v430,
+            v439 = X1 * v418, v440 = v439 + v428, v441 = X1 * v413, v442 = v441 + v432,
+            v443 = X1 * v414, v444 = v443 + (v433 + (v424 + v422)), v445 = v442 * v436,
+            v446 = 2.0 * v380, v447 = 2.0 * v377, v448 = v438 * v440, v449 = v445 - v448,
+            v450 = v449 * v444, v451 = 2.0 * v376, v452 = v397[0], v453 = v397[1], v454 = v397[2],
+            v455 = v397[3], v456 = v392 * v392, v457 = v398 * v450, v458 = v452 * v457,
+            v459 = v453 * v457, v460 = v454 * v457, v461 = v455 * v457, v462 = v392 * v459,
+            v463 = v392 * v461, v464 = v392 * v458,
+            v465 = v378 * v460 + v381 * v459 + v382 * v461 + v384 * v458, v466 = v456 * v465,
+            v467 = v388 * v466, v468 = v412 * v467, v469 = v405 * v468,
+            v470 = v434 * v464 - v376 * v469 + v377 * v463;
+        s343 += v470; const V v471 = v446 * v464 + v376 * v463 + v377 * v469; s341 += v471;
+        const V v472 = v447 * v462 + v379 * v463 + v380 * v469; s342 += v472;
+        const V v473 = v451 * v462 + v380 * v463 - v379 * v469; s340 += v473; V v474[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_1_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v474, &failed);
+        const V v475 = v474[2]; V v476[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_0_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v476, &failed);
+        const V v477 = v476[2]; V v478[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_2_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v478, &failed);
+        const V v479 = v478[2]; V v480[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_3_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v480, &failed);
+        const V v481 = v480[2]; V v482[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_5_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v482, &failed);
+        const V v483 = v482[2],
+            v484 = v24 * v483 + (v20 * v481 + (t12 * v479 + (t8 * v477 + t10 * v475)));
+        V v485[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_7_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v485, &failed);
+        const V v486 = v485[2]; V v487[21];
+        softehl_solid_taylor_mean_ogden_isochoric_1_2_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v487, &failed);
+        const V v488 = 2.0 * v375, v489 = 0.3333333333333333 * v387, v490 = v356 * v77 + v265,
+            v491 = v355 * v75 + v264, v492 = v278 - v79 * v358, v493 = v279 - v79 * v360,
+            v494 = v239 - v361 * v84 + v81 * (v355 * v70 + (v266 - v356 * v68)),
+            v495 = v81 * (v490 - v491) + (v233 - v365 * v84), v496 = 0.25 * v494, v497 = v487[2],
+            v498 = v487[7], v499 = v487[11], v500 = v487[12],
+            v501 = v275 + v43 * (v80 * v367 - 0.25 * (v490 + v491)), v502 = 0.25 * v495,
+            v503 = 0.25 * (v364 * v118 + v107 * v494), v504 = 0.25 * (v364 * v117 + v101 * v494),
+            v505 = 0.25 * (v366 * v118 + v107 * v495), v506 = 0.25 * (v366 * v117 + v101 * v495),
+            v507 = v53 * v501 - v52 * v493 - v57 * v492, v508 = v488 * v507,
+            v509 = v114 + v58 * v496 + v52 * v503 + v57 * v504,
+            v510 = v113 + v51 * v496 + v46 * v503 + v50 * v504,
+            v511 = v115 + v51 * v502 + v46 * v505 + v50 * v506,
+            v512 = v116 + v58 * v502 + v52 * v505 + v57 * v506, v513 = v489 * v508,
+            v514 = v451 * v509 + v447 * v510, v515 = v434 * v511 + v446 * v512,
+            v516 = v379 * v509 - v380 * v510 + v376 * v511 - v377 * v512,
+            v517 = v379 * v510 + v380 * v509 + v376 * v512 + v377 * v511, v518 = v405 * v516,
+            v519 = v412 * v518, v520 = v456 * (v391 * v513 + v388 * v519),
+            v521 = v392 * v515 - v384 * v520, v522 = v392 * v517 - v382 * v520,
+            v523 = v392 * v514 - v381 * v520, v524 = v392 * v508 - v378 * v520,
+            v525 = v26 * v486 + v484 + v497 * v521 + v498 * v523 + v499 * v524 + v500 * v522;
+        V v526[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_4_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v526, &failed);
+        const V v527 = v526[2]; V v528[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_6_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v528, &failed);
+        const V v529 = v528[2]; V v530[6];
+        softehl_solid_taylor_mean_ogden_isochoric_1_by_8_lanes(softehl_mask(1), (const V[]){v393, v395, v396, v394, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(parameters[0]), softehl_splat(parameters[2]), softehl_splat(parameters[4]), softehl_splat(v1), softehl_splat(v2), softehl_splat(v3), softehl_splat(v4), softehl_splat(v5), softehl_splat(v6)}, v530, &failed);
+        const V v531 = v416 * t5, v532 = 2.0 * v462, v533 = 2.0 * v464, v534 = v414 * t1,
+            v535 = v487[0], v536 = v487[1], v537 = v487[3], v538 = v487[6], v539 = v487[8],
+            v540 = v487[15], v541 = v417 * t7, v542 = v409 * t7, v543 = v409 * t6, v544 = v415 * t3,
+            v545 = v544 + (v541 + (v534 + v531)), v546 = v410 * t3, v547 = v410 * t2,
+            v548 = v408 * v60, v549 = v543 + v548, v550 = v408 * v64, v551 = v542 + v550,
+            v552 = v411 * v66, v553 = v546 + v552, v554 = v411 * v61, v555 = v547 + v554,
+            v556 = v476[0], v557 = v476[1], v558 = v476[3], v559 = v474[0], v560 = v474[1],
+            v561 = v474[3], v562 = v478[0], v563 = v478[1], v564 = v478[3], v565 = v480[0],
+            v566 = v480[1], v567 = v480[3],
+            v568 = t10 * v559 + (t8 * v556 + (v537 * v522 + (v535 * v521 + v536 * v523))),
+            v569 = t10 * v560 + (t8 * v557 + (v539 * v522 + (v536 * v521 + v538 * v523))),
+            v570 = t10 * v561 + (t8 * v558 + (v540 * v522 + (v537 * v521 + v539 * v523))),
+            v571 = v526[0], v572 = v526[1], v573 = v526[3], v574 = v482[0], v575 = v482[1],
+            v576 = v482[3], v577 = v528[0], v578 = v528[1], v579 = v528[3], v580 = v485[0],
+            v581 = v485[1], v582 = v485[3], v583 = v530[0], v584 = v530[1], v585 = v530[2],
+            v586 = v530[3],
+            v587 = v24 * v574 + (v20 * v565 + (t12 * v562 + v568) - v19 * v571) - v23 * v577,
+            v588 = v24 * v575 + (v20 * v566 + (t12 * v563 + v569) - v19 * v572) - v23 * v578,
+            v589 = v24 * v576 + (v20 * v567 + (t12 * v564 + v570) - v19 * v573) - v23 * v579,
+            v590 = v418 * t0, v591 = v590 + v555, v592 = v418 * t1, v593 = v592 + v553,
+            v594 = v413 * t0, v595 = v594 + v549, v596 = v413 * t1, v597 = v596 + v551,
+            v598 = v442 * v591 + v436 * v597 - v440 * v595 - v438 * v593,
+            v599 = v449 * v545 + v444 * v598, v600 = v398 * v599, v601 = v391 * v466,
+            v602 = v457 * (v497 * v524 + (v26 * v580 + v587 - v25 * v583)) + v452 * v600,
+            v603 = v457 * (v498 * v524 + (v26 * v581 + v588 - v25 * v584)) + v453 * v600,
+            v604 = (v525 - v19 * v527 - v23 * v529 - v25 * v585) * v457 + v454 * v600,
+            v605 = v457 * (v500 * v524 + (v26 * v582 + v589 - v25 * v586)) + v455 * v600,
+            v606 = v392 * v460 - v489 * v601, v607 = v488 * v606,
+            v608 = v508 * v460 + (v515 * v458 + (v514 * v459 + v517 * v461)) + v378 * v604,
+            v609 = v508 * (v387 * (v387 * (0.2222222222222222 * v386)) * v601) + v392 * v604,
+            v610 = v392 * v602 - v520 * v458, v611 = v392 * v603 - v520 * v459,
+            v612 = v392 * v605 - v520 * v461,
+            v613 = v456 * (v608 + v381 * v603 + v382 * v605 + v384 * v602) - v520 * (2.0 * v392 * v465);
+        s351 += v503 * v473; s351 -= v493 * v607; s350 += v504 * v473; s350 -= v492 * v607;
+        const V v614 = v412 * (v513 * v466 + v388 * v613) - v518 * (v390 * (v390 * (0.2222222222222222 * v389)) * v467),
+            v615 = v507 * (2.0 * v606) + v488 * (v609 - v520 * v460 - v489 * (v519 * v466 + v391 * v613)),
+            v616 = v516 * (2.0 * v468) + v405 * v614,
+            v617 = v512 * v463 + (v509 * v532 + (v451 * v611 + v380 * v612)) - v511 * v469,
+            v618 = v512 * v469 + (v511 * v463 + (v510 * v532 + (v447 * v611 + v379 * v612))),
+            v619 = v512 * v533 + (v510 * v469 + (v509 * v463 + (v446 * v610 + v376 * v612))),
+            v620 = v511 * v533 + (v510 * v463 + (v434 * v610 + v377 * v612 - v509 * v469)),
+            v621 = v618 + v380 * v616;
+        s347 += v621; const V v622 = v619 + v377 * v616; s346 += v622;
+        const V v623 = v620 - v376 * v616; s348 += v623; const V v624 = v617 - v379 * v616;
+        s345 += v624; s350 -= v362 * v615; s351 -= v363 * v615; s344 += v501 * v607;
+        s344 += v369 * v615; s349 += v496 * v473; s349 += v502 * v471; s352 += v496 * v472;
+        s352 += v502 * v470; s351 += v505 * v471; s354 += v503 * v472; s354 += v505 * v470;
+        s350 += v506 * v471; s353 += v504 * v472; s353 += v506 * v470; s349 += v368 * v624;
+        s352 += v368 * v621; s351 += v370 * v624; s354 += v370 * v621; s350 += v371 * v624;
+        s353 += v371 * v621; s351 += v372 * v622; s354 += v372 * v623; s349 += v374 * v622;
+        s352 += v374 * v623; s350 += v373 * v622; s353 += v373 * v623;
+    }
+    const V v625 = v326 + s343, v626 = v331 + s340, v627 = s341 - v312, v628 = s342 - v310,
+        v629 = v329 + s348, v630 = v330 + s345, v631 = s344 + v315, v632 = s346 - v311,
+        v633 = s347 - v309, v634 = v332 + (s349 - v324 - v320), v635 = v335 + (s352 - v325),
+        v636 = v631 - v634, v637 = v631 + v634,
+        v638 = v333 + (s351 + (v318 + (v336 - v314 - v317)) - v105 * v626) - v93 * v630,
+        v639 = v92 * v630 + (v334 + (v94 * v626 + (s350 + (v319 + (v337 - v313 - v316))))),
+        v640 = v635 - v323,
+        v641 = v85 * v625 + (v327 + (s354 + (v321 + v338)) - v105 * v628 - v93 * v633),
+        v642 = v92 * v633 + (v94 * v628 + (v328 + (s353 + (v322 + v339)))) - v86 * v625,
+        v643 = v82 * v632 + (v85 * v627 + v638), v644 = v82 * v629 + v641, v645 = v642 - v83 * v629,
+        v646 = v639 - v86 * v627 - v83 * v632, v647 = v643 + v646, v648 = v644 + v645,
+        v649 = v645 - v644, v650 = v646 - v643, v651 = v640 + v648, v652 = v640 - v648,
+        v653 = v637 + v647, v654 = v637 - v647, v655 = v323 - v635 - v649, v656 = v636 - v650;
+    softehl_store4(R + 0, 8, v651, v653, v655, v656);
+    const V v657 = v636 + v650, v658 = v649 - v640;
+    softehl_store4(R + 4, 8, v652, v654, v658, v657);
+    if (softehl_any(failed)) {
+        softehl_spoil(failed, R, 8);
+    }
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_ogden_pseudo_load, 8, 8, 0, 15, 8, 0)

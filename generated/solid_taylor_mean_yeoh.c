@@ -24,3103 +24,628 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_solid_taylor_mean_yeoh_energy_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_yeoh_energy)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
     const double v1 = 0.5 * parameters[3];
-    const V v2 = X4 - X0;
-    const V v3 = X0 - X2;
-    const V v4 = X4 - X2;
-    const V v5 = v2 - X2;
-    const V v6 = X4 - X6;
-    const V v7 = X6 + v5;
-    const V v8 = X1 - X3;
-    const V v9 = X1 + X3;
-    const V v10 = v3 + v6;
-    const V v11 = X5 - X3;
-    const V v12 = v6 - v3;
-    const V v13 = 0.25 * v7;
-    const V v14 = 0.25 * v10;
-    const V v15 = X5 - X7;
-    const V v16 = X5 + X7;
-    const V v17 = 0.25 * v12;
-    const V v18 = v8 + v15;
-    const V v19 = v12 - v7;
-    const V v20 = v7 - v12;
-    const V v21 = v12 + v7;
-    const V v22 = v15 - v8;
-    const V v23 = 0.25 * v18;
-    const V v24 = 0.0625 * v19;
-    const V v25 = 0.0625 * v20;
-    const V v26 = 0.0625 * v21;
-    const V v27 = 0.25 * v22;
-    const V v28 = v9 + v16;
-    const V v29 = v16 - v9;
-    const V v30 = 0.25 * v28;
-    const V v31 = v22 - v29;
-    const V v32 = 0.25 * v29;
-    const V v33 = v22 + v29;
-    const V v34 = v29 - v22;
-    const V v35 = v17 * v32;
-    const V v36 = 0.0625 * v31;
-    const V v37 = 0.0625 * v33;
-    const V v38 = 0.0625 * v34;
-    const V v39 = 1.0 / v30;
-    const V v40 = v30 * v30;
-    const V v41 = v27 * v13;
-    const V v42 = v35 - v41;
-    const V v43 = 1.0 / v40;
-    const V v44 = 1.0 / v42;
-    const V v45 = 0.25 * v39;
-    const V v46 = 0.25 * v43;
-    const V v47 = v36 * v44;
-    const V v48 = v25 * v44;
-    const V v49 = v37 * v44;
-    const V v50 = v26 * v44;
-    const V v51 = v38 * v44;
-    const V v52 = v24 * v44;
-    const V v53 = v23 * v50;
-    const V v54 = v14 * v49;
-    const V v55 = v53 - v54;
-    const V v56 = v55 - 0.25;
-    const V v57 = (-0.25) - v55;
-    const V v58 = v23 * v48;
-    const V v59 = 0.25 - v58;
-    const V v60 = v14 * v47;
-    const V v61 = v59 - v60;
-    const V v62 = v23 * v52;
-    const V v63 = 0.25 - v62;
-    const V v64 = v14 * v51;
-    const V v65 = v63 - v64;
-    V s66 = softehl_splat(0.0);
-    V s67 = softehl_splat(0.0);
-    V s68 = softehl_splat(0.0);
-    V s69 = softehl_splat(0.0);
-    V s70 = softehl_splat(0.0);
-    V s71 = softehl_splat(0.0);
-    V s72 = softehl_splat(0.0);
-    V s73 = softehl_splat(0.0);
+    const V v2 = X0 - X2, v3 = X4 - X2, v4 = X4 - X6, v5 = X6 + (X4 - X0 - X2), v6 = X1 - X3,
+        v7 = X1 + X3, v8 = X5 - X3, v9 = v4 - v2, v10 = 0.25 * v5, v11 = 0.25 * (v2 + v4),
+        v12 = X5 - X7, v13 = X5 + X7, v14 = 0.25 * v9, v15 = v12 - v6, v16 = 0.25 * (v6 + v12),
+        v17 = 0.25 * v15, v18 = v13 - v7, v19 = 0.25 * (v7 + v13), v20 = 0.25 * v18,
+        v21 = 1.0 / (v14 * v20 - v17 * v10), v22 = 0.25 * (1.0 / v19),
+        v23 = 0.25 * (1.0 / (v19 * v19)), v24 = 0.0625 * (v15 - v18) * v21,
+        v25 = 0.0625 * (v5 - v9) * v21, v26 = 0.0625 * (v15 + v18) * v21,
+        v27 = 0.0625 * (v9 + v5) * v21, v28 = 0.0625 * (v18 - v15) * v21,
+        v29 = 0.0625 * (v9 - v5) * v21, v30 = v16 * v27 - v11 * v26, v31 = v30 - 0.25,
+        v32 = (-0.25) - v30, v33 = 0.25 - v16 * v25 - v11 * v24, v34 = 0.25 - v16 * v29 - v11 * v28;
+    V s35 = {0}, s36 = {0}, s37 = {0}, s38 = {0}, s39 = {0}, s40 = {0}, s41 = {0}, s42 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v74 = 1.0 - w[1];
-        const double v75 = 1.0 + w[1];
-        const double v76 = 0.25 * w[1];
-        const double v77 = 1.0 - w[0];
-        const double v78 = 1.0 + w[0];
-        const double v79 = 0.25 * w[0];
-        const double v80 = 0.25 * v75;
-        const double v81 = 0.25 - v76;
-        const double v82 = 0.25 + v76;
-        const double v83 = 0.25 + v79;
-        const double v84 = 0.25 - v79;
-        const V v85 = X5 * v78;
-        const double v86 = v76 - 0.25;
-        const V v87 = X3 * v78;
-        const V v88 = X3 * v81;
-        const V v89 = X2 * v81;
-        const double v90 = v79 - 0.25;
-        const V v91 = X6 * v84;
-        const V v92 = X7 * v84;
-        const V v93 = X7 * v77;
-        const V v94 = v85 + v93;
-        const V v95 = X1 * v77;
-        const V v96 = v95 + v87;
-        const V v97 = v80 * v94;
-        const V v98 = X1 * v86;
-        const V v99 = v88 + v98;
-        const V v100 = X1 * v90;
-        const V v101 = v92 + v100;
-        const V v102 = X0 * v86;
-        const V v103 = v89 + v102;
-        const V v104 = X0 * v90;
-        const V v105 = v91 + v104;
-        const V v106 = 0.25 * v96;
-        const V v107 = v74 * v106;
-        const V v108 = v97 + v107;
-        const V v109 = v82 * v15;
-        const V v110 = v109 + v99;
-        const V v111 = v82 * v6;
-        const V v112 = v111 + v103;
-        const V v113 = v83 * v11;
-        const V v114 = v113 + v101;
-        const V v115 = v83 * v4;
-        const V v116 = v115 + v105;
-        const double v117 = w[1] * w[2];
-        const V v118 = w[0] * v112;
-        const V v119 = v112 * v114;
-        const V v120 = w[1] * v114;
-        const V v121 = w[1] * v116;
-        const V v122 = v118 - v121;
-        const V v123 = v116 * v110;
-        const V v124 = v119 - v123;
-        const V v125 = w[0] * v110;
-        const V v126 = v120 - v125;
-        const V v127 = w[2] * v108;
-        const V v128 = v108 * v124;
-        const V v129 = 0.25 * v124;
-        const V v130 = v127 * v126;
-        s72 += v130;
-        const V v131 = v127 * v122;
-        s73 += v131;
-        const V v132 = w[2] * v129;
-        s66 += v132;
-        const V v133 = v117 * v129;
-        s68 += v133;
-        const V v134 = w[2] * v128;
-        s69 += v134;
-        const V v135 = v117 * v128;
-        s71 += v135;
-        const V v136 = w[0] * v132;
-        s67 += v136;
-        const V v137 = w[0] * v134;
-        s70 += v137;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v43 = 1.0 - w[1], v44 = 1.0 + w[1], v45 = 0.25 * w[1], v46 = 1.0 - w[0],
+            v47 = 1.0 + w[0], v48 = 0.25 * w[0], v49 = 0.25 * v44, v50 = 0.25 - v45,
+            v51 = 0.25 + v45, v52 = 0.25 + v48, v53 = 0.25 - v48;
+        const V v54 = X5 * v47; const double v55 = v45 - 0.25;
+        const V v56 = X3 * v47, v57 = X3 * v50, v58 = X2 * v50;
+        const double v59 = v48 - 0.25;
+        const V v60 = X6 * v53, v61 = X7 * v53, v62 = X7 * v46, v63 = v54 + v62, v64 = X1 * v46,
+            v65 = v64 + v56, v66 = v49 * v63, v67 = X1 * v55, v68 = X1 * v59, v69 = X0 * v55,
+            v70 = X0 * v59, v71 = 0.25 * v65, v72 = v43 * v71, v73 = v66 + v72, v74 = v51 * v12,
+            v75 = v74 + (v57 + v67), v76 = v51 * v4, v77 = v76 + (v58 + v69), v78 = v52 * v8,
+            v79 = v78 + (v61 + v68), v80 = v52 * v3, v81 = v80 + (v60 + v70);
+        const double v82 = w[1] * w[2];
+        const V v83 = v77 * v79 - v81 * v75, v84 = w[2] * v73, v85 = v73 * v83, v86 = 0.25 * v83;
+        s41 += v84 * (w[1] * v79 - w[0] * v75); s42 += v84 * (w[0] * v77 - w[1] * v81);
+        const V v87 = w[2] * v86; s35 += v87; s37 += v82 * v86; const V v88 = w[2] * v85;
+        s38 += v88; s40 += v82 * v85; s36 += w[0] * v87; s39 += w[0] * v88;
     }
-    const V v138 = 1.0 / s69;
-    const V v139 = v1 * s69;
-    const V v140 = s70 * v138;
-    const V v141 = v138 * s71;
-    const V v142 = v138 * s72;
-    const V v143 = v138 * s73;
-    const V v144 = s66 * v138;
-    const V v145 = s67 * v138;
-    const V v146 = s68 * v138;
-    const V v147 = v144 - v146;
-    const V v148 = v144 + v146;
-    const V v149 = v145 + v147;
-    const V v150 = v147 - v145;
-    const V v151 = v145 + v148;
-    const V v152 = v148 - v145;
-    const V v153 = v56 * v142;
-    const V v154 = v49 + v153;
-    const V v155 = v56 * v143;
-    const V v156 = v155 - v50;
-    const V v157 = v65 * v142;
-    const V v158 = v51 + v157;
-    const V v159 = v65 * v143;
-    const V v160 = v52 + v159;
-    const V v161 = v57 * v143;
-    const V v162 = v50 + v161;
-    const V v163 = v57 * v142;
-    const V v164 = v163 - v49;
-    const V v165 = v61 * v142;
-    const V v166 = v47 + v165;
-    const V v167 = v61 * v143;
-    const V v168 = v48 + v167;
-    const V v169 = d2 * v156;
-    const V v170 = d3 * v156;
-    const V v171 = 1.0 + v170;
-    const V v172 = d7 * v164;
-    const V v173 = d7 * v162;
-    const V v174 = v173 + v171;
-    const V v175 = d7 * v152;
-    const V v176 = 1.0 + v175;
-    const V v177 = d6 * v162;
-    const V v178 = v169 + v177;
-    const V v179 = d6 * v164;
-    const V v180 = 1.0 + v179;
-    const V v181 = d2 * v154;
-    const V v182 = v181 + v180;
-    const V v183 = d3 * v154;
-    const V v184 = v183 + v172;
-    const V v185 = d3 * v149;
-    const V v186 = v185 + v176;
-    const V v187 = d0 * v166;
-    const V v188 = v187 + v182;
-    const V v189 = d0 * v168;
-    const V v190 = v189 + v178;
-    const V v191 = d1 * v166;
-    const V v192 = v191 + v184;
-    const V v193 = d1 * v168;
-    const V v194 = v193 + v174;
-    const V v195 = d1 * v150;
-    const V v196 = v195 + v186;
-    const V v197 = d4 * v158;
-    const V v198 = v197 + v188;
-    const V v199 = d4 * v160;
-    const V v200 = v199 + v190;
-    const V v201 = d5 * v158;
-    const V v202 = v201 + v192;
-    const V v203 = d5 * v160;
-    const V v204 = v203 + v194;
-    const V v205 = d5 * v151;
-    const V v206 = v205 + v196;
-    const V v207 = v198 * v204;
-    const V v208 = v206 * v206;
-    const V v209 = v200 * v202;
-    const V v210 = v207 - v209;
-    const V v211 = v208 * v210;
-    const V v212 = v210 * v211;
-    const V v213 = softehl_vlog(v212);
-    const V v214 = v212 - v213;
-    const V v215 = 0.5 * v214;
-    const V v216 = (-0.5) + v215;
-    const V v217 = v139 * v216;
-    V s218 = softehl_splat(0.0);
+    const V v89 = 1.0 / s38, v90 = s39 * v89, v91 = v89 * s40, v92 = v89 * s41, v93 = v89 * s42,
+        v94 = s35 * v89, v95 = s36 * v89, v96 = s37 * v89, v97 = v94 - v96, v98 = v94 + v96,
+        v99 = v26 + v31 * v92, v100 = v31 * v93 - v27, v101 = v28 + v34 * v92,
+        v102 = v29 + v34 * v93, v103 = v27 + v32 * v93, v104 = v32 * v92 - v26,
+        v105 = v24 + v33 * v92, v106 = v25 + v33 * v93,
+        v107 = d5 * (v95 + v98) + (d1 * (v97 - v95) + (d3 * (v95 + v97) + (1.0 + d7 * (v98 - v95)))),
+        v108 = (d4 * v101 + (d0 * v105 + (d2 * v99 + (1.0 + d6 * v104)))) * (d5 * v102 + (d1 * v106 + (d7 * v103 + (1.0 + d3 * v100)))),
+        v109 = (d4 * v102 + (d0 * v106 + (d2 * v100 + d6 * v103))) * (d5 * v101 + (d1 * v105 + (d3 * v99 + d7 * v104))),
+        v110 = v108 - v109, v111 = v110 * (v107 * v107 * v110), v112 = softehl_vlog(v111),
+        v113 = v1 * s38 * ((-0.5) + 0.5 * (v111 - v112));
+    V s114 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v219 = 1.0 - w[0];
-        const double v220 = 1.0 + w[0];
-        const double v221 = 0.25 * w[0];
-        const double v222 = 1.0 - w[1];
-        const double v223 = 1.0 + w[1];
-        const double v224 = 0.25 * w[1];
-        const double v225 = 0.25 + v221;
-        const double v226 = 0.25 - v221;
-        const double v227 = 0.25 * v223;
-        const V v228 = w[0] - v140;
-        const double v229 = 0.25 - v224;
-        const double v230 = 0.25 + v224;
-        const V v231 = w[1] - v141;
-        const double v232 = v221 - 0.25;
-        const V v233 = X6 * v226;
-        const V v234 = X7 * v226;
-        const V v235 = X7 * v219;
-        const double v236 = v224 - 0.25;
-        const V v237 = X2 * v229;
-        const V v238 = v27 * v228;
-        const V v239 = v32 * v231;
-        const V v240 = X3 * v229;
-        const V v241 = v225 * v4;
-        const V v242 = v233 + v241;
-        const V v243 = v225 * v11;
-        const V v244 = v234 + v243;
-        const V v245 = v230 * v6;
-        const V v246 = v237 + v245;
-        const V v247 = v230 * v15;
-        const V v248 = v240 + v247;
-        const V v249 = X1 * v219;
-        const V v250 = X3 * v220;
-        const V v251 = v249 + v250;
-        const V v252 = X5 * v220;
-        const V v253 = v252 + v235;
-        const V v254 = X1 * v236;
-        const V v255 = v254 + v248;
-        const V v256 = X0 * v236;
-        const V v257 = v256 + v246;
-        const V v258 = X0 * v232;
-        const V v259 = v258 + v242;
-        const V v260 = X1 * v232;
-        const V v261 = v260 + v244;
-        const V v262 = 0.25 * v251;
-        const V v263 = v227 * v253;
-        const V v264 = v257 * v261;
-        const V v265 = v222 * v262;
-        const V v266 = v263 + v265;
-        const V v267 = v255 * v259;
-        const V v268 = v264 - v267;
-        const V v269 = v266 * v268;
-        const V v270 = v17 * v228;
-        const V v271 = v45 * v228;
-        const V v272 = v145 + v271;
-        const V v273 = v45 * v231;
-        const V v274 = v146 + v273;
-        const V v275 = v13 * v231;
-        const V v276 = v270 - v275;
-        const V v277 = v239 - v238;
-        const V v278 = v239 + v238;
-        const V v279 = v46 * v278;
-        const V v280 = v144 - v279;
-        const V v281 = v44 * v276;
-        const V v282 = v143 + v281;
-        const V v283 = v44 * v277;
-        const V v284 = v142 + v283;
-        const V v285 = w[2] * v269;
-        const V v286 = v274 - v280;
-        const V v287 = v274 + v280;
-        const V v288 = v65 * v282;
-        const V v289 = v52 + v288;
-        const V v290 = v65 * v284;
-        const V v291 = v51 + v290;
-        const V v292 = v57 * v282;
-        const V v293 = v50 + v292;
-        const V v294 = v57 * v284;
-        const V v295 = v294 - v49;
-        const V v296 = v56 * v284;
-        const V v297 = v49 + v296;
-        const V v298 = v56 * v282;
-        const V v299 = v298 - v50;
-        const V v300 = v272 + v286;
-        const V v301 = v272 - v286;
-        const V v302 = v272 + v287;
-        const V v303 = v287 - v272;
-        const V v304 = v61 * v284;
-        const V v305 = v47 + v304;
-        const V v306 = v61 * v282;
-        const V v307 = v48 + v306;
-        const V v308 = d2 * v299;
-        const V v309 = d2 * v297;
-        const V v310 = 1.0 + v309;
-        const V v311 = d3 * v297;
-        const V v312 = d3 * v299;
-        const V v313 = 1.0 + v312;
-        const V v314 = d3 * v301;
-        const V v315 = 1.0 + v314;
-        const V v316 = d0 * v307;
-        const V v317 = v316 + v308;
-        const V v318 = d0 * v305;
-        const V v319 = v318 + v310;
-        const V v320 = d1 * v305;
-        const V v321 = v320 + v311;
-        const V v322 = d1 * v307;
-        const V v323 = v322 + v313;
-        const V v324 = d1 * v300;
-        const V v325 = v315 - v324;
-        const V v326 = d4 * v291;
-        const V v327 = v326 + v319;
-        const V v328 = d4 * v289;
-        const V v329 = v328 + v317;
-        const V v330 = d5 * v291;
-        const V v331 = v330 + v321;
-        const V v332 = d5 * v289;
-        const V v333 = v332 + v323;
-        const V v334 = d5 * v302;
-        const V v335 = v334 + v325;
-        const V v336 = d6 * v295;
-        const V v337 = v336 + v327;
-        const V v338 = d6 * v293;
-        const V v339 = v338 + v329;
-        const V v340 = d7 * v295;
-        const V v341 = v340 + v331;
-        const V v342 = d7 * v293;
-        const V v343 = v342 + v333;
-        const V v344 = d7 * v303;
-        const V v345 = v344 + v335;
-        const V v346 = v345 * v345;
-        const V v347 = v337 * v337;
-        const V v348 = v337 * v343;
-        const V v349 = v343 * v343;
-        const V v350 = v347 + v349;
-        const V v351 = v339 * v341;
-        const V v352 = v348 - v351;
-        const V v353 = v352 * v352;
-        const V v354 = v339 * v339;
-        const V v355 = v354 + v350;
-        const V v356 = v341 * v341;
-        const V v357 = v356 + v355;
-        const V v358 = v346 + v357;
-        const V v359 = v346 * v353;
-        const V v360 = softehl_vrcbrt(v359);
-        const V v361 = v358 * v360;
-        const V v362 = (-3.0) + v361;
-        const V v363 = v362 * v362;
-        const V v364 = parameters[1] * v363;
-        const V v365 = parameters[2] * v363;
-        const V v366 = parameters[0] + v365;
-        const V v367 = v362 * v366;
-        const V v368 = v364 + v367;
-        const V v369 = v285 * v368;
-        s218 += v369;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v115 = 1.0 - w[0], v116 = 1.0 + w[0], v117 = 0.25 * w[0], v118 = 1.0 - w[1],
+            v119 = 1.0 + w[1], v120 = 0.25 * w[1], v121 = 0.25 + v117, v122 = 0.25 - v117,
+            v123 = 0.25 * v119;
+        const V v124 = w[0] - v90;
+        const double v125 = 0.25 - v120, v126 = 0.25 + v120;
+        const V v127 = w[1] - v91; const double v128 = v117 - 0.25;
+        const V v129 = X6 * v122, v130 = X7 * v122, v131 = X7 * v115;
+        const double v132 = v120 - 0.25;
+        const V v133 = X2 * v125, v134 = v17 * v124, v135 = v20 * v127, v136 = X3 * v125,
+            v137 = v121 * v3, v138 = v121 * v8, v139 = v126 * v4, v140 = v126 * v12,
+            v141 = X1 * v115, v142 = X3 * v116, v143 = v141 + v142, v144 = X5 * v116,
+            v145 = v144 + v131, v146 = X1 * v132, v147 = v146 + (v136 + v140), v148 = X0 * v132,
+            v149 = v148 + (v133 + v139), v150 = X0 * v128, v151 = v150 + (v129 + v137),
+            v152 = X1 * v128, v153 = v152 + (v130 + v138), v154 = 0.25 * v143, v155 = v123 * v145,
+            v156 = v118 * v154, v157 = v155 + v156, v158 = v149 * v153 - v147 * v151,
+            v159 = v157 * v158, v160 = v95 + v22 * v124, v161 = v96 + v22 * v127,
+            v162 = v94 - v23 * (v135 + v134), v163 = v93 + v21 * (v14 * v124 - v10 * v127),
+            v164 = v92 + v21 * (v135 - v134), v165 = w[2] * v159, v166 = v161 - v162,
+            v167 = v161 + v162, v168 = v29 + v34 * v163, v169 = v28 + v34 * v164,
+            v170 = v27 + v32 * v163, v171 = v32 * v164 - v26, v172 = v26 + v31 * v164,
+            v173 = v31 * v163 - v27, v174 = v24 + v33 * v164, v175 = v25 + v33 * v163,
+            v176 = d5 * (v160 + v167) + (1.0 + d3 * (v160 - v166) - d1 * (v160 + v166)),
+            v177 = d6 * v171 + (d4 * v169 + (d0 * v174 + (1.0 + d2 * v172))),
+            v178 = d6 * v170 + (d4 * v168 + (d0 * v175 + d2 * v173)),
+            v179 = d7 * v171 + (d5 * v169 + (d1 * v174 + d3 * v172)),
+            v180 = d7 * v170 + (d5 * v168 + (d1 * v175 + (1.0 + d3 * v173))),
+            v181 = d7 * (v167 - v160) + v176, v182 = v181 * v181, v183 = v177 * v180 - v178 * v179,
+            v184 = v182 + (v179 * v179 + (v178 * v178 + (v177 * v177 + v180 * v180))),
+            v185 = softehl_vrcbrt(v182 * (v183 * v183)), v186 = (-3.0) + v184 * v185,
+            v187 = v186 * v186,
+            v188 = parameters[1] * v187 + v186 * (parameters[0] + parameters[2] * v187),
+            v189 = v165 * v188;
+        s114 += v189;
     }
-    const V v370 = v217 + s218;
-    const V v371 = 6.283185307179586 * v370;
-    softehl_store1(R + 0, 1, v371);
+    softehl_store1(R + 0, 1, 6.283185307179586 * (v113 + s114));
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_yeoh_energy, 8, 8, 0, 0, 1, 0)
 
-void softehl_solid_taylor_mean_yeoh_energy(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_yeoh_residual)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_yeoh_energy_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 1 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_yeoh_energy_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 1 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 1];
-    softehl_solid_taylor_mean_yeoh_energy(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 1 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_solid_taylor_mean_yeoh_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    const double v1 = 3.0 * parameters[2];
-    const double v2 = 2.0 * parameters[1];
-    const double v3 = 1.5707963267948966 * parameters[3];
-    const V v4 = X4 - X0;
-    const V v5 = X0 - X2;
-    const V v6 = X4 - X2;
-    const V v7 = v4 - X2;
-    const V v8 = X4 - X6;
-    const V v9 = X6 + v7;
-    const V v10 = X1 - X3;
-    const V v11 = X1 + X3;
-    const V v12 = v5 + v8;
-    const V v13 = X5 - X3;
-    const V v14 = v8 - v5;
-    const V v15 = 0.25 * v9;
-    const V v16 = 0.0625 * v9;
-    const V v17 = X5 - X7;
-    const V v18 = X5 + X7;
-    const V v19 = 0.25 * v14;
-    const V v20 = 0.0625 * v14;
-    const V v21 = v10 + v17;
-    const V v22 = v11 + v18;
-    const V v23 = v17 - v10;
-    const V v24 = v18 - v11;
-    const V v25 = 0.25 * v22;
-    const V v26 = 0.25 * v23;
-    const V v27 = 0.0625 * v23;
-    const V v28 = 0.25 * v24;
-    const V v29 = 0.0625 * v24;
-    const V v30 = v19 * v28;
-    const V v31 = d0 - d2;
-    const V v32 = d0 + d2;
-    const V v33 = 1.0 / v25;
-    const V v34 = v25 * v25;
-    const V v35 = v26 * v15;
-    const V v36 = v30 - v35;
-    const V v37 = v12 * v27;
-    const V v38 = v12 * v29;
-    const V v39 = 1.0 / v34;
-    const V v40 = 1.0 / v36;
-    const V v41 = v32 - d4;
-    const V v42 = v41 - d6;
-    const V v43 = d4 - d6;
-    const V v44 = d1 + d3;
-    const V v45 = d1 - d3;
-    const V v46 = d5 + d7;
-    const V v47 = d5 - d7;
-    const V v48 = v31 - v43;
-    const V v49 = v31 + v43;
-    const V v50 = 0.25 * v33;
-    const V v51 = v44 - v46;
-    const V v52 = v44 + v46;
-    const V v53 = v45 - v47;
-    const V v54 = v45 + v47;
-    const V v55 = 0.25 * v39;
-    const V v56 = v27 * v40;
-    const V v57 = v29 * v40;
-    const V v58 = v40 * v37;
-    const V v59 = v40 * v38;
-    const V v60 = v21 * v40;
-    const V v61 = v40 * v16;
-    const V v62 = v20 * v40;
-    const V v63 = v16 * v60;
-    const V v64 = v20 * v60;
-    const V v65 = 0.25 * v59;
-    const V v66 = v51 * v56;
-    const V v67 = v51 * v62;
-    const V v68 = 1.0 - v67;
-    const V v69 = 0.25 * v63;
-    const V v70 = v65 - v69;
-    const V v71 = v48 * v61;
-    const V v72 = v48 * v57;
-    const V v73 = 1.0 - v72;
-    const V v74 = v53 * v57;
-    const V v75 = v66 - v74;
-    const V v76 = v53 * v61;
-    const V v77 = v68 + v76;
-    const V v78 = 0.25 * v64;
-    const V v79 = v42 * v62;
-    const V v80 = v71 - v79;
-    const V v81 = v42 * v56;
-    const V v82 = v73 + v81;
-    const V v83 = 0.25 * v58;
-    const V v84 = v78 - v83;
-    V s85 = softehl_splat(0.0);
-    V s86 = softehl_splat(0.0);
-    V s87 = softehl_splat(0.0);
-    V s88 = softehl_splat(0.0);
-    V s89 = softehl_splat(0.0);
-    V s90 = softehl_splat(0.0);
-    V s91 = softehl_splat(0.0);
-    V s92 = softehl_splat(0.0);
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    const double v1 = 3.0 * parameters[2], v2 = 2.0 * parameters[1],
+        v3 = 1.5707963267948966 * parameters[3];
+    const V v4 = X0 - X2, v5 = X4 - X2, v6 = X4 - X6, v7 = X6 + (X4 - X0 - X2), v8 = X1 - X3,
+        v9 = X1 + X3, v10 = v4 + v6, v11 = X5 - X3, v12 = v6 - v4, v13 = 0.25 * v7,
+        v14 = 0.0625 * v7, v15 = X5 - X7, v16 = X5 + X7, v17 = 0.25 * v12, v18 = 0.0625 * v12,
+        v19 = v15 - v8, v20 = v16 - v9, v21 = 0.25 * (v9 + v16), v22 = 0.25 * v19,
+        v23 = 0.0625 * v19, v24 = 0.25 * v20, v25 = 0.0625 * v20, v26 = d0 - d2,
+        v27 = 1.0 / (v17 * v24 - v22 * v13), v28 = d0 + d2 - d4 - d6, v29 = d4 - d6, v30 = d1 + d3,
+        v31 = d1 - d3, v32 = d5 + d7, v33 = d5 - d7, v34 = v26 - v29, v35 = v26 + v29,
+        v36 = 0.25 * (1.0 / v21), v37 = v30 - v32, v38 = v30 + v32, v39 = v31 - v33,
+        v40 = v31 + v33, v41 = 0.25 * (1.0 / (v21 * v21)), v42 = v23 * v27, v43 = v25 * v27,
+        v44 = v27 * (v10 * v23), v45 = v27 * (v10 * v25), v46 = (v8 + v15) * v27, v47 = v27 * v14,
+        v48 = v18 * v27, v49 = v14 * v46, v50 = v18 * v46, v51 = 0.25 * v45 - 0.25 * v49,
+        v52 = v37 * v42 - v39 * v43, v53 = 1.0 - v37 * v48 + v39 * v47, v54 = v34 * v47 - v28 * v48,
+        v55 = 1.0 - v34 * v43 + v28 * v42, v56 = 0.25 * v50 - 0.25 * v44;
+    V s57 = {0}, s58 = {0}, s59 = {0}, s60 = {0}, s61 = {0}, s62 = {0}, s63 = {0}, s64 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v93 = 1.0 - w[1];
-        const double v94 = 1.0 + w[1];
-        const double v95 = 0.25 * w[1];
-        const double v96 = 1.0 - w[0];
-        const double v97 = 1.0 + w[0];
-        const double v98 = 0.25 * w[0];
-        const double v99 = 0.25 * v94;
-        const double v100 = 0.25 - v95;
-        const double v101 = 0.25 + v95;
-        const double v102 = 0.25 + v98;
-        const double v103 = 0.25 - v98;
-        const V v104 = X5 * v97;
-        const double v105 = v95 - 0.25;
-        const V v106 = X3 * v97;
-        const V v107 = X3 * v100;
-        const V v108 = X2 * v100;
-        const double v109 = v98 - 0.25;
-        const V v110 = X6 * v103;
-        const V v111 = X7 * v103;
-        const V v112 = X7 * v96;
-        const V v113 = v104 + v112;
-        const V v114 = X1 * v96;
-        const V v115 = v114 + v106;
-        const V v116 = v99 * v113;
-        const V v117 = X1 * v105;
-        const V v118 = v107 + v117;
-        const V v119 = X1 * v109;
-        const V v120 = v111 + v119;
-        const V v121 = X0 * v105;
-        const V v122 = v108 + v121;
-        const V v123 = X0 * v109;
-        const V v124 = v110 + v123;
-        const V v125 = 0.25 * v115;
-        const V v126 = v93 * v125;
-        const V v127 = v116 + v126;
-        const V v128 = v101 * v17;
-        const V v129 = v128 + v118;
-        const V v130 = v101 * v8;
-        const V v131 = v130 + v122;
-        const V v132 = v102 * v13;
-        const V v133 = v132 + v120;
-        const V v134 = v102 * v6;
-        const V v135 = v134 + v124;
-        const double v136 = w[1] * w[2];
-        const V v137 = w[0] * v131;
-        const V v138 = v131 * v133;
-        const V v139 = w[1] * v133;
-        const V v140 = w[1] * v135;
-        const V v141 = v137 - v140;
-        const V v142 = v135 * v129;
-        const V v143 = v138 - v142;
-        const V v144 = w[0] * v129;
-        const V v145 = v139 - v144;
-        const V v146 = w[2] * v127;
-        const V v147 = v127 * v143;
-        const V v148 = 0.25 * v143;
-        const V v149 = v146 * v145;
-        s91 += v149;
-        const V v150 = v146 * v141;
-        s92 += v150;
-        const V v151 = w[2] * v148;
-        s85 += v151;
-        const V v152 = v136 * v148;
-        s87 += v152;
-        const V v153 = w[2] * v147;
-        s88 += v153;
-        const V v154 = v136 * v147;
-        s90 += v154;
-        const V v155 = w[0] * v151;
-        s86 += v155;
-        const V v156 = w[0] * v153;
-        s89 += v156;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v65 = 1.0 - w[1], v66 = 1.0 + w[1], v67 = 0.25 * w[1], v68 = 1.0 - w[0],
+            v69 = 1.0 + w[0], v70 = 0.25 * w[0], v71 = 0.25 * v66, v72 = 0.25 - v67,
+            v73 = 0.25 + v67, v74 = 0.25 + v70, v75 = 0.25 - v70;
+        const V v76 = X5 * v69; const double v77 = v67 - 0.25;
+        const V v78 = X3 * v69, v79 = X3 * v72, v80 = X2 * v72;
+        const double v81 = v70 - 0.25;
+        const V v82 = X6 * v75, v83 = X7 * v75, v84 = X7 * v68, v85 = v76 + v84, v86 = X1 * v68,
+            v87 = v86 + v78, v88 = v71 * v85, v89 = X1 * v77, v90 = X1 * v81, v91 = X0 * v77,
+            v92 = X0 * v81, v93 = 0.25 * v87, v94 = v65 * v93, v95 = v88 + v94, v96 = v73 * v15,
+            v97 = v96 + (v79 + v89), v98 = v73 * v6, v99 = v98 + (v80 + v91), v100 = v74 * v11,
+            v101 = v100 + (v83 + v90), v102 = v74 * v5, v103 = v102 + (v82 + v92);
+        const double v104 = w[1] * w[2];
+        const V v105 = v99 * v101 - v103 * v97, v106 = w[2] * v95, v107 = v95 * v105,
+            v108 = 0.25 * v105;
+        s63 += v106 * (w[1] * v101 - w[0] * v97); s64 += v106 * (w[0] * v99 - w[1] * v103);
+        const V v109 = w[2] * v108; s57 += v109; s59 += v104 * v108; const V v110 = w[2] * v107;
+        s60 += v110; s62 += v104 * v107; s58 += w[0] * v109; s61 += w[0] * v110;
     }
-    const V v157 = 1.0 / s88;
-    const V v158 = s88 * v3;
-    const V v159 = s89 * v157;
-    const V v160 = v157 * s90;
-    const V v161 = v157 * s91;
-    const V v162 = 0.25 * v161;
-    const V v163 = v157 * s92;
-    const V v164 = 0.25 * v163;
-    const V v165 = s85 * v157;
-    const V v166 = s86 * v157;
-    const V v167 = s87 * v157;
-    const V v168 = v165 * v52;
-    const V v169 = 1.0 + v168;
-    const V v170 = v63 * v162;
-    const V v171 = v63 * v164;
-    const V v172 = v64 * v162;
-    const V v173 = v64 * v164;
-    const V v174 = v58 * v162;
-    const V v175 = v58 * v164;
-    const V v176 = v172 - v174;
-    const V v177 = v174 - v172;
-    const V v178 = v173 - v175;
-    const V v179 = v175 - v173;
-    const V v180 = v59 * v162;
-    const V v181 = v59 * v164;
-    const V v182 = v170 - v180;
-    const V v183 = v180 - v170;
-    const V v184 = v171 - v181;
-    const V v185 = v181 - v171;
-    const V v186 = v167 * v51;
-    const V v187 = v169 - v186;
-    const V v188 = v166 * v53;
-    const V v189 = v187 - v188;
-    const V v190 = 2.0 * v189;
-    const V v191 = v189 * v189;
-    const V v192 = v49 * v162;
-    const V v193 = v82 + v192;
-    const V v194 = v49 * v164;
-    const V v195 = v80 + v194;
-    const V v196 = v54 * v162;
-    const V v197 = v75 + v196;
-    const V v198 = v54 * v164;
-    const V v199 = v77 + v198;
-    const V v200 = v53 * v183;
-    const V v201 = v200 + v197;
-    const V v202 = v53 * v185;
-    const V v203 = v202 + v199;
-    const V v204 = v51 * v176;
-    const V v205 = v204 + v201;
-    const V v206 = v51 * v178;
-    const V v207 = v206 + v203;
-    const V v208 = v42 * v176;
-    const V v209 = v208 + v193;
-    const V v210 = v42 * v178;
-    const V v211 = v210 + v195;
-    const V v212 = v48 * v183;
-    const V v213 = v212 + v209;
-    const V v214 = v48 * v185;
-    const V v215 = v214 + v211;
-    const V v216 = v213 * v207;
-    const V v217 = v215 * v205;
-    const V v218 = v216 - v217;
-    const V v219 = 2.0 * v218;
-    const V v220 = v218 * v218;
-    const V v221 = v191 * v219;
-    const V v222 = v191 * v220;
-    const V v223 = v190 * v220;
-    const V v224 = 1.0 / v222;
-    const V v225 = 1.0 - v224;
-    const V v226 = v158 * v225;
-    const V v227 = v221 * v226;
-    const V v228 = v223 * v226;
-    const V v229 = v205 * v227;
-    const V v230 = v215 * v227;
-    const V v231 = v207 * v227;
-    const V v232 = v213 * v227;
-    const V v233 = v166 * v228;
-    const V v234 = v167 * v228;
-    const V v235 = v165 * v228;
-    const V v236 = v178 * v232;
-    const V v237 = v185 * v232;
-    const V v238 = v164 * v232;
-    const V v239 = v164 * v229;
-    const V v240 = v176 * v231;
-    const V v241 = v183 * v231;
-    const V v242 = v162 * v231;
-    const V v243 = v162 * v230;
-    const V v244 = v177 * v230;
-    const V v245 = v236 + v244;
-    const V v246 = v182 * v230;
-    const V v247 = v237 + v246;
-    const V v248 = v179 * v229;
-    const V v249 = v240 + v248;
-    const V v250 = v184 * v229;
-    const V v251 = v241 + v250;
-    V s252 = softehl_splat(0.0);
-    V s253 = softehl_splat(0.0);
-    V s254 = softehl_splat(0.0);
-    V s255 = softehl_splat(0.0);
-    V s256 = softehl_splat(0.0);
-    V s257 = softehl_splat(0.0);
-    V s258 = softehl_splat(0.0);
-    V s259 = softehl_splat(0.0);
-    V s260 = softehl_splat(0.0);
-    V s261 = softehl_splat(0.0);
-    V s262 = softehl_splat(0.0);
+    const V v111 = 1.0 / s60, v112 = s61 * v111, v113 = v111 * s62, v114 = v111 * s63,
+        v115 = 0.25 * v114, v116 = v111 * s64, v117 = 0.25 * v116, v118 = s57 * v111,
+        v119 = s58 * v111, v120 = s59 * v111, v121 = v49 * v115, v122 = v49 * v117,
+        v123 = v50 * v115, v124 = v50 * v117, v125 = v44 * v115, v126 = v44 * v117,
+        v127 = v123 - v125, v128 = v124 - v126, v129 = v45 * v115, v130 = v45 * v117,
+        v131 = v129 - v121, v132 = v130 - v122, v133 = 1.0 + v118 * v38 - v120 * v37 - v119 * v39,
+        v134 = v133 * v133, v135 = v37 * v127 + (v39 * v131 + (v52 + v40 * v115)),
+        v136 = v37 * v128 + (v39 * v132 + (v53 + v40 * v117)),
+        v137 = v34 * v131 + (v28 * v127 + (v55 + v35 * v115)),
+        v138 = v34 * v132 + (v28 * v128 + (v54 + v35 * v117)), v139 = v137 * v136 - v138 * v135,
+        v140 = v139 * v139, v141 = s60 * v3 * (1.0 - 1.0 / (v134 * v140)),
+        v142 = v134 * (2.0 * v139) * v141, v143 = 2.0 * v133 * v140 * v141, v144 = v135 * v142,
+        v145 = v138 * v142, v146 = v136 * v142, v147 = v137 * v142, v148 = v119 * v143,
+        v149 = v120 * v143, v150 = v118 * v143, v151 = v117 * v147, v152 = v117 * v144,
+        v153 = v115 * v146, v154 = v115 * v145, v155 = v128 * v147 + (v125 - v123) * v145,
+        v156 = v132 * v147 + (v121 - v129) * v145, v157 = v127 * v146 + (v126 - v124) * v144,
+        v158 = v131 * v146 + (v122 - v130) * v144;
+    V s159 = {0}, s160 = {0}, s161 = {0}, s162 = {0}, s163 = {0}, s164 = {0}, s165 = {0},
+        s166 = {0}, s167 = {0}, s168 = {0}, s169 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v263 = 1.0 - w[0];
-        const double v264 = 1.0 + w[0];
-        const double v265 = 0.25 * w[0];
-        const double v266 = 1.0 - w[1];
-        const double v267 = 1.0 + w[1];
-        const double v268 = 0.25 * w[1];
-        const double v269 = 0.25 + v265;
-        const double v270 = 0.25 - v265;
-        const double v271 = 0.25 * v267;
-        const V v272 = w[0] - v159;
-        const double v273 = 0.25 - v268;
-        const double v274 = 0.25 + v268;
-        const V v275 = w[1] - v160;
-        const double v276 = v265 - 0.25;
-        const V v277 = X6 * v270;
-        const V v278 = X7 * v270;
-        const V v279 = X7 * v263;
-        const double v280 = v268 - 0.25;
-        const V v281 = v26 * v272;
-        const V v282 = X2 * v273;
-        const V v283 = v28 * v275;
-        const V v284 = X3 * v273;
-        const V v285 = v269 * v6;
-        const V v286 = v277 + v285;
-        const V v287 = v269 * v13;
-        const V v288 = v278 + v287;
-        const V v289 = X1 * v263;
-        const V v290 = v274 * v8;
-        const V v291 = v282 + v290;
-        const V v292 = v274 * v17;
-        const V v293 = v284 + v292;
-        const V v294 = X3 * v264;
-        const V v295 = v289 + v294;
-        const V v296 = X5 * v264;
-        const V v297 = v296 + v279;
-        const V v298 = X1 * v280;
-        const V v299 = v298 + v293;
-        const V v300 = X1 * v276;
-        const V v301 = v300 + v288;
-        const V v302 = X0 * v280;
-        const V v303 = v302 + v291;
-        const V v304 = X0 * v276;
-        const V v305 = v304 + v286;
-        const V v306 = 0.25 * v295;
-        const V v307 = v303 * v301;
-        const V v308 = v271 * v297;
-        const V v309 = v299 * v305;
-        const V v310 = v307 - v309;
-        const V v311 = v266 * v306;
-        const V v312 = v308 + v311;
-        const V v313 = v19 * v272;
-        const V v314 = v50 * v272;
-        const V v315 = v166 + v314;
-        const V v316 = v50 * v275;
-        const V v317 = v167 + v316;
-        const V v318 = v312 * v310;
-        const V v319 = v15 * v275;
-        const V v320 = v313 - v319;
-        const V v321 = v283 - v281;
-        const V v322 = v283 + v281;
-        const V v323 = v55 * v322;
-        const V v324 = v165 - v323;
-        const V v325 = v40 * v320;
-        const V v326 = v163 + v325;
-        const V v327 = v40 * v321;
-        const V v328 = v161 + v327;
-        const V v329 = w[2] * v318;
-        const V v330 = 0.25 * v326;
-        const V v331 = 0.25 * v328;
-        const V v332 = 6.283185307179586 * v329;
-        const V v333 = v326 * v84;
-        const V v334 = v328 * v84;
-        const V v335 = v328 * v70;
-        const V v336 = v326 * v70;
-        const V v337 = v324 * v52;
-        const V v338 = 1.0 + v337;
-        const V v339 = v49 * v330;
-        const V v340 = v80 + v339;
-        const V v341 = v49 * v331;
-        const V v342 = v82 + v341;
-        const V v343 = v54 * v330;
-        const V v344 = v77 + v343;
-        const V v345 = v54 * v331;
-        const V v346 = v75 + v345;
-        const V v347 = v317 * v51;
-        const V v348 = v338 - v347;
-        const V v349 = v51 * v333;
-        const V v350 = v349 + v344;
-        const V v351 = v51 * v334;
-        const V v352 = v351 + v346;
-        const V v353 = v53 * v336;
-        const V v354 = v353 + v350;
-        const V v355 = v53 * v335;
-        const V v356 = v355 + v352;
-        const V v357 = v315 * v53;
-        const V v358 = v348 - v357;
-        const V v359 = 2.0 * v354;
-        const V v360 = v42 * v333;
-        const V v361 = v360 + v340;
-        const V v362 = v42 * v334;
-        const V v363 = v362 + v342;
-        const V v364 = 2.0 * v356;
-        const V v365 = v354 * v354;
-        const V v366 = v358 * v358;
-        const V v367 = 2.0 * v358;
-        const V v368 = v48 * v336;
-        const V v369 = v368 + v361;
-        const V v370 = v48 * v335;
-        const V v371 = v370 + v363;
-        const V v372 = v356 * v356;
-        const V v373 = v372 + v365;
-        const V v374 = 2.0 * v369;
-        const V v375 = 2.0 * v371;
-        const V v376 = v366 + v373;
-        const V v377 = v371 * v354;
-        const V v378 = v369 * v356;
-        const V v379 = v377 - v378;
-        const V v380 = v371 * v371;
-        const V v381 = v380 + v376;
-        const V v382 = v369 * v369;
-        const V v383 = v382 + v381;
-        const V v384 = 2.0 * v379;
-        const V v385 = v379 * v379;
-        const V v386 = 0.3333333333333333 * v383;
-        const V v387 = v366 * v384;
-        const V v388 = v366 * v385;
-        const V v389 = softehl_vrcbrt(v388);
-        const V v390 = v389 * v383;
-        const V v391 = (-3.0) + v390;
-        const V v392 = v389 * v389;
-        const V v393 = v1 * v391;
-        const V v394 = v2 + v393;
-        const V v395 = v391 * v394;
-        const V v396 = parameters[0] + v395;
-        const V v397 = v332 * v396;
-        const V v398 = v389 * v397;
-        const V v399 = v386 * v397;
-        const V v400 = v392 * v399;
-        const V v401 = v392 * v400;
-        const V v402 = v387 * v401;
-        const V v403 = v356 * v402;
-        const V v404 = v374 * v398;
-        const V v405 = v403 + v404;
-        s255 += v405;
-        const V v406 = v369 * v402;
-        const V v407 = v375 * v398;
-        const V v408 = v354 * v402;
-        const V v409 = v407 - v408;
-        s256 += v409;
-        const V v410 = v364 * v398;
-        const V v411 = v406 + v410;
-        s254 += v411;
-        const V v412 = v385 * v401;
-        const V v413 = v398 - v412;
-        const V v414 = v367 * v413;
-        const V v415 = v359 * v398;
-        const V v416 = v371 * v402;
-        const V v417 = v415 - v416;
-        s253 += v417;
-        const V v418 = v324 * v414;
-        s252 += v418;
-        const V v419 = v336 * v417;
-        const V v420 = v336 * v405;
-        const V v421 = v335 * v409;
-        s261 += v420;
-        s261 += v421;
-        const V v422 = v335 * v411;
-        s258 += v419;
-        s258 += v422;
-        const V v423 = v315 * v414;
-        s258 -= v423;
-        const V v424 = v333 * v417;
-        const V v425 = v317 * v414;
-        s259 += v424;
-        s259 -= v425;
-        const V v426 = v333 * v405;
-        const V v427 = v330 * v417;
-        const V v428 = v330 * v405;
-        const V v429 = v334 * v411;
-        s259 += v429;
-        const V v430 = v334 * v409;
-        s262 += v426;
-        s262 += v430;
-        const V v431 = v331 * v411;
-        s257 += v427;
-        s257 += v431;
-        const V v432 = v331 * v409;
-        s260 += v428;
-        s260 += v432;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v170 = 1.0 - w[0], v171 = 1.0 + w[0], v172 = 0.25 * w[0], v173 = 1.0 - w[1],
+            v174 = 1.0 + w[1], v175 = 0.25 * w[1], v176 = 0.25 + v172, v177 = 0.25 - v172,
+            v178 = 0.25 * v174;
+        const V v179 = w[0] - v112;
+        const double v180 = 0.25 - v175, v181 = 0.25 + v175;
+        const V v182 = w[1] - v113; const double v183 = v172 - 0.25;
+        const V v184 = X6 * v177, v185 = X7 * v177, v186 = X7 * v170;
+        const double v187 = v175 - 0.25;
+        const V v188 = v22 * v179, v189 = X2 * v180, v190 = v24 * v182, v191 = X3 * v180,
+            v192 = v176 * v5, v193 = v176 * v11, v194 = X1 * v170, v195 = v181 * v6,
+            v196 = v181 * v15, v197 = X3 * v171, v198 = v194 + v197, v199 = X5 * v171,
+            v200 = v199 + v186, v201 = X1 * v187, v202 = v201 + (v191 + v196), v203 = X1 * v183,
+            v204 = v203 + (v185 + v193), v205 = X0 * v187, v206 = v205 + (v189 + v195),
+            v207 = X0 * v183, v208 = v207 + (v184 + v192), v209 = 0.25 * v198, v210 = v178 * v200,
+            v211 = v206 * v204 - v202 * v208, v212 = v173 * v209, v213 = v210 + v212,
+            v214 = v119 + v36 * v179, v215 = v120 + v36 * v182, v216 = v213 * v211,
+            v217 = v118 - v41 * (v190 + v188), v218 = v116 + v27 * (v17 * v179 - v13 * v182),
+            v219 = v114 + v27 * (v190 - v188), v220 = w[2] * v216, v221 = 0.25 * v218,
+            v222 = 0.25 * v219, v223 = v218 * v56, v224 = v219 * v56, v225 = v219 * v51,
+            v226 = v218 * v51, v227 = v39 * v226 + (v37 * v223 + (v53 + v40 * v221)),
+            v228 = v39 * v225 + (v37 * v224 + (v52 + v40 * v222)),
+            v229 = 1.0 + v217 * v38 - v215 * v37 - v214 * v39, v230 = v229 * v229,
+            v231 = v34 * v226 + (v28 * v223 + (v54 + v35 * v221)),
+            v232 = v34 * v225 + (v28 * v224 + (v55 + v35 * v222)), v233 = v232 * v227 - v231 * v228,
+            v234 = v231 * v231 + (v232 * v232 + (v230 + (v228 * v228 + v227 * v227))),
+            v235 = v233 * v233, v236 = softehl_vrcbrt(v230 * v235), v237 = (-3.0) + v236 * v234,
+            v238 = v236 * v236,
+            v239 = 6.283185307179586 * v220 * (parameters[0] + v237 * (v2 + v1 * v237)),
+            v240 = v236 * v239, v241 = v238 * (v238 * (0.3333333333333333 * v234 * v239)),
+            v242 = v230 * (2.0 * v233) * v241, v243 = v228 * v242 + 2.0 * v231 * v240;
+        s162 += v243; const V v244 = 2.0 * v232 * v240 - v227 * v242; s163 += v244;
+        const V v245 = v231 * v242 + 2.0 * v228 * v240; s161 += v245;
+        const V v246 = 2.0 * v229 * (v240 - v235 * v241), v247 = 2.0 * v227 * v240 - v232 * v242;
+        s160 += v247; const V v248 = v217 * v246; s159 += v248; s168 += v226 * v243;
+        s168 += v225 * v244; s165 += v226 * v247; s165 += v225 * v245; s165 -= v214 * v246;
+        s166 += v223 * v247; s166 -= v215 * v246; s166 += v224 * v245; s169 += v223 * v243;
+        s169 += v224 * v244; s164 += v221 * v247; s164 += v222 * v245; s167 += v221 * v243;
+        s167 += v222 * v244;
     }
-    const V v433 = v231 + s256;
-    const V v434 = v232 + s253;
-    const V v435 = v235 + s252;
-    const V v436 = s254 - v230;
-    const V v437 = v238 - v243;
-    const V v438 = v242 + s260;
-    const V v439 = s255 - v229;
-    const V v440 = s257 + v437;
-    const V v441 = s258 - v233;
-    const V v442 = s259 - v234;
-    const V v443 = v435 - v440;
-    const V v444 = v435 + v440;
-    const V v445 = v247 + v441;
-    const V v446 = s261 + v251;
-    const V v447 = v245 + v442;
-    const V v448 = s262 + v249;
-    const V v449 = v438 - v239;
-    const V v450 = v239 - v438;
-    const V v451 = v62 * v434;
-    const V v452 = v447 - v451;
-    const V v453 = v62 * v439;
-    const V v454 = v448 - v453;
-    const V v455 = v61 * v434;
-    const V v456 = v455 + v445;
-    const V v457 = v61 * v439;
-    const V v458 = v457 + v446;
-    const V v459 = v56 * v436;
-    const V v460 = v459 + v452;
-    const V v461 = v56 * v433;
-    const V v462 = v461 + v454;
-    const V v463 = v57 * v436;
-    const V v464 = v456 - v463;
-    const V v465 = v57 * v433;
-    const V v466 = v458 - v465;
-    const V v467 = v460 + v464;
-    const V v468 = v462 + v466;
-    const V v469 = v464 - v460;
-    const V v470 = v466 - v462;
-    const V v471 = v443 - v469;
-    const V v472 = v443 + v469;
-    const V v473 = v444 + v467;
-    const V v474 = v444 - v467;
-    const V v475 = v450 - v470;
-    const V v476 = v449 + v468;
-    softehl_store4(R + 0, 8, v476, v473, v475, v471);
-    const V v477 = v449 - v468;
-    const V v478 = v470 - v449;
-    softehl_store4(R + 4, 8, v477, v474, v478, v472);
+    const V v249 = v146 + s163, v250 = v147 + s160, v251 = v150 + s159, v252 = s161 - v145,
+        v253 = v153 + s167, v254 = s162 - v144, v255 = s164 + (v151 - v154), v256 = v251 - v255,
+        v257 = v251 + v255, v258 = v253 - v152,
+        v259 = v42 * v252 + (v155 + (s166 - v149) - v48 * v250),
+        v260 = v42 * v249 + (s169 + v157 - v48 * v254),
+        v261 = v47 * v250 + (v156 + (s165 - v148)) - v43 * v252,
+        v262 = v47 * v254 + (s168 + v158) - v43 * v249, v263 = v259 + v261, v264 = v260 + v262,
+        v265 = v261 - v259, v266 = v262 - v260, v267 = v256 - v265, v268 = v256 + v265,
+        v269 = v257 + v263, v270 = v257 - v263, v271 = v152 - v253 - v266, v272 = v258 + v264;
+    softehl_store4(R + 0, 8, v272, v269, v271, v267);
+    const V v273 = v258 - v264, v274 = v266 - v258;
+    softehl_store4(R + 4, 8, v273, v270, v274, v268);
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_yeoh_residual, 8, 8, 0, 0, 8, 0)
 
-void softehl_solid_taylor_mean_yeoh_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_yeoh_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_yeoh_residual_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_yeoh_residual_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_taylor_mean_yeoh_residual(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_solid_taylor_mean_yeoh_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
     const double v1 = 1.5707963267948966 * parameters[3];
-    const V v2 = X4 - X0;
-    const V v3 = X0 - X2;
-    const V v4 = X4 - X2;
-    const V v5 = v2 - X2;
-    const V v6 = X4 - X6;
-    const V v7 = X6 + v5;
-    const V v8 = X1 - X3;
-    const V v9 = X1 + X3;
-    const V v10 = v3 + v6;
-    const V v11 = X5 - X3;
-    const V v12 = v6 - v3;
-    const V v13 = 0.25 * v7;
-    const V v14 = 0.0625 * v7;
-    const V v15 = X5 - X7;
-    const V v16 = X5 + X7;
-    const V v17 = 0.25 * v12;
-    const V v18 = 0.0625 * v12;
-    const V v19 = v8 + v15;
-    const V v20 = v9 + v16;
-    const V v21 = v15 - v8;
-    const V v22 = v16 - v9;
-    const V v23 = 0.25 * v20;
-    const V v24 = 0.25 * v21;
-    const V v25 = 0.0625 * v21;
-    const V v26 = 0.25 * v22;
-    const V v27 = 0.0625 * v22;
-    const V v28 = v17 * v26;
-    const V v29 = d0 - d2;
-    const V v30 = d0 + d2;
-    const V v31 = 1.0 / v23;
-    const V v32 = v23 * v23;
-    const V v33 = v24 * v13;
-    const V v34 = v28 - v33;
-    const V v35 = v10 * v25;
-    const V v36 = v10 * v27;
-    const V v37 = 1.0 / v32;
-    const V v38 = 1.0 / v34;
-    const V v39 = v30 - d4;
-    const V v40 = v39 - d6;
-    const V v41 = d4 - d6;
-    const V v42 = d1 + d3;
-    const V v43 = d1 - d3;
-    const V v44 = d5 + d7;
-    const V v45 = d5 - d7;
-    const V v46 = v29 - v41;
-    const V v47 = v29 + v41;
-    const V v48 = 0.25 * v31;
-    const V v49 = v42 - v44;
-    const V v50 = v42 + v44;
-    const V v51 = v43 - v45;
-    const V v52 = v43 + v45;
-    const V v53 = 0.25 * v37;
-    const V v54 = v25 * v38;
-    const V v55 = v27 * v38;
-    const V v56 = v38 * v35;
-    const V v57 = v38 * v36;
-    const V v58 = v19 * v38;
-    const V v59 = v38 * v14;
-    const V v60 = v18 * v38;
-    const V v61 = v14 * v58;
-    const V v62 = v18 * v58;
-    const V v63 = 0.25 * v57;
-    const V v64 = v49 * v54;
-    const V v65 = v49 * v60;
-    const V v66 = 1.0 - v65;
-    const V v67 = 0.25 * v61;
-    const V v68 = v63 - v67;
-    const V v69 = v46 * v59;
-    const V v70 = v46 * v55;
-    const V v71 = 1.0 - v70;
-    const V v72 = v51 * v55;
-    const V v73 = v64 - v72;
-    const V v74 = v51 * v59;
-    const V v75 = v66 + v74;
-    const V v76 = 0.25 * v62;
-    const V v77 = v40 * v60;
-    const V v78 = v69 - v77;
-    const V v79 = v40 * v54;
-    const V v80 = v71 + v79;
-    const V v81 = 0.25 * v56;
-    const V v82 = v76 - v81;
-    V s83 = softehl_splat(0.0);
-    V s84 = softehl_splat(0.0);
-    V s85 = softehl_splat(0.0);
-    V s86 = softehl_splat(0.0);
-    V s87 = softehl_splat(0.0);
-    V s88 = softehl_splat(0.0);
-    V s89 = softehl_splat(0.0);
-    V s90 = softehl_splat(0.0);
+    const V v2 = X0 - X2, v3 = X4 - X2, v4 = X4 - X6, v5 = X6 + (X4 - X0 - X2), v6 = X1 - X3,
+        v7 = X1 + X3, v8 = v2 + v4, v9 = X5 - X3, v10 = v4 - v2, v11 = 0.25 * v5, v12 = 0.0625 * v5,
+        v13 = X5 - X7, v14 = X5 + X7, v15 = 0.25 * v10, v16 = 0.0625 * v10, v17 = v13 - v6,
+        v18 = v14 - v7, v19 = 0.25 * (v7 + v14), v20 = 0.25 * v17, v21 = 0.0625 * v17,
+        v22 = 0.25 * v18, v23 = 0.0625 * v18, v24 = d0 - d2, v25 = 1.0 / (v15 * v22 - v20 * v11),
+        v26 = d0 + d2 - d4 - d6, v27 = d4 - d6, v28 = d1 + d3, v29 = d1 - d3, v30 = d5 + d7,
+        v31 = d5 - d7, v32 = v24 - v27, v33 = v24 + v27, v34 = 0.25 * (1.0 / v19), v35 = v28 - v30,
+        v36 = v28 + v30, v37 = v29 - v31, v38 = v29 + v31, v39 = 0.25 * (1.0 / (v19 * v19)),
+        v40 = v21 * v25, v41 = v23 * v25, v42 = v25 * (v8 * v21), v43 = v25 * (v8 * v23),
+        v44 = (v6 + v13) * v25, v45 = v25 * v12, v46 = v16 * v25, v47 = v12 * v44, v48 = v16 * v44,
+        v49 = 0.25 * v43 - 0.25 * v47, v50 = v35 * v40 - v37 * v41,
+        v51 = 1.0 - v35 * v46 + v37 * v45, v52 = v32 * v45 - v26 * v46,
+        v53 = 1.0 - v32 * v41 + v26 * v40, v54 = 0.25 * v48 - 0.25 * v42;
+    V s55 = {0}, s56 = {0}, s57 = {0}, s58 = {0}, s59 = {0}, s60 = {0}, s61 = {0}, s62 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v91 = 1.0 - w[1];
-        const double v92 = 1.0 + w[1];
-        const double v93 = 0.25 * w[1];
-        const double v94 = 1.0 - w[0];
-        const double v95 = 1.0 + w[0];
-        const double v96 = 0.25 * w[0];
-        const double v97 = 0.25 * v92;
-        const double v98 = 0.25 - v93;
-        const double v99 = 0.25 + v93;
-        const double v100 = 0.25 + v96;
-        const double v101 = 0.25 - v96;
-        const V v102 = X5 * v95;
-        const double v103 = v93 - 0.25;
-        const V v104 = X3 * v95;
-        const V v105 = X3 * v98;
-        const V v106 = X2 * v98;
-        const double v107 = v96 - 0.25;
-        const V v108 = X6 * v101;
-        const V v109 = X7 * v101;
-        const V v110 = X7 * v94;
-        const V v111 = v102 + v110;
-        const V v112 = X1 * v94;
-        const V v113 = v112 + v104;
-        const V v114 = v97 * v111;
-        const V v115 = X1 * v103;
-        const V v116 = v105 + v115;
-        const V v117 = X1 * v107;
-        const V v118 = v109 + v117;
-        const V v119 = X0 * v103;
-        const V v120 = v106 + v119;
-        const V v121 = X0 * v107;
-        const V v122 = v108 + v121;
-        const V v123 = 0.25 * v113;
-        const V v124 = v91 * v123;
-        const V v125 = v114 + v124;
-        const V v126 = v99 * v15;
-        const V v127 = v126 + v116;
-        const V v128 = v99 * v6;
-        const V v129 = v128 + v120;
-        const V v130 = v100 * v11;
-        const V v131 = v130 + v118;
-        const V v132 = v100 * v4;
-        const V v133 = v132 + v122;
-        const double v134 = w[1] * w[2];
-        const V v135 = w[0] * v129;
-        const V v136 = v129 * v131;
-        const V v137 = w[1] * v131;
-        const V v138 = w[1] * v133;
-        const V v139 = v135 - v138;
-        const V v140 = v133 * v127;
-        const V v141 = v136 - v140;
-        const V v142 = w[0] * v127;
-        const V v143 = v137 - v142;
-        const V v144 = w[2] * v125;
-        const V v145 = v125 * v141;
-        const V v146 = 0.25 * v141;
-        const V v147 = v144 * v143;
-        s89 += v147;
-        const V v148 = v144 * v139;
-        s90 += v148;
-        const V v149 = w[2] * v146;
-        s83 += v149;
-        const V v150 = v134 * v146;
-        s85 += v150;
-        const V v151 = w[2] * v145;
-        s86 += v151;
-        const V v152 = v134 * v145;
-        s88 += v152;
-        const V v153 = w[0] * v149;
-        s84 += v153;
-        const V v154 = w[0] * v151;
-        s87 += v154;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v63 = 1.0 - w[1], v64 = 1.0 + w[1], v65 = 0.25 * w[1], v66 = 1.0 - w[0],
+            v67 = 1.0 + w[0], v68 = 0.25 * w[0], v69 = 0.25 * v64, v70 = 0.25 - v65,
+            v71 = 0.25 + v65, v72 = 0.25 + v68, v73 = 0.25 - v68;
+        const V v74 = X5 * v67; const double v75 = v65 - 0.25;
+        const V v76 = X3 * v67, v77 = X3 * v70, v78 = X2 * v70;
+        const double v79 = v68 - 0.25;
+        const V v80 = X6 * v73, v81 = X7 * v73, v82 = X7 * v66, v83 = v74 + v82, v84 = X1 * v66,
+            v85 = v84 + v76, v86 = v69 * v83, v87 = X1 * v75, v88 = v77 + v87, v89 = X1 * v79,
+            v90 = v81 + v89, v91 = X0 * v75, v92 = v78 + v91, v93 = X0 * v79, v94 = v80 + v93,
+            v95 = 0.25 * v85, v96 = v63 * v95, v97 = v86 + v96, v98 = v71 * v13, v99 = v98 + v88,
+            v100 = v71 * v4, v101 = v100 + v92, v102 = v72 * v9, v103 = v102 + v90, v104 = v72 * v3,
+            v105 = v104 + v94;
+        const double v106 = w[1] * w[2];
+        const V v107 = v101 * v103, v108 = v105 * v99, v109 = v107 - v108, v110 = w[2] * v97,
+            v111 = v97 * v109, v112 = 0.25 * v109;
+        s61 += v110 * (w[1] * v103 - w[0] * v99); s62 += v110 * (w[0] * v101 - w[1] * v105);
+        const V v113 = w[2] * v112; s55 += v113; s57 += v106 * v112; const V v114 = w[2] * v111;
+        s58 += v114; s60 += v106 * v111; s56 += w[0] * v113; s59 += w[0] * v114;
     }
-    const V v155 = 1.0 / s86;
-    const V v156 = s86 * v1;
-    const V v157 = s87 * v155;
-    const V v158 = v155 * s88;
-    const V v159 = v155 * s89;
-    const V v160 = 0.25 * v159;
-    const V v161 = v155 * s90;
-    const V v162 = 0.25 * v161;
-    const V v163 = s83 * v155;
-    const V v164 = s84 * v155;
-    const V v165 = s85 * v155;
-    const V v166 = 2.0 * v165;
-    const V v167 = 2.0 * v164;
-    const V v168 = 2.0 * v163;
-    const V v169 = v61 * v160;
-    const V v170 = v61 * v162;
-    const V v171 = v62 * v160;
-    const V v172 = v62 * v162;
-    const V v173 = v56 * v160;
-    const V v174 = v56 * v162;
-    const V v175 = v171 - v173;
-    const V v176 = v173 - v171;
-    const V v177 = v172 - v174;
-    const V v178 = v174 - v172;
-    const V v179 = v163 * v50;
-    const V v180 = 1.0 + v179;
-    const V v181 = v177 - v60;
-    const V v182 = v57 * v160;
-    const V v183 = v57 * v162;
-    const V v184 = v169 - v182;
-    const V v185 = v182 - v169;
-    const V v186 = v170 - v183;
-    const V v187 = v183 - v170;
-    const V v188 = v165 * v49;
-    const V v189 = v180 - v188;
-    const V v190 = v47 * v160;
-    const V v191 = v80 + v190;
-    const V v192 = v47 * v162;
-    const V v193 = v78 + v192;
-    const V v194 = v52 * v160;
-    const V v195 = v73 + v194;
-    const V v196 = v52 * v162;
-    const V v197 = v75 + v196;
-    const V v198 = v164 * v51;
-    const V v199 = v189 - v198;
-    const V v200 = 2.0 * v199;
-    const V v201 = v199 * v199;
-    const V v202 = v51 * v185;
-    const V v203 = v202 + v195;
-    const V v204 = v51 * v187;
-    const V v205 = v204 + v197;
-    const V v206 = v55 + v184;
-    const V v207 = v59 - v186;
-    const V v208 = v46 * v185;
-    const V v209 = v208 + v191;
-    const V v210 = v46 * v187;
-    const V v211 = v210 + v193;
-    const V v212 = v164 * v200;
-    const V v213 = v54 + v175;
-    const V v214 = v165 * v200;
-    const V v215 = v163 * v200;
-    const V v216 = v40 * v175;
-    const V v217 = v216 + v209;
-    const V v218 = v40 * v177;
-    const V v219 = v218 + v211;
-    const V v220 = v207 * v217;
-    const V v221 = v201 * v156;
-    const V v222 = v181 * v217;
-    const V v223 = v162 * v217;
-    const V v224 = v49 * v175;
-    const V v225 = v224 + v203;
-    const V v226 = v49 * v177;
-    const V v227 = v226 + v205;
-    const V v228 = v225 * v207;
-    const V v229 = v227 * v217;
-    const V v230 = v227 * v213;
-    const V v231 = v213 * v219;
-    const V v232 = v222 - v231;
-    const V v233 = v160 * v219;
-    const V v234 = v223 - v233;
-    const V v235 = v160 * v227;
-    const V v236 = v225 * v219;
-    const V v237 = v229 - v236;
-    const V v238 = v162 * v225;
-    const V v239 = v235 - v238;
-    const V v240 = 2.0 * v237;
-    const V v241 = v237 * v237;
-    const V v242 = v227 * v206;
-    const V v243 = v228 + v242;
-    const V v244 = v206 * v219;
-    const V v245 = v220 + v244;
-    const V v246 = v225 * v181;
-    const V v247 = v230 - v246;
-    const V v248 = v232 * v240;
-    const V v249 = v240 * v245;
-    const V v250 = v201 * v241;
-    const V v251 = v201 * v240;
-    const V v252 = v200 * v241;
-    const V v253 = v234 * v240;
-    const V v254 = v156 * v240;
-    const V v255 = v156 * v241;
-    const V v256 = 1.0 / v250;
-    const V v257 = v240 * v254;
-    const V v258 = v221 * v253;
-    const V v259 = v215 * v255;
-    const V v260 = v201 * v249;
-    const V v261 = v201 * v248;
-    const V v262 = v201 * v257;
-    const V v263 = v201 * v262;
-    const V v264 = v214 * v241;
-    const V v265 = v261 - v264;
-    const V v266 = v212 * v241;
-    const V v267 = v260 - v266;
-    const V v268 = v256 * v256;
-    const V v269 = v258 * v268;
-    const V v270 = v259 * v268;
-    const V v271 = v263 * v268;
-    const V v272 = 1.0 - v256;
-    const V v273 = v156 * v272;
-    const V v274 = v156 * v268;
-    const V v275 = v265 * v274;
-    const V v276 = v267 * v274;
-    const V v277 = v215 * v273;
-    const V v278 = v248 * v273;
-    const V v279 = v249 * v273;
-    const V v280 = v253 * v273;
-    const V v281 = v201 * v270;
-    const V v282 = v277 + v281;
-    const V v283 = v252 * v270;
-    const V v284 = v241 * v269;
-    const V v285 = v280 + v284;
-    const V v286 = v251 * v269;
-    const V v287 = v241 * v275;
-    const V v288 = v278 + v287;
-    const V v289 = v201 * v275;
-    const V v290 = v214 * v273;
-    const V v291 = v289 - v290;
-    const V v292 = v241 * v276;
-    const V v293 = v279 + v292;
-    const V v294 = v241 * v273;
-    const V v295 = v201 * v276;
-    const V v296 = v212 * v273;
-    const V v297 = v295 - v296;
-    const V v298 = v201 * v273;
-    const V v299 = v168 * v294;
-    const V v300 = v283 + v299;
-    const V v301 = 2.0 * v298;
-    const V v302 = v271 + v301;
-    const V v303 = v234 * v301;
-    const V v304 = v286 + v303;
-    const V v305 = v240 * v298;
-    const V v306 = v240 * v282;
-    const V v307 = v240 * v291;
-    const V v308 = v240 * v297;
-    const V v309 = v232 * v301;
-    const V v310 = v307 + v309;
-    const V v311 = v245 * v301;
-    const V v312 = v308 + v311;
-    const V v313 = v247 * v302;
-    const V v314 = v243 * v302;
-    const V v315 = v239 * v302;
-    const V v316 = v200 * v285;
-    const V v317 = v200 * v288;
-    const V v318 = v200 * v293;
-    const V v319 = v200 * v294;
-    const V v320 = v166 * v294;
-    const V v321 = v317 - v320;
-    const V v322 = v167 * v294;
-    const V v323 = v318 - v322;
-    const V v324 = v213 * v305;
-    const V v325 = v181 * v305;
-    const V v326 = v207 * v305;
-    const V v327 = v165 * v321;
-    const V v328 = v165 * v316;
-    const V v329 = v164 * v316;
-    const V v330 = v164 * v319;
-    const V v331 = v165 * v319;
-    const V v332 = v163 * v319;
-    const V v333 = v225 * v306;
-    const V v334 = v227 * v306;
-    const V v335 = v217 * v306;
-    const V v336 = v219 * v306;
-    const V v337 = v162 * v333;
-    const V v338 = v162 * v335;
-    const V v339 = v160 * v334;
-    const V v340 = v160 * v336;
-    const V v341 = v178 * v333;
-    const V v342 = v186 * v333;
-    const V v343 = v177 * v335;
-    const V v344 = v187 * v335;
-    const V v345 = v175 * v334;
-    const V v346 = v341 + v345;
-    const V v347 = v185 * v334;
-    const V v348 = v342 + v347;
-    const V v349 = v176 * v336;
-    const V v350 = v343 + v349;
-    const V v351 = v184 * v336;
-    const V v352 = v344 + v351;
-    const V v353 = v163 * v300;
-    const V v354 = v165 * v300;
-    const V v355 = v164 * v300;
-    const V v356 = v165 * v323;
-    const V v357 = v164 * v323;
-    const V v358 = v225 * v305;
-    const V v359 = v219 * v305;
-    const V v360 = v227 * v305;
-    const V v361 = v217 * v305;
-    const V v362 = v160 * v305;
-    const V v363 = v160 * v359;
-    const V v364 = v160 * v360;
-    const V v365 = v162 * v305;
-    const V v366 = v162 * v358;
-    const V v367 = v162 * v361;
-    const V v368 = v217 * v304;
-    const V v369 = v225 * v304;
-    const V v370 = v362 + v369;
-    const V v371 = v219 * v304;
-    const V v372 = v227 * v304;
-    const V v373 = v365 + v372;
-    const V v374 = v177 * v361;
-    const V v375 = v187 * v361;
-    const V v376 = v162 * v368;
-    const V v377 = v177 * v368;
-    const V v378 = v187 * v368;
-    const V v379 = v162 * v370;
-    const V v380 = v225 * v313;
-    const V v381 = v227 * v313;
-    const V v382 = v225 * v314;
-    const V v383 = v227 * v314;
-    const V v384 = v225 * v315;
-    const V v385 = v227 * v315;
-    const V v386 = v178 * v380;
-    const V v387 = v178 * v370;
-    const V v388 = v186 * v370;
-    const V v389 = v178 * v382;
-    const V v390 = v186 * v382;
-    const V v391 = v162 * v384;
-    const V v392 = v178 * v384;
-    const V v393 = v186 * v384;
-    const V v394 = v175 * v381;
-    const V v395 = v386 + v394;
-    const V v396 = v175 * v383;
-    const V v397 = v185 * v383;
-    const V v398 = v175 * v385;
-    const V v399 = v392 + v398;
-    const V v400 = v185 * v385;
-    const V v401 = v393 + v400;
-    const V v402 = v160 * v385;
-    const V v403 = v185 * v373;
-    const V v404 = v388 + v403;
-    const V v405 = v160 * v373;
-    const V v406 = v175 * v373;
-    const V v407 = v387 + v406;
-    const V v408 = v178 * v358;
-    const V v409 = v186 * v358;
-    const V v410 = v160 * v371;
-    const V v411 = v175 * v360;
-    const V v412 = v408 + v411;
-    const V v413 = v185 * v360;
-    const V v414 = v409 + v413;
-    const V v415 = v176 * v371;
-    const V v416 = v377 + v415;
-    const V v417 = v184 * v371;
-    const V v418 = v378 + v417;
-    const V v419 = v176 * v359;
-    const V v420 = v374 + v419;
-    const V v421 = v184 * v359;
-    const V v422 = v375 + v421;
-    const V v423 = v217 * v310;
-    const V v424 = v217 * v312;
-    const V v425 = v219 * v310;
-    const V v426 = v219 * v312;
-    const V v427 = v176 * v425;
-    const V v428 = v176 * v426;
-    const V v429 = v184 * v426;
-    const V v430 = v225 * v312;
-    const V v431 = v225 * v310;
-    const V v432 = v324 + v431;
-    const V v433 = v227 * v310;
-    const V v434 = v325 + v433;
-    const V v435 = v227 * v312;
-    const V v436 = v326 + v435;
-    const V v437 = v206 * v305;
-    const V v438 = v430 - v437;
-    const V v439 = v177 * v423;
-    const V v440 = v427 + v439;
-    const V v441 = v177 * v424;
-    const V v442 = v428 + v441;
-    const V v443 = v187 * v424;
-    const V v444 = v429 + v443;
-    const V v445 = v185 * v434;
-    const V v446 = v185 * v436;
-    const V v447 = v162 * v432;
-    const V v448 = v162 * v438;
-    const V v449 = v160 * v434;
-    const V v450 = v160 * v436;
-    const V v451 = v175 * v434;
-    const V v452 = v175 * v436;
-    const V v453 = v186 * v432;
-    const V v454 = v445 + v453;
-    const V v455 = v186 * v438;
-    const V v456 = v446 + v455;
-    const V v457 = v178 * v432;
-    const V v458 = v451 + v457;
-    const V v459 = v178 * v438;
-    const V v460 = v452 + v459;
-    V s461 = softehl_splat(0.0);
-    V s462 = softehl_splat(0.0);
-    V s463 = softehl_splat(0.0);
-    V s464 = softehl_splat(0.0);
-    V s465 = softehl_splat(0.0);
-    V s466 = softehl_splat(0.0);
-    V s467 = softehl_splat(0.0);
-    V s468 = softehl_splat(0.0);
-    V s469 = softehl_splat(0.0);
-    V s470 = softehl_splat(0.0);
-    V s471 = softehl_splat(0.0);
-    V s472 = softehl_splat(0.0);
-    V s473 = softehl_splat(0.0);
-    V s474 = softehl_splat(0.0);
-    V s475 = softehl_splat(0.0);
-    V s476 = softehl_splat(0.0);
-    V s477 = softehl_splat(0.0);
-    V s478 = softehl_splat(0.0);
-    V s479 = softehl_splat(0.0);
-    V s480 = softehl_splat(0.0);
-    V s481 = softehl_splat(0.0);
-    V s482 = softehl_splat(0.0);
-    V s483 = softehl_splat(0.0);
-    V s484 = softehl_splat(0.0);
-    V s485 = softehl_splat(0.0);
-    V s486 = softehl_splat(0.0);
-    V s487 = softehl_splat(0.0);
-    V s488 = softehl_splat(0.0);
-    V s489 = softehl_splat(0.0);
-    V s490 = softehl_splat(0.0);
-    V s491 = softehl_splat(0.0);
-    V s492 = softehl_splat(0.0);
-    V s493 = softehl_splat(0.0);
-    V s494 = softehl_splat(0.0);
-    V s495 = softehl_splat(0.0);
-    V s496 = softehl_splat(0.0);
-    V s497 = softehl_splat(0.0);
-    V s498 = softehl_splat(0.0);
-    V s499 = softehl_splat(0.0);
-    V s500 = softehl_splat(0.0);
-    V s501 = softehl_splat(0.0);
-    V s502 = softehl_splat(0.0);
-    V s503 = softehl_splat(0.0);
-    V s504 = softehl_splat(0.0);
-    V s505 = softehl_splat(0.0);
-    V s506 = softehl_splat(0.0);
-    V s507 = softehl_splat(0.0);
-    V s508 = softehl_splat(0.0);
-    V s509 = softehl_splat(0.0);
-    V s510 = softehl_splat(0.0);
-    V s511 = softehl_splat(0.0);
-    V s512 = softehl_splat(0.0);
-    V s513 = softehl_splat(0.0);
-    V s514 = softehl_splat(0.0);
-    V s515 = softehl_splat(0.0);
-    V s516 = softehl_splat(0.0);
-    V s517 = softehl_splat(0.0);
-    V s518 = softehl_splat(0.0);
-    V s519 = softehl_splat(0.0);
-    V s520 = softehl_splat(0.0);
-    V s521 = softehl_splat(0.0);
+    const V v115 = 1.0 / s58, v116 = s58 * v1, v117 = s59 * v115, v118 = v115 * s60,
+        v119 = v115 * s61, v120 = 0.25 * v119, v121 = v115 * s62, v122 = 0.25 * v121,
+        v123 = s55 * v115, v124 = s56 * v115, v125 = s57 * v115, v126 = v47 * v120,
+        v127 = v47 * v122, v128 = v48 * v120, v129 = v48 * v122, v130 = v42 * v120,
+        v131 = v42 * v122, v132 = v128 - v130, v133 = v130 - v128, v134 = v129 - v131,
+        v135 = v131 - v129, v136 = v134 - v46, v137 = v43 * v120, v138 = v43 * v122,
+        v139 = v126 - v137, v140 = v137 - v126, v141 = v127 - v138, v142 = v138 - v127,
+        v143 = 1.0 + v123 * v36 - v125 * v35 - v124 * v37, v144 = 2.0 * v143, v145 = v143 * v143,
+        v146 = v41 + v139, v147 = v45 - v141, v148 = v124 * v144, v149 = v40 + v132,
+        v150 = v125 * v144, v151 = v123 * v144,
+        v152 = v26 * v132 + (v32 * v140 + (v53 + v33 * v120)),
+        v153 = v26 * v134 + (v32 * v142 + (v52 + v33 * v122)),
+        v154 = v35 * v132 + (v37 * v140 + (v50 + v38 * v120)),
+        v155 = v35 * v134 + (v37 * v142 + (v51 + v38 * v122)), v156 = v136 * v152 - v149 * v153,
+        v157 = v122 * v152 - v120 * v153, v158 = v155 * v152 - v154 * v153, v159 = 2.0 * v158,
+        v160 = v158 * v158, v161 = v147 * v152 + v146 * v153, v162 = v156 * v159,
+        v163 = v159 * v161, v164 = v157 * v159, v165 = 1.0 / (v145 * v160), v166 = v165 * v165,
+        v167 = v145 * v116 * v164 * v166, v168 = v151 * (v116 * v160) * v166,
+        v169 = v116 * (1.0 - v165), v170 = v116 * v166, v171 = (v145 * v162 - v150 * v160) * v170,
+        v172 = (v145 * v163 - v148 * v160) * v170, v173 = v160 * v169, v174 = v145 * v169,
+        v175 = v144 * v160 * v168 + 2.0 * v123 * v173, v176 = 2.0 * v174,
+        v177 = v145 * (v145 * (v159 * (v116 * v159))) * v166 + v176,
+        v178 = v145 * v159 * v167 + v157 * v176, v179 = v159 * v174,
+        v180 = v159 * (v151 * v169 + v145 * v168),
+        v181 = v159 * (v145 * v171 - v150 * v169) + v156 * v176,
+        v182 = v159 * (v145 * v172 - v148 * v169) + v161 * v176,
+        v183 = (v155 * v149 - v154 * v136) * v177, v184 = (v154 * v147 + v155 * v146) * v177,
+        v185 = (v120 * v155 - v122 * v154) * v177, v186 = v144 * (v164 * v169 + v160 * v167),
+        v187 = v144 * v173, v188 = v144 * (v163 * v169 + v160 * v172) - 2.0 * v124 * v173,
+        v189 = v125 * (v144 * (v162 * v169 + v160 * v171) - 2.0 * v125 * v173), v190 = v125 * v186,
+        v191 = v124 * v186, v192 = v124 * v187, v193 = v125 * v187, v194 = v123 * v187,
+        v195 = v154 * v180, v196 = v155 * v180, v197 = v152 * v180, v198 = v153 * v180,
+        v199 = v122 * v195, v200 = v122 * v197, v201 = v120 * v196, v202 = v120 * v198,
+        v203 = v135 * v195 + v132 * v196, v204 = v141 * v195 + v140 * v196,
+        v205 = v134 * v197 + v133 * v198, v206 = v142 * v197 + v139 * v198, v207 = v123 * v175,
+        v208 = v125 * v175, v209 = v124 * v175, v210 = v125 * v188, v211 = v124 * v188,
+        v212 = v154 * v179, v213 = v153 * v179, v214 = v155 * v179, v215 = v152 * v179,
+        v216 = v120 * v213, v217 = v120 * v214, v218 = v122 * v212, v219 = v122 * v215,
+        v220 = v152 * v178, v221 = v120 * v179 + v154 * v178, v222 = v153 * v178,
+        v223 = v122 * v179 + v155 * v178, v224 = v122 * v220, v225 = v122 * v221,
+        v226 = v154 * v183, v227 = v155 * v183, v228 = v154 * v184, v229 = v155 * v184,
+        v230 = v154 * v185, v231 = v155 * v185, v232 = v135 * v228, v233 = v141 * v228,
+        v234 = v122 * v230, v235 = v135 * v226 + v132 * v227, v236 = v132 * v229,
+        v237 = v140 * v229, v238 = v135 * v230 + v132 * v231, v239 = v141 * v230 + v140 * v231,
+        v240 = v120 * v231, v241 = v141 * v221 + v140 * v223, v242 = v120 * v223,
+        v243 = v135 * v221 + v132 * v223, v244 = v120 * v222, v245 = v135 * v212 + v132 * v214,
+        v246 = v141 * v212 + v140 * v214, v247 = v134 * v220 + v133 * v222,
+        v248 = v142 * v220 + v139 * v222, v249 = v134 * v215 + v133 * v213,
+        v250 = v142 * v215 + v139 * v213, v251 = v152 * v181, v252 = v152 * v182,
+        v253 = v153 * v181, v254 = v153 * v182, v255 = v149 * v179 + v154 * v181,
+        v256 = v136 * v179 + v155 * v181, v257 = v147 * v179 + v155 * v182,
+        v258 = v154 * v182 - v146 * v179, v259 = v133 * v253 + v134 * v251,
+        v260 = v133 * v254 + v134 * v252, v261 = v139 * v254 + v142 * v252, v262 = v122 * v255,
+        v263 = v122 * v258, v264 = v120 * v256, v265 = v120 * v257,
+        v266 = v140 * v256 + v141 * v255, v267 = v140 * v257 + v141 * v258,
+        v268 = v132 * v256 + v135 * v255, v269 = v132 * v257 + v135 * v258;
+    V s270 = {0}, s271 = {0}, s272 = {0}, s273 = {0}, s274 = {0}, s275 = {0}, s276 = {0},
+        s277 = {0}, s278 = {0}, s279 = {0}, s280 = {0}, s281 = {0}, s282 = {0}, s283 = {0},
+        s284 = {0}, s285 = {0}, s286 = {0}, s287 = {0}, s288 = {0}, s289 = {0}, s290 = {0},
+        s291 = {0}, s292 = {0}, s293 = {0}, s294 = {0}, s295 = {0}, s296 = {0}, s297 = {0},
+        s298 = {0}, s299 = {0}, s300 = {0}, s301 = {0}, s302 = {0}, s303 = {0}, s304 = {0},
+        s305 = {0}, s306 = {0}, s307 = {0}, s308 = {0}, s309 = {0}, s310 = {0}, s311 = {0},
+        s312 = {0}, s313 = {0}, s314 = {0}, s315 = {0}, s316 = {0}, s317 = {0}, s318 = {0},
+        s319 = {0}, s320 = {0}, s321 = {0}, s322 = {0}, s323 = {0}, s324 = {0}, s325 = {0},
+        s326 = {0}, s327 = {0}, s328 = {0}, s329 = {0}, s330 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v522 = 0.25 * w[1];
-        const double v523 = 0.25 - v522;
-        const double v524 = 0.25 + v522;
-        const double v525 = v522 - 0.25;
-        const V v526 = X1 * v525;
-        const V v527 = X3 * v523;
-        const V v528 = v527 + v526;
-        const V v529 = v524 * v15;
-        const V v530 = v529 + v528;
-        const double v531 = 0.25 * w[0];
-        const double v532 = 0.25 + v531;
-        const double v533 = 0.25 - v531;
-        const double v534 = v531 - 0.25;
-        const V v535 = X0 * v534;
-        const V v536 = X6 * v533;
-        const V v537 = v536 + v535;
-        const V v538 = v532 * v4;
-        const V v539 = v538 + v537;
-        const V v540 = X7 * v533;
-        const V v541 = X1 * v534;
-        const V v542 = v540 + v541;
-        const V v543 = v532 * v11;
-        const V v544 = v543 + v542;
-        const V v545 = X2 * v523;
-        const V v546 = X0 * v525;
-        const V v547 = v545 + v546;
-        const V v548 = v524 * v6;
-        const V v549 = v548 + v547;
-        const V v550 = v549 * v544;
-        const double v551 = 1.0 - w[1];
-        const double v552 = 1.0 + w[1];
-        const double v553 = 1.0 - w[0];
-        const double v554 = 1.0 + w[0];
-        const double v555 = 0.25 * v552;
-        const V v556 = v539 * v530;
-        const V v557 = v550 - v556;
-        const V v558 = X7 * v553;
-        const V v559 = X1 * v553;
-        const V v560 = X5 * v554;
-        const V v561 = v560 + v558;
-        const V v562 = X3 * v554;
-        const V v563 = v559 + v562;
-        const V v564 = v555 * v561;
-        const V v565 = 0.25 * v563;
-        const V v566 = v551 * v565;
-        const V v567 = v564 + v566;
-        const V v568 = v567 * v557;
-        const V v569 = w[2] * v568;
-        const V v570 = 6.283185307179586 * v569;
-        const V v571 = w[0] - v157;
-        const V v572 = w[1] - v158;
-        const V v573 = parameters[2] * v570;
-        const V v574 = parameters[1] * v570;
-        const V v575 = parameters[0] * v570;
-        const V v576 = v24 * v571;
-        const V v577 = v26 * v572;
-        const V v578 = 3.0 * v573;
-        const V v579 = v17 * v571;
-        const V v580 = v48 * v571;
-        const V v581 = v164 + v580;
-        const V v582 = v48 * v572;
-        const V v583 = v165 + v582;
-        const V v584 = v13 * v572;
-        const V v585 = v579 - v584;
-        const V v586 = v577 + v576;
-        const V v587 = v38 * v585;
-        const V v588 = v161 + v587;
-        const V v589 = v577 - v576;
-        const V v590 = v38 * v589;
-        const V v591 = v159 + v590;
-        const V v592 = v53 * v586;
-        const V v593 = v163 - v592;
-        const V v594 = 2.0 * v574;
-        const V v595 = 0.25 * v588;
-        const V v596 = v588 * v82;
-        const V v597 = v588 * v68;
-        const V v598 = v591 * v82;
-        const V v599 = v591 * v68;
-        const V v600 = 0.25 * v591;
-        const V v601 = v593 * v593;
-        const V v602 = v593 * v50;
-        const V v603 = 1.0 + v602;
-        const V v604 = v47 * v595;
-        const V v605 = v78 + v604;
-        const V v606 = v52 * v595;
-        const V v607 = v75 + v606;
-        const V v608 = v52 * v600;
-        const V v609 = v73 + v608;
-        const V v610 = v47 * v600;
-        const V v611 = v80 + v610;
-        const V v612 = v40 * v596;
-        const V v613 = v612 + v605;
-        const V v614 = v40 * v598;
-        const V v615 = v614 + v611;
-        const V v616 = v46 * v597;
-        const V v617 = v616 + v613;
-        const V v618 = v46 * v599;
-        const V v619 = v618 + v615;
-        const V v620 = 2.0 * v617;
-        const V v621 = v49 * v596;
-        const V v622 = v621 + v607;
-        const V v623 = v583 * v49;
-        const V v624 = v603 - v623;
-        const V v625 = v49 * v598;
-        const V v626 = v625 + v609;
-        const V v627 = v617 * v617;
-        const V v628 = 2.0 * v619;
-        const V v629 = v51 * v597;
-        const V v630 = v629 + v622;
-        const V v631 = v51 * v599;
-        const V v632 = v631 + v626;
-        const V v633 = v581 * v51;
-        const V v634 = v624 - v633;
-        const V v635 = 2.0 * v630;
-        const V v636 = v619 * v619;
-        const V v637 = v636 + v627;
-        const V v638 = v619 * v630;
-        const V v639 = 2.0 * v632;
-        const V v640 = v634 * v634;
-        const V v641 = 2.0 * v634;
-        const V v642 = v632 * v632;
-        const V v643 = v642 + v637;
-        const V v644 = v617 * v632;
-        const V v645 = v638 - v644;
-        const V v646 = v630 * v630;
-        const V v647 = v646 + v643;
-        const V v648 = v640 + v647;
-        const V v649 = 2.0 * v645;
-        const V v650 = v645 * v645;
-        const V v651 = v641 * v641;
-        const V v652 = v640 * v650;
-        const V v653 = softehl_vrcbrt(v652);
-        const V v654 = v640 * v649;
-        const V v655 = v630 * v649;
-        const V v656 = v619 * v649;
-        const V v657 = v632 * v649;
-        const V v658 = v617 * v649;
-        const V v659 = v641 * v650;
-        const V v660 = 0.3333333333333333 * v650;
-        const V v661 = v640 * v655;
-        const V v662 = v640 * v656;
-        const V v663 = v640 * v657;
-        const V v664 = v640 * v658;
-        const V v665 = 0.3333333333333333 * v654;
-        const V v666 = v653 * v653;
-        const V v667 = 0.3333333333333333 * v666;
-        const V v668 = v666 * v667;
-        const V v669 = v668 * v659;
-        const V v670 = v668 * v661;
-        const V v671 = v668 * v662;
-        const V v672 = v668 * v663;
-        const V v673 = v668 * v664;
-        const V v674 = v653 * v666;
-        const V v675 = v650 * v668;
-        const V v676 = v654 * v668;
-        const V v677 = 1.3333333333333333 * v653;
-        const V v678 = v674 * v677;
-        const V v679 = v674 * v678;
-        const V v680 = v675 * v648;
-        const V v681 = v653 - v680;
-        const V v682 = v676 * v648;
-        const V v683 = v668 * v648;
-        const V v684 = v672 * v648;
-        const V v685 = v673 * v648;
-        const V v686 = v653 * v648;
-        const V v687 = (-3.0) + v686;
-        const V v688 = 2.0 * v687;
-        const V v689 = v628 * v653;
-        const V v690 = v670 * v648;
-        const V v691 = v689 - v690;
-        const V v692 = v620 * v653;
-        const V v693 = v692 + v684;
-        const V v694 = v639 * v653;
-        const V v695 = v694 + v685;
-        const V v696 = v635 * v653;
-        const V v697 = v671 * v648;
-        const V v698 = v696 - v697;
-        const V v699 = v641 * v653;
-        const V v700 = v669 * v648;
-        const V v701 = v699 - v700;
-        const V v702 = v578 * v687;
-        const V v703 = v687 * v702;
-        const V v704 = v575 + v703;
-        const V v705 = v574 * v688;
-        const V v706 = v704 + v705;
-        const V v707 = v578 * v688;
-        const V v708 = v594 + v707;
-        const V v709 = v701 * v708;
-        const V v710 = v698 * v708;
-        const V v711 = v693 * v708;
-        const V v712 = v695 * v708;
-        const V v713 = v694 * v708;
-        const V v714 = v696 * v708;
-        const V v715 = v653 * v709;
-        const V v716 = v669 * v706;
-        const V v717 = v715 - v716;
-        const V v718 = v653 * v710;
-        const V v719 = v671 * v706;
-        const V v720 = v718 - v719;
-        const V v721 = v653 * v711;
-        const V v722 = v653 * v712;
-        const V v723 = v648 * v713;
-        const V v724 = v648 * v714;
-        const V v725 = v672 * v706;
-        const V v726 = v721 + v725;
-        const V v727 = v673 * v706;
-        const V v728 = v722 + v727;
-        const V v729 = v639 * v706;
-        const V v730 = v723 + v729;
-        const V v731 = v635 * v706;
-        const V v732 = v724 + v731;
-        const V v733 = v648 * v706;
-        const V v734 = v653 * v706;
-        const V v735 = v691 * v708;
-        const V v736 = v653 * v735;
-        const V v737 = v670 * v706;
-        const V v738 = v736 - v737;
-        const V v739 = v681 * v708;
-        const V v740 = v682 * v708;
-        const V v741 = v689 * v708;
-        const V v742 = v692 * v708;
-        const V v743 = v648 * v741;
-        const V v744 = v648 * v742;
-        const V v745 = v648 * v739;
-        const V v746 = v653 * v739;
-        const V v747 = v706 + v745;
-        const V v748 = v660 * v733;
-        const V v749 = v665 * v733;
-        const V v750 = v668 * v733;
-        const V v751 = v668 * v747;
-        const V v752 = v679 * v748;
-        const V v753 = v751 - v752;
-        const V v754 = v679 * v749;
-        const V v755 = v683 * v740;
-        const V v756 = v754 + v755;
-        const V v757 = v640 * v750;
-        const V v758 = v675 * v706;
-        const V v759 = v746 - v758;
-        const V v760 = v650 * v753;
-        const V v761 = v759 - v760;
-        const V v762 = v651 * v761;
-        const V v763 = 2.0 * v734;
-        const V v764 = v650 * v750;
-        const V v765 = v734 - v764;
-        const V v766 = v650 * v756;
-        const V v767 = v653 * v740;
-        const V v768 = v766 - v767;
-        const V v769 = v654 * v756;
-        const V v770 = v635 * v734;
-        const V v771 = 2.0 * v757;
-        const V v772 = v769 - v771;
-        const V v773 = v639 * v734;
-        const V v774 = v620 * v734;
-        const V v775 = v628 * v734;
-        const V v776 = v676 * v730;
-        const V v777 = v649 * v757;
-        const V v778 = v649 * v750;
-        const V v779 = v768 - v778;
-        const V v780 = v628 * v738;
-        const V v781 = v763 + v780;
-        const V v782 = v620 * v717;
-        const V v783 = v628 * v717;
-        const V v784 = v620 * v720;
-        const V v785 = v628 * v720;
-        const V v786 = v620 * v728;
-        const V v787 = v628 * v728;
-        const V v788 = v628 * v726;
-        const V v789 = v628 * v706;
-        const V v790 = v743 + v789;
-        const V v791 = v620 * v706;
-        const V v792 = v744 + v791;
-        const V v793 = v620 * v726;
-        const V v794 = v763 + v793;
-        const V v795 = v635 * v717;
-        const V v796 = v639 * v717;
-        const V v797 = v639 * v720;
-        const V v798 = v635 * v720;
-        const V v799 = v763 + v798;
-        const V v800 = v639 * v728;
-        const V v801 = v763 + v800;
-        const V v802 = v676 * v792;
-        const V v803 = v676 * v706;
-        const V v804 = v779 - v803;
-        const V v805 = v777 + v786;
-        const V v806 = v785 - v777;
-        const V v807 = v641 * v804;
-        const V v808 = v641 * v765;
-        const V v809 = v632 * v777;
-        const V v810 = v774 + v809;
-        s464 += v810;
-        const V v811 = v632 * v772;
-        const V v812 = v802 + v811;
-        const V v813 = v630 * v772;
-        const V v814 = v630 * v777;
-        const V v815 = v775 - v814;
-        s465 += v815;
-        const V v816 = 2.0 * v765;
-        const V v817 = v762 + v816;
-        const V v818 = v676 * v790;
-        const V v819 = v813 - v818;
-        const V v820 = v593 * v808;
-        s461 += v820;
-        const V v821 = v619 * v772;
-        const V v822 = v676 * v732;
-        const V v823 = v821 - v822;
-        const V v824 = v619 * v777;
-        const V v825 = v770 - v824;
-        s462 += v825;
-        const V v826 = v617 * v777;
-        const V v827 = v773 + v826;
-        s463 += v827;
-        const V v828 = v617 * v772;
-        const V v829 = v776 + v828;
-        const V v830 = v601 * v817;
-        s480 += v830;
-        const V v831 = v630 * v819;
-        const V v832 = v781 + v831;
-        const V v833 = v632 * v812;
-        const V v834 = v794 + v833;
-        const V v835 = v630 * v812;
-        const V v836 = v788 - v835;
-        const V v837 = v632 * v823;
-        const V v838 = v784 - v837;
-        const V v839 = v630 * v823;
-        const V v840 = v806 + v839;
-        const V v841 = v619 * v823;
-        const V v842 = v799 + v841;
-        const V v843 = v617 * v823;
-        const V v844 = v797 - v843;
-        const V v845 = v619 * v807;
-        const V v846 = v795 + v845;
-        const V v847 = v632 * v807;
-        const V v848 = v782 - v847;
-        const V v849 = v632 * v829;
-        const V v850 = v805 + v849;
-        const V v851 = v630 * v807;
-        const V v852 = v783 + v851;
-        const V v853 = v617 * v807;
-        const V v854 = v796 - v853;
-        const V v855 = v630 * v829;
-        const V v856 = v787 - v855;
-        const V v857 = v617 * v829;
-        const V v858 = v801 + v857;
-        const V v859 = v595 * v838;
-        const V v860 = v595 * v846;
-        const V v861 = v595 * v848;
-        const V v862 = v595 * v836;
-        const V v863 = v595 * v850;
-        const V v864 = v595 * v844;
-        const V v865 = v593 * v848;
-        s472 += v865;
-        const V v866 = v593 * v846;
-        s474 += v866;
-        const V v867 = v593 * v852;
-        s473 += v867;
-        const V v868 = v583 * v846;
-        const V v869 = v583 * v854;
-        const V v870 = v593 * v854;
-        s475 += v870;
-        const V v871 = v581 * v846;
-        const V v872 = v581 * v854;
-        const V v873 = v598 * v852;
-        const V v874 = v598 * v854;
-        const V v875 = v598 * v827;
-        const V v876 = v599 * v827;
-        const V v877 = v600 * v827;
-        const V v878 = v599 * v852;
-        const V v879 = v600 * v852;
-        const V v880 = v861 + v879;
-        const V v881 = v599 * v854;
-        const V v882 = v600 * v854;
-        const V v883 = v860 + v882;
-        const V v884 = v596 * v846;
-        const V v885 = v874 + v884;
-        const V v886 = v596 * v848;
-        const V v887 = v873 + v886;
-        const V v888 = v597 * v848;
-        const V v889 = v878 + v888;
-        const V v890 = v597 * v846;
-        const V v891 = v881 + v890;
-        const V v892 = v593 * v880;
-        s478 += v892;
-        const V v893 = v593 * v883;
-        s479 += v893;
-        const V v894 = v593 * v887;
-        s476 += v894;
-        const V v895 = v593 * v889;
-        s477 += v895;
-        const V v896 = v596 * v825;
-        s468 += v875;
-        s468 += v896;
-        const V v897 = v597 * v825;
-        s467 += v876;
-        s467 += v897;
-        const V v898 = v595 * v825;
-        s466 += v877;
-        s466 += v898;
-        const V v899 = v600 * v856;
-        const V v900 = v596 * v810;
-        const V v901 = v597 * v810;
-        const V v902 = v595 * v810;
-        const V v903 = v596 * v836;
-        const V v904 = v600 * v836;
-        const V v905 = v597 * v836;
-        const V v906 = v863 + v899;
-        const V v907 = v600 * v815;
-        s469 += v902;
-        s469 += v907;
-        const V v908 = v598 * v815;
-        s471 += v900;
-        s471 += v908;
-        const V v909 = v599 * v815;
-        s470 += v901;
-        s470 += v909;
-        const V v910 = v598 * v836;
-        const V v911 = v599 * v836;
-        const V v912 = v600 * v906;
-        const V v913 = v598 * v832;
-        const V v914 = v903 + v913;
-        const V v915 = v599 * v832;
-        const V v916 = v905 + v915;
-        const V v917 = v600 * v832;
-        const V v918 = v862 + v917;
-        s486 += v918;
-        const V v919 = v600 * v914;
-        const V v920 = v596 * v834;
-        const V v921 = v910 + v920;
-        const V v922 = v597 * v834;
-        const V v923 = v911 + v922;
-        const V v924 = v600 * v916;
-        const V v925 = v600 * v918;
-        const V v926 = v595 * v834;
-        const V v927 = v904 + v926;
-        s485 += v927;
-        const V v928 = v595 * v921;
-        s503 += v919;
-        s503 += v928;
-        const V v929 = v595 * v923;
-        s508 += v924;
-        s508 += v929;
-        const V v930 = v595 * v927;
-        s512 += v925;
-        s512 += v930;
-        const V v931 = v596 * v838;
-        const V v932 = v597 * v838;
-        const V v933 = v596 * v850;
-        const V v934 = v597 * v850;
-        const V v935 = v600 * v850;
-        s491 += v859;
-        s491 += v935;
-        const V v936 = v596 * v842;
-        const V v937 = v596 * v844;
-        const V v938 = v600 * v844;
-        const V v939 = v597 * v844;
-        const V v940 = v597 * v842;
-        const V v941 = v595 * v842;
-        const V v942 = v938 + v941;
-        s497 += v942;
-        const V v943 = v936 - v868;
-        const V v944 = v937 - v869;
-        const V v945 = v939 - v872;
-        const V v946 = v595 * v942;
-        const V v947 = v940 - v871;
-        const V v948 = v598 * v844;
-        const V v949 = v943 + v948;
-        const V v950 = v598 * v840;
-        const V v951 = v931 + v950;
-        const V v952 = v598 * v856;
-        const V v953 = v933 + v952;
-        const V v954 = v599 * v856;
-        const V v955 = v934 + v954;
-        const V v956 = v599 * v844;
-        const V v957 = v947 + v956;
-        const V v958 = v599 * v840;
-        const V v959 = v932 + v958;
-        const V v960 = v598 * v858;
-        const V v961 = v944 + v960;
-        const V v962 = v599 * v858;
-        const V v963 = v945 + v962;
-        const V v964 = v595 * v949;
-        const V v965 = v595 * v951;
-        const V v966 = v600 * v955;
-        const V v967 = v595 * v957;
-        const V v968 = v600 * v961;
-        s518 += v964;
-        s518 += v968;
-        const V v969 = v600 * v953;
-        s506 += v965;
-        s506 += v969;
-        const V v970 = v600 * v858;
-        const V v971 = v864 + v970;
-        s498 += v971;
-        const V v972 = v595 * v959;
-        s511 += v966;
-        s511 += v972;
-        const V v973 = v600 * v963;
-        s520 += v967;
-        s520 += v973;
-        const V v974 = v600 * v971;
-        s521 += v946;
-        s521 += v974;
-        const V v975 = v600 * v840;
-        const V v976 = v859 + v975;
-        const V v977 = v595 * v840;
-        s492 += v899;
-        s492 += v977;
-        const V v978 = v595 * v976;
-        s515 += v912;
-        s515 += v978;
-        const V v979 = v581 * v808;
-        s467 -= v979;
-        const V v980 = v583 * v808;
-        s468 -= v980;
-        const V v981 = v583 * v817;
-        const V v982 = v885 - v981;
-        const V v983 = v581 * v817;
-        const V v984 = v891 - v983;
-        const V v985 = v593 * v982;
-        s499 += v985;
-        const V v986 = v593 * v984;
-        s500 += v986;
-        const V v987 = v54 + v598;
-        const V v988 = v596 - v60;
-        const V v989 = v987 * v832;
-        const V v990 = v987 * v850;
-        const V v991 = v987 * v856;
-        const V v992 = v988 * v834;
-        const V v993 = v987 * v858;
-        const V v994 = v987 * v914;
-        const V v995 = v987 * v953;
-        const V v996 = v988 * v842;
-        const V v997 = v988 * v959;
-        const V v998 = v988 * v976;
-        const V v999 = v987 * v961;
-        s494 += v993;
-        s494 -= v869;
-        const V v1000 = v988 * v921;
-        s501 += v994;
-        s501 += v1000;
-        const V v1001 = v988 * v838;
-        s487 += v1001;
-        s487 += v990;
-        const V v1002 = v988 * v840;
-        s488 += v1002;
-        s488 += v991;
-        s493 += v996;
-        s493 -= v868;
-        const V v1003 = v987 * v836;
-        s481 += v1003;
-        s481 += v992;
-        const V v1004 = v988 * v836;
-        s482 += v989;
-        s482 += v1004;
-        const V v1005 = v988 * v951;
-        s504 += v1005;
-        s504 += v995;
-        const V v1006 = v987 * v955;
-        s509 += v997;
-        s509 += v1006;
-        const V v1007 = v987 * v906;
-        s513 += v998;
-        s513 += v1007;
-        const V v1008 = v583 * v848;
-        s487 -= v1008;
-        const V v1009 = v583 * v852;
-        s488 -= v1009;
-        const V v1010 = v987 * v844;
-        s493 += v1010;
-        const V v1011 = v988 * v844;
-        s494 += v1011;
-        const V v1012 = v988 * v949;
-        s516 += v999;
-        s516 += v1012;
-        const V v1013 = v583 * v887;
-        s504 -= v1013;
-        const V v1014 = v583 * v889;
-        s509 -= v1014;
-        const V v1015 = v583 * v880;
-        s513 -= v1015;
-        const V v1016 = v583 * v982;
-        s516 -= v1016;
-        const V v1017 = v59 + v597;
-        const V v1018 = v599 - v55;
-        const V v1019 = v1017 * v834;
-        const V v1020 = v1017 * v838;
-        const V v1021 = v1017 * v840;
-        const V v1022 = v1017 * v842;
-        const V v1023 = v1018 * v832;
-        const V v1024 = v1017 * v921;
-        const V v1025 = v1017 * v951;
-        const V v1026 = v1018 * v858;
-        const V v1027 = v1018 * v916;
-        const V v1028 = v1017 * v959;
-        const V v1029 = v1017 * v976;
-        const V v1030 = v1018 * v914;
-        s502 += v1030;
-        s502 += v1024;
-        s495 += v1022;
-        s495 -= v871;
-        const V v1031 = v1018 * v850;
-        s489 += v1020;
-        s489 += v1031;
-        const V v1032 = v1018 * v856;
-        s490 += v1021;
-        s490 += v1032;
-        s496 += v1026;
-        s496 -= v872;
-        const V v1033 = v1017 * v923;
-        s507 += v1027;
-        s507 += v1033;
-        const V v1034 = v1018 * v953;
-        s505 += v1025;
-        s505 += v1034;
-        const V v1035 = v1018 * v836;
-        s483 += v1035;
-        s483 += v1019;
-        const V v1036 = v1017 * v836;
-        s484 += v1023;
-        s484 += v1036;
-        const V v1037 = v1018 * v955;
-        s510 += v1028;
-        s510 += v1037;
-        const V v1038 = v581 * v848;
-        s489 -= v1038;
-        const V v1039 = v581 * v852;
-        s490 -= v1039;
-        const V v1040 = v581 * v880;
-        s514 += v1029;
-        s514 -= v1040;
-        const V v1041 = v581 * v887;
-        s505 -= v1041;
-        const V v1042 = v581 * v889;
-        s510 -= v1042;
-        const V v1043 = v1018 * v844;
-        s495 += v1043;
-        const V v1044 = v1017 * v844;
-        s496 += v1044;
-        const V v1045 = v1018 * v961;
-        const V v1046 = v1018 * v906;
-        s514 += v1046;
-        const V v1047 = v1018 * v963;
-        const V v1048 = v581 * v982;
-        s517 += v1045;
-        s517 -= v1048;
-        const V v1049 = v581 * v984;
-        s519 += v1047;
-        s519 -= v1049;
-        const V v1050 = v1017 * v949;
-        s517 += v1050;
-        const V v1051 = v1017 * v957;
-        s519 += v1051;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v331 = 0.25 * w[1], v332 = 0.25 - v331, v333 = 0.25 + v331, v334 = v331 - 0.25;
+        const V v335 = X1 * v334, v336 = X3 * v332, v337 = v336 + v335, v338 = v333 * v13,
+            v339 = v338 + v337;
+        const double v340 = 0.25 * w[0], v341 = 0.25 + v340, v342 = 0.25 - v340, v343 = v340 - 0.25;
+        const V v344 = X0 * v343, v345 = X6 * v342, v346 = v345 + v344, v347 = v341 * v3,
+            v348 = v347 + v346, v349 = X7 * v342, v350 = X1 * v343, v351 = v349 + v350,
+            v352 = v341 * v9, v353 = v352 + v351, v354 = X2 * v332, v355 = X0 * v334,
+            v356 = v354 + v355, v357 = v333 * v4, v358 = v357 + v356, v359 = v358 * v353;
+        const double v360 = 1.0 - w[1], v361 = 1.0 + w[1], v362 = 1.0 - w[0], v363 = 1.0 + w[0],
+            v364 = 0.25 * v361;
+        const V v365 = v348 * v339, v366 = v359 - v365, v367 = X7 * v362, v368 = X1 * v362,
+            v369 = X5 * v363, v370 = v369 + v367, v371 = X3 * v363, v372 = v368 + v371,
+            v373 = v364 * v370, v374 = 0.25 * v372, v375 = v360 * v374, v376 = v373 + v375,
+            v377 = v376 * v366, v378 = w[2] * v377, v379 = 6.283185307179586 * v378,
+            v380 = w[0] - v117, v381 = w[1] - v118, v382 = parameters[1] * v379, v383 = v20 * v380,
+            v384 = v22 * v381, v385 = 3.0 * (parameters[2] * v379), v386 = v124 + v34 * v380,
+            v387 = v125 + v34 * v381, v388 = v121 + v25 * (v15 * v380 - v11 * v381),
+            v389 = v119 + v25 * (v384 - v383), v390 = v123 - v39 * (v384 + v383),
+            v391 = 0.25 * v388, v392 = v388 * v54, v393 = v388 * v49, v394 = v389 * v54,
+            v395 = v389 * v49, v396 = 0.25 * v389,
+            v397 = v32 * v393 + (v26 * v392 + (v52 + v33 * v391)),
+            v398 = v32 * v395 + (v26 * v394 + (v53 + v33 * v396)), v399 = 2.0 * v397,
+            v400 = 2.0 * v398, v401 = v37 * v393 + (v35 * v392 + (v51 + v38 * v391)),
+            v402 = v37 * v395 + (v35 * v394 + (v50 + v38 * v396)),
+            v403 = 1.0 + v390 * v36 - v387 * v35 - v386 * v37, v404 = 2.0 * v401, v405 = 2.0 * v402,
+            v406 = v403 * v403, v407 = 2.0 * v403, v408 = v398 * v401 - v397 * v402,
+            v409 = v406 + (v401 * v401 + (v402 * v402 + (v398 * v398 + v397 * v397))),
+            v410 = 2.0 * v408, v411 = v408 * v408, v412 = softehl_vrcbrt(v406 * v411),
+            v413 = v406 * v410, v414 = v412 * v412, v415 = v414 * (0.3333333333333333 * v414),
+            v416 = v415 * (v407 * v411), v417 = v415 * (v406 * (v401 * v410)),
+            v418 = v415 * (v406 * (v398 * v410)), v419 = v415 * (v406 * (v402 * v410)),
+            v420 = v415 * (v406 * (v397 * v410)), v421 = v412 * v414, v422 = v411 * v415,
+            v423 = v413 * v415, v424 = v421 * (v421 * (1.3333333333333333 * v412)),
+            v425 = (-3.0) + v412 * v409, v426 = 2.0 * v425, v427 = v400 * v412, v428 = v399 * v412,
+            v429 = v405 * v412, v430 = v404 * v412,
+            v431 = parameters[0] * v379 + v425 * (v385 * v425) + v382 * v426,
+            v432 = 2.0 * v382 + v385 * v426,
+            v433 = v412 * ((v407 * v412 - v416 * v409) * v432) - v416 * v431,
+            v434 = v412 * ((v430 - v418 * v409) * v432) - v418 * v431,
+            v435 = v412 * ((v428 + v419 * v409) * v432) + v419 * v431,
+            v436 = v412 * ((v429 + v420 * v409) * v432) + v420 * v431, v437 = v409 * v431,
+            v438 = v412 * v431, v439 = (v412 - v422 * v409) * v432, v440 = v423 * v409 * v432,
+            v441 = v415 * v437,
+            v442 = v415 * (v431 + v409 * v439) - v424 * (0.3333333333333333 * v411 * v437),
+            v443 = v424 * (0.3333333333333333 * v413 * v437) + v415 * v409 * v440,
+            v444 = v406 * v441, v445 = 2.0 * v438, v446 = v438 - v411 * v441,
+            v447 = v413 * v443 - 2.0 * v444, v448 = v410 * v444,
+            v449 = v445 + v400 * (v412 * ((v427 - v417 * v409) * v432) - v417 * v431),
+            v450 = v407 * (v411 * v443 - v412 * v440 - v410 * v441 - v423 * v431),
+            v451 = v407 * v446, v452 = v399 * v438 + v402 * v448;
+        s273 += v452;
+        const V v453 = v423 * (v409 * (v428 * v432) + v399 * v431) + v402 * v447,
+            v454 = v400 * v438 - v401 * v448;
+        s274 += v454;
+        const V v455 = v407 * v407 * (v412 * v439 - v422 * v431 - v411 * v442) + 2.0 * v446,
+            v456 = v390 * v451;
+        s270 += v456;
+        const V v457 = v398 * v447 - v423 * (v409 * (v430 * v432) + v404 * v431),
+            v458 = v404 * v438 - v398 * v448;
+        s271 += v458; const V v459 = v405 * v438 + v397 * v448; s272 += v459;
+        const V v460 = v423 * (v409 * (v429 * v432) + v405 * v431) + v397 * v447,
+            v461 = v390 * v390 * v455;
+        s289 += v461;
+        const V v462 = v401 * (v401 * v447 - v423 * (v409 * (v427 * v432) + v400 * v431)),
+            v463 = v449 + v462, v464 = v445 + v399 * v435 + v402 * v453,
+            v465 = v400 * v435 - v401 * v453, v466 = v399 * v434 - v402 * v457,
+            v467 = v400 * v434 - v448 + v401 * v457, v468 = v445 + v404 * v434 + v398 * v457,
+            v469 = v405 * v434 - v397 * v457, v470 = v404 * v433 + v398 * v450,
+            v471 = v399 * v433 - v402 * v450, v472 = v448 + v399 * v436 + v402 * v460,
+            v473 = v400 * v433 + v401 * v450, v474 = v405 * v433 - v397 * v450,
+            v475 = v400 * v436 - v401 * v460, v476 = v445 + v405 * v436 + v397 * v460,
+            v477 = v391 * v466, v478 = v390 * v471;
+        s281 += v478; const V v479 = v390 * v470; s283 += v479; const V v480 = v390 * v473;
+        s282 += v480;
+        const V v481 = v387 * v470, v482 = v387 * v474, v483 = v390 * v474;
+        s284 += v483;
+        const V v484 = v386 * v470, v485 = v386 * v474, v486 = v391 * v471 + v396 * v473,
+            v487 = v394 * v473 + v392 * v471, v488 = v395 * v473 + v393 * v471, v489 = v390 * v486;
+        s287 += v489; const V v490 = v390 * (v391 * v470 + v396 * v474); s288 += v490;
+        const V v491 = v390 * v487; s285 += v491; const V v492 = v390 * v488; s286 += v492;
+        s277 += v394 * v459; s277 += v392 * v458; s276 += v395 * v459; s276 += v393 * v458;
+        s275 += v396 * v459; s275 += v391 * v458;
+        const V v493 = v396 * v475, v494 = v391 * v472 + v493;
+        s278 += v391 * v452; s278 += v396 * v454; s280 += v392 * v452; s280 += v394 * v454;
+        s279 += v393 * v452; s279 += v395 * v454;
+        const V v495 = v392 * v465 + v394 * v463, v496 = v393 * v465 + v395 * v463,
+            v497 = v391 * v465 + v396 * v463;
+        s295 += v497;
+        const V v498 = v394 * v465 + v392 * v464, v499 = v395 * v465 + v393 * v464,
+            v500 = v396 * v465 + v391 * v464;
+        s294 += v500; s312 += v396 * v495; s312 += v391 * v498; s317 += v396 * v496;
+        s317 += v391 * v499; s321 += v396 * v497; s321 += v391 * v500; s300 += v477;
+        s300 += v396 * v472; const V v501 = v396 * v469 + v391 * v468; s306 += v501;
+        const V v502 = v392 * v468 - v481 + v394 * v469, v503 = v392 * v466 + v394 * v467,
+            v504 = v392 * v472 + v394 * v475, v505 = v393 * v472 + v395 * v475,
+            v506 = v393 * v468 - v484 + v395 * v469, v507 = v393 * v466 + v395 * v467,
+            v508 = v392 * v469 - v482 + v394 * v476, v509 = v393 * v469 - v485 + v395 * v476;
+        s327 += v391 * v502; s327 += v396 * v508; s315 += v391 * v503; s315 += v396 * v504;
+        const V v510 = v391 * v469 + v396 * v476; s307 += v510; s320 += v396 * v505;
+        s320 += v391 * v507; s329 += v391 * v506; s329 += v396 * v509; s330 += v391 * v501;
+        s330 += v396 * v510; const V v511 = v477 + v396 * v467; s301 += v493; s301 += v391 * v467;
+        s324 += v396 * v494; s324 += v391 * v511; s276 -= v386 * v451; s277 -= v387 * v451;
+        const V v512 = v394 * v474 + v392 * v470 - v387 * v455,
+            v513 = v395 * v474 + v393 * v470 - v386 * v455, v514 = v390 * v512;
+        s308 += v514; const V v515 = v390 * v513; s309 += v515;
+        const V v516 = v40 + v394, v517 = v392 - v46;
+        s303 += v516 * v476; s303 -= v482; s310 += v516 * v495; s310 += v517 * v498;
+        s296 += v517 * v466; s296 += v516 * v472; s297 += v517 * v467; s297 += v516 * v475;
+        s302 += v517 * v468; s302 -= v481; s290 += v516 * v465; s290 += v517 * v464;
+        s291 += v516 * v463; s291 += v517 * v465; s313 += v517 * v503; s313 += v516 * v504;
+        s318 += v517 * v507; s318 += v516 * v505; s322 += v517 * v511; s322 += v516 * v494;
+        s296 -= v387 * v471; s297 -= v387 * v473; s302 += v516 * v469; s303 += v517 * v469;
+        s325 += v516 * v508; s325 += v517 * v502; s313 -= v387 * v487; s318 -= v387 * v488;
+        s322 -= v387 * v486; s325 -= v387 * v512;
+        const V v518 = v45 + v393, v519 = v395 - v41;
+        s311 += v519 * v495; s311 += v518 * v498; s304 += v518 * v468; s304 -= v484;
+        s298 += v518 * v466; s298 += v519 * v472; s299 += v518 * v467; s299 += v519 * v475;
+        s305 += v519 * v476; s305 -= v485; s316 += v519 * v496; s316 += v518 * v499;
+        s314 += v518 * v503; s314 += v519 * v504; s292 += v519 * v465; s292 += v518 * v464;
+        s293 += v519 * v463; s293 += v518 * v465; s319 += v518 * v507; s319 += v519 * v505;
+        s298 -= v386 * v471; s299 -= v386 * v473; s323 += v518 * v511; s323 -= v386 * v486;
+        s314 -= v386 * v487; s319 -= v386 * v488; s304 += v519 * v469; s305 += v518 * v469;
+        s323 += v519 * v494; s326 += v519 * v508; s326 -= v386 * v512; s328 += v519 * v509;
+        s328 -= v386 * v513; s326 += v518 * v502; s328 += v518 * v506;
     }
-    const V v1052 = v360 + s465;
-    const V v1053 = s464 - v358;
-    const V v1054 = v364 + s469;
-    const V v1055 = s470 + v414;
-    const V v1056 = v54 * v1052;
-    const V v1057 = v1056 + s471;
-    const V v1058 = v55 * v1052;
-    const V v1059 = v1055 - v1058;
-    const V v1060 = v366 - v1054;
-    const V v1061 = v1054 - v366;
-    const V v1062 = v59 * v1053;
-    const V v1063 = v1062 + v1059;
-    const V v1064 = v60 * v1053;
-    const V v1065 = v1057 - v1064;
-    const V v1066 = v412 + v1065;
-    const V v1067 = v1063 - v1066;
-    const V v1068 = v1063 + v1066;
-    const V v1069 = v1060 - v1067;
-    const V v1070 = v1061 + v1068;
-    const V v1071 = v1061 - v1068;
-    const V v1072 = v1067 - v1061;
-    const V v1073 = v361 + s462;
-    const V v1074 = v332 + s461;
-    const V v1075 = s463 - v359;
-    const V v1076 = v367 - v363;
-    const V v1077 = s467 - v330;
-    const V v1078 = s466 + v1076;
-    const V v1079 = s468 - v331;
-    const V v1080 = v59 * v1073;
-    const V v1081 = v1080 + v1077;
-    const V v1082 = v60 * v1073;
-    const V v1083 = v1079 - v1082;
-    const V v1084 = v1074 - v1078;
-    const V v1085 = v1074 + v1078;
-    const V v1086 = v55 * v1075;
-    const V v1087 = v1081 - v1086;
-    const V v1088 = v54 * v1075;
-    const V v1089 = v1088 + v1083;
-    const V v1090 = v422 + v1087;
-    const V v1091 = v420 + v1089;
-    const V v1092 = v1090 - v1091;
-    const V v1093 = v1090 + v1091;
-    const V v1094 = v1084 - v1092;
-    const V v1095 = v1084 + v1092;
-    const V v1096 = v1085 + v1093;
-    softehl_store4(R + 0, 8, v1070, v1096, v1069, v1094);
-    const V v1097 = v1085 - v1093;
-    softehl_store4(R + 4, 8, v1071, v1097, v1072, v1095);
-    const V v1098 = v381 + s482;
-    const V v1099 = v382 + s483;
-    const V v1100 = v385 + s486;
-    const V v1101 = s481 - v380;
-    const V v1102 = v402 - v391;
-    const V v1103 = s484 - v383;
-    const V v1104 = s512 + v1102;
-    const V v1105 = s485 - v384;
-    const V v1106 = v60 * v1101;
-    const V v1107 = s501 - v1106;
-    const V v1108 = s502 - v389;
-    const V v1109 = s503 + v399;
-    const V v1110 = s507 - v390;
-    const V v1111 = v54 * v1098;
-    const V v1112 = v1111 + v1107;
-    const V v1113 = s508 + v401;
-    const V v1114 = v1108 - v396;
-    const V v1115 = v60 * v1105;
-    const V v1116 = v1109 - v1115;
-    const V v1117 = v1110 - v397;
-    const V v1118 = v60 * v1099;
-    const V v1119 = v1114 - v1118;
-    const V v1120 = v395 + v1112;
-    const V v1121 = v59 * v1105;
-    const V v1122 = v1121 + v1113;
-    const V v1123 = v59 * v1099;
-    const V v1124 = v1123 + v1117;
-    const V v1125 = v54 * v1100;
-    const V v1126 = v1125 + v1116;
-    const V v1127 = v54 * v1103;
-    const V v1128 = v1127 + v1119;
-    const V v1129 = v55 * v1100;
-    const V v1130 = v1122 - v1129;
-    const V v1131 = v55 * v1103;
-    const V v1132 = v1124 - v1131;
-    const V v1133 = v1104 + v1130;
-    const V v1134 = v1120 + v1128;
-    const V v1135 = v1128 - v1120;
-    const V v1136 = v1120 - v1128;
-    const V v1137 = v1126 + v1130;
-    const V v1138 = v1126 - v1135;
-    const V v1139 = v1136 - v1126;
-    const V v1140 = v1104 - v1137;
-    const V v1141 = v1128 + v1132;
-    const V v1142 = v1126 - v1134;
-    const V v1143 = v1135 - v1126;
-    const V v1144 = v1126 + v1134;
-    const V v1145 = v1132 - v1128;
-    const V v1146 = v1134 - v1126;
-    const V v1147 = v1130 - v1126;
-    const V v1148 = v1145 - v1126;
-    const V v1149 = v1130 - v1145;
-    const V v1150 = v1141 + v1144;
-    const V v1151 = v1130 - v1141;
-    const V v1152 = v1140 + v1146;
-    const V v1153 = v1130 + v1148;
-    const V v1154 = v1145 - v1130;
-    const V v1155 = v1141 - v1130;
-    const V v1156 = v1140 + v1151;
-    const V v1157 = v1137 + v1150;
-    const V v1158 = v1104 - v1147;
-    const V v1159 = v1152 + v1155;
-    const V v1160 = v1142 + v1156;
-    const V v1161 = v1137 + v1142;
-    const V v1162 = v1147 - v1104;
-    const V v1163 = v1161 - v1104;
-    const V v1164 = v1143 + v1149;
-    const V v1165 = v1155 + v1163;
-    const V v1166 = v1158 + v1164;
-    const V v1167 = v1143 + v1154;
-    const V v1168 = v1154 + v1158;
-    const V v1169 = v1149 + v1162;
-    const V v1170 = v1162 + v1167;
-    const V v1171 = v1133 + v1153;
-    const V v1172 = v1133 + v1157;
-    const V v1173 = v1139 - v1171;
-    const V v1174 = v1139 + v1171;
-    const V v1175 = v1138 + v1168;
-    const V v1176 = v1138 + v1169;
-    const V v1177 = v334 + s473;
-    const V v1178 = v339 - v337;
-    const V v1179 = v373 + s492;
-    const V v1180 = v434 + s488;
-    const V v1181 = v405 - v379;
-    const V v1182 = v436 + s490;
-    const V v1183 = s478 + v1178;
-    const V v1184 = v449 - v447;
-    const V v1185 = s515 + v1181;
-    const V v1186 = v450 - v448;
-    const V v1187 = s472 - v333;
-    const V v1188 = s513 + v1184;
-    const V v1189 = s476 + v346;
-    const V v1190 = s514 + v1186;
-    const V v1191 = s477 + v348;
-    const V v1192 = v1183 + v1188;
-    const V v1193 = v1183 - v1188;
-    const V v1194 = s487 - v432;
-    const V v1195 = v1183 + v1185;
-    const V v1196 = s489 - v438;
-    const V v1197 = s491 - v370;
-    const V v1198 = v1190 + v1193;
-    const V v1199 = s504 + v458;
-    const V v1200 = s505 + v460;
-    const V v1201 = s506 + v407;
-    const V v1202 = s509 + v454;
-    const V v1203 = s510 + v456;
-    const V v1204 = s511 + v404;
-    const V v1205 = v1188 + v1190;
-    const V v1206 = v60 * v1197;
-    const V v1207 = v1201 - v1206;
-    const V v1208 = v59 * v1197;
-    const V v1209 = v1208 + v1204;
-    const V v1210 = v60 * v1187;
-    const V v1211 = v59 * v1187;
-    const V v1212 = v1211 + v1191;
-    const V v1213 = v1185 + v1190;
-    const V v1214 = v1198 - v1185;
-    const V v1215 = v1185 - v1198;
-    const V v1216 = v1210 + v1188;
-    const V v1217 = v55 * v1177;
-    const V v1218 = v1212 - v1217;
-    const V v1219 = v55 * v1179;
-    const V v1220 = v1209 - v1219;
-    const V v1221 = v54 * v1177;
-    const V v1222 = v1221 + v1189;
-    const V v1223 = v54 * v1179;
-    const V v1224 = v1223 + v1207;
-    const V v1225 = v1216 - v1222;
-    const V v1226 = v1222 - v1210;
-    const V v1227 = v1218 - v1183;
-    const V v1228 = v1218 + v1220;
-    const V v1229 = v1218 - v1220;
-    const V v1230 = v1225 - v1227;
-    const V v1231 = v1224 + v1226;
-    const V v1232 = v1227 - v1226;
-    const V v1233 = v1220 + v1224;
-    const V v1234 = v1226 - v1224;
-    const V v1235 = v1220 - v1224;
-    const V v1236 = v1188 + v1232;
-    const V v1237 = v1205 + v1231;
-    const V v1238 = v1233 - v1213;
-    const V v1239 = v1185 - v1235;
-    const V v1240 = v1228 + v1237;
-    const V v1241 = v1232 - v1188;
-    const V v1242 = v1235 - v1185;
-    const V v1243 = v1195 + v1240;
-    const V v1244 = v1195 - v1205;
-    const V v1245 = v1236 + v1242;
-    const V v1246 = v1192 - v1213;
-    const V v1247 = v1242 - v1190;
-    const V v1248 = v60 * v1194;
-    const V v1249 = v1199 - v1248;
-    const V v1250 = v60 * v1196;
-    const V v1251 = v1200 - v1250;
-    const V v1252 = v59 * v1194;
-    const V v1253 = v1252 + v1202;
-    const V v1254 = v59 * v1196;
-    const V v1255 = v1254 + v1203;
-    const V v1256 = v54 * v1180;
-    const V v1257 = v1256 + v1249;
-    const V v1258 = v54 * v1182;
-    const V v1259 = v1258 + v1251;
-    const V v1260 = v55 * v1180;
-    const V v1261 = v1253 - v1260;
-    const V v1262 = v55 * v1182;
-    const V v1263 = v1255 - v1262;
-    const V v1264 = v1226 + v1257;
-    const V v1265 = v1224 + v1259;
-    const V v1266 = v1218 + v1261;
-    const V v1267 = v1257 + v1259;
-    const V v1268 = v1220 + v1263;
-    const V v1269 = v1261 - v1257;
-    const V v1270 = v1261 + v1263;
-    const V v1271 = v1263 - v1259;
-    const V v1272 = v1234 - v1257;
-    const V v1273 = v1230 - v1257;
-    const V v1274 = v1264 - v1265;
-    const V v1275 = v1264 + v1265;
-    const V v1276 = v1247 + v1271;
-    const V v1277 = v1190 - v1271;
-    const V v1278 = v1259 + v1272;
-    const V v1279 = v1273 - v1261;
-    const V v1280 = v1238 + v1259;
-    const V v1281 = v1229 - v1261;
-    const V v1282 = v1275 - v1266;
-    const V v1283 = v1263 + v1280;
-    const V v1284 = v1263 + v1281;
-    const V v1285 = v1282 - v1268;
-    const V v1286 = v1246 + v1266;
-    const V v1287 = v1286 - v1268;
-    const V v1288 = v1278 - v1284;
-    const V v1289 = v1278 + v1284;
-    const V v1290 = v1285 - v1192;
-    const V v1291 = v1279 - v1283;
-    const V v1292 = v1279 + v1283;
-    softehl_store4(K + 32, 64, v1160, v1291, v1165, v1292);
-    const V v1293 = v1274 + v1287;
-    const V v1294 = v1274 - v1287;
-    const V v1295 = v1290 - v1213;
-    softehl_store4(K + 16, 64, v1173, v1295, v1174, v1294);
-    const V v1296 = v1215 - v1288;
-    const V v1297 = v1231 - v1267;
-    const V v1298 = v1243 + v1267;
-    const V v1299 = v1288 - v1214;
-    const V v1300 = v1228 - v1270;
-    const V v1301 = v1270 + v1298;
-    softehl_store4(K + 0, 64, v1172, v1301, v1173, v1293);
-    const V v1302 = v1241 + v1269;
-    const V v1303 = v1245 - v1269;
-    const V v1304 = v1276 + v1302;
-    const V v1305 = v1277 + v1303;
-    softehl_store4(K + 52, 64, v1176, v1305, v1175, v1296);
-    const V v1306 = v1239 + v1277;
-    const V v1307 = v1302 + v1306;
-    softehl_store4(K + 48, 64, v1170, v1304, v1166, v1307);
-    const V v1308 = v1297 + v1300;
-    const V v1309 = v1297 - v1300;
-    const V v1310 = v1214 + v1289;
-    const V v1311 = v1214 - v1289;
-    const V v1312 = v1309 - v1244;
-    softehl_store4(K + 20, 64, v1165, v1312, v1166, v1299);
-    const V v1313 = v1244 + v1308;
-    softehl_store4(K + 4, 64, v1160, v1313, v1170, v1310);
-    const V v1314 = v1244 - v1308;
-    softehl_store4(K + 36, 64, v1159, v1314, v1176, v1311);
-    const V v1315 = v368 + s497;
-    const V v1316 = v335 + s474;
-    const V v1317 = v376 - v410;
-    const V v1318 = v353 + s480;
-    const V v1319 = v338 - v340;
-    const V v1320 = v423 + s493;
-    const V v1321 = v424 + s495;
-    const V v1322 = s521 + v1317;
-    const V v1323 = s479 + v1319;
-    const V v1324 = s475 - v336;
-    const V v1325 = s494 - v425;
-    const V v1326 = v1318 - v1323;
-    const V v1327 = v1318 + v1323;
-    const V v1328 = 2.0 * v1323;
-    const V v1329 = v1318 + v1328;
-    const V v1330 = s496 - v426;
-    const V v1331 = v1323 - v1322;
-    const V v1332 = v1322 + v1323;
-    const V v1333 = v1322 + v1329;
-    const V v1334 = s498 - v371;
-    const V v1335 = v54 * v1325;
-    const V v1336 = s499 - v354;
-    const V v1337 = s500 - v355;
-    const V v1338 = v54 * v1330;
-    const V v1339 = v1335 - v327;
-    const V v1340 = v350 + v1336;
-    const V v1341 = v352 + v1337;
-    const V v1342 = v1338 - v356;
-    const V v1343 = s518 - v328;
-    const V v1344 = s519 - v357;
-    const V v1345 = s520 - v329;
-    const V v1346 = s516 + v1339;
-    const V v1347 = s517 + v1342;
-    const V v1348 = v54 * v1334;
-    const V v1349 = v1348 + v1343;
-    const V v1350 = v54 * v1324;
-    const V v1351 = v1350 + v1340;
-    const V v1352 = v55 * v1324;
-    const V v1353 = v1341 - v1352;
-    const V v1354 = v55 * v1330;
-    const V v1355 = v1344 - v1354;
-    const V v1356 = v55 * v1334;
-    const V v1357 = v1345 - v1356;
-    const V v1358 = v440 + v1346;
-    const V v1359 = v442 + v1347;
-    const V v1360 = v416 + v1349;
-    const V v1361 = v444 + v1355;
-    const V v1362 = v418 + v1357;
-    const V v1363 = v60 * v1316;
-    const V v1364 = v1351 - v1363;
-    const V v1365 = v59 * v1316;
-    const V v1366 = v1365 + v1353;
-    const V v1367 = v60 * v1320;
-    const V v1368 = v1358 - v1367;
-    const V v1369 = v60 * v1321;
-    const V v1370 = v1359 - v1369;
-    const V v1371 = v59 * v1321;
-    const V v1372 = v1371 + v1361;
-    const V v1373 = v60 * v1315;
-    const V v1374 = v1360 - v1373;
-    const V v1375 = v59 * v1315;
-    const V v1376 = v1375 + v1362;
-    const V v1377 = v1364 - v1366;
-    const V v1378 = v1364 + v1366;
-    const V v1379 = v1364 - v1374;
-    const V v1380 = v1364 + v1374;
-    const V v1381 = v1366 - v1376;
-    const V v1382 = v1366 + v1376;
-    const V v1383 = v1333 + v1378;
-    const V v1384 = v1327 - v1378;
-    const V v1385 = v1368 - v1370;
-    const V v1386 = v1368 + v1370;
-    const V v1387 = v1370 - v1372;
-    const V v1388 = v1370 + v1372;
-    const V v1389 = v1331 + v1381;
-    const V v1390 = v1380 + v1383;
-    const V v1391 = v1381 - v1387;
-    const V v1392 = v1387 + v1389;
-    const V v1393 = v1380 - v1386;
-    const V v1394 = v1386 + v1390;
-    const V v1395 = v1374 - v1376;
-    const V v1396 = v1374 + v1376;
-    const V v1397 = v1379 - v1385;
-    const V v1398 = v1392 + v1395;
-    const V v1399 = v1388 + v1394;
-    const V v1400 = v1331 - v1395;
-    const V v1401 = v1391 + v1397;
-    const V v1402 = v1382 + v1399;
-    const V v1403 = v1382 - v1388;
-    const V v1404 = v1397 - v1391;
-    const V v1405 = v1384 + v1393;
-    const V v1406 = v1396 + v1402;
-    const V v1407 = v1332 - v1396;
-    const V v1408 = v1326 + v1385;
-    const V v1409 = v1393 + v1403;
-    const V v1410 = v1405 - v1403;
-    const V v1411 = v1379 + v1408;
-    const V v1412 = v1384 + v1407;
-    const V v1413 = v1410 - v1407;
-    const V v1414 = v1377 + v1411;
-    const V v1415 = v1326 - v1377;
-    const V v1416 = v1398 + v1414;
-    softehl_store4(K + 8, 64, v1301, v1406, v1295, v1416);
-    const V v1417 = v1409 + v1412;
-    softehl_store4(K + 40, 64, v1313, v1417, v1312, v1413);
-    const V v1418 = v1400 + v1415;
-    const V v1419 = v1412 - v1409;
-    const V v1420 = v1414 - v1398;
-    softehl_store4(K + 24, 64, v1293, v1416, v1294, v1420);
-    const V v1421 = v1415 - v1400;
-    const V v1422 = v1401 + v1418;
-    softehl_store4(K + 12, 64, v1291, v1417, v1304, v1422);
-    const V v1423 = v1404 + v1421;
-    softehl_store4(K + 28, 64, v1292, v1413, v1307, v1423);
-    softehl_store4(K + 56, 64, v1310, v1422, v1299, v1423);
-    const V v1424 = v1418 - v1401;
-    softehl_store4(K + 44, 64, v1314, v1419, v1305, v1424);
-    const V v1425 = v1421 - v1404;
-    softehl_store4(K + 60, 64, v1311, v1424, v1296, v1425);
+    const V v520 = v214 + s274, v521 = s273 - v212, v522 = v217 + s278, v523 = v522 - v218,
+        v524 = v45 * v521 + (s279 + v246 - v41 * v520),
+        v525 = v245 + (v40 * v520 + s280 - v46 * v521), v526 = v524 - v525, v527 = v524 + v525,
+        v528 = v218 - v522 - v526, v529 = v523 + v527, v530 = v523 - v527, v531 = v526 - v523,
+        v532 = v215 + s271, v533 = v194 + s270, v534 = s272 - v213, v535 = s275 + (v219 - v216),
+        v536 = v533 - v535, v537 = v533 + v535,
+        v538 = v250 + (v45 * v532 + (s276 - v192) - v41 * v534),
+        v539 = v249 + (v40 * v534 + (s277 - v193 - v46 * v532)), v540 = v538 - v539,
+        v541 = v538 + v539, v542 = v536 - v540, v543 = v536 + v540, v544 = v537 + v541;
+    softehl_store4(R + 0, 8, v529, v544, v528, v542); const V v545 = v537 - v541;
+    softehl_store4(R + 4, 8, v530, v545, v531, v543);
+    const V v546 = v228 + s292, v547 = v231 + s295, v548 = s293 - v229, v549 = s321 + (v240 - v234),
+        v550 = s294 - v230, v551 = v235 + (v40 * (v227 + s291) + (s310 - v46 * (s290 - v226))),
+        v552 = v40 * v547 + (s312 + v238 - v46 * v550),
+        v553 = v40 * v548 + (s311 - v232 - v236 - v46 * v546),
+        v554 = v45 * v550 + (s317 + v239) - v41 * v547,
+        v555 = v45 * v546 + (s316 - v233 - v237) - v41 * v548, v556 = v549 + v554,
+        v557 = v551 + v553, v558 = v553 - v551, v559 = v552 + v554, v560 = v552 - v558,
+        v561 = v551 - v553 - v552, v562 = v549 - v559, v563 = v553 + v555, v564 = v552 - v557,
+        v565 = v558 - v552, v566 = v555 - v553, v567 = v554 - v552, v568 = v554 - v566,
+        v569 = v566 - v554, v570 = v563 - v554, v571 = v549 - v567,
+        v572 = v562 + (v557 - v552) + v570, v573 = v564 + (v562 + (v554 - v563)),
+        v574 = v567 - v549, v575 = v570 + (v559 + v564 - v549), v576 = v571 + (v565 + v568),
+        v577 = v574 + (v565 + v569), v578 = v556 + (v554 + (v566 - v552)),
+        v579 = v556 + (v559 + (v563 + (v552 + v557))), v580 = v561 - v578, v581 = v561 + v578,
+        v582 = v560 + (v569 + v571), v583 = v560 + (v568 + v574), v584 = v196 + s282,
+        v585 = v223 + s301, v586 = v256 + s297, v587 = v257 + s299, v588 = s287 + (v201 - v199),
+        v589 = s324 + (v242 - v225), v590 = s281 - v195, v591 = s322 + (v264 - v262),
+        v592 = s323 + (v265 - v263), v593 = v588 + v591, v594 = s296 - v255, v595 = v588 + v589,
+        v596 = s298 - v258, v597 = s300 - v221, v598 = v592 + (v588 - v591), v599 = v591 + v592,
+        v600 = v46 * v590, v601 = v589 + v592, v602 = v598 - v589,
+        v603 = v45 * v590 + (s286 + v204) - v41 * v584,
+        v604 = v45 * v597 + (s320 + v241) - v41 * v585, v605 = v40 * v584 + (s285 + v203),
+        v606 = v40 * v585 + (s315 + v243 - v46 * v597), v607 = v605 - v600, v608 = v603 - v588,
+        v609 = v603 + v604, v610 = v606 + v607, v611 = v608 - v607, v612 = v604 - v606,
+        v613 = v612 - v589, v614 = v595 - v599, v615 = v40 * v586 + (s313 + v268 - v46 * v594),
+        v616 = v40 * v587 + (s314 + v269 - v46 * v596),
+        v617 = v45 * v594 + (s318 + v266) - v41 * v586,
+        v618 = v45 * v596 + (s319 + v267) - v41 * v587, v619 = v607 + v615, v620 = v606 + v616,
+        v621 = v603 + v617, v622 = v615 + v616, v623 = v604 + v618, v624 = v617 - v615,
+        v625 = v617 + v618, v626 = v618 - v616, v627 = v619 - v620, v628 = v592 - v626,
+        v629 = v616 + (v607 - v606 - v615), v630 = v600 + v591 - v605 - v608 - v615 - v617,
+        v631 = v618 + (v604 + v606 - v601 + v616), v632 = v618 + (v603 - v604 - v617),
+        v633 = v593 - v601 + v621 - v623, v634 = v629 - v632, v635 = v629 + v632,
+        v636 = v630 - v631, v637 = v630 + v631;
+    softehl_store4(K + 32, 64, v573, v636, v575, v637);
+    const V v638 = v627 + v633, v639 = v627 - v633, v640 = v619 + v620 - v621 - v623 - v593 - v601;
+    softehl_store4(K + 16, 64, v580, v640, v581, v639);
+    const V v641 = v589 - v598 - v634, v642 = v610 - v622, v643 = v634 - v602, v644 = v609 - v625,
+        v645 = v625 + (v595 + (v609 + (v599 + v610)) + v622);
+    softehl_store4(K + 0, 64, v579, v645, v580, v638);
+    const V v646 = v611 - v591 + v624, v647 = v613 - v592 + v626 + v646,
+        v648 = v628 + (v591 + v611 + v613 - v624);
+    softehl_store4(K + 52, 64, v583, v648, v582, v641); const V v649 = v646 + (v589 - v612 + v628);
+    softehl_store4(K + 48, 64, v577, v647, v576, v649);
+    const V v650 = v642 + v644, v651 = v602 + v635, v652 = v602 - v635, v653 = v642 - v644 - v614;
+    softehl_store4(K + 20, 64, v575, v653, v576, v643); const V v654 = v614 + v650;
+    softehl_store4(K + 4, 64, v573, v654, v577, v651); const V v655 = v614 - v650;
+    softehl_store4(K + 36, 64, v572, v655, v583, v652);
+    const V v656 = v220 + s306, v657 = v197 + s283, v658 = v207 + s289, v659 = v252 + s304,
+        v660 = s330 + (v224 - v244), v661 = s288 + (v200 - v202), v662 = s284 - v198,
+        v663 = v658 - v661, v664 = s305 - v254, v665 = v661 - v660, v666 = s307 - v222,
+        v667 = v40 * v662 + (v205 + (s308 - v208)) - v46 * v657,
+        v668 = v45 * v657 + (v206 + (s309 - v209) - v41 * v662),
+        v669 = v259 + (s325 + (v40 * (s303 - v253) - v189)) - v46 * (v251 + s302),
+        v670 = v260 + (s326 + (v40 * v664 - v210)) - v46 * v659,
+        v671 = v45 * v659 + (v261 + (s328 - v211 - v41 * v664)),
+        v672 = v247 + (v40 * v666 + (s327 - v190)) - v46 * v656,
+        v673 = v45 * v656 + (v248 + (s329 - v191 - v41 * v666)), v674 = v667 - v668,
+        v675 = v667 + v668, v676 = v667 - v672, v677 = v667 + v672, v678 = v668 - v673,
+        v679 = v668 + v673, v680 = v658 + v661 - v675, v681 = v669 - v670, v682 = v669 + v670,
+        v683 = v670 - v671, v684 = v670 + v671, v685 = v678 - v683, v686 = v677 - v682,
+        v687 = v672 - v673, v688 = v672 + v673, v689 = v676 - v681,
+        v690 = v683 + (v665 + v678) + v687, v691 = v665 - v687, v692 = v685 + v689,
+        v693 = v679 + (v684 + (v682 + (v677 + (v660 + (v658 + 2.0 * v661) + v675)))),
+        v694 = v679 - v684, v695 = v689 - v685, v696 = v688 + v693, v697 = v660 + v661 - v688,
+        v698 = v686 + v694, v699 = v680 + v697, v700 = v680 + v686 - v694 - v697,
+        v701 = v674 + (v676 + (v663 + v681)), v702 = v663 - v674, v703 = v690 + v701;
+    softehl_store4(K + 8, 64, v645, v696, v640, v703); const V v704 = v698 + v699;
+    softehl_store4(K + 40, 64, v654, v704, v653, v700);
+    const V v705 = v691 + v702, v706 = v699 - v698, v707 = v701 - v690;
+    softehl_store4(K + 24, 64, v638, v703, v639, v707);
+    const V v708 = v702 - v691, v709 = v692 + v705;
+    softehl_store4(K + 12, 64, v636, v704, v647, v709); const V v710 = v695 + v708;
+    softehl_store4(K + 28, 64, v637, v700, v649, v710);
+    softehl_store4(K + 56, 64, v651, v709, v643, v710); const V v711 = v705 - v692;
+    softehl_store4(K + 44, 64, v655, v706, v648, v711); const V v712 = v708 - v695;
+    softehl_store4(K + 60, 64, v652, v711, v641, v712);
 }
+SOFTEHL_BATCH(softehl_solid_taylor_mean_yeoh_tangent, 8, 8, 0, 0, 8, (8 * 8))
 
-void softehl_solid_taylor_mean_yeoh_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_yeoh_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_yeoh_tangent_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + 8 * e, tangent + (8 * 8) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_yeoh_tangent_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), tangent + (8 * 8) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * 8];
-    double K[SOFTEHL_LANES * (8 * 8)];
-    softehl_solid_taylor_mean_yeoh_tangent(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (8 * 8) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_solid_taylor_mean_yeoh_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
     const double v1 = 0.25 * parameters[3];
-    const V v2 = X0 + d0;
-    const V v3 = X2 + d2;
-    const V v4 = X1 + d1;
-    const V v5 = X0 - X2;
-    const V v6 = X4 + d4;
-    const V v7 = X6 + d6;
-    const V v8 = X4 - X0;
-    const V v9 = X4 - X6;
-    const V v10 = X4 - X2;
-    const V v11 = v8 - X2;
-    const V v12 = X6 + v11;
-    const V v13 = X1 - X3;
-    const V v14 = X1 + X3;
-    const V v15 = v5 + v9;
-    const V v16 = v9 - v5;
-    const V v17 = 0.25 * v12;
-    const V v18 = 0.25 * v15;
-    const V v19 = 0.25 * v16;
-    const V v20 = v12 - v16;
-    const V v21 = v16 + v12;
-    const V v22 = v16 - v12;
-    const double v23 = 3.0 * parameters[2];
-    const V v24 = 0.0625 * v20;
-    const V v25 = 0.0625 * v21;
-    const V v26 = 0.0625 * v22;
-    const double v27 = 2.0 * parameters[1];
-    const V v28 = X3 + d3;
-    const V v29 = X5 + d5;
-    const V v30 = X5 - X3;
-    const V v31 = X5 - X7;
-    const V v32 = X5 + X7;
-    const V v33 = X7 + d7;
-    const V v34 = v13 + v31;
-    const V v35 = v14 + v32;
-    const V v36 = v32 - v14;
-    const V v37 = 0.25 * v34;
-    const V v38 = v31 - v13;
-    const V v39 = 0.25 * v35;
-    const V v40 = 0.25 * v36;
-    const V v41 = 0.25 * v38;
-    const V v42 = v38 - v36;
-    const V v43 = v19 * v40;
-    const V v44 = v38 + v36;
-    const V v45 = v36 - v38;
-    const V v46 = 0.0625 * v42;
-    const V v47 = 0.0625 * v44;
-    const V v48 = 0.0625 * v45;
-    const V v49 = 1.0 / v39;
-    const V v50 = v39 * v39;
-    const V v51 = v41 * v17;
-    const V v52 = v43 - v51;
-    const V v53 = 1.0 / v50;
-    const V v54 = 1.0 / v52;
-    const V v55 = 0.25 * v49;
-    const V v56 = 0.25 * v53;
-    const V v57 = v46 * v54;
-    const V v58 = v47 * v54;
-    const V v59 = v25 * v54;
-    const V v60 = v48 * v54;
-    const V v61 = v26 * v54;
-    const V v62 = v24 * v54;
-    const V v63 = v37 * v59;
-    const V v64 = v18 * v58;
-    const V v65 = v63 - v64;
-    const V v66 = v65 - 0.25;
-    const V v67 = (-0.25) - v65;
-    const V v68 = v37 * v62;
-    const V v69 = 0.25 - v68;
-    const V v70 = v18 * v57;
-    const V v71 = v69 - v70;
-    const V v72 = v37 * v61;
-    const V v73 = 0.25 - v72;
-    const V v74 = v18 * v60;
-    const V v75 = v73 - v74;
-    V s76 = softehl_splat(0.0);
-    V s77 = softehl_splat(0.0);
-    V s78 = softehl_splat(0.0);
-    V s79 = softehl_splat(0.0);
-    V s80 = softehl_splat(0.0);
-    V s81 = softehl_splat(0.0);
-    V s82 = softehl_splat(0.0);
-    V s83 = softehl_splat(0.0);
+    const V v2 = X0 + d0, v3 = X2 + d2, v4 = X1 + d1, v5 = X0 - X2, v6 = X4 + d4, v7 = X6 + d6,
+        v8 = X4 - X6, v9 = X4 - X2, v10 = X6 + (X4 - X0 - X2), v11 = X1 - X3, v12 = X1 + X3,
+        v13 = v8 - v5, v14 = 0.25 * v10, v15 = 0.25 * (v5 + v8), v16 = 0.25 * v13;
+    const double v17 = 3.0 * parameters[2], v18 = 2.0 * parameters[1];
+    const V v19 = X3 + d3, v20 = X5 + d5, v21 = X5 - X3, v22 = X5 - X7, v23 = X5 + X7,
+        v24 = X7 + d7, v25 = v23 - v12, v26 = 0.25 * (v11 + v22), v27 = v22 - v11,
+        v28 = 0.25 * (v12 + v23), v29 = 0.25 * v25, v30 = 0.25 * v27,
+        v31 = 1.0 / (v16 * v29 - v30 * v14), v32 = 0.25 * (1.0 / v28),
+        v33 = 0.25 * (1.0 / (v28 * v28)), v34 = 0.0625 * (v27 - v25) * v31,
+        v35 = 0.0625 * (v27 + v25) * v31, v36 = 0.0625 * (v13 + v10) * v31,
+        v37 = 0.0625 * (v25 - v27) * v31, v38 = 0.0625 * (v13 - v10) * v31,
+        v39 = 0.0625 * (v10 - v13) * v31, v40 = v26 * v36 - v15 * v35, v41 = v40 - 0.25,
+        v42 = (-0.25) - v40, v43 = 0.25 - v26 * v39 - v15 * v34, v44 = 0.25 - v26 * v38 - v15 * v37;
+    V s45 = {0}, s46 = {0}, s47 = {0}, s48 = {0}, s49 = {0}, s50 = {0}, s51 = {0}, s52 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v84 = 1.0 - w[1];
-        const double v85 = 1.0 + w[1];
-        const double v86 = 0.25 * w[1];
-        const double v87 = 1.0 - w[0];
-        const double v88 = 1.0 + w[0];
-        const double v89 = 0.25 * v84;
-        const double v90 = 0.25 * v85;
-        const double v91 = 0.25 * w[0];
-        const double v92 = 0.25 - v86;
-        const double v93 = 0.25 + v86;
-        const double v94 = 0.25 + v91;
-        const double v95 = 0.25 - v91;
-        const double v96 = v89 * v87;
-        const double v97 = v89 * v88;
-        const double v98 = v88 * v90;
-        const double v99 = v87 * v90;
-        const double v100 = v86 - 0.25;
-        const V v101 = X2 * v92;
-        const double v102 = v91 - 0.25;
-        const V v103 = X3 * v92;
-        const V v104 = X3 * v97;
-        const V v105 = X6 * v95;
-        const V v106 = X7 * v95;
-        const V v107 = v96 * v2;
-        const V v108 = v93 * v9;
-        const V v109 = v101 + v108;
-        const V v110 = v93 * v31;
-        const V v111 = v103 + v110;
-        const V v112 = X7 * v99;
-        const V v113 = v112 + v104;
-        const V v114 = v96 * v4;
-        const V v115 = v94 * v10;
-        const V v116 = v105 + v115;
-        const V v117 = v94 * v30;
-        const V v118 = v106 + v117;
-        const V v119 = v98 * v6;
-        const V v120 = v107 + v119;
-        const V v121 = X0 * v100;
-        const V v122 = v121 + v109;
-        const V v123 = X0 * v102;
-        const V v124 = v123 + v116;
-        const V v125 = X1 * v100;
-        const V v126 = v125 + v111;
-        const V v127 = X1 * v96;
-        const V v128 = v127 + v113;
-        const V v129 = X1 * v102;
-        const V v130 = v129 + v118;
-        const V v131 = v98 * v29;
-        const V v132 = v114 + v131;
-        const V v133 = X5 * v98;
-        const V v134 = v133 + v128;
-        const V v135 = v99 * v7;
-        const V v136 = v135 + v120;
-        const V v137 = v99 * v33;
-        const V v138 = v137 + v132;
-        const V v139 = v122 * v130;
-        const V v140 = w[0] * v122;
-        const V v141 = w[1] * v130;
-        const V v142 = v3 * v97;
-        const V v143 = v142 + v136;
-        const V v144 = v28 * v97;
-        const V v145 = v144 + v138;
-        const V v146 = w[1] * v124;
-        const V v147 = v140 - v146;
-        const double v148 = w[1] * w[2];
-        const V v149 = v126 * v124;
-        const V v150 = v139 - v149;
-        const V v151 = w[0] * v126;
-        const V v152 = v141 - v151;
-        const V v153 = w[2] * v134;
-        const V v154 = v150 * v134;
-        const V v155 = 0.25 * v150;
-        const V v156 = v152 * v153;
-        s82 += v156;
-        const V v157 = v147 * v153;
-        s83 += v157;
-        const V v158 = w[2] * v155;
-        s76 += v158;
-        const V v159 = v148 * v155;
-        s78 += v159;
-        const V v160 = w[2] * v154;
-        s79 += v160;
-        const V v161 = v148 * v154;
-        s81 += v161;
-        const V v162 = w[0] * v158;
-        s77 += v162;
-        const V v163 = w[0] * v160;
-        s80 += v163;
-        softehl_store2(R + 7 * q + 0, (7 * points), v143, v145);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v53 = 0.25 * w[1], v54 = 1.0 - w[0], v55 = 1.0 + w[0],
+            v56 = 0.25 * (1.0 - w[1]), v57 = 0.25 * (1.0 + w[1]), v58 = 0.25 * w[0],
+            v59 = 0.25 - v53, v60 = 0.25 + v53, v61 = 0.25 + v58, v62 = 0.25 - v58, v63 = v56 * v54,
+            v64 = v56 * v55, v65 = v55 * v57, v66 = v54 * v57, v67 = v53 - 0.25, v68 = v58 - 0.25;
+        const V v69 = X0 * v67 + (X2 * v59 + v60 * v8), v70 = X0 * v68 + (X6 * v62 + v61 * v9),
+            v71 = X1 * v67 + (X3 * v59 + v60 * v22), v72 = X1 * v68 + (X7 * v62 + v61 * v21),
+            v73 = X5 * v65 + (X1 * v63 + (X7 * v66 + X3 * v64)),
+            v74 = v3 * v64 + (v66 * v7 + (v63 * v2 + v65 * v6)),
+            v75 = v19 * v64 + (v66 * v24 + (v63 * v4 + v65 * v20));
+        const double v76 = w[1] * w[2];
+        const V v77 = v69 * v72 - v71 * v70, v78 = w[2] * v73, v79 = v77 * v73, v80 = 0.25 * v77,
+            v81 = (w[1] * v72 - w[0] * v71) * v78;
+        s51 += v81; const V v82 = (w[0] * v69 - w[1] * v70) * v78; s52 += v82;
+        const V v83 = w[2] * v80; s45 += v83; const V v84 = v76 * v80; s47 += v84;
+        const V v85 = w[2] * v79; s48 += v85; const V v86 = v76 * v79; s50 += v86;
+        const V v87 = w[0] * v83; s46 += v87; const V v88 = w[0] * v85; s49 += v88;
+        softehl_store2(R + 7 * q + 0, (7 * points), v74, v75);
     }
-    const V v164 = 1.0 / s79;
-    const V v165 = s80 * v164;
-    const V v166 = v164 * s81;
-    const V v167 = v164 * s82;
-    const V v168 = v164 * s83;
-    const V v169 = s76 * v164;
-    const V v170 = s77 * v164;
-    const V v171 = s78 * v164;
-    const V v172 = v169 - v171;
-    const V v173 = v169 + v171;
-    const V v174 = v170 + v172;
-    const V v175 = v172 - v170;
-    const V v176 = v71 * v168;
-    const V v177 = v62 + v176;
-    const V v178 = v71 * v167;
-    const V v179 = v57 + v178;
-    const V v180 = v66 * v167;
-    const V v181 = v58 + v180;
-    const V v182 = v66 * v168;
-    const V v183 = v182 - v59;
-    const V v184 = v67 * v168;
-    const V v185 = v59 + v184;
-    const V v186 = v67 * v167;
-    const V v187 = v186 - v58;
-    const V v188 = v75 * v167;
-    const V v189 = v60 + v188;
-    const V v190 = v75 * v168;
-    const V v191 = v61 + v190;
-    const V v192 = v170 + v173;
-    const V v193 = d2 * v183;
-    const V v194 = d2 * v181;
-    const V v195 = 1.0 + v194;
-    const V v196 = d3 * v181;
-    const V v197 = d3 * v183;
-    const V v198 = 1.0 + v197;
-    const V v199 = v173 - v170;
-    const V v200 = d1 * v175;
-    const V v201 = 1.0 + v200;
-    const V v202 = d3 * v174;
-    const V v203 = v202 + v201;
-    const V v204 = d0 * v177;
-    const V v205 = v204 + v193;
-    const V v206 = d1 * v177;
-    const V v207 = v206 + v198;
-    const V v208 = d0 * v179;
-    const V v209 = v208 + v195;
-    const V v210 = d1 * v179;
-    const V v211 = v210 + v196;
-    const V v212 = d4 * v191;
-    const V v213 = v212 + v205;
-    const V v214 = d4 * v189;
-    const V v215 = v214 + v209;
-    const V v216 = d5 * v191;
-    const V v217 = v216 + v207;
-    const V v218 = d5 * v189;
-    const V v219 = v218 + v211;
-    const V v220 = d5 * v192;
-    const V v221 = v220 + v203;
-    const V v222 = d6 * v185;
-    const V v223 = v222 + v213;
-    const V v224 = d6 * v187;
-    const V v225 = v224 + v215;
-    const V v226 = d7 * v185;
-    const V v227 = v226 + v217;
-    const V v228 = d7 * v187;
-    const V v229 = v228 + v219;
-    const V v230 = d7 * v199;
-    const V v231 = v230 + v221;
-    const V v232 = v225 * v227;
-    const V v233 = v223 * v229;
-    const V v234 = v232 - v233;
-    const V v235 = v231 * v234;
+    const V v89 = 1.0 / s48, v90 = s49 * v89, v91 = v89 * s50, v92 = v89 * s51, v93 = v89 * s52,
+        v94 = s45 * v89, v95 = s46 * v89, v96 = s47 * v89, v97 = v94 - v96, v98 = v94 + v96,
+        v99 = v39 + v43 * v93, v100 = v34 + v43 * v92, v101 = v35 + v41 * v92,
+        v102 = v41 * v93 - v36, v103 = v36 + v42 * v93, v104 = v42 * v92 - v35,
+        v105 = v37 + v44 * v92, v106 = v38 + v44 * v93,
+        v107 = d7 * (v98 - v95) + (d5 * (v95 + v98) + (d3 * (v95 + v97) + (1.0 + d1 * (v97 - v95)))),
+        v108 = (d6 * v104 + (d4 * v105 + (d0 * v100 + (1.0 + d2 * v101)))) * (d7 * v103 + (d5 * v106 + (d1 * v99 + (1.0 + d3 * v102)))),
+        v109 = (d6 * v103 + (d4 * v106 + (d0 * v99 + d2 * v102))) * (d7 * v104 + (d5 * v105 + (d1 * v100 + d3 * v101))),
+        v110 = v107 * (v108 - v109);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v236 = w[0] - v165;
-        const V v237 = w[1] - v166;
-        const V v238 = v41 * v236;
-        const V v239 = v40 * v237;
-        const V v240 = v19 * v236;
-        const V v241 = v55 * v236;
-        const V v242 = v170 + v241;
-        const V v243 = v55 * v237;
-        const V v244 = v171 + v243;
-        const V v245 = v17 * v237;
-        const V v246 = v240 - v245;
-        const V v247 = v54 * v246;
-        const V v248 = v168 + v247;
-        const V v249 = v239 + v238;
-        const V v250 = v239 - v238;
-        const V v251 = v54 * v250;
-        const V v252 = v167 + v251;
-        const V v253 = v56 * v249;
-        const V v254 = v169 - v253;
-        const V v255 = v71 * v248;
-        const V v256 = v62 + v255;
-        const V v257 = v75 * v248;
-        const V v258 = v61 + v257;
-        const V v259 = v244 - v254;
-        const V v260 = v244 + v254;
-        const V v261 = v71 * v252;
-        const V v262 = v57 + v261;
-        const V v263 = v75 * v252;
-        const V v264 = v60 + v263;
-        const V v265 = v67 * v248;
-        const V v266 = v59 + v265;
-        const V v267 = v67 * v252;
-        const V v268 = v66 * v252;
-        const V v269 = v58 + v268;
-        const V v270 = v66 * v248;
-        const V v271 = v270 - v59;
-        const V v272 = v242 + v259;
-        const V v273 = v242 - v259;
-        const V v274 = v242 + v260;
-        const V v275 = v267 - v58;
-        const V v276 = v260 - v242;
-        const V v277 = d0 * v256;
-        const V v278 = d0 * v262;
-        const V v279 = 1.0 + v278;
-        const V v280 = d1 * v262;
-        const V v281 = d1 * v256;
-        const V v282 = 1.0 + v281;
-        const V v283 = d1 * v272;
-        const V v284 = 1.0 - v283;
-        const V v285 = d2 * v271;
-        const V v286 = v277 + v285;
-        const V v287 = d2 * v269;
-        const V v288 = v287 + v279;
-        const V v289 = d3 * v269;
-        const V v290 = v280 + v289;
-        const V v291 = d3 * v271;
-        const V v292 = v291 + v282;
-        const V v293 = d3 * v273;
-        const V v294 = v293 + v284;
-        const V v295 = d4 * v258;
-        const V v296 = v295 + v286;
-        const V v297 = d4 * v264;
-        const V v298 = v297 + v288;
-        const V v299 = d5 * v264;
-        const V v300 = v299 + v290;
-        const V v301 = d5 * v258;
-        const V v302 = v301 + v292;
-        const V v303 = d5 * v274;
-        const V v304 = v303 + v294;
-        const V v305 = d6 * v266;
-        const V v306 = v305 + v296;
-        const V v307 = d6 * v275;
-        const V v308 = v307 + v298;
-        const V v309 = d7 * v275;
-        const V v310 = v309 + v300;
-        const V v311 = d7 * v266;
-        const V v312 = v311 + v302;
-        const V v313 = d7 * v276;
-        const V v314 = v313 + v304;
-        const V v315 = v308 * v312;
-        const V v316 = v306 * v310;
-        const V v317 = v315 - v316;
-        const V v318 = v317 * v314;
-        const V v319 = 1.0 / v318;
-        const V v320 = v235 * v319;
-        const M v321 = softehl_eq(v320, softehl_splat(0.0));
-        V v322 = softehl_splat(0.0);
-        const M m323 = ~v321;
-        if (softehl_any(m323)) {
-            const V v324 = softehl_vrcbrt(v320);
-            const V v325 = v320 * v324;
-            const V v326 = v324 * v325;
-            v322 = softehl_blend(m323, v326, v322);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const V v111 = w[0] - v90, v112 = w[1] - v91, v113 = v30 * v111, v114 = v29 * v112,
+            v115 = v95 + v32 * v111, v116 = v96 + v32 * v112,
+            v117 = v93 + v31 * (v16 * v111 - v14 * v112), v118 = v92 + v31 * (v114 - v113),
+            v119 = v94 - v33 * (v114 + v113), v120 = v39 + v43 * v117, v121 = v38 + v44 * v117,
+            v122 = v116 - v119, v123 = v116 + v119, v124 = v34 + v43 * v118,
+            v125 = v37 + v44 * v118, v126 = v36 + v42 * v117, v127 = v35 + v41 * v118,
+            v128 = v41 * v117 - v36, v129 = v42 * v118 - v35,
+            v130 = d5 * (v115 + v123) + (d3 * (v115 - v122) + (1.0 - d1 * (v115 + v122))),
+            v131 = d6 * v126 + (d4 * v121 + (d0 * v120 + d2 * v128)),
+            v132 = d6 * v129 + (d4 * v125 + (d2 * v127 + (1.0 + d0 * v124))),
+            v133 = d7 * v129 + (d5 * v125 + (d1 * v124 + d3 * v127)),
+            v134 = d7 * v126 + (d5 * v121 + (d3 * v128 + (1.0 + d1 * v120))),
+            v135 = d7 * (v123 - v115) + v130,
+            v136 = v110 * (1.0 / ((v132 * v134 - v131 * v133) * v135));
+        const M v137 = softehl_eq(v136, softehl_splat(0.0)); V v138 = softehl_splat(0.0);
+        const M m139 = ~v137;
+        if (softehl_any(m139)) {
+            const V v140 = softehl_vrcbrt(v136), v141 = v140 * (v136 * v140);
+            v138 = softehl_blend(m139, v141, v138);
         }
-        const V v327 = v308 * v322;
-        const V v328 = v306 * v322;
-        const V v329 = v310 * v322;
-        const V v330 = v312 * v322;
-        const V v331 = v314 * v322;
-        const V v332 = 2.0 * v327;
-        const V v333 = v327 * v327;
-        const V v334 = 2.0 * v328;
-        const V v335 = 2.0 * v329;
-        const V v336 = 2.0 * v330;
-        const V v337 = v331 * v331;
-        const V v338 = v327 * v330;
-        const V v339 = 2.0 * v331;
-        const V v340 = v328 * v328;
-        const V v341 = v333 + v340;
-        const V v342 = v331 * v339;
-        const V v343 = v328 * v329;
-        const V v344 = v338 - v343;
-        const V v345 = 2.0 * v337;
-        const V v346 = v331 * v344;
-        const V v347 = v329 * v329;
-        const V v348 = v347 + v341;
-        const V v349 = v344 * v344;
-        const V v350 = v345 * v344;
-        const V v351 = v330 * v330;
-        const V v352 = v351 + v348;
-        const V v353 = v337 + v352;
-        const V v354 = v337 * v349;
-        const V v355 = 1.0 / v346;
-        const V v356 = 0.3333333333333333 * v353;
-        const V v357 = softehl_vrcbrt(v354);
-        const V v358 = 1.0 / v354;
-        const V v359 = v353 * v357;
-        const V v360 = (-3.0) + v359;
-        const V v361 = 1.0 - v358;
-        const V v362 = v1 * v361;
-        const V v363 = v357 * v357;
-        const V v364 = v363 * v356;
-        const V v365 = v363 * v364;
-        const V v366 = v23 * v360;
-        const V v367 = v27 + v366;
-        const V v368 = v360 * v367;
-        const V v369 = parameters[0] + v368;
-        const V v370 = v365 * v369;
-        const V v371 = v362 - v370;
-        const V v372 = v357 * v369;
-        const V v373 = v350 * v371;
-        const V v374 = v349 * v371;
-        const V v375 = v336 * v372;
-        const V v376 = v335 * v372;
-        const V v377 = v334 * v372;
-        const V v378 = v372 + v374;
-        const V v379 = v342 * v378;
-        const V v380 = v355 * v379;
-        const V v381 = v332 * v372;
-        const V v382 = v329 * v373;
-        const V v383 = v377 - v382;
-        const V v384 = v328 * v373;
-        const V v385 = v376 - v384;
-        const V v386 = v328 * v383;
-        const V v387 = v329 * v385;
-        const V v388 = v330 * v383;
-        const V v389 = v330 * v373;
-        const V v390 = v381 + v389;
-        const V v391 = v327 * v373;
-        const V v392 = v375 + v391;
-        const V v393 = v330 * v392;
-        const V v394 = v387 + v393;
-        const V v395 = v327 * v390;
-        const V v396 = v395 + v386;
-        const V v397 = v329 * v390;
-        const V v398 = v397 + v388;
-        const V v399 = v355 * v396;
-        const V v400 = v355 * v394;
-        const V v401 = v355 * v398;
-        softehl_store4(R + 7 * q + 2, (7 * points), v346, v399, v400, v380);
-        softehl_store1(R + 7 * q + 6, (7 * points), v401);
+        const V v142 = v132 * v138, v143 = v131 * v138, v144 = v133 * v138, v145 = v134 * v138,
+            v146 = v135 * v138, v147 = v146 * v146, v148 = v142 * v145 - v143 * v144,
+            v149 = v146 * v148, v150 = v148 * v148,
+            v151 = v147 + (v145 * v145 + (v144 * v144 + (v142 * v142 + v143 * v143))),
+            v152 = v147 * v150, v153 = 1.0 / v149, v154 = softehl_vrcbrt(v152),
+            v155 = (-3.0) + v151 * v154, v156 = v154 * v154,
+            v157 = parameters[0] + v155 * (v18 + v17 * v155),
+            v158 = v1 * (1.0 - 1.0 / v152) - v156 * (v156 * (0.3333333333333333 * v151)) * v157,
+            v159 = v154 * v157, v160 = 2.0 * v147 * v148 * v158,
+            v161 = v153 * (v146 * (2.0 * v146) * (v159 + v150 * v158)),
+            v162 = 2.0 * v143 * v159 - v144 * v160, v163 = 2.0 * v142 * v159 + v145 * v160,
+            v164 = v144 * (2.0 * v144 * v159 - v143 * v160) + v145 * (2.0 * v145 * v159 + v142 * v160),
+            v165 = v153 * (v142 * v163 + v143 * v162), v166 = v153 * v164,
+            v167 = v153 * (v144 * v163 + v145 * v162);
+        softehl_store4(R + 7 * q + 2, (7 * points), v149, v165, v166, v161);
+        softehl_store1(R + 7 * q + 6, (7 * points), v167);
     }
 }
-
-void softehl_solid_taylor_mean_yeoh_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_yeoh_fields_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, 0, parameters, rule, basis, values + (7 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_yeoh_fields_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, 0, parameters, rule, basis, values + (7 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double R[SOFTEHL_LANES * (7 * points)];
-    softehl_solid_taylor_mean_yeoh_fields(SOFTEHL_LANES, points, modes, X, d, 0, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (7 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_solid_taylor_mean_yeoh_fields, 8, 8, 0, 0, (7 * points), 0)

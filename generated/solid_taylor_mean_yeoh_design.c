@@ -24,1200 +24,229 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_solid_taylor_mean_yeoh_pseudo_load_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_solid_taylor_mean_yeoh_pseudo_load)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V t0, t1, t2, t3;
-    softehl_load4(t + 0, 12, &t0, &t1, &t2, &t3);
-    (void)t0; (void)t1; (void)t2; (void)t3;
-    V t4, t5, t6, t7;
-    softehl_load4(t + 4, 12, &t4, &t5, &t6, &t7);
-    (void)t4; (void)t5; (void)t6; (void)t7;
-    V t8, t9, t10, t11;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7;
+    softehl_load4(X + 0, 8, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 8, &X4, &X5, &X6, &X7);
+    V d0, d1, d2, d3, d4, d5, d6, d7;
+    softehl_load4(d + 0, 8, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 8, &d4, &d5, &d6, &d7);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8, t9, t10, t11;
+    softehl_load4(t + 0, 12, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 12, &t4, &t5, &t6, &t7);
     softehl_load4(t + 8, 12, &t8, &t9, &t10, &t11);
-    (void)t8; (void)t9; (void)t10; (void)t11;
-    const double v1 = 0.5 * parameters[3];
-    const double v2 = 1.5707963267948966 * parameters[3];
-    const V v3 = X4 - X0;
-    const V v4 = X0 - X2;
-    const V v5 = X4 - X2;
-    const V v6 = v3 - X2;
-    const V v7 = X4 - X6;
-    const V v8 = X6 + v6;
-    const V v9 = X1 - X3;
-    const V v10 = X1 + X3;
-    const V v11 = v4 + v7;
-    const V v12 = X5 - X3;
-    const V v13 = v7 - v4;
-    const V v14 = 0.25 * v8;
-    const V v15 = 0.0625 * v8;
-    const V v16 = X5 - X7;
-    const V v17 = X5 + X7;
-    const V v18 = 0.25 * v13;
-    const V v19 = 0.0625 * v13;
-    const V v20 = v9 + v16;
-    const V v21 = v10 + v17;
-    const V v22 = v16 - v9;
-    const V v23 = v17 - v10;
-    const V v24 = 0.25 * v22;
-    const V v25 = 0.0625 * v22;
-    const V v26 = 0.25 * v23;
-    const V v27 = 0.0625 * v23;
-    const V v28 = 0.25 * v21;
-    const V v29 = 0.5 * v21;
-    const V v30 = d0 - d2;
-    const V v31 = d0 + d2;
-    const V v32 = d1 + d3;
-    const V v33 = d1 - d3;
-    const V v34 = v18 * v26;
-    const V v35 = 1.0 / v28;
-    const V v36 = v28 * v28;
-    const V v37 = 1.0 / v36;
-    const V v38 = v24 * v14;
-    const V v39 = v34 - v38;
-    const V v40 = v31 - d4;
-    const V v41 = 1.0 / v39;
-    const V v42 = v40 - d6;
-    const V v43 = d4 - d6;
-    const V v44 = d5 + d7;
-    const V v45 = d5 - d7;
-    const V v46 = v30 + v43;
-    const V v47 = v30 - v43;
-    const V v48 = v32 - v44;
-    const V v49 = v32 + v44;
-    const V v50 = v33 - v45;
-    const V v51 = v33 + v45;
-    const V v52 = t0 - t2;
-    const V v53 = 0.25 * v35;
-    const V v54 = v35 * v35;
-    const V v55 = v37 * v29;
-    const V v56 = t1 - t3;
-    const V v57 = t1 + t3;
-    const V v58 = t4 - t2;
-    const V v59 = t4 - t6;
-    const V v60 = t6 + v58;
-    const V v61 = v52 + v59;
-    const V v62 = v60 - t0;
-    const V v63 = v41 * v41;
-    const V v64 = v25 * v41;
-    const V v65 = v59 - v52;
-    const V v66 = v11 * v25;
-    const V v67 = v11 * v27;
-    const V v68 = v27 * v41;
-    const V v69 = 0.25 * v62;
-    const V v70 = 0.0625 * v62;
-    const V v71 = 0.25 * v65;
-    const V v72 = 0.0625 * v65;
-    const V v73 = v41 * v66;
-    const V v74 = v41 * v67;
-    const V v75 = v25 * v61;
-    const V v76 = v27 * v61;
-    const V v77 = v26 * v71;
-    const V v78 = v41 * v70;
-    const V v79 = v20 * v41;
-    const V v80 = 0.25 * v73;
-    const V v81 = 0.25 * v74;
-    const V v82 = v79 * v70;
-    const V v83 = v41 * v15;
-    const V v84 = v15 * v79;
-    const V v85 = v24 * v69;
-    const V v86 = v77 - v85;
-    const V v87 = v19 * v79;
-    const V v88 = v19 * v41;
-    const V v89 = v79 * v72;
-    const V v90 = v41 * v72;
-    const V v91 = v74 - v84;
-    const V v92 = 0.25 * v84;
-    const V v93 = 0.25 * v87;
-    const V v94 = v81 - v92;
-    const V v95 = v87 - v73;
-    const V v96 = v47 * v83;
-    const V v97 = v50 * v83;
-    const V v98 = 1.0 + v97;
-    const V v99 = v42 * v88;
-    const V v100 = v96 - v99;
-    const V v101 = t5 - t3;
-    const V v102 = v48 * v88;
-    const V v103 = v98 - v102;
-    const V v104 = t5 - t7;
-    const V v105 = t5 + t7;
-    const V v106 = v93 - v80;
-    const V v107 = v48 * v64;
-    const V v108 = v42 * v64;
-    const V v109 = 1.0 + v108;
-    const V v110 = v56 + v104;
-    const V v111 = v57 + v105;
-    const V v112 = v50 * v68;
-    const V v113 = v107 - v112;
-    const V v114 = v47 * v68;
-    const V v115 = v109 - v114;
-    const V v116 = 0.25 * v111;
-    const V v117 = v104 - v56;
-    const V v118 = v105 - v57;
-    const V v119 = v41 * v110;
-    const V v120 = 0.25 * v117;
-    const V v121 = 0.0625 * v117;
-    const V v122 = 0.25 * v118;
-    const V v123 = 0.0625 * v118;
-    const V v124 = v116 * v54;
-    const V v125 = v116 * v55;
-    const V v126 = v41 * v121;
-    const V v127 = v14 * v120;
-    const V v128 = v86 - v127;
-    const V v129 = v18 * v122;
-    const V v130 = v129 + v128;
-    const V v131 = v41 * v123;
-    const V v132 = v11 * v121;
-    const V v133 = v75 + v132;
-    const V v134 = v11 * v123;
-    const V v135 = v76 + v134;
-    const V v136 = v63 * v130;
-    const V v137 = v41 * v133;
-    const V v138 = v41 * v135;
-    const V v139 = v25 * v136;
-    const V v140 = v126 - v139;
-    const V v141 = v27 * v136;
-    const V v142 = v131 - v141;
-    const V v143 = v20 * v136;
-    const V v144 = v119 - v143;
-    const V v145 = v66 * v136;
-    const V v146 = v137 - v145;
-    const V v147 = v67 * v136;
-    const V v148 = v138 - v147;
-    const V v149 = v42 * v140;
-    const V v150 = v48 * v140;
-    const V v151 = v47 * v142;
-    const V v152 = v149 - v151;
-    const V v153 = v50 * v142;
-    const V v154 = v150 - v153;
-    const V v155 = v15 * v136;
-    const V v156 = v78 - v155;
-    const V v157 = v19 * v136;
-    const V v158 = v90 - v157;
-    const V v159 = v47 * v156;
-    const V v160 = v50 * v156;
-    const V v161 = v42 * v158;
-    const V v162 = v159 - v161;
-    const V v163 = v48 * v158;
-    const V v164 = v160 - v163;
-    const V v165 = v15 * v144;
-    const V v166 = v82 + v165;
-    const V v167 = v19 * v144;
-    const V v168 = v89 + v167;
-    const V v169 = v148 - v166;
-    const V v170 = v168 - v146;
-    V s171 = softehl_splat(0.0);
-    V s172 = softehl_splat(0.0);
-    V s173 = softehl_splat(0.0);
-    V s174 = softehl_splat(0.0);
-    V s175 = softehl_splat(0.0);
-    V s176 = softehl_splat(0.0);
-    V s177 = softehl_splat(0.0);
-    V s178 = softehl_splat(0.0);
-    V s179 = softehl_splat(0.0);
-    V s180 = softehl_splat(0.0);
-    V s181 = softehl_splat(0.0);
-    V s182 = softehl_splat(0.0);
-    V s183 = softehl_splat(0.0);
-    V s184 = softehl_splat(0.0);
-    V s185 = softehl_splat(0.0);
-    V s186 = softehl_splat(0.0);
+    const double v1 = 0.5 * parameters[3], v2 = 1.5707963267948966 * parameters[3];
+    const V v3 = X0 - X2, v4 = X4 - X2, v5 = X4 - X6, v6 = X6 + (X4 - X0 - X2), v7 = X1 - X3,
+        v8 = X1 + X3, v9 = v3 + v5, v10 = X5 - X3, v11 = v5 - v3, v12 = 0.25 * v6,
+        v13 = 0.0625 * v6, v14 = X5 - X7, v15 = X5 + X7, v16 = 0.25 * v11, v17 = 0.0625 * v11,
+        v18 = v7 + v14, v19 = v8 + v15, v20 = v14 - v7, v21 = v15 - v8, v22 = 0.25 * v20,
+        v23 = 0.0625 * v20, v24 = 0.25 * v21, v25 = 0.0625 * v21, v26 = 0.25 * v19, v27 = d0 - d2,
+        v28 = d1 + d3, v29 = d1 - d3, v30 = 1.0 / v26, v31 = 1.0 / (v26 * v26),
+        v32 = 1.0 / (v16 * v24 - v22 * v12), v33 = d0 + d2 - d4 - d6, v34 = d4 - d6, v35 = d5 + d7,
+        v36 = d5 - d7, v37 = v27 + v34, v38 = v27 - v34, v39 = v28 - v35, v40 = v28 + v35,
+        v41 = v29 - v36, v42 = v29 + v36, v43 = t0 - t2, v44 = 0.25 * v30, v45 = t1 - t3,
+        v46 = t1 + t3, v47 = t4 - t2, v48 = t4 - t6, v49 = v43 + v48, v50 = t6 + v47 - t0,
+        v51 = v23 * v32, v52 = v48 - v43, v53 = v9 * v23, v54 = v9 * v25, v55 = v25 * v32,
+        v56 = 0.25 * v50, v57 = 0.0625 * v50, v58 = 0.25 * v52, v59 = 0.0625 * v52, v60 = v32 * v53,
+        v61 = v32 * v54, v62 = v18 * v32, v63 = 0.25 * v60, v64 = 0.25 * v61, v65 = v32 * v13,
+        v66 = v13 * v62, v67 = v17 * v62, v68 = v17 * v32, v69 = v61 - v66, v70 = 0.25 * v66,
+        v71 = 0.25 * v67, v72 = v64 - v70, v73 = v67 - v60, v74 = v38 * v65 - v33 * v68,
+        v75 = t5 - t3, v76 = 1.0 + v41 * v65 - v39 * v68, v77 = t5 - t7, v78 = t5 + t7,
+        v79 = v71 - v63, v80 = v39 * v51 - v41 * v55, v81 = 1.0 + v33 * v51 - v38 * v55,
+        v82 = 0.25 * (v46 + v78), v83 = v77 - v45, v84 = v78 - v46, v85 = 0.25 * v83,
+        v86 = 0.0625 * v83, v87 = 0.25 * v84, v88 = 0.0625 * v84, v89 = v82 * (v30 * v30),
+        v90 = v82 * (v31 * (0.5 * v19)),
+        v91 = v32 * v32 * (v16 * v87 + (v24 * v58 - v22 * v56 - v12 * v85)),
+        v92 = v32 * v86 - v23 * v91, v93 = v32 * v88 - v25 * v91,
+        v94 = v32 * (v45 + v77) - v18 * v91, v95 = v32 * (v23 * v49 + v9 * v86) - v53 * v91,
+        v96 = v32 * (v25 * v49 + v9 * v88) - v54 * v91, v97 = v33 * v92 - v38 * v93,
+        v98 = v39 * v92 - v41 * v93, v99 = v32 * v57 - v13 * v91, v100 = v32 * v59 - v17 * v91,
+        v101 = v38 * v99 - v33 * v100, v102 = v41 * v99 - v39 * v100, v103 = v62 * v57 + v13 * v94,
+        v104 = v62 * v59 + v17 * v94, v105 = v96 - v103, v106 = v104 - v95;
+    V s107 = {0}, s108 = {0}, s109 = {0}, s110 = {0}, s111 = {0}, s112 = {0}, s113 = {0},
+        s114 = {0}, s115 = {0}, s116 = {0}, s117 = {0}, s118 = {0}, s119 = {0}, s120 = {0},
+        s121 = {0}, s122 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v187 = 1.0 - w[1];
-        const double v188 = 1.0 + w[1];
-        const double v189 = 0.25 * w[1];
-        const double v190 = 1.0 - w[0];
-        const double v191 = 1.0 + w[0];
-        const double v192 = 0.25 * v187;
-        const double v193 = 0.25 * v188;
-        const double v194 = 0.25 * w[0];
-        const double v195 = 0.25 - v189;
-        const double v196 = 0.25 + v189;
-        const double v197 = 0.25 + v194;
-        const double v198 = 0.25 - v194;
-        const double v199 = v192 * v190;
-        const double v200 = v192 * v191;
-        const double v201 = v191 * v193;
-        const double v202 = v190 * v193;
-        const double v203 = v189 - 0.25;
-        const V v204 = X2 * v195;
-        const double v205 = v194 - 0.25;
-        const V v206 = v196 * v16;
-        const V v207 = X6 * v198;
-        const V v208 = v197 * v12;
-        const V v209 = X5 * v201;
-        const V v210 = v201 * t5;
-        const V v211 = v196 * v7;
-        const V v212 = v204 + v211;
-        const V v213 = v195 * t2;
-        const V v214 = v198 * t6;
-        const V v215 = v197 * v5;
-        const V v216 = v207 + v215;
-        const V v217 = v196 * v104;
-        const V v218 = v196 * v59;
-        const V v219 = v213 + v218;
-        const V v220 = v197 * v101;
-        const V v221 = v197 * v58;
-        const V v222 = v214 + v221;
-        const V v223 = X0 * v203;
-        const V v224 = v223 + v212;
-        const V v225 = X0 * v205;
-        const V v226 = v225 + v216;
-        const V v227 = X3 * v195;
-        const V v228 = v227 + v206;
-        const V v229 = X3 * v200;
-        const V v230 = v209 + v229;
-        const V v231 = v195 * t3;
-        const V v232 = v231 + v217;
-        const V v233 = v200 * t3;
-        const V v234 = v210 + v233;
-        const V v235 = v203 * t0;
-        const V v236 = v235 + v219;
-        const V v237 = v205 * t0;
-        const V v238 = v237 + v222;
-        const V v239 = X7 * v198;
-        const V v240 = v239 + v208;
-        const V v241 = X7 * v202;
-        const V v242 = v241 + v230;
-        const V v243 = v198 * t7;
-        const V v244 = v243 + v220;
-        const V v245 = v202 * t7;
-        const V v246 = v245 + v234;
-        const V v247 = X1 * v203;
-        const V v248 = v247 + v228;
-        const V v249 = v203 * t1;
-        const V v250 = v249 + v232;
-        const V v251 = X1 * v205;
-        const V v252 = v251 + v240;
-        const V v253 = v205 * t1;
-        const V v254 = v253 + v244;
-        const V v255 = X1 * v199;
-        const V v256 = v255 + v242;
-        const V v257 = v199 * t1;
-        const V v258 = v257 + v246;
-        const V v259 = w[0] * v224;
-        const V v260 = w[0] * v236;
-        const V v261 = v252 * v236;
-        const V v262 = v224 * v252;
-        const V v263 = w[1] * v252;
-        const V v264 = w[1] * v226;
-        const V v265 = v259 - v264;
-        const V v266 = w[1] * v254;
-        const V v267 = v224 * v254;
-        const V v268 = v261 + v267;
-        const V v269 = w[1] * v238;
-        const V v270 = v260 - v269;
-        const double v271 = w[1] * w[2];
-        const V v272 = v248 * v226;
-        const V v273 = v262 - v272;
-        const V v274 = w[0] * v248;
-        const V v275 = v263 - v274;
-        const V v276 = v248 * v238;
-        const V v277 = v268 - v276;
-        const V v278 = w[2] * v256;
-        const V v279 = w[0] * v250;
-        const V v280 = v266 - v279;
-        const V v281 = v226 * v250;
-        const V v282 = v277 - v281;
-        const V v283 = w[2] * v258;
-        const V v284 = v273 * v258;
-        const V v285 = 0.25 * v273;
-        const V v286 = v273 * v256;
-        const V v287 = v270 * v278;
-        const V v288 = v278 * v280;
-        const V v289 = v275 * v278;
-        s177 += v289;
-        const V v290 = v265 * v278;
-        s178 += v290;
-        const V v291 = v256 * v282;
-        const V v292 = v284 + v291;
-        const V v293 = 0.25 * v282;
-        const V v294 = v265 * v283;
-        s186 += v287;
-        s186 += v294;
-        const V v295 = v275 * v283;
-        s185 += v288;
-        s185 += v295;
-        const V v296 = w[2] * v285;
-        s171 += v296;
-        const V v297 = v271 * v285;
-        s173 += v297;
-        const V v298 = w[2] * v286;
-        s174 += v298;
-        const V v299 = v271 * v286;
-        s176 += v299;
-        const V v300 = w[0] * v296;
-        s172 += v300;
-        const V v301 = w[2] * v293;
-        s179 += v301;
-        const V v302 = v271 * v293;
-        s181 += v302;
-        const V v303 = w[2] * v292;
-        s182 += v303;
-        const V v304 = v271 * v292;
-        s184 += v304;
-        const V v305 = w[0] * v298;
-        s175 += v305;
-        const V v306 = w[0] * v301;
-        s180 += v306;
-        const V v307 = w[0] * v303;
-        s183 += v307;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v123 = 1.0 - w[1], v124 = 1.0 + w[1], v125 = 0.25 * w[1], v126 = 1.0 - w[0],
+            v127 = 1.0 + w[0], v128 = 0.25 * v123, v129 = 0.25 * v124, v130 = 0.25 * w[0],
+            v131 = 0.25 - v125, v132 = 0.25 + v125, v133 = 0.25 + v130, v134 = 0.25 - v130,
+            v135 = v128 * v126, v136 = v128 * v127, v137 = v127 * v129, v138 = v126 * v129,
+            v139 = v125 - 0.25;
+        const V v140 = X2 * v131; const double v141 = v130 - 0.25;
+        const V v142 = v132 * v14, v143 = X6 * v134, v144 = v133 * v10, v145 = X5 * v137,
+            v146 = v137 * t5, v147 = v132 * v5, v148 = v131 * t2, v149 = v134 * t6,
+            v150 = v133 * v4, v151 = v143 + v150, v152 = v132 * v77, v153 = v132 * v48,
+            v154 = v133 * v75, v155 = v133 * v47, v156 = v149 + v155, v157 = X0 * v139,
+            v158 = v157 + (v140 + v147), v159 = X0 * v141, v160 = v159 + v151, v161 = X3 * v131,
+            v162 = X3 * v136, v163 = v131 * t3, v164 = v136 * t3, v165 = v139 * t0,
+            v166 = v165 + (v148 + v153), v167 = v141 * t0, v168 = v167 + v156, v169 = X7 * v134,
+            v170 = v169 + v144, v171 = X7 * v138, v172 = v134 * t7, v173 = v172 + v154,
+            v174 = v138 * t7, v175 = X1 * v139, v176 = v175 + (v161 + v142), v177 = v139 * t1,
+            v178 = v177 + (v163 + v152), v179 = X1 * v141, v180 = v179 + v170, v181 = v141 * t1,
+            v182 = v181 + v173, v183 = X1 * v135, v184 = v183 + (v171 + (v145 + v162)),
+            v185 = v135 * t1, v186 = v185 + (v174 + (v146 + v164)),
+            v187 = w[0] * v158 - w[1] * v160;
+        const double v188 = w[1] * w[2];
+        const V v189 = v158 * v180 - v176 * v160, v190 = w[1] * v180 - w[0] * v176,
+            v191 = w[2] * v184, v192 = v180 * v166 + v158 * v182 - v176 * v168 - v160 * v178,
+            v193 = w[2] * v186, v194 = 0.25 * v189, v195 = v189 * v184, v196 = v190 * v191;
+        s113 += v196; const V v197 = v187 * v191; s114 += v197;
+        const V v198 = v189 * v186 + v184 * v192, v199 = 0.25 * v192;
+        s122 += (w[0] * v166 - w[1] * v168) * v191; s122 += v187 * v193;
+        s121 += v191 * (w[1] * v182 - w[0] * v178); s121 += v190 * v193; const V v200 = w[2] * v194;
+        s107 += v200; const V v201 = v188 * v194; s109 += v201; const V v202 = w[2] * v195;
+        s110 += v202; const V v203 = v188 * v195; s112 += v203; const V v204 = w[0] * v200;
+        s108 += v204; const V v205 = w[2] * v199; s115 += v205; const V v206 = v188 * v199;
+        s117 += v206; const V v207 = w[2] * v198; s118 += v207; const V v208 = v188 * v198;
+        s120 += v208; const V v209 = w[0] * v202; s111 += v209; const V v210 = w[0] * v205;
+        s116 += v210; const V v211 = w[0] * v207; s119 += v211;
     }
-    const V v308 = 1.0 / s174;
-    const V v309 = 0.5 * s174;
-    const V v310 = v2 * s174;
-    const V v311 = t11 * v309;
-    const V v312 = v308 * v308;
-    const V v313 = v312 * s182;
-    const V v314 = v1 * s182;
-    const V v315 = v311 + v314;
-    const V v316 = 3.141592653589793 * v315;
-    const V v317 = v308 * s179;
-    const V v318 = v308 * s180;
-    const V v319 = v308 * s181;
-    const V v320 = v308 * s185;
-    const V v321 = v308 * s186;
-    const V v322 = s177 * v313;
-    const V v323 = v320 - v322;
-    const V v324 = v308 * s177;
-    const V v325 = 0.25 * v324;
-    const V v326 = s175 * v308;
-    const V v327 = s175 * v313;
-    const V v328 = v308 * s176;
-    const V v329 = v308 * s178;
-    const V v330 = s178 * v313;
-    const V v331 = v321 - v330;
-    const V v332 = s171 * v308;
-    const V v333 = s172 * v308;
-    const V v334 = s173 * v308;
-    const V v335 = 0.25 * v329;
-    const V v336 = s176 * v313;
-    const V v337 = v92 * v329;
-    const V v338 = v92 * v324;
-    const V v339 = v93 * v324;
-    const V v340 = v93 * v329;
-    const V v341 = v80 * v324;
-    const V v342 = v80 * v329;
-    const V v343 = v81 * v324;
-    const V v344 = v81 * v329;
-    const V v345 = v324 * v146;
-    const V v346 = v329 * v146;
-    const V v347 = v324 * v148;
-    const V v348 = v329 * v148;
-    const V v349 = v343 - v338;
-    const V v350 = v341 - v339;
-    const V v351 = v339 - v341;
-    const V v352 = v338 - v343;
-    const V v353 = v342 - v340;
-    const V v354 = v340 - v342;
-    const V v355 = 0.25 * v323;
-    const V v356 = v73 * v323;
-    const V v357 = v345 + v356;
-    const V v358 = v74 * v323;
-    const V v359 = v347 + v358;
-    const V v360 = v74 * v331;
-    const V v361 = v348 + v360;
-    const V v362 = 0.25 * v331;
-    const V v363 = v73 * v331;
-    const V v364 = v346 + v363;
-    const V v365 = v337 - v344;
-    const V v366 = v344 - v337;
-    const V v367 = v84 * v323;
-    const V v368 = v84 * v331;
-    const V v369 = v87 * v323;
-    const V v370 = v87 * v331;
-    const V v371 = v308 * s183;
-    const V v372 = v327 - v371;
-    const V v373 = v308 * s184;
-    const V v374 = v336 - v373;
-    const V v375 = v24 * v372;
-    const V v376 = v26 * v374;
-    const V v377 = v18 * v372;
-    const V v378 = v53 * v372;
-    const V v379 = v53 * v374;
-    const V v380 = v14 * v374;
-    const V v381 = v377 - v380;
-    const V v382 = v324 * v166;
-    const V v383 = v367 + v382;
-    const V v384 = v324 * v168;
-    const V v385 = v369 + v384;
-    const V v386 = v329 * v166;
-    const V v387 = v368 + v386;
-    const V v388 = v329 * v168;
-    const V v389 = v370 + v388;
-    const V v390 = v359 - v383;
-    const V v391 = v361 - v387;
-    const V v392 = v364 - v389;
-    const V v393 = v357 - v385;
-    const V v394 = 0.25 * v390;
-    const V v395 = v387 - v361;
-    const V v396 = v389 - v364;
-    const V v397 = v383 - v359;
-    const V v398 = 0.25 * v391;
-    const V v399 = 0.25 * v393;
-    const V v400 = 0.25 * v392;
-    const V v401 = v385 - v357;
-    const V v402 = 0.25 * v395;
-    const V v403 = 0.25 * v396;
-    const V v404 = 0.25 * v397;
-    const V v405 = 0.25 * v401;
-    const V v406 = s171 * v313;
-    const V v407 = v317 - v406;
-    const V v408 = s172 * v313;
-    const V v409 = v318 - v408;
-    const V v410 = s173 * v313;
-    const V v411 = v319 - v410;
-    const V v412 = v409 + v378;
-    const V v413 = v411 + v379;
-    const V v414 = v49 * v407;
-    const V v415 = v49 * v332;
-    const V v416 = 1.0 + v415;
-    const V v417 = v47 * v394;
-    const V v418 = v152 + v417;
-    const V v419 = v47 * v349;
-    const V v420 = v115 + v419;
-    const V v421 = v47 * v366;
-    const V v422 = v100 + v421;
-    const V v423 = v47 * v398;
-    const V v424 = v162 + v423;
-    const V v425 = v50 * v349;
-    const V v426 = v113 + v425;
-    const V v427 = v50 * v333;
-    const V v428 = v416 - v427;
-    const V v429 = v50 * v366;
-    const V v430 = v103 + v429;
-    const V v431 = v50 * v409;
-    const V v432 = v414 - v431;
-    const V v433 = v50 * v394;
-    const V v434 = v154 + v433;
-    const V v435 = v50 * v398;
-    const V v436 = v164 + v435;
-    const V v437 = v46 * v325;
-    const V v438 = v437 + v420;
-    const V v439 = v46 * v362;
-    const V v440 = v439 + v424;
-    const V v441 = v51 * v325;
-    const V v442 = v441 + v426;
-    const V v443 = v51 * v335;
-    const V v444 = v443 + v430;
-    const V v445 = v51 * v362;
-    const V v446 = v445 + v436;
-    const V v447 = v51 * v355;
-    const V v448 = v447 + v434;
-    const V v449 = v46 * v335;
-    const V v450 = v449 + v422;
-    const V v451 = v46 * v355;
-    const V v452 = v451 + v418;
-    const V v453 = v42 * v351;
-    const V v454 = v453 + v438;
-    const V v455 = v48 * v351;
-    const V v456 = v455 + v442;
-    const V v457 = v42 * v403;
-    const V v458 = v457 + v440;
-    const V v459 = v48 * v403;
-    const V v460 = v459 + v446;
-    const V v461 = v48 * v354;
-    const V v462 = v461 + v444;
-    const V v463 = v42 * v354;
-    const V v464 = v463 + v450;
-    const V v465 = v42 * v405;
-    const V v466 = v465 + v452;
-    const V v467 = v48 * v405;
-    const V v468 = v467 + v448;
-    const V v469 = v454 * v460;
-    const V v470 = v454 * v462;
-    const V v471 = v48 * v334;
-    const V v472 = v428 - v471;
-    const V v473 = v48 * v411;
-    const V v474 = v432 - v473;
-    const V v475 = 2.0 * v472;
-    const V v476 = v472 * v472;
-    const V v477 = v462 * v466;
-    const V v478 = v469 + v477;
-    const V v479 = v456 * v464;
-    const V v480 = v470 - v479;
-    const V v481 = v464 * v468;
-    const V v482 = v478 - v481;
-    const V v483 = 2.0 * v480;
-    const V v484 = v480 * v480;
-    const V v485 = v474 * v475;
-    const V v486 = v456 * v458;
-    const V v487 = v482 - v486;
-    const V v488 = v476 * v484;
-    const V v489 = 1.0 / v488;
-    const V v490 = v483 * v487;
-    const V v491 = v484 * v485;
-    const V v492 = v476 * v490;
-    const V v493 = v491 + v492;
-    const V v494 = v310 * v489;
-    const V v495 = v489 * v494;
-    const V v496 = v493 * v495;
-    const V v497 = 1.0 - v489;
-    const V v498 = v316 * v497;
-    const V v499 = v496 + v498;
-    const V v500 = v310 - v494;
-    const V v501 = v485 * v500;
-    const V v502 = v490 * v500;
-    const V v503 = v484 * v499;
-    const V v504 = v502 + v503;
-    const V v505 = v476 * v499;
-    const V v506 = v501 + v505;
-    const V v507 = v484 * v500;
-    const V v508 = v476 * v500;
-    const V v509 = v483 * v506;
-    const V v510 = v483 * v508;
-    const V v511 = 2.0 * v508;
-    const V v512 = v487 * v511;
-    const V v513 = v509 + v512;
-    const V v514 = v468 * v510;
-    const V v515 = v458 * v510;
-    const V v516 = v475 * v504;
-    const V v517 = v475 * v507;
-    const V v518 = 2.0 * v507;
-    const V v519 = v474 * v518;
-    const V v520 = v516 + v519;
-    const V v521 = v456 * v513;
-    const V v522 = v514 + v521;
-    const V v523 = v456 * v510;
-    const V v524 = v464 * v513;
-    const V v525 = v515 + v524;
-    const V v526 = v464 * v510;
-    const V v527 = v409 * v517;
-    const V v528 = v411 * v517;
-    const V v529 = v407 * v517;
-    const V v530 = v332 * v520;
-    const V v531 = v529 + v530;
-    const V v532 = v333 * v520;
-    const V v533 = v334 * v520;
-    const V v534 = v350 * v525;
-    const V v535 = v352 * v525;
-    const V v536 = v325 * v525;
-    const V v537 = v353 * v522;
-    const V v538 = v365 * v522;
-    const V v539 = v335 * v522;
-    const V v540 = v399 * v526;
-    const V v541 = v404 * v526;
-    const V v542 = v355 * v526;
-    const V v543 = v400 * v523;
-    const V v544 = v402 * v523;
-    const V v545 = v362 * v523;
-    const V v546 = v460 * v510;
-    const V v547 = v466 * v510;
-    const V v548 = v462 * v510;
-    const V v549 = v355 * v548;
-    const V v550 = v405 * v548;
-    const V v551 = v543 + v550;
-    const V v552 = v394 * v548;
-    const V v553 = v544 + v552;
-    const V v554 = v462 * v513;
-    const V v555 = v546 + v554;
-    const V v556 = v454 * v513;
-    const V v557 = v547 + v556;
-    const V v558 = v454 * v510;
-    const V v559 = v362 * v558;
-    const V v560 = v335 * v557;
-    const V v561 = v559 + v560;
-    const V v562 = v403 * v558;
-    const V v563 = v540 + v562;
-    const V v564 = v398 * v558;
-    const V v565 = v541 + v564;
-    const V v566 = v325 * v555;
-    const V v567 = v549 + v566;
-    const V v568 = v354 * v557;
-    const V v569 = v366 * v557;
-    const V v570 = v351 * v555;
-    const V v571 = v349 * v555;
-    V s572 = softehl_splat(0.0);
-    V s573 = softehl_splat(0.0);
-    V s574 = softehl_splat(0.0);
-    V s575 = softehl_splat(0.0);
-    V s576 = softehl_splat(0.0);
-    V s577 = softehl_splat(0.0);
-    V s578 = softehl_splat(0.0);
-    V s579 = softehl_splat(0.0);
-    V s580 = softehl_splat(0.0);
-    V s581 = softehl_splat(0.0);
-    V s582 = softehl_splat(0.0);
-    V s583 = softehl_splat(0.0);
-    V s584 = softehl_splat(0.0);
-    V s585 = softehl_splat(0.0);
-    V s586 = softehl_splat(0.0);
+    const V v212 = 1.0 / s110, v213 = v2 * s110, v214 = v212 * v212 * s118,
+        v215 = v212 * s121 - s113 * v214, v216 = v212 * s113, v217 = 0.25 * v216,
+        v218 = s111 * v212, v219 = v212 * s112, v220 = v212 * s114,
+        v221 = v212 * s122 - s114 * v214, v222 = s107 * v212, v223 = s108 * v212,
+        v224 = s109 * v212, v225 = 0.25 * v220, v226 = v70 * v220, v227 = v70 * v216,
+        v228 = v71 * v216, v229 = v71 * v220, v230 = v63 * v216, v231 = v63 * v220,
+        v232 = v64 * v216, v233 = v64 * v220, v234 = v232 - v227, v235 = v228 - v230,
+        v236 = v229 - v231, v237 = 0.25 * v215, v238 = v216 * v95 + v60 * v215,
+        v239 = v216 * v96 + v61 * v215, v240 = v220 * v96 + v61 * v221, v241 = 0.25 * v221,
+        v242 = v220 * v95 + v60 * v221, v243 = v233 - v226, v244 = s111 * v214 - v212 * s119,
+        v245 = s112 * v214 - v212 * s120, v246 = v22 * v244, v247 = v24 * v245,
+        v248 = v16 * v244 - v12 * v245, v249 = v66 * v215 + v216 * v103,
+        v250 = v67 * v215 + v216 * v104, v251 = v66 * v221 + v220 * v103,
+        v252 = v67 * v221 + v220 * v104, v253 = 0.25 * (v239 - v249), v254 = 0.25 * (v240 - v251),
+        v255 = 0.25 * (v252 - v242), v256 = 0.25 * (v250 - v238), v257 = v212 * s115 - s107 * v214,
+        v258 = v212 * s116 - s108 * v214, v259 = v212 * s117 - s109 * v214,
+        v260 = v258 + v44 * v244, v261 = v259 + v44 * v245,
+        v262 = v33 * v235 + (v37 * v217 + (v81 + v38 * v234)),
+        v263 = v39 * v235 + (v42 * v217 + (v80 + v41 * v234)),
+        v264 = v33 * v255 + (v37 * v241 + (v101 + v38 * v254)),
+        v265 = v39 * v255 + (v42 * v241 + (v102 + v41 * v254)),
+        v266 = v39 * v236 + (v42 * v225 + (v76 + v41 * v243)),
+        v267 = v33 * v236 + (v37 * v225 + (v74 + v38 * v243)),
+        v268 = v33 * v256 + (v37 * v237 + (v97 + v38 * v253)),
+        v269 = v39 * v256 + (v42 * v237 + (v98 + v41 * v253)),
+        v270 = 1.0 + v40 * v222 - v41 * v223 - v39 * v224,
+        v271 = v40 * v257 - v41 * v258 - v39 * v259, v272 = 2.0 * v270, v273 = v270 * v270,
+        v274 = v262 * v266 - v263 * v267, v275 = 2.0 * v274, v276 = v274 * v274, v277 = v271 * v272,
+        v278 = v262 * v265 + v266 * v268 - v267 * v269 - v263 * v264, v279 = 1.0 / (v273 * v276),
+        v280 = v275 * v278, v281 = v213 * v279,
+        v282 = 3.141592653589793 * (t11 * (0.5 * s110) + v1 * s118) * (1.0 - v279),
+        v283 = (v276 * v277 + v273 * v280) * (v279 * v281) + v282, v284 = v213 - v281,
+        v285 = v276 * v284, v286 = v273 * v284, v287 = v275 * v286,
+        v288 = v275 * (v277 * v284 + v273 * v283) + v278 * (2.0 * v286), v289 = v272 * v285,
+        v290 = v272 * (v280 * v284 + v276 * v283) + v271 * (2.0 * v285),
+        v291 = v269 * v287 + v263 * v288, v292 = v263 * v287, v293 = v264 * v287 + v267 * v288,
+        v294 = v267 * v287, v295 = v258 * v289, v296 = v259 * v289,
+        v297 = v257 * v289 + v222 * v290, v298 = v223 * v290, v299 = v224 * v290,
+        v300 = (v230 - v228) * v293, v301 = (v227 - v232) * v293, v302 = v217 * v293,
+        v303 = (v231 - v229) * v291, v304 = (v226 - v233) * v291, v305 = v225 * v291,
+        v306 = v237 * v294, v307 = v241 * v292, v308 = v266 * v287,
+        v309 = 0.25 * (v242 - v252) * v292 + v256 * v308,
+        v310 = 0.25 * (v251 - v240) * v292 + v253 * v308, v311 = v265 * v287 + v266 * v288,
+        v312 = v268 * v287 + v262 * v288, v313 = v262 * v287, v314 = v241 * v313 + v225 * v312,
+        v315 = 0.25 * (v238 - v250) * v294 + v255 * v313,
+        v316 = 0.25 * (v249 - v239) * v294 + v254 * v313, v317 = v237 * v308 + v217 * v311,
+        v318 = v236 * v312, v319 = v243 * v312, v320 = v235 * v311, v321 = v234 * v311;
+    V s322 = {0}, s323 = {0}, s324 = {0}, s325 = {0}, s326 = {0}, s327 = {0}, s328 = {0},
+        s329 = {0}, s330 = {0}, s331 = {0}, s332 = {0}, s333 = {0}, s334 = {0}, s335 = {0},
+        s336 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v587 = 1.0 + w[1];
-        const double v588 = 0.25 * w[1];
-        const double v589 = 1.0 - w[1];
-        const double v590 = 0.25 * v587;
-        const double v591 = 0.25 * v589;
-        const V v592 = w[1] - v328;
-        const double v593 = v588 - 0.25;
-        const V v594 = v26 * v592;
-        const V v595 = 0.25 * v592;
-        const V v596 = v592 * v122;
-        const V v597 = v596 + v376;
-        const V v598 = v592 * v69;
-        const V v599 = v381 - v598;
-        const double v600 = 0.25 * w[0];
-        const double v601 = 1.0 - w[0];
-        const double v602 = 1.0 + w[0];
-        const V v603 = w[0] - v326;
-        const V v604 = v124 * v595;
-        const V v605 = v413 - v604;
-        const double v606 = 0.25 + v600;
-        const double v607 = 0.25 - v600;
-        const V v608 = v603 * v71;
-        const V v609 = v608 + v599;
-        const double v610 = v600 - 0.25;
-        const V v611 = v24 * v603;
-        const V v612 = 0.25 * v603;
-        const V v613 = v18 * v603;
-        const V v614 = v603 * v120;
-        const V v615 = v614 + v375;
-        const V v616 = v606 * v5;
-        const V v617 = v606 * v12;
-        const V v618 = v607 * t6;
-        const V v619 = v606 * v101;
-        const V v620 = v14 * v592;
-        const V v621 = v613 - v620;
-        const V v622 = v124 * v612;
-        const V v623 = v412 - v622;
-        const V v624 = v597 + v615;
-        const V v625 = v606 * v58;
-        const V v626 = v618 + v625;
-        const V v627 = X6 * v607;
-        const V v628 = v627 + v616;
-        const V v629 = v597 - v615;
-        const V v630 = X7 * v607;
-        const V v631 = v630 + v617;
-        const V v632 = v607 * t7;
-        const V v633 = v632 + v619;
-        const V v634 = v594 - v611;
-        const V v635 = v594 + v611;
-        const V v636 = v610 * t0;
-        const V v637 = v636 + v626;
-        const V v638 = v593 * t0;
-        const V v639 = X0 * v610;
-        const V v640 = v639 + v628;
-        const V v641 = X0 * v593;
-        const V v642 = 0.25 * v635;
-        const V v643 = X1 * v610;
-        const V v644 = v643 + v631;
-        const V v645 = v610 * t1;
-        const V v646 = v645 + v633;
-        const V v647 = X1 * v593;
-        const V v648 = v593 * t1;
-        const V v649 = v41 * v629;
-        const V v650 = v323 + v649;
-        const V v651 = v41 * v634;
-        const V v652 = v324 + v651;
-        const V v653 = v634 * v136;
-        const V v654 = v650 - v653;
-        const V v655 = v125 * v642;
-        const V v656 = v621 * v136;
-        const V v657 = v331 - v656;
-        const V v658 = v41 * v621;
-        const V v659 = v329 + v658;
-        const V v660 = v41 * v609;
-        const V v661 = v657 + v660;
-        const V v662 = 0.25 * v652;
-        const V v663 = 0.25 * v654;
-        const V v664 = v37 * v642;
-        const V v665 = v332 - v664;
-        const V v666 = 0.25 * v624;
-        const V v667 = v655 - v666;
-        const V v668 = 0.25 * v659;
-        const V v669 = 0.25 * v661;
-        const V v670 = v37 * v667;
-        const V v671 = v407 + v670;
-        const V v672 = v106 * v652;
-        const V v673 = v106 * v659;
-        const V v674 = v94 * v652;
-        const V v675 = v94 * v659;
-        const V v676 = v659 * v170;
-        const V v677 = v652 * v170;
-        const V v678 = v659 * v169;
-        const V v679 = v652 * v169;
-        const double v680 = v591 * v601;
-        const double v681 = v601 * v590;
-        const double v682 = v602 * v590;
-        const double v683 = v591 * v602;
-        const V v684 = v95 * v661;
-        const V v685 = v676 + v684;
-        const V v686 = v654 * v95;
-        const V v687 = v677 + v686;
-        const V v688 = v91 * v661;
-        const V v689 = v678 + v688;
-        const V v690 = v654 * v91;
-        const V v691 = v679 + v690;
-        const V v692 = X1 * v680;
-        const V v693 = v680 * t1;
-        const V v694 = 0.25 * v685;
-        const V v695 = 0.25 * v687;
-        const V v696 = 0.25 * v689;
-        const V v697 = 0.25 * v691;
-        const V v698 = X5 * v682;
-        const V v699 = v692 + v698;
-        const V v700 = v682 * t5;
-        const V v701 = v693 + v700;
-        const V v702 = v49 * v671;
-        const V v703 = X7 * v681;
-        const V v704 = v703 + v699;
-        const V v705 = v681 * t7;
-        const V v706 = v705 + v701;
-        const V v707 = v49 * v665;
-        const V v708 = 1.0 + v707;
-        const double v709 = 0.25 - v588;
-        const double v710 = 0.25 + v588;
-        const V v711 = X3 * v683;
-        const V v712 = v711 + v704;
-        const V v713 = v683 * t3;
-        const V v714 = v713 + v706;
-        const V v715 = X3 * v709;
-        const V v716 = v715 + v647;
-        const V v717 = v709 * t3;
-        const V v718 = v717 + v648;
-        const V v719 = X2 * v709;
-        const V v720 = v719 + v641;
-        const V v721 = v709 * t2;
-        const V v722 = v721 + v638;
-        const V v723 = v710 * v7;
-        const V v724 = v723 + v720;
-        const V v725 = v710 * v16;
-        const V v726 = v725 + v716;
-        const V v727 = v710 * v59;
-        const V v728 = v727 + v722;
-        const V v729 = v710 * v104;
-        const V v730 = v729 + v718;
-        const V v731 = v724 * v646;
-        const V v732 = v724 * v644;
-        const V v733 = v644 * v728;
-        const V v734 = v731 + v733;
-        const V v735 = v35 * v612;
-        const V v736 = v333 + v735;
-        const V v737 = v35 * v595;
-        const V v738 = v334 + v737;
-        const V v739 = v48 * v605;
-        const V v740 = v702 - v739;
-        const V v741 = v48 * v738;
-        const V v742 = v708 - v741;
-        const V v743 = v726 * v637;
-        const V v744 = v734 - v743;
-        const V v745 = v726 * v640;
-        const V v746 = v732 - v745;
-        const V v747 = v640 * v730;
-        const V v748 = v744 - v747;
-        const V v749 = v714 * v746;
-        const V v750 = v712 * v746;
-        const V v751 = v712 * v748;
-        const V v752 = v749 + v751;
-        const V v753 = v50 * v623;
-        const V v754 = v740 - v753;
-        const V v755 = v50 * v736;
-        const V v756 = v742 - v755;
-        const V v757 = v50 * v697;
-        const V v758 = v154 + v757;
-        const V v759 = v756 * v756;
-        const V v760 = 2.0 * v756;
-        const V v761 = w[2] * v750;
-        const V v762 = w[2] * v752;
-        const V v763 = v48 * v695;
-        const V v764 = v763 + v758;
-        const V v765 = v48 * v672;
-        const V v766 = v113 + v765;
-        const V v767 = 6.283185307179586 * v761;
-        const V v768 = 6.283185307179586 * v762;
-        const V v769 = v760 * v754;
-        const V v770 = v50 * v674;
-        const V v771 = v770 + v766;
-        const V v772 = v51 * v663;
-        const V v773 = v772 + v764;
-        const V v774 = v51 * v662;
-        const V v775 = v774 + v771;
-        const V v776 = 2.0 * v775;
-        const V v777 = v46 * v662;
-        const V v778 = v115 + v777;
-        const V v779 = v46 * v663;
-        const V v780 = v152 + v779;
-        const V v781 = v775 * v775;
-        const V v782 = v759 + v781;
-        const V v783 = v47 * v674;
-        const V v784 = v783 + v778;
-        const V v785 = v47 * v697;
-        const V v786 = v785 + v780;
-        const V v787 = v46 * v668;
-        const V v788 = v100 + v787;
-        const V v789 = v51 * v668;
-        const V v790 = v103 + v789;
-        const V v791 = v46 * v669;
-        const V v792 = v162 + v791;
-        const V v793 = v51 * v669;
-        const V v794 = v164 + v793;
-        const V v795 = t10 * v767;
-        const V v796 = t9 * v767;
-        const V v797 = t8 * v767;
-        const V v798 = parameters[2] * v767;
-        const V v799 = parameters[2] * v768;
-        const V v800 = v795 + v799;
-        const V v801 = v47 * v675;
-        const V v802 = v801 + v788;
-        const V v803 = v47 * v696;
-        const V v804 = v792 + v803;
-        const V v805 = v50 * v675;
-        const V v806 = v805 + v790;
-        const V v807 = v50 * v696;
-        const V v808 = v794 + v807;
-        const V v809 = 3.0 * v798;
-        const V v810 = parameters[1] * v767;
-        const V v811 = parameters[1] * v768;
-        const V v812 = v796 + v811;
-        const V v813 = parameters[0] * v768;
-        const V v814 = v797 + v813;
-        const V v815 = parameters[0] * v767;
-        const V v816 = 2.0 * v810;
-        const V v817 = v42 * v673;
-        const V v818 = v817 + v802;
-        const V v819 = v48 * v673;
-        const V v820 = v819 + v806;
-        const V v821 = v48 * v694;
-        const V v822 = v808 + v821;
-        const V v823 = v42 * v694;
-        const V v824 = v804 + v823;
-        const V v825 = 2.0 * v818;
-        const V v826 = 2.0 * v820;
-        const V v827 = v42 * v672;
-        const V v828 = v827 + v784;
-        const V v829 = v42 * v695;
-        const V v830 = v829 + v786;
-        const V v831 = v818 * v818;
-        const V v832 = v782 + v831;
-        const V v833 = 2.0 * v828;
-        const V v834 = v820 * v828;
-        const V v835 = v822 * v828;
-        const V v836 = v828 * v828;
-        const V v837 = v832 + v836;
-        const V v838 = v820 * v820;
-        const V v839 = v837 + v838;
-        const V v840 = v824 * v825;
-        const V v841 = v769 + v840;
-        const V v842 = v820 * v830;
-        const V v843 = v835 + v842;
-        const V v844 = v775 * v818;
-        const V v845 = v834 - v844;
-        const V v846 = v775 * v824;
-        const V v847 = v843 - v846;
-        const V v848 = 2.0 * v845;
-        const V v849 = v845 * v845;
-        const V v850 = v830 * v833;
-        const V v851 = v841 + v850;
-        const V v852 = v773 * v818;
-        const V v853 = v847 - v852;
-        const V v854 = v848 * v853;
-        const V v855 = v822 * v826;
-        const V v856 = v851 + v855;
-        const V v857 = v773 * v776;
-        const V v858 = v856 + v857;
-        const V v859 = v759 * v849;
-        const V v860 = softehl_vrcbrt(v859);
-        const V v861 = v769 * v849;
-        const V v862 = v759 * v854;
-        const V v863 = v861 + v862;
-        const V v864 = v860 * v860;
-        const V v865 = 0.3333333333333333 * v864;
-        const V v866 = v864 * v865;
-        const V v867 = v860 * v864;
-        const V v868 = 0.4444444444444444 * v860;
-        const V v869 = v863 * v866;
-        const V v870 = v858 * v860;
-        const V v871 = v839 * v869;
-        const V v872 = v870 - v871;
-        const V v873 = v839 * v860;
-        const V v874 = (-3.0) + v873;
-        const V v875 = 3.0 * v874;
-        const V v876 = v874 * v875;
-        const V v877 = 2.0 * v874;
-        const V v878 = v809 * v872;
-        const V v879 = v812 + v878;
-        const V v880 = v816 * v872;
-        const V v881 = v814 + v880;
-        const V v882 = v877 * v879;
-        const V v883 = v881 + v882;
-        const V v884 = v800 * v876;
-        const V v885 = v883 + v884;
-        const V v886 = v839 * v885;
-        const V v887 = v860 * v885;
-        const V v888 = v798 * v876;
-        const V v889 = v815 + v888;
-        const V v890 = v810 * v877;
-        const V v891 = v889 + v890;
-        const V v892 = v858 * v891;
-        const V v893 = v886 + v892;
-        const V v894 = v869 * v891;
-        const V v895 = v887 - v894;
-        const V v896 = v839 * v891;
-        const V v897 = v860 * v891;
-        const V v898 = v868 * v896;
-        const V v899 = v866 * v896;
-        const V v900 = v866 * v893;
-        const V v901 = v867 * v898;
-        const V v902 = v867 * v901;
-        const V v903 = v863 * v902;
-        const V v904 = v900 - v903;
-        const V v905 = v769 * v899;
-        const V v906 = v759 * v904;
-        const V v907 = v905 + v906;
-        const V v908 = v759 * v899;
-        const V v909 = 2.0 * v908;
-        const V v910 = v853 * v909;
-        const V v911 = v848 * v907;
-        const V v912 = v910 + v911;
-        const V v913 = v848 * v908;
-        const V v914 = 2.0 * v897;
-        const V v915 = v849 * v899;
-        const V v916 = v897 - v915;
-        const V v917 = 2.0 * v916;
-        const V v918 = v754 * v917;
-        const V v919 = v760 * v916;
-        const V v920 = v671 * v919;
-        const V v921 = v854 * v899;
-        const V v922 = v895 - v921;
-        const V v923 = v849 * v904;
-        const V v924 = v922 - v923;
-        const V v925 = v760 * v924;
-        const V v926 = v918 + v925;
-        const V v927 = v665 * v926;
-        s576 += v920;
-        s576 += v927;
-        const V v928 = v775 * v913;
-        const V v929 = v775 * v912;
-        const V v930 = v825 * v897;
-        const V v931 = v928 + v930;
-        s574 += v931;
-        const V v932 = v825 * v895;
-        const V v933 = v929 + v932;
-        const V v934 = v773 * v913;
-        const V v935 = v933 + v934;
-        const V v936 = v773 * v914;
-        const V v937 = v824 * v914;
-        const V v938 = v935 + v937;
-        s579 += v938;
-        const V v939 = v824 * v913;
-        const V v940 = v936 + v939;
-        const V v941 = v776 * v895;
-        const V v942 = v940 + v941;
-        const V v943 = v776 * v897;
-        const V v944 = v818 * v913;
-        const V v945 = v943 + v944;
-        s573 += v945;
-        const V v946 = v818 * v912;
-        const V v947 = v942 + v946;
-        s578 += v947;
-        const V v948 = v826 * v897;
-        const V v949 = v826 * v895;
-        const V v950 = v833 * v897;
-        const V v951 = v833 * v895;
-        const V v952 = v820 * v913;
-        const V v953 = v950 - v952;
-        s575 += v953;
-        const V v954 = v820 * v912;
-        const V v955 = v951 - v954;
-        const V v956 = v828 * v912;
-        const V v957 = v949 - v956;
-        const V v958 = v828 * v913;
-        const V v959 = v948 - v958;
-        s572 += v959;
-        const V v960 = v822 * v913;
-        const V v961 = v955 - v960;
-        const V v962 = v822 * v914;
-        const V v963 = v957 + v962;
-        const V v964 = v830 * v913;
-        const V v965 = v963 - v964;
-        s577 += v965;
-        const V v966 = v830 * v914;
-        const V v967 = v961 + v966;
-        s580 += v967;
-        const V v968 = v694 * v959;
-        const V v969 = v694 * v931;
-        const V v970 = v605 * v919;
-        s583 += v968;
-        s583 -= v970;
-        const V v971 = v738 * v926;
-        s583 -= v971;
-        const V v972 = v695 * v945;
-        s583 += v972;
-        const V v973 = v695 * v953;
-        s586 += v969;
-        s586 += v973;
-        const V v974 = v673 * v965;
-        s583 += v974;
-        const V v975 = v673 * v938;
-        s586 += v975;
-        const V v976 = v672 * v947;
-        s583 += v976;
-        const V v977 = v672 * v967;
-        s586 += v977;
-        const V v978 = v696 * v959;
-        const V v979 = v623 * v919;
-        s582 += v978;
-        s582 -= v979;
-        const V v980 = v736 * v926;
-        s582 -= v980;
-        const V v981 = v696 * v931;
-        const V v982 = v669 * v959;
-        const V v983 = v669 * v931;
-        const V v984 = v697 * v945;
-        s582 += v984;
-        const V v985 = v697 * v953;
-        s585 += v981;
-        s585 += v985;
-        const V v986 = v663 * v945;
-        s581 += v982;
-        s581 += v986;
-        const V v987 = v663 * v953;
-        s584 += v983;
-        s584 += v987;
-        const V v988 = v675 * v965;
-        s582 += v988;
-        const V v989 = v675 * v938;
-        s585 += v989;
-        const V v990 = v668 * v965;
-        s581 += v990;
-        const V v991 = v668 * v938;
-        s584 += v991;
-        const V v992 = v674 * v947;
-        s582 += v992;
-        const V v993 = v674 * v967;
-        s585 += v993;
-        const V v994 = v662 * v947;
-        s581 += v994;
-        const V v995 = v662 * v967;
-        s584 += v995;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v337 = 1.0 + w[1], v338 = 0.25 * w[1], v339 = 1.0 - w[1], v340 = 0.25 * v337,
+            v341 = 0.25 * v339;
+        const V v342 = w[1] - v219; const double v343 = v338 - 0.25;
+        const V v344 = v24 * v342, v345 = 0.25 * v342, v346 = v342 * v87 + v247;
+        const double v347 = 0.25 * w[0], v348 = 1.0 - w[0], v349 = 1.0 + w[0];
+        const V v350 = w[0] - v218, v351 = v261 - v89 * v345;
+        const double v352 = 0.25 + v347, v353 = 0.25 - v347, v354 = v347 - 0.25;
+        const V v355 = v22 * v350, v356 = 0.25 * v350, v357 = v350 * v85 + v246, v358 = v352 * v4,
+            v359 = v352 * v10, v360 = v353 * t6, v361 = v352 * v75, v362 = v16 * v350 - v12 * v342,
+            v363 = v260 - v89 * v356, v364 = v352 * v47, v365 = v360 + v364, v366 = X6 * v353,
+            v367 = v366 + v358, v368 = X7 * v353, v369 = v368 + v359, v370 = v353 * t7,
+            v371 = v370 + v361, v372 = v344 - v355, v373 = v354 * t0, v374 = v373 + v365,
+            v375 = v343 * t0, v376 = X0 * v354, v377 = v376 + v367, v378 = X0 * v343,
+            v379 = 0.25 * (v344 + v355), v380 = X1 * v354, v381 = v380 + v369, v382 = v354 * t1,
+            v383 = v382 + v371, v384 = X1 * v343, v385 = v343 * t1, v386 = v216 + v32 * v372,
+            v387 = v215 + v32 * (v346 - v357) - v372 * v91, v388 = v220 + v32 * v362,
+            v389 = v221 - v362 * v91 + v32 * (v350 * v58 + (v248 - v342 * v56)), v390 = 0.25 * v386,
+            v391 = 0.25 * v387, v392 = v222 - v31 * v379, v393 = 0.25 * v388, v394 = 0.25 * v389,
+            v395 = v257 + v31 * (v90 * v379 - 0.25 * (v346 + v357)), v396 = v79 * v386,
+            v397 = v79 * v388, v398 = v72 * v386, v399 = v72 * v388;
+        const double v400 = v341 * v348, v401 = v348 * v340, v402 = v349 * v340, v403 = v341 * v349;
+        const V v404 = X1 * v400, v405 = v400 * t1, v406 = 0.25 * (v388 * v106 + v73 * v389),
+            v407 = 0.25 * (v386 * v106 + v387 * v73), v408 = 0.25 * (v388 * v105 + v69 * v389),
+            v409 = 0.25 * (v386 * v105 + v387 * v69), v410 = X5 * v402, v411 = v402 * t5,
+            v412 = X7 * v401, v413 = v401 * t7;
+        const double v414 = 0.25 - v338, v415 = 0.25 + v338;
+        const V v416 = X3 * v403, v417 = v416 + (v412 + (v404 + v410)), v418 = v403 * t3,
+            v419 = v418 + (v413 + (v405 + v411)), v420 = X3 * v414, v421 = v414 * t3,
+            v422 = X2 * v414, v423 = v414 * t2, v424 = v415 * v5, v425 = v424 + (v422 + v378),
+            v426 = v415 * v14, v427 = v426 + (v420 + v384), v428 = v415 * v48,
+            v429 = v428 + (v423 + v375), v430 = v415 * v77, v431 = v430 + (v421 + v385),
+            v432 = v223 + v30 * v356, v433 = v224 + v30 * v345, v434 = v425 * v381 - v427 * v377,
+            v435 = v425 * v383 + v381 * v429 - v427 * v374 - v377 * v431, v436 = v417 * v434,
+            v437 = v419 * v434 + v417 * v435, v438 = v40 * v395 - v39 * v351 - v41 * v363,
+            v439 = 1.0 + v40 * v392 - v39 * v433 - v41 * v432, v440 = v439 * v439,
+            v441 = 2.0 * v439, v442 = w[2] * v436, v443 = w[2] * v437,
+            v444 = 6.283185307179586 * v442, v445 = 6.283185307179586 * v443, v446 = v441 * v438,
+            v447 = v42 * v391 + (v39 * v407 + (v98 + v41 * v409)),
+            v448 = v42 * v390 + (v41 * v398 + (v80 + v39 * v396)), v449 = 2.0 * v448,
+            v450 = parameters[2] * v444, v451 = parameters[1] * v444,
+            v452 = v33 * v397 + (v38 * v399 + (v74 + v37 * v393)),
+            v453 = v39 * v397 + (v41 * v399 + (v76 + v42 * v393)),
+            v454 = v102 + v42 * v394 + v41 * v408 + v39 * v406,
+            v455 = v101 + v37 * v394 + v38 * v408 + v33 * v406, v456 = 2.0 * v452,
+            v457 = 2.0 * v453, v458 = v33 * v396 + (v38 * v398 + (v81 + v37 * v390)),
+            v459 = v33 * v407 + (v38 * v409 + (v97 + v37 * v391)), v460 = 2.0 * v458,
+            v461 = v440 + v448 * v448 + v452 * v452 + v458 * v458 + v453 * v453,
+            v462 = v453 * v458 - v448 * v452, v463 = 2.0 * v462, v464 = v462 * v462,
+            v465 = v454 * v458 + v453 * v459 - v448 * v455 - v447 * v452, v466 = v463 * v465,
+            v467 = v446 + v455 * v456 + v459 * v460 + v454 * v457 + v447 * v449,
+            v468 = softehl_vrcbrt(v440 * v464), v469 = v446 * v464 + v440 * v466,
+            v470 = v468 * v468, v471 = v470 * (0.3333333333333333 * v470), v472 = v468 * v470,
+            v473 = v469 * v471, v474 = v467 * v468 - v461 * v473, v475 = (-3.0) + v461 * v468,
+            v476 = v475 * (3.0 * v475), v477 = 2.0 * v475,
+            v478 = t8 * v444 + parameters[0] * v445 + 2.0 * v451 * v474 + v477 * (t9 * v444 + parameters[1] * v445 + 3.0 * v450 * v474),
+            v479 = v478 + (t10 * v444 + parameters[2] * v445) * v476,
+            v480 = parameters[0] * v444 + v450 * v476 + v451 * v477,
+            v481 = v468 * v479 - v473 * v480, v482 = v461 * v480, v483 = v468 * v480,
+            v484 = v471 * v482,
+            v485 = v471 * (v461 * v479 + v467 * v480) - v469 * (v472 * (v472 * (0.4444444444444444 * v468 * v482))),
+            v486 = v440 * v484, v487 = v465 * (2.0 * v486) + v463 * (v446 * v484 + v440 * v485),
+            v488 = v463 * v486, v489 = 2.0 * v483, v490 = v483 - v464 * v484, v491 = v441 * v490,
+            v492 = v438 * (2.0 * v490) + v441 * (v481 - v466 * v484 - v464 * v485);
+        s326 += v395 * v491; s326 += v392 * v492; const V v493 = v448 * v488 + v456 * v483;
+        s324 += v493; const V v494 = v448 * v487 + v456 * v481 + v447 * v488 + v455 * v489;
+        s329 += v494; const V v495 = v449 * v483 + v452 * v488; s323 += v495;
+        const V v496 = v447 * v489 + v455 * v488 + v449 * v481 + v452 * v487; s328 += v496;
+        const V v497 = v460 * v483 - v453 * v488; s325 += v497;
+        const V v498 = v457 * v483 - v458 * v488; s322 += v498;
+        const V v499 = v457 * v481 - v458 * v487 + v454 * v489 - v459 * v488; s327 += v499;
+        const V v500 = v460 * v481 - v453 * v487 - v454 * v488 + v459 * v489; s330 += v500;
+        s333 += v406 * v498; s333 -= v351 * v491; s333 -= v433 * v492; s333 += v407 * v495;
+        s336 += v406 * v493; s336 += v407 * v497; s333 += v397 * v499; s336 += v397 * v494;
+        s333 += v396 * v496; s336 += v396 * v500; s332 += v408 * v498; s332 -= v363 * v491;
+        s332 -= v432 * v492; s332 += v409 * v495; s335 += v408 * v493; s335 += v409 * v497;
+        s331 += v394 * v498; s331 += v391 * v495; s334 += v394 * v493; s334 += v391 * v497;
+        s332 += v399 * v499; s335 += v399 * v494; s331 += v393 * v499; s334 += v393 * v494;
+        s332 += v398 * v496; s335 += v398 * v500; s331 += v390 * v496; s334 += v390 * v500;
     }
-    const V v996 = v548 + s575;
-    const V v997 = v558 + s572;
-    const V v998 = s573 - v526;
-    const V v999 = s574 - v523;
-    const V v1000 = v555 + s580;
-    const V v1001 = v557 + s577;
-    const V v1002 = v568 - v528;
-    const V v1003 = v569 - v527;
-    const V v1004 = v537 + v570;
-    const V v1005 = v538 + v571;
-    const V v1006 = s576 + v531;
-    const V v1007 = v1002 - v533;
-    const V v1008 = s578 - v525;
-    const V v1009 = v1003 - v532;
-    const V v1010 = s586 + v1004;
-    const V v1011 = s579 - v522;
-    const V v1012 = s585 + v1005;
-    const V v1013 = v534 + v1007;
-    const V v1014 = v535 + v1009;
-    const V v1015 = s581 - v542;
-    const V v1016 = v551 + v1010;
-    const V v1017 = v553 + v1012;
-    const V v1018 = s583 + v1013;
-    const V v1019 = s582 + v1014;
-    const V v1020 = v1015 - v536;
-    const V v1021 = s584 - v545;
-    const V v1022 = v158 * v999;
-    const V v1023 = v1016 - v1022;
-    const V v1024 = v158 * v997;
-    const V v1025 = v1018 - v1024;
-    const V v1026 = v156 * v999;
-    const V v1027 = v1026 + v1017;
-    const V v1028 = v156 * v997;
-    const V v1029 = v1028 + v1019;
-    const V v1030 = v561 + v1020;
-    const V v1031 = v567 + v1021;
-    const V v1032 = v563 + v1025;
-    const V v1033 = v1006 - v1030;
-    const V v1034 = v1006 + v1030;
-    const V v1035 = v565 + v1029;
-    const V v1036 = v88 * v1011;
-    const V v1037 = v1023 - v1036;
-    const V v1038 = v88 * v1001;
-    const V v1039 = v1032 - v1038;
-    const V v1040 = v83 * v1011;
-    const V v1041 = v1040 + v1027;
-    const V v1042 = v83 * v1001;
-    const V v1043 = v1042 + v1035;
-    const V v1044 = v1031 - v539;
-    const V v1045 = v539 - v1031;
-    const V v1046 = v140 * v998;
-    const V v1047 = v1046 + v1039;
-    const V v1048 = v140 * v996;
-    const V v1049 = v1048 + v1037;
-    const V v1050 = v142 * v996;
-    const V v1051 = v1041 - v1050;
-    const V v1052 = v142 * v998;
-    const V v1053 = v1043 - v1052;
-    const V v1054 = v64 * v1008;
-    const V v1055 = v1054 + v1047;
-    const V v1056 = v64 * v1000;
-    const V v1057 = v1056 + v1049;
-    const V v1058 = v68 * v1000;
-    const V v1059 = v1051 - v1058;
-    const V v1060 = v68 * v1008;
-    const V v1061 = v1053 - v1060;
-    const V v1062 = v1055 + v1061;
-    const V v1063 = v1057 + v1059;
-    const V v1064 = v1059 - v1057;
-    const V v1065 = v1061 - v1055;
-    const V v1066 = v1044 + v1063;
-    const V v1067 = v1044 - v1063;
-    const V v1068 = v1034 + v1062;
-    const V v1069 = v1034 - v1062;
-    const V v1070 = v1045 - v1064;
-    const V v1071 = v1033 - v1065;
-    softehl_store4(R + 0, 8, v1066, v1068, v1070, v1071);
-    const V v1072 = v1033 + v1065;
-    const V v1073 = v1064 - v1044;
-    softehl_store4(R + 4, 8, v1067, v1069, v1073, v1072);
+    const V v501 = v308 + s325, v502 = v313 + s322, v503 = s323 - v294, v504 = s324 - v292,
+        v505 = v311 + s330, v506 = v312 + s327, v507 = s326 + v297, v508 = s328 - v293,
+        v509 = s329 - v291, v510 = v314 + (s331 - v306 - v302), v511 = v317 + (s334 - v307),
+        v512 = v507 - v510, v513 = v507 + v510,
+        v514 = v315 + (s333 + (v300 + (v318 - v296 - v299)) - v100 * v502) - v68 * v506,
+        v515 = v65 * v506 + (v316 + (v99 * v502 + (s332 + (v301 + (v319 - v295 - v298))))),
+        v516 = v511 - v305,
+        v517 = v92 * v501 + (v309 + (s336 + (v303 + v320)) - v100 * v504 - v68 * v509),
+        v518 = v65 * v509 + (v99 * v504 + (v310 + (s335 + (v304 + v321)))) - v93 * v501,
+        v519 = v51 * v508 + (v92 * v503 + v514), v520 = v51 * v505 + v517, v521 = v518 - v55 * v505,
+        v522 = v515 - v93 * v503 - v55 * v508, v523 = v519 + v522, v524 = v520 + v521,
+        v525 = v521 - v520, v526 = v522 - v519, v527 = v516 + v524, v528 = v516 - v524,
+        v529 = v513 + v523, v530 = v513 - v523, v531 = v305 - v511 - v525, v532 = v512 - v526;
+    softehl_store4(R + 0, 8, v527, v529, v531, v532);
+    const V v533 = v512 + v526, v534 = v525 - v516;
+    softehl_store4(R + 4, 8, v528, v530, v534, v533);
 }
-
-void softehl_solid_taylor_mean_yeoh_pseudo_load(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_solid_taylor_mean_yeoh_pseudo_load_group(points, modes, coordinates + 8 * e, dofs + 8 * e, 0, direction + 12 * e, parameters, rule, basis, values + 8 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_solid_taylor_mean_yeoh_pseudo_load_group(points, modes, coordinates + 8 * (n - SOFTEHL_LANES), dofs + 8 * (n - SOFTEHL_LANES), 0, direction + 12 * (n - SOFTEHL_LANES), parameters, rule, basis, values + 8 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 8];
-    softehl_pad(X, coordinates, 8, n);
-    double d[SOFTEHL_LANES * 8];
-    softehl_pad(d, dofs, 8, n);
-    double t[SOFTEHL_LANES * 12];
-    softehl_pad(t, direction, 12, n);
-    double R[SOFTEHL_LANES * 8];
-    softehl_solid_taylor_mean_yeoh_pseudo_load(SOFTEHL_LANES, points, modes, X, d, 0, parameters, t, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 8 * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_solid_taylor_mean_yeoh_pseudo_load, 8, 8, 0, 12, 8, 0)

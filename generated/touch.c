@@ -25,228 +25,96 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_touch_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_touch_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 16, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 16, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
+    SOFTEHL_IDLE;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15;
+    softehl_load4(d + 0, 16, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 16, &d4, &d5, &d6, &d7);
     softehl_load4(d + 8, 16, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13, d14, d15;
     softehl_load4(d + 12, 16, &d12, &d13, &d14, &d15);
-    (void)d12; (void)d13; (void)d14; (void)d15;
     V a0, a1, a2, a3;
     softehl_load4(a + 0, 4, &a0, &a1, &a2, &a3);
-    (void)a0; (void)a1; (void)a2; (void)a3;
     softehl_store4(R + 4, 16, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(R + 8, 16, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v1 = d4 * d8;
-    const V v2 = d5 * d6;
-    const V v3 = d5 * d7;
-    const V v4 = v1 - v3;
-    const V v5 = d3 * d7;
-    const V v6 = d3 * d8;
-    const V v7 = v2 - v6;
-    const V v8 = d4 * d6;
-    const V v9 = v5 - v8;
-    const V v10 = v4 * v4;
-    const V v11 = v7 * v7;
-    const V v12 = v10 + v11;
-    const V v13 = v9 * v9;
-    const V v14 = v12 + v13;
-    const V v15 = softehl_vsqrt(v14);
-    const V v16 = 1.0 / v15;
-    const V v17 = v4 * v16;
-    const V v18 = v7 * v16;
-    const V v19 = v9 * v16;
-    const V v20 = d0 * v17;
-    const V v21 = d1 * v18;
-    const V v22 = v20 + v21;
-    const V v23 = d2 * v19;
-    const V v24 = v22 + v23;
-    const V v25 = a0 * v24;
-    const V v26 = d12 - v25;
-    const M v27 = softehl_eq(v26, v26);
-    V v28 = softehl_splat(0.0);
-    V v29 = softehl_splat(0.0);
-    V v30 = softehl_splat(0.0);
-    V v31 = softehl_splat(0.0);
-    const M m32 = v27;
-    if (softehl_any(m32)) {
-        const M v33 = softehl_le(softehl_splat(0.0), v26);
-        V v34 = softehl_splat(0.0);
-        V v35 = softehl_splat(0.0);
-        V v36 = softehl_splat(0.0);
-        V v37 = softehl_splat(0.0);
-        const M m38 = v33 & m32;
-        if (softehl_any(m38)) {
-            const V v39 = a2 + v24;
-            const V v40 = v24 - a3;
-            const V v41 = v39 * v40;
-            const M v42 = softehl_eq(v41, v41);
-            V v43 = softehl_splat(0.0);
-            const M m44 = v42 & m38;
-            if (softehl_any(m44)) {
-                const M v45 = softehl_lt(v41, softehl_splat(0.0));
-                const V v46 = softehl_blend(v45, v26, softehl_splat(0.0));
-                v43 = softehl_blend(m44, v46, v43);
+    const V v1 = d4 * d8 - d5 * d7, v2 = d5 * d6 - d3 * d8, v3 = d3 * d7 - d4 * d6,
+        v4 = softehl_vsqrt(v1 * v1 + v2 * v2 + v3 * v3), v5 = 1.0 / v4, v6 = v1 * v5, v7 = v2 * v5,
+        v8 = v3 * v5, v9 = d0 * v6 + d1 * v7 + d2 * v8, v10 = a0 * v9, v11 = d12 - v10;
+    const M v12 = softehl_eq(v11, v11);
+    V v13 = softehl_splat(0.0), v14 = softehl_splat(0.0), v15 = softehl_splat(0.0),
+        v16 = softehl_splat(0.0);
+    const M m17 = v12;
+    if (softehl_any(m17)) {
+        const M v18 = softehl_le(softehl_splat(0.0), v11);
+        V v19 = softehl_splat(0.0), v20 = softehl_splat(0.0), v21 = softehl_splat(0.0),
+            v22 = softehl_splat(0.0);
+        const M m23 = v18 & m17;
+        if (softehl_any(m23)) {
+            const V v24 = (a2 + v9) * (v9 - a3); const M v25 = softehl_eq(v24, v24);
+            V v26 = softehl_splat(0.0); const M m27 = v25 & m23;
+            if (softehl_any(m27)) {
+                const M v28 = softehl_lt(v24, softehl_splat(0.0));
+                const V v29 = softehl_blend(v28, v11, softehl_splat(0.0));
+                v26 = softehl_blend(m27, v29, v26);
             }
-            const M m47 = ~v42 & m38;
-            if (softehl_any(m47)) {
-                const V v48 = v41 * v41;
-                const V v49 = v41 * v48;
-                v43 = softehl_blend(m47, v49, v43);
+            const M m30 = ~v25 & m23;
+            if (softehl_any(m30)) {
+                const V v31 = v24 * (v24 * v24); v26 = softehl_blend(m30, v31, v26);
             }
-            const V v50 = a1 * v43;
-            const V v51 = d9 * a0;
-            const V v52 = d13 + v51;
-            const V v53 = d10 * a0;
-            const V v54 = d14 + v53;
-            const V v55 = d11 * a0;
-            const V v56 = d15 + v55;
-            const V v57 = v50 * v50;
-            const V v58 = v52 * v17;
-            const M v59 = softehl_eq(v57, v57);
-            const V v60 = v54 * v18;
-            const V v61 = v58 + v60;
-            const V v62 = v56 * v19;
-            const V v63 = v61 + v62;
-            const V v64 = v17 * v63;
-            const V v65 = v52 - v64;
-            const V v66 = v18 * v63;
-            const V v67 = v54 - v66;
-            const V v68 = v19 * v63;
-            const V v69 = v56 - v68;
-            const V v70 = v65 * v65;
-            const V v71 = v67 * v67;
-            const V v72 = v70 + v71;
-            const V v73 = v69 * v69;
-            const V v74 = v72 + v73;
-            const M v75 = softehl_eq(v74, v74);
-            const M v76 = v59 & v75;
-            V v77 = softehl_splat(0.0);
-            const M m78 = v76 & m38;
-            if (softehl_any(m78)) {
-                const M v79 = softehl_lt(v57, v74);
-                V v80 = softehl_splat(0.0);
-                const M m81 = v79 & m78;
-                if (softehl_any(m81)) {
-                    const V v82 = 1.0 / v74;
-                    const V v83 = softehl_vsqrt(v82);
-                    const V v84 = v83 * v50;
-                    v80 = softehl_blend(m81, v84, v80);
+            const V v32 = a1 * v26, v33 = d13 + d9 * a0, v34 = d14 + d10 * a0, v35 = d15 + d11 * a0,
+                v36 = v32 * v32;
+            const M v37 = softehl_eq(v36, v36);
+            const V v38 = v33 * v6 + v34 * v7 + v35 * v8, v39 = v33 - v6 * v38,
+                v40 = v34 - v7 * v38, v41 = v35 - v8 * v38, v42 = v39 * v39 + v40 * v40 + v41 * v41;
+            const M v43 = softehl_eq(v42, v42), v44 = v37 & v43;
+            V v45 = softehl_splat(0.0); const M m46 = v44 & m23;
+            if (softehl_any(m46)) {
+                const M v47 = softehl_lt(v36, v42); V v48 = softehl_splat(0.0);
+                const M m49 = v47 & m46;
+                if (softehl_any(m49)) {
+                    const V v50 = softehl_vsqrt(1.0 / v42), v51 = v50 * v32;
+                    v48 = softehl_blend(m49, v51, v48);
                 }
-                const M m85 = ~v79 & m78;
-                if (softehl_any(m85)) {
-                    const M v86 = softehl_lt(softehl_splat(0.0), a1);
-                    const V v87 = softehl_blend(v86, softehl_splat(1.0), softehl_splat(0.0));
-                    v80 = softehl_blend(m85, v87, v80);
+                const M m52 = ~v47 & m46;
+                if (softehl_any(m52)) {
+                    const M v53 = softehl_lt(softehl_splat(0.0), a1);
+                    const V v54 = softehl_blend(v53, softehl_splat(1.0), softehl_splat(0.0));
+                    v48 = softehl_blend(m52, v54, v48);
                 }
-                v77 = softehl_blend(m78, v80, v77);
+                v45 = softehl_blend(m46, v48, v45);
             }
-            const M m88 = ~v76 & m38;
-            if (softehl_any(m88)) {
-                const V v89 = v57 - v74;
-                const V v90 = v89 * v89;
-                const V v91 = v89 * v90;
-                v77 = softehl_blend(m88, v91, v77);
+            const M m55 = ~v44 & m23;
+            if (softehl_any(m55)) {
+                const V v56 = v36 - v42, v57 = v56 * (v56 * v56);
+                v45 = softehl_blend(m55, v57, v45);
             }
-            const V v92 = v65 * v77;
-            const V v93 = v67 * v77;
-            const V v94 = v69 * v77;
-            v34 = softehl_blend(m38, v92, v34);
-            v35 = softehl_blend(m38, v43, v35);
-            v36 = softehl_blend(m38, v93, v36);
-            v37 = softehl_blend(m38, v94, v37);
+            const V v58 = v39 * v45, v59 = v40 * v45, v60 = v41 * v45;
+            v19 = softehl_blend(m23, v58, v19); v20 = softehl_blend(m23, v26, v20);
+            v21 = softehl_blend(m23, v59, v21); v22 = softehl_blend(m23, v60, v22);
         }
-        v28 = softehl_blend(m32, v34, v28);
-        v29 = softehl_blend(m32, v35, v29);
-        v30 = softehl_blend(m32, v36, v30);
-        v31 = softehl_blend(m32, v37, v31);
+        v13 = softehl_blend(m17, v19, v13); v14 = softehl_blend(m17, v20, v14);
+        v15 = softehl_blend(m17, v21, v15); v16 = softehl_blend(m17, v22, v16);
     }
-    const M m95 = ~v27;
-    if (softehl_any(m95)) {
-        const V v96 = v25 - d12;
-        const V v97 = v96 * v96;
-        const V v98 = v96 * v97;
-        v28 = softehl_blend(m95, v98, v28);
-        v29 = softehl_blend(m95, v98, v29);
-        v30 = softehl_blend(m95, v98, v30);
-        v31 = softehl_blend(m95, v98, v31);
+    const M m61 = ~v12;
+    if (softehl_any(m61)) {
+        const V v62 = v10 - d12, v63 = v62 * (v62 * v62);
+        v13 = softehl_blend(m61, v63, v13); v14 = softehl_blend(m61, v63, v14);
+        v15 = softehl_blend(m61, v63, v15); v16 = softehl_blend(m61, v63, v16);
     }
-    const V v99 = 1.0 / a0;
-    const V v100 = v17 * v29;
-    const V v101 = v18 * v29;
-    const V v102 = v19 * v29;
-    const V v103 = v100 + v28;
-    const V v104 = v101 + v30;
-    const V v105 = v102 + v31;
-    softehl_store4(R + 0, 16, v103, v104, v105, softehl_splat(0.0));
-    const V v106 = v99 * v29;
-    const V v107 = v99 * v28;
-    const V v108 = v99 * v30;
-    const V v109 = v99 * v31;
-    softehl_store4(R + 12, 16, v106, v107, v108, v109);
+    const V v64 = 1.0 / a0;
+    softehl_store4(R + 0, 16, v6 * v14 + v13, v7 * v14 + v15, v8 * v14 + v16, softehl_splat(0.0));
+    softehl_store4(R + 12, 16, v64 * v14, v64 * v13, v64 * v15, v64 * v16);
 }
+SOFTEHL_BATCH(softehl_touch_residual, 0, 16, 4, 0, 16, 0)
 
-void softehl_touch_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_touch_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_touch_residual_group(points, modes, 0, dofs + 16 * e, data + 4 * e, 0, parameters, rule, basis, values + 16 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_touch_residual_group(points, modes, 0, dofs + 16 * (n - SOFTEHL_LANES), data + 4 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 16 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double d[SOFTEHL_LANES * 16];
-    softehl_pad(d, dofs, 16, n);
-    double a[SOFTEHL_LANES * 4];
-    softehl_pad(a, data, 4, n);
-    double R[SOFTEHL_LANES * 16];
-    softehl_touch_residual(SOFTEHL_LANES, points, modes, 0, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 16 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_touch_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 16, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 16, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
+    SOFTEHL_IDLE;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15;
+    softehl_load4(d + 0, 16, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 16, &d4, &d5, &d6, &d7);
     softehl_load4(d + 8, 16, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13, d14, d15;
     softehl_load4(d + 12, 16, &d12, &d13, &d14, &d15);
-    (void)d12; (void)d13; (void)d14; (void)d15;
     V a0, a1, a2, a3;
     softehl_load4(a + 0, 4, &a0, &a1, &a2, &a3);
-    (void)a0; (void)a1; (void)a2; (void)a3;
     softehl_store4(R + 4, 16, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(R + 8, 16, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 48, 256, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
@@ -285,1414 +153,471 @@ static void softehl_touch_tangent_group(
     softehl_store4(K + 180, 256, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 184, 256, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 188, 256, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v1 = 1.0 / a0;
-    const V v2 = d4 * d8;
-    const V v3 = d5 * d6;
-    const V v4 = d5 * d7;
-    const V v5 = v2 - v4;
-    const V v6 = d3 * d7;
-    const V v7 = d3 * d8;
-    const V v8 = v3 - v7;
-    const V v9 = d4 * d6;
-    const V v10 = v6 - v9;
-    const V v11 = 2.0 * v5;
-    const V v12 = v5 * v5;
-    const V v13 = 2.0 * v8;
-    const V v14 = 2.0 * v10;
-    const V v15 = v8 * v8;
-    const V v16 = v12 + v15;
-    const V v17 = v10 * v10;
-    const V v18 = v16 + v17;
-    const V v19 = d8 * v11;
-    const V v20 = d4 * v11;
-    const V v21 = softehl_vsqrt(v18);
-    const V v22 = 1.0 / v18;
-    const V v23 = d6 * v13;
-    const V v24 = d7 * v14;
-    const V v25 = d6 * v14;
-    const V v26 = v19 - v25;
-    const V v27 = d5 * v13;
-    const V v28 = d3 * v14;
-    const V v29 = d4 * v14;
-    const V v30 = v27 - v29;
-    const V v31 = d3 * v13;
-    const V v32 = v20 - v31;
-    const V v33 = d7 * v11;
-    const V v34 = v23 - v33;
-    const V v35 = d5 * v11;
-    const V v36 = v28 - v35;
-    const V v37 = d8 * v13;
-    const V v38 = v24 - v37;
-    const V v39 = 1.0 / v21;
-    const V v40 = softehl_vsqrt(v22);
-    const V v41 = 0.5 * v40;
-    const V v42 = d8 * v39;
-    const V v43 = d7 * v39;
-    const V v44 = d6 * v39;
-    const V v45 = d5 * v39;
-    const V v46 = d4 * v39;
-    const V v47 = d3 * v39;
-    const V v48 = v39 * v39;
-    const V v49 = v38 * v48;
-    const V v50 = v41 * v49;
-    const V v51 = v26 * v48;
-    const V v52 = v41 * v51;
-    const V v53 = v34 * v48;
-    const V v54 = v41 * v53;
-    const V v55 = v30 * v48;
-    const V v56 = v41 * v55;
-    const V v57 = v36 * v48;
-    const V v58 = v32 * v48;
-    const V v59 = v41 * v57;
-    const V v60 = v41 * v58;
-    const V v61 = v8 * v50;
-    const V v62 = v42 + v61;
-    const V v63 = v8 * v54;
-    const V v64 = v44 - v63;
-    const V v65 = v8 * v56;
-    const V v66 = v45 - v65;
-    const V v67 = v8 * v60;
-    const V v68 = v47 + v67;
-    const V v69 = v8 * v59;
-    const V v70 = d1 * v64;
-    const V v71 = d1 * v66;
-    const V v72 = v8 * v39;
-    const V v73 = d1 * v72;
-    const V v74 = a0 * v72;
-    const V v75 = v8 * v52;
-    const V v76 = v5 * v39;
-    const V v77 = v10 * v39;
-    const V v78 = a0 * v76;
-    const V v79 = d0 * v76;
-    const V v80 = v79 + v73;
-    const V v81 = a0 * v77;
-    const V v82 = d2 * v77;
-    const V v83 = v80 + v82;
-    const V v84 = a0 * v83;
-    const V v85 = d12 - v84;
-    const M v86 = softehl_eq(v85, v85);
-    const V v87 = v5 * v50;
-    const V v88 = v10 * v50;
-    const V v89 = v43 - v88;
-    const V v90 = d2 * v89;
-    const V v91 = d0 * v87;
-    const V v92 = v90 - v91;
-    const V v93 = d1 * v62;
-    const V v94 = v92 - v93;
-    const V v95 = a0 * v94;
-    const V v96 = v10 * v56;
-    const V v97 = v46 + v96;
-    const V v98 = v5 * v56;
-    const V v99 = d0 * v98;
-    const V v100 = v71 - v99;
-    const V v101 = d2 * v97;
-    const V v102 = v100 - v101;
-    const V v103 = a0 * v102;
-    const V v104 = v5 * v60;
-    const V v105 = v46 - v104;
-    const V v106 = v10 * v60;
-    const V v107 = d0 * v105;
-    const V v108 = d2 * v106;
-    const V v109 = v107 - v108;
-    const V v110 = d1 * v68;
-    const V v111 = v109 - v110;
-    const V v112 = a0 * v111;
-    const V v113 = v5 * v52;
-    const V v114 = v42 - v113;
-    const V v115 = d0 * v114;
-    const V v116 = d1 * v75;
-    const V v117 = v115 - v116;
-    const V v118 = v10 * v52;
-    const V v119 = v44 + v118;
-    const V v120 = d2 * v119;
-    const V v121 = v117 - v120;
-    const V v122 = a0 * v121;
-    const V v123 = v10 * v54;
-    const V v124 = v5 * v54;
-    const V v125 = v43 + v124;
-    const V v126 = v5 * v59;
-    const V v127 = v45 + v126;
-    const V v128 = v10 * v59;
-    const V v129 = v47 - v128;
-    const V v130 = d2 * v129;
-    const V v131 = d0 * v127;
-    const V v132 = v130 - v131;
-    const V v133 = d1 * v69;
-    const V v134 = v132 - v133;
-    const V v135 = a0 * v134;
-    const V v136 = d0 * v125;
-    const V v137 = v70 - v136;
-    const V v138 = d2 * v123;
-    const V v139 = v137 - v138;
-    const V v140 = a0 * v139;
-    V v141 = softehl_splat(0.0);
-    V v142 = softehl_splat(0.0);
-    V v143 = softehl_splat(0.0);
-    V v144 = softehl_splat(0.0);
-    V v145 = softehl_splat(0.0);
-    V v146 = softehl_splat(0.0);
-    V v147 = softehl_splat(0.0);
-    V v148 = softehl_splat(0.0);
-    V v149 = softehl_splat(0.0);
-    V v150 = softehl_splat(0.0);
-    V v151 = softehl_splat(0.0);
-    V v152 = softehl_splat(0.0);
-    V v153 = softehl_splat(0.0);
-    V v154 = softehl_splat(0.0);
-    V v155 = softehl_splat(0.0);
-    V v156 = softehl_splat(0.0);
-    V v157 = softehl_splat(0.0);
-    V v158 = softehl_splat(0.0);
-    V v159 = softehl_splat(0.0);
-    V v160 = softehl_splat(0.0);
-    V v161 = softehl_splat(0.0);
-    V v162 = softehl_splat(0.0);
-    V v163 = softehl_splat(0.0);
-    V v164 = softehl_splat(0.0);
-    V v165 = softehl_splat(0.0);
-    V v166 = softehl_splat(0.0);
-    V v167 = softehl_splat(0.0);
-    V v168 = softehl_splat(0.0);
-    V v169 = softehl_splat(0.0);
-    V v170 = softehl_splat(0.0);
-    V v171 = softehl_splat(0.0);
-    V v172 = softehl_splat(0.0);
-    V v173 = softehl_splat(0.0);
-    V v174 = softehl_splat(0.0);
-    V v175 = softehl_splat(0.0);
-    V v176 = softehl_splat(0.0);
-    V v177 = softehl_splat(0.0);
-    V v178 = softehl_splat(0.0);
-    V v179 = softehl_splat(0.0);
-    V v180 = softehl_splat(0.0);
-    V v181 = softehl_splat(0.0);
-    V v182 = softehl_splat(0.0);
-    V v183 = softehl_splat(0.0);
-    V v184 = softehl_splat(0.0);
-    V v185 = softehl_splat(0.0);
-    V v186 = softehl_splat(0.0);
-    V v187 = softehl_splat(0.0);
-    V v188 = softehl_splat(0.0);
-    V v189 = softehl_splat(0.0);
-    V v190 = softehl_splat(0.0);
-    V v191 = softehl_splat(0.0);
-    V v192 = softehl_splat(0.0);
-    V v193 = softehl_splat(0.0);
-    V v194 = softehl_splat(0.0);
-    V v195 = softehl_splat(0.0);
-    V v196 = softehl_splat(0.0);
-    V v197 = softehl_splat(0.0);
-    V v198 = softehl_splat(0.0);
-    V v199 = softehl_splat(0.0);
-    V v200 = softehl_splat(0.0);
-    V v201 = softehl_splat(0.0);
-    V v202 = softehl_splat(0.0);
-    V v203 = softehl_splat(0.0);
-    V v204 = softehl_splat(0.0);
-    V v205 = softehl_splat(0.0);
-    V v206 = softehl_splat(0.0);
-    V v207 = softehl_splat(0.0);
-    V v208 = softehl_splat(0.0);
-    V v209 = softehl_splat(0.0);
-    V v210 = softehl_splat(0.0);
-    V v211 = softehl_splat(0.0);
-    V v212 = softehl_splat(0.0);
-    V v213 = softehl_splat(0.0);
-    V v214 = softehl_splat(0.0);
-    V v215 = softehl_splat(0.0);
-    V v216 = softehl_splat(0.0);
-    V v217 = softehl_splat(0.0);
-    V v218 = softehl_splat(0.0);
-    V v219 = softehl_splat(0.0);
-    V v220 = softehl_splat(0.0);
-    const M m221 = v86;
-    if (softehl_any(m221)) {
-        const M v222 = softehl_le(softehl_splat(0.0), v85);
-        V v223 = softehl_splat(0.0);
-        V v224 = softehl_splat(0.0);
-        V v225 = softehl_splat(0.0);
-        V v226 = softehl_splat(0.0);
-        V v227 = softehl_splat(0.0);
-        V v228 = softehl_splat(0.0);
-        V v229 = softehl_splat(0.0);
-        V v230 = softehl_splat(0.0);
-        V v231 = softehl_splat(0.0);
-        V v232 = softehl_splat(0.0);
-        V v233 = softehl_splat(0.0);
-        V v234 = softehl_splat(0.0);
-        V v235 = softehl_splat(0.0);
-        V v236 = softehl_splat(0.0);
-        V v237 = softehl_splat(0.0);
-        V v238 = softehl_splat(0.0);
-        V v239 = softehl_splat(0.0);
-        V v240 = softehl_splat(0.0);
-        V v241 = softehl_splat(0.0);
-        V v242 = softehl_splat(0.0);
-        V v243 = softehl_splat(0.0);
-        V v244 = softehl_splat(0.0);
-        V v245 = softehl_splat(0.0);
-        V v246 = softehl_splat(0.0);
-        V v247 = softehl_splat(0.0);
-        V v248 = softehl_splat(0.0);
-        V v249 = softehl_splat(0.0);
-        V v250 = softehl_splat(0.0);
-        V v251 = softehl_splat(0.0);
-        V v252 = softehl_splat(0.0);
-        V v253 = softehl_splat(0.0);
-        V v254 = softehl_splat(0.0);
-        V v255 = softehl_splat(0.0);
-        V v256 = softehl_splat(0.0);
-        V v257 = softehl_splat(0.0);
-        V v258 = softehl_splat(0.0);
-        V v259 = softehl_splat(0.0);
-        V v260 = softehl_splat(0.0);
-        V v261 = softehl_splat(0.0);
-        V v262 = softehl_splat(0.0);
-        V v263 = softehl_splat(0.0);
-        V v264 = softehl_splat(0.0);
-        V v265 = softehl_splat(0.0);
-        V v266 = softehl_splat(0.0);
-        V v267 = softehl_splat(0.0);
-        V v268 = softehl_splat(0.0);
-        V v269 = softehl_splat(0.0);
-        V v270 = softehl_splat(0.0);
-        V v271 = softehl_splat(0.0);
-        V v272 = softehl_splat(0.0);
-        V v273 = softehl_splat(0.0);
-        V v274 = softehl_splat(0.0);
-        V v275 = softehl_splat(0.0);
-        V v276 = softehl_splat(0.0);
-        V v277 = softehl_splat(0.0);
-        V v278 = softehl_splat(0.0);
-        V v279 = softehl_splat(0.0);
-        V v280 = softehl_splat(0.0);
-        V v281 = softehl_splat(0.0);
-        V v282 = softehl_splat(0.0);
-        V v283 = softehl_splat(0.0);
-        V v284 = softehl_splat(0.0);
-        V v285 = softehl_splat(0.0);
-        V v286 = softehl_splat(0.0);
-        V v287 = softehl_splat(0.0);
-        V v288 = softehl_splat(0.0);
-        V v289 = softehl_splat(0.0);
-        V v290 = softehl_splat(0.0);
-        V v291 = softehl_splat(0.0);
-        V v292 = softehl_splat(0.0);
-        V v293 = softehl_splat(0.0);
-        V v294 = softehl_splat(0.0);
-        V v295 = softehl_splat(0.0);
-        V v296 = softehl_splat(0.0);
-        V v297 = softehl_splat(0.0);
-        V v298 = softehl_splat(0.0);
-        V v299 = softehl_splat(0.0);
-        V v300 = softehl_splat(0.0);
-        V v301 = softehl_splat(0.0);
-        V v302 = softehl_splat(0.0);
-        const M m303 = v222 & m221;
-        if (softehl_any(m303)) {
-            const V v304 = a2 + v83;
-            const V v305 = v83 - a3;
-            const V v306 = v304 * v305;
-            const M v307 = softehl_eq(v306, v306);
-            V v308 = softehl_splat(0.0);
-            V v309 = softehl_splat(0.0);
-            V v310 = softehl_splat(0.0);
-            V v311 = softehl_splat(0.0);
-            V v312 = softehl_splat(0.0);
-            V v313 = softehl_splat(0.0);
-            V v314 = softehl_splat(0.0);
-            V v315 = softehl_splat(0.0);
-            V v316 = softehl_splat(0.0);
-            V v317 = softehl_splat(0.0);
-            V v318 = softehl_splat(0.0);
-            const M m319 = v307 & m303;
-            if (softehl_any(m319)) {
-                const M v320 = softehl_lt(v306, softehl_splat(0.0));
-                V v321 = softehl_splat(0.0);
-                V v322 = softehl_splat(0.0);
-                V v323 = softehl_splat(0.0);
-                V v324 = softehl_splat(0.0);
-                V v325 = softehl_splat(0.0);
-                V v326 = softehl_splat(0.0);
-                V v327 = softehl_splat(0.0);
-                V v328 = softehl_splat(0.0);
-                V v329 = softehl_splat(0.0);
-                V v330 = softehl_splat(0.0);
-                V v331 = softehl_splat(0.0);
-                const M m332 = v320 & m319;
-                if (softehl_any(m332)) {
-                    const V v333 = -v78;
-                    const V v334 = -v74;
-                    const V v335 = -v81;
-                    const V v336 = -v122;
-                    const V v337 = -v140;
-                    const V v338 = -v103;
-                    const V v339 = -v112;
-                    const V v340 = -v95;
-                    const V v341 = -v135;
-                    v321 = softehl_blend(m332, v85, v321);
-                    v322 = softehl_blend(m332, v333, v322);
-                    v323 = softehl_blend(m332, v334, v323);
-                    v324 = softehl_blend(m332, v335, v324);
-                    v325 = softehl_blend(m332, v340, v325);
-                    v326 = softehl_blend(m332, v336, v326);
-                    v327 = softehl_blend(m332, v337, v327);
-                    v328 = softehl_blend(m332, v338, v328);
-                    v329 = softehl_blend(m332, v341, v329);
-                    v330 = softehl_blend(m332, v339, v330);
-                    v331 = softehl_blend(m332, softehl_splat(1.0), v331);
+    const V v1 = 1.0 / a0, v2 = d4 * d8 - d5 * d7, v3 = d5 * d6 - d3 * d8, v4 = d3 * d7 - d4 * d6,
+        v5 = 2.0 * v2, v6 = 2.0 * v3, v7 = 2.0 * v4, v8 = v2 * v2 + v3 * v3 + v4 * v4,
+        v9 = softehl_vsqrt(v8), v10 = 1.0 / v9, v11 = softehl_vsqrt(1.0 / v8), v12 = 0.5 * v11,
+        v13 = d8 * v10, v14 = d7 * v10, v15 = d6 * v10, v16 = d5 * v10, v17 = d4 * v10,
+        v18 = d3 * v10, v19 = v10 * v10, v20 = v12 * ((d7 * v7 - d8 * v6) * v19),
+        v21 = v12 * ((d8 * v5 - d6 * v7) * v19), v22 = v12 * ((d6 * v6 - d7 * v5) * v19),
+        v23 = v12 * ((d5 * v6 - d4 * v7) * v19), v24 = v12 * ((d3 * v7 - d5 * v5) * v19),
+        v25 = v12 * ((d4 * v5 - d3 * v6) * v19), v26 = v13 + v3 * v20, v27 = v15 - v3 * v22,
+        v28 = v16 - v3 * v23, v29 = v18 + v3 * v25, v30 = v3 * v24, v31 = v3 * v10, v32 = a0 * v31,
+        v33 = v3 * v21, v34 = v2 * v10, v35 = v4 * v10, v36 = a0 * v34, v37 = a0 * v35,
+        v38 = d0 * v34 + d1 * v31 + d2 * v35, v39 = a0 * v38, v40 = d12 - v39;
+    const M v41 = softehl_eq(v40, v40);
+    const V v42 = v2 * v20, v43 = v14 - v4 * v20, v44 = d2 * v43 - d0 * v42 - d1 * v26,
+        v45 = a0 * v44, v46 = v17 + v4 * v23, v47 = v2 * v23, v48 = d1 * v28 - d0 * v47 - d2 * v46,
+        v49 = a0 * v48, v50 = v17 - v2 * v25, v51 = v4 * v25, v52 = d0 * v50 - d2 * v51 - d1 * v29,
+        v53 = a0 * v52, v54 = v13 - v2 * v21, v55 = v15 + v4 * v21,
+        v56 = d0 * v54 - d1 * v33 - d2 * v55, v57 = a0 * v56, v58 = v4 * v22, v59 = v14 + v2 * v22,
+        v60 = v16 + v2 * v24, v61 = v18 - v4 * v24, v62 = d2 * v61 - d0 * v60 - d1 * v30,
+        v63 = a0 * v62, v64 = d1 * v27 - d0 * v59 - d2 * v58, v65 = a0 * v64;
+    V v66 = softehl_splat(0.0), v67 = softehl_splat(0.0), v68 = softehl_splat(0.0),
+        v69 = softehl_splat(0.0), v70 = softehl_splat(0.0), v71 = softehl_splat(0.0),
+        v72 = softehl_splat(0.0), v73 = softehl_splat(0.0), v74 = softehl_splat(0.0),
+        v75 = softehl_splat(0.0), v76 = softehl_splat(0.0), v77 = softehl_splat(0.0),
+        v78 = softehl_splat(0.0), v79 = softehl_splat(0.0), v80 = softehl_splat(0.0),
+        v81 = softehl_splat(0.0), v82 = softehl_splat(0.0), v83 = softehl_splat(0.0),
+        v84 = softehl_splat(0.0), v85 = softehl_splat(0.0), v86 = softehl_splat(0.0),
+        v87 = softehl_splat(0.0), v88 = softehl_splat(0.0), v89 = softehl_splat(0.0),
+        v90 = softehl_splat(0.0), v91 = softehl_splat(0.0), v92 = softehl_splat(0.0),
+        v93 = softehl_splat(0.0), v94 = softehl_splat(0.0), v95 = softehl_splat(0.0),
+        v96 = softehl_splat(0.0), v97 = softehl_splat(0.0), v98 = softehl_splat(0.0),
+        v99 = softehl_splat(0.0), v100 = softehl_splat(0.0), v101 = softehl_splat(0.0),
+        v102 = softehl_splat(0.0), v103 = softehl_splat(0.0), v104 = softehl_splat(0.0),
+        v105 = softehl_splat(0.0), v106 = softehl_splat(0.0), v107 = softehl_splat(0.0),
+        v108 = softehl_splat(0.0), v109 = softehl_splat(0.0), v110 = softehl_splat(0.0),
+        v111 = softehl_splat(0.0), v112 = softehl_splat(0.0), v113 = softehl_splat(0.0),
+        v114 = softehl_splat(0.0), v115 = softehl_splat(0.0), v116 = softehl_splat(0.0),
+        v117 = softehl_splat(0.0), v118 = softehl_splat(0.0), v119 = softehl_splat(0.0),
+        v120 = softehl_splat(0.0), v121 = softehl_splat(0.0), v122 = softehl_splat(0.0),
+        v123 = softehl_splat(0.0), v124 = softehl_splat(0.0), v125 = softehl_splat(0.0),
+        v126 = softehl_splat(0.0), v127 = softehl_splat(0.0), v128 = softehl_splat(0.0),
+        v129 = softehl_splat(0.0), v130 = softehl_splat(0.0), v131 = softehl_splat(0.0),
+        v132 = softehl_splat(0.0), v133 = softehl_splat(0.0), v134 = softehl_splat(0.0),
+        v135 = softehl_splat(0.0), v136 = softehl_splat(0.0), v137 = softehl_splat(0.0),
+        v138 = softehl_splat(0.0), v139 = softehl_splat(0.0), v140 = softehl_splat(0.0),
+        v141 = softehl_splat(0.0), v142 = softehl_splat(0.0), v143 = softehl_splat(0.0),
+        v144 = softehl_splat(0.0), v145 = softehl_splat(0.0);
+    const M m146 = v41;
+    if (softehl_any(m146)) {
+        const M v147 = softehl_le(softehl_splat(0.0), v40);
+        V v148 = softehl_splat(0.0), v149 = softehl_splat(0.0), v150 = softehl_splat(0.0),
+            v151 = softehl_splat(0.0), v152 = softehl_splat(0.0), v153 = softehl_splat(0.0),
+            v154 = softehl_splat(0.0), v155 = softehl_splat(0.0), v156 = softehl_splat(0.0),
+            v157 = softehl_splat(0.0), v158 = softehl_splat(0.0), v159 = softehl_splat(0.0),
+            v160 = softehl_splat(0.0), v161 = softehl_splat(0.0), v162 = softehl_splat(0.0),
+            v163 = softehl_splat(0.0), v164 = softehl_splat(0.0), v165 = softehl_splat(0.0),
+            v166 = softehl_splat(0.0), v167 = softehl_splat(0.0), v168 = softehl_splat(0.0),
+            v169 = softehl_splat(0.0), v170 = softehl_splat(0.0), v171 = softehl_splat(0.0),
+            v172 = softehl_splat(0.0), v173 = softehl_splat(0.0), v174 = softehl_splat(0.0),
+            v175 = softehl_splat(0.0), v176 = softehl_splat(0.0), v177 = softehl_splat(0.0),
+            v178 = softehl_splat(0.0), v179 = softehl_splat(0.0), v180 = softehl_splat(0.0),
+            v181 = softehl_splat(0.0), v182 = softehl_splat(0.0), v183 = softehl_splat(0.0),
+            v184 = softehl_splat(0.0), v185 = softehl_splat(0.0), v186 = softehl_splat(0.0),
+            v187 = softehl_splat(0.0), v188 = softehl_splat(0.0), v189 = softehl_splat(0.0),
+            v190 = softehl_splat(0.0), v191 = softehl_splat(0.0), v192 = softehl_splat(0.0),
+            v193 = softehl_splat(0.0), v194 = softehl_splat(0.0), v195 = softehl_splat(0.0),
+            v196 = softehl_splat(0.0), v197 = softehl_splat(0.0), v198 = softehl_splat(0.0),
+            v199 = softehl_splat(0.0), v200 = softehl_splat(0.0), v201 = softehl_splat(0.0),
+            v202 = softehl_splat(0.0), v203 = softehl_splat(0.0), v204 = softehl_splat(0.0),
+            v205 = softehl_splat(0.0), v206 = softehl_splat(0.0), v207 = softehl_splat(0.0),
+            v208 = softehl_splat(0.0), v209 = softehl_splat(0.0), v210 = softehl_splat(0.0),
+            v211 = softehl_splat(0.0), v212 = softehl_splat(0.0), v213 = softehl_splat(0.0),
+            v214 = softehl_splat(0.0), v215 = softehl_splat(0.0), v216 = softehl_splat(0.0),
+            v217 = softehl_splat(0.0), v218 = softehl_splat(0.0), v219 = softehl_splat(0.0),
+            v220 = softehl_splat(0.0), v221 = softehl_splat(0.0), v222 = softehl_splat(0.0),
+            v223 = softehl_splat(0.0), v224 = softehl_splat(0.0), v225 = softehl_splat(0.0),
+            v226 = softehl_splat(0.0), v227 = softehl_splat(0.0);
+        const M m228 = v147 & m146;
+        if (softehl_any(m228)) {
+            const V v229 = a2 + v38, v230 = v38 - a3, v231 = v229 * v230;
+            const M v232 = softehl_eq(v231, v231);
+            V v233 = softehl_splat(0.0), v234 = softehl_splat(0.0), v235 = softehl_splat(0.0),
+                v236 = softehl_splat(0.0), v237 = softehl_splat(0.0), v238 = softehl_splat(0.0),
+                v239 = softehl_splat(0.0), v240 = softehl_splat(0.0), v241 = softehl_splat(0.0),
+                v242 = softehl_splat(0.0), v243 = softehl_splat(0.0);
+            const M m244 = v232 & m228;
+            if (softehl_any(m244)) {
+                const M v245 = softehl_lt(v231, softehl_splat(0.0));
+                V v246 = softehl_splat(0.0), v247 = softehl_splat(0.0), v248 = softehl_splat(0.0),
+                    v249 = softehl_splat(0.0), v250 = softehl_splat(0.0), v251 = softehl_splat(0.0),
+                    v252 = softehl_splat(0.0), v253 = softehl_splat(0.0), v254 = softehl_splat(0.0),
+                    v255 = softehl_splat(0.0), v256 = softehl_splat(0.0);
+                const M m257 = v245 & m244;
+                if (softehl_any(m257)) {
+                    const V v258 = -v36, v259 = -v32, v260 = -v37, v261 = -v57, v262 = -v65,
+                        v263 = -v49, v264 = -v53, v265 = -v45, v266 = -v63;
+                    v246 = softehl_blend(m257, v40, v246); v247 = softehl_blend(m257, v258, v247);
+                    v248 = softehl_blend(m257, v259, v248); v249 = softehl_blend(m257, v260, v249);
+                    v250 = softehl_blend(m257, v265, v250); v251 = softehl_blend(m257, v261, v251);
+                    v252 = softehl_blend(m257, v262, v252); v253 = softehl_blend(m257, v263, v253);
+                    v254 = softehl_blend(m257, v266, v254); v255 = softehl_blend(m257, v264, v255);
+                    v256 = softehl_blend(m257, softehl_splat(1.0), v256);
                 }
-                v308 = softehl_blend(m319, v321, v308);
-                v309 = softehl_blend(m319, v322, v309);
-                v310 = softehl_blend(m319, v323, v310);
-                v311 = softehl_blend(m319, v324, v311);
-                v312 = softehl_blend(m319, v325, v312);
-                v313 = softehl_blend(m319, v326, v313);
-                v314 = softehl_blend(m319, v327, v314);
-                v315 = softehl_blend(m319, v328, v315);
-                v316 = softehl_blend(m319, v329, v316);
-                v317 = softehl_blend(m319, v330, v317);
-                v318 = softehl_blend(m319, v331, v318);
+                v233 = softehl_blend(m244, v246, v233); v234 = softehl_blend(m244, v247, v234);
+                v235 = softehl_blend(m244, v248, v235); v236 = softehl_blend(m244, v249, v236);
+                v237 = softehl_blend(m244, v250, v237); v238 = softehl_blend(m244, v251, v238);
+                v239 = softehl_blend(m244, v252, v239); v240 = softehl_blend(m244, v253, v240);
+                v241 = softehl_blend(m244, v254, v241); v242 = softehl_blend(m244, v255, v242);
+                v243 = softehl_blend(m244, v256, v243);
             }
-            const M m342 = ~v307 & m303;
-            if (softehl_any(m342)) {
-                const V v343 = v306 * v306;
-                const V v344 = v306 * v343;
-                const V v345 = 3.0 * v343;
-                const V v346 = v304 + v305;
-                const V v347 = v76 * v345;
-                const V v348 = v346 * v347;
-                const V v349 = v72 * v345;
-                const V v350 = v346 * v349;
-                const V v351 = v77 * v345;
-                const V v352 = v345 * v121;
-                const V v353 = v345 * v139;
-                const V v354 = v345 * v102;
-                const V v355 = v345 * v111;
-                const V v356 = v345 * v94;
-                const V v357 = v345 * v134;
-                const V v358 = v346 * v351;
-                const V v359 = v346 * v352;
-                const V v360 = v346 * v353;
-                const V v361 = v346 * v354;
-                const V v362 = v346 * v355;
-                const V v363 = v346 * v356;
-                const V v364 = v346 * v357;
-                v308 = softehl_blend(m342, v344, v308);
-                v309 = softehl_blend(m342, v348, v309);
-                v310 = softehl_blend(m342, v350, v310);
-                v311 = softehl_blend(m342, v358, v311);
-                v312 = softehl_blend(m342, v363, v312);
-                v313 = softehl_blend(m342, v359, v313);
-                v314 = softehl_blend(m342, v360, v314);
-                v315 = softehl_blend(m342, v361, v315);
-                v316 = softehl_blend(m342, v364, v316);
-                v317 = softehl_blend(m342, v362, v317);
-                v318 = softehl_blend(m342, softehl_splat(0.0), v318);
+            const M m267 = ~v232 & m228;
+            if (softehl_any(m267)) {
+                const V v268 = v231 * v231, v269 = v231 * v268, v270 = 3.0 * v268,
+                    v271 = v229 + v230, v272 = v271 * (v34 * v270), v273 = v271 * (v31 * v270),
+                    v274 = v271 * (v35 * v270), v275 = v271 * (v270 * v56),
+                    v276 = v271 * (v270 * v64), v277 = v271 * (v270 * v48),
+                    v278 = v271 * (v270 * v52), v279 = v271 * (v270 * v44),
+                    v280 = v271 * (v270 * v62);
+                v233 = softehl_blend(m267, v269, v233); v234 = softehl_blend(m267, v272, v234);
+                v235 = softehl_blend(m267, v273, v235); v236 = softehl_blend(m267, v274, v236);
+                v237 = softehl_blend(m267, v279, v237); v238 = softehl_blend(m267, v275, v238);
+                v239 = softehl_blend(m267, v276, v239); v240 = softehl_blend(m267, v277, v240);
+                v241 = softehl_blend(m267, v280, v241); v242 = softehl_blend(m267, v278, v242);
+                v243 = softehl_blend(m267, softehl_splat(0.0), v243);
             }
-            const V v365 = a1 * v308;
-            const V v366 = a1 * v318;
-            const V v367 = v76 * v76;
-            const V v368 = 1.0 - v367;
-            const V v369 = v365 * v365;
-            const V v370 = v72 * v72;
-            const V v371 = 1.0 - v370;
-            const V v372 = v76 * v72;
-            const V v373 = d9 * a0;
-            const V v374 = d13 + v373;
-            const V v375 = d10 * a0;
-            const V v376 = d14 + v375;
-            const V v377 = d11 * a0;
-            const V v378 = d15 + v377;
-            const M v379 = softehl_eq(v369, v369);
-            const V v380 = v374 * v76;
-            const V v381 = v76 * v78;
-            const V v382 = a0 - v381;
-            const V v383 = v72 * v78;
-            const V v384 = v77 * v78;
-            const V v385 = v77 * v81;
-            const V v386 = a0 - v385;
-            const V v387 = v76 * v77;
-            const V v388 = v376 * v72;
-            const V v389 = v380 + v388;
-            const V v390 = v72 * v77;
-            const V v391 = v77 * v77;
-            const V v392 = 1.0 - v391;
-            const V v393 = v378 * v77;
-            const V v394 = v389 + v393;
-            const V v395 = v77 * v74;
-            const V v396 = v72 * v74;
-            const V v397 = a0 - v396;
-            const V v398 = v77 * v394;
-            const V v399 = v378 - v398;
-            const V v400 = v378 * v89;
-            const V v401 = v394 * v89;
-            const V v402 = v76 * v394;
-            const V v403 = v374 - v402;
-            const V v404 = v72 * v394;
-            const V v405 = v376 - v404;
-            const V v406 = v394 * v87;
-            const V v407 = v374 * v87;
-            const V v408 = v400 - v407;
-            const V v409 = v394 * v62;
-            const V v410 = 2.0 * v403;
-            const V v411 = v403 * v403;
-            const V v412 = 2.0 * v405;
-            const V v413 = 2.0 * v399;
-            const V v414 = v376 * v62;
-            const V v415 = v408 - v414;
-            const V v416 = v405 * v405;
-            const V v417 = v411 + v416;
-            const V v418 = v399 * v399;
-            const V v419 = v417 + v418;
-            const M v420 = softehl_eq(v419, v419);
-            const V v421 = v76 * v415;
-            const V v422 = v406 - v421;
-            const V v423 = v72 * v415;
-            const V v424 = v409 - v423;
-            const V v425 = v77 * v415;
-            const V v426 = v401 + v425;
-            const V v427 = v413 * v392;
-            const V v428 = v413 * v386;
-            const V v429 = v410 * v368;
-            const V v430 = v412 * v371;
-            const V v431 = v410 * v382;
-            const V v432 = v412 * v397;
-            const M v433 = v379 & v420;
-            const V v434 = v413 * v426;
-            const V v435 = v410 * v422;
-            const V v436 = v412 * v372;
-            const V v437 = v429 - v436;
-            const V v438 = v410 * v372;
-            const V v439 = v430 - v438;
-            const V v440 = v412 * v383;
-            const V v441 = v431 - v440;
-            const V v442 = v410 * v383;
-            const V v443 = v432 - v442;
-            const V v444 = v412 * v424;
-            const V v445 = v435 + v444;
-            const V v446 = v413 * v387;
-            const V v447 = v410 * v387;
-            const V v448 = v413 * v390;
-            const V v449 = v412 * v390;
-            const V v450 = v447 + v449;
-            const V v451 = v413 * v384;
-            const V v452 = v410 * v384;
-            const V v453 = v413 * v395;
-            const V v454 = v412 * v395;
-            const V v455 = v452 + v454;
-            const V v456 = a1 * v309;
-            const V v457 = a1 * v310;
-            const V v458 = a1 * v311;
-            const V v459 = a1 * v313;
-            const V v460 = a1 * v314;
-            const V v461 = a1 * v315;
-            const V v462 = a1 * v317;
-            const V v463 = a1 * v312;
-            const V v464 = a1 * v316;
-            const V v465 = v394 * v114;
-            const V v466 = v374 * v114;
-            const V v467 = v394 * v75;
-            const V v468 = v394 * v119;
-            const V v469 = v394 * v125;
-            const V v470 = v376 * v75;
-            const V v471 = v466 - v470;
-            const V v472 = v376 * v64;
-            const V v473 = v394 * v64;
-            const V v474 = v374 * v125;
-            const V v475 = v472 - v474;
-            const V v476 = v378 * v119;
-            const V v477 = v471 - v476;
-            const V v478 = v394 * v123;
-            const V v479 = v378 * v123;
-            const V v480 = v475 - v479;
-            const V v481 = v394 * v98;
-            const V v482 = v376 * v66;
-            const V v483 = v394 * v66;
-            const V v484 = v374 * v98;
-            const V v485 = v482 - v484;
-            const V v486 = v76 * v477;
-            const V v487 = v465 + v486;
-            const V v488 = v76 * v480;
-            const V v489 = v469 - v488;
-            const V v490 = v72 * v477;
-            const V v491 = v467 - v490;
-            const V v492 = v72 * v480;
-            const V v493 = v473 + v492;
-            const V v494 = v77 * v480;
-            const V v495 = v478 - v494;
-            const V v496 = v77 * v477;
-            const V v497 = v468 - v496;
-            const V v498 = v378 * v97;
-            const V v499 = v485 - v498;
-            const V v500 = v394 * v97;
-            const V v501 = v412 * v491;
-            const V v502 = v410 * v489;
-            const V v503 = v77 * v499;
-            const V v504 = v500 - v503;
-            const V v505 = v410 * v487;
-            const V v506 = v501 - v505;
-            const V v507 = v412 * v493;
-            const V v508 = v502 - v507;
-            const V v509 = v413 * v497;
-            const V v510 = v506 + v509;
-            const V v511 = v413 * v495;
-            const V v512 = v508 + v511;
-            const V v513 = v76 * v499;
-            const V v514 = v481 - v513;
-            const V v515 = v72 * v499;
-            const V v516 = v483 + v515;
-            const V v517 = v413 * v504;
-            const V v518 = v394 * v127;
-            const V v519 = v378 * v129;
-            const V v520 = v394 * v129;
-            const V v521 = v394 * v69;
-            const V v522 = v394 * v105;
-            const V v523 = v374 * v105;
-            const V v524 = v374 * v127;
-            const V v525 = v519 - v524;
-            const V v526 = v394 * v68;
-            const V v527 = v394 * v106;
-            const V v528 = v378 * v106;
-            const V v529 = v523 - v528;
-            const V v530 = v412 * v516;
-            const V v531 = v517 - v530;
-            const V v532 = v376 * v69;
-            const V v533 = v525 - v532;
-            const V v534 = v376 * v68;
-            const V v535 = v529 - v534;
-            const V v536 = v72 * v533;
-            const V v537 = v521 - v536;
-            const V v538 = v72 * v535;
-            const V v539 = v526 - v538;
-            const V v540 = v410 * v514;
-            const V v541 = v540 + v531;
-            const V v542 = v76 * v533;
-            const V v543 = v518 - v542;
-            const V v544 = v76 * v535;
-            const V v545 = v522 + v544;
-            const V v546 = v77 * v533;
-            const V v547 = v520 + v546;
-            const V v548 = v77 * v535;
-            const V v549 = v527 - v548;
-            const V v550 = v413 * v547;
-            const V v551 = v413 * v549;
-            const V v552 = v410 * v543;
-            const V v553 = v410 * v545;
-            const V v554 = v551 - v553;
-            const V v555 = v412 * v537;
-            const V v556 = v552 + v555;
-            const V v557 = v412 * v539;
-            const V v558 = v554 + v557;
-            V v559 = softehl_splat(0.0);
-            V v560 = softehl_splat(0.0);
-            V v561 = softehl_splat(0.0);
-            V v562 = softehl_splat(0.0);
-            V v563 = softehl_splat(0.0);
-            V v564 = softehl_splat(0.0);
-            V v565 = softehl_splat(0.0);
-            V v566 = softehl_splat(0.0);
-            V v567 = softehl_splat(0.0);
-            V v568 = softehl_splat(0.0);
-            V v569 = softehl_splat(0.0);
-            V v570 = softehl_splat(0.0);
-            V v571 = softehl_splat(0.0);
-            V v572 = softehl_splat(0.0);
-            V v573 = softehl_splat(0.0);
-            V v574 = softehl_splat(0.0);
-            V v575 = softehl_splat(0.0);
-            const M m576 = v433 & m303;
-            if (softehl_any(m576)) {
-                const M v577 = softehl_lt(v369, v419);
-                V v578 = softehl_splat(0.0);
-                V v579 = softehl_splat(0.0);
-                V v580 = softehl_splat(0.0);
-                V v581 = softehl_splat(0.0);
-                V v582 = softehl_splat(0.0);
-                V v583 = softehl_splat(0.0);
-                V v584 = softehl_splat(0.0);
-                V v585 = softehl_splat(0.0);
-                V v586 = softehl_splat(0.0);
-                V v587 = softehl_splat(0.0);
-                V v588 = softehl_splat(0.0);
-                V v589 = softehl_splat(0.0);
-                V v590 = softehl_splat(0.0);
-                V v591 = softehl_splat(0.0);
-                V v592 = softehl_splat(0.0);
-                V v593 = softehl_splat(0.0);
-                V v594 = softehl_splat(0.0);
-                const M m595 = v577 & m576;
-                if (softehl_any(m595)) {
-                    const V v596 = 1.0 / v419;
-                    const V v597 = v437 - v446;
-                    const V v598 = v439 - v448;
-                    const V v599 = v427 - v450;
-                    const V v600 = v441 - v451;
-                    const V v601 = v428 - v455;
-                    const V v602 = v365 * v597;
-                    const V v603 = v365 * v598;
-                    const V v604 = v365 * v599;
-                    const V v605 = v365 * v600;
-                    const V v606 = v445 - v434;
-                    const V v607 = v556 - v550;
-                    const V v608 = softehl_vsqrt(v596);
-                    const V v609 = v443 - v453;
-                    const V v610 = v608 * v365;
-                    const V v611 = v608 * v366;
-                    const V v612 = 0.5 * v608;
-                    const V v613 = v608 * v612;
-                    const V v614 = v608 * v613;
-                    const V v615 = v365 * v614;
-                    const V v616 = v614 * v602;
-                    const V v617 = -v616;
-                    const V v618 = v614 * v603;
-                    const V v619 = -v618;
-                    const V v620 = v614 * v604;
-                    const V v621 = v614 * v605;
-                    const V v622 = -v620;
-                    const V v623 = -v621;
-                    const V v624 = v615 * v609;
-                    const V v625 = -v624;
-                    const V v626 = v615 * v601;
-                    const V v627 = -v626;
-                    const V v628 = v608 * v456;
-                    const V v629 = v608 * v457;
-                    const V v630 = v608 * v458;
-                    const V v631 = v608 * v459;
-                    const V v632 = v615 * v510;
-                    const V v633 = v631 - v632;
-                    const V v634 = v608 * v460;
-                    const V v635 = v615 * v512;
-                    const V v636 = v634 - v635;
-                    const V v637 = v608 * v461;
-                    const V v638 = v615 * v541;
-                    const V v639 = v637 - v638;
-                    const V v640 = v608 * v462;
-                    const V v641 = v615 * v558;
-                    const V v642 = v640 - v641;
-                    const V v643 = v608 * v463;
-                    const V v644 = v615 * v606;
-                    const V v645 = v643 - v644;
-                    const V v646 = v608 * v464;
-                    const V v647 = v615 * v607;
-                    const V v648 = v646 - v647;
-                    v578 = softehl_blend(m595, v610, v578);
-                    v579 = softehl_blend(m595, v628, v579);
-                    v580 = softehl_blend(m595, v629, v580);
-                    v581 = softehl_blend(m595, v630, v581);
-                    v582 = softehl_blend(m595, v645, v582);
-                    v583 = softehl_blend(m595, v633, v583);
-                    v584 = softehl_blend(m595, v636, v584);
-                    v585 = softehl_blend(m595, v639, v585);
-                    v586 = softehl_blend(m595, v648, v586);
-                    v587 = softehl_blend(m595, v642, v587);
-                    v588 = softehl_blend(m595, v623, v588);
-                    v589 = softehl_blend(m595, v625, v589);
-                    v590 = softehl_blend(m595, v627, v590);
-                    v591 = softehl_blend(m595, v611, v591);
-                    v592 = softehl_blend(m595, v617, v592);
-                    v593 = softehl_blend(m595, v619, v593);
-                    v594 = softehl_blend(m595, v622, v594);
+            const V v281 = a1 * v233, v282 = a1 * v243, v283 = 1.0 - v34 * v34, v284 = v281 * v281,
+                v285 = 1.0 - v31 * v31, v286 = v34 * v31, v287 = d13 + d9 * a0,
+                v288 = d14 + d10 * a0, v289 = d15 + d11 * a0;
+            const M v290 = softehl_eq(v284, v284);
+            const V v291 = a0 - v34 * v36, v292 = v31 * v36, v293 = v35 * v36,
+                v294 = a0 - v35 * v37, v295 = v34 * v35, v296 = v31 * v35, v297 = 1.0 - v35 * v35,
+                v298 = v287 * v34 + v288 * v31 + v289 * v35, v299 = v35 * v32,
+                v300 = a0 - v31 * v32, v301 = v289 - v35 * v298, v302 = v287 - v34 * v298,
+                v303 = v288 - v31 * v298, v304 = 2.0 * v302, v305 = 2.0 * v303, v306 = 2.0 * v301,
+                v307 = v289 * v43 - v287 * v42 - v288 * v26,
+                v308 = v302 * v302 + v303 * v303 + v301 * v301;
+            const M v309 = softehl_eq(v308, v308);
+            const V v310 = v298 * v42 - v34 * v307, v311 = v298 * v26 - v31 * v307,
+                v312 = v298 * v43 + v35 * v307, v313 = v306 * v297, v314 = v306 * v294;
+            const M v315 = v290 & v309;
+            const V v316 = v306 * v312, v317 = v304 * v283 - v305 * v286,
+                v318 = v305 * v285 - v304 * v286, v319 = v304 * v291 - v305 * v292,
+                v320 = v305 * v300 - v304 * v292, v321 = v304 * v310 + v305 * v311,
+                v322 = v306 * v295, v323 = v306 * v296, v324 = v304 * v295 + v305 * v296,
+                v325 = v306 * v293, v326 = v306 * v299, v327 = v304 * v293 + v305 * v299,
+                v328 = a1 * v234, v329 = a1 * v235, v330 = a1 * v236, v331 = a1 * v238,
+                v332 = a1 * v239, v333 = a1 * v240, v334 = a1 * v242, v335 = a1 * v237,
+                v336 = a1 * v241, v337 = v287 * v54 - v288 * v33 - v289 * v55,
+                v338 = v288 * v27 - v287 * v59 - v289 * v58, v339 = v298 * v54 + v34 * v337,
+                v340 = v298 * v59 - v34 * v338, v341 = v298 * v33 - v31 * v337,
+                v342 = v298 * v27 + v31 * v338, v343 = v298 * v58 - v35 * v338,
+                v344 = v298 * v55 - v35 * v337, v345 = v288 * v28 - v287 * v47 - v289 * v46,
+                v346 = v298 * v46 - v35 * v345, v347 = v305 * v341 - v304 * v339 + v306 * v344,
+                v348 = v304 * v340 - v305 * v342 + v306 * v343, v349 = v298 * v47 - v34 * v345,
+                v350 = v298 * v28 + v31 * v345, v351 = v289 * v61 - v287 * v60 - v288 * v30,
+                v352 = v287 * v50 - v289 * v51 - v288 * v29, v353 = v298 * v30 - v31 * v351,
+                v354 = v298 * v29 - v31 * v352, v355 = v304 * v349 + (v306 * v346 - v305 * v350),
+                v356 = v298 * v60 - v34 * v351, v357 = v298 * v50 + v34 * v352,
+                v358 = v298 * v61 + v35 * v351, v359 = v298 * v51 - v35 * v352, v360 = v306 * v358,
+                v361 = v304 * v356 + v305 * v353, v362 = v306 * v359 - v304 * v357 + v305 * v354;
+            V v363 = softehl_splat(0.0), v364 = softehl_splat(0.0), v365 = softehl_splat(0.0),
+                v366 = softehl_splat(0.0), v367 = softehl_splat(0.0), v368 = softehl_splat(0.0),
+                v369 = softehl_splat(0.0), v370 = softehl_splat(0.0), v371 = softehl_splat(0.0),
+                v372 = softehl_splat(0.0), v373 = softehl_splat(0.0), v374 = softehl_splat(0.0),
+                v375 = softehl_splat(0.0), v376 = softehl_splat(0.0), v377 = softehl_splat(0.0),
+                v378 = softehl_splat(0.0), v379 = softehl_splat(0.0);
+            const M m380 = v315 & m228;
+            if (softehl_any(m380)) {
+                const M v381 = softehl_lt(v284, v308);
+                V v382 = softehl_splat(0.0), v383 = softehl_splat(0.0), v384 = softehl_splat(0.0),
+                    v385 = softehl_splat(0.0), v386 = softehl_splat(0.0), v387 = softehl_splat(0.0),
+                    v388 = softehl_splat(0.0), v389 = softehl_splat(0.0), v390 = softehl_splat(0.0),
+                    v391 = softehl_splat(0.0), v392 = softehl_splat(0.0), v393 = softehl_splat(0.0),
+                    v394 = softehl_splat(0.0), v395 = softehl_splat(0.0), v396 = softehl_splat(0.0),
+                    v397 = softehl_splat(0.0), v398 = softehl_splat(0.0);
+                const M m399 = v381 & m380;
+                if (softehl_any(m399)) {
+                    const V v400 = softehl_vsqrt(1.0 / v308), v401 = v400 * v281,
+                        v402 = v400 * v282, v403 = v400 * (v400 * (0.5 * v400)), v404 = v281 * v403,
+                        v405 = -(v403 * (v281 * (v317 - v322))),
+                        v406 = -(v403 * (v281 * (v318 - v323))),
+                        v407 = -(v403 * (v281 * (v313 - v324))),
+                        v408 = -(v403 * (v281 * (v319 - v325))), v409 = -(v404 * (v320 - v326)),
+                        v410 = -(v404 * (v314 - v327)), v411 = v400 * v328, v412 = v400 * v329,
+                        v413 = v400 * v330, v414 = v400 * v331 - v404 * v347,
+                        v415 = v400 * v332 - v404 * v348, v416 = v400 * v333 - v404 * v355,
+                        v417 = v400 * v334 - v404 * v362, v418 = v400 * v335 - v404 * (v321 - v316),
+                        v419 = v400 * v336 - v404 * (v361 - v360);
+                    v382 = softehl_blend(m399, v401, v382); v383 = softehl_blend(m399, v411, v383);
+                    v384 = softehl_blend(m399, v412, v384); v385 = softehl_blend(m399, v413, v385);
+                    v386 = softehl_blend(m399, v418, v386); v387 = softehl_blend(m399, v414, v387);
+                    v388 = softehl_blend(m399, v415, v388); v389 = softehl_blend(m399, v416, v389);
+                    v390 = softehl_blend(m399, v419, v390); v391 = softehl_blend(m399, v417, v391);
+                    v392 = softehl_blend(m399, v408, v392); v393 = softehl_blend(m399, v409, v393);
+                    v394 = softehl_blend(m399, v410, v394); v395 = softehl_blend(m399, v402, v395);
+                    v396 = softehl_blend(m399, v405, v396); v397 = softehl_blend(m399, v406, v397);
+                    v398 = softehl_blend(m399, v407, v398);
                 }
-                const M m649 = ~v577 & m576;
-                if (softehl_any(m649)) {
-                    const M v650 = softehl_lt(softehl_splat(0.0), a1);
-                    const V v651 = softehl_blend(v650, softehl_splat(1.0), softehl_splat(0.0));
-                    v578 = softehl_blend(m649, v651, v578);
-                    v579 = softehl_blend(m649, softehl_splat(0.0), v579);
-                    v580 = softehl_blend(m649, softehl_splat(0.0), v580);
-                    v581 = softehl_blend(m649, softehl_splat(0.0), v581);
-                    v582 = softehl_blend(m649, softehl_splat(0.0), v582);
-                    v583 = softehl_blend(m649, softehl_splat(0.0), v583);
-                    v584 = softehl_blend(m649, softehl_splat(0.0), v584);
-                    v585 = softehl_blend(m649, softehl_splat(0.0), v585);
-                    v586 = softehl_blend(m649, softehl_splat(0.0), v586);
-                    v587 = softehl_blend(m649, softehl_splat(0.0), v587);
-                    v588 = softehl_blend(m649, softehl_splat(0.0), v588);
-                    v589 = softehl_blend(m649, softehl_splat(0.0), v589);
-                    v590 = softehl_blend(m649, softehl_splat(0.0), v590);
-                    v591 = softehl_blend(m649, softehl_splat(0.0), v591);
-                    v592 = softehl_blend(m649, softehl_splat(0.0), v592);
-                    v593 = softehl_blend(m649, softehl_splat(0.0), v593);
-                    v594 = softehl_blend(m649, softehl_splat(0.0), v594);
+                const M m420 = ~v381 & m380;
+                if (softehl_any(m420)) {
+                    const M v421 = softehl_lt(softehl_splat(0.0), a1);
+                    const V v422 = softehl_blend(v421, softehl_splat(1.0), softehl_splat(0.0));
+                    v382 = softehl_blend(m420, v422, v382);
+                    v383 = softehl_blend(m420, softehl_splat(0.0), v383);
+                    v384 = softehl_blend(m420, softehl_splat(0.0), v384);
+                    v385 = softehl_blend(m420, softehl_splat(0.0), v385);
+                    v386 = softehl_blend(m420, softehl_splat(0.0), v386);
+                    v387 = softehl_blend(m420, softehl_splat(0.0), v387);
+                    v388 = softehl_blend(m420, softehl_splat(0.0), v388);
+                    v389 = softehl_blend(m420, softehl_splat(0.0), v389);
+                    v390 = softehl_blend(m420, softehl_splat(0.0), v390);
+                    v391 = softehl_blend(m420, softehl_splat(0.0), v391);
+                    v392 = softehl_blend(m420, softehl_splat(0.0), v392);
+                    v393 = softehl_blend(m420, softehl_splat(0.0), v393);
+                    v394 = softehl_blend(m420, softehl_splat(0.0), v394);
+                    v395 = softehl_blend(m420, softehl_splat(0.0), v395);
+                    v396 = softehl_blend(m420, softehl_splat(0.0), v396);
+                    v397 = softehl_blend(m420, softehl_splat(0.0), v397);
+                    v398 = softehl_blend(m420, softehl_splat(0.0), v398);
                 }
-                v559 = softehl_blend(m576, v578, v559);
-                v560 = softehl_blend(m576, v579, v560);
-                v561 = softehl_blend(m576, v580, v561);
-                v562 = softehl_blend(m576, v581, v562);
-                v563 = softehl_blend(m576, v582, v563);
-                v564 = softehl_blend(m576, v583, v564);
-                v565 = softehl_blend(m576, v584, v565);
-                v566 = softehl_blend(m576, v585, v566);
-                v567 = softehl_blend(m576, v586, v567);
-                v568 = softehl_blend(m576, v587, v568);
-                v569 = softehl_blend(m576, v588, v569);
-                v570 = softehl_blend(m576, v589, v570);
-                v571 = softehl_blend(m576, v590, v571);
-                v572 = softehl_blend(m576, v591, v572);
-                v573 = softehl_blend(m576, v592, v573);
-                v574 = softehl_blend(m576, v593, v574);
-                v575 = softehl_blend(m576, v594, v575);
+                v363 = softehl_blend(m380, v382, v363); v364 = softehl_blend(m380, v383, v364);
+                v365 = softehl_blend(m380, v384, v365); v366 = softehl_blend(m380, v385, v366);
+                v367 = softehl_blend(m380, v386, v367); v368 = softehl_blend(m380, v387, v368);
+                v369 = softehl_blend(m380, v388, v369); v370 = softehl_blend(m380, v389, v370);
+                v371 = softehl_blend(m380, v390, v371); v372 = softehl_blend(m380, v391, v372);
+                v373 = softehl_blend(m380, v392, v373); v374 = softehl_blend(m380, v393, v374);
+                v375 = softehl_blend(m380, v394, v375); v376 = softehl_blend(m380, v395, v376);
+                v377 = softehl_blend(m380, v396, v377); v378 = softehl_blend(m380, v397, v378);
+                v379 = softehl_blend(m380, v398, v379);
             }
-            const M m652 = ~v433 & m303;
-            if (softehl_any(m652)) {
-                const V v653 = 2.0 * v365;
-                const V v654 = v369 - v419;
-                const V v655 = v446 - v437;
-                const V v656 = v448 - v439;
-                const V v657 = v450 - v427;
-                const V v658 = v451 - v441;
-                const V v659 = v654 * v654;
-                const V v660 = v453 - v443;
-                const V v661 = v654 * v659;
-                const V v662 = 3.0 * v659;
-                const V v663 = v653 * v459;
-                const V v664 = v434 - v445;
-                const V v665 = v550 - v556;
-                const V v666 = v455 - v428;
-                const V v667 = v653 * v460;
-                const V v668 = v663 - v510;
-                const V v669 = v655 * v662;
-                const V v670 = v656 * v662;
-                const V v671 = v657 * v662;
-                const V v672 = v658 * v662;
-                const V v673 = v662 * v660;
-                const V v674 = v662 * v666;
-                const V v675 = v667 - v512;
-                const V v676 = v662 * v668;
-                const V v677 = v653 * v463;
-                const V v678 = v664 + v677;
-                const V v679 = v653 * v464;
-                const V v680 = v665 + v679;
-                const V v681 = v662 * v653;
-                const V v682 = v662 * v675;
-                const V v683 = v662 * v678;
-                const V v684 = v653 * v461;
-                const V v685 = v653 * v462;
-                const V v686 = v662 * v680;
-                const V v687 = v366 * v681;
-                const V v688 = v681 * v456;
-                const V v689 = v681 * v457;
-                const V v690 = v681 * v458;
-                const V v691 = v684 - v541;
-                const V v692 = v685 - v558;
-                const V v693 = v662 * v691;
-                const V v694 = v662 * v692;
-                v559 = softehl_blend(m652, v661, v559);
-                v560 = softehl_blend(m652, v688, v560);
-                v561 = softehl_blend(m652, v689, v561);
-                v562 = softehl_blend(m652, v690, v562);
-                v563 = softehl_blend(m652, v683, v563);
-                v564 = softehl_blend(m652, v676, v564);
-                v565 = softehl_blend(m652, v682, v565);
-                v566 = softehl_blend(m652, v693, v566);
-                v567 = softehl_blend(m652, v686, v567);
-                v568 = softehl_blend(m652, v694, v568);
-                v569 = softehl_blend(m652, v672, v569);
-                v570 = softehl_blend(m652, v673, v570);
-                v571 = softehl_blend(m652, v674, v571);
-                v572 = softehl_blend(m652, v687, v572);
-                v573 = softehl_blend(m652, v669, v573);
-                v574 = softehl_blend(m652, v670, v574);
-                v575 = softehl_blend(m652, v671, v575);
+            const M m423 = ~v315 & m228;
+            if (softehl_any(m423)) {
+                const V v424 = 2.0 * v281, v425 = v284 - v308, v426 = v425 * v425,
+                    v427 = v425 * v426, v428 = 3.0 * v426, v429 = (v322 - v317) * v428,
+                    v430 = (v323 - v318) * v428, v431 = (v324 - v313) * v428,
+                    v432 = (v325 - v319) * v428, v433 = v428 * (v326 - v320),
+                    v434 = v428 * (v327 - v314), v435 = v428 * (v424 * v331 - v347),
+                    v436 = v428 * v424, v437 = v428 * (v424 * v332 - v348),
+                    v438 = v428 * (v316 - v321 + v424 * v335),
+                    v439 = v428 * (v360 - v361 + v424 * v336), v440 = v282 * v436,
+                    v441 = v436 * v328, v442 = v436 * v329, v443 = v436 * v330,
+                    v444 = v428 * (v424 * v333 - v355), v445 = v428 * (v424 * v334 - v362);
+                v363 = softehl_blend(m423, v427, v363); v364 = softehl_blend(m423, v441, v364);
+                v365 = softehl_blend(m423, v442, v365); v366 = softehl_blend(m423, v443, v366);
+                v367 = softehl_blend(m423, v438, v367); v368 = softehl_blend(m423, v435, v368);
+                v369 = softehl_blend(m423, v437, v369); v370 = softehl_blend(m423, v444, v370);
+                v371 = softehl_blend(m423, v439, v371); v372 = softehl_blend(m423, v445, v372);
+                v373 = softehl_blend(m423, v432, v373); v374 = softehl_blend(m423, v433, v374);
+                v375 = softehl_blend(m423, v434, v375); v376 = softehl_blend(m423, v440, v376);
+                v377 = softehl_blend(m423, v429, v377); v378 = softehl_blend(m423, v430, v378);
+                v379 = softehl_blend(m423, v431, v379);
             }
-            const V v695 = v559 * v372;
-            const V v696 = v559 * v387;
-            const V v697 = v559 * v390;
-            const V v698 = v559 * v383;
-            const V v699 = v559 * v384;
-            const V v700 = v559 * v395;
-            const V v701 = v559 * v368;
-            const V v702 = v559 * v382;
-            const V v703 = v559 * v371;
-            const V v704 = v559 * v397;
-            const V v705 = v559 * v392;
-            const V v706 = v559 * v386;
-            const V v707 = v559 * v489;
-            const V v708 = v559 * v514;
-            const V v709 = v559 * v491;
-            const V v710 = v559 * v539;
-            const V v711 = v559 * v497;
-            const V v712 = v559 * v495;
-            const V v713 = v559 * v504;
-            const V v714 = v559 * v549;
-            const V v715 = v559 * v422;
-            const V v716 = v559 * v543;
-            const V v717 = v559 * v424;
-            const V v718 = v559 * v537;
-            const V v719 = v403 * v559;
-            const V v720 = v405 * v559;
-            const V v721 = v399 * v559;
-            const V v722 = v403 * v572;
-            const V v723 = v405 * v572;
-            const V v724 = v399 * v572;
-            const V v725 = v399 * v566;
-            const V v726 = v713 + v725;
-            const V v727 = v405 * v566;
-            const V v728 = v403 * v566;
-            const V v729 = v708 + v728;
-            const V v730 = v403 * v567;
-            const V v731 = v716 + v730;
-            const V v732 = v405 * v567;
-            const V v733 = v718 + v732;
-            const V v734 = v399 * v567;
-            const V v735 = v559 * v516;
-            const V v736 = v727 - v735;
-            const V v737 = v403 * v574;
-            const V v738 = v399 * v574;
-            const V v739 = v405 * v574;
-            const V v740 = v703 + v739;
-            const V v741 = v559 * v547;
-            const V v742 = v734 - v741;
-            const V v743 = v403 * v575;
-            const V v744 = v405 * v575;
-            const V v745 = v399 * v575;
-            const V v746 = v705 + v745;
-            const V v747 = v737 - v695;
-            const V v748 = v738 - v697;
-            const V v749 = v744 - v697;
-            const V v750 = v1 * v740;
-            const V v751 = v1 * v746;
-            const V v752 = v1 * v747;
-            const V v753 = v1 * v748;
-            const V v754 = v1 * v749;
-            const V v755 = v743 - v696;
-            const V v756 = v1 * v755;
-            const V v757 = v403 * v560;
-            const V v758 = v405 * v560;
-            const V v759 = v399 * v560;
-            const V v760 = v403 * v561;
-            const V v761 = v405 * v561;
-            const V v762 = v399 * v561;
-            const V v763 = v403 * v562;
-            const V v764 = v405 * v562;
-            const V v765 = v399 * v562;
-            const V v766 = v405 * v573;
-            const V v767 = v399 * v573;
-            const V v768 = v403 * v573;
-            const V v769 = v701 + v768;
-            const V v770 = v766 - v695;
-            const V v771 = v767 - v696;
-            const V v772 = v405 * v569;
-            const V v773 = v399 * v569;
-            const V v774 = v403 * v569;
-            const V v775 = v702 + v774;
-            const V v776 = v1 * v769;
-            const V v777 = v1 * v770;
-            const V v778 = v1 * v771;
-            const V v779 = v1 * v775;
-            const V v780 = v772 - v698;
-            const V v781 = v773 - v699;
-            const V v782 = v1 * v780;
-            const V v783 = v1 * v781;
-            const V v784 = v403 * v570;
-            const V v785 = v784 - v698;
-            const V v786 = v399 * v570;
-            const V v787 = v405 * v570;
-            const V v788 = v704 + v787;
-            const V v789 = v1 * v785;
-            const V v790 = v1 * v788;
-            const V v791 = v786 - v700;
-            const V v792 = v1 * v791;
-            const V v793 = v403 * v571;
-            const V v794 = v793 - v699;
-            const V v795 = v405 * v571;
-            const V v796 = v399 * v571;
-            const V v797 = v706 + v796;
-            const V v798 = v795 - v700;
-            const V v799 = v1 * v794;
-            const V v800 = v1 * v797;
-            const V v801 = v1 * v798;
-            const V v802 = v403 * v564;
-            const V v803 = v405 * v564;
-            const V v804 = v709 + v803;
-            const V v805 = v399 * v564;
-            const V v806 = v711 + v805;
-            const V v807 = v403 * v568;
-            const V v808 = v405 * v568;
-            const V v809 = v710 + v808;
-            const V v810 = v399 * v568;
-            const V v811 = v714 + v810;
-            const V v812 = v559 * v487;
-            const V v813 = v802 - v812;
-            const V v814 = v559 * v545;
-            const V v815 = v807 - v814;
-            const V v816 = v405 * v565;
-            const V v817 = v403 * v565;
-            const V v818 = v707 + v817;
-            const V v819 = v399 * v565;
-            const V v820 = v712 + v819;
-            const V v821 = v399 * v563;
-            const V v822 = v403 * v563;
-            const V v823 = v715 + v822;
-            const V v824 = v405 * v563;
-            const V v825 = v717 + v824;
-            const V v826 = v559 * v493;
-            const V v827 = v816 - v826;
-            const V v828 = v559 * v426;
-            const V v829 = v821 - v828;
-            v223 = softehl_blend(m303, v719, v223);
-            v224 = softehl_blend(m303, v308, v224);
-            v225 = softehl_blend(m303, v720, v225);
-            v226 = softehl_blend(m303, v721, v226);
-            v227 = softehl_blend(m303, v757, v227);
-            v228 = softehl_blend(m303, v309, v228);
-            v229 = softehl_blend(m303, v760, v229);
-            v230 = softehl_blend(m303, v310, v230);
-            v231 = softehl_blend(m303, v763, v231);
-            v232 = softehl_blend(m303, v311, v232);
-            v233 = softehl_blend(m303, v823, v233);
-            v234 = softehl_blend(m303, v312, v234);
-            v235 = softehl_blend(m303, v813, v235);
-            v236 = softehl_blend(m303, v313, v236);
-            v237 = softehl_blend(m303, v818, v237);
-            v238 = softehl_blend(m303, v314, v238);
-            v239 = softehl_blend(m303, v729, v239);
-            v240 = softehl_blend(m303, v315, v240);
-            v241 = softehl_blend(m303, v731, v241);
-            v242 = softehl_blend(m303, v316, v242);
-            v243 = softehl_blend(m303, v815, v243);
-            v244 = softehl_blend(m303, v317, v244);
-            v245 = softehl_blend(m303, v775, v245);
-            v246 = softehl_blend(m303, v785, v246);
-            v247 = softehl_blend(m303, v794, v247);
-            v248 = softehl_blend(m303, v722, v248);
-            v249 = softehl_blend(m303, v318, v249);
-            v250 = softehl_blend(m303, v769, v250);
-            v251 = softehl_blend(m303, v747, v251);
-            v252 = softehl_blend(m303, v755, v252);
-            v253 = softehl_blend(m303, v758, v253);
-            v254 = softehl_blend(m303, v761, v254);
-            v255 = softehl_blend(m303, v764, v255);
-            v256 = softehl_blend(m303, v825, v256);
-            v257 = softehl_blend(m303, v804, v257);
-            v258 = softehl_blend(m303, v827, v258);
-            v259 = softehl_blend(m303, v736, v259);
-            v260 = softehl_blend(m303, v733, v260);
-            v261 = softehl_blend(m303, v809, v261);
-            v262 = softehl_blend(m303, v780, v262);
-            v263 = softehl_blend(m303, v788, v263);
-            v264 = softehl_blend(m303, v798, v264);
-            v265 = softehl_blend(m303, v723, v265);
-            v266 = softehl_blend(m303, v770, v266);
-            v267 = softehl_blend(m303, v740, v267);
-            v268 = softehl_blend(m303, v749, v268);
-            v269 = softehl_blend(m303, v759, v269);
-            v270 = softehl_blend(m303, v762, v270);
-            v271 = softehl_blend(m303, v765, v271);
-            v272 = softehl_blend(m303, v829, v272);
-            v273 = softehl_blend(m303, v806, v273);
-            v274 = softehl_blend(m303, v820, v274);
-            v275 = softehl_blend(m303, v726, v275);
-            v276 = softehl_blend(m303, v742, v276);
-            v277 = softehl_blend(m303, v811, v277);
-            v278 = softehl_blend(m303, v781, v278);
-            v279 = softehl_blend(m303, v791, v279);
-            v280 = softehl_blend(m303, v797, v280);
-            v281 = softehl_blend(m303, v724, v281);
-            v282 = softehl_blend(m303, v771, v282);
-            v283 = softehl_blend(m303, v748, v283);
-            v284 = softehl_blend(m303, v746, v284);
-            v285 = softehl_blend(m303, v779, v285);
-            v286 = softehl_blend(m303, v789, v286);
-            v287 = softehl_blend(m303, v799, v287);
-            v288 = softehl_blend(m303, v776, v288);
-            v289 = softehl_blend(m303, v752, v289);
-            v290 = softehl_blend(m303, v756, v290);
-            v291 = softehl_blend(m303, v782, v291);
-            v292 = softehl_blend(m303, v790, v292);
-            v293 = softehl_blend(m303, v801, v293);
-            v294 = softehl_blend(m303, v777, v294);
-            v295 = softehl_blend(m303, v750, v295);
-            v296 = softehl_blend(m303, v754, v296);
-            v297 = softehl_blend(m303, v783, v297);
-            v298 = softehl_blend(m303, v792, v298);
-            v299 = softehl_blend(m303, v800, v299);
-            v300 = softehl_blend(m303, v778, v300);
-            v301 = softehl_blend(m303, v753, v301);
-            v302 = softehl_blend(m303, v751, v302);
+            const V v446 = v363 * v286, v447 = v363 * v295, v448 = v363 * v296, v449 = v363 * v292,
+                v450 = v363 * v293, v451 = v363 * v299, v452 = v302 * v363, v453 = v303 * v363,
+                v454 = v301 * v363, v455 = v302 * v376, v456 = v303 * v376, v457 = v301 * v376,
+                v458 = v363 * v346 + v301 * v370, v459 = v363 * v349 + v302 * v370,
+                v460 = v363 * v356 + v302 * v371, v461 = v363 * v353 + v303 * v371,
+                v462 = v303 * v370 - v363 * v350, v463 = v363 * v285 + v303 * v378,
+                v464 = v301 * v371 - v363 * v358, v465 = v363 * v297 + v301 * v379,
+                v466 = v302 * v378 - v446, v467 = v301 * v378 - v448, v468 = v303 * v379 - v448,
+                v469 = v1 * v463, v470 = v1 * v465, v471 = v1 * v466, v472 = v1 * v467,
+                v473 = v1 * v468, v474 = v302 * v379 - v447, v475 = v1 * v474, v476 = v302 * v364,
+                v477 = v303 * v364, v478 = v301 * v364, v479 = v302 * v365, v480 = v303 * v365,
+                v481 = v301 * v365, v482 = v302 * v366, v483 = v303 * v366, v484 = v301 * v366,
+                v485 = v363 * v283 + v302 * v377, v486 = v303 * v377 - v446,
+                v487 = v301 * v377 - v447, v488 = v363 * v291 + v302 * v373, v489 = v1 * v485,
+                v490 = v1 * v486, v491 = v1 * v487, v492 = v1 * v488, v493 = v303 * v373 - v449,
+                v494 = v301 * v373 - v450, v495 = v1 * v493, v496 = v1 * v494,
+                v497 = v302 * v374 - v449, v498 = v363 * v300 + v303 * v374, v499 = v1 * v497,
+                v500 = v1 * v498, v501 = v301 * v374 - v451, v502 = v1 * v501,
+                v503 = v302 * v375 - v450, v504 = v363 * v294 + v301 * v375,
+                v505 = v303 * v375 - v451, v506 = v1 * v503, v507 = v1 * v504, v508 = v1 * v505,
+                v509 = v363 * v341 + v303 * v368, v510 = v363 * v344 + v301 * v368,
+                v511 = v363 * v354 + v303 * v372, v512 = v363 * v359 + v301 * v372,
+                v513 = v302 * v368 - v363 * v339, v514 = v302 * v372 - v363 * v357,
+                v515 = v363 * v340 + v302 * v369, v516 = v363 * v343 + v301 * v369,
+                v517 = v363 * v310 + v302 * v367, v518 = v363 * v311 + v303 * v367,
+                v519 = v303 * v369 - v363 * v342, v520 = v301 * v367 - v363 * v312;
+            v148 = softehl_blend(m228, v452, v148); v149 = softehl_blend(m228, v233, v149);
+            v150 = softehl_blend(m228, v453, v150); v151 = softehl_blend(m228, v454, v151);
+            v152 = softehl_blend(m228, v476, v152); v153 = softehl_blend(m228, v234, v153);
+            v154 = softehl_blend(m228, v479, v154); v155 = softehl_blend(m228, v235, v155);
+            v156 = softehl_blend(m228, v482, v156); v157 = softehl_blend(m228, v236, v157);
+            v158 = softehl_blend(m228, v517, v158); v159 = softehl_blend(m228, v237, v159);
+            v160 = softehl_blend(m228, v513, v160); v161 = softehl_blend(m228, v238, v161);
+            v162 = softehl_blend(m228, v515, v162); v163 = softehl_blend(m228, v239, v163);
+            v164 = softehl_blend(m228, v459, v164); v165 = softehl_blend(m228, v240, v165);
+            v166 = softehl_blend(m228, v460, v166); v167 = softehl_blend(m228, v241, v167);
+            v168 = softehl_blend(m228, v514, v168); v169 = softehl_blend(m228, v242, v169);
+            v170 = softehl_blend(m228, v488, v170); v171 = softehl_blend(m228, v497, v171);
+            v172 = softehl_blend(m228, v503, v172); v173 = softehl_blend(m228, v455, v173);
+            v174 = softehl_blend(m228, v243, v174); v175 = softehl_blend(m228, v485, v175);
+            v176 = softehl_blend(m228, v466, v176); v177 = softehl_blend(m228, v474, v177);
+            v178 = softehl_blend(m228, v477, v178); v179 = softehl_blend(m228, v480, v179);
+            v180 = softehl_blend(m228, v483, v180); v181 = softehl_blend(m228, v518, v181);
+            v182 = softehl_blend(m228, v509, v182); v183 = softehl_blend(m228, v519, v183);
+            v184 = softehl_blend(m228, v462, v184); v185 = softehl_blend(m228, v461, v185);
+            v186 = softehl_blend(m228, v511, v186); v187 = softehl_blend(m228, v493, v187);
+            v188 = softehl_blend(m228, v498, v188); v189 = softehl_blend(m228, v505, v189);
+            v190 = softehl_blend(m228, v456, v190); v191 = softehl_blend(m228, v486, v191);
+            v192 = softehl_blend(m228, v463, v192); v193 = softehl_blend(m228, v468, v193);
+            v194 = softehl_blend(m228, v478, v194); v195 = softehl_blend(m228, v481, v195);
+            v196 = softehl_blend(m228, v484, v196); v197 = softehl_blend(m228, v520, v197);
+            v198 = softehl_blend(m228, v510, v198); v199 = softehl_blend(m228, v516, v199);
+            v200 = softehl_blend(m228, v458, v200); v201 = softehl_blend(m228, v464, v201);
+            v202 = softehl_blend(m228, v512, v202); v203 = softehl_blend(m228, v494, v203);
+            v204 = softehl_blend(m228, v501, v204); v205 = softehl_blend(m228, v504, v205);
+            v206 = softehl_blend(m228, v457, v206); v207 = softehl_blend(m228, v487, v207);
+            v208 = softehl_blend(m228, v467, v208); v209 = softehl_blend(m228, v465, v209);
+            v210 = softehl_blend(m228, v492, v210); v211 = softehl_blend(m228, v499, v211);
+            v212 = softehl_blend(m228, v506, v212); v213 = softehl_blend(m228, v489, v213);
+            v214 = softehl_blend(m228, v471, v214); v215 = softehl_blend(m228, v475, v215);
+            v216 = softehl_blend(m228, v495, v216); v217 = softehl_blend(m228, v500, v217);
+            v218 = softehl_blend(m228, v508, v218); v219 = softehl_blend(m228, v490, v219);
+            v220 = softehl_blend(m228, v469, v220); v221 = softehl_blend(m228, v473, v221);
+            v222 = softehl_blend(m228, v496, v222); v223 = softehl_blend(m228, v502, v223);
+            v224 = softehl_blend(m228, v507, v224); v225 = softehl_blend(m228, v491, v225);
+            v226 = softehl_blend(m228, v472, v226); v227 = softehl_blend(m228, v470, v227);
         }
-        v141 = softehl_blend(m221, v223, v141);
-        v142 = softehl_blend(m221, v224, v142);
-        v143 = softehl_blend(m221, v225, v143);
-        v144 = softehl_blend(m221, v226, v144);
-        v145 = softehl_blend(m221, v227, v145);
-        v146 = softehl_blend(m221, v228, v146);
-        v147 = softehl_blend(m221, v229, v147);
-        v148 = softehl_blend(m221, v230, v148);
-        v149 = softehl_blend(m221, v231, v149);
-        v150 = softehl_blend(m221, v232, v150);
-        v151 = softehl_blend(m221, v233, v151);
-        v152 = softehl_blend(m221, v234, v152);
-        v153 = softehl_blend(m221, v235, v153);
-        v154 = softehl_blend(m221, v236, v154);
-        v155 = softehl_blend(m221, v237, v155);
-        v156 = softehl_blend(m221, v238, v156);
-        v157 = softehl_blend(m221, v239, v157);
-        v158 = softehl_blend(m221, v240, v158);
-        v159 = softehl_blend(m221, v241, v159);
-        v160 = softehl_blend(m221, v242, v160);
-        v161 = softehl_blend(m221, v243, v161);
-        v162 = softehl_blend(m221, v244, v162);
-        v163 = softehl_blend(m221, v245, v163);
-        v164 = softehl_blend(m221, v246, v164);
-        v165 = softehl_blend(m221, v247, v165);
-        v166 = softehl_blend(m221, v248, v166);
-        v167 = softehl_blend(m221, v249, v167);
-        v168 = softehl_blend(m221, v250, v168);
-        v169 = softehl_blend(m221, v251, v169);
-        v170 = softehl_blend(m221, v252, v170);
-        v171 = softehl_blend(m221, v253, v171);
-        v172 = softehl_blend(m221, v254, v172);
-        v173 = softehl_blend(m221, v255, v173);
-        v174 = softehl_blend(m221, v256, v174);
-        v175 = softehl_blend(m221, v257, v175);
-        v176 = softehl_blend(m221, v258, v176);
-        v177 = softehl_blend(m221, v259, v177);
-        v178 = softehl_blend(m221, v260, v178);
-        v179 = softehl_blend(m221, v261, v179);
-        v180 = softehl_blend(m221, v262, v180);
-        v181 = softehl_blend(m221, v263, v181);
-        v182 = softehl_blend(m221, v264, v182);
-        v183 = softehl_blend(m221, v265, v183);
-        v184 = softehl_blend(m221, v266, v184);
-        v185 = softehl_blend(m221, v267, v185);
-        v186 = softehl_blend(m221, v268, v186);
-        v187 = softehl_blend(m221, v269, v187);
-        v188 = softehl_blend(m221, v270, v188);
-        v189 = softehl_blend(m221, v271, v189);
-        v190 = softehl_blend(m221, v272, v190);
-        v191 = softehl_blend(m221, v273, v191);
-        v192 = softehl_blend(m221, v274, v192);
-        v193 = softehl_blend(m221, v275, v193);
-        v194 = softehl_blend(m221, v276, v194);
-        v195 = softehl_blend(m221, v277, v195);
-        v196 = softehl_blend(m221, v278, v196);
-        v197 = softehl_blend(m221, v279, v197);
-        v198 = softehl_blend(m221, v280, v198);
-        v199 = softehl_blend(m221, v281, v199);
-        v200 = softehl_blend(m221, v282, v200);
-        v201 = softehl_blend(m221, v283, v201);
-        v202 = softehl_blend(m221, v284, v202);
-        v203 = softehl_blend(m221, v285, v203);
-        v204 = softehl_blend(m221, v286, v204);
-        v205 = softehl_blend(m221, v287, v205);
-        v206 = softehl_blend(m221, v288, v206);
-        v207 = softehl_blend(m221, v289, v207);
-        v208 = softehl_blend(m221, v290, v208);
-        v209 = softehl_blend(m221, v291, v209);
-        v210 = softehl_blend(m221, v292, v210);
-        v211 = softehl_blend(m221, v293, v211);
-        v212 = softehl_blend(m221, v294, v212);
-        v213 = softehl_blend(m221, v295, v213);
-        v214 = softehl_blend(m221, v296, v214);
-        v215 = softehl_blend(m221, v297, v215);
-        v216 = softehl_blend(m221, v298, v216);
-        v217 = softehl_blend(m221, v299, v217);
-        v218 = softehl_blend(m221, v300, v218);
-        v219 = softehl_blend(m221, v301, v219);
-        v220 = softehl_blend(m221, v302, v220);
+        v66 = softehl_blend(m146, v148, v66); v67 = softehl_blend(m146, v149, v67);
+        v68 = softehl_blend(m146, v150, v68); v69 = softehl_blend(m146, v151, v69);
+        v70 = softehl_blend(m146, v152, v70); v71 = softehl_blend(m146, v153, v71);
+        v72 = softehl_blend(m146, v154, v72); v73 = softehl_blend(m146, v155, v73);
+        v74 = softehl_blend(m146, v156, v74); v75 = softehl_blend(m146, v157, v75);
+        v76 = softehl_blend(m146, v158, v76); v77 = softehl_blend(m146, v159, v77);
+        v78 = softehl_blend(m146, v160, v78); v79 = softehl_blend(m146, v161, v79);
+        v80 = softehl_blend(m146, v162, v80); v81 = softehl_blend(m146, v163, v81);
+        v82 = softehl_blend(m146, v164, v82); v83 = softehl_blend(m146, v165, v83);
+        v84 = softehl_blend(m146, v166, v84); v85 = softehl_blend(m146, v167, v85);
+        v86 = softehl_blend(m146, v168, v86); v87 = softehl_blend(m146, v169, v87);
+        v88 = softehl_blend(m146, v170, v88); v89 = softehl_blend(m146, v171, v89);
+        v90 = softehl_blend(m146, v172, v90); v91 = softehl_blend(m146, v173, v91);
+        v92 = softehl_blend(m146, v174, v92); v93 = softehl_blend(m146, v175, v93);
+        v94 = softehl_blend(m146, v176, v94); v95 = softehl_blend(m146, v177, v95);
+        v96 = softehl_blend(m146, v178, v96); v97 = softehl_blend(m146, v179, v97);
+        v98 = softehl_blend(m146, v180, v98); v99 = softehl_blend(m146, v181, v99);
+        v100 = softehl_blend(m146, v182, v100); v101 = softehl_blend(m146, v183, v101);
+        v102 = softehl_blend(m146, v184, v102); v103 = softehl_blend(m146, v185, v103);
+        v104 = softehl_blend(m146, v186, v104); v105 = softehl_blend(m146, v187, v105);
+        v106 = softehl_blend(m146, v188, v106); v107 = softehl_blend(m146, v189, v107);
+        v108 = softehl_blend(m146, v190, v108); v109 = softehl_blend(m146, v191, v109);
+        v110 = softehl_blend(m146, v192, v110); v111 = softehl_blend(m146, v193, v111);
+        v112 = softehl_blend(m146, v194, v112); v113 = softehl_blend(m146, v195, v113);
+        v114 = softehl_blend(m146, v196, v114); v115 = softehl_blend(m146, v197, v115);
+        v116 = softehl_blend(m146, v198, v116); v117 = softehl_blend(m146, v199, v117);
+        v118 = softehl_blend(m146, v200, v118); v119 = softehl_blend(m146, v201, v119);
+        v120 = softehl_blend(m146, v202, v120); v121 = softehl_blend(m146, v203, v121);
+        v122 = softehl_blend(m146, v204, v122); v123 = softehl_blend(m146, v205, v123);
+        v124 = softehl_blend(m146, v206, v124); v125 = softehl_blend(m146, v207, v125);
+        v126 = softehl_blend(m146, v208, v126); v127 = softehl_blend(m146, v209, v127);
+        v128 = softehl_blend(m146, v210, v128); v129 = softehl_blend(m146, v211, v129);
+        v130 = softehl_blend(m146, v212, v130); v131 = softehl_blend(m146, v213, v131);
+        v132 = softehl_blend(m146, v214, v132); v133 = softehl_blend(m146, v215, v133);
+        v134 = softehl_blend(m146, v216, v134); v135 = softehl_blend(m146, v217, v135);
+        v136 = softehl_blend(m146, v218, v136); v137 = softehl_blend(m146, v219, v137);
+        v138 = softehl_blend(m146, v220, v138); v139 = softehl_blend(m146, v221, v139);
+        v140 = softehl_blend(m146, v222, v140); v141 = softehl_blend(m146, v223, v141);
+        v142 = softehl_blend(m146, v224, v142); v143 = softehl_blend(m146, v225, v143);
+        v144 = softehl_blend(m146, v226, v144); v145 = softehl_blend(m146, v227, v145);
     }
-    const M m830 = ~v86;
-    if (softehl_any(m830)) {
-        const V v831 = v84 - d12;
-        const V v832 = v831 * v831;
-        const V v833 = v831 * v832;
-        const V v834 = 3.0 * v832;
-        const V v835 = v78 * v834;
-        const V v836 = v834 * v74;
-        const V v837 = v834 * v81;
-        const V v838 = -v834;
-        const V v839 = v834 * v122;
-        const V v840 = v834 * v140;
-        const V v841 = v834 * v103;
-        const V v842 = v834 * v112;
-        const V v843 = v834 * v95;
-        const V v844 = v834 * v135;
-        v141 = softehl_blend(m830, v833, v141);
-        v142 = softehl_blend(m830, v833, v142);
-        v143 = softehl_blend(m830, v833, v143);
-        v144 = softehl_blend(m830, v833, v144);
-        v145 = softehl_blend(m830, v835, v145);
-        v146 = softehl_blend(m830, v835, v146);
-        v147 = softehl_blend(m830, v836, v147);
-        v148 = softehl_blend(m830, v836, v148);
-        v149 = softehl_blend(m830, v837, v149);
-        v150 = softehl_blend(m830, v837, v150);
-        v151 = softehl_blend(m830, v843, v151);
-        v152 = softehl_blend(m830, v843, v152);
-        v153 = softehl_blend(m830, v839, v153);
-        v154 = softehl_blend(m830, v839, v154);
-        v155 = softehl_blend(m830, v840, v155);
-        v156 = softehl_blend(m830, v840, v156);
-        v157 = softehl_blend(m830, v841, v157);
-        v158 = softehl_blend(m830, v841, v158);
-        v159 = softehl_blend(m830, v844, v159);
-        v160 = softehl_blend(m830, v844, v160);
-        v161 = softehl_blend(m830, v842, v161);
-        v162 = softehl_blend(m830, v842, v162);
-        v163 = softehl_blend(m830, softehl_splat(0.0), v163);
-        v164 = softehl_blend(m830, softehl_splat(0.0), v164);
-        v165 = softehl_blend(m830, softehl_splat(0.0), v165);
-        v166 = softehl_blend(m830, v838, v166);
-        v167 = softehl_blend(m830, v838, v167);
-        v168 = softehl_blend(m830, softehl_splat(0.0), v168);
-        v169 = softehl_blend(m830, softehl_splat(0.0), v169);
-        v170 = softehl_blend(m830, softehl_splat(0.0), v170);
-        v171 = softehl_blend(m830, v835, v171);
-        v172 = softehl_blend(m830, v836, v172);
-        v173 = softehl_blend(m830, v837, v173);
-        v174 = softehl_blend(m830, v843, v174);
-        v175 = softehl_blend(m830, v839, v175);
-        v176 = softehl_blend(m830, v840, v176);
-        v177 = softehl_blend(m830, v841, v177);
-        v178 = softehl_blend(m830, v844, v178);
-        v179 = softehl_blend(m830, v842, v179);
-        v180 = softehl_blend(m830, softehl_splat(0.0), v180);
-        v181 = softehl_blend(m830, softehl_splat(0.0), v181);
-        v182 = softehl_blend(m830, softehl_splat(0.0), v182);
-        v183 = softehl_blend(m830, v838, v183);
-        v184 = softehl_blend(m830, softehl_splat(0.0), v184);
-        v185 = softehl_blend(m830, softehl_splat(0.0), v185);
-        v186 = softehl_blend(m830, softehl_splat(0.0), v186);
-        v187 = softehl_blend(m830, v835, v187);
-        v188 = softehl_blend(m830, v836, v188);
-        v189 = softehl_blend(m830, v837, v189);
-        v190 = softehl_blend(m830, v843, v190);
-        v191 = softehl_blend(m830, v839, v191);
-        v192 = softehl_blend(m830, v840, v192);
-        v193 = softehl_blend(m830, v841, v193);
-        v194 = softehl_blend(m830, v844, v194);
-        v195 = softehl_blend(m830, v842, v195);
-        v196 = softehl_blend(m830, softehl_splat(0.0), v196);
-        v197 = softehl_blend(m830, softehl_splat(0.0), v197);
-        v198 = softehl_blend(m830, softehl_splat(0.0), v198);
-        v199 = softehl_blend(m830, v838, v199);
-        v200 = softehl_blend(m830, softehl_splat(0.0), v200);
-        v201 = softehl_blend(m830, softehl_splat(0.0), v201);
-        v202 = softehl_blend(m830, softehl_splat(0.0), v202);
-        v203 = softehl_blend(m830, softehl_splat(0.0), v203);
-        v204 = softehl_blend(m830, softehl_splat(0.0), v204);
-        v205 = softehl_blend(m830, softehl_splat(0.0), v205);
-        v206 = softehl_blend(m830, softehl_splat(0.0), v206);
-        v207 = softehl_blend(m830, softehl_splat(0.0), v207);
-        v208 = softehl_blend(m830, softehl_splat(0.0), v208);
-        v209 = softehl_blend(m830, softehl_splat(0.0), v209);
-        v210 = softehl_blend(m830, softehl_splat(0.0), v210);
-        v211 = softehl_blend(m830, softehl_splat(0.0), v211);
-        v212 = softehl_blend(m830, softehl_splat(0.0), v212);
-        v213 = softehl_blend(m830, softehl_splat(0.0), v213);
-        v214 = softehl_blend(m830, softehl_splat(0.0), v214);
-        v215 = softehl_blend(m830, softehl_splat(0.0), v215);
-        v216 = softehl_blend(m830, softehl_splat(0.0), v216);
-        v217 = softehl_blend(m830, softehl_splat(0.0), v217);
-        v218 = softehl_blend(m830, softehl_splat(0.0), v218);
-        v219 = softehl_blend(m830, softehl_splat(0.0), v219);
-        v220 = softehl_blend(m830, softehl_splat(0.0), v220);
+    const M m521 = ~v41;
+    if (softehl_any(m521)) {
+        const V v522 = v39 - d12, v523 = v522 * v522, v524 = v522 * v523, v525 = 3.0 * v523,
+            v526 = v36 * v525, v527 = v525 * v32, v528 = v525 * v37, v529 = -v525,
+            v530 = v525 * v57, v531 = v525 * v65, v532 = v525 * v49, v533 = v525 * v53,
+            v534 = v525 * v45, v535 = v525 * v63;
+        v66 = softehl_blend(m521, v524, v66); v67 = softehl_blend(m521, v524, v67);
+        v68 = softehl_blend(m521, v524, v68); v69 = softehl_blend(m521, v524, v69);
+        v70 = softehl_blend(m521, v526, v70); v71 = softehl_blend(m521, v526, v71);
+        v72 = softehl_blend(m521, v527, v72); v73 = softehl_blend(m521, v527, v73);
+        v74 = softehl_blend(m521, v528, v74); v75 = softehl_blend(m521, v528, v75);
+        v76 = softehl_blend(m521, v534, v76); v77 = softehl_blend(m521, v534, v77);
+        v78 = softehl_blend(m521, v530, v78); v79 = softehl_blend(m521, v530, v79);
+        v80 = softehl_blend(m521, v531, v80); v81 = softehl_blend(m521, v531, v81);
+        v82 = softehl_blend(m521, v532, v82); v83 = softehl_blend(m521, v532, v83);
+        v84 = softehl_blend(m521, v535, v84); v85 = softehl_blend(m521, v535, v85);
+        v86 = softehl_blend(m521, v533, v86); v87 = softehl_blend(m521, v533, v87);
+        v88 = softehl_blend(m521, softehl_splat(0.0), v88);
+        v89 = softehl_blend(m521, softehl_splat(0.0), v89);
+        v90 = softehl_blend(m521, softehl_splat(0.0), v90); v91 = softehl_blend(m521, v529, v91);
+        v92 = softehl_blend(m521, v529, v92); v93 = softehl_blend(m521, softehl_splat(0.0), v93);
+        v94 = softehl_blend(m521, softehl_splat(0.0), v94);
+        v95 = softehl_blend(m521, softehl_splat(0.0), v95); v96 = softehl_blend(m521, v526, v96);
+        v97 = softehl_blend(m521, v527, v97); v98 = softehl_blend(m521, v528, v98);
+        v99 = softehl_blend(m521, v534, v99); v100 = softehl_blend(m521, v530, v100);
+        v101 = softehl_blend(m521, v531, v101); v102 = softehl_blend(m521, v532, v102);
+        v103 = softehl_blend(m521, v535, v103); v104 = softehl_blend(m521, v533, v104);
+        v105 = softehl_blend(m521, softehl_splat(0.0), v105);
+        v106 = softehl_blend(m521, softehl_splat(0.0), v106);
+        v107 = softehl_blend(m521, softehl_splat(0.0), v107);
+        v108 = softehl_blend(m521, v529, v108);
+        v109 = softehl_blend(m521, softehl_splat(0.0), v109);
+        v110 = softehl_blend(m521, softehl_splat(0.0), v110);
+        v111 = softehl_blend(m521, softehl_splat(0.0), v111);
+        v112 = softehl_blend(m521, v526, v112); v113 = softehl_blend(m521, v527, v113);
+        v114 = softehl_blend(m521, v528, v114); v115 = softehl_blend(m521, v534, v115);
+        v116 = softehl_blend(m521, v530, v116); v117 = softehl_blend(m521, v531, v117);
+        v118 = softehl_blend(m521, v532, v118); v119 = softehl_blend(m521, v535, v119);
+        v120 = softehl_blend(m521, v533, v120);
+        v121 = softehl_blend(m521, softehl_splat(0.0), v121);
+        v122 = softehl_blend(m521, softehl_splat(0.0), v122);
+        v123 = softehl_blend(m521, softehl_splat(0.0), v123);
+        v124 = softehl_blend(m521, v529, v124);
+        v125 = softehl_blend(m521, softehl_splat(0.0), v125);
+        v126 = softehl_blend(m521, softehl_splat(0.0), v126);
+        v127 = softehl_blend(m521, softehl_splat(0.0), v127);
+        v128 = softehl_blend(m521, softehl_splat(0.0), v128);
+        v129 = softehl_blend(m521, softehl_splat(0.0), v129);
+        v130 = softehl_blend(m521, softehl_splat(0.0), v130);
+        v131 = softehl_blend(m521, softehl_splat(0.0), v131);
+        v132 = softehl_blend(m521, softehl_splat(0.0), v132);
+        v133 = softehl_blend(m521, softehl_splat(0.0), v133);
+        v134 = softehl_blend(m521, softehl_splat(0.0), v134);
+        v135 = softehl_blend(m521, softehl_splat(0.0), v135);
+        v136 = softehl_blend(m521, softehl_splat(0.0), v136);
+        v137 = softehl_blend(m521, softehl_splat(0.0), v137);
+        v138 = softehl_blend(m521, softehl_splat(0.0), v138);
+        v139 = softehl_blend(m521, softehl_splat(0.0), v139);
+        v140 = softehl_blend(m521, softehl_splat(0.0), v140);
+        v141 = softehl_blend(m521, softehl_splat(0.0), v141);
+        v142 = softehl_blend(m521, softehl_splat(0.0), v142);
+        v143 = softehl_blend(m521, softehl_splat(0.0), v143);
+        v144 = softehl_blend(m521, softehl_splat(0.0), v144);
+        v145 = softehl_blend(m521, softehl_splat(0.0), v145);
     }
-    const V v845 = v1 * v141;
-    const V v846 = v1 * v142;
-    const V v847 = v142 * v114;
-    const V v848 = v142 * v105;
-    const V v849 = v142 * v64;
-    const V v850 = v142 * v66;
-    const V v851 = v142 * v89;
-    const V v852 = v76 * v142;
-    const V v853 = v852 + v141;
-    const V v854 = v142 * v129;
-    const V v855 = v1 * v143;
-    const V v856 = v1 * v144;
-    softehl_store4(R + 12, 16, v846, v845, v855, v856);
-    const V v857 = v1 * v167;
-    softehl_store4(K + 204, 256, v857, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v858 = v76 * v167;
-    const V v859 = v1 * v166;
-    softehl_store4(K + 220, 256, v859, v206, v207, v208);
-    const V v860 = v858 + v166;
-    softehl_store4(K + 12, 256, v860, v168, v169, v170);
-    const V v861 = v72 * v142;
-    const V v862 = v861 + v143;
-    const V v863 = v72 * v167;
-    const V v864 = v77 * v167;
-    const V v865 = v77 * v142;
-    const V v866 = v865 + v144;
-    softehl_store4(R + 0, 16, v853, v862, v866, softehl_splat(0.0));
-    const V v867 = v1 * v183;
-    softehl_store4(K + 236, 256, v867, v212, v213, v214);
-    const V v868 = v863 + v183;
-    softehl_store4(K + 28, 256, v868, v184, v185, v186);
-    const V v869 = v1 * v199;
-    softehl_store4(K + 252, 256, v869, v218, v219, v220);
-    const V v870 = v864 + v199;
-    softehl_store4(K + 44, 256, v870, v200, v201, v202);
-    const V v871 = v1 * v146;
-    const V v872 = v76 * v146;
-    const V v873 = v72 * v146;
-    const V v874 = v77 * v146;
-    const V v875 = v1 * v148;
-    const V v876 = v76 * v148;
-    const V v877 = v72 * v148;
-    const V v878 = v77 * v148;
-    const V v879 = v872 + v145;
-    const V v880 = v1 * v145;
-    const V v881 = v873 + v171;
-    const V v882 = v1 * v171;
-    const V v883 = v874 + v187;
-    const V v884 = v1 * v187;
-    const V v885 = v876 + v147;
-    const V v886 = v1 * v147;
-    const V v887 = v877 + v172;
-    const V v888 = v1 * v172;
-    const V v889 = v878 + v188;
-    const V v890 = v1 * v188;
-    const V v891 = v1 * v150;
-    const V v892 = v77 * v150;
-    const V v893 = v1 * v154;
-    const V v894 = v77 * v154;
-    const V v895 = v1 * v156;
-    const V v896 = v77 * v156;
-    const V v897 = v1 * v158;
-    const V v898 = v77 * v158;
-    const V v899 = v892 + v189;
-    const V v900 = v1 * v189;
-    const V v901 = v1 * v162;
-    softehl_store4(K + 200, 256, v901, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v902 = v77 * v162;
-    const V v903 = v142 * v119;
-    const V v904 = v894 - v903;
-    const V v905 = v142 * v123;
-    const V v906 = v896 - v905;
-    const V v907 = v142 * v97;
-    const V v908 = v898 - v907;
-    const V v909 = v142 * v106;
-    const V v910 = v902 - v909;
-    const V v911 = v1 * v149;
-    const V v912 = v1 * v173;
-    const V v913 = v904 + v191;
-    const V v914 = v1 * v191;
-    const V v915 = v906 + v192;
-    const V v916 = v1 * v192;
-    const V v917 = v908 + v193;
-    const V v918 = v1 * v193;
-    const V v919 = v910 + v195;
-    softehl_store4(K + 40, 256, v919, v196, v197, v198);
-    const V v920 = v1 * v195;
-    softehl_store4(K + 248, 256, v920, v215, v216, v217);
-    const V v921 = v1 * v152;
-    softehl_store4(K + 192, 256, v871, v875, v891, v921);
-    const V v922 = v1 * v160;
-    softehl_store4(K + 196, 256, v893, v895, v897, v922);
-    const V v923 = v76 * v150;
-    const V v924 = v923 + v149;
-    const V v925 = v76 * v152;
-    const V v926 = v76 * v160;
-    const V v927 = v72 * v150;
-    const V v928 = v927 + v173;
-    const V v929 = v72 * v152;
-    const V v930 = v72 * v160;
-    const V v931 = v76 * v156;
-    const V v932 = v72 * v156;
-    const V v933 = v849 + v932;
-    const V v934 = v142 * v87;
-    const V v935 = v925 - v934;
-    const V v936 = v142 * v127;
-    const V v937 = v926 - v936;
-    const V v938 = v142 * v62;
-    const V v939 = v929 - v938;
-    const V v940 = v142 * v69;
-    const V v941 = v930 - v940;
-    const V v942 = v142 * v125;
-    const V v943 = v931 - v942;
-    const V v944 = v76 * v158;
-    const V v945 = v72 * v158;
-    const V v946 = v850 + v945;
-    const V v947 = v933 + v176;
-    const V v948 = v1 * v176;
-    const V v949 = v142 * v98;
-    const V v950 = v944 - v949;
-    const V v951 = v151 + v935;
-    softehl_store4(K + 0, 256, v879, v885, v924, v951);
-    const V v952 = v1 * v151;
-    softehl_store4(K + 208, 256, v880, v886, v911, v952);
-    const V v953 = v943 + v155;
-    const V v954 = v1 * v155;
-    const V v955 = v946 + v177;
-    const V v956 = v1 * v177;
-    const V v957 = v159 + v937;
-    const V v958 = v1 * v159;
-    const V v959 = v950 + v157;
-    const V v960 = v1 * v157;
-    const V v961 = v72 * v154;
-    const V v962 = v72 * v162;
-    const V v963 = v1 * v153;
-    softehl_store4(K + 212, 256, v963, v954, v960, v958);
-    const V v964 = v847 + v153;
-    const V v965 = v1 * v161;
-    softehl_store4(K + 216, 256, v965, v203, v204, v205);
-    const V v966 = v848 + v161;
-    const V v967 = v76 * v154;
-    const V v968 = v967 + v964;
-    softehl_store4(K + 4, 256, v968, v953, v959, v957);
-    const V v969 = v76 * v162;
-    const V v970 = v969 + v966;
-    softehl_store4(K + 8, 256, v970, v163, v164, v165);
-    const V v971 = v142 * v75;
-    const V v972 = v961 - v971;
-    const V v973 = v142 * v68;
-    const V v974 = v962 - v973;
-    const V v975 = v1 * v175;
-    const V v976 = v972 + v175;
-    const V v977 = v1 * v179;
-    softehl_store4(K + 232, 256, v977, v209, v210, v211);
-    const V v978 = v974 + v179;
-    softehl_store4(K + 24, 256, v978, v180, v181, v182);
-    const V v979 = v1 * v174;
-    softehl_store4(K + 224, 256, v882, v888, v912, v979);
-    const V v980 = v174 + v939;
-    softehl_store4(K + 16, 256, v881, v887, v928, v980);
-    const V v981 = v1 * v178;
-    softehl_store4(K + 228, 256, v975, v948, v956, v981);
-    const V v982 = v178 + v941;
-    softehl_store4(K + 20, 256, v976, v947, v955, v982);
-    const V v983 = v1 * v190;
-    softehl_store4(K + 240, 256, v884, v890, v900, v983);
-    const V v984 = v1 * v194;
-    softehl_store4(K + 244, 256, v914, v916, v918, v984);
-    const V v985 = v851 + v190;
-    const V v986 = v854 + v194;
-    const V v987 = v77 * v152;
-    const V v988 = v987 + v985;
-    softehl_store4(K + 32, 256, v883, v889, v899, v988);
-    const V v989 = v77 * v160;
-    const V v990 = v989 + v986;
-    softehl_store4(K + 36, 256, v913, v915, v917, v990);
+    softehl_store4(R + 12, 16, v1 * v67, v1 * v66, v1 * v68, v1 * v69);
+    softehl_store4(K + 204, 256, v1 * v92, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 220, 256, v1 * v91, v131, v132, v133);
+    softehl_store4(K + 12, 256, v34 * v92 + v91, v93, v94, v95);
+    softehl_store4(R + 0, 16, v34 * v67 + v66, v31 * v67 + v68, v35 * v67 + v69, softehl_splat(0.0));
+    softehl_store4(K + 236, 256, v1 * v108, v137, v138, v139);
+    softehl_store4(K + 28, 256, v31 * v92 + v108, v109, v110, v111);
+    softehl_store4(K + 252, 256, v1 * v124, v143, v144, v145);
+    softehl_store4(K + 44, 256, v35 * v92 + v124, v125, v126, v127);
+    softehl_store4(K + 200, 256, v1 * v87, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    const V v536 = v35 * v79 - v67 * v55 + v116, v537 = v35 * v81 - v67 * v58 + v117,
+        v538 = v35 * v83 - v67 * v46 + v118, v539 = v35 * v87 - v67 * v51 + v120;
+    softehl_store4(K + 40, 256, v539, v121, v122, v123);
+    softehl_store4(K + 248, 256, v1 * v120, v140, v141, v142);
+    softehl_store4(K + 192, 256, v1 * v71, v1 * v73, v1 * v75, v1 * v77);
+    softehl_store4(K + 196, 256, v1 * v79, v1 * v81, v1 * v83, v1 * v85);
+    const V v540 = v76 + (v34 * v77 - v67 * v42);
+    softehl_store4(K + 0, 256, v34 * v71 + v70, v34 * v73 + v72, v34 * v75 + v74, v540);
+    softehl_store4(K + 208, 256, v1 * v70, v1 * v72, v1 * v74, v1 * v76);
+    const V v541 = v34 * v81 - v67 * v59 + v80, v542 = v84 + (v34 * v85 - v67 * v60),
+        v543 = v34 * v83 - v67 * v47 + v82;
+    softehl_store4(K + 212, 256, v1 * v78, v1 * v80, v1 * v82, v1 * v84);
+    softehl_store4(K + 216, 256, v1 * v86, v128, v129, v130);
+    const V v544 = v34 * v79 + (v67 * v54 + v78);
+    softehl_store4(K + 4, 256, v544, v541, v543, v542);
+    const V v545 = v34 * v87 + (v67 * v50 + v86); softehl_store4(K + 8, 256, v545, v88, v89, v90);
+    const V v546 = v31 * v79 - v67 * v33 + v100;
+    softehl_store4(K + 232, 256, v1 * v104, v134, v135, v136);
+    const V v547 = v31 * v87 - v67 * v29 + v104;
+    softehl_store4(K + 24, 256, v547, v105, v106, v107);
+    softehl_store4(K + 224, 256, v1 * v96, v1 * v97, v1 * v98, v1 * v99);
+    const V v548 = v99 + (v31 * v77 - v67 * v26);
+    softehl_store4(K + 16, 256, v31 * v71 + v96, v31 * v73 + v97, v31 * v75 + v98, v548);
+    softehl_store4(K + 228, 256, v1 * v100, v1 * v101, v1 * v102, v1 * v103);
+    const V v549 = v103 + (v31 * v85 - v67 * v30);
+    softehl_store4(K + 20, 256, v546, v67 * v27 + v31 * v81 + v101, v67 * v28 + v31 * v83 + v102, v549);
+    softehl_store4(K + 240, 256, v1 * v112, v1 * v113, v1 * v114, v1 * v115);
+    softehl_store4(K + 244, 256, v1 * v116, v1 * v117, v1 * v118, v1 * v119);
+    const V v550 = v35 * v77 + (v67 * v43 + v115);
+    softehl_store4(K + 32, 256, v35 * v71 + v112, v35 * v73 + v113, v35 * v75 + v114, v550);
+    const V v551 = v35 * v85 + (v67 * v61 + v119);
+    softehl_store4(K + 36, 256, v536, v537, v538, v551);
 }
-
-void softehl_touch_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_touch_tangent_group(points, modes, 0, dofs + 16 * e, data + 4 * e, 0, parameters, rule, basis, values + 16 * e, tangent + (16 * 16) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_touch_tangent_group(points, modes, 0, dofs + 16 * (n - SOFTEHL_LANES), data + 4 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 16 * (n - SOFTEHL_LANES), tangent + (16 * 16) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double d[SOFTEHL_LANES * 16];
-    softehl_pad(d, dofs, 16, n);
-    double a[SOFTEHL_LANES * 4];
-    softehl_pad(a, data, 4, n);
-    double R[SOFTEHL_LANES * 16];
-    double K[SOFTEHL_LANES * (16 * 16)];
-    softehl_touch_tangent(SOFTEHL_LANES, points, modes, 0, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 16 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (16 * 16) * n; ++i) tangent[i] = K[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_touch_tangent, 0, 16, 4, 0, 16, (16 * 16))

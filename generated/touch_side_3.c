@@ -35,233 +35,62 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_touch_side_3_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_touch_side_3_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 9, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 9, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8;
+    softehl_load4(X + 0, 9, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 9, &X4, &X5, &X6, &X7);
     softehl_load1(X + 8, 9, &X8);
-    (void)X8;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 21, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 21, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15, d16, d17, d18, d19, d20;
+    softehl_load4(d + 0, 21, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 21, &d4, &d5, &d6, &d7);
     softehl_load4(d + 8, 21, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13, d14, d15;
     softehl_load4(d + 12, 21, &d12, &d13, &d14, &d15);
-    (void)d12; (void)d13; (void)d14; (void)d15;
-    V d16, d17, d18, d19;
-    softehl_load4(d + 16, 21, &d16, &d17, &d18, &d19);
-    (void)d16; (void)d17; (void)d18; (void)d19;
-    V d20;
-    softehl_load1(d + 20, 21, &d20);
-    (void)d20;
-    V a0;
+    softehl_load4(d + 16, 21, &d16, &d17, &d18, &d19); softehl_load1(d + 20, 21, &d20); (void)d0;
+    (void)d1; (void)d2; (void)d3; (void)d4; (void)d5; (void)d6; (void)d7; (void)d8; V a0;
     softehl_load1(a + 0, 1, &a0);
-    (void)a0;
     softehl_store4(R + 0, 21, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(R + 4, 21, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v1 = 1.0 / a0;
-    const V v2 = X4 - X1;
-    const V v3 = X0 - X3;
-    const V v4 = X5 - X2;
-    const V v5 = X8 - X2;
-    const V v6 = X3 - X0;
-    const V v7 = X0 - X6;
-    const V v8 = X6 - X0;
-    const V v9 = v3 * v5;
-    const V v10 = v2 * v5;
-    const V v11 = v7 * v2;
-    const V v12 = X1 - X7;
-    const V v13 = X7 - X1;
-    const V v14 = v6 * v13;
-    const V v15 = v14 + v11;
-    const V v16 = v8 * v4;
-    const V v17 = v16 + v9;
-    const V v18 = v4 * v12;
-    const V v19 = v10 + v18;
-    const V v20 = v17 * v17;
-    const V v21 = v15 * v15;
-    const V v22 = v21 + v20;
-    const V v23 = v19 * v19;
-    const V v24 = v22 + v23;
-    const V v25 = softehl_vsqrt(v24);
-    V s26 = softehl_splat(0.0);
-    V s27 = softehl_splat(0.0);
-    V s28 = softehl_splat(0.0);
-    V s29 = softehl_splat(0.0);
-    V s30 = softehl_splat(0.0);
-    V s31 = softehl_splat(0.0);
-    V s32 = softehl_splat(0.0);
-    V s33 = softehl_splat(0.0);
-    V s34 = softehl_splat(0.0);
-    V s35 = softehl_splat(0.0);
-    V s36 = softehl_splat(0.0);
-    V s37 = softehl_splat(0.0);
+    const V v1 = 1.0 / a0, v2 = X4 - X1, v3 = X5 - X2, v4 = X8 - X2,
+        v5 = (X3 - X0) * (X7 - X1) + (X0 - X6) * v2, v6 = (X6 - X0) * v3 + (X0 - X3) * v4,
+        v7 = v2 * v4 + v3 * (X1 - X7), v8 = softehl_vsqrt(v5 * v5 + v6 * v6 + v7 * v7);
+    V s9 = {0}, s10 = {0}, s11 = {0}, s12 = {0}, s13 = {0}, s14 = {0}, s15 = {0}, s16 = {0},
+        s17 = {0}, s18 = {0}, s19 = {0}, s20 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v38 = d17 * w[1];
-        const V v39 = d18 * w[1];
-        const V v40 = d19 * w[1];
-        const V v41 = d20 * w[1];
-        const double v42 = 1.0 - w[1];
-        const V v43 = w[1] * v25;
-        const V v44 = d13 * w[0];
-        const V v45 = v38 + v44;
-        const V v46 = d14 * w[0];
-        const V v47 = v39 + v46;
-        const double v48 = v42 - w[0];
-        const V v49 = d15 * w[0];
-        const V v50 = v40 + v49;
-        const V v51 = d16 * w[0];
-        const V v52 = v41 + v51;
-        const V v53 = w[0] * v1;
-        const V v54 = d9 * v48;
-        const V v55 = v54 + v45;
-        const V v56 = d10 * v48;
-        const V v57 = v56 + v47;
-        const V v58 = d11 * v48;
-        const V v59 = v58 + v50;
-        const V v60 = v48 * v1;
-        const V v61 = d12 * v48;
-        const V v62 = v61 + v52;
-        const V v63 = w[2] * v53;
-        const V v64 = w[2] * v60;
-        const V v65 = v1 * v55;
-        const V v66 = v25 * v55;
-        const V v67 = v1 * v57;
-        const V v68 = v25 * v57;
-        const V v69 = v1 * v59;
-        const V v70 = v1 * v62;
-        const V v71 = v25 * v59;
-        const V v72 = v25 * v62;
-        const V v73 = w[2] * v69;
-        const V v74 = w[2] * v67;
-        const V v75 = w[2] * v65;
-        const V v76 = w[2] * v70;
-        const V v77 = v63 * v68;
-        s32 += v77;
-        const V v78 = v64 * v68;
-        s36 += v78;
-        const V v79 = v63 * v71;
-        s31 += v79;
-        const V v80 = v64 * v71;
-        s35 += v80;
-        const V v81 = v64 * v72;
-        s34 += v81;
-        const V v82 = v63 * v72;
-        s30 += v82;
-        const V v83 = v63 * v66;
-        s33 += v83;
-        const V v84 = v64 * v66;
-        s37 += v84;
-        const V v85 = v43 * v73;
-        s27 += v85;
-        const V v86 = v43 * v74;
-        s28 += v86;
-        const V v87 = v43 * v75;
-        s29 += v87;
-        const V v88 = v43 * v76;
-        s26 += v88;
+        const double *restrict w = rule + 3 * q; (void)w; const V v21 = w[1] * v8;
+        const double v22 = 1.0 - w[1] - w[0];
+        const V v23 = d9 * v22 + (d17 * w[1] + d13 * w[0]),
+            v24 = d10 * v22 + (d18 * w[1] + d14 * w[0]),
+            v25 = d11 * v22 + (d19 * w[1] + d15 * w[0]),
+            v26 = d12 * v22 + (d20 * w[1] + d16 * w[0]), v27 = w[2] * (w[0] * v1),
+            v28 = w[2] * (v22 * v1), v29 = v8 * v23, v30 = v8 * v24, v31 = v8 * v25, v32 = v8 * v26,
+            v33 = v27 * v30;
+        s15 += v33; const V v34 = v28 * v30; s19 += v34; const V v35 = v27 * v31; s14 += v35;
+        const V v36 = v28 * v31; s18 += v36; const V v37 = v28 * v32; s17 += v37;
+        const V v38 = v27 * v32; s13 += v38; const V v39 = v27 * v29; s16 += v39;
+        const V v40 = v28 * v29; s20 += v40; const V v41 = v21 * (w[2] * (v1 * v25)); s10 += v41;
+        const V v42 = v21 * (w[2] * (v1 * v24)); s11 += v42;
+        const V v43 = v21 * (w[2] * (v1 * v23)); s12 += v43;
+        const V v44 = v21 * (w[2] * (v1 * v26)); s9 += v44;
     }
-    const V v89 = -s26;
-    softehl_store1(R + 20, 21, v89);
-    const V v90 = -s27;
-    const V v91 = -s28;
-    const V v92 = -s29;
-    const V v93 = -s30;
-    softehl_store4(R + 16, 21, v93, v92, v91, v90);
-    const V v94 = -s31;
-    const V v95 = -s32;
-    const V v96 = -s33;
-    const V v97 = -s34;
-    softehl_store4(R + 12, 21, v97, v96, v95, v94);
-    const V v98 = -s35;
-    const V v99 = -s36;
-    const V v100 = -s37;
-    softehl_store4(R + 8, 21, softehl_splat(0.0), v100, v99, v98);
+    softehl_store1(R + 20, 21, -s9); softehl_store4(R + 16, 21, -s13, -s12, -s11, -s10);
+    softehl_store4(R + 12, 21, -s17, -s16, -s15, -s14);
+    softehl_store4(R + 8, 21, softehl_splat(0.0), -s20, -s19, -s18);
 }
+SOFTEHL_BATCH(softehl_touch_side_3_residual, 9, 21, 1, 0, 21, 0)
 
-void softehl_touch_side_3_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_touch_side_3_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_touch_side_3_residual_group(points, modes, coordinates + 9 * e, dofs + 21 * e, data + 1 * e, 0, parameters, rule, basis, values + 21 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_touch_side_3_residual_group(points, modes, coordinates + 9 * (n - SOFTEHL_LANES), dofs + 21 * (n - SOFTEHL_LANES), data + 1 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 21 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 9];
-    softehl_pad(X, coordinates, 9, n);
-    double d[SOFTEHL_LANES * 21];
-    softehl_pad(d, dofs, 21, n);
-    double a[SOFTEHL_LANES * 1];
-    softehl_pad(a, data, 1, n);
-    double R[SOFTEHL_LANES * 21];
-    softehl_touch_side_3_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 21 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_touch_side_3_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 9, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 9, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8;
+    softehl_load4(X + 0, 9, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 9, &X4, &X5, &X6, &X7);
     softehl_load1(X + 8, 9, &X8);
-    (void)X8;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 21, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 21, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15, d16, d17, d18, d19, d20;
+    softehl_load4(d + 0, 21, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 21, &d4, &d5, &d6, &d7);
     softehl_load4(d + 8, 21, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13, d14, d15;
     softehl_load4(d + 12, 21, &d12, &d13, &d14, &d15);
-    (void)d12; (void)d13; (void)d14; (void)d15;
-    V d16, d17, d18, d19;
-    softehl_load4(d + 16, 21, &d16, &d17, &d18, &d19);
-    (void)d16; (void)d17; (void)d18; (void)d19;
-    V d20;
-    softehl_load1(d + 20, 21, &d20);
-    (void)d20;
-    V a0;
+    softehl_load4(d + 16, 21, &d16, &d17, &d18, &d19); softehl_load1(d + 20, 21, &d20); (void)d0;
+    (void)d1; (void)d2; (void)d3; (void)d4; (void)d5; (void)d6; (void)d7; (void)d8; V a0;
     softehl_load1(a + 0, 1, &a0);
-    (void)a0;
     softehl_store4(R + 0, 21, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(R + 4, 21, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 0, 441, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
@@ -339,402 +168,110 @@ static void softehl_touch_side_3_tangent_group(
     softehl_store4(K + 420, 441, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 424, 441, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 428, 441, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v1 = 1.0 / a0;
-    const V v2 = X4 - X1;
-    const V v3 = X0 - X3;
-    const V v4 = X5 - X2;
-    const V v5 = X8 - X2;
-    const V v6 = X3 - X0;
-    const V v7 = X0 - X6;
-    const V v8 = X6 - X0;
-    const V v9 = v3 * v5;
-    const V v10 = v2 * v5;
-    const V v11 = v7 * v2;
-    const V v12 = X1 - X7;
-    const V v13 = X7 - X1;
-    const V v14 = v6 * v13;
-    const V v15 = v14 + v11;
-    const V v16 = v8 * v4;
-    const V v17 = v16 + v9;
-    const V v18 = v4 * v12;
-    const V v19 = v10 + v18;
-    const V v20 = v17 * v17;
-    const V v21 = v15 * v15;
-    const V v22 = v21 + v20;
-    const V v23 = v19 * v19;
-    const V v24 = v22 + v23;
-    const V v25 = softehl_vsqrt(v24);
-    V s26 = softehl_splat(0.0);
-    V s27 = softehl_splat(0.0);
-    V s28 = softehl_splat(0.0);
-    V s29 = softehl_splat(0.0);
-    V s30 = softehl_splat(0.0);
-    V s31 = softehl_splat(0.0);
-    V s32 = softehl_splat(0.0);
-    V s33 = softehl_splat(0.0);
-    V s34 = softehl_splat(0.0);
-    V s35 = softehl_splat(0.0);
-    V s36 = softehl_splat(0.0);
-    V s37 = softehl_splat(0.0);
-    V s38 = softehl_splat(0.0);
-    V s39 = softehl_splat(0.0);
-    V s40 = softehl_splat(0.0);
-    V s41 = softehl_splat(0.0);
-    V s42 = softehl_splat(0.0);
-    V s43 = softehl_splat(0.0);
-    V s44 = softehl_splat(0.0);
+    const V v1 = 1.0 / a0, v2 = X4 - X1, v3 = X5 - X2, v4 = X8 - X2,
+        v5 = (X3 - X0) * (X7 - X1) + (X0 - X6) * v2, v6 = (X6 - X0) * v3 + (X0 - X3) * v4,
+        v7 = v2 * v4 + v3 * (X1 - X7), v8 = softehl_vsqrt(v5 * v5 + v6 * v6 + v7 * v7);
+    V s9 = {0}, s10 = {0}, s11 = {0}, s12 = {0}, s13 = {0}, s14 = {0}, s15 = {0}, s16 = {0},
+        s17 = {0}, s18 = {0}, s19 = {0}, s20 = {0}, s21 = {0}, s22 = {0}, s23 = {0}, s24 = {0},
+        s25 = {0}, s26 = {0}, s27 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v45 = d17 * w[1];
-        const V v46 = d18 * w[1];
-        const V v47 = d19 * w[1];
-        const V v48 = d20 * w[1];
-        const double v49 = 1.0 - w[1];
-        const V v50 = w[1] * v25;
-        const V v51 = w[1] * v1;
-        const V v52 = w[0] * v1;
-        const V v53 = d13 * w[0];
-        const V v54 = v45 + v53;
-        const V v55 = d14 * w[0];
-        const V v56 = v46 + v55;
-        const double v57 = v49 - w[0];
-        const V v58 = d15 * w[0];
-        const V v59 = v47 + v58;
-        const V v60 = d16 * w[0];
-        const V v61 = v48 + v60;
-        const V v62 = w[0] * v25;
-        const V v63 = w[2] * v52;
-        const V v64 = w[2] * v51;
-        const V v65 = d9 * v57;
-        const V v66 = v65 + v54;
-        const V v67 = d10 * v57;
-        const V v68 = v67 + v56;
-        const V v69 = d11 * v57;
-        const V v70 = v69 + v59;
-        const V v71 = d12 * v57;
-        const V v72 = v71 + v61;
-        const V v73 = v57 * v1;
-        const V v74 = v57 * v25;
-        const V v75 = v50 * v64;
-        s40 += v75;
-        const V v76 = v63 * v62;
-        s38 += v76;
-        const V v77 = w[2] * v73;
-        const V v78 = v1 * v66;
-        const V v79 = v25 * v66;
-        const V v80 = v1 * v68;
-        const V v81 = v25 * v68;
-        const V v82 = v1 * v70;
-        const V v83 = v25 * v70;
-        const V v84 = w[2] * v78;
-        const V v85 = w[2] * v80;
-        const V v86 = v1 * v72;
-        const V v87 = v25 * v72;
-        const V v88 = w[2] * v82;
-        const V v89 = v77 * v62;
-        s42 += v89;
-        const V v90 = w[2] * v86;
-        const V v91 = v63 * v83;
-        s31 += v91;
-        const V v92 = v77 * v83;
-        s35 += v92;
-        const V v93 = v50 * v84;
-        s29 += v93;
-        const V v94 = v50 * v85;
-        s28 += v94;
-        const V v95 = v50 * v88;
-        s27 += v95;
-        const V v96 = v77 * v87;
-        s34 += v96;
-        const V v97 = v63 * v87;
-        s30 += v97;
-        const V v98 = v63 * v81;
-        s32 += v98;
-        const V v99 = v77 * v81;
-        s36 += v99;
-        const V v100 = v50 * v90;
-        s26 += v100;
-        const V v101 = v63 * v79;
-        s33 += v101;
-        const V v102 = v77 * v79;
-        s37 += v102;
-        const V v103 = v50 * v63;
-        s39 += v103;
-        const V v104 = v50 * v77;
-        s43 += v104;
-        const V v105 = v77 * v74;
-        s41 += v105;
-        const V v106 = v63 * v74;
-        s44 += v106;
+        const double *restrict w = rule + 3 * q; (void)w; const V v28 = w[1] * v8;
+        const double v29 = 1.0 - w[1] - w[0];
+        const V v30 = w[0] * v8, v31 = w[2] * (w[0] * v1),
+            v32 = d9 * v29 + (d17 * w[1] + d13 * w[0]), v33 = d10 * v29 + (d18 * w[1] + d14 * w[0]),
+            v34 = d11 * v29 + (d19 * w[1] + d15 * w[0]),
+            v35 = d12 * v29 + (d20 * w[1] + d16 * w[0]), v36 = v29 * v8;
+        s23 += v28 * (w[2] * (w[1] * v1)); s21 += v31 * v30;
+        const V v37 = w[2] * (v29 * v1), v38 = v8 * v32, v39 = v8 * v33, v40 = v8 * v34,
+            v41 = v8 * v35, v42 = v37 * v30;
+        s25 += v42; const V v43 = v31 * v40; s14 += v43; const V v44 = v37 * v40; s18 += v44;
+        const V v45 = v28 * (w[2] * (v1 * v32)); s12 += v45;
+        const V v46 = v28 * (w[2] * (v1 * v33)); s11 += v46;
+        const V v47 = v28 * (w[2] * (v1 * v34)); s10 += v47; const V v48 = v37 * v41; s17 += v48;
+        const V v49 = v31 * v41; s13 += v49; const V v50 = v31 * v39; s15 += v50;
+        const V v51 = v37 * v39; s19 += v51; const V v52 = v28 * (w[2] * (v1 * v35)); s9 += v52;
+        const V v53 = v31 * v38; s16 += v53; const V v54 = v37 * v38; s20 += v54; s22 += v28 * v31;
+        const V v55 = v28 * v37; s26 += v55; const V v56 = v37 * v36; s24 += v56;
+        const V v57 = v31 * v36; s27 += v57;
     }
-    const V v107 = -s26;
-    softehl_store1(R + 20, 21, v107);
-    const V v108 = -s27;
-    const V v109 = -s28;
-    const V v110 = -s29;
-    const V v111 = -s30;
-    softehl_store4(R + 16, 21, v111, v110, v109, v108);
-    const V v112 = -s31;
-    const V v113 = -s32;
-    const V v114 = -s33;
-    const V v115 = -s34;
-    softehl_store4(R + 12, 21, v115, v114, v113, v112);
-    const V v116 = -s35;
-    const V v117 = -s36;
-    const V v118 = -s37;
-    softehl_store4(R + 8, 21, softehl_splat(0.0), v118, v117, v116);
-    const V v119 = -s38;
-    softehl_store4(K + 284, 441, softehl_splat(0.0), softehl_splat(0.0), v119, softehl_splat(0.0));
-    softehl_store4(K + 308, 441, v119, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 328, 441, softehl_splat(0.0), softehl_splat(0.0), v119, softehl_splat(0.0));
-    softehl_store4(K + 352, 441, v119, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v120 = -s39;
-    softehl_store4(K + 288, 441, softehl_splat(0.0), softehl_splat(0.0), v120, softehl_splat(0.0));
-    softehl_store4(K + 312, 441, v120, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 332, 441, softehl_splat(0.0), softehl_splat(0.0), v120, softehl_splat(0.0));
-    softehl_store4(K + 356, 441, v120, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 368, 441, softehl_splat(0.0), softehl_splat(0.0), v120, softehl_splat(0.0));
-    softehl_store4(K + 392, 441, v120, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 412, 441, softehl_splat(0.0), softehl_splat(0.0), v120, softehl_splat(0.0));
-    softehl_store4(K + 436, 441, v120, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v121 = -s40;
-    softehl_store4(K + 372, 441, softehl_splat(0.0), softehl_splat(0.0), v121, softehl_splat(0.0));
-    softehl_store4(K + 396, 441, v121, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 416, 441, softehl_splat(0.0), softehl_splat(0.0), v121, softehl_splat(0.0));
-    softehl_store1(K + 440, 441, v121);
-    const V v122 = -s41;
-    softehl_store4(K + 196, 441, softehl_splat(0.0), softehl_splat(0.0), v122, softehl_splat(0.0));
-    softehl_store4(K + 220, 441, v122, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 240, 441, softehl_splat(0.0), softehl_splat(0.0), v122, softehl_splat(0.0));
-    softehl_store4(K + 264, 441, v122, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v123 = -s42;
-    softehl_store4(K + 200, 441, softehl_splat(0.0), softehl_splat(0.0), v123, softehl_splat(0.0));
-    softehl_store4(K + 224, 441, v123, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 244, 441, softehl_splat(0.0), softehl_splat(0.0), v123, softehl_splat(0.0));
-    softehl_store4(K + 268, 441, v123, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v124 = -s43;
-    softehl_store4(K + 204, 441, softehl_splat(0.0), softehl_splat(0.0), v124, softehl_splat(0.0));
-    softehl_store4(K + 228, 441, v124, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 248, 441, softehl_splat(0.0), softehl_splat(0.0), v124, softehl_splat(0.0));
-    softehl_store4(K + 272, 441, v124, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 364, 441, softehl_splat(0.0), softehl_splat(0.0), v124, softehl_splat(0.0));
-    softehl_store4(K + 388, 441, v124, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 408, 441, softehl_splat(0.0), softehl_splat(0.0), v124, softehl_splat(0.0));
-    softehl_store4(K + 432, 441, v124, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v125 = -s44;
-    softehl_store4(K + 280, 441, softehl_splat(0.0), softehl_splat(0.0), v125, softehl_splat(0.0));
-    softehl_store4(K + 304, 441, v125, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 324, 441, softehl_splat(0.0), softehl_splat(0.0), v125, softehl_splat(0.0));
-    softehl_store4(K + 348, 441, v125, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store1(R + 20, 21, -s9); softehl_store4(R + 16, 21, -s13, -s12, -s11, -s10);
+    softehl_store4(R + 12, 21, -s17, -s16, -s15, -s14);
+    softehl_store4(R + 8, 21, softehl_splat(0.0), -s20, -s19, -s18); const V v58 = -s21;
+    softehl_store4(K + 284, 441, softehl_splat(0.0), softehl_splat(0.0), v58, softehl_splat(0.0));
+    softehl_store4(K + 308, 441, v58, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 328, 441, softehl_splat(0.0), softehl_splat(0.0), v58, softehl_splat(0.0));
+    softehl_store4(K + 352, 441, v58, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    const V v59 = -s22;
+    softehl_store4(K + 288, 441, softehl_splat(0.0), softehl_splat(0.0), v59, softehl_splat(0.0));
+    softehl_store4(K + 312, 441, v59, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 332, 441, softehl_splat(0.0), softehl_splat(0.0), v59, softehl_splat(0.0));
+    softehl_store4(K + 356, 441, v59, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 368, 441, softehl_splat(0.0), softehl_splat(0.0), v59, softehl_splat(0.0));
+    softehl_store4(K + 392, 441, v59, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 412, 441, softehl_splat(0.0), softehl_splat(0.0), v59, softehl_splat(0.0));
+    softehl_store4(K + 436, 441, v59, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    const V v60 = -s23;
+    softehl_store4(K + 372, 441, softehl_splat(0.0), softehl_splat(0.0), v60, softehl_splat(0.0));
+    softehl_store4(K + 396, 441, v60, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 416, 441, softehl_splat(0.0), softehl_splat(0.0), v60, softehl_splat(0.0));
+    softehl_store1(K + 440, 441, v60); const V v61 = -s24;
+    softehl_store4(K + 196, 441, softehl_splat(0.0), softehl_splat(0.0), v61, softehl_splat(0.0));
+    softehl_store4(K + 220, 441, v61, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 240, 441, softehl_splat(0.0), softehl_splat(0.0), v61, softehl_splat(0.0));
+    softehl_store4(K + 264, 441, v61, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    const V v62 = -s25;
+    softehl_store4(K + 200, 441, softehl_splat(0.0), softehl_splat(0.0), v62, softehl_splat(0.0));
+    softehl_store4(K + 224, 441, v62, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 244, 441, softehl_splat(0.0), softehl_splat(0.0), v62, softehl_splat(0.0));
+    softehl_store4(K + 268, 441, v62, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    const V v63 = -s26;
+    softehl_store4(K + 204, 441, softehl_splat(0.0), softehl_splat(0.0), v63, softehl_splat(0.0));
+    softehl_store4(K + 228, 441, v63, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 248, 441, softehl_splat(0.0), softehl_splat(0.0), v63, softehl_splat(0.0));
+    softehl_store4(K + 272, 441, v63, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 364, 441, softehl_splat(0.0), softehl_splat(0.0), v63, softehl_splat(0.0));
+    softehl_store4(K + 388, 441, v63, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 408, 441, softehl_splat(0.0), softehl_splat(0.0), v63, softehl_splat(0.0));
+    softehl_store4(K + 432, 441, v63, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    const V v64 = -s27;
+    softehl_store4(K + 280, 441, softehl_splat(0.0), softehl_splat(0.0), v64, softehl_splat(0.0));
+    softehl_store4(K + 304, 441, v64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 324, 441, softehl_splat(0.0), softehl_splat(0.0), v64, softehl_splat(0.0));
+    softehl_store4(K + 348, 441, v64, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
 }
+SOFTEHL_BATCH(softehl_touch_side_3_tangent, 9, 21, 1, 0, 21, (21 * 21))
 
-void softehl_touch_side_3_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_touch_side_3_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_touch_side_3_tangent_group(points, modes, coordinates + 9 * e, dofs + 21 * e, data + 1 * e, 0, parameters, rule, basis, values + 21 * e, tangent + (21 * 21) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_touch_side_3_tangent_group(points, modes, coordinates + 9 * (n - SOFTEHL_LANES), dofs + 21 * (n - SOFTEHL_LANES), data + 1 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 21 * (n - SOFTEHL_LANES), tangent + (21 * 21) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 9];
-    softehl_pad(X, coordinates, 9, n);
-    double d[SOFTEHL_LANES * 21];
-    softehl_pad(d, dofs, 21, n);
-    double a[SOFTEHL_LANES * 1];
-    softehl_pad(a, data, 1, n);
-    double R[SOFTEHL_LANES * 21];
-    double K[SOFTEHL_LANES * (21 * 21)];
-    softehl_touch_side_3_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 21 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (21 * 21) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_touch_side_3_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 9, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 9, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8;
+    softehl_load4(X + 0, 9, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 9, &X4, &X5, &X6, &X7);
     softehl_load1(X + 8, 9, &X8);
-    (void)X8;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 21, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 21, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15, d16, d17, d18, d19, d20;
+    softehl_load4(d + 0, 21, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 21, &d4, &d5, &d6, &d7);
     softehl_load4(d + 8, 21, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13, d14, d15;
     softehl_load4(d + 12, 21, &d12, &d13, &d14, &d15);
-    (void)d12; (void)d13; (void)d14; (void)d15;
-    V d16, d17, d18, d19;
-    softehl_load4(d + 16, 21, &d16, &d17, &d18, &d19);
-    (void)d16; (void)d17; (void)d18; (void)d19;
-    V d20;
-    softehl_load1(d + 20, 21, &d20);
-    (void)d20;
-    V a0;
-    softehl_load1(a + 0, 1, &a0);
-    (void)a0;
-    const V v1 = X2 + d2;
-    const V v2 = X3 + d3;
-    const V v3 = X4 + d4;
-    const V v4 = X6 + d6;
-    const V v5 = X7 + d7;
-    const V v6 = X3 - X0;
-    const V v7 = X6 - X0;
-    const V v8 = v2 - X0;
-    const V v9 = X0 - X6;
-    const V v10 = v4 - X0;
-    const V v11 = X0 - X3;
-    const V v12 = X7 - X1;
-    const V v13 = X4 - X1;
-    const V v14 = v5 - X1;
-    const V v15 = v3 - X1;
-    const V v16 = v6 * v12;
-    const V v17 = X1 - X7;
-    const V v18 = X8 + d8;
-    const V v19 = v9 * v13;
-    const V v20 = v16 + v19;
-    const V v21 = X0 + d0;
-    const V v22 = v15 - d1;
-    const V v23 = X1 + d1;
-    const V v24 = v20 * v20;
-    const V v25 = d0 - v10;
-    const V v26 = X8 - X2;
-    const V v27 = d1 - v14;
-    const V v28 = v14 - d1;
-    const V v29 = v25 * v22;
-    const V v30 = v10 - d0;
-    const V v31 = v13 * v26;
-    const V v32 = v11 * v26;
-    const V v33 = d0 - v8;
-    const V v34 = v8 - d0;
-    const V v35 = v34 * v28;
-    const V v36 = v35 + v29;
-    const V v37 = v18 - v1;
-    const V v38 = X5 + d5;
-    const V v39 = X5 - X2;
-    const V v40 = v22 * v37;
-    const V v41 = v33 * v37;
-    const V v42 = v7 * v39;
-    const V v43 = v42 + v32;
-    const V v44 = v39 * v17;
-    const V v45 = v31 + v44;
-    const V v46 = v36 * v36;
-    const V v47 = v38 - v1;
-    const V v48 = v30 * v47;
-    const V v49 = v48 + v41;
-    const V v50 = v27 * v47;
-    const V v51 = v40 + v50;
-    const V v52 = v43 * v43;
-    const V v53 = v24 + v52;
-    const V v54 = v45 * v45;
-    const V v55 = v53 + v54;
-    const V v56 = v49 * v49;
-    const V v57 = v46 + v56;
-    const V v58 = v51 * v51;
-    const V v59 = v58 + v57;
-    const V v60 = softehl_vsqrt(v55);
-    const V v61 = softehl_vsqrt(v59);
-    const V v62 = 1.0 / v61;
-    const V v63 = v60 * v62;
+    softehl_load4(d + 16, 21, &d16, &d17, &d18, &d19); softehl_load1(d + 20, 21, &d20); V a0;
+    softehl_load1(a + 0, 1, &a0); (void)a0;
+    const V v1 = X2 + d2, v2 = X3 + d3, v3 = X4 + d4, v4 = X6 + d6, v5 = X7 + d7, v6 = v2 - X0,
+        v7 = v4 - X0, v8 = X4 - X1, v9 = v5 - X1, v10 = X8 + d8,
+        v11 = (X3 - X0) * (X7 - X1) + (X0 - X6) * v8, v12 = X0 + d0, v13 = v3 - X1 - d1,
+        v14 = X1 + d1, v15 = X8 - X2, v16 = (v6 - d0) * (v9 - d1) + (d0 - v7) * v13, v17 = v10 - v1,
+        v18 = X5 + d5, v19 = X5 - X2, v20 = (X6 - X0) * v19 + (X0 - X3) * v15,
+        v21 = v8 * v15 + v19 * (X1 - X7), v22 = v18 - v1, v23 = (v7 - d0) * v22 + (d0 - v6) * v17,
+        v24 = v13 * v17 + (d1 - v9) * v22, v25 = softehl_vsqrt(v11 * v11 + v20 * v20 + v21 * v21),
+        v26 = softehl_vsqrt(v24 * v24 + (v16 * v16 + v23 * v23)), v27 = v25 * (1.0 / v26);
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const V v64 = w[2] * v61;
-        const V v65 = d17 * w[1];
-        const V v66 = d18 * w[1];
-        const V v67 = d19 * w[1];
-        const V v68 = d20 * w[1];
-        const double v69 = 1.0 - w[1];
-        const V v70 = w[1] * v4;
-        const V v71 = w[1] * v5;
-        const V v72 = w[1] * v18;
-        const V v73 = d13 * w[0];
-        const V v74 = v65 + v73;
-        const V v75 = d14 * w[0];
-        const V v76 = v66 + v75;
-        const double v77 = v69 - w[0];
-        const V v78 = d15 * w[0];
-        const V v79 = v67 + v78;
-        const V v80 = d16 * w[0];
-        const V v81 = v68 + v80;
-        const V v82 = w[0] * v2;
-        const V v83 = v70 + v82;
-        const V v84 = w[0] * v3;
-        const V v85 = v71 + v84;
-        const V v86 = w[0] * v38;
-        const V v87 = v72 + v86;
-        const V v88 = d9 * v77;
-        const V v89 = v88 + v74;
-        const V v90 = d10 * v77;
-        const V v91 = v90 + v76;
-        const V v92 = d11 * v77;
-        const V v93 = v92 + v79;
-        const V v94 = d12 * v77;
-        const V v95 = v94 + v81;
-        const V v96 = v77 * v21;
-        const V v97 = v83 + v96;
-        const V v98 = v77 * v23;
-        const V v99 = v85 + v98;
-        const V v100 = v77 * v1;
-        const V v101 = v87 + v100;
-        const V v102 = v89 * v63;
-        const V v103 = v91 * v63;
-        const V v104 = v93 * v63;
-        const V v105 = v95 * v63;
-        softehl_store4(R + 8 * q + 0, (8 * points), v102, v103, v104, v105);
-        softehl_store4(R + 8 * q + 4, (8 * points), v97, v99, v101, v64);
+        const double *restrict w = rule + 3 * q; (void)w; const V v28 = w[2] * v26;
+        const double v29 = 1.0 - w[1] - w[0];
+        const V v30 = w[1] * v4 + w[0] * v2 + v29 * v12, v31 = w[1] * v5 + w[0] * v3 + v29 * v14,
+            v32 = w[1] * v10 + w[0] * v18 + v29 * v1,
+            v33 = (d9 * v29 + (d17 * w[1] + d13 * w[0])) * v27,
+            v34 = (d10 * v29 + (d18 * w[1] + d14 * w[0])) * v27,
+            v35 = (d11 * v29 + (d19 * w[1] + d15 * w[0])) * v27,
+            v36 = (d12 * v29 + (d20 * w[1] + d16 * w[0])) * v27;
+        softehl_store4(R + 8 * q + 0, (8 * points), v33, v34, v35, v36);
+        softehl_store4(R + 8 * q + 4, (8 * points), v30, v31, v32, v28);
     }
 }
-
-void softehl_touch_side_3_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_touch_side_3_fields_group(points, modes, coordinates + 9 * e, dofs + 21 * e, data + 1 * e, 0, parameters, rule, basis, values + (8 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_touch_side_3_fields_group(points, modes, coordinates + 9 * (n - SOFTEHL_LANES), dofs + 21 * (n - SOFTEHL_LANES), data + 1 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (8 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 9];
-    softehl_pad(X, coordinates, 9, n);
-    double d[SOFTEHL_LANES * 21];
-    softehl_pad(d, dofs, 21, n);
-    double a[SOFTEHL_LANES * 1];
-    softehl_pad(a, data, 1, n);
-    double R[SOFTEHL_LANES * (8 * points)];
-    softehl_touch_side_3_fields(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (8 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_touch_side_3_fields, 9, 21, 1, 0, (8 * points), 0)

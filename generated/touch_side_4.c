@@ -42,314 +42,79 @@
  */
 #include "softehl_kernels.h"
 
-static void softehl_touch_side_4_residual_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
+SOFTEHL_GROUP(softehl_touch_side_4_residual)
 {
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8, X9, X10, X11;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8, X9, X10, X11;
+    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
     softehl_load4(X + 8, 12, &X8, &X9, &X10, &X11);
-    (void)X8; (void)X9; (void)X10; (void)X11;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 28, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 28, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15, d16, d17, d18, d19, d20,
+        d21, d22, d23, d24, d25, d26, d27;
+    softehl_load4(d + 0, 28, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 28, &d4, &d5, &d6, &d7);
     softehl_load4(d + 8, 28, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13, d14, d15;
     softehl_load4(d + 12, 28, &d12, &d13, &d14, &d15);
-    (void)d12; (void)d13; (void)d14; (void)d15;
-    V d16, d17, d18, d19;
     softehl_load4(d + 16, 28, &d16, &d17, &d18, &d19);
-    (void)d16; (void)d17; (void)d18; (void)d19;
-    V d20, d21, d22, d23;
     softehl_load4(d + 20, 28, &d20, &d21, &d22, &d23);
-    (void)d20; (void)d21; (void)d22; (void)d23;
-    V d24, d25, d26, d27;
-    softehl_load4(d + 24, 28, &d24, &d25, &d26, &d27);
-    (void)d24; (void)d25; (void)d26; (void)d27;
-    V a0;
+    softehl_load4(d + 24, 28, &d24, &d25, &d26, &d27); (void)d0; (void)d1; (void)d2; (void)d3;
+    (void)d4; (void)d5; (void)d6; (void)d7; (void)d8; (void)d9; (void)d10; (void)d11; V a0;
     softehl_load1(a + 0, 1, &a0);
-    (void)a0;
     softehl_store4(R + 0, 28, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(R + 4, 28, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(R + 8, 28, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v1 = 1.0 / a0;
-    const V v2 = X6 - X9;
-    const V v3 = X6 - X3;
-    const V v4 = X7 - X4;
-    const V v5 = X7 - X10;
-    const V v6 = X8 - X11;
-    const V v7 = X8 - X5;
-    V s8 = softehl_splat(0.0);
-    V s9 = softehl_splat(0.0);
-    V s10 = softehl_splat(0.0);
-    V s11 = softehl_splat(0.0);
-    V s12 = softehl_splat(0.0);
-    V s13 = softehl_splat(0.0);
-    V s14 = softehl_splat(0.0);
-    V s15 = softehl_splat(0.0);
-    V s16 = softehl_splat(0.0);
-    V s17 = softehl_splat(0.0);
-    V s18 = softehl_splat(0.0);
-    V s19 = softehl_splat(0.0);
-    V s20 = softehl_splat(0.0);
-    V s21 = softehl_splat(0.0);
-    V s22 = softehl_splat(0.0);
-    V s23 = softehl_splat(0.0);
+    const V v1 = 1.0 / a0, v2 = X6 - X9, v3 = X6 - X3, v4 = X7 - X4, v5 = X7 - X10, v6 = X8 - X11,
+        v7 = X8 - X5;
+    V s8 = {0}, s9 = {0}, s10 = {0}, s11 = {0}, s12 = {0}, s13 = {0}, s14 = {0}, s15 = {0},
+        s16 = {0}, s17 = {0}, s18 = {0}, s19 = {0}, s20 = {0}, s21 = {0}, s22 = {0}, s23 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v24 = 1.0 - w[1];
-        const double v25 = 0.25 * w[1];
-        const double v26 = 1.0 + w[1];
-        const double v27 = 1.0 - w[0];
-        const double v28 = 1.0 + w[0];
-        const double v29 = 0.25 * w[0];
-        const double v30 = 0.25 - v25;
-        const double v31 = 0.25 + v25;
-        const double v32 = 0.25 + v29;
-        const double v33 = 0.25 - v29;
-        const V v34 = d12 * v27;
-        const V v35 = d20 * v28;
-        const double v36 = v25 - 0.25;
-        const V v37 = d13 * v27;
-        const V v38 = d21 * v28;
-        const V v39 = X3 * v30;
-        const V v40 = d16 * v28;
-        const V v41 = v34 + v40;
-        const double v42 = v29 - 0.25;
-        const V v43 = d24 * v27;
-        const V v44 = v35 + v43;
-        const V v45 = d17 * v28;
-        const V v46 = v37 + v45;
-        const V v47 = X10 * v33;
-        const V v48 = d25 * v27;
-        const V v49 = v38 + v48;
-        const V v50 = v24 * v41;
-        const V v51 = X9 * v33;
-        const V v52 = X11 * v33;
-        const V v53 = v24 * v46;
-        const V v54 = X4 * v30;
-        const V v55 = X5 * v30;
-        const V v56 = d14 * v27;
-        const V v57 = v26 * v44;
-        const V v58 = v50 + v57;
-        const V v59 = v26 * v49;
-        const V v60 = v53 + v59;
-        const V v61 = d22 * v28;
-        const V v62 = d15 * v27;
-        const V v63 = 0.25 * v58;
-        const V v64 = d18 * v28;
-        const V v65 = v56 + v64;
-        const V v66 = 0.25 * v60;
-        const V v67 = d23 * v28;
-        const V v68 = d26 * v27;
-        const V v69 = v61 + v68;
-        const V v70 = d19 * v28;
-        const V v71 = v62 + v70;
-        const V v72 = v24 * v65;
-        const V v73 = v24 * v1;
-        const V v74 = v28 * v1;
-        const V v75 = v27 * v1;
-        const V v76 = v24 * v71;
-        const V v77 = d27 * v27;
-        const V v78 = v67 + v77;
-        const V v79 = v27 * v73;
-        const V v80 = v28 * v73;
-        const V v81 = v26 * v69;
-        const V v82 = v72 + v81;
-        const V v83 = w[2] * v74;
-        const V v84 = w[2] * v75;
-        const V v85 = v26 * v78;
-        const V v86 = v76 + v85;
-        const V v87 = 0.25 * v82;
-        const V v88 = w[2] * v80;
-        const V v89 = w[2] * v79;
-        const V v90 = 0.25 * v86;
-        const V v91 = v31 * v5;
-        const V v92 = v54 + v91;
-        const V v93 = v31 * v6;
-        const V v94 = v55 + v93;
-        const V v95 = v31 * v2;
-        const V v96 = v39 + v95;
-        const V v97 = v32 * v7;
-        const V v98 = v52 + v97;
-        const V v99 = v32 * v4;
-        const V v100 = v47 + v99;
-        const V v101 = v32 * v3;
-        const V v102 = v51 + v101;
-        const V v103 = X1 * v36;
-        const V v104 = v103 + v92;
-        const V v105 = X1 * v42;
-        const V v106 = v105 + v100;
-        const V v107 = X2 * v36;
-        const V v108 = v107 + v94;
-        const V v109 = X2 * v42;
-        const V v110 = v109 + v98;
-        const V v111 = X0 * v36;
-        const V v112 = v111 + v96;
-        const V v113 = X0 * v42;
-        const V v114 = v113 + v102;
-        const V v115 = v104 * v110;
-        const V v116 = v106 * v112;
-        const V v117 = v108 * v114;
-        const V v118 = v106 * v108;
-        const V v119 = v115 - v118;
-        const V v120 = v104 * v114;
-        const V v121 = v116 - v120;
-        const V v122 = v110 * v112;
-        const V v123 = v117 - v122;
-        const V v124 = v119 * v119;
-        const V v125 = v121 * v121;
-        const V v126 = v124 + v125;
-        const V v127 = v123 * v123;
-        const V v128 = v126 + v127;
-        const V v129 = softehl_vsqrt(v128);
-        const V v130 = 0.25 * v129;
-        const V v131 = v87 * v130;
-        const V v132 = v90 * v130;
-        const V v133 = v63 * v130;
-        const V v134 = v66 * v130;
-        const V v135 = v26 * v133;
-        const V v136 = v26 * v134;
-        const V v137 = v26 * v131;
-        const V v138 = v26 * v132;
-        const V v139 = v88 * v131;
-        s17 += v139;
-        const V v140 = v89 * v131;
-        s21 += v140;
-        const V v141 = v84 * v136;
-        s10 += v141;
-        const V v142 = v83 * v136;
-        s14 += v142;
-        const V v143 = v88 * v134;
-        s18 += v143;
-        const V v144 = v89 * v134;
-        s22 += v144;
-        const V v145 = v84 * v135;
-        s11 += v145;
-        const V v146 = v83 * v135;
-        s15 += v146;
-        const V v147 = v84 * v138;
-        s8 += v147;
-        const V v148 = v83 * v138;
-        s12 += v148;
-        const V v149 = v84 * v137;
-        s9 += v149;
-        const V v150 = v83 * v137;
-        s13 += v150;
-        const V v151 = v88 * v132;
-        s16 += v151;
-        const V v152 = v89 * v132;
-        s20 += v152;
-        const V v153 = v88 * v133;
-        s19 += v153;
-        const V v154 = v89 * v133;
-        s23 += v154;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v24 = 1.0 - w[1], v25 = 0.25 * w[1], v26 = 1.0 + w[1], v27 = 1.0 - w[0],
+            v28 = 1.0 + w[0], v29 = 0.25 * w[0], v30 = 0.25 - v25, v31 = 0.25 + v25,
+            v32 = 0.25 + v29, v33 = 0.25 - v29, v34 = v25 - 0.25, v35 = v29 - 0.25;
+        const V v36 = 0.25 * (v24 * (d12 * v27 + d16 * v28) + v26 * (d20 * v28 + d24 * v27)),
+            v37 = 0.25 * (v24 * (d13 * v27 + d17 * v28) + v26 * (d21 * v28 + d25 * v27)),
+            v38 = v24 * v1, v39 = w[2] * (v28 * v1), v40 = w[2] * (v27 * v1),
+            v41 = 0.25 * (v24 * (d14 * v27 + d18 * v28) + v26 * (d22 * v28 + d26 * v27)),
+            v42 = w[2] * (v28 * v38), v43 = w[2] * (v27 * v38),
+            v44 = 0.25 * (v24 * (d15 * v27 + d19 * v28) + v26 * (d23 * v28 + d27 * v27)),
+            v45 = X1 * v34 + (X4 * v30 + v31 * v5), v46 = X1 * v35 + (X10 * v33 + v32 * v4),
+            v47 = X2 * v34 + (X5 * v30 + v31 * v6), v48 = X2 * v35 + (X11 * v33 + v32 * v7),
+            v49 = X0 * v34 + (X3 * v30 + v31 * v2), v50 = X0 * v35 + (X9 * v33 + v32 * v3),
+            v51 = v45 * v48 - v46 * v47, v52 = v46 * v49 - v45 * v50, v53 = v47 * v50 - v48 * v49,
+            v54 = softehl_vsqrt(v51 * v51 + v52 * v52 + v53 * v53), v55 = 0.25 * v54,
+            v56 = v41 * v55, v57 = v44 * v55, v58 = v36 * v55, v59 = v37 * v55, v60 = v26 * v58,
+            v61 = v26 * v59, v62 = v26 * v56, v63 = v26 * v57, v64 = v42 * v56;
+        s17 += v64; const V v65 = v43 * v56; s21 += v65; const V v66 = v40 * v61; s10 += v66;
+        const V v67 = v39 * v61; s14 += v67; const V v68 = v42 * v59; s18 += v68;
+        const V v69 = v43 * v59; s22 += v69; const V v70 = v40 * v60; s11 += v70;
+        const V v71 = v39 * v60; s15 += v71; const V v72 = v40 * v63; s8 += v72;
+        const V v73 = v39 * v63; s12 += v73; const V v74 = v40 * v62; s9 += v74;
+        const V v75 = v39 * v62; s13 += v75; const V v76 = v42 * v57; s16 += v76;
+        const V v77 = v43 * v57; s20 += v77; const V v78 = v42 * v58; s19 += v78;
+        const V v79 = v43 * v58; s23 += v79;
     }
-    const V v155 = -s8;
-    const V v156 = -s9;
-    const V v157 = -s10;
-    const V v158 = -s11;
-    softehl_store4(R + 24, 28, v158, v157, v156, v155);
-    const V v159 = -s12;
-    const V v160 = -s13;
-    const V v161 = -s14;
-    const V v162 = -s15;
-    softehl_store4(R + 20, 28, v162, v161, v160, v159);
-    const V v163 = -s16;
-    const V v164 = -s17;
-    const V v165 = -s18;
-    const V v166 = -s19;
-    softehl_store4(R + 16, 28, v166, v165, v164, v163);
-    const V v167 = -s20;
-    const V v168 = -s21;
-    const V v169 = -s22;
-    const V v170 = -s23;
-    softehl_store4(R + 12, 28, v170, v169, v168, v167);
+    softehl_store4(R + 24, 28, -s11, -s10, -s9, -s8);
+    softehl_store4(R + 20, 28, -s15, -s14, -s13, -s12);
+    softehl_store4(R + 16, 28, -s19, -s18, -s17, -s16);
+    softehl_store4(R + 12, 28, -s23, -s22, -s21, -s20);
 }
+SOFTEHL_BATCH(softehl_touch_side_4_residual, 12, 28, 1, 0, 28, 0)
 
-void softehl_touch_side_4_residual(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_touch_side_4_tangent)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_touch_side_4_residual_group(points, modes, coordinates + 12 * e, dofs + 28 * e, data + 1 * e, 0, parameters, rule, basis, values + 28 * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_touch_side_4_residual_group(points, modes, coordinates + 12 * (n - SOFTEHL_LANES), dofs + 28 * (n - SOFTEHL_LANES), data + 1 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 28 * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 12];
-    softehl_pad(X, coordinates, 12, n);
-    double d[SOFTEHL_LANES * 28];
-    softehl_pad(d, dofs, 28, n);
-    double a[SOFTEHL_LANES * 1];
-    softehl_pad(a, data, 1, n);
-    double R[SOFTEHL_LANES * 28];
-    softehl_touch_side_4_residual(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < 28 * n; ++i) values[i] = R[i];
-#endif
-}
-
-static void softehl_touch_side_4_tangent_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8, X9, X10, X11;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8, X9, X10, X11;
+    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
     softehl_load4(X + 8, 12, &X8, &X9, &X10, &X11);
-    (void)X8; (void)X9; (void)X10; (void)X11;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 28, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 28, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15, d16, d17, d18, d19, d20,
+        d21, d22, d23, d24, d25, d26, d27;
+    softehl_load4(d + 0, 28, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 28, &d4, &d5, &d6, &d7);
     softehl_load4(d + 8, 28, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13, d14, d15;
     softehl_load4(d + 12, 28, &d12, &d13, &d14, &d15);
-    (void)d12; (void)d13; (void)d14; (void)d15;
-    V d16, d17, d18, d19;
     softehl_load4(d + 16, 28, &d16, &d17, &d18, &d19);
-    (void)d16; (void)d17; (void)d18; (void)d19;
-    V d20, d21, d22, d23;
     softehl_load4(d + 20, 28, &d20, &d21, &d22, &d23);
-    (void)d20; (void)d21; (void)d22; (void)d23;
-    V d24, d25, d26, d27;
-    softehl_load4(d + 24, 28, &d24, &d25, &d26, &d27);
-    (void)d24; (void)d25; (void)d26; (void)d27;
-    V a0;
+    softehl_load4(d + 24, 28, &d24, &d25, &d26, &d27); (void)d0; (void)d1; (void)d2; (void)d3;
+    (void)d4; (void)d5; (void)d6; (void)d7; (void)d8; (void)d9; (void)d10; (void)d11; V a0;
     softehl_load1(a + 0, 1, &a0);
-    (void)a0;
     softehl_store4(R + 0, 28, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(R + 4, 28, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(R + 8, 28, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
@@ -485,659 +250,181 @@ static void softehl_touch_side_4_tangent_group(
     softehl_store4(K + 756, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 760, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
     softehl_store4(K + 764, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    const V v1 = 1.0 / a0;
-    const V v2 = X6 - X9;
-    const V v3 = X6 - X3;
-    const V v4 = X7 - X4;
-    const V v5 = X7 - X10;
-    const V v6 = X8 - X11;
-    const V v7 = X8 - X5;
-    const V v8 = 0.25 * v1;
-    V s9 = softehl_splat(0.0);
-    V s10 = softehl_splat(0.0);
-    V s11 = softehl_splat(0.0);
-    V s12 = softehl_splat(0.0);
-    V s13 = softehl_splat(0.0);
-    V s14 = softehl_splat(0.0);
-    V s15 = softehl_splat(0.0);
-    V s16 = softehl_splat(0.0);
-    V s17 = softehl_splat(0.0);
-    V s18 = softehl_splat(0.0);
-    V s19 = softehl_splat(0.0);
-    V s20 = softehl_splat(0.0);
-    V s21 = softehl_splat(0.0);
-    V s22 = softehl_splat(0.0);
-    V s23 = softehl_splat(0.0);
-    V s24 = softehl_splat(0.0);
-    V s25 = softehl_splat(0.0);
-    V s26 = softehl_splat(0.0);
-    V s27 = softehl_splat(0.0);
-    V s28 = softehl_splat(0.0);
-    V s29 = softehl_splat(0.0);
-    V s30 = softehl_splat(0.0);
-    V s31 = softehl_splat(0.0);
-    V s32 = softehl_splat(0.0);
-    V s33 = softehl_splat(0.0);
-    V s34 = softehl_splat(0.0);
-    V s35 = softehl_splat(0.0);
-    V s36 = softehl_splat(0.0);
-    V s37 = softehl_splat(0.0);
-    V s38 = softehl_splat(0.0);
-    V s39 = softehl_splat(0.0);
-    V s40 = softehl_splat(0.0);
+    const V v1 = 1.0 / a0, v2 = X6 - X9, v3 = X6 - X3, v4 = X7 - X4, v5 = X7 - X10, v6 = X8 - X11,
+        v7 = X8 - X5, v8 = 0.25 * v1;
+    V s9 = {0}, s10 = {0}, s11 = {0}, s12 = {0}, s13 = {0}, s14 = {0}, s15 = {0}, s16 = {0},
+        s17 = {0}, s18 = {0}, s19 = {0}, s20 = {0}, s21 = {0}, s22 = {0}, s23 = {0}, s24 = {0},
+        s25 = {0}, s26 = {0}, s27 = {0}, s28 = {0}, s29 = {0}, s30 = {0}, s31 = {0}, s32 = {0},
+        s33 = {0}, s34 = {0}, s35 = {0}, s36 = {0}, s37 = {0}, s38 = {0}, s39 = {0}, s40 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v41 = 1.0 - w[1];
-        const double v42 = 0.25 * w[1];
-        const double v43 = 1.0 + w[1];
-        const double v44 = 1.0 - w[0];
-        const double v45 = 1.0 + w[0];
-        const double v46 = 0.25 * w[0];
-        const double v47 = 0.25 - v42;
-        const double v48 = 0.25 + v42;
-        const double v49 = 0.25 + v46;
-        const double v50 = 0.25 - v46;
-        const V v51 = d12 * v44;
-        const V v52 = d20 * v45;
-        const double v53 = v42 - 0.25;
-        const V v54 = d13 * v44;
-        const V v55 = d21 * v45;
-        const V v56 = X3 * v47;
-        const V v57 = d16 * v45;
-        const V v58 = v51 + v57;
-        const double v59 = v46 - 0.25;
-        const V v60 = d24 * v44;
-        const V v61 = v52 + v60;
-        const V v62 = d17 * v45;
-        const V v63 = v54 + v62;
-        const V v64 = X10 * v50;
-        const V v65 = d25 * v44;
-        const V v66 = v55 + v65;
-        const V v67 = v41 * v58;
-        const V v68 = X9 * v50;
-        const V v69 = X11 * v50;
-        const V v70 = v41 * v63;
-        const V v71 = X4 * v47;
-        const V v72 = X5 * v47;
-        const V v73 = d14 * v44;
-        const V v74 = v43 * v61;
-        const V v75 = v67 + v74;
-        const V v76 = v43 * v66;
-        const V v77 = v70 + v76;
-        const V v78 = d22 * v45;
-        const V v79 = d15 * v44;
-        const V v80 = 0.25 * v75;
-        const V v81 = d18 * v45;
-        const V v82 = v73 + v81;
-        const V v83 = 0.25 * v77;
-        const V v84 = d23 * v45;
-        const V v85 = d26 * v44;
-        const V v86 = v78 + v85;
-        const V v87 = d19 * v45;
-        const V v88 = v79 + v87;
-        const V v89 = v41 * v82;
-        const V v90 = v41 * v1;
-        const V v91 = v45 * v1;
-        const V v92 = v44 * v1;
-        const V v93 = v41 * v88;
-        const V v94 = d27 * v44;
-        const V v95 = v84 + v94;
-        const V v96 = v44 * v90;
-        const V v97 = v45 * v90;
-        const V v98 = v43 * v86;
-        const V v99 = v89 + v98;
-        const V v100 = w[2] * v91;
-        const V v101 = w[2] * v92;
-        const V v102 = v43 * v95;
-        const V v103 = v93 + v102;
-        const V v104 = 0.25 * v99;
-        const V v105 = w[2] * v97;
-        const V v106 = w[2] * v96;
-        const V v107 = 0.25 * v103;
-        const V v108 = v48 * v5;
-        const V v109 = v71 + v108;
-        const V v110 = v48 * v6;
-        const V v111 = v72 + v110;
-        const V v112 = v48 * v2;
-        const V v113 = v56 + v112;
-        const V v114 = v49 * v7;
-        const V v115 = v69 + v114;
-        const V v116 = v49 * v4;
-        const V v117 = v64 + v116;
-        const V v118 = v49 * v3;
-        const V v119 = v68 + v118;
-        const V v120 = X1 * v53;
-        const V v121 = v120 + v109;
-        const V v122 = X1 * v59;
-        const V v123 = v122 + v117;
-        const V v124 = X2 * v53;
-        const V v125 = v124 + v111;
-        const V v126 = X2 * v59;
-        const V v127 = v126 + v115;
-        const V v128 = X0 * v53;
-        const V v129 = v128 + v113;
-        const V v130 = X0 * v59;
-        const V v131 = v130 + v119;
-        const V v132 = v121 * v127;
-        const V v133 = v123 * v129;
-        const V v134 = v125 * v131;
-        const V v135 = v123 * v125;
-        const V v136 = v132 - v135;
-        const V v137 = v121 * v131;
-        const V v138 = v133 - v137;
-        const V v139 = v127 * v129;
-        const V v140 = v134 - v139;
-        const V v141 = v136 * v136;
-        const V v142 = v138 * v138;
-        const V v143 = v141 + v142;
-        const V v144 = v140 * v140;
-        const V v145 = v143 + v144;
-        const V v146 = softehl_vsqrt(v145);
-        const V v147 = 0.25 * v146;
-        const V v148 = v104 * v147;
-        const V v149 = v107 * v147;
-        const V v150 = v80 * v147;
-        const V v151 = v83 * v147;
-        const V v152 = v43 * v150;
-        const V v153 = v43 * v151;
-        const V v154 = v43 * v148;
-        const V v155 = v43 * v149;
-        const V v156 = v105 * v148;
-        s18 += v156;
-        const V v157 = v106 * v148;
-        s22 += v157;
-        const V v158 = v101 * v153;
-        s11 += v158;
-        const V v159 = v100 * v153;
-        s15 += v159;
-        const V v160 = v105 * v151;
-        s19 += v160;
-        const V v161 = v106 * v151;
-        s23 += v161;
-        const V v162 = v101 * v152;
-        s12 += v162;
-        const V v163 = v100 * v152;
-        s16 += v163;
-        const V v164 = v101 * v155;
-        s9 += v164;
-        const V v165 = v100 * v155;
-        s13 += v165;
-        const V v166 = v101 * v154;
-        s10 += v166;
-        const V v167 = v100 * v154;
-        s14 += v167;
-        const V v168 = v105 * v149;
-        s17 += v168;
-        const V v169 = v106 * v149;
-        s21 += v169;
-        const V v170 = v105 * v150;
-        s20 += v170;
-        const V v171 = v106 * v150;
-        s24 += v171;
-        const double v172 = v41 * v44;
-        const double v173 = v41 * v45;
-        const V v174 = v41 * v8;
-        const V v175 = v45 * v8;
-        const V v176 = v44 * v8;
-        const double v177 = v45 * v43;
-        const double v178 = v44 * v43;
-        const V v179 = v44 * v174;
-        const V v180 = v45 * v174;
-        const V v181 = v172 * v147;
-        const V v182 = v173 * v147;
-        const V v183 = v147 * v177;
-        const V v184 = v147 * v178;
-        const V v185 = w[2] * v175;
-        const V v186 = w[2] * v176;
-        const V v187 = w[2] * v179;
-        const V v188 = w[2] * v180;
-        const V v189 = v43 * v181;
-        const V v190 = v43 * v182;
-        const V v191 = v43 * v183;
-        const V v192 = v43 * v184;
-        const V v193 = v185 * v189;
-        s33 += v193;
-        const V v194 = v186 * v189;
-        s37 += v194;
-        const V v195 = v187 * v181;
-        s25 += v195;
-        const V v196 = v188 * v181;
-        s29 += v196;
-        const V v197 = v187 * v182;
-        s26 += v197;
-        const V v198 = v188 * v182;
-        s30 += v198;
-        const V v199 = v187 * v183;
-        s27 += v199;
-        const V v200 = v187 * v184;
-        s28 += v200;
-        const V v201 = v188 * v183;
-        s31 += v201;
-        const V v202 = v188 * v184;
-        s32 += v202;
-        const V v203 = v185 * v190;
-        s34 += v203;
-        const V v204 = v186 * v190;
-        s38 += v204;
-        const V v205 = v185 * v191;
-        s35 += v205;
-        const V v206 = v186 * v191;
-        s39 += v206;
-        const V v207 = v185 * v192;
-        s36 += v207;
-        const V v208 = v186 * v192;
-        s40 += v208;
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v41 = 1.0 - w[1], v42 = 0.25 * w[1], v43 = 1.0 + w[1], v44 = 1.0 - w[0],
+            v45 = 1.0 + w[0], v46 = 0.25 * w[0], v47 = 0.25 - v42, v48 = 0.25 + v42,
+            v49 = 0.25 + v46, v50 = 0.25 - v46, v51 = v42 - 0.25, v52 = v46 - 0.25;
+        const V v53 = 0.25 * (v41 * (d12 * v44 + d16 * v45) + v43 * (d20 * v45 + d24 * v44)),
+            v54 = 0.25 * (v41 * (d13 * v44 + d17 * v45) + v43 * (d21 * v45 + d25 * v44)),
+            v55 = v41 * v1, v56 = w[2] * (v45 * v1), v57 = w[2] * (v44 * v1),
+            v58 = 0.25 * (v41 * (d14 * v44 + d18 * v45) + v43 * (d22 * v45 + d26 * v44)),
+            v59 = w[2] * (v45 * v55), v60 = w[2] * (v44 * v55),
+            v61 = 0.25 * (v41 * (d15 * v44 + d19 * v45) + v43 * (d23 * v45 + d27 * v44)),
+            v62 = X1 * v51 + (X4 * v47 + v48 * v5), v63 = X1 * v52 + (X10 * v50 + v49 * v4),
+            v64 = X2 * v51 + (X5 * v47 + v48 * v6), v65 = X2 * v52 + (X11 * v50 + v49 * v7),
+            v66 = X0 * v51 + (X3 * v47 + v48 * v2), v67 = X0 * v52 + (X9 * v50 + v49 * v3),
+            v68 = v62 * v65 - v63 * v64, v69 = v63 * v66 - v62 * v67, v70 = v64 * v67 - v65 * v66,
+            v71 = softehl_vsqrt(v68 * v68 + v69 * v69 + v70 * v70), v72 = 0.25 * v71,
+            v73 = v58 * v72, v74 = v61 * v72, v75 = v53 * v72, v76 = v54 * v72, v77 = v43 * v75,
+            v78 = v43 * v76, v79 = v43 * v73, v80 = v43 * v74, v81 = v59 * v73;
+        s18 += v81; const V v82 = v60 * v73; s22 += v82; const V v83 = v57 * v78; s11 += v83;
+        const V v84 = v56 * v78; s15 += v84; const V v85 = v59 * v76; s19 += v85;
+        const V v86 = v60 * v76; s23 += v86; const V v87 = v57 * v77; s12 += v87;
+        const V v88 = v56 * v77; s16 += v88; const V v89 = v57 * v80; s9 += v89;
+        const V v90 = v56 * v80; s13 += v90; const V v91 = v57 * v79; s10 += v91;
+        const V v92 = v56 * v79; s14 += v92; const V v93 = v59 * v74; s17 += v93;
+        const V v94 = v60 * v74; s21 += v94; const V v95 = v59 * v75; s20 += v95;
+        const V v96 = v60 * v75; s24 += v96;
+        const V v97 = v41 * v8, v98 = v41 * v44 * v72, v99 = v41 * v45 * v72,
+            v100 = v72 * (v45 * v43), v101 = v72 * (v44 * v43), v102 = w[2] * (v45 * v8),
+            v103 = w[2] * (v44 * v8), v104 = w[2] * (v44 * v97), v105 = w[2] * (v45 * v97),
+            v106 = v43 * v98, v107 = v43 * v99, v108 = v43 * v100, v109 = v43 * v101;
+        s33 += v102 * v106; s37 += v103 * v106; s25 += v104 * v98; s29 += v105 * v98;
+        s26 += v104 * v99; s30 += v105 * v99; s27 += v104 * v100; s28 += v104 * v101;
+        s31 += v105 * v100; s32 += v105 * v101; s34 += v102 * v107; s38 += v103 * v107;
+        s35 += v102 * v108; s39 += v103 * v108; s36 += v102 * v109; s40 += v103 * v109;
     }
-    const V v209 = -s9;
-    const V v210 = -s10;
-    const V v211 = -s11;
-    const V v212 = -s12;
-    softehl_store4(R + 24, 28, v212, v211, v210, v209);
-    const V v213 = -s13;
-    const V v214 = -s14;
-    const V v215 = -s15;
-    const V v216 = -s16;
-    softehl_store4(R + 20, 28, v216, v215, v214, v213);
-    const V v217 = -s17;
-    const V v218 = -s18;
-    const V v219 = -s19;
-    const V v220 = -s20;
-    softehl_store4(R + 16, 28, v220, v219, v218, v217);
-    const V v221 = -s21;
-    const V v222 = -s22;
-    const V v223 = -s23;
-    const V v224 = -s24;
-    softehl_store4(R + 12, 28, v224, v223, v222, v221);
-    const V v225 = -s25;
-    softehl_store4(K + 348, 784, v225, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 376, 784, softehl_splat(0.0), v225, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 404, 784, softehl_splat(0.0), softehl_splat(0.0), v225, softehl_splat(0.0));
-    softehl_store4(K + 432, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v225);
-    const V v226 = -s26;
-    softehl_store4(K + 352, 784, v226, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 380, 784, softehl_splat(0.0), v226, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 408, 784, softehl_splat(0.0), softehl_splat(0.0), v226, softehl_splat(0.0));
-    softehl_store4(K + 436, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v226);
-    const V v227 = -s27;
-    softehl_store4(K + 356, 784, v227, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 384, 784, softehl_splat(0.0), v227, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 412, 784, softehl_splat(0.0), softehl_splat(0.0), v227, softehl_splat(0.0));
-    softehl_store4(K + 440, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v227);
-    const V v228 = -s28;
-    softehl_store4(K + 360, 784, v228, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 388, 784, softehl_splat(0.0), v228, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 416, 784, softehl_splat(0.0), softehl_splat(0.0), v228, softehl_splat(0.0));
-    softehl_store4(K + 444, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v228);
-    const V v229 = -s29;
-    softehl_store4(K + 460, 784, v229, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 488, 784, softehl_splat(0.0), v229, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 516, 784, softehl_splat(0.0), softehl_splat(0.0), v229, softehl_splat(0.0));
-    softehl_store4(K + 544, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v229);
-    const V v230 = -s30;
-    softehl_store4(K + 464, 784, v230, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 492, 784, softehl_splat(0.0), v230, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 520, 784, softehl_splat(0.0), softehl_splat(0.0), v230, softehl_splat(0.0));
-    softehl_store4(K + 548, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v230);
-    const V v231 = -s31;
-    softehl_store4(K + 468, 784, v231, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 496, 784, softehl_splat(0.0), v231, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 524, 784, softehl_splat(0.0), softehl_splat(0.0), v231, softehl_splat(0.0));
-    softehl_store4(K + 552, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v231);
-    const V v232 = -s32;
-    softehl_store4(K + 472, 784, v232, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 500, 784, softehl_splat(0.0), v232, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 528, 784, softehl_splat(0.0), softehl_splat(0.0), v232, softehl_splat(0.0));
-    softehl_store4(K + 556, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v232);
-    const V v233 = -s33;
-    softehl_store4(K + 572, 784, v233, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 600, 784, softehl_splat(0.0), v233, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 628, 784, softehl_splat(0.0), softehl_splat(0.0), v233, softehl_splat(0.0));
-    softehl_store4(K + 656, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v233);
-    const V v234 = -s34;
-    softehl_store4(K + 576, 784, v234, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 604, 784, softehl_splat(0.0), v234, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 632, 784, softehl_splat(0.0), softehl_splat(0.0), v234, softehl_splat(0.0));
-    softehl_store4(K + 660, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v234);
-    const V v235 = -s35;
-    softehl_store4(K + 580, 784, v235, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 608, 784, softehl_splat(0.0), v235, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 636, 784, softehl_splat(0.0), softehl_splat(0.0), v235, softehl_splat(0.0));
-    softehl_store4(K + 664, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v235);
-    const V v236 = -s36;
-    softehl_store4(K + 584, 784, v236, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 612, 784, softehl_splat(0.0), v236, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 640, 784, softehl_splat(0.0), softehl_splat(0.0), v236, softehl_splat(0.0));
-    softehl_store4(K + 668, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v236);
-    const V v237 = -s37;
-    softehl_store4(K + 684, 784, v237, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 712, 784, softehl_splat(0.0), v237, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 740, 784, softehl_splat(0.0), softehl_splat(0.0), v237, softehl_splat(0.0));
-    softehl_store4(K + 768, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v237);
-    const V v238 = -s38;
-    softehl_store4(K + 688, 784, v238, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 716, 784, softehl_splat(0.0), v238, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 744, 784, softehl_splat(0.0), softehl_splat(0.0), v238, softehl_splat(0.0));
-    softehl_store4(K + 772, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v238);
-    const V v239 = -s39;
-    softehl_store4(K + 692, 784, v239, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 720, 784, softehl_splat(0.0), v239, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 748, 784, softehl_splat(0.0), softehl_splat(0.0), v239, softehl_splat(0.0));
-    softehl_store4(K + 776, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v239);
-    const V v240 = -s40;
-    softehl_store4(K + 696, 784, v240, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 724, 784, softehl_splat(0.0), v240, softehl_splat(0.0), softehl_splat(0.0));
-    softehl_store4(K + 752, 784, softehl_splat(0.0), softehl_splat(0.0), v240, softehl_splat(0.0));
-    softehl_store4(K + 780, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v240);
+    softehl_store4(R + 24, 28, -s12, -s11, -s10, -s9);
+    softehl_store4(R + 20, 28, -s16, -s15, -s14, -s13);
+    softehl_store4(R + 16, 28, -s20, -s19, -s18, -s17);
+    softehl_store4(R + 12, 28, -s24, -s23, -s22, -s21); const V v110 = -s25;
+    softehl_store4(K + 348, 784, v110, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 376, 784, softehl_splat(0.0), v110, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 404, 784, softehl_splat(0.0), softehl_splat(0.0), v110, softehl_splat(0.0));
+    softehl_store4(K + 432, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v110);
+    const V v111 = -s26;
+    softehl_store4(K + 352, 784, v111, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 380, 784, softehl_splat(0.0), v111, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 408, 784, softehl_splat(0.0), softehl_splat(0.0), v111, softehl_splat(0.0));
+    softehl_store4(K + 436, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v111);
+    const V v112 = -s27;
+    softehl_store4(K + 356, 784, v112, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 384, 784, softehl_splat(0.0), v112, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 412, 784, softehl_splat(0.0), softehl_splat(0.0), v112, softehl_splat(0.0));
+    softehl_store4(K + 440, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v112);
+    const V v113 = -s28;
+    softehl_store4(K + 360, 784, v113, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 388, 784, softehl_splat(0.0), v113, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 416, 784, softehl_splat(0.0), softehl_splat(0.0), v113, softehl_splat(0.0));
+    softehl_store4(K + 444, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v113);
+    const V v114 = -s29;
+    softehl_store4(K + 460, 784, v114, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 488, 784, softehl_splat(0.0), v114, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 516, 784, softehl_splat(0.0), softehl_splat(0.0), v114, softehl_splat(0.0));
+    softehl_store4(K + 544, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v114);
+    const V v115 = -s30;
+    softehl_store4(K + 464, 784, v115, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 492, 784, softehl_splat(0.0), v115, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 520, 784, softehl_splat(0.0), softehl_splat(0.0), v115, softehl_splat(0.0));
+    softehl_store4(K + 548, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v115);
+    const V v116 = -s31;
+    softehl_store4(K + 468, 784, v116, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 496, 784, softehl_splat(0.0), v116, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 524, 784, softehl_splat(0.0), softehl_splat(0.0), v116, softehl_splat(0.0));
+    softehl_store4(K + 552, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v116);
+    const V v117 = -s32;
+    softehl_store4(K + 472, 784, v117, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 500, 784, softehl_splat(0.0), v117, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 528, 784, softehl_splat(0.0), softehl_splat(0.0), v117, softehl_splat(0.0));
+    softehl_store4(K + 556, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v117);
+    const V v118 = -s33;
+    softehl_store4(K + 572, 784, v118, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 600, 784, softehl_splat(0.0), v118, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 628, 784, softehl_splat(0.0), softehl_splat(0.0), v118, softehl_splat(0.0));
+    softehl_store4(K + 656, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v118);
+    const V v119 = -s34;
+    softehl_store4(K + 576, 784, v119, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 604, 784, softehl_splat(0.0), v119, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 632, 784, softehl_splat(0.0), softehl_splat(0.0), v119, softehl_splat(0.0));
+    softehl_store4(K + 660, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v119);
+    const V v120 = -s35;
+    softehl_store4(K + 580, 784, v120, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 608, 784, softehl_splat(0.0), v120, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 636, 784, softehl_splat(0.0), softehl_splat(0.0), v120, softehl_splat(0.0));
+    softehl_store4(K + 664, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v120);
+    const V v121 = -s36;
+    softehl_store4(K + 584, 784, v121, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 612, 784, softehl_splat(0.0), v121, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 640, 784, softehl_splat(0.0), softehl_splat(0.0), v121, softehl_splat(0.0));
+    softehl_store4(K + 668, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v121);
+    const V v122 = -s37;
+    softehl_store4(K + 684, 784, v122, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 712, 784, softehl_splat(0.0), v122, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 740, 784, softehl_splat(0.0), softehl_splat(0.0), v122, softehl_splat(0.0));
+    softehl_store4(K + 768, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v122);
+    const V v123 = -s38;
+    softehl_store4(K + 688, 784, v123, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 716, 784, softehl_splat(0.0), v123, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 744, 784, softehl_splat(0.0), softehl_splat(0.0), v123, softehl_splat(0.0));
+    softehl_store4(K + 772, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v123);
+    const V v124 = -s39;
+    softehl_store4(K + 692, 784, v124, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 720, 784, softehl_splat(0.0), v124, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 748, 784, softehl_splat(0.0), softehl_splat(0.0), v124, softehl_splat(0.0));
+    softehl_store4(K + 776, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v124);
+    const V v125 = -s40;
+    softehl_store4(K + 696, 784, v125, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 724, 784, softehl_splat(0.0), v125, softehl_splat(0.0), softehl_splat(0.0));
+    softehl_store4(K + 752, 784, softehl_splat(0.0), softehl_splat(0.0), v125, softehl_splat(0.0));
+    softehl_store4(K + 780, 784, softehl_splat(0.0), softehl_splat(0.0), softehl_splat(0.0), v125);
 }
+SOFTEHL_BATCH(softehl_touch_side_4_tangent, 12, 28, 1, 0, 28, (28 * 28))
 
-void softehl_touch_side_4_tangent(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
+SOFTEHL_GROUP(softehl_touch_side_4_fields)
 {
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_touch_side_4_tangent_group(points, modes, coordinates + 12 * e, dofs + 28 * e, data + 1 * e, 0, parameters, rule, basis, values + 28 * e, tangent + (28 * 28) * e);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_touch_side_4_tangent_group(points, modes, coordinates + 12 * (n - SOFTEHL_LANES), dofs + 28 * (n - SOFTEHL_LANES), data + 1 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + 28 * (n - SOFTEHL_LANES), tangent + (28 * 28) * (n - SOFTEHL_LANES));
-        return;
-    }
-    double X[SOFTEHL_LANES * 12];
-    softehl_pad(X, coordinates, 12, n);
-    double d[SOFTEHL_LANES * 28];
-    softehl_pad(d, dofs, 28, n);
-    double a[SOFTEHL_LANES * 1];
-    softehl_pad(a, data, 1, n);
-    double R[SOFTEHL_LANES * 28];
-    double K[SOFTEHL_LANES * (28 * 28)];
-    softehl_touch_side_4_tangent(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, K);
-    for (ptrdiff_t i = 0; i < 28 * n; ++i) values[i] = R[i];
-    for (ptrdiff_t i = 0; i < (28 * 28) * n; ++i) tangent[i] = K[i];
-#endif
-}
-
-static void softehl_touch_side_4_fields_group(
-    ptrdiff_t points, ptrdiff_t modes, const double *restrict X,
-    const double *restrict d, const double *restrict a, const double *restrict t,
-    const double *restrict parameters, const double *restrict rule, const double *restrict basis,
-    double *restrict R, double *restrict K)
-{
-    (void)points, (void)modes, (void)X, (void)d, (void)a, (void)t, (void)parameters, (void)rule, (void)basis, (void)R, (void)K;
-    V X0, X1, X2, X3;
-    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3);
-    (void)X0; (void)X1; (void)X2; (void)X3;
-    V X4, X5, X6, X7;
-    softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
-    (void)X4; (void)X5; (void)X6; (void)X7;
-    V X8, X9, X10, X11;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5, X6, X7, X8, X9, X10, X11;
+    softehl_load4(X + 0, 12, &X0, &X1, &X2, &X3); softehl_load4(X + 4, 12, &X4, &X5, &X6, &X7);
     softehl_load4(X + 8, 12, &X8, &X9, &X10, &X11);
-    (void)X8; (void)X9; (void)X10; (void)X11;
-    V d0, d1, d2, d3;
-    softehl_load4(d + 0, 28, &d0, &d1, &d2, &d3);
-    (void)d0; (void)d1; (void)d2; (void)d3;
-    V d4, d5, d6, d7;
-    softehl_load4(d + 4, 28, &d4, &d5, &d6, &d7);
-    (void)d4; (void)d5; (void)d6; (void)d7;
-    V d8, d9, d10, d11;
+    V d0, d1, d2, d3, d4, d5, d6, d7, d8, d9, d10, d11, d12, d13, d14, d15, d16, d17, d18, d19, d20,
+        d21, d22, d23, d24, d25, d26, d27;
+    softehl_load4(d + 0, 28, &d0, &d1, &d2, &d3); softehl_load4(d + 4, 28, &d4, &d5, &d6, &d7);
     softehl_load4(d + 8, 28, &d8, &d9, &d10, &d11);
-    (void)d8; (void)d9; (void)d10; (void)d11;
-    V d12, d13, d14, d15;
     softehl_load4(d + 12, 28, &d12, &d13, &d14, &d15);
-    (void)d12; (void)d13; (void)d14; (void)d15;
-    V d16, d17, d18, d19;
     softehl_load4(d + 16, 28, &d16, &d17, &d18, &d19);
-    (void)d16; (void)d17; (void)d18; (void)d19;
-    V d20, d21, d22, d23;
     softehl_load4(d + 20, 28, &d20, &d21, &d22, &d23);
-    (void)d20; (void)d21; (void)d22; (void)d23;
-    V d24, d25, d26, d27;
-    softehl_load4(d + 24, 28, &d24, &d25, &d26, &d27);
-    (void)d24; (void)d25; (void)d26; (void)d27;
-    V a0;
-    softehl_load1(a + 0, 1, &a0);
-    (void)a0;
-    const V v1 = X0 + d0;
-    const V v2 = X1 + d1;
-    const V v3 = X2 + d2;
-    const V v4 = X3 + d3;
-    const V v5 = X4 + d4;
-    const V v6 = X5 + d5;
-    const V v7 = X6 + d6;
-    const V v8 = X6 - X3;
-    const V v9 = X7 + d7;
-    const V v10 = X7 - X4;
-    const V v11 = X9 + d9;
-    const V v12 = X6 - X9;
-    const V v13 = X8 + d8;
-    const V v14 = X8 - X5;
-    const V v15 = X7 - X10;
-    const V v16 = X8 - X11;
-    const V v17 = X11 + d11;
-    const V v18 = v7 - v11;
-    const V v19 = X10 + d10;
-    const V v20 = v7 - v4;
-    const V v21 = v9 - v5;
-    const V v22 = v9 - v19;
-    const V v23 = v13 - v6;
-    const V v24 = v13 - v17;
+    softehl_load4(d + 24, 28, &d24, &d25, &d26, &d27); V a0; softehl_load1(a + 0, 1, &a0); (void)a0;
+    const V v1 = X0 + d0, v2 = X1 + d1, v3 = X2 + d2, v4 = X3 + d3, v5 = X4 + d4, v6 = X5 + d5,
+        v7 = X6 + d6, v8 = X6 - X3, v9 = X7 + d7, v10 = X7 - X4, v11 = X9 + d9, v12 = X6 - X9,
+        v13 = X8 + d8, v14 = X8 - X5, v15 = X7 - X10, v16 = X8 - X11, v17 = X11 + d11,
+        v18 = v7 - v11, v19 = X10 + d10, v20 = v7 - v4, v21 = v9 - v5, v22 = v9 - v19,
+        v23 = v13 - v6, v24 = v13 - v17;
     for (ptrdiff_t q = 0; q < points; ++q) {
-        const double *restrict w = rule + 3 * q;
-        (void)w;
-        const double v25 = 1.0 - w[1];
-        const double v26 = 0.25 * w[1];
-        const double v27 = 1.0 + w[1];
-        const double v28 = 1.0 - w[0];
-        const double v29 = 1.0 + w[0];
-        const double v30 = 0.25 * w[0];
-        const double v31 = 0.25 - v26;
-        const double v32 = 0.25 + v26;
-        const double v33 = 0.25 * v25;
-        const double v34 = 0.25 * v27;
-        const double v35 = 0.25 + v30;
-        const double v36 = 0.25 - v30;
-        const double v37 = v26 - 0.25;
-        const V v38 = d12 * v28;
-        const double v39 = v28 * v33;
-        const double v40 = v29 * v33;
-        const double v41 = v29 * v34;
-        const double v42 = v28 * v34;
-        const double v43 = v30 - 0.25;
-        const V v44 = X3 * v31;
-        const V v45 = d16 * v29;
-        const V v46 = v38 + v45;
-        const V v47 = X10 * v36;
-        const V v48 = X9 * v36;
-        const V v49 = X4 * v31;
-        const V v50 = X5 * v31;
-        const V v51 = X11 * v36;
-        const V v52 = v7 * v41;
-        const V v53 = v9 * v41;
-        const V v54 = v13 * v41;
-        const V v55 = v25 * v46;
-        const V v56 = d20 * v29;
-        const V v57 = d17 * v29;
-        const V v58 = d21 * v29;
-        const V v59 = d18 * v29;
-        const V v60 = d22 * v29;
-        const V v61 = d19 * v29;
-        const V v62 = d23 * v29;
-        const V v63 = d24 * v28;
-        const V v64 = v56 + v63;
-        const V v65 = d13 * v28;
-        const V v66 = v65 + v57;
-        const V v67 = d25 * v28;
-        const V v68 = v58 + v67;
-        const V v69 = d14 * v28;
-        const V v70 = v69 + v59;
-        const V v71 = d26 * v28;
-        const V v72 = v60 + v71;
-        const V v73 = d15 * v28;
-        const V v74 = v73 + v61;
-        const V v75 = d27 * v28;
-        const V v76 = v62 + v75;
-        const V v77 = v27 * v64;
-        const V v78 = v55 + v77;
-        const V v79 = v25 * v66;
-        const V v80 = v25 * v70;
-        const V v81 = v25 * v74;
-        const V v82 = v27 * v68;
-        const V v83 = v79 + v82;
-        const V v84 = 0.25 * v78;
-        const V v85 = v27 * v72;
-        const V v86 = v80 + v85;
-        const V v87 = v27 * v76;
-        const V v88 = v81 + v87;
-        const V v89 = 0.25 * v83;
-        const V v90 = 0.25 * v86;
-        const V v91 = 0.25 * v88;
-        const V v92 = v36 * v19;
-        const V v93 = v19 * v42;
-        const V v94 = v53 + v93;
-        const V v95 = v11 * v42;
-        const V v96 = v52 + v95;
-        const V v97 = v36 * v11;
-        const V v98 = v17 * v42;
-        const V v99 = v54 + v98;
-        const V v100 = v36 * v17;
-        const V v101 = v32 * v16;
-        const V v102 = v50 + v101;
-        const V v103 = v32 * v18;
-        const V v104 = v32 * v22;
-        const V v105 = v32 * v24;
-        const V v106 = v35 * v14;
-        const V v107 = v51 + v106;
-        const V v108 = v35 * v21;
-        const V v109 = v92 + v108;
-        const V v110 = v35 * v20;
-        const V v111 = v97 + v110;
-        const V v112 = v35 * v23;
-        const V v113 = v100 + v112;
-        const V v114 = X2 * v37;
-        const V v115 = v114 + v102;
-        const V v116 = X2 * v43;
-        const V v117 = v116 + v107;
-        const V v118 = v1 * v37;
-        const V v119 = v118 + v103;
-        const V v120 = v1 * v43;
-        const V v121 = v120 + v111;
-        const V v122 = v1 * v39;
-        const V v123 = v96 + v122;
-        const V v124 = v2 * v43;
-        const V v125 = v124 + v109;
-        const V v126 = v2 * v37;
-        const V v127 = v126 + v104;
-        const V v128 = v2 * v39;
-        const V v129 = v94 + v128;
-        const V v130 = v3 * v39;
-        const V v131 = v99 + v130;
-        const V v132 = v3 * v43;
-        const V v133 = v132 + v113;
-        const V v134 = v3 * v37;
-        const V v135 = v134 + v105;
-        const V v136 = v31 * v4;
-        const V v137 = v136 + v119;
-        const V v138 = v4 * v40;
-        const V v139 = v138 + v123;
-        const V v140 = v31 * v5;
-        const V v141 = v140 + v127;
-        const V v142 = v5 * v40;
-        const V v143 = v142 + v129;
-        const V v144 = v6 * v40;
-        const V v145 = v144 + v131;
-        const V v146 = v31 * v6;
-        const V v147 = v146 + v135;
-        const V v148 = v125 * v137;
-        const V v149 = v133 * v141;
-        const V v150 = v121 * v141;
-        const V v151 = v148 - v150;
-        const V v152 = v121 * v147;
-        const V v153 = v125 * v147;
-        const V v154 = v149 - v153;
-        const V v155 = v133 * v137;
-        const V v156 = v152 - v155;
-        const V v157 = v151 * v151;
-        const V v158 = X0 * v37;
-        const V v159 = v44 + v158;
-        const V v160 = X0 * v43;
-        const V v161 = v48 + v160;
-        const V v162 = X1 * v43;
-        const V v163 = v47 + v162;
-        const V v164 = X1 * v37;
-        const V v165 = v49 + v164;
-        const V v166 = v32 * v12;
-        const V v167 = v166 + v159;
-        const V v168 = v32 * v15;
-        const V v169 = v168 + v165;
-        const V v170 = v154 * v154;
-        const V v171 = v157 + v170;
-        const V v172 = v35 * v8;
-        const V v173 = v172 + v161;
-        const V v174 = v35 * v10;
-        const V v175 = v174 + v163;
-        const V v176 = v156 * v156;
-        const V v177 = v171 + v176;
-        const V v178 = v169 * v117;
-        const V v179 = softehl_vsqrt(v177);
-        const V v180 = v173 * v115;
-        const V v181 = v175 * v115;
-        const V v182 = v178 - v181;
-        const V v183 = v167 * v175;
-        const V v184 = v167 * v117;
-        const V v185 = v180 - v184;
-        const V v186 = v173 * v169;
-        const V v187 = v183 - v186;
-        const V v188 = v185 * v185;
-        const V v189 = v187 * v187;
-        const V v190 = v189 + v188;
-        const V v191 = v182 * v182;
-        const V v192 = v190 + v191;
-        const V v193 = softehl_vsqrt(v192);
-        const V v194 = 1.0 / v179;
-        const V v195 = w[2] * v179;
-        const V v196 = v84 * v193;
-        const V v197 = v194 * v196;
-        const V v198 = v89 * v193;
-        const V v199 = v194 * v198;
-        const V v200 = v90 * v193;
-        const V v201 = v194 * v200;
-        const V v202 = v91 * v193;
-        const V v203 = v194 * v202;
-        softehl_store4(R + 8 * q + 0, (8 * points), v197, v199, v201, v203);
-        softehl_store4(R + 8 * q + 4, (8 * points), v139, v143, v145, v195);
+        const double *restrict w = rule + 3 * q; (void)w;
+        const double v25 = 1.0 - w[1], v26 = 0.25 * w[1], v27 = 1.0 + w[1], v28 = 1.0 - w[0],
+            v29 = 1.0 + w[0], v30 = 0.25 * w[0], v31 = 0.25 - v26, v32 = 0.25 + v26,
+            v33 = 0.25 * v25, v34 = 0.25 * v27, v35 = 0.25 + v30, v36 = 0.25 - v30,
+            v37 = v26 - 0.25, v38 = v28 * v33, v39 = v29 * v33, v40 = v29 * v34, v41 = v28 * v34,
+            v42 = v30 - 0.25;
+        const V v43 = 0.25 * (v25 * (d12 * v28 + d16 * v29) + v27 * (d20 * v29 + d24 * v28)),
+            v44 = 0.25 * (v25 * (d13 * v28 + d17 * v29) + v27 * (d21 * v29 + d25 * v28)),
+            v45 = 0.25 * (v25 * (d14 * v28 + d18 * v29) + v27 * (d22 * v29 + d26 * v28)),
+            v46 = 0.25 * (v25 * (d15 * v28 + d19 * v29) + v27 * (d23 * v29 + d27 * v28)),
+            v47 = X2 * v37 + (X5 * v31 + v32 * v16), v48 = X2 * v42 + (X11 * v36 + v35 * v14),
+            v49 = v1 * v42 + (v36 * v11 + v35 * v20), v50 = v2 * v42 + (v36 * v19 + v35 * v21),
+            v51 = v3 * v42 + (v36 * v17 + v35 * v23), v52 = v31 * v4 + (v1 * v37 + v32 * v18),
+            v53 = v4 * v39 + (v7 * v40 + v11 * v41 + v1 * v38),
+            v54 = v31 * v5 + (v2 * v37 + v32 * v22),
+            v55 = v5 * v39 + (v9 * v40 + v19 * v41 + v2 * v38),
+            v56 = v6 * v39 + (v13 * v40 + v17 * v41 + v3 * v38),
+            v57 = v31 * v6 + (v3 * v37 + v32 * v24), v58 = v50 * v52 - v49 * v54,
+            v59 = v51 * v54 - v50 * v57, v60 = v49 * v57 - v51 * v52,
+            v61 = v32 * v12 + (X3 * v31 + X0 * v37), v62 = v32 * v15 + (X4 * v31 + X1 * v37),
+            v63 = v35 * v8 + (X9 * v36 + X0 * v42), v64 = v35 * v10 + (X10 * v36 + X1 * v42),
+            v65 = softehl_vsqrt(v58 * v58 + v59 * v59 + v60 * v60), v66 = v62 * v48 - v64 * v47,
+            v67 = v63 * v47 - v61 * v48, v68 = v61 * v64 - v63 * v62,
+            v69 = softehl_vsqrt(v68 * v68 + v67 * v67 + v66 * v66), v70 = 1.0 / v65,
+            v71 = w[2] * v65, v72 = v70 * (v43 * v69), v73 = v70 * (v44 * v69),
+            v74 = v70 * (v45 * v69), v75 = v70 * (v46 * v69);
+        softehl_store4(R + 8 * q + 0, (8 * points), v72, v73, v74, v75);
+        softehl_store4(R + 8 * q + 4, (8 * points), v53, v55, v56, v71);
     }
 }
-
-void softehl_touch_side_4_fields(
-    ptrdiff_t n, ptrdiff_t points, ptrdiff_t modes,
-    const double *restrict coordinates, const double *restrict dofs,
-    const double *restrict data, const double *restrict parameters,
-    const double *restrict direction,
-    const double *restrict rule, const double *restrict basis,
-    double *restrict values, double *restrict tangent)
-{
-    (void)coordinates, (void)data, (void)direction, (void)tangent;
-    if (n < 1) return;
-    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)
-        softehl_touch_side_4_fields_group(points, modes, coordinates + 12 * e, dofs + 28 * e, data + 1 * e, 0, parameters, rule, basis, values + (8 * points) * e, 0);
-#if SOFTEHL_LANES > 1
-    if (n >= SOFTEHL_LANES) {
-        if (n % SOFTEHL_LANES) softehl_touch_side_4_fields_group(points, modes, coordinates + 12 * (n - SOFTEHL_LANES), dofs + 28 * (n - SOFTEHL_LANES), data + 1 * (n - SOFTEHL_LANES), 0, parameters, rule, basis, values + (8 * points) * (n - SOFTEHL_LANES), 0);
-        return;
-    }
-    double X[SOFTEHL_LANES * 12];
-    softehl_pad(X, coordinates, 12, n);
-    double d[SOFTEHL_LANES * 28];
-    softehl_pad(d, dofs, 28, n);
-    double a[SOFTEHL_LANES * 1];
-    softehl_pad(a, data, 1, n);
-    double R[SOFTEHL_LANES * (8 * points)];
-    softehl_touch_side_4_fields(SOFTEHL_LANES, points, modes, X, d, a, parameters, 0, rule, basis, R, 0);
-    for (ptrdiff_t i = 0; i < (8 * points) * n; ++i) values[i] = R[i];
-#endif
-}
+SOFTEHL_BATCH(softehl_touch_side_4_fields, 12, 28, 1, 0, (8 * points), 0)

@@ -41,9 +41,9 @@ def function(
     if fallible:
         _mark(p, task)
     p.line(1, "}")
-    body = "\n".join(_unused(p.lines) + p.lines)
-    text = f"{abi.declaration(definition.name, task)}\n{{\n{body}\n}}\n"
-    return text, p.temporaries
+    body = "\n".join([*_unused(p.lines), p.text()])
+    name = abi.function_name(definition.name, task)
+    return f"SOFTEHL_KERNEL({name})\n{{\n{body}\n}}\n", p.temporaries
 
 
 def _in_loop(x: Entry) -> bool:
@@ -109,7 +109,7 @@ def _store_after(p: Printer, task: str, entries: Sequence[Entry]) -> None:
 
 def _loop(p: Printer, loop: Loop, task: str, entries: Sequence[Entry]) -> None:
     for s in loop.sums:
-        p.line(2, f"double {p.fresh(s, 's')} = 0.0;")
+        p.line(2, f"double {p.fresh(s, 's')} = {{0}};")
     p.line(2, "for (ptrdiff_t q = 0; q < points; ++q) {")
     p.line(3, f"const double *restrict w = rule + {p.d.rule.dimension + 1} * q;")
     p.line(3, "(void)w;")
@@ -126,7 +126,7 @@ def _loop(p: Printer, loop: Loop, task: str, entries: Sequence[Entry]) -> None:
             basis.gather(p, 3, "t", "t", design_width(p.d))
     p.block(3, loop.body)
     for s in loop.sums:
-        p.line(3, f"{p.ref(s)} += {p.ref(s.args[0])};")
+        p.line(3, f"{p.ref(s)} += {p.bare(s.args[0])};")
     here = [x for x in entries if x.node in loop.outputs]
     if here and task in abi.AT_POINTS:
         _store_fields(p, here)

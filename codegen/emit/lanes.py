@@ -77,7 +77,7 @@ class LanePrinter(Printer):
 
     def value(self, n: Node) -> str:
         """Reference that is a vector in any case."""
-        return f"softehl_splat({self.ref(n)})" if self.is_scalar(n) else self.ref(n)
+        return f"softehl_splat({self.bare(n)})" if self.is_scalar(n) else self.bare(n)
 
     def same(self, s: Same) -> str:
         return self.ref(s.new) if self.is_scalar(s.old) else self.value(s.new)
@@ -98,16 +98,18 @@ class LanePrinter(Printer):
             self.line(depth, f"const M {self.fresh(s)} = {right};")
         else:
             right = self.expression(s)
+            if self.hides(s, right):
+                return
             self.line(depth, f"const V {self.fresh(s)} = {right};")
 
     def expression(self, n: Node) -> str:
         if not self.is_scalar(n):
             if n.op in FUNCTIONS:
-                return f"softehl_v{n.op}({self.ref(n.args[0])})"
+                return f"softehl_v{n.op}({self.bare(n.args[0])})"
             if n.op in _OF_TWO:
                 return f"softehl_v{n.op}({', '.join(map(self.value, n.args))})"
             if n.op is Op.POW:
-                return f"softehl_vpow({self.ref(n.args[0])}, {number(float(n.payload))})"  # type: ignore[arg-type]
+                return f"softehl_vpow({self.bare(n.args[0])}, {number(float(n.payload))})"  # type: ignore[arg-type]
         return super().expression(n)
 
     def call(self, depth: int, n: Node, routine: Routine) -> None:

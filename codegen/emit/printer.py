@@ -1,11 +1,13 @@
-"""Scheduled values as lines of C: one value, one line.  Nothing is optimised here."""
+"""Scheduled values as lines of C.  Nothing is optimised here."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from softehl.codegen import abi
-from softehl.codegen.emit.schedule import If, Same, Statement
+from softehl.codegen.emit.filled import filled
+from softehl.codegen.emit.once import used_once
+from softehl.codegen.emit.schedule import If, Same, Schedule, Statement
 from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, Place, Routine
 from softehl.codegen.language.definition import Definition
 
@@ -47,6 +49,17 @@ _ARRAYS = {
     "interpolated direction": "t{}",
 }
 
+_LONG = 64
+"""Length of an expression that gets a name of its own, so that lines stay readable."""
+_BARE: dict[Op, tuple[frozenset[Op], ...]] = {
+    Op.ADD: (frozenset({Op.ADD, Op.SUB, Op.MUL, Op.RECIP, Op.NEG}), frozenset({Op.MUL, Op.RECIP})),
+    Op.SUB: (frozenset({Op.ADD, Op.SUB, Op.MUL, Op.RECIP, Op.NEG}), frozenset({Op.MUL, Op.RECIP})),
+    Op.MUL: (frozenset({Op.MUL, Op.RECIP}), frozenset()),
+    Op.NEG: (frozenset(),),
+    Op.RECIP: (frozenset(),),
+}
+"""Operands, by place, that an operation takes without parentheses; others take all of them."""
+
 
 def number(value: float) -> str:
     """A double that C reads back exactly."""
@@ -64,6 +77,16 @@ class Printer:
         self.lines: list[str] = []
         self.names: dict[Node, str] = {}
         self.temporaries = 0
+        self.once: frozenset[Node] = frozenset()
+        self.inside: dict[Node, str] = {}
+
+    def read(self, plan: Schedule, outputs: Iterable[Node], stored: Iterable[Node] = ()) -> None:
+        """Know the values that are used once, see `once.used_once`."""
+        self.once = used_once(plan, outputs, stored)
+
+    def text(self) -> str:
+        """All lines, filled."""
+        return "\n".join(filled(self.lines))
 
     def line(self, depth: int, text: str) -> None:
         self.lines.append("    " * depth + text)
@@ -73,7 +96,11 @@ class Printer:
             return number(float(n.value))
         if isinstance(n.payload, Input):
             return _ARRAYS[n.payload.array].format(n.payload.index)
-        return self.names[n]
+        return f"({self.inside[n]})" if n in self.inside else self.names[n]
+
+    def bare(self, n: Node) -> str:
+        """The same where no parentheses are needed."""
+        return self.inside[n] if n in self.inside else self.ref(n)
 
     def fresh(self, n: Node, letter: str = "v") -> str:
         self.temporaries += 1
@@ -94,8 +121,17 @@ class Printer:
     def statement(self, depth: int, s: Node) -> None:
         """A value of its own."""
         right = self.expression(s)
+        if self.hides(s, right):
+            return
         kind = "int" if s.op in BOOLEAN else "double"
         self.line(depth, f"const {kind} {self.fresh(s)} = {right};")
+
+    def hides(self, n: Node, expression: str) -> bool:
+        """True, and no line, for a short expression that the only line that needs it will hold."""
+        if n not in self.once or len(expression) > _LONG:
+            return False
+        self.inside[n] = expression
+        return True
 
     def same(self, s: Same) -> str:
         """Reference to a value under another name."""
@@ -120,7 +156,13 @@ class Printer:
             return f"{self.ref(n.args[0])}[{n.payload.index}]"
         if n.op is Op.POW:
             return f"pow({self.ref(n.args[0])}, {number(float(n.payload))})"  # type: ignore[arg-type]
-        return _FORMATS[n.op].format(*(self.ref(a) for a in n.args))
+        return _FORMATS[n.op].format(*(self.operand(n, k) for k in range(len(n.args))))
+
+    def operand(self, n: Node, k: int) -> str:
+        """The k-th operand of an expression."""
+        a, places = n.args[k], _BARE.get(n.op)
+        loose = places is None or a.op in places[k]
+        return self.bare(a) if loose else self.ref(a)
 
     def branch(self, depth: int, s: If) -> None:
         names = [self.fresh(n) for n in s.merged]

@@ -61,11 +61,13 @@ class Body:
     def text(self, depth: int, targets: Sequence[str]) -> str:
         """The values and their stores."""
         p = self.printer
-        for stage in schedule(self.roots).stages:
+        plan = schedule(self.roots)
+        p.read(plan, self.roots)
+        for stage in plan.stages:
             p.block(depth, stage.before)
         for target, n in zip(targets, self.roots, strict=True):
             p.line(depth, f"{target} = {p.value(n)};")
-        return "\n".join(p.lines)
+        return p.text()
 
 
 def newton_values(r: Newton) -> tuple[list[Node], list[str]]:

@@ -1,9 +1,7 @@
 """A kernel for several elements at once: every value is a vector with one lane per element.
 
 A `group` function handles as many elements as a vector has lanes: pointers, stages, loops over the
-points, stores.  The public function walks over the batch; what is left is the last group once more,
-moved back so that it ends with the batch (the same values are written again), and a batch smaller
-than a group is filled up with its last element.
+points, stores.  The public function walks over the batch (`softehl_batch` in the header).
 """
 
 from __future__ import annotations
@@ -14,34 +12,15 @@ from collections.abc import Iterable, Sequence
 from softehl.codegen import abi
 from softehl.codegen.derive.outputs import Entry
 from softehl.codegen.emit import basis
+from softehl.codegen.emit.batch import functions, widths
 from softehl.codegen.emit.lanes import LanePrinter
 from softehl.codegen.emit.order import ADDITIONS
-from softehl.codegen.emit.printer import (
-    data_expression,
-    design_width,
-    direction_expression,
-    dofs_expression,
-)
+from softehl.codegen.emit.printer import design_width, dofs_expression
 from softehl.codegen.emit.schedule import If, Loop, Same, Schedule, Statement, flat
 from softehl.codegen.graph.graph import FREE, Input, Node, Op
 from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Definition
 
-GROUP = (
-    ("ptrdiff_t", "points"),
-    ("ptrdiff_t", "modes"),
-    ("const double *restrict", "X"),
-    ("const double *restrict", "d"),
-    ("const double *restrict", "a"),
-    ("const double *restrict", "t"),
-    ("const double *restrict", "parameters"),
-    ("const double *restrict", "rule"),
-    ("const double *restrict", "basis"),
-    ("double *restrict", "R"),
-    ("double *restrict", "K"),
-)
-WIDE = 256
-"""Unknowns of an element above which a group of tangents has no room on a stack."""
 _READ = {"coordinates": "X", "dofs": "d", "data": "a", "direction": "t"}
 
 
@@ -51,31 +30,7 @@ def function(
     """C text of one kernel (group function and batch loop) and the number of its temporaries."""
     p = LanePrinter(definition)
     _Group(p, task, entries).write(plan)
-    name = abi.function_name(definition.name, task)
-    used = "\n".join(p.lines)
-    idle = ", ".join(f"(void){n}" for _, n in GROUP)
-    arguments = ",\n    ".join(
-        ", ".join(f"{kind} {n}".replace("* ", "*") for kind, n in GROUP[k : k + 3])
-        for k in range(0, len(GROUP), 3)
-    )
-    group = f"static void {name}_group(\n    {arguments})\n{{\n    {idle};\n{used}\n}}\n"
-    return f"{group}\n{batch(definition, task)}", p.temporaries
-
-
-def widths(d: Definition, task: str) -> dict[str, str]:
-    """Values per element of each array, "0" for those that a task does not use."""
-    size = dofs_expression(d)
-    along = direction_expression(d, task) or "0"
-    values = {abi.Task.ENERGY: "1"}
-    values |= dict.fromkeys(abi.AT_POINTS, f"({len(d.fields)} * points)")
-    return {
-        "coordinates": str(d.coordinate_width),
-        "dofs": size,
-        "data": data_expression(d),
-        "direction": along,
-        "values": values.get(abi.Task(task), size) if task in set(abi.Task) else size,
-        "tangent": f"({size} * {size})" if task == abi.Task.TANGENT else "0",
-    }
+    return functions(definition, task, p.text()), p.temporaries
 
 
 def along_basis(x: Entry) -> bool:
@@ -91,10 +46,13 @@ class _Group:
         self.widths = widths(p.d, task)
         self.scattered = any(map(along_basis, entries))
         self.stores = _Stores(p, self._targets())
-        self.fallible = any(n.op is Op.CALL for n in reachable([x.node for x in entries]))
+        needed = reachable([x.node for x in entries])
+        self.fallible = any(n.op is Op.CALL for n in needed)
+        self.inputs = {p.ref(n) for n in needed if isinstance(n.payload, Input)}
 
     def write(self, plan: Schedule) -> None:
         p = self.p
+        p.read(plan, [x.node for x in self.entries], self.stores.once())
         if self.fallible:
             p.line(1, "M failed = softehl_mask(0);")
         self._loads()
@@ -150,13 +108,16 @@ class _Group:
         ]
 
     def _load(self, depth: int, letter: str, count: int, width: str, pointer: str) -> None:
+        names = [f"{letter}{k}" for k in range(count)]
+        for name in names:
+            self.p.line(depth, f"V {name};")
         for start in range(0, count, 4):
-            names = [f"{letter}{k}" for k in range(start, min(start + 4, count))]
-            self.p.line(depth, f"V {', '.join(names)};")
-            pointers = ", ".join(f"&{n}" for n in names)
+            pointers = [f"&{n}" for n in names[start : start + 4]]
             source = f"{pointer} + {start}, {width}"
-            self.p.line(depth, f"softehl_load{len(names)}({source}, {pointers});")
-            self.p.line(depth, " ".join(f"(void){n};" for n in names))
+            self.p.line(depth, f"softehl_load{len(pointers)}({source}, {', '.join(pointers)});")
+        for name in names:
+            if name not in self.inputs:
+                self.p.line(depth, f"(void){name};")
 
     def _written(self) -> dict[str, str]:
         arrays = {"R": self.widths["values"], "K": self.widths["tangent"]}
@@ -183,8 +144,8 @@ class _Group:
     def _loop(self, loop: Loop) -> None:
         p, d = self.p, self.p.d
         for s in loop.sums:
-            kind, start = ("double", "0.0") if p.is_scalar(s) else ("V", p.zero)
-            p.line(1, f"{kind} {p.fresh(s, 's')} = {start};")
+            kind = "double" if p.is_scalar(s) else "V"
+            p.line(1, f"{kind} {p.fresh(s, 's')} = {{0}};")
         p.line(1, "for (ptrdiff_t q = 0; q < points; ++q) {")
         p.line(2, f"const double *restrict w = rule + {d.rule.dimension + 1} * q;")
         p.line(2, "(void)w;")
@@ -219,7 +180,7 @@ class _Group:
         for statement in loop.body:
             if isinstance(statement, Node) and statement in terms:
                 for s, sign, term in terms[statement]:
-                    p.line(2, f"{p.ref(s)} {sign}= {p.ref(term)};")
+                    p.line(2, f"{p.ref(s)} {sign}= {p.bare(term)};")
                 continue
             if isinstance(statement, Same) and statement.new in terms:
                 continue
@@ -229,7 +190,7 @@ class _Group:
 
     def _add(self, sums: Sequence[Node]) -> None:
         for s in sums:
-            self.p.line(2, f"{self.p.ref(s)} += {self.p.ref(s.args[0])};")
+            self.p.line(2, f"{self.p.ref(s)} += {self.p.bare(s.args[0])};")
 
     def _fields(self, entries: Sequence[Entry]) -> None:
         """Values at the point `q`: neighbours together."""
@@ -309,6 +270,11 @@ class _Stores:
         self.missing: list[int] = []
         self.waiting: dict[Node, list[int]] = {}
 
+    def once(self) -> list[Node]:
+        """Values that stand at one place."""
+        places = Counter(n for _, nodes in self.targets for n in nodes)
+        return [n for n, count in places.items() if count == 1]
+
     def start(self) -> None:
         """Print what is known from the beginning."""
         for k, (_, nodes) in enumerate(self.targets):
@@ -331,45 +297,3 @@ class _Stores:
         target, nodes = self.targets[k]
         values = ", ".join(map(self.p.value, nodes))
         self.p.line(1, f"softehl_store{len(nodes)}({target}, {values});")
-
-
-def batch(d: Definition, task: str) -> str:
-    """The public function: full groups, the last one moved back, or one that is filled up."""
-    name = abi.function_name(d.name, task)
-    wide = widths(d, task)
-    letters = {**_READ, "values": "R", "tangent": "K"}
-
-    def call(at: str) -> str:
-        place = {letters[k]: f"{k} + {w} * {at}" if w != "0" else "0" for k, w in wide.items()}
-        given = [place.get(n, n) for _, n in GROUP]
-        return f"{name}_group({', '.join(given)});"
-
-    lines = [
-        abi.declaration(d.name, task),
-        "{",
-        "    (void)coordinates, (void)data, (void)direction, (void)tangent;",
-        "    if (n < 1) return;",
-        "    for (ptrdiff_t e = 0; e + SOFTEHL_LANES <= n; e += SOFTEHL_LANES)",
-        f"        {call('e')}",
-        "#if SOFTEHL_LANES > 1",
-        "    if (n >= SOFTEHL_LANES) {",
-        f"        if (n % SOFTEHL_LANES) {call('(n - SOFTEHL_LANES)')}",
-        "        return;",
-        "    }",
-    ]
-    used = {k: w for k, w in wide.items() if w != "0"}
-    for array, width in used.items():
-        kept = "static _Thread_local " if array == "tangent" and len(d.unknowns) > WIDE else ""
-        lines.append(f"    {kept}double {letters[array]}[SOFTEHL_LANES * {width}];")
-        if array in _READ:
-            lines.append(f"    softehl_pad({letters[array]}, {array}, {width}, n);")
-    names = [a.split()[-1].strip("*") for a in " ".join(abi.ARGUMENTS).split(",")]
-    arguments = [letters.get(k, k) if k in used or k not in wide else "0" for k in names]
-    lines.append(f"    {name}({', '.join(['SOFTEHL_LANES', *arguments[1:]])});")
-    for array in ("values", "tangent"):
-        if array in used:
-            letter, width = letters[array], wide[array]
-            lines.append(
-                f"    for (ptrdiff_t i = 0; i < {width} * n; ++i) {array}[i] = {letter}[i];"
-            )
-    return "\n".join([*lines, "#endif", "}", ""])

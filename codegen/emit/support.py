@@ -4,96 +4,8 @@ V is one value of every element of a group, M a mask of elements: all bits of a 
 With one lane both are scalars, and nothing is padded or transposed.
 """
 
-LANES = r"""
-/* One lane per element: 8 with AVX-512, else 4.  Without vector extensions a group is one element.
-   A file of kernels in which 8 lanes do not pay says SOFTEHL_MOST_LANES 4. */
-#if !defined(SOFTEHL_LANES) && defined(__GNUC__) && defined(__has_builtin)
-#if __has_builtin(__builtin_shufflevector)
-#if defined(__AVX512F__) && !defined(SOFTEHL_MOST_LANES)
-#define SOFTEHL_LANES 8
-#else
-#define SOFTEHL_LANES 4
-#endif
-#endif
-#endif
-#ifndef SOFTEHL_LANES
-#define SOFTEHL_LANES 1
-#endif
-"""
-
-ROOTS = r"""
-/* a^(-1/3) for a > 0, not-a-number otherwise. */
-static inline double softehl_rcbrt(double a)
-{
-    return a > 0.0 ? 1.0 / cbrt(a) : NAN;
-}
-"""
-
-_FOUR = r"""
-#if SOFTEHL_LANES > 1
-typedef double V __attribute__((vector_size(8 * SOFTEHL_LANES)));
-typedef long long M __attribute__((vector_size(8 * SOFTEHL_LANES)));
-typedef double softehl_four __attribute__((vector_size(32)));
-typedef double softehl_row __attribute__((vector_size(32), aligned(8)));
-typedef long long softehl_half __attribute__((vector_size(32)));
-
-/* Whether any lane of a mask is set. */
-static inline int softehl_any4(softehl_half m)
-{
-#ifdef __AVX__
-    return __builtin_ia32_movmskpd256((softehl_four)m) != 0;
-#else
-    return ((m[0] | m[1]) | (m[2] | m[3])) != 0;
-#endif
-}
-#endif
-
-#if SOFTEHL_LANES == 4
-#define SOFTEHL_EACH(F) {F(0), F(1), F(2), F(3)}
-#define SOFTEHL_EVEN 0, 4, 2, 6
-#define SOFTEHL_ODD 1, 5, 3, 7
-#define SOFTEHL_LOW 0, 1, 4, 5
-#define SOFTEHL_HIGH 2, 3, 6, 7
-#define softehl_any(m) softehl_any4(m)
-
-static inline V softehl_rows(const double *p, ptrdiff_t width)
-{
-    (void)width;
-    return *(const softehl_row *)p;
-}
-
-static inline void softehl_put(double *p, ptrdiff_t width, V a)
-{
-    (void)width;
-    *(softehl_row *)p = a;
-}
-#elif SOFTEHL_LANES == 8
-#define SOFTEHL_EACH(F) {F(0), F(1), F(2), F(3), F(4), F(5), F(6), F(7)}
-#define SOFTEHL_EVEN 0, 8, 2, 10, 4, 12, 6, 14
-#define SOFTEHL_ODD 1, 9, 3, 11, 5, 13, 7, 15
-#define SOFTEHL_LOW 0, 1, 8, 9, 4, 5, 12, 13
-#define SOFTEHL_HIGH 2, 3, 10, 11, 6, 7, 14, 15
-
-static inline int softehl_any(M m)
-{
-    return softehl_any4(__builtin_shufflevector(m, m, 0, 1, 2, 3) |
-                        __builtin_shufflevector(m, m, 4, 5, 6, 7));
-}
-
-/* The rows of lanes l and l + 4, four values each. */
-static inline V softehl_rows(const double *p, ptrdiff_t width)
-{
-    const softehl_four a = *(const softehl_row *)p, b = *(const softehl_row *)(p + 4 * width);
-    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
-}
-
-static inline void softehl_put(double *p, ptrdiff_t width, V a)
-{
-    *(softehl_row *)p = __builtin_shufflevector(a, a, 0, 1, 2, 3);
-    *(softehl_row *)(p + 4 * width) = __builtin_shufflevector(a, a, 4, 5, 6, 7);
-}
-#endif
-"""
+from softehl.codegen.emit.support_batch import ARRAYS, BATCH
+from softehl.codegen.emit.support_lanes import FOUR, LANES, ROOTS
 
 _VECTORS = r"""
 #if SOFTEHL_LANES > 1
@@ -344,39 +256,4 @@ static inline void softehl_store3(double *p, ptrdiff_t width, V a, V b, V c)
 }
 """
 
-_ARRAYS = r"""
-/* Rows of `width` values of the elements of a group, to one V for each value and back. */
-static inline void softehl_gather(V *to, const double *from, ptrdiff_t width)
-{
-    ptrdiff_t k = 0;
-    for (; k + 4 <= width; k += 4)
-        softehl_load4(from + k, width, to + k, to + k + 1, to + k + 2, to + k + 3);
-    for (; k < width; ++k) to[k] = softehl_column(from + k, width);
-}
-
-static inline void softehl_scatter(double *to, const V *from, ptrdiff_t width)
-{
-    ptrdiff_t k = 0;
-    for (; k + 4 <= width; k += 4)
-        softehl_store4(to + k, width, from[k], from[k + 1], from[k + 2], from[k + 3]);
-    for (; k < width; ++k) softehl_store1(to + k, width, from[k]);
-}
-
-/* Not-a-number for all values of the elements in which something failed. */
-static inline void softehl_spoil(M failed, double *p, ptrdiff_t width)
-{
-    for (int l = 0; l < SOFTEHL_LANES; ++l)
-        for (ptrdiff_t k = 0; k < width && softehl_lane(failed, l) != 0; ++k)
-            p[l * width + k] = NAN;
-}
-
-/* Fill a group with `count` elements of `width` values and repeat the last one. */
-static inline void softehl_pad(double *to, const double *from, ptrdiff_t width, ptrdiff_t count)
-{
-    for (ptrdiff_t e = 0; e < SOFTEHL_LANES; ++e)
-        for (ptrdiff_t k = 0; k < width; ++k)
-            to[e * width + k] = from[(e < count ? e : count - 1) * width + k];
-}
-"""
-
-TEXT = LANES + ROOTS + _FOUR + _VECTORS + _ARRAYS
+TEXT = LANES + ROOTS + FOUR + _VECTORS + ARRAYS + BATCH

@@ -10,10 +10,10 @@ from collections.abc import Iterable, Sequence
 
 from softehl.codegen import abi
 from softehl.codegen.derive.outputs import Entry
-from softehl.codegen.emit import support as support_c
 from softehl.codegen.emit.printer import Printer, number
 from softehl.codegen.emit.routines import called
 from softehl.codegen.emit.schedule import Loop, Schedule
+from softehl.codegen.emit.support_lanes import ROOTS
 from softehl.codegen.graph.graph import Input, Node
 from softehl.codegen.language.definition import Definition
 
@@ -98,6 +98,7 @@ def function(
     if fallible:
         p.line(1, "int failed = 0;")
     values = {} if task == abi.Task.FIELDS else {_target(p, task, x): x.node for x in entries}
+    p.read(plan, [x.node for x in entries])
     for stage in plan.stages:
         p.block(1, stage.before)
         if stage.loop is not None:
@@ -110,7 +111,7 @@ def function(
     if fallible:
         _mark(p, task)
     declaration = abi.ufcx_declaration(definition.name, task)
-    body = "\n".join(p.lines)
+    body = p.text()
     return f"{declaration};\n\n{declaration}\n{{\n{body}\n}}\n", p.temporaries
 
 
@@ -139,7 +140,7 @@ def _loop(p: Printer, loop: Loop, fields: Sequence[Entry]) -> None:
     p.line(1, f"for (int q = 0; q < {len(p.d.rule.weights)}; ++q) {{")
     p.block(2, loop.body)
     for s in loop.sums:
-        p.line(2, f"{p.ref(s)} += {p.ref(s.args[0])};")
+        p.line(2, f"{p.ref(s)} += {p.bare(s.args[0])};")
     for x in fields:
         if x.node in loop.outputs:
             _store(p, 2, x)
@@ -175,7 +176,7 @@ def _mark(p: _CellPrinter, task: str) -> None:
 
 def source(definition: Definition, functions: Iterable[str], before: Iterable[str] = ()) -> str:
     """The C file of a kernel family; `before` are the routines that its functions call."""
-    head = [_banner(definition), "#include <math.h>", "#include <stdint.h>", support_c.ROOTS]
+    head = [_banner(definition), "#include <math.h>", "#include <stdint.h>", ROOTS]
     return "\n".join([*head, *before, *functions])
 
 

@@ -27,13 +27,13 @@ def files(page: Interface, *, single: bool = False) -> tuple[dict[str, str], Ker
     """
     kernel = pipeline.compile_model(page.definition)
     lanes = ["#define SOFTEHL_LANES 1\n"] if single else []
-    declarations = [abi.declaration(page.name, t) for t in kernel.functions]
+    names = [abi.function_name(page.name, t) for t in kernel.functions]
     return {
         f"{page.name}.h": header(page),
         f"{page.name}.c": "\n".join(
             [*lanes, *kernel.shared.values(), kernel.text, functions(page)]
         ),
-        source.HEADER: source.header(declarations, signed=False),
+        source.HEADER: source.header(names, signed=False),
     }, kernel
 
 

@@ -41,7 +41,8 @@ FLAGS = (*COMMON, "-march=native")
 PLAIN = (*COMMON, *(["-march=x86-64"] if platform.machine() in ("x86_64", "AMD64") else []))
 """For every processor of this platform: what a wheel carries."""
 LARGE, LIGHT = 20_000, "-O1"
-"""Values in a file above which more than -O1 costs minutes, and the code gets slower."""
+"""Operations in a file above which more than -O1 costs minutes, and the code gets slower."""
+OPERATORS = (" + ", " - ", " * ", " / ")
 STRICT = ("-Wall", "-Wextra", "-Werror")
 """For our own tests alone: another compiler may warn of what ours does not."""
 SHARED = "pairs_"
@@ -87,6 +88,11 @@ def compiler() -> list[str]:
         raise BuildError(f"CC={given!r} is no command ({reason}): set CC to a C compiler") from None
 
 
+def large(text: str) -> bool:
+    """True for a file of C with more operations than `LARGE`."""
+    return sum(map(text.count, OPERATORS)) > LARGE
+
+
 def build(
     directory: Path, *, flags: Sequence[str] = FLAGS, extra: Sequence[str] = ()
 ) -> dict[str, float]:
@@ -104,7 +110,7 @@ def build(
         def compiled(source: Path, to: Path) -> float:
             start = perf_counter()
             text = source.read_text(encoding="utf-8")
-            light = [LIGHT] if text.count(" const ") > LARGE else []
+            light = [LIGHT] if large(text) else []
             words = [*compiling, *light, *extra]
             if source.name.startswith(SHARED):
                 shutil.copyfile(_shared(source, text, words, flags), to)

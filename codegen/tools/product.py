@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from softehl.codegen import abi
@@ -16,15 +16,24 @@ from softehl.codegen.pipeline import Function, KernelSource
 def files(kernels: Iterable[KernelSource]) -> dict[str, str]:
     """Every file of `generated/`: C, header, signature, manifest."""
     kernels = list(kernels)
-    declarations = [abi.declaration(k.definition.name, t) for k in kernels for t in k.functions]
+    names = [abi.function_name(k.definition.name, t) for k in kernels for t in k.functions]
     out = {f"{k.definition.name}.c": k.text for k in kernels}
     out |= {f"{k.definition.name}_design.c": k.design for k in kernels if k.design}
     out |= {name: text for k in kernels for name, text in k.shared.items()}
-    out[source.HEADER] = source.header(declarations)
+    out[source.HEADER] = source.header(names)
     out["signature.c"] = SIGNATURE_C
     manifest = {k.definition.name: _manifest(k) for k in kernels}
-    out["manifest.json"] = json.dumps({"kernels": manifest}, indent=1) + "\n"
+    out["manifest.json"] = _text(manifest)
     return out
+
+
+def _text(manifest: Mapping[str, Any]) -> str:
+    """JSON with one line for each entry of a kernel."""
+    kernels = []
+    for name, kernel in manifest.items():
+        entries = (f"   {json.dumps(key)}: {json.dumps(value)}" for key, value in kernel.items())
+        kernels.append(f"  {json.dumps(name)}: {{\n" + ",\n".join(entries) + "\n  }")
+    return '{\n "kernels": {\n' + ",\n".join(kernels) + "\n }\n}\n"
 
 
 def ufcx_files(kernels: Iterable[KernelSource]) -> dict[str, str]:

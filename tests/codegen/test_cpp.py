@@ -49,6 +49,9 @@ def test_a_kernel_is_called_from_cpp(tmp_path: Path) -> None:
 
 
 def test_cffi_reads_the_prototypes() -> None:
-    text = source.header([abi.declaration("spring", "energy")])
-    prototypes = text[text.index("void softehl_spring") : text.rindex("#if defined(__cplusplus)")]
-    cffi.FFI().cdef(prototypes)
+    text = source.header([abi.function_name("spring", "energy")])
+    kind = text[text.index("typedef void softehl_kernel") : text.index("#if !defined(__cplusplus)")]
+    prototypes = text[
+        text.index("softehl_kernel softehl") : text.rindex("#if defined(__cplusplus)")
+    ]
+    cffi.FFI().cdef(kind + prototypes)

@@ -147,7 +147,8 @@ def test_the_side_that_is_not_taken_leaves_no_trace(workshop: Workshop) -> None:
     rows = [row for row in text.splitlines() if "log(" in row]
     lanes = [row for row in rows if "softehl_vlog(" in row]
     for found, depth in ((lanes, 8), ([row for row in rows if row not in lanes], 12)):
-        assert {len(row) - len(row.lstrip()) for row in found} == {depth}, "inside the if"
+        assert found
+        assert all(len(row) - len(row.lstrip()) >= depth for row in found), "inside the if"
     assert text.count("pow(") > 0, "2/7 is no root of the C library"
 
 
@@ -300,14 +301,12 @@ def test_documentation_cannot_end_the_comment(tmp_path: Path) -> None:
     compiled(m.finish(), tmp_path)
 
 
-def test_one_value_one_line() -> None:
+def test_every_value_is_declared_once() -> None:
     kernel = pipeline.compile_model(ALL["contact"]())
     for task, function in kernel.functions.items():
-        names = re.findall(r"const (?:double|int) (v\d+) =", function.text)
-        declared = re.findall(r"^ *double ([vs\d, ]+)(?: = 0\.0)?;", function.text, re.MULTILINE)
-        merged = [n for row in declared for n in row.split(", ")]
-        assert len(names) == len(set(names))
-        assert len(names) + len(merged) == function.temporaries, task
+        rows = re.findall(r"(?:const )?(?:double|int) ([vs]\d[^;]*);", function.text)
+        names = [n for row in rows for n in re.findall(r"(?:^|,\s+)([vs]\d+)", row)]
+        assert len(names) == len(set(names)) == function.temporaries, task
         assert "pow(" not in function.text
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from softehl.codegen.abi import Task
-from softehl.codegen.emit import simd
 from softehl.codegen.emit.points import assembly, function, loops
 from softehl.codegen.emit.points.function import Outputs
 from softehl.codegen.emit.points.layout import Layout
@@ -31,5 +30,4 @@ def kernel(layout: Layout, task: str, outputs: Outputs, plan: Schedule) -> Writt
         shared = (f"{name.removeprefix('softehl_')}.c", text)
         pieces.insert(0, f"{assembly.declaration(name, Parent(layout, outputs).size)};\n")
     pieces.append(loops.Group(layout, task, outputs, name).text())
-    pieces.append(simd.batch(layout.d, task))
     return Written("\n".join(pieces), temporaries, shared)

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from softehl.codegen import abi
 from softehl.codegen.abi import Task
-from softehl.codegen.emit import simd
+from softehl.codegen.emit.batch import widths
 from softehl.codegen.emit.points import function
 from softehl.codegen.emit.points.function import Outputs
 from softehl.codegen.emit.points.layout import Layout, Needs
@@ -28,7 +28,7 @@ class Frame:
         self.needs = Needs.of(outputs.entries)
         self.out = Lines()
         self.D = layout.dimension
-        self.widths = simd.widths(layout.d, task)
+        self.widths = widths(layout.d, task)
         self.ring = layout.form.axisymmetric
         self.design = task in abi.DESIGN
         self.spread = function.used(task)

@@ -86,6 +86,8 @@ def text(layout: Layout, task: str, outputs: Outputs, plan: Schedule) -> tuple[s
     for array, argument in ARRAYS.items():
         for k in needs[array]:
             p.line(1, f"const V {_NAMES[array]}{k} = {argument}[{k}];")
+    written = [n for _, n in outputs.targets()]
+    p.read(plan, written, written)
     _statements(p, outputs.targets(), [s for stage in plan.stages for s in stage.before])
     p.line(1, "return failed;")
     arguments = ", ".join(f"const V *restrict {a}" for a in ARRAYS.values())
@@ -93,7 +95,7 @@ def text(layout: Layout, task: str, outputs: Outputs, plan: Schedule) -> tuple[s
         f"static M {name(layout, task)}(\n    const double *restrict parameters, {arguments},\n"
         "    V *restrict P, V *restrict A)"
     )
-    return "\n".join([head, "{", *p.lines, "}", ""]), p.temporaries
+    return "\n".join([head, "{", p.text(), "}", ""]), p.temporaries
 
 
 def _statements(

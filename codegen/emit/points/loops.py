@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from softehl.codegen import abi
 from softehl.codegen.abi import Task
-from softehl.codegen.emit import simd
+from softehl.codegen.emit.batch import functions
 from softehl.codegen.emit.points import function, geometry, pairs
 from softehl.codegen.emit.points.frame import Frame, components, products
 from softehl.codegen.emit.points.function import Outputs
@@ -25,7 +25,7 @@ class Group(Frame):
     # the whole ----------------------------------------------------------------------------------
 
     def text(self) -> str:
-        """C text of the group function."""
+        """C text of the functions of a group and of a batch."""
         self._start()
         self.out.open(f"for (int q = 0; q < {self.layout.points}; ++q)")
         products(self)
@@ -36,11 +36,7 @@ class Group(Frame):
         if self.task == Task.TANGENT:
             self.out.add(f"{self.pairs}(S, K);")
         self._finish()
-        name = abi.function_name(self.layout.d.name, self.task)
-        idle = ", ".join(f"(void){n}" for _, n in simd.GROUP)
-        arguments = ",\n    ".join(f"{kind} {n}".replace("* ", "*") for kind, n in simd.GROUP)
-        body = "\n".join(self.out.lines)
-        return f"static void {name}_group(\n    {arguments})\n{{\n    {idle};\n{body}\n}}\n"
+        return functions(self.layout.d, self.task, "\n".join(self.out.lines))
 
     def _start(self) -> None:
         out, d = self.out, self.layout.d

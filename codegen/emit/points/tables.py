@@ -78,7 +78,7 @@ def shape(order: int, cell: Element, rule: QuadratureRule) -> Shape:
     line = _line(cell, rule)
     if cell.lines is not None and line is not None:
         return Shape(order, *_products(line, cell.dimension), line, long=True)
-    values, slopes = _evaluated(cell.shape, rule.points, cell.dimension)
+    values, slopes = _evaluated(cell.shape, cell.gradient, rule.points, cell.dimension)
     return Shape(order, values, slopes, line)
 
 
@@ -87,10 +87,12 @@ def constant(points: int, dimension: int) -> Shape:
     return Shape(0, ((1.0,),) * points, (((0.0,) * dimension,),) * points, None)
 
 
-def _evaluated(function: Any, points: Sequence[Sequence[Any]], dimension: int) -> tuple[Any, Any]:
+def _evaluated(
+    function: Any, gradient: Any, points: Sequence[Sequence[Any]], dimension: int
+) -> tuple[Any, Any]:
     at = sp.symbols(f"x:{dimension}", real=True)
     N = [sp.sympify(v) for v in function(*at)]
-    flat = [*N, *(sp.diff(v, x) for v in N for x in at)]
+    flat = [*N, *(v for row in gradient(*at) for v in row)]
     compiled = sp.lambdify(at, flat, "mpmath")
     values, slopes = [], []
     with mpmath.workdps(DIGITS):
@@ -123,7 +125,10 @@ def _line(cell: Element, rule: QuadratureRule) -> Line | None:
             for a in sides
         ]
 
-    values, slopes = _evaluated(lagrange, [(x,) for x in along], 1)
+    def slope(x: Any) -> list[Any]:
+        return [(sp.diff(v, x),) for v in lagrange(x)]
+
+    values, slopes = _evaluated(lagrange, slope, [(x,) for x in along], 1)
     return Line(values, tuple(tuple(s for (s,) in row) for row in slopes), places)
 
 

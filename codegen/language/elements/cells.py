@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any, TypeAlias
 
@@ -58,10 +59,15 @@ class Element:
 
     def gradient(self, *point: Any) -> list[tuple[Any, ...]]:
         """(dN_a/dxi, dN_a/deta, ...) of every shape function."""
-        places = [sp.Dummy(real=True) for _ in point]
+        places, slopes = self._slopes
         values = dict(zip(places, point, strict=True))
-        slopes = [[sp.diff(N, s) for s in places] for N in self.shape(*places)]
         return [tuple(slope.xreplace(values) for slope in row) for row in slopes]
+
+    @cached_property
+    def _slopes(self) -> tuple[list[Any], list[list[Any]]]:
+        """Parent coordinates, and derivatives of every shape function by them."""
+        places: list[Any] = [sp.Dummy(real=True) for _ in range(self.dimension)]
+        return places, [[sp.diff(N, s) for s in places] for N in self.shape(*places)]
 
 
 def element(name: str, order: int | None = None) -> Element:
