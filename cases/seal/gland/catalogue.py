@@ -51,6 +51,11 @@ class Ring:
         middle = 0.5 * (self.inner_diameter + self.section_diameter)
         return 2.0 * pi**2 * middle * (0.5 * self.section_diameter) ** 2
 
+    @property
+    def outer_diameter(self) -> float:
+        """Inside diameter and twice the section, mm."""
+        return self.inner_diameter + 2.0 * self.section_diameter
+
 
 def ring(name: str) -> Ring:
     """The ring of a name (trade.ring_names), of a round section or an X-ring.
