@@ -64,10 +64,10 @@ class PseudoTransient:
 
     corrector: Corrector
     begin: float = 1.0
-    last: float = 1e3
+    last: float = 1e4
     load_step: float = 0.25
     wanted: float = 0.7
-    settled: float = 0.1
+    settled: float = 1e-3
     shortest: float = 0.5
     longest: float = 10.0
     cut: float = 0.25

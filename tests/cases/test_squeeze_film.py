@@ -106,7 +106,7 @@ def test_the_first_step_holds_the_film_where_it_is(
     scales = InletScales.of(system, "out", 400.0, dry.x)
     assert scales is not None
     begun = replace(squeeze_film, system=system, scales=scales)
-    steps, first = FilmCorrectors.of(system, dry.newton).steps, begun.first
+    steps, first = FilmCorrectors.of(system, dry.newton).steps(), begun.first
     found = steps.solve(begun.step(start, first, 0.0), start)
     assert found.converged, found.message
     assert 0.0 < begun.change(start, found.x) < 0.3

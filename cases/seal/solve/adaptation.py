@@ -7,7 +7,7 @@ estimated from the same film on a coarser mesh of the same spacing (`states.esti
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
@@ -109,8 +109,8 @@ class Adaptation:
         """The film on the mesh that is made for it; None where there is none."""
         if found.begun is None or self.p.mesh != "graded":
             return None
-        squeeze_film, x = found.begun
-        layout = film_layout(squeeze_film.system, x, squeeze_film.scales.thickness)
+        squeeze_film, now = found.begun
+        layout = film_layout(squeeze_film.system, now.x, squeeze_film.scales.thickness)
         try:
             return self._carried(found, build_system(self.p, layout, density))
         except MeshError:
@@ -126,7 +126,7 @@ class Adaptation:
         found: Film | NoFilm | None = None
         if before:
             system = before[-1].system
-            found = self.films.on(system).from_neighbour(before[-1], film.loads.speed)
+            found = self.films.on(system).from_neighbour(before, film.loads.speed)
         else:
             try:
                 system = system_at(film.system, density)
@@ -141,19 +141,19 @@ class Adaptation:
     def _carried(self, found: Film | NoFilm, system: SealSystem) -> Film | NoFilm | None:
         """The film on the mesh of a system; None where there is no contact state on it.
 
-        Where none was found, or is not found at once, it is squeezed out anew.
+        Where none was found, or does not lead on, it is squeezed out anew.
         """
         assert found.begun is not None
-        squeeze_film, x = found.begun
+        squeeze_film, now = found.begun
         dry = self.contacts.from_mesh(squeeze_film.system, squeeze_film.dry, system)
         if isinstance(dry, StageFailed):
             return None
         solver, again = self.films.on(system), None
         if isinstance(found, Film):
             transfer = FilmTransfer(squeeze_film.system, system, (squeeze_film.dry, dry[1]))
-            y = transfer.state(x)
-            carried = squeeze_film.carried(system, y, dry[1])
-            again = solver.from_film(carried, y, transfer.pressures(x))
+            start, pressures = replace(now, x=transfer.state(now.x)), transfer.pressures(now.x)
+            carried = squeeze_film.carried(system, start.x, dry[1])
+            again = solver.from_film(carried, start, pressures)
         if isinstance(again, Film):
             return again
         return solver.from_contact(squeeze_film.film.stroke, squeeze_film.film.speed, dry[1])

@@ -67,6 +67,10 @@ class WholeSteps:
     def solve(self, problem: Relaxed, x0: Array) -> Solution:
         """See `Corrector`."""
         pressures = element_pressures(problem.problem, self.system.solids, x0)
+        return self.begun(problem, x0, pressures)
+
+    def begun(self, problem: Relaxed, x0: Array, pressures: Array) -> Solution:
+        """The step from a state of another mesh with these element pressures (Q,)."""
         held = lagged(self.system, problem.problem, pressures)
         newton = replace(self.newton, tolerance=LEAST, stagnation=1.0, max_iterations=_MONOLITHIC)
         return newton.solve(Anchored(held, problem.term, problem.state), problem.admissible(x0))
@@ -96,6 +100,23 @@ class Steady:
         return self.whole.steady(problem.problem, x0)
 
 
+@dataclass(eq=False)
+class CarriedSteps:
+    """Steps of which the first begins with the element pressures (Q,) of another mesh."""
+
+    ladder: Ladder
+    whole: WholeSteps
+    pressures: Array | None
+
+    def solve(self, problem: Relaxed, x0: Array) -> Solution:
+        """See `Corrector`."""
+        if self.pressures is None:
+            return self.ladder.solve(problem, x0)
+        found = self.whole.begun(problem, x0, self.pressures)
+        self.pressures = None if found.converged else self.pressures
+        return found
+
+
 @dataclass(frozen=True, eq=False)
 class FilmCorrectors:
     """Correctors of one film; `fast` is None where condensing does not serve."""
@@ -111,11 +132,10 @@ class FilmCorrectors:
         fast = film_corrector(p, linear) if quick and isinstance(linear, Condenser) else None
         return cls(WholeSteps(system, newton), fast)
 
-    @property
-    def steps(self) -> Corrector:
-        """Solves steps in time."""
+    def steps(self, pressures: Array | None = None) -> Corrector:
+        """Solves steps in time; pressures: (Q,) of a state that another mesh has left."""
         fast = (CondensedSteps(self.fast),) if self.fast else ()
-        return Ladder((*fast, self.whole), self._refused)
+        return CarriedSteps(Ladder((*fast, self.whole), self._refused), self.whole, pressures)
 
     @property
     def first(self) -> Corrector:

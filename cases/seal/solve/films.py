@@ -8,11 +8,11 @@ elements (`runtime.fem.lagged_pressure`).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf
+from math import exp, inf, log
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.layers import film_layer
@@ -26,12 +26,23 @@ from softehl.cases.seal.states.state import StageRecord, place
 from softehl.cases.seal.states.verdict import FilmNumbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.solve.homotopy import Continuation
+from softehl.runtime.solve.newton import NonlinearProblem
 from softehl.runtime.solve.pseudo_transient import Moment, PseudoTransient
-from softehl.runtime.solve.solution import Solution, Status
+from softehl.runtime.solve.solution import Point, Solution, Status
+from softehl.runtime.solve.steps import StepRule
 
-_NEIGHBOUR = 3e-3
-"""First step from the film at another speed, of T. With 0.1 of it most instrokes began with a step
-that failed, which costs as much as ten that do not."""
+_AGAIN = 0.01
+"""First step of a film that was carried to another mesh and is not found there at once, of T."""
+
+_LEAST = 0.3
+"""Least step in ln U on the way from the film at another speed."""
+
+_NEIGHBOUR = 0.1
+"""First step from the film at another speed, of T."""
+
+_AT_ONCE = 8
+"""Iterations in which it is found at once: it takes four, or does not come nearer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +68,14 @@ class Film:
         return self.squeeze_film.film
 
     @property
-    def begun(self) -> tuple[SqueezeFilm, Array]:
-        """How it was squeezed out, and its unknowns."""
-        return self.squeeze_film, self.x
+    def begun(self) -> tuple[SqueezeFilm, Moment]:
+        """The moment from which it is squeezed out where it is not found at once."""
+        return self.squeeze_film, Moment(self.x, _AGAIN, 1.0)
+
+    @property
+    def solution(self) -> Solution:
+        """The film as a point of a path."""
+        return Solution(self.x, Status.CONVERGED, "", (), 0, 0)
 
     @cached_property
     def problem(self) -> Problem:
@@ -76,14 +92,14 @@ class Film:
 class NoFilm:
     """Why there is no film at a speed.
 
-    begun: how it was squeezed out, and the state that was reached, where it took a step.
+    begun: how it was squeezed out, and how far, where it took a step.
     """
 
     stroke: Stroke
     speed: float
     status: Status
     message: str
-    begun: tuple[SqueezeFilm, Array] | None = None
+    begun: tuple[SqueezeFilm, Moment] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,52 +130,68 @@ class FilmSolver:
         correctors = FilmCorrectors.of(self.system, self.driver.newton)
         return self._followed(squeeze_film, Moment(pressed, squeeze_film.first), correctors)
 
-    def from_neighbour(self, film: Film, speed: float) -> Film | NoFilm:
-        """The film at |U|, mm/s, from one at another speed: at once, else squeezed out from it."""
-        squeeze_film, correctors = film.squeeze_film.at(speed), film.correctors
-        with self._told(squeeze_film.film) as told:
-            problem = self.system.film_problem(squeeze_film.film).since(film.x)
-            layered = correctors.layered(problem, squeeze_film.layer)
-            found = told(correctors.first.solve(layered, film.x))
-        if found.converged and squeeze_film.change(film.x, found.x) < inf:
-            return self._entered(squeeze_film, correctors, found)
-        return self._followed(squeeze_film, Moment(film.x, _NEIGHBOUR, 1.0), correctors)
+    def from_neighbour(self, last: Sequence[Film], speed: float) -> Film | NoFilm:
+        """The film at |U|, mm/s, along those at speeds between, from the last film on our mesh.
 
-    def from_film(self, carried: SqueezeFilm, x: Array, pressures: Array) -> Film | NoFilm:
-        """The steady film of another mesh, carried to ours, x (n,), where it is found at once.
-
-        pressures: (Q,) of the elements. With them one iteration for all unknowns brings the section
-        near to equilibrium.
+        last: films at other speeds, the latest last.
         """
-        film, correctors = carried.film, FilmCorrectors.of(self.system, self.driver.newton)
-        with self._told(film) as told:
-            problem = self.system.film_problem(film).since(x)
-            begun = correctors.whole.steady(problem, x, pressures, iterations=1)
-            layered = correctors.layered(problem, carried.layer)
-            found = told(correctors.first.solve(layered, begun.nearest))
+        film, correctors = last[-1], last[-1].correctors
+        squeeze_film, before = film.squeeze_film.at(speed), [film.x]
+        known = [Point(log(f.loads.speed), f.solution) for f in last if f.system is film.system]
+        start, stop = known[-1].parameter, log(speed)
+
+        def problem_at(t: float) -> NonlinearProblem:
+            loads = replace(squeeze_film.film, speed=speed if t == stop else exp(t))
+            problem = self.system.film_problem(loads).since(before[0])
+            return correctors.layered(problem, squeeze_film.layer)
+
+        with self._told(squeeze_film.film) as told:
+
+            def tell(point: Point) -> None:
+                before[0] = told(point.solution).x
+
+            rule = StepRule(abs(stop - start), min(_LEAST, abs(stop - start)))
+            path = Continuation(correctors.first, rule, name="ln U")
+            previous = known[-2] if len(known) > 1 else None
+            branch = path.follow(problem_at, start, stop, film.x, on_point=tell, previous=previous)
+        if branch.converged and squeeze_film.change(film.x, branch.last.x) < inf:
+            return self._entered(squeeze_film, correctors, branch.last)
+        x = branch.last.x if branch.points else film.x
+        return self._followed(squeeze_film, Moment(x, _NEIGHBOUR, 1.0), correctors)
+
+    def from_film(self, carried: SqueezeFilm, start: Moment, pressures: Array) -> Film | NoFilm:
+        """The steady film of another mesh, carried to ours: at once, else squeezed out from there.
+
+        pressures: (Q,) of the elements.
+        """
+        correctors, x = FilmCorrectors.of(self.system, self.driver.newton), start.x
+        with self._told(carried.film) as told:
+            problem = self.system.film_problem(carried.film).since(x)
+            found = told(correctors.whole.steady(problem, x, pressures, _AT_ONCE))
         if found.converged and carried.change(x, found.x) < inf:
             return self._entered(carried, correctors, found)
-        return NoFilm(film.stroke, film.speed, found.status, f"carried film: {found.message}")
+        return self._followed(carried, start, correctors, pressures)
 
     def _followed(
         self,
         squeeze_film: SqueezeFilm,
         start: Moment,
         correctors: FilmCorrectors,
+        pressures: Array | None = None,
     ) -> Film | NoFilm:
         film = squeeze_film.film
-        steps = PseudoTransient(correctors.steps)
+        steps = PseudoTransient(correctors.steps(pressures))
         with self._told(film) as told:
             branch, reached = steps.follow(squeeze_film, start, on_point=lambda p: told(p.solution))
             if not branch.converged:
                 words = branch.message
-                begun = None if reached is start else (squeeze_film, reached.x)
+                begun = None if reached is start else (squeeze_film, reached)
                 return NoFilm(film.stroke, film.speed, branch.status, words, begun)
             problem = self.system.film_problem(film).since(reached.x)
             end = told(correctors.steady(problem, squeeze_film.layer, reached.x))
         if not end.converged:
             words = f"steady film: {end.message}"
-            return NoFilm(film.stroke, film.speed, end.status, words, (squeeze_film, reached.x))
+            return NoFilm(film.stroke, film.speed, end.status, words, (squeeze_film, reached))
         return self._entered(squeeze_film, correctors, end)
 
     def _entered(

@@ -92,7 +92,7 @@ class DryContact:
         found = films.from_contact(stroke, speed, self.x)
         if isinstance(found, NoFilm):
             above = films.from_contact(stroke, FASTER * speed, self.x)
-            below = films.from_neighbour(above, speed) if isinstance(above, Film) else found
+            below = films.from_neighbour([above], speed) if isinstance(above, Film) else found
             found = below if isinstance(below, Film) else found
         return found
 
@@ -102,8 +102,8 @@ class DryContact:
         """The film at |U|, mm/s, on a mesh that is made for it; last: films of the same stroke."""
         found = None
         if last:
-            near = last[-1].film
-            found = self.films.on(near.system).from_neighbour(near, speed)
+            near = [adapted.film for adapted in last]
+            found = self.films.on(near[-1].system).from_neighbour(near, speed)
         if not isinstance(found, Film):
             found = self.film(stroke, speed)
         return Adaptation(self.parameters, self.solver, self.films).adapted(found, last)
