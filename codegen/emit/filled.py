@@ -12,7 +12,7 @@ _KEPT = re.compile(r"(?:for|if|while|return|else|#|/|\*|\}|static|typedef)")
 
 
 def filled(lines: Iterable[str]) -> list[str]:
-    """The same statements: neighbours of one depth share lines, and declarations their type."""
+    """Statements in filled lines: neighbours of one depth share them, declarations share a type."""
     out: list[str] = []
     split = [line for text in lines for line in text.split("\n")]
     for depth, group in groupby(split, _depth):

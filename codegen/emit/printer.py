@@ -99,7 +99,7 @@ class Printer:
         return f"({self.inside[n]})" if n in self.inside else self.names[n]
 
     def bare(self, n: Node) -> str:
-        """The same where no parentheses are needed."""
+        """An operand where no parentheses are needed."""
         return self.inside[n] if n in self.inside else self.ref(n)
 
     def fresh(self, n: Node, letter: str = "v") -> str:

@@ -196,7 +196,7 @@ def blocks(family: str, count: int) -> tuple[Block, ...]:
         "film_facet": 6,
         **{family: 2 * sum(map(int, family[-2:])) for family in mortar.FAMILIES},
         **{family: 2 * nodes for family, nodes in mortar.SIDES.items()},
-        "touch": 0,
+        "touch": 12,
         **{family: 3 * nodes for family, nodes in touch.SIDES.items()},
     }
     known |= {"mean_rotation": 8, "mean_axial": 8, "film_upwind_rough": 4}

@@ -214,9 +214,10 @@ def test_a_kernel_that_writes_its_arguments_is_seen(
 ) -> None:
     write(ALL["contact"](), tmp_path)
     source = tmp_path / "contact.c"
-    head, body = source.read_text().split("void softehl_contact_residual(")
+    begin = "SOFTEHL_KERNEL(softehl_contact_residual)"
+    head, body = source.read_text().split(begin)
     wrong = "{\n    ((double *)(size_t)dofs)[0] = 7.0, ((double *)(size_t)parameters)[0] = 7.0;"
-    source.write_text(f"{head}void softehl_contact_residual({body.replace('{', wrong, 1)}")
+    source.write_text(f"{head}{begin}{body.replace('{', wrong, 1)}")
     build.build(tmp_path, extra=("-O0",))
     assert written(load_kernel("contact", tmp_path), rng) == {"u", "parameters"}
 

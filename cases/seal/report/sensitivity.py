@@ -62,7 +62,7 @@ def write_sensitivities(
 
 
 def told(folder: Path) -> list[str]:
-    """What tolerances do, and which keys matter most, in a line for each speed."""
+    """Effects of tolerances and the most important keys, a line for each speed."""
     bands = [ToleranceRow.parse(c) for c in _cells(folder / "tolerances.csv", ToleranceRow)]
     slopes = [SensitivityRow.parse(c) for c in _cells(folder / "sensitivity.csv", SensitivityRow)]
     lines = []
