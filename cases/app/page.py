@@ -67,10 +67,11 @@ class Page:
         self.table.param.watch(lambda _: self._choose(), "selection")
         self._preview()
         self._look()
-        pn.state.add_periodic_callback(self._look, period=PERIOD)
+        pn.state.onload(self._keep_looking)
         buttons = pn.Row(self.stop, self.go_on, self.links)
         return pn.template.BootstrapTemplate(
             title="softehl: reciprocating seals",
+            busy_indicator=None,  # it changes the document outside the lock
             sidebar=[*self.form.widgets.values(), self.begin],
             main=[
                 pn.Row(self.drawing, self.words, **_WIDE),
@@ -83,6 +84,10 @@ class Page:
                 self.curves,
             ],
         )
+
+    def _keep_looking(self) -> None:
+        """Look at the runs from now on: the browser has the page that changes refer to."""
+        pn.io.PeriodicCallback(callback=self._look, period=PERIOD, background=True).start()
 
     # --- what is chosen in the form -------------------------------------------------------------
 
