@@ -83,7 +83,7 @@ def sweep(folder: Path, **given: Any) -> None:
 
     points = [(eta, p_s) for eta in VISCOSITIES for p_s in PRESSURES]
     cases = {
-        f"{number}": softehl.ORing(viscosity=eta, sealed_pressure=p_s, stroke="out", **given)
+        f"{number}": softehl.Seal(viscosity=eta, sealed_pressure=p_s, stroke="out", **given)
         for number, (eta, p_s) in enumerate(points)
     }
     for curve in softehl.solve_cases(cases, folder):

@@ -21,7 +21,7 @@ import numpy as np
 
 from softehl.cases.cycle import CASE, Cycle
 from softehl.cases.harness.observer import Observer, Outcome, State
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import Silent
 
@@ -59,7 +59,7 @@ def curve(density: int, speeds: int, ends: tuple[float, float], **given: Any) ->
     """A curve of so many speeds between two, evenly in log U."""
     between = tuple(np.geomspace(*ends, speeds).tolist())
     keys = {"density": density, "speeds": between, "stroke": "out", "error_estimate": False}
-    p, begun = ORing.model_validate({**keys, **given}), time.process_time()
+    p, begun = Seal.model_validate({**keys, **given}), time.process_time()
     outcome = _reached(run(p, Silent()))
     seconds = time.process_time() - begun
     steps = sum(len(stage.parameters) for stage in outcome.stages)

@@ -16,14 +16,14 @@ from unittest.mock import patch
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded
 
 from benchmarks.clock import Clock
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.sensitivity import sensitivity
 from softehl.cases.seal.sensitivity.quantities import QUANTITIES
 from softehl.cases.seal.solve import method
 from softehl.cases.seal.states.state import Silent
 
 
-def measured(p: ORing, wanted: Sequence[str]) -> tuple[float, float, int]:
+def measured(p: Seal, wanted: Sequence[str]) -> tuple[float, float, int]:
     """Seconds of a run without its sensitivities, those of these quantities, its states."""
     clock = Clock(("sensitivities", "solving"))
     works: dict[str, Any] = {
@@ -41,7 +41,7 @@ def measured(p: ORing, wanted: Sequence[str]) -> tuple[float, float, int]:
 
 def main(runs: int) -> None:
     """Print a line for all quantities, and one for h* alone."""
-    p = ORing(sensitivity=True)
+    p = Seal(sensitivity=True)
     for wanted in (QUANTITIES, ("h_star",)):
         found = [measured(p, wanted) for _ in range(runs)]
         solving, spent = (min(times) for times in list(zip(*found, strict=True))[:2])

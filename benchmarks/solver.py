@@ -24,7 +24,7 @@ from typing import Any
 
 from benchmarks.solver_summary import FILM, difference, summary
 from softehl.cases.paper.states import PAPER
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import COLLAPSED, Silent
 from softehl.runtime.io import write_json
@@ -40,7 +40,7 @@ class Quiet(Silent):
         self.marks.append(time.process_time())
 
 
-def measure(parameters: ORing) -> dict[str, Any]:
+def measure(parameters: Seal) -> dict[str, Any]:
     """One run: its stages, its films, its cost."""
     observer, wall, cpu = Quiet(), time.perf_counter(), time.process_time()
     outcome = run(parameters, observer)
@@ -77,7 +77,7 @@ def measure(parameters: ORing) -> dict[str, Any]:
     }
 
 
-def in_its_own_process(parameters: ORing) -> dict[str, Any]:
+def in_its_own_process(parameters: Seal) -> dict[str, Any]:
     """`measure` in a fresh interpreter."""
     command = [sys.executable, "-m", "benchmarks.solver", "--one", parameters.model_dump_json()]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -85,7 +85,7 @@ def in_its_own_process(parameters: ORing) -> dict[str, Any]:
     return result
 
 
-def show(parameters: ORing, result: dict[str, Any]) -> None:
+def show(parameters: Seal, result: dict[str, Any]) -> None:
     """The table of one run."""
     p, row = (
         parameters,
@@ -103,13 +103,13 @@ def show(parameters: ORing, result: dict[str, Any]) -> None:
     print(row.format("all", *counts, result["cpu"], result["wall"], f"{result['memory']:.0f} MB"))
 
 
-def compare(parameters: ORing, routes: list[str]) -> list[dict[str, Any]]:
+def compare(parameters: Seal, routes: list[str]) -> list[dict[str, Any]]:
     """All routes of one case, against the first of them."""
     first: dict[str, Any] | None = None
     results = []
     for route in routes:
         solver, linear = route.split(":")
-        p = ORing(**{**parameters.model_dump(), "solver": solver, "linear": linear})
+        p = Seal(**{**parameters.model_dump(), "solver": solver, "linear": linear})
         result = in_its_own_process(p)
         show(p, result)
         case = p.model_dump(include={"density", "sealed_pressure", "stroke"})
@@ -135,12 +135,12 @@ def main() -> None:
     parser.add_argument("--one", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.one:
-        print(json.dumps(measure(ORing.model_validate_json(given.one))))
+        print(json.dumps(measure(Seal.model_validate_json(given.one))))
         return
     results: list[dict[str, Any]] = []
     for pressure, stroke in itertools.product(given.pressures, given.strokes):
         for density in given.densities:
-            parameters = ORing(
+            parameters = Seal(
                 density=density,
                 sealed_pressure=pressure,
                 stroke=stroke,

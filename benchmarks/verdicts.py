@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.reach import ratio
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import FilmState, Silent
@@ -71,7 +71,7 @@ def drawn(number: int) -> Keys:
             "speeds": tuple(sorted((float(f"{u:.2g}") for u in speeds), reverse=True)),
         }
         try:
-            ORing(**given)
+            Seal(**given)
         except ValueError:
             continue
         return given
@@ -100,7 +100,7 @@ class Keeper(Silent):
 
 def _solve(given: Keys, path: Path, limit: int) -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
-    run(ORing(**given), Keeper(path))
+    run(Seal(**given), Keeper(path))
 
 
 def solved(given: Keys, path: Path, limit: float) -> None:
@@ -151,7 +151,7 @@ def told(line: Line) -> str:
     shown = " | ".join(f"{value:+.2f}" for value in off)
     estimates = row["h_star_error_percent"], row["rod_friction_error_percent"]
     said = ", ".join("-" if np.isnan(value) else f"{value:+.2f}" for value in estimates)
-    p_s = ratio(ORing(**given), given["sealed_pressure"])
+    p_s = ratio(Seal(**given), given["sealed_pressure"])
     where = f"{number} | {given.get('section', 'round')} | {numerics} | {p_s:.1f} | {u:+g}"
     return f"| {where} | {shown} | {said} | {row['verdict']} |"
 

@@ -311,11 +311,11 @@ def design(case: str, words: tuple[str, ...], key: str, assignments: tuple[str, 
     """Find the value of a key."""
     from softehl.cases.harness.case_file import read_case
     from softehl.cases.harness.errors import BadInput
-    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.gland.parameters import Seal
     from softehl.cases.seal.sensitivity.design_command import design_case
 
     read = read_case(case, SHIPPED, assignments)
-    if type(read.parameters) is not ORing:
+    if type(read.parameters) is not Seal:
         raise BadInput(f"{read.case.name} has no sensitivities; allowed: a seal, such as oring")
     return design_case(read.parameters, " ".join(words), key)
 

@@ -19,7 +19,7 @@ from softehl.cases.harness.row import OK, Row, column
 from softehl.cases.seal.cycle.motion import Motion, motion_keys, motion_of
 from softehl.cases.seal.gland.assumed import assumed
 from softehl.cases.seal.gland.headings import CYCLE
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.reach import beyond_reach, reach
 from softehl.cases.seal.gland.rubbers.rubber import outside
 from softehl.cases.seal.gland.surfaces import MIXED
@@ -40,7 +40,7 @@ PICTURES, ANIMATION = ("friction_loop", "film_map"), "cycle.gif"
 Points = tuple[Annotated[tuple[float, float], Field(strict=False)], ...]
 
 
-class Cycle(ORing):
+class Cycle(Seal):
     """An O-ring and how its rod moves; the film conserves mass. `speeds`, `stroke` are not used."""
 
     headings = CYCLE

@@ -11,7 +11,7 @@ from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import Record
 from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.assumed import assumed
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.reach import beyond_reach, reach
 from softehl.cases.seal.gland.rubbers.rubber import outside, soft
 from softehl.cases.seal.gland.trade.said import understood
@@ -31,12 +31,12 @@ from softehl.cases.seal.states.state import Outcome as SealOutcome
 _THINNEST = "thinnest film [um]"
 
 
-class ORingCase(Case[ORing, FilmRow]):
+class ORingCase(Case[Seal, FilmRow]):
     """One curve: h* over the rod speed, of both strokes, at one sealed pressure."""
 
     name = "oring"
     title = "reciprocating O-ring, a rod seal: film thickness, friction, leakage over the rod speed"
-    parameters = ORing
+    parameters = Seal
     row = FilmRow
     selection = ("speeds", "stroke", "travel", "solver", "linear", "tolerance")
     ways = ("solver", "linear")
@@ -48,23 +48,23 @@ class ORingCase(Case[ORing, FilmRow]):
     shared = "contacts"
     left_out = LEFT_OUT
 
-    def solve(self, parameters: ORing, observer: Observer, shared: Path | None) -> Outcome:
+    def solve(self, parameters: Seal, observer: Observer, shared: Path | None) -> Outcome:
         """See :class:`Case`; runs of one section share their contact states."""
         return run_oring(parameters, ObserverAdapter(observer), shared)
 
-    def requested(self, parameters: ORing) -> list[float]:
+    def requested(self, parameters: Seal) -> list[float]:
         """See :class:`Case`."""
         return plan.rod_speeds(parameters)
 
-    def rounds(self, parameters: ORing) -> Sequence[ORing]:
+    def rounds(self, parameters: Seal) -> Sequence[Seal]:
         """See :class:`Case`."""
         return plan.refinements(parameters)
 
-    def pieces(self, parameters: ORing, rows: Sequence[FilmRow], jobs: int) -> list[ORing]:
+    def pieces(self, parameters: Seal, rows: Sequence[FilmRow], jobs: int) -> list[Seal]:
         """See :class:`Case`."""
         return plan.pieces(parameters, rows, jobs)
 
-    def piece_name(self, piece: ORing) -> str:
+    def piece_name(self, piece: Seal) -> str:
         """See :class:`Case`."""
         return piece.stroke
 
@@ -77,7 +77,7 @@ class ORingCase(Case[ORing, FilmRow]):
         return f"Film thickness, p_s = {rows[0].sealed_pressure_MPa:g} MPa"
 
     def complaints(
-        self, parameters: ORing, rows: Sequence[FilmRow], rejected: Sequence[FilmRow], advice: str
+        self, parameters: Seal, rows: Sequence[FilmRow], rejected: Sequence[FilmRow], advice: str
     ) -> list[str]:
         """See :class:`Case`."""
         collapsed = super().complaints(parameters, rows, rejected, advice)
@@ -89,11 +89,11 @@ class ORingCase(Case[ORing, FilmRow]):
             words += _not_differentiated(rows)
         return words
 
-    def assumed(self, parameters: ORing, given: Collection[str]) -> list[str]:
+    def assumed(self, parameters: Seal, given: Collection[str]) -> list[str]:
         """See :class:`Case`."""
         return assumed(parameters, given)
 
-    def warnings(self, parameters: ORing) -> list[str]:
+    def warnings(self, parameters: Seal) -> list[str]:
         """See :class:`Case`."""
         p = parameters
         gland = p.rod_diameter, p.housing_diameter, p.groove_width
@@ -101,7 +101,7 @@ class ORingCase(Case[ORing, FilmRow]):
         unusual = [*soft(p), *outside(p.compound, p.temperature), *advised]
         return [*beyond_reach(p, p.sealed_pressure), *unused_keys(p), *unusual]
 
-    def answer(self, parameters: ORing, rows: Sequence[FilmRow]) -> list[str]:
+    def answer(self, parameters: Seal, rows: Sequence[FilmRow]) -> list[str]:
         """See :class:`Case`."""
         return answer(rows, parameters.travel)
 
@@ -111,7 +111,7 @@ class ORingCase(Case[ORing, FilmRow]):
 
         return told(folder)
 
-    def merits(self, parameters: ORing, rows: Sequence[FilmRow]) -> Mapping[str, float]:
+    def merits(self, parameters: Seal, rows: Sequence[FilmRow]) -> Mapping[str, float]:
         """See :class:`Case`; of all speeds the worst."""
         found = {
             "largest friction [N]": max(abs(row.rod_friction_N) for row in rows),
@@ -127,11 +127,11 @@ class ORingCase(Case[ORing, FilmRow]):
         """See :class:`Case`."""
         return -1.0 if merit == _THINNEST else 1.0
 
-    def titled(self, parameters: ORing) -> str:
+    def titled(self, parameters: Seal) -> str:
         """See :class:`Case`."""
         return titled(self.title, parameters)
 
-    def foreword(self, parameters: ORing) -> list[str]:
+    def foreword(self, parameters: Seal) -> list[str]:
         """See :class:`Case`."""
         return [*understood(parameters.said), *reach(parameters, parameters.sealed_pressure)]
 
@@ -149,7 +149,7 @@ class ORingCase(Case[ORing, FilmRow]):
 
     def draw(
         self,
-        parameters: ORing,
+        parameters: Seal,
         folder: Path,
         rows: Sequence[FilmRow],
         rejected: Sequence[FilmRow],
@@ -169,7 +169,7 @@ class ORingCase(Case[ORing, FilmRow]):
 
         return parts(runs)
 
-    def share(self, parameters: ORing) -> tuple[float, str]:
+    def share(self, parameters: Seal) -> tuple[float, str]:
         """See :class:`Case`."""
         from softehl.cases.seal.solve.contact_store import contact_key
 
@@ -177,7 +177,7 @@ class ORingCase(Case[ORing, FilmRow]):
 
 
 def run_oring(
-    parameters: ORing, observer: SealObserver, contacts: Path | None = None
+    parameters: Seal, observer: SealObserver, contacts: Path | None = None
 ) -> SealOutcome:
     """Solve a seal and report to the observer, with sensitivities where they are asked for.
 

@@ -3,7 +3,7 @@
 from concurrent.futures import ProcessPoolExecutor
 import softehl
 
-cases = [softehl.ORing(sealed_pressure=p) for p in (0.5, 1.0, 2.0)]
+cases = [softehl.Seal(sealed_pressure=p) for p in (0.5, 1.0, 2.0)]
 if __name__ == "__main__":
     with ProcessPoolExecutor(2) as executor:
         curves = softehl.solve_cases(cases, "results/sweep", executor)

@@ -27,20 +27,20 @@ from softehl.cases.seal.states.observer_adapter import read_profile, read_sectio
 SIZE = (2.5, 2.3)
 """Of each picture, inches: four stand side by side."""
 SPEEDS = (1600.0, 800.0, 400.0, 200.0, 100.0)
-PRESSED = softehl.ORing(
+PRESSED = softehl.Seal(
     density=4, sealed_pressure=5.0, stroke="out", speeds=(1600.0,), error_estimate=False
 )
-DEFAULT = softehl.ORing()
-SWEPT = softehl.ORing(stroke="in", speeds=SPEEDS, error_estimate=False)
-STABLE = softehl.ORing(stroke="in", speeds=(100.0,), error_estimate=False)
+DEFAULT = softehl.Seal()
+SWEPT = softehl.Seal(stroke="in", speeds=SPEEDS, error_estimate=False)
+STABLE = softehl.Seal(stroke="in", speeds=(100.0,), error_estimate=False)
 PAPERS = STABLE.model_copy(update=PAPER)
 _FIRST: Any = {"stroke": "out", "speeds": (800.0,), "error_estimate": False}
 _NBR_90: Any = {"ring": "AS568-210", "rod": 19.0, "shore_A": 90.0, "sealed_pressure": 10.0}
 _GLAND: Any = {"housing_diameter": 56.4}
 FIRST = {
-    "first_o_ring": softehl.ORing(**_FIRST, **_NBR_90),
-    "first_x_ring": softehl.ORing(**_FIRST, **_GLAND, section="x_ring", groove_width=4.3),
-    "first_u_cup": softehl.ORing(**_FIRST, **_GLAND, section="u_cup", groove_width=6.0),
+    "first_o_ring": softehl.Seal(**_FIRST, **_NBR_90),
+    "first_x_ring": softehl.Seal(**_FIRST, **_GLAND, section="x_ring", groove_width=4.3),
+    "first_u_cup": softehl.Seal(**_FIRST, **_GLAND, section="u_cup", groove_width=6.0),
 }
 """The worked designs of docs/first-seal.md, by the names of their pictures."""
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks" / "README.md"

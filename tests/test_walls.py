@@ -214,7 +214,8 @@ def test_public_names() -> None:
     own = ["load_kernel"]
     assert sorted([*softehl._PUBLIC, *softehl._MODELLING, *own]) == softehl.__all__
     for name in softehl.__all__:
-        assert getattr(softehl, name).__name__.rpartition(".")[2] in (name, "run")
+        assert getattr(softehl, name).__name__.rpartition(".")[2] in (name, "run", "Seal")
+    assert softehl.ORing is softehl.Seal
     assert set(softehl.__all__) <= set(dir(softehl))
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         softehl.nothing  # noqa: B018

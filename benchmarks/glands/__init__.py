@@ -13,7 +13,7 @@ from functools import cache
 from itertools import count
 from typing import Any, NamedTuple
 
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from tests.cases import gland_matrix, section_matrix
 
 STRATA = 5
@@ -55,7 +55,7 @@ def first(section: str, stratum: int, taken: set[str]) -> Drawn:
 
 
 @cache
-def drawn(is_round: bool, number: int) -> ORing:
+def drawn(is_round: bool, number: int) -> Seal:
     """An O-ring, or a seal of any other section, by number."""
     if is_round:
         return gland_matrix.drawn(number)
@@ -63,7 +63,7 @@ def drawn(is_round: bool, number: int) -> ORing:
     return p.model_copy(update={"sealed_pressure": round(2.5 * p.sealed_pressure, 3)})
 
 
-def keys(p: ORing) -> dict[str, Any]:
+def keys(p: Seal) -> dict[str, Any]:
     """The keys of a case file, all but defaults; the estimate of the error stays on by default."""
     given = p.model_dump(mode="json", exclude_unset=True, exclude_none=True)
     given = {k: v for k, v in given.items() if k not in ("error_estimate", "materials")}

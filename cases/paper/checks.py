@@ -21,7 +21,7 @@ from softehl.cases.paper.item import (
     state_table,
 )
 from softehl.cases.paper.states import PAPER, STABILISED, Request, State, Store, ask, setup
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
 from softehl.runtime.io import Cell
 
@@ -37,7 +37,7 @@ LETTERS = {"ok": ".", "oscillating": "o", "under-resolved": "U", "collapsed": "C
 # --- every combination of p_s, stroke, speed and density ----------------------------------------
 
 
-def _matrix_setups(scope: Scope) -> list[ORing]:
+def _matrix_setups(scope: Scope) -> list[Seal]:
     pressures = scope.some_pressures(MATRIX_PRESSURES)
     return [setup(d, p) for d in scope.meshes((4, 8, 16)) for p in pressures]
 
@@ -124,7 +124,7 @@ def _study(store: Store, scope: Scope, scheme: dict[str, Any]) -> Table:
 # --- net leakage --------------------------------------------------------------------------------
 
 
-def _leakage_setups(scope: Scope) -> list[ORing]:
+def _leakage_setups(scope: Scope) -> list[Seal]:
     return [setup(scope.mesh(16), p) for p in scope.some_pressures(MATRIX_PRESSURES)]
 
 
@@ -165,7 +165,7 @@ def _shear_requests(scope: Scope) -> list[Request]:
     return [ask(s, speeds) for s in _shear_setups(scope)]
 
 
-def _shear_setups(scope: Scope) -> list[ORing]:
+def _shear_setups(scope: Scope) -> list[Seal]:
     density, p_s = scope.mesh(16), scope.pressure(1.0)
     return [setup(density, p_s), setup(density, p_s, shear_traction=False)]
 

@@ -8,7 +8,7 @@ from typing import Any
 from softehl.cases.paper.item import Item, Product, Scope, Table, both, density_words, with_all
 from softehl.cases.paper.states import PAPER, STABILISED, Request, Store, ask, setup
 from softehl.cases.paper.tables import counted
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.runtime.io import Cell
 
 ARCS = ((-34.0, 43.0), (-33.0, 42.0), (-36.0, 46.0), (-38.0, 49.0))
@@ -30,7 +30,7 @@ SCHEMES = {"paper": PAPER, "stabilised": STABILISED}
 # --- where the lubricated arc ends --------------------------------------------------------------
 
 
-def _arc_setups(scope: Scope) -> dict[tuple[str, float, float], ORing]:
+def _arc_setups(scope: Scope) -> dict[tuple[str, float, float], Seal]:
     density, p_s = scope.mesh(16), scope.pressure(1.0)
     return {
         (name, start, end): setup(density, p_s, **{**scheme, "arc_start": start, "arc_end": end})
@@ -66,7 +66,7 @@ def arc(store: Store, scope: Scope) -> Product:
 # --- the outstroke without cavitation -----------------------------------------------------------
 
 
-def _cavitation_setups(scope: Scope) -> list[tuple[ORing, ORing]]:
+def _cavitation_setups(scope: Scope) -> list[tuple[Seal, Seal]]:
     density, pressures = scope.mesh(16), scope.some_pressures((0.0, 1.0, 5.0))
     return [
         (setup(density, p), setup(density, p, cavitation_penalty=NO_CAVITATION)) for p in pressures
@@ -108,7 +108,7 @@ def _changes(states: list[Any]) -> list[float]:
 # --- what a higher order of the pressure costs --------------------------------------------------
 
 
-def _order_setups(scope: Scope) -> list[ORing]:
+def _order_setups(scope: Scope) -> list[Seal]:
     return [
         setup(d, scope.pressure(1.0), reynolds=kind, pressure_order=m)
         for kind in ("fe", "dg")

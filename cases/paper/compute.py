@@ -14,7 +14,7 @@ from softehl.cases.harness.processes import processes
 from softehl.cases.harness.sweep import Curve, Task, shared_folder, solved
 from softehl.cases.oring import CASE
 from softehl.cases.paper.states import ENDED, Request, Store
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.plan import rod_speeds, strokes_of
 from softehl.runtime.io import read_json
 
@@ -69,12 +69,12 @@ def _run(request: Request, store: Store, resume: bool) -> Run:
     return Run(CASE, parameters, shared_folder(CASE, store.folder))
 
 
-def _earlier(request: Request, store: Store) -> tuple[str, ORing] | None:
+def _earlier(request: Request, store: Store) -> tuple[str, Seal] | None:
     """Status and parameters of an earlier run in the folder, None if there is none to be read."""
     path = store.run_folder(request.setup) / "run.json"
     try:
         content = read_json(path)
-        return str(content["status"]), ORing(**content["parameters"])
+        return str(content["status"]), Seal(**content["parameters"])
     except (OSError, ValueError, TypeError, KeyError):
         return None
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from softehl.cases.paper.states import SPEEDS, Request, State, Store
-from softehl.cases.seal.gland.parameters import DENSITIES, ORing
+from softehl.cases.seal.gland.parameters import DENSITIES, Seal
 from softehl.runtime.io import Cell
 
 if TYPE_CHECKING:  # imported late: matplotlib is slow to import
@@ -173,6 +173,6 @@ def both(speeds: Sequence[float]) -> list[float]:
     return [sign * u for sign in (1.0, -1.0) for u in speeds]
 
 
-def with_all(base: ORing, **changes: object) -> ORing:
+def with_all(base: Seal, **changes: object) -> Seal:
     """Copy of the parameters with some changed, checked again."""
-    return ORing(**(base.model_dump() | changes))
+    return Seal(**(base.model_dump() | changes))

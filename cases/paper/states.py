@@ -14,7 +14,7 @@ from softehl.cases.harness.curve import CurveFolder
 from softehl.cases.harness.row import OK
 from softehl.cases.harness.sweep import differences
 from softehl.cases.oring import CASE
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.observer_adapter import read_profile
 from softehl.cases.seal.states.plan import SIGNS
 from softehl.cases.seal.states.state import COLLAPSED, FilmRow, Profile
@@ -46,28 +46,28 @@ STABILISED: dict[str, Any] = {"mesh": "graded", "upwinding": 1.0, "error_estimat
 _IN_NAME = ("density", "sealed_pressure")
 
 
-def setup(density: int, sealed_pressure: float, **others: Any) -> ORing:
+def setup(density: int, sealed_pressure: float, **others: Any) -> Seal:
     """Parameters of a run, without speeds and stroke (those are left at their defaults)."""
     given: dict[str, Any] = {"density": density, "sealed_pressure": float(sealed_pressure)}
-    return ORing(**{**PAPER, **given, **others})
+    return Seal(**{**PAPER, **given, **others})
 
 
 @dataclass(frozen=True)
 class Request:
     """A run that is needed: its parameters and the signed speeds U (mm/s, + = outstroke)."""
 
-    setup: ORing
+    setup: Seal
     speeds: frozenset[float]
 
     @property
     def name(self) -> str:
         """The folder of the run: density, p_s and what is not as in the paper's default."""
-        others = differences(self.setup, ORing(**PAPER), (*CASE.selection, *_IN_NAME))
+        others = differences(self.setup, Seal(**PAPER), (*CASE.selection, *_IN_NAME))
         first = [f"d{self.setup.density}", f"ps{number_text(self.setup.sealed_pressure)}"]
         return "-".join([*first, *others])
 
     @property
-    def parameters(self) -> ORing:
+    def parameters(self) -> Seal:
         """Parameters for `softehl run`; both strokes get the same speeds if both are needed."""
         strokes = [
             stroke for stroke, sign in SIGNS.items() if any(sign * u > 0 for u in self.speeds)
@@ -77,7 +77,7 @@ class Request:
         return self.setup.model_copy(update={"stroke": stroke, "speeds": magnitudes})
 
 
-def ask(parameters: ORing, speeds: Iterable[float]) -> Request:
+def ask(parameters: Seal, speeds: Iterable[float]) -> Request:
     """A request for signed speeds U."""
     return Request(parameters, frozenset(float(u) for u in speeds))
 
@@ -99,7 +99,7 @@ class State:
     place: the folder of its files.
     """
 
-    setup: ORing
+    setup: Seal
     rod_speed: float
     row: FilmRow | None = None
     place: Path | None = None
@@ -145,16 +145,16 @@ class Store:
     folder: Path
     _rows: dict[Path, list[FilmRow]] = field(default_factory=dict, repr=False)
 
-    def run_folder(self, parameters: ORing) -> Path:
+    def run_folder(self, parameters: Seal) -> Path:
         """Folder of the run of these parameters, whether it exists or not."""
         return self.folder / Request(parameters, frozenset()).name
 
-    def ended(self, parameters: ORing) -> bool:
+    def ended(self, parameters: Seal) -> bool:
         """True if the run of these parameters came to its end.  Raises OSError, ValueError."""
         path = self.run_folder(parameters) / "run.json"
         return path.exists() and read_json(path).get("status") in ENDED
 
-    def state(self, parameters: ORing, rod_speed: float) -> State:
+    def state(self, parameters: Seal, rod_speed: float) -> State:
         """The state at a signed speed U, mm/s."""
         run = self.run_folder(parameters)
         for place in (run, run / "rejected"):
@@ -163,11 +163,11 @@ class Store:
                     return State(parameters, rod_speed, row, place)
         return State(parameters, rod_speed)
 
-    def states(self, parameters: ORing, speeds: Sequence[float]) -> list[State]:
+    def states(self, parameters: Seal, speeds: Sequence[float]) -> list[State]:
         """The states at several signed speeds."""
         return [self.state(parameters, u) for u in speeds]
 
-    def contact(self, parameters: ORing) -> tuple[Array, Array] | None:
+    def contact(self, parameters: Seal) -> tuple[Array, Array] | None:
         """x (mm) and frictionless contact pressure (MPa) along the arc, None if not reached."""
         name = number_text(parameters.sealed_pressure)
         path = self.run_folder(parameters) / f"contact_{name}.csv"
@@ -176,7 +176,7 @@ class Store:
         columns = read_columns(path, ("x_mm", "p_MPa"))
         return columns["x_mm"], columns["p_MPa"]
 
-    def effort(self, parameters: ORing, stages: Sequence[str], stroke: str) -> tuple[int, float]:
+    def effort(self, parameters: Seal, stages: Sequence[str], stroke: str) -> tuple[int, float]:
         """Iterations and seconds of some stages of a run; nan seconds where there is none."""
         path = self.run_folder(parameters) / "run.json"
         found = read_json(path).get("stages", []) if path.exists() else []

@@ -10,7 +10,7 @@ import numpy as np
 from softehl.cases.paper.item import Item, Product, Scope, Table, density_words
 from softehl.cases.paper.states import SPEEDS, Request, Store, ask, setup
 from softehl.cases.seal.equations.equations import build_system
-from softehl.cases.seal.gland.parameters import DENSITIES, ORing
+from softehl.cases.seal.gland.parameters import DENSITIES, Seal
 from softehl.runtime.io import number_text
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ FIG_4_PRESSURES = (0.0, 1.0, 2.0, 5.0)
 
 def table_1(_: Store, __: Scope) -> Product:
     """Table 1 and the defaults of the case."""
-    default = ORing()
+    default = Seal()
     rows: list[tuple[str, ...]] = [
         (title, key, number_text(getattr(default, key)), paper, unit)
         for title, key, paper, unit in TABLE_1
@@ -58,7 +58,7 @@ def table_2_densities(scope: Scope) -> tuple[int, ...]:
 
 
 @cache
-def counted(p: ORing) -> tuple[int, int]:
+def counted(p: Seal) -> tuple[int, int]:
     """Numbers of all unknowns and of those of pressure of a case."""
     system = build_system(p)
     return system.layout.total, system.pressure_count
@@ -122,7 +122,7 @@ def _fig_4_requests(scope: Scope) -> list[Request]:
     return [ask(s, [speed]) for s in _fig_4_setups(scope)]
 
 
-def _fig_4_setups(scope: Scope) -> list[ORing]:
+def _fig_4_setups(scope: Scope) -> list[Seal]:
     density = scope.mesh(paper=2, default=2)
     return [setup(density, p_s) for p_s in scope.some_pressures(FIG_4_PRESSURES)]
 
@@ -159,7 +159,7 @@ def fig_4(store: Store, scope: Scope) -> Product:
     return Product({"fig4": Table(header, rows)}, caption, draw, (5.6, 4.8))
 
 
-def _section(axes: Axes, p: ORing, store: Store) -> None:
+def _section(axes: Axes, p: Seal, store: Store) -> None:
     """The mesh and the walls, in z to the right and r downwards."""
     import meshio
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from softehl.cases.harness.processes import processes
     from softehl.cases.harness.sweep import Curve
     from softehl.cases.oring import run_oring
-    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.gland.parameters import ORing, Seal
     from softehl.cases.seal.states.state import FilmState, Observer, Outcome, Silent
     from softehl.cases.shipped import solve_cases
     from softehl.codegen.language import kinematics
@@ -60,6 +60,7 @@ _PUBLIC = {
     "Outcome": "softehl.cases.seal.states.state",
     "Problem": "softehl.runtime.fem.problem",
     "ProblemError": "softehl.runtime.fem.checks",
+    "Seal": "softehl.cases.seal.gland.parameters",
     "Silent": "softehl.cases.seal.states.state",
     "Solution": "softehl.runtime.solve.solution",
     "Status": "softehl.runtime.solve.solution",
@@ -102,6 +103,7 @@ __all__ = [
     "Outcome",
     "Problem",
     "ProblemError",
+    "Seal",
     "Silent",
     "Solution",
     "Status",

@@ -21,7 +21,7 @@ import numpy as np
 
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.gland.catalogue import as568
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import FilmState, Silent
 
@@ -29,7 +29,7 @@ SEED = 13
 SPEEDS = (1000.0, 100.0, 10.0)
 
 
-def drawn(number: int) -> ORing:
+def drawn(number: int) -> Seal:
     """A general ring on a rod of 3 to 500 mm in a groove that it does not overfill.
 
     Stretch 0 to 6 %, squeeze 6 to 30 %, width 1.02 to 2 sections, fill up to 95 %, shear modulus 1
@@ -49,7 +49,7 @@ def drawn(number: int) -> ORing:
         p_s = rng.uniform(0.0, 5.0) * mu
         if 0.25 * math.pi * d**2 > 0.95 * depth * width or p_s > 20.0:
             continue
-        return ORing(
+        return Seal(
             inner_diameter=ring.inner_diameter,
             section_diameter=d,
             rod_diameter=round(rod, 4),
@@ -102,7 +102,7 @@ class Watch(Silent):
 
 
 def solved(
-    number: int, limit: float, draw: Callable[[int], ORing] = drawn, **changes: Any
+    number: int, limit: float, draw: Callable[[int], Seal] = drawn, **changes: Any
 ) -> dict[str, Any]:
     """What came out of a gland, as it is written to the file."""
     p, watch, begin = draw(number).model_copy(update=changes), Watch(), time.process_time()
@@ -130,7 +130,7 @@ def solved(
     }
 
 
-def main(draw: Callable[[int], ORing], words: str | None) -> None:
+def main(draw: Callable[[int], Seal], words: str | None) -> None:
     """Solve, print and keep what the command line asks for."""
     arguments = asked(words)
     file, done = Path(arguments.file), set[int]()

@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.state import FilmRow
 
 
-def oring(**changes: Any) -> ORing:
+def oring(**changes: Any) -> Seal:
     """The O-ring on the mesh and by the scheme of the paper, with other values for some keys."""
     values: dict[str, Any] = {
         "mesh": "uniform",
@@ -17,7 +17,7 @@ def oring(**changes: Any) -> ORing:
         "arc_end": 43.0,
         **changes,
     }
-    return ORing(**values)
+    return Seal(**values)
 
 
 def film_values(**given: Any) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.sections import SECTIONS
 from tests.cases.gland_matrix import SPEEDS, main
 
@@ -37,7 +37,7 @@ _SHARES = {
 """Dimensions over section_diameter, from and to."""
 
 
-def drawn(number: int) -> ORing:
+def drawn(number: int) -> Seal:
     """A seal of one of the sections on a rod of 10 to 200 mm.
 
     Height 2 to 7 mm, squeeze 7 to 20 %, stretch 0 to 4 %, 1.03 to 1.5 widths of its section wide,
@@ -56,7 +56,7 @@ def drawn(number: int) -> ORing:
             return p
 
 
-def _once(rng: np.random.Generator, section: str) -> ORing:
+def _once(rng: np.random.Generator, section: str) -> Seal:
     height, rod = rng.uniform(2.0, 7.0), math.exp(rng.uniform(math.log(10.0), math.log(200.0)))
     sizes = {k: round(rng.uniform(*ends) * height, 4) for k, ends in _SHARES[section].items()}
     depth = height * (1.0 - rng.uniform(0.07, 0.20))
@@ -80,8 +80,8 @@ def _once(rng: np.random.Generator, section: str) -> ORing:
         "speeds": SPEEDS,
         "error_estimate": False,
     }
-    width = ORing(**given).axial_width
-    return ORing(**{**given, "groove_width": round(rng.uniform(1.03, 1.5) * width, 3)})
+    width = Seal(**given).axial_width
+    return Seal(**{**given, "groove_width": round(rng.uniform(1.03, 1.5) * width, 3)})
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from softehl.cases.harness.report.page import parts_of, render, write_xlsx
 from softehl.cases.harness.report.part import FinishedRun, Part, Table
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.cycle.transient import Reading
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.answer import RETURNS, answer
 from softehl.cases.seal.states.state import UNCERTAIN, FilmRow
 from tests.cases.test_leakage import row
@@ -145,8 +145,8 @@ def test_breaking_away_is_friction_of_a_slow_rod() -> None:
 
 def test_a_report_is_titled_by_its_seal() -> None:
     titles = [
-        oring.CASE.titled(ORing()),
-        oring.CASE.titled(ORing(section="x_ring", groove_width=4.3)),
+        oring.CASE.titled(Seal()),
+        oring.CASE.titled(Seal(section="x_ring", groove_width=4.3)),
         cycle.CASE.titled(cycle.Cycle(section="u_cup", groove_width=6.0)),
     ]
     for title, name in zip(titles, ("O-ring", "X-ring", "U-cup"), strict=True):

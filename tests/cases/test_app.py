@@ -13,7 +13,7 @@ from softehl.__main__ import main
 from softehl.cases.app.choices import CHOICES, rods, slides_on
 from softehl.cases.app.runs import Desk, case_text
 from softehl.cases.harness.case_file import read_case
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.shipped import SHIPPED
 
 GIVEN = {
@@ -45,7 +45,7 @@ def test_all_that_is_offered_is_understood() -> None:
             if option == "smooth":
                 continue
             key, rod = slides_on(given.pop("rod"))
-            p = ORing.model_validate({**given, key: rod})
+            p = Seal.model_validate({**given, key: rod})
             assert p.piston == (key == "bore"), option
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.checkpoints import Checkpoint, Checkpoints
 from softehl.cases.seal.solve.contact import contact_problem
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
@@ -14,7 +14,7 @@ from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.state import Silent
 
-LOADED = ORing(sealed_pressure=10.0, density=1)
+LOADED = Seal(sealed_pressure=10.0, density=1)
 
 
 def at(system: SealSystem, share: float) -> Checkpoint:
@@ -28,7 +28,7 @@ def system() -> SealSystem:
     return build_system(LOADED)
 
 
-def share(checkpoints: Checkpoints, p: ORing = LOADED) -> float | None:
+def share(checkpoints: Checkpoints, p: Seal = LOADED) -> float | None:
     found = checkpoints.restart(p)
     return found.pressure / p.sealed_pressure if found else None
 
@@ -58,7 +58,7 @@ def test_a_new_path_replaces_what_lies_beyond_its_start(system: SealSystem) -> N
 
 def test_contact_above_three_shear_moduli_is_not_walked_from_rest_on_every_mesh() -> None:
     """189 factorisations; from rest on each of the four meshes it is more than 4 times 93."""
-    p = ORing(
+    p = Seal(
         inner_diameter=69.215,
         section_diameter=5.334,
         rod_diameter=71.0932,

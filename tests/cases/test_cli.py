@@ -24,7 +24,7 @@ from softehl.cases.harness.report.page import read_finished
 from softehl.cases.harness.row import OK
 from softehl.cases.harness.session import NOT_CONVERGED
 from softehl.cases.oring import ORingCase
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report import PICTURES
 from softehl.cases.seal.solve.method import run as solve_really
 from softehl.cases.seal.states.observer_adapter import ObserverAdapter
@@ -68,7 +68,7 @@ FILES = {
 USED = {"film": kernel_signatures()["film"]}
 
 
-Solve = Callable[[ORing, Observer], harness.Outcome]
+Solve = Callable[[Seal, Observer], harness.Outcome]
 
 
 class Fake(ORingCase):
@@ -78,7 +78,7 @@ class Fake(ORingCase):
         self.solver = solver
 
     def solve(
-        self, parameters: ORing, observer: harness.Observer, shared: Path | None
+        self, parameters: Seal, observer: harness.Observer, shared: Path | None
     ) -> harness.Outcome:
         return self.solver(parameters, ObserverAdapter(observer))
 
@@ -94,7 +94,7 @@ def section() -> Section:
     return Section(points, np.array([[0, 1, 2, 3]]), data)
 
 
-def film_state(parameters: ORing, speed: float, verdict: str = OK) -> FilmState:
+def film_state(parameters: Seal, speed: float, verdict: str = OK) -> FilmState:
     x = np.linspace(-1.0, 1.0, 5)
     h_star = abs(speed) ** 0.5 / 10
     values = film_values(
@@ -121,7 +121,7 @@ def film_state(parameters: ORing, speed: float, verdict: str = OK) -> FilmState:
     )
 
 
-def solve(parameters: ORing, observer: Observer) -> Outcome:
+def solve(parameters: Seal, observer: Observer) -> Outcome:
     """Every requested state, fast ones first."""
     p = parameters.sealed_pressure
     x = np.array([-1.0, 0.0, 1.0])
@@ -146,7 +146,7 @@ def outcome(*states: FilmState, status: Status = Status.CONVERGED, message: str 
     return Outcome(states, status, message, unknowns, USED, (stage,))
 
 
-def solve_roughly(parameters: ORing, observer: Observer) -> Outcome:
+def solve_roughly(parameters: Seal, observer: Observer) -> Outcome:
     """Every requested state, with an error that falls with the density and rises with 1 / U."""
     states = []
     for sign in {"out": [1.0], "in": [-1.0], "both": [1.0, -1.0]}[parameters.stroke]:
@@ -158,14 +158,14 @@ def solve_roughly(parameters: ORing, observer: Observer) -> Outcome:
     return outcome(*states)
 
 
-def solve_and_stop(parameters: ORing, observer: Observer) -> Outcome:
+def solve_and_stop(parameters: Seal, observer: Observer) -> Outcome:
     """One state, then no convergence."""
     state = film_state(parameters, max(parameters.speeds))
     observer.film_state(state)
     return outcome(state, status=Status.STEP_TOO_SMALL, message="stopped at\nU = 250 mm/s")
 
 
-def solve_and_collapse(parameters: ORing, observer: Observer) -> Outcome:
+def solve_and_collapse(parameters: Seal, observer: Observer) -> Outcome:
     """A good state and a collapsed one."""
     fast, slow = max(parameters.speeds), min(parameters.speeds)
     states = [film_state(parameters, fast), film_state(parameters, slow, COLLAPSED)]
@@ -174,7 +174,7 @@ def solve_and_collapse(parameters: ORing, observer: Observer) -> Outcome:
     return outcome(*states)
 
 
-def solve_unsealed(parameters: ORing, observer: Observer) -> Outcome:
+def solve_unsealed(parameters: Seal, observer: Observer) -> Outcome:
     """States that are uncertain for a reason of their own."""
     states = []
     for speed in parameters.speeds:
@@ -184,13 +184,13 @@ def solve_unsealed(parameters: ORing, observer: Observer) -> Outcome:
     return outcome(*states)
 
 
-def solve_and_forget(parameters: ORing, observer: Observer) -> Outcome:
+def solve_and_forget(parameters: Seal, observer: Observer) -> Outcome:
     """Claims convergence without having reached everything."""
     observer.film_state(film_state(parameters, max(parameters.speeds)))
     return outcome()
 
 
-def solve_and_break(parameters: ORing, observer: Observer) -> Outcome:
+def solve_and_break(parameters: Seal, observer: Observer) -> Outcome:
     """One state, then an error in the program."""
     observer.stage("speed", sealed_pressure=1.0, stroke="out", steps=None)
     observer.step(label="U", parameter=400.0, iterations=4, residuals=(1.0,), fraction=None)
@@ -198,13 +198,13 @@ def solve_and_break(parameters: ORing, observer: Observer) -> Outcome:
     raise ArithmeticError("broken")
 
 
-def solve_and_die(parameters: ORing, observer: Observer) -> Outcome:
+def solve_and_die(parameters: Seal, observer: Observer) -> Outcome:
     """One state, then the end of the process without any clean-up."""
     observer.film_state(film_state(parameters, max(parameters.speeds)))
     os._exit(9)
 
 
-def solve_instroke_dies(parameters: ORing, observer: Observer) -> Outcome:
+def solve_instroke_dies(parameters: Seal, observer: Observer) -> Outcome:
     """Outstroke as it should be, instroke killed after its first state."""
     if parameters.stroke == "out":
         return solve(parameters, observer)
@@ -212,7 +212,7 @@ def solve_instroke_dies(parameters: ORing, observer: Observer) -> Outcome:
     os._exit(9)
 
 
-def solve_without_kernels(parameters: ORing, observer: Observer) -> Outcome:
+def solve_without_kernels(parameters: Seal, observer: Observer) -> Outcome:
     raise MissingKernelsError("no compiled kernels;\nrun `python -m softehl.codegen.tools.build`")
 
 
@@ -403,7 +403,7 @@ def test_a_run_says_what_it_assumed(here: Path, invoke: Invoke) -> None:
 def test_run_json(here: Path, invoke: Invoke) -> None:
     assert invoke("run", "oring", *FAST, "--set", "density=4", "--out", "a")[0] == 0
     content = run_json(here / "a")
-    parameters = ORing(density=4, speeds=(400.0, 100.0)).model_dump(mode="json")
+    parameters = Seal(density=4, speeds=(400.0, 100.0)).model_dump(mode="json")
     assert parameters["speeds"] == [400.0, 100.0]
     assert content["parameters"] == parameters
     assert (content["case"], content["status"]) == ("oring", "converged")
@@ -455,7 +455,7 @@ def test_a_tolerance_that_no_mesh_meets_is_named(here: Path, invoke: Invoke) -> 
 
 
 def test_a_tolerance_goes_on_where_a_film_collapsed(here: Path, invoke: Invoke) -> None:
-    def solver(parameters: ORing, observer: Observer) -> Outcome:
+    def solver(parameters: Seal, observer: Observer) -> Outcome:
         return (solve_roughly if parameters.density > 2 else solve_and_collapse)(
             parameters, observer
         )
@@ -524,7 +524,7 @@ def test_not_converged(here: Path, invoke: Invoke) -> None:
 
 
 def test_a_shape_that_cannot_be_meshed_is_one_line(here: Path, invoke: Invoke) -> None:
-    def solve_without_mesh(parameters: ORing, observer: Observer) -> Outcome:
+    def solve_without_mesh(parameters: Seal, observer: Observer) -> Outcome:
         observer.film_state(film_state(parameters, max(parameters.speeds)))
         raise MeshError("no sound mesh of sq at density 1; use rounder corners")
 
@@ -604,7 +604,7 @@ def test_a_killed_run_is_resumed(here: Path, invoke: Invoke) -> None:
     assert run_json(folder)["status"] == "running"
     asked: list[tuple[str, tuple[float, ...]]] = []
 
-    def counting(parameters: ORing, observer: Observer) -> Outcome:
+    def counting(parameters: Seal, observer: Observer) -> Outcome:
         asked.append((parameters.stroke, parameters.speeds))
         return solve(parameters, observer)
 

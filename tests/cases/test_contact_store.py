@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.equations.equations import build_system
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.keys import dimensions
 from softehl.cases.seal.solve.contact import contact_problem
@@ -110,10 +110,10 @@ CHANGED = {
 }
 
 
-def case(**changes: Any) -> ORing:
+def case(**changes: Any) -> Seal:
     given = {"density": 1, "sealed_pressure": 0.5, "stroke": "out", "speeds": (1600.0,)}
     scheme = {"mesh": "uniform", "upwinding": 0.0, "arc_start": -34.0, "arc_end": 43.0}
-    return ORing(**{**scheme, **given, **changes})
+    return Seal(**{**scheme, **given, **changes})
 
 
 def cost(outcome: Outcome) -> int:
@@ -145,7 +145,7 @@ def test_every_parameter_either_matters_or_does_not() -> None:
     assert contact_key(case(rod=50.5)) != contact_key(case())
     sections = {name: section for section in SECTIONS for name in dimensions(section)}
     known = {*CHANGED, *RUBBERS, *sections, "section", "outline", "cap_thickness", "materials"}
-    assert known == set(ORing.model_fields) - set(WITHOUT_INFLUENCE)
+    assert known == set(Seal.model_fields) - set(WITHOUT_INFLUENCE)
     key = contact_key(case())
     assert {contact_key(case(**other)) for other in (OTHER, ROUGH, THINNING)} == {key}
     assert (
@@ -184,7 +184,7 @@ def test_a_second_curve_has_no_contact_path(solved: tuple[Path, Outcome], contac
 
 
 def test_a_state_holds_whatever_the_film_is(contacts: Path) -> None:
-    def residual(of: ORing) -> float:
+    def residual(of: Seal) -> float:
         system = build_system(of)
         problem = contact_problem(system, 0.5)
         return problem.norm(problem.residual(ContactStore(contacts).read(system)))

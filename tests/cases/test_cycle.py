@@ -23,7 +23,7 @@ from softehl.cases.seal.cycle.motion import Motion, RodFilm, Table, differences
 from softehl.cases.seal.cycle.strip import Oil, Strip
 from softehl.cases.seal.cycle.transient import Reading
 from softehl.cases.seal.equations.system import FILM, PRESSURE, SQUEEZE, VOID
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report.cycle import (
     MovingSection,
     film_map,
@@ -353,7 +353,7 @@ def test_titles_part_quantity_and_unit() -> None:
 
 def test_an_animation_moves(tmp_path: Path) -> None:
     film, loop = film_and_loop()
-    p, angle = ORing(), np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    p, angle = Seal(), np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
     outline = {
         "t_s": np.repeat([0.1, 1.0], 40),
         "z_mm": np.tile(1.7 * np.cos(angle), 2),
@@ -366,7 +366,7 @@ def test_an_animation_moves(tmp_path: Path) -> None:
 
 
 def test_the_section_and_the_rod_of_an_animation_move() -> None:
-    p, axes = ORing(), Figure().subplots()
+    p, axes = Seal(), Figure().subplots()
     outline = {
         "t_s": np.repeat([0.0, 1.0], 4),
         "z_mm": np.tile([-1.0, 1.0, 1.0, -1.0], 2),

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from softehl.__main__ import main
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.sensitivity import design_command
 from softehl.cases.seal.sensitivity.design import (
     Change,
@@ -26,11 +26,11 @@ from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import FilmState, Silent
 from tests.cases.oring_cases import film_values
 
-P = ORing()
+P = Seal()
 POWER = -3.0
 
 
-def power_law(p: ORing, slope: float = POWER, **given: Any) -> FilmState:
+def power_law(p: Seal, slope: float = POWER, **given: Any) -> FilmState:
     """A made-up film whose friction is a power of the rod diameter."""
     values = film_values(verdict="ok", inlet_ratio=1.0)
     values["rod_friction_N"] = -5.0 * (p.rod_diameter / 50.0) ** POWER
@@ -45,12 +45,12 @@ def power_law(p: ORing, slope: float = POWER, **given: Any) -> FilmState:
     return replace(state, **given)
 
 
-def held(p: ORing) -> Change:
+def held(p: Seal) -> Change:
     """How the same friction changes where the mesh is held: not quite as from mesh to mesh."""
     return lambda factor: factor ** (1.01 * POWER)
 
 
-def steps(target: Target, solve: Callable[[ORing], FilmState | None]) -> list[Step]:
+def steps(target: Target, solve: Callable[[Seal], FilmState | None]) -> list[Step]:
     return designed(P, target, "rod_diameter", solve, held)
 
 
@@ -144,7 +144,7 @@ def test_a_measure_of_the_gland_is_designed_by_the_key_that_it_decides(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def found(p: ORing, _target: Target, by: str, *_: object) -> list[Step]:
+    def found(p: Seal, _target: Target, by: str, *_: object) -> list[Step]:
         first, last = {"housing_diameter": (56.3, 56.4), "groove_width": (3.74, 4.0)}[by]
         return [Step(first, 5.0, math.nan), Step(last, 4.5, 4.5)]
 
@@ -189,7 +189,7 @@ def test_the_held_mesh_gives_what_the_run_did() -> None:
 
 def test_a_piston_seal_is_told_by_its_own_sizes(capsys: pytest.CaptureFixture[str]) -> None:
     """Diameters are counted negative inside; no sign of it is told."""
-    p = ORing(bore=40.0, ring="32x4")
+    p = Seal(bore=40.0, ring="32x4")
     steps = [Step(-33.0, 3.2, 3.2), Step(-32.9, 2.9, 2.9)]
     design_command._tell(p, Target.of("friction -10%"), "housing_diameter", steps)
     told = capsys.readouterr().out

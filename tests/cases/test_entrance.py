@@ -9,7 +9,7 @@ import pytest
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.entrance import built_up, facing, wedge_friction
 from softehl.cases.seal.states.state import CLIPPED, FilmState, Silent
@@ -49,7 +49,7 @@ def test_a_surface_that_turns_away_at_once_builds_nothing_up() -> None:
 
 
 def test_friction_below_a_wedge_is_that_of_its_shear() -> None:
-    system = build_system(ORing(density=1))
+    system = build_system(Seal(density=1))
     way = np.linspace(0.0, 1.0, 20001)
     gap = 0.01 + SLOPE * way
     around = 2.0 * np.pi * system.rod_radius * FLOW
@@ -66,7 +66,7 @@ def test_a_gap_that_does_not_widen_is_no_wedge() -> None:
 @cache
 def _cut(arc_end: float, speed: float) -> FilmState:
     """The paper's ring on the instroke, whose inlet is at the air end of the arc."""
-    p = ORing(arc_start=-34.0, arc_end=arc_end, speeds=(speed,), stroke="in", error_estimate=False)
+    p = Seal(arc_start=-34.0, arc_end=arc_end, speeds=(speed,), stroke="in", error_estimate=False)
     (state,) = run(p, Silent()).states
     return state
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.gland.parameters import DENSITIES, ORing
+from softehl.cases.seal.gland.parameters import DENSITIES, Seal
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.estimate import (
     ORDER,
@@ -50,7 +50,7 @@ def curve() -> Outcome:
     return run(_case(), Silent())
 
 
-def _case(**changes: object) -> ORing:
+def _case(**changes: object) -> Seal:
     given = {"mesh": "graded", "upwinding": 1.0, "stroke": "out", "speeds": tuple(CONVERGED)}
     return oring(**{**given, **changes})
 
@@ -105,7 +105,7 @@ def test_without_an_estimate_only_the_way_is_another(curve: Outcome) -> None:
 @pytest.mark.parametrize("density", [1, 2])
 def test_density_one_is_not_ok(density: Literal[1, 2]) -> None:
     # h* of density 1 is 2.3 % too small, and its estimate says 1 % too large
-    (state,) = run(ORing(density=density, stroke="out", speeds=(60.0,)), Silent()).states
+    (state,) = run(Seal(density=density, stroke="out", speeds=(60.0,)), Silent()).states
     assert state.verdict == (UNCERTAIN if density == 1 else OK)
     assert bool(state.advice) == (density == 1)
 
@@ -126,7 +126,7 @@ def test_density_one_is_not_ok(density: Literal[1, 2]) -> None:
     ],
 )
 def test_settings_whose_error_two_meshes_do_not_show(keys: dict[str, Any], words: str) -> None:
-    said = reservation(ORing(**keys), NUMBERS, NUMBERS)
+    said = reservation(Seal(**keys), NUMBERS, NUMBERS)
     assert words in said
     assert bool(said) == bool(words)
 
@@ -145,6 +145,6 @@ def test_settings_whose_error_two_meshes_do_not_show(keys: dict[str, Any], words
 def test_a_small_error_of_the_thickness_is_not_enough(
     film: dict[str, Any], other: dict[str, Any], words: str
 ) -> None:
-    said = reservation(ORing(), replace(NUMBERS, **film), replace(NUMBERS, **other))
+    said = reservation(Seal(), replace(NUMBERS, **film), replace(NUMBERS, **other))
     assert said.startswith(words) if words.startswith("friction") else words in said
     assert bool(said) == bool(words)

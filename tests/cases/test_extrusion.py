@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact import load_stage
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
@@ -21,13 +21,13 @@ from softehl.runtime.solve.solution import Branch, Status
 
 def found(**changes: Any) -> State:
     driver = PathDriver(Silent())
-    p = ORing(**{"density": 1, "extrusion_gap": 0.1, **changes})
+    p = Seal(**{"density": 1, "extrusion_gap": 0.1, **changes})
     state = ContactMeshes(ContactSolver(driver)).contact(p)
     assert not isinstance(state, StageFailed), state.message
     return state
 
 
-def distance(places: np.ndarray, p: ORing) -> np.ndarray:
+def distance(places: np.ndarray, p: Seal) -> np.ndarray:
     """Distance of places (n, 2) from the wall and its rounded edge."""
     corner = np.array([0.5 * p.groove_width, 0.5 * p.rod_diameter + p.extrusion_gap])
     a = corner + p.corner_fillet - places
@@ -55,7 +55,7 @@ def sizes(system: SealSystem) -> np.ndarray:
 
 def test_the_mesh_is_fine_where_the_section_meets_the_edge() -> None:
     """A quarter of the fillet: over the whole of the guide's edge, at the air end of the film."""
-    p = ORing(density=2, extrusion_gap=0.1)
+    p = Seal(density=2, extrusion_gap=0.1)
     guide = build_system(p.model_copy(update={"mesh": "uniform"}))
     centre = np.array([0.0, 0.5 * (p.inner_diameter + p.section_diameter)])
     z, r = (guide.mesh.points[guide.mesh.arc_nodes] - centre).T
@@ -64,11 +64,11 @@ def test_the_mesh_is_fine_where_the_section_meets_the_edge() -> None:
     assert sizes(guide)[: guide.mesh.arc][edge].max() < 0.3 * p.corner_fillet
     system, _ = found(sealed_pressure=2.0)
     assert sizes(system)[system.mesh.arc] < 2 * 0.3 * p.corner_fillet  # density 1
-    assert sizes(build_system(ORing(density=2))).min() > 0.3 * p.corner_fillet
+    assert sizes(build_system(Seal(density=2))).min() > 0.3 * p.corner_fillet
 
 
 def test_a_run_that_ends_in_the_gap_says_so() -> None:
-    p = ORing(density=1, extrusion_gap=0.05, corner_fillet=0.2, sealed_pressure=9.0)
+    p = Seal(density=1, extrusion_gap=0.05, corner_fillet=0.2, sealed_pressure=9.0)
     stage = load_stage(build_system(p))
     failed = StageFailed(stage, Branch((), Status.STEP_TOO_SMALL, ""))
     text = explained(failed, "contact", p)[1]
@@ -77,10 +77,10 @@ def test_a_run_that_ends_in_the_gap_says_so() -> None:
 
 
 def test_a_closed_gap_is_the_wall_down_to_the_rod() -> None:
-    closed, open_ = build_system(ORing(density=1)), build_system(ORing(extrusion_gap=0.1))
+    closed, open_ = build_system(Seal(density=1)), build_system(Seal(extrusion_gap=0.1))
     kernels = [s.problem.assembler.block("air_wall").kernel.name for s in (closed, open_)]
     assert kernels == ["contact", "contact_corner"]
-    assert ORing(backup=True) == ORing(backup=True, extrusion_gap=0.0)
+    assert Seal(backup=True) == Seal(backup=True, extrusion_gap=0.0)
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from softehl.cases.harness import table
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.lock import FolderLock
 from softehl.cases.oring import CASE
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.state import FilmRow, Observer
 from tests.cases.test_cli import FAST, Fake, film_state, solve
 
@@ -44,7 +44,7 @@ def resumed(monkeypatch: pytest.MonkeyPatch, *more: str) -> tuple[int, list[tupl
     """Exit code of a resumed run, and the states that it computed."""
     computed: list[tuple[str, float]] = []
 
-    def counting(parameters: ORing, observer: Observer) -> Any:
+    def counting(parameters: Seal, observer: Observer) -> Any:
         computed.extend((parameters.stroke, u) for u in parameters.speeds)
         return solve(parameters, observer)
 
@@ -208,10 +208,10 @@ def test_a_lock_is_for_one(tmp_path: Path) -> None:
 )
 def test_a_name_of_a_curve_is_one_component(name: str, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="is no name for a curve"):
-        softehl.solve_cases({name: ORing()}, tmp_path)
+        softehl.solve_cases({name: Seal()}, tmp_path)
 
 
-def slowly(parameters: ORing, observer: Observer) -> Any:
+def slowly(parameters: Seal, observer: Observer) -> Any:
     """A state, then a long silence."""
     observer.film_state(film_state(parameters, max(parameters.speeds)))
     print("there", flush=True)
@@ -269,7 +269,7 @@ def test_a_file_without_end_is_no_case(tmp_path: Path, capsys: pytest.CaptureFix
 def test_a_narrow_terminal_loses_columns_never_digits(
     width: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rows = [FilmRow.part_of(film_state(ORing(), u)) for u in (1600.0, -0.123456)]
+    rows = [FilmRow.part_of(film_state(Seal(), u)) for u in (1600.0, -0.123456)]
     console = Console(width=width, force_terminal=True, record=True, legacy_windows=False)
     monkeypatch.setattr(table, "Console", lambda **_: console)
     with console.capture() as captured:

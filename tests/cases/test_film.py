@@ -10,7 +10,7 @@ import pytest
 
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.equations.layers import film_layer
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve import film_correctors
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.solve.squeeze_film import film_loads
@@ -128,7 +128,7 @@ def test_where_it_gives_up_newton_goes_on(
 
 def test_a_film_that_ends_at_a_wall_leaves_no_multiplier_undetermined() -> None:
     """Above three shear moduli the arc reaches the wall; the rest of the section is condensed."""
-    system = build_system(ORing(density=1))
+    system = build_system(Seal(density=1))
     x, air_end = system.at_rest(), system.mesh.arc_nodes[-3:]
     at_wall = system.obstacles["air_wall"].c
     system.displacements(x)[air_end, 0] = -at_wall - system.mesh.points[air_end, 0]

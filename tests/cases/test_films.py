@@ -10,7 +10,7 @@ import pytest
 
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.equations.equations import build_system
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.adaptation import FITS, Adaptation, Adapted
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.film_layout import film_layout, misfit
@@ -23,8 +23,8 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.solve.solution import Status
 
 RING: dict[str, Any] = {"ring": "AS568-210", "rod": 19.0, "error_estimate": False}
-P = ORing(**RING, density=1, sealed_pressure=3.0, mu_1=1.5)
-THIN = ORing(
+P = Seal(**RING, density=1, sealed_pressure=3.0, mu_1=1.5)
+THIN = Seal(
     inner_diameter=9.525,
     section_diameter=1.78,
     rod_diameter=9.525,
@@ -36,7 +36,7 @@ THIN = ORing(
 """A film of 0.0403 um at density 4, much thinner than what holds the rod off in contact."""
 
 
-def contact_of(p: ORing) -> DryContact:
+def contact_of(p: Seal) -> DryContact:
     found = DryContact.of(p, Silent())
     assert not isinstance(found, StageFailed)
     return found
@@ -63,7 +63,7 @@ def solver(dry: DryContact, system: Any = None) -> FilmSolver:
     return dry.films.on(system or dry.system)
 
 
-def adaptation(p: ORing, dry: DryContact) -> Adaptation:
+def adaptation(p: Seal, dry: DryContact) -> Adaptation:
     return Adaptation(p, dry.solver, dry.films)
 
 
@@ -161,7 +161,7 @@ def test_films_do_not_depend_on_the_speeds_that_were_asked_for_before() -> None:
     """But for their meshes, which films of several speeds share where these fit them."""
     given: dict[str, Any] = {**RING, "density": 2, "stroke": "out"}
     many, few = (
-        run(ORing(**given, speeds=speeds), Silent()).states
+        run(Seal(**given, speeds=speeds), Silent()).states
         for speeds in ((800.0, 200.0, 50.0), (50.0,))
     )
     assert many[-1].rod_speed == few[-1].rod_speed == 50.0
@@ -172,7 +172,7 @@ def test_films_do_not_depend_on_the_speeds_that_were_asked_for_before() -> None:
 def test_a_film_that_is_not_found_ends_soon_and_with_a_reason() -> None:
     """No more meshes are made once one has led no further."""
     given: dict[str, Any] = {"section": "rectangular", "groove_width": 4.6, "density": 1}
-    p = ORing(**given, sealed_pressure=2.0, stroke="out", speeds=(1.0,), error_estimate=False)
+    p = Seal(**given, sealed_pressure=2.0, stroke="out", speeds=(1.0,), error_estimate=False)
     outcome = run(p, Silent())
     assert not outcome.states
     assert outcome.message.startswith("outstroke: no film was found at 1 mm/s: ")

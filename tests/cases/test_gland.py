@@ -10,7 +10,7 @@ from softehl.cases.harness.row import OK
 from softehl.cases.oring import CASE
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.equations.system import BORE, ROD
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact import approach_stage, load_stage, release_stage
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
@@ -35,7 +35,7 @@ from tests.cases.gland_matrix import drawn
 
 def solved(**changes: Any) -> Outcome:
     given = {"ring": "AS568-210", "rod": 19.0, "speeds": (400.0,), "error_estimate": False}
-    return run(ORing(**{**given, **changes}), Silent())
+    return run(Seal(**{**given, **changes}), Silent())
 
 
 def test_a_stretched_ring_in_a_wide_groove_leans_on_the_wall_of_the_air_side() -> None:
@@ -67,12 +67,12 @@ def test_without_pressure_both_strokes_are_mirror_images() -> None:
 
 def test_an_arc_that_ends_within_the_contact_is_not_ok() -> None:
     """The trial's setting: h* was 15 to 26 % off there, and called ok."""
-    outcome = run(ORing(arc_start=-34.0, arc_end=26.0, speeds=(400.0,)), Silent())
+    outcome = run(Seal(arc_start=-34.0, arc_end=26.0, speeds=(400.0,)), Silent())
     assert all(s.verdict in (CLIPPED, COLLAPSED, UNDER_RESOLVED) for s in outcome.states)
 
 
 def test_what_cannot_be_reached_is_told_in_words_of_the_problem() -> None:
-    p = ORing(ring="AS568-210", rod=19.0, sealed_pressure=9.0)
+    p = Seal(ring="AS568-210", rod=19.0, sealed_pressure=9.0)
     system = build_system(p.model_copy(update={"mesh": "uniform", "density": 1}))
     stages = {
         "% of the way": approach_stage(system),
@@ -98,18 +98,18 @@ def test_what_cannot_be_reached_is_told_in_words_of_the_problem() -> None:
 )
 def test_a_film_that_is_not_found_is_told_why(given: dict[str, Any], says: str) -> None:
     missed = [NoFilm("out", speed, Status.DIVERGED, "no end") for speed in (400.0, 25.5)]
-    status, words = without_films(missed, ORing(**given))
+    status, words = without_films(missed, Seal(**given))
     assert status is Status.DIVERGED
     assert words.startswith("outstroke: no film was found at 400, 25.5 mm/s: no end; ")
     assert says in words
 
 
 def test_a_ring_that_overfills_its_gland_is_warned_of() -> None:
-    narrow = ORing(ring="AS568-210", rod=19.0, groove_width=3.6, housing_diameter=23.9)
+    narrow = Seal(ring="AS568-210", rod=19.0, groove_width=3.6, housing_diameter=23.9)
     assert CASE.warnings(narrow) == [
         "the ring fills 115 % of its gland; handbooks advise 60 to 95 %"
     ]
-    assert CASE.warnings(ORing(ring="AS568-210", rod=19.0)) == []
+    assert CASE.warnings(Seal(ring="AS568-210", rod=19.0)) == []
 
 
 @pytest.mark.parametrize(
@@ -122,18 +122,18 @@ def test_a_ring_that_overfills_its_gland_is_warned_of() -> None:
     ],
 )
 def test_a_key_that_changes_nothing_is_named(given: dict[str, Any], words: str) -> None:
-    assert CASE.warnings(ORing(**given)) == [words]
+    assert CASE.warnings(Seal(**given)) == [words]
     with_them: dict[str, Any] = {
         "oil": "ISO VG 46",
         "temperature": 80.0,
         "extrusion_gap": 0.1,
         "roughness": 0.2,
     }
-    assert CASE.warnings(ORing(**{**with_them, **given})) == []
+    assert CASE.warnings(Seal(**{**with_them, **given})) == []
 
 
 def test_a_rubber_that_is_compressible_is_warned_of() -> None:
-    (word,) = CASE.warnings(ORing(bulk_modulus=3.66))
+    (word,) = CASE.warnings(Seal(bulk_modulus=3.66))
     assert word.startswith("bulk_modulus = 3.66 MPa is 1 shear moduli")
 
 
@@ -147,7 +147,7 @@ def test_a_path_from_rest_takes_few_steps_however_incompressible_the_rubber() ->
 
 
 def test_pressure_that_ends_where_nothing_touches_is_told() -> None:
-    system = build_system(ORing(density=1, mesh="uniform", arc_start=-34.0, arc_end=43.0))
+    system = build_system(Seal(density=1, mesh="uniform", arc_start=-34.0, arc_end=43.0))
     x = system.at_rest()
     assert "lowest point" in unsealed(system, x)
     x[system.layout.part(ROD)] = -1.0
@@ -159,7 +159,7 @@ def test_pressure_that_ends_where_nothing_touches_is_told() -> None:
 def test_an_inlet_that_is_cut_off_lacks_pressure() -> None:
     """h* lacks about a tenth of that share; the arc from -34 degrees is whole."""
     whole, cut = (
-        run(ORing(arc_start=a, arc_end=43.0, speeds=(400.0,), stroke="out"), Silent()).states[0]
+        run(Seal(arc_start=a, arc_end=43.0, speeds=(400.0,), stroke="out"), Silent()).states[0]
         for a in (-34.0, -25.0)
     )
     # its friction lacks what the oil before the arc adds
@@ -185,7 +185,7 @@ def test_a_film_thinner_than_the_way_of_the_rod_is_resolved_where_it_is(estimate
 
     Density 4 of that mesh gave 0.0402.
     """
-    p = ORing(
+    p = Seal(
         inner_diameter=9.525,
         section_diameter=1.78,
         rod_diameter=9.525,
@@ -238,7 +238,7 @@ def test_settings_of_a_trial_are_right_by_a_finer_mesh_and_by_the_dry_contact(na
 
 def _by_the_law(**given: Any) -> tuple[float, float]:
     """h* (um) of an outstroke, and that over `film_thickness` at the edge of its inlet."""
-    p = ORing(**given, stroke="out", error_estimate=False)
+    p = Seal(**given, stroke="out", error_estimate=False)
     found = ContactMeshes(ContactSolver(PathDriver(Silent()))).contact(p)
     assert not isinstance(found, StageFailed)
     state = run(p, Silent()).states[0]

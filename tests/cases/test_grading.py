@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.section.uniform_layout import uniform_layout
 from softehl.cases.seal.solve.contact_layout import graded_layout
@@ -24,7 +24,7 @@ from softehl.runtime.mesh.sections import corner_jacobians
 from softehl.runtime.mesh.spacing import Spacing, Spot, graded
 from tests.cases.oring_cases import oring
 
-_RADIUS = 0.5 * ORing().section_diameter
+_RADIUS = 0.5 * Seal().section_diameter
 
 
 @cache
@@ -106,7 +106,7 @@ def test_a_graded_film_needs_no_finer_mesh_at_low_speed() -> None:
 
 
 def test_a_mesh_may_be_asked_for() -> None:
-    assert ORing().mesh == "graded"
+    assert Seal().mesh == "graded"
     assert _contact(1, "uniform")[0].section.layout.spacing is None
 
 
@@ -135,7 +135,7 @@ def test_more_layers_than_there_may_be_are_not_made() -> None:
 @pytest.mark.parametrize("density", [1, 2, 4])
 def test_no_element_is_folded_wherever_the_arc_ends(density: int) -> None:
     _, spacing = _placed()
-    guide = uniform_layout(ORing())
+    guide = uniform_layout(Seal())
     for first, last in np.random.default_rng(7).uniform([5.0, 5.0], [74.0, 74.0], (40, 2)):
         layout = guide.between(guide, _on_circle(guide, -first, last)).graded(spacing, 54, 1e-3)
         assert corner_jacobians(layout.mesh(density)).min() > 0.05, (first, last)
@@ -145,7 +145,7 @@ def test_narrow_sides_would_fold_one(monkeypatch: pytest.MonkeyPatch) -> None:
     # with sides of 25 degrees, AS568 rings in deep grooves at 3.7 shear moduli found no contact
     monkeypatch.setattr(o_grid, "_SIDES", 25.0)
     _, spacing = _placed()
-    guide = uniform_layout(ORing())
+    guide = uniform_layout(Seal())
     layout = guide.between(guide, _on_circle(guide, -51.2, 64.6)).graded(spacing, 54, 1e-3)
     assert corner_jacobians(layout.mesh(2)).min() < 0.0
 
@@ -158,7 +158,7 @@ def _on_circle(guide: Layout, first: float, last: float) -> tuple[float, float]:
 
 def _placed() -> tuple[Layout, Spacing]:
     """A section whose arc goes from -35 to 35 degrees."""
-    guide = uniform_layout(ORing())
+    guide = uniform_layout(Seal())
     spacing = graded(1.0, [Spot(0.2), Spot(0.8)], 66, coarsest=0.1, rate=0.3)
     return guide.between(guide, _on_circle(guide, -35.0, 35.0)), spacing
 

@@ -17,7 +17,7 @@ from softehl.cases.seal.gland.grooves import (
     gland,
     squeeze,
 )
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.tolerances import read_tolerances
 
 METRIC = {
@@ -48,8 +48,8 @@ PNEUMATIC = {
 }
 
 
-def made(**given: Any) -> ORing:
-    return ORing(**given)
+def made(**given: Any) -> Seal:
+    return Seal(**given)
 
 
 def assumed(**given: Any) -> str:
@@ -131,7 +131,7 @@ def test_a_ring_by_name_brings_its_section() -> None:
     p = made(ring="X-ring AS568-210", rod=19.0)
     assert (p.section, p.gland) == ("x_ring", "dynamic")
     assert p.housing_diameter == pytest.approx(19.0 + 2 * 0.128 * INCH, abs=1e-3)
-    assert ORing(**p.model_dump()) == p
+    assert Seal(**p.model_dump()) == p
     with pytest.raises(ValueError, match='section = "u_cup" and ring = "X-ring AS568-210" contra'):
         made(ring="X-ring AS568-210", rod=19.0, section="u_cup")
 
@@ -142,7 +142,7 @@ def test_a_u_cup_by_its_groove() -> None:
     assert p.groove_width == 8.0
     assert p.section_diameter == pytest.approx(5.435)
     assert p.inner_diameter == pytest.approx(25.0 - 0.435)
-    assert ORing(**p.model_dump()) == p
+    assert Seal(**p.model_dump()) == p
     assert "gland" not in assumed(ring="U-cup 25x35x8")
     assert "rod" not in assumed(ring="U-cup 25x35x8")
     fitted = made(ring="U-cup 25x35x8", rod="25 f7", housing_diameter="35 H9")
@@ -172,7 +172,7 @@ def test_depth_and_fill_decide_housing_and_width() -> None:
     assert p.housing_diameter == pytest.approx(42.8)
     volume = 2 * pi**2 * 20.0 * 2.0**2
     assert volume / (0.25 * pi * (42.8**2 - 36.0**2) * p.groove_width) == pytest.approx(0.75)
-    assert ORing(**p.model_dump()) == p
+    assert Seal(**p.model_dump()) == p
     square = made(section="rectangular", groove_depth=3.2, fill=80.0)
     filled = catalogue.fill(square.free_ring, 50.0, 56.4, square.groove_width)
     assert filled == pytest.approx(80.0)
@@ -201,7 +201,7 @@ def test_tolerances_of_depth_squeeze_and_fill_are_those_of_diameter_and_width() 
     ]
     sizes = [share for share, _ in shares.values()]
     assert sizes == pytest.approx([2 * 0.04 / 43.0, 2 * 0.02 * 4.0 / 43.0, 0.1])
-    shares = read_tolerances(("groove_depth 2 %",), dict(ORing()), None)
+    shares = read_tolerances(("groove_depth 2 %",), dict(Seal()), None)
     assert shares["groove_depth"][0] == pytest.approx(0.02 * 6.3 / 56.3)
 
 
@@ -215,4 +215,4 @@ def test_tolerances_of_depth_squeeze_and_fill_are_those_of_diameter_and_width() 
 )
 def test_a_tolerance_that_is_not_understood(text: str, says: str) -> None:
     with pytest.raises(ValueError, match=says):
-        read_tolerances((text,), dict(ORing()), None)
+        read_tolerances((text,), dict(Seal()), None)

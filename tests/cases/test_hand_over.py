@@ -11,7 +11,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.report.part import FinishedRun
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report.hand_over import (
     BLOCKS,
     FILES,
@@ -46,7 +46,7 @@ def run(pressure: float, law: FrictionLaw, speeds: tuple[float, ...] = SPEEDS) -
         for u in speeds
     ]
     case = SimpleNamespace(titled=lambda _: "a seal")
-    return FinishedRun(Path("run"), case, ORing(sealed_pressure=pressure), rows)
+    return FinishedRun(Path("run"), case, Seal(sealed_pressure=pressure), rows)
 
 
 @pytest.mark.parametrize("block", BLOCKS)
@@ -99,7 +99,7 @@ def test_files_of_a_hand_over(tmp_path: Path) -> None:
 
 def test_what_is_not_one_seal_is_refused() -> None:
     one, other = run(1.0, LAWS["Cylinder Friction"]), run(5.0, LAWS["Cylinder Friction"])
-    harder = ORing(sealed_pressure=5.0, mu_1=4.0)
+    harder = Seal(sealed_pressure=5.0, mu_1=4.0)
     with pytest.raises(BadInput, match="differ in mu_1"):
         SealMap.of([one, replace(other, parameters=harder)])
     with pytest.raises(BadInput, match="no speed has a film at every sealed pressure"):

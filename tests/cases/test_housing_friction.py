@@ -9,7 +9,7 @@ import pytest
 
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.equations.system import FRICTION, SHEAR, WALLS
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact import contact_problem
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
@@ -20,7 +20,7 @@ from softehl.cases.seal.states.state import Outcome, Silent
 
 def solved(**changes: Any) -> Outcome:
     given = {"density": 1, "speeds": (800.0,), "stroke": "out", "error_estimate": False}
-    return run(ORing(**{**given, **changes}), Silent())
+    return run(Seal(**{**given, **changes}), Silent())
 
 
 @pytest.mark.slow
@@ -52,7 +52,7 @@ def test_stresses_of_the_walls_stay_within_coulombs_cone() -> None:
     """In contact: nowhere above the limit, somewhere at it; a smaller coefficient is exceeded."""
     driver = PathDriver(Silent())
     route = ContactMeshes(ContactSolver(driver))
-    p = ORing(density=1, mesh="uniform", arc_start=-60.0, arc_end=60.0, housing_friction=0.2)
+    p = Seal(density=1, mesh="uniform", arc_start=-60.0, arc_end=60.0, housing_friction=0.2)
     found = route.contact(p)
     assert not isinstance(found, StageFailed)
     system, x = found
@@ -67,13 +67,13 @@ def test_stresses_of_the_walls_stay_within_coulombs_cone() -> None:
 
 
 def test_without_friction_nothing_of_it_is_in_the_system() -> None:
-    p = ORing(density=1)
+    p = Seal(density=1)
     kernels = [b.kernel.name for b in _system(p).problem.assembler.blocks]
     assert FRICTION not in kernels
     assert not set(SHEAR.values()) & set(_system(p).layout.names)
 
 
-def _system(p: ORing) -> Any:
+def _system(p: Seal) -> Any:
     from softehl.cases.seal.equations.equations import build_system
 
     return build_system(p)

@@ -15,7 +15,7 @@ from softehl.cases.harness.row import OK
 from softehl.cases.harness.session import Reporter
 from softehl.cases.oring import CASE
 from softehl.cases.seal.cycle.transient import March, Reading
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
 from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.cases.seal.states.state import OSCILLATING, UNDER_RESOLVED, FilmRow
@@ -27,7 +27,7 @@ RADIUS = 25.0
 
 def row(speed: float, film: float, verdict: str = OK, sealed_pressure: float = 1.0) -> FilmRow:
     """A row with the leak rate that goes with h* in micrometres, (16)."""
-    state = film_state(ORing(sealed_pressure=sealed_pressure), speed, verdict)
+    state = film_state(Seal(sealed_pressure=sealed_pressure), speed, verdict)
     leak = math.pi * RADIUS * speed * film * 1e-3
     return replace(FilmRow.part_of(state), h_star_um=film, leak_rate_mm3_s=leak)
 
@@ -64,7 +64,7 @@ def test_the_worse_verdict_of_the_two_is_kept() -> None:
 
 
 def test_a_run_of_both_strokes_writes_the_table(tmp_path: Path) -> None:
-    run = Run(CASE, ORing(speeds=(400.0, 100.0)))
+    run = Run(CASE, Seal(speeds=(400.0, 100.0)))
     record = RunRecord(tmp_path / "both", run, "refuse")
     observer = ObserverAdapter(Reporter(record, Display(), "both"))
     for speed in (400.0, -400.0, 100.0):

@@ -10,7 +10,7 @@ import pytest
 from pydantic import ValidationError
 
 from softehl.cases.seal.equations.equations import build_system
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.rubbers.hardness import shore_band, youngs_modulus
 from softehl.cases.seal.gland.rubbers.materials import (
     MATERIALS,
@@ -41,7 +41,7 @@ NEO_HOOKE: list[dict[str, Any]] = [
 
 def refused(**given: Any) -> str:
     with pytest.raises(ValidationError) as caught:
-        ORing(**given)
+        Seal(**given)
     return str(caught.value)
 
 
@@ -54,7 +54,7 @@ def table(folder: Path, *lines: str) -> str:
 # --- the same rubber by several energies ------------------------------------------------------
 
 
-def forces(p: ORing, twist: float = 0.0) -> Any:
+def forces(p: Seal, twist: float = 0.0) -> Any:
     """Nodal forces of the solid in a homogeneous strain and some shear."""
     system = build_system(p)
     x = system.at_rest()
@@ -68,18 +68,18 @@ def forces(p: ORing, twist: float = 0.0) -> Any:
 
 @pytest.mark.parametrize("given", NEO_HOOKE, ids=lambda given: given["material"])
 def test_every_energy_has_the_neo_hookean_limit(given: dict[str, Any]) -> None:
-    expected = forces(ORing(density=1, bulk_modulus=4.0, material="neo-hooke", mu=3.66), 0.01)
-    found = forces(ORing(density=1, bulk_modulus=4.0, **given), 0.01)
+    expected = forces(Seal(density=1, bulk_modulus=4.0, material="neo-hooke", mu=3.66), 0.01)
+    found = forces(Seal(density=1, bulk_modulus=4.0, **given), 0.01)
     limit = (
         3e-5 if given["material"] in ("arruda-boyce", "gent") else 1e-11
     )  # of 1 / J_m, 1 / lambda_m^2
     assert np.abs(found - expected).max() <= limit * np.abs(expected).max()
-    other = forces(ORing(density=1, bulk_modulus=4.0, material="neo-hooke", mu=3.67), 0.01)
+    other = forces(Seal(density=1, bulk_modulus=4.0, material="neo-hooke", mu=3.67), 0.01)
     assert np.abs(other - expected).max() > 1e-4 * np.abs(expected).max()
 
 
 def test_table_1_is_an_ogden_rubber_too() -> None:
-    cases = [ORing(density=1, bulk_modulus=4.0, **given) for given in TABLE_1]
+    cases = [Seal(density=1, bulk_modulus=4.0, **given) for given in TABLE_1]
     expected, found = (forces(p, 0.01) for p in cases)
     assert np.abs(found - expected).max() <= 1e-11 * np.abs(expected).max()
 
@@ -112,7 +112,7 @@ def test_gents_rule() -> None:
 
 
 def test_a_hardness_makes_a_neo_hookean_rubber() -> None:
-    p = ORing(shore_A=70.0)
+    p = Seal(shore_A=70.0)
     assert (p.material, p.mu_1, p.mu_2) == ("neo-hooke", None, None)
     assert p.shear_modulus == pytest.approx(5.52051 / 3.0, rel=1e-5)
     others: list[dict[str, Any]] = [
@@ -120,17 +120,17 @@ def test_a_hardness_makes_a_neo_hookean_rubber() -> None:
         {"material": "arruda-boyce", "lambda_m": 3.0},
     ]
     for more in others:
-        assert ORing(shore_A=70.0, **more).shear_modulus == pytest.approx(p.shear_modulus)
+        assert Seal(shore_A=70.0, **more).shear_modulus == pytest.approx(p.shear_modulus)
 
 
 def test_what_a_case_had_is_read_back() -> None:
     """run.json has every key: what follows from another one is no contradiction of it."""
     for p in (
-        ORing(shore_A=70.0),
-        ORing(fit=str(TRELOAR), material="yeoh"),
-        ORing(material="ogden", **PUBLISHED),
+        Seal(shore_A=70.0),
+        Seal(fit=str(TRELOAR), material="yeoh"),
+        Seal(material="ogden", **PUBLISHED),
     ):
-        assert ORing(**p.model_dump()) == p
+        assert Seal(**p.model_dump()) == p
 
 
 # --- contradictions -----------------------------------------------------------------------------
@@ -251,7 +251,7 @@ def test_a_modulus_follows_the_temperature_of_the_tests(tmp_path: Path) -> None:
             lines.append(f"uniaxial,{stretch},{2 * factor * (stretch - stretch**-2)},{heat}")
     path.write_text("\n".join(lines), encoding="utf-8")
     for at, modulus in ((20.0, 2.0), (60.0, 1.6), (80.0, 1.5)):
-        p = ORing(material="neo-hooke", fit=str(path), temperature=at)
+        p = Seal(material="neo-hooke", fit=str(path), temperature=at)
         assert p.shear_modulus == pytest.approx(modulus, rel=1e-6)
     assert "20 to 100 degC" in refused(material="neo-hooke", fit=str(path), temperature=120.0)
     assert "the temperature of" in refused(material="neo-hooke", fit=str(path))

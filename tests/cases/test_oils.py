@@ -16,7 +16,7 @@ from softehl.cases.seal.gland.oils import (
     density,
     read_oil,
 )
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 
 VG46 = (
     "ISO VG 46",
@@ -47,20 +47,20 @@ def test_grades_are_of_one_family() -> None:
 
 
 def test_a_case_takes_the_dynamic_viscosity() -> None:
-    p = ORing(oil="ISO VG 46", temperature=60.0)
+    p = Seal(oil="ISO VG 46", temperature=60.0)
     rho = 870.0 - 0.65 * 45.0
     assert density(60.0) == pytest.approx(rho)
     assert p.viscosity == pytest.approx(20.623 * rho * 1e-12, rel=1e-4)
     assert p.pressure_viscosity == pytest.approx(1e-2 * (0.6 + 0.965 * log10(17.338)), rel=1e-3)
-    heavy = ORing(oil="ISO VG 46", temperature=60.0, oil_density=900.0)
+    heavy = Seal(oil="ISO VG 46", temperature=60.0, oil_density=900.0)
     assert heavy.viscosity / p.viscosity == pytest.approx((rho + 30.0) / rho)
-    own = ORing(oil="ISO VG 46", temperature=60.0, pressure_viscosity=0.015)
+    own = Seal(oil="ISO VG 46", temperature=60.0, pressure_viscosity=0.015)
     assert own.pressure_viscosity == 0.015
-    assert ORing(**p.model_dump()) == p
+    assert Seal(**p.model_dump()) == p
 
 
 def test_without_an_oil_table_1_holds() -> None:
-    p = ORing()
+    p = Seal()
     assert (p.viscosity, p.pressure_viscosity, p.temperature) == (6.59e-8, 0.02, None)
 
 
@@ -76,9 +76,9 @@ def test_roelands_at_the_pressures_of_seals() -> None:
     assert alpha == pytest.approx(0.0197, rel=0.01)
     assert 0.995 < ratio(10.0) < 0.9985
     assert 0.97 < ratio(30.0) < 0.99
-    p = ORing(oil="ISO VG 46", temperature=40.0, roelands=z)
+    p = Seal(oil="ISO VG 46", temperature=40.0, roelands=z)
     assert p.pressure_viscosity == pytest.approx(barus_of_roelands(p.viscosity, z))
-    assert ORing(**p.model_dump()) == p
+    assert Seal(**p.model_dump()) == p
 
 
 def test_wooster() -> None:
@@ -114,7 +114,7 @@ def test_wooster() -> None:
 )
 def test_what_is_no_oil(given: dict[str, Any], words: tuple[str, ...]) -> None:
     with pytest.raises(ValidationError) as caught:
-        ORing(**given)
+        Seal(**given)
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 

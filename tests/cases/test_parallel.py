@@ -22,7 +22,7 @@ from softehl.cases.harness.processes import completed, processes
 from softehl.cases.harness.sweep import Curve, Task, in_order
 from softehl.cases.harness.workers import solve_side_by_side
 from softehl.cases.oring import CASE
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.shipped import solve_cases
 from softehl.runtime.kernels import ArgumentError, MissingKernelsError, StaleKernelsError
 from softehl.runtime.solve.backends import MissingBackend
@@ -40,10 +40,10 @@ ERRORS = (
 )
 
 
-def case(**changes: Any) -> ORing:
+def case(**changes: Any) -> Seal:
     given = {"density": 1, "sealed_pressure": 0.5, "stroke": "out", "speeds": (1600.0,)}
     paper = {"mesh": "uniform", "arc_start": -34.0, "arc_end": 43.0}
-    return ORing(**{**paper, **given, **changes})
+    return Seal(**{**paper, **given, **changes})
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +133,7 @@ def alive(pid: int) -> bool:
 # --- strokes side by side -------------------------------------------------------------------------
 
 
-def step_for_ever(parameters: ORing, observer: Observer) -> harness.Outcome:
+def step_for_ever(parameters: Seal, observer: Observer) -> harness.Outcome:
     """Takes a minute unless nobody listens any more."""
     for number in range(6000):
         observer.step(label="U", parameter=number, iterations=1, residuals=(), fraction=None)
@@ -141,7 +141,7 @@ def step_for_ever(parameters: ORing, observer: Observer) -> harness.Outcome:
     return outcome()
 
 
-def tell_and_end(parameters: ORing, observer: Observer) -> harness.Outcome:
+def tell_and_end(parameters: Seal, observer: Observer) -> harness.Outcome:
     for number in range(500):
         observer.stage(str(number), title="", where={})
     return outcome()

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from softehl.cases.harness.case_file import read_assignment, read_case
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.shipped import SHIPPED
 
 TABLE_1 = {
@@ -26,7 +26,7 @@ TABLE_1 = {
 
 
 def test_defaults_are_table_1() -> None:
-    parameters = ORing()
+    parameters = Seal()
     assert {key: getattr(parameters, key) for key in TABLE_1} == TABLE_1
     assert (parameters.density, parameters.pressure_order, parameters.solid) == (
         2,
@@ -38,7 +38,7 @@ def test_defaults_are_table_1() -> None:
 
 
 def test_an_integer_is_a_number() -> None:
-    parameters = ORing(sealed_pressure=2, speeds=(400, 100))
+    parameters = Seal(sealed_pressure=2, speeds=(400, 100))
     assert repr(parameters.sealed_pressure) == "2.0"
     assert repr(parameters.speeds) == "(400.0, 100.0)"
 
@@ -54,18 +54,18 @@ def test_an_integer_is_a_number() -> None:
 def test_one_value_is_a_list_of_one(key: str, value: Any, listed: tuple[Any, ...]) -> None:
     for given in (value, [value]):
         values: dict[str, Any] = {"sensitivity": True, key: given}
-        assert getattr(ORing(**values), key) == listed
+        assert getattr(Seal(**values), key) == listed
 
 
 def test_one_term_of_ogden_is_a_list_of_one() -> None:
     values: dict[str, Any] = {"material": "ogden", "ogden_mu": 1.2, "ogden_alpha": 2}
-    ring = ORing(**values)
+    ring = Seal(**values)
     assert (ring.ogden_mu, ring.ogden_alpha) == ((1.2,), (2.0,))
 
 
 def test_parameters_are_frozen() -> None:
     with pytest.raises(ValidationError, match="frozen"):
-        ORing().density = 4
+        Seal().density = 4
 
 
 @pytest.mark.parametrize("density", [1, 2, 4, 8, 16])
@@ -105,7 +105,7 @@ def test_every_density_of_the_list(density: int) -> None:
 )
 def test_a_wrong_value_is_named(key: str, value: Any) -> None:
     with pytest.raises(ValidationError, match=key):
-        ORing(**{key: value})
+        Seal(**{key: value})
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_a_wrong_value_is_named(key: str, value: Any) -> None:
 )
 def test_a_seal_that_cannot_be_mounted(changes: dict[str, Any], reason: str) -> None:
     with pytest.raises(ValidationError, match=reason):
-        ORing(**changes)
+        Seal(**changes)
 
 
 @pytest.mark.parametrize(
@@ -158,7 +158,7 @@ def test_case_file_and_set(tmp_path: Path) -> None:
     path.write_text('case = "oring"\ndensity = 4\nspeeds = [800, 25]\nstroke = "in"\n')
     run = read_case(str(path), SHIPPED, ["stroke=both", "stroke=both"])
     assert run.case.name == "oring"
-    assert run.parameters == ORing(density=4, speeds=(800.0, 25.0), stroke="both")
+    assert run.parameters == Seal(density=4, speeds=(800.0, 25.0), stroke="both")
 
 
 def test_a_key_is_set_once() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from softehl.cases.harness.files import write_content
 from softehl.cases.seal.equations.equations import SealSystem, build_system
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report.paraview import PARTS, gland_outlines, write_paraview
 from softehl.cases.seal.solve.contact import contact_problem
 from softehl.cases.seal.solve.method import run
@@ -99,7 +99,7 @@ def beside(x: Array, p: Array, at: Array) -> list[Array]:
     ids=["round", "x_ring"],
 )
 def test_what_a_run_writes_of_its_sections(changes: dict[str, Any], tmp_path: Path) -> None:
-    p = ORing(speeds=(400.0,), stroke="out", error_estimate=False, **changes)
+    p = Seal(speeds=(400.0,), stroke="out", error_estimate=False, **changes)
     (state,) = run(p, Silent()).states
     file = state.file_names()[1]
     write_content(tmp_path / file, state.section)
@@ -145,7 +145,7 @@ def test_film_pressure_at_a_facet_is_the_mean_of_its_sides() -> None:
 
 def test_the_series_goes_up_in_speed_and_has_no_other_stroke(tmp_path: Path) -> None:
     rows = [row(u) for u in (400.0, 25.0, 100.0, -50.0)]
-    write_paraview(ORing(), tmp_path, rows)
+    write_paraview(Seal(), tmp_path, rows)
     named = [(u, f"section_1_{u:g}.vtu") for u in (25.0, 100.0, 400.0)]
     assert read_series(tmp_path / "section_out.pvd") == named
     assert read_series(tmp_path / "section_in.pvd") == [(50.0, "section_1_-50.vtu")]
@@ -157,7 +157,7 @@ def row(speed: float) -> FilmRow:
 
 @pytest.mark.parametrize("gap", [0.0, 0.1])
 def test_the_gland_is_that_of_the_model(gap: float, tmp_path: Path) -> None:
-    p = ORing(extrusion_gap=gap, corner_fillet=0.2)
+    p = Seal(extrusion_gap=gap, corner_fillet=0.2)
     write_content(tmp_path / "gland.vtu", gland_outlines(p))
     mesh = meshio.read(tmp_path / "gland.vtu")
     lines, part = mesh.cells_dict["line"], mesh.cell_data["part"][0]

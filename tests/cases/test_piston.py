@@ -8,7 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 from softehl.cases.oring import run_oring
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.state import FilmState, Silent
 
 LARGE = 4900.0
@@ -34,7 +34,7 @@ def film(side: str, diameter: float, stroke: str = "out", section: str = "round"
     sizes |= {"rod": diameter, "inner_diameter": diameter} if side == "rod" else {"bore": diameter}
     sizes |= {"speeds": (400.0,), "stroke": stroke, "density": 1, "error_estimate": False}
     kept = Kept()
-    run_oring(ORing(**sizes), kept)
+    run_oring(Seal(**sizes), kept)
     return kept.films[-1]
 
 
@@ -73,13 +73,13 @@ def test_signs_of_the_strokes_are_those_of_a_rod_seal() -> None:
 
 
 def test_sizes_are_those_of_the_trade() -> None:
-    p = ORing.model_validate({"bore": "40 H8", "ring": "32x4"})
+    p = Seal.model_validate({"bore": "40 H8", "ring": "32x4"})
     assert p.piston
     assert p.ring_diameter == pytest.approx(32.0)
     assert p.rod_diameter == pytest.approx(-40.0195)
     assert p.housing_diameter == pytest.approx(-33.0)  # by the nominal bore of the chart
-    assert p.free_ring.volume / ORing(ring="32x4", rod=33).free_ring.volume == pytest.approx(-1.0)
-    assert ORing(**p.settled()).rod_diameter == p.rod_diameter
+    assert p.free_ring.volume / Seal(ring="32x4", rod=33).free_ring.volume == pytest.approx(-1.0)
+    assert Seal(**p.settled()).rod_diameter == p.rod_diameter
 
 
 @pytest.mark.parametrize(
@@ -92,13 +92,13 @@ def test_sizes_are_those_of_the_trade() -> None:
     ],
 )
 def test_grooves_of_a_piston(given: dict[str, Any]) -> None:
-    p = ORing(**given)
+    p = Seal(**given)
     assert (p.rod_diameter, p.inner_diameter) == (-40.0, -40.0)
     assert p.housing_diameter == pytest.approx(-33.0)
 
 
 def test_a_cup_is_named_by_bore_groove_and_width() -> None:
-    p = ORing(bore=40, ring="U-cup 40x30x8")
+    p = Seal(bore=40, ring="U-cup 40x30x8")
     assert (p.rod_diameter, p.housing_diameter, p.groove_width) == (-40.0, -30.0, 8.0)
     assert p.inner_diameter < -40.0  # free lips are wider than the bore
 
@@ -116,4 +116,4 @@ def test_a_cup_is_named_by_bore_groove_and_width() -> None:
 )
 def test_what_is_no_piston_seal_is_refused(given: dict[str, Any], words: str) -> None:
     with pytest.raises(ValidationError, match=words):
-        ORing(**given)
+        Seal(**given)

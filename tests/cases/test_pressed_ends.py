@@ -10,7 +10,7 @@ import pytest
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.system import BORE, ROD
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.solve.contact_layout import placed_layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
@@ -22,7 +22,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.outline import Outline, Shape
 from softehl.runtime.mesh.section_mesh import Sizes
 
-P = ORing(ring="AS568-210", rod=19.0, gland="dynamic", density=1, sealed_pressure=3.0)
+P = Seal(ring="AS568-210", rod=19.0, gland="dynamic", density=1, sealed_pressure=3.0)
 
 
 def route() -> ContactMeshes:

@@ -10,7 +10,7 @@ from softehl.cases.harness.case_file import read_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.loads import ContactLoads
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.rubbers.regions import PRESETS
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.inlet import inlet_length
@@ -29,7 +29,7 @@ GENT: dict[str, Any] = {"material": "gent", "mu": 3.0, "J_m": 30.0}
 
 
 def test_a_cap_is_of_ptfe() -> None:
-    p = ORing(**CAPPED)
+    p = Seal(**CAPPED)
     assert p.materials["cap"].shear_modulus == PRESETS["ptfe"]["mu"]
     assert p.materials["cap"].bulk_modulus == PRESETS["ptfe"]["bulk_modulus"]
     assert p.surface_modulus == 171.0
@@ -37,7 +37,7 @@ def test_a_cap_is_of_ptfe() -> None:
     E, nu = 500.0, 0.46
     assert PRESETS["ptfe"]["mu"] == pytest.approx(E / (2.0 + 2.0 * nu), rel=2e-3)
     assert PRESETS["ptfe"]["bulk_modulus"] == pytest.approx(E / (3.0 - 6.0 * nu), rel=2e-3)
-    assert inlet_length(p, 1.0) > inlet_length(ORing(), 1.0)
+    assert inlet_length(p, 1.0) > inlet_length(Seal(), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -53,9 +53,9 @@ def test_a_cap_is_of_ptfe() -> None:
 def test_what_one_types_for_a_cap(given: list[str], modulus: float) -> None:
     words = ["section=rectangular", "groove_width=4.3", "cap_thickness=0.6", *given]
     p = read_case("oring", SHIPPED, words).parameters
-    assert isinstance(p, ORing)
+    assert isinstance(p, Seal)
     assert p.surface_modulus == pytest.approx(modulus)
-    assert ORing(**p.model_dump()) == p
+    assert Seal(**p.model_dump()) == p
 
 
 @pytest.mark.parametrize(
@@ -87,9 +87,9 @@ def test_a_cap_that_is_none(given: list[str], reason: str) -> None:
 def test_regions_need_a_section_that_has_them() -> None:
     bare: dict[str, Any] = {"section": "rectangular", "materials": {"cap": "ptfe"}}
     with pytest.raises(ValueError, match="no regions; cap_thickness makes one"):
-        ORing(**bare)
+        Seal(**bare)
     with pytest.raises(ValueError, match='not for section = "round"'):
-        ORing(cap_thickness=0.5)
+        Seal(cap_thickness=0.5)
 
 
 def _state(system: SealSystem, size: float) -> Array:
@@ -98,7 +98,7 @@ def _state(system: SealSystem, size: float) -> Array:
 
 
 def test_two_regions_of_one_material_are_one_region_bitwise() -> None:
-    two = build_system(ORing(**CAPPED, **SAME))
+    two = build_system(Seal(**CAPPED, **SAME))
     p = two.parameters.model_copy(update={"materials": {}})
     one = SealSystem.of(p, replace(two.section, own=()))
     assert (two.solids, one.solids) == (("solid cap", "solid"), ("solid",))
@@ -108,13 +108,13 @@ def test_two_regions_of_one_material_are_one_region_bitwise() -> None:
     assert np.array_equal(r, s)
     assert np.array_equal(K.data, L.data)
     other: dict[str, Any] = {"materials": {"cap": {"mu_1": 3.05, "mu_2": 0.62}}}
-    t, _ = build_system(ORing(**CAPPED, **other)).contact_problem(loads).linearise(x)
+    t, _ = build_system(Seal(**CAPPED, **other)).contact_problem(loads).linearise(x)
     assert not np.array_equal(r, t)
 
 
 def test_the_tangent_of_different_materials() -> None:
     gent: dict[str, Any] = {"materials": {"cap": GENT}}
-    system = build_system(ORing(**CAPPED, **gent))
+    system = build_system(Seal(**CAPPED, **gent))
     assert [b.kernel_of(system.parameters) for b in system.blocks[:2]] == [
         "solid_taylor_mean_gent",
         "solid_taylor_mean",
@@ -134,7 +134,7 @@ WIDE = 28.0
 
 
 def _squeezed(**changes: Any) -> tuple[SealSystem, Array]:
-    system = build_system(ORing(**changes))
+    system = build_system(Seal(**changes))
     x = ContactSolver(PathDriver(Silent())).from_rest(system)
     assert not isinstance(x, StageFailed)
     return system, x
@@ -163,5 +163,5 @@ def test_two_layers_between_frictionless_plates() -> None:
 
 def test_equal_parameters_with_a_cap_are_one() -> None:
     values: dict[str, Any] = {"section": "rectangular", "materials": {"cap": {"mu": 10.0}}}
-    thin, again, thick = (ORing(**values, cap_thickness=t) for t in (0.4, 0.4, 0.5))
-    assert len({thin, again, thick, ORing()}) == 3
+    thin, again, thick = (Seal(**values, cap_thickness=t) for t in (0.4, 0.4, 0.5))
+    assert len({thin, again, thick, Seal()}) == 3

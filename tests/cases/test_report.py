@@ -15,7 +15,7 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import regime
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure, fitted_exponent, plain_ticks
@@ -32,7 +32,7 @@ from softehl.cases.seal.report.stribeck import crossing, hersey_um, stribeck_fig
 from softehl.cases.seal.states.state import COLLAPSED, OSCILLATING, FilmRow, Profile, Section
 from tests.cases.oring_cases import film_values
 
-SEAL = ORing()
+SEAL = Seal()
 SPEEDS = (100.0, 400.0, 1600.0)
 
 
@@ -327,7 +327,7 @@ def rough_rows() -> list[FilmRow]:
 
 
 def test_the_stribeck_picture_marks_regimes_and_shares() -> None:
-    p = ORing.model_validate({"roughness": 0.3})
+    p = Seal.model_validate({"roughness": 0.3})
     rows = rough_rows()
     outstroke = rows[:3]
     # straight in logarithms: lambda is one at 1 mm/s and three at 9 mm/s
@@ -352,7 +352,7 @@ def test_smooth_surfaces_have_no_stribeck_picture() -> None:
 
 
 def test_one_speed_has_no_stribeck_picture() -> None:
-    p = ORing.model_validate({"roughness": 0.3})
+    p = Seal.model_validate({"roughness": 0.3})
     assert stribeck_figure(p, [r for r in rough_rows() if abs(r.rod_speed_mm_s) == 4.0]) is None
 
 
@@ -368,6 +368,6 @@ def test_the_sealed_fluid_reaches_to_where_the_seal_touches() -> None:
     """Into the mouth of a U-cup, which is deeper than the middle of the groove."""
     for middle, end in ((None, 0.0), (0.9, 0.9)):
         axes = Figure().subplots()
-        draw_gland(axes, ORing(sealed_pressure=1.0), middle)
+        draw_gland(axes, Seal(sealed_pressure=1.0), middle)
         fluid = axes.patches[0].get_path()
         assert fluid.get_extents().x1 == pytest.approx(end)

@@ -24,7 +24,7 @@ from softehl.cases.paper.inverse import film_of, largest_inlet_gradient
 from softehl.cases.paper.item import Scope
 from softehl.cases.paper.query import angle, ripple
 from softehl.cases.paper.states import NOT_REACHED, Store, ask, merged, setup
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.io import write_csv, write_json
 
@@ -172,7 +172,7 @@ def test_a_damaged_run_is_not_kept(tmp_path: Path) -> None:
 
 
 def write_state(
-    store: Store, parameters: ORing, speed: float, verdict: str, h: Sequence[float] = (2.0, 2.0)
+    store: Store, parameters: Seal, speed: float, verdict: str, h: Sequence[float] = (2.0, 2.0)
 ) -> None:
     """A made-up state with h* = 2 um."""
     folder = store.run_folder(parameters)
@@ -270,13 +270,13 @@ def test_inverse_theory_finds_the_film_of_a_pressure_made_from_it(
     slope = 6.0 * eta * speed * (h - film) / h**3
     reduced = np.concatenate(([0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1]) * np.diff(x))))
     p = -np.log(1.0 - alpha * reduced) / alpha if alpha else reduced
-    ring = ORing(pressure_viscosity=alpha, viscosity=eta)
+    ring = Seal(pressure_viscosity=alpha, viscosity=eta)
     place = (x, p) if outstroke else (-x[::-1], p[::-1])
     w = largest_inlet_gradient(*place, ring, outstroke)
     assert film_of(w, speed) == pytest.approx(1e3 * film, rel=1e-3)
     assert film_of(2.0 * w, speed) == pytest.approx(1e3 * film / sqrt(2.0), rel=1e-3)
     thicker = largest_inlet_gradient(
-        *place, ORing(pressure_viscosity=alpha, viscosity=2 * eta), outstroke
+        *place, Seal(pressure_viscosity=alpha, viscosity=2 * eta), outstroke
     )
     assert film_of(thicker, speed) != pytest.approx(1e3 * film, rel=0.1)
 

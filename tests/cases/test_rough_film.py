@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from softehl.cases.harness.row import OK
 from softehl.cases.oring import CASE
 from softehl.cases.seal.equations.equations import build_system
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import Surfaces, regime
 from softehl.cases.seal.solve.inlet import inlet_length
 from softehl.cases.seal.solve.method import run
@@ -27,12 +27,12 @@ SPEEDS = (2000.0, 500.0, 200.0, 50.0, 10.0, 1.0, 0.1, 0.01)
 def test_a_roughness_has_bounds(rms: float) -> None:
     """Metres for micrometres would be no roughness that a film can be solved with."""
     with pytest.raises(ValidationError, match="roughness"):
-        ORing(roughness=(0.0, rms))
+        Seal(roughness=(0.0, rms))
 
 
 def solved(**given: Any) -> dict[float, FilmState]:
     """States by their signed speed."""
-    p = ORing.model_validate({"density": 1, "error_estimate": False, **given})
+    p = Seal.model_validate({"density": 1, "error_estimate": False, **given})
     outcome = run(p, Silent())
     assert outcome.converged, outcome.message
     return {s.rod_speed_mm_s: s for s in outcome.states}
@@ -100,13 +100,13 @@ def test_little_roughness_is_the_smooth_film() -> None:
 
 
 def test_a_pressure_of_cavitation_asks_for_the_film_that_has_one() -> None:
-    assert not ORing().conserving
-    assert ORing(cavitation_pressure=-0.05).conserving
+    assert not Seal().conserving
+    assert Seal(cavitation_pressure=-0.05).conserving
 
 
 def test_without_roughness_the_pages_are_the_smooth_ones() -> None:
-    default = build_system(ORing(density=1))
-    zero = build_system(ORing.model_validate({"density": 1, "roughness": 0}))
+    default = build_system(Seal(density=1))
+    zero = build_system(Seal.model_validate({"density": 1, "roughness": 0}))
     names = [[b.kernel.name for b in s.problem.assembler.blocks] for s in (default, zero)]
     assert names[0] == names[1]
     assert not any("rough" in name or "void" in name for name in names[0])
@@ -126,7 +126,7 @@ def test_without_roughness_the_pages_are_the_smooth_ones() -> None:
 )
 def test_what_does_not_fit_is_said(keys: dict[str, Any], words: str) -> None:
     with pytest.raises(ValidationError, match=words):
-        ORing.model_validate(keys)
+        Seal.model_validate(keys)
 
 
 def test_a_smooth_run_says_where_usual_surfaces_would_touch() -> None:
@@ -165,8 +165,8 @@ def test_the_guard_of_rough_films_lets_them_interpenetrate() -> None:
 
 
 def test_stiffness_of_asperities_is_that_of_the_rubber() -> None:
-    assert ORing().surfaces == Surfaces(0.0, 0.0, 14.64, 0.1)
-    assert ORing(asperity_stiffness=3.0).surfaces.stiffness == 3.0
+    assert Seal().surfaces == Surfaces(0.0, 0.0, 14.64, 0.1)
+    assert Seal(asperity_stiffness=3.0).surfaces.stiffness == 3.0
 
 
 @pytest.mark.slow
@@ -188,7 +188,7 @@ def test_densities_agree_on_a_rough_film(sigma: float) -> None:
 
 def test_the_mesh_of_a_rough_seal_is_no_finer_than_its_asperities_ask() -> None:
     """Smooth, the inlet shrinks with the slowest speed; rough, h rises by sigma over it."""
-    smooth, rough = (ORing.model_validate({"speeds": (0.01,), "roughness": r}) for r in (0, 0.1))
+    smooth, rough = (Seal.model_validate({"speeds": (0.01,), "roughness": r}) for r in (0, 0.1))
     rise = 25.0
     assert inlet_length(rough, rise) > 10.0 * inlet_length(smooth, rise)
     length = inlet_length(rough, rise)

@@ -12,7 +12,7 @@ import pytest
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.loads import FilmLoads
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.section.layout import pressure_boundary
 from softehl.cases.seal.section.uniform_layout import uniform_layout
@@ -49,14 +49,14 @@ X_RING: dict[str, Any] = {"section": "x_ring", "lobe_radius": 0.9, "fillet_radiu
 @cache
 def _contact(**changes: Any) -> tuple[SealSystem, Array]:
     route = ContactMeshes(ContactSolver(PathDriver(Silent())))
-    found = route.contact(ORing(**changes))
+    found = route.contact(Seal(**changes))
     assert not isinstance(found, StageFailed)
     return found
 
 
 @cache
 def _curve(**changes: Any) -> Outcome:
-    return run(ORing(**{"error_estimate": False, **changes}), Silent())
+    return run(Seal(**{"error_estimate": False, **changes}), Silent())
 
 
 @pytest.mark.parametrize(
@@ -77,37 +77,37 @@ def _curve(**changes: Any) -> Outcome:
 )
 def test_a_section_that_is_not_one(changes: dict[str, Any], reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
-        ORing(**changes)
+        Seal(**changes)
 
 
 def test_a_width_that_is_given_is_that_of_the_section() -> None:
     given: dict[str, Any] = {"section": "rectangular", "section_width": 3.0}
-    p = ORing(**given)
+    p = Seal(**given)
     assert p.axial_width == pytest.approx(3.0, rel=1e-12)
     assert p.free_section.outline.area == pytest.approx(3.0 * 3.53 - (4 - np.pi) * 0.4236**2)
 
 
 def test_sections_of_two_lobes_conserve_mass() -> None:
     wide: dict[str, Any] = {"groove_width": 8.0}
-    lobes = {name: ORing(**{"section": name, **wide}).lobes for name in SECTIONS}
+    lobes = {name: Seal(**{"section": name, **wide}).lobes for name in SECTIONS}
     assert lobes == {name: 2 if name == "x_ring" else 1 for name in SECTIONS}
-    assert ORing(section="x_ring").conserving
-    assert not ORing(section="x_ring", cavitation="penalty").conserving
+    assert Seal(section="x_ring").conserving
+    assert not Seal(section="x_ring", cavitation="penalty").conserving
     circle: dict[str, Any] = {"section": "x_ring", "lobe_radius": 1.765}
-    assert not ORing(**circle).conserving
+    assert not Seal(**circle).conserving
 
 
 def test_a_file_of_points_is_a_section_and_known_by_what_it_holds(tmp_path: Path) -> None:
     file = tmp_path / "square.csv"
     file.write_text("z_mm,r_mm\n0,0\n3,0\n3,3.4\n0,3.4\n")
-    p = ORing(outline=str(file))
+    p = Seal(outline=str(file))
     assert p.section_diameter == pytest.approx(3.4)
     assert p.free_section.outline.box[1] == pytest.approx(0.5 * p.inner_diameter)
     before = contact_key(p)
     file.write_text("z_mm,r_mm\n0,0\n3,0\n3,3.4\n0.1,3.4\n")
-    assert contact_key(ORing(outline=str(file))) != before
+    assert contact_key(Seal(outline=str(file))) != before
     with pytest.raises(ValueError, match="contradict"):
-        ORing(outline=str(file), section_diameter=3.0)
+        Seal(outline=str(file), section_diameter=3.0)
 
 
 def test_contacts_are_parted_where_the_gap_is_wide() -> None:
@@ -161,7 +161,7 @@ def test_an_outline_that_runs_into_itself_is_seen() -> None:
 
 
 def test_a_section_that_reaches_into_the_rod_beyond_its_film_is_seen() -> None:
-    system = build_system(ORing(section="trapezoid", density=1, **GROOVE))
+    system = build_system(Seal(section="trapezoid", density=1, **GROOVE))
     x = system.at_rest()
     assert overlap(system, x) == ""
     beyond = system.mesh.outer_nodes[3]
@@ -177,7 +177,7 @@ def test_a_section_that_reaches_into_the_rod_beyond_its_film_is_seen() -> None:
 
 @pytest.mark.parametrize("section", ["trapezoid", "rectangular", "d_ring"])
 def test_contact_is_looked_for_on_the_side_that_rolls_onto_the_rod(section: str) -> None:
-    p = ORing.model_validate({"section": section, **GROOVE})
+    p = Seal.model_validate({"section": section, **GROOVE})
     guide, drawn = uniform_layout(p), p.free_section.film
     begin, end = guide.film
     assert begin == drawn[0]
@@ -185,7 +185,7 @@ def test_contact_is_looked_for_on_the_side_that_rolls_onto_the_rod(section: str)
     # nothing rolls without pressure, and a side that faces away from the rod never meets it
     guide = uniform_layout(p.model_copy(update={"sealed_pressure": 0.0}))
     assert guide.film == pytest.approx(drawn)
-    x_ring = ORing(**X_RING)
+    x_ring = Seal(**X_RING)
     guide = uniform_layout(x_ring)
     heading = x_ring.free_section.outline.heading(np.array([guide.film[1] - 1e-6]))
     assert np.degrees(heading[0]) == pytest.approx(90.0, abs=0.1)
@@ -194,7 +194,7 @@ def test_contact_is_looked_for_on_the_side_that_rolls_onto_the_rod(section: str)
 @pytest.mark.parametrize("density", [1, 2])
 def test_the_sealed_pressure_ends_on_the_same_lobe_of_every_mesh(density: int) -> None:
     """With nodes here and there on two equal lobes either may have the lowest one."""
-    p = ORing(**X_RING)
+    p = Seal(**X_RING)
     layout = uniform_layout(p)
     begin, end = layout.film
     for shift in np.linspace(0.0, 0.2, 9):
@@ -206,7 +206,7 @@ def test_the_sealed_pressure_ends_on_the_same_lobe_of_every_mesh(density: int) -
 
 
 def test_a_groove_that_grazes_the_rod_parts_two_contacts_once_it_opens() -> None:
-    system = build_system(ORing(section="rectangular", **GROOVE))
+    system = build_system(Seal(section="rectangular", **GROOVE))
     x = system.at_rest()
     pressure = np.zeros(len(system.section.places))
     pressure[10:60] = 2.0 + np.sin(np.arange(50.0))
@@ -222,7 +222,7 @@ def test_a_groove_that_grazes_the_rod_parts_two_contacts_once_it_opens() -> None
 
 
 def test_corner_peaks_do_not_place_an_edge() -> None:
-    system = build_system(ORing(section="rectangular", **GROOVE))
+    system = build_system(Seal(section="rectangular", **GROOVE))
     s, x = system.section.places, system.at_rest()
     touching = slice(20, 40)
     pressure = np.zeros(len(s))
@@ -357,7 +357,7 @@ def mirrored(system: SealSystem, x: Array) -> tuple[SealSystem, Array]:
 def test_without_pressure_the_mirror_image_of_a_state_is_one(section: str) -> None:
     """Exact, whatever the mesh: the triangles inside are not symmetric, and need not be."""
     system = build_system(
-        ORing(**{**X_RING, **_plain(section), "density": 1, "sealed_pressure": 0.0})
+        Seal(**{**X_RING, **_plain(section), "density": 1, "sealed_pressure": 0.0})
     )
     x = ContactSolver(PathDriver(Silent())).from_rest(system)
     assert not isinstance(x, StageFailed)

@@ -14,7 +14,7 @@ from ezdxf.filemanagement import new
 
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.equations.equations import build_system
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.files import finer, outline_of, read_mesh, read_outline
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
@@ -291,8 +291,8 @@ def test_an_o_ring_from_a_drawing_has_the_film_of_the_built_in_one(tmp_path: Pat
     """A drawn circle is a circle: it has the same mesh."""
     given: dict[str, Any] = {"speeds": (800.0,), "error_estimate": False}
     cases = {
-        "drawn": ORing(outline=str(draw(DRAWN["round"], tmp_path / "ring.dxf")), **given),
-        "built_in": ORing(**given),
+        "drawn": Seal(outline=str(draw(DRAWN["round"], tmp_path / "ring.dxf")), **given),
+        "built_in": Seal(**given),
     }
     drawn, built_in = solve_cases(cases, tmp_path / "runs")
     for a, b in zip(drawn.rows, built_in.rows, strict=True):
@@ -300,7 +300,7 @@ def test_an_o_ring_from_a_drawing_has_the_film_of_the_built_in_one(tmp_path: Pat
         assert a.verdict == b.verdict
 
 
-def saved_as_it_is(p: ORing, path: Path) -> tuple[ORing, FilmState]:
+def saved_as_it_is(p: Seal, path: Path) -> tuple[Seal, FilmState]:
     """A case with the mesh that a graded run came to as its file, and what that run found."""
     route = ContactMeshes(ContactSolver(PathDriver(Silent())))
     found = route.contact(p)
@@ -324,36 +324,36 @@ def saved_as_it_is(p: ORing, path: Path) -> tuple[ORing, FilmState]:
     own = {"outline": str(path), "mesh": "file", "inner_diameter": 2.0 * mesh.points[:, 1].min()}
     given = {**p.model_dump(), **changes, **own}
     del given["section_diameter"]
-    return ORing(**given), state
+    return Seal(**given), state
 
 
 ONE_FILM: dict[str, Any] = {"speeds": (800.0,), "stroke": "out", "error_estimate": False}
 
 
 def test_a_mesh_file_as_it_is_has_the_film_of_that_mesh(tmp_path: Path) -> None:
-    p, expected = saved_as_it_is(ORing(density=1, **ONE_FILM), tmp_path / "ring.msh")
+    p, expected = saved_as_it_is(Seal(density=1, **ONE_FILM), tmp_path / "ring.msh")
     (found,) = run(p, Silent()).states
     assert found.h_star_um == pytest.approx(expected.h_star_um, rel=1e-4)
     assert found.verdict == expected.verdict == OK
-    finer = ORing(**{**p.model_dump(), "density": 2})
+    finer = Seal(**{**p.model_dump(), "density": 2})
     assert len(build_system(finer).mesh.quads) == 4 * len(build_system(p).mesh.quads)
 
 
 def test_a_mesh_as_it_is_needs_a_file(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r'give outline = "seal\.msh" too'):
-        ORing(mesh="file")
+        Seal(mesh="file")
     mesh, shape = meshed()
     path = save(mesh, shape, tmp_path / "seal.msh")
     given: dict[str, Any] = {"outline": str(path), "mesh": "file", "groove_width": 5.0}
-    p = ORing(**given)
+    p = Seal(**given)
     assert p.regions == ("rubber",)
-    system = build_system(ORing(**{**p.model_dump(), "density": 1}))
+    system = build_system(Seal(**{**p.model_dump(), "density": 1}))
     assert np.array_equal(system.mesh.quads, read_mesh(path, p.inner_diameter)[1].quads)
     own: dict[str, Any] = {"materials": {"rubber": {"material": "neo-hooke", "mu": 9.0}}}
-    hard = ORing(**given, **own)
+    hard = Seal(**given, **own)
     assert hard.surface_modulus == 9.0
     assert build_system(hard).solids == ("solid rubber",)
     with pytest.raises(ValueError, match=r"materials\.cap: the section has rubber"):
-        ORing(**{**given, "materials": {"cap": "ptfe"}})
+        Seal(**{**given, "materials": {"cap": "ptfe"}})
     with pytest.raises(ValueError, match="has its own regions; leave it out"):
-        ORing(**given, cap_thickness=1.0)
+        Seal(**given, cap_thickness=1.0)

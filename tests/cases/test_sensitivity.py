@@ -16,7 +16,7 @@ from pydantic import ValidationError
 
 from softehl.__main__ import main
 from softehl.cases.oring import CASE
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.keys import dimensions
 from softehl.cases.seal.gland.tolerances import ToleranceRow, band, read_tolerances
@@ -44,10 +44,10 @@ from tests.cases.oring_cases import film_values
 SLOPES = Mapping[str, Mapping[str, float]]
 
 
-def film_of(speed: float, **given: Any) -> ORing:
+def film_of(speed: float, **given: Any) -> Seal:
     """A coarse case of one film."""
     values = {"density": 1, "speeds": (speed,), "error_estimate": False, "stroke": "out", **given}
-    return ORing(**values)
+    return Seal(**values)
 
 
 CASES = {
@@ -248,7 +248,7 @@ def test_only_states_that_the_mesh_shows_are_differentiated() -> None:
     assert not resolved(replace(row, inlet_ratio=0.9))
     assert not resolved(replace(row, inlet_ratio=math.nan))
     assert not resolved(replace(row, verdict="under-resolved"))
-    p = ORing(sensitivity=True)
+    p = Seal(sensitivity=True)
     (words,) = CASE.complaints(p, [replace(row, inlet_ratio=0.9)], [], "")
     assert "the mesh does not show the film well enough" in words
     assert CASE.complaints(p, [row], [], "") == []
@@ -258,7 +258,7 @@ def test_only_states_that_the_mesh_shows_are_differentiated() -> None:
 
 
 def test_tolerances_of_a_catalogue_ring_and_given_ones() -> None:
-    p = ORing(
+    p = Seal(
         ring="AS568-226",
         rod=50.0,
         sensitivity=True,
@@ -278,13 +278,13 @@ def test_the_modulus_is_that_of_the_rubber() -> None:
     rubbers: list[tuple[dict[str, Any], tuple[str, ...]]]
     rubbers = [({"shore_A": 70.0}, ("mu",)), ({"mu_2": 0.0}, ("mu_1",))]
     for given, names in rubbers:
-        p = ORing(sensitivity=True, tolerances=("modulus 25 %",), **given)
+        p = Seal(sensitivity=True, tolerances=("modulus 25 %",), **given)
         shares = read_tolerances(p.tolerances, p.model_dump(), p.ring)
         assert shares["modulus"] == (0.25, names)
 
 
 def test_the_rod_is_its_diameter() -> None:
-    p = ORing(rod=50.0, sensitivity=True, tolerances=("rod 0.05 mm",))
+    p = Seal(rod=50.0, sensitivity=True, tolerances=("rod 0.05 mm",))
     shares = read_tolerances(p.tolerances, p.model_dump(), p.ring)
     assert shares["rod"][0] == pytest.approx(0.001)
     assert shares["rod"][1] == ("rod_diameter",)
@@ -317,7 +317,7 @@ def test_a_band_adds_up() -> None:
 )
 def test_what_makes_no_sense_is_refused(given: dict[str, object], message: str) -> None:
     with pytest.raises(ValidationError, match=message):
-        ORing(**{"sensitivity": True, **given})  # type: ignore[arg-type]
+        Seal(**{"sensitivity": True, **given})  # type: ignore[arg-type]
 
 
 # ----------------------------------------------------------------------------------- command line

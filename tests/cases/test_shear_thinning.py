@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from softehl.cases.cycle import Cycle
 from softehl.cases.seal.equations.system import FILM, blocks_of
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.profiles import Slider
 from tests.cases.test_slider import row
 
@@ -24,28 +24,28 @@ POLYMER: dict[str, Any] = {
 WEDGE: dict[str, Any] = {"profile": "wedge", "start": 0.0, "end": 1.0, "segments": 200}
 
 
-def kernel(p: ORing) -> str:
+def kernel(p: Seal) -> str:
     (name,) = (block.kernel_of(p) for block in blocks_of(p) if block.name == FILM)
     return name
 
 
 def test_keys_choose_the_kernel_of_the_film() -> None:
-    assert kernel(ORing()) == "film"
-    assert kernel(ORing(eyring_stress=5)) == "film_eyring"
-    assert kernel(ORing(**POLYMER)) == "film_carreau"
-    assert kernel(ORing(**POLYMER, section="x_ring", groove_width=4.3)) == "film_conserving_carreau"
-    assert kernel(ORing(eyring_stress=5, cavitation_pressure=-0.05)) == "film_conserving_eyring"
+    assert kernel(Seal()) == "film"
+    assert kernel(Seal(eyring_stress=5)) == "film_eyring"
+    assert kernel(Seal(**POLYMER)) == "film_carreau"
+    assert kernel(Seal(**POLYMER, section="x_ring", groove_width=4.3)) == "film_conserving_carreau"
+    assert kernel(Seal(eyring_stress=5, cavitation_pressure=-0.05)) == "film_conserving_eyring"
     assert kernel(Cycle(**POLYMER)) == "film_conserving_carreau"
 
 
 def test_a_rate_is_a_stress_of_the_oil_at_its_temperature() -> None:
-    p = ORing(**POLYMER, oil="ISO VG 46", temperature=40)
+    p = Seal(**POLYMER, oil="ISO VG 46", temperature=40)
     values = p.thinning_values(p.viscosity)
     assert values["critical_stress"] == pytest.approx(1e5 * p.viscosity)
     assert (values["thinning_exponent"], values["thinning_plateau"]) == (0.6, 0.6)
-    assert ORing().thinning_values(6.59e-8) == {}
+    assert Seal().thinning_values(6.59e-8) == {}
     bar: Any = "50 bar"
-    assert ORing(eyring_stress=bar).thinning_values(1.0)["critical_stress"] == 5.0
+    assert Seal(eyring_stress=bar).thinning_values(1.0)["critical_stress"] == 5.0
 
 
 REFUSED: list[tuple[dict[str, Any], str]] = [
@@ -68,7 +68,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("given", "words"), REFUSED)
-@pytest.mark.parametrize("case", [ORing, Slider])
+@pytest.mark.parametrize("case", [Seal, Slider])
 def test_what_contradicts_itself_is_refused(case: Any, given: dict[str, Any], words: str) -> None:
     with pytest.raises(ValidationError) as found:
         case(**given)

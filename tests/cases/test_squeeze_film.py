@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.equations.system import DISPLACEMENT
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact import OFFSET
 from softehl.cases.seal.solve.film_correctors import FilmCorrectors
 from softehl.cases.seal.solve.films import NoFilm
@@ -20,7 +20,7 @@ from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.relaxed import Anchored, Relaxed
 
-P = ORing(ring="AS568-210", rod=19.0, sealed_pressure=3.0, density=1, speeds=(400.0,), mu_1=1.5)
+P = Seal(ring="AS568-210", rod=19.0, sealed_pressure=3.0, density=1, speeds=(400.0,), mu_1=1.5)
 
 
 @pytest.fixture(scope="module")

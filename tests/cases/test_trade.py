@@ -11,7 +11,7 @@ from softehl.cases.harness.errors import BadInput
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.headings import WORDS
 from softehl.cases.seal.gland.oils import density
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.tolerances import read_tolerances
 from softehl.cases.seal.gland.viscosity_index import at_100_of_index, viscosity_index
 from softehl.cases.shipped import SHIPPED
@@ -20,13 +20,13 @@ CAP = "materials.cap=PU 95"
 GLAND = ("rod=36", "squeeze=15", "groove_width=5.4")
 
 
-def said(p: ORing) -> list[str]:
+def said(p: Seal) -> list[str]:
     return CASE.assumed(p, p.model_fields_set)
 
 
-def typed(*assignments: str) -> ORing:
+def typed(*assignments: str) -> Seal:
     parameters = read_case("oring", SHIPPED, assignments).parameters
-    assert isinstance(parameters, ORing)
+    assert isinstance(parameters, Seal)
     return parameters
 
 
@@ -44,7 +44,7 @@ def test_a_rubber_by_polymer_and_hardness(key: str) -> None:
     assert (p.compound, p.shore_A, p.material) == ("NBR 70", 70.0, "neo-hooke")
     assert p.shear_modulus == pytest.approx(1.84017, rel=1e-5)
     assert typed(f"{key}=70 Shore A").shear_modulus == p.shear_modulus
-    assert ORing(**p.model_dump()) == p
+    assert Seal(**p.model_dump()) == p
 
 
 def test_polyurethane_has_a_rule_of_its_own() -> None:
@@ -70,7 +70,7 @@ def test_a_rubber_outside_its_temperatures_is_told() -> None:
 def test_a_rod_with_a_fit_is_solved_at_the_middle_of_its_limits() -> None:
     p = typed("ring=AS568-210", "rod=19 f7", "sensitivity=true")
     assert p.rod_diameter == pytest.approx(19.0 - 0.5e-3 * (20 + 41))
-    assert ORing(**p.model_dump()) == p
+    assert Seal(**p.model_dump()) == p
     share, keys = read_tolerances((), dict(p), None)["rod_diameter"]
     assert keys == ("rod_diameter",)
     assert share * p.rod_diameter == pytest.approx(0.0105)
@@ -89,7 +89,7 @@ def test_a_finish_is_an_rms_height_and_its_factor_is_told() -> None:
     both = typed("roughness=Ra 0.1 and Rq 0.4")
     assert both.roughness == pytest.approx((0.125331, 0.4), rel=1e-5)
     assert typed('roughness=["Ra 0.1", 0.4]').roughness == both.roughness
-    assert ORing(**both.model_dump()) == both
+    assert Seal(**both.model_dump()) == both
 
 
 def test_oils_by_their_din_names_and_a_viscosity_in_one_word() -> None:
@@ -152,7 +152,7 @@ def test_what_is_not_read_is_answered_with_what_to_write(
 
 
 def test_every_word_that_is_no_key_is_answered_with_one() -> None:
-    keys = ORing.model_fields
+    keys = Seal.model_fields
     assert not set(WORDS) & set(keys)
     for answer in WORDS.values():
         names = re.findall(r"write (\w+)", answer)

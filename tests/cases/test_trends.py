@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import FULL
 from softehl.cases.seal.report.stribeck import crossing
 from softehl.cases.seal.solve.method import run
@@ -26,7 +26,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "validation" / "films.md"
 def solved(*given: tuple[str, Any]) -> dict[float, FilmState]:
     """States of density 1 by their signed speed."""
     keys = {"density": 1, "error_estimate": False, "speeds": SPEEDS, **dict(given)}
-    outcome = run(ORing.model_validate(keys), Silent())
+    outcome = run(Seal.model_validate(keys), Silent())
     assert outcome.converged, outcome.message
     return {s.rod_speed_mm_s: s for s in outcome.states}
 
@@ -100,7 +100,7 @@ def test_roughness_raises_the_friction_of_mixed_films_only() -> None:
 @pytest.mark.slow
 def test_full_films_begin_the_later_the_rougher() -> None:
     """lambda = 3 at a speed that grows as sigma^(5/3), h being as U^(3/5)."""
-    p, speeds = ORing(), []
+    p, speeds = Seal(), []
     for sigma in (0.1, 0.2, 0.4):
         rows: Any = [rough(sigma)[u] for u in sorted(MIXED)]
         found = crossing(p, rows, FULL)

@@ -3,7 +3,7 @@
 import pytest
 
 from softehl.cases.harness.units import is_quantity, read_quantity
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 
 
 @pytest.mark.parametrize(
@@ -43,19 +43,19 @@ def test_a_wrong_unit_names_those_that_fit() -> None:
 
 
 def test_a_case_takes_them_in_every_key_with_a_unit() -> None:
-    case = ORing(sealed_pressure="30 bar", speeds=["0.2 m/s", 100], viscosity="40 mPa s")  # type: ignore[arg-type]
+    case = Seal(sealed_pressure="30 bar", speeds=["0.2 m/s", 100], viscosity="40 mPa s")  # type: ignore[arg-type]
     assert case.sealed_pressure == pytest.approx(3.0)
     assert case.speeds == (200.0, 100.0)
     assert case.viscosity == pytest.approx(4e-8)
     with pytest.raises(ValueError, match=r"sealed_pressure: .* is not a number in MPa"):
-        ORing(sealed_pressure="30 mm")  # type: ignore[arg-type]
+        Seal(sealed_pressure="30 mm")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("viscosity", [46.0, 0.046, 1e-15])
 def test_a_viscosity_in_other_units_is_refused(viscosity: float) -> None:
     with pytest.raises(ValueError, match="viscosity"):
-        ORing(viscosity=viscosity)
+        Seal(viscosity=viscosity)
 
 
 def test_a_list_with_units_needs_no_brackets() -> None:
-    assert ORing(speeds="0.4 m/s, 100 mm/s").speeds == (400.0, 100.0)  # type: ignore[arg-type]
+    assert Seal(speeds="0.4 m/s, 100 mm/s").speeds == (400.0, 100.0)  # type: ignore[arg-type]

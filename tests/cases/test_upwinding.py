@@ -9,7 +9,7 @@ from scipy.sparse.linalg import spsolve
 
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.equations.loads import FilmLoads
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import Outcome
 from softehl.runtime.fem.problem import Problem
@@ -19,7 +19,7 @@ from tests.cases.test_method import Recorder
 TREATMENTS = ("fe", "dg")
 
 
-def reversed_sign(parameters: ORing, strength: float) -> ORing:
+def reversed_sign(parameters: Seal, strength: float) -> Seal:
     """What no case may ask for: the load moved upstream."""
     return parameters.model_copy(update={"upwinding": strength})
 

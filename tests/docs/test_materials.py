@@ -9,7 +9,7 @@ import pytest
 
 from softehl.cases.seal.gland.grooves import gland
 from softehl.cases.seal.gland.oils import GRADES
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.rubbers.hardness import shore_band, youngs_modulus
 from softehl.cases.seal.gland.rubbers.materials import MATERIALS, shear_modulus
 from softehl.cases.seal.gland.rubbers.rubber_data import fit, read_data
@@ -80,7 +80,7 @@ def test_what_thinning_does_to_an_o_ring() -> None:
     lines = [line for line in text.splitlines() if line.startswith("|")]
     at = next(i for i, line in enumerate(lines) if line.startswith("| Carreau, 1e5 1/s"))
     h, friction = ([float(v) for v in line.split("|")[2:6]] for line in lines[at : at + 2])
-    p = ORing(carreau_rate=1e5, carreau_exponent=0.6, carreau_plateau=0.6, speeds=(800.0,))
+    p = Seal(carreau_rate=1e5, carreau_exponent=0.6, carreau_plateau=0.6, speeds=(800.0,))
     for row in run(p, Silent()).states:
         column = 0 if row.rod_speed_mm_s > 0.0 else 2
         assert row.h_star_um == pytest.approx(h[column], rel=1e-3)

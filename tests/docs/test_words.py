@@ -15,7 +15,7 @@ import pytest
 from softehl.__main__ import _commands as program
 from softehl.cases.harness.case import load_case
 from softehl.cases.harness.parameters import keys_of
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.rubbers.hardness import youngs_modulus
 from softehl.cases.seal.states import verdict
 from softehl.cases.shipped import SHIPPED
@@ -183,7 +183,7 @@ def test_limits_are_two_screens() -> None:
 
 def test_a_hardness_has_one_modulus_on_all_pages() -> None:
     """Gent's; the default rubber is named by its modulus."""
-    default = ORing().rubber("").shear_modulus
+    default = Seal().rubber("").shear_modulus
     found = 0
     for page in TIMELESS:
         text = " ".join(page.read_text(encoding="utf-8").split())

@@ -81,7 +81,7 @@ import softehl
 
 if __name__ == "__main__":
     given = {"density": 1, "stroke": "out", "speeds": (1600.0,)}
-    cases = [softehl.ORing(sealed_pressure=p, **given) for p in (0.5, 1.0)]
+    cases = [softehl.Seal(sealed_pressure=p, **given) for p in (0.5, 1.0)]
     with MPIPoolExecutor() as executor:
         curves = softehl.solve_cases(cases, sys.argv[1] + "/mpi", executor)
     here = softehl.solve_cases(cases, sys.argv[1] + "/here")

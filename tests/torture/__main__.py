@@ -38,7 +38,7 @@ SCRIPT = """
 import softehl
 speeds = (1600.0, 800.0, 400.0)
 cases = {
-    str(p): softehl.ORing(density=1, sealed_pressure=p, speeds=speeds) for p in (1.0, 2.0)
+    str(p): softehl.Seal(density=1, sealed_pressure=p, speeds=speeds) for p in (1.0, 2.0)
 }
 if __name__ == "__main__":
     with softehl.processes(2) as executor:

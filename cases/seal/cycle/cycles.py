@@ -21,7 +21,7 @@ from softehl.cases.seal.cycle.restart import (
 )
 from softehl.cases.seal.cycle.transient import Instant, March, Reading, TimeSteps
 from softehl.cases.seal.equations.equations import build_system
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.failure import explained
 from softehl.cases.seal.solve.film_correctors import film_corrector
 from softehl.cases.seal.solve.films import NoFilm
@@ -66,7 +66,7 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
     """All cycles of a case; log: makes a row of each.  Failure is in the outcome's status."""
     speed = motion.speed.at(0.0)
     changes = {"speeds": (speed,), "stroke": "out", "error_estimate": False, "tolerance": None}
-    p: ORing = parameters.model_copy(update={**changes, "sealed_pressure": motion.pressure.at(0.0)})
+    p: Seal = parameters.model_copy(update={**changes, "sealed_pressure": motion.pressure.at(0.0)})
     contact = DryContact.of(p, ObserverAdapter(observer))
     if isinstance(contact, StageFailed):
         return _outcome(p, *explained(contact, "contact", p))
@@ -151,7 +151,7 @@ def _outline(march: March, instant: Instant) -> dict[str, Array]:
     return {"t_s": np.full(len(z), instant.t), "z_mm": z.copy(), "r_mm": r.copy()}
 
 
-def _outcome(p: ORing, status: Status, message: str) -> Outcome:
+def _outcome(p: Seal, status: Status, message: str) -> Outcome:
     system = build_system(p)
     kernels = {b.kernel.name: b.kernel.signature for b in system.problem.assembler.blocks}
     return Outcome((), status, message, system.counts, kernels)

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.section.section import SealSection
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.assembly import ElementBlock
@@ -42,9 +42,9 @@ class Field:
 
     name: str
     on: Place
-    scale: Callable[[ORing], float]
+    scale: Callable[[Seal], float]
     order: int | None = None
-    needed: Callable[[ORing], bool] = lambda _: True
+    needed: Callable[[Seal], bool] = lambda _: True
 
 
 @dataclass(frozen=True)
@@ -66,12 +66,12 @@ class Block:
     fields: tuple[str, ...]
     group: Group
     layer: bool = False
-    needed: Callable[[ORing], bool] = lambda _: True
-    rule: Callable[[ORing, int], Rule] | None = None
+    needed: Callable[[Seal], bool] = lambda _: True
+    rule: Callable[[Seal, int], Rule] | None = None
     constant: bool = False
     region: str = ""
 
-    def kernel_of(self, p: ORing) -> str:
+    def kernel_of(self, p: Seal) -> str:
         """Name of the kernel in a case."""
         solid = p.rubber(self.region).solid_kernel(p.solid)
         return self.kernel.format(solid=solid, oil=p.film_suffix)
@@ -91,7 +91,7 @@ class Unknowns:
         return int(self.rows["arc"].shape[1]) - 1
 
 
-def number_unknowns(field: Field, p: ORing, section: SealSection) -> Unknowns:
+def number_unknowns(field: Field, p: Seal, section: SealSection) -> Unknowns:
     """Places of the unknowns of a field.
 
     Pressures: m_p a segment and one more where they are continuous, m_p + 1 a segment in (22).
@@ -123,7 +123,7 @@ class Numbering:
     layout: DofLayout
 
     @classmethod
-    def of(cls, fields: tuple[Field, ...], p: ORing, section: SealSection) -> Numbering:
+    def of(cls, fields: tuple[Field, ...], p: Seal, section: SealSection) -> Numbering:
         """Fields that the case has, one after another."""
         present = [field for field in fields if field.needed(p)]
         unknowns = {field.name: number_unknowns(field, p, section) for field in present}
@@ -141,7 +141,7 @@ class Numbering:
         first = sum(widths[:position])
         return slice(first, first + widths[position])
 
-    def element_block(self, block: Block, p: ORing, data: Array | None) -> ElementBlock:
+    def element_block(self, block: Block, p: Seal, data: Array | None) -> ElementBlock:
         """The elements of a block; data: their constants (n, k)."""
         films = [f for f in block.fields if self.unknowns[f].field.on == "film"]
         kernel = load_kernel(block.kernel_of(p))

@@ -30,7 +30,7 @@ from softehl.cases.seal.equations.system import (
     without_contact,
 )
 from softehl.cases.seal.equations.unknowns import SealUnknowns
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.section.section import SealSection, seal_section
 from softehl.runtime.arrays import Array
@@ -60,7 +60,7 @@ class SealSystem(SealUnknowns):
     @classmethod
     def of(
         cls,
-        p: ORing,
+        p: Seal,
         section: SealSection,
         fields: tuple[Field, ...] = FIELDS,
         blocks: tuple[Block, ...] | None = None,
@@ -82,7 +82,7 @@ class SealSystem(SealUnknowns):
         system = cls(p, section, numbering, present, obstacles_of(p), problem)
         return replace(system, problem=system._at_rest())
 
-    def moved(self, p: ORing, section: SealSection) -> SealSystem:
+    def moved(self, p: Seal, section: SealSection) -> SealSystem:
         """The system of other numbers on the same mesh with its nodes moved; nothing is checked."""
         constants = _contact_constants(p, section, self.blocks)
         assembler, stays = self.problem.assembler, section is self.section
@@ -252,7 +252,7 @@ class SealSystem(SealUnknowns):
 
 
 def _contact_constants(
-    p: ORing, section: SealSection, blocks: tuple[Block, ...]
+    p: Seal, section: SealSection, blocks: tuple[Block, ...]
 ) -> dict[str, Array]:
     """Constants (n, k) of the contact elements, by block; slip is counted from the start."""
     obstacles, found = obstacles_of(p), {}
@@ -267,7 +267,7 @@ def _contact_constants(
 
 
 def build_system(
-    p: ORing, layout: Layout | None = None, density: Fraction | None = None
+    p: Seal, layout: Layout | None = None, density: Fraction | None = None
 ) -> SealSystem:
     """The system of a case on its section; see `seal_section`."""
     return SealSystem.of(p, seal_section(p, layout, density))

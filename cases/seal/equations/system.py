@@ -15,7 +15,7 @@ from typing import TypeAlias
 from softehl.cases.seal.equations import scales
 from softehl.cases.seal.equations.declared import Block, Field, Place
 from softehl.cases.seal.equations.loads import ContactLoads, FilmLoads
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import void_values
 from softehl.cases.seal.section.section import BODY, SealSection
 from softehl.runtime.fem.contact import Obstacle, inner_cylinder, outer_cylinder, plane
@@ -31,7 +31,7 @@ Values: TypeAlias = Mapping[str, float]
 """Parameters of a kernel by their names."""
 
 
-def _segment_rule(p: ORing, order: int) -> Rule:
+def _segment_rule(p: Seal, order: int) -> Rule:
     return film_rule(order, p.quadrature, p.quadrature_points)
 
 
@@ -57,11 +57,11 @@ SHEAR = {name: f"{name}_shear" for name in WALLS}
 """Tangential stresses of the obstacles that have friction."""
 
 
-def _rubs(p: ORing) -> bool:
+def _rubs(p: Seal) -> bool:
     return p.rubs
 
 
-_RUPTURING: tuple[tuple[str, Callable[[ORing], bool]], ...] = (
+_RUPTURING: tuple[tuple[str, Callable[[Seal], bool]], ...] = (
     ("conserving{oil}", lambda p: p.conserving and not p.rough),
     ("rough", lambda p: p.rough),
 )
@@ -72,7 +72,7 @@ def _walls() -> Iterator[Block]:
     for name, on in WALLS.items():
         cornered, fields = name == AIR_WALL, (DISPLACEMENT, name)
 
-        def plain(p: ORing, cornered: bool = cornered) -> bool:
+        def plain(p: Seal, cornered: bool = cornered) -> bool:
             return not p.rubs and not (cornered and p.opens)
 
         yield Block(name, "contact", on, fields, "contact", needed=plain)
@@ -150,7 +150,7 @@ BLOCKS = (
 )
 
 
-def blocks_of(p: ORing) -> tuple[Block, ...]:
+def blocks_of(p: Seal) -> tuple[Block, ...]:
     """The blocks of a case, first the solids of its section in the order of their elements."""
     solid, *others = BLOCKS
     own = [replace(solid, name=f"{SOLID} {r}", elements=r, region=r) for r in p.materials]
@@ -158,7 +158,7 @@ def blocks_of(p: ORing) -> tuple[Block, ...]:
     return (*own, *body, *(block for block in others if block.needed(p)))
 
 
-def obstacles_of(p: ORing) -> dict[str, Obstacle]:
+def obstacles_of(p: Seal) -> dict[str, Obstacle]:
     """The obstacles by the names of their blocks."""
     half = 0.5 * p.groove_width
     obstacles = (
@@ -170,7 +170,7 @@ def obstacles_of(p: ORing) -> dict[str, Obstacle]:
     return {obstacle.name: obstacle for obstacle in obstacles}
 
 
-def values_at_rest(block: Block, p: ORing, section: SealSection) -> Values | None:
+def values_at_rest(block: Block, p: Seal, section: SealSection) -> Values | None:
     """Parameters of a block of the unloaded contact problem; None where it is switched off."""
     if block.group == "solid":
         return p.rubber(block.region).rubber_values
@@ -209,7 +209,7 @@ def without_contact() -> dict[str, Values | None]:
     return {ROD: None, "sealed_arc": {"pressure": 0.0}}
 
 
-def film_values(p: ORing, film: FilmLoads) -> Values:
+def film_values(p: Seal, film: FilmLoads) -> Values:
     """Parameters of the terms of the film."""
     return {
         "rod_radius": 0.5 * p.rod_diameter,
@@ -232,7 +232,7 @@ def film_values(p: ORing, film: FilmLoads) -> Values:
 _FILM = ("film", "squeeze")
 
 
-def contact_kernels(p: ORing) -> tuple[str, ...]:
+def contact_kernels(p: Seal) -> tuple[str, ...]:
     """Names of the kernels that the contact problem of a case depends on, each once."""
     kernels = [b.kernel_of(p) for b in blocks_of(p) if b.group not in _FILM]
     return tuple(dict.fromkeys(kernels))

@@ -18,7 +18,7 @@ from softehl.cases.seal.equations.system import (
     SHEAR,
     WALLS,
 )
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.section.section import SealSection
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.contact import tributary_areas
@@ -30,7 +30,7 @@ from softehl.runtime.mesh.sections import SectionMesh
 class SealUnknowns:
     """A section and its unknowns: what stands where in a vector of them, and what it means."""
 
-    parameters: ORing
+    parameters: Seal
     section: SealSection
     numbering: Numbering
 

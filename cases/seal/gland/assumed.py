@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 
 from softehl.cases.seal.gland.grooves import UnknownGlandError, gland
 from softehl.cases.seal.gland.oils import is_improved
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.rubbers import materials
 from softehl.cases.seal.gland.rubbers.hardness import shore_band
 from softehl.cases.seal.gland.sections.keys import ROUND, dimensions
@@ -16,13 +16,13 @@ from softehl.cases.seal.gland.trade.ring_names import read_ring
 _RUBBER = {"fit", "shore_A"}.union(*(m.keys for m in materials.MATERIALS.values()))
 
 
-def assumed(p: ORing, given: Collection[str]) -> list[str]:
+def assumed(p: Seal, given: Collection[str]) -> list[str]:
     """Important values that were not given.  given: the keys that were."""
     said = frozenset(given)
     return [*_ring(p, said), *_gland(p, said), *_fluids(p, said)]
 
 
-def _ring(p: ORing, said: frozenset[str]) -> Iterator[str]:
+def _ring(p: Seal, said: frozenset[str]) -> Iterator[str]:
     """Ring and rubber."""
     if not said & {"ring", "section_diameter", "outline"}:
         yield f"a section of {p.section_diameter:g} mm"
@@ -40,7 +40,7 @@ def _ring(p: ORing, said: frozenset[str]) -> Iterator[str]:
         yield f"a rubber of shear modulus {p.shear_modulus:.3g} MPa"
 
 
-def _gland(p: ORing, said: frozenset[str]) -> Iterator[str]:
+def _gland(p: Seal, said: frozenset[str]) -> Iterator[str]:
     """Rod and groove."""
     if p.ring and read_ring(p.ring).outer is not None:
         said |= {"rod", "housing_diameter", "groove_width"}  # a U-cup is named by its groove
@@ -63,12 +63,12 @@ def _gland(p: ORing, said: frozenset[str]) -> Iterator[str]:
         yield "a back-up ring"
 
 
-def _called(p: ORing, key: str) -> str:
+def _called(p: Seal, key: str) -> str:
     """A key of the groove as the user of a piston seal knows it."""
     return "groove_diameter" if p.piston and key == "housing_diameter" else key
 
 
-def _kind(p: ORing) -> tuple[str, bool]:
+def _kind(p: Seal) -> tuple[str, bool]:
     """A gland in words, and whether it is one of a chart or was given."""
     if not p.gland:
         return "a gland", True
@@ -85,7 +85,7 @@ def _kind(p: ORing) -> tuple[str, bool]:
     return "its standard gland", True
 
 
-def _fluids(p: ORing, said: frozenset[str]) -> Iterator[str]:
+def _fluids(p: Seal, said: frozenset[str]) -> Iterator[str]:
     """Pressure and oil."""
     if "sealed_pressure" not in said:
         yield f"a sealed pressure of {p.sealed_pressure:g} MPa"

@@ -32,7 +32,7 @@ class Ring:
     """A ring as it is sold, mm. Tolerances are +-, None where the class gives none.
 
     area, middle: of a section that is not round, mm^2, and radius of its centroid, mm.
-    inner_diameter: less the outside diameter for a ring in a piston, see `ORing.piston`.
+    inner_diameter: less the outside diameter for a ring in a piston, see `Seal.piston`.
     """
 
     name: str

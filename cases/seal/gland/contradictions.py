@@ -11,20 +11,20 @@ from softehl.cases.seal.gland.sections.keys import is_mesh
 from softehl.cases.seal.gland.tolerances import read_tolerances
 
 if TYPE_CHECKING:
-    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.gland.parameters import Seal
     from softehl.cases.seal.gland.rubbers.rubber_keys import RubberKeys
 
 _LOWEST_ESTIMATED = 3
 """Least pressure order whose error is well below what the meshes differ by."""
 
 
-def require_consistent(p: ORing) -> None:
+def require_consistent(p: Seal) -> None:
     """ValueError for the first contradiction: what was given, what is allowed, what to do."""
     for check in _CHECKS:
         check(p)
 
 
-def _mesh_is_there(p: ORing) -> None:
+def _mesh_is_there(p: Seal) -> None:
     if p.mesh != "file":
         return
     if not is_mesh(p.outline):
@@ -41,7 +41,7 @@ def _mesh_is_there(p: ORing) -> None:
         raise ValueError(f"materials: {names} have elements in common; an element has one")
 
 
-def _rubber_has_an_element(p: ORing) -> None:
+def _rubber_has_an_element(p: Seal) -> None:
     rubbers: tuple[RubberKeys, ...] = (p, *p.materials.values())
     for rubber in rubbers:
         if p.solid != "taylor_mean" and rubber.energy != "mooney_rivlin":
@@ -51,7 +51,7 @@ def _rubber_has_an_element(p: ORing) -> None:
             )
 
 
-def _sensitivity_has_a_meaning(p: ORing) -> None:
+def _sensitivity_has_a_meaning(p: Seal) -> None:
     read_tolerances(p.tolerances, dict(p), p.ring)
     if p.tolerances and not p.sensitivity:
         raise ValueError(
@@ -65,7 +65,7 @@ def _sensitivity_has_a_meaning(p: ORing) -> None:
         )
 
 
-def _rule_is_rich_enough(p: ORing) -> None:
+def _rule_is_rich_enough(p: Seal) -> None:
     points, order = p.quadrature_points, p.pressure_order
     if points is not None and points < order:
         raise ValueError(
@@ -74,7 +74,7 @@ def _rule_is_rich_enough(p: ORing) -> None:
         )
 
 
-def _film_has_its_model(p: ORing) -> None:
+def _film_has_its_model(p: Seal) -> None:
     for name, given in (
         ("roughness", p.rough),
         ("cavitation_pressure", p.cavitation_pressure < 0.0),
@@ -88,7 +88,7 @@ def _film_has_its_model(p: ORing) -> None:
     p.require_smooth_film(dg=p.reynolds == "dg", rough=p.rough)
 
 
-def _tolerance_has_an_estimate(p: ORing) -> None:
+def _tolerance_has_an_estimate(p: Seal) -> None:
     if p.tolerance is not None and not (p.error_estimate and p.mesh == "graded"):
         raise ValueError(
             f"tolerance = {p.tolerance:g} needs an estimate of the error; "
@@ -101,7 +101,7 @@ def _tolerance_has_an_estimate(p: ORing) -> None:
         )
 
 
-def _air_side_is_closed_or_open(p: ORing) -> None:
+def _air_side_is_closed_or_open(p: Seal) -> None:
     gap, depth = p.extrusion_gap, 0.5 * (p.housing_diameter - p.rod_diameter)
     if p.backup and gap:
         raise ValueError(
@@ -125,12 +125,12 @@ def _air_side_is_closed_or_open(p: ORing) -> None:
         )
 
 
-def _arc_has_two_ends(p: ORing) -> None:
+def _arc_has_two_ends(p: Seal) -> None:
     if (p.arc_start is None) != (p.arc_end is None):
         raise ValueError("arc_start and arc_end: give both, or none to have them found")
 
 
-def _section_is_one(p: ORing) -> None:
+def _section_is_one(p: Seal) -> None:
     p.sized(p.section_diameter)
     if p.round:
         if p.materials:
@@ -156,7 +156,7 @@ def _section_is_one(p: ORing) -> None:
         )
 
 
-def _diameters_have_one_sign(p: ORing) -> None:
+def _diameters_have_one_sign(p: Seal) -> None:
     if p.rod_diameter * p.inner_diameter < 0.0 or p.rod_diameter * p.housing_diameter < 0.0:
         raise ValueError(
             f"rod_diameter = {p.rod_diameter:g}, housing_diameter = {p.housing_diameter:g} and "
@@ -165,7 +165,7 @@ def _diameters_have_one_sign(p: ORing) -> None:
         )
 
 
-def _seal_is_squeezed(p: ORing) -> None:
+def _seal_is_squeezed(p: Seal) -> None:
     gap = 0.5 * (p.housing_diameter - p.rod_diameter)
     between, keys = "rod and housing", "rod_diameter, housing_diameter"
     if p.piston:
@@ -179,7 +179,7 @@ def _seal_is_squeezed(p: ORing) -> None:
         )
 
 
-def _ring_fits_the_rod(p: ORing) -> None:
+def _ring_fits_the_rod(p: Seal) -> None:
     stretch = p.rod_diameter / p.inner_diameter - 1.0
     if p.piston and not -0.1 <= stretch <= 0.2:
         raise ValueError(
@@ -193,7 +193,7 @@ def _ring_fits_the_rod(p: ORing) -> None:
         )
 
 
-def _section_is_between_the_walls(p: ORing) -> None:
+def _section_is_between_the_walls(p: Seal) -> None:
     if p.groove_width < p.axial_width:
         what = "section_diameter" if p.round else "the width of the section"
         raise ValueError(
@@ -209,7 +209,7 @@ def _section_is_between_the_walls(p: ORing) -> None:
         )
 
 
-def _pressure_is_within_reach(p: ORing) -> None:
+def _pressure_is_within_reach(p: Seal) -> None:
     found = ratio(p, p.sealed_pressure)
     if found > MOST:
         raise ValueError(

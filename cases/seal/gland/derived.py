@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from softehl.cases.seal.gland import catalogue
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 
 BASES = {
     "groove_depth": "housing_diameter",
@@ -13,7 +13,7 @@ BASES = {
 """Measure -> the key that it decides, all others held."""
 
 
-def derived(p: ORing, name: str) -> float:
+def derived(p: Seal, name: str) -> float:
     """A measure of the gland of a case: mm or %."""
     depth = 0.5 * (p.housing_diameter - p.rod_diameter)
     if name == "groove_depth":

@@ -1,4 +1,4 @@
-"""Parameters of the reciprocating O-ring (section 5.1 and Table 1 of the paper), with their limits.
+"""Parameters of a reciprocating seal (section 5.1 and Table 1 of the paper), with their limits.
 
 Units are mm, MPa, N, s.
 """
@@ -42,8 +42,8 @@ DENSITIES: tuple[int, ...] = get_args(Density)
 Speed = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 
 
-class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
-    """Everything that defines one run of the O-ring case, or of a seal of another section.
+class Seal(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
+    """Everything that defines one run of a seal: an O-ring, or a seal of another section.
 
     Raises pydantic.ValidationError also for a geometry in which the seal is not squeezed.
     """
@@ -483,3 +483,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
     def _nothing_contradicts(self) -> Self:
         require_consistent(self)
         return self
+
+
+ORing = Seal
+"""The old name."""

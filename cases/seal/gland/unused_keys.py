@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from softehl.cases.seal.gland.given import shown
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 
-_NEEDS: Mapping[str, tuple[Callable[[ORing], Any], str]] = {
+_NEEDS: Mapping[str, tuple[Callable[[Seal], Any], str]] = {
     "temperature": (lambda p: p.oil or p.fit, "an oil or a fit"),
     "ogden_terms": (lambda p: p.fit, "a fit"),
     "corner_fillet": (lambda p: p.opens, "an extrusion_gap"),
@@ -19,7 +19,7 @@ _NEEDS: Mapping[str, tuple[Callable[[ORing], Any], str]] = {
 """Key -> whether it has an effect, and what it has none without."""
 
 
-def unused_keys(p: ORing) -> list[str]:
+def unused_keys(p: Seal) -> list[str]:
     """Keys with a value of their own that have no effect, in words."""
     fields = type(p).model_fields
     return [

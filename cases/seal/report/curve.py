@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.gland.parameters import Seal
 
 _BESIDE, _ROOM = 1.2, 1.7  # factors of logarithmic axes: free space, and that of the legend
 _BESIDE_MARK = {"out": (-5, 4), "in": (5, -9)}  # points from a mark to its word
@@ -25,7 +25,7 @@ _PLAIN = ((1.0,), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0))  # 
 _ENOUGH, _MANY = 3, 7  # ticks of an axis
 
 
-def curve_figure(p: ORing, rows: Sequence[FilmRow], rejected: Sequence[FilmRow] = ()) -> Figure:
+def curve_figure(p: Seal, rows: Sequence[FilmRow], rejected: Sequence[FilmRow] = ()) -> Figure:
     """h* over |U|, both logarithmic, a line a stroke; rejected states are marked on the axis.
 
     Bars of both strokes where there is one speed. Not drawn: rough films so slow that the sealed
@@ -55,7 +55,7 @@ def curve_figure(p: ORing, rows: Sequence[FilmRow], rejected: Sequence[FilmRow] 
     return figure
 
 
-def _one_speed_figure(p: ORing, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]) -> Figure:
+def _one_speed_figure(p: Seal, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]) -> Figure:
     """A bar for each stroke with its error, its number and what is wrong with it."""
     from matplotlib.figure import Figure
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.patches import Polygon
     from PIL.Image import Image
 
-    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.gland.parameters import Seal
 
 Table = Mapping[str, Array]
 
@@ -95,14 +95,14 @@ class MovingSection:
     times: (n,). outlines: (n, B, 2), mm.
     """
 
-    parameters: ORing
+    parameters: Seal
     times: Array
     outlines: Array
     ring: Polygon
     marks: LineCollection
 
     @classmethod
-    def on(cls, axes: Axes, p: ORing, outline: Table) -> MovingSection:
+    def on(cls, axes: Axes, p: Seal, outline: Table) -> MovingSection:
         """On axes; outline: a line for every time and node."""
         from matplotlib.collections import LineCollection
         from matplotlib.patches import Polygon
@@ -127,7 +127,7 @@ class MovingSection:
         return self.ring, self.marks
 
 
-def write_animation(path: Path, p: ORing, film: Table, loop: Table, outline: Table) -> None:
+def write_animation(path: Path, p: Seal, film: Table, loop: Table, outline: Table) -> None:
     """Section, film and pressure through a cycle with the place of the rod, as a GIF.  OSError.
 
     outline: the deformed outline of the section, a line for every time and node of it.

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.gland.parameters import Seal
 
 
-def gland_figure(p: ORing) -> Figure:
+def gland_figure(p: Seal) -> Figure:
     """The section as it is made, at its radius on the rod, and the gland that it goes into."""
     from matplotlib.figure import Figure
     from matplotlib.patches import Polygon
@@ -42,7 +42,7 @@ def gland_figure(p: ORing) -> Figure:
     return figure
 
 
-def fit_numbers(p: ORing) -> list[tuple[str, float, str]]:
+def fit_numbers(p: Seal) -> list[tuple[str, float, str]]:
     """Fit of the ring in its gland: name, value, unit."""
     fits = fit_percent(p)
     return [

@@ -16,13 +16,13 @@ from softehl.runtime.io import write_csv
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.gland.parameters import Seal
 
 _COLOURS = dict(zip(SECOND, ("#1b6ca8", "#c8553d", "#4f8a52"), strict=True))
 _LINES = ("-", "--", ":", "-.")
 
 
-def fit_of(p: ORing) -> Fit | None:
+def fit_of(p: Seal) -> Fit | None:
     """The fit that a case took its rubber from.  Raises ValueError where it cannot be read."""
     if p.fit is None:
         return None

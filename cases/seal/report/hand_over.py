@@ -14,7 +14,7 @@ import numpy as np
 
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.report.part import FinishedRun
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import write_csv, write_text
@@ -226,7 +226,7 @@ def _require_one_seal(runs: Sequence[FinishedRun]) -> None:
     """Raises BadInput unless runs are of one seal but for its pressure and its motion."""
     first = runs[0]
     for run in runs:
-        if type(run.parameters) is not ORing:
+        if type(run.parameters) is not Seal:
             raise BadInput(f"{run.folder} is no curve of a seal; allowed: runs of oring")
         one, other = first.parameters.settled(), run.parameters.settled()
         differing = [k for k, v in one.items() if k not in _MOTION and other[k] != v]

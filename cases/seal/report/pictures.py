@@ -17,7 +17,7 @@ from softehl.cases.seal.states.observer_adapter import read_profile, read_sectio
 from softehl.cases.seal.states.state import FilmRow
 
 if TYPE_CHECKING:
-    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.gland.parameters import Seal
 
 PICTURES = ("curve", "profiles", "section")
 """Names of the files, each .png or .svg or both, of every run."""
@@ -27,7 +27,7 @@ SOME = ("fit", "stribeck")
 
 
 def write_plots(
-    p: ORing,
+    p: Seal,
     folder: Path,
     rows: Sequence[FilmRow],
     rejected: Sequence[FilmRow] = (),

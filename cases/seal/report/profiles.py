@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.gland.parameters import Seal
 
 Results = Sequence[tuple[FilmRow, Profile]]
 Colour = tuple[float, float, float, float]
@@ -25,7 +25,7 @@ _MARGIN = 0.3  # mm beside the contacts
 _LEAST, _MOST = 0.7, 20.0  # of the least h and of the largest h*
 
 
-def profiles_figure(p: ORing, results: Results) -> Figure:
+def profiles_figure(p: Seal, results: Results) -> Figure:
     """Pressure above film thickness; a state that is not ok is dotted, with its verdict."""
     from matplotlib.figure import Figure
 

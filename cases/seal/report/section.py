@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.tri import TriContourSet
 
-    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.gland.parameters import Seal
 
 
 _METAL, _FLUID, _FILM, _CONTACT, _LINE = "#d9dadd", "#d3e6f5", "#1b6ca8", "#8a8f98", "#3b3f45"
@@ -69,7 +69,7 @@ class Scale:
     height: float
 
     @classmethod
-    def of(cls, p: ORing, views: Sequence[View]) -> Scale:
+    def of(cls, p: Seal, views: Sequence[View]) -> Scale:
         """One scale for several states."""
         from matplotlib.ticker import MaxNLocator
 
@@ -82,7 +82,7 @@ class Scale:
         return cls(levels, _BAND * p.section_diameter / pressure)
 
 
-def section_figure(p: ORing, views: Sequence[View]) -> Figure:
+def section_figure(p: Seal, views: Sequence[View]) -> Figure:
     """A panel for each state, all with one scale of stress and one of pressure."""
     from matplotlib.figure import Figure
 
@@ -105,7 +105,7 @@ def section_figure(p: ORing, views: Sequence[View]) -> Figure:
     return figure
 
 
-def draw_view(axes: Axes, p: ORing, view: View, scale: Scale) -> TriContourSet:
+def draw_view(axes: Axes, p: Seal, view: View, scale: Scale) -> TriContourSet:
     """One state in its gland; what a colour bar needs."""
     draw_gland(axes, p, 0.5 * (view.row.contact_start_mm + view.row.contact_end_mm))
     shown = _draw_ring(axes, view.section, scale.levels)
@@ -115,7 +115,7 @@ def draw_view(axes: Axes, p: ORing, view: View, scale: Scale) -> TriContourSet:
     return shown
 
 
-def draw_gland(axes: Axes, p: ORing, middle: float | None = None) -> None:
+def draw_gland(axes: Axes, p: Seal, middle: float | None = None) -> None:
     """Rod, housing with its walls, and the fluid on the sealed side; limits of the picture.
 
     middle: where the seal touches the rod and hides the end of the fluid, mm; that of the groove.
@@ -155,7 +155,7 @@ def _draw_ring(axes: Axes, section: Section, levels: Array) -> TriContourSet:
     return shown
 
 
-def _draw_film(axes: Axes, p: ORing, profile: Profile, height: float) -> None:
+def _draw_film(axes: Axes, p: Seal, profile: Profile, height: float) -> None:
     """Film pressure as a band in the rod.  height: mm for 1 MPa."""
     rod, x, film = 0.5 * p.rod_diameter, profile.x_mm, np.maximum(profile.p_MPa, 0.0)
     axes.fill_between(x, rod, rod - height * film, color=_FILM, lw=0)
@@ -168,7 +168,7 @@ def _draw_film(axes: Axes, p: ORing, profile: Profile, height: float) -> None:
     )
 
 
-def _draw_contact(axes: Axes, p: ORing, section: Section, height: float) -> None:
+def _draw_contact(axes: Axes, p: Seal, section: Section, height: float) -> None:
     """Contact pressure as bands in the housing and its walls.  height: mm for 1 MPa."""
     from matplotlib.collections import PolyCollection
 
@@ -196,7 +196,7 @@ def _normals(points: Array, edges: Integers) -> Array:
     return np.asarray(np.divide(total, length, out=total, where=length > 0.0))
 
 
-def _draw_motion(axes: Axes, p: ORing, speed: float) -> None:
+def _draw_motion(axes: Axes, p: Seal, speed: float) -> None:
     """An arrow the way the rod goes."""
     half = 0.3 * p.section_diameter * np.sign(speed)
     level = 0.5 * p.rod_diameter - (_AROUND[1] - 0.05) * p.section_diameter

@@ -17,7 +17,7 @@ from softehl.runtime.io import read_csv, write_csv
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.gland.parameters import Seal
 
 PANELS = {"h_star": "film thickness $h^*$", "friction": "friction", "leakage": "leakage"}
 """Quantities of the picture, and what they are called in it."""
@@ -29,7 +29,7 @@ Table = dict[float, dict[str, dict[str, float]]]
 
 
 def write_sensitivities(
-    p: ORing, folder: Path, rows: Sequence[FilmRow], kinds: Sequence[str]
+    p: Seal, folder: Path, rows: Sequence[FilmRow], kinds: Sequence[str]
 ) -> None:
     """Join the sensitivities of the states into `sensitivity.csv`; tolerances; the picture.
 
@@ -94,7 +94,7 @@ def _cells(path: Path, kind: type[Record]) -> list[list[str]]:
     return read_csv(path, kind.header()) if path.exists() else []
 
 
-def tornado_figure(p: ORing, table: Table) -> Figure:
+def tornado_figure(p: Seal, table: Table) -> Figure:
     """Bars: per cent of each quantity for one per cent of a parameter, at the slowest speeds."""
     from matplotlib.figure import Figure
 

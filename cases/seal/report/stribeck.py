@@ -17,19 +17,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.gland.parameters import Seal
 
 _HERSEY = "$\\eta_0 |U| / p_{\\mathrm{dry}}$ [µm]   ($p_{\\mathrm{dry}}$ largest dry pressure)"
 _REGIMES = {MIXED: "boundary | mixed", FULL: "mixed | full"}
 _PANELS = (2.2, 1.0)  # heights of friction and of shares of asperities
 
 
-def hersey_um(p: ORing, row: FilmRow) -> float:
+def hersey_um(p: Seal, row: FilmRow) -> float:
     """eta_0 |U| over the largest pressure of the dry contact, um."""
     return 1e3 * p.viscosity * abs(row.rod_speed_mm_s) / row.contact_p_max_MPa
 
 
-def crossing(p: ORing, rows: Sequence[FilmRow], ratio: float) -> float | None:
+def crossing(p: Seal, rows: Sequence[FilmRow], ratio: float) -> float | None:
     """eta U / p (um) where the rows of a stroke, by rising speed, first have this lambda ratio.
 
     By the logarithms of both; None where they have not.
@@ -42,7 +42,7 @@ def crossing(p: ORing, rows: Sequence[FilmRow], ratio: float) -> float | None:
     return None
 
 
-def stribeck_figure(p: ORing, rows: Sequence[FilmRow]) -> Figure | None:
+def stribeck_figure(p: Seal, rows: Sequence[FilmRow]) -> Figure | None:
     """Friction of both strokes and the shares of asperities; None for smooth ones or one speed."""
     from matplotlib.figure import Figure
 
@@ -71,7 +71,7 @@ def stribeck_figure(p: ORing, rows: Sequence[FilmRow]) -> Figure | None:
 
 
 def _draw_stroke(
-    p: ORing, friction: Axes, shares: Axes, stroke: str, rows: Sequence[FilmRow]
+    p: Seal, friction: Axes, shares: Axes, stroke: str, rows: Sequence[FilmRow]
 ) -> None:
     x = [hersey_um(p, row) for row in rows]
     colour, label = style.COLOURS[stroke], style.STROKES[stroke]
@@ -103,6 +103,6 @@ def _draw_stroke(
         )
 
 
-def _surfaces(p: ORing) -> str:
+def _surfaces(p: Seal) -> str:
     rod, seal = p.roughness
     return f"rms rod {rod:g}, seal {seal:g} µm"

@@ -8,7 +8,7 @@ if TYPE_CHECKING:  # imported late: matplotlib is slow to import
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.gland.parameters import ORing
+    from softehl.cases.seal.gland.parameters import Seal
 
 STYLE: Any = {
     "axes.axisbelow": True,
@@ -40,7 +40,7 @@ H_STAR = "film thickness h* = 2q / |U| [µm]"
 SPEED = "rod speed |U| [mm/s]"
 
 
-def subject(p: ORing) -> str:
+def subject(p: Seal) -> str:
     """The ring, the oil and the sealed pressure in three lines, for the head of a picture."""
     return (
         f"{p.named} {p.ring_diameter:g} \N{MULTIPLICATION SIGN} {p.section_diameter:g} mm, "
@@ -52,13 +52,13 @@ def subject(p: ORing) -> str:
     )
 
 
-def between(p: ORing) -> str:
+def between(p: Seal) -> str:
     """The two surfaces that the seal is squeezed between, in words."""
     slides, holds = ("bore", "groove of the piston") if p.piston else ("rod", "housing")
     return f"{slides} {abs(p.rod_diameter):.6g} mm, {holds} {abs(p.housing_diameter):.6g} mm"
 
 
-def radial_axis(axes: Axes, p: ORing) -> None:
+def radial_axis(axes: Axes, p: Seal) -> None:
     """Radii at the axis of a picture, upwards: those of a piston seal are counted negative."""
     axes.set_ylabel("r [mm]")
     axes.yaxis.set_major_formatter(lambda r, _: f"{abs(r):.4g}")

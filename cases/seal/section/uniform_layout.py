@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import pi, radians
 
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.section.layout import Layout
 from softehl.runtime.mesh.outline import Shape, gentle
 from softehl.runtime.mesh.section_mesh import Sizes
@@ -25,7 +25,7 @@ BEYOND = 0.3
 section."""
 
 
-def uniform_layout(p: ORing) -> Layout:
+def uniform_layout(p: Seal) -> Layout:
     """The section of a case with equal segments on its arc, the given one or a wide guide."""
     shape = p.free_section
     if p.mesh == "file":

@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.sensitivity.quantities import QUANTITIES
 from softehl.cases.seal.states.sensitivity_table import resolved
 from softehl.cases.seal.states.state import FilmState
@@ -78,11 +78,11 @@ def value_of(state: FilmState, quantity: str) -> float:
 
 
 def designed(
-    p: ORing,
+    p: Seal,
     target: Target,
     key: str,
-    solve: Callable[[ORing], FilmState | None],
-    hold: Callable[[ORing], Change | None],
+    solve: Callable[[Seal], FilmState | None],
+    hold: Callable[[Seal], Change | None],
 ) -> list[Step]:
     """Steps to the value of a key of p that meets the target; the last one does.
 
@@ -103,10 +103,10 @@ def designed(
                 "this target; choose another key (sensitivity.csv shows which have an influence)"
             )
         value *= math.exp(way / slope)
-        state = _film(ORing(**{**p.settled(), key: value}), key, solve)
+        state = _film(Seal(**{**p.settled(), key: value}), key, solve)
         steps.append(Step(value, value_of(state, target.quantity), wanted))
         if abs(steps[-1].quantity / wanted - 1.0) <= TOLERANCE:
-            change = hold(ORing(**{**p.settled(), key: value}))
+            change = hold(Seal(**{**p.settled(), key: value}))
             return [*steps, *settled(steps[-1], wanted, slope, change)]
     raise NoDesignError(
         f"after {STEPS} solves {target.quantity} is still {steps[-1].quantity:.4g}, wanted was "
@@ -139,7 +139,7 @@ def settled(near: Step, wanted: float, slope: float, change: Change | None) -> l
     return steps[1:]
 
 
-def _film(p: ORing, key: str, solve: Callable[[ORing], FilmState | None]) -> FilmState:
+def _film(p: Seal, key: str, solve: Callable[[Seal], FilmState | None]) -> FilmState:
     state = solve(p)
     if state is None or not resolved(state) or state.sensitivity is None:
         verdict = "did not converge" if state is None else f"has the verdict {state.verdict}"

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
 from softehl.cases.seal.gland.derived import BASES, derived
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.varied import NUMBERS, PRESSURE_KEY
 from softehl.cases.seal.sensitivity.design import Change, NoDesignError, Step, Target, designed
 from softehl.cases.seal.sensitivity.held import HeldFilm
@@ -37,7 +37,7 @@ INSTEAD = {
 """Keys that cannot be chosen freely: what to do instead."""
 
 
-def design_case(p: ORing, target: str, key: str) -> int:
+def design_case(p: Seal, target: str, key: str) -> int:
     """Print the way to the target; exit code 0, or 3 where it is not reached.  Raises BadInput."""
     asked = SAME.get(key, key)
     key = BASES.get(asked, asked)
@@ -64,15 +64,15 @@ def design_case(p: ORing, target: str, key: str) -> int:
 
 
 def _unit(key: str) -> str:
-    return next(one.unit for one in keys_of(ORing) if one.name == key)
+    return next(one.unit for one in keys_of(Seal) if one.name == key)
 
 
-def _one_film(p: ORing) -> ORing:
+def _one_film(p: Seal) -> Seal:
     """The case of its first speed, at outstroke unless it has one stroke.  Raises BadInput."""
     stroke = "out" if p.stroke == "both" else p.stroke
     given = {"speeds": p.speeds[:1], "stroke": stroke, "error_estimate": False}
     try:
-        return ORing(**{**p.settled(), **given, "sensitivity": True})
+        return Seal(**{**p.settled(), **given, "sensitivity": True})
     except ValidationError as error:
         raise BadInput(f"a design needs the sensitivities: {_reason(error)}") from None
 
@@ -81,17 +81,17 @@ def _reason(error: ValidationError) -> str:
     return error.errors()[0]["msg"].removeprefix("Value error, ")
 
 
-def _solve(p: ORing) -> FilmState | None:
+def _solve(p: Seal) -> FilmState | None:
     states = run(p, Silent(), differentiate=differentiation(p)).states
     return states[0] if states else None
 
 
-def _hold(p: ORing, quantity: str, key: str) -> Change | None:
+def _hold(p: Seal, quantity: str, key: str) -> Change | None:
     held = HeldFilm.of(p)
     return None if held is None else lambda factor: held.change(quantity, key, factor)
 
 
-def _tell(p: ORing, target: Target, key: str, steps: Sequence[Step]) -> None:
+def _tell(p: Seal, target: Target, key: str, steps: Sequence[Step]) -> None:
     first, last = steps[0], steps[-1]
     sign = 1.0 if p.stroke == "out" else -1.0
     name = {of: said for said, of in _OF_PISTON.items()}.get(key, key) if p.piston else key

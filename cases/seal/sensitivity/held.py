@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.sensitivity.quantities import quantities
 from softehl.cases.seal.sensitivity.variation import FilmCase
 from softehl.cases.seal.solve.films import NoFilm
@@ -27,7 +27,7 @@ class HeldFilm:
     newton: Newton
 
     @classmethod
-    def of(cls, p: ORing) -> HeldFilm | None:
+    def of(cls, p: Seal) -> HeldFilm | None:
         """The film of a case; None where it is not reached."""
         assert p.stroke != "both"
         contact = DryContact.of(p, Silent())

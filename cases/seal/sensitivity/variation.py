@@ -14,7 +14,7 @@ import numpy as np
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.gland.given import number, times
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.varied import LENGTHS, NUMBERS, PRESSURE_KEY
 from softehl.cases.seal.section.uniform_layout import uniform_layout
 from softehl.runtime.fem.design import Inputs, rate_of
@@ -73,7 +73,7 @@ def _varies(value: Any) -> bool:
     return any(number(v) and v for v in numbers)
 
 
-def frozen(system: SealSystem, p: ORing) -> SealSystem:
+def frozen(system: SealSystem, p: Seal) -> SealSystem:
     """The system of other parameters on the same mesh, moved with the measures of its section.
 
     The sealed pressure ends at the nodes at which it ended.

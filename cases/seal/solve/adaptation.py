@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.film_layout import film_layout, misfit
 from softehl.cases.seal.solve.film_transfer import FilmTransfer
@@ -59,7 +59,7 @@ class Adaptation:
     p: the case, whose density they have. contacts, films: solve for either on them.
     """
 
-    p: ORing
+    p: Seal
     contacts: ContactSolver
     films: FilmSolver
 

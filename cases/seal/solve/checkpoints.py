@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.runtime.arrays import Array
 
 _SHARE = 0.5
@@ -40,7 +40,7 @@ class Checkpoints:
         """The next state of a path."""
         self.states.append(state)
 
-    def restart(self, p: ORing) -> Checkpoint | None:
+    def restart(self, p: Seal) -> Checkpoint | None:
         """State at which to take up the path of a case; None where there is nothing but rest.
 
         With friction there is not: what slips remembers its path.

@@ -12,7 +12,7 @@ from __future__ import annotations
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import ContactLoads
 from softehl.cases.seal.equations.system import BORE, ROD
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve import remedies
 from softehl.cases.seal.solve.path import Stage
 from softehl.cases.seal.solve.pressure_newton import PressureNewton
@@ -33,7 +33,7 @@ STEPS = StepRule(0.05, 3e-4, 0.3)
 """Steps of the way of the rod, of the pressure over the shear modulus, of what friction takes."""
 
 
-def held_place(p: ORing) -> float | None:
+def held_place(p: Seal) -> float | None:
     """Mean axial displacement (mm) at which contact and film hold a section, None if it is free.
 
     With the arc of the paper's scheme it is free: the walls of a narrow groove hold it. So it is
@@ -43,12 +43,12 @@ def held_place(p: ORing) -> float | None:
     return None if free else 0.0
 
 
-def held_moment(p: ORing) -> float | None:
+def held_moment(p: Seal) -> float | None:
     """Moment (N mm) on the section in contact and film, None where its mean rotation is held."""
     return 0.0 if p.rubs else None
 
 
-def assembly(p: ORing) -> str:
+def assembly(p: Seal) -> str:
     """The way on which contact is found, in words: with friction the result depends on it."""
     words = "squeezed with its mean place and rotation held"
     if p.sealed_pressure > 0.0:

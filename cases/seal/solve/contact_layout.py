@@ -13,7 +13,7 @@ import numpy as np
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.system import AIR_WALL, BORE, ROD, SEALED_WALL, WALLS
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.section.uniform_layout import uniform_layout
 from softehl.cases.seal.solve.inlet import film_thickness, inlet_length
@@ -84,7 +84,7 @@ along which the pressure hardly changes and the film does."""
 def placed_layout(
     system: SealSystem,
     x: Array,
-    p: ORing,
+    p: Seal,
     most: int = MOST_SEGMENTS,
 ) -> Layout:
     """The layout of a case whose arc reaches as far as a film may matter in the contact state x.
@@ -126,7 +126,7 @@ def placed_layout(
     return layout.graded(spacing, long, DEPTH * inlet, first)
 
 
-def _edge_spot(system: SealSystem, x: Array, p: ORing, ends: Sequence[float]) -> Spot:
+def _edge_spot(system: SealSystem, x: Array, p: Seal, ends: Sequence[float]) -> Spot:
     """Place at which the section meets the edge of the gap, on an arc between `ends`, mm."""
     nodes = system.mesh.arc_nodes
     centre = np.array([p.air_wall, 0.5 * p.rod_diameter])

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact_layout import MOST_SEGMENTS, graded_layout, placed_layout
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
 from softehl.cases.seal.solve.contact_store import ContactStore, stored_contact
@@ -40,12 +40,12 @@ class ContactMeshes:
     solver: ContactSolver
     store: ContactStore = field(default_factory=ContactStore)
 
-    def contact(self, p: ORing) -> State | StageFailed:
+    def contact(self, p: Seal) -> State | StageFailed:
         """The system of a case and its unknowns (n,) in contact under p_s."""
         graded = p.mesh == "graded" or (p.mesh == "uniform" and p.given_arc is None)
         return self._graded(p) if graded else self._uniform(p)
 
-    def _uniform(self, p: ORing) -> State | StageFailed:
+    def _uniform(self, p: Seal) -> State | StageFailed:
         """On equal segments: the path on the coarsest mesh, then finer ones."""
         first = p.density if p.solver != "auto" else COARSE
         densities = list(_doublings(first, p.density))
@@ -53,7 +53,7 @@ class ContactMeshes:
         system = build_system(_at(p, (*kept, first)[0]))
         return self._finer(system, self._begun(system), p.density)
 
-    def _graded(self, p: ORing) -> State | StageFailed:
+    def _graded(self, p: Seal) -> State | StageFailed:
         """On meshes that the contact places, the last of which is finer."""
         # what sticks keeps the rotation of the mesh on which it began to
         guide = min(GUIDE, p.density)
@@ -67,7 +67,7 @@ class ContactMeshes:
         state = self._sealed(_at(p, guide), state)
         return state if isinstance(state, StageFailed) else self._finer(*state, p.density)
 
-    def _sealed(self, p: ORing, state: State | StageFailed) -> State | StageFailed:
+    def _sealed(self, p: Seal, state: State | StageFailed) -> State | StageFailed:
         """On the last of the graded meshes; on more where pressure ends outside the contact."""
         for number in range(PASSES, PASSES + SEALS):
             state = self._next(state, p, number)
@@ -76,7 +76,7 @@ class ContactMeshes:
         return state
 
     def _next(
-        self, state: State | StageFailed, p: ORing, number: int, most: int = MOST_SEGMENTS
+        self, state: State | StageFailed, p: Seal, number: int, most: int = MOST_SEGMENTS
     ) -> State | StageFailed:
         """On a mesh that is made for the contact on another one; most: as of `placed_layout`."""
         if isinstance(state, StageFailed):
@@ -116,5 +116,5 @@ def _doublings(first: int, last: int) -> Iterator[int]:
         first *= 2
 
 
-def _at(p: ORing, density: int) -> ORing:
+def _at(p: Seal, density: int) -> Seal:
     return p.model_copy(update={"density": density})

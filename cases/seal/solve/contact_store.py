@@ -19,7 +19,7 @@ import numpy as np
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.system import contact_kernels
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact import contact_problem, correction_stage
 from softehl.cases.seal.solve.path import Stage
 from softehl.runtime.arrays import Array
@@ -41,7 +41,7 @@ WITHOUT_INFLUENCE = (
 """Parameters that the contact stage does not know."""
 
 
-def contact_key(parameters: ORing) -> str:
+def contact_key(parameters: Seal) -> str:
     """Name of a contact state: all parameters but those without influence, and the kernels."""
     kernels = contact_kernels(parameters)
     given = parameters.model_dump(exclude=set(WITHOUT_INFLUENCE))
@@ -57,7 +57,7 @@ class ContactStore:
 
     folder: Path | None = None
 
-    def densities(self, parameters: ORing, among: Sequence[int]) -> list[int]:
+    def densities(self, parameters: Seal, among: Sequence[int]) -> list[int]:
         """Densities of which there is a state, good or not; finest first."""
         if self.folder is None:
             return []
@@ -83,7 +83,7 @@ class ContactStore:
             self.folder.mkdir(parents=True, exist_ok=True)
             write_arrays(self._path(system.parameters), parts)
 
-    def _path(self, parameters: ORing) -> Path:
+    def _path(self, parameters: Seal) -> Path:
         assert self.folder is not None
         return self.folder / f"{contact_key(parameters)}.npz"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.films import NoFilm
 from softehl.cases.seal.solve.path import StageFailed
 from softehl.runtime.solve.solution import Status
@@ -24,7 +24,7 @@ _THICK = "try a finer mesh (larger density), or lower speeds or a thinner oil wh
 _HIGH = 1.5  # shear moduli
 
 
-def explained(failed: StageFailed, where: str, p: ORing) -> tuple[Status, str]:
+def explained(failed: StageFailed, where: str, p: Seal) -> tuple[Status, str]:
     """Status and message of a run that ends with this stage.
 
     where: which part of the run it was.
@@ -33,7 +33,7 @@ def explained(failed: StageFailed, where: str, p: ORing) -> tuple[Status, str]:
     return failed.branch.status, f"{where}: {failed.message}{advice}"
 
 
-def without_films(missed: Sequence[NoFilm], p: ORing) -> tuple[Status, str]:
+def without_films(missed: Sequence[NoFilm], p: Seal) -> tuple[Status, str]:
     """Status and message of a stroke that lacks the films of these speeds."""
     first, speeds = missed[0], ", ".join(f"{film.speed:g}" for film in missed)
     advice = ROLLING if p.rotation == "free" else _film_advice(p)
@@ -41,7 +41,7 @@ def without_films(missed: Sequence[NoFilm], p: ORing) -> tuple[Status, str]:
     return first.status, words
 
 
-def _film_advice(p: ORing) -> str:
+def _film_advice(p: Seal) -> str:
     """Advice for a film that was not found."""
     if p.given_arc:
         return _ARC.format(*p.given_arc)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.pressure_newton import lagged
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.lagged_pressure import element_pressures
@@ -34,7 +34,7 @@ _MONOLITHIC = 12
 """Iterations of Newton's method for all unknowns."""
 
 
-def film_corrector(p: ORing, linear: Condenser) -> SchurCorrector:
+def film_corrector(p: Seal, linear: Condenser) -> SchurCorrector:
     """Modified Newton iterations on the Schur complement of the section, for films of a case."""
     inner = ModifiedNewton(max_inner=_CAVITIES) if p.conserving else ModifiedNewton()
     finish = Newton(max_iterations=1, linear=linear)

@@ -15,7 +15,7 @@ from math import inf
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import Stroke
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.contacts import Edge, contact_edges
 from softehl.runtime.arrays import Array
 
@@ -43,7 +43,7 @@ class InletScales:
         return InletScales(self.time * ratio**-0.6, self.thickness * ratio**0.6)
 
 
-def inlet_length(p: ORing, rise: float) -> float:
+def inlet_length(p: Seal, rise: float) -> float:
     """Length l (mm) of the inlet at an edge of this K^2, at the slowest speed, see above.
 
     Between rough surfaces at least that over which h = K l^(3/2) / E rises by sigma.
@@ -53,13 +53,13 @@ def inlet_length(p: ORing, rise: float) -> float:
     return float(max((flow * E**2 / rise**1.5) ** 0.4, asperities))
 
 
-def inlet_time(p: ORing, edge: Edge, speed: float) -> float:
+def inlet_time(p: Seal, edge: Edge, speed: float) -> float:
     """Time (s) in which a rod passes the inlet at an edge at |U|."""
     at_speed = p.model_copy(update={"speeds": (speed,)})
     return inlet_length(at_speed, edge.rise) / speed
 
 
-def film_thickness(p: ORing, edges: Sequence[Edge], speed: float) -> float:
+def film_thickness(p: Seal, edges: Sequence[Edge], speed: float) -> float:
     """About half of h* (mm) at |U|, K l^(3/2) / E with the l above."""
     flow, E = p.viscosity * speed, 3.0 * p.surface_modulus
     return max((flow**0.6 * E**0.2 * edge.rise**-0.4 for edge in edges), default=0.0)

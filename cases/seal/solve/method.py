@@ -8,7 +8,7 @@ from pathlib import Path
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.loads import Stroke
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.adaptation import Adaptation, Adapted
 from softehl.cases.seal.solve.contact import assembly, contact_problem
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
@@ -50,7 +50,7 @@ class DryContact:
 
     @classmethod
     def of(
-        cls, p: ORing, observer: Observer, contacts: Path | None = None
+        cls, p: Seal, observer: Observer, contacts: Path | None = None
     ) -> DryContact | StageFailed:
         """Contact of a case; contacts: see `run`."""
         driver = PathDriver(observer, Newton(max_iterations=10, linear=choose(p.linear)))
@@ -61,7 +61,7 @@ class DryContact:
         return cls(*found, solver)
 
     @property
-    def parameters(self) -> ORing:
+    def parameters(self) -> Seal:
         """The case."""
         return self.system.parameters
 
@@ -110,7 +110,7 @@ class DryContact:
 
 
 def run(
-    parameters: ORing,
+    parameters: Seal,
     observer: Observer,
     contacts: Path | None = None,
     differentiate: Differentiate | None = None,

@@ -15,7 +15,7 @@ from softehl.cases.seal.equations.system import (
     WALLS,
 )
 from softehl.cases.seal.gland.catalogue import fill, squeeze, stretch
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.contacts import contacts
 from softehl.cases.seal.states.section_view import section_view
 from softehl.cases.seal.states.state import ContactState
@@ -72,7 +72,7 @@ def contact_peaks(system: SealSystem, sealed_pressure: float, x: Array) -> tuple
     return tuple(float(pressure[nodes].max()) for nodes in contacts(system, x))
 
 
-def fit_percent(p: ORing) -> dict[str, float]:
+def fit_percent(p: Seal) -> dict[str, float]:
     """Fit of the free ring in its gland."""
     depth = 0.5 * (p.housing_diameter - p.rod_diameter)
     return {

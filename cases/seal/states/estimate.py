@@ -15,7 +15,7 @@ import math
 from fractions import Fraction
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
-from softehl.cases.seal.gland.parameters import ORing
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.reach import ratio
 from softehl.cases.seal.states.verdict import (
     INLET_RATIO,
@@ -61,7 +61,7 @@ def _percent(density: int) -> float:
     return 100.0 / (math.pow(ratio, ORDER) - 1.0)
 
 
-def unseen(p: ORing) -> str:
+def unseen(p: Seal) -> str:
     """Why no estimate of a case can be relied on; empty where it can."""
     if p.mesh != "graded":
         return f'mesh = "{p.mesh}" has no estimate of the error; use mesh = "graded" where it goes'
@@ -90,7 +90,7 @@ def friction_bound(density: int, film: FilmNumbers, other: FilmNumbers) -> float
     return abs(_percent(density)) * apart / abs(film.friction)
 
 
-def reservation(p: ORing, film: FilmNumbers, other: FilmNumbers | None) -> str:
+def reservation(p: Seal, film: FilmNumbers, other: FilmNumbers | None) -> str:
     """Why a state whose estimated error of h* is small is not `ok` all the same; empty if it is.
 
     other: the film on the coarser mesh. Where no estimate is wanted

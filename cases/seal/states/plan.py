@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from softehl.cases.seal.equations.loads import Stroke
-from softehl.cases.seal.gland.parameters import DENSITIES, ORing
+from softehl.cases.seal.gland.parameters import DENSITIES, Seal
 from softehl.cases.seal.gland.surfaces import FULL
 from softehl.cases.seal.states.state import CLIPPED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED, FilmRow
 from softehl.cases.seal.states.verdict import DOUBTFUL
@@ -42,18 +42,18 @@ def doubts(rows: Sequence[FilmRow], advice: Mapping[float, str]) -> dict[str, li
     return found
 
 
-def strokes_of(parameters: ORing) -> tuple[Stroke, ...]:
+def strokes_of(parameters: Seal) -> tuple[Stroke, ...]:
     """The strokes that are asked for, one by one."""
     return tuple(SIGNS) if parameters.stroke == "both" else (parameters.stroke,)
 
 
-def rod_speeds(parameters: ORing) -> list[float]:
+def rod_speeds(parameters: Seal) -> list[float]:
     """The signed rod speeds U that are asked for."""
     signs = [SIGNS[stroke] for stroke in strokes_of(parameters)]
     return [sign * speed for sign in signs for speed in parameters.speeds]
 
 
-def refinements(parameters: ORing) -> list[ORing]:
+def refinements(parameters: Seal) -> list[Seal]:
     """The run, and where it has a tolerance the same on every finer mesh there is."""
     if parameters.tolerance is None:
         return [parameters]
@@ -61,7 +61,7 @@ def refinements(parameters: ORing) -> list[ORing]:
     return [parameters.model_copy(update={"density": density}) for density in finer]
 
 
-def pieces(parameters: ORing, rows: Sequence[FilmRow], jobs: int) -> list[ORing]:
+def pieces(parameters: Seal, rows: Sequence[FilmRow], jobs: int) -> list[Seal]:
     """The parameter sets still to be run at this density: one for both strokes, or one for each.
 
     Strokes go separately where they can run side by side or miss different speeds.
@@ -79,7 +79,7 @@ def pieces(parameters: ORing, rows: Sequence[FilmRow], jobs: int) -> list[ORing]
     ]
 
 
-def missing_speeds(parameters: ORing, stroke: Stroke, rows: Sequence[FilmRow]) -> tuple[float, ...]:
+def missing_speeds(parameters: Seal, stroke: Stroke, rows: Sequence[FilmRow]) -> tuple[float, ...]:
     """The requested speeds |U| of a stroke to be solved.
 
     They have no row, or one of a coarser mesh that does not meet the tolerance.
@@ -89,7 +89,7 @@ def missing_speeds(parameters: ORing, stroke: Stroke, rows: Sequence[FilmRow]) -
     return tuple(u for u in parameters.speeds if SIGNS[stroke] * u not in kept)
 
 
-def outside_tolerance(parameters: ORing, rows: Sequence[FilmRow]) -> list[FilmRow]:
+def outside_tolerance(parameters: Seal, rows: Sequence[FilmRow]) -> list[FilmRow]:
     """The rows that do not meet the tolerance, if there is one."""
     tolerance = parameters.tolerance
     return [row for row in rows if tolerance is not None and not row.within(tolerance)]
