@@ -112,7 +112,7 @@ class Case(Generic[P, R]):
         return []
 
     def told(self, folder: Path) -> list[str]:
-        """What other files of a finished run say, in lines that follow the answer."""
+        """Lines that follow the answer, from other files of a finished run."""
         return []
 
     def merits(self, parameters: P, rows: Sequence[R]) -> Mapping[str, float]:

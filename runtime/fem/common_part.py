@@ -100,7 +100,7 @@ def _plane(cell: Cell, corners: Array) -> Array:
 
 
 def _inside(points: Array, polygon: Array) -> Flags:
-    """Whether points (n, k, 2) lie in convex polygons (n, m, 2) that go round counterclockwise."""
+    """True for points (n, k, 2) in convex polygons (n, m, 2) that go round counterclockwise."""
     edge = np.roll(polygon, -1, axis=1) - polygon
     length = np.maximum(np.linalg.norm(edge, axis=2), 1e-300)
     off = points[:, :, None] - polygon[:, None]
@@ -126,7 +126,7 @@ def _crossings(S: Array, M: Array) -> tuple[Array, Array, Flags]:
 
 
 def _once(points: Array, valid: Flags, S: Array) -> Flags:
-    """Those that are no earlier ones again."""
+    """True for points that do not repeat an earlier one."""
     size = np.linalg.norm(S - S.mean(axis=1, keepdims=True), axis=2).max(axis=1)
     away = np.abs(points[:, :, None] - points[:, None]).max(axis=3) > 2 * _ON * size[:, None, None]
     away |= ~valid[:, None, :]

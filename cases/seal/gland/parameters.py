@@ -338,7 +338,7 @@ class ORing(SectionKeys, RubberKeys, ThinningKeys, SaidKeys):
 
     @property
     def piston(self) -> bool:
-        """Whether the seal sits in a piston and slides on a bore.
+        """True if the seal sits in a piston and slides on a bore.
 
         Its diameters are counted negative then. With r = -radius a piston seal is a rod seal: what
         slides is below it, what holds it above.

@@ -73,10 +73,10 @@ def fading(speed: Array, more: float, rate: float) -> Array:
 
 
 def humped(speed: Array, more: float, rate: float) -> Array:
-    """That of "Cylinder Friction (IL)", smooth at rest; rate: 1 / breakaway speed, s/mm."""
+    """Fading of "Cylinder Friction (IL)", smooth at rest; rate: 1 / breakaway speed, s/mm."""
     v = rate * speed / np.sqrt(2.0)
     return np.asarray(
-        more * np.sqrt(2.0 * np.e) * v * np.exp(-(v**2)) + np.tanh(10.0 * rate * speed)
+        more * np.exp(0.5) * np.sqrt(2.0) * v * np.exp(-(v**2)) + np.tanh(10.0 * rate * speed)
     )
 
 
@@ -108,7 +108,7 @@ class FrictionLaw:
 
     @property
     def numbers(self) -> dict[str, tuple[float, str]]:
-        """What the block asks for, in SI units."""
+        """Numbers that the block asks for, in SI units."""
         last = {
             "Cylinder Friction": (
                 *("Breakaway friction increase coefficient", "Transition coefficient"),

@@ -1,4 +1,4 @@
-"""Where the nodes of the arc lie for a film that is known: close together where h or p changes.
+"""Places of the nodes of the arc for a known film: close together where h or p changes.
 
 The film says what contact cannot: a groove between two lobes has a pressure of its own, a lip is
 pulled down by suction, an instroke drags its inlet along the arc.

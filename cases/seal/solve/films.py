@@ -58,7 +58,7 @@ class Film:
 
     @property
     def begun(self) -> tuple[SqueezeFilm, Array]:
-        """How it was squeezed out, and its unknowns."""
+        """The squeeze film that it came from, and its unknowns."""
         return self.squeeze_film, self.x
 
     @cached_property
@@ -98,7 +98,7 @@ class FilmSolver:
     driver: PathDriver
 
     def on(self, system: SealSystem) -> FilmSolver:
-        """The same on the mesh of another system."""
+        """This solver on the mesh of another system."""
         return replace(self, system=system)
 
     def from_contact(self, stroke: Stroke, speed: float, x: Array) -> Film | NoFilm:
