@@ -182,7 +182,7 @@ def write_hand_over(folder: Path, runs: Sequence[FinishedRun]) -> list[str]:
         misfit = f"within {100.0 * law.misfit:.2g} % of every film"
         said.append(f"{name}: {misfit}")
     doubtful = sum(row.verdict != "ok" for run in runs for row in run.rows)
-    return [*said, f"{doubtful} films have a verdict other than ok"] if doubtful else said
+    return [*said, f"films with a verdict other than ok: {doubtful}"] if doubtful else said
 
 
 def modelica(seal: SealMap) -> str:
