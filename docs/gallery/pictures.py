@@ -22,7 +22,7 @@ from tests.docs.pages import Reader, blocks
 
 HERE = Path(__file__).resolve().parent
 SIZE = (7.2, 2.7)  # inches
-BLUE, ORANGE, GREY = "#1f5fa8", "#d9661f", "0.45"
+BLUE, ORANGE, GREEN, GREY = "#1f5fa8", "#d9661f", "#3b8f4a", "0.45"
 
 _STYLE: Any = {
     "axes.spines.right": False,
@@ -517,17 +517,17 @@ def jumps(figure: Figure, space: dict[str, Any]) -> None:
     left.set_axis_off()
     figure.colorbar(drawn, ax=left, label="u", shrink=0.85)
     sizes = np.array([8, 16, 32])
-    for order, colour in ((1, BLUE), (2, ORANGE)):
+    for order, colour in ((1, BLUE), (2, ORANGE), (3, GREEN)):
         errors = [space["error"](found) for found in space["results"][order]]
         right.plot(sizes, errors, "o", color=colour, label=f"order {order}")
-    right.plot(sizes, [9.605e-05, 5.606e-06, 3.484e-07], "k+", ms=8, label="deal.II, order 3")
+    right.plot(sizes, [9.605e-05, 5.606e-06, 3.484e-07], "k+", ms=9, label="deal.II, order 3")
     for order in (1, 2, 3):
         label = "least error" if order == 1 else None
         right.plot(sizes, space["best"](sizes, order), color=GREY, lw=1, label=label)
     right.set(xscale="log", yscale="log", xlabel="cells along a side", ylabel="error")
     right.set_xticks(sizes, [str(n) for n in sizes])
     right.minorticks_off()
-    right.legend(loc="lower left")
+    right.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
