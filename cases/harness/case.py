@@ -112,7 +112,7 @@ class Case(Generic[P, R]):
         return []
 
     def told(self, folder: Path) -> list[str]:
-        """Lines that follow the answer: findings in other files of a finished run."""
+        """Lines that follow the answer, from other files of a finished run."""
         return []
 
     def merits(self, parameters: P, rows: Sequence[R]) -> Mapping[str, float]:

@@ -36,5 +36,5 @@ def write(definitions: Iterable[Definition], target: Target, folder: Path | None
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
         cache.write(folder / name, text.encode())
-    print(f"{len(files)} files of target {target} in {folder}")
+    print(f"files of target {target} in {folder}: {len(files)}")
     return 0

@@ -22,7 +22,7 @@ from tests.docs.pages import Reader, blocks
 
 HERE = Path(__file__).resolve().parent
 SIZE = (7.2, 2.7)  # inches
-BLUE, ORANGE, GREY = "#1f5fa8", "#d9661f", "0.45"
+BLUE, ORANGE, GREEN, GREY = "#1f5fa8", "#d9661f", "#3b8f4a", "0.45"
 
 _STYLE: Any = {
     "axes.spines.right": False,
@@ -475,6 +475,61 @@ def laminate(figure: Figure, space: dict[str, Any]) -> None:
     right.legend()
 
 
+def enhanced(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2, width_ratios=[1.2, 1])
+    for model, colour in (("plain", ORANGE), ("enhanced", BLUE)):
+        result = space["beam"](model, tilt=0.2)
+        mesh = result.system.mesh
+        places = mesh.points + 4e6 * (result.deformed(("u_x", "u_y")) - mesh.points)
+        (cells,) = mesh.cells.values()
+        left.add_collection(PolyCollection(places[cells], facecolors="none", edgecolors=colour))
+    left.autoscale_view()
+    left.set_aspect("equal")
+    left.set_axis_off()
+    near = 10.0 ** -np.arange(0, 5.5, 0.5)
+    for model, tilt, mark, label in (
+        ("enhanced", 0, "o", "Q1E4"),
+        ("enhanced", 0.2, "^", "Q1E4, trapezoids"),
+        ("plain", 0, "s", "Q1"),
+    ):
+        lifts = [
+            space["lift"](space["beam"](model, tilt, nu))[0] / space["exact"](nu)
+            for nu in (1 - near) / 2
+        ]
+        colour = ORANGE if model == "plain" else BLUE
+        right.plot(near, lifts, mark, color=colour, label=label)
+    fine = np.logspace(-5, 0, 100)
+    right.plot(fine, space["locked"]((1 - fine) / 2), color=GREY, lw=1, label="closed forms")
+    right.axhline(1, color=GREY, lw=1)
+    right.set(xscale="log", xlabel="1 - 2 nu", ylabel="lift / theory of beams")
+    right.invert_xaxis()
+    right.legend(loc="center right")
+
+
+def jumps(figure: Figure, space: dict[str, Any]) -> None:
+    left, right = figure.subplots(1, 2, width_ratios=[1, 1.3])
+    result = space["results"][1][0]
+    mesh, u = result.system.mesh, result.values("u")
+    (cells,) = mesh.cells.values()
+    triangles = np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
+    drawn = left.tripcolor(*mesh.points.T, triangles, u, shading="gouraud", cmap="RdBu_r")
+    left.set_aspect("equal")
+    left.set_axis_off()
+    figure.colorbar(drawn, ax=left, label="u", shrink=0.85)
+    sizes = np.array([8, 16, 32])
+    for order, colour in ((1, BLUE), (2, ORANGE), (3, GREEN)):
+        errors = [space["error"](found) for found in space["results"][order]]
+        right.plot(sizes, errors, "o", color=colour, label=f"order {order}")
+    right.plot(sizes, [9.605e-05, 5.606e-06, 3.484e-07], "k+", ms=9, label="deal.II, order 3")
+    for order in (1, 2, 3):
+        label = "least error" if order == 1 else None
+        right.plot(sizes, space["best"](sizes, order), color=GREY, lw=1, label=label)
+    right.set(xscale="log", yscale="log", xlabel="cells along a side", ylabel="error")
+    right.set_xticks(sizes, [str(n) for n in sizes])
+    right.minorticks_off()
+    right.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
 ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "cook": cook,
     "plasticity": plasticity,
@@ -492,6 +547,8 @@ ENTRIES: dict[str, Callable[[Figure, dict[str, Any]], None]] = {
     "contact": contact,
     "column": column,
     "swing": swing,
+    "enhanced": enhanced,
+    "jumps": jumps,
     "laminate": laminate,
 }
 

@@ -126,7 +126,7 @@ def _crossings(S: Array, M: Array) -> tuple[Array, Array, Flags]:
 
 
 def _once(points: Array, valid: Flags, S: Array) -> Flags:
-    """Points without those that repeat earlier ones."""
+    """True for points that do not repeat an earlier one."""
     size = np.linalg.norm(S - S.mean(axis=1, keepdims=True), axis=2).max(axis=1)
     away = np.abs(points[:, :, None] - points[:, None]).max(axis=3) > 2 * _ON * size[:, None, None]
     away |= ~valid[:, None, :]

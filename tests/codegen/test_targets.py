@@ -92,7 +92,7 @@ def test_generate_writes_cells_for_dolfinx(
     assert cli.generate(target="ufcx", out=tmp_path / "cells") == 0
     printed = capsys.readouterr()
     assert "left out: film interpolates p" in printed.err
-    assert "1 files of target ufcx" in printed.out
+    assert "files of target ufcx in " in printed.out
     assert [p.name for p in (tmp_path / "cells").iterdir()] == ["contact_ufcx.c"]
 
 

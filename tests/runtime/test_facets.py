@@ -81,7 +81,7 @@ def test_interior_penalty_has_order_two(shape: Any) -> None:
 def error(mesh: Mesh, u: Array) -> float:
     """L2 norm of u less sin(pi x) sin(pi y)."""
     ((kind, cells),) = mesh.cells.items()
-    at, weights = CELLS[kind].rule(6)
+    at, weights = CELLS[kind].rule(8)
     N, places = CELLS[kind].shape(at), mesh.points[cells]
     X, found = np.einsum("qa,nad->dnq", N, places), np.einsum("qa,na->nq", N, u[cells])
     gap = found - np.sin(np.pi * X[0]) * np.sin(np.pi * X[1])
@@ -124,12 +124,26 @@ def test_residual_and_tangent_are_differences_of_a_closed_form_in_50_digits() ->
     assert np.abs(K[0] - wrong).max() > 1e-10
 
 
+def test_order_three_has_the_errors_of_step_74_of_deal_ii() -> None:
+    """The table of its results, penalty p (p + 1) / h; the square is twice as wide here."""
+    errors = []
+    for n in (4, 8):
+        mesh = Mesh.rectangle(2.0, 2.0, cells=(n, n), order=3).split()
+        study = penalised(mesh, 12.0)
+        study.add("body", PAGE, model="poisson")
+        study.add("sides", PAGE, on="boundary", model="facets", gamma=12.0)
+        errors.append(error(mesh, study.solve().values("u")) / 2)  # of the area
+    np.testing.assert_allclose(errors, [0.00193285, 9.60497e-05], rtol=3e-6)
+
+
 def test_what_has_no_facets_says_so() -> None:
     mesh = Mesh.rectangle(1.0, 1.0, cells=(1, 1))
     with pytest.raises(MeshError, match="no facet between two cells"):
         penalised(mesh, 1.0)
     with pytest.raises(MeshError, match="facets of wedge6"):
         turns("wedge6")
+    with pytest.raises(ValueError, match="quadrilaterals of order 1 to 4"):
+        load_kernel(laplace, cell="hex64_side")
     with pytest.raises(ValueError, match=r"m.size: quad4 is a cell here"):
         Study(mesh).add("body", nitsche)
     with pytest.raises(ValueError, match=r"laplace.* has m.jump or m.average"):

@@ -73,10 +73,10 @@ def fading(speed: Array, more: float, rate: float) -> Array:
 
 
 def humped(speed: Array, more: float, rate: float) -> Array:
-    """Coefficients of "Cylinder Friction (IL)", smooth at rest; rate: 1 / breakaway speed, s/mm."""
+    """Fading of "Cylinder Friction (IL)", smooth at rest; rate: 1 / breakaway speed, s/mm."""
     v = rate * speed / np.sqrt(2.0)
     return np.asarray(
-        more * np.sqrt(2.0 * np.e) * v * np.exp(-(v**2)) + np.tanh(10.0 * rate * speed)
+        more * np.exp(0.5) * np.sqrt(2.0) * v * np.exp(-(v**2)) + np.tanh(10.0 * rate * speed)
     )
 
 
@@ -108,7 +108,7 @@ class FrictionLaw:
 
     @property
     def numbers(self) -> dict[str, tuple[float, str]]:
-        """Values that the block asks for, in SI units."""
+        """Numbers that the block asks for, in SI units."""
         last = {
             "Cylinder Friction": (
                 *("Breakaway friction increase coefficient", "Transition coefficient"),
@@ -182,7 +182,7 @@ def write_hand_over(folder: Path, runs: Sequence[FinishedRun]) -> list[str]:
         misfit = f"within {100.0 * law.misfit:.2g} % of every film"
         said.append(f"{name}: {misfit}")
     doubtful = sum(row.verdict != "ok" for run in runs for row in run.rows)
-    return [*said, f"{doubtful} films have a verdict other than ok"] if doubtful else said
+    return [*said, f"films with a verdict other than ok: {doubtful}"] if doubtful else said
 
 
 def modelica(seal: SealMap) -> str:

@@ -62,7 +62,7 @@ def write_sensitivities(
 
 
 def told(folder: Path) -> list[str]:
-    """Effects of tolerances and the most important keys, a line for each speed."""
+    """A line for each speed: the effect of tolerances, and the keys that matter most."""
     bands = [ToleranceRow.parse(c) for c in _cells(folder / "tolerances.csv", ToleranceRow)]
     slopes = [SensitivityRow.parse(c) for c in _cells(folder / "sensitivity.csv", SensitivityRow)]
     lines = []

@@ -90,7 +90,7 @@ class Adaptation:
         return found, fits
 
     def _fits(self, film: Film, density: Fraction, like: Film | None = None) -> bool:
-        """True if a mesh fits its film; a mesh that is given always does.
+        """True if a mesh fits its film; a mesh that is given is as it is.
 
         like: the film on another mesh, which this one must resolve as well for its density.
         """

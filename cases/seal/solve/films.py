@@ -114,7 +114,7 @@ class FilmSolver:
     driver: PathDriver
 
     def on(self, system: SealSystem) -> FilmSolver:
-        """The same on the mesh of another system."""
+        """The solver on the mesh of another system."""
         return replace(self, system=system)
 
     def from_contact(self, stroke: Stroke, speed: float, x: Array) -> Film | NoFilm:

@@ -52,7 +52,7 @@ class DryContact:
     def of(
         cls, p: Seal, observer: Observer, contacts: Path | None = None
     ) -> DryContact | StageFailed:
-        """Contact of a case; contacts: see `run`."""
+        """The dry contact of a case; contacts: see `run`."""
         driver = PathDriver(observer, Newton(max_iterations=10, linear=choose(p.linear)))
         solver = ContactSolver(driver)
         found = ContactMeshes(solver, ContactStore(contacts)).contact(p)
@@ -77,7 +77,7 @@ class DryContact:
 
     @property
     def state(self) -> ContactState:
-        """State of the contact for reports."""
+        """The state that is reported."""
         p_s = self.parameters.sealed_pressure
         return contact_state(self.system, contact_problem(self.system, p_s), p_s, self.x)
 
