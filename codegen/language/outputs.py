@@ -13,7 +13,7 @@ from softehl.codegen.language.symbols import Symbols
 
 
 class Outputs:
-    """What is evaluated at the points, and what is generated; tasks None: all but the product."""
+    """Fields, new history and chosen tasks; tasks None: all but the product."""
 
     def __init__(self, symbols: Symbols) -> None:
         self._symbols = symbols
@@ -76,7 +76,7 @@ class Outputs:
 
 
 def check(definition: Definition) -> None:
-    """Whether a finished model has what its tasks need.  Raises ModelError where not."""
+    """Check that a finished model has what its tasks need.  Raises ModelError where not."""
     name, chosen = definition.name, definition.tasks or ()
     if Task.ENERGY in chosen and not definition.conservative:
         raise ModelError(f"no energy for {name}: its residual is not the gradient of one")

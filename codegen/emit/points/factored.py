@@ -65,7 +65,7 @@ class Factored:
 
     @cached_property
     def kept(self) -> Kept:
-        """What a product needs at a point."""
+        """The variables that a product needs at a point."""
         return Kept(self.layout, self.outputs)
 
     # the product --------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""What a product by sum factorisation keeps at every point of a state: the function `keep`."""
+"""The function `keep`: variables at every point of a state that a factored product needs."""
 
 from __future__ import annotations
 
