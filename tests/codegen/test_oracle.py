@@ -37,7 +37,7 @@ EMPTY = ("no pressure", "open", "beyond", "missed-right", "missed-left")
 MEETINGS = ("sticking", "slipping", "slipping-back", *EMPTY[1:])
 CHOSEN = {
     **{f"mortar_{a}{b}": MEETINGS for a in (2, 3) for b in (2, 3)},
-    "touch": ("sticking", "slipping", "frictionless", "open", "beyond"),
+    "touch": ("sticking", "slipping", "open", "beyond"),
     "contact": ("closed", "open"),
     "contact_corner": (
         *("in the wall", "in the fillet", "in the lip", "before the wall, open"),

@@ -194,7 +194,7 @@ def test_only_what_is_asked_for_is_generated(asked: dict[str, Any], made: list[s
     source = pipeline.compile_model(chosen(**asked))
     assert list(source.functions) == made
     for task in (*abi.Task, "d_k"):
-        assert (f"({abi.function_name('chosen', task)})" in source.text) == (task in made)
+        assert (abi.function_name("chosen", task) + "(" in source.text) == (task in made)
 
 
 @pytest.mark.parametrize(

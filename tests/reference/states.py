@@ -216,20 +216,19 @@ def mortar_states() -> Iterator[State]:
 
 
 def touch_states() -> Iterator[State]:
-    """Points that stick, slip, slide freely, are open, too deep, their face turned; faces alone."""
+    """Points that stick, slip, are open or too deep, their face turned; faces alone."""
     corners = {3: UNIT[[0, 1, 2]], 4: UNIT}
     turn = np.linalg.qr(np.array([[1.0, 0.3, -0.2], [-0.1, 1.0, 0.4], [0.3, -0.2, 1.0]]))[0]
     turn *= np.sign(np.linalg.det(turn))
-    for label, gap, came, friction in (
-        ("sticking", -0.01, (1e-3, -2e-3), 0.3),
-        ("slipping", -0.02, (0.03, 0.05), 0.3),
-        ("frictionless", -0.02, (0.03, 0.05), 0.0),
-        ("open", 0.3, (0.01, 0.0), 0.3),
-        ("beyond", -0.7, (0.01, 0.0), 0.3),
+    for label, gap, came in (
+        ("sticking", -0.01, (1e-3, -2e-3)),
+        ("slipping", -0.02, (0.03, 0.05)),
+        ("open", 0.3, (0.01, 0.0)),
+        ("beyond", -0.7, (0.01, 0.0)),
     ):
         rows = [[0.02, -0.01, gap], [1.1, 0.2, 0.0], [-0.1, 0.9, 0.0], [*came, 1e-3]]
         dofs = (*_tuple(np.array(rows) @ turn.T), 0.4, 0.02, -0.03, 0.01)
-        yield State("touch", label, (), dofs, (), (10.0, friction, 0.5, 1.0))
+        yield State("touch", label, (), dofs, (), (10.0, 0.3, 0.5, 1.0))
     for a in (3, 4):
         rng = np.random.default_rng(2016)
         now = np.column_stack([corners[a], 0.1 * rng.uniform(-1, 1, a)]) @ turn.T
