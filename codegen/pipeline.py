@@ -151,7 +151,7 @@ def _with_action(made: KernelSource) -> KernelSource:
     text = action.text(before)
     text = action.text([*emit_lanes.wrappers(text), *before])
     shared = {**made.shared, f"{d.name}_action.c": text}
-    return replace(made, shared=shared, kept=len(action.kept))
+    return replace(made, shared=shared, kept=len(action.kept.names))
 
 
 def form(d: Definition) -> Choice:

@@ -100,7 +100,7 @@ class Fields(Model):
         return self._declared_fields([name], order, given=False)[0]
 
     def _internal_unknowns(self, names: Sequence[str]) -> list[sp.Symbol]:
-        self._internal += names
+        self._arguments.internal += names
         return self._declared_fields(names, 0, given=False)
 
     @property
@@ -138,7 +138,7 @@ class Fields(Model):
         """Time derivative of a field, or its second one, by what `Study.march` gives: see
         `Model.rates`.
         """
-        coefficient, suffix = self._of_time(order)
+        coefficient, suffix = self._arguments.of_time(order)
         rest = Entries.of(self._of_step(field, suffix)).values
         now = Entries.of(field)
         return now.arrange([coefficient * a + b for a, b in zip(now.values, rest, strict=True)])
@@ -217,8 +217,7 @@ class Fields(Model):
         for factor, value in zip(left.values, right.values, strict=True):
             if sp.sympify(value).is_number:
                 continue
-            label = f"weak_flux_{self._factors}"
-            self._factors += 1
+            label = self._equations.numbered("weak_flux")
             frozen.append(self.define(label, factor * volume, interface=True))
             density += frozen[-1] * value
         total = self._total_of(f"virtual_work_{self._densities}", density)
@@ -282,7 +281,7 @@ class Fields(Model):
         met = expression.free_symbols
         fields = [t for v, t in self._traced.items() if v in met or expression.has(v)]
         known = {s for t in fields for s in (t.value, *_leaves(t.value))}
-        known |= {sp.Symbol(a.name, real=True) for a in self._arguments["parameters"]}
+        known |= {sp.Symbol(n, real=True) for n in self._arguments.names("parameters")}
         strange = sorted(str(s) for s in _leaves(expression) - known)
         if strange or not fields:
             raise ModelError(

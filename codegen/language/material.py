@@ -20,9 +20,10 @@ from typing import Any
 import sympy as sp
 
 from softehl.codegen.language.definition import PointForm
+from softehl.codegen.language.draft import NAME
 from softehl.codegen.language.fields import AXES, Fields
 from softehl.codegen.language.lower import ModelError
-from softehl.codegen.language.model import NAME, Model
+from softehl.codegen.language.model import Model
 from softehl.codegen.language.pages import Page
 
 _SHOWN = {1: ((0, 0),), 2: ((0, 0), (1, 1), (2, 2), (0, 1))}

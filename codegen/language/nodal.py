@@ -60,12 +60,12 @@ class Nodal(Fields):
     def point(self) -> list[sp.Symbol]:
         """Parent coordinates, under names that a page does not use."""
         names = (f"parent_{k}" for k in range(self.rule.dimension))
-        return [self._input(s, "rule", k, varying=True) for k, s in enumerate(names)]
+        return [self._symbols.input(s, "rule", k, varying=True) for k, s in enumerate(names)]
 
     @property
     def weight(self) -> sp.Symbol:
         """Weight of the quadrature point, under such a name, too."""
-        return self._input("parent_weight", "rule", self.rule.dimension, varying=True)
+        return self._symbols.input("parent_weight", "rule", self.rule.dimension, varying=True)
 
     def finish(self) -> Definition:
         """The frozen definition, which knows its cell."""

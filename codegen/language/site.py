@@ -52,7 +52,7 @@ class Site(Fields):
             ]
             found = [Quantity(component, k) for k in (None, *range(self.dimension))]
             if component.given:
-                start = len(self._arguments["data"])
+                start = len(self._arguments.lists["data"])
                 symbols = self.data(**dict.fromkeys(labels, "at the point"))
                 self._given_at_point.update(enumerate(found, start))
             else:
@@ -72,7 +72,7 @@ class Site(Fields):
 
     def point_data(self, **meanings: str) -> list[sp.Symbol]:
         """As of any model; here they do not vary, there is one point."""
-        return self._declare("point data", meanings)
+        return self._arguments.declare("point data", meanings)
 
     def _check_use(self, potential: Node) -> None:
         """Nothing: which values and gradients occur is what is found out here."""

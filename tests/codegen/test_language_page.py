@@ -55,7 +55,7 @@ def test_examples_against_the_oracle(name: str, names: dict[str, Any], tmp_path:
 
 def test_the_page_names_everything() -> None:
     said = set(re.findall(r"`(?:\w+(?:, \w+)* = )?m\.(\w+)", PAGE))
-    there = {n for n in vars(Model) if not n.startswith("_")}
+    there = {n for n in dir(Model) if not n.startswith("_")}
     assert there <= said | {"doc"}
     functions = set(re.findall(r"\w+", SUPPORTED))
     assert functions <= set(re.findall(r"\w+", PAGE))

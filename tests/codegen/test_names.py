@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 import sympy as sp
 
-from softehl.codegen.language import model as language
-from softehl.codegen.language import names
+from softehl.codegen.language import names, symbols
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
@@ -181,7 +180,7 @@ def test_the_check_reads_a_page_with_its_names_written_out(
         seen = names._WRITTEN.get()
         return names.named(label, value, **how) if seen else sp.Symbol(label, real=True)
 
-    monkeypatch.setattr(language, "named", blind)
+    monkeypatch.setattr(symbols, "named", blind)
     monkeypatch.setenv("SOFTEHL_CACHE", str(tmp_path / "wrong"))
     assert files.generate([path]) == 1
     printed = capsys.readouterr().err

@@ -22,18 +22,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softehl.codegen import abi
 from softehl.codegen.abi import Task
 from softehl.codegen.emit import source
-from softehl.codegen.emit.points import constants, function, geometry, nodes
-from softehl.codegen.emit.points.frame import Frame, components, products
+from softehl.codegen.emit.points import constants, function, nodes
+from softehl.codegen.emit.points.frame import components
 from softehl.codegen.emit.points.function import Outputs
-from softehl.codegen.emit.points.inputs import Inputs
+from softehl.codegen.emit.points.kept import Kept
 from softehl.codegen.emit.points.layout import Layout
-from softehl.codegen.emit.points.lines import Lines, load
-from softehl.codegen.emit.points.sweeps import Table, sweep
+from softehl.codegen.emit.points.lines import Lines
+from softehl.codegen.emit.points.sweeps import Table, lagrange, sweep
 from softehl.codegen.emit.schedule import Schedule
 from softehl.codegen.language.definition import Component, Quantity
 from softehl.codegen.language.elements.cells import ELEMENTS
@@ -59,67 +58,15 @@ class Factored:
     def text(self, before: list[str]) -> str:
         """C file. before: routines that the function of the point calls."""
         point, _ = function.text(self.layout, Task.PRODUCT, self.outputs, self.plan)
-        keep, action = self._keep(), self._action()
+        keep, action = self.kept.text(), self._action()
         tables = constants.used(self.layout, keep)
         pieces = [self._tables_of_lines(), point, keep, action]
         return source.source(self.layout.d, pieces, [*before, nodes.SUPPORT, *tables])
 
     @cached_property
-    def frame(self) -> Frame:
-        """The frame whose inputs are kept."""
-        return Frame(self.layout, Task.PRODUCT, self.outputs)
-
-    @property
-    def kept(self) -> list[str]:
-        """Variables of C that are kept at a point."""
-        D, needs = range(self.layout.dimension), self.frame.needs
-        found = [f"I{k}{m}" for k in D for m in D] + ["w"]
-        for array, letter in function.ARRAYS.items():
-            if array != "direction":
-                found += [f"{letter}[{k}]" for k in needs[array]]
-        return found
-
-    # what is kept -------------------------------------------------------------------------------
-
-    def _keep(self) -> str:
-        f = self.frame
-        f.out, d = Lines(), self.layout.d
-        out, count, points = f.out, len(self.kept), self.layout.points
-        sizes = {
-            "xs": ("X", d.coordinate_width, f.widths["coordinates"]),
-            "us": ("d", len(d.unknowns), f.widths["dofs"]),
-            "es": ("a", len(d.data), f.widths["data"]),
-        }
-        out.add(f"enum {{ points = {points} }};")
-        for array, (start, size, width) in sizes.items():
-            if size:
-                out.add(f"V {array}[{size}];")
-                load(out, array, start, size, width)
-                out.idle(array)
-        out.open(f"for (int q = 0; q < {points}; ++q)")
-        products(f)
-        geometry.write(f)
-        Inputs(f).write(direction=False)
-        out.idle("x", "g", "e", "b")
-        out.add(f"softehl_wide *const to = (softehl_wide *)R + {count} * q;")
-        for k, value in enumerate(self.kept):
-            out.add(f"to[{k}] = {value};")
-        out.close()
-        name, body = abi.function_name(d.name, "keep"), "\n".join(out.lines)
-        moved = {"X": f.widths["coordinates"], "d": f.widths["dofs"], "a": f.widths["data"]}
-        arrays = {"X": "coordinates", "d": "dofs", "a": "data"}
-        given = [f"{arrays[k]} + {w} * e" if w != "0" else "0" for k, w in moved.items()]
-        return (
-            f"static void {name}_group(const double *restrict X, const double *restrict d,\n"
-            "    const double *restrict a, const double *restrict parameters, double *restrict R)\n"
-            f"{{\n    (void)X, (void)d, (void)a, (void)parameters;\n{body}\n}}\n\n"
-            f"{abi.declaration(d.name, 'keep')};\n{abi.declaration(d.name, 'keep')}\n{{\n"
-            "    (void)points, (void)modes, (void)data, (void)direction, (void)rule, (void)basis;\n"
-            "    (void)tangent;\n"
-            "    for (ptrdiff_t e = 0; e < n; e += SOFTEHL_LANES)\n"
-            f"        {name}_group({', '.join(given)}, parameters, values + {count * points} * e);"
-            "\n}\n"
-        )
+    def kept(self) -> Kept:
+        """The variables that a product needs at a point."""
+        return Kept(self.layout, self.outputs)
 
     # the product --------------------------------------------------------------------------------
 
@@ -139,7 +86,7 @@ class Factored:
         cell = sorted({float(place[0]) for place in ELEMENTS[self.layout.d.cell].nodes})
         assert len(cell) == n
         assert len(rule.points) == count**D
-        to, slope = _lagrange(cell, at)[0], _lagrange(at, at)[1]
+        to, slope = lagrange(cell, at)[0], lagrange(at, at)[1]
         return {"to": Table(to, 1), "slope": Table(slope, -1)}
 
     def _tables_of_lines(self) -> str:
@@ -175,7 +122,7 @@ class Factored:
         for line in nodes.scatter(C, n**D):
             out.add(line)
         name, body = abi.function_name(d.name, "action"), "\n".join(out.lines)
-        step = len(self.kept) * q**D
+        step = len(self.kept.names) * q**D
         arguments = (
             "ptrdiff_t first, ptrdiff_t last, const double *restrict parameters,\n"
             "    const double *restrict kept, const int *restrict index, const double *restrict x,"
@@ -242,8 +189,8 @@ class Factored:
 
     def _points(self, out: Lines, points: int) -> None:
         """Fluxes at every point, in the places of the slopes."""
-        layout, D, count = self.layout, self.layout.dimension, len(self.kept)
-        f = self.frame
+        layout, D, count = self.layout, self.layout.dimension, len(self.kept.names)
+        f = self.kept.frame
         out.open(f"for (int q = 0; q < {points}; ++q)")
         out.add(f"const softehl_wide *const from = kept + {count} * q;")
         out.add(f"for (int k = 0; k < {count}; ++k)")
@@ -256,7 +203,7 @@ class Factored:
         sizes["P"], sizes["A"] = max(len(self.outputs.rows), 1), 1
         for letter, size in sizes.items():
             out.add(f"V {letter}[{max(size, 1)}];")
-        for k, value in enumerate(self.kept):
+        for k, value in enumerate(self.kept.names):
             value = value.replace("x[", "X[")  # x is the vector here
             kind = "" if "[" in value else "const V "
             out.add(f"{kind}{value} = from[{k}];")
@@ -290,17 +237,3 @@ class Factored:
                 total = " + ".join(f"{v} * I{m}{axis}" for axis, v in slopes.items())
                 text = f"w * ({total})" if slopes and c in met else "softehl_splat(0.0)"
                 out.add(f"slopes[{k}][{m}][p] = {text};")
-
-
-def _lagrange(
-    nodes: list[float], at: list[float]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Values and slopes (points, nodes) of Lagrange's polynomials."""
-    values, slopes = np.ones((len(at), len(nodes))), np.zeros((len(at), len(nodes)))
-    for a, x in enumerate(nodes):
-        others = [b for b in nodes if b != x]
-        scale = float(np.prod([x - b for b in others]))
-        for k, p in enumerate(at):
-            values[k, a] = np.prod([p - b for b in others]) / scale
-            slopes[k, a] = sum(np.prod([p - b for b in others if b != c]) for c in others) / scale
-    return values, slopes

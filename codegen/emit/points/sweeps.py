@@ -81,3 +81,17 @@ def _sum(letter: str, factors: list[float]) -> str:
     """Sum of products; zero if there are none."""
     terms = [f"{letter}{i} * {number(float(f))}" for i, f in enumerate(factors) if f]
     return " + ".join(terms) or "softehl_splat(0.0)"
+
+
+def lagrange(
+    nodes: list[float], at: list[float]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Values and slopes (points, nodes) of Lagrange's polynomials."""
+    values, slopes = np.ones((len(at), len(nodes))), np.zeros((len(at), len(nodes)))
+    for a, x in enumerate(nodes):
+        others = [b for b in nodes if b != x]
+        scale = float(np.prod([x - b for b in others]))
+        for k, p in enumerate(at):
+            values[k, a] = np.prod([p - b for b in others]) / scale
+            slopes[k, a] = sum(np.prod([p - b for b in others if b != c]) for c in others) / scale
+    return values, slopes

@@ -1,0 +1,131 @@
+"""Local unknowns of a model, solved for inside the kernel, and energies of principal stretches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+
+from softehl.codegen.graph.graph import Graph, Input, Node, Op
+from softehl.codegen.graph.routines import (
+    SYMMETRIC,
+    Control,
+    depends,
+    isotropic,
+    localise,
+    newton,
+    sums_written_out,
+    symmetric,
+)
+from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.language.elements.quadrature import QuadratureRule
+from softehl.codegen.language.entries import Entries, applied, fraction
+from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.symbols import Symbols
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """Settings of a local Newton iteration as a page gives them (`Model.implicit`)."""
+
+    tolerance: float
+    size: float
+    iterations: int
+
+    def control(self, name: str) -> Control:
+        """The settings, exact and checked."""
+        count = self.iterations
+        if not (isinstance(count, int) and count > 0):
+            raise ModelError(f"{name}: iterations = {count!r} must be an integer > 0")
+        return Control(fraction(self.tolerance), fraction(self.size, zero=True), count)
+
+
+def implicit(
+    symbols: Symbols,
+    name: str,
+    equations: Callable[[Any], Any],
+    start: Any,
+    iteration: Iteration,
+    condensed: Callable[[list[Node], list[Node]], list[Node]],
+) -> Any:
+    """Names of the solution of equations = 0, arranged like `start`.
+
+    condensed: of the equations and the unknowns, the equations without integrals.
+    """
+    begin, unknowns = Entries.of(start), Entries.of(start).map(lambda _: sp.Dummy(real=True))
+    local = symbols.placeholders(name, unknowns)
+    found = Entries.of(applied(name, equations, unknowns.shaped()))
+    if len(found.values) != len(local):
+        raise ModelError(
+            f"{name}: {len(found.values)} equations for {len(local)} unknowns; one for each"
+        )
+    values = condensed([symbols.lower(e) for e in found.values], local)
+    system = localise(symbols.graph, values, local)
+    routine = newton(symbols.graph, name, system, iteration.control(name))
+    for k in range(len(local)):
+        if all(row[k] is symbols.graph.zero for row in routine.by_local):
+            raise ModelError(f"{name}: unknown {k} does not occur in the equations")
+    args = [*system.external, *(symbols.lower(e) for e in begin.values)]
+    below = [*found.values, *begin.values]
+    solution = symbols.named(name, begin, symbols.graph.run(routine, args), below)
+    symbols.record.implicit(
+        found.values, unknowns.values, begin.values, Entries.of(solution).values
+    )
+    return solution
+
+
+def hold_integrals(values: Sequence[Node], unknowns: Sequence[Node]) -> bool:
+    """True if integrals of the unknowns are among the equations."""
+    return any(n.op is Op.SUM for n in depends(values, unknowns))
+
+
+def written_out(
+    graph: Graph,
+    name: str,
+    values: list[Node],
+    unknowns: Sequence[Node],
+    given: Collection[Node],
+    rule: QuadratureRule,
+) -> list[Node]:
+    """Equations with integrals of the unknowns as sums of one term for each point.
+
+    given: values whose derivatives a page gives.
+    """
+    inside = depends(values, unknowns)
+    if any(v.varying for v in values):
+        raise ModelError(
+            f"{name}: an equation varies with the point and another holds an integral of the "
+            "unknowns; wrap it in integral(...) too"
+        )
+    below = reachable([n for n in inside if n.op is Op.SUM])
+    arrays = {n.payload.array for n in below if isinstance(n.payload, Input) and n.varying}
+    if arrays - {"rule"} or any(n in given for n in below):
+        raise ModelError(
+            f"{name}: an integral of local unknowns may hold no point data, no interpolated "
+            "field and no given derivative; use m.unknown for what the element condenses"
+        )
+    return sums_written_out(graph, values, inside, rule.rows())
+
+
+def principal(
+    symbols: Symbols, name: str, C: Any, energy: Callable[[Any, Any, Any], Any]
+) -> sp.Symbol:
+    """Name of an isotropic energy of the roots of the eigenvalues of C."""
+    if sp.Matrix(C).shape != (3, 3):
+        raise ModelError(f"{name}: C has shape {sp.Matrix(C).shape}, must be (3, 3)")
+    squares = Entries([sp.Dummy(positive=True) for _ in range(3)], ("", "", ""), list)
+    local = symbols.placeholders(name, squares)
+    written = applied(name, energy, *(sp.sqrt(c) for c in squares.values))
+    value = symbols.lower(written)
+    if not symmetric(value, local):
+        raise ModelError(f"{name}: the energy changes when two stretches are exchanged")
+    system = localise(symbols.graph, [value], local)
+    routine = isotropic(name, 6 + len(system.external), system.values[0])
+    args = [*(symbols.lower(C[i, j]) for i, j in SYMMETRIC), *system.external]
+    node = symbols.graph.name(name, symbols.graph.run(routine, args)[0])
+    symbol: sp.Symbol = symbols.record.principal(
+        symbols.name(name, node, [*C, written], known=False), written, squares.values, C
+    )
+    return symbol
