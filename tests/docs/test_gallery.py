@@ -27,8 +27,8 @@ def read(entry: str, monkeypatch: pytest.MonkeyPatch, folder: Path) -> Reader:
     return reader
 
 
-LONG = ("fbar",)
-"""Entries that take as long as all others together."""
+LONG = ("fbar", "jumps")
+"""Entries that take 10 s and more."""
 
 
 @pytest.mark.parametrize(

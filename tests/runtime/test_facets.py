@@ -124,6 +124,7 @@ def test_residual_and_tangent_are_differences_of_a_closed_form_in_50_digits() ->
     assert np.abs(K[0] - wrong).max() > 1e-10
 
 
+@pytest.mark.slow
 def test_order_three_has_the_errors_of_step_74_of_deal_ii() -> None:
     """The table of its results, penalty p (p + 1) / h; the square is twice as wide here."""
     errors = []
