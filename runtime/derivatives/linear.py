@@ -100,8 +100,8 @@ class Linear:
             found = None if near is None else refined(near, K, b)
             if found is not None:
                 return found
-            memo[key] = _turned(memo.get("plain")) if turned else None
-            memo[key] = memo[key] or choose("auto").factorise(K)
+            plain = _turned(memo.get("plain")) if turned else None
+            memo[key] = plain or choose("auto").factorise(K)
         return np.asarray(memo[key].solve(b))
 
     @property

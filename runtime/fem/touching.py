@@ -7,8 +7,9 @@ unknowns alone, although the list is another one in each iteration.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
+from itertools import product
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -62,20 +63,13 @@ class Contact:
         """Its blocks without elements, which keep their places."""
         none = np.empty(0, dtype=np.int64)
         x = np.zeros(int(max(self.displacements.max(), self.multipliers.max())) + 1)
-        return [self._block(a, b, none, none, x) for a, b in self._kinds()]
+        chosen = by_kind(self.sides, self.others, none, none)
+        return [self._block(a, b, i, j, x) for a, b, i, j in chosen]
 
     def blocks(self, x: Array, old: Array) -> list[ElementBlock]:
         """Elements of the pairs at unknowns x; old: those of the step before."""
-        one, other = self.pairs(x)
-        mine, theirs = starts([s.faces for s in self.sides]), starts([f for _, f in self.others])
-        kind, kind_of_other = (
-            np.searchsorted(s, k, side="right") - 1 for s, k in ((mine, one), (theirs, other))
-        )
-        found = []
-        for a, b in self._kinds():
-            chosen = (kind == a) & (kind_of_other == b)
-            found.append(self._block(a, b, one[chosen] - mine[a], other[chosen] - theirs[b], old))
-        return found
+        chosen = by_kind(self.sides, self.others, *self.pairs(x))
+        return [self._block(a, b, i, j, old) for a, b, i, j in chosen]
 
     def pairs(self, x: Array) -> tuple[Integers, Integers]:
         """Numbers of sides and of others, both counted through their kinds, that may meet at x."""
@@ -85,14 +79,8 @@ class Contact:
         places = self.points + moved
         mine = np.concatenate([s.faces[:, :2] for s in self.sides])
         theirs = np.concatenate([faces[:, :2] for _, faces in self.others])
-        one, other = facing(_balls(places[mine]), _balls(places[theirs]), limits(self.sides))
-        kept = (mine[one][:, :, None] != theirs[other][:, None, :]).all(axis=(1, 2))
-        if self.alone:
-            kept &= one < other
-        return one[kept], other[kept]
-
-    def _kinds(self) -> list[tuple[int, int]]:
-        return [(a, b) for a in range(len(self.sides)) for b in range(len(self.others))]
+        found = facing(_balls(places[mine]), _balls(places[theirs]), limits(self.sides))
+        return apart(mine, theirs, *found, alone=self.alone)
 
     def _block(self, a: int, b: int, one: Integers, other: Integers, old: Array) -> ElementBlock:
         """Elements of sides of kind a with others of kind b."""
@@ -141,13 +129,42 @@ def facing(mine: Balls, theirs: Balls, limits: tuple[Array, Array]) -> tuple[Int
     return one[kept], other[kept]
 
 
+def apart(
+    mine: Integers, theirs: Integers, one: Integers, other: Integers, *, alone: bool
+) -> tuple[Integers, Integers]:
+    """Pairs of faces without a corner in common; alone: both are one surface, each pair once.
+
+    mine, theirs: corners (n, k) of all faces. one, other: rows of them, (m,).
+    """
+    kept = (mine[one][:, :, None] != theirs[other][:, None, :]).all(axis=(1, 2))
+    if alone:
+        kept &= one < other
+    return one[kept], other[kept]
+
+
+def by_kind(
+    sides: Sequence[Side], others: Sequence[tuple[str, Integers]], one: Integers, other: Integers
+) -> Iterator[tuple[int, int, Integers, Integers]]:
+    """For each kind of side and of other: their numbers, and the pairs by numbers within them.
+
+    one, other: pairs of faces that are counted through all kinds.
+    """
+    mine, theirs = _starts([s.faces for s in sides]), _starts([faces for _, faces in others])
+    kind, kind_of_other = (
+        np.searchsorted(s, k, side="right") - 1 for s, k in ((mine, one), (theirs, other))
+    )
+    for a, b in product(range(len(sides)), range(len(others))):
+        chosen = (kind == a) & (kind_of_other == b)
+        yield a, b, one[chosen] - mine[a], other[chosen] - theirs[b]
+
+
 def limits(sides: Sequence[Side]) -> tuple[Array, Array]:
     """Depth and reach of the faces of all kinds."""
     depth, reach = (np.concatenate([getattr(s, n) for s in sides]) for n in ("depth", "reach"))
     return depth, reach
 
 
-def starts(parts: Sequence[Integers]) -> Integers:
+def _starts(parts: Sequence[Integers]) -> Integers:
     """Numbers of the first row of each part, counted through all."""
     return np.cumsum([0, *map(len, parts)])[:-1]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.assembly import ElementBlock
 from softehl.runtime.fem.common_part import CORNER, common_part, mean_normal
 from softehl.runtime.fem.face_pair import MULTIPLIERS, FacePair
-from softehl.runtime.fem.touching import Balls, Side, facing, limits, starts
+from softehl.runtime.fem.touching import Balls, Side, apart, by_kind, facing, limits
 from softehl.runtime.mesh.cells import CELLS
 
 
@@ -37,9 +38,8 @@ class FaceContact:
         """Its blocks without elements, which keep their places."""
         x = np.zeros(int(max(self.displacements.max(), self.multipliers.max())) + 1)
         none = np.empty(0, dtype=np.int64)
-        return [
-            self._block(a, b, (none, none, np.empty((0, 3, CORNER))), x) for a, b in self._kinds()
-        ]
+        chosen, corners = by_kind(self.sides, self.others, none, none), np.empty((0, 3, CORNER))
+        return [self._block(a, b, (i, j, corners), x) for a, b, i, j in chosen]
 
     def blocks(self, x: Array, old: Array) -> list[ElementBlock]:
         """Elements of the pairs at unknowns x; old: of the step before."""
@@ -47,15 +47,8 @@ class FaceContact:
         if not np.isfinite(moved).all():
             return self.empty()
         places = self.points + moved
-        one, other = self._pairs(places)
-        mine, theirs = starts([s.faces for s in self.sides]), starts([f for _, f in self.others])
-        kind, kind_of_other = (
-            np.searchsorted(s, k, side="right") - 1 for s, k in ((mine, one), (theirs, other))
-        )
         found = []
-        for a, b in self._kinds():
-            chosen = (kind == a) & (kind_of_other == b)
-            i, j = one[chosen] - mine[a], other[chosen] - theirs[b]
+        for a, b, i, j in by_kind(self.sides, self.others, *self._pairs(places)):
             side, (label, faces) = self.sides[a], self.others[b]
             cells = CELLS[side.kind], CELLS[label]
             part = common_part(cells[0], places[side.faces[i]], cells[1], places[faces[j]])
@@ -65,15 +58,8 @@ class FaceContact:
     def _pairs(self, places: Array) -> tuple[Integers, Integers]:
         """Numbers of sides and of others, both counted through their kinds, that may meet."""
         mine = [(s.kind, s.faces) for s in self.sides]
-        one, other = facing(_balls(places, mine), _balls(places, self.others), limits(self.sides))
-        ours, theirs = _corners(mine)[one], _corners(self.others)[other]
-        kept = (ours[:, :, None] != theirs[:, None, :]).all(axis=(1, 2))
-        if self.alone:
-            kept &= one < other
-        return one[kept], other[kept]
-
-    def _kinds(self) -> list[tuple[int, int]]:
-        return [(a, b) for a in range(len(self.sides)) for b in range(len(self.others))]
+        found = facing(_balls(places, mine), _balls(places, self.others), limits(self.sides))
+        return apart(_corners(mine), _corners(self.others), *found, alone=self.alone)
 
     def _block(
         self, a: int, b: int, found: tuple[Integers, Integers, Array], old: Array
@@ -101,10 +87,10 @@ class FaceContact:
         )
 
 
-def _balls(places: Array, kinds: object) -> Balls:
+def _balls(places: Array, kinds: Sequence[tuple[str, Integers]]) -> Balls:
     """Centres, radii and normals of the faces of all kinds."""
     found = []
-    for kind, faces in kinds:  # type: ignore[attr-defined]
+    for kind, faces in kinds:
         corners = places[faces[:, : CELLS[kind].corners]]
         centre = corners.mean(axis=1)
         radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
@@ -113,7 +99,6 @@ def _balls(places: Array, kinds: object) -> Balls:
     return centre, radius, normal
 
 
-def _corners(kinds: object) -> Integers:
+def _corners(kinds: Sequence[tuple[str, Integers]]) -> Integers:
     """Corners of the faces of all kinds, (n, 4), the last one twice on triangles."""
-    rows = [faces[:, [0, 1, 2, CELLS[kind].corners - 1]] for kind, faces in kinds]  # type: ignore[attr-defined]
-    return np.concatenate(rows)
+    return np.concatenate([faces[:, [0, 1, 2, CELLS[kind].corners - 1]] for kind, faces in kinds])
