@@ -66,7 +66,8 @@ def read_tolerances(
     twice = [name for name, times in Counter(name for name, _ in typed).items() if times > 1]
     if twice:
         raise ValueError(f"tolerances: {twice[0]} is given twice; leave one of them out")
-    known = [*_of_ring(ring_name), *_of_limits(values)]
+    of_ring = [f"{key} {tolerance!r} mm" for key, _, tolerance in ring_sizes(ring_name)]
+    known = [*of_ring, *_of_limits(values)]
     return dict([*(_share(text, values) for text in known), *typed])
 
 
@@ -128,19 +129,19 @@ def _moved(name: str, values: Mapping[str, object]) -> tuple[str, ...]:
     return tuple(key for key in names if key in _VARIED and values.get(key))
 
 
-def _of_ring(name: str | None) -> list[str]:
-    """Tolerances of a ring of the catalogue, +- mm."""
+def ring_sizes(name: str | None) -> list[tuple[str, float, float]]:
+    """Sizes of a ring of the catalogue that have a tolerance: key, mm, +- mm; none of a U-cup."""
     if name is None:
         return []
     try:
         known = ring(name)
     except UnknownRingError:
         return []
-    sizes = {
-        "section_diameter": known.section_tolerance,
-        "inner_diameter": known.inner_tolerance,
-    }
-    return [f"{key} {size!r} mm" for key, size in sizes.items() if size]
+    sizes = (
+        ("section_diameter", known.section_diameter, known.section_tolerance),
+        ("inner_diameter", known.inner_diameter, known.inner_tolerance),
+    )
+    return [(key, value, tolerance) for key, value, tolerance in sizes if tolerance]
 
 
 def band(

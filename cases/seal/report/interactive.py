@@ -121,7 +121,7 @@ def curve_plot(runs: Sequence[FinishedRun]) -> Any:
                 _draw(
                     panel, rows, _look(runs, number, stroke), f"{run.name}, {style.STROKES[stroke]}"
                 )
-    _place_legend(panel)
+    _place_legend(panel, outside=len(runs) > 1)
     return panel
 
 
@@ -168,12 +168,15 @@ def friction_plot(runs: Sequence[FinishedRun]) -> Any:
                     x, y, line_color=look["color"], line_dash=look["dash"], legend_label=label
                 )
                 panel.scatter(x, y, size=6, color=look["color"])
-    _place_legend(panel)
+    _place_legend(panel, outside=len(runs) > 1)
     return panel
 
 
-def _place_legend(panel: Any) -> None:
-    """Put the legend where a rising curve leaves room; a narrow one shows through it."""
+def _place_legend(panel: Any, *, outside: bool) -> None:
+    """Put the legend where a rising curve leaves room; outside: above, where there are many."""
+    if outside:
+        panel.legend.ncols = 2
+        panel.add_layout(panel.legend[0], "above")
     panel.legend.location = "top_left"
     panel.legend.background_fill_alpha = 0.5
     panel.legend.label_text_font_size = "11px"
