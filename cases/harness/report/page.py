@@ -167,7 +167,7 @@ def _answers(runs: Sequence[FinishedRun]) -> list[Part]:
 
 
 def left_out(case: AnyCase) -> list[Part]:
-    """What the model of a case leaves out."""
+    """The limits of a model, in words."""
     return [Part("What the model leaves out", lines=case.left_out)] if case.left_out else []
 
 
@@ -246,7 +246,7 @@ def all_keys(runs: Sequence[FinishedRun]) -> Part:
 
 
 def versions(runs: Sequence[FinishedRun]) -> Part:
-    """What computed the runs."""
+    """Versions of what computed the runs."""
     told = [run.content.get("versions") or {} for run in runs]
     names = dict.fromkeys(name for found in told for name in found)
     rows = [(name, *(str(found.get(name) or "") for found in told)) for name in names]

@@ -89,7 +89,7 @@ def _line(run: FinishedRun, row: FilmRow | None) -> dict[str, list[float]]:
     }
 
 
-def _narrow(width: int) -> dict[str, Any]:
+def narrow(width: int) -> dict[str, Any]:
     """A width that shrinks with the window, so that a telephone shows the whole plot."""
     return {"width_policy": "max", "max_width": width, "min_width": min(width, _LEAST)}
 
@@ -99,7 +99,7 @@ def _panel(label: str, limits: dict[str, Any], *, log: bool) -> Any:
 
     panel = figure(
         height=_HEIGHT,
-        **_narrow(_WIDTH),
+        **narrow(_WIDTH),
         x_range=limits["x"],
         y_range=limits["h" if log else "p"],
         y_axis_type="log" if log else "linear",
@@ -187,7 +187,7 @@ def _over_speed(runs: Sequence[FinishedRun], label: str) -> Any:
     from bokeh.plotting import figure
 
     panel = figure(
-        **_narrow(int(1.4 * _WIDTH)),
+        **narrow(int(1.4 * _WIDTH)),
         height=int(1.2 * _HEIGHT),
         x_axis_type="log",
         y_axis_type="log",

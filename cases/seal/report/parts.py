@@ -73,7 +73,7 @@ def _compared(runs: Sequence[FinishedRun]) -> list[Part]:
 
 def gland(runs: Sequence[FinishedRun]) -> Part:
     """The seals in their glands, and how they sit."""
-    pictures = [Picture(run.name, _png(gland_figure(run.parameters))) for run in runs]
+    pictures = [Picture(run.name, png(gland_figure(run.parameters))) for run in runs]
     numbers = [fit_numbers(run.parameters) for run in runs]
     rows: list[tuple[Cell, ...]] = [
         (name, *(found[k][1] for found in numbers), unit)
@@ -97,7 +97,7 @@ def _rubber(runs: Sequence[FinishedRun]) -> list[Part]:
         except ValueError:
             continue  # the table of tests is elsewhere now
         if found:
-            pictures.append(Picture(f"{run.name}: {run.parameters.fit}", _png(fit_figure([found]))))
+            pictures.append(Picture(f"{run.name}: {run.parameters.fit}", png(fit_figure([found]))))
     return [Part("Rubber", "Tests and the material fitted to them.", pictures)] if pictures else []
 
 
@@ -114,7 +114,7 @@ def _section(runs: Sequence[FinishedRun]) -> Part:
                 views.append(View(row, profile, section))
         views = [view for view in views if view.complete]
         if views:
-            pictures.append(Picture(run.name, _png(section_figure(run.parameters, views))))
+            pictures.append(Picture(run.name, png(section_figure(run.parameters, views))))
     text = "Stress in the ring, film pressure on the rod, contact pressure on housing and walls."
     return Part("Deformed section", text, pictures=pictures)
 
@@ -138,7 +138,7 @@ def _curve(runs: Sequence[FinishedRun]) -> Part:
     )
     if _several_speeds(runs):
         return Part("Film thickness", text, plots=[curve_plot(runs)], lines=lines)
-    pictures = [Picture(run.name, _png(curve_figure(run.parameters, run.rows))) for run in runs]
+    pictures = [Picture(run.name, png(curve_figure(run.parameters, run.rows))) for run in runs]
     return Part("Film thickness", text, pictures=pictures, lines=lines)
 
 
@@ -183,7 +183,7 @@ def _surfaces(runs: Sequence[FinishedRun]) -> list[Part]:
     tables, pictures = [], []
     for run in runs:
         if figure := stribeck_figure(run.parameters, run.rows):
-            pictures.append(Picture(run.name, _png(figure)))
+            pictures.append(Picture(run.name, png(figure)))
         if any(isfinite(row.lambda_ratio) for row in run.rows):
             rows = [[getattr(row, name) for name in _SURFACE] for row in run.rows]
             tables.append(Table(run.name, _titles(FilmRow, _SURFACE), rows))
@@ -254,7 +254,8 @@ def _tornados(runs: Sequence[FinishedRun]) -> list[Picture]:
     return [Picture(name, path.read_bytes()) for name, path in paths if path.exists()]
 
 
-def _png(figure: Figure) -> bytes:
+def png(figure: Figure) -> bytes:
+    """A picture for a page."""
     found = BytesIO()
     figure.savefig(found, format="png", dpi=130)
     return found.getvalue()
