@@ -28,9 +28,11 @@ Shipped = Mapping[str, str]
 _BARE_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _FILE = re.compile(r"(\.{0,2}/)?[A-Za-z_][A-Za-z0-9_./-]*\.[A-Za-z]{1,5}")
 _PHRASE = re.compile(
-    r"""(?=.*[^\W\d_]|.*[\u00b1\u00d7\u00d8\u2300\#\"]|.*\d ?[+(-])(?!["'])[^\[\]{}\\\n]+"""
+    r"""(?=.*[^\W\d_]|.*[\u00b1\u00d7\u00d8\u2300\#\"]|.*\d ?[+(-])(?!["'])"""
+    r"""(?:[^\[\]{}=\\\n]|(?<=R[aq])=)+"""
 )
-"""Words without quotation marks, sizes with limits among them."""
+"""Words without quotation marks, sizes with limits and finishes ("Ra=0.2") among them."""
+
 
 _SHOWN = 60
 _LARGEST = 1 << 20  # bytes of a case file; also ends reading what has no end

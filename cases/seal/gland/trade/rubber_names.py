@@ -84,8 +84,8 @@ def read_rubber(key: str, given: str) -> RubberName | None:
         name = _SHORT[short[1].upper()]
         raise refused(key, given, "is a maker's short name", f"{name} {short[2]}")
     if found := re.match(rf"{_POLYMER}[ /-]*(?P<shore>\d\d)\b", text, re.IGNORECASE):
-        form = _read(key, given, found.groupdict()).text
-        raise refused(key, given, "says more than polymer and hardness", form)
+        shorter = _read(key, given, found.groupdict()).text
+        raise refused(key, given, "says more than polymer and hardness", shorter)
     if shore := re.search(r"(?<!\d)[1-9]\d(?!\d)", text):
         forms = ("NBR 70", "FKM 75", "EPDM 80", "PU 95", f"{shore[0]} Shore A")
         raise refused(key, given, "names no polymer that is known here", *forms)
