@@ -46,7 +46,7 @@ _SPELT = {
     **dict.fromkeys(("ips", "in/sec"), "in/s"),
     '"': "in",
 }
-"""Other spellings of units; pressures are over that of the air side."""
+"""Other spellings of units; bar(g) and psig are bar and psi."""
 
 _FAHRENHEIT = ("F", "degF", "°F", "deg F")
 

@@ -75,9 +75,10 @@ def read_fit(key: str, given: str, *, hole: bool = False) -> Band | None:
     text = re.sub(
         r" ?[(](?:ISO 286[^)]*|(?P<limits>[^)]*))[)]$", r" \g<limits>", plain(given)
     ).strip()
-    if (found := _ENDS.fullmatch(text)) and 0.9 < float(found["low"]) / float(found["high"]) <= 1.0:
+    if found := _ENDS.fullmatch(text):
         low, high = float(found["low"]), float(found["high"])
-        return Band(round(0.5 * (low + high), 6), low, high)
+        if 0.9 * high < low <= high:
+            return Band(round(0.5 * (low + high), 6), low, high)
     if found := _CLASS.fullmatch(text):
         return _class(key, given, found, hole)
     if found := _BOTH.fullmatch(text):

@@ -12,8 +12,8 @@ from softehl.cases.seal.gland.trade.text import NUMBER, plain, refused
 IMPROVED = 140.0
 """Least viscosity index of HVLP oils, DIN 51524-3."""
 
-GRADES = (5, 7, 10, 15, 22, 32, 46, 68, 100, 150, 220, 320, 460, 680, 1000, 1500)
-"""Grades of ISO 3448."""
+GRADES = (10, 15, 22, 32, 46, 68, 100, 150, 220, 320)
+"""Grades of ISO 3448 that are known here."""
 
 TWO = "46 cSt at 40 degC, 6.8 cSt at 100 degC"
 """Two viscosities, as an example."""
