@@ -3,7 +3,7 @@
 Heavy modules are imported when a command needs them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -14,6 +14,7 @@ from softehl.cases.shipped import SHIPPED
 
 if TYPE_CHECKING:
     from softehl.cases.harness.earlier import Existing
+    from softehl.cases.harness.report.part import FinishedRun, Part
 
 _NAMES = ", ".join(SHIPPED)
 _Command = TypeVar("_Command", bound=Callable[..., Any])
@@ -239,12 +240,10 @@ def _report_of(folder: Path, code: int, *, quiet: bool) -> int:
 
 
 def _write_report(folders: tuple[Path, ...], path: Path, *, xlsx: bool, quiet: bool) -> None:
-    from softehl.cases.harness.errors import BadInput
-    from softehl.cases.harness.report.page import parts_of, read_finished, write_page, write_xlsx
+    from softehl.cases.harness.report.page import parts_of, read_finished
     from softehl.cases.harness.report.sweep_page import is_sweep, read_sweep, sweep_parts
 
-    if path.suffix not in (".html", ".htm"):
-        raise BadInput(f'--out {str(path)!r}: a report is a page; allowed: a name with ".html"')
+    _require_page(path, "--out")
     runs, title = [], ""
     if len(folders) == 1 and is_sweep(folders[0]):
         sweep = read_sweep(folders[0], SHIPPED)
@@ -252,6 +251,29 @@ def _write_report(folders: tuple[Path, ...], path: Path, *, xlsx: bool, quiet: b
     else:
         runs = [read_finished(folder, SHIPPED) for folder in folders]
         parts = parts_of(runs)
+    _write(path, runs, parts, title, xlsx=xlsx, quiet=quiet)
+
+
+def _require_page(path: Path, option: str) -> None:
+    from softehl.cases.harness.errors import BadInput
+
+    if path.suffix not in (".html", ".htm"):
+        raise BadInput(f'{option} {str(path)!r}: a report is a page; allowed: a name with ".html"')
+
+
+def _write(
+    path: Path,
+    runs: "Sequence[FinishedRun]",
+    parts: "Sequence[Part]",
+    title: str,
+    *,
+    xlsx: bool = False,
+    quiet: bool,
+) -> None:
+    """Write a page and its tables, and say so.  Raises BadInput."""
+    from softehl.cases.harness.errors import BadInput
+    from softehl.cases.harness.report.page import write_page, write_xlsx
+
     try:
         size = write_page(runs, parts, path, title)
         if xlsx:
@@ -307,17 +329,41 @@ def keys(case: str) -> int:
 @click.option(
     "--set", "assignments", metavar="KEY=VALUE", multiple=True, help="As in `softehl run`."
 )
-def design(case: str, words: tuple[str, ...], key: str, assignments: tuple[str, ...]) -> int:
+@click.option(
+    "--report",
+    "page",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Write a page on it: curve of the design, results, gland and section before and after.",
+)
+def design(
+    case: str, words: tuple[str, ...], key: str, assignments: tuple[str, ...], page: Path | None
+) -> int:
     """Find the value of a key."""
     from softehl.cases.harness.case_file import read_case
     from softehl.cases.harness.errors import BadInput
+    from softehl.cases.harness.progress import make_display
+    from softehl.cases.harness.session import Teller
     from softehl.cases.seal.gland.parameters import Seal
-    from softehl.cases.seal.sensitivity.design_command import design_case
+    from softehl.cases.seal.sensitivity.design_command import design_case, told
+    from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 
     read = read_case(case, SHIPPED, assignments)
     if type(read.parameters) is not Seal:
         raise BadInput(f"{read.case.name} has no sensitivities; allowed: a seal, such as oring")
-    return design_case(read.parameters, " ".join(words), key)
+    if page is not None:
+        _require_page(page, "--report")
+    with make_display(read.case.foreword(read.parameters), quiet=False) as display:
+        found = design_case(read.parameters, " ".join(words), key, ObserverAdapter(Teller(display)))
+    for line in told(found):
+        click.echo(line)
+    if page is not None:
+        from softehl.cases.seal.report.design import design_parts, design_title
+
+        parts = design_parts(found, read.case)
+        title = design_title(found, read.case.titled(read.parameters))
+        _write(page, [], parts, title, quiet=False)
+    return 0
 
 
 @click.command()

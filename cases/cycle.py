@@ -138,7 +138,11 @@ class CycleRow(Row):
     p_max_MPa: float = column("MPa", "largest film pressure")
     asperity_load_percent: float = column("%", "largest share of asperities in the load")
     change_percent: float = column(
-        "%", "of energy and leaks against the cycle before", head="change", shown=".2g", default=nan
+        "%",
+        "change of energy and leaks against the cycle before",
+        head="change",
+        shown=".2g",
+        default=nan,
     )
     breakaway_N: float = column(
         "N",

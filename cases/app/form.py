@@ -7,6 +7,7 @@ from typing import Any
 
 import panel as pn
 import panel_material_ui as pmui
+from panel.util import edit_readonly
 
 from softehl.cases.app.choices import CHOICES, DENSITIES, SPEEDS, USUAL_SPEEDS, rods, slides_on
 from softehl.cases.app.runs import CASE
@@ -16,6 +17,9 @@ from softehl.cases.harness.errors import BadInput
 from softehl.cases.shipped import SHIPPED
 
 _HERE = "desk"
+_TEXTS = frozenset(choice.key for choice in CHOICES)
+"""Keys whose fields take any text."""
+
 _BY_GROOVE = "u-cup"
 """A ring that is named by its groove, which has no other gland."""
 
@@ -55,20 +59,35 @@ class Form:
         self.widgets["ring"].param.watch(self._offer_rods, "value")
 
     def watch(self, told: Callable[[Any], None]) -> None:
-        """Call a function whenever a value changes."""
-        for widget in self.widgets.values():
+        """Call a function whenever a value changes, or what is typed in a field."""
+        for key, widget in self.widgets.items():
+            if key in _TEXTS:
+                widget.param.watch(lambda event: _show_text(event.obj), "value")
+                widget.param.watch(told, "value_input")
             widget.param.watch(told, "value")
+
+    def settle(self) -> None:
+        """Take over what was typed and not entered: the form is what its fields show."""
+        for key in _TEXTS:
+            widget = self.widgets[key]
+            typed = widget.value_input
+            if typed and widget.value != typed:
+                _list(widget, typed)
+                widget.value = typed
 
     def keep_in(self, address: Any) -> None:
         """Keep all values in the address of the page, so that they are there after a reload."""
         for key, widget in self.widgets.items():
+            if key in _TEXTS and (text := address.query_params.get(key)):
+                _list(widget, str(text))
             address.sync(widget, {"value": key})
 
     def values(self) -> dict[str, Any]:
         """The keys of the case.  Raises BadInput for another key that cannot be read."""
         found: dict[str, Any] = {}
         for key, widget in self.widgets.items():
-            value = widget.value.strip() if isinstance(widget.value, str) else widget.value
+            value = widget.value_input or widget.value if key in _TEXTS else widget.value
+            value = value.strip() if isinstance(value, str) else value
             if key != "more" and value and value != "smooth":
                 found[key] = value
         if str(found.get("ring", "")).lower().startswith(_BY_GROOVE):
@@ -99,3 +118,16 @@ class Form:
             self.widgets["rod"].options = offered
             if self.widgets["rod"].value not in offered:
                 self.widgets["rod"].value = offered[0]
+
+
+def _list(widget: Any, text: str) -> None:
+    """Put a text among those that a field offers: it drops a value that is not among them."""
+    if text not in widget.options:
+        widget.options = [*widget.options, text]
+
+
+def _show_text(widget: Any) -> None:
+    """Write the value of a field into it: the widget empties itself where that is not listed."""
+    if widget.value and widget.value_input != widget.value:
+        with edit_readonly(widget):
+            widget.value_input = widget.value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Sequence
 from io import StringIO
 from typing import Any
@@ -22,6 +23,16 @@ from softehl.cases.seal.report.interactive import curve_plot, friction_plot
 PERIOD = 500
 """Milliseconds between two looks at the runs."""
 
+_NARROW = """
+@media (max-width: 40rem) {
+  #container { height: auto !important; overflow: visible !important; }
+  #content { display: block; overflow: visible !important; }
+  #sidebar { width: 100% !important; height: auto !important; border: none; }
+  #main { width: 100%; max-height: none !important; overflow: visible !important; }
+}
+"""
+"""On a telephone the form stands above the runs."""
+
 _WIDE = {"sizing_mode": "stretch_width"}
 
 
@@ -31,8 +42,10 @@ class Page:
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
         self.form = Form()
-        self.drawing = pn.pane.SVG(width=460, height=420, encode=False)
-        self.words = pn.pane.Alert(alert_type="light", min_width=300, **_WIDE)
+        self.drawing = pn.pane.SVG(
+            max_width=460, encode=False, sizing_mode="stretch_width", styles={"flex": "1 1 20rem"}
+        )
+        self.words = pn.pane.Alert(alert_type="light", styles={"flex": "1 1 18rem"})
         self.begin = pn.widgets.Button(name="Run", button_type="primary", **_WIDE)
         self.table = pn.widgets.Tabulator(
             pd.DataFrame(),
@@ -47,7 +60,7 @@ class Page:
         self.stop = pn.widgets.Button(name="Stop", button_type="danger", disabled=True)
         self.go_on = pn.widgets.Button(name="Go on", disabled=True)
         self.progress = pn.indicators.Progress(value=0, max=100, **_WIDE)
-        self.told = pn.pane.Str("", **_WIDE)
+        self.told = pn.pane.Str("", styles={"white-space": "pre-wrap"}, **_WIDE)
         self.links = pn.pane.HTML("", **_WIDE)
         self.answer = pn.Column(**_WIDE)
         self.plots = pn.pane.Bokeh(None), pn.pane.Bokeh(None)
@@ -69,12 +82,13 @@ class Page:
         self._look()
         pn.state.onload(self._keep_looking)
         buttons = pn.Row(self.stop, self.go_on, self.links)
-        return pn.template.BootstrapTemplate(
+        page = pn.template.BootstrapTemplate(
             title="softehl: reciprocating seals",
+            meta_viewport="width=device-width, initial-scale=1",
             busy_indicator=None,  # it changes the document outside the lock
             sidebar=[*self.form.widgets.values(), self.begin],
             main=[
-                pn.Row(self.drawing, self.words, **_WIDE),
+                pn.FlexBox(self.drawing, self.words, **_WIDE),
                 pn.pane.Markdown("## Runs"),
                 self.table,
                 self.progress,
@@ -84,6 +98,8 @@ class Page:
                 self.curves,
             ],
         )
+        page.config.raw_css = [_NARROW]
+        return page
 
     def _keep_looking(self) -> None:
         """Look at the runs from now on: the browser has the page that changes refer to."""
@@ -99,6 +115,7 @@ class Page:
             self.words.param.update(object=html.escape(error.message), alert_type="danger")
             self.begin.disabled = True
             return
+        self.form.settle()
         self.drawing.object = _drawing(run)
         warned = bool(run.case.warnings(run.parameters))
         self.words.param.update(object=_told(run), alert_type="warning" if warned else "light")
@@ -161,7 +178,11 @@ class Page:
         self.go_on.disabled = any(s.running or s.status == "done" for s in chosen) or not chosen
         asked, done = (sum(getattr(s, name) for s in chosen) for name in ("asked", "done"))
         self.progress.value = round(100 * done / asked) if asked else 0
-        self.told.object = "\n".join(f"{s.name}: {s.line}" for s in chosen if s.status != "done")
+        self.told.object = "\n".join(
+            f"{s.name}: {_SAVED if s.status == 'stopped' else s.line}"
+            for s in chosen
+            if s.status != "done"
+        )
         found = [state.run for state in chosen if state.run is not None and state.run.rows]
         self.links.object = _links([run.name for run in found])
         self.answer.objects = [
@@ -177,6 +198,7 @@ class Page:
             pane.object = plot
 
 
+_SAVED = "stopped; what it reached is saved"
 _COLUMNS = ("run", "seal", "rubber", "pressure", "status", "states", "answer")
 
 
@@ -205,7 +227,8 @@ def _drawing(run: Run) -> str:
     with matplotlib.rc_context(style.STYLE):
         gland_figure(run.parameters).savefig(found, format="svg")
     text = found.getvalue()
-    return text[text.index("<svg") :]  # without the head of a file
+    text = text[text.index("<svg") :]  # without the head of a file
+    return re.sub(r' (width|height)="[\d.]+pt"', "", text, count=2)  # as wide as the page has room
 
 
 def _told(run: Run) -> str:

@@ -27,8 +27,12 @@ Shipped = Mapping[str, str]
 
 _BARE_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _FILE = re.compile(r"(\.{0,2}/)?[A-Za-z_][A-Za-z0-9_./-]*\.[A-Za-z]{1,5}")
-_PHRASE = re.compile(r"""(?=.*[^\W\d_]|.*[\u00b1\u00d8\u2300]|.*\d ?[+-])[^"'\[\]{}=\#\\\n]+""")
-"""Words without quotation marks, sizes with limits among them."""
+_PHRASE = re.compile(
+    r"""(?=.*[^\W\d_]|.*[\u00b1\u00d7\u00d8\u2300\#\"]|.*\d ?[+(-])(?!["'])"""
+    r"""(?:[^\[\]{}=\\\n]|(?<=R[aq])=)+"""
+)
+"""Words without quotation marks, sizes with limits and finishes ("Ra=0.2") among them."""
+
 
 _SHOWN = 60
 _LARGEST = 1 << 20  # bytes of a case file; also ends reading what has no end
@@ -96,6 +100,9 @@ def read_assignment(text: str, origin: str = "--set") -> tuple[str, object]:
         return key, value
     if "," in value and (read := _toml_value(f"[{value}]")) is not None:  # 400, 100
         return key, read
+    items = [item.strip() for item in value[1:-1].split(",")]
+    if value.startswith("[") and value.endswith("]") and all(map(is_quantity, items)):
+        return key, items
     raise BadInput(
         f"{origin} {key}: {shortened(value)!r} is not a TOML value; "
         f'allowed are a number, true or false, a word, "text" or a list as in [400, 100]'

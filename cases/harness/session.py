@@ -76,6 +76,25 @@ def _solve(
     return [run.solve(*pair) for pair in zip(pieces, reporters, strict=True)]
 
 
+@dataclass(frozen=True)
+class Teller(Observer):
+    """Shows what a computation tells and keeps nothing of it."""
+
+    display: Display
+
+    def stage(self, name: str, *, title: str, where: Mapping[str, Any]) -> None:
+        """See :class:`Observer`."""
+        self.display.stage("", title)
+
+    def step(self, **step: Unpack[Step]) -> None:
+        """See :class:`Observer`."""
+        self.display.step("", f"{step['label']} = {step['parameter']:.4g}", step["fraction"])
+
+    def state(self, state: State) -> None:
+        """See :class:`Observer`."""
+        self.display.state(state.row)
+
+
 @dataclass
 class Reporter(Observer):
     """Passes on what one worker of a run tells: to the record first, then to the display."""

@@ -7,8 +7,8 @@ of the same kind is converted to it. There is no arithmetic of units here.
 import re
 
 _QUANTITY = re.compile(
-    r"""[ ]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
-    [ ]*(1/\S+|(?![eE][+-]?\d)[A-Za-z%\xb5\xb0][^\n]*?)[ ]*""",
+    r"""[ ]*([+-]?(?:\d+,\d{1,2}(?!\d)|\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
+    [ ]*(1/\S+|(?![eE][+-]?\d)[A-Za-z%"\xb5\xb0\u03bc][^\n]*?)[ ]*""",
     re.VERBOSE,
 )
 
@@ -17,10 +17,11 @@ _KINDS = {
     "MPa": {
         **{"MPa": 1.0, "GPa": 1e3, "kPa": 1e-3, "Pa": 1e-6, "bar": 0.1, "mbar": 1e-4},
         **{"psi": 6.894757293168361e-3, "N/mm2": 1.0, "N/mm^2": 1.0},
+        **{"ksi": 6.894757293168361, "kgf/cm2": 0.0980665, "atm": 0.101325},
     },
     "mm/s": {
         **{"mm/s": 1.0, "m/s": 1e3, "cm/s": 10.0, "um/s": 1e-3, "µm/s": 1e-3},
-        **{"mm/min": 1.0 / 60.0, "m/min": 1e3 / 60.0, "in/s": 25.4},
+        **{"mm/min": 1.0 / 60.0, "m/min": 1e3 / 60.0, "in/s": 25.4, "ft/s": 304.8},
     },
     "MPa s": {
         **{"MPa s": 1.0, "Pa s": 1e-6, "mPa s": 1e-9, "cP": 1e-9, "P": 1e-7},
@@ -34,6 +35,20 @@ _KINDS = {
     "degC": {"degC": 1.0, "°C": 1.0, "C": 1.0},
     "kg/m3": {"kg/m3": 1.0, "kg/m^3": 1.0, "kg/m³": 1.0, "g/cm3": 1e3, "g/ml": 1e3, "kg/l": 1e3},
 }
+
+_SPELT = {
+    **dict.fromkeys(("Bar", "BAR", "barg", "bar(g)", "bar g"), "bar"),
+    **dict.fromkeys(("PSI", "Psi", "psig", "psi g", "lbf/in2"), "psi"),
+    **dict.fromkeys(("Mpa", "MPA", "N/mm²"), "MPa"),
+    **dict.fromkeys(("kgf/cm²", "kg/cm2", "kg/cm²", "kp/cm2", "kp/cm²"), "kgf/cm2"),
+    **dict.fromkeys(("cps", "cp", "mPaS"), "cP"),
+    **dict.fromkeys(("microinch", "microinches", "μin"), "uin"),
+    **dict.fromkeys(("ips", "in/sec"), "in/s"),
+    '"': "in",
+}
+"""Other spellings of units; bar(g) and psig are bar and psi."""
+
+_FAHRENHEIT = ("F", "degF", "°F", "deg F")
 
 _TOLERANCE_CLASS = re.compile(r"[A-Za-z]{1,2} ?\d{1,2}")  # of ISO 286, as f7
 _KINEMATIC = ("cSt", "St", "mm2/s", "mm^2/s", "mm²/s", "m2/s")
@@ -51,8 +66,11 @@ def read_quantity(text: str, unit: str) -> float:
     """
     known, found = _KINDS.get(unit, {unit: 1.0}), _QUANTITY.fullmatch(text)
     given = found[2].replace("·", " ").replace("*", " ") if found else ""
-    if found and given in known:
-        return float(found[1]) * known[given]
+    number = float(found[1].replace(",", ".")) if found else 0.0
+    if (given := given if given in known else _SPELT.get(given, given)) in known:
+        return number * known[given]
+    if unit == "degC" and given in _FAHRENHEIT:
+        return round((number - 32.0) / 1.8, 9)
     if unit == "MPa s" and given in _KINEMATIC:
         raise ValueError(
             f'"{text}" is a kinematic viscosity; write the dynamic one, which is it times the '

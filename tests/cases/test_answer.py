@@ -18,6 +18,7 @@ from softehl.cases.harness.report.part import FinishedRun, Part, Table
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.cycle.transient import Reading
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.report.parts import tolerances
 from softehl.cases.seal.states.answer import RETURNS, answer
 from softehl.cases.seal.states.state import UNCERTAIN, FilmRow
 from tests.cases.test_leakage import row
@@ -152,6 +153,27 @@ def test_a_report_is_titled_by_its_seal() -> None:
     for title, name in zip(titles, ("O-ring", "X-ring", "U-cup"), strict=True):
         seal = f"{name} 50.39 \N{MULTIPLICATION SIGN} 3.53 mm"
         assert title.startswith(f"reciprocating {seal}, a rod seal")
+
+
+def test_a_title_of_several_seals_says_once_what_is_shown() -> None:
+    names = ("NBR 70", "PU 95", "NBR 70")
+    runs = [
+        FinishedRun(Path(n), oring.CASE, Seal.model_validate({"material": n}), [], content={})
+        for n in names
+    ]
+    head = render(runs, []).split("<h1>")[1].split("</h1>")[0]
+    assert head.startswith("Reciprocating O-ring")
+    assert [head.count(words) for words in ("NBR 70", "PU 95", "film thickness")] == [1, 1, 1]
+
+
+def test_tolerances_of_a_cup_are_those_of_its_rod() -> None:
+    """The name of a U-cup is that of its groove: the ring itself has none that are known."""
+    cup = Seal.model_validate({"ring": "U-cup 25x35x8", "rod": "25 f7"})
+    seals = (cup, Seal(ring="36x4", rod=36))
+    runs = [FinishedRun(Path("a"), oring.CASE, seal, [], content={}) for seal in seals]
+    of_cup, of_ring = ([row[1] for row in tolerances([r]).tables[0].rows] for r in runs)
+    assert of_cup == ["rod = 25 mm"]
+    assert of_ring == ["section diameter = 4 mm", "inner diameter = 36 mm"]
 
 
 def test_no_text_of_a_sheet_is_a_formula(tmp_path: Path) -> None:

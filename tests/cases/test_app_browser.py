@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -112,12 +113,16 @@ class Hand:
         self.until(lambda: words in self.texts(css))
         next(e for e in self.all(css) if e.text == words).click()
 
-    def choose(self, number: int, words: str) -> None:
-        """Choose from the list of a field."""
+    def type(self, number: int, words: str) -> None:
+        """Type into a field in place of what it holds."""
         self.until(lambda: len(self.all("input[role=combobox]")) > number)
         field = self.all("input[role=combobox]")[number]
         field.click()
         field.send_keys("\ue009a\ue000" + words)  # control-a
+
+    def choose(self, number: int, words: str) -> None:
+        """Choose from the list of a field."""
+        self.type(number, words)
         self.click("li[role=option]", words)
 
     def states(self) -> dict[str, tuple[str, str]]:
@@ -152,6 +157,16 @@ def drawn(hand: Hand, words: str) -> bool:
     return any(words in text for text in hand.texts("svg text"))
 
 
+def told(hand: Hand, words: str) -> bool:
+    """Whether the words on the gland have these."""
+    return any(words in line for line in hand.texts("li"))
+
+
+def shown(hand: Hand, rubber: str) -> bool:
+    """Whether the form shows this rubber."""
+    return rubber in hand.fields()
+
+
 def reports(hand: Hand, runs: int) -> list[str]:
     """Addresses on the page of the report of so many runs."""
     script = ALL.replace("return found", "return found.map((e) => e.href)")
@@ -171,6 +186,29 @@ def _has_files(address: str) -> None:
     with pytest.raises(HTTPError, match="404") as refused:
         fetch(f"{base}/file/case.toml?run=..%2F..&{token}")
     refused.value.close()
+
+
+@pytest.mark.slow
+def test_the_form_is_what_its_fields_show(browser: Driver, address: str) -> None:
+    """Texts that are in no list, entered or only typed, and after a reload; what is wrong is said;
+    on a telephone nothing is wider than the page.
+    """
+    hand = Hand(browser)
+    browser.get(address)
+    hand.until(lambda: drawn(hand, "rod 35.9625 mm"))
+    for words, end, modulus in (("NBR 71", "\ue007", "1.928"), ("FKM 82", "\t", "3.543")):
+        hand.type(2, words + end)
+        hand.until(partial(told, hand, f"shear modulus of the rubber {modulus} MPa"))
+        hand.until(partial(shown, hand, words))
+    browser.refresh()
+    hand.until(partial(told, hand, "shear modulus of the rubber 3.543 MPa"))
+    hand.until(partial(shown, hand, "FKM 82"))
+    hand.type(1, "1 7/16 in\t")
+    hand.until(lambda: any("is no size; write" in words for words in hand.texts("p")))
+    narrow = {"width": 400, "height": 900, "deviceScaleFactor": 1, "mobile": True}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", narrow)
+    hand.until(lambda: browser.execute_script("return document.body.scrollWidth") == 400)
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
 @pytest.mark.slow

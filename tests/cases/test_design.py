@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -21,6 +22,7 @@ from softehl.cases.seal.sensitivity.design import (
     designed,
     settled,
 )
+from softehl.cases.seal.sensitivity.design_command import Design, told
 from softehl.cases.seal.sensitivity.held import HeldFilm
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import FilmState, Silent
@@ -150,11 +152,13 @@ def test_a_measure_of_the_gland_is_designed_by_the_key_that_it_decides(
 
     monkeypatch.setattr(design_command, "designed", found)
     assert main(["design", "oring", "friction -10%", "--by", measure]) == 0
-    *_, summary, told = capsys.readouterr().out.splitlines()
-    assert f"by {key} = " in summary
-    words = re.fullmatch(rf"{measure} from (\S+) to (\S+) (mm|%)", told)
-    assert words
-    assert (float(words[1]), float(words[2])) == pytest.approx(ends, rel=1e-3)
+    _, first, *_, summary, told = capsys.readouterr().out.splitlines()
+    given = re.fullmatch(rf"  {measure} = (\S+) (mm|%): friction = 5 N", first)
+    met = re.search(rf" by {measure} = (\S+) (mm|%) \(", summary)
+    assert given
+    assert met
+    assert (float(given[1]), float(met[1])) == pytest.approx(ends, rel=1e-3)
+    assert re.fullmatch(rf"{key} from (\S+) to (\S+) mm", told)
 
 
 def test_h_star_may_be_typed_as_it_is_printed() -> None:
@@ -189,10 +193,37 @@ def test_the_held_mesh_gives_what_the_run_did() -> None:
 
 def test_a_piston_seal_is_told_by_its_own_sizes(capsys: pytest.CaptureFixture[str]) -> None:
     """Diameters are counted negative inside; no sign of it is told."""
-    p = Seal(bore=40.0, ring="32x4")
     steps = [Step(-33.0, 3.2, 3.2), Step(-32.9, 2.9, 2.9)]
-    design_command._tell(p, Target.of("friction -10%"), "housing_diameter", steps)
-    told = capsys.readouterr().out
-    assert "groove_diameter = 33: friction = 3.2" in told
-    assert "by groove_diameter = 32.9 (-0.303 %)" in told
-    assert "= -3" not in told
+    target, p = Target.of("friction -10%"), Seal(bore=40.0, ring="32x4")
+    words = "\n".join(told(Design(p, target, "housing_diameter", "groove_diameter", steps)))
+    assert "groove_diameter = 33 mm: friction = 3.2 N" in words
+    assert "by groove_diameter = 32.9 mm (-0.303 %)" in words
+    assert "= -3" not in words
+
+
+def test_a_design_is_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What to change, what a hundredth of a millimetre of it does, and all other results."""
+    page = tmp_path / "design.html"
+    given = ["ring=36x4", "rod=36", "material=NBR 70", "density=1", "speeds=400", "stroke=out"]
+    told_to = [word for text in given for word in ("--set", text)]
+    typed = ["design", "oring", "friction -5%", "--by", "groove_depth", *told_to]
+    assert main([*typed, "--report", str(page)]) == 0
+    printed = capsys.readouterr()
+    assert "film at +400 mm/s" in printed.err  # it tells what it does meanwhile
+    depth = re.search(r" by groove_depth = (\S+) mm", printed.out)
+    assert depth
+    text = page.read_text(encoding="utf-8")
+    assert "of NBR 70, a rod seal: groove depth for friction -5\N{NO-BREAK SPACE}%</h1>" in text
+    assert f"groove depth {float(depth[1]):.5g} mm instead of 3.5 mm" in text
+    assert re.search(r"0\.01 mm more groove depth there: friction -[12]\.\d %", text)
+    rows = re.findall(r"<td[^>]*>friction</td><td>(\S+)</td><td>(\S+)</td>", text)
+    before, after = map(float, rows[-1])
+    assert after / before == pytest.approx(0.95, abs=1e-3)
+    outside = re.sub(r"<(script|details).*?</\1>", "", text, flags=re.DOTALL)
+    assert not re.search(r"h_star|p_max|contact_width", outside)
+
+
+def test_a_page_of_a_design_is_html(capsys: pytest.CaptureFixture[str]) -> None:
+    typed = ["design", "oring", "friction -5%", "--by", "rod", "--report", "a.pdf"]
+    assert main(typed) == 2
+    assert "--report 'a.pdf': a report is a page" in capsys.readouterr().err

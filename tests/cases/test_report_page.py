@@ -98,7 +98,7 @@ def test_runs_side_by_side_have_materials_and_leakage(
         content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
         assert f"<td>{content['parameters']['mu']:.4g}</td>" in text
         assert f"<td>{100.0 * content['leakage'][0]['net_mm3_per_mm']:.4g}</td>" in text
-    heads = re.findall(r"<th>([^<]*)</th>", text)
+    heads = re.findall(r"<th[^>]*>([^<]*)</th>", text)
     assert [head for head in heads if re.search(r"_(um|mm|mm_s|MPa|N|percent)\b", head)] == []
 
 
@@ -124,7 +124,7 @@ def test_a_sweep_has_a_pivot_table_and_its_best_and_worst_run(swept: Path) -> No
     text = (swept / "report.html").read_text(encoding="utf-8")
     assert "over sealed pressure and mu</h1>" in text
     book = load_workbook(swept / "report.xlsx")
-    pivot = [[c.value for c in row] for row in book["largest friction N"].iter_rows()]
+    pivot = [[c.value for c in row] for row in book["Largest friction N"].iter_rows()]
     assert pivot[1] == [None, "mu = 0.5 MPa", "mu = 0.9 MPa"]
     assert [row[0] for row in pivot[2:]] == ["sealed pressure = 0.5 MPa", "sealed pressure = 1 MPa"]
     friction = {}
@@ -138,6 +138,9 @@ def test_a_sweep_has_a_pivot_table_and_its_best_and_worst_run(swept: Path) -> No
     assert (least, most) == pytest.approx((friction[best], friction[worst]))
     assert f"(run {best})" in str(at)
     assert f"(run {worst})" in str(where)
+    asked = [row[0].value for row in book["What was asked"].iter_rows()]
+    assert "speeds" in asked  # the same in all runs
+    assert not {"sealed_pressure", "mu"} & set(asked)
     thin = rows["thinnest film [um]"]
     assert float(str(thin[1])) > float(str(thin[3]))  # the thicker one is better
 
@@ -209,6 +212,18 @@ def test_the_slider_moves_the_film_in_a_browser(
     )
     errors = [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
     assert errors == []
+
+
+def test_a_page_fits_a_telephone(browser: Any, runs: tuple[Path, Path], swept: Path) -> None:
+    """Wide tables scroll by themselves; the page does not."""
+    assert main(["report", str(swept)]) == 0
+    narrow = {"width": 400, "height": 900, "deviceScaleFactor": 1, "mobile": True}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", narrow)
+    for page in (runs[0] / "report.html", swept / "report.html"):
+        browser.get(page.as_uri())
+        browser.execute_async_script("setTimeout(arguments[0], 500)")
+        assert browser.execute_script("return document.documentElement.scrollWidth") == 400
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
 def test_an_error_of_a_page_is_seen(browser: Any, tmp_path: Path) -> None:

@@ -265,11 +265,12 @@ def test_tolerances_of_a_catalogue_ring_and_given_ones() -> None:
         tolerances=("viscosity 20 %", "modulus 10 %", "inner_diameter 0.1 mm"),
     )
     shares = read_tolerances(p.tolerances, p.model_dump(), p.ring)
-    assert shares["viscosity"] == (0.2, ("viscosity",))
-    assert shares["inner_diameter"][0] == pytest.approx(0.1 / p.inner_diameter)
-    assert shares["modulus"] == (0.1, ("mu_1", "mu_2"))
+    assert shares["viscosity"] == {"viscosity": 0.2}
+    assert shares["inner_diameter"] == {"inner_diameter": pytest.approx(0.1 / p.inner_diameter)}
+    assert shares["modulus"] == {"mu_1": 0.1, "mu_2": 0.1}
     # AS568-226: section 0.139 +- 0.004 in
-    assert shares["section_diameter"][0] == pytest.approx(0.004 / 0.139, rel=1e-3)
+    section = pytest.approx(0.004 / 0.139, rel=1e-3)
+    assert shares["section_diameter"] == {"section_diameter": section}
     assert set(shares) == {"section_diameter", "inner_diameter", "viscosity", "modulus"}
 
 
@@ -280,18 +281,25 @@ def test_the_modulus_is_that_of_the_rubber() -> None:
     for given, names in rubbers:
         p = Seal(sensitivity=True, tolerances=("modulus 25 %",), **given)
         shares = read_tolerances(p.tolerances, p.model_dump(), p.ring)
-        assert shares["modulus"] == (0.25, names)
+        assert shares["modulus"] == dict.fromkeys(names, 0.25)
 
 
 def test_the_rod_is_its_diameter() -> None:
     p = Seal(rod=50.0, sensitivity=True, tolerances=("rod 0.05 mm",))
     shares = read_tolerances(p.tolerances, p.model_dump(), p.ring)
-    assert shares["rod"][0] == pytest.approx(0.001)
-    assert shares["rod"][1] == ("rod_diameter",)
+    assert shares["rod"] == {"rod_diameter": pytest.approx(0.001)}
+
+
+def test_a_thicker_ring_of_a_piston_is_larger_outside() -> None:
+    """Its inside diameter has a tolerance of its own: 0.1 mm of section are 0.2 mm outside."""
+    p = Seal(ring="32x4", bore=40.0, sensitivity=True, tolerances=("section_diameter 0.1 mm",))
+    shares = read_tolerances(p.tolerances, p.model_dump(), None)
+    moved = {key: share * getattr(p, key) for key, share in shares["section_diameter"].items()}
+    assert moved == pytest.approx({"section_diameter": 0.1, "inner_diameter": -0.2})
 
 
 def test_a_band_adds_up() -> None:
-    shares = {"a": (0.01, ("a",)), "both": (0.02, ("b", "c"))}
+    shares = {"a": {"a": 0.01}, "both": {"b": 0.02, "c": 0.02}}
     row = band((1.0, 400.0), "friction", {"a": -3.0, "b": 1.0, "c": 1.0, "d": 9.0}, shares)
     assert row.worst_percent == pytest.approx(3.0 + 4.0)
     assert row.likely_percent == pytest.approx(5.0)

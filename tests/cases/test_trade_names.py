@@ -7,8 +7,10 @@ from math import pi, sqrt
 
 import pytest
 
+from softehl.cases.seal.gland import oils
 from softehl.cases.seal.gland.trade.finish_names import read_finish
 from softehl.cases.seal.gland.trade.fit_names import DEVIATIONS, GRADES, STEPS, band, read_fit
+from softehl.cases.seal.gland.trade.oil_names import GRADES as GRADES_OF_OILS
 from softehl.cases.seal.gland.trade.oil_names import dynamic, read_oil_name
 from softehl.cases.seal.gland.trade.ring_names import Kind, RingName, read_ring
 from softehl.cases.seal.gland.trade.rubber_names import RubberName, read_rubber
@@ -46,6 +48,11 @@ RINGS = {
     "DIN 3771 36 x 3.55": (36.0, 3.55, None),
     "DIN 3771 36 x 3,55": (36.0, 3.55, None),
     "ISO 3601-1 226A 50,39x3,53 N": (50.39, 3.53, None),
+    "Ø36x4": METRIC,
+    "Φ36\u00d74": METRIC,
+    "ISO 3601-1A 36x4": METRIC,
+    "DIN 3770 36x4": METRIC,
+    "XR 36x4": (36.0, 4.0, "x_ring"),
     "X-ring 36x4": (36.0, 4.0, "x_ring"),
     "36 x 4 X-Ring": (36.0, 4.0, "x_ring"),
     "quad ring 36 x 4": (36.0, 4.0, "x_ring"),
@@ -54,10 +61,13 @@ DASH: dict[str, Kind | None] = {
     **dict.fromkeys(("AS568-210", "as568-210", "AS568A-210", "AS 568-210", "AS568 210")),
     **dict.fromkeys(("SAE AS568-210", "AS568 dash 210", "2-210", "-210", "210", "dash 210")),
     **dict.fromkeys(
-        ("BS 210", "BS1806-210", "size 210", "No. 210", "Parker 2-210", "AS568\u2013210")
+        ("BS 210", "BS1806-210", "size 210", "No. 210", "#210", "Parker 2-210", "AS568\u2013210")
     ),
     **dict.fromkeys(("O-ring 210", "O-ring AS568-210", "OR 210"), "round"),
-    **dict.fromkeys(("X-ring AS568-210", "Q4210", "quad-ring 4210", "quad ring 210"), "x_ring"),
+    **dict.fromkeys(
+        ("X-ring AS568-210", "Q4210", "quad-ring 4210", "Quad-Ring® 4210", "quad ring 210"),
+        "x_ring",
+    ),
 }
 CUPS = ("U-cup 25x35x8", "u cup 25 x 35 x 8 mm", "25x35x8", "U-ring 25x35x8")
 NO_RINGS = {
@@ -67,6 +77,12 @@ NO_RINGS = {
     "OR 36-4": "36x4",
     "36/4": "AS568-226",
     "ring 36 by 4": "36x4",
+    "36x4 NBR 70": 'material = "NBR 70"; write "36x4"',
+    "O-Ring Ø36x4 NBR70": 'write "36x4"',
+    "U-cup 25-35-8": 'write "U-cup 25x35x8"',
+    "NI 25x35x8": 'write "U-cup 25x35x8"',
+    "JIS B 2401 P-20": "size of JIS B 2401 (P20)",
+    "Stepseal": "36x4",
     "P36": "JIS B 2401",
     "G 50": "JIS B 2401",
     "1 1/4 in x 1/8 in": "AS568-226",
@@ -80,6 +96,12 @@ FITS = {
     "36 mm f7": (35.950, 35.975),
     "Ø36 f7": (35.950, 35.975),
     "⌀ 36 f 7": (35.950, 35.975),
+    "φ36 f7": (35.950, 35.975),
+    "d36f7": (35.950, 35.975),
+    "36 f7 (ISO 286)": (35.950, 35.975),
+    "36 (-0.025/-0.05)": (35.950, 35.975),
+    "35.95 to 35.975": (35.950, 35.975),
+    "35.95-35.975 mm": (35.950, 35.975),
     "36,0 f7": (35.950, 35.975),
     "36-f7": (35.950, 35.975),
     "36 f8": (35.936, 35.975),
@@ -129,24 +151,50 @@ OILS = {
         ("ISO VG 46", "iso vg 46", "VG 46", "VG46", "ISO-VG 46", "ISO VG46"), (46, None)
     ),
     **dict.fromkeys(
-        ("HLP 46", "HLP46", "HLP-46", "HLPD 46", "HL 46", "HM 46", "CLP 46"), (46, None)
+        (
+            "HLP 46",
+            "HLP46",
+            "HLP-46",
+            "HLPD 46",
+            "HL 46",
+            "HM 46",
+            "CLP 46",
+            "L-HM 46",
+            "AW 46",
+            "AW ISO 46",
+        ),
+        (46, None),
     ),
+    **dict.fromkeys(("DIN 51524-2 HLP 46", "DIN 51524 HLP 46", "ISO 11158 HM 46"), (46, None)),
     **dict.fromkeys(("ISO HM 46", "HLP ISO VG 46", "HLP VG 46", "ISO 46"), (46, None)),
     **dict.fromkeys(("HVLP 46", "hvlp46", "HVLP ISO VG 46", "HVLP-D 46"), (46, 140.0)),
     **dict.fromkeys(("ISO VG 46 VI 140", "HLP 46, VI=140", "VG 46 (VI 140)"), (46, 140.0)),
 }
-WARM = ("HLP 46 at 50 degC", "ISO VG 46 @ 50°C", "VG 46, 50 C", "HLP 46 / 50 °C")
+FAHRENHEIT = "AW 46 at 122 F"
+WARM = (
+    FAHRENHEIT,
+    "HLP 46 bei 50 °C",
+    "HLP 46 (50 °C)",
+    "HLP 46 at 50 degC",
+    "ISO VG 46 @ 50°C",
+    "VG 46, 50 C",
+    "HLP 46 / 50 °C",
+)
 POINTS = (
     "46 cSt at 40 degC, 6.8 cSt at 100 degC",
     "46 cSt at 40 °C; 6.8 cSt at 100 °C",
     "46 mm2/s at 40 C and 6.8 mm2/s at 100 C",
     "46 mm²/s @ 40°C, 6,8 mm²/s @ 100°C",
     "46cSt 40C, 6.8cSt 100C",
+    "46 cSt @ 104 F, 6.8 cSt @ 212 °F",
 )
 NO_OILS = {
     "oil": "ISO VG 46",
     "46": "ISO VG 46",
     "Tellus 46": "ISO VG 46",
+    "Mobil DTE 25": "ISO VG of its data sheet",
+    "SAE 30": "says no viscosity of its own",
+    "MIL-H-5606": "6.8 cSt at 100 degC",
     "Shell Tellus S2 M 68": "ISO VG 68",
     "46 cSt": "6.8 cSt at 100 degC",
     "46 cSt at 40 degC": "one viscosity says nothing of another temperature",
@@ -162,19 +210,30 @@ NO_OILS = {
     "Klüber grease": "base oil",
     "46 cSt at 400 degC, 6.8 cSt at 100 degC": "out of range",
 }
-VISCOSITIES = ("100 mPas", "100 mPa s", "100 mPa·s", "100 cP", "0.1 Pa s", "0,1 Pas")
+VISCOSITIES = (
+    "100 cps",
+    "100 mPa*s",
+    "100 mPas",
+    "100 mPa s",
+    "100 mPa·s",
+    "100 cP",
+    "0.1 Pa s",
+    "0,1 Pas",
+)
 RUBBERS = {
     **dict.fromkeys(("NBR 70", "NBR70", "nbr-70", "NBR 70 Shore A", "NBR 70 ShA"), ("NBR", 70.0)),
     **dict.fromkeys(("70 NBR", "70 Shore A NBR", "NBR Shore A 70", "NBR 70A"), ("NBR", 70.0)),
     **dict.fromkeys(("NBR 70 IRHD", "NBR, Shore A 70", "NBR 70°ShA", "nitrile 70"), ("NBR", 70.0)),
     **dict.fromkeys(("Buna-N 70", "Perbunan 70", "NBR/70"), ("NBR", 70.0)),
+    **dict.fromkeys(("NBR 70°", "70NBR", "NBR 70 JIS A", "NBR 70 Hs"), ("NBR", 70.0)),
     **dict.fromkeys(("FKM 75", "FPM 75", "Viton 75", "FKM 75 Shore"), ("FKM", 75.0)),
     **dict.fromkeys(("EPDM 80", "EPDM80"), ("EPDM", 80.0)),
-    **dict.fromkeys(("PU 95", "PUR 95", "TPU 95A", "AU 95", "polyurethane 95"), ("PU", 95.0)),
-    **dict.fromkeys(("HNBR 85",), ("HNBR", 85.0)),
+    **dict.fromkeys(("PU 95", "PUR 95", "TPU 95A", "AU 95", "Polyurethan 95"), ("PU", 95.0)),
+    **dict.fromkeys(("HNBR 85", "H-NBR 85"), ("HNBR", 85.0)),
     **dict.fromkeys(("VMQ 60", "silicone 60"), ("VMQ", 60.0)),
     **dict.fromkeys(
-        ("70 Shore A", "70 ShA", "70A", "Shore A 70", "70 sh", "Sh A 70"), (None, 70.0)
+        ("70 Shore A", "70 ShA", "70A", "Shore A 70", "70 sh", "Sh A 70", "Shore 70 A", "JIS A 70"),
+        (None, 70.0),
     ),
 }
 NO_RUBBERS = {
@@ -186,6 +245,10 @@ NO_RUBBERS = {
     "NBR 5": "NBR 70",
     "PTFE": "cap_thickness",
     "rubber 70": "70 Shore A",
+    "N70": 'short name; write "NBR 70"',
+    "V75": 'write "FKM 75"',
+    "EPDM 70 peroxide": 'write "EPDM 70"',
+    "N0674-70": "70 Shore A",
     "XYZ-70": "FKM 75",
 }
 NO_NAMES = ("gent", "neo-hooke", "mooney-rivlin", "soft", "rubber")
@@ -193,10 +256,15 @@ FINISHES = {
     **dict.fromkeys(
         ("Ra 0.2", "Ra0.2", "Ra=0.2", "Ra 0,2", "ra 0.2 um", "Ra: 0.2 µm"), 0.2 * sqrt(pi / 2)
     ),
-    **dict.fromkeys(("0.2 um Ra", "Ra 200 nm", "Ra < 0.2 μm"), 0.2 * sqrt(pi / 2)),
+    **dict.fromkeys(
+        ("0.2 um Ra", "Ra 200 nm", "Ra < 0.2 μm", "Ra max 0.2", "Ra ≤ 0.2"), 0.2 * sqrt(pi / 2)
+    ),
     **dict.fromkeys(("Rq 0.25", "rms 0.25", "0.25 um rms", "Rq=0.25 µm"), 0.25),
 }
 NO_FINISHES = {
+    "RMS 8": 'write the unit; write "Rq 8 um" or "Rq 8 uin"',
+    "16 rms": "Rq 16 uin",
+    "Ra 0.1 / Ra 0.4": "Ra 0.1 and Ra 0.4",
     "Rz 1": "Ra 0.2",
     "Rt 1": "Rq 0.25",
     "Rmax 1": "Ra",
@@ -208,7 +276,7 @@ NO_FINISHES = {
 def test_two_hundred_spellings() -> None:
     texts: list[str] = [*RINGS, *DASH, *CUPS, *FITS, *HOLES, *OILS, *WARM, *POINTS, *VISCOSITIES]
     texts += [*RUBBERS, *FINISHES, *NO_RINGS, *NO_FITS, *NO_OILS, *NO_RUBBERS, *NO_FINISHES]
-    assert len([*texts, *NO_NAMES, *PLAIN]) >= 200
+    assert len([*texts, *NO_NAMES, *PLAIN]) >= 200, len(texts)
 
 
 @pytest.mark.parametrize("name", RINGS)
@@ -254,6 +322,10 @@ def test_oils() -> None:
         assert dynamic(name) == pytest.approx(1e-7), name
 
 
+def test_grades_of_refusals_are_those_of_oils() -> None:
+    assert set(GRADES_OF_OILS) == set(oils.GRADES)
+
+
 def test_rubbers() -> None:
     for name, (polymer, shore) in RUBBERS.items():
         assert read_rubber("material", name) == RubberName(polymer, shore), name
@@ -282,8 +354,13 @@ def test_what_is_not_understood_is_answered_with_what_is() -> None:
             assert "\n" not in str(caught.value)
 
 
+def _read_finishes(text: str) -> list[float | None]:
+    return [read_finish(part) for part in text.split(" and ")]
+
+
 @pytest.mark.parametrize(
-    ("names", "read"), [(NO_RINGS, read_ring), (NO_OILS, read_oil_name), (NO_FINISHES, read_finish)]
+    ("names", "read"),
+    [(NO_RINGS, read_ring), (NO_OILS, read_oil_name), (NO_FINISHES, _read_finishes)],
 )
 def test_the_forms_of_a_refusal_are_read(names: dict[str, str], read: object) -> None:
     assert callable(read)

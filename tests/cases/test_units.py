@@ -2,6 +2,7 @@
 
 import pytest
 
+from softehl.cases.harness.case_file import read_assignment
 from softehl.cases.harness.units import is_quantity, read_quantity
 from softehl.cases.seal.gland.parameters import Seal
 
@@ -11,6 +12,12 @@ from softehl.cases.seal.gland.parameters import Seal
     [
         ("30 bar", "MPa", 3.0),
         ("435.113 psi", "MPa", 3.0),
+        ("435.113 PSI", "MPa", 3.0),
+        ("30 Bar", "MPa", 3.0),
+        ("3,0 Mpa", "MPa", 3.0),
+        ("30.5914865 kgf/cm²", "MPa", 3.0),
+        ("122 °F", "degC", 50.0),
+        ('2"', "mm", 50.8),
         ("0.2 m/s", "mm/s", 200.0),
         ("12 m/min", "mm/s", 200.0),
         ("12 %", "%", 12.0),
@@ -30,7 +37,7 @@ def test_quantities(text: str, unit: str, value: float) -> None:
     assert read_quantity(text, unit) == pytest.approx(value, rel=1e-5)
 
 
-@pytest.mark.parametrize("text", ["AS568-226", "out", "12", "1e-3", "", "-226", "bar"])
+@pytest.mark.parametrize("text", ["AS568-226", "out", "12", "1,600 kPa", "1e-3", "", "-226", "bar"])
 def test_other_texts_are_no_quantities(text: str) -> None:
     assert not is_quantity(text)
 
@@ -55,6 +62,18 @@ def test_a_case_takes_them_in_every_key_with_a_unit() -> None:
 def test_a_viscosity_in_other_units_is_refused(viscosity: float) -> None:
     with pytest.raises(ValueError, match="viscosity"):
         Seal(viscosity=viscosity)
+
+
+def test_what_is_typed_without_quotation_marks_reaches_its_key() -> None:
+    for text in ("36 \u00d7 4", "#210", '1.5"', "36 (-0.025/-0.05)", "Ra=0.2", "Ra ≤ 0.2"):
+        assert read_assignment(f"key={text}") == ("key", text)
+    assert read_assignment("speeds=[0.4 m/s, 100 mm/s]")[1] == ["0.4 m/s", "100 mm/s"]
+
+
+def test_a_size_that_is_none_is_refused_by_its_key() -> None:
+    for text in ("1 7/16 in", "f7", "large"):
+        with pytest.raises(ValueError, match='is no size; write "36 mm" or "36 f7"'):
+            Seal(ring="36x4", rod=text)  # type: ignore[arg-type]
 
 
 def test_a_list_with_units_needs_no_brackets() -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import base64
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from softehl.cases.harness.case import Alarm, load_case
+from softehl.cases.harness.case import Alarm, AnyCase, load_case
 from softehl.cases.harness.curve import CurveFolder
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
@@ -68,11 +68,9 @@ def parts_of(runs: Sequence[FinishedRun]) -> list[Part]:
         own = list(runs[0].case.report(runs))
     except ImportError as error:
         raise BadInput(f"{_MISSING} ({error})") from None
-    parts = [*_answers(runs), _asked(runs), *([_side_by_side(runs)] if len(runs) > 1 else []), *own]
-    left_out = runs[0].case.left_out
-    if left_out:
-        parts.append(Part("What the model leaves out", lines=left_out))
-    return [*parts, _all_rows(runs), _all_keys(runs), _versions(runs)]
+    several = [_side_by_side(runs)] if len(runs) > 1 else []
+    parts = [*_answers(runs), asked(runs), *several, *own, *left_out(runs[0].case)]
+    return [*parts, _all_rows(runs), all_keys(runs), versions(runs)]
 
 
 def render(runs: Sequence[FinishedRun], parts: Sequence[Part], title: str = "") -> str:
@@ -96,7 +94,7 @@ def render(runs: Sequence[FinishedRun], parts: Sequence[Part], title: str = "") 
     page.tests["alarm"] = lambda line: isinstance(line, Alarm)
     page.filters["base64"] = lambda data: base64.b64encode(data).decode()
     return page.get_template("report.html").render(
-        title=title or _title(runs),
+        title=capital(title or _title(runs)),
         runs=runs,
         parts=parts,
         resources=needed,
@@ -106,8 +104,16 @@ def render(runs: Sequence[FinishedRun], parts: Sequence[Part], title: str = "") 
 
 
 def _title(runs: Sequence[FinishedRun]) -> str:
-    """Title that names the runs, each kind once."""
-    return "; ".join(dict.fromkeys(run.case.titled(run.parameters) for run in runs))
+    """Title that names the runs, each kind once; what all of them show stands once, at its end."""
+    titles = dict.fromkeys(run.case.titled(run.parameters) for run in runs)
+    subjects, shown = zip(*(title.partition(": ")[::2] for title in titles), strict=True)
+    same = len(set(shown)) == 1 and bool(shown[0])
+    return f"{' and '.join(subjects)}: {shown[0]}" if same else "; ".join(titles)
+
+
+def capital(words: str) -> str:
+    """Words that begin with a capital letter, all else as it is."""
+    return words[:1].upper() + words[1:]
 
 
 def shown(value: Cell | None) -> str:
@@ -160,14 +166,22 @@ def _answers(runs: Sequence[FinishedRun]) -> list[Part]:
     return [Part("Answer", lines=lines)] if lines else []
 
 
-def _asked(runs: Sequence[FinishedRun]) -> Part:
-    """The keys that are not at their defaults, with units and meaning, a column for each run."""
+def left_out(case: AnyCase) -> list[Part]:
+    """The limits of a model, in words."""
+    return [Part("What the model leaves out", lines=case.left_out)] if case.left_out else []
+
+
+def asked(runs: Sequence[FinishedRun], without: Collection[str] = ()) -> Part:
+    """The keys that are not at their defaults, with units and meaning, a column for each run.
+
+    without: keys that are told elsewhere.
+    """
     default = runs[0].case.parameters().model_dump()
     given = [run.parameters.model_dump() for run in runs]
     rows = [
         (key.name, *(_text(g[key.name]) for g in given), key.unit, key.meaning)
         for key in keys_of(runs[0].case.parameters)
-        if any(g[key.name] != default[key.name] for g in given)
+        if key.name not in without and any(g[key.name] != default[key.name] for g in given)
     ]
     header = ("key", *(run.name for run in runs), "unit", "meaning")
     words = "Every key is at its default." if not rows else ""
@@ -220,7 +234,8 @@ def _all_rows(runs: Sequence[FinishedRun]) -> Part:
     return Part("All columns", tables=tables, folded=True)
 
 
-def _all_keys(runs: Sequence[FinishedRun]) -> Part:
+def all_keys(runs: Sequence[FinishedRun]) -> Part:
+    """Every key with its value."""
     given = [run.parameters.model_dump() for run in runs]
     rows = [
         (key.name, *(_text(g[key.name]) for g in given), key.unit, key.bounds, key.meaning)
@@ -230,10 +245,11 @@ def _all_keys(runs: Sequence[FinishedRun]) -> Part:
     return Part("All keys", tables=[Table("As used", header, rows)], folded=True)
 
 
-def _versions(runs: Sequence[FinishedRun]) -> Part:
-    versions = [run.content.get("versions") or {} for run in runs]
-    names = dict.fromkeys(name for found in versions for name in found)
-    rows = [(name, *(str(found.get(name) or "") for found in versions)) for name in names]
+def versions(runs: Sequence[FinishedRun]) -> Part:
+    """Versions of what computed the runs."""
+    told = [run.content.get("versions") or {} for run in runs]
+    names = dict.fromkeys(name for found in told for name in found)
+    rows = [(name, *(str(found.get(name) or "") for found in told)) for name in names]
     rows.append(("seconds", *(shown(run.content.get("seconds")) for run in runs)))
     table = Table("Versions", ("", *(run.name for run in runs)), rows)
     return Part("Versions", tables=[table], folded=True)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from softehl.runtime.io import Cell
+
+_BROAD = 1.6  # width over height of a picture with several panels
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,12 @@ class Picture:
 
     caption: str
     png: bytes
+
+    @property
+    def broad(self) -> bool:
+        """True if it is much wider than high: a narrow page shows it at a size that can be read."""
+        width, height = struct.unpack(">II", self.png[16:24])
+        return bool(width > _BROAD * height)
 
 
 @dataclass(frozen=True, eq=False)

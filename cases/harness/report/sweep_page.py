@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, nan
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 from softehl.cases.harness.case import AnyCase, load_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
-from softehl.cases.harness.report.page import read_finished
+from softehl.cases.harness.report.page import asked, capital, left_out, read_finished
 from softehl.cases.harness.report.part import FinishedRun, Part, Table
 from softehl.cases.harness.responses import titled, titled_value
 from softehl.runtime.io import Cell, read_json
 
 _HEIGHT, _WIDTH, _LEAST = 320, 620, 300  # px
+_LABEL = 26  # letters of a line along the axis
 _COLUMNS = 12  # of a table at most: random points have a value of their own each
 _COLOURS = ("#1b6ca8", "#c8553d", "#4f8a52", "#7a5195", "#b58900", "#444444")
 
@@ -91,8 +93,17 @@ def sweep_parts(sweep: FinishedSweep) -> list[Part]:
     parts = [_best(sweep)]
     for name in sweep.names:
         tables = [_pivot(sweep, name)] if others and few else []
-        parts.append(Part(name, plots=[_plot(sweep, name)], tables=tables))
-    return [*parts, _every(sweep)]
+        parts.append(Part(capital(name), plots=[_plot(sweep, name)], tables=tables))
+    return [*parts, _same(sweep), *left_out(sweep.case), _every(sweep)]
+
+
+def _same(sweep: FinishedSweep) -> Part:
+    """The keys that are the same in all runs."""
+    runs = [point.run for point in sweep.points if point.run is not None]
+    first, *others = (run.parameters.model_dump() for run in runs)
+    differ = [key for key in first if any(other[key] != first[key] for other in others)]
+    named = replace(runs[0], folder=Path("all runs"), content={"status": "converged"})
+    return asked([named], without=[*differ, *sweep.keys])
 
 
 def _point(
@@ -168,7 +179,7 @@ def _plot(sweep: FinishedSweep, name: str) -> Any:
         max_width=_WIDTH,
         min_width=_LEAST,
         x_axis_label=titled(_plain(first), sweep.keys[first]),
-        y_axis_label=name,
+        y_axis_label="\n".join(wrap(name, _LABEL)),
         tools="pan,box_zoom,wheel_zoom,reset,save",
         **size,
     )

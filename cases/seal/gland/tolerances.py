@@ -50,8 +50,8 @@ class ToleranceRow(Record):
     largest_percent: float = column("%", "its part")
 
 
-Shares = Mapping[str, tuple[float, tuple[str, ...]]]
-"""Name of a tolerance -> its relative size, and the parameters that it moves."""
+Shares = Mapping[str, Mapping[str, float]]
+"""Name of a tolerance -> the parameters that it moves, each by a share of its value."""
 
 
 def read_tolerances(
@@ -66,8 +66,19 @@ def read_tolerances(
     twice = [name for name, times in Counter(name for name, _ in typed).items() if times > 1]
     if twice:
         raise ValueError(f"tolerances: {twice[0]} is given twice; leave one of them out")
-    known = [*_of_ring(ring_name), *_of_limits(values)]
+    of_ring = [f"{key} {tolerance!r} mm" for key, _, tolerance in ring_sizes(ring_name)]
+    known = [*of_ring, *_of_limits(values)]
     return dict([*(_share(text, values) for text in known), *typed])
+
+
+def _with_outside(moved: dict[str, float], values: Mapping[str, object]) -> dict[str, float]:
+    """What a tolerance of the section moves: the outside of a piston ring with it, which is the
+    inside diameter and twice the section.
+    """
+    section, outside = (float(str(values[key])) for key in ("section_diameter", "inner_diameter"))
+    if "section_diameter" in moved and outside < 0.0:
+        moved["inner_diameter"] = moved["section_diameter"] * 2.0 * section / -outside
+    return moved
 
 
 def _of_limits(values: Mapping[str, object]) -> list[str]:
@@ -77,8 +88,8 @@ def _of_limits(values: Mapping[str, object]) -> list[str]:
     return [f"{LIMITED[name]} {found.half:.9f} mm" for name, found in bands(said)]
 
 
-def _share(text: str, values: Mapping[str, object]) -> tuple[str, tuple[float, tuple[str, ...]]]:
-    """The name of a tolerance, its relative size and the parameters that it moves.  ValueError."""
+def _share(text: str, values: Mapping[str, object]) -> tuple[str, dict[str, float]]:
+    """The name of a tolerance, and the share by which it moves each parameter.  ValueError."""
     found = _ITEM.fullmatch(text.strip())
     if found and found["name"] in _OF_THE_GLAND:
         return found["name"], _of_the_gland(found, values)
@@ -92,12 +103,11 @@ def _share(text: str, values: Mapping[str, object]) -> tuple[str, tuple[float, t
             'in "viscosity 10 %" or "rod_diameter 0.05 mm"'
         )
     size = float(found["size"])
-    return found["name"], (0.01 * size if found["unit"] == "%" else size / abs(known[0]), names)
+    share = 0.01 * size if found["unit"] == "%" else size / abs(known[0])
+    return found["name"], _with_outside(dict.fromkeys(names, share), values)
 
 
-def _of_the_gland(
-    found: re.Match[str], values: Mapping[str, object]
-) -> tuple[float, tuple[str, ...]]:
+def _of_the_gland(found: re.Match[str], values: Mapping[str, object]) -> dict[str, float]:
     """The share by which a depth, squeeze (points) or fill (points) moves diameter or width."""
     name, size, unit = found["name"], float(found["size"]), found["unit"]
     rod, housing, section, fill = (
@@ -114,12 +124,12 @@ def _of_the_gland(
             raise ValueError(
                 f'tolerances: "{found[0]}" needs fill; write "groove_width 0.2 mm", or give fill'
             )
-        return size / fill, ("groove_width",)
+        return {"groove_width": size / fill}
     depth = 0.5 * (housing - rod)
     wrong = 0.01 * size * section if name == "squeeze" else size
     if name == "groove_depth" and unit == "%":
         wrong = 0.01 * size * depth
-    return 2.0 * wrong / abs(housing), ("housing_diameter",)
+    return {"housing_diameter": 2.0 * wrong / abs(housing)}
 
 
 def _moved(name: str, values: Mapping[str, object]) -> tuple[str, ...]:
@@ -128,19 +138,19 @@ def _moved(name: str, values: Mapping[str, object]) -> tuple[str, ...]:
     return tuple(key for key in names if key in _VARIED and values.get(key))
 
 
-def _of_ring(name: str | None) -> list[str]:
-    """Tolerances of a ring of the catalogue, +- mm."""
+def ring_sizes(name: str | None) -> list[tuple[str, float, float]]:
+    """Sizes of a ring of the catalogue that have a tolerance: key, mm, +- mm; none of a U-cup."""
     if name is None:
         return []
     try:
         known = ring(name)
     except UnknownRingError:
         return []
-    sizes = {
-        "section_diameter": known.section_tolerance,
-        "inner_diameter": known.inner_tolerance,
-    }
-    return [f"{key} {size!r} mm" for key, size in sizes.items() if size]
+    sizes = (
+        ("section_diameter", known.section_diameter, known.section_tolerance),
+        ("inner_diameter", known.inner_diameter, known.inner_tolerance),
+    )
+    return [(key, value, tolerance) for key, value, tolerance in sizes if tolerance]
 
 
 def band(
@@ -148,8 +158,8 @@ def band(
 ) -> ToleranceRow:
     """Effect of tolerances on one quantity; place: p_s and U; slopes: its log derivatives."""
     parts = {
-        name: 100.0 * abs(sum(slopes.get(key, 0.0) for key in keys)) * share
-        for name, (share, keys) in shares.items()
+        name: 100.0 * abs(sum(slopes.get(key, 0.0) * share for key, share in moved.items()))
+        for name, moved in shares.items()
     }
     largest = max(parts, key=lambda name: parts[name])
     return ToleranceRow(

@@ -6,19 +6,25 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
+from softehl.cases.seal.report import style
+from softehl.cases.seal.report.parts import gland
 
 if TYPE_CHECKING:
     from softehl.runtime.io import Cell
 
 
 def cycle_parts(runs: Sequence[FinishedRun], pictures: Sequence[str]) -> list[Part]:
-    """Every cycle in numbers, and the pictures (names without .png) that the runs have."""
+    """Cycles in numbers, the pictures (names without .png) that the runs have, the glands."""
+    import matplotlib
+
     titles = {"friction_loop": "Friction loop", "film_map": "Film over time and place"}
     shown = (titles.get(name, name) for name in pictures)
     parts = (
         Part(title, pictures=_found(runs, n)) for title, n in zip(shown, pictures, strict=True)
     )
-    return [_numbers(runs), *(part for part in parts if part.pictures)]
+    with matplotlib.rc_context(style.STYLE):
+        seals = gland(runs)
+    return [_numbers(runs), *(part for part in parts if part.pictures), seals]
 
 
 def _numbers(runs: Sequence[FinishedRun]) -> Part:

@@ -89,7 +89,7 @@ def _line(run: FinishedRun, row: FilmRow | None) -> dict[str, list[float]]:
     }
 
 
-def _narrow(width: int) -> dict[str, Any]:
+def narrow(width: int) -> dict[str, Any]:
     """A width that shrinks with the window, so that a telephone shows the whole plot."""
     return {"width_policy": "max", "max_width": width, "min_width": min(width, _LEAST)}
 
@@ -99,7 +99,7 @@ def _panel(label: str, limits: dict[str, Any], *, log: bool) -> Any:
 
     panel = figure(
         height=_HEIGHT,
-        **_narrow(_WIDTH),
+        **narrow(_WIDTH),
         x_range=limits["x"],
         y_range=limits["h" if log else "p"],
         y_axis_type="log" if log else "linear",
@@ -121,7 +121,7 @@ def curve_plot(runs: Sequence[FinishedRun]) -> Any:
                 _draw(
                     panel, rows, _look(runs, number, stroke), f"{run.name}, {style.STROKES[stroke]}"
                 )
-    _place_legend(panel)
+    _place_legend(panel, outside=len(runs) > 1)
     return panel
 
 
@@ -168,12 +168,15 @@ def friction_plot(runs: Sequence[FinishedRun]) -> Any:
                     x, y, line_color=look["color"], line_dash=look["dash"], legend_label=label
                 )
                 panel.scatter(x, y, size=6, color=look["color"])
-    _place_legend(panel)
+    _place_legend(panel, outside=len(runs) > 1)
     return panel
 
 
-def _place_legend(panel: Any) -> None:
-    """Put the legend where a rising curve leaves room; a narrow one shows through it."""
+def _place_legend(panel: Any, *, outside: bool) -> None:
+    """Put the legend where a rising curve leaves room; outside: above, where there are many."""
+    if outside:
+        panel.legend.ncols = 2
+        panel.add_layout(panel.legend[0], "above")
     panel.legend.location = "top_left"
     panel.legend.background_fill_alpha = 0.5
     panel.legend.label_text_font_size = "11px"
@@ -184,7 +187,7 @@ def _over_speed(runs: Sequence[FinishedRun], label: str) -> Any:
     from bokeh.plotting import figure
 
     panel = figure(
-        **_narrow(int(1.4 * _WIDTH)),
+        **narrow(int(1.4 * _WIDTH)),
         height=int(1.2 * _HEIGHT),
         x_axis_type="log",
         y_axis_type="log",

@@ -12,7 +12,6 @@ LEFT_OUT = (
     "Fillets of the groove: its corners are sharp.",
     "The extrusion gap, unless the case opens it: the wall of the air side reaches the rod.",
     "Friction of the seal on its housing, unless the case has a coefficient.",
-    "Piston seals: the seal sits in the housing, and the rod slides in it.",
     "Wear, swelling and ageing: dimensions and moduli are those given.",
 )
 """A report ends with these."""

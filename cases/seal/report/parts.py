@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 from softehl.cases.harness.earlier import advice_of
 from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
 from softehl.cases.harness.row import Record
-from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.oils import is_grade
 from softehl.cases.seal.gland.rubbers.hardness import shore_band
-from softehl.cases.seal.gland.tolerances import ToleranceRow
+from softehl.cases.seal.gland.tolerances import ToleranceRow, ring_sizes
 from softehl.cases.seal.gland.trade.said import bands
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure
@@ -22,6 +21,7 @@ from softehl.cases.seal.report.fit import fit_figure, fit_of
 from softehl.cases.seal.report.interactive import curve_plot, film_plot, friction_plot
 from softehl.cases.seal.report.section import View, section_figure
 from softehl.cases.seal.report.stribeck import stribeck_figure
+from softehl.cases.seal.sensitivity.quantities import CALLED
 from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
 from softehl.cases.seal.states.observer_adapter import read_profile, read_section
 from softehl.cases.seal.states.state import FilmRow
@@ -38,10 +38,10 @@ def parts(runs: Sequence[FinishedRun]) -> list[Part]:
     import matplotlib
 
     with matplotlib.rc_context(style.STYLE):
-        found = [_gland(runs), *_rubber(runs), _section(runs)]
+        found = [gland(runs), *_rubber(runs), _section(runs)]
         surfaces, curve = _surfaces(runs), _curve(runs)
     found += [_film(runs), curve, _friction(runs), *_leakage(runs), *surfaces]
-    return [*_compared(runs), *found, _tolerances(runs)]
+    return [*_compared(runs), *found, tolerances(runs)]
 
 
 def _compared(runs: Sequence[FinishedRun]) -> list[Part]:
@@ -56,7 +56,7 @@ def _compared(runs: Sequence[FinishedRun]) -> list[Part]:
         ("oil", *(q.oil or "by its viscosity" for q in p), ""),
         ("viscosity", *(q.viscosity * 1e9 for q in p), "mPa s"),
         ("sealed pressure", *(q.sealed_pressure for q in p), "MPa"),
-        ("rms height of the seal", *(q.roughness[1] for q in p), "um"),
+        ("rms height of the seal", *(q.roughness[1] or "smooth" for q in p), "um"),
     ]
     tables = [Table("Materials", ("", *names, "unit"), rows)]
     nets = [{row.speed_mm_s: row for row in net_leakage(run.rows)} for run in runs]
@@ -71,8 +71,9 @@ def _compared(runs: Sequence[FinishedRun]) -> list[Part]:
     return [Part("Materials and leakage side by side", tables=tables)]
 
 
-def _gland(runs: Sequence[FinishedRun]) -> Part:
-    pictures = [Picture(run.name, _png(gland_figure(run.parameters))) for run in runs]
+def gland(runs: Sequence[FinishedRun]) -> Part:
+    """The seals in their glands, and how they sit."""
+    pictures = [Picture(run.name, png(gland_figure(run.parameters))) for run in runs]
     numbers = [fit_numbers(run.parameters) for run in runs]
     rows: list[tuple[Cell, ...]] = [
         (name, *(found[k][1] for found in numbers), unit)
@@ -96,7 +97,7 @@ def _rubber(runs: Sequence[FinishedRun]) -> list[Part]:
         except ValueError:
             continue  # the table of tests is elsewhere now
         if found:
-            pictures.append(Picture(f"{run.name}: {run.parameters.fit}", _png(fit_figure([found]))))
+            pictures.append(Picture(f"{run.name}: {run.parameters.fit}", png(fit_figure([found]))))
     return [Part("Rubber", "Tests and the material fitted to them.", pictures)] if pictures else []
 
 
@@ -113,7 +114,7 @@ def _section(runs: Sequence[FinishedRun]) -> Part:
                 views.append(View(row, profile, section))
         views = [view for view in views if view.complete]
         if views:
-            pictures.append(Picture(run.name, _png(section_figure(run.parameters, views))))
+            pictures.append(Picture(run.name, png(section_figure(run.parameters, views))))
     text = "Stress in the ring, film pressure on the rod, contact pressure on housing and walls."
     return Part("Deformed section", text, pictures=pictures)
 
@@ -137,7 +138,7 @@ def _curve(runs: Sequence[FinishedRun]) -> Part:
     )
     if _several_speeds(runs):
         return Part("Film thickness", text, plots=[curve_plot(runs)], lines=lines)
-    pictures = [Picture(run.name, _png(curve_figure(run.parameters, run.rows))) for run in runs]
+    pictures = [Picture(run.name, png(curve_figure(run.parameters, run.rows))) for run in runs]
     return Part("Film thickness", text, pictures=pictures, lines=lines)
 
 
@@ -165,8 +166,11 @@ def _leakage(runs: Sequence[FinishedRun]) -> list[Part]:
         rows = net_leakage(run.rows)
         if rows:
             travel = run.parameters.travel
-            header = (*LeakageRow.titles(), f"in a cycle of {travel:g} mm out and back [mm3]")
-            cells = [(*row.cells(), travel * row.net_mm3_per_mm) for row in rows]
+            header = list(LeakageRow.titles())
+            header.insert(2, f"net in a cycle of {travel:g} mm out and back [mm3]")
+            cells = [list(row.cells()) for row in rows]
+            for line, row in zip(cells, rows, strict=True):
+                line.insert(2, travel * row.net_mm3_per_mm)
             tables.append(Table(run.name, header, cells))
     text = (
         "Out minus in; negative: the instroke could take back more than there is, dry on balance."
@@ -179,7 +183,7 @@ def _surfaces(runs: Sequence[FinishedRun]) -> list[Part]:
     tables, pictures = [], []
     for run in runs:
         if figure := stribeck_figure(run.parameters, run.rows):
-            pictures.append(Picture(run.name, _png(figure)))
+            pictures.append(Picture(run.name, png(figure)))
         if any(isfinite(row.lambda_ratio) for row in run.rows):
             rows = [[getattr(row, name) for name in _SURFACE] for row in run.rows]
             tables.append(Table(run.name, _titles(FilmRow, _SURFACE), rows))
@@ -201,21 +205,15 @@ def _titles(kind: type[Record], names: Sequence[str]) -> list[str]:
     return [column.title for column in kind.columns() if column.name in names]
 
 
-def _tolerances(runs: Sequence[FinishedRun]) -> Part:
+def tolerances(runs: Sequence[FinishedRun]) -> Part:
     """Tolerances of the input."""
     rows: list[tuple[str, str, str]] = []
     for run in runs:
         p = run.parameters
-        if p.ring:
-            ring = catalogue.ring(p.ring)
-            rows += [
-                (run.name, f"{key} = {value:g} mm", f"+- {tolerance:g} mm")
-                for key, value, tolerance in (
-                    ("section_diameter", ring.section_diameter, ring.section_tolerance),
-                    ("inner_diameter", ring.inner_diameter, ring.inner_tolerance),
-                )
-                if tolerance is not None
-            ]
+        rows += [
+            (run.name, f"{key.replace('_', ' ')} = {value:g} mm", f"+- {tolerance:g} mm")
+            for key, value, tolerance in ring_sizes(p.ring)
+        ]
         rows += [
             (run.name, f"{name} = {found.nominal:g} mm", f"{found.low:g} to {found.high:g} mm")
             for name, found in bands(p.said)
@@ -237,10 +235,18 @@ def _bands(run: FinishedRun) -> list[Table]:
     """Bands of the results by the tolerances, if the run has sensitivities."""
     try:
         cells = read_csv(run.folder / "tolerances.csv", ToleranceRow.header())
-        rows = [ToleranceRow.parse(row).cells() for row in cells]
+        found = [ToleranceRow.parse(row) for row in cells]
     except (OSError, ValueError):
         return []
-    return [Table(f"{run.name}: changes that follow", ToleranceRow.titles(), rows)]
+    header = ("", "rod speed U [mm/s]", "likely change [%]", "at worst [%]", "most of it by")
+    rows = [
+        (
+            *(CALLED[row.quantity][0], row.rod_speed_mm_s, row.likely_percent, row.worst_percent),
+            f"{row.largest.replace('_', ' ')}, {row.largest_percent:.3g} %",
+        )
+        for row in found
+    ]
+    return [Table(f"{run.name}: changes that follow", header, rows)]
 
 
 def _tornados(runs: Sequence[FinishedRun]) -> list[Picture]:
@@ -248,7 +254,8 @@ def _tornados(runs: Sequence[FinishedRun]) -> list[Picture]:
     return [Picture(name, path.read_bytes()) for name, path in paths if path.exists()]
 
 
-def _png(figure: Figure) -> bytes:
+def png(figure: Figure) -> bytes:
+    """A picture for a page."""
     found = BytesIO()
     figure.savefig(found, format="png", dpi=130)
     return found.getvalue()

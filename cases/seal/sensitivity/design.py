@@ -43,6 +43,11 @@ class Target:
     quantity: str
     factor: float
 
+    @property
+    def percent(self) -> float:
+        """The change in per cent."""
+        return round(100.0 * (self.factor - 1.0), 9)
+
     @classmethod
     def of(cls, text: str) -> Target:
         """From "friction -10 %".  Raises NoDesignError."""
@@ -58,11 +63,15 @@ class Target:
 
 @dataclass(frozen=True)
 class Step:
-    """A value of the key, the quantity there by a nonlinear solve, and what was predicted."""
+    """A value of the key, the quantity there by a nonlinear solve, and what was predicted.
+
+    state: the film; None on a mesh that is held, where only the quantity is known.
+    """
 
     value: float
     quantity: float
     predicted: float
+    state: FilmState | None = None
 
 
 def value_of(state: FilmState, quantity: str) -> float:
@@ -92,7 +101,7 @@ def designed(
     """
     state, value = _film(p, key, solve), float(getattr(p, key))
     wanted = target.factor * value_of(state, target.quantity)
-    steps = [Step(value, value_of(state, target.quantity), math.nan)]
+    steps = [Step(value, value_of(state, target.quantity), math.nan, state)]
     for _ in range(STEPS):
         assert state.sensitivity is not None
         slope = state.sensitivity[target.quantity].get(key, 0.0)
@@ -104,7 +113,7 @@ def designed(
             )
         value *= math.exp(way / slope)
         state = _film(Seal(**{**p.settled(), key: value}), key, solve)
-        steps.append(Step(value, value_of(state, target.quantity), wanted))
+        steps.append(Step(value, value_of(state, target.quantity), wanted, state))
         if abs(steps[-1].quantity / wanted - 1.0) <= TOLERANCE:
             change = hold(Seal(**{**p.settled(), key: value}))
             return [*steps, *settled(steps[-1], wanted, slope, change)]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 
-import click
 from pydantic import ValidationError
 
 from softehl.cases.harness.errors import BadInput
@@ -14,12 +15,15 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.varied import NUMBERS, PRESSURE_KEY
 from softehl.cases.seal.sensitivity.design import Change, NoDesignError, Step, Target, designed
 from softehl.cases.seal.sensitivity.held import HeldFilm
+from softehl.cases.seal.sensitivity.quantities import CALLED
 from softehl.cases.seal.sensitivity.sensitivity import differentiation
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.states.state import FilmState, Silent
+from softehl.cases.seal.states.state import FilmState, Observer, Silent
 from softehl.runtime.names import meant
 
 _OF_PISTON = {"bore": "rod_diameter", "groove_diameter": "housing_diameter"}
+"""Diameters of a piston seal, whose keys are less than 0."""
+
 SAME = {"rod": "rod_diameter", **_OF_PISTON}
 """Names of a key."""
 
@@ -37,34 +41,66 @@ INSTEAD = {
 """Keys that cannot be chosen freely: what to do instead."""
 
 
-def design_case(p: Seal, target: str, key: str) -> int:
-    """Print the way to the target; exit code 0, or 3 where it is not reached.  Raises BadInput."""
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A target that is met.
+
+    parameters: the case of one film that it began with. key: what was changed. asked: the key or
+    measure of the gland that a user named, which follows from it.
+    """
+
+    parameters: Seal
+    target: Target
+    key: str
+    asked: str
+    steps: Sequence[Step]
+
+    @property
+    def met(self) -> Seal:
+        """The case that meets the target."""
+        return self.at(self.steps[-1].value)
+
+    def at(self, value: float) -> Seal:
+        """The case with another value of the key."""
+        return self.parameters.model_copy(update={self.key: value})
+
+    def measure(self, value: float) -> float:
+        """The value of what a user named, where the key has this one; of a piston not negative."""
+        if self.asked in BASES:
+            return derived(self.at(value), self.asked)
+        return abs(value) if self.asked in _OF_PISTON else value
+
+    @property
+    def unit(self) -> str:
+        """Of what a user named."""
+        return next(one.unit for one in keys_of(Seal) if one.name == self.asked)
+
+    @property
+    def change(self) -> float:
+        """Of the quantity, %."""
+        return 100.0 * (self.steps[-1].quantity / self.steps[0].quantity - 1.0)
+
+
+def design_case(p: Seal, target: str, key: str, observer: Observer | None = None) -> Design:
+    """The way to a target by a key.  Raises BadInput, also where it is not reached."""
     asked = SAME.get(key, key)
-    key = BASES.get(asked, asked)
+    base = BASES.get(asked, asked)
     known = [k for k in (*NUMBERS, PRESSURE_KEY) if isinstance(getattr(p, k), float)]
-    if key not in known:
-        hint = f" ({INSTEAD[key]})" if key in INSTEAD else meant(key, known)
-        raise BadInput(f"--by {key}{hint}: allowed: {', '.join([*known, *BASES])}")
+    if base not in known:
+        hint = f" ({INSTEAD[base]})" if base in INSTEAD else meant(base, known)
+        raise BadInput(f"--by {base}{hint}: allowed: {', '.join([*known, *BASES])}")
     p = _one_film(p)
+    solve = partial(_solve, observer or Silent())
     try:
         wanted = Target.of(target)
-        steps = designed(p, wanted, key, _solve, lambda q: _hold(q, wanted.quantity, key))
+        steps = designed(p, wanted, base, solve, lambda q: _hold(q, wanted.quantity, base))
     except NoDesignError as error:
         raise BadInput(str(error)) from None
     except ValidationError as error:
-        wrong = f"the target needs a {key} that a case cannot have: {_reason(error)}"
+        wrong = f"the target needs a {base} that a case cannot have: {_reason(error)}"
         raise BadInput(wrong) from None
-    _tell(p, wanted, key, steps)
-    if asked != key:
-        first, last = (
-            derived(p.model_copy(update={key: step.value}), asked) for step in (steps[0], steps[-1])
-        )
-        click.echo(f"{asked} from {first:.5g} to {last:.5g} {_unit(asked)}")
-    return 0
-
-
-def _unit(key: str) -> str:
-    return next(one.unit for one in keys_of(Seal) if one.name == key)
+    of_piston = {of: said for said, of in _OF_PISTON.items()} if p.piston else {}
+    return Design(p, wanted, base, of_piston.get(asked, asked), steps)
 
 
 def _one_film(p: Seal) -> Seal:
@@ -81,8 +117,8 @@ def _reason(error: ValidationError) -> str:
     return error.errors()[0]["msg"].removeprefix("Value error, ")
 
 
-def _solve(p: Seal) -> FilmState | None:
-    states = run(p, Silent(), differentiate=differentiation(p)).states
+def _solve(observer: Observer, p: Seal) -> FilmState | None:
+    states = run(p, observer, differentiate=differentiation(p)).states
     return states[0] if states else None
 
 
@@ -91,18 +127,29 @@ def _hold(p: Seal, quantity: str, key: str) -> Change | None:
     return None if held is None else lambda factor: held.change(quantity, key, factor)
 
 
-def _tell(p: Seal, target: Target, key: str, steps: Sequence[Step]) -> None:
+def told(design: Design) -> list[str]:
+    """A design in words: its steps, and what it comes to."""
+    p, target, steps = design.parameters, design.target, design.steps
     first, last = steps[0], steps[-1]
     sign = 1.0 if p.stroke == "out" else -1.0
-    name = {of: said for said, of in _OF_PISTON.items()}.get(key, key) if p.piston else key
-    values = [abs(step.value) if name != key else step.value for step in steps]
-    click.echo(f"p_s = {p.sealed_pressure:g} MPa, U = {sign * p.speeds[0]:+g} mm/s")
-    for step, value in zip(steps, values, strict=True):
-        click.echo(f"  {name} = {value:.8g}: {target.quantity} = {step.quantity:.5g}")
-    change = 100.0 * (last.quantity / first.quantity - 1.0)
-    moved = 100.0 * (last.value / first.value - 1.0)
-    click.echo(
-        f"{target.quantity} {change:+.2f} % (wanted {100.0 * (target.factor - 1.0):+g} %) by "
-        f"{name} = {values[-1]:.8g} ({moved:+.3f} %); by the first sensitivity alone: "
-        f"{values[1]:.8g}, which gives {100 * (steps[1].quantity / first.quantity - 1):+.2f} %"
+    name, unit = design.asked, f" {design.unit}".rstrip()
+    values = [design.measure(step.value) for step in steps]
+    lines = [f"p_s = {p.sealed_pressure:g} MPa, U = {sign * p.speeds[0]:+g} mm/s"]
+    lines += [
+        f"  {name} = {value:.8g}{unit}: {target.quantity} = {step.quantity:.5g} {_of(target)}"
+        for step, value in zip(steps, values, strict=True)
+    ]
+    moved = 100.0 * (values[-1] / values[0] - 1.0)
+    alone = 100.0 * (steps[1].quantity / first.quantity - 1.0)
+    lines.append(
+        f"{target.quantity} {design.change:+.2f} % (wanted {target.percent:+g} %) by {name} = "
+        f"{values[-1]:.8g}{unit} ({moved:+.3f} %); by the first sensitivity alone: "
+        f"{values[1]:.8g}{unit}, which gives {alone:+.2f} %"
     )
+    if design.asked in BASES:
+        lines.append(f"{design.key} from {first.value:.5g} to {last.value:.5g} mm")
+    return lines
+
+
+def _of(target: Target) -> str:
+    return CALLED[target.quantity][1]

@@ -19,7 +19,16 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import FieldRates, Inputs, weighted
 from softehl.runtime.fem.problem import Problem
 
-QUANTITIES = ("h_star", "friction", "leakage", "p_max", "contact_width")
+CALLED = {
+    "h_star": ("film thickness h*", "um"),
+    "friction": ("friction", "N"),
+    "leakage": ("leakage of the stroke", "mm3/s"),
+    "p_max": ("largest film pressure", "MPa"),
+    "contact_width": ("contact width", "mm"),
+}
+"""Names of the quantities -> what a reader calls them, and their unit in `curve.csv`."""
+
+QUANTITIES = tuple(CALLED)
 """Names of the quantities."""
 
 

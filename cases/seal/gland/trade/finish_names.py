@@ -11,9 +11,11 @@ from softehl.cases.seal.gland.trade.text import NUMBER, plain, refused
 RMS_OF_RA = sqrt(0.5 * pi)
 """Rms height over mean height (Ra) of a surface whose heights have a normal distribution."""
 
+_UNIT = "um|nm|uin|microinch(?:es)?|mm"
+_SMOOTH = 1.0  # rms height below which a number without a unit is in um, not in microinches
 _FINISH = re.compile(
-    rf"(?P<kind>R[a-z]{{1,3}}\d?)[ =<:]*(?P<height>{NUMBER}) ?(?P<unit>um|nm|uin|mm)?"
-    rf"|(?P<height2>{NUMBER}) ?(?P<unit2>um|nm|uin|mm)? ?(?P<kind2>R[a-z]{{1,3}}\d?)",
+    rf"(?P<kind>R[a-z]{{1,3}}\d?)(?: max\.?)?[ =<\u2264:]*(?P<height>{NUMBER}) ?(?P<unit>{_UNIT})?"
+    rf"|(?P<height2>{NUMBER}) ?(?P<unit2>{_UNIT})? ?(?P<kind2>R[a-z]{{1,3}}\d?)",
     re.IGNORECASE,
 )
 
@@ -24,15 +26,21 @@ def read_finish(given: str) -> float | None:
     Raises NotUnderstoodError.
     """
     text = plain(given)
-    if re.fullmatch(rf"{NUMBER} ?(um|nm|uin|mm)?", text):
+    if re.fullmatch(rf"{NUMBER} ?({_UNIT})?", text):
         return None
     found = _FINISH.fullmatch(text)
     if not found:
+        if re.search(r"\d ?/ ?R", text):
+            why = "has two finishes; write those of rod and seal"
+            raise refused("roughness", given, why, "Ra 0.1 and Ra 0.4")
         if re.fullmatch(r"N ?(1[0-2]|[1-9])", text, re.IGNORECASE):
             raise refused("roughness", given, "is a grade of ISO 1302, a band of Ra", "Ra 0.2")
         raise refused("roughness", given, "is no finish in um", "Ra 0.2", "Rq 0.25", "0.25 um")
     kind, unit = found["kind"] or found["kind2"], found["unit"] or found["unit2"] or "um"
     height = read_quantity(f"{found['height'] or found['height2']} {unit.lower()}", "um")
+    if kind.lower() == "rms" and height >= _SMOOTH and not (found["unit"] or found["unit2"]):
+        why = "is in micrometres or in microinches; write the unit"
+        raise refused("roughness", given, why, f"Rq {height:g} um", f"Rq {height:g} uin")
     if kind.lower() == "ra":
         return round(RMS_OF_RA * height, 6)
     if kind.lower() in ("rq", "rms"):

@@ -38,8 +38,9 @@ DEVIATIONS: dict[str, tuple[int, ...]] = {
 A hole of the same letter has its lower limit as far above it; js and JS lie around it.
 """
 
-_SIZE = rf"(?P<size>{NUMBER}) ?(?:mm)?"
+_SIZE = rf"(?:d ?|dia\.? ?)?(?P<size>{NUMBER}) ?(?:mm)?"
 _CLASS = re.compile(rf"{_SIZE}[ -]*(?P<letter>[A-Za-z]{{1,2}}) ?(?P<grade>\d{{1,2}})")
+_ENDS = re.compile(rf"(?P<low>{NUMBER}) ?(?:mm)? ?(?:to|\.\.+|-|bis) ?(?P<high>{NUMBER}) ?(?:mm)?")
 _BOTH = re.compile(rf"{_SIZE} ?[A-Za-z]{{1,2}} ?\d{{1,2}} ?/ ?[A-Za-z]{{1,2}} ?\d{{1,2}}")
 _EQUAL = re.compile(rf"{_SIZE} ?(?:±|\+ ?/? ?-) ?(?P<by>{NUMBER}) ?(?:mm)?")
 _LIMITS = re.compile(
@@ -71,7 +72,13 @@ def read_fit(key: str, given: str, *, hole: bool = False) -> Band | None:
 
     hole: whether the size is that of a hole, whose classes have capital letters.
     """
-    text = plain(given)
+    text = re.sub(
+        r" ?[(](?:ISO 286[^)]*|(?P<limits>[^)]*))[)]$", r" \g<limits>", plain(given)
+    ).strip()
+    if found := _ENDS.fullmatch(text):
+        low, high = float(found["low"]), float(found["high"])
+        if 0.9 * high < low <= high:
+            return Band(round(0.5 * (low + high), 6), low, high)
     if found := _CLASS.fullmatch(text):
         return _class(key, given, found, hole)
     if found := _BOTH.fullmatch(text):

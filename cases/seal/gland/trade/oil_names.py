@@ -12,6 +12,9 @@ from softehl.cases.seal.gland.trade.text import NUMBER, plain, refused
 IMPROVED = 140.0
 """Least viscosity index of HVLP oils, DIN 51524-3."""
 
+GRADES = (10, 15, 22, 32, 46, 68, 100, 150, 220, 320)
+"""Grades of ISO 3448 that are known here."""
+
 TWO = "46 cSt at 40 degC, 6.8 cSt at 100 degC"
 """Two viscosities, as an example."""
 
@@ -31,11 +34,15 @@ class OilName:
     improved: bool = False
 
 
-_MINERAL = r"HLP-?D|HLP|HL|HM|CLP|CL|HH|hydraulic oil"
+_STANDARD = re.compile(
+    r"(?:DIN ?51524(?:-\d)?|ISO ?(?:6743|11158)(?:-\d)?|JIS)[ ,:]*", re.IGNORECASE
+)
+_MINERAL = r"HLP-?D|HLP|HL|(?:L-)?HM|CLP|CL|HH|AW|hydraulic oil"
 _IMPROVED = r"HVLP-?D|HVLP"
 _ISO = r"ISO[ -]?VG|VG|ISO"
 _DEGREE = r"(?:deg ?C|° ?C|C)"
-_AT = rf"(?:[ ,]*(?:at|@|/)? ?(?P<at>-?{NUMBER}) ?{_DEGREE})?"
+_WARM = rf"(?P<at>-?{NUMBER}) ?(?:{_DEGREE}|(?P<f>(?:deg ?|° ?)?F))"
+_AT = rf"(?:[ ,]*(?:at|@|/|bei)? ?[(]?{_WARM}[)]?)?"
 _GRADE = re.compile(
     rf"(?P<plain>ISO[ -]?)?(?:(?P<improved>{_IMPROVED})|(?P<mineral>{_MINERAL}))?[ -]*"
     rf"(?P<iso>{_ISO})?[ -]*"
@@ -43,7 +50,7 @@ _GRADE = re.compile(
     re.IGNORECASE,
 )
 _POINT = re.compile(
-    rf"(?P<nu>{NUMBER}) ?(?:cSt|mm\^?2/s) ?(?:at|@|/)? ?(?P<at>-?{NUMBER}) ?{_DEGREE}",
+    rf"(?P<nu>{NUMBER}) ?(?:cSt|mm\^?2/s) ?(?:at|@|/|bei)? ?{_WARM}",
     re.IGNORECASE,
 )
 _GREASE = re.compile(r".*\b(?:grease|NLGI|Fett|lithium soap|molykote)\b.*", re.IGNORECASE)
@@ -56,13 +63,13 @@ _OTHER = re.compile(
 
 def read_oil_name(given: str) -> OilName:
     """The oil of a name.  Raises NotUnderstoodError."""
-    text = plain(given)
+    text = _STANDARD.sub("", plain(given))
     found = _GRADE.fullmatch(text)
     if found and any(found[k] for k in ("plain", "improved", "mineral", "iso")):
         return _of_grade(found)
     points = [_POINT.fullmatch(part.strip()) for part in re.split(r"[;,]| and ", text)]
     if len(points) == 2 and all(points):
-        pairs = tuple((float(p["nu"]), float(p["at"])) for p in points if p)
+        pairs = tuple((float(p["nu"]), _celsius(p)) for p in points if p)
         for nu, at in pairs:
             if not (0.7 < nu < 1e6 and -60.0 <= at <= 300.0):
                 raise refused("oil", given, f": {nu:g} cSt at {at:g} degC is out of range", TWO)
@@ -77,10 +84,16 @@ def dynamic(given: str) -> float | None:
     return None
 
 
+def _celsius(found: re.Match[str]) -> float:
+    """The temperature of a name, degC."""
+    at = float(found["at"])
+    return round((at - 32.0) / 1.8, 6) if found["f"] else at
+
+
 def _of_grade(found: re.Match[str]) -> OilName:
     improved = bool(found["improved"] and not found["index"])
     index = float(found["index"]) if found["index"] else IMPROVED if improved else None
-    at = float(found["at"]) if found["at"] else None
+    at = _celsius(found) if found["at"] else None
     return OilName(int(found["grade"]), index, temperature=at, improved=improved)
 
 
@@ -93,16 +106,18 @@ def _unknown(given: str, text: str) -> Exception:
         )
         return refused("oil", given, why, TWO)
     numbers = [int(n) for n in re.findall(r"(?<![\d.])\d+(?![\d.])", text)]
-    grade = next((n for n in numbers if 5 <= n <= 1500), 46)
+    grade = next((n for n in numbers if n in GRADES), 46)
     forms = (f"ISO VG {grade}", f"HLP {grade}", f"HVLP {grade}", TWO)
     if found := _OTHER.fullmatch(text):
         kind = found["kind"] or found["word"]
         if kind.upper() == "HV":
             return refused("oil", given, "does not say its viscosity index", *forms[2:])
-        why = "is no mineral oil: write two viscosities of its data sheet"
+        why = "says no viscosity of its own: write two of its data sheet"
         return refused("oil", given, why, TWO)
     if re.search(r"cSt|mm\^?2/s", text, re.IGNORECASE):
         why = "is not understood (one viscosity says nothing of another temperature)"
+    elif re.search(r"[A-Za-z]{3,}", text):
+        why = "is not understood; of a brand write the ISO VG of its data sheet"
     else:
         why = "is not understood"
     return refused("oil", given, why, *forms)

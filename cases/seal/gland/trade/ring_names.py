@@ -30,23 +30,27 @@ class RingName:
 _KINDS: tuple[tuple[str, Kind], ...] = (
     (r"O[- ]?rings?|ORs?|O[- ]?seals?|RORs?|toroidal seals?", "round"),
     (
-        r"X[- ]?rings?|quad[- ]?rings?|quad seals?|4[- ]?lobe(?:d)?(?: rings?)?|Q-?(?=4\d\d\d)",
+        r"X[- ]?rings?|XRs?|quad[- ]?(?:rings?|seals?)|4[- ]?lobe(?:d)?(?: rings?)?|Q-?(?=4\d\d\d)",
         "x_ring",
     ),
     (r"U[- ]?cups?|U[- ]?rings?|U[- ]?seals?|lip seals?|Nutring", "u_cup"),
 )
 _STANDARD = re.compile(
-    r"\b(?:(?:DIN|EN|BS|GOST R)[ -]?)*ISO[ -]?3601(?:-[1-5](?!\d))?(?:[:-](?:19|20)\d\d)?"
-    r"|\bDIN[ -]?3771(?:-[1-5](?!\d))?|\bGB/?T[ -]?3452(?:\.1)?",
+    r"\b(?:(?:DIN|EN|BS|GOST R)[ -]?)*ISO[ -]?3601(?:-[1-5][AB]?(?!\d))?(?:[:-](?:19|20)\d\d)?"
+    r"|\bDIN[ -]?377[01](?:-[1-5](?!\d))?|\bGB/?T[ -]?3452(?:\.1)?",
     re.IGNORECASE,
 )
 _DASH = re.compile(
-    r"(?P<said>(?:SAE )?AS[ -]?568[A-G]?(?: dash| no\.?)?|ARP ?568|BS(?: ?1806)?|Parker"
+    r"(?P<said>(?:SAE )?AS[ -]?568[A-G]?(?: dash| no\.?)?|ARP ?568|#|BS(?: ?1806)?|Parker"
     r"|dash|size|no\.?)?"
     r"[ -]*?(?P<dash>2-|-)?(?P<number>\d{1,3})[AB]?",
     re.IGNORECASE,
 )
 _QUAD = re.compile(r"4(?P<number>\d{3})")
+_COMPOUND = re.compile(
+    r"(?P<ring>.*\d)[ ,;/-]+(?P<rubber>(?:[XH]?NBR|F?FKM|FPM|EPDM|F?VMQ|PUR?|CR|ACM)[ -]?\d\d\b.*)",
+    re.IGNORECASE,
+)
 _SIZE = re.compile(
     rf"(?:\d{{3}}[AB][ -]+)?(?:ID|d1)?[ =]*(?P<inner>{NUMBER}) ?(?:mm)?x(?P<section>{NUMBER})"
     rf" ?(?:mm)?(?:x(?P<third>{NUMBER}) ?(?:mm)?)?(?:[ -]+[NS])?",
@@ -88,7 +92,7 @@ def read_ring(given: str) -> RingName:
                 *(f"AS568-{int(found['number']):03d}", f"{found['number']}x3.55"),
             )
         return RingName(number=int(found["number"]), kind=kind)
-    raise _unknown(given, rest)
+    raise _unknown(given, rest, kind)
 
 
 def _without_kind(text: str) -> tuple[str, Kind | None]:
@@ -102,13 +106,19 @@ def _without_kind(text: str) -> tuple[str, Kind | None]:
     return (left if re.fullmatch(r"-\d+", left) else left.strip(" ,;:-")), None
 
 
-def _unknown(given: str, rest: str) -> Exception:
+def _unknown(given: str, rest: str, kind: Kind | None) -> Exception:
     usual = ("36x4", "ISO 3601 50.4x3.55", "AS568-226")
+    if found := _COMPOUND.fullmatch(rest):
+        ring = found["ring"].strip(" ,;-/")
+        why = f"has its rubber in it, which is another key: material = {found['rubber']!r}"
+        return refused("ring", given, why.replace("'", '"'), ring)
     if found := re.fullmatch(r"(?:JIS ?(?:B ?2401)? ?)?([PGVS])-? ?(\d+)A?", rest, re.IGNORECASE):
         size = f"{found[1].upper()}{found[2]}"
         why = f"is a size of JIS B 2401 ({size}), whose diameters are not in the catalogue"
         return refused("ring", given, why, *usual[:2])
-    sizes = re.findall(NUMBER, rest)[-2:]
+    sizes = re.findall(NUMBER, rest)
+    if len(sizes) == 3 and (kind == "u_cup" or re.search(r"\dx[\d.]+x\d", rest)):
+        return refused("ring", given, "is not known", f"U-cup {'x'.join(sizes)}")
     if len(sizes) == 2 and not re.search(r'"|/|\bin', rest):
         large, small = sorted(map(float, sizes), reverse=True)
         return refused("ring", given, "is not known", f"{large:g}x{small:g}", usual[2])

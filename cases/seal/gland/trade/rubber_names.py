@@ -25,27 +25,34 @@ RANGES: dict[str, tuple[float, float] | None] = {
 _ALIASES = {
     "NBR": ("nitrile", "Buna[ -]?N", "Perbunan", "acrylonitrile"),
     "FKM": ("FPM", "Viton"),
+    "HNBR": ("H-NBR",),
     "EPDM": ("EPM",),
     "VMQ": ("MVQ", "silicone"),
-    "PU": ("PUR", "TPU", "AU", "EU", "TPE-?U", "polyurethane", "urethane"),
+    "PU": ("PUR", "TPU", "AU", "EU", "TPE-?U", "polyurethane?", "urethane"),
+    "ACM": ("polyacrylate",),
     "CR": ("neoprene", "chloroprene"),
     "FFKM": ("Kalrez",),
     "NR": ("natural rubber",),
 }
 _SPELT = {word: name for name in RANGES for word in (name, *_ALIASES.get(name, ()))}
 _POLYMER = rf"(?P<name>{'|'.join(sorted(_SPELT, key=len, reverse=True))})"
-_UNIT = r"(?:°|deg)? ?(?:(?:sh(?:ore)?\.?)? ?-?(?P<scale>[AD])|sh(?:ore)?|IRHD|duro(?:meter)?)"
+_UNIT = (
+    r"(?:°|deg)? ?(?:(?:sh(?:ore)?\.?)? ?-?(?P<scale>[AD])|sh(?:ore)?|IRHD|duro(?:meter)?"
+    r"|JIS[ -]?A|Hs)|°"
+)
 _SHORE = rf"(?P<shore>{NUMBER})(?: ?{_UNIT})?"
 _FORMS = tuple(
     re.compile(form, re.IGNORECASE)
     for form in (
         rf"{_POLYMER}(?:[ /-]*{_SHORE})?",
-        rf"{_SHORE}[ /-]+{_POLYMER}",
+        rf"{_SHORE}[ /-]*{_POLYMER}",
         rf"{_POLYMER}[ ,/-]+(?:sh(?:ore)?) ?(?P<scale>[AD])[ =]*(?P<shore>{NUMBER})",
         r"(?P<shore>\d+(?:\.\d+)?) ?" + _UNIT,
-        rf"(?:sh(?:ore)?\.?) ?(?P<scale>[AD])[ =]*(?P<shore>{NUMBER})",
+        rf"(?:sh(?:ore)?\.?|JIS) ?(?P<scale>[AD])[ =]*(?P<shore>{NUMBER})",
+        rf"sh(?:ore)? ?(?P<shore>{NUMBER}) ?(?P<scale>[AD])",
     )
 )
+_SHORT = {"N": "NBR", "V": "FKM", "E": "EPDM", "S": "VMQ"}
 _PLASTICS = re.compile(r"(?:PTFE|Teflon|POM|PA ?6?|PEEK|UHMW-?PE)\b.*", re.IGNORECASE)
 
 
@@ -73,7 +80,13 @@ def read_rubber(key: str, given: str) -> RubberName | None:
         raise refused(
             key, given, "is a plastic, no rubber: it may be a cap, cap_thickness and materials.cap"
         )
-    if shore := re.search(r"\d+", text):
+    if short := re.fullmatch(r"([NVES]) ?-?(\d\d)", text, re.IGNORECASE):
+        name = _SHORT[short[1].upper()]
+        raise refused(key, given, "is a maker's short name", f"{name} {short[2]}")
+    if found := re.match(rf"{_POLYMER}[ /-]*(?P<shore>\d\d)\b", text, re.IGNORECASE):
+        shorter = _read(key, given, found.groupdict()).text
+        raise refused(key, given, "says more than polymer and hardness", shorter)
+    if shore := re.search(r"(?<!\d)[1-9]\d(?!\d)", text):
         forms = ("NBR 70", "FKM 75", "EPDM 80", "PU 95", f"{shore[0]} Shore A")
         raise refused(key, given, "names no polymer that is known here", *forms)
     return None

@@ -10,12 +10,13 @@ from collections.abc import Iterator
 from typing import Any
 
 from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.harness.units import is_quantity
 from softehl.cases.seal.gland.given import put
 from softehl.cases.seal.gland.trade.finish_names import RMS_OF_RA, read_finish
 from softehl.cases.seal.gland.trade.fit_names import Band, read_fit
 from softehl.cases.seal.gland.trade.oil_names import dynamic
 from softehl.cases.seal.gland.trade.rubber_names import read_rubber
-from softehl.cases.seal.gland.trade.text import NUMBER, NotUnderstoodError, plain
+from softehl.cases.seal.gland.trade.text import NUMBER, NotUnderstoodError, plain, refused
 
 LENGTHS = {
     **{"rod": "rod_diameter", "rod_diameter": "rod_diameter"},
@@ -110,8 +111,11 @@ def _length(name: str, values: dict[str, Any]) -> list[str]:
     if re.fullmatch(rf"{NUMBER} ?(mm)?", text):
         values[name] = float(text.removesuffix("mm"))
         return []
-    if read_fit(name, values[name], hole=name not in _SHAFTS) is None:
-        return []
+    hole = name not in _SHAFTS
+    if read_fit(name, values[name], hole=hole) is None:
+        if is_quantity(text):
+            return []
+        raise refused(name, values[name], "is no size", "36 mm", f"36 {'H8' if hole else 'f7'}")
     del values[name]
     return [f"{name} = {text}"]
 

@@ -6,9 +6,10 @@ import re
 import unicodedata
 
 _SIGNS = str.maketrans(
-    {"\u00d7": "x", "\u2715": "x", "\u03bc": "u"} | dict.fromkeys("\u2300\u2205\u00d8\u00f8", " ")
+    {"\u00d7": "x", "\u2715": "x", "\u03bc": "u"}
+    | dict.fromkeys("\u2300\u2205\u00d8\u00f8\u03a6\u03c6\u00ae\u2122", " ")
 )
-"""Times, micro; diameter."""
+"""Times, micro; diameter, also as a Greek letter, and marks."""
 
 _DASHES = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "-"))
 _COMMA = re.compile(r"(?<=\d),(?=\d)")
