@@ -24,7 +24,10 @@ def equations(statement: Statement) -> System:
         raise StudyError("there are no elements: add a page, study.add('body', 'solid.py')")
     mesh, pages = statement.mesh, statement.blocks.values()
     elements = [Elements(b.name, b.nodes, b.slots, b.shared) for b in pages]
-    numbering = Numbering.of(len(mesh.points), elements)
+    try:
+        numbering = Numbering.of(len(mesh.points), elements)
+    except ValueError as error:
+        raise StudyError(str(error)) from None
     for c in statement.conditions:
         _require(c.name, c.nodes, numbering, c.words, every=False)
     forces, implied = _forces(statement, numbering)
@@ -111,8 +114,7 @@ class _Writer:
         )
 
     def force(self, force: Force) -> ElementBlock:
-        columns = [self.numbering.nodal[name][force.nodes] for name in force.names]
-        dofs = np.stack(columns, axis=2).reshape(len(force.nodes), -1)
+        dofs = self.numbering.at(force.names, force.nodes)
         places = self.mesh.points[force.nodes].reshape(len(dofs), -1)
         if isinstance(force.kernel, Tie):
             places = self.mesh.points[force.nodes[:, 0]]
