@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,14 +19,17 @@ from softehl.runtime.statement.records import Block, Force, Statement, StudyErro
 from softehl.runtime.system import System
 
 
-def equations(statement: Statement) -> System:
-    """Equations of a statement.  Raises StudyError for what does not fit together."""
+def equations(statement: Statement, fields: Mapping[str, Sequence[str]] | None = None) -> System:
+    """Equations of a statement; fields: see `Numbering.of`.
+
+    Raises StudyError for what does not fit together.
+    """
     if not statement.blocks:
         raise StudyError("there are no elements: add a page, study.add('body', 'solid.py')")
     mesh, pages = statement.mesh, statement.blocks.values()
-    elements = [Elements(b.name, b.nodes, b.slots, b.shared) for b in pages]
+    elements = [Elements(b.name, b.nodes, b.slots, b.shared, b.form.places) for b in pages]
     try:
-        numbering = Numbering.of(len(mesh.points), elements)
+        numbering = Numbering.of(len(mesh.points), elements, fields)
     except ValueError as error:
         raise StudyError(str(error)) from None
     for c in statement.conditions:
@@ -110,6 +114,9 @@ class _Writer:
         return ElementBlock(
             *(block.name, block.kernel, places, self.numbering.dofs[block.name]),
             data=data,
+            rule=block.form.rule,
+            constant=block.form.constant,
+            point_data=block.initial,
             check_orientation=facet_nodes(block.kernel) is None,
         )
 
