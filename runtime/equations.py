@@ -116,7 +116,6 @@ class _Writer:
             data=data,
             rule=block.form.rule,
             constant=block.form.constant,
-            point_data=block.initial,
             check_orientation=facet_nodes(block.kernel) is None,
         )
 

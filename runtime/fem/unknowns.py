@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -68,6 +69,11 @@ class Elements:
     slots: tuple[Slot, ...]
     shared: frozenset[str] = frozenset()
     along: Mapping[str, Integers] = field(default_factory=lambda: MappingProxyType({}))
+
+    @cached_property
+    def own(self) -> dict[str, None]:
+        """Names of the unknowns without a node, in their order."""
+        return dict.fromkeys(slot.name for slot in self.slots if slot.node is None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +161,7 @@ def _present(points: int, blocks: Sequence[Elements]) -> dict[str, Flags]:
 
 def _others(blocks: Sequence[Elements]) -> dict[str, int]:
     """Numbers of the unknowns of elements, and of those along elements, by name."""
-    own = dict.fromkeys(s.name for block in blocks for s in block.slots if s.node is None)
+    own = dict.fromkeys(name for block in blocks for name in block.own)
     found = {name: _first(name, blocks, None) for name in own}
     for block in blocks:
         for name, places in block.along.items():
@@ -170,7 +176,7 @@ def _first(name: str, blocks: Sequence[Elements], until: Elements | None) -> int
 
     The one that blocks share comes first.
     """
-    users = [b for b in blocks if Slot(name, None) in b.slots]
+    users = [block for block in blocks if name in block.own]
     count = int(any(name in user.shared for user in users))
     for user in users:
         if user is until:

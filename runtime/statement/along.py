@@ -26,8 +26,8 @@ def placed(
     StudyError.
     """
     own = [s for s in slots if s.node is None and s.name in form.along]
-    rest = tuple(s for s in slots if s not in own)
-    names = [name for name in form.along if name not in [s.name for s in own]]
+    rest, standing = tuple(s for s in slots if s not in own), [s.name for s in own]
+    names = [name for name in form.along if name not in standing]
     if bool(names) != bool(kernel.interpolated) or (*rest, *own) != tuple(slots):
         has = kernel.interpolated or listed([s.name for s in slots if s.node is None])
         example = f", as in along={{{kernel.interpolated!r}: 2}}" if kernel.interpolated else ""
@@ -35,7 +35,7 @@ def placed(
             f"{block!r}: along = {listed(form.along)}; {kernel.name} has {has} along "
             f"its elements{example}"
         )
-    places = {name: _places(block, name, nodes, given) for name, given in form.along.items()}
+    places = {n: _places(block, n, nodes, form.along[n]) for n in (*standing, *names)}
     orders = [places[name].shape[1] - 1 for name in names]
     rule = form.rule or (_rule(block, kernel, orders) if names else None)
     count = sum(places[name].shape[1] for name in names)
