@@ -97,14 +97,14 @@ class Study(Paths, Fitted):
         the elements themselves, an array (n, k) of node numbers. shared: unknowns without a node
         that are one for all elements, not one for each. called: name of an unknown on the page ->
         its name in the study. along: fields that the page interpolates along its lines -> order of
-        their polynomials, continuous where lines meet; or places (n, m) of their unknowns, counted
-        from 0, which blocks share. rule: of quadrature, instead of the page's own. constant: the
-        tangent does not depend on unknowns; it is evaluated once. given: parameters of the page
-        (numbers, or functions of the load factor) and its data (a number, (n,) numbers or a
-        function of the elements' centres (n, dim)). A page of fields on several kinds of cells
-        makes a block of each, "body:quad4", "body:tri3". Two are not given: `dt` is the length of a
-        step of `march`, `rate` comes from `Model.rates`. Raises StudyError, MeshError, or what is
-        wrong with the page.
+        their polynomials, which have nodal unknowns at both ends of a line; or places (n, m) of
+        their unknowns, counted from 0, which blocks share. rule: of quadrature, instead of the
+        page's own. constant: the tangent does not depend on unknowns; it is evaluated once. given:
+        parameters of the page (numbers, or functions of the load factor) and its data (a number,
+        (n,) numbers or a function of the elements' centres (n, dim)). A page of fields on several
+        kinds of cells makes a block of each, "body:quad4", "body:tri3". Two are not given: `dt` is
+        the length of a step of `march`, `rate` comes from `Model.rates`. Raises StudyError,
+        MeshError, or what is wrong with the page.
         """
         blocks = self._statement.blocks
         if name in blocks:

@@ -1,8 +1,8 @@
-"""Fields that a page interpolates along its elements: places of their unknowns, and the rule."""
+"""Fields that a page interpolates along its elements: where their unknowns stand, and the rule."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,14 +16,14 @@ from softehl.runtime.statement.records import Form, StudyError
 
 
 def placed(
-    block: str, kernel: Kernel, nodes: Integers, slots: Sequence[Slot], form: Form
+    block: str, kernel: Kernel, count: int, slots: Sequence[Slot], form: Form
 ) -> tuple[tuple[Slot, ...], Form]:
-    """Slots that are not along the elements, and the form with the places of those that are.
+    """Slots of unknowns at nodes and of elements, and the form with the places of all others.
 
-    An order stands for polynomials of this order that are continuous where elements have an end in
-    common: their values at the Gauss-Lobatto points, those at the ends first, in the order of their
-    nodes. An unknown of the element may stand at a place of a field of other elements. Raises
-    StudyError.
+    count: of the elements. An order stands for a polynomial by its values at the Gauss-Lobatto
+    points of a line: the first and the last are unknowns of its two nodes, those between them of
+    the element ("p:1", ...). An unknown of an element may be the one at a place of a field of other
+    elements. Raises StudyError.
     """
     own = [s for s in slots if s.node is None and s.name in form.along]
     rest, standing = tuple(s for s in slots if s not in own), [s.name for s in own]
@@ -35,16 +35,39 @@ def placed(
             f"{block!r}: along = {listed(form.along)}; {kernel.name} has {has} along "
             f"its elements{example}"
         )
-    places = {n: _places(block, n, nodes, form.along[n]) for n in (*standing, *names)}
-    orders = [places[name].shape[1] - 1 for name in names]
-    rule = form.rule or (_rule(block, kernel, orders) if names else None)
-    count = sum(places[name].shape[1] for name in names)
-    if names and (rule is None or rule.basis is None or rule.basis.shape[1] != count):
-        there = 0 if rule is None or rule.basis is None else rule.basis.shape[1]
+    orders = _orders(block, kernel, form.along)
+    along = [f for name, order in orders.items() for f in _by_order(name, order)]
+    places = {} if orders else {n: _places(block, n, count, form.along[n]) for n in form.along}
+    places = {name: places[name] for name in (*standing, *names) if name in places}
+    widths = [orders[n] + 1 if orders else places[n].shape[1] for n in names]
+    rule = form.rule or (_rule(block, kernel, [w - 1 for w in widths]) if names else None)
+    functions = 0 if rule is None or rule.basis is None else rule.basis.shape[1]
+    if names and functions != sum(widths):
         raise StudyError(
-            f"{block!r}: an element has {count} unknowns along it, the rule {there} functions"
+            f"{block!r}: an element has {sum(widths)} unknowns along it, the rule {functions} "
+            "functions"
         )
-    return rest, replace(form, along=places, rule=rule)
+    return (*rest, *along), replace(form, along=places, rule=rule)
+
+
+def _by_order(name: str, order: int) -> tuple[Slot, ...]:
+    """Unknowns of a polynomial along a line, from its first node to its second."""
+    inner = (Slot(f"{name}:{k}", None) for k in range(1, order))
+    return (Slot(name, 0), *inner, Slot(name, 1))
+
+
+def _orders(block: str, kernel: Kernel, along: Mapping[str, int | Integers]) -> dict[str, int]:
+    """Orders of the fields; none where places are given.  Raises StudyError."""
+    orders = {n: given for n, given in along.items() if isinstance(given, int)}
+    if orders and (len(orders) < len(along) or kernel.nodes < 2):
+        raise StudyError(
+            f"{block!r}: along = {listed(along)}: orders for all of them, on lines of 2 nodes or "
+            "more, or places for all of them"
+        )
+    for name, order in orders.items():
+        if order < 1:
+            raise StudyError(f"{block!r}: along {name!r}: order {order}, must be at least 1")
+    return orders
 
 
 def _rule(block: str, kernel: Kernel, orders: Sequence[int]) -> Rule:
@@ -60,20 +83,14 @@ def _rule(block: str, kernel: Kernel, orders: Sequence[int]) -> Rule:
     return rules[0] if len(rules) == 1 else several(*rules)
 
 
-def _places(block: str, name: str, nodes: Integers, given: int | Integers) -> Integers:
+def _places(block: str, name: str, count: int, given: int | Integers) -> Integers:
     """Places (n, m) of a field, counted from 0.  Raises StudyError."""
-    n = len(nodes)
-    if isinstance(given, int):
-        if given < 1:
-            raise StudyError(f"{block!r}: along {name!r}: order {given}, must be at least 1")
-        ends, numbers = np.unique(nodes[:, :2], return_inverse=True)
-        first, last = numbers.reshape(n, 2).T
-        inner = len(ends) + np.arange(n * (given - 1)).reshape(n, given - 1)
-        return np.column_stack([first, inner, last])
     places = np.asarray(given)
-    if places.dtype.kind not in "iu" or places.ndim != 2 or len(places) != n or (places < 0).any():
+    if places.dtype.kind not in "iu" or places.ndim != 2 or len(places) != count:
         raise StudyError(
-            f"{block!r}: along {name!r}: an order, or numbers of places from 0 on, ({n}, m); given "
+            f"{block!r}: along {name!r}: an order, or numbers of places ({count}, m); given "
             f"{places.dtype} of shape {places.shape}"
         )
+    if places.size and places.min() < 0:
+        raise StudyError(f"{block!r}: along {name!r}: places are counted from 0")
     return places

@@ -121,7 +121,7 @@ def page_on(
     told = tuple(Slot(form.called.get(s.name, s.name), s.node) for s in found)
     form = replace(form, shared=frozenset(form.called.get(s, s) for s in form.shared))
     previous, rates, accelerations = _automatic(kernel, found, told)
-    told, form = placed(name, kernel, nodes, told, form)
+    told, form = placed(name, kernel, len(nodes), told, form)
     known("argument", given, _arguments(kernel), kernel.name)
     timed = {"rate": rates, "acceleration": accelerations}
     automatic = ("dt", *(p for p, slots_of in timed.items() if slots_of))

@@ -71,24 +71,29 @@ def test_a_field_along_lines_of_order_3_is_exact_for_a_cubic(places: Any) -> Non
     assert abs(coarse.solve().fields("line")["p"][:, 0] - found["p"][:, 0]).max() > 1e-4
 
 
-def test_elements_at_places_of_a_field_and_the_start_from_a_result() -> None:
+def test_ends_of_a_field_along_lines_are_unknowns_of_nodes() -> None:
+    """p'' = 0 between 2 and 5, in a chain of lines whose numbers do not follow each other."""
+    points = np.array([[0.0], [3.0], [1.0]])
+    study = Study(Mesh(points, {"line2": np.array([[2, 1], [0, 2]])}))
+    study.add("pipe", diffusion(), along={"p": 3}, c=0.0)
+    study.fix((0.0,), p=2.0)
+    study.fix((3.0,), p=5.0)
+    result = study.solve()
+    assert result.values("p") == pytest.approx([2.0, 5.0, 3.0], rel=1e-12)
+    assert result.fields("pipe")["p"] == pytest.approx(2.0 + result.fields("pipe")["x"], rel=1e-12)
+    assert beginning(study.system(), result)[1].tolist() == result.x.tolist()
+
+
+def test_elements_stand_at_places_of_a_field_of_others() -> None:
     """Two tanks and a pipe of resistance 1: flux (a - b) / (1 / k + 1 + 1 / k)."""
-    study = line()
-    study.add("pipe", diffusion(), along={"p": 2}, c=0.0)
-    for name, end, level in (("left", 0, 7.0), ("right", 2, 0.0)):
-        place = study.mesh.nodes(name)[:, None]
-        study.add(
-            name,
-            tank(),
-            on=place,
-            called={"q": "p"},
-            along={"p": np.array([[end]])},
-            k=0.4,
-            a=level,
-        )
+    study = line(1)
+    study.add("pipe", diffusion(), along={"p": np.array([[0, 1, 2]])}, c=0.0)
+    for name, place, level in (("left", 0, 7.0), ("right", 2, 0.0)):
+        along = {"p": np.array([[place]])}
+        study.add(name, tank(), on=name, called={"q": "p"}, along=along, k=0.4, a=level)
     result = study.solve()
     q = 7.0 / (1 / 0.4 + 1.0 + 1 / 0.4)
-    assert result.values("p")[[0, 2]] == pytest.approx([7.0 - q / 0.4, q / 0.4], rel=1e-12)
+    assert result.values("p") == pytest.approx([7.0 - q / 0.4, 3.5, q / 0.4], rel=1e-12)
     assert beginning(study.system(), result)[1].tolist() == result.x.tolist()
 
 
@@ -98,9 +103,9 @@ def test_lines_may_have_fields_of_their_own() -> None:
     assert study.system().numbering.layout.count("p") == 10
     found = study.solve().fields("line")
     assert found["p"].shape == (2, 5)
-    lone = line(1)  # [0, 1] and not [0, 0.5]: nothing ties the two lines
-    lone.add("line", diffusion(), along={"p": 4}, c=1.0)
-    x = lone.solve().fields("line")
+    study = line(1)  # [0, 1] and not [0, 0.5]: nothing ties the two lines
+    study.add("line", diffusion(), along={"p": 4}, c=1.0)
+    x = study.solve().fields("line")
     assert x["p"] == pytest.approx(x["x"] ** 2 * (3 - 2 * x["x"]), abs=1e-12)
     assert abs(found["p"] - found["x"] ** 2 * (3 - 2 * found["x"])).max() > 1e-3
 
@@ -142,8 +147,10 @@ def test_a_constant_tangent_is_evaluated_once(monkeypatch: pytest.MonkeyPatch) -
     [
         ({}, r"'line': along = none; diffusion has p along its elements, as in along=\{'p': 2"),
         ({"along": {"p": 0}}, r"along 'p': order 0, must be at least 1"),
+        ({"along": {"p": np.array([[0, 1], [1, -1]])}}, r"along 'p': places are counted from 0"),
+        ({"along": {"p": 2, "q": np.eye(2)}}, r"along = p, q: orders for all of them, on lines"),
         ({"along": {"p": 2, "q": 2}}, r"interpolates p: give an order for each of them, or the"),
-        ({"along": {"p": np.array([[0, 1]])}}, r"numbers of places from 0 on, \(2, m\); given int"),
+        ({"along": {"p": np.array([[0, 1]])}}, r"numbers of places \(2, m\); given int"),
         ({"along": {"p": np.array([[0], [1]])}}, r"give an order for each of them, or the rule"),
         ({"along": {"p": 2}, "rule": film_rule(3)}, r"has 3 unknowns along it, the rule 4"),
         ({"along": {"p": 2}, "called": {"r": "p"}}, r"diffusion has no unknown 'r'"),
