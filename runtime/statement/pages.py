@@ -93,8 +93,13 @@ def elements_of(mesh: Mesh, name: str, kernel: Kernel, on: On, cells: str | None
 
 
 def _listed(mesh: Mesh, name: str, kernel: Kernel, nodes: Integers) -> Integers:
-    """Elements that are given by their nodes (n, k).  Raises StudyError."""
-    if nodes.dtype.kind not in "iu" or nodes.ndim != 2 or nodes.shape[1] != kernel.nodes:
+    """Elements that are given by their nodes (n, k); (n, 0) for a page that knows of none.
+
+    Raises StudyError.
+    """
+    nowhere = not kernel.coordinates and all(slot.node is None for slot in slots(kernel))
+    widths = (kernel.nodes, 0) if nowhere else (kernel.nodes,)
+    if nodes.dtype.kind not in "iu" or nodes.ndim != 2 or nodes.shape[1] not in widths:
         raise StudyError(
             f"{name!r}: elements of {kernel.name} are given as node numbers (n, {kernel.nodes}); "
             f"given {nodes.dtype} of shape {nodes.shape}"
@@ -138,7 +143,9 @@ def page_on(
         hint = "; where t is the time or load factor, give t=lambda t: t" if "t" in missing else ""
         raise StudyError(f"{name!r}: {kernel.name} needs {', '.join(missing)}{hint}")
     own = facet_nodes(kernel)
-    centres = mesh.points[nodes if own is None else nodes[:, own]].mean(axis=1)
+    nowhere = np.full((len(nodes), mesh.dimension), np.nan)
+    around = nodes if own is None else nodes[:, own]
+    centres = mesh.points[around].mean(axis=1) if around.size else nowhere
     data = {d: datum(name, d, given[d], centres) for d in kernel.data if d in given}
     return Block(
         name=name,

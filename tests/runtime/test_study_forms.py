@@ -88,9 +88,10 @@ def test_elements_stand_at_places_of_a_field_of_others() -> None:
     """Two tanks and a pipe of resistance 1: flux (a - b) / (1 / k + 1 + 1 / k)."""
     study = line(1)
     study.add("pipe", diffusion(), along={"p": np.array([[0, 1, 2]])}, c=0.0)
-    for name, place, level in (("left", 0, 7.0), ("right", 2, 0.0)):
+    nowhere = np.empty((1, 0), dtype=np.int64)  # the page knows of no node
+    for name, on, place, level in (("in", "left", 0, 7.0), ("out", nowhere, 2, 0.0)):
         along = {"p": np.array([[place]])}
-        study.add(name, tank(), on=name, called={"q": "p"}, along=along, k=0.4, a=level)
+        study.add(name, tank(), on=on, called={"q": "p"}, along=along, k=0.4, a=level)
     result = study.solve()
     q = 7.0 / (1 / 0.4 + 1.0 + 1 / 0.4)
     assert result.values("p") == pytest.approx([7.0 - q / 0.4, 3.5, q / 0.4], rel=1e-12)

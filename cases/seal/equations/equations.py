@@ -65,7 +65,7 @@ class SealSystem(SealUnknowns):
         numbering = posed.numbering
         cells = section.coordinates("cells"), numbering.at(MOVED, section.mesh.quads)
         still = replace(
-            posed.problem(posed.still(0.0, posed.at_rest(), posed.histories())),
+            posed.resting(),
             scales={f.name: f.scale(p) for f in FIELDS if f.name in numbering.layout.names},
             absolute=True,
             guards=(KeepsOrientation(*cells),),

@@ -39,7 +39,10 @@ def seal_study(p: Seal, section: SealSection, blocks: Sequence[Block]) -> Study:
     Raises KeyError for a kernel that asks for a value that nobody gives.
     """
     places, still = _film_places(p, section), film_values(p, _STILL)
-    elements = {**section.elements, "film_nodes": _film_nodes(section, places)}
+    elements = {
+        **section.elements,
+        "film_nodes": np.empty((len(places["film_nodes"]), 0), np.int64),
+    }
     study = Study(Mesh(section.mesh.points, {"quad4": section.mesh.quads}), "axisymmetric")
     for block in blocks:
         kernel = load_kernel(block.kernel_of(p))
@@ -70,13 +73,6 @@ def _film_places(p: Seal, section: SealSection) -> Mapping[str, Integers]:
     arc = number(section.mesh.arc, p.pressure_order, 0)
     facets = np.concatenate([arc[:-1], arc[1:]], axis=1)
     return {"arc": arc, "facets": facets, "film_nodes": np.arange(arc.max() + 1)[:, None]}
-
-
-def _film_nodes(section: SealSection, places: Mapping[str, Integers]) -> Integers:
-    """A node (n, 1) near each place of a film pressure."""
-    segment = np.zeros(len(places["film_nodes"]), dtype=np.int64)
-    segment[places["arc"]] = np.arange(section.mesh.arc)[:, None]
-    return section.mesh.arc_nodes[segment][:, None]
 
 
 def _contact_constants(p: Seal, section: SealSection, block: Block) -> dict[str, Array]:
