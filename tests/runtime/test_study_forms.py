@@ -10,8 +10,10 @@ import pytest
 
 from softehl import Definition, Mesh, Model, Study, element, kinematics, load_kernel, quadrature
 from softehl.runtime.begin import beginning
+from softehl.runtime.dynamics.motion import stored_energy
 from softehl.runtime.fem.assembly import ElementBlock
 from softehl.runtime.fem.dofs import separate_dofs
+from softehl.runtime.fem.products import NoProductError, require_product
 from softehl.runtime.fem.rules import film_rule
 from softehl.runtime.study import StudyError
 
@@ -141,6 +143,46 @@ def test_a_constant_tangent_is_evaluated_once(monkeypatch: pytest.MonkeyPatch) -
         numbers.append(len(calls))
     assert found[0] == pytest.approx(found[1], rel=1e-14)
     assert numbers[1] == 1 < numbers[0]
+
+
+def test_derivatives_and_energies_know_the_rule_of_a_block() -> None:
+    """Of p at an end by c: against central differences. With 2 points they would be others."""
+
+    def solved(c: float) -> Any:
+        study = line()
+        study.add("line", diffusion(), along={"p": 4}, rule=film_rule(4, "gauss", 3), c=c)
+        return study.solve()
+
+    result, step = solved(1.0), 1e-4
+    found = result.sensitivity("p", at=(1.0,), by={"line": ["c"]})["line", "c"]
+    ends = [solved(1.0 + sign * step).values("p")[-1] for sign in (1, -1)]
+    assert found == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-6)
+    assert stored_energy(result.problem, result.x) == pytest.approx(
+        load_kernel(diffusion())
+        .energy(
+            np.array([[0.0, 0.5], [0.5, 1.0]]),
+            result.x[result.system.numbering.dofs["line"]],
+            parameters={"c": 1.0},
+            rule=film_rule(4, "gauss", 3),
+        )
+        .sum(),
+        rel=1e-12,
+    )
+
+
+def test_products_without_a_matrix_refuse_a_rule() -> None:
+    study = line()
+    study.add("line", diffusion(), along={"p": 4}, c=1.0)
+    with pytest.raises(NoProductError, match="'line': products have the quadrature of the page"):
+        require_product(study.system().assembler.block("line"))
+
+
+def test_elements_by_their_nodes_have_no_mass_by_density() -> None:
+    study = line()
+    study.add("rope", rope(), on=np.array([[0, 2]]), called={"u": "u_x"}, k=3.0)
+    study.fix("left", u_x=0.0)
+    with pytest.raises(StudyError, match="'rope': its elements are given by their nodes and have"):
+        study.solve().modes(1, mass={"rope": {"rho": 1.0}})
 
 
 @pytest.mark.parametrize(
