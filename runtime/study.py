@@ -27,6 +27,7 @@ from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.names import listed
 from softehl.runtime.paths import Paths
 from softehl.runtime.statement import given as read
+from softehl.runtime.statement.along import require_apart
 from softehl.runtime.statement.contacts import touch
 from softehl.runtime.statement.pages import (
     On,
@@ -121,6 +122,7 @@ class Study(Paths, Fitted):
             label = name if len(kernels) == 1 else f"{name}:{kernel.cell}"
             elements = elements_of(self.mesh, label, kernel, on, cells)
             block = page_on(self.mesh, label, kernel, elements, form, given)
+            require_apart(block, blocks.values())
             blocks[label] = replace(block, differentiated=origin.differentiated(kernel))
 
     def load(self, where: Where, **components: Amount) -> None:

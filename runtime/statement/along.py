@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from softehl.runtime.fem.rules import automatic_points, film_rule, several
 from softehl.runtime.fem.unknowns import Slot
 from softehl.runtime.kernels import Kernel, Rule
 from softehl.runtime.names import listed
-from softehl.runtime.statement.records import Form, StudyError
+from softehl.runtime.statement.records import Block, Form, StudyError
 
 
 def placed(
@@ -48,6 +48,23 @@ def placed(
             "functions"
         )
     return (*rest, *along), replace(form, along=places, rule=rule)
+
+
+def require_apart(block: Block, others: Iterable[Block]) -> None:
+    """Raise StudyError where two blocks on one line would have inner unknowns of their own."""
+    inner = {slot.name for slot in block.slots if slot.node is None and ":" in slot.name}
+    for other in others:
+        both = inner & {slot.name for slot in other.slots}
+        if both and _lines(block) & _lines(other):
+            field = min(both).partition(":")[0]
+            raise StudyError(
+                f"{block.name!r}: {other.name!r} has {field} along the same lines: give both the "
+                "places of its unknowns, so that they share them"
+            )
+
+
+def _lines(block: Block) -> set[tuple[int, ...]]:
+    return {tuple(sorted(ends)) for ends in block.nodes[:, :2].tolist()}
 
 
 def _by_order(name: str, order: int) -> tuple[Slot, ...]:

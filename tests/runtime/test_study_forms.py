@@ -209,6 +209,25 @@ def test_what_does_not_fit_is_refused(given: dict[str, Any], words: str) -> None
         line().add("line", diffusion(), c=1.0, **given)
 
 
+def test_two_blocks_share_a_field_along_lines_by_its_places() -> None:
+    """c = 1 in two halves on the same lines; by their orders they would not share p within them."""
+    study = line()
+    study.add("half", diffusion(), along={"p": 2}, c=0.5)
+    with pytest.raises(StudyError, match="'other': 'half' has p along the same lines: give both"):
+        study.add("other", diffusion(), along={"p": 2}, c=0.5)
+    both, whole = line(), line()
+    places = np.array([[0, 1, 2], [2, 3, 4]])
+    for name in ("half", "other"):
+        both.add(name, diffusion(), along={"p": places}, c=0.5)
+    whole.add("line", diffusion(), along={"p": places}, c=0.5)
+    assert both.solve().values("p") == pytest.approx(whole.solve().values("p"), rel=1e-12)
+    apart = line()  # one block a line
+    for cell in ([[0, 1]], [[1, 2]]):
+        apart.add(str(cell), diffusion(), on=np.array(cell), along={"p": 2}, c=0.5)
+    ends = whole.solve().values("p")[[0, 2, 4]]
+    assert apart.solve().values("p") == pytest.approx(ends, rel=1e-12)
+
+
 def test_a_page_without_a_field_along_it_is_told() -> None:
     with pytest.raises(StudyError, match=r"along = p; rope has none along its elements"):
         line().add("rope", rope(), along={"p": 2}, k=1.0)
