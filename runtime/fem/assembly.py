@@ -173,7 +173,7 @@ class ElementBlock:
         return replace(self, data=data)
 
     def given(self, parameters: Array) -> dict[str, Any]:
-        """What its kernel takes besides coordinates and unknowns."""
+        """Arguments of its kernel besides coordinates and unknowns."""
         given = {"data": self.data, "parameters": parameters, "rule": self.rule}
         return given if self.point_data is None else {**given, "point_data": self.point_data}
 

@@ -28,7 +28,7 @@ class StudyError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """How a page stands on its elements.
+    """Form of a page on its elements: names, places, quadrature.
 
     shared: unknowns without a node that are one for all elements. called: name of an unknown on the
     page -> its name in the study. along: fields that it interpolates along its elements -> places

@@ -18,7 +18,7 @@ function decorated by `softehl.page`."""
 
 @dataclass(frozen=True)
 class Origin:
-    """Where kernels come from. model: which, where a source has several. law: a stress law."""
+    """Origin of kernels. model: one of several of a source. law: it is a stress law."""
 
     source: Any
     model: str | None
