@@ -76,11 +76,15 @@ def _take_others(whole: System, before: System, x: Array, values: Array) -> None
     named = set(whole.numbering.nodal)
     for name, block in whole.blocks.items():
         own = [(k, slot) for k, slot in enumerate(block.slots) if slot.node is None]
-        named |= {slot.name for _, slot in own}
+        named |= {slot.name for _, slot in own} | block.form.places.keys()
         old = before.blocks.get(name)
-        if not own or old is None:
+        if not (own or block.form.along) or old is None:
             continue
         _require_elements(block, old)
+        for along, places in block.form.places.items():
+            if np.array_equal(places, old.form.places.get(along, ())):
+                here, there = (s.numbering.rows(name, along) for s in (whole, before))
+                x[here] = values[there]
         for k, slot in own:
             if slot in old.slots:
                 there = before.numbering.dofs[name][:, old.slots.index(slot)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,13 +19,19 @@ from softehl.runtime.statement.records import Block, Force, Statement, StudyErro
 from softehl.runtime.system import System
 
 
-def equations(statement: Statement) -> System:
-    """Equations of a statement.  Raises StudyError for what does not fit together."""
+def equations(statement: Statement, fields: Mapping[str, Sequence[str]] | None = None) -> System:
+    """Equations of a statement; fields: see `Numbering.of`.
+
+    Raises StudyError for what does not fit together.
+    """
     if not statement.blocks:
         raise StudyError("there are no elements: add a page, study.add('body', 'solid.py')")
     mesh, pages = statement.mesh, statement.blocks.values()
-    elements = [Elements(b.name, b.nodes, b.slots, b.shared) for b in pages]
-    numbering = Numbering.of(len(mesh.points), elements)
+    elements = [Elements(b.name, b.nodes, b.slots, b.shared, b.form.places) for b in pages]
+    try:
+        numbering = Numbering.of(len(mesh.points), elements, fields)
+    except ValueError as error:
+        raise StudyError(str(error)) from None
     for c in statement.conditions:
         _require(c.name, c.nodes, numbering, c.words, every=False)
     forces, implied = _forces(statement, numbering)
@@ -107,12 +114,13 @@ class _Writer:
         return ElementBlock(
             *(block.name, block.kernel, places, self.numbering.dofs[block.name]),
             data=data,
+            rule=block.form.rule,
+            constant=block.form.constant,
             check_orientation=facet_nodes(block.kernel) is None,
         )
 
     def force(self, force: Force) -> ElementBlock:
-        columns = [self.numbering.nodal[name][force.nodes] for name in force.names]
-        dofs = np.stack(columns, axis=2).reshape(len(force.nodes), -1)
+        dofs = self.numbering.at(force.names, force.nodes)
         places = self.mesh.points[force.nodes].reshape(len(dofs), -1)
         if isinstance(force.kernel, Tie):
             places = self.mesh.points[force.nodes[:, 0]]

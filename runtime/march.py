@@ -19,6 +19,7 @@ from softehl.runtime.held import require_held
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.result import Result
 from softehl.runtime.share import Share
+from softehl.runtime.solve.differences import differences
 from softehl.runtime.solve.held import FirstStep, Remembering
 from softehl.runtime.solve.homotopy import Trial, Way, walk
 from softehl.runtime.solve.newton import Newton
@@ -163,15 +164,13 @@ class March:
 
     def posed(self, system: System, clock: Clock, dt: float) -> Step:
         """The step of length dt: du/dt = rate u + rest."""
-        old = clock.states[0]
+        steps = [dt]
         if self.method == "bdf2" and len(clock.times) > 1:
-            r = dt / (clock.times[0] - clock.times[1])
-            rate = (1.0 + 2.0 * r) / (1.0 + r) / dt
-            weights: tuple[float, ...] = -(1.0 + r) / dt, r * r / (1.0 + r) / dt
-            rest = (r * r / (1.0 + r) * clock.states[1] - (1.0 + r) * old) / dt
-        else:
-            rate, weights, rest = 1.0 / dt, (-1.0 / dt,), -old / dt
-        return Step(clock.t + dt, 1.0, old, rate, rest, dt, clock.histories, weights=weights)
+            steps.append(clock.times[0] - clock.times[1])
+        rate, *weights = differences(steps).tolist()
+        rest = np.einsum("k,kn->n", weights, clock.states[: len(weights)])
+        old, history = clock.states[0], clock.histories
+        return Step(clock.t + dt, 1.0, old, rate, rest, dt, history, weights=tuple(weights))
 
     def factor(self, system: System, clock: Clock, step: Step, x: Array) -> float:
         """By how much the next step may be longer; below 1 where the error is too large."""

@@ -12,6 +12,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.fem.mass import PARAMETER, Mass, interpolation, mass_matrices
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.names import listed, meant
 from softehl.runtime.statement.given import datum, known
 from softehl.runtime.statement.records import Block, StudyError
@@ -54,6 +55,11 @@ def _elements(system: System, block: Block, values: Mapping[str, Any]) -> Elemen
     at = [slot.name for slot in block.slots if slot.node is not None]
     names = _names(system, block, at, values.get("of"))
     count = at.count(names[0])
+    if count > len(CELLS[block.kind].nodes):
+        raise StudyError(
+            f"mass of {block.name!r}: its elements are given by their nodes and have no cells; put "
+            "a page or the mass on cells, or write accelerations into the page"
+        )
     nodes = block.nodes[:, :count]
     centres = system.mesh.points[block.nodes].mean(axis=1)
     density = datum(f"mass of {block.name}", "rho", values["rho"], centres)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Literal, cast
 
@@ -33,9 +33,13 @@ class Paths:
 
     _statement: Statement
 
-    def system(self) -> System:
-        """Equations of the study.  Raises StudyError for what does not fit together."""
-        return equations(self._statement)
+    def system(self, fields: Mapping[str, Sequence[str]] | None = None) -> System:
+        """Equations of the study.  Raises StudyError for what does not fit together.
+
+        fields: name of a field -> its unknowns, which are then numbered node by node, the fields in
+        this order and before all other unknowns; left out, each unknown is a field.
+        """
+        return equations(self._statement, fields)
 
     def solve(
         self,

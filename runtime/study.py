@@ -12,48 +12,44 @@ Unknowns have the names that the pages give them; equal names on equal nodes are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
-from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from softehl.runtime.arrays import Integers
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.fit.fitted import Fitted
-from softehl.runtime.kernels import Kernel
+from softehl.runtime.kernels import Kernel, Rule
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.names import listed
 from softehl.runtime.paths import Paths
 from softehl.runtime.statement import given as read
+from softehl.runtime.statement.along import require_apart
 from softehl.runtime.statement.contacts import touch
 from softehl.runtime.statement.pages import (
+    On,
     beside_of,
     elements_of,
     geometry_of,
-    is_folder,
     kinds_of,
     page_on,
-    require_page,
     wants_traces,
 )
 from softehl.runtime.statement.records import (
     Condition,
     Datum,
     Force,
+    Form,
     Start,
     Statement,
     StudyError,
     Where,
     shown,
 )
-
-Source: TypeAlias = "str | Path | Kernel | object"
-"""A model file, a folder of generated C, the name of a shipped kernel, a kernel, a Definition, or a
-function decorated by `softehl.page`."""
+from softehl.runtime.statement.sources import Origin, Source
 
 
 @dataclass(eq=False)
@@ -83,10 +79,14 @@ class Study(Paths, Fitted):
         source: Source = None,
         *,
         material: Source = None,
-        on: str | Predicate | None = None,
+        on: On = None,
         cells: str | None = None,
         model: str | None = None,
         shared: Sequence[str] = (),
+        called: Mapping[str, str] | None = None,
+        along: Mapping[str, int | Integers] | None = None,
+        rule: Rule | None = None,
+        constant: bool = False,
         **given: Any,
     ) -> None:
         """Elements of a page on all cells, on a group of cells, or `on` a side.
@@ -94,13 +94,18 @@ class Study(Paths, Fitted):
         source: a page (file or function), a folder that `softehl generate` wrote, a Definition, a
         kernel, or the name of one that ships; a page of fields stands on any kind of cell.
         material: instead, a stress law (file or function) for a body of it. model: which, where
-        there are several. shared: unknowns without a node that are one for all elements, not one
-        for each. given: parameters of the page (numbers, or functions of the load factor) and its
-        data (a number, (n,) numbers or a function of the elements' centres (n, dim)). A page of
-        fields on several kinds of cells makes a block of each, "body:quad4", "body:tri3". Two
-        are not given: `dt` is the length of a step
-        of `march`, `rate` comes from `Model.rates`. On a side, a page of one node has an element at
-        each node. Raises StudyError, MeshError, or what is wrong with the page.
+        there are several. on: a side, on which a page of one node has an element at each node; or
+        the elements themselves, an array (n, k) of node numbers. shared: unknowns without a node
+        that are one for all elements, not one for each. called: name of an unknown on the page ->
+        its name in the study. along: fields that the page interpolates along its lines -> order of
+        their polynomials, which have nodal unknowns at both ends of a line; or places (n, m) of
+        their unknowns, counted from 0, which blocks share. rule: of quadrature, instead of the
+        page's own. constant: the tangent does not depend on unknowns; it is evaluated once. given:
+        parameters of the page (numbers, or functions of the load factor) and its data (a number,
+        (n,) numbers or a function of the elements' centres (n, dim)). A page of fields on several
+        kinds of cells makes a block of each, "body:quad4", "body:tri3". Two are not given: `dt` is
+        the length of a step of `march`, `rate` comes from `Model.rates`. Raises StudyError,
+        MeshError, or what is wrong with the page.
         """
         blocks = self._statement.blocks
         if name in blocks:
@@ -108,22 +113,17 @@ class Study(Paths, Fitted):
         if (source is None) == (material is None):
             raise StudyError(f"{name!r}: give a page or material=..., one of them")
         law = material is not None
-        page = material if law else source
-        kinds = kinds_of(self.mesh, on, cells)
-        try:
-            kernels = [self._loaded(page, model, kinds[0] if kinds else None, law=law)]
-        except ValueError as error:
-            if on is None or not wants_traces(error):
-                raise
-            kinds = beside_of(self.mesh, on)
-            kernels = [self._loaded(page, model, kinds[0], law=law)]
-        if kernels[0].cell and not isinstance(page, Kernel):
-            kernels += [self._loaded(page, model, kind, law=law) for kind in kinds[1:]]
+        origin = Origin(
+            material if law else source, model, geometry_of(self.mesh, self.geometry), law
+        )
+        form = Form(frozenset(shared), called or {}, along or {}, rule, constant)
+        kernels = self._kernels(origin, on, cells)
         for kernel in kernels:
             label = name if len(kernels) == 1 else f"{name}:{kernel.cell}"
             elements = elements_of(self.mesh, label, kernel, on, cells)
-            block = page_on(self.mesh, label, kernel, elements, shared, given)
-            blocks[label] = replace(block, differentiated=self._later(page, model, kernel, law))
+            block = page_on(self.mesh, label, kernel, elements, form, given)
+            require_apart(block, blocks.values())
+            blocks[label] = replace(block, differentiated=origin.differentiated(kernel))
 
     def load(self, where: Where, **components: Amount) -> None:
         """Dead loads per reference length or area of a side, or forces at a place or nodes.
@@ -254,41 +254,19 @@ class Study(Paths, Fitted):
         """True if sides are those of rings."""
         return self.geometry == "axisymmetric"
 
-    def _loaded(self, source: Source, model: str | None, kind: str | None, *, law: bool) -> Kernel:
-        """By the front door, which knows when the generator is needed: this room does not."""
-        if isinstance(source, Kernel):
-            return source
-        require_page(source)
-        import softehl
-
-        return softehl.load_kernel(
-            source,  # type: ignore[arg-type]
-            model,
-            cell=kind,
-            geometry=geometry_of(self.mesh, self.geometry),
-            materials=law,
-        )
-
-    def _later(
-        self, source: Source, model: str | None, kernel: Kernel, law: bool
-    ) -> Callable[[], Kernel] | None:
-        """Maker of the kernel of derivatives of a page, which is derived when it is asked for."""
-        if isinstance(source, Kernel) or is_folder(source):
-            return None
-        if "pseudo_load" in kernel.tasks and not kernel.point_data:
-            return None  # it comes with what is needed
-        import softehl
-
-        return cache(
-            lambda: softehl.load_kernel(
-                source,  # type: ignore[arg-type]
-                model or (None if kernel.cell else kernel.name),
-                cell=kernel.cell or None,
-                geometry=geometry_of(self.mesh, self.geometry),
-                materials=law,
-                derivatives=True,
-            )
-        )
+    def _kernels(self, origin: Origin, on: On, cells: str | None) -> list[Kernel]:
+        """Kernels of a page on the kinds of cells or faces that are meant."""
+        kinds = kinds_of(self.mesh, on, cells)
+        try:
+            kernels = [origin.loaded(kinds[0] if kinds else None)]
+        except ValueError as error:
+            if on is None or isinstance(on, np.ndarray) or not wants_traces(error):
+                raise
+            kinds = beside_of(self.mesh, on)
+            kernels = [origin.loaded(kinds[0])]
+        if kernels[0].cell and not isinstance(origin.source, Kernel):
+            kernels += [origin.loaded(kind) for kind in kinds[1:]]
+        return kernels
 
     def _add_force(
         self,
@@ -304,4 +282,4 @@ class Study(Paths, Fitted):
         forces.append(Force(label, kernel, nodes, names, what, place))
 
 
-__all__ = ["MeshError", "Study", "StudyError"]
+__all__ = ["MeshError", "Source", "Study", "StudyError"]

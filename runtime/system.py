@@ -105,6 +105,10 @@ class System:
                 )
         return Step(t, t, old, 0.0, np.zeros(self.size), 0.0, histories)
 
+    def resting(self) -> Problem:
+        """The equations without time at load factor 0, at the values of the start."""
+        return self.problem(self.still(0.0, self.at_rest(), self.histories()))
+
     def committed(
         self, problem: Problem, x: Array, before: Mapping[str, Array]
     ) -> dict[str, Array]:

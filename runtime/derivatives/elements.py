@@ -78,7 +78,7 @@ class Elements:
 
     def _given(self, history: Array | None) -> dict[str, Any]:
         block = self.block
-        given = {"data": block.data, "parameters": self.parameters}
+        given = block.given(self.parameters)
         if block.point_data is None:
             return given
         moved = np.zeros_like(block.point_data) if history is None else history

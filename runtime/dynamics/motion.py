@@ -98,9 +98,7 @@ def stored_energy(problem: Problem, x: Array) -> float:
         if isinstance(kernel, Spring):
             found += float(0.5 * kernel.stiffness * np.sum(u**2))
         elif isinstance(kernel, Kernel) and has_energy(kernel):
-            given = {"data": block.data, "parameters": problem.parameters[block.name]}
-            if block.point_data is not None:
-                given["point_data"] = block.point_data
+            given = block.given(problem.parameters[block.name])
             values = kernel.energy(block.coordinates, np.ascontiguousarray(u), **given)
             found += float(values.sum())
     return found

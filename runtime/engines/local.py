@@ -78,6 +78,7 @@ def _page(block: Block, rows: Integers) -> Block:
     return replace(
         block,
         nodes=block.nodes[rows],
+        form=replace(block.form, along={n: p[rows] for n, p in block.form.places.items()}),
         data={name: values[rows] for name, values in block.data.items()},
         initial=_chosen(block.initial, rows),
     )

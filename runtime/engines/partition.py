@@ -97,7 +97,8 @@ def partition(system: System, cells: Cells, main: Integers, processes: int) -> P
     for block in system.assembler.blocks:
         if block.name not in elements:
             page = system.blocks.get(block.name)
-            at = page.nodes[:, 0] if page is not None else places[block.dofs[:, 0]]
+            stands = page is not None and page.nodes.shape[1] > 0
+            at = page.nodes[:, 0] if page and stands else places[block.dofs[:, 0]]
             elements[block.name] = node[at]
     owner = np.where(places >= 0, node[places], 0)
     loose = places < 0  # unknowns of elements: with the first element that has them

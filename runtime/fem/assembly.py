@@ -117,7 +117,7 @@ class ElementBlock:
         """Element residuals (n, ndof) at the global vector x."""
         again, dofs = self._again("residual", parameters), self._gathered(x)
         if again is None:
-            return self.kernel.residual(self.coordinates, dofs, **self._given(parameters))
+            return self.kernel.residual(self.coordinates, dofs, **self.given(parameters))
         again(dofs, values := np.empty(dofs.shape), None)
         return values
 
@@ -125,7 +125,7 @@ class ElementBlock:
         """Element residuals (n, ndof) and tangents (n, ndof, ndof) at the global vector x."""
         again, dofs = self._again("tangent", parameters), self._gathered(x)
         if again is None:
-            return self.kernel.tangent(self.coordinates, dofs, **self._given(parameters))
+            return self.kernel.tangent(self.coordinates, dofs, **self.given(parameters))
         values, tangents = np.empty(dofs.shape), np.empty((*dofs.shape, dofs.shape[1]))
         again(dofs, values, tangents)
         return values, tangents
@@ -141,7 +141,7 @@ class ElementBlock:
         known = self.calls.get(task)
         if known is None or known[0] is not parameters:
             at_rest = np.zeros(self.dofs.shape)
-            call = self.kernel.call(task, self.coordinates, at_rest, **self._given(parameters))
+            call = self.kernel.call(task, self.coordinates, at_rest, **self.given(parameters))
             known = self.calls[task] = parameters, call.again()
         return known[1]
 
@@ -172,7 +172,8 @@ class ElementBlock:
         data[:, columns] = x[self.dofs[:, [places[names[k]] for k in columns]]]
         return replace(self, data=data)
 
-    def _given(self, parameters: Array) -> dict[str, Any]:
+    def given(self, parameters: Array) -> dict[str, Any]:
+        """Arguments of its kernel besides coordinates and unknowns."""
         given = {"data": self.data, "parameters": parameters, "rule": self.rule}
         return given if self.point_data is None else {**given, "point_data": self.point_data}
 
@@ -184,7 +185,7 @@ class ElementBlock:
         if internal and not self.kernel.fields:
             values = np.empty((len(self.dofs), len(self._rule.weights), 0))
         else:
-            given = self._given(parameters)
+            given = self.given(parameters)
             values = self.kernel.fields_at(self.coordinates, x[self.dofs], **given)
         found = {name: values[:, :, i] for i, name in enumerate(self.kernel.fields)}
         for name, numbers in internal.items():

@@ -36,6 +36,10 @@ class NoProductError(ValueError):
 def require_product(block: ElementBlock) -> Kernel:
     """The kernel of a block, which has such a product.  Raises NoProductError."""
     kernel = block.kernel
+    if block.rule is not None:
+        raise NoProductError(
+            f"block {block.name!r}: products have the quadrature of the page; leave rule out"
+        )
     if isinstance(kernel, Kernel) and kernel.kept:
         return kernel
     name = getattr(kernel, "name", type(kernel).__name__)

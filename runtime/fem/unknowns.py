@@ -2,14 +2,17 @@
 
 A page calls its unknowns u_x1, u_y1, u_x2, ...: a name and the number of the element's node. Equal
 names on equal nodes are one unknown, whichever block they come from. A name without a number
-belongs to the element alone, or to all elements together where it is declared as shared.
+belongs to the element alone, or to all elements together where it is declared as shared. A field
+that a page interpolates along its elements has unknowns at places of its own, which blocks share.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
@@ -55,19 +58,29 @@ def from_names(unknowns: Sequence[str], nodes: int) -> tuple[Slot, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Elements:
-    """Elements of one block: nodes (n, k), what their unknowns are, which of them are shared."""
+    """Elements of one block: nodes (n, k), what their unknowns are, which of them are shared.
+
+    along: names of fields that are interpolated along the elements -> numbers (n, m) of their
+    places, counted from 0 in each field; blocks that name the same place share its unknown.
+    """
 
     block: str
     nodes: Integers
     slots: tuple[Slot, ...]
     shared: frozenset[str] = frozenset()
+    along: Mapping[str, Integers] = field(default_factory=lambda: MappingProxyType({}))
+
+    @cached_property
+    def own(self) -> dict[str, None]:
+        """Names of the unknowns without a node, in their order."""
+        return dict.fromkeys(slot.name for slot in self.slots if slot.node is None)
 
 
 @dataclass(frozen=True, eq=False)
 class Numbering:
     """Numbers of all unknowns.
 
-    layout: a field for each name. nodal: name -> (points,) number of the unknown at each node, -1
+    layout: its fields. nodal: name -> (points,) number of the unknown at each node, -1
     where there is none. dofs: block -> (n, ndof) element dof map.
     """
 
@@ -76,54 +89,117 @@ class Numbering:
     dofs: Mapping[str, Integers]
 
     @classmethod
-    def of(cls, points: int, blocks: Sequence[Elements]) -> Numbering:
-        """Number the unknowns of blocks of elements on so many nodes."""
-        present: dict[str, Flags] = {}
-        own: dict[str, list[Elements]] = {}
-        for block in blocks:
-            for slot in block.slots:
-                if slot.node is not None:
-                    there = present.setdefault(slot.name, np.zeros(points, dtype=bool))
-                    there[block.nodes[:, slot.node]] = True
-                else:
-                    own.setdefault(slot.name, []).append(block)
-        counts = {name: int(there.sum()) for name, there in present.items()}
-        counts |= {name: _own(name, users) for name, users in own.items()}
-        layout = DofLayout.of(**counts)
-        nodal = {}
-        for name, there in present.items():
-            nodal[name] = np.full(points, -1)
-            nodal[name][there] = layout.dofs(name)
-        dofs = {b.block: _element_dofs(b, layout, nodal, own) for b in blocks}
-        return cls(layout, nodal, dofs)
+    def of(
+        cls,
+        points: int,
+        blocks: Sequence[Elements],
+        fields: Mapping[str, Sequence[str]] | None = None,
+    ) -> Numbering:
+        """Number the unknowns of blocks of elements on so many nodes.
+
+        fields: name of a field -> names of its unknowns, which are numbered node by node. These
+        fields come first, in this order, but for those that no block has; then each other name as
+        a field of its own. Raises ValueError for a field of several names that are not at nodes.
+        """
+        there, others = _present(points, blocks), _others(blocks)
+        both = sorted(there.keys() & others.keys())
+        if both:
+            raise ValueError(
+                f"{', '.join(both)}: an unknown of nodes in one block and of elements in another; "
+                "give one of them another name"
+            )
+        counts = {name: int(found.sum()) for name, found in there.items()} | others
+        members = _members(counts, there.keys(), fields or {})
+        layout = DofLayout.of(**{f: sum(counts[n] for n in names) for f, names in members.items()})
+        nodal: dict[str, Integers] = {}
+        rows: dict[str, Integers] = {}
+        for name, names in members.items():
+            if names[0] in others:
+                rows[names[0]] = layout.dofs(name)
+                continue
+            numbers = np.full((points, len(names)), -1)
+            numbers[np.stack([there[n] for n in names], axis=1)] = layout.dofs(name)
+            nodal |= {n: np.ascontiguousarray(numbers[:, k]) for k, n in enumerate(names)}
+        nodal = {name: nodal[name] for name in there}
+        return cls(layout, nodal, {b.block: _dofs(b, blocks, nodal, rows) for b in blocks})
+
+    def at(self, names: Sequence[str], nodes: Integers) -> Integers:
+        """Numbers (n, k m) of m unknowns of nodes (n, k), node by node."""
+        return np.stack([self.nodal[name][nodes] for name in names], axis=2).reshape(len(nodes), -1)
+
+    def rows(self, block: str, field: str) -> Integers:
+        """Numbers (n, k) of the unknowns of a field in the elements of a block."""
+        part, dofs = self.layout.part(field), self.dofs[block]
+        return dofs[:, ((dofs >= part.start) & (dofs < part.stop)).all(axis=0)]
 
 
-def _own(name: str, users: Sequence[Elements]) -> int:
-    """Number of unknowns of a name without nodes."""
-    shared = any(name in user.shared for user in users)
-    return int(shared) + sum(len(u.nodes) for u in users if name not in u.shared)
+def _members(
+    known: Collection[str], at_nodes: Collection[str], fields: Mapping[str, Sequence[str]]
+) -> dict[str, list[str]]:
+    """Fields with the names of their unknowns: those that are given, then each other name."""
+    found = {field: [n for n in names if n in known] for field, names in fields.items()}
+    grouped = {unknown for names in found.values() for unknown in names}
+    for name, names in found.items():
+        if len(names) > 1 and not set(names) <= set(at_nodes):
+            raise ValueError(f"field {name!r}: {', '.join(names)} are not all at nodes")
+        if name in known and name not in grouped:
+            raise ValueError(f"field {name!r}: an unknown that is not in it has this name")
+    alone = {name: [name] for name in known if name not in grouped}
+    return {name: names for name, names in (found | alone).items() if names}
 
 
-def _element_dofs(
+def _present(points: int, blocks: Sequence[Elements]) -> dict[str, Flags]:
+    """Unknowns at nodes: name -> (points,) where there is one."""
+    found: dict[str, Flags] = {}
+    for block in blocks:
+        for slot in block.slots:
+            if slot.node is not None:
+                there = found.setdefault(slot.name, np.zeros(points, dtype=bool))
+                there[block.nodes[:, slot.node]] = True
+    return found
+
+
+def _others(blocks: Sequence[Elements]) -> dict[str, int]:
+    """Numbers of the unknowns of elements, and of those along elements, by name."""
+    own = dict.fromkeys(name for block in blocks for name in block.own)
+    found = {name: _first(name, blocks, None) for name in own}
+    for block in blocks:
+        for name, places in block.along.items():
+            if name in own:
+                raise ValueError(f"{name}: an unknown of elements and a field along them")
+            found[name] = max(found.get(name, 0), int(places.max(initial=-1)) + 1)
+    return found
+
+
+def _first(name: str, blocks: Sequence[Elements], until: Elements | None) -> int:
+    """Number of the unknowns of a name without nodes in the blocks before one of them.
+
+    The one that blocks share comes first.
+    """
+    users = [block for block in blocks if name in block.own]
+    count = int(any(name in user.shared for user in users))
+    for user in users:
+        if user is until:
+            break
+        count += len(user.nodes) if name not in user.shared else 0
+    return count
+
+
+def _dofs(
     block: Elements,
-    layout: DofLayout,
+    blocks: Sequence[Elements],
     nodal: Mapping[str, Integers],
-    own: Mapping[str, list[Elements]],
+    rows: Mapping[str, Integers],
 ) -> Integers:
-    n = len(block.nodes)
-    columns = []
+    """Element dof map (n, ndof) of a block. rows: numbers of the unknowns without nodes."""
+    n, columns = len(block.nodes), []
     for slot in block.slots:
         if slot.node is not None:
             columns.append(nodal[slot.name][block.nodes[:, slot.node]])
-            continue
-        users, numbers = own[slot.name], layout.dofs(slot.name)
-        if slot.name in block.shared:
-            columns.append(np.full(n, numbers[0]))
-            continue
-        first = int(any(slot.name in user.shared for user in users))
-        for user in users:
-            if user is block:
-                break
-            first += len(user.nodes) if slot.name not in user.shared else 0
-        columns.append(numbers[first : first + n])
+        elif slot.name in block.shared:
+            columns.append(np.full(n, rows[slot.name][0]))
+        else:
+            first = _first(slot.name, blocks, block)
+            columns.append(rows[slot.name][first : first + n])
+    columns += [column for name, places in block.along.items() for column in rows[name][places].T]
     return np.ascontiguousarray(np.stack(columns, axis=1))

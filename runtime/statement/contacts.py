@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from softehl.runtime.arrays import Integers
-from softehl.runtime.fem.unknowns import Slot
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, Predicate
 from softehl.runtime.mesh.thickness import by_normals, in_chains
 from softehl.runtime.statement.given import finite
 from softehl.runtime.statement.pages import page_on
-from softehl.runtime.statement.records import Block, StudyError, shown
+from softehl.runtime.statement.records import Block, Form, StudyError, shown
 
 MULTIPLIERS = {2: ("lambda", "tau"), 3: ("lambda", "tau_x", "tau_y", "tau_z")}
 """Unknowns of a contact by the dimension of its mesh."""
@@ -104,8 +103,6 @@ def _block(
     family = "mortar" if mesh.dimension == 2 else "touch"
     kernel = load_kernel(f"{family}_side_{len(CELLS[elements[0]].nodes)}")
     given = {"rho": 1.0, "ring": ring} if mesh.dimension == 2 else {"rho": 1.0}
-    block = page_on(mesh, label, kernel, elements, (), given)
     told = {f"u_{axis}": name for axis, name in zip("xyz", names, strict=False)}
     told |= {m: f"{name}:{m}" for m in MULTIPLIERS[mesh.dimension]}
-    slots = tuple(Slot(told[s.name], s.node) for s in block.slots)
-    return replace(block, slots=slots)
+    return page_on(mesh, label, kernel, elements, Form(called=told), given)

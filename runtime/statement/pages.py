@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.unknowns import Slot, slots
-from softehl.runtime.kernels import Kernel
+from softehl.runtime.kernels import Kernel, Rule
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.facets import beside, interior
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
+from softehl.runtime.statement.along import placed
 from softehl.runtime.statement.given import datum, known, parameter
-from softehl.runtime.statement.records import Block, StudyError
+from softehl.runtime.statement.records import Block, Form, StudyError
 
 GEOMETRIES = {1: ("solid",), 2: ("plane strain", "axisymmetric"), 3: ("solid",)}
 """Geometries of meshes by their dimension, the default first."""
 Elements = tuple[str, Integers]
 """Kind of cells or faces and their nodes (n, k)."""
+On: TypeAlias = "str | Predicate | Integers | None"
+"""A side, or the nodes (n, k) of the elements themselves; None: cells."""
 
 
 def _faces(mesh: Mesh, on: str | Predicate, kernel: Kernel) -> Mapping[str, Integers]:
@@ -28,8 +32,10 @@ def _faces(mesh: Mesh, on: str | Predicate, kernel: Kernel) -> Mapping[str, Inte
     return mesh.outer_faces(on) if kernel.cell else mesh.faces(on)
 
 
-def kinds_of(mesh: Mesh, on: str | Predicate | None, cells: str | None) -> tuple[str, ...]:
-    """The kinds of cells or faces that are meant."""
+def kinds_of(mesh: Mesh, on: On, cells: str | None) -> tuple[str, ...]:
+    """The kinds of cells or faces that are meant; none where elements are given by their nodes."""
+    if isinstance(on, np.ndarray):
+        return ()
     if on is None:
         return tuple(mesh.cells_of(cells))
     if on == "interior" and on not in mesh.sides:
@@ -55,12 +61,12 @@ def beside_of(mesh: Mesh, on: str | Predicate) -> tuple[str, ...]:
     return tuple(f"{k}_side" for k in mesh.cells if there.keys() & set(CELLS[k].faces))
 
 
-def elements_of(
-    mesh: Mesh, name: str, kernel: Kernel, on: str | Predicate | None, cells: str | None
-) -> Elements:
+def elements_of(mesh: Mesh, name: str, kernel: Kernel, on: On, cells: str | None) -> Elements:
     """The elements of a kernel.  Raises StudyError, MeshError."""
     if on is not None and cells is not None:
         raise StudyError(f"{name!r}: give cells=... or on=..., not both")
+    if isinstance(on, np.ndarray):
+        return "point1", _listed(mesh, name, kernel, on)
     if on is not None and kernel.nodes == 1:
         return "point1", mesh.nodes(on)[:, None]
     stem, _, facet = kernel.cell.partition("_")
@@ -86,20 +92,41 @@ def elements_of(
     return next(iter(fit.items()))
 
 
+def _listed(mesh: Mesh, name: str, kernel: Kernel, nodes: Integers) -> Integers:
+    """Elements that are given by their nodes (n, k); (n, 0) for a page that knows of none.
+
+    Raises StudyError.
+    """
+    nowhere = not kernel.coordinates and all(slot.node is None for slot in slots(kernel))
+    widths = (kernel.nodes, 0) if nowhere else (kernel.nodes,)
+    if nodes.dtype.kind not in "iu" or nodes.ndim != 2 or nodes.shape[1] not in widths:
+        raise StudyError(
+            f"{name!r}: elements of {kernel.name} are given as node numbers (n, {kernel.nodes}); "
+            f"given {nodes.dtype} of shape {nodes.shape}"
+        )
+    if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(mesh.points):
+        raise StudyError(f"{name!r}: node numbers go from 0 to {len(mesh.points) - 1}")
+    return nodes.astype(np.int64)
+
+
 def page_on(
     mesh: Mesh,
     name: str,
     kernel: Kernel,
     elements: Elements,
-    shared: Sequence[str],
+    form: Form,
     given: Mapping[str, Any],
 ) -> Block:
     """A block of elements with everything its page needs.  Raises StudyError."""
     kind, nodes = elements
     _require_fit(mesh, kernel)
     found = slots(kernel)
-    known("unknown", shared, [s.name for s in found if s.node is None], kernel.name)
-    previous, rates, accelerations = _automatic(kernel, found)
+    known("unknown", form.shared, [s.name for s in found if s.node is None], kernel.name)
+    known("unknown", form.called, [s.name for s in found], kernel.name)
+    told = tuple(Slot(form.called.get(s.name, s.name), s.node) for s in found)
+    form = replace(form, shared=frozenset(form.called.get(s, s) for s in form.shared))
+    previous, rates, accelerations = _automatic(kernel, found, told)
+    told, form = placed(name, kernel, len(nodes), told, form)
     known("argument", given, _arguments(kernel), kernel.name)
     timed = {"rate": rates, "acceleration": accelerations}
     automatic = ("dt", *(p for p, slots_of in timed.items() if slots_of))
@@ -116,20 +143,22 @@ def page_on(
         hint = "; where t is the time or load factor, give t=lambda t: t" if "t" in missing else ""
         raise StudyError(f"{name!r}: {kernel.name} needs {', '.join(missing)}{hint}")
     own = facet_nodes(kernel)
-    centres = mesh.points[nodes if own is None else nodes[:, own]].mean(axis=1)
+    nowhere = np.full((len(nodes), mesh.dimension), np.nan)
+    around = nodes if own is None else nodes[:, own]
+    centres = mesh.points[around].mean(axis=1) if around.size else nowhere
     data = {d: datum(name, d, given[d], centres) for d in kernel.data if d in given}
     return Block(
         name=name,
         kernel=kernel,
         nodes=nodes,
         kind=kind,
-        slots=found,
-        shared=frozenset(shared),
+        slots=told,
+        form=form,
         data=data,
         previous={d: s for d, s in previous.items() if d not in data},
         rates={d: s for d, s in rates.items() if d not in data},
         accelerations={d: s for d, s in accelerations.items() if d not in data},
-        initial=_initial(name, kernel, given, centres),
+        initial=_initial(name, kernel, given, centres, form.rule),
         parameters={p: parameter(name, p, given[p]) for p in kernel.parameters if p in given},
     )
 
@@ -141,11 +170,6 @@ def facet_nodes(kernel: Kernel) -> Integers | None:
 
 
 def _require_fit(mesh: Mesh, kernel: Kernel) -> None:
-    if kernel.interpolated is not None:
-        raise StudyError(
-            f"{kernel.name} interpolates {kernel.interpolated}: a study has unknowns at nodes "
-            "and cells only; assemble it by softehl.ElementBlock"
-        )
     if kernel.coordinates and len(kernel.coordinates) != mesh.dimension:
         raise StudyError(
             f"{kernel.name} has {len(kernel.coordinates)} coordinates a node "
@@ -157,9 +181,15 @@ def _arguments(kernel: Kernel) -> list[str]:
     return [*kernel.parameters, *kernel.data, *kernel.point_data]
 
 
-def _automatic(kernel: Kernel, found: Sequence[Slot]) -> list[dict[str, Slot]]:
-    """Data u_old1, u_rate1, u_acceleration1, ... of nodal unknowns u: what a study fills itself."""
-    nodal = {f"{s.name}{{}}{s.node + 1}": s for s in found if s.node is not None}
+def _automatic(
+    kernel: Kernel, found: Sequence[Slot], told: Sequence[Slot]
+) -> list[dict[str, Slot]]:
+    """Data u_old1, u_rate1, u_acceleration1, ... of nodal unknowns u: what a study fills itself.
+
+    found: unknowns as the page calls them; told: as the study does.
+    """
+    pairs = zip(found, told, strict=True)
+    nodal = {f"{s.name}{{}}{s.node + 1}": ours for s, ours in pairs if s.node is not None}
     tables = [
         {label.format(suffix): slot for label, slot in nodal.items()}
         for suffix in ("_old", "_rate", "_acceleration")
@@ -167,12 +197,14 @@ def _automatic(kernel: Kernel, found: Sequence[Slot]) -> list[dict[str, Slot]]:
     return [{d: table[d] for d in kernel.data if d in table} for table in tables]
 
 
-def _initial(block: str, kernel: Kernel, given: Mapping[str, Any], centres: Array) -> Array | None:
+def _initial(
+    block: str, kernel: Kernel, given: Mapping[str, Any], centres: Array, rule: Rule | None
+) -> Array | None:
     """Point data at the start, (n, points, k): numbers or functions of the centres, else zero."""
     if not kernel.point_data:
         return None
     columns = [datum(block, name, given.get(name, 0.0), centres) for name in kernel.point_data]
-    points = len(kernel.default_rule.weights)
+    points = len((rule or kernel.default_rule).weights)
     return np.repeat(np.stack(columns, axis=1)[:, None, :], points, axis=1)
 
 

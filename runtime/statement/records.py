@@ -11,7 +11,7 @@ import numpy as np
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.fem.unknowns import Slot
-from softehl.runtime.kernels import Kernel
+from softehl.runtime.kernels import Kernel, Rule
 from softehl.runtime.mesh.mesh import Mesh, Predicate
 
 Where: TypeAlias = "str | Predicate | Integers | Sequence[float]"
@@ -27,10 +27,33 @@ class StudyError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
+class Form:
+    """Form of a page on its elements: names, places, quadrature.
+
+    shared: unknowns without a node that are one for all elements. called: name of an unknown on the
+    page -> its name in the study. along: fields that it interpolates along its elements -> places
+    (n, m) of their unknowns, or an order. rule: of quadrature, None for that of the page. constant:
+    whether its tangent depends on parameters and data alone.
+    """
+
+    shared: frozenset[str] = frozenset()
+    called: Mapping[str, str] = field(default_factory=dict)
+    along: Mapping[str, int | Integers] = field(default_factory=dict)
+    rule: Rule | None = None
+    constant: bool = False
+
+    @property
+    def places(self) -> dict[str, Integers]:
+        """Places (n, m) of the fields along the elements, without those that are orders still."""
+        return {name: p for name, p in self.along.items() if not isinstance(p, int)}
+
+
+@dataclass(frozen=True, eq=False)
 class Block:
     """Elements of one page.
 
-    nodes: (n, k). kind: of the cells or faces. data: name -> (n,) of those that the user gave.
+    nodes: (n, k). kind: of the cells or faces. slots: its unknowns but for those along elements,
+    as the study calls them. data: name -> (n,) of those that the user gave.
     previous: column of the kernel's data -> name and node of the unknown whose value at the step
     before it is; rates, accelerations: likewise of what `rates` adds. initial: (n, points, k) point
     data at the start, or None.
@@ -42,7 +65,7 @@ class Block:
     nodes: Integers
     kind: str
     slots: tuple[Slot, ...]
-    shared: frozenset[str]
+    form: Form
     data: Mapping[str, Array]
     previous: Mapping[str, Slot]
     rates: Mapping[str, Slot]
@@ -50,6 +73,11 @@ class Block:
     initial: Array | None
     parameters: Mapping[str, Number]
     differentiated: Callable[[], Kernel] | None = None
+
+    @property
+    def shared(self) -> frozenset[str]:
+        """Unknowns without a node that are one for all elements."""
+        return self.form.shared
 
     @property
     def filled(self) -> dict[str, Slot]:

@@ -19,7 +19,7 @@ from softehl.cases.cycle import CASE, Cycle, cycle_row
 from softehl.cases.harness.pictures import titled
 from softehl.cases.seal.cycle import cycles
 from softehl.cases.seal.cycle.cycles import Films
-from softehl.cases.seal.cycle.motion import Motion, RodFilm, Table, differences
+from softehl.cases.seal.cycle.motion import Motion, RodFilm, Table
 from softehl.cases.seal.cycle.strip import Oil, Strip
 from softehl.cases.seal.cycle.transient import Reading
 from softehl.cases.seal.equations.system import FILM, PRESSURE, SQUEEZE, VOID
@@ -33,6 +33,7 @@ from softehl.cases.seal.report.cycle import (
 )
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_arrays, read_table
+from softehl.runtime.solve.differences import differences
 from softehl.runtime.solve.newton import Newton
 from tests.reference.calling import fitted_order
 
@@ -141,13 +142,6 @@ def test_the_frame_does_not_matter() -> None:
             .x
         )
     np.testing.assert_allclose(results[1], results[0], rtol=0, atol=1e-9 * abs(results[0]).max())
-
-
-def test_differences_are_exact_for_straight_lines_and_parabolas() -> None:
-    t = np.array([1.0, 0.7, 0.2])
-    assert differences([0.3]) @ t[:2] == pytest.approx(1.0)
-    assert differences([0.3, 0.5]) @ t**2 == pytest.approx(2.0)
-    assert differences([0.3, 0.5]).sum() == pytest.approx(0.0)
 
 
 def test_motions_repeat_and_stop_at_their_corners() -> None:

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from softehl.cases.seal.equations.declared import Block, Numbering
+from softehl.cases.seal.equations.declared import Block
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.scales import film_flux
-from softehl.cases.seal.equations.system import BLOCKS, DISPLACEMENT, FIELDS, PRESSURE
+from softehl.cases.seal.equations.system import BLOCKS, PRESSURE, ROD
 from softehl.cases.seal.section.section import seal_section
 from tests.cases.oring_cases import oring
 
@@ -21,8 +21,7 @@ TABLE_2 = {1: (1076, 109), 2: (3587, 217), 4: (12929, 433), 8: (48893, 865), 16:
 @pytest.mark.parametrize("d", TABLE_2)
 def test_unknowns_of_table_2(d: int) -> None:
     p = oring(density=1, mesh="uniform", arc_start=-34.0, arc_end=43.0)
-    section = seal_section(p, density=Fraction(d))
-    layout = Numbering.of(FIELDS, p, section).layout
+    layout = SealSystem.of(p, seal_section(p, density=Fraction(d))).layout
     total, pressures = TABLE_2[d]
     assert layout.count(PRESSURE) == pressures == 108 * d + 1
     assert layout.total == pytest.approx(total, rel=0.03)
@@ -218,8 +217,8 @@ def test_a_name_that_is_spelled_elsewhere_is_seen(source: str) -> None:
 def test_columns_of_the_film_s_dof_maps(reynolds: str) -> None:
     system = build_system(oring(density=1, pressure_order=3, reynolds=reynolds))
     film = system.problem.assembler.block("film").dofs
-    assert np.array_equal(film[:, system.columns("film", PRESSURE)], system.pressure_dofs())
-    assert film[:, system.columns("film", DISPLACEMENT)].max() < 2 * len(system.mesh.points)
+    assert np.array_equal(film[:, 4:], system.pressure_dofs())
+    assert film[:, :4].max() < 2 * len(system.mesh.points)
     x = system.at_rest()
     system.pressures(x)[:] = np.arange(system.pressure_count)
     assert x[system.film_ends].tolist() == [0.0, system.pressure_count - 1.0]
@@ -227,11 +226,9 @@ def test_columns_of_the_film_s_dof_maps(reynolds: str) -> None:
 
 
 def test_a_kernel_that_asks_for_what_nobody_gives_is_named() -> None:
-    stranger = Block("stranger", "contact", "arc", (DISPLACEMENT, PRESSURE), "film")
+    stranger = Block("stranger", "contact", "arc_nodes", (ROD,), "film")
     p = oring(density=1)
-    system = SealSystem.of(p, build_system(p).section, blocks=(*BLOCKS, stranger))
-    film = FilmLoads(1.0, "out", 400.0, np.zeros(28))
     with pytest.raises(
         KeyError, match=r"'stranger' asks for offset; cases/seal/equations/system.py gives"
     ):
-        system.film_problem(film)
+        SealSystem.of(p, seal_section(p), blocks=(*BLOCKS, stranger))

@@ -12,6 +12,7 @@ import sympy as sp
 
 from softehl import Definition, Mesh, Model, Study, element, kinematics, quadrature
 from softehl.runtime.result import Result
+from softehl.runtime.solve.differences import differences
 from softehl.runtime.solve.solution import NotConverged, Status
 from softehl.runtime.study import StudyError
 
@@ -308,3 +309,10 @@ def test_a_local_error_that_no_step_keeps_ends_a_march() -> None:
     march = study.march(dt=1e-2, until=0.1, tolerance=1e-2)
     with pytest.raises(NotConverged, match=r"refused.*the local error is above its tolerance"):
         list(march)
+
+
+def test_differences_are_exact_for_straight_lines_and_parabolas() -> None:
+    t = np.array([1.0, 0.7, 0.2])
+    assert differences([0.3]) @ t[:2] == pytest.approx(1.0)
+    assert differences([0.3, 0.5]) @ t**2 == pytest.approx(2.0)
+    assert differences([0.3, 0.5]).sum() == pytest.approx(0.0)

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_table
 
 _POINTS = 240  # of a sine: its speed is then right to 1e-4 of the largest
@@ -122,18 +121,6 @@ class RodFilm:
         if not self.places or not self.places[0] <= place <= self.places[-1]:
             return None
         return float(np.interp(place, self.places, self.films))
-
-
-def differences(steps: Sequence[float]) -> Array:
-    """Weights of d/dt at the newest of two (backward Euler) or three times (BDF2).
-
-    steps: the last step and, for BDF2, the one before. Newest first.
-    """
-    dt = steps[0]
-    if len(steps) == 1:
-        return np.array([1.0, -1.0]) / dt
-    r = dt / steps[1]
-    return np.array([(1.0 + 2.0 * r) / (1.0 + r), -(1.0 + r), r**2 / (1.0 + r)]) / dt
 
 
 def motion_keys(given: dict[str, Any]) -> dict[str, Any]:

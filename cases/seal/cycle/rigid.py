@@ -2,21 +2,23 @@
 
 from dataclasses import replace
 from math import exp, log
+from typing import Any
 
 import numpy as np
 
 from softehl.cases.seal.cycle.strip import Oil, Strip
-from softehl.cases.seal.equations.system import DISPLACEMENT, FILM, PRESSURE
+from softehl.cases.seal.equations.system import DISPLACEMENT, FILM, MOVED, PRESSURE
 from softehl.cases.seal.gland.profiles import Slider
 from softehl.cases.seal.gland.surfaces import Surfaces
 from softehl.runtime.fem import dofs, rules
-from softehl.runtime.fem.assembly import Assembler
-from softehl.runtime.fem.chain import chain_block
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.kernels import load_kernel
+from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Solution, Status
 from softehl.runtime.solve.steps import StepRule
+from softehl.runtime.study import Study
 
 _SOFT = 1e-8  # of the penalty, where the path begins
 _STIFFER = StepRule(log(100.0), log(2.0))  # longer first steps cost twice the iterations
@@ -42,24 +44,27 @@ def conserving_problem(p: Slider, speed: float, alpha: float) -> Problem:
 
 def film_problem(p: Slider, speed: float, alpha: float) -> Problem:
     """The film between its end pressures (alpha = 0: the reduced ones), on a rod of radius zero."""
-    x, m_p, dg = p.nodes, p.pressure_order, p.reynolds == "dg"
-    nodes, oil = np.stack([x, p.gap(x)], axis=1), np.array([0.0, speed, p.viscosity, alpha])
-    numbers = (dofs.separate_dofs if dg else dofs.chain_dofs)(p.segments, m_p, nodes.size)
-    layout = dofs.DofLayout.of(displacement=nodes.size, pressure=numbers.max() + 1 - nodes.size)
-    film = chain_block(f"film{p.film_suffix}", nodes, numbers, rules.film_rule(m_p))
-    blocks = [replace(film, name=FILM)]
-    thinning = p.thinning_values(p.viscosity)
-    own = [thinning[name] for name in film.kernel.parameters if name in thinning]
-    parameters = {FILM: np.concatenate([oil, [p.cavitation_penalty, 1.0, 1.0], own])}
+    x, order, dg = p.nodes, p.pressure_order, p.reynolds == "dg"
+    chain = np.arange(p.segments)[:, None] + np.arange(3)
+    places = (dofs.separate_dofs if dg else dofs.chain_dofs)(p.segments, order, 0)
+    film, thinning = load_kernel(f"film{p.film_suffix}"), p.thinning_values(p.viscosity)
+    oil: dict[str, Any] = {"rod_radius": 0.0, "rod_speed": speed, "viscosity": p.viscosity}
+    oil["pressure_viscosity"] = alpha
+    weights = {"cavitation_penalty": p.cavitation_penalty, "force_weight": 1.0, "shear_weight": 1.0}
+    values = {**oil, **weights, **thinning}
+    given = {name: values[name] for name in film.parameters}
+    study = Study(Mesh(np.stack([x, p.gap(x)], axis=1), {"line2": chain[:, :2]}))
+    study.add(FILM, film, along={PRESSURE: places}, rule=rules.film_rule(order), **given)
     if dg:
-        parameters["film_facet"] = oil
-        sides = np.hstack([numbers[:-1], numbers[1:]])
-        blocks.append(chain_block("film_facet", nodes, sides, rules.facet_rule(m_p)))
+        sides, rule = np.hstack([places[:-1], places[1:]]), rules.facet_rule(order)
+        facet, inner = load_kernel("film_facet"), chain[:-1]
+        study.add("film_facet", facet, on=inner, along={PRESSURE: sides}, rule=rule, **oil)
+    study.fix(np.arange(len(x)), u_z=0.0, u_r=0.0)
     ends = np.array([p.start_pressure, p.end_pressure])
     if p.pressure_viscosity and not alpha:
         ends = -np.expm1(-p.pressure_viscosity * ends) / p.pressure_viscosity
-    problem = Problem(Assembler.build(layout.total, blocks), layout, parameters, {})
-    return problem.with_fixed([layout.dofs(DISPLACEMENT), numbers[[0, -1], [0, -1]]], [0.0, ends])
+    problem = study.system({DISPLACEMENT: MOVED}).resting()
+    return problem.also_fixed(problem.layout.dofs(PRESSURE)[[0, -1]], ends)
 
 
 def conserving_solution(p: Slider, speed: float) -> tuple[Problem, Solution]:

@@ -4,17 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from softehl.cases.seal.equations import scales
-from softehl.cases.seal.equations.system import DISPLACEMENT, FILM, PRESSURE, SQUEEZE, VOID
+from softehl.cases.seal.equations.system import (
+    DISPLACEMENT,
+    FILM,
+    MOVED,
+    PRESSURE,
+    SQUEEZE,
+    VOID,
+)
 from softehl.cases.seal.gland.surfaces import PRESSURE_SCALE, VOID_SCALE, Surfaces, void_values
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem import dofs, rules
-from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
+from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.study import Study
 
 CAVITATION = "cavitation"
 """Block of the condition of cavitation."""
@@ -68,42 +77,35 @@ class Strip:
 
         Everything is free but the place of the surfaces; `between` prescribes the ends.
         """
-        n, m = len(self.x), self.unknowns
-        nodes = np.stack([self.x, self.h], axis=2).reshape(n, 4)
-        moved = np.arange(4 * n).reshape(n, 4)
-        pressures = dofs.chain_dofs(n, self.order, 4 * n)
-        film = dofs.gather_rows(moved, pressures, pressures + m)
-        voids = dofs.gather_rows(4 * n + np.arange(m), 4 * n + m + np.arange(m))
+        n, order = len(self.x), self.order
+        places, each = dofs.chain_dofs(n, order, 0), np.arange(self.unknowns)[:, None]
         rough = bool(self.surfaces.sigma)
         flow = load_kernel("film_rough" if rough else f"film_conserving{self.oil.suffix}")
-        content = load_kernel("film_squeeze_rough" if rough else "film_squeeze")
-        history = np.zeros((n, self.order + 1, 1))
-        blocks = [
-            ElementBlock(
-                *(FILM, flow, nodes, film, np.zeros((n, 2))),
-                rule=rules.rupture_rule(self.order, polynomial=False),
-            ),
-            ElementBlock(CAVITATION, load_kernel("film_void"), np.empty((m, 0)), voids),
-            ElementBlock(
-                *(SQUEEZE, content, nodes, film),
-                rule=rules.content_rule(self.order),
-                point_data=history,
-            ),
-        ]
-        layout = dofs.DofLayout.of(**{DISPLACEMENT: 4 * n, PRESSURE: m, VOID: m})
-        values = {
+        values: dict[str, Any] = {
             **{"rod_radius": 0.0, "rod_speed": speed, "viscosity": self.oil.viscosity},
             **{"pressure_viscosity": self.oil.alpha, "force_weight": 0.0, "shear_weight": 0.0},
-            **{"rate": 0.0, **self.oil.thinning, **self.surfaces.values()},
+            **self.oil.thinning,
+            **self.surfaces.values(),
         }
-        chosen = {name: values[name] for name in flow.parameters}
-        return Problem(
-            Assembler.build(layout.total, blocks),
-            layout,
-            {FILM: chosen, CAVITATION: void_values(self.oil.cavitation_pressure)},
-            {DISPLACEMENT: 1.0, PRESSURE: self._fluxes(speed, pressures - 4 * n), VOID: 1.0},
-            absolute=True,
+        points = np.stack([self.x, self.h], axis=2).reshape(2 * n, 2)
+        study = Study(Mesh(points, {"line2": np.arange(2 * n).reshape(n, 2)}))
+        along, rule = {PRESSURE: places, VOID: places}, rules.rupture_rule(order, polynomial=False)
+        known = {name: value for name, value in values.items() if name in flow.parameters}
+        study.add(FILM, flow, along=along, rule=rule, **known)
+        study.add(
+            *(CAVITATION, load_kernel("film_void")),
+            on=np.empty((len(each), 0), np.int64),
+            called={"p": PRESSURE, "v": VOID},
+            along={PRESSURE: each, VOID: each},
+            **dict[str, Any](void_values(self.oil.cavitation_pressure)),
         )
+        content = load_kernel("film_squeeze_rough" if rough else "film_squeeze")
+        held = {name: values.get(name, 0.0) for name in content.parameters}
+        study.add(SQUEEZE, content, along=along, rule=rules.content_rule(order), **held)
+        problem = study.system({DISPLACEMENT: MOVED}).resting()
+        sizes: dict[str, float | Array] = {DISPLACEMENT: 1.0, VOID: 1.0}
+        sizes[PRESSURE] = self._fluxes(speed, places)
+        return replace(problem, scales=sizes, absolute=True).with_parameters(**{SQUEEZE: None})
 
     def _fluxes(self, speed: float, rows: Integers) -> Array:
         """Sizes (unknowns,) of the fluxes, mm^2/s; rows: unknowns of the segments, from 0."""

@@ -13,7 +13,7 @@ from math import nan
 
 import numpy as np
 
-from softehl.cases.seal.cycle.motion import Motion, RodFilm, differences
+from softehl.cases.seal.cycle.motion import Motion, RodFilm
 from softehl.cases.seal.cycle.strip import missing
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.layers import film_layer
@@ -23,6 +23,7 @@ from softehl.cases.seal.states.results import rough_numbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layer, Layered
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.solve.differences import differences
 from softehl.runtime.solve.homotopy import Trial, Way, followed
 from softehl.runtime.solve.predictor import through
 from softehl.runtime.solve.record import End, Record

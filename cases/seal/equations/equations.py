@@ -9,13 +9,14 @@ from fractions import Fraction
 import numpy as np
 
 from softehl.cases.seal.equations import scales
-from softehl.cases.seal.equations.declared import Block, Field, Numbering
+from softehl.cases.seal.equations.declared import Block
 from softehl.cases.seal.equations.loads import ContactLoads, FilmLoads
+from softehl.cases.seal.equations.study import NUMBERED, chosen, seal_study
 from softehl.cases.seal.equations.system import (
     AIR_WALL,
     AXIAL,
-    DISPLACEMENT,
     FIELDS,
+    MOVED,
     PRESSURE,
     ROD,
     ROTATION,
@@ -26,7 +27,6 @@ from softehl.cases.seal.equations.system import (
     contact_values,
     film_values,
     obstacles_of,
-    values_at_rest,
     without_contact,
 )
 from softehl.cases.seal.equations.unknowns import SealUnknowns
@@ -34,11 +34,9 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.section.section import SealSection, seal_section
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.assembly import Assembler, Memo
-from softehl.runtime.fem.contact import Obstacle, contact_data, tributary_areas
+from softehl.runtime.fem.contact import Obstacle, tributary_areas
 from softehl.runtime.fem.guards import ChangesLittle, Guard, KeepsOrientation, StaysPositive
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.kernels import load_kernel
 
 _STEP = 0.9  # of its thickness a film may lose in an iteration
 _ROUGH_STEP = 0.7  # of its thickness that of a rough film may change, at least by sigma
@@ -59,53 +57,30 @@ class SealSystem(SealUnknowns):
 
     @classmethod
     def of(
-        cls,
-        p: Seal,
-        section: SealSection,
-        fields: tuple[Field, ...] = FIELDS,
-        blocks: tuple[Block, ...] | None = None,
+        cls, p: Seal, section: SealSection, blocks: tuple[Block, ...] | None = None
     ) -> SealSystem:
         """The system of a case on a section."""
-        numbering = Numbering.of(fields, p, section)
         present = tuple(b for b in blocks or blocks_of(p) if b.needed(p))
-        constants = _contact_constants(p, section, present)
-        elements = [numbering.element_block(b, p, constants.get(b.name)) for b in present]
-        cells = section.coordinates("cells"), numbering.rows(DISPLACEMENT, "cells")
-        problem = Problem(
-            assembler=Assembler.build(numbering.layout.total, elements),
-            layout=numbering.layout,
-            parameters={},
-            scales={name: u.field.scale(p) for name, u in numbering.unknowns.items()},
+        posed = seal_study(p, section, present).system(NUMBERED)
+        numbering = posed.numbering
+        cells = section.coordinates("cells"), numbering.at(MOVED, section.mesh.quads)
+        still = replace(
+            posed.resting(),
+            scales={f.name: f.scale(p) for f in FIELDS if f.name in numbering.layout.names},
             absolute=True,
             guards=(KeepsOrientation(*cells),),
         )
-        system = cls(p, section, numbering, present, obstacles_of(p), problem)
-        return replace(system, problem=system._at_rest())
+        off = {block.name: None for block in present if block.group in ("film", "squeeze")}
+        system = cls(p, section, numbering, present, obstacles_of(p), still.with_parameters(**off))
+        films = [system.layout.dofs(field.name) for field in system.film_fields()]
+        return replace(system, problem=system.problem.with_fixed(films, [0.0] * len(films)))
 
     def moved(self, p: Seal, section: SealSection) -> SealSystem:
-        """The system of other numbers on the same mesh with its nodes moved; nothing is checked."""
-        constants = _contact_constants(p, section, self.blocks)
-        assembler, stays = self.problem.assembler, section is self.section
-        placed = [
-            section.coordinates(d.elements)
-            if d.elements in section.elements and not stays
-            else b.coordinates
-            for b, d in zip(assembler.blocks, self.blocks, strict=True)
-        ]
-        elements = tuple(
-            replace(b, coordinates=at, data=constants.get(b.name, b.data))
-            for b, at in zip(assembler.blocks, placed, strict=True)
-        )
-        cells = section.coordinates("cells"), self.numbering.rows(DISPLACEMENT, "cells")
-        problem = replace(
-            self.problem,
-            assembler=replace(assembler, blocks=elements, memo=Memo()),
-            guards=(KeepsOrientation(*cells),),
-        )
-        system = replace(
-            self, parameters=p, section=section, obstacles=obstacles_of(p), problem=problem
-        )
-        return replace(system, problem=system._at_rest())
+        """The system of other numbers on the same mesh with its nodes moved."""
+        found = SealSystem.of(p, section, self.blocks)
+        structure = self.problem.assembler.structure  # what is known of its pattern stays
+        assembler = replace(found.problem.assembler, structure=structure)
+        return replace(found, problem=replace(found.problem, assembler=assembler))
 
     @property
     def pressure_boundary(self) -> int:
@@ -142,10 +117,6 @@ class SealSystem(SealUnknowns):
         nodes, segments = self.section.chains[WALLS[name]]
         areas = tributary_areas(self.mesh.points, segments, nodes)
         return float(self.pressing(name, x) @ areas)
-
-    def columns(self, block: str, field: str) -> slice:
-        """Columns of the unknowns of a field in the dof map of a block."""
-        return self.numbering.columns(self._block(block), field)
 
     # --- loads ------------------------------------------------------------------------------------
 
@@ -193,7 +164,7 @@ class SealSystem(SealUnknowns):
         surfaces; between rough ones, which may interpenetrate, it changes little at a time.
         """
         nodes = self.mesh.arc_nodes
-        radii = self.layout.part(DISPLACEMENT).start + 2 * nodes + 1
+        radii = self.numbering.nodal["u_r"][nodes]
         gaps = self.mesh.points[nodes, 1] - self.rod_radius
         if self.parameters.rough:
             return ChangesLittle(radii, gaps, _ROUGH_STEP, self.parameters.surfaces.sigma)
@@ -204,22 +175,16 @@ class SealSystem(SealUnknowns):
 
         gap: (arc nodes,) film thickness, mm, near enough.
         """
-        unknowns, arc = self.numbering.unknowns[PRESSURE], self.mesh.points[self.mesh.arc_nodes]
+        p, arc = self.parameters, self.mesh.points[self.mesh.arc_nodes]
         h, dx = np.maximum(gap[1:], gap[:-1]), np.linalg.norm(np.diff(arc, axis=0), axis=1)
-        driven = scales.pressure_flux(h, dx, unknowns.order, self.parameters.viscosity)
-        largest = np.zeros(unknowns.count)
-        np.maximum.at(largest, unknowns.rows["arc"], driven[:, None])
+        driven = scales.pressure_flux(h, dx, p.pressure_order, p.viscosity)
+        largest = np.zeros(self.pressure_count)
+        np.maximum.at(
+            largest, self.pressure_dofs() - self.layout.part(PRESSURE).start, driven[:, None]
+        )
         return scales.film_flux(speed) + largest
 
     # --- inside -----------------------------------------------------------------------------------
-
-    def _at_rest(self) -> Problem:
-        """See `problem`."""
-        given = {b: values_at_rest(b, self.parameters, self.section) for b in self.blocks}
-        chosen = {b.name: self._chosen(b, values) for b, values in given.items() if values}
-        problem = self.problem.with_parameters(**chosen)
-        pressures = [field.name for field in self.film_fields()]
-        return problem.with_fixed([self.layout.dofs(n) for n in pressures], [0.0] * len(pressures))
 
     def _film_parameters(self, film: FilmLoads) -> dict[str, Values]:
         """Parameters of every term of the film."""
@@ -233,37 +198,11 @@ class SealSystem(SealUnknowns):
 
     def _chosen(self, block: Block, values: Values) -> Values:
         """Values that the kernel of a block asks for."""
-        names = self.problem.assembler.block(block.name).kernel.parameters
-        missing = [name for name in names if name not in values]
-        if missing:
-            raise KeyError(
-                f"block {block.name!r} asks for {', '.join(missing)}; "
-                f"cases/seal/equations/system.py gives {block.group} blocks {', '.join(values)}"
-            )
-        return {name: values[name] for name in names}
+        return chosen(block, self.problem.assembler.block(block.name).kernel, values)
 
     @property
     def _film_blocks(self) -> list[Block]:
         return [block for block in self.blocks if block.group == "film"]
-
-    def _block(self, name: str) -> Block:
-        (found,) = [block for block in self.blocks if block.name == name]
-        return found
-
-
-def _contact_constants(
-    p: Seal, section: SealSection, blocks: tuple[Block, ...]
-) -> dict[str, Array]:
-    """Constants (n, k) of the contact elements, by block; slip is counted from the start."""
-    obstacles, found = obstacles_of(p), {}
-    for block in (b for b in blocks if b.group == "contact"):
-        chain = section.chains[block.elements]
-        stiffness = section.node_moduli(p)[chain[0]]
-        values = contact_data(obstacles[block.name], section.mesh.points, *chain, stiffness)
-        known = dict(zip(("n_z", "n_r", "c", "area", "rho"), values.T, strict=True))
-        names, none = load_kernel(block.kernel_of(p)).data, np.zeros(len(values))
-        found[block.name] = np.stack([known.get(name, none) for name in names], axis=1)
-    return found
 
 
 def build_system(

@@ -7,7 +7,7 @@ import numpy as np
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.system import (
     AIR_WALL,
-    DISPLACEMENT,
+    MOVED,
     ROTATION,
     SEALED_WALL,
     WALLS,
@@ -25,11 +25,9 @@ def film_layer(system: SealSystem, x: Array) -> Layer:
     the ends are the film's own; all other unknowns of its blocks are prescribed. Multipliers of arc
     nodes at a wall are shared too: only the displacements of these nodes determine them.
     """
-    start, nodes = system.layout.part(DISPLACEMENT).start, system.mesh.arc_nodes
+    moved = system.numbering.at(MOVED, system.mesh.arc_nodes[:, None]).ravel()
     moment = system.layout.dofs(ROTATION)
-    shared = np.concatenate(
-        [start + 2 * nodes, start + 2 * nodes + 1, moment, _walls_of_arc(system, x)]
-    )
+    shared = np.concatenate([moved, moment, _walls_of_arc(system, x)])
     own = [system.layout.dofs(field.name) for field in system.film_fields()]
     inner = np.concatenate(own)
     if system.parameters.conserving:  # side by side along the film: their matrix is a band

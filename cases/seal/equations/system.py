@@ -31,12 +31,15 @@ Values: TypeAlias = Mapping[str, float]
 """Parameters of a kernel by their names."""
 
 
-def _segment_rule(p: Seal, order: int) -> Rule:
-    return film_rule(order, p.quadrature, p.quadrature_points)
+def _segment_rule(p: Seal) -> Rule:
+    return film_rule(p.pressure_order, p.quadrature, p.quadrature_points)
 
 
 DISPLACEMENT, PRESSURE, ROD = "displacement", "pressure", "rod"
 """Displacements; film pressures; contact multipliers of the rod."""
+
+MOVED = "u_z", "u_r"
+"""Components of a displacement."""
 
 VOID = "void"
 """Void fractions of the film, where its pressures stand."""
@@ -70,7 +73,7 @@ _RUPTURING: tuple[tuple[str, Callable[[Seal], bool]], ...] = (
 def _walls() -> Iterator[Block]:
     """Contact with each wall: plain, or with friction, or with the edge of an open gap."""
     for name, on in WALLS.items():
-        cornered, fields = name == AIR_WALL, (DISPLACEMENT, name)
+        cornered, fields = name == AIR_WALL, (name,)
 
         def plain(p: Seal, cornered: bool = cornered) -> bool:
             return not p.rubs and not (cornered and p.opens)
@@ -82,34 +85,34 @@ def _walls() -> Iterator[Block]:
 
 
 FIELDS = (
-    Field(DISPLACEMENT, "nodes", scales.force),
+    Field(DISPLACEMENT, "nodes", scales.force, MOVED),
     Field(PRESSURE, "film", scales.largest_flux),
-    Field(VOID, "film", scales.void, needed=lambda p: p.conserving),
+    Field(VOID, "film", scales.void),
     Field(ROD, "arc_nodes", scales.gap),
     *(Field(name, nodes, scales.gap) for name, nodes in WALLS.items()),
-    *(Field(SHEAR[name], nodes, scales.gap, needed=_rubs) for name, nodes in WALLS.items()),
+    *(Field(SHEAR[name], nodes, scales.gap) for name, nodes in WALLS.items()),
     Field(ROTATION, "section", scales.rotation),
     Field(AXIAL, "section", scales.place),
 )
 
 BLOCKS = (
-    Block(SOLID, "{solid}", BODY, (DISPLACEMENT,), "solid"),
-    Block("sealed_side", "follower_pressure", "sealed_side", (DISPLACEMENT,), "load"),
-    Block("sealed_arc", "follower_pressure", "sealed_arc", (DISPLACEMENT,), "load", layer=True),
-    Block(ROD, "contact", "arc_nodes", (DISPLACEMENT, ROD), "contact", layer=True),
+    Block(SOLID, "{solid}", BODY, (), "solid"),
+    Block("sealed_side", "follower_pressure", "sealed_side", (), "load"),
+    Block("sealed_arc", "follower_pressure", "sealed_arc", (), "load", layer=True),
+    Block(ROD, "contact", "arc_nodes", (ROD,), "contact", layer=True),
     *_walls(),
     Block(
-        *(FILM, "film{oil}", "arc", (DISPLACEMENT, PRESSURE), "film"),
+        *(FILM, "film{oil}", "arc", (PRESSURE,), "film"),
         layer=True,
         needed=lambda p: not p.conserving,
         rule=_segment_rule,
     ),
     *(
         Block(
-            *(FILM, f"film_{kind}", "arc", (DISPLACEMENT, PRESSURE, VOID), "film"),
+            *(FILM, f"film_{kind}", "arc", (PRESSURE, VOID), "film"),
             layer=True,
             needed=needed,
-            rule=lambda _, order: rupture_rule(order),
+            rule=lambda p: rupture_rule(p.pressure_order),
         )
         for kind, needed in _RUPTURING
     ),
@@ -120,33 +123,33 @@ BLOCKS = (
     ),
     *(
         Block(
-            *(SQUEEZE, f"film_squeeze{kind}", "arc", (DISPLACEMENT, PRESSURE, VOID), "squeeze"),
+            *(SQUEEZE, f"film_squeeze{kind}", "arc", (PRESSURE, VOID), "squeeze"),
             layer=True,
             needed=needed,
-            rule=lambda _, order: content_rule(order),
+            rule=lambda p: content_rule(p.pressure_order),
         )
         for kind, needed in zip(("", "_rough"), (n for _, n in _RUPTURING), strict=True)
     ),
     Block(
-        *("upwind", "film_upwind", "arc", (DISPLACEMENT, PRESSURE), "film"),
+        *("upwind", "film_upwind", "arc", (PRESSURE,), "film"),
         layer=True,
         needed=lambda p: p.upwinding != 0.0 and not p.rough,
         rule=_segment_rule,
     ),
     Block(
-        *("upwind", "film_upwind_rough", "arc", (DISPLACEMENT, PRESSURE), "film"),
+        *("upwind", "film_upwind_rough", "arc", (PRESSURE,), "film"),
         layer=True,
         needed=lambda p: p.upwinding != 0.0 and p.rough,
         rule=_segment_rule,
     ),
     Block(
-        *(FACET, "film_facet", "facets", (DISPLACEMENT, PRESSURE), "film"),
+        *(FACET, "film_facet", "facets", (PRESSURE,), "film"),
         layer=True,
         needed=lambda p: p.reynolds == "dg",
-        rule=lambda _, order: facet_rule(order),
+        rule=lambda p: facet_rule(p.pressure_order),
     ),
-    Block("rotation", "mean_rotation", "cells", (DISPLACEMENT, ROTATION), "support", constant=True),
-    Block("hold", "mean_axial", "cells", (DISPLACEMENT, AXIAL), "support", constant=True),
+    Block("rotation", "mean_rotation", "cells", (ROTATION,), "support", constant=True),
+    Block("hold", "mean_axial", "cells", (AXIAL,), "support", constant=True),
 )
 
 

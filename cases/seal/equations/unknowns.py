@@ -7,11 +7,13 @@ from math import pi
 
 import numpy as np
 
-from softehl.cases.seal.equations.declared import Field, Numbering
+from softehl.cases.seal.equations.declared import Field
 from softehl.cases.seal.equations.system import (
     AXIAL,
     BORE,
     DISPLACEMENT,
+    FIELDS,
+    FILM,
     PRESSURE,
     ROD,
     ROTATION,
@@ -23,6 +25,7 @@ from softehl.cases.seal.section.section import SealSection
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.contact import tributary_areas
 from softehl.runtime.fem.dofs import DofLayout
+from softehl.runtime.fem.unknowns import Numbering
 from softehl.runtime.mesh.sections import SectionMesh
 
 
@@ -91,7 +94,7 @@ class SealUnknowns:
 
     def pressure_dofs(self, field: str = PRESSURE) -> Integers:
         """Numbers (segments, m_p + 1) of the pressure unknowns of each segment of the film."""
-        return self.numbering.rows(field, "arc")
+        return self.numbering.rows(FILM, field)
 
     def pressures(self, x: Array, field: str = PRESSURE) -> Array:
         """All pressure unknowns, MPa."""
@@ -147,7 +150,7 @@ class SealUnknowns:
 
     @property
     def _fields(self) -> tuple[Field, ...]:
-        return tuple(unknowns.field for unknowns in self.numbering.unknowns.values())
+        return tuple(field for field in FIELDS if field.name in self.layout.names)
 
     def _ends(self, field: str) -> Integers:
         return self.layout.dofs(field)[[0, -1]]

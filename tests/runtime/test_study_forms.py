@@ -1,0 +1,234 @@
+"""How pages stand on elements: by nodes, by other names, along lines, by other rules."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from softehl import Definition, Mesh, Model, Study, element, kinematics, load_kernel, quadrature
+from softehl.runtime.begin import beginning
+from softehl.runtime.dynamics.motion import stored_energy
+from softehl.runtime.fem.assembly import ElementBlock
+from softehl.runtime.fem.dofs import separate_dofs
+from softehl.runtime.fem.products import NoProductError, require_product
+from softehl.runtime.fem.rules import film_rule
+from softehl.runtime.study import StudyError
+
+
+@cache
+def diffusion() -> Definition:
+    """-p'' + c p = f along a line, f such that p = x^2 (3 - 2 x) where c = 1; p is interpolated."""
+    m = Model("diffusion", nodes=2, rule=quadrature.gauss(2, 1), unroll=False)
+    X = m.coordinates("X")
+    (c,) = m.parameters(c="reaction")
+    (xi,) = m.point()
+    p, p_xi = m.interpolated("p")
+    kind = element("line2")
+    e = kinematics.isoparametric(m, X, kind.gradient(xi))
+    N = kind.shape(xi)
+    x = m.define("x", sum(a * b for a, b in zip(N, X[0], strict=True)))
+    f = 12 * x - 6 + 3 * x**2 - 2 * x**3
+    density = (p_xi / e.detJ) ** 2 / 2 + c * (p**2 / 2 - f * p)
+    m.potential(m.integral("Pi", density * e.detJ))
+    m.fields(x=x, p=p)
+    return m.finish()
+
+
+@cache
+def tank() -> Definition:
+    """A tank of level a behind a resistance 1 / k, at one place of a line."""
+    m = Model("tank", nodes=1, rule=quadrature.point_rule())
+    (k, a) = m.parameters(k="conductance", a="level")
+    q = m.unknown("q")
+    m.potential(k * (q - a) ** 2 / 2)
+    return m.finish()
+
+
+@cache
+def rope() -> Definition:
+    """A linear spring of stiffness k between two nodes, along x."""
+    m = Model("rope", nodes=2, rule=quadrature.point_rule())
+    (u,) = m.nodal_unknowns("u")
+    (k,) = m.parameters(k="stiffness")
+    m.potential(k * (u[1] - u[0]) ** 2 / 2)
+    return m.finish()
+
+
+def line(cells: int = 2) -> Study:
+    return Study(Mesh.line(1.0, cells=cells))
+
+
+@pytest.mark.parametrize("places", [3, np.array([[0, 1, 2, 3], [3, 4, 5, 6]])])
+def test_a_field_along_lines_of_order_3_is_exact_for_a_cubic(places: Any) -> None:
+    study = line()
+    study.add("line", diffusion(), along={"p": places}, c=1.0)
+    found = study.solve().fields("line")
+    x = found["x"]
+    assert found["p"] == pytest.approx(x**2 * (3 - 2 * x), abs=1e-12)
+    coarse = line()
+    coarse.add("line", diffusion(), along={"p": 2}, c=1.0)
+    assert abs(coarse.solve().fields("line")["p"][:, 0] - found["p"][:, 0]).max() > 1e-4
+
+
+def test_ends_of_a_field_along_lines_are_unknowns_of_nodes() -> None:
+    """p'' = 0 between 2 and 5, in a chain of lines whose numbers do not follow each other."""
+    points = np.array([[0.0], [3.0], [1.0]])
+    study = Study(Mesh(points, {"line2": np.array([[2, 1], [0, 2]])}))
+    study.add("pipe", diffusion(), along={"p": 3}, c=0.0)
+    study.fix((0.0,), p=2.0)
+    study.fix((3.0,), p=5.0)
+    result = study.solve()
+    assert result.values("p") == pytest.approx([2.0, 5.0, 3.0], rel=1e-12)
+    assert result.fields("pipe")["p"] == pytest.approx(2.0 + result.fields("pipe")["x"], rel=1e-12)
+    assert beginning(study.system(), result)[1].tolist() == result.x.tolist()
+
+
+def test_elements_stand_at_places_of_a_field_of_others() -> None:
+    """Two tanks and a pipe of resistance 1: flux (a - b) / (1 / k + 1 + 1 / k)."""
+    study = line(1)
+    study.add("pipe", diffusion(), along={"p": np.array([[0, 1, 2]])}, c=0.0)
+    nowhere = np.empty((1, 0), dtype=np.int64)  # the page knows of no node
+    for name, on, place, level in (("in", "left", 0, 7.0), ("out", nowhere, 2, 0.0)):
+        along = {"p": np.array([[place]])}
+        study.add(name, tank(), on=on, called={"q": "p"}, along=along, k=0.4, a=level)
+    result = study.solve()
+    q = 7.0 / (1 / 0.4 + 1.0 + 1 / 0.4)
+    assert result.values("p") == pytest.approx([7.0 - q / 0.4, 3.5, q / 0.4], rel=1e-12)
+    assert beginning(study.system(), result)[1].tolist() == result.x.tolist()
+
+
+def test_lines_may_have_fields_of_their_own() -> None:
+    study = line()
+    study.add("line", diffusion(), along={"p": separate_dofs(2, 4, 0)}, rule=film_rule(4), c=1.0)
+    assert study.system().numbering.layout.count("p") == 10
+    found = study.solve().fields("line")
+    assert found["p"].shape == (2, 5)
+    study = line(1)  # [0, 1] and not [0, 0.5]: nothing ties the two lines
+    study.add("line", diffusion(), along={"p": 4}, c=1.0)
+    x = study.solve().fields("line")
+    assert x["p"] == pytest.approx(x["x"] ** 2 * (3 - 2 * x["x"]), abs=1e-12)
+    assert abs(found["p"] - found["x"] ** 2 * (3 - 2 * found["x"])).max() > 1e-3
+
+
+def test_an_element_between_any_two_nodes_under_another_name() -> None:
+    """Springs of 2 in a chain, and a rope of 3 between its ends: 1 + 3 in all."""
+    study = line()
+    study.add("chain", rope(), called={"u": "u_x"}, k=2.0)
+    study.add("rope", rope(), on=np.array([[0, 2]]), called={"u": "u_x"}, k=3.0)
+    study.fix("left", u_x=0.0)
+    study.load((1.0,), u_x=8.0)
+    assert study.solve().at((1.0,))["u_x"] == pytest.approx(2.0, rel=1e-12)
+
+
+def test_a_constant_tangent_is_evaluated_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+    tangent = ElementBlock.tangent
+
+    def counted(block: ElementBlock, x: Any, parameters: Any) -> Any:
+        calls.extend([block.name] if block.name == "chain" else [])
+        return tangent(block, x, parameters)
+
+    monkeypatch.setattr(ElementBlock, "tangent", counted)
+    found, numbers = [], []
+    for constant in (False, True):
+        study = line()
+        study.add("chain", rope(), constant=constant, k=2.0)
+        study.fix("left", u=0.0)
+        study.load((1.0,), u=1.0)
+        calls.clear()
+        found.append(study.solve(steps=4).values("u"))
+        numbers.append(len(calls))
+    assert found[0] == pytest.approx(found[1], rel=1e-14)
+    assert numbers[1] == 1 < numbers[0]
+
+
+def test_derivatives_and_energies_know_the_rule_of_a_block() -> None:
+    """Of p at an end by c: against central differences. With 2 points they would be others."""
+
+    def solved(c: float) -> Any:
+        study = line()
+        study.add("line", diffusion(), along={"p": 4}, rule=film_rule(4, "gauss", 3), c=c)
+        return study.solve()
+
+    result, step = solved(1.0), 1e-4
+    found = result.sensitivity("p", at=(1.0,), by={"line": ["c"]})["line", "c"]
+    ends = [solved(1.0 + sign * step).values("p")[-1] for sign in (1, -1)]
+    assert found == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-6)
+    assert stored_energy(result.problem, result.x) == pytest.approx(
+        load_kernel(diffusion())
+        .energy(
+            np.array([[0.0, 0.5], [0.5, 1.0]]),
+            result.x[result.system.numbering.dofs["line"]],
+            parameters={"c": 1.0},
+            rule=film_rule(4, "gauss", 3),
+        )
+        .sum(),
+        rel=1e-12,
+    )
+
+
+def test_products_without_a_matrix_refuse_a_rule() -> None:
+    study = line()
+    study.add("line", diffusion(), along={"p": 4}, c=1.0)
+    with pytest.raises(NoProductError, match="'line': products have the quadrature of the page"):
+        require_product(study.system().assembler.block("line"))
+
+
+def test_elements_by_their_nodes_have_no_mass_by_density() -> None:
+    study = line()
+    study.add("rope", rope(), on=np.array([[0, 2]]), called={"u": "u_x"}, k=3.0)
+    study.fix("left", u_x=0.0)
+    with pytest.raises(StudyError, match="'rope': its elements are given by their nodes and have"):
+        study.solve().modes(1, mass={"rope": {"rho": 1.0}})
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({}, r"'line': along = none; diffusion has p along its elements, as in along=\{'p': 2"),
+        ({"along": {"p": 0}}, r"along 'p': order 0, must be at least 1"),
+        ({"along": {"p": np.array([[0, 1], [1, -1]])}}, r"along 'p': places are counted from 0"),
+        ({"along": {"p": 2, "q": np.eye(2)}}, r"along = p, q: orders for all of them, on lines"),
+        ({"along": {"p": 2, "q": 2}}, r"interpolates p: give an order for each of them, or the"),
+        ({"along": {"p": np.array([[0, 1]])}}, r"numbers of places \(2, m\); given int"),
+        ({"along": {"p": np.array([[0], [1]])}}, r"give an order for each of them, or the rule"),
+        ({"along": {"p": 2}, "rule": film_rule(3)}, r"has 3 unknowns along it, the rule 4"),
+        ({"along": {"p": 2}, "called": {"r": "p"}}, r"diffusion has no unknown 'r'"),
+        (
+            {"along": {"p": 2}, "on": np.array([[0, 1, 2]])},
+            r"given as node numbers \(n, 2\); given",
+        ),
+        ({"along": {"p": 2}, "on": np.array([[0, 7]])}, r"node numbers go from 0 to 2"),
+    ],
+)
+def test_what_does_not_fit_is_refused(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(StudyError, match=words):
+        line().add("line", diffusion(), c=1.0, **given)
+
+
+def test_two_blocks_share_a_field_along_lines_by_its_places() -> None:
+    """c = 1 in two halves on the same lines; by their orders they would not share p within them."""
+    study = line()
+    study.add("half", diffusion(), along={"p": 2}, c=0.5)
+    with pytest.raises(StudyError, match="'other': 'half' has p along the same lines: give both"):
+        study.add("other", diffusion(), along={"p": 2}, c=0.5)
+    both, whole = line(), line()
+    places = np.array([[0, 1, 2], [2, 3, 4]])
+    for name in ("half", "other"):
+        both.add(name, diffusion(), along={"p": places}, c=0.5)
+    whole.add("line", diffusion(), along={"p": places}, c=0.5)
+    assert both.solve().values("p") == pytest.approx(whole.solve().values("p"), rel=1e-12)
+    apart = line()  # one block a line
+    for cell in ([[0, 1]], [[1, 2]]):
+        apart.add(str(cell), diffusion(), on=np.array(cell), along={"p": 2}, c=0.5)
+    ends = whole.solve().values("p")[[0, 2, 4]]
+    assert apart.solve().values("p") == pytest.approx(ends, rel=1e-12)
+
+
+def test_a_page_without_a_field_along_it_is_told() -> None:
+    with pytest.raises(StudyError, match=r"along = p; rope has none along its elements"):
+        line().add("rope", rope(), along={"p": 2}, k=1.0)
+    assert load_kernel("film").interpolated == "p"
