@@ -93,14 +93,14 @@ class Study(Paths, Fitted):
 
         source: a page (file or function), a folder that `softehl generate` wrote, a Definition, a
         kernel, or the name of one that ships; a page of fields stands on any kind of cell.
-        material: instead, a stress law (file or function) for a body of it. model: which, where
-        there are several. shared: unknowns without a node that are one for all elements, not one
-        for each. given: parameters of the page (numbers, or functions of the load factor) and its
-        data (a number, (n,) numbers or a function of the elements' centres (n, dim)). A page of
-        fields on several kinds of cells makes a block of each, "body:quad4", "body:tri3". Two
-        are not given: `dt` is the length of a step
-        of `march`, `rate` comes from `Model.rates`. On a side, a page of one node has an element at
-        each node. Raises StudyError, MeshError, or what is wrong with the page.
+        material: instead, a stress law for a body of it: a file, a function, or the name of one
+        that ships ("neo_hooke"). model: which, where there are several. shared: unknowns without a
+        node that are one for all elements, not one for each. given: parameters of the page
+        (numbers, or functions of the load factor) and its data (a number, (n,) numbers or a
+        function of the elements' centres (n, dim)). A page of fields on several kinds of cells
+        makes a block of each, "body:quad4", "body:tri3". Two are not given: `dt` is the length of a
+        step of `march`, `rate` comes from `Model.rates`. On a side, a page of one node has an
+        element at each node. Raises StudyError, MeshError, or what is wrong with the page.
         """
         blocks = self._statement.blocks
         if name in blocks:
