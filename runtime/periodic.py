@@ -232,7 +232,7 @@ class Reduced:
         for part in self.problem.layout.fields:
             rows = self.basis[part]
             known = np.asarray(abs(rows).T @ noise[part])
-            left = np.linalg.norm(np.maximum(np.abs(rows.T @ r[part]) - known, 0.0))
+            left = np.linalg.norm(np.maximum(np.abs(np.asarray(rows.T @ r[part])) - known, 0.0))
             size = np.linalg.norm(forces[part])
             worst = max(worst, float(left / size) if size > 0.0 else 0.0)
         return worst

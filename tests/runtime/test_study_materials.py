@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -229,7 +230,7 @@ def test_a_material_that_ships_has_the_stress_of_its_energy(name: str) -> None:
 
     def W(F: Array) -> float:
         J = np.linalg.det(F)
-        return energy(F) + rubber * 0.9 / 4 * (J**2 - 1 - 2 * np.log(J))
+        return float(energy(F) + rubber * 0.9 / 4 * (J**2 - 1 - 2 * np.log(J)))
 
     def slope(i: int, k: int) -> float:
         h = np.zeros((3, 3))
@@ -240,7 +241,8 @@ def test_a_material_that_ships_has_the_stress_of_its_energy(name: str) -> None:
     P = np.array([[slope(i, k) for k in range(3)] for i in range(3)])
     cauchy = P if name == "hooke" else P @ F.T / J
     study = Study(Mesh.rectangle(1, 1, cells=(1, 1)))
-    study.add("body", material=name, **given, **({"kappa": 0.9} if rubber else {}))
+    arguments: dict[str, Any] = given | ({"kappa": 0.9} if rubber else {})
+    study.add("body", material=name, **arguments)
     for i, u in enumerate(("u_x", "u_y")):
         study.fix("boundary", **{u: lambda x, t, i=i: x @ (F - np.eye(3))[i, :2]})
     found = study.solve().fields("body")
