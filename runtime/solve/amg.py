@@ -20,6 +20,7 @@ from softehl.runtime.solve.linear import (
 )
 
 _UNSYMMETRIC = 1e-9  # of the largest entry
+_ROUNDING = 1e-10  # of the largest eigenvalue of the coarsest grid
 _COARSEST = 100  # unknowns that are solved by a pseudo-inverse, in milliseconds
 
 
@@ -116,15 +117,37 @@ class Preconditioned:
 
     def _cycles(self, method: str, b: Array) -> tuple[Array, float]:
         """Solution of a Krylov method, and what it leaves of b, relative to it."""
-        given = {"tol": self.tolerance, "maxiter": self.most, "accel": method}
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of a matrix that is indefinite: see `solve`
-            x = self.levels.solve(b, **given)
+        x = self._solved(method, b)[0]
         left = np.linalg.norm(b - self.levels.levels[0].A @ x) / np.linalg.norm(b)
         return x, float(left)
 
+    def _solved(self, method: str, b: Array) -> tuple[Array, int]:
+        """Solution of a Krylov method, and -1 where the matrix is found to be indefinite.
+
+        Warnings of that are caught: pyamg lets none of them be ignored.
+        """
+        with warnings.catch_warnings(record=True):
+            given = {"tol": self.tolerance, "maxiter": self.most, "accel": method}
+            x, info = self.levels.solve(b, return_info=True, **given)
+        return x, int(info)
+
     def loosest(self) -> None:
         """See `solve.held.Judging`: iterations that converged show that the matrix is regular."""
+
+    def indefinite(self) -> bool | None:
+        """True where the matrix has a negative eigenvalue; None where it is not symmetric.
+
+        One of the coarsest grid is one of the matrix. Otherwise conjugate gradients tell: on a
+        random right side, in which each mode has its share, they meet what they must divide by.
+        """
+        if not self.symmetric:
+            return None
+        coarse = self.levels.levels[-1].A.toarray()
+        values = np.linalg.eigvalsh((coarse + coarse.T) / 2.0)
+        if values[0] < -_ROUNDING * np.abs(values).max():
+            return True
+        b = np.random.default_rng(0).uniform(-1.0, 1.0, len(self.order))
+        return self._solved("cg", b)[1] < 0
 
 
 @dataclass(eq=False)
@@ -174,3 +197,12 @@ class _Either:
 
     def loosest(self) -> None:
         """See `Preconditioned`."""
+
+    def indefinite(self) -> bool | None:
+        """See `Preconditioned`; None where factors stand in."""
+        return self.factors.indefinite() if isinstance(self.factors, Preconditioned) else None
+
+    def pivots(self) -> Array | None:
+        """Of the factors that stand in, if they know them."""
+        known = getattr(self.factors, "pivots", None)
+        return None if known is None else known()

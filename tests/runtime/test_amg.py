@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import sympy as sp
 import softehl
 from softehl.runtime.engines import sizes
 from softehl.runtime.solve import amg
+from softehl.runtime.solve.eigen import Pivots
 from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.solve.superlu import SuperLU
 from softehl.runtime.statement.records import StudyError
@@ -126,3 +128,31 @@ def test_a_linear_march_factorises_once(monkeypatch: pytest.MonkeyPatch) -> None
     study.fix("left", T=1)
     assert len(list(study.march(dt=0.25, until=1, linear="superlu"))) == 4
     assert len(made) == 1
+
+
+@pytest.mark.parametrize("pressed", [0.2, 0.4])
+def test_multigrid_tells_a_state_that_is_unstable(pressed: float) -> None:
+    """A column held at both ends, before and beyond its first load."""
+    study = softehl.Study(softehl.Mesh.box((10, 1, 1), cells=(20, 3, 3)))
+    study.add("column", material="saint_venant", E=2000, nu=0)
+    study.fix("left", u_x=0, u_y=0, u_z=0)
+    study.fix("right", u_x=-pressed, u_y=0, u_z=0)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        unstable = study.solve(linear="amg").unstable
+    words = [str(warning.message) for warning in told]
+    if pressed < 0.3:
+        assert unstable == 0
+        assert not words
+    else:
+        assert unstable == 2
+        assert len(words) == 1  # nothing of pyamg's own
+        assert "its energy falls along one direction at least (" in words[0]
+
+
+def test_stability_needs_no_factors_beside_multigrid(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: Any) -> Any:
+        pytest.fail("factorised")
+
+    monkeypatch.setattr(Pivots, "of", none)
+    cube().solve(linear="amg")
