@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csr_array
 
-from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.solve.linear import (
     Factors,
     LinearSolver,
@@ -20,6 +20,9 @@ from softehl.runtime.solve.linear import (
 )
 
 _UNSYMMETRIC = 1e-9  # of the largest entry
+_WORN, _SLACK = 1.5, 4
+"""Grids are made anew where a solution takes so many times the iterations of the first, and these:
+a hierarchy takes about as long as twelve of them."""
 _ROUNDING = 1e-10  # of the largest eigenvalue of the coarsest grid
 _COARSEST = 100  # unknowns that are solved by a pseudo-inverse, in milliseconds
 
@@ -48,11 +51,12 @@ class Modes:
     near: Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Multigrid:
     """Smoothed aggregation around conjugate gradients; GMRES where a matrix is not symmetric.
 
     Rows and columns are scaled to a diagonal of 1: polynomials smooth stiff and soft parts alike.
+    The grids of a symmetric matrix serve the next ones, too, until these take many more iterations.
     tolerance: of the residual, relative to the right side; Newton's method corrects the rest.
     most: iterations of one solution.
     """
@@ -61,27 +65,74 @@ class Multigrid:
     tolerance: float = 1e-6
     most: int = 150
     name: str = "multigrid"
+    _grids: Grids | None = field(default=None, init=False, repr=False)
 
     def factorise(self, K: SparseMatrix) -> Preconditioned:
         """The hierarchy of K, (n, n); raises SingularMatrix."""
         sums = checked_row_sums(K)
-        order, block = self.modes.order, self.modes.block
-        diagonal = np.abs(K.diagonal())[order]
-        scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-        by = diags_array(scale)
-        A = csr_array(by @ csr_array(K)[order][:, order] @ by)
-        alone = (sums == np.abs(K.diagonal()))[order]  # prescribed: nothing else in the row
-        near = np.where(alone[:, None], 0.0, self.modes.near / scale[:, None])
+        order, diagonal = self.modes.order, np.abs(K.diagonal())
+        held = (sums == diagonal)[order]  # prescribed: nothing else in the row
+        A = csr_array(K)[order][:, order]
         largest = float(np.abs(A.data).max(initial=0.0))
         symmetric = bool(abs(A - A.T).max() <= _UNSYMMETRIC * largest)
-        levels = hierarchy(A, near, block, CHEBYSHEV if symmetric else GAUSS_SEIDEL)
-        return Preconditioned(levels, order, scale, symmetric, self.tolerance, self.most)
+        grids = self._grids
+        if grids is None or not (symmetric and grids.serve(held)):
+            diagonal = diagonal[order]
+            scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+            near = np.where(held[:, None], 0.0, self.modes.near / scale[:, None])
+            smoother = CHEBYSHEV if symmetric else GAUSS_SEIDEL
+            grids = Grids(scale, near, held, self.modes.block, smoother)
+            self._grids = grids if symmetric else None
+        A.data *= np.repeat(grids.scale, np.diff(A.indptr)) * grids.scale[A.indices]
+        blocks = A.tobsr((self.modes.block,) * 2)
+        return Preconditioned(blocks, grids, order, symmetric, self.tolerance, self.most)
 
 
-def hierarchy(
-    A: csr_array[np.float64], near: Array, block: int, smoother: Smoother = GAUSS_SEIDEL
-) -> Any:
-    """Smoothed aggregation of A, (n, n), as pyamg has it: a symmetric cycle.
+@dataclass(eq=False)
+class Grids:
+    """A hierarchy of grids for like matrices, made of the first of them.
+
+    scale: (n,) of rows and columns. near: (n, k) motions that they hardly resist. held: (n,)
+    prescribed unknowns. block: unknowns of a node, which are neighbours.
+    """
+
+    scale: Array
+    near: Array
+    held: Flags
+    block: int
+    smoother: Smoother
+    worn: bool = field(default=False, init=False)
+    _levels: Any = field(default=None, init=False)
+    _of: Any = field(default=None, init=False)
+    _least: int = field(default=0, init=False)
+
+    def serve(self, held: Flags) -> bool:
+        """Whether a matrix with these unknowns prescribed may use them."""
+        return not self.worn and np.array_equal(held, self.held)
+
+    def of(self, A: Any) -> Any:
+        """The hierarchy, made of A if there is none."""
+        return self.renewed(A) if self._levels is None else self._levels
+
+    def renewed(self, A: Any) -> Any:
+        """The hierarchy of A itself."""
+        self._levels = None  # never two at a time: they are what memory goes into
+        self._levels, self._least = hierarchy(A, self.near, self.block, self.smoother), 0
+        self._of, self.worn = A, False
+        return self._levels
+
+    def own(self, A: Any) -> bool:
+        """Whether they were made of A."""
+        return self._of is A
+
+    def took(self, steps: int) -> None:
+        """Learn how many iterations a solution took."""
+        self._least = self._least or steps
+        self.worn = self.worn or steps > _WORN * self._least + _SLACK
+
+
+def hierarchy(A: Any, near: Array, block: int, smoother: Smoother = GAUSS_SEIDEL) -> Any:
+    """Smoothed aggregation of A, (n, n), sparse, as pyamg has it: a symmetric cycle.
 
     near: (n, k) motions that A hardly resists. block: unknowns of a node, which are neighbours.
     """
@@ -102,47 +153,56 @@ def hierarchy(
 
 @dataclass(frozen=True, eq=False)
 class Preconditioned:
-    """A hierarchy of grids of a matrix, as `Factors`."""
+    """A scaled matrix and a hierarchy of grids for it, as `Factors`."""
 
-    levels: Any
+    matrix: Any
+    grids: Grids
     order: Integers
-    scale: Array
     symmetric: bool
     tolerance: float
     most: int
 
     def solve(self, b: Array) -> Array:
-        """x of A x = b, (n,), to the tolerance; raises SingularMatrix where it is not met."""
+        """x of the matrix, (n,), to the tolerance; raises SingularMatrix where it is not met."""
         if not b.any():
             return np.zeros(len(b))
-        right = self.scale * b[self.order]
+        right = self.grids.scale * b[self.order]
         found, left = self._cycles("cg", right) if self.symmetric else (right, np.inf)
+        if not left <= 10.0 * self.tolerance and not self.grids.own(self.matrix):
+            self.grids.renewed(self.matrix)
+            found, left = self._cycles("cg", right)
         if not left <= 10.0 * self.tolerance:  # far from balance tangents are indefinite
             found, left = self._cycles("gmres", right)
         if not left <= 10.0 * self.tolerance:
+            self.grids.worn = True
             raise SingularMatrix(
                 f"multigrid left {left:.1e} of the right side after {self.most} steps; allowed are "
                 f'{self.tolerance:.0e}. Use linear = "direct"'
             )
         x = np.empty(len(b))
-        x[self.order] = self.scale * found
+        x[self.order] = self.grids.scale * found
         return x
 
     def _cycles(self, method: str, b: Array) -> tuple[Array, float]:
         """Solution of a Krylov method, and what it leaves of b, relative to it."""
-        x = self._solved(method, b)[0]
-        left = np.linalg.norm(b - self.levels.levels[0].A @ x) / np.linalg.norm(b)
+        x, steps, _ = self._solved(method, b)
+        self.grids.took(steps)
+        left = np.linalg.norm(b - self.matrix @ x) / np.linalg.norm(b)
         return x, float(left)
 
-    def _solved(self, method: str, b: Array) -> tuple[Array, int]:
-        """Solution of a Krylov method, and -1 where the matrix is found to be indefinite.
+    def _solved(self, method: str, b: Array) -> tuple[Array, int, bool]:
+        """Solution of a Krylov method, iterations, and whether the matrix turned out indefinite.
 
         Warnings of that are caught: pyamg lets none of them be ignored.
         """
+        from pyamg import krylov
+
+        cycle = self.grids.of(self.matrix).aspreconditioner(cycle="V")
+        norms = list[float]()
         with warnings.catch_warnings(record=True):
-            given = {"tol": self.tolerance, "maxiter": self.most, "accel": method}
-            x, info = self.levels.solve(b, return_info=True, **given)
-        return x, int(info)
+            given = {"tol": self.tolerance, "maxiter": self.most, "M": cycle, "residuals": norms}
+            x, info = getattr(krylov, method)(self.matrix, b, **given)
+        return x, len(norms), info < 0
 
     def loosest(self) -> None:
         """See `solve.held.Judging`: iterations that converged show that the matrix is regular."""
@@ -150,17 +210,22 @@ class Preconditioned:
     def indefinite(self) -> bool | None:
         """True where the matrix has a negative eigenvalue; None where it is not symmetric.
 
-        One of the coarsest grid is one of the matrix. Otherwise conjugate gradients tell: on a
-        random right side, in which each mode has its share, they meet what they must divide by.
+        Conjugate gradients tell: on a random right side, in which each mode has its share, they
+        meet what they must divide by. A negative eigenvalue of the coarsest grid is one of the
+        matrix that the grids were made of.
         """
         if not self.symmetric:
             return None
-        coarse = self.levels.levels[-1].A.toarray()
-        values = np.linalg.eigvalsh((coarse + coarse.T) / 2.0)
-        if values[0] < -_ROUNDING * np.abs(values).max():
-            return True
         b = np.random.default_rng(0).uniform(-1.0, 1.0, len(self.order))
-        return self._solved("cg", b)[1] < 0
+        falls = self._solved("cg", b)[2]
+        if not self.grids.own(self.matrix):
+            if not falls:
+                return False
+            self.grids.renewed(self.matrix)  # those of another matrix may be what is indefinite
+            falls = self._solved("cg", b)[2]
+        coarse = self.grids.of(self.matrix).levels[-1].A.toarray()
+        values = np.linalg.eigvalsh((coarse + coarse.T) / 2.0)
+        return falls or bool(values[0] < -_ROUNDING * np.abs(values).max())
 
 
 @dataclass(eq=False)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.sparse import csc_array, diags_array
 
 import softehl
 from softehl.runtime.arrays import Array, Flags
@@ -71,10 +72,8 @@ def iterations(study: softehl.Study, motions: int = 6) -> int:
     modes = sizes.nodal_modes(system)
     assert modes is not None
     told = amg.Modes(modes.order, 3, modes.near[:, :motions])
-    factors, norms = amg.Multigrid(told).factorise(K), list[float]()
-    b = factors.scale * -r[modes.order]
-    factors.levels.solve(b, tol=1e-6, accel="cg", residuals=norms)
-    return len(norms)
+    factors = amg.Multigrid(told).factorise(K)
+    return factors._solved("cg", factors.grids.scale * -r[modes.order])[1]
 
 
 def test_multigrid_keeps_rigid_motions() -> None:
@@ -104,6 +103,30 @@ def test_stiff_and_soft_parts_take_hardly_more_iterations_than_one() -> None:
         return study
 
     assert iterations(parts(1e3)) < 2 * iterations(parts(1.0))
+
+
+def test_grids_serve_the_tangents_of_a_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of the first serve all, which are alike; other matrices get grids of their own."""
+    made, plain = list[int](), amg.hierarchy
+
+    def counted(A: Any, *given: Any) -> Any:
+        made.append(A.shape[0])
+        return plain(A, *given)
+
+    monkeypatch.setattr(amg, "hierarchy", counted)
+    assert cube().solve(linear="amg").iterations > 2
+    assert len(made) == 1
+    system = cube().system()
+    problem = system.problem(system.still(1.0, system.at_rest(), {}))
+    r, K = problem.linearise(system.at_rest())
+    modes = sizes.nodal_modes(system)
+    assert modes is not None
+    solver, half = amg.Multigrid(modes), np.arange(len(r)) % 2
+    held = csc_array(K + diags_array(1e4 * half))
+    for matrix in (K, held, K):
+        x = solver.factorise(matrix).solve(r)
+        assert np.linalg.norm(matrix @ x - r) < 1e-4 * np.linalg.norm(r)
+    assert len(made) > 2
 
 
 def test_size_decides_and_progress_says_so(
