@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.solve.linear import (
@@ -18,8 +17,8 @@ from softehl.runtime.solve.linear import (
     SparseMatrix,
     checked_row_sums,
 )
+from softehl.runtime.solve.reordered import Entries
 
-_UNSYMMETRIC = 1e-9  # of the largest entry
 _WORN, _SLACK = 1.5, 4
 """Grids are made anew where a solution takes so many times the iterations of the first, and these:
 a hierarchy takes about as long as twelve of them."""
@@ -66,15 +65,16 @@ class Multigrid:
     most: int = 150
     name: str = "multigrid"
     _grids: Grids | None = field(default=None, init=False, repr=False)
+    _entries: Entries | None = field(default=None, init=False, repr=False)
 
     def factorise(self, K: SparseMatrix) -> Preconditioned:
         """The hierarchy of K, (n, n); raises SingularMatrix."""
         sums = checked_row_sums(K)
         order, diagonal = self.modes.order, np.abs(K.diagonal())
         held = (sums == diagonal)[order]  # prescribed: nothing else in the row
-        A = csr_array(K)[order][:, order]
-        largest = float(np.abs(A.data).max(initial=0.0))
-        symmetric = bool(abs(A - A.T).max() <= _UNSYMMETRIC * largest)
+        if self._entries is None or not self._entries.fit(K):
+            self._entries = Entries.of(K, order)
+        A, symmetric = self._entries.taken(K)
         grids = self._grids
         if grids is None or not (symmetric and grids.serve(held)):
             diagonal = diagonal[order]

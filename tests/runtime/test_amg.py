@@ -17,6 +17,7 @@ from softehl.runtime.arrays import Array, Flags
 from softehl.runtime.engines import sizes
 from softehl.runtime.solve import amg
 from softehl.runtime.solve.eigen import Pivots
+from softehl.runtime.solve.reordered import Entries
 from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.solve.superlu import SuperLU
 from softehl.runtime.statement.records import StudyError
@@ -206,3 +207,19 @@ def test_stability_needs_no_factors_beside_multigrid(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(Pivots, "of", none)
     cube().solve(linear="amg")
+
+
+def test_entries_in_another_order() -> None:
+    """By numbers that are kept while the pattern is the same; an unsymmetric matrix is seen."""
+    random = np.random.default_rng(0)
+    dense = random.uniform(1, 2, (7, 7)) * (random.random((7, 7)) < 0.4)
+    order = random.permutation(7).astype(np.int64)
+    for matrix, symmetric in ((dense + dense.T, True), (dense, False), (np.tri(7), False)):
+        K = csc_array(matrix)
+        entries = Entries.of(K, order)
+        K.data *= 3.0
+        found, even = entries.taken(K)
+        np.testing.assert_array_equal(found.toarray(), 3.0 * matrix[order][:, order])
+        assert even == symmetric
+        assert entries.fit(K)
+        assert not entries.fit(csc_array(np.eye(7)))
