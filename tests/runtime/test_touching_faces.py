@@ -85,8 +85,9 @@ def test_a_uniform_stress_passes_where_the_interface_is_inclined(
 
 
 @pytest.mark.parametrize("shapes", [("hex", "tetrahedron"), ("tetrahedron", "hex")])
-@pytest.mark.parametrize("friction", [0.3, 0.05])
+@pytest.mark.parametrize("friction", [5.0, 0.02])
 def test_the_tangent_is_the_derivative(shapes: tuple[str, str], friction: float) -> None:
+    """All points press, and stick or slip far from the limit: none changes in a difference."""
     study = Study(boxes(2, 3, shapes))
     study.add("body", elastic, **RUBBER)
     study.contact("upper:bottom", "lower:top", friction=friction)
@@ -94,18 +95,24 @@ def test_the_tangent_is_the_derivative(shapes: tuple[str, str], friction: float)
     study.fix("upper:top", u_x=0.03, u_y=0.02, u_z=-0.1)
     result = study.solve(steps=2)
     assert result.residual_norms[-1] < 1e-8
-    # a point may begin to slip or to stick within a difference: not in all of them
-    assert min(off_tangent(result, seed) for seed in (1, 2, 3)) < 1e-8
+    slide = 0.05 if friction < 1.0 else 0.0
+    assert max(off_tangent(result, slide, seed) for seed in (1, 2, 3)) < 1e-8
 
 
-def off_tangent(result: Result, seed: int) -> float:
-    """Relative difference between the tangent near a result and differences of residuals."""
+def off_tangent(result: Result, slide: float, seed: int) -> float:
+    """Relative difference between the tangent near a result and differences of residuals.
+
+    slide: of the whole upper body along (3, 2, 0) since the result, from which slip counts.
+    """
     system, rng = result.system, np.random.default_rng(seed)
     problem = system.problem(system.still(1.0, result.x, {}))
     x = result.x.copy()
     for name in ("u_x", "u_y", "u_z"):
         part = system.numbering.layout.part(name)
         x[part] += 0.002 * rng.normal(size=part.stop - part.start)
+    upper = system.mesh.nodes("upper:boundary")
+    for name, share in (("u_x", 3.0), ("u_y", 2.0)):
+        x[system.numbering.nodal[name][upper]] += share * slide
     y = rng.normal(size=len(x))
     y[problem.fixed] = 0.0
     half, whole = (
