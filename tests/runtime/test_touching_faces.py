@@ -256,4 +256,4 @@ def test_a_cylinder_that_rolls_or_irons_does_not_chatter(rolls: bool) -> None:
         found = r.fields("contact")
         shear = np.sqrt(sum(found[f"shear_{c}"] ** 2 for c in "xyz"))
         share = (shear * found["area"]).sum() / (found["pressure"] * found["area"]).sum()
-        assert share < 0.25 if rolls else share == pytest.approx(0.3, rel=5e-3)
+        assert share < 0.25 if rolls else share == pytest.approx(0.3, rel=2e-2)
