@@ -197,7 +197,7 @@ class Problem:
         return float(np.linalg.norm([a / (b or 1.0) for a, b in sizes]))
 
     def noise(self, x: Array, K: csc_array[np.float64]) -> Array:
-        """What rounding may make of each residual at x, (n,). K: a tangent near x."""
+        """Share of rounding in each residual at x, (n,), at most. K: a tangent near x."""
         return ROUNDING * self._terms(np.abs(x) + self.assembler.reach(), K)
 
     def _terms(self, magnitudes: Array, K: csc_array[np.float64]) -> Array:

@@ -107,7 +107,7 @@ class Grids:
     _least: int = field(default=0, init=False)
 
     def serve(self, held: Flags) -> bool:
-        """Whether a matrix with these unknowns prescribed may use them."""
+        """True if a matrix with these unknowns prescribed may use them."""
         return not self.worn and np.array_equal(held, self.held)
 
     def of(self, A: Any) -> Any:
@@ -122,7 +122,7 @@ class Grids:
         return self._levels
 
     def own(self, A: Any) -> bool:
-        """Whether they were made of A."""
+        """True if they were made of A."""
         return self._of is A
 
     def took(self, steps: int) -> None:

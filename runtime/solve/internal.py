@@ -97,7 +97,7 @@ class Eliminated:
         return np.concatenate([found, *(p.signs for p in self.parts if p.signs is not None)])
 
     def indefinite(self) -> bool | None:
-        """Whether what is left has a negative eigenvalue; None where it is not known."""
+        """True if the rest has a negative eigenvalue; None where it is not known."""
         known = getattr(self.rest, "indefinite", None)
         return None if known is None else known()
 

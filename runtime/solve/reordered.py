@@ -16,7 +16,7 @@ _UNSYMMETRIC = 1e-9  # of the largest entry
 
 @dataclass(frozen=True, eq=False)
 class Entries:
-    """Where the entries of a matrix stand when its unknowns are in another order.
+    """Numbers of the entries of a matrix whose unknowns are in another order.
 
     indices, indptr: of the matrix, by columns. place: numbers of its entries, (n, n), by rows, in
     the order. turned: those of the transpose, in the same pattern; None where it has another.
@@ -42,7 +42,7 @@ class Entries:
         return cls(K.indices, K.indptr, place, turned.data if alike else None)
 
     def fit(self, K: SparseMatrix) -> bool:
-        """Whether K has the pattern."""
+        """True if K has the pattern."""
         return np.array_equal(K.indptr, self.indptr) and np.array_equal(K.indices, self.indices)
 
     def taken(self, K: SparseMatrix) -> tuple[csr_array[np.float64], bool]:
