@@ -123,7 +123,8 @@ class LoadSteps:
         end = at.results[-1]
         words = f"{_NAME} {end.t:.4g}"
         near = first_step.last if end.iterations else None  # else they are of a step before
-        warn_unstable(end.problem, end.point.solution.x, near, words)
+        if near is not None or system.size <= _KEPT:  # factors for this alone may be too large
+            warn_unstable(end.problem, end.point.solution.x, near, words)
         return end
 
 

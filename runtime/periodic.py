@@ -216,16 +216,23 @@ class Reduced:
         return 1.0
 
     def measure(self, z: Array, K: object, *, rounded: bool = False) -> float:
-        """Residuals of each field relative to its forces, inf where they are not finite."""
+        """Residuals of each field relative to its forces, inf where they are not finite.
+
+        rounded: what rounding may have caused does not count, which at rest is all there is.
+        """
         x = self.full(z)
-        assembler = self.problem.at(x).assembler
-        r, forces = assembler.residual_and_size(x, self.problem.parameters)
+        problem = self.problem.at(x)
+        r, forces = problem.assembler.residual_and_size(x, problem.parameters)
         if not np.isfinite(r).all():
             return float("inf")
+        noise = np.zeros_like(r)
+        if rounded:
+            noise = problem.noise(x, problem.assembler.linearise(x, problem.parameters)[1])
         worst = 0.0
         for part in self.problem.layout.fields:
             rows = self.basis[part]
-            left = np.linalg.norm(np.asarray(rows.T @ r[part]))
+            known = np.asarray(abs(rows).T @ noise[part])
+            left = np.linalg.norm(np.maximum(np.abs(np.asarray(rows.T @ r[part])) - known, 0.0))
             size = np.linalg.norm(forces[part])
             worst = max(worst, float(left / size) if size > 0.0 else 0.0)
         return worst

@@ -64,14 +64,27 @@ def warn_unstable(problem: Any, x: Array, factors: tuple[Any, Any] | None, words
 
     factors: a tangent near by and its factors, if they are at hand. words: of the state.
     """
-    found = None if factors is None else negative_by_factors(problem, *factors)
-    if found is None and isinstance(problem, Problem):
-        found = negative_directions(problem, x)
-    if found:
-        many = f"{found} independent directions" if found > 1 else "one direction"
+    along = _falls_along(problem, x, factors)
+    if along:
         warnings.warn(
-            f"the state at {words} is unstable: its energy falls along {many} "
+            f"the state at {words} is unstable: its energy falls along {along} "
             '(result.modes shows them); study.follow(detect="bifurcation") finds other branches',
             Unstable,
             stacklevel=4,
         )
+
+
+def _falls_along(problem: Any, x: Array, factors: tuple[Any, Any] | None) -> str:
+    """Along how many directions the energy falls, in words; empty where along none."""
+    found = None
+    if factors is not None:
+        found = negative_by_factors(problem, *factors)
+        iterative = getattr(factors[1], "indefinite", None)
+        falls = iterative() if found is None and iterative is not None else None
+        if falls is not None:  # other factors would be too large
+            return "one direction at least" if falls else ""
+    if found is None and isinstance(problem, Problem):
+        found = negative_directions(problem, x)
+    if not found:
+        return ""
+    return f"{found} independent directions" if found > 1 else "one direction"

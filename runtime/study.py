@@ -93,8 +93,8 @@ class Study(Paths, Fitted):
 
         source: a page (file or function), a folder that `softehl generate` wrote, a Definition, a
         kernel, or the name of one that ships; a page of fields stands on any kind of cell.
-        material: instead, a stress law (file or function) for a body of it. model: which, where
-        there are several. on: a side, on which a page of one node has an element at each node; or
+        material: instead, a stress law for a body of it: a file, a function, or the name of one
+        that ships ("neo_hooke"). model: which, where there are several. on: a side, on which a page of one node has an element at each node; or
         the elements themselves, an array (n, k) of node numbers. shared: unknowns without a node
         that are one for all elements, not one for each. called: name of an unknown on the page ->
         its name in the study. along: fields that the page interpolates along its lines -> order of

@@ -98,6 +98,19 @@ def _for_derivatives(source: Path | Definition | Page | Law, where: Where) -> Pa
     return library([d.for_derivatives() for d in free], key).folder
 
 
+def of_law(name: str, where: Where, *, derivatives: bool = False) -> Path:
+    """Folder of the kernels of a material that ships; raises ValueError for another name."""
+    cells, geometry, _ = where
+    key = store.digest("law", generator(), name, *cells, geometry, str(derivatives))
+    files = store.recall(key)
+    if files is not None:
+        return compiled(files)[0]
+    from softehl.codegen.models.laws import law
+
+    found = _definitions(law(name), where)
+    return library([d.for_derivatives() if derivatives else d for d in found], key).folder
+
+
 def _definitions(source: Definition | Page | Law, where: Where) -> list[Definition]:
     from softehl.codegen.language.material import Law
     from softehl.codegen.language.pages import On, Page

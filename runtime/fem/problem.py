@@ -175,7 +175,7 @@ class Problem:
                 return 1.0
             terms = self._terms(np.abs(x), K)
             if rounded:
-                noise = ROUNDING * self._terms(np.abs(x) + self.assembler.reach(), K)
+                noise = self.noise(x, K)
         free: Flags = np.ones(len(r), dtype=bool)
         free[self.fixed] = False
         defect = np.where(free, np.maximum(np.abs(r) - noise, 0.0), 0.0)
@@ -195,6 +195,10 @@ class Problem:
         r[self.fixed] = 0.0
         sizes = [[float(np.linalg.norm(v[f])) for v in (r, forces)] for f in self.layout.fields]
         return float(np.linalg.norm([a / (b or 1.0) for a, b in sizes]))
+
+    def noise(self, x: Array, K: csc_array[np.float64]) -> Array:
+        """Share of rounding in each residual at x, (n,), at most. K: a tangent near x."""
+        return ROUNDING * self._terms(np.abs(x) + self.assembler.reach(), K)
 
     def _terms(self, magnitudes: Array, K: csc_array[np.float64]) -> Array:
         """Terms that cancel in each equation, (n,), for unknowns of these magnitudes, (n,).

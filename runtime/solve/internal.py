@@ -96,6 +96,11 @@ class Eliminated:
             return None
         return np.concatenate([found, *(p.signs for p in self.parts if p.signs is not None)])
 
+    def indefinite(self) -> bool | None:
+        """True if the rest has a negative eigenvalue; None where it is not known."""
+        known = getattr(self.rest, "indefinite", None)
+        return None if known is None else known()
+
     def loosest(self) -> int | None:
         """See `solve.held.Judging`: what K_II admits is regular, so the rest decides."""
         number = self.rest.loosest() if isinstance(self.rest, Judging) else self._loose()

@@ -168,7 +168,8 @@ def load_kernel(
 ) -> "Kernel":
     """A compiled kernel, by any of
 
-    - the name of one that ships: `load_kernel("solid_q4")`;
+    - the name of one that ships: `load_kernel("solid_q4")`; with `materials`, that of a material
+      that ships, `load_kernel("neo_hooke", cell="hex8", materials=True)`;
     - a model file: `load_kernel("my_model.py")`, with `name` where it has several models.  It is
       derived and compiled if the cache does not have it; the file is run then;
     - a folder that `softehl generate` wrote: `load_kernel("generated/my_model")`;
@@ -185,7 +186,13 @@ def load_kernel(
 
     # os.path: a name that is too long for a file is none
     folder_given = isinstance(source, (str, Path)) and os.path.isdir(source)
+    where = (() if cell is None else (cell,), geometry or "", materials)
     if isinstance(source, str) and not source.endswith(".py") and not folder_given:
+        if materials:
+            with with_sympy():
+                from softehl.codegen.tools.library import of_law
+
+                return kernels.kernel_in(of_law(source, where, derivatives=derivatives), None, cell)
         shipped = kernels.load_kernel(source)
         if not derivatives:
             return shipped
@@ -199,6 +206,5 @@ def load_kernel(
 
     place = Path(source) if isinstance(source, str) else source
     with with_sympy():
-        where = (() if cell is None else (cell,), geometry or "", materials)
         folder = library.folder_of(place, where, derivatives=derivatives)
     return kernels.kernel_in(folder, name, cell)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,10 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.sparse import csc_array, diags_array
 
 import softehl
+from softehl.runtime.arrays import Array, Flags
 from softehl.runtime.engines import sizes
 from softehl.runtime.solve import amg
+from softehl.runtime.solve.eigen import Pivots
+from softehl.runtime.solve.reordered import Entries
 from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.solve.superlu import SuperLU
 from softehl.runtime.statement.records import StudyError
@@ -60,21 +65,69 @@ def test_multigrid_finds_what_factors_find(make: Any) -> None:
     assert np.abs(x - y).max() < 1e-7 * np.abs(y).max()
 
 
+def iterations(study: softehl.Study, motions: int = 6) -> int:
+    """Of conjugate gradients at rest, with multigrid that is told so many rigid motions."""
+    system = study.system()
+    problem = system.problem(system.still(1.0, system.at_rest(), {}))
+    r, K = problem.linearise(system.at_rest())
+    modes = sizes.nodal_modes(system)
+    assert modes is not None
+    told = amg.Modes(modes.order, 3, modes.near[:, :motions])
+    factors = amg.Multigrid(told).factorise(K)
+    return factors._solved("cg", factors.grids.scale * -r[modes.order])[1]
+
+
 def test_multigrid_keeps_rigid_motions() -> None:
-    """Without rotations, or with wrong ones, it needs far more iterations."""
+    """Without rotations it needs far more iterations."""
+    study = softehl.Study(softehl.Mesh.box((10, 1, 1), cells=(30, 3, 3)))
+    study.add("beam", rubber, mu=0.4, K=2.0)
+    study.fix("left", u_x=0, u_y=0, u_z=0)
+    study.load("right", u_y=1e-3)
+    assert iterations(study) < 0.8 * iterations(study, motions=3)
+
+
+def test_stiff_and_soft_parts_take_hardly_more_iterations_than_one() -> None:
+    """By scaling: without it, 1 to 1000 takes ten times as many."""
+
+    def core(x: Array) -> Flags:
+        return np.asarray(np.abs(x - 0.5).max(axis=1) < 0.25)
+
+    def parts(stiff: float) -> softehl.Study:
+        mesh = softehl.Mesh.box((1, 1, 1), cells=(8, 8, 8))
+        mesh = mesh.with_group("core", core)
+        mesh = mesh.with_group("shell", lambda x: ~core(x))
+        study = softehl.Study(mesh)
+        study.add("shell", rubber, cells="shell", mu=0.4, K=2.0)
+        study.add("core", rubber, cells="core", mu=0.4 * stiff, K=2.0 * stiff)
+        study.fix("left", u_x=0, u_y=0, u_z=0)
+        study.load("right", u_y=1e-3)
+        return study
+
+    assert iterations(parts(1e3)) < 2 * iterations(parts(1.0))
+
+
+def test_grids_serve_the_tangents_of_a_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of the first serve all, which are alike; other matrices get grids of their own."""
+    made, plain = list[int](), amg.hierarchy
+
+    def counted(A: Any, *given: Any) -> Any:
+        made.append(A.shape[0])
+        return plain(A, *given)
+
+    monkeypatch.setattr(amg, "hierarchy", counted)
+    assert cube().solve(linear="amg").iterations > 2
+    assert len(made) == 1
     system = cube().system()
     problem = system.problem(system.still(1.0, system.at_rest(), {}))
     r, K = problem.linearise(system.at_rest())
-    right = sizes.nodal_modes(system)
-    assert right is not None
-    shifts = amg.Modes(right.order, 3, right.near[:, :3])
-    steps = []
-    for modes in (right, shifts):
-        factors = amg.Multigrid(modes).factorise(K)
-        norms = list[float]()
-        factors.levels.solve(-r[modes.order], tol=1e-6, accel="cg", residuals=norms)
-        steps.append(len(norms))
-    assert steps[0] < 0.8 * steps[1]
+    modes = sizes.nodal_modes(system)
+    assert modes is not None
+    solver, half = amg.Multigrid(modes), np.arange(len(r)) % 2
+    held = csc_array(K + diags_array(1e4 * half))
+    for matrix in (K, held, K):
+        x = solver.factorise(matrix).solve(r)
+        assert np.linalg.norm(matrix @ x - r) < 1e-4 * np.linalg.norm(r)
+    assert len(made) > 2
 
 
 def test_size_decides_and_progress_says_so(
@@ -126,3 +179,47 @@ def test_a_linear_march_factorises_once(monkeypatch: pytest.MonkeyPatch) -> None
     study.fix("left", T=1)
     assert len(list(study.march(dt=0.25, until=1, linear="superlu"))) == 4
     assert len(made) == 1
+
+
+@pytest.mark.parametrize("pressed", [0.2, 0.4])
+def test_multigrid_tells_a_state_that_is_unstable(pressed: float) -> None:
+    """A column held at both ends, before and beyond its first load."""
+    study = softehl.Study(softehl.Mesh.box((10, 1, 1), cells=(20, 3, 3)))
+    study.add("column", material="saint_venant", E=2000, nu=0)
+    study.fix("left", u_x=0, u_y=0, u_z=0)
+    study.fix("right", u_x=-pressed, u_y=0, u_z=0)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        unstable = study.solve(linear="amg").unstable
+    words = [str(warning.message) for warning in told]
+    if pressed < 0.3:
+        assert unstable == 0
+        assert not words
+    else:
+        assert unstable == 2
+        assert len(words) == 1  # nothing of pyamg's own
+        assert "its energy falls along one direction at least (" in words[0]
+
+
+def test_stability_needs_no_factors_beside_multigrid(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: Any) -> Any:
+        pytest.fail("factorised")
+
+    monkeypatch.setattr(Pivots, "of", none)
+    cube().solve(linear="amg")
+
+
+def test_entries_in_another_order() -> None:
+    """By numbers that are kept while the pattern is the same; an unsymmetric matrix is seen."""
+    random = np.random.default_rng(0)
+    dense = random.uniform(1, 2, (7, 7)) * (random.random((7, 7)) < 0.4)
+    order = random.permutation(7).astype(np.int64)
+    for matrix, symmetric in ((dense + dense.T, True), (dense, False), (np.tri(7), False)):
+        K = csc_array(matrix)
+        entries = Entries.of(K, order)
+        K.data *= 3.0
+        found, even = entries.taken(K)
+        np.testing.assert_array_equal(found.toarray(), 3.0 * matrix[order][:, order])
+        assert even == symmetric
+        assert entries.fit(K)
+        assert not entries.fit(csc_array(np.eye(7)))

@@ -96,6 +96,22 @@ def test_a_path_goes_on_from_a_state() -> None:
     assert np.abs(cell.solve(F, start=half).P - cell.solve(F).P).max() < 1e-9
 
 
+def test_rounding_at_rest_is_no_force() -> None:
+    """The derivative of J^(-2/3) I1 leaves rounding in the forces of an undeformed cell."""
+    study = softehl.Study(softehl.Mesh.rectangle(1, 1, cells=(7, 5)))
+    study.add("body", material="neo_hooke", mu=0.4, kappa=0.9)
+    cell = study.periodic(("left", "right"), ("bottom", "top"))
+    rest = cell.solve(np.eye(2))
+    r, forces = rest.result.problem.assembler.residual_and_size(
+        rest.result.x, rest.result.problem.parameters
+    )
+    assert np.abs(r).max() > 1e-3 * forces.max() > 0.0  # nothing else is there
+    lame, J = 0.9 / 2 * (1.1 - 1 / 1.1), 1.1  # of F = diag(1.1, 1): closed form
+    I1 = J**2 + 2
+    dev = 0.4 * J ** (-2 / 3) * (J - I1 / (3 * J))
+    assert cell.solve([[1.1, 0], [0, 1]]).P[0, 0] == pytest.approx(dev + lame, rel=1e-10)
+
+
 def test_a_hole_counts_in_the_volume_and_corners_are_one_node() -> None:
     mesh = softehl.Mesh.box((1, 1, 1), cells=(2, 2, 2))
     study = softehl.Study(mesh)

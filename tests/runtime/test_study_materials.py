@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ import softehl
 from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.material import Law, Material
 from softehl.codegen.tools.model_text import ModelFileError
+from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.result import Result
 from softehl.runtime.study import Source, Study, StudyError
@@ -169,3 +172,85 @@ def test_a_material_by_itself_has_a_symmetric_tangent_of_nine_gradients() -> Non
     assert [q.axis for q in form.unknowns] == [0, 1, 2] * 3
     assert form.definition.conservative
     assert not neo_stress.at_point().definition.conservative
+
+
+def _bar(F: Array) -> tuple[float, float, Array]:
+    """I1bar, I2bar and the squares of the isochoric stretches of F."""
+    squares = np.linalg.eigvalsh(F.T @ F) * np.linalg.det(F) ** (-2 / 3)
+    return squares.sum(), (1 / squares).sum(), squares
+
+
+def _linear(strain: Array, E: float, nu: float) -> float:
+    lame, G = E * nu / (1 + nu) / (1 - 2 * nu), E / 2 / (1 + nu)
+    return float(lame / 2 * np.trace(strain) ** 2 + G * (strain**2).sum())
+
+
+CHAIN = (1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750)
+SHIPPED: dict[str, tuple[dict[str, float], Callable[[Array], float]]] = {
+    "hooke": ({"E": 2, "nu": 0.3}, lambda F: _linear((F + F.T) / 2 - np.eye(3), 2, 0.3)),
+    "saint-venant": ({"E": 2, "nu": 0.3}, lambda F: _linear((F.T @ F - np.eye(3)) / 2, 2, 0.3)),
+    "neo_hooke": ({"mu": 0.4}, lambda F: 0.2 * (_bar(F)[0] - 3)),
+    "mooney_rivlin": (
+        {"mu_1": 0.3, "mu_2": 0.2},
+        lambda F: 0.15 * (_bar(F)[0] - 3) + 0.1 * (_bar(F)[1] - 3),
+    ),
+    "yeoh": (
+        {"c_1": 0.3, "c_2": 0.2, "c_3": 0.1},
+        lambda F: float(np.polyval([0.1, 0.2, 0.3, 0], _bar(F)[0] - 3)),
+    ),
+    "gent": (
+        {"mu": 0.4, "J_m": 5},
+        lambda F: -0.2 * 5 * float(np.log(1 - (_bar(F)[0] - 3) / 5)),
+    ),
+    "arruda_boyce": (
+        {"mu": 0.4, "lambda_m": 2},
+        lambda F: (
+            0.4 * sum(c * (_bar(F)[0] ** k - 3**k) / 4 ** (k - 1) for k, c in enumerate(CHAIN, 1))
+        ),
+    ),
+    "ogden": (
+        {"mu_1": 0.3, "alpha_1": 3, "mu_2": -0.1, "alpha_2": -2, "mu_3": 0.02, "alpha_3": 5},
+        lambda F: sum(
+            m / a * float((_bar(F)[2] ** (a / 2) - 1).sum())
+            for m, a in ((0.3, 3), (-0.1, -2), (0.02, 5))
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in list(SHIPPED)[3:7])) for n in SHIPPED]
+)
+def test_a_material_that_ships_has_the_stress_of_its_energy(name: str) -> None:
+    """The Cauchy stress of a homogeneous motion, against differences of W(F) written anew."""
+    given, energy = SHIPPED[name]
+    F = np.array([[1.2, 0.3, 0], [-0.1, 0.9, 0], [0, 0, 1]])
+    J = np.linalg.det(F)
+    rubber = name not in ("hooke", "saint-venant")
+
+    def W(F: Array) -> float:
+        J = np.linalg.det(F)
+        return float(energy(F) + rubber * 0.9 / 4 * (J**2 - 1 - 2 * np.log(J)))
+
+    def slope(i: int, k: int) -> float:
+        h = np.zeros((3, 3))
+        h[i, k] = 1e-3
+        rises = [W(F + n * h) - W(F - n * h) for n in (1, 2, 3)]
+        return float(np.dot([45, -9, 1], rises)) / 60e-3
+
+    P = np.array([[slope(i, k) for k in range(3)] for i in range(3)])
+    cauchy = P if name == "hooke" else P @ F.T / J
+    study = Study(Mesh.rectangle(1, 1, cells=(1, 1)))
+    arguments: dict[str, Any] = given | ({"kappa": 0.9} if rubber else {})
+    study.add("body", material=name, **arguments)
+    for i, u in enumerate(("u_x", "u_y")):
+        study.fix("boundary", **{u: lambda x, t, i=i: x @ (F - np.eye(3))[i, :2]})
+    found = study.solve().fields("body")
+    for label, (i, k) in {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1)}.items():
+        assert np.allclose(found[f"sigma_{label}"], cauchy[i, k], rtol=1e-8, atol=1e-10), label
+        assert not np.allclose(found[f"sigma_{label}"], 1.001 * cauchy[i, k], rtol=1e-5)
+
+
+def test_a_material_that_does_not_ship_is_an_error_with_those_that_do() -> None:
+    with pytest.raises(ValueError, match="no material is called 'rubber'; there are hooke, saint"):
+        sheared(material="rubber", mu=1.0)

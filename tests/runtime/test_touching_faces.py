@@ -85,8 +85,9 @@ def test_a_uniform_stress_passes_where_the_interface_is_inclined(
 
 
 @pytest.mark.parametrize("shapes", [("hex", "tetrahedron"), ("tetrahedron", "hex")])
-@pytest.mark.parametrize("friction", [0.3, 0.05])
+@pytest.mark.parametrize("friction", [5.0, 0.02])
 def test_the_tangent_is_the_derivative(shapes: tuple[str, str], friction: float) -> None:
+    """All points press, and stick or slip far from the limit: none changes in a difference."""
     study = Study(boxes(2, 3, shapes))
     study.add("body", elastic, **RUBBER)
     study.contact("upper:bottom", "lower:top", friction=friction)
@@ -94,18 +95,24 @@ def test_the_tangent_is_the_derivative(shapes: tuple[str, str], friction: float)
     study.fix("upper:top", u_x=0.03, u_y=0.02, u_z=-0.1)
     result = study.solve(steps=2)
     assert result.residual_norms[-1] < 1e-8
-    # a point may begin to slip or to stick within a difference: not in all of them
-    assert min(off_tangent(result, seed) for seed in (1, 2, 3)) < 1e-8
+    slide = 0.05 if friction < 1.0 else 0.0
+    assert max(off_tangent(result, slide, seed) for seed in (1, 2, 3)) < 1e-8
 
 
-def off_tangent(result: Result, seed: int) -> float:
-    """Relative difference between the tangent near a result and differences of residuals."""
+def off_tangent(result: Result, slide: float, seed: int) -> float:
+    """Relative difference between the tangent near a result and differences of residuals.
+
+    slide: of the whole upper body along (3, 2, 0) since the result, from which slip counts.
+    """
     system, rng = result.system, np.random.default_rng(seed)
     problem = system.problem(system.still(1.0, result.x, {}))
     x = result.x.copy()
     for name in ("u_x", "u_y", "u_z"):
         part = system.numbering.layout.part(name)
         x[part] += 0.002 * rng.normal(size=part.stop - part.start)
+    upper = system.mesh.nodes("upper:boundary")
+    for name, share in (("u_x", 3.0), ("u_y", 2.0)):
+        x[system.numbering.nodal[name][upper]] += share * slide
     y = rng.normal(size=len(x))
     y[problem.fixed] = 0.0
     half, whole = (
@@ -202,3 +209,51 @@ def test_what_space_does_not_have_is_refused(
     study.add("body", elastic, **RUBBER)
     with pytest.raises(StudyError, match=re.escape(words)):
         study.contact(*sides, **given)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rolls", [True, False])
+def test_a_cylinder_that_rolls_or_irons_does_not_chatter(rolls: bool) -> None:
+    """Reactions on the way keep to a parabola within 1 %; with 12 cells along it they do not."""
+
+    def sector(x: Array) -> Array:
+        angle, r = (1.1 if rolls else 0.6) * (x[:, 0] - 1), 1.0 - 0.5 * x[:, 2]
+        return np.stack([r * np.sin(angle), 0.5 * x[:, 1], 1.0 - r * np.cos(angle)], axis=1)
+
+    def moved(x: Array, t: float) -> Array:
+        way = 0.6 * max(t - 1, 0)
+        turn = way / 0.95 if rolls else 0.0
+        X, Z = x[:, 0], x[:, 2] - 1.0
+        aside = np.cos(turn) * X + np.sin(turn) * Z - X + way
+        down = np.cos(turn) * Z - np.sin(turn) * X - Z - 0.1 * min(t, 1)
+        return np.stack([aside, down], axis=1)
+
+    cylinder = Mesh.box((2, 1, 1), cells=(20 if rolls else 8, 1, 1)).map(sector)
+    block = Mesh.box((2.5, 0.5, 0.6), cells=(18, 1, 3)).map(lambda x: np.subtract(x, [0.9, 0, 0.6]))
+    study = Study(Mesh.union(cylinder=cylinder, block=block))
+    stiff = 1.0 if rolls else 100.0
+    study.add("cylinder", elastic, cells="cylinder", mu=stiff, K=4 * stiff)
+    study.add("block", elastic, cells="block", mu=1.0, K=4.0)
+    study.contact("block:top", "cylinder:bottom", friction=0.3)
+    study.fix("block:bottom", u_x=0, u_y=0, u_z=0)
+    for side in ("block:front", "block:back"):
+        study.fix(side, u_y=0)
+    study.fix(
+        "cylinder:top",
+        u_x=lambda x, t: moved(x, t)[:, 0],
+        u_y=0,
+        u_z=lambda x, t: moved(x, t)[:, 1],
+    )
+    path: list[Result] = []
+    study.solve(steps=12, start=study.solve(steps=2), until=2.0, on_step=path.append)
+    steady = path[-9:]
+    way = np.array([r.t for r in steady])
+    load = np.array([r.reaction("block:bottom")["u_z"] for r in steady])
+    off = load - np.polyval(np.polyfit(way, load, 2), way)
+    assert np.abs(off).max() < 0.01 * load.mean()
+    assert max(r.iterations for r in path) < 10
+    for r in steady:
+        found = r.fields("contact")
+        shear = np.sqrt(sum(found[f"shear_{c}"] ** 2 for c in "xyz"))
+        share = (shear * found["area"]).sum() / (found["pressure"] * found["area"]).sum()
+        assert share < 0.25 if rolls else share == pytest.approx(0.3, rel=2e-2)
