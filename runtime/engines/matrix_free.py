@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,8 @@ import numpy as np
 from softehl.runtime.arrays import Array
 from softehl.runtime.engines.levels import Levels
 from softehl.runtime.engines.tangent import Iteration, Tangent
+from softehl.runtime.engines.tied import Ties
 from softehl.runtime.fem.assembly import Assembler
-from softehl.runtime.fem.loads import Tie
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.products import NoProductError, require_product, threads
 from softehl.runtime.mesh.cells import CELLS
@@ -54,8 +55,6 @@ class MatrixFree:
         fields = {tuple(dict.fromkeys(name for name, _ in kernel.places)) for kernel in kernels}
         if len(fields) > 1:
             raise StudyError(f"{_WHO}: pages have different fields; all must have the same")
-        if any(isinstance(b.kernel, Tie) for b in system.assembler.blocks):
-            raise StudyError(f"{_WHO}: it cannot solve for the forces of ties; leave linear out")
         order = next(iter(cells.values()))
         levels = Levels.of(system, pages, order, self.threads or threads())
         iteration = Iteration(self.tolerance, self.most, self.iterations)
@@ -115,6 +114,11 @@ class Matrixless:
         """See `Problem`: it has no elements that are sought."""
         return self
 
+    @cached_property
+    def ties(self) -> Ties:
+        """Of all its steps.  Raises StudyError where one follows from others."""
+        return Ties.of(self.problem, self.levels.unknowns)
+
     def residual(self, x: Array) -> Array:
         """See `Problem`."""
         return self.problem.residual(x)
@@ -123,7 +127,7 @@ class Matrixless:
         """See `Problem`."""
         problem = self.problem
         r = problem.assembler.residual(x, problem.parameters)
-        tangent = Tangent.of(problem, self.levels, self.iteration, x)
+        tangent = Tangent.of(problem, self.levels, self.iteration, self.ties, x)
         defect = np.zeros_like(r)
         defect[problem.fixed] = x[problem.fixed] - problem.values
         if defect.any():
