@@ -74,7 +74,7 @@ class Tangent:
         order = levels.unknowns[0]
         if rest.nnz:
             rest = csr_array(rest)[order][:, order]
-            P = _held(levels.steps[0], ties.free[order])
+            P = without(levels.steps[0], ties.free[order])
             lower = lower + P.T @ rest @ P
         T = ties.follows[1].matrix
         found = csr_array(rest), diagonal, ties, csr_array(T.T @ lower @ T)
@@ -174,7 +174,7 @@ class Tangent:
         diagonal[self.held] = 1.0
         found, matrix = list[Level](), self.lower
         for step, (upper, lower) in zip(levels.steps, pairwise(follows), strict=True):
-            P = _held(step, upper.moving) @ lower.matrix
+            P = without(step, upper.moving) @ lower.matrix
             if not found:
                 found.append(Level.of(self.apply, diagonal, P))
                 continue
@@ -226,8 +226,8 @@ def _matrix(dofs: Integers, tangents: Array, size: int) -> csr_array:
     return csr_array(coo_array((tangents.ravel(), (rows, columns)), (size, size)))
 
 
-def _held(step: csr_array, moving: Flags) -> csr_array:
-    """Interpolation without rows of what does not move."""
+def without(step: csr_array, moving: Flags) -> csr_array:
+    """Interpolation to what moves: without other rows."""
     return csr_array(step.multiply(moving.astype(np.float64)[:, None]))
 
 

@@ -66,23 +66,25 @@ class Multigrid:
         return Preconditioned(levels, order, symmetric, self.tolerance, self.most)
 
 
-def hierarchy(A: csr_array[np.float64], near: Array, block: int) -> Any:
+def hierarchy(A: csr_array[np.float64], near: Array, block: int, *, light: bool = False) -> Any:
     """Smoothed aggregation of A, (n, n), as pyamg has it: a symmetric cycle.
 
     near: (n, k) motions that A hardly resists. block: unknowns of a node, which are neighbours.
+    light: half the sweeps, and an interpolation that costs more to make.
     """
     import pyamg
 
-    sweeps = ("block_gauss_seidel", {"sweep": "symmetric"})
+    sweeps = ("forward", "backward") if light else ("symmetric", "symmetric")
+    before, after = (("block_gauss_seidel", {"sweep": sweep}) for sweep in sweeps)
     with np.errstate(all="ignore"):
         return pyamg.smoothed_aggregation_solver(
             A.tobsr((block, block)),
             B=near,
             strength=("symmetric", {"theta": 0.0}),
-            smooth="jacobi",
+            smooth=("energy", {"krylov": "cg"}) if light else "jacobi",
             improve_candidates=None,
-            presmoother=sweeps,
-            postsmoother=sweeps,
+            presmoother=before,
+            postsmoother=after,
             max_coarse=_COARSEST,
         )
 

@@ -102,7 +102,7 @@ def periodic(order: int, wide: float = 0.03) -> Study:
 
 @pytest.mark.parametrize("order", [2, 4])
 def test_ties_as_with_factors(order: int) -> None:
-    study, engine = periodic(order), MatrixFree()
+    study, engine = periodic(order), MatrixFree(tolerance=1e-8)
     wanted, found = study.solve(), study.solve(engine=engine)
     assert apart(wanted, found, ("u_x", "u_y", "u_z")) < 1e-10
     assert max(engine.iterations) < 20
