@@ -27,9 +27,10 @@ from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import System
 
 _WHO = 'linear = "matrix-free"'
+
 TOLERANCE = 1e-4
-"""Of linear solutions.  Iterations of a whole load step for 1e-6, 1e-5, 1e-4, 1e-3, all of which end
-at Newton's tolerance: K/mu = 1000 396, 321, 253, 264; nu = 0.3 26, 22, 18, 15.
+"""Of linear solutions.  Iterations of a whole load step for 1e-6, 1e-5, 1e-4, 1e-3, all of which
+end at Newton's tolerance: K/mu = 1000 396, 321, 253, 264; nu = 0.3 26, 22, 18, 15.
 """
 
 
