@@ -19,15 +19,13 @@ from softehl.runtime.engines import tangent as alone
 from softehl.runtime.engines.exchange import Exchange
 from softehl.runtime.engines.levels import Levels
 from softehl.runtime.engines.matrix import Times
+from softehl.runtime.engines.matrix_free import TOLERANCE
 from softehl.runtime.engines.tied import Ties
 from softehl.runtime.fem.assembly import Assembler
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mpi import petsc, world
 from softehl.runtime.solve.coarse import DIRECT_BELOW
 from softehl.runtime.solve.multigrid import DEGREE
-
-TOLERANCE = 1e-4
-"""Of linear solutions: as in one process, `engines.matrix_free`."""
 
 
 @dataclass(eq=False)

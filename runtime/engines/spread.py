@@ -36,25 +36,25 @@ class Team:
     interleaved: int
     solver: Solver
     levels: Levels | None = None
-    tangent: Tangent | None = None
+    tangent: Operator | None = None
     reach: Array = field(default_factory=lambda: np.empty(0))
     counts: Array = field(default_factory=lambda: np.empty(0))
 
     def tangent_of(self, problem: Problem) -> Operator:
-        """The matrix for the prescribed unknowns of a problem, or what stands for it."""
-        if self.levels is not None:
-            self.solver.reset()
-            return Shell(problem, self.levels, self.exchange)
+        """The matrix for the prescribed unknowns of a problem, or a new shell."""
         known = self.tangent
-        same = known is not None and known.fixed == problem.fixed.tobytes()
+        same = isinstance(known, Tangent) and known.fixed == problem.fixed.tobytes()
         if world().allreduce(int(not same)) or known is None:
             if known is not None:
-                known.matrix.destroy()
-            self.tangent = known = Tangent.of(
-                problem.assembler, problem.fixed, self.exchange, self.interleaved
-            )
+                known.matrix.destroy()  # a shell and PETSc's matrix hold each other
             self.solver.reset()
+            self.tangent = known = self._new(problem)
         return known
+
+    def _new(self, problem: Problem) -> Operator:
+        if self.levels is not None:
+            return Shell(problem, self.levels, self.exchange)
+        return Tangent.of(problem.assembler, problem.fixed, self.exchange, self.interleaved)
 
 
 @dataclass(frozen=True, eq=False)
