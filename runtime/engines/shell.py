@@ -32,8 +32,8 @@ from softehl.runtime.solve.multigrid import DEGREE
 class Shell:
     """The tangent of a problem that is spread over processes; see `engines.matrix.Tangent`.
 
-    held: (k,) whether an own unknown is
-    prescribed. local: the part of this process's elements. matrix: PETSc's. own: (k,) the diagonal.
+    held: (k,) whether an own unknown is prescribed. local: the part of this process's elements.
+    matrix: PETSc's. own: (k,) the diagonal.
     """
 
     problem: Problem
@@ -128,9 +128,8 @@ class Shell:
         below.setOperators(lower, lower)
 
     def _is_symmetric(self) -> bool:
-        u, v = (self.exchange.vector.duplicate() for _ in range(2))
-        for vector in (u, v):
-            vector.setRandom()
+        numbers = np.random.default_rng(world().rank).uniform(-1.0, 1.0, (2, len(self.held)))
+        u, v = (self.exchange.to_petsc(row) for row in numbers)
         Ku, Kv = u.duplicate(), v.duplicate()
         self.matrix.mult(u, Ku)
         self.matrix.mult(v, Kv)
