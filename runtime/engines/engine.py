@@ -59,11 +59,7 @@ def engine_of(engine: AnyEngine, linear: Linear = "auto") -> Engine:
     Raises StudyError for an unknown one, MissingPetsc.
     """
     if linear == "matrix-free":
-        if engine is not None:
-            raise StudyError('linear = "matrix-free" is an engine by itself: leave engine out')
-        from softehl.runtime.engines.matrix_free import MatrixFree
-
-        return MatrixFree()
+        return _matrix_free(engine)
     if engine is None or engine == "serial":
         return Serial(linear)
     if linear != "auto":
@@ -75,6 +71,19 @@ def engine_of(engine: AnyEngine, linear: Linear = "auto") -> Engine:
     if isinstance(engine, str):
         raise StudyError(f'engine = {engine!r}: allowed are "serial" and "petsc"')
     return engine
+
+
+def _matrix_free(engine: AnyEngine) -> Engine:
+    """Without matrices, alone or by PETSc.  Raises StudyError, MissingPetsc."""
+    if engine == "petsc":
+        from softehl.runtime.engines.petsc import Petsc
+
+        return Petsc(matrix_free=True)
+    if engine is not None:
+        raise StudyError('linear = "matrix-free": engine = "petsc" is allowed, or leave engine out')
+    from softehl.runtime.engines.matrix_free import MatrixFree
+
+    return MatrixFree()
 
 
 def note_of(engine: Engine) -> Callable[[], str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -126,6 +126,24 @@ class Tangent:
         magnitudes.mult(self.exchange.to_petsc(x), found)
         return np.array(found.array_r[self.exchange.places])
 
+    def prepare(self, ksp: Any, near: Any) -> None:
+        """Krylov method and preconditioner, where no option says otherwise.
+
+        near: motions that multigrid should know of, or None.
+        """
+        pc = ksp.getPC()
+        if self.matrix.getSize()[0] < DIRECT_BELOW:
+            ksp.setType("preonly")
+            pc.setType("lu")
+            pc.setFactorSolverType("mumps")
+        else:
+            ksp.setType("gmres")
+            ksp.setTolerances(rtol=1e-6, max_it=500)
+            ksp.setGMRESRestart(60)
+            pc.setType("gamg")
+        if near is not None:
+            self.matrix.setNearNullSpace(near)
+
     def empty_row(self) -> int:
         """PETSc's number of a row of zeros, -1 if there is none."""
         starts, _, values = self.matrix.getValuesCSR()
@@ -139,9 +157,56 @@ class Tangent:
         return found[0] if found else -1
 
 
+class Operator(Protocol):
+    """A tangent that is spread over processes, as `Solver` and Newton's method see it: `Tangent`,
+    which says what its methods do, or `engines.shell.Shell`.
+    """
+
+    @property
+    def matrix(self) -> Any:
+        """PETSc's."""
+        ...
+
+    @property
+    def exchange(self) -> Exchange:
+        """Of its vectors."""
+        ...
+
+    def fill(
+        self,
+        assembler: Assembler,
+        x: Array,
+        parameters: Mapping[str, Array],
+        defect: Array,
+        times: Times,
+    ) -> Array:
+        """See the class."""
+        ...
+
+    def diagonal(self) -> Array:
+        """See the class."""
+        ...
+
+    def times(self, x: Array) -> Array:
+        """See the class."""
+        ...
+
+    def times_magnitudes(self, x: Array) -> Array:
+        """See the class."""
+        ...
+
+    def prepare(self, ksp: Any, near: Any) -> None:
+        """See the class."""
+        ...
+
+    def empty_row(self) -> int:
+        """See the class."""
+        ...
+
+
 @dataclass(eq=False)
 class Solver:
-    """Krylov method and preconditioner, by PETSc's options; the default is MUMPS below
+    """Krylov method and preconditioner, by PETSc's options; the default of a matrix is MUMPS below
     `DIRECT_BELOW` unknowns and GMRES with algebraic multigrid above.
 
     near: what multigrid should know of (rigid-body motions), or None. fields: name -> own numbers
@@ -154,7 +219,7 @@ class Solver:
     times: Times = field(default_factory=Times)
     _ksp: Any = None
 
-    def solve(self, tangent: Tangent, r: Array) -> Array:
+    def solve(self, tangent: Operator, r: Array) -> Array:
         """Local x (m,) of K x = r, own values (k,).  Raises SingularMatrix on all processes."""
         began = time.perf_counter()
         ksp = self._prepared(tangent)
@@ -187,27 +252,17 @@ class Solver:
             self._ksp.destroy()
         self._ksp = None
 
-    def _prepared(self, tangent: Tangent) -> Any:
+    def _prepared(self, tangent: Operator) -> Any:
         if self._ksp is None:
             self._ksp = self._new(tangent)
         self._ksp.setOperators(tangent.matrix)
         return self._ksp
 
-    def _new(self, tangent: Tangent) -> Any:
+    def _new(self, tangent: Operator) -> Any:
         PETSc = petsc()
         ksp = PETSc.KSP().create(world())
         pc = ksp.getPC()
-        if tangent.matrix.getSize()[0] < DIRECT_BELOW:
-            ksp.setType("preonly")
-            pc.setType("lu")
-            pc.setFactorSolverType("mumps")
-        else:
-            ksp.setType("gmres")
-            ksp.setTolerances(rtol=1e-6, max_it=500)
-            ksp.setGMRESRestart(60)
-            pc.setType("gamg")
-        if self.near is not None:
-            tangent.matrix.setNearNullSpace(self.near)
+        tangent.prepare(ksp, self.near)
         database = PETSc.Options()
         for name, value in self.options.items():
             database[name.removeprefix("-")] = value

@@ -10,10 +10,13 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.engines.exchange import Exchange, largest, total
+from softehl.runtime.engines.levels import Levels
 from softehl.runtime.engines.local import Part, part_of
 from softehl.runtime.engines.matrix import Solver, Times
+from softehl.runtime.engines.matrix_free import suitable
 from softehl.runtime.engines.partition import Cells, Partition, partition
 from softehl.runtime.engines.spread import Distributed, Spread, Team
+from softehl.runtime.fem.loads import Tie
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mpi import petsc, world
 from softehl.runtime.share import Share
@@ -29,10 +32,12 @@ class Petsc:
     """PETSc on all processes.
 
     options: by PETSc's own names, {"ksp_type": "cg", "pc_type": "gamg"}; those of the command line
-    and of PETSC_OPTIONS count too. times: what it has cost so far. Raises MissingPetsc.
+    and of PETSC_OPTIONS count too. matrix_free: whether the tangent is a shell matrix, with
+    multigrid in the order. times: what it has cost so far. Raises MissingPetsc.
     """
 
     options: Mapping[str, Any] = field(default_factory=dict)
+    matrix_free: bool = False
     times: Times = field(default_factory=Times)
 
     def __post_init__(self) -> None:
@@ -43,6 +48,7 @@ class Petsc:
         system = system.everywhere
         if system.contacts:
             raise StudyError('contact: its pairs are sought in one process, engine="serial"')
+        order = self._order(system)
         comm = world()
         cells = Cells.of(system)
         cut = partition(system, cells, _cut(system, cells), comm.size)
@@ -51,7 +57,20 @@ class Petsc:
         near = _rigid_motions(part, cut, exchange)
         solver = Solver(self.options, near, _fields(part, exchange), self.times)
         team = Team(part, exchange, cut.interleaved, solver)
+        if order:
+            pages = [part.system.assembler.block(name) for name in system.blocks]
+            team.levels = Levels.of(part.system, pages, order, 1)
         return replace(part.system, share=Processes(team))
+
+    def _order(self, system: System) -> int:
+        """Order of the cells of pages with products, 0 for a matrix.  Raises StudyError."""
+        if not self.matrix_free:
+            return 0
+        if any(isinstance(b.kernel, Tie) for b in system.assembler.blocks):
+            raise StudyError(
+                'linear = "matrix-free": ties are taken in one process, leave engine out'
+            )
+        return suitable(system)[1]
 
     def newton(self, system: System, given: Newton | None) -> Newton:
         """See `Engine`."""

@@ -10,8 +10,10 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.engines.exchange import Exchange, largest, total
+from softehl.runtime.engines.levels import Levels
 from softehl.runtime.engines.local import Part
-from softehl.runtime.engines.matrix import Solver, Tangent
+from softehl.runtime.engines.matrix import Operator, Solver, Tangent
+from softehl.runtime.engines.shell import Shell
 from softehl.runtime.fem.checks import element_name, rows_not_finite, unknown_name
 from softehl.runtime.fem.measure import ROUNDING, Balance, is_lost, size
 from softehl.runtime.fem.problem import Problem
@@ -24,7 +26,8 @@ from softehl.runtime.solve.linear import SingularMatrix
 class Team:
     """Objects that the processes share through a whole path: exchange of vectors, and the matrix.
 
-    tangent: of the latest set of prescribed unknowns. reach, counts: see `Assembler`, of own
+    tangent: of the latest set of prescribed unknowns. levels: of multigrid in the order, where the
+    tangent is to be no matrix. reach, counts: see `Assembler`, of own
     unknowns.
     """
 
@@ -32,29 +35,33 @@ class Team:
     exchange: Exchange
     interleaved: int
     solver: Solver
-    tangent: Tangent | None = None
+    levels: Levels | None = None
+    tangent: Operator | None = None
     reach: Array = field(default_factory=lambda: np.empty(0))
     counts: Array = field(default_factory=lambda: np.empty(0))
 
-    def tangent_of(self, problem: Problem) -> Tangent:
-        """The matrix for the prescribed unknowns of a problem."""
+    def tangent_of(self, problem: Problem) -> Operator:
+        """The matrix for the prescribed unknowns of a problem, or a new shell."""
         known = self.tangent
-        same = known is not None and known.fixed == problem.fixed.tobytes()
+        same = isinstance(known, Tangent) and known.fixed == problem.fixed.tobytes()
         if world().allreduce(int(not same)) or known is None:
             if known is not None:
-                known.matrix.destroy()
-            self.tangent = known = Tangent.of(
-                problem.assembler, problem.fixed, self.exchange, self.interleaved
-            )
+                known.matrix.destroy()  # a shell and PETSc's matrix hold each other
             self.solver.reset()
+            self.tangent = known = self._new(problem)
         return known
+
+    def _new(self, problem: Problem) -> Operator:
+        if self.levels is not None:
+            return Shell(problem, self.levels, self.exchange)
+        return Tangent.of(problem.assembler, problem.fixed, self.exchange, self.interleaved)
 
 
 @dataclass(frozen=True, eq=False)
 class Factors:
     """Matrix and solver of Newton's method on all processes."""
 
-    tangent: Tangent
+    tangent: Operator
     solver: Solver
 
     def solve(self, r: Array) -> Array:

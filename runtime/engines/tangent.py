@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.engines.levels import Levels
+from softehl.runtime.engines.tied import Ties
 from softehl.runtime.fem.assembly import ElementBlock
+from softehl.runtime.fem.loads import Tie
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.products import Product
 from softehl.runtime.solve.coarse import coarse_solver
@@ -33,10 +36,9 @@ class Iteration:
 class Tangent:
     """The tangent at a state: products of pages, a matrix of loads and springs, and multigrid.
 
-    rest: matrix of all blocks that are no pages, node by node as the first level has it.
-    diagonals: of K, (n,). lower: K at the first lower level, without prescribed unknowns. free:
-    whether an unknown is not prescribed. held: prescribed ones, and work: two vectors for products,
-    node by node.
+    rest: matrix of loads and springs, node by node as the first level has it. diagonals: of K,
+    (n,). ties: of its unknowns. lower: K at the first lower level, in what moves there. held:
+    places of what does not move by itself, and work: two vectors for products, node by node.
     """
 
     problem: Problem
@@ -45,26 +47,26 @@ class Tangent:
     products: tuple[Product, ...]
     rest: csr_array
     diagonals: Array
+    ties: Ties
     lower: csr_array
-    free: Flags
     held: Integers
     work: tuple[Array, Array]
 
     @classmethod
-    def of(cls, problem: Problem, levels: Levels, iteration: Iteration, x: Array) -> Tangent:
+    def of(
+        cls, problem: Problem, levels: Levels, iteration: Iteration, ties: Ties, x: Array
+    ) -> Tangent:
         """At x, (n,)."""
-        free: Flags = np.ones(len(x), dtype=bool)
-        free[problem.fixed] = False
         products, diagonal, rest = [], np.zeros(len(x)), csr_array((len(x), len(x)))
         count = levels.steps[0].shape[1]
         lower = csr_array((count, count))
         for block in problem.assembler.blocks:
             given = problem.parameters.get(block.name)
-            if given is None or not len(block.dofs):
+            if given is None or not len(block.dofs) or isinstance(block.kernel, Tie):
                 continue
             if block.name in levels.places:
                 products.append(Product.of(block, x, given, levels.places[block.name]))
-                lower = lower + _projected(block, x, given, levels, free, diagonal)
+                lower = lower + _projected(block, x, given, levels, ties.free, diagonal)
             else:
                 tangents = block.tangent(x, given)[1]
                 rest = rest + _matrix(block.dofs, tangents, len(x))
@@ -72,33 +74,48 @@ class Tangent:
         order = levels.unknowns[0]
         if rest.nnz:
             rest = csr_array(rest)[order][:, order]
-            P = _held(levels.steps[0], free[order], free[levels.unknowns[1]])
+            P = without(levels.steps[0], ties.free[order])
             lower = lower + P.T @ rest @ P
-        found = csr_array(rest), diagonal, csr_array(lower), free, np.flatnonzero(~free[order])
+        T = ties.follows[1].matrix
+        found = csr_array(rest), diagonal, ties, csr_array(T.T @ lower @ T)
         places = next(iter(levels.places.values()))
+        held = np.flatnonzero(~ties.follows[0].moving)
         work = places.vector(), places.vector()
-        return cls(problem, levels, iteration, tuple(products), *found, work)
+        return cls(problem, levels, iteration, tuple(products), *found, held, work)
 
     def times(self, v: Array) -> Array:
         """K v, prescribed unknowns included."""
+        return np.asarray(self._untied(v) + self.ties.whole @ v)
+
+    def _untied(self, v: Array) -> Array:
+        """K v without ties."""
         order, y = self.levels.unknowns[0], np.empty_like(v)
-        y[order] = self._product(v[order], self.held[:0])
+        given, found = self.work
+        given[: len(v)] = v[order]
+        y[order] = self._product(given, found)
         return y
 
-    def _product(self, v: Array, held: Integers) -> Array:
-        """K v node by node, where unknowns that are held do not move."""
-        given, found = self.work
-        x, y = given[: len(v)], found[: len(v)]
-        x[:] = v
-        x[held] = 0.0
+    def _product(self, given: Array, found: Array) -> Array:
+        """K v without ties, node by node, of the first numbers of a vector for products; a part
+        of the other one.
+        """
+        n = self.levels.unknowns[0].size
         found.fill(0.0)
         for product in self.products:
             product(given, found)
-        return y + self.rest @ x if self.rest.nnz else y.copy()
+        if self.rest.nnz:
+            found[:n] += self.rest @ given[:n]
+        return found[:n]
 
     def apply(self, v: Array) -> Array:
-        """K v node by node, rows and columns of prescribed unknowns replaced by those of 1."""
-        y = self._product(v, self.held)
+        """T' K T v node by node, with ones for what does not move by itself."""
+        given, found = self.work
+        x, follow = given[: len(v)], self.ties.follows[0]
+        x[:] = v
+        x[self.held] = 0.0
+        follow.spread(x)
+        y = self._product(given, found).copy()
+        follow.gather(y)
         y[self.held] = v[self.held]
         return y
 
@@ -114,11 +131,25 @@ class Tangent:
 
     def solve(self, r: Array) -> Array:
         """x of K x = r.  Raises SingularMatrix where the iteration does not get there."""
-        given, cycle, order = self.iteration, self._multigrid(), self.levels.unknowns[0]
-        if self._is_symmetric():
-            found = conjugate_gradients(self.apply, cycle, r[order], given.tolerance, given.most)
-        else:
-            found = minimal_residuals(self.apply, cycle, r[order], given.tolerance, given.most)
+        order, ties, follow = self.levels.unknowns[0], self.ties, self.ties.follows[0]
+        fixed, tied = self.problem.fixed, len(self.ties.forces) > 0
+        x = ties.shift(r)
+        b = (r - self._untied(x) if tied else r)[order]
+        follow.gather(b)
+        b[self.held] = 0.0
+        z = self._iterated(b)
+        follow.spread(z)
+        x[order] += z
+        if tied:
+            ties.put_forces(x, r - self._untied(x))
+        x[fixed] = r[fixed]
+        return x
+
+    def _iterated(self, b: Array) -> Array:
+        """z of T' K T z = b, node by node; zero for what does not move by itself."""
+        given, cycle = self.iteration, self._multigrid()
+        method = conjugate_gradients if self._is_symmetric() else minimal_residuals
+        found = method(self.apply, cycle, b, given.tolerance, given.most)
         given.counts.append(found.iterations)
         # up to a negative curvature it is a direction of descent, which Newton's method may take
         if not (found.converged or found.negative) or not np.isfinite(found.x).all():
@@ -126,29 +157,33 @@ class Tangent:
                 f"matrix-free: no linear solution after {found.iterations} iterations: leave "
                 "linear out, or take more steps"
             )
-        x = np.empty_like(r)
-        x[order] = found.x
-        return x
+        return found.x
 
     def _is_symmetric(self) -> bool:
-        u, v = np.random.default_rng(0).uniform(-1.0, 1.0, (2, len(self.free)))
+        u, v = np.random.default_rng(0).uniform(-1.0, 1.0, (2, len(self.diagonals)))
         Ku, Kv = self.apply(u), self.apply(v)
         size = np.linalg.norm(u) * np.linalg.norm(Kv)
         return bool(abs(u @ Kv - v @ Ku) <= 1e-10 * size)
 
     def _multigrid(self) -> Multigrid:
-        levels, free = self.levels, [self.free[numbers] for numbers in self.levels.unknowns]
-        diagonal = np.where(self.free, self.diagonals, 1.0)[levels.unknowns[0]]
+        levels, follows = self.levels, self.ties.follows
+        diagonal = self.diagonals[levels.unknowns[0]]
         if not np.isfinite(diagonal).all():
             raise SingularMatrix("the tangent has entries that are not finite")
-        found = [Level.of(self.apply, diagonal, _held(levels.steps[0], free[0], free[1]))]
-        matrix = self.lower
-        for k, step in enumerate(levels.steps[1:], start=1):
-            P, A = _held(step, free[k], free[k + 1]), _with_ones(matrix, free[k])
+        follows[0].gather(diagonal)
+        diagonal[self.held] = 1.0
+        found, matrix = list[Level](), self.lower
+        for step, (upper, lower) in zip(levels.steps, pairwise(follows), strict=True):
+            P = without(step, upper.moving) @ lower.matrix
+            if not found:
+                found.append(Level.of(self.apply, diagonal, P))
+                continue
+            A = _with_ones(matrix, upper.moving)
             found.append(Level.of(A.__matmul__, A.diagonal(), P))
             matrix = csr_array(P.T @ matrix @ P)
-        near = np.where(free[-1][:, None], levels.near, 0.0)
-        lowest = coarse_solver(_with_ones(matrix, free[-1]), near, levels.components)
+        moving = follows[-1].moving
+        near = np.where(moving[:, None], levels.near, 0.0)
+        lowest = coarse_solver(_with_ones(matrix, moving), near, levels.components)
         return Multigrid(found, lowest)
 
 
@@ -162,7 +197,8 @@ class _Bound:
         problem = self.tangent.problem
         root = np.sqrt(np.abs(self.tangent.diagonals))
         root[problem.fixed] = 0.0
-        return np.asarray(root * problem.assembler.around(root * x, problem.parameters))
+        around = problem.assembler.around(root * x, problem.parameters)
+        return np.asarray(root * around + abs(self.tangent.ties.whole) @ x)
 
 
 def _projected(
@@ -190,10 +226,9 @@ def _matrix(dofs: Integers, tangents: Array, size: int) -> csr_array:
     return csr_array(coo_array((tangents.ravel(), (rows, columns)), (size, size)))
 
 
-def _held(step: csr_array, upper: Flags, lower: Flags) -> csr_array:
-    """Interpolation without rows and columns of prescribed unknowns."""
-    scaled = step.multiply(upper.astype(np.float64)[:, None])
-    return csr_array(scaled.multiply(lower.astype(np.float64)[None]))
+def without(step: csr_array, moving: Flags) -> csr_array:
+    """Interpolation to what moves: without other rows."""
+    return csr_array(step.multiply(moving.astype(np.float64)[:, None]))
 
 
 def _with_ones(A: csr_array, free: Flags) -> csr_array:

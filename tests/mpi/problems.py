@@ -15,8 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
+import softehl
 from softehl import Mesh, Study
+from softehl.codegen.language.fields import Fields
 from softehl.runtime.arrays import Array
 from softehl.runtime.engines.petsc import Petsc
 from softehl.runtime.fem.loads import Amount
@@ -83,6 +86,31 @@ def yielding(pull: Amount = 0.2) -> Study:
     return study
 
 
+@softehl.page
+def rubber(m: Fields) -> None:
+    """Compressible neo-Hooke with products."""
+    u = m.vector("u")
+    mu, lam = m.parameters(mu="shear modulus [MPa]", lam="Lame's constant [MPa]")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    m.minimise(mu / 2 * ((F.T * F).trace() - 3) - mu * sp.log(J))
+    m.minimise(lam / 4 * (J**2 - 1 - 2 * sp.log(J)))
+    m.fields(J=J)
+    m.offer(product=True)
+
+
+def pushed() -> Study:
+    """A block of order 2 that is held below, lowered and pushed above, on springs."""
+    mesh = Mesh.box((1, 1, 1), cells=(3, 2, 3), order=2)
+    study = Study(mesh.map(lambda x: x + 0.02 * np.sin(3 * x[:, ::-1])))
+    study.add("body", rubber, mu=1.0, lam=8.0)
+    study.fix("bottom", u_x=0, u_y=0, u_z=0)
+    study.fix("top", u_z=-0.02)
+    study.load("top", u_x=0.02)
+    study.spring("back", u_y=0.1)
+    return study
+
+
 def warm(cells: int = 40) -> Study:
     """Heat in a bar: rates, and values of steps before."""
     study = Study(Mesh.line(1.0, cells=cells))
@@ -126,6 +154,12 @@ def solved(name: str, engine: Any, folder: Path) -> dict[str, Any]:
     if name == "adaptive":
         path = list(warm().march(dt=1e-3, until=0.1, tolerance=1e-3, engine=engine))
         return numbers(path[-1], "bar")
+    if name == "pushed":
+        if engine == "petsc":
+            engine = Petsc({"ksp_rtol": 1e-10}, matrix_free=True)
+        result = pushed().solve(engine=engine)
+        krylov = engine.times.iterations if isinstance(engine, Petsc) else 0
+        return {**numbers(result, "body"), "krylov": krylov}
     if name in ("march", "restart", "slow"):
         return _marched(name, engine, folder)
     if name == "split":

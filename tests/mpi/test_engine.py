@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 
 from softehl.runtime.io import read_arrays
+from softehl.runtime.statement.records import StudyError
+from tests.mpi.problems import tied
 
 pytestmark = [
     pytest.mark.mpi,
@@ -98,6 +100,21 @@ def test_multigrid_by_options(tmp_path: Path) -> None:
     found = run("gamg", 2, tmp_path)
     assert found.pop("krylov") > 40
     assert_equal(found, serially("cube4", tmp_path), limit=1e-8)
+
+
+@pytest.mark.parametrize("processes", PROCESSES)
+def test_shell_matrices(processes: int, tmp_path: Path) -> None:
+    found, wanted = run("pushed", processes, tmp_path), dict(serially("pushed", tmp_path))
+    assert 20 < found.pop("krylov") < 120
+    for name in ("krylov", "iterations"):
+        wanted.pop(name)
+    found.pop("iterations")
+    assert_equal(found, wanted, limit=1e-9)
+
+
+def test_shell_matrices_with_ties_are_refused() -> None:
+    with pytest.raises(StudyError, match="ties are taken in one process, leave engine out"):
+        tied().solve(linear="matrix-free", engine="petsc")
 
 
 def test_fields_are_split_by_the_names_of_the_page(tmp_path: Path) -> None:

@@ -83,6 +83,43 @@ def test_the_same_solution_as_with_factors(order: int, nu: float) -> None:
     assert apart(wanted, other, names) > 1e-7
 
 
+def periodic(order: int, wide: float = 0.03) -> Study:
+    """A block between plates that repeats along x, and has a chain of ties beside."""
+    mesh = Mesh.box((1, 1, 1), cells=(2, 1, 2), order=order)
+    study = Study(mesh)
+    study.add("body", solid, mu=1.0, lam=2.0)
+    study.fix("bottom", u_x=0, u_y=0, u_z=0)
+    study.fix("top", u_x=0.05)
+    study.tie(
+        "right", "left", "u_x", "u_y", "u_z", offset=lambda x, t: t * wide * x[:, 2] * (1 - x[:, 2])
+    )
+    study.tie((0, 1, 1), (0, 0, 1), "u_z")
+    study.tie((0.25, 0, 0.5), (0.5, 1, 1), "u_z", offset=0.01)  # no corner, and one
+    study.fix((0, 0, 1), u_z=-0.02)
+    study.load("top", u_y=0.02)
+    return study
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_ties_as_with_factors(order: int) -> None:
+    study, engine = periodic(order), MatrixFree(tolerance=1e-8)
+    wanted, found = study.solve(), study.solve(engine=engine)
+    assert apart(wanted, found, ("u_x", "u_y", "u_z")) < 1e-10
+    assert max(engine.iterations) < 20
+    for side in ("left", "right", "bottom"):
+        assert found.reaction(side) == pytest.approx(wanted.reaction(side), abs=1e-10)
+    other = periodic(order, 0.0301).solve()
+    assert apart(wanted, other, ("u_x", "u_y", "u_z")) > 1e-6
+
+
+def test_ties_in_a_circle_are_refused() -> None:
+    study = block(2, 0.3, (1, 1, 1))
+    study.tie("right", "left", "u_y")
+    study.tie("back", "front", "u_y")
+    with pytest.raises(StudyError, match=r"u_y.* is tied in a circle.*: leave one of them out"):
+        study.solve(linear="matrix-free")
+
+
 def test_two_bodies_in_the_plane_and_several_threads() -> None:
     mesh = Mesh.rectangle(2, 1, cells=(6, 9), order=3)
     mesh = mesh.with_group("a", lambda x: x[:, 0] < 1).with_group("b", lambda x: x[:, 0] > 1)
@@ -117,11 +154,8 @@ def test_what_it_cannot_solve_is_refused() -> None:
     study = block(2, 0.3)
     with pytest.raises(StudyError, match="linear = 'gamg': allowed are"):
         study.solve(linear="gamg")  # type: ignore[arg-type]
-    with pytest.raises(StudyError, match="is an engine by itself: leave engine out"):
+    with pytest.raises(StudyError, match="is allowed, or leave engine out"):
         study.solve(linear="matrix-free", engine="serial")
-    study.tie("left", "right", "u_z")
-    with pytest.raises(StudyError, match="cannot solve for the forces of ties"):
-        study.solve(linear="matrix-free")
     triangles = Study(Mesh.rectangle(1, 1, cells=(2, 2), shape="triangle"))
     triangles.add("body", solid, mu=1, lam=1)
     with pytest.raises(StudyError, match="on quadrilaterals and hexahedra"):
