@@ -302,8 +302,8 @@ def test_documentation_cannot_end_the_comment(tmp_path: Path) -> None:
 def test_every_value_is_declared_once() -> None:
     kernel = pipeline.compile_model(ALL["contact"]())
     for task, function in kernel.functions.items():
-        rows = re.findall(r"(?:const )?(?:V|M|double) ([vm]\d[^;]*);", function.text)
-        names = [n for row in rows for n in re.findall(r"(?:^|,\s+)([vm]\d+)", row)]
+        rows = re.findall(r"(?:const )?(?:V|M|double) ([vms]\d[^;]*);", function.text)
+        names = [n for row in rows for n in re.findall(r"(?:^|,\s+)([vms]\d+)", row)]
         assert len(names) == len(set(names)) == function.temporaries, task
         assert "pow(" not in function.text
 
