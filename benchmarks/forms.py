@@ -46,8 +46,8 @@ class Built:
     size: tuple[float, float]
 
 
-def built(material: str, cell: str, form: Form, folder: Path) -> Built:
-    """Derive and compile, in series."""
+def built(material: str, cell: str, form: Form | None, folder: Path) -> Built:
+    """Derive and compile, in series. form: None for that which is taken by itself."""
     start = time.process_time()
     d = replace(MATERIALS[material].page(), form=form).definition(cell)
     files = product.files([pipeline.compile_model(d)])
