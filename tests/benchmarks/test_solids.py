@@ -33,5 +33,5 @@ def test_values_that_differ_are_an_error() -> None:
 
 
 def test_a_python_without_ffcx_is_named(tmp_path: Path) -> None:
-    with pytest.raises(SystemExit, match="has no FFCx that works: .*No module named"):
+    with pytest.raises(SystemExit, match=r"has no FFCx that works: .*No module named"):
         solids.theirs(sys.executable, "quad4", tmp_path)
