@@ -46,8 +46,8 @@ class Built:
     size: tuple[float, float]
 
 
-def built(material: str, cell: str, form: Form, folder: Path) -> Built:
-    """Derive and compile, in series."""
+def built(material: str, cell: str, form: Form | None, folder: Path) -> Built:
+    """Derive and compile, in series. form: None for that which is taken by itself."""
     start = time.process_time()
     d = replace(MATERIALS[material].page(), form=form).definition(cell)
     files = product.files([pipeline.compile_model(d)])
@@ -69,7 +69,7 @@ def built(material: str, cell: str, form: Form, folder: Path) -> Built:
 
 def _compiled(source: Path, to: Path) -> float:
     """CPU seconds of the compiler."""
-    light = [build.LIGHT] if build.large(source.read_text()) else []
+    light = build.lighter(source, source.read_text())
     flags = [f for f in build.FLAGS if f != "-shared"]
     command = ["cc", *flags, *light, '-DSOFTEHL_SIGNATURE="x"', "-c", str(source), "-o", str(to)]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -57,15 +57,14 @@ not-a-number in *every* entry of its `values` and `tangent`; the other elements 
 Targets
 -------
 `simd` (the default): the functions above, several elements at once, one a lane of a vector: eight
-with AVX-512, else four; one after another where there is little to compute.  If a batch is no
-multiple of the lanes, its last elements are computed and written twice.  A kernel of an
-interpolated field keeps 8 (ndof + ndof^2) bytes a lane on the stack; so does the tangent of a page
-of fields that is compiled as loops around a point, besides the moduli of its points.  Such a family
-has its rule written into it, and calls `void softehl_pairs_CELL_DIGEST`, which makes tangents of
-moduli and stands in a file of its own, the same for all pages with the same fields.  The lanes are
-the vector extensions of gcc >= 12 and clang; another compiler, or `-DSOFTEHL_LANES=1`, gets groups
-of one element from the same source.
-`scalar`: the functions above, one element after another, plain C11.
+with AVX-512, else four.  If a batch is no multiple of the lanes, its last elements are computed and
+written twice.  A kernel of an interpolated field keeps 8 (ndof + ndof^2) bytes a lane on the stack;
+so does the tangent of a page of fields that is compiled as loops around a point, besides the moduli
+of its points.  Such a family has its rule written into it, and calls
+`void softehl_pairs_CELL_DIGEST`, which makes tangents of moduli and stands in a file of its own,
+the same for all pages with the same fields.  The lanes are the vector extensions of gcc >= 12 and
+clang; another compiler, or `-DSOFTEHL_LANES=1`, gets groups of one element from the same source.
+`scalar`: the same text with one lane: one element after another, plain C11.
 `ufcx`: one cell at a time for DOLFINx custom kernels.  The tasks `energy`, `residual`, `tangent`,
 `d_NAME` and `fields` of a family become functions `softehl_NAME_TASK_ufcx` of UFCx's type,
 

@@ -10,8 +10,8 @@
     schedule    what is computed once, what at each point, what inside a branch
     choice      of all ways the one with fewest operations
     order       straight pieces in the order of a small register file
-    print       C, with a name for each value that is used again: several elements at once, or where
-                there is little to compute one after another
+    print       C, with a name for each value that is used again, for several elements at once; one
+                at a time is the same text with one lane
     routines    local iterations and functions of stretches as C functions of their own
 
 A page of fields on a large cell goes another way (`form`): all of this for the function of a point
@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import ModuleType
 
 from softehl.codegen.abi import DESIGN, ROLLED, Target, Task, derivative_task
 from softehl.codegen.derive import points as at_points
@@ -32,7 +31,6 @@ from softehl.codegen.derive import structure, variants
 from softehl.codegen.derive.outputs import Entry, placed
 from softehl.codegen.derive.structure import Structure
 from softehl.codegen.derive.variants import Variant
-from softehl.codegen.emit import c as emit_c
 from softehl.codegen.emit import lane_routines as emit_lane_routines
 from softehl.codegen.emit import lanes as emit_lanes
 from softehl.codegen.emit import routines as emit_routines
@@ -54,9 +52,6 @@ from softehl.codegen.optimise import passes
 
 SHORT = 3000
 """Operations of one element up to which writing the loop over its points out is tried."""
-FEW = 64
-"""Operations of one element below which loading and storing in lanes costs more than it saves;
-what a routine does besides always pays."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +124,9 @@ def compile_model(definition: Definition, target: Target = Target.SIMD) -> Kerne
     others = [f for t, f in functions.items() if t not in DESIGN]
     if {r for f in others for r in f.routines} & {r for f in design for r in f.routines}:
         others, design = others + design, []  # no routine is written twice
-    text, more = _file(definition, others), _file(definition, design) if design else ""
+    single = target is Target.SCALAR
+    text = _file(definition, others, single=single)
+    more = _file(definition, design, single=single) if design else ""
     made = KernelSource(definition, text, functions, more)
     return _with_action(made) if target is Target.SIMD else made
 
@@ -216,14 +213,12 @@ def _ordered(
     return Outputs(entries), plan, called
 
 
-def _file(d: Definition, functions: Sequence[Function]) -> str:
-    """The C file of some functions, with the routines that they call."""
-    wide = dict.fromkeys(r for f in functions if f.printer == "simd" for r in f.routines)
-    narrow = dict.fromkeys(r for f in functions if f.printer != "simd" for r in f.routines)
-    routines = emit_routines.texts(d, narrow) + emit_lane_routines.texts(d, wide)
+def _file(d: Definition, functions: Sequence[Function], *, single: bool) -> str:
+    """The C file of some functions, with the routines that they call. single: with one lane."""
+    routines = emit_lane_routines.texts(d, dict.fromkeys(r for f in functions for r in f.routines))
     called = "".join([*routines, *(f.text for f in functions)])
-    before = emit_lanes.wrappers(called) + list(dict.fromkeys(routines))
-    return emit_source.source(d, [f.text for f in functions], before)
+    before = emit_lanes.wrappers(called) + routines
+    return emit_source.source(d, [f.text for f in functions], before, single=single)
 
 
 def compile_task(d: Definition, task: str, target: Target = Target.SIMD) -> Function:
@@ -235,7 +230,7 @@ def compile_task(d: Definition, task: str, target: Target = Target.SIMD) -> Func
     chosen = min(attempts, key=lambda a: a.operations)
     entries, plan = chosen.entries, chosen.plan
     called = tuple(emit_routines.called([x.node for x in entries]))
-    printer = _printer(target, FEW if called else chosen.operations)
+    printer = emit_ufcx if target is Target.UFCX else emit_simd
     if printer is emit_simd and is_straight(plan):
         roots, order = arranged(d.graph, [x.node for x in entries])
         entries, plan = placed(entries, roots), straight_line(order)
@@ -273,11 +268,3 @@ def _attempt(d: Definition, way: Variant, *, unrolled: bool) -> Attempt:
     plan = schedule(roots)
     work = plan.operations_once + len(d.rule.points) * plan.operations_per_point
     return Attempt(way.rule, unrolled, placed(way.entries, roots), trace, plan, work)
-
-
-def _printer(target: Target, operations: int) -> ModuleType:
-    """Several elements at once where wanted, and where there is more to do than to fetch."""
-    if target is Target.UFCX:
-        return emit_ufcx
-    at_once = target is Target.SIMD and operations >= FEW
-    return emit_simd if at_once else emit_c

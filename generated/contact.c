@@ -15,62 +15,63 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_contact_residual)
+SOFTEHL_GROUP(softehl_contact_residual)
 {
-    (void)points;
-    (void)modes;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 3 * e;
-        const double *restrict a = data + 5 * e; double *restrict R = values + 3 * e;
-        (void)X; (void)d; (void)a;
-        const double v1 = X[0] + d[0], v2 = a[0] * v1, v3 = X[1] + d[1], v4 = a[1] * v3,
-            v5 = v4 + v2, v6 = a[2] + parameters[0], v7 = v5 - v6, v8 = a[4] * v7, v9 = d[2] + v8;
-        const int v10 = v9 <= 0.0; double v11, v12;
-        if (v10) {
-            const double v13 = a[3] * parameters[1], v14 = v13 * v9, v15 = a[3] * v7;
-            v11 = v14; v12 = v15;
-        } else {
-            const double v16 = 1.0 / a[4], v17 = d[2] * a[3], v18 = v17 * v16, v19 = -v18;
-            v11 = 0.0; v12 = v19;
-        }
-        const double v20 = a[0] * v11, v21 = a[1] * v11;
-        R[0] = v20; R[1] = v21; R[2] = v12;
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1);
+    V d0, d1, d2;
+    softehl_load3(d + 0, 3, &d0, &d1, &d2);
+    V a0, a1, a2, a3, a4;
+    softehl_load4(a + 0, 5, &a0, &a1, &a2, &a3); softehl_load1(a + 4, 5, &a4);
+    const V v1 = a1 * (X1 + d1) + (a0 * (X0 + d0) - (a2 + parameters[0])), v2 = d2 + a4 * v1;
+    const M v3 = softehl_le(v2, softehl_splat(0.0));
+    V v4 = softehl_splat(0.0), v5 = softehl_splat(0.0);
+    const M m6 = v3;
+    if (softehl_any(m6)) {
+        const V v7 = a3 * v1, v8 = a3 * parameters[1] * v2;
+        v4 = softehl_blend(m6, v8, v4); v5 = softehl_blend(m6, v7, v5);
     }
+    const M m9 = ~v3;
+    if (softehl_any(m9)) {
+        const V v10 = -(d2 * a3 * (1.0 / a4)); v5 = softehl_blend(m9, v10, v5);
+    }
+    softehl_store3(R + 0, 3, a0 * v4, a1 * v4, v5);
 }
+SOFTEHL_BATCH(softehl_contact_residual, 2, 3, 5, 0, 3, 0)
 
-SOFTEHL_KERNEL(softehl_contact_tangent)
+SOFTEHL_GROUP(softehl_contact_tangent)
 {
-    (void)points;
-    (void)modes;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 3 * e;
-        const double *restrict a = data + 5 * e; double *restrict R = values + 3 * e;
-        double *restrict K = tangent + 3 * 3 * e; (void)X; (void)d; (void)a;
-        const double v1 = X[0] + d[0], v2 = a[0] * v1, v3 = X[1] + d[1], v4 = a[1] * v3,
-            v5 = v4 + v2, v6 = a[2] + parameters[0], v7 = v5 - v6, v8 = a[4] * v7, v9 = d[2] + v8;
-        const int v10 = v9 <= 0.0; double v11, v12, v13, v14, v15, v16, v17, v18, v19, v20;
-        if (v10) {
-            const double v21 = a[3] * parameters[1], v22 = v21 * v9, v23 = a[3] * v7,
-                v24 = a[0] * a[0], v25 = a[4] * v24, v26 = v21 * v25, v27 = a[1] * a[4],
-                v28 = v21 * v27, v29 = a[0] * v28, v30 = a[0] * v21, v31 = a[1] * v28,
-                v32 = a[1] * v21, v33 = a[0] * a[3], v34 = a[1] * a[3];
-            v11 = v22; v12 = v23; v13 = v26; v14 = v29; v15 = v30; v16 = v31; v17 = v32; v18 = v33;
-            v19 = v34; v20 = 0.0;
-        } else {
-            const double v35 = 1.0 / a[4], v36 = d[2] * a[3], v37 = v36 * v35, v38 = -v37,
-                v39 = a[3] * v35, v40 = -v39;
-            v11 = 0.0; v12 = v38; v13 = 0.0; v14 = 0.0; v15 = 0.0; v16 = 0.0; v17 = 0.0; v18 = 0.0;
-            v19 = 0.0; v20 = v40;
-        }
-        const double v41 = a[0] * v11, v42 = a[1] * v11;
-        R[0] = v41; R[1] = v42; R[2] = v12; K[0] = v13; K[1] = v14; K[2] = v15; K[3] = v14;
-        K[4] = v16; K[5] = v17; K[6] = v18; K[7] = v19; K[8] = v20;
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1);
+    V d0, d1, d2;
+    softehl_load3(d + 0, 3, &d0, &d1, &d2);
+    V a0, a1, a2, a3, a4;
+    softehl_load4(a + 0, 5, &a0, &a1, &a2, &a3); softehl_load1(a + 4, 5, &a4);
+    const V v1 = a1 * (X1 + d1) + (a0 * (X0 + d0) - (a2 + parameters[0])), v2 = d2 + a4 * v1;
+    const M v3 = softehl_le(v2, softehl_splat(0.0));
+    V v4 = softehl_splat(0.0), v5 = softehl_splat(0.0), v6 = softehl_splat(0.0),
+        v7 = softehl_splat(0.0), v8 = softehl_splat(0.0), v9 = softehl_splat(0.0),
+        v10 = softehl_splat(0.0), v11 = softehl_splat(0.0), v12 = softehl_splat(0.0),
+        v13 = softehl_splat(0.0);
+    const M m14 = v3;
+    if (softehl_any(m14)) {
+        const V v15 = a3 * parameters[1], v16 = a3 * v1, v17 = a0 * a3, v18 = a1 * a3,
+            v19 = v15 * v2, v20 = a0 * v15, v21 = a1 * v15, v22 = v15 * (a1 * a4),
+            v23 = v15 * (a4 * (a0 * a0)), v24 = a0 * v22, v25 = a1 * v22;
+        v4 = softehl_blend(m14, v19, v4); v5 = softehl_blend(m14, v16, v5);
+        v6 = softehl_blend(m14, v23, v6); v7 = softehl_blend(m14, v24, v7);
+        v8 = softehl_blend(m14, v20, v8); v9 = softehl_blend(m14, v25, v9);
+        v10 = softehl_blend(m14, v21, v10); v11 = softehl_blend(m14, v17, v11);
+        v12 = softehl_blend(m14, v18, v12);
     }
+    const M m26 = ~v3;
+    if (softehl_any(m26)) {
+        const V v27 = 1.0 / a4, v28 = -(d2 * a3 * v27), v29 = -(a3 * v27);
+        v5 = softehl_blend(m26, v28, v5); v13 = softehl_blend(m26, v29, v13);
+    }
+    softehl_store4(K + 0, 9, v6, v7, v8, v7); softehl_store4(K + 4, 9, v9, v10, v11, v12);
+    softehl_store1(K + 8, 9, v13); softehl_store3(R + 0, 3, a0 * v4, a1 * v4, v5);
 }
+SOFTEHL_BATCH(softehl_contact_tangent, 2, 3, 5, 0, 3, (3 * 3))

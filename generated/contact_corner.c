@@ -13,63 +13,45 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_contact_corner_energy)
+SOFTEHL_GROUP(softehl_contact_corner_energy)
 {
-    (void)points;
-    (void)modes;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 3 * e;
-        const double *restrict a = data + 2 * e; (void)X; (void)d; (void)a;
-        const double v1 = parameters[1] + parameters[2], v2 = v1 - X[1], v3 = v2 - d[1],
-            v4 = parameters[0] + parameters[2], v5 = v4 - X[0], v6 = v5 - d[0];
-        const int v7 = 0.0 < v3, v8 = 0.0 < v6;
-        double v9;
-        if (v8) {
-            double v10;
-            if (v7) {
-                const double v11 = v3 * v3, v12 = v6 * v6, v13 = v12 + v11;
-                const int v14 = 0.0 < v13; double v15;
-                if (v14) {
-                    const double v16 = sqrt(v13); v15 = v16;
-                } else {
-                    v15 = 0.0;
-                }
-                v10 = v15;
-            } else {
-                v10 = v6;
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1);
+    V d0, d1, d2;
+    softehl_load3(d + 0, 3, &d0, &d1, &d2);
+    V a0, a1;
+    softehl_load2(a + 0, 2, &a0, &a1);
+    const V v1 = parameters[2] + (parameters[0] - X0 - d0),
+        v2 = parameters[2] + (parameters[1] - X1 - d1);
+    const M v3 = softehl_lt(softehl_splat(0.0), v1), v4 = softehl_lt(softehl_splat(0.0), v2);
+    V v5 = softehl_splat(0.0); const M m6 = v3;
+    if (softehl_any(m6)) {
+        V v7 = v1; const M m8 = v4 & m6;
+        if (softehl_any(m8)) {
+            const V v9 = v1 * v1 + v2 * v2; const M v10 = softehl_lt(softehl_splat(0.0), v9);
+            V v11 = softehl_splat(0.0); const M m12 = v10 & m8;
+            if (softehl_any(m12)) {
+                const V v13 = softehl_vsqrt(v9); v11 = softehl_blend(m12, v13, v11);
             }
-            v9 = v10;
-        } else {
-            double v17;
-            if (v7) {
-                v17 = v3;
-            } else {
-                const int v18 = v6 < v3; double v19;
-                if (v18) {
-                    v19 = v3;
-                } else {
-                    v19 = v6;
-                }
-                v17 = v19;
-            }
-            v9 = v17;
+            v7 = softehl_blend(m8, v11, v7);
         }
-        const double v20 = v9 - parameters[2], v21 = a[1] * v20, v22 = d[2] + v21;
-        const int v23 = 0.0 < v22; double v24;
-        if (v23) {
-            v24 = 0.0;
-        } else {
-            v24 = v22;
-        }
-        const double v25 = v24 * v24, v26 = d[2] * d[2], v27 = v25 - v26, v28 = 1.0 / a[1],
-            v29 = 0.5 * a[0], v30 = v29 * v28, v31 = v27 * v30;
-        values[e] = v31;
+        v5 = softehl_blend(m6, v7, v5);
     }
+    const M m14 = ~v3;
+    if (softehl_any(m14)) {
+        V v15 = v2; const M m16 = ~v4 & m14;
+        if (softehl_any(m16)) {
+            const M v17 = softehl_lt(v1, v2); const V v18 = softehl_blend(v17, v2, v1);
+            v15 = softehl_blend(m16, v18, v15);
+        }
+        v5 = softehl_blend(m14, v15, v5);
+    }
+    const V v19 = d2 + a1 * (v5 - parameters[2]); const M v20 = softehl_lt(softehl_splat(0.0), v19);
+    const V v21 = softehl_blend(v20, softehl_splat(0.0), v19);
+    softehl_store1(R + 0, 1, (v21 * v21 - d2 * d2) * (0.5 * a0 * (1.0 / a1)));
 }
+SOFTEHL_BATCH(softehl_contact_corner_energy, 2, 3, 2, 0, 1, 0)
 
 SOFTEHL_GROUP(softehl_contact_corner_residual)
 {
@@ -120,7 +102,6 @@ SOFTEHL_GROUP(softehl_contact_corner_residual)
                 v30 = softehl_blend(m31, softehl_splat(0.0), v30);
             }
             v25 = softehl_blend(m28, v29, v25); v26 = softehl_blend(m28, v30, v26);
-            v27 = softehl_blend(m28, softehl_splat(0.0), v27);
         }
         const M m36 = ~v4 & m24;
         if (softehl_any(m36)) {
@@ -132,8 +113,7 @@ SOFTEHL_GROUP(softehl_contact_corner_residual)
                 v37 = softehl_blend(m39, v40, v37); v38 = softehl_blend(m39, v41, v38);
             }
             const V v42 = (d2 + a1 * (v10 - parameters[2])) * (v38 * (v1 * (2.0 * a1)));
-            v25 = softehl_blend(m36, softehl_splat(0.0), v25); v26 = softehl_blend(m36, v37, v26);
-            v27 = softehl_blend(m36, v42, v27);
+            v26 = softehl_blend(m36, v37, v26); v27 = softehl_blend(m36, v42, v27);
         }
         const V v43 = v1 * (2.0 * v18), v44 = a1 * v26 * v43;
         v20 = softehl_blend(m24, v25, v20); v21 = softehl_blend(m24, v44, v21);
@@ -176,79 +156,80 @@ SOFTEHL_GROUP(softehl_contact_corner_tangent)
     V v23 = softehl_splat(0.0), v24 = softehl_splat(0.0), v25 = softehl_splat(0.0),
         v26 = softehl_splat(0.0), v27 = softehl_splat(0.0), v28 = softehl_splat(0.0),
         v29 = softehl_splat(0.0), v30 = softehl_splat(0.0), v31 = softehl_splat(0.0),
-        v32 = softehl_splat(0.0), v33 = softehl_splat(0.0), v34 = softehl_splat(0.0);
-    const M m35 = ~v22;
+        v32 = softehl_splat(0.0), v33 = softehl_splat(0.0), v34 = v8;
+    const M m35 = v22;
     if (softehl_any(m35)) {
-        const V v36 = v1 * (2.0 * a1);
-        V v37 = softehl_splat(0.0), v38 = softehl_splat(0.0), v39 = softehl_splat(0.0),
-            v40 = softehl_splat(0.0), v41 = softehl_splat(0.0), v42 = softehl_splat(0.0),
-            v43 = softehl_splat(0.0), v44 = softehl_splat(0.0), v45 = softehl_splat(0.0);
-        const M m46 = v4 & m35;
-        if (softehl_any(m46)) {
-            V v47 = softehl_splat(0.0), v48 = softehl_splat(1.0), v49 = softehl_splat(0.0),
-                v50 = softehl_splat((-1.0)), v51 = softehl_splat(0.0), v52 = softehl_splat(0.0),
-                v53 = softehl_splat(0.0);
-            const M m54 = v5 & m46;
-            if (softehl_any(m54)) {
-                V v55 = softehl_splat(0.0), v56 = softehl_splat(0.0), v57 = softehl_splat(0.0),
-                    v58 = softehl_splat(0.0), v59 = softehl_splat(0.0), v60 = softehl_splat(0.0);
-                const M m61 = v9 & m54;
-                if (softehl_any(m61)) {
-                    const V v62 = softehl_vsqrt(1.0 / v7), v63 = 0.5 * v62, v64 = a1 * v63,
-                        v65 = (d2 + a1 * (v10 - parameters[2])) * v8, v66 = v64 * v8,
-                        v67 = v64 * v65, v68 = v20 * v63, v69 = -v68, v70 = v62 * (v62 * v63),
-                        v71 = v19 * v63, v72 = -v71,
-                        v73 = (v70 * (v2 * v65) - v68 * v66) * (a1 * v20),
-                        v74 = a1 * (v70 * (v3 * v65) - v71 * v66), v75 = v20 * v74, v76 = v19 * v74;
-                    v55 = softehl_blend(m61, v67, v55); v56 = softehl_blend(m61, v73, v56);
-                    v57 = softehl_blend(m61, v69, v57); v58 = softehl_blend(m61, v75, v58);
-                    v59 = softehl_blend(m61, v72, v59); v60 = softehl_blend(m61, v76, v60);
-                }
-                v47 = softehl_blend(m54, v55, v47);
-                v48 = softehl_blend(m54, softehl_splat(0.0), v48);
-                v49 = softehl_blend(m54, v56, v49); v50 = softehl_blend(m54, v57, v50);
-                v51 = softehl_blend(m54, v58, v51); v52 = softehl_blend(m54, v59, v52);
-                v53 = softehl_blend(m54, v60, v53);
-            }
-            v37 = softehl_blend(m46, v47, v37); v38 = softehl_blend(m46, v48, v38);
-            v39 = softehl_blend(m46, softehl_splat(0.0), v39); v40 = softehl_blend(m46, v49, v40);
-            v41 = softehl_blend(m46, v50, v41); v42 = softehl_blend(m46, v51, v42);
-            v43 = softehl_blend(m46, v52, v43); v44 = softehl_blend(m46, v53, v44);
-            v45 = softehl_blend(m46, softehl_splat(0.0), v45);
-        }
-        const M m77 = ~v4 & m35;
-        if (softehl_any(m77)) {
-            V v78 = softehl_splat(0.0), v79 = softehl_splat(1.0), v80 = softehl_splat(0.0),
-                v81 = softehl_splat((-1.0));
-            const M m82 = ~v5 & m77;
-            if (softehl_any(m82)) {
-                const V v83 = softehl_blend(v6, softehl_splat(0.0), softehl_splat(1.0)),
-                    v84 = softehl_blend(v6, softehl_splat(1.0), softehl_splat(0.0)),
-                    v85 = softehl_blend(v6, softehl_splat(0.0), softehl_splat((-1.0))),
-                    v86 = softehl_blend(v6, softehl_splat((-1.0)), softehl_splat(0.0));
-                v78 = softehl_blend(m82, v83, v78); v79 = softehl_blend(m82, v84, v79);
-                v80 = softehl_blend(m82, v85, v80); v81 = softehl_blend(m82, v86, v81);
-            }
-            const V v87 = a1 * v79, v88 = (d2 + a1 * (v11 - parameters[2])) * (v87 * v8),
-                v89 = v81 * (v87 * v36);
-            v37 = softehl_blend(m77, softehl_splat(0.0), v37); v38 = softehl_blend(m77, v78, v38);
-            v39 = softehl_blend(m77, v88, v39); v40 = softehl_blend(m77, softehl_splat(0.0), v40);
-            v41 = softehl_blend(m77, v80, v41); v42 = softehl_blend(m77, softehl_splat(0.0), v42);
-            v43 = softehl_blend(m77, v81, v43); v44 = softehl_blend(m77, softehl_splat(0.0), v44);
-            v45 = softehl_blend(m77, v89, v45);
-        }
-        const V v90 = a1 * v38, v91 = v1 * (2.0 * v21), v92 = v36 * v41, v93 = v36 * v43,
-            v94 = v90 * v92, v95 = v90 * v91, v96 = -(v90 * v93 + v42);
-        v23 = softehl_blend(m35, v37, v23); v24 = softehl_blend(m35, v95, v24);
-        v25 = softehl_blend(m35, v39, v25); v26 = softehl_blend(m35, v91, v26);
-        v27 = softehl_blend(m35, v40, v27); v28 = softehl_blend(m35, v94, v28);
-        v29 = softehl_blend(m35, v96, v29); v30 = softehl_blend(m35, v92, v30);
-        v31 = softehl_blend(m35, v44, v31); v32 = softehl_blend(m35, v45, v32);
-        v33 = softehl_blend(m35, v93, v33); v34 = softehl_blend(m35, v8, v34);
+        v34 = softehl_blend(m35, softehl_splat(0.0), v34);
     }
-    softehl_store1(K + 8, 9, v34 - v8); const V v97 = 2.0 * v23;
+    const M m36 = ~v22;
+    if (softehl_any(m36)) {
+        const V v37 = v1 * (2.0 * a1);
+        V v38 = softehl_splat(0.0), v39 = softehl_splat(0.0), v40 = softehl_splat(0.0),
+            v41 = softehl_splat(0.0), v42 = softehl_splat(0.0), v43 = softehl_splat(0.0),
+            v44 = softehl_splat(0.0), v45 = softehl_splat(0.0), v46 = softehl_splat(0.0);
+        const M m47 = v4 & m36;
+        if (softehl_any(m47)) {
+            V v48 = softehl_splat(0.0), v49 = softehl_splat(1.0), v50 = softehl_splat(0.0),
+                v51 = softehl_splat((-1.0)), v52 = softehl_splat(0.0), v53 = softehl_splat(0.0),
+                v54 = softehl_splat(0.0);
+            const M m55 = v5 & m47;
+            if (softehl_any(m55)) {
+                V v56 = softehl_splat(0.0), v57 = softehl_splat(0.0), v58 = softehl_splat(0.0),
+                    v59 = softehl_splat(0.0), v60 = softehl_splat(0.0), v61 = softehl_splat(0.0);
+                const M m62 = v9 & m55;
+                if (softehl_any(m62)) {
+                    const V v63 = softehl_vsqrt(1.0 / v7), v64 = 0.5 * v63, v65 = a1 * v64,
+                        v66 = (d2 + a1 * (v10 - parameters[2])) * v8, v67 = v65 * v8,
+                        v68 = v65 * v66, v69 = v20 * v64, v70 = -v69, v71 = v63 * (v63 * v64),
+                        v72 = v19 * v64, v73 = -v72,
+                        v74 = (v71 * (v2 * v66) - v69 * v67) * (a1 * v20),
+                        v75 = a1 * (v71 * (v3 * v66) - v72 * v67), v76 = v20 * v75, v77 = v19 * v75;
+                    v56 = softehl_blend(m62, v68, v56); v57 = softehl_blend(m62, v74, v57);
+                    v58 = softehl_blend(m62, v70, v58); v59 = softehl_blend(m62, v76, v59);
+                    v60 = softehl_blend(m62, v73, v60); v61 = softehl_blend(m62, v77, v61);
+                }
+                v48 = softehl_blend(m55, v56, v48);
+                v49 = softehl_blend(m55, softehl_splat(0.0), v49);
+                v50 = softehl_blend(m55, v57, v50); v51 = softehl_blend(m55, v58, v51);
+                v52 = softehl_blend(m55, v59, v52); v53 = softehl_blend(m55, v60, v53);
+                v54 = softehl_blend(m55, v61, v54);
+            }
+            v38 = softehl_blend(m47, v48, v38); v39 = softehl_blend(m47, v49, v39);
+            v41 = softehl_blend(m47, v50, v41); v42 = softehl_blend(m47, v51, v42);
+            v43 = softehl_blend(m47, v52, v43); v44 = softehl_blend(m47, v53, v44);
+            v45 = softehl_blend(m47, v54, v45);
+        }
+        const M m78 = ~v4 & m36;
+        if (softehl_any(m78)) {
+            V v79 = softehl_splat(0.0), v80 = softehl_splat(1.0), v81 = softehl_splat(0.0),
+                v82 = softehl_splat((-1.0));
+            const M m83 = ~v5 & m78;
+            if (softehl_any(m83)) {
+                const V v84 = softehl_blend(v6, softehl_splat(0.0), softehl_splat(1.0)),
+                    v85 = softehl_blend(v6, softehl_splat(1.0), softehl_splat(0.0)),
+                    v86 = softehl_blend(v6, softehl_splat(0.0), softehl_splat((-1.0))),
+                    v87 = softehl_blend(v6, softehl_splat((-1.0)), softehl_splat(0.0));
+                v79 = softehl_blend(m83, v84, v79); v80 = softehl_blend(m83, v85, v80);
+                v81 = softehl_blend(m83, v86, v81); v82 = softehl_blend(m83, v87, v82);
+            }
+            const V v88 = a1 * v80, v89 = (d2 + a1 * (v11 - parameters[2])) * (v88 * v8),
+                v90 = v82 * (v88 * v37);
+            v39 = softehl_blend(m78, v79, v39); v40 = softehl_blend(m78, v89, v40);
+            v42 = softehl_blend(m78, v81, v42); v44 = softehl_blend(m78, v82, v44);
+            v46 = softehl_blend(m78, v90, v46);
+        }
+        const V v91 = a1 * v39, v92 = v1 * (2.0 * v21), v93 = v37 * v42, v94 = v37 * v44,
+            v95 = v91 * v93, v96 = v91 * v92, v97 = -(v91 * v94 + v43);
+        v23 = softehl_blend(m36, v38, v23); v24 = softehl_blend(m36, v96, v24);
+        v25 = softehl_blend(m36, v40, v25); v26 = softehl_blend(m36, v92, v26);
+        v27 = softehl_blend(m36, v41, v27); v28 = softehl_blend(m36, v95, v28);
+        v29 = softehl_blend(m36, v97, v29); v30 = softehl_blend(m36, v93, v30);
+        v31 = softehl_blend(m36, v45, v31); v32 = softehl_blend(m36, v46, v32);
+        v33 = softehl_blend(m36, v94, v33);
+    }
+    softehl_store1(K + 8, 9, v34 - v8); const V v98 = 2.0 * v23;
     softehl_store3(R + 0, 3, -(v24 + v20 * v23), -(v25 + v19 * v23), v26 - v1 * (2.0 * d2));
-    const V v98 = v97 - v28 - v27; softehl_store4(K + 0, 9, v98, v29, v30, v29);
-    const V v99 = v97 - v32 - v31; softehl_store4(K + 4, 9, v99, v33, v30, v33);
+    const V v99 = v98 - v28 - v27; softehl_store4(K + 0, 9, v99, v29, v30, v29);
+    const V v100 = v98 - v32 - v31; softehl_store4(K + 4, 9, v100, v33, v30, v33);
 }
 SOFTEHL_BATCH(softehl_contact_corner_tangent, 2, 3, 2, 0, 3, (3 * 3))

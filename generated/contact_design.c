@@ -15,38 +15,42 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_contact_pseudo_load)
+SOFTEHL_GROUP(softehl_contact_pseudo_load)
 {
-    (void)modes;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 3 * e;
-        const double *restrict a = data + 5 * e; const double *restrict t = direction + 9 * e;
-        double *restrict R = values + 3 * e; (void)X; (void)d; (void)a; (void)t;
-        const double v1 = a[2] + parameters[0], v2 = X[1] + d[1], v3 = a[1] * v2, v4 = X[0] + d[0],
-            v5 = a[0] * v4, v6 = v3 + v5, v7 = v6 - v1, v8 = a[4] * v7, v9 = d[2] + v8;
-        const int v10 = v9 <= 0.0; double v11, v12, v13, v14;
-        if (v10) {
-            const double v15 = a[3] * parameters[1], v16 = v15 * v9, v17 = v2 * t[3],
-                v18 = a[1] * t[1], v19 = v17 + v18, v20 = v4 * t[2], v21 = a[0] * t[0],
-                v22 = parameters[1] * t[5], v23 = a[3] * t[8], v24 = v22 + v23, v25 = v19 + v20,
-                v26 = v21 + v25, v27 = v26 - t[4], v28 = v27 - t[7], v29 = a[4] * v28,
-                v30 = a[3] * v28, v31 = v7 * t[6], v32 = v7 * t[5], v33 = v29 + v31,
-                v34 = v30 + v32, v35 = v15 * v33, v36 = v9 * v24, v37 = v35 + v36, v38 = a[0] * v37,
-                v39 = a[1] * v37;
-            v11 = v16; v12 = v34; v13 = v38; v14 = v39;
-        } else {
-            const double v40 = 1.0 / a[4], v41 = a[3] * v40, v42 = v41 * t[6], v43 = v42 - t[5],
-                v44 = v40 * v43, v45 = d[2] * v44;
-            v11 = 0.0; v12 = v45; v13 = 0.0; v14 = 0.0;
-        }
-        const double v46 = v11 * t[2], v47 = v11 * t[3], v48 = v46 + v13, v49 = v47 + v14;
-        double s50 = {0};
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 1 * q; (void)w; s50 += w[0];
-        }
-        const double v51 = s50 * v48, v52 = s50 * v49, v53 = s50 * v12;
-        R[0] = v51; R[1] = v52; R[2] = v53;
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1);
+    V d0, d1, d2;
+    softehl_load3(d + 0, 3, &d0, &d1, &d2);
+    V a0, a1, a2, a3, a4;
+    softehl_load4(a + 0, 5, &a0, &a1, &a2, &a3); softehl_load1(a + 4, 5, &a4);
+    V t0, t1, t2, t3, t4, t5, t6, t7, t8;
+    softehl_load4(t + 0, 9, &t0, &t1, &t2, &t3); softehl_load4(t + 4, 9, &t4, &t5, &t6, &t7);
+    softehl_load1(t + 8, 9, &t8);
+    const V v1 = X0 + d0, v2 = X1 + d1, v3 = a1 * v2 + (a0 * v1 - (a2 + parameters[0])),
+        v4 = d2 + a4 * v3;
+    const M v5 = softehl_le(v4, softehl_splat(0.0));
+    V v6 = softehl_splat(0.0), v7 = softehl_splat(0.0), v8 = softehl_splat(0.0),
+        v9 = softehl_splat(0.0);
+    const M m10 = v5;
+    if (softehl_any(m10)) {
+        const V v11 = a3 * parameters[1], v12 = v11 * v4,
+            v13 = a0 * t0 + (a1 * t1 + (v1 * t2 + (v2 * t3 - t4 - t7))), v14 = v3 * t5 + a3 * v13,
+            v15 = v4 * (parameters[1] * t5 + a3 * t8) + v11 * (v3 * t6 + a4 * v13), v16 = a0 * v15,
+            v17 = a1 * v15;
+        v6 = softehl_blend(m10, v12, v6); v7 = softehl_blend(m10, v14, v7);
+        v8 = softehl_blend(m10, v16, v8); v9 = softehl_blend(m10, v17, v9);
     }
+    const M m18 = ~v5;
+    if (softehl_any(m18)) {
+        const V v19 = 1.0 / a4, v20 = d2 * (v19 * (a3 * v19 * t6 - t5));
+        v7 = softehl_blend(m18, v20, v7);
+    }
+    const V v21 = v6 * t2 + v8, v22 = v6 * t3 + v9;
+    double s23 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 1 * q; (void)w; s23 += w[0];
+    }
+    softehl_store3(R + 0, 3, s23 * v21, s23 * v22, s23 * v7);
 }
+SOFTEHL_BATCH(softehl_contact_pseudo_load, 2, 3, 5, 9, 3, 0)

@@ -18,49 +18,26 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_contact_friction_residual)
+SOFTEHL_GROUP(softehl_contact_friction_residual)
 {
-    (void)points;
-    (void)modes;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 4 * e;
-        const double *restrict a = data + 7 * e; double *restrict R = values + 4 * e;
-        (void)X; (void)d; (void)a;
-        const double v1 = X[0] + d[0], v2 = a[0] * v1, v3 = X[1] + d[1], v4 = a[1] * v3,
-            v5 = v4 + v2, v6 = a[2] + parameters[0], v7 = v5 - v6, v8 = a[4] * v7, v9 = d[2] + v8,
-            v10 = -v9;
-        const int v11 = 0.0 < v10; double v12;
-        if (v11) {
-            v12 = v10;
-        } else {
-            v12 = 0.0;
-        }
-        const double v13 = parameters[1] * v12, v14 = d[1] - a[6], v15 = a[0] * v14,
-            v16 = d[0] - a[5], v17 = a[1] * v16, v18 = v17 - v15, v19 = a[4] * v18,
-            v20 = d[3] + v19;
-        const int v21 = v13 < v20; double v22;
-        if (v21) {
-            v22 = v13;
-        } else {
-            v22 = v20;
-        }
-        const double v23 = -v13; const int v24 = v23 < v22; double v25;
-        if (v24) {
-            v25 = v22;
-        } else {
-            v25 = v23;
-        }
-        const double v26 = a[1] * v25, v27 = a[0] * v12, v28 = v26 - v27, v29 = a[3] * v28,
-            v30 = a[0] * v25, v31 = a[1] * v12, v32 = v31 + v30, v33 = a[3] * v32, v34 = -v33,
-            v35 = d[2] + v12, v36 = 1.0 / a[4], v37 = a[3] * v36, v38 = v37 * v35, v39 = -v38,
-            v40 = v25 - d[3], v41 = v37 * v40;
-        R[0] = v29; R[1] = v34; R[2] = v39; R[3] = v41;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, 4, &d0, &d1, &d2, &d3);
+    V a0, a1, a2, a3, a4, a5, a6;
+    softehl_load4(a + 0, 7, &a0, &a1, &a2, &a3); softehl_load3(a + 4, 7, &a4, &a5, &a6);
+    const V v1 = d2 + a4 * (a1 * (X1 + d1) + (a0 * (X0 + d0) - (a2 + parameters[0]))), v2 = -v1;
+    const M v3 = softehl_lt(softehl_splat(0.0), v2);
+    const V v4 = softehl_blend(v3, v2, softehl_splat(0.0)), v5 = parameters[1] * v4,
+        v6 = d3 + a4 * (a1 * (d0 - a5) - a0 * (d1 - a6));
+    const M v7 = softehl_lt(v5, v6);
+    const V v8 = softehl_blend(v7, v5, v6), v9 = -v5;
+    const M v10 = softehl_lt(v9, v8);
+    const V v11 = softehl_blend(v10, v8, v9), v12 = a3 * (1.0 / a4);
+    softehl_store4(R + 0, 4, a3 * (a1 * v11 - a0 * v4), -(a3 * (a1 * v4 + a0 * v11)), -(v12 * (d2 + v4)), v12 * (v11 - d3));
 }
+SOFTEHL_BATCH(softehl_contact_friction_residual, 2, 4, 7, 0, 4, 0)
 
 SOFTEHL_GROUP(softehl_contact_friction_tangent)
 {
@@ -92,13 +69,12 @@ SOFTEHL_GROUP(softehl_contact_friction_tangent)
     const V v27 = softehl_blend(v26, v24, v25), v28 = -v24;
     const M v29 = softehl_lt(v28, v27);
     const V v30 = parameters[1] * v1, v31 = parameters[1] * v2;
-    V v32 = softehl_splat(0.0), v33 = softehl_splat(0.0), v34 = softehl_splat(0.0),
-        v35 = softehl_splat(0.0), v36 = softehl_splat(0.0), v37 = softehl_splat(0.0),
-        v38 = softehl_splat(0.0);
+    V v32 = v28, v33 = softehl_splat(0.0), v34 = softehl_splat(0.0), v35 = softehl_splat(0.0),
+        v36 = softehl_splat(0.0), v37 = softehl_splat(0.0), v38 = softehl_splat(0.0);
     const M m39 = v29;
     if (softehl_any(m39)) {
-        V v40 = softehl_splat(0.0), v41 = softehl_splat(0.0), v42 = softehl_splat(0.0),
-            v43 = softehl_splat(0.0), v44 = softehl_splat(0.0), v45 = softehl_splat(0.0);
+        V v40 = v2, v41 = softehl_splat(0.0), v42 = softehl_splat(0.0), v43 = v3,
+            v44 = softehl_splat(0.0), v45 = softehl_splat(1.0);
         const M m46 = v26 & m39;
         if (softehl_any(m46)) {
             V v47 = softehl_splat(0.0), v48 = softehl_splat(0.0), v49 = softehl_splat(0.0);
@@ -111,15 +87,12 @@ SOFTEHL_GROUP(softehl_contact_friction_tangent)
             }
             v40 = softehl_blend(m46, v47, v40); v41 = softehl_blend(m46, v48, v41);
             v42 = softehl_blend(m46, v49, v42); v43 = softehl_blend(m46, softehl_splat(0.0), v43);
-            v44 = softehl_blend(m46, softehl_splat(0.0), v44);
             v45 = softehl_blend(m46, softehl_splat(0.0), v45);
         }
         const M m54 = ~v26 & m39;
         if (softehl_any(m54)) {
             const V v55 = -v1, v56 = -v4;
-            v40 = softehl_blend(m54, v2, v40); v41 = softehl_blend(m54, v55, v41);
-            v42 = softehl_blend(m54, softehl_splat(0.0), v42); v43 = softehl_blend(m54, v3, v43);
-            v44 = softehl_blend(m54, v56, v44); v45 = softehl_blend(m54, softehl_splat(1.0), v45);
+            v41 = softehl_blend(m54, v55, v41); v44 = softehl_blend(m54, v56, v44);
         }
         v32 = softehl_blend(m39, v27, v32); v33 = softehl_blend(m39, v40, v33);
         v34 = softehl_blend(m39, v41, v34); v35 = softehl_blend(m39, v42, v35);
@@ -131,11 +104,8 @@ SOFTEHL_GROUP(softehl_contact_friction_tangent)
         const V v58 = softehl_blend(v7, v30, softehl_splat(0.0)),
             v59 = softehl_blend(v7, v31, softehl_splat(0.0)),
             v60 = softehl_blend(v7, softehl_splat(parameters[1]), softehl_splat(0.0));
-        v32 = softehl_blend(m57, v28, v32); v33 = softehl_blend(m57, v58, v33);
-        v34 = softehl_blend(m57, v59, v34); v35 = softehl_blend(m57, v60, v35);
-        v36 = softehl_blend(m57, softehl_splat(0.0), v36);
-        v37 = softehl_blend(m57, softehl_splat(0.0), v37);
-        v38 = softehl_blend(m57, softehl_splat(0.0), v38);
+        v33 = softehl_blend(m57, v58, v33); v34 = softehl_blend(m57, v59, v34);
+        v35 = softehl_blend(m57, v60, v35);
     }
     softehl_store4(K + 0, 16, a3 * (a1 * v33 + v9), a3 * (a1 * v34 + v10), a3 * (a1 * v35 + v11), v36);
     const V v61 = a3 * (1.0 / a4);

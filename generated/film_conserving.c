@@ -177,16 +177,14 @@ SOFTEHL_GROUP(softehl_film_conserving_tangent)
         s24 += v68 * v73; s25 += v69 * v73;
         const V v77 = parameters[2] * v59, v78 = v66 * (v64 * (v54 * (v77 * v15))), v79 = v68 * v78,
             v80 = v69 * v78;
-        V v81 = softehl_splat(0.0), v82 = softehl_splat(0.0), v83 = softehl_splat(0.0),
-            v84 = softehl_splat(0.0), v85 = softehl_splat(0.0), v86 = softehl_splat(0.0),
-            v87 = softehl_splat(0.0), v88 = softehl_splat(0.0), v89 = softehl_splat(0.0),
-            v90 = softehl_splat(0.0), v91 = softehl_splat(0.0), v92 = softehl_splat(0.0);
+        V v81 = softehl_splat(0.0), v82 = v54, v83 = softehl_splat(0.0), v84 = softehl_splat(0.0),
+            v85 = softehl_splat(0.0), v86 = softehl_splat(0.0), v87 = softehl_splat(0.0), v88 = v79,
+            v89 = softehl_splat(0.0), v90 = v80, v91 = softehl_splat(0.0), v92 = v76;
         const M m93 = v60;
         if (softehl_any(m93)) {
             const V v94 = v46 * v52, v95 = -(v47 * v46);
             v81 = softehl_blend(m93, v54, v81); v82 = softehl_blend(m93, softehl_splat(0.0), v82);
-            v83 = softehl_blend(m93, v94, v83); v84 = softehl_blend(m93, softehl_splat(0.0), v84);
-            v85 = softehl_blend(m93, v95, v85); v86 = softehl_blend(m93, softehl_splat(0.0), v86);
+            v83 = softehl_blend(m93, v94, v83); v85 = softehl_blend(m93, v95, v85);
             v87 = softehl_blend(m93, v79, v87); v88 = softehl_blend(m93, softehl_splat(0.0), v88);
             v89 = softehl_blend(m93, v80, v89); v90 = softehl_blend(m93, softehl_splat(0.0), v90);
             v91 = softehl_blend(m93, v76, v91); v92 = softehl_blend(m93, softehl_splat(0.0), v92);
@@ -194,12 +192,7 @@ SOFTEHL_GROUP(softehl_film_conserving_tangent)
         const M m96 = ~v60;
         if (softehl_any(m96)) {
             const V v97 = v45 * v52, v98 = -(v47 * v45);
-            v81 = softehl_blend(m96, softehl_splat(0.0), v81); v82 = softehl_blend(m96, v54, v82);
-            v83 = softehl_blend(m96, softehl_splat(0.0), v83); v84 = softehl_blend(m96, v97, v84);
-            v85 = softehl_blend(m96, softehl_splat(0.0), v85); v86 = softehl_blend(m96, v98, v86);
-            v87 = softehl_blend(m96, softehl_splat(0.0), v87); v88 = softehl_blend(m96, v79, v88);
-            v89 = softehl_blend(m96, softehl_splat(0.0), v89); v90 = softehl_blend(m96, v80, v90);
-            v91 = softehl_blend(m96, softehl_splat(0.0), v91); v92 = softehl_blend(m96, v76, v92);
+            v84 = softehl_blend(m96, v97, v84); v86 = softehl_blend(m96, v98, v86);
         }
         const V v99 = 0.08333333333333333 * p3, v100 = softehl_vexp(p2 * parameters[3]),
             v101 = v45 * v82 + v46 * v81, v102 = 0.5 * v58, v103 = v86 + v85, v104 = v84 + v83,

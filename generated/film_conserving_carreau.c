@@ -36,55 +36,6 @@
  */
 #include "softehl_kernels.h"
 
-/* What cancels in an equation: the sum of |slope * value| over the local unknowns
-   and all that comes from outside. */
-static V softehl_terms_lanes(int n, const V *A, const V *s, int m, const V *B, const V *p)
-{
-    V terms = softehl_splat(0.0);
-    for (int k = 0; k < n; ++k) terms += softehl_vfabs(A[k] * s[k]);
-    for (int k = 0; k < m; ++k) {
-        const V term = softehl_vfabs(B[k] * p[k]);
-        terms += softehl_blend(softehl_lt(term, softehl_splat(HUGE_VAL)), term, softehl_splat(0.0));
-    }
-    return terms;
-}
-
-/* Solve A x = b for `count` columns b in place, with partial pivoting in every lane
-   for itself; returns the lanes in which A is singular. */
-static M softehl_eliminate_lanes(int n, V *A, int count, V *b)
-{
-    M singular = softehl_mask(0);
-    for (int k = 0; k < n; ++k) {
-        for (int i = k + 1; i < n; ++i) {
-            const M larger = softehl_lt(softehl_vfabs(A[k * n + k]), softehl_vfabs(A[i * n + k]));
-            if (!softehl_any(larger)) continue;
-            for (int j = k; j < n; ++j) {
-                const V x = A[k * n + j], y = A[i * n + j];
-                A[k * n + j] = softehl_blend(larger, y, x);
-                A[i * n + j] = softehl_blend(larger, x, y);
-            }
-            for (int j = 0; j < count; ++j) {
-                const V x = b[k * count + j], y = b[i * count + j];
-                b[k * count + j] = softehl_blend(larger, y, x);
-                b[i * count + j] = softehl_blend(larger, x, y);
-            }
-        }
-        singular |= ~softehl_lt(softehl_splat(0.0), softehl_vfabs(A[k * n + k]));
-        A[k * n + k] = 1.0 / A[k * n + k];
-        for (int i = k + 1; i < n; ++i) {
-            const V factor = A[i * n + k] * A[k * n + k];
-            for (int j = k + 1; j < n; ++j) A[i * n + j] -= factor * A[k * n + j];
-            for (int j = 0; j < count; ++j) b[i * count + j] -= factor * b[k * count + j];
-        }
-    }
-    for (int k = n - 1; k >= 0; --k)
-        for (int j = 0; j < count; ++j) {
-            for (int i = k + 1; i < n; ++i) b[k * count + j] -= A[k * n + i] * b[i * count + j];
-            b[k * count + j] *= A[k * n + k];
-        }
-    return singular;
-}
-
 /* level: 7 local unknowns, at most 50 Newton steps */
 static void softehl_film_conserving_carreau_level_lanes(
     M active, const V *restrict p, V *restrict s, M *lost)
@@ -635,30 +586,21 @@ SOFTEHL_GROUP(softehl_film_conserving_carreau_tangent)
             v226 = 0.6612093864662645 * (v215 - v219) + v225,
             v227 = parameters[6] * (v9 * v209 * v226 - v66 * (v66 * (parameters[6] * v70)) * v213),
             v228 = parameters[6] * (v9 * v208 * v226), v229 = parameters[6] * (v9 * v88 * v226);
-        V v230 = softehl_splat(0.0), v231 = softehl_splat(0.0), v232 = softehl_splat(0.0),
+        V v230 = softehl_splat(0.0), v231 = v95, v232 = softehl_splat(0.0),
             v233 = softehl_splat(0.0), v234 = softehl_splat(0.0), v235 = softehl_splat(0.0),
             v236 = softehl_splat(0.0), v237 = softehl_splat(0.0), v238 = softehl_splat(0.0),
             v239 = softehl_splat(0.0), v240 = softehl_splat(0.0), v241 = softehl_splat(0.0),
             v242 = softehl_splat(0.0), v243 = softehl_splat(0.0), v244 = softehl_splat(0.0),
-            v245 = softehl_splat(0.0), v246 = softehl_splat(0.0), v247 = softehl_splat(0.0);
+            v245 = v223, v246 = softehl_splat(0.0), v247 = v224;
         const M m248 = v103;
         if (softehl_any(m248)) {
             const V v249 = v89 * v222, v250 = v89 * v218, v251 = v89 * v228, v252 = -(v89 * v221),
                 v253 = v89 * v229, v254 = v89 * v227;
             v230 = softehl_blend(m248, v95, v230);
             v231 = softehl_blend(m248, softehl_splat(0.0), v231);
-            v232 = softehl_blend(m248, v253, v232);
-            v233 = softehl_blend(m248, softehl_splat(0.0), v233);
-            v234 = softehl_blend(m248, v249, v234);
-            v235 = softehl_blend(m248, softehl_splat(0.0), v235);
-            v236 = softehl_blend(m248, v252, v236);
-            v237 = softehl_blend(m248, softehl_splat(0.0), v237);
-            v238 = softehl_blend(m248, v254, v238);
-            v239 = softehl_blend(m248, softehl_splat(0.0), v239);
-            v240 = softehl_blend(m248, v250, v240);
-            v241 = softehl_blend(m248, softehl_splat(0.0), v241);
-            v242 = softehl_blend(m248, v251, v242);
-            v243 = softehl_blend(m248, softehl_splat(0.0), v243);
+            v232 = softehl_blend(m248, v253, v232); v234 = softehl_blend(m248, v249, v234);
+            v236 = softehl_blend(m248, v252, v236); v238 = softehl_blend(m248, v254, v238);
+            v240 = softehl_blend(m248, v250, v240); v242 = softehl_blend(m248, v251, v242);
             v244 = softehl_blend(m248, v223, v244);
             v245 = softehl_blend(m248, softehl_splat(0.0), v245);
             v246 = softehl_blend(m248, v224, v246);
@@ -668,24 +610,9 @@ SOFTEHL_GROUP(softehl_film_conserving_carreau_tangent)
         if (softehl_any(m255)) {
             const V v256 = v210 * v222, v257 = v210 * v218, v258 = v210 * v228,
                 v259 = -(v210 * v221), v260 = v210 * v229, v261 = v210 * v227;
-            v230 = softehl_blend(m255, softehl_splat(0.0), v230);
-            v231 = softehl_blend(m255, v95, v231);
-            v232 = softehl_blend(m255, softehl_splat(0.0), v232);
-            v233 = softehl_blend(m255, v260, v233);
-            v234 = softehl_blend(m255, softehl_splat(0.0), v234);
-            v235 = softehl_blend(m255, v256, v235);
-            v236 = softehl_blend(m255, softehl_splat(0.0), v236);
-            v237 = softehl_blend(m255, v259, v237);
-            v238 = softehl_blend(m255, softehl_splat(0.0), v238);
-            v239 = softehl_blend(m255, v261, v239);
-            v240 = softehl_blend(m255, softehl_splat(0.0), v240);
-            v241 = softehl_blend(m255, v257, v241);
-            v242 = softehl_blend(m255, softehl_splat(0.0), v242);
-            v243 = softehl_blend(m255, v258, v243);
-            v244 = softehl_blend(m255, softehl_splat(0.0), v244);
-            v245 = softehl_blend(m255, v223, v245);
-            v246 = softehl_blend(m255, softehl_splat(0.0), v246);
-            v247 = softehl_blend(m255, v224, v247);
+            v233 = softehl_blend(m255, v260, v233); v235 = softehl_blend(m255, v256, v235);
+            v237 = softehl_blend(m255, v259, v237); v239 = softehl_blend(m255, v261, v239);
+            v241 = softehl_blend(m255, v257, v241); v243 = softehl_blend(m255, v258, v243);
         }
         const double v262 = 0.5 * w[1], v263 = 0.5 * w[2];
         const V v264 = softehl_vexp(p2 * parameters[3]);
@@ -734,32 +661,22 @@ SOFTEHL_GROUP(softehl_film_conserving_carreau_tangent)
             v368 = 1.0 / v362, v369 = 1.0 / v363, v370 = 1.0 / v364, v371 = 1.0 / v365,
             v372 = v334 * v369 + (v340 * v371 - v328 * v366 - v330 * v367 - v326 * v368),
             v373 = v332 * v370 + v372, v374 = v350 * v373, v375 = v315 * v374;
-        V v376 = softehl_splat(0.0), v377 = softehl_splat(0.0), v378 = softehl_splat(0.0),
+        V v376 = softehl_splat(0.0), v377 = v62, v378 = softehl_splat(0.0),
             v379 = softehl_splat(0.0), v380 = softehl_splat(0.0), v381 = softehl_splat(0.0),
-            v382 = softehl_splat(0.0), v383 = softehl_splat(0.0);
+            v382 = softehl_splat(0.0), v383 = v351;
         const M m384 = v319;
         if (softehl_any(m384)) {
             const V v385 = v89 * v211, v386 = -(v54 * v89);
             v376 = softehl_blend(m384, v62, v376);
             v377 = softehl_blend(m384, softehl_splat(0.0), v377);
-            v378 = softehl_blend(m384, v385, v378);
-            v379 = softehl_blend(m384, softehl_splat(0.0), v379);
-            v380 = softehl_blend(m384, v386, v380);
-            v381 = softehl_blend(m384, softehl_splat(0.0), v381);
+            v378 = softehl_blend(m384, v385, v378); v380 = softehl_blend(m384, v386, v380);
             v382 = softehl_blend(m384, v351, v382);
             v383 = softehl_blend(m384, softehl_splat(0.0), v383);
         }
         const M m387 = ~v319;
         if (softehl_any(m387)) {
             const V v388 = v210 * v211, v389 = -(v54 * v210);
-            v376 = softehl_blend(m387, softehl_splat(0.0), v376);
-            v377 = softehl_blend(m387, v62, v377);
-            v378 = softehl_blend(m387, softehl_splat(0.0), v378);
-            v379 = softehl_blend(m387, v388, v379);
-            v380 = softehl_blend(m387, softehl_splat(0.0), v380);
-            v381 = softehl_blend(m387, v389, v381);
-            v382 = softehl_blend(m387, softehl_splat(0.0), v382);
-            v383 = softehl_blend(m387, v351, v383);
+            v379 = softehl_blend(m387, v388, v379); v381 = softehl_blend(m387, v389, v381);
         }
         const V v390 = 1.0 / v348, v391 = 1.0 / v339, v392 = 1.0 / v346, v393 = 1.0 / v338,
             v394 = 1.0 / v344, v395 = 1.0 / v336, v396 = 2.0 * v323, v397 = 2.0 * v322,
@@ -1178,19 +1095,16 @@ SOFTEHL_GROUP(softehl_film_conserving_carreau_pseudo_load)
             v255 = parameters[6] * (v251 + v31 * (v93 * v224 * v243 + v248) + t14 * v254),
             v256 = v227 * t12 + v255;
         V v257 = softehl_splat(0.0), v258 = softehl_splat(0.0), v259 = softehl_splat(0.0),
-            v260 = softehl_splat(0.0);
+            v260 = v232;
         const M m261 = v233;
         if (softehl_any(m261)) {
-            const V v262 = v231 * v256; v257 = softehl_blend(m261, softehl_splat(0.0), v257);
-            v258 = softehl_blend(m261, v262, v258); v259 = softehl_blend(m261, v232, v259);
+            const V v262 = v231 * v256; v258 = softehl_blend(m261, v262, v258);
+            v259 = softehl_blend(m261, v232, v259);
             v260 = softehl_blend(m261, softehl_splat(0.0), v260);
         }
         const M m263 = ~v233;
         if (softehl_any(m263)) {
             const V v264 = v230 * v256; v257 = softehl_blend(m263, v264, v257);
-            v258 = softehl_blend(m263, softehl_splat(0.0), v258);
-            v259 = softehl_blend(m263, softehl_splat(0.0), v259);
-            v260 = softehl_blend(m263, v232, v260);
         }
         const double v265 = 0.5 * w[1], v266 = 0.5 * w[2];
         const V v267 = 0.5 * p3, v268 = softehl_vexp(p2 * parameters[3]);
@@ -1358,20 +1272,16 @@ SOFTEHL_GROUP(softehl_film_conserving_carreau_pseudo_load)
             v599 = v484 * (v591 + v542 * v486 * v598);
         const M v600 = softehl_lt(softehl_splat(0.0), v44);
         V v601 = softehl_splat(0.0), v602 = softehl_splat(0.0), v603 = softehl_splat(0.0),
-            v604 = softehl_splat(0.0);
+            v604 = v44;
         const M m605 = v600;
         if (softehl_any(m605)) {
             const V v606 = v231 * v234; v601 = softehl_blend(m605, v606, v601);
-            v602 = softehl_blend(m605, softehl_splat(0.0), v602);
             v603 = softehl_blend(m605, v44, v603);
             v604 = softehl_blend(m605, softehl_splat(0.0), v604);
         }
         const M m607 = ~v600;
         if (softehl_any(m607)) {
-            const V v608 = v230 * v234; v601 = softehl_blend(m607, softehl_splat(0.0), v601);
-            v602 = softehl_blend(m607, v608, v602);
-            v603 = softehl_blend(m607, softehl_splat(0.0), v603);
-            v604 = softehl_blend(m607, v44, v604);
+            const V v608 = v230 * v234; v602 = softehl_blend(m607, v608, v602);
         }
         const V v609 = 0.5 * (v230 * v604 + v231 * v603),
             v610 = v465 * (v609 * v47 + v48 * (v602 + v601)) + (v45 * v609 * v470 + v599),
@@ -1566,13 +1476,10 @@ SOFTEHL_GROUP(softehl_film_conserving_carreau_fields_rate)
         const M m273 = v231;
         if (softehl_any(m273)) {
             const V v274 = v226 * v270 - v230 * tp4; v271 = softehl_blend(m273, v274, v271);
-            v272 = softehl_blend(m273, softehl_splat(0.0), v272);
         }
         const M m275 = ~v231;
         if (softehl_any(m275)) {
-            const V v276 = v225 * v270 - v230 * tp6;
-            v271 = softehl_blend(m275, softehl_splat(0.0), v271);
-            v272 = softehl_blend(m275, v276, v272);
+            const V v276 = v225 * v270 - v230 * tp6; v272 = softehl_blend(m275, v276, v272);
         }
         const double v277 = 0.5 * w[1], v278 = 0.5 * w[2];
         const V v279 = softehl_vexp(p2 * parameters[3]);
@@ -1732,21 +1639,16 @@ SOFTEHL_GROUP(softehl_film_conserving_carreau_fields_rate)
             v607 = v493 * (v574 + v551 * v495 * (v604 + v605 - v606));
         const M v608 = softehl_lt(softehl_splat(0.0), v35);
         V v609 = softehl_splat(0.0), v610 = softehl_splat(0.0), v611 = softehl_splat(0.0),
-            v612 = softehl_splat(0.0);
+            v612 = v35;
         const M m613 = v608;
         if (softehl_any(m613)) {
             const V v614 = v226 * v232 - v35 * tp4; v609 = softehl_blend(m613, v614, v609);
-            v610 = softehl_blend(m613, softehl_splat(0.0), v610);
             v611 = softehl_blend(m613, v35, v611);
             v612 = softehl_blend(m613, softehl_splat(0.0), v612);
         }
         const M m615 = ~v608;
         if (softehl_any(m615)) {
-            const V v616 = v225 * v232 - v35 * tp6;
-            v609 = softehl_blend(m615, softehl_splat(0.0), v609);
-            v610 = softehl_blend(m615, v616, v610);
-            v611 = softehl_blend(m615, softehl_splat(0.0), v611);
-            v612 = softehl_blend(m615, v35, v612);
+            const V v616 = v225 * v232 - v35 * tp6; v610 = softehl_blend(m615, v616, v610);
         }
         const V v617 = 0.5 * (v225 * v612 + v226 * v611),
             v618 = v474 * (v617 * v38 + v39 * (v610 + v609)) + (v36 * v617 * v479 + v607),

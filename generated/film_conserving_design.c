@@ -89,19 +89,15 @@ SOFTEHL_GROUP(softehl_film_conserving_pseudo_load)
             v36 = t7 - v30 * v8 - v31 * v7, v37 = v31 * v13 + v30 * v14, v38 = v35 * v1,
             v39 = v1 * (t6 + v37) + v35 * v12, v40 = w[3] * (p0 * (v38 * v10 + v9 * v39));
         s23 += v30 * v40; s24 += v31 * v40;
-        V v41 = softehl_splat(0.0), v42 = softehl_splat(0.0), v43 = softehl_splat(0.0),
-            v44 = softehl_splat(0.0);
+        V v41 = softehl_splat(0.0), v42 = v32, v43 = softehl_splat(0.0), v44 = softehl_splat(0.0);
         const M m45 = v33;
         if (softehl_any(m45)) {
             const V v46 = v29 * v36; v41 = softehl_blend(m45, v32, v41);
             v42 = softehl_blend(m45, softehl_splat(0.0), v42); v43 = softehl_blend(m45, v46, v43);
-            v44 = softehl_blend(m45, softehl_splat(0.0), v44);
         }
         const M m47 = ~v33;
         if (softehl_any(m47)) {
-            const V v48 = v28 * v36; v41 = softehl_blend(m47, softehl_splat(0.0), v41);
-            v42 = softehl_blend(m47, v32, v42); v43 = softehl_blend(m47, softehl_splat(0.0), v43);
-            v44 = softehl_blend(m47, v48, v44);
+            const V v48 = v28 * v36; v44 = softehl_blend(m47, v48, v44);
         }
         const double v49 = 0.5 * w[1], v50 = 0.5 * w[2], v51 = 0.5 - v49, v52 = 0.5 + v49,
             v53 = 0.5 - v50, v54 = 0.5 + v50;
@@ -198,19 +194,15 @@ SOFTEHL_GROUP(softehl_film_conserving_fields_rate)
         const M v22 = softehl_lt(softehl_splat(0.0), v21);
         const V v23 = v19 * v8 + v20 * v12, v24 = t7 - v19 * v9 - v20 * v10,
             v25 = v20 * v5 + v19 * v7;
-        V v26 = softehl_splat(0.0), v27 = softehl_splat(0.0), v28 = softehl_splat(0.0),
-            v29 = softehl_splat(0.0);
+        V v26 = softehl_splat(0.0), v27 = v21, v28 = softehl_splat(0.0), v29 = softehl_splat(0.0);
         const M m30 = v22;
         if (softehl_any(m30)) {
             const V v31 = v17 * v24 - v21 * tp4; v26 = softehl_blend(m30, v21, v26);
             v27 = softehl_blend(m30, softehl_splat(0.0), v27); v28 = softehl_blend(m30, v31, v28);
-            v29 = softehl_blend(m30, softehl_splat(0.0), v29);
         }
         const M m32 = ~v22;
         if (softehl_any(m32)) {
-            const V v33 = v16 * v24 - v21 * tp6; v26 = softehl_blend(m32, softehl_splat(0.0), v26);
-            v27 = softehl_blend(m32, v21, v27); v28 = softehl_blend(m32, softehl_splat(0.0), v28);
-            v29 = softehl_blend(m32, v33, v29);
+            const V v33 = v16 * v24 - v21 * tp6; v29 = softehl_blend(m32, v33, v29);
         }
         const double v34 = 0.5 * w[1], v35 = 0.5 * w[2], v36 = 0.5 - v34, v37 = 0.5 + v34,
             v38 = 0.5 - v35, v39 = 0.5 + v35;

@@ -305,204 +305,197 @@ SOFTEHL_GROUP(softehl_film_conserving_eyring_tangent)
             v135 = softehl_blend(m146, v153, v135);
         }
         const V v156 = 1.0 - p6, v157 = 1.0 - p4;
-        V v158 = softehl_splat(0.0), v159 = softehl_splat(0.0), v160 = softehl_splat(0.0),
+        V v158 = v117, v159 = softehl_splat(0.0), v160 = softehl_splat(0.0),
             v161 = softehl_splat(0.0), v162 = softehl_splat(0.0), v163 = softehl_splat(0.0),
             v164 = softehl_splat(0.0), v165 = softehl_splat(0.0), v166 = softehl_splat(0.0);
-        const M m167 = ~v125;
+        const M m167 = v125;
         if (softehl_any(m167)) {
-            const V v168 = v156 * v121, v169 = v156 * v122, v170 = v156 * v127,
-                v171 = -(v156 * v120), v172 = v56 * (v18 * v117), v173 = v156 * v128,
-                v174 = v156 * v124, v175 = v48 * v172, v176 = v49 * v172;
-            v158 = softehl_blend(m167, v117, v158); v159 = softehl_blend(m167, v173, v159);
-            v160 = softehl_blend(m167, v168, v160); v161 = softehl_blend(m167, v171, v161);
-            v162 = softehl_blend(m167, v174, v162); v163 = softehl_blend(m167, v169, v163);
-            v164 = softehl_blend(m167, v170, v164); v165 = softehl_blend(m167, v175, v165);
-            v166 = softehl_blend(m167, v176, v166);
+            v158 = softehl_blend(m167, softehl_splat(0.0), v158);
         }
-        const double v177 = 0.5 * w[1], v178 = 0.5 * w[2], v179 = 0.5 - v177, v180 = 0.5 + v177,
-            v181 = 0.5 - v178, v182 = 0.5 + v178;
-        const V v183 = v156 * v158 + v157 * v129, v184 = v179 * v2 + v180 * v4,
-            v185 = v181 * v2 + v182 * v4;
-        const double v186 = 0.5 * (v179 + v181), v187 = 0.5 * (v180 + v182);
-        const V v188 = v184 + v185, v189 = 0.25 * v188, v190 = p0 * v10 - v18 * (v183 - v58),
-            v191 = v18 * v56, v192 = v56 * v23, v193 = v56 * (v58 - v183), v194 = p3 * v15,
-            v195 = p3 * v189, v196 = v13 * v189, v197 = v13 * v195, v198 = v194 * v186,
-            v199 = v194 * v187, v200 = v1 * v190 - (v162 + v157 * v133 - v50) * v191,
-            v201 = v56 * (w[3] * v190), v202 = v22 * v193,
-            v203 = v21 * v193 + v56 * v24 * (v157 * v130 + (v159 - v57)), v204 = v197 * v197,
-            v205 = (v160 + v157 * v131) * v192 + v203, v206 = v203 - (v161 + v157 * v132) * v192;
-        const M v207 = softehl_lt(v204, softehl_splat(1.0)); s34 += v45 * v201; s33 += v44 * v201;
-        const V v208 = v44 * v200 + (v66 + v202), v209 = v45 * v200 - v66 - v202, v210 = v48 * v206;
-        s36 += v210; const V v211 = v49 * v206; s38 += v211; const V v212 = v48 * v205; s35 += v212;
-        const V v213 = v49 * v205; s37 += v213; const V v214 = v48 * v208; s40 += v214;
-        const V v215 = v49 * v208; s42 += v215; const V v216 = v48 * v209; s39 += v216;
-        const V v217 = v49 * v209; s41 += v217;
-        V v218 = softehl_splat(0.0), v219 = softehl_splat(0.0), v220 = softehl_splat(0.0),
-            v221 = softehl_splat(0.0), v222 = softehl_splat(0.0), v223 = softehl_splat(0.0),
-            v224 = softehl_splat(0.0), v225 = softehl_splat(0.0), v226 = softehl_splat(0.0),
-            v227 = softehl_splat(0.0);
-        const M m228 = v207;
-        if (softehl_any(m228)) {
-            const V v229 = 2.0 * v197, v230 = v196 * v229, v231 = v195 * v229, v232 = v229 * v198,
-                v233 = v229 * v199, v234 = 1.9572941063391263e-20 * v204,
-                v235 = 2.5529923126162516e-21 * v204, v236 = 8.22063524662433e-18 + v234,
-                v237 = 1.1743764638034756e-18 + v235, v238 = 2.8114572543455206e-15 + v204 * v236,
-                v239 = 4.439143033177138e-16 + v204 * v237,
-                v240 = 1.34949948208585e-13 + v204 * v239, v241 = v239 + v204 * (v235 + v237),
-                v242 = v238 + v204 * (v234 + v236), v243 = 7.647163731819816e-13 + v204 * v238,
-                v244 = 3.2118087673643227e-11 + v204 * v240,
-                v245 = 5.7812557812557815e-09 + v204 * v244,
-                v246 = 7.515632515632515e-07 + v204 * v245,
-                v247 = 6.613756613756614e-05 + v204 * v246,
-                v248 = 0.0035714285714285713 + v204 * v247, v249 = 0.1 + v204 * v248,
-                v250 = 1.6059043836821613e-10 + v204 * v243,
-                v251 = 2.505210838544172e-08 + v204 * v250,
-                v252 = 2.7557319223985893e-06 + v204 * v251,
-                v253 = v204 * (v250 * v230 + v204 * (v243 * v230 + v204 * (v230 * v242))),
-                v254 = v204 * (v250 * v232 + v204 * (v243 * v232 + v204 * (v232 * v242))),
-                v255 = v204 * (v250 * v233 + v204 * (v243 * v233 + v204 * (v233 * v242))),
-                v256 = v204 * (v250 * v231 + v204 * (v243 * v231 + v204 * (v231 * v242))),
-                v257 = 0.0001984126984126984 + v204 * v252,
-                v258 = 0.008333333333333333 + v204 * v257,
-                v259 = v204 * (v257 * v232 + v204 * (v252 * v232 + v204 * (v251 * v232 + v254))),
-                v260 = 0.16666666666666666 + v204 * v258,
-                v261 = v204 * (v257 * v230 + v204 * (v252 * v230 + v204 * (v251 * v230 + v253))),
-                v262 = v204 * (v257 * v233 + v204 * (v252 * v233 + v204 * (v251 * v233 + v255))),
-                v263 = v204 * (v257 * v231 + v204 * (v252 * v231 + v204 * (v251 * v231 + v256))),
-                v264 = 1.0 / (1.0 + v204 * v260), v265 = v264 * v264, v266 = 1.0 + v204 * v249,
-                v267 = -(v265 * (v260 * v230 + v204 * (v258 * v230 + v261))),
-                v268 = -(v265 * (v260 * v232 + v204 * (v258 * v232 + v259))),
-                v269 = -(v265 * (v260 * v233 + v204 * (v258 * v233 + v262))),
-                v270 = -(v265 * (v260 * v231 + v204 * (v258 * v231 + v263))),
-                v271 = v204 * (v244 * v230 + v204 * (v240 * v230 + v204 * (v230 * v241))),
-                v272 = v204 * (v244 * v231 + v204 * (v240 * v231 + v204 * (v231 * v241))),
-                v273 = v204 * (v244 * v232 + v204 * (v240 * v232 + v204 * (v232 * v241))),
-                v274 = v204 * (v244 * v233 + v204 * (v240 * v233 + v204 * (v233 * v241))),
-                v275 = v204 * (v247 * v232 + v204 * (v246 * v232 + v204 * (v245 * v232 + v273))),
-                v276 = v249 * v232 + v204 * (v248 * v232 + v275),
-                v277 = v204 * (v247 * v233 + v204 * (v246 * v233 + v204 * (v245 * v233 + v274))),
-                v278 = v249 * v233 + v204 * (v248 * v233 + v277),
-                v279 = v204 * (v247 * v230 + v204 * (v246 * v230 + v204 * (v245 * v230 + v271))),
-                v280 = v249 * v230 + v204 * (v248 * v230 + v279),
-                v281 = v204 * (v247 * v231 + v204 * (v246 * v231 + v204 * (v245 * v231 + v272))),
-                v282 = v249 * v231 + v204 * (v248 * v231 + v281);
-            v218 = softehl_blend(m228, v264, v218); v219 = softehl_blend(m228, v266, v219);
-            v220 = softehl_blend(m228, v282, v220); v221 = softehl_blend(m228, v270, v221);
-            v222 = softehl_blend(m228, v268, v222); v223 = softehl_blend(m228, v276, v223);
-            v224 = softehl_blend(m228, v269, v224); v225 = softehl_blend(m228, v278, v225);
-            v226 = softehl_blend(m228, v267, v226); v227 = softehl_blend(m228, v280, v227);
+        const M m168 = ~v125;
+        if (softehl_any(m168)) {
+            const V v169 = v156 * v121, v170 = v156 * v122, v171 = v156 * v127,
+                v172 = -(v156 * v120), v173 = v56 * (v18 * v117), v174 = v156 * v128,
+                v175 = v156 * v124, v176 = v48 * v173, v177 = v49 * v173;
+            v159 = softehl_blend(m168, v174, v159); v160 = softehl_blend(m168, v169, v160);
+            v161 = softehl_blend(m168, v172, v161); v162 = softehl_blend(m168, v175, v162);
+            v163 = softehl_blend(m168, v170, v163); v164 = softehl_blend(m168, v171, v164);
+            v165 = softehl_blend(m168, v176, v165); v166 = softehl_blend(m168, v177, v166);
         }
-        const M m283 = ~v207;
-        if (softehl_any(m283)) {
-            const V v284 = softehl_vsinh(v197), v285 = 3.0 * v197, v286 = softehl_vcosh(v197),
-                v287 = 3.0 * v204, v288 = 1.0 / v284, v289 = 1.0 / (v197 * v204),
-                v290 = v284 * v285, v291 = v285 * v286 - 3.0 * v284, v292 = v286 * v196,
-                v293 = 3.0 * v286 + v290, v294 = v286 * v198, v295 = v286 * v199,
-                v296 = v197 * v288, v297 = v288 * v288, v298 = v291 * v289, v299 = v289 * v289,
-                v300 = v197 * v297, v301 = v288 * v196 - v297 * (v197 * v292),
-                v302 = v289 * (v196 * v293 - 3.0 * v292) - v299 * (v287 * (v291 * v196)),
-                v303 = v299 * (v291 * v287), v304 = v288 * v199 - v295 * v300,
-                v305 = v288 * v198 - v294 * v300,
-                v306 = v289 * (v293 * v198 - 3.0 * v294) - v198 * v303,
-                v307 = v289 * (v293 * v199 - 3.0 * v295) - v199 * v303,
-                v308 = v195 * (v288 - v297 * (v197 * v286)), v309 = v195 * (v289 * v290 - v303);
-            v218 = softehl_blend(m283, v296, v218); v219 = softehl_blend(m283, v298, v219);
-            v220 = softehl_blend(m283, v309, v220); v221 = softehl_blend(m283, v308, v221);
-            v222 = softehl_blend(m283, v305, v222); v223 = softehl_blend(m283, v306, v223);
-            v224 = softehl_blend(m283, v304, v224); v225 = softehl_blend(m283, v307, v225);
-            v226 = softehl_blend(m283, v301, v226); v227 = softehl_blend(m283, v302, v227);
+        const double v178 = 0.5 * w[1], v179 = 0.5 * w[2], v180 = 0.5 - v178, v181 = 0.5 + v178,
+            v182 = 0.5 - v179, v183 = 0.5 + v179;
+        const V v184 = v156 * v158 + v157 * v129, v185 = v180 * v2 + v181 * v4,
+            v186 = v182 * v2 + v183 * v4;
+        const double v187 = 0.5 * (v180 + v182), v188 = 0.5 * (v181 + v183);
+        const V v189 = v185 + v186, v190 = 0.25 * v189, v191 = p0 * v10 - v18 * (v184 - v58),
+            v192 = v18 * v56, v193 = v56 * v23, v194 = v56 * (v58 - v184), v195 = p3 * v15,
+            v196 = p3 * v190, v197 = v13 * v190, v198 = v13 * v196, v199 = v195 * v187,
+            v200 = v195 * v188, v201 = v1 * v191 - (v162 + v157 * v133 - v50) * v192,
+            v202 = v56 * (w[3] * v191), v203 = v22 * v194,
+            v204 = v21 * v194 + v56 * v24 * (v157 * v130 + (v159 - v57)), v205 = v198 * v198,
+            v206 = (v160 + v157 * v131) * v193 + v204, v207 = v204 - (v161 + v157 * v132) * v193;
+        const M v208 = softehl_lt(v205, softehl_splat(1.0)); s34 += v45 * v202; s33 += v44 * v202;
+        const V v209 = v44 * v201 + (v66 + v203), v210 = v45 * v201 - v66 - v203, v211 = v48 * v207;
+        s36 += v211; const V v212 = v49 * v207; s38 += v212; const V v213 = v48 * v206; s35 += v213;
+        const V v214 = v49 * v206; s37 += v214; const V v215 = v48 * v209; s40 += v215;
+        const V v216 = v49 * v209; s42 += v216; const V v217 = v48 * v210; s39 += v217;
+        const V v218 = v49 * v210; s41 += v218;
+        V v219 = softehl_splat(0.0), v220 = softehl_splat(0.0), v221 = softehl_splat(0.0),
+            v222 = softehl_splat(0.0), v223 = softehl_splat(0.0), v224 = softehl_splat(0.0),
+            v225 = softehl_splat(0.0), v226 = softehl_splat(0.0), v227 = softehl_splat(0.0),
+            v228 = softehl_splat(0.0);
+        const M m229 = v208;
+        if (softehl_any(m229)) {
+            const V v230 = 2.0 * v198, v231 = v197 * v230, v232 = v196 * v230, v233 = v230 * v199,
+                v234 = v230 * v200, v235 = 1.9572941063391263e-20 * v205,
+                v236 = 2.5529923126162516e-21 * v205, v237 = 8.22063524662433e-18 + v235,
+                v238 = 1.1743764638034756e-18 + v236, v239 = 2.8114572543455206e-15 + v205 * v237,
+                v240 = 4.439143033177138e-16 + v205 * v238,
+                v241 = 1.34949948208585e-13 + v205 * v240, v242 = v240 + v205 * (v236 + v238),
+                v243 = v239 + v205 * (v235 + v237), v244 = 7.647163731819816e-13 + v205 * v239,
+                v245 = 3.2118087673643227e-11 + v205 * v241,
+                v246 = 5.7812557812557815e-09 + v205 * v245,
+                v247 = 7.515632515632515e-07 + v205 * v246,
+                v248 = 6.613756613756614e-05 + v205 * v247,
+                v249 = 0.0035714285714285713 + v205 * v248, v250 = 0.1 + v205 * v249,
+                v251 = 1.6059043836821613e-10 + v205 * v244,
+                v252 = 2.505210838544172e-08 + v205 * v251,
+                v253 = 2.7557319223985893e-06 + v205 * v252,
+                v254 = v205 * (v251 * v231 + v205 * (v244 * v231 + v205 * (v231 * v243))),
+                v255 = v205 * (v251 * v233 + v205 * (v244 * v233 + v205 * (v233 * v243))),
+                v256 = v205 * (v251 * v234 + v205 * (v244 * v234 + v205 * (v234 * v243))),
+                v257 = v205 * (v251 * v232 + v205 * (v244 * v232 + v205 * (v232 * v243))),
+                v258 = 0.0001984126984126984 + v205 * v253,
+                v259 = 0.008333333333333333 + v205 * v258,
+                v260 = v205 * (v258 * v233 + v205 * (v253 * v233 + v205 * (v252 * v233 + v255))),
+                v261 = 0.16666666666666666 + v205 * v259,
+                v262 = v205 * (v258 * v231 + v205 * (v253 * v231 + v205 * (v252 * v231 + v254))),
+                v263 = v205 * (v258 * v234 + v205 * (v253 * v234 + v205 * (v252 * v234 + v256))),
+                v264 = v205 * (v258 * v232 + v205 * (v253 * v232 + v205 * (v252 * v232 + v257))),
+                v265 = 1.0 / (1.0 + v205 * v261), v266 = v265 * v265, v267 = 1.0 + v205 * v250,
+                v268 = -(v266 * (v261 * v231 + v205 * (v259 * v231 + v262))),
+                v269 = -(v266 * (v261 * v233 + v205 * (v259 * v233 + v260))),
+                v270 = -(v266 * (v261 * v234 + v205 * (v259 * v234 + v263))),
+                v271 = -(v266 * (v261 * v232 + v205 * (v259 * v232 + v264))),
+                v272 = v205 * (v245 * v231 + v205 * (v241 * v231 + v205 * (v231 * v242))),
+                v273 = v205 * (v245 * v232 + v205 * (v241 * v232 + v205 * (v232 * v242))),
+                v274 = v205 * (v245 * v233 + v205 * (v241 * v233 + v205 * (v233 * v242))),
+                v275 = v205 * (v245 * v234 + v205 * (v241 * v234 + v205 * (v234 * v242))),
+                v276 = v205 * (v248 * v233 + v205 * (v247 * v233 + v205 * (v246 * v233 + v274))),
+                v277 = v250 * v233 + v205 * (v249 * v233 + v276),
+                v278 = v205 * (v248 * v234 + v205 * (v247 * v234 + v205 * (v246 * v234 + v275))),
+                v279 = v250 * v234 + v205 * (v249 * v234 + v278),
+                v280 = v205 * (v248 * v231 + v205 * (v247 * v231 + v205 * (v246 * v231 + v272))),
+                v281 = v250 * v231 + v205 * (v249 * v231 + v280),
+                v282 = v205 * (v248 * v232 + v205 * (v247 * v232 + v205 * (v246 * v232 + v273))),
+                v283 = v250 * v232 + v205 * (v249 * v232 + v282);
+            v219 = softehl_blend(m229, v265, v219); v220 = softehl_blend(m229, v267, v220);
+            v221 = softehl_blend(m229, v283, v221); v222 = softehl_blend(m229, v271, v222);
+            v223 = softehl_blend(m229, v269, v223); v224 = softehl_blend(m229, v277, v224);
+            v225 = softehl_blend(m229, v270, v225); v226 = softehl_blend(m229, v279, v226);
+            v227 = softehl_blend(m229, v268, v227); v228 = softehl_blend(m229, v281, v228);
         }
-        const V v310 = 0.08333333333333333 * p3, v311 = v184 * v185, v312 = 0.5 * v188,
-            v313 = softehl_vexp(p2 * parameters[3]), v314 = v312 * v312;
-        const M v315 = softehl_lt(softehl_splat(0.0), v111);
-        const V v316 = 1.0 / (parameters[6] * v312), v317 = v312 * v314, v318 = 1.0 / v314,
-            v319 = v311 * v318, v320 = v310 * v317, v321 = parameters[2] * v313, v322 = v321 * v111,
-            v323 = 1.0 / (v321 * v9), v324 = v319 * v319, v325 = v320 * v324,
-            v326 = -(v319 * (v111 * (v53 * (0.5 * w[3])))), v327 = v322 * v218, v328 = v316 * v327,
-            v329 = 1.0 + v328 * v328, v330 = softehl_vsqrt(v329), v331 = v325 * v330,
-            v332 = v219 * v331;
-        V v333 = softehl_splat(0.0), v334 = softehl_splat(0.0), v335 = softehl_splat(0.0),
-            v336 = softehl_splat(0.0), v337 = softehl_splat(0.0), v338 = softehl_splat(0.0),
-            v339 = softehl_splat(0.0), v340 = softehl_splat(0.0);
-        const M m341 = v315;
-        if (softehl_any(m341)) {
-            const V v342 = v157 * v109, v343 = -(v44 * v157);
-            v333 = softehl_blend(m341, v111, v333);
-            v334 = softehl_blend(m341, softehl_splat(0.0), v334);
-            v335 = softehl_blend(m341, v342, v335);
-            v336 = softehl_blend(m341, softehl_splat(0.0), v336);
-            v337 = softehl_blend(m341, v343, v337);
-            v338 = softehl_blend(m341, softehl_splat(0.0), v338);
-            v339 = softehl_blend(m341, v326, v339);
-            v340 = softehl_blend(m341, softehl_splat(0.0), v340);
+        const M m284 = ~v208;
+        if (softehl_any(m284)) {
+            const V v285 = softehl_vsinh(v198), v286 = 3.0 * v198, v287 = softehl_vcosh(v198),
+                v288 = 3.0 * v205, v289 = 1.0 / v285, v290 = 1.0 / (v198 * v205),
+                v291 = v285 * v286, v292 = v286 * v287 - 3.0 * v285, v293 = v287 * v197,
+                v294 = 3.0 * v287 + v291, v295 = v287 * v199, v296 = v287 * v200,
+                v297 = v198 * v289, v298 = v289 * v289, v299 = v292 * v290, v300 = v290 * v290,
+                v301 = v198 * v298, v302 = v289 * v197 - v298 * (v198 * v293),
+                v303 = v290 * (v197 * v294 - 3.0 * v293) - v300 * (v288 * (v292 * v197)),
+                v304 = v300 * (v292 * v288), v305 = v289 * v200 - v296 * v301,
+                v306 = v289 * v199 - v295 * v301,
+                v307 = v290 * (v294 * v199 - 3.0 * v295) - v199 * v304,
+                v308 = v290 * (v294 * v200 - 3.0 * v296) - v200 * v304,
+                v309 = v196 * (v289 - v298 * (v198 * v287)), v310 = v196 * (v290 * v291 - v304);
+            v219 = softehl_blend(m284, v297, v219); v220 = softehl_blend(m284, v299, v220);
+            v221 = softehl_blend(m284, v310, v221); v222 = softehl_blend(m284, v309, v222);
+            v223 = softehl_blend(m284, v306, v223); v224 = softehl_blend(m284, v307, v224);
+            v225 = softehl_blend(m284, v305, v225); v226 = softehl_blend(m284, v308, v226);
+            v227 = softehl_blend(m284, v302, v227); v228 = softehl_blend(m284, v303, v228);
         }
-        const M m344 = ~v315;
-        if (softehl_any(m344)) {
-            const V v345 = v156 * v109, v346 = -(v44 * v156);
-            v333 = softehl_blend(m344, softehl_splat(0.0), v333);
-            v334 = softehl_blend(m344, v111, v334);
-            v335 = softehl_blend(m344, softehl_splat(0.0), v335);
-            v336 = softehl_blend(m344, v345, v336);
-            v337 = softehl_blend(m344, softehl_splat(0.0), v337);
-            v338 = softehl_blend(m344, v346, v338);
-            v339 = softehl_blend(m344, softehl_splat(0.0), v339);
-            v340 = softehl_blend(m344, v326, v340);
+        const V v311 = 0.08333333333333333 * p3, v312 = v185 * v186, v313 = 0.5 * v189,
+            v314 = softehl_vexp(p2 * parameters[3]), v315 = v313 * v313;
+        const M v316 = softehl_lt(softehl_splat(0.0), v111);
+        const V v317 = 1.0 / (parameters[6] * v313), v318 = v313 * v315, v319 = 1.0 / v315,
+            v320 = v312 * v319, v321 = v311 * v318, v322 = parameters[2] * v314, v323 = v322 * v111,
+            v324 = 1.0 / (v322 * v9), v325 = v320 * v320, v326 = v321 * v325,
+            v327 = -(v320 * (v111 * (v53 * (0.5 * w[3])))), v328 = v323 * v219, v329 = v317 * v328,
+            v330 = 1.0 + v329 * v329, v331 = softehl_vsqrt(v330), v332 = v326 * v331,
+            v333 = v220 * v332;
+        V v334 = softehl_splat(0.0), v335 = v111, v336 = softehl_splat(0.0),
+            v337 = softehl_splat(0.0), v338 = softehl_splat(0.0), v339 = softehl_splat(0.0),
+            v340 = softehl_splat(0.0), v341 = v327;
+        const M m342 = v316;
+        if (softehl_any(m342)) {
+            const V v343 = v157 * v109, v344 = -(v44 * v157);
+            v334 = softehl_blend(m342, v111, v334);
+            v335 = softehl_blend(m342, softehl_splat(0.0), v335);
+            v336 = softehl_blend(m342, v343, v336); v338 = softehl_blend(m342, v344, v338);
+            v340 = softehl_blend(m342, v327, v340);
+            v341 = softehl_blend(m342, softehl_splat(0.0), v341);
         }
-        const V v347 = 3.0 * v314, v348 = 2.0 * v328, v349 = parameters[6] * v327,
-            v350 = v310 * v324, v351 = 0.5 * (v156 * v334 + v157 * v333), v352 = v316 * v322,
-            v353 = v316 * v316, v354 = v323 * v323, v355 = v53 * v351, v356 = v319 * v351,
-            v357 = v54 * v319, v358 = v320 * (2.0 * v319), v359 = softehl_vsqrt(1.0 / v329),
-            v360 = (v164 + v157 * v135 - v59) * v191, v361 = v318 * v318,
-            v362 = w[3] * (v319 * v355 - v323 * v332), v363 = v9 * v56, v364 = v352 * v325,
-            v365 = 0.5 * v359,
-            v366 = v354 * (v9 * v332) - v348 * (v219 * (v325 * (v218 * (v323 * (v316 * v111))))) * v365,
-            v367 = v325 * v348 * v365,
-            v368 = v324 * (0.08333333333333333 * v317) * v330 + v364 * v348 * v365 * v226,
-            v369 = v219 * (v325 * (v218 * (v323 * (v316 * (v44 * v321))))) * v348 * v365,
-            v370 = v109 * (v219 * (v325 * (v218 * (v323 * (v321 * v316))))) * v348 * v365,
-            v371 = -(v48 * v363), v372 = -(v49 * v363), v373 = v56 * (v18 * v129),
-            v374 = v56 * (v10 - v18 * (v163 + v157 * v134)), v375 = w[3] * (v313 * v5 * v366),
-            v376 = v48 * v373, v377 = v49 * v373, v378 = v48 * v374, v379 = v49 * v374,
-            v380 = (v348 * (v219 * v364) * v365 * v221 + v331 * v220) * (v323 * v14),
-            v381 = -(v48 * v360), v382 = -(v49 * v360), v383 = 0.5 * (v332 * (v321 * v354) + v380),
-            v384 = -(w[3] * v323 * (v331 * v227 + v219 * v368)),
-            v385 = v318 * (v179 * v185 + v181 * v184) - v361 * (v188 * (v311 * v186)),
-            v386 = v318 * (v180 * v185 + v182 * v184) - v361 * (v188 * (v311 * v187)),
-            v387 = w[3] * (parameters[7] * (v357 * (v336 + v335) - v370) - v383),
-            v388 = w[3] * (parameters[7] * (v357 * (v338 + v337) + v369) + v383),
-            v389 = (v347 * (v186 * v350) + v385 * v358) * v330 + v367 * (v352 * v222 - v353 * (v186 * v349)),
-            v390 = (v347 * (v187 * v350) + v386 * v358) * v330 + v367 * (v352 * v224 - v353 * (v187 * v349)),
-            v391 = w[3] * (v45 * v356 + v385 * v355 - v323 * (v331 * v223 + v219 * v389)),
-            v392 = w[3] * (v44 * v356 + v386 * v355 - v323 * (v331 * v225 + v219 * v390));
+        const M m345 = ~v316;
+        if (softehl_any(m345)) {
+            const V v346 = v156 * v109, v347 = -(v44 * v156);
+            v337 = softehl_blend(m345, v346, v337); v339 = softehl_blend(m345, v347, v339);
+        }
+        const V v348 = 3.0 * v315, v349 = 2.0 * v329, v350 = parameters[6] * v328,
+            v351 = v311 * v325, v352 = 0.5 * (v156 * v335 + v157 * v334), v353 = v317 * v323,
+            v354 = v317 * v317, v355 = v324 * v324, v356 = v53 * v352, v357 = v320 * v352,
+            v358 = v54 * v320, v359 = v321 * (2.0 * v320), v360 = softehl_vsqrt(1.0 / v330),
+            v361 = (v164 + v157 * v135 - v59) * v192, v362 = v319 * v319,
+            v363 = w[3] * (v320 * v356 - v324 * v333), v364 = v9 * v56, v365 = v353 * v326,
+            v366 = 0.5 * v360,
+            v367 = v355 * (v9 * v333) - v349 * (v220 * (v326 * (v219 * (v324 * (v317 * v111))))) * v366,
+            v368 = v326 * v349 * v366,
+            v369 = v325 * (0.08333333333333333 * v318) * v331 + v365 * v349 * v366 * v227,
+            v370 = v220 * (v326 * (v219 * (v324 * (v317 * (v44 * v322))))) * v349 * v366,
+            v371 = v109 * (v220 * (v326 * (v219 * (v324 * (v322 * v317))))) * v349 * v366,
+            v372 = -(v48 * v364), v373 = -(v49 * v364), v374 = v56 * (v18 * v129),
+            v375 = v56 * (v10 - v18 * (v163 + v157 * v134)), v376 = w[3] * (v314 * v5 * v367),
+            v377 = v48 * v374, v378 = v49 * v374, v379 = v48 * v375, v380 = v49 * v375,
+            v381 = (v349 * (v220 * v365) * v366 * v222 + v332 * v221) * (v324 * v14),
+            v382 = -(v48 * v361), v383 = -(v49 * v361), v384 = 0.5 * (v333 * (v322 * v355) + v381),
+            v385 = -(w[3] * v324 * (v332 * v228 + v220 * v369)),
+            v386 = v319 * (v180 * v186 + v182 * v185) - v362 * (v189 * (v312 * v187)),
+            v387 = v319 * (v181 * v186 + v183 * v185) - v362 * (v189 * (v312 * v188)),
+            v388 = w[3] * (parameters[7] * (v358 * (v337 + v336) - v371) - v384),
+            v389 = w[3] * (parameters[7] * (v358 * (v339 + v338) + v370) + v384),
+            v390 = (v348 * (v187 * v351) + v386 * v359) * v331 + v368 * (v353 * v223 - v354 * (v187 * v350)),
+            v391 = (v348 * (v188 * v351) + v387 * v359) * v331 + v368 * (v353 * v225 - v354 * (v188 * v350)),
+            v392 = w[3] * (v45 * v357 + v386 * v356 - v324 * (v332 * v224 + v220 * v390)),
+            v393 = w[3] * (v44 * v357 + v387 * v356 - v324 * (v332 * v226 + v220 * v391));
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
             (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
-            R_lanes[4 + i] += D1 * v362; K_lanes[(4 + i) * (4 + modes) + 0] += D1 * v387;
-            K_lanes[0 * (4 + modes) + 4 + i] += N * v378 + D * v381 + N2 * v376 + N3 * v165;
-            K_lanes[(4 + i) * (4 + modes) + 1] += D1 * v391;
-            K_lanes[1 * (4 + modes) + 4 + i] += N * v371;
-            K_lanes[(4 + i) * (4 + modes) + 2] += D1 * v388;
-            K_lanes[2 * (4 + modes) + 4 + i] += N * v379 + D * v382 + N2 * v377 + N3 * v166;
-            K_lanes[(4 + i) * (4 + modes) + 3] += D1 * v392;
-            K_lanes[3 * (4 + modes) + 4 + i] += N * v372;
-            const V r0 = softehl_splat(0.0), r1 = softehl_splat(0.0), r2 = D1 * v375,
-                r3 = D1 * v384, r4 = D1 * v339, r5 = softehl_splat(0.0), r6 = D1 * v340,
+            R_lanes[4 + i] += D1 * v363; K_lanes[(4 + i) * (4 + modes) + 0] += D1 * v388;
+            K_lanes[0 * (4 + modes) + 4 + i] += N * v379 + D * v382 + N2 * v377 + N3 * v165;
+            K_lanes[(4 + i) * (4 + modes) + 1] += D1 * v392;
+            K_lanes[1 * (4 + modes) + 4 + i] += N * v372;
+            K_lanes[(4 + i) * (4 + modes) + 2] += D1 * v389;
+            K_lanes[2 * (4 + modes) + 4 + i] += N * v380 + D * v383 + N2 * v378 + N3 * v166;
+            K_lanes[(4 + i) * (4 + modes) + 3] += D1 * v393;
+            K_lanes[3 * (4 + modes) + 4 + i] += N * v373;
+            const V r0 = softehl_splat(0.0), r1 = softehl_splat(0.0), r2 = D1 * v376,
+                r3 = D1 * v385, r4 = D1 * v340, r5 = softehl_splat(0.0), r6 = D1 * v341,
                 r7 = softehl_splat(0.0);
             for (ptrdiff_t j = 0; j < modes; ++j)
                 K_lanes[(4 + i) * (4 + modes) + 4 + j] += r0 * B[8 * j] + r1 * B[8 * j + 1] + r2 * B[8 * j + 2] + r3 * B[8 * j + 3] + r4 * B[8 * j + 4] + r5 * B[8 * j + 5] + r6 * B[8 * j + 6] + r7 * B[8 * j + 7];
         }
     }
-    const V v393 = -s25, v394 = -s26, v395 = -s27, v396 = -s28, v397 = -s29, v398 = -s30,
-        v399 = -s31, v400 = -s32, v401 = -s35, v402 = -s37;
-    R_lanes[0] = s34; R_lanes[1] = v396; R_lanes[2] = s33; R_lanes[3] = v395;
-    K_lanes[0 * (4 + modes) + 0] = v401; K_lanes[0 * (4 + modes) + 1] = s39;
+    const V v394 = -s25, v395 = -s26, v396 = -s27, v397 = -s28, v398 = -s29, v399 = -s30,
+        v400 = -s31, v401 = -s32, v402 = -s35, v403 = -s37;
+    R_lanes[0] = s34; R_lanes[1] = v397; R_lanes[2] = s33; R_lanes[3] = v396;
+    K_lanes[0 * (4 + modes) + 0] = v402; K_lanes[0 * (4 + modes) + 1] = s39;
     K_lanes[0 * (4 + modes) + 2] = s36; K_lanes[0 * (4 + modes) + 3] = s40;
-    K_lanes[1 * (4 + modes) + 0] = s25; K_lanes[1 * (4 + modes) + 1] = v397;
-    K_lanes[1 * (4 + modes) + 2] = v393; K_lanes[1 * (4 + modes) + 3] = v398;
-    K_lanes[2 * (4 + modes) + 0] = v402; K_lanes[2 * (4 + modes) + 1] = s41;
+    K_lanes[1 * (4 + modes) + 0] = s25; K_lanes[1 * (4 + modes) + 1] = v398;
+    K_lanes[1 * (4 + modes) + 2] = v394; K_lanes[1 * (4 + modes) + 3] = v399;
+    K_lanes[2 * (4 + modes) + 0] = v403; K_lanes[2 * (4 + modes) + 1] = s41;
     K_lanes[2 * (4 + modes) + 2] = s38; K_lanes[2 * (4 + modes) + 3] = s42;
-    K_lanes[3 * (4 + modes) + 0] = s26; K_lanes[3 * (4 + modes) + 1] = v399;
-    K_lanes[3 * (4 + modes) + 2] = v394; K_lanes[3 * (4 + modes) + 3] = v400;
+    K_lanes[3 * (4 + modes) + 0] = s26; K_lanes[3 * (4 + modes) + 1] = v400;
+    K_lanes[3 * (4 + modes) + 2] = v395; K_lanes[3 * (4 + modes) + 3] = v401;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
     softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));

@@ -139,105 +139,104 @@ SOFTEHL_GROUP(softehl_film_conserving_eyring_pseudo_load)
             v87 = softehl_blend(m92, v95, v87); v88 = softehl_blend(m92, v94, v88);
         }
         const V v96 = 1.0 - p6, v97 = 1.0 - p4;
-        V v98 = softehl_splat(0.0), v99 = softehl_splat(0.0);
-        const M m100 = ~v85;
+        V v98 = softehl_splat(0.0), v99 = v84;
+        const M m100 = v85;
         if (softehl_any(m100)) {
-            const V v101 = v96 * v83; v98 = softehl_blend(m100, v101, v98);
-            v99 = softehl_blend(m100, v84, v99);
+            v99 = softehl_blend(m100, softehl_splat(0.0), v99);
         }
-        const double v102 = 0.5 * w[1], v103 = 0.5 * w[2];
-        const V v104 = 0.5 * p3;
-        const double v105 = 0.5 - v102, v106 = 0.5 + v102, v107 = 0.5 - v103, v108 = 0.5 + v103;
-        const V v109 = v97 * v88 + (v96 * v99 - v40), v110 = v105 * v2 + v106 * v3,
-            v111 = v107 * v2 + v108 * v3, v112 = v105 * v13 + v106 * v14,
-            v113 = v107 * v13 + v108 * v14, v114 = 0.5 * (v110 + v111), v115 = 0.5 * (v112 + v113),
-            v116 = v42 * (p0 * v19 - v26 * v109 - v23 * (v97 * v87 + (v41 - v39 + v98))),
-            v117 = v104 * v114, v118 = w[3] * (v43 * (p0 * v11 - v23 * v109) + v116),
-            v119 = v17 * v117, v120 = v17 * (v104 * v115 - v117 * v22), v121 = v119 * v119;
-        const M v122 = softehl_lt(v121, softehl_splat(1.0)); const V v123 = v32 * v118; s29 += v123;
-        const V v124 = v33 * v118; s30 += v124;
-        V v125 = softehl_splat(0.0), v126 = softehl_splat(0.0), v127 = softehl_splat(0.0),
-            v128 = softehl_splat(0.0);
-        const M m129 = v122;
-        if (softehl_any(m129)) {
-            const V v130 = 1.9572941063391263e-20 * v121, v131 = 2.5529923126162516e-21 * v121,
-                v132 = 2.0 * v119 * v120, v133 = 8.22063524662433e-18 + v130,
-                v134 = 1.1743764638034756e-18 + v131, v135 = 2.8114572543455206e-15 + v121 * v133,
-                v136 = 4.439143033177138e-16 + v121 * v134,
-                v137 = 7.647163731819816e-13 + v121 * v135,
-                v138 = 1.34949948208585e-13 + v121 * v136,
-                v139 = 3.2118087673643227e-11 + v121 * v138,
-                v140 = 5.7812557812557815e-09 + v121 * v139,
-                v141 = v121 * (v138 * v132 + v121 * (v132 * (v136 + v121 * (v131 + v134)))),
-                v142 = 1.6059043836821613e-10 + v121 * v137,
-                v143 = 7.515632515632515e-07 + v121 * v140,
-                v144 = 2.505210838544172e-08 + v121 * v142,
-                v145 = v121 * (v137 * v132 + v121 * (v132 * (v135 + v121 * (v130 + v133)))),
-                v146 = 6.613756613756614e-05 + v121 * v143,
-                v147 = 0.0035714285714285713 + v121 * v146,
-                v148 = v121 * (v143 * v132 + v121 * (v140 * v132 + v121 * (v139 * v132 + v141))),
-                v149 = 2.7557319223985893e-06 + v121 * v144, v150 = 0.1 + v121 * v147,
-                v151 = 0.0001984126984126984 + v121 * v149,
-                v152 = v121 * (v149 * v132 + v121 * (v144 * v132 + v121 * (v142 * v132 + v145))),
-                v153 = 0.008333333333333333 + v121 * v151,
-                v154 = v150 * v132 + v121 * (v147 * v132 + v121 * (v146 * v132 + v148)),
-                v155 = 0.16666666666666666 + v121 * v153, v156 = 1.0 / (1.0 + v121 * v155),
-                v157 = 1.0 + v121 * v150,
-                v158 = v156 * v156 * (v155 * v132 + v121 * (v153 * v132 + v121 * (v151 * v132 + v152))),
-                v159 = -v158;
-            v125 = softehl_blend(m129, v159, v125); v126 = softehl_blend(m129, v156, v126);
-            v127 = softehl_blend(m129, v157, v127); v128 = softehl_blend(m129, v154, v128);
+        const M m101 = ~v85;
+        if (softehl_any(m101)) {
+            const V v102 = v96 * v83; v98 = softehl_blend(m101, v102, v98);
         }
-        const M m160 = ~v122;
-        if (softehl_any(m160)) {
-            const V v161 = softehl_vsinh(v119), v162 = 3.0 * v119, v163 = softehl_vcosh(v119),
-                v164 = 1.0 / v161, v165 = 1.0 / (v119 * v121), v166 = v162 * v163 - 3.0 * v161,
-                v167 = v119 * v164, v168 = v166 * v165, v169 = v164 * (v120 * (1.0 - v167 * v163)),
-                v170 = v165 * (v120 * (v161 * v162 - v165 * (v121 * (3.0 * v166))));
-            v125 = softehl_blend(m160, v169, v125); v126 = softehl_blend(m160, v167, v126);
-            v127 = softehl_blend(m160, v168, v127); v128 = softehl_blend(m160, v170, v128);
+        const double v103 = 0.5 * w[1], v104 = 0.5 * w[2];
+        const V v105 = 0.5 * p3;
+        const double v106 = 0.5 - v103, v107 = 0.5 + v103, v108 = 0.5 - v104, v109 = 0.5 + v104;
+        const V v110 = v97 * v88 + (v96 * v99 - v40), v111 = v106 * v2 + v107 * v3,
+            v112 = v108 * v2 + v109 * v3, v113 = v106 * v13 + v107 * v14,
+            v114 = v108 * v13 + v109 * v14, v115 = 0.5 * (v111 + v112), v116 = 0.5 * (v113 + v114),
+            v117 = v42 * (p0 * v19 - v26 * v110 - v23 * (v97 * v87 + (v41 - v39 + v98))),
+            v118 = v105 * v115, v119 = w[3] * (v43 * (p0 * v11 - v23 * v110) + v117),
+            v120 = v17 * v118, v121 = v17 * (v105 * v116 - v118 * v22), v122 = v120 * v120;
+        const M v123 = softehl_lt(v122, softehl_splat(1.0)); const V v124 = v32 * v119; s29 += v124;
+        const V v125 = v33 * v119; s30 += v125;
+        V v126 = softehl_splat(0.0), v127 = softehl_splat(0.0), v128 = softehl_splat(0.0),
+            v129 = softehl_splat(0.0);
+        const M m130 = v123;
+        if (softehl_any(m130)) {
+            const V v131 = 1.9572941063391263e-20 * v122, v132 = 2.5529923126162516e-21 * v122,
+                v133 = 2.0 * v120 * v121, v134 = 8.22063524662433e-18 + v131,
+                v135 = 1.1743764638034756e-18 + v132, v136 = 2.8114572543455206e-15 + v122 * v134,
+                v137 = 4.439143033177138e-16 + v122 * v135,
+                v138 = 7.647163731819816e-13 + v122 * v136,
+                v139 = 1.34949948208585e-13 + v122 * v137,
+                v140 = 3.2118087673643227e-11 + v122 * v139,
+                v141 = 5.7812557812557815e-09 + v122 * v140,
+                v142 = v122 * (v139 * v133 + v122 * (v133 * (v137 + v122 * (v132 + v135)))),
+                v143 = 1.6059043836821613e-10 + v122 * v138,
+                v144 = 7.515632515632515e-07 + v122 * v141,
+                v145 = 2.505210838544172e-08 + v122 * v143,
+                v146 = v122 * (v138 * v133 + v122 * (v133 * (v136 + v122 * (v131 + v134)))),
+                v147 = 6.613756613756614e-05 + v122 * v144,
+                v148 = 0.0035714285714285713 + v122 * v147,
+                v149 = v122 * (v144 * v133 + v122 * (v141 * v133 + v122 * (v140 * v133 + v142))),
+                v150 = 2.7557319223985893e-06 + v122 * v145, v151 = 0.1 + v122 * v148,
+                v152 = 0.0001984126984126984 + v122 * v150,
+                v153 = v122 * (v150 * v133 + v122 * (v145 * v133 + v122 * (v143 * v133 + v146))),
+                v154 = 0.008333333333333333 + v122 * v152,
+                v155 = v151 * v133 + v122 * (v148 * v133 + v122 * (v147 * v133 + v149)),
+                v156 = 0.16666666666666666 + v122 * v154, v157 = 1.0 / (1.0 + v122 * v156),
+                v158 = 1.0 + v122 * v151,
+                v159 = v157 * v157 * (v156 * v133 + v122 * (v154 * v133 + v122 * (v152 * v133 + v153))),
+                v160 = -v159;
+            v126 = softehl_blend(m130, v160, v126); v127 = softehl_blend(m130, v157, v127);
+            v128 = softehl_blend(m130, v158, v128); v129 = softehl_blend(m130, v155, v129);
         }
-        const V v171 = softehl_vexp(p2 * parameters[3]), v172 = v114 * v114, v173 = 1.0 / v172,
-            v174 = v172 * (0.08333333333333333 * p3 * v114), v175 = 1.0 / (parameters[6] * v114);
-        const M v176 = softehl_lt(softehl_splat(0.0), v75);
-        const V v177 = v110 * v111, v178 = v177 * v173, v179 = v171 * (t8 + p2 * v4),
-            v180 = parameters[2] * v171,
-            v181 = v111 * v112 + v110 * v113 - v115 * (v173 * (v114 * (2.0 * v177))),
-            v182 = v173 * v181, v183 = v180 * v75, v184 = v178 * v178, v185 = v184 * v174,
-            v186 = v115 * (v184 * (v172 * (0.25 * p3))) + v182 * (2.0 * v178 * v174),
-            v187 = 1.0 / (v180 * v9), v188 = v183 * v126,
-            v189 = v126 * (v180 * v76 + v75 * v179) - v175 * (parameters[6] * v115 + v114 * t12) * v188,
-            v190 = v175 * v188, v191 = 1.0 + v190 * v190, v192 = softehl_vsqrt(v191),
-            v193 = v185 * v192, v194 = softehl_vsqrt(1.0 / v191),
-            v195 = v193 * (v187 * (v180 * v10 + v9 * v179)) - v186 * v192 - v185 * v190 * v194 * (v175 * (v183 * v125 + v189)),
-            v196 = v187 * (v127 * v195 - v193 * v128);
-        V v197 = softehl_splat(0.0), v198 = softehl_splat(0.0), v199 = softehl_splat(0.0),
-            v200 = softehl_splat(0.0);
-        const M m201 = v176;
-        if (softehl_any(m201)) {
-            const V v202 = v97 * v76; v197 = softehl_blend(m201, v202, v197);
-            v198 = softehl_blend(m201, softehl_splat(0.0), v198);
-            v199 = softehl_blend(m201, v75, v199);
-            v200 = softehl_blend(m201, softehl_splat(0.0), v200);
+        const M m161 = ~v123;
+        if (softehl_any(m161)) {
+            const V v162 = softehl_vsinh(v120), v163 = 3.0 * v120, v164 = softehl_vcosh(v120),
+                v165 = 1.0 / v162, v166 = 1.0 / (v120 * v122), v167 = v163 * v164 - 3.0 * v162,
+                v168 = v120 * v165, v169 = v167 * v166, v170 = v165 * (v121 * (1.0 - v168 * v164)),
+                v171 = v166 * (v121 * (v162 * v163 - v166 * (v122 * (3.0 * v167))));
+            v126 = softehl_blend(m161, v170, v126); v127 = softehl_blend(m161, v168, v127);
+            v128 = softehl_blend(m161, v169, v128); v129 = softehl_blend(m161, v171, v129);
         }
-        const M m203 = ~v176;
-        if (softehl_any(m203)) {
-            const V v204 = v96 * v76; v197 = softehl_blend(m203, softehl_splat(0.0), v197);
-            v198 = softehl_blend(m203, v204, v198);
-            v199 = softehl_blend(m203, softehl_splat(0.0), v199);
-            v200 = softehl_blend(m203, v75, v200);
+        const V v172 = softehl_vexp(p2 * parameters[3]), v173 = v115 * v115, v174 = 1.0 / v173,
+            v175 = v173 * (0.08333333333333333 * p3 * v115), v176 = 1.0 / (parameters[6] * v115);
+        const M v177 = softehl_lt(softehl_splat(0.0), v75);
+        const V v178 = v111 * v112, v179 = v178 * v174, v180 = v172 * (t8 + p2 * v4),
+            v181 = parameters[2] * v172,
+            v182 = v112 * v113 + v111 * v114 - v116 * (v174 * (v115 * (2.0 * v178))),
+            v183 = v174 * v182, v184 = v181 * v75, v185 = v179 * v179, v186 = v185 * v175,
+            v187 = v116 * (v185 * (v173 * (0.25 * p3))) + v183 * (2.0 * v179 * v175),
+            v188 = 1.0 / (v181 * v9), v189 = v184 * v127,
+            v190 = v127 * (v181 * v76 + v75 * v180) - v176 * (parameters[6] * v116 + v115 * t12) * v189,
+            v191 = v176 * v189, v192 = 1.0 + v191 * v191, v193 = softehl_vsqrt(v192),
+            v194 = v186 * v193, v195 = softehl_vsqrt(1.0 / v192),
+            v196 = v194 * (v188 * (v181 * v10 + v9 * v180)) - v187 * v193 - v186 * v191 * v195 * (v176 * (v184 * v126 + v190)),
+            v197 = v188 * (v128 * v196 - v194 * v129);
+        V v198 = softehl_splat(0.0), v199 = softehl_splat(0.0), v200 = softehl_splat(0.0),
+            v201 = v75;
+        const M m202 = v177;
+        if (softehl_any(m202)) {
+            const V v203 = v97 * v76; v198 = softehl_blend(m202, v203, v198);
+            v200 = softehl_blend(m202, v75, v200);
+            v201 = softehl_blend(m202, softehl_splat(0.0), v201);
         }
-        const V v205 = 0.5 * (v96 * v200 + v97 * v199),
-            v206 = v178 * (v205 * v38 + v37 * (v198 + v197)) + (v35 * v205 * v182 + v196),
-            v207 = w[3] * v206;
+        const M m204 = ~v177;
+        if (softehl_any(m204)) {
+            const V v205 = v96 * v76; v199 = softehl_blend(m204, v205, v199);
+        }
+        const V v206 = 0.5 * (v96 * v201 + v97 * v200),
+            v207 = v179 * (v206 * v38 + v37 * (v199 + v198)) + (v35 * v206 * v183 + v197),
+            v208 = w[3] * v207;
         for (ptrdiff_t i = 0; i < modes; ++i) {
             const double N = B[8 * i], D = B[8 * i + 1], N1 = B[8 * i + 2], D1 = B[8 * i + 3], N2 = B[8 * i + 4], D2 = B[8 * i + 5], N3 = B[8 * i + 6], D3 = B[8 * i + 7];
             (void)N, (void)D, (void)N1, (void)D1, (void)N2, (void)D2, (void)N3, (void)D3;
-            R_lanes[4 + i] += D1 * v207;
+            R_lanes[4 + i] += D1 * v208;
         }
     }
-    const V v208 = -s27, v209 = -s28;
-    R_lanes[0] = s30; R_lanes[1] = v209; R_lanes[2] = s29; R_lanes[3] = v208;
+    const V v209 = -s27, v210 = -s28;
+    R_lanes[0] = s30; R_lanes[1] = v210; R_lanes[2] = s29; R_lanes[3] = v209;
 #if SOFTEHL_LANES > 1
     softehl_scatter(R, R_lanes, (4 + modes));
 #endif
@@ -434,21 +433,16 @@ SOFTEHL_GROUP(softehl_film_conserving_eyring_fields_rate)
             v202 = v133 * (v201 - v200 * (v193 * v195) * (v180 * (v190 * v131 + v196))),
             v203 = v194 * (v202 - v199 * v134);
         V v204 = softehl_splat(0.0), v205 = softehl_splat(0.0), v206 = softehl_splat(0.0),
-            v207 = softehl_splat(0.0);
+            v207 = v82;
         const M m208 = v178;
         if (softehl_any(m208)) {
             const V v209 = v107 * v83 - v82 * tp4; v204 = softehl_blend(m208, v209, v204);
-            v205 = softehl_blend(m208, softehl_splat(0.0), v205);
             v206 = softehl_blend(m208, v82, v206);
             v207 = softehl_blend(m208, softehl_splat(0.0), v207);
         }
         const M m210 = ~v178;
         if (softehl_any(m210)) {
-            const V v211 = v106 * v83 - v82 * tp6;
-            v204 = softehl_blend(m210, softehl_splat(0.0), v204);
-            v205 = softehl_blend(m210, v211, v205);
-            v206 = softehl_blend(m210, softehl_splat(0.0), v206);
-            v207 = softehl_blend(m210, v82, v207);
+            const V v211 = v106 * v83 - v82 * tp6; v205 = softehl_blend(m210, v211, v205);
         }
         const V v212 = 0.5 * (v106 * v207 + v107 * v206), v213 = v29 + v117,
             v214 = v186 * (v212 * v28 + v27 * (v205 + v204)) + (v26 * v212 * v187 + v203),

@@ -21,45 +21,57 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_film_facet_residual)
+SOFTEHL_GROUP(softehl_film_facet_residual)
 {
-    (void)data;
-    (void)direction;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 6 * e;
-        const double *restrict d = dofs + (6 + modes) * e;
-        double *restrict R = values + (6 + modes) * e; (void)X; (void)d;
-        for (ptrdiff_t i = 0; i < (6 + modes); ++i) R[i] = 0.0;
-        const double v1 = X[3] - parameters[0], v2 = X[2] + d[2], v3 = d[3] + v1,
-            v4 = 0.5 * parameters[1], v5 = v3 * v4, v6 = 0.08333333333333333 * v3, v7 = v3 * v6,
-            v8 = v3 * v7, v9 = X[0] + d[0], v10 = X[4] + d[4], v11 = v2 - v9, v12 = v10 - v2,
-            v13 = 0.5 * v11, v14 = 0.5 * v12, v15 = parameters[2] * v13, v16 = parameters[2] * v14,
-            v17 = 2.0 * v5;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 1 * q; (void)w;
-            const double *restrict B = basis + 4 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[6 + i]; p1 += B[4 * i + 1] * d[6 + i];
-                p2 += B[4 * i + 2] * d[6 + i]; p3 += B[4 * i + 3] * d[6 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v18 = p2 * parameters[3], v19 = exp(v18), v20 = v19 * v16, v21 = 1.0 / v20,
-                v22 = v8 * v21, v23 = p3 * v22, v24 = p0 * parameters[3], v25 = exp(v24),
-                v26 = v25 * v15, v27 = 1.0 / v26, v28 = v8 * v27, v29 = p1 * v28, v30 = v29 + v23,
-                v31 = v17 - v30, v32 = 0.5 * v31, v33 = w[0] * v32, v34 = -v33, v35 = p0 - p2,
-                v36 = 0.5 * v35, v37 = w[0] * v36, v38 = v37 * v28, v39 = -v38, v40 = v37 * v22,
-                v41 = -v40;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
-                (void)N, (void)D, (void)N1, (void)D1;
-                R[6 + i] += N * v34 + D * v39 + N1 * v33 + D1 * v41;
-            }
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5;
+    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3); softehl_load2(X + 4, 6, &X4, &X5); (void)X1;
+    (void)X5;
+    V d0, d1, d2, d3, d4, d5;
+    softehl_load4(d + 0, (6 + modes), &d0, &d1, &d2, &d3);
+    softehl_load2(d + 4, (6 + modes), &d4, &d5); (void)d1; (void)d5;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(6 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (6 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(6 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (6 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const V v1 = X2 + d2, v2 = d3 + (X3 - parameters[0]),
+        v3 = v2 * (v2 * (0.08333333333333333 * v2)), v4 = 2.0 * (v2 * (0.5 * parameters[1])),
+        v5 = parameters[2] * (0.5 * (v1 - (X0 + d0))), v6 = parameters[2] * (0.5 * (X4 + d4 - v1));
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 1 * q; (void)w;
+        const double *restrict B = basis + 4 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[4 * i] * d_lanes[6 + i]; p1 += B[4 * i + 1] * d_lanes[6 + i];
+            p2 += B[4 * i + 2] * d_lanes[6 + i]; p3 += B[4 * i + 3] * d_lanes[6 + i];
         }
-        R[0] = 0.0; R[1] = 0.0; R[2] = 0.0; R[3] = 0.0; R[4] = 0.0; R[5] = 0.0;
+        (void)p0, (void)p1, (void)p2, (void)p3;
+        const V v7 = softehl_vexp(p0 * parameters[3]), v8 = softehl_vexp(p2 * parameters[3]),
+            v9 = w[0] * (0.5 * (p0 - p2)), v10 = v3 * (1.0 / (v7 * v5)),
+            v11 = v3 * (1.0 / (v8 * v6)), v12 = -(v9 * v11), v13 = -(v9 * v10),
+            v14 = w[0] * (0.5 * (v4 - p1 * v10 - p3 * v11)), v15 = -v14;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
+            (void)N, (void)D, (void)N1, (void)D1;
+            R_lanes[6 + i] += N * v15 + D * v13 + N1 * v14 + D1 * v12;
+        }
     }
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (6 + modes));
+#endif
 }
+SOFTEHL_BATCH(softehl_film_facet_residual, 6, (6 + modes), 0, 0, (6 + modes), 0)
 
 SOFTEHL_GROUP(softehl_film_facet_tangent)
 {
@@ -142,36 +154,42 @@ SOFTEHL_GROUP(softehl_film_facet_tangent)
 }
 SOFTEHL_BATCH(softehl_film_facet_tangent, 6, (6 + modes), 0, 0, (6 + modes), ((6 + modes) * (6 + modes)))
 
-SOFTEHL_KERNEL(softehl_film_facet_fields)
+SOFTEHL_GROUP(softehl_film_facet_fields)
 {
-    (void)data;
-    (void)direction;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 6 * e;
-        const double *restrict d = dofs + (6 + modes) * e; (void)X; (void)d;
-        const double v1 = X[2] + d[2], v2 = X[3] - parameters[0], v3 = d[3] + v2,
-            v4 = 0.5 * parameters[1], v5 = v3 * v4, v6 = 0.08333333333333333 * v3, v7 = v3 * v6,
-            v8 = v3 * v7, v9 = X[0] + d[0], v10 = X[4] + d[4], v11 = v1 - v9, v12 = v10 - v1,
-            v13 = 0.5 * v11, v14 = 0.5 * v12, v15 = parameters[2] * v13, v16 = parameters[2] * v14;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 1 * q; (void)w;
-            const double *restrict B = basis + 4 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[6 + i]; p1 += B[4 * i + 1] * d[6 + i];
-                p2 += B[4 * i + 2] * d[6 + i]; p3 += B[4 * i + 3] * d[6 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v17 = p0 - p2, v18 = p3 * v8, v19 = p2 * parameters[3], v20 = exp(v19),
-                v21 = v20 * v16, v22 = 1.0 / v21, v23 = v22 * v18, v24 = v5 - v23, v25 = p1 * v8,
-                v26 = p0 * parameters[3], v27 = exp(v26), v28 = v27 * v15, v29 = 1.0 / v28,
-                v30 = v29 * v25, v31 = v5 - v30, v32 = v31 + v24, v33 = 0.5 * v32, v34 = v31 - v24;
-            double *restrict out = values + 5 * (points * e + q); out[2] = v17; out[3] = v33;
-            out[4] = v34;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3, X4, X5;
+    softehl_load4(X + 0, 6, &X0, &X1, &X2, &X3); softehl_load2(X + 4, 6, &X4, &X5); (void)X1;
+    (void)X5;
+    V d0, d1, d2, d3, d4, d5;
+    softehl_load4(d + 0, (6 + modes), &d0, &d1, &d2, &d3);
+    softehl_load2(d + 4, (6 + modes), &d4, &d5); (void)d1; (void)d5;
+#if SOFTEHL_LANES > 1
+    V d_lanes[(6 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (6 + modes));
+#endif
+    const V v1 = X2 + d2, v2 = d3 + (X3 - parameters[0]), v3 = v2 * (0.5 * parameters[1]),
+        v4 = v2 * (v2 * (0.08333333333333333 * v2)), v5 = parameters[2] * (0.5 * (v1 - (X0 + d0))),
+        v6 = parameters[2] * (0.5 * (X4 + d4 - v1));
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 1 * q; (void)w;
+        const double *restrict B = basis + 4 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[4 * i] * d_lanes[6 + i]; p1 += B[4 * i + 1] * d_lanes[6 + i];
+            p2 += B[4 * i + 2] * d_lanes[6 + i]; p3 += B[4 * i + 3] * d_lanes[6 + i];
         }
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            double *restrict out = values + 5 * (points * e + q); out[0] = v1; out[1] = v3;
-        }
+        (void)p0, (void)p1, (void)p2, (void)p3;
+        const V v7 = p0 - p2, v8 = softehl_vexp(p0 * parameters[3]),
+            v9 = softehl_vexp(p2 * parameters[3]), v10 = v3 - 1.0 / (v8 * v5) * (p1 * v4),
+            v11 = v3 - 1.0 / (v9 * v6) * (p3 * v4), v12 = v10 - v11, v13 = 0.5 * (v10 + v11);
+        softehl_store3(R + 5 * q + 2, (5 * points), v7, v13, v12);
+    }
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        softehl_store2(R + 5 * q + 0, (5 * points), v1, v2);
     }
 }
+SOFTEHL_BATCH(softehl_film_facet_fields, 6, (6 + modes), 0, 0, (5 * points), 0)

@@ -454,11 +454,10 @@ SOFTEHL_GROUP(softehl_film_rough_tangent)
         const M v259 = softehl_le(softehl_splat(0.5), v256);
         const V v260 = v56 * (v253 * (v252 * (v258 * v20)) * v257), v261 = v50 * v260,
             v262 = v53 * v260;
-        V v263 = softehl_splat(0.0), v264 = softehl_splat(0.0), v265 = softehl_splat(0.0);
+        V v263 = v256, v264 = softehl_splat(0.0), v265 = softehl_splat(0.0);
         const M m266 = v259;
         if (softehl_any(m266)) {
             const double v267 = v10 * v248, v268 = v10 * v249;
-            v263 = softehl_blend(m266, v256, v263);
             v264 = softehl_blend(m266, softehl_splat(v267), v264);
             v265 = softehl_blend(m266, softehl_splat(v268), v265);
         }
@@ -473,11 +472,10 @@ SOFTEHL_GROUP(softehl_film_rough_tangent)
         const double v276 = 0.5 - v274, v277 = 0.5 + v274;
         const V v278 = v276 * v6 + v277 * v7, v279 = v10 * v278;
         const M v280 = softehl_le(softehl_splat(0.5), v279);
-        V v281 = softehl_splat(0.0), v282 = softehl_splat(0.0), v283 = softehl_splat(0.0);
+        V v281 = v279, v282 = softehl_splat(0.0), v283 = softehl_splat(0.0);
         const M m284 = v280;
         if (softehl_any(m284)) {
             const double v285 = v10 * v276, v286 = v10 * v277;
-            v281 = softehl_blend(m284, v279, v281);
             v282 = softehl_blend(m284, softehl_splat(v285), v282);
             v283 = softehl_blend(m284, softehl_splat(v286), v283);
         }
@@ -494,19 +492,16 @@ SOFTEHL_GROUP(softehl_film_rough_tangent)
             v300 = parameters[7] * (0.3989422804014327 * v299 + (v55 * v297 + parameters[8] * v224)),
             v301 = v298 * v298, v302 = 1.0 / v301, v303 = v295 * v302,
             v304 = -(v303 * (v252 * (0.5 * w[3]) * v300));
-        V v305 = softehl_splat(0.0), v306 = softehl_splat(0.0), v307 = softehl_splat(0.0),
+        V v305 = softehl_splat(0.0), v306 = v252, v307 = softehl_splat(0.0),
             v308 = softehl_splat(0.0), v309 = softehl_splat(0.0), v310 = softehl_splat(0.0),
-            v311 = softehl_splat(0.0), v312 = softehl_splat(0.0), v313 = softehl_splat(0.0),
-            v314 = softehl_splat(0.0), v315 = softehl_splat(0.0), v316 = softehl_splat(0.0);
+            v311 = softehl_splat(0.0), v312 = v261, v313 = softehl_splat(0.0), v314 = v262,
+            v315 = softehl_splat(0.0), v316 = v304;
         const M m317 = v255;
         if (softehl_any(m317)) {
             const V v318 = v246 * v251, v319 = -(v48 * v246);
             v305 = softehl_blend(m317, v252, v305);
             v306 = softehl_blend(m317, softehl_splat(0.0), v306);
-            v307 = softehl_blend(m317, v318, v307);
-            v308 = softehl_blend(m317, softehl_splat(0.0), v308);
-            v309 = softehl_blend(m317, v319, v309);
-            v310 = softehl_blend(m317, softehl_splat(0.0), v310);
+            v307 = softehl_blend(m317, v318, v307); v309 = softehl_blend(m317, v319, v309);
             v311 = softehl_blend(m317, v261, v311);
             v312 = softehl_blend(m317, softehl_splat(0.0), v312);
             v313 = softehl_blend(m317, v262, v313);
@@ -517,18 +512,7 @@ SOFTEHL_GROUP(softehl_film_rough_tangent)
         const M m320 = ~v255;
         if (softehl_any(m320)) {
             const V v321 = v245 * v251, v322 = -(v48 * v245);
-            v305 = softehl_blend(m320, softehl_splat(0.0), v305);
-            v306 = softehl_blend(m320, v252, v306);
-            v307 = softehl_blend(m320, softehl_splat(0.0), v307);
-            v308 = softehl_blend(m320, v321, v308);
-            v309 = softehl_blend(m320, softehl_splat(0.0), v309);
-            v310 = softehl_blend(m320, v322, v310);
-            v311 = softehl_blend(m320, softehl_splat(0.0), v311);
-            v312 = softehl_blend(m320, v261, v312);
-            v313 = softehl_blend(m320, softehl_splat(0.0), v313);
-            v314 = softehl_blend(m320, v262, v314);
-            v315 = softehl_blend(m320, softehl_splat(0.0), v315);
-            v316 = softehl_blend(m320, v304, v316);
+            v308 = softehl_blend(m320, v321, v308); v310 = softehl_blend(m320, v322, v310);
         }
         const V v323 = 0.08333333333333333 * p3, v324 = 0.5 * v250,
             v325 = softehl_vexp(p2 * parameters[3]), v326 = v245 * v306 + v246 * v305,

@@ -250,21 +250,17 @@ SOFTEHL_GROUP(softehl_film_rough_pseudo_load)
             v227 = t7 - v36 * v10 - v37 * v9;
         const M v228 = softehl_lt(softehl_splat(0.0), v226);
         const V v229 = parameters[8] * v202 + (v119 + v203 * t14);
-        V v230 = softehl_splat(0.0), v231 = softehl_splat(0.0), v232 = softehl_splat(0.0),
+        V v230 = softehl_splat(0.0), v231 = v226, v232 = softehl_splat(0.0),
             v233 = softehl_splat(0.0);
         const M m234 = v228;
         if (softehl_any(m234)) {
             const V v235 = v225 * v227; v230 = softehl_blend(m234, v226, v230);
             v231 = softehl_blend(m234, softehl_splat(0.0), v231);
             v232 = softehl_blend(m234, v235, v232);
-            v233 = softehl_blend(m234, softehl_splat(0.0), v233);
         }
         const M m236 = ~v228;
         if (softehl_any(m236)) {
-            const V v237 = v224 * v227; v230 = softehl_blend(m236, softehl_splat(0.0), v230);
-            v231 = softehl_blend(m236, v226, v231);
-            v232 = softehl_blend(m236, softehl_splat(0.0), v232);
-            v233 = softehl_blend(m236, v237, v233);
+            const V v237 = v224 * v227; v233 = softehl_blend(m236, v237, v233);
         }
         const double v238 = 0.5 * w[2], v239 = 0.5 - v238, v240 = 0.5 + v238;
         const V v241 = v224 * v231 + v225 * v230, v242 = v19 + v226 * v226,
@@ -292,11 +288,10 @@ SOFTEHL_GROUP(softehl_film_rough_pseudo_load)
             v280 = v107 * v25 + v14 * v106 - v30 * v279 - v27 * (v259 * (v277 - v278 * v262) + v270),
             v281 = w[3] * (v85 * (v14 * v107 - v27 * v279) + v84 * v280), v282 = v36 * v281;
         s33 += v282; const V v283 = v37 * v281; s34 += v283;
-        V v284 = softehl_splat(0.0), v285 = softehl_splat(0.0);
+        V v284 = v248, v285 = softehl_splat(0.0);
         const M m286 = v252;
         if (softehl_any(m286)) {
-            const V v287 = v1 * v247 - v246 * v11; v284 = softehl_blend(m286, v248, v284);
-            v285 = softehl_blend(m286, v287, v285);
+            const V v287 = v1 * v247 - v246 * v11; v285 = softehl_blend(m286, v287, v285);
         }
         const M m288 = ~v252;
         if (softehl_any(m288)) {
@@ -308,11 +303,10 @@ SOFTEHL_GROUP(softehl_film_rough_pseudo_load)
         const double v294 = 0.5 - v292, v295 = 0.5 + v292;
         const V v296 = v294 * v3 + v295 * v4, v297 = v294 * v17 + v295 * v18, v298 = v1 * v296;
         const M v299 = softehl_le(softehl_splat(0.5), v298);
-        V v300 = softehl_splat(0.0), v301 = softehl_splat(0.0);
+        V v300 = v298, v301 = softehl_splat(0.0);
         const M m302 = v299;
         if (softehl_any(m302)) {
-            const V v303 = v1 * v297 - v296 * v11; v300 = softehl_blend(m302, v298, v300);
-            v301 = softehl_blend(m302, v303, v301);
+            const V v303 = v1 * v297 - v296 * v11; v301 = softehl_blend(m302, v303, v301);
         }
         const M m304 = ~v299;
         if (softehl_any(m304)) {
@@ -528,22 +522,17 @@ SOFTEHL_GROUP(softehl_film_rough_fields_rate)
         const M v151 = softehl_lt(softehl_splat(0.0), v149);
         const V v152 = parameters[8] * v123 + v42,
             v153 = parameters[8] * v122 + (v123 * t14 + v41) - v147 * (v148 * v152);
-        V v154 = softehl_splat(0.0), v155 = softehl_splat(0.0), v156 = softehl_splat(0.0),
+        V v154 = softehl_splat(0.0), v155 = v149, v156 = softehl_splat(0.0),
             v157 = softehl_splat(0.0);
         const M m158 = v151;
         if (softehl_any(m158)) {
             const V v159 = v145 * v150 - v149 * tp4; v154 = softehl_blend(m158, v149, v154);
             v155 = softehl_blend(m158, softehl_splat(0.0), v155);
             v156 = softehl_blend(m158, v159, v156);
-            v157 = softehl_blend(m158, softehl_splat(0.0), v157);
         }
         const M m160 = ~v151;
         if (softehl_any(m160)) {
-            const V v161 = v144 * v150 - v149 * tp6;
-            v154 = softehl_blend(m160, softehl_splat(0.0), v154);
-            v155 = softehl_blend(m160, v149, v155);
-            v156 = softehl_blend(m160, softehl_splat(0.0), v156);
-            v157 = softehl_blend(m160, v161, v157);
+            const V v161 = v144 * v150 - v149 * tp6; v157 = softehl_blend(m160, v161, v157);
         }
         const double v162 = 0.5 * w[2], v163 = 0.5 - v162, v164 = 0.5 + v162;
         const V v165 = 2.25 + v30, v166 = 6.25 + v30, v167 = 2.7777777777777777 + v30,
@@ -605,11 +594,10 @@ SOFTEHL_GROUP(softehl_film_rough_fields_rate)
             v246 = v225 * (v233 * (v20 * v243) + v219 * v245),
             v247 = v148 * (v152 * (v186 * v235 + v234 * v189) + v234 * v186 * v153) + v246,
             v248 = v247 - v218;
-        V v249 = softehl_splat(0.0), v250 = softehl_splat(0.0);
+        V v249 = v195, v250 = softehl_splat(0.0);
         const M m251 = v197;
         if (softehl_any(m251)) {
-            const V v252 = v1 * v194 - v193 * v18; v249 = softehl_blend(m251, v195, v249);
-            v250 = softehl_blend(m251, v252, v250);
+            const V v252 = v1 * v194 - v193 * v18; v250 = softehl_blend(m251, v252, v250);
         }
         const M m253 = ~v197;
         if (softehl_any(m253)) {
@@ -621,11 +609,10 @@ SOFTEHL_GROUP(softehl_film_rough_fields_rate)
         const double v259 = 0.5 - v257, v260 = 0.5 + v257;
         const V v261 = v259 * v3 + v260 * v4, v262 = v259 * v13 + v260 * v14, v263 = v1 * v261;
         const M v264 = softehl_le(softehl_splat(0.5), v263);
-        V v265 = softehl_splat(0.0), v266 = softehl_splat(0.0);
+        V v265 = v263, v266 = softehl_splat(0.0);
         const M m267 = v264;
         if (softehl_any(m267)) {
-            const V v268 = v1 * v262 - v261 * v18; v265 = softehl_blend(m267, v263, v265);
-            v266 = softehl_blend(m267, v268, v266);
+            const V v268 = v1 * v262 - v261 * v18; v266 = softehl_blend(m267, v268, v266);
         }
         const M m269 = ~v264;
         if (softehl_any(m269)) {

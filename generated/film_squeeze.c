@@ -17,115 +17,149 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_film_squeeze_residual)
+SOFTEHL_GROUP(softehl_film_squeeze_residual)
 {
-    (void)direction;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict a = data + (0 + 1 * points) * e;
-        double *restrict R = values + (4 + modes) * e; (void)X; (void)d; (void)a;
-        for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = d[1] + v1,
-            v4 = d[3] + v2, v5 = X[2] + d[2], v6 = v5 - X[0], v7 = v6 - d[0], v8 = 0.5 * v7,
-            v9 = parameters[1] * v8;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q; (void)w;
-            const double *restrict b = a + 0 + 1 * q; (void)b;
-            const double *restrict B = basis + 4 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[4 + i]; p1 += B[4 * i + 1] * d[4 + i];
-                p2 += B[4 * i + 2] * d[4 + i]; p3 += B[4 * i + 3] * d[4 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v10 = 0.5 * w[0], v11 = 0.5 + v10, v12 = v11 * v4, v13 = 0.5 - v10,
-                v14 = v13 * v3, v15 = v14 + v12, v16 = 1.0 - p2, v17 = v16 * v9, v18 = v15 * v17,
-                v19 = b[0] + v18, v20 = w[1] * v19, v21 = -v20;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
-                (void)N, (void)D, (void)N1, (void)D1; R[4 + i] += N * v21;
-            }
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const V v1 = d1 + (X1 - parameters[0]), v2 = d3 + (X3 - parameters[0]),
+        v3 = parameters[1] * (0.5 * (X2 + d2 - X0 - d0));
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q; (void)w; const double *restrict b = a + 0 + 1 * q;
+        V b0; softehl_load1(b + 0, (0 + 1 * points), &b0);
+        const double *restrict B = basis + 4 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[4 * i] * d_lanes[4 + i]; p1 += B[4 * i + 1] * d_lanes[4 + i];
+            p2 += B[4 * i + 2] * d_lanes[4 + i]; p3 += B[4 * i + 3] * d_lanes[4 + i];
         }
-        R[0] = 0.0; R[1] = 0.0; R[2] = 0.0; R[3] = 0.0;
+        (void)p0, (void)p1, (void)p2, (void)p3; const double v4 = 0.5 * w[0];
+        const V v5 = w[1] * (b0 + ((0.5 - v4) * v1 + (0.5 + v4) * v2) * ((1.0 - p2) * v3)),
+            v6 = -v5;
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
+            (void)N, (void)D, (void)N1, (void)D1; R_lanes[4 + i] += N * v6;
+        }
     }
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+#endif
 }
+SOFTEHL_BATCH(softehl_film_squeeze_residual, 4, (4 + modes), (0 + 1 * points), 0, (4 + modes), 0)
 
-SOFTEHL_KERNEL(softehl_film_squeeze_tangent)
+SOFTEHL_GROUP(softehl_film_squeeze_tangent)
 {
-    (void)direction;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict a = data + (0 + 1 * points) * e;
-        double *restrict R = values + (4 + modes) * e;
-        double *restrict K = tangent + (4 + modes) * (4 + modes) * e; (void)X; (void)d; (void)a;
-        for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        for (ptrdiff_t i = 0; i < (4 + modes) * (4 + modes); ++i) K[i] = 0.0;
-        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = d[1] + v1,
-            v4 = d[3] + v2, v5 = X[2] + d[2], v6 = v5 - X[0], v7 = v6 - d[0], v8 = 0.5 * v7,
-            v9 = parameters[1] * v8, v10 = 0.5 * parameters[1];
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q; (void)w;
-            const double *restrict b = a + 0 + 1 * q; (void)b;
-            const double *restrict B = basis + 4 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[4 + i]; p1 += B[4 * i + 1] * d[4 + i];
-                p2 += B[4 * i + 2] * d[4 + i]; p3 += B[4 * i + 3] * d[4 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v11 = 0.5 * w[0], v12 = 0.5 + v11, v13 = v12 * v4, v14 = 0.5 - v11,
-                v15 = v14 * v3, v16 = v15 + v13, v17 = v16 * v8, v18 = 1.0 - p2,
-                v19 = parameters[1] * v18, v20 = v19 * v17, v21 = b[0] + v20, v22 = w[1] * v21,
-                v23 = -v22, v24 = v18 * v10, v25 = w[1] * v24, v26 = v16 * v25, v27 = v14 * w[1],
-                v28 = v18 * v9, v29 = v28 * v27, v30 = -v29, v31 = -v26, v32 = v12 * w[1],
-                v33 = v28 * v32, v34 = -v33, v35 = parameters[1] * w[1], v36 = v35 * v17;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
-                (void)N, (void)D, (void)N1, (void)D1; R[4 + i] += N * v23;
-                K[(4 + i) * (4 + modes) + 0] += N * v26; K[(4 + i) * (4 + modes) + 1] += N * v30;
-                K[(4 + i) * (4 + modes) + 2] += N * v31; K[(4 + i) * (4 + modes) + 3] += N * v34;
-                const double r0 = 0.0, r1 = 0.0, r2 = N * v36, r3 = 0.0;
-                for (ptrdiff_t j = 0; j < modes; ++j)
-                    K[(4 + i) * (4 + modes) + 4 + j] += r0 * B[4 * j] + r1 * B[4 * j + 1] + r2 * B[4 * j + 2] + r3 * B[4 * j + 3];
-            }
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+#if SOFTEHL_LANES > 1
+    V K_lanes[((4 + modes) * (4 + modes))];
+#else
+    V *const K_lanes = K;
+#endif
+    for (ptrdiff_t i = 0; i < ((4 + modes) * (4 + modes)); ++i)
+        K_lanes[i] = softehl_splat(0.0);
+    const V v1 = d1 + (X1 - parameters[0]), v2 = d3 + (X3 - parameters[0]);
+    const double v3 = 0.5 * parameters[1];
+    const V v4 = 0.5 * (X2 + d2 - X0 - d0), v5 = parameters[1] * v4;
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q; (void)w; const double *restrict b = a + 0 + 1 * q;
+        V b0; softehl_load1(b + 0, (0 + 1 * points), &b0);
+        const double *restrict B = basis + 4 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[4 * i] * d_lanes[4 + i]; p1 += B[4 * i + 1] * d_lanes[4 + i];
+            p2 += B[4 * i + 2] * d_lanes[4 + i]; p3 += B[4 * i + 3] * d_lanes[4 + i];
         }
-        R[0] = 0.0; R[1] = 0.0; R[2] = 0.0; R[3] = 0.0; K[0 * (4 + modes) + 0] = 0.0;
-        K[0 * (4 + modes) + 1] = 0.0; K[0 * (4 + modes) + 2] = 0.0; K[0 * (4 + modes) + 3] = 0.0;
-        K[1 * (4 + modes) + 0] = 0.0; K[1 * (4 + modes) + 1] = 0.0; K[1 * (4 + modes) + 2] = 0.0;
-        K[1 * (4 + modes) + 3] = 0.0; K[2 * (4 + modes) + 0] = 0.0; K[2 * (4 + modes) + 1] = 0.0;
-        K[2 * (4 + modes) + 2] = 0.0; K[2 * (4 + modes) + 3] = 0.0; K[3 * (4 + modes) + 0] = 0.0;
-        K[3 * (4 + modes) + 1] = 0.0; K[3 * (4 + modes) + 2] = 0.0; K[3 * (4 + modes) + 3] = 0.0;
+        (void)p0, (void)p1, (void)p2, (void)p3; const double v6 = 0.5 * w[0]; const V v7 = 1.0 - p2;
+        const double v8 = 0.5 - v6, v9 = 0.5 + v6;
+        const V v10 = v7 * v5, v11 = v8 * v1 + v9 * v2, v12 = v11 * v4,
+            v13 = v11 * (w[1] * (v7 * v3)), v14 = parameters[1] * w[1] * v12,
+            v15 = -(v10 * (v8 * w[1])), v16 = -(v10 * (v9 * w[1])), v17 = -v13,
+            v18 = -(w[1] * (b0 + parameters[1] * v7 * v12));
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
+            (void)N, (void)D, (void)N1, (void)D1; R_lanes[4 + i] += N * v18;
+            K_lanes[(4 + i) * (4 + modes) + 0] += N * v13;
+            K_lanes[(4 + i) * (4 + modes) + 1] += N * v15;
+            K_lanes[(4 + i) * (4 + modes) + 2] += N * v17;
+            K_lanes[(4 + i) * (4 + modes) + 3] += N * v16;
+            const V r0 = softehl_splat(0.0), r1 = softehl_splat(0.0), r2 = N * v14,
+                r3 = softehl_splat(0.0);
+            for (ptrdiff_t j = 0; j < modes; ++j)
+                K_lanes[(4 + i) * (4 + modes) + 4 + j] += r0 * B[4 * j] + r1 * B[4 * j + 1] + r2 * B[4 * j + 2] + r3 * B[4 * j + 3];
+        }
     }
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+    softehl_scatter(K, K_lanes, ((4 + modes) * (4 + modes)));
+#endif
 }
+SOFTEHL_BATCH(softehl_film_squeeze_tangent, 4, (4 + modes), (0 + 1 * points), 0, (4 + modes), ((4 + modes) * (4 + modes)))
 
-SOFTEHL_KERNEL(softehl_film_squeeze_fields)
+SOFTEHL_GROUP(softehl_film_squeeze_fields)
 {
-    (void)direction;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict a = data + (0 + 1 * points) * e; (void)X; (void)d; (void)a;
-        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = d[1] + v1,
-            v4 = d[3] + v2, v5 = X[2] + d[2], v6 = v5 - X[0], v7 = v6 - d[0], v8 = 0.5 * v7;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q; (void)w;
-            const double *restrict b = a + 0 + 1 * q; (void)b;
-            const double *restrict B = basis + 4 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[4 + i]; p1 += B[4 * i + 1] * d[4 + i];
-                p2 += B[4 * i + 2] * d[4 + i]; p3 += B[4 * i + 3] * d[4 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v9 = 0.5 * w[0], v10 = 0.5 + v9, v11 = v10 * v4, v12 = 0.5 - v9,
-                v13 = v12 * v3, v14 = v13 + v11, v15 = 1.0 - p2, v16 = v15 * v8, v17 = v14 * v16,
-                v18 = w[1] * v8;
-            double *restrict out = values + 4 * (points * e + q); out[0] = v17; out[1] = v18;
-            out[2] = p2; out[3] = v14;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+    const V v1 = d1 + (X1 - parameters[0]), v2 = d3 + (X3 - parameters[0]),
+        v3 = 0.5 * (X2 + d2 - X0 - d0);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q; (void)w; const double *restrict b = a + 0 + 1 * q;
+        V b0; softehl_load1(b + 0, (0 + 1 * points), &b0); (void)b0;
+        const double *restrict B = basis + 4 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[4 * i] * d_lanes[4 + i]; p1 += B[4 * i + 1] * d_lanes[4 + i];
+            p2 += B[4 * i + 2] * d_lanes[4 + i]; p3 += B[4 * i + 3] * d_lanes[4 + i];
         }
+        (void)p0, (void)p1, (void)p2, (void)p3; const double v4 = 0.5 * w[0];
+        const V v5 = w[1] * v3, v6 = (0.5 - v4) * v1 + (0.5 + v4) * v2, v7 = v6 * ((1.0 - p2) * v3);
+        softehl_store4(R + 4 * q + 0, (4 * points), v7, v5, p2, v6);
     }
 }
+SOFTEHL_BATCH(softehl_film_squeeze_fields, 4, (4 + modes), (0 + 1 * points), 0, (4 * points), 0)

@@ -20,43 +20,55 @@
 
 SOFTEHL_LANEWISE(erfc)
 
-SOFTEHL_KERNEL(softehl_film_squeeze_rough_residual)
+SOFTEHL_GROUP(softehl_film_squeeze_rough_residual)
 {
-    (void)direction;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict a = data + (0 + 1 * points) * e;
-        double *restrict R = values + (4 + modes) * e; (void)X; (void)d; (void)a;
-        for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = 1.0 / parameters[2],
-            v4 = d[1] + v1, v5 = d[3] + v2, v6 = X[2] + d[2], v7 = v6 - X[0], v8 = v7 - d[0],
-            v9 = 0.5 * v8, v10 = parameters[1] * v9, v11 = parameters[2] * v10;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q; (void)w;
-            const double *restrict b = a + 0 + 1 * q; (void)b;
-            const double *restrict B = basis + 4 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[4 + i]; p1 += B[4 * i + 1] * d[4 + i];
-                p2 += B[4 * i + 2] * d[4 + i]; p3 += B[4 * i + 3] * d[4 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v12 = 0.5 * w[0], v13 = 0.5 + v12, v14 = v13 * v5, v15 = 0.5 - v12,
-                v16 = v15 * v4, v17 = v16 + v14, v18 = v3 * v17, v19 = 0.5 * v18, v20 = v18 * v19,
-                v21 = -v20, v22 = exp(v21), v23 = 0.3989422804014327 * v22,
-                v24 = 0.7071067811865476 * v18, v25 = erfc(v24), v26 = 0.5 * v25, v27 = 1.0 - v26,
-                v28 = v18 * v27, v29 = v28 + v23, v30 = 1.0 - p2, v31 = v30 * v11, v32 = v31 * v29,
-                v33 = b[0] + v32, v34 = w[1] * v33, v35 = -v34;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
-                (void)N, (void)D, (void)N1, (void)D1; R[4 + i] += N * v35;
-            }
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const double v1 = 1.0 / parameters[2];
+    const V v2 = d1 + (X1 - parameters[0]), v3 = d3 + (X3 - parameters[0]),
+        v4 = parameters[2] * (parameters[1] * (0.5 * (X2 + d2 - X0 - d0)));
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q; (void)w; const double *restrict b = a + 0 + 1 * q;
+        V b0; softehl_load1(b + 0, (0 + 1 * points), &b0);
+        const double *restrict B = basis + 4 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[4 * i] * d_lanes[4 + i]; p1 += B[4 * i + 1] * d_lanes[4 + i];
+            p2 += B[4 * i + 2] * d_lanes[4 + i]; p3 += B[4 * i + 3] * d_lanes[4 + i];
         }
-        R[0] = 0.0; R[1] = 0.0; R[2] = 0.0; R[3] = 0.0;
+        (void)p0, (void)p1, (void)p2, (void)p3; const double v5 = 0.5 * w[0];
+        const V v6 = v1 * ((0.5 - v5) * v2 + (0.5 + v5) * v3),
+            v7 = softehl_vexp(-(v6 * (0.5 * v6))), v8 = softehl_verfc(0.7071067811865476 * v6),
+            v9 = (1.0 - p2) * v4 * (v6 * (1.0 - 0.5 * v8) + 0.3989422804014327 * v7),
+            v10 = -(w[1] * (b0 + v9));
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            const double N = B[4 * i], D = B[4 * i + 1], N1 = B[4 * i + 2], D1 = B[4 * i + 3];
+            (void)N, (void)D, (void)N1, (void)D1; R_lanes[4 + i] += N * v10;
+        }
     }
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+#endif
 }
+SOFTEHL_BATCH(softehl_film_squeeze_rough_residual, 4, (4 + modes), (0 + 1 * points), 0, (4 + modes), 0)
 
 SOFTEHL_GROUP(softehl_film_squeeze_rough_tangent)
 {
@@ -130,35 +142,39 @@ SOFTEHL_GROUP(softehl_film_squeeze_rough_tangent)
 }
 SOFTEHL_BATCH(softehl_film_squeeze_rough_tangent, 4, (4 + modes), (0 + 1 * points), 0, (4 + modes), ((4 + modes) * (4 + modes)))
 
-SOFTEHL_KERNEL(softehl_film_squeeze_rough_fields)
+SOFTEHL_GROUP(softehl_film_squeeze_rough_fields)
 {
-    (void)direction;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        const double *restrict a = data + (0 + 1 * points) * e; (void)X; (void)d; (void)a;
-        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = 1.0 / parameters[2],
-            v4 = d[1] + v1, v5 = d[3] + v2, v6 = X[2] + d[2], v7 = v6 - X[0], v8 = v7 - d[0],
-            v9 = 0.5 * v8;
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q; (void)w;
-            const double *restrict b = a + 0 + 1 * q; (void)b;
-            const double *restrict B = basis + 4 * modes * q;
-            double p0 = 0.0, p1 = 0.0, p2 = 0.0, p3 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[4 * i] * d[4 + i]; p1 += B[4 * i + 1] * d[4 + i];
-                p2 += B[4 * i + 2] * d[4 + i]; p3 += B[4 * i + 3] * d[4 + i];
-            }
-            (void)p0, (void)p1, (void)p2, (void)p3;
-            const double v10 = 0.5 * w[0], v11 = 0.5 + v10, v12 = v11 * v5, v13 = 0.5 - v10,
-                v14 = v13 * v4, v15 = v14 + v12, v16 = v3 * v15, v17 = 0.5 * v16, v18 = v16 * v17,
-                v19 = -v18, v20 = exp(v19), v21 = 0.3989422804014327 * v20,
-                v22 = 0.7071067811865476 * v16, v23 = erfc(v22), v24 = 0.5 * v23, v25 = 1.0 - v24,
-                v26 = v16 * v25, v27 = v26 + v21, v28 = parameters[2] * v27, v29 = 1.0 - p2,
-                v30 = v29 * v9, v31 = v28 * v30, v32 = w[1] * v9;
-            double *restrict out = values + 4 * (points * e + q); out[0] = v31; out[1] = v32;
-            out[2] = p2; out[3] = v28;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+    const double v1 = 1.0 / parameters[2];
+    const V v2 = d1 + (X1 - parameters[0]), v3 = d3 + (X3 - parameters[0]),
+        v4 = 0.5 * (X2 + d2 - X0 - d0);
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q; (void)w; const double *restrict b = a + 0 + 1 * q;
+        V b0; softehl_load1(b + 0, (0 + 1 * points), &b0); (void)b0;
+        const double *restrict B = basis + 4 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0), p2 = softehl_splat(0.0), p3 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[4 * i] * d_lanes[4 + i]; p1 += B[4 * i + 1] * d_lanes[4 + i];
+            p2 += B[4 * i + 2] * d_lanes[4 + i]; p3 += B[4 * i + 3] * d_lanes[4 + i];
         }
+        (void)p0, (void)p1, (void)p2, (void)p3; const double v5 = 0.5 * w[0];
+        const V v6 = w[1] * v4, v7 = v1 * ((0.5 - v5) * v2 + (0.5 + v5) * v3),
+            v8 = softehl_vexp(-(v7 * (0.5 * v7))), v9 = softehl_verfc(0.7071067811865476 * v7),
+            v10 = parameters[2] * (v7 * (1.0 - 0.5 * v9) + 0.3989422804014327 * v8),
+            v11 = v10 * ((1.0 - p2) * v4);
+        softehl_store4(R + 4 * q + 0, (4 * points), v11, v6, p2, v10);
     }
 }
+SOFTEHL_BATCH(softehl_film_squeeze_rough_fields, 4, (4 + modes), (0 + 1 * points), 0, (4 * points), 0)

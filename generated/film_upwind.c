@@ -16,49 +16,58 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_film_upwind_residual)
+SOFTEHL_GROUP(softehl_film_upwind_residual)
 {
-    (void)data;
-    (void)direction;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e;
-        const double *restrict d = dofs + (4 + modes) * e;
-        double *restrict R = values + (4 + modes) * e; (void)X; (void)d;
-        for (ptrdiff_t i = 0; i < (4 + modes); ++i) R[i] = 0.0;
-        const double v1 = X[1] - parameters[0], v2 = X[3] - parameters[0], v3 = 6.0 * parameters[1],
-            v4 = parameters[2] * v3, v5 = d[1] + v1, v6 = d[3] + v2, v7 = v6 - v5, v8 = 5.0 * v7,
-            v9 = parameters[4] * parameters[5], v10 = X[2] + d[2], v11 = v10 - X[0],
-            v12 = v11 - d[0], v13 = 0.5 * v12, v14 = v4 * v13, v15 = v13 * v14, v16 = v9 * v13,
-            v17 = v5 + v6, v18 = 0.5 * v17, v19 = 0.5 * v7, v20 = 1.0 / v18, v21 = v8 * v20,
-            v22 = parameters[1] * v21;
-        const int v23 = v22 <= 0.0; const double v24 = parameters[0] + v18; double v25;
-        if (v23) {
-            v25 = 1.0;
-        } else {
-            const double v26 = v21 * v21, v27 = 1.0 + v26, v28 = 1.0 / v27;
-            v25 = v28;
-        }
-        const double v29 = 3.141592653589793 * parameters[3], v30 = 3.141592653589793 * v16,
-            v31 = v18 * v29, v32 = v18 * v31, v33 = v18 * v32, v34 = 1.0 / v33, v35 = v15 * v34,
-            v36 = v35 * v35, v37 = 9.0 + v36, v38 = 1.0 / v37, v39 = v25 * v30, v40 = v36 * v39,
-            v41 = v38 * v40;
-        double s42 = {0};
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 2 * q; (void)w;
-            const double *restrict B = basis + 2 * modes * q; double p0 = 0.0, p1 = 0.0;
-            for (ptrdiff_t i = 0; i < modes; ++i) {
-                p0 += B[2 * i] * d[4 + i]; p1 += B[2 * i + 1] * d[4 + i];
-            }
-            (void)p0, (void)p1;
-            const double v43 = w[0] * v24, v44 = 0.5 * w[0], v45 = w[0] * v44,
-                v46 = (-0.16666666666666666) + v45, v47 = v46 * v19, v48 = v47 + v43,
-                v49 = p1 * v41, v50 = w[1] * v49, v51 = v48 * v50;
-            s42 += v51;
-        }
-        const double v52 = -s42; R[0] = 0.0; R[1] = v52; R[2] = 0.0; R[3] = s42;
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, (4 + modes), &d0, &d1, &d2, &d3);
+#if SOFTEHL_LANES > 1
+    V d_lanes[(4 + modes)];
+#else
+    const V *const d_lanes = d;
+#endif
+#if SOFTEHL_LANES > 1
+    softehl_gather(d_lanes, d, (4 + modes));
+#endif
+#if SOFTEHL_LANES > 1
+    V R_lanes[(4 + modes)];
+#else
+    V *const R_lanes = R;
+#endif
+    for (ptrdiff_t i = 0; i < (4 + modes); ++i)
+        R_lanes[i] = softehl_splat(0.0);
+    const V v1 = d1 + (X1 - parameters[0]), v2 = d3 + (X3 - parameters[0]),
+        v3 = 0.5 * (X2 + d2 - X0 - d0), v4 = v2 - v1, v5 = 0.5 * (v1 + v2), v6 = 0.5 * v4,
+        v7 = parameters[0] + v5, v8 = 5.0 * v4 * (1.0 / v5);
+    const M v9 = softehl_le(parameters[1] * v8, softehl_splat(0.0)); V v10 = softehl_splat(1.0);
+    const M m11 = ~v9;
+    if (softehl_any(m11)) {
+        const V v12 = 1.0 / (1.0 + v8 * v8); v10 = softehl_blend(m11, v12, v10);
     }
+    const V v13 = v3 * (parameters[2] * (6.0 * parameters[1]) * v3) * (1.0 / (v5 * (v5 * (v5 * (3.141592653589793 * parameters[3]))))),
+        v14 = v13 * v13,
+        v15 = v14 * (v10 * (3.141592653589793 * (parameters[4] * parameters[5] * v3))),
+        v16 = 1.0 / (9.0 + v14) * v15;
+    V s17 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 2 * q; (void)w;
+        const double *restrict B = basis + 2 * modes * q;
+        V p0 = softehl_splat(0.0), p1 = softehl_splat(0.0);
+        for (ptrdiff_t i = 0; i < modes; ++i) {
+            p0 += B[2 * i] * d_lanes[4 + i]; p1 += B[2 * i + 1] * d_lanes[4 + i];
+        }
+        (void)p0, (void)p1;
+        const V v18 = (((-0.16666666666666666) + w[0] * (0.5 * w[0])) * v6 + w[0] * v7) * (w[1] * (p1 * v16));
+        s17 += v18;
+    }
+    const V v19 = -s17; R_lanes[1] = v19; R_lanes[3] = s17;
+#if SOFTEHL_LANES > 1
+    softehl_scatter(R, R_lanes, (4 + modes));
+#endif
 }
+SOFTEHL_BATCH(softehl_film_upwind_residual, 4, (4 + modes), 0, 0, (4 + modes), 0)
 
 SOFTEHL_GROUP(softehl_film_upwind_tangent)
 {

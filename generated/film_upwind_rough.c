@@ -110,11 +110,10 @@ SOFTEHL_GROUP(softehl_film_upwind_rough_tangent)
         v6 = 0.5 * (X2 + d2 - X0 - d0), v7 = v5 - v4, v8 = 0.5 * (v4 + v5), v9 = 0.5 * v7,
         v10 = v1 * v8, v11 = parameters[1] + v8;
     const M v12 = softehl_le(softehl_splat(0.5), v10);
-    V v13 = softehl_splat(0.0), v14 = softehl_splat(0.0);
+    V v13 = v10, v14 = softehl_splat(0.0);
     const M m15 = v12;
     if (softehl_any(m15)) {
-        const double v16 = 0.5 * v1; v13 = softehl_blend(m15, v10, v13);
-        v14 = softehl_blend(m15, softehl_splat(v16), v14);
+        const double v16 = 0.5 * v1; v14 = softehl_blend(m15, softehl_splat(v16), v14);
     }
     const M m17 = ~v12;
     if (softehl_any(m17)) {

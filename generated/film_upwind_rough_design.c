@@ -50,11 +50,10 @@ SOFTEHL_GROUP(softehl_film_upwind_rough_pseudo_load)
         v15 = t1 - t5, v16 = t3 - t5, v17 = v1 * v12, v18 = parameters[1] + v12;
     const M v19 = softehl_le(softehl_splat(0.5), v17);
     const V v20 = 0.5 * (v15 + v16), v21 = 0.5 * (v16 - v15), v22 = t5 + v20;
-    V v23 = softehl_splat(0.0), v24 = softehl_splat(0.0);
+    V v23 = v17, v24 = softehl_splat(0.0);
     const M m25 = v19;
     if (softehl_any(m25)) {
-        const V v26 = v1 * v20 - v12 * v11; v23 = softehl_blend(m25, v17, v23);
-        v24 = softehl_blend(m25, v26, v24);
+        const V v26 = v1 * v20 - v12 * v11; v24 = softehl_blend(m25, v26, v24);
     }
     const M m27 = ~v19;
     if (softehl_any(m27)) {

@@ -10,62 +10,54 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_film_void_residual)
+SOFTEHL_GROUP(softehl_film_void_residual)
 {
-    (void)points;
-    (void)modes;
-    (void)coordinates;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict d = dofs + 2 * e; double *restrict R = values + 2 * e; (void)d;
-        const double v1 = 1.0 / parameters[1], v2 = d[0] - parameters[0], v3 = v2 * v1,
-            v4 = v3 * v3, v5 = 1.0 / parameters[2], v6 = d[1] * v5, v7 = v6 * v6, v8 = 1e-30 + v7,
-            v9 = v8 + v4, v10 = sqrt(v9), v11 = v3 + v6;
-        const int v12 = 0.0 < v11; double v13;
-        if (v12) {
-            const double v14 = v11 + v10, v15 = 1.0 / v14, v16 = 2.0 * v6, v17 = v3 * v16,
-                v18 = v17 * v15;
-            v13 = v18;
-        } else {
-            const double v19 = v11 - v10; v13 = v19;
-        }
-        R[0] = 0.0; R[1] = v13;
+    SOFTEHL_IDLE;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = (d0 - parameters[0]) * (1.0 / parameters[1]), v2 = d1 * (1.0 / parameters[2]),
+        v3 = v1 + v2;
+    const M v4 = softehl_lt(softehl_splat(0.0), v3);
+    const V v5 = softehl_vsqrt(v2 * v2 + (1e-30 + v1 * v1)); V v6 = softehl_splat(0.0);
+    const M m7 = v4;
+    if (softehl_any(m7)) {
+        const V v8 = v1 * (2.0 * v2) * (1.0 / (v3 + v5)); v6 = softehl_blend(m7, v8, v6);
     }
+    const M m9 = ~v4;
+    if (softehl_any(m9)) {
+        const V v10 = v3 - v5; v6 = softehl_blend(m9, v10, v6);
+    }
+    softehl_store2(R + 0, 2, softehl_splat(0.0), v6);
 }
+SOFTEHL_BATCH(softehl_film_void_residual, 0, 2, 0, 0, 2, 0)
 
-SOFTEHL_KERNEL(softehl_film_void_tangent)
+SOFTEHL_GROUP(softehl_film_void_tangent)
 {
-    (void)points;
-    (void)modes;
-    (void)coordinates;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict d = dofs + 2 * e; double *restrict R = values + 2 * e;
-        double *restrict K = tangent + 2 * 2 * e; (void)d;
-        const double v1 = 1.0 / parameters[1], v2 = d[0] - parameters[0], v3 = v2 * v1,
-            v4 = v3 * v3, v5 = 1.0 / parameters[2], v6 = d[1] * v5, v7 = v6 * v6, v8 = 1e-30 + v7,
-            v9 = v8 + v4, v10 = sqrt(v9), v11 = v3 + v6, v12 = 2.0 * v3;
-        const int v13 = 0.0 < v11;
-        const double v14 = v1 * v12, v15 = 1.0 / v9, v16 = sqrt(v15), v17 = 0.5 * v16,
-            v18 = v14 * v17, v19 = 2.0 * v5, v20 = v6 * v19, v21 = v20 * v17;
-        double v22, v23, v24;
-        if (v13) {
-            const double v25 = v11 + v10, v26 = 1.0 / v25, v27 = v6 * v12, v28 = v27 * v26,
-                v29 = v26 * v26, v30 = v27 * v29, v31 = v1 + v18, v32 = v31 * v30, v33 = 2.0 * v1,
-                v34 = v6 * v33, v35 = v26 * v34, v36 = v35 - v32, v37 = v5 + v21, v38 = v37 * v30,
-                v39 = v5 * v12, v40 = v26 * v39, v41 = v40 - v38;
-            v22 = v28; v23 = v36; v24 = v41;
-        } else {
-            const double v42 = v11 - v10, v43 = v1 - v18, v44 = v5 - v21;
-            v22 = v42; v23 = v43; v24 = v44;
-        }
-        R[0] = 0.0; R[1] = v22; K[0] = 0.0; K[1] = 0.0; K[2] = v23; K[3] = v24;
+    SOFTEHL_IDLE;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const double v1 = 1.0 / parameters[1], v2 = 1.0 / parameters[2];
+    const V v3 = (d0 - parameters[0]) * v1, v4 = d1 * v2, v5 = 2.0 * v3, v6 = v3 + v4,
+        v7 = v4 * v4 + (1e-30 + v3 * v3);
+    const M v8 = softehl_lt(softehl_splat(0.0), v6);
+    const V v9 = softehl_vsqrt(v7), v10 = softehl_vsqrt(1.0 / v7), v11 = 0.5 * v10,
+        v12 = v1 * v5 * v11, v13 = v4 * (2.0 * v2) * v11;
+    V v14 = softehl_splat(0.0), v15 = softehl_splat(0.0), v16 = softehl_splat(0.0);
+    const M m17 = v8;
+    if (softehl_any(m17)) {
+        const V v18 = v4 * v5, v19 = 1.0 / (v6 + v9), v20 = v18 * v19, v21 = v18 * (v19 * v19),
+            v22 = v19 * (v4 * (2.0 * v1)) - (v1 + v12) * v21,
+            v23 = v19 * (v2 * v5) - (v2 + v13) * v21;
+        v14 = softehl_blend(m17, v20, v14); v15 = softehl_blend(m17, v22, v15);
+        v16 = softehl_blend(m17, v23, v16);
     }
+    const M m24 = ~v8;
+    if (softehl_any(m24)) {
+        const V v25 = v6 - v9, v26 = v1 - v12, v27 = v2 - v13;
+        v14 = softehl_blend(m24, v25, v14); v15 = softehl_blend(m24, v26, v15);
+        v16 = softehl_blend(m24, v27, v16);
+    }
+    softehl_store2(R + 0, 2, softehl_splat(0.0), v14);
+    softehl_store4(K + 0, 4, softehl_splat(0.0), softehl_splat(0.0), v15, v16);
 }
+SOFTEHL_BATCH(softehl_film_void_tangent, 0, 2, 0, 0, 2, (2 * 2))

@@ -10,36 +10,33 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_film_void_pseudo_load)
+SOFTEHL_GROUP(softehl_film_void_pseudo_load)
 {
-    (void)modes;
-    (void)coordinates;
-    (void)data;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict d = dofs + 2 * e; const double *restrict t = direction + 3 * e;
-        double *restrict R = values + 2 * e; (void)d; (void)t;
-        const double v1 = d[0] - parameters[0], v2 = 1.0 / parameters[1], v3 = v1 * v2,
-            v4 = 1.0 / parameters[2], v5 = d[1] * v4, v6 = v3 + v5;
-        const int v7 = 0.0 < v6;
-        const double v8 = 2.0 * v3, v9 = v5 * v5, v10 = 2.0 * v5, v11 = 1e-30 + v9, v12 = v3 * v3,
-            v13 = v11 + v12, v14 = 1.0 / v13, v15 = sqrt(v14), v16 = 0.5 * v15, v17 = v4 * v5,
-            v18 = t[2] * v17, v19 = v10 * v18, v20 = v3 * t[1], v21 = t[0] + v20, v22 = v2 * v21,
-            v23 = v18 + v22, v24 = v8 * v22, v25 = v19 + v24, v26 = v16 * v25;
-        double v27;
-        if (v7) {
-            const double v28 = sqrt(v13), v29 = v6 + v28, v30 = 1.0 / v29, v31 = v10 * v22,
-                v32 = v23 + v26, v33 = v5 * v30, v34 = v32 * v33, v35 = v34 - v18, v36 = v8 * v35,
-                v37 = v36 - v31, v38 = v30 * v37;
-            v27 = v38;
-        } else {
-            const double v39 = v26 - v23; v27 = v39;
-        }
-        double s40 = {0};
-        for (ptrdiff_t q = 0; q < points; ++q) {
-            const double *restrict w = rule + 1 * q; (void)w; s40 += w[0];
-        }
-        const double v41 = s40 * v27; R[0] = 0.0; R[1] = v41;
+    SOFTEHL_IDLE;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    V t0, t1, t2;
+    softehl_load3(t + 0, 3, &t0, &t1, &t2);
+    const double v1 = 1.0 / parameters[1], v2 = 1.0 / parameters[2];
+    const V v3 = (d0 - parameters[0]) * v1, v4 = d1 * v2, v5 = t2 * (v2 * v4),
+        v6 = v1 * (t0 + v3 * t1), v7 = 2.0 * v3, v8 = v5 + v6, v9 = 1e-30 + v4 * v4 + v3 * v3,
+        v10 = softehl_vsqrt(1.0 / v9), v11 = v3 + v4;
+    const M v12 = softehl_lt(softehl_splat(0.0), v11);
+    const V v13 = 2.0 * v4, v14 = 0.5 * v10 * (v13 * v5 + v7 * v6);
+    V v15 = softehl_splat(0.0); const M m16 = v12;
+    if (softehl_any(m16)) {
+        const V v17 = softehl_vsqrt(v9), v18 = 1.0 / (v11 + v17),
+            v19 = v18 * (v7 * ((v8 + v14) * (v4 * v18) - v5) - v13 * v6);
+        v15 = softehl_blend(m16, v19, v15);
     }
+    const M m20 = ~v12;
+    if (softehl_any(m20)) {
+        const V v21 = v14 - v8; v15 = softehl_blend(m20, v21, v15);
+    }
+    double s22 = {0};
+    for (ptrdiff_t q = 0; q < points; ++q) {
+        const double *restrict w = rule + 1 * q; (void)w; s22 += w[0];
+    }
+    softehl_store2(R + 0, 2, softehl_splat(0.0), s22 * v15);
 }
+SOFTEHL_BATCH(softehl_film_void_pseudo_load, 0, 2, 0, 3, 2, 0)

@@ -10,64 +10,44 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_follower_pressure_residual)
+SOFTEHL_GROUP(softehl_follower_pressure_residual)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e; const double *restrict d = dofs + 4 * e;
-        double *restrict R = values + 4 * e; (void)X; (void)d;
-        const double v1 = X[1] + d[1], v2 = 0.2113248654051871 * v1, v3 = X[3] + d[3],
-            v4 = 0.7886751345948129 * v3, v5 = v4 + v2, v6 = 6.283185307179586 * parameters[0],
-            v7 = v6 * v5, v8 = v3 - X[1], v9 = v8 - d[1], v10 = 0.5 * v9, v11 = v10 * v7,
-            v12 = 0.2113248654051871 * v11, v13 = 0.7886751345948129 * v1,
-            v14 = 0.2113248654051871 * v3, v15 = v14 + v13, v16 = v6 * v15, v17 = v10 * v16,
-            v18 = 0.7886751345948129 * v17, v19 = v18 + v12, v20 = X[2] + d[2], v21 = v20 - X[0],
-            v22 = v21 - d[0], v23 = 0.5 * v22, v24 = v23 * v7, v25 = 0.2113248654051871 * v24,
-            v26 = v23 * v16, v27 = 0.7886751345948129 * v26, v28 = v27 + v25, v29 = -v28,
-            v30 = 0.7886751345948129 * v11, v31 = 0.2113248654051871 * v17, v32 = v31 + v30,
-            v33 = 0.7886751345948129 * v24, v34 = 0.2113248654051871 * v26, v35 = v34 + v33,
-            v36 = -v35;
-        R[0] = v19; R[1] = v29; R[2] = v32; R[3] = v36;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, 4, &d0, &d1, &d2, &d3);
+    const double v1 = 6.283185307179586 * parameters[0];
+    const V v2 = X3 + d3, v3 = X1 + d1, v4 = 0.5 * (v2 - X1 - d1), v5 = 0.5 * (X2 + d2 - X0 - d0),
+        v6 = v1 * (0.2113248654051871 * v2 + 0.7886751345948129 * v3),
+        v7 = v1 * (0.7886751345948129 * v2 + 0.2113248654051871 * v3), v8 = v4 * v6, v9 = v5 * v6,
+        v10 = v4 * v7, v11 = v5 * v7;
+    softehl_store4(R + 0, 4, 0.7886751345948129 * v8 + 0.2113248654051871 * v10, -(0.7886751345948129 * v9 + 0.2113248654051871 * v11), 0.2113248654051871 * v8 + 0.7886751345948129 * v10, -(0.2113248654051871 * v9 + 0.7886751345948129 * v11));
 }
+SOFTEHL_BATCH(softehl_follower_pressure_residual, 4, 4, 0, 0, 4, 0)
 
-SOFTEHL_KERNEL(softehl_follower_pressure_tangent)
+SOFTEHL_GROUP(softehl_follower_pressure_tangent)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 4 * e; const double *restrict d = dofs + 4 * e;
-        double *restrict R = values + 4 * e; double *restrict K = tangent + 4 * 4 * e;
-        (void)X; (void)d;
-        const double v1 = X[1] + d[1], v2 = 0.2113248654051871 * v1, v3 = X[3] + d[3],
-            v4 = 0.7886751345948129 * v3, v5 = v4 + v2, v6 = 6.283185307179586 * parameters[0],
-            v7 = v6 * v5, v8 = v3 - X[1], v9 = v8 - d[1], v10 = 0.5 * v9, v11 = v10 * v7,
-            v12 = 0.2113248654051871 * v11, v13 = 0.7886751345948129 * v1,
-            v14 = 0.2113248654051871 * v3, v15 = v14 + v13, v16 = v6 * v15, v17 = v10 * v16,
-            v18 = 0.7886751345948129 * v17, v19 = v18 + v12, v20 = X[2] + d[2], v21 = v20 - X[0],
-            v22 = v21 - d[0], v23 = 0.5 * v22, v24 = v23 * v7, v25 = 0.2113248654051871 * v24,
-            v26 = v23 * v16, v27 = 0.7886751345948129 * v26, v28 = v27 + v25, v29 = -v28,
-            v30 = 0.7886751345948129 * v11, v31 = 0.2113248654051871 * v17, v32 = v31 + v30,
-            v33 = 0.7886751345948129 * v24, v34 = 0.2113248654051871 * v26, v35 = v34 + v33,
-            v36 = -v35, v37 = 0.10566243270259355 * v7, v38 = 0.39433756729740643 * v16,
-            v39 = v38 + v37, v40 = 4.1887902047863905 * parameters[0], v41 = v10 * v40,
-            v42 = v41 - v39, v43 = 0.39433756729740643 * v7, v44 = 0.10566243270259355 * v16,
-            v45 = v44 + v43, v46 = 1.3277932893555753 * parameters[0], v47 = v23 * v46,
-            v48 = 0.2113248654051871 * v47, v49 = 4.9553920178240105 * parameters[0],
-            v50 = 0.39433756729740643 * v22, v51 = v50 * v49, v52 = v51 + v48, v53 = -v52,
-            v54 = -v39, v55 = 1.5773502691896257 * v47, v56 = -v55, v57 = v45 + v41, v58 = -v45;
-        R[0] = v19; R[1] = v29; R[2] = v32; R[3] = v36; K[0] = 0.0; K[1] = v42; K[2] = 0.0;
-        K[3] = v45; K[4] = v39; K[5] = v53; K[6] = v54; K[7] = v56; K[8] = 0.0; K[9] = v54;
-        K[10] = 0.0; K[11] = v57; K[12] = v45; K[13] = v56; K[14] = v58; K[15] = v53;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1, X2, X3;
+    softehl_load4(X + 0, 4, &X0, &X1, &X2, &X3);
+    V d0, d1, d2, d3;
+    softehl_load4(d + 0, 4, &d0, &d1, &d2, &d3);
+    const double v1 = 6.283185307179586 * parameters[0];
+    const V v2 = X3 + d3, v3 = X1 + d1, v4 = 0.5 * (v2 - X1 - d1), v5 = X2 + d2 - X0 - d0,
+        v6 = v1 * (0.2113248654051871 * v2 + 0.7886751345948129 * v3),
+        v7 = v1 * (0.7886751345948129 * v2 + 0.2113248654051871 * v3), v8 = 0.5 * v5,
+        v9 = v4 * (4.1887902047863905 * parameters[0]),
+        v10 = v8 * (1.3277932893555753 * parameters[0]), v11 = v4 * v6, v12 = v4 * v7,
+        v13 = v8 * v6, v14 = v8 * v7,
+        v15 = 0.39433756729740643 * v5 * (4.9553920178240105 * parameters[0]) + 0.2113248654051871 * v10,
+        v16 = 0.39433756729740643 * v6 + 0.10566243270259355 * v7,
+        v17 = 0.10566243270259355 * v6 + 0.39433756729740643 * v7;
+    softehl_store4(K + 0, 16, softehl_splat(0.0), v9 - v16, softehl_splat(0.0), v17);
+    const V v18 = -v16;
+    softehl_store4(K + 8, 16, softehl_splat(0.0), v18, softehl_splat(0.0), v17 + v9);
+    const V v19 = -v15, v20 = -(1.5773502691896257 * v10);
+    softehl_store4(K + 4, 16, v16, v19, v18, v20); softehl_store4(K + 12, 16, v17, v20, -v17, v19);
+    softehl_store4(R + 0, 4, 0.7886751345948129 * v11 + 0.2113248654051871 * v12, -(0.7886751345948129 * v13 + 0.2113248654051871 * v14), 0.2113248654051871 * v11 + 0.7886751345948129 * v12, -(0.2113248654051871 * v13 + 0.7886751345948129 * v14));
 }
+SOFTEHL_BATCH(softehl_follower_pressure_tangent, 4, 4, 0, 0, 4, (4 * 4))

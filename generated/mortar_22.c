@@ -225,14 +225,18 @@ SOFTEHL_GROUP(softehl_mortar_22_tangent)
             v117 = softehl_splat(0.0);
         const M m118 = v110 & m109;
         if (softehl_any(m118)) {
-            V v119 = softehl_splat(0.0), v120 = softehl_splat(0.0), v121 = softehl_splat(0.0),
-                v122 = softehl_splat(0.0), v123 = softehl_splat(0.0), v124 = softehl_splat(0.0);
-            const M m125 = ~v56 & m118;
+            V v119 = v74, v120 = v75, v121 = softehl_splat(0.0), v122 = softehl_splat(0.0),
+                v123 = softehl_splat(0.0), v124 = softehl_splat(0.0);
+            const M m125 = v56 & m118;
             if (softehl_any(m125)) {
-                const V v126 = -v77, v127 = -v79, v128 = v66 - v81, v129 = v68 - v83;
-                v119 = softehl_blend(m125, v74, v119); v120 = softehl_blend(m125, v75, v120);
-                v121 = softehl_blend(m125, v126, v121); v122 = softehl_blend(m125, v127, v122);
-                v123 = softehl_blend(m125, v128, v123); v124 = softehl_blend(m125, v129, v124);
+                v119 = softehl_blend(m125, softehl_splat(0.0), v119);
+                v120 = softehl_blend(m125, softehl_splat(0.0), v120);
+            }
+            const M m126 = ~v56 & m118;
+            if (softehl_any(m126)) {
+                const V v127 = -v77, v128 = -v79, v129 = v66 - v81, v130 = v68 - v83;
+                v121 = softehl_blend(m126, v127, v121); v122 = softehl_blend(m126, v128, v122);
+                v123 = softehl_blend(m126, v129, v123); v124 = softehl_blend(m126, v130, v124);
             }
             v111 = softehl_blend(m118, v57, v111); v112 = softehl_blend(m118, v119, v112);
             v113 = softehl_blend(m118, v120, v113); v114 = softehl_blend(m118, v121, v114);
@@ -244,635 +248,587 @@ SOFTEHL_GROUP(softehl_mortar_22_tangent)
         v106 = softehl_blend(m109, v117, v106); v107 = softehl_blend(m109, v112, v107);
         v108 = softehl_blend(m109, v113, v108);
     }
-    const M m130 = ~v58;
-    if (softehl_any(m130)) {
-        const V v131 = (-1.0) - v57, v132 = v131 * (v131 * v131);
-        V v133 = softehl_splat(0.0), v134 = softehl_splat(0.0), v135 = softehl_splat(0.0),
-            v136 = softehl_splat(0.0), v137 = softehl_splat(0.0), v138 = softehl_splat(0.0);
-        const M m139 = ~v56 & m130;
-        if (softehl_any(m139)) {
-            const V v140 = (-1.0) - v55, v141 = v140 * (3.0 * v140), v142 = (v81 - v66) * v141,
-                v143 = (v83 - v68) * v141, v144 = v77 * v141, v145 = v79 * v141,
-                v146 = -(v74 * v141), v147 = -(v75 * v141);
-            v133 = softehl_blend(m139, v144, v133); v134 = softehl_blend(m139, v145, v134);
-            v135 = softehl_blend(m139, v142, v135); v136 = softehl_blend(m139, v143, v136);
-            v137 = softehl_blend(m139, v146, v137); v138 = softehl_blend(m139, v147, v138);
+    const M m131 = ~v58;
+    if (softehl_any(m131)) {
+        const V v132 = (-1.0) - v57, v133 = v132 * (v132 * v132);
+        V v134 = softehl_splat(0.0), v135 = softehl_splat(0.0), v136 = softehl_splat(0.0),
+            v137 = softehl_splat(0.0), v138 = softehl_splat(0.0), v139 = softehl_splat(0.0);
+        const M m140 = ~v56 & m131;
+        if (softehl_any(m140)) {
+            const V v141 = (-1.0) - v55, v142 = v141 * (3.0 * v141), v143 = (v81 - v66) * v142,
+                v144 = (v83 - v68) * v142, v145 = v77 * v142, v146 = v79 * v142,
+                v147 = -(v74 * v142), v148 = -(v75 * v142);
+            v134 = softehl_blend(m140, v145, v134); v135 = softehl_blend(m140, v146, v135);
+            v136 = softehl_blend(m140, v143, v136); v137 = softehl_blend(m140, v144, v137);
+            v138 = softehl_blend(m140, v147, v138); v139 = softehl_blend(m140, v148, v139);
         }
-        v102 = softehl_blend(m130, v132, v102); v103 = softehl_blend(m130, v133, v103);
-        v104 = softehl_blend(m130, v134, v104); v105 = softehl_blend(m130, v135, v105);
-        v106 = softehl_blend(m130, v136, v106); v107 = softehl_blend(m130, v137, v107);
-        v108 = softehl_blend(m130, v138, v108);
+        v102 = softehl_blend(m131, v133, v102); v103 = softehl_blend(m131, v134, v103);
+        v104 = softehl_blend(m131, v135, v104); v105 = softehl_blend(m131, v136, v105);
+        v106 = softehl_blend(m131, v137, v106); v107 = softehl_blend(m131, v138, v107);
+        v108 = softehl_blend(m131, v139, v108);
     }
-    V v148 = softehl_splat(0.0), v149 = softehl_splat(0.0), v150 = softehl_splat(0.0),
-        v151 = softehl_splat(0.0), v152 = softehl_splat(0.0), v153 = softehl_splat(0.0),
-        v154 = softehl_splat(0.0);
-    const M m155 = v62;
-    if (softehl_any(m155)) {
-        const M v156 = softehl_lt(softehl_splat((-1.0)), v61);
-        V v157 = softehl_splat((-1.0)), v158 = softehl_splat(0.0), v159 = softehl_splat(0.0),
-            v160 = softehl_splat(0.0), v161 = softehl_splat(0.0), v162 = softehl_splat(0.0),
-            v163 = softehl_splat(0.0);
-        const M m164 = v156 & m155;
-        if (softehl_any(m164)) {
-            V v165 = softehl_splat(0.0), v166 = softehl_splat(0.0), v167 = softehl_splat(0.0),
-                v168 = softehl_splat(0.0), v169 = softehl_splat(0.0), v170 = softehl_splat(0.0);
-            const M m171 = ~v60 & m164;
-            if (softehl_any(m171)) {
-                const V v172 = -v76, v173 = -v78, v174 = v65 - v80, v175 = v67 - v82;
-                v165 = softehl_blend(m171, v74, v165); v166 = softehl_blend(m171, v75, v166);
-                v167 = softehl_blend(m171, v172, v167); v168 = softehl_blend(m171, v173, v168);
-                v169 = softehl_blend(m171, v174, v169); v170 = softehl_blend(m171, v175, v170);
+    V v149 = softehl_splat(0.0), v150 = softehl_splat(0.0), v151 = softehl_splat(0.0),
+        v152 = softehl_splat(0.0), v153 = softehl_splat(0.0), v154 = softehl_splat(0.0),
+        v155 = softehl_splat(0.0);
+    const M m156 = v62;
+    if (softehl_any(m156)) {
+        const M v157 = softehl_lt(softehl_splat((-1.0)), v61);
+        V v158 = softehl_splat((-1.0)), v159 = softehl_splat(0.0), v160 = softehl_splat(0.0),
+            v161 = softehl_splat(0.0), v162 = softehl_splat(0.0), v163 = softehl_splat(0.0),
+            v164 = softehl_splat(0.0);
+        const M m165 = v157 & m156;
+        if (softehl_any(m165)) {
+            V v166 = v74, v167 = v75, v168 = softehl_splat(0.0), v169 = softehl_splat(0.0),
+                v170 = softehl_splat(0.0), v171 = softehl_splat(0.0);
+            const M m172 = v60 & m165;
+            if (softehl_any(m172)) {
+                v166 = softehl_blend(m172, softehl_splat(0.0), v166);
+                v167 = softehl_blend(m172, softehl_splat(0.0), v167);
             }
-            v157 = softehl_blend(m164, v61, v157); v158 = softehl_blend(m164, v165, v158);
-            v159 = softehl_blend(m164, v166, v159); v160 = softehl_blend(m164, v167, v160);
-            v161 = softehl_blend(m164, v168, v161); v162 = softehl_blend(m164, v169, v162);
-            v163 = softehl_blend(m164, v170, v163);
+            const M m173 = ~v60 & m165;
+            if (softehl_any(m173)) {
+                const V v174 = -v76, v175 = -v78, v176 = v65 - v80, v177 = v67 - v82;
+                v168 = softehl_blend(m173, v174, v168); v169 = softehl_blend(m173, v175, v169);
+                v170 = softehl_blend(m173, v176, v170); v171 = softehl_blend(m173, v177, v171);
+            }
+            v158 = softehl_blend(m165, v61, v158); v159 = softehl_blend(m165, v166, v159);
+            v160 = softehl_blend(m165, v167, v160); v161 = softehl_blend(m165, v168, v161);
+            v162 = softehl_blend(m165, v169, v162); v163 = softehl_blend(m165, v170, v163);
+            v164 = softehl_blend(m165, v171, v164);
         }
-        v148 = softehl_blend(m155, v157, v148); v149 = softehl_blend(m155, v160, v149);
-        v150 = softehl_blend(m155, v161, v150); v151 = softehl_blend(m155, v162, v151);
-        v152 = softehl_blend(m155, v163, v152); v153 = softehl_blend(m155, v158, v153);
-        v154 = softehl_blend(m155, v159, v154);
+        v149 = softehl_blend(m156, v158, v149); v150 = softehl_blend(m156, v161, v150);
+        v151 = softehl_blend(m156, v162, v151); v152 = softehl_blend(m156, v163, v152);
+        v153 = softehl_blend(m156, v164, v153); v154 = softehl_blend(m156, v159, v154);
+        v155 = softehl_blend(m156, v160, v155);
     }
-    const M m176 = ~v62;
-    if (softehl_any(m176)) {
-        const V v177 = (-1.0) - v61, v178 = v177 * (v177 * v177);
-        V v179 = softehl_splat(0.0), v180 = softehl_splat(0.0), v181 = softehl_splat(0.0),
-            v182 = softehl_splat(0.0), v183 = softehl_splat(0.0), v184 = softehl_splat(0.0);
-        const M m185 = ~v60 & m176;
-        if (softehl_any(m185)) {
-            const V v186 = (-1.0) - v59, v187 = v186 * (3.0 * v186), v188 = (v80 - v65) * v187,
-                v189 = (v82 - v67) * v187, v190 = v76 * v187, v191 = v78 * v187,
-                v192 = -(v74 * v187), v193 = -(v75 * v187);
-            v179 = softehl_blend(m185, v190, v179); v180 = softehl_blend(m185, v191, v180);
-            v181 = softehl_blend(m185, v188, v181); v182 = softehl_blend(m185, v189, v182);
-            v183 = softehl_blend(m185, v192, v183); v184 = softehl_blend(m185, v193, v184);
+    const M m178 = ~v62;
+    if (softehl_any(m178)) {
+        const V v179 = (-1.0) - v61, v180 = v179 * (v179 * v179);
+        V v181 = softehl_splat(0.0), v182 = softehl_splat(0.0), v183 = softehl_splat(0.0),
+            v184 = softehl_splat(0.0), v185 = softehl_splat(0.0), v186 = softehl_splat(0.0);
+        const M m187 = ~v60 & m178;
+        if (softehl_any(m187)) {
+            const V v188 = (-1.0) - v59, v189 = v188 * (3.0 * v188), v190 = (v80 - v65) * v189,
+                v191 = (v82 - v67) * v189, v192 = v76 * v189, v193 = v78 * v189,
+                v194 = -(v74 * v189), v195 = -(v75 * v189);
+            v181 = softehl_blend(m187, v192, v181); v182 = softehl_blend(m187, v193, v182);
+            v183 = softehl_blend(m187, v190, v183); v184 = softehl_blend(m187, v191, v184);
+            v185 = softehl_blend(m187, v194, v185); v186 = softehl_blend(m187, v195, v186);
         }
-        v148 = softehl_blend(m176, v178, v148); v149 = softehl_blend(m176, v179, v149);
-        v150 = softehl_blend(m176, v180, v150); v151 = softehl_blend(m176, v181, v151);
-        v152 = softehl_blend(m176, v182, v152); v153 = softehl_blend(m176, v183, v153);
-        v154 = softehl_blend(m176, v184, v154);
+        v149 = softehl_blend(m178, v180, v149); v150 = softehl_blend(m178, v181, v150);
+        v151 = softehl_blend(m178, v182, v151); v152 = softehl_blend(m178, v183, v152);
+        v153 = softehl_blend(m178, v184, v153); v154 = softehl_blend(m178, v185, v154);
+        v155 = softehl_blend(m178, v186, v155);
     }
-    const V v194 = 1.0 / (v48 * v86 + v28 * v87), v195 = v148 - v102;
-    const M v196 = softehl_eq(v195, v195);
-    const V v197 = 0.5 * v194, v198 = v86 * v194, v199 = 0.5 * v198, v200 = v87 * v194,
-        v201 = v194 * v194, v202 = 0.5 * v200, v203 = 0.5 * v86 * v201, v204 = 0.5 * v87 * v201;
-    V v205 = softehl_splat(0.0), v206 = softehl_splat(0.0), v207 = softehl_splat(0.0),
-        v208 = softehl_splat(0.0), v209 = softehl_splat(0.0), v210 = softehl_splat(0.0),
-        v211 = softehl_splat(0.0), v212 = softehl_splat(0.0), v213 = softehl_splat(0.0);
-    const M m214 = v196;
-    if (softehl_any(m214)) {
-        const M v215 = softehl_lt(softehl_splat(0.0), v195);
-        V v216 = softehl_splat(0.0), v217 = softehl_splat(0.0), v218 = softehl_splat(0.0),
-            v219 = softehl_splat(0.0), v220 = softehl_splat(0.0), v221 = softehl_splat(0.0),
-            v222 = softehl_splat(0.0), v223 = softehl_splat(0.0), v224 = softehl_splat(0.0);
-        const M m225 = v215 & m214;
-        if (softehl_any(m225)) {
-            const V v226 = -v107, v227 = v149 - v103, v228 = -v108, v229 = v150 - v104,
-                v230 = v151 - v105, v231 = v152 - v106;
-            v216 = softehl_blend(m225, v195, v216); v217 = softehl_blend(m225, v227, v217);
-            v218 = softehl_blend(m225, v229, v218); v219 = softehl_blend(m225, v230, v219);
-            v220 = softehl_blend(m225, v231, v220); v221 = softehl_blend(m225, v153, v221);
-            v222 = softehl_blend(m225, v154, v222); v223 = softehl_blend(m225, v226, v223);
-            v224 = softehl_blend(m225, v228, v224);
+    const V v196 = 1.0 / (v48 * v86 + v28 * v87), v197 = v149 - v102;
+    const M v198 = softehl_eq(v197, v197);
+    const V v199 = 0.5 * v196, v200 = v86 * v196, v201 = 0.5 * v200, v202 = v87 * v196,
+        v203 = v196 * v196, v204 = 0.5 * v202, v205 = 0.5 * v86 * v203, v206 = 0.5 * v87 * v203;
+    V v207 = softehl_splat(0.0), v208 = softehl_splat(0.0), v209 = softehl_splat(0.0),
+        v210 = softehl_splat(0.0), v211 = softehl_splat(0.0), v212 = softehl_splat(0.0),
+        v213 = softehl_splat(0.0), v214 = softehl_splat(0.0), v215 = softehl_splat(0.0);
+    const M m216 = v198;
+    if (softehl_any(m216)) {
+        const M v217 = softehl_lt(softehl_splat(0.0), v197);
+        V v218 = softehl_splat(0.0), v219 = softehl_splat(0.0), v220 = softehl_splat(0.0),
+            v221 = softehl_splat(0.0), v222 = softehl_splat(0.0), v223 = softehl_splat(0.0),
+            v224 = softehl_splat(0.0), v225 = softehl_splat(0.0), v226 = softehl_splat(0.0);
+        const M m227 = v217 & m216;
+        if (softehl_any(m227)) {
+            const V v228 = -v107, v229 = v150 - v103, v230 = -v108, v231 = v151 - v104,
+                v232 = v152 - v105, v233 = v153 - v106;
+            v218 = softehl_blend(m227, v197, v218); v219 = softehl_blend(m227, v229, v219);
+            v220 = softehl_blend(m227, v231, v220); v221 = softehl_blend(m227, v232, v221);
+            v222 = softehl_blend(m227, v233, v222); v223 = softehl_blend(m227, v154, v223);
+            v224 = softehl_blend(m227, v155, v224); v225 = softehl_blend(m227, v228, v225);
+            v226 = softehl_blend(m227, v230, v226);
         }
-        v205 = softehl_blend(m214, v216, v205); v206 = softehl_blend(m214, v217, v206);
-        v207 = softehl_blend(m214, v218, v207); v208 = softehl_blend(m214, v219, v208);
-        v209 = softehl_blend(m214, v220, v209); v210 = softehl_blend(m214, v221, v210);
-        v211 = softehl_blend(m214, v222, v211); v212 = softehl_blend(m214, v223, v212);
-        v213 = softehl_blend(m214, v224, v213);
+        v207 = softehl_blend(m216, v218, v207); v208 = softehl_blend(m216, v219, v208);
+        v209 = softehl_blend(m216, v220, v209); v210 = softehl_blend(m216, v221, v210);
+        v211 = softehl_blend(m216, v222, v211); v212 = softehl_blend(m216, v223, v212);
+        v213 = softehl_blend(m216, v224, v213); v214 = softehl_blend(m216, v225, v214);
+        v215 = softehl_blend(m216, v226, v215);
     }
-    const M m232 = ~v196;
-    if (softehl_any(m232)) {
-        const V v233 = v102 - v148, v234 = v233 * v233, v235 = v233 * v234, v236 = 3.0 * v234,
-            v237 = (v103 - v149) * v236, v238 = (v104 - v150) * v236, v239 = (v105 - v151) * v236,
-            v240 = (v106 - v152) * v236, v241 = -(v153 * v236), v242 = -(v154 * v236),
-            v243 = v107 * v236, v244 = v108 * v236;
-        v205 = softehl_blend(m232, v235, v205); v206 = softehl_blend(m232, v237, v206);
-        v207 = softehl_blend(m232, v238, v207); v208 = softehl_blend(m232, v239, v208);
-        v209 = softehl_blend(m232, v240, v209); v210 = softehl_blend(m232, v241, v210);
-        v211 = softehl_blend(m232, v242, v211); v212 = softehl_blend(m232, v243, v212);
-        v213 = softehl_blend(m232, v244, v213);
+    const M m234 = ~v198;
+    if (softehl_any(m234)) {
+        const V v235 = v102 - v149, v236 = v235 * v235, v237 = v235 * v236, v238 = 3.0 * v236,
+            v239 = (v103 - v150) * v238, v240 = (v104 - v151) * v238, v241 = (v105 - v152) * v238,
+            v242 = (v106 - v153) * v238, v243 = -(v154 * v238), v244 = -(v155 * v238),
+            v245 = v107 * v238, v246 = v108 * v238;
+        v207 = softehl_blend(m234, v237, v207); v208 = softehl_blend(m234, v239, v208);
+        v209 = softehl_blend(m234, v240, v209); v210 = softehl_blend(m234, v241, v210);
+        v211 = softehl_blend(m234, v242, v211); v212 = softehl_blend(m234, v243, v212);
+        v213 = softehl_blend(m234, v244, v213); v214 = softehl_blend(m234, v245, v214);
+        v215 = softehl_blend(m234, v246, v215);
     }
-    const V v245 = 0.5 * v205, v246 = 0.5 * v206, v247 = 0.5 * v207, v248 = 0.5 * v208,
-        v249 = v24 * v245, v250 = v24 * v246, v251 = v24 * v247, v252 = v24 * v248,
-        v253 = 0.5 * (v102 + v148), v254 = 0.5 * (v149 + v103), v255 = 0.5 * v209,
-        v256 = 0.5 * (v150 + v104), v257 = 0.5 * v210, v258 = v24 * v255, v259 = 0.5 * v211,
-        v260 = 0.5 * v212, v261 = v24 * v257, v262 = 0.5 * (v151 + v105), v263 = v24 * v259,
-        v264 = v24 * v260, v265 = 0.5 * v213, v266 = 0.5 * (v152 + v106), v267 = v24 * v265,
-        v268 = 0.5 * v153, v269 = 0.5 * v154, v270 = 0.5 * v107, v271 = 0.5 * v108,
-        v272 = v201 * (v93 + v48 * v99), v273 = v201 * (v97 + v28 * v101),
-        v274 = v201 * (v48 * v98 - v93), v275 = v201 * (v28 * v100 - v97),
-        v276 = v249 * (6.283185307179586 * (a12 * v11)),
-        v277 = 0.5 * ((v46 - v45) * v87 - (v20 - v17) * v86),
-        v278 = 0.5 * ((v5 - v4) * v86 + (v15 - v14) * v87),
-        v279 = 0.5 * ((v3 - v2) * v86 + (v7 - v9) * v87);
-    V s280 = {0}, s281 = {0}, s282 = {0}, s283 = {0}, s284 = {0}, s285 = {0}, s286 = {0},
-        s287 = {0}, s288 = {0}, s289 = {0}, s290 = {0}, s291 = {0}, s292 = {0}, s293 = {0},
-        s294 = {0}, s295 = {0}, s296 = {0}, s297 = {0}, s298 = {0}, s299 = {0}, s300 = {0},
-        s301 = {0}, s302 = {0}, s303 = {0}, s304 = {0}, s305 = {0}, s306 = {0}, s307 = {0},
-        s308 = {0}, s309 = {0}, s310 = {0}, s311 = {0}, s312 = {0}, s313 = {0}, s314 = {0},
-        s315 = {0}, s316 = {0}, s317 = {0}, s318 = {0}, s319 = {0}, s320 = {0}, s321 = {0},
-        s322 = {0}, s323 = {0}, s324 = {0}, s325 = {0}, s326 = {0}, s327 = {0}, s328 = {0},
-        s329 = {0}, s330 = {0}, s331 = {0}, s332 = {0}, s333 = {0}, s334 = {0}, s335 = {0},
-        s336 = {0}, s337 = {0}, s338 = {0}, s339 = {0}, s340 = {0}, s341 = {0}, s342 = {0},
-        s343 = {0}, s344 = {0}, s345 = {0}, s346 = {0}, s347 = {0}, s348 = {0}, s349 = {0},
-        s350 = {0}, s351 = {0}, s352 = {0}, s353 = {0}, s354 = {0}, s355 = {0}, s356 = {0},
-        s357 = {0}, s358 = {0}, s359 = {0}, s360 = {0}, s361 = {0}, s362 = {0}, s363 = {0},
-        s364 = {0}, s365 = {0}, s366 = {0}, s367 = {0}, s368 = {0}, s369 = {0}, s370 = {0},
-        s371 = {0}, s372 = {0}, s373 = {0}, s374 = {0}, s375 = {0}, s376 = {0}, s377 = {0},
-        s378 = {0}, s379 = {0}, s380 = {0}, s381 = {0}, s382 = {0}, s383 = {0}, s384 = {0},
-        s385 = {0}, s386 = {0}, s387 = {0}, s388 = {0}, s389 = {0}, s390 = {0}, s391 = {0},
-        s392 = {0}, s393 = {0}, s394 = {0}, s395 = {0}, s396 = {0}, s397 = {0}, s398 = {0},
-        s399 = {0}, s400 = {0}, s401 = {0}, s402 = {0}, s403 = {0}, s404 = {0}, s405 = {0},
-        s406 = {0}, s407 = {0}, s408 = {0}, s409 = {0}, s410 = {0}, s411 = {0}, s412 = {0},
-        s413 = {0}, s414 = {0}, s415 = {0}, s416 = {0}, s417 = {0}, s418 = {0}, s419 = {0},
-        s420 = {0}, s421 = {0}, s422 = {0}, s423 = {0}, s424 = {0}, s425 = {0}, s426 = {0},
-        s427 = {0}, s428 = {0}, s429 = {0}, s430 = {0}, s431 = {0};
+    const V v247 = 0.5 * v207, v248 = 0.5 * v208, v249 = 0.5 * v209, v250 = 0.5 * v210,
+        v251 = v24 * v247, v252 = v24 * v248, v253 = v24 * v249, v254 = v24 * v250,
+        v255 = 0.5 * (v102 + v149), v256 = 0.5 * (v150 + v103), v257 = 0.5 * v211,
+        v258 = 0.5 * (v151 + v104), v259 = 0.5 * v212, v260 = v24 * v257, v261 = 0.5 * v213,
+        v262 = 0.5 * v214, v263 = v24 * v259, v264 = 0.5 * (v152 + v105), v265 = v24 * v261,
+        v266 = v24 * v262, v267 = 0.5 * v215, v268 = 0.5 * (v153 + v106), v269 = v24 * v267,
+        v270 = 0.5 * v154, v271 = 0.5 * v155, v272 = 0.5 * v107, v273 = 0.5 * v108,
+        v274 = v203 * (v93 + v48 * v99), v275 = v203 * (v97 + v28 * v101),
+        v276 = v203 * (v48 * v98 - v93), v277 = v203 * (v28 * v100 - v97),
+        v278 = v251 * (6.283185307179586 * (a12 * v11)),
+        v279 = 0.5 * ((v46 - v45) * v87 - (v20 - v17) * v86),
+        v280 = 0.5 * ((v5 - v4) * v86 + (v15 - v14) * v87),
+        v281 = 0.5 * ((v3 - v2) * v86 + (v7 - v9) * v87);
+    V s282 = {0}, s283 = {0}, s284 = {0}, s285 = {0}, s286 = {0}, s287 = {0}, s288 = {0},
+        s289 = {0}, s290 = {0}, s291 = {0}, s292 = {0}, s293 = {0}, s294 = {0}, s295 = {0},
+        s296 = {0}, s297 = {0}, s298 = {0}, s299 = {0}, s300 = {0}, s301 = {0}, s302 = {0},
+        s303 = {0}, s304 = {0}, s305 = {0}, s306 = {0}, s307 = {0}, s308 = {0}, s309 = {0},
+        s310 = {0}, s311 = {0}, s312 = {0}, s313 = {0}, s314 = {0}, s315 = {0}, s316 = {0},
+        s317 = {0}, s318 = {0}, s319 = {0}, s320 = {0}, s321 = {0}, s322 = {0}, s323 = {0},
+        s324 = {0}, s325 = {0}, s326 = {0}, s327 = {0}, s328 = {0}, s329 = {0}, s330 = {0},
+        s331 = {0}, s332 = {0}, s333 = {0}, s334 = {0}, s335 = {0}, s336 = {0}, s337 = {0},
+        s338 = {0}, s339 = {0}, s340 = {0}, s341 = {0}, s342 = {0}, s343 = {0}, s344 = {0},
+        s345 = {0}, s346 = {0}, s347 = {0}, s348 = {0}, s349 = {0}, s350 = {0}, s351 = {0},
+        s352 = {0}, s353 = {0}, s354 = {0}, s355 = {0}, s356 = {0}, s357 = {0}, s358 = {0},
+        s359 = {0}, s360 = {0}, s361 = {0}, s362 = {0}, s363 = {0}, s364 = {0}, s365 = {0},
+        s366 = {0}, s367 = {0}, s368 = {0}, s369 = {0}, s370 = {0}, s371 = {0}, s372 = {0},
+        s373 = {0}, s374 = {0}, s375 = {0}, s376 = {0}, s377 = {0}, s378 = {0}, s379 = {0},
+        s380 = {0}, s381 = {0}, s382 = {0}, s383 = {0}, s384 = {0}, s385 = {0}, s386 = {0},
+        s387 = {0}, s388 = {0}, s389 = {0}, s390 = {0}, s391 = {0}, s392 = {0}, s393 = {0},
+        s394 = {0}, s395 = {0}, s396 = {0}, s397 = {0}, s398 = {0}, s399 = {0}, s400 = {0},
+        s401 = {0}, s402 = {0}, s403 = {0}, s404 = {0}, s405 = {0}, s406 = {0}, s407 = {0},
+        s408 = {0}, s409 = {0}, s410 = {0}, s411 = {0}, s412 = {0}, s413 = {0}, s414 = {0},
+        s415 = {0}, s416 = {0}, s417 = {0}, s418 = {0}, s419 = {0}, s420 = {0}, s421 = {0},
+        s422 = {0}, s423 = {0}, s424 = {0}, s425 = {0}, s426 = {0}, s427 = {0}, s428 = {0},
+        s429 = {0}, s430 = {0}, s431 = {0}, s432 = {0}, s433 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
         const double *restrict w = rule + 2 * q; (void)w;
-        const V v432 = w[0] * v257 + v268, v433 = w[0] * v259 + v269, v434 = w[0] * v260 + v270,
-            v435 = w[0] * v246 + v254, v436 = w[0] * v247 + v256, v437 = w[0] * v248 + v262,
-            v438 = w[0] * v255 + v266, v439 = w[0] * v265 + v271, v440 = 0.5 * (w[0] * v245 + v253),
-            v441 = v33 * v432, v442 = v19 * v432, v443 = v19 * v435, v444 = v33 * v436,
-            v445 = v19 * v437, v446 = v33 * v438, v447 = v33 * v433, v448 = v19 * v433,
-            v449 = v33 * v439, v450 = v19 * v439, v451 = v33 * v434, v452 = v19 * v434,
-            v453 = 0.5 - v440, v454 = 0.5 + v440, v455 = v440 - 0.5, v456 = v19 * v438 + v454,
-            v457 = v10 * v453 + v1 * v454, v458 = v12 * v453 + v8 * v454,
-            v459 = d8 * v453 + d10 * v454, v460 = v457 - v47, v461 = v458 - v22,
-            v462 = v33 * v435 + v453, v463 = v19 * v436 + v453, v464 = v33 * v437 + v454,
-            v465 = v194 * v460, v466 = v194 * v461,
-            v467 = 1.0 + a12 * ((-1.0) + 6.283185307179586 * (X1 * v453 + X3 * v454)),
-            v468 = v86 * v460 + v87 * v461, v469 = v249 * v467, v470 = w[1] * v454,
-            v471 = w[1] * v453, v472 = v35 * v453, v473 = v35 * v454, v474 = v197 * v468,
-            v475 = v203 * v468, v476 = v204 * v468, v477 = v472 * v469, v478 = v473 * v469,
-            v479 = v87 * v469, v480 = v86 * v469, v481 = w[1] * v477, v482 = w[1] * v478,
-            v483 = v198 * v451 + (v200 * v452 - v199 - v475),
-            v484 = v198 * v441 + (v200 * v442 + (v475 - v199)), v485 = v92 * v466,
-            v486 = v96 * v465, v487 = 0.5 - v474, v488 = 0.5 + v474, v489 = w[1] * v487,
-            v490 = w[1] * v488, v491 = v87 * (v487 - v441) + (v86 * v442 + v277 * v484),
-            v492 = v87 * (v488 - v451) + (v86 * v452 + v277 * v483),
-            v493 = v46 * v488 + (v45 * v487 - v457), v494 = v20 * v488 + (v17 * v487 - v458),
-            v495 = v92 * v493, v496 = v96 * v494, v497 = v87 * v493 - v86 * v494, v498 = a8 * v497,
-            v499 = v476 + (v198 * v447 + (v200 * v448 - v202)),
-            v500 = v198 * v449 + (v200 * v450 - v202) - v476,
-            v501 = v86 * (v448 - v487) - v87 * v447 + v277 * v499,
-            v502 = v86 * (v450 - v488) - v87 * v449 + v277 * v500, v503 = v459 - v498;
-        const M v504 = softehl_eq(v503, v503);
-        const V v505 = v100 * v466 + (v198 * v446 + (v200 * v456 - v486 - v275 * v468)),
-            v506 = v101 * v466 + (v486 + (v198 * v444 + (v200 * v463 - v273 * v468))),
-            v507 = v496 + (v86 * v456 - v87 * v446) + v100 * v493 + v277 * v505,
-            v508 = v86 * v463 - v87 * v444 - v496 + v101 * v493 + v277 * v506,
-            v509 = v99 * v465 + (v485 + (v200 * v443 + v198 * v462) - v272 * v468),
-            v510 = v98 * v465 + (v198 * v464 + (v200 * v445 - v485 - v274 * v468)),
-            v511 = v86 * v443 - v87 * v462 + v495 - v99 * v494 + v277 * v509,
-            v512 = v86 * v445 - v87 * v464 - v495 - v98 * v494 + v277 * v510;
-        V v513 = softehl_splat(0.0), v514 = softehl_splat(0.0), v515 = softehl_splat(0.0),
-            v516 = softehl_splat(0.0), v517 = softehl_splat(0.0), v518 = softehl_splat(0.0),
-            v519 = softehl_splat(0.0), v520 = softehl_splat(0.0), v521 = softehl_splat(0.0),
-            v522 = softehl_splat(0.0), v523 = softehl_splat(0.0), v524 = softehl_splat(0.0),
-            v525 = softehl_splat(0.0), v526 = softehl_splat(0.0), v527 = softehl_splat(0.0),
-            v528 = softehl_splat(0.0), v529 = softehl_splat(0.0), v530 = softehl_splat(0.0),
-            v531 = softehl_splat(0.0), v532 = softehl_splat(0.0), v533 = softehl_splat(0.0),
-            v534 = softehl_splat(0.0), v535 = softehl_splat(0.0), v536 = softehl_splat(0.0),
-            v537 = softehl_splat(0.0), v538 = softehl_splat(0.0), v539 = softehl_splat(0.0),
-            v540 = softehl_splat(0.0), v541 = softehl_splat(0.0), v542 = softehl_splat(0.0),
-            v543 = softehl_splat(0.0), v544 = softehl_splat(0.0), v545 = softehl_splat(0.0),
-            v546 = softehl_splat(0.0), v547 = softehl_splat(0.0), v548 = softehl_splat(0.0),
-            v549 = softehl_splat(0.0), v550 = softehl_splat(0.0), v551 = softehl_splat(0.0),
-            v552 = softehl_splat(0.0), v553 = softehl_splat(0.0), v554 = softehl_splat(0.0),
-            v555 = softehl_splat(0.0), v556 = softehl_splat(0.0), v557 = softehl_splat(0.0),
-            v558 = softehl_splat(0.0), v559 = softehl_splat(0.0);
-        const M m560 = v504;
-        if (softehl_any(m560)) {
-            const M v561 = softehl_le(softehl_splat(0.0), v503);
-            V v562 = softehl_splat(0.0), v563 = softehl_splat(0.0), v564 = softehl_splat(0.0),
-                v565 = softehl_splat(0.0), v566 = softehl_splat(0.0), v567 = softehl_splat(0.0),
-                v568 = softehl_splat(0.0), v569 = softehl_splat(0.0), v570 = softehl_splat(0.0),
-                v571 = softehl_splat(0.0), v572 = softehl_splat(0.0), v573 = softehl_splat(0.0),
-                v574 = softehl_splat(0.0), v575 = softehl_splat(0.0), v576 = softehl_splat(0.0),
-                v577 = softehl_splat(0.0), v578 = softehl_splat(0.0), v579 = softehl_splat(0.0),
-                v580 = softehl_splat(0.0), v581 = softehl_splat(0.0), v582 = softehl_splat(0.0),
-                v583 = softehl_splat(0.0), v584 = softehl_splat(0.0), v585 = softehl_splat(0.0),
-                v586 = softehl_splat(0.0), v587 = softehl_splat(0.0), v588 = softehl_splat(0.0),
-                v589 = softehl_splat(0.0), v590 = softehl_splat(0.0), v591 = softehl_splat(0.0),
-                v592 = softehl_splat(0.0), v593 = softehl_splat(0.0), v594 = softehl_splat(0.0),
-                v595 = softehl_splat(0.0), v596 = softehl_splat(0.0), v597 = softehl_splat(0.0),
-                v598 = softehl_splat(0.0);
-            const M m599 = v561 & m560;
-            if (softehl_any(m599)) {
-                const V v600 = a10 + v497, v601 = v497 - a11, v602 = v600 * v601;
-                const M v603 = softehl_eq(v602, v602);
-                V v604 = softehl_splat(0.0), v605 = softehl_splat(0.0), v606 = softehl_splat(0.0),
-                    v607 = softehl_splat(0.0), v608 = softehl_splat(0.0);
-                const M m609 = v603 & m599;
-                if (softehl_any(m609)) {
-                    const M v610 = softehl_lt(v602, softehl_splat(0.0));
-                    const V v611 = softehl_blend(v610, v503, softehl_splat(0.0)),
-                        v612 = softehl_blend(v610, v453, softehl_splat(0.0)),
-                        v613 = softehl_blend(v610, v454, softehl_splat(0.0)),
-                        v614 = softehl_blend(v610, v36, softehl_splat(0.0)),
-                        v615 = softehl_blend(v610, v40, softehl_splat(0.0));
-                    v604 = softehl_blend(m609, v611, v604); v605 = softehl_blend(m609, v612, v605);
-                    v606 = softehl_blend(m609, v613, v606); v607 = softehl_blend(m609, v614, v607);
-                    v608 = softehl_blend(m609, v615, v608);
+        const V v434 = w[0] * v259 + v270, v435 = w[0] * v261 + v271, v436 = w[0] * v262 + v272,
+            v437 = w[0] * v248 + v256, v438 = w[0] * v249 + v258, v439 = w[0] * v250 + v264,
+            v440 = w[0] * v257 + v268, v441 = w[0] * v267 + v273, v442 = 0.5 * (w[0] * v247 + v255),
+            v443 = v33 * v434, v444 = v19 * v434, v445 = v19 * v437, v446 = v33 * v438,
+            v447 = v19 * v439, v448 = v33 * v440, v449 = v33 * v435, v450 = v19 * v435,
+            v451 = v33 * v441, v452 = v19 * v441, v453 = v33 * v436, v454 = v19 * v436,
+            v455 = 0.5 - v442, v456 = 0.5 + v442, v457 = v442 - 0.5, v458 = v19 * v440 + v456,
+            v459 = v10 * v455 + v1 * v456, v460 = v12 * v455 + v8 * v456,
+            v461 = d8 * v455 + d10 * v456, v462 = v459 - v47, v463 = v460 - v22,
+            v464 = v33 * v437 + v455, v465 = v19 * v438 + v455, v466 = v33 * v439 + v456,
+            v467 = v196 * v462, v468 = v196 * v463,
+            v469 = 1.0 + a12 * ((-1.0) + 6.283185307179586 * (X1 * v455 + X3 * v456)),
+            v470 = v86 * v462 + v87 * v463, v471 = v251 * v469, v472 = w[1] * v456,
+            v473 = w[1] * v455, v474 = v35 * v455, v475 = v35 * v456, v476 = v199 * v470,
+            v477 = v205 * v470, v478 = v206 * v470, v479 = v474 * v471, v480 = v475 * v471,
+            v481 = v87 * v471, v482 = v86 * v471, v483 = w[1] * v479, v484 = w[1] * v480,
+            v485 = v200 * v453 + (v202 * v454 - v201 - v477),
+            v486 = v200 * v443 + (v202 * v444 + (v477 - v201)), v487 = v92 * v468,
+            v488 = v96 * v467, v489 = 0.5 - v476, v490 = 0.5 + v476, v491 = w[1] * v489,
+            v492 = w[1] * v490, v493 = v87 * (v489 - v443) + (v86 * v444 + v279 * v486),
+            v494 = v87 * (v490 - v453) + (v86 * v454 + v279 * v485),
+            v495 = v46 * v490 + (v45 * v489 - v459), v496 = v20 * v490 + (v17 * v489 - v460),
+            v497 = v92 * v495, v498 = v96 * v496, v499 = v87 * v495 - v86 * v496, v500 = a8 * v499,
+            v501 = v478 + (v200 * v449 + (v202 * v450 - v204)),
+            v502 = v200 * v451 + (v202 * v452 - v204) - v478,
+            v503 = v86 * (v450 - v489) - v87 * v449 + v279 * v501,
+            v504 = v86 * (v452 - v490) - v87 * v451 + v279 * v502, v505 = v461 - v500;
+        const M v506 = softehl_eq(v505, v505);
+        const V v507 = v100 * v468 + (v200 * v448 + (v202 * v458 - v488 - v277 * v470)),
+            v508 = v101 * v468 + (v488 + (v200 * v446 + (v202 * v465 - v275 * v470))),
+            v509 = v498 + (v86 * v458 - v87 * v448) + v100 * v495 + v279 * v507,
+            v510 = v86 * v465 - v87 * v446 - v498 + v101 * v495 + v279 * v508,
+            v511 = v99 * v467 + (v487 + (v202 * v445 + v200 * v464) - v274 * v470),
+            v512 = v98 * v467 + (v200 * v466 + (v202 * v447 - v487 - v276 * v470)),
+            v513 = v86 * v445 - v87 * v464 + v497 - v99 * v496 + v279 * v511,
+            v514 = v86 * v447 - v87 * v466 - v497 - v98 * v496 + v279 * v512;
+        V v515 = softehl_splat(0.0), v516 = softehl_splat(0.0), v517 = softehl_splat(0.0),
+            v518 = softehl_splat(0.0), v519 = softehl_splat(0.0), v520 = softehl_splat(0.0),
+            v521 = softehl_splat(0.0), v522 = softehl_splat(0.0), v523 = softehl_splat(0.0),
+            v524 = softehl_splat(0.0), v525 = softehl_splat(0.0), v526 = softehl_splat(0.0),
+            v527 = softehl_splat(0.0), v528 = softehl_splat(0.0), v529 = softehl_splat(0.0),
+            v530 = softehl_splat(0.0), v531 = softehl_splat(0.0), v532 = softehl_splat(0.0),
+            v533 = softehl_splat(0.0), v534 = softehl_splat(0.0), v535 = softehl_splat(0.0),
+            v536 = softehl_splat(0.0), v537 = softehl_splat(0.0), v538 = softehl_splat(0.0),
+            v539 = softehl_splat(0.0), v540 = softehl_splat(0.0), v541 = softehl_splat(0.0),
+            v542 = softehl_splat(0.0), v543 = softehl_splat(0.0), v544 = softehl_splat(0.0),
+            v545 = softehl_splat(0.0), v546 = softehl_splat(0.0), v547 = softehl_splat(0.0),
+            v548 = softehl_splat(0.0), v549 = softehl_splat(0.0), v550 = softehl_splat(0.0),
+            v551 = softehl_splat(0.0), v552 = softehl_splat(0.0), v553 = softehl_splat(0.0),
+            v554 = softehl_splat(0.0), v555 = softehl_splat(0.0), v556 = softehl_splat(0.0),
+            v557 = softehl_splat(0.0), v558 = softehl_splat(0.0), v559 = softehl_splat(0.0),
+            v560 = softehl_splat(0.0), v561 = softehl_splat(0.0);
+        const M m562 = v506;
+        if (softehl_any(m562)) {
+            const M v563 = softehl_le(softehl_splat(0.0), v505);
+            V v564 = softehl_splat(0.0), v565 = softehl_splat(0.0), v566 = softehl_splat(0.0),
+                v567 = softehl_splat(0.0), v568 = softehl_splat(0.0), v569 = softehl_splat(0.0),
+                v570 = softehl_splat(0.0), v571 = softehl_splat(0.0), v572 = softehl_splat(0.0),
+                v573 = softehl_splat(0.0), v574 = softehl_splat(0.0), v575 = softehl_splat(0.0),
+                v576 = softehl_splat(0.0), v577 = softehl_splat(0.0), v578 = softehl_splat(0.0),
+                v579 = softehl_splat(0.0), v580 = softehl_splat(0.0), v581 = softehl_splat(0.0),
+                v582 = softehl_splat(0.0), v583 = softehl_splat(0.0), v584 = softehl_splat(0.0),
+                v585 = softehl_splat(0.0), v586 = softehl_splat(0.0), v587 = softehl_splat(0.0),
+                v588 = softehl_splat(0.0), v589 = softehl_splat(0.0), v590 = softehl_splat(0.0),
+                v591 = softehl_splat(0.0), v592 = softehl_splat(0.0), v593 = softehl_splat(0.0),
+                v594 = softehl_splat(0.0), v595 = softehl_splat(0.0), v596 = softehl_splat(0.0),
+                v597 = softehl_splat(0.0), v598 = softehl_splat(0.0), v599 = softehl_splat(0.0),
+                v600 = softehl_splat(0.0);
+            const M m601 = v563 & m562;
+            if (softehl_any(m601)) {
+                const V v602 = a10 + v499, v603 = v499 - a11, v604 = v602 * v603;
+                const M v605 = softehl_eq(v604, v604);
+                V v606 = softehl_splat(0.0), v607 = softehl_splat(0.0), v608 = softehl_splat(0.0),
+                    v609 = softehl_splat(0.0), v610 = softehl_splat(0.0);
+                const M m611 = v605 & m601;
+                if (softehl_any(m611)) {
+                    const M v612 = softehl_lt(v604, softehl_splat(0.0));
+                    const V v613 = softehl_blend(v612, v505, softehl_splat(0.0)),
+                        v614 = softehl_blend(v612, v455, softehl_splat(0.0)),
+                        v615 = softehl_blend(v612, v456, softehl_splat(0.0)),
+                        v616 = softehl_blend(v612, v36, softehl_splat(0.0)),
+                        v617 = softehl_blend(v612, v40, softehl_splat(0.0));
+                    v606 = softehl_blend(m611, v613, v606); v607 = softehl_blend(m611, v614, v607);
+                    v608 = softehl_blend(m611, v615, v608); v609 = softehl_blend(m611, v616, v609);
+                    v610 = softehl_blend(m611, v617, v610);
                 }
-                const M m616 = ~v603 & m599;
-                if (softehl_any(m616)) {
-                    const V v617 = v602 * v602, v618 = v602 * v617,
-                        v619 = 3.0 * v617 * (v600 + v601);
-                    v604 = softehl_blend(m616, v618, v604);
-                    v605 = softehl_blend(m616, softehl_splat(0.0), v605);
-                    v606 = softehl_blend(m616, softehl_splat(0.0), v606);
-                    v607 = softehl_blend(m616, v619, v607);
-                    v608 = softehl_blend(m616, softehl_splat(0.0), v608);
+                const M m618 = ~v605 & m601;
+                if (softehl_any(m618)) {
+                    const V v619 = v604 * v604, v620 = v604 * v619,
+                        v621 = 3.0 * v619 * (v602 + v603);
+                    v606 = softehl_blend(m618, v620, v606); v609 = softehl_blend(m618, v621, v609);
                 }
-                const V v620 = a9 * v604; const M v621 = softehl_eq(v620, v620);
-                const V v622 = v5 * v488 + (v4 * v487 - v3 * v453 - v2 * v454),
-                    v623 = v15 * v488 + (v14 * v487 - v7 * v453 - v9 * v454),
-                    v624 = d9 * v453 + d11 * v454 + a8 * (v86 * v622 + v87 * v623);
-                const M v625 = softehl_eq(v624, v624), v626 = v621 & v625;
-                V v627 = softehl_splat(0.0), v628 = softehl_splat(0.0), v629 = softehl_splat(0.0),
-                    v630 = softehl_splat(0.0), v631 = softehl_splat(0.0), v632 = softehl_splat(0.0);
-                const M m633 = v626 & m599;
-                if (softehl_any(m633)) {
-                    const M v634 = softehl_lt(v620, v624);
-                    V v635 = v620, v636 = softehl_splat(0.0), v637 = softehl_splat(0.0), v638 = a9,
-                        v639 = softehl_splat(0.0), v640 = softehl_splat(0.0);
-                    const M m641 = ~v634 & m633;
-                    if (softehl_any(m641)) {
-                        V v642 = softehl_splat(0.0), v643 = softehl_splat(0.0),
-                            v644 = softehl_splat(0.0), v645 = softehl_splat(0.0),
-                            v646 = softehl_splat(0.0), v647 = softehl_splat(0.0);
-                        const M m648 = v621 & m641;
-                        if (softehl_any(m648)) {
-                            const M v649 = softehl_lt(v620, -v624);
-                            V v650 = v624, v651 = v453, v652 = v454, v653 = softehl_splat(0.0),
-                                v654 = a8, v655 = v42;
-                            const M m656 = v649 & m648;
-                            if (softehl_any(m656)) {
-                                const V v657 = -v620; v650 = softehl_blend(m656, v657, v650);
-                                v651 = softehl_blend(m656, softehl_splat(0.0), v651);
-                                v652 = softehl_blend(m656, softehl_splat(0.0), v652);
-                                v653 = softehl_blend(m656, v13, v653);
-                                v654 = softehl_blend(m656, softehl_splat(0.0), v654);
-                                v655 = softehl_blend(m656, softehl_splat(0.0), v655);
+                const V v622 = a9 * v606; const M v623 = softehl_eq(v622, v622);
+                const V v624 = v5 * v490 + (v4 * v489 - v3 * v455 - v2 * v456),
+                    v625 = v15 * v490 + (v14 * v489 - v7 * v455 - v9 * v456),
+                    v626 = d9 * v455 + d11 * v456 + a8 * (v86 * v624 + v87 * v625);
+                const M v627 = softehl_eq(v626, v626), v628 = v623 & v627;
+                V v629 = softehl_splat(0.0), v630 = softehl_splat(0.0), v631 = softehl_splat(0.0),
+                    v632 = softehl_splat(0.0), v633 = softehl_splat(0.0), v634 = softehl_splat(0.0);
+                const M m635 = v628 & m601;
+                if (softehl_any(m635)) {
+                    const M v636 = softehl_lt(v622, v626);
+                    V v637 = v622, v638 = softehl_splat(0.0), v639 = softehl_splat(0.0), v640 = a9,
+                        v641 = softehl_splat(0.0), v642 = softehl_splat(0.0);
+                    const M m643 = ~v636 & m635;
+                    if (softehl_any(m643)) {
+                        V v644 = softehl_splat(0.0), v645 = softehl_splat(0.0),
+                            v646 = softehl_splat(0.0), v647 = softehl_splat(0.0),
+                            v648 = softehl_splat(0.0), v649 = softehl_splat(0.0);
+                        const M m650 = v623 & m643;
+                        if (softehl_any(m650)) {
+                            const M v651 = softehl_lt(v622, -v626);
+                            V v652 = v626, v653 = v455, v654 = v456, v655 = softehl_splat(0.0),
+                                v656 = a8, v657 = v42;
+                            const M m658 = v651 & m650;
+                            if (softehl_any(m658)) {
+                                const V v659 = -v622; v652 = softehl_blend(m658, v659, v652);
+                                v653 = softehl_blend(m658, softehl_splat(0.0), v653);
+                                v654 = softehl_blend(m658, softehl_splat(0.0), v654);
+                                v655 = softehl_blend(m658, v13, v655);
+                                v656 = softehl_blend(m658, softehl_splat(0.0), v656);
+                                v657 = softehl_blend(m658, softehl_splat(0.0), v657);
                             }
-                            v642 = softehl_blend(m648, v650, v642);
-                            v643 = softehl_blend(m648, v651, v643);
-                            v644 = softehl_blend(m648, v652, v644);
-                            v645 = softehl_blend(m648, v653, v645);
-                            v646 = softehl_blend(m648, v654, v646);
-                            v647 = softehl_blend(m648, v655, v647);
+                            v644 = softehl_blend(m650, v652, v644);
+                            v645 = softehl_blend(m650, v653, v645);
+                            v646 = softehl_blend(m650, v654, v646);
+                            v647 = softehl_blend(m650, v655, v647);
+                            v648 = softehl_blend(m650, v656, v648);
+                            v649 = softehl_blend(m650, v657, v649);
                         }
-                        const M m658 = ~v621 & m641;
-                        if (softehl_any(m658)) {
-                            const V v659 = v624 + v620, v660 = v659 * v659, v661 = v659 * v660,
-                                v662 = 3.0 * v660, v663 = v42 * v662, v664 = a9 * v662,
-                                v665 = a8 * v662, v666 = v453 * v662, v667 = v454 * v662;
-                            v642 = softehl_blend(m658, v661, v642);
-                            v643 = softehl_blend(m658, v666, v643);
-                            v644 = softehl_blend(m658, v667, v644);
-                            v645 = softehl_blend(m658, v664, v645);
-                            v646 = softehl_blend(m658, v665, v646);
-                            v647 = softehl_blend(m658, v663, v647);
+                        const M m660 = ~v623 & m643;
+                        if (softehl_any(m660)) {
+                            const V v661 = v626 + v622, v662 = v661 * v661, v663 = v661 * v662,
+                                v664 = 3.0 * v662, v665 = v42 * v664, v666 = a9 * v664,
+                                v667 = a8 * v664, v668 = v455 * v664, v669 = v456 * v664;
+                            v644 = softehl_blend(m660, v663, v644);
+                            v645 = softehl_blend(m660, v668, v645);
+                            v646 = softehl_blend(m660, v669, v646);
+                            v647 = softehl_blend(m660, v666, v647);
+                            v648 = softehl_blend(m660, v667, v648);
+                            v649 = softehl_blend(m660, v665, v649);
                         }
-                        v635 = softehl_blend(m641, v642, v635);
-                        v636 = softehl_blend(m641, v643, v636);
-                        v637 = softehl_blend(m641, v644, v637);
-                        v638 = softehl_blend(m641, v645, v638);
-                        v639 = softehl_blend(m641, v646, v639);
-                        v640 = softehl_blend(m641, v647, v640);
+                        v637 = softehl_blend(m643, v644, v637);
+                        v638 = softehl_blend(m643, v645, v638);
+                        v639 = softehl_blend(m643, v646, v639);
+                        v640 = softehl_blend(m643, v647, v640);
+                        v641 = softehl_blend(m643, v648, v641);
+                        v642 = softehl_blend(m643, v649, v642);
                     }
-                    v627 = softehl_blend(m633, v635, v627); v628 = softehl_blend(m633, v636, v628);
-                    v629 = softehl_blend(m633, v637, v629); v630 = softehl_blend(m633, v638, v630);
-                    v631 = softehl_blend(m633, v639, v631); v632 = softehl_blend(m633, v640, v632);
+                    v629 = softehl_blend(m635, v637, v629); v630 = softehl_blend(m635, v638, v630);
+                    v631 = softehl_blend(m635, v639, v631); v632 = softehl_blend(m635, v640, v632);
+                    v633 = softehl_blend(m635, v641, v633); v634 = softehl_blend(m635, v642, v634);
                 }
-                const M m668 = ~v626 & m599;
-                if (softehl_any(m668)) {
-                    const V v669 = v620 - v624, v670 = v669 * v669, v671 = v669 * v670,
-                        v672 = 3.0 * v670, v673 = v41 * v672, v674 = a9 * v672, v675 = -(a8 * v672),
-                        v676 = v455 * v672, v677 = -(v454 * v672);
-                    v627 = softehl_blend(m668, v671, v627); v628 = softehl_blend(m668, v676, v628);
-                    v629 = softehl_blend(m668, v677, v629); v630 = softehl_blend(m668, v674, v630);
-                    v631 = softehl_blend(m668, v675, v631); v632 = softehl_blend(m668, v673, v632);
+                const M m670 = ~v628 & m601;
+                if (softehl_any(m670)) {
+                    const V v671 = v622 - v626, v672 = v671 * v671, v673 = v671 * v672,
+                        v674 = 3.0 * v672, v675 = v41 * v674, v676 = a9 * v674, v677 = -(a8 * v674),
+                        v678 = v457 * v674, v679 = -(v456 * v674);
+                    v629 = softehl_blend(m670, v673, v629); v630 = softehl_blend(m670, v678, v630);
+                    v631 = softehl_blend(m670, v679, v631); v632 = softehl_blend(m670, v676, v632);
+                    v633 = softehl_blend(m670, v677, v633); v634 = softehl_blend(m670, v675, v634);
                 }
-                const V v678 = v92 * v623, v679 = v96 * v622, v680 = v605 * v630,
-                    v681 = v606 * v630,
-                    v682 = v630 * (v436 * v608 + v607 * v508) + v631 * (v436 * v279 + (v506 * v278 + (v679 + v101 * v623))),
-                    v683 = v630 * (v437 * v608 + v607 * v512) + v631 * (v437 * v279 + (v510 * v278 + (v98 * v622 - v678))),
-                    v684 = v630 * (v438 * v608 + v607 * v507) + v631 * (v438 * v279 + (v505 * v278 + (v100 * v623 - v679))),
-                    v685 = v631 * (v432 * v279 + v484 * v278) + v630 * (v432 * v608 + v607 * v491),
-                    v686 = v631 * (v433 * v279 + v499 * v278) + v630 * (v433 * v608 + v607 * v501),
-                    v687 = v631 * (v434 * v279 + v483 * v278) + v630 * (v434 * v608 + v607 * v492),
-                    v688 = v630 * (v435 * v608 + v607 * v511) + v631 * (v435 * v279 + (v509 * v278 + (v99 * v622 + v678))),
-                    v689 = v631 * (v439 * v279 + v500 * v278) + v630 * (v439 * v608 + v607 * v502),
-                    v690 = v628 * v480, v691 = v629 * v480, v692 = v628 * v479, v693 = v629 * v479,
-                    v694 = v628 * v481, v695 = v629 * v481, v696 = v628 * v482, v697 = v629 * v482,
-                    v698 = v471 * v690, v699 = v471 * v691, v700 = v471 * v692, v701 = v471 * v693,
-                    v702 = v470 * v690, v703 = v470 * v691, v704 = v470 * v692, v705 = v470 * v693,
-                    v706 = -(v489 * v690), v707 = -(v489 * v691), v708 = -(v489 * v692),
-                    v709 = -(v489 * v693), v710 = -(v490 * v690), v711 = -(v490 * v691),
-                    v712 = -(v490 * v692), v713 = -(v490 * v693);
-                v562 = softehl_blend(m599, v604, v562); v563 = softehl_blend(m599, v605, v563);
-                v564 = softehl_blend(m599, v606, v564); v565 = softehl_blend(m599, v627, v565);
-                v566 = softehl_blend(m599, v698, v566); v567 = softehl_blend(m599, v699, v567);
-                v568 = softehl_blend(m599, v700, v568); v569 = softehl_blend(m599, v701, v569);
-                v570 = softehl_blend(m599, v702, v570); v571 = softehl_blend(m599, v703, v571);
-                v572 = softehl_blend(m599, v704, v572); v573 = softehl_blend(m599, v705, v573);
-                v574 = softehl_blend(m599, v706, v574); v575 = softehl_blend(m599, v707, v575);
-                v576 = softehl_blend(m599, v708, v576); v577 = softehl_blend(m599, v709, v577);
-                v578 = softehl_blend(m599, v710, v578); v579 = softehl_blend(m599, v711, v579);
-                v580 = softehl_blend(m599, v712, v580); v581 = softehl_blend(m599, v713, v581);
-                v582 = softehl_blend(m599, v694, v582); v583 = softehl_blend(m599, v695, v583);
-                v584 = softehl_blend(m599, v696, v584); v585 = softehl_blend(m599, v697, v585);
-                v586 = softehl_blend(m599, v680, v586); v587 = softehl_blend(m599, v681, v587);
-                v588 = softehl_blend(m599, v607, v588); v589 = softehl_blend(m599, v608, v589);
-                v590 = softehl_blend(m599, v688, v590); v591 = softehl_blend(m599, v632, v591);
-                v592 = softehl_blend(m599, v682, v592); v593 = softehl_blend(m599, v683, v593);
-                v594 = softehl_blend(m599, v684, v594); v595 = softehl_blend(m599, v685, v595);
-                v596 = softehl_blend(m599, v686, v596); v597 = softehl_blend(m599, v687, v597);
-                v598 = softehl_blend(m599, v689, v598);
+                const V v680 = v92 * v625, v681 = v96 * v624, v682 = v607 * v632,
+                    v683 = v608 * v632,
+                    v684 = v632 * (v438 * v610 + v609 * v510) + v633 * (v438 * v281 + (v508 * v280 + (v681 + v101 * v625))),
+                    v685 = v632 * (v439 * v610 + v609 * v514) + v633 * (v439 * v281 + (v512 * v280 + (v98 * v624 - v680))),
+                    v686 = v632 * (v440 * v610 + v609 * v509) + v633 * (v440 * v281 + (v507 * v280 + (v100 * v625 - v681))),
+                    v687 = v633 * (v434 * v281 + v486 * v280) + v632 * (v434 * v610 + v609 * v493),
+                    v688 = v633 * (v435 * v281 + v501 * v280) + v632 * (v435 * v610 + v609 * v503),
+                    v689 = v633 * (v436 * v281 + v485 * v280) + v632 * (v436 * v610 + v609 * v494),
+                    v690 = v632 * (v437 * v610 + v609 * v513) + v633 * (v437 * v281 + (v511 * v280 + (v99 * v624 + v680))),
+                    v691 = v633 * (v441 * v281 + v502 * v280) + v632 * (v441 * v610 + v609 * v504),
+                    v692 = v630 * v482, v693 = v631 * v482, v694 = v630 * v481, v695 = v631 * v481,
+                    v696 = v630 * v483, v697 = v631 * v483, v698 = v630 * v484, v699 = v631 * v484,
+                    v700 = v473 * v692, v701 = v473 * v693, v702 = v473 * v694, v703 = v473 * v695,
+                    v704 = v472 * v692, v705 = v472 * v693, v706 = v472 * v694, v707 = v472 * v695,
+                    v708 = -(v491 * v692), v709 = -(v491 * v693), v710 = -(v491 * v694),
+                    v711 = -(v491 * v695), v712 = -(v492 * v692), v713 = -(v492 * v693),
+                    v714 = -(v492 * v694), v715 = -(v492 * v695);
+                v564 = softehl_blend(m601, v606, v564); v565 = softehl_blend(m601, v607, v565);
+                v566 = softehl_blend(m601, v608, v566); v567 = softehl_blend(m601, v629, v567);
+                v568 = softehl_blend(m601, v700, v568); v569 = softehl_blend(m601, v701, v569);
+                v570 = softehl_blend(m601, v702, v570); v571 = softehl_blend(m601, v703, v571);
+                v572 = softehl_blend(m601, v704, v572); v573 = softehl_blend(m601, v705, v573);
+                v574 = softehl_blend(m601, v706, v574); v575 = softehl_blend(m601, v707, v575);
+                v576 = softehl_blend(m601, v708, v576); v577 = softehl_blend(m601, v709, v577);
+                v578 = softehl_blend(m601, v710, v578); v579 = softehl_blend(m601, v711, v579);
+                v580 = softehl_blend(m601, v712, v580); v581 = softehl_blend(m601, v713, v581);
+                v582 = softehl_blend(m601, v714, v582); v583 = softehl_blend(m601, v715, v583);
+                v584 = softehl_blend(m601, v696, v584); v585 = softehl_blend(m601, v697, v585);
+                v586 = softehl_blend(m601, v698, v586); v587 = softehl_blend(m601, v699, v587);
+                v588 = softehl_blend(m601, v682, v588); v589 = softehl_blend(m601, v683, v589);
+                v590 = softehl_blend(m601, v609, v590); v591 = softehl_blend(m601, v610, v591);
+                v592 = softehl_blend(m601, v690, v592); v593 = softehl_blend(m601, v634, v593);
+                v594 = softehl_blend(m601, v684, v594); v595 = softehl_blend(m601, v685, v595);
+                v596 = softehl_blend(m601, v686, v596); v597 = softehl_blend(m601, v687, v597);
+                v598 = softehl_blend(m601, v688, v598); v599 = softehl_blend(m601, v689, v599);
+                v600 = softehl_blend(m601, v691, v600);
             }
-            v513 = softehl_blend(m560, v562, v513); v514 = softehl_blend(m560, v563, v514);
-            v515 = softehl_blend(m560, v564, v515); v516 = softehl_blend(m560, v565, v516);
-            v517 = softehl_blend(m560, v566, v517); v518 = softehl_blend(m560, v567, v518);
-            v519 = softehl_blend(m560, v568, v519); v520 = softehl_blend(m560, v569, v520);
-            v521 = softehl_blend(m560, v570, v521); v522 = softehl_blend(m560, v571, v522);
-            v523 = softehl_blend(m560, v572, v523); v524 = softehl_blend(m560, v573, v524);
-            v525 = softehl_blend(m560, v574, v525); v526 = softehl_blend(m560, v575, v526);
-            v527 = softehl_blend(m560, v576, v527); v528 = softehl_blend(m560, v577, v528);
-            v529 = softehl_blend(m560, v578, v529); v530 = softehl_blend(m560, v579, v530);
-            v531 = softehl_blend(m560, v580, v531); v532 = softehl_blend(m560, v581, v532);
-            v533 = softehl_blend(m560, v582, v533); v534 = softehl_blend(m560, v583, v534);
-            v535 = softehl_blend(m560, v584, v535); v536 = softehl_blend(m560, v585, v536);
-            v537 = softehl_blend(m560, v586, v537);
-            v538 = softehl_blend(m560, softehl_splat(0.0), v538);
-            v539 = softehl_blend(m560, v587, v539);
-            v540 = softehl_blend(m560, softehl_splat(0.0), v540);
-            v541 = softehl_blend(m560, v588, v541); v542 = softehl_blend(m560, v589, v542);
-            v543 = softehl_blend(m560, v590, v543); v544 = softehl_blend(m560, v591, v544);
-            v545 = softehl_blend(m560, softehl_splat(0.0), v545);
-            v546 = softehl_blend(m560, v592, v546);
-            v547 = softehl_blend(m560, softehl_splat(0.0), v547);
-            v548 = softehl_blend(m560, v593, v548);
-            v549 = softehl_blend(m560, softehl_splat(0.0), v549);
-            v550 = softehl_blend(m560, v594, v550);
-            v551 = softehl_blend(m560, softehl_splat(0.0), v551);
-            v552 = softehl_blend(m560, v595, v552);
-            v553 = softehl_blend(m560, softehl_splat(0.0), v553);
-            v554 = softehl_blend(m560, v596, v554);
-            v555 = softehl_blend(m560, softehl_splat(0.0), v555);
-            v556 = softehl_blend(m560, v597, v556);
-            v557 = softehl_blend(m560, softehl_splat(0.0), v557);
-            v558 = softehl_blend(m560, v598, v558);
-            v559 = softehl_blend(m560, softehl_splat(0.0), v559);
+            v515 = softehl_blend(m562, v564, v515); v516 = softehl_blend(m562, v565, v516);
+            v517 = softehl_blend(m562, v566, v517); v518 = softehl_blend(m562, v567, v518);
+            v519 = softehl_blend(m562, v568, v519); v520 = softehl_blend(m562, v569, v520);
+            v521 = softehl_blend(m562, v570, v521); v522 = softehl_blend(m562, v571, v522);
+            v523 = softehl_blend(m562, v572, v523); v524 = softehl_blend(m562, v573, v524);
+            v525 = softehl_blend(m562, v574, v525); v526 = softehl_blend(m562, v575, v526);
+            v527 = softehl_blend(m562, v576, v527); v528 = softehl_blend(m562, v577, v528);
+            v529 = softehl_blend(m562, v578, v529); v530 = softehl_blend(m562, v579, v530);
+            v531 = softehl_blend(m562, v580, v531); v532 = softehl_blend(m562, v581, v532);
+            v533 = softehl_blend(m562, v582, v533); v534 = softehl_blend(m562, v583, v534);
+            v535 = softehl_blend(m562, v584, v535); v536 = softehl_blend(m562, v585, v536);
+            v537 = softehl_blend(m562, v586, v537); v538 = softehl_blend(m562, v587, v538);
+            v539 = softehl_blend(m562, v588, v539); v541 = softehl_blend(m562, v589, v541);
+            v543 = softehl_blend(m562, v590, v543); v544 = softehl_blend(m562, v591, v544);
+            v545 = softehl_blend(m562, v592, v545); v546 = softehl_blend(m562, v593, v546);
+            v548 = softehl_blend(m562, v594, v548); v550 = softehl_blend(m562, v595, v550);
+            v552 = softehl_blend(m562, v596, v552); v554 = softehl_blend(m562, v597, v554);
+            v556 = softehl_blend(m562, v598, v556); v558 = softehl_blend(m562, v599, v558);
+            v560 = softehl_blend(m562, v600, v560);
         }
-        const M m714 = ~v504;
-        if (softehl_any(m714)) {
-            const V v715 = v498 - v459, v716 = v715 * v715, v717 = v715 * v716, v718 = 3.0 * v716,
-                v719 = v455 * v718, v720 = v39 * v718, v721 = -(v454 * v718), v722 = a8 * v718,
-                v723 = v722 * v511, v724 = v722 * v508, v725 = v722 * v512, v726 = v722 * v507,
-                v727 = v722 * v491, v728 = v722 * v501, v729 = v722 * v492, v730 = v722 * v502;
-            v513 = softehl_blend(m714, v717, v513); v514 = softehl_blend(m714, v719, v514);
-            v515 = softehl_blend(m714, v721, v515); v516 = softehl_blend(m714, v717, v516);
-            v517 = softehl_blend(m714, softehl_splat(0.0), v517);
-            v518 = softehl_blend(m714, softehl_splat(0.0), v518);
-            v519 = softehl_blend(m714, softehl_splat(0.0), v519);
-            v520 = softehl_blend(m714, softehl_splat(0.0), v520);
-            v521 = softehl_blend(m714, softehl_splat(0.0), v521);
-            v522 = softehl_blend(m714, softehl_splat(0.0), v522);
-            v523 = softehl_blend(m714, softehl_splat(0.0), v523);
-            v524 = softehl_blend(m714, softehl_splat(0.0), v524);
-            v525 = softehl_blend(m714, softehl_splat(0.0), v525);
-            v526 = softehl_blend(m714, softehl_splat(0.0), v526);
-            v527 = softehl_blend(m714, softehl_splat(0.0), v527);
-            v528 = softehl_blend(m714, softehl_splat(0.0), v528);
-            v529 = softehl_blend(m714, softehl_splat(0.0), v529);
-            v530 = softehl_blend(m714, softehl_splat(0.0), v530);
-            v531 = softehl_blend(m714, softehl_splat(0.0), v531);
-            v532 = softehl_blend(m714, softehl_splat(0.0), v532);
-            v533 = softehl_blend(m714, softehl_splat(0.0), v533);
-            v534 = softehl_blend(m714, softehl_splat(0.0), v534);
-            v535 = softehl_blend(m714, softehl_splat(0.0), v535);
-            v536 = softehl_blend(m714, softehl_splat(0.0), v536);
-            v537 = softehl_blend(m714, softehl_splat(0.0), v537);
-            v538 = softehl_blend(m714, v719, v538);
-            v539 = softehl_blend(m714, softehl_splat(0.0), v539);
-            v540 = softehl_blend(m714, v721, v540); v541 = softehl_blend(m714, v722, v541);
-            v542 = softehl_blend(m714, v720, v542);
-            v543 = softehl_blend(m714, softehl_splat(0.0), v543);
-            v544 = softehl_blend(m714, v720, v544); v545 = softehl_blend(m714, v723, v545);
-            v546 = softehl_blend(m714, softehl_splat(0.0), v546);
-            v547 = softehl_blend(m714, v724, v547);
-            v548 = softehl_blend(m714, softehl_splat(0.0), v548);
-            v549 = softehl_blend(m714, v725, v549);
-            v550 = softehl_blend(m714, softehl_splat(0.0), v550);
-            v551 = softehl_blend(m714, v726, v551);
-            v552 = softehl_blend(m714, softehl_splat(0.0), v552);
-            v553 = softehl_blend(m714, v727, v553);
-            v554 = softehl_blend(m714, softehl_splat(0.0), v554);
-            v555 = softehl_blend(m714, v728, v555);
-            v556 = softehl_blend(m714, softehl_splat(0.0), v556);
-            v557 = softehl_blend(m714, v729, v557);
-            v558 = softehl_blend(m714, softehl_splat(0.0), v558);
-            v559 = softehl_blend(m714, v730, v559);
+        const M m716 = ~v506;
+        if (softehl_any(m716)) {
+            const V v717 = v500 - v461, v718 = v717 * v717, v719 = v717 * v718, v720 = 3.0 * v718,
+                v721 = v457 * v720, v722 = v39 * v720, v723 = -(v456 * v720), v724 = a8 * v720,
+                v725 = v724 * v513, v726 = v724 * v510, v727 = v724 * v514, v728 = v724 * v509,
+                v729 = v724 * v493, v730 = v724 * v503, v731 = v724 * v494, v732 = v724 * v504;
+            v515 = softehl_blend(m716, v719, v515); v516 = softehl_blend(m716, v721, v516);
+            v517 = softehl_blend(m716, v723, v517); v518 = softehl_blend(m716, v719, v518);
+            v540 = softehl_blend(m716, v721, v540); v542 = softehl_blend(m716, v723, v542);
+            v543 = softehl_blend(m716, v724, v543); v544 = softehl_blend(m716, v722, v544);
+            v546 = softehl_blend(m716, v722, v546); v547 = softehl_blend(m716, v725, v547);
+            v549 = softehl_blend(m716, v726, v549); v551 = softehl_blend(m716, v727, v551);
+            v553 = softehl_blend(m716, v728, v553); v555 = softehl_blend(m716, v729, v555);
+            v557 = softehl_blend(m716, v730, v557); v559 = softehl_blend(m716, v731, v559);
+            v561 = softehl_blend(m716, v732, v561);
         }
-        s288 += v517; s289 += v518; s290 += v519; s291 += v520; s292 += v521; s293 += v522;
-        s294 += v523; s295 += v524; s296 += v525; s297 += v526; s298 += v527; s299 += v528;
-        s300 += v529; s301 += v530; s302 += v531; s303 += v532; s304 += v533; s305 += v534;
-        s306 += v535; s307 += v536;
-        const V v731 = v538 + v537, v732 = v540 + v539, v733 = v435 * v542 + v541 * v511,
-            v734 = v436 * v542 + v541 * v508, v735 = v437 * v542 + v541 * v512,
-            v736 = v438 * v542 + v541 * v507, v737 = v432 * v542 + v541 * v491,
-            v738 = v433 * v542 + v541 * v501, v739 = v434 * v542 + v541 * v492,
-            v740 = v439 * v542 + v541 * v502, v741 = w[1] * v514, v742 = v35 * w[1],
-            v743 = w[1] * v515, v744 = v514 * v479 + v731 * v480, v745 = v731 * v479 - v514 * v480;
-        s282 += v741 * v477; s284 += v741 * v478; s283 += v743 * v477; s285 += v743 * v478;
-        const V v746 = v515 * v479 + v732 * v480, v747 = v732 * v479 - v515 * v480;
-        s316 += v731 * v481; s317 += v732 * v481; s318 += v731 * v482; s319 += v732 * v482;
-        s322 += v471 * v745; s321 += v471 * v746; s323 += v471 * v747; s320 += v471 * v744;
-        s324 += v470 * v744; s325 += v470 * v746; s326 += v470 * v745; s327 += v470 * v747;
-        s328 += v489 * v744; s329 += v489 * v746; s330 += v489 * v745; s331 += v489 * v747;
-        s332 += v490 * v744; s333 += v490 * v746; s334 += v490 * v745; s335 += v490 * v747;
-        const V v748 = v742 * v454, v749 = v742 * v453, v750 = v513 * v469, v751 = v513 * v467,
-            v752 = v513 * v276, v753 = v516 * v469, v754 = v516 * v467, v755 = v516 * v276;
-        s280 += v748 * v750; s286 += v748 * v753; s281 += v749 * v750; s287 += v749 * v753;
-        const V v756 = 0.5 * v750, v757 = 0.5 * v753, v758 = v92 * v750, v759 = v92 * v753,
-            v760 = v96 * v750, v761 = v96 * v753, v762 = v35 * (v756 + v454 * v752),
-            v763 = v35 * (v757 + v454 * v755), v764 = v35 * (v453 * v752 - v756),
-            v765 = v35 * (v453 * v755 - v757), v766 = v435 * v544 + (v545 + v543),
-            v767 = v436 * v544 + (v547 + v546), v768 = v437 * v544 + (v549 + v548),
-            v769 = v438 * v544 + (v551 + v550), v770 = v439 * v544 + (v559 + v558),
-            v771 = v432 * v544 + (v553 + v552), v772 = v433 * v544 + (v555 + v554),
-            v773 = v434 * v544 + (v557 + v556), v774 = v472 * v751, v775 = v473 * v751,
-            v776 = v472 * v754, v777 = v473 * v754, v778 = v87 * v513 + v86 * v516,
-            v779 = v87 * v516 - v86 * v513, v780 = v778 * v469, v781 = v779 * v469,
-            v782 = v778 * v467, v783 = v779 * v467, v784 = v778 * v276, v785 = v779 * v276,
-            v786 = 0.5 * v780, v787 = 0.5 * v781;
-        s309 += v490 * v780; s308 += v490 * v781; s310 += v489 * v781; s311 += v489 * v780;
-        s312 += v470 * v781; s313 += v470 * v780; s314 += v471 * v781; s315 += v471 * v780;
-        const V v788 = v435 * v786, v789 = v435 * v787, v790 = v436 * v786, v791 = v436 * v787,
-            v792 = v437 * v786, v793 = v437 * v787, v794 = v438 * v786, v795 = v438 * v787,
-            v796 = v432 * v786, v797 = v432 * v787, v798 = v433 * v786, v799 = v433 * v787,
-            v800 = v434 * v786, v801 = v434 * v787, v802 = v439 * v786, v803 = v439 * v787,
-            v804 = v509 * v786, v805 = v509 * v787, v806 = v506 * v786, v807 = v506 * v787,
-            v808 = v510 * v786, v809 = v510 * v787, v810 = v505 * v786, v811 = v505 * v787,
-            v812 = v484 * v786, v813 = v484 * v787, v814 = v499 * v786, v815 = v499 * v787,
-            v816 = v483 * v786, v817 = v483 * v787, v818 = v500 * v786, v819 = v500 * v787,
-            v820 = v439 * v785 + (v267 * v783 + (v479 * v770 - v740 * v480)),
-            v821 = v250 * v782 + (v435 * v784 + (v99 * v753 + (v758 + v733 * v479))),
-            v822 = w[1] * (v453 * v820 - v803);
-        s383 += v822; const V v823 = w[1] * (v803 + v454 * v820); s399 += v823;
-        const V v824 = w[1] * (v819 - v487 * v820); s415 += v824;
-        const V v825 = w[1] * (v819 + v488 * v820); s431 += v825;
-        const V v826 = v267 * v782 + (v439 * v784 + v740 * v479) + v480 * v770,
-            v827 = v821 + v480 * v766,
-            v828 = v250 * v783 + (v435 * v785 + (v759 - v99 * v750)) - v733 * v480 + v479 * v766;
-        s336 += w[1] * (v250 * v774 + v435 * v764 + v733 * v477);
-        const V v829 = w[1] * (v453 * v826 - v802); s375 += v829;
-        s337 += w[1] * (v251 * v774 + v436 * v764 + v734 * v477);
-        s338 += w[1] * (v252 * v774 + v437 * v764 + v735 * v477);
-        const V v830 = w[1] * (v453 * v828 - v789); s376 += v830;
-        const V v831 = w[1] * (v453 * v827 - v788); s368 += v831;
-        const V v832 = w[1] * (v788 + v454 * v827); s384 += v832;
-        const V v833 = w[1] * (v789 + v454 * v828); s392 += v833;
-        const V v834 = w[1] * (v250 * v775 + (v435 * v762 + v733 * v478)); s344 += v834;
-        const V v835 = w[1] * (v252 * v775 + (v437 * v762 + v735 * v478)); s346 += v835;
-        const V v836 = w[1] * (v251 * v775 + (v436 * v762 + v734 * v478)); s345 += v836;
-        const V v837 = v437 * v785 + (v252 * v783 + (v479 * v768 - v98 * v750 - v759 - v735 * v480)),
-            v838 = v432 * v785 + (v261 * v783 + (v479 * v771 - v737 * v480)),
-            v839 = w[1] * (v453 * v837 - v793);
-        s378 += v839; s348 += w[1] * (v261 * v775 + v432 * v762 + v737 * v478);
-        s340 += w[1] * (v261 * v774 + v432 * v764 + v737 * v477);
-        const V v840 = w[1] * (v453 * v838 - v797); s380 += v840;
-        const V v841 = v251 * v782 + (v436 * v784 + (v761 + (v101 * v750 + v734 * v479)));
-        s339 += w[1] * (v258 * v774 + v438 * v764 + v736 * v477);
-        s347 += w[1] * (v258 * v775 + v438 * v762 + v736 * v478);
-        const V v842 = v841 + v480 * v767,
-            v843 = v261 * v782 + (v432 * v784 + v737 * v479) + v480 * v771,
-            v844 = w[1] * (v251 * v776 + (v436 * v765 + v477 * v767));
-        s353 += v844; const V v845 = w[1] * (v261 * v776 + (v432 * v765 + v477 * v771));
-        s356 += v845; const V v846 = w[1] * (v261 * v777 + (v432 * v763 + v478 * v771));
-        s364 += v846; const V v847 = w[1] * (v251 * v777 + v436 * v763 + v478 * v767); s361 += v847;
-        const V v848 = v436 * v785 + (v251 * v783 + (v101 * v753 - v760 - v734 * v480)) + v479 * v767,
-            v849 = v438 * v785 + (v258 * v783 + (v760 + v100 * v753)) - v736 * v480 + v479 * v769,
-            v850 = w[1] * (v453 * v842 - v790);
-        s369 += v850; const V v851 = w[1] * (v453 * v843 - v796); s372 += v851;
-        const V v852 = w[1] * (v453 * v848 - v791); s377 += v852;
-        const V v853 = w[1] * (v453 * v849 - v795); s379 += v853;
-        const V v854 = w[1] * (v790 + v454 * v842); s385 += v854;
-        const V v855 = w[1] * (v796 + v454 * v843); s388 += v855;
-        const V v856 = w[1] * (v791 + v454 * v848); s393 += v856;
-        const V v857 = w[1] * (v795 + v454 * v849); s395 += v857;
-        const V v858 = w[1] * (v258 * v777 + (v438 * v763 + v478 * v769)); s363 += v858;
-        const V v859 = v258 * v782 + (v438 * v784 + (v100 * v750 + (v736 * v479 - v761))),
-            v860 = v252 * v782 + (v437 * v784 + (v98 * v753 + (v735 * v479 - v758))),
-            v861 = v859 + v480 * v769, v862 = w[1] * (v258 * v776 + v438 * v765 + v477 * v769);
-        s355 += v862;
-        const V v863 = v860 + v480 * v768, v864 = w[1] * (v250 * v776 + v435 * v765 + v477 * v766);
-        s352 += v864; const V v865 = w[1] * (v250 * v777 + v435 * v763 + v478 * v766); s360 += v865;
-        const V v866 = w[1] * (v252 * v776 + v437 * v765 + v477 * v768); s354 += v866;
-        const V v867 = w[1] * (v252 * v777 + v437 * v763 + v478 * v768); s362 += v867;
-        const V v868 = w[1] * (v453 * v861 - v794); s371 += v868;
-        const V v869 = w[1] * (v453 * v863 - v792); s370 += v869;
-        s341 += w[1] * (v263 * v774 + v433 * v764 + v738 * v477);
-        s349 += w[1] * (v263 * v775 + v433 * v762 + v738 * v478);
-        s342 += w[1] * (v264 * v774 + v434 * v764 + v739 * v477);
-        s350 += w[1] * (v264 * v775 + v434 * v762 + v739 * v478);
-        s343 += w[1] * (v267 * v774 + v439 * v764 + v740 * v477);
-        s351 += w[1] * (v267 * v775 + v439 * v762 + v740 * v478);
-        const V v870 = w[1] * (v263 * v776 + v433 * v765 + v477 * v772); s357 += v870;
-        const V v871 = w[1] * (v264 * v776 + v434 * v765 + v477 * v773); s358 += v871;
-        const V v872 = w[1] * (v267 * v776 + v439 * v765 + v477 * v770); s359 += v872;
-        const V v873 = w[1] * (v267 * v777 + v439 * v763 + v478 * v770); s367 += v873;
-        const V v874 = w[1] * (v263 * v777 + v433 * v763 + v478 * v772); s365 += v874;
-        const V v875 = w[1] * (v264 * v777 + v434 * v763 + v478 * v773); s366 += v875;
-        const V v876 = w[1] * (v792 + v454 * v863); s386 += v876;
-        const V v877 = w[1] * (v794 + v454 * v861); s387 += v877;
-        const V v878 = w[1] * (v802 + v454 * v826); s391 += v878;
-        const V v879 = w[1] * (v793 + v454 * v837); s394 += v879;
-        const V v880 = v433 * v784 + (v263 * v782 + (v738 * v479 + v480 * v772)),
-            v881 = v434 * v784 + (v264 * v782 + (v739 * v479 + v480 * v773)),
-            v882 = v433 * v785 + (v263 * v783 + (v479 * v772 - v738 * v480)),
-            v883 = v434 * v785 + (v264 * v783 + (v479 * v773 - v739 * v480)),
-            v884 = w[1] * (v797 + v454 * v838);
-        s396 += v884; const V v885 = w[1] * (v798 + v454 * v880); s389 += v885;
-        const V v886 = w[1] * (v453 * v880 - v798); s373 += v886;
-        const V v887 = w[1] * (v453 * v881 - v800); s374 += v887;
-        const V v888 = w[1] * (v453 * v882 - v799); s381 += v888;
-        const V v889 = w[1] * (v453 * v883 - v801); s382 += v889;
-        const V v890 = w[1] * (v800 + v454 * v881); s390 += v890;
-        const V v891 = w[1] * (v799 + v454 * v882); s397 += v891;
-        const V v892 = w[1] * (v801 + v454 * v883); s398 += v892;
-        const V v893 = w[1] * (v814 - v487 * v880); s405 += v893;
-        const V v894 = w[1] * (v816 - v487 * v881); s406 += v894;
-        const V v895 = w[1] * (v815 - v487 * v882); s413 += v895;
-        const V v896 = w[1] * (v817 - v487 * v883); s414 += v896;
-        const V v897 = w[1] * (v814 + v488 * v880); s421 += v897;
-        const V v898 = w[1] * (v816 + v488 * v881); s422 += v898;
-        const V v899 = w[1] * (v815 + v488 * v882); s429 += v899;
-        const V v900 = w[1] * (v817 + v488 * v883); s430 += v900;
-        const V v901 = w[1] * (v804 - v487 * v827); s400 += v901;
-        const V v902 = w[1] * (v804 + v488 * v827); s416 += v902;
-        const V v903 = w[1] * (v806 - v487 * v842); s401 += v903;
-        const V v904 = w[1] * (v806 + v488 * v842); s417 += v904;
-        const V v905 = w[1] * (v808 - v487 * v863); s402 += v905;
-        const V v906 = w[1] * (v808 + v488 * v863); s418 += v906;
-        const V v907 = w[1] * (v810 - v487 * v861); s403 += v907;
-        const V v908 = w[1] * (v810 + v488 * v861); s419 += v908;
-        const V v909 = w[1] * (v812 - v487 * v843); s404 += v909;
-        const V v910 = w[1] * (v812 + v488 * v843); s420 += v910;
-        const V v911 = w[1] * (v818 - v487 * v826); s407 += v911;
-        const V v912 = w[1] * (v818 + v488 * v826); s423 += v912;
-        const V v913 = w[1] * (v805 - v487 * v828); s408 += v913;
-        const V v914 = w[1] * (v805 + v488 * v828); s424 += v914;
-        const V v915 = w[1] * (v807 - v487 * v848); s409 += v915;
-        const V v916 = w[1] * (v807 + v488 * v848); s425 += v916;
-        const V v917 = w[1] * (v809 - v487 * v837); s410 += v917;
-        const V v918 = w[1] * (v809 + v488 * v837); s426 += v918;
-        const V v919 = w[1] * (v811 - v487 * v849); s411 += v919;
-        const V v920 = w[1] * (v811 + v488 * v849); s427 += v920;
-        const V v921 = w[1] * (v813 - v487 * v838); s412 += v921;
-        const V v922 = w[1] * (v813 + v488 * v838); s428 += v922;
+        s290 += v519; s291 += v520; s292 += v521; s293 += v522; s294 += v523; s295 += v524;
+        s296 += v525; s297 += v526; s298 += v527; s299 += v528; s300 += v529; s301 += v530;
+        s302 += v531; s303 += v532; s304 += v533; s305 += v534; s306 += v535; s307 += v536;
+        s308 += v537; s309 += v538;
+        const V v733 = v540 + v539, v734 = v542 + v541, v735 = v437 * v544 + v543 * v513,
+            v736 = v438 * v544 + v543 * v510, v737 = v439 * v544 + v543 * v514,
+            v738 = v440 * v544 + v543 * v509, v739 = v434 * v544 + v543 * v493,
+            v740 = v435 * v544 + v543 * v503, v741 = v436 * v544 + v543 * v494,
+            v742 = v441 * v544 + v543 * v504, v743 = w[1] * v516, v744 = v35 * w[1],
+            v745 = w[1] * v517, v746 = v516 * v481 + v733 * v482, v747 = v733 * v481 - v516 * v482;
+        s284 += v743 * v479; s286 += v743 * v480; s285 += v745 * v479; s287 += v745 * v480;
+        const V v748 = v517 * v481 + v734 * v482, v749 = v734 * v481 - v517 * v482;
+        s318 += v733 * v483; s319 += v734 * v483; s320 += v733 * v484; s321 += v734 * v484;
+        s324 += v473 * v747; s323 += v473 * v748; s325 += v473 * v749; s322 += v473 * v746;
+        s326 += v472 * v746; s327 += v472 * v748; s328 += v472 * v747; s329 += v472 * v749;
+        s330 += v491 * v746; s331 += v491 * v748; s332 += v491 * v747; s333 += v491 * v749;
+        s334 += v492 * v746; s335 += v492 * v748; s336 += v492 * v747; s337 += v492 * v749;
+        const V v750 = v744 * v456, v751 = v744 * v455, v752 = v515 * v471, v753 = v515 * v469,
+            v754 = v515 * v278, v755 = v518 * v471, v756 = v518 * v469, v757 = v518 * v278;
+        s282 += v750 * v752; s288 += v750 * v755; s283 += v751 * v752; s289 += v751 * v755;
+        const V v758 = 0.5 * v752, v759 = 0.5 * v755, v760 = v92 * v752, v761 = v92 * v755,
+            v762 = v96 * v752, v763 = v96 * v755, v764 = v35 * (v758 + v456 * v754),
+            v765 = v35 * (v759 + v456 * v757), v766 = v35 * (v455 * v754 - v758),
+            v767 = v35 * (v455 * v757 - v759), v768 = v437 * v546 + (v547 + v545),
+            v769 = v438 * v546 + (v549 + v548), v770 = v439 * v546 + (v551 + v550),
+            v771 = v440 * v546 + (v553 + v552), v772 = v441 * v546 + (v561 + v560),
+            v773 = v434 * v546 + (v555 + v554), v774 = v435 * v546 + (v557 + v556),
+            v775 = v436 * v546 + (v559 + v558), v776 = v474 * v753, v777 = v475 * v753,
+            v778 = v474 * v756, v779 = v475 * v756, v780 = v87 * v515 + v86 * v518,
+            v781 = v87 * v518 - v86 * v515, v782 = v780 * v471, v783 = v781 * v471,
+            v784 = v780 * v469, v785 = v781 * v469, v786 = v780 * v278, v787 = v781 * v278,
+            v788 = 0.5 * v782, v789 = 0.5 * v783;
+        s311 += v492 * v782; s310 += v492 * v783; s312 += v491 * v783; s313 += v491 * v782;
+        s314 += v472 * v783; s315 += v472 * v782; s316 += v473 * v783; s317 += v473 * v782;
+        const V v790 = v437 * v788, v791 = v437 * v789, v792 = v438 * v788, v793 = v438 * v789,
+            v794 = v439 * v788, v795 = v439 * v789, v796 = v440 * v788, v797 = v440 * v789,
+            v798 = v434 * v788, v799 = v434 * v789, v800 = v435 * v788, v801 = v435 * v789,
+            v802 = v436 * v788, v803 = v436 * v789, v804 = v441 * v788, v805 = v441 * v789,
+            v806 = v511 * v788, v807 = v511 * v789, v808 = v508 * v788, v809 = v508 * v789,
+            v810 = v512 * v788, v811 = v512 * v789, v812 = v507 * v788, v813 = v507 * v789,
+            v814 = v486 * v788, v815 = v486 * v789, v816 = v501 * v788, v817 = v501 * v789,
+            v818 = v485 * v788, v819 = v485 * v789, v820 = v502 * v788, v821 = v502 * v789,
+            v822 = v441 * v787 + (v269 * v785 + (v481 * v772 - v742 * v482)),
+            v823 = v252 * v784 + (v437 * v786 + (v99 * v755 + (v760 + v735 * v481))),
+            v824 = w[1] * (v455 * v822 - v805);
+        s385 += v824; const V v825 = w[1] * (v805 + v456 * v822); s401 += v825;
+        const V v826 = w[1] * (v821 - v489 * v822); s417 += v826;
+        const V v827 = w[1] * (v821 + v490 * v822); s433 += v827;
+        const V v828 = v269 * v784 + (v441 * v786 + v742 * v481) + v482 * v772,
+            v829 = v823 + v482 * v768,
+            v830 = v252 * v785 + (v437 * v787 + (v761 - v99 * v752)) - v735 * v482 + v481 * v768;
+        s338 += w[1] * (v252 * v776 + v437 * v766 + v735 * v479);
+        const V v831 = w[1] * (v455 * v828 - v804); s377 += v831;
+        s339 += w[1] * (v253 * v776 + v438 * v766 + v736 * v479);
+        s340 += w[1] * (v254 * v776 + v439 * v766 + v737 * v479);
+        const V v832 = w[1] * (v455 * v830 - v791); s378 += v832;
+        const V v833 = w[1] * (v455 * v829 - v790); s370 += v833;
+        const V v834 = w[1] * (v790 + v456 * v829); s386 += v834;
+        const V v835 = w[1] * (v791 + v456 * v830); s394 += v835;
+        const V v836 = w[1] * (v252 * v777 + (v437 * v764 + v735 * v480)); s346 += v836;
+        const V v837 = w[1] * (v254 * v777 + (v439 * v764 + v737 * v480)); s348 += v837;
+        const V v838 = w[1] * (v253 * v777 + (v438 * v764 + v736 * v480)); s347 += v838;
+        const V v839 = v439 * v787 + (v254 * v785 + (v481 * v770 - v98 * v752 - v761 - v737 * v482)),
+            v840 = v434 * v787 + (v263 * v785 + (v481 * v773 - v739 * v482)),
+            v841 = w[1] * (v455 * v839 - v795);
+        s380 += v841; s350 += w[1] * (v263 * v777 + v434 * v764 + v739 * v480);
+        s342 += w[1] * (v263 * v776 + v434 * v766 + v739 * v479);
+        const V v842 = w[1] * (v455 * v840 - v799); s382 += v842;
+        const V v843 = v253 * v784 + (v438 * v786 + (v763 + (v101 * v752 + v736 * v481)));
+        s341 += w[1] * (v260 * v776 + v440 * v766 + v738 * v479);
+        s349 += w[1] * (v260 * v777 + v440 * v764 + v738 * v480);
+        const V v844 = v843 + v482 * v769,
+            v845 = v263 * v784 + (v434 * v786 + v739 * v481) + v482 * v773,
+            v846 = w[1] * (v253 * v778 + (v438 * v767 + v479 * v769));
+        s355 += v846; const V v847 = w[1] * (v263 * v778 + (v434 * v767 + v479 * v773));
+        s358 += v847; const V v848 = w[1] * (v263 * v779 + (v434 * v765 + v480 * v773));
+        s366 += v848; const V v849 = w[1] * (v253 * v779 + v438 * v765 + v480 * v769); s363 += v849;
+        const V v850 = v438 * v787 + (v253 * v785 + (v101 * v755 - v762 - v736 * v482)) + v481 * v769,
+            v851 = v440 * v787 + (v260 * v785 + (v762 + v100 * v755)) - v738 * v482 + v481 * v771,
+            v852 = w[1] * (v455 * v844 - v792);
+        s371 += v852; const V v853 = w[1] * (v455 * v845 - v798); s374 += v853;
+        const V v854 = w[1] * (v455 * v850 - v793); s379 += v854;
+        const V v855 = w[1] * (v455 * v851 - v797); s381 += v855;
+        const V v856 = w[1] * (v792 + v456 * v844); s387 += v856;
+        const V v857 = w[1] * (v798 + v456 * v845); s390 += v857;
+        const V v858 = w[1] * (v793 + v456 * v850); s395 += v858;
+        const V v859 = w[1] * (v797 + v456 * v851); s397 += v859;
+        const V v860 = w[1] * (v260 * v779 + (v440 * v765 + v480 * v771)); s365 += v860;
+        const V v861 = v260 * v784 + (v440 * v786 + (v100 * v752 + (v738 * v481 - v763))),
+            v862 = v254 * v784 + (v439 * v786 + (v98 * v755 + (v737 * v481 - v760))),
+            v863 = v861 + v482 * v771, v864 = w[1] * (v260 * v778 + v440 * v767 + v479 * v771);
+        s357 += v864;
+        const V v865 = v862 + v482 * v770, v866 = w[1] * (v252 * v778 + v437 * v767 + v479 * v768);
+        s354 += v866; const V v867 = w[1] * (v252 * v779 + v437 * v765 + v480 * v768); s362 += v867;
+        const V v868 = w[1] * (v254 * v778 + v439 * v767 + v479 * v770); s356 += v868;
+        const V v869 = w[1] * (v254 * v779 + v439 * v765 + v480 * v770); s364 += v869;
+        const V v870 = w[1] * (v455 * v863 - v796); s373 += v870;
+        const V v871 = w[1] * (v455 * v865 - v794); s372 += v871;
+        s343 += w[1] * (v265 * v776 + v435 * v766 + v740 * v479);
+        s351 += w[1] * (v265 * v777 + v435 * v764 + v740 * v480);
+        s344 += w[1] * (v266 * v776 + v436 * v766 + v741 * v479);
+        s352 += w[1] * (v266 * v777 + v436 * v764 + v741 * v480);
+        s345 += w[1] * (v269 * v776 + v441 * v766 + v742 * v479);
+        s353 += w[1] * (v269 * v777 + v441 * v764 + v742 * v480);
+        const V v872 = w[1] * (v265 * v778 + v435 * v767 + v479 * v774); s359 += v872;
+        const V v873 = w[1] * (v266 * v778 + v436 * v767 + v479 * v775); s360 += v873;
+        const V v874 = w[1] * (v269 * v778 + v441 * v767 + v479 * v772); s361 += v874;
+        const V v875 = w[1] * (v269 * v779 + v441 * v765 + v480 * v772); s369 += v875;
+        const V v876 = w[1] * (v265 * v779 + v435 * v765 + v480 * v774); s367 += v876;
+        const V v877 = w[1] * (v266 * v779 + v436 * v765 + v480 * v775); s368 += v877;
+        const V v878 = w[1] * (v794 + v456 * v865); s388 += v878;
+        const V v879 = w[1] * (v796 + v456 * v863); s389 += v879;
+        const V v880 = w[1] * (v804 + v456 * v828); s393 += v880;
+        const V v881 = w[1] * (v795 + v456 * v839); s396 += v881;
+        const V v882 = v435 * v786 + (v265 * v784 + (v740 * v481 + v482 * v774)),
+            v883 = v436 * v786 + (v266 * v784 + (v741 * v481 + v482 * v775)),
+            v884 = v435 * v787 + (v265 * v785 + (v481 * v774 - v740 * v482)),
+            v885 = v436 * v787 + (v266 * v785 + (v481 * v775 - v741 * v482)),
+            v886 = w[1] * (v799 + v456 * v840);
+        s398 += v886; const V v887 = w[1] * (v800 + v456 * v882); s391 += v887;
+        const V v888 = w[1] * (v455 * v882 - v800); s375 += v888;
+        const V v889 = w[1] * (v455 * v883 - v802); s376 += v889;
+        const V v890 = w[1] * (v455 * v884 - v801); s383 += v890;
+        const V v891 = w[1] * (v455 * v885 - v803); s384 += v891;
+        const V v892 = w[1] * (v802 + v456 * v883); s392 += v892;
+        const V v893 = w[1] * (v801 + v456 * v884); s399 += v893;
+        const V v894 = w[1] * (v803 + v456 * v885); s400 += v894;
+        const V v895 = w[1] * (v816 - v489 * v882); s407 += v895;
+        const V v896 = w[1] * (v818 - v489 * v883); s408 += v896;
+        const V v897 = w[1] * (v817 - v489 * v884); s415 += v897;
+        const V v898 = w[1] * (v819 - v489 * v885); s416 += v898;
+        const V v899 = w[1] * (v816 + v490 * v882); s423 += v899;
+        const V v900 = w[1] * (v818 + v490 * v883); s424 += v900;
+        const V v901 = w[1] * (v817 + v490 * v884); s431 += v901;
+        const V v902 = w[1] * (v819 + v490 * v885); s432 += v902;
+        const V v903 = w[1] * (v806 - v489 * v829); s402 += v903;
+        const V v904 = w[1] * (v806 + v490 * v829); s418 += v904;
+        const V v905 = w[1] * (v808 - v489 * v844); s403 += v905;
+        const V v906 = w[1] * (v808 + v490 * v844); s419 += v906;
+        const V v907 = w[1] * (v810 - v489 * v865); s404 += v907;
+        const V v908 = w[1] * (v810 + v490 * v865); s420 += v908;
+        const V v909 = w[1] * (v812 - v489 * v863); s405 += v909;
+        const V v910 = w[1] * (v812 + v490 * v863); s421 += v910;
+        const V v911 = w[1] * (v814 - v489 * v845); s406 += v911;
+        const V v912 = w[1] * (v814 + v490 * v845); s422 += v912;
+        const V v913 = w[1] * (v820 - v489 * v828); s409 += v913;
+        const V v914 = w[1] * (v820 + v490 * v828); s425 += v914;
+        const V v915 = w[1] * (v807 - v489 * v830); s410 += v915;
+        const V v916 = w[1] * (v807 + v490 * v830); s426 += v916;
+        const V v917 = w[1] * (v809 - v489 * v850); s411 += v917;
+        const V v918 = w[1] * (v809 + v490 * v850); s427 += v918;
+        const V v919 = w[1] * (v811 - v489 * v839); s412 += v919;
+        const V v920 = w[1] * (v811 + v490 * v839); s428 += v920;
+        const V v921 = w[1] * (v813 - v489 * v851); s413 += v921;
+        const V v922 = w[1] * (v813 + v490 * v851); s429 += v922;
+        const V v923 = w[1] * (v815 - v489 * v840); s414 += v923;
+        const V v924 = w[1] * (v815 + v490 * v840); s430 += v924;
     }
-    softehl_store4(K + 104, 144, s282, softehl_splat(0.0), s283, softehl_splat(0.0));
-    softehl_store4(K + 128, 144, s284, softehl_splat(0.0), s285, softehl_splat(0.0));
-    softehl_store4(R + 8, 12, s281, s287, s280, s286);
-    softehl_store4(R + 0, 12, s315, s314, s313, s312);
-    softehl_store4(K + 116, 144, s316, s304, s317, s305);
-    softehl_store4(K + 140, 144, s318, s306, s319, s307);
-    softehl_store4(K + 8, 144, s320, s288, s321, s289);
-    softehl_store4(K + 20, 144, s322, s290, s323, s291);
-    softehl_store4(K + 32, 144, s324, s292, s325, s293);
-    softehl_store4(K + 44, 144, s326, s294, s327, s295);
-    softehl_store4(K + 96, 144, s336, s337, s338, s339);
-    softehl_store4(K + 100, 144, s340, s341, s342, s343);
-    softehl_store4(K + 120, 144, s344, s345, s346, s347);
-    softehl_store4(K + 124, 144, s348, s349, s350, s351);
-    softehl_store4(K + 108, 144, s352, s353, s354, s355);
-    softehl_store4(K + 112, 144, s356, s357, s358, s359);
-    softehl_store4(K + 132, 144, s360, s361, s362, s363);
-    softehl_store4(K + 136, 144, s364, s365, s366, s367);
-    softehl_store4(K + 0, 144, s368, s369, s370, s371);
-    softehl_store4(K + 4, 144, s372, s373, s374, s375);
-    softehl_store4(K + 12, 144, s376, s377, s378, s379);
-    softehl_store4(K + 16, 144, s380, s381, s382, s383);
-    softehl_store4(K + 24, 144, s384, s385, s386, s387);
-    softehl_store4(K + 28, 144, s388, s389, s390, s391);
-    softehl_store4(K + 36, 144, s392, s393, s394, s395);
-    softehl_store4(K + 40, 144, s396, s397, s398, s399);
-    softehl_store4(K + 48, 144, s400, s401, s402, s403);
-    softehl_store4(K + 52, 144, s404, s405, s406, s407);
-    softehl_store4(K + 60, 144, s408, s409, s410, s411);
-    softehl_store4(K + 64, 144, s412, s413, s414, s415);
-    softehl_store4(R + 4, 12, -s311, -s310, -s309, -s308);
-    softehl_store4(K + 56, 144, -s328, s296, -s329, s297);
-    softehl_store4(K + 68, 144, -s330, s298, -s331, s299);
-    softehl_store4(K + 80, 144, -s332, s300, -s333, s301);
-    softehl_store4(K + 92, 144, -s334, s302, -s335, s303);
-    softehl_store4(K + 72, 144, -s416, -s417, -s418, -s419);
-    softehl_store4(K + 76, 144, -s420, -s421, -s422, -s423);
-    softehl_store4(K + 84, 144, -s424, -s425, -s426, -s427);
-    softehl_store4(K + 88, 144, -s428, -s429, -s430, -s431);
+    softehl_store4(K + 104, 144, s284, softehl_splat(0.0), s285, softehl_splat(0.0));
+    softehl_store4(K + 128, 144, s286, softehl_splat(0.0), s287, softehl_splat(0.0));
+    softehl_store4(R + 8, 12, s283, s289, s282, s288);
+    softehl_store4(R + 0, 12, s317, s316, s315, s314);
+    softehl_store4(K + 116, 144, s318, s306, s319, s307);
+    softehl_store4(K + 140, 144, s320, s308, s321, s309);
+    softehl_store4(K + 8, 144, s322, s290, s323, s291);
+    softehl_store4(K + 20, 144, s324, s292, s325, s293);
+    softehl_store4(K + 32, 144, s326, s294, s327, s295);
+    softehl_store4(K + 44, 144, s328, s296, s329, s297);
+    softehl_store4(K + 96, 144, s338, s339, s340, s341);
+    softehl_store4(K + 100, 144, s342, s343, s344, s345);
+    softehl_store4(K + 120, 144, s346, s347, s348, s349);
+    softehl_store4(K + 124, 144, s350, s351, s352, s353);
+    softehl_store4(K + 108, 144, s354, s355, s356, s357);
+    softehl_store4(K + 112, 144, s358, s359, s360, s361);
+    softehl_store4(K + 132, 144, s362, s363, s364, s365);
+    softehl_store4(K + 136, 144, s366, s367, s368, s369);
+    softehl_store4(K + 0, 144, s370, s371, s372, s373);
+    softehl_store4(K + 4, 144, s374, s375, s376, s377);
+    softehl_store4(K + 12, 144, s378, s379, s380, s381);
+    softehl_store4(K + 16, 144, s382, s383, s384, s385);
+    softehl_store4(K + 24, 144, s386, s387, s388, s389);
+    softehl_store4(K + 28, 144, s390, s391, s392, s393);
+    softehl_store4(K + 36, 144, s394, s395, s396, s397);
+    softehl_store4(K + 40, 144, s398, s399, s400, s401);
+    softehl_store4(K + 48, 144, s402, s403, s404, s405);
+    softehl_store4(K + 52, 144, s406, s407, s408, s409);
+    softehl_store4(K + 60, 144, s410, s411, s412, s413);
+    softehl_store4(K + 64, 144, s414, s415, s416, s417);
+    softehl_store4(R + 4, 12, -s313, -s312, -s311, -s310);
+    softehl_store4(K + 56, 144, -s330, s298, -s331, s299);
+    softehl_store4(K + 68, 144, -s332, s300, -s333, s301);
+    softehl_store4(K + 80, 144, -s334, s302, -s335, s303);
+    softehl_store4(K + 92, 144, -s336, s304, -s337, s305);
+    softehl_store4(K + 72, 144, -s418, -s419, -s420, -s421);
+    softehl_store4(K + 76, 144, -s422, -s423, -s424, -s425);
+    softehl_store4(K + 84, 144, -s426, -s427, -s428, -s429);
+    softehl_store4(K + 88, 144, -s430, -s431, -s432, -s433);
 }
 SOFTEHL_BATCH(softehl_mortar_22_tangent, 8, 12, 13, 0, 12, (12 * 12))

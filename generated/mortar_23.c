@@ -249,14 +249,18 @@ SOFTEHL_GROUP(softehl_mortar_23_tangent)
             v129 = softehl_splat(0.0);
         const M m130 = v122 & m121;
         if (softehl_any(m130)) {
-            V v131 = softehl_splat(0.0), v132 = softehl_splat(0.0), v133 = softehl_splat(0.0),
-                v134 = softehl_splat(0.0), v135 = softehl_splat(0.0), v136 = softehl_splat(0.0);
-            const M m137 = ~v60 & m130;
+            V v131 = v78, v132 = v79, v133 = softehl_splat(0.0), v134 = softehl_splat(0.0),
+                v135 = softehl_splat(0.0), v136 = softehl_splat(0.0);
+            const M m137 = v60 & m130;
             if (softehl_any(m137)) {
-                const V v138 = -v81, v139 = -v83, v140 = v70 - v85, v141 = v72 - v87;
-                v131 = softehl_blend(m137, v78, v131); v132 = softehl_blend(m137, v79, v132);
-                v133 = softehl_blend(m137, v138, v133); v134 = softehl_blend(m137, v139, v134);
-                v135 = softehl_blend(m137, v140, v135); v136 = softehl_blend(m137, v141, v136);
+                v131 = softehl_blend(m137, softehl_splat(0.0), v131);
+                v132 = softehl_blend(m137, softehl_splat(0.0), v132);
+            }
+            const M m138 = ~v60 & m130;
+            if (softehl_any(m138)) {
+                const V v139 = -v81, v140 = -v83, v141 = v70 - v85, v142 = v72 - v87;
+                v133 = softehl_blend(m138, v139, v133); v134 = softehl_blend(m138, v140, v134);
+                v135 = softehl_blend(m138, v141, v135); v136 = softehl_blend(m138, v142, v136);
             }
             v123 = softehl_blend(m130, v61, v123); v124 = softehl_blend(m130, v131, v124);
             v125 = softehl_blend(m130, v132, v125); v126 = softehl_blend(m130, v133, v126);
@@ -268,771 +272,713 @@ SOFTEHL_GROUP(softehl_mortar_23_tangent)
         v118 = softehl_blend(m121, v129, v118); v119 = softehl_blend(m121, v124, v119);
         v120 = softehl_blend(m121, v125, v120);
     }
-    const M m142 = ~v62;
-    if (softehl_any(m142)) {
-        const V v143 = (-1.0) - v61, v144 = v143 * (v143 * v143);
-        V v145 = softehl_splat(0.0), v146 = softehl_splat(0.0), v147 = softehl_splat(0.0),
-            v148 = softehl_splat(0.0), v149 = softehl_splat(0.0), v150 = softehl_splat(0.0);
-        const M m151 = ~v60 & m142;
-        if (softehl_any(m151)) {
-            const V v152 = (-1.0) - v59, v153 = v152 * (3.0 * v152), v154 = (v85 - v70) * v153,
-                v155 = (v87 - v72) * v153, v156 = v81 * v153, v157 = v83 * v153,
-                v158 = -(v78 * v153), v159 = -(v79 * v153);
-            v145 = softehl_blend(m151, v156, v145); v146 = softehl_blend(m151, v157, v146);
-            v147 = softehl_blend(m151, v154, v147); v148 = softehl_blend(m151, v155, v148);
-            v149 = softehl_blend(m151, v158, v149); v150 = softehl_blend(m151, v159, v150);
+    const M m143 = ~v62;
+    if (softehl_any(m143)) {
+        const V v144 = (-1.0) - v61, v145 = v144 * (v144 * v144);
+        V v146 = softehl_splat(0.0), v147 = softehl_splat(0.0), v148 = softehl_splat(0.0),
+            v149 = softehl_splat(0.0), v150 = softehl_splat(0.0), v151 = softehl_splat(0.0);
+        const M m152 = ~v60 & m143;
+        if (softehl_any(m152)) {
+            const V v153 = (-1.0) - v59, v154 = v153 * (3.0 * v153), v155 = (v85 - v70) * v154,
+                v156 = (v87 - v72) * v154, v157 = v81 * v154, v158 = v83 * v154,
+                v159 = -(v78 * v154), v160 = -(v79 * v154);
+            v146 = softehl_blend(m152, v157, v146); v147 = softehl_blend(m152, v158, v147);
+            v148 = softehl_blend(m152, v155, v148); v149 = softehl_blend(m152, v156, v149);
+            v150 = softehl_blend(m152, v159, v150); v151 = softehl_blend(m152, v160, v151);
         }
-        v114 = softehl_blend(m142, v144, v114); v115 = softehl_blend(m142, v145, v115);
-        v116 = softehl_blend(m142, v146, v116); v117 = softehl_blend(m142, v147, v117);
-        v118 = softehl_blend(m142, v148, v118); v119 = softehl_blend(m142, v149, v119);
-        v120 = softehl_blend(m142, v150, v120);
+        v114 = softehl_blend(m143, v145, v114); v115 = softehl_blend(m143, v146, v115);
+        v116 = softehl_blend(m143, v147, v116); v117 = softehl_blend(m143, v148, v117);
+        v118 = softehl_blend(m143, v149, v118); v119 = softehl_blend(m143, v150, v119);
+        v120 = softehl_blend(m143, v151, v120);
     }
-    V v160 = softehl_splat(0.0), v161 = softehl_splat(0.0), v162 = softehl_splat(0.0),
-        v163 = softehl_splat(0.0), v164 = softehl_splat(0.0), v165 = softehl_splat(0.0),
-        v166 = softehl_splat(0.0);
-    const M m167 = v66;
-    if (softehl_any(m167)) {
-        const M v168 = softehl_lt(softehl_splat((-1.0)), v65);
-        V v169 = softehl_splat((-1.0)), v170 = softehl_splat(0.0), v171 = softehl_splat(0.0),
-            v172 = softehl_splat(0.0), v173 = softehl_splat(0.0), v174 = softehl_splat(0.0),
-            v175 = softehl_splat(0.0);
-        const M m176 = v168 & m167;
-        if (softehl_any(m176)) {
-            V v177 = softehl_splat(0.0), v178 = softehl_splat(0.0), v179 = softehl_splat(0.0),
-                v180 = softehl_splat(0.0), v181 = softehl_splat(0.0), v182 = softehl_splat(0.0);
-            const M m183 = ~v64 & m176;
-            if (softehl_any(m183)) {
-                const V v184 = -v80, v185 = -v82, v186 = v69 - v84, v187 = v71 - v86;
-                v177 = softehl_blend(m183, v78, v177); v178 = softehl_blend(m183, v79, v178);
-                v179 = softehl_blend(m183, v184, v179); v180 = softehl_blend(m183, v185, v180);
-                v181 = softehl_blend(m183, v186, v181); v182 = softehl_blend(m183, v187, v182);
+    V v161 = softehl_splat(0.0), v162 = softehl_splat(0.0), v163 = softehl_splat(0.0),
+        v164 = softehl_splat(0.0), v165 = softehl_splat(0.0), v166 = softehl_splat(0.0),
+        v167 = softehl_splat(0.0);
+    const M m168 = v66;
+    if (softehl_any(m168)) {
+        const M v169 = softehl_lt(softehl_splat((-1.0)), v65);
+        V v170 = softehl_splat((-1.0)), v171 = softehl_splat(0.0), v172 = softehl_splat(0.0),
+            v173 = softehl_splat(0.0), v174 = softehl_splat(0.0), v175 = softehl_splat(0.0),
+            v176 = softehl_splat(0.0);
+        const M m177 = v169 & m168;
+        if (softehl_any(m177)) {
+            V v178 = v78, v179 = v79, v180 = softehl_splat(0.0), v181 = softehl_splat(0.0),
+                v182 = softehl_splat(0.0), v183 = softehl_splat(0.0);
+            const M m184 = v64 & m177;
+            if (softehl_any(m184)) {
+                v178 = softehl_blend(m184, softehl_splat(0.0), v178);
+                v179 = softehl_blend(m184, softehl_splat(0.0), v179);
             }
-            v169 = softehl_blend(m176, v65, v169); v170 = softehl_blend(m176, v177, v170);
-            v171 = softehl_blend(m176, v178, v171); v172 = softehl_blend(m176, v179, v172);
-            v173 = softehl_blend(m176, v180, v173); v174 = softehl_blend(m176, v181, v174);
-            v175 = softehl_blend(m176, v182, v175);
+            const M m185 = ~v64 & m177;
+            if (softehl_any(m185)) {
+                const V v186 = -v80, v187 = -v82, v188 = v69 - v84, v189 = v71 - v86;
+                v180 = softehl_blend(m185, v186, v180); v181 = softehl_blend(m185, v187, v181);
+                v182 = softehl_blend(m185, v188, v182); v183 = softehl_blend(m185, v189, v183);
+            }
+            v170 = softehl_blend(m177, v65, v170); v171 = softehl_blend(m177, v178, v171);
+            v172 = softehl_blend(m177, v179, v172); v173 = softehl_blend(m177, v180, v173);
+            v174 = softehl_blend(m177, v181, v174); v175 = softehl_blend(m177, v182, v175);
+            v176 = softehl_blend(m177, v183, v176);
         }
-        v160 = softehl_blend(m167, v169, v160); v161 = softehl_blend(m167, v172, v161);
-        v162 = softehl_blend(m167, v173, v162); v163 = softehl_blend(m167, v174, v163);
-        v164 = softehl_blend(m167, v175, v164); v165 = softehl_blend(m167, v170, v165);
-        v166 = softehl_blend(m167, v171, v166);
+        v161 = softehl_blend(m168, v170, v161); v162 = softehl_blend(m168, v173, v162);
+        v163 = softehl_blend(m168, v174, v163); v164 = softehl_blend(m168, v175, v164);
+        v165 = softehl_blend(m168, v176, v165); v166 = softehl_blend(m168, v171, v166);
+        v167 = softehl_blend(m168, v172, v167);
     }
-    const M m188 = ~v66;
-    if (softehl_any(m188)) {
-        const V v189 = (-1.0) - v65, v190 = v189 * (v189 * v189);
-        V v191 = softehl_splat(0.0), v192 = softehl_splat(0.0), v193 = softehl_splat(0.0),
-            v194 = softehl_splat(0.0), v195 = softehl_splat(0.0), v196 = softehl_splat(0.0);
-        const M m197 = ~v64 & m188;
-        if (softehl_any(m197)) {
-            const V v198 = (-1.0) - v63, v199 = v198 * (3.0 * v198), v200 = (v84 - v69) * v199,
-                v201 = (v86 - v71) * v199, v202 = v80 * v199, v203 = v82 * v199,
-                v204 = -(v78 * v199), v205 = -(v79 * v199);
-            v191 = softehl_blend(m197, v202, v191); v192 = softehl_blend(m197, v203, v192);
-            v193 = softehl_blend(m197, v200, v193); v194 = softehl_blend(m197, v201, v194);
-            v195 = softehl_blend(m197, v204, v195); v196 = softehl_blend(m197, v205, v196);
+    const M m190 = ~v66;
+    if (softehl_any(m190)) {
+        const V v191 = (-1.0) - v65, v192 = v191 * (v191 * v191);
+        V v193 = softehl_splat(0.0), v194 = softehl_splat(0.0), v195 = softehl_splat(0.0),
+            v196 = softehl_splat(0.0), v197 = softehl_splat(0.0), v198 = softehl_splat(0.0);
+        const M m199 = ~v64 & m190;
+        if (softehl_any(m199)) {
+            const V v200 = (-1.0) - v63, v201 = v200 * (3.0 * v200), v202 = (v84 - v69) * v201,
+                v203 = (v86 - v71) * v201, v204 = v80 * v201, v205 = v82 * v201,
+                v206 = -(v78 * v201), v207 = -(v79 * v201);
+            v193 = softehl_blend(m199, v204, v193); v194 = softehl_blend(m199, v205, v194);
+            v195 = softehl_blend(m199, v202, v195); v196 = softehl_blend(m199, v203, v196);
+            v197 = softehl_blend(m199, v206, v197); v198 = softehl_blend(m199, v207, v198);
         }
-        v160 = softehl_blend(m188, v190, v160); v161 = softehl_blend(m188, v191, v161);
-        v162 = softehl_blend(m188, v192, v162); v163 = softehl_blend(m188, v193, v163);
-        v164 = softehl_blend(m188, v194, v164); v165 = softehl_blend(m188, v195, v165);
-        v166 = softehl_blend(m188, v196, v166);
+        v161 = softehl_blend(m190, v192, v161); v162 = softehl_blend(m190, v193, v162);
+        v163 = softehl_blend(m190, v194, v163); v164 = softehl_blend(m190, v195, v164);
+        v165 = softehl_blend(m190, v196, v165); v166 = softehl_blend(m190, v197, v166);
+        v167 = softehl_blend(m190, v198, v167);
     }
-    const V v206 = v110 * v110, v207 = 2.0 * v110, v208 = v160 - v114, v209 = 0.01 * v206,
-        v210 = 4.0 * v111, v211 = 4.0 * v90 * v111, v212 = 4.0 * v91 * v111;
-    const M v213 = softehl_eq(v208, v208);
-    const V v214 = v96 * v207, v215 = v97 * v207, v216 = -v211, v217 = -v212,
-        v218 = v112 + v43 * v105, v219 = v113 + v47 * v105, v220 = v47 * v104 - v113,
-        v221 = v43 * v104 - v112, v222 = v108 + v25 * v107, v223 = v109 + v27 * v107,
-        v224 = v25 * v106 - v108, v225 = v27 * v106 - v109;
-    V v226 = softehl_splat(0.0), v227 = softehl_splat(0.0), v228 = softehl_splat(0.0),
-        v229 = softehl_splat(0.0), v230 = softehl_splat(0.0), v231 = softehl_splat(0.0),
-        v232 = softehl_splat(0.0), v233 = softehl_splat(0.0), v234 = softehl_splat(0.0);
-    const M m235 = v213;
-    if (softehl_any(m235)) {
-        const M v236 = softehl_lt(softehl_splat(0.0), v208);
-        V v237 = softehl_splat(0.0), v238 = softehl_splat(0.0), v239 = softehl_splat(0.0),
-            v240 = softehl_splat(0.0), v241 = softehl_splat(0.0), v242 = softehl_splat(0.0),
-            v243 = softehl_splat(0.0), v244 = softehl_splat(0.0), v245 = softehl_splat(0.0);
-        const M m246 = v236 & m235;
-        if (softehl_any(m246)) {
-            const V v247 = -v119, v248 = v161 - v115, v249 = -v120, v250 = v162 - v116,
-                v251 = v163 - v117, v252 = v164 - v118;
-            v237 = softehl_blend(m246, v208, v237); v238 = softehl_blend(m246, v248, v238);
-            v239 = softehl_blend(m246, v250, v239); v240 = softehl_blend(m246, v251, v240);
-            v241 = softehl_blend(m246, v252, v241); v242 = softehl_blend(m246, v165, v242);
-            v243 = softehl_blend(m246, v166, v243); v244 = softehl_blend(m246, v247, v244);
-            v245 = softehl_blend(m246, v249, v245);
+    const V v208 = v110 * v110, v209 = 2.0 * v110, v210 = v161 - v114, v211 = 0.01 * v208,
+        v212 = 4.0 * v111, v213 = 4.0 * v90 * v111, v214 = 4.0 * v91 * v111;
+    const M v215 = softehl_eq(v210, v210);
+    const V v216 = v96 * v209, v217 = v97 * v209, v218 = -v213, v219 = -v214,
+        v220 = v112 + v43 * v105, v221 = v113 + v47 * v105, v222 = v47 * v104 - v113,
+        v223 = v43 * v104 - v112, v224 = v108 + v25 * v107, v225 = v109 + v27 * v107,
+        v226 = v25 * v106 - v108, v227 = v27 * v106 - v109;
+    V v228 = softehl_splat(0.0), v229 = softehl_splat(0.0), v230 = softehl_splat(0.0),
+        v231 = softehl_splat(0.0), v232 = softehl_splat(0.0), v233 = softehl_splat(0.0),
+        v234 = softehl_splat(0.0), v235 = softehl_splat(0.0), v236 = softehl_splat(0.0);
+    const M m237 = v215;
+    if (softehl_any(m237)) {
+        const M v238 = softehl_lt(softehl_splat(0.0), v210);
+        V v239 = softehl_splat(0.0), v240 = softehl_splat(0.0), v241 = softehl_splat(0.0),
+            v242 = softehl_splat(0.0), v243 = softehl_splat(0.0), v244 = softehl_splat(0.0),
+            v245 = softehl_splat(0.0), v246 = softehl_splat(0.0), v247 = softehl_splat(0.0);
+        const M m248 = v238 & m237;
+        if (softehl_any(m248)) {
+            const V v249 = -v119, v250 = v162 - v115, v251 = -v120, v252 = v163 - v116,
+                v253 = v164 - v117, v254 = v165 - v118;
+            v239 = softehl_blend(m248, v210, v239); v240 = softehl_blend(m248, v250, v240);
+            v241 = softehl_blend(m248, v252, v241); v242 = softehl_blend(m248, v253, v242);
+            v243 = softehl_blend(m248, v254, v243); v244 = softehl_blend(m248, v166, v244);
+            v245 = softehl_blend(m248, v167, v245); v246 = softehl_blend(m248, v249, v246);
+            v247 = softehl_blend(m248, v251, v247);
         }
-        v226 = softehl_blend(m235, v237, v226); v227 = softehl_blend(m235, v238, v227);
-        v228 = softehl_blend(m235, v239, v228); v229 = softehl_blend(m235, v240, v229);
-        v230 = softehl_blend(m235, v241, v230); v231 = softehl_blend(m235, v242, v231);
-        v232 = softehl_blend(m235, v243, v232); v233 = softehl_blend(m235, v244, v233);
-        v234 = softehl_blend(m235, v245, v234);
+        v228 = softehl_blend(m237, v239, v228); v229 = softehl_blend(m237, v240, v229);
+        v230 = softehl_blend(m237, v241, v230); v231 = softehl_blend(m237, v242, v231);
+        v232 = softehl_blend(m237, v243, v232); v233 = softehl_blend(m237, v244, v233);
+        v234 = softehl_blend(m237, v245, v234); v235 = softehl_blend(m237, v246, v235);
+        v236 = softehl_blend(m237, v247, v236);
     }
-    const M m253 = ~v213;
-    if (softehl_any(m253)) {
-        const V v254 = v114 - v160, v255 = v254 * v254, v256 = v254 * v255, v257 = 3.0 * v255,
-            v258 = (v115 - v161) * v257, v259 = (v116 - v162) * v257, v260 = (v117 - v163) * v257,
-            v261 = (v118 - v164) * v257, v262 = -(v165 * v257), v263 = -(v166 * v257),
-            v264 = v119 * v257, v265 = v120 * v257;
-        v226 = softehl_blend(m253, v256, v226); v227 = softehl_blend(m253, v258, v227);
-        v228 = softehl_blend(m253, v259, v228); v229 = softehl_blend(m253, v260, v229);
-        v230 = softehl_blend(m253, v261, v230); v231 = softehl_blend(m253, v262, v231);
-        v232 = softehl_blend(m253, v263, v232); v233 = softehl_blend(m253, v264, v233);
-        v234 = softehl_blend(m253, v265, v234);
+    const M m255 = ~v215;
+    if (softehl_any(m255)) {
+        const V v256 = v114 - v161, v257 = v256 * v256, v258 = v256 * v257, v259 = 3.0 * v257,
+            v260 = (v115 - v162) * v259, v261 = (v116 - v163) * v259, v262 = (v117 - v164) * v259,
+            v263 = (v118 - v165) * v259, v264 = -(v166 * v259), v265 = -(v167 * v259),
+            v266 = v119 * v259, v267 = v120 * v259;
+        v228 = softehl_blend(m255, v258, v228); v229 = softehl_blend(m255, v260, v229);
+        v230 = softehl_blend(m255, v261, v230); v231 = softehl_blend(m255, v262, v231);
+        v232 = softehl_blend(m255, v263, v232); v233 = softehl_blend(m255, v264, v233);
+        v234 = softehl_blend(m255, v265, v234); v235 = softehl_blend(m255, v266, v235);
+        v236 = softehl_blend(m255, v267, v236);
     }
-    const V v266 = 0.5 * v226, v267 = 0.5 * v227, v268 = 0.5 * v228, v269 = 0.5 * v229,
-        v270 = v24 * v266, v271 = v24 * v267, v272 = v24 * v268, v273 = v24 * v269,
-        v274 = 0.5 * (v114 + v160), v275 = 0.5 * v230, v276 = 0.5 * (v161 + v115),
-        v277 = 0.5 * v231, v278 = 0.5 * (v162 + v116), v279 = v24 * v275, v280 = v24 * v277,
-        v281 = 0.5 * v232, v282 = 0.5 * v233, v283 = 0.5 * v234, v284 = 0.5 * (v163 + v117),
-        v285 = v24 * v281, v286 = v24 * v282, v287 = v24 * v283, v288 = 0.5 * (v164 + v118),
-        v289 = 0.5 * v165, v290 = 0.5 * v166, v291 = 0.5 * v119, v292 = 0.5 * v120,
-        v293 = v270 * (6.283185307179586 * (a14 * v17)),
-        v294 = 0.5 * ((v11 - v4) * v90 + (v14 - v13) * v91);
-    V s295 = {0}, s296 = {0}, s297 = {0}, s298 = {0}, s299 = {0}, s300 = {0}, s301 = {0},
-        s302 = {0}, s303 = {0}, s304 = {0}, s305 = {0}, s306 = {0}, s307 = {0}, s308 = {0},
-        s309 = {0}, s310 = {0}, s311 = {0}, s312 = {0}, s313 = {0}, s314 = {0}, s315 = {0},
-        s316 = {0}, s317 = {0}, s318 = {0}, s319 = {0}, s320 = {0}, s321 = {0}, s322 = {0},
-        s323 = {0}, s324 = {0}, s325 = {0}, s326 = {0}, s327 = {0}, s328 = {0}, s329 = {0},
-        s330 = {0}, s331 = {0}, s332 = {0}, s333 = {0}, s334 = {0}, s335 = {0}, s336 = {0},
-        s337 = {0}, s338 = {0}, s339 = {0}, s340 = {0}, s341 = {0}, s342 = {0}, s343 = {0},
-        s344 = {0}, s345 = {0}, s346 = {0}, s347 = {0}, s348 = {0}, s349 = {0}, s350 = {0},
-        s351 = {0}, s352 = {0}, s353 = {0}, s354 = {0}, s355 = {0}, s356 = {0}, s357 = {0},
-        s358 = {0}, s359 = {0}, s360 = {0}, s361 = {0}, s362 = {0}, s363 = {0}, s364 = {0},
-        s365 = {0}, s366 = {0}, s367 = {0}, s368 = {0}, s369 = {0}, s370 = {0}, s371 = {0},
-        s372 = {0}, s373 = {0}, s374 = {0}, s375 = {0}, s376 = {0}, s377 = {0}, s378 = {0},
-        s379 = {0}, s380 = {0}, s381 = {0}, s382 = {0}, s383 = {0}, s384 = {0}, s385 = {0},
-        s386 = {0}, s387 = {0}, s388 = {0}, s389 = {0}, s390 = {0}, s391 = {0}, s392 = {0},
-        s393 = {0}, s394 = {0}, s395 = {0}, s396 = {0}, s397 = {0}, s398 = {0}, s399 = {0},
-        s400 = {0}, s401 = {0}, s402 = {0}, s403 = {0}, s404 = {0}, s405 = {0}, s406 = {0},
-        s407 = {0}, s408 = {0}, s409 = {0}, s410 = {0}, s411 = {0}, s412 = {0}, s413 = {0},
-        s414 = {0}, s415 = {0}, s416 = {0}, s417 = {0}, s418 = {0}, s419 = {0}, s420 = {0},
-        s421 = {0}, s422 = {0}, s423 = {0}, s424 = {0}, s425 = {0}, s426 = {0}, s427 = {0},
-        s428 = {0}, s429 = {0}, s430 = {0}, s431 = {0}, s432 = {0}, s433 = {0}, s434 = {0},
-        s435 = {0}, s436 = {0}, s437 = {0}, s438 = {0}, s439 = {0}, s440 = {0}, s441 = {0},
-        s442 = {0}, s443 = {0}, s444 = {0}, s445 = {0}, s446 = {0}, s447 = {0}, s448 = {0},
-        s449 = {0}, s450 = {0}, s451 = {0}, s452 = {0}, s453 = {0}, s454 = {0}, s455 = {0},
-        s456 = {0}, s457 = {0}, s458 = {0}, s459 = {0}, s460 = {0}, s461 = {0}, s462 = {0},
-        s463 = {0}, s464 = {0}, s465 = {0}, s466 = {0}, s467 = {0}, s468 = {0}, s469 = {0},
-        s470 = {0}, s471 = {0}, s472 = {0}, s473 = {0}, s474 = {0}, s475 = {0}, s476 = {0},
-        s477 = {0}, s478 = {0}, s479 = {0}, s480 = {0}, s481 = {0}, s482 = {0}, s483 = {0},
-        s484 = {0}, s485 = {0}, s486 = {0}, s487 = {0}, s488 = {0}, s489 = {0}, s490 = {0},
-        s491 = {0}, s492 = {0}, s493 = {0}, s494 = {0}, s495 = {0}, s496 = {0}, s497 = {0},
-        s498 = {0}, s499 = {0}, s500 = {0};
+    const V v268 = 0.5 * v228, v269 = 0.5 * v229, v270 = 0.5 * v230, v271 = 0.5 * v231,
+        v272 = v24 * v268, v273 = v24 * v269, v274 = v24 * v270, v275 = v24 * v271,
+        v276 = 0.5 * (v114 + v161), v277 = 0.5 * v232, v278 = 0.5 * (v162 + v115),
+        v279 = 0.5 * v233, v280 = 0.5 * (v163 + v116), v281 = v24 * v277, v282 = v24 * v279,
+        v283 = 0.5 * v234, v284 = 0.5 * v235, v285 = 0.5 * v236, v286 = 0.5 * (v164 + v117),
+        v287 = v24 * v283, v288 = v24 * v284, v289 = v24 * v285, v290 = 0.5 * (v165 + v118),
+        v291 = 0.5 * v166, v292 = 0.5 * v167, v293 = 0.5 * v119, v294 = 0.5 * v120,
+        v295 = v272 * (6.283185307179586 * (a14 * v17)),
+        v296 = 0.5 * ((v11 - v4) * v90 + (v14 - v13) * v91);
+    V s297 = {0}, s298 = {0}, s299 = {0}, s300 = {0}, s301 = {0}, s302 = {0}, s303 = {0},
+        s304 = {0}, s305 = {0}, s306 = {0}, s307 = {0}, s308 = {0}, s309 = {0}, s310 = {0},
+        s311 = {0}, s312 = {0}, s313 = {0}, s314 = {0}, s315 = {0}, s316 = {0}, s317 = {0},
+        s318 = {0}, s319 = {0}, s320 = {0}, s321 = {0}, s322 = {0}, s323 = {0}, s324 = {0},
+        s325 = {0}, s326 = {0}, s327 = {0}, s328 = {0}, s329 = {0}, s330 = {0}, s331 = {0},
+        s332 = {0}, s333 = {0}, s334 = {0}, s335 = {0}, s336 = {0}, s337 = {0}, s338 = {0},
+        s339 = {0}, s340 = {0}, s341 = {0}, s342 = {0}, s343 = {0}, s344 = {0}, s345 = {0},
+        s346 = {0}, s347 = {0}, s348 = {0}, s349 = {0}, s350 = {0}, s351 = {0}, s352 = {0},
+        s353 = {0}, s354 = {0}, s355 = {0}, s356 = {0}, s357 = {0}, s358 = {0}, s359 = {0},
+        s360 = {0}, s361 = {0}, s362 = {0}, s363 = {0}, s364 = {0}, s365 = {0}, s366 = {0},
+        s367 = {0}, s368 = {0}, s369 = {0}, s370 = {0}, s371 = {0}, s372 = {0}, s373 = {0},
+        s374 = {0}, s375 = {0}, s376 = {0}, s377 = {0}, s378 = {0}, s379 = {0}, s380 = {0},
+        s381 = {0}, s382 = {0}, s383 = {0}, s384 = {0}, s385 = {0}, s386 = {0}, s387 = {0},
+        s388 = {0}, s389 = {0}, s390 = {0}, s391 = {0}, s392 = {0}, s393 = {0}, s394 = {0},
+        s395 = {0}, s396 = {0}, s397 = {0}, s398 = {0}, s399 = {0}, s400 = {0}, s401 = {0},
+        s402 = {0}, s403 = {0}, s404 = {0}, s405 = {0}, s406 = {0}, s407 = {0}, s408 = {0},
+        s409 = {0}, s410 = {0}, s411 = {0}, s412 = {0}, s413 = {0}, s414 = {0}, s415 = {0},
+        s416 = {0}, s417 = {0}, s418 = {0}, s419 = {0}, s420 = {0}, s421 = {0}, s422 = {0},
+        s423 = {0}, s424 = {0}, s425 = {0}, s426 = {0}, s427 = {0}, s428 = {0}, s429 = {0},
+        s430 = {0}, s431 = {0}, s432 = {0}, s433 = {0}, s434 = {0}, s435 = {0}, s436 = {0},
+        s437 = {0}, s438 = {0}, s439 = {0}, s440 = {0}, s441 = {0}, s442 = {0}, s443 = {0},
+        s444 = {0}, s445 = {0}, s446 = {0}, s447 = {0}, s448 = {0}, s449 = {0}, s450 = {0},
+        s451 = {0}, s452 = {0}, s453 = {0}, s454 = {0}, s455 = {0}, s456 = {0}, s457 = {0},
+        s458 = {0}, s459 = {0}, s460 = {0}, s461 = {0}, s462 = {0}, s463 = {0}, s464 = {0},
+        s465 = {0}, s466 = {0}, s467 = {0}, s468 = {0}, s469 = {0}, s470 = {0}, s471 = {0},
+        s472 = {0}, s473 = {0}, s474 = {0}, s475 = {0}, s476 = {0}, s477 = {0}, s478 = {0},
+        s479 = {0}, s480 = {0}, s481 = {0}, s482 = {0}, s483 = {0}, s484 = {0}, s485 = {0},
+        s486 = {0}, s487 = {0}, s488 = {0}, s489 = {0}, s490 = {0}, s491 = {0}, s492 = {0},
+        s493 = {0}, s494 = {0}, s495 = {0}, s496 = {0}, s497 = {0}, s498 = {0}, s499 = {0},
+        s500 = {0}, s501 = {0}, s502 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
         const double *restrict w = rule + 2 * q; (void)w;
-        const V v501 = 0.5 * (w[0] * v266 + v274), v502 = 0.5 - v501, v503 = 0.5 + v501,
-            v504 = v12 * v502 + v1 * v503, v505 = v18 * v502 + v10 * v503, v506 = v5 - v504,
-            v507 = v23 - v505, v508 = v90 * v506 + v91 * v507, v509 = 4.0 * v508,
-            v510 = v206 - v111 * v509;
-        const M v511 = softehl_eq(v510, v510);
-        const V v512 = v210 * v506, v513 = v210 * v507;
-        V v514 = softehl_splat(0.0), v515 = softehl_splat(0.0), v516 = softehl_splat(0.0),
-            v517 = softehl_splat(0.0), v518 = softehl_splat(0.0), v519 = softehl_splat(0.0),
-            v520 = softehl_splat(0.0), v521 = softehl_splat(0.0), v522 = softehl_splat(0.0),
-            v523 = softehl_splat(0.0);
-        const M m524 = v511;
-        if (softehl_any(m524)) {
-            const M v525 = softehl_lt(v209, v510);
-            V v526 = v209, v527 = softehl_splat(0.0), v528 = softehl_splat(0.0),
-                v529 = softehl_splat(0.0), v530 = softehl_splat(0.0), v531 = softehl_splat(0.0),
-                v532 = softehl_splat(0.0), v533 = softehl_splat(0.0), v534 = softehl_splat(1.0),
-                v535 = softehl_splat(0.0);
-            const M m536 = v525 & m524;
-            if (softehl_any(m536)) {
-                const V v537 = -v512, v538 = -v513, v539 = -v509;
-                v526 = softehl_blend(m536, v510, v526); v527 = softehl_blend(m536, v539, v527);
-                v528 = softehl_blend(m536, v216, v528); v529 = softehl_blend(m536, v217, v529);
-                v530 = softehl_blend(m536, v212, v530); v531 = softehl_blend(m536, v211, v531);
-                v532 = softehl_blend(m536, v537, v532); v533 = softehl_blend(m536, v538, v533);
-                v534 = softehl_blend(m536, softehl_splat(0.0), v534);
-                v535 = softehl_blend(m536, softehl_splat(1.0), v535);
+        const V v503 = 0.5 * (w[0] * v268 + v276), v504 = 0.5 - v503, v505 = 0.5 + v503,
+            v506 = v12 * v504 + v1 * v505, v507 = v18 * v504 + v10 * v505, v508 = v5 - v506,
+            v509 = v23 - v507, v510 = v90 * v508 + v91 * v509, v511 = 4.0 * v510,
+            v512 = v208 - v111 * v511;
+        const M v513 = softehl_eq(v512, v512);
+        const V v514 = v212 * v508, v515 = v212 * v509;
+        V v516 = softehl_splat(0.0), v517 = softehl_splat(0.0), v518 = softehl_splat(0.0),
+            v519 = softehl_splat(0.0), v520 = softehl_splat(0.0), v521 = softehl_splat(0.0),
+            v522 = softehl_splat(0.0), v523 = softehl_splat(0.0), v524 = softehl_splat(0.0),
+            v525 = softehl_splat(0.0);
+        const M m526 = v513;
+        if (softehl_any(m526)) {
+            const M v527 = softehl_lt(v211, v512);
+            V v528 = v211, v529 = softehl_splat(0.0), v530 = softehl_splat(0.0),
+                v531 = softehl_splat(0.0), v532 = softehl_splat(0.0), v533 = softehl_splat(0.0),
+                v534 = softehl_splat(0.0), v535 = softehl_splat(0.0), v536 = softehl_splat(1.0),
+                v537 = softehl_splat(0.0);
+            const M m538 = v527 & m526;
+            if (softehl_any(m538)) {
+                const V v539 = -v514, v540 = -v515, v541 = -v511;
+                v528 = softehl_blend(m538, v512, v528); v529 = softehl_blend(m538, v541, v529);
+                v530 = softehl_blend(m538, v218, v530); v531 = softehl_blend(m538, v219, v531);
+                v532 = softehl_blend(m538, v214, v532); v533 = softehl_blend(m538, v213, v533);
+                v534 = softehl_blend(m538, v539, v534); v535 = softehl_blend(m538, v540, v535);
+                v536 = softehl_blend(m538, softehl_splat(0.0), v536);
+                v537 = softehl_blend(m538, softehl_splat(1.0), v537);
             }
-            v514 = softehl_blend(m524, v526, v514); v515 = softehl_blend(m524, v527, v515);
-            v516 = softehl_blend(m524, v528, v516); v517 = softehl_blend(m524, v529, v517);
-            v518 = softehl_blend(m524, v530, v518); v519 = softehl_blend(m524, v531, v519);
-            v520 = softehl_blend(m524, v532, v520); v521 = softehl_blend(m524, v533, v521);
-            v522 = softehl_blend(m524, v534, v522); v523 = softehl_blend(m524, v535, v523);
+            v516 = softehl_blend(m526, v528, v516); v517 = softehl_blend(m526, v529, v517);
+            v518 = softehl_blend(m526, v530, v518); v519 = softehl_blend(m526, v531, v519);
+            v520 = softehl_blend(m526, v532, v520); v521 = softehl_blend(m526, v533, v521);
+            v522 = softehl_blend(m526, v534, v522); v523 = softehl_blend(m526, v535, v523);
+            v524 = softehl_blend(m526, v536, v524); v525 = softehl_blend(m526, v537, v525);
         }
-        const M m540 = ~v511;
-        if (softehl_any(m540)) {
-            const V v541 = v209 - v510, v542 = v541 * v541, v543 = v541 * v542, v544 = 3.0 * v542,
-                v545 = -v544, v546 = v509 * v544, v547 = v211 * v544, v548 = -v547,
-                v549 = v212 * v544, v550 = -v549, v551 = v512 * v544, v552 = v513 * v544;
-            v514 = softehl_blend(m540, v543, v514); v515 = softehl_blend(m540, v546, v515);
-            v516 = softehl_blend(m540, v547, v516); v517 = softehl_blend(m540, v549, v517);
-            v518 = softehl_blend(m540, v550, v518); v519 = softehl_blend(m540, v548, v519);
-            v520 = softehl_blend(m540, v551, v520); v521 = softehl_blend(m540, v552, v521);
-            v522 = softehl_blend(m540, v544, v522); v523 = softehl_blend(m540, v545, v523);
+        const M m542 = ~v513;
+        if (softehl_any(m542)) {
+            const V v543 = v211 - v512, v544 = v543 * v543, v545 = v543 * v544, v546 = 3.0 * v544,
+                v547 = -v546, v548 = v511 * v546, v549 = v213 * v546, v550 = -v549,
+                v551 = v214 * v546, v552 = -v551, v553 = v514 * v546, v554 = v515 * v546;
+            v516 = softehl_blend(m542, v545, v516); v517 = softehl_blend(m542, v548, v517);
+            v518 = softehl_blend(m542, v549, v518); v519 = softehl_blend(m542, v551, v519);
+            v520 = softehl_blend(m542, v552, v520); v521 = softehl_blend(m542, v550, v521);
+            v522 = softehl_blend(m542, v553, v522); v523 = softehl_blend(m542, v554, v523);
+            v524 = softehl_blend(m542, v546, v524); v525 = softehl_blend(m542, v547, v525);
         }
-        const V v553 = 2.0 * v508, v554 = w[0] * v281 + v290, v555 = w[0] * v282 + v291,
-            v556 = w[0] * v267 + v276, v557 = w[0] * v283 + v292, v558 = w[0] * v268 + v278,
-            v559 = w[0] * v269 + v284, v560 = w[0] * v275 + v288, v561 = v501 - 0.5,
-            v562 = w[0] * v277 + v289, v563 = v46 * v554, v564 = v29 * v554, v565 = v29 * v556,
-            v566 = v46 * v558, v567 = v29 * v559, v568 = v46 * v560, v569 = v46 * v562,
-            v570 = v29 * v562, v571 = v46 * v557, v572 = v29 * v557, v573 = v46 * v555,
-            v574 = v29 * v555, v575 = v46 * v556 + v502, v576 = v29 * v558 + v502,
-            v577 = w[1] * v502, v578 = v34 * v502, v579 = v34 * v503,
-            v580 = d10 * v502 + d12 * v503, v581 = w[1] * v503, v582 = v46 * v559 + v503,
-            v583 = v29 * v560 + v503, v584 = softehl_vsqrt(v514),
-            v585 = 1.0 + a14 * ((-1.0) + 6.283185307179586 * (X1 * v502 + X3 * v503)),
-            v586 = v270 * v585, v587 = softehl_vsqrt(1.0 / v514), v588 = 0.5 * v587,
-            v589 = v91 * v586, v590 = v90 * v586, v591 = v578 * v586, v592 = v579 * v586,
-            v593 = 1.0 / (v110 - v584), v594 = v553 * v593, v595 = 0.5 * v594, v596 = 2.0 * v594,
-            v597 = v593 * v593, v598 = v553 * v597, v599 = v553 * v588 * v597,
-            v600 = v588 * (v553 * v523) * v597 + 0.01 * (v588 * (v553 * v522) * v597),
-            v601 = v94 * v593, v602 = v95 * v593, v603 = v588 * (v553 * v515) * v597,
-            v604 = 2.0 * v506 * v593 + v520 * v599, v605 = 2.0 * v507 * v593 + v521 * v599,
-            v606 = v601 - v588 * (v553 * v519) * v597, v607 = v602 - v588 * (v553 * v518) * v597,
-            v608 = v598 - v207 * v600, v609 = v214 * v600 - v96 * v598, v610 = v96 * v603,
-            v611 = v215 * v600 - v97 * v598, v612 = v97 * v603,
-            v613 = v609 + (v569 * v606 + v570 * v607 - v610),
-            v614 = v573 * v606 + v574 * v607 - v610 - v609,
-            v615 = v563 * v606 + (v611 + (v564 * v607 - v612)),
-            v616 = v571 * v606 + (v572 * v607 - v612 - v611),
-            v617 = v90 * v603 - v601 - v588 * (v553 * v516) * v597,
-            v618 = v91 * v603 - v602 - v588 * (v553 * v517) * v597, v619 = (-1.0) - v594,
-            v620 = 0.5 * (v619 - v594), v621 = v595 * v619, v622 = 1.0 - v594, v623 = v595 * v622,
-            v624 = 1.0 - v594 * v594, v625 = 0.5 * (v622 - v594), v626 = w[1] * v624,
-            v627 = w[1] * v623, v628 = w[1] * v621, v629 = v100 * v605, v630 = v103 * v604,
-            v631 = v583 * v607 + (v568 * v606 + (v224 * v608 - v225 * v603)) - v106 * v605,
-            v632 = v630 + v631, v633 = v5 * v624 - v504 - v2 * v621 - v3 * v623, v634 = v100 * v633,
-            v635 = v23 * v624 - v505 - v16 * v621 - v21 * v623, v636 = v103 * v635,
-            v637 = v222 * v608 + (v576 * v607 + (v566 * v606 - v223 * v603)) - v630 - v107 * v605,
-            v638 = v91 * (v3 * v625 + (v5 * v596 + v2 * v620)) - v90 * (v21 * v625 + (v23 * v596 + v16 * v620)),
-            v639 = v91 * v633 - v90 * v635,
-            v640 = v636 + (v106 * v633 + (v90 * v583 - v91 * v568)) + v638 * v632,
-            v641 = a10 * v639, v642 = v107 * v633 + (v90 * v576 - v91 * v566) - v636 + v638 * v637,
-            v643 = v90 * (v564 + v621) - v91 * v563 + v638 * v615,
-            v644 = v90 * (v572 + v623) - v91 * v571 + v638 * v616, v645 = v618 * v638 - v90 * v624,
-            v646 = v91 * v624 + v617 * v638, v647 = v90 * v570 - v91 * (v569 + v621) + v638 * v613,
-            v648 = v580 - v641, v649 = v638 * v614 + (v90 * v574 - v91 * (v573 + v623));
-        const M v650 = softehl_eq(v648, v648);
-        const V v651 = v629 + (v221 * v608 + (v567 * v607 + (v582 * v606 - v220 * v603))),
-            v652 = v218 * v608 + (v565 * v607 + (v575 * v606 - v219 * v603)) - v629 - v105 * v604,
-            v653 = v651 - v104 * v604,
-            v654 = v634 + (v90 * v565 - v91 * v575) - v105 * v635 + v638 * v652,
-            v655 = v90 * v567 - v91 * v582 - v634 - v104 * v635 + v638 * v653;
-        V v656 = softehl_splat(0.0), v657 = softehl_splat(0.0), v658 = softehl_splat(0.0),
-            v659 = softehl_splat(0.0), v660 = softehl_splat(0.0), v661 = softehl_splat(0.0),
-            v662 = softehl_splat(0.0), v663 = softehl_splat(0.0), v664 = softehl_splat(0.0),
-            v665 = softehl_splat(0.0), v666 = softehl_splat(0.0), v667 = softehl_splat(0.0),
-            v668 = softehl_splat(0.0), v669 = softehl_splat(0.0), v670 = softehl_splat(0.0),
-            v671 = softehl_splat(0.0), v672 = softehl_splat(0.0), v673 = softehl_splat(0.0),
-            v674 = softehl_splat(0.0), v675 = softehl_splat(0.0), v676 = softehl_splat(0.0),
-            v677 = softehl_splat(0.0), v678 = softehl_splat(0.0), v679 = softehl_splat(0.0),
-            v680 = softehl_splat(0.0), v681 = softehl_splat(0.0), v682 = softehl_splat(0.0),
-            v683 = softehl_splat(0.0), v684 = softehl_splat(0.0), v685 = softehl_splat(0.0),
-            v686 = softehl_splat(0.0), v687 = softehl_splat(0.0), v688 = softehl_splat(0.0),
-            v689 = softehl_splat(0.0), v690 = softehl_splat(0.0), v691 = softehl_splat(0.0),
-            v692 = softehl_splat(0.0), v693 = softehl_splat(0.0), v694 = softehl_splat(0.0),
-            v695 = softehl_splat(0.0), v696 = softehl_splat(0.0), v697 = softehl_splat(0.0),
-            v698 = softehl_splat(0.0), v699 = softehl_splat(0.0), v700 = softehl_splat(0.0),
-            v701 = softehl_splat(0.0), v702 = softehl_splat(0.0), v703 = softehl_splat(0.0),
-            v704 = softehl_splat(0.0), v705 = softehl_splat(0.0), v706 = softehl_splat(0.0),
-            v707 = softehl_splat(0.0), v708 = softehl_splat(0.0), v709 = softehl_splat(0.0),
-            v710 = softehl_splat(0.0);
-        const M m711 = v650;
-        if (softehl_any(m711)) {
-            const M v712 = softehl_le(softehl_splat(0.0), v648);
-            V v713 = softehl_splat(0.0), v714 = softehl_splat(0.0), v715 = softehl_splat(0.0),
-                v716 = softehl_splat(0.0), v717 = softehl_splat(0.0), v718 = softehl_splat(0.0),
-                v719 = softehl_splat(0.0), v720 = softehl_splat(0.0), v721 = softehl_splat(0.0),
-                v722 = softehl_splat(0.0), v723 = softehl_splat(0.0), v724 = softehl_splat(0.0),
-                v725 = softehl_splat(0.0), v726 = softehl_splat(0.0), v727 = softehl_splat(0.0),
-                v728 = softehl_splat(0.0), v729 = softehl_splat(0.0), v730 = softehl_splat(0.0),
-                v731 = softehl_splat(0.0), v732 = softehl_splat(0.0), v733 = softehl_splat(0.0),
-                v734 = softehl_splat(0.0), v735 = softehl_splat(0.0), v736 = softehl_splat(0.0),
-                v737 = softehl_splat(0.0), v738 = softehl_splat(0.0), v739 = softehl_splat(0.0),
-                v740 = softehl_splat(0.0), v741 = softehl_splat(0.0), v742 = softehl_splat(0.0),
-                v743 = softehl_splat(0.0), v744 = softehl_splat(0.0), v745 = softehl_splat(0.0),
-                v746 = softehl_splat(0.0), v747 = softehl_splat(0.0), v748 = softehl_splat(0.0),
-                v749 = softehl_splat(0.0), v750 = softehl_splat(0.0), v751 = softehl_splat(0.0),
-                v752 = softehl_splat(0.0), v753 = softehl_splat(0.0), v754 = softehl_splat(0.0),
-                v755 = softehl_splat(0.0);
-            const M m756 = v712 & m711;
-            if (softehl_any(m756)) {
-                const V v757 = a12 + v639, v758 = v639 - a13, v759 = v757 * v758;
-                const M v760 = softehl_eq(v759, v759);
-                V v761 = softehl_splat(0.0), v762 = softehl_splat(0.0), v763 = softehl_splat(0.0),
-                    v764 = softehl_splat(0.0), v765 = softehl_splat(0.0);
-                const M m766 = v760 & m756;
-                if (softehl_any(m766)) {
-                    const M v767 = softehl_lt(v759, softehl_splat(0.0));
-                    const V v768 = softehl_blend(v767, v648, softehl_splat(0.0)),
-                        v769 = softehl_blend(v767, v502, softehl_splat(0.0)),
-                        v770 = softehl_blend(v767, v503, softehl_splat(0.0)),
-                        v771 = softehl_blend(v767, v35, softehl_splat(0.0)),
-                        v772 = softehl_blend(v767, v33, softehl_splat(0.0));
-                    v761 = softehl_blend(m766, v768, v761); v762 = softehl_blend(m766, v769, v762);
-                    v763 = softehl_blend(m766, v770, v763); v764 = softehl_blend(m766, v771, v764);
-                    v765 = softehl_blend(m766, v772, v765);
+        const V v555 = 2.0 * v510, v556 = w[0] * v283 + v292, v557 = w[0] * v284 + v293,
+            v558 = w[0] * v269 + v278, v559 = w[0] * v285 + v294, v560 = w[0] * v270 + v280,
+            v561 = w[0] * v271 + v286, v562 = w[0] * v277 + v290, v563 = v503 - 0.5,
+            v564 = w[0] * v279 + v291, v565 = v46 * v556, v566 = v29 * v556, v567 = v29 * v558,
+            v568 = v46 * v560, v569 = v29 * v561, v570 = v46 * v562, v571 = v46 * v564,
+            v572 = v29 * v564, v573 = v46 * v559, v574 = v29 * v559, v575 = v46 * v557,
+            v576 = v29 * v557, v577 = v46 * v558 + v504, v578 = v29 * v560 + v504,
+            v579 = w[1] * v504, v580 = v34 * v504, v581 = v34 * v505,
+            v582 = d10 * v504 + d12 * v505, v583 = w[1] * v505, v584 = v46 * v561 + v505,
+            v585 = v29 * v562 + v505, v586 = softehl_vsqrt(v516),
+            v587 = 1.0 + a14 * ((-1.0) + 6.283185307179586 * (X1 * v504 + X3 * v505)),
+            v588 = v272 * v587, v589 = softehl_vsqrt(1.0 / v516), v590 = 0.5 * v589,
+            v591 = v91 * v588, v592 = v90 * v588, v593 = v580 * v588, v594 = v581 * v588,
+            v595 = 1.0 / (v110 - v586), v596 = v555 * v595, v597 = 0.5 * v596, v598 = 2.0 * v596,
+            v599 = v595 * v595, v600 = v555 * v599, v601 = v555 * v590 * v599,
+            v602 = v590 * (v555 * v525) * v599 + 0.01 * (v590 * (v555 * v524) * v599),
+            v603 = v94 * v595, v604 = v95 * v595, v605 = v590 * (v555 * v517) * v599,
+            v606 = 2.0 * v508 * v595 + v522 * v601, v607 = 2.0 * v509 * v595 + v523 * v601,
+            v608 = v603 - v590 * (v555 * v521) * v599, v609 = v604 - v590 * (v555 * v520) * v599,
+            v610 = v600 - v209 * v602, v611 = v216 * v602 - v96 * v600, v612 = v96 * v605,
+            v613 = v217 * v602 - v97 * v600, v614 = v97 * v605,
+            v615 = v611 + (v571 * v608 + v572 * v609 - v612),
+            v616 = v575 * v608 + v576 * v609 - v612 - v611,
+            v617 = v565 * v608 + (v613 + (v566 * v609 - v614)),
+            v618 = v573 * v608 + (v574 * v609 - v614 - v613),
+            v619 = v90 * v605 - v603 - v590 * (v555 * v518) * v599,
+            v620 = v91 * v605 - v604 - v590 * (v555 * v519) * v599, v621 = (-1.0) - v596,
+            v622 = 0.5 * (v621 - v596), v623 = v597 * v621, v624 = 1.0 - v596, v625 = v597 * v624,
+            v626 = 1.0 - v596 * v596, v627 = 0.5 * (v624 - v596), v628 = w[1] * v626,
+            v629 = w[1] * v625, v630 = w[1] * v623, v631 = v100 * v607, v632 = v103 * v606,
+            v633 = v585 * v609 + (v570 * v608 + (v226 * v610 - v227 * v605)) - v106 * v607,
+            v634 = v632 + v633, v635 = v5 * v626 - v506 - v2 * v623 - v3 * v625, v636 = v100 * v635,
+            v637 = v23 * v626 - v507 - v16 * v623 - v21 * v625, v638 = v103 * v637,
+            v639 = v224 * v610 + (v578 * v609 + (v568 * v608 - v225 * v605)) - v632 - v107 * v607,
+            v640 = v91 * (v3 * v627 + (v5 * v598 + v2 * v622)) - v90 * (v21 * v627 + (v23 * v598 + v16 * v622)),
+            v641 = v91 * v635 - v90 * v637,
+            v642 = v638 + (v106 * v635 + (v90 * v585 - v91 * v570)) + v640 * v634,
+            v643 = a10 * v641, v644 = v107 * v635 + (v90 * v578 - v91 * v568) - v638 + v640 * v639,
+            v645 = v90 * (v566 + v623) - v91 * v565 + v640 * v617,
+            v646 = v90 * (v574 + v625) - v91 * v573 + v640 * v618, v647 = v620 * v640 - v90 * v626,
+            v648 = v91 * v626 + v619 * v640, v649 = v90 * v572 - v91 * (v571 + v623) + v640 * v615,
+            v650 = v582 - v643, v651 = v640 * v616 + (v90 * v576 - v91 * (v575 + v625));
+        const M v652 = softehl_eq(v650, v650);
+        const V v653 = v631 + (v223 * v610 + (v569 * v609 + (v584 * v608 - v222 * v605))),
+            v654 = v220 * v610 + (v567 * v609 + (v577 * v608 - v221 * v605)) - v631 - v105 * v606,
+            v655 = v653 - v104 * v606,
+            v656 = v636 + (v90 * v567 - v91 * v577) - v105 * v637 + v640 * v654,
+            v657 = v90 * v569 - v91 * v584 - v636 - v104 * v637 + v640 * v655;
+        V v658 = softehl_splat(0.0), v659 = softehl_splat(0.0), v660 = softehl_splat(0.0),
+            v661 = softehl_splat(0.0), v662 = softehl_splat(0.0), v663 = softehl_splat(0.0),
+            v664 = softehl_splat(0.0), v665 = softehl_splat(0.0), v666 = softehl_splat(0.0),
+            v667 = softehl_splat(0.0), v668 = softehl_splat(0.0), v669 = softehl_splat(0.0),
+            v670 = softehl_splat(0.0), v671 = softehl_splat(0.0), v672 = softehl_splat(0.0),
+            v673 = softehl_splat(0.0), v674 = softehl_splat(0.0), v675 = softehl_splat(0.0),
+            v676 = softehl_splat(0.0), v677 = softehl_splat(0.0), v678 = softehl_splat(0.0),
+            v679 = softehl_splat(0.0), v680 = softehl_splat(0.0), v681 = softehl_splat(0.0),
+            v682 = softehl_splat(0.0), v683 = softehl_splat(0.0), v684 = softehl_splat(0.0),
+            v685 = softehl_splat(0.0), v686 = softehl_splat(0.0), v687 = softehl_splat(0.0),
+            v688 = softehl_splat(0.0), v689 = softehl_splat(0.0), v690 = softehl_splat(0.0),
+            v691 = softehl_splat(0.0), v692 = softehl_splat(0.0), v693 = softehl_splat(0.0),
+            v694 = softehl_splat(0.0), v695 = softehl_splat(0.0), v696 = softehl_splat(0.0),
+            v697 = softehl_splat(0.0), v698 = softehl_splat(0.0), v699 = softehl_splat(0.0),
+            v700 = softehl_splat(0.0), v701 = softehl_splat(0.0), v702 = softehl_splat(0.0),
+            v703 = softehl_splat(0.0), v704 = softehl_splat(0.0), v705 = softehl_splat(0.0),
+            v706 = softehl_splat(0.0), v707 = softehl_splat(0.0), v708 = softehl_splat(0.0),
+            v709 = softehl_splat(0.0), v710 = softehl_splat(0.0), v711 = softehl_splat(0.0),
+            v712 = softehl_splat(0.0);
+        const M m713 = v652;
+        if (softehl_any(m713)) {
+            const M v714 = softehl_le(softehl_splat(0.0), v650);
+            V v715 = softehl_splat(0.0), v716 = softehl_splat(0.0), v717 = softehl_splat(0.0),
+                v718 = softehl_splat(0.0), v719 = softehl_splat(0.0), v720 = softehl_splat(0.0),
+                v721 = softehl_splat(0.0), v722 = softehl_splat(0.0), v723 = softehl_splat(0.0),
+                v724 = softehl_splat(0.0), v725 = softehl_splat(0.0), v726 = softehl_splat(0.0),
+                v727 = softehl_splat(0.0), v728 = softehl_splat(0.0), v729 = softehl_splat(0.0),
+                v730 = softehl_splat(0.0), v731 = softehl_splat(0.0), v732 = softehl_splat(0.0),
+                v733 = softehl_splat(0.0), v734 = softehl_splat(0.0), v735 = softehl_splat(0.0),
+                v736 = softehl_splat(0.0), v737 = softehl_splat(0.0), v738 = softehl_splat(0.0),
+                v739 = softehl_splat(0.0), v740 = softehl_splat(0.0), v741 = softehl_splat(0.0),
+                v742 = softehl_splat(0.0), v743 = softehl_splat(0.0), v744 = softehl_splat(0.0),
+                v745 = softehl_splat(0.0), v746 = softehl_splat(0.0), v747 = softehl_splat(0.0),
+                v748 = softehl_splat(0.0), v749 = softehl_splat(0.0), v750 = softehl_splat(0.0),
+                v751 = softehl_splat(0.0), v752 = softehl_splat(0.0), v753 = softehl_splat(0.0),
+                v754 = softehl_splat(0.0), v755 = softehl_splat(0.0), v756 = softehl_splat(0.0),
+                v757 = softehl_splat(0.0);
+            const M m758 = v714 & m713;
+            if (softehl_any(m758)) {
+                const V v759 = a12 + v641, v760 = v641 - a13, v761 = v759 * v760;
+                const M v762 = softehl_eq(v761, v761);
+                V v763 = softehl_splat(0.0), v764 = softehl_splat(0.0), v765 = softehl_splat(0.0),
+                    v766 = softehl_splat(0.0), v767 = softehl_splat(0.0);
+                const M m768 = v762 & m758;
+                if (softehl_any(m768)) {
+                    const M v769 = softehl_lt(v761, softehl_splat(0.0));
+                    const V v770 = softehl_blend(v769, v650, softehl_splat(0.0)),
+                        v771 = softehl_blend(v769, v504, softehl_splat(0.0)),
+                        v772 = softehl_blend(v769, v505, softehl_splat(0.0)),
+                        v773 = softehl_blend(v769, v35, softehl_splat(0.0)),
+                        v774 = softehl_blend(v769, v33, softehl_splat(0.0));
+                    v763 = softehl_blend(m768, v770, v763); v764 = softehl_blend(m768, v771, v764);
+                    v765 = softehl_blend(m768, v772, v765); v766 = softehl_blend(m768, v773, v766);
+                    v767 = softehl_blend(m768, v774, v767);
                 }
-                const M m773 = ~v760 & m756;
-                if (softehl_any(m773)) {
-                    const V v774 = v759 * v759, v775 = v759 * v774,
-                        v776 = 3.0 * v774 * (v757 + v758);
-                    v761 = softehl_blend(m773, v775, v761);
-                    v762 = softehl_blend(m773, softehl_splat(0.0), v762);
-                    v763 = softehl_blend(m773, softehl_splat(0.0), v763);
-                    v764 = softehl_blend(m773, v776, v764);
-                    v765 = softehl_blend(m773, softehl_splat(0.0), v765);
+                const M m775 = ~v762 & m758;
+                if (softehl_any(m775)) {
+                    const V v776 = v761 * v761, v777 = v761 * v776,
+                        v778 = 3.0 * v776 * (v759 + v760);
+                    v763 = softehl_blend(m775, v777, v763); v766 = softehl_blend(m775, v778, v766);
                 }
-                const V v777 = a11 * v761; const M v778 = softehl_eq(v777, v777);
-                const V v779 = v8 * v624 - v11 * v502 - v4 * v503 - v6 * v621 - v7 * v623,
-                    v780 = v22 * v624 - v14 * v502 - v13 * v503 - v15 * v621 - v20 * v623,
-                    v781 = a10 * (v90 * v779 + v91 * v780) + (d11 * v502 + d13 * v503);
-                const M v782 = softehl_eq(v781, v781), v783 = v778 & v782;
-                V v784 = softehl_splat(0.0), v785 = softehl_splat(0.0), v786 = softehl_splat(0.0),
-                    v787 = softehl_splat(0.0), v788 = softehl_splat(0.0), v789 = softehl_splat(0.0);
-                const M m790 = v783 & m756;
-                if (softehl_any(m790)) {
-                    const M v791 = softehl_lt(v777, v781);
-                    V v792 = v777, v793 = softehl_splat(0.0), v794 = softehl_splat(0.0), v795 = a11,
-                        v796 = softehl_splat(0.0), v797 = softehl_splat(0.0);
-                    const M m798 = ~v791 & m790;
-                    if (softehl_any(m798)) {
-                        V v799 = softehl_splat(0.0), v800 = softehl_splat(0.0),
-                            v801 = softehl_splat(0.0), v802 = softehl_splat(0.0),
-                            v803 = softehl_splat(0.0), v804 = softehl_splat(0.0);
-                        const M m805 = v778 & m798;
-                        if (softehl_any(m805)) {
-                            const M v806 = softehl_lt(v777, -v781);
-                            V v807 = v781, v808 = v502, v809 = v503, v810 = softehl_splat(0.0),
-                                v811 = a10, v812 = v42;
-                            const M m813 = v806 & m805;
-                            if (softehl_any(m813)) {
-                                const V v814 = -v777; v807 = softehl_blend(m813, v814, v807);
-                                v808 = softehl_blend(m813, softehl_splat(0.0), v808);
-                                v809 = softehl_blend(m813, softehl_splat(0.0), v809);
-                                v810 = softehl_blend(m813, v19, v810);
-                                v811 = softehl_blend(m813, softehl_splat(0.0), v811);
-                                v812 = softehl_blend(m813, softehl_splat(0.0), v812);
+                const V v779 = a11 * v763; const M v780 = softehl_eq(v779, v779);
+                const V v781 = v8 * v626 - v11 * v504 - v4 * v505 - v6 * v623 - v7 * v625,
+                    v782 = v22 * v626 - v14 * v504 - v13 * v505 - v15 * v623 - v20 * v625,
+                    v783 = a10 * (v90 * v781 + v91 * v782) + (d11 * v504 + d13 * v505);
+                const M v784 = softehl_eq(v783, v783), v785 = v780 & v784;
+                V v786 = softehl_splat(0.0), v787 = softehl_splat(0.0), v788 = softehl_splat(0.0),
+                    v789 = softehl_splat(0.0), v790 = softehl_splat(0.0), v791 = softehl_splat(0.0);
+                const M m792 = v785 & m758;
+                if (softehl_any(m792)) {
+                    const M v793 = softehl_lt(v779, v783);
+                    V v794 = v779, v795 = softehl_splat(0.0), v796 = softehl_splat(0.0), v797 = a11,
+                        v798 = softehl_splat(0.0), v799 = softehl_splat(0.0);
+                    const M m800 = ~v793 & m792;
+                    if (softehl_any(m800)) {
+                        V v801 = softehl_splat(0.0), v802 = softehl_splat(0.0),
+                            v803 = softehl_splat(0.0), v804 = softehl_splat(0.0),
+                            v805 = softehl_splat(0.0), v806 = softehl_splat(0.0);
+                        const M m807 = v780 & m800;
+                        if (softehl_any(m807)) {
+                            const M v808 = softehl_lt(v779, -v783);
+                            V v809 = v783, v810 = v504, v811 = v505, v812 = softehl_splat(0.0),
+                                v813 = a10, v814 = v42;
+                            const M m815 = v808 & m807;
+                            if (softehl_any(m815)) {
+                                const V v816 = -v779; v809 = softehl_blend(m815, v816, v809);
+                                v810 = softehl_blend(m815, softehl_splat(0.0), v810);
+                                v811 = softehl_blend(m815, softehl_splat(0.0), v811);
+                                v812 = softehl_blend(m815, v19, v812);
+                                v813 = softehl_blend(m815, softehl_splat(0.0), v813);
+                                v814 = softehl_blend(m815, softehl_splat(0.0), v814);
                             }
-                            v799 = softehl_blend(m805, v807, v799);
-                            v800 = softehl_blend(m805, v808, v800);
-                            v801 = softehl_blend(m805, v809, v801);
-                            v802 = softehl_blend(m805, v810, v802);
-                            v803 = softehl_blend(m805, v811, v803);
-                            v804 = softehl_blend(m805, v812, v804);
+                            v801 = softehl_blend(m807, v809, v801);
+                            v802 = softehl_blend(m807, v810, v802);
+                            v803 = softehl_blend(m807, v811, v803);
+                            v804 = softehl_blend(m807, v812, v804);
+                            v805 = softehl_blend(m807, v813, v805);
+                            v806 = softehl_blend(m807, v814, v806);
                         }
-                        const M m815 = ~v778 & m798;
-                        if (softehl_any(m815)) {
-                            const V v816 = v781 + v777, v817 = v816 * v816, v818 = v816 * v817,
-                                v819 = 3.0 * v817, v820 = v42 * v819, v821 = a11 * v819,
-                                v822 = a10 * v819, v823 = v502 * v819, v824 = v503 * v819;
-                            v799 = softehl_blend(m815, v818, v799);
-                            v800 = softehl_blend(m815, v823, v800);
-                            v801 = softehl_blend(m815, v824, v801);
-                            v802 = softehl_blend(m815, v821, v802);
-                            v803 = softehl_blend(m815, v822, v803);
-                            v804 = softehl_blend(m815, v820, v804);
+                        const M m817 = ~v780 & m800;
+                        if (softehl_any(m817)) {
+                            const V v818 = v783 + v779, v819 = v818 * v818, v820 = v818 * v819,
+                                v821 = 3.0 * v819, v822 = v42 * v821, v823 = a11 * v821,
+                                v824 = a10 * v821, v825 = v504 * v821, v826 = v505 * v821;
+                            v801 = softehl_blend(m817, v820, v801);
+                            v802 = softehl_blend(m817, v825, v802);
+                            v803 = softehl_blend(m817, v826, v803);
+                            v804 = softehl_blend(m817, v823, v804);
+                            v805 = softehl_blend(m817, v824, v805);
+                            v806 = softehl_blend(m817, v822, v806);
                         }
-                        v792 = softehl_blend(m798, v799, v792);
-                        v793 = softehl_blend(m798, v800, v793);
-                        v794 = softehl_blend(m798, v801, v794);
-                        v795 = softehl_blend(m798, v802, v795);
-                        v796 = softehl_blend(m798, v803, v796);
-                        v797 = softehl_blend(m798, v804, v797);
+                        v794 = softehl_blend(m800, v801, v794);
+                        v795 = softehl_blend(m800, v802, v795);
+                        v796 = softehl_blend(m800, v803, v796);
+                        v797 = softehl_blend(m800, v804, v797);
+                        v798 = softehl_blend(m800, v805, v798);
+                        v799 = softehl_blend(m800, v806, v799);
                     }
-                    v784 = softehl_blend(m790, v792, v784); v785 = softehl_blend(m790, v793, v785);
-                    v786 = softehl_blend(m790, v794, v786); v787 = softehl_blend(m790, v795, v787);
-                    v788 = softehl_blend(m790, v796, v788); v789 = softehl_blend(m790, v797, v789);
+                    v786 = softehl_blend(m792, v794, v786); v787 = softehl_blend(m792, v795, v787);
+                    v788 = softehl_blend(m792, v796, v788); v789 = softehl_blend(m792, v797, v789);
+                    v790 = softehl_blend(m792, v798, v790); v791 = softehl_blend(m792, v799, v791);
                 }
-                const M m825 = ~v783 & m756;
-                if (softehl_any(m825)) {
-                    const V v826 = v777 - v781, v827 = v826 * v826, v828 = v826 * v827,
-                        v829 = 3.0 * v827, v830 = v41 * v829, v831 = a11 * v829,
-                        v832 = -(a10 * v829), v833 = v561 * v829, v834 = -(v503 * v829);
-                    v784 = softehl_blend(m825, v828, v784); v785 = softehl_blend(m825, v833, v785);
-                    v786 = softehl_blend(m825, v834, v786); v787 = softehl_blend(m825, v831, v787);
-                    v788 = softehl_blend(m825, v832, v788); v789 = softehl_blend(m825, v830, v789);
+                const M m827 = ~v785 & m758;
+                if (softehl_any(m827)) {
+                    const V v828 = v779 - v783, v829 = v828 * v828, v830 = v828 * v829,
+                        v831 = 3.0 * v829, v832 = v41 * v831, v833 = a11 * v831,
+                        v834 = -(a10 * v831), v835 = v563 * v831, v836 = -(v505 * v831);
+                    v786 = softehl_blend(m827, v830, v786); v787 = softehl_blend(m827, v835, v787);
+                    v788 = softehl_blend(m827, v836, v788); v789 = softehl_blend(m827, v833, v789);
+                    v790 = softehl_blend(m827, v834, v790); v791 = softehl_blend(m827, v832, v791);
                 }
-                const V v835 = v100 * v780, v836 = v103 * v779, v837 = v762 * v787,
-                    v838 = v763 * v787, v839 = v764 * v787,
-                    v840 = v90 * (v7 * v625 + (v8 * v596 + v6 * v620)) + v91 * (v20 * v625 + (v22 * v596 + v15 * v620)),
-                    v841 = w[1] * v785, v842 = w[1] * v786, v843 = v785 * v590, v844 = v786 * v590,
-                    v845 = v785 * v589, v846 = v786 * v589, v847 = v841 * v591, v848 = v842 * v591,
-                    v849 = v841 * v592, v850 = v842 * v592, v851 = v840 * v788,
-                    v852 = v788 * (v562 * v294 + v840 * v613) + v787 * (v562 * v765 + v764 * v647),
-                    v853 = v788 * (v557 * v294 + v840 * v616) + v787 * (v557 * v765 + v764 * v644),
-                    v854 = v787 * (v556 * v765 + v764 * v654) + v788 * (v840 * v652 + (v556 * v294 + (v105 * v779 + v835))),
-                    v855 = v787 * (v558 * v765 + v764 * v642) + v788 * (v840 * v637 + (v558 * v294 + (v836 + v107 * v780))),
-                    v856 = v787 * (v559 * v765 + v764 * v655) + v788 * (v840 * v653 + (v559 * v294 + (v104 * v779 - v835))),
-                    v857 = v787 * (v560 * v765 + v764 * v640) + v788 * (v840 * v632 + (v560 * v294 + (v106 * v780 - v836))),
-                    v858 = v788 * (v554 * v294 + v840 * v615) + v787 * (v554 * v765 + v764 * v643),
-                    v859 = v788 * (v555 * v294 + v840 * v614) + v787 * (v555 * v765 + v764 * v649),
-                    v860 = v646 * v839 + v617 * v851, v861 = v645 * v839 + v618 * v851,
-                    v862 = v577 * v846, v863 = v577 * v843, v864 = v577 * v844, v865 = v577 * v845,
-                    v866 = v581 * v843, v867 = v581 * v844, v868 = v581 * v845, v869 = v581 * v846,
-                    v870 = v628 * v843, v871 = v628 * v844, v872 = v628 * v845, v873 = v628 * v846,
-                    v874 = v627 * v843, v875 = v627 * v844, v876 = v627 * v845, v877 = v627 * v846,
-                    v878 = -(v626 * v843), v879 = -(v626 * v844), v880 = -(v626 * v845),
-                    v881 = -(v626 * v846);
-                v713 = softehl_blend(m756, v761, v713); v714 = softehl_blend(m756, v762, v714);
-                v715 = softehl_blend(m756, v763, v715); v716 = softehl_blend(m756, v784, v716);
-                v717 = softehl_blend(m756, v764, v717); v718 = softehl_blend(m756, v863, v718);
-                v719 = softehl_blend(m756, v864, v719); v720 = softehl_blend(m756, v865, v720);
-                v721 = softehl_blend(m756, v862, v721); v722 = softehl_blend(m756, v866, v722);
-                v723 = softehl_blend(m756, v867, v723); v724 = softehl_blend(m756, v868, v724);
-                v725 = softehl_blend(m756, v869, v725); v726 = softehl_blend(m756, v870, v726);
-                v727 = softehl_blend(m756, v871, v727); v728 = softehl_blend(m756, v872, v728);
-                v729 = softehl_blend(m756, v873, v729); v730 = softehl_blend(m756, v874, v730);
-                v731 = softehl_blend(m756, v875, v731); v732 = softehl_blend(m756, v876, v732);
-                v733 = softehl_blend(m756, v877, v733); v734 = softehl_blend(m756, v878, v734);
-                v735 = softehl_blend(m756, v879, v735); v736 = softehl_blend(m756, v880, v736);
-                v737 = softehl_blend(m756, v881, v737); v738 = softehl_blend(m756, v847, v738);
-                v739 = softehl_blend(m756, v848, v739); v740 = softehl_blend(m756, v849, v740);
-                v741 = softehl_blend(m756, v850, v741); v742 = softehl_blend(m756, v837, v742);
-                v743 = softehl_blend(m756, v838, v743); v744 = softehl_blend(m756, v860, v744);
-                v745 = softehl_blend(m756, v861, v745); v746 = softehl_blend(m756, v765, v746);
-                v747 = softehl_blend(m756, v854, v747); v748 = softehl_blend(m756, v789, v748);
-                v749 = softehl_blend(m756, v855, v749); v750 = softehl_blend(m756, v856, v750);
-                v751 = softehl_blend(m756, v857, v751); v752 = softehl_blend(m756, v852, v752);
-                v753 = softehl_blend(m756, v858, v753); v754 = softehl_blend(m756, v859, v754);
-                v755 = softehl_blend(m756, v853, v755);
+                const V v837 = v100 * v782, v838 = v103 * v781, v839 = v764 * v789,
+                    v840 = v765 * v789, v841 = v766 * v789,
+                    v842 = v90 * (v7 * v627 + (v8 * v598 + v6 * v622)) + v91 * (v20 * v627 + (v22 * v598 + v15 * v622)),
+                    v843 = w[1] * v787, v844 = w[1] * v788, v845 = v787 * v592, v846 = v788 * v592,
+                    v847 = v787 * v591, v848 = v788 * v591, v849 = v843 * v593, v850 = v844 * v593,
+                    v851 = v843 * v594, v852 = v844 * v594, v853 = v842 * v790,
+                    v854 = v790 * (v564 * v296 + v842 * v615) + v789 * (v564 * v767 + v766 * v649),
+                    v855 = v790 * (v559 * v296 + v842 * v618) + v789 * (v559 * v767 + v766 * v646),
+                    v856 = v789 * (v558 * v767 + v766 * v656) + v790 * (v842 * v654 + (v558 * v296 + (v105 * v781 + v837))),
+                    v857 = v789 * (v560 * v767 + v766 * v644) + v790 * (v842 * v639 + (v560 * v296 + (v838 + v107 * v782))),
+                    v858 = v789 * (v561 * v767 + v766 * v657) + v790 * (v842 * v655 + (v561 * v296 + (v104 * v781 - v837))),
+                    v859 = v789 * (v562 * v767 + v766 * v642) + v790 * (v842 * v634 + (v562 * v296 + (v106 * v782 - v838))),
+                    v860 = v790 * (v556 * v296 + v842 * v617) + v789 * (v556 * v767 + v766 * v645),
+                    v861 = v790 * (v557 * v296 + v842 * v616) + v789 * (v557 * v767 + v766 * v651),
+                    v862 = v648 * v841 + v619 * v853, v863 = v647 * v841 + v620 * v853,
+                    v864 = v579 * v848, v865 = v579 * v845, v866 = v579 * v846, v867 = v579 * v847,
+                    v868 = v583 * v845, v869 = v583 * v846, v870 = v583 * v847, v871 = v583 * v848,
+                    v872 = v630 * v845, v873 = v630 * v846, v874 = v630 * v847, v875 = v630 * v848,
+                    v876 = v629 * v845, v877 = v629 * v846, v878 = v629 * v847, v879 = v629 * v848,
+                    v880 = -(v628 * v845), v881 = -(v628 * v846), v882 = -(v628 * v847),
+                    v883 = -(v628 * v848);
+                v715 = softehl_blend(m758, v763, v715); v716 = softehl_blend(m758, v764, v716);
+                v717 = softehl_blend(m758, v765, v717); v718 = softehl_blend(m758, v786, v718);
+                v719 = softehl_blend(m758, v766, v719); v720 = softehl_blend(m758, v865, v720);
+                v721 = softehl_blend(m758, v866, v721); v722 = softehl_blend(m758, v867, v722);
+                v723 = softehl_blend(m758, v864, v723); v724 = softehl_blend(m758, v868, v724);
+                v725 = softehl_blend(m758, v869, v725); v726 = softehl_blend(m758, v870, v726);
+                v727 = softehl_blend(m758, v871, v727); v728 = softehl_blend(m758, v872, v728);
+                v729 = softehl_blend(m758, v873, v729); v730 = softehl_blend(m758, v874, v730);
+                v731 = softehl_blend(m758, v875, v731); v732 = softehl_blend(m758, v876, v732);
+                v733 = softehl_blend(m758, v877, v733); v734 = softehl_blend(m758, v878, v734);
+                v735 = softehl_blend(m758, v879, v735); v736 = softehl_blend(m758, v880, v736);
+                v737 = softehl_blend(m758, v881, v737); v738 = softehl_blend(m758, v882, v738);
+                v739 = softehl_blend(m758, v883, v739); v740 = softehl_blend(m758, v849, v740);
+                v741 = softehl_blend(m758, v850, v741); v742 = softehl_blend(m758, v851, v742);
+                v743 = softehl_blend(m758, v852, v743); v744 = softehl_blend(m758, v839, v744);
+                v745 = softehl_blend(m758, v840, v745); v746 = softehl_blend(m758, v862, v746);
+                v747 = softehl_blend(m758, v863, v747); v748 = softehl_blend(m758, v767, v748);
+                v749 = softehl_blend(m758, v856, v749); v750 = softehl_blend(m758, v791, v750);
+                v751 = softehl_blend(m758, v857, v751); v752 = softehl_blend(m758, v858, v752);
+                v753 = softehl_blend(m758, v859, v753); v754 = softehl_blend(m758, v854, v754);
+                v755 = softehl_blend(m758, v860, v755); v756 = softehl_blend(m758, v861, v756);
+                v757 = softehl_blend(m758, v855, v757);
             }
-            v656 = softehl_blend(m711, v713, v656); v657 = softehl_blend(m711, v714, v657);
-            v658 = softehl_blend(m711, v715, v658); v659 = softehl_blend(m711, v716, v659);
-            v660 = softehl_blend(m711, v717, v660); v661 = softehl_blend(m711, v718, v661);
-            v662 = softehl_blend(m711, v719, v662); v663 = softehl_blend(m711, v720, v663);
-            v664 = softehl_blend(m711, v721, v664); v665 = softehl_blend(m711, v722, v665);
-            v666 = softehl_blend(m711, v723, v666); v667 = softehl_blend(m711, v724, v667);
-            v668 = softehl_blend(m711, v725, v668); v669 = softehl_blend(m711, v726, v669);
-            v670 = softehl_blend(m711, v727, v670); v671 = softehl_blend(m711, v728, v671);
-            v672 = softehl_blend(m711, v729, v672); v673 = softehl_blend(m711, v730, v673);
-            v674 = softehl_blend(m711, v731, v674); v675 = softehl_blend(m711, v732, v675);
-            v676 = softehl_blend(m711, v733, v676); v677 = softehl_blend(m711, v734, v677);
-            v678 = softehl_blend(m711, v735, v678); v679 = softehl_blend(m711, v736, v679);
-            v680 = softehl_blend(m711, v737, v680); v681 = softehl_blend(m711, v738, v681);
-            v682 = softehl_blend(m711, v739, v682); v683 = softehl_blend(m711, v740, v683);
-            v684 = softehl_blend(m711, v741, v684); v685 = softehl_blend(m711, v742, v685);
-            v686 = softehl_blend(m711, softehl_splat(0.0), v686);
-            v687 = softehl_blend(m711, v743, v687);
-            v688 = softehl_blend(m711, softehl_splat(0.0), v688);
-            v689 = softehl_blend(m711, v744, v689);
-            v690 = softehl_blend(m711, softehl_splat(0.0), v690);
-            v691 = softehl_blend(m711, v745, v691);
-            v692 = softehl_blend(m711, softehl_splat(0.0), v692);
-            v693 = softehl_blend(m711, v746, v693); v694 = softehl_blend(m711, v747, v694);
-            v695 = softehl_blend(m711, v748, v695);
-            v696 = softehl_blend(m711, softehl_splat(0.0), v696);
-            v697 = softehl_blend(m711, v749, v697);
-            v698 = softehl_blend(m711, softehl_splat(0.0), v698);
-            v699 = softehl_blend(m711, v750, v699);
-            v700 = softehl_blend(m711, softehl_splat(0.0), v700);
-            v701 = softehl_blend(m711, v751, v701);
-            v702 = softehl_blend(m711, softehl_splat(0.0), v702);
-            v703 = softehl_blend(m711, v752, v703);
-            v704 = softehl_blend(m711, softehl_splat(0.0), v704);
-            v705 = softehl_blend(m711, v753, v705);
-            v706 = softehl_blend(m711, softehl_splat(0.0), v706);
-            v707 = softehl_blend(m711, v754, v707);
-            v708 = softehl_blend(m711, softehl_splat(0.0), v708);
-            v709 = softehl_blend(m711, v755, v709);
-            v710 = softehl_blend(m711, softehl_splat(0.0), v710);
+            v658 = softehl_blend(m713, v715, v658); v659 = softehl_blend(m713, v716, v659);
+            v660 = softehl_blend(m713, v717, v660); v661 = softehl_blend(m713, v718, v661);
+            v662 = softehl_blend(m713, v719, v662); v663 = softehl_blend(m713, v720, v663);
+            v664 = softehl_blend(m713, v721, v664); v665 = softehl_blend(m713, v722, v665);
+            v666 = softehl_blend(m713, v723, v666); v667 = softehl_blend(m713, v724, v667);
+            v668 = softehl_blend(m713, v725, v668); v669 = softehl_blend(m713, v726, v669);
+            v670 = softehl_blend(m713, v727, v670); v671 = softehl_blend(m713, v728, v671);
+            v672 = softehl_blend(m713, v729, v672); v673 = softehl_blend(m713, v730, v673);
+            v674 = softehl_blend(m713, v731, v674); v675 = softehl_blend(m713, v732, v675);
+            v676 = softehl_blend(m713, v733, v676); v677 = softehl_blend(m713, v734, v677);
+            v678 = softehl_blend(m713, v735, v678); v679 = softehl_blend(m713, v736, v679);
+            v680 = softehl_blend(m713, v737, v680); v681 = softehl_blend(m713, v738, v681);
+            v682 = softehl_blend(m713, v739, v682); v683 = softehl_blend(m713, v740, v683);
+            v684 = softehl_blend(m713, v741, v684); v685 = softehl_blend(m713, v742, v685);
+            v686 = softehl_blend(m713, v743, v686); v687 = softehl_blend(m713, v744, v687);
+            v689 = softehl_blend(m713, v745, v689); v691 = softehl_blend(m713, v746, v691);
+            v693 = softehl_blend(m713, v747, v693); v695 = softehl_blend(m713, v748, v695);
+            v696 = softehl_blend(m713, v749, v696); v697 = softehl_blend(m713, v750, v697);
+            v699 = softehl_blend(m713, v751, v699); v701 = softehl_blend(m713, v752, v701);
+            v703 = softehl_blend(m713, v753, v703); v705 = softehl_blend(m713, v754, v705);
+            v707 = softehl_blend(m713, v755, v707); v709 = softehl_blend(m713, v756, v709);
+            v711 = softehl_blend(m713, v757, v711);
         }
-        const M m882 = ~v650;
-        if (softehl_any(m882)) {
-            const V v883 = v641 - v580, v884 = v883 * v883, v885 = v883 * v884, v886 = 3.0 * v884,
-                v887 = v561 * v886, v888 = v30 * v886, v889 = -(v503 * v886), v890 = a10 * v886,
-                v891 = v890 * v646, v892 = v890 * v645, v893 = v890 * v654, v894 = v890 * v642,
-                v895 = v890 * v655, v896 = v890 * v640, v897 = v890 * v647, v898 = v890 * v643,
-                v899 = v890 * v649, v900 = v890 * v644;
-            v656 = softehl_blend(m882, v885, v656); v657 = softehl_blend(m882, v887, v657);
-            v658 = softehl_blend(m882, v889, v658); v659 = softehl_blend(m882, v885, v659);
-            v660 = softehl_blend(m882, v890, v660);
-            v661 = softehl_blend(m882, softehl_splat(0.0), v661);
-            v662 = softehl_blend(m882, softehl_splat(0.0), v662);
-            v663 = softehl_blend(m882, softehl_splat(0.0), v663);
-            v664 = softehl_blend(m882, softehl_splat(0.0), v664);
-            v665 = softehl_blend(m882, softehl_splat(0.0), v665);
-            v666 = softehl_blend(m882, softehl_splat(0.0), v666);
-            v667 = softehl_blend(m882, softehl_splat(0.0), v667);
-            v668 = softehl_blend(m882, softehl_splat(0.0), v668);
-            v669 = softehl_blend(m882, softehl_splat(0.0), v669);
-            v670 = softehl_blend(m882, softehl_splat(0.0), v670);
-            v671 = softehl_blend(m882, softehl_splat(0.0), v671);
-            v672 = softehl_blend(m882, softehl_splat(0.0), v672);
-            v673 = softehl_blend(m882, softehl_splat(0.0), v673);
-            v674 = softehl_blend(m882, softehl_splat(0.0), v674);
-            v675 = softehl_blend(m882, softehl_splat(0.0), v675);
-            v676 = softehl_blend(m882, softehl_splat(0.0), v676);
-            v677 = softehl_blend(m882, softehl_splat(0.0), v677);
-            v678 = softehl_blend(m882, softehl_splat(0.0), v678);
-            v679 = softehl_blend(m882, softehl_splat(0.0), v679);
-            v680 = softehl_blend(m882, softehl_splat(0.0), v680);
-            v681 = softehl_blend(m882, softehl_splat(0.0), v681);
-            v682 = softehl_blend(m882, softehl_splat(0.0), v682);
-            v683 = softehl_blend(m882, softehl_splat(0.0), v683);
-            v684 = softehl_blend(m882, softehl_splat(0.0), v684);
-            v685 = softehl_blend(m882, softehl_splat(0.0), v685);
-            v686 = softehl_blend(m882, v887, v686);
-            v687 = softehl_blend(m882, softehl_splat(0.0), v687);
-            v688 = softehl_blend(m882, v889, v688);
-            v689 = softehl_blend(m882, softehl_splat(0.0), v689);
-            v690 = softehl_blend(m882, v891, v690);
-            v691 = softehl_blend(m882, softehl_splat(0.0), v691);
-            v692 = softehl_blend(m882, v892, v692); v693 = softehl_blend(m882, v888, v693);
-            v694 = softehl_blend(m882, softehl_splat(0.0), v694);
-            v695 = softehl_blend(m882, v888, v695); v696 = softehl_blend(m882, v893, v696);
-            v697 = softehl_blend(m882, softehl_splat(0.0), v697);
-            v698 = softehl_blend(m882, v894, v698);
-            v699 = softehl_blend(m882, softehl_splat(0.0), v699);
-            v700 = softehl_blend(m882, v895, v700);
-            v701 = softehl_blend(m882, softehl_splat(0.0), v701);
-            v702 = softehl_blend(m882, v896, v702);
-            v703 = softehl_blend(m882, softehl_splat(0.0), v703);
-            v704 = softehl_blend(m882, v897, v704);
-            v705 = softehl_blend(m882, softehl_splat(0.0), v705);
-            v706 = softehl_blend(m882, v898, v706);
-            v707 = softehl_blend(m882, softehl_splat(0.0), v707);
-            v708 = softehl_blend(m882, v899, v708);
-            v709 = softehl_blend(m882, softehl_splat(0.0), v709);
-            v710 = softehl_blend(m882, v900, v710);
+        const M m884 = ~v652;
+        if (softehl_any(m884)) {
+            const V v885 = v643 - v582, v886 = v885 * v885, v887 = v885 * v886, v888 = 3.0 * v886,
+                v889 = v563 * v888, v890 = v30 * v888, v891 = -(v505 * v888), v892 = a10 * v888,
+                v893 = v892 * v648, v894 = v892 * v647, v895 = v892 * v656, v896 = v892 * v644,
+                v897 = v892 * v657, v898 = v892 * v642, v899 = v892 * v649, v900 = v892 * v645,
+                v901 = v892 * v651, v902 = v892 * v646;
+            v658 = softehl_blend(m884, v887, v658); v659 = softehl_blend(m884, v889, v659);
+            v660 = softehl_blend(m884, v891, v660); v661 = softehl_blend(m884, v887, v661);
+            v662 = softehl_blend(m884, v892, v662); v688 = softehl_blend(m884, v889, v688);
+            v690 = softehl_blend(m884, v891, v690); v692 = softehl_blend(m884, v893, v692);
+            v694 = softehl_blend(m884, v894, v694); v695 = softehl_blend(m884, v890, v695);
+            v697 = softehl_blend(m884, v890, v697); v698 = softehl_blend(m884, v895, v698);
+            v700 = softehl_blend(m884, v896, v700); v702 = softehl_blend(m884, v897, v702);
+            v704 = softehl_blend(m884, v898, v704); v706 = softehl_blend(m884, v899, v706);
+            v708 = softehl_blend(m884, v900, v708); v710 = softehl_blend(m884, v901, v710);
+            v712 = softehl_blend(m884, v902, v712);
         }
-        s307 += v661; s308 += v662; s309 += v663; s310 += v664; s311 += v665; s312 += v666;
-        s313 += v667; s314 += v668; s315 += v669; s316 += v670; s317 += v671; s318 += v672;
-        s319 += v673; s320 += v674; s321 += v675; s322 += v676; s323 += v677; s324 += v678;
-        s325 += v679; s326 += v680; s327 += v681; s328 += v682; s329 += v683; s330 += v684;
-        const V v901 = v686 + v685, v902 = v688 + v687, v903 = v690 + v689, v904 = v692 + v691,
-            v905 = v646 * v660, v906 = v645 * v660, v907 = w[1] * v905, v908 = w[1] * v906,
-            v909 = v34 * w[1], v910 = w[1] * v657, v911 = w[1] * v658, v912 = w[1] * v901,
-            v913 = w[1] * v902, v914 = w[1] * v591;
-        s303 += v907 * v591; s304 += v908 * v591; s305 += v907 * v592; s306 += v908 * v592;
-        const V v915 = w[1] * v592; s297 += v910 * v591; s299 += v910 * v592; s298 += v911 * v591;
-        s300 += v911 * v592; s341 += v912 * v591; s343 += v912 * v592; s342 += v913 * v591;
-        s344 += v913 * v592; s367 += v903 * v915; s368 += v904 * v915; s365 += v903 * v914;
-        s366 += v904 * v914;
-        const V v916 = v905 * v589 + v903 * v590, v917 = v903 * v589 - v905 * v590,
-            v918 = v906 * v589 + v904 * v590, v919 = v904 * v589 - v906 * v590,
-            v920 = v657 * v589 + v901 * v590, v921 = v901 * v589 - v657 * v590,
-            v922 = v658 * v589 + v902 * v590, v923 = v902 * v589 - v658 * v590;
-        s369 += v577 * v916; s370 += v577 * v918; s345 += v577 * v920; s371 += v577 * v917;
-        s347 += v577 * v921; s346 += v577 * v922; s348 += v577 * v923; s349 += v581 * v920;
-        s350 += v581 * v922; s351 += v581 * v921; s352 += v581 * v923; s375 += v581 * v917;
-        s353 += v628 * v920; s354 += v628 * v922; s355 += v628 * v921; s356 += v628 * v923;
-        s357 += v627 * v920; s358 += v627 * v922; s359 += v627 * v921; s360 += v627 * v923;
-        s361 += v626 * v920; s362 += v626 * v922; s363 += v626 * v921; s364 += v626 * v923;
-        const V v924 = v909 * v503, v925 = v909 * v502, v926 = v656 * v586, v927 = v656 * v585,
-            v928 = v656 * v293, v929 = v659 * v586, v930 = v659 * v585, v931 = v659 * v293,
-            v932 = 0.5 * v926;
-        s295 += v924 * v926; s301 += v924 * v929; s296 += v925 * v926; s302 += v925 * v929;
-        const V v933 = 0.5 * v929, v934 = v100 * v926, v935 = v100 * v929, v936 = v103 * v926,
-            v937 = v103 * v929, v938 = v34 * (v932 + v503 * v928),
-            v939 = v34 * (v933 + v503 * v931), v940 = v34 * (v502 * v928 - v932),
-            v941 = v34 * (v502 * v931 - v933), v942 = v578 * v927, v943 = v579 * v927,
-            v944 = v578 * v930, v945 = v579 * v930, v946 = v560 * v693 + v660 * v640,
-            v947 = v562 * v693 + v660 * v647, v948 = v555 * v693 + v660 * v649,
-            v949 = v554 * v693 + v660 * v643, v950 = v556 * v693 + v660 * v654,
-            v951 = v558 * v693 + v660 * v642;
-        s400 += w[1] * (v279 * v943 + v560 * v938 + v946 * v592);
-        const V v952 = v559 * v693 + v660 * v655, v953 = v557 * v693 + v660 * v644,
-            v954 = v558 * v695 + (v698 + v697), v955 = v559 * v695 + (v700 + v699),
-            v956 = v557 * v695 + (v710 + v709), v957 = v556 * v695 + (v696 + v694),
-            v958 = v560 * v695 + (v702 + v701), v959 = v562 * v695 + (v704 + v703),
-            v960 = v554 * v695 + (v706 + v705), v961 = v555 * v695 + (v708 + v707),
-            v962 = v91 * v656 + v90 * v659, v963 = v91 * v659 - v90 * v656;
-        s372 += v577 * v919; s376 += v581 * v919; s373 += v581 * v916; s374 += v581 * v918;
-        const V v964 = v962 * v586, v965 = v963 * v586, v966 = v962 * v585, v967 = v963 * v585,
-            v968 = v962 * v293, v969 = v963 * v293, v970 = 0.5 * v964;
-        s338 += v581 * v964; s337 += v581 * v965;
-        const V v971 = 0.5 * v965, v972 = v620 * v964, v973 = v620 * v965, v974 = v625 * v964,
-            v975 = v625 * v965, v976 = v596 * v964, v977 = v596 * v965;
-        s331 += v626 * v965; s332 += v626 * v964; s333 += v627 * v965; s334 += v627 * v964;
-        s335 += v628 * v965; s336 += v628 * v964; s339 += v577 * v965; s340 += v577 * v964;
-        const V v978 = v556 * v971, v979 = v556 * v970, v980 = v558 * v970, v981 = v558 * v971,
-            v982 = v559 * v970, v983 = v559 * v971, v984 = v560 * v970, v985 = v560 * v971,
-            v986 = v562 * v970, v987 = v562 * v971, v988 = v554 * v970, v989 = v554 * v971,
-            v990 = v555 * v970, v991 = v557 * v970, v992 = v555 * v971, v993 = v557 * v971;
-        s377 += w[1] * (v617 * v972 - v621 * v916); s378 += w[1] * (v618 * v972 - v621 * v918);
-        s379 += w[1] * (v617 * v973 - v621 * v917); s380 += w[1] * (v618 * v973 - v621 * v919);
-        s381 += w[1] * (v617 * v974 - v623 * v916); s382 += w[1] * (v618 * v974 - v623 * v918);
-        s383 += w[1] * (v617 * v975 - v623 * v917); s384 += w[1] * (v618 * v975 - v623 * v919);
-        s385 += w[1] * (v617 * v976 + v624 * v916); s386 += w[1] * (v618 * v976 + v624 * v918);
-        s387 += w[1] * (v617 * v977 + v624 * v917); s388 += w[1] * (v618 * v977 + v624 * v919);
-        s389 += w[1] * (v271 * v942 + v556 * v940 + v950 * v591);
-        s390 += w[1] * (v272 * v942 + v558 * v940 + v951 * v591);
-        s391 += w[1] * (v273 * v942 + v559 * v940 + v952 * v591);
-        s392 += w[1] * (v279 * v942 + v560 * v940 + v946 * v591);
-        const V v994 = w[1] * (v559 * v938 + (v273 * v943 + v952 * v592)); s399 += v994;
-        const V v995 = w[1] * (v271 * v943 + (v556 * v938 + v950 * v592)); s397 += v995;
-        const V v996 = w[1] * (v272 * v943 + (v558 * v938 + v951 * v592)); s398 += v996;
-        s393 += w[1] * (v280 * v942 + v562 * v940 + v947 * v591);
-        const V v997 = w[1] * (v562 * v938 + (v280 * v943 + v947 * v592)); s401 += v997;
-        const V v998 = v280 * v967 + (v562 * v969 + (v589 * v959 - v947 * v590)),
-            v999 = v280 * v966 + (v562 * v968 + (v947 * v589 + v590 * v959)),
-            v1000 = v279 * v966 + (v560 * v968 + (v946 * v589 + (v106 * v926 - v937))),
-            v1001 = v285 * v966 + (v554 * v968 + (v949 * v589 + v590 * v960)),
-            v1002 = w[1] * (v502 * v998 - v987);
-        s433 += v1002; const V v1003 = w[1] * (v502 * v999 - v986); s425 += v1003;
-        const V v1004 = v285 * v967 + (v554 * v969 + v589 * v960) - v949 * v590;
-        s402 += w[1] * (v285 * v943 + v554 * v938 + v949 * v592);
-        s394 += w[1] * (v285 * v942 + v554 * v940 + v949 * v591);
-        const V v1005 = w[1] * (v502 * v1001 - v988); s426 += v1005;
-        const V v1006 = w[1] * (v502 * v1004 - v989); s434 += v1006;
-        s395 += w[1] * (v286 * v942 + v555 * v940 + v948 * v591);
-        s396 += w[1] * (v287 * v942 + v557 * v940 + v953 * v591);
-        const V v1007 = v1000 + v590 * v958,
-            v1008 = w[1] * (v279 * v944 + v560 * v941 + v591 * v958);
-        s408 += v1008; const V v1009 = w[1] * (v279 * v945 + v560 * v939 + v592 * v958);
-        s416 += v1009;
-        const V v1010 = v279 * v967 + (v560 * v969 + (v936 + v106 * v929 - v946 * v590)) + v589 * v958,
-            v1011 = w[1] * (v555 * v938 + (v286 * v943 + v948 * v592));
-        s403 += v1011; const V v1012 = w[1] * (v557 * v938 + (v287 * v943 + v953 * v592));
-        s404 += v1012; const V v1013 = w[1] * (v502 * v1007 - v984); s424 += v1013;
-        const V v1014 = w[1] * (v502 * v1010 - v985); s432 += v1014;
-        const V v1015 = v286 * v967 + (v555 * v969 + (v589 * v961 - v948 * v590)),
-            v1016 = v287 * v967 + (v557 * v969 + (v589 * v956 - v953 * v590)),
-            v1017 = v557 * v968 + (v287 * v966 + (v953 * v589 + v590 * v956)),
-            v1018 = v555 * v968 + (v286 * v966 + (v948 * v589 + v590 * v961)),
-            v1019 = w[1] * (v502 * v1015 - v992);
-        s435 += v1019; const V v1020 = w[1] * (v502 * v1016 - v993); s436 += v1020;
-        const V v1021 = w[1] * (v502 * v1017 - v991); s428 += v1021;
-        const V v1022 = w[1] * (v502 * v1018 - v990); s427 += v1022;
-        const V v1023 = w[1] * (v287 * v945 + v557 * v939 + v592 * v956); s420 += v1023;
-        const V v1024 = w[1] * (v287 * v944 + v557 * v941 + v591 * v956); s412 += v1024;
-        const V v1025 = w[1] * (v273 * v945 + v559 * v939 + v592 * v955); s415 += v1025;
-        const V v1026 = w[1] * (v273 * v944 + v559 * v941 + v591 * v955); s407 += v1026;
-        const V v1027 = v273 * v966 + (v559 * v968 + (v952 * v589 + (v104 * v929 - v934) + v590 * v955)),
-            v1028 = v273 * v967 + (v559 * v969 + (v589 * v955 - v104 * v926 - v935 - v952 * v590)),
-            v1029 = w[1] * (v280 * v944 + v562 * v941 + v591 * v959);
-        s409 += v1029; const V v1030 = w[1] * (v280 * v945 + v562 * v939 + v592 * v959);
-        s417 += v1030; const V v1031 = w[1] * (v502 * v1027 - v982); s423 += v1031;
-        const V v1032 = w[1] * (v502 * v1028 - v983); s431 += v1032;
-        const V v1033 = w[1] * (v285 * v944 + v554 * v941 + v591 * v960); s410 += v1033;
-        const V v1034 = w[1] * (v285 * v945 + v554 * v939 + v592 * v960); s418 += v1034;
-        const V v1035 = w[1] * (v286 * v944 + v555 * v941 + v591 * v961); s411 += v1035;
-        const V v1036 = w[1] * (v286 * v945 + v555 * v939 + v592 * v961); s419 += v1036;
-        const V v1037 = w[1] * (v982 + v503 * v1027); s439 += v1037;
-        const V v1038 = w[1] * (v983 + v503 * v1028); s447 += v1038;
-        const V v1039 = w[1] * (v984 + v503 * v1007); s440 += v1039;
-        const V v1040 = w[1] * (v986 + v503 * v999); s441 += v1040;
-        const V v1041 = w[1] * (v988 + v503 * v1001); s442 += v1041;
-        const V v1042 = w[1] * (v990 + v503 * v1018); s443 += v1042;
-        const V v1043 = w[1] * (v991 + v503 * v1017); s444 += v1043;
-        const V v1044 = w[1] * (v985 + v503 * v1010); s448 += v1044;
-        const V v1045 = w[1] * (v987 + v503 * v998); s449 += v1045;
-        const V v1046 = w[1] * (v989 + v503 * v1004); s450 += v1046;
-        const V v1047 = w[1] * (v992 + v503 * v1015); s451 += v1047;
-        const V v1048 = w[1] * (v993 + v503 * v1016); s452 += v1048;
-        const V v1049 = w[1] * (v614 * v972 - v621 * v1018); s459 += v1049;
-        const V v1050 = w[1] * (v632 * v973 - v621 * v1010); s464 += v1050;
-        const V v1051 = w[1] * (v613 * v973 - v621 * v998); s465 += v1051;
-        const V v1052 = w[1] * (v615 * v973 - v621 * v1004); s466 += v1052;
-        const V v1053 = w[1] * (v614 * v973 - v621 * v1015); s467 += v1053;
-        const V v1054 = w[1] * (v616 * v973 - v621 * v1016); s468 += v1054;
-        const V v1055 = w[1] * (v653 * v972 - v621 * v1027); s455 += v1055;
-        const V v1056 = w[1] * (v632 * v972 - v621 * v1007); s456 += v1056;
-        const V v1057 = w[1] * (v613 * v972 - v621 * v999); s457 += v1057;
-        const V v1058 = w[1] * (v615 * v972 - v621 * v1001); s458 += v1058;
-        const V v1059 = w[1] * (v616 * v972 - v621 * v1017); s460 += v1059;
-        const V v1060 = w[1] * (v653 * v973 - v621 * v1028); s463 += v1060;
-        const V v1061 = w[1] * (v653 * v974 - v623 * v1027); s471 += v1061;
-        const V v1062 = w[1] * (v632 * v974 - v623 * v1007); s472 += v1062;
-        const V v1063 = w[1] * (v613 * v974 - v623 * v999); s473 += v1063;
-        const V v1064 = w[1] * (v615 * v974 - v623 * v1001); s474 += v1064;
-        const V v1065 = w[1] * (v616 * v974 - v623 * v1017); s476 += v1065;
-        const V v1066 = w[1] * (v653 * v975 - v623 * v1028); s479 += v1066;
-        const V v1067 = w[1] * (v653 * v976 + v624 * v1027); s487 += v1067;
-        const V v1068 = w[1] * (v632 * v976 + v624 * v1007); s488 += v1068;
-        const V v1069 = w[1] * (v613 * v976 + v624 * v999); s489 += v1069;
-        const V v1070 = w[1] * (v615 * v976 + v624 * v1001); s490 += v1070;
-        const V v1071 = w[1] * (v616 * v976 + v624 * v1017); s492 += v1071;
-        const V v1072 = w[1] * (v653 * v977 + v624 * v1028); s495 += v1072;
-        const V v1073 = w[1] * (v614 * v974 - v623 * v1018); s475 += v1073;
-        const V v1074 = w[1] * (v614 * v976 + v624 * v1018); s491 += v1074;
-        const V v1075 = w[1] * (v632 * v975 - v623 * v1010); s480 += v1075;
-        const V v1076 = w[1] * (v632 * v977 + v624 * v1010); s496 += v1076;
-        const V v1077 = w[1] * (v613 * v975 - v623 * v998); s481 += v1077;
-        const V v1078 = w[1] * (v613 * v977 + v624 * v998); s497 += v1078;
-        const V v1079 = w[1] * (v615 * v975 - v623 * v1004); s482 += v1079;
-        const V v1080 = w[1] * (v615 * v977 + v624 * v1004); s498 += v1080;
-        const V v1081 = w[1] * (v614 * v975 - v623 * v1015); s483 += v1081;
-        const V v1082 = w[1] * (v614 * v977 + v624 * v1015); s499 += v1082;
-        const V v1083 = w[1] * (v616 * v975 - v623 * v1016); s484 += v1083;
-        const V v1084 = w[1] * (v616 * v977 + v624 * v1016); s500 += v1084;
-        const V v1085 = w[1] * (v271 * v945 + v556 * v939 + v592 * v957); s413 += v1085;
-        const V v1086 = w[1] * (v272 * v945 + v558 * v939 + v592 * v954); s414 += v1086;
-        const V v1087 = v556 * v968 + (v950 * v589 + (v271 * v966 + (v934 + v105 * v929) + v590 * v957)),
-            v1088 = v558 * v968 + (v951 * v589 + (v272 * v966 + (v107 * v926 + v937) + v590 * v954)),
-            v1089 = v556 * v969 + (v271 * v967 + (v935 - v105 * v926) - v950 * v590 + v589 * v957),
-            v1090 = v558 * v969 + (v272 * v967 + (v107 * v929 - v936) - v951 * v590 + v589 * v954),
-            v1091 = w[1] * (v556 * v941 + (v271 * v944 + v591 * v957));
-        s405 += v1091; const V v1092 = w[1] * (v558 * v941 + (v272 * v944 + v591 * v954));
-        s406 += v1092; const V v1093 = w[1] * (v652 * v974 - v623 * v1087); s469 += v1093;
-        const V v1094 = w[1] * (v637 * v974 - v623 * v1088); s470 += v1094;
-        const V v1095 = w[1] * (v652 * v975 - v623 * v1089); s477 += v1095;
-        const V v1096 = w[1] * (v637 * v975 - v623 * v1090); s478 += v1096;
-        const V v1097 = w[1] * (v652 * v976 + v624 * v1087); s485 += v1097;
-        const V v1098 = w[1] * (v637 * v976 + v624 * v1088); s486 += v1098;
-        const V v1099 = w[1] * (v652 * v977 + v624 * v1089); s493 += v1099;
-        const V v1100 = w[1] * (v637 * v977 + v624 * v1090); s494 += v1100;
-        const V v1101 = w[1] * (v502 * v1087 - v979); s421 += v1101;
-        const V v1102 = w[1] * (v502 * v1088 - v980); s422 += v1102;
-        const V v1103 = w[1] * (v502 * v1089 - v978); s429 += v1103;
-        const V v1104 = w[1] * (v502 * v1090 - v981); s430 += v1104;
-        const V v1105 = w[1] * (v979 + v503 * v1087); s437 += v1105;
-        const V v1106 = w[1] * (v980 + v503 * v1088); s438 += v1106;
-        const V v1107 = w[1] * (v978 + v503 * v1089); s445 += v1107;
-        const V v1108 = w[1] * (v981 + v503 * v1090); s446 += v1108;
-        const V v1109 = w[1] * (v652 * v972 - v621 * v1087); s453 += v1109;
-        const V v1110 = w[1] * (v637 * v972 - v621 * v1088); s454 += v1110;
-        const V v1111 = w[1] * (v652 * v973 - v621 * v1089); s461 += v1111;
-        const V v1112 = w[1] * (v637 * v973 - v621 * v1090); s462 += v1112;
+        s309 += v663; s310 += v664; s311 += v665; s312 += v666; s313 += v667; s314 += v668;
+        s315 += v669; s316 += v670; s317 += v671; s318 += v672; s319 += v673; s320 += v674;
+        s321 += v675; s322 += v676; s323 += v677; s324 += v678; s325 += v679; s326 += v680;
+        s327 += v681; s328 += v682; s329 += v683; s330 += v684; s331 += v685; s332 += v686;
+        const V v903 = v688 + v687, v904 = v690 + v689, v905 = v692 + v691, v906 = v694 + v693,
+            v907 = v648 * v662, v908 = v647 * v662, v909 = w[1] * v907, v910 = w[1] * v908,
+            v911 = v34 * w[1], v912 = w[1] * v659, v913 = w[1] * v660, v914 = w[1] * v903,
+            v915 = w[1] * v904, v916 = w[1] * v593;
+        s305 += v909 * v593; s306 += v910 * v593; s307 += v909 * v594; s308 += v910 * v594;
+        const V v917 = w[1] * v594; s299 += v912 * v593; s301 += v912 * v594; s300 += v913 * v593;
+        s302 += v913 * v594; s343 += v914 * v593; s345 += v914 * v594; s344 += v915 * v593;
+        s346 += v915 * v594; s369 += v905 * v917; s370 += v906 * v917; s367 += v905 * v916;
+        s368 += v906 * v916;
+        const V v918 = v907 * v591 + v905 * v592, v919 = v905 * v591 - v907 * v592,
+            v920 = v908 * v591 + v906 * v592, v921 = v906 * v591 - v908 * v592,
+            v922 = v659 * v591 + v903 * v592, v923 = v903 * v591 - v659 * v592,
+            v924 = v660 * v591 + v904 * v592, v925 = v904 * v591 - v660 * v592;
+        s371 += v579 * v918; s372 += v579 * v920; s347 += v579 * v922; s373 += v579 * v919;
+        s349 += v579 * v923; s348 += v579 * v924; s350 += v579 * v925; s351 += v583 * v922;
+        s352 += v583 * v924; s353 += v583 * v923; s354 += v583 * v925; s377 += v583 * v919;
+        s355 += v630 * v922; s356 += v630 * v924; s357 += v630 * v923; s358 += v630 * v925;
+        s359 += v629 * v922; s360 += v629 * v924; s361 += v629 * v923; s362 += v629 * v925;
+        s363 += v628 * v922; s364 += v628 * v924; s365 += v628 * v923; s366 += v628 * v925;
+        const V v926 = v911 * v505, v927 = v911 * v504, v928 = v658 * v588, v929 = v658 * v587,
+            v930 = v658 * v295, v931 = v661 * v588, v932 = v661 * v587, v933 = v661 * v295,
+            v934 = 0.5 * v928;
+        s297 += v926 * v928; s303 += v926 * v931; s298 += v927 * v928; s304 += v927 * v931;
+        const V v935 = 0.5 * v931, v936 = v100 * v928, v937 = v100 * v931, v938 = v103 * v928,
+            v939 = v103 * v931, v940 = v34 * (v934 + v505 * v930),
+            v941 = v34 * (v935 + v505 * v933), v942 = v34 * (v504 * v930 - v934),
+            v943 = v34 * (v504 * v933 - v935), v944 = v580 * v929, v945 = v581 * v929,
+            v946 = v580 * v932, v947 = v581 * v932, v948 = v562 * v695 + v662 * v642,
+            v949 = v564 * v695 + v662 * v649, v950 = v557 * v695 + v662 * v651,
+            v951 = v556 * v695 + v662 * v645, v952 = v558 * v695 + v662 * v656,
+            v953 = v560 * v695 + v662 * v644;
+        s402 += w[1] * (v281 * v945 + v562 * v940 + v948 * v594);
+        const V v954 = v561 * v695 + v662 * v657, v955 = v559 * v695 + v662 * v646,
+            v956 = v560 * v697 + (v700 + v699), v957 = v561 * v697 + (v702 + v701),
+            v958 = v559 * v697 + (v712 + v711), v959 = v558 * v697 + (v698 + v696),
+            v960 = v562 * v697 + (v704 + v703), v961 = v564 * v697 + (v706 + v705),
+            v962 = v556 * v697 + (v708 + v707), v963 = v557 * v697 + (v710 + v709),
+            v964 = v91 * v658 + v90 * v661, v965 = v91 * v661 - v90 * v658;
+        s374 += v579 * v921; s378 += v583 * v921; s375 += v583 * v918; s376 += v583 * v920;
+        const V v966 = v964 * v588, v967 = v965 * v588, v968 = v964 * v587, v969 = v965 * v587,
+            v970 = v964 * v295, v971 = v965 * v295, v972 = 0.5 * v966;
+        s340 += v583 * v966; s339 += v583 * v967;
+        const V v973 = 0.5 * v967, v974 = v622 * v966, v975 = v622 * v967, v976 = v627 * v966,
+            v977 = v627 * v967, v978 = v598 * v966, v979 = v598 * v967;
+        s333 += v628 * v967; s334 += v628 * v966; s335 += v629 * v967; s336 += v629 * v966;
+        s337 += v630 * v967; s338 += v630 * v966; s341 += v579 * v967; s342 += v579 * v966;
+        const V v980 = v558 * v973, v981 = v558 * v972, v982 = v560 * v972, v983 = v560 * v973,
+            v984 = v561 * v972, v985 = v561 * v973, v986 = v562 * v972, v987 = v562 * v973,
+            v988 = v564 * v972, v989 = v564 * v973, v990 = v556 * v972, v991 = v556 * v973,
+            v992 = v557 * v972, v993 = v559 * v972, v994 = v557 * v973, v995 = v559 * v973;
+        s379 += w[1] * (v619 * v974 - v623 * v918); s380 += w[1] * (v620 * v974 - v623 * v920);
+        s381 += w[1] * (v619 * v975 - v623 * v919); s382 += w[1] * (v620 * v975 - v623 * v921);
+        s383 += w[1] * (v619 * v976 - v625 * v918); s384 += w[1] * (v620 * v976 - v625 * v920);
+        s385 += w[1] * (v619 * v977 - v625 * v919); s386 += w[1] * (v620 * v977 - v625 * v921);
+        s387 += w[1] * (v619 * v978 + v626 * v918); s388 += w[1] * (v620 * v978 + v626 * v920);
+        s389 += w[1] * (v619 * v979 + v626 * v919); s390 += w[1] * (v620 * v979 + v626 * v921);
+        s391 += w[1] * (v273 * v944 + v558 * v942 + v952 * v593);
+        s392 += w[1] * (v274 * v944 + v560 * v942 + v953 * v593);
+        s393 += w[1] * (v275 * v944 + v561 * v942 + v954 * v593);
+        s394 += w[1] * (v281 * v944 + v562 * v942 + v948 * v593);
+        const V v996 = w[1] * (v561 * v940 + (v275 * v945 + v954 * v594)); s401 += v996;
+        const V v997 = w[1] * (v273 * v945 + (v558 * v940 + v952 * v594)); s399 += v997;
+        const V v998 = w[1] * (v274 * v945 + (v560 * v940 + v953 * v594)); s400 += v998;
+        s395 += w[1] * (v282 * v944 + v564 * v942 + v949 * v593);
+        const V v999 = w[1] * (v564 * v940 + (v282 * v945 + v949 * v594)); s403 += v999;
+        const V v1000 = v282 * v969 + (v564 * v971 + (v591 * v961 - v949 * v592)),
+            v1001 = v282 * v968 + (v564 * v970 + (v949 * v591 + v592 * v961)),
+            v1002 = v281 * v968 + (v562 * v970 + (v948 * v591 + (v106 * v928 - v939))),
+            v1003 = v287 * v968 + (v556 * v970 + (v951 * v591 + v592 * v962)),
+            v1004 = w[1] * (v504 * v1000 - v989);
+        s435 += v1004; const V v1005 = w[1] * (v504 * v1001 - v988); s427 += v1005;
+        const V v1006 = v287 * v969 + (v556 * v971 + v591 * v962) - v951 * v592;
+        s404 += w[1] * (v287 * v945 + v556 * v940 + v951 * v594);
+        s396 += w[1] * (v287 * v944 + v556 * v942 + v951 * v593);
+        const V v1007 = w[1] * (v504 * v1003 - v990); s428 += v1007;
+        const V v1008 = w[1] * (v504 * v1006 - v991); s436 += v1008;
+        s397 += w[1] * (v288 * v944 + v557 * v942 + v950 * v593);
+        s398 += w[1] * (v289 * v944 + v559 * v942 + v955 * v593);
+        const V v1009 = v1002 + v592 * v960,
+            v1010 = w[1] * (v281 * v946 + v562 * v943 + v593 * v960);
+        s410 += v1010; const V v1011 = w[1] * (v281 * v947 + v562 * v941 + v594 * v960);
+        s418 += v1011;
+        const V v1012 = v281 * v969 + (v562 * v971 + (v938 + v106 * v931 - v948 * v592)) + v591 * v960,
+            v1013 = w[1] * (v557 * v940 + (v288 * v945 + v950 * v594));
+        s405 += v1013; const V v1014 = w[1] * (v559 * v940 + (v289 * v945 + v955 * v594));
+        s406 += v1014; const V v1015 = w[1] * (v504 * v1009 - v986); s426 += v1015;
+        const V v1016 = w[1] * (v504 * v1012 - v987); s434 += v1016;
+        const V v1017 = v288 * v969 + (v557 * v971 + (v591 * v963 - v950 * v592)),
+            v1018 = v289 * v969 + (v559 * v971 + (v591 * v958 - v955 * v592)),
+            v1019 = v559 * v970 + (v289 * v968 + (v955 * v591 + v592 * v958)),
+            v1020 = v557 * v970 + (v288 * v968 + (v950 * v591 + v592 * v963)),
+            v1021 = w[1] * (v504 * v1017 - v994);
+        s437 += v1021; const V v1022 = w[1] * (v504 * v1018 - v995); s438 += v1022;
+        const V v1023 = w[1] * (v504 * v1019 - v993); s430 += v1023;
+        const V v1024 = w[1] * (v504 * v1020 - v992); s429 += v1024;
+        const V v1025 = w[1] * (v289 * v947 + v559 * v941 + v594 * v958); s422 += v1025;
+        const V v1026 = w[1] * (v289 * v946 + v559 * v943 + v593 * v958); s414 += v1026;
+        const V v1027 = w[1] * (v275 * v947 + v561 * v941 + v594 * v957); s417 += v1027;
+        const V v1028 = w[1] * (v275 * v946 + v561 * v943 + v593 * v957); s409 += v1028;
+        const V v1029 = v275 * v968 + (v561 * v970 + (v954 * v591 + (v104 * v931 - v936) + v592 * v957)),
+            v1030 = v275 * v969 + (v561 * v971 + (v591 * v957 - v104 * v928 - v937 - v954 * v592)),
+            v1031 = w[1] * (v282 * v946 + v564 * v943 + v593 * v961);
+        s411 += v1031; const V v1032 = w[1] * (v282 * v947 + v564 * v941 + v594 * v961);
+        s419 += v1032; const V v1033 = w[1] * (v504 * v1029 - v984); s425 += v1033;
+        const V v1034 = w[1] * (v504 * v1030 - v985); s433 += v1034;
+        const V v1035 = w[1] * (v287 * v946 + v556 * v943 + v593 * v962); s412 += v1035;
+        const V v1036 = w[1] * (v287 * v947 + v556 * v941 + v594 * v962); s420 += v1036;
+        const V v1037 = w[1] * (v288 * v946 + v557 * v943 + v593 * v963); s413 += v1037;
+        const V v1038 = w[1] * (v288 * v947 + v557 * v941 + v594 * v963); s421 += v1038;
+        const V v1039 = w[1] * (v984 + v505 * v1029); s441 += v1039;
+        const V v1040 = w[1] * (v985 + v505 * v1030); s449 += v1040;
+        const V v1041 = w[1] * (v986 + v505 * v1009); s442 += v1041;
+        const V v1042 = w[1] * (v988 + v505 * v1001); s443 += v1042;
+        const V v1043 = w[1] * (v990 + v505 * v1003); s444 += v1043;
+        const V v1044 = w[1] * (v992 + v505 * v1020); s445 += v1044;
+        const V v1045 = w[1] * (v993 + v505 * v1019); s446 += v1045;
+        const V v1046 = w[1] * (v987 + v505 * v1012); s450 += v1046;
+        const V v1047 = w[1] * (v989 + v505 * v1000); s451 += v1047;
+        const V v1048 = w[1] * (v991 + v505 * v1006); s452 += v1048;
+        const V v1049 = w[1] * (v994 + v505 * v1017); s453 += v1049;
+        const V v1050 = w[1] * (v995 + v505 * v1018); s454 += v1050;
+        const V v1051 = w[1] * (v616 * v974 - v623 * v1020); s461 += v1051;
+        const V v1052 = w[1] * (v634 * v975 - v623 * v1012); s466 += v1052;
+        const V v1053 = w[1] * (v615 * v975 - v623 * v1000); s467 += v1053;
+        const V v1054 = w[1] * (v617 * v975 - v623 * v1006); s468 += v1054;
+        const V v1055 = w[1] * (v616 * v975 - v623 * v1017); s469 += v1055;
+        const V v1056 = w[1] * (v618 * v975 - v623 * v1018); s470 += v1056;
+        const V v1057 = w[1] * (v655 * v974 - v623 * v1029); s457 += v1057;
+        const V v1058 = w[1] * (v634 * v974 - v623 * v1009); s458 += v1058;
+        const V v1059 = w[1] * (v615 * v974 - v623 * v1001); s459 += v1059;
+        const V v1060 = w[1] * (v617 * v974 - v623 * v1003); s460 += v1060;
+        const V v1061 = w[1] * (v618 * v974 - v623 * v1019); s462 += v1061;
+        const V v1062 = w[1] * (v655 * v975 - v623 * v1030); s465 += v1062;
+        const V v1063 = w[1] * (v655 * v976 - v625 * v1029); s473 += v1063;
+        const V v1064 = w[1] * (v634 * v976 - v625 * v1009); s474 += v1064;
+        const V v1065 = w[1] * (v615 * v976 - v625 * v1001); s475 += v1065;
+        const V v1066 = w[1] * (v617 * v976 - v625 * v1003); s476 += v1066;
+        const V v1067 = w[1] * (v618 * v976 - v625 * v1019); s478 += v1067;
+        const V v1068 = w[1] * (v655 * v977 - v625 * v1030); s481 += v1068;
+        const V v1069 = w[1] * (v655 * v978 + v626 * v1029); s489 += v1069;
+        const V v1070 = w[1] * (v634 * v978 + v626 * v1009); s490 += v1070;
+        const V v1071 = w[1] * (v615 * v978 + v626 * v1001); s491 += v1071;
+        const V v1072 = w[1] * (v617 * v978 + v626 * v1003); s492 += v1072;
+        const V v1073 = w[1] * (v618 * v978 + v626 * v1019); s494 += v1073;
+        const V v1074 = w[1] * (v655 * v979 + v626 * v1030); s497 += v1074;
+        const V v1075 = w[1] * (v616 * v976 - v625 * v1020); s477 += v1075;
+        const V v1076 = w[1] * (v616 * v978 + v626 * v1020); s493 += v1076;
+        const V v1077 = w[1] * (v634 * v977 - v625 * v1012); s482 += v1077;
+        const V v1078 = w[1] * (v634 * v979 + v626 * v1012); s498 += v1078;
+        const V v1079 = w[1] * (v615 * v977 - v625 * v1000); s483 += v1079;
+        const V v1080 = w[1] * (v615 * v979 + v626 * v1000); s499 += v1080;
+        const V v1081 = w[1] * (v617 * v977 - v625 * v1006); s484 += v1081;
+        const V v1082 = w[1] * (v617 * v979 + v626 * v1006); s500 += v1082;
+        const V v1083 = w[1] * (v616 * v977 - v625 * v1017); s485 += v1083;
+        const V v1084 = w[1] * (v616 * v979 + v626 * v1017); s501 += v1084;
+        const V v1085 = w[1] * (v618 * v977 - v625 * v1018); s486 += v1085;
+        const V v1086 = w[1] * (v618 * v979 + v626 * v1018); s502 += v1086;
+        const V v1087 = w[1] * (v273 * v947 + v558 * v941 + v594 * v959); s415 += v1087;
+        const V v1088 = w[1] * (v274 * v947 + v560 * v941 + v594 * v956); s416 += v1088;
+        const V v1089 = v558 * v970 + (v952 * v591 + (v273 * v968 + (v936 + v105 * v931) + v592 * v959)),
+            v1090 = v560 * v970 + (v953 * v591 + (v274 * v968 + (v107 * v928 + v939) + v592 * v956)),
+            v1091 = v558 * v971 + (v273 * v969 + (v937 - v105 * v928) - v952 * v592 + v591 * v959),
+            v1092 = v560 * v971 + (v274 * v969 + (v107 * v931 - v938) - v953 * v592 + v591 * v956),
+            v1093 = w[1] * (v558 * v943 + (v273 * v946 + v593 * v959));
+        s407 += v1093; const V v1094 = w[1] * (v560 * v943 + (v274 * v946 + v593 * v956));
+        s408 += v1094; const V v1095 = w[1] * (v654 * v976 - v625 * v1089); s471 += v1095;
+        const V v1096 = w[1] * (v639 * v976 - v625 * v1090); s472 += v1096;
+        const V v1097 = w[1] * (v654 * v977 - v625 * v1091); s479 += v1097;
+        const V v1098 = w[1] * (v639 * v977 - v625 * v1092); s480 += v1098;
+        const V v1099 = w[1] * (v654 * v978 + v626 * v1089); s487 += v1099;
+        const V v1100 = w[1] * (v639 * v978 + v626 * v1090); s488 += v1100;
+        const V v1101 = w[1] * (v654 * v979 + v626 * v1091); s495 += v1101;
+        const V v1102 = w[1] * (v639 * v979 + v626 * v1092); s496 += v1102;
+        const V v1103 = w[1] * (v504 * v1089 - v981); s423 += v1103;
+        const V v1104 = w[1] * (v504 * v1090 - v982); s424 += v1104;
+        const V v1105 = w[1] * (v504 * v1091 - v980); s431 += v1105;
+        const V v1106 = w[1] * (v504 * v1092 - v983); s432 += v1106;
+        const V v1107 = w[1] * (v981 + v505 * v1089); s439 += v1107;
+        const V v1108 = w[1] * (v982 + v505 * v1090); s440 += v1108;
+        const V v1109 = w[1] * (v980 + v505 * v1091); s447 += v1109;
+        const V v1110 = w[1] * (v983 + v505 * v1092); s448 += v1110;
+        const V v1111 = w[1] * (v654 * v974 - v623 * v1089); s455 += v1111;
+        const V v1112 = w[1] * (v639 * v974 - v623 * v1090); s456 += v1112;
+        const V v1113 = w[1] * (v654 * v975 - v623 * v1091); s463 += v1113;
+        const V v1114 = w[1] * (v639 * v975 - v623 * v1092); s464 += v1114;
     }
-    softehl_store2(R + 12, 14, s295, s301);
-    softehl_store4(K + 148, 196, s303, s304, s297, softehl_splat(0.0));
-    softehl_store4(K + 176, 196, s305, s306, s299, softehl_splat(0.0));
-    softehl_store4(R + 4, 14, s336, s335, s334, s333);
-    softehl_store4(R + 0, 14, s340, s339, s338, s337);
-    softehl_store4(K + 164, 196, s341, s327, s342, s328);
-    softehl_store4(K + 192, 196, s343, s329, s344, s330);
-    softehl_store4(K + 24, 196, s347, s309, s348, s310);
-    softehl_store4(K + 52, 196, s351, s313, s352, s314);
-    softehl_store4(K + 80, 196, s355, s317, s356, s318);
-    softehl_store4(K + 108, 196, s359, s321, s360, s322);
-    softehl_store4(K + 8, 196, s369, s370, s345, s307);
-    softehl_store4(K + 36, 196, s373, s374, s349, s311);
-    softehl_store4(K + 140, 196, s389, s390, s391, s392);
-    softehl_store4(K + 144, 196, s393, s394, s395, s396);
-    softehl_store4(K + 168, 196, s397, s398, s399, s400);
-    softehl_store4(K + 172, 196, s401, s402, s403, s404);
-    softehl_store4(K + 152, 196, s298, softehl_splat(0.0), s405, s406);
-    softehl_store4(K + 156, 196, s407, s408, s409, s410);
-    softehl_store4(K + 160, 196, s411, s412, s365, s366);
-    softehl_store4(K + 180, 196, s300, softehl_splat(0.0), s413, s414);
-    softehl_store4(K + 184, 196, s415, s416, s417, s418);
-    softehl_store4(K + 188, 196, s419, s420, s367, s368);
-    softehl_store4(K + 0, 196, s421, s422, s423, s424);
-    softehl_store4(K + 4, 196, s425, s426, s427, s428);
-    softehl_store4(K + 12, 196, s346, s308, s429, s430);
-    softehl_store4(K + 16, 196, s431, s432, s433, s434);
-    softehl_store4(K + 20, 196, s435, s436, s371, s372);
-    softehl_store4(K + 28, 196, s437, s438, s439, s440);
-    softehl_store4(K + 32, 196, s441, s442, s443, s444);
-    softehl_store4(K + 40, 196, s350, s312, s445, s446);
-    softehl_store4(K + 44, 196, s447, s448, s449, s450);
-    softehl_store4(K + 48, 196, s451, s452, s375, s376);
-    softehl_store4(R + 8, 14, -s332, -s331, s296, s302);
-    softehl_store4(K + 136, 196, -s363, s325, -s364, s326);
-    softehl_store4(K + 64, 196, -s377, -s378, s353, s315);
-    softehl_store4(K + 92, 196, -s381, -s382, s357, s319);
-    softehl_store4(K + 120, 196, -s385, -s386, -s361, s323);
-    softehl_store4(K + 56, 196, -s453, -s454, -s455, -s456);
-    softehl_store4(K + 60, 196, -s457, -s458, -s459, -s460);
-    softehl_store4(K + 68, 196, s354, s316, -s461, -s462);
-    softehl_store4(K + 72, 196, -s463, -s464, -s465, -s466);
-    softehl_store4(K + 76, 196, -s467, -s468, -s379, -s380);
-    softehl_store4(K + 84, 196, -s469, -s470, -s471, -s472);
-    softehl_store4(K + 88, 196, -s473, -s474, -s475, -s476);
-    softehl_store4(K + 96, 196, s358, s320, -s477, -s478);
-    softehl_store4(K + 100, 196, -s479, -s480, -s481, -s482);
-    softehl_store4(K + 104, 196, -s483, -s484, -s383, -s384);
-    softehl_store4(K + 112, 196, -s485, -s486, -s487, -s488);
-    softehl_store4(K + 116, 196, -s489, -s490, -s491, -s492);
-    softehl_store4(K + 124, 196, -s362, s324, -s493, -s494);
-    softehl_store4(K + 128, 196, -s495, -s496, -s497, -s498);
-    softehl_store4(K + 132, 196, -s499, -s500, -s387, -s388);
+    softehl_store2(R + 12, 14, s297, s303);
+    softehl_store4(K + 148, 196, s305, s306, s299, softehl_splat(0.0));
+    softehl_store4(K + 176, 196, s307, s308, s301, softehl_splat(0.0));
+    softehl_store4(R + 4, 14, s338, s337, s336, s335);
+    softehl_store4(R + 0, 14, s342, s341, s340, s339);
+    softehl_store4(K + 164, 196, s343, s329, s344, s330);
+    softehl_store4(K + 192, 196, s345, s331, s346, s332);
+    softehl_store4(K + 24, 196, s349, s311, s350, s312);
+    softehl_store4(K + 52, 196, s353, s315, s354, s316);
+    softehl_store4(K + 80, 196, s357, s319, s358, s320);
+    softehl_store4(K + 108, 196, s361, s323, s362, s324);
+    softehl_store4(K + 8, 196, s371, s372, s347, s309);
+    softehl_store4(K + 36, 196, s375, s376, s351, s313);
+    softehl_store4(K + 140, 196, s391, s392, s393, s394);
+    softehl_store4(K + 144, 196, s395, s396, s397, s398);
+    softehl_store4(K + 168, 196, s399, s400, s401, s402);
+    softehl_store4(K + 172, 196, s403, s404, s405, s406);
+    softehl_store4(K + 152, 196, s300, softehl_splat(0.0), s407, s408);
+    softehl_store4(K + 156, 196, s409, s410, s411, s412);
+    softehl_store4(K + 160, 196, s413, s414, s367, s368);
+    softehl_store4(K + 180, 196, s302, softehl_splat(0.0), s415, s416);
+    softehl_store4(K + 184, 196, s417, s418, s419, s420);
+    softehl_store4(K + 188, 196, s421, s422, s369, s370);
+    softehl_store4(K + 0, 196, s423, s424, s425, s426);
+    softehl_store4(K + 4, 196, s427, s428, s429, s430);
+    softehl_store4(K + 12, 196, s348, s310, s431, s432);
+    softehl_store4(K + 16, 196, s433, s434, s435, s436);
+    softehl_store4(K + 20, 196, s437, s438, s373, s374);
+    softehl_store4(K + 28, 196, s439, s440, s441, s442);
+    softehl_store4(K + 32, 196, s443, s444, s445, s446);
+    softehl_store4(K + 40, 196, s352, s314, s447, s448);
+    softehl_store4(K + 44, 196, s449, s450, s451, s452);
+    softehl_store4(K + 48, 196, s453, s454, s377, s378);
+    softehl_store4(R + 8, 14, -s334, -s333, s298, s304);
+    softehl_store4(K + 136, 196, -s365, s327, -s366, s328);
+    softehl_store4(K + 64, 196, -s379, -s380, s355, s317);
+    softehl_store4(K + 92, 196, -s383, -s384, s359, s321);
+    softehl_store4(K + 120, 196, -s387, -s388, -s363, s325);
+    softehl_store4(K + 56, 196, -s455, -s456, -s457, -s458);
+    softehl_store4(K + 60, 196, -s459, -s460, -s461, -s462);
+    softehl_store4(K + 68, 196, s356, s318, -s463, -s464);
+    softehl_store4(K + 72, 196, -s465, -s466, -s467, -s468);
+    softehl_store4(K + 76, 196, -s469, -s470, -s381, -s382);
+    softehl_store4(K + 84, 196, -s471, -s472, -s473, -s474);
+    softehl_store4(K + 88, 196, -s475, -s476, -s477, -s478);
+    softehl_store4(K + 96, 196, s360, s322, -s479, -s480);
+    softehl_store4(K + 100, 196, -s481, -s482, -s483, -s484);
+    softehl_store4(K + 104, 196, -s485, -s486, -s385, -s386);
+    softehl_store4(K + 112, 196, -s487, -s488, -s489, -s490);
+    softehl_store4(K + 116, 196, -s491, -s492, -s493, -s494);
+    softehl_store4(K + 124, 196, -s364, s326, -s495, -s496);
+    softehl_store4(K + 128, 196, -s497, -s498, -s499, -s500);
+    softehl_store4(K + 132, 196, -s501, -s502, -s389, -s390);
 }
 SOFTEHL_BATCH(softehl_mortar_23_tangent, 10, 14, 15, 0, 14, (14 * 14))

@@ -279,14 +279,18 @@ SOFTEHL_GROUP(softehl_mortar_32_tangent)
             v115 = softehl_splat(0.0);
         const M m116 = v108 & m107;
         if (softehl_any(m116)) {
-            V v117 = softehl_splat(0.0), v118 = softehl_splat(0.0), v119 = softehl_splat(0.0),
-                v120 = softehl_splat(0.0), v121 = softehl_splat(0.0), v122 = softehl_splat(0.0);
-            const M m123 = ~v74 & m116;
+            V v117 = v89, v118 = v91, v119 = softehl_splat(0.0), v120 = softehl_splat(0.0),
+                v121 = softehl_splat(0.0), v122 = softehl_splat(0.0);
+            const M m123 = v74 & m116;
             if (softehl_any(m123)) {
-                const V v124 = -v93, v125 = -v95, v126 = v83 - v97, v127 = v87 - v99;
-                v117 = softehl_blend(m123, v89, v117); v118 = softehl_blend(m123, v91, v118);
-                v119 = softehl_blend(m123, v124, v119); v120 = softehl_blend(m123, v125, v120);
-                v121 = softehl_blend(m123, v126, v121); v122 = softehl_blend(m123, v127, v122);
+                v117 = softehl_blend(m123, softehl_splat(0.0), v117);
+                v118 = softehl_blend(m123, softehl_splat(0.0), v118);
+            }
+            const M m124 = ~v74 & m116;
+            if (softehl_any(m124)) {
+                const V v125 = -v93, v126 = -v95, v127 = v83 - v97, v128 = v87 - v99;
+                v119 = softehl_blend(m124, v125, v119); v120 = softehl_blend(m124, v126, v120);
+                v121 = softehl_blend(m124, v127, v121); v122 = softehl_blend(m124, v128, v122);
             }
             v109 = softehl_blend(m116, v75, v109); v110 = softehl_blend(m116, v117, v110);
             v111 = softehl_blend(m116, v118, v111); v112 = softehl_blend(m116, v119, v112);
@@ -298,1013 +302,957 @@ SOFTEHL_GROUP(softehl_mortar_32_tangent)
         v104 = softehl_blend(m107, v115, v104); v105 = softehl_blend(m107, v110, v105);
         v106 = softehl_blend(m107, v111, v106);
     }
-    const M m128 = ~v76;
-    if (softehl_any(m128)) {
-        const V v129 = (-1.0) - v75, v130 = v129 * (v129 * v129);
-        V v131 = softehl_splat(0.0), v132 = softehl_splat(0.0), v133 = softehl_splat(0.0),
-            v134 = softehl_splat(0.0), v135 = softehl_splat(0.0), v136 = softehl_splat(0.0);
-        const M m137 = ~v74 & m128;
-        if (softehl_any(m137)) {
-            const V v138 = (-1.0) - v73, v139 = v138 * (3.0 * v138), v140 = (v97 - v83) * v139,
-                v141 = (v99 - v87) * v139, v142 = v93 * v139, v143 = v95 * v139,
-                v144 = -(v89 * v139), v145 = -(v91 * v139);
-            v131 = softehl_blend(m137, v142, v131); v132 = softehl_blend(m137, v143, v132);
-            v133 = softehl_blend(m137, v140, v133); v134 = softehl_blend(m137, v141, v134);
-            v135 = softehl_blend(m137, v144, v135); v136 = softehl_blend(m137, v145, v136);
+    const M m129 = ~v76;
+    if (softehl_any(m129)) {
+        const V v130 = (-1.0) - v75, v131 = v130 * (v130 * v130);
+        V v132 = softehl_splat(0.0), v133 = softehl_splat(0.0), v134 = softehl_splat(0.0),
+            v135 = softehl_splat(0.0), v136 = softehl_splat(0.0), v137 = softehl_splat(0.0);
+        const M m138 = ~v74 & m129;
+        if (softehl_any(m138)) {
+            const V v139 = (-1.0) - v73, v140 = v139 * (3.0 * v139), v141 = (v97 - v83) * v140,
+                v142 = (v99 - v87) * v140, v143 = v93 * v140, v144 = v95 * v140,
+                v145 = -(v89 * v140), v146 = -(v91 * v140);
+            v132 = softehl_blend(m138, v143, v132); v133 = softehl_blend(m138, v144, v133);
+            v134 = softehl_blend(m138, v141, v134); v135 = softehl_blend(m138, v142, v135);
+            v136 = softehl_blend(m138, v145, v136); v137 = softehl_blend(m138, v146, v137);
         }
-        v100 = softehl_blend(m128, v130, v100); v101 = softehl_blend(m128, v131, v101);
-        v102 = softehl_blend(m128, v132, v102); v103 = softehl_blend(m128, v133, v103);
-        v104 = softehl_blend(m128, v134, v104); v105 = softehl_blend(m128, v135, v105);
-        v106 = softehl_blend(m128, v136, v106);
+        v100 = softehl_blend(m129, v131, v100); v101 = softehl_blend(m129, v132, v101);
+        v102 = softehl_blend(m129, v133, v102); v103 = softehl_blend(m129, v134, v103);
+        v104 = softehl_blend(m129, v135, v104); v105 = softehl_blend(m129, v136, v105);
+        v106 = softehl_blend(m129, v137, v106);
     }
-    V v146 = softehl_splat(0.0), v147 = softehl_splat(0.0), v148 = softehl_splat(0.0),
-        v149 = softehl_splat(0.0), v150 = softehl_splat(0.0), v151 = softehl_splat(0.0),
-        v152 = softehl_splat(0.0);
-    const M m153 = v80;
-    if (softehl_any(m153)) {
-        const M v154 = softehl_lt(softehl_splat((-1.0)), v79);
-        V v155 = softehl_splat((-1.0)), v156 = softehl_splat(0.0), v157 = softehl_splat(0.0),
-            v158 = softehl_splat(0.0), v159 = softehl_splat(0.0), v160 = softehl_splat(0.0),
-            v161 = softehl_splat(0.0);
-        const M m162 = v154 & m153;
-        if (softehl_any(m162)) {
-            V v163 = softehl_splat(0.0), v164 = softehl_splat(0.0), v165 = softehl_splat(0.0),
-                v166 = softehl_splat(0.0), v167 = softehl_splat(0.0), v168 = softehl_splat(0.0);
-            const M m169 = ~v78 & m162;
-            if (softehl_any(m169)) {
-                const V v170 = -v92, v171 = -v94, v172 = v82 - v96, v173 = v86 - v98;
-                v163 = softehl_blend(m169, v89, v163); v164 = softehl_blend(m169, v91, v164);
-                v165 = softehl_blend(m169, v170, v165); v166 = softehl_blend(m169, v171, v166);
-                v167 = softehl_blend(m169, v172, v167); v168 = softehl_blend(m169, v173, v168);
+    V v147 = softehl_splat(0.0), v148 = softehl_splat(0.0), v149 = softehl_splat(0.0),
+        v150 = softehl_splat(0.0), v151 = softehl_splat(0.0), v152 = softehl_splat(0.0),
+        v153 = softehl_splat(0.0);
+    const M m154 = v80;
+    if (softehl_any(m154)) {
+        const M v155 = softehl_lt(softehl_splat((-1.0)), v79);
+        V v156 = softehl_splat((-1.0)), v157 = softehl_splat(0.0), v158 = softehl_splat(0.0),
+            v159 = softehl_splat(0.0), v160 = softehl_splat(0.0), v161 = softehl_splat(0.0),
+            v162 = softehl_splat(0.0);
+        const M m163 = v155 & m154;
+        if (softehl_any(m163)) {
+            V v164 = v89, v165 = v91, v166 = softehl_splat(0.0), v167 = softehl_splat(0.0),
+                v168 = softehl_splat(0.0), v169 = softehl_splat(0.0);
+            const M m170 = v78 & m163;
+            if (softehl_any(m170)) {
+                v164 = softehl_blend(m170, softehl_splat(0.0), v164);
+                v165 = softehl_blend(m170, softehl_splat(0.0), v165);
             }
-            v155 = softehl_blend(m162, v79, v155); v156 = softehl_blend(m162, v163, v156);
-            v157 = softehl_blend(m162, v164, v157); v158 = softehl_blend(m162, v165, v158);
-            v159 = softehl_blend(m162, v166, v159); v160 = softehl_blend(m162, v167, v160);
-            v161 = softehl_blend(m162, v168, v161);
+            const M m171 = ~v78 & m163;
+            if (softehl_any(m171)) {
+                const V v172 = -v92, v173 = -v94, v174 = v82 - v96, v175 = v86 - v98;
+                v166 = softehl_blend(m171, v172, v166); v167 = softehl_blend(m171, v173, v167);
+                v168 = softehl_blend(m171, v174, v168); v169 = softehl_blend(m171, v175, v169);
+            }
+            v156 = softehl_blend(m163, v79, v156); v157 = softehl_blend(m163, v164, v157);
+            v158 = softehl_blend(m163, v165, v158); v159 = softehl_blend(m163, v166, v159);
+            v160 = softehl_blend(m163, v167, v160); v161 = softehl_blend(m163, v168, v161);
+            v162 = softehl_blend(m163, v169, v162);
         }
-        v146 = softehl_blend(m153, v155, v146); v147 = softehl_blend(m153, v158, v147);
-        v148 = softehl_blend(m153, v159, v148); v149 = softehl_blend(m153, v160, v149);
-        v150 = softehl_blend(m153, v161, v150); v151 = softehl_blend(m153, v156, v151);
-        v152 = softehl_blend(m153, v157, v152);
+        v147 = softehl_blend(m154, v156, v147); v148 = softehl_blend(m154, v159, v148);
+        v149 = softehl_blend(m154, v160, v149); v150 = softehl_blend(m154, v161, v150);
+        v151 = softehl_blend(m154, v162, v151); v152 = softehl_blend(m154, v157, v152);
+        v153 = softehl_blend(m154, v158, v153);
     }
-    const M m174 = ~v80;
-    if (softehl_any(m174)) {
-        const V v175 = (-1.0) - v79, v176 = v175 * (v175 * v175);
-        V v177 = softehl_splat(0.0), v178 = softehl_splat(0.0), v179 = softehl_splat(0.0),
-            v180 = softehl_splat(0.0), v181 = softehl_splat(0.0), v182 = softehl_splat(0.0);
-        const M m183 = ~v78 & m174;
-        if (softehl_any(m183)) {
-            const V v184 = (-1.0) - v77, v185 = v184 * (3.0 * v184), v186 = (v96 - v82) * v185,
-                v187 = (v98 - v86) * v185, v188 = v92 * v185, v189 = v94 * v185,
-                v190 = -(v89 * v185), v191 = -(v91 * v185);
-            v177 = softehl_blend(m183, v188, v177); v178 = softehl_blend(m183, v189, v178);
-            v179 = softehl_blend(m183, v186, v179); v180 = softehl_blend(m183, v187, v180);
-            v181 = softehl_blend(m183, v190, v181); v182 = softehl_blend(m183, v191, v182);
+    const M m176 = ~v80;
+    if (softehl_any(m176)) {
+        const V v177 = (-1.0) - v79, v178 = v177 * (v177 * v177);
+        V v179 = softehl_splat(0.0), v180 = softehl_splat(0.0), v181 = softehl_splat(0.0),
+            v182 = softehl_splat(0.0), v183 = softehl_splat(0.0), v184 = softehl_splat(0.0);
+        const M m185 = ~v78 & m176;
+        if (softehl_any(m185)) {
+            const V v186 = (-1.0) - v77, v187 = v186 * (3.0 * v186), v188 = (v96 - v82) * v187,
+                v189 = (v98 - v86) * v187, v190 = v92 * v187, v191 = v94 * v187,
+                v192 = -(v89 * v187), v193 = -(v91 * v187);
+            v179 = softehl_blend(m185, v190, v179); v180 = softehl_blend(m185, v191, v180);
+            v181 = softehl_blend(m185, v188, v181); v182 = softehl_blend(m185, v189, v182);
+            v183 = softehl_blend(m185, v192, v183); v184 = softehl_blend(m185, v193, v184);
         }
-        v146 = softehl_blend(m174, v176, v146); v147 = softehl_blend(m174, v177, v147);
-        v148 = softehl_blend(m174, v178, v148); v149 = softehl_blend(m174, v179, v149);
-        v150 = softehl_blend(m174, v180, v150); v151 = softehl_blend(m174, v181, v151);
-        v152 = softehl_blend(m174, v182, v152);
+        v147 = softehl_blend(m176, v178, v147); v148 = softehl_blend(m176, v179, v148);
+        v149 = softehl_blend(m176, v180, v149); v150 = softehl_blend(m176, v181, v150);
+        v151 = softehl_blend(m176, v182, v151); v152 = softehl_blend(m176, v183, v152);
+        v153 = softehl_blend(m176, v184, v153);
     }
-    const V v192 = 1.0 + v100, v193 = 0.5 + v100, v194 = 2.0 * v100, v195 = 0.5 * v100,
-        v196 = 0.5 + v146, v197 = 2.0 * v146, v198 = 0.5 * v146, v199 = v100 - 0.5,
-        v200 = v100 - 1.0, v201 = v100 * v100 - 1.0, v202 = 1.0 + v146, v203 = v146 - 0.5,
-        v204 = v146 - 1.0, v205 = v195 * v192, v206 = v146 * v146 - 1.0, v207 = v195 * v200,
-        v208 = v198 * v202, v209 = v198 * v204, v210 = 2.0 * v147, v211 = 0.5 * v147,
-        v212 = v198 * v147, v213 = 2.0 * v101, v214 = 0.5 * v101, v215 = 2.0 * v148,
-        v216 = 0.5 * v148, v217 = v198 * v148, v218 = 2.0 * v102, v219 = 0.5 * v102,
-        v220 = 2.0 * v149, v221 = 0.5 * v149, v222 = v198 * v149, v223 = 2.0 * v103,
-        v224 = 0.5 * v103, v225 = 2.0 * v150, v226 = 0.5 * v150, v227 = v198 * v150,
-        v228 = 2.0 * v104, v229 = 0.5 * v104, v230 = 2.0 * v151, v231 = 0.5 * v151,
-        v232 = v198 * v151, v233 = v198 * v152, v234 = 2.0 * v152, v235 = 0.5 * v152,
-        v236 = 2.0 * v105, v237 = 0.5 * v105, v238 = 2.0 * v106, v239 = 0.5 * v106,
-        v240 = v197 * v151, v241 = v197 * v147, v242 = v197 * v148, v243 = v197 * v149,
-        v244 = v197 * v150, v245 = v197 * v152, v246 = v194 * v106, v247 = v194 * v101,
-        v248 = v195 * v101, v249 = v195 * v106, v250 = v194 * v102, v251 = v195 * v102,
-        v252 = v194 * v103, v253 = v195 * v103, v254 = v194 * v104, v255 = v195 * v104,
-        v256 = v195 * v105, v257 = v194 * v105, v258 = v27 * v103 - v20 * v223,
-        v259 = v52 * v104 - v2 * v228, v260 = v52 * v105 - v2 * v236,
-        v261 = v27 * v105 - v20 * v236, v262 = v193 + (v52 * v103 - v2 * v223),
-        v263 = v193 + (v27 * v104 - v20 * v228), v264 = v52 * v149 + (v196 - v2 * v220),
-        v265 = v27 * v149 - v20 * v220, v266 = v27 * v150 + (v196 - v20 * v225),
-        v267 = v52 * v150 - v2 * v225, v268 = v27 * v147 - v20 * v210,
-        v269 = v52 * v147 + v203 - v2 * v210, v270 = v27 * v101 - v20 * v213,
-        v271 = v52 * v101 + v199 - v2 * v213, v272 = v52 * v148 - v2 * v215,
-        v273 = v27 * v148 + v203 - v20 * v215, v274 = v52 * v102 - v2 * v218,
-        v275 = v27 * v102 + v199 - v20 * v218, v276 = v52 * v151 - v2 * v230,
-        v277 = v27 * v151 - v20 * v230, v278 = v52 * v152 - v2 * v234,
-        v279 = v27 * v152 - v20 * v234, v280 = v52 * v106 - v2 * v238,
-        v281 = v27 * v106 - v20 * v238, v282 = v10 * v199 + (v49 * v193 - v2 * v194),
-        v283 = v22 * v199 + (v23 * v193 - v20 * v194), v284 = 2.0 * v282, v285 = 2.0 * v283,
-        v286 = 1.0 / (v282 * v282 + v283 * v283), v287 = v54 + v2 * v201 - v10 * v207 - v49 * v205,
-        v288 = v31 + v20 * v201 - v22 * v207 - v23 * v205,
-        v289 = v51 + v2 * v206 - v10 * v209 - v49 * v208,
-        v290 = v24 + v20 * v206 - v22 * v209 - v23 * v208, v291 = v282 * v287 + v283 * v288,
-        v292 = v286 * v286, v293 = v194 * v291 * v292, v294 = v291 * v292,
-        v295 = v100 + v286 * v291, v296 = v286 * (v201 * v282 - v194 * v287) + v284 * v293,
-        v297 = v286 * (v201 * v283 - v194 * v288) + v285 * v293,
-        v298 = (v259 * v284 + v263 * v285) * v294, v299 = (v260 * v284 + v261 * v285) * v294,
-        v300 = (v280 * v284 + v281 * v285) * v294;
-    const M v301 = softehl_lt(softehl_splat(1.0), v295);
-    const V v302 = (v274 * v284 + v275 * v285) * v294, v303 = (v262 * v284 + v258 * v285) * v294,
-        v304 = v294 * (v271 * v284 + v270 * v285), v305 = v10 * v203 + (v49 * v196 - v2 * v197),
-        v306 = v22 * v203 + (v23 * v196 - v20 * v197), v307 = 2.0 * v305, v308 = 2.0 * v306,
-        v309 = 1.0 / (v305 * v305 + v306 * v306), v310 = v289 * v305 + v290 * v306,
-        v311 = v212 + v211 * v202, v312 = v212 + v211 * v204, v313 = v217 + v216 * v202,
-        v314 = v217 + v216 * v204, v315 = v222 + v221 * v202, v316 = v222 + v221 * v204,
-        v317 = v227 + v226 * v202, v318 = v227 + v226 * v204, v319 = v232 + v231 * v202,
-        v320 = v232 + v231 * v204, v321 = v233 + v235 * v202, v322 = v233 + v235 * v204,
-        v323 = v309 * v309, v324 = v146 + v309 * v310, v325 = v310 * v323,
-        v326 = v197 * v310 * v323, v327 = (v206 * v305 - v197 * v289) * v309 + v307 * v326,
-        v328 = v309 * (v206 * v306 - v197 * v290) + v308 * v326,
-        v329 = (v269 * v307 + v268 * v308) * v325, v330 = (v272 * v307 + v273 * v308) * v325,
-        v331 = (v264 * v307 + v265 * v308) * v325, v332 = (v267 * v307 + v266 * v308) * v325,
-        v333 = (v276 * v307 + v277 * v308) * v325, v334 = (v278 * v307 + v279 * v308) * v325,
-        v335 = v269 * v289 + v268 * v290 + v305 * (v2 * v241 - v209 - v10 * v312 - v49 * v311),
-        v336 = v264 * v289 + v265 * v290 + v305 * (v2 * v243 - v208 - v10 * v316 - v49 * v315),
-        v337 = v335 + v306 * (v20 * v241 - v22 * v312 - v23 * v311),
-        v338 = v336 + v306 * (v20 * v243 - v22 * v316 - v23 * v315),
-        v339 = v272 * v289 + v273 * v290 + (v2 * v242 - v49 * v313 - v10 * v314) * v305,
-        v340 = v339 + (v20 * v242 - v209 - v23 * v313 - v22 * v314) * v306,
-        v341 = v267 * v289 + v266 * v290 + (v2 * v244 - v49 * v317 - v10 * v318) * v305,
-        v342 = v341 + (v20 * v244 - v208 - v23 * v317 - v22 * v318) * v306,
-        v343 = v276 * v289 + v277 * v290 + (1.0 + v2 * v240 - v49 * v319 - v10 * v320) * v305,
-        v344 = v343 + (v20 * v240 - v23 * v319 - v22 * v320) * v306,
-        v345 = v278 * v289 + v279 * v290 + (v2 * v245 - v49 * v321 - v10 * v322) * v305,
-        v346 = v345 + (1.0 + v20 * v245 - v23 * v321 - v22 * v322) * v306,
-        v347 = v248 + v214 * v192, v348 = v248 + v214 * v200, v349 = v251 + v219 * v192,
-        v350 = v251 + v219 * v200, v351 = v253 + v224 * v192, v352 = v253 + v224 * v200,
-        v353 = v255 + v229 * v192, v354 = v255 + v229 * v200,
-        v355 = v271 * v287 + v270 * v288 + (v2 * v247 - v207 - v49 * v347 - v10 * v348) * v282,
-        v356 = v274 * v287 + v275 * v288 + (v2 * v250 - v49 * v349 - v10 * v350) * v282,
-        v357 = v262 * v287 + v258 * v288 + (v2 * v252 - v205 - v49 * v351 - v10 * v352) * v282,
-        v358 = v355 + (v20 * v247 - v23 * v347 - v22 * v348) * v283,
-        v359 = v356 + (v20 * v250 - v207 - v23 * v349 - v22 * v350) * v283,
-        v360 = v357 + (v20 * v252 - v23 * v351 - v22 * v352) * v283,
-        v361 = v259 * v287 + v263 * v288 + (v2 * v254 - v49 * v353 - v10 * v354) * v282,
-        v362 = v361 + (v20 * v254 - v205 - v23 * v353 - v22 * v354) * v283,
-        v363 = v256 + v237 * v192, v364 = v256 + v237 * v200, v365 = v249 + v239 * v192,
-        v366 = v249 + v239 * v200,
-        v367 = v260 * v287 + v261 * v288 + (1.0 + v2 * v257 - v49 * v363 - v10 * v364) * v282,
-        v368 = v280 * v287 + v281 * v288 + (v2 * v246 - v49 * v365 - v10 * v366) * v282,
-        v369 = v367 + (v20 * v257 - v23 * v363 - v22 * v364) * v283,
-        v370 = v368 + (1.0 + v20 * v246 - v23 * v365 - v22 * v366) * v283,
-        v371 = softehl_blend(v301, softehl_splat(1.0), v295);
-    const M v372 = softehl_eq(v371, v371), v373 = softehl_lt(softehl_splat(1.0), v324);
-    const V v374 = softehl_blend(v373, softehl_splat(1.0), v324);
-    const M v375 = softehl_eq(v374, v374);
-    const V v376 = v309 * v337 + (v147 - v329), v377 = v309 * v340 + (v148 - v330),
-        v378 = v309 * v338 + (v149 - v331), v379 = v309 * v342 + (v150 - v332),
-        v380 = v286 * v358 + (v101 - v304), v381 = v286 * v359 + (v102 - v302),
-        v382 = v286 * v360 + (v103 - v303), v383 = v286 * v362 + (v104 - v298),
-        v384 = v309 * v344 + (v151 - v333), v385 = v309 * v346 + (v152 - v334),
-        v386 = v286 * v369 + (v105 - v299), v387 = v286 * v370 + (v106 - v300);
-    V v388 = softehl_splat(0.0), v389 = softehl_splat(0.0), v390 = softehl_splat(0.0),
-        v391 = softehl_splat(0.0), v392 = softehl_splat(0.0), v393 = softehl_splat(0.0),
-        v394 = softehl_splat(0.0), v395 = softehl_splat(0.0), v396 = softehl_splat(0.0);
-    const M m397 = v372;
-    if (softehl_any(m397)) {
-        const M v398 = softehl_lt(softehl_splat((-1.0)), v371);
-        V v399 = softehl_splat((-1.0)), v400 = softehl_splat(0.0), v401 = softehl_splat(0.0),
-            v402 = softehl_splat(0.0), v403 = softehl_splat(0.0), v404 = softehl_splat(0.0),
-            v405 = softehl_splat(0.0), v406 = softehl_splat(0.0), v407 = softehl_splat(0.0);
-        const M m408 = v398 & m397;
-        if (softehl_any(m408)) {
-            const V v409 = softehl_blend(v301, softehl_splat(0.0), v296),
-                v410 = softehl_blend(v301, softehl_splat(0.0), v297),
-                v411 = softehl_blend(v301, softehl_splat(0.0), v380),
-                v412 = softehl_blend(v301, softehl_splat(0.0), v381),
-                v413 = softehl_blend(v301, softehl_splat(0.0), v382),
-                v414 = softehl_blend(v301, softehl_splat(0.0), v383),
-                v415 = softehl_blend(v301, softehl_splat(0.0), v386),
-                v416 = softehl_blend(v301, softehl_splat(0.0), v387);
-            v399 = softehl_blend(m408, v371, v399); v400 = softehl_blend(m408, v409, v400);
-            v401 = softehl_blend(m408, v410, v401); v402 = softehl_blend(m408, v411, v402);
-            v403 = softehl_blend(m408, v412, v403); v404 = softehl_blend(m408, v413, v404);
-            v405 = softehl_blend(m408, v414, v405); v406 = softehl_blend(m408, v415, v406);
-            v407 = softehl_blend(m408, v416, v407);
+    const V v194 = 1.0 + v100, v195 = 0.5 + v100, v196 = 2.0 * v100, v197 = 0.5 * v100,
+        v198 = 0.5 + v147, v199 = 2.0 * v147, v200 = 0.5 * v147, v201 = v100 - 0.5,
+        v202 = v100 - 1.0, v203 = v100 * v100 - 1.0, v204 = 1.0 + v147, v205 = v147 - 0.5,
+        v206 = v147 - 1.0, v207 = v197 * v194, v208 = v147 * v147 - 1.0, v209 = v197 * v202,
+        v210 = v200 * v204, v211 = v200 * v206, v212 = 2.0 * v148, v213 = 0.5 * v148,
+        v214 = v200 * v148, v215 = 2.0 * v101, v216 = 0.5 * v101, v217 = 2.0 * v149,
+        v218 = 0.5 * v149, v219 = v200 * v149, v220 = 2.0 * v102, v221 = 0.5 * v102,
+        v222 = 2.0 * v150, v223 = 0.5 * v150, v224 = v200 * v150, v225 = 2.0 * v103,
+        v226 = 0.5 * v103, v227 = 2.0 * v151, v228 = 0.5 * v151, v229 = v200 * v151,
+        v230 = 2.0 * v104, v231 = 0.5 * v104, v232 = 2.0 * v152, v233 = 0.5 * v152,
+        v234 = v200 * v152, v235 = v200 * v153, v236 = 2.0 * v153, v237 = 0.5 * v153,
+        v238 = 2.0 * v105, v239 = 0.5 * v105, v240 = 2.0 * v106, v241 = 0.5 * v106,
+        v242 = v199 * v152, v243 = v199 * v148, v244 = v199 * v149, v245 = v199 * v150,
+        v246 = v199 * v151, v247 = v199 * v153, v248 = v196 * v106, v249 = v196 * v101,
+        v250 = v197 * v101, v251 = v197 * v106, v252 = v196 * v102, v253 = v197 * v102,
+        v254 = v196 * v103, v255 = v197 * v103, v256 = v196 * v104, v257 = v197 * v104,
+        v258 = v197 * v105, v259 = v196 * v105, v260 = v27 * v103 - v20 * v225,
+        v261 = v52 * v104 - v2 * v230, v262 = v52 * v105 - v2 * v238,
+        v263 = v27 * v105 - v20 * v238, v264 = v195 + (v52 * v103 - v2 * v225),
+        v265 = v195 + (v27 * v104 - v20 * v230), v266 = v52 * v150 + (v198 - v2 * v222),
+        v267 = v27 * v150 - v20 * v222, v268 = v27 * v151 + (v198 - v20 * v227),
+        v269 = v52 * v151 - v2 * v227, v270 = v27 * v148 - v20 * v212,
+        v271 = v52 * v148 + v205 - v2 * v212, v272 = v27 * v101 - v20 * v215,
+        v273 = v52 * v101 + v201 - v2 * v215, v274 = v52 * v149 - v2 * v217,
+        v275 = v27 * v149 + v205 - v20 * v217, v276 = v52 * v102 - v2 * v220,
+        v277 = v27 * v102 + v201 - v20 * v220, v278 = v52 * v152 - v2 * v232,
+        v279 = v27 * v152 - v20 * v232, v280 = v52 * v153 - v2 * v236,
+        v281 = v27 * v153 - v20 * v236, v282 = v52 * v106 - v2 * v240,
+        v283 = v27 * v106 - v20 * v240, v284 = v10 * v201 + (v49 * v195 - v2 * v196),
+        v285 = v22 * v201 + (v23 * v195 - v20 * v196), v286 = 2.0 * v284, v287 = 2.0 * v285,
+        v288 = 1.0 / (v284 * v284 + v285 * v285), v289 = v54 + v2 * v203 - v10 * v209 - v49 * v207,
+        v290 = v31 + v20 * v203 - v22 * v209 - v23 * v207,
+        v291 = v51 + v2 * v208 - v10 * v211 - v49 * v210,
+        v292 = v24 + v20 * v208 - v22 * v211 - v23 * v210, v293 = v284 * v289 + v285 * v290,
+        v294 = v288 * v288, v295 = v196 * v293 * v294, v296 = v293 * v294,
+        v297 = v100 + v288 * v293, v298 = v288 * (v203 * v284 - v196 * v289) + v286 * v295,
+        v299 = v288 * (v203 * v285 - v196 * v290) + v287 * v295,
+        v300 = (v261 * v286 + v265 * v287) * v296, v301 = (v262 * v286 + v263 * v287) * v296,
+        v302 = (v282 * v286 + v283 * v287) * v296;
+    const M v303 = softehl_lt(softehl_splat(1.0), v297);
+    const V v304 = (v276 * v286 + v277 * v287) * v296, v305 = (v264 * v286 + v260 * v287) * v296,
+        v306 = v296 * (v273 * v286 + v272 * v287), v307 = v10 * v205 + (v49 * v198 - v2 * v199),
+        v308 = v22 * v205 + (v23 * v198 - v20 * v199), v309 = 2.0 * v307, v310 = 2.0 * v308,
+        v311 = 1.0 / (v307 * v307 + v308 * v308), v312 = v291 * v307 + v292 * v308,
+        v313 = v214 + v213 * v204, v314 = v214 + v213 * v206, v315 = v219 + v218 * v204,
+        v316 = v219 + v218 * v206, v317 = v224 + v223 * v204, v318 = v224 + v223 * v206,
+        v319 = v229 + v228 * v204, v320 = v229 + v228 * v206, v321 = v234 + v233 * v204,
+        v322 = v234 + v233 * v206, v323 = v235 + v237 * v204, v324 = v235 + v237 * v206,
+        v325 = v311 * v311, v326 = v147 + v311 * v312, v327 = v312 * v325,
+        v328 = v199 * v312 * v325, v329 = (v208 * v307 - v199 * v291) * v311 + v309 * v328,
+        v330 = v311 * (v208 * v308 - v199 * v292) + v310 * v328,
+        v331 = (v271 * v309 + v270 * v310) * v327, v332 = (v274 * v309 + v275 * v310) * v327,
+        v333 = (v266 * v309 + v267 * v310) * v327, v334 = (v269 * v309 + v268 * v310) * v327,
+        v335 = (v278 * v309 + v279 * v310) * v327, v336 = (v280 * v309 + v281 * v310) * v327,
+        v337 = v271 * v291 + v270 * v292 + v307 * (v2 * v243 - v211 - v10 * v314 - v49 * v313),
+        v338 = v266 * v291 + v267 * v292 + v307 * (v2 * v245 - v210 - v10 * v318 - v49 * v317),
+        v339 = v337 + v308 * (v20 * v243 - v22 * v314 - v23 * v313),
+        v340 = v338 + v308 * (v20 * v245 - v22 * v318 - v23 * v317),
+        v341 = v274 * v291 + v275 * v292 + (v2 * v244 - v49 * v315 - v10 * v316) * v307,
+        v342 = v341 + (v20 * v244 - v211 - v23 * v315 - v22 * v316) * v308,
+        v343 = v269 * v291 + v268 * v292 + (v2 * v246 - v49 * v319 - v10 * v320) * v307,
+        v344 = v343 + (v20 * v246 - v210 - v23 * v319 - v22 * v320) * v308,
+        v345 = v278 * v291 + v279 * v292 + (1.0 + v2 * v242 - v49 * v321 - v10 * v322) * v307,
+        v346 = v345 + (v20 * v242 - v23 * v321 - v22 * v322) * v308,
+        v347 = v280 * v291 + v281 * v292 + (v2 * v247 - v49 * v323 - v10 * v324) * v307,
+        v348 = v347 + (1.0 + v20 * v247 - v23 * v323 - v22 * v324) * v308,
+        v349 = v250 + v216 * v194, v350 = v250 + v216 * v202, v351 = v253 + v221 * v194,
+        v352 = v253 + v221 * v202, v353 = v255 + v226 * v194, v354 = v255 + v226 * v202,
+        v355 = v257 + v231 * v194, v356 = v257 + v231 * v202,
+        v357 = v273 * v289 + v272 * v290 + (v2 * v249 - v209 - v49 * v349 - v10 * v350) * v284,
+        v358 = v276 * v289 + v277 * v290 + (v2 * v252 - v49 * v351 - v10 * v352) * v284,
+        v359 = v264 * v289 + v260 * v290 + (v2 * v254 - v207 - v49 * v353 - v10 * v354) * v284,
+        v360 = v357 + (v20 * v249 - v23 * v349 - v22 * v350) * v285,
+        v361 = v358 + (v20 * v252 - v209 - v23 * v351 - v22 * v352) * v285,
+        v362 = v359 + (v20 * v254 - v23 * v353 - v22 * v354) * v285,
+        v363 = v261 * v289 + v265 * v290 + (v2 * v256 - v49 * v355 - v10 * v356) * v284,
+        v364 = v363 + (v20 * v256 - v207 - v23 * v355 - v22 * v356) * v285,
+        v365 = v258 + v239 * v194, v366 = v258 + v239 * v202, v367 = v251 + v241 * v194,
+        v368 = v251 + v241 * v202,
+        v369 = v262 * v289 + v263 * v290 + (1.0 + v2 * v259 - v49 * v365 - v10 * v366) * v284,
+        v370 = v282 * v289 + v283 * v290 + (v2 * v248 - v49 * v367 - v10 * v368) * v284,
+        v371 = v369 + (v20 * v259 - v23 * v365 - v22 * v366) * v285,
+        v372 = v370 + (1.0 + v20 * v248 - v23 * v367 - v22 * v368) * v285,
+        v373 = softehl_blend(v303, softehl_splat(1.0), v297);
+    const M v374 = softehl_eq(v373, v373), v375 = softehl_lt(softehl_splat(1.0), v326);
+    const V v376 = softehl_blend(v375, softehl_splat(1.0), v326);
+    const M v377 = softehl_eq(v376, v376);
+    const V v378 = v311 * v339 + (v148 - v331), v379 = v311 * v342 + (v149 - v332),
+        v380 = v311 * v340 + (v150 - v333), v381 = v311 * v344 + (v151 - v334),
+        v382 = v288 * v360 + (v101 - v306), v383 = v288 * v361 + (v102 - v304),
+        v384 = v288 * v362 + (v103 - v305), v385 = v288 * v364 + (v104 - v300),
+        v386 = v311 * v346 + (v152 - v335), v387 = v311 * v348 + (v153 - v336),
+        v388 = v288 * v371 + (v105 - v301), v389 = v288 * v372 + (v106 - v302);
+    V v390 = softehl_splat(0.0), v391 = softehl_splat(0.0), v392 = softehl_splat(0.0),
+        v393 = softehl_splat(0.0), v394 = softehl_splat(0.0), v395 = softehl_splat(0.0),
+        v396 = softehl_splat(0.0), v397 = softehl_splat(0.0), v398 = softehl_splat(0.0);
+    const M m399 = v374;
+    if (softehl_any(m399)) {
+        const M v400 = softehl_lt(softehl_splat((-1.0)), v373);
+        V v401 = softehl_splat((-1.0)), v402 = softehl_splat(0.0), v403 = softehl_splat(0.0),
+            v404 = softehl_splat(0.0), v405 = softehl_splat(0.0), v406 = softehl_splat(0.0),
+            v407 = softehl_splat(0.0), v408 = softehl_splat(0.0), v409 = softehl_splat(0.0);
+        const M m410 = v400 & m399;
+        if (softehl_any(m410)) {
+            const V v411 = softehl_blend(v303, softehl_splat(0.0), v298),
+                v412 = softehl_blend(v303, softehl_splat(0.0), v299),
+                v413 = softehl_blend(v303, softehl_splat(0.0), v382),
+                v414 = softehl_blend(v303, softehl_splat(0.0), v383),
+                v415 = softehl_blend(v303, softehl_splat(0.0), v384),
+                v416 = softehl_blend(v303, softehl_splat(0.0), v385),
+                v417 = softehl_blend(v303, softehl_splat(0.0), v388),
+                v418 = softehl_blend(v303, softehl_splat(0.0), v389);
+            v401 = softehl_blend(m410, v373, v401); v402 = softehl_blend(m410, v411, v402);
+            v403 = softehl_blend(m410, v412, v403); v404 = softehl_blend(m410, v413, v404);
+            v405 = softehl_blend(m410, v414, v405); v406 = softehl_blend(m410, v415, v406);
+            v407 = softehl_blend(m410, v416, v407); v408 = softehl_blend(m410, v417, v408);
+            v409 = softehl_blend(m410, v418, v409);
         }
-        v388 = softehl_blend(m397, v399, v388); v389 = softehl_blend(m397, v400, v389);
-        v390 = softehl_blend(m397, v401, v390); v391 = softehl_blend(m397, v402, v391);
-        v392 = softehl_blend(m397, v403, v392); v393 = softehl_blend(m397, v404, v393);
-        v394 = softehl_blend(m397, v405, v394); v395 = softehl_blend(m397, v406, v395);
-        v396 = softehl_blend(m397, v407, v396);
+        v390 = softehl_blend(m399, v401, v390); v391 = softehl_blend(m399, v402, v391);
+        v392 = softehl_blend(m399, v403, v392); v393 = softehl_blend(m399, v404, v393);
+        v394 = softehl_blend(m399, v405, v394); v395 = softehl_blend(m399, v406, v395);
+        v396 = softehl_blend(m399, v407, v396); v397 = softehl_blend(m399, v408, v397);
+        v398 = softehl_blend(m399, v409, v398);
     }
-    const M m417 = ~v372;
-    if (softehl_any(m417)) {
-        const V v418 = (-1.0) - v371, v419 = v418 * (v418 * v418);
-        V v420 = softehl_splat(0.0), v421 = softehl_splat(0.0), v422 = softehl_splat(0.0),
-            v423 = softehl_splat(0.0), v424 = softehl_splat(0.0), v425 = softehl_splat(0.0),
-            v426 = softehl_splat(0.0), v427 = softehl_splat(0.0);
-        const M m428 = ~v301 & m417;
-        if (softehl_any(m428)) {
-            const V v429 = (-1.0) - v295, v430 = v429 * (3.0 * v429), v431 = -(v296 * v430),
-                v432 = -(v297 * v430), v433 = -(v380 * v430), v434 = -(v381 * v430),
-                v435 = -(v382 * v430), v436 = -(v383 * v430), v437 = -(v386 * v430),
-                v438 = -(v387 * v430);
-            v420 = softehl_blend(m428, v431, v420); v421 = softehl_blend(m428, v432, v421);
-            v422 = softehl_blend(m428, v433, v422); v423 = softehl_blend(m428, v434, v423);
-            v424 = softehl_blend(m428, v435, v424); v425 = softehl_blend(m428, v436, v425);
-            v426 = softehl_blend(m428, v437, v426); v427 = softehl_blend(m428, v438, v427);
+    const M m419 = ~v374;
+    if (softehl_any(m419)) {
+        const V v420 = (-1.0) - v373, v421 = v420 * (v420 * v420);
+        V v422 = softehl_splat(0.0), v423 = softehl_splat(0.0), v424 = softehl_splat(0.0),
+            v425 = softehl_splat(0.0), v426 = softehl_splat(0.0), v427 = softehl_splat(0.0),
+            v428 = softehl_splat(0.0), v429 = softehl_splat(0.0);
+        const M m430 = ~v303 & m419;
+        if (softehl_any(m430)) {
+            const V v431 = (-1.0) - v297, v432 = v431 * (3.0 * v431), v433 = -(v298 * v432),
+                v434 = -(v299 * v432), v435 = -(v382 * v432), v436 = -(v383 * v432),
+                v437 = -(v384 * v432), v438 = -(v385 * v432), v439 = -(v388 * v432),
+                v440 = -(v389 * v432);
+            v422 = softehl_blend(m430, v433, v422); v423 = softehl_blend(m430, v434, v423);
+            v424 = softehl_blend(m430, v435, v424); v425 = softehl_blend(m430, v436, v425);
+            v426 = softehl_blend(m430, v437, v426); v427 = softehl_blend(m430, v438, v427);
+            v428 = softehl_blend(m430, v439, v428); v429 = softehl_blend(m430, v440, v429);
         }
-        v388 = softehl_blend(m417, v419, v388); v389 = softehl_blend(m417, v420, v389);
-        v390 = softehl_blend(m417, v421, v390); v391 = softehl_blend(m417, v422, v391);
-        v392 = softehl_blend(m417, v423, v392); v393 = softehl_blend(m417, v424, v393);
-        v394 = softehl_blend(m417, v425, v394); v395 = softehl_blend(m417, v426, v395);
-        v396 = softehl_blend(m417, v427, v396);
+        v390 = softehl_blend(m419, v421, v390); v391 = softehl_blend(m419, v422, v391);
+        v392 = softehl_blend(m419, v423, v392); v393 = softehl_blend(m419, v424, v393);
+        v394 = softehl_blend(m419, v425, v394); v395 = softehl_blend(m419, v426, v395);
+        v396 = softehl_blend(m419, v427, v396); v397 = softehl_blend(m419, v428, v397);
+        v398 = softehl_blend(m419, v429, v398);
     }
-    V v439 = softehl_splat(0.0), v440 = softehl_splat(0.0), v441 = softehl_splat(0.0),
-        v442 = softehl_splat(0.0), v443 = softehl_splat(0.0), v444 = softehl_splat(0.0),
-        v445 = softehl_splat(0.0), v446 = softehl_splat(0.0), v447 = softehl_splat(0.0);
-    const M m448 = v375;
-    if (softehl_any(m448)) {
-        const M v449 = softehl_lt(softehl_splat((-1.0)), v374);
-        V v450 = softehl_splat((-1.0)), v451 = softehl_splat(0.0), v452 = softehl_splat(0.0),
-            v453 = softehl_splat(0.0), v454 = softehl_splat(0.0), v455 = softehl_splat(0.0),
-            v456 = softehl_splat(0.0), v457 = softehl_splat(0.0), v458 = softehl_splat(0.0);
-        const M m459 = v449 & m448;
-        if (softehl_any(m459)) {
-            const V v460 = softehl_blend(v373, softehl_splat(0.0), v327),
-                v461 = softehl_blend(v373, softehl_splat(0.0), v328),
-                v462 = softehl_blend(v373, softehl_splat(0.0), v376),
-                v463 = softehl_blend(v373, softehl_splat(0.0), v377),
-                v464 = softehl_blend(v373, softehl_splat(0.0), v378),
-                v465 = softehl_blend(v373, softehl_splat(0.0), v379),
-                v466 = softehl_blend(v373, softehl_splat(0.0), v384),
-                v467 = softehl_blend(v373, softehl_splat(0.0), v385);
-            v450 = softehl_blend(m459, v374, v450); v451 = softehl_blend(m459, v460, v451);
-            v452 = softehl_blend(m459, v461, v452); v453 = softehl_blend(m459, v462, v453);
-            v454 = softehl_blend(m459, v463, v454); v455 = softehl_blend(m459, v464, v455);
-            v456 = softehl_blend(m459, v465, v456); v457 = softehl_blend(m459, v466, v457);
-            v458 = softehl_blend(m459, v467, v458);
+    V v441 = softehl_splat(0.0), v442 = softehl_splat(0.0), v443 = softehl_splat(0.0),
+        v444 = softehl_splat(0.0), v445 = softehl_splat(0.0), v446 = softehl_splat(0.0),
+        v447 = softehl_splat(0.0), v448 = softehl_splat(0.0), v449 = softehl_splat(0.0);
+    const M m450 = v377;
+    if (softehl_any(m450)) {
+        const M v451 = softehl_lt(softehl_splat((-1.0)), v376);
+        V v452 = softehl_splat((-1.0)), v453 = softehl_splat(0.0), v454 = softehl_splat(0.0),
+            v455 = softehl_splat(0.0), v456 = softehl_splat(0.0), v457 = softehl_splat(0.0),
+            v458 = softehl_splat(0.0), v459 = softehl_splat(0.0), v460 = softehl_splat(0.0);
+        const M m461 = v451 & m450;
+        if (softehl_any(m461)) {
+            const V v462 = softehl_blend(v375, softehl_splat(0.0), v329),
+                v463 = softehl_blend(v375, softehl_splat(0.0), v330),
+                v464 = softehl_blend(v375, softehl_splat(0.0), v378),
+                v465 = softehl_blend(v375, softehl_splat(0.0), v379),
+                v466 = softehl_blend(v375, softehl_splat(0.0), v380),
+                v467 = softehl_blend(v375, softehl_splat(0.0), v381),
+                v468 = softehl_blend(v375, softehl_splat(0.0), v386),
+                v469 = softehl_blend(v375, softehl_splat(0.0), v387);
+            v452 = softehl_blend(m461, v376, v452); v453 = softehl_blend(m461, v462, v453);
+            v454 = softehl_blend(m461, v463, v454); v455 = softehl_blend(m461, v464, v455);
+            v456 = softehl_blend(m461, v465, v456); v457 = softehl_blend(m461, v466, v457);
+            v458 = softehl_blend(m461, v467, v458); v459 = softehl_blend(m461, v468, v459);
+            v460 = softehl_blend(m461, v469, v460);
         }
-        v439 = softehl_blend(m448, v450, v439); v440 = softehl_blend(m448, v451, v440);
-        v441 = softehl_blend(m448, v452, v441); v442 = softehl_blend(m448, v453, v442);
-        v443 = softehl_blend(m448, v454, v443); v444 = softehl_blend(m448, v455, v444);
-        v445 = softehl_blend(m448, v456, v445); v446 = softehl_blend(m448, v457, v446);
-        v447 = softehl_blend(m448, v458, v447);
+        v441 = softehl_blend(m450, v452, v441); v442 = softehl_blend(m450, v453, v442);
+        v443 = softehl_blend(m450, v454, v443); v444 = softehl_blend(m450, v455, v444);
+        v445 = softehl_blend(m450, v456, v445); v446 = softehl_blend(m450, v457, v446);
+        v447 = softehl_blend(m450, v458, v447); v448 = softehl_blend(m450, v459, v448);
+        v449 = softehl_blend(m450, v460, v449);
     }
-    const M m468 = ~v375;
-    if (softehl_any(m468)) {
-        const V v469 = (-1.0) - v374, v470 = v469 * (v469 * v469);
-        V v471 = softehl_splat(0.0), v472 = softehl_splat(0.0), v473 = softehl_splat(0.0),
-            v474 = softehl_splat(0.0), v475 = softehl_splat(0.0), v476 = softehl_splat(0.0),
-            v477 = softehl_splat(0.0), v478 = softehl_splat(0.0);
-        const M m479 = ~v373 & m468;
-        if (softehl_any(m479)) {
-            const V v480 = (-1.0) - v324, v481 = v480 * (3.0 * v480), v482 = -(v327 * v481),
-                v483 = -(v328 * v481), v484 = -(v376 * v481), v485 = -(v377 * v481),
-                v486 = -(v378 * v481), v487 = -(v379 * v481), v488 = -(v384 * v481),
-                v489 = -(v385 * v481);
-            v471 = softehl_blend(m479, v482, v471); v472 = softehl_blend(m479, v483, v472);
-            v473 = softehl_blend(m479, v484, v473); v474 = softehl_blend(m479, v485, v474);
-            v475 = softehl_blend(m479, v486, v475); v476 = softehl_blend(m479, v487, v476);
-            v477 = softehl_blend(m479, v488, v477); v478 = softehl_blend(m479, v489, v478);
+    const M m470 = ~v377;
+    if (softehl_any(m470)) {
+        const V v471 = (-1.0) - v376, v472 = v471 * (v471 * v471);
+        V v473 = softehl_splat(0.0), v474 = softehl_splat(0.0), v475 = softehl_splat(0.0),
+            v476 = softehl_splat(0.0), v477 = softehl_splat(0.0), v478 = softehl_splat(0.0),
+            v479 = softehl_splat(0.0), v480 = softehl_splat(0.0);
+        const M m481 = ~v375 & m470;
+        if (softehl_any(m481)) {
+            const V v482 = (-1.0) - v326, v483 = v482 * (3.0 * v482), v484 = -(v329 * v483),
+                v485 = -(v330 * v483), v486 = -(v378 * v483), v487 = -(v379 * v483),
+                v488 = -(v380 * v483), v489 = -(v381 * v483), v490 = -(v386 * v483),
+                v491 = -(v387 * v483);
+            v473 = softehl_blend(m481, v484, v473); v474 = softehl_blend(m481, v485, v474);
+            v475 = softehl_blend(m481, v486, v475); v476 = softehl_blend(m481, v487, v476);
+            v477 = softehl_blend(m481, v488, v477); v478 = softehl_blend(m481, v489, v478);
+            v479 = softehl_blend(m481, v490, v479); v480 = softehl_blend(m481, v491, v480);
         }
-        v439 = softehl_blend(m468, v470, v439); v440 = softehl_blend(m468, v471, v440);
-        v441 = softehl_blend(m468, v472, v441); v442 = softehl_blend(m468, v473, v442);
-        v443 = softehl_blend(m468, v474, v443); v444 = softehl_blend(m468, v475, v444);
-        v445 = softehl_blend(m468, v476, v445); v446 = softehl_blend(m468, v477, v446);
-        v447 = softehl_blend(m468, v478, v447);
+        v441 = softehl_blend(m470, v472, v441); v442 = softehl_blend(m470, v473, v442);
+        v443 = softehl_blend(m470, v474, v443); v444 = softehl_blend(m470, v475, v444);
+        v445 = softehl_blend(m470, v476, v445); v446 = softehl_blend(m470, v477, v446);
+        v447 = softehl_blend(m470, v478, v447); v448 = softehl_blend(m470, v479, v448);
+        v449 = softehl_blend(m470, v480, v449);
     }
-    const V v490 = v439 - v388; const M v491 = softehl_eq(v490, v490);
-    V v492 = softehl_splat(0.0), v493 = softehl_splat(0.0), v494 = softehl_splat(0.0),
-        v495 = softehl_splat(0.0), v496 = softehl_splat(0.0), v497 = softehl_splat(0.0),
-        v498 = softehl_splat(0.0), v499 = softehl_splat(0.0), v500 = softehl_splat(0.0),
-        v501 = softehl_splat(0.0), v502 = softehl_splat(0.0);
-    const M m503 = v491;
-    if (softehl_any(m503)) {
-        const M v504 = softehl_lt(softehl_splat(0.0), v490);
-        V v505 = softehl_splat(0.0), v506 = softehl_splat(0.0), v507 = softehl_splat(0.0),
-            v508 = softehl_splat(0.0), v509 = softehl_splat(0.0), v510 = softehl_splat(0.0),
-            v511 = softehl_splat(0.0), v512 = softehl_splat(0.0), v513 = softehl_splat(0.0),
-            v514 = softehl_splat(0.0), v515 = softehl_splat(0.0);
-        const M m516 = v504 & m503;
-        if (softehl_any(m516)) {
-            const V v517 = v440 - v389, v518 = -v395, v519 = v441 - v390, v520 = v442 - v391,
-                v521 = v443 - v392, v522 = -v396, v523 = v444 - v393, v524 = v445 - v394;
-            v505 = softehl_blend(m516, v490, v505); v506 = softehl_blend(m516, v517, v506);
-            v507 = softehl_blend(m516, v519, v507); v508 = softehl_blend(m516, v520, v508);
-            v509 = softehl_blend(m516, v521, v509); v510 = softehl_blend(m516, v523, v510);
-            v511 = softehl_blend(m516, v524, v511); v512 = softehl_blend(m516, v446, v512);
-            v513 = softehl_blend(m516, v447, v513); v514 = softehl_blend(m516, v518, v514);
-            v515 = softehl_blend(m516, v522, v515);
+    const V v492 = v441 - v390; const M v493 = softehl_eq(v492, v492);
+    V v494 = softehl_splat(0.0), v495 = softehl_splat(0.0), v496 = softehl_splat(0.0),
+        v497 = softehl_splat(0.0), v498 = softehl_splat(0.0), v499 = softehl_splat(0.0),
+        v500 = softehl_splat(0.0), v501 = softehl_splat(0.0), v502 = softehl_splat(0.0),
+        v503 = softehl_splat(0.0), v504 = softehl_splat(0.0);
+    const M m505 = v493;
+    if (softehl_any(m505)) {
+        const M v506 = softehl_lt(softehl_splat(0.0), v492);
+        V v507 = softehl_splat(0.0), v508 = softehl_splat(0.0), v509 = softehl_splat(0.0),
+            v510 = softehl_splat(0.0), v511 = softehl_splat(0.0), v512 = softehl_splat(0.0),
+            v513 = softehl_splat(0.0), v514 = softehl_splat(0.0), v515 = softehl_splat(0.0),
+            v516 = softehl_splat(0.0), v517 = softehl_splat(0.0);
+        const M m518 = v506 & m505;
+        if (softehl_any(m518)) {
+            const V v519 = v442 - v391, v520 = -v397, v521 = v443 - v392, v522 = v444 - v393,
+                v523 = v445 - v394, v524 = -v398, v525 = v446 - v395, v526 = v447 - v396;
+            v507 = softehl_blend(m518, v492, v507); v508 = softehl_blend(m518, v519, v508);
+            v509 = softehl_blend(m518, v521, v509); v510 = softehl_blend(m518, v522, v510);
+            v511 = softehl_blend(m518, v523, v511); v512 = softehl_blend(m518, v525, v512);
+            v513 = softehl_blend(m518, v526, v513); v514 = softehl_blend(m518, v448, v514);
+            v515 = softehl_blend(m518, v449, v515); v516 = softehl_blend(m518, v520, v516);
+            v517 = softehl_blend(m518, v524, v517);
         }
-        v492 = softehl_blend(m503, v505, v492); v493 = softehl_blend(m503, v506, v493);
-        v494 = softehl_blend(m503, v507, v494); v495 = softehl_blend(m503, v508, v495);
-        v496 = softehl_blend(m503, v509, v496); v497 = softehl_blend(m503, v510, v497);
-        v498 = softehl_blend(m503, v511, v498); v499 = softehl_blend(m503, v512, v499);
-        v500 = softehl_blend(m503, v513, v500); v501 = softehl_blend(m503, v514, v501);
-        v502 = softehl_blend(m503, v515, v502);
+        v494 = softehl_blend(m505, v507, v494); v495 = softehl_blend(m505, v508, v495);
+        v496 = softehl_blend(m505, v509, v496); v497 = softehl_blend(m505, v510, v497);
+        v498 = softehl_blend(m505, v511, v498); v499 = softehl_blend(m505, v512, v499);
+        v500 = softehl_blend(m505, v513, v500); v501 = softehl_blend(m505, v514, v501);
+        v502 = softehl_blend(m505, v515, v502); v503 = softehl_blend(m505, v516, v503);
+        v504 = softehl_blend(m505, v517, v504);
     }
-    const M m525 = ~v491;
-    if (softehl_any(m525)) {
-        const V v526 = v388 - v439, v527 = v526 * v526, v528 = v526 * v527, v529 = 3.0 * v527,
-            v530 = (v389 - v440) * v529, v531 = (v390 - v441) * v529, v532 = (v391 - v442) * v529,
-            v533 = (v392 - v443) * v529, v534 = (v393 - v444) * v529, v535 = (v394 - v445) * v529,
-            v536 = v395 * v529, v537 = v396 * v529, v538 = -(v446 * v529), v539 = -(v447 * v529);
-        v492 = softehl_blend(m525, v528, v492); v493 = softehl_blend(m525, v530, v493);
-        v494 = softehl_blend(m525, v531, v494); v495 = softehl_blend(m525, v532, v495);
-        v496 = softehl_blend(m525, v533, v496); v497 = softehl_blend(m525, v534, v497);
-        v498 = softehl_blend(m525, v535, v498); v499 = softehl_blend(m525, v538, v499);
-        v500 = softehl_blend(m525, v539, v500); v501 = softehl_blend(m525, v536, v501);
-        v502 = softehl_blend(m525, v537, v502);
+    const M m527 = ~v493;
+    if (softehl_any(m527)) {
+        const V v528 = v390 - v441, v529 = v528 * v528, v530 = v528 * v529, v531 = 3.0 * v529,
+            v532 = (v391 - v442) * v531, v533 = (v392 - v443) * v531, v534 = (v393 - v444) * v531,
+            v535 = (v394 - v445) * v531, v536 = (v395 - v446) * v531, v537 = (v396 - v447) * v531,
+            v538 = v397 * v531, v539 = v398 * v531, v540 = -(v448 * v531), v541 = -(v449 * v531);
+        v494 = softehl_blend(m527, v530, v494); v495 = softehl_blend(m527, v532, v495);
+        v496 = softehl_blend(m527, v533, v496); v497 = softehl_blend(m527, v534, v497);
+        v498 = softehl_blend(m527, v535, v498); v499 = softehl_blend(m527, v536, v499);
+        v500 = softehl_blend(m527, v537, v500); v501 = softehl_blend(m527, v540, v501);
+        v502 = softehl_blend(m527, v541, v502); v503 = softehl_blend(m527, v538, v503);
+        v504 = softehl_blend(m527, v539, v504);
     }
-    const V v540 = 0.5 * v493, v541 = 0.5 * v494, v542 = 0.5 * v495, v543 = 0.5 * v496,
-        v544 = 0.5 * (v388 + v439), v545 = 0.5 * (v440 + v389), v546 = 0.5 * (v441 + v390),
-        v547 = 0.5 * v497, v548 = 0.5 * v498, v549 = 0.5 * (v442 + v391), v550 = 0.5 * v499,
-        v551 = 0.5 * v500, v552 = 0.5 * v501, v553 = 0.5 * (v443 + v392), v554 = 0.5 * v502,
-        v555 = 0.5 * v446, v556 = 0.5 * v447, v557 = 0.5 * v395, v558 = 0.5 * (v444 + v393),
-        v559 = 0.5 * v396, v560 = 0.5 * (v445 + v394), v561 = 6.283185307179586 * a14,
-        v562 = 0.5 * v492, v563 = 0.25 * v492;
-    V s564 = {0}, s565 = {0}, s566 = {0}, s567 = {0}, s568 = {0}, s569 = {0}, s570 = {0},
-        s571 = {0}, s572 = {0}, s573 = {0}, s574 = {0}, s575 = {0}, s576 = {0}, s577 = {0},
-        s578 = {0}, s579 = {0}, s580 = {0}, s581 = {0}, s582 = {0}, s583 = {0}, s584 = {0},
-        s585 = {0}, s586 = {0}, s587 = {0}, s588 = {0}, s589 = {0}, s590 = {0}, s591 = {0},
-        s592 = {0}, s593 = {0}, s594 = {0}, s595 = {0}, s596 = {0}, s597 = {0}, s598 = {0},
-        s599 = {0}, s600 = {0}, s601 = {0}, s602 = {0}, s603 = {0}, s604 = {0}, s605 = {0},
-        s606 = {0}, s607 = {0}, s608 = {0}, s609 = {0}, s610 = {0}, s611 = {0}, s612 = {0},
-        s613 = {0}, s614 = {0}, s615 = {0}, s616 = {0}, s617 = {0}, s618 = {0}, s619 = {0},
-        s620 = {0}, s621 = {0}, s622 = {0}, s623 = {0}, s624 = {0}, s625 = {0}, s626 = {0},
-        s627 = {0}, s628 = {0}, s629 = {0}, s630 = {0}, s631 = {0}, s632 = {0}, s633 = {0},
-        s634 = {0}, s635 = {0}, s636 = {0}, s637 = {0}, s638 = {0}, s639 = {0}, s640 = {0},
-        s641 = {0}, s642 = {0}, s643 = {0}, s644 = {0}, s645 = {0}, s646 = {0}, s647 = {0},
-        s648 = {0}, s649 = {0}, s650 = {0}, s651 = {0}, s652 = {0}, s653 = {0}, s654 = {0},
-        s655 = {0}, s656 = {0}, s657 = {0}, s658 = {0}, s659 = {0}, s660 = {0}, s661 = {0},
-        s662 = {0}, s663 = {0}, s664 = {0}, s665 = {0}, s666 = {0}, s667 = {0}, s668 = {0},
-        s669 = {0}, s670 = {0}, s671 = {0}, s672 = {0}, s673 = {0}, s674 = {0}, s675 = {0},
-        s676 = {0}, s677 = {0}, s678 = {0}, s679 = {0}, s680 = {0}, s681 = {0}, s682 = {0},
-        s683 = {0}, s684 = {0}, s685 = {0}, s686 = {0}, s687 = {0}, s688 = {0}, s689 = {0},
-        s690 = {0}, s691 = {0}, s692 = {0}, s693 = {0}, s694 = {0}, s695 = {0}, s696 = {0},
-        s697 = {0}, s698 = {0}, s699 = {0}, s700 = {0}, s701 = {0}, s702 = {0}, s703 = {0},
-        s704 = {0}, s705 = {0}, s706 = {0}, s707 = {0}, s708 = {0}, s709 = {0}, s710 = {0},
-        s711 = {0}, s712 = {0}, s713 = {0}, s714 = {0}, s715 = {0}, s716 = {0}, s717 = {0},
-        s718 = {0}, s719 = {0}, s720 = {0}, s721 = {0}, s722 = {0}, s723 = {0}, s724 = {0},
-        s725 = {0}, s726 = {0}, s727 = {0}, s728 = {0}, s729 = {0}, s730 = {0}, s731 = {0},
-        s732 = {0}, s733 = {0}, s734 = {0}, s735 = {0}, s736 = {0}, s737 = {0}, s738 = {0},
-        s739 = {0}, s740 = {0}, s741 = {0}, s742 = {0}, s743 = {0}, s744 = {0}, s745 = {0},
-        s746 = {0}, s747 = {0}, s748 = {0}, s749 = {0}, s750 = {0}, s751 = {0}, s752 = {0},
-        s753 = {0}, s754 = {0}, s755 = {0}, s756 = {0}, s757 = {0}, s758 = {0}, s759 = {0},
-        s760 = {0}, s761 = {0}, s762 = {0}, s763 = {0}, s764 = {0}, s765 = {0}, s766 = {0},
-        s767 = {0}, s768 = {0}, s769 = {0};
+    const V v542 = 0.5 * v495, v543 = 0.5 * v496, v544 = 0.5 * v497, v545 = 0.5 * v498,
+        v546 = 0.5 * (v390 + v441), v547 = 0.5 * (v442 + v391), v548 = 0.5 * (v443 + v392),
+        v549 = 0.5 * v499, v550 = 0.5 * v500, v551 = 0.5 * (v444 + v393), v552 = 0.5 * v501,
+        v553 = 0.5 * v502, v554 = 0.5 * v503, v555 = 0.5 * (v445 + v394), v556 = 0.5 * v504,
+        v557 = 0.5 * v448, v558 = 0.5 * v449, v559 = 0.5 * v397, v560 = 0.5 * (v446 + v395),
+        v561 = 0.5 * v398, v562 = 0.5 * (v447 + v396), v563 = 6.283185307179586 * a14,
+        v564 = 0.5 * v494, v565 = 0.25 * v494;
+    V s566 = {0}, s567 = {0}, s568 = {0}, s569 = {0}, s570 = {0}, s571 = {0}, s572 = {0},
+        s573 = {0}, s574 = {0}, s575 = {0}, s576 = {0}, s577 = {0}, s578 = {0}, s579 = {0},
+        s580 = {0}, s581 = {0}, s582 = {0}, s583 = {0}, s584 = {0}, s585 = {0}, s586 = {0},
+        s587 = {0}, s588 = {0}, s589 = {0}, s590 = {0}, s591 = {0}, s592 = {0}, s593 = {0},
+        s594 = {0}, s595 = {0}, s596 = {0}, s597 = {0}, s598 = {0}, s599 = {0}, s600 = {0},
+        s601 = {0}, s602 = {0}, s603 = {0}, s604 = {0}, s605 = {0}, s606 = {0}, s607 = {0},
+        s608 = {0}, s609 = {0}, s610 = {0}, s611 = {0}, s612 = {0}, s613 = {0}, s614 = {0},
+        s615 = {0}, s616 = {0}, s617 = {0}, s618 = {0}, s619 = {0}, s620 = {0}, s621 = {0},
+        s622 = {0}, s623 = {0}, s624 = {0}, s625 = {0}, s626 = {0}, s627 = {0}, s628 = {0},
+        s629 = {0}, s630 = {0}, s631 = {0}, s632 = {0}, s633 = {0}, s634 = {0}, s635 = {0},
+        s636 = {0}, s637 = {0}, s638 = {0}, s639 = {0}, s640 = {0}, s641 = {0}, s642 = {0},
+        s643 = {0}, s644 = {0}, s645 = {0}, s646 = {0}, s647 = {0}, s648 = {0}, s649 = {0},
+        s650 = {0}, s651 = {0}, s652 = {0}, s653 = {0}, s654 = {0}, s655 = {0}, s656 = {0},
+        s657 = {0}, s658 = {0}, s659 = {0}, s660 = {0}, s661 = {0}, s662 = {0}, s663 = {0},
+        s664 = {0}, s665 = {0}, s666 = {0}, s667 = {0}, s668 = {0}, s669 = {0}, s670 = {0},
+        s671 = {0}, s672 = {0}, s673 = {0}, s674 = {0}, s675 = {0}, s676 = {0}, s677 = {0},
+        s678 = {0}, s679 = {0}, s680 = {0}, s681 = {0}, s682 = {0}, s683 = {0}, s684 = {0},
+        s685 = {0}, s686 = {0}, s687 = {0}, s688 = {0}, s689 = {0}, s690 = {0}, s691 = {0},
+        s692 = {0}, s693 = {0}, s694 = {0}, s695 = {0}, s696 = {0}, s697 = {0}, s698 = {0},
+        s699 = {0}, s700 = {0}, s701 = {0}, s702 = {0}, s703 = {0}, s704 = {0}, s705 = {0},
+        s706 = {0}, s707 = {0}, s708 = {0}, s709 = {0}, s710 = {0}, s711 = {0}, s712 = {0},
+        s713 = {0}, s714 = {0}, s715 = {0}, s716 = {0}, s717 = {0}, s718 = {0}, s719 = {0},
+        s720 = {0}, s721 = {0}, s722 = {0}, s723 = {0}, s724 = {0}, s725 = {0}, s726 = {0},
+        s727 = {0}, s728 = {0}, s729 = {0}, s730 = {0}, s731 = {0}, s732 = {0}, s733 = {0},
+        s734 = {0}, s735 = {0}, s736 = {0}, s737 = {0}, s738 = {0}, s739 = {0}, s740 = {0},
+        s741 = {0}, s742 = {0}, s743 = {0}, s744 = {0}, s745 = {0}, s746 = {0}, s747 = {0},
+        s748 = {0}, s749 = {0}, s750 = {0}, s751 = {0}, s752 = {0}, s753 = {0}, s754 = {0},
+        s755 = {0}, s756 = {0}, s757 = {0}, s758 = {0}, s759 = {0}, s760 = {0}, s761 = {0},
+        s762 = {0}, s763 = {0}, s764 = {0}, s765 = {0}, s766 = {0}, s767 = {0}, s768 = {0},
+        s769 = {0}, s770 = {0}, s771 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
         const double *restrict w = rule + 2 * q; (void)w;
-        const V v770 = w[0] * v550 + v555, v771 = w[0] * v551 + v556, v772 = w[0] * v542 + v549,
-            v773 = w[0] * v543 + v553, v774 = w[0] * v547 + v558, v775 = w[0] * v548 + v560,
-            v776 = w[0] * v540 + v545, v777 = w[0] * v541 + v546, v778 = w[0] * v552 + v557,
-            v779 = w[0] * v554 + v559, v780 = w[0] * v562 + v544, v781 = v33 * v772,
-            v782 = v33 * v774, v783 = v33 * v770, v784 = v33 * v776, v785 = v33 * v778,
-            v786 = v33 * v779, v787 = 0.5 * v780, v788 = 2.0 * v780, v789 = v13 * v780,
-            v790 = v16 * v780, v791 = (-1.0) + v780, v792 = 1.0 + v780, v793 = 0.5 + v780,
-            v794 = (-0.5) + v780, v795 = v787 * v791, v796 = v787 - 0.5, v797 = v787 * v792,
-            v798 = 0.5 * (v780 + v791), v799 = 0.5 * (v780 + v792), v800 = v33 * v773 + v794,
-            v801 = w[1] * v797, v802 = w[1] * v795, v803 = 1.0 - v780 * v780,
-            v804 = X2 * v793 + (X0 * v794 - v3 * v780), v805 = X3 * v793 + (X1 * v794 - v19 * v780),
-            v806 = w[1] * v803, v807 = v2 * v803 + (v10 * v795 + v49 * v797), v808 = v2 * v788,
-            v809 = v804 * v804 + v805 * v805, v810 = v20 * v803 + (v22 * v795 + v23 * v797),
-            v811 = v20 * v788, v812 = v49 * v793 + v10 * v794 - v808,
-            v813 = v10 * v798 + v49 * v799 - v808, v814 = softehl_vsqrt(v809),
-            v815 = v23 * v793 + v22 * v794 - v811, v816 = v22 * v798 + v23 * v799 - v811,
-            v817 = (-1.0) + 6.283185307179586 * (X5 * v803 + (v789 * v791 + v790 * v792)),
-            v818 = v807 - v55, v819 = v810 - v34, v820 = v803 + v776 * v813, v821 = v776 * v816,
-            v822 = v812 * v812 + v815 * v815, v823 = 1.0 + a14 * v817, v824 = v60 * v773,
-            v825 = v773 * v813, v826 = v795 + v773 * v816, v827 = v60 * v775, v828 = v775 * v813,
-            v829 = v60 * v776 - v788, v830 = softehl_vsqrt(v822), v831 = v60 * v777,
-            v832 = v777 * v813, v833 = v60 * v770, v834 = v770 * v813, v835 = v770 * v816,
-            v836 = v60 * v771, v837 = v771 * v813, v838 = v771 * v816, v839 = v33 * v771,
-            v840 = v803 + v777 * v816, v841 = v33 * v775 + v793, v842 = v797 + v775 * v816,
-            v843 = v33 * v777 - v788, v844 = v60 * v778, v845 = v778 * v813, v846 = v778 * v816,
-            v847 = v562 * v814, v848 = v60 * v779, v849 = v779 * v813, v850 = v779 * v816,
-            v851 = v823 * v847, v852 = softehl_vsqrt(1.0 / v822), v853 = v772 * v816,
-            v854 = v774 * v816, v855 = v60 * v772 + v794, v856 = v60 * v774 + v793,
-            v857 = v795 + v772 * v813, v858 = v797 + v774 * v813, v859 = 0.5 - v787,
-            v860 = 0.5 + v787, v861 = 1.0 / v830, v862 = v43 * v859, v863 = v43 * v860,
-            v864 = d10 * v859 + d12 * v860, v865 = v862 * v851, v866 = v863 * v851,
-            v867 = 0.5 * v852, v868 = v861 * v861, v869 = 2.0 * v812 * v867 * v868,
-            v870 = 2.0 * v815 * v867 * v868, v871 = w[1] * v865, v872 = w[1] * v866,
-            v873 = v861 - v812 * v869, v874 = v812 * v861, v875 = v812 * v870, v876 = v815 * v861,
-            v877 = v861 - v815 * v870, v878 = v815 * v869, v879 = v876 * v851, v880 = v874 * v851,
-            v881 = 0.5 * (v57 * v876 - v36 * v874), v882 = 1.0 / (v65 * v874 + v41 * v876),
-            v883 = v818 * v874 + v819 * v876, v884 = v882 * (0.5 * v883), v885 = v882 * v882,
-            v886 = v885 * (0.5 * v874 * v883), v887 = v885 * (0.5 * v876 * v883),
-            v888 = v876 * v882,
-            v889 = v882 * (v818 * v873 - v819 * v878) - v885 * (v883 * (v65 * v873 - v41 * v878)),
-            v890 = v882 * (v819 * v877 - v818 * v875) - v885 * (v883 * (v41 * v877 - v65 * v875)),
-            v891 = v874 * v882, v892 = 0.5 * v891, v893 = 0.5 * v888, v894 = 0.5 - v884,
-            v895 = 0.5 + v884, v896 = v54 * v895 + (v51 * v894 - v807), v897 = w[1] * v894,
-            v898 = w[1] * v895, v899 = v31 * v895 + (v24 * v894 - v810),
-            v900 = v876 * v896 - v874 * v899, v901 = v878 * v896 + v873 * v899,
-            v902 = v877 * v896 + v875 * v899, v903 = a10 * v900, v904 = v864 - v903,
-            v905 = v783 * v890 + (v833 * v889 + (v834 * v891 + (v835 * v888 + (v886 - v892))));
-        const M v906 = softehl_eq(v904, v904);
-        const V v907 = v843 * v890 + (v831 * v889 + (v832 * v891 + v840 * v888)),
-            v908 = v874 * v835 + v876 * (v894 - v834) - v833 * v901 + v783 * v902 + v881 * v905,
-            v909 = v907 * v881 + (v874 * v840 - v876 * v832 - v831 * v901 + v843 * v902),
-            v910 = v836 * v889 + (v839 * v890 + (v887 + (v837 * v891 + (v838 * v888 - v893)))),
-            v911 = v874 * (v838 - v894) - v876 * v837 + v839 * v902 - v836 * v901 + v881 * v910,
-            v912 = v786 * v890 + (v848 * v889 + (v849 * v891 + (v850 * v888 - v893) - v887)),
-            v913 = v874 * (v850 - v895) - v876 * v849 - v848 * v901 + v786 * v902 + v881 * v912,
-            v914 = v844 * v889 + (v785 * v890 + (v845 * v891 + (v846 * v888 - v892 - v886))),
-            v915 = v874 * v846 + v876 * (v895 - v845) + v785 * v902 - v844 * v901 + v881 * v914,
-            v916 = v781 * v890 + (v855 * v889 + (v857 * v891 + v853 * v888)),
-            v917 = v916 * v881 + (v874 * v853 - v876 * v857 - v855 * v901 + v781 * v902),
-            v918 = v800 * v890 + (v824 * v889 + (v825 * v891 + v826 * v888)),
-            v919 = v918 * v881 + (v874 * v826 - v876 * v825 - v824 * v901 + v800 * v902),
-            v920 = v782 * v890 + (v856 * v889 + (v858 * v891 + v854 * v888)),
-            v921 = v920 * v881 + (v874 * v854 - v876 * v858 - v856 * v901 + v782 * v902),
-            v922 = v841 * v890 + (v827 * v889 + (v828 * v891 + v842 * v888)),
-            v923 = v784 * v890 + (v829 * v889 + (v820 * v891 + v821 * v888)),
-            v924 = v922 * v881 + (v874 * v842 - v876 * v828 - v827 * v901 + v841 * v902),
-            v925 = v923 * v881 + (v874 * v821 - v876 * v820 - v829 * v901 + v784 * v902);
-        V v926 = softehl_splat(0.0), v927 = softehl_splat(0.0), v928 = softehl_splat(0.0),
-            v929 = softehl_splat(0.0), v930 = softehl_splat(0.0), v931 = softehl_splat(0.0),
-            v932 = softehl_splat(0.0), v933 = softehl_splat(0.0), v934 = softehl_splat(0.0),
-            v935 = softehl_splat(0.0), v936 = softehl_splat(0.0), v937 = softehl_splat(0.0),
-            v938 = softehl_splat(0.0), v939 = softehl_splat(0.0), v940 = softehl_splat(0.0),
-            v941 = softehl_splat(0.0), v942 = softehl_splat(0.0), v943 = softehl_splat(0.0),
-            v944 = softehl_splat(0.0), v945 = softehl_splat(0.0), v946 = softehl_splat(0.0),
-            v947 = softehl_splat(0.0), v948 = softehl_splat(0.0), v949 = softehl_splat(0.0),
-            v950 = softehl_splat(0.0), v951 = softehl_splat(0.0), v952 = softehl_splat(0.0),
-            v953 = softehl_splat(0.0), v954 = softehl_splat(0.0), v955 = softehl_splat(0.0),
-            v956 = softehl_splat(0.0), v957 = softehl_splat(0.0), v958 = softehl_splat(0.0),
-            v959 = softehl_splat(0.0), v960 = softehl_splat(0.0), v961 = softehl_splat(0.0),
-            v962 = softehl_splat(0.0), v963 = softehl_splat(0.0), v964 = softehl_splat(0.0),
-            v965 = softehl_splat(0.0), v966 = softehl_splat(0.0), v967 = softehl_splat(0.0),
-            v968 = softehl_splat(0.0), v969 = softehl_splat(0.0), v970 = softehl_splat(0.0),
-            v971 = softehl_splat(0.0), v972 = softehl_splat(0.0), v973 = softehl_splat(0.0),
-            v974 = softehl_splat(0.0), v975 = softehl_splat(0.0), v976 = softehl_splat(0.0),
-            v977 = softehl_splat(0.0), v978 = softehl_splat(0.0), v979 = softehl_splat(0.0),
-            v980 = softehl_splat(0.0);
-        const M m981 = v906;
-        if (softehl_any(m981)) {
-            const M v982 = softehl_le(softehl_splat(0.0), v904);
-            V v983 = softehl_splat(0.0), v984 = softehl_splat(0.0), v985 = softehl_splat(0.0),
-                v986 = softehl_splat(0.0), v987 = softehl_splat(0.0), v988 = softehl_splat(0.0),
-                v989 = softehl_splat(0.0), v990 = softehl_splat(0.0), v991 = softehl_splat(0.0),
-                v992 = softehl_splat(0.0), v993 = softehl_splat(0.0), v994 = softehl_splat(0.0),
-                v995 = softehl_splat(0.0), v996 = softehl_splat(0.0), v997 = softehl_splat(0.0),
-                v998 = softehl_splat(0.0), v999 = softehl_splat(0.0), v1000 = softehl_splat(0.0),
-                v1001 = softehl_splat(0.0), v1002 = softehl_splat(0.0), v1003 = softehl_splat(0.0),
-                v1004 = softehl_splat(0.0), v1005 = softehl_splat(0.0), v1006 = softehl_splat(0.0),
-                v1007 = softehl_splat(0.0), v1008 = softehl_splat(0.0), v1009 = softehl_splat(0.0),
-                v1010 = softehl_splat(0.0), v1011 = softehl_splat(0.0), v1012 = softehl_splat(0.0),
-                v1013 = softehl_splat(0.0), v1014 = softehl_splat(0.0), v1015 = softehl_splat(0.0),
-                v1016 = softehl_splat(0.0), v1017 = softehl_splat(0.0), v1018 = softehl_splat(0.0),
-                v1019 = softehl_splat(0.0), v1020 = softehl_splat(0.0), v1021 = softehl_splat(0.0),
-                v1022 = softehl_splat(0.0), v1023 = softehl_splat(0.0), v1024 = softehl_splat(0.0),
-                v1025 = softehl_splat(0.0);
-            const M m1026 = v982 & m981;
-            if (softehl_any(m1026)) {
-                const V v1027 = a12 + v900, v1028 = v900 - a13, v1029 = v1027 * v1028;
-                const M v1030 = softehl_eq(v1029, v1029);
-                V v1031 = softehl_splat(0.0), v1032 = softehl_splat(0.0),
-                    v1033 = softehl_splat(0.0), v1034 = softehl_splat(0.0),
-                    v1035 = softehl_splat(0.0);
-                const M m1036 = v1030 & m1026;
-                if (softehl_any(m1036)) {
-                    const M v1037 = softehl_lt(v1029, softehl_splat(0.0));
-                    const V v1038 = softehl_blend(v1037, v904, softehl_splat(0.0)),
-                        v1039 = softehl_blend(v1037, v859, softehl_splat(0.0)),
-                        v1040 = softehl_blend(v1037, v860, softehl_splat(0.0)),
-                        v1041 = softehl_blend(v1037, v44, softehl_splat(0.0)),
-                        v1042 = softehl_blend(v1037, v46, softehl_splat(0.0));
-                    v1031 = softehl_blend(m1036, v1038, v1031);
-                    v1032 = softehl_blend(m1036, v1039, v1032);
-                    v1033 = softehl_blend(m1036, v1040, v1033);
-                    v1034 = softehl_blend(m1036, v1041, v1034);
-                    v1035 = softehl_blend(m1036, v1042, v1035);
+        const V v772 = w[0] * v552 + v557, v773 = w[0] * v553 + v558, v774 = w[0] * v544 + v551,
+            v775 = w[0] * v545 + v555, v776 = w[0] * v549 + v560, v777 = w[0] * v550 + v562,
+            v778 = w[0] * v542 + v547, v779 = w[0] * v543 + v548, v780 = w[0] * v554 + v559,
+            v781 = w[0] * v556 + v561, v782 = w[0] * v564 + v546, v783 = v33 * v774,
+            v784 = v33 * v776, v785 = v33 * v772, v786 = v33 * v778, v787 = v33 * v780,
+            v788 = v33 * v781, v789 = 0.5 * v782, v790 = 2.0 * v782, v791 = v13 * v782,
+            v792 = v16 * v782, v793 = (-1.0) + v782, v794 = 1.0 + v782, v795 = 0.5 + v782,
+            v796 = (-0.5) + v782, v797 = v789 * v793, v798 = v789 - 0.5, v799 = v789 * v794,
+            v800 = 0.5 * (v782 + v793), v801 = 0.5 * (v782 + v794), v802 = v33 * v775 + v796,
+            v803 = w[1] * v799, v804 = w[1] * v797, v805 = 1.0 - v782 * v782,
+            v806 = X2 * v795 + (X0 * v796 - v3 * v782), v807 = X3 * v795 + (X1 * v796 - v19 * v782),
+            v808 = w[1] * v805, v809 = v2 * v805 + (v10 * v797 + v49 * v799), v810 = v2 * v790,
+            v811 = v806 * v806 + v807 * v807, v812 = v20 * v805 + (v22 * v797 + v23 * v799),
+            v813 = v20 * v790, v814 = v49 * v795 + v10 * v796 - v810,
+            v815 = v10 * v800 + v49 * v801 - v810, v816 = softehl_vsqrt(v811),
+            v817 = v23 * v795 + v22 * v796 - v813, v818 = v22 * v800 + v23 * v801 - v813,
+            v819 = (-1.0) + 6.283185307179586 * (X5 * v805 + (v791 * v793 + v792 * v794)),
+            v820 = v809 - v55, v821 = v812 - v34, v822 = v805 + v778 * v815, v823 = v778 * v818,
+            v824 = v814 * v814 + v817 * v817, v825 = 1.0 + a14 * v819, v826 = v60 * v775,
+            v827 = v775 * v815, v828 = v797 + v775 * v818, v829 = v60 * v777, v830 = v777 * v815,
+            v831 = v60 * v778 - v790, v832 = softehl_vsqrt(v824), v833 = v60 * v779,
+            v834 = v779 * v815, v835 = v60 * v772, v836 = v772 * v815, v837 = v772 * v818,
+            v838 = v60 * v773, v839 = v773 * v815, v840 = v773 * v818, v841 = v33 * v773,
+            v842 = v805 + v779 * v818, v843 = v33 * v777 + v795, v844 = v799 + v777 * v818,
+            v845 = v33 * v779 - v790, v846 = v60 * v780, v847 = v780 * v815, v848 = v780 * v818,
+            v849 = v564 * v816, v850 = v60 * v781, v851 = v781 * v815, v852 = v781 * v818,
+            v853 = v825 * v849, v854 = softehl_vsqrt(1.0 / v824), v855 = v774 * v818,
+            v856 = v776 * v818, v857 = v60 * v774 + v796, v858 = v60 * v776 + v795,
+            v859 = v797 + v774 * v815, v860 = v799 + v776 * v815, v861 = 0.5 - v789,
+            v862 = 0.5 + v789, v863 = 1.0 / v832, v864 = v43 * v861, v865 = v43 * v862,
+            v866 = d10 * v861 + d12 * v862, v867 = v864 * v853, v868 = v865 * v853,
+            v869 = 0.5 * v854, v870 = v863 * v863, v871 = 2.0 * v814 * v869 * v870,
+            v872 = 2.0 * v817 * v869 * v870, v873 = w[1] * v867, v874 = w[1] * v868,
+            v875 = v863 - v814 * v871, v876 = v814 * v863, v877 = v814 * v872, v878 = v817 * v863,
+            v879 = v863 - v817 * v872, v880 = v817 * v871, v881 = v878 * v853, v882 = v876 * v853,
+            v883 = 0.5 * (v57 * v878 - v36 * v876), v884 = 1.0 / (v65 * v876 + v41 * v878),
+            v885 = v820 * v876 + v821 * v878, v886 = v884 * (0.5 * v885), v887 = v884 * v884,
+            v888 = v887 * (0.5 * v876 * v885), v889 = v887 * (0.5 * v878 * v885),
+            v890 = v878 * v884,
+            v891 = v884 * (v820 * v875 - v821 * v880) - v887 * (v885 * (v65 * v875 - v41 * v880)),
+            v892 = v884 * (v821 * v879 - v820 * v877) - v887 * (v885 * (v41 * v879 - v65 * v877)),
+            v893 = v876 * v884, v894 = 0.5 * v893, v895 = 0.5 * v890, v896 = 0.5 - v886,
+            v897 = 0.5 + v886, v898 = v54 * v897 + (v51 * v896 - v809), v899 = w[1] * v896,
+            v900 = w[1] * v897, v901 = v31 * v897 + (v24 * v896 - v812),
+            v902 = v878 * v898 - v876 * v901, v903 = v880 * v898 + v875 * v901,
+            v904 = v879 * v898 + v877 * v901, v905 = a10 * v902, v906 = v866 - v905,
+            v907 = v785 * v892 + (v835 * v891 + (v836 * v893 + (v837 * v890 + (v888 - v894))));
+        const M v908 = softehl_eq(v906, v906);
+        const V v909 = v845 * v892 + (v833 * v891 + (v834 * v893 + v842 * v890)),
+            v910 = v876 * v837 + v878 * (v896 - v836) - v835 * v903 + v785 * v904 + v883 * v907,
+            v911 = v909 * v883 + (v876 * v842 - v878 * v834 - v833 * v903 + v845 * v904),
+            v912 = v838 * v891 + (v841 * v892 + (v889 + (v839 * v893 + (v840 * v890 - v895)))),
+            v913 = v876 * (v840 - v896) - v878 * v839 + v841 * v904 - v838 * v903 + v883 * v912,
+            v914 = v788 * v892 + (v850 * v891 + (v851 * v893 + (v852 * v890 - v895) - v889)),
+            v915 = v876 * (v852 - v897) - v878 * v851 - v850 * v903 + v788 * v904 + v883 * v914,
+            v916 = v846 * v891 + (v787 * v892 + (v847 * v893 + (v848 * v890 - v894 - v888))),
+            v917 = v876 * v848 + v878 * (v897 - v847) + v787 * v904 - v846 * v903 + v883 * v916,
+            v918 = v783 * v892 + (v857 * v891 + (v859 * v893 + v855 * v890)),
+            v919 = v918 * v883 + (v876 * v855 - v878 * v859 - v857 * v903 + v783 * v904),
+            v920 = v802 * v892 + (v826 * v891 + (v827 * v893 + v828 * v890)),
+            v921 = v920 * v883 + (v876 * v828 - v878 * v827 - v826 * v903 + v802 * v904),
+            v922 = v784 * v892 + (v858 * v891 + (v860 * v893 + v856 * v890)),
+            v923 = v922 * v883 + (v876 * v856 - v878 * v860 - v858 * v903 + v784 * v904),
+            v924 = v843 * v892 + (v829 * v891 + (v830 * v893 + v844 * v890)),
+            v925 = v786 * v892 + (v831 * v891 + (v822 * v893 + v823 * v890)),
+            v926 = v924 * v883 + (v876 * v844 - v878 * v830 - v829 * v903 + v843 * v904),
+            v927 = v925 * v883 + (v876 * v823 - v878 * v822 - v831 * v903 + v786 * v904);
+        V v928 = softehl_splat(0.0), v929 = softehl_splat(0.0), v930 = softehl_splat(0.0),
+            v931 = softehl_splat(0.0), v932 = softehl_splat(0.0), v933 = softehl_splat(0.0),
+            v934 = softehl_splat(0.0), v935 = softehl_splat(0.0), v936 = softehl_splat(0.0),
+            v937 = softehl_splat(0.0), v938 = softehl_splat(0.0), v939 = softehl_splat(0.0),
+            v940 = softehl_splat(0.0), v941 = softehl_splat(0.0), v942 = softehl_splat(0.0),
+            v943 = softehl_splat(0.0), v944 = softehl_splat(0.0), v945 = softehl_splat(0.0),
+            v946 = softehl_splat(0.0), v947 = softehl_splat(0.0), v948 = softehl_splat(0.0),
+            v949 = softehl_splat(0.0), v950 = softehl_splat(0.0), v951 = softehl_splat(0.0),
+            v952 = softehl_splat(0.0), v953 = softehl_splat(0.0), v954 = softehl_splat(0.0),
+            v955 = softehl_splat(0.0), v956 = softehl_splat(0.0), v957 = softehl_splat(0.0),
+            v958 = softehl_splat(0.0), v959 = softehl_splat(0.0), v960 = softehl_splat(0.0),
+            v961 = softehl_splat(0.0), v962 = softehl_splat(0.0), v963 = softehl_splat(0.0),
+            v964 = softehl_splat(0.0), v965 = softehl_splat(0.0), v966 = softehl_splat(0.0),
+            v967 = softehl_splat(0.0), v968 = softehl_splat(0.0), v969 = softehl_splat(0.0),
+            v970 = softehl_splat(0.0), v971 = softehl_splat(0.0), v972 = softehl_splat(0.0),
+            v973 = softehl_splat(0.0), v974 = softehl_splat(0.0), v975 = softehl_splat(0.0),
+            v976 = softehl_splat(0.0), v977 = softehl_splat(0.0), v978 = softehl_splat(0.0),
+            v979 = softehl_splat(0.0), v980 = softehl_splat(0.0), v981 = softehl_splat(0.0),
+            v982 = softehl_splat(0.0);
+        const M m983 = v908;
+        if (softehl_any(m983)) {
+            const M v984 = softehl_le(softehl_splat(0.0), v906);
+            V v985 = softehl_splat(0.0), v986 = softehl_splat(0.0), v987 = softehl_splat(0.0),
+                v988 = softehl_splat(0.0), v989 = softehl_splat(0.0), v990 = softehl_splat(0.0),
+                v991 = softehl_splat(0.0), v992 = softehl_splat(0.0), v993 = softehl_splat(0.0),
+                v994 = softehl_splat(0.0), v995 = softehl_splat(0.0), v996 = softehl_splat(0.0),
+                v997 = softehl_splat(0.0), v998 = softehl_splat(0.0), v999 = softehl_splat(0.0),
+                v1000 = softehl_splat(0.0), v1001 = softehl_splat(0.0), v1002 = softehl_splat(0.0),
+                v1003 = softehl_splat(0.0), v1004 = softehl_splat(0.0), v1005 = softehl_splat(0.0),
+                v1006 = softehl_splat(0.0), v1007 = softehl_splat(0.0), v1008 = softehl_splat(0.0),
+                v1009 = softehl_splat(0.0), v1010 = softehl_splat(0.0), v1011 = softehl_splat(0.0),
+                v1012 = softehl_splat(0.0), v1013 = softehl_splat(0.0), v1014 = softehl_splat(0.0),
+                v1015 = softehl_splat(0.0), v1016 = softehl_splat(0.0), v1017 = softehl_splat(0.0),
+                v1018 = softehl_splat(0.0), v1019 = softehl_splat(0.0), v1020 = softehl_splat(0.0),
+                v1021 = softehl_splat(0.0), v1022 = softehl_splat(0.0), v1023 = softehl_splat(0.0),
+                v1024 = softehl_splat(0.0), v1025 = softehl_splat(0.0), v1026 = softehl_splat(0.0),
+                v1027 = softehl_splat(0.0);
+            const M m1028 = v984 & m983;
+            if (softehl_any(m1028)) {
+                const V v1029 = a12 + v902, v1030 = v902 - a13, v1031 = v1029 * v1030;
+                const M v1032 = softehl_eq(v1031, v1031);
+                V v1033 = softehl_splat(0.0), v1034 = softehl_splat(0.0),
+                    v1035 = softehl_splat(0.0), v1036 = softehl_splat(0.0),
+                    v1037 = softehl_splat(0.0);
+                const M m1038 = v1032 & m1028;
+                if (softehl_any(m1038)) {
+                    const M v1039 = softehl_lt(v1031, softehl_splat(0.0));
+                    const V v1040 = softehl_blend(v1039, v906, softehl_splat(0.0)),
+                        v1041 = softehl_blend(v1039, v861, softehl_splat(0.0)),
+                        v1042 = softehl_blend(v1039, v862, softehl_splat(0.0)),
+                        v1043 = softehl_blend(v1039, v44, softehl_splat(0.0)),
+                        v1044 = softehl_blend(v1039, v46, softehl_splat(0.0));
+                    v1033 = softehl_blend(m1038, v1040, v1033);
+                    v1034 = softehl_blend(m1038, v1041, v1034);
+                    v1035 = softehl_blend(m1038, v1042, v1035);
+                    v1036 = softehl_blend(m1038, v1043, v1036);
+                    v1037 = softehl_blend(m1038, v1044, v1037);
                 }
-                const M m1043 = ~v1030 & m1026;
-                if (softehl_any(m1043)) {
-                    const V v1044 = v1029 * v1029, v1045 = v1029 * v1044,
-                        v1046 = 3.0 * v1044 * (v1027 + v1028);
-                    v1031 = softehl_blend(m1043, v1045, v1031);
-                    v1032 = softehl_blend(m1043, softehl_splat(0.0), v1032);
-                    v1033 = softehl_blend(m1043, softehl_splat(0.0), v1033);
-                    v1034 = softehl_blend(m1043, v1046, v1034);
-                    v1035 = softehl_blend(m1043, softehl_splat(0.0), v1035);
+                const M m1045 = ~v1032 & m1028;
+                if (softehl_any(m1045)) {
+                    const V v1046 = v1031 * v1031, v1047 = v1031 * v1046,
+                        v1048 = 3.0 * v1046 * (v1029 + v1030);
+                    v1033 = softehl_blend(m1045, v1047, v1033);
+                    v1036 = softehl_blend(m1045, v1048, v1036);
                 }
-                const V v1047 = a11 * v1031; const M v1048 = softehl_eq(v1047, v1047);
-                const V v1049 = v9 * v895 + (v8 * v894 - v5 * v795 - v6 * v797 - v4 * v803),
-                    v1050 = v25 * v895 + (v21 * v894 - v12 * v795 - v14 * v797 - v18 * v803),
-                    v1051 = d11 * v859 + d13 * v860 + a10 * (v874 * v1049 + v876 * v1050);
-                const M v1052 = softehl_eq(v1051, v1051), v1053 = v1048 & v1052;
-                V v1054 = softehl_splat(0.0), v1055 = softehl_splat(0.0),
-                    v1056 = softehl_splat(0.0), v1057 = softehl_splat(0.0),
-                    v1058 = softehl_splat(0.0), v1059 = softehl_splat(0.0);
-                const M m1060 = v1053 & m1026;
-                if (softehl_any(m1060)) {
-                    const M v1061 = softehl_lt(v1047, v1051);
-                    V v1062 = v1047, v1063 = softehl_splat(0.0), v1064 = softehl_splat(0.0),
-                        v1065 = a11, v1066 = softehl_splat(0.0), v1067 = softehl_splat(0.0);
-                    const M m1068 = ~v1061 & m1060;
-                    if (softehl_any(m1068)) {
-                        V v1069 = softehl_splat(0.0), v1070 = softehl_splat(0.0),
-                            v1071 = softehl_splat(0.0), v1072 = softehl_splat(0.0),
-                            v1073 = softehl_splat(0.0), v1074 = softehl_splat(0.0);
-                        const M m1075 = v1048 & m1068;
-                        if (softehl_any(m1075)) {
-                            const M v1076 = softehl_lt(v1047, -v1051);
-                            V v1077 = v1051, v1078 = v859, v1079 = v860, v1080 = softehl_splat(0.0),
-                                v1081 = a10, v1082 = v48;
-                            const M m1083 = v1076 & m1075;
-                            if (softehl_any(m1083)) {
-                                const V v1084 = -v1047; v1077 = softehl_blend(m1083, v1084, v1077);
-                                v1078 = softehl_blend(m1083, softehl_splat(0.0), v1078);
-                                v1079 = softehl_blend(m1083, softehl_splat(0.0), v1079);
-                                v1080 = softehl_blend(m1083, v1, v1080);
-                                v1081 = softehl_blend(m1083, softehl_splat(0.0), v1081);
-                                v1082 = softehl_blend(m1083, softehl_splat(0.0), v1082);
+                const V v1049 = a11 * v1033; const M v1050 = softehl_eq(v1049, v1049);
+                const V v1051 = v9 * v897 + (v8 * v896 - v5 * v797 - v6 * v799 - v4 * v805),
+                    v1052 = v25 * v897 + (v21 * v896 - v12 * v797 - v14 * v799 - v18 * v805),
+                    v1053 = d11 * v861 + d13 * v862 + a10 * (v876 * v1051 + v878 * v1052);
+                const M v1054 = softehl_eq(v1053, v1053), v1055 = v1050 & v1054;
+                V v1056 = softehl_splat(0.0), v1057 = softehl_splat(0.0),
+                    v1058 = softehl_splat(0.0), v1059 = softehl_splat(0.0),
+                    v1060 = softehl_splat(0.0), v1061 = softehl_splat(0.0);
+                const M m1062 = v1055 & m1028;
+                if (softehl_any(m1062)) {
+                    const M v1063 = softehl_lt(v1049, v1053);
+                    V v1064 = v1049, v1065 = softehl_splat(0.0), v1066 = softehl_splat(0.0),
+                        v1067 = a11, v1068 = softehl_splat(0.0), v1069 = softehl_splat(0.0);
+                    const M m1070 = ~v1063 & m1062;
+                    if (softehl_any(m1070)) {
+                        V v1071 = softehl_splat(0.0), v1072 = softehl_splat(0.0),
+                            v1073 = softehl_splat(0.0), v1074 = softehl_splat(0.0),
+                            v1075 = softehl_splat(0.0), v1076 = softehl_splat(0.0);
+                        const M m1077 = v1050 & m1070;
+                        if (softehl_any(m1077)) {
+                            const M v1078 = softehl_lt(v1049, -v1053);
+                            V v1079 = v1053, v1080 = v861, v1081 = v862, v1082 = softehl_splat(0.0),
+                                v1083 = a10, v1084 = v48;
+                            const M m1085 = v1078 & m1077;
+                            if (softehl_any(m1085)) {
+                                const V v1086 = -v1049; v1079 = softehl_blend(m1085, v1086, v1079);
+                                v1080 = softehl_blend(m1085, softehl_splat(0.0), v1080);
+                                v1081 = softehl_blend(m1085, softehl_splat(0.0), v1081);
+                                v1082 = softehl_blend(m1085, v1, v1082);
+                                v1083 = softehl_blend(m1085, softehl_splat(0.0), v1083);
+                                v1084 = softehl_blend(m1085, softehl_splat(0.0), v1084);
                             }
-                            v1069 = softehl_blend(m1075, v1077, v1069);
-                            v1070 = softehl_blend(m1075, v1078, v1070);
-                            v1071 = softehl_blend(m1075, v1079, v1071);
-                            v1072 = softehl_blend(m1075, v1080, v1072);
-                            v1073 = softehl_blend(m1075, v1081, v1073);
-                            v1074 = softehl_blend(m1075, v1082, v1074);
+                            v1071 = softehl_blend(m1077, v1079, v1071);
+                            v1072 = softehl_blend(m1077, v1080, v1072);
+                            v1073 = softehl_blend(m1077, v1081, v1073);
+                            v1074 = softehl_blend(m1077, v1082, v1074);
+                            v1075 = softehl_blend(m1077, v1083, v1075);
+                            v1076 = softehl_blend(m1077, v1084, v1076);
                         }
-                        const M m1085 = ~v1048 & m1068;
-                        if (softehl_any(m1085)) {
-                            const V v1086 = v1051 + v1047, v1087 = v1086 * v1086,
-                                v1088 = v1086 * v1087, v1089 = 3.0 * v1087, v1090 = v48 * v1089,
-                                v1091 = a11 * v1089, v1092 = a10 * v1089, v1093 = v859 * v1089,
-                                v1094 = v860 * v1089;
-                            v1069 = softehl_blend(m1085, v1088, v1069);
-                            v1070 = softehl_blend(m1085, v1093, v1070);
-                            v1071 = softehl_blend(m1085, v1094, v1071);
-                            v1072 = softehl_blend(m1085, v1091, v1072);
-                            v1073 = softehl_blend(m1085, v1092, v1073);
-                            v1074 = softehl_blend(m1085, v1090, v1074);
+                        const M m1087 = ~v1050 & m1070;
+                        if (softehl_any(m1087)) {
+                            const V v1088 = v1053 + v1049, v1089 = v1088 * v1088,
+                                v1090 = v1088 * v1089, v1091 = 3.0 * v1089, v1092 = v48 * v1091,
+                                v1093 = a11 * v1091, v1094 = a10 * v1091, v1095 = v861 * v1091,
+                                v1096 = v862 * v1091;
+                            v1071 = softehl_blend(m1087, v1090, v1071);
+                            v1072 = softehl_blend(m1087, v1095, v1072);
+                            v1073 = softehl_blend(m1087, v1096, v1073);
+                            v1074 = softehl_blend(m1087, v1093, v1074);
+                            v1075 = softehl_blend(m1087, v1094, v1075);
+                            v1076 = softehl_blend(m1087, v1092, v1076);
                         }
-                        v1062 = softehl_blend(m1068, v1069, v1062);
-                        v1063 = softehl_blend(m1068, v1070, v1063);
-                        v1064 = softehl_blend(m1068, v1071, v1064);
-                        v1065 = softehl_blend(m1068, v1072, v1065);
-                        v1066 = softehl_blend(m1068, v1073, v1066);
-                        v1067 = softehl_blend(m1068, v1074, v1067);
+                        v1064 = softehl_blend(m1070, v1071, v1064);
+                        v1065 = softehl_blend(m1070, v1072, v1065);
+                        v1066 = softehl_blend(m1070, v1073, v1066);
+                        v1067 = softehl_blend(m1070, v1074, v1067);
+                        v1068 = softehl_blend(m1070, v1075, v1068);
+                        v1069 = softehl_blend(m1070, v1076, v1069);
                     }
-                    v1054 = softehl_blend(m1060, v1062, v1054);
-                    v1055 = softehl_blend(m1060, v1063, v1055);
-                    v1056 = softehl_blend(m1060, v1064, v1056);
-                    v1057 = softehl_blend(m1060, v1065, v1057);
-                    v1058 = softehl_blend(m1060, v1066, v1058);
-                    v1059 = softehl_blend(m1060, v1067, v1059);
+                    v1056 = softehl_blend(m1062, v1064, v1056);
+                    v1057 = softehl_blend(m1062, v1065, v1057);
+                    v1058 = softehl_blend(m1062, v1066, v1058);
+                    v1059 = softehl_blend(m1062, v1067, v1059);
+                    v1060 = softehl_blend(m1062, v1068, v1060);
+                    v1061 = softehl_blend(m1062, v1069, v1061);
                 }
-                const M m1095 = ~v1053 & m1026;
-                if (softehl_any(m1095)) {
-                    const V v1096 = v1047 - v1051, v1097 = v1096 * v1096, v1098 = v1096 * v1097,
-                        v1099 = 3.0 * v1097, v1100 = v47 * v1099, v1101 = a11 * v1099,
-                        v1102 = -(a10 * v1099), v1103 = v796 * v1099, v1104 = -(v860 * v1099);
-                    v1054 = softehl_blend(m1095, v1098, v1054);
-                    v1055 = softehl_blend(m1095, v1103, v1055);
-                    v1056 = softehl_blend(m1095, v1104, v1056);
-                    v1057 = softehl_blend(m1095, v1101, v1057);
-                    v1058 = softehl_blend(m1095, v1102, v1058);
-                    v1059 = softehl_blend(m1095, v1100, v1059);
+                const M m1097 = ~v1055 & m1028;
+                if (softehl_any(m1097)) {
+                    const V v1098 = v1049 - v1053, v1099 = v1098 * v1098, v1100 = v1098 * v1099,
+                        v1101 = 3.0 * v1099, v1102 = v47 * v1101, v1103 = a11 * v1101,
+                        v1104 = -(a10 * v1101), v1105 = v798 * v1101, v1106 = -(v862 * v1101);
+                    v1056 = softehl_blend(m1097, v1100, v1056);
+                    v1057 = softehl_blend(m1097, v1105, v1057);
+                    v1058 = softehl_blend(m1097, v1106, v1058);
+                    v1059 = softehl_blend(m1097, v1103, v1059);
+                    v1060 = softehl_blend(m1097, v1104, v1060);
+                    v1061 = softehl_blend(m1097, v1102, v1061);
                 }
-                const V v1105 = v1032 * v1057, v1106 = v1033 * v1057,
-                    v1107 = v873 * v1049 - v878 * v1050, v1108 = v877 * v1050 - v875 * v1049,
-                    v1109 = (v4 * v788 - v5 * v798 - v6 * v799) * v874 + (v18 * v788 - v12 * v798 - v14 * v799) * v876,
-                    v1110 = 0.5 * (v11 * v874 + v30 * v876),
-                    v1111 = v1058 * (v916 * v1110 + (v772 * v1109 + (v855 * v1107 + v781 * v1108))),
-                    v1112 = v1058 * (v905 * v1110 + (v770 * v1109 + (v833 * v1107 + v783 * v1108))),
-                    v1113 = v1058 * (v918 * v1110 + (v773 * v1109 + (v824 * v1107 + v800 * v1108))),
-                    v1114 = v1058 * (v779 * v1109 + (v912 * v1110 + (v848 * v1107 + v786 * v1108))),
-                    v1115 = v1058 * (v922 * v1110 + (v775 * v1109 + (v827 * v1107 + v841 * v1108))),
-                    v1116 = v1057 * (v772 * v1035 + v1034 * v917) + v1111,
-                    v1117 = v1057 * (v770 * v1035 + v1034 * v908) + v1112,
-                    v1118 = v1057 * (v773 * v1035 + v1034 * v919) + v1113,
-                    v1119 = v1057 * (v779 * v1035 + v1034 * v913) + v1114,
-                    v1120 = v1057 * (v775 * v1035 + v1034 * v924) + v1115,
-                    v1121 = v1058 * (v910 * v1110 + (v771 * v1109 + (v836 * v1107 + v839 * v1108))),
-                    v1122 = v1057 * (v771 * v1035 + v1034 * v911) + v1121,
-                    v1123 = v1058 * (v774 * v1109 + (v920 * v1110 + (v856 * v1107 + v782 * v1108))),
-                    v1124 = v1058 * (v776 * v1109 + (v923 * v1110 + (v829 * v1107 + v784 * v1108))),
-                    v1125 = v1058 * (v777 * v1109 + (v907 * v1110 + (v831 * v1107 + v843 * v1108))),
-                    v1126 = v1058 * (v778 * v1109 + (v914 * v1110 + (v844 * v1107 + v785 * v1108))),
-                    v1127 = v1057 * (v774 * v1035 + v1034 * v921) + v1123,
-                    v1128 = v1057 * (v776 * v1035 + v1034 * v925) + v1124,
-                    v1129 = v1057 * (v777 * v1035 + v1034 * v909) + v1125,
-                    v1130 = v1057 * (v778 * v1035 + v1034 * v915) + v1126, v1131 = v1055 * v880,
-                    v1132 = v1056 * v880, v1133 = v1055 * v879, v1134 = v1056 * v879,
-                    v1135 = v1055 * v871, v1136 = v1056 * v871, v1137 = v1055 * v872,
-                    v1138 = v1056 * v872, v1139 = v802 * v1131, v1140 = v802 * v1132,
-                    v1141 = v802 * v1133, v1142 = v802 * v1134, v1143 = v801 * v1131,
-                    v1144 = v801 * v1132, v1145 = v801 * v1133, v1146 = v801 * v1134,
-                    v1147 = v806 * v1131, v1148 = v806 * v1132, v1149 = v806 * v1133,
-                    v1150 = v806 * v1134, v1151 = -(v897 * v1131), v1152 = -(v897 * v1132),
-                    v1153 = -(v897 * v1133), v1154 = -(v897 * v1134), v1155 = -(v898 * v1131),
-                    v1156 = -(v898 * v1132), v1157 = -(v898 * v1133), v1158 = -(v898 * v1134);
-                v983 = softehl_blend(m1026, v1031, v983); v984 = softehl_blend(m1026, v1032, v984);
-                v985 = softehl_blend(m1026, v1033, v985); v986 = softehl_blend(m1026, v1054, v986);
-                v987 = softehl_blend(m1026, v1139, v987); v988 = softehl_blend(m1026, v1140, v988);
-                v989 = softehl_blend(m1026, v1141, v989); v990 = softehl_blend(m1026, v1142, v990);
-                v991 = softehl_blend(m1026, v1143, v991); v992 = softehl_blend(m1026, v1144, v992);
-                v993 = softehl_blend(m1026, v1145, v993); v994 = softehl_blend(m1026, v1146, v994);
-                v995 = softehl_blend(m1026, v1147, v995); v996 = softehl_blend(m1026, v1148, v996);
-                v997 = softehl_blend(m1026, v1149, v997); v998 = softehl_blend(m1026, v1150, v998);
-                v999 = softehl_blend(m1026, v1151, v999);
-                v1000 = softehl_blend(m1026, v1152, v1000);
-                v1001 = softehl_blend(m1026, v1153, v1001);
-                v1002 = softehl_blend(m1026, v1154, v1002);
-                v1003 = softehl_blend(m1026, v1155, v1003);
-                v1004 = softehl_blend(m1026, v1156, v1004);
-                v1005 = softehl_blend(m1026, v1157, v1005);
-                v1006 = softehl_blend(m1026, v1158, v1006);
-                v1007 = softehl_blend(m1026, v1135, v1007);
-                v1008 = softehl_blend(m1026, v1136, v1008);
-                v1009 = softehl_blend(m1026, v1137, v1009);
-                v1010 = softehl_blend(m1026, v1138, v1010);
-                v1011 = softehl_blend(m1026, v1105, v1011);
-                v1012 = softehl_blend(m1026, v1106, v1012);
-                v1013 = softehl_blend(m1026, v1034, v1013);
-                v1014 = softehl_blend(m1026, v1035, v1014);
-                v1015 = softehl_blend(m1026, v1116, v1015);
-                v1016 = softehl_blend(m1026, v1059, v1016);
-                v1017 = softehl_blend(m1026, v1118, v1017);
-                v1018 = softehl_blend(m1026, v1127, v1018);
-                v1019 = softehl_blend(m1026, v1120, v1019);
-                v1020 = softehl_blend(m1026, v1128, v1020);
-                v1021 = softehl_blend(m1026, v1129, v1021);
-                v1022 = softehl_blend(m1026, v1117, v1022);
-                v1023 = softehl_blend(m1026, v1122, v1023);
-                v1024 = softehl_blend(m1026, v1130, v1024);
-                v1025 = softehl_blend(m1026, v1119, v1025);
+                const V v1107 = v1034 * v1059, v1108 = v1035 * v1059,
+                    v1109 = v875 * v1051 - v880 * v1052, v1110 = v879 * v1052 - v877 * v1051,
+                    v1111 = (v4 * v790 - v5 * v800 - v6 * v801) * v876 + (v18 * v790 - v12 * v800 - v14 * v801) * v878,
+                    v1112 = 0.5 * (v11 * v876 + v30 * v878),
+                    v1113 = v1060 * (v918 * v1112 + (v774 * v1111 + (v857 * v1109 + v783 * v1110))),
+                    v1114 = v1060 * (v907 * v1112 + (v772 * v1111 + (v835 * v1109 + v785 * v1110))),
+                    v1115 = v1060 * (v920 * v1112 + (v775 * v1111 + (v826 * v1109 + v802 * v1110))),
+                    v1116 = v1060 * (v781 * v1111 + (v914 * v1112 + (v850 * v1109 + v788 * v1110))),
+                    v1117 = v1060 * (v924 * v1112 + (v777 * v1111 + (v829 * v1109 + v843 * v1110))),
+                    v1118 = v1059 * (v774 * v1037 + v1036 * v919) + v1113,
+                    v1119 = v1059 * (v772 * v1037 + v1036 * v910) + v1114,
+                    v1120 = v1059 * (v775 * v1037 + v1036 * v921) + v1115,
+                    v1121 = v1059 * (v781 * v1037 + v1036 * v915) + v1116,
+                    v1122 = v1059 * (v777 * v1037 + v1036 * v926) + v1117,
+                    v1123 = v1060 * (v912 * v1112 + (v773 * v1111 + (v838 * v1109 + v841 * v1110))),
+                    v1124 = v1059 * (v773 * v1037 + v1036 * v913) + v1123,
+                    v1125 = v1060 * (v776 * v1111 + (v922 * v1112 + (v858 * v1109 + v784 * v1110))),
+                    v1126 = v1060 * (v778 * v1111 + (v925 * v1112 + (v831 * v1109 + v786 * v1110))),
+                    v1127 = v1060 * (v779 * v1111 + (v909 * v1112 + (v833 * v1109 + v845 * v1110))),
+                    v1128 = v1060 * (v780 * v1111 + (v916 * v1112 + (v846 * v1109 + v787 * v1110))),
+                    v1129 = v1059 * (v776 * v1037 + v1036 * v923) + v1125,
+                    v1130 = v1059 * (v778 * v1037 + v1036 * v927) + v1126,
+                    v1131 = v1059 * (v779 * v1037 + v1036 * v911) + v1127,
+                    v1132 = v1059 * (v780 * v1037 + v1036 * v917) + v1128, v1133 = v1057 * v882,
+                    v1134 = v1058 * v882, v1135 = v1057 * v881, v1136 = v1058 * v881,
+                    v1137 = v1057 * v873, v1138 = v1058 * v873, v1139 = v1057 * v874,
+                    v1140 = v1058 * v874, v1141 = v804 * v1133, v1142 = v804 * v1134,
+                    v1143 = v804 * v1135, v1144 = v804 * v1136, v1145 = v803 * v1133,
+                    v1146 = v803 * v1134, v1147 = v803 * v1135, v1148 = v803 * v1136,
+                    v1149 = v808 * v1133, v1150 = v808 * v1134, v1151 = v808 * v1135,
+                    v1152 = v808 * v1136, v1153 = -(v899 * v1133), v1154 = -(v899 * v1134),
+                    v1155 = -(v899 * v1135), v1156 = -(v899 * v1136), v1157 = -(v900 * v1133),
+                    v1158 = -(v900 * v1134), v1159 = -(v900 * v1135), v1160 = -(v900 * v1136);
+                v985 = softehl_blend(m1028, v1033, v985); v986 = softehl_blend(m1028, v1034, v986);
+                v987 = softehl_blend(m1028, v1035, v987); v988 = softehl_blend(m1028, v1056, v988);
+                v989 = softehl_blend(m1028, v1141, v989); v990 = softehl_blend(m1028, v1142, v990);
+                v991 = softehl_blend(m1028, v1143, v991); v992 = softehl_blend(m1028, v1144, v992);
+                v993 = softehl_blend(m1028, v1145, v993); v994 = softehl_blend(m1028, v1146, v994);
+                v995 = softehl_blend(m1028, v1147, v995); v996 = softehl_blend(m1028, v1148, v996);
+                v997 = softehl_blend(m1028, v1149, v997); v998 = softehl_blend(m1028, v1150, v998);
+                v999 = softehl_blend(m1028, v1151, v999);
+                v1000 = softehl_blend(m1028, v1152, v1000);
+                v1001 = softehl_blend(m1028, v1153, v1001);
+                v1002 = softehl_blend(m1028, v1154, v1002);
+                v1003 = softehl_blend(m1028, v1155, v1003);
+                v1004 = softehl_blend(m1028, v1156, v1004);
+                v1005 = softehl_blend(m1028, v1157, v1005);
+                v1006 = softehl_blend(m1028, v1158, v1006);
+                v1007 = softehl_blend(m1028, v1159, v1007);
+                v1008 = softehl_blend(m1028, v1160, v1008);
+                v1009 = softehl_blend(m1028, v1137, v1009);
+                v1010 = softehl_blend(m1028, v1138, v1010);
+                v1011 = softehl_blend(m1028, v1139, v1011);
+                v1012 = softehl_blend(m1028, v1140, v1012);
+                v1013 = softehl_blend(m1028, v1107, v1013);
+                v1014 = softehl_blend(m1028, v1108, v1014);
+                v1015 = softehl_blend(m1028, v1036, v1015);
+                v1016 = softehl_blend(m1028, v1037, v1016);
+                v1017 = softehl_blend(m1028, v1118, v1017);
+                v1018 = softehl_blend(m1028, v1061, v1018);
+                v1019 = softehl_blend(m1028, v1120, v1019);
+                v1020 = softehl_blend(m1028, v1129, v1020);
+                v1021 = softehl_blend(m1028, v1122, v1021);
+                v1022 = softehl_blend(m1028, v1130, v1022);
+                v1023 = softehl_blend(m1028, v1131, v1023);
+                v1024 = softehl_blend(m1028, v1119, v1024);
+                v1025 = softehl_blend(m1028, v1124, v1025);
+                v1026 = softehl_blend(m1028, v1132, v1026);
+                v1027 = softehl_blend(m1028, v1121, v1027);
             }
-            v926 = softehl_blend(m981, v983, v926); v927 = softehl_blend(m981, v984, v927);
-            v928 = softehl_blend(m981, v985, v928); v929 = softehl_blend(m981, v986, v929);
-            v930 = softehl_blend(m981, v987, v930); v931 = softehl_blend(m981, v988, v931);
-            v932 = softehl_blend(m981, v989, v932); v933 = softehl_blend(m981, v990, v933);
-            v934 = softehl_blend(m981, v991, v934); v935 = softehl_blend(m981, v992, v935);
-            v936 = softehl_blend(m981, v993, v936); v937 = softehl_blend(m981, v994, v937);
-            v938 = softehl_blend(m981, v995, v938); v939 = softehl_blend(m981, v996, v939);
-            v940 = softehl_blend(m981, v997, v940); v941 = softehl_blend(m981, v998, v941);
-            v942 = softehl_blend(m981, v999, v942); v943 = softehl_blend(m981, v1000, v943);
-            v944 = softehl_blend(m981, v1001, v944); v945 = softehl_blend(m981, v1002, v945);
-            v946 = softehl_blend(m981, v1003, v946); v947 = softehl_blend(m981, v1004, v947);
-            v948 = softehl_blend(m981, v1005, v948); v949 = softehl_blend(m981, v1006, v949);
-            v950 = softehl_blend(m981, v1007, v950); v951 = softehl_blend(m981, v1008, v951);
-            v952 = softehl_blend(m981, v1009, v952); v953 = softehl_blend(m981, v1010, v953);
-            v954 = softehl_blend(m981, v1011, v954);
-            v955 = softehl_blend(m981, softehl_splat(0.0), v955);
-            v956 = softehl_blend(m981, v1012, v956);
-            v957 = softehl_blend(m981, softehl_splat(0.0), v957);
-            v958 = softehl_blend(m981, v1013, v958); v959 = softehl_blend(m981, v1014, v959);
-            v960 = softehl_blend(m981, v1015, v960); v961 = softehl_blend(m981, v1016, v961);
-            v962 = softehl_blend(m981, softehl_splat(0.0), v962);
-            v963 = softehl_blend(m981, v1017, v963);
-            v964 = softehl_blend(m981, softehl_splat(0.0), v964);
-            v965 = softehl_blend(m981, v1018, v965);
-            v966 = softehl_blend(m981, softehl_splat(0.0), v966);
-            v967 = softehl_blend(m981, v1019, v967);
-            v968 = softehl_blend(m981, softehl_splat(0.0), v968);
-            v969 = softehl_blend(m981, v1020, v969);
-            v970 = softehl_blend(m981, softehl_splat(0.0), v970);
-            v971 = softehl_blend(m981, v1021, v971);
-            v972 = softehl_blend(m981, softehl_splat(0.0), v972);
-            v973 = softehl_blend(m981, v1022, v973);
-            v974 = softehl_blend(m981, softehl_splat(0.0), v974);
-            v975 = softehl_blend(m981, v1023, v975);
-            v976 = softehl_blend(m981, softehl_splat(0.0), v976);
-            v977 = softehl_blend(m981, v1024, v977);
-            v978 = softehl_blend(m981, softehl_splat(0.0), v978);
-            v979 = softehl_blend(m981, v1025, v979);
-            v980 = softehl_blend(m981, softehl_splat(0.0), v980);
+            v928 = softehl_blend(m983, v985, v928); v929 = softehl_blend(m983, v986, v929);
+            v930 = softehl_blend(m983, v987, v930); v931 = softehl_blend(m983, v988, v931);
+            v932 = softehl_blend(m983, v989, v932); v933 = softehl_blend(m983, v990, v933);
+            v934 = softehl_blend(m983, v991, v934); v935 = softehl_blend(m983, v992, v935);
+            v936 = softehl_blend(m983, v993, v936); v937 = softehl_blend(m983, v994, v937);
+            v938 = softehl_blend(m983, v995, v938); v939 = softehl_blend(m983, v996, v939);
+            v940 = softehl_blend(m983, v997, v940); v941 = softehl_blend(m983, v998, v941);
+            v942 = softehl_blend(m983, v999, v942); v943 = softehl_blend(m983, v1000, v943);
+            v944 = softehl_blend(m983, v1001, v944); v945 = softehl_blend(m983, v1002, v945);
+            v946 = softehl_blend(m983, v1003, v946); v947 = softehl_blend(m983, v1004, v947);
+            v948 = softehl_blend(m983, v1005, v948); v949 = softehl_blend(m983, v1006, v949);
+            v950 = softehl_blend(m983, v1007, v950); v951 = softehl_blend(m983, v1008, v951);
+            v952 = softehl_blend(m983, v1009, v952); v953 = softehl_blend(m983, v1010, v953);
+            v954 = softehl_blend(m983, v1011, v954); v955 = softehl_blend(m983, v1012, v955);
+            v956 = softehl_blend(m983, v1013, v956); v958 = softehl_blend(m983, v1014, v958);
+            v960 = softehl_blend(m983, v1015, v960); v961 = softehl_blend(m983, v1016, v961);
+            v962 = softehl_blend(m983, v1017, v962); v963 = softehl_blend(m983, v1018, v963);
+            v965 = softehl_blend(m983, v1019, v965); v967 = softehl_blend(m983, v1020, v967);
+            v969 = softehl_blend(m983, v1021, v969); v971 = softehl_blend(m983, v1022, v971);
+            v973 = softehl_blend(m983, v1023, v973); v975 = softehl_blend(m983, v1024, v975);
+            v977 = softehl_blend(m983, v1025, v977); v979 = softehl_blend(m983, v1026, v979);
+            v981 = softehl_blend(m983, v1027, v981);
         }
-        const M m1159 = ~v906;
-        if (softehl_any(m1159)) {
-            const V v1160 = v903 - v864, v1161 = v1160 * v1160, v1162 = v1160 * v1161,
-                v1163 = 3.0 * v1161, v1164 = v796 * v1163, v1165 = v45 * v1163,
-                v1166 = -(v860 * v1163), v1167 = a10 * v1163, v1168 = v1167 * v917,
-                v1169 = v1167 * v919, v1170 = v1167 * v921, v1171 = v1167 * v924,
-                v1172 = v1167 * v925, v1173 = v1167 * v909, v1174 = v1167 * v908,
-                v1175 = v1167 * v911, v1176 = v1167 * v915, v1177 = v1167 * v913;
-            v926 = softehl_blend(m1159, v1162, v926); v927 = softehl_blend(m1159, v1164, v927);
-            v928 = softehl_blend(m1159, v1166, v928); v929 = softehl_blend(m1159, v1162, v929);
-            v930 = softehl_blend(m1159, softehl_splat(0.0), v930);
-            v931 = softehl_blend(m1159, softehl_splat(0.0), v931);
-            v932 = softehl_blend(m1159, softehl_splat(0.0), v932);
-            v933 = softehl_blend(m1159, softehl_splat(0.0), v933);
-            v934 = softehl_blend(m1159, softehl_splat(0.0), v934);
-            v935 = softehl_blend(m1159, softehl_splat(0.0), v935);
-            v936 = softehl_blend(m1159, softehl_splat(0.0), v936);
-            v937 = softehl_blend(m1159, softehl_splat(0.0), v937);
-            v938 = softehl_blend(m1159, softehl_splat(0.0), v938);
-            v939 = softehl_blend(m1159, softehl_splat(0.0), v939);
-            v940 = softehl_blend(m1159, softehl_splat(0.0), v940);
-            v941 = softehl_blend(m1159, softehl_splat(0.0), v941);
-            v942 = softehl_blend(m1159, softehl_splat(0.0), v942);
-            v943 = softehl_blend(m1159, softehl_splat(0.0), v943);
-            v944 = softehl_blend(m1159, softehl_splat(0.0), v944);
-            v945 = softehl_blend(m1159, softehl_splat(0.0), v945);
-            v946 = softehl_blend(m1159, softehl_splat(0.0), v946);
-            v947 = softehl_blend(m1159, softehl_splat(0.0), v947);
-            v948 = softehl_blend(m1159, softehl_splat(0.0), v948);
-            v949 = softehl_blend(m1159, softehl_splat(0.0), v949);
-            v950 = softehl_blend(m1159, softehl_splat(0.0), v950);
-            v951 = softehl_blend(m1159, softehl_splat(0.0), v951);
-            v952 = softehl_blend(m1159, softehl_splat(0.0), v952);
-            v953 = softehl_blend(m1159, softehl_splat(0.0), v953);
-            v954 = softehl_blend(m1159, softehl_splat(0.0), v954);
-            v955 = softehl_blend(m1159, v1164, v955);
-            v956 = softehl_blend(m1159, softehl_splat(0.0), v956);
-            v957 = softehl_blend(m1159, v1166, v957); v958 = softehl_blend(m1159, v1167, v958);
-            v959 = softehl_blend(m1159, v1165, v959);
-            v960 = softehl_blend(m1159, softehl_splat(0.0), v960);
-            v961 = softehl_blend(m1159, v1165, v961); v962 = softehl_blend(m1159, v1168, v962);
-            v963 = softehl_blend(m1159, softehl_splat(0.0), v963);
-            v964 = softehl_blend(m1159, v1169, v964);
-            v965 = softehl_blend(m1159, softehl_splat(0.0), v965);
-            v966 = softehl_blend(m1159, v1170, v966);
-            v967 = softehl_blend(m1159, softehl_splat(0.0), v967);
-            v968 = softehl_blend(m1159, v1171, v968);
-            v969 = softehl_blend(m1159, softehl_splat(0.0), v969);
-            v970 = softehl_blend(m1159, v1172, v970);
-            v971 = softehl_blend(m1159, softehl_splat(0.0), v971);
-            v972 = softehl_blend(m1159, v1173, v972);
-            v973 = softehl_blend(m1159, softehl_splat(0.0), v973);
-            v974 = softehl_blend(m1159, v1174, v974);
-            v975 = softehl_blend(m1159, softehl_splat(0.0), v975);
-            v976 = softehl_blend(m1159, v1175, v976);
-            v977 = softehl_blend(m1159, softehl_splat(0.0), v977);
-            v978 = softehl_blend(m1159, v1176, v978);
-            v979 = softehl_blend(m1159, softehl_splat(0.0), v979);
-            v980 = softehl_blend(m1159, v1177, v980);
+        const M m1161 = ~v908;
+        if (softehl_any(m1161)) {
+            const V v1162 = v905 - v866, v1163 = v1162 * v1162, v1164 = v1162 * v1163,
+                v1165 = 3.0 * v1163, v1166 = v798 * v1165, v1167 = v45 * v1165,
+                v1168 = -(v862 * v1165), v1169 = a10 * v1165, v1170 = v1169 * v919,
+                v1171 = v1169 * v921, v1172 = v1169 * v923, v1173 = v1169 * v926,
+                v1174 = v1169 * v927, v1175 = v1169 * v911, v1176 = v1169 * v910,
+                v1177 = v1169 * v913, v1178 = v1169 * v917, v1179 = v1169 * v915;
+            v928 = softehl_blend(m1161, v1164, v928); v929 = softehl_blend(m1161, v1166, v929);
+            v930 = softehl_blend(m1161, v1168, v930); v931 = softehl_blend(m1161, v1164, v931);
+            v957 = softehl_blend(m1161, v1166, v957); v959 = softehl_blend(m1161, v1168, v959);
+            v960 = softehl_blend(m1161, v1169, v960); v961 = softehl_blend(m1161, v1167, v961);
+            v963 = softehl_blend(m1161, v1167, v963); v964 = softehl_blend(m1161, v1170, v964);
+            v966 = softehl_blend(m1161, v1171, v966); v968 = softehl_blend(m1161, v1172, v968);
+            v970 = softehl_blend(m1161, v1173, v970); v972 = softehl_blend(m1161, v1174, v972);
+            v974 = softehl_blend(m1161, v1175, v974); v976 = softehl_blend(m1161, v1176, v976);
+            v978 = softehl_blend(m1161, v1177, v978); v980 = softehl_blend(m1161, v1178, v980);
+            v982 = softehl_blend(m1161, v1179, v982);
         }
-        s572 += v930; s573 += v931; s574 += v932; s575 += v933; s576 += v934; s577 += v935;
-        s578 += v936; s579 += v937; s580 += v938; s581 += v939; s582 += v940; s583 += v941;
-        s584 += v942; s585 += v943; s586 += v944; s587 += v945; s588 += v946; s589 += v947;
-        s590 += v948; s591 += v949; s592 += v950; s593 += v951; s594 += v952; s595 += v953;
-        const V v1178 = v955 + v954, v1179 = v957 + v956, v1180 = softehl_vsqrt(1.0 / v809),
-            v1181 = v814 * v823,
-            v1182 = (v16 * v792 + (v13 * v791 + (v789 + v790)) - X5 * v788) * (v847 * v561),
-            v1183 = v926 * v1181, v1184 = v926 * v851, v1185 = v929 * v851, v1186 = v929 * v1181,
-            v1187 = 0.5 * v1184, v1188 = 0.5 * v1185, v1189 = v862 * v1183, v1190 = v862 * v1186,
-            v1191 = v863 * v1183, v1192 = v863 * v1186, v1193 = v876 * v926 + v874 * v929,
-            v1194 = v876 * v929 - v874 * v926, v1195 = v1193 * v1181, v1196 = v1194 * v1181,
-            v1197 = v1193 * v851, v1198 = v1194 * v851,
-            v1199 = v1182 + 2.0 * (v15 * v804 + v26 * v805) * (v1180 * (v563 * v823)),
-            v1200 = 0.5 * v1197, v1201 = v1193 * v1199, v1202 = (v877 * v926 - v875 * v929) * v851,
-            v1203 = v1194 * v1199, v1204 = (v875 * v926 + v877 * v929) * v851, v1205 = v926 * v1199,
-            v1206 = v929 * v1199, v1207 = 0.5 * v1198, v1208 = (v873 * v929 - v878 * v926) * v851,
-            v1209 = (v873 * v926 + v878 * v929) * v851;
-        s596 += v898 * v1198; s597 += v898 * v1197; s598 += v897 * v1198; s599 += v897 * v1197;
-        s600 += v806 * v1198; s601 += v806 * v1197; s602 += v801 * v1198; s603 += v801 * v1197;
-        s604 += v802 * v1198; s605 += v802 * v1197;
-        const V v1210 = v798 * v1197, v1211 = v798 * v1198, v1212 = v799 * v1197,
-            v1213 = v799 * v1198, v1214 = v788 * v1197, v1215 = v788 * v1198, v1216 = v43 * w[1],
-            v1217 = w[1] * v927, v1218 = w[1] * v928, v1219 = v1216 * v860, v1220 = v1216 * v859,
-            v1221 = v43 * (v1187 + v860 * v1205), v1222 = v43 * (v859 * v1205 - v1187),
-            v1223 = v43 * (v1188 + v860 * v1206), v1224 = v43 * (v859 * v1206 - v1188);
-        s564 += v1219 * v1184; s565 += v1220 * v1184; s570 += v1219 * v1185; s571 += v1220 * v1185;
-        const V v1225 = v772 * v959 + v958 * v917, v1226 = v774 * v959 + v958 * v921,
-            v1227 = v775 * v959 + v958 * v924, v1228 = v771 * v959 + v958 * v911,
-            v1229 = v778 * v959 + v958 * v915, v1230 = v779 * v959 + v958 * v913,
-            v1231 = v773 * v959 + v958 * v919, v1232 = v776 * v959 + v958 * v925,
-            v1233 = v777 * v959 + v958 * v909, v1234 = v770 * v959 + v958 * v908,
-            v1235 = v773 * v961 + (v964 + v963), v1236 = v776 * v961 + (v970 + v969),
-            v1237 = v777 * v961 + (v972 + v971), v1238 = v770 * v961 + (v974 + v973),
-            v1239 = v779 * v961 + (v980 + v979), v1240 = v772 * v961 + (v962 + v960),
-            v1241 = v774 * v961 + (v966 + v965), v1242 = v775 * v961 + (v968 + v967),
-            v1243 = v771 * v961 + (v976 + v975), v1244 = v778 * v961 + (v978 + v977);
-        s566 += v1217 * v865; s568 += v1217 * v866; s567 += v1218 * v865; s569 += v1218 * v866;
-        const V v1245 = w[1] * (v542 * v1190 + (v772 * v1224 + v865 * v1240)); s650 += v1245;
-        const V v1246 = w[1] * (v547 * v1190 + (v774 * v1224 + v865 * v1241)); s652 += v1246;
-        const V v1247 = w[1] * (v548 * v1190 + (v775 * v1224 + v865 * v1242)); s653 += v1247;
-        const V v1248 = w[1] * (v551 * v1190 + (v771 * v1224 + v865 * v1243)); s657 += v1248;
-        const V v1249 = w[1] * (v552 * v1190 + (v778 * v1224 + v865 * v1244)); s658 += v1249;
-        const V v1250 = w[1] * (v542 * v1192 + (v772 * v1223 + v866 * v1240)); s660 += v1250;
-        const V v1251 = w[1] * (v547 * v1192 + (v774 * v1223 + v866 * v1241)); s662 += v1251;
-        const V v1252 = v916 * v1200, v1253 = v916 * v1207, v1254 = v918 * v1200,
-            v1255 = v918 * v1207, v1256 = v920 * v1200, v1257 = v920 * v1207, v1258 = v922 * v1200,
-            v1259 = v922 * v1207, v1260 = v923 * v1200, v1261 = v923 * v1207, v1262 = v907 * v1200,
-            v1263 = v907 * v1207, v1264 = v905 * v1200, v1265 = v905 * v1207, v1266 = v910 * v1200,
-            v1267 = v910 * v1207, v1268 = v914 * v1200, v1269 = v914 * v1207, v1270 = v912 * v1200,
-            v1271 = v912 * v1207;
-        s606 += v1178 * v871; s607 += v1179 * v871; s608 += v1178 * v872; s609 += v1179 * v872;
-        const V v1272 = v927 * v879 + v1178 * v880, v1273 = v928 * v879 + v1179 * v880,
-            v1274 = v1178 * v879 - v927 * v880, v1275 = v1179 * v879 - v928 * v880;
-        s610 += v802 * v1272; s611 += v802 * v1273; s612 += v802 * v1274; s613 += v802 * v1275;
-        s614 += v801 * v1272; s615 += v801 * v1273; s616 += v801 * v1274; s617 += v801 * v1275;
-        s618 += v806 * v1272; s619 += v806 * v1273; s620 += v806 * v1274; s621 += v806 * v1275;
-        s622 += v897 * v1272; s623 += v897 * v1273; s624 += v897 * v1274; s625 += v897 * v1275;
-        s626 += v898 * v1272; s627 += v898 * v1273; s628 += v898 * v1274; s629 += v898 * v1275;
-        s630 += w[1] * (v542 * v1189 + v772 * v1222 + v1225 * v865);
-        s631 += w[1] * (v543 * v1189 + v773 * v1222 + v1231 * v865);
-        s632 += w[1] * (v547 * v1189 + v774 * v1222 + v1226 * v865);
-        s633 += w[1] * (v548 * v1189 + v775 * v1222 + v1227 * v865);
-        s634 += w[1] * (v540 * v1189 + v776 * v1222 + v1232 * v865);
-        s635 += w[1] * (v541 * v1189 + v777 * v1222 + v1233 * v865);
-        s636 += w[1] * (v550 * v1189 + v770 * v1222 + v1234 * v865);
-        s641 += w[1] * (v543 * v1191 + v773 * v1221 + v1231 * v866);
-        s645 += w[1] * (v541 * v1191 + v777 * v1221 + v1233 * v866);
-        s646 += w[1] * (v550 * v1191 + v770 * v1221 + v1234 * v866);
-        s642 += w[1] * (v547 * v1191 + v774 * v1221 + v1226 * v866);
-        s643 += w[1] * (v548 * v1191 + v775 * v1221 + v1227 * v866);
-        const V v1276 = v800 * v1204 + (v543 * v1196 + v773 * v1203 - v1231 * v880) - v824 * v1209,
-            v1277 = v824 * v1208 + (v800 * v1202 + (v543 * v1195 + (v773 * v1201 + v1231 * v879))),
-            v1278 = v782 * v1204 + (v547 * v1196 + v774 * v1203 - v1226 * v880) - v856 * v1209,
-            v1279 = v856 * v1208 + (v782 * v1202 + (v547 * v1195 + (v774 * v1201 + v1226 * v879))),
-            v1280 = v841 * v1204 + (v548 * v1196 + v775 * v1203 - v1227 * v880) - v827 * v1209,
-            v1281 = v827 * v1208 + (v841 * v1202 + (v548 * v1195 + (v775 * v1201 + v1227 * v879))),
-            v1282 = v843 * v1204 + (v541 * v1196 + v777 * v1203 - v1233 * v880) - v831 * v1209,
-            v1283 = v831 * v1208 + (v843 * v1202 + (v541 * v1195 + (v777 * v1201 + v1233 * v879))),
-            v1284 = v1276 + v879 * v1235, v1285 = v1277 + v880 * v1235,
-            v1286 = v1278 + v879 * v1241, v1287 = v1279 + v880 * v1241,
-            v1288 = v1280 + v879 * v1242, v1289 = v1281 + v880 * v1242,
-            v1290 = v1282 + v879 * v1237, v1291 = v1283 + v880 * v1237,
-            v1292 = w[1] * (v548 * v1192 + v775 * v1223 + v866 * v1242);
-        s663 += v1292; const V v1293 = w[1] * (v803 * v1285 - v773 * v1214); s711 += v1293;
-        const V v1294 = w[1] * (v803 * v1287 - v774 * v1214); s712 += v1294;
-        const V v1295 = w[1] * (v803 * v1284 - v773 * v1215); s721 += v1295;
-        const V v1296 = w[1] * (v803 * v1288 - v775 * v1215); s723 += v1296;
-        const V v1297 = w[1] * (v803 * v1289 - v775 * v1214); s713 += v1297;
-        const V v1298 = w[1] * (v803 * v1291 - v777 * v1214); s715 += v1298;
-        const V v1299 = w[1] * (v803 * v1290 - v777 * v1215); s725 += v1299;
-        const V v1300 = w[1] * (v803 * v1286 - v774 * v1215); s722 += v1300;
-        const V v1301 = w[1] * (v775 * v1210 + v795 * v1289); s673 += v1301;
-        const V v1302 = w[1] * (v774 * v1211 + v795 * v1286); s682 += v1302;
-        const V v1303 = w[1] * (v773 * v1210 + v795 * v1285); s671 += v1303;
-        const V v1304 = w[1] * (v774 * v1210 + v795 * v1287); s672 += v1304;
-        const V v1305 = w[1] * (v777 * v1210 + v795 * v1291); s675 += v1305;
-        const V v1306 = w[1] * (v773 * v1211 + v795 * v1284); s681 += v1306;
-        const V v1307 = w[1] * (v775 * v1211 + v795 * v1288); s683 += v1307;
-        const V v1308 = w[1] * (v777 * v1211 + v795 * v1290); s685 += v1308;
-        const V v1309 = w[1] * (v773 * v1212 + v797 * v1285); s691 += v1309;
-        const V v1310 = w[1] * (v774 * v1212 + v797 * v1287); s692 += v1310;
-        const V v1311 = w[1] * (v777 * v1212 + v797 * v1291); s695 += v1311;
-        const V v1312 = w[1] * (v773 * v1213 + v797 * v1284); s701 += v1312;
-        const V v1313 = w[1] * (v775 * v1213 + v797 * v1288); s703 += v1313;
-        const V v1314 = w[1] * (v777 * v1213 + v797 * v1290); s705 += v1314;
-        const V v1315 = w[1] * (v775 * v1212 + v797 * v1289); s693 += v1315;
-        const V v1316 = w[1] * (v774 * v1213 + v797 * v1286); s702 += v1316;
-        const V v1317 = w[1] * (v1258 - v894 * v1289); s733 += v1317;
-        const V v1318 = w[1] * (v1262 - v894 * v1291); s735 += v1318;
-        const V v1319 = w[1] * (v1257 - v894 * v1286); s742 += v1319;
-        const V v1320 = w[1] * (v1259 - v894 * v1288); s743 += v1320;
-        const V v1321 = w[1] * (v1263 - v894 * v1290); s745 += v1321;
-        const V v1322 = w[1] * (v1258 + v895 * v1289); s753 += v1322;
-        const V v1323 = w[1] * (v1262 + v895 * v1291); s755 += v1323;
-        const V v1324 = w[1] * (v1257 + v895 * v1286); s762 += v1324;
-        const V v1325 = w[1] * (v1259 + v895 * v1288); s763 += v1325;
-        const V v1326 = w[1] * (v1263 + v895 * v1290); s765 += v1326;
-        const V v1327 = w[1] * (v1254 - v894 * v1285); s731 += v1327;
-        const V v1328 = w[1] * (v1254 + v895 * v1285); s751 += v1328;
-        const V v1329 = w[1] * (v1256 - v894 * v1287); s732 += v1329;
-        const V v1330 = w[1] * (v1256 + v895 * v1287); s752 += v1330;
-        const V v1331 = w[1] * (v1255 - v894 * v1284); s741 += v1331;
-        const V v1332 = w[1] * (v1255 + v895 * v1284); s761 += v1332;
-        s640 += w[1] * (v542 * v1191 + v772 * v1221 + v1225 * v866);
-        const V v1333 = w[1] * (v551 * v1192 + v771 * v1223 + v866 * v1243); s667 += v1333;
-        const V v1334 = v781 * v1204 + (v542 * v1196 + v772 * v1203 - v1225 * v880 + v879 * v1240),
-            v1335 = v781 * v1202 + (v542 * v1195 + (v772 * v1201 + v1225 * v879) + v880 * v1240),
-            v1336 = v1334 - v855 * v1209, v1337 = v855 * v1208 + v1335,
-            v1338 = w[1] * (v551 * v1191 + (v771 * v1221 + v1228 * v866));
-        s647 += v1338; const V v1339 = w[1] * (v551 * v1189 + (v771 * v1222 + v1228 * v865));
-        s637 += v1339;
-        const V v1340 = v551 * v1195 + (v839 * v1202 + (v1228 * v879 + (v771 * v1201 + v880 * v1243))),
-            v1341 = v551 * v1196 + (v839 * v1204 + (v771 * v1203 + v879 * v1243 - v1228 * v880)),
-            v1342 = v836 * v1208 + v1340, v1343 = v1341 - v836 * v1209,
-            v1344 = w[1] * (v772 * v1210 + v795 * v1337);
-        s670 += v1344; const V v1345 = w[1] * (v772 * v1211 + v795 * v1336); s680 += v1345;
-        const V v1346 = w[1] * (v771 * v1210 + v795 * v1342); s677 += v1346;
-        const V v1347 = w[1] * (v771 * v1211 + v795 * v1343); s687 += v1347;
-        const V v1348 = w[1] * (v803 * v1336 - v772 * v1215); s720 += v1348;
-        const V v1349 = w[1] * (v803 * v1337 - v772 * v1214); s710 += v1349;
-        const V v1350 = w[1] * (v803 * v1343 - v771 * v1215); s727 += v1350;
-        const V v1351 = w[1] * (v803 * v1342 - v771 * v1214); s717 += v1351;
-        const V v1352 = w[1] * (v772 * v1212 + v797 * v1337); s690 += v1352;
-        const V v1353 = w[1] * (v771 * v1213 + v797 * v1343); s707 += v1353;
-        const V v1354 = w[1] * (v771 * v1212 + v797 * v1342); s697 += v1354;
-        const V v1355 = w[1] * (v772 * v1213 + v797 * v1336); s700 += v1355;
-        const V v1356 = w[1] * (v1252 - v894 * v1337); s730 += v1356;
-        const V v1357 = w[1] * (v1266 - v894 * v1342); s737 += v1357;
-        const V v1358 = w[1] * (v1253 - v894 * v1336); s740 += v1358;
-        const V v1359 = w[1] * (v1267 - v894 * v1343); s747 += v1359;
-        const V v1360 = w[1] * (v1252 + v895 * v1337); s750 += v1360;
-        const V v1361 = w[1] * (v1266 + v895 * v1342); s757 += v1361;
-        const V v1362 = w[1] * (v1253 + v895 * v1336); s760 += v1362;
-        const V v1363 = w[1] * (v1267 + v895 * v1343); s767 += v1363;
-        s638 += w[1] * (v552 * v1189 + v778 * v1222 + v1229 * v865);
-        s639 += w[1] * (v554 * v1189 + v779 * v1222 + v1230 * v865);
-        s648 += w[1] * (v552 * v1191 + v778 * v1221 + v1229 * v866);
-        s649 += w[1] * (v554 * v1191 + v779 * v1221 + v1230 * v866);
-        s644 += w[1] * (v540 * v1191 + v776 * v1221 + v1232 * v866);
-        const V v1364 = w[1] * (v540 * v1190 + v776 * v1224 + v865 * v1236); s654 += v1364;
-        const V v1365 = w[1] * (v554 * v1190 + v779 * v1224 + v865 * v1239); s659 += v1365;
-        const V v1366 = w[1] * (v540 * v1192 + (v776 * v1223 + v866 * v1236)); s664 += v1366;
-        const V v1367 = w[1] * (v554 * v1192 + (v779 * v1223 + v866 * v1239)); s669 += v1367;
-        const V v1368 = v784 * v1202 + (v540 * v1195 + (v776 * v1201 + v1232 * v879 + v880 * v1236)),
-            v1369 = v784 * v1204 + (v540 * v1196 + (v776 * v1203 - v1232 * v880 + v879 * v1236)),
-            v1370 = v786 * v1202 + (v1230 * v879 + (v554 * v1195 + (v779 * v1201 + v880 * v1239))),
-            v1371 = v786 * v1204 + (v554 * v1196 + (v779 * v1203 + v879 * v1239) - v1230 * v880),
-            v1372 = v829 * v1208 + v1368, v1373 = v1369 - v829 * v1209,
-            v1374 = v848 * v1208 + v1370, v1375 = v1371 - v848 * v1209,
-            v1376 = v833 * v1208 + (v783 * v1202 + (v550 * v1195 + (v770 * v1201 + v1234 * v879))),
-            v1377 = v783 * v1204 + (v550 * v1196 + v770 * v1203 - v1234 * v880) - v833 * v1209,
-            v1378 = v844 * v1208 + (v785 * v1202 + (v552 * v1195 + v778 * v1201)) + v1229 * v879,
-            v1379 = v785 * v1204 + (v552 * v1196 + v778 * v1203) - v844 * v1209 - v1229 * v880,
-            v1380 = v1376 + v880 * v1238, v1381 = v1377 + v879 * v1238,
-            v1382 = v1378 + v880 * v1244, v1383 = v1379 + v879 * v1244,
-            v1384 = w[1] * (v552 * v1192 + v778 * v1223 + v866 * v1244);
-        s668 += v1384; const V v1385 = w[1] * (v803 * v1372 - v776 * v1214); s714 += v1385;
-        const V v1386 = w[1] * (v803 * v1374 - v779 * v1214); s719 += v1386;
-        const V v1387 = w[1] * (v803 * v1373 - v776 * v1215); s724 += v1387;
-        const V v1388 = w[1] * (v803 * v1375 - v779 * v1215); s729 += v1388;
-        const V v1389 = w[1] * (v803 * v1380 - v770 * v1214); s716 += v1389;
-        const V v1390 = w[1] * (v803 * v1382 - v778 * v1214); s718 += v1390;
-        const V v1391 = w[1] * (v803 * v1381 - v770 * v1215); s726 += v1391;
-        const V v1392 = w[1] * (v803 * v1383 - v778 * v1215); s728 += v1392;
-        const V v1393 = w[1] * (v770 * v1210 + v795 * v1380); s676 += v1393;
-        const V v1394 = w[1] * (v778 * v1210 + v795 * v1382); s678 += v1394;
-        const V v1395 = w[1] * (v778 * v1211 + v795 * v1383); s688 += v1395;
-        const V v1396 = w[1] * (v776 * v1210 + v795 * v1372); s674 += v1396;
-        const V v1397 = w[1] * (v779 * v1210 + v795 * v1374); s679 += v1397;
-        const V v1398 = w[1] * (v776 * v1211 + v795 * v1373); s684 += v1398;
-        const V v1399 = w[1] * (v770 * v1211 + v795 * v1381); s686 += v1399;
-        const V v1400 = w[1] * (v779 * v1211 + v795 * v1375); s689 += v1400;
-        const V v1401 = w[1] * (v776 * v1212 + v797 * v1372); s694 += v1401;
-        const V v1402 = w[1] * (v779 * v1212 + v797 * v1374); s699 += v1402;
-        const V v1403 = w[1] * (v776 * v1213 + v797 * v1373); s704 += v1403;
-        const V v1404 = w[1] * (v770 * v1213 + v797 * v1381); s706 += v1404;
-        const V v1405 = w[1] * (v779 * v1213 + v797 * v1375); s709 += v1405;
-        const V v1406 = w[1] * (v770 * v1212 + v797 * v1380); s696 += v1406;
-        const V v1407 = w[1] * (v778 * v1212 + v797 * v1382); s698 += v1407;
-        const V v1408 = w[1] * (v778 * v1213 + v797 * v1383); s708 += v1408;
-        const V v1409 = w[1] * (v1264 - v894 * v1380); s736 += v1409;
-        const V v1410 = w[1] * (v1268 - v894 * v1382); s738 += v1410;
-        const V v1411 = w[1] * (v1261 - v894 * v1373); s744 += v1411;
-        const V v1412 = w[1] * (v1269 - v894 * v1383); s748 += v1412;
-        const V v1413 = w[1] * (v1271 - v894 * v1375); s749 += v1413;
-        const V v1414 = w[1] * (v1264 + v895 * v1380); s756 += v1414;
-        const V v1415 = w[1] * (v1268 + v895 * v1382); s758 += v1415;
-        const V v1416 = w[1] * (v1261 + v895 * v1373); s764 += v1416;
-        const V v1417 = w[1] * (v1269 + v895 * v1383); s768 += v1417;
-        const V v1418 = w[1] * (v1271 + v895 * v1375); s769 += v1418;
-        const V v1419 = w[1] * (v1260 - v894 * v1372); s734 += v1419;
-        const V v1420 = w[1] * (v1260 + v895 * v1372); s754 += v1420;
-        const V v1421 = w[1] * (v1270 - v894 * v1374); s739 += v1421;
-        const V v1422 = w[1] * (v1270 + v895 * v1374); s759 += v1422;
-        const V v1423 = w[1] * (v1265 - v894 * v1381); s746 += v1423;
-        const V v1424 = w[1] * (v1265 + v895 * v1381); s766 += v1424;
-        const V v1425 = w[1] * (v543 * v1190 + v773 * v1224 + v865 * v1235); s651 += v1425;
-        const V v1426 = w[1] * (v543 * v1192 + v773 * v1223 + v866 * v1235); s661 += v1426;
-        const V v1427 = w[1] * (v541 * v1190 + v777 * v1224 + v865 * v1237); s655 += v1427;
-        const V v1428 = w[1] * (v541 * v1192 + v777 * v1223 + v866 * v1237); s665 += v1428;
-        const V v1429 = w[1] * (v550 * v1190 + v770 * v1224 + v865 * v1238); s656 += v1429;
-        const V v1430 = w[1] * (v550 * v1192 + v770 * v1223 + v866 * v1238); s666 += v1430;
+        s574 += v932; s575 += v933; s576 += v934; s577 += v935; s578 += v936; s579 += v937;
+        s580 += v938; s581 += v939; s582 += v940; s583 += v941; s584 += v942; s585 += v943;
+        s586 += v944; s587 += v945; s588 += v946; s589 += v947; s590 += v948; s591 += v949;
+        s592 += v950; s593 += v951; s594 += v952; s595 += v953; s596 += v954; s597 += v955;
+        const V v1180 = v957 + v956, v1181 = v959 + v958, v1182 = softehl_vsqrt(1.0 / v811),
+            v1183 = v816 * v825,
+            v1184 = (v16 * v794 + (v13 * v793 + (v791 + v792)) - X5 * v790) * (v849 * v563),
+            v1185 = v928 * v1183, v1186 = v928 * v853, v1187 = v931 * v853, v1188 = v931 * v1183,
+            v1189 = 0.5 * v1186, v1190 = 0.5 * v1187, v1191 = v864 * v1185, v1192 = v864 * v1188,
+            v1193 = v865 * v1185, v1194 = v865 * v1188, v1195 = v878 * v928 + v876 * v931,
+            v1196 = v878 * v931 - v876 * v928, v1197 = v1195 * v1183, v1198 = v1196 * v1183,
+            v1199 = v1195 * v853, v1200 = v1196 * v853,
+            v1201 = v1184 + 2.0 * (v15 * v806 + v26 * v807) * (v1182 * (v565 * v825)),
+            v1202 = 0.5 * v1199, v1203 = v1195 * v1201, v1204 = (v879 * v928 - v877 * v931) * v853,
+            v1205 = v1196 * v1201, v1206 = (v877 * v928 + v879 * v931) * v853, v1207 = v928 * v1201,
+            v1208 = v931 * v1201, v1209 = 0.5 * v1200, v1210 = (v875 * v931 - v880 * v928) * v853,
+            v1211 = (v875 * v928 + v880 * v931) * v853;
+        s598 += v900 * v1200; s599 += v900 * v1199; s600 += v899 * v1200; s601 += v899 * v1199;
+        s602 += v808 * v1200; s603 += v808 * v1199; s604 += v803 * v1200; s605 += v803 * v1199;
+        s606 += v804 * v1200; s607 += v804 * v1199;
+        const V v1212 = v800 * v1199, v1213 = v800 * v1200, v1214 = v801 * v1199,
+            v1215 = v801 * v1200, v1216 = v790 * v1199, v1217 = v790 * v1200, v1218 = v43 * w[1],
+            v1219 = w[1] * v929, v1220 = w[1] * v930, v1221 = v1218 * v862, v1222 = v1218 * v861,
+            v1223 = v43 * (v1189 + v862 * v1207), v1224 = v43 * (v861 * v1207 - v1189),
+            v1225 = v43 * (v1190 + v862 * v1208), v1226 = v43 * (v861 * v1208 - v1190);
+        s566 += v1221 * v1186; s567 += v1222 * v1186; s572 += v1221 * v1187; s573 += v1222 * v1187;
+        const V v1227 = v774 * v961 + v960 * v919, v1228 = v776 * v961 + v960 * v923,
+            v1229 = v777 * v961 + v960 * v926, v1230 = v773 * v961 + v960 * v913,
+            v1231 = v780 * v961 + v960 * v917, v1232 = v781 * v961 + v960 * v915,
+            v1233 = v775 * v961 + v960 * v921, v1234 = v778 * v961 + v960 * v927,
+            v1235 = v779 * v961 + v960 * v911, v1236 = v772 * v961 + v960 * v910,
+            v1237 = v775 * v963 + (v966 + v965), v1238 = v778 * v963 + (v972 + v971),
+            v1239 = v779 * v963 + (v974 + v973), v1240 = v772 * v963 + (v976 + v975),
+            v1241 = v781 * v963 + (v982 + v981), v1242 = v774 * v963 + (v964 + v962),
+            v1243 = v776 * v963 + (v968 + v967), v1244 = v777 * v963 + (v970 + v969),
+            v1245 = v773 * v963 + (v978 + v977), v1246 = v780 * v963 + (v980 + v979);
+        s568 += v1219 * v867; s570 += v1219 * v868; s569 += v1220 * v867; s571 += v1220 * v868;
+        const V v1247 = w[1] * (v544 * v1192 + (v774 * v1226 + v867 * v1242)); s652 += v1247;
+        const V v1248 = w[1] * (v549 * v1192 + (v776 * v1226 + v867 * v1243)); s654 += v1248;
+        const V v1249 = w[1] * (v550 * v1192 + (v777 * v1226 + v867 * v1244)); s655 += v1249;
+        const V v1250 = w[1] * (v553 * v1192 + (v773 * v1226 + v867 * v1245)); s659 += v1250;
+        const V v1251 = w[1] * (v554 * v1192 + (v780 * v1226 + v867 * v1246)); s660 += v1251;
+        const V v1252 = w[1] * (v544 * v1194 + (v774 * v1225 + v868 * v1242)); s662 += v1252;
+        const V v1253 = w[1] * (v549 * v1194 + (v776 * v1225 + v868 * v1243)); s664 += v1253;
+        const V v1254 = v918 * v1202, v1255 = v918 * v1209, v1256 = v920 * v1202,
+            v1257 = v920 * v1209, v1258 = v922 * v1202, v1259 = v922 * v1209, v1260 = v924 * v1202,
+            v1261 = v924 * v1209, v1262 = v925 * v1202, v1263 = v925 * v1209, v1264 = v909 * v1202,
+            v1265 = v909 * v1209, v1266 = v907 * v1202, v1267 = v907 * v1209, v1268 = v912 * v1202,
+            v1269 = v912 * v1209, v1270 = v916 * v1202, v1271 = v916 * v1209, v1272 = v914 * v1202,
+            v1273 = v914 * v1209;
+        s608 += v1180 * v873; s609 += v1181 * v873; s610 += v1180 * v874; s611 += v1181 * v874;
+        const V v1274 = v929 * v881 + v1180 * v882, v1275 = v930 * v881 + v1181 * v882,
+            v1276 = v1180 * v881 - v929 * v882, v1277 = v1181 * v881 - v930 * v882;
+        s612 += v804 * v1274; s613 += v804 * v1275; s614 += v804 * v1276; s615 += v804 * v1277;
+        s616 += v803 * v1274; s617 += v803 * v1275; s618 += v803 * v1276; s619 += v803 * v1277;
+        s620 += v808 * v1274; s621 += v808 * v1275; s622 += v808 * v1276; s623 += v808 * v1277;
+        s624 += v899 * v1274; s625 += v899 * v1275; s626 += v899 * v1276; s627 += v899 * v1277;
+        s628 += v900 * v1274; s629 += v900 * v1275; s630 += v900 * v1276; s631 += v900 * v1277;
+        s632 += w[1] * (v544 * v1191 + v774 * v1224 + v1227 * v867);
+        s633 += w[1] * (v545 * v1191 + v775 * v1224 + v1233 * v867);
+        s634 += w[1] * (v549 * v1191 + v776 * v1224 + v1228 * v867);
+        s635 += w[1] * (v550 * v1191 + v777 * v1224 + v1229 * v867);
+        s636 += w[1] * (v542 * v1191 + v778 * v1224 + v1234 * v867);
+        s637 += w[1] * (v543 * v1191 + v779 * v1224 + v1235 * v867);
+        s638 += w[1] * (v552 * v1191 + v772 * v1224 + v1236 * v867);
+        s643 += w[1] * (v545 * v1193 + v775 * v1223 + v1233 * v868);
+        s647 += w[1] * (v543 * v1193 + v779 * v1223 + v1235 * v868);
+        s648 += w[1] * (v552 * v1193 + v772 * v1223 + v1236 * v868);
+        s644 += w[1] * (v549 * v1193 + v776 * v1223 + v1228 * v868);
+        s645 += w[1] * (v550 * v1193 + v777 * v1223 + v1229 * v868);
+        const V v1278 = v802 * v1206 + (v545 * v1198 + v775 * v1205 - v1233 * v882) - v826 * v1211,
+            v1279 = v826 * v1210 + (v802 * v1204 + (v545 * v1197 + (v775 * v1203 + v1233 * v881))),
+            v1280 = v784 * v1206 + (v549 * v1198 + v776 * v1205 - v1228 * v882) - v858 * v1211,
+            v1281 = v858 * v1210 + (v784 * v1204 + (v549 * v1197 + (v776 * v1203 + v1228 * v881))),
+            v1282 = v843 * v1206 + (v550 * v1198 + v777 * v1205 - v1229 * v882) - v829 * v1211,
+            v1283 = v829 * v1210 + (v843 * v1204 + (v550 * v1197 + (v777 * v1203 + v1229 * v881))),
+            v1284 = v845 * v1206 + (v543 * v1198 + v779 * v1205 - v1235 * v882) - v833 * v1211,
+            v1285 = v833 * v1210 + (v845 * v1204 + (v543 * v1197 + (v779 * v1203 + v1235 * v881))),
+            v1286 = v1278 + v881 * v1237, v1287 = v1279 + v882 * v1237,
+            v1288 = v1280 + v881 * v1243, v1289 = v1281 + v882 * v1243,
+            v1290 = v1282 + v881 * v1244, v1291 = v1283 + v882 * v1244,
+            v1292 = v1284 + v881 * v1239, v1293 = v1285 + v882 * v1239,
+            v1294 = w[1] * (v550 * v1194 + v777 * v1225 + v868 * v1244);
+        s665 += v1294; const V v1295 = w[1] * (v805 * v1287 - v775 * v1216); s713 += v1295;
+        const V v1296 = w[1] * (v805 * v1289 - v776 * v1216); s714 += v1296;
+        const V v1297 = w[1] * (v805 * v1286 - v775 * v1217); s723 += v1297;
+        const V v1298 = w[1] * (v805 * v1290 - v777 * v1217); s725 += v1298;
+        const V v1299 = w[1] * (v805 * v1291 - v777 * v1216); s715 += v1299;
+        const V v1300 = w[1] * (v805 * v1293 - v779 * v1216); s717 += v1300;
+        const V v1301 = w[1] * (v805 * v1292 - v779 * v1217); s727 += v1301;
+        const V v1302 = w[1] * (v805 * v1288 - v776 * v1217); s724 += v1302;
+        const V v1303 = w[1] * (v777 * v1212 + v797 * v1291); s675 += v1303;
+        const V v1304 = w[1] * (v776 * v1213 + v797 * v1288); s684 += v1304;
+        const V v1305 = w[1] * (v775 * v1212 + v797 * v1287); s673 += v1305;
+        const V v1306 = w[1] * (v776 * v1212 + v797 * v1289); s674 += v1306;
+        const V v1307 = w[1] * (v779 * v1212 + v797 * v1293); s677 += v1307;
+        const V v1308 = w[1] * (v775 * v1213 + v797 * v1286); s683 += v1308;
+        const V v1309 = w[1] * (v777 * v1213 + v797 * v1290); s685 += v1309;
+        const V v1310 = w[1] * (v779 * v1213 + v797 * v1292); s687 += v1310;
+        const V v1311 = w[1] * (v775 * v1214 + v799 * v1287); s693 += v1311;
+        const V v1312 = w[1] * (v776 * v1214 + v799 * v1289); s694 += v1312;
+        const V v1313 = w[1] * (v779 * v1214 + v799 * v1293); s697 += v1313;
+        const V v1314 = w[1] * (v775 * v1215 + v799 * v1286); s703 += v1314;
+        const V v1315 = w[1] * (v777 * v1215 + v799 * v1290); s705 += v1315;
+        const V v1316 = w[1] * (v779 * v1215 + v799 * v1292); s707 += v1316;
+        const V v1317 = w[1] * (v777 * v1214 + v799 * v1291); s695 += v1317;
+        const V v1318 = w[1] * (v776 * v1215 + v799 * v1288); s704 += v1318;
+        const V v1319 = w[1] * (v1260 - v896 * v1291); s735 += v1319;
+        const V v1320 = w[1] * (v1264 - v896 * v1293); s737 += v1320;
+        const V v1321 = w[1] * (v1259 - v896 * v1288); s744 += v1321;
+        const V v1322 = w[1] * (v1261 - v896 * v1290); s745 += v1322;
+        const V v1323 = w[1] * (v1265 - v896 * v1292); s747 += v1323;
+        const V v1324 = w[1] * (v1260 + v897 * v1291); s755 += v1324;
+        const V v1325 = w[1] * (v1264 + v897 * v1293); s757 += v1325;
+        const V v1326 = w[1] * (v1259 + v897 * v1288); s764 += v1326;
+        const V v1327 = w[1] * (v1261 + v897 * v1290); s765 += v1327;
+        const V v1328 = w[1] * (v1265 + v897 * v1292); s767 += v1328;
+        const V v1329 = w[1] * (v1256 - v896 * v1287); s733 += v1329;
+        const V v1330 = w[1] * (v1256 + v897 * v1287); s753 += v1330;
+        const V v1331 = w[1] * (v1258 - v896 * v1289); s734 += v1331;
+        const V v1332 = w[1] * (v1258 + v897 * v1289); s754 += v1332;
+        const V v1333 = w[1] * (v1257 - v896 * v1286); s743 += v1333;
+        const V v1334 = w[1] * (v1257 + v897 * v1286); s763 += v1334;
+        s642 += w[1] * (v544 * v1193 + v774 * v1223 + v1227 * v868);
+        const V v1335 = w[1] * (v553 * v1194 + v773 * v1225 + v868 * v1245); s669 += v1335;
+        const V v1336 = v783 * v1206 + (v544 * v1198 + v774 * v1205 - v1227 * v882 + v881 * v1242),
+            v1337 = v783 * v1204 + (v544 * v1197 + (v774 * v1203 + v1227 * v881) + v882 * v1242),
+            v1338 = v1336 - v857 * v1211, v1339 = v857 * v1210 + v1337,
+            v1340 = w[1] * (v553 * v1193 + (v773 * v1223 + v1230 * v868));
+        s649 += v1340; const V v1341 = w[1] * (v553 * v1191 + (v773 * v1224 + v1230 * v867));
+        s639 += v1341;
+        const V v1342 = v553 * v1197 + (v841 * v1204 + (v1230 * v881 + (v773 * v1203 + v882 * v1245))),
+            v1343 = v553 * v1198 + (v841 * v1206 + (v773 * v1205 + v881 * v1245 - v1230 * v882)),
+            v1344 = v838 * v1210 + v1342, v1345 = v1343 - v838 * v1211,
+            v1346 = w[1] * (v774 * v1212 + v797 * v1339);
+        s672 += v1346; const V v1347 = w[1] * (v774 * v1213 + v797 * v1338); s682 += v1347;
+        const V v1348 = w[1] * (v773 * v1212 + v797 * v1344); s679 += v1348;
+        const V v1349 = w[1] * (v773 * v1213 + v797 * v1345); s689 += v1349;
+        const V v1350 = w[1] * (v805 * v1338 - v774 * v1217); s722 += v1350;
+        const V v1351 = w[1] * (v805 * v1339 - v774 * v1216); s712 += v1351;
+        const V v1352 = w[1] * (v805 * v1345 - v773 * v1217); s729 += v1352;
+        const V v1353 = w[1] * (v805 * v1344 - v773 * v1216); s719 += v1353;
+        const V v1354 = w[1] * (v774 * v1214 + v799 * v1339); s692 += v1354;
+        const V v1355 = w[1] * (v773 * v1215 + v799 * v1345); s709 += v1355;
+        const V v1356 = w[1] * (v773 * v1214 + v799 * v1344); s699 += v1356;
+        const V v1357 = w[1] * (v774 * v1215 + v799 * v1338); s702 += v1357;
+        const V v1358 = w[1] * (v1254 - v896 * v1339); s732 += v1358;
+        const V v1359 = w[1] * (v1268 - v896 * v1344); s739 += v1359;
+        const V v1360 = w[1] * (v1255 - v896 * v1338); s742 += v1360;
+        const V v1361 = w[1] * (v1269 - v896 * v1345); s749 += v1361;
+        const V v1362 = w[1] * (v1254 + v897 * v1339); s752 += v1362;
+        const V v1363 = w[1] * (v1268 + v897 * v1344); s759 += v1363;
+        const V v1364 = w[1] * (v1255 + v897 * v1338); s762 += v1364;
+        const V v1365 = w[1] * (v1269 + v897 * v1345); s769 += v1365;
+        s640 += w[1] * (v554 * v1191 + v780 * v1224 + v1231 * v867);
+        s641 += w[1] * (v556 * v1191 + v781 * v1224 + v1232 * v867);
+        s650 += w[1] * (v554 * v1193 + v780 * v1223 + v1231 * v868);
+        s651 += w[1] * (v556 * v1193 + v781 * v1223 + v1232 * v868);
+        s646 += w[1] * (v542 * v1193 + v778 * v1223 + v1234 * v868);
+        const V v1366 = w[1] * (v542 * v1192 + v778 * v1226 + v867 * v1238); s656 += v1366;
+        const V v1367 = w[1] * (v556 * v1192 + v781 * v1226 + v867 * v1241); s661 += v1367;
+        const V v1368 = w[1] * (v542 * v1194 + (v778 * v1225 + v868 * v1238)); s666 += v1368;
+        const V v1369 = w[1] * (v556 * v1194 + (v781 * v1225 + v868 * v1241)); s671 += v1369;
+        const V v1370 = v786 * v1204 + (v542 * v1197 + (v778 * v1203 + v1234 * v881 + v882 * v1238)),
+            v1371 = v786 * v1206 + (v542 * v1198 + (v778 * v1205 - v1234 * v882 + v881 * v1238)),
+            v1372 = v788 * v1204 + (v1232 * v881 + (v556 * v1197 + (v781 * v1203 + v882 * v1241))),
+            v1373 = v788 * v1206 + (v556 * v1198 + (v781 * v1205 + v881 * v1241) - v1232 * v882),
+            v1374 = v831 * v1210 + v1370, v1375 = v1371 - v831 * v1211,
+            v1376 = v850 * v1210 + v1372, v1377 = v1373 - v850 * v1211,
+            v1378 = v835 * v1210 + (v785 * v1204 + (v552 * v1197 + (v772 * v1203 + v1236 * v881))),
+            v1379 = v785 * v1206 + (v552 * v1198 + v772 * v1205 - v1236 * v882) - v835 * v1211,
+            v1380 = v846 * v1210 + (v787 * v1204 + (v554 * v1197 + v780 * v1203)) + v1231 * v881,
+            v1381 = v787 * v1206 + (v554 * v1198 + v780 * v1205) - v846 * v1211 - v1231 * v882,
+            v1382 = v1378 + v882 * v1240, v1383 = v1379 + v881 * v1240,
+            v1384 = v1380 + v882 * v1246, v1385 = v1381 + v881 * v1246,
+            v1386 = w[1] * (v554 * v1194 + v780 * v1225 + v868 * v1246);
+        s670 += v1386; const V v1387 = w[1] * (v805 * v1374 - v778 * v1216); s716 += v1387;
+        const V v1388 = w[1] * (v805 * v1376 - v781 * v1216); s721 += v1388;
+        const V v1389 = w[1] * (v805 * v1375 - v778 * v1217); s726 += v1389;
+        const V v1390 = w[1] * (v805 * v1377 - v781 * v1217); s731 += v1390;
+        const V v1391 = w[1] * (v805 * v1382 - v772 * v1216); s718 += v1391;
+        const V v1392 = w[1] * (v805 * v1384 - v780 * v1216); s720 += v1392;
+        const V v1393 = w[1] * (v805 * v1383 - v772 * v1217); s728 += v1393;
+        const V v1394 = w[1] * (v805 * v1385 - v780 * v1217); s730 += v1394;
+        const V v1395 = w[1] * (v772 * v1212 + v797 * v1382); s678 += v1395;
+        const V v1396 = w[1] * (v780 * v1212 + v797 * v1384); s680 += v1396;
+        const V v1397 = w[1] * (v780 * v1213 + v797 * v1385); s690 += v1397;
+        const V v1398 = w[1] * (v778 * v1212 + v797 * v1374); s676 += v1398;
+        const V v1399 = w[1] * (v781 * v1212 + v797 * v1376); s681 += v1399;
+        const V v1400 = w[1] * (v778 * v1213 + v797 * v1375); s686 += v1400;
+        const V v1401 = w[1] * (v772 * v1213 + v797 * v1383); s688 += v1401;
+        const V v1402 = w[1] * (v781 * v1213 + v797 * v1377); s691 += v1402;
+        const V v1403 = w[1] * (v778 * v1214 + v799 * v1374); s696 += v1403;
+        const V v1404 = w[1] * (v781 * v1214 + v799 * v1376); s701 += v1404;
+        const V v1405 = w[1] * (v778 * v1215 + v799 * v1375); s706 += v1405;
+        const V v1406 = w[1] * (v772 * v1215 + v799 * v1383); s708 += v1406;
+        const V v1407 = w[1] * (v781 * v1215 + v799 * v1377); s711 += v1407;
+        const V v1408 = w[1] * (v772 * v1214 + v799 * v1382); s698 += v1408;
+        const V v1409 = w[1] * (v780 * v1214 + v799 * v1384); s700 += v1409;
+        const V v1410 = w[1] * (v780 * v1215 + v799 * v1385); s710 += v1410;
+        const V v1411 = w[1] * (v1266 - v896 * v1382); s738 += v1411;
+        const V v1412 = w[1] * (v1270 - v896 * v1384); s740 += v1412;
+        const V v1413 = w[1] * (v1263 - v896 * v1375); s746 += v1413;
+        const V v1414 = w[1] * (v1271 - v896 * v1385); s750 += v1414;
+        const V v1415 = w[1] * (v1273 - v896 * v1377); s751 += v1415;
+        const V v1416 = w[1] * (v1266 + v897 * v1382); s758 += v1416;
+        const V v1417 = w[1] * (v1270 + v897 * v1384); s760 += v1417;
+        const V v1418 = w[1] * (v1263 + v897 * v1375); s766 += v1418;
+        const V v1419 = w[1] * (v1271 + v897 * v1385); s770 += v1419;
+        const V v1420 = w[1] * (v1273 + v897 * v1377); s771 += v1420;
+        const V v1421 = w[1] * (v1262 - v896 * v1374); s736 += v1421;
+        const V v1422 = w[1] * (v1262 + v897 * v1374); s756 += v1422;
+        const V v1423 = w[1] * (v1272 - v896 * v1376); s741 += v1423;
+        const V v1424 = w[1] * (v1272 + v897 * v1376); s761 += v1424;
+        const V v1425 = w[1] * (v1267 - v896 * v1383); s748 += v1425;
+        const V v1426 = w[1] * (v1267 + v897 * v1383); s768 += v1426;
+        const V v1427 = w[1] * (v545 * v1192 + v775 * v1226 + v867 * v1237); s653 += v1427;
+        const V v1428 = w[1] * (v545 * v1194 + v775 * v1225 + v868 * v1237); s663 += v1428;
+        const V v1429 = w[1] * (v543 * v1192 + v779 * v1226 + v867 * v1239); s657 += v1429;
+        const V v1430 = w[1] * (v543 * v1194 + v779 * v1225 + v868 * v1239); s667 += v1430;
+        const V v1431 = w[1] * (v552 * v1192 + v772 * v1226 + v867 * v1240); s658 += v1431;
+        const V v1432 = w[1] * (v552 * v1194 + v772 * v1225 + v868 * v1240); s668 += v1432;
     }
-    softehl_store2(R + 12, 14, s564, s570); softehl_store4(R + 0, 14, s605, s604, s603, s602);
-    softehl_store4(K + 164, 196, s606, s592, s607, s593);
-    softehl_store4(K + 192, 196, s608, s594, s609, s595);
-    softehl_store4(K + 24, 196, s612, s574, s613, s575);
-    softehl_store4(K + 52, 196, s616, s578, s617, s579);
-    softehl_store4(K + 80, 196, s620, s582, s621, s583);
-    softehl_store4(K + 140, 196, s630, s631, s632, s633);
-    softehl_store4(K + 144, 196, s634, s635, s636, s637);
-    softehl_store4(K + 148, 196, s638, s639, s566, softehl_splat(0.0));
-    softehl_store4(K + 168, 196, s640, s641, s642, s643);
-    softehl_store4(K + 172, 196, s644, s645, s646, s647);
-    softehl_store4(K + 176, 196, s648, s649, s568, softehl_splat(0.0));
-    softehl_store4(K + 152, 196, s567, softehl_splat(0.0), s650, s651);
-    softehl_store4(K + 156, 196, s652, s653, s654, s655);
-    softehl_store4(K + 160, 196, s656, s657, s658, s659);
-    softehl_store4(K + 180, 196, s569, softehl_splat(0.0), s660, s661);
-    softehl_store4(K + 184, 196, s662, s663, s664, s665);
-    softehl_store4(K + 188, 196, s666, s667, s668, s669);
-    softehl_store4(K + 0, 196, s670, s671, s672, s673);
-    softehl_store4(K + 4, 196, s674, s675, s676, s677);
-    softehl_store4(K + 8, 196, s678, s679, s610, s572);
-    softehl_store4(K + 12, 196, s611, s573, s680, s681);
-    softehl_store4(K + 16, 196, s682, s683, s684, s685);
-    softehl_store4(K + 20, 196, s686, s687, s688, s689);
-    softehl_store4(K + 28, 196, s690, s691, s692, s693);
-    softehl_store4(K + 32, 196, s694, s695, s696, s697);
-    softehl_store4(K + 36, 196, s698, s699, s614, s576);
-    softehl_store4(K + 40, 196, s615, s577, s700, s701);
-    softehl_store4(K + 44, 196, s702, s703, s704, s705);
-    softehl_store4(K + 48, 196, s706, s707, s708, s709);
-    softehl_store4(K + 56, 196, s710, s711, s712, s713);
-    softehl_store4(K + 60, 196, s714, s715, s716, s717);
-    softehl_store4(K + 64, 196, s718, s719, s618, s580);
-    softehl_store4(K + 68, 196, s619, s581, s720, s721);
-    softehl_store4(K + 72, 196, s722, s723, s724, s725);
-    softehl_store4(K + 76, 196, s726, s727, s728, s729);
-    softehl_store4(K + 84, 196, s730, s731, s732, s733);
-    softehl_store4(K + 88, 196, s734, s735, s736, s737);
-    softehl_store4(K + 100, 196, s742, s743, s744, s745);
-    softehl_store4(K + 104, 196, s746, s747, s748, s749);
-    softehl_store4(R + 8, 14, -s597, -s596, s565, s571);
-    softehl_store4(R + 4, 14, s601, s600, -s599, -s598);
-    softehl_store4(K + 92, 196, s738, s739, -s622, s584);
-    softehl_store4(K + 96, 196, -s623, s585, s740, s741);
-    softehl_store4(K + 108, 196, -s624, s586, -s625, s587);
-    softehl_store4(K + 136, 196, -s628, s590, -s629, s591);
-    softehl_store4(K + 112, 196, -s750, -s751, -s752, -s753);
-    softehl_store4(K + 116, 196, -s754, -s755, -s756, -s757);
-    softehl_store4(K + 120, 196, -s758, -s759, -s626, s588);
-    softehl_store4(K + 124, 196, -s627, s589, -s760, -s761);
-    softehl_store4(K + 128, 196, -s762, -s763, -s764, -s765);
-    softehl_store4(K + 132, 196, -s766, -s767, -s768, -s769);
+    softehl_store2(R + 12, 14, s566, s572); softehl_store4(R + 0, 14, s607, s606, s605, s604);
+    softehl_store4(K + 164, 196, s608, s594, s609, s595);
+    softehl_store4(K + 192, 196, s610, s596, s611, s597);
+    softehl_store4(K + 24, 196, s614, s576, s615, s577);
+    softehl_store4(K + 52, 196, s618, s580, s619, s581);
+    softehl_store4(K + 80, 196, s622, s584, s623, s585);
+    softehl_store4(K + 140, 196, s632, s633, s634, s635);
+    softehl_store4(K + 144, 196, s636, s637, s638, s639);
+    softehl_store4(K + 148, 196, s640, s641, s568, softehl_splat(0.0));
+    softehl_store4(K + 168, 196, s642, s643, s644, s645);
+    softehl_store4(K + 172, 196, s646, s647, s648, s649);
+    softehl_store4(K + 176, 196, s650, s651, s570, softehl_splat(0.0));
+    softehl_store4(K + 152, 196, s569, softehl_splat(0.0), s652, s653);
+    softehl_store4(K + 156, 196, s654, s655, s656, s657);
+    softehl_store4(K + 160, 196, s658, s659, s660, s661);
+    softehl_store4(K + 180, 196, s571, softehl_splat(0.0), s662, s663);
+    softehl_store4(K + 184, 196, s664, s665, s666, s667);
+    softehl_store4(K + 188, 196, s668, s669, s670, s671);
+    softehl_store4(K + 0, 196, s672, s673, s674, s675);
+    softehl_store4(K + 4, 196, s676, s677, s678, s679);
+    softehl_store4(K + 8, 196, s680, s681, s612, s574);
+    softehl_store4(K + 12, 196, s613, s575, s682, s683);
+    softehl_store4(K + 16, 196, s684, s685, s686, s687);
+    softehl_store4(K + 20, 196, s688, s689, s690, s691);
+    softehl_store4(K + 28, 196, s692, s693, s694, s695);
+    softehl_store4(K + 32, 196, s696, s697, s698, s699);
+    softehl_store4(K + 36, 196, s700, s701, s616, s578);
+    softehl_store4(K + 40, 196, s617, s579, s702, s703);
+    softehl_store4(K + 44, 196, s704, s705, s706, s707);
+    softehl_store4(K + 48, 196, s708, s709, s710, s711);
+    softehl_store4(K + 56, 196, s712, s713, s714, s715);
+    softehl_store4(K + 60, 196, s716, s717, s718, s719);
+    softehl_store4(K + 64, 196, s720, s721, s620, s582);
+    softehl_store4(K + 68, 196, s621, s583, s722, s723);
+    softehl_store4(K + 72, 196, s724, s725, s726, s727);
+    softehl_store4(K + 76, 196, s728, s729, s730, s731);
+    softehl_store4(K + 84, 196, s732, s733, s734, s735);
+    softehl_store4(K + 88, 196, s736, s737, s738, s739);
+    softehl_store4(K + 100, 196, s744, s745, s746, s747);
+    softehl_store4(K + 104, 196, s748, s749, s750, s751);
+    softehl_store4(R + 8, 14, -s599, -s598, s567, s573);
+    softehl_store4(R + 4, 14, s603, s602, -s601, -s600);
+    softehl_store4(K + 92, 196, s740, s741, -s624, s586);
+    softehl_store4(K + 96, 196, -s625, s587, s742, s743);
+    softehl_store4(K + 108, 196, -s626, s588, -s627, s589);
+    softehl_store4(K + 136, 196, -s630, s592, -s631, s593);
+    softehl_store4(K + 112, 196, -s752, -s753, -s754, -s755);
+    softehl_store4(K + 116, 196, -s756, -s757, -s758, -s759);
+    softehl_store4(K + 120, 196, -s760, -s761, -s628, s590);
+    softehl_store4(K + 124, 196, -s629, s591, -s762, -s763);
+    softehl_store4(K + 128, 196, -s764, -s765, -s766, -s767);
+    softehl_store4(K + 132, 196, -s768, -s769, -s770, -s771);
 }
 SOFTEHL_BATCH(softehl_mortar_32_tangent, 10, 14, 15, 0, 14, (14 * 14))

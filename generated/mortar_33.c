@@ -295,14 +295,18 @@ SOFTEHL_GROUP(softehl_mortar_33_tangent)
             v111 = softehl_splat(0.0);
         const M m112 = v104 & m103;
         if (softehl_any(m112)) {
-            V v113 = softehl_splat(0.0), v114 = softehl_splat(0.0), v115 = softehl_splat(0.0),
-                v116 = softehl_splat(0.0), v117 = softehl_splat(0.0), v118 = softehl_splat(0.0);
-            const M m119 = ~v70 & m112;
+            V v113 = v85, v114 = v87, v115 = softehl_splat(0.0), v116 = softehl_splat(0.0),
+                v117 = softehl_splat(0.0), v118 = softehl_splat(0.0);
+            const M m119 = v70 & m112;
             if (softehl_any(m119)) {
-                const V v120 = -v89, v121 = -v91, v122 = v79 - v93, v123 = v83 - v95;
-                v113 = softehl_blend(m119, v85, v113); v114 = softehl_blend(m119, v87, v114);
-                v115 = softehl_blend(m119, v120, v115); v116 = softehl_blend(m119, v121, v116);
-                v117 = softehl_blend(m119, v122, v117); v118 = softehl_blend(m119, v123, v118);
+                v113 = softehl_blend(m119, softehl_splat(0.0), v113);
+                v114 = softehl_blend(m119, softehl_splat(0.0), v114);
+            }
+            const M m120 = ~v70 & m112;
+            if (softehl_any(m120)) {
+                const V v121 = -v89, v122 = -v91, v123 = v79 - v93, v124 = v83 - v95;
+                v115 = softehl_blend(m120, v121, v115); v116 = softehl_blend(m120, v122, v116);
+                v117 = softehl_blend(m120, v123, v117); v118 = softehl_blend(m120, v124, v118);
             }
             v105 = softehl_blend(m112, v71, v105); v106 = softehl_blend(m112, v113, v106);
             v107 = softehl_blend(m112, v114, v107); v108 = softehl_blend(m112, v115, v108);
@@ -314,1176 +318,1098 @@ SOFTEHL_GROUP(softehl_mortar_33_tangent)
         v100 = softehl_blend(m103, v111, v100); v101 = softehl_blend(m103, v106, v101);
         v102 = softehl_blend(m103, v107, v102);
     }
-    const M m124 = ~v72;
-    if (softehl_any(m124)) {
-        const V v125 = (-1.0) - v71, v126 = v125 * (v125 * v125);
-        V v127 = softehl_splat(0.0), v128 = softehl_splat(0.0), v129 = softehl_splat(0.0),
-            v130 = softehl_splat(0.0), v131 = softehl_splat(0.0), v132 = softehl_splat(0.0);
-        const M m133 = ~v70 & m124;
-        if (softehl_any(m133)) {
-            const V v134 = (-1.0) - v69, v135 = v134 * (3.0 * v134), v136 = (v93 - v79) * v135,
-                v137 = (v95 - v83) * v135, v138 = v89 * v135, v139 = v91 * v135,
-                v140 = -(v85 * v135), v141 = -(v87 * v135);
-            v127 = softehl_blend(m133, v138, v127); v128 = softehl_blend(m133, v139, v128);
-            v129 = softehl_blend(m133, v136, v129); v130 = softehl_blend(m133, v137, v130);
-            v131 = softehl_blend(m133, v140, v131); v132 = softehl_blend(m133, v141, v132);
+    const M m125 = ~v72;
+    if (softehl_any(m125)) {
+        const V v126 = (-1.0) - v71, v127 = v126 * (v126 * v126);
+        V v128 = softehl_splat(0.0), v129 = softehl_splat(0.0), v130 = softehl_splat(0.0),
+            v131 = softehl_splat(0.0), v132 = softehl_splat(0.0), v133 = softehl_splat(0.0);
+        const M m134 = ~v70 & m125;
+        if (softehl_any(m134)) {
+            const V v135 = (-1.0) - v69, v136 = v135 * (3.0 * v135), v137 = (v93 - v79) * v136,
+                v138 = (v95 - v83) * v136, v139 = v89 * v136, v140 = v91 * v136,
+                v141 = -(v85 * v136), v142 = -(v87 * v136);
+            v128 = softehl_blend(m134, v139, v128); v129 = softehl_blend(m134, v140, v129);
+            v130 = softehl_blend(m134, v137, v130); v131 = softehl_blend(m134, v138, v131);
+            v132 = softehl_blend(m134, v141, v132); v133 = softehl_blend(m134, v142, v133);
         }
-        v96 = softehl_blend(m124, v126, v96); v97 = softehl_blend(m124, v127, v97);
-        v98 = softehl_blend(m124, v128, v98); v99 = softehl_blend(m124, v129, v99);
-        v100 = softehl_blend(m124, v130, v100); v101 = softehl_blend(m124, v131, v101);
-        v102 = softehl_blend(m124, v132, v102);
+        v96 = softehl_blend(m125, v127, v96); v97 = softehl_blend(m125, v128, v97);
+        v98 = softehl_blend(m125, v129, v98); v99 = softehl_blend(m125, v130, v99);
+        v100 = softehl_blend(m125, v131, v100); v101 = softehl_blend(m125, v132, v101);
+        v102 = softehl_blend(m125, v133, v102);
     }
-    V v142 = softehl_splat(0.0), v143 = softehl_splat(0.0), v144 = softehl_splat(0.0),
-        v145 = softehl_splat(0.0), v146 = softehl_splat(0.0), v147 = softehl_splat(0.0),
-        v148 = softehl_splat(0.0);
-    const M m149 = v76;
-    if (softehl_any(m149)) {
-        const M v150 = softehl_lt(softehl_splat((-1.0)), v75);
-        V v151 = softehl_splat((-1.0)), v152 = softehl_splat(0.0), v153 = softehl_splat(0.0),
-            v154 = softehl_splat(0.0), v155 = softehl_splat(0.0), v156 = softehl_splat(0.0),
-            v157 = softehl_splat(0.0);
-        const M m158 = v150 & m149;
-        if (softehl_any(m158)) {
-            V v159 = softehl_splat(0.0), v160 = softehl_splat(0.0), v161 = softehl_splat(0.0),
-                v162 = softehl_splat(0.0), v163 = softehl_splat(0.0), v164 = softehl_splat(0.0);
-            const M m165 = ~v74 & m158;
-            if (softehl_any(m165)) {
-                const V v166 = -v88, v167 = -v90, v168 = v78 - v92, v169 = v82 - v94;
-                v159 = softehl_blend(m165, v85, v159); v160 = softehl_blend(m165, v87, v160);
-                v161 = softehl_blend(m165, v166, v161); v162 = softehl_blend(m165, v167, v162);
-                v163 = softehl_blend(m165, v168, v163); v164 = softehl_blend(m165, v169, v164);
+    V v143 = softehl_splat(0.0), v144 = softehl_splat(0.0), v145 = softehl_splat(0.0),
+        v146 = softehl_splat(0.0), v147 = softehl_splat(0.0), v148 = softehl_splat(0.0),
+        v149 = softehl_splat(0.0);
+    const M m150 = v76;
+    if (softehl_any(m150)) {
+        const M v151 = softehl_lt(softehl_splat((-1.0)), v75);
+        V v152 = softehl_splat((-1.0)), v153 = softehl_splat(0.0), v154 = softehl_splat(0.0),
+            v155 = softehl_splat(0.0), v156 = softehl_splat(0.0), v157 = softehl_splat(0.0),
+            v158 = softehl_splat(0.0);
+        const M m159 = v151 & m150;
+        if (softehl_any(m159)) {
+            V v160 = v85, v161 = v87, v162 = softehl_splat(0.0), v163 = softehl_splat(0.0),
+                v164 = softehl_splat(0.0), v165 = softehl_splat(0.0);
+            const M m166 = v74 & m159;
+            if (softehl_any(m166)) {
+                v160 = softehl_blend(m166, softehl_splat(0.0), v160);
+                v161 = softehl_blend(m166, softehl_splat(0.0), v161);
             }
-            v151 = softehl_blend(m158, v75, v151); v152 = softehl_blend(m158, v159, v152);
-            v153 = softehl_blend(m158, v160, v153); v154 = softehl_blend(m158, v161, v154);
-            v155 = softehl_blend(m158, v162, v155); v156 = softehl_blend(m158, v163, v156);
-            v157 = softehl_blend(m158, v164, v157);
+            const M m167 = ~v74 & m159;
+            if (softehl_any(m167)) {
+                const V v168 = -v88, v169 = -v90, v170 = v78 - v92, v171 = v82 - v94;
+                v162 = softehl_blend(m167, v168, v162); v163 = softehl_blend(m167, v169, v163);
+                v164 = softehl_blend(m167, v170, v164); v165 = softehl_blend(m167, v171, v165);
+            }
+            v152 = softehl_blend(m159, v75, v152); v153 = softehl_blend(m159, v160, v153);
+            v154 = softehl_blend(m159, v161, v154); v155 = softehl_blend(m159, v162, v155);
+            v156 = softehl_blend(m159, v163, v156); v157 = softehl_blend(m159, v164, v157);
+            v158 = softehl_blend(m159, v165, v158);
         }
-        v142 = softehl_blend(m149, v151, v142); v143 = softehl_blend(m149, v154, v143);
-        v144 = softehl_blend(m149, v155, v144); v145 = softehl_blend(m149, v156, v145);
-        v146 = softehl_blend(m149, v157, v146); v147 = softehl_blend(m149, v152, v147);
-        v148 = softehl_blend(m149, v153, v148);
+        v143 = softehl_blend(m150, v152, v143); v144 = softehl_blend(m150, v155, v144);
+        v145 = softehl_blend(m150, v156, v145); v146 = softehl_blend(m150, v157, v146);
+        v147 = softehl_blend(m150, v158, v147); v148 = softehl_blend(m150, v153, v148);
+        v149 = softehl_blend(m150, v154, v149);
     }
-    const M m170 = ~v76;
-    if (softehl_any(m170)) {
-        const V v171 = (-1.0) - v75, v172 = v171 * (v171 * v171);
-        V v173 = softehl_splat(0.0), v174 = softehl_splat(0.0), v175 = softehl_splat(0.0),
-            v176 = softehl_splat(0.0), v177 = softehl_splat(0.0), v178 = softehl_splat(0.0);
-        const M m179 = ~v74 & m170;
-        if (softehl_any(m179)) {
-            const V v180 = (-1.0) - v73, v181 = v180 * (3.0 * v180), v182 = (v92 - v78) * v181,
-                v183 = (v94 - v82) * v181, v184 = v88 * v181, v185 = v90 * v181,
-                v186 = -(v85 * v181), v187 = -(v87 * v181);
-            v173 = softehl_blend(m179, v184, v173); v174 = softehl_blend(m179, v185, v174);
-            v175 = softehl_blend(m179, v182, v175); v176 = softehl_blend(m179, v183, v176);
-            v177 = softehl_blend(m179, v186, v177); v178 = softehl_blend(m179, v187, v178);
+    const M m172 = ~v76;
+    if (softehl_any(m172)) {
+        const V v173 = (-1.0) - v75, v174 = v173 * (v173 * v173);
+        V v175 = softehl_splat(0.0), v176 = softehl_splat(0.0), v177 = softehl_splat(0.0),
+            v178 = softehl_splat(0.0), v179 = softehl_splat(0.0), v180 = softehl_splat(0.0);
+        const M m181 = ~v74 & m172;
+        if (softehl_any(m181)) {
+            const V v182 = (-1.0) - v73, v183 = v182 * (3.0 * v182), v184 = (v92 - v78) * v183,
+                v185 = (v94 - v82) * v183, v186 = v88 * v183, v187 = v90 * v183,
+                v188 = -(v85 * v183), v189 = -(v87 * v183);
+            v175 = softehl_blend(m181, v186, v175); v176 = softehl_blend(m181, v187, v176);
+            v177 = softehl_blend(m181, v184, v177); v178 = softehl_blend(m181, v185, v178);
+            v179 = softehl_blend(m181, v188, v179); v180 = softehl_blend(m181, v189, v180);
         }
-        v142 = softehl_blend(m170, v172, v142); v143 = softehl_blend(m170, v173, v143);
-        v144 = softehl_blend(m170, v174, v144); v145 = softehl_blend(m170, v175, v145);
-        v146 = softehl_blend(m170, v176, v146); v147 = softehl_blend(m170, v177, v147);
-        v148 = softehl_blend(m170, v178, v148);
+        v143 = softehl_blend(m172, v174, v143); v144 = softehl_blend(m172, v175, v144);
+        v145 = softehl_blend(m172, v176, v145); v146 = softehl_blend(m172, v177, v146);
+        v147 = softehl_blend(m172, v178, v147); v148 = softehl_blend(m172, v179, v148);
+        v149 = softehl_blend(m172, v180, v149);
     }
-    const V v188 = 1.0 + v96, v189 = 0.5 + v96, v190 = 2.0 * v96, v191 = 0.5 * v96,
-        v192 = 0.5 + v142, v193 = 2.0 * v142, v194 = 0.5 * v142, v195 = v96 - 0.5, v196 = v96 - 1.0,
-        v197 = v96 * v96 - 1.0, v198 = 1.0 + v142, v199 = v142 - 0.5, v200 = v142 - 1.0,
-        v201 = v191 * v188, v202 = v142 * v142 - 1.0, v203 = v191 * v196, v204 = v194 * v198,
-        v205 = v194 * v200, v206 = 2.0 * v143, v207 = 0.5 * v143, v208 = v194 * v143,
-        v209 = 2.0 * v97, v210 = 0.5 * v97, v211 = 2.0 * v144, v212 = 0.5 * v144,
-        v213 = v194 * v144, v214 = 2.0 * v98, v215 = 0.5 * v98, v216 = 2.0 * v145,
-        v217 = 0.5 * v145, v218 = v194 * v145, v219 = 2.0 * v99, v220 = 0.5 * v99,
-        v221 = 2.0 * v146, v222 = 0.5 * v146, v223 = v194 * v146, v224 = 2.0 * v100,
-        v225 = 0.5 * v100, v226 = 2.0 * v147, v227 = 0.5 * v147, v228 = v194 * v147,
-        v229 = v194 * v148, v230 = 2.0 * v148, v231 = 0.5 * v148, v232 = 2.0 * v101,
-        v233 = 0.5 * v101, v234 = 2.0 * v102, v235 = 0.5 * v102, v236 = v193 * v147,
-        v237 = v193 * v143, v238 = v193 * v144, v239 = v193 * v145, v240 = v193 * v146,
-        v241 = v193 * v148, v242 = v190 * v102, v243 = v190 * v97, v244 = v191 * v97,
-        v245 = v191 * v102, v246 = v190 * v98, v247 = v191 * v98, v248 = v190 * v99,
-        v249 = v191 * v99, v250 = v190 * v100, v251 = v191 * v100, v252 = v191 * v101,
-        v253 = v190 * v101, v254 = v32 * v99 - v8 * v219, v255 = v35 * v100 - v1 * v224,
-        v256 = v35 * v101 - v1 * v232, v257 = v32 * v101 - v8 * v232,
-        v258 = v189 + (v35 * v99 - v1 * v219), v259 = v189 + (v32 * v100 - v8 * v224),
-        v260 = v35 * v145 + (v192 - v1 * v216), v261 = v32 * v145 - v8 * v216,
-        v262 = v32 * v146 + (v192 - v8 * v221), v263 = v35 * v146 - v1 * v221,
-        v264 = v32 * v143 - v8 * v206, v265 = v35 * v143 + v199 - v1 * v206,
-        v266 = v32 * v97 - v8 * v209, v267 = v35 * v97 + v195 - v1 * v209,
-        v268 = v35 * v144 - v1 * v211, v269 = v32 * v144 + v199 - v8 * v211,
-        v270 = v35 * v98 - v1 * v214, v271 = v32 * v98 + v195 - v8 * v214,
-        v272 = v35 * v147 - v1 * v226, v273 = v32 * v147 - v8 * v226, v274 = v35 * v148 - v1 * v230,
-        v275 = v32 * v148 - v8 * v230, v276 = v35 * v102 - v1 * v234, v277 = v32 * v102 - v8 * v234,
-        v278 = v28 * v195 + (v31 * v189 - v1 * v190), v279 = v29 * v195 + (v30 * v189 - v8 * v190),
-        v280 = 2.0 * v278, v281 = 2.0 * v279, v282 = 1.0 / (v278 * v278 + v279 * v279),
-        v283 = v4 + v1 * v197 - v28 * v203 - v31 * v201,
-        v284 = v14 + v8 * v197 - v29 * v203 - v30 * v201,
-        v285 = v3 + v1 * v202 - v28 * v205 - v31 * v204,
-        v286 = v12 + v8 * v202 - v29 * v205 - v30 * v204, v287 = v278 * v283 + v279 * v284,
-        v288 = v282 * v282, v289 = v190 * v287 * v288, v290 = v287 * v288, v291 = v96 + v282 * v287,
-        v292 = v282 * (v197 * v278 - v190 * v283) + v280 * v289,
-        v293 = v282 * (v197 * v279 - v190 * v284) + v281 * v289,
-        v294 = (v255 * v280 + v259 * v281) * v290, v295 = (v256 * v280 + v257 * v281) * v290,
-        v296 = (v276 * v280 + v277 * v281) * v290;
-    const M v297 = softehl_lt(softehl_splat(1.0), v291);
-    const V v298 = (v270 * v280 + v271 * v281) * v290, v299 = (v258 * v280 + v254 * v281) * v290,
-        v300 = v290 * (v267 * v280 + v266 * v281), v301 = v28 * v199 + (v31 * v192 - v1 * v193),
-        v302 = v29 * v199 + (v30 * v192 - v8 * v193), v303 = 2.0 * v301, v304 = 2.0 * v302,
-        v305 = 1.0 / (v301 * v301 + v302 * v302), v306 = v285 * v301 + v286 * v302,
-        v307 = v208 + v207 * v198, v308 = v208 + v207 * v200, v309 = v213 + v212 * v198,
-        v310 = v213 + v212 * v200, v311 = v218 + v217 * v198, v312 = v218 + v217 * v200,
-        v313 = v223 + v222 * v198, v314 = v223 + v222 * v200, v315 = v228 + v227 * v198,
-        v316 = v228 + v227 * v200, v317 = v229 + v231 * v198, v318 = v229 + v231 * v200,
-        v319 = v305 * v305, v320 = v142 + v305 * v306, v321 = v306 * v319,
-        v322 = v193 * v306 * v319, v323 = (v202 * v301 - v193 * v285) * v305 + v303 * v322,
-        v324 = v305 * (v202 * v302 - v193 * v286) + v304 * v322,
-        v325 = (v265 * v303 + v264 * v304) * v321, v326 = (v268 * v303 + v269 * v304) * v321,
-        v327 = (v260 * v303 + v261 * v304) * v321, v328 = (v263 * v303 + v262 * v304) * v321,
-        v329 = (v272 * v303 + v273 * v304) * v321, v330 = (v274 * v303 + v275 * v304) * v321,
-        v331 = v265 * v285 + v264 * v286 + v301 * (v1 * v237 - v205 - v28 * v308 - v31 * v307),
-        v332 = v260 * v285 + v261 * v286 + v301 * (v1 * v239 - v204 - v28 * v312 - v31 * v311),
-        v333 = v331 + v302 * (v8 * v237 - v29 * v308 - v30 * v307),
-        v334 = v332 + v302 * (v8 * v239 - v29 * v312 - v30 * v311),
-        v335 = v268 * v285 + v269 * v286 + (v1 * v238 - v31 * v309 - v28 * v310) * v301,
-        v336 = v335 + (v8 * v238 - v205 - v30 * v309 - v29 * v310) * v302,
-        v337 = v263 * v285 + v262 * v286 + (v1 * v240 - v31 * v313 - v28 * v314) * v301,
-        v338 = v337 + (v8 * v240 - v204 - v30 * v313 - v29 * v314) * v302,
-        v339 = v272 * v285 + v273 * v286 + (1.0 + v1 * v236 - v31 * v315 - v28 * v316) * v301,
-        v340 = v339 + (v8 * v236 - v30 * v315 - v29 * v316) * v302,
-        v341 = v274 * v285 + v275 * v286 + (v1 * v241 - v31 * v317 - v28 * v318) * v301,
-        v342 = v341 + (1.0 + v8 * v241 - v30 * v317 - v29 * v318) * v302, v343 = v244 + v210 * v188,
-        v344 = v244 + v210 * v196, v345 = v247 + v215 * v188, v346 = v247 + v215 * v196,
-        v347 = v249 + v220 * v188, v348 = v249 + v220 * v196, v349 = v251 + v225 * v188,
-        v350 = v251 + v225 * v196,
-        v351 = v267 * v283 + v266 * v284 + (v1 * v243 - v203 - v31 * v343 - v28 * v344) * v278,
-        v352 = v270 * v283 + v271 * v284 + (v1 * v246 - v31 * v345 - v28 * v346) * v278,
-        v353 = v258 * v283 + v254 * v284 + (v1 * v248 - v201 - v31 * v347 - v28 * v348) * v278,
-        v354 = v351 + (v8 * v243 - v30 * v343 - v29 * v344) * v279,
-        v355 = v352 + (v8 * v246 - v203 - v30 * v345 - v29 * v346) * v279,
-        v356 = v353 + (v8 * v248 - v30 * v347 - v29 * v348) * v279,
-        v357 = v255 * v283 + v259 * v284 + (v1 * v250 - v31 * v349 - v28 * v350) * v278,
-        v358 = v357 + (v8 * v250 - v201 - v30 * v349 - v29 * v350) * v279,
-        v359 = v252 + v233 * v188, v360 = v252 + v233 * v196, v361 = v245 + v235 * v188,
-        v362 = v245 + v235 * v196,
-        v363 = v256 * v283 + v257 * v284 + (1.0 + v1 * v253 - v31 * v359 - v28 * v360) * v278,
-        v364 = v276 * v283 + v277 * v284 + (v1 * v242 - v31 * v361 - v28 * v362) * v278,
-        v365 = v363 + (v8 * v253 - v30 * v359 - v29 * v360) * v279,
-        v366 = v364 + (1.0 + v8 * v242 - v30 * v361 - v29 * v362) * v279,
-        v367 = softehl_blend(v297, softehl_splat(1.0), v291);
-    const M v368 = softehl_eq(v367, v367), v369 = softehl_lt(softehl_splat(1.0), v320);
-    const V v370 = softehl_blend(v369, softehl_splat(1.0), v320);
-    const M v371 = softehl_eq(v370, v370);
-    const V v372 = v305 * v333 + (v143 - v325), v373 = v305 * v336 + (v144 - v326),
-        v374 = v305 * v334 + (v145 - v327), v375 = v305 * v338 + (v146 - v328),
-        v376 = v282 * v354 + (v97 - v300), v377 = v282 * v355 + (v98 - v298),
-        v378 = v282 * v356 + (v99 - v299), v379 = v282 * v358 + (v100 - v294),
-        v380 = v305 * v340 + (v147 - v329), v381 = v305 * v342 + (v148 - v330),
-        v382 = v282 * v365 + (v101 - v295), v383 = v282 * v366 + (v102 - v296);
-    V v384 = softehl_splat(0.0), v385 = softehl_splat(0.0), v386 = softehl_splat(0.0),
-        v387 = softehl_splat(0.0), v388 = softehl_splat(0.0), v389 = softehl_splat(0.0),
-        v390 = softehl_splat(0.0), v391 = softehl_splat(0.0), v392 = softehl_splat(0.0);
-    const M m393 = v368;
-    if (softehl_any(m393)) {
-        const M v394 = softehl_lt(softehl_splat((-1.0)), v367);
-        V v395 = softehl_splat((-1.0)), v396 = softehl_splat(0.0), v397 = softehl_splat(0.0),
-            v398 = softehl_splat(0.0), v399 = softehl_splat(0.0), v400 = softehl_splat(0.0),
-            v401 = softehl_splat(0.0), v402 = softehl_splat(0.0), v403 = softehl_splat(0.0);
-        const M m404 = v394 & m393;
-        if (softehl_any(m404)) {
-            const V v405 = softehl_blend(v297, softehl_splat(0.0), v292),
-                v406 = softehl_blend(v297, softehl_splat(0.0), v293),
-                v407 = softehl_blend(v297, softehl_splat(0.0), v376),
-                v408 = softehl_blend(v297, softehl_splat(0.0), v377),
-                v409 = softehl_blend(v297, softehl_splat(0.0), v378),
-                v410 = softehl_blend(v297, softehl_splat(0.0), v379),
-                v411 = softehl_blend(v297, softehl_splat(0.0), v382),
-                v412 = softehl_blend(v297, softehl_splat(0.0), v383);
-            v395 = softehl_blend(m404, v367, v395); v396 = softehl_blend(m404, v405, v396);
-            v397 = softehl_blend(m404, v406, v397); v398 = softehl_blend(m404, v407, v398);
-            v399 = softehl_blend(m404, v408, v399); v400 = softehl_blend(m404, v409, v400);
-            v401 = softehl_blend(m404, v410, v401); v402 = softehl_blend(m404, v411, v402);
-            v403 = softehl_blend(m404, v412, v403);
+    const V v190 = 1.0 + v96, v191 = 0.5 + v96, v192 = 2.0 * v96, v193 = 0.5 * v96,
+        v194 = 0.5 + v143, v195 = 2.0 * v143, v196 = 0.5 * v143, v197 = v96 - 0.5, v198 = v96 - 1.0,
+        v199 = v96 * v96 - 1.0, v200 = 1.0 + v143, v201 = v143 - 0.5, v202 = v143 - 1.0,
+        v203 = v193 * v190, v204 = v143 * v143 - 1.0, v205 = v193 * v198, v206 = v196 * v200,
+        v207 = v196 * v202, v208 = 2.0 * v144, v209 = 0.5 * v144, v210 = v196 * v144,
+        v211 = 2.0 * v97, v212 = 0.5 * v97, v213 = 2.0 * v145, v214 = 0.5 * v145,
+        v215 = v196 * v145, v216 = 2.0 * v98, v217 = 0.5 * v98, v218 = 2.0 * v146,
+        v219 = 0.5 * v146, v220 = v196 * v146, v221 = 2.0 * v99, v222 = 0.5 * v99,
+        v223 = 2.0 * v147, v224 = 0.5 * v147, v225 = v196 * v147, v226 = 2.0 * v100,
+        v227 = 0.5 * v100, v228 = 2.0 * v148, v229 = 0.5 * v148, v230 = v196 * v148,
+        v231 = v196 * v149, v232 = 2.0 * v149, v233 = 0.5 * v149, v234 = 2.0 * v101,
+        v235 = 0.5 * v101, v236 = 2.0 * v102, v237 = 0.5 * v102, v238 = v195 * v148,
+        v239 = v195 * v144, v240 = v195 * v145, v241 = v195 * v146, v242 = v195 * v147,
+        v243 = v195 * v149, v244 = v192 * v102, v245 = v192 * v97, v246 = v193 * v97,
+        v247 = v193 * v102, v248 = v192 * v98, v249 = v193 * v98, v250 = v192 * v99,
+        v251 = v193 * v99, v252 = v192 * v100, v253 = v193 * v100, v254 = v193 * v101,
+        v255 = v192 * v101, v256 = v32 * v99 - v8 * v221, v257 = v35 * v100 - v1 * v226,
+        v258 = v35 * v101 - v1 * v234, v259 = v32 * v101 - v8 * v234,
+        v260 = v191 + (v35 * v99 - v1 * v221), v261 = v191 + (v32 * v100 - v8 * v226),
+        v262 = v35 * v146 + (v194 - v1 * v218), v263 = v32 * v146 - v8 * v218,
+        v264 = v32 * v147 + (v194 - v8 * v223), v265 = v35 * v147 - v1 * v223,
+        v266 = v32 * v144 - v8 * v208, v267 = v35 * v144 + v201 - v1 * v208,
+        v268 = v32 * v97 - v8 * v211, v269 = v35 * v97 + v197 - v1 * v211,
+        v270 = v35 * v145 - v1 * v213, v271 = v32 * v145 + v201 - v8 * v213,
+        v272 = v35 * v98 - v1 * v216, v273 = v32 * v98 + v197 - v8 * v216,
+        v274 = v35 * v148 - v1 * v228, v275 = v32 * v148 - v8 * v228, v276 = v35 * v149 - v1 * v232,
+        v277 = v32 * v149 - v8 * v232, v278 = v35 * v102 - v1 * v236, v279 = v32 * v102 - v8 * v236,
+        v280 = v28 * v197 + (v31 * v191 - v1 * v192), v281 = v29 * v197 + (v30 * v191 - v8 * v192),
+        v282 = 2.0 * v280, v283 = 2.0 * v281, v284 = 1.0 / (v280 * v280 + v281 * v281),
+        v285 = v4 + v1 * v199 - v28 * v205 - v31 * v203,
+        v286 = v14 + v8 * v199 - v29 * v205 - v30 * v203,
+        v287 = v3 + v1 * v204 - v28 * v207 - v31 * v206,
+        v288 = v12 + v8 * v204 - v29 * v207 - v30 * v206, v289 = v280 * v285 + v281 * v286,
+        v290 = v284 * v284, v291 = v192 * v289 * v290, v292 = v289 * v290, v293 = v96 + v284 * v289,
+        v294 = v284 * (v199 * v280 - v192 * v285) + v282 * v291,
+        v295 = v284 * (v199 * v281 - v192 * v286) + v283 * v291,
+        v296 = (v257 * v282 + v261 * v283) * v292, v297 = (v258 * v282 + v259 * v283) * v292,
+        v298 = (v278 * v282 + v279 * v283) * v292;
+    const M v299 = softehl_lt(softehl_splat(1.0), v293);
+    const V v300 = (v272 * v282 + v273 * v283) * v292, v301 = (v260 * v282 + v256 * v283) * v292,
+        v302 = v292 * (v269 * v282 + v268 * v283), v303 = v28 * v201 + (v31 * v194 - v1 * v195),
+        v304 = v29 * v201 + (v30 * v194 - v8 * v195), v305 = 2.0 * v303, v306 = 2.0 * v304,
+        v307 = 1.0 / (v303 * v303 + v304 * v304), v308 = v287 * v303 + v288 * v304,
+        v309 = v210 + v209 * v200, v310 = v210 + v209 * v202, v311 = v215 + v214 * v200,
+        v312 = v215 + v214 * v202, v313 = v220 + v219 * v200, v314 = v220 + v219 * v202,
+        v315 = v225 + v224 * v200, v316 = v225 + v224 * v202, v317 = v230 + v229 * v200,
+        v318 = v230 + v229 * v202, v319 = v231 + v233 * v200, v320 = v231 + v233 * v202,
+        v321 = v307 * v307, v322 = v143 + v307 * v308, v323 = v308 * v321,
+        v324 = v195 * v308 * v321, v325 = (v204 * v303 - v195 * v287) * v307 + v305 * v324,
+        v326 = v307 * (v204 * v304 - v195 * v288) + v306 * v324,
+        v327 = (v267 * v305 + v266 * v306) * v323, v328 = (v270 * v305 + v271 * v306) * v323,
+        v329 = (v262 * v305 + v263 * v306) * v323, v330 = (v265 * v305 + v264 * v306) * v323,
+        v331 = (v274 * v305 + v275 * v306) * v323, v332 = (v276 * v305 + v277 * v306) * v323,
+        v333 = v267 * v287 + v266 * v288 + v303 * (v1 * v239 - v207 - v28 * v310 - v31 * v309),
+        v334 = v262 * v287 + v263 * v288 + v303 * (v1 * v241 - v206 - v28 * v314 - v31 * v313),
+        v335 = v333 + v304 * (v8 * v239 - v29 * v310 - v30 * v309),
+        v336 = v334 + v304 * (v8 * v241 - v29 * v314 - v30 * v313),
+        v337 = v270 * v287 + v271 * v288 + (v1 * v240 - v31 * v311 - v28 * v312) * v303,
+        v338 = v337 + (v8 * v240 - v207 - v30 * v311 - v29 * v312) * v304,
+        v339 = v265 * v287 + v264 * v288 + (v1 * v242 - v31 * v315 - v28 * v316) * v303,
+        v340 = v339 + (v8 * v242 - v206 - v30 * v315 - v29 * v316) * v304,
+        v341 = v274 * v287 + v275 * v288 + (1.0 + v1 * v238 - v31 * v317 - v28 * v318) * v303,
+        v342 = v341 + (v8 * v238 - v30 * v317 - v29 * v318) * v304,
+        v343 = v276 * v287 + v277 * v288 + (v1 * v243 - v31 * v319 - v28 * v320) * v303,
+        v344 = v343 + (1.0 + v8 * v243 - v30 * v319 - v29 * v320) * v304, v345 = v246 + v212 * v190,
+        v346 = v246 + v212 * v198, v347 = v249 + v217 * v190, v348 = v249 + v217 * v198,
+        v349 = v251 + v222 * v190, v350 = v251 + v222 * v198, v351 = v253 + v227 * v190,
+        v352 = v253 + v227 * v198,
+        v353 = v269 * v285 + v268 * v286 + (v1 * v245 - v205 - v31 * v345 - v28 * v346) * v280,
+        v354 = v272 * v285 + v273 * v286 + (v1 * v248 - v31 * v347 - v28 * v348) * v280,
+        v355 = v260 * v285 + v256 * v286 + (v1 * v250 - v203 - v31 * v349 - v28 * v350) * v280,
+        v356 = v353 + (v8 * v245 - v30 * v345 - v29 * v346) * v281,
+        v357 = v354 + (v8 * v248 - v205 - v30 * v347 - v29 * v348) * v281,
+        v358 = v355 + (v8 * v250 - v30 * v349 - v29 * v350) * v281,
+        v359 = v257 * v285 + v261 * v286 + (v1 * v252 - v31 * v351 - v28 * v352) * v280,
+        v360 = v359 + (v8 * v252 - v203 - v30 * v351 - v29 * v352) * v281,
+        v361 = v254 + v235 * v190, v362 = v254 + v235 * v198, v363 = v247 + v237 * v190,
+        v364 = v247 + v237 * v198,
+        v365 = v258 * v285 + v259 * v286 + (1.0 + v1 * v255 - v31 * v361 - v28 * v362) * v280,
+        v366 = v278 * v285 + v279 * v286 + (v1 * v244 - v31 * v363 - v28 * v364) * v280,
+        v367 = v365 + (v8 * v255 - v30 * v361 - v29 * v362) * v281,
+        v368 = v366 + (1.0 + v8 * v244 - v30 * v363 - v29 * v364) * v281,
+        v369 = softehl_blend(v299, softehl_splat(1.0), v293);
+    const M v370 = softehl_eq(v369, v369), v371 = softehl_lt(softehl_splat(1.0), v322);
+    const V v372 = softehl_blend(v371, softehl_splat(1.0), v322);
+    const M v373 = softehl_eq(v372, v372);
+    const V v374 = v307 * v335 + (v144 - v327), v375 = v307 * v338 + (v145 - v328),
+        v376 = v307 * v336 + (v146 - v329), v377 = v307 * v340 + (v147 - v330),
+        v378 = v284 * v356 + (v97 - v302), v379 = v284 * v357 + (v98 - v300),
+        v380 = v284 * v358 + (v99 - v301), v381 = v284 * v360 + (v100 - v296),
+        v382 = v307 * v342 + (v148 - v331), v383 = v307 * v344 + (v149 - v332),
+        v384 = v284 * v367 + (v101 - v297), v385 = v284 * v368 + (v102 - v298);
+    V v386 = softehl_splat(0.0), v387 = softehl_splat(0.0), v388 = softehl_splat(0.0),
+        v389 = softehl_splat(0.0), v390 = softehl_splat(0.0), v391 = softehl_splat(0.0),
+        v392 = softehl_splat(0.0), v393 = softehl_splat(0.0), v394 = softehl_splat(0.0);
+    const M m395 = v370;
+    if (softehl_any(m395)) {
+        const M v396 = softehl_lt(softehl_splat((-1.0)), v369);
+        V v397 = softehl_splat((-1.0)), v398 = softehl_splat(0.0), v399 = softehl_splat(0.0),
+            v400 = softehl_splat(0.0), v401 = softehl_splat(0.0), v402 = softehl_splat(0.0),
+            v403 = softehl_splat(0.0), v404 = softehl_splat(0.0), v405 = softehl_splat(0.0);
+        const M m406 = v396 & m395;
+        if (softehl_any(m406)) {
+            const V v407 = softehl_blend(v299, softehl_splat(0.0), v294),
+                v408 = softehl_blend(v299, softehl_splat(0.0), v295),
+                v409 = softehl_blend(v299, softehl_splat(0.0), v378),
+                v410 = softehl_blend(v299, softehl_splat(0.0), v379),
+                v411 = softehl_blend(v299, softehl_splat(0.0), v380),
+                v412 = softehl_blend(v299, softehl_splat(0.0), v381),
+                v413 = softehl_blend(v299, softehl_splat(0.0), v384),
+                v414 = softehl_blend(v299, softehl_splat(0.0), v385);
+            v397 = softehl_blend(m406, v369, v397); v398 = softehl_blend(m406, v407, v398);
+            v399 = softehl_blend(m406, v408, v399); v400 = softehl_blend(m406, v409, v400);
+            v401 = softehl_blend(m406, v410, v401); v402 = softehl_blend(m406, v411, v402);
+            v403 = softehl_blend(m406, v412, v403); v404 = softehl_blend(m406, v413, v404);
+            v405 = softehl_blend(m406, v414, v405);
         }
-        v384 = softehl_blend(m393, v395, v384); v385 = softehl_blend(m393, v396, v385);
-        v386 = softehl_blend(m393, v397, v386); v387 = softehl_blend(m393, v398, v387);
-        v388 = softehl_blend(m393, v399, v388); v389 = softehl_blend(m393, v400, v389);
-        v390 = softehl_blend(m393, v401, v390); v391 = softehl_blend(m393, v402, v391);
-        v392 = softehl_blend(m393, v403, v392);
+        v386 = softehl_blend(m395, v397, v386); v387 = softehl_blend(m395, v398, v387);
+        v388 = softehl_blend(m395, v399, v388); v389 = softehl_blend(m395, v400, v389);
+        v390 = softehl_blend(m395, v401, v390); v391 = softehl_blend(m395, v402, v391);
+        v392 = softehl_blend(m395, v403, v392); v393 = softehl_blend(m395, v404, v393);
+        v394 = softehl_blend(m395, v405, v394);
     }
-    const M m413 = ~v368;
-    if (softehl_any(m413)) {
-        const V v414 = (-1.0) - v367, v415 = v414 * (v414 * v414);
-        V v416 = softehl_splat(0.0), v417 = softehl_splat(0.0), v418 = softehl_splat(0.0),
-            v419 = softehl_splat(0.0), v420 = softehl_splat(0.0), v421 = softehl_splat(0.0),
-            v422 = softehl_splat(0.0), v423 = softehl_splat(0.0);
-        const M m424 = ~v297 & m413;
-        if (softehl_any(m424)) {
-            const V v425 = (-1.0) - v291, v426 = v425 * (3.0 * v425), v427 = -(v292 * v426),
-                v428 = -(v293 * v426), v429 = -(v376 * v426), v430 = -(v377 * v426),
-                v431 = -(v378 * v426), v432 = -(v379 * v426), v433 = -(v382 * v426),
-                v434 = -(v383 * v426);
-            v416 = softehl_blend(m424, v427, v416); v417 = softehl_blend(m424, v428, v417);
-            v418 = softehl_blend(m424, v429, v418); v419 = softehl_blend(m424, v430, v419);
-            v420 = softehl_blend(m424, v431, v420); v421 = softehl_blend(m424, v432, v421);
-            v422 = softehl_blend(m424, v433, v422); v423 = softehl_blend(m424, v434, v423);
+    const M m415 = ~v370;
+    if (softehl_any(m415)) {
+        const V v416 = (-1.0) - v369, v417 = v416 * (v416 * v416);
+        V v418 = softehl_splat(0.0), v419 = softehl_splat(0.0), v420 = softehl_splat(0.0),
+            v421 = softehl_splat(0.0), v422 = softehl_splat(0.0), v423 = softehl_splat(0.0),
+            v424 = softehl_splat(0.0), v425 = softehl_splat(0.0);
+        const M m426 = ~v299 & m415;
+        if (softehl_any(m426)) {
+            const V v427 = (-1.0) - v293, v428 = v427 * (3.0 * v427), v429 = -(v294 * v428),
+                v430 = -(v295 * v428), v431 = -(v378 * v428), v432 = -(v379 * v428),
+                v433 = -(v380 * v428), v434 = -(v381 * v428), v435 = -(v384 * v428),
+                v436 = -(v385 * v428);
+            v418 = softehl_blend(m426, v429, v418); v419 = softehl_blend(m426, v430, v419);
+            v420 = softehl_blend(m426, v431, v420); v421 = softehl_blend(m426, v432, v421);
+            v422 = softehl_blend(m426, v433, v422); v423 = softehl_blend(m426, v434, v423);
+            v424 = softehl_blend(m426, v435, v424); v425 = softehl_blend(m426, v436, v425);
         }
-        v384 = softehl_blend(m413, v415, v384); v385 = softehl_blend(m413, v416, v385);
-        v386 = softehl_blend(m413, v417, v386); v387 = softehl_blend(m413, v418, v387);
-        v388 = softehl_blend(m413, v419, v388); v389 = softehl_blend(m413, v420, v389);
-        v390 = softehl_blend(m413, v421, v390); v391 = softehl_blend(m413, v422, v391);
-        v392 = softehl_blend(m413, v423, v392);
+        v386 = softehl_blend(m415, v417, v386); v387 = softehl_blend(m415, v418, v387);
+        v388 = softehl_blend(m415, v419, v388); v389 = softehl_blend(m415, v420, v389);
+        v390 = softehl_blend(m415, v421, v390); v391 = softehl_blend(m415, v422, v391);
+        v392 = softehl_blend(m415, v423, v392); v393 = softehl_blend(m415, v424, v393);
+        v394 = softehl_blend(m415, v425, v394);
     }
-    V v435 = softehl_splat(0.0), v436 = softehl_splat(0.0), v437 = softehl_splat(0.0),
-        v438 = softehl_splat(0.0), v439 = softehl_splat(0.0), v440 = softehl_splat(0.0),
-        v441 = softehl_splat(0.0), v442 = softehl_splat(0.0), v443 = softehl_splat(0.0);
-    const M m444 = v371;
-    if (softehl_any(m444)) {
-        const M v445 = softehl_lt(softehl_splat((-1.0)), v370);
-        V v446 = softehl_splat((-1.0)), v447 = softehl_splat(0.0), v448 = softehl_splat(0.0),
-            v449 = softehl_splat(0.0), v450 = softehl_splat(0.0), v451 = softehl_splat(0.0),
-            v452 = softehl_splat(0.0), v453 = softehl_splat(0.0), v454 = softehl_splat(0.0);
-        const M m455 = v445 & m444;
-        if (softehl_any(m455)) {
-            const V v456 = softehl_blend(v369, softehl_splat(0.0), v323),
-                v457 = softehl_blend(v369, softehl_splat(0.0), v324),
-                v458 = softehl_blend(v369, softehl_splat(0.0), v372),
-                v459 = softehl_blend(v369, softehl_splat(0.0), v373),
-                v460 = softehl_blend(v369, softehl_splat(0.0), v374),
-                v461 = softehl_blend(v369, softehl_splat(0.0), v375),
-                v462 = softehl_blend(v369, softehl_splat(0.0), v380),
-                v463 = softehl_blend(v369, softehl_splat(0.0), v381);
-            v446 = softehl_blend(m455, v370, v446); v447 = softehl_blend(m455, v456, v447);
-            v448 = softehl_blend(m455, v457, v448); v449 = softehl_blend(m455, v458, v449);
-            v450 = softehl_blend(m455, v459, v450); v451 = softehl_blend(m455, v460, v451);
-            v452 = softehl_blend(m455, v461, v452); v453 = softehl_blend(m455, v462, v453);
-            v454 = softehl_blend(m455, v463, v454);
+    V v437 = softehl_splat(0.0), v438 = softehl_splat(0.0), v439 = softehl_splat(0.0),
+        v440 = softehl_splat(0.0), v441 = softehl_splat(0.0), v442 = softehl_splat(0.0),
+        v443 = softehl_splat(0.0), v444 = softehl_splat(0.0), v445 = softehl_splat(0.0);
+    const M m446 = v373;
+    if (softehl_any(m446)) {
+        const M v447 = softehl_lt(softehl_splat((-1.0)), v372);
+        V v448 = softehl_splat((-1.0)), v449 = softehl_splat(0.0), v450 = softehl_splat(0.0),
+            v451 = softehl_splat(0.0), v452 = softehl_splat(0.0), v453 = softehl_splat(0.0),
+            v454 = softehl_splat(0.0), v455 = softehl_splat(0.0), v456 = softehl_splat(0.0);
+        const M m457 = v447 & m446;
+        if (softehl_any(m457)) {
+            const V v458 = softehl_blend(v371, softehl_splat(0.0), v325),
+                v459 = softehl_blend(v371, softehl_splat(0.0), v326),
+                v460 = softehl_blend(v371, softehl_splat(0.0), v374),
+                v461 = softehl_blend(v371, softehl_splat(0.0), v375),
+                v462 = softehl_blend(v371, softehl_splat(0.0), v376),
+                v463 = softehl_blend(v371, softehl_splat(0.0), v377),
+                v464 = softehl_blend(v371, softehl_splat(0.0), v382),
+                v465 = softehl_blend(v371, softehl_splat(0.0), v383);
+            v448 = softehl_blend(m457, v372, v448); v449 = softehl_blend(m457, v458, v449);
+            v450 = softehl_blend(m457, v459, v450); v451 = softehl_blend(m457, v460, v451);
+            v452 = softehl_blend(m457, v461, v452); v453 = softehl_blend(m457, v462, v453);
+            v454 = softehl_blend(m457, v463, v454); v455 = softehl_blend(m457, v464, v455);
+            v456 = softehl_blend(m457, v465, v456);
         }
-        v435 = softehl_blend(m444, v446, v435); v436 = softehl_blend(m444, v447, v436);
-        v437 = softehl_blend(m444, v448, v437); v438 = softehl_blend(m444, v449, v438);
-        v439 = softehl_blend(m444, v450, v439); v440 = softehl_blend(m444, v451, v440);
-        v441 = softehl_blend(m444, v452, v441); v442 = softehl_blend(m444, v453, v442);
-        v443 = softehl_blend(m444, v454, v443);
+        v437 = softehl_blend(m446, v448, v437); v438 = softehl_blend(m446, v449, v438);
+        v439 = softehl_blend(m446, v450, v439); v440 = softehl_blend(m446, v451, v440);
+        v441 = softehl_blend(m446, v452, v441); v442 = softehl_blend(m446, v453, v442);
+        v443 = softehl_blend(m446, v454, v443); v444 = softehl_blend(m446, v455, v444);
+        v445 = softehl_blend(m446, v456, v445);
     }
-    const M m464 = ~v371;
-    if (softehl_any(m464)) {
-        const V v465 = (-1.0) - v370, v466 = v465 * (v465 * v465);
-        V v467 = softehl_splat(0.0), v468 = softehl_splat(0.0), v469 = softehl_splat(0.0),
-            v470 = softehl_splat(0.0), v471 = softehl_splat(0.0), v472 = softehl_splat(0.0),
-            v473 = softehl_splat(0.0), v474 = softehl_splat(0.0);
-        const M m475 = ~v369 & m464;
-        if (softehl_any(m475)) {
-            const V v476 = (-1.0) - v320, v477 = v476 * (3.0 * v476), v478 = -(v323 * v477),
-                v479 = -(v324 * v477), v480 = -(v372 * v477), v481 = -(v373 * v477),
-                v482 = -(v374 * v477), v483 = -(v375 * v477), v484 = -(v380 * v477),
-                v485 = -(v381 * v477);
-            v467 = softehl_blend(m475, v478, v467); v468 = softehl_blend(m475, v479, v468);
-            v469 = softehl_blend(m475, v480, v469); v470 = softehl_blend(m475, v481, v470);
-            v471 = softehl_blend(m475, v482, v471); v472 = softehl_blend(m475, v483, v472);
-            v473 = softehl_blend(m475, v484, v473); v474 = softehl_blend(m475, v485, v474);
+    const M m466 = ~v373;
+    if (softehl_any(m466)) {
+        const V v467 = (-1.0) - v372, v468 = v467 * (v467 * v467);
+        V v469 = softehl_splat(0.0), v470 = softehl_splat(0.0), v471 = softehl_splat(0.0),
+            v472 = softehl_splat(0.0), v473 = softehl_splat(0.0), v474 = softehl_splat(0.0),
+            v475 = softehl_splat(0.0), v476 = softehl_splat(0.0);
+        const M m477 = ~v371 & m466;
+        if (softehl_any(m477)) {
+            const V v478 = (-1.0) - v322, v479 = v478 * (3.0 * v478), v480 = -(v325 * v479),
+                v481 = -(v326 * v479), v482 = -(v374 * v479), v483 = -(v375 * v479),
+                v484 = -(v376 * v479), v485 = -(v377 * v479), v486 = -(v382 * v479),
+                v487 = -(v383 * v479);
+            v469 = softehl_blend(m477, v480, v469); v470 = softehl_blend(m477, v481, v470);
+            v471 = softehl_blend(m477, v482, v471); v472 = softehl_blend(m477, v483, v472);
+            v473 = softehl_blend(m477, v484, v473); v474 = softehl_blend(m477, v485, v474);
+            v475 = softehl_blend(m477, v486, v475); v476 = softehl_blend(m477, v487, v476);
         }
-        v435 = softehl_blend(m464, v466, v435); v436 = softehl_blend(m464, v467, v436);
-        v437 = softehl_blend(m464, v468, v437); v438 = softehl_blend(m464, v469, v438);
-        v439 = softehl_blend(m464, v470, v439); v440 = softehl_blend(m464, v471, v440);
-        v441 = softehl_blend(m464, v472, v441); v442 = softehl_blend(m464, v473, v442);
-        v443 = softehl_blend(m464, v474, v443);
+        v437 = softehl_blend(m466, v468, v437); v438 = softehl_blend(m466, v469, v438);
+        v439 = softehl_blend(m466, v470, v439); v440 = softehl_blend(m466, v471, v440);
+        v441 = softehl_blend(m466, v472, v441); v442 = softehl_blend(m466, v473, v442);
+        v443 = softehl_blend(m466, v474, v443); v444 = softehl_blend(m466, v475, v444);
+        v445 = softehl_blend(m466, v476, v445);
     }
-    const V v486 = v435 - v384; const M v487 = softehl_eq(v486, v486);
-    V v488 = softehl_splat(0.0), v489 = softehl_splat(0.0), v490 = softehl_splat(0.0),
-        v491 = softehl_splat(0.0), v492 = softehl_splat(0.0), v493 = softehl_splat(0.0),
-        v494 = softehl_splat(0.0), v495 = softehl_splat(0.0), v496 = softehl_splat(0.0),
-        v497 = softehl_splat(0.0), v498 = softehl_splat(0.0);
-    const M m499 = v487;
-    if (softehl_any(m499)) {
-        const M v500 = softehl_lt(softehl_splat(0.0), v486);
-        V v501 = softehl_splat(0.0), v502 = softehl_splat(0.0), v503 = softehl_splat(0.0),
-            v504 = softehl_splat(0.0), v505 = softehl_splat(0.0), v506 = softehl_splat(0.0),
-            v507 = softehl_splat(0.0), v508 = softehl_splat(0.0), v509 = softehl_splat(0.0),
-            v510 = softehl_splat(0.0), v511 = softehl_splat(0.0);
-        const M m512 = v500 & m499;
-        if (softehl_any(m512)) {
-            const V v513 = v436 - v385, v514 = -v391, v515 = v437 - v386, v516 = v438 - v387,
-                v517 = v439 - v388, v518 = -v392, v519 = v440 - v389, v520 = v441 - v390;
-            v501 = softehl_blend(m512, v486, v501); v502 = softehl_blend(m512, v513, v502);
-            v503 = softehl_blend(m512, v515, v503); v504 = softehl_blend(m512, v516, v504);
-            v505 = softehl_blend(m512, v517, v505); v506 = softehl_blend(m512, v519, v506);
-            v507 = softehl_blend(m512, v520, v507); v508 = softehl_blend(m512, v442, v508);
-            v509 = softehl_blend(m512, v443, v509); v510 = softehl_blend(m512, v514, v510);
-            v511 = softehl_blend(m512, v518, v511);
+    const V v488 = v437 - v386; const M v489 = softehl_eq(v488, v488);
+    V v490 = softehl_splat(0.0), v491 = softehl_splat(0.0), v492 = softehl_splat(0.0),
+        v493 = softehl_splat(0.0), v494 = softehl_splat(0.0), v495 = softehl_splat(0.0),
+        v496 = softehl_splat(0.0), v497 = softehl_splat(0.0), v498 = softehl_splat(0.0),
+        v499 = softehl_splat(0.0), v500 = softehl_splat(0.0);
+    const M m501 = v489;
+    if (softehl_any(m501)) {
+        const M v502 = softehl_lt(softehl_splat(0.0), v488);
+        V v503 = softehl_splat(0.0), v504 = softehl_splat(0.0), v505 = softehl_splat(0.0),
+            v506 = softehl_splat(0.0), v507 = softehl_splat(0.0), v508 = softehl_splat(0.0),
+            v509 = softehl_splat(0.0), v510 = softehl_splat(0.0), v511 = softehl_splat(0.0),
+            v512 = softehl_splat(0.0), v513 = softehl_splat(0.0);
+        const M m514 = v502 & m501;
+        if (softehl_any(m514)) {
+            const V v515 = v438 - v387, v516 = -v393, v517 = v439 - v388, v518 = v440 - v389,
+                v519 = v441 - v390, v520 = -v394, v521 = v442 - v391, v522 = v443 - v392;
+            v503 = softehl_blend(m514, v488, v503); v504 = softehl_blend(m514, v515, v504);
+            v505 = softehl_blend(m514, v517, v505); v506 = softehl_blend(m514, v518, v506);
+            v507 = softehl_blend(m514, v519, v507); v508 = softehl_blend(m514, v521, v508);
+            v509 = softehl_blend(m514, v522, v509); v510 = softehl_blend(m514, v444, v510);
+            v511 = softehl_blend(m514, v445, v511); v512 = softehl_blend(m514, v516, v512);
+            v513 = softehl_blend(m514, v520, v513);
         }
-        v488 = softehl_blend(m499, v501, v488); v489 = softehl_blend(m499, v502, v489);
-        v490 = softehl_blend(m499, v503, v490); v491 = softehl_blend(m499, v504, v491);
-        v492 = softehl_blend(m499, v505, v492); v493 = softehl_blend(m499, v506, v493);
-        v494 = softehl_blend(m499, v507, v494); v495 = softehl_blend(m499, v508, v495);
-        v496 = softehl_blend(m499, v509, v496); v497 = softehl_blend(m499, v510, v497);
-        v498 = softehl_blend(m499, v511, v498);
+        v490 = softehl_blend(m501, v503, v490); v491 = softehl_blend(m501, v504, v491);
+        v492 = softehl_blend(m501, v505, v492); v493 = softehl_blend(m501, v506, v493);
+        v494 = softehl_blend(m501, v507, v494); v495 = softehl_blend(m501, v508, v495);
+        v496 = softehl_blend(m501, v509, v496); v497 = softehl_blend(m501, v510, v497);
+        v498 = softehl_blend(m501, v511, v498); v499 = softehl_blend(m501, v512, v499);
+        v500 = softehl_blend(m501, v513, v500);
     }
-    const M m521 = ~v487;
-    if (softehl_any(m521)) {
-        const V v522 = v384 - v435, v523 = v522 * v522, v524 = v522 * v523, v525 = 3.0 * v523,
-            v526 = (v385 - v436) * v525, v527 = (v386 - v437) * v525, v528 = (v387 - v438) * v525,
-            v529 = (v388 - v439) * v525, v530 = (v389 - v440) * v525, v531 = (v390 - v441) * v525,
-            v532 = v391 * v525, v533 = v392 * v525, v534 = -(v442 * v525), v535 = -(v443 * v525);
-        v488 = softehl_blend(m521, v524, v488); v489 = softehl_blend(m521, v526, v489);
-        v490 = softehl_blend(m521, v527, v490); v491 = softehl_blend(m521, v528, v491);
-        v492 = softehl_blend(m521, v529, v492); v493 = softehl_blend(m521, v530, v493);
-        v494 = softehl_blend(m521, v531, v494); v495 = softehl_blend(m521, v534, v495);
-        v496 = softehl_blend(m521, v535, v496); v497 = softehl_blend(m521, v532, v497);
-        v498 = softehl_blend(m521, v533, v498);
+    const M m523 = ~v489;
+    if (softehl_any(m523)) {
+        const V v524 = v386 - v437, v525 = v524 * v524, v526 = v524 * v525, v527 = 3.0 * v525,
+            v528 = (v387 - v438) * v527, v529 = (v388 - v439) * v527, v530 = (v389 - v440) * v527,
+            v531 = (v390 - v441) * v527, v532 = (v391 - v442) * v527, v533 = (v392 - v443) * v527,
+            v534 = v393 * v527, v535 = v394 * v527, v536 = -(v444 * v527), v537 = -(v445 * v527);
+        v490 = softehl_blend(m523, v526, v490); v491 = softehl_blend(m523, v528, v491);
+        v492 = softehl_blend(m523, v529, v492); v493 = softehl_blend(m523, v530, v493);
+        v494 = softehl_blend(m523, v531, v494); v495 = softehl_blend(m523, v532, v495);
+        v496 = softehl_blend(m523, v533, v496); v497 = softehl_blend(m523, v536, v497);
+        v498 = softehl_blend(m523, v537, v498); v499 = softehl_blend(m523, v534, v499);
+        v500 = softehl_blend(m523, v535, v500);
     }
-    const V v536 = 0.5 * v489, v537 = 0.5 * v490, v538 = 0.5 * v491, v539 = 0.5 * v492,
-        v540 = 0.5 * (v384 + v435), v541 = 0.5 * (v436 + v385), v542 = 0.5 * (v437 + v386),
-        v543 = 0.5 * v493, v544 = 0.5 * v494, v545 = 0.5 * (v438 + v387), v546 = 0.5 * v495,
-        v547 = 0.5 * v496, v548 = 0.5 * v497, v549 = 0.5 * (v439 + v388), v550 = 0.5 * v498,
-        v551 = 0.5 * v442, v552 = 0.5 * v443, v553 = 0.5 * v391, v554 = 0.5 * (v440 + v389),
-        v555 = 0.5 * v392, v556 = 0.5 * (v441 + v390), v557 = 6.283185307179586 * a16,
-        v558 = 0.5 * v488, v559 = 0.25 * v488;
-    V s560 = {0}, s561 = {0}, s562 = {0}, s563 = {0}, s564 = {0}, s565 = {0}, s566 = {0},
-        s567 = {0}, s568 = {0}, s569 = {0}, s570 = {0}, s571 = {0}, s572 = {0}, s573 = {0},
-        s574 = {0}, s575 = {0}, s576 = {0}, s577 = {0}, s578 = {0}, s579 = {0}, s580 = {0},
-        s581 = {0}, s582 = {0}, s583 = {0}, s584 = {0}, s585 = {0}, s586 = {0}, s587 = {0},
-        s588 = {0}, s589 = {0}, s590 = {0}, s591 = {0}, s592 = {0}, s593 = {0}, s594 = {0},
-        s595 = {0}, s596 = {0}, s597 = {0}, s598 = {0}, s599 = {0}, s600 = {0}, s601 = {0},
-        s602 = {0}, s603 = {0}, s604 = {0}, s605 = {0}, s606 = {0}, s607 = {0}, s608 = {0},
-        s609 = {0}, s610 = {0}, s611 = {0}, s612 = {0}, s613 = {0}, s614 = {0}, s615 = {0},
-        s616 = {0}, s617 = {0}, s618 = {0}, s619 = {0}, s620 = {0}, s621 = {0}, s622 = {0},
-        s623 = {0}, s624 = {0}, s625 = {0}, s626 = {0}, s627 = {0}, s628 = {0}, s629 = {0},
-        s630 = {0}, s631 = {0}, s632 = {0}, s633 = {0}, s634 = {0}, s635 = {0}, s636 = {0},
-        s637 = {0}, s638 = {0}, s639 = {0}, s640 = {0}, s641 = {0}, s642 = {0}, s643 = {0},
-        s644 = {0}, s645 = {0}, s646 = {0}, s647 = {0}, s648 = {0}, s649 = {0}, s650 = {0},
-        s651 = {0}, s652 = {0}, s653 = {0}, s654 = {0}, s655 = {0}, s656 = {0}, s657 = {0},
-        s658 = {0}, s659 = {0}, s660 = {0}, s661 = {0}, s662 = {0}, s663 = {0}, s664 = {0},
-        s665 = {0}, s666 = {0}, s667 = {0}, s668 = {0}, s669 = {0}, s670 = {0}, s671 = {0},
-        s672 = {0}, s673 = {0}, s674 = {0}, s675 = {0}, s676 = {0}, s677 = {0}, s678 = {0},
-        s679 = {0}, s680 = {0}, s681 = {0}, s682 = {0}, s683 = {0}, s684 = {0}, s685 = {0},
-        s686 = {0}, s687 = {0}, s688 = {0}, s689 = {0}, s690 = {0}, s691 = {0}, s692 = {0},
-        s693 = {0}, s694 = {0}, s695 = {0}, s696 = {0}, s697 = {0}, s698 = {0}, s699 = {0},
-        s700 = {0}, s701 = {0}, s702 = {0}, s703 = {0}, s704 = {0}, s705 = {0}, s706 = {0},
-        s707 = {0}, s708 = {0}, s709 = {0}, s710 = {0}, s711 = {0}, s712 = {0}, s713 = {0},
-        s714 = {0}, s715 = {0}, s716 = {0}, s717 = {0}, s718 = {0}, s719 = {0}, s720 = {0},
-        s721 = {0}, s722 = {0}, s723 = {0}, s724 = {0}, s725 = {0}, s726 = {0}, s727 = {0},
-        s728 = {0}, s729 = {0}, s730 = {0}, s731 = {0}, s732 = {0}, s733 = {0}, s734 = {0},
-        s735 = {0}, s736 = {0}, s737 = {0}, s738 = {0}, s739 = {0}, s740 = {0}, s741 = {0},
-        s742 = {0}, s743 = {0}, s744 = {0}, s745 = {0}, s746 = {0}, s747 = {0}, s748 = {0},
-        s749 = {0}, s750 = {0}, s751 = {0}, s752 = {0}, s753 = {0}, s754 = {0}, s755 = {0},
-        s756 = {0}, s757 = {0}, s758 = {0}, s759 = {0}, s760 = {0}, s761 = {0}, s762 = {0},
-        s763 = {0}, s764 = {0}, s765 = {0}, s766 = {0}, s767 = {0}, s768 = {0}, s769 = {0},
-        s770 = {0}, s771 = {0}, s772 = {0}, s773 = {0}, s774 = {0}, s775 = {0}, s776 = {0},
-        s777 = {0}, s778 = {0}, s779 = {0}, s780 = {0}, s781 = {0}, s782 = {0}, s783 = {0},
-        s784 = {0}, s785 = {0}, s786 = {0}, s787 = {0}, s788 = {0}, s789 = {0}, s790 = {0},
-        s791 = {0}, s792 = {0}, s793 = {0}, s794 = {0}, s795 = {0}, s796 = {0}, s797 = {0},
-        s798 = {0}, s799 = {0}, s800 = {0}, s801 = {0}, s802 = {0}, s803 = {0}, s804 = {0},
-        s805 = {0}, s806 = {0}, s807 = {0}, s808 = {0}, s809 = {0}, s810 = {0}, s811 = {0},
-        s812 = {0}, s813 = {0}, s814 = {0}, s815 = {0}, s816 = {0}, s817 = {0}, s818 = {0},
-        s819 = {0}, s820 = {0}, s821 = {0}, s822 = {0}, s823 = {0}, s824 = {0}, s825 = {0},
-        s826 = {0}, s827 = {0};
+    const V v538 = 0.5 * v491, v539 = 0.5 * v492, v540 = 0.5 * v493, v541 = 0.5 * v494,
+        v542 = 0.5 * (v386 + v437), v543 = 0.5 * (v438 + v387), v544 = 0.5 * (v439 + v388),
+        v545 = 0.5 * v495, v546 = 0.5 * v496, v547 = 0.5 * (v440 + v389), v548 = 0.5 * v497,
+        v549 = 0.5 * v498, v550 = 0.5 * v499, v551 = 0.5 * (v441 + v390), v552 = 0.5 * v500,
+        v553 = 0.5 * v444, v554 = 0.5 * v445, v555 = 0.5 * v393, v556 = 0.5 * (v442 + v391),
+        v557 = 0.5 * v394, v558 = 0.5 * (v443 + v392), v559 = 6.283185307179586 * a16,
+        v560 = 0.5 * v490, v561 = 0.25 * v490;
+    V s562 = {0}, s563 = {0}, s564 = {0}, s565 = {0}, s566 = {0}, s567 = {0}, s568 = {0},
+        s569 = {0}, s570 = {0}, s571 = {0}, s572 = {0}, s573 = {0}, s574 = {0}, s575 = {0},
+        s576 = {0}, s577 = {0}, s578 = {0}, s579 = {0}, s580 = {0}, s581 = {0}, s582 = {0},
+        s583 = {0}, s584 = {0}, s585 = {0}, s586 = {0}, s587 = {0}, s588 = {0}, s589 = {0},
+        s590 = {0}, s591 = {0}, s592 = {0}, s593 = {0}, s594 = {0}, s595 = {0}, s596 = {0},
+        s597 = {0}, s598 = {0}, s599 = {0}, s600 = {0}, s601 = {0}, s602 = {0}, s603 = {0},
+        s604 = {0}, s605 = {0}, s606 = {0}, s607 = {0}, s608 = {0}, s609 = {0}, s610 = {0},
+        s611 = {0}, s612 = {0}, s613 = {0}, s614 = {0}, s615 = {0}, s616 = {0}, s617 = {0},
+        s618 = {0}, s619 = {0}, s620 = {0}, s621 = {0}, s622 = {0}, s623 = {0}, s624 = {0},
+        s625 = {0}, s626 = {0}, s627 = {0}, s628 = {0}, s629 = {0}, s630 = {0}, s631 = {0},
+        s632 = {0}, s633 = {0}, s634 = {0}, s635 = {0}, s636 = {0}, s637 = {0}, s638 = {0},
+        s639 = {0}, s640 = {0}, s641 = {0}, s642 = {0}, s643 = {0}, s644 = {0}, s645 = {0},
+        s646 = {0}, s647 = {0}, s648 = {0}, s649 = {0}, s650 = {0}, s651 = {0}, s652 = {0},
+        s653 = {0}, s654 = {0}, s655 = {0}, s656 = {0}, s657 = {0}, s658 = {0}, s659 = {0},
+        s660 = {0}, s661 = {0}, s662 = {0}, s663 = {0}, s664 = {0}, s665 = {0}, s666 = {0},
+        s667 = {0}, s668 = {0}, s669 = {0}, s670 = {0}, s671 = {0}, s672 = {0}, s673 = {0},
+        s674 = {0}, s675 = {0}, s676 = {0}, s677 = {0}, s678 = {0}, s679 = {0}, s680 = {0},
+        s681 = {0}, s682 = {0}, s683 = {0}, s684 = {0}, s685 = {0}, s686 = {0}, s687 = {0},
+        s688 = {0}, s689 = {0}, s690 = {0}, s691 = {0}, s692 = {0}, s693 = {0}, s694 = {0},
+        s695 = {0}, s696 = {0}, s697 = {0}, s698 = {0}, s699 = {0}, s700 = {0}, s701 = {0},
+        s702 = {0}, s703 = {0}, s704 = {0}, s705 = {0}, s706 = {0}, s707 = {0}, s708 = {0},
+        s709 = {0}, s710 = {0}, s711 = {0}, s712 = {0}, s713 = {0}, s714 = {0}, s715 = {0},
+        s716 = {0}, s717 = {0}, s718 = {0}, s719 = {0}, s720 = {0}, s721 = {0}, s722 = {0},
+        s723 = {0}, s724 = {0}, s725 = {0}, s726 = {0}, s727 = {0}, s728 = {0}, s729 = {0},
+        s730 = {0}, s731 = {0}, s732 = {0}, s733 = {0}, s734 = {0}, s735 = {0}, s736 = {0},
+        s737 = {0}, s738 = {0}, s739 = {0}, s740 = {0}, s741 = {0}, s742 = {0}, s743 = {0},
+        s744 = {0}, s745 = {0}, s746 = {0}, s747 = {0}, s748 = {0}, s749 = {0}, s750 = {0},
+        s751 = {0}, s752 = {0}, s753 = {0}, s754 = {0}, s755 = {0}, s756 = {0}, s757 = {0},
+        s758 = {0}, s759 = {0}, s760 = {0}, s761 = {0}, s762 = {0}, s763 = {0}, s764 = {0},
+        s765 = {0}, s766 = {0}, s767 = {0}, s768 = {0}, s769 = {0}, s770 = {0}, s771 = {0},
+        s772 = {0}, s773 = {0}, s774 = {0}, s775 = {0}, s776 = {0}, s777 = {0}, s778 = {0},
+        s779 = {0}, s780 = {0}, s781 = {0}, s782 = {0}, s783 = {0}, s784 = {0}, s785 = {0},
+        s786 = {0}, s787 = {0}, s788 = {0}, s789 = {0}, s790 = {0}, s791 = {0}, s792 = {0},
+        s793 = {0}, s794 = {0}, s795 = {0}, s796 = {0}, s797 = {0}, s798 = {0}, s799 = {0},
+        s800 = {0}, s801 = {0}, s802 = {0}, s803 = {0}, s804 = {0}, s805 = {0}, s806 = {0},
+        s807 = {0}, s808 = {0}, s809 = {0}, s810 = {0}, s811 = {0}, s812 = {0}, s813 = {0},
+        s814 = {0}, s815 = {0}, s816 = {0}, s817 = {0}, s818 = {0}, s819 = {0}, s820 = {0},
+        s821 = {0}, s822 = {0}, s823 = {0}, s824 = {0}, s825 = {0}, s826 = {0}, s827 = {0},
+        s828 = {0}, s829 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
         const double *restrict w = rule + 2 * q; (void)w;
-        const V v828 = w[0] * v558 + v540, v829 = (-1.0) + v828, v830 = 1.0 + v828,
-            v831 = 0.5 + v828, v832 = (-0.5) + v828, v833 = 1.0 - v828 * v828, v834 = 0.5 * v828,
-            v835 = 2.0 * v828, v836 = v834 * v829, v837 = v834 * v830, v838 = v1 * v835,
-            v839 = v8 * v835, v840 = v28 * v836 + (v31 * v837 + v1 * v833),
-            v841 = v28 * v832 + (v31 * v831 - v838), v842 = v6 - v840,
-            v843 = v29 * v836 + (v30 * v837 + v8 * v833), v844 = v29 * v832 + (v30 * v831 - v839),
-            v845 = v27 - v843, v846 = v841 * v841 + v844 * v844, v847 = softehl_vsqrt(v846),
-            v848 = 1.0 / v847, v849 = softehl_vsqrt(1.0 / v846), v850 = 0.5 * v849,
-            v851 = v841 * v848, v852 = v844 * v848, v853 = v848 * v848,
-            v854 = 2.0 * v841 * v850 * v853, v855 = 2.0 * v844 * v850 * v853, v856 = v841 * v855,
-            v857 = v844 * v854, v858 = v848 - v841 * v854, v859 = v848 - v844 * v855,
-            v860 = v61 * v851 + v62 * v852, v861 = v842 * v851 + v845 * v852, v862 = 2.0 * v861,
-            v863 = 4.0 * v861, v864 = v842 * v858 - v845 * v857, v865 = v845 * v859 - v842 * v856,
-            v866 = v55 * v858 - v58 * v857, v867 = v58 * v859 - v55 * v856,
-            v868 = v55 * v851 + v58 * v852, v869 = v868 * v868, v870 = 2.0 * v868,
-            v871 = v851 * v870, v872 = v852 * v870, v873 = v866 * v870, v874 = v867 * v870,
-            v875 = 0.01 * v869, v876 = v869 - v860 * v863;
-        const M v877 = softehl_lt(v875, v876);
-        V v878 = softehl_splat(0.0), v879 = softehl_splat(0.0), v880 = softehl_splat(0.0),
-            v881 = softehl_splat(0.0), v882 = softehl_splat(0.0), v883 = softehl_splat(0.0),
-            v884 = softehl_splat(0.0), v885 = softehl_splat(0.0), v886 = softehl_splat(0.0),
-            v887 = softehl_splat(0.0), v888 = softehl_splat(0.0), v889 = softehl_splat(0.0),
-            v890 = softehl_splat(0.0);
-        const M m891 = v877;
-        if (softehl_any(m891)) {
-            const V v892 = 4.0 * v860, v893 = v873 - v892 * v864 - v863 * (v61 * v858 - v62 * v857),
-                v894 = v874 - v892 * v865 - v863 * (v62 * v859 - v61 * v856),
-                v895 = softehl_vsqrt(v876), v896 = softehl_vsqrt(1.0 / v876), v897 = 0.5 * v896,
-                v898 = 1.0 / (v868 - v895), v899 = v898 * v898,
-                v900 = v863 * (v851 * v862) * v897 * v899,
-                v901 = v863 * (v852 * v862) * v897 * v899,
-                v902 = v862 * (4.0 * v851 * v860) * v897 * v899,
-                v903 = v862 * (4.0 * v852 * v860) * v897 * v899, v904 = -v902, v905 = -v903,
-                v906 = -v900, v907 = 0.5 * v900, v908 = -v901, v909 = 0.5 * v901;
-            v878 = softehl_blend(m891, v876, v878); v879 = softehl_blend(m891, v906, v879);
-            v880 = softehl_blend(m891, v904, v880); v881 = softehl_blend(m891, v908, v881);
-            v882 = softehl_blend(m891, v905, v882); v883 = softehl_blend(m891, v903, v883);
-            v884 = softehl_blend(m891, v902, v884); v885 = softehl_blend(m891, v893, v885);
-            v886 = softehl_blend(m891, v894, v886); v887 = softehl_blend(m891, v907, v887);
-            v888 = softehl_blend(m891, v871, v888); v889 = softehl_blend(m891, v909, v889);
-            v890 = softehl_blend(m891, v872, v890);
+        const V v830 = w[0] * v560 + v542, v831 = (-1.0) + v830, v832 = 1.0 + v830,
+            v833 = 0.5 + v830, v834 = (-0.5) + v830, v835 = 1.0 - v830 * v830, v836 = 0.5 * v830,
+            v837 = 2.0 * v830, v838 = v836 * v831, v839 = v836 * v832, v840 = v1 * v837,
+            v841 = v8 * v837, v842 = v28 * v838 + (v31 * v839 + v1 * v835),
+            v843 = v28 * v834 + (v31 * v833 - v840), v844 = v6 - v842,
+            v845 = v29 * v838 + (v30 * v839 + v8 * v835), v846 = v29 * v834 + (v30 * v833 - v841),
+            v847 = v27 - v845, v848 = v843 * v843 + v846 * v846, v849 = softehl_vsqrt(v848),
+            v850 = 1.0 / v849, v851 = softehl_vsqrt(1.0 / v848), v852 = 0.5 * v851,
+            v853 = v843 * v850, v854 = v846 * v850, v855 = v850 * v850,
+            v856 = 2.0 * v843 * v852 * v855, v857 = 2.0 * v846 * v852 * v855, v858 = v843 * v857,
+            v859 = v846 * v856, v860 = v850 - v843 * v856, v861 = v850 - v846 * v857,
+            v862 = v61 * v853 + v62 * v854, v863 = v844 * v853 + v847 * v854, v864 = 2.0 * v863,
+            v865 = 4.0 * v863, v866 = v844 * v860 - v847 * v859, v867 = v847 * v861 - v844 * v858,
+            v868 = v55 * v860 - v58 * v859, v869 = v58 * v861 - v55 * v858,
+            v870 = v55 * v853 + v58 * v854, v871 = v870 * v870, v872 = 2.0 * v870,
+            v873 = v853 * v872, v874 = v854 * v872, v875 = v868 * v872, v876 = v869 * v872,
+            v877 = 0.01 * v871, v878 = v871 - v862 * v865;
+        const M v879 = softehl_lt(v877, v878);
+        V v880 = v877, v881 = softehl_splat(0.0), v882 = softehl_splat(0.0),
+            v883 = softehl_splat(0.0), v884 = softehl_splat(0.0), v885 = softehl_splat(0.0),
+            v886 = softehl_splat(0.0), v887 = softehl_splat(0.0), v888 = softehl_splat(0.0),
+            v889 = softehl_splat(0.0), v890 = v873, v891 = softehl_splat(0.0), v892 = v874;
+        const M m893 = v879;
+        if (softehl_any(m893)) {
+            const V v894 = 4.0 * v862, v895 = v875 - v894 * v866 - v865 * (v61 * v860 - v62 * v859),
+                v896 = v876 - v894 * v867 - v865 * (v62 * v861 - v61 * v858),
+                v897 = softehl_vsqrt(v878), v898 = softehl_vsqrt(1.0 / v878), v899 = 0.5 * v898,
+                v900 = 1.0 / (v870 - v897), v901 = v900 * v900,
+                v902 = v865 * (v853 * v864) * v899 * v901,
+                v903 = v865 * (v854 * v864) * v899 * v901,
+                v904 = v864 * (4.0 * v853 * v862) * v899 * v901,
+                v905 = v864 * (4.0 * v854 * v862) * v899 * v901, v906 = -v904, v907 = -v905,
+                v908 = -v902, v909 = 0.5 * v902, v910 = -v903, v911 = 0.5 * v903;
+            v880 = softehl_blend(m893, v878, v880); v881 = softehl_blend(m893, v908, v881);
+            v882 = softehl_blend(m893, v906, v882); v883 = softehl_blend(m893, v910, v883);
+            v884 = softehl_blend(m893, v907, v884); v885 = softehl_blend(m893, v905, v885);
+            v886 = softehl_blend(m893, v904, v886); v887 = softehl_blend(m893, v895, v887);
+            v888 = softehl_blend(m893, v896, v888); v889 = softehl_blend(m893, v909, v889);
+            v891 = softehl_blend(m893, v911, v891);
         }
-        const M m910 = ~v877;
-        if (softehl_any(m910)) {
-            const V v911 = 0.01 * v871, v912 = 0.01 * v872, v913 = 0.01 * v873, v914 = 0.01 * v874;
-            v878 = softehl_blend(m910, v875, v878);
-            v879 = softehl_blend(m910, softehl_splat(0.0), v879);
-            v880 = softehl_blend(m910, softehl_splat(0.0), v880);
-            v881 = softehl_blend(m910, softehl_splat(0.0), v881);
-            v882 = softehl_blend(m910, softehl_splat(0.0), v882);
-            v883 = softehl_blend(m910, softehl_splat(0.0), v883);
-            v884 = softehl_blend(m910, softehl_splat(0.0), v884);
-            v885 = softehl_blend(m910, v913, v885); v886 = softehl_blend(m910, v914, v886);
-            v887 = softehl_blend(m910, softehl_splat(0.0), v887);
-            v888 = softehl_blend(m910, v911, v888);
-            v889 = softehl_blend(m910, softehl_splat(0.0), v889);
-            v890 = softehl_blend(m910, v912, v890);
+        const M m912 = ~v879;
+        if (softehl_any(m912)) {
+            const V v913 = 0.01 * v873, v914 = 0.01 * v874, v915 = 0.01 * v875, v916 = 0.01 * v876;
+            v887 = softehl_blend(m912, v915, v887); v888 = softehl_blend(m912, v916, v888);
+            v890 = softehl_blend(m912, v913, v890); v892 = softehl_blend(m912, v914, v892);
         }
-        const V v915 = w[0] * v546 + v551, v916 = w[0] * v547 + v552, v917 = w[0] * v538 + v545,
-            v918 = w[0] * v539 + v549, v919 = w[0] * v543 + v554, v920 = w[0] * v544 + v556,
-            v921 = w[0] * v536 + v541, v922 = w[0] * v537 + v542, v923 = w[0] * v548 + v553,
-            v924 = w[0] * v550 + v555, v925 = 0.5 - v834, v926 = 0.5 + v834, v927 = v834 - 0.5,
-            v928 = v46 * v925, v929 = v46 * v926, v930 = d12 * v925 + d14 * v926, v931 = v22 * v828,
-            v932 = v24 * v828, v933 = v40 * v924, v934 = 0.5 * (v828 + v829),
-            v935 = 0.5 * (v828 + v830), v936 = v40 * v917, v937 = v40 * v919, v938 = v40 * v921,
-            v939 = v40 * v915, v940 = v43 * v915, v941 = v43 * v924, v942 = v43 * v918,
-            v943 = v43 * v920, v944 = v43 * v917 + v832, v945 = v40 * v918 + v832,
-            v946 = v43 * v921 - v835, v947 = v43 * v919 + v831, v948 = v40 * v920 + v831,
-            v949 = v43 * v922, v950 = v40 * v922 - v835, v951 = v40 * v916, v952 = v43 * v916,
-            v953 = v40 * v923, v954 = v43 * v923, v955 = X0 * v832 + X2 * v831 - v2 * v828,
-            v956 = X1 * v832 + X3 * v831 - v9 * v828, v957 = softehl_vsqrt(v878),
-            v958 = v955 * v955 + v956 * v956, v959 = softehl_vsqrt(v958), v960 = w[1] * v833,
-            v961 = w[1] * v837, v962 = w[1] * v836,
-            v963 = (-1.0) + 6.283185307179586 * (X5 * v833 + (v931 * v829 + v932 * v830)),
-            v964 = 1.0 + a16 * v963, v965 = softehl_vsqrt(1.0 / v878),
-            v966 = v31 * v935 + (v28 * v934 - v838), v967 = v30 * v935 + (v29 * v934 - v839),
-            v968 = v836 + v917 * v966, v969 = v917 * v967, v970 = v837 + v919 * v966,
-            v971 = v919 * v967, v972 = v836 + v918 * v967, v973 = v918 * v966, v974 = v920 * v966,
-            v975 = v837 + v920 * v967, v976 = v921 * v967, v977 = v833 + v921 * v966,
-            v978 = v922 * v966, v979 = v833 + v922 * v967, v980 = v915 * v966, v981 = v915 * v967,
-            v982 = v916 * v966, v983 = v916 * v967, v984 = v923 * v966, v985 = v923 * v967,
-            v986 = v924 * v966, v987 = v924 * v967, v988 = v558 * v959, v989 = v988 * v964,
-            v990 = 0.5 * v965, v991 = v852 * v989, v992 = v928 * v989, v993 = v929 * v989,
-            v994 = v851 * v989, v995 = 1.0 / (v868 - v957), v996 = v995 * v995,
-            v997 = v996 * (v861 * (v851 - v888 * v990)),
-            v998 = v996 * (v861 * (v852 - v890 * v990)), v999 = 2.0 * v851 * v995,
-            v1000 = 2.0 * v852 * v995, v1001 = 2.0 * v995, v1002 = v862 * v995, v1003 = v862 * v996,
-            v1004 = v1003 * (v866 - v990 * v885) - v864 * v1001,
-            v1005 = v1003 * (v867 - v990 * v886) - v865 * v1001, v1006 = 0.5 * v1002,
-            v1007 = 2.0 * v1002, v1008 = v999 - v884, v1009 = v879 - v880 - v999,
-            v1010 = (-1.0) - v1002, v1011 = 0.5 * (v1010 - v1002), v1012 = v1006 * v1010,
-            v1013 = 1.0 - v1002, v1014 = v1006 * v1013, v1015 = 1.0 - v1002 * v1002,
-            v1016 = 0.5 * (v1013 - v1002), v1017 = v881 - v882 - v1000, v1018 = v1000 - v883,
-            v1019 = w[1] * v1015, v1020 = w[1] * v1012, v1021 = w[1] * v1014,
-            v1022 = v6 * v1015 - v840 - v3 * v1012 - v4 * v1014,
-            v1023 = v27 * v1015 - v843 - v12 * v1012 - v14 * v1014,
-            v1024 = v852 * (v4 * v1016 + (v6 * v1007 + v3 * v1011)) - v851 * (v14 * v1016 + (v27 * v1007 + v12 * v1011)),
-            v1025 = v852 * v1022 - v851 * v1023, v1026 = v857 * v1022 + v858 * v1023,
-            v1027 = v859 * v1022 + v856 * v1023, v1028 = a12 * v1025,
-            v1029 = v852 * v1015 + v1024 * v1009, v1030 = v1024 * v1017 - v851 * v1015,
-            v1031 = v930 - v1028,
-            v1032 = v939 * v1027 + (v851 * v981 - v852 * (v1012 + v980) - v940 * v1026),
-            v1033 = v939 * v1005 + (v940 * v1004 + (v887 + v1008 * v980 + v1018 * v981 - v997)),
-            v1034 = v1032 + v1024 * v1033;
-        const M v1035 = softehl_eq(v1031, v1031);
-        const V v1036 = v951 * v1005 + (v952 * v1004 + (v889 + v1008 * v982 + v1018 * v983 - v998)),
-            v1037 = v951 * v1027 + (v851 * (v1012 + v983) - v852 * v982 - v952 * v1026),
-            v1038 = v953 * v1005 + (v954 * v1004 + (v997 + (v887 + v1008 * v984 + v1018 * v985))),
-            v1039 = v953 * v1027 + (v851 * v985 - v852 * (v1014 + v984) - v954 * v1026),
-            v1040 = v1037 + v1024 * v1036, v1041 = v1039 + v1024 * v1038,
-            v1042 = v941 * v1004 + (v933 * v1005 + (v998 + (v889 + v1008 * v986 + v1018 * v987))),
-            v1043 = v933 * v1027 + (v851 * (v1014 + v987) - v852 * v986) - v941 * v1026,
-            v1044 = v1043 + v1024 * v1042,
-            v1045 = v936 * v1005 + (v944 * v1004 + (v1008 * v968 + v1018 * v969)),
-            v1046 = v936 * v1027 + (v851 * v969 - v852 * v968 - v944 * v1026) + v1024 * v1045,
-            v1047 = v945 * v1005 + (v942 * v1004 + (v1008 * v973 + v1018 * v972)),
-            v1048 = v945 * v1027 + (v851 * v972 - v852 * v973 - v942 * v1026) + v1024 * v1047,
-            v1049 = v937 * v1005 + (v947 * v1004 + (v1008 * v970 + v1018 * v971)),
-            v1050 = v937 * v1027 + (v851 * v971 - v852 * v970 - v947 * v1026) + v1024 * v1049,
-            v1051 = v948 * v1005 + (v943 * v1004 + (v1008 * v974 + v1018 * v975)),
-            v1052 = v948 * v1027 + (v851 * v975 - v852 * v974 - v943 * v1026) + v1024 * v1051,
-            v1053 = v938 * v1005 + (v946 * v1004 + (v1008 * v977 + v1018 * v976)),
-            v1054 = v950 * v1005 + (v949 * v1004 + (v1008 * v978 + v1018 * v979)),
-            v1055 = v938 * v1027 + (v851 * v976 - v852 * v977 - v946 * v1026) + v1024 * v1053,
-            v1056 = v950 * v1027 + (v851 * v979 - v852 * v978 - v949 * v1026) + v1024 * v1054;
-        V v1057 = softehl_splat(0.0), v1058 = softehl_splat(0.0), v1059 = softehl_splat(0.0),
-            v1060 = softehl_splat(0.0), v1061 = softehl_splat(0.0), v1062 = softehl_splat(0.0),
-            v1063 = softehl_splat(0.0), v1064 = softehl_splat(0.0), v1065 = softehl_splat(0.0),
-            v1066 = softehl_splat(0.0), v1067 = softehl_splat(0.0), v1068 = softehl_splat(0.0),
-            v1069 = softehl_splat(0.0), v1070 = softehl_splat(0.0), v1071 = softehl_splat(0.0),
-            v1072 = softehl_splat(0.0), v1073 = softehl_splat(0.0), v1074 = softehl_splat(0.0),
-            v1075 = softehl_splat(0.0), v1076 = softehl_splat(0.0), v1077 = softehl_splat(0.0),
-            v1078 = softehl_splat(0.0), v1079 = softehl_splat(0.0), v1080 = softehl_splat(0.0),
-            v1081 = softehl_splat(0.0), v1082 = softehl_splat(0.0), v1083 = softehl_splat(0.0),
-            v1084 = softehl_splat(0.0), v1085 = softehl_splat(0.0), v1086 = softehl_splat(0.0),
-            v1087 = softehl_splat(0.0), v1088 = softehl_splat(0.0), v1089 = softehl_splat(0.0),
-            v1090 = softehl_splat(0.0), v1091 = softehl_splat(0.0), v1092 = softehl_splat(0.0),
-            v1093 = softehl_splat(0.0), v1094 = softehl_splat(0.0), v1095 = softehl_splat(0.0),
-            v1096 = softehl_splat(0.0), v1097 = softehl_splat(0.0), v1098 = softehl_splat(0.0),
-            v1099 = softehl_splat(0.0), v1100 = softehl_splat(0.0), v1101 = softehl_splat(0.0),
-            v1102 = softehl_splat(0.0), v1103 = softehl_splat(0.0), v1104 = softehl_splat(0.0),
-            v1105 = softehl_splat(0.0), v1106 = softehl_splat(0.0), v1107 = softehl_splat(0.0),
-            v1108 = softehl_splat(0.0), v1109 = softehl_splat(0.0), v1110 = softehl_splat(0.0),
-            v1111 = softehl_splat(0.0), v1112 = softehl_splat(0.0), v1113 = softehl_splat(0.0),
-            v1114 = softehl_splat(0.0), v1115 = softehl_splat(0.0), v1116 = softehl_splat(0.0),
-            v1117 = softehl_splat(0.0), v1118 = softehl_splat(0.0), v1119 = softehl_splat(0.0);
-        const M m1120 = v1035;
-        if (softehl_any(m1120)) {
-            const M v1121 = softehl_le(softehl_splat(0.0), v1031);
-            V v1122 = softehl_splat(0.0), v1123 = softehl_splat(0.0), v1124 = softehl_splat(0.0),
-                v1125 = softehl_splat(0.0), v1126 = softehl_splat(0.0), v1127 = softehl_splat(0.0),
-                v1128 = softehl_splat(0.0), v1129 = softehl_splat(0.0), v1130 = softehl_splat(0.0),
-                v1131 = softehl_splat(0.0), v1132 = softehl_splat(0.0), v1133 = softehl_splat(0.0),
-                v1134 = softehl_splat(0.0), v1135 = softehl_splat(0.0), v1136 = softehl_splat(0.0),
-                v1137 = softehl_splat(0.0), v1138 = softehl_splat(0.0), v1139 = softehl_splat(0.0),
-                v1140 = softehl_splat(0.0), v1141 = softehl_splat(0.0), v1142 = softehl_splat(0.0),
-                v1143 = softehl_splat(0.0), v1144 = softehl_splat(0.0), v1145 = softehl_splat(0.0),
-                v1146 = softehl_splat(0.0), v1147 = softehl_splat(0.0), v1148 = softehl_splat(0.0),
-                v1149 = softehl_splat(0.0), v1150 = softehl_splat(0.0), v1151 = softehl_splat(0.0),
-                v1152 = softehl_splat(0.0), v1153 = softehl_splat(0.0), v1154 = softehl_splat(0.0),
-                v1155 = softehl_splat(0.0), v1156 = softehl_splat(0.0), v1157 = softehl_splat(0.0),
-                v1158 = softehl_splat(0.0), v1159 = softehl_splat(0.0), v1160 = softehl_splat(0.0),
-                v1161 = softehl_splat(0.0), v1162 = softehl_splat(0.0), v1163 = softehl_splat(0.0),
-                v1164 = softehl_splat(0.0), v1165 = softehl_splat(0.0), v1166 = softehl_splat(0.0),
-                v1167 = softehl_splat(0.0), v1168 = softehl_splat(0.0), v1169 = softehl_splat(0.0),
-                v1170 = softehl_splat(0.0);
-            const M m1171 = v1121 & m1120;
-            if (softehl_any(m1171)) {
-                const V v1172 = a14 + v1025, v1173 = v1025 - a15, v1174 = v1172 * v1173;
-                const M v1175 = softehl_eq(v1174, v1174);
-                V v1176 = softehl_splat(0.0), v1177 = softehl_splat(0.0),
-                    v1178 = softehl_splat(0.0), v1179 = softehl_splat(0.0),
-                    v1180 = softehl_splat(0.0);
-                const M m1181 = v1175 & m1171;
-                if (softehl_any(m1181)) {
-                    const M v1182 = softehl_lt(v1174, softehl_splat(0.0));
-                    const V v1183 = softehl_blend(v1182, v1031, softehl_splat(0.0)),
-                        v1184 = softehl_blend(v1182, v925, softehl_splat(0.0)),
-                        v1185 = softehl_blend(v1182, v926, softehl_splat(0.0)),
-                        v1186 = softehl_blend(v1182, v47, softehl_splat(0.0)),
-                        v1187 = softehl_blend(v1182, v51, softehl_splat(0.0));
-                    v1176 = softehl_blend(m1181, v1183, v1176);
-                    v1177 = softehl_blend(m1181, v1184, v1177);
-                    v1178 = softehl_blend(m1181, v1185, v1178);
-                    v1179 = softehl_blend(m1181, v1186, v1179);
-                    v1180 = softehl_blend(m1181, v1187, v1180);
+        const V v917 = w[0] * v548 + v553, v918 = w[0] * v549 + v554, v919 = w[0] * v540 + v547,
+            v920 = w[0] * v541 + v551, v921 = w[0] * v545 + v556, v922 = w[0] * v546 + v558,
+            v923 = w[0] * v538 + v543, v924 = w[0] * v539 + v544, v925 = w[0] * v550 + v555,
+            v926 = w[0] * v552 + v557, v927 = 0.5 - v836, v928 = 0.5 + v836, v929 = v836 - 0.5,
+            v930 = v46 * v927, v931 = v46 * v928, v932 = d12 * v927 + d14 * v928, v933 = v22 * v830,
+            v934 = v24 * v830, v935 = v40 * v926, v936 = 0.5 * (v830 + v831),
+            v937 = 0.5 * (v830 + v832), v938 = v40 * v919, v939 = v40 * v921, v940 = v40 * v923,
+            v941 = v40 * v917, v942 = v43 * v917, v943 = v43 * v926, v944 = v43 * v920,
+            v945 = v43 * v922, v946 = v43 * v919 + v834, v947 = v40 * v920 + v834,
+            v948 = v43 * v923 - v837, v949 = v43 * v921 + v833, v950 = v40 * v922 + v833,
+            v951 = v43 * v924, v952 = v40 * v924 - v837, v953 = v40 * v918, v954 = v43 * v918,
+            v955 = v40 * v925, v956 = v43 * v925, v957 = X0 * v834 + X2 * v833 - v2 * v830,
+            v958 = X1 * v834 + X3 * v833 - v9 * v830, v959 = softehl_vsqrt(v880),
+            v960 = v957 * v957 + v958 * v958, v961 = softehl_vsqrt(v960), v962 = w[1] * v835,
+            v963 = w[1] * v839, v964 = w[1] * v838,
+            v965 = (-1.0) + 6.283185307179586 * (X5 * v835 + (v933 * v831 + v934 * v832)),
+            v966 = 1.0 + a16 * v965, v967 = softehl_vsqrt(1.0 / v880),
+            v968 = v31 * v937 + (v28 * v936 - v840), v969 = v30 * v937 + (v29 * v936 - v841),
+            v970 = v838 + v919 * v968, v971 = v919 * v969, v972 = v839 + v921 * v968,
+            v973 = v921 * v969, v974 = v838 + v920 * v969, v975 = v920 * v968, v976 = v922 * v968,
+            v977 = v839 + v922 * v969, v978 = v923 * v969, v979 = v835 + v923 * v968,
+            v980 = v924 * v968, v981 = v835 + v924 * v969, v982 = v917 * v968, v983 = v917 * v969,
+            v984 = v918 * v968, v985 = v918 * v969, v986 = v925 * v968, v987 = v925 * v969,
+            v988 = v926 * v968, v989 = v926 * v969, v990 = v560 * v961, v991 = v990 * v966,
+            v992 = 0.5 * v967, v993 = v854 * v991, v994 = v930 * v991, v995 = v931 * v991,
+            v996 = v853 * v991, v997 = 1.0 / (v870 - v959), v998 = v997 * v997,
+            v999 = v998 * (v863 * (v853 - v890 * v992)),
+            v1000 = v998 * (v863 * (v854 - v892 * v992)), v1001 = 2.0 * v853 * v997,
+            v1002 = 2.0 * v854 * v997, v1003 = 2.0 * v997, v1004 = v864 * v997, v1005 = v864 * v998,
+            v1006 = v1005 * (v868 - v992 * v887) - v866 * v1003,
+            v1007 = v1005 * (v869 - v992 * v888) - v867 * v1003, v1008 = 0.5 * v1004,
+            v1009 = 2.0 * v1004, v1010 = v1001 - v886, v1011 = v881 - v882 - v1001,
+            v1012 = (-1.0) - v1004, v1013 = 0.5 * (v1012 - v1004), v1014 = v1008 * v1012,
+            v1015 = 1.0 - v1004, v1016 = v1008 * v1015, v1017 = 1.0 - v1004 * v1004,
+            v1018 = 0.5 * (v1015 - v1004), v1019 = v883 - v884 - v1002, v1020 = v1002 - v885,
+            v1021 = w[1] * v1017, v1022 = w[1] * v1014, v1023 = w[1] * v1016,
+            v1024 = v6 * v1017 - v842 - v3 * v1014 - v4 * v1016,
+            v1025 = v27 * v1017 - v845 - v12 * v1014 - v14 * v1016,
+            v1026 = v854 * (v4 * v1018 + (v6 * v1009 + v3 * v1013)) - v853 * (v14 * v1018 + (v27 * v1009 + v12 * v1013)),
+            v1027 = v854 * v1024 - v853 * v1025, v1028 = v859 * v1024 + v860 * v1025,
+            v1029 = v861 * v1024 + v858 * v1025, v1030 = a12 * v1027,
+            v1031 = v854 * v1017 + v1026 * v1011, v1032 = v1026 * v1019 - v853 * v1017,
+            v1033 = v932 - v1030,
+            v1034 = v941 * v1029 + (v853 * v983 - v854 * (v1014 + v982) - v942 * v1028),
+            v1035 = v941 * v1007 + (v942 * v1006 + (v889 + v1010 * v982 + v1020 * v983 - v999)),
+            v1036 = v1034 + v1026 * v1035;
+        const M v1037 = softehl_eq(v1033, v1033);
+        const V v1038 = v953 * v1007 + (v954 * v1006 + (v891 + v1010 * v984 + v1020 * v985 - v1000)),
+            v1039 = v953 * v1029 + (v853 * (v1014 + v985) - v854 * v984 - v954 * v1028),
+            v1040 = v955 * v1007 + (v956 * v1006 + (v999 + (v889 + v1010 * v986 + v1020 * v987))),
+            v1041 = v955 * v1029 + (v853 * v987 - v854 * (v1016 + v986) - v956 * v1028),
+            v1042 = v1039 + v1026 * v1038, v1043 = v1041 + v1026 * v1040,
+            v1044 = v943 * v1006 + (v935 * v1007 + (v1000 + (v891 + v1010 * v988 + v1020 * v989))),
+            v1045 = v935 * v1029 + (v853 * (v1016 + v989) - v854 * v988) - v943 * v1028,
+            v1046 = v1045 + v1026 * v1044,
+            v1047 = v938 * v1007 + (v946 * v1006 + (v1010 * v970 + v1020 * v971)),
+            v1048 = v938 * v1029 + (v853 * v971 - v854 * v970 - v946 * v1028) + v1026 * v1047,
+            v1049 = v947 * v1007 + (v944 * v1006 + (v1010 * v975 + v1020 * v974)),
+            v1050 = v947 * v1029 + (v853 * v974 - v854 * v975 - v944 * v1028) + v1026 * v1049,
+            v1051 = v939 * v1007 + (v949 * v1006 + (v1010 * v972 + v1020 * v973)),
+            v1052 = v939 * v1029 + (v853 * v973 - v854 * v972 - v949 * v1028) + v1026 * v1051,
+            v1053 = v950 * v1007 + (v945 * v1006 + (v1010 * v976 + v1020 * v977)),
+            v1054 = v950 * v1029 + (v853 * v977 - v854 * v976 - v945 * v1028) + v1026 * v1053,
+            v1055 = v940 * v1007 + (v948 * v1006 + (v1010 * v979 + v1020 * v978)),
+            v1056 = v952 * v1007 + (v951 * v1006 + (v1010 * v980 + v1020 * v981)),
+            v1057 = v940 * v1029 + (v853 * v978 - v854 * v979 - v948 * v1028) + v1026 * v1055,
+            v1058 = v952 * v1029 + (v853 * v981 - v854 * v980 - v951 * v1028) + v1026 * v1056;
+        V v1059 = softehl_splat(0.0), v1060 = softehl_splat(0.0), v1061 = softehl_splat(0.0),
+            v1062 = softehl_splat(0.0), v1063 = softehl_splat(0.0), v1064 = softehl_splat(0.0),
+            v1065 = softehl_splat(0.0), v1066 = softehl_splat(0.0), v1067 = softehl_splat(0.0),
+            v1068 = softehl_splat(0.0), v1069 = softehl_splat(0.0), v1070 = softehl_splat(0.0),
+            v1071 = softehl_splat(0.0), v1072 = softehl_splat(0.0), v1073 = softehl_splat(0.0),
+            v1074 = softehl_splat(0.0), v1075 = softehl_splat(0.0), v1076 = softehl_splat(0.0),
+            v1077 = softehl_splat(0.0), v1078 = softehl_splat(0.0), v1079 = softehl_splat(0.0),
+            v1080 = softehl_splat(0.0), v1081 = softehl_splat(0.0), v1082 = softehl_splat(0.0),
+            v1083 = softehl_splat(0.0), v1084 = softehl_splat(0.0), v1085 = softehl_splat(0.0),
+            v1086 = softehl_splat(0.0), v1087 = softehl_splat(0.0), v1088 = softehl_splat(0.0),
+            v1089 = softehl_splat(0.0), v1090 = softehl_splat(0.0), v1091 = softehl_splat(0.0),
+            v1092 = softehl_splat(0.0), v1093 = softehl_splat(0.0), v1094 = softehl_splat(0.0),
+            v1095 = softehl_splat(0.0), v1096 = softehl_splat(0.0), v1097 = softehl_splat(0.0),
+            v1098 = softehl_splat(0.0), v1099 = softehl_splat(0.0), v1100 = softehl_splat(0.0),
+            v1101 = softehl_splat(0.0), v1102 = softehl_splat(0.0), v1103 = softehl_splat(0.0),
+            v1104 = softehl_splat(0.0), v1105 = softehl_splat(0.0), v1106 = softehl_splat(0.0),
+            v1107 = softehl_splat(0.0), v1108 = softehl_splat(0.0), v1109 = softehl_splat(0.0),
+            v1110 = softehl_splat(0.0), v1111 = softehl_splat(0.0), v1112 = softehl_splat(0.0),
+            v1113 = softehl_splat(0.0), v1114 = softehl_splat(0.0), v1115 = softehl_splat(0.0),
+            v1116 = softehl_splat(0.0), v1117 = softehl_splat(0.0), v1118 = softehl_splat(0.0),
+            v1119 = softehl_splat(0.0), v1120 = softehl_splat(0.0), v1121 = softehl_splat(0.0);
+        const M m1122 = v1037;
+        if (softehl_any(m1122)) {
+            const M v1123 = softehl_le(softehl_splat(0.0), v1033);
+            V v1124 = softehl_splat(0.0), v1125 = softehl_splat(0.0), v1126 = softehl_splat(0.0),
+                v1127 = softehl_splat(0.0), v1128 = softehl_splat(0.0), v1129 = softehl_splat(0.0),
+                v1130 = softehl_splat(0.0), v1131 = softehl_splat(0.0), v1132 = softehl_splat(0.0),
+                v1133 = softehl_splat(0.0), v1134 = softehl_splat(0.0), v1135 = softehl_splat(0.0),
+                v1136 = softehl_splat(0.0), v1137 = softehl_splat(0.0), v1138 = softehl_splat(0.0),
+                v1139 = softehl_splat(0.0), v1140 = softehl_splat(0.0), v1141 = softehl_splat(0.0),
+                v1142 = softehl_splat(0.0), v1143 = softehl_splat(0.0), v1144 = softehl_splat(0.0),
+                v1145 = softehl_splat(0.0), v1146 = softehl_splat(0.0), v1147 = softehl_splat(0.0),
+                v1148 = softehl_splat(0.0), v1149 = softehl_splat(0.0), v1150 = softehl_splat(0.0),
+                v1151 = softehl_splat(0.0), v1152 = softehl_splat(0.0), v1153 = softehl_splat(0.0),
+                v1154 = softehl_splat(0.0), v1155 = softehl_splat(0.0), v1156 = softehl_splat(0.0),
+                v1157 = softehl_splat(0.0), v1158 = softehl_splat(0.0), v1159 = softehl_splat(0.0),
+                v1160 = softehl_splat(0.0), v1161 = softehl_splat(0.0), v1162 = softehl_splat(0.0),
+                v1163 = softehl_splat(0.0), v1164 = softehl_splat(0.0), v1165 = softehl_splat(0.0),
+                v1166 = softehl_splat(0.0), v1167 = softehl_splat(0.0), v1168 = softehl_splat(0.0),
+                v1169 = softehl_splat(0.0), v1170 = softehl_splat(0.0), v1171 = softehl_splat(0.0),
+                v1172 = softehl_splat(0.0);
+            const M m1173 = v1123 & m1122;
+            if (softehl_any(m1173)) {
+                const V v1174 = a14 + v1027, v1175 = v1027 - a15, v1176 = v1174 * v1175;
+                const M v1177 = softehl_eq(v1176, v1176);
+                V v1178 = softehl_splat(0.0), v1179 = softehl_splat(0.0),
+                    v1180 = softehl_splat(0.0), v1181 = softehl_splat(0.0),
+                    v1182 = softehl_splat(0.0);
+                const M m1183 = v1177 & m1173;
+                if (softehl_any(m1183)) {
+                    const M v1184 = softehl_lt(v1176, softehl_splat(0.0));
+                    const V v1185 = softehl_blend(v1184, v1033, softehl_splat(0.0)),
+                        v1186 = softehl_blend(v1184, v927, softehl_splat(0.0)),
+                        v1187 = softehl_blend(v1184, v928, softehl_splat(0.0)),
+                        v1188 = softehl_blend(v1184, v47, softehl_splat(0.0)),
+                        v1189 = softehl_blend(v1184, v51, softehl_splat(0.0));
+                    v1178 = softehl_blend(m1183, v1185, v1178);
+                    v1179 = softehl_blend(m1183, v1186, v1179);
+                    v1180 = softehl_blend(m1183, v1187, v1180);
+                    v1181 = softehl_blend(m1183, v1188, v1181);
+                    v1182 = softehl_blend(m1183, v1189, v1182);
                 }
-                const M m1188 = ~v1175 & m1171;
-                if (softehl_any(m1188)) {
-                    const V v1189 = v1174 * v1174, v1190 = v1174 * v1189,
-                        v1191 = 3.0 * v1189 * (v1172 + v1173);
-                    v1176 = softehl_blend(m1188, v1190, v1176);
-                    v1177 = softehl_blend(m1188, softehl_splat(0.0), v1177);
-                    v1178 = softehl_blend(m1188, softehl_splat(0.0), v1178);
-                    v1179 = softehl_blend(m1188, v1191, v1179);
-                    v1180 = softehl_blend(m1188, softehl_splat(0.0), v1180);
+                const M m1190 = ~v1177 & m1173;
+                if (softehl_any(m1190)) {
+                    const V v1191 = v1176 * v1176, v1192 = v1176 * v1191,
+                        v1193 = 3.0 * v1191 * (v1174 + v1175);
+                    v1178 = softehl_blend(m1190, v1192, v1178);
+                    v1181 = softehl_blend(m1190, v1193, v1181);
                 }
-                const V v1192 = a13 * v1176; const M v1193 = softehl_eq(v1192, v1192);
-                const V v1194 = v11 * v1015 - v18 * v836 - v19 * v837 - v5 * v833 - v7 * v1012 - v10 * v1014,
-                    v1195 = v26 * v1015 - v21 * v836 - v23 * v837 - v13 * v833 - v15 * v1012 - v17 * v1014,
-                    v1196 = a12 * (v851 * v1194 + v852 * v1195) + (d13 * v925 + d15 * v926);
-                const M v1197 = softehl_eq(v1196, v1196), v1198 = v1193 & v1197;
-                V v1199 = softehl_splat(0.0), v1200 = softehl_splat(0.0),
-                    v1201 = softehl_splat(0.0), v1202 = softehl_splat(0.0),
-                    v1203 = softehl_splat(0.0), v1204 = softehl_splat(0.0);
-                const M m1205 = v1198 & m1171;
-                if (softehl_any(m1205)) {
-                    const M v1206 = softehl_lt(v1192, v1196);
-                    V v1207 = v1192, v1208 = softehl_splat(0.0), v1209 = softehl_splat(0.0),
-                        v1210 = a13, v1211 = softehl_splat(0.0), v1212 = softehl_splat(0.0);
-                    const M m1213 = ~v1206 & m1205;
-                    if (softehl_any(m1213)) {
-                        V v1214 = softehl_splat(0.0), v1215 = softehl_splat(0.0),
-                            v1216 = softehl_splat(0.0), v1217 = softehl_splat(0.0),
-                            v1218 = softehl_splat(0.0), v1219 = softehl_splat(0.0);
-                        const M m1220 = v1193 & m1213;
-                        if (softehl_any(m1220)) {
-                            const M v1221 = softehl_lt(v1192, -v1196);
-                            V v1222 = v1196, v1223 = v925, v1224 = v926, v1225 = softehl_splat(0.0),
-                                v1226 = a12, v1227 = v54;
-                            const M m1228 = v1221 & m1220;
-                            if (softehl_any(m1228)) {
-                                const V v1229 = -v1192; v1222 = softehl_blend(m1228, v1229, v1222);
-                                v1223 = softehl_blend(m1228, softehl_splat(0.0), v1223);
-                                v1224 = softehl_blend(m1228, softehl_splat(0.0), v1224);
-                                v1225 = softehl_blend(m1228, v16, v1225);
-                                v1226 = softehl_blend(m1228, softehl_splat(0.0), v1226);
-                                v1227 = softehl_blend(m1228, softehl_splat(0.0), v1227);
+                const V v1194 = a13 * v1178; const M v1195 = softehl_eq(v1194, v1194);
+                const V v1196 = v11 * v1017 - v18 * v838 - v19 * v839 - v5 * v835 - v7 * v1014 - v10 * v1016,
+                    v1197 = v26 * v1017 - v21 * v838 - v23 * v839 - v13 * v835 - v15 * v1014 - v17 * v1016,
+                    v1198 = a12 * (v853 * v1196 + v854 * v1197) + (d13 * v927 + d15 * v928);
+                const M v1199 = softehl_eq(v1198, v1198), v1200 = v1195 & v1199;
+                V v1201 = softehl_splat(0.0), v1202 = softehl_splat(0.0),
+                    v1203 = softehl_splat(0.0), v1204 = softehl_splat(0.0),
+                    v1205 = softehl_splat(0.0), v1206 = softehl_splat(0.0);
+                const M m1207 = v1200 & m1173;
+                if (softehl_any(m1207)) {
+                    const M v1208 = softehl_lt(v1194, v1198);
+                    V v1209 = v1194, v1210 = softehl_splat(0.0), v1211 = softehl_splat(0.0),
+                        v1212 = a13, v1213 = softehl_splat(0.0), v1214 = softehl_splat(0.0);
+                    const M m1215 = ~v1208 & m1207;
+                    if (softehl_any(m1215)) {
+                        V v1216 = softehl_splat(0.0), v1217 = softehl_splat(0.0),
+                            v1218 = softehl_splat(0.0), v1219 = softehl_splat(0.0),
+                            v1220 = softehl_splat(0.0), v1221 = softehl_splat(0.0);
+                        const M m1222 = v1195 & m1215;
+                        if (softehl_any(m1222)) {
+                            const M v1223 = softehl_lt(v1194, -v1198);
+                            V v1224 = v1198, v1225 = v927, v1226 = v928, v1227 = softehl_splat(0.0),
+                                v1228 = a12, v1229 = v54;
+                            const M m1230 = v1223 & m1222;
+                            if (softehl_any(m1230)) {
+                                const V v1231 = -v1194; v1224 = softehl_blend(m1230, v1231, v1224);
+                                v1225 = softehl_blend(m1230, softehl_splat(0.0), v1225);
+                                v1226 = softehl_blend(m1230, softehl_splat(0.0), v1226);
+                                v1227 = softehl_blend(m1230, v16, v1227);
+                                v1228 = softehl_blend(m1230, softehl_splat(0.0), v1228);
+                                v1229 = softehl_blend(m1230, softehl_splat(0.0), v1229);
                             }
-                            v1214 = softehl_blend(m1220, v1222, v1214);
-                            v1215 = softehl_blend(m1220, v1223, v1215);
-                            v1216 = softehl_blend(m1220, v1224, v1216);
-                            v1217 = softehl_blend(m1220, v1225, v1217);
-                            v1218 = softehl_blend(m1220, v1226, v1218);
-                            v1219 = softehl_blend(m1220, v1227, v1219);
+                            v1216 = softehl_blend(m1222, v1224, v1216);
+                            v1217 = softehl_blend(m1222, v1225, v1217);
+                            v1218 = softehl_blend(m1222, v1226, v1218);
+                            v1219 = softehl_blend(m1222, v1227, v1219);
+                            v1220 = softehl_blend(m1222, v1228, v1220);
+                            v1221 = softehl_blend(m1222, v1229, v1221);
                         }
-                        const M m1230 = ~v1193 & m1213;
-                        if (softehl_any(m1230)) {
-                            const V v1231 = v1196 + v1192, v1232 = v1231 * v1231,
-                                v1233 = v1231 * v1232, v1234 = 3.0 * v1232, v1235 = v54 * v1234,
-                                v1236 = a13 * v1234, v1237 = a12 * v1234, v1238 = v925 * v1234,
-                                v1239 = v926 * v1234;
-                            v1214 = softehl_blend(m1230, v1233, v1214);
-                            v1215 = softehl_blend(m1230, v1238, v1215);
-                            v1216 = softehl_blend(m1230, v1239, v1216);
-                            v1217 = softehl_blend(m1230, v1236, v1217);
-                            v1218 = softehl_blend(m1230, v1237, v1218);
-                            v1219 = softehl_blend(m1230, v1235, v1219);
+                        const M m1232 = ~v1195 & m1215;
+                        if (softehl_any(m1232)) {
+                            const V v1233 = v1198 + v1194, v1234 = v1233 * v1233,
+                                v1235 = v1233 * v1234, v1236 = 3.0 * v1234, v1237 = v54 * v1236,
+                                v1238 = a13 * v1236, v1239 = a12 * v1236, v1240 = v927 * v1236,
+                                v1241 = v928 * v1236;
+                            v1216 = softehl_blend(m1232, v1235, v1216);
+                            v1217 = softehl_blend(m1232, v1240, v1217);
+                            v1218 = softehl_blend(m1232, v1241, v1218);
+                            v1219 = softehl_blend(m1232, v1238, v1219);
+                            v1220 = softehl_blend(m1232, v1239, v1220);
+                            v1221 = softehl_blend(m1232, v1237, v1221);
                         }
-                        v1207 = softehl_blend(m1213, v1214, v1207);
-                        v1208 = softehl_blend(m1213, v1215, v1208);
-                        v1209 = softehl_blend(m1213, v1216, v1209);
-                        v1210 = softehl_blend(m1213, v1217, v1210);
-                        v1211 = softehl_blend(m1213, v1218, v1211);
-                        v1212 = softehl_blend(m1213, v1219, v1212);
+                        v1209 = softehl_blend(m1215, v1216, v1209);
+                        v1210 = softehl_blend(m1215, v1217, v1210);
+                        v1211 = softehl_blend(m1215, v1218, v1211);
+                        v1212 = softehl_blend(m1215, v1219, v1212);
+                        v1213 = softehl_blend(m1215, v1220, v1213);
+                        v1214 = softehl_blend(m1215, v1221, v1214);
                     }
-                    v1199 = softehl_blend(m1205, v1207, v1199);
-                    v1200 = softehl_blend(m1205, v1208, v1200);
-                    v1201 = softehl_blend(m1205, v1209, v1201);
-                    v1202 = softehl_blend(m1205, v1210, v1202);
-                    v1203 = softehl_blend(m1205, v1211, v1203);
-                    v1204 = softehl_blend(m1205, v1212, v1204);
+                    v1201 = softehl_blend(m1207, v1209, v1201);
+                    v1202 = softehl_blend(m1207, v1210, v1202);
+                    v1203 = softehl_blend(m1207, v1211, v1203);
+                    v1204 = softehl_blend(m1207, v1212, v1204);
+                    v1205 = softehl_blend(m1207, v1213, v1205);
+                    v1206 = softehl_blend(m1207, v1214, v1206);
                 }
-                const M m1240 = ~v1198 & m1171;
-                if (softehl_any(m1240)) {
-                    const V v1241 = v1192 - v1196, v1242 = v1241 * v1241, v1243 = v1241 * v1242,
-                        v1244 = 3.0 * v1242, v1245 = v52 * v1244, v1246 = a13 * v1244,
-                        v1247 = -(a12 * v1244), v1248 = v927 * v1244, v1249 = -(v926 * v1244);
-                    v1199 = softehl_blend(m1240, v1243, v1199);
-                    v1200 = softehl_blend(m1240, v1248, v1200);
-                    v1201 = softehl_blend(m1240, v1249, v1201);
-                    v1202 = softehl_blend(m1240, v1246, v1202);
-                    v1203 = softehl_blend(m1240, v1247, v1203);
-                    v1204 = softehl_blend(m1240, v1245, v1204);
+                const M m1242 = ~v1200 & m1173;
+                if (softehl_any(m1242)) {
+                    const V v1243 = v1194 - v1198, v1244 = v1243 * v1243, v1245 = v1243 * v1244,
+                        v1246 = 3.0 * v1244, v1247 = v52 * v1246, v1248 = a13 * v1246,
+                        v1249 = -(a12 * v1246), v1250 = v929 * v1246, v1251 = -(v928 * v1246);
+                    v1201 = softehl_blend(m1242, v1245, v1201);
+                    v1202 = softehl_blend(m1242, v1250, v1202);
+                    v1203 = softehl_blend(m1242, v1251, v1203);
+                    v1204 = softehl_blend(m1242, v1248, v1204);
+                    v1205 = softehl_blend(m1242, v1249, v1205);
+                    v1206 = softehl_blend(m1242, v1247, v1206);
                 }
-                const V v1250 = v858 * v1194 - v857 * v1195, v1251 = v859 * v1195 - v856 * v1194,
-                    v1252 = (v5 * v835 - v18 * v934 - v19 * v935) * v851 + (v13 * v835 - v21 * v934 - v23 * v935) * v852,
-                    v1253 = v851 * (v10 * v1016 + (v11 * v1007 + v7 * v1011)) + v852 * (v17 * v1016 + (v26 * v1007 + v15 * v1011)),
-                    v1254 = v1179 * v1202,
-                    v1255 = v1203 * (v921 * v1252 + (v1053 * v1253 + (v946 * v1250 + v938 * v1251))),
-                    v1256 = v1202 * (v921 * v1180 + v1055 * v1179) + v1255,
-                    v1257 = v1203 * (v922 * v1252 + (v1054 * v1253 + (v949 * v1250 + v950 * v1251))),
-                    v1258 = v1202 * (v922 * v1180 + v1056 * v1179) + v1257,
-                    v1259 = v1203 * (v915 * v1252 + (v1033 * v1253 + (v940 * v1250 + v939 * v1251))),
-                    v1260 = v1202 * (v915 * v1180 + v1034 * v1179) + v1259,
-                    v1261 = v1203 * (v916 * v1252 + (v1036 * v1253 + (v952 * v1250 + v951 * v1251))),
-                    v1262 = v1202 * (v916 * v1180 + v1040 * v1179) + v1261,
-                    v1263 = v1203 * (v923 * v1252 + (v1038 * v1253 + (v954 * v1250 + v953 * v1251))),
-                    v1264 = v1202 * (v923 * v1180 + v1041 * v1179) + v1263,
-                    v1265 = v1203 * (v924 * v1252 + (v1042 * v1253 + (v941 * v1250 + v933 * v1251))),
-                    v1266 = v1202 * (v924 * v1180 + v1044 * v1179) + v1265, v1267 = v1177 * v1202,
-                    v1268 = v1178 * v1202,
-                    v1269 = v1203 * (v1047 * v1253 + (v918 * v1252 + (v942 * v1250 + v945 * v1251))),
-                    v1270 = v1203 * (v1049 * v1253 + (v919 * v1252 + (v947 * v1250 + v937 * v1251))),
-                    v1271 = v1203 * (v1051 * v1253 + (v920 * v1252 + (v943 * v1250 + v948 * v1251))),
-                    v1272 = v1253 * v1203,
-                    v1273 = v1203 * (v1045 * v1253 + (v917 * v1252 + (v944 * v1250 + v936 * v1251))),
-                    v1274 = v1202 * (v917 * v1180 + v1046 * v1179) + v1273,
-                    v1275 = v1202 * (v918 * v1180 + v1048 * v1179) + v1269,
-                    v1276 = v1202 * (v919 * v1180 + v1050 * v1179) + v1270,
-                    v1277 = v1202 * (v920 * v1180 + v1052 * v1179) + v1271, v1278 = w[1] * v1200,
-                    v1279 = w[1] * v1201, v1280 = v1200 * v994, v1281 = v1201 * v994,
-                    v1282 = v1200 * v991, v1283 = v1201 * v991,
-                    v1284 = v1029 * v1254 + v1009 * v1272, v1285 = v1030 * v1254 + v1017 * v1272,
-                    v1286 = v1278 * v992, v1287 = v1279 * v992, v1288 = v1278 * v993,
-                    v1289 = v1279 * v993, v1290 = v962 * v1280, v1291 = v962 * v1281,
-                    v1292 = v962 * v1282, v1293 = v962 * v1283, v1294 = v961 * v1280,
-                    v1295 = v961 * v1281, v1296 = v961 * v1282, v1297 = v961 * v1283,
-                    v1298 = v960 * v1280, v1299 = v960 * v1281, v1300 = v960 * v1282,
-                    v1301 = v960 * v1283, v1302 = v1020 * v1280, v1303 = v1020 * v1281,
-                    v1304 = v1020 * v1282, v1305 = v1020 * v1283, v1306 = v1021 * v1280,
-                    v1307 = v1021 * v1281, v1308 = v1021 * v1282, v1309 = v1021 * v1283,
-                    v1310 = -(v1019 * v1280), v1311 = -(v1019 * v1281), v1312 = -(v1019 * v1282),
-                    v1313 = -(v1019 * v1283);
-                v1122 = softehl_blend(m1171, v1176, v1122);
-                v1123 = softehl_blend(m1171, v1177, v1123);
-                v1124 = softehl_blend(m1171, v1178, v1124);
-                v1125 = softehl_blend(m1171, v1199, v1125);
-                v1126 = softehl_blend(m1171, v1290, v1126);
-                v1127 = softehl_blend(m1171, v1291, v1127);
-                v1128 = softehl_blend(m1171, v1292, v1128);
-                v1129 = softehl_blend(m1171, v1293, v1129);
-                v1130 = softehl_blend(m1171, v1294, v1130);
-                v1131 = softehl_blend(m1171, v1295, v1131);
-                v1132 = softehl_blend(m1171, v1296, v1132);
-                v1133 = softehl_blend(m1171, v1297, v1133);
-                v1134 = softehl_blend(m1171, v1298, v1134);
-                v1135 = softehl_blend(m1171, v1299, v1135);
-                v1136 = softehl_blend(m1171, v1300, v1136);
-                v1137 = softehl_blend(m1171, v1301, v1137);
-                v1138 = softehl_blend(m1171, v1302, v1138);
-                v1139 = softehl_blend(m1171, v1303, v1139);
-                v1140 = softehl_blend(m1171, v1304, v1140);
-                v1141 = softehl_blend(m1171, v1305, v1141);
-                v1142 = softehl_blend(m1171, v1306, v1142);
-                v1143 = softehl_blend(m1171, v1307, v1143);
-                v1144 = softehl_blend(m1171, v1308, v1144);
-                v1145 = softehl_blend(m1171, v1309, v1145);
-                v1146 = softehl_blend(m1171, v1310, v1146);
-                v1147 = softehl_blend(m1171, v1311, v1147);
-                v1148 = softehl_blend(m1171, v1312, v1148);
-                v1149 = softehl_blend(m1171, v1313, v1149);
-                v1150 = softehl_blend(m1171, v1179, v1150);
-                v1151 = softehl_blend(m1171, v1286, v1151);
-                v1152 = softehl_blend(m1171, v1287, v1152);
-                v1153 = softehl_blend(m1171, v1288, v1153);
-                v1154 = softehl_blend(m1171, v1289, v1154);
-                v1155 = softehl_blend(m1171, v1267, v1155);
-                v1156 = softehl_blend(m1171, v1268, v1156);
-                v1157 = softehl_blend(m1171, v1180, v1157);
-                v1158 = softehl_blend(m1171, v1284, v1158);
-                v1159 = softehl_blend(m1171, v1285, v1159);
-                v1160 = softehl_blend(m1171, v1274, v1160);
-                v1161 = softehl_blend(m1171, v1204, v1161);
-                v1162 = softehl_blend(m1171, v1275, v1162);
-                v1163 = softehl_blend(m1171, v1276, v1163);
-                v1164 = softehl_blend(m1171, v1277, v1164);
-                v1165 = softehl_blend(m1171, v1256, v1165);
-                v1166 = softehl_blend(m1171, v1258, v1166);
-                v1167 = softehl_blend(m1171, v1260, v1167);
-                v1168 = softehl_blend(m1171, v1262, v1168);
-                v1169 = softehl_blend(m1171, v1264, v1169);
-                v1170 = softehl_blend(m1171, v1266, v1170);
+                const V v1252 = v860 * v1196 - v859 * v1197, v1253 = v861 * v1197 - v858 * v1196,
+                    v1254 = (v5 * v837 - v18 * v936 - v19 * v937) * v853 + (v13 * v837 - v21 * v936 - v23 * v937) * v854,
+                    v1255 = v853 * (v10 * v1018 + (v11 * v1009 + v7 * v1013)) + v854 * (v17 * v1018 + (v26 * v1009 + v15 * v1013)),
+                    v1256 = v1181 * v1204,
+                    v1257 = v1205 * (v923 * v1254 + (v1055 * v1255 + (v948 * v1252 + v940 * v1253))),
+                    v1258 = v1204 * (v923 * v1182 + v1057 * v1181) + v1257,
+                    v1259 = v1205 * (v924 * v1254 + (v1056 * v1255 + (v951 * v1252 + v952 * v1253))),
+                    v1260 = v1204 * (v924 * v1182 + v1058 * v1181) + v1259,
+                    v1261 = v1205 * (v917 * v1254 + (v1035 * v1255 + (v942 * v1252 + v941 * v1253))),
+                    v1262 = v1204 * (v917 * v1182 + v1036 * v1181) + v1261,
+                    v1263 = v1205 * (v918 * v1254 + (v1038 * v1255 + (v954 * v1252 + v953 * v1253))),
+                    v1264 = v1204 * (v918 * v1182 + v1042 * v1181) + v1263,
+                    v1265 = v1205 * (v925 * v1254 + (v1040 * v1255 + (v956 * v1252 + v955 * v1253))),
+                    v1266 = v1204 * (v925 * v1182 + v1043 * v1181) + v1265,
+                    v1267 = v1205 * (v926 * v1254 + (v1044 * v1255 + (v943 * v1252 + v935 * v1253))),
+                    v1268 = v1204 * (v926 * v1182 + v1046 * v1181) + v1267, v1269 = v1179 * v1204,
+                    v1270 = v1180 * v1204,
+                    v1271 = v1205 * (v1049 * v1255 + (v920 * v1254 + (v944 * v1252 + v947 * v1253))),
+                    v1272 = v1205 * (v1051 * v1255 + (v921 * v1254 + (v949 * v1252 + v939 * v1253))),
+                    v1273 = v1205 * (v1053 * v1255 + (v922 * v1254 + (v945 * v1252 + v950 * v1253))),
+                    v1274 = v1255 * v1205,
+                    v1275 = v1205 * (v1047 * v1255 + (v919 * v1254 + (v946 * v1252 + v938 * v1253))),
+                    v1276 = v1204 * (v919 * v1182 + v1048 * v1181) + v1275,
+                    v1277 = v1204 * (v920 * v1182 + v1050 * v1181) + v1271,
+                    v1278 = v1204 * (v921 * v1182 + v1052 * v1181) + v1272,
+                    v1279 = v1204 * (v922 * v1182 + v1054 * v1181) + v1273, v1280 = w[1] * v1202,
+                    v1281 = w[1] * v1203, v1282 = v1202 * v996, v1283 = v1203 * v996,
+                    v1284 = v1202 * v993, v1285 = v1203 * v993,
+                    v1286 = v1031 * v1256 + v1011 * v1274, v1287 = v1032 * v1256 + v1019 * v1274,
+                    v1288 = v1280 * v994, v1289 = v1281 * v994, v1290 = v1280 * v995,
+                    v1291 = v1281 * v995, v1292 = v964 * v1282, v1293 = v964 * v1283,
+                    v1294 = v964 * v1284, v1295 = v964 * v1285, v1296 = v963 * v1282,
+                    v1297 = v963 * v1283, v1298 = v963 * v1284, v1299 = v963 * v1285,
+                    v1300 = v962 * v1282, v1301 = v962 * v1283, v1302 = v962 * v1284,
+                    v1303 = v962 * v1285, v1304 = v1022 * v1282, v1305 = v1022 * v1283,
+                    v1306 = v1022 * v1284, v1307 = v1022 * v1285, v1308 = v1023 * v1282,
+                    v1309 = v1023 * v1283, v1310 = v1023 * v1284, v1311 = v1023 * v1285,
+                    v1312 = -(v1021 * v1282), v1313 = -(v1021 * v1283), v1314 = -(v1021 * v1284),
+                    v1315 = -(v1021 * v1285);
+                v1124 = softehl_blend(m1173, v1178, v1124);
+                v1125 = softehl_blend(m1173, v1179, v1125);
+                v1126 = softehl_blend(m1173, v1180, v1126);
+                v1127 = softehl_blend(m1173, v1201, v1127);
+                v1128 = softehl_blend(m1173, v1292, v1128);
+                v1129 = softehl_blend(m1173, v1293, v1129);
+                v1130 = softehl_blend(m1173, v1294, v1130);
+                v1131 = softehl_blend(m1173, v1295, v1131);
+                v1132 = softehl_blend(m1173, v1296, v1132);
+                v1133 = softehl_blend(m1173, v1297, v1133);
+                v1134 = softehl_blend(m1173, v1298, v1134);
+                v1135 = softehl_blend(m1173, v1299, v1135);
+                v1136 = softehl_blend(m1173, v1300, v1136);
+                v1137 = softehl_blend(m1173, v1301, v1137);
+                v1138 = softehl_blend(m1173, v1302, v1138);
+                v1139 = softehl_blend(m1173, v1303, v1139);
+                v1140 = softehl_blend(m1173, v1304, v1140);
+                v1141 = softehl_blend(m1173, v1305, v1141);
+                v1142 = softehl_blend(m1173, v1306, v1142);
+                v1143 = softehl_blend(m1173, v1307, v1143);
+                v1144 = softehl_blend(m1173, v1308, v1144);
+                v1145 = softehl_blend(m1173, v1309, v1145);
+                v1146 = softehl_blend(m1173, v1310, v1146);
+                v1147 = softehl_blend(m1173, v1311, v1147);
+                v1148 = softehl_blend(m1173, v1312, v1148);
+                v1149 = softehl_blend(m1173, v1313, v1149);
+                v1150 = softehl_blend(m1173, v1314, v1150);
+                v1151 = softehl_blend(m1173, v1315, v1151);
+                v1152 = softehl_blend(m1173, v1181, v1152);
+                v1153 = softehl_blend(m1173, v1288, v1153);
+                v1154 = softehl_blend(m1173, v1289, v1154);
+                v1155 = softehl_blend(m1173, v1290, v1155);
+                v1156 = softehl_blend(m1173, v1291, v1156);
+                v1157 = softehl_blend(m1173, v1269, v1157);
+                v1158 = softehl_blend(m1173, v1270, v1158);
+                v1159 = softehl_blend(m1173, v1182, v1159);
+                v1160 = softehl_blend(m1173, v1286, v1160);
+                v1161 = softehl_blend(m1173, v1287, v1161);
+                v1162 = softehl_blend(m1173, v1276, v1162);
+                v1163 = softehl_blend(m1173, v1206, v1163);
+                v1164 = softehl_blend(m1173, v1277, v1164);
+                v1165 = softehl_blend(m1173, v1278, v1165);
+                v1166 = softehl_blend(m1173, v1279, v1166);
+                v1167 = softehl_blend(m1173, v1258, v1167);
+                v1168 = softehl_blend(m1173, v1260, v1168);
+                v1169 = softehl_blend(m1173, v1262, v1169);
+                v1170 = softehl_blend(m1173, v1264, v1170);
+                v1171 = softehl_blend(m1173, v1266, v1171);
+                v1172 = softehl_blend(m1173, v1268, v1172);
             }
-            v1057 = softehl_blend(m1120, v1122, v1057); v1058 = softehl_blend(m1120, v1123, v1058);
-            v1059 = softehl_blend(m1120, v1124, v1059); v1060 = softehl_blend(m1120, v1125, v1060);
-            v1061 = softehl_blend(m1120, v1126, v1061); v1062 = softehl_blend(m1120, v1127, v1062);
-            v1063 = softehl_blend(m1120, v1128, v1063); v1064 = softehl_blend(m1120, v1129, v1064);
-            v1065 = softehl_blend(m1120, v1130, v1065); v1066 = softehl_blend(m1120, v1131, v1066);
-            v1067 = softehl_blend(m1120, v1132, v1067); v1068 = softehl_blend(m1120, v1133, v1068);
-            v1069 = softehl_blend(m1120, v1134, v1069); v1070 = softehl_blend(m1120, v1135, v1070);
-            v1071 = softehl_blend(m1120, v1136, v1071); v1072 = softehl_blend(m1120, v1137, v1072);
-            v1073 = softehl_blend(m1120, v1138, v1073); v1074 = softehl_blend(m1120, v1139, v1074);
-            v1075 = softehl_blend(m1120, v1140, v1075); v1076 = softehl_blend(m1120, v1141, v1076);
-            v1077 = softehl_blend(m1120, v1142, v1077); v1078 = softehl_blend(m1120, v1143, v1078);
-            v1079 = softehl_blend(m1120, v1144, v1079); v1080 = softehl_blend(m1120, v1145, v1080);
-            v1081 = softehl_blend(m1120, v1146, v1081); v1082 = softehl_blend(m1120, v1147, v1082);
-            v1083 = softehl_blend(m1120, v1148, v1083); v1084 = softehl_blend(m1120, v1149, v1084);
-            v1085 = softehl_blend(m1120, v1150, v1085); v1086 = softehl_blend(m1120, v1151, v1086);
-            v1087 = softehl_blend(m1120, v1152, v1087); v1088 = softehl_blend(m1120, v1153, v1088);
-            v1089 = softehl_blend(m1120, v1154, v1089); v1090 = softehl_blend(m1120, v1155, v1090);
-            v1091 = softehl_blend(m1120, softehl_splat(0.0), v1091);
-            v1092 = softehl_blend(m1120, v1156, v1092);
-            v1093 = softehl_blend(m1120, softehl_splat(0.0), v1093);
-            v1094 = softehl_blend(m1120, v1157, v1094); v1095 = softehl_blend(m1120, v1158, v1095);
-            v1096 = softehl_blend(m1120, softehl_splat(0.0), v1096);
-            v1097 = softehl_blend(m1120, v1159, v1097);
-            v1098 = softehl_blend(m1120, softehl_splat(0.0), v1098);
-            v1099 = softehl_blend(m1120, v1160, v1099); v1100 = softehl_blend(m1120, v1161, v1100);
-            v1101 = softehl_blend(m1120, softehl_splat(0.0), v1101);
-            v1102 = softehl_blend(m1120, v1162, v1102);
-            v1103 = softehl_blend(m1120, softehl_splat(0.0), v1103);
-            v1104 = softehl_blend(m1120, v1163, v1104);
-            v1105 = softehl_blend(m1120, softehl_splat(0.0), v1105);
-            v1106 = softehl_blend(m1120, v1164, v1106);
-            v1107 = softehl_blend(m1120, softehl_splat(0.0), v1107);
-            v1108 = softehl_blend(m1120, v1165, v1108);
-            v1109 = softehl_blend(m1120, softehl_splat(0.0), v1109);
-            v1110 = softehl_blend(m1120, v1166, v1110);
-            v1111 = softehl_blend(m1120, softehl_splat(0.0), v1111);
-            v1112 = softehl_blend(m1120, v1167, v1112);
-            v1113 = softehl_blend(m1120, softehl_splat(0.0), v1113);
-            v1114 = softehl_blend(m1120, v1168, v1114);
-            v1115 = softehl_blend(m1120, softehl_splat(0.0), v1115);
-            v1116 = softehl_blend(m1120, v1169, v1116);
-            v1117 = softehl_blend(m1120, softehl_splat(0.0), v1117);
-            v1118 = softehl_blend(m1120, v1170, v1118);
-            v1119 = softehl_blend(m1120, softehl_splat(0.0), v1119);
+            v1059 = softehl_blend(m1122, v1124, v1059); v1060 = softehl_blend(m1122, v1125, v1060);
+            v1061 = softehl_blend(m1122, v1126, v1061); v1062 = softehl_blend(m1122, v1127, v1062);
+            v1063 = softehl_blend(m1122, v1128, v1063); v1064 = softehl_blend(m1122, v1129, v1064);
+            v1065 = softehl_blend(m1122, v1130, v1065); v1066 = softehl_blend(m1122, v1131, v1066);
+            v1067 = softehl_blend(m1122, v1132, v1067); v1068 = softehl_blend(m1122, v1133, v1068);
+            v1069 = softehl_blend(m1122, v1134, v1069); v1070 = softehl_blend(m1122, v1135, v1070);
+            v1071 = softehl_blend(m1122, v1136, v1071); v1072 = softehl_blend(m1122, v1137, v1072);
+            v1073 = softehl_blend(m1122, v1138, v1073); v1074 = softehl_blend(m1122, v1139, v1074);
+            v1075 = softehl_blend(m1122, v1140, v1075); v1076 = softehl_blend(m1122, v1141, v1076);
+            v1077 = softehl_blend(m1122, v1142, v1077); v1078 = softehl_blend(m1122, v1143, v1078);
+            v1079 = softehl_blend(m1122, v1144, v1079); v1080 = softehl_blend(m1122, v1145, v1080);
+            v1081 = softehl_blend(m1122, v1146, v1081); v1082 = softehl_blend(m1122, v1147, v1082);
+            v1083 = softehl_blend(m1122, v1148, v1083); v1084 = softehl_blend(m1122, v1149, v1084);
+            v1085 = softehl_blend(m1122, v1150, v1085); v1086 = softehl_blend(m1122, v1151, v1086);
+            v1087 = softehl_blend(m1122, v1152, v1087); v1088 = softehl_blend(m1122, v1153, v1088);
+            v1089 = softehl_blend(m1122, v1154, v1089); v1090 = softehl_blend(m1122, v1155, v1090);
+            v1091 = softehl_blend(m1122, v1156, v1091); v1092 = softehl_blend(m1122, v1157, v1092);
+            v1094 = softehl_blend(m1122, v1158, v1094); v1096 = softehl_blend(m1122, v1159, v1096);
+            v1097 = softehl_blend(m1122, v1160, v1097); v1099 = softehl_blend(m1122, v1161, v1099);
+            v1101 = softehl_blend(m1122, v1162, v1101); v1102 = softehl_blend(m1122, v1163, v1102);
+            v1104 = softehl_blend(m1122, v1164, v1104); v1106 = softehl_blend(m1122, v1165, v1106);
+            v1108 = softehl_blend(m1122, v1166, v1108); v1110 = softehl_blend(m1122, v1167, v1110);
+            v1112 = softehl_blend(m1122, v1168, v1112); v1114 = softehl_blend(m1122, v1169, v1114);
+            v1116 = softehl_blend(m1122, v1170, v1116); v1118 = softehl_blend(m1122, v1171, v1118);
+            v1120 = softehl_blend(m1122, v1172, v1120);
         }
-        const M m1314 = ~v1035;
-        if (softehl_any(m1314)) {
-            const V v1315 = v1028 - v930, v1316 = v1315 * v1315, v1317 = v1315 * v1316,
-                v1318 = 3.0 * v1316, v1319 = v927 * v1318, v1320 = v50 * v1318,
-                v1321 = -(v926 * v1318), v1322 = a12 * v1318, v1323 = v1322 * v1046,
-                v1324 = v1322 * v1048, v1325 = v1322 * v1050, v1326 = v1322 * v1052,
-                v1327 = v1322 * v1055, v1328 = v1322 * v1056, v1329 = v1322 * v1034,
-                v1330 = v1322 * v1040, v1331 = v1322 * v1041, v1332 = v1322 * v1044,
-                v1333 = v1322 * v1029, v1334 = v1322 * v1030;
-            v1057 = softehl_blend(m1314, v1317, v1057); v1058 = softehl_blend(m1314, v1319, v1058);
-            v1059 = softehl_blend(m1314, v1321, v1059); v1060 = softehl_blend(m1314, v1317, v1060);
-            v1061 = softehl_blend(m1314, softehl_splat(0.0), v1061);
-            v1062 = softehl_blend(m1314, softehl_splat(0.0), v1062);
-            v1063 = softehl_blend(m1314, softehl_splat(0.0), v1063);
-            v1064 = softehl_blend(m1314, softehl_splat(0.0), v1064);
-            v1065 = softehl_blend(m1314, softehl_splat(0.0), v1065);
-            v1066 = softehl_blend(m1314, softehl_splat(0.0), v1066);
-            v1067 = softehl_blend(m1314, softehl_splat(0.0), v1067);
-            v1068 = softehl_blend(m1314, softehl_splat(0.0), v1068);
-            v1069 = softehl_blend(m1314, softehl_splat(0.0), v1069);
-            v1070 = softehl_blend(m1314, softehl_splat(0.0), v1070);
-            v1071 = softehl_blend(m1314, softehl_splat(0.0), v1071);
-            v1072 = softehl_blend(m1314, softehl_splat(0.0), v1072);
-            v1073 = softehl_blend(m1314, softehl_splat(0.0), v1073);
-            v1074 = softehl_blend(m1314, softehl_splat(0.0), v1074);
-            v1075 = softehl_blend(m1314, softehl_splat(0.0), v1075);
-            v1076 = softehl_blend(m1314, softehl_splat(0.0), v1076);
-            v1077 = softehl_blend(m1314, softehl_splat(0.0), v1077);
-            v1078 = softehl_blend(m1314, softehl_splat(0.0), v1078);
-            v1079 = softehl_blend(m1314, softehl_splat(0.0), v1079);
-            v1080 = softehl_blend(m1314, softehl_splat(0.0), v1080);
-            v1081 = softehl_blend(m1314, softehl_splat(0.0), v1081);
-            v1082 = softehl_blend(m1314, softehl_splat(0.0), v1082);
-            v1083 = softehl_blend(m1314, softehl_splat(0.0), v1083);
-            v1084 = softehl_blend(m1314, softehl_splat(0.0), v1084);
-            v1085 = softehl_blend(m1314, v1322, v1085);
-            v1086 = softehl_blend(m1314, softehl_splat(0.0), v1086);
-            v1087 = softehl_blend(m1314, softehl_splat(0.0), v1087);
-            v1088 = softehl_blend(m1314, softehl_splat(0.0), v1088);
-            v1089 = softehl_blend(m1314, softehl_splat(0.0), v1089);
-            v1090 = softehl_blend(m1314, softehl_splat(0.0), v1090);
-            v1091 = softehl_blend(m1314, v1319, v1091);
-            v1092 = softehl_blend(m1314, softehl_splat(0.0), v1092);
-            v1093 = softehl_blend(m1314, v1321, v1093); v1094 = softehl_blend(m1314, v1320, v1094);
-            v1095 = softehl_blend(m1314, softehl_splat(0.0), v1095);
-            v1096 = softehl_blend(m1314, v1333, v1096);
-            v1097 = softehl_blend(m1314, softehl_splat(0.0), v1097);
-            v1098 = softehl_blend(m1314, v1334, v1098);
-            v1099 = softehl_blend(m1314, softehl_splat(0.0), v1099);
-            v1100 = softehl_blend(m1314, v1320, v1100); v1101 = softehl_blend(m1314, v1323, v1101);
-            v1102 = softehl_blend(m1314, softehl_splat(0.0), v1102);
-            v1103 = softehl_blend(m1314, v1324, v1103);
-            v1104 = softehl_blend(m1314, softehl_splat(0.0), v1104);
-            v1105 = softehl_blend(m1314, v1325, v1105);
-            v1106 = softehl_blend(m1314, softehl_splat(0.0), v1106);
-            v1107 = softehl_blend(m1314, v1326, v1107);
-            v1108 = softehl_blend(m1314, softehl_splat(0.0), v1108);
-            v1109 = softehl_blend(m1314, v1327, v1109);
-            v1110 = softehl_blend(m1314, softehl_splat(0.0), v1110);
-            v1111 = softehl_blend(m1314, v1328, v1111);
-            v1112 = softehl_blend(m1314, softehl_splat(0.0), v1112);
-            v1113 = softehl_blend(m1314, v1329, v1113);
-            v1114 = softehl_blend(m1314, softehl_splat(0.0), v1114);
-            v1115 = softehl_blend(m1314, v1330, v1115);
-            v1116 = softehl_blend(m1314, softehl_splat(0.0), v1116);
-            v1117 = softehl_blend(m1314, v1331, v1117);
-            v1118 = softehl_blend(m1314, softehl_splat(0.0), v1118);
-            v1119 = softehl_blend(m1314, v1332, v1119);
+        const M m1316 = ~v1037;
+        if (softehl_any(m1316)) {
+            const V v1317 = v1030 - v932, v1318 = v1317 * v1317, v1319 = v1317 * v1318,
+                v1320 = 3.0 * v1318, v1321 = v929 * v1320, v1322 = v50 * v1320,
+                v1323 = -(v928 * v1320), v1324 = a12 * v1320, v1325 = v1324 * v1048,
+                v1326 = v1324 * v1050, v1327 = v1324 * v1052, v1328 = v1324 * v1054,
+                v1329 = v1324 * v1057, v1330 = v1324 * v1058, v1331 = v1324 * v1036,
+                v1332 = v1324 * v1042, v1333 = v1324 * v1043, v1334 = v1324 * v1046,
+                v1335 = v1324 * v1031, v1336 = v1324 * v1032;
+            v1059 = softehl_blend(m1316, v1319, v1059); v1060 = softehl_blend(m1316, v1321, v1060);
+            v1061 = softehl_blend(m1316, v1323, v1061); v1062 = softehl_blend(m1316, v1319, v1062);
+            v1087 = softehl_blend(m1316, v1324, v1087); v1093 = softehl_blend(m1316, v1321, v1093);
+            v1095 = softehl_blend(m1316, v1323, v1095); v1096 = softehl_blend(m1316, v1322, v1096);
+            v1098 = softehl_blend(m1316, v1335, v1098); v1100 = softehl_blend(m1316, v1336, v1100);
+            v1102 = softehl_blend(m1316, v1322, v1102); v1103 = softehl_blend(m1316, v1325, v1103);
+            v1105 = softehl_blend(m1316, v1326, v1105); v1107 = softehl_blend(m1316, v1327, v1107);
+            v1109 = softehl_blend(m1316, v1328, v1109); v1111 = softehl_blend(m1316, v1329, v1111);
+            v1113 = softehl_blend(m1316, v1330, v1113); v1115 = softehl_blend(m1316, v1331, v1115);
+            v1117 = softehl_blend(m1316, v1332, v1117); v1119 = softehl_blend(m1316, v1333, v1119);
+            v1121 = softehl_blend(m1316, v1334, v1121);
         }
-        s568 += v1061; s569 += v1062; s570 += v1063; s571 += v1064; s572 += v1065; s573 += v1066;
-        s574 += v1067; s575 += v1068; s576 += v1069; s577 += v1070; s578 += v1071; s579 += v1072;
-        s580 += v1073; s581 += v1074; s582 += v1075; s583 += v1076; s584 += v1077; s585 += v1078;
-        s586 += v1079; s587 += v1080; s588 += v1081; s589 += v1082; s590 += v1083; s591 += v1084;
-        s594 += v1086; s595 += v1087; s598 += v1088; s599 += v1089;
-        const V v1335 = v1091 + v1090, v1336 = v1093 + v1092, v1337 = softehl_vsqrt(1.0 / v958),
-            v1338 = v1096 + v1095, v1339 = v1098 + v1097,
-            v1340 = (v24 * v830 + (v22 * v829 + (v931 + v932)) - X5 * v835) * (v988 * v557),
-            v1341 = v1029 * v1085, v1342 = v1030 * v1085, v1343 = v959 * v964, v1344 = w[1] * v1058,
-            v1345 = v46 * w[1], v1346 = w[1] * v1059, v1347 = w[1] * v1335,
-            v1348 = v1058 * v991 + v1335 * v994, v1349 = v1335 * v991 - v1058 * v994,
-            v1350 = v1345 * v926, v1351 = v1345 * v925, v1352 = v1059 * v991 + v1336 * v994,
-            v1353 = w[1] * v1336, v1354 = v1336 * v991 - v1059 * v994,
-            v1355 = v1340 + 2.0 * (v39 * v955 + v34 * v956) * (v1337 * (v559 * v964)),
-            v1356 = w[1] * v992;
-        s612 += v1347 * v992; s614 += v1347 * v993; const V v1357 = w[1] * v993;
-        s613 += v1353 * v992; s615 += v1353 * v993; s562 += v1344 * v992; s564 += v1344 * v993;
-        s563 += v1346 * v992; s565 += v1346 * v993;
-        const V v1358 = v1057 * v1355, v1359 = v1057 * v989, v1360 = v1057 * v1343,
-            v1361 = v1060 * v989, v1362 = v1060 * v1343, v1363 = v1060 * v1355, v1364 = 0.5 * v1359,
-            v1365 = 0.5 * v1361;
-        s560 += v1350 * v1359; s566 += v1350 * v1361; s561 += v1351 * v1359; s567 += v1351 * v1361;
-        const V v1366 = v852 * v1057 + v851 * v1060, v1367 = v852 * v1060 - v851 * v1057,
-            v1368 = v928 * v1362, v1369 = v928 * v1360, v1370 = v929 * v1360, v1371 = v929 * v1362,
-            v1372 = v1366 * v989, v1373 = v1367 * v989, v1374 = v1366 * v1343,
-            v1375 = v1367 * v1343, v1376 = v1366 * v1355, v1377 = v1367 * v1355,
-            v1378 = v934 * v1373, v1379 = v934 * v1372, v1380 = v935 * v1372, v1381 = v935 * v1373,
-            v1382 = v835 * v1372, v1383 = v835 * v1373, v1384 = v1011 * v1372,
-            v1385 = v1011 * v1373, v1386 = v1016 * v1372, v1387 = v1016 * v1373,
-            v1388 = v1007 * v1372, v1389 = v1007 * v1373;
-        s604 += v1020 * v1373; s605 += v1020 * v1372; s606 += v960 * v1373; s607 += v960 * v1372;
-        s608 += v961 * v1373; s609 += v961 * v1372; s610 += v962 * v1373; s611 += v962 * v1372;
-        s601 += v1019 * v1372; s603 += v1021 * v1372; s600 += v1019 * v1373; s602 += v1021 * v1373;
-        s616 += v962 * v1348; s620 += v961 * v1348; s632 += v1021 * v1348; s636 += v1019 * v1348;
-        s617 += v962 * v1352; s621 += v961 * v1352; s633 += v1021 * v1352; s637 += v1019 * v1352;
-        s618 += v962 * v1349; s622 += v961 * v1349; s634 += v1021 * v1349; s635 += v1021 * v1354;
-        s619 += v962 * v1354; s623 += v961 * v1354; s638 += v1019 * v1349; s639 += v1019 * v1354;
-        s625 += v960 * v1352; s626 += v960 * v1349; s627 += v960 * v1354; s629 += v1020 * v1352;
-        s630 += v1020 * v1349; s631 += v1020 * v1354; s628 += v1020 * v1348; s624 += v960 * v1348;
-        s592 += v1341 * v1356; s593 += v1342 * v1356; s596 += v1341 * v1357; s597 += v1342 * v1357;
-        s650 += v1338 * v1356; s651 += v1339 * v1356; s662 += v1338 * v1357; s663 += v1339 * v1357;
-        const V v1390 = v1338 * v991 - v1341 * v994, v1391 = v1339 * v991 - v1342 * v994,
-            v1392 = v1341 * v991 + v1338 * v994, v1393 = v1342 * v991 + v1339 * v994;
-        s666 += v962 * v1390; s667 += v962 * v1391; s664 += v962 * v1392; s665 += v962 * v1393;
-        const V v1394 = (v859 * v1057 - v856 * v1060) * v989,
-            v1395 = (v856 * v1057 + v859 * v1060) * v989,
-            v1396 = (v858 * v1057 + v857 * v1060) * v989,
-            v1397 = (v858 * v1060 - v857 * v1057) * v989;
-        s668 += v961 * v1392; s669 += v961 * v1393; s670 += v961 * v1390; s671 += v961 * v1391;
-        s672 += v960 * v1392; s673 += v960 * v1393; s674 += v960 * v1390; s675 += v960 * v1391;
-        const V v1398 = v918 * v1094 + v1048 * v1085, v1399 = v919 * v1094 + v1050 * v1085,
-            v1400 = v920 * v1094 + v1052 * v1085, v1401 = v916 * v1094 + v1040 * v1085,
-            v1402 = v923 * v1094 + v1041 * v1085, v1403 = v917 * v1094 + v1046 * v1085,
-            v1404 = v921 * v1094 + v1055 * v1085, v1405 = v922 * v1094 + v1056 * v1085,
-            v1406 = v915 * v1094 + v1034 * v1085, v1407 = v924 * v1094 + v1044 * v1085,
-            v1408 = v917 * v1100 + (v1101 + v1099), v1409 = v921 * v1100 + (v1109 + v1108),
-            v1410 = v922 * v1100 + (v1111 + v1110), v1411 = v915 * v1100 + (v1113 + v1112),
-            v1412 = v924 * v1100 + (v1119 + v1118), v1413 = v918 * v1100 + (v1103 + v1102),
-            v1414 = v919 * v1100 + (v1105 + v1104), v1415 = v920 * v1100 + (v1107 + v1106),
-            v1416 = v916 * v1100 + (v1115 + v1114), v1417 = v923 * v1100 + (v1117 + v1116),
-            v1418 = v46 * (v1364 + v926 * v1358), v1419 = v46 * (v925 * v1358 - v1364),
-            v1420 = v46 * (v1365 + v926 * v1363), v1421 = v46 * (v925 * v1363 - v1365);
-        s684 += w[1] * (v1009 * v1388 + v1015 * v1392);
-        s686 += w[1] * (v1009 * v1389 + v1015 * v1390);
-        s685 += w[1] * (v1017 * v1388 + v1015 * v1393);
-        s687 += w[1] * (v1017 * v1389 + v1015 * v1391);
-        s676 += w[1] * (v1009 * v1384 - v1012 * v1392);
-        s677 += w[1] * (v1017 * v1384 - v1012 * v1393);
-        s678 += w[1] * (v1009 * v1385 - v1012 * v1390);
-        s679 += w[1] * (v1017 * v1385 - v1012 * v1391);
-        s680 += w[1] * (v1009 * v1386 - v1014 * v1392);
-        s681 += w[1] * (v1017 * v1386 - v1014 * v1393);
-        s682 += w[1] * (v1009 * v1387 - v1014 * v1390);
-        s683 += w[1] * (v1017 * v1387 - v1014 * v1391);
-        s640 += w[1] * (v1403 * v992 + (v538 * v1369 + v917 * v1419));
-        s641 += w[1] * (v1398 * v992 + (v539 * v1369 + v918 * v1419));
-        s642 += w[1] * (v1399 * v992 + (v543 * v1369 + v919 * v1419));
-        s643 += w[1] * (v1400 * v992 + (v544 * v1369 + v920 * v1419));
-        s644 += w[1] * (v1404 * v992 + (v536 * v1369 + v921 * v1419));
-        s645 += w[1] * (v1405 * v992 + (v537 * v1369 + v922 * v1419));
-        s646 += w[1] * (v1406 * v992 + (v546 * v1369 + v915 * v1419));
-        s647 += w[1] * (v1401 * v992 + (v547 * v1369 + v916 * v1419));
-        s648 += w[1] * (v1402 * v992 + (v548 * v1369 + v923 * v1419));
-        s649 += w[1] * (v1407 * v992 + (v550 * v1369 + v924 * v1419));
-        s661 += w[1] * (v1407 * v993 + (v550 * v1370 + v924 * v1418));
-        s658 += w[1] * (v1406 * v993 + (v546 * v1370 + v915 * v1418));
-        s659 += w[1] * (v1401 * v993 + (v547 * v1370 + v916 * v1418));
-        s652 += w[1] * (v1403 * v993 + (v538 * v1370 + v917 * v1418));
-        s653 += w[1] * (v1398 * v993 + (v539 * v1370 + v918 * v1418));
-        s654 += w[1] * (v1399 * v993 + (v543 * v1370 + v919 * v1418));
-        s655 += w[1] * (v1400 * v993 + (v544 * v1370 + v920 * v1418));
-        s656 += w[1] * (v1404 * v993 + (v536 * v1370 + v921 * v1418));
-        const V v1422 = v1399 * v991 + (v919 * v1376 + (v543 * v1374 + v937 * v1394)) + v994 * v1414,
-            v1423 = v919 * v1377 + (v543 * v1375 + v937 * v1395) - v1399 * v994 + v991 * v1414,
-            v1424 = v1400 * v991 + (v920 * v1376 + (v544 * v1374 + v948 * v1394)) + v994 * v1415,
-            v1425 = v920 * v1377 + (v544 * v1375 + v948 * v1395) - v1400 * v994 + v991 * v1415;
-        s657 += w[1] * (v1405 * v993 + (v537 * v1370 + v922 * v1418));
-        s660 += w[1] * (v1402 * v993 + (v548 * v1370 + v923 * v1418));
-        const V v1426 = v947 * v1397 + v1422, v1427 = v1423 - v947 * v1396,
-            v1428 = v943 * v1397 + v1424, v1429 = v1425 - v943 * v1396,
-            v1430 = v946 * v1397 + (v1404 * v991 + (v536 * v1374 + v938 * v1394) + v994 * v1409),
-            v1431 = v921 * v1377 + (v536 * v1375 + v938 * v1395) - v1404 * v994 - v946 * v1396,
-            v1432 = v922 * v1377 + (v537 * v1375 + v950 * v1395) - v1405 * v994 - v949 * v1396,
-            v1433 = v1431 + v991 * v1409, v1434 = v1432 + v991 * v1410,
-            v1435 = v949 * v1397 + (v1405 * v991 + (v537 * v1374 + v950 * v1394)) + v994 * v1410,
-            v1436 = w[1] * (v833 * v1426 - v919 * v1382);
-        s750 += v1436; const V v1437 = w[1] * (v833 * v1428 - v920 * v1382); s751 += v1437;
-        const V v1438 = w[1] * (v833 * v1427 - v919 * v1383); s760 += v1438;
-        const V v1439 = w[1] * (v833 * v1429 - v920 * v1383); s761 += v1439;
-        const V v1440 = v922 * v1376 + v1435, v1441 = v921 * v1376 + v1430,
-            v1442 = w[1] * (v833 * v1433 - v921 * v1383);
-        s762 += v1442; const V v1443 = w[1] * (v833 * v1434 - v922 * v1383); s763 += v1443;
-        const V v1444 = w[1] * (v922 * v1379 + v836 * v1440); s713 += v1444;
-        const V v1445 = w[1] * (v921 * v1379 + v836 * v1441); s712 += v1445;
-        const V v1446 = w[1] * (v919 * v1379 + v836 * v1426); s710 += v1446;
-        const V v1447 = w[1] * (v833 * v1440 - v922 * v1382); s753 += v1447;
-        const V v1448 = w[1] * (v833 * v1441 - v921 * v1382); s752 += v1448;
-        const V v1449 = w[1] * (v920 * v1379 + v836 * v1428); s711 += v1449;
-        const V v1450 = w[1] * (v919 * v1378 + v836 * v1427); s720 += v1450;
-        const V v1451 = w[1] * (v920 * v1378 + v836 * v1429); s721 += v1451;
-        const V v1452 = v1403 * v991 + (v944 * v1397 + (v917 * v1376 + (v538 * v1374 + v936 * v1394))),
-            v1453 = w[1] * (v921 * v1378 + v836 * v1433);
-        s722 += v1453;
-        const V v1454 = v1452 + v994 * v1408,
-            v1455 = v538 * v1375 + v936 * v1395 - v944 * v1396 - v1403 * v994 + v991 * v1408,
-            v1456 = w[1] * (v922 * v1378 + v836 * v1434);
-        s723 += v1456; const V v1457 = w[1] * (v919 * v1381 + v837 * v1427); s740 += v1457;
-        const V v1458 = w[1] * (v920 * v1381 + v837 * v1429); s741 += v1458;
-        const V v1459 = w[1] * (v917 * v1379 + v836 * v1454); s708 += v1459;
-        const V v1460 = w[1] * (v917 * v1380 + v837 * v1454); s728 += v1460;
-        const V v1461 = v917 * v1377 + v1455, v1462 = w[1] * (v922 * v1381 + v837 * v1434);
-        s743 += v1462; const V v1463 = w[1] * (v833 * v1454 - v917 * v1382); s748 += v1463;
-        const V v1464 = w[1] * (v917 * v1378 + v836 * v1461); s718 += v1464;
-        const V v1465 = w[1] * (v917 * v1381 + v837 * v1461); s738 += v1465;
-        const V v1466 = w[1] * (v919 * v1380 + v837 * v1426); s730 += v1466;
-        const V v1467 = w[1] * (v833 * v1461 - v917 * v1383); s758 += v1467;
-        const V v1468 = w[1] * (v920 * v1380 + v837 * v1428); s731 += v1468;
-        const V v1469 = w[1] * (v921 * v1380 + v837 * v1441); s732 += v1469;
-        const V v1470 = w[1] * (v922 * v1380 + v837 * v1440); s733 += v1470;
-        const V v1471 = w[1] * (v921 * v1381 + v837 * v1433); s742 += v1471;
-        const V v1472 = w[1] * (v1049 * v1384 - v1012 * v1426); s770 += v1472;
-        const V v1473 = w[1] * (v1051 * v1384 - v1012 * v1428); s771 += v1473;
-        const V v1474 = w[1] * (v1053 * v1384 - v1012 * v1441); s772 += v1474;
-        const V v1475 = w[1] * (v1054 * v1384 - v1012 * v1440); s773 += v1475;
-        const V v1476 = w[1] * (v1053 * v1385 - v1012 * v1433); s782 += v1476;
-        const V v1477 = w[1] * (v1045 * v1384 - v1012 * v1454); s768 += v1477;
-        const V v1478 = w[1] * (v1045 * v1385 - v1012 * v1461); s778 += v1478;
-        const V v1479 = w[1] * (v1049 * v1385 - v1012 * v1427); s780 += v1479;
-        const V v1480 = w[1] * (v1051 * v1385 - v1012 * v1429); s781 += v1480;
-        const V v1481 = w[1] * (v1054 * v1385 - v1012 * v1434); s783 += v1481;
-        const V v1482 = w[1] * (v1045 * v1386 - v1014 * v1454); s788 += v1482;
-        const V v1483 = w[1] * (v1045 * v1387 - v1014 * v1461); s798 += v1483;
-        const V v1484 = w[1] * (v1049 * v1387 - v1014 * v1427); s800 += v1484;
-        const V v1485 = w[1] * (v1051 * v1387 - v1014 * v1429); s801 += v1485;
-        const V v1486 = w[1] * (v1054 * v1387 - v1014 * v1434); s803 += v1486;
-        const V v1487 = w[1] * (v1045 * v1388 + v1015 * v1454); s808 += v1487;
-        const V v1488 = w[1] * (v1045 * v1389 + v1015 * v1461); s818 += v1488;
-        const V v1489 = w[1] * (v1049 * v1389 + v1015 * v1427); s820 += v1489;
-        const V v1490 = w[1] * (v1051 * v1389 + v1015 * v1429); s821 += v1490;
-        const V v1491 = w[1] * (v1054 * v1389 + v1015 * v1434); s823 += v1491;
-        const V v1492 = w[1] * (v1049 * v1386 - v1014 * v1426); s790 += v1492;
-        const V v1493 = w[1] * (v1049 * v1388 + v1015 * v1426); s810 += v1493;
-        const V v1494 = w[1] * (v1051 * v1386 - v1014 * v1428); s791 += v1494;
-        const V v1495 = w[1] * (v1051 * v1388 + v1015 * v1428); s811 += v1495;
-        const V v1496 = w[1] * (v1053 * v1386 - v1014 * v1441); s792 += v1496;
-        const V v1497 = w[1] * (v1053 * v1388 + v1015 * v1441); s812 += v1497;
-        const V v1498 = w[1] * (v1054 * v1386 - v1014 * v1440); s793 += v1498;
-        const V v1499 = w[1] * (v1054 * v1388 + v1015 * v1440); s813 += v1499;
-        const V v1500 = w[1] * (v1053 * v1387 - v1014 * v1433); s802 += v1500;
-        const V v1501 = w[1] * (v1053 * v1389 + v1015 * v1433); s822 += v1501;
-        const V v1502 = v1398 * v991 + (v942 * v1397 + (v918 * v1376 + (v539 * v1374 + v945 * v1394))),
-            v1503 = v918 * v1377 + (v539 * v1375 + v945 * v1395) - v942 * v1396 - v1398 * v994,
-            v1504 = v923 * v1377 + (v548 * v1375 + v953 * v1395) - v954 * v1396 - v1402 * v994,
-            v1505 = v1502 + v994 * v1413, v1506 = v1503 + v991 * v1413,
-            v1507 = v1406 * v991 + (v940 * v1397 + (v546 * v1374 + v939 * v1394)) + v994 * v1411,
-            v1508 = v546 * v1375 + v939 * v1395 - v940 * v1396 - v1406 * v994 + v991 * v1411,
-            v1509 = v1504 + v991 * v1417,
-            v1510 = v1402 * v991 + (v954 * v1397 + (v548 * v1374 + v953 * v1394)) + v994 * v1417,
-            v1511 = v1401 * v991 + (v952 * v1397 + (v547 * v1374 + v951 * v1394)) + v994 * v1416,
-            v1512 = v547 * v1375 + v951 * v1395 - v952 * v1396 - v1401 * v994 + v991 * v1416,
-            v1513 = v1407 * v991 + (v941 * v1397 + (v550 * v1374 + v933 * v1394)) + v994 * v1412,
-            v1514 = v550 * v1375 + v933 * v1395 - v941 * v1396 - v1407 * v994 + v991 * v1412,
-            v1515 = v915 * v1376 + v1507, v1516 = v915 * v1377 + v1508,
-            v1517 = v923 * v1376 + v1510, v1518 = v916 * v1376 + v1511,
-            v1519 = v916 * v1377 + v1512, v1520 = v924 * v1376 + v1513,
-            v1521 = v924 * v1377 + v1514, v1522 = w[1] * (v833 * v1509 - v923 * v1383);
-        s766 += v1522; const V v1523 = w[1] * (v833 * v1516 - v915 * v1383); s764 += v1523;
-        const V v1524 = w[1] * (v833 * v1517 - v923 * v1382); s756 += v1524;
-        const V v1525 = w[1] * (v833 * v1518 - v916 * v1382); s755 += v1525;
-        const V v1526 = w[1] * (v833 * v1519 - v916 * v1383); s765 += v1526;
-        const V v1527 = w[1] * (v833 * v1520 - v924 * v1382); s757 += v1527;
-        const V v1528 = w[1] * (v833 * v1521 - v924 * v1383); s767 += v1528;
-        const V v1529 = w[1] * (v833 * v1515 - v915 * v1382); s754 += v1529;
-        const V v1530 = w[1] * (v924 * v1378 + v836 * v1521); s727 += v1530;
-        const V v1531 = w[1] * (v918 * v1379 + v836 * v1505); s709 += v1531;
-        const V v1532 = w[1] * (v918 * v1378 + v836 * v1506); s719 += v1532;
-        const V v1533 = w[1] * (v833 * v1505 - v918 * v1382); s749 += v1533;
-        const V v1534 = w[1] * (v833 * v1506 - v918 * v1383); s759 += v1534;
-        const V v1535 = w[1] * (v915 * v1379 + v836 * v1515); s714 += v1535;
-        const V v1536 = w[1] * (v916 * v1379 + v836 * v1518); s715 += v1536;
-        const V v1537 = w[1] * (v923 * v1379 + v836 * v1517); s716 += v1537;
-        const V v1538 = w[1] * (v924 * v1379 + v836 * v1520); s717 += v1538;
-        const V v1539 = w[1] * (v915 * v1378 + v836 * v1516); s724 += v1539;
-        const V v1540 = w[1] * (v916 * v1378 + v836 * v1519); s725 += v1540;
-        const V v1541 = w[1] * (v923 * v1378 + v836 * v1509); s726 += v1541;
-        const V v1542 = w[1] * (v915 * v1380 + v837 * v1515); s734 += v1542;
-        const V v1543 = w[1] * (v916 * v1380 + v837 * v1518); s735 += v1543;
-        const V v1544 = w[1] * (v923 * v1380 + v837 * v1517); s736 += v1544;
-        const V v1545 = w[1] * (v924 * v1380 + v837 * v1520); s737 += v1545;
-        const V v1546 = w[1] * (v915 * v1381 + v837 * v1516); s744 += v1546;
-        const V v1547 = w[1] * (v916 * v1381 + v837 * v1519); s745 += v1547;
-        const V v1548 = w[1] * (v918 * v1380 + v837 * v1505); s729 += v1548;
-        const V v1549 = w[1] * (v918 * v1381 + v837 * v1506); s739 += v1549;
-        const V v1550 = w[1] * (v923 * v1381 + v837 * v1509); s746 += v1550;
-        const V v1551 = w[1] * (v924 * v1381 + v837 * v1521); s747 += v1551;
-        const V v1552 = w[1] * (v1047 * v1384 - v1012 * v1505); s769 += v1552;
-        const V v1553 = w[1] * (v1047 * v1385 - v1012 * v1506); s779 += v1553;
-        const V v1554 = w[1] * (v1033 * v1385 - v1012 * v1516); s784 += v1554;
-        const V v1555 = w[1] * (v1038 * v1385 - v1012 * v1509); s786 += v1555;
-        const V v1556 = w[1] * (v1042 * v1385 - v1012 * v1521); s787 += v1556;
-        const V v1557 = w[1] * (v1033 * v1384 - v1012 * v1515); s774 += v1557;
-        const V v1558 = w[1] * (v1036 * v1384 - v1012 * v1518); s775 += v1558;
-        const V v1559 = w[1] * (v1038 * v1384 - v1012 * v1517); s776 += v1559;
-        const V v1560 = w[1] * (v1042 * v1384 - v1012 * v1520); s777 += v1560;
-        const V v1561 = w[1] * (v1036 * v1385 - v1012 * v1519); s785 += v1561;
-        const V v1562 = w[1] * (v1033 * v1386 - v1014 * v1515); s794 += v1562;
-        const V v1563 = w[1] * (v1036 * v1386 - v1014 * v1518); s795 += v1563;
-        const V v1564 = w[1] * (v1038 * v1386 - v1014 * v1517); s796 += v1564;
-        const V v1565 = w[1] * (v1042 * v1386 - v1014 * v1520); s797 += v1565;
-        const V v1566 = w[1] * (v1036 * v1387 - v1014 * v1519); s805 += v1566;
-        const V v1567 = w[1] * (v1033 * v1388 + v1015 * v1515); s814 += v1567;
-        const V v1568 = w[1] * (v1036 * v1388 + v1015 * v1518); s815 += v1568;
-        const V v1569 = w[1] * (v1038 * v1388 + v1015 * v1517); s816 += v1569;
-        const V v1570 = w[1] * (v1042 * v1388 + v1015 * v1520); s817 += v1570;
-        const V v1571 = w[1] * (v1036 * v1389 + v1015 * v1519); s825 += v1571;
-        const V v1572 = w[1] * (v1047 * v1386 - v1014 * v1505); s789 += v1572;
-        const V v1573 = w[1] * (v1047 * v1388 + v1015 * v1505); s809 += v1573;
-        const V v1574 = w[1] * (v1047 * v1387 - v1014 * v1506); s799 += v1574;
-        const V v1575 = w[1] * (v1047 * v1389 + v1015 * v1506); s819 += v1575;
-        const V v1576 = w[1] * (v1033 * v1387 - v1014 * v1516); s804 += v1576;
-        const V v1577 = w[1] * (v1033 * v1389 + v1015 * v1516); s824 += v1577;
-        const V v1578 = w[1] * (v1038 * v1387 - v1014 * v1509); s806 += v1578;
-        const V v1579 = w[1] * (v1038 * v1389 + v1015 * v1509); s826 += v1579;
-        const V v1580 = w[1] * (v1042 * v1387 - v1014 * v1521); s807 += v1580;
-        const V v1581 = w[1] * (v1042 * v1389 + v1015 * v1521); s827 += v1581;
-        const V v1582 = w[1] * (v538 * v1368 + v917 * v1421 + v992 * v1408); s688 += v1582;
-        const V v1583 = w[1] * (v538 * v1371 + v917 * v1420 + v993 * v1408); s698 += v1583;
-        const V v1584 = w[1] * (v539 * v1368 + v918 * v1421 + v992 * v1413); s689 += v1584;
-        const V v1585 = w[1] * (v539 * v1371 + v918 * v1420 + v993 * v1413); s699 += v1585;
-        const V v1586 = w[1] * (v543 * v1368 + v919 * v1421 + v992 * v1414); s690 += v1586;
-        const V v1587 = w[1] * (v543 * v1371 + v919 * v1420 + v993 * v1414); s700 += v1587;
-        const V v1588 = w[1] * (v544 * v1368 + v920 * v1421 + v992 * v1415); s691 += v1588;
-        const V v1589 = w[1] * (v544 * v1371 + v920 * v1420 + v993 * v1415); s701 += v1589;
-        const V v1590 = w[1] * (v536 * v1368 + v921 * v1421 + v992 * v1409); s692 += v1590;
-        const V v1591 = w[1] * (v536 * v1371 + v921 * v1420 + v993 * v1409); s702 += v1591;
-        const V v1592 = w[1] * (v537 * v1368 + v922 * v1421 + v992 * v1410); s693 += v1592;
-        const V v1593 = w[1] * (v537 * v1371 + v922 * v1420 + v993 * v1410); s703 += v1593;
-        const V v1594 = w[1] * (v546 * v1368 + v915 * v1421 + v992 * v1411); s694 += v1594;
-        const V v1595 = w[1] * (v546 * v1371 + v915 * v1420 + v993 * v1411); s704 += v1595;
-        const V v1596 = w[1] * (v547 * v1368 + v916 * v1421 + v992 * v1416); s695 += v1596;
-        const V v1597 = w[1] * (v547 * v1371 + v916 * v1420 + v993 * v1416); s705 += v1597;
-        const V v1598 = w[1] * (v548 * v1368 + v923 * v1421 + v992 * v1417); s696 += v1598;
-        const V v1599 = w[1] * (v548 * v1371 + v923 * v1420 + v993 * v1417); s706 += v1599;
-        const V v1600 = w[1] * (v550 * v1368 + v924 * v1421 + v992 * v1412); s697 += v1600;
-        const V v1601 = w[1] * (v550 * v1371 + v924 * v1420 + v993 * v1412); s707 += v1601;
+        s570 += v1063; s571 += v1064; s572 += v1065; s573 += v1066; s574 += v1067; s575 += v1068;
+        s576 += v1069; s577 += v1070; s578 += v1071; s579 += v1072; s580 += v1073; s581 += v1074;
+        s582 += v1075; s583 += v1076; s584 += v1077; s585 += v1078; s586 += v1079; s587 += v1080;
+        s588 += v1081; s589 += v1082; s590 += v1083; s591 += v1084; s592 += v1085; s593 += v1086;
+        s596 += v1088; s597 += v1089; s600 += v1090; s601 += v1091;
+        const V v1337 = v1093 + v1092, v1338 = v1095 + v1094, v1339 = softehl_vsqrt(1.0 / v960),
+            v1340 = v1098 + v1097, v1341 = v1100 + v1099,
+            v1342 = (v24 * v832 + (v22 * v831 + (v933 + v934)) - X5 * v837) * (v990 * v559),
+            v1343 = v1031 * v1087, v1344 = v1032 * v1087, v1345 = v961 * v966, v1346 = w[1] * v1060,
+            v1347 = v46 * w[1], v1348 = w[1] * v1061, v1349 = w[1] * v1337,
+            v1350 = v1060 * v993 + v1337 * v996, v1351 = v1337 * v993 - v1060 * v996,
+            v1352 = v1347 * v928, v1353 = v1347 * v927, v1354 = v1061 * v993 + v1338 * v996,
+            v1355 = w[1] * v1338, v1356 = v1338 * v993 - v1061 * v996,
+            v1357 = v1342 + 2.0 * (v39 * v957 + v34 * v958) * (v1339 * (v561 * v966)),
+            v1358 = w[1] * v994;
+        s614 += v1349 * v994; s616 += v1349 * v995; const V v1359 = w[1] * v995;
+        s615 += v1355 * v994; s617 += v1355 * v995; s564 += v1346 * v994; s566 += v1346 * v995;
+        s565 += v1348 * v994; s567 += v1348 * v995;
+        const V v1360 = v1059 * v1357, v1361 = v1059 * v991, v1362 = v1059 * v1345,
+            v1363 = v1062 * v991, v1364 = v1062 * v1345, v1365 = v1062 * v1357, v1366 = 0.5 * v1361,
+            v1367 = 0.5 * v1363;
+        s562 += v1352 * v1361; s568 += v1352 * v1363; s563 += v1353 * v1361; s569 += v1353 * v1363;
+        const V v1368 = v854 * v1059 + v853 * v1062, v1369 = v854 * v1062 - v853 * v1059,
+            v1370 = v930 * v1364, v1371 = v930 * v1362, v1372 = v931 * v1362, v1373 = v931 * v1364,
+            v1374 = v1368 * v991, v1375 = v1369 * v991, v1376 = v1368 * v1345,
+            v1377 = v1369 * v1345, v1378 = v1368 * v1357, v1379 = v1369 * v1357,
+            v1380 = v936 * v1375, v1381 = v936 * v1374, v1382 = v937 * v1374, v1383 = v937 * v1375,
+            v1384 = v837 * v1374, v1385 = v837 * v1375, v1386 = v1013 * v1374,
+            v1387 = v1013 * v1375, v1388 = v1018 * v1374, v1389 = v1018 * v1375,
+            v1390 = v1009 * v1374, v1391 = v1009 * v1375;
+        s606 += v1022 * v1375; s607 += v1022 * v1374; s608 += v962 * v1375; s609 += v962 * v1374;
+        s610 += v963 * v1375; s611 += v963 * v1374; s612 += v964 * v1375; s613 += v964 * v1374;
+        s603 += v1021 * v1374; s605 += v1023 * v1374; s602 += v1021 * v1375; s604 += v1023 * v1375;
+        s618 += v964 * v1350; s622 += v963 * v1350; s634 += v1023 * v1350; s638 += v1021 * v1350;
+        s619 += v964 * v1354; s623 += v963 * v1354; s635 += v1023 * v1354; s639 += v1021 * v1354;
+        s620 += v964 * v1351; s624 += v963 * v1351; s636 += v1023 * v1351; s637 += v1023 * v1356;
+        s621 += v964 * v1356; s625 += v963 * v1356; s640 += v1021 * v1351; s641 += v1021 * v1356;
+        s627 += v962 * v1354; s628 += v962 * v1351; s629 += v962 * v1356; s631 += v1022 * v1354;
+        s632 += v1022 * v1351; s633 += v1022 * v1356; s630 += v1022 * v1350; s626 += v962 * v1350;
+        s594 += v1343 * v1358; s595 += v1344 * v1358; s598 += v1343 * v1359; s599 += v1344 * v1359;
+        s652 += v1340 * v1358; s653 += v1341 * v1358; s664 += v1340 * v1359; s665 += v1341 * v1359;
+        const V v1392 = v1340 * v993 - v1343 * v996, v1393 = v1341 * v993 - v1344 * v996,
+            v1394 = v1343 * v993 + v1340 * v996, v1395 = v1344 * v993 + v1341 * v996;
+        s668 += v964 * v1392; s669 += v964 * v1393; s666 += v964 * v1394; s667 += v964 * v1395;
+        const V v1396 = (v861 * v1059 - v858 * v1062) * v991,
+            v1397 = (v858 * v1059 + v861 * v1062) * v991,
+            v1398 = (v860 * v1059 + v859 * v1062) * v991,
+            v1399 = (v860 * v1062 - v859 * v1059) * v991;
+        s670 += v963 * v1394; s671 += v963 * v1395; s672 += v963 * v1392; s673 += v963 * v1393;
+        s674 += v962 * v1394; s675 += v962 * v1395; s676 += v962 * v1392; s677 += v962 * v1393;
+        const V v1400 = v920 * v1096 + v1050 * v1087, v1401 = v921 * v1096 + v1052 * v1087,
+            v1402 = v922 * v1096 + v1054 * v1087, v1403 = v918 * v1096 + v1042 * v1087,
+            v1404 = v925 * v1096 + v1043 * v1087, v1405 = v919 * v1096 + v1048 * v1087,
+            v1406 = v923 * v1096 + v1057 * v1087, v1407 = v924 * v1096 + v1058 * v1087,
+            v1408 = v917 * v1096 + v1036 * v1087, v1409 = v926 * v1096 + v1046 * v1087,
+            v1410 = v919 * v1102 + (v1103 + v1101), v1411 = v923 * v1102 + (v1111 + v1110),
+            v1412 = v924 * v1102 + (v1113 + v1112), v1413 = v917 * v1102 + (v1115 + v1114),
+            v1414 = v926 * v1102 + (v1121 + v1120), v1415 = v920 * v1102 + (v1105 + v1104),
+            v1416 = v921 * v1102 + (v1107 + v1106), v1417 = v922 * v1102 + (v1109 + v1108),
+            v1418 = v918 * v1102 + (v1117 + v1116), v1419 = v925 * v1102 + (v1119 + v1118),
+            v1420 = v46 * (v1366 + v928 * v1360), v1421 = v46 * (v927 * v1360 - v1366),
+            v1422 = v46 * (v1367 + v928 * v1365), v1423 = v46 * (v927 * v1365 - v1367);
+        s686 += w[1] * (v1011 * v1390 + v1017 * v1394);
+        s688 += w[1] * (v1011 * v1391 + v1017 * v1392);
+        s687 += w[1] * (v1019 * v1390 + v1017 * v1395);
+        s689 += w[1] * (v1019 * v1391 + v1017 * v1393);
+        s678 += w[1] * (v1011 * v1386 - v1014 * v1394);
+        s679 += w[1] * (v1019 * v1386 - v1014 * v1395);
+        s680 += w[1] * (v1011 * v1387 - v1014 * v1392);
+        s681 += w[1] * (v1019 * v1387 - v1014 * v1393);
+        s682 += w[1] * (v1011 * v1388 - v1016 * v1394);
+        s683 += w[1] * (v1019 * v1388 - v1016 * v1395);
+        s684 += w[1] * (v1011 * v1389 - v1016 * v1392);
+        s685 += w[1] * (v1019 * v1389 - v1016 * v1393);
+        s642 += w[1] * (v1405 * v994 + (v540 * v1371 + v919 * v1421));
+        s643 += w[1] * (v1400 * v994 + (v541 * v1371 + v920 * v1421));
+        s644 += w[1] * (v1401 * v994 + (v545 * v1371 + v921 * v1421));
+        s645 += w[1] * (v1402 * v994 + (v546 * v1371 + v922 * v1421));
+        s646 += w[1] * (v1406 * v994 + (v538 * v1371 + v923 * v1421));
+        s647 += w[1] * (v1407 * v994 + (v539 * v1371 + v924 * v1421));
+        s648 += w[1] * (v1408 * v994 + (v548 * v1371 + v917 * v1421));
+        s649 += w[1] * (v1403 * v994 + (v549 * v1371 + v918 * v1421));
+        s650 += w[1] * (v1404 * v994 + (v550 * v1371 + v925 * v1421));
+        s651 += w[1] * (v1409 * v994 + (v552 * v1371 + v926 * v1421));
+        s663 += w[1] * (v1409 * v995 + (v552 * v1372 + v926 * v1420));
+        s660 += w[1] * (v1408 * v995 + (v548 * v1372 + v917 * v1420));
+        s661 += w[1] * (v1403 * v995 + (v549 * v1372 + v918 * v1420));
+        s654 += w[1] * (v1405 * v995 + (v540 * v1372 + v919 * v1420));
+        s655 += w[1] * (v1400 * v995 + (v541 * v1372 + v920 * v1420));
+        s656 += w[1] * (v1401 * v995 + (v545 * v1372 + v921 * v1420));
+        s657 += w[1] * (v1402 * v995 + (v546 * v1372 + v922 * v1420));
+        s658 += w[1] * (v1406 * v995 + (v538 * v1372 + v923 * v1420));
+        const V v1424 = v1401 * v993 + (v921 * v1378 + (v545 * v1376 + v939 * v1396)) + v996 * v1416,
+            v1425 = v921 * v1379 + (v545 * v1377 + v939 * v1397) - v1401 * v996 + v993 * v1416,
+            v1426 = v1402 * v993 + (v922 * v1378 + (v546 * v1376 + v950 * v1396)) + v996 * v1417,
+            v1427 = v922 * v1379 + (v546 * v1377 + v950 * v1397) - v1402 * v996 + v993 * v1417;
+        s659 += w[1] * (v1407 * v995 + (v539 * v1372 + v924 * v1420));
+        s662 += w[1] * (v1404 * v995 + (v550 * v1372 + v925 * v1420));
+        const V v1428 = v949 * v1399 + v1424, v1429 = v1425 - v949 * v1398,
+            v1430 = v945 * v1399 + v1426, v1431 = v1427 - v945 * v1398,
+            v1432 = v948 * v1399 + (v1406 * v993 + (v538 * v1376 + v940 * v1396) + v996 * v1411),
+            v1433 = v923 * v1379 + (v538 * v1377 + v940 * v1397) - v1406 * v996 - v948 * v1398,
+            v1434 = v924 * v1379 + (v539 * v1377 + v952 * v1397) - v1407 * v996 - v951 * v1398,
+            v1435 = v1433 + v993 * v1411, v1436 = v1434 + v993 * v1412,
+            v1437 = v951 * v1399 + (v1407 * v993 + (v539 * v1376 + v952 * v1396)) + v996 * v1412,
+            v1438 = w[1] * (v835 * v1428 - v921 * v1384);
+        s752 += v1438; const V v1439 = w[1] * (v835 * v1430 - v922 * v1384); s753 += v1439;
+        const V v1440 = w[1] * (v835 * v1429 - v921 * v1385); s762 += v1440;
+        const V v1441 = w[1] * (v835 * v1431 - v922 * v1385); s763 += v1441;
+        const V v1442 = v924 * v1378 + v1437, v1443 = v923 * v1378 + v1432,
+            v1444 = w[1] * (v835 * v1435 - v923 * v1385);
+        s764 += v1444; const V v1445 = w[1] * (v835 * v1436 - v924 * v1385); s765 += v1445;
+        const V v1446 = w[1] * (v924 * v1381 + v838 * v1442); s715 += v1446;
+        const V v1447 = w[1] * (v923 * v1381 + v838 * v1443); s714 += v1447;
+        const V v1448 = w[1] * (v921 * v1381 + v838 * v1428); s712 += v1448;
+        const V v1449 = w[1] * (v835 * v1442 - v924 * v1384); s755 += v1449;
+        const V v1450 = w[1] * (v835 * v1443 - v923 * v1384); s754 += v1450;
+        const V v1451 = w[1] * (v922 * v1381 + v838 * v1430); s713 += v1451;
+        const V v1452 = w[1] * (v921 * v1380 + v838 * v1429); s722 += v1452;
+        const V v1453 = w[1] * (v922 * v1380 + v838 * v1431); s723 += v1453;
+        const V v1454 = v1405 * v993 + (v946 * v1399 + (v919 * v1378 + (v540 * v1376 + v938 * v1396))),
+            v1455 = w[1] * (v923 * v1380 + v838 * v1435);
+        s724 += v1455;
+        const V v1456 = v1454 + v996 * v1410,
+            v1457 = v540 * v1377 + v938 * v1397 - v946 * v1398 - v1405 * v996 + v993 * v1410,
+            v1458 = w[1] * (v924 * v1380 + v838 * v1436);
+        s725 += v1458; const V v1459 = w[1] * (v921 * v1383 + v839 * v1429); s742 += v1459;
+        const V v1460 = w[1] * (v922 * v1383 + v839 * v1431); s743 += v1460;
+        const V v1461 = w[1] * (v919 * v1381 + v838 * v1456); s710 += v1461;
+        const V v1462 = w[1] * (v919 * v1382 + v839 * v1456); s730 += v1462;
+        const V v1463 = v919 * v1379 + v1457, v1464 = w[1] * (v924 * v1383 + v839 * v1436);
+        s745 += v1464; const V v1465 = w[1] * (v835 * v1456 - v919 * v1384); s750 += v1465;
+        const V v1466 = w[1] * (v919 * v1380 + v838 * v1463); s720 += v1466;
+        const V v1467 = w[1] * (v919 * v1383 + v839 * v1463); s740 += v1467;
+        const V v1468 = w[1] * (v921 * v1382 + v839 * v1428); s732 += v1468;
+        const V v1469 = w[1] * (v835 * v1463 - v919 * v1385); s760 += v1469;
+        const V v1470 = w[1] * (v922 * v1382 + v839 * v1430); s733 += v1470;
+        const V v1471 = w[1] * (v923 * v1382 + v839 * v1443); s734 += v1471;
+        const V v1472 = w[1] * (v924 * v1382 + v839 * v1442); s735 += v1472;
+        const V v1473 = w[1] * (v923 * v1383 + v839 * v1435); s744 += v1473;
+        const V v1474 = w[1] * (v1051 * v1386 - v1014 * v1428); s772 += v1474;
+        const V v1475 = w[1] * (v1053 * v1386 - v1014 * v1430); s773 += v1475;
+        const V v1476 = w[1] * (v1055 * v1386 - v1014 * v1443); s774 += v1476;
+        const V v1477 = w[1] * (v1056 * v1386 - v1014 * v1442); s775 += v1477;
+        const V v1478 = w[1] * (v1055 * v1387 - v1014 * v1435); s784 += v1478;
+        const V v1479 = w[1] * (v1047 * v1386 - v1014 * v1456); s770 += v1479;
+        const V v1480 = w[1] * (v1047 * v1387 - v1014 * v1463); s780 += v1480;
+        const V v1481 = w[1] * (v1051 * v1387 - v1014 * v1429); s782 += v1481;
+        const V v1482 = w[1] * (v1053 * v1387 - v1014 * v1431); s783 += v1482;
+        const V v1483 = w[1] * (v1056 * v1387 - v1014 * v1436); s785 += v1483;
+        const V v1484 = w[1] * (v1047 * v1388 - v1016 * v1456); s790 += v1484;
+        const V v1485 = w[1] * (v1047 * v1389 - v1016 * v1463); s800 += v1485;
+        const V v1486 = w[1] * (v1051 * v1389 - v1016 * v1429); s802 += v1486;
+        const V v1487 = w[1] * (v1053 * v1389 - v1016 * v1431); s803 += v1487;
+        const V v1488 = w[1] * (v1056 * v1389 - v1016 * v1436); s805 += v1488;
+        const V v1489 = w[1] * (v1047 * v1390 + v1017 * v1456); s810 += v1489;
+        const V v1490 = w[1] * (v1047 * v1391 + v1017 * v1463); s820 += v1490;
+        const V v1491 = w[1] * (v1051 * v1391 + v1017 * v1429); s822 += v1491;
+        const V v1492 = w[1] * (v1053 * v1391 + v1017 * v1431); s823 += v1492;
+        const V v1493 = w[1] * (v1056 * v1391 + v1017 * v1436); s825 += v1493;
+        const V v1494 = w[1] * (v1051 * v1388 - v1016 * v1428); s792 += v1494;
+        const V v1495 = w[1] * (v1051 * v1390 + v1017 * v1428); s812 += v1495;
+        const V v1496 = w[1] * (v1053 * v1388 - v1016 * v1430); s793 += v1496;
+        const V v1497 = w[1] * (v1053 * v1390 + v1017 * v1430); s813 += v1497;
+        const V v1498 = w[1] * (v1055 * v1388 - v1016 * v1443); s794 += v1498;
+        const V v1499 = w[1] * (v1055 * v1390 + v1017 * v1443); s814 += v1499;
+        const V v1500 = w[1] * (v1056 * v1388 - v1016 * v1442); s795 += v1500;
+        const V v1501 = w[1] * (v1056 * v1390 + v1017 * v1442); s815 += v1501;
+        const V v1502 = w[1] * (v1055 * v1389 - v1016 * v1435); s804 += v1502;
+        const V v1503 = w[1] * (v1055 * v1391 + v1017 * v1435); s824 += v1503;
+        const V v1504 = v1400 * v993 + (v944 * v1399 + (v920 * v1378 + (v541 * v1376 + v947 * v1396))),
+            v1505 = v920 * v1379 + (v541 * v1377 + v947 * v1397) - v944 * v1398 - v1400 * v996,
+            v1506 = v925 * v1379 + (v550 * v1377 + v955 * v1397) - v956 * v1398 - v1404 * v996,
+            v1507 = v1504 + v996 * v1415, v1508 = v1505 + v993 * v1415,
+            v1509 = v1408 * v993 + (v942 * v1399 + (v548 * v1376 + v941 * v1396)) + v996 * v1413,
+            v1510 = v548 * v1377 + v941 * v1397 - v942 * v1398 - v1408 * v996 + v993 * v1413,
+            v1511 = v1506 + v993 * v1419,
+            v1512 = v1404 * v993 + (v956 * v1399 + (v550 * v1376 + v955 * v1396)) + v996 * v1419,
+            v1513 = v1403 * v993 + (v954 * v1399 + (v549 * v1376 + v953 * v1396)) + v996 * v1418,
+            v1514 = v549 * v1377 + v953 * v1397 - v954 * v1398 - v1403 * v996 + v993 * v1418,
+            v1515 = v1409 * v993 + (v943 * v1399 + (v552 * v1376 + v935 * v1396)) + v996 * v1414,
+            v1516 = v552 * v1377 + v935 * v1397 - v943 * v1398 - v1409 * v996 + v993 * v1414,
+            v1517 = v917 * v1378 + v1509, v1518 = v917 * v1379 + v1510,
+            v1519 = v925 * v1378 + v1512, v1520 = v918 * v1378 + v1513,
+            v1521 = v918 * v1379 + v1514, v1522 = v926 * v1378 + v1515,
+            v1523 = v926 * v1379 + v1516, v1524 = w[1] * (v835 * v1511 - v925 * v1385);
+        s768 += v1524; const V v1525 = w[1] * (v835 * v1518 - v917 * v1385); s766 += v1525;
+        const V v1526 = w[1] * (v835 * v1519 - v925 * v1384); s758 += v1526;
+        const V v1527 = w[1] * (v835 * v1520 - v918 * v1384); s757 += v1527;
+        const V v1528 = w[1] * (v835 * v1521 - v918 * v1385); s767 += v1528;
+        const V v1529 = w[1] * (v835 * v1522 - v926 * v1384); s759 += v1529;
+        const V v1530 = w[1] * (v835 * v1523 - v926 * v1385); s769 += v1530;
+        const V v1531 = w[1] * (v835 * v1517 - v917 * v1384); s756 += v1531;
+        const V v1532 = w[1] * (v926 * v1380 + v838 * v1523); s729 += v1532;
+        const V v1533 = w[1] * (v920 * v1381 + v838 * v1507); s711 += v1533;
+        const V v1534 = w[1] * (v920 * v1380 + v838 * v1508); s721 += v1534;
+        const V v1535 = w[1] * (v835 * v1507 - v920 * v1384); s751 += v1535;
+        const V v1536 = w[1] * (v835 * v1508 - v920 * v1385); s761 += v1536;
+        const V v1537 = w[1] * (v917 * v1381 + v838 * v1517); s716 += v1537;
+        const V v1538 = w[1] * (v918 * v1381 + v838 * v1520); s717 += v1538;
+        const V v1539 = w[1] * (v925 * v1381 + v838 * v1519); s718 += v1539;
+        const V v1540 = w[1] * (v926 * v1381 + v838 * v1522); s719 += v1540;
+        const V v1541 = w[1] * (v917 * v1380 + v838 * v1518); s726 += v1541;
+        const V v1542 = w[1] * (v918 * v1380 + v838 * v1521); s727 += v1542;
+        const V v1543 = w[1] * (v925 * v1380 + v838 * v1511); s728 += v1543;
+        const V v1544 = w[1] * (v917 * v1382 + v839 * v1517); s736 += v1544;
+        const V v1545 = w[1] * (v918 * v1382 + v839 * v1520); s737 += v1545;
+        const V v1546 = w[1] * (v925 * v1382 + v839 * v1519); s738 += v1546;
+        const V v1547 = w[1] * (v926 * v1382 + v839 * v1522); s739 += v1547;
+        const V v1548 = w[1] * (v917 * v1383 + v839 * v1518); s746 += v1548;
+        const V v1549 = w[1] * (v918 * v1383 + v839 * v1521); s747 += v1549;
+        const V v1550 = w[1] * (v920 * v1382 + v839 * v1507); s731 += v1550;
+        const V v1551 = w[1] * (v920 * v1383 + v839 * v1508); s741 += v1551;
+        const V v1552 = w[1] * (v925 * v1383 + v839 * v1511); s748 += v1552;
+        const V v1553 = w[1] * (v926 * v1383 + v839 * v1523); s749 += v1553;
+        const V v1554 = w[1] * (v1049 * v1386 - v1014 * v1507); s771 += v1554;
+        const V v1555 = w[1] * (v1049 * v1387 - v1014 * v1508); s781 += v1555;
+        const V v1556 = w[1] * (v1035 * v1387 - v1014 * v1518); s786 += v1556;
+        const V v1557 = w[1] * (v1040 * v1387 - v1014 * v1511); s788 += v1557;
+        const V v1558 = w[1] * (v1044 * v1387 - v1014 * v1523); s789 += v1558;
+        const V v1559 = w[1] * (v1035 * v1386 - v1014 * v1517); s776 += v1559;
+        const V v1560 = w[1] * (v1038 * v1386 - v1014 * v1520); s777 += v1560;
+        const V v1561 = w[1] * (v1040 * v1386 - v1014 * v1519); s778 += v1561;
+        const V v1562 = w[1] * (v1044 * v1386 - v1014 * v1522); s779 += v1562;
+        const V v1563 = w[1] * (v1038 * v1387 - v1014 * v1521); s787 += v1563;
+        const V v1564 = w[1] * (v1035 * v1388 - v1016 * v1517); s796 += v1564;
+        const V v1565 = w[1] * (v1038 * v1388 - v1016 * v1520); s797 += v1565;
+        const V v1566 = w[1] * (v1040 * v1388 - v1016 * v1519); s798 += v1566;
+        const V v1567 = w[1] * (v1044 * v1388 - v1016 * v1522); s799 += v1567;
+        const V v1568 = w[1] * (v1038 * v1389 - v1016 * v1521); s807 += v1568;
+        const V v1569 = w[1] * (v1035 * v1390 + v1017 * v1517); s816 += v1569;
+        const V v1570 = w[1] * (v1038 * v1390 + v1017 * v1520); s817 += v1570;
+        const V v1571 = w[1] * (v1040 * v1390 + v1017 * v1519); s818 += v1571;
+        const V v1572 = w[1] * (v1044 * v1390 + v1017 * v1522); s819 += v1572;
+        const V v1573 = w[1] * (v1038 * v1391 + v1017 * v1521); s827 += v1573;
+        const V v1574 = w[1] * (v1049 * v1388 - v1016 * v1507); s791 += v1574;
+        const V v1575 = w[1] * (v1049 * v1390 + v1017 * v1507); s811 += v1575;
+        const V v1576 = w[1] * (v1049 * v1389 - v1016 * v1508); s801 += v1576;
+        const V v1577 = w[1] * (v1049 * v1391 + v1017 * v1508); s821 += v1577;
+        const V v1578 = w[1] * (v1035 * v1389 - v1016 * v1518); s806 += v1578;
+        const V v1579 = w[1] * (v1035 * v1391 + v1017 * v1518); s826 += v1579;
+        const V v1580 = w[1] * (v1040 * v1389 - v1016 * v1511); s808 += v1580;
+        const V v1581 = w[1] * (v1040 * v1391 + v1017 * v1511); s828 += v1581;
+        const V v1582 = w[1] * (v1044 * v1389 - v1016 * v1523); s809 += v1582;
+        const V v1583 = w[1] * (v1044 * v1391 + v1017 * v1523); s829 += v1583;
+        const V v1584 = w[1] * (v540 * v1370 + v919 * v1423 + v994 * v1410); s690 += v1584;
+        const V v1585 = w[1] * (v540 * v1373 + v919 * v1422 + v995 * v1410); s700 += v1585;
+        const V v1586 = w[1] * (v541 * v1370 + v920 * v1423 + v994 * v1415); s691 += v1586;
+        const V v1587 = w[1] * (v541 * v1373 + v920 * v1422 + v995 * v1415); s701 += v1587;
+        const V v1588 = w[1] * (v545 * v1370 + v921 * v1423 + v994 * v1416); s692 += v1588;
+        const V v1589 = w[1] * (v545 * v1373 + v921 * v1422 + v995 * v1416); s702 += v1589;
+        const V v1590 = w[1] * (v546 * v1370 + v922 * v1423 + v994 * v1417); s693 += v1590;
+        const V v1591 = w[1] * (v546 * v1373 + v922 * v1422 + v995 * v1417); s703 += v1591;
+        const V v1592 = w[1] * (v538 * v1370 + v923 * v1423 + v994 * v1411); s694 += v1592;
+        const V v1593 = w[1] * (v538 * v1373 + v923 * v1422 + v995 * v1411); s704 += v1593;
+        const V v1594 = w[1] * (v539 * v1370 + v924 * v1423 + v994 * v1412); s695 += v1594;
+        const V v1595 = w[1] * (v539 * v1373 + v924 * v1422 + v995 * v1412); s705 += v1595;
+        const V v1596 = w[1] * (v548 * v1370 + v917 * v1423 + v994 * v1413); s696 += v1596;
+        const V v1597 = w[1] * (v548 * v1373 + v917 * v1422 + v995 * v1413); s706 += v1597;
+        const V v1598 = w[1] * (v549 * v1370 + v918 * v1423 + v994 * v1418); s697 += v1598;
+        const V v1599 = w[1] * (v549 * v1373 + v918 * v1422 + v995 * v1418); s707 += v1599;
+        const V v1600 = w[1] * (v550 * v1370 + v925 * v1423 + v994 * v1419); s698 += v1600;
+        const V v1601 = w[1] * (v550 * v1373 + v925 * v1422 + v995 * v1419); s708 += v1601;
+        const V v1602 = w[1] * (v552 * v1370 + v926 * v1423 + v994 * v1414); s699 += v1602;
+        const V v1603 = w[1] * (v552 * v1373 + v926 * v1422 + v995 * v1414); s709 += v1603;
     }
-    softehl_store4(K + 204, 256, s562, softehl_splat(0.0), s563, softehl_splat(0.0));
-    softehl_store4(K + 236, 256, s564, softehl_splat(0.0), s565, softehl_splat(0.0));
-    softehl_store4(R + 12, 16, s561, s567, s560, s566);
-    softehl_store4(R + 4, 16, s607, s606, s605, s604);
-    softehl_store4(R + 0, 16, s611, s610, s609, s608);
-    softehl_store4(K + 220, 256, s612, s594, s613, s595);
-    softehl_store4(K + 252, 256, s614, s598, s615, s599);
-    softehl_store4(K + 12, 256, s616, s568, s617, s569);
-    softehl_store4(K + 28, 256, s618, s570, s619, s571);
-    softehl_store4(K + 44, 256, s620, s572, s621, s573);
-    softehl_store4(K + 60, 256, s622, s574, s623, s575);
-    softehl_store4(K + 76, 256, s624, s576, s625, s577);
-    softehl_store4(K + 92, 256, s626, s578, s627, s579);
-    softehl_store4(K + 108, 256, s628, s580, s629, s581);
-    softehl_store4(K + 124, 256, s630, s582, s631, s583);
-    softehl_store4(K + 140, 256, s632, s584, s633, s585);
-    softehl_store4(K + 156, 256, s634, s586, s635, s587);
-    softehl_store4(K + 192, 256, s640, s641, s642, s643);
-    softehl_store4(K + 196, 256, s644, s645, s646, s647);
-    softehl_store4(K + 200, 256, s648, s649, s592, s593);
-    softehl_store4(K + 224, 256, s652, s653, s654, s655);
-    softehl_store4(K + 228, 256, s656, s657, s658, s659);
-    softehl_store4(K + 232, 256, s660, s661, s596, s597);
-    softehl_store4(K + 208, 256, s688, s689, s690, s691);
-    softehl_store4(K + 212, 256, s692, s693, s694, s695);
-    softehl_store4(K + 216, 256, s696, s697, s650, s651);
-    softehl_store4(K + 240, 256, s698, s699, s700, s701);
-    softehl_store4(K + 244, 256, s702, s703, s704, s705);
-    softehl_store4(K + 248, 256, s706, s707, s662, s663);
-    softehl_store4(K + 0, 256, s708, s709, s710, s711);
-    softehl_store4(K + 4, 256, s712, s713, s714, s715);
-    softehl_store4(K + 8, 256, s716, s717, s664, s665);
-    softehl_store4(K + 16, 256, s718, s719, s720, s721);
-    softehl_store4(K + 20, 256, s722, s723, s724, s725);
-    softehl_store4(K + 24, 256, s726, s727, s666, s667);
-    softehl_store4(K + 32, 256, s728, s729, s730, s731);
-    softehl_store4(K + 36, 256, s732, s733, s734, s735);
-    softehl_store4(K + 40, 256, s736, s737, s668, s669);
-    softehl_store4(K + 48, 256, s738, s739, s740, s741);
-    softehl_store4(K + 52, 256, s742, s743, s744, s745);
-    softehl_store4(K + 56, 256, s746, s747, s670, s671);
-    softehl_store4(K + 64, 256, s748, s749, s750, s751);
-    softehl_store4(K + 68, 256, s752, s753, s754, s755);
-    softehl_store4(K + 72, 256, s756, s757, s672, s673);
-    softehl_store4(K + 80, 256, s758, s759, s760, s761);
-    softehl_store4(K + 84, 256, s762, s763, s764, s765);
-    softehl_store4(K + 88, 256, s766, s767, s674, s675);
-    softehl_store4(R + 8, 16, s603, s602, -s601, -s600);
-    softehl_store4(K + 172, 256, -s636, s588, -s637, s589);
-    softehl_store4(K + 188, 256, -s638, s590, -s639, s591);
-    softehl_store4(K + 96, 256, -s768, -s769, -s770, -s771);
-    softehl_store4(K + 100, 256, -s772, -s773, -s774, -s775);
-    softehl_store4(K + 104, 256, -s776, -s777, -s676, -s677);
-    softehl_store4(K + 112, 256, -s778, -s779, -s780, -s781);
-    softehl_store4(K + 116, 256, -s782, -s783, -s784, -s785);
-    softehl_store4(K + 120, 256, -s786, -s787, -s678, -s679);
-    softehl_store4(K + 128, 256, -s788, -s789, -s790, -s791);
-    softehl_store4(K + 132, 256, -s792, -s793, -s794, -s795);
-    softehl_store4(K + 136, 256, -s796, -s797, -s680, -s681);
-    softehl_store4(K + 144, 256, -s798, -s799, -s800, -s801);
-    softehl_store4(K + 148, 256, -s802, -s803, -s804, -s805);
-    softehl_store4(K + 152, 256, -s806, -s807, -s682, -s683);
-    softehl_store4(K + 160, 256, -s808, -s809, -s810, -s811);
-    softehl_store4(K + 164, 256, -s812, -s813, -s814, -s815);
-    softehl_store4(K + 168, 256, -s816, -s817, -s684, -s685);
-    softehl_store4(K + 176, 256, -s818, -s819, -s820, -s821);
-    softehl_store4(K + 180, 256, -s822, -s823, -s824, -s825);
-    softehl_store4(K + 184, 256, -s826, -s827, -s686, -s687);
+    softehl_store4(K + 204, 256, s564, softehl_splat(0.0), s565, softehl_splat(0.0));
+    softehl_store4(K + 236, 256, s566, softehl_splat(0.0), s567, softehl_splat(0.0));
+    softehl_store4(R + 12, 16, s563, s569, s562, s568);
+    softehl_store4(R + 4, 16, s609, s608, s607, s606);
+    softehl_store4(R + 0, 16, s613, s612, s611, s610);
+    softehl_store4(K + 220, 256, s614, s596, s615, s597);
+    softehl_store4(K + 252, 256, s616, s600, s617, s601);
+    softehl_store4(K + 12, 256, s618, s570, s619, s571);
+    softehl_store4(K + 28, 256, s620, s572, s621, s573);
+    softehl_store4(K + 44, 256, s622, s574, s623, s575);
+    softehl_store4(K + 60, 256, s624, s576, s625, s577);
+    softehl_store4(K + 76, 256, s626, s578, s627, s579);
+    softehl_store4(K + 92, 256, s628, s580, s629, s581);
+    softehl_store4(K + 108, 256, s630, s582, s631, s583);
+    softehl_store4(K + 124, 256, s632, s584, s633, s585);
+    softehl_store4(K + 140, 256, s634, s586, s635, s587);
+    softehl_store4(K + 156, 256, s636, s588, s637, s589);
+    softehl_store4(K + 192, 256, s642, s643, s644, s645);
+    softehl_store4(K + 196, 256, s646, s647, s648, s649);
+    softehl_store4(K + 200, 256, s650, s651, s594, s595);
+    softehl_store4(K + 224, 256, s654, s655, s656, s657);
+    softehl_store4(K + 228, 256, s658, s659, s660, s661);
+    softehl_store4(K + 232, 256, s662, s663, s598, s599);
+    softehl_store4(K + 208, 256, s690, s691, s692, s693);
+    softehl_store4(K + 212, 256, s694, s695, s696, s697);
+    softehl_store4(K + 216, 256, s698, s699, s652, s653);
+    softehl_store4(K + 240, 256, s700, s701, s702, s703);
+    softehl_store4(K + 244, 256, s704, s705, s706, s707);
+    softehl_store4(K + 248, 256, s708, s709, s664, s665);
+    softehl_store4(K + 0, 256, s710, s711, s712, s713);
+    softehl_store4(K + 4, 256, s714, s715, s716, s717);
+    softehl_store4(K + 8, 256, s718, s719, s666, s667);
+    softehl_store4(K + 16, 256, s720, s721, s722, s723);
+    softehl_store4(K + 20, 256, s724, s725, s726, s727);
+    softehl_store4(K + 24, 256, s728, s729, s668, s669);
+    softehl_store4(K + 32, 256, s730, s731, s732, s733);
+    softehl_store4(K + 36, 256, s734, s735, s736, s737);
+    softehl_store4(K + 40, 256, s738, s739, s670, s671);
+    softehl_store4(K + 48, 256, s740, s741, s742, s743);
+    softehl_store4(K + 52, 256, s744, s745, s746, s747);
+    softehl_store4(K + 56, 256, s748, s749, s672, s673);
+    softehl_store4(K + 64, 256, s750, s751, s752, s753);
+    softehl_store4(K + 68, 256, s754, s755, s756, s757);
+    softehl_store4(K + 72, 256, s758, s759, s674, s675);
+    softehl_store4(K + 80, 256, s760, s761, s762, s763);
+    softehl_store4(K + 84, 256, s764, s765, s766, s767);
+    softehl_store4(K + 88, 256, s768, s769, s676, s677);
+    softehl_store4(R + 8, 16, s605, s604, -s603, -s602);
+    softehl_store4(K + 172, 256, -s638, s590, -s639, s591);
+    softehl_store4(K + 188, 256, -s640, s592, -s641, s593);
+    softehl_store4(K + 96, 256, -s770, -s771, -s772, -s773);
+    softehl_store4(K + 100, 256, -s774, -s775, -s776, -s777);
+    softehl_store4(K + 104, 256, -s778, -s779, -s678, -s679);
+    softehl_store4(K + 112, 256, -s780, -s781, -s782, -s783);
+    softehl_store4(K + 116, 256, -s784, -s785, -s786, -s787);
+    softehl_store4(K + 120, 256, -s788, -s789, -s680, -s681);
+    softehl_store4(K + 128, 256, -s790, -s791, -s792, -s793);
+    softehl_store4(K + 132, 256, -s794, -s795, -s796, -s797);
+    softehl_store4(K + 136, 256, -s798, -s799, -s682, -s683);
+    softehl_store4(K + 144, 256, -s800, -s801, -s802, -s803);
+    softehl_store4(K + 148, 256, -s804, -s805, -s806, -s807);
+    softehl_store4(K + 152, 256, -s808, -s809, -s684, -s685);
+    softehl_store4(K + 160, 256, -s810, -s811, -s812, -s813);
+    softehl_store4(K + 164, 256, -s814, -s815, -s816, -s817);
+    softehl_store4(K + 168, 256, -s818, -s819, -s686, -s687);
+    softehl_store4(K + 176, 256, -s820, -s821, -s822, -s823);
+    softehl_store4(K + 180, 256, -s824, -s825, -s826, -s827);
+    softehl_store4(K + 184, 256, -s828, -s829, -s688, -s689);
 }
 SOFTEHL_BATCH(softehl_mortar_33_tangent, 12, 16, 17, 0, 16, (16 * 16))

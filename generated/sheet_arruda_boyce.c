@@ -9,57 +9,41 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_sheet_arruda_boyce_energy)
+SOFTEHL_GROUP(softehl_sheet_arruda_boyce_energy)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
-            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 * v10,
-            v12 = v11 * v11, v13 = 0.0027142857142857142 * v12, v14 = v13 - 0.21985714285714286,
-            v15 = parameters[1] * parameters[1], v16 = parameters[1] * v15, v17 = v16 * v16,
-            v18 = 1.0 / v17, v19 = v18 * v14, v20 = 0.05 * v11, v21 = v20 - 0.45, v22 = 1.0 / v15,
-            v23 = v22 * v21, v24 = v19 + v23, v25 = 0.0007703153988868275 * v10, v26 = v12 * v25,
-            v27 = v26 - 0.18718664192949908, v28 = v15 * v15, v29 = v28 * v28, v30 = 1.0 / v29,
-            v31 = v30 * v27, v32 = v31 + v24, v33 = 0.010476190476190476 * v10, v34 = v11 * v33,
-            v35 = v34 - 0.28285714285714286, v36 = 1.0 / v28, v37 = v36 * v35, v38 = v37 + v32,
-            v39 = v38 - 1.5, v40 = 0.5 * v10, v41 = v40 + v39, v42 = parameters[0] * v41;
-        values[e] = v42;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1);
+    const double v3 = parameters[1] * parameters[1], v4 = parameters[1] * v3, v5 = v3 * v3;
+    const V v6 = softehl_vexp(-(d0 + d1)), v7 = v1 * v1 + v2 * v2 + v6 * v6, v8 = v7 * v7,
+        v9 = v8 * v8, v10 = 1.0 / (v4 * v4) * (0.0027142857142857142 * v9 - 0.21985714285714286),
+        v11 = 1.0 / (v5 * v5) * (v9 * (0.0007703153988868275 * v7) - 0.18718664192949908),
+        v12 = 1.0 / v5 * (v8 * (0.010476190476190476 * v7) - 0.28285714285714286),
+        v13 = v12 + (1.0 / v3 * (0.05 * v8 - 0.45) + (0.5 * v7 + (v10 + v11))) - 1.5;
+    softehl_store1(R + 0, 1, parameters[0] * v13);
 }
+SOFTEHL_BATCH(softehl_sheet_arruda_boyce_energy, 2, 2, 0, 0, 1, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_arruda_boyce_residual)
+SOFTEHL_GROUP(softehl_sheet_arruda_boyce_residual)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
-            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 * v10,
-            v12 = parameters[1] * parameters[1], v13 = v12 * v12, v14 = v13 * v13, v15 = 1.0 / v14,
-            v16 = 0.0038515769944341373 * v15, v17 = v11 * v16, v18 = parameters[1] * v12,
-            v19 = v18 * v18, v20 = 1.0 / v19, v21 = 0.010857142857142857 * v20, v22 = v10 * v21,
-            v23 = v22 + v17, v24 = 1.0 / v13, v25 = 0.03142857142857143 * v24, v26 = v25 + v23,
-            v27 = v11 * v26, v28 = 1.0 / v12, v29 = 0.1 * v28, v30 = v10 * v29, v31 = 0.5 + v30,
-            v32 = v31 + v27, v33 = parameters[0] * v32, v34 = 2.0 * v3, v35 = v3 * v34,
-            v36 = v35 * v33, v37 = 2.0 * v8, v38 = v8 * v37, v39 = v38 * v33, v40 = v36 - v39,
-            v41 = 2.0 * v1, v42 = v1 * v41, v43 = v42 * v33, v44 = v43 - v39;
-        R[0] = v40; R[1] = v44;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1);
+    const double v3 = parameters[1] * parameters[1], v4 = parameters[1] * v3, v5 = v3 * v3;
+    const V v6 = softehl_vexp(-(d0 + d1)), v7 = v2 * v2 + (v1 * v1 + v6 * v6),
+        v8 = 0.03142857142857143 * (1.0 / v5) + 0.010857142857142857 * (1.0 / (v4 * v4)) * v7,
+        v9 = v7 * v7,
+        v10 = 0.5 + 0.1 * (1.0 / v3) * v7 + v9 * (v8 + 0.0038515769944341373 * (1.0 / (v5 * v5)) * v9),
+        v11 = parameters[0] * v10, v12 = v6 * (2.0 * v6) * v11;
+    softehl_store2(R + 0, 2, v1 * (2.0 * v1) * v11 - v12, v2 * (2.0 * v2) * v11 - v12);
 }
+SOFTEHL_BATCH(softehl_sheet_arruda_boyce_residual, 2, 2, 0, 0, 2, 0)
 
 SOFTEHL_GROUP(softehl_sheet_arruda_boyce_tangent)
 {
@@ -89,56 +73,41 @@ SOFTEHL_GROUP(softehl_sheet_arruda_boyce_tangent)
 }
 SOFTEHL_BATCH(softehl_sheet_arruda_boyce_tangent, 2, 2, 0, 0, 2, (2 * 2))
 
-SOFTEHL_KERNEL(softehl_sheet_arruda_boyce_d_mu)
+SOFTEHL_GROUP(softehl_sheet_arruda_boyce_d_mu)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
-            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 * v10,
-            v12 = parameters[1] * parameters[1], v13 = v12 * v12, v14 = v13 * v13, v15 = 1.0 / v14,
-            v16 = 0.0038515769944341373 * v15, v17 = v11 * v16, v18 = parameters[1] * v12,
-            v19 = v18 * v18, v20 = 1.0 / v19, v21 = 0.010857142857142857 * v20, v22 = v10 * v21,
-            v23 = v22 + v17, v24 = 1.0 / v13, v25 = 0.03142857142857143 * v24, v26 = v25 + v23,
-            v27 = v11 * v26, v28 = 1.0 / v12, v29 = 0.1 * v28, v30 = v10 * v29, v31 = 0.5 + v30,
-            v32 = v31 + v27, v33 = 2.0 * v3, v34 = v3 * v33, v35 = v34 * v32, v36 = 2.0 * v8,
-            v37 = v8 * v36, v38 = v37 * v32, v39 = v35 - v38, v40 = 2.0 * v1, v41 = v1 * v40,
-            v42 = v41 * v32, v43 = v42 - v38;
-        R[0] = v39; R[1] = v43;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1);
+    const double v3 = parameters[1] * parameters[1], v4 = parameters[1] * v3, v5 = v3 * v3;
+    const V v6 = softehl_vexp(-(d0 + d1)), v7 = v2 * v2 + (v1 * v1 + v6 * v6),
+        v8 = 0.03142857142857143 * (1.0 / v5) + 0.010857142857142857 * (1.0 / (v4 * v4)) * v7,
+        v9 = v7 * v7,
+        v10 = 0.5 + 0.1 * (1.0 / v3) * v7 + v9 * (v8 + 0.0038515769944341373 * (1.0 / (v5 * v5)) * v9),
+        v11 = v6 * (2.0 * v6) * v10;
+    softehl_store2(R + 0, 2, v1 * (2.0 * v1) * v10 - v11, v2 * (2.0 * v2) * v10 - v11);
 }
+SOFTEHL_BATCH(softehl_sheet_arruda_boyce_d_mu, 2, 2, 0, 0, 2, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_arruda_boyce_d_lambda_m)
+SOFTEHL_GROUP(softehl_sheet_arruda_boyce_d_lambda_m)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = parameters[1] * parameters[1], v2 = v1 * v1, v3 = v2 * v2, v4 = 1.0 / v3,
-            v5 = 0.030812615955473098 * v4, v6 = v4 * v5, v7 = parameters[1] * v1, v8 = v7 * v7,
-            v9 = v8 * v6, v10 = exp(d[1]), v11 = v10 * v10, v12 = exp(d[0]), v13 = v12 * v12,
-            v14 = v13 + v11, v15 = d[0] + d[1], v16 = -v15, v17 = exp(v16), v18 = v17 * v17,
-            v19 = v14 + v18, v20 = v19 * v19, v21 = v20 * v9, v22 = v20 * v21,
-            v23 = 0.06514285714285714 * v2, v24 = 1.0 / v8, v25 = v24 * v23, v26 = v24 * v25,
-            v27 = v20 * v26, v28 = 1.0 / v1, v29 = 0.2 * v28, v30 = v28 * v29, v31 = v30 + v27,
-            v32 = v19 * v31, v33 = v32 + v22, v34 = parameters[1] * v33, v35 = 1.0 / v2,
-            v36 = 0.12571428571428572 * v7, v37 = v35 * v36, v38 = v35 * v37, v39 = v20 * v38,
-            v40 = v39 + v34, v41 = parameters[0] * v40, v42 = 2.0 * v12, v43 = v12 * v42,
-            v44 = v43 * v41, v45 = 2.0 * v17, v46 = v17 * v45, v47 = v46 * v41, v48 = v47 - v44,
-            v49 = 2.0 * v10, v50 = v10 * v49, v51 = v50 * v41, v52 = v47 - v51;
-        R[0] = v48; R[1] = v52;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1);
+    const double v3 = parameters[1] * parameters[1], v4 = v3 * v3, v5 = parameters[1] * v3,
+        v6 = 1.0 / v3;
+    const V v7 = softehl_vexp(-(d0 + d1));
+    const double v8 = 1.0 / (v4 * v4), v9 = v5 * v5, v10 = 1.0 / v4, v11 = 1.0 / v9;
+    const V v12 = v2 * v2 + (v1 * v1 + v7 * v7), v13 = v12 * v12,
+        v14 = v6 * (0.2 * v6) + v13 * (v11 * (v11 * (0.06514285714285714 * v4))),
+        v15 = v12 * v14 + v13 * (v13 * (v9 * (v8 * (0.030812615955473098 * v8)))),
+        v16 = v13 * (v10 * (v10 * (0.12571428571428572 * v5))) + parameters[1] * v15,
+        v17 = parameters[0] * v16, v18 = v7 * (2.0 * v7) * v17;
+    softehl_store2(R + 0, 2, v18 - v1 * (2.0 * v1) * v17, v18 - v2 * (2.0 * v2) * v17);
 }
+SOFTEHL_BATCH(softehl_sheet_arruda_boyce_d_lambda_m, 2, 2, 0, 0, 2, 0)

@@ -9,120 +9,85 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_sheet_gent_energy)
+SOFTEHL_GROUP(softehl_sheet_gent_energy)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
-            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
-            v12 = 1.0 / parameters[1], v13 = v12 * v11, v14 = 1.0 - v13, v15 = log(v14),
-            v16 = 0.5 * parameters[0], v17 = parameters[1] * v16, v18 = v17 * v15, v19 = -v18;
-        values[e] = v19;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1), v3 = softehl_vexp(-(d0 + d1)),
+        v4 = softehl_vlog(1.0 - 1.0 / parameters[1] * (v1 * v1 + v2 * v2 + v3 * v3 - 3.0));
+    softehl_store1(R + 0, 1, -(parameters[1] * (0.5 * parameters[0]) * v4));
 }
+SOFTEHL_BATCH(softehl_sheet_gent_energy, 2, 2, 0, 0, 1, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_gent_residual)
+SOFTEHL_GROUP(softehl_sheet_gent_residual)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
-            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
-            v12 = 1.0 / parameters[1], v13 = v12 * v11, v14 = 1.0 - v13, v15 = 1.0 / v14,
-            v16 = 0.5 * parameters[0], v17 = parameters[1] * v16, v18 = v12 * v17, v19 = v18 * v15,
-            v20 = 2.0 * v3, v21 = v3 * v20, v22 = v21 * v19, v23 = 2.0 * v8, v24 = v8 * v23,
-            v25 = v24 * v19, v26 = v22 - v25, v27 = 2.0 * v1, v28 = v1 * v27, v29 = v28 * v19,
-            v30 = v29 - v25;
-        R[0] = v26; R[1] = v30;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1);
+    const double v3 = 1.0 / parameters[1];
+    const V v4 = softehl_vexp(-(d0 + d1)),
+        v5 = v3 * (parameters[1] * (0.5 * parameters[0])) * (1.0 / (1.0 - v3 * (v2 * v2 + (v1 * v1 + v4 * v4) - 3.0))),
+        v6 = v4 * (2.0 * v4) * v5;
+    softehl_store2(R + 0, 2, v1 * (2.0 * v1) * v5 - v6, v2 * (2.0 * v2) * v5 - v6);
 }
+SOFTEHL_BATCH(softehl_sheet_gent_residual, 2, 2, 0, 0, 2, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_gent_tangent)
+SOFTEHL_GROUP(softehl_sheet_gent_tangent)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; double *restrict K = tangent + 2 * 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
-            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
-            v12 = 1.0 / parameters[1], v13 = v12 * v11, v14 = 1.0 - v13, v15 = 1.0 / v14,
-            v16 = 0.5 * parameters[0], v17 = parameters[1] * v16, v18 = v12 * v17, v19 = v18 * v15,
-            v20 = 2.0 * v3, v21 = v20 * v19, v22 = v3 * v21, v23 = 2.0 * v8, v24 = v23 * v19,
-            v25 = v8 * v24, v26 = v22 - v25, v27 = 2.0 * v1, v28 = v27 * v19, v29 = v1 * v28,
-            v30 = v29 - v25, v31 = v25 + v22, v32 = v15 * v15, v33 = v3 * v20, v34 = v8 * v23,
-            v35 = v33 - v34, v36 = v12 * v12, v37 = v17 * v36, v38 = v35 * v37, v39 = v38 * v32,
-            v40 = v20 * v39, v41 = v21 + v40, v42 = v3 * v41, v43 = v42 + v31, v44 = v23 * v39,
-            v45 = v44 - v24, v46 = v8 * v45, v47 = v43 - v46, v48 = v1 * v27, v49 = v48 - v34,
-            v50 = v49 * v37, v51 = v50 * v32, v52 = v23 * v51, v53 = v52 - v24, v54 = v8 * v53,
-            v55 = v25 - v54, v56 = v33 * v51, v57 = v56 + v55, v58 = v27 * v51, v59 = v28 + v58,
-            v60 = v1 * v59, v61 = v29 + v60, v62 = v55 + v61;
-        R[0] = v26; R[1] = v30; K[0] = v47; K[1] = v57; K[2] = v57; K[3] = v62;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1);
+    const double v3 = parameters[1] * (0.5 * parameters[0]), v4 = 1.0 / parameters[1];
+    const V v5 = softehl_vexp(-(d0 + d1)), v6 = 2.0 * v5, v7 = 2.0 * v2, v8 = 2.0 * v1,
+        v9 = v5 * v6, v10 = v1 * v8, v11 = 1.0 / (1.0 - v4 * (v1 * v1 + v2 * v2 + v5 * v5 - 3.0));
+    const double v12 = v3 * (v4 * v4);
+    const V v13 = v4 * v3 * v11, v14 = v11 * v11, v15 = v6 * v13, v16 = v7 * v13, v17 = v8 * v13,
+        v18 = v5 * v15, v19 = (v2 * v7 - v9) * v12 * v14, v20 = v2 * v16,
+        v21 = (v10 - v9) * v12 * v14, v22 = v1 * v17;
+    softehl_store2(R + 0, 2, v22 - v18, v20 - v18);
+    const V v23 = v18 - v5 * (v6 * v19 - v15), v24 = v10 * v19 + v23;
+    softehl_store4(K + 0, 4, v22 + (v18 + (v1 * (v17 + v8 * v21) - v5 * (v6 * v21 - v15))), v24, v24, v23 + (v20 + v2 * (v16 + v7 * v19)));
 }
+SOFTEHL_BATCH(softehl_sheet_gent_tangent, 2, 2, 0, 0, 2, (2 * 2))
 
-SOFTEHL_KERNEL(softehl_sheet_gent_d_mu)
+SOFTEHL_GROUP(softehl_sheet_gent_d_mu)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
-            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
-            v12 = 1.0 / parameters[1], v13 = v12 * v11, v14 = 1.0 - v13, v15 = 1.0 / v14,
-            v16 = 0.5 * parameters[1], v17 = v16 * v12, v18 = v15 * v17, v19 = 2.0 * v3,
-            v20 = v3 * v19, v21 = v20 * v18, v22 = 2.0 * v8, v23 = v8 * v22, v24 = v23 * v18,
-            v25 = v21 - v24, v26 = 2.0 * v1, v27 = v1 * v26, v28 = v27 * v18, v29 = v28 - v24;
-        R[0] = v25; R[1] = v29;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1);
+    const double v3 = 1.0 / parameters[1];
+    const V v4 = softehl_vexp(-(d0 + d1)),
+        v5 = 1.0 / (1.0 - v3 * (v2 * v2 + (v1 * v1 + v4 * v4) - 3.0)) * (0.5 * parameters[1] * v3),
+        v6 = v4 * (2.0 * v4) * v5;
+    softehl_store2(R + 0, 2, v1 * (2.0 * v1) * v5 - v6, v2 * (2.0 * v2) * v5 - v6);
 }
+SOFTEHL_BATCH(softehl_sheet_gent_d_mu, 2, 2, 0, 0, 2, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_gent_d_J_m)
+SOFTEHL_GROUP(softehl_sheet_gent_d_J_m)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
-            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
-            v12 = 0.5 * parameters[0], v13 = parameters[1] * v12, v14 = v13 * v11,
-            v15 = 1.0 / parameters[1], v16 = v15 * v11, v17 = 1.0 - v16, v18 = 1.0 / v17,
-            v19 = v18 * v14, v20 = v15 * v15, v21 = v20 * v19, v22 = v12 - v21, v23 = v15 * v22,
-            v24 = v13 * v20, v25 = v23 - v24, v26 = v18 * v25, v27 = 2.0 * v3, v28 = v3 * v27,
-            v29 = v28 * v26, v30 = 2.0 * v8, v31 = v8 * v30, v32 = v31 * v26, v33 = v29 - v32,
-            v34 = 2.0 * v1, v35 = v1 * v34, v36 = v35 * v26, v37 = v36 - v32;
-        R[0] = v33; R[1] = v37;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1); const double v1 = 0.5 * parameters[0];
+    const V v2 = softehl_vexp(d0), v3 = softehl_vexp(d1);
+    const double v4 = 1.0 / parameters[1], v5 = parameters[1] * v1;
+    const V v6 = softehl_vexp(-(d0 + d1)), v7 = v3 * v3 + (v2 * v2 + v6 * v6) - 3.0,
+        v8 = 1.0 / (1.0 - v4 * v7);
+    const double v9 = v4 * v4;
+    const V v10 = v8 * (v4 * (v1 - v9 * (v8 * (v5 * v7))) - v5 * v9), v11 = v6 * (2.0 * v6) * v10;
+    softehl_store2(R + 0, 2, v2 * (2.0 * v2) * v10 - v11, v3 * (2.0 * v3) * v10 - v11);
 }
+SOFTEHL_BATCH(softehl_sheet_gent_d_J_m, 2, 2, 0, 0, 2, 0)

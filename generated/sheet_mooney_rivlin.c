@@ -9,113 +9,76 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_sheet_mooney_rivlin_energy)
+SOFTEHL_GROUP(softehl_sheet_mooney_rivlin_energy)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = 1.0 / v1, v3 = v2 * v2, v4 = exp(d[0]), v5 = 1.0 / v4,
-            v6 = v5 * v5, v7 = v6 + v3, v8 = d[0] + d[1], v9 = -v8, v10 = exp(v9), v11 = 1.0 / v10,
-            v12 = v11 * v11, v13 = v7 + v12, v14 = v13 - 3.0, v15 = parameters[1] * v14,
-            v16 = v1 * v1, v17 = v4 * v4, v18 = v17 + v16, v19 = v10 * v10, v20 = v18 + v19,
-            v21 = v20 - 3.0, v22 = parameters[0] * v21, v23 = v22 + v15, v24 = 0.5 * v23;
-        values[e] = v24;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1), v3 = softehl_vexp(-(d0 + d1)),
+        v4 = 1.0 / v1, v5 = 1.0 / v2, v6 = 1.0 / v3,
+        v7 = parameters[0] * (v1 * v1 + v2 * v2 + v3 * v3 - 3.0) + parameters[1] * (v4 * v4 + v5 * v5 + v6 * v6 - 3.0);
+    softehl_store1(R + 0, 1, 0.5 * v7);
 }
+SOFTEHL_BATCH(softehl_sheet_mooney_rivlin_energy, 2, 2, 0, 0, 1, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_mooney_rivlin_residual)
+SOFTEHL_GROUP(softehl_sheet_mooney_rivlin_residual)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = exp(d[0]), v2 = 1.0 / v1, v3 = 0.5 * parameters[1], v4 = v3 * v2,
-            v5 = v2 * v4, v6 = v2 * v5, v7 = 0.5 * parameters[0], v8 = v1 * v7, v9 = v8 - v6,
-            v10 = 2.0 * v1, v11 = v10 * v9, v12 = d[0] + d[1], v13 = -v12, v14 = exp(v13),
-            v15 = 1.0 / v14, v16 = v3 * v15, v17 = v15 * v16, v18 = v15 * v17, v19 = v14 * v7,
-            v20 = v19 - v18, v21 = 2.0 * v14, v22 = v21 * v20, v23 = v11 - v22, v24 = exp(d[1]),
-            v25 = 1.0 / v24, v26 = v3 * v25, v27 = v25 * v26, v28 = v25 * v27, v29 = v24 * v7,
-            v30 = v29 - v28, v31 = 2.0 * v24, v32 = v31 * v30, v33 = v32 - v22;
-        R[0] = v23; R[1] = v33;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const double v1 = 0.5 * parameters[0], v2 = 0.5 * parameters[1];
+    const V v3 = softehl_vexp(d0), v4 = softehl_vexp(d1), v5 = softehl_vexp(-(d0 + d1)),
+        v6 = 1.0 / v3, v7 = 1.0 / v4, v8 = 1.0 / v5,
+        v9 = 2.0 * v5 * (v5 * v1 - v8 * (v8 * (v2 * v8)));
+    softehl_store2(R + 0, 2, 2.0 * v3 * (v3 * v1 - v6 * (v6 * (v2 * v6))) - v9, 2.0 * v4 * (v4 * v1 - v7 * (v7 * (v2 * v7))) - v9);
 }
+SOFTEHL_BATCH(softehl_sheet_mooney_rivlin_residual, 2, 2, 0, 0, 2, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_mooney_rivlin_tangent)
+SOFTEHL_GROUP(softehl_sheet_mooney_rivlin_tangent)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; double *restrict K = tangent + 2 * 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[0]), v2 = 1.0 / v1, v3 = v2 * v2, v4 = parameters[1] * v2,
-            v5 = v3 * v4, v6 = 2.0 * v1, v7 = 0.5 * parameters[0], v8 = v7 * v6, v9 = v8 - v5,
-            v10 = v1 * v9, v11 = d[0] + d[1], v12 = -v11, v13 = exp(v12), v14 = 1.0 / v13,
-            v15 = v14 * v14, v16 = parameters[1] * v14, v17 = v15 * v16, v18 = 2.0 * v13,
-            v19 = v7 * v18, v20 = v19 - v17, v21 = v13 * v20, v22 = v10 - v21, v23 = exp(d[1]),
-            v24 = 1.0 / v23, v25 = v24 * v24, v26 = parameters[1] * v24, v27 = v25 * v26,
-            v28 = 2.0 * v23, v29 = v7 * v28, v30 = v29 - v27, v31 = v23 * v30, v32 = v31 - v21,
-            v33 = 6.0 * v13, v34 = 0.5 * parameters[1], v35 = v34 * v33, v36 = v15 * v35,
-            v37 = v15 * v36, v38 = v19 + v37, v39 = v13 * v38, v40 = v21 + v39, v41 = 6.0 * v1,
-            v42 = v34 * v41, v43 = v3 * v42, v44 = v3 * v43, v45 = v8 + v44, v46 = v1 * v45,
-            v47 = v10 + v46, v48 = v47 + v40, v49 = v31 + v40, v50 = 6.0 * v23, v51 = v34 * v50,
-            v52 = v25 * v51, v53 = v25 * v52, v54 = v29 + v53, v55 = v23 * v54, v56 = v55 + v49;
-        R[0] = v22; R[1] = v32; K[0] = v48; K[1] = v40; K[2] = v40; K[3] = v56;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1); const double v1 = 0.5 * parameters[0];
+    const V v2 = softehl_vexp(d0), v3 = softehl_vexp(d1);
+    const double v4 = 0.5 * parameters[1];
+    const V v5 = softehl_vexp(-(d0 + d1)), v6 = 1.0 / v2, v7 = v6 * v6, v8 = 1.0 / v3, v9 = v8 * v8,
+        v10 = 1.0 / v5, v11 = v10 * v10, v12 = v1 * (2.0 * v5), v13 = v1 * (2.0 * v3),
+        v14 = v1 * (2.0 * v2), v15 = v5 * (v12 - v11 * (parameters[1] * v10)),
+        v16 = v3 * (v13 - v9 * (parameters[1] * v8)), v17 = v2 * (v14 - v7 * (parameters[1] * v6)),
+        v18 = v15 + v5 * (v12 + v11 * (v11 * (v4 * (6.0 * v5))));
+    softehl_store2(R + 0, 2, v17 - v15, v16 - v15);
+    softehl_store4(K + 0, 4, v17 + v2 * (v14 + v7 * (v7 * (v4 * (6.0 * v2)))) + v18, v18, v18, v3 * (v13 + v9 * (v9 * (v4 * (6.0 * v3)))) + (v16 + v18));
 }
+SOFTEHL_BATCH(softehl_sheet_mooney_rivlin_tangent, 2, 2, 0, 0, 2, (2 * 2))
 
-SOFTEHL_KERNEL(softehl_sheet_mooney_rivlin_d_mu_1)
+SOFTEHL_GROUP(softehl_sheet_mooney_rivlin_d_mu_1)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)parameters;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = d[0] + d[1], v2 = -v1, v3 = exp(v2), v4 = v3 * v3, v5 = exp(d[0]),
-            v6 = v5 * v5, v7 = v6 - v4, v8 = exp(d[1]), v9 = v8 * v8, v10 = v9 - v4;
-        R[0] = v7; R[1] = v10;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1), v3 = softehl_vexp(-(d0 + d1)),
+        v4 = v3 * v3;
+    softehl_store2(R + 0, 2, v1 * v1 - v4, v2 * v2 - v4);
 }
+SOFTEHL_BATCH(softehl_sheet_mooney_rivlin_d_mu_1, 2, 2, 0, 0, 2, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_mooney_rivlin_d_mu_2)
+SOFTEHL_GROUP(softehl_sheet_mooney_rivlin_d_mu_2)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)parameters;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = d[0] + d[1], v2 = -v1, v3 = exp(v2), v4 = 1.0 / v3, v5 = v4 * v4,
-            v6 = exp(d[0]), v7 = 1.0 / v6, v8 = v7 * v7, v9 = v5 - v8, v10 = exp(d[1]),
-            v11 = 1.0 / v10, v12 = v11 * v11, v13 = v5 - v12;
-        R[0] = v9; R[1] = v13;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1), v3 = softehl_vexp(-(d0 + d1)),
+        v4 = 1.0 / v1, v5 = 1.0 / v2, v6 = 1.0 / v3, v7 = v6 * v6;
+    softehl_store2(R + 0, 2, v7 - v4 * v4, v7 - v5 * v5);
 }
+SOFTEHL_BATCH(softehl_sheet_mooney_rivlin_d_mu_2, 2, 2, 0, 0, 2, 0)

@@ -13,62 +13,44 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_sheet_ogden_energy)
+SOFTEHL_GROUP(softehl_sheet_ogden_energy)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        (void)X; (void)d;
-        const double v1 = d[1] * parameters[3], v2 = exp(v1), v3 = d[0] * parameters[3],
-            v4 = exp(v3), v5 = v4 + v2, v6 = d[0] + d[1], v7 = parameters[3] * v6, v8 = -v7,
-            v9 = exp(v8), v10 = v9 + v5, v11 = v10 - 3.0, v12 = 1.0 / parameters[3],
-            v13 = parameters[2] * v12, v14 = v13 * v11, v15 = d[1] * parameters[1], v16 = exp(v15),
-            v17 = d[0] * parameters[1], v18 = exp(v17), v19 = v18 + v16, v20 = parameters[1] * v6,
-            v21 = -v20, v22 = exp(v21), v23 = v22 + v19, v24 = v23 - 3.0, v25 = 1.0 / parameters[1],
-            v26 = parameters[0] * v25, v27 = v26 * v24, v28 = v27 + v14, v29 = d[1] * parameters[5],
-            v30 = exp(v29), v31 = d[0] * parameters[5], v32 = exp(v31), v33 = v32 + v30,
-            v34 = parameters[5] * v6, v35 = -v34, v36 = exp(v35), v37 = v36 + v33, v38 = v37 - 3.0,
-            v39 = 1.0 / parameters[5], v40 = parameters[4] * v39, v41 = v40 * v38, v42 = v41 + v28;
-        values[e] = v42;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0 * parameters[1]), v2 = softehl_vexp(d0 * parameters[3]),
+        v3 = softehl_vexp(d0 * parameters[5]), v4 = d0 + d1, v5 = softehl_vexp(d1 * parameters[1]),
+        v6 = softehl_vexp(d1 * parameters[3]), v7 = softehl_vexp(d1 * parameters[5]),
+        v8 = softehl_vexp(-(parameters[1] * v4)), v9 = softehl_vexp(-(parameters[3] * v4)),
+        v10 = softehl_vexp(-(parameters[5] * v4)),
+        v11 = parameters[0] * (1.0 / parameters[1]) * (v8 + (v1 + v5) - 3.0) + parameters[2] * (1.0 / parameters[3]) * (v9 + (v2 + v6) - 3.0),
+        v12 = parameters[4] * (1.0 / parameters[5]) * (v10 + (v3 + v7) - 3.0) + v11;
+    softehl_store1(R + 0, 1, v12);
 }
+SOFTEHL_BATCH(softehl_sheet_ogden_energy, 2, 2, 0, 0, 1, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_ogden_residual)
+SOFTEHL_GROUP(softehl_sheet_ogden_residual)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = d[0] * parameters[3], v2 = exp(v1), v3 = parameters[3] * v2,
-            v4 = 1.0 / parameters[3], v5 = parameters[2] * v4, v6 = v5 * v3,
-            v7 = d[0] * parameters[5], v8 = exp(v7), v9 = parameters[5] * v8,
-            v10 = 1.0 / parameters[5], v11 = parameters[4] * v10, v12 = v11 * v9, v13 = v12 + v6,
-            v14 = d[0] * parameters[1], v15 = exp(v14), v16 = parameters[1] * v15,
-            v17 = 1.0 / parameters[1], v18 = parameters[0] * v17, v19 = v18 * v16, v20 = v13 + v19,
-            v21 = d[0] + d[1], v22 = parameters[3] * v21, v23 = -v22, v24 = exp(v23),
-            v25 = parameters[3] * v24, v26 = v5 * v25, v27 = parameters[5] * v21, v28 = -v27,
-            v29 = exp(v28), v30 = parameters[5] * v29, v31 = v11 * v30, v32 = v31 + v26,
-            v33 = parameters[1] * v21, v34 = -v33, v35 = exp(v34), v36 = parameters[1] * v35,
-            v37 = v18 * v36, v38 = v32 + v37, v39 = v20 - v38, v40 = d[1] * parameters[3],
-            v41 = exp(v40), v42 = parameters[3] * v41, v43 = v5 * v42, v44 = d[1] * parameters[5],
-            v45 = exp(v44), v46 = parameters[5] * v45, v47 = v11 * v46, v48 = v47 + v43,
-            v49 = d[1] * parameters[1], v50 = exp(v49), v51 = parameters[1] * v50, v52 = v18 * v51,
-            v53 = v48 + v52, v54 = v53 - v38;
-        R[0] = v39; R[1] = v54;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0 * parameters[1]), v2 = softehl_vexp(d0 * parameters[3]),
+        v3 = softehl_vexp(d0 * parameters[5]), v4 = d0 + d1, v5 = softehl_vexp(d1 * parameters[1]),
+        v6 = softehl_vexp(d1 * parameters[3]), v7 = softehl_vexp(d1 * parameters[5]);
+    const double v8 = parameters[0] * (1.0 / parameters[1]),
+        v9 = parameters[2] * (1.0 / parameters[3]), v10 = parameters[4] * (1.0 / parameters[5]);
+    const V v11 = softehl_vexp(-(parameters[1] * v4)), v12 = softehl_vexp(-(parameters[3] * v4)),
+        v13 = softehl_vexp(-(parameters[5] * v4)),
+        v14 = v10 * (parameters[5] * v13) + v9 * (parameters[3] * v12) + v8 * (parameters[1] * v11),
+        v15 = v10 * (parameters[5] * v7) + v9 * (parameters[3] * v6) + v8 * (parameters[1] * v5),
+        v16 = v10 * (parameters[5] * v3) + v9 * (parameters[3] * v2) + v8 * (parameters[1] * v1);
+    softehl_store2(R + 0, 2, v16 - v14, v15 - v14);
 }
+SOFTEHL_BATCH(softehl_sheet_ogden_residual, 2, 2, 0, 0, 2, 0)
 
 SOFTEHL_GROUP(softehl_sheet_ogden_tangent)
 {
@@ -96,128 +78,86 @@ SOFTEHL_GROUP(softehl_sheet_ogden_tangent)
 }
 SOFTEHL_BATCH(softehl_sheet_ogden_tangent, 2, 2, 0, 0, 2, (2 * 2))
 
-SOFTEHL_KERNEL(softehl_sheet_ogden_d_mu_1)
+SOFTEHL_GROUP(softehl_sheet_ogden_d_mu_1)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = d[0] + d[1], v2 = parameters[1] * v1, v3 = -v2, v4 = exp(v3),
-            v5 = d[0] * parameters[1], v6 = exp(v5), v7 = v6 - v4, v8 = d[1] * parameters[1],
-            v9 = exp(v8), v10 = v9 - v4;
-        R[0] = v7; R[1] = v10;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0 * parameters[1]), v2 = softehl_vexp(d1 * parameters[1]),
+        v3 = softehl_vexp(-(parameters[1] * (d0 + d1)));
+    softehl_store2(R + 0, 2, v1 - v3, v2 - v3);
 }
+SOFTEHL_BATCH(softehl_sheet_ogden_d_mu_1, 2, 2, 0, 0, 2, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_ogden_d_alpha_1)
+SOFTEHL_GROUP(softehl_sheet_ogden_d_alpha_1)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = 1.0 / parameters[1], v2 = parameters[0] * v1, v3 = v1 * v2,
-            v4 = d[0] + d[1], v5 = v4 * v2, v6 = v5 + v3, v7 = parameters[1] * v6, v8 = v2 - v7,
-            v9 = parameters[1] * v4, v10 = -v9, v11 = exp(v10), v12 = v11 * v8, v13 = d[0] * v2,
-            v14 = v13 - v3, v15 = parameters[1] * v14, v16 = v2 + v15, v17 = d[0] * parameters[1],
-            v18 = exp(v17), v19 = v18 * v16, v20 = v19 - v12, v21 = d[1] * v2, v22 = v21 - v3,
-            v23 = parameters[1] * v22, v24 = v2 + v23, v25 = d[1] * parameters[1], v26 = exp(v25),
-            v27 = v26 * v24, v28 = v27 - v12;
-        R[0] = v20; R[1] = v28;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1); const double v1 = 1.0 / parameters[1];
+    const V v2 = softehl_vexp(d0 * parameters[1]), v3 = d0 + d1,
+        v4 = softehl_vexp(d1 * parameters[1]), v5 = softehl_vexp(-(parameters[1] * v3));
+    const double v6 = parameters[0] * v1, v7 = v1 * v6;
+    const V v8 = v5 * (v6 - parameters[1] * (v3 * v6 + v7));
+    softehl_store2(R + 0, 2, v2 * (v6 + parameters[1] * (d0 * v6 - v7)) - v8, v4 * (v6 + parameters[1] * (d1 * v6 - v7)) - v8);
 }
+SOFTEHL_BATCH(softehl_sheet_ogden_d_alpha_1, 2, 2, 0, 0, 2, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_ogden_d_mu_2)
+SOFTEHL_GROUP(softehl_sheet_ogden_d_mu_2)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = d[0] + d[1], v2 = parameters[3] * v1, v3 = -v2, v4 = exp(v3),
-            v5 = d[0] * parameters[3], v6 = exp(v5), v7 = v6 - v4, v8 = d[1] * parameters[3],
-            v9 = exp(v8), v10 = v9 - v4;
-        R[0] = v7; R[1] = v10;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0 * parameters[3]), v2 = softehl_vexp(d1 * parameters[3]),
+        v3 = softehl_vexp(-(parameters[3] * (d0 + d1)));
+    softehl_store2(R + 0, 2, v1 - v3, v2 - v3);
 }
+SOFTEHL_BATCH(softehl_sheet_ogden_d_mu_2, 2, 2, 0, 0, 2, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_ogden_d_alpha_2)
+SOFTEHL_GROUP(softehl_sheet_ogden_d_alpha_2)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = 1.0 / parameters[3], v2 = parameters[2] * v1, v3 = v1 * v2,
-            v4 = d[0] + d[1], v5 = v4 * v2, v6 = v5 + v3, v7 = parameters[3] * v6, v8 = v2 - v7,
-            v9 = parameters[3] * v4, v10 = -v9, v11 = exp(v10), v12 = v11 * v8, v13 = d[0] * v2,
-            v14 = v13 - v3, v15 = parameters[3] * v14, v16 = v2 + v15, v17 = d[0] * parameters[3],
-            v18 = exp(v17), v19 = v18 * v16, v20 = v19 - v12, v21 = d[1] * v2, v22 = v21 - v3,
-            v23 = parameters[3] * v22, v24 = v2 + v23, v25 = d[1] * parameters[3], v26 = exp(v25),
-            v27 = v26 * v24, v28 = v27 - v12;
-        R[0] = v20; R[1] = v28;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1); const double v1 = 1.0 / parameters[3];
+    const V v2 = softehl_vexp(d0 * parameters[3]), v3 = d0 + d1,
+        v4 = softehl_vexp(d1 * parameters[3]), v5 = softehl_vexp(-(parameters[3] * v3));
+    const double v6 = parameters[2] * v1, v7 = v1 * v6;
+    const V v8 = v5 * (v6 - parameters[3] * (v3 * v6 + v7));
+    softehl_store2(R + 0, 2, v2 * (v6 + parameters[3] * (d0 * v6 - v7)) - v8, v4 * (v6 + parameters[3] * (d1 * v6 - v7)) - v8);
 }
+SOFTEHL_BATCH(softehl_sheet_ogden_d_alpha_2, 2, 2, 0, 0, 2, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_ogden_d_mu_3)
+SOFTEHL_GROUP(softehl_sheet_ogden_d_mu_3)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = d[0] + d[1], v2 = parameters[5] * v1, v3 = -v2, v4 = exp(v3),
-            v5 = d[0] * parameters[5], v6 = exp(v5), v7 = v6 - v4, v8 = d[1] * parameters[5],
-            v9 = exp(v8), v10 = v9 - v4;
-        R[0] = v7; R[1] = v10;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0 * parameters[5]), v2 = softehl_vexp(d1 * parameters[5]),
+        v3 = softehl_vexp(-(parameters[5] * (d0 + d1)));
+    softehl_store2(R + 0, 2, v1 - v3, v2 - v3);
 }
+SOFTEHL_BATCH(softehl_sheet_ogden_d_mu_3, 2, 2, 0, 0, 2, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_ogden_d_alpha_3)
+SOFTEHL_GROUP(softehl_sheet_ogden_d_alpha_3)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = 1.0 / parameters[5], v2 = parameters[4] * v1, v3 = v1 * v2,
-            v4 = d[0] + d[1], v5 = v4 * v2, v6 = v5 + v3, v7 = parameters[5] * v6, v8 = v2 - v7,
-            v9 = parameters[5] * v4, v10 = -v9, v11 = exp(v10), v12 = v11 * v8, v13 = d[0] * v2,
-            v14 = v13 - v3, v15 = parameters[5] * v14, v16 = v2 + v15, v17 = d[0] * parameters[5],
-            v18 = exp(v17), v19 = v18 * v16, v20 = v19 - v12, v21 = d[1] * v2, v22 = v21 - v3,
-            v23 = parameters[5] * v22, v24 = v2 + v23, v25 = d[1] * parameters[5], v26 = exp(v25),
-            v27 = v26 * v24, v28 = v27 - v12;
-        R[0] = v20; R[1] = v28;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1); const double v1 = 1.0 / parameters[5];
+    const V v2 = softehl_vexp(d0 * parameters[5]), v3 = d0 + d1,
+        v4 = softehl_vexp(d1 * parameters[5]), v5 = softehl_vexp(-(parameters[5] * v3));
+    const double v6 = parameters[4] * v1, v7 = v1 * v6;
+    const V v8 = v5 * (v6 - parameters[5] * (v3 * v6 + v7));
+    softehl_store2(R + 0, 2, v2 * (v6 + parameters[5] * (d0 * v6 - v7)) - v8, v4 * (v6 + parameters[5] * (d1 * v6 - v7)) - v8);
 }
+SOFTEHL_BATCH(softehl_sheet_ogden_d_alpha_3, 2, 2, 0, 0, 2, 0)

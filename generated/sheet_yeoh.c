@@ -10,137 +10,89 @@
  */
 #include "softehl_kernels.h"
 
-SOFTEHL_KERNEL(softehl_sheet_yeoh_energy)
+SOFTEHL_GROUP(softehl_sheet_yeoh_energy)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
-            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
-            v12 = v11 * v11, v13 = parameters[2] * v12, v14 = parameters[0] + v13, v15 = v11 * v14,
-            v16 = parameters[1] * v12, v17 = v16 + v15;
-        values[e] = v17;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1), v3 = softehl_vexp(-(d0 + d1)),
+        v4 = v1 * v1 + v2 * v2 + v3 * v3 - 3.0, v5 = v4 * v4;
+    softehl_store1(R + 0, 1, parameters[1] * v5 + v4 * (parameters[0] + parameters[2] * v5));
 }
+SOFTEHL_BATCH(softehl_sheet_yeoh_energy, 2, 2, 0, 0, 1, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_yeoh_residual)
+SOFTEHL_GROUP(softehl_sheet_yeoh_residual)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
-            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
-            v12 = 3.0 * parameters[2], v13 = v11 * v12, v14 = 2.0 * parameters[1], v15 = v14 + v13,
-            v16 = v11 * v15, v17 = parameters[0] + v16, v18 = 2.0 * v3, v19 = v3 * v18,
-            v20 = v19 * v17, v21 = 2.0 * v8, v22 = v8 * v21, v23 = v22 * v17, v24 = v20 - v23,
-            v25 = 2.0 * v1, v26 = v1 * v25, v27 = v26 * v17, v28 = v27 - v23;
-        R[0] = v24; R[1] = v28;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1), v3 = softehl_vexp(-(d0 + d1)),
+        v4 = v2 * v2 + (v1 * v1 + v3 * v3) - 3.0,
+        v5 = parameters[0] + v4 * (2.0 * parameters[1] + 3.0 * parameters[2] * v4),
+        v6 = v3 * (2.0 * v3) * v5;
+    softehl_store2(R + 0, 2, v1 * (2.0 * v1) * v5 - v6, v2 * (2.0 * v2) * v5 - v6);
 }
+SOFTEHL_BATCH(softehl_sheet_yeoh_residual, 2, 2, 0, 0, 2, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_yeoh_tangent)
+SOFTEHL_GROUP(softehl_sheet_yeoh_tangent)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; double *restrict K = tangent + 2 * 2 * e;
-        (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
-            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
-            v12 = 3.0 * parameters[2], v13 = v11 * v12, v14 = v11 * v13, v15 = 2.0 * v11,
-            v16 = parameters[1] * v15, v17 = parameters[0] + v16, v18 = v14 + v17, v19 = 2.0 * v3,
-            v20 = v19 * v18, v21 = v3 * v20, v22 = 2.0 * v8, v23 = v22 * v18, v24 = v8 * v23,
-            v25 = v21 - v24, v26 = 2.0 * v1, v27 = v26 * v18, v28 = v1 * v27, v29 = v28 - v24,
-            v30 = v24 + v21, v31 = v12 * v15, v32 = 2.0 * parameters[1], v33 = v32 + v31,
-            v34 = v3 * v19, v35 = v8 * v22, v36 = v34 - v35, v37 = v36 * v33, v38 = v19 * v37,
-            v39 = v38 + v20, v40 = v3 * v39, v41 = v40 + v30, v42 = v22 * v37, v43 = v42 - v23,
-            v44 = v8 * v43, v45 = v41 - v44, v46 = v1 * v26, v47 = v46 - v35, v48 = v47 * v33,
-            v49 = v22 * v48, v50 = v49 - v23, v51 = v8 * v50, v52 = v24 - v51, v53 = v34 * v48,
-            v54 = v53 + v52, v55 = v26 * v48, v56 = v55 + v27, v57 = v1 * v56, v58 = v28 + v57,
-            v59 = v52 + v58;
-        R[0] = v25; R[1] = v29; K[0] = v45; K[1] = v54; K[2] = v54; K[3] = v59;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1); const double v1 = 3.0 * parameters[2];
+    const V v2 = softehl_vexp(d0), v3 = softehl_vexp(d1), v4 = softehl_vexp(-(d0 + d1)),
+        v5 = 2.0 * v4, v6 = 2.0 * v3, v7 = 2.0 * v2, v8 = v4 * v5, v9 = v2 * v7,
+        v10 = v2 * v2 + v3 * v3 + v4 * v4 - 3.0, v11 = 2.0 * v10,
+        v12 = parameters[1] * v11 + (parameters[0] + v10 * (v10 * v1)),
+        v13 = 2.0 * parameters[1] + v1 * v11, v14 = v5 * v12, v15 = v6 * v12, v16 = v7 * v12,
+        v17 = (v3 * v6 - v8) * v13, v18 = v3 * v15, v19 = (v9 - v8) * v13, v20 = v4 * v14,
+        v21 = v2 * v16;
+    softehl_store2(R + 0, 2, v21 - v20, v18 - v20);
+    const V v22 = v20 - v4 * (v5 * v17 - v14), v23 = v9 * v17 + v22;
+    softehl_store4(K + 0, 4, v21 + (v20 + (v2 * (v7 * v19 + v16) - v4 * (v5 * v19 - v14))), v23, v23, v18 + v3 * (v6 * v17 + v15) + v22);
 }
+SOFTEHL_BATCH(softehl_sheet_yeoh_tangent, 2, 2, 0, 0, 2, (2 * 2))
 
-SOFTEHL_KERNEL(softehl_sheet_yeoh_d_c_1)
+SOFTEHL_GROUP(softehl_sheet_yeoh_d_c_1)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)parameters;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = exp(d[0]), v2 = 2.0 * v1, v3 = v1 * v2, v4 = d[0] + d[1], v5 = -v4,
-            v6 = exp(v5), v7 = 2.0 * v6, v8 = v6 * v7, v9 = v3 - v8, v10 = exp(d[1]),
-            v11 = 2.0 * v10, v12 = v10 * v11, v13 = v12 - v8;
-        R[0] = v9; R[1] = v13;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1), v3 = softehl_vexp(-(d0 + d1)),
+        v4 = v3 * (2.0 * v3);
+    softehl_store2(R + 0, 2, v1 * (2.0 * v1) - v4, v2 * (2.0 * v2) - v4);
 }
+SOFTEHL_BATCH(softehl_sheet_yeoh_d_c_1, 2, 2, 0, 0, 2, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_yeoh_d_c_2)
+SOFTEHL_GROUP(softehl_sheet_yeoh_d_c_2)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)parameters;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
-            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
-            v12 = 2.0 * v11, v13 = 2.0 * v3, v14 = v3 * v13, v15 = v14 * v12, v16 = 2.0 * v8,
-            v17 = v8 * v16, v18 = v17 * v12, v19 = v15 - v18, v20 = 2.0 * v1, v21 = v1 * v20,
-            v22 = v21 * v12, v23 = v22 - v18;
-        R[0] = v19; R[1] = v23;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1), v3 = softehl_vexp(-(d0 + d1)),
+        v4 = 2.0 * (v2 * v2 + (v1 * v1 + v3 * v3) - 3.0), v5 = v3 * (2.0 * v3) * v4;
+    softehl_store2(R + 0, 2, v1 * (2.0 * v1) * v4 - v5, v2 * (2.0 * v2) * v4 - v5);
 }
+SOFTEHL_BATCH(softehl_sheet_yeoh_d_c_2, 2, 2, 0, 0, 2, 0)
 
-SOFTEHL_KERNEL(softehl_sheet_yeoh_d_c_3)
+SOFTEHL_GROUP(softehl_sheet_yeoh_d_c_3)
 {
-    (void)points;
-    (void)modes;
-    (void)data;
-    (void)parameters;
-    (void)direction;
-    (void)rule;
-    (void)basis;
-    (void)tangent;
-    for (ptrdiff_t e = 0; e < n; ++e) {
-        const double *restrict X = coordinates + 2 * e; const double *restrict d = dofs + 2 * e;
-        double *restrict R = values + 2 * e; (void)X; (void)d;
-        const double v1 = exp(d[1]), v2 = v1 * v1, v3 = exp(d[0]), v4 = v3 * v3, v5 = v4 + v2,
-            v6 = d[0] + d[1], v7 = -v6, v8 = exp(v7), v9 = v8 * v8, v10 = v5 + v9, v11 = v10 - 3.0,
-            v12 = 3.0 * v11, v13 = v11 * v12, v14 = 2.0 * v3, v15 = v3 * v14, v16 = v15 * v13,
-            v17 = 2.0 * v8, v18 = v8 * v17, v19 = v18 * v13, v20 = v16 - v19, v21 = 2.0 * v1,
-            v22 = v1 * v21, v23 = v22 * v13, v24 = v23 - v19;
-        R[0] = v20; R[1] = v24;
-    }
+    SOFTEHL_IDLE;
+    V X0, X1;
+    softehl_load2(X + 0, 2, &X0, &X1); (void)X0; (void)X1;
+    V d0, d1;
+    softehl_load2(d + 0, 2, &d0, &d1);
+    const V v1 = softehl_vexp(d0), v2 = softehl_vexp(d1), v3 = softehl_vexp(-(d0 + d1)),
+        v4 = v2 * v2 + (v1 * v1 + v3 * v3) - 3.0, v5 = v4 * (3.0 * v4), v6 = v3 * (2.0 * v3) * v5;
+    softehl_store2(R + 0, 2, v1 * (2.0 * v1) * v5 - v6, v2 * (2.0 * v2) * v5 - v6);
 }
+SOFTEHL_BATCH(softehl_sheet_yeoh_d_c_3, 2, 2, 0, 0, 2, 0)

@@ -149,8 +149,8 @@ def test_every_folder_has_its_place(room: str) -> None:
 @pytest.mark.parametrize(
     ("room", "path", "source"),
     [
-        ("codegen", "graph/graph.py", "from softehl.codegen.emit.c import lines"),
-        ("codegen", "emit/c.py", "from softehl.codegen import pipeline"),
+        ("codegen", "graph/graph.py", "from softehl.codegen.emit.simd import lines"),
+        ("codegen", "emit/simd.py", "from softehl.codegen import pipeline"),
         ("runtime", "mesh/mesh.py", "def f():\n    import softehl.runtime.fem.dofs"),
         ("runtime", "fem/dofs.py", "from softehl.runtime.solve.newton import Newton"),
         ("cases", "harness/record.py", "from softehl.cases.seal.states.state import FilmRow"),

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from softehl.codegen import abi
 from softehl.codegen.emit.printer import Printer, number
 from softehl.codegen.emit.schedule import If, Same, Statement
-from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, Routine
+from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, FREE, Input, Node, Op, Routine
 from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Definition
 
@@ -131,15 +131,22 @@ class LanePrinter(Printer):
                 a, b = (self.value(x) for x in n.args[1:])
                 self.line(depth, f"const V {name} = softehl_blend({condition}, {a}, {b});")
             return
-        known = 1 if not s.then else 2 if not s.otherwise else 0
+        known = {n: next((k for k in (2, 1) if self._known(n.args[k])), 0) for n in s.merged}
         for n, name in zip(s.merged, names, strict=True):
-            start = self.value(n.args[known]) if known else self.zero
+            start = self.value(n.args[known[n]]) if known[n] else self.zero
             self.line(depth, f"V {name} = {start};")
         for k, sign, inner in ((1, "", s.then), (2, "~", s.otherwise)):
-            if k != known:
-                self._side(depth, s, k, f"{sign}{condition}", inner)
+            taken = [n for n in s.merged if known[n] != k]
+            if taken:
+                self._side(depth, taken, k, f"{sign}{condition}", inner)
 
-    def _side(self, depth: int, s: If, k: int, chosen: str, inner: Sequence[Statement]) -> None:
+    def _known(self, n: Node) -> bool:
+        """True for a value that stands before what is printed next."""
+        return n.op in FREE or n in self.names or n in self.inside
+
+    def _side(
+        self, depth: int, taken: Sequence[Node], k: int, chosen: str, inner: Sequence[Statement]
+    ) -> None:
         """One side of a branch, for the lanes that want it; the others keep what they have."""
         before = self.active
         self.temporaries += 1
@@ -148,7 +155,7 @@ class LanePrinter(Printer):
         self.line(depth, f"const M {self.active} = {both};")
         self.line(depth, f"if (softehl_any({self.active})) {{")
         self.block(depth + 1, inner)
-        for n in s.merged:
+        for n in taken:
             name, value = self.names[n], self.value(n.args[k])
             blend = f"softehl_blend({self.active}, {value}, {name})"
             self.line(depth + 1, f"{name} = {blend};")

@@ -9,11 +9,23 @@ from softehl.codegen.emit import support as support_c
 from softehl.codegen.language.definition import Definition
 
 HEADER = "softehl_kernels.h"
+ONE_LANE = "#define SOFTEHL_LANES 1\n"
+"""In front of the header: one element at a time, in plain C11."""
 
 
-def source(definition: Definition, functions: Iterable[str], before: Iterable[str] = ()) -> str:
-    """The C file of a kernel family; `before` are the routines that its functions call."""
-    return "\n".join([_banner(definition), f'#include "{HEADER}"', "", *before, *functions])
+def source(
+    definition: Definition,
+    functions: Iterable[str],
+    before: Iterable[str] = (),
+    *,
+    single: bool = False,
+) -> str:
+    """The C file of a kernel family; `before` are the routines that its functions call.
+
+    single: with one lane, whatever the compiler knows.
+    """
+    include = f'{ONE_LANE if single else ""}#include "{HEADER}"'
+    return "\n".join([_banner(definition), include, "", *before, *functions])
 
 
 def _banner(d: Definition) -> str:

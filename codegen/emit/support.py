@@ -6,6 +6,7 @@ With one lane both are scalars, and nothing is padded or transposed.
 
 from softehl.codegen.emit.support_batch import ARRAYS, BATCH
 from softehl.codegen.emit.support_lanes import FOUR, LANES, ROOTS
+from softehl.codegen.emit.support_local import LOCAL
 
 _VECTORS = r"""
 #if SOFTEHL_LANES > 1
@@ -256,4 +257,4 @@ static inline void softehl_store3(double *p, ptrdiff_t width, V a, V b, V c)
 }
 """
 
-TEXT = LANES + ROOTS + FOUR + _VECTORS + ARRAYS + BATCH
+TEXT = LANES + ROOTS + FOUR + _VECTORS + ARRAYS + LOCAL + BATCH

@@ -43,8 +43,9 @@ BATCH = r"""
         const double *restrict direction, const double *restrict rule,              \
         const double *restrict basis, double *restrict values, double *restrict tangent)
 
-/* What computes as many elements as there are lanes: never printed into the loop over groups. */
-#ifdef __GNUC__
+/* What computes as many elements as there are lanes: several are never printed into the loop over
+   groups. */
+#if defined(__GNUC__) && SOFTEHL_LANES > 1
 #define SOFTEHL_APART static __attribute__((noinline))
 #else
 #define SOFTEHL_APART static

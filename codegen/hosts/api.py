@@ -26,7 +26,7 @@ def files(page: Interface, *, single: bool = False) -> tuple[dict[str, str], Ker
     single: for a host that asks for one element at a time, so that lanes would be empty.
     """
     kernel = pipeline.compile_model(page.definition)
-    lanes = ["#define SOFTEHL_LANES 1\n"] if single else []
+    lanes = [source.ONE_LANE] if single else []
     names = [abi.function_name(page.name, t) for t in kernel.functions]
     return {
         f"{page.name}.h": header(page),

@@ -9,9 +9,9 @@ from typing import Any
 import sympy as sp
 
 from softehl.codegen.graph.graph import Input, Node
+from softehl.codegen.language.complaints import ModelError, page_line
 from softehl.codegen.language.definition import Argument, Condition
 from softehl.codegen.language.entries import Listed
-from softehl.codegen.language.lower import ModelError, page_line
 from softehl.codegen.language.symbols import Symbols
 
 _TIMES = (

@@ -13,12 +13,12 @@ from softehl.codegen.graph.graph import Node
 from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language import local, outputs
 from softehl.codegen.language.arguments import Arguments
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import cells
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.equations import Equations
 from softehl.codegen.language.intermediates import Intermediates
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.outputs import Outputs
 from softehl.codegen.language.symbols import Symbols
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.complaints import ModelError
 
 
 @dataclass(frozen=True)

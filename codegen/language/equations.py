@@ -9,7 +9,7 @@ import sympy as sp
 
 from softehl.codegen.graph.graph import Node
 from softehl.codegen.graph.traverse import reachable
-from softehl.codegen.language.lower import ModelError, warn_page
+from softehl.codegen.language.complaints import ModelError, warn_page
 from softehl.codegen.language.record import Integral
 from softehl.codegen.language.symbols import Symbols
 

@@ -12,13 +12,13 @@ from typing import Any
 
 import sympy as sp
 
+from softehl.codegen.language.complaints import Elsewhere, ModelError
 from softehl.codegen.language.definition import Component, Definition
 from softehl.codegen.language.elements.cells import ELEMENTS, Element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.elements.shapes import interpolate
 from softehl.codegen.language.entries import Entries
-from softehl.codegen.language.fields import AXISYMMETRIC, Elsewhere, Traced
-from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.fields import AXISYMMETRIC, Traced
 from softehl.codegen.language.nodal import Nodal
 
 FIRST = {"tri": (0, 1), "quad": (0, 1), "tet": (0, 2, 1), "hex": (0, 3, 2, 1)}

@@ -16,11 +16,11 @@ from typing import Any
 
 import sympy as sp
 
+from softehl.codegen.language.complaints import Elsewhere, ModelError, NeedsElement
 from softehl.codegen.language.definition import Component
 from softehl.codegen.language.elements.cells import Element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.entries import Entries
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
 
 PLANE, AXISYMMETRIC, SOLID = "plane strain", "axisymmetric", "solid"
@@ -29,17 +29,6 @@ GEOMETRIES = {1: (SOLID, PLANE, AXISYMMETRIC), 2: (PLANE, AXISYMMETRIC, SOLID), 
 but the first of one are of sides."""
 AXES = "xyz"
 _IN_FIELDS = "a page of fields says it with m.vector, m.scalar and m.minimise or m.weak"
-
-
-class NeedsElement(ModelError):  # noqa: N818 (named after what it is)
-    """Error of a page that asks for what is known in whole elements only."""
-
-    def __init__(self, what: str) -> None:
-        super().__init__(f"{what}: known in cells only, not on sides and not at a point alone")
-
-
-class Elsewhere(ModelError):  # noqa: N818 (named after what it is)
-    """A page is not meant for cells, or not for facets; another one of its file may be."""
 
 
 @dataclass(frozen=True)
@@ -120,15 +109,15 @@ class Fields(Model):
     @property
     def size(self) -> Any:
         """Volume of a cell at a facet per area of the facet: a length."""
-        raise _no_facet("m.size", self.cell)
+        raise Elsewhere.no_facet("m.size", self.cell.name)
 
     def jump(self, value: Any) -> Any:
         """A value on a facet in the cell that the normal leaves, less that in the other one."""
-        raise _no_facet(f"m.jump({value})", self.cell)
+        raise Elsewhere.no_facet(f"m.jump({value})", self.cell.name)
 
     def average(self, value: Any) -> Any:
         """Mean of a value in both cells at a facet."""
-        raise _no_facet(f"m.average({value})", self.cell)
+        raise Elsewhere.no_facet(f"m.average({value})", self.cell.name)
 
     def previous(self, field: Any) -> Any:
         """A field at the beginning of the step; it has gradients, too."""
@@ -292,11 +281,6 @@ class Fields(Model):
         for k in range(self.dimension):
             slopes.append(sp.Add(*(expression.diff(t.value) * t.slopes[k] for t in fields)))
         return slopes
-
-
-def _no_facet(what: str, cell: Element) -> ModelError:
-    words = f'{what}: {cell.name} is a cell here; facets are on="interior" and sides of a mesh'
-    return Elsewhere(words)
 
 
 def _leaves(expression: Any) -> set[Any]:

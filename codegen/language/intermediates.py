@@ -10,8 +10,8 @@ import sympy as sp
 from softehl.codegen.graph.differentiate import gradient
 from softehl.codegen.graph.graph import Node, Op
 from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.entries import Entries
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.symbols import Symbols
 
 

@@ -20,9 +20,9 @@ from softehl.codegen.graph.routines import (
     symmetric,
 )
 from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.entries import Entries, applied, fraction
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.symbols import Symbols
 
 

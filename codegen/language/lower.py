@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-import warnings
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import sympy as sp
@@ -15,48 +11,7 @@ import sympy as sp
 from softehl.codegen.graph.domain import Domain, decidable
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.traverse import Recursion, recursion
-
-
-class ModelError(ValueError):
-    """The model says something a kernel cannot hold; the message names it and the page's line.
-
-    `where` is the file and line; left out, it is found among the callers: the first one that is
-    not the generator itself (a model that ships is a page like any other).
-    """
-
-    def __init__(self, message: str, where: str | None = None) -> None:
-        place = where or page_line()
-        super().__init__(f"{place}: {message}" if place else message)
-
-
-_CODEGEN = Path(__file__).resolve().parents[1]
-
-
-def page_line() -> str:
-    """File and line of the model page that is being read, e.g. `my_model.py:12`."""
-    frame: FrameType | None = sys._getframe(1)
-    while frame is not None:
-        path = Path(frame.f_code.co_filename).resolve()
-        ours = path.is_relative_to(_CODEGEN) and not path.is_relative_to(_CODEGEN / "models")
-        if not ours and "sympy" not in path.parts and not path.name.startswith("<"):
-            return f"{path}:{frame.f_lineno}"
-        frame = frame.f_back
-    return ""
-
-
-class ModelWarning(UserWarning):
-    """A page says what is allowed, but seldom meant."""
-
-
-_WARNED: dict[str | tuple[str, type[Warning], int], int] = {}
-"""What Python's warnings remember, so that a page that is read again does not warn again."""
-
-
-def warn_page(message: str) -> None:
-    """A `ModelWarning` with the page's line."""
-    file, _, line = page_line().rpartition(":")
-    warnings.warn_explicit(message, ModelWarning, file, int(line or 0), registry=_WARNED)
-
+from softehl.codegen.language.complaints import ModelError
 
 _FUNCTIONS: dict[type, Op] = {
     sp.log: Op.LOG,

@@ -19,10 +19,10 @@ from typing import Any
 
 import sympy as sp
 
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import PointForm
 from softehl.codegen.language.draft import NAME
 from softehl.codegen.language.fields import AXES, Fields
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.language.pages import Page
 

@@ -15,10 +15,10 @@ from typing import Any
 import sympy as sp
 
 from softehl.codegen.language import local
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Argument, Definition
 from softehl.codegen.language.draft import Draft
 from softehl.codegen.language.entries import Listed
-from softehl.codegen.language.lower import ModelError
 
 __all__ = ["Argument", "Definition", "Model"]
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import sympy as sp
 from sympy.core.symbol import Str
 
-from softehl.codegen.language.lower import ModelError
+from softehl.codegen.language.complaints import ModelError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -7,8 +7,8 @@ from typing import Any
 
 from softehl.codegen.abi import Task
 from softehl.codegen.graph.graph import Input, Node
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.symbols import Symbols
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args, overload
 
+from softehl.codegen.language.complaints import ModelError, NeedsElement
 from softehl.codegen.language.definition import Definition, PointForm
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.elements.cells import Element, element
@@ -17,10 +18,8 @@ from softehl.codegen.language.fields import (
     GEOMETRIES,
     SOLID,
     Fields,
-    NeedsElement,
     order_of,
 )
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.side import Side
 from softehl.codegen.language.site import Site
 from softehl.codegen.language.whole import Whole

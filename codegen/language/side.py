@@ -7,13 +7,13 @@ from typing import Any
 
 import sympy as sp
 
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Component
 from softehl.codegen.language.elements.cells import Element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.elements.shapes import interpolate
 from softehl.codegen.language.entries import Entries
 from softehl.codegen.language.fields import AXISYMMETRIC
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.nodal import Nodal
 
 

@@ -8,8 +8,9 @@ from typing import Any
 import sympy as sp
 
 from softehl.codegen.graph.graph import Graph, Input, Node, Op
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.entries import Entries
-from softehl.codegen.language.lower import Lowering, ModelError
+from softehl.codegen.language.lower import Lowering
 from softehl.codegen.language.names import named
 from softehl.codegen.language.record import Record
 

@@ -30,9 +30,8 @@ from types import ModuleType
 from typing import Any
 
 from softehl.codegen.language import names
+from softehl.codegen.language.complaints import Elsewhere, ModelError
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.fields import Elsewhere
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.material import Law
 from softehl.codegen.language.model import Model
 from softehl.codegen.language.pages import NOWHERE, On, Page

@@ -21,9 +21,9 @@ from softehl.codegen.graph.evaluate import State, Walk, evaluate
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.partials import DifferentiationError, partials
 from softehl.codegen.graph.traverse import operations
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
 from softehl.codegen.tools.oracle import Oracle

@@ -15,8 +15,8 @@ import sympy as sp
 import softehl
 from softehl.codegen import pipeline
 from softehl.codegen.derive import structure
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.fields import Fields
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.pages import Form, Page
 from softehl.codegen.tools import build, library, verify
 from softehl.runtime.arrays import Array

@@ -8,6 +8,8 @@ import re
 import shutil
 import subprocess
 import sys
+from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -189,3 +191,18 @@ def test_the_cost_table_keeps_names_whole(
     assert table.kernels() == 0
     printed = capsys.readouterr().out
     assert all(name in printed for name in ALL)
+
+
+def test_no_routine_is_written_twice() -> None:
+    assert doubled([p.read_text() for p in sorted(GENERATED.glob("*.[ch]"))]) == []
+    once = "static int f(int a)\n{\n    return a;\n}\n"
+    assert doubled([f"/* one */\n{once}", f"#define A\n\n{once}"]) == [once.strip()]
+
+
+_FUNCTION = re.compile(r"^static [^;{]*^\{.*?^\}", re.M | re.S)
+
+
+def doubled(texts: Iterable[str]) -> list[str]:
+    """Functions that stand in several texts."""
+    found = [m for text in texts for m in _FUNCTION.findall(text)]
+    return [m for m, count in Counter(found).items() if count > 1]

@@ -18,9 +18,9 @@ from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.routines import Newton, inverse
 from softehl.codegen.graph.spec import IllegalGraphError, check
 from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build, product
 from softehl.codegen.tools.oracle import Oracle

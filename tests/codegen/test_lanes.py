@@ -280,6 +280,13 @@ def test_a_long_file_is_compiled_lightly(tmp_path: Path, monkeypatch: pytest.Mon
         assert (build.LIGHT in compiling) is light
 
 
+def test_long_loops_that_pages_share_are_compiled_lightly() -> None:
+    loops = Path(f"{build.SHARED}hex27.c")
+    assert build.lighter(loops, " + " * 2501) == build.SHARED_LIGHT
+    assert build.lighter(loops, " + " * 2500) == ()
+    assert build.lighter(Path("mine.c"), " + " * 2501) == ()
+
+
 def test_the_time_of_an_element_is_measured(library: Any) -> None:
     d, kernel = library["branched"]
     tasks = ("energy", "residual", "tangent", "fields")

@@ -13,9 +13,10 @@ from softehl.codegen import pipeline
 from softehl.codegen.graph.evaluate import State
 from softehl.codegen.graph.graph import Graph, Op
 from softehl.codegen.graph.traverse import Recursion, recursion
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
-from softehl.codegen.language.lower import Lowering, ModelError
+from softehl.codegen.language.lower import Lowering
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools.oracle import Oracle
 from tests.codegen.workshop import compiled

@@ -13,8 +13,9 @@ from softehl.codegen.graph.evaluate import evaluate
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.traverse import operations, reachable
 from softehl.codegen.language import kinematics as kin
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.elements import quadrature
-from softehl.codegen.language.lower import Lowering, ModelError
+from softehl.codegen.language.lower import Lowering
 from softehl.codegen.language.model import Model
 from tests.codegen.workshop import close, inputs, unknowns
 

@@ -10,8 +10,8 @@ import pytest
 import sympy as sp
 
 from softehl.codegen.language import names, symbols
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.elements import quadrature
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import files, user
 

@@ -64,9 +64,7 @@ def kernels(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
         *(model(f"power_{i}", e) for i, e in enumerate(POWERS)),
         local("local"),
     ]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "FEW", 0)  # lanes also where there is little to compute
-        made = [pipeline.compile_model(m.finish(), request.param) for m in models]
+    made = [pipeline.compile_model(m.finish(), request.param) for m in models]
     for name, text in product.files(made).items():
         (folder / name).write_text(text, encoding="utf-8")
     build.build(folder, extra=(*build.STRICT, "-O1"))

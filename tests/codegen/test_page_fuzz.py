@@ -13,8 +13,8 @@ from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 
 from softehl.codegen.graph.evaluate import State, Walk
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.elements import quadrature
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import user
 from softehl.codegen.tools.model_text import ModelFileError

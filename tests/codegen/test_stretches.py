@@ -15,9 +15,9 @@ from softehl.codegen.graph.evaluate import State
 from softehl.codegen.graph.graph import Op
 from softehl.codegen.graph.routines import Isotropic, upper
 from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build
 from softehl.codegen.tools.oracle import Oracle

@@ -13,9 +13,9 @@ import sympy as sp
 
 from softehl.codegen import abi, pipeline
 from softehl.codegen.language import kinematics as kin
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature, shapes
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.fem.rules import film_rule, several

@@ -272,7 +272,7 @@ def test_arguments_that_a_study_fills_and_those_it_does_not() -> None:
 
 
 def test_pages_that_are_refused() -> None:
-    from softehl.codegen.language.lower import ModelError
+    from softehl.codegen.language.complaints import ModelError
 
     m = Model("m", nodes=2, rule=quadrature.gauss(1, 1))
     m.nodal_unknowns("u")

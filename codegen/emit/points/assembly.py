@@ -12,7 +12,7 @@ from softehl.codegen.emit.points import constants, dense, tensor
 from softehl.codegen.emit.points.function import Outputs
 from softehl.codegen.emit.points.layout import Layout, orders
 from softehl.codegen.emit.points.lines import Lines
-from softehl.codegen.emit.points.pairs import STEM, Pair, Parent, ranks, stored
+from softehl.codegen.emit.points.pairs import STEM, Pair, Parent, ranks
 from softehl.codegen.emit.source import HEADER
 
 _SHORT = 65536
@@ -65,8 +65,7 @@ def _store(out: Lines, layout: Layout, count: int, *, symmetric: bool) -> None:
     if count > _SHORT:
         _store_by_ranks(out, layout, symmetric=symmetric)
         return
-    places = ", ".join(map(str, stored(layout, symmetric=symmetric)))
-    out.add(f"static const unsigned short {name}[{count}] = {{{places}}};")
+    _places(out, layout, name, symmetric=symmetric)
     out.open(f"for (ptrdiff_t k = 0; k < {whole}; k += 4)")
     out.add(f"const unsigned short *const at = {name} + k;")
     values = ", ".join(f"k_lanes[at[{i}]]" for i in range(4))
@@ -74,6 +73,28 @@ def _store(out: Lines, layout: Layout, count: int, *, symmetric: bool) -> None:
     out.close()
     for k in range(whole, count):
         out.add(f"softehl_store1(K + {k}, {count}, k_lanes[{name}[{k}]]);")
+
+
+def _places(out: Lines, layout: Layout, name: str, *, symmetric: bool) -> None:
+    """Table of the place in k_lanes of every entry, row by row.
+
+    Of a symmetric tangent that of the two mirrored entries which is computed; the C compiler
+    compares the ranks.
+    """
+    size = len(layout.d.unknowns)
+    count, order = size * size, {rank: n for n, rank in enumerate(sorted(ranks(layout)))}
+    if not symmetric:
+        values = ", ".join(map(str, range(count)))
+        out.add(f"static const unsigned short {name}[{count}] = {{{values}}};")
+        return
+    numbers = ", ".join(f"{name}{j} = {order[rank]}" for j, rank in enumerate(ranks(layout)))
+    out.add(f"enum {{{numbers}}};")
+    mirrored = f"{name}##j < {name}##i ? j * {size} + i : i * {size} + j"
+    out.lines.append(f"#define {name}_entry(i, j) ({mirrored})")
+    row = ", ".join(f"{name}_entry(i, {j})" for j in range(size))
+    out.lines.append(f"#define {name}_row(i) {row}")
+    rows = ", ".join(f"{name}_row({i})" for i in range(size))
+    out.add(f"static const unsigned short {name}[{count}] = {{{rows}}};")
 
 
 def _store_by_ranks(out: Lines, layout: Layout, *, symmetric: bool) -> None:

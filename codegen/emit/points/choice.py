@@ -18,7 +18,11 @@ from softehl.codegen.graph.traverse import reachable
 SAVED = 0.35
 """Part of the operations that whole-element code saves: 0.25 to 0.45 on tri3 to tet10."""
 LARGE = 12_000
-"""Operations up to which simplices and wedges stay whole: there loops save the least."""
+"""Operations up to which simplices and wedges stay whole: there loops save the least.
+
+Neo-Hooke on wedge6 (9,300): loops take 1.35 times as long, and 0.5 s to build instead of 2.6.
+On tet10 (12,600): 1.1 times, and 0.6 s instead of 5, with a third of the C.
+"""
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 
@@ -31,23 +32,28 @@ class Lines:
         self.add("}")
 
 
+LONG = 64
+"""Values of an element above which they are moved in a loop: straight code gains nothing there."""
+
+
 def load(out: Lines, to: str, source: str, count: int, width: str) -> None:
     """Values of every lane from rows of the elements: `to`[k] = `source`[k]."""
-    for k in range(0, count, 4):
-        size = min(4, count - k)
-        pointers = ", ".join(f"&{to}[{k + i}]" for i in range(size))
-        out.add(f"softehl_load{size}({source} + {k}, {width}, {pointers});")
+    _moved(out, count, lambda at: f"&{to}[{at}]", f"softehl_load{{}}({source} + {{}}, {width}, ")
 
 
 def store(out: Lines, to: str, source: str, count: int, width: str) -> None:
     """Values of every lane to rows of the elements."""
-    whole = count - count % 4
-    if whole > 64:
+    _moved(out, count, lambda at: f"{source}[{at}]", f"softehl_store{{}}({to} + {{}}, {width}, ")
+
+
+def _moved(out: Lines, count: int, value: Callable[[str], str], call: str) -> None:
+    """Calls for four neighbours each, and for those that are left."""
+    whole = count - count % 4 if count > LONG else 0
+    if whole:
         out.open(f"for (ptrdiff_t k = 0; k < {whole}; k += 4)")
-        values = ", ".join(f"{source}[k + {i}]" for i in range(4))
-        out.add(f"softehl_store4({to} + k, {width}, {values});")
+        out.add(f"{call.format(4, 'k')}{', '.join(value(f'k + {i}') for i in range(4))});")
         out.close()
-    for k in range(whole if whole > 64 else 0, count, 4):
+    for k in range(whole, count, 4):
         size = min(4, count - k)
-        values = ", ".join(f"{source}[{k + i}]" for i in range(size))
-        out.add(f"softehl_store{size}({to} + {k}, {width}, {values});")
+        values = ", ".join(value(str(k + i)) for i in range(size))
+        out.add(f"{call.format(size, k)}{values});")

@@ -166,16 +166,6 @@ class Pair:
         out.add(f"k_lanes[({row}) * {size} + {column}] = {value};")
 
 
-def stored(layout: Layout, *, symmetric: bool) -> list[int]:
-    """Place in k_lanes of every entry of the tangent, row by row.
-
-    Of a symmetric one that of the two mirrored entries which is computed.
-    """
-    size, rank = len(layout.d.places), ranks(layout)
-    pairs = product(range(size), repeat=2)
-    return [j * size + i if symmetric and rank[j] < rank[i] else i * size + j for i, j in pairs]
-
-
 def ranks(layout: Layout) -> list[tuple[Any, ...]]:
     """Ranks of the unknowns: of two mirrored entries that with the row of lower rank is kept."""
     names = {c.name: c for c in layout.components}

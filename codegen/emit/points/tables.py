@@ -62,9 +62,12 @@ class Shape:
             found[label] = lambda: _array(label, values)
 
         table("N", self.values)
-        table("D", self.slopes)
-        if self.line is not None:
+        if self.line is None:
+            table("D", self.slopes)
+        else:
             line = self.line
+            slopes = f"{name}_D{self.order}"
+            found[slopes] = lambda: _slopes(slopes, line)
             table("L", line.values)
             table("M", line.slopes)
             label = f"{name}_along{self.order}"
@@ -145,6 +148,32 @@ def _products(line: Line, dimension: int) -> tuple[Any, Any]:
         values.append(tuple(row[0] for row in rows))
         slopes.append(tuple(tuple(row[1:]) for row in rows))
     return tuple(values), tuple(slopes)
+
+
+def _slopes(name: str, line: Line) -> str:
+    """Table NAME of slopes [point][node][direction] of products, which the C compiler multiplies.
+
+    For a cell of 27 nodes that is a twentieth of the text of the numbers.
+    """
+    D = len(line.places[0])
+    lines = []
+    for letter, rows in (("L", line.values), ("M", line.slopes)):
+        for point, row in enumerate(rows):
+            lines += [f"#define {name}_{letter}{point}{a} {number(v)}" for a, v in enumerate(row)]
+    points, nodes = "ijk"[:D], "abc"[:D]
+    slopes = [
+        " * ".join(f"{name}_{'M' if k == by else 'L'}##{points[k]}##{nodes[k]}" for k in range(D))
+        for by in range(D)
+    ]
+    lines.append(f"#define {name}_node({', '.join(points + nodes)}) {{{', '.join(slopes)}}}")
+    given = ", ".join(points)
+    terms = [f"    {name}_node({given}, {', '.join(map(str, place))})" for place in line.places]
+    entries = ", \\\n".join(terms)
+    lines.append(f"#define {name}_point({given}) {{ \\\n{entries}}}")
+    every = product(range(len(line.values)), repeat=D)
+    table = ",\n".join(f"{name}_point({', '.join(map(str, q))})" for q in every)
+    size = f"[{len(line.values) ** D}][{len(line.places)}][{D}]"
+    return "\n".join([*lines, f"static const double {name}{size} = {{\n{table}}};\n"])
 
 
 def weights(name: str, rule: QuadratureRule) -> str:

@@ -16,8 +16,8 @@ import softehl
 from softehl.codegen.abi import TargetError
 from softehl.codegen.graph.evaluate import State, Walk
 from softehl.codegen.hosts.material import VOIGT, Measure, Response, response, solid
+from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.elements import quadrature
-from softehl.codegen.language.lower import ModelError
 from softehl.codegen.language.material import Law, Material
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import cli, hosts
