@@ -233,11 +233,11 @@ def in_ngsolve(place: Path) -> None:
     u = ng.GridFunction(space)
     u.Set(ng.CF((0.1 * ng.x * ng.y, 0.05 * ng.x)))
     integrands = {
-        "softehl": page.integrator(mu=MU, lame=LAME),
+        "softehl's integrator": page.integrator(mu=MU, lame=LAME),
         "realcompile": ng.Variation(W.Compile(realcompile=True, wait=True) * ng.dx),
         "symbolic": ng.Variation(W * ng.dx),
     }
-    forms = {}
+    forms = {"softehl's form": page.form(space, mu=MU, lame=LAME)}
     for name, integrand in integrands.items():
         forms[name] = ng.BilinearForm(space, symmetric=False)
         forms[name] += integrand
@@ -249,7 +249,7 @@ def in_ngsolve(place: Path) -> None:
     for name, seconds in least(calls, 40, time.process_time).items():
         row(f"assembly of {CELLS} x {CELLS} cells in NGSolve, {name}", seconds, 1e-3, "ms")
     solved = {name: _stretched(ng, space, form) for name, form in forms.items()}
-    own, theirs = solved["softehl"], solved["realcompile"]
+    own, theirs = solved["softehl's form"], solved["realcompile"]
     size = max(abs(v) for v in theirs[0])
     off = max(abs(a - b) for a, b in zip(own[0], theirs[0], strict=True)) / size
     print(f"| solution against realcompile, {own[1]} and {theirs[1]} Newton steps | {off:.1e} |")

@@ -3,6 +3,7 @@
 #include <python_ngstd.hpp>
 
 #include "@name@.h"
+#include "@name@_many.h"
 
 using namespace ngfem;
 
@@ -65,7 +66,6 @@ void flatten(const FiniteElement &fel, Array<const BaseScalarFiniteElement *> &o
 // One element as the page sees it: its arguments, and its unknowns from those of the space.
 struct Element {
     double X[NODES * DIM + 1], u[U], data[@NAME@_DATA + 1], p[@NAME@_PARAMETERS + 1];
-    ArrayMem<const BaseScalarFiniteElement *, NAMES> scalars;
     int first[NAMES];                     // of the functions of each name
     const int *same[NAMES];               // function of each node, where functions are nodal
     bool nodal = true;                    // all functions are
@@ -183,34 +183,35 @@ public:
         const FlatVector<double> *elx, LocalHeap &lh) const
     {
         Element e;
+        ArrayMem<const BaseScalarFiniteElement *, NAMES> scalars;
         if (trafo.GetElementType() != kind)
             throw Exception("@name@: is a page of @cell@, and the mesh has other cells");
-        flatten(fel, e.scalars);
-        if (e.scalars.Size() != NAMES)
-            throw Exception("@name@: the space has " + ToString(e.scalars.Size())
+        flatten(fel, scalars);
+        if (scalars.Size() != NAMES)
+            throw Exception("@name@: the space has " + ToString(scalars.Size())
                 + " functions, the page @names@: @unknowns@");
         static const Places cell;
         const int side = cell.Fill(trafo, bool(GetDeformation()), e.X);
         for (int k = 0, start = 0; k < NAMES; ++k) {
-            const int ndof = e.scalars[k]->GetNDof();
+            const int ndof = scalars[k]->GetNDof();
             if (ndof != counts[k])
                 throw Exception("@name@: function " + ToString(k + 1) + " of the space has "
                     + ToString(ndof) + " unknowns a cell, the page " + ToString(counts[k]));
             e.first[k] = start, start += ndof;
             e.same[k] = nullptr;
-            if (e.scalars[k]->Order() == 1) {
-                static const Nodal nodal(*e.scalars[k]);
+            if (scalars[k]->Order() == 1) {
+                static const Nodal nodal(*scalars[k]);
                 e.same[k] = nodal.function[side];
                 for (int a = 0; a < ndof; ++a)
                     e.function[places[k][a]] = e.first[k] + e.same[k][a];
-            } else if (k > 0 && e.scalars[k] == e.scalars[k - 1]) {
+            } else if (k > 0 && scalars[k] == scalars[k - 1]) {
                 e.nodal = false;
                 new (&e.values[k]) FlatMatrix<double>(ndof, ndof, e.values[k - 1].Data());
             } else {
                 e.nodal = false;
                 new (&e.values[k]) FlatMatrix<double>(ndof, ndof, lh);
                 for (int a = 0; a < ndof; ++a)
-                    e.scalars[k]->CalcShape(Nodal::At(side, a), e.values[k].Row(a));
+                    scalars[k]->CalcShape(Nodal::At(side, a), e.values[k].Row(a));
             }
             for (int a = 0; a < ndof; ++a) {
                 double sum = 0;
@@ -230,6 +231,9 @@ public:
         return e;
     }
 
+    // True where parameters and data are the same for all cells.
+    bool Constant() const { return !functions; }
+
     void Evaluate(const BaseMappedIntegrationPoint &centre, Element &e) const
     {
         for (int k = 0; k < @NAME@_PARAMETERS; ++k)
@@ -247,6 +251,12 @@ public:
         const Element e = Read(fel, trafo, elx, lh);
         double R[U], K[U * U];
         @name@_tangent(1, e.X, e.u, e.data, e.p, R, K);
+        Scatter(e, K, elmat, lh);
+    }
+
+    // The tangent of the page as one of the functions of the space.
+    void Scatter(const Element &e, const double *K, FlatMatrix<double> elmat, LocalHeap &lh) const
+    {
         if (e.nodal) {
             for (int i = 0; i < U; ++i)
                 for (int j = 0; j < U; ++j)
@@ -320,6 +330,8 @@ public:
     }
 };
 
+#include "form.hpp"
+
 std::vector<Value> ordered(py::dict values, std::vector<string> names)
 {
     std::vector<Value> out;
@@ -335,6 +347,18 @@ std::vector<Value> ordered(py::dict values, std::vector<string> names)
     return out;
 }
 
+shared_ptr<Page> page(py::dict given)
+{
+    const std::vector<string> parameters = {@parameters@}, constants = {@constants@};
+    for (auto item : given) {
+        const auto name = py::cast<string>(item.first);
+        if (std::count(parameters.begin(), parameters.end(), name)
+            + std::count(constants.begin(), constants.end(), name) == 0)
+            throw py::type_error("@name@ has no " + name);
+    }
+    return make_shared<Page>(ordered(given, parameters), ordered(given, constants));
+}
+
 } // namespace
 
 PYBIND11_MODULE(@name@_ngsolve, m)
@@ -342,15 +366,11 @@ PYBIND11_MODULE(@name@_ngsolve, m)
     py::module_::import("ngsolve");
     m.doc() = "@name@ in NGSolve: integrator(...) for a BilinearForm.";
     py::class_<Page, shared_ptr<Page>, BilinearFormIntegrator>(m, "Page");
-    m.def("integrator", [](py::kwargs given) {
-        const std::vector<string> parameters = {@parameters@}, constants = {@constants@};
-        for (auto item : given) {
-            const auto name = py::cast<string>(item.first);
-            if (std::count(parameters.begin(), parameters.end(), name)
-                + std::count(constants.begin(), constants.end(), name) == 0)
-                throw py::type_error("@name@ has no " + name);
-        }
-        return make_shared<Page>(ordered(given, parameters), ordered(given, constants));
-    }, "Integrator with parameters and data by name: numbers, or coefficient functions, which are "
-       "read at the centre of each cell.");
+    py::class_<Form, shared_ptr<Form>, ngcomp::BilinearForm>(m, "Form");
+    m.def("integrator", [](py::kwargs given) { return page(given); },
+        "Integrator with parameters and data by name: numbers, or coefficient functions, which are "
+        "read at the centre of each cell.");
+    m.def("form", [](shared_ptr<ngcomp::FESpace> space, py::kwargs given) {
+        return make_shared<Form>(space, page(given));
+    }, "Bilinear form of the integrator alone, which assembles many cells at a time.");
 }

@@ -55,7 +55,7 @@ def test_a_form_is_that_of_the_page(tmp_path: Path) -> None:
     done = made(folder(field("tri6"), "ngsolve", tmp_path), PYTHON=PYTHON)
     assert done.returncode == 0, done.stdout + done.stderr
     found = errors(done.stdout)
-    assert len(found) == 4
+    assert len(found) == 6
     assert max(found) < 1e-13
 
 
