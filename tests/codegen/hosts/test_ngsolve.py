@@ -59,6 +59,7 @@ def test_a_form_is_that_of_the_page(tmp_path: Path) -> None:
     assert max(found) < 1e-13
 
 
+@pytest.mark.slow
 @FEW
 @given(d=pages(cells=("line2", "tri3", "tri6"), memory=False))
 def test_random_pages(d: Definition, tmp_path_factory: pytest.TempPathFactory) -> None:
