@@ -3,7 +3,7 @@
     python -m benchmarks.hosts        (in the environment of `make hosts`, ngscxx on the PATH)
 
 A row for each measurement; what is not installed is named and left out. The page is the neo-Hookean
-quad4 of docs/models. All on one thread, least of many runs, rivals in the same run.
+quad4 of docs/models. All on one thread, the least of many runs, rivals in turn in one loop.
 """
 
 from __future__ import annotations
@@ -27,75 +27,31 @@ LANES = "#define SOFTEHL_LANES 1\n"
 MU, LAME = 0.4, 1.2
 CELLS = 64
 """Cells a direction of the block."""
+SIZES = (1, 64, 4096, 262144)
+"""Numbers of elements of a call in JAX."""
 TRAINED, STEPS = 24, 200
 """Cells a direction and steps of the training of a network."""
-
-CALLER = """
-#include <stdio.h>
-#include <time.h>
-void uel_();
-void xit_(void) {}
-int main(void)
-{
-    double rhs[8], k[64], s[24] = {0}, e[8], p[2] = {0.4, 1.2}, X[8] = {1, 1, 2, 1, 2, 2, 1, 2};
-    double u[8] = {0, .01, .02, -.01, .03, .02, 0, .01}, t[2] = {1, 1}, dt = 1, cut = 1, best = 1;
-    int n = 8, one = 1, stored = 1, props = 2, dim = 2, nodes = 4, none = 0, flags[5] = {1, 1, 1};
-    for (int run = 0; run < 50; ++run) {
-        struct timespec a, b;
-        clock_gettime(CLOCK_MONOTONIC, &a);
-        for (int i = 0; i < 1000; ++i)
-            uel_(rhs, k, s, e, &n, &one, &stored, p, &props, X, &dim, &nodes, u, u, u, u, &one, t,
-                &dt, &one, &one, &one, t, &none, &none, t, t, &one, flags, &n, t, &none, &cut,
-                &none, &none, &dt);
-        clock_gettime(CLOCK_MONOTONIC, &b);
-        const double seconds = (b.tv_sec - a.tv_sec) + 1e-9 * (b.tv_nsec - a.tv_nsec);
-        best = seconds / 1000 < best ? seconds / 1000 : best;
-    }
-    printf("%.9f", best);
-}
-"""
-
-UMAT_CALLER = """
-#include <stdio.h>
-#include <time.h>
-void umat_();
-void xit_(void) {}
-int main(void)
-{
-    double s[6], v[6] = {0}, c[36], o[9] = {0}, t[2] = {1, 1}, dt = 0.1, p[4] = {0.4, 2, 0.6, 2};
-    double F[9] = {1.1, 0.05, -0.1, 0.2, 0.9, 0.1, -0.1, 0.15, 1.2}, cut = 1, best = 1;
-    int three = 3, six = 6, four = 4, one = 1;
-    for (int run = 0; run < 50; ++run) {
-        struct timespec a, b;
-        clock_gettime(CLOCK_MONOTONIC, &a);
-        for (int i = 0; i < 1000; ++i) {
-            for (int k = 0; k < 6; ++k)
-                v[k] = 0.01 * k;
-            umat_(s, v, c, o, o, o, o, o, o, o, o, o, t, &dt, o, o, o, o, "CREEPING", &three,
-                &three, &six, &six, p, &four, o, o, &cut, o, F, F, &one, &one, &one, &one, &one,
-                &one, (size_t)8);
-        }
-        clock_gettime(CLOCK_MONOTONIC, &b);
-        const double seconds = (b.tv_sec - a.tv_sec) + 1e-9 * (b.tv_nsec - a.tv_nsec);
-        best = seconds / 1000 < best ? seconds / 1000 : best;
-    }
-    printf("%.9f", cut < 1 ? -1 : best);
-}
-"""
 
 
 def row(what: str, seconds: float, unit: float, name: str) -> None:
     print(f"| {what} | {seconds / unit:.3g} {name} |", flush=True)
 
 
-def least(call: Callable[[], object], runs: int = 20) -> float:
-    call()
-    times = []
-    for _ in range(runs):
-        start = time.perf_counter()
+def least(
+    calls: dict[str, Callable[[], object]],
+    runs: int = 20,
+    clock: Callable[[], float] = time.perf_counter,
+) -> dict[str, float]:
+    """Seconds of each call, in rounds of all calls."""
+    for call in calls.values():
         call()
-        times.append(time.perf_counter() - start)
-    return min(times)
+    best = dict.fromkeys(calls, float("inf"))
+    for _ in range(runs):
+        for name, call in calls.items():
+            start = clock()
+            call()
+            best[name] = min(best[name], clock() - start)
+    return best
 
 
 def folder(host: str, place: Path, target: str, page: Path = PAGE) -> Path:
@@ -109,16 +65,15 @@ def folder(host: str, place: Path, target: str, page: Path = PAGE) -> Path:
 
 def user_element(place: Path) -> None:
     folder("abaqus", place, "neo_hooke_uel.o")
-    called(place, "UEL", "neo_hooke", CALLER)
+    called(place, "UEL", "neo_hooke", "uel_caller.c")
 
 
 def user_material(place: Path) -> None:
     folder("abaqus", place, "creeping_umat.o", LAW)
-    called(place, "UMAT with history and local unknowns", "creeping", UMAT_CALLER)
+    called(place, "UMAT with history and local unknowns", "creeping", "umat_caller.c")
 
 
 def called(place: Path, subroutine: str, page: str, caller: str) -> None:
-    (place / "caller.c").write_text(caller)
     text = (place / f"{page}.c").read_text()
     for what, source in {
         f"call of {subroutine}, one lane": text,
@@ -126,8 +81,10 @@ def called(place: Path, subroutine: str, page: str, caller: str) -> None:
     }.items():
         (place / f"{page}.c").write_text(source)
         flags = ["-w", "-O2", "-march=native", "-fno-math-errno", "-ffp-contract=fast"]
-        files = ["caller.c", f"{subroutine.split()[0].lower()}.c", f"{page}.c"]
-        subprocess.run(["cc", *flags, *files, "-lm", "-o", "caller"], cwd=place, check=True)
+        files = [str(Path(__file__).with_name(caller)), f"{subroutine[:4].strip().lower()}.c"]
+        subprocess.run(
+            ["cc", *flags, *files, f"{page}.c", "-lm", "-o", "caller"], cwd=place, check=True
+        )
         done = subprocess.run(["./caller"], cwd=place, check=True, capture_output=True, text=True)
         row(what, float(done.stdout), 1e-9, "ns")
 
@@ -138,19 +95,28 @@ def in_jax(place: Path) -> None:
     jnp: Any = importlib.import_module("jax.numpy")
     folder("jax", place, "libneo_hooke_jax.so")
     page: Any = importlib.import_module("neo_hooke_jax")
-    n, p = 4096, page.parameters(mu=MU, lame=LAME)
+    hessian = jax.vmap(jax.hessian(_energy(jax, jnp)), (0, 0, None))
+    for n in SIZES:
+        _tangents(jax, jnp, page, hessian, n)
+    _train(jax, jnp)
+
+
+def _tangents(jax: Any, jnp: Any, page: Any, hessian: Any, n: int) -> None:
+    """Tangents of n elements by our operation and by JAX's own derivatives."""
+    p = page.parameters(mu=MU, lame=LAME)
     noise = 0.05 * jnp.sin(jnp.arange(16.0 * n)).reshape(2, n, 8)
     X, u = jnp.array([1.0, 1, 2, 1, 2, 2, 1, 2]) + noise[0], noise[1]
     ours = jax.jit(lambda u: page.tangent(X, u, None, p)[1])
-    rival = jax.jit(jax.vmap(jax.hessian(_energy(jax, jnp)), (0, 0, None)))
+    rival = jax.jit(hessian)
     assert jnp.abs(ours(u) - rival(u, X, p)).max() < 1e-12
-    row("tangent in JAX, softehl", least(lambda: jax.block_until_ready(ours(u))) / n, 1e-9, "ns")
-    seconds = least(lambda: jax.block_until_ready(rival(u, X, p))) / n
-    row("tangent in JAX, jit(vmap(hessian))", seconds, 1e-9, "ns")
-    one = jax.vmap(jax.hessian(_energy(jax, jnp)), (0, 0, None))
-    seconds = least(lambda: jax.block_until_ready(one(u, X, p)), 3) / n
-    row("tangent in JAX, vmap(hessian) without jit", seconds, 1e-9, "ns")
-    _train(jax, jnp)
+    calls: dict[str, Callable[[], object]] = {
+        "softehl, jit": lambda: jax.block_until_ready(ours(u)),
+        "jit(vmap(hessian))": lambda: jax.block_until_ready(rival(u, X, p)),
+        "softehl without jit": lambda: jax.block_until_ready(page.tangent(X, u, None, p)),
+        "vmap(hessian) without jit": lambda: jax.block_until_ready(hessian(u, X, p)),
+    }
+    for what, seconds in least(calls, 5 if n > 1e5 else 20).items():
+        row(f"tangent of {n} elements in JAX, {what}", seconds / n, 1e-9, "ns")
 
 
 def _energy(jax: Any, jnp: Any) -> Any:
@@ -267,15 +233,42 @@ def in_ngsolve(place: Path) -> None:
     u = ng.GridFunction(space)
     u.Set(ng.CF((0.1 * ng.x * ng.y, 0.05 * ng.x)))
     integrands = {
-        "softehl": page.integrator(mu=MU, lame=LAME),
+        "softehl's integrator": page.integrator(mu=MU, lame=LAME),
         "realcompile": ng.Variation(W.Compile(realcompile=True, wait=True) * ng.dx),
         "symbolic": ng.Variation(W * ng.dx),
     }
+    forms = {"softehl's form": page.form(space, mu=MU, lame=LAME)}
     for name, integrand in integrands.items():
-        form = ng.BilinearForm(space, symmetric=False)
-        form += integrand
-        seconds = least(lambda form=form: form.AssembleLinearization(u.vec))  # type: ignore[misc]
+        forms[name] = ng.BilinearForm(space, symmetric=False)
+        forms[name] += integrand
+    calls: dict[str, Callable[[], object]] = {
+        name: lambda form=form: form.AssembleLinearization(u.vec)  # type: ignore[misc]
+        for name, form in forms.items()
+    }
+    # on one thread the time of the processor leaves out other work on the machine
+    for name, seconds in least(calls, 40, time.process_time).items():
         row(f"assembly of {CELLS} x {CELLS} cells in NGSolve, {name}", seconds, 1e-3, "ms")
+    solved = {name: _stretched(ng, space, form) for name, form in forms.items()}
+    own, theirs = solved["softehl's form"], solved["realcompile"]
+    size = max(abs(v) for v in theirs[0])
+    off = max(abs(a - b) for a, b in zip(own[0], theirs[0], strict=True)) / size
+    print(f"| solution against realcompile, {own[1]} and {theirs[1]} Newton steps | {off:.1e} |")
+
+
+def _stretched(ng: Any, space: Any, form: Any) -> tuple[list[float], int]:
+    """Unknowns of the block stretched by a fifth, and Newton's steps to 1e-12."""
+    held = ng.VectorH1(space.mesh, order=1, dirichlet="left|right")
+    u, step = ng.GridFunction(held), ng.GridFunction(held)
+    u.Set(ng.CF((0.2 * ng.x, 0)))
+    residual = u.vec.CreateVector()
+    steps, length = 0, 1.0
+    while length > 1e-12:
+        form.Apply(u.vec, residual)
+        form.AssembleLinearization(u.vec)
+        step.vec.data = form.mat.Inverse(held.FreeDofs()) * residual
+        u.vec.data -= step.vec
+        steps, length = steps + 1, max(map(abs, step.vec))
+    return list(u.vec), steps
 
 
 def main() -> None:

@@ -8,6 +8,7 @@ from softehl.codegen.hosts import patch
 from softehl.codegen.hosts.abaqus_host import INCREMENTS, dt_of
 from softehl.codegen.hosts.interface import Interface
 from softehl.codegen.hosts.patch import Patch
+from softehl.codegen.language.definition import Argument
 
 SCALAR = 11
 """First degree of freedom of names that are no displacements: Abaqus calls it temperature."""
@@ -32,7 +33,7 @@ def deck(page: Interface, mesh: Patch, settings: Sequence[float]) -> str:
         *_element(page, len(settings)),
         "*ELEMENT, TYPE=U1, ELSET=CELLS",
         *_rows((n + 1, *(k + 1 for k in cell)) for n, cell in enumerate(mesh.cells)),
-        *("*UEL PROPERTY, ELSET=CELLS", *_lines(list(settings) or [0.0], 8)),
+        *("*UEL PROPERTY, ELSET=CELLS", *named(page.given, settings, page.definition.example)),
         *_initial(page),
         f"*STEP, NLGEOM=YES{'' if page.symmetric else ', UNSYMM=YES'}",
         *(_procedure(page), f"{dt!r}, {INCREMENTS * dt!r}", "*BOUNDARY"),
@@ -65,6 +66,21 @@ def _element(page: Interface, settings: int) -> list[str]:
         ", ".join(map(str, rows[0])),
         *changes,
     ]
+
+
+def named(
+    arguments: Sequence[Argument], values: Sequence[float], example: Sequence[tuple[str, float]]
+) -> list[str]:
+    """Lines of a deck with at most 8 values, their names before them."""
+    if not arguments:
+        return ["0.0"]
+    known, lines = dict(example), []
+    pairs = list(zip((a.name for a in arguments), values, strict=True))
+    for k in range(0, len(pairs), 8):
+        row = pairs[k : k + 8]
+        lines.append(f"** give your values: {', '.join(name for name, _ in row)}")
+        lines.append(", ".join(repr(float(known.get(name, v))) for name, v in row))
+    return lines
 
 
 def _procedure(page: Interface) -> str:

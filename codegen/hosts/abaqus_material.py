@@ -68,7 +68,7 @@ def _deck(r: Response, settings: Sequence[float]) -> str:
         "*SOLID SECTION, ELSET=CELLS, MATERIAL=LAW",
         "*MATERIAL, NAME=LAW",
         f"*USER MATERIAL, CONSTANTS={max(len(settings), 1)}{unsymmetric}",
-        *shared.constants(list(settings) or [0.0]),
+        *shared.constants(r, settings),
         *shared.depvar(r),
         f"*STEP, NLGEOM={large}{', UNSYMM=YES' if unsymmetric else ''}",
         *("*STATIC", "0.25, 1.0", "*BOUNDARY", *held),

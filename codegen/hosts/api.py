@@ -31,10 +31,15 @@ def files(page: Interface, *, single: bool = False) -> tuple[dict[str, str], Ker
     return {
         f"{page.name}.h": header(page),
         f"{page.name}.c": "\n".join(
-            [*lanes, *kernel.shared.values(), kernel.text, functions(page)]
+            [*lanes, *map(_private, kernel.shared.values()), kernel.text, functions(page)]
         ),
         source.HEADER: source.header(names, signed=False),
     }, kernel
+
+
+def _private(shared: str) -> str:
+    """Functions that kernels share by name, of this file alone: their lanes are its own."""
+    return re.sub(r"^void softehl_pairs_", r"static \g<0>", shared, count=1, flags=re.MULTILINE)
 
 
 def sizes(page: Interface) -> dict[str, int]:

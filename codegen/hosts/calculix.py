@@ -67,7 +67,7 @@ def deck(r: Response, settings: Sequence[float], count: int = 2) -> str:
         *("*NODE, NSET=ALL", *nodes, "*ELEMENT, TYPE=C3D8, ELSET=CELLS", *elements),
         f"*MATERIAL, NAME={_names(r.law)['MATERIAL']}",
         f"*USER MATERIAL, CONSTANTS={max(len(settings), 1)}",
-        *shared.constants(list(settings) or [0.0]),
+        *shared.constants(r, settings),
         *shared.depvar(r),
         f"*SOLID SECTION, ELSET=CELLS, MATERIAL={_names(r.law)['MATERIAL']}",
         *(step, "*STATIC", "0.25, 1.0", "*BOUNDARY", *held),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
@@ -38,12 +39,21 @@ def module(page: Interface, states: Sequence[State]) -> dict[str, str]:
     """Every file of the integrator."""
     kind = _kind(page)
     texts, kernel = api.files(page, single=True)
+    texts = _many(page) | texts
     words = _words(page, kind, samples(page, kernel, states)[0])
     texts["ngsolve.cpp"] = api.filled(api.template("ngsolve.cpp"), words)
+    texts["form.hpp"] = api.filled(api.template("ngsolve_form.hpp"), words)
     texts[f"test_{page.name}.py"] = api.filled(api.template("ngsolve_test.py.in"), words)
     texts["Makefile"] = api.filled(api.template("ngsolve.mk"), words)
     texts["NOTES.md"] = api.filled(api.template("ngsolve.md"), words)
     return texts
+
+
+def _many(page: Interface) -> dict[str, str]:
+    """The tangent again, for many cells at a time, under another name."""
+    d = page.definition
+    again = Interface(replace(d, name=f"{d.name}_many", tasks=(Task.TANGENT,)))
+    return api.files(again)[0]
 
 
 def _kind(page: Interface) -> Element:

@@ -14,6 +14,7 @@ from softehl.codegen.graph.evaluate import State
 from softehl.codegen.hosts import abaqus_host as host
 from softehl.codegen.hosts import api, patch
 from softehl.codegen.hosts.abaqus import arguments, conditions
+from softehl.codegen.hosts.abaqus_deck import named
 from softehl.codegen.hosts.interface import Interface
 from softehl.codegen.hosts.material import Measure, Response, solid
 from softehl.codegen.hosts.sample import samples
@@ -112,6 +113,6 @@ def block(count: int = 2) -> tuple[list[str], list[str], list[str]]:
     return nodes, elements, held
 
 
-def constants(values: Sequence[float]) -> list[str]:
-    """Lines of *USER MATERIAL, at most 8 numbers each."""
-    return [", ".join(map(repr, values[k : k + 8])) for k in range(0, max(len(values), 1), 8)]
+def constants(r: Response, values: Sequence[float]) -> list[str]:
+    """Lines of *USER MATERIAL: names, then values; those of `m.example` where the law has them."""
+    return named(r.parameters, values, r.written.example)

@@ -3,6 +3,7 @@
 #include <python_ngstd.hpp>
 
 #include "@name@.h"
+#include "@name@_many.h"
 
 using namespace ngfem;
 
@@ -23,19 +24,40 @@ const int places[NAMES][NODES] = {
 @places@
 };
 
+// An argument of the page: a number, or a function of NGSolve where there is one.
+struct Value {
+    shared_ptr<CoefficientFunction> function;
+    double number = 0;
+};
+
+// Asking for the class of an object costs more than a small kernel: T is the class that the last
+// object of each thread had.
+template <typename T, typename F> bool is(const FiniteElement &fel, F found)
+{
+    thread_local const std::type_info *last = nullptr;
+    if (&typeid(fel) == last)
+        return true;
+    if (!found(fel))
+        return false;
+    last = &typeid(fel);
+    return true;
+}
+
 void flatten(const FiniteElement &fel, Array<const BaseScalarFiniteElement *> &out)
 {
-    if (typeid(fel) == typeid(CompoundFiniteElement)) {
-        auto &all = static_cast<const CompoundFiniteElement &>(fel);
-        for (int k = 0; k < all.GetNComponents(); ++k)
-            flatten(all[k], out);
-    } else if (typeid(fel) == typeid(VectorFiniteElement)) {
+    if (is<BaseScalarFiniteElement>(fel, [](auto &f) {
+            return dynamic_cast<const BaseScalarFiniteElement *>(&f) != nullptr; })) {
+        out.Append(static_cast<const BaseScalarFiniteElement *>(&fel));
+    } else if (is<VectorFiniteElement>(fel, [](auto &f) {
+            return typeid(f) == typeid(VectorFiniteElement); })) {
         auto &vector = static_cast<const VectorFiniteElement &>(fel);
         flatten(vector[0], out);
         for (int k = 1; k < vector.GetNComponents(); ++k)
             out.Append(out.Last());
-    } else if (auto scalar = dynamic_cast<const BaseScalarFiniteElement *>(&fel)) {
-        out.Append(scalar);
+    } else if (typeid(fel) == typeid(CompoundFiniteElement)) {
+        auto &all = static_cast<const CompoundFiniteElement &>(fel);
+        for (int k = 0; k < all.GetNComponents(); ++k)
+            flatten(all[k], out);
     } else {
         throw Exception("@name@: needs H1 and VectorH1 spaces, one function for each of @unknowns@");
     }
@@ -44,11 +66,17 @@ void flatten(const FiniteElement &fel, Array<const BaseScalarFiniteElement *> &o
 // One element as the page sees it: its arguments, and its unknowns from those of the space.
 struct Element {
     double X[NODES * DIM + 1], u[U], data[@NAME@_DATA + 1], p[@NAME@_PARAMETERS + 1];
-    ArrayMem<const BaseScalarFiniteElement *, NAMES> scalars;
     int first[NAMES];                     // of the functions of each name
     const int *same[NAMES];               // function of each node, where functions are nodal
+    bool nodal = true;                    // all functions are
     FlatMatrix<double> values[NAMES];     // of the functions at the nodes, where they are not
+    int function[U];                      // of each unknown, where all functions are nodal
 };
+
+IntegrationPoint point(const double *x)
+{
+    return IntegrationPoint(x[0], x[1], x[2], 0);
+}
 
 // Function that is one at each node: those of order 1 are nodal, whatever the numbers of vertices.
 struct Nodal {
@@ -65,19 +93,88 @@ struct Nodal {
                         function[side][a] = i;
             }
     }
-    static IntegrationPoint At(int side, int a)
+    static IntegrationPoint At(int side, int a) { return point(nodes[side ? mirrored[a] : a]); }
+};
+
+// Places of the nodes of a cell.
+struct Places {
+    static constexpr int CORNERS = ET_trait<kind>::N_VERTEX;
+    IntegrationPoint centre;
+    double weights[2][NODES][CORNERS];     // of the corners in the places of the nodes
+    double slopes[CORNERS][DIM];           // of the functions of the corners at the centre
+    Places()
     {
-        const double *x = nodes[side ? mirrored[a] : a];
-        return IntegrationPoint(x[0], x[1], x[2], 0);
+        double x[3] = {0, 0, 0};
+        for (int a = 0; a < NODES; ++a)
+            for (int c = 0; c < 3; ++c)
+                x[c] += nodes[a][c] / NODES;
+        centre = point(x);
+        ScalarFE<kind, 1> linear;
+        for (int side = 0; side < 2; ++side)
+            for (int a = 0; a < NODES; ++a)
+                linear.CalcShape(Nodal::At(side, a), FlatVector<>(CORNERS, weights[side][a]));
+        linear.CalcDShape(centre, FlatMatrix<>(CORNERS, DIM, slopes[0]));
+    }
+
+    // Fills X; 1 where the cell is a mirror image, 0 otherwise.
+    int Fill(const ElementTransformation &trafo, bool deformed, double *X) const
+    {
+        auto mesh = static_cast<const ngcomp::MeshAccess *>(trafo.GetMesh());
+        if (mesh && !deformed && !mesh->GetDeformation() && !trafo.IsComplex()) {
+            const auto cell = mesh->GetElement<DIM, VOL>(trafo.GetElementNr());
+            if (!cell.is_curved)
+                return Straight(*mesh, cell.Vertices(), X);
+        }
+        return Mapped(trafo, X);
+    }
+
+    template <typename V> int Straight(const ngcomp::MeshAccess &mesh, V corners, double *X) const
+    {
+        double P[CORNERS][DIM];
+        Mat<DIM, DIM> jacobian = 0.0;
+        for (int v = 0; v < CORNERS; ++v) {
+            const Vec<DIM> place = mesh.GetPoint<DIM>(corners[v]);
+            for (int c = 0; c < DIM; ++c) {
+                P[v][c] = place(c);
+                for (int d = 0; d < DIM; ++d)
+                    jacobian(c, d) += place(c) * slopes[v][d];
+            }
+        }
+        const int side = Det(jacobian) < 0;
+        for (int a = 0; a < NODES; ++a)
+            for (int c = 0; c < DIM; ++c) {
+                double sum = 0;
+                for (int v = 0; v < CORNERS; ++v)
+                    sum += weights[side][a][v] * P[v][c];
+                X[DIM * a + c] = sum;
+            }
+        return side;
+    }
+
+    // By the map of NGSolve: curved cells, and meshes with a deformation.
+    int Mapped(const ElementTransformation &trafo, double *X) const
+    {
+        Mat<DIM, DIM> jacobian;
+        trafo.CalcJacobian(centre, jacobian);
+        const int side = Det(jacobian) < 0;
+        for (int a = 0; a < NODES; ++a)
+            trafo.CalcPoint(Nodal::At(side, a), FlatVector<>(DIM, X + DIM * a));
+        return side;
     }
 };
 
 class Page : public BilinearFormIntegrator {
-    Array<shared_ptr<CoefficientFunction>> parameters, constants;
+    std::vector<Value> parameters, constants;
+    bool functions = false;
 
 public:
-    Page(Array<shared_ptr<CoefficientFunction>> p, Array<shared_ptr<CoefficientFunction>> c)
-        : parameters(std::move(p)), constants(std::move(c)) {}
+    Page(std::vector<Value> p, std::vector<Value> c)
+        : parameters(std::move(p)), constants(std::move(c))
+    {
+        for (auto *values : {&parameters, &constants})
+            for (auto &value : *values)
+                functions = functions || value.function;
+    }
     string Name() const override { return "@name@"; }
     VorB VB() const override { return VOL; }
     xbool IsSymmetric() const override { return bool(@symmetric@); }
@@ -86,64 +183,65 @@ public:
         const FlatVector<double> *elx, LocalHeap &lh) const
     {
         Element e;
+        ArrayMem<const BaseScalarFiniteElement *, NAMES> scalars;
         if (trafo.GetElementType() != kind)
             throw Exception("@name@: is a page of @cell@, and the mesh has other cells");
-        flatten(fel, e.scalars);
-        if (e.scalars.Size() != NAMES)
-            throw Exception("@name@: the space has " + ToString(e.scalars.Size())
+        flatten(fel, scalars);
+        if (scalars.Size() != NAMES)
+            throw Exception("@name@: the space has " + ToString(scalars.Size())
                 + " functions, the page @names@: @unknowns@");
-        static const IntegrationRule at = All();
-        MappedIntegrationRule<DIM, DIM> mapped(at, trafo, lh);
-        const auto &centre = mapped[NODES];
-        const int side = centre.GetJacobiDet() < 0;
-        for (int a = 0; a < NODES; ++a)
-            for (int c = 0; c < DIM; ++c)
-                e.X[DIM * a + c] = mapped[side ? mirrored[a] : a].GetPoint()(c);
+        static const Places cell;
+        const int side = cell.Fill(trafo, bool(GetDeformation()), e.X);
         for (int k = 0, start = 0; k < NAMES; ++k) {
-            const int ndof = e.scalars[k]->GetNDof();
+            const int ndof = scalars[k]->GetNDof();
             if (ndof != counts[k])
                 throw Exception("@name@: function " + ToString(k + 1) + " of the space has "
                     + ToString(ndof) + " unknowns a cell, the page " + ToString(counts[k]));
             e.first[k] = start, start += ndof;
             e.same[k] = nullptr;
-            if (e.scalars[k]->Order() == 1) {
-                static const Nodal nodal(*e.scalars[k]);
+            if (scalars[k]->Order() == 1) {
+                static const Nodal nodal(*scalars[k]);
                 e.same[k] = nodal.function[side];
-            } else if (k > 0 && e.scalars[k] == e.scalars[k - 1]) {
+                for (int a = 0; a < ndof; ++a)
+                    e.function[places[k][a]] = e.first[k] + e.same[k][a];
+            } else if (k > 0 && scalars[k] == scalars[k - 1]) {
+                e.nodal = false;
                 new (&e.values[k]) FlatMatrix<double>(ndof, ndof, e.values[k - 1].Data());
             } else {
+                e.nodal = false;
                 new (&e.values[k]) FlatMatrix<double>(ndof, ndof, lh);
                 for (int a = 0; a < ndof; ++a)
-                    e.scalars[k]->CalcShape(at[side ? mirrored[a] : a], e.values[k].Row(a));
+                    scalars[k]->CalcShape(Nodal::At(side, a), e.values[k].Row(a));
             }
             for (int a = 0; a < ndof; ++a) {
                 double sum = 0;
                 if (elx && e.same[k])
-                    sum = (*elx)(e.first[k] + e.same[k][a]);
+                    sum = (*elx)(e.function[places[k][a]]);
                 for (int i = 0; elx && !e.same[k] && i < ndof; ++i)
                     sum += e.values[k](a, i) * (*elx)(e.first[k] + i);
                 e.u[places[k][a]] = sum;
             }
         }
         for (int k = 0; k < @NAME@_PARAMETERS; ++k)
-            e.p[k] = parameters[k]->Evaluate(centre);
+            e.p[k] = parameters[k].number;
         for (int k = 0; k < @NAME@_DATA; ++k)
-            e.data[k] = constants[k]->Evaluate(centre);
+            e.data[k] = constants[k].number;
+        if (functions)
+            Evaluate(MappedIntegrationPoint<DIM, DIM>(cell.centre, trafo), e);
         return e;
     }
 
-    // All nodes, then the centre.
-    static IntegrationRule All()
+    // True where parameters and data are the same for all cells.
+    bool Constant() const { return !functions; }
+
+    void Evaluate(const BaseMappedIntegrationPoint &centre, Element &e) const
     {
-        IntegrationRule out;
-        double x[3] = {0, 0, 0};
-        for (int a = 0; a < NODES; ++a) {
-            out.AddIntegrationPoint(Nodal::At(0, a));
-            for (int c = 0; c < 3; ++c)
-                x[c] += nodes[a][c] / NODES;
-        }
-        out.AddIntegrationPoint(IntegrationPoint(x[0], x[1], x[2], 0));
-        return out;
+        for (int k = 0; k < @NAME@_PARAMETERS; ++k)
+            if (parameters[k].function)
+                e.p[k] = parameters[k].function->Evaluate(centre);
+        for (int k = 0; k < @NAME@_DATA; ++k)
+            if (constants[k].function)
+                e.data[k] = constants[k].function->Evaluate(centre);
     }
 
     void Matrix(const FiniteElement &fel, const ElementTransformation &trafo,
@@ -153,6 +251,18 @@ public:
         const Element e = Read(fel, trafo, elx, lh);
         double R[U], K[U * U];
         @name@_tangent(1, e.X, e.u, e.data, e.p, R, K);
+        Scatter(e, K, elmat, lh);
+    }
+
+    // The tangent of the page as one of the functions of the space.
+    void Scatter(const Element &e, const double *K, FlatMatrix<double> elmat, LocalHeap &lh) const
+    {
+        if (e.nodal) {
+            for (int i = 0; i < U; ++i)
+                for (int j = 0; j < U; ++j)
+                    elmat(e.function[i], e.function[j]) = K[i * U + j];
+            return;
+        }
         for (int k = 0; k < NAMES; ++k)
             for (int l = 0; l < NAMES; ++l) {
                 auto out = elmat.Rows(e.first[k], e.first[k] + counts[k])
@@ -220,19 +330,33 @@ public:
     }
 };
 
-Array<shared_ptr<CoefficientFunction>> ordered(py::dict values, std::vector<string> names)
+#include "form.hpp"
+
+std::vector<Value> ordered(py::dict values, std::vector<string> names)
 {
-    Array<shared_ptr<CoefficientFunction>> out;
+    std::vector<Value> out;
     for (auto &name : names) {
         if (!values.contains(name.c_str()))
             throw py::type_error("@name@ needs " + name);
         py::object value = values[name.c_str()];
         if (py::isinstance<CoefficientFunction>(value))
-            out.Append(py::cast<shared_ptr<CoefficientFunction>>(value));
+            out.push_back({py::cast<shared_ptr<CoefficientFunction>>(value)});
         else
-            out.Append(make_shared<ConstantCoefficientFunction>(py::cast<double>(value)));
+            out.push_back({nullptr, py::cast<double>(value)});
     }
     return out;
+}
+
+shared_ptr<Page> page(py::dict given)
+{
+    const std::vector<string> parameters = {@parameters@}, constants = {@constants@};
+    for (auto item : given) {
+        const auto name = py::cast<string>(item.first);
+        if (std::count(parameters.begin(), parameters.end(), name)
+            + std::count(constants.begin(), constants.end(), name) == 0)
+            throw py::type_error("@name@ has no " + name);
+    }
+    return make_shared<Page>(ordered(given, parameters), ordered(given, constants));
 }
 
 } // namespace
@@ -242,15 +366,11 @@ PYBIND11_MODULE(@name@_ngsolve, m)
     py::module_::import("ngsolve");
     m.doc() = "@name@ in NGSolve: integrator(...) for a BilinearForm.";
     py::class_<Page, shared_ptr<Page>, BilinearFormIntegrator>(m, "Page");
-    m.def("integrator", [](py::kwargs given) {
-        const std::vector<string> parameters = {@parameters@}, constants = {@constants@};
-        for (auto item : given) {
-            const auto name = py::cast<string>(item.first);
-            if (std::count(parameters.begin(), parameters.end(), name)
-                + std::count(constants.begin(), constants.end(), name) == 0)
-                throw py::type_error("@name@ has no " + name);
-        }
-        return make_shared<Page>(ordered(given, parameters), ordered(given, constants));
-    }, "Integrator with parameters and data by name: numbers, or coefficient functions, which are "
-       "read at the centre of each cell.");
+    py::class_<Form, shared_ptr<Form>, ngcomp::BilinearForm>(m, "Form");
+    m.def("integrator", [](py::kwargs given) { return page(given); },
+        "Integrator with parameters and data by name: numbers, or coefficient functions, which are "
+        "read at the centre of each cell.");
+    m.def("form", [](shared_ptr<ngcomp::FESpace> space, py::kwargs given) {
+        return make_shared<Form>(space, page(given));
+    }, "Bilinear form of the integrator alone, which assembles many cells at a time.");
 }

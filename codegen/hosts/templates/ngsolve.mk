@@ -5,14 +5,14 @@ NGSCXX ?= ngscxx
 NGSLD ?= ngsld
 CFLAGS ?= -O2 -march=native -fno-math-errno -ffp-contract=fast
 
-@name@_ngsolve.so: ngsolve.o @name@.o
-	$(NGSLD) -shared ngsolve.o @name@.o -o $@ -lngfem -lngcomp -lngstd
+@name@_ngsolve.so: ngsolve.o @name@.o @name@_many.o
+	$(NGSLD) -shared ngsolve.o @name@.o @name@_many.o -o $@ -lngfem -lngcomp -lngstd
 
-ngsolve.o: ngsolve.cpp @name@.h
+ngsolve.o: ngsolve.cpp form.hpp @name@.h @name@_many.h
 	@command -v $(NGSCXX) >/dev/null || { echo "no $(NGSCXX): pip install ngsolve, and put it on the PATH"; exit 1; }
 	$(NGSCXX) -w -c ngsolve.cpp -o $@
 
-@name@.o: @name@.c @name@.h softehl_kernels.h
+%.o: %.c %.h softehl_kernels.h
 	$(CC) -std=c11 -fPIC -Wno-psabi $(CFLAGS) -c $< -o $@
 
 lib@name@.so: @name@.o

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-import ctypes
 import shutil
 import subprocess
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import given
 
 from softehl.codegen import pipeline
 from softehl.codegen.abi import TargetError
+from softehl.codegen.hosts.all import ELEMENTS
 from softehl.codegen.hosts.interface import Before, Given, Interface, Timed
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.models import ALL
-from softehl.codegen.tools import cli, hosts, samples
-from softehl.runtime.arrays import Array
+from softehl.codegen.tools import cli, hosts
 from tests.codegen import field_pages
 from tests.codegen.hosts.random_pages import FEW, A, K, page, pages
-from tests.codegen.hosts.workshop import errors, folder, made
-from tests.codegen.workshop import compiled
+from tests.codegen.hosts.workshop import errors, folder, made, off_python
 
 ROOT = Path(__file__).parents[3]
 NEO_HOOKE = ROOT / "docs" / "models" / "neo_hooke.py"
@@ -75,15 +72,6 @@ def test_the_test_of_a_folder_sees_a_fault(name: str, old: str, new: str, tmp_pa
     assert "FAILED" in done.stdout
 
 
-def called(library: ctypes.CDLL, d: Definition, arrays: list[Array]) -> tuple[Array, Array]:
-    """Residual and tangent of the functions in the folder."""
-    n, size = len(arrays[1]), len(d.unknowns)
-    R, K = np.empty((n, size)), np.empty((n, size, size))
-    pointers = [a.ctypes.data_as(ctypes.c_void_p) for a in (*arrays, R, K)]
-    getattr(library, f"{d.name}_tangent")(ctypes.c_ssize_t(n), *pointers)
-    return R, K
-
-
 @FEW
 @given(d=pages())
 def test_random_pages_give_what_their_python_kernels_give(
@@ -91,16 +79,21 @@ def test_random_pages_give_what_their_python_kernels_give(
 ) -> None:
     place = folder(d, "c", tmp_path_factory.mktemp("c"))
     assert made(place, "lib").returncode == 0
-    states = samples.admissible(d, 3)
-    X, u = (np.array([getattr(s, k) for s in states]) for k in ("coordinates", "dofs"))
-    constants, points = (np.array([getattr(s, k) for s in states]) for k in ("data", "point_data"))
-    p = np.array(states[0].parameters)
-    kernel = compiled(d, tmp_path_factory.mktemp("python"))
-    expected = kernel.tangent(X, u, data=constants, point_data=points, parameters=p)
-    data = np.hstack([constants, points.reshape(3, -1)])
-    found = called(ctypes.CDLL(str(place / f"lib{d.name}.so")), d, [X, u, data, p])
-    for a, b in zip(found, expected, strict=True):
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-13 * np.abs(b).max())
+    assert off_python(d, place) < 1e-13
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
+@FEW
+@given(d=pages())
+def test_random_pages_in_cpp(d: Definition, tmp_path_factory: pytest.TempPathFactory) -> None:
+    place = folder(d, "cpp", tmp_path_factory.mktemp("cpp"))
+    assert made(place, "lib").returncode == 0
+    assert off_python(d, place) < 1e-13
+    done = made(place)
+    assert done.returncode == 0, done.stdout + done.stderr
+    values = 5 if d.conservative else 4
+    assert max(errors(done.stdout)[:values]) < 1e-13
 
 
 # -------------------------------------------------------------------------------- the description
@@ -127,9 +120,11 @@ def test_rates_come_from_the_step_in_time() -> None:
     assert seen.data == [Before(0, rate=True), Before(1, rate=True)]
 
 
-def test_an_interpolated_field_is_refused() -> None:
-    with pytest.raises(TargetError, match=r"film interpolates p .* target c needs a fixed number"):
-        hosts.files(ALL["film"](), "c")
+@pytest.mark.parametrize("host", ELEMENTS)
+def test_an_interpolated_field_is_refused(host: str) -> None:
+    said = rf"film interpolates p .* target {host} needs a fixed number"
+    with pytest.raises(TargetError, match=said):
+        hosts.files(ALL["film"](), host)
 
 
 def test_a_page_and_a_folder_are_needed(capsys: pytest.CaptureFixture[str]) -> None:

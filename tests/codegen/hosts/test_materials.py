@@ -11,6 +11,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from hypothesis import given
 
 import softehl
 from softehl.codegen.abi import TargetError
@@ -25,6 +26,7 @@ from softehl.codegen.tools.model_text import ModelFileError
 from softehl.codegen.tools.user import definitions
 from softehl.runtime.arrays import Array
 from tests.codegen.hosts.materials import fluid, hooke, neo, ogden_1, turned
+from tests.codegen.hosts.random_pages import FEW, laws
 from tests.codegen.hosts.workshop import errors, folder, made
 
 MU, BULK = 0.4, 1.7
@@ -108,6 +110,20 @@ def test_a_cell_of_calculix_is_the_page(law: Law, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
     assert max(errors(done.stdout)[:2]) < 1e-13
     assert "the patch is solved" in done.stdout
+
+
+@needs_fortran
+@pytest.mark.slow
+@pytest.mark.parametrize("host", ["abaqus", "calculix"])
+@FEW
+@given(law=laws())
+def test_random_laws(law: Law, host: str, tmp_path_factory: pytest.TempPathFactory) -> None:
+    place = folder(law, host, tmp_path_factory.mktemp(host))
+    (place / "patch.txt").unlink()  # a random energy need not have a minimum
+    rhs, matrix, state, differences, cut = errors(made(place).stdout)
+    assert max(rhs, matrix, state) < 1e-13
+    assert differences < 1e-5
+    assert cut == 0
 
 
 @pytest.mark.parametrize("law", [neo, fluid, hooke], ids=lambda law: law.name)

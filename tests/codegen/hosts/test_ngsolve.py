@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import given
 
 from softehl.codegen.abi import TargetError
 from softehl.codegen.language import kinematics
@@ -16,8 +17,8 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements.cells import element
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import hosts, user
-from tests.codegen.hosts.random_pages import A, B, page
-from tests.codegen.hosts.workshop import errors, folder, made
+from tests.codegen.hosts.random_pages import FEW, A, B, page, pages
+from tests.codegen.hosts.workshop import errors, folder, made, off_python
 
 ROOT = Path(__file__).parents[3]
 PYTHON = os.environ.get("SOFTEHL_NGSOLVE", sys.executable)
@@ -54,8 +55,22 @@ def test_a_form_is_that_of_the_page(tmp_path: Path) -> None:
     done = made(folder(field("tri6"), "ngsolve", tmp_path), PYTHON=PYTHON)
     assert done.returncode == 0, done.stdout + done.stderr
     found = errors(done.stdout)
-    assert len(found) == 2
+    assert len(found) == 6
     assert max(found) < 1e-13
+
+
+@pytest.mark.slow
+@FEW
+@given(d=pages(cells=("line2", "tri3", "tri6"), memory=False))
+def test_random_pages(d: Definition, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """The kernel of a folder is that of Python; NGSolve's forms are those of the kernel."""
+    place = folder(d, "ngsolve", tmp_path_factory.mktemp("ngsolve"))
+    assert made(place, f"lib{d.name}.so").returncode == 0
+    assert off_python(d, place) < 1e-13
+    if has_ngsolve():
+        done = made(place, PYTHON=PYTHON)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert max(errors(done.stdout)) < 1e-13
 
 
 def test_the_space_has_a_function_for_each_name() -> None:

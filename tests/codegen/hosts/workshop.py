@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import re
 import subprocess
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.material import Law
-from softehl.codegen.tools import hosts
+from softehl.codegen.tools import hosts, samples
+from tests.codegen.workshop import compiled
 
 _ERROR = re.compile(r"(\d\.\de[-+]\d\d)  (?:ok|FAILED)$", re.MULTILINE | re.IGNORECASE)
 
@@ -43,3 +47,23 @@ def made(place: Path, target: str = "test", **settings: str) -> subprocess.Compl
 def errors(printed: str) -> list[float]:
     """The errors that a test printed, in its order."""
     return [float(m[1]) for m in _ERROR.finditer(printed)]
+
+
+def off_python(d: Definition, place: Path) -> float:
+    """Largest difference of residual and tangent in libNAME.so from those of the Python kernel."""
+    states = samples.admissible(d, 3)
+    X, u = (np.array([getattr(s, k) for s in states]) for k in ("coordinates", "dofs"))
+    constants, points = (np.array([getattr(s, k) for s in states]) for k in ("data", "point_data"))
+    p, n, size = np.array(states[0].parameters), len(u), len(d.unknowns)
+    (place / "python").mkdir()
+    kernel = compiled(d, place / "python")
+    known = {"data": constants} if constants.size else {}
+    known |= {"point_data": points} if points.size else {}
+    expected = kernel.tangent(X, u, parameters=p, **known)
+    found = np.empty((n, size)), np.empty((n, size, size))
+    data = np.hstack([constants.reshape(n, -1), points.reshape(n, -1)])
+    pointers = [a.ctypes.data_as(ctypes.c_void_p) for a in (X, u, data, p, *found)]
+    library = ctypes.CDLL(str(place / f"lib{d.name}.so"))
+    getattr(library, f"{d.name}_tangent")(ctypes.c_ssize_t(n), *pointers)
+    pairs = zip(found, expected, strict=True)
+    return max(float(np.abs(a - b).max() / np.abs(b).max()) for a, b in pairs)
