@@ -2,7 +2,8 @@
 
 A loaded state of another mesh is carried over and corrected by Newton's method. Where that fails
 the path is taken up at a checkpoint under less pressure, carried in the same way; where that does
-not lead on either, at rest, which is the same on every mesh.
+not lead on either, at rest, which is the same on every mesh. Where a path of the pressure ends, the
+section creeps on from there (`solve.contact_relaxation`).
 """
 
 from __future__ import annotations
@@ -15,11 +16,14 @@ from softehl.cases.seal.solve.checkpoints import Checkpoint, Checkpoints
 from softehl.cases.seal.solve.contact import (
     approach_stage,
     at_air_wall,
+    contact_problem,
+    correction_stage,
     held_place,
     load_stage,
     path_corrector,
     release_stage,
 )
+from softehl.cases.seal.solve.contact_relaxation import CreepCorrector
 from softehl.cases.seal.solve.contact_transfer import carried_contact
 from softehl.cases.seal.solve.path import Followed, PathDriver, Stage, StageFailed
 from softehl.runtime.arrays import Array
@@ -75,7 +79,21 @@ class ContactSolver:
         def keep(point: Point) -> None:
             self.checkpoints.keep(Checkpoint(system, point.parameter, point.solution.x))
 
-        return self._follow(system, replace(load_stage(system, begin, place), on_point=keep), x)
+        stage = replace(load_stage(system, begin, place), on_point=keep)
+        found = self._follow(system, stage, x)
+        if not isinstance(found, StageFailed) or system.parameters.rubs:
+            return found  # what slips remembers its path
+        last = found.branch.last.x if found.branch.points else x
+        crept = self.driver.follow(self._creep(system), last)
+        return found if isinstance(crept, StageFailed) else crept
+
+    def _creep(self, system: SealSystem) -> Stage:
+        """From a state under any pressure to the sealed pressure."""
+        problem = contact_problem(system, system.parameters.sealed_pressure)
+        stage = correction_stage(
+            system, problem, method="pseudo-transient continuation", name="creep to the contact"
+        )
+        return replace(stage, corrector=CreepCorrector(system, self.driver.newton))
 
     def _follow(self, system: SealSystem, stage: Stage, x: Array) -> Followed:
         """To the end of a stage, by the corrector of paths."""

@@ -80,12 +80,11 @@ class WholeSteps:
         problem: Problem,
         x0: Array,
         pressures: Array | None = None,
-        iterations: int = _MONOLITHIC,
     ) -> Solution:
         """The steady film, from x0 (n,)."""
         if pressures is None:
             pressures = element_pressures(problem, self.system.solids, x0)
-        newton = replace(self.newton, max_iterations=iterations)
+        newton = replace(self.newton, max_iterations=_MONOLITHIC)
         return newton.solve(lagged(self.system, problem, pressures), problem.admissible(x0))
 
 
