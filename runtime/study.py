@@ -94,12 +94,13 @@ class Study(Paths, Fitted):
         source: a page (file or function), a folder that `softehl generate` wrote, a Definition, a
         kernel, or the name of one that ships; a page of fields stands on any kind of cell.
         material: instead, a stress law for a body of it: a file, a function, or the name of one
-        that ships ("neo_hooke"). model: which, where there are several. on: a side, on which a page of one node has an element at each node; or
-        the elements themselves, an array (n, k) of node numbers. shared: unknowns without a node
-        that are one for all elements, not one for each. called: name of an unknown on the page ->
-        its name in the study. along: fields that the page interpolates along its lines -> order of
-        their polynomials, which have nodal unknowns at both ends of a line; or places (n, m) of
-        their unknowns, counted from 0, which blocks share. rule: of quadrature, instead of the
+        that ships ("neo_hooke"). model: which, where there are several. on: a side, on which a page
+        of one node has an element at each node; or the elements themselves, an array (n, k) of node
+        numbers. shared: unknowns without a node that are one for all elements, not one for each.
+        called: name of an unknown on the page -> its name in the study. along: fields that the page
+        interpolates along its lines -> order of their polynomials, which have nodal unknowns at
+        both ends of a line; or places (n, m) of their unknowns, counted from 0, which blocks share.
+        rule: of quadrature, instead of the
         page's own. constant: the tangent does not depend on unknowns; it is evaluated once. given:
         parameters of the page (numbers, or functions of the load factor) and its data (a number,
         (n,) numbers or a function of the elements' centres (n, dim)). A page of fields on several
