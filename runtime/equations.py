@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,7 +27,7 @@ def equations(statement: Statement) -> System:
     elements = [Elements(b.name, b.nodes, b.slots, b.shared) for b in pages]
     numbering = Numbering.of(len(mesh.points), elements)
     for c in statement.conditions:
-        _require(c.name, c.nodes, numbering, c.words, every=False)
+        _require(c.name, c.nodes, numbering, c.words, somewhere=mesh.anywhere)
     forces, implied = _forces(statement, numbering)
     ties = {f.label: len(f.nodes) for f in forces if isinstance(f.kernel, Tie)}
     layout = replace(
@@ -59,7 +60,7 @@ def _forces(
     forces, implied = [], []
     for force in statement.forces:
         for name in force.names:
-            _require(name, force.nodes, numbering, force.label, every=True)
+            _require(name, force.nodes, numbering, force.label)
         if isinstance(force.kernel, Tie):
             # where both sides are prescribed nothing is left for a multiplier to do
             both = np.isin(force.nodes, statement.prescribed(force.names[0])).all(axis=1)
@@ -69,15 +70,22 @@ def _forces(
     return (*forces,), (*implied,)
 
 
-def _require(name: str, nodes: Integers, numbering: Numbering, words: str, *, every: bool) -> None:
-    """Raise StudyError unless the nodes have an unknown of this name."""
+def _require(
+    name: str,
+    nodes: Integers,
+    numbering: Numbering,
+    words: str,
+    *,
+    somewhere: Callable[[object], bool] | None = None,
+) -> None:
+    """Raise StudyError unless the nodes have an unknown of this name; somewhere: some of them."""
     if name not in numbering.nodal:
         known = listed(numbering.nodal)
         raise StudyError(
             f"{words}: no unknown {name!r}{meant(name, numbering.nodal)}; at nodes: {known}"
         )
     there = numbering.nodal[name][nodes] >= 0
-    if not (there.all() if every else there.any()):
+    if not (there.all() if somewhere is None else somewhere(there.any())):
         raise StudyError(f"{words}: no page has the unknown {name!r} there")
 
 
@@ -85,7 +93,9 @@ def _at_start(statement: Statement, numbering: Numbering) -> dict[str, Array]:
     """Unknown -> its values at every node, (points,), nan where nothing was said."""
     found: dict[str, Array] = {}
     for start in statement.start:
-        _require(start.name, start.nodes, numbering, f"start({start.name}=...)", every=False)
+        somewhere = statement.mesh.anywhere
+        words = f"start({start.name}=...)"
+        _require(start.name, start.nodes, numbering, words, somewhere=somewhere)
         values = found.setdefault(start.name, np.full(len(statement.mesh.points), np.nan))
         values[start.nodes] = start.values
     return found

@@ -19,6 +19,7 @@ from softehl.runtime.derivatives.trail import Trail
 from softehl.runtime.fem.loads import Spring, Tie
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mass import Masses
+from softehl.runtime.mesh.mesh import MeshError, place_text
 from softehl.runtime.modes import natural
 from softehl.runtime.names import meant
 from softehl.runtime.output import Picture, piece_names
@@ -36,7 +37,7 @@ class Result:
     """A converged state of a study.
 
     If it is spread over processes, all of them call every method and get the same
-    values. histories: of the elements of this process. trail: the step with those before it, of
+    values; of a mesh in parts those at nodes and cells are of the process's own part. histories: of the elements of this process. trail: the step with those before it, of
     which derivatives are taken.
     """
 
@@ -73,7 +74,7 @@ class Result:
 
     def norm(self) -> float:
         """2-norm of all unknowns."""
-        return float(np.linalg.norm(self.x))
+        return self.system.share.norm(self.x)
 
     def values(self, name: str) -> Array:
         """An unknown at every node, (points,), nan where there is none; else all of its values.
@@ -89,12 +90,24 @@ class Result:
             return self.x[layout.part(name)]
         return np.where(numbers >= 0, self.x[numbers], np.nan)
 
+    def gathered(self, name: str) -> Array:
+        """An unknown at every node of the whole mesh, also where each process has a part of it."""
+        return self.system.share.at_all_nodes(self.values(name))
+
     def at(self, place: tuple[float, ...]) -> dict[str, float]:
         """Values of the unknowns at a place of the undeformed mesh, interpolated within a cell.
 
         Raises MeshError if the place lies outside.
         """
-        nodes, weights = self.system.mesh.locate(np.asarray(place, dtype=np.float64))
+        x = np.asarray(place, dtype=np.float64)
+        holding = self.system.mesh.holding(x)
+        found = self.system.share.found(None if holding is None else self._inside(*holding))
+        if found is None:
+            raise MeshError(f"{place_text(x)} lies outside the mesh")
+        return found
+
+    def _inside(self, nodes: Integers, weights: Array) -> dict[str, float]:
+        """Values where the shape functions of the nodes of a cell have these weights."""
         found = {}
         for name, numbers in self._whole.numbering.nodal.items():
             there = numbers[nodes]
@@ -134,13 +147,19 @@ class Result:
         Every cell counts with the mean of its points.
         """
         nodes = self._whole.blocks[block].nodes
-        count = np.bincount(nodes.ravel(), minlength=len(self.system.mesh.points))
+        added = self._added
+        count = added(np.bincount(nodes.ravel(), minlength=len(self.system.mesh.points)))
         found = {}
         for name, values in self.fields(block).items():
             means = np.repeat(values.mean(axis=1), nodes.shape[1])
-            total = np.bincount(nodes.ravel(), means, len(count))
+            total = added(np.bincount(nodes.ravel(), means, len(count)))
             found[name] = np.where(count > 0, total / np.maximum(count, 1), np.nan)
         return found
+
+    def _added(self, values: Array) -> Array:
+        """Sums at nodes; where each process has a part of the mesh, over the parts."""
+        piece = self.system.mesh.piece
+        return values if piece is None else piece.added(values)
 
     @cached_property
     def _forces(self) -> Array:
@@ -164,7 +183,7 @@ class Result:
         found = {}
         for name, numbers in self._whole.numbering.nodal.items():
             there = numbers[nodes]
-            found[name] = float(self._forces[there[there >= 0]].sum())
+            found[name] = self.system.share.summed(self._forces, there[there >= 0])
         return found
 
     @cached_property
@@ -241,6 +260,8 @@ class Result:
             share.together()
             if share.first:
                 piece.write_index(target, pieces)
+        elif target.suffix == ".vtu" and self.system.mesh.piece is not None:
+            raise ValueError(f"write({str(path)!r}): of a mesh in parts results are .pvtu")
         elif target.suffix == ".vtu":
             picture = self._picture(self._whole, self.system.mesh.cells, self.x)
             if share.first:
@@ -261,6 +282,8 @@ class Result:
     def _own_cells(self) -> dict[str, Integers]:
         """Cells of the elements of this process; on process 0 also those that have no elements."""
         mesh, whole = self.system.mesh, self._whole.blocks.values()
+        if mesh.piece is not None:
+            return dict(mesh.cells)
         found = {}
         for kind, cells in mesh.cells.items():
             own = [b.nodes for b in self.system.blocks.values() if b.kind == kind]

@@ -43,6 +43,7 @@ class MatrixFree:
 
     def spread(self, system: System) -> System:
         """See `Engine`.  Raises StudyError for what it cannot solve."""
+        system.mesh.require_whole(_WHO)
         try:
             pages = [system.assembler.block(name) for name in system.blocks]
             kernels = [require_product(block) for block in pages]

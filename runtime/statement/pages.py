@@ -62,7 +62,7 @@ def elements_of(
     if on is not None and cells is not None:
         raise StudyError(f"{name!r}: give cells=... or on=..., not both")
     if on is not None and kernel.nodes == 1:
-        return "point1", mesh.nodes(on)[:, None]
+        return "point1", mesh.own(mesh.nodes(on))[:, None]
     stem, _, facet = kernel.cell.partition("_")
     if facet and (on is None or stem not in mesh.cells):
         raise StudyError(
