@@ -110,8 +110,8 @@ class _Writer:
 
     def page(self, block: Block) -> ElementBlock:
         n = len(block.nodes)
-        width = len(block.kernel.coordinates)
-        places = self.mesh.points[block.nodes].reshape(n, -1) if width else np.empty((n, 0))
+        width = block.nodes.shape[1] * self.mesh.dimension if block.kernel.coordinates else 0
+        places = self.mesh.points[block.nodes].reshape(n, width) if width else np.empty((n, 0))
         given = [block.data[d] for d in block.kernel.data if d in block.data]
         data = np.stack(given, axis=1) if given else None  # what else there is comes with steps
         return ElementBlock(
