@@ -37,8 +37,9 @@ class Result:
     """A converged state of a study.
 
     If it is spread over processes, all of them call every method and get the same
-    values; of a mesh in parts those at nodes and cells are of the process's own part. histories: of the elements of this process. trail: the step with those before it, of
-    which derivatives are taken.
+    values; of a mesh in parts those at nodes and cells are of the process's own part. histories: of
+    the elements of this process. trail: the step with those before it, of which derivatives are
+    taken.
     """
 
     system: System
@@ -91,7 +92,13 @@ class Result:
         return np.where(numbers >= 0, self.x[numbers], np.nan)
 
     def gathered(self, name: str) -> Array:
-        """An unknown at every node of the whole mesh, also where each process has a part of it."""
+        """An unknown at every node of the whole mesh, also where each process has a part of it.
+
+        Raises KeyError for what is no unknown at nodes.
+        """
+        if name not in self._whole.numbering.nodal:
+            known = ", ".join(self._whole.numbering.nodal)
+            raise KeyError(f"no unknown {name!r} at nodes; there are {known}")
         return self.system.share.at_all_nodes(self.values(name))
 
     def at(self, place: tuple[float, ...]) -> dict[str, float]:
@@ -147,19 +154,19 @@ class Result:
         Every cell counts with the mean of its points.
         """
         nodes = self._whole.blocks[block].nodes
-        added = self._added
-        count = added(np.bincount(nodes.ravel(), minlength=len(self.system.mesh.points)))
+        points, piece = len(self.system.mesh.points), self.system.mesh.piece
+
+        def sums(weights: Array) -> Array:
+            here = np.bincount(nodes.ravel(), weights, points).astype(np.float64, copy=False)
+            return here if piece is None else piece.added(here)
+
+        count = sums(np.ones(nodes.size))
         found = {}
         for name, values in self.fields(block).items():
             means = np.repeat(values.mean(axis=1), nodes.shape[1])
-            total = added(np.bincount(nodes.ravel(), means, len(count)))
+            total = sums(means)
             found[name] = np.where(count > 0, total / np.maximum(count, 1), np.nan)
         return found
-
-    def _added(self, values: Array) -> Array:
-        """Sums at nodes; where each process has a part of the mesh, over the parts."""
-        piece = self.system.mesh.piece
-        return values if piece is None else piece.added(values)
 
     @cached_property
     def _forces(self) -> Array:
@@ -250,7 +257,8 @@ class Result:
         """Write the mesh with unknowns at nodes and fields in cells (means), atomically.
 
         .vtu: one file. .pvtu: one for each process beside it, written by all at once; no process
-        then needs to have the whole. Unknowns u_x, u_y, u_z are written as one vector u as well.
+        then needs to have the whole, and of a mesh in parts this alone is possible. Unknowns u_x,
+        u_y, u_z are written as one vector u as well.
         """
         target, share = Path(path), self.system.share
         if target.suffix == ".pvtu":

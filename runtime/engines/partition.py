@@ -146,4 +146,5 @@ def numbered(system: System, owner: Integers, places: Integers) -> tuple[Integer
         )
         kind[numbers[there]] = k
     order = np.lexsort((kind, places, group, owner))
-    return order, len(nodal) if not group.any() else 1
+    alike = not group.any() and all(np.array_equal(there, present[0]) for there in present)
+    return order, len(nodal) if alike else 1

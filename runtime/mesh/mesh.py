@@ -75,9 +75,7 @@ class Mesh:
     # making one ---------------------------------------------------------------------------------
 
     @classmethod
-    def line(
-        cls, length: float, *, cells: int, order: int = 1, spread: bool = False
-    ) -> Mesh:
+    def line(cls, length: float, *, cells: int, order: int = 1, spread: bool = False) -> Mesh:
         """A line from 0 to `length`; sides "left" and "right". spread: see `box`."""
         from softehl.runtime.mesh.structured import grid
 
@@ -143,7 +141,7 @@ class Mesh:
         Raises MeshError where the file cannot be read or holds other cells than ours.
         """
         from softehl.runtime.mesh.files import read
-        from softehl.runtime.mesh.part_files import read_parts  
+        from softehl.runtime.mesh.part_files import read_parts
 
         return read_parts(Path(path)) if spread else read(Path(path))
 

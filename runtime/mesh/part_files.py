@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -165,7 +166,7 @@ class _Chosen:
 
     def arrays(self, mesh: Mesh, left: dict[str, dict[str, Integers]]) -> dict[str, Array]:
         """What is written; faces of sides are taken out of those that are `left`."""
-        found = {"points": mesh.points[self.used], "numbers": self.used}
+        found: dict[str, Any] = {"points": mesh.points[self.used], "numbers": self.used}
         faces: dict[str, list[Integers]] = {}
         for kind, rows in self.rows.items():
             nodes = mesh.cells[kind][rows]

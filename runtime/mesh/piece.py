@@ -17,7 +17,7 @@ from softehl.runtime.mesh.faces import matched
 from softehl.runtime.mpi import world
 
 if TYPE_CHECKING:
-    from softehl.runtime.mesh.mesh import Faces, Mesh
+    from softehl.runtime.mesh.mesh import Mesh
 
 
 @dataclass(frozen=True, eq=False)

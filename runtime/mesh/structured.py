@@ -83,7 +83,8 @@ def _span(counts: Sequence[int], rank: int, processes: int) -> list[tuple[int, i
     cuts = min(fit, key=lambda cuts: sum((c - 1) / n for c, n in zip(cuts, counts, strict=True)))
     place = np.unravel_index(rank, cuts, order="F")
     return [
-        (n * int(k) // c, n * (int(k) + 1) // c) for k, c, n in zip(place, cuts, counts, strict=True)
+        (n * int(k) // c, n * (int(k) + 1) // c)
+        for k, c, n in zip(place, cuts, counts, strict=True)
     ]
 
 

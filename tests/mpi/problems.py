@@ -145,7 +145,9 @@ def solved(name: str, engine: Any, folder: Path) -> dict[str, Any]:
             result.write(folder / file)
         return numbers(result, "body")
     if name in ("condensed", "jumps"):
-        return numbers({"condensed": condensed, "jumps": jumps}[name]().solve(engine=engine), "body")
+        return numbers(
+            {"condensed": condensed, "jumps": jumps}[name]().solve(engine=engine), "body"
+        )
     if name == "yielding":
         study = yielding()
         half = study.solve(steps=10, until=0.5, engine=engine)

@@ -19,12 +19,13 @@ import pytest
 
 from softehl.runtime.io import read_arrays
 
-pytestmark = [
+MARKS = [
     pytest.mark.mpi,
     pytest.mark.skipif(
         importlib.util.find_spec("petsc4py") is None, reason="PETSc is not installed"
     ),
 ]
+pytestmark = MARKS
 ROOT = Path(__file__).parents[2]
 MPIEXEC = Path(sys.executable).with_name("mpiexec")
 PROCESSES = (1, 2, 3)
@@ -82,7 +83,7 @@ def test_the_serial_cube_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("processes", PROCESSES)
-@pytest.mark.parametrize("name", ["contact", "tied", "yielding", "adaptive"])
+@pytest.mark.parametrize("name", ["contact", "tied", "yielding", "adaptive", "condensed", "jumps"])
 def test_any_number_of_processes_gives_what_one_gives(
     name: str, processes: int, tmp_path: Path
 ) -> None:

@@ -85,7 +85,6 @@ DAMAGED = {
     "cells of Gmsh's type 7 are not known": re.sub(r"\n2 1 2 (\d)\n", r"\n2 1 7 \1\n", SQUARE),
     "a section is shorter than it says": SQUARE.replace("$Elements\n4 ", "$Elements\n9 "),
     "version 3: save it as 4.1 or 2.2": SQUARE.replace("4.1 0 8", "3 0 8"),
-    "cut into partitions": SQUARE.replace("$Entities", "$PartitionedEntities\n$Entities"),
     "no nodes or no cells": SQUARE[: SQUARE.index("$Elements")],
     "the file ends in": SQUARE[: SQUARE.index("$EndElements")],
 }
