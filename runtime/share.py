@@ -63,7 +63,7 @@ class Share:
         return float(values[numbers].sum())
 
     def found(self, value: T | None) -> T | None:
-        """What one process has found, on all of them."""
+        """Value that one process has found, on all of them."""
         return value
 
     def at_all_nodes(self, values: Array) -> Array:

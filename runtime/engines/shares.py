@@ -1,4 +1,4 @@
-"""What the processes of a solution share, where each has its part of the equations."""
+"""Distribution of a solution over processes, where each has its part of the equations."""
 
 from __future__ import annotations
 

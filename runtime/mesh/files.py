@@ -30,7 +30,7 @@ def read(path: Path) -> Mesh:
 
 
 def content_of(path: Path) -> gmsh.Content:
-    """What a file holds.  Raises MeshError."""
+    """Content of a mesh file.  Raises MeshError."""
     if not path.is_file():
         raise MeshError(f"no mesh file {str(path)!r}")
     try:

@@ -208,7 +208,7 @@ class Mesh:
         return bool(something) if self.piece is None else self.piece.anywhere(something)
 
     def own(self, nodes: Integers) -> Integers:
-        """Those of the nodes that are this process's own; all, where the mesh is whole."""
+        """Nodes of these that are this process's own; all, where the mesh is whole."""
         return nodes if self.piece is None else nodes[self.piece.owned[nodes]]
 
     def require_whole(self, words: str) -> None:

@@ -165,7 +165,7 @@ class _Chosen:
         return cls(rows, used, place)
 
     def arrays(self, mesh: Mesh, left: dict[str, dict[str, Integers]]) -> dict[str, Array]:
-        """What is written; faces of sides are taken out of those that are `left`."""
+        """Arrays of the file; faces of sides are taken out of those that are `left`."""
         found: dict[str, Any] = {"points": mesh.points[self.used], "numbers": self.used}
         faces: dict[str, list[Integers]] = {}
         for kind, rows in self.rows.items():

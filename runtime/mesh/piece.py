@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """What joins the part of a mesh that this process has to those of the others.
+    """Connection of the part of a mesh that this process has with those of the others.
 
     numbers: (n,) number of each node in the whole mesh. shared: process -> nodes that it has too,
     in the order of the whole. cuts: kind -> faces (m, k) that a cell of another process has too.

@@ -39,7 +39,7 @@ def misplaced(mesh: Mesh) -> float:
 
 
 def test_every_file_has_each_cell_once_with_all_its_names() -> None:
-    files = sorted(FOLDER.glob("*.msh"))
+    files = [f for f in sorted(FOLDER.glob("*.msh")) if not f.name.startswith("parts")]
     assert len(files) == 33
     for file in files:
         mesh = Mesh.read(file)
