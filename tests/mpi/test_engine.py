@@ -66,7 +66,7 @@ def assert_equal(found: dict[str, Any], expected: dict[str, Any], limit: float =
     assert found.keys() == expected.keys()
     size = max(abs(value) for name, value in expected.items() if name.startswith("force"))
     for name, value in expected.items():
-        scale = size if name.startswith("force") else max(abs(value), 1e-3)
+        scale = max(size if name.startswith("force") else abs(value), 1e-3)
         assert abs(found[name] - value) <= limit * scale, (name, found[name], value)
 
 
