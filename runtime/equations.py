@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,7 +33,7 @@ def equations(statement: Statement, fields: Mapping[str, Sequence[str]] | None =
     except ValueError as error:
         raise StudyError(str(error)) from None
     for c in statement.conditions:
-        _require(c.name, c.nodes, numbering, c.words, every=False)
+        _require(c.name, c.nodes, numbering, c.words, somewhere=mesh.anywhere)
     forces, implied = _forces(statement, numbering)
     ties = {f.label: len(f.nodes) for f in forces if isinstance(f.kernel, Tie)}
     layout = replace(
@@ -66,7 +66,7 @@ def _forces(
     forces, implied = [], []
     for force in statement.forces:
         for name in force.names:
-            _require(name, force.nodes, numbering, force.label, every=True)
+            _require(name, force.nodes, numbering, force.label)
         if isinstance(force.kernel, Tie):
             # where both sides are prescribed nothing is left for a multiplier to do
             both = np.isin(force.nodes, statement.prescribed(force.names[0])).all(axis=1)
@@ -76,15 +76,22 @@ def _forces(
     return (*forces,), (*implied,)
 
 
-def _require(name: str, nodes: Integers, numbering: Numbering, words: str, *, every: bool) -> None:
-    """Raise StudyError unless the nodes have an unknown of this name."""
+def _require(
+    name: str,
+    nodes: Integers,
+    numbering: Numbering,
+    words: str,
+    *,
+    somewhere: Callable[[object], bool] | None = None,
+) -> None:
+    """Raise StudyError unless the nodes have an unknown of this name; somewhere: some of them."""
     if name not in numbering.nodal:
         known = listed(numbering.nodal)
         raise StudyError(
             f"{words}: no unknown {name!r}{meant(name, numbering.nodal)}; at nodes: {known}"
         )
     there = numbering.nodal[name][nodes] >= 0
-    if not (there.all() if every else there.any()):
+    if not (there.all() if somewhere is None else somewhere(there.any())):
         raise StudyError(f"{words}: no page has the unknown {name!r} there")
 
 
@@ -92,7 +99,9 @@ def _at_start(statement: Statement, numbering: Numbering) -> dict[str, Array]:
     """Unknown -> its values at every node, (points,), nan where nothing was said."""
     found: dict[str, Array] = {}
     for start in statement.start:
-        _require(start.name, start.nodes, numbering, f"start({start.name}=...)", every=False)
+        somewhere = statement.mesh.anywhere
+        words = f"start({start.name}=...)"
+        _require(start.name, start.nodes, numbering, words, somewhere=somewhere)
         values = found.setdefault(start.name, np.full(len(statement.mesh.points), np.nan))
         values[start.nodes] = start.values
     return found
@@ -107,8 +116,8 @@ class _Writer:
 
     def page(self, block: Block) -> ElementBlock:
         n = len(block.nodes)
-        width = len(block.kernel.coordinates)
-        places = self.mesh.points[block.nodes].reshape(n, -1) if width else np.empty((n, 0))
+        width = block.nodes.shape[1] * self.mesh.dimension if block.kernel.coordinates else 0
+        places = self.mesh.points[block.nodes].reshape(n, width) if width else np.empty((n, 0))
         given = [block.data[d] for d in block.kernel.data if d in block.data]
         data = np.stack(given, axis=1) if given else None  # what else there is comes with steps
         return ElementBlock(

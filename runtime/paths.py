@@ -142,6 +142,8 @@ class Paths:
             return watched(found, Watch(told.until(until), write))
         require_none(method, {"mass": mass, "velocity": velocity, "rho_inf": rho_inf})
         system = where.spread(self.system())
+        if checkpoint is not None or restart is not None:
+            system.mesh.require_whole("checkpoint and restart")
         require_no_inertia(method, system)
         if restart is None:
             clock = Clock.begin(system, start, dt)

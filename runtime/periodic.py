@@ -242,6 +242,7 @@ def periodic(
     statement: Statement, system: System, pairs: Sequence[tuple[Any, Any]], tolerance: float
 ) -> Cell:
     """The cell of a study.  Raises StudyError, MeshError."""
+    system.mesh.require_whole("periodic")
     mesh, nodal = system.mesh, system.numbering.nodal
     names = [f"u_{axis}" for axis in _AXES[: mesh.dimension]]
     missing = [name for name in names if name not in nodal]

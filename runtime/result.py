@@ -19,6 +19,7 @@ from softehl.runtime.derivatives.trail import Trail
 from softehl.runtime.fem.loads import Spring, Tie
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mass import Masses
+from softehl.runtime.mesh.mesh import MeshError, place_text
 from softehl.runtime.modes import natural
 from softehl.runtime.names import meant
 from softehl.runtime.output import Picture, piece_names
@@ -36,8 +37,9 @@ class Result:
     """A converged state of a study.
 
     If it is spread over processes, all of them call every method and get the same
-    values. histories: of the elements of this process. trail: the step with those before it, of
-    which derivatives are taken.
+    values; of a mesh in parts those at nodes and cells are of the process's own part. histories: of
+    the elements of this process. trail: the step with those before it, of which derivatives are
+    taken.
     """
 
     system: System
@@ -73,7 +75,7 @@ class Result:
 
     def norm(self) -> float:
         """2-norm of all unknowns."""
-        return float(np.linalg.norm(self.x))
+        return self.system.share.norm(self.x)
 
     def values(self, name: str) -> Array:
         """An unknown at every node, (points,), nan where there is none; else all of its values.
@@ -89,12 +91,30 @@ class Result:
             return self.x[layout.part(name)]
         return np.where(numbers >= 0, self.x[numbers], np.nan)
 
+    def gathered(self, name: str) -> Array:
+        """An unknown at every node of the whole mesh, also where each process has a part of it.
+
+        Raises KeyError for what is no unknown at nodes.
+        """
+        if name not in self._whole.numbering.nodal:
+            known = ", ".join(self._whole.numbering.nodal)
+            raise KeyError(f"no unknown {name!r} at nodes; there are {known}")
+        return self.system.share.at_all_nodes(self.values(name))
+
     def at(self, place: tuple[float, ...]) -> dict[str, float]:
         """Values of the unknowns at a place of the undeformed mesh, interpolated within a cell.
 
         Raises MeshError if the place lies outside.
         """
-        nodes, weights = self.system.mesh.locate(np.asarray(place, dtype=np.float64))
+        x = np.asarray(place, dtype=np.float64)
+        holding = self.system.mesh.holding(x)
+        found = self.system.share.found(None if holding is None else self._inside(*holding))
+        if found is None:
+            raise MeshError(f"{place_text(x)} lies outside the mesh")
+        return found
+
+    def _inside(self, nodes: Integers, weights: Array) -> dict[str, float]:
+        """Values where the shape functions of the nodes of a cell have these weights."""
         found = {}
         for name, numbers in self._whole.numbering.nodal.items():
             there = numbers[nodes]
@@ -134,11 +154,17 @@ class Result:
         Every cell counts with the mean of its points.
         """
         nodes = self._whole.blocks[block].nodes
-        count = np.bincount(nodes.ravel(), minlength=len(self.system.mesh.points))
+        points, piece = len(self.system.mesh.points), self.system.mesh.piece
+
+        def sums(weights: Array) -> Array:
+            here = np.bincount(nodes.ravel(), weights, points).astype(np.float64, copy=False)
+            return here if piece is None else piece.added(here)
+
+        count = sums(np.ones(nodes.size))
         found = {}
         for name, values in self.fields(block).items():
             means = np.repeat(values.mean(axis=1), nodes.shape[1])
-            total = np.bincount(nodes.ravel(), means, len(count))
+            total = sums(means)
             found[name] = np.where(count > 0, total / np.maximum(count, 1), np.nan)
         return found
 
@@ -164,7 +190,7 @@ class Result:
         found = {}
         for name, numbers in self._whole.numbering.nodal.items():
             there = numbers[nodes]
-            found[name] = float(self._forces[there[there >= 0]].sum())
+            found[name] = self.system.share.summed(self._forces, there[there >= 0])
         return found
 
     @cached_property
@@ -231,7 +257,8 @@ class Result:
         """Write the mesh with unknowns at nodes and fields in cells (means), atomically.
 
         .vtu: one file. .pvtu: one for each process beside it, written by all at once; no process
-        then needs to have the whole. Unknowns u_x, u_y, u_z are written as one vector u as well.
+        then needs to have the whole, and of a mesh in parts this alone is possible. Unknowns u_x,
+        u_y, u_z are written as one vector u as well.
         """
         target, share = Path(path), self.system.share
         if target.suffix == ".pvtu":
@@ -241,6 +268,8 @@ class Result:
             share.together()
             if share.first:
                 piece.write_index(target, pieces)
+        elif target.suffix == ".vtu" and self.system.mesh.piece is not None:
+            raise ValueError(f"write({str(path)!r}): of a mesh in parts results are .pvtu")
         elif target.suffix == ".vtu":
             picture = self._picture(self._whole, self.system.mesh.cells, self.x)
             if share.first:
@@ -261,6 +290,8 @@ class Result:
     def _own_cells(self) -> dict[str, Integers]:
         """Cells of the elements of this process; on process 0 also those that have no elements."""
         mesh, whole = self.system.mesh, self._whole.blocks.values()
+        if mesh.piece is not None:
+            return dict(mesh.cells)
         found = {}
         for kind, cells in mesh.cells.items():
             own = [b.nodes for b in self.system.blocks.values() if b.kind == kind]

@@ -8,10 +8,14 @@ something is asked of `Share`, so that all processes decide alike.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
-from softehl.runtime.arrays import Array
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.problem import Problem
+
+T = TypeVar("T")
 
 
 class Share:
@@ -49,6 +53,22 @@ class Share:
     def largest(self, value: float) -> float:
         """The largest of the numbers that the processes have."""
         return value
+
+    def norm(self, x: Array) -> float:
+        """2-norm of what `whole` gave, each unknown counted once."""
+        return float(np.linalg.norm(x))
+
+    def summed(self, values: Array, numbers: Integers) -> float:
+        """Sum of values at these unknowns, each counted once."""
+        return float(values[numbers].sum())
+
+    def found(self, value: T | None) -> T | None:
+        """Value that one process has found, on all of them."""
+        return value
+
+    def at_all_nodes(self, values: Array) -> Array:
+        """Values (n,) at the nodes of this process's mesh as those at all nodes of the whole."""
+        return values
 
     def together(self) -> None:
         """Wait for the other processes."""

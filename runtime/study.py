@@ -142,7 +142,7 @@ class Study(Paths, Fitted):
                     kernel = DeadLoad(CELLS[kind], value, self._ring)
                     self._add_force("load", where, kernel, faces, (name,))
             else:
-                nodes = read.nodes_of(self.mesh, where)
+                nodes = self.mesh.own(read.nodes_of(self.mesh, where))
                 self._add_force("load", where, NodalForce(value), nodes[:, None], (name,))
 
     def pressure(
@@ -172,7 +172,7 @@ class Study(Paths, Fitted):
         read.named(f"spring({shown(where)})", stiffness, "u_x=2")
         for name, value in stiffness.items():
             kernel = Spring(read.finite(name, value))
-            nodes = read.nodes_of(self.mesh, where)
+            nodes = self.mesh.own(read.nodes_of(self.mesh, where))
             self._add_force("spring", where, kernel, nodes[:, None], (name,))
 
     def fix(self, where: Where, **values: Amount) -> None:
@@ -197,6 +197,7 @@ class Study(Paths, Fitted):
         The sides must have the same nodes but for a shift; `tolerance` is relative to their size.
         """
         words = f"tie({shown(where)}, {shown(to)})"
+        self.mesh.require_whole(words)
         read.named(words, names, f'tie({shown(where)}, {shown(to)}, "u_x", "u_y")')
         offset = read.amount(words, "offset", offset)
         ours, theirs = read.nodes_of(self.mesh, where), read.nodes_of(self.mesh, to)

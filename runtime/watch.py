@@ -37,7 +37,8 @@ class Series:
 
     def __call__(self, result: Result) -> None:
         """Write one more result; its file first, then the list that names it."""
-        name = f"{self.path.stem}_{len(self.entries) + 1:04d}.vtu"
+        kind = "vtu" if result.system.mesh.piece is None else "pvtu"
+        name = f"{self.path.stem}_{len(self.entries) + 1:04d}.{kind}"
         result.write(self.path.with_name(name))
         self.entries.append((result.t, name))
         if result.system.share.first:

@@ -41,6 +41,7 @@ class Serial:
 
     def spread(self, system: System) -> System:
         """See `Engine`."""
+        system.mesh.require_whole('engine = "serial"')
         return system
 
     def newton(self, system: System, given: Newton | None) -> Newton:

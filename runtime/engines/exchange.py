@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.engines.local import Part
-from softehl.runtime.engines.partition import Partition
 from softehl.runtime.mpi import petsc, world
 
 
@@ -32,19 +30,17 @@ class Exchange:
     sent: int = field(default=0)
 
     @classmethod
-    def of(cls, part: Part, partition: Partition) -> Exchange:
-        """The exchange of the unknowns of a part."""
+    def of(cls, numbers: Integers, owned: Integers, starts: Integers) -> Exchange:
+        """Of unknowns with these numbers (m,); starts: where those of each process begin."""
         PETSc, comm = petsc(), world()
-        numbers = partition.numbers[part.unknowns]
-        first, last = partition.starts[comm.rank : comm.rank + 2]
-        vector = PETSc.Vec().createMPI((int(last - first), int(partition.starts[-1])), comm=comm)
+        first, last = starts[comm.rank : comm.rank + 2]
+        vector = PETSc.Vec().createMPI((int(last - first), int(starts[-1])), comm=comm)
         vector.setBlockSize(1)
         copies = PETSc.Vec().createSeq(len(numbers))
         chosen = PETSc.IS().createGeneral(numbers.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
         scatter = PETSc.Scatter().create(vector, chosen, copies, None)
-        ghosts = len(numbers) - len(part.owned)
-        places = numbers[part.owned] - first
-        return cls(numbers, part.owned, places, vector, copies, scatter, ghosts)
+        ghosts, places = len(numbers) - len(owned), numbers[owned] - first
+        return cls(numbers, owned, places, vector, copies, scatter, ghosts)
 
     def local(self, vector: Any) -> Array:
         """The local vector (m,) of one of PETSc's: own values and copies of the neighbours'."""
@@ -52,6 +48,13 @@ class Exchange:
         self.scatter.scatter(vector, self.copies, petsc().InsertMode.INSERT_VALUES, mode)
         self.sent += 8 * self.ghosts
         return np.array(self.copies.array_r)
+
+    def copied(self, own: Array) -> Array:
+        """The local vector (m,) of own values (k,)."""
+        vector = self.to_petsc(own)
+        found = self.local(vector)
+        vector.destroy()
+        return found
 
     def added(self, x: Array) -> Array:
         """Of sums (m,) over own elements those over all: of own unknowns, (k,)."""
@@ -69,7 +72,9 @@ class Exchange:
         return np.array(self.vector.array_r[self.places])
 
     def to_petsc(self, own: Array) -> Any:
-        """A new vector of PETSc's with these own values (k,)."""
+        """A new vector of PETSc's with these own values (k,): whoever asks destroys it, for Python
+        cannot tell when the other processes are done with it.
+        """
         found = self.vector.duplicate()
         found.array[self.places] = own
         return found

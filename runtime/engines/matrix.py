@@ -106,25 +106,34 @@ class Tangent:
         """Magnitudes of the diagonal of K, own rows, (k,)."""
         found = self.exchange.vector.duplicate()
         self.matrix.getDiagonal(found)
-        return np.asarray(np.abs(found.array_r[self.exchange.places]))
+        return self._own(np.abs(found.array_r), found)
 
     def times(self, x: Array) -> Array:
         """K times own values x, (k,): own rows, (k,)."""
-        found = self.exchange.vector.duplicate()
-        self.matrix.mult(self.exchange.to_petsc(x), found)
-        return np.array(found.array_r[self.exchange.places])
+        return self._product(self.matrix, x)
 
     def times_magnitudes(self, x: Array) -> Array:
         """|K| times own values x, (k,), at least 0: own rows, (k,)."""
         starts, columns, values = self.matrix.getValuesCSR()
-        magnitudes = (
-            petsc()
-            .Mat()
-            .createAIJ(self.matrix.getSizes(), csr=(starts, columns, np.abs(values)), comm=world())
-        )
-        found = self.exchange.vector.duplicate()
-        magnitudes.mult(self.exchange.to_petsc(x), found)
-        return np.array(found.array_r[self.exchange.places])
+        np.abs(values, out=values)
+        csr = starts, columns, values
+        magnitudes = petsc().Mat().createAIJ(self.matrix.getSizes(), csr=csr, comm=world())
+        del starts, columns, values, csr
+        found = self._product(magnitudes, x)
+        magnitudes.destroy()  # here and below: PETSc keeps what Python alone lets go
+        return found
+
+    def _product(self, matrix: Any, x: Array) -> Array:
+        found, given = self.exchange.vector.duplicate(), self.exchange.to_petsc(x)
+        matrix.mult(given, found)
+        return self._own(found.array_r, found, given)
+
+    def _own(self, values: Array, *done: Any) -> Array:
+        """Own values (k,), a copy, of a process's piece; vectors that are done with."""
+        own = np.array(values[self.exchange.places])
+        for vector in done:
+            vector.destroy()
+        return own
 
     def prepare(self, ksp: Any, near: Any) -> None:
         """Krylov method and preconditioner, where no option says otherwise.
@@ -235,11 +244,14 @@ class Solver:
             self.times.solver += time.perf_counter() - began
         self.times.solves += 1
         self.times.iterations += ksp.getIterationNumber()
-        if reason < 0 or not np.isfinite(x.norm()):
+        size, found = x.norm(), tangent.exchange.local(x)
+        b.destroy()
+        x.destroy()
+        if reason < 0 or not np.isfinite(size):
             row = tangent.empty_row()
             words = f"PETSc's {ksp.getType()} with {ksp.getPC().getType()} failed (reason {reason})"
             raise SingularMatrix(words, None if row < 0 else row)
-        return tangent.exchange.local(x)
+        return found
 
     @property
     def direct(self) -> bool:

@@ -49,6 +49,7 @@ class MatrixFree:
 
     def spread(self, system: System) -> System:
         """See `Engine`.  Raises StudyError for what it cannot solve."""
+        system.mesh.require_whole(_WHO)
         pages, order = suitable(system)
         levels = Levels.of(system, pages, order, self.threads or threads())
         iteration = Iteration(self.tolerance, self.most, self.iterations)

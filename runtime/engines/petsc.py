@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.engines.exchange import Exchange, largest, total
+from softehl.runtime.arrays import Integers
+from softehl.runtime.engines.exchange import Exchange
 from softehl.runtime.engines.levels import Levels
 from softehl.runtime.engines.local import Part, part_of
 from softehl.runtime.engines.matrix import Solver, Times
 from softehl.runtime.engines.matrix_free import suitable
-from softehl.runtime.engines.partition import Cells, Partition, partition
-from softehl.runtime.engines.spread import Distributed, Spread, Team
+from softehl.runtime.engines.partition import Cells, partition
+from softehl.runtime.engines.pieces import part_here
+from softehl.runtime.engines.shares import Parts, Processes
+from softehl.runtime.engines.spread import Distributed, Team
 from softehl.runtime.fem.loads import Tie
-from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mpi import petsc, world
-from softehl.runtime.share import Share
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import System
@@ -48,19 +48,27 @@ class Petsc:
         system = system.everywhere
         if system.contacts:
             raise StudyError('contact: its pairs are sought in one process, engine="serial"')
+        if system.mesh.piece is not None:
+            if self.matrix_free:
+                system.mesh.require_whole('linear = "matrix-free"')
+            part, exchange, interleaved = part_here(system, system.mesh.piece)
+            return replace(system, share=Parts(self._team(part, exchange, interleaved)))
         order = self._order(system)
         comm = world()
         cells = Cells.of(system)
         cut = partition(system, cells, _cut(system, cells), comm.size)
         part = part_of(system, cut, comm.rank)
-        exchange = Exchange.of(part, cut)
-        near = _rigid_motions(part, cut, exchange)
-        solver = Solver(self.options, near, _fields(part, exchange), self.times)
-        team = Team(part, exchange, cut.interleaved, solver)
+        exchange = Exchange.of(cut.numbers[part.unknowns], part.owned, cut.starts)
+        team = self._team(part, exchange, cut.interleaved)
         if order:
             pages = [part.system.assembler.block(name) for name in system.blocks]
             team.levels = Levels.of(part.system, pages, order, 1)
         return replace(part.system, share=Processes(team))
+
+    def _team(self, part: Part, exchange: Exchange, interleaved: int) -> Team:
+        near = _rigid_motions(part, interleaved, exchange)
+        solver = Solver(self.options, near, _fields(part, exchange), self.times)
+        return Team(part, exchange, interleaved, solver)
 
     def _order(self, system: System) -> int:
         """Order of the cells of pages with products, 0 for a matrix.  Raises StudyError."""
@@ -75,72 +83,6 @@ class Petsc:
     def newton(self, system: System, given: Newton | None) -> Newton:
         """See `Engine`."""
         return replace(given or Newton(), linear=Distributed())
-
-
-@dataclass(eq=False)
-class Processes(Share):
-    """See `Share`: what a process of several has."""
-
-    team: Team
-
-    @property
-    def first(self) -> bool:  # type: ignore[override]
-        """See `Share`."""
-        return bool(world().rank == 0)
-
-    @property
-    def pieces(self) -> tuple[int, int]:  # type: ignore[override]
-        """See `Share`."""
-        return world().rank, world().size
-
-    def posed(self, problem: Problem) -> Spread:
-        """See `Share`."""
-        return Spread(problem, self.team)
-
-    def whole(self, x: Array) -> Array:
-        """See `Share`."""
-        part = self.team.part
-        return _gathered(x[..., part.owned], part.unknowns[part.owned], self._whole.size)
-
-    def own(self, x: Array) -> Array:
-        """See `Share`."""
-        return np.asarray(x[..., self.team.part.unknowns])
-
-    def whole_cells(self, block: str, values: Array) -> Array:
-        """See `Share`."""
-        rows = self.team.part.elements[block]
-        count = len(self._whole.blocks[block].nodes)
-        return np.moveaxis(_gathered(np.moveaxis(values, 0, -1), rows, count), -1, 0)
-
-    def own_cells(self, block: str, values: Array) -> Array:
-        """See `Share`."""
-        return np.asarray(values[self.team.part.elements[block]])
-
-    def whole_forces(self, forces: Array) -> Array:
-        """See `Share`."""
-        part = self.team.part
-        own = self.team.exchange.added(forces)
-        return _gathered(own, part.unknowns[part.owned], self._whole.size)
-
-    def largest(self, value: float) -> float:
-        """See `Share`."""
-        return largest(value)
-
-    def together(self) -> None:
-        """See `Share`."""
-        world().Barrier()
-
-    @property
-    def _whole(self) -> System:
-        return self.team.part.system.everywhere
-
-
-def _gathered(values: Array, places: Integers, count: int) -> Array:
-    """The array (..., count) of which each process has `values` at its own `places`."""
-    flat = values.reshape(-1, values.shape[-1]) if values.ndim > 1 else values[None]
-    found = np.zeros((len(flat), count))
-    found[:, places] = flat
-    return np.asarray(total(found).reshape(*values.shape[:-1], count))
 
 
 def _cut(system: System, cells: Cells) -> Integers:
@@ -163,12 +105,12 @@ def _cut(system: System, cells: Cells) -> Integers:
     return np.concatenate(comm.allgather(processes.getIndices().astype(np.int64)))
 
 
-def _rigid_motions(part: Part, cut: Partition, exchange: Exchange) -> Any:
+def _rigid_motions(part: Part, interleaved: int, exchange: Exchange) -> Any:
     """Rigid-body motions for multigrid, where the only unknowns are displacements; else None."""
     mesh, layout = part.system.mesh, part.system.numbering.layout
     stems = {name.rpartition("_")[0] for name in layout.names}
     axes = tuple(name.rpartition("_")[2] for name in layout.names)
-    if cut.interleaved < 2 or len(stems) > 1 or axes != _AXES[: mesh.dimension]:
+    if interleaved < 2 or len(stems) > 1 or axes != _AXES[: mesh.dimension]:
         return None
     places = np.empty(len(exchange.owned))
     for axis, name in enumerate(layout.names):

@@ -227,7 +227,7 @@ class Spread:
         exchange, problem = self.team.exchange, self.problem
         root = np.sqrt(K.tangent.diagonal())
         root[np.isin(self.team.part.owned, problem.fixed)] = 0.0
-        local = exchange.local(exchange.to_petsc(root * magnitudes))
+        local = exchange.copied(root * magnitudes)
         around = exchange.added(problem.assembler.around(local, self.parameters))
         return K.tangent.times_magnitudes(magnitudes) + root * around
 

@@ -44,6 +44,7 @@ def turns(kind: str) -> Integers:
 
 def interior(mesh: Mesh, kind: str) -> Integers:
     """Facets between two cells of a kind: nodes (n, 2 k) of both.  Raises MeshError."""
+    mesh.require_whole('on="interior"')
     if len(mesh.cells) > 1:
         raise MeshError(f'on="interior": the mesh has {", ".join(mesh.cells)}; one kind is needed')
     turned, cells = turns(kind), mesh.cells[kind]
@@ -78,6 +79,7 @@ def split(mesh: Mesh) -> Mesh:
 
     Sides and groups stay; `origin` tells which nodes were one.
     """
+    mesh.require_whole("split")
     first, cells, copied = 0, {}, []
     for kind, nodes in mesh.cells.items():
         cells[kind] = first + np.arange(nodes.size).reshape(nodes.shape)

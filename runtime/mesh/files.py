@@ -21,15 +21,24 @@ Names = Mapping[str, Mapping[str, Integers]]
 
 def read(path: Path) -> Mesh:
     """See `Mesh.read`."""
+    content = content_of(path)
+    points = content.points
+    top = highest(path, content.cells)
+    if points.shape[1] > top and not np.ptp(points[:, top:], axis=0).any():
+        points = points[:, :top]
+    return mesh_of(content, np.ascontiguousarray(points), top)[0]
+
+
+def content_of(path: Path) -> gmsh.Content:
+    """Content of a mesh file.  Raises MeshError."""
     if not path.is_file():
         raise MeshError(f"no mesh file {str(path)!r}")
     try:
         data = path.read_bytes() if path.suffix == ".msh" else b""
-        found = gmsh.parse(data) if b"$MeshFormat" in data else _by_meshio(path)
+        return gmsh.parse(data) if b"$MeshFormat" in data else _by_meshio(path)
     except _DEFECTS as error:
         words = " ".join(str(error).split()) or "not a mesh file that meshio knows"
         raise MeshError(f"{path}: {words}") from None
-    return _mesh(path, found.points, found.cells, found.names)
 
 
 def _by_meshio(path: Path) -> gmsh.Content:
@@ -60,13 +69,20 @@ def _by_meshio(path: Path) -> gmsh.Content:
     )
 
 
-def _mesh(path: Path, points: Array, cells: Mapping[str, Integers], names: Names) -> Mesh:
-    """Cells of the highest dimension are the mesh; named ones of one less are sides."""
+def highest(path: Path, cells: Mapping[str, Integers]) -> int:
+    """Dimension of the cells that are the mesh.  Raises MeshError where there are none."""
     top = max((CELLS[kind].dimension for kind, nodes in cells.items() if len(nodes)), default=0)
     if not top:
         raise MeshError(f"{path}: there are no cells")
-    if points.shape[1] > top and not np.ptp(points[:, top:], axis=0).any():
-        points = points[:, :top]
+    return top
+
+
+def mesh_of(content: gmsh.Content, points: Array, top: int) -> tuple[Mesh, Integers]:
+    """The mesh, whose cells have the highest dimension, and which points of the file it has: those
+    of cells (mesh generators leave the centres of arcs). Named cells of one dimension less are
+    sides.
+    """
+    cells, names = content.cells, content.names
     groups: dict[str, dict[str, Integers]] = {}
     sides: dict[str, dict[str, Integers]] = {}
     for name, members in names.items():
@@ -78,19 +94,12 @@ def _mesh(path: Path, points: Array, cells: Mapping[str, Integers], names: Names
             elif CELLS[kind].dimension == top - 1:
                 sides.setdefault(name, {})[kind] = cells[kind][chosen]
     main = {kind: nodes for kind, nodes in cells.items() if CELLS[kind].dimension == top}
-    return _used(Mesh(np.ascontiguousarray(points), main, groups, sides))
-
-
-def _used(mesh: Mesh) -> Mesh:
-    """Without the points that no cell has (centres of arcs that mesh generators leave)."""
-    used = np.unique(np.concatenate([nodes.ravel() for nodes in mesh.cells.values()]))
-    if len(used) == len(mesh.points):
-        return mesh
-    number = np.full(len(mesh.points), -1)
+    used = np.unique(np.concatenate([nodes.ravel() for nodes in main.values()]))
+    number = np.full(len(points), -1)
     number[used] = np.arange(len(used))
-    sides = {n: {k: number[f] for k, f in side.items()} for n, side in mesh.sides.items()}
-    cells = {kind: number[nodes] for kind, nodes in mesh.cells.items()}
-    return Mesh(mesh.points[used], cells, mesh.groups, sides)
+    sides = {n: {k: number[f] for k, f in side.items()} for n, side in sides.items()}
+    main = {kind: number[nodes] for kind, nodes in main.items()}
+    return Mesh(points[used], main, groups, sides), used
 
 
 def write(mesh: Mesh, path: Path) -> None:

@@ -40,12 +40,13 @@ class GmshError(ValueError):
 @dataclass(frozen=True)
 class Content:
     """Content of a file: points (n, 3); kind -> cells (m, k), each once; name -> kind -> numbers of
-    cells of that kind, rising.
+    cells of that kind, rising. tags: (n,) numbers of the points in the file, if it has some.
     """
 
     points: Array
     cells: Mapping[str, Integers]
     names: Mapping[str, Mapping[str, Integers]]
+    tags: Integers | None = None
 
 
 @dataclass
@@ -136,8 +137,6 @@ def parse(data: bytes) -> Content:
         name = title[1:]
         if name == "MeshFormat":
             version = _version(source)
-        elif name == "PartitionedEntities":
-            raise GmshError("the mesh is cut into partitions: save it without")
         elif name == "PhysicalNames":
             for _ in range(int(source.line())):
                 dimension, number, words = source.line().split(maxsplit=2)
@@ -204,6 +203,21 @@ def _entities_4(source: _Source, found: _Parts, version: str) -> None:
                 source.whole("i4", source.one("u8"))  # what bounds it
 
 
+def _partitions_4(source: _Source, found: _Parts, version: str) -> None:
+    """Entities of a mesh in partitions, with the groups of what they are parts of."""
+    source.one("u8")
+    source.whole("i4", 2 * source.one("u8"))  # ghosts
+    for dimension, count in enumerate(source.whole("u8", 4).tolist()):
+        for _ in range(count):
+            tag = int(source.whole("i4", 3)[0])
+            source.whole("i4", source.one("u8"))  # its partitions
+            source.reals(6 if dimension else 3)
+            groups = source.whole("i4", source.one("u8")).tolist()
+            found.entities[dimension, tag] = [(dimension, abs(group)) for group in groups]
+            if dimension:
+                source.whole("i4", source.one("u8"))
+
+
 def _nodes_4(source: _Source, found: _Parts, version: str) -> None:
     if version != "4.1":
         for _ in range(int(source.whole("u8", 2)[0])):
@@ -233,6 +247,7 @@ _SECTIONS = {
     ("2", "Nodes"): _nodes_2,
     ("2", "Elements"): _cells_2,
     ("4", "Entities"): _entities_4,
+    ("4", "PartitionedEntities"): _partitions_4,
     ("4", "Nodes"): _nodes_4,
     ("4", "Elements"): _cells_4,
 }
@@ -267,7 +282,8 @@ def _content(found: _Parts) -> Content:
                 members.setdefault(name, []).append(chosen)
         for name, lists in members.items():
             names[name][kind] = np.unique(np.concatenate(lists))
-    return Content(np.concatenate(found.points), cells, {n: g for n, g in names.items() if g})
+    kept = {name: members for name, members in names.items() if members}
+    return Content(np.concatenate(found.points), cells, kept, tags)
 
 
 def text(

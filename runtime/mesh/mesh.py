@@ -20,6 +20,7 @@ import numpy as np
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.faces import as_known, matched, once
+from softehl.runtime.mesh.piece import Piece
 from softehl.runtime.names import meant, misfit
 
 Faces: TypeAlias = Mapping[str, Integers]
@@ -43,7 +44,8 @@ class Mesh:
     points: (n, dim) places of the nodes. cells: kind -> node numbers (m, k). groups: name -> kind
     -> numbers of cells of that kind. sides: name -> faces, in any order of their nodes; `faces`
     gives them from outside counterclockwise. numbers: (n,) nodes with the same number are at one
-    place of which every cell has its own copy; None: there are no copies.
+    place of which every cell has its own copy; None: there are no copies. piece: of a mesh that is
+    in parts under mpirun, of which this is that of this process; None: it is the whole.
     """
 
     points: Array
@@ -51,6 +53,7 @@ class Mesh:
     groups: Mapping[str, Mapping[str, Integers]] = field(default_factory=dict)
     sides: Mapping[str, Faces] = field(default_factory=dict)
     numbers: Integers | None = None
+    piece: Piece | None = None
 
     def __post_init__(self) -> None:
         """Raises MeshError for an unknown kind of cell or a wrong number of nodes."""
@@ -72,11 +75,11 @@ class Mesh:
     # making one ---------------------------------------------------------------------------------
 
     @classmethod
-    def line(cls, length: float, *, cells: int, order: int = 1) -> Mesh:
-        """A line from 0 to `length`; sides "left" and "right"."""
+    def line(cls, length: float, *, cells: int, order: int = 1, spread: bool = False) -> Mesh:
+        """A line from 0 to `length`; sides "left" and "right". spread: see `box`."""
         from softehl.runtime.mesh.structured import grid
 
-        return grid((length,), (cells,), order, "quad")
+        return grid((length,), (cells,), order, "quad", spread=spread)
 
     @classmethod
     def rectangle(
@@ -87,15 +90,16 @@ class Mesh:
         cells: tuple[int, int],
         order: int = 1,
         shape: Shape = "quad",
+        spread: bool = False,
     ) -> Mesh:
         """[0, width] x [0, height]; sides "left" "right" (x), "bottom" "top" (y).
 
         shape: "quad" (quad4, quad9, up to quad49 of order 6), "serendipity" (quad8) or
-        "triangle" (tri3, tri6).
+        "triangle" (tri3, tri6). spread: see `box`.
         """
         from softehl.runtime.mesh.structured import grid
 
-        return grid((width, height), cells, order, shape)
+        return grid((width, height), cells, order, shape, spread=spread)
 
     @classmethod
     def box(
@@ -105,15 +109,17 @@ class Mesh:
         cells: tuple[int, int, int],
         order: int = 1,
         shape: Shape = "hex",
+        spread: bool = False,
     ) -> Mesh:
         """[0, a] x [0, b] x [0, c]; "left" "right" (x), "front" "back" (y), "bottom" "top" (z).
 
         shape: "hex" (hex8, hex27, up to hex343 of order 6), "serendipity" (hex20), "tetrahedron"
-        (tet4, tet10) or "wedge" (wedge6).
+        (tet4, tet10) or "wedge" (wedge6). spread: under mpirun every process makes its own part
+        only (docs/cluster.md); of one process that is the whole.
         """
         from softehl.runtime.mesh.structured import grid
 
-        return grid(tuple(size), cells, order, shape)
+        return grid(tuple(size), cells, order, shape, spread=spread)
 
     @classmethod
     def union(cls, **parts: Mesh) -> Mesh:
@@ -126,23 +132,32 @@ class Mesh:
         return union(parts)
 
     @classmethod
-    def read(cls, path: str | Path) -> Mesh:
+    def read(cls, path: str | Path, *, spread: bool = False) -> Mesh:
         """A mesh file of any format that meshio reads; its groups become names.
 
+        spread: of "part.msh" or "part.npz" each process reads its share of the files part_1.msh,
+        part_2.msh, ..., as `gmsh -part_split` or `write(parts=...)` made them; there must be as
+        many as processes, or more.
         Raises MeshError where the file cannot be read or holds other cells than ours.
         """
         from softehl.runtime.mesh.files import read
+        from softehl.runtime.mesh.part_files import read_parts
 
-        return read(Path(path))
+        return read_parts(Path(path)) if spread else read(Path(path))
 
-    def write(self, path: str | Path) -> None:
+    def write(self, path: str | Path, *, parts: int | None = None) -> None:
         """Write the mesh in the format of the file name; Gmsh's .msh keeps the names.
 
-        Raises MeshError.
+        parts: into so many files of NumPy, part_1.npz, ... for "part.npz", each of which holds
+        cells that are close together, for `read(spread=True)`. Raises MeshError.
         """
         from softehl.runtime.mesh.files import write
+        from softehl.runtime.mesh.part_files import write_parts
 
-        write(self, Path(path))
+        if parts is None:
+            write(self, Path(path))
+        else:
+            write_parts(self, Path(path), parts)
 
     # another one from it ------------------------------------------------------------------------
 
@@ -163,7 +178,7 @@ class Mesh:
         for kind, nodes in self.cells.items():
             inside = _told(where, self.points[nodes].mean(axis=1), name)
             chosen[kind] = np.flatnonzero(inside)
-        if not any(map(len, chosen.values())):
+        if not self.anywhere(any(map(len, chosen.values()))):
             raise MeshError(f"group {name!r}: the predicate chooses no cell")
         return replace(self, groups={**self.groups, name: chosen})
 
@@ -188,6 +203,19 @@ class Mesh:
         """(n,) the same number for all copies of a node; see `split`."""
         return np.arange(len(self.points)) if self.numbers is None else self.numbers
 
+    def anywhere(self, something: object) -> bool:
+        """True if there is something, of a mesh in parts on any process."""
+        return bool(something) if self.piece is None else self.piece.anywhere(something)
+
+    def own(self, nodes: Integers) -> Integers:
+        """Nodes of these that are this process's own; all, where the mesh is whole."""
+        return nodes if self.piece is None else nodes[self.piece.owned[nodes]]
+
+    def require_whole(self, words: str) -> None:
+        """Raise MeshError where the mesh is in parts."""
+        if self.piece is not None:
+            raise MeshError(f"{words}: not for a mesh in parts; leave out spread=True")
+
     @cached_property
     def boundary(self) -> Faces:
         """Every face that belongs to one cell only."""
@@ -195,10 +223,14 @@ class Mesh:
         for kind, nodes in self.cells.items():
             for face, local in CELLS[kind].side_nodes:
                 found.setdefault(face.name, []).append(nodes[:, list(local)])
-        copies = self.numbers
-        return {
-            k: once(np.concatenate(parts), CELLS[k].corners, copies) for k, parts in found.items()
+        faces = {
+            k: once(np.concatenate(parts), CELLS[k].corners, self.numbers)
+            for k, parts in found.items()
         }
+        if self.piece is None:
+            return faces
+        cuts = self.piece.cuts
+        return {k: f[matched(f, cuts[k], CELLS[k].corners) < 0] for k, f in faces.items()}
 
     def faces(self, where: str | Predicate) -> Faces:
         """Faces of a named side, or those of the boundary all of whose nodes are meant.
@@ -241,14 +273,15 @@ class Mesh:
         """Numbers of the nodes of a side or group, or of those that are meant; sorted."""
         if callable(where):
             chosen = np.flatnonzero(_told(where, self.points, "the predicate"))
-            if not len(chosen):
+            if not self.anywhere(len(chosen)):
                 raise MeshError("the predicate chooses no node")
             return chosen
         if where in self.groups and where not in self.sides:
             parts = [self.cells[kind][chosen] for kind, chosen in self.groups[where].items()]
         else:
             parts = list(self.faces(where).values())
-        return np.unique(np.concatenate([part.ravel() for part in parts]))
+        found = np.unique(np.concatenate([part.ravel() for part in parts]))
+        return found if self.piece is None else self.piece.everywhere(found)
 
     def cells_of(self, group: str | None) -> Mapping[str, Integers]:
         """Kind -> node numbers (m, k) of the cells of a group, of all cells for None."""
@@ -271,18 +304,33 @@ class Mesh:
             )
         return nearest
 
+    def nodes_at(self, place: Array) -> Integers:
+        """The node at a place (dim,); of a mesh in parts none where it is on another process."""
+        if self.piece is None:
+            return np.array([self.node_at(place)])
+        self._require_place(place)
+        near = np.linalg.norm(self.points - place, axis=1) <= _NEAR * self._size
+        found = self.piece.everywhere(np.flatnonzero(near))
+        if not self.anywhere(len(found)):
+            raise MeshError(f"no node at {place_text(place)}, in any part of the mesh")
+        return found
+
     def locate(self, place: Array) -> tuple[Integers, Array]:
         """The nodes (k,) of the cell that holds a place (dim,), and their shape functions there.
 
         Raises MeshError if the place lies outside the mesh.
         """
-        self._require_place(place)
-        from softehl.runtime.mesh.cell_at import cell_at
-
-        found = cell_at(self.points, self.cells, place, _NEAR * self._size)
+        found = self.holding(place)
         if found is None:
             raise MeshError(f"{place_text(place)} lies outside the mesh")
         return found
+
+    def holding(self, place: Array) -> tuple[Integers, Array] | None:
+        """As `locate`; None where no cell, of a mesh in parts of this process, holds the place."""
+        self._require_place(place)
+        from softehl.runtime.mesh.cell_at import cell_at
+
+        return cell_at(self.points, self.cells, place, _NEAR * self._size)
 
     @cached_property
     def _size(self) -> float:
@@ -304,9 +352,10 @@ class Mesh:
     def _meant_faces(self, where: Predicate, name: str) -> Faces:
         inside = _told(where, self.points, name)
         found = {kind: faces[inside[faces].all(axis=1)] for kind, faces in self.boundary.items()}
-        if not any(map(len, found.values())):
+        there = {kind: faces for kind, faces in found.items() if self.anywhere(len(faces))}
+        if not there:
             raise MeshError(f"side {name!r}: no face of the boundary has all its nodes there")
-        return {kind: faces for kind, faces in found.items() if len(faces)}
+        return there
 
 
 def _told(where: Predicate, places: Array, name: str) -> Flags:

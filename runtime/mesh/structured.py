@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import permutations
+from dataclasses import replace
+from itertools import permutations, product
+from math import prod
 
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.cells import CELLS, lobatto
 from softehl.runtime.mesh.mesh import Mesh, MeshError
+from softehl.runtime.mesh.piece import joined
+from softehl.runtime.mpi import world
 
 KINDS = {
     (1, "quad"): ("line2", "line3", "line4", "line5", "line6", "line7"),
@@ -28,8 +32,15 @@ SIDES[3] = ("left", "right", "front", "back", "bottom", "top")
 """Names of the sides at the smallest and largest x, y and z."""
 
 
-def grid(size: Sequence[float], cells: int | Sequence[int], order: int, shape: str) -> Mesh:
-    """A line, rectangle or box from the origin.  Raises MeshError."""
+def grid(
+    size: Sequence[float],
+    cells: int | Sequence[int],
+    order: int,
+    shape: str,
+    *,
+    spread: bool = False,
+) -> Mesh:
+    """A line, rectangle or box from the origin; spread: this process's part.  Raises MeshError."""
     dimension = len(size)
     kind = _kind(dimension, order, shape)
     counts = tuple(cells) if isinstance(cells, Sequence) else (cells,)
@@ -37,12 +48,44 @@ def grid(size: Sequence[float], cells: int | Sequence[int], order: int, shape: s
         raise MeshError(f"cells = {cells}: {dimension} numbers of at least 1 are needed")
     if not all(np.isfinite(length) and length > 0 for length in size):
         raise MeshError(f"size = {tuple(size)}: lengths must be positive")
-    axes = [_axis(a, n, order) for a, n in zip(size, counts, strict=True)]
+    rank, processes = (world().rank, world().size) if spread else (0, 1)
+    spans = _span(counts, rank, processes)
+    axes = [
+        _axis(a, n, order)[order * first : order * last + 1]
+        for a, n, (first, last) in zip(size, counts, spans, strict=True)
+    ]
     points = np.stack([x.ravel(order="F") for x in np.meshgrid(*axes, indexing="ij")], axis=1)
-    nodes = _numbers(kind, counts, order)
+    nodes = _numbers(kind, [last - first for first, last in spans], order)
     used, renumbered = np.unique(nodes, return_inverse=True)
     mesh = Mesh(points[used], {kind: renumbered.reshape(nodes.shape).astype(np.int64)})
-    return Mesh(mesh.points, mesh.cells, sides=_sides(mesh, size))
+    mesh = replace(mesh, sides=_sides(mesh, size))
+    if processes == 1:
+        return mesh
+    here = np.unravel_index(used, [len(axis) for axis in axes], order="F")
+    strides = np.cumprod([1, *(order * n + 1 for n in counts[:-1])])
+    moved = [at + order * first for at, (first, _) in zip(here, spans, strict=True)]
+    return joined(mesh, np.stack(moved, axis=1) @ strides)
+
+
+def _span(counts: Sequence[int], rank: int, processes: int) -> list[tuple[int, int]]:
+    """First and last plane of the cells of a process along each axis.
+
+    The box is cut into equal boxes with the least area between them.
+    """
+    whole = [range(1, processes + 1)] * len(counts)
+    fit = [
+        cuts
+        for cuts in product(*whole)
+        if prod(cuts) == processes and all(c <= n for c, n in zip(cuts, counts, strict=True))
+    ]
+    if not fit:
+        raise MeshError(f"cells = {tuple(counts)}: too few to be cut for {processes} processes")
+    cuts = min(fit, key=lambda cuts: sum((c - 1) / n for c, n in zip(cuts, counts, strict=True)))
+    place = np.unravel_index(rank, cuts, order="F")
+    return [
+        (n * int(k) // c, n * (int(k) + 1) // c)
+        for k, c, n in zip(place, cuts, counts, strict=True)
+    ]
 
 
 def _axis(length: float, cells: int, order: int) -> Array:
@@ -111,8 +154,8 @@ def _simplex(kind: str, corners: Array) -> Array:
 def _sides(mesh: Mesh, size: Sequence[float]) -> dict[str, dict[str, Integers]]:
     """Faces at the smallest and largest coordinate of each axis."""
     if mesh.dimension == 1:
-        ends = (mesh.points[:, 0].argmin(), mesh.points[:, 0].argmax())
-        return {n: {"point1": np.array([[e]])} for n, e in zip(SIDES[1], ends, strict=True)}
+        ends = [np.flatnonzero(mesh.points[:, 0] == end) for end in (0.0, size[0])]
+        return {n: {"point1": e[:, None]} for n, e in zip(SIDES[1], ends, strict=True)}
     named = {}
     for k, name in enumerate(SIDES[mesh.dimension]):
         axis, bound = k // 2, (0.0, size[k // 2])[k % 2]

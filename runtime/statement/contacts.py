@@ -53,6 +53,7 @@ def touch(
 ) -> tuple[Touch, dict[str, Block]]:
     """A contact and the blocks of its sides.  Raises StudyError, MeshError."""
     words = f"contact({', '.join(shown(s) for s in sides if s is not None)})"
+    mesh.require_whole(words)
     if mesh.dimension not in KINDS:
         raise StudyError(f"{words}: contact is for meshes in 2-D and 3-D, this one is a line")
     usual = tuple(f"u_{axis}" for axis in "xyz"[: mesh.dimension])

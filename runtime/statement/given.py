@@ -83,13 +83,14 @@ def function(words: str, given: Callable[..., Any], *arguments: str) -> Callable
 def _real(words: str, value: object, places: Array | tuple[()]) -> Array:
     """One finite real number, or one for each place: () or (n,).  Raises StudyError."""
     found = np.asarray(value)
-    many = f", or ({len(places)},) of them" if len(places) else ""
+    shapes = [(), (len(places),)] if isinstance(places, np.ndarray) else [()]
+    many = f", or ({len(places)},) of them" if len(shapes) > 1 else ""
     if found.dtype.kind == "O":  # numbers of SymPy, say
         try:
             found = found.astype(np.float64)
         except (TypeError, ValueError):
             found = found.astype(str)
-    if found.dtype.kind not in "fiub" or found.shape not in ((), (len(places),) if many else ()):
+    if found.dtype.kind not in "fiub" or found.shape not in shapes:
         raise StudyError(
             f"{words}: one real number{many} is needed; given {found.dtype} of shape {found.shape}"
         )
@@ -122,10 +123,10 @@ def nodes_of(mesh: Mesh, where: Where) -> Integers:
         return mesh.nodes(where)
     given = np.asarray(where)
     if isinstance(where, tuple) or given.dtype.kind == "f":
-        return np.array([mesh.node_at(given)])
-    if given.dtype.kind not in "iu" or given.ndim != 1 or not given.size:
+        return mesh.nodes_at(given)
+    if given.dtype.kind not in "iu" or given.ndim != 1 or not mesh.anywhere(given.size):
         raise StudyError(f"{shown(where)}: node numbers are a list of integers")
-    if given.min() < 0 or given.max() >= len(mesh.points):
+    if given.size and not 0 <= given.min() <= given.max() < len(mesh.points):
         raise StudyError(f"node numbers go from 0 to {len(mesh.points) - 1}")
     if len(np.unique(given)) < len(given):
         raise StudyError(f"{shown(where)}: a node number stands twice")

@@ -68,7 +68,7 @@ def elements_of(mesh: Mesh, name: str, kernel: Kernel, on: On, cells: str | None
     if isinstance(on, np.ndarray):
         return "point1", _listed(mesh, name, kernel, on)
     if on is not None and kernel.nodes == 1:
-        return "point1", mesh.nodes(on)[:, None]
+        return "point1", mesh.own(mesh.nodes(on))[:, None]
     stem, _, facet = kernel.cell.partition("_")
     if facet and (on is None or stem not in mesh.cells):
         raise StudyError(

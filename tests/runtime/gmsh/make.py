@@ -75,6 +75,28 @@ def written(name: str, dimension: int, *, order: int = 1, **given: bool) -> None
         gmsh.write(str(HERE / f"{name}_{version}.msh"))
 
 
+def in_parts() -> None:
+    """A plate of two materials, whole and in three files, one for each partition."""
+    gmsh.clear()
+    gmsh.option.restoreDefaults()
+    gmsh.option.setNumber("General.Terminal", 0)
+    occ, model = gmsh.model.occ, gmsh.model
+    soft, hard = occ.addRectangle(0, 0, 0, 2, 1), occ.addRectangle(2, 0, 0, 1, 1)
+    occ.fragment([(2, soft)], [(2, hard)])
+    occ.synchronize()
+    model.addPhysicalGroup(2, [soft], 1, "soft")
+    model.addPhysicalGroup(2, [hard], 2, "hard")
+    for number, (name, x) in enumerate((("left", 0.0), ("middle", 2.0), ("right", 3.0)), start=1):
+        there = [t for d, t in model.getEntities(1) if abs(occ.getCenterOfMass(d, t)[0] - x) < 1e-9]
+        model.addPhysicalGroup(1, there, number, name)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 0.5)
+    model.mesh.generate(2)
+    gmsh.write(str(HERE / "parts_all.msh"))
+    model.mesh.partition(3)
+    gmsh.option.setNumber("Mesh.PartitionSplitMeshFiles", 1)
+    gmsh.write(str(HERE / "parts.msh"))
+
+
 if __name__ == "__main__":
     gmsh.initialize()
     written("square", 2)
@@ -84,4 +106,5 @@ if __name__ == "__main__":
     written("cube_tet10", 3, order=2)
     written("cube_hex20", 3, order=2, hexahedra=True, serendipity=True)
     written("cube_hex27", 3, order=2, hexahedra=True)
+    in_parts()
     gmsh.finalize()
