@@ -309,7 +309,7 @@ def test_a_wrong_kernel_is_caught_whichever_task_is_wrong(
     for task in ("energy", "residual", "tangent"):
         text = derived["spring.c"]
         start = text.index(f"softehl_spring_{task}")
-        wrong = text[:start] + text[start:].replace("* v", "* 1.0000001 * v", 1)
+        wrong = text[:start] + text[start:].replace("parameters[0]", "1.0000001 * parameters[0]", 1)
         assert wrong != text
         files = {**derived, "spring.c": wrong}
         folder, _ = library.compiled(files)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -214,10 +215,13 @@ def test_a_kernel_that_writes_its_arguments_is_seen(
 ) -> None:
     write(ALL["contact"](), tmp_path)
     source = tmp_path / "contact.c"
-    begin = "SOFTEHL_KERNEL(softehl_contact_residual)"
-    head, body = source.read_text().split(begin)
-    wrong = "{\n    ((double *)(size_t)dofs)[0] = 7.0, ((double *)(size_t)parameters)[0] = 7.0;"
-    source.write_text(f"{head}{begin}{body.replace('{', wrong, 1)}")
+    called = re.search(r"SOFTEHL_BATCH\(softehl_contact_residual,.*\)", source.read_text())
+    assert called
+    wrong = """SOFTEHL_KERNEL(softehl_contact_residual)
+{
+    ((double *)(size_t)dofs)[0] = 7.0, ((double *)(size_t)parameters)[0] = 7.0;
+}"""
+    source.write_text(source.read_text().replace(called[0], wrong))
     build.build(tmp_path, extra=("-O0",))
     assert written(load_kernel("contact", tmp_path), rng) == {"u", "parameters"}
 
