@@ -88,9 +88,10 @@ class Record:
     def too_small(self, step: float, smallest: float) -> None:
         """End because the last failure asks for a step below `smallest`; say what stands there."""
         here, failed = self.points[-1].parameter, self.failures[-1]
+        less = f"the next step would be {step:.2g}, smaller than {smallest:.2g}"
         words = (
-            f"reached {self.name} = {here:.9g}; the next step would be {step:.2g}, smaller than "
-            f"{smallest:.2g}; last attempt, at {failed.parameter:.9g}: "
+            f"reached {self.name} = {here:.9g}; {less if step else 'no shorter step is tried'}; "
+            f"last attempt, at {failed.parameter:.9g}: "
             f"{failed.solution.status.value} ({failed.solution.message})"
         )
         reason = failed.solution.status
