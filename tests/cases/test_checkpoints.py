@@ -7,10 +7,9 @@ import pytest
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.checkpoints import Checkpoint, Checkpoints
 from softehl.cases.seal.solve.contact import contact_problem
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
-from softehl.cases.seal.solve.contact_solver import ContactSolver
+from softehl.cases.seal.solve.contact_solver import Checkpoint, Checkpoints, ContactSolver
 from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.state import Silent
 

@@ -14,10 +14,10 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.adaptation import FITS, Adaptation, Adapted
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.film_layout import film_layout, misfit
-from softehl.cases.seal.solve.film_transfer import FilmTransfer
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
 from softehl.cases.seal.solve.method import DryContact, run
 from softehl.cases.seal.solve.path import PathDriver, StageFailed
+from softehl.cases.seal.solve.transfer import FilmTransfer
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.solution import Status

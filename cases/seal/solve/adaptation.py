@@ -14,9 +14,9 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.film_layout import film_layout, misfit
-from softehl.cases.seal.solve.film_transfer import FilmTransfer
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
 from softehl.cases.seal.solve.path import StageFailed
+from softehl.cases.seal.solve.transfer import FilmTransfer
 from softehl.cases.seal.states.estimate import coarser_density, system_at
 from softehl.cases.seal.states.verdict import FilmNumbers, fewest_inlet_segments
 from softehl.runtime.mesh.mesh import MeshError
