@@ -36,8 +36,8 @@ _AGAIN = 0.01
 """First step of a film that was carried to another mesh and is not found there at once, of T."""
 
 _POWER = 0.6
-"""A film is as thick as this power of U (`solve.inlet`): by it films at several speeds lie nearly on
-a line. A round ring's instroke takes six steps from 100 to 10 mm/s, and eleven in ln U."""
+"""A film is as thick as this power of U (`solve.inlet`): films at several speeds lie nearly on
+a line by it. A round ring's instroke takes six steps from 100 to 10 mm/s, and eleven in ln U."""
 
 _LEAST = 0.06
 """Least step on the way from the film at another speed, of the larger power. Of the smaller one
