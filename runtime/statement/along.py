@@ -42,6 +42,8 @@ def placed(
             f"{block!r}: along = {listed(form.along)}; {kernel.name} has {has} along "
             f"its elements{example}"
         )
+    renamed = [form.called[name] for name in interpolated(kernel) if name in form.called]
+    known("field", renamed, form.along, f"{block!r}: along")
     orders = _orders(block, kernel, form)
     names = list(orders) or names
     along = [f for name, order in orders.items() for f in _by_order(name, order)]

@@ -189,6 +189,10 @@ def test_elements_by_their_nodes_have_no_mass_by_density() -> None:
     ("given", "words"),
     [
         ({}, r"'line': along = none; diffusion has p along its elements, as in along=\{'p': 2"),
+        (
+            {"along": {"p": 2}, "called": {"p": "q"}, "rule": film_rule(2)},
+            r"'line': along has no field 'q'; it has p",
+        ),
         ({"along": {"q": 2}}, r"diffusion has no field 'q'; it has p"),
         ({"along": 2}, r"along = 2: a dict is needed, as in along="),
         ({"along": {"p": 2}, "rule": 4}, r"rule = 4: a rule is needed, as in rule=softehl.quad"),
