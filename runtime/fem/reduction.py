@@ -62,8 +62,8 @@ def concave(problem: Problem, K: csc_array) -> Flags:
     free[fixed] = False
     diagonal = K.diagonal()
     for part in layout.fields:
-        own = diagonal[part][free[part]] if free[part].any() else diagonal[part]
-        found[part] = bool((own <= 0.0).all())
+        own, held = diagonal[part], not free[part].any()
+        found[part] = bool((own < 0.0).all() if held else (own[free[part]] <= 0.0).all())
     others = abs(K) @ (~found).astype(np.float64)  # a fixed unknown is no other field
     found[fixed] = False
     others[_written(problem)] = 1.0
