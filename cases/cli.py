@@ -353,6 +353,8 @@ def design(
         raise BadInput(f"{read.case.name} has no sensitivities; allowed: a seal, such as oring")
     if page is not None:
         _require_page(page, "--report")
+        if not page.parent.is_dir():
+            raise BadInput(f"--report {str(page)!r}: there is no folder {str(page.parent)!r}")
     with make_display(read.case.foreword(read.parameters), quiet=False) as display:
         found = design_case(read.parameters, " ".join(words), key, ObserverAdapter(Teller(display)))
     for line in told(found):

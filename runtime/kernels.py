@@ -103,7 +103,10 @@ def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
     """The kernel family `name`; raises `KernelError` when it is missing or stale."""
     entries = manifest(directory)
     if name not in entries:
-        raise MissingKernelsError(f"no kernel {name!r}; there are {', '.join(entries)}")
+        raise MissingKernelsError(
+            f"no kernel {name!r}; there are {', '.join(entries)}; a model file ends in .py, and a "
+            "law by name is given as material=..."
+        )
     library = library_of(directory)
     try:
         return _kernel(name, entries[name], library)

@@ -21,7 +21,7 @@ import numpy as np
 from softehl.runtime.arrays import Integers
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.fit.fitted import Fitted
-from softehl.runtime.kernels import Kernel, Rule
+from softehl.runtime.kernels import Kernel
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.names import listed
@@ -29,6 +29,7 @@ from softehl.runtime.paths import Paths
 from softehl.runtime.statement import given as read
 from softehl.runtime.statement.along import require_apart
 from softehl.runtime.statement.contacts import touch
+from softehl.runtime.statement.forms import elements_on, form_of
 from softehl.runtime.statement.pages import (
     On,
     beside_of,
@@ -42,7 +43,6 @@ from softehl.runtime.statement.records import (
     Condition,
     Datum,
     Force,
-    Form,
     Start,
     Statement,
     StudyError,
@@ -79,13 +79,13 @@ class Study(Paths, Fitted):
         source: Source = None,
         *,
         material: Source = None,
-        on: On = None,
+        on: On | Sequence[Sequence[int]] = None,
         cells: str | None = None,
         model: str | None = None,
         shared: Sequence[str] = (),
         called: Mapping[str, str] | None = None,
         along: Mapping[str, int | Integers] | None = None,
-        rule: Rule | None = None,
+        rule: object = None,
         constant: bool = False,
         **given: Any,
     ) -> None:
@@ -100,13 +100,13 @@ class Study(Paths, Fitted):
         called: name of an unknown on the page -> its name in the study. along: fields that the page
         interpolates along its lines -> order of their polynomials, which have nodal unknowns at
         both ends of a line; or places (n, m) of their unknowns, counted from 0, which blocks share.
-        rule: of quadrature, instead of the
-        page's own. constant: the tangent does not depend on unknowns; it is evaluated once. given:
-        parameters of the page (numbers, or functions of the load factor) and its data (a number,
-        (n,) numbers or a function of the elements' centres (n, dim)). A page of fields on several
-        kinds of cells makes a block of each, "body:quad4", "body:tri3". Two are not given: `dt` is
-        the length of a step of `march`, `rate` comes from `Model.rates`. Raises StudyError,
-        MeshError, or what is wrong with the page.
+        rule: of quadrature, instead of the page's own, as in `softehl.quadrature.gauss(4, 1)`.
+        constant: the tangent does not depend on unknowns; it is evaluated once.
+        given: parameters of the page (numbers, or functions of the load factor) and its data (a
+        number, (n,) numbers or a function of the elements' centres (n, dim)). A page of fields on
+        several kinds of cells makes a block of each, "body:quad4", "body:tri3". Two are not given:
+        `dt` is the length of a step of `march`, `rate` comes from `Model.rates`.
+        Raises StudyError, MeshError, or what is wrong with the page.
         """
         blocks = self._statement.blocks
         if name in blocks:
@@ -117,7 +117,8 @@ class Study(Paths, Fitted):
         origin = Origin(
             material if law else source, model, geometry_of(self.mesh, self.geometry), law
         )
-        form = Form(frozenset(shared), called or {}, along or {}, rule, constant)
+        form = form_of(name, shared, called, along, rule, constant)
+        on = elements_on(name, on)
         kernels = self._kernels(origin, on, cells)
         for kernel in kernels:
             label = name if len(kernels) == 1 else f"{name}:{kernel.cell}"

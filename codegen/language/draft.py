@@ -36,7 +36,7 @@ class Draft:
         name: str,
         *,
         nodes: int,
-        rule: QuadratureRule,
+        rule: QuadratureRule | None = None,
         unroll: bool | None = None,
         doc: str | None = "",
     ) -> None:
@@ -47,6 +47,11 @@ class Draft:
         if len(name) > LONGEST:
             raise ModelError(
                 f"the name {name[:20]}... of a model has {len(name)} letters, allowed are {LONGEST}"
+            )
+        if rule is None:
+            raise ModelError(
+                f"{name} has no rule: give rule=quadrature.gauss(2, 2), say, or "
+                "rule=quadrature.point_rule() where there is no integral"
             )
         wrong = self._foreign(rule, nodes)
         if wrong:

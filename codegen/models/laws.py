@@ -21,10 +21,14 @@ from softehl.codegen.language.materials import (
     Energy,
 )
 
+_NEO_HOOKE = Energy({"mu": "shear modulus [MPa]"}, lambda I1, _, mu: mu / 2 * (I1 - 3))
+_POSITIVE = ("mu", "J_m", "lambda_m", "kappa")
+
 
 def _linear(m: Material, strain: Any) -> None:
     """lame / 2 (tr strain)^2 + G strain : strain."""
     E, nu = m.parameters(E="Young's modulus [MPa]", nu="Poisson's ratio, below 0.5")
+    m.require(E > 0, nu > -1, nu < 0.5)
     lame, G = E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 + 2 * nu)
     m.energy(lame / 2 * strain.trace() ** 2 + G * (strain.T * strain).trace())
 
@@ -35,11 +39,6 @@ def _hooke(m: Material) -> None:
 
 def _saint_venant(m: Material) -> None:
     _linear(m, m.green)
-
-
-def _neo_hooke(m: Material) -> None:
-    (mu,) = m.parameters(mu="shear modulus [MPa]")
-    _isochoric(m, Energy({}, lambda I1, _: mu / 2 * (I1 - 3)))
 
 
 def _of(energy: Energy) -> Callable[[Material], None]:
@@ -57,6 +56,8 @@ def _isochoric(m: Material, energy: Energy) -> None:
         I1 = m.define("I1", C.trace())
         W = term(I1, m.define("I2", (I1**2 - (C * C).trace()) / 2))
     m.energy(W + VOLUMETRIC.declared(m.model)(J**2))
+    given = (*energy.parameter_symbols(), *VOLUMETRIC.parameter_symbols())
+    m.require(*(symbol > 0 for symbol in given if str(symbol) in _POSITIVE))
 
 
 LAWS = {
@@ -64,7 +65,7 @@ LAWS = {
     for law in (
         Law("hooke", "Linear elasticity at small strain.", _hooke),
         Law("saint_venant", "Linear between Green's strain and its stress.", _saint_venant),
-        Law("neo_hooke", "mu / 2 (I1bar - 3).", _neo_hooke),
+        Law("neo_hooke", "mu / 2 (I1bar - 3).", _of(_NEO_HOOKE)),
         Law("mooney_rivlin", "mu_1 / 2 (I1bar - 3) + mu_2 / 2 (I2bar - 3).", _of(MOONEY_RIVLIN)),
         Law("yeoh", "A cubic in I1bar - 3.", _of(YEOH)),
         Law("gent", "Chains that lock.", _of(GENT)),
@@ -76,8 +77,11 @@ LAWS = {
 
 
 def law(name: str) -> Law:
-    """The law of a name, which may be written with hyphens.  Raises ValueError."""
-    found = LAWS.get(name.replace("-", "_"))
+    """The law of a name; capitals, hyphens and spaces do not count.  Raises ValueError."""
+    said = "".join(filter(str.isalpha, name.lower()))
+    found = next((LAWS[known] for known in LAWS if known.replace("_", "") == said), None)
     if found is None:
-        raise ValueError(f"no material is called {name!r}; there are {', '.join(LAWS)}, and files")
+        raise ValueError(
+            f"no material is called {name!r}; allowed: {', '.join(LAWS)}, or a file, my_law.py"
+        )
     return found

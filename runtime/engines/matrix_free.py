@@ -47,6 +47,14 @@ class MatrixFree:
     threads: int | None = None
     iterations: list[int] = field(default_factory=list)
 
+    def __post_init__(self) -> None:
+        """Raises StudyError for settings that no solution can meet."""
+        if not (0 < self.tolerance < 1 and self.most >= 1 and (self.threads or 1) >= 1):
+            raise StudyError(
+                f"MatrixFree(tolerance={self.tolerance!r}, most={self.most!r}, threads="
+                f"{self.threads!r}): allowed are 0 < tolerance < 1, most >= 1, threads >= 1 or None"
+            )
+
     def spread(self, system: System) -> System:
         """See `Engine`.  Raises StudyError for what it cannot solve."""
         system.mesh.require_whole(_WHO)

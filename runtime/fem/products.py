@@ -46,7 +46,7 @@ def require_product(block: ElementBlock) -> Kernel:
     raise NoProductError(
         f"block {block.name!r}: {name} has no product by sum factorisation; a page of fields has "
         "it on quadrilaterals and hexahedra, all its fields of the order of the cell, where it "
-        "says m.offer(product=True)"
+        "says m.offer(product=True); a law by name does not"
     )
 
 

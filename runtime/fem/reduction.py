@@ -58,12 +58,14 @@ def concave(problem: Problem, K: csc_array) -> Flags:
     """
     layout, fixed = problem.layout, problem.fixed
     found: Flags = np.zeros(layout.total, dtype=bool)
+    free = ~found
+    free[fixed] = False
     diagonal = K.diagonal()
-    diagonal[fixed] = 0.0
     for part in layout.fields:
-        found[part] = bool((diagonal[part] <= 0.0).all())
+        own, held = diagonal[part], not free[part].any()
+        found[part] = bool((own < 0.0).all() if held else (own[free[part]] <= 0.0).all())
+    others = abs(K) @ (~found).astype(np.float64)  # a fixed unknown is no other field
     found[fixed] = False
-    others = abs(K) @ (~found).astype(np.float64)
     others[_written(problem)] = 1.0
     for part in layout.fields:
         if not others[part].any():

@@ -32,7 +32,11 @@ def read(path: Path) -> Mesh:
 def content_of(path: Path) -> gmsh.Content:
     """Content of a mesh file.  Raises MeshError."""
     if not path.is_file():
-        raise MeshError(f"no mesh file {str(path)!r}")
+        split = path.with_name(f"{path.stem}_1{path.suffix}").is_file()
+        hint = f"; parts of it are there: Mesh.read({path.name!r}, spread=True)" if split else ""
+        raise MeshError(f"no mesh file {str(path)!r}{hint}")
+    if path.suffix == ".npz":
+        raise MeshError(f"{path}: one part of a mesh; all of them: Mesh.read(..., spread=True)")
     try:
         data = path.read_bytes() if path.suffix == ".msh" else b""
         return gmsh.parse(data) if b"$MeshFormat" in data else _by_meshio(path)
@@ -110,6 +114,8 @@ def write(mesh: Mesh, path: Path) -> None:
             f"{high[0]}: cells of order 3 and more cannot be written as a mesh, formats know no "
             "nodes of Gauss and Lobatto; write a result for pictures"
         )
+    if path.suffix == ".npz":
+        raise MeshError(f"write({path.name!r}): say how many files, as in parts=2; or write a .vtu")
     points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.dimension)))
     if path.suffix == ".msh":
         try:

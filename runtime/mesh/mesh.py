@@ -294,7 +294,7 @@ class Mesh:
 
     def node_at(self, place: Array) -> int:
         """Number of the node at a place (dim,).  Raises MeshError that names the nearest one."""
-        self._require_place(place)
+        place = self._placed(place)
         distance = np.linalg.norm(self.points - place, axis=1)
         nearest = int(distance.argmin())
         if distance[nearest] > _NEAR * self._size:
@@ -308,7 +308,7 @@ class Mesh:
         """The node at a place (dim,); of a mesh in parts none where it is on another process."""
         if self.piece is None:
             return np.array([self.node_at(place)])
-        self._require_place(place)
+        place = self._placed(place)
         near = np.linalg.norm(self.points - place, axis=1) <= _NEAR * self._size
         found = self.piece.everywhere(np.flatnonzero(near))
         if not self.anywhere(len(found)):
@@ -327,7 +327,7 @@ class Mesh:
 
     def holding(self, place: Array) -> tuple[Integers, Array] | None:
         """As `locate`; None where no cell, of a mesh in parts of this process, holds the place."""
-        self._require_place(place)
+        place = self._placed(place)
         from softehl.runtime.mesh.cell_at import cell_at
 
         return cell_at(self.points, self.cells, place, _NEAR * self._size)
@@ -336,9 +336,12 @@ class Mesh:
     def _size(self) -> float:
         return float(np.ptp(self.points, axis=0).max())
 
-    def _require_place(self, place: Array) -> None:
+    def _placed(self, given: Array) -> Array:
+        """A place as an array, which may be given as a tuple.  Raises MeshError."""
+        place = np.asarray(given, dtype=np.float64)
         if place.shape != (self.dimension,) or not np.isfinite(place).all():
             raise MeshError(f"a place has {self.dimension} coordinates, given {place.tolist()}")
+        return place
 
     def check(self) -> None:
         """Raise MeshError for a cell that is turned inside out: its number and place.

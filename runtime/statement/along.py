@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from softehl.runtime.arrays import Integers
-from softehl.runtime.fem.rules import automatic_points, film_rule, several
+from softehl.runtime.fem.rules import (
+    automatic_points,
+    gauss,
+    lagrange,
+    pressure_nodes,
+    several,
+)
 from softehl.runtime.fem.unknowns import Slot
 from softehl.runtime.kernels import Kernel, Rule
 from softehl.runtime.names import listed
+from softehl.runtime.statement.given import known
 from softehl.runtime.statement.records import Block, Form, StudyError
 
 
@@ -35,12 +42,17 @@ def placed(
             f"{block!r}: along = {listed(form.along)}; {kernel.name} has {has} along "
             f"its elements{example}"
         )
-    orders = _orders(block, kernel, form.along)
+    renamed = [form.called[name] for name in interpolated(kernel) if name in form.called]
+    known("field", renamed, form.along, f"{block!r}: along")
+    orders = _orders(block, kernel, form)
+    names = list(orders) or names
     along = [f for name, order in orders.items() for f in _by_order(name, order)]
     places = {} if orders else {n: _places(block, n, count, form.along[n]) for n in form.along}
     places = {name: places[name] for name in (*standing, *names) if name in places}
     widths = [orders[n] + 1 if orders else places[n].shape[1] for n in names]
-    rule = form.rule or (_rule(block, kernel, [w - 1 for w in widths]) if names else None)
+    rule = form.rule
+    if names and (rule is None or rule.basis is None):
+        rule = _rule(block, kernel, [w - 1 for w in widths], rule)
     functions = 0 if rule is None or rule.basis is None else rule.basis.shape[1]
     if names and functions != sum(widths):
         raise StudyError(
@@ -48,6 +60,11 @@ def placed(
             "functions"
         )
     return (*rest, *along), replace(form, along=places, rule=rule)
+
+
+def interpolated(kernel: Kernel) -> list[str]:
+    """Names of the fields that a page interpolates."""
+    return kernel.interpolated.split(", ") if kernel.interpolated else []
 
 
 def require_apart(block: Block, others: Iterable[Block]) -> None:
@@ -73,8 +90,12 @@ def _by_order(name: str, order: int) -> tuple[Slot, ...]:
     return (Slot(name, 0), *inner, Slot(name, 1))
 
 
-def _orders(block: str, kernel: Kernel, along: Mapping[str, int | Integers]) -> dict[str, int]:
-    """Orders of the fields; none where places are given.  Raises StudyError."""
+def _orders(block: str, kernel: Kernel, form: Form) -> dict[str, int]:
+    """Orders of the fields, as the page lists them; none where places are given.
+
+    Raises StudyError.
+    """
+    along = form.along
     orders = {n: given for n, given in along.items() if isinstance(given, int)}
     if orders and (len(orders) < len(along) or kernel.nodes < 2):
         raise StudyError(
@@ -84,19 +105,30 @@ def _orders(block: str, kernel: Kernel, along: Mapping[str, int | Integers]) -> 
     for name, order in orders.items():
         if order < 1:
             raise StudyError(f"{block!r}: along {name!r}: order {order}, must be at least 1")
-    return orders
+    fields = [form.called.get(name, name) for name in interpolated(kernel)]
+    if (form.rule and form.rule.basis is not None) or len(orders) != len(fields):
+        return orders
+    known("field", orders, fields, kernel.name)
+    return {name: orders[name] for name in fields}
 
 
-def _rule(block: str, kernel: Kernel, orders: Sequence[int]) -> Rule:
-    """Lagrange polynomials of these orders at Gauss points, which integrate products of them."""
-    fields = (kernel.interpolated or "").split(", ")
-    if len(fields) != len(orders) or min(orders) < 1:
+def _rule(block: str, kernel: Kernel, orders: Sequence[int], given: Rule | None) -> Rule:
+    """Lagrange polynomials of these orders at the points of a rule.
+
+    Left out, they are Gauss points which integrate products of them.
+    """
+    if len(interpolated(kernel)) != len(orders) or min(orders) < 1:
         raise StudyError(
             f"{block!r}: {kernel.name} interpolates {kernel.interpolated}: give an order for each "
             "of them, or the rule with their shape functions, rule=..."
         )
-    points = automatic_points(max(orders), "gauss")
-    rules = [film_rule(order, "gauss", points) for order in orders]
+    at = given or gauss(automatic_points(max(orders), "gauss"))
+    if at.points.shape[1:] != (1,):
+        raise StudyError(
+            f"{block!r}: the rule has points of {at.points.shape[1]} coordinates; a line has 1"
+        )
+    bases = [lagrange(pressure_nodes(order), at.points[:, 0]) for order in orders]
+    rules = [Rule(at.points, at.weights, basis) for basis in bases]
     return rules[0] if len(rules) == 1 else several(*rules)
 
 

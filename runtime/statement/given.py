@@ -69,7 +69,15 @@ class Rising:
 
     def __call__(self, t: float) -> float:
         """Raises StudyError."""
-        return float(_real(f"{self.words} at t = {t:g}", self.function(t), ()))
+        words = f"{self.words} at t = {t:g}"
+        try:
+            found = self.function(t)
+        except TypeError as error:  # a function of places, say
+            raise StudyError(
+                f"{words}: {error}; a parameter is a number or a function of the load factor or "
+                "time, one number that all elements of a block have"
+            ) from error
+        return float(_real(words, found, ()))
 
 
 def function(words: str, given: Callable[..., Any], *arguments: str) -> Callable[..., Any]:
@@ -109,7 +117,7 @@ def named(words: str, values: Mapping[str, object] | tuple[str, ...], example: s
 
 def known(what: str, given: Iterable[str], allowed: Iterable[str], of: str) -> None:
     """Raise StudyError for a name that is not among the allowed ones."""
-    names = list(allowed)
+    names = list(dict.fromkeys(allowed))
     for name in given:
         if name not in names:
             raise StudyError(

@@ -15,7 +15,7 @@ from softehl.runtime.kernels import Kernel, Rule
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.facets import beside, interior
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
-from softehl.runtime.statement.along import placed
+from softehl.runtime.statement.along import interpolated, placed
 from softehl.runtime.statement.given import datum, known, parameter
 from softehl.runtime.statement.records import Block, Form, StudyError
 
@@ -122,7 +122,7 @@ def page_on(
     _require_fit(mesh, kernel)
     found = slots(kernel)
     known("unknown", form.shared, [s.name for s in found if s.node is None], kernel.name)
-    known("unknown", form.called, [s.name for s in found], kernel.name)
+    known("unknown", form.called, [s.name for s in found] + interpolated(kernel), kernel.name)
     told = tuple(Slot(form.called.get(s.name, s.name), s.node) for s in found)
     form = replace(form, shared=frozenset(form.called.get(s, s) for s in form.shared))
     previous, rates, accelerations = _automatic(kernel, found, told)

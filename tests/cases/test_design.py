@@ -224,6 +224,10 @@ def test_a_design_is_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
 
 
 def test_a_page_of_a_design_is_html(capsys: pytest.CaptureFixture[str]) -> None:
-    typed = ["design", "oring", "friction -5%", "--by", "rod", "--report", "a.pdf"]
-    assert main(typed) == 2
+    typed = ["design", "oring", "friction -5%", "--by", "rod", "--report"]
+    assert main([*typed, "a.pdf"]) == 2
     assert "--report 'a.pdf': a report is a page" in capsys.readouterr().err
+    assert main([*typed, "none/a.html"]) == 2  # before it solves
+    assert capsys.readouterr().err == (
+        "softehl: --report 'none/a.html': there is no folder 'none'\n"
+    )

@@ -146,6 +146,13 @@ def test_a_model_whose_name_no_file_can_have(
     assert said.endswith("letters, allowed are 200\n")
 
 
+def test_a_model_without_a_rule(capsys: pytest.CaptureFixture[str]) -> None:
+    text = Path("mine.py").read_text()
+    assert ", rule=quadrature.point_rule()" in text
+    Path("mine.py").write_text(text.replace(", rule=quadrature.point_rule()", ""))
+    assert "has no rule: give rule=quadrature.gauss(2, 2), say, or" in refused(capsys, "mine.py")
+
+
 def test_a_file_whose_name_is_too_long(capsys: pytest.CaptureFixture[str]) -> None:
     long = "a" * 500
     assert len(refused(capsys, f"{long}.py")) < 200

@@ -184,6 +184,13 @@ def test_what_is_refused(tmp_path: Path) -> None:
         Mesh(mesh.points, {"quad4": mesh.cells["quad4"] + 1})
     with pytest.raises(MeshError, match="no mesh file"):
         Mesh.read(tmp_path / "missing.msh")
+    with pytest.raises(MeshError, match=r"say how many files, as in parts=2"):
+        mesh.write(tmp_path / "part.npz")
+    mesh.write(tmp_path / "part.npz", parts=2)
+    with pytest.raises(MeshError, match=r"parts of it are there: .*'part.npz', spread=True"):
+        Mesh.read(tmp_path / "part.npz")
+    with pytest.raises(MeshError, match=r"part_1.npz: one part of a mesh; all of them"):
+        Mesh.read(tmp_path / "part_1.npz")
     quads = mesh.cells["quad4"]
     with pytest.raises(MeshError, match=r"1 of 7 quad4 have the nodes of one before.*number 6"):
         Mesh(mesh.points, {"quad4": np.vstack([quads, quads[:1, [1, 2, 3, 0]]])}).check()

@@ -165,6 +165,8 @@ def test_what_it_cannot_solve_is_refused() -> None:
 def test_too_few_iterations_are_said() -> None:
     with pytest.raises(NotConverged, match="no linear solution after 2 iterations"):
         block(2, 0.3).solve(engine=MatrixFree(most=2))
+    with pytest.raises(StudyError, match="allowed are 0 < tolerance < 1, most >= 1"):
+        MatrixFree(tolerance=-1.0)
 
 
 def test_algebraic_multigrid_below(monkeypatch: pytest.MonkeyPatch) -> None:

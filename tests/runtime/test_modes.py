@@ -236,6 +236,14 @@ def test_a_column_beyond_its_load_is_not_silent() -> None:
     assert np.isnan(modes.frequencies[0])
 
 
+def test_a_body_of_negative_stiffness_is_unstable_along_all_its_unknowns() -> None:
+    study = Study(Mesh.rectangle(1.0, 1.0, cells=(2, 2)))
+    study.add("body", rubber, mu=-1.0, lame=-1.0)
+    study.fix("left", u_x=0, u_y=0)  # held nodes are no other field: nothing is a multiplier
+    with pytest.warns(Unstable, match="12 independent directions"):
+        assert at_rest(study).unstable == 12
+
+
 def test_ties_and_pressures_are_not_taken_for_instabilities() -> None:
     study = column(mixed, mu=YOUNG / 2, K=2 * YOUNG)
     assert at_rest(study).unstable == 0

@@ -302,6 +302,11 @@ MISTAKES: list[tuple[str, Callable[[Any], object], str]] = [
         "'b': mu: a function of (t) is needed, this one takes (x, t)",
     ),
     (
+        "a parameter of places",
+        lambda s: [s.add("b", pages.solid(), **{**SOLID, "mu": lambda x: x[:, 0]}), s.solve()],
+        "is not subscriptable; a parameter is a number or a function of the load factor or time",
+    ),
+    (
         "arguments of a predicate",
         lambda s: s.fix(lambda x, y: x == 0, u_x=0.0),
         "a function of (x) is needed, this one takes (x, y)",

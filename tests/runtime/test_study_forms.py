@@ -189,6 +189,16 @@ def test_elements_by_their_nodes_have_no_mass_by_density() -> None:
     ("given", "words"),
     [
         ({}, r"'line': along = none; diffusion has p along its elements, as in along=\{'p': 2"),
+        (
+            {"along": {"p": 2}, "called": {"p": "q"}, "rule": film_rule(2)},
+            r"'line': along has no field 'q'; it has p",
+        ),
+        ({"along": {"q": 2}}, r"diffusion has no field 'q'; it has p"),
+        ({"along": 2}, r"along = 2: a dict is needed, as in along="),
+        ({"along": {"p": 2}, "rule": 4}, r"rule = 4: a rule is needed, as in rule=softehl.quad"),
+        ({"along": {"p": 2}, "rule": quadrature.gauss(2, 2)}, r"the rule has points of 2"),
+        ({"along": {"p": 2}, "called": {"p": 3}}, r"names are text"),
+        ({"along": {"p": 2}, "on": [[0, 1], [1]]}, r"elements have the same number of nodes"),
         ({"along": {"p": 0}}, r"along 'p': order 0, must be at least 1"),
         ({"along": {"p": np.array([[0, 1], [1, -1]])}}, r"along 'p': places are counted from 0"),
         ({"along": {"p": 2, "q": np.eye(2)}}, r"along = p, q: orders for all of them, on lines"),
@@ -232,3 +242,18 @@ def test_a_page_without_a_field_along_it_is_told() -> None:
     with pytest.raises(StudyError, match=r"along = p; rope has none along its elements"):
         line().add("rope", rope(), along={"p": 2}, k=1.0)
     assert load_kernel("film").interpolated == "p"
+
+
+def test_a_rule_of_a_page_and_lists_of_nodes_serve_a_field_under_another_name() -> None:
+    study = line()
+    given: dict[str, Any] = {
+        "on": [[0, 1], [1, 2]],
+        "along": {"q": 3},
+        "called": {"p": "q"},
+        "c": 1.0,
+    }
+    study.add("line", diffusion(), rule=quadrature.gauss(5, 1), **given)
+    found = study.solve().fields("line")
+    assert found["x"].shape == (2, 5)
+    x = found["x"]
+    assert found["p"] == pytest.approx(x**2 * (3 - 2 * x), abs=1e-12)
