@@ -109,9 +109,19 @@ class Hand:
         return found
 
     def click(self, css: str, words: str) -> None:
-        """Click on what has these words."""
-        self.until(lambda: words in self.texts(css))
-        next(e for e in self.all(css) if e.text == words).click()
+        """Click on what has these words, as soon as it stands still."""
+        self.until(lambda: self._clicked(css, words))
+
+    def _clicked(self, css: str, words: str) -> bool:
+        from selenium.common.exceptions import StaleElementReferenceException
+
+        try:
+            found = [e for e in self.all(css) if e.text == words]
+            for element in found[:1]:
+                element.click()
+        except StaleElementReferenceException:  # a list is drawn anew for each letter
+            return False
+        return bool(found)
 
     def type(self, number: int, words: str) -> None:
         """Type into a field in place of what it holds."""
