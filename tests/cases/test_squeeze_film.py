@@ -97,10 +97,10 @@ def test_what_holds_no_length_of_the_rod_has_no_pressure_of_its_own(dry: DryCont
 
 
 @pytest.mark.parametrize("viscosity", [P.viscosity, 1e-11], ids=["usual", "thin"])
-def test_the_first_step_changes_the_film_by_less_than_a_linearisation_bears(
+def test_the_first_step_holds_the_film_where_it_is(
     dry: DryContact, squeeze_film: SqueezeFilm, viscosity: float
 ) -> None:
-    """1 is what it bears. Also of an oil whose film is a thousand times thinner than the gap."""
+    """Also of an oil whose film is a thousand times thinner than the gap of the contact."""
     p = P.model_copy(update={"viscosity": viscosity})
     system, start = dry.system.moved(p, dry.system.section), pressed_film(dry.system, dry.x, 3.0)
     scales = InletScales.of(system, "out", 400.0, dry.x)
@@ -109,9 +109,9 @@ def test_the_first_step_changes_the_film_by_less_than_a_linearisation_bears(
     steps, first = FilmCorrectors.of(system, dry.newton).steps(), begun.first
     found = steps.solve(begun.step(start, first, 0.0), start)
     assert found.converged, found.message
-    assert 0.0 < begun.change(start, found.x) < 1.0
+    assert 0.0 < begun.change(start, found.x) < 0.3
     longer = steps.solve(begun.step(start, 1e5 * first, 0.0), start)
-    assert not longer.converged or begun.change(start, longer.x) > 1.0
+    assert not longer.converged or begun.change(start, longer.x) > 0.3
 
 
 def test_a_rod_that_nothing_touches_has_no_film(dry: DryContact) -> None:
