@@ -34,9 +34,9 @@ EXPONENT = 1.5
 """a of the local time steps. On X-rings at the slowest speed 1 found no film and 2 was as good."""
 
 FIRST, ROUGH = 1e-3, 0.1
-"""First step, of T, where contact leaves a gap as thin as the film; a thicker one flows sooner. With
-0.1 two films of a round ring are not found. The second is for rough surfaces, where a U-cup has
-no outstroke from 1e-3, and the same film from 1e-2, 0.1 and 1."""
+"""First step, of T, where contact leaves a gap as thin as the film; a thicker one flows sooner.
+With 0.1 two films of a round ring are not found. The second is for rough surfaces, where a U-cup
+has no outstroke from 1e-3, and the same film from 1e-2, 0.1 and 1."""
 
 _NO_WIDTH = 1e-6
 """Of the widest part of the arc around a node, below which it is between segments on a wall."""
