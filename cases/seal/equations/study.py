@@ -59,7 +59,7 @@ def seal_study(p: Seal, section: SealSection, blocks: Sequence[Block]) -> Study:
             along={f: places[block.elements] for f in block.fields if _ON[f] == "film"},
             rule=block.rule(p) if block.rule else None,
             constant=block.constant,
-            **given | _contact_constants(p, section, block),
+            **given | _contact_constants(p, section, block, kernel.data),
         )
     return study
 
@@ -75,11 +75,13 @@ def _film_places(p: Seal, section: SealSection) -> Mapping[str, Integers]:
     return {"arc": arc, "facets": facets, "film_nodes": np.arange(arc.max() + 1)[:, None]}
 
 
-def _contact_constants(p: Seal, section: SealSection, block: Block) -> dict[str, Array]:
-    """Constants (n,) of contact elements; none of other blocks."""
+def _contact_constants(
+    p: Seal, section: SealSection, block: Block, names: Sequence[str]
+) -> dict[str, Array]:
+    """Constants (n,) of contact elements by these names; none of other blocks."""
     if block.group != "contact":
         return {}
-    chain, names = section.chains[block.elements], load_kernel(block.kernel_of(p)).data
+    chain = section.chains[block.elements]
     stiffness, obstacle = section.node_moduli(p)[chain[0]], obstacles_of(p)[block.name]
     values = contact_data(obstacle, section.mesh.points, *chain, stiffness)
     known = dict(zip(("n_z", "n_r", "c", "area", "rho"), values.T, strict=True))

@@ -18,7 +18,6 @@ from softehl.cases.seal.solve.path import Stage
 from softehl.cases.seal.solve.pressure_newton import PressureNewton
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.kernels import load_kernel
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
 from softehl.runtime.solve.steps import StepRule
 
@@ -180,6 +179,4 @@ def path_corrector(system: SealSystem, newton: Newton) -> Corrector | None:
     p = system.parameters
     if p.solver != "auto" or p.rubs:
         return None
-    return PressureNewton(
-        newton, system.solids, load_kernel("follower_pressure"), system.bulk_moduli
-    )
+    return PressureNewton(newton, system)

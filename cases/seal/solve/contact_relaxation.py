@@ -16,9 +16,8 @@ from scipy.sparse import csc_array, diags_array
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.solve.contact import contact_problem
-from softehl.cases.seal.solve.pressure_newton import lagged
+from softehl.cases.seal.solve.pressure_newton import PressureNewton
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.lagged_pressure import element_pressures
 from softehl.runtime.fem.mass import lumped, mass_matrices
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.relaxed import Anchored
@@ -68,29 +67,6 @@ class Creeping:
         return springs
 
 
-@dataclass(eq=False)
-class CreepNewton:
-    """Newton's method for the steps of `Creeping`.
-
-    pressures: (Q,) of the elements, None until the first step; they change with every step.
-    """
-
-    system: SealSystem
-    newton: Newton
-    pressures: Array | None = None
-
-    def solve(self, problem: Anchored, x0: Array) -> Solution:
-        """See `Corrector`."""
-        solids, pressures = self.system.solids, self.pressures
-        if pressures is None:
-            pressures = element_pressures(problem.problem, solids, x0)
-        held = replace(problem, problem=lagged(self.system, problem.problem, pressures))
-        found = self.newton.solve(held, x0)
-        if found.converged:
-            self.pressures = element_pressures(problem.problem, solids, found.x)
-        return found
-
-
 @dataclass(frozen=True, eq=False)
 class CreepCorrector:
     """Contact under p_s from a state under any pressure: in time, then by Newton's method."""
@@ -101,13 +77,12 @@ class CreepCorrector:
     def solve(self, problem: Problem, x0: Array) -> Solution:
         """See `Corrector`."""
         settings = replace(self.newton, tolerance=_TOLERANCE, stagnation=1.0)
-        steps = PseudoTransient(CreepNewton(self.system, settings), last=LAST)
+        steps = PseudoTransient(PressureNewton(settings, self.system), last=LAST)
         branch, reached = steps.follow(Creeping(self.system), Moment(x0, FIRST, 1.0))
         made, spent = branch.factorisations, branch.iterations
         if not branch.converged:
             return Solution(x0, branch.status, branch.message, (), made, spent)
-        pressures = element_pressures(problem, self.system.solids, reached.x)
-        end = self.newton.solve(lagged(self.system, problem, pressures), reached.x)
+        end = PressureNewton(self.newton, self.system).solve(problem, reached.x)
         return replace(
             end,
             iterations=end.iterations + spent,

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.assembly import ElementKernel
 from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.relaxed import Anchored
 from softehl.runtime.kernels import load_kernel
-from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.newton import Newton, NonlinearProblem
 from softehl.runtime.solve.solution import Solution
 
 
@@ -26,27 +26,27 @@ class PressureNewton:
 
     A predictor of continuation spoils volume ratios like any interpolation: with the pressures of
     the last solution, steps are as long as those of a compressible solid. `pressures`, (Q,), None
-    until the first solve, changes with every solution; the rest are settings: solids, follower and
-    stiffness as of `LaggedPressure.of`.
+    until the first solve, changes with every solution; the rest are settings.
     """
 
     newton: Newton
-    solids: tuple[str, ...]
-    follower: ElementKernel
-    stiffness: Array
+    system: SealSystem
     pressures: Array | None = None
 
-    def solve(self, problem: Problem, x0: Array) -> Solution:
-        """Solve R(x) = 0 from x0, (n,)."""
-        pressures = self.pressures
-        if pressures is None:
-            pressures = element_pressures(problem, self.solids, x0)
-        lagged = LaggedPressure.of(problem, self.solids, self.follower, pressures, self.stiffness)
-        solution = self.newton.solve(lagged, x0)
+    def solve(self, problem: Problem | Anchored, x0: Array) -> Solution:
+        """Solve R(x) = 0 from x0, (n,); of an anchored problem the one within is lagged."""
+        bare = problem.problem if isinstance(problem, Anchored) else problem
+        if self.pressures is None:
+            self.take_up(bare, x0)
+        assert self.pressures is not None
+        held: NonlinearProblem = lagged(self.system, bare, self.pressures)
+        if isinstance(problem, Anchored):
+            held = replace(problem, problem=held)
+        solution = self.newton.solve(held, x0)
         if solution.converged:
-            self.pressures = element_pressures(problem, self.solids, solution.x)
+            self.take_up(bare, solution.x)
         return solution
 
     def take_up(self, problem: Problem, x: Array) -> None:
         """Go on from a solution (n,) that another corrector found; see `Informed`."""
-        self.pressures = element_pressures(problem, self.solids, x)
+        self.pressures = element_pressures(problem, self.system.solids, x)
