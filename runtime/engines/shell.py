@@ -32,14 +32,15 @@ from softehl.runtime.solve.multigrid import DEGREE
 class Shell:
     """The tangent of a problem that is spread over processes; see `engines.matrix.Tangent`.
 
-    held: (k,) whether an own unknown is prescribed. local: the part of this process's elements.
-    matrix: PETSc's. own: (k,) the diagonal.
+    held: (k,) whether an own unknown is prescribed. ties: what moves, where there are none. local:
+    the part of this process's elements. matrix: PETSc's. own: (k,) the diagonal.
     """
 
     problem: Problem
     levels: Levels
     exchange: Exchange
     held: Flags = field(init=False)
+    ties: Ties = field(init=False)
     local: alone.Tangent = field(init=False)
     matrix: Any = field(init=False)
     own: Array = field(init=False)
@@ -47,6 +48,7 @@ class Shell:
     def __post_init__(self) -> None:
         """An empty shell."""
         self.held = np.isin(self.exchange.owned, self.problem.fixed)
+        self.ties = Ties.of(self.problem, self.levels.unknowns)
         sizes = self.exchange.vector.getSizes()
         self.matrix = petsc().Mat().createPython((sizes, sizes), self, comm=world())
         self.matrix.setUp()
@@ -62,8 +64,8 @@ class Shell:
         """Evaluate all elements at x, (m,); their residuals with K times defect taken off, (m,)."""
         began, problem = time.perf_counter(), self.problem
         r = assembler.residual(x, parameters)
-        ties = Ties.of(problem, self.levels.unknowns)
-        self.local = alone.Tangent.of(problem, self.levels, alone.Iteration(0.0, 0), ties, x)
+        once = alone.Iteration(0.0, 0)
+        self.local = alone.Tangent.of(problem, self.levels, once, self.ties, x)
         self.own = self.exchange.added(self.local.diagonals)
         if defect.any():
             r -= self.local.times(defect)
