@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.marked import renew
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.reach import ratio
 from softehl.cases.seal.solve.method import run
@@ -199,12 +200,10 @@ def main() -> None:
                 path = options.folder / f"{kind}_{number}.json"
                 solved(reference(given, times), path, options.limit)
     text = tables(options.folder, options.count)
-    if options.page is None:
+    if options.page:
+        renew(options.page, "verdicts", text)
+    else:
         print(text)
-        return
-    before, _, rest = options.page.read_text(encoding="utf-8").partition("<!-- verdicts -->\n")
-    _, _, after = rest.partition("<!-- end -->")
-    options.page.write_text(f"{before}<!-- verdicts -->\n{text}\n<!-- end -->{after}", "utf-8")
 
 
 if __name__ == "__main__":

@@ -2,9 +2,11 @@
 
     python -m benchmarks.glands FILE --source CHECKOUT/src [--limit N] [--first K] [--timeout S]
     python -m benchmarks.glands --compare OLD NEW
+    python -m benchmarks.glands FILE --page PAGE
 
 Each seal is a run of the command line in a process of its own. FILE gets a line of JSON for each as
-soon as it has ended; seals that FILE has are not run again.
+soon as it has ended; seals that FILE has are not run again. --page writes the table of FILE between
+the marks of a page of the documentation.
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.glands import STATES, Drawn, sample
-from benchmarks.glands.table import comparison, read
+from benchmarks.glands.table import comparison, read, results
+from benchmarks.marked import renew
 
 RUN = ("-m", "softehl", "run", "seal.toml", "--out", "out", "--quiet", "--pictures", "none")
 SHORT = {"case": "oring", "density": 1, "speeds": [800.0], "stroke": "out", "error_estimate": False}
@@ -102,12 +105,16 @@ def main() -> None:
     parser.add_argument("--first", type=int, help="only the first K seals of the sample")
     parser.add_argument("--timeout", type=float, default=240.0, help="seconds of CPU for a seal")
     parser.add_argument("--compare", type=Path, nargs=2, metavar=("OLD", "NEW"))
+    parser.add_argument("--page", type=Path, help="page of the documentation to renew")
     given = parser.parse_args()
     if given.compare:
         print(comparison(*(read(file) for file in given.compare)))
         return
+    if given.file and given.page:
+        renew(given.page, "glands", results(read(given.file)))
+        return
     if not given.file or not given.source:
-        parser.error("give FILE and --source, or --compare OLD NEW")
+        parser.error("give FILE with --source or --page, or --compare OLD NEW")
     have = read(given.file) if given.file.exists() else {}
     prepare(given.source)
     missing = (seal for seal in islice(sample(), given.first) if seal.name not in have)

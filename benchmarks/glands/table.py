@@ -1,21 +1,25 @@
-"""The comparison of two runs of the sample of seals, in Markdown."""
+"""Tables of a run of the sample of seals, and of two runs side by side, in Markdown."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from operator import itemgetter
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, TypeVar
 
 Run = dict[str, Any]
 Runs = dict[str, Run]
+Row = TypeVar("Row", bound=tuple[Run, ...])
+"""A run, or the same seal with two programs."""
 
 MISSING = {"verdict": "not reached", "h_star_um": math.nan}
 LARGEST = 0.5  # % between two h* that count as equal
 GROUPS = "| seals | number | states | `ok` old | `ok` new | CPU old, s | CPU new, s |"
+RESULTS = "| seals | number | states | reached | `ok` | share | the others | CPU, s: median, most |"
 STATES = "| seal | p_s / mu | U, mm/s | old | new | h\\* old, um | new | % |"
 
 
@@ -44,17 +48,43 @@ def head(columns: str) -> list[str]:
     return [columns, "|---" * (columns.count("|") - 1) + "|"]
 
 
+def results(runs: Runs) -> str:
+    """What one program reached: by p_s / mu, by section, and all."""
+    lines = [
+        result(name, [run for (run,) in some])
+        for name, some in grouped([(run,) for run in runs.values()])
+    ]
+    return "\n".join([*head(RESULTS), *lines])
+
+
+def result(name: str, runs: Sequence[Run]) -> str:
+    """A line of that table: the seals of a group."""
+    asked, ok = (sum(run[key] for run in runs) for key in ("asked", "ok"))
+    verdicts = Counter(state["verdict"] for run in runs for state in run["states"].values())
+    others = ", ".join(
+        f"{n} `{verdict}`" for verdict, n in sorted(verdicts.items()) if verdict != "ok"
+    )
+    times = [run["cpu_s"] for run in runs]
+    share = f"{asked} | {verdicts.total()} | {ok} | {100.0 * ok / asked:.1f} %"
+    return f"| {name} | {len(runs)} | {share} | {others} | {median(times):.0f}, {max(times):.0f} |"
+
+
 def groups(pairs: list[tuple[Run, Run]]) -> Iterator[str]:
-    """Lines of the first table: by p_s / mu, by section, and all."""
+    """Lines of the first table of a comparison."""
+    for name, some in grouped(pairs):
+        asked = sum(a["asked"] for a, _ in some)
+        ok = " | ".join(str(sum(pair[k]["ok"] for pair in some)) for k in (0, 1))
+        cpu = " | ".join(f"{median(pair[k]['cpu_s'] for pair in some):.1f}" for k in (0, 1))
+        yield f"| {name} | {len(some)} | {asked} | {ok} | {cpu} |"
+
+
+def grouped(rows: list[Row]) -> Iterator[tuple[str, list[Row]]]:
+    """Runs, or pairs of them, by p_s / mu, by section, and all."""
     for group in (pressure, itemgetter("section"), lambda _: "all"):
-        found: dict[str, list[tuple[Run, Run]]] = {}
-        for pair in pairs:
-            found.setdefault(group(pair[0]), []).append(pair)
-        for name, some in sorted(found.items()):
-            asked = sum(a["asked"] for a, _ in some)
-            ok = " | ".join(str(sum(pair[k]["ok"] for pair in some)) for k in (0, 1))
-            cpu = " | ".join(f"{median(pair[k]['cpu_s'] for pair in some):.1f}" for k in (0, 1))
-            yield f"| {name} | {len(some)} | {asked} | {ok} | {cpu} |"
+        found: dict[str, list[Row]] = {}
+        for row in rows:
+            found.setdefault(group(row[0]), []).append(row)
+        yield from sorted(found.items())
 
 
 def pressure(run: Run) -> str:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from benchmarks.glands import sample
-from benchmarks.glands.table import comparison
+from benchmarks.glands.table import comparison, results
+from benchmarks.marked import renew
 
 
 def test_the_first_half_has_the_kinds_and_pressures_in_proportion() -> None:
@@ -41,3 +43,17 @@ def test_a_comparison_counts_states_and_names_those_that_differ() -> None:
 def test_seals_of_another_draw_are_not_compared() -> None:
     with pytest.raises(SystemExit, match="other keys"):
         comparison({"a": line("ok", 1.0)}, {"a": line("ok", 1.0, keys={"density": 4})})
+
+
+def test_the_table_of_a_program_counts_what_it_reached(tmp_path: Path) -> None:
+    runs = {"a": line("ok", 1.0), "b": line("uncertain", 1.0, section="x_ring", cpu_s=9.6)}
+    table = results(runs)
+    assert "| round | 1 | 2 | 1 | 1 | 50.0 % |  | 4, 4 |" in table
+    assert "| all | 2 | 4 | 2 | 1 | 25.0 % | 1 `uncertain` | 7, 10 |" in table
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- glands -->\nold\n<!-- end -->\nafter\n", encoding="utf-8")
+    renew(page, "glands", table)
+    assert page.read_text(encoding="utf-8").startswith("before\n<!-- glands -->\n| seals | number")
+    assert page.read_text(encoding="utf-8").endswith(" |\n<!-- end -->\nafter\n")
+    with pytest.raises(SystemExit, match="has no lines <!-- other -->"):
+        renew(page, "other", table)

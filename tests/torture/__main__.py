@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from benchmarks.marked import renew
 from tests.mpi.test_engine import mpiexec
 from tests.torture.trials import (
     CASE,
@@ -305,11 +306,7 @@ def main() -> int:
         for failure in tally.failures:
             print(f"  {failure}", flush=True)
     if len(sys.argv) > 2:
-        page = Path(sys.argv[2])
-        before, _, rest = page.read_text().partition("<!-- table -->\n")
-        _, _, after = rest.partition("<!-- end -->")
-        table = "\n".join(lines(tallies))
-        page.write_text(f"{before}<!-- table -->\n{table}\n\n<!-- end -->{after}")
+        renew(Path(sys.argv[2]), "table", "\n".join([*lines(tallies), ""]))
     return int(any(tally.failures for tally in tallies))
 
 
