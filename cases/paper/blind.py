@@ -9,7 +9,7 @@ from softehl.cases.paper.checks import LETTERS, observed_order
 from softehl.cases.paper.curves import ORDERS
 from softehl.cases.paper.item import STUDY_DENSITIES, Item, Product, Scope, Table
 from softehl.cases.paper.states import PAPER, STABILISED, Request, State, Store, ask, setup
-from softehl.cases.seal.gland.parameters import DENSITIES
+from softehl.cases.seal.gland.records.discretisation import DENSITIES
 from softehl.runtime.io import Cell
 
 # --- Sec. 5.2: the largest pressure jump for each density and order -----------------------------

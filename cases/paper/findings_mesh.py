@@ -9,7 +9,7 @@ from math import isfinite
 from softehl.cases.paper.checks import observed_order
 from softehl.cases.paper.curves import ORDERS
 from softehl.cases.paper.query import Finding, Measure, Query, counted, difference, numbers, ripple
-from softehl.cases.seal.gland.parameters import DENSITIES
+from softehl.cases.seal.gland.records.discretisation import DENSITIES
 
 VISIBLE = 0.05
 """Oscillation index that can be seen in a diagram: a zigzag of 1.25 % of h."""

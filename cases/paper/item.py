@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from softehl.cases.paper.states import SPEEDS, Request, State, Store
-from softehl.cases.seal.gland.parameters import DENSITIES, Seal
+from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.discretisation import DENSITIES
 from softehl.runtime.io import Cell
 
 if TYPE_CHECKING:  # imported late: matplotlib is slow to import

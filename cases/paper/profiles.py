@@ -18,7 +18,7 @@ from softehl.cases.paper.item import (
     state_table,
 )
 from softehl.cases.paper.states import Request, State, Store, ask, setup
-from softehl.cases.seal.gland.parameters import DENSITIES
+from softehl.cases.seal.gland.records.discretisation import DENSITIES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,8 @@ import numpy as np
 from softehl.cases.paper.item import Item, Product, Scope, Table, density_words
 from softehl.cases.paper.states import SPEEDS, Request, Store, ask, setup
 from softehl.cases.seal.equations.equations import build_system
-from softehl.cases.seal.gland.parameters import DENSITIES, Seal
+from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.discretisation import DENSITIES
 from softehl.runtime.io import number_text
 
 if TYPE_CHECKING:

@@ -9,7 +9,8 @@ from typing import Any, Literal
 import pytest
 
 from softehl.cases.harness.row import OK
-from softehl.cases.seal.gland.parameters import DENSITIES, Seal
+from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.discretisation import DENSITIES
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.estimate import (
     ORDER,

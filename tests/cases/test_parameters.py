@@ -1,5 +1,6 @@
 """The parameter set of the O-ring: Table 1, limits, case files and `--set`."""
 
+from inspect import get_annotations
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,12 @@ TABLE_1 = {
     "pressure_viscosity": 0.02,
     "cavitation_penalty": 1.0e4,
 }
+
+
+def test_a_key_is_declared_by_one_record() -> None:
+    """A second one would hide the first without a word."""
+    declared = [k for kind in Seal.__mro__ for k in get_annotations(kind)]
+    assert [k for k in Seal.model_fields if declared.count(k) != 1] == []
 
 
 def test_defaults_are_table_1() -> None:

@@ -13,7 +13,7 @@ from softehl.cases.harness.row import OK
 from softehl.cases.oring import CASE
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.surfaces import Surfaces, regime
+from softehl.cases.seal.gland.surfaces import SurfacePair, regime
 from softehl.cases.seal.solve.inlet import inlet_length
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import FilmRow, FilmState, Silent
@@ -165,7 +165,7 @@ def test_the_guard_of_rough_films_lets_them_interpenetrate() -> None:
 
 
 def test_stiffness_of_asperities_is_that_of_the_rubber() -> None:
-    assert Seal().surfaces == Surfaces(0.0, 0.0, 14.64, 0.1)
+    assert Seal().surfaces == SurfacePair(0.0, 0.0, 14.64, 0.1)
     assert Seal(asperity_stiffness=3.0).surfaces.stiffness == 3.0
 
 

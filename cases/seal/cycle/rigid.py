@@ -9,7 +9,7 @@ import numpy as np
 from softehl.cases.seal.cycle.strip import Oil, Strip
 from softehl.cases.seal.equations.system import DISPLACEMENT, FILM, MOVED, PRESSURE
 from softehl.cases.seal.gland.profiles import Slider
-from softehl.cases.seal.gland.surfaces import Surfaces
+from softehl.cases.seal.gland.surfaces import SurfacePair
 from softehl.runtime.fem import dofs, rules
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
@@ -26,7 +26,7 @@ _STIFFER = StepRule(log(100.0), log(2.0))  # longer first steps cost twice the i
 
 def strip_of(p: Slider, alpha: float) -> Strip:
     """The film of a slider that conserves mass; alpha: coefficient of Barus' law."""
-    surfaces = Surfaces.of(p.roughness, p.asperity_stiffness, p.boundary_friction)
+    surfaces = SurfacePair.of(p.roughness, p.asperity_stiffness, p.boundary_friction)
     thinning = p.film_suffix, p.thinning_values(p.viscosity)
     oil = Oil(p.viscosity, alpha, p.cavitation_pressure, *thinning)
     return Strip(*p.ends, p.pressure_order, oil, surfaces)

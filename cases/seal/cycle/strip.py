@@ -17,7 +17,7 @@ from softehl.cases.seal.equations.system import (
     SQUEEZE,
     VOID,
 )
-from softehl.cases.seal.gland.surfaces import PRESSURE_SCALE, VOID_SCALE, Surfaces, void_values
+from softehl.cases.seal.gland.surfaces import PRESSURE_SCALE, VOID_SCALE, SurfacePair, void_values
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem import dofs, rules
 from softehl.runtime.fem.problem import Problem
@@ -58,7 +58,7 @@ class Strip:
     h: Array
     order: int
     oil: Oil
-    surfaces: Surfaces = field(default_factory=Surfaces)
+    surfaces: SurfacePair = field(default_factory=SurfacePair)
 
     @property
     def unknowns(self) -> int:

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator
 from softehl.cases.seal.gland.grooves import UnknownGlandError, gland
 from softehl.cases.seal.gland.oils import is_improved
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.rubbers import materials
 from softehl.cases.seal.gland.rubbers.hardness import shore_band
 from softehl.cases.seal.gland.sections.keys import ROUND, dimensions
@@ -40,7 +41,7 @@ def _ring(p: Seal, said: frozenset[str]) -> Iterator[str]:
         yield f"a rubber of shear modulus {p.shear_modulus:.3g} MPa"
 
 
-def _gland(p: Seal, said: frozenset[str]) -> Iterator[str]:
+def _gland(p: Gland, said: frozenset[str]) -> Iterator[str]:
     """Rod and groove."""
     if p.ring and read_ring(p.ring).outer is not None:
         said |= {"rod", "housing_diameter", "groove_width"}  # a U-cup is named by its groove
@@ -63,12 +64,12 @@ def _gland(p: Seal, said: frozenset[str]) -> Iterator[str]:
         yield "a back-up ring"
 
 
-def _called(p: Seal, key: str) -> str:
+def _called(p: Gland, key: str) -> str:
     """A key of the groove as the user of a piston seal knows it."""
     return "groove_diameter" if p.piston and key == "housing_diameter" else key
 
 
-def _kind(p: Seal) -> tuple[str, bool]:
+def _kind(p: Gland) -> tuple[str, bool]:
     """A gland in words, and whether it is one of a chart or was given."""
     if not p.gland:
         return "a gland", True

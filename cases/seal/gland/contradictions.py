@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softehl.cases.seal.gland.reach import MOST, ratio
+from softehl.cases.seal.gland.records.discretisation import Discretisation
+from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.records.solid import Solid
+from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
 from softehl.cases.seal.gland.sections.keys import is_mesh
 from softehl.cases.seal.gland.tolerances import read_tolerances
 
 if TYPE_CHECKING:
     from softehl.cases.seal.gland.parameters import Seal
-    from softehl.cases.seal.gland.rubbers.rubber_keys import RubberKeys
 
 _LOWEST_ESTIMATED = 3
 """Least pressure order whose error is well below what the meshes differ by."""
@@ -24,7 +27,7 @@ def require_consistent(p: Seal) -> None:
         check(p)
 
 
-def _mesh_is_there(p: Seal) -> None:
+def _mesh_is_there(p: Solid) -> None:
     if p.mesh != "file":
         return
     if not is_mesh(p.outline):
@@ -41,8 +44,8 @@ def _mesh_is_there(p: Seal) -> None:
         raise ValueError(f"materials: {names} have elements in common; an element has one")
 
 
-def _rubber_has_an_element(p: Seal) -> None:
-    rubbers: tuple[RubberKeys, ...] = (p, *p.materials.values())
+def _rubber_has_an_element(p: Solid) -> None:
+    rubbers: tuple[Rubber, ...] = (p, *p.materials.values())
     for rubber in rubbers:
         if p.solid != "taylor_mean" and rubber.energy != "mooney_rivlin":
             raise ValueError(
@@ -65,7 +68,7 @@ def _sensitivity_has_a_meaning(p: Seal) -> None:
         )
 
 
-def _rule_is_rich_enough(p: Seal) -> None:
+def _rule_is_rich_enough(p: Discretisation) -> None:
     points, order = p.quadrature_points, p.pressure_order
     if points is not None and points < order:
         raise ValueError(
@@ -88,7 +91,7 @@ def _film_has_its_model(p: Seal) -> None:
     p.require_smooth_film(dg=p.reynolds == "dg", rough=p.rough)
 
 
-def _tolerance_has_an_estimate(p: Seal) -> None:
+def _tolerance_has_an_estimate(p: Discretisation) -> None:
     if p.tolerance is not None and not (p.error_estimate and p.mesh == "graded"):
         raise ValueError(
             f"tolerance = {p.tolerance:g} needs an estimate of the error; "
@@ -101,8 +104,8 @@ def _tolerance_has_an_estimate(p: Seal) -> None:
         )
 
 
-def _air_side_is_closed_or_open(p: Seal) -> None:
-    gap, depth = p.extrusion_gap, 0.5 * (p.housing_diameter - p.rod_diameter)
+def _air_side_is_closed_or_open(p: Gland) -> None:
+    gap, depth = p.extrusion_gap, p.depth
     if p.backup and gap:
         raise ValueError(
             f"backup = true and extrusion_gap = {gap:g} contradict each other: a back-up ring "
@@ -125,13 +128,13 @@ def _air_side_is_closed_or_open(p: Seal) -> None:
         )
 
 
-def _arc_has_two_ends(p: Seal) -> None:
+def _arc_has_two_ends(p: Discretisation) -> None:
     if (p.arc_start is None) != (p.arc_end is None):
         raise ValueError("arc_start and arc_end: give both, or none to have them found")
 
 
 def _section_is_one(p: Seal) -> None:
-    p.sized(p.section_diameter)
+    _ = p.sizes
     if p.round:
         if p.materials:
             raise ValueError(
@@ -156,7 +159,7 @@ def _section_is_one(p: Seal) -> None:
         )
 
 
-def _diameters_have_one_sign(p: Seal) -> None:
+def _diameters_have_one_sign(p: Gland) -> None:
     if p.rod_diameter * p.inner_diameter < 0.0 or p.rod_diameter * p.housing_diameter < 0.0:
         raise ValueError(
             f"rod_diameter = {p.rod_diameter:g}, housing_diameter = {p.housing_diameter:g} and "
@@ -165,21 +168,20 @@ def _diameters_have_one_sign(p: Seal) -> None:
         )
 
 
-def _seal_is_squeezed(p: Seal) -> None:
-    gap = 0.5 * (p.housing_diameter - p.rod_diameter)
+def _seal_is_squeezed(p: Gland) -> None:
     between, keys = "rod and housing", "rod_diameter, housing_diameter"
     if p.piston:
         between, keys = "bore and ground of the groove", "bore, groove_diameter"
-    if not 0.5 * p.section_diameter < gap < p.section_diameter:
+    if not 0.5 * p.section_diameter < p.depth < p.section_diameter:
         raise ValueError(
-            f"the gap between {between} is {gap:g} mm ({keys}); "
+            f"the gap between {between} is {p.depth:g} mm ({keys}); "
             f"to squeeze the seal it must be between a half and one section_diameter, "
             f"{0.5 * p.section_diameter:g} to {p.section_diameter:g} mm; give groove_depth or "
             'squeeze, or gland = "dynamic" gives a groove'
         )
 
 
-def _ring_fits_the_rod(p: Seal) -> None:
+def _ring_fits_the_rod(p: Gland) -> None:
     stretch = p.rod_diameter / p.inner_diameter - 1.0
     if p.piston and not -0.1 <= stretch <= 0.2:
         raise ValueError(
@@ -193,7 +195,7 @@ def _ring_fits_the_rod(p: Seal) -> None:
         )
 
 
-def _section_is_between_the_walls(p: Seal) -> None:
+def _section_is_between_the_walls(p: Gland) -> None:
     if p.groove_width < p.axial_width:
         what = "section_diameter" if p.round else "the width of the section"
         raise ValueError(

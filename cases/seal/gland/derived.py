@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from softehl.cases.seal.gland import catalogue
-from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.gland import Gland
 
 BASES = {
     "groove_depth": "housing_diameter",
@@ -13,11 +12,6 @@ BASES = {
 """Measure -> the key that it decides, all others held."""
 
 
-def derived(p: Seal, name: str) -> float:
+def derived(p: Gland, name: str) -> float:
     """A measure of the gland of a case: mm or %."""
-    depth = 0.5 * (p.housing_diameter - p.rod_diameter)
-    if name == "groove_depth":
-        return depth
-    if name == "squeeze":
-        return catalogue.squeeze(p.section_diameter, depth)
-    return catalogue.fill(p.free_ring, p.rod_diameter, p.housing_diameter, p.groove_width)
+    return {"groove_depth": p.depth, "squeeze": p.squeeze_percent, "fill": p.fill_percent}[name]

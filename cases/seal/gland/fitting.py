@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.given import number, put
-from softehl.cases.seal.gland.grooves import Gland, cup_gland, gland
+from softehl.cases.seal.gland.grooves import Groove, cup_gland, gland
+from softehl.cases.seal.gland.records.free_seal import FreeSeal
+from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.sections.base import parts_of
-from softehl.cases.seal.gland.sections.keys import SectionKeys
+from softehl.cases.seal.gland.sections.keys import shape_of_file
 from softehl.cases.seal.gland.sections.u_cup import UCup
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.said import bands
@@ -32,6 +35,7 @@ def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
     refused with their keys.
     """
     values = dict(given)
+    _with_outline(values)
     if isinstance(values.get("ring"), int):
         values["ring"] = str(values["ring"])  # "-226" is a number to a reader of TOML
     side = _side(values)
@@ -48,6 +52,21 @@ def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(values.get("gland"), str) or any(number(values.get(k)) for k in _GLAND):
         _with_gland(values)
     return values
+
+
+def _with_outline(values: dict[str, Any]) -> None:
+    """The height of an outline that is given."""
+    if isinstance(values.get("outline"), str):
+        inner = _size(values, "inner_diameter")
+        if not number(inner) or inner == 0.0:
+            return  # refused with its key
+        _, low, _, high = shape_of_file(Path(values["outline"]), float(inner)).outline.box
+        put(values, "section_diameter", high - low, f"outline = {values['outline']}")
+
+
+def _size(values: Mapping[str, Any], key: str) -> Any:
+    """The value of a key of the gland, its default where none is given."""
+    return values.get(key, Gland.model_fields[key].default)
 
 
 def _side(values: Mapping[str, Any]) -> float:
@@ -69,7 +88,7 @@ def _in_piston(values: dict[str, Any]) -> None:
     inner_diameter: of the ring; without one it is just as large as the bore outside.
     """
     bore, inner = values.get("rod_diameter"), values.get("inner_diameter")
-    section, ground = values.get("section_diameter", 3.53), values.get("housing_diameter")
+    section, ground = _size(values, "section_diameter"), values.get("housing_diameter")
     if number(ground) and ground > 0.0:
         values["housing_diameter"] = -float(ground)
     if number(inner) and inner > 0.0 and number(section):
@@ -129,7 +148,7 @@ def _with_cup(values: dict[str, Any], rod: float, groove: float, width: float) -
 
 
 def _with_gland(values: dict[str, Any]) -> None:
-    section, rod = values.get("section_diameter", 3.53), values.get("rod_diameter", 50.0)
+    section, rod = _size(values, "section_diameter"), _size(values, "rod_diameter")
     if not (number(section) and number(rod)):
         return
     if number(values.get("squeeze")):
@@ -147,10 +166,10 @@ def _with_gland(values: dict[str, Any]) -> None:
         if values.get("groove_width") is None and values.get("fill") is None:
             values["groove_width"] = round(gland.width.middle, 4)
     if number(values.get("fill")):
-        _follow(values, "groove_width", _filled(values, section, rod), "fill")
+        _follow(values, "groove_width", _filled(values), "fill")
 
 
-def _gland(values: Mapping[str, Any], section: float) -> Gland:
+def _gland(values: Mapping[str, Any], section: float) -> Groove:
     """The standard gland of a section."""
     if values.get("section") != "u_cup":
         return gland(section, values["gland"], values.get("section", "round"))
@@ -161,16 +180,11 @@ def _gland(values: Mapping[str, Any], section: float) -> Gland:
     return cup_gland(section, sizes["heel_height"], sizes["section_width"])
 
 
-def _filled(values: Mapping[str, Any], section: float, rod: float) -> float:
+def _filled(values: Mapping[str, Any]) -> float:
     """Width of the groove that a ring fills to its share, mm."""
-    keys = SectionKeys(**{k: values[k] for k in SectionKeys.model_fields if k in values})
-    inner, housing = values.get("inner_diameter", 50.39), values.get("housing_diameter", 56.30)
-    if keys.round:
-        ring = catalogue.Ring("", inner, section)
-    else:
-        outline = keys.free(section, inner).outline
-        ring = catalogue.Ring("", inner, section, area=outline.area, middle=outline.centroid[1])
-    return catalogue.fill(ring, rod, housing, 1.0) / float(values["fill"])
+    free = FreeSeal(**{k: values[k] for k in FreeSeal.model_fields if k in values})
+    rod, housing = _size(values, "rod_diameter"), _size(values, "housing_diameter")
+    return catalogue.fill(free.free_ring, rod, housing, 1.0) / float(values["fill"])
 
 
 def _follow(values: dict[str, Any], key: str, value: float, source: str) -> None:

@@ -49,7 +49,7 @@ class Range(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Gland:
+class Groove:
     """A groove for one section, mm: depth from the rod to its ground, axial width, corner radius.
 
     The depth holds the clearance between rod and housing; the width is one without back-up rings.
@@ -63,7 +63,7 @@ class Gland:
     by_rule: bool = False
 
 
-def gland(section_diameter: float, kind: str = "dynamic", section: str = "round") -> Gland:
+def gland(section_diameter: float, kind: str = "dynamic", section: str = "round") -> Groove:
     """The gland for a section (mm) of this shape; kind: one of KINDS.
 
     Raises UnknownGlandError. A U-cup: `cup_gland`.
@@ -88,10 +88,10 @@ def gland(section_diameter: float, kind: str = "dynamic", section: str = "round"
     )
 
 
-def cup_gland(height: float, heel_height: float, width: float) -> Gland:
+def cup_gland(height: float, heel_height: float, width: float) -> Groove:
     """The gland of a U-cup whose free lips and heel have these heights, mm."""
     depth, groove = 0.5 * (height + heel_height), 1.1 * width
-    return Gland(height, Range(depth, depth), Range(groove, groove), by_rule=True)
+    return Groove(height, Range(depth, depth), Range(groove, groove), by_rule=True)
 
 
 def squeeze(section_diameter: float, depth: float) -> float:
@@ -99,7 +99,7 @@ def squeeze(section_diameter: float, depth: float) -> float:
     return 100.0 * (1.0 - depth / section_diameter)
 
 
-def _between(below: Gland, above: Gland, section: float) -> Gland:
+def _between(below: Groove, above: Groove, section: float) -> Groove:
     """A gland in proportions that are interpolated between two sections."""
     part = (section - below.section_diameter) / (above.section_diameter - below.section_diameter)
 
@@ -108,7 +108,7 @@ def _between(below: Gland, above: Gland, section: float) -> Gland:
         length = round(section * ((1.0 - part) * low + part * high), 2)
         return Range(length, length)
 
-    return Gland(section, size("depth"), size("width"), by_rule=True)
+    return Groove(section, size("depth"), size("width"), by_rule=True)
 
 
 # inch: section, depth, width (+- 0.005), corner radius
@@ -145,17 +145,17 @@ def _inches(low: float, high: float) -> Range:
     return Range(round(low * INCH, 4), round(high * INCH, 4))
 
 
-def _metric(rows: Iterable[tuple[float, float, float]]) -> list[Gland]:
-    return [Gland(d, Range(t, t), Range(b, b)) for d, t, b in rows]
+def _metric(rows: Iterable[tuple[float, float, float]]) -> list[Groove]:
+    return [Groove(d, Range(t, t), Range(b, b)) for d, t, b in rows]
 
 
-def _chart(*rows: Sequence[Gland]) -> tuple[Gland, ...]:
+def _chart(*rows: Sequence[Groove]) -> tuple[Groove, ...]:
     return tuple(sorted((g for some in rows for g in some), key=lambda g: g.section_diameter))
 
 
 _DYNAMIC = _chart(
     [
-        Gland(
+        Groove(
             round(section * INCH, 4),
             _inches(*depth),
             _inches(width - 0.005, width + 0.005),

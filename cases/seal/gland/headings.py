@@ -2,41 +2,36 @@
 
 from __future__ import annotations
 
-from softehl.cases.seal.gland.rubbers.rubber_keys import RubberKeys
+from softehl.cases.harness.parameters import Parameters
+from softehl.cases.seal.gland.records.duty import Duty
+from softehl.cases.seal.gland.records.film_model import FilmModel
+from softehl.cases.seal.gland.records.free_seal import FreeSeal
+from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.records.oil import Oil
+from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
 from softehl.cases.seal.gland.sections.keys import SectionKeys
 from softehl.cases.seal.gland.shear_thinning import ThinningKeys
+from softehl.cases.seal.gland.surfaces import Surfaces
 
 _HARDNESS = ("compound", "shore_A")
-_SURFACES = ("roughness", "asperity_stiffness", "boundary_friction")
-_CAVITATION = ("cavitation", "cavitation_pressure", "cavitation_penalty")
+
+
+def own(record: type[Parameters]) -> tuple[str, ...]:
+    """Keys that a record declares itself, in order."""
+    return tuple(name for name in record.__annotations__ if name in record.model_fields)
+
 
 SEAL = {
-    "ring": ("ring", "inner_diameter", "section_diameter", *SectionKeys.model_fields),
-    "gland": (
-        *(
-            "rod",
-            "bore",
-            "rod_diameter",
-            "gland",
-            "groove_depth",
-            "squeeze",
-            "groove_diameter",
-            "housing_diameter",
-        ),
-        *("fill", "groove_width"),
-        *("groove_centre", "backup", "extrusion_gap", "corner_fillet", "housing_friction"),
-    ),
+    "ring": (*own(FreeSeal), *SectionKeys.model_fields),
+    "gland": own(Gland),
     "rubber": (
         *_HARDNESS,
-        *(k for k in RubberKeys.model_fields if k not in _HARDNESS),
+        *(k for k in Rubber.model_fields if k not in _HARDNESS),
         "materials",
     ),
-    "oil": (
-        *("oil", "temperature", "viscosity", "pressure_viscosity", "roelands", "oil_density"),
-        *ThinningKeys.model_fields,
-    ),
-    "motion": ("sealed_pressure", "speeds", "stroke", "travel"),
-    "film": (*_SURFACES, *_CAVITATION, "shear_traction", "arc_start", "arc_end"),
+    "oil": (*own(Oil), *ThinningKeys.model_fields),
+    "motion": own(Duty),
+    "film": (*Surfaces.model_fields, *own(FilmModel), "arc_start", "arc_end"),
     "mesh": ("density", "tolerance", "error_estimate", "mesh"),
     "numerics": (
         *("sensitivity", "tolerances", "pressure_order", "reynolds", "quadrature"),
@@ -83,7 +78,10 @@ SLIDER = {
     ),
     "oil": ("viscosity", "pressure_viscosity", *ThinningKeys.model_fields),
     "motion": ("speeds", "start_pressure", "end_pressure"),
-    "film": (*_SURFACES, *_CAVITATION, "supply"),
+    "film": (
+        *Surfaces.model_fields,
+        *("cavitation", "cavitation_pressure", "cavitation_penalty", "supply"),
+    ),
     "mesh": ("segments",),
     "numerics": ("pressure_order", "reynolds"),
 }

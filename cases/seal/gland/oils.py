@@ -12,6 +12,7 @@ from math import isclose, log, log10
 from typing import Any
 
 from softehl.cases.seal.gland.given import number, put
+from softehl.cases.seal.gland.records.oil import Oil
 from softehl.cases.seal.gland.trade.oil_names import read_oil_name
 from softehl.cases.seal.gland.viscosity_index import at_100_of_index
 
@@ -138,7 +139,7 @@ def with_oil(given: Mapping[str, Any]) -> dict[str, Any]:
             f'oil_density = {values["oil_density"]} needs an oil, as in oil = "ISO VG 46"'
         )
     if number(z) and z >= 0.0:
-        eta = values.get("viscosity", 6.59e-8)
+        eta = values.get("viscosity", Oil.model_fields["viscosity"].default)
         if number(eta) and eta > 0.0:
             put(values, "pressure_viscosity", barus_of_roelands(eta, z), f"roelands = {z:g}")
     return values

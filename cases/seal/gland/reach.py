@@ -6,10 +6,8 @@ docs/limits.md, of a random sample of 300 glands of O-rings and one of other sec
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.free_seal import FreeSeal
+from softehl.cases.seal.gland.records.solid import Solid
 
 MOST = 6.0
 """Largest p_s / mu that is not refused: runs above it take minutes to `uncertain` states."""
@@ -28,13 +26,13 @@ _OTHER_WORDS = f"sections other than round were tried up to {_OTHER:g}, not abov
 _DO = "the run may take minutes and end without a film; a harder rubber or a lower pressure helps"
 
 
-def ratio(p: Seal, pressure: float) -> float:
+def ratio(p: Solid, pressure: float) -> float:
     """Sealed pressure (MPa) over the shear modulus of the softest part of the section."""
     parts = [*([""] if p.has_body else []), *p.materials]
     return pressure / min(p.rubber(part).shear_modulus for part in parts)
 
 
-def reach(p: Seal, pressure: float) -> list[str]:
+def reach(p: Solid, pressure: float) -> list[str]:
     """Line about the ratio and its meaning; nothing without a pressure."""
     found = ratio(p, pressure)
     if not found or _beyond(p, found):
@@ -42,7 +40,7 @@ def reach(p: Seal, pressure: float) -> list[str]:
     return [f"{_named(found)}: {_ROUND_WORDS if p.round else _OTHER_WORDS}"]
 
 
-def beyond_reach(p: Seal, pressure: float) -> list[str]:
+def beyond_reach(p: Solid, pressure: float) -> list[str]:
     """Line with advice where the ratio is above what is known to run."""
     found = ratio(p, pressure)
     if not _beyond(p, found):
@@ -50,7 +48,7 @@ def beyond_reach(p: Seal, pressure: float) -> list[str]:
     return [f"{_named(found)}: {_ROUND_WORDS if p.round else _OTHER_WORDS}; {_DO}"]
 
 
-def _beyond(p: Seal, found: float) -> bool:
+def _beyond(p: FreeSeal, found: float) -> bool:
     return found > (_SURE if p.round else _OTHER)
 
 

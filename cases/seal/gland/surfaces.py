@@ -12,6 +12,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
+from softehl.cases.harness.parameters import Parameters, key
 from softehl.cases.seal.gland.trade.finish_names import read_finish
 
 MICROMETRE = 1e-3  # mm
@@ -60,8 +61,34 @@ ROUGHNESS = (
 )
 
 
+class Surfaces(Parameters):
+    """Rod and seal as they are made."""
+
+    roughness: Roughness = key(
+        (0.0, 0.0), "rms heights of rod and seal, 0 = smooth", unit="um", bounds=ROUGHNESS
+    )
+    asperity_stiffness: float | None = key(
+        None,
+        "pressure K of touching asperities, K F_3/2(h/sigma)",
+        unit="MPa",
+        bounds="> 0, left out = 4 (mu_1 + mu_2)",
+        gt=0,
+    )
+    boundary_friction: float = key(0.1, "friction coefficient of touching asperities", ge=0, le=2)
+
+    @property
+    def rough(self) -> bool:
+        """True if the film knows roughness."""
+        return any(self.roughness)
+
+    def pair(self, modulus: float) -> SurfacePair:
+        """Both of them, by the seal's shear modulus G: on rigid asperities E* = 4 G."""
+        stiffness = self.asperity_stiffness or 4.0 * modulus
+        return SurfacePair.of(self.roughness, stiffness, self.boundary_friction)
+
+
 @dataclass(frozen=True)
-class Surfaces:
+class SurfacePair:
     """Two rough surfaces.
 
     moving, resting: rms heights, mm. stiffness: K of the asperities, MPa. friction: their
@@ -75,7 +102,7 @@ class Surfaces:
     slip: float = SLIP
 
     @classmethod
-    def of(cls, roughness: tuple[float, float], stiffness: float, friction: float) -> Surfaces:
+    def of(cls, roughness: tuple[float, float], stiffness: float, friction: float) -> SurfacePair:
         """From rms heights in um."""
         moving, resting = (MICROMETRE * rms for rms in roughness)
         return cls(moving, resting, stiffness, friction)

@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 from softehl.cases.seal.equations.loads import Stroke
-from softehl.cases.seal.gland.parameters import DENSITIES, Seal
+from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.discretisation import DENSITIES
 from softehl.cases.seal.gland.surfaces import FULL
 from softehl.cases.seal.states.state import CLIPPED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED, FilmRow
 from softehl.cases.seal.states.verdict import DOUBTFUL

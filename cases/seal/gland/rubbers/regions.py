@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from softehl.cases.seal.gland.given import number
 from softehl.cases.seal.gland.rubbers.rubber import with_rubber
-from softehl.cases.seal.gland.rubbers.rubber_keys import RubberKeys
+from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
 from softehl.cases.seal.gland.trade.rubber_names import is_plastic
 from softehl.runtime.mesh.parted_mesh import CAP
 
@@ -25,7 +25,7 @@ MATERIALS = (
 )
 
 
-class Region(RubberKeys):
+class Region(Rubber):
     """Material of a region of a section.  Raises pydantic.ValidationError, ValueError."""
 
     @classmethod

@@ -24,9 +24,10 @@ from softehl.cases.seal.gland.trade.rubber_names import RANGES, read_rubber
 from softehl.cases.seal.gland.trade.text import refused
 
 if TYPE_CHECKING:
-    from softehl.cases.seal.gland.rubbers.rubber_keys import RubberKeys
+    from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
 
-_PAPER = {"mu_1": 3.04, "mu_2": 0.62}  # MPa, Table 1 of the paper
+PAPER = {"mu_1": 3.04, "mu_2": 0.62}
+"""Moduli of Table 1 of the paper, MPa."""
 
 
 def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -52,7 +53,7 @@ def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(table, str):
         _with_fit(values, material, Path(table))
     if values["material"] == "mooney-rivlin":
-        values.update({k: v for k, v in _PAPER.items() if values.get(k) is None})
+        values.update({k: v for k, v in PAPER.items() if values.get(k) is None})
     _require_complete(values, material)
     return values
 
@@ -187,7 +188,7 @@ _LEAST_BULK = 20.0
 """Bulk over shear modulus of a rubber at least; Poisson's ratio is 0.475 there."""
 
 
-def soft(p: RubberKeys) -> list[str]:
+def soft(p: Rubber) -> list[str]:
     """Unusual properties of a rubber, in words."""
     ratio = p.bulk_modulus / p.shear_modulus
     if ratio >= _LEAST_BULK:

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from softehl.cases.harness.parameters import Parameters, key
 from softehl.cases.seal.gland.rubbers import materials
-from softehl.cases.seal.gland.rubbers.rubber import polymer_of, require_stable
+from softehl.cases.seal.gland.rubbers.rubber import PAPER, polymer_of, require_stable
 from softehl.cases.seal.gland.trade.said import rubber_named
 
 Terms = Annotated[
@@ -17,18 +17,18 @@ Terms = Annotated[
 ]
 
 
-class RubberKeys(Parameters):
+class Rubber(Parameters):
     """Keys of the material of a seal, or of a region of it."""
 
     material: materials.Name = key("mooney-rivlin", "rubber")
     mu_1: float | None = key(
-        3.04,
+        PAPER["mu_1"],
         "Mooney-Rivlin modulus mu_1; mu_1 + mu_2 is the shear modulus",
         unit="MPa",
         gt=0,
         le=1000,
     )
-    mu_2: float | None = key(0.62, "Mooney-Rivlin modulus mu_2", unit="MPa", ge=0, le=1000)
+    mu_2: float | None = key(PAPER["mu_2"], "Mooney-Rivlin modulus mu_2", unit="MPa", ge=0, le=1000)
     mu: float | None = key(
         None, "modulus mu of neo-hooke, arruda-boyce and gent", unit="MPa", gt=0, le=1000
     )

@@ -17,7 +17,6 @@ import numpy as np
 from pydantic import ValidationError, create_model
 
 from softehl.cases.harness.parameters import Parameters, key
-from softehl.cases.seal.gland.given import number, put
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.files import read_mesh, read_outline
 from softehl.runtime.mesh.outline import Shape
@@ -114,42 +113,6 @@ class SectionKeys(_Keys):
         """Name of the seal."""
         return NAMES[self.section] if self.outline is None else f"ring of {Path(self.outline).name}"
 
-    def free(self, height: float, inner_diameter: float) -> Shape:
-        """The free section where it is, mm.  ValueError where there is none."""
-        shape = self._whole(height, inner_diameter)
-        return shape if self.cap_thickness is None else capped(shape, self.cap_thickness)
-
-    def _whole(self, height: float, inner_diameter: float) -> Shape:
-        sizes = self.sized(height)
-        if self.outline is None:
-            return shape_of(self.section, sizes, inner_diameter)
-        if self.section != ROUND or len(sizes) > 1:
-            others = [name for name in sizes if name != "height"] or ["section"]
-            raise ValueError(f"outline and {', '.join(others)}: give one of them")
-        return shape_of_file(Path(self.outline), inner_diameter)
-
-    def measured(self, height: float) -> dict[str, float]:
-        """Key of each dimension but the height -> what it is, given or left out, mm."""
-        if self.round or self.outline is not None:
-            return {}
-        page = SECTIONS[self.section](**self.sized(height))
-        return {name: getattr(page, own) for name, own in dimensions(self.section).items()}
-
-    def sized(self, height: float) -> dict[str, float]:
-        """The dimensions that are given, as their page calls them.  ValueError for others'."""
-        known = dimensions(self.section)
-        given = {
-            name: value
-            for section in SECTIONS
-            for name in dimensions(section)
-            if (value := getattr(self, name)) is not None
-        }
-        for name in given:
-            if name not in known:
-                has = ", ".join(known) or "section_diameter alone"
-                raise ValueError(f'{name} is no dimension of section = "{self.section}": {has}')
-        return {"height": height, **{known[name]: value for name, value in given.items()}}
-
 
 def shape_of(section: str, sizes: Mapping[str, float], inner_diameter: float) -> Shape:
     """The shape of a section of these dimensions.  ValueError where they bound none."""
@@ -196,16 +159,6 @@ def surface_of(path: Path) -> str:
     lowest = nodes[int(np.argmin(mesh.points[nodes, 1]))]
     found = [name for name, cells in mesh.regions.items() if (mesh.quads[cells] == lowest).any()]
     return found[0] if found else ""
-
-
-def with_outline(values: dict[str, Any]) -> dict[str, Any]:
-    """The keys of a case with the height of an outline that is given.  ValueError."""
-    if isinstance(values.get("outline"), str):
-        inner = values.get("inner_diameter", 50.39)
-        inner = float(inner) if number(inner) and inner != 0.0 else 50.39  # refused with its key
-        _, low, _, high = shape_of_file(Path(values["outline"]), inner).outline.box
-        put(values, "section_diameter", high - low, f"outline = {values['outline']}")
-    return values
 
 
 @lru_cache(maxsize=32)

@@ -1,0 +1,32 @@
+"""What the film knows beside the flow of its oil: surfaces, cavitation, shear of the seal."""
+
+from typing import Literal
+
+from softehl.cases.harness.parameters import key
+from softehl.cases.seal.gland.records.free_seal import FreeSeal
+from softehl.cases.seal.gland.surfaces import Surfaces
+
+
+class FilmModel(FreeSeal, Surfaces):
+    """The model of a film between these surfaces; the number of its contacts is by the section."""
+
+    cavitation: Literal["penalty", "mass-conserving"] | None = key(
+        None,
+        "model of cavitation",
+        bounds='"penalty" or "mass-conserving", left out = the latter with roughness, '
+        "with a cavitation_pressure and where a section has two lobes",
+    )
+    cavitation_pressure: float = key(
+        0.0, "mass-conserving: pressure of the ruptured film", unit="MPa", ge=-0.1, le=0
+    )
+    cavitation_penalty: float = key(
+        1.0e4, "penalty of pressures below zero, flux for a pressure", unit="mm/(MPa s)", gt=0
+    )
+    shear_traction: bool = key(True, "whether the shear stress of the film acts on the seal")
+
+    @property
+    def conserving(self) -> bool:
+        """True if the film conserves mass where it ruptures."""
+        if self.cavitation is None:
+            return self.rough or self.lobes > 1 or self.cavitation_pressure < 0.0
+        return self.cavitation == "mass-conserving"

@@ -1,0 +1,114 @@
+"""The seal before it is fitted: its section and its diameters."""
+
+from pathlib import Path
+
+from softehl.cases.harness.parameters import key
+from softehl.cases.seal.gland.catalogue import Ring
+from softehl.cases.seal.gland.sections import SECTIONS
+from softehl.cases.seal.gland.sections.base import HEIGHT
+from softehl.cases.seal.gland.sections.keys import (
+    ROUND,
+    SectionKeys,
+    capped,
+    dimensions,
+    lobes,
+    mesh_of_file,
+    shape_of,
+    shape_of_file,
+)
+from softehl.runtime.mesh.outline import Shape
+from softehl.runtime.mesh.sections import SectionMesh
+
+SIGNED = "other than 0; of a piston seal negative: give bore"
+
+
+class FreeSeal(SectionKeys):
+    """The seal before it is fitted; its lengths are in mm."""
+
+    ring: str | None = key(
+        None,
+        "a ring by its name, for inner_diameter and section_diameter",
+        bounds='"AS568-226", "36x4", "ISO 3601 50.4x3.55", "X-ring 36x4", "U-cup 25x35x8", left '
+        "out = by its diameters (docs/trade.md)",
+    )
+    inner_diameter: float = key(
+        50.39,
+        "inner diameter of the seal D_inner; of a piston seal less its outside diameter",
+        unit="mm",
+        bounds=SIGNED,
+        ge=-5000,
+        le=5000,
+    )
+    section_diameter: float = key(
+        HEIGHT,
+        "diameter of the section D_seal; radial height of one that is not round",
+        unit="mm",
+        gt=0,
+    )
+
+    @property
+    def free_ring(self) -> Ring:
+        """The seal as it is sold."""
+        if self.round:
+            return Ring("", self.inner_diameter, self.section_diameter)
+        outline = self.free_section.outline
+        sizes = {"area": outline.area, "middle": outline.centroid[1]}
+        return Ring("", self.inner_diameter, self.section_diameter, **sizes)
+
+    @property
+    def free_section(self) -> Shape:
+        """The free section where it is.  ValueError where there is none."""
+        shape = self._whole
+        return shape if self.cap_thickness is None else capped(shape, self.cap_thickness)
+
+    @property
+    def _whole(self) -> Shape:
+        sizes = self.sizes
+        if self.outline is None:
+            return shape_of(self.section, sizes, self.inner_diameter)
+        if self.section != ROUND or len(sizes) > 1:
+            others = [name for name in sizes if name != "height"] or ["section"]
+            raise ValueError(f"outline and {', '.join(others)}: give one of them")
+        return shape_of_file(Path(self.outline), self.inner_diameter)
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """The dimensions that are given, as their page calls them.  ValueError for others'."""
+        known = dimensions(self.section)
+        given = {
+            name: value
+            for section in SECTIONS
+            for name in dimensions(section)
+            if (value := getattr(self, name)) is not None
+        }
+        for name in given:
+            if name not in known:
+                has = ", ".join(known) or "section_diameter alone"
+                raise ValueError(f'{name} is no dimension of section = "{self.section}": {has}')
+        return {"height": self.section_diameter, **{known[n]: size for n, size in given.items()}}
+
+    @property
+    def axial_width(self) -> float:
+        """Height of the free section, mm."""
+        if self.round:
+            return self.section_diameter
+        left, _, right, _ = self.free_section.outline.box
+        return right - left
+
+    @property
+    def measures(self) -> dict[str, float]:
+        """Key of each dimension of the section but its height -> what it is, mm."""
+        if self.round or self.outline is not None:
+            return {}
+        page = SECTIONS[self.section](**self.sizes)
+        return {name: getattr(page, own) for name, own in dimensions(self.section).items()}
+
+    @property
+    def lobes(self) -> int:
+        """Number of contacts with the rod that the section is made for."""
+        return 1 if self.round else lobes(self.free_section)
+
+    @property
+    def file_mesh(self) -> SectionMesh:
+        """The mesh of the file that outline names, where it is."""
+        return mesh_of_file(Path(self.outline or ""), self.inner_diameter)
