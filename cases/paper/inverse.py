@@ -19,14 +19,14 @@ import numpy as np
 
 from softehl.cases.paper.item import STUDY_DENSITIES, Item, Product, Scope, Table, both
 from softehl.cases.paper.states import Request, State, Store, ask, setup
-from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.oil import Oil
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import Cell
 
 PRESSURES = (1.0, 5.0)
 
 
-def largest_inlet_gradient(x: Array, p: Array, p_ring: Seal, outstroke: bool) -> float:
+def largest_inlet_gradient(x: Array, p: Array, p_ring: Oil, outstroke: bool) -> float:
     """max |dp/dx| / eta before the pressure maximum, 1/(mm s), from x (n,) in mm and p (n,) in MPa.
 
     Slopes of the chords between neighbouring points, with eta (13) at their middle. The inlet is

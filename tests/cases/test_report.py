@@ -33,6 +33,7 @@ from softehl.cases.seal.states.state import COLLAPSED, OSCILLATING, FilmRow, Pro
 from tests.cases.oring_cases import film_values
 
 SEAL = Seal()
+HEAD = style.subject(SEAL)
 SPEEDS = (100.0, 400.0, 1600.0)
 
 
@@ -109,8 +110,8 @@ def figures() -> dict[str, Figure]:
     views = [View(r, profile(r.h_star_um), square()) for r in (rows[2], rows[5])]
     results = [(r, profile(r.h_star_um)) for r in rows]
     return {
-        "curve": curve_figure(SEAL, rows),
-        "profiles": profiles_figure(SEAL, results),
+        "curve": curve_figure(HEAD, rows),
+        "profiles": profiles_figure(HEAD, results),
         "section": section_figure(SEAL, views),
     }
 
@@ -134,7 +135,7 @@ def test_a_picture_names_the_ring_the_oil_and_its_units(name: str) -> None:
 def test_the_slope_is_the_measured_one(exponent: float) -> None:
     rows = power_law(exponent)
     assert fitted_exponent(rows) == pytest.approx(exponent, abs=1e-12)
-    axes = curve_figure(SEAL, rows).axes[0]
+    axes = curve_figure(HEAD, rows).axes[0]
     assert f"slope {exponent:.3f} (fitted)" in legend(axes)
     (dashed,) = (line for line in axes.lines if line.get_linestyle() == "--")
     (x0, x1), (y0, y1) = np.log(drawn(dashed))
@@ -145,19 +146,19 @@ def test_the_slope_is_the_measured_one(exponent: float) -> None:
 def test_one_speed_has_no_slope() -> None:
     rows = [row(100.0, 0.5), row(-100.0, 0.4)]
     assert fitted_exponent(rows) is None
-    assert "slope" not in texts(curve_figure(SEAL, rows))
+    assert "slope" not in texts(curve_figure(HEAD, rows))
 
 
 def test_one_speed_is_a_bar_for_each_stroke() -> None:
     rows = [row(400.0, 1.5, error=2.0), row(-400.0, 1.0, error=nan, verdict=OSCILLATING)]
-    figure = curve_figure(SEAL, rows)
+    figure = curve_figure(HEAD, rows)
     (axes,) = figure.axes
     assert (axes.get_xscale(), axes.get_yscale()) == ("linear", "linear")
     assert [patch.get_height() for patch in axes.patches] == [1.5, 1.0]  # type: ignore[attr-defined]
     said = texts(figure)
     for words in ("|U| = 400 mm/s", "1.5 µm", "± 2 %", "1 µm\noscillating", "instroke"):
         assert words in said
-    lost = texts(curve_figure(SEAL, [], [replace(row(400.0, 0.1), verdict=COLLAPSED)]))
+    lost = texts(curve_figure(HEAD, [], [replace(row(400.0, 0.1), verdict=COLLAPSED)]))
     assert "no result" in lost
     assert "0.1 µm" not in lost
 
@@ -169,7 +170,7 @@ def test_a_slope_is_not_fitted_to_doubtful_states() -> None:
 
 def test_error_bars_have_the_estimated_length() -> None:
     rows = [row(100.0, 0.5, error=-2.0), row(400.0, 1.0, error=1.0), row(1600.0, 2.0, error=nan)]
-    axes = curve_figure(SEAL, rows).axes[0]
+    axes = curve_figure(HEAD, rows).axes[0]
     assert "outstroke (error bars: at most 2 %)" in legend(axes)
     bars = next(artist for artist in axes.collections if isinstance(artist, LineCollection))
     ends = np.array([np.asarray(segment)[:, 1] for segment in bars.get_segments()])
@@ -178,7 +179,7 @@ def test_error_bars_have_the_estimated_length() -> None:
 
 def test_without_an_estimate_there_are_no_bars() -> None:
     rows = [row(speed, 0.5, error=nan) for speed in (100.0, 200.0)]
-    axes = curve_figure(SEAL, rows).axes[0]
+    axes = curve_figure(HEAD, rows).axes[0]
     assert legend(axes)[0] == "outstroke"
     assert list(axes.containers) == []
 
@@ -186,7 +187,7 @@ def test_without_an_estimate_there_are_no_bars() -> None:
 def test_verdicts_are_marked() -> None:
     rows = [*power_law(0.6)[:3], row(25.0, 0.3, verdict=OSCILLATING)]
     lost = replace(row(10.0, 0.1), verdict=COLLAPSED)
-    figure = curve_figure(SEAL, rows, [lost])
+    figure = curve_figure(HEAD, rows, [lost])
     axes = figure.axes[0]
     assert "outstroke, film collapsed: no result" in legend(axes)
     assert "oscillating" in texts(figure)
@@ -219,7 +220,7 @@ def test_ticks_of_short_and_long_axes(low: float, high: float) -> None:
 
 
 def test_ticks_are_written_out() -> None:
-    figure = curve_figure(SEAL, power_law(0.6))
+    figure = curve_figure(HEAD, power_law(0.6))
     assert "e-" not in texts(figure)
     assert [t.get_text() for t in figure.axes[0].get_xticklabels()] == ["100", "200", "500", "1000"]
 
@@ -229,7 +230,7 @@ def test_ticks_are_written_out() -> None:
 
 def test_profiles_have_a_panel_a_stroke_and_a_line_a_speed() -> None:
     rows = [*power_law(0.6), row(25.0, 0.3, verdict=OSCILLATING)]
-    figure = profiles_figure(SEAL, [(r, profile(r.h_star_um)) for r in rows])
+    figure = profiles_figure(HEAD, [(r, profile(r.h_star_um)) for r in rows])
     pressure_out, pressure_in, film_out, film_in = figure.axes
     assert [len(axes.lines) for axes in figure.axes] == [4, 3, 4, 3]
     assert (pressure_out.get_title(), pressure_in.get_title()) == ("outstroke", "instroke")
@@ -288,7 +289,7 @@ def test_the_label_of_the_colours_is_on_the_picture(factor: float) -> None:
 
 def test_the_legend_of_a_tornado_is_beside_its_bars() -> None:
     slopes = {quantity: {f"key_{k}": 10.0 - k for k in range(10)} for quantity in PANELS}
-    figure = tornado_figure(SEAL, {400.0: slopes, -400.0: slopes})
+    figure = tornado_figure(HEAD, {400.0: slopes, -400.0: slopes})
     figure.draw_without_rendering()
     (found,) = figure.legends
     for axes in figure.axes:
@@ -359,7 +360,7 @@ def test_one_speed_has_no_stribeck_picture() -> None:
 def test_films_that_flow_against_the_rod_are_left_out_of_the_curve() -> None:
     """Pressure drives oil through asperities faster than a slow rod: h* < 0."""
     rows = [*rough_rows(), replace(row(-0.01, 1.0), h_star_um=-0.2)]
-    (axes,) = curve_figure(SEAL, rows).axes
+    (axes,) = curve_figure(HEAD, rows).axes
     drawn = np.concatenate([np.asarray(line.get_ydata()) for line in axes.get_lines()])
     assert np.min(drawn) > 0.0
 

@@ -6,7 +6,8 @@ from math import pi
 
 import numpy as np
 
-from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.duty import Duty
+from softehl.cases.seal.gland.records.gland import Gland
 from softehl.runtime.arrays import Array
 
 # 1 MPa on 1 mm of rod, a gap of 10 micrometres, 1 milliradian.
@@ -14,27 +15,27 @@ _PRESSURE, _GAP, _ROTATION = 1.0, 0.01, 1e-3
 _DIFFERENCE = 1e-4  # MPa between the ends of a segment
 
 
-def force(p: Seal) -> float:
+def force(p: Gland) -> float:
     """A pressure on the rod, N."""
     return pi * abs(p.rod_diameter) * _PRESSURE
 
 
-def gap(p: Seal) -> float:
+def gap(p: Gland) -> float:
     """A gap times an area of the rod, mm^3."""
     return pi * abs(p.rod_diameter) * _GAP
 
 
-def rotation(_: Seal) -> float:
+def rotation(_: object) -> float:
     """A mean rotation."""
     return _ROTATION
 
 
-def place(_: Seal) -> float:
+def place(_: object) -> float:
     """A mean axial displacement, mm."""
     return _GAP
 
 
-def void(_: Seal) -> float:
+def void(_: object) -> float:
     """The condition of cavitation: a pressure and a void fraction of `surfaces`."""
     return 1.0
 
@@ -44,7 +45,7 @@ def film_flux(speed: float) -> float:
     return 0.5 * speed * _GAP
 
 
-def largest_flux(p: Seal) -> float:
+def largest_flux(p: Duty) -> float:
     """Flux of the highest speed of a case."""
     return film_flux(max(p.speeds))
 

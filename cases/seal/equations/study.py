@@ -17,6 +17,7 @@ from softehl.cases.seal.equations.system import (
     values_at_rest,
 )
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.discretisation import Discretisation
 from softehl.cases.seal.section.section import SealSection
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.assembly import ElementKernel
@@ -64,7 +65,7 @@ def seal_study(p: Seal, section: SealSection, blocks: Sequence[Block]) -> Study:
     return study
 
 
-def _film_places(p: Seal, section: SealSection) -> Mapping[str, Integers]:
+def _film_places(p: Discretisation, section: SealSection) -> Mapping[str, Integers]:
     """Places (n, k) of film pressures on the sets of elements that know them.
 
     m_p a segment and one more where pressures are continuous, m_p + 1 a segment in (22).

@@ -16,6 +16,8 @@ from softehl.cases.seal.equations import scales
 from softehl.cases.seal.equations.declared import Block, Field, Place
 from softehl.cases.seal.equations.loads import ContactLoads, FilmLoads
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.discretisation import Discretisation
+from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.surfaces import void_values
 from softehl.cases.seal.section.section import BODY, SealSection
 from softehl.runtime.fem.contact import Obstacle, inner_cylinder, outer_cylinder, plane
@@ -31,7 +33,7 @@ Values: TypeAlias = Mapping[str, float]
 """Parameters of a kernel by their names."""
 
 
-def _segment_rule(p: Seal) -> Rule:
+def _segment_rule(p: Discretisation) -> Rule:
     return film_rule(p.pressure_order, p.quadrature, p.quadrature_points)
 
 
@@ -60,7 +62,7 @@ SHEAR = {name: f"{name}_shear" for name in WALLS}
 """Tangential stresses of the obstacles that have friction."""
 
 
-def _rubs(p: Seal) -> bool:
+def _rubs(p: Gland) -> bool:
     return p.rubs
 
 
@@ -75,7 +77,7 @@ def _walls() -> Iterator[Block]:
     for name, on in WALLS.items():
         cornered, fields = name == AIR_WALL, (name,)
 
-        def plain(p: Seal, cornered: bool = cornered) -> bool:
+        def plain(p: Gland, cornered: bool = cornered) -> bool:
             return not p.rubs and not (cornered and p.opens)
 
         yield Block(name, "contact", on, fields, "contact", needed=plain)
@@ -161,14 +163,13 @@ def blocks_of(p: Seal) -> tuple[Block, ...]:
     return (*own, *body, *(block for block in others if block.needed(p)))
 
 
-def obstacles_of(p: Seal) -> dict[str, Obstacle]:
+def obstacles_of(p: Gland) -> dict[str, Obstacle]:
     """The obstacles by the names of their blocks."""
-    half = 0.5 * p.groove_width
     obstacles = (
         inner_cylinder(ROD, 0.5 * p.rod_diameter),
         outer_cylinder(BORE, 0.5 * p.housing_diameter),
-        plane(SEALED_WALL, p.groove_centre - half, faces=1),
-        plane(AIR_WALL, p.groove_centre + half, faces=-1),
+        plane(SEALED_WALL, p.sealed_wall, faces=1),
+        plane(AIR_WALL, p.air_wall, faces=-1),
     )
     return {obstacle.name: obstacle for obstacle in obstacles}
 

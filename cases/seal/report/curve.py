@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.gland.parameters import Seal
 
 _BESIDE, _ROOM = 1.2, 1.7  # factors of logarithmic axes: free space, and that of the legend
 _BESIDE_MARK = {"out": (-5, 4), "in": (5, -9)}  # points from a mark to its word
@@ -25,17 +24,17 @@ _PLAIN = ((1.0,), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0))  # 
 _ENOUGH, _MANY = 3, 7  # ticks of an axis
 
 
-def curve_figure(p: Seal, rows: Sequence[FilmRow], rejected: Sequence[FilmRow] = ()) -> Figure:
+def curve_figure(head: str, rows: Sequence[FilmRow], rejected: Sequence[FilmRow] = ()) -> Figure:
     """h* over |U|, both logarithmic, a line a stroke; rejected states are marked on the axis.
 
-    Bars of both strokes where there is one speed. Not drawn: rough films so slow that the sealed
-    pressure drives oil against the rod, h* < 0.
+    head: what it is about. Bars of both strokes where there is one speed. Not drawn: rough films so
+    slow that the sealed pressure drives oil against the rod, h* < 0.
     """
     from matplotlib.figure import Figure
 
     rows = [row for row in rows if row.h_star_um > 0.0]
     if len({abs(row.rod_speed_mm_s) for row in (*rows, *rejected)}) == 1:
-        return _one_speed_figure(p, rows, rejected)
+        return _one_speed_figure(head, rows, rejected)
     figure = Figure(figsize=(5.4, 4.4))
     axes = figure.subplots()
     _set_limits(axes, rows, rejected)
@@ -51,11 +50,11 @@ def curve_figure(p: Seal, rows: Sequence[FilmRow], rejected: Sequence[FilmRow] =
     axes.set_ylabel(style.H_STAR)
     axes.legend(loc="upper left")
     style.set_margins(figure, left=0.62, right=0.12, bottom=0.5, top=0.6)
-    style.write_head(figure, style.subject(p), left=0.62)
+    style.write_head(figure, head, left=0.62)
     return figure
 
 
-def _one_speed_figure(p: Seal, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]) -> Figure:
+def _one_speed_figure(head: str, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]) -> Figure:
     """A bar for each stroke with its error, its number and what is wrong with it."""
     from matplotlib.figure import Figure
 
@@ -78,7 +77,7 @@ def _one_speed_figure(p: Seal, rows: Sequence[FilmRow], rejected: Sequence[FilmR
     axes.set_ylim(0.0, 1.35 * max((row.h_star_um for row in rows), default=1.0))
     axes.grid(visible=False, axis="x")
     style.set_margins(figure, left=0.62, right=0.12, bottom=0.5, top=0.6)
-    style.write_head(figure, style.subject(p), left=0.62)
+    style.write_head(figure, head, left=0.62)
     return figure
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.section import draw_gland
 from softehl.cases.seal.section.uniform_layout import uniform_layout
-from softehl.cases.seal.states.contact_results import fit_percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,13 +24,11 @@ def gland_figure(p: Seal) -> Figure:
     axes = figure.subplots()
     draw_gland(axes, p)
     rod, housing = 0.5 * p.rod_diameter, 0.5 * p.housing_diameter
-    half, size = 0.5 * p.groove_width, p.section_diameter
+    left, right, size = p.sealed_wall, p.air_wall, p.section_diameter
     contour = uniform_layout(p).contour - [0.0, 0.5 * p.inner_diameter - rod]
     axes.add_patch(Polygon(contour, facecolor="#f2c14e", edgecolor="#3b3f45"))
-    left, right = p.groove_centre - half, p.groove_centre + half
     _measure(axes, (left, housing), (right, housing), f"{p.groove_width:.4g}", (0, 5))
-    depth = housing - rod
-    _measure(axes, (right, rod), (right, housing), f"{depth:.4g}", (5, 0))
+    _measure(axes, (right, rod), (right, housing), f"{p.depth:.4g}", (5, 0))
     _measure(
         axes, (-0.5 * size, rod + 0.5 * size), (0.5 * size, rod + 0.5 * size), f"{size:.4g}", (0, 4)
     )
@@ -44,11 +41,10 @@ def gland_figure(p: Seal) -> Figure:
 
 def fit_numbers(p: Seal) -> list[tuple[str, float, str]]:
     """Fit of the ring in its gland: name, value, unit."""
-    fits = fit_percent(p)
     return [
-        ("squeeze", fits["squeeze_percent"], "%"),
-        ("stretch", fits["stretch_percent"], "%"),
-        ("gland fill", fits["fill_percent"], "%"),
+        ("squeeze", p.squeeze_percent, "%"),
+        ("stretch", p.stretch_percent, "%"),
+        ("gland fill", p.fill_percent, "%"),
         ("shear modulus of the rubber", p.shear_modulus, "MPa"),
         ("viscosity of the oil", p.viscosity * 1e9, "mPa s"),
     ]

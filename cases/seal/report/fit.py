@@ -16,17 +16,17 @@ from softehl.runtime.io import write_csv
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.gland.parameters import Seal
+    from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
 
 _COLOURS = dict(zip(SECOND, ("#1b6ca8", "#c8553d", "#4f8a52"), strict=True))
 _LINES = ("-", "--", ":", "-.")
 
 
-def fit_of(p: Seal) -> Fit | None:
-    """The fit that a case took its rubber from.  Raises ValueError where it cannot be read."""
+def fit_of(p: Rubber, temperature: float | None) -> Fit | None:
+    """The fit that a rubber was taken from.  Raises ValueError where it cannot be read."""
     if p.fit is None:
         return None
-    return fit(p.material, read_data(Path(p.fit)), p.ogden_terms, p.temperature)
+    return fit(p.material, read_data(Path(p.fit)), p.ogden_terms, temperature)
 
 
 def write_residuals(found: Fit, path: Path) -> None:

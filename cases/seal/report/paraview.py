@@ -15,7 +15,7 @@ from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.io import write_pvd
 
 if TYPE_CHECKING:
-    from softehl.cases.seal.gland.parameters import Seal
+    from softehl.cases.seal.gland.records.gland import Gland
 
 FILES = ("gland.vtu", "section_out.pvd", "section_in.pvd")
 
@@ -25,7 +25,7 @@ PARTS = ("rod", "groove", "housing")
 _FILLET = np.linspace(0.0, 0.5 * pi, 17)
 
 
-def write_paraview(p: Seal, folder: Path, rows: Sequence[FilmRow]) -> None:
+def write_paraview(p: Gland, folder: Path, rows: Sequence[FilmRow]) -> None:
     """Write the gland, and a series over |U| in mm/s for each stroke that has rows."""
     write_content(folder / "gland.vtu", gland_outlines(p))
     for stroke in ("out", "in"):
@@ -34,13 +34,13 @@ def write_paraview(p: Seal, folder: Path, rows: Sequence[FilmRow]) -> None:
             write_pvd(folder / f"section_{stroke}.pvd", sorted(entries))
 
 
-def gland_outlines(p: Seal) -> Cells:
+def gland_outlines(p: Gland) -> Cells:
     """Lines of the rod, the groove and the housing beside it, as they are modelled; part: which.
 
     The walls end at the rod, and where there is an extrusion gap, in the fillet at its edge.
     """
-    rod, housing, half = 0.5 * p.rod_diameter, 0.5 * p.housing_diameter, 0.5 * p.groove_width
-    start, end = p.groove_centre - half, p.groove_centre + half
+    rod, housing = 0.5 * p.rod_diameter, 0.5 * p.housing_diameter
+    start, end = p.sealed_wall, p.air_wall
     left, right = start - p.section_diameter, end + p.section_diameter
     top, edge = housing + p.section_diameter, _edge(p, end, rod)
     foot = [start, rod]
@@ -57,7 +57,7 @@ def gland_outlines(p: Seal) -> Cells:
     return Cells(np.concatenate(lines), np.stack([nodes, nodes + 1], axis=1), {}, {"part": part})
 
 
-def _edge(p: Seal, wall: float, rod: float) -> list[list[float]]:
+def _edge(p: Gland, wall: float, rod: float) -> list[list[float]]:
     """Points of the end of the air wall, from the wall on: at the rod, or the fillet."""
     if not p.opens:
         return [[wall, rod]]

@@ -93,7 +93,7 @@ def _rubber(runs: Sequence[FinishedRun]) -> list[Part]:
     pictures = []
     for run in runs:
         try:
-            found = fit_of(run.parameters)
+            found = fit_of(run.parameters, run.parameters.temperature)
         except ValueError:
             continue  # the table of tests is elsewhere now
         if found:
@@ -138,7 +138,10 @@ def _curve(runs: Sequence[FinishedRun]) -> Part:
     )
     if _several_speeds(runs):
         return Part("Film thickness", text, plots=[curve_plot(runs)], lines=lines)
-    pictures = [Picture(run.name, png(curve_figure(run.parameters, run.rows))) for run in runs]
+    pictures = [
+        Picture(run.name, png(curve_figure(style.subject(run.parameters), run.rows)))
+        for run in runs
+    ]
     return Part("Film thickness", text, pictures=pictures, lines=lines)
 
 

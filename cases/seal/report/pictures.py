@@ -38,7 +38,7 @@ def write_plots(
     kinds: of the files of each; none if empty. Raises OSError, and ValueError where a profile or a
     section cannot be read back.
     """
-    if found := fit_of(p):
+    if found := fit_of(p, p.temperature):
         write_residuals(found, folder / "fit.csv")
     if not kinds:
         return
@@ -47,10 +47,10 @@ def write_plots(
     results = [(row, read_profile(folder, row)) for row in rows]
     fastest = _fastest(rows)
     views = [View(row, at, read_section(folder, row)) for row, at in results if row in fastest]
-    views = [view for view in views if view.complete]
+    views, head = [view for view in views if view.complete], style.subject(p)
     with matplotlib.rc_context(style.STYLE):
-        save(curve_figure(p, rows, rejected), folder / "curve", kinds)
-        save(profiles_figure(p, results), folder / "profiles", kinds)
+        save(curve_figure(head, rows, rejected), folder / "curve", kinds)
+        save(profiles_figure(head, results), folder / "profiles", kinds)
         if found:
             save(fit_figure([found]), folder / "fit", kinds)
         if stribeck := stribeck_figure(p, rows):

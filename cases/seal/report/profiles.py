@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from softehl.cases.seal.gland.parameters import Seal
 
 Results = Sequence[tuple[FilmRow, Profile]]
 Colour = tuple[float, float, float, float]
@@ -25,7 +24,7 @@ _MARGIN = 0.3  # mm beside the contacts
 _LEAST, _MOST = 0.7, 20.0  # of the least h and of the largest h*
 
 
-def profiles_figure(p: Seal, results: Results) -> Figure:
+def profiles_figure(head: str, results: Results) -> Figure:
     """Pressure above film thickness; a state that is not ok is dotted, with its verdict."""
     from matplotlib.figure import Figure
 
@@ -47,7 +46,7 @@ def profiles_figure(p: Seal, results: Results) -> Figure:
     axes[1, 0].set_ylabel(style.FILM)
     _show_contact(axes[1, 0], [row for row, _ in results])
     style.set_margins(figure, left=0.55, right=0.12, bottom=0.5, top=0.82, between=0.07)
-    style.write_head(figure, style.subject(p), left=0.55)
+    style.write_head(figure, head, left=0.55)
     return figure
 
 

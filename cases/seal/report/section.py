@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.tri import TriContourSet
 
     from softehl.cases.seal.gland.parameters import Seal
+    from softehl.cases.seal.gland.records.free_seal import FreeSeal
+    from softehl.cases.seal.gland.records.gland import Gland
 
 
 _METAL, _FLUID, _FILM, _CONTACT, _LINE = "#d9dadd", "#d3e6f5", "#1b6ca8", "#8a8f98", "#3b3f45"
@@ -69,7 +71,7 @@ class Scale:
     height: float
 
     @classmethod
-    def of(cls, p: Seal, views: Sequence[View]) -> Scale:
+    def of(cls, p: FreeSeal, views: Sequence[View]) -> Scale:
         """One scale for several states."""
         from matplotlib.ticker import MaxNLocator
 
@@ -123,7 +125,7 @@ def draw_gland(axes: Axes, p: Seal, middle: float | None = None) -> None:
     size, lip = p.section_diameter, 0.5 * p.rod_diameter + _CLEARANCE * p.section_diameter
     rod, housing = 0.5 * p.rod_diameter, 0.5 * p.housing_diameter
     beside, below, above = (share * size for share in _AROUND)
-    start, end = (p.groove_centre + side * 0.5 * p.groove_width for side in (-1, 1))
+    start, end = p.sealed_wall, p.air_wall
     left, right, bottom, top = start - size, end + size, rod - size, housing + size  # out of sight
     if p.sealed_pressure:
         edge = p.groove_centre if middle is None else middle
@@ -155,7 +157,7 @@ def _draw_ring(axes: Axes, section: Section, levels: Array) -> TriContourSet:
     return shown
 
 
-def _draw_film(axes: Axes, p: Seal, profile: Profile, height: float) -> None:
+def _draw_film(axes: Axes, p: Gland, profile: Profile, height: float) -> None:
     """Film pressure as a band in the rod.  height: mm for 1 MPa."""
     rod, x, film = 0.5 * p.rod_diameter, profile.x_mm, np.maximum(profile.p_MPa, 0.0)
     axes.fill_between(x, rod, rod - height * film, color=_FILM, lw=0)
@@ -168,7 +170,7 @@ def _draw_film(axes: Axes, p: Seal, profile: Profile, height: float) -> None:
     )
 
 
-def _draw_contact(axes: Axes, p: Seal, section: Section, height: float) -> None:
+def _draw_contact(axes: Axes, p: Gland, section: Section, height: float) -> None:
     """Contact pressure as bands in the housing and its walls.  height: mm for 1 MPa."""
     from matplotlib.collections import PolyCollection
 
@@ -196,7 +198,7 @@ def _normals(points: Array, edges: Integers) -> Array:
     return np.asarray(np.divide(total, length, out=total, where=length > 0.0))
 
 
-def _draw_motion(axes: Axes, p: Seal, speed: float) -> None:
+def _draw_motion(axes: Axes, p: Gland, speed: float) -> None:
     """An arrow the way the rod goes."""
     half = 0.3 * p.section_diameter * np.sign(speed)
     level = 0.5 * p.rod_diameter - (_AROUND[1] - 0.05) * p.section_diameter

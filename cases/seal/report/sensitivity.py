@@ -58,7 +58,7 @@ def write_sensitivities(
     import matplotlib
 
     with matplotlib.rc_context(style.STYLE):
-        save(tornado_figure(p, table), folder / "tornado", kinds)
+        save(tornado_figure(style.subject(p), table), folder / "tornado", kinds)
 
 
 def told(folder: Path) -> list[str]:
@@ -94,7 +94,7 @@ def _cells(path: Path, kind: type[Record]) -> list[list[str]]:
     return read_csv(path, kind.header()) if path.exists() else []
 
 
-def tornado_figure(p: Seal, table: Table) -> Figure:
+def tornado_figure(head: str, table: Table) -> Figure:
     """Bars: per cent of each quantity for one per cent of a parameter, at the slowest speeds."""
     from matplotlib.figure import Figure
 
@@ -128,6 +128,6 @@ def tornado_figure(p: Seal, table: Table) -> Figure:
         axes.axvline(0.0, color="0.2", linewidth=0.8)
     handles, labels = panels[-1].get_legend_handles_labels()
     figure.legend(handles, labels, loc="upper right")  # above the panels, where no bar is
-    style.write_head(figure, style.subject(p), 0.3)
+    style.write_head(figure, head, 0.3)
     style.set_margins(figure, 1.45, 0.15, 0.5, 0.85, 0.75)
     return figure

@@ -18,18 +18,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from softehl.cases.seal.gland.parameters import Seal
+    from softehl.cases.seal.gland.records.oil import Oil
+    from softehl.cases.seal.gland.surfaces import Surfaces
 
 _HERSEY = "$\\eta_0 |U| / p_{\\mathrm{dry}}$ [µm]   ($p_{\\mathrm{dry}}$ largest dry pressure)"
 _REGIMES = {MIXED: "boundary | mixed", FULL: "mixed | full"}
 _PANELS = (2.2, 1.0)  # heights of friction and of shares of asperities
 
 
-def hersey_um(p: Seal, row: FilmRow) -> float:
+def hersey_um(p: Oil, row: FilmRow) -> float:
     """eta_0 |U| over the largest pressure of the dry contact, um."""
     return 1e3 * p.viscosity * abs(row.rod_speed_mm_s) / row.contact_p_max_MPa
 
 
-def crossing(p: Seal, rows: Sequence[FilmRow], ratio: float) -> float | None:
+def crossing(p: Oil, rows: Sequence[FilmRow], ratio: float) -> float | None:
     """eta U / p (um) where the rows of a stroke, by rising speed, first have this lambda ratio.
 
     By the logarithms of both; None where they have not.
@@ -71,7 +73,7 @@ def stribeck_figure(p: Seal, rows: Sequence[FilmRow]) -> Figure | None:
 
 
 def _draw_stroke(
-    p: Seal, friction: Axes, shares: Axes, stroke: str, rows: Sequence[FilmRow]
+    p: Oil, friction: Axes, shares: Axes, stroke: str, rows: Sequence[FilmRow]
 ) -> None:
     x = [hersey_um(p, row) for row in rows]
     colour, label = style.COLOURS[stroke], style.STROKES[stroke]
@@ -103,6 +105,6 @@ def _draw_stroke(
         )
 
 
-def _surfaces(p: Seal) -> str:
+def _surfaces(p: Surfaces) -> str:
     rod, seal = p.roughness
     return f"rms rod {rod:g}, seal {seal:g} µm"

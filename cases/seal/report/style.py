@@ -9,6 +9,7 @@ if TYPE_CHECKING:  # imported late: matplotlib is slow to import
     from matplotlib.figure import Figure
 
     from softehl.cases.seal.gland.parameters import Seal
+    from softehl.cases.seal.gland.records.gland import Gland
 
 STYLE: Any = {
     "axes.axisbelow": True,
@@ -52,13 +53,13 @@ def subject(p: Seal) -> str:
     )
 
 
-def between(p: Seal) -> str:
+def between(p: Gland) -> str:
     """The two surfaces that the seal is squeezed between, in words."""
     slides, holds = ("bore", "groove of the piston") if p.piston else ("rod", "housing")
     return f"{slides} {abs(p.rod_diameter):.6g} mm, {holds} {abs(p.housing_diameter):.6g} mm"
 
 
-def radial_axis(axes: Axes, p: Seal) -> None:
+def radial_axis(axes: Axes, p: Gland) -> None:
     """Radii at the axis of a picture, upwards: those of a piston seal are counted negative."""
     axes.set_ylabel("r [mm]")
     axes.yaxis.set_major_formatter(lambda r, _: f"{abs(r):.4g}")

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.solid import Solid
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.section.uniform_layout import uniform_layout
 from softehl.runtime.arrays import Array, Integers
@@ -109,7 +110,7 @@ class SealSection:
         nodes = self.elements[elements]
         return np.ascontiguousarray(self.mesh.points[nodes].reshape(len(nodes), -1))
 
-    def node_moduli(self, p: Seal) -> Array:
+    def node_moduli(self, p: Solid) -> Array:
         """Shear modulus (nodes,) of the stiffest material at a node, MPa."""
         found = np.full(len(self.mesh.points), p.shear_modulus)
         for name in self.own:

@@ -15,7 +15,7 @@ import numpy as np
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import FilmLoads
-from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.numerics import Numerics
 from softehl.cases.seal.sensitivity.quantities import (
     QUANTITIES,
     along,
@@ -78,7 +78,7 @@ def sensitivities(
     return slopes
 
 
-def differentiation(p: Seal) -> Differentiate | None:
+def differentiation(p: Numerics) -> Differentiate | None:
     """Function that differentiates the films of a run; None where a case does not ask for it.
 
     Rates are kept for the films of the mesh that was last in use.

@@ -14,8 +14,6 @@ from softehl.cases.seal.equations.system import (
     SEALED_WALL,
     WALLS,
 )
-from softehl.cases.seal.gland.catalogue import fill, squeeze, stretch
-from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.contacts import contacts
 from softehl.cases.seal.states.section_view import section_view
 from softehl.cases.seal.states.state import ContactState
@@ -72,16 +70,6 @@ def contact_peaks(system: SealSystem, sealed_pressure: float, x: Array) -> tuple
     return tuple(float(pressure[nodes].max()) for nodes in contacts(system, x))
 
 
-def fit_percent(p: Seal) -> dict[str, float]:
-    """Fit of the free ring in its gland."""
-    depth = 0.5 * (p.housing_diameter - p.rod_diameter)
-    return {
-        "stretch_percent": stretch(p.free_ring, p.rod_diameter, p.housing_diameter),
-        "squeeze_percent": squeeze(p.section_diameter, depth),
-        "fill_percent": fill(p.free_ring, p.rod_diameter, p.housing_diameter, p.groove_width),
-    }
-
-
 def contact_numbers(system: SealSystem, x: Array) -> dict[str, float]:
     """Fit of the ring in its gland; axial forces on it in the contact state x, + to the air side.
 
@@ -98,7 +86,9 @@ def contact_numbers(system: SealSystem, x: Array) -> dict[str, float]:
         "sealed_pressure_N": p.sealed_pressure * pi * abs(float(crown**2 - bottom**2)),
     }
     return {
-        **fit_percent(p),
+        "stretch_percent": p.stretch_percent,
+        "squeeze_percent": p.squeeze_percent,
+        "fill_percent": p.fill_percent,
         **forces,
         "axial_sum_N": sum(forces.values()),
         **mean_motion(system, x),

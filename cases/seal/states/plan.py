@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 
 from softehl.cases.seal.equations.loads import Stroke
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.records.discretisation import DENSITIES
+from softehl.cases.seal.gland.records.discretisation import DENSITIES, Discretisation
+from softehl.cases.seal.gland.records.duty import Duty
 from softehl.cases.seal.gland.surfaces import FULL
 from softehl.cases.seal.states.state import CLIPPED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED, FilmRow
 from softehl.cases.seal.states.verdict import DOUBTFUL
@@ -43,12 +44,12 @@ def doubts(rows: Sequence[FilmRow], advice: Mapping[float, str]) -> dict[str, li
     return found
 
 
-def strokes_of(parameters: Seal) -> tuple[Stroke, ...]:
+def strokes_of(parameters: Duty) -> tuple[Stroke, ...]:
     """The strokes that are asked for, one by one."""
     return tuple(SIGNS) if parameters.stroke == "both" else (parameters.stroke,)
 
 
-def rod_speeds(parameters: Seal) -> list[float]:
+def rod_speeds(parameters: Duty) -> list[float]:
     """The signed rod speeds U that are asked for."""
     signs = [SIGNS[stroke] for stroke in strokes_of(parameters)]
     return [sign * speed for sign in signs for speed in parameters.speeds]
@@ -90,7 +91,7 @@ def missing_speeds(parameters: Seal, stroke: Stroke, rows: Sequence[FilmRow]) ->
     return tuple(u for u in parameters.speeds if SIGNS[stroke] * u not in kept)
 
 
-def outside_tolerance(parameters: Seal, rows: Sequence[FilmRow]) -> list[FilmRow]:
+def outside_tolerance(parameters: Discretisation, rows: Sequence[FilmRow]) -> list[FilmRow]:
     """The rows that do not meet the tolerance, if there is one."""
     tolerance = parameters.tolerance
     return [row for row in rows if tolerance is not None and not row.within(tolerance)]
