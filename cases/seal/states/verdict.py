@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import inf, isfinite, nan
 
@@ -64,6 +65,31 @@ STRONG_OSCILLATION = 0.2
 DOUBTFUL = "the estimated error of h* is large or not known; use a finer mesh (larger density)"
 
 FINER_MESH = "the film collapsed on this mesh; use a finer mesh (larger density)"
+
+_SHORT = (
+    "the inlet is only {:.2g} segments long, it needs {:g} with this pressure_order: h* may be "
+    "wrong by tens of per cent; use a finer mesh (larger density)"
+)
+_UNSEEN = (
+    "h* is {:.3g} of what the steepest slope of {} inlet gives, it must be near 1: the mesh does "
+    "not show it; use a finer mesh (larger density)"
+)
+_UNSEALED = (
+    "the sealed pressure is taken to end {}, where the ring touches nothing; try more squeeze or a "
+    "narrower groove"
+)
+_OVERLAP = (
+    "the section runs {}, which the model does not hinder; try a lower sealed_pressure, a harder "
+    "rubber or a wider mouth"
+)
+_MISMATCH = (
+    "the fluxes of the two contacts differ by {:.2g} %: oil is lost in the groove between them; "
+    'use cavitation = "mass-conserving"'
+)
+_ZIGZAG = (
+    "the film oscillates from node to node (index {:.2g}): h* holds to a few per cent, the profile "
+    "does not; use a finer mesh (larger density)"
+)
 
 
 @dataclass(frozen=True)
@@ -199,76 +225,38 @@ class Verdict:
     @property
     def word(self) -> str:
         """OK or what is worst: COLLAPSED, UNDER_RESOLVED, CLIPPED, UNCERTAIN, OSCILLATING."""
-        if self.collapsed:
-            return COLLAPSED
-        if self.last is None:
-            return OK
-        if self.last.inlet_segments < self.fewest and not self.last.touching:
-            return UNDER_RESOLVED
-        if self.last.clipped:
-            return CLIPPED
-        if not self.ratios[0] <= self.last.inlet_ratio <= self.ratios[1]:
-            return UNDER_RESOLVED
-        if self.ratios != ANY_RATIO and abs(self.last.next_ratio - 1.0) > NEXT_RATIO:
-            return UNDER_RESOLVED
-        if self.error is not None and not abs(self.error) <= LARGEST_ERROR:
-            return UNCERTAIN
-        if self.unsealed or self.overlap or self.last.mismatch > LARGEST_ERROR:
-            return UNCERTAIN
-        return OSCILLATING if self.last.oscillation > STRONG_OSCILLATION else OK
+        return next((word for word, _ in self._doubts()), OK)
 
     @property
     def advice(self) -> str:
         """Advice; empty for OK."""
-        word, last = self.word, self.last
-        if word == COLLAPSED:
-            return f"{FINER_MESH}: {self.collapsed}"
-        if last is None or word == OK:
-            return ""
-        if word == CLIPPED:
-            if last.lacking <= MOST_LACKING:
-                where = f"the arc ends where the film is only {1e3 * last.end_gap:.3g} um thick"
-            else:
-                where = f"the arc cuts off {100.0 * last.lacking:.2g} % of the inlet's pressure"
-            return (
-                f"{where}; leave arc_start and arc_end out, or move them outwards; where they are "
-                "left out, the section has no room for so thick a film"
-            )
-        if word == UNCERTAIN and self.unsealed:
-            return (
-                f"the sealed pressure is taken to end {self.unsealed}, where the ring touches "
-                "nothing; try more squeeze or a narrower groove"
-            )
-        if word == UNCERTAIN and self.overlap:
-            return (
-                f"the section runs {self.overlap}, which the model does not hinder; "
-                "try a lower sealed_pressure, a harder rubber or a wider mouth"
-            )
-        if word == UNCERTAIN and last.mismatch > LARGEST_ERROR:
-            return (
-                f"the fluxes of the two contacts differ by {last.mismatch:.2g} %: oil is lost in "
-                'the groove between them; use cavitation = "mass-conserving"'
-            )
-        if word == UNCERTAIN:
-            return DOUBTFUL
-        if word == UNDER_RESOLVED and last.inlet_segments >= self.fewest:
-            seen = self.ratios[0] <= last.inlet_ratio <= self.ratios[1]
-            next_one = "the next contact's", last.next_ratio
-            of, ratio = next_one if seen else ("its", last.inlet_ratio)
-            return (
-                f"h* is {ratio:.3g} of what the steepest slope of {of} inlet gives, it "
-                "must be near 1: the mesh does not show it; use a finer mesh (larger density)"
-            )
-        if word == UNDER_RESOLVED:
-            return (
-                f"the inlet is only {last.inlet_segments:.2g} segments long, it needs "
-                f"{self.fewest:g} with this pressure_order: h* may be wrong by tens of per cent; "
-                "use a finer mesh (larger density)"
-            )
-        return (
-            f"the film oscillates from node to node (index {last.oscillation:.2g}): h* holds to "
-            "a few per cent, the profile does not; use a finer mesh (larger density)"
-        )
+        return next((advice for _, advice in self._doubts()), "")
+
+    def _doubts(self) -> Iterator[tuple[str, str]]:
+        """Verdicts that stand against the last film, worst first, each with its advice."""
+        if self.collapsed:
+            yield COLLAPSED, f"{FINER_MESH}: {self.collapsed}"
+        film = self.last
+        if film is None:
+            return
+        if film.inlet_segments < self.fewest and not film.touching:
+            yield UNDER_RESOLVED, _SHORT.format(film.inlet_segments, self.fewest)
+        if film.clipped:
+            yield CLIPPED, _cut(film)
+        if not self.ratios[0] <= film.inlet_ratio <= self.ratios[1]:
+            yield UNDER_RESOLVED, _UNSEEN.format(film.inlet_ratio, "its")
+        if self.ratios != ANY_RATIO and abs(film.next_ratio - 1.0) > NEXT_RATIO:
+            yield UNDER_RESOLVED, _UNSEEN.format(film.next_ratio, "the next contact's")
+        if self.unsealed:
+            yield UNCERTAIN, _UNSEALED.format(self.unsealed)
+        if self.overlap:
+            yield UNCERTAIN, _OVERLAP.format(self.overlap)
+        if film.mismatch > LARGEST_ERROR:
+            yield UNCERTAIN, _MISMATCH.format(film.mismatch)
+        if self.error is not None and not abs(self.error) <= LARGEST_ERROR:
+            yield UNCERTAIN, DOUBTFUL
+        if film.oscillation > STRONG_OSCILLATION:
+            yield OSCILLATING, _ZIGZAG.format(film.oscillation)
 
     def _suspicion(self, film: FilmNumbers) -> str:
         if film.h_min <= 0.0 and not self.rough:
@@ -298,3 +286,15 @@ class Verdict:
         if self.last is None or self.last.h_star <= 0.0:
             return inf
         return local_exponent(self.last.speed, self.last.h_star, film.speed, film.h_star)
+
+
+def _cut(film: FilmNumbers) -> str:
+    """Advice for a film whose arc ends within it."""
+    if film.lacking <= MOST_LACKING:
+        where = f"the arc ends where the film is only {1e3 * film.end_gap:.3g} um thick"
+    else:
+        where = f"the arc cuts off {100.0 * film.lacking:.2g} % of the inlet's pressure"
+    return (
+        f"{where}; leave arc_start and arc_end out, or move them outwards; where they are left "
+        "out, the section has no room for so thick a film"
+    )
