@@ -9,7 +9,6 @@ import pytest
 from pydantic import ValidationError
 
 from softehl.cases.seal.gland.oils import (
-    GRADES,
     Walther,
     barus,
     barus_of_roelands,
@@ -17,6 +16,7 @@ from softehl.cases.seal.gland.oils import (
     read_oil,
 )
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.trade.oil_names import GRADES
 
 VG46 = (
     "ISO VG 46",

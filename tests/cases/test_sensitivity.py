@@ -264,7 +264,7 @@ def test_tolerances_of_a_catalogue_ring_and_given_ones() -> None:
         sensitivity=True,
         tolerances=("viscosity 20 %", "modulus 10 %", "inner_diameter 0.1 mm"),
     )
-    shares = read_tolerances(p.tolerances, p.model_dump(), p.ring)
+    shares = read_tolerances(p)
     assert shares["viscosity"] == {"viscosity": 0.2}
     assert shares["inner_diameter"] == {"inner_diameter": pytest.approx(0.1 / p.inner_diameter)}
     assert shares["modulus"] == {"mu_1": 0.1, "mu_2": 0.1}
@@ -280,20 +280,20 @@ def test_the_modulus_is_that_of_the_rubber() -> None:
     rubbers = [({"shore_A": 70.0}, ("mu",)), ({"mu_2": 0.0}, ("mu_1",))]
     for given, names in rubbers:
         p = Seal(sensitivity=True, tolerances=("modulus 25 %",), **given)
-        shares = read_tolerances(p.tolerances, p.model_dump(), p.ring)
+        shares = read_tolerances(p)
         assert shares["modulus"] == dict.fromkeys(names, 0.25)
 
 
 def test_the_rod_is_its_diameter() -> None:
     p = Seal(rod=50.0, sensitivity=True, tolerances=("rod 0.05 mm",))
-    shares = read_tolerances(p.tolerances, p.model_dump(), p.ring)
+    shares = read_tolerances(p)
     assert shares["rod"] == {"rod_diameter": pytest.approx(0.001)}
 
 
 def test_a_thicker_ring_of_a_piston_is_larger_outside() -> None:
     """Its inside diameter has a tolerance of its own: 0.1 mm of section are 0.2 mm outside."""
     p = Seal(ring="32x4", bore=40.0, sensitivity=True, tolerances=("section_diameter 0.1 mm",))
-    shares = read_tolerances(p.tolerances, p.model_dump(), None)
+    shares = read_tolerances(p)
     moved = {key: share * getattr(p, key) for key, share in shares["section_diameter"].items()}
     assert moved == pytest.approx({"section_diameter": 0.1, "inner_diameter": -0.2})
 

@@ -71,7 +71,7 @@ def test_a_rod_with_a_fit_is_solved_at_the_middle_of_its_limits() -> None:
     p = typed("ring=AS568-210", "rod=19 f7", "sensitivity=true")
     assert p.rod_diameter == pytest.approx(19.0 - 0.5e-3 * (20 + 41))
     assert Seal(**p.model_dump()) == p
-    moved = read_tolerances((), dict(p), None)["rod_diameter"]
+    moved = read_tolerances(p)["rod_diameter"]
     assert moved == {"rod_diameter": pytest.approx(0.0105 / p.rod_diameter)}
     assert CASE.foreword(p)[0] == ("rod = 19 f7: 18.959 to 18.98 mm, solved at the middle, 18.9695")
 

@@ -7,10 +7,8 @@ from math import pi, sqrt
 
 import pytest
 
-from softehl.cases.seal.gland import oils
 from softehl.cases.seal.gland.trade.finish_names import read_finish
 from softehl.cases.seal.gland.trade.fit_names import DEVIATIONS, GRADES, STEPS, band, read_fit
-from softehl.cases.seal.gland.trade.oil_names import GRADES as GRADES_OF_OILS
 from softehl.cases.seal.gland.trade.oil_names import dynamic, read_oil_name
 from softehl.cases.seal.gland.trade.ring_names import Kind, RingName, read_ring
 from softehl.cases.seal.gland.trade.rubber_names import RubberName, read_rubber
@@ -320,10 +318,6 @@ def test_oils() -> None:
         assert read_oil_name(name).points == ((46.0, 40.0), (6.8, 100.0)), name
     for name in VISCOSITIES:
         assert dynamic(name) == pytest.approx(1e-7), name
-
-
-def test_grades_of_refusals_are_those_of_oils() -> None:
-    assert set(GRADES_OF_OILS) == set(oils.GRADES)
 
 
 def test_rubbers() -> None:

@@ -55,7 +55,7 @@ def _rubber_has_an_element(p: Solid) -> None:
 
 
 def _sensitivity_has_a_meaning(p: Seal) -> None:
-    read_tolerances(p.tolerances, dict(p), p.ring)
+    read_tolerances(p)
     if p.tolerances and not p.sensitivity:
         raise ValueError(
             "tolerances need the sensitivities of the run; set sensitivity = true (--sensitivity)"
@@ -224,7 +224,6 @@ def _pressure_is_within_reach(p: Seal) -> None:
 _CHECKS = (
     _mesh_is_there,
     _rubber_has_an_element,
-    _sensitivity_has_a_meaning,
     _rule_is_rich_enough,
     _film_has_its_model,
     _tolerance_has_an_estimate,
@@ -235,5 +234,6 @@ _CHECKS = (
     _seal_is_squeezed,
     _ring_fits_the_rod,
     _section_is_between_the_walls,
+    _sensitivity_has_a_meaning,
     _pressure_is_within_reach,
 )

@@ -13,17 +13,8 @@ from typing import Any
 
 from softehl.cases.seal.gland.given import number, put
 from softehl.cases.seal.gland.records.oil import Oil
-from softehl.cases.seal.gland.trade.oil_names import read_oil_name
+from softehl.cases.seal.gland.trade.oil_names import GRADES, read_oil_name
 from softehl.cases.seal.gland.viscosity_index import at_100_of_index
-
-GRADES = {
-    **{10: 2.6, 15: 3.4, 22: 4.3, 32: 5.4, 46: 6.8, 68: 8.6},
-    **{100: 11.1, 150: 14.7, 220: 19.0, 320: 24.0},
-}
-"""ISO 3448 grade, its viscosity at 40 degC (+-10 %) -> at 100 degC, of a mineral oil, cSt.
-
-Typical of hydraulic oils without viscosity improver, viscosity index 90 to 105.
-"""
 
 DENSITY = 870.0
 """At 15 degC, of a mineral oil, kg/m^3."""

@@ -9,14 +9,19 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from softehl.cases.harness.row import Record, column
 from softehl.cases.seal.gland.catalogue import UnknownRingError, ring
+from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.trade.said import LENGTHS as LIMITED
 from softehl.cases.seal.gland.trade.said import bands
 from softehl.cases.seal.gland.varied import LENGTHS, MEASURES, NUMBERS, PRESSURE_KEY
+
+if TYPE_CHECKING:
+    from softehl.cases.seal.gland.parameters import Seal
 
 _SURFACES = {
     "rod": ("rod_diameter",),
@@ -54,47 +59,27 @@ Shares = Mapping[str, Mapping[str, float]]
 """Name of a tolerance -> the parameters that it moves, each by a share of its value."""
 
 
-def read_tolerances(
-    given: Sequence[str], values: Mapping[str, object], ring_name: str | None
-) -> Shares:
+def read_tolerances(p: Seal) -> Shares:
     """The tolerances of a case: those of its ring in the catalogue, of limits, and those given.
 
-    given: texts such as "viscosity 10 %" or "rod_diameter 0.05 mm". values: those of the case's
-    keys. Raises ValueError.
+    Raises ValueError.
     """
-    typed = [_share(text, values) for text in given]
+    typed = [_share(text, p) for text in p.tolerances]
     twice = [name for name, times in Counter(name for name, _ in typed).items() if times > 1]
     if twice:
         raise ValueError(f"tolerances: {twice[0]} is given twice; leave one of them out")
-    of_ring = [f"{key} {tolerance!r} mm" for key, _, tolerance in ring_sizes(ring_name)]
-    known = [*of_ring, *_of_limits(values)]
-    return dict([*(_share(text, values) for text in known), *typed])
+    of_ring = [f"{key} {tolerance!r} mm" for key, _, tolerance in ring_sizes(p.ring)]
+    of_limits = [f"{LIMITED[name]} {found.half:.9f} mm" for name, found in bands(p.said)]
+    return dict([*(_share(text, p) for text in (*of_ring, *of_limits)), *typed])
 
 
-def _with_outside(moved: dict[str, float], values: Mapping[str, object]) -> dict[str, float]:
-    """What a tolerance of the section moves: the outside of a piston ring with it, which is the
-    inside diameter and twice the section.
-    """
-    section, outside = (float(str(values[key])) for key in ("section_diameter", "inner_diameter"))
-    if "section_diameter" in moved and outside < 0.0:
-        moved["inner_diameter"] = moved["section_diameter"] * 2.0 * section / -outside
-    return moved
-
-
-def _of_limits(values: Mapping[str, object]) -> list[str]:
-    """Tolerances of what was given with its limits, "36 f7", +- mm."""
-    said = values.get("said", ())
-    assert isinstance(said, tuple)
-    return [f"{LIMITED[name]} {found.half:.9f} mm" for name, found in bands(said)]
-
-
-def _share(text: str, values: Mapping[str, object]) -> tuple[str, dict[str, float]]:
+def _share(text: str, p: Seal) -> tuple[str, dict[str, float]]:
     """The name of a tolerance, and the share by which it moves each parameter.  ValueError."""
     found = _ITEM.fullmatch(text.strip())
     if found and found["name"] in _OF_THE_GLAND:
-        return found["name"], _of_the_gland(found, values)
-    names = _moved(found["name"], values) if found else ()
-    known = [value for value in map(values.get, names) if isinstance(value, float)]
+        return found["name"], _of_the_gland(found, p)
+    names = _moved(found["name"], p) if found else ()
+    known = [value for name in names if isinstance(value := getattr(p, name), float)]
     metric = found is None or found["unit"] != "mm" or _IN_MM.issuperset(names)
     if not found or not known or len(known) < len(names) or not metric:
         raise ValueError(
@@ -104,38 +89,30 @@ def _share(text: str, values: Mapping[str, object]) -> tuple[str, dict[str, floa
         )
     size = float(found["size"])
     share = 0.01 * size if found["unit"] == "%" else size / abs(known[0])
-    return found["name"], _with_outside(dict.fromkeys(names, share), values)
+    moved = dict.fromkeys(names, share)
+    if p.piston and "section_diameter" in moved:  # less the outside: inside and twice the section
+        moved["inner_diameter"] = share * 2.0 * p.section_diameter / -p.inner_diameter
+    return found["name"], moved
 
 
-def _of_the_gland(found: re.Match[str], values: Mapping[str, object]) -> dict[str, float]:
+def _of_the_gland(found: re.Match[str], p: Gland) -> dict[str, float]:
     """The share by which a depth, squeeze (points) or fill (points) moves diameter or width."""
     name, size, unit = found["name"], float(found["size"]), found["unit"]
-    rod, housing, section, fill = (
-        float(str(values.get(key) or 0.0))
-        for key in ("rod_diameter", "housing_diameter", "section_diameter", "fill")
-    )
     if unit not in _OF_THE_GLAND[name]:
         unit, usual = _OF_THE_GLAND[name][0], 0.05 if name == "groove_depth" else 2
         raise ValueError(
             f'tolerances: "{found[0]}" is not understood; write "{name} {usual} {unit}"'
         )
     if name == "fill":
-        if not fill:
-            raise ValueError(
-                f'tolerances: "{found[0]}" needs fill; write "groove_width 0.2 mm", or give fill'
-            )
-        return {"groove_width": size / fill}
-    depth = 0.5 * (housing - rod)
-    wrong = 0.01 * size * section if name == "squeeze" else size
-    if name == "groove_depth" and unit == "%":
-        wrong = 0.01 * size * depth
-    return {"housing_diameter": 2.0 * wrong / abs(housing)}
+        return {"groove_width": size / p.fill_percent}
+    wrong = 0.01 * size * (p.section_diameter if name == "squeeze" else p.depth)
+    return {"housing_diameter": 2.0 * (wrong if unit == "%" else size) / abs(p.housing_diameter)}
 
 
-def _moved(name: str, values: Mapping[str, object]) -> tuple[str, ...]:
+def _moved(name: str, p: Seal) -> tuple[str, ...]:
     """The keys that a tolerance moves: those of its name that have a value and a sensitivity."""
     names = _ALIASES.get(name, (name,))
-    return tuple(key for key in names if key in _VARIED and values.get(key))
+    return tuple(key for key in names if key in _VARIED and getattr(p, key))
 
 
 def ring_sizes(name: str | None) -> list[tuple[str, float, float]]:

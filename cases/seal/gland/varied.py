@@ -25,3 +25,10 @@ NUMBERS = (
 
 MEASURES = tuple(dict.fromkeys(key for section in SECTIONS for key in dimensions(section)))
 """Dimensions of sections that are not round, which are lengths too."""
+
+BASES = {
+    "groove_depth": ("housing_diameter", "depth"),
+    "squeeze": ("housing_diameter", "squeeze_percent"),
+    "fill": ("groove_width", "fill_percent"),
+}
+"""Measure of the gland -> the key that it decides, all others held, and its name in `Gland`."""

@@ -45,7 +45,7 @@ def write_sensitivities(
     for row in map(SensitivityRow.parse, cells):
         quantity = table.setdefault(row.rod_speed_mm_s, {}).setdefault(row.quantity, {})
         quantity[row.parameter] = row.log_derivative
-    shares = read_tolerances(p.tolerances, p.model_dump(), p.ring)
+    shares = read_tolerances(p)
     if shares:
         bands = [
             band((p.sealed_pressure, speed), name, slopes, shares)

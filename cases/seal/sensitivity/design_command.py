@@ -10,9 +10,8 @@ from pydantic import ValidationError
 
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
-from softehl.cases.seal.gland.derived import BASES, derived
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.varied import NUMBERS, PRESSURE_KEY
+from softehl.cases.seal.gland.varied import BASES, NUMBERS, PRESSURE_KEY
 from softehl.cases.seal.sensitivity.design import Change, NoDesignError, Step, Target, designed
 from softehl.cases.seal.sensitivity.held import HeldFilm
 from softehl.cases.seal.sensitivity.quantities import CALLED
@@ -67,7 +66,7 @@ class Design:
     def measure(self, value: float) -> float:
         """The value of what a user named, where the key has this one; of a piston not negative."""
         if self.asked in BASES:
-            return derived(self.at(value), self.asked)
+            return float(getattr(self.at(value), BASES[self.asked][1]))
         return abs(value) if self.asked in _OF_PISTON else value
 
     @property
@@ -84,7 +83,7 @@ class Design:
 def design_case(p: Seal, target: str, key: str, observer: Observer | None = None) -> Design:
     """The way to a target by a key.  Raises BadInput, also where it is not reached."""
     asked = SAME.get(key, key)
-    base = BASES.get(asked, asked)
+    base, _ = BASES.get(asked, (asked, asked))
     known = [k for k in (*NUMBERS, PRESSURE_KEY) if isinstance(getattr(p, k), float)]
     if base not in known:
         hint = f" ({INSTEAD[base]})" if base in INSTEAD else meant(base, known)

@@ -11,7 +11,7 @@ Speed = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
 
 
 class Duty(Parameters):
-    """What a seal is to do."""
+    """Sealed pressure, speeds and strokes."""
 
     sealed_pressure: float = key(1.0, "sealed pressure p_s", unit="MPa", ge=0, le=100)
     speeds: tuple[Speed, ...] = key(

@@ -1,4 +1,4 @@
-"""What the film knows beside the flow of its oil: surfaces, cavitation, shear of the seal."""
+"""The model of a film: surfaces, cavitation, shear of the seal."""
 
 from typing import Literal
 

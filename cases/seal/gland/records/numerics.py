@@ -1,4 +1,4 @@
-"""How a seal is solved, and what is made of its states beside the curve."""
+"""Solvers, support of the section, and results beside the curve."""
 
 from typing import Literal
 
@@ -6,7 +6,7 @@ from softehl.cases.harness.parameters import Parameters, key
 
 
 class Numerics(Parameters):
-    """Solvers, what holds the section, and sensitivities."""
+    """Solvers, support, sensitivities."""
 
     sensitivity: bool = key(
         False, "whether sensitivity.csv is written: how results follow every parameter"

@@ -12,8 +12,14 @@ from softehl.cases.seal.gland.trade.text import NUMBER, plain, refused
 IMPROVED = 140.0
 """Least viscosity index of HVLP oils, DIN 51524-3."""
 
-GRADES = (10, 15, 22, 32, 46, 68, 100, 150, 220, 320)
-"""Grades of ISO 3448 that are known here."""
+GRADES = {
+    **{10: 2.6, 15: 3.4, 22: 4.3, 32: 5.4, 46: 6.8, 68: 8.6},
+    **{100: 11.1, 150: 14.7, 220: 19.0, 320: 24.0},
+}
+"""ISO 3448 grade, its viscosity at 40 degC (+-10 %) -> at 100 degC, of a mineral oil, cSt.
+
+Typical of hydraulic oils without viscosity improver, viscosity index 90 to 105.
+"""
 
 TWO = "46 cSt at 40 degC, 6.8 cSt at 100 degC"
 """Two viscosities, as an example."""
