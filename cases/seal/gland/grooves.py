@@ -1,5 +1,7 @@
 """Standard glands: grooves that charts of makers give for a section, and what lies between them.
 
+`grooves.csv` holds the charts:
+
 - Inch O-rings, "dynamic": the common chart of makers' handbooks for reciprocating seals (e.g.
   Apple Rubber's design guide, table A).
 - Metric O-rings, "dynamic": a maker's chart of housing dimensions (orings.co.uk, O-ring housing);
@@ -15,8 +17,11 @@ and lips, and the groove is a tenth wider than the seal.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+import csv
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
@@ -27,6 +32,8 @@ Kind = Literal["dynamic", "hydraulic", "pneumatic"]
 
 KINDS: tuple[Kind, ...] = ("dynamic", "hydraulic", "pneumatic")
 """Uses of a reciprocating seal; "dynamic" is "hydraulic"."""
+
+_SIZES = ("section", "depth_low", "depth_high", "width_low", "width_high")
 
 SAME = 0.03
 """Relative difference of two sections that have the same groove."""
@@ -50,7 +57,7 @@ class Range(NamedTuple):
 
 @dataclass(frozen=True)
 class Groove:
-    """A groove for one section, mm: depth from the rod to its ground, axial width, corner radius.
+    """A groove for one section, mm: depth from the rod to its ground, axial width.
 
     The depth holds the clearance between rod and housing; the width is one without back-up rings.
     by_rule: whether it follows from a rule, not from a chart.
@@ -59,7 +66,6 @@ class Groove:
     section_diameter: float
     depth: Range
     width: Range
-    radius: Range | None = None
     by_rule: bool = False
 
 
@@ -70,8 +76,8 @@ def gland(section_diameter: float, kind: str = "dynamic", section: str = "round"
     """
     if kind not in KINDS:
         raise UnknownGlandError(f'gland = "{kind}" is not known; there is {_quoted(KINDS)}')
-    round_rings = _PNEUMATIC if kind == "pneumatic" else _DYNAMIC
-    chart = _X_RINGS if section == "x_ring" else round_rings
+    round_rings = "pneumatic" if kind == "pneumatic" else "dynamic"
+    chart = _chart("x_ring" if section == "x_ring" else round_rings)
     near = min(chart, key=lambda g: abs(g.section_diameter - section_diameter))
     if abs(section_diameter - near.section_diameter) <= SAME * near.section_diameter:
         return near
@@ -111,67 +117,18 @@ def _between(below: Groove, above: Groove, section: float) -> Groove:
     return Groove(section, size("depth"), size("width"), by_rule=True)
 
 
-# inch: section, depth, width (+- 0.005), corner radius
-_INCH = (
-    (0.070, (0.055, 0.057), 0.095, (0.005, 0.015)),
-    (0.103, (0.087, 0.090), 0.145, (0.005, 0.020)),
-    (0.139, (0.119, 0.123), 0.185, (0.005, 0.030)),
-    (0.210, (0.183, 0.188), 0.285, (0.005, 0.050)),
-    (0.275, (0.234, 0.240), 0.375, (0.005, 0.060)),
-)
-
-# mm: section, depth, width
-_HYDRAULIC_MM = (
-    *((1.5, 1.25, 2.0), (1.8, 1.45, 2.4), (2.0, 1.65, 2.7), (2.4, 2.05, 3.2), (2.5, 2.15, 3.3)),
-    *((2.65, 2.25, 3.6), (3.0, 2.6, 4.0), (3.55, 3.1, 4.8), (4.0, 3.5, 5.2), (4.5, 4.0, 5.8)),
-    *((5.0, 4.4, 6.6), (5.3, 4.7, 7.1), (5.7, 5.0, 7.2), (6.0, 5.3, 7.4), (6.5, 5.7, 8.0)),
-    (7.0, 6.1, 9.5),
-)
-_PNEUMATIC_MM = (
-    *((1.5, 1.35, 1.9), (1.78, 1.55, 2.3), (2.0, 1.8, 2.4), (2.4, 2.15, 2.9), (2.5, 2.25, 3.0)),
-    *((2.62, 2.35, 3.1), (3.0, 2.75, 3.6), (3.53, 3.25, 4.2), (4.0, 3.7, 4.8), (4.5, 4.2, 5.4)),
-    *((5.0, 4.65, 6.0), (5.33, 4.95, 6.4), (5.7, 5.35, 6.9), (6.0, 5.65, 7.2), (6.5, 6.1, 7.8)),
-    *((7.0, 6.6, 8.4), (7.5, 7.1, 9.0), (8.0, 7.6, 9.6)),
-)
-
-# inch: section, depth, width (+0.005)
-_QUAD_INCH = (
-    *((0.070, 0.061, 0.080), (0.103, 0.094, 0.115), (0.139, 0.128, 0.155)),
-    *((0.210, 0.196, 0.240), (0.275, 0.256, 0.310)),
-)
+@cache
+def _chart(name: str) -> tuple[Groove, ...]:
+    """The grooves of a chart by their sections: "dynamic", "pneumatic" or "x_ring"."""
+    text = files(__package__).joinpath("grooves.csv").read_text(encoding="utf-8")
+    rows = (_groove(row) for row in csv.DictReader(text.splitlines()) if row["chart"] == name)
+    return tuple(sorted(rows, key=lambda groove: groove.section_diameter))
 
 
-def _inches(low: float, high: float) -> Range:
-    return Range(round(low * INCH, 4), round(high * INCH, 4))
-
-
-def _metric(rows: Iterable[tuple[float, float, float]]) -> list[Groove]:
-    return [Groove(d, Range(t, t), Range(b, b)) for d, t, b in rows]
-
-
-def _chart(*rows: Sequence[Groove]) -> tuple[Groove, ...]:
-    return tuple(sorted((g for some in rows for g in some), key=lambda g: g.section_diameter))
-
-
-_DYNAMIC = _chart(
-    [
-        Groove(
-            round(section * INCH, 4),
-            _inches(*depth),
-            _inches(width - 0.005, width + 0.005),
-            _inches(*radius),
-        )
-        for section, depth, width, radius in _INCH
-    ],
-    _metric(_HYDRAULIC_MM),
-)
-_PNEUMATIC = _chart(_metric(_PNEUMATIC_MM))
-_X_RINGS = _chart(
-    [
-        replace(g, width=Range(g.width.low, round(g.width.low + 0.005 * INCH, 4)))
-        for g in _metric([(round(INCH * d, 4), INCH * t, INCH * b) for d, t, b in _QUAD_INCH])
-    ]
-)
+def _groove(row: dict[str, str]) -> Groove:
+    unit = INCH if row["unit"] == "in" else 1.0
+    section, *ends = (round(unit * float(row[name]), 4) for name in _SIZES)
+    return Groove(section, Range(*ends[:2]), Range(*ends[2:]))
 
 
 def _quoted(names: Iterable[str]) -> str:

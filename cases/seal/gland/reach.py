@@ -33,24 +33,21 @@ def ratio(p: Solid, pressure: float) -> float:
 
 
 def reach(p: Solid, pressure: float) -> list[str]:
-    """Line about the ratio and its meaning; nothing without a pressure."""
+    """Line about the ratio and its meaning; nothing without a pressure or beyond the reach."""
     found = ratio(p, pressure)
-    if not found or _beyond(p, found):
-        return []
-    return [f"{_named(found)}: {_ROUND_WORDS if p.round else _OTHER_WORDS}"]
+    return [_line(p, found)] if 0.0 < found <= _most(p) else []
 
 
 def beyond_reach(p: Solid, pressure: float) -> list[str]:
     """Line with advice where the ratio is above what is known to run."""
     found = ratio(p, pressure)
-    if not _beyond(p, found):
-        return []
-    return [f"{_named(found)}: {_ROUND_WORDS if p.round else _OTHER_WORDS}; {_DO}"]
+    return [f"{_line(p, found)}; {_DO}"] if found > _most(p) else []
 
 
-def _beyond(p: FreeSeal, found: float) -> bool:
-    return found > (_SURE if p.round else _OTHER)
+def _most(p: FreeSeal) -> float:
+    return _SURE if p.round else _OTHER
 
 
-def _named(found: float) -> str:
-    return f"sealed pressure / shear modulus = {found:.2g}"
+def _line(p: FreeSeal, found: float) -> str:
+    words = _ROUND_WORDS if p.round else _OTHER_WORDS
+    return f"sealed pressure / shear modulus = {found:.2g}: {words}"
