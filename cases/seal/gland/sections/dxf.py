@@ -7,14 +7,13 @@ from math import cos, dist, radians, sin
 from pathlib import Path
 from typing import Any
 
-from softehl.cases.seal.gland.sections.seated import require_film_below, runs, seated
-from softehl.runtime.mesh.outline import Arc, Line, Outline, OutlineError, Piece, Point, Shape
+from softehl.cases.seal.gland.sections.seated import Named, mirrored, named_shape
+from softehl.runtime.mesh.outline import Arc, Line, OutlineError, Piece, Point, Shape
 from softehl.runtime.mesh.outline_checks import CLOSED
 from softehl.runtime.mesh.pieces import bulge_arc
 
 _UNITS = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0, 13: 1e-3}  # $INSUNITS of DXF -> mm
 _WORDS = ("DIMENSION", "HATCH", "LEADER", "MTEXT", "MULTILEADER", "POINT", "TEXT", "VIEWPORT")
-Named = tuple[Piece, str]
 
 
 def read_dxf(path: Path, inner_diameter: float | None = None) -> Shape:
@@ -23,28 +22,7 @@ def read_dxf(path: Path, inner_diameter: float | None = None) -> Shape:
     One closed contour; the layers FILM and PRESSURE name its lubricated and its sealed part. A
     drawing whose sealed side is on the right is mirrored. Raises OutlineError, one line.
     """
-    named = _chained(_pieces(path), path.name)
-    pieces = [piece for piece, _ in named]
-    try:
-        outline = Outline(pieces)
-        if outline.pieces[0] != pieces[0]:  # it was clockwise
-            named = [(piece.reversed(), layer) for piece, layer in reversed(named)]
-        found = runs([layer for _, layer in named], path.name)
-        if found.mirrored:
-            named = [(_mirrored(piece).reversed(), layer) for piece, layer in reversed(named)]
-            outline = Outline([piece for piece, _ in named])
-            found = runs([layer for _, layer in named], path.name)
-    except OutlineError as error:
-        words = str(error)
-        raise OutlineError(
-            words if words.startswith(path.name) else f"{path.name}: {words}"
-        ) from None
-    outline = seated(outline, inner_diameter)
-    ends = [
-        (float(outline.starts[first]), float(outline.starts[(first + count) % len(named)]))
-        for first, count in (found.film, found.pressure)
-    ]
-    return require_film_below(Shape(outline, ends[0], ends[1], path.stem), path.name)
+    return named_shape(_chained(_pieces(path), path.name), inner_diameter, path.name)
 
 
 def _pieces(path: Path) -> list[Named]:
@@ -98,7 +76,7 @@ def _converted(entity: Any, file: str) -> Iterator[Piece]:
             "polyline; explode it or draw it as arcs"
         )
     behind = entity.dxf.hasattr("extrusion") and entity.dxf.extrusion.z < 0.0
-    yield from (map(_mirrored, found) if behind else found)
+    yield from (map(mirrored, found) if behind else found)
 
 
 def _flat(point: Any) -> Point:
@@ -119,14 +97,6 @@ def _polyline(corners: list[tuple[float, float, float]], closed: bool) -> list[P
     ends = [*points[1:], points[0]] if closed else points[1:]
     pairs = zip(points, ends, (bulge for _, _, bulge in corners), strict=False)
     return [bulge_arc(a, b, float(bulge)) for a, b, bulge in pairs if a != b]
-
-
-def _mirrored(piece: Piece) -> Piece:
-    """The piece with -z for z."""
-    (a, b), (c, d) = piece.start, piece.end
-    if isinstance(piece, Line):
-        return Line((-a, b), (-c, d))
-    return Arc((-a, b), (-c, d), (-piece.centre[0], piece.centre[1]), not piece.ccw)
 
 
 def _chained(named: list[Named], file: str) -> list[Named]:

@@ -13,13 +13,15 @@ from softehl.cases.seal.gland.sections.dxf import read_dxf
 from softehl.cases.seal.gland.sections.seated import (
     FILM,
     PRESSURE,
+    named_shape,
+    outline_in,
     require_film_below,
     runs,
     seated,
 )
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.mesh import Mesh, MeshError
-from softehl.runtime.mesh.outline import Outline, OutlineError, Point, Shape
+from softehl.runtime.mesh.outline import Line, Outline, OutlineError, Point, Shape
 from softehl.runtime.mesh.sections import SectionMesh, corner_jacobians
 from softehl.runtime.mesh.subdivide import subdivided
 
@@ -55,10 +57,7 @@ def read_points(path: Path, inner_diameter: float | None = None) -> Shape:
             "left out), numbers in the first two"
         ) from None
     parts = [(row.get("part") or "").strip() for row in rows]
-    try:
-        return outline_of(points, inner_diameter, parts if any(parts) else None, path.stem)
-    except OutlineError as error:
-        raise OutlineError(f"{path.name}: {error}") from None
+    return outline_of(points, inner_diameter, parts if any(parts) else None, path.name)
 
 
 def outline_of(
@@ -72,28 +71,19 @@ def outline_of(
     parts: FILM, PRESSURE or else of the side behind each point. Without: film where the polygon
     faces the rod, sealed pressure from its highest point on. Raises OutlineError.
     """
-    if parts is None:
-        outline = seated(Outline.polygon(points), inner_diameter)
-        z, r = np.array([piece.start for piece in outline.pieces]).T
-        highest = np.flatnonzero(r >= r.max() - 1e-6 * outline.size)
-        crown = highest[int(np.argmin(z[highest]))]
-        shape = Shape.facing(outline, (float(z[crown]), float(r[crown])), name)
-        return require_film_below(shape, name)
-    drawn, names = list(points), list(parts)
-    if drawn[0] == drawn[-1]:
-        drawn, names = drawn[:-1], names[:-1]
-    if Outline.polygon(drawn).pieces[0].end != drawn[1]:  # it was clockwise
-        drawn, names = drawn[::-1], [*names[-2::-1], names[-1]]
-    found = runs(names, name)
-    if found.mirrored:
-        drawn, names = [(-z, r) for z, r in drawn[::-1]], [*names[-2::-1], names[-1]]
-        found = runs(names, name)
-    outline = seated(Outline.polygon(drawn), inner_diameter)
-    ends = [
-        (float(outline.starts[first]), float(outline.starts[(first + count) % len(drawn)]))
-        for first, count in (found.film, found.pressure)
-    ]
-    return require_film_below(Shape(outline, ends[0], ends[1], name), name)
+    if len(points) > 1 and points[0] == points[-1]:
+        points = points[:-1]
+    if len(points) < 3:
+        raise OutlineError(f"{name}: {len(points)} points make no outline; at least 3 are needed")
+    lines = [Line(a, b) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
+    if parts is not None:
+        return named_shape(list(zip(lines, parts, strict=False)), inner_diameter, name)
+    outline = seated(outline_in(name, lines), inner_diameter)
+    z, r = np.array([piece.start for piece in outline.pieces]).T
+    highest = np.flatnonzero(r >= r.max() - 1e-6 * outline.size)
+    crown = highest[int(np.argmin(z[highest]))]
+    shape = Shape.facing(outline, (float(z[crown]), float(r[crown])), Path(name).stem)
+    return require_film_below(shape, name)
 
 
 def read_mesh(path: Path, inner_diameter: float | None = None) -> tuple[Shape, SectionMesh]:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from softehl.runtime.mesh.outline import Outline, OutlineError, Point, Shape
+from softehl.runtime.mesh.outline import Arc, Line, Outline, OutlineError, Piece, Point, Shape
+
+Named = tuple[Piece, str]
+"""A piece of a contour, and the name of its side."""
 
 FILM, PRESSURE = "FILM", "PRESSURE"
 """Layers of a drawing, or named sides of a mesh: what may carry film, what p_s acts on."""
@@ -56,6 +60,47 @@ def _run(flags: Sequence[bool], name: str, file: str) -> tuple[int, int]:
         words = "is the whole contour" if here.all() else f"is {len(starts)} parts"
         raise OutlineError(f"{file}: {name} {words}; it must be one part, and not all of it")
     return int(starts[0]), int(here.sum())
+
+
+def named_shape(named: Sequence[Named], inner_diameter: float | None, file: str) -> Shape:
+    """The section of a closed contour, either way round; with its sealed side at +z it is mirrored.
+
+    Raises OutlineError, one line.
+    """
+    outline = outline_in(file, [piece for piece, _ in named])
+    if outline.pieces[0] != named[0][0]:  # it was clockwise
+        named = _backwards(named)
+    found = runs([name for _, name in named], file)
+    if found.mirrored:
+        named = _backwards([(mirrored(piece), name) for piece, name in named])
+        outline = Outline([piece for piece, _ in named])
+        found = runs([name for _, name in named], file)
+    outline = seated(outline, inner_diameter)
+    film, pressure = (
+        (float(outline.starts[first]), float(outline.starts[(first + count) % len(named)]))
+        for first, count in (found.film, found.pressure)
+    )
+    return require_film_below(Shape(outline, film, pressure, Path(file).stem), file)
+
+
+def outline_in(file: str, pieces: Sequence[Piece]) -> Outline:
+    """The outline of pieces; an OutlineError names the file."""
+    try:
+        return Outline(pieces)
+    except OutlineError as error:
+        raise OutlineError(f"{file}: {error}") from None
+
+
+def mirrored(piece: Piece) -> Piece:
+    """The piece with -z for z."""
+    (a, b), (c, d) = piece.start, piece.end
+    if isinstance(piece, Line):
+        return Line((-a, b), (-c, d))
+    return Arc((-a, b), (-c, d), (-piece.centre[0], piece.centre[1]), not piece.ccw)
+
+
+def _backwards(named: Sequence[Named]) -> list[Named]:
+    return [(piece.reversed(), name) for piece, name in reversed(named)]
 
 
 def seated(outline: Outline, inner_diameter: float | None) -> Outline:
