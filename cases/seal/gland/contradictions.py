@@ -8,6 +8,7 @@ import numpy as np
 
 from softehl.cases.seal.gland.reach import MOST, ratio
 from softehl.cases.seal.gland.records.discretisation import Discretisation
+from softehl.cases.seal.gland.records.film_model import FilmModel
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.records.solid import Solid
 from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
@@ -128,7 +129,7 @@ def _air_side_is_closed_or_open(p: Gland) -> None:
         )
 
 
-def _arc_has_two_ends(p: Discretisation) -> None:
+def _arc_has_two_ends(p: FilmModel) -> None:
     if (p.arc_start is None) != (p.arc_end is None):
         raise ValueError("arc_start and arc_end: give both, or none to have them found")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from softehl.cases.harness.parameters import Parameters
-from softehl.cases.seal.gland.records.duty import Duty
 from softehl.cases.seal.gland.records.film_model import FilmModel
 from softehl.cases.seal.gland.records.free_seal import FreeSeal
 from softehl.cases.seal.gland.records.gland import Gland
@@ -30,8 +29,8 @@ SEAL = {
         "materials",
     ),
     "oil": (*own(Oil), *ThinningKeys.model_fields),
-    "motion": own(Duty),
-    "film": (*Surfaces.model_fields, *own(FilmModel), "arc_start", "arc_end"),
+    "motion": ("sealed_pressure", "speeds", "stroke", "travel"),
+    "film": (*Surfaces.model_fields, *own(FilmModel)),
     "mesh": ("density", "tolerance", "error_estimate", "mesh"),
     "numerics": (
         *("sensitivity", "tolerances", "pressure_order", "reynolds", "quadrature"),

@@ -23,7 +23,7 @@ from softehl.cases.seal.gland.surfaces import SurfacePair
 from softehl.cases.seal.gland.trade.said import SaidKeys, with_limits
 
 
-class Seal(SaidKeys, Numerics, Duty, FilmModel, Oil, Solid, Gland):
+class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
     """Everything that defines one run of a seal: an O-ring, or a seal of another section.
 
     Its keys are those of its records; what needs one of them takes that one. Raises

@@ -19,35 +19,11 @@ class Discretisation(Parameters):
         "mesh density d: 27 d segments on an arc that is given, 33 d or more on one that is found",
         bounds="1, 2, 4, 8 or 16",
     )
-    tolerance: float | None = key(
-        None,
-        "largest estimated error of h*, reached by finer meshes",
-        unit="%",
-        bounds="left out = any",
-        gt=0,
-    )
-    error_estimate: bool = key(True, "whether the error of h* is estimated, on a graded mesh")
     mesh: Literal["graded", "uniform", "file"] = key(
         "graded",
         "segments of the arc",
         bounds='"graded" (fine at the contact edges), "uniform" or "file" (those of the mesh file '
         "that outline names, each divided by density)",
-    )
-    arc_start: float | None = key(
-        None,
-        "sealed end of the lubricated arc, from the bottom",
-        unit="degrees",
-        bounds="-120 to < 0, left out = found from the contact",
-        ge=-120.0,
-        lt=0.0,
-    )
-    arc_end: float | None = key(
-        None,
-        "air end of the lubricated arc, from the bottom",
-        unit="degrees",
-        bounds="> 0 to 120, left out = found from the contact",
-        gt=0.0,
-        le=120.0,
     )
     pressure_order: int = key(
         4, "order m_p of the film pressure on a segment", bounds="1 to 64", ge=1, le=64
@@ -62,17 +38,19 @@ class Discretisation(Parameters):
     upwinding: float = key(
         1.0, "strength c of the bubble-load upwinding", bounds=">= 0, 0 = the paper's scheme", ge=0
     )
+    error_estimate: bool = key(True, "whether the error of h* is estimated, on a graded mesh")
+    tolerance: float | None = key(
+        None,
+        "largest estimated error of h*, reached by finer meshes",
+        unit="%",
+        bounds="left out = any",
+        gt=0,
+    )
     solid: Literal["taylor_mean", "taylor", "fbar", "q4"] = key(
         "taylor_mean",
         "solid element",
         bounds='"taylor_mean" (passes the patch test), "taylor" (the paper\'s), "fbar" or "q4"',
     )
-
-    @property
-    def given_arc(self) -> tuple[float, float] | None:
-        """Ends of the lubricated arc where they are given; else the contact decides."""
-        start, end = self.arc_start, self.arc_end
-        return None if start is None or end is None else (start, end)
 
     @field_validator("density", mode="before")
     @classmethod

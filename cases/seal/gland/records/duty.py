@@ -14,6 +14,9 @@ class Duty(Parameters):
     """Sealed pressure, speeds and strokes."""
 
     sealed_pressure: float = key(1.0, "sealed pressure p_s", unit="MPa", ge=0, le=100)
+    stroke: Literal["out", "in", "both"] = key(
+        "both", "direction of the rod", bounds='"out" (to the air side), "in" or "both"'
+    )
     speeds: tuple[Speed, ...] = key(
         (1600.0, 800.0, 400.0, 200.0, 100.0),
         "rod speeds |U|",
@@ -21,9 +24,6 @@ class Duty(Parameters):
         bounds="a number > 0, or a list of different ones in any order",
         min_length=1,
         strict=False,
-    )
-    stroke: Literal["out", "in", "both"] = key(
-        "both", "direction of the rod", bounds='"out" (to the air side), "in" or "both"'
     )
     travel: float = key(
         100.0, "way of the rod from end to end, for leakage in a cycle", unit="mm", gt=0

@@ -1,4 +1,4 @@
-"""The model of a film: surfaces, cavitation, shear of the seal."""
+"""The model of a film: surfaces, cavitation, shear of the seal, and its arc."""
 
 from typing import Literal
 
@@ -23,6 +23,28 @@ class FilmModel(FreeSeal, Surfaces):
         1.0e4, "penalty of pressures below zero, flux for a pressure", unit="mm/(MPa s)", gt=0
     )
     shear_traction: bool = key(True, "whether the shear stress of the film acts on the seal")
+    arc_start: float | None = key(
+        None,
+        "sealed end of the lubricated arc, from the bottom",
+        unit="degrees",
+        bounds="-120 to < 0, left out = found from the contact",
+        ge=-120.0,
+        lt=0.0,
+    )
+    arc_end: float | None = key(
+        None,
+        "air end of the lubricated arc, from the bottom",
+        unit="degrees",
+        bounds="> 0 to 120, left out = found from the contact",
+        gt=0.0,
+        le=120.0,
+    )
+
+    @property
+    def given_arc(self) -> tuple[float, float] | None:
+        """Ends of the lubricated arc where they are given; else the contact decides."""
+        start, end = self.arc_start, self.arc_end
+        return None if start is None or end is None else (start, end)
 
     @property
     def conserving(self) -> bool:
