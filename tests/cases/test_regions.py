@@ -37,7 +37,7 @@ def test_a_cap_is_of_ptfe() -> None:
     E, nu = 500.0, 0.46
     assert PRESETS["ptfe"]["mu"] == pytest.approx(E / (2.0 + 2.0 * nu), rel=2e-3)
     assert PRESETS["ptfe"]["bulk_modulus"] == pytest.approx(E / (3.0 - 6.0 * nu), rel=2e-3)
-    assert inlet_length(p, 1.0) > inlet_length(Seal(), 1.0)
+    assert inlet_length(p, 1.0, 100.0) > inlet_length(Seal(), 1.0, 100.0)
 
 
 @pytest.mark.parametrize(

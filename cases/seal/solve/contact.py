@@ -13,6 +13,7 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import ContactLoads
 from softehl.cases.seal.equations.system import BORE, ROD
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.solve import remedies
 from softehl.cases.seal.solve.path import Stage
 from softehl.cases.seal.solve.pressure_newton import PressureNewton
@@ -46,7 +47,7 @@ def held_place(p: Seal) -> float | None:
     return None if free else 0.0
 
 
-def held_moment(p: Seal) -> float | None:
+def held_moment(p: Gland) -> float | None:
     """Moment (N mm) on the section in contact and film, None where its mean rotation is held."""
     return 0.0 if p.rubs else None
 

@@ -14,6 +14,7 @@ import numpy as np
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.system import AIR_WALL, BORE, ROD, SEALED_WALL, WALLS
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.section.uniform_layout import uniform_layout
 from softehl.cases.seal.solve.inlet import film_thickness, inlet_length
@@ -116,7 +117,7 @@ def placed_layout(
         spots.append(Spot(place, k**-0.3, rates if edge.sealed else rates[::-1]))
     if p.opens:
         spots.append(_edge_spot(system, x, p, ends))
-    parts, inlet = len(edges) // 2, inlet_length(p, steepest)
+    parts, inlet = len(edges) // 2, inlet_length(p, steepest, min(p.speeds))
     coarsest = length / max(parts * _PLACED_COARSEST, _FLAT_COARSEST if layout.flat else 0)
     for long in range(layout.long, max(parts * most, layout.long) + 1, parts * _THIRDS):
         spacing = graded(length, spots, long * _DENSITY, coarsest=coarsest, rate=RATE)
@@ -126,7 +127,7 @@ def placed_layout(
     return layout.graded(spacing, long, DEPTH * inlet, first)
 
 
-def _edge_spot(system: SealSystem, x: Array, p: Seal, ends: Sequence[float]) -> Spot:
+def _edge_spot(system: SealSystem, x: Array, p: Gland, ends: Sequence[float]) -> Spot:
     """Place at which the section meets the edge of the gap, on an arc between `ends`, mm."""
     nodes = system.mesh.arc_nodes
     centre = np.array([p.air_wall, 0.5 * p.rod_diameter])

@@ -20,6 +20,9 @@ import numpy as np
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.system import contact_kernels
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.numerics import Numerics
+from softehl.cases.seal.gland.records.oil import Oil
+from softehl.cases.seal.gland.surfaces import Surfaces
 from softehl.cases.seal.solve.contact import contact_problem, correction_stage
 from softehl.cases.seal.solve.path import Stage
 from softehl.runtime.arrays import Array
@@ -27,16 +30,11 @@ from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.kernels import load_kernel
 
 WITHOUT_INFLUENCE = (
-    *("stroke", "speeds", "pressure_order", "reynolds", "quadrature", "quadrature_points"),
-    *("viscosity", "pressure_viscosity", "shear_traction", "cavitation_penalty"),
-    *("cavitation", "cavitation_pressure", "roughness", "asperity_stiffness", "boundary_friction"),
-    *("ring", "rod", "bore", "groove_diameter", "squeeze", "groove_depth", "fill", "gland"),
-    "backup",  # dimensions follow
-    *("said", "compound", "travel"),
-    *("shore_A", "fit", "ogden_terms", "oil", "temperature", "oil_density", "roelands"),
-    *("shear_thinning", "eyring_stress", "carreau_stress", "carreau_rate", "carreau_exponent"),
-    *("carreau_plateau", "rotation", "solver", "linear", "upwinding", "error_estimate"),
-    *("tolerance", "sensitivity", "tolerances"),
+    *(*Seal.names, "ogden_terms"),  # values of others follow
+    *(*Oil.model_fields, *Surfaces.model_fields, *Numerics.model_fields),
+    *("cavitation", "cavitation_pressure", "cavitation_penalty", "shear_traction"),
+    *("stroke", "speeds", "travel", "error_estimate", "tolerance", "upwinding"),
+    *("pressure_order", "reynolds", "quadrature", "quadrature_points"),
 )
 """Parameters that the contact stage does not know."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.numerics import Numerics
 from softehl.cases.seal.solve.films import NoFilm
 from softehl.cases.seal.solve.path import StageFailed
 from softehl.runtime.solve.solution import Status
@@ -24,7 +25,7 @@ _THICK = "try a finer mesh (larger density), or lower speeds or a thinner oil wh
 _HIGH = 1.5  # shear moduli
 
 
-def explained(failed: StageFailed, where: str, p: Seal) -> tuple[Status, str]:
+def explained(failed: StageFailed, where: str, p: Numerics) -> tuple[Status, str]:
     """Status and message of a run that ends with this stage.
 
     where: which part of the run it was.

@@ -25,7 +25,7 @@ MULTIPLE = 1.75
 
 @dataclass(frozen=True)
 class InletScales:
-    """Time T (s) and thickness h_r (mm) of a film at its inlet."""
+    """Time T (s) in which a rod passes the inlet of a film, and its thickness h_r (mm) there."""
 
     time: float
     thickness: float
@@ -36,27 +36,22 @@ class InletScales:
         edge, p = inlet_edge(system, stroke, x), system.parameters
         if edge is None:
             return None
-        return cls(inlet_time(p, edge, speed), MULTIPLE * film_thickness(p, [edge], speed))
+        time = inlet_length(p, edge.rise, speed) / speed
+        return cls(time, MULTIPLE * film_thickness(p, [edge], speed))
 
     def at(self, ratio: float) -> InletScales:
         """Scales at another speed, which is so many times ours: l is as U^0.4, h as U^0.6."""
         return InletScales(self.time * ratio**-0.6, self.thickness * ratio**0.6)
 
 
-def inlet_length(p: Seal, rise: float) -> float:
-    """Length l (mm) of the inlet at an edge of this K^2, at the slowest speed, see above.
+def inlet_length(p: Seal, rise: float, speed: float) -> float:
+    """Length l (mm) of the inlet at an edge of this K^2 at |U|, see above.
 
     Between rough surfaces at least that over which h = K l^(3/2) / E rises by sigma.
     """
-    flow, E = p.viscosity * min(p.speeds), 3.0 * p.surface_modulus
+    flow, E = p.viscosity * speed, 3.0 * p.surface_modulus
     asperities = (p.surfaces.sigma * E / rise**0.5) ** (2.0 / 3.0)
     return float(max((flow * E**2 / rise**1.5) ** 0.4, asperities))
-
-
-def inlet_time(p: Seal, edge: Edge, speed: float) -> float:
-    """Time (s) in which a rod passes the inlet at an edge at |U|."""
-    at_speed = p.model_copy(update={"speeds": (speed,)})
-    return inlet_length(at_speed, edge.rise) / speed
 
 
 def film_thickness(p: Seal, edges: Sequence[Edge], speed: float) -> float:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.gland import Gland
 
 _GLAND = (
     "glands with a squeeze of 6 to 30 %, a stretch of 0 to 6 % and a width of 1.02 to 2 sections "
@@ -21,13 +21,13 @@ _EXTRUSION = (
 _RELEASE = "try a smaller housing_friction or a finer mesh (larger density)"
 
 
-def not_squeezed(p: Seal, share: float) -> str:
+def not_squeezed(p: Gland, share: float) -> str:
     """Rod and housing came this share of their way, 0 to 1."""
     way = f"only {100.0 * share:.0f} % of the way"
     return f"{_ring(p)} can be pressed into its gland ({_gland(p)}) {way}; {_GLAND}"
 
 
-def not_released(p: Seal) -> str:
+def not_released(p: Gland) -> str:
     """Friction did not take the place of what holds the section."""
     return (
         f"friction of the housing does not hold {_ring(p)} in its gland ({_gland(p)}); {_RELEASE}"
@@ -47,19 +47,16 @@ def not_carried(p: Seal, name: str) -> str:
     return f"{name} was not found ({_gland(p)}, p_s = {p.sealed_pressure:g} MPa); {_corner(p)}"
 
 
-def _corner(p: Seal) -> str:
+def _corner(p: Gland) -> str:
     """Words on the gap between wall and rod at too high a pressure."""
     return _EXTRUSION.format(p.extrusion_gap, p.corner_fillet) if p.opens else _PRESSURE
 
 
-def _ring(p: Seal) -> str:
-    stretch = catalogue.stretch(p.free_ring, p.rod_diameter, p.housing_diameter)
+def _ring(p: Gland) -> str:
     ring = f"{p.ring_diameter:g} x {p.section_diameter:g} mm"
     what = "a ring" if p.round else f"this {p.named}"
-    return f"{what} of {ring}, stretched by {stretch:.2g} %,"
+    return f"{what} of {ring}, stretched by {p.stretch_percent:.2g} %,"
 
 
-def _gland(p: Seal) -> str:
-    depth = 0.5 * (p.housing_diameter - p.rod_diameter)
-    squeeze = catalogue.squeeze(p.section_diameter, depth)
-    return f"squeeze {squeeze:.3g} %, width {p.groove_width:g} mm"
+def _gland(p: Gland) -> str:
+    return f"squeeze {p.squeeze_percent:.3g} %, width {p.groove_width:g} mm"
