@@ -177,7 +177,7 @@ def test_an_implicit_step_conserves_what_the_film_holds(
     """Outflow minus inflow is what the film has lost, by the local time steps."""
     system, start = dry.system, pressed_film(dry.system, dry.x, 3.0)
     step = squeeze_film.step(start, 0.3, 0.0)
-    solution = FilmCorrectors.of(system, dry.newton).whole.solve(step, start)
+    solution = FilmCorrectors.of(system, dry.newton).whole().solve(step, start)
     assert solution.converged, solution.message
     rows = np.setdiff1d(system.layout.dofs("pressure"), step.problem.fixed)
     fluxes = np.add.reduce(step.problem.residual(solution.x)[rows])

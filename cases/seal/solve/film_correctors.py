@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.pressure_newton import lagged
+from softehl.cases.seal.solve.pressure_newton import PressureNewton
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.lagged_pressure import element_pressures
 from softehl.runtime.fem.layered import Layer, Layered
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.relaxed import Anchored, Relaxed
+from softehl.runtime.fem.relaxed import Relaxed
 from softehl.runtime.solve.ladder import Ladder
 from softehl.runtime.solve.linear import Condenser
 from softehl.runtime.solve.modified_newton import ModifiedNewton
@@ -58,69 +57,11 @@ class CondensedSteps:
 
 
 @dataclass(frozen=True, eq=False)
-class WholeSteps:
-    """Newton's method for all unknowns of a step, which holds on to the element pressures."""
-
-    system: SealSystem
-    newton: Newton
-
-    def solve(self, problem: Relaxed, x0: Array) -> Solution:
-        """See `Corrector`."""
-        pressures = element_pressures(problem.problem, self.system.solids, x0)
-        return self.begun(problem, x0, pressures)
-
-    def begun(self, problem: Relaxed, x0: Array, pressures: Array) -> Solution:
-        """The step from a state of another mesh with these element pressures (Q,)."""
-        held = lagged(self.system, problem.problem, pressures)
-        newton = replace(self.newton, tolerance=LEAST, stagnation=1.0, max_iterations=_MONOLITHIC)
-        return newton.solve(Anchored(held, problem.term, problem.state), problem.admissible(x0))
-
-    def steady(
-        self,
-        problem: Problem,
-        x0: Array,
-        pressures: Array | None = None,
-    ) -> Solution:
-        """The steady film, from x0 (n,)."""
-        if pressures is None:
-            pressures = element_pressures(problem, self.system.solids, x0)
-        newton = replace(self.newton, max_iterations=_MONOLITHIC)
-        return newton.solve(lagged(self.system, problem, pressures), problem.admissible(x0))
-
-
-@dataclass(frozen=True, eq=False)
-class Steady:
-    """Newton's method for all unknowns of a steady film."""
-
-    whole: WholeSteps
-
-    def solve(self, problem: Layered, x0: Array) -> Solution:
-        """See `Corrector`."""
-        return self.whole.steady(problem.problem, x0)
-
-
-@dataclass(eq=False)
-class CarriedSteps:
-    """Steps of which the first begins with the element pressures (Q,) of another mesh."""
-
-    ladder: Ladder
-    whole: WholeSteps
-    pressures: Array | None
-
-    def solve(self, problem: Relaxed, x0: Array) -> Solution:
-        """See `Corrector`."""
-        if self.pressures is None:
-            return self.ladder.solve(problem, x0)
-        found = self.whole.begun(problem, x0, self.pressures)
-        self.pressures = None if found.converged else self.pressures
-        return found
-
-
-@dataclass(frozen=True, eq=False)
 class FilmCorrectors:
     """Correctors of one film; `fast` is None where condensing does not serve."""
 
-    whole: WholeSteps
+    system: SealSystem
+    newton: Newton
     fast: SchurCorrector | None
 
     @classmethod
@@ -129,29 +70,33 @@ class FilmCorrectors:
         p, linear = system.parameters, newton.linear
         quick = p.solver == "auto" and p.rotation == "fixed" and not p.rubs
         fast = film_corrector(p, linear) if quick and isinstance(linear, Condenser) else None
-        return cls(WholeSteps(system, newton), fast)
+        return cls(system, replace(newton, max_iterations=_MONOLITHIC), fast)
+
+    def whole(self, pressures: Array | None = None) -> PressureNewton:
+        """Solves for all unknowns; pressures: (Q,) of a state that another mesh has left."""
+        return PressureNewton(self.newton, self.system, pressures)
 
     def steps(self, pressures: Array | None = None) -> Corrector:
-        """Solves steps in time; pressures: (Q,) of a state that another mesh has left."""
+        """Solves steps in time; pressures: as of `whole`."""
+        newton = replace(self.newton, tolerance=LEAST, stagnation=1.0)
         fast = (CondensedSteps(self.fast),) if self.fast else ()
-        return CarriedSteps(Ladder((*fast, self.whole), self._refused), self.whole, pressures)
+        return Ladder((*fast, PressureNewton(newton, self.system, pressures)), self._refused)
 
     @property
     def first(self) -> Corrector:
         """Solves steady films that are `layered`, from others near by."""
-        return self.fast or Steady(self.whole)
+        return self.fast or self.whole()
 
     def layered(self, problem: Problem, layer: Layer) -> Layered:
         """A steady film as its correctors take it."""
-        return Layered(problem, layer, (self.whole.system.film_guard(),))
+        return Layered(problem, layer, (self.system.film_guard(),))
 
     def steady(self, problem: Problem, layer: Layer, x: Array) -> Solution:
         """The steady film from the last step in time, x (n,)."""
         fast = (self.fast,) if self.fast else ()
-        return Ladder((*fast, Steady(self.whole))).solve(self.layered(problem, layer), x)
+        return Ladder((*fast, self.whole())).solve(self.layered(problem, layer), x)
 
     def _refused(self, x: Array) -> str:
-        system = self.whole.system
-        if system.parameters.rough or system.arc_film(x)[1].min() > 0.0:
+        if self.system.parameters.rough or self.system.arc_film(x)[1].min() > 0.0:
             return ""
         return "the film would be closed at a node"

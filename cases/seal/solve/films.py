@@ -173,7 +173,7 @@ class FilmSolver:
         correctors, x = FilmCorrectors.of(self.system, self.driver.newton), start.x
         with self._told(carried.film) as told:
             problem = self.system.film_problem(carried.film).since(x)
-            found = told(correctors.whole.steady(problem, x, pressures))
+            found = told(correctors.whole(pressures).solve(problem, x))
         if found.converged and carried.change(x, found.x) < inf:
             return self._entered(carried, correctors, found)
         return self._followed(carried, start, correctors, pressures)

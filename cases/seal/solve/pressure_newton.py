@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
+from softehl.runtime.fem.layered import Layered
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.relaxed import Anchored
+from softehl.runtime.fem.relaxed import Anchored, Relaxed
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.solve.newton import Newton, NonlinearProblem
 from softehl.runtime.solve.solution import Solution
@@ -25,28 +26,27 @@ class PressureNewton:
     """Newton's method with lagged element pressures, which go on from solution to solution.
 
     A predictor of continuation spoils volume ratios like any interpolation: with the pressures of
-    the last solution, steps are as long as those of a compressible solid. `pressures`, (Q,), None
-    until the first solve, changes with every solution; the rest are settings.
+    the last solution, steps are as long as those of a compressible solid. `pressures`, (Q,), are
+    None for those of the start and change with every solution; the rest are settings.
     """
 
     newton: Newton
     system: SealSystem
     pressures: Array | None = None
 
-    def solve(self, problem: Problem | Anchored, x0: Array) -> Solution:
+    def solve(self, problem: Problem | Layered | Anchored, x0: Array) -> Solution:
         """Solve R(x) = 0 from x0, (n,); of an anchored problem the one within is lagged."""
-        bare = problem.problem if isinstance(problem, Anchored) else problem
+        bare = problem if isinstance(problem, Problem) else problem.problem
         if self.pressures is None:
-            self.take_up(bare, x0)
-        assert self.pressures is not None
+            self.pressures = element_pressures(bare, self.system.solids, x0)
         held: NonlinearProblem = lagged(self.system, bare, self.pressures)
-        if isinstance(problem, Anchored):
-            held = replace(problem, problem=held)
-        solution = self.newton.solve(held, x0)
+        if isinstance(problem, Relaxed | Anchored):
+            held = Anchored(held, problem.term, problem.state)
+        solution = self.newton.solve(held, bare.admissible(x0))
         if solution.converged:
-            self.take_up(bare, solution.x)
+            self.pressures = element_pressures(bare, self.system.solids, solution.x)
         return solution
 
-    def take_up(self, problem: Problem, x: Array) -> None:
+    def take_up(self, problem: Problem | Layered | Anchored, x: Array) -> None:
         """Go on from a solution (n,) that another corrector found; see `Informed`."""
-        self.pressures = element_pressures(problem, self.system.solids, x)
+        self.pressures = None  # of the start of the next solve
