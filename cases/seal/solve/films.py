@@ -29,7 +29,7 @@ from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import NonlinearProblem
 from softehl.runtime.solve.pseudo_transient import Moment, PseudoTransient
-from softehl.runtime.solve.solution import Point, Solution, Status
+from softehl.runtime.solve.solution import Branch, Point, Solution, Status
 from softehl.runtime.solve.steps import StepRule
 
 _AGAIN = 0.01
@@ -150,7 +150,7 @@ class FilmSolver:
             problem = self.system.film_problem(loads).since(before[0])
             return correctors.layered(problem, squeeze_film.layer)
 
-        with self._told(squeeze_film.film) as told:
+        with self._told(squeeze_film.film) as (told, costs):
 
             def tell(point: Point) -> None:
                 before[0] = told(point.solution).x
@@ -160,6 +160,7 @@ class FilmSolver:
             path = Continuation(correctors.first, rule, name="U^0.6")
             previous = known[-2] if len(known) > 1 else None
             branch = path.follow(problem_at, start, stop, film.x, on_point=tell, previous=previous)
+            costs.append(branch)
         if branch.converged and squeeze_film.change(film.x, branch.last.x) < inf:
             return self._entered(squeeze_film, correctors, branch.last)
         x = branch.last.x if branch.points else film.x
@@ -171,9 +172,10 @@ class FilmSolver:
         pressures: (Q,) of the elements.
         """
         correctors, x = FilmCorrectors.of(self.system, self.driver.newton), start.x
-        with self._told(carried.film) as told:
+        with self._told(carried.film) as (told, costs):
             problem = self.system.film_problem(carried.film).since(x)
             found = told(correctors.whole(pressures).solve(problem, x))
+            costs.append(found)
         if found.converged and carried.change(x, found.x) < inf:
             return self._entered(carried, correctors, found)
         return self._followed(carried, start, correctors, pressures)
@@ -187,14 +189,16 @@ class FilmSolver:
     ) -> Film | NoFilm:
         film = squeeze_film.film
         steps = PseudoTransient(correctors.steps(pressures))
-        with self._told(film) as told:
+        with self._told(film) as (told, costs):
             branch, reached = steps.follow(squeeze_film, start, on_point=lambda p: told(p.solution))
+            costs.append(branch)
             if not branch.converged:
                 words = branch.message
                 begun = None if reached is start else (squeeze_film, reached)
                 return NoFilm(film.stroke, film.speed, branch.status, words, begun)
             problem = self.system.film_problem(film).since(reached.x)
             end = told(correctors.steady(problem, squeeze_film.layer, reached.x))
+            costs.append(end)
         if not end.converged:
             words = f"steady film: {end.message}"
             return NoFilm(film.stroke, film.speed, end.status, words, (squeeze_film, reached))
@@ -216,8 +220,11 @@ class FilmSolver:
         return Film(more, end.x, end.iterations, correctors) if end.converged else film
 
     @contextmanager
-    def _told(self, film: FilmLoads) -> Iterator[Callable[[Solution], Solution]]:
-        """Tell the observer of solutions, and keep a record of them."""
+    def _told(
+        self, film: FilmLoads
+    ) -> Iterator[tuple[Callable[[Solution], Solution], list[Branch | Solution]]]:
+        """Tell the observer of solutions, and keep a record of them and of what is spent."""
+        costs = list[Branch | Solution]()
         name, begin, found = f"film at {film.rod_speed:+g} mm/s", time.perf_counter(), []
         p_s, stroke = film.sealed_pressure, film.stroke
         self.driver.observer.stage(name, sealed_pressure=p_s, stroke=stroke, steps=None)
@@ -234,14 +241,14 @@ class FilmSolver:
             return solution
 
         try:
-            yield told
+            yield told, costs
         finally:
             self.driver.records.append(
                 StageRecord(
                     name=name,
                     seconds=time.perf_counter() - begin,
-                    factorisations=sum(s.factorisations for s in found),
-                    iterations=sum(s.iterations for s in found),
+                    factorisations=sum(cost.factorisations for cost in costs),
+                    iterations=sum(cost.iterations for cost in costs),
                     residual_histories=tuple(s.residual_norms for s in found),
                     parameters=tuple(float(n) for n in range(1, len(found) + 1)),
                     where=place(p_s, stroke),
