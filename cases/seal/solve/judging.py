@@ -48,8 +48,14 @@ def verdict_of_contact(system: SealSystem, x: Array) -> Verdict:
 
 @dataclass(frozen=True)
 class Judge:
-    """Makes states of films; differentiate: makes sensitivities, None where none are asked."""
+    """Makes states of films.
 
+    contact: verdict on their dry contact. It is that of its own mesh: on the mesh of a film the
+    sealed pressure may end at a node beside the contact, which no film depends on. differentiate:
+    makes sensitivities, None where none are asked.
+    """
+
+    contact: Verdict
     differentiate: Differentiate | None = None
 
     def state(self, adapted: Adapted, faster: FilmNumbers | None) -> FilmState:
@@ -58,8 +64,7 @@ class Judge:
         numbers = film.numbers
         error, friction = errors(p.density, numbers, other)
         wanted = p.error_estimate and p.mesh == "graded"
-        verdict = verdict_of_contact(film.system, film.squeeze_film.dry)
-        verdict = replace(verdict, last=faster).after(numbers)
+        verdict = replace(self.contact, last=faster).after(numbers)
         verdict = replace(verdict, error=error if wanted else None)
         state = film_state(film.system, film.problem, film.loads, film.x, verdict, film.iterations)
         state = replace(

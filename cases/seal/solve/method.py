@@ -16,7 +16,7 @@ from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.contact_store import ContactStore
 from softehl.cases.seal.solve.failure import explained, without_films
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
-from softehl.cases.seal.solve.judging import Differentiate, Judge
+from softehl.cases.seal.solve.judging import Differentiate, Judge, verdict_of_contact
 from softehl.cases.seal.solve.path import PathDriver, StageFailed
 from softehl.cases.seal.states.contact_results import contact_numbers, contact_state
 from softehl.cases.seal.states.plan import strokes_of
@@ -125,7 +125,7 @@ def run(
         failures = [explained(contact, "contact", parameters)]
         return _outcome(build_system(parameters), contact.records, [], failures)
     observer.contact_state(contact.state)
-    judge = Judge(differentiate)
+    judge = Judge(verdict_of_contact(contact.system, contact.x), differentiate)
     states, failures = list[FilmState](), list[tuple[Status, str]]()
     for stroke in strokes_of(parameters):
         last, missed = list[Adapted](), list[NoFilm]()
