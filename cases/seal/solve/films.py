@@ -18,9 +18,9 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.layers import film_layer
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.solve.film_correctors import FilmCorrectors
-from softehl.cases.seal.solve.inlet import InletScales
+from softehl.cases.seal.solve.inlet import POWER, InletScales
 from softehl.cases.seal.solve.path import PathDriver
-from softehl.cases.seal.solve.squeeze_film import SqueezeFilm, film_loads, pressed_film
+from softehl.cases.seal.solve.squeeze_film import FIRST, SqueezeFilm, film_loads, pressed_film
 from softehl.cases.seal.states.results import film_numbers
 from softehl.cases.seal.states.state import StageRecord, place
 from softehl.cases.seal.states.verdict import FilmNumbers
@@ -32,22 +32,12 @@ from softehl.runtime.solve.pseudo_transient import Moment, PseudoTransient
 from softehl.runtime.solve.solution import Branch, Point, Solution, Status
 from softehl.runtime.solve.steps import StepRule
 
-_AGAIN = 0.01
-"""First step of a film that was carried to another mesh and is not found there at once, of T."""
-
-_POWER = 0.6
-"""A film is as thick as this power of U (`solve.inlet`): films at several speeds lie nearly on
-a line by it. A round ring's instroke takes six steps from 100 to 10 mm/s, and eleven in ln U."""
-
 _LEAST = 0.06
-"""Least step on the way from the film at another speed, of the larger power. Of the smaller one
-films that do not go on cost as much again as all of their seal."""
+"""Least step on the way from the film at another speed, of the larger power of U. Of the smaller
+one films that do not go on cost as much again as all of their seal."""
 
 _USUAL = 12
 """Iterations of a step that is not too long: modified ones, two for one of Newton's."""
-
-_NEIGHBOUR = 0.1
-"""First step from the film at another speed, of T."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +65,7 @@ class Film:
     @property
     def begun(self) -> tuple[SqueezeFilm, Moment]:
         """The moment from which it is squeezed out where it is not found at once."""
-        return self.squeeze_film, Moment(self.x, _AGAIN, 1.0)
+        return self.squeeze_film, Moment(self.x, FIRST, 1.0)
 
     @property
     def solution(self) -> Solution:
@@ -142,11 +132,11 @@ class FilmSolver:
         """
         film, correctors = last[-1], last[-1].correctors
         squeeze_film, before = film.squeeze_film.at(speed), [film.x]
-        known = [Point(f.loads.speed**_POWER, f.solution) for f in last if f.system is film.system]
-        start, stop = known[-1].parameter, speed**_POWER
+        known = [Point(f.loads.speed**POWER, f.solution) for f in last if f.system is film.system]
+        start, stop = known[-1].parameter, speed**POWER
 
         def problem_at(t: float) -> NonlinearProblem:
-            loads = replace(squeeze_film.film, speed=speed if t == stop else t ** (1.0 / _POWER))
+            loads = replace(squeeze_film.film, speed=speed if t == stop else t ** (1.0 / POWER))
             problem = self.system.film_problem(loads).since(before[0])
             return correctors.layered(problem, squeeze_film.layer)
 
@@ -164,7 +154,7 @@ class FilmSolver:
         if branch.converged and squeeze_film.change(film.x, branch.last.x) < inf:
             return self._entered(squeeze_film, correctors, branch.last)
         x = branch.last.x if branch.points else film.x
-        return self._followed(squeeze_film, Moment(x, _NEIGHBOUR, 1.0), correctors)
+        return self._followed(squeeze_film, Moment(x, FIRST, 1.0), correctors)
 
     def from_film(self, carried: SqueezeFilm, start: Moment, pressures: Array) -> Film | NoFilm:
         """The steady film of another mesh, carried to ours: at once, else squeezed out from there.
@@ -174,7 +164,8 @@ class FilmSolver:
         correctors, x = FilmCorrectors.of(self.system, self.driver.newton), start.x
         with self._told(carried.film) as (told, costs):
             problem = self.system.film_problem(carried.film).since(x)
-            found = told(correctors.whole(pressures).solve(problem, x))
+            layered = correctors.layered(problem, carried.layer)
+            found = told(correctors.whole(pressures).solve(layered, x))
             costs.append(found)
         if found.converged and carried.change(x, found.x) < inf:
             return self._entered(carried, correctors, found)

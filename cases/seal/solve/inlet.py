@@ -22,6 +22,9 @@ from softehl.runtime.arrays import Array
 MULTIPLE = 1.75
 """About h* in `film_thickness`, whatever the ring."""
 
+POWER = 0.6
+"""Power of U that h is as, and that 1 / T is as, with the l above."""
+
 
 @dataclass(frozen=True)
 class InletScales:
@@ -40,8 +43,8 @@ class InletScales:
         return cls(time, MULTIPLE * film_thickness(p, [edge], speed))
 
     def at(self, ratio: float) -> InletScales:
-        """Scales at another speed, which is so many times ours: l is as U^0.4, h as U^0.6."""
-        return InletScales(self.time * ratio**-0.6, self.thickness * ratio**0.6)
+        """Scales at another speed, which is so many times ours."""
+        return InletScales(self.time / ratio**POWER, self.thickness * ratio**POWER)
 
 
 def inlet_length(p: Seal, rise: float, speed: float) -> float:
@@ -57,7 +60,7 @@ def inlet_length(p: Seal, rise: float, speed: float) -> float:
 def film_thickness(p: Seal, edges: Sequence[Edge], speed: float) -> float:
     """About half of h* (mm) at |U|, K l^(3/2) / E with the l above."""
     flow, E = p.viscosity * speed, 3.0 * p.surface_modulus
-    return max((flow**0.6 * E**0.2 * edge.rise**-0.4 for edge in edges), default=0.0)
+    return max((flow**POWER * E**0.2 * edge.rise**-0.4 for edge in edges), default=0.0)
 
 
 def inlet_edge(system: SealSystem, stroke: Stroke, x: Array) -> Edge | None:

@@ -42,7 +42,8 @@ class PressureNewton:
         held: NonlinearProblem = lagged(self.system, bare, self.pressures)
         if isinstance(problem, Relaxed | Anchored):
             held = Anchored(held, problem.term, problem.state)
-        solution = self.newton.solve(held, bare.admissible(x0))
+        start = problem.admissible(x0) if isinstance(problem, Layered) else x0
+        solution = self.newton.solve(held, start)
         if solution.converged:
             self.pressures = element_pressures(bare, self.system.solids, solution.x)
         return solution

@@ -33,10 +33,9 @@ from softehl.runtime.fem.rules import content_rule, pressure_nodes
 EXPONENT = 1.5
 """a of the local time steps. On X-rings at the slowest speed 1 found no film and 2 was as good."""
 
-FIRST, ROUGH = 1e-3, 0.1
-"""First step, of T, where contact leaves a gap as thin as the film; a thicker one flows sooner.
-With 0.1 two films of a round ring are not found. The second is for rough surfaces, where a U-cup
-has no outstroke from 1e-3, and the same film from 1e-2, 0.1 and 1."""
+FIRST = 1e-2
+"""First step, of T; from contact where it leaves a gap as thin as the film: a thicker one flows
+sooner. With 0.1 two films of a round ring are not found, with 1e-3 none of a rough U-cup."""
 
 _NO_WIDTH = 1e-6
 """Of the widest part of the arc around a node, below which it is between segments on a wall."""
@@ -111,8 +110,7 @@ class SqueezeFilm:
     @property
     def first(self) -> float:
         """Length of the first step from the contact state; see `FIRST`."""
-        first = ROUGH if self.system.parameters.rough else FIRST
-        return float(first * min(1.0, self.scales.thickness / OFFSET) ** EXPONENT)
+        return float(FIRST * min(1.0, self.scales.thickness / OFFSET) ** EXPONENT)
 
     def _masses(self, x: Array) -> csc_array[np.float64]:
         """Rates of what the film holds, by the local time steps; see `gap_masses`."""
