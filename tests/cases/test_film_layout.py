@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.solve.contact_layout import RATE
 from softehl.cases.seal.solve.film_layout import (
     COARSEST,
-    GROWTH,
     RISE,
     THIN,
     THINNING,
@@ -68,7 +68,7 @@ def test_segments_grow_away_from_a_step(system: SealSystem) -> None:
     at, size = sizes(system, film(system, h, np.ones(len(s))), THICKNESS)
     least = THINNING / np.log(3.0) * (s[node] - s[node - 1])
     away = np.maximum(np.maximum(s[node - 1] - at, at - s[node]), 0.0)
-    expected = np.minimum(least + GROWTH * away, s[-1] / COARSEST)
+    expected = np.minimum(least + RATE * away, s[-1] / COARSEST)
     assert size == pytest.approx(expected, rel=0.02)
 
 

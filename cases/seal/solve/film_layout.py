@@ -13,6 +13,8 @@ from scipy.integrate import cumulative_trapezoid
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.section.layout import Layout
+from softehl.cases.seal.solve.contact_layout import DEPTH, RATE
+from softehl.cases.seal.states.film_signs import INLET
 from softehl.cases.seal.states.section_view import film_pressure
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.spacing import STATIONS, Spacing
@@ -20,14 +22,11 @@ from softehl.runtime.mesh.spacing import STATIONS, Spacing
 THINNING, RISE = 0.3, 0.05
 """Changes along a segment at density 2: of ln h where the film is thin, of p over its maximum."""
 
-THIN = 10.0
+THIN = INLET[0]
 """Film, of that at the inlet, from which on its thickness does not decide about the segments."""
 
-GROWTH, COARSEST = 0.3, 24
-"""Growth of the segments along the arc; it is so many of the longest ones long."""
-
-DEPTH = 2.5
-"""Elements on the arc are nowhere thicker than so many of the shortest segments of the inlet."""
+COARSEST = 24
+"""The arc is so many of its longest segments long."""
 
 _CLOSED = 1e-3  # of that thickness: rough surfaces may interpenetrate
 _DENSITY, _THIRDS = 2, 3
@@ -76,8 +75,8 @@ def sizes(system: SealSystem, x: Array, thickness: float) -> tuple[Array, Array]
     segment = np.minimum(1.0 / np.maximum(wanted, 1e-12), longest)
     s = np.linspace(0.0, at[-1], STATIONS)
     there = segment[_segments(at, s)]
-    step = GROWTH * (s[1] - s[0])
-    for way in (slice(None), slice(None, None, -1)):  # no faster growth than GROWTH on either side
+    step = RATE * (s[1] - s[0])
+    for way in (slice(None), slice(None, None, -1)):  # no faster growth than RATE on either side
         place = step * np.arange(STATIONS)
         there[way] = np.minimum.accumulate(there[way] - place) + place
     return s, there
