@@ -30,8 +30,8 @@ ALIKE = 1.25
 """Ratio of the segments that two meshes have for a film, relative to their densities: what they
 differ by shows the error of both only where they resolve the same things alike."""
 
-CYCLES, FEW = 6, 2
-"""Meshes of a film, at most, and of the coarser one of its estimate."""
+CYCLES = 3
+"""Meshes that are made for a film, at most, and for the coarser one of its estimate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ class Adaptation:
         like: see `_fits`.
         """
         fits = isinstance(found, Film) and self._fits(found, density, like)
-        for _ in range(CYCLES if like is None else FEW):
+        for _ in range(CYCLES):
             again = None if fits else self._remeshed(found, density)
             if not isinstance(again, Film):
                 break
@@ -141,22 +141,19 @@ class Adaptation:
     def _carried(self, found: Film | NoFilm, system: SealSystem) -> Film | NoFilm | None:
         """The film on the mesh of a system; None where there is no contact state on it.
 
-        Where none was found, or does not lead on, it is squeezed out anew.
+        Where none was found it is squeezed out anew.
         """
         assert found.begun is not None
         squeeze_film, now = found.begun
         dry = self.contacts.from_mesh(squeeze_film.system, squeeze_film.dry, system)
         if isinstance(dry, StageFailed):
             return None
-        solver, again = self.films.on(system), None
-        if isinstance(found, Film):
-            transfer = FilmTransfer(squeeze_film.system, system, (squeeze_film.dry, dry[1]))
-            start, pressures = replace(now, x=transfer.state(now.x)), transfer.pressures(now.x)
-            carried = squeeze_film.carried(system, start.x, dry[1])
-            again = solver.from_film(carried, start, pressures)
-        if isinstance(again, Film):
-            return again
-        return solver.from_contact(squeeze_film.film.stroke, squeeze_film.film.speed, dry[1])
+        solver, film = self.films.on(system), squeeze_film.film
+        if isinstance(found, NoFilm):
+            return solver.from_contact(film.stroke, film.speed, dry[1])
+        transfer = FilmTransfer(squeeze_film.system, system, (squeeze_film.dry, dry[1]))
+        start, pressures = replace(now, x=transfer.state(now.x)), transfer.pressures(now.x)
+        return solver.from_film(squeeze_film.carried(system, start.x, dry[1]), start, pressures)
 
 
 def _misfit(film: Film, density: float) -> float:
