@@ -132,6 +132,8 @@ def test_a_thick_film_over_a_shallow_groove_has_two_contacts() -> None:
     deep = np.where(np.abs(x) < 0.1, 0.03, h)
     assert contact_film(deep, lobes=2) == CONTACT_FILM
     assert contact_film(np.minimum(h, 0.007), lobes=2) == CONTACT_FILM
+    # a film that is nowhere below 20 um has a contact, too
+    assert contact_film(h + 0.1) == pytest.approx(0.208)
 
 
 def test_a_lobe_that_oil_lifts_does_not_meter_it() -> None:

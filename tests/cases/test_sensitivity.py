@@ -28,13 +28,12 @@ from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
 from softehl.cases.seal.solve.films import Film
 from softehl.cases.seal.solve.method import DryContact
 from softehl.cases.seal.solve.path import StageFailed
-from softehl.cases.seal.states.contacts import CONTACT_FILM
-from softehl.cases.seal.states.results import film_numbers
+from softehl.cases.seal.states.results import film_numbers, film_state
 from softehl.cases.seal.states.sensitivity_table import SensitivityRow, resolved
 from softehl.cases.seal.states.state import FilmRow, Silent
+from softehl.cases.seal.states.verdict import Verdict
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Inputs
-from softehl.runtime.fem.postprocess import interval_below
 from softehl.runtime.io import read_csv, write_csv
 from softehl.runtime.solve.linear import Factorisation, SparseMatrix
 from softehl.runtime.solve.newton import Newton
@@ -60,6 +59,7 @@ CASES = {
     ),
     "section x_ring": film_of(400.0, section="x_ring", groove_width=4.3, housing_diameter=56.4),
     "piston": film_of(400.0, bore=50.0),
+    "thick": film_of(1600.0, viscosity=1e-5),  # nowhere below 20 um
     "thinning": film_of(
         400.0, carreau_stress=0.01, carreau_exponent=0.6, carreau_plateau=0.3, stroke="in"
     ),
@@ -92,14 +92,15 @@ def solved(case: FilmCase, x: Array) -> Array:
 
 def reported(case: FilmCase, x: Array) -> dict[str, float]:
     """What `film_state` reports."""
-    numbers = film_numbers(case.system, case.system.film_problem(case.film), case.film, x)
-    start, end = interval_below(*case.system.arc_film(x), CONTACT_FILM)
+    problem = case.system.film_problem(case.film)
+    numbers = film_numbers(case.system, problem, case.film, x)
+    state = film_state(case.system, problem, case.film, x, Verdict(1.0, last=numbers), 0)
     return {
         "h_star": numbers.h_star,
         "friction": numbers.friction,
         "leakage": case.system.around * numbers.flux,
         "p_max": numbers.p_max,
-        "contact_width": end - start,
+        "contact_width": state.contact_end_mm - state.contact_start_mm,
     }
 
 

@@ -1,7 +1,7 @@
 """The reported quantities of a film and how they follow from its fields: values and gradients.
 
 They are those of `cases.seal.states.results`. A point or a segment that is chosen there (the
-largest pressure, the segment of the flux, the place where the film is 20 um thick) is held.
+largest pressure, the segment of the flux, the place where the film ends, the least film) is held.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from softehl.cases.seal.equations.system import DISPLACEMENT, FACET, FILM
 from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
-from softehl.cases.seal.states.contacts import CONTACT_FILM, contact_film
+from softehl.cases.seal.states.contacts import CONTACT_FILM, GROOVE, contact_film, contact_level
 from softehl.cases.seal.states.results import film_parts, metering
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import FieldRates, Inputs, weighted
@@ -90,10 +90,11 @@ def _flux(
 
 
 def _width(case: FilmCase, x: Array) -> Quantity:
-    """Length over which the film is thinner than 20 um, piecewise linear between nodes."""
+    """Length of what counts as contact (`contact_level`), piecewise linear between nodes."""
     z, h = case.system.arc_film(x)
+    level = contact_level(h)
     by_z, by_h = np.zeros(len(z)), np.zeros(len(z))
-    inside, ends = np.flatnonzero(h < CONTACT_FILM), []
+    inside, ends = np.flatnonzero(h < level), []
     for at, outside, sign in ((inside[0], -1, -1.0), (inside[-1], 1, 1.0)):
         other = at + outside
         if not 0 <= other < len(z):
@@ -101,12 +102,14 @@ def _width(case: FilmCase, x: Array) -> Quantity:
             ends.append(z[at])
             continue
         rise = h[other] - h[at]
-        t = (CONTACT_FILM - h[at]) / rise
+        t = (level - h[at]) / rise
         slope = (z[other] - z[at]) / rise
         by_z[at] += sign * (1.0 - t)
         by_z[other] += sign * t
         by_h[at] -= sign * slope * (1.0 - t)
         by_h[other] -= sign * slope * t
+        if level > CONTACT_FILM:
+            by_h[h.argmin()] += sign * slope * GROOVE
         ends.append(z[at] + t * (z[other] - z[at]))
     width = float(ends[1] - ends[0])
     return Quantity(width, z=by_z / width, h=by_h / width)

@@ -15,7 +15,8 @@ CONTACT_FILM = 0.02
 """Film thickness that counts as contact, mm; a gap above it parts two contacts of a film."""
 
 GROOVE = 2.0
-"""Of the thinnest film: what parts two lobes whose groove is not as deep as `CONTACT_FILM`."""
+"""Of the thinnest film: what parts two lobes whose groove is not as deep as `CONTACT_FILM`, and
+what counts as contact of a film that is nowhere much thinner than that."""
 
 GRAZED = 1e-3
 """Gap that parts two dry contacts, mm: a film opens a groove whose ground is so near to the rod."""
@@ -47,15 +48,20 @@ def groups(h: Array, inside: Flags, apart: float = CONTACT_FILM) -> list[Integer
     return [part for part in np.split(nodes, cuts) if len(part)]
 
 
+def contact_level(h: Array) -> float:
+    """Film thickness (mm) below which a film h (nodes,) is in contact; more in a thick film."""
+    return max(CONTACT_FILM, GROOVE * float(h.min()))
+
+
 def contact_film(h: Array, lobes: int = 1) -> float:
-    """Film thickness that counts as contact, mm, of a film h (nodes,) of a section with lobes.
+    """`contact_level` of a film h (nodes,) of a section with lobes, so that each has its contact.
 
     Less than `CONTACT_FILM` where a thick film fills a shallow groove: else both of its contacts
     would be one, with an inlet and an exit in its middle.
     """
-    thin = GROOVE * float(h.min())
-    whole, parted = (len(groups(h, h < level, level)) for level in (CONTACT_FILM, thin))
-    return min(thin, CONTACT_FILM) if whole < lobes == parted else CONTACT_FILM
+    usual, thin = contact_level(h), GROOVE * float(h.min())
+    whole, parted = (len(groups(h, h < level, level)) for level in (usual, thin))
+    return thin if whole < lobes == parted else usual
 
 
 def contacts(system: SealSystem, x: Array) -> list[Integers]:

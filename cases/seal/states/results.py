@@ -16,7 +16,7 @@ from softehl.cases.seal.equations.system import (
     FILM,
 )
 from softehl.cases.seal.gland.surfaces import MICROMETRE, regime
-from softehl.cases.seal.states.contacts import CONTACT_FILM, contact_film, groups
+from softehl.cases.seal.states.contacts import CONTACT_FILM, contact_film, contact_level, groups
 from softehl.cases.seal.states.entrance import built_up, wedge, wedge_friction
 from softehl.cases.seal.states.film_signs import (
     INLET,
@@ -229,7 +229,8 @@ def film_state(
 ) -> FilmState:
     """The record of a converged film whose numbers are the last of `verdict`."""
     numbers = verdict.last or film_numbers(system, problem, film, x)
-    limits = interval_below(*system.arc_film(x), CONTACT_FILM)
+    z, h = system.arc_film(x)
+    limits = interval_below(z, h, contact_level(h))
     state = FilmState(
         sealed_pressure_MPa=film.sealed_pressure,
         rod_speed_mm_s=film.rod_speed,

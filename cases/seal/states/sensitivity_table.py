@@ -15,7 +15,8 @@ class SensitivityRow(Record):
     sealed_pressure_MPa: float = column("MPa", "sealed pressure p_s")
     rod_speed_mm_s: float = column("mm/s", "rod speed U, + = outstroke (to the air side)")
     quantity: str = column(
-        "", "`h_star`, `friction`, `leakage`, `p_max` or `contact_width` (where h < 20 um)"
+        "",
+        "`h_star`, `friction`, `leakage`, `p_max` or `contact_width` (that of `curve.csv`)",
     )
     parameter: str = column("", "a key of the case, or `U`")
     log_derivative: float = column(

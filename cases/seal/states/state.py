@@ -80,10 +80,16 @@ class FilmRow(Row):
         "mm3/s", "leak rate 2 pi R q, + = to the air side", head="leak", shown=".4g"
     )
     contact_start_mm: float = column(
-        "mm", "sealed end of the contact, where h is 20 um", head="contact", shown=".2f"
+        "mm",
+        "sealed end of the contact, where h is 20 um, or twice the least h if that is more",
+        head="contact",
+        shown=".2f",
     )
     contact_end_mm: float = column(
-        "mm", "air end of the contact, where h is 20 um", head="contact", shown="+.2f"
+        "mm",
+        "air end of the contact, where h is 20 um, or twice the least h if that is more",
+        head="contact",
+        shown="+.2f",
     )
     newton_iterations: int = column(
         "", "iterations of Newton's method for this state", head="Newton"
