@@ -81,4 +81,5 @@ def read_quantity(text: str, unit: str) -> float:
             f'"{text}" is a size with a tolerance class, which is not read; write the size alone, '
             f'"{found[1]} mm"'
         )
-    raise ValueError(f'"{text}" is not a number in {unit}; allowed units: {", ".join(known)}')
+    units = [*known, *(_FAHRENHEIT if unit == "degC" else ())]
+    raise ValueError(f'"{text}" is not a number in {unit}; allowed units: {", ".join(units)}')

@@ -45,6 +45,8 @@ def test_other_texts_are_no_quantities(text: str) -> None:
 def test_a_wrong_unit_names_those_that_fit() -> None:
     with pytest.raises(ValueError, match='"3 mm" is not a number in MPa; allowed units: MPa, GPa'):
         read_quantity("3 mm", "MPa")
+    with pytest.raises(ValueError, match="allowed units: degC, °C, C, F, degF"):
+        read_quantity("350 K", "degC")
     with pytest.raises(ValueError, match="is a kinematic viscosity"):
         read_quantity("46 cSt", "MPa s")
 
