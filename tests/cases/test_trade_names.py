@@ -87,6 +87,7 @@ NO_RINGS = {
     "quad ring": "36x4",
     "U-cup 25x5": "U-cup 25x35x8",
     "25x35x8x2": "AS568-226",
+    "AS568-2100": 'is no size of AS568, which have three digits; write "AS568-226"',
 }
 FITS = {
     "36 f7": (35.950, 35.975),
@@ -191,7 +192,7 @@ NO_OILS = {
     "46": "ISO VG 46",
     "Tellus 46": "ISO VG 46",
     "Mobil DTE 25": "ISO VG of its data sheet",
-    "SAE 30": "says no viscosity of its own",
+    "SAE 30": "does not say its viscosity",
     "MIL-H-5606": "6.8 cSt at 100 degC",
     "Shell Tellus S2 M 68": "ISO VG 68",
     "46 cSt": "6.8 cSt at 100 degC",

@@ -116,6 +116,8 @@ def _unknown(given: str, rest: str, kind: Kind | None) -> Exception:
         size = f"{found[1].upper()}{found[2]}"
         why = f"is a size of JIS B 2401 ({size}), whose diameters are not in the catalogue"
         return refused("ring", given, why, *usual[:2])
+    if re.match(r"AS[ -]?568", rest, re.IGNORECASE):
+        return refused("ring", given, "is no size of AS568, which have three digits", usual[2])
     sizes = re.findall(NUMBER, rest)
     if len(sizes) == 3 and (kind == "u_cup" or re.search(r"\dx[\d.]+x\d", rest)):
         return refused("ring", given, "is not known", f"U-cup {'x'.join(sizes)}")
