@@ -265,7 +265,7 @@ class CycleCase(Case[Cycle, CycleRow]):
             parts.append(f"least lambda {row.lambda_ratio:.2g}")
         line = f"{'; '.join(parts)}{end}"
         if row.lambda_ratio < MIXED:
-            line = Alarm(f"{line}; thinner than the surfaces are rough")
+            line = Alarm(f"{line}; film below the roughness of the surfaces")
         return [line]
 
     def caption(self, rows: Sequence[CycleRow]) -> str:

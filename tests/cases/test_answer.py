@@ -41,12 +41,12 @@ from tests.cases.test_leakage import row
         ),
         (
             [row(400.0, 1.1)],
-            "whether it leaks is open: no speed has a film of both strokes",
+            "leakage is not known: no speed has a film of both strokes",
             "friction 3 N out",
         ),
         (
             [row(-400.0, 1.1, UNCERTAIN)],
-            "whether it leaks is open: no speed has a film of both strokes",
+            "leakage is not known: no speed has a film of both strokes",
             "leakage needs both strokes; friction 3 N in (in uncertain)",
         ),
     ],
@@ -76,10 +76,12 @@ def test_films_thinner_than_roughness_are_an_alarm() -> None:
     out = replace(row(400.0, 1.4), lambda_ratio=3.5, regime="full")
     line = answer([out, back], 100.0)[1]
     assert isinstance(line, Alarm)
-    assert line.endswith("least lambda 0.7 in (boundary); thinner than the surfaces are rough: in")
+    assert line.endswith(
+        "least lambda 0.7 (boundary, instroke); film below the roughness of the surfaces: instroke"
+    )
     smooth = replace(row(400.0, 1.4), h_min_um=0.1)
     assert isinstance(answer([smooth], 100.0)[1], Alarm)
-    assert "usual surfaces" in answer([smooth], 100.0)[1]
+    assert "usual roughness, 0.2 um: outstroke" in answer([smooth], 100.0)[1]
     page = render([cycles()], [Part("x", lines=[line, "calm"])])
     assert f'<li class="not">{line}</li><li>calm</li>' in page
 
@@ -126,7 +128,7 @@ def test_rough_cycles_say_how_they_break_away() -> None:
     assert not isinstance(calm, Alarm)
     (line,) = run.case.answer(run.parameters, [replace(known, lambda_ratio=0.7)])
     assert isinstance(line, Alarm)
-    assert line.endswith("least lambda 0.7; thinner than the surfaces are rough")
+    assert line.endswith("least lambda 0.7; film below the roughness of the surfaces")
 
 
 def test_breaking_away_is_friction_of_a_slow_rod() -> None:

@@ -366,7 +366,7 @@ def test_a_run_writes_its_files(here: Path, invoke: Invoke) -> None:
     assert any("h*" in line and "friction" in line for line in out)
     assert sum("ok" in line for line in out) == 4
     assert out[-1] == "written to results/oring"
-    assert err[0].startswith("sealed pressure / shear modulus = 0.27: every film of a sample")
+    assert err[0].startswith("sealed pressure / shear modulus = 0.27: in a sample")
     assert err[1] == "contact, p_s = 1 MPa, stroke both"
 
 

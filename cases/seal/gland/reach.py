@@ -19,8 +19,9 @@ _OTHER = 2.0
 """Largest p_s / mu at which other sections were tried."""
 
 _ROUND_WORDS = (
-    f"every film of a sample of O-rings was right up to {_SURE:g}, 98 % up to 4, 89 % from 4 to 5, "
-    f"above that states are uncertain, and nothing was tried above {_TRIED:g} (docs/limits.md)"
+    f"in a sample of O-rings all films were right at ratios to {_SURE:g}, 98 % at 3 to 4, "
+    "89 % at 4 to 5; above 5 states are uncertain, and nothing was tried above "
+    f"{_TRIED:g} (docs/limits.md)"
 )
 _OTHER_WORDS = f"sections other than round were tried up to {_OTHER:g}, not above (docs/limits.md)"
 _DO = "the run may take minutes and end without a film; a harder rubber or a lower pressure helps"

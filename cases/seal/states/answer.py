@@ -21,8 +21,8 @@ _Strokes = Mapping[str, FilmRow]
 def answer(rows: Sequence[FilmRow], travel: float) -> list[str]:
     """Answer if the seal leaks, and a line for each sealed pressure and speed |U|, fast ones first.
 
-    travel: way of the rod from end to end, mm. A line with a film that is thinner than surfaces are
-    rough is an Alarm.
+    travel: way of the rod from end to end, mm. A line with a film that is thinner than the
+    roughness is an Alarm.
     """
     if not rows:
         return []
@@ -67,7 +67,7 @@ def _whether(
 ) -> str:
     """One line: leaks, how much and where most, or returns what it takes out."""
     if not kinds:
-        return "whether it leaks is open: no speed has a film of both strokes"
+        return "leakage is not known: no speed has a film of both strokes"
     cycle = f"in a cycle of {travel:g} mm out and back"
     leaking = [at for at, kind in kinds.items() if kind == "leaks"]
     if not leaking:
@@ -117,15 +117,19 @@ def _ratio(strokes: _Strokes) -> Iterator[str]:
     rough = {s: row for s, row in strokes.items() if row.regime}
     if rough:
         stroke, row = min(rough.items(), key=lambda item: item[1].lambda_ratio)
-        yield f"least lambda {row.lambda_ratio:.2g} {stroke} ({row.regime})"
+        yield f"least lambda {row.lambda_ratio:.3g} ({row.regime}, {stroke}stroke)"
 
 
 def _thin(strokes: _Strokes) -> str:
-    """Which films are thinner than surfaces are rough, in words."""
+    """Which films are thinner than the roughness of the surfaces, in words."""
     rough = [s for s, row in strokes.items() if row.regime and row.lambda_ratio < MIXED]
     smooth = [s for s, row in strokes.items() if not row.regime and row.h_min_um < USUAL]
     if rough:
-        return f"thinner than the surfaces are rough: {', '.join(rough)}"
+        return f"film below the roughness of the surfaces: {_named(rough)}"
     if smooth:
-        return f"thinner than usual surfaces are rough, {USUAL:g} um: {', '.join(smooth)}"
+        return f"film below the usual roughness, {USUAL:g} um: {_named(smooth)}"
     return ""
+
+
+def _named(strokes: Sequence[str]) -> str:
+    return ", ".join(f"{stroke}stroke" for stroke in strokes)

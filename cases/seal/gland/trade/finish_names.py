@@ -46,6 +46,6 @@ def read_finish(given: str) -> float | None:
     if kind.lower() in ("rq", "rms"):
         return height
     raise refused(
-        *("roughness", given, f"{kind} does not give a mean or rms height; write Ra or Rq"),
+        *("roughness", given, "gives neither Ra nor Rq"),
         *("Ra 0.2", "Rq 0.25"),
     )

@@ -118,12 +118,12 @@ def _unknown(given: str, text: str) -> Exception:
         kind = found["kind"] or found["word"]
         if kind.upper() == "HV":
             return refused("oil", given, "does not say its viscosity index", *forms[2:])
-        why = "says no viscosity of its own: write two of its data sheet"
+        why = "does not say its viscosity: take two values from its data sheet"
         return refused("oil", given, why, TWO)
     if re.search(r"cSt|mm\^?2/s", text, re.IGNORECASE):
         why = "is not understood (one viscosity says nothing of another temperature)"
     elif re.search(r"[A-Za-z]{3,}", text):
-        why = "is not understood; of a brand write the ISO VG of its data sheet"
+        why = "is not understood (for a brand write the ISO VG of its data sheet)"
     else:
         why = "is not understood"
     return refused("oil", given, why, *forms)
