@@ -111,12 +111,20 @@ _OF_STEADY_FILMS = (
 )
 """Keys of the seal that a cycle has no use for."""
 
+_WITHOUT_TABLE = ("travel", "frequency", "shape", "ramp")
+"""Keys of which a table of the motion takes the place."""
+
 
 def unused(p: Cycle) -> list[str]:
     """Which of these were given, in words."""
     fields = type(p).model_fields
-    given = [key for key in _OF_STEADY_FILMS if getattr(p, key) != fields[key].default]
-    return [f"{key} has no effect on a cycle, only on steady films" for key in given]
+    given = [key for key in fields if getattr(p, key) != fields[key].default]
+    steady = [key for key in _OF_STEADY_FILMS if key in given]
+    beside = [key for key in _WITHOUT_TABLE if key in given and p.motion]
+    return [
+        *(f"{key} has no effect on a cycle, only on steady films" for key in steady),
+        *(f"{key} has no effect beside a motion of its own" for key in beside),
+    ]
 
 
 BREAKAWAY = 0.1
@@ -236,7 +244,7 @@ class CycleCase(Case[Cycle, CycleRow]):
         """See :class:`Case`."""
         highest = parameters.path.pressure.largest
         words = [*beyond_reach(parameters, highest), *unused_keys(parameters), *unused(parameters)]
-        words += outside(parameters.compound, parameters.temperature)
+        words += [*outside(parameters.compound, parameters.temperature), *parameters.path.defects()]
         if parameters.rough:
             return words
         return [
@@ -254,10 +262,9 @@ class CycleCase(Case[Cycle, CycleRow]):
         leak = leaks(row.leak_mm3)
         if row.leak_mm3 > 0.0 and parameters.motion is None:
             leak += f", {far(row.leak_mm3, parameters.travel)}"
-        parts = [
-            f"cycle {row.cycle:g}: {leak}",
-            f"friction {row.friction_out_N:.3g} N out, {abs(row.friction_in_N):.3g} N in at most",
-        ]
+        back = f", {-row.friction_in_N:.3g} N in" if row.friction_in_N < 0.0 else ""
+        friction = f"friction {row.friction_out_N:.3g} N out{back} at most"
+        parts = [f"cycle {row.cycle:g}: {leak}", friction]
         if isfinite(row.breakaway_N):
             parts.append(f"{row.breakaway_N:.3g} N to break away")
         parts.append(f"its work {row.energy_mJ:.4g} mJ")

@@ -126,6 +126,8 @@ def test_rough_cycles_say_how_they_break_away() -> None:
     (calm,) = run.case.answer(run.parameters, [known])
     assert "10 N in at most; 15 N to break away; its work 425 mJ; least lambda 3.5" in calm
     assert not isinstance(calm, Alarm)
+    (one_way,) = run.case.answer(run.parameters, [replace(known, friction_in_N=9.0)])
+    assert "friction 12 N out at most; 15 N to break away" in one_way
     (line,) = run.case.answer(run.parameters, [replace(known, lambda_ratio=0.7)])
     assert isinstance(line, Alarm)
     assert line.endswith("least lambda 0.7; film below the roughness of the surfaces")

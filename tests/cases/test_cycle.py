@@ -199,6 +199,22 @@ def test_keys_of_steady_films_are_named() -> None:
     ]
 
 
+def test_a_motion_that_does_not_go_to_and_fro_is_warned_of() -> None:
+    def words(*motion: tuple[float, float], **keys: float) -> list[str]:
+        return CASE.warnings(Cycle(roughness=(0.0, 0.2), motion=motion, **keys))  # type: ignore[arg-type]
+
+    back = ((0.0, 100.0), (0.2, 100.0), (0.25, -100.0), (0.45, -100.0))
+    assert words(*back, (0.5, 100.0)) == []
+    assert words(*back) == [
+        "motion: the speed jumps from -100 to 100 mm/s where it repeats; "
+        "end it with the speed that it begins with"
+    ]
+    assert words((0.0, 100.0), (0.2, 100.0), travel=5.0) == [
+        "travel has no effect beside a motion of its own",
+        "motion: the rod does not come back: +20 mm farther in each cycle",
+    ]
+
+
 @pytest.mark.slow
 def test_long_periods_give_the_steady_curve(tmp_path: Path) -> None:
     """The mean leak over the period tends to that of steady strokes as one over it."""

@@ -14,6 +14,7 @@ import numpy as np
 from softehl.runtime.io import read_table
 
 _POINTS = 240  # of a sine: its speed is then right to 1e-4 of the largest
+_CLOSED = 0.01  # of the way of a cycle, and of the largest speed: measured motions close so well
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,20 @@ class Motion:
     def period(self) -> float:
         """Time of a cycle, s."""
         return self.speed.period
+
+    def defects(self) -> list[str]:
+        """Why the rod does not go to and fro as the table repeats, in words; none if it does."""
+        times, values = np.array(self.speed.times), np.array(self.speed.values)
+        on, jump = self.place(self.period), float(values[0] - values[-1])
+        words = []
+        if abs(on) > _CLOSED * float(np.trapezoid(np.abs(values), times)):
+            words.append(f"motion: the rod does not come back: {on:+.3g} mm farther in each cycle")
+        if abs(jump) > _CLOSED * self.speed.largest:
+            words.append(
+                f"motion: the speed jumps from {values[-1]:g} to {values[0]:g} mm/s where it "
+                "repeats; end it with the speed that it begins with"
+            )
+        return words
 
     def place(self, t: float) -> float:
         """Way of the rod since t = 0, mm."""
