@@ -175,5 +175,5 @@ def test_a_film_that_is_not_found_ends_soon_and_with_a_reason() -> None:
     p = Seal(**given, sealed_pressure=2.0, stroke="out", speeds=(1.0,), error_estimate=False)
     outcome = run(p, Silent())
     assert not outcome.states
-    assert outcome.message.startswith("outstroke: no film was found at 1 mm/s: ")
+    assert outcome.message.startswith("outstroke: no film was found at 1 mm/s; ")
     assert sum(stage.name.startswith("film at") for stage in outcome.stages) <= 3

@@ -100,8 +100,9 @@ def test_a_film_that_is_not_found_is_told_why(given: dict[str, Any], says: str) 
     missed = [NoFilm("out", speed, Status.DIVERGED, "no end") for speed in (400.0, 25.5)]
     status, words = without_films(missed, Seal(**given))
     assert status is Status.DIVERGED
-    assert words.startswith("outstroke: no film was found at 400, 25.5 mm/s: no end; ")
+    assert words.startswith("outstroke: no film was found at 400, 25.5 mm/s; ")
     assert says in words
+    assert words.endswith("; the solver says: no end")
 
 
 def test_a_ring_that_overfills_its_gland_is_warned_of() -> None:

@@ -38,8 +38,8 @@ def without_films(missed: Sequence[NoFilm], p: Seal) -> tuple[Status, str]:
     """Status and message of a stroke that lacks the films of these speeds."""
     first, speeds = missed[0], ", ".join(f"{film.speed:g}" for film in missed)
     advice = ROLLING if p.rotation == "free" else _film_advice(p)
-    words = f"{first.stroke}stroke: no film was found at {speeds} mm/s: {first.message}; {advice}"
-    return first.status, words
+    words = f"{first.stroke}stroke: no film was found at {speeds} mm/s; {advice}"
+    return first.status, f"{words}; the solver says: {first.message}"
 
 
 def _film_advice(p: Seal) -> str:
