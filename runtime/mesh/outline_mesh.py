@@ -69,17 +69,21 @@ def outline_mesh(
     layout = BoundaryLayout.of(shape.outline, film, spacing, long, strip.least)
     _require_density(density, long)
     coarse = Fraction(density) / _divisions(Fraction(density))
-    best, found, mesh = 0.0, 1.0, None
+    best, mesh = 0.0, None
     for halvings in range(_TRIES):  # the coarsest of its family decides how thick the strip is
-        tried = _mesh(layout, coarse, strip.thick * 0.5**halvings, strip.growth)
+        thick = strip.thick * 0.5**halvings
+        tried = _mesh(layout, coarse, thick, strip.growth)
         share = _worst(tried)
-        if share > best:
-            best, found, mesh = share, strip.thick * 0.5**halvings, tried
+        if share <= best:
+            continue
+        if coarse != density and share >= _LEAST:
+            tried = _mesh(layout, Fraction(density), thick, strip.growth)
+            if _worst(tried) < _LEAST:  # elements of the finer one fold in a front that is curved
+                continue
+        best, mesh = share, tried
         if share >= WORST:
             break
-    if coarse != density and best >= _LEAST:
-        mesh = _mesh(layout, Fraction(density), found, strip.growth)
-    if mesh and _worst(mesh) >= _LEAST:
+    if mesh and best >= _LEAST:
         return mesh
     raise MeshError(
         f"no sound mesh of {shape.name} at density {density} with {long} segments of its film: a "

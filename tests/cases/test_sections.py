@@ -141,6 +141,10 @@ def test_many_sections_of_random_dimensions_have_sound_meshes(name: str) -> None
     require_sound_meshes(name, range(2, 22), (1, 2))
 
 
+def test_a_strip_that_folds_only_in_the_finer_mesh_is_made_thinner() -> None:
+    require_sound_meshes("u_cup", range(14, 15), (4,))
+
+
 @pytest.mark.parametrize("name", ["rectangular", "x_ring", "d_ring", "trapezoid", "u_cup"])
 def test_the_patch_test_is_passed(name: str) -> None:
     shape = SECTIONS[name]().shape(50.39)
