@@ -7,6 +7,7 @@ from typing import Any
 import sympy as sp
 
 import softehl
+from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.material import Material
 
 NAMES = ("xx", "yy", "zz", "xy", "yz", "xz")
@@ -109,11 +110,25 @@ def crystal(m: Material) -> None:
     m.history(**{f"g_{k}": a for k, a in enumerate(v)})
 
 
+@softehl.page
+def fbar(m: Fields) -> None:
+    """F-bar after de Souza Neto et al., 1996, neo-Hooke: the volume is that of the centroid."""
+    u = m.vector("u")
+    mu, K = m.parameters(mu="shear modulus", K="bulk modulus")
+    F = m.deformation_gradient(u)
+    J, cofactor = m.define("J", F.det()), F.adjugate().T
+    J0 = m.centroid(J)
+    a = m.define("a", (J0 / J) ** sp.Rational(1, 3))
+    m.weak(mu / a * (F - cofactor / (J * a**2)) + K * (J0 - 1) * cofactor, F)
+
+
 MATERIALS = {law.name: law for law in (neo_hooke, plastic, viscous, crystal)}
+PAGES = {name: law.page() for name, law in MATERIALS.items()} | {"fbar": fbar}
 EXAMPLES = {
     "neo_hooke": (0.4, 0.9),
     "plastic": (0.4, 0.9, 0.1, 0.01),
     "viscous": (0.4, 0.9, 0.6, 2.0, 0.1),
     "crystal": (0.4, 0.9, 0.1, 0.05, 0.1),
+    "fbar": (0.4, 0.9),
 }
 """Values of the parameters."""

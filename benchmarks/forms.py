@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.field_pages import EXAMPLES, MATERIALS
+from benchmarks.field_pages import EXAMPLES, PAGES
 from softehl.codegen import pipeline
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.pages import Form
@@ -49,7 +49,7 @@ class Built:
 def built(material: str, cell: str, form: Form | None, folder: Path) -> Built:
     """Derive and compile, in series. form: None for that which is taken by itself."""
     start = time.process_time()
-    d = replace(MATERIALS[material].page(), form=form).definition(cell)
+    d = replace(PAGES[material], form=form).definition(cell)
     files = product.files([pipeline.compile_model(d)])
     derive = time.process_time() - start
     folder.mkdir(parents=True)
@@ -156,7 +156,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.forms", description=__doc__)
     parser.add_argument("cells", nargs="*", default=["quad4", "hex8"], help="kinds of cells")
-    parser.add_argument("--material", choices=list(MATERIALS), default="neo_hooke")
+    parser.add_argument("--material", choices=list(PAGES), default="neo_hooke")
     parser.add_argument("--point", action="store_true", help="loops around a point alone")
     given = parser.parse_args(arguments)
     forms: list[Form] = ["point"] if given.point else ["whole", "point"]

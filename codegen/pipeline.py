@@ -43,7 +43,7 @@ from softehl.codegen.emit.points import factored as emit_factored
 from softehl.codegen.emit.points import family as emit_points
 from softehl.codegen.emit.points.choice import Choice, choose
 from softehl.codegen.emit.points.function import Outputs
-from softehl.codegen.emit.points.layout import Layout
+from softehl.codegen.emit.points.layout import Layout, Needs
 from softehl.codegen.emit.runs import arranged_plan
 from softehl.codegen.emit.schedule import Schedule, is_straight, schedule, straight_line
 from softehl.codegen.graph.graph import Routine
@@ -180,7 +180,9 @@ def _at_points(d: Definition, tasks: Sequence[str]) -> KernelSource:
         called = dict.fromkeys(r for t in some for r in functions[t].routines)
         routines = emit_lane_routines.texts(layout.site, called)
         before = emit_lanes.wrappers("".join([*routines, *texts]))
-        before += [*routines, *emit_constants.used(layout, "".join(texts))]
+        places = [layout, *([layout.at_centroid()] if layout.form.centroid else [])]
+        tables = [emit_constants.used(place, "".join(texts)) for place in places]
+        before += [*routines, *dict.fromkeys(table for some in tables for table in some)]
         files.append(emit_source.source(d, texts, before) if texts else "")
     shared = dict(pair for f in functions.values() for pair in f.shared)
     return KernelSource(d, files[0], functions, files[1], shared)
@@ -190,11 +192,26 @@ def _at_point(layout: Layout, task: str) -> Function:
     """One kernel of a page of fields: the function of a point and the loops of the cell."""
     chosen = _moduli(layout.site, task)
     outputs, plan, called = _ordered(layout, task, chosen)
-    made = emit_points.kernel(layout, task, outputs, plan)
+    made = emit_points.kernel(
+        layout, task, emit_points.At(outputs, plan), _at_centroid(layout, task, outputs)
+    )
     shared = () if made.shared is None else (made.shared,)
     return Function(
         made.text, plan, made.temporaries, None, (chosen,), chosen, "points", called, shared
     )
+
+
+def _at_centroid(layout: Layout, task: str, point: Outputs) -> emit_points.At | None:
+    """Values at the centroid that the function of a point reads, None where there are none."""
+    form, needs = layout.form, Needs.of(point.entries)
+    first = at_points.first_rate(form.definition, task)
+    read = {*needs["dofs"], *(k - first for k in needs["direction"])}
+    if not read.intersection(form.centroid):
+        return None
+    way = Variant("at the centroid", at_points.at_centroid(form, task))
+    attempt = _attempt(layout.site, way, unrolled=True)
+    outputs, plan, _ = _ordered(layout, task, attempt)
+    return emit_points.At(Outputs(outputs.entries, square=False), plan)
 
 
 def _ordered(

@@ -6,9 +6,9 @@ from softehl.codegen.abi import Task, derivative_task
 from softehl.codegen.derive import variants
 from softehl.codegen.derive.outputs import Entry, Slot
 from softehl.codegen.derive.variants import moved_arguments, moved_unknowns
-from softehl.codegen.graph.differentiate import directional
+from softehl.codegen.graph.differentiate import directional, gradient
 from softehl.codegen.graph.graph import Node
-from softehl.codegen.language.definition import Definition
+from softehl.codegen.language.definition import Definition, PointForm
 
 _KNOWN = frozenset(map(str, Task))
 RATES = 1000
@@ -29,10 +29,34 @@ def outputs(d: Definition, task: str) -> list[Entry]:
         assert by is not None
         rates = directional(d.graph, [x.node for x in rows], {by: d.graph.one}, d.given)
         return [Entry(x.row, None, n) for x, n in zip(rows, rates, strict=True)]
-    first = d.coordinate_width + len(d.data) + len(d.parameters)
-    seeds = {**moved_arguments(d), **moved_unknowns(d, first)}
+    seeds = {**moved_arguments(d), **moved_unknowns(d, first_rate(d, task))}
     rates = directional(d.graph, [x.node for x in rows], seeds, d.given)
     return rows + [Entry(Slot(False, RATES + k), None, n) for k, n in enumerate(rates)]
+
+
+def first_rate(d: Definition, task: str) -> int:
+    """Entries of `direction` at a point before those of its unknowns."""
+    return 0 if task == Task.PRODUCT else d.coordinate_width + len(d.data) + len(d.parameters)
+
+
+def at_centroid(form: PointForm, task: str) -> list[Entry]:
+    """Values at the centroid; for a tangent also their derivatives by what the fields are there,
+    with columns numbered as in `form.all`, and for tasks along `direction` their rates.
+    """
+    d, values = form.definition, list(form.centroid.values())
+    g, rows = d.graph, [Entry(Slot(False, k), None, n) for k, n in enumerate(values)]
+    dofs = {k: g.input("dofs", k) for k in range(len(form.all)) if k not in form.centroid}
+    if task == Task.TANGENT:
+        for x in rows:
+            slopes = gradient(g, x.node, list(dofs.values()), given=d.given)
+            rows = rows + [Entry(x.row, Slot(False, k), slopes[n]) for k, n in dofs.items()]
+    elif task in (Task.PRODUCT, Task.PSEUDO_LOAD, Task.FIELDS_RATE):
+        first = first_rate(d, task)
+        seeds = {} if task == Task.PRODUCT else moved_arguments(d)
+        seeds |= {n: g.input("direction", first + k) for k, n in dofs.items()}
+        rates = directional(g, values, seeds, d.given)
+        rows += [Entry(Slot(False, RATES + k), None, n) for k, n in enumerate(rates)]
+    return rows
 
 
 def argument(d: Definition, task: str) -> Node | None:

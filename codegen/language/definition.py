@@ -56,7 +56,8 @@ class PointForm:
 
     Its unknowns are values and gradients: `all` says what each is, `unknowns` those that occur, in
     the order of `definition.directions`. data: of those of its data that are interpolated, by
-    their number. axisymmetric: whether the volume is that of a ring.
+    their number. axisymmetric: whether the volume is that of a ring. centroid: unknowns that are no
+    fields but values at the centroid of the cell, by their number in `all`, and what they are.
     """
 
     definition: Definition
@@ -64,6 +65,13 @@ class PointForm:
     all: tuple[Quantity, ...]
     data: Mapping[int, Quantity]
     axisymmetric: bool
+    centroid: Mapping[int, Node] = field(default_factory=dict)
+
+    @property
+    def own(self) -> dict[int, Quantity]:
+        """The unknowns that are fields at this point, with their numbers in `unknowns`."""
+        others = {self.all[k] for k in self.centroid}
+        return {k: q for k, q in enumerate(self.unknowns) if q not in others}
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,14 @@ from typing import Any
 
 import sympy as sp
 
-from softehl.codegen.graph.graph import Input, Node
+from softehl.codegen.graph.differentiate import gradient
+from softehl.codegen.graph.graph import Input, Node, Op
 from softehl.codegen.graph.traverse import reachable
+from softehl.codegen.language.complaints import NeedsElement
 from softehl.codegen.language.definition import Component, PointForm, Quantity
 from softehl.codegen.language.elements.cells import Element
 from softehl.codegen.language.elements.quadrature import point_rule
+from softehl.codegen.language.entries import Entries
 from softehl.codegen.language.fields import AXISYMMETRIC, Fields, Traced
 
 
@@ -27,6 +30,7 @@ class Site(Fields):
         self._X = [x[0] for x in self.coordinates(*"XYZ"[: cell.dimension])]
         self._quantities: list[Quantity] = []
         self._given_at_point: dict[int, Quantity] = {}
+        self._centroid: dict[int, Node] = {}
 
     def form(self) -> PointForm:
         """The finished model with the meaning of its unknowns and data."""
@@ -34,6 +38,10 @@ class Site(Fields):
         used = set(reachable([d.potential]))
         directions = tuple(n for n in d.directions if n in used)
         unknowns = tuple(self._quantities[_index(n)] for n in directions)
+        others = [n for n in directions if _index(n) in self._centroid]
+        varied = gradient(d.graph, d.potential, others, constant=d.constant, given=d.given)
+        if any(varied[n] is not d.graph.zero for n in others):
+            raise NeedsElement("m.centroid of what is varied")
         d = replace(d, directions=directions)
         return PointForm(
             definition=d,
@@ -41,7 +49,27 @@ class Site(Fields):
             all=tuple(self._quantities),
             data=dict(self._given_at_point),
             axisymmetric=self.geometry == AXISYMMETRIC,
+            centroid=self._centroid,
         )
+
+    def centroid(self, value: Any) -> Any:
+        """See `Fields`: unknowns of their own, where fields and places alone say what they are."""
+        entries, named = Entries.of(value), []
+        for v in entries.values:
+            node = self._symbols.lower(v)
+            met = reachable([node])
+            inputs = [n.payload for n in met if isinstance(n.payload, Input)]
+            known = all(
+                i.array == "coordinates" or (i.array == "dofs" and i.index not in self._centroid)
+                for i in inputs
+            )
+            if not known or any(n.op is Op.CALL for n in met):
+                raise NeedsElement(f"m.centroid({value})")
+            label = f"centroid_{len(self._centroid)}"
+            self._centroid[len(self._quantities)] = node
+            self._quantities.append(Quantity(Component(label, 0), None))
+            named.append(self.unknown(label))
+        return entries.arrange(named)
 
     def _components_of(self, components: Sequence[Component]) -> list[Traced]:
         traced = []

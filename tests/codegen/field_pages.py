@@ -79,3 +79,18 @@ def creep(m: Fields) -> None:
     m.history(v_old=v, w_old=w)
     m.fields(v=v)
     m.offer(product=True, pseudo_load=True, fields_rate=True, derivatives=[G])
+
+
+@softehl.page
+def fbar(m: Fields) -> None:
+    """F-bar after de Souza Neto et al., 1996: J is that of the centroid."""
+    u = m.vector("u")
+    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    J0 = m.centroid(J)
+    a = m.define("a", (J0 / J) ** sp.Rational(1, 3))
+    P = (F - F.adjugate().T / J / a**2) * mu / a + K * (J0 - 1) * F.adjugate().T
+    m.weak(P, F)
+    m.fields(J=J0, J_here=J)
+    m.offer(product=True, pseudo_load=True, fields_rate=True, derivatives=[mu])

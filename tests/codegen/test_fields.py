@@ -71,12 +71,16 @@ def called(kernel: Kernel, task: str, X: Array, dofs: Array, given: Any) -> list
         (field_pages.constant_pressure, "quad4", "plane strain"),
         (field_pages.heat, "hex8", "solid"),
         (field_pages.creep, "quad4", "axisymmetric"),
+        (field_pages.fbar, "tri6", "plane strain"),
         pytest.param(field_pages.mixed, "quad9", "axisymmetric", marks=pytest.mark.slow),
         pytest.param(field_pages.mixed, "quad16", "plane strain", marks=pytest.mark.slow),
         pytest.param(field_pages.mixed, "tet10", "solid", marks=pytest.mark.slow),
         pytest.param(field_pages.mixed, "hex27", "solid", marks=pytest.mark.slow),
         pytest.param(field_pages.creep, "wedge6", "solid", marks=pytest.mark.slow),
         pytest.param(field_pages.creep, "hex20", "solid", marks=pytest.mark.slow),
+        pytest.param(field_pages.fbar, "quad4", "axisymmetric", marks=pytest.mark.slow),
+        pytest.param(field_pages.fbar, "hex8", "solid", marks=pytest.mark.slow),
+        pytest.param(field_pages.fbar, "wedge6", "solid", marks=pytest.mark.slow),
     ],
     ids=lambda value: getattr(value, "name", value),
 )
@@ -210,6 +214,19 @@ def test_small_elements_stay_whole_and_large_ones_do_not() -> None:
     assert not any(map(at_points, ("tri3", "tri6", "quad4", "tet4", "wedge6")))
     assert all(map(at_points, ("quad9", "hex8", "tet10")))
     assert at_points("tri3", field_pages.creep)
+
+
+def test_values_at_the_centroid_that_are_varied_or_no_fields_need_the_whole_element() -> None:
+    def page(write: Callable[[Fields, Any], None]) -> Page:
+        return Page("middle", lambda m: write(m, m.scalar("T")))
+
+    def at_point(write: Callable[[Fields, Any], None]) -> bool:
+        return page(write).definition("tri6").point is not None
+
+    assert at_point(lambda m, T: m.weak(m.centroid(T**2) * m.grad(T), m.grad(T)))
+    assert not at_point(lambda m, T: m.minimise(T**2 * m.centroid(T)))
+    assert not at_point(lambda m, T: m.weak(m.centroid(m.previous(T)) * m.grad(T), m.grad(T)))
+    assert not at_point(lambda m, T: m.weak(T * m.centroid(m.parameters(k="a")[0] * T), T))
 
 
 def test_derivatives_that_are_asked_for_later_are_known_at_the_point() -> None:

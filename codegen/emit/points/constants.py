@@ -12,7 +12,7 @@ from softehl.codegen.emit.points.layout import Layout, orders
 
 def used(layout: Layout, text: str, prefix: str = "") -> list[str]:
     """The tables of the cell that a text names."""
-    name, form = prefix + layout.d.cell, layout.form
+    name, form = prefix + layout.tables, layout.form
     every = [*form.all, *form.data.values()]
     found = {**{o: layout.shape(o) for o in orders(every)}, layout.geometry.order: layout.geometry}
     texts: dict[str, Callable[[], str]] = {}

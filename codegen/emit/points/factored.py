@@ -41,6 +41,8 @@ from softehl.codegen.language.elements.cells import ELEMENTS
 def fits(layout: Layout) -> bool:
     """True if a page has a product by sum factorisation on its cell."""
     shape, cell = layout.geometry, layout.d.cell
+    if layout.form.centroid:
+        return False
     if shape.line is None or not cell.startswith(("quad", "hex")) or layout.dimension < 2:
         return False
     orders = {c.order for c in layout.components}

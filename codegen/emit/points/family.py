@@ -8,7 +8,6 @@ from softehl.codegen.abi import Task
 from softehl.codegen.emit.points import assembly, function, loops
 from softehl.codegen.emit.points.function import Outputs
 from softehl.codegen.emit.points.layout import Layout
-from softehl.codegen.emit.points.pairs import Parent
 from softehl.codegen.emit.schedule import Schedule
 
 
@@ -21,13 +20,25 @@ class Written:
     shared: tuple[str, str] | None
 
 
-def kernel(layout: Layout, task: str, outputs: Outputs, plan: Schedule) -> Written:
-    """The function of the point, the loops of the cell around it, and the batch."""
-    point, temporaries = function.text(layout, task, outputs, plan)
-    pieces, name, shared = [point], "", None
+@dataclass(frozen=True)
+class At:
+    """What is computed at the points or at the centroid: outputs, statements in their order."""
+
+    outputs: Outputs
+    plan: Schedule
+
+
+def kernel(layout: Layout, task: str, point: At, centroid: At | None) -> Written:
+    """The functions of the point and the centroid, the loops of the cell, and the batch."""
+    text, temporaries = function.text(layout, task, point.outputs, point.plan)
+    pieces, name, shared = [text], "", None
+    if centroid is not None:
+        there = layout.at_centroid()
+        pieces.append(function.text(there, task, centroid.outputs, centroid.plan)[0])
     if task == Task.TANGENT:
-        name, text = assembly.file(layout, outputs)
+        name, text = assembly.file(layout, point.outputs)
         shared = (f"{name.removeprefix('softehl_')}.c", text)
-        pieces.insert(0, f"{assembly.declaration(name, Parent(layout, outputs).size)};\n")
-    pieces.append(loops.Group(layout, task, outputs, name).text())
+        pieces.insert(0, f"{assembly.declaration(name, layout, point.outputs)};\n")
+    values = None if centroid is None else centroid.outputs
+    pieces.append(loops.Group(layout, task, point.outputs, name, values).text())
     return Written("\n".join(pieces), temporaries, shared)

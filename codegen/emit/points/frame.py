@@ -9,7 +9,7 @@ from softehl.codegen.abi import Task
 from softehl.codegen.emit.batch import widths
 from softehl.codegen.emit.points import function
 from softehl.codegen.emit.points.function import Outputs
-from softehl.codegen.emit.points.layout import Layout, Needs
+from softehl.codegen.emit.points.layout import Layout, Needs, orders
 from softehl.codegen.emit.points.lines import Lines
 from softehl.codegen.emit.printer import design_width
 from softehl.codegen.language.definition import Component, Quantity
@@ -63,7 +63,7 @@ class Frame:
 
     def factors(self, order: int, wanted: Iterable[str], node: str) -> None:
         """Shape functions N and slopes D0, D1, D2 of a node at the point q."""
-        name = self.layout.d.cell
+        name = self.layout.tables
         if self.layout.shape(order).long:
             for f in sorted(wanted):
                 table = f"N{order}[{node}]" if f == "N" else f"D{order}[{node}][{f[1:]}]"
@@ -77,7 +77,7 @@ class Frame:
 
 def products(f: Frame) -> None:
     """Shape functions N<order> and slopes D<order> at the point q where their tables are long."""
-    out, D, name = f.out, f.D, f.layout.d.cell
+    out, D, name = f.out, f.D, f.layout.tables
     for order in f.layout.long_orders:
         shape = f.layout.shape(order)
         assert shape.line is not None
@@ -100,3 +100,28 @@ def products(f: Frame) -> None:
 def components(quantities: Iterable[Quantity]) -> list[Component]:
     """Components of quantities, each once."""
     return list(dict.fromkeys(q.component for q in quantities))
+
+
+def to_nodes(f: Frame, fluxes: dict[Quantity, str], to: str, weight: str) -> None:
+    """Fluxes at the point q, pulled back to the parent cell, times their weight added at nodes."""
+    out = f.out
+    for order in orders(list(fluxes)):
+        here = {q: v for q, v in fluxes.items() if q.component.order == order}
+        terms: dict[Component, list[str]] = {}
+        for n, c in enumerate(components(here)):
+            slopes = {q.axis: v for q, v in here.items() if q.component == c}
+            value = slopes.pop(None, None)
+            terms[c] = []
+            if value is not None:
+                out.add(f"const V f{order}{n} = {weight}{value};")
+                terms[c].append(f"f{order}{n} * N")
+            for m in range(f.D if slopes else 0):
+                total = " + ".join(f"{v} * I{m}{axis}" for axis, v in slopes.items())
+                out.add(f"const V f{order}{n}{m} = {weight}({total});")
+                terms[c].append(f"f{order}{n}{m} * D{m}")
+        out.open(f"for (int n = 0; n < {f.layout.shape(order).nodes}; ++n)")
+        factors = {t.rpartition(" ")[2] for some in terms.values() for t in some}
+        f.factors(order, factors, "n")
+        for c, some in terms.items():
+            out.add(f"{to}[{f.layout.place(c).at('n')}] += {' + '.join(some)};")
+        out.close()

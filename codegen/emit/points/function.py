@@ -25,14 +25,17 @@ class Outputs:
     """Outputs of a task and their places: the arrays P and A of the function.
 
     moduli: number in A by row and column, of those that are not zero; of symmetric ones the upper
-    triangle alone.
+    triangle alone. square: whether rows and columns are the same quantities.
     """
 
     entries: Sequence[Entry]
+    square: bool = True
 
     @cached_property
     def symmetric(self) -> bool:
         """True if every modulus and its mirror are one and the same value."""
+        if not self.square:
+            return False
         pairs = ((x.row, x.column, x.node) for x in self.entries if x.column is not None)
         found = {(i.position, j.position): n for i, j, n in pairs}
         return all(found.get((j, i)) is n for (i, j), n in found.items())
@@ -71,7 +74,7 @@ def _is_zero(n: Node) -> bool:
 
 def name(layout: Layout, task: str) -> str:
     """Name of the function."""
-    return f"{abi.function_name(layout.d.name, task)}_point"
+    return f"{abi.function_name(layout.d.name, task)}_{layout.place_of_points}"
 
 
 def text(layout: Layout, task: str, outputs: Outputs, plan: Schedule) -> tuple[str, int]:

@@ -23,7 +23,7 @@ def write(f: Frame) -> None:
         _moved(f)
     if f.spread or f.task == Task.ENERGY:
         ring = " * (6.283185307179586 * X1)" if f.ring else ""
-        out.add(f"const V w = det * {f.layout.d.cell}_W[q]{ring};")
+        out.add(f"const V w = det * {f.layout.tables}_W[q]{ring};")
 
 
 def _inverse(f: Frame) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from softehl.codegen.abi import Task
@@ -21,7 +21,8 @@ class Inputs:
     def write(self, *, direction: bool = True) -> None:
         """The arrays x, g, e, b, t of the function of the point; without direction not t."""
         site, form = self.f.layout.site, self.f.layout.form
-        known = self._interpolated("us", {k: form.all[k] for k in self._read("dofs")}, "g")
+        known = self._interpolated("us", self._fields(self._read("dofs")), "g")
+        known |= self._centroid("g", "c", 0, self._read("dofs"))
         data = {k: form.data[k] for k in self._read("data") if k in form.data}
         known |= self._interpolated("es", data, "e")
         names = [a.name for a in self.f.layout.d.data]
@@ -38,6 +39,17 @@ class Inputs:
         moved = self._direction(known)
         width = 1 + max([*self.f.needs["direction"], 0])
         self._array("t", width, moved)
+
+    def _fields(self, numbers: Iterable[int]) -> dict[int, Quantity]:
+        """Unknowns by number, those at the centroid left out."""
+        form = self.f.layout.form
+        return {k: form.all[k] for k in numbers if k not in form.centroid}
+
+    def _centroid(self, to: str, source: str, first: int, wanted: Sequence[int]) -> dict[str, str]:
+        """Entries of an array that are values at the centroid, or their rates."""
+        numbers = enumerate(self.f.layout.form.centroid)
+        places = {first + k: f"{source}[{n}]" for n, k in numbers}
+        return {f"{to}[{k}]": places[k] for k in wanted if k in places}
 
     def _read(self, array: str) -> tuple[int, ...]:
         """Entries that the function reads; in tasks of variations also those that move."""
@@ -113,7 +125,7 @@ class Inputs:
         d = self.f.layout.d
         count = len(d.point_data)
         self.f.out.add(f"V b[{max(count, 1)}];")
-        if count:
+        if count and self.f.needs["point data"]:
             load(
                 self.f.out,
                 "b",
@@ -127,14 +139,16 @@ class Inputs:
         form, site = self.f.layout.form, self.f.layout.site
         wanted = self.f.needs["direction"]
         if self.f.task == Task.PRODUCT:
-            return self._interpolated("ts", {k: form.all[k] for k in wanted}, "t")
+            at = self._centroid("t", "dc", 0, wanted)
+            return at | self._interpolated("ts", self._fields(wanted), "t")
         if not self.f.design:
             return {}
         first = self.f.D + len(site.data) + len(site.parameters)
         moved: dict[str, str] = {}
         if self.f.task == Task.FIELDS_RATE:
-            some = {k: form.all[k - first] for k in wanted if k >= first}
-            moved |= self._interpolated("ts", some, "t")
+            some = self._fields(k - first for k in wanted if k >= first)
+            moved |= self._interpolated("ts", {first + k: q for k, q in some.items()}, "t")
+        moved |= self._centroid("t", "dc", first, wanted)
         data = {k: form.data[k - self.f.D] for k in wanted if k - self.f.D in form.data}
         moved |= self._interpolated("ts", data, "t")
         names, width = [a.name for a in self.f.layout.d.data], self.f.layout.d.coordinate_width

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from softehl.codegen.derive.outputs import Entry
@@ -15,6 +15,7 @@ from softehl.codegen.language.definition import Component, Definition, PointForm
 from softehl.codegen.language.elements.cells import ELEMENTS
 from softehl.codegen.language.fields import order_of
 from softehl.codegen.language.nodal import CORNERS
+from softehl.codegen.language.pages import rule_of
 
 
 @dataclass(frozen=True)
@@ -35,15 +36,31 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A family `d` with its form at a point."""
+    """A family `d` with its form at a point. centroid: whether the only point is the centroid."""
 
     d: Definition
     form: PointForm
+    centroid: bool = False
 
     @property
     def site(self) -> Definition:
         """The model at the point."""
         return self.form.definition
+
+    @property
+    def place_of_points(self) -> str:
+        """In a word."""
+        return "centroid" if self.centroid else "point"
+
+    @property
+    def tables(self) -> str:
+        """Beginning of the names of tables of constants."""
+        return self.d.cell + ("_centroid" if self.centroid else "")
+
+    def at_centroid(self) -> Layout:
+        """The same with the centroid as its only point."""
+        rule = rule_of(ELEMENTS[self.d.cell], 1)
+        return Layout(replace(self.d, rule=rule), self.form, centroid=True)
 
     @property
     def points(self) -> int:
@@ -58,7 +75,8 @@ class Layout:
     @cached_property
     def components(self) -> list[Component]:
         """Unknown components, in the order of the page."""
-        return list(dict.fromkeys(q.component for q in self.form.all))
+        some = [q for k, q in enumerate(self.form.all) if k not in self.form.centroid]
+        return list(dict.fromkeys(q.component for q in some))
 
     def place(self, c: Component) -> Place:
         """Place of a component among the unknowns, or the data, of the element."""

@@ -5,28 +5,39 @@ from __future__ import annotations
 from softehl.codegen import abi
 from softehl.codegen.abi import Task
 from softehl.codegen.emit.batch import functions
-from softehl.codegen.emit.points import function, geometry, pairs
-from softehl.codegen.emit.points.frame import Frame, components, products
+from softehl.codegen.emit.points import function, geometry
+from softehl.codegen.emit.points.centroid import Centroid, zeros
+from softehl.codegen.emit.points.frame import Frame, components, products, to_nodes
 from softehl.codegen.emit.points.function import Outputs
 from softehl.codegen.emit.points.inputs import Inputs
-from softehl.codegen.emit.points.layout import Layout, orders
+from softehl.codegen.emit.points.layout import Layout
 from softehl.codegen.emit.points.lines import load, store
-from softehl.codegen.language.definition import Component, Quantity
+from softehl.codegen.emit.points.pairs import Parent, pulled_back
+from softehl.codegen.language.definition import Quantity
 
 
 class Group(Frame):
     """The function that handles one group of elements in a task."""
 
-    def __init__(self, layout: Layout, task: str, outputs: Outputs, pairs: str = "") -> None:
-        """pairs: name of the function that makes tangents of moduli."""
+    def __init__(
+        self,
+        layout: Layout,
+        task: str,
+        outputs: Outputs,
+        pairs: str = "",
+        centroid: Outputs | None = None,
+    ) -> None:
+        """pairs: name of the function that makes tangents of moduli. centroid: of its function."""
         super().__init__(layout, task, outputs)
-        self.pairs = pairs
+        self.pairs, self.centroid, self.parent = pairs, centroid, Parent(layout, outputs)
 
     # the whole ----------------------------------------------------------------------------------
 
     def text(self) -> str:
         """C text of the functions of a group and of a batch."""
         self._start()
+        if self.centroid is not None:
+            Centroid(self.layout.at_centroid(), self.task, self.centroid).write(self.out)
         self.out.open(f"for (int q = 0; q < {self.layout.points}; ++q)")
         products(self)
         geometry.write(self)
@@ -34,7 +45,8 @@ class Group(Frame):
         self._call()
         self.out.close()
         if self.task == Task.TANGENT:
-            self.out.add(f"{self.pairs}(S, K);")
+            more = "T, G, " if self.parent.of_centroid else ""
+            self.out.add(f"{self.pairs}(S, {more}K);")
         self._finish()
         return functions(self.layout.d, self.task, "\n".join(self.out.lines))
 
@@ -58,8 +70,9 @@ class Group(Frame):
         if self.task == Task.ENERGY:
             out.add("V r[1] = {softehl_splat(0.0)};")
         if self.task == Task.TANGENT:
-            size = pairs.Parent(self.layout, self.outputs).size
-            out.add(f"V S[{self.layout.points}][{size}];")
+            out.add(f"V S[{self.layout.points}][{self.parent.size}];")
+            if self.parent.of_centroid:
+                zeros(out, "T", len(self.parent.of_centroid), len(d.unknowns))
 
     # what it gives ------------------------------------------------------------------------------
 
@@ -76,16 +89,20 @@ class Group(Frame):
             store(out, f"R + {len(d.fields)} * q", "P", len(d.fields), width)
         else:
             moved = self.task == Task.PSEUDO_LOAD
-            self._fluxes(self._moved_fluxes() if moved else self._plain_fluxes())
+            to_nodes(self, self._moved_fluxes() if moved else self._plain_fluxes(), "r", "w * ")
         if self.task == Task.TANGENT:
-            pairs.pulled_back(out, self.layout, outputs)
+            pulled_back(out, self.layout, outputs)
+            for k, fluxes in enumerate(self.parent.of_centroid):
+                out.open("")
+                to_nodes(self, fluxes, f"T[{k}]", "w * ")
+                out.close()
 
     def _plain_fluxes(self) -> dict[Quantity, str]:
-        return {q: f"P[{k}]" for k, q in enumerate(self.layout.form.unknowns)}
+        return {q: f"P[{k}]" for k, q in self.layout.form.own.items()}
 
     def _moved_fluxes(self) -> dict[Quantity, str]:
         """Rates of fluxes with what the moving places add."""
-        numbers = {q: k for k, q in enumerate(self.layout.form.unknowns)}
+        numbers = {q: k for k, q in self.layout.form.own.items()}
         found: dict[Quantity, str] = {}
         for c in components(numbers):
             mine = {q.axis: k for q, k in numbers.items() if q.component == c}
@@ -100,30 +117,6 @@ class Group(Frame):
                 self.out.add(f"const V {name} = {' + '.join(terms)};")
                 found[Quantity(c, axis)] = name
         return found
-
-    def _fluxes(self, fluxes: dict[Quantity, str]) -> None:
-        """Fluxes pulled back to the parent cell and added at the nodes."""
-        out = self.out
-        for order in orders(list(fluxes)):
-            here = {q: v for q, v in fluxes.items() if q.component.order == order}
-            terms: dict[Component, list[str]] = {}
-            for n, c in enumerate(components(here)):
-                slopes = {q.axis: v for q, v in here.items() if q.component == c}
-                value = slopes.pop(None, None)
-                terms[c] = []
-                if value is not None:
-                    out.add(f"const V f{order}{n} = w * {value};")
-                    terms[c].append(f"f{order}{n} * N")
-                for m in range(self.D if slopes else 0):
-                    total = " + ".join(f"{v} * I{m}{axis}" for axis, v in slopes.items())
-                    out.add(f"const V f{order}{n}{m} = w * ({total});")
-                    terms[c].append(f"f{order}{n}{m} * D{m}")
-            out.open(f"for (int n = 0; n < {self.layout.shape(order).nodes}; ++n)")
-            factors = {t.rpartition(" ")[2] for some in terms.values() for t in some}
-            self.factors(order, factors, "n")
-            for c, some in terms.items():
-                out.add(f"r[{self.layout.place(c).at('n')}] += {' + '.join(some)};")
-            out.close()
 
     def _finish(self) -> None:
         out, d = self.out, self.layout.d

@@ -36,13 +36,25 @@ class Parent:
     @cached_property
     def moduli(self) -> dict[tuple[Quantity, Quantity], str]:
         """Moduli at the point by what they multiply, as the function gives them; both triangles."""
-        q = self.layout.form.unknowns
-        found = {}
+        q, found = self.layout.form.own, {}
         for k, (i, j) in enumerate(self.outputs.moduli):
+            if j not in q:
+                continue
             found[q[i], q[j]] = f"A[{k}]"
             if self.symmetric:
                 found[q[j], q[i]] = f"A[{k}]"
         return found
+
+    @cached_property
+    def of_centroid(self) -> list[dict[Quantity, str]]:
+        """Derivatives of fluxes by each value at the centroid; empty where all are zero."""
+        q, found = self.layout.form.own, []
+        numbers = {value: k for k, value in enumerate(self.layout.form.unknowns)}
+        for value in (self.layout.form.all[k] for k in self.layout.form.centroid):
+            column = numbers.get(value)
+            pairs = enumerate(self.outputs.moduli)
+            found.append({q[i]: f"A[{k}]" for k, (i, j) in pairs if j == column})
+        return found if any(found) else []
 
     @cached_property
     def blocks(self) -> dict[tuple[Component, bool, Component, bool], list[tuple[Quantity, ...]]]:
@@ -57,7 +69,7 @@ class Parent:
     def quantities(self) -> list[Quantity]:
         """Values and parent slopes of the components, in the order of the page."""
         found: dict[Quantity, None] = {}
-        for q in self.layout.form.unknowns:
+        for q in self.layout.form.own.values():
             axes = [None] if q.axis is None else range(self.layout.dimension)
             found.update(dict.fromkeys(Quantity(q.component, k) for k in axes))
         order = {c: k for k, c in enumerate(self.layout.components)}
