@@ -204,6 +204,20 @@ def test_the_check_of_kernels_reads_the_page_of_a_point_kernel(tmp_path: Path) -
     assert verify.check(d, tasks, tmp_path / "wrong" / build.LIBRARY).errors["energy"] > 1e-10
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "cell",
+    ["tri3", "tri6", "quad4", "quad9", "tet4", "tet10", "wedge6", "hex8", "hex20", "hex27"],
+)
+def test_one_page_has_exact_derivatives_on_ten_cells(cell: str, tmp_path: Path) -> None:
+    d = field_pages.rubber.definition(cell)
+    compiled(d, tmp_path)
+    tasks = ["residual", "tangent", "fields"]
+    errors = verify.check(d, tasks, tmp_path / build.LIBRARY).errors
+    assert sorted(errors) == sorted(tasks)
+    assert max(errors.values()) < 1e-13
+
+
 # ----------------------------------------------------------------------------------- the choice
 
 

@@ -137,16 +137,29 @@ def constant_pressure(m):  # type: ignore[no-untyped-def]
 
 @softehl.page
 def poisson(m):  # type: ignore[no-untyped-def]
-    """- div grad T = q with T = sin(pi x) sin(pi y)."""
+    """- div grad T = q with T = sin(pi x) sin(pi y) or sin(pi x) sin(pi y) sin(pi z)."""
     T = m.scalar("T")
-    x, y = m.position
-    q = 2 * sp.pi**2 * sp.sin(sp.pi * x) * sp.sin(sp.pi * y)
+    exact = sp.Mul(*(sp.sin(sp.pi * x) for x in m.position))
     m.weak(m.grad(T), m.grad(T))
-    m.weak(-q, T)
-    m.fields(error=(T - sp.sin(sp.pi * x) * sp.sin(sp.pi * y)) ** 2)
+    m.weak(-len(m.position) * sp.pi**2 * exact, T)
+    m.fields(error=(T - exact) ** 2)
 
 
-@pytest.mark.parametrize(("shape", "order"), [("triangle", 1), ("quad", 2)])
+@pytest.mark.parametrize(
+    ("shape", "order"),
+    [
+        ("triangle", 1),
+        ("quad", 2),
+        pytest.param("triangle", 2, marks=pytest.mark.slow),
+        pytest.param("quad", 1, marks=pytest.mark.slow),
+        pytest.param("tetrahedron", 1, marks=pytest.mark.slow),
+        pytest.param("tetrahedron", 2, marks=pytest.mark.slow),
+        pytest.param("wedge", 1, marks=pytest.mark.slow),
+        pytest.param("hex", 1, marks=pytest.mark.slow),
+        pytest.param("serendipity", 2, marks=pytest.mark.slow),
+        pytest.param("hex", 2, marks=pytest.mark.slow),
+    ],
+)
 def test_errors_fall_with_the_order_of_the_cell(shape: str, order: int) -> None:
     errors = []
     for cells in (4, 8):
