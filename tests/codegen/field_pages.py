@@ -83,14 +83,16 @@ def creep(m: Fields) -> None:
 
 @softehl.page
 def fbar(m: Fields) -> None:
-    """F-bar after de Souza Neto et al., 1996: J is that of the centroid."""
+    """F-bar after de Souza Neto et al., 1996: J is that of the centroid; history at the point."""
     u = m.vector("u")
     mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
+    (J_old,) = m.point_data(J_old="volume ratio of the step before")
     F = m.deformation_gradient(u)
     J = m.define("J", F.det())
     J0 = m.centroid(J)
     a = m.define("a", (J0 / J) ** sp.Rational(1, 3))
-    P = (F - F.adjugate().T / J / a**2) * mu / a + K * (J0 - 1) * F.adjugate().T
-    m.weak(P, F)
-    m.fields(J=J0, J_here=J)
+    pressure = K * (J0 - 1) + mu * (J - J_old)
+    m.weak((F - F.adjugate().T / J / a**2) * mu / a + pressure * F.adjugate().T, F)
+    m.history(J_old=J)
+    m.fields(J0=J0)
     m.offer(product=True, pseudo_load=True, fields_rate=True, derivatives=[mu])

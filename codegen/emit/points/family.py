@@ -22,7 +22,7 @@ class Written:
 
 @dataclass(frozen=True)
 class At:
-    """What is computed at the points or at the centroid: outputs, statements in their order."""
+    """Outputs at the points or at the centroid, and statements in their order."""
 
     outputs: Outputs
     plan: Schedule

@@ -58,7 +58,7 @@ class Layout:
         return self.d.cell + ("_centroid" if self.centroid else "")
 
     def at_centroid(self) -> Layout:
-        """The same with the centroid as its only point."""
+        """This family with the centroid as its only point."""
         rule = rule_of(ELEMENTS[self.d.cell], 1)
         return Layout(replace(self.d, rule=rule), self.form, centroid=True)
 
