@@ -169,6 +169,7 @@ def test_films_do_not_depend_on_the_speeds_that_were_asked_for_before() -> None:
     assert many[-1].h_star_um == pytest.approx(few[-1].h_star_um, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_a_film_that_is_not_found_ends_soon_and_with_a_reason() -> None:
     """No more meshes are made once one has led no further."""
     given: dict[str, Any] = {"section": "rectangular", "groove_width": 4.6, "density": 1}

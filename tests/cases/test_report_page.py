@@ -67,18 +67,24 @@ def test_numbers_are_those_of_the_curve(runs: tuple[Path, Path], page: str) -> N
         assert f"<td>{state['h_star_um']:.4g}</td>" in page
 
 
-def test_two_folders_side_by_side(runs: tuple[Path, Path], tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def both(runs: tuple[Path, Path]) -> Path:
+    """The page of both runs, with its tables beside it."""
+    out = runs[0].with_name("both.html")
+    assert main(["report", *map(str, runs), "--out", str(out), "--xlsx"]) == 0
+    return out
+
+
+def test_two_folders_side_by_side(runs: tuple[Path, Path], both: Path) -> None:
     from openpyxl import load_workbook
 
-    out = tmp_path / "both.html"
-    assert main(["report", *map(str, runs), "--out", str(out), "--xlsx"]) == 0
-    text = out.read_text(encoding="utf-8")
+    text = both.read_text(encoding="utf-8")
     assert len(text.encode()) < LARGEST
     soft, hard = (json.loads((r / "run.json").read_text(encoding="utf-8"))["states"] for r in runs)
     change = 100.0 * (hard[0]["h_star_um"] / soft[0]["h_star_um"] - 1.0)
     assert "hard, difference in %" in text
     assert f"<td>{change:.4g}</td>" in text
-    book = load_workbook(out.with_suffix(".xlsx"))
+    book = load_workbook(both.with_suffix(".xlsx"))
     first = next(s for s in book.worksheets if s.title.startswith("Side by side"))
     header = [cell.value for cell in first[2]]
     assert header == ["U [mm/s]", "soft", "hard", "hard, difference in %"]
@@ -87,12 +93,8 @@ def test_two_folders_side_by_side(runs: tuple[Path, Path], tmp_path: Path) -> No
     )
 
 
-def test_runs_side_by_side_have_materials_and_leakage(
-    runs: tuple[Path, Path], tmp_path: Path
-) -> None:
-    out = tmp_path / "both.html"
-    assert main(["report", *map(str, runs), "--out", str(out)]) == 0
-    text = out.read_text(encoding="utf-8")
+def test_runs_side_by_side_have_materials_and_leakage(runs: tuple[Path, Path], both: Path) -> None:
+    text = both.read_text(encoding="utf-8")
     assert "Materials and leakage side by side" in text
     for folder in runs:
         content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
@@ -108,7 +110,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("sweep")
     study = place / "study.toml"
     study.write_text(
-        'case = "oring"\nmaterial = "neo-hooke"\ndensity = 1\nspeeds = 400\n'
+        'case = "oring"\nmaterial = "neo-hooke"\ndensity = 1\nspeeds = 400\nstroke = "out"\n'
         "error_estimate = false\n"
         "[grid]\nsealed_pressure = [0.5, 1]\nmu = [0.5, 0.9]\n",
         encoding="utf-8",

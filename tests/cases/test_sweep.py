@@ -350,26 +350,18 @@ def test_dask_gives_the_same_table(
     assert "no scheduler there" in capsys.readouterr().err
 
 
-def test_one_table_is_not_another(reference: Path, tmp_path: Path) -> None:
-    """What the tests of equal tables compare can differ."""
-    assert swept(tmp_path / "s.toml", GRID.replace("count = 3", "count = 2")) == 0
-    with pytest.raises(AssertionError):
-        same_tables(tmp_path / "s", reference)
-
-
 def test_a_sweep_killed_and_resumed(reference: Path, tmp_path: Path) -> None:
     path = tmp_path / "s.toml"
     path.write_text(GRID)
     command = [sys.executable, "-m", "softehl", "sweep", str(path), "--quiet"]
     command += ["--out", str(tmp_path / "s"), "--resume", "--jobs", "2"]
-    for wanted in (1, 3):
-        process = subprocess.Popen(command, start_new_session=True)
-        end = time.monotonic() + 120.0
-        while len(list(tmp_path.glob("s/runs/*/curve.csv"))) < wanted and process.poll() is None:
-            assert time.monotonic() < end
-            time.sleep(0.01)
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+    process = subprocess.Popen(command, start_new_session=True)
+    end = time.monotonic() + 120.0
+    while len(list(tmp_path.glob("s/runs/*/curve.csv"))) < 2 and process.poll() is None:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
     assert swept(path, GRID, "--resume") == 0
     same_tables(tmp_path / "s", reference)
 

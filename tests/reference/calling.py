@@ -91,12 +91,14 @@ class Part:
 
 def assemble(parts: Sequence[Part], x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Dense residual and tangent of all parts."""
-    total, matrix = np.zeros(x.size), np.zeros((x.size, x.size))
+    n = x.size
+    total, matrix = np.zeros(n), np.zeros(n * n)
     for part in parts:
         forces, tangents = part.elements(x)
-        np.add.at(total, part.maps, forces)
-        np.add.at(matrix, (part.maps[:, :, None], part.maps[:, None, :]), tangents)
-    return total, matrix
+        places = part.maps[:, :, None] * n + part.maps[:, None, :]
+        total += np.bincount(part.maps.ravel(), forces.ravel(), n)
+        matrix += np.bincount(places.ravel(), tangents.ravel(), n * n)
+    return total, matrix.reshape(n, n)
 
 
 def solve(
