@@ -27,6 +27,7 @@ from softehl.cases.shipped import solve_cases
 from softehl.runtime.kernels import ArgumentError, MissingKernelsError, StaleKernelsError
 from softehl.runtime.solve.backends import MissingBackend
 from softehl.runtime.solve.linear import SingularMatrix
+from tests.cases.elsewhere import double, fail, touch, wait_in_a_worker
 from tests.cases.test_cli import outcome
 
 ERRORS = (
@@ -55,14 +56,6 @@ def pool() -> Iterator[Executor]:
 # --- tasks ----------------------------------------------------------------------------------------
 
 
-def double(value: int) -> int:
-    return 2 * value
-
-
-def fail(number: int) -> None:
-    raise ERRORS[number]
-
-
 def test_results_with_and_without_an_executor(pool: Executor) -> None:
     for executor in (None, pool):
         assert dict(completed(double, [3, 1, 2], executor)) == {0: 6, 1: 2, 2: 4}
@@ -73,7 +66,7 @@ def test_an_error_comes_back_as_what_it_is(number: int, pool: Executor) -> None:
     copy = pickle.loads(pickle.dumps(ERRORS[number]))
     assert (type(copy), copy.args) == (type(ERRORS[number]), ERRORS[number].args)
     with pytest.raises(type(ERRORS[number])) as raised:
-        list(completed(fail, [number], pool))
+        list(completed(fail, [ERRORS[number]], pool))
     assert raised.value.args == ERRORS[number].args
 
 
@@ -81,12 +74,6 @@ def test_after_an_error_nothing_more_is_begun(tmp_path: Path) -> None:
     with processes(1) as executor, pytest.raises(ZeroDivisionError):
         list(completed(touch, [tmp_path / f"{n}" for n in range(20)], executor))
     assert not (tmp_path / "19").exists()
-
-
-def touch(path: Path) -> None:
-    path.write_text("")
-    time.sleep(0.02)
-    1 / int(path.name)
 
 
 def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
@@ -99,18 +86,6 @@ def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
     os.kill(parent.pid, signal.SIGKILL)
     parent.join()
     assert eventually(lambda: not alive(worker))
-
-
-def wait_in_a_worker(target: Path) -> None:
-    with processes(1) as executor:
-        executor.submit(tell_and_wait, target)
-
-
-def tell_and_wait(target: Path) -> None:
-    part = target.with_name("part")
-    part.write_text(str(os.getpid()))
-    part.rename(target)
-    time.sleep(60.0)
 
 
 def eventually(look: Any, seconds: float = 120.0) -> Any:
