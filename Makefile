@@ -5,6 +5,8 @@ PYTHON ?= python3
 OUT ?= results/oring
 # each process computes on one thread: the work is spread over processes
 export OMP_NUM_THREADS ?= 1
+# the tests start hundreds of processes: they load the byte code that the first one has made
+export PYTHONDONTWRITEBYTECODE =
 
 VENV := .venv
 BIN := $(VENV)/bin

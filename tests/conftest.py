@@ -1,7 +1,19 @@
 """What all tests share."""
 
+import gc
+
 import numpy as np
 import pytest
+
+
+def pytest_configure() -> None:
+    """Look for cycles rarely: a quarter of the time of compiling went into it."""
+    gc.set_threshold(100_000, 20, 20)
+
+
+def pytest_collection_finish() -> None:
+    """Leave modules and tests, which stay to the end, out of it."""
+    gc.freeze()
 
 
 @pytest.fixture

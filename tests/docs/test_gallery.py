@@ -27,8 +27,10 @@ def read(entry: str, monkeypatch: pytest.MonkeyPatch, folder: Path) -> Reader:
     return reader
 
 
-LONG = ("fbar", "jumps")
-"""Entries that take 10 s and more."""
+LONG = (
+    *("contact", "cook", "enhanced", "fbar", "fit", "fracture", "jumps", "stick-slip", "swing"),
+)
+"""Entries that take 3 s and more."""
 
 
 @pytest.mark.parametrize(
@@ -76,25 +78,23 @@ def test_cook_in_plane_strain_takes_35_lines() -> None:
 # free out of its plane, as deal.II's panel is, where it would buckle
 @pytest.mark.filterwarnings("ignore::softehl.runtime.stability.Unstable")
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "row"), [("hex20", "3-D, `hex20`"), ("hex27", "3-D, `hex27`")])
-def test_cook_with_quadratic_elements(
-    kind: str, row: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_cook_with_quadratic_elements(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from softehl import Mesh, Study
 
     space = read("cook", monkeypatch, tmp_path).namespace
     page: dict[str, object] = {}
     exec((GALLERY / "models" / "cook.py").read_text(), page)
-    given = {"shape": "serendipity"} if kind == "hex20" else {}
-    found = []
-    for n in (1, 2, 4, 8):
-        mesh = Mesh.box((48, 44, 1), cells=(n, n, 1), order=2, **given)  # type: ignore[arg-type]
-        study = Study(mesh.map(space["tapered"]))
-        study.add("rubber", page["rubber"](kind), mu=space["mu"], kappa=space["kappa"])  # type: ignore[operator]
-        study.fix("left", u_x=0, u_y=0, u_z=0)
-        study.load("right", u_y=1 / 16)
-        found.append(study.solve(steps=10).at((48, 60, 0))["u_y"])
-    table = re.search(rf"^\| {re.escape(row)} \|(.*)$", written("cook"), re.MULTILINE)
-    assert table is not None
-    shown = [float(value) for value in table[1].split("|") if value.strip()]
-    np.testing.assert_allclose(found, shown, atol=6e-4)
+    for kind in ("hex20", "hex27"):
+        given = {"shape": "serendipity"} if kind == "hex20" else {}
+        found = []
+        for n in (1, 2, 4, 8):
+            mesh = Mesh.box((48, 44, 1), cells=(n, n, 1), order=2, **given)  # type: ignore[arg-type]
+            study = Study(mesh.map(space["tapered"]))
+            study.add("rubber", page["rubber"](kind), mu=space["mu"], kappa=space["kappa"])  # type: ignore[operator]
+            study.fix("left", u_x=0, u_y=0, u_z=0)
+            study.load("right", u_y=1 / 16)
+            found.append(study.solve(steps=10).at((48, 60, 0))["u_y"])
+        table = re.search(rf"^\| 3-D, `{kind}` \|(.*)$", written("cook"), re.MULTILINE)
+        assert table is not None
+        shown = [float(value) for value in table[1].split("|") if value.strip()]
+        np.testing.assert_allclose(found, shown, atol=6e-4)

@@ -17,6 +17,12 @@ PAGES = (
 TUTORIAL = "\n".join((DOCS / page).read_text(encoding="utf-8") for page in PAGES)
 CHAPTERS = dict(re.findall(r"^## (.+?)\n(.*?)(?=^## |\Z)", TUTORIAL, re.MULTILINE | re.DOTALL))
 
+LONG = (
+    *("A rubber on any cell", "Cook's membrane", "Two bodies"),
+    "Ogden: principal stretches in three dimensions",
+)
+"""Chapters that take 3 s and more."""
+
 
 @pytest.fixture
 def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reader:
@@ -28,7 +34,9 @@ def reader(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reader:
     return Reader(DOCS / "models")
 
 
-@pytest.mark.parametrize("chapter", CHAPTERS)
+@pytest.mark.parametrize(
+    "chapter", [pytest.param(c, marks=[pytest.mark.slow] * (c in LONG)) for c in CHAPTERS]
+)
 def test_a_chapter_runs_in_order_and_prints_what_it_shows(chapter: str, reader: Reader) -> None:
     for block in blocks(CHAPTERS[chapter]):
         reader.read(block)
@@ -36,6 +44,7 @@ def test_a_chapter_runs_in_order_and_prints_what_it_shows(chapter: str, reader: 
 
 def test_the_chapters_hold_the_whole_page_and_every_model() -> None:
     inside = [b for text in CHAPTERS.values() for b in blocks(text)]
+    assert set(LONG) < set(CHAPTERS)
     assert len(inside) == len(blocks(TUTORIAL))
     assert TUTORIAL.count("\n```") == 2 * len(inside)
     shown = {b.name for b in inside if b.kind == "python" and b.name}
