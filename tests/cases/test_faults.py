@@ -211,14 +211,14 @@ def test_a_name_of_a_curve_is_one_component(name: str, tmp_path: Path) -> None:
         softehl.solve_cases({name: Seal()}, tmp_path)
 
 
-def slowly(parameters: Seal, observer: Observer) -> Any:
-    """A state, then a long silence."""
-    observer.film_state(film_state(parameters, max(parameters.speeds)))
-    print("there", flush=True)
-    time.sleep(60)
-
-
 def run_slowly(folder: str) -> None:
+    """A state, then a long silence."""
+
+    def slowly(parameters: Seal, observer: Observer) -> Any:
+        observer.film_state(film_state(parameters, max(parameters.speeds)))
+        Path(folder).with_name("there").touch()
+        time.sleep(300)
+
     # ignored where the tests themselves run in the background
     signal.signal(signal.SIGINT, signal.default_int_handler)
     oring.CASE = Fake(slowly)
@@ -230,14 +230,11 @@ def test_a_signal_ends_a_run_with_a_word(number: signal.Signals, tmp_path: Path)
     folder = tmp_path / "a"
     process = multiprocessing.get_context("spawn").Process(target=run_slowly, args=(str(folder),))
     process.start()
-    for _ in range(600):
-        if (folder / "curve.csv").exists() and "400" in (folder / "curve.csv").read_text():
-            break
-        time.sleep(0.1)
-    time.sleep(0.5)
+    while not (tmp_path / "there").exists() and process.is_alive():
+        time.sleep(0.02)
     assert process.pid is not None
     os.kill(process.pid, number)
-    process.join(20)
+    process.join(120)
     assert process.exitcode == 128 + number
     content = json.loads((folder / "run.json").read_text())
     assert content["status"] == "interrupted"

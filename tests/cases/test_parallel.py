@@ -109,8 +109,8 @@ def alive(pid: int) -> bool:
 
 
 def step_for_ever(parameters: Seal, observer: Observer) -> harness.Outcome:
-    """Takes a minute unless nobody listens any more."""
-    for number in range(6000):
+    """Takes five minutes unless nobody listens any more."""
+    for number in range(30_000):
         observer.step(label="U", parameter=number, iterations=1, residuals=(), fraction=None)
         time.sleep(0.01)
     return outcome()
@@ -148,7 +148,7 @@ def test_an_error_on_this_side_ends_the_other() -> None:
     begin = time.monotonic()
     with pytest.raises(OSError, match="no room"):
         solve_side_by_side(step_for_ever, [case(), case()], [Counter(3), Counter(10**6)])
-    assert time.monotonic() - begin < 30.0
+    assert time.monotonic() - begin < 200.0
 
 
 # --- curves ---------------------------------------------------------------------------------------

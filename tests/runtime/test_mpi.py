@@ -36,21 +36,31 @@ def awaited(stream: TextIO) -> float:
 def test_what_is_printed_is_read_before_all_end(pipe: Pipe) -> None:
     reading, stderr = pipe
     print(LINE, end="", file=stderr, flush=True)
-    launcher = threading.Timer(0.3, os.read, (reading, 100))
+    reads = threading.Event()
+
+    def read() -> None:
+        reads.set()
+        os.read(reading, 100)
+
+    launcher = threading.Timer(0.3, read)
     launcher.start()
-    assert awaited(stderr) > 0.25
+    awaited(stderr)
+    assert reads.is_set()
     launcher.join()
 
 
 def test_a_launcher_that_never_reads_is_left(pipe: Pipe, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mpi, "_READ", 0.2)
     print(LINE, end="", file=pipe[1], flush=True)
-    assert 0.2 <= awaited(pipe[1]) < 5.0
+    assert awaited(pipe[1]) >= 0.2
 
 
-def test_files_empty_and_closed_streams_are_not_waited_for(pipe: Pipe, tmp_path: Path) -> None:
-    assert awaited(pipe[1]) < 1.0
+def test_files_empty_and_closed_streams_are_not_waited_for(
+    pipe: Pipe, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mpi, "_READ", 60.0)
+    assert awaited(pipe[1]) < 30.0
     with (tmp_path / "errors.txt").open("w", encoding="utf-8") as file:
         print(LINE, end="", file=file, flush=True)
-        assert awaited(file) < 1.0
-    assert awaited(file) < 1.0
+        assert awaited(file) < 30.0
+    assert awaited(file) < 30.0
