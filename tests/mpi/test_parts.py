@@ -28,9 +28,13 @@ def run(name: str, processes: int, folder: Path) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.parametrize("processes", PROCESSES)
 @pytest.mark.parametrize(
-    "name", ["hex", "serendipity", "wedge", "tetrahedron", "line", "files", "gmsh"]
+    ("name", "processes"),
+    [
+        *(("hex", n) for n in PROCESSES),
+        *(("serendipity", 2), ("wedge", 3), ("tetrahedron", 2), ("line", 3)),
+        *((name, n) for name in ("files", "gmsh") for n in (2, 3)),
+    ],
 )
 def test_parts_give_what_the_whole_gives(name: str, processes: int, tmp_path: Path) -> None:
     found = run(name, processes, tmp_path)

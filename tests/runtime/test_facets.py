@@ -48,7 +48,7 @@ def penalised(mesh: Mesh, gamma: float) -> Study:
     [
         ("quad", 1, (3, 2)),
         ("triangle", 2, (3, 2)),
-        ("hex", 1, (2, 2, 2)),
+        pytest.param("hex", 1, (2, 2, 2), marks=pytest.mark.slow),
         ("tetrahedron", 1, (2, 1, 2)),
     ],
 )
@@ -66,7 +66,7 @@ def test_a_linear_field_is_found_to_rounding(shape: Any, order: int, cells: Any)
     np.testing.assert_allclose(found, 1 + 2 * mesh.points[:, 0] - 3 * mesh.points[:, 1], atol=2e-13)
 
 
-@pytest.mark.parametrize("shape", ["quad", "triangle"])
+@pytest.mark.parametrize("shape", ["quad", pytest.param("triangle", marks=pytest.mark.slow)])
 def test_interior_penalty_has_order_two(shape: Any) -> None:
     errors = []
     for n in (4, 8, 16):
