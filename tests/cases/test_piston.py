@@ -50,6 +50,7 @@ def test_piston_and_rod_are_one_where_curvature_vanishes(stroke: str) -> None:
     assert max(map(abs, apart(LARGE, stroke).values())) < 1e-3
 
 
+@pytest.mark.slow
 def test_so_are_those_of_a_cup() -> None:
     """Its lips are soft: at this diameter 0.3 % are left, which vanish as 1 / diameter."""
     far, near = (apart(d, "out", "u_cup") for d in (LARGE, 0.5 * LARGE))

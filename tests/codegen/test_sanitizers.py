@@ -187,6 +187,7 @@ def test_one_double_too_few_is_caught(array: str, program: Path) -> None:
     assert "AddressSanitizer: heap-buffer-overflow" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gcc", "clang"])
 def test_the_shipped_c_compiles_without_a_warning(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

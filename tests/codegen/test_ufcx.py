@@ -236,6 +236,7 @@ def test_local_unknowns_and_data_of_points(tmp_path: Path) -> None:
     assert close(fields, batch.fields_at(X, u, **given)[0])
 
 
+@pytest.mark.slow
 @FEW
 @given(d=pages())
 def test_random_pages(d: Definition, tmp_path_factory: pytest.TempPathFactory) -> None:

@@ -72,6 +72,7 @@ def test_the_test_of_a_folder_sees_a_fault(name: str, old: str, new: str, tmp_pa
     assert "FAILED" in done.stdout
 
 
+@pytest.mark.slow
 @FEW
 @given(d=pages())
 def test_random_pages_give_what_their_python_kernels_give(
