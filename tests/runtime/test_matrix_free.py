@@ -73,7 +73,13 @@ def apart(a: Result, b: Result, names: tuple[str, ...]) -> float:
     return max(float(np.abs(x - y).max()) for x, y in pairs) / size
 
 
-@pytest.mark.parametrize(("order", "nu"), [(1, 0.3), (2, 0.3), (2, 0.499), (3, 0.45), (4, 0.3)])
+SOLVED = [
+    *((1, 0.3), (2, 0.3), (2, 0.499), (3, 0.45)),
+    pytest.param(4, 0.3, marks=pytest.mark.slow),
+]
+
+
+@pytest.mark.parametrize(("order", "nu"), SOLVED)
 def test_the_same_solution_as_with_factors(order: int, nu: float) -> None:
     study = block(order, nu, (3, 3, 3) if order < 3 else (2, 1, 2))
     names = ("u_x", "u_y", "u_z")
@@ -100,7 +106,7 @@ def periodic(order: int, wide: float = 0.03) -> Study:
     return study
 
 
-@pytest.mark.parametrize("order", [2, 4])
+@pytest.mark.parametrize("order", [2, pytest.param(4, marks=pytest.mark.slow)])
 def test_ties_as_with_factors(order: int) -> None:
     study, engine = periodic(order), MatrixFree(tolerance=1e-8)
     wanted, found = study.solve(), study.solve(engine=engine)
