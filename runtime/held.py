@@ -25,6 +25,8 @@ _ROUNDING = 1e-12
 """Of the terms of an equation: what is left of a free motion by rounding, with a margin.  A spring
 that is weaker than that, relative to the body, cannot be told from none."""
 
+_BALANCINGS = 20  # each halves the exponents that are left
+
 _AXES = "xyz"
 
 
@@ -45,8 +47,9 @@ def require_held(system: System, problem: Any, x: Array) -> None:
     parts = connected_components(K, directed=False)[1].astype(np.int64)
     node, name = _nodal(system)
     fields, centres, sizes = _candidates(system, parts, node, name)
-    rows = np.asarray(K @ fields)
-    scale = np.asarray(abs(K) @ np.abs(fields)).sum(axis=1)
+    units = _units(list(system.numbering.nodal), K, parts, name)
+    rows = np.asarray(K @ (units[:, None] * fields))
+    scale = np.asarray(abs(K) @ (units[:, None] * np.abs(fields))).sum(axis=1)
     rows[scale > 0.0] /= scale[scale > 0.0, None]
     rows[problem.fixed] = fields[problem.fixed]
     order = np.argsort(parts, kind="stable")
@@ -59,7 +62,9 @@ def require_held(system: System, problem: Any, x: Array) -> None:
             continue
         part = int(parts[members[0]])
         shape = len(free), len(system.numbering.nodal), system.mesh.dimension + 1
-        told = _Motions(system, free.reshape(shape), centres[part], sizes[part]).words()
+        unit = np.ones(shape[1])
+        unit[name[members]] = units[members]
+        told = _Motions(system, free.reshape(shape), unit, centres[part], sizes[part]).words()
         first = int(node[members[node[members] >= 0]].min())
         alone = (parts[node >= 0] == part).all()
         raise NotConverged(_loose(system, x, told, first, alone=bool(alone)))
@@ -102,6 +107,28 @@ def _candidates(
     return fields.reshape(len(node), -1), centres, sizes
 
 
+def _units(known: list[str], K: csc_array, parts: Integers, name: Integers) -> Array:
+    """Units of the unknowns, (n,), in which the terms of an equation K x, (n, n), count alike: a
+    pressure in Pa beside displacements in mm. One for each part and each vector or scalar.
+    """
+    vectors = [stem if axis in _AXES else n for n in known for stem, _, axis in [n.rpartition("_")]]
+    kinds = {stem: k for k, stem in enumerate(dict.fromkeys(vectors))}
+    if len(kinds) < 2:
+        return np.ones(len(name))
+    kind = np.array([*(kinds[stem] for stem in vectors), len(kinds)])[name]  # the last: no node
+    found, group = np.unique(parts * (len(kinds) + 1) + kind, return_inverse=True)
+    ones, n = np.ones(len(name)), np.arange(len(name))
+    member = csc_array((ones, (n, group)), shape=(len(name), len(found)))
+    terms = csc_array(member.T @ abs(K) @ member)
+    terms = csc_array(terms.maximum(terms.T))
+    units = np.ones(len(found))
+    for _ in range(_BALANCINGS):  # the method of Ruiz
+        scaled = terms.multiply(units[:, None]).multiply(units)
+        largest = scaled.max(axis=0).toarray().ravel()
+        units /= np.sqrt(np.where(largest > 0.0, largest, 1.0))
+    return np.asarray(2.0 ** np.round(np.log2(units[group])))  # adds no rounding of its own
+
+
 def _independent(fields: Array) -> Array:
     """Combinations (columns, k) of the columns of (n, columns) that are independent and of size 1:
     nodes on a line do not tell all coordinates apart.
@@ -125,10 +152,13 @@ def _null(rows: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Motions:
-    """Free motions (k, names, 1 + dim) of a part: constants, and slopes by (x - centre) / size."""
+    """Free motions (k, names, 1 + dim) of a part: constants, and slopes by (x - centre) / size, in
+    units (names,).
+    """
 
     system: System
     motions: Array
+    units: Array
     centre: Array
     size: float
 
@@ -162,7 +192,8 @@ class _Motions:
             return f"a translation along {_AXES[vector.index(int(moved[0]))]}"
         if len(moved) == 1:
             return f"a constant added to {known[moved[0]]}"
-        parts = ", ".join(f"{known[i]} by {values[i]:.3g}" for i in moved)
+        amounts = values * self.units / self.units[moved].max()
+        parts = ", ".join(f"{known[i]} by {amounts[i]:.3g}" for i in moved)
         return f"a shift of {parts}"
 
     def _rotations(self, turned: Array, *, moves: bool) -> list[str]:

@@ -17,6 +17,11 @@ from softehl.runtime.arrays import Array, Integers
 SparseMatrix: TypeAlias = "csc_array[np.float64] | csc_matrix[np.float64]"
 
 
+_UNLIKE = 1e-2
+"""Of the largest entries of the rows that it joins: where no entry of a row is so large, pivots are
+compared in units that have nothing to do with each other. It is SuperLU's threshold of a pivot."""
+
+
 class SingularMatrix(ArithmeticError):  # noqa: N818 (named after what it is)
     """The matrix has no usable factors; Newton turns it into Status.SINGULAR.
 
@@ -90,7 +95,8 @@ class Factorisation:
     factors: anything with `solve`, exact or of a matrix near by. row_sums: (n,) sums of |matrix|
     along rows, the scale of each row's rounding error. accuracy: largest row-wise backward error
     of a solution. settled: largest size of the last correction, relative to the solution; where
-    pivots were perturbed it does not shrink if the matrix is singular.
+    pivots were perturbed it does not shrink if the matrix is singular. units: (n,) of the unknowns
+    if `matrix` is a balanced one, see `balanced`; solutions are those of the one that was given.
     """
 
     matrix: SparseMatrix
@@ -99,11 +105,17 @@ class Factorisation:
     refinement: int
     accuracy: float
     settled: float = math.inf
+    units: Array | None = None
 
     def solve(self, b: Array) -> Array:
         """x of matrix x = b, shapes (n,); raises SingularMatrix if x is not finite or not a
         solution to `accuracy`, as weak pivots may cause.
         """
+        if self.units is None:
+            return self._solved(b)
+        return self.units * self._solved(self.units * b)
+
+    def _solved(self, b: Array) -> Array:
         x: Array = self.factors.solve(b)
         correction = 0.0
         for _ in range(self.refinement):
@@ -144,6 +156,46 @@ class Factorisation:
         defect = np.abs(b - self.matrix @ x)
         ratio = np.divide(defect, scale, out=np.zeros_like(defect), where=scale > 0.0)
         return float(ratio.max(initial=0.0))
+
+
+def balanced(K: SparseMatrix) -> tuple[SparseMatrix, Array, Array | None]:
+    """D K D, its row sums (n,) and D, (n,): no row has entries that are all small beside those of
+    the rows that it joins. K itself and None for D where that is so already. Raises SingularMatrix
+    as `checked_row_sums`.
+
+    Displacements in m beside pressures in Pa spoil the choice of pivots. D has powers of two.
+    """
+    sums = checked_row_sums(K)
+    size: Array = np.abs(K.data)
+    units: Array = np.ones(K.shape[0])
+    while True:  # the method of Ruiz: each turn halves the exponents that are left
+        root = 1.0 / np.sqrt(_largest(size, K))
+        _scale(size, root, K)
+        if _largest(size, K).min() >= _UNLIKE:
+            break
+        units *= root
+    if (units == 1.0).all():
+        return K, sums, None
+    units = np.asarray(2.0 ** np.round(np.log2(units)))
+    scaled = K.data.copy()
+    _scale(scaled, units, K)
+    K = type(K)((scaled, K.indices, K.indptr), shape=K.shape)
+    return K, checked_row_sums(K), units
+
+
+def _scale(entries: Array, units: Array, K: SparseMatrix) -> None:
+    """Multiply entries (nnz,) of a matrix like K by the units (n,) of their rows and columns."""
+    entries *= units[K.indices]
+    entries *= np.repeat(units, np.diff(K.indptr))
+
+
+def _largest(size: Array, K: SparseMatrix) -> Array:
+    """Largest of the sizes (nnz,) in each row of K, and the column of the same number: (n,)."""
+    found: Array = np.zeros(K.shape[0])
+    np.maximum.at(found, K.indices, size)
+    filled = np.flatnonzero(np.diff(K.indptr))
+    found[filled] = np.maximum(found[filled], np.maximum.reduceat(size, K.indptr[filled]))
+    return found
 
 
 def checked_row_sums(K: SparseMatrix) -> Array:

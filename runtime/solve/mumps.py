@@ -25,7 +25,7 @@ from softehl.runtime.solve.linear import (
     Factorisation,
     SingularMatrix,
     SparseMatrix,
-    checked_row_sums,
+    balanced,
 )
 
 _PAUSE = 5e-4  # seconds between looks for a task: who waits leaves the core to the others
@@ -148,9 +148,9 @@ class Mumps:
 
     def factorise(self, K: SparseMatrix) -> Factorisation:
         """Factors of K, square, shape (n, n), csc; raises SingularMatrix."""
-        row_sums = checked_row_sums(K)
+        K, row_sums, units = balanced(K)
         factors = self.team.factorise(K)
-        return Factorisation(K, factors, row_sums, self.refinement, self.accuracy)
+        return Factorisation(K, factors, row_sums, self.refinement, self.accuracy, units=units)
 
     def condense(self, K: SparseMatrix, boundary: Integers) -> SchurBySolves:
         """See `Condenser`."""

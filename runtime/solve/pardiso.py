@@ -22,6 +22,7 @@ from softehl.runtime.solve.linear import (
     Factorisation,
     SingularMatrix,
     SparseMatrix,
+    balanced,
     checked_row_sums,
 )
 
@@ -250,12 +251,13 @@ class Pardiso:
 
     def factorise(self, K: SparseMatrix) -> Factorisation:
         """Factors of K, square, shape (n, n), csc; raises SingularMatrix."""
-        row_sums = checked_row_sums(K)
+        K, row_sums, units = balanced(K)
         handle = self._handle(K, np.empty(0, dtype=np.int64))
         handle.factorise(K, np.empty(0))
         lent = _Lent(handle)
         weakref.finalize(lent, self.idle.give_back, handle).atexit = False
-        return Factorisation(K, lent, row_sums, self.refinement, self.accuracy, self.settled)
+        settings = self.refinement, self.accuracy, self.settled
+        return Factorisation(K, lent, row_sums, *settings, units)
 
     def condense(self, K: SparseMatrix, boundary: Integers) -> PartialFactors:
         """Factors of K, (n, n), without those unknowns, (m,), and their Schur complement."""

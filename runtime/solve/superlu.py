@@ -16,6 +16,7 @@ from softehl.runtime.solve.linear import (
     Factors,
     SingularMatrix,
     SparseMatrix,
+    balanced,
     checked_row_sums,
 )
 from softehl.runtime.solve.ordering import (
@@ -51,8 +52,9 @@ class SuperLU:
 
     def factorise(self, K: SparseMatrix) -> Factorisation:
         """Factors of K, square, shape (n, n), csc; raises SingularMatrix."""
-        row_sums = checked_row_sums(K)
-        return Factorisation(K, self._ordered(K), row_sums, self.refinement, self.accuracy)
+        K, row_sums, units = balanced(K)
+        settings = self.refinement, self.accuracy
+        return Factorisation(K, self._ordered(K), row_sums, *settings, units=units)
 
     def condense(self, K: SparseMatrix, boundary: Integers) -> Condensed:
         """See `Condenser`: by one factorisation unless pivots or memory forbid it."""

@@ -60,6 +60,22 @@ def test_refinement_gives_back_the_digits_of_weak_pivots() -> None:
     assert errors[1] < 1e-14
 
 
+def test_units_of_unknowns_change_nothing() -> None:
+    """Springs that a multiplier in small units holds; also by the factors of the transpose."""
+    a, b, c, unit = 0.1, 0.3, 0.7, 2.0**-60
+    K = np.zeros((5, 5))
+    for i, k in enumerate((a, b, c)):
+        K[i : i + 2, i : i + 2] += [[k, -k], [-k, k]]
+    K[0, 4] = K[4, 0] = unit
+    factors = SuperLU("NATURAL").factorise(csc_array(K))
+    turned = factors.transposed()
+    assert factors.units is not None
+    assert turned is not None
+    pulled = [0.0, 1 / a, 1 / a + 1 / b, 1 / a + 1 / b + 1 / c, 1 / unit]
+    for one in (factors, turned):
+        assert one.solve(np.array([0.0, 0, 0, 1, 0])) == pytest.approx(pulled, rel=1e-14)
+
+
 def test_solution_ruined_by_weak_pivots_is_refused() -> None:
     K = csc_array(np.array([[1e-20, 1.0], [1.0, 1.0]]))
     solver = SuperLU("NATURAL", pivot_threshold=0.0, refinement=0)

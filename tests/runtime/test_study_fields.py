@@ -289,3 +289,30 @@ def test_sides_have_outward_normals_and_values() -> None:
     study.add("loss", convection, on="right", h=0.5, q=1.0)
     # 3 dT/dx = - (T / 2 + 1) on the right: T = 4 - a x with 3 a = (4 - 2 a) / 2 + 1
     assert study.solve().at((2.0, 0.5))["T"] == pytest.approx(4 - 2 * 3 / 4, rel=1e-12)
+
+
+@softehl.page
+def taylor_hood(m):  # type: ignore[no-untyped-def]
+    """Displacements, and a pressure of lower order."""
+    u, p = m.vector("u"), m.scalar("p", order=1)
+    mu, K = m.parameters(mu="shear modulus", K="bulk modulus")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + p * (J - 1) - p**2 / (2 * K))
+
+
+@pytest.mark.parametrize(("length", "mu"), [(1e-9, 1e10), (1e6, 1e-9)])
+def test_units_of_lengths_and_pressures_change_nothing(length: float, mu: float) -> None:
+    def bent(length: float, mu: float) -> tuple[float, float, int]:
+        study = Study(Mesh.rectangle(2 * length, length, cells=(3, 2), order=2))
+        study.add("rubber", taylor_hood, mu=mu, K=1000 * mu)
+        study.fix("left", u_x=0, u_y=0)
+        study.load("right", u_y=0.02 * mu)
+        result = study.solve()
+        corner = result.at((2 * length, length))
+        return corner["u_y"] / length, corner["p"] / mu, result.iterations
+
+    *values, iterations = bent(length, mu)
+    *expected, usual = bent(1.0, 1.0)
+    assert values == pytest.approx(expected, rel=1e-8)
+    assert iterations == usual
