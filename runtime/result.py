@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.between import at_every_node, shares
 from softehl.runtime.derivatives.asked import By, inputs
 from softehl.runtime.derivatives.inputs import Input, Key
 from softehl.runtime.derivatives.quantities import quantity
@@ -107,21 +108,13 @@ class Result:
         Raises MeshError if the place lies outside.
         """
         x = np.asarray(place, dtype=np.float64)
-        holding = self.system.mesh.holding(x)
-        found = self.system.share.found(None if holding is None else self._inside(*holding))
+        known = shares(self._whole, x)
+        here = None
+        if known is not None:
+            here = {n: float(self.x[numbers] @ w) for n, (numbers, w) in known.items()}
+        found = self.system.share.found(here)
         if found is None:
             raise MeshError(f"{place_text(x)} lies outside the mesh")
-        return found
-
-    def _inside(self, nodes: Integers, weights: Array) -> dict[str, float]:
-        """Values where the shape functions of the nodes of a cell have these weights."""
-        found = {}
-        for name, numbers in self._whole.numbering.nodal.items():
-            there = numbers[nodes]
-            # an unknown of lower order stands at corners only: interpolated by the cell's corners
-            if (there[np.abs(weights) > 1e-9] >= 0).all():
-                known = there >= 0
-                found[name] = float(self.x[there[known]] @ weights[known])
         return found
 
     def along(self, start: tuple[float, ...], end: tuple[float, ...], count: int = 100) -> Any:
@@ -280,10 +273,7 @@ class Result:
 
     def _picture(self, system: System, cells: Mapping[str, Integers], x: Array) -> Picture:
         """Of all unknowns x, or of those of this process with its own fields."""
-        nodal = {
-            name: np.where(numbers >= 0, x[numbers], np.nan)
-            for name, numbers in system.numbering.nodal.items()
-        }
+        nodal = at_every_node(system, x)
         fields = self.fields if system is self._whole else self._own_fields
         return Picture.of(system.mesh.points, cells, nodal, system.blocks, fields)
 

@@ -42,7 +42,7 @@ ORDER = {
             "statement",
             "system",
             "contacts",
-            "equations output mass",
+            "between equations output mass",
             "modes stability derivatives",
             "result",
             "begin bifurcation fit",

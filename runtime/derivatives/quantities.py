@@ -9,8 +9,10 @@ from typing import Protocol
 import numpy as np
 
 from softehl.runtime.arrays import Array
+from softehl.runtime.between import shares
 from softehl.runtime.derivatives.linear import Linear
 from softehl.runtime.derivatives.trail import Trail
+from softehl.runtime.mesh.mesh import MeshError, place_text
 from softehl.runtime.names import listed, meant
 from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import System
@@ -50,10 +52,14 @@ class AtPlace:
     def _shares(self, system: System) -> Array:
         """Weights (n,) of all unknowns."""
         _require(self.name, system)
-        nodes, shares = system.mesh.locate(np.asarray(self.place, dtype=np.float64))
-        numbers, found = system.numbering.nodal[self.name][nodes], np.zeros(system.size)
-        there = numbers >= 0
-        np.add.at(found, numbers[there], shares[there])
+        place, found = np.asarray(self.place, dtype=np.float64), np.zeros(system.size)
+        known = shares(system, place)
+        if known is None:
+            raise MeshError(f"{place_text(place)} lies outside the mesh")
+        if self.name not in known:
+            raise StudyError(f"no {self.name} at {place_text(place)}; there are {listed(known)}")
+        numbers, weights = known[self.name]
+        np.add.at(found, numbers, weights)
         return found
 
     def weights(self, linear: Linear) -> Array:

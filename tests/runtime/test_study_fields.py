@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 import sympy as sp
@@ -316,3 +317,52 @@ def test_units_of_lengths_and_pressures_change_nothing(length: float, mu: float)
     *expected, usual = bent(1.0, 1.0)
     assert values == pytest.approx(expected, rel=1e-8)
     assert iterations == usual
+
+
+@pytest.mark.parametrize("shape", ["quad", "serendipity", "triangle"])
+def test_a_field_of_lower_order_has_values_between_its_nodes(shape: str, tmp_path: Path) -> None:
+    """A pressure that is linear: at any place, its derivative too, and in the file."""
+    mesh = Mesh.rectangle(2, 1, cells=(2, 2), order=2, shape=shape)  # type: ignore[arg-type]
+    study = Study(mesh)
+    study.add("flow", darcy, k=2.0)
+    study.fix("left", p=0)
+    study.fix("right", p=3)
+    result = study.solve()
+    for place in ((0.3, 0.1), (0.5, 0.25), (1.5, 1.0)):
+        assert result.at(place)["p"] == pytest.approx(1.5 * place[0])
+        slope = result.sensitivity("p", at=place, by={"fix:right": "p"})
+        assert slope["fix:right", "p"] == pytest.approx(place[0] / 2)
+    assert result.along((0, 0.3), (2, 0.3), 7)["p"] == pytest.approx(np.linspace(0, 3, 7))
+    assert np.isnan(result.values("p")).any(), "no unknowns stand there"
+    result.write(tmp_path / "flow.vtu")
+    written = meshio.read(tmp_path / "flow.vtu")
+    assert written.point_data["p"] == pytest.approx(1.5 * mesh.points[:, 0])
+
+
+@softehl.page(degree=2)
+def darcy(m):  # type: ignore[no-untyped-def]
+    """A potential of lower order."""
+    p = m.scalar("p", order=1)
+    (k,) = m.parameters(k="permeability")
+    m.minimise(k / 2 * m.grad(p).dot(m.grad(p)))
+
+
+def test_a_field_is_not_continued_into_a_cell_without_it() -> None:
+    mesh = Mesh.rectangle(2, 1, cells=(2, 1), order=2).with_group("wet", lambda x: x[:, 0] < 1)
+    study = Study(mesh)
+    study.add("flow", darcy, cells="wet", k=1.0)
+    study.add("heat", conduction, k=1.0)
+    study.fix("left", p=1, T=1)
+    result = study.solve()
+    assert result.at((0.3, 0.4))["p"] == pytest.approx(1)
+    assert sorted(result.at((1.7, 0.4))) == ["T"]
+    with pytest.raises(StudyError, match=r"no p at \(1.7, 0.4\); there are T"):
+        result.sensitivity("p", at=(1.7, 0.4), by={"flow": "k"})
+
+
+@softehl.page
+def conduction(m):  # type: ignore[no-untyped-def]
+    """A temperature."""
+    T = m.scalar("T")
+    (k,) = m.parameters(k="conductivity")
+    m.minimise(k / 2 * m.grad(T).dot(m.grad(T)))
