@@ -12,12 +12,12 @@ class ModelError(ValueError):
     """The model says something a kernel cannot hold; the message names it and the page's line.
 
     `where` is the file and line; left out, it is found among the callers: the first one that is
-    not the generator itself (a model that ships is a page like any other).
+    not the generator itself (a model that ships is a page like any other). text: without it.
     """
 
     def __init__(self, message: str, where: str | None = None) -> None:
-        place = where or page_line()
-        super().__init__(f"{place}: {message}" if place else message)
+        self.where, self.text = where or page_line(), message
+        super().__init__(f"{self.where}: {message}" if self.where else message)
 
 
 _CODEGEN = Path(__file__).resolve().parents[1]
@@ -54,6 +54,10 @@ class NeedsElement(ModelError):  # noqa: N818 (named after what it is)
 
     def __init__(self, what: str) -> None:
         super().__init__(f"{what}: known in cells only, not on sides and not at a point alone")
+
+
+class Empty(ModelError):  # noqa: N818 (named after what it is)
+    """A page states no equations."""
 
 
 class Elsewhere(ModelError):  # noqa: N818 (named after what it is)

@@ -57,8 +57,11 @@ class Listed(list[Any]):
             ) from None
 
 
-def applied(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
-    """Value of a function of a page, or an error that says how many arguments it gets."""
+def applied(name: str, function: Callable[..., Any], *arguments: Any, write: str = "") -> Any:
+    """Value of a function of a page, or an error that says how many arguments it gets.
+
+    write: what to write instead; a lambda where it is left out.
+    """
     try:
         inspect.signature(function).bind(*arguments)
     except ValueError:
@@ -67,7 +70,8 @@ def applied(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
         count = len(arguments)
         raise ModelError(
             f"{name}: its function gets {count} argument{'s' * (count != 1)}, and cannot take "
-            f"{'them' if count != 1 else 'it'}; write `lambda {', '.join('abc'[:count])}: ...`"
+            f"{'them' if count != 1 else 'it'}; write "
+            + (write or f"`lambda {', '.join('abc'[:count])}: ...`")
         ) from None
     return function(*arguments)
 

@@ -9,7 +9,7 @@ import sympy as sp
 
 from softehl.codegen.graph.graph import Node
 from softehl.codegen.graph.traverse import reachable
-from softehl.codegen.language.complaints import ModelError, warn_page
+from softehl.codegen.language.complaints import Empty, ModelError, warn_page
 from softehl.codegen.language.record import Integral
 from softehl.codegen.language.symbols import Symbols
 
@@ -75,7 +75,7 @@ class Equations:
         """The sum of all potentials and weak forms, and what is frozen in it."""
         model = self._symbols.model
         if not self._potentials:
-            raise ModelError(f"model {model} has neither a potential nor a weak form")
+            raise Empty(f"model {model} has neither a potential nor a weak form")
         total = self._symbols.graph.zero
         constant = dict.fromkeys(n for _, frozen in self._potentials for n in frozen)
         for value, frozen in self._potentials:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args, overload
+from typing import Any, Literal, TypeVar, get_args, overload
 
-from softehl.codegen.language.complaints import ModelError, NeedsElement
+from softehl.codegen.language.complaints import Empty, ModelError, NeedsElement
 from softehl.codegen.language.definition import Definition, PointForm
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.elements.cells import Element, element
@@ -24,6 +24,7 @@ from softehl.codegen.language.side import Side
 from softehl.codegen.language.site import Site
 from softehl.codegen.language.whole import Whole
 
+T = TypeVar("T")
 Write = Callable[[Fields], Any]
 Form = Literal["whole", "point"]
 
@@ -85,8 +86,7 @@ class Page:
         if space_of(chosen, kind.dimension) > kind.dimension:
             degree = self.degree or 2 * order_of(kind)
             side = Side(name, kind, chosen, rule_of(kind, degree), self.doc)
-            applied(self.name, self.write, side)
-            return side.finish()
+            return self._made(side, side.finish)
         try:
             point = self._at_point(name, kind, chosen)
         except NeedsElement:
@@ -94,10 +94,10 @@ class Page:
                 raise
             point = None
         whole = Whole(name, kind, chosen, self.rule(kind, point), self.doc)
-        applied(self.name, self.write, whole)
+        made = self._made(whole, whole.finish)
         unroll = False if self.form == "point" else None
         at = None if self.form == "whole" else point
-        return replace(whole.finish(), point=at, unroll=unroll)
+        return replace(made, point=at, unroll=unroll)
 
     def _on_facet(self, name: str, kind: Element, geometry: str, facet: str) -> Definition:
         """On facets between two cells ("interior") or on those of a side ("side")."""
@@ -105,9 +105,8 @@ class Page:
             raise PlaceError(f'no facet "{facet}" of {kind.name}: "interior" or "side"')
         face = element(FACES[shape_of(kind)])
         rule = rule_of(face, self.degree or 2 * order_of(kind))
-        made = Facet(name, kind, geometry, rule, self.doc, both=facet == "interior")
-        applied(self.name, self.write, made)
-        return replace(made.finish(), cell=f"{kind.name}_{facet}")
+        on = Facet(name, kind, geometry, rule, self.doc, both=facet == "interior")
+        return replace(self._made(on, on.finish), cell=f"{kind.name}_{facet}")
 
     def definitions(self, on: On) -> list[Definition]:
         """Its models on all cells that are wanted."""
@@ -116,12 +115,12 @@ class Page:
                 f"{self.name} is a page of fields, which stands on any cell: say which, as in "
                 'softehl.load_kernel(page, cell="hex8") or softehl generate --cell hex8'
             )
-        try:
-            return [self.definition(cell, on.geometry) for cell in on.cells]
-        except ModelError:
-            raise
-        except ValueError as error:  # no such cell
-            raise PlaceError(str(error)) from None
+        for cell in on.cells:
+            try:
+                element(cell.partition("_")[0])
+            except ValueError as error:
+                raise PlaceError(str(error)) from None
+        return [self.definition(cell, on.geometry) for cell in on.cells]
 
     def at_point(self, cell: str, geometry: str | None = None) -> PointForm:
         """The model at a point of a cell."""
@@ -130,8 +129,23 @@ class Page:
 
     def _at_point(self, name: str, kind: Element, geometry: str) -> PointForm:
         site = Site(name, kind, geometry, self.doc)
-        applied(self.name, self.write, site)
-        return site.form()
+        return self._made(site, site.form)
+
+    def _made(self, onto: Fields, finish: Callable[[], T]) -> T:
+        """What the page makes of `onto`.  Raises ModelError with a line of the page."""
+        code = self.write.__code__
+        where = f"{code.co_filename}:{code.co_firstlineno}"
+        value = None
+        try:
+            value = applied(self.name, self.write, onto, write=f"`def {self.name}(m):`")
+            return finish()
+        except ModelError as error:
+            if type(error) not in (ModelError, Empty) or error.where.startswith(code.co_filename):
+                raise
+            if value is not None and isinstance(error, Empty):
+                words = "returns a value, which is lost: say m.minimise(energy) or m.weak(...)"
+                raise ModelError(f"{error.text}; {self.name} {words}", where) from error
+            raise ModelError(error.text, where) from error
 
     def rule(self, cell: Element, form: PointForm | None) -> QuadratureRule:
         """The quadrature on a cell; form: at a point, None if it is not known there."""

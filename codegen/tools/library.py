@@ -114,12 +114,14 @@ def of_law(name: str, where: Where, *, derivatives: bool = False) -> Path:
 def _definitions(source: Definition | Page | Law, where: Where) -> list[Definition]:
     from softehl.codegen.language.material import Law
     from softehl.codegen.language.pages import On, Page
+    from softehl.codegen.tools import user
 
     cells, geometry, _ = where
     if isinstance(source, Law):
         source = source.page()
     if isinstance(source, Page):
-        return source.definitions(On(cells, geometry or None))
+        with user.errors_of(source):
+            return source.definitions(On(cells, geometry or None))
     return [source]
 
 

@@ -29,6 +29,8 @@ from time import perf_counter
 from types import ModuleType
 from typing import Any
 
+from sympy.matrices import ShapeError
+
 from softehl.codegen.language import names
 from softehl.codegen.language.complaints import Elsewhere, ModelError
 from softehl.codegen.language.definition import Definition
@@ -230,6 +232,18 @@ def _imports_from(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
+def errors_of(page: Page) -> Iterator[None]:
+    """As for a model file, what went wrong while a page of a script ran; ModelError stays."""
+    try:
+        yield
+    except ModelError:
+        raise
+    except Exception as error:
+        with _errors_of(Path(page.write.__code__.co_filename)):
+            raise error
+
+
+@contextmanager
 def _errors_of(path: Path) -> Iterator[None]:
     """Say in one line, with the model's own line, what went wrong while it ran."""
     try:
@@ -249,6 +263,11 @@ def _errors_of(path: Path) -> Iterator[None]:
         where, written = _line(path, error)
         if isinstance(error, TypeError) and "truth value of Relational" in what:
             kind, what = "", _TRUTH
+        if isinstance(error, TypeError) and "'list'" in what:
+            what += " (m.parameters, m.data and m.rates give a list: (mu,) = m.parameters(...))"
+        if isinstance(error, ShapeError):
+            what += " (m.grad(u) has as many columns as the mesh has dimensions; "
+            what += "m.deformation_gradient(u) is 3 x 3)"
         if isinstance(error, TypeError) and _NUMERIC.search(what):
             found = _FUNCTION.search(written)
             use = f"sp.{_IN_SYMPY.get(found[2], found[2])}" if found else "those of sympy"

@@ -342,6 +342,35 @@ def test_what_a_page_cannot_say_is_told(write: Callable[[Fields], Any], words: s
         Page("wrong", write).definition("quad4")
 
 
+def returned(m: Fields) -> Any:
+    return m.scalar("T") ** 2
+
+
+def one_in_a_list(m: Fields) -> None:
+    k: Any = m.parameters(k="conductivity")
+    m.minimise(k / 2 * m.scalar("T") ** 2)
+
+
+@pytest.mark.parametrize(
+    ("write", "words"),
+    [
+        (returned, r"LINE: .* returned returns a value, .* say m.minimise"),
+        (one_in_a_list, r"LINE+2: TypeError: .* give a list: \(mu,\) = m.parameters"),
+        (lambda m: m.weak(m.grad(m.vector("u")) + sp.eye(3), 1), "LINE: ShapeError: .* is 3 x 3"),
+        (lambda m: 1 if m.scalar("T") < 1 else 2, "LINE: a condition on symbols .*Piecewise"),
+        (lambda m: np.log(m.scalar("T")), "LINE: np.log computes with numbers.* sp.log"),
+        (lambda: None, r"LINE: .* cannot take it; write `def wrong\(m\):`"),
+    ],
+)
+def test_what_goes_wrong_in_a_page_of_a_script_is_told_with_its_line(
+    write: Callable[..., Any], words: str
+) -> None:
+    first = write.__code__.co_firstlineno
+    words = words.replace("LINE+2", str(first + 2)).replace("LINE", str(first))
+    with pytest.raises(ValueError, match=f"test_fields.py:{words}"):
+        softehl.load_kernel(Page(write.__name__.replace("<lambda>", "wrong"), write), cell="quad4")
+
+
 def test_cells_geometries_and_forms_are_checked() -> None:
     with pytest.raises(ModelError, match='in 3-D; allowed is "solid"'):
         field_pages.rubber.definition("hex8", "plane strain")
