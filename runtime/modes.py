@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csc_array
 
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, count_of
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.reduction import Reduction, is_symmetric, symmetric
 from softehl.runtime.mass import Masses, mass_matrix
@@ -103,5 +103,5 @@ def _response(loaded: Problem, x: Array, here: Tangent, words: str) -> Array:
 
 
 def _require_count(words: str, count: int) -> None:
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-        raise StudyError(f"{words}: a number of at least 1 is needed")
+    if count_of(count) is None:
+        raise StudyError(f"{words}: a whole number of at least 1 is needed")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Literal, cast
 
+from softehl.runtime.arrays import count_of
 from softehl.runtime.begin import beginning
 from softehl.runtime.bifurcation import Bifurcation, require_detect
 from softehl.runtime.buckling import Buckling, linear_buckling
@@ -71,8 +72,9 @@ class Paths:
         Raises StudyError; NotConverged if the end is not reached: its `reached` is the last Result,
         or None.
         """
-        if not (isinstance(steps, int) and steps > 0):
-            raise StudyError(f"steps = {steps}: a number of at least 1 is needed")
+        count = count_of(steps)
+        if count is None:
+            raise StudyError(f"steps = {steps!r}: a whole number of at least 1 is needed")
         until = read.finite("until", until)
         if on_step is not None:
             read.function("on_step", on_step, "result")
@@ -82,7 +84,7 @@ class Paths:
         newton = where.newton(system, newton)
         told = Telling(progress, system.share.first, "load factor", begin[0], note_of(where))
         with Watch(told.until(until), write, on_step) as watch:
-            path = LoadSteps(steps, newton, watch, record, before)
+            path = LoadSteps(count, newton, watch, record, before)
             return path.run(system, begin, until)
 
     def march(

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array, hstack
 from scipy.sparse.csgraph import connected_components
 
-from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.arrays import Array, Flags, Integers, count_of
 from softehl.runtime.begin import SMALLEST
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mesh.mesh import Mesh
@@ -95,15 +95,16 @@ class Cell:
         F: (dim, dim), with None where the mean stress vanishes instead. History is committed after
         each step. Raises StudyError; NotConverged where the end is not reached.
         """
-        if not (isinstance(steps, int) and steps > 0):
-            raise StudyError(f"steps = {steps}: a number of at least 1 is needed")
+        count = count_of(steps)
+        if count is None:
+            raise StudyError(f"steps = {steps!r}: a whole number of at least 1 is needed")
         wanted, free = self._gradient(F)
         dim = len(wanted)
         before = np.eye(dim) if start is None else start.F
         after = np.where(free, before, wanted)
         x0 = self.system.at_rest() if start is None else start.result.x
         path = _Path(self, free, before, after, x0, self._histories(start))
-        first = 1.0 / steps
+        first = 1.0 / count
         follow = Continuation(
             newton or Newton(linear=choose("auto")),
             StepRule(first, min(SMALLEST, first), first),

@@ -57,6 +57,10 @@ class Mesh:
 
     def __post_init__(self) -> None:
         """Raises MeshError for an unknown kind of cell or a wrong number of nodes."""
+        if not isinstance(self.cells, Mapping):
+            raise MeshError('cells are given by their kinds, {"quad4": nodes}')
+        object.__setattr__(self, "points", np.asarray(self.points))
+        object.__setattr__(self, "cells", {k: np.asarray(n) for k, n in self.cells.items()})
         if self.points.ndim != 2 or self.points.dtype.kind not in "fiu":
             given = f"{self.points.dtype} of shape {self.points.shape}"
             raise MeshError(f"points are {given}, must be real numbers of shape (n, dim)")
@@ -69,8 +73,13 @@ class Mesh:
             count = len(CELLS[name].nodes)
             if nodes.ndim != 2 or nodes.shape[1] != count:
                 raise MeshError(f"{name} has nodes of shape {nodes.shape}, must be (m, {count})")
+            if nodes.size and nodes.dtype.kind not in "iu":
+                raise MeshError(f"{name} has nodes of {nodes.dtype}, must be integers")
             if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(self.points):
-                raise MeshError(f"{name}: node numbers go beyond the {len(self.points)} points")
+                raise MeshError(
+                    f"{name}: node numbers from {nodes.min()} to {nodes.max()}, must be from 0 to "
+                    f"{len(self.points) - 1}"
+                )
 
     # making one ---------------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ from math import prod
 
 import numpy as np
 
-from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.arrays import Array, Integers, count_of
 from softehl.runtime.mesh.cells import CELLS, lobatto
 from softehl.runtime.mesh.mesh import Mesh, MeshError
 from softehl.runtime.mesh.piece import joined
@@ -43,9 +43,9 @@ def grid(
     """A line, rectangle or box from the origin; spread: this process's part.  Raises MeshError."""
     dimension = len(size)
     kind = _kind(dimension, order, shape)
-    counts = tuple(cells) if isinstance(cells, Sequence) else (cells,)
-    if len(counts) != dimension or not all(isinstance(n, int) and n > 0 for n in counts):
-        raise MeshError(f"cells = {cells}: {dimension} numbers of at least 1 are needed")
+    counts = [n for n in map(count_of, np.ravel(np.asarray(cells, dtype=object))) if n]
+    if len(counts) != dimension or np.size(cells) != dimension:
+        raise MeshError(f"cells = {cells}: {dimension} whole numbers of at least 1 are needed")
     if not all(np.isfinite(length) and length > 0 for length in size):
         raise MeshError(f"size = {tuple(size)}: lengths must be positive")
     rank, processes = (world().rank, world().size) if spread else (0, 1)

@@ -96,7 +96,7 @@ def _orders(block: str, kernel: Kernel, form: Form) -> dict[str, int]:
     Raises StudyError.
     """
     along = form.along
-    orders = {n: given for n, given in along.items() if isinstance(given, int)}
+    orders = {n: int(given) for n, given in along.items() if isinstance(given, int | np.integer)}
     if orders and (len(orders) < len(along) or kernel.nodes < 2):
         raise StudyError(
             f"{block!r}: along = {listed(along)}: orders for all of them, on lines of 2 nodes or "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,12 @@ from softehl.runtime.statement.records import Datum, Number, StudyError, Where, 
 
 def finite(name: str, value: object) -> float:
     """A number.  Raises StudyError."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+    found: Any = value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
+    if isinstance(found, bool | np.bool_) or not isinstance(found, Real):
         raise StudyError(f"{name} = {value!r}: a real number is needed, or a function")
-    if not np.isfinite(value):
+    if not np.isfinite(float(found)):
         raise StudyError(f"{name} = {value!r}: the number must be finite")
-    return float(value)
+    return float(found)
 
 
 def amount(words: str, name: str, value: Amount) -> Amount:
@@ -36,6 +38,11 @@ def amount(words: str, name: str, value: Amount) -> Amount:
 
 def parameter(block: str, name: str, value: Number) -> Number:
     """A number, or a function of t whose values are looked at.  Raises StudyError."""
+    if np.size(value) > 1:  # type: ignore[arg-type]
+        raise StudyError(
+            f"{block!r}: {name} has {np.size(value)} values: a parameter is one number for all "  # type: ignore[arg-type]
+            f"elements; declare what each has as data, m.data({name}=...)"
+        )
     if not callable(value):
         return finite(f"{block!r}: {name}", value)
     return Rising(f"{block!r}: {name}", function(f"{block!r}: {name}", value, "t"))
@@ -99,8 +106,13 @@ def _real(words: str, value: object, places: Array | tuple[()]) -> Array:
         except (TypeError, ValueError):
             found = found.astype(str)
     if found.dtype.kind not in "fiub" or found.shape not in shapes:
+        columns = ""
+        shape = np.shape(places)
+        if many and len(shape) == 2 and found.shape in (shape, shape[1:]):
+            columns = f"; x has all places, {shape}, in columns: x[:, 0], ..."
         raise StudyError(
             f"{words}: one real number{many} is needed; given {found.dtype} of shape {found.shape}"
+            + columns
         )
     bad = np.flatnonzero(~np.isfinite(found))
     if len(bad):

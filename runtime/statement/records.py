@@ -45,7 +45,7 @@ class Form:
     @property
     def places(self) -> dict[str, Integers]:
         """Places (n, m) of the fields along the elements, without those that are orders still."""
-        return {name: p for name, p in self.along.items() if not isinstance(p, int)}
+        return {name: p for name, p in self.along.items() if not isinstance(p, int | np.integer)}
 
 
 @dataclass(frozen=True, eq=False)

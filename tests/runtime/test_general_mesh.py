@@ -172,7 +172,7 @@ def test_what_is_refused(tmp_path: Path) -> None:
         Mesh.rectangle(1, 1, cells=(1, 1), shape="serendipity")
     with pytest.raises(MeshError, match="allowed are quad, serendipity, triangle"):
         Mesh.rectangle(1, 1, cells=(1, 1), shape="hex")
-    with pytest.raises(MeshError, match="2 numbers of at least 1"):
+    with pytest.raises(MeshError, match="2 whole numbers of at least 1"):
         Mesh.rectangle(1, 1, cells=(0, 1))
     with pytest.raises(MeshError, match="lengths must be positive"):
         Mesh.rectangle(-1, 1, cells=(1, 1))
@@ -180,7 +180,7 @@ def test_what_is_refused(tmp_path: Path) -> None:
         Mesh(mesh.points, {"quad5": mesh.cells["quad4"]})
     with pytest.raises(MeshError, match=r"must be \(m, 4\)"):
         Mesh(mesh.points, {"quad4": mesh.cells["quad4"][:, :3]})
-    with pytest.raises(MeshError, match="beyond the 12 points"):
+    with pytest.raises(MeshError, match="from 1 to 12, must be from 0 to 11"):
         Mesh(mesh.points, {"quad4": mesh.cells["quad4"] + 1})
     with pytest.raises(MeshError, match="no mesh file"):
         Mesh.read(tmp_path / "missing.msh")
