@@ -179,13 +179,15 @@ class Arguments:
             raise ModelError(f"example: {names} is no argument of {self._symbols.model}")
         self.example.update({name: float(v) for name, v in values.items()})
 
-    def check_use(self, equations: set[Node], used: set[Node]) -> None:
-        """Every unknown enters the equations, every other argument is used somewhere."""
+    def check_use(self, equations: set[Node], used: set[Node], unused: str) -> None:
+        """Every unknown enters the equations, every other argument is used somewhere.
+
+        unused: advice on unknowns.
+        """
         for name, (n, where) in self._declared.items():
             unknown = isinstance(n.payload, Input) and n.payload.array == "dofs"
             if n not in (equations if unknown else used):
-                advice = "its residual is zero; is it idle?" if unknown else "leave it out"
-                what = "unknown" if unknown else "argument"
+                what, advice = ("unknown", unused) if unknown else ("argument", "leave it out")
                 raise ModelError(f"the {what} {name} is never used: {advice}", where)
 
     def _input(self, name: str, array: str, index: int, *, varying: bool = False) -> sp.Symbol:

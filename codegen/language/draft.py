@@ -31,6 +31,8 @@ LONGEST = 200
 class Draft:
     """Owner of the parts of a model; `Model` adds what a page may say."""
 
+    _unused = 'its residual is zero; if that is meant, say idle=["..."] in m.nodal_unknowns'
+
     def __init__(
         self,
         name: str,
@@ -117,7 +119,7 @@ class Draft:
         ]
         equations = set(reachable([potential, *given]))
         used = equations | set(reachable([n for _, n in self._outputs.evaluated]))
-        self._arguments.check_use(equations, used)
+        self._arguments.check_use(equations, used, self._unused)
 
     def _condensed(self, name: str, values: list[Node], unknowns: list[Node]) -> list[Node]:
         """Equations of local unknowns; integrals of these, and with them the loop, written out."""

@@ -43,6 +43,8 @@ class Traced:
 class Fields(Model):
     """The model of a page of fields; the page gets it as its only argument."""
 
+    _unused = 'a page that needs one component of a vector declares it, as in m.scalar("u_y")'
+
     def __init__(
         self, name: str, cell: Element, geometry: str, nodes: int, rule: QuadratureRule, doc: str
     ) -> None:

@@ -213,8 +213,10 @@ def geometry_of(mesh: Mesh, geometry: str | None) -> str:
     allowed = GEOMETRIES[mesh.dimension]
     if geometry is not None and geometry not in allowed:
         words = " or ".join(f'"{g}"' for g in allowed)
+        stress = "stress" in str(geometry) and mesh.dimension == 2
+        advice = "; plane stress is said on a page: docs/fields.md#plane-stress" if stress else ""
         raise StudyError(
-            f"geometry = {geometry!r} of a mesh in {mesh.dimension}-D: allowed is {words}"
+            f"geometry = {geometry!r} of a mesh in {mesh.dimension}-D: allowed is {words}{advice}"
         )
     return geometry or allowed[0]
 

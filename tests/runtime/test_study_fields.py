@@ -183,6 +183,8 @@ def test_an_axisymmetric_body_is_stretched_around_the_x_axis() -> None:
 def test_a_geometry_that_the_mesh_cannot_have_is_refused() -> None:
     with pytest.raises(StudyError, match='"plane strain" or "axisymmetric"'):
         Study(Mesh.rectangle(1, 1, cells=(1, 1)), geometry="solid")
+    with pytest.raises(StudyError, match="plane stress is said on a page"):
+        Study(Mesh.rectangle(1, 1, cells=(1, 1)), geometry="plane stress")
 
 
 def test_a_file_may_hold_a_page_of_fields(tmp_path: Path) -> None:
