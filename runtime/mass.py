@@ -31,6 +31,8 @@ def mass_blocks(system: System, given: Masses | None) -> list[ElementBlock]:
     it; left out, u_x, u_y, u_z. A page on several kinds of cells is named once. Raises StudyError.
     """
     found: list[ElementBlock] = []
+    if given is not None and not isinstance(given, Mapping):
+        raise StudyError(f"mass = {given!r}: give densities by blocks, as in {_EXAMPLE}")
     for name, values in (given or {}).items():
         blocks = [b for b in system.blocks.values() if b.name == name or _base(b) == name]
         if not blocks:

@@ -126,6 +126,8 @@ def smallest_factors(K: csc_array, G: csc_array, count: int) -> tuple[Array, Arr
     n = K.shape[0]
     if not 0 < count < n - 1:
         raise NoModes(f"{count} buckling factors: from 1 to {n - 2} are possible here")
+    if not G.data.any():
+        raise NoModes("the stiffness does not change with the load, as in laws of small strains")
     try:
         factors = sparse_linalg.splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01)
     except RuntimeError as error:

@@ -260,6 +260,7 @@ def test_ties_and_pressures_are_not_taken_for_instabilities() -> None:
         ({"body": {"rho": -1.0}}, "rho = -1, it cannot be negative$"),
         ({"body": 1.0}, "give its density, as in"),
         (None, "there is no mass: give densities"),
+        (1e-9, "mass = 1e-09: give densities by blocks, as in"),
     ],
 )
 def test_what_is_refused(mass: Any, words: str) -> None:
@@ -279,6 +280,12 @@ def test_numbers_that_are_refused() -> None:
     study.fix("left", u_x=0, u_y=0)
     with pytest.raises(StudyError, match="nothing changes with the load factor"):
         study.buckling()
+    linear = Study(Mesh.rectangle(9.0, 1.0, cells=(9, 1)))
+    linear.add("body", material="hooke", E=1.0, nu=0.3)
+    linear.fix("left", u_x=0, u_y=0)
+    linear.load("right", u_x=-1)
+    with pytest.raises(StudyError, match="the stiffness does not change with the load, as in"):
+        linear.buckling()
 
 
 def test_an_unsymmetric_tangent_has_no_modes() -> None:
