@@ -120,13 +120,13 @@ def _units(known: list[str], K: csc_array, parts: Integers, name: Integers) -> A
     ones, n = np.ones(len(name)), np.arange(len(name))
     member = csc_array((ones, (n, group)), shape=(len(name), len(found)))
     terms = csc_array(member.T @ abs(K) @ member)
-    terms = csc_array(terms.maximum(terms.T))
-    units = np.ones(len(found))
+    rows, columns = np.ones(len(found)), np.ones(len(found))
     for _ in range(_BALANCINGS):  # the method of Ruiz
-        scaled = terms.multiply(units[:, None]).multiply(units)
-        largest = scaled.max(axis=0).toarray().ravel()
-        units /= np.sqrt(np.where(largest > 0.0, largest, 1.0))
-    return np.asarray(2.0 ** np.round(np.log2(units[group])))  # adds no rounding of its own
+        scaled = terms.multiply(rows[:, None]).multiply(columns)
+        largest = [scaled.max(axis=k).toarray().ravel() for k in (1, 0)]
+        row, column = (1.0 / np.sqrt(np.where(a > 0.0, a, 1.0)) for a in largest)
+        rows, columns = rows * row, columns * column
+    return np.asarray(2.0 ** np.round(np.log2(columns[group])))  # adds no rounding of its own
 
 
 def _independent(fields: Array) -> Array:

@@ -95,8 +95,8 @@ class Factorisation:
     factors: anything with `solve`, exact or of a matrix near by. row_sums: (n,) sums of |matrix|
     along rows, the scale of each row's rounding error. accuracy: largest row-wise backward error
     of a solution. settled: largest size of the last correction, relative to the solution; where
-    pivots were perturbed it does not shrink if the matrix is singular. units: (n,) of the unknowns
-    if `matrix` is a balanced one, see `balanced`; solutions are those of the one that was given.
+    pivots were perturbed it does not shrink if the matrix is singular. units: of rows and columns,
+    (n,), if `matrix` is a balanced one; solutions are those of the one that was given.
     """
 
     matrix: SparseMatrix
@@ -105,7 +105,7 @@ class Factorisation:
     refinement: int
     accuracy: float
     settled: float = math.inf
-    units: Array | None = None
+    units: tuple[Array, Array] | None = None
 
     def solve(self, b: Array) -> Array:
         """x of matrix x = b, shapes (n,); raises SingularMatrix if x is not finite or not a
@@ -113,7 +113,8 @@ class Factorisation:
         """
         if self.units is None:
             return self._solved(b)
-        return self.units * self._solved(self.units * b)
+        rows, columns = self.units
+        return columns * self._solved(rows * b)
 
     def _solved(self, b: Array) -> Array:
         x: Array = self.factors.solve(b)
@@ -142,7 +143,8 @@ class Factorisation:
             return None
         K = csc_array(self.matrix.T)
         row_sums: Array = np.asarray(abs(K).sum(axis=1)).ravel()
-        return replace(self, matrix=K, factors=factors, row_sums=row_sums)
+        units = None if self.units is None else self.units[::-1]
+        return replace(self, matrix=K, factors=factors, row_sums=row_sums, units=units)
 
     def pivots(self) -> Array | None:
         """Pivots (n,) where they are all on the diagonal, as in L D L'; None where not known."""
@@ -158,44 +160,47 @@ class Factorisation:
         return float(ratio.max(initial=0.0))
 
 
-def balanced(K: SparseMatrix) -> tuple[SparseMatrix, Array, Array | None]:
-    """D K D, its row sums (n,) and D, (n,): no row has entries that are all small beside those of
-    the rows that it joins. K itself and None for D where that is so already. Raises SingularMatrix
-    as `checked_row_sums`.
+def balanced(K: SparseMatrix) -> tuple[SparseMatrix, Array, tuple[Array, Array] | None]:
+    """D K E, its row sums (n,), D and E, (n,): no row or column has entries that are all small
+    beside those of the columns or rows that it joins. K itself and None where that is so already.
+    Raises SingularMatrix as `checked_row_sums`.
 
-    Displacements in m beside pressures in Pa spoil the choice of pivots. D has powers of two.
+    Displacements in m beside pressures in Pa spoil the choice of pivots. D and E have powers of
+    two; of a symmetric matrix they are the same.
     """
     sums = checked_row_sums(K)
     size: Array = np.abs(K.data)
-    units: Array = np.ones(K.shape[0])
+    rows, columns = np.ones(K.shape[0]), np.ones(K.shape[1])
     while True:  # the method of Ruiz: each turn halves the exponents that are left
-        root = 1.0 / np.sqrt(_largest(size, K))
-        _scale(size, root, K)
-        if _largest(size, K).min() >= _UNLIKE:
+        row, column = (1.0 / np.sqrt(largest) for largest in _largest(size, K))
+        _scale(size, row, column, K)
+        if min(largest.min() for largest in _largest(size, K)) >= _UNLIKE:
             break
-        units *= root
-    if (units == 1.0).all():
+        rows *= row
+        columns *= column
+    if (rows == 1.0).all() and (columns == 1.0).all():
         return K, sums, None
-    units = np.asarray(2.0 ** np.round(np.log2(units)))
+    rows, columns = (np.asarray(2.0 ** np.round(np.log2(units))) for units in (rows, columns))
     scaled = K.data.copy()
-    _scale(scaled, units, K)
+    _scale(scaled, rows, columns, K)
     K = type(K)((scaled, K.indices, K.indptr), shape=K.shape)
-    return K, checked_row_sums(K), units
+    return K, checked_row_sums(K), (rows, columns)
 
 
-def _scale(entries: Array, units: Array, K: SparseMatrix) -> None:
-    """Multiply entries (nnz,) of a matrix like K by the units (n,) of their rows and columns."""
-    entries *= units[K.indices]
-    entries *= np.repeat(units, np.diff(K.indptr))
+def _scale(entries: Array, rows: Array, columns: Array, K: SparseMatrix) -> None:
+    """Multiply entries (nnz,) of a matrix like K by the units (n,) of its rows and columns."""
+    entries *= rows[K.indices]
+    entries *= np.repeat(columns, np.diff(K.indptr))
 
 
-def _largest(size: Array, K: SparseMatrix) -> Array:
-    """Largest of the sizes (nnz,) in each row of K, and the column of the same number: (n,)."""
-    found: Array = np.zeros(K.shape[0])
-    np.maximum.at(found, K.indices, size)
+def _largest(size: Array, K: SparseMatrix) -> tuple[Array, Array]:
+    """Largest of the sizes (nnz,) in each row of K, and in each column, (n,); 1 in an empty one."""
+    rows, columns = np.zeros(K.shape[0]), np.ones(K.shape[1])
+    np.maximum.at(rows, K.indices, size)
     filled = np.flatnonzero(np.diff(K.indptr))
-    found[filled] = np.maximum(found[filled], np.maximum.reduceat(size, K.indptr[filled]))
-    return found
+    columns[filled] = np.maximum.reduceat(size, K.indptr[filled])
+    columns[columns == 0.0] = 1.0
+    return rows, columns
 
 
 def checked_row_sums(K: SparseMatrix) -> Array:

@@ -321,6 +321,33 @@ def test_units_of_lengths_and_pressures_change_nothing(length: float, mu: float)
     assert iterations == usual
 
 
+@softehl.page
+def biot(m):  # type: ignore[no-untyped-def]
+    """Soil whose pores are full of water."""
+    u, p = m.vector("u"), m.scalar("p", order=1)
+    E, k = m.parameters(E="Young's modulus", k="permeability over viscosity")
+    e = (m.grad(u) + m.grad(u).T) / 2
+    m.weak(E * e - p * sp.eye(len(u)), m.grad(u))
+    m.weak(m.grad(m.rate(u)).trace(), p)
+    m.weak(k * m.grad(p), m.grad(p))
+
+
+def test_units_of_time_change_nothing_either() -> None:
+    """Terzaghi's column; rows of the tangent have rates in them, columns have not."""
+
+    def pressures(height: float, E: float, k: float) -> list[float]:
+        study = Study(Mesh.rectangle(height / 4, height, cells=(1, 4), order=2))
+        study.add("soil", biot, E=E, k=k)
+        study.fix("boundary", u_x=0)
+        study.fix("bottom", u_y=0)
+        study.fix("top", p=0)
+        study.load("top", u_y=-1e-3 * E)
+        dt = 0.05 * height**2 / (k * E)
+        return [r.at((0, 0))["p"] / (1e-3 * E) for r in study.march(dt=dt, until=2 * dt)]
+
+    assert pressures(1e-6, 1e11, 1e-18) == pytest.approx(pressures(1.0, 1.0, 1.0), rel=1e-9)
+
+
 @pytest.mark.parametrize("shape", ["quad", "serendipity", "triangle"])
 def test_a_field_of_lower_order_has_values_between_its_nodes(shape: str, tmp_path: Path) -> None:
     """A pressure that is linear: at any place, its derivative too, and in the file."""
