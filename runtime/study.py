@@ -132,7 +132,8 @@ class Study(Paths, Fitted):
 
         A number grows with the load factor (in `march` it is constant); a function
         f(x (n, dim), t) gives the load itself.
-        where: a side or a predicate of faces; a tuple of coordinates or node numbers for forces.
+        where: a side, or a predicate of places, for the faces of the boundary all of whose nodes it
+        chooses; a tuple of coordinates or node numbers for forces. A body force is a page.
         """
         words = f"load({shown(where)})"
         read.named(words, components, "u_x=1")

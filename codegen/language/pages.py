@@ -132,7 +132,7 @@ class Page:
         return self._made(site, site.form)
 
     def _made(self, onto: Fields, finish: Callable[[], T]) -> T:
-        """What the page makes of `onto`.  Raises ModelError with a line of the page."""
+        """Result of the page on `onto`.  Raises ModelError with a line of the page."""
         code = self.write.__code__
         where = f"{code.co_filename}:{code.co_firstlineno}"
         value = None
