@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.mpi import petsc, world
 
 
@@ -63,6 +63,17 @@ class Exchange:
     def highest(self, x: Array) -> Array:
         """Of numbers (m,), at least 0, the largest of any process: of own unknowns, (k,)."""
         return self._back(x, petsc().InsertMode.MAX_VALUES)
+
+    def renumbered(self, kept: Flags) -> tuple[Integers, Integers]:
+        """PETSc's numbers (m,) if it had only those own unknowns (k,) that are kept, -1 for others;
+        and where those of each process begin.
+        """
+        chosen = np.flatnonzero(kept)
+        chosen = chosen[np.argsort(self.places[chosen])]
+        starts = np.concatenate([[0], np.cumsum(world().allgather(len(chosen)))])
+        own = np.full(len(self.owned), -1.0)
+        own[chosen] = starts[world().rank] + np.arange(len(chosen))
+        return self.copied(own).astype(np.int64), starts
 
     def _back(self, x: Array, mode: Any) -> Array:
         self.copies.array[:] = x

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 
-from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.engines.exchange import Exchange
-from softehl.runtime.fem.assembly import Assembler
+from softehl.runtime.engines.inner import Columns, Outer, Piece, require_eliminated
+from softehl.runtime.fem.assembly import Assembler, ElementBlock
+from softehl.runtime.fem.pattern import Structure
 from softehl.runtime.mpi import petsc, world
 from softehl.runtime.solve.linear import SingularMatrix
 
@@ -33,42 +35,66 @@ class Times:
 @dataclass(eq=False)
 class Tangent:
     """The matrix that element blocks share: its structure is told PETSc once for a set of
-    prescribed unknowns, whose rows and columns are dropped by negative numbers.
+    prescribed unknowns, whose rows and columns are dropped by negative numbers. Internal unknowns
+    of elements are condensed before.
 
     matrix: PETSc's. values: one for each entry of every element, then one for each own unknown on
-    the diagonal. owned: local numbers of own unknowns.
+    the diagonal. fixed: local numbers of prescribed unknowns. columns: of blocks with internal
+    unknowns. exchange: of all unknowns; outer: of those that PETSc has. pieces, own: what `fill`
+    found: elements with internal unknowns, and the diagonal (k,).
     """
 
     matrix: Any
     values: Array
-    fixed: bytes
+    fixed: Integers
+    structure: Structure
+    columns: dict[str, Columns]
     exchange: Exchange
+    outer: Outer
+    pieces: list[Piece] = field(default_factory=list)
+    own: Array = field(default_factory=lambda: np.empty(0))
 
     @classmethod
-    def of(cls, assembler: Assembler, fixed: Integers, exchange: Exchange, block: int) -> Tangent:
+    def of(
+        cls, assembler: Assembler, fixed: Integers, exchange: Exchange, outer: Outer, block: int
+    ) -> Tangent:
         """An empty matrix; `fixed` are local numbers of prescribed unknowns."""
         PETSc = petsc()
-        numbers = exchange.numbers.astype(PETSc.IntType)
-        own = numbers[exchange.owned]
-        dropped = numbers.copy()
-        dropped[fixed] = -1
-        maps = [dropped[b.dofs] for b in assembler.blocks]
+        there = np.full(len(exchange.numbers), -1, dtype=PETSc.IntType)
+        there[outer.kept] = outer.exchange.numbers
+        own = there[outer.owned]
+        there[fixed] = -1
+        columns = {b.name: Columns.of(b) for b in assembler.blocks if b.internal}
+        maps = [
+            there[b.dofs[:, columns[b.name].outer] if b.internal else b.dofs]
+            for b in assembler.blocks
+        ]
         rows = np.concatenate([*(np.repeat(m, m.shape[1], axis=1).ravel() for m in maps), own])
-        columns = np.concatenate([*(np.tile(m, m.shape[1]).ravel() for m in maps), own])
+        across = np.concatenate([*(np.tile(m, m.shape[1]).ravel() for m in maps), own])
         matrix = PETSc.Mat().create(comm=world())
-        sizes = exchange.vector.getSizes()
+        sizes = outer.exchange.vector.getSizes()
         matrix.setSizes((sizes, sizes), block)
         matrix.setType("aij")
-        matrix.setPreallocationCOO(rows, columns)
+        matrix.setPreallocationCOO(rows, across)
         values = np.zeros(len(rows))
-        values[len(rows) - len(own) :] = np.isin(exchange.owned, fixed)
-        return cls(matrix, values, fixed.tobytes(), exchange)
+        values[len(rows) - len(own) :] = np.isin(outer.owned, fixed)
+        return cls(matrix, values, fixed, assembler.structure, columns, exchange, outer)
+
+    def serves(self, assembler: Assembler, fixed: Integers) -> bool:
+        """True if it has the structure of these elements and prescribed unknowns."""
+        return self.structure is assembler.structure and np.array_equal(self.fixed, fixed)
+
+    @property
+    def rows(self) -> Exchange:
+        """Of PETSc's vectors."""
+        return self.outer.exchange
 
     def places(self, assembler: Assembler) -> Iterator[tuple[Any, Array]]:
         """Pieces of blocks, with the place of their tangents' entries."""
         first = 0
         for block in assembler.blocks:
-            width = block.dofs.shape[1] ** 2
+            inner = len(self.columns[block.name].inner) if block.name in self.columns else 0
+            width = (block.dofs.shape[1] - inner) ** 2
             for piece, _ in block.pieces(np.empty(0, dtype=np.int64)):
                 last = first + width * len(piece.dofs)
                 yield piece, self.values[first:last]
@@ -84,7 +110,10 @@ class Tangent:
     ) -> Array:
         """Evaluate all elements at x, (m,); their residuals with K times defect taken off, (m,)."""
         r, began = np.zeros(assembler.size), time.perf_counter()
+        diagonal, free = np.zeros(assembler.size), np.ones(assembler.size, dtype=bool)
+        free[self.fixed] = False
         moved = bool(defect.any())
+        self.pieces = []
         for piece, place in self.places(assembler):
             if not len(piece.dofs):
                 continue
@@ -92,48 +121,79 @@ class Tangent:
                 place[:] = 0.0
                 continue
             local, tangents = piece.tangent(x, parameters[piece.name])
-            place[:] = tangents.ravel()
+            place[:] = self._condensed(piece, tangents, free).ravel()
+            np.add.at(diagonal, piece.dofs, np.einsum("nii->ni", tangents))
             if moved:
                 local = local - np.einsum("nij,nj->ni", tangents, defect[piece.dofs])
             np.add.at(r, piece.dofs.ravel(), local.ravel())
+        self.own = np.where(free[self.exchange.owned], self.exchange.added(diagonal), 1.0)
         between = time.perf_counter()
         self.matrix.setValuesCOO(self.values, petsc().InsertMode.INSERT_VALUES)
         times.kernels += between - began
         times.matrix += time.perf_counter() - between
         return r
 
+    def _condensed(self, piece: ElementBlock, K: Array, free: Flags) -> Array:
+        """What is left of tangents K without internal unknowns."""
+        columns = self.columns.get(piece.name)
+        if columns is None:
+            return K
+        found = Piece.of(columns, piece.dofs, K, free)
+        self.pieces.append(found)
+        return np.asarray(K[:, columns.outer][:, :, columns.outer] - found.back @ found.slopes)
+
+    def solved(self, solver: Solver, r: Array) -> Array:
+        """Local x (m,) of K x = r, own values (k,).  Raises SingularMatrix on all processes."""
+        if not self.columns:
+            return solver.solve(self, r)
+        require_eliminated(self.pieces, self.exchange)
+        exchange, right = self.exchange, np.zeros(len(self.exchange.numbers))
+        right[exchange.owned] = r
+        given = right.copy()
+        for piece in self.pieces:
+            piece.eliminate(right)
+        x = np.zeros(len(right))
+        left = exchange.copied(exchange.added(right))
+        x[self.outer.kept] = solver.solve(self, left[self.outer.owned])
+        for piece in self.pieces:
+            piece.recover(x, given)
+        return x
+
     def diagonal(self) -> Array:
         """Magnitudes of the diagonal of K, own rows, (k,)."""
-        found = self.exchange.vector.duplicate()
-        self.matrix.getDiagonal(found)
-        return self._own(np.abs(found.array_r), found)
+        return np.abs(self.own)
 
     def times(self, x: Array) -> Array:
         """K times own values x, (k,): own rows, (k,)."""
-        return self._product(self.matrix, x)
+        return self._product(self.matrix, x, lambda entries: entries)
 
     def times_magnitudes(self, x: Array) -> Array:
-        """|K| times own values x, (k,), at least 0: own rows, (k,)."""
+        """|K| times own values x, (k,), at least 0, own rows, (k,): a bound of internal ones."""
         starts, columns, values = self.matrix.getValuesCSR()
         np.abs(values, out=values)
         csr = starts, columns, values
         magnitudes = petsc().Mat().createAIJ(self.matrix.getSizes(), csr=csr, comm=world())
         del starts, columns, values, csr
-        found = self._product(magnitudes, x)
+        found = self._product(magnitudes, x, np.abs)
         magnitudes.destroy()  # here and below: PETSc keeps what Python alone lets go
         return found
 
-    def _product(self, matrix: Any, x: Array) -> Array:
-        found, given = self.exchange.vector.duplicate(), self.exchange.to_petsc(x)
+    def _product(self, matrix: Any, x: Array, of: Callable[[Array], Array]) -> Array:
+        local = np.zeros(len(self.exchange.numbers))
+        local[self.exchange.owned] = x
+        rows = self.rows
+        found, given = rows.vector.duplicate(), rows.to_petsc(local[self.outer.owned])
         matrix.mult(given, found)
-        return self._own(found.array_r, found, given)
-
-    def _own(self, values: Array, *done: Any) -> Array:
-        """Own values (k,), a copy, of a process's piece; vectors that are done with."""
-        own = np.array(values[self.exchange.places])
-        for vector in done:
-            vector.destroy()
-        return own
+        y = np.zeros(len(local))
+        y[self.outer.owned] = found.array_r[rows.places]
+        found.destroy()
+        given.destroy()
+        if self.columns:
+            local = self.exchange.copied(x)
+            for piece in self.pieces:
+                piece.add_product(y, local, of)
+            return self.exchange.added(y)
+        return np.asarray(y[self.exchange.owned])
 
     def prepare(self, ksp: Any, near: Any) -> None:
         """Krylov method and preconditioner, where no option says otherwise.
@@ -158,12 +218,9 @@ class Tangent:
         starts, _, values = self.matrix.getValuesCSR()
         sums = np.add.reduceat(np.append(np.abs(values), 0.0), starts[:-1])
         sums[starts[:-1] == starts[1:]] = 0.0
-        empty = np.flatnonzero(sums == 0.0)
-        first = self.matrix.getOwnershipRange()[0]
-        found = [
-            n for n in world().allgather(int(first + empty[0]) if len(empty) else -1) if n >= 0
-        ]
-        return found[0] if found else -1
+        empty = self.outer.owned[sums[self.rows.places] == 0.0]
+        first = int(self.exchange.numbers[empty].min()) if len(empty) else -1
+        return next((n for n in world().allgather(first) if n >= 0), -1)
 
 
 class Operator(Protocol):
@@ -178,7 +235,16 @@ class Operator(Protocol):
 
     @property
     def exchange(self) -> Exchange:
-        """Of its vectors."""
+        """Of all unknowns."""
+        ...
+
+    @property
+    def rows(self) -> Exchange:
+        """Of PETSc's vectors."""
+        ...
+
+    def solved(self, solver: Solver, r: Array) -> Array:
+        """See the class."""
         ...
 
     def fill(
@@ -229,10 +295,13 @@ class Solver:
     _ksp: Any = None
 
     def solve(self, tangent: Operator, r: Array) -> Array:
-        """Local x (m,) of K x = r, own values (k,).  Raises SingularMatrix on all processes."""
+        """Local x of the matrix for own values r, both of `rows`.
+
+        Raises SingularMatrix on all processes.
+        """
         began = time.perf_counter()
         ksp = self._prepared(tangent)
-        b = tangent.exchange.to_petsc(r)
+        b = tangent.rows.to_petsc(r)
         x = b.duplicate()
         reason = 0
         try:
@@ -244,7 +313,7 @@ class Solver:
             self.times.solver += time.perf_counter() - began
         self.times.solves += 1
         self.times.iterations += ksp.getIterationNumber()
-        size, found = x.norm(), tangent.exchange.local(x)
+        size, found = x.norm(), tangent.rows.local(x)
         b.destroy()
         x.destroy()
         if reason < 0 or not np.isfinite(size):

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from softehl.runtime.arrays import Flags, Integers
+from softehl.runtime.engines.sizes import internal
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.system import System
 
@@ -135,7 +136,8 @@ def nodes_of_unknowns(system: System) -> Integers:
 
 def numbered(system: System, owner: Integers, places: Integers) -> tuple[Integers, int]:
     """Unknowns in PETSc's order: by process, then those that stand on the same nodes as the first
-    field together, node by node; and how many of them a node has where there are no others.
+    field together, node by node; and how many of them a node has where there are no others but
+    internal ones.
     """
     nodal = list(system.numbering.nodal.values())
     present: list[Flags] = [numbers >= 0 for numbers in nodal]
@@ -147,5 +149,7 @@ def numbered(system: System, owner: Integers, places: Integers) -> tuple[Integer
         )
         kind[numbers[there]] = k
     order = np.lexsort((kind, places, group, owner))
+    for inner in internal(system.assembler):
+        group[inner] = 0  # condensed before PETSc sees them
     alike = not group.any() and all(np.array_equal(there, present[0]) for there in present)
     return order, len(nodal) if alike else 1

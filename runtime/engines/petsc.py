@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from softehl.runtime.arrays import Integers
+from softehl.runtime.arrays import Flags, Integers
 from softehl.runtime.engines.exchange import Exchange
+from softehl.runtime.engines.inner import Outer
 from softehl.runtime.engines.levels import Levels
 from softehl.runtime.engines.local import Part, part_of
 from softehl.runtime.engines.matrix import Solver, Times
@@ -66,9 +67,10 @@ class Petsc:
         return replace(part.system, share=Processes(team))
 
     def _team(self, part: Part, exchange: Exchange, interleaved: int) -> Team:
-        near = _rigid_motions(part, interleaved, exchange)
-        solver = Solver(self.options, near, _fields(part, exchange), self.times)
-        return Team(part, exchange, interleaved, solver)
+        outer = Outer.of(exchange, part.system.assembler)
+        near = _rigid_motions(part, interleaved, outer)
+        solver = Solver(self.options, near, _fields(part, outer), self.times)
+        return Team(part, exchange, outer, interleaved, solver)
 
     def _order(self, system: System) -> int:
         """Order of the cells of pages with products, 0 for a matrix.  Raises StudyError."""
@@ -105,36 +107,39 @@ def _cut(system: System, cells: Cells) -> Integers:
     return np.concatenate(comm.allgather(processes.getIndices().astype(np.int64)))
 
 
-def _rigid_motions(part: Part, interleaved: int, exchange: Exchange) -> Any:
+def _rigid_motions(part: Part, interleaved: int, outer: Outer) -> Any:
     """Rigid-body motions for multigrid, where the only unknowns are displacements; else None."""
-    mesh, layout = part.system.mesh, part.system.numbering.layout
-    stems = {name.rpartition("_")[0] for name in layout.names}
-    axes = tuple(name.rpartition("_")[2] for name in layout.names)
+    mesh, own = part.system.mesh, outer.owned
+    parts = _spans(part, own)
+    stems = {name.rpartition("_")[0] for name in parts}
+    axes = tuple(name.rpartition("_")[2] for name in parts)
     if interleaved < 2 or len(stems) > 1 or axes != _AXES[: mesh.dimension]:
         return None
-    places = np.empty(len(exchange.owned))
-    for axis, name in enumerate(layout.names):
+    places = np.empty(len(own))
+    for axis, (name, chosen) in enumerate(parts.items()):
         numbers = part.system.numbering.nodal[name]
         there = np.flatnonzero(numbers >= 0)
-        local = np.empty(len(exchange.numbers))
+        local = np.empty(part.system.size)
         local[numbers[there]] = mesh.points[there, axis]
-        own = (exchange.owned >= layout.part(name).start) & (
-            exchange.owned < layout.part(name).stop
-        )
-        places[own] = local[exchange.owned[own]]
-    coordinates = exchange.to_petsc(places)
+        places[chosen] = local[own[chosen]]
+    coordinates = outer.exchange.to_petsc(places)
     coordinates.setBlockSize(mesh.dimension)
     return petsc().NullSpace().createRigidBody(coordinates)
 
 
-def _fields(part: Part, exchange: Exchange) -> dict[str, Integers]:
+def _spans(part: Part, own: Integers) -> dict[str, Flags]:
+    """Unknown -> which of own ones, by their local numbers, are of that name; no internal ones."""
+    layout, blocks = part.system.numbering.layout, part.system.assembler.blocks
+    inner = {name for block in blocks for name in block.internal}
+    spans = {name: layout.part(name) for name in layout.names if name not in inner}
+    return {name: (own >= span.start) & (own < span.stop) for name, span in spans.items()}
+
+
+def _fields(part: Part, outer: Outer) -> dict[str, Integers]:
     """Field -> where its own unknowns stand in this process's piece; displacements are one."""
-    layout = part.system.numbering.layout
     found: dict[str, list[Integers]] = {}
-    for name in layout.names:
+    for name, chosen in _spans(part, outer.owned).items():
         stem, _, axis = name.rpartition("_")
         label = stem if stem and axis in (*_AXES, "r") else name
-        span = layout.part(name)
-        own = (exchange.owned >= span.start) & (exchange.owned < span.stop)
-        found.setdefault(label, []).append(exchange.places[own])
+        found.setdefault(label, []).append(outer.exchange.places[chosen])
     return {label: np.sort(np.concatenate(places)) for label, places in found.items()}

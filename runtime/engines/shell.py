@@ -18,7 +18,7 @@ from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.engines import tangent as alone
 from softehl.runtime.engines.exchange import Exchange
 from softehl.runtime.engines.levels import Levels
-from softehl.runtime.engines.matrix import Times
+from softehl.runtime.engines.matrix import Solver, Times
 from softehl.runtime.engines.matrix_free import TOLERANCE
 from softehl.runtime.engines.tied import Ties
 from softehl.runtime.fem.assembly import Assembler
@@ -103,6 +103,15 @@ class Shell:
             root * exchange.added(problem.assembler.around(local, problem.parameters))
         )
 
+    @property
+    def rows(self) -> Exchange:
+        """See `engines.matrix.Operator`."""
+        return self.exchange
+
+    def solved(self, solver: Solver, r: Array) -> Array:
+        """See `engines.matrix.Operator`."""
+        return solver.solve(self, r)
+
     def empty_row(self) -> int:
         """None is known."""
         return -1
@@ -163,15 +172,10 @@ class Shell:
         """PETSc's number of each unknown of the lower level; own ones, by their numbers among own
         unknowns, in that order.
         """
-        exchange = self.exchange
-        chosen = np.flatnonzero(np.isin(exchange.owned, self.levels.unknowns[1]))
-        chosen = chosen[np.argsort(exchange.places[chosen])]
-        counts = world().allgather(len(chosen))
-        first = sum(counts[: world().rank])
-        own = np.full(len(exchange.owned), -1.0)
-        own[chosen] = first + np.arange(len(chosen))
-        every = exchange.local(exchange.to_petsc(own))
-        return every[self.levels.unknowns[1]].astype(np.int64), chosen
+        exchange, lower = self.exchange, self.levels.unknowns[1]
+        kept = np.isin(exchange.owned, lower)
+        chosen = np.flatnonzero(kept)
+        return exchange.renumbered(kept)[0][lower], chosen[np.argsort(exchange.places[chosen])]
 
     def _motions(self, A: Any, near: Any, chosen: Integers) -> Any:
         """The motions at the nodes of the lower level, made orthogonal."""

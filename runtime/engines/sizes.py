@@ -9,6 +9,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Flags, Integers
 from softehl.runtime.engines.motions import is_vector, motions
+from softehl.runtime.fem.assembly import Assembler
 from softehl.runtime.names import listed
 from softehl.runtime.solve import amg, pardiso
 from softehl.runtime.solve.amg import Modes, Multigrid, OrFactors
@@ -38,14 +39,14 @@ def linear_solver(system: System, linear: Linear) -> tuple[LinearSolver, Callabl
     It condenses internal unknowns of elements. Raises StudyError for an unknown name or where
     multigrid cannot be used.
     """
-    groups = internal(system)
+    groups = internal(system.assembler)
     found, note = _of_rest(system, linear, system.size - sum(g.size for g in groups))
     return (Condensing(found, groups) if groups else found), note
 
 
-def internal(system: System) -> tuple[Integers, ...]:
+def internal(assembler: Assembler) -> tuple[Integers, ...]:
     """Numbers (n, k) of the internal unknowns of each block that has some."""
-    found = [b.internal.values() for b in system.assembler.blocks if b.internal]
+    found = [b.internal.values() for b in assembler.blocks if b.internal]
     return tuple(np.stack(list(numbers), axis=1) for numbers in found)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.engines.exchange import Exchange, largest, total
+from softehl.runtime.engines.inner import Outer
 from softehl.runtime.engines.levels import Levels
 from softehl.runtime.engines.local import Part
 from softehl.runtime.engines.matrix import Operator, Solver, Tangent
@@ -27,12 +28,13 @@ class Team:
     """Objects that the processes share through a whole path: exchange of vectors, and the matrix.
 
     tangent: of the latest set of prescribed unknowns. levels: of multigrid in the order, where the
-    tangent is to be no matrix. reach, counts: see `Assembler`, of own
+    tangent is to be no matrix. outer: what PETSc has. reach, counts: see `Assembler`, of own
     unknowns.
     """
 
     part: Part
     exchange: Exchange
+    outer: Outer
     interleaved: int
     solver: Solver
     levels: Levels | None = None
@@ -43,7 +45,7 @@ class Team:
     def tangent_of(self, problem: Problem) -> Operator:
         """The matrix for the prescribed unknowns of a problem, or a new shell."""
         known = self.tangent
-        same = isinstance(known, Tangent) and known.fixed == problem.fixed.tobytes()
+        same = isinstance(known, Tangent) and known.serves(problem.assembler, problem.fixed)
         if world().allreduce(int(not same)) or known is None:
             if known is not None:
                 known.matrix.destroy()  # a shell and PETSc's matrix hold each other
@@ -54,7 +56,8 @@ class Team:
     def _new(self, problem: Problem) -> Operator:
         if self.levels is not None:
             return Shell(problem, self.levels, self.exchange)
-        return Tangent.of(problem.assembler, problem.fixed, self.exchange, self.interleaved)
+        given = problem.assembler, problem.fixed, self.exchange, self.outer
+        return Tangent.of(*given, self.interleaved)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +69,7 @@ class Factors:
 
     def solve(self, r: Array) -> Array:
         """Local x, (m,), of own r, (k,)."""
-        return self.solver.solve(self.tangent, r)
+        return self.tangent.solved(self.solver, r)
 
     def loosest(self) -> int | None:
         """See `runtime.solve.held.loosest`: PETSc's number. Only a direct solver is asked."""

@@ -122,19 +122,28 @@ def inverted(K: csr_array, group: Integers) -> tuple[bsr_array, Array | None]:
     if (element != entries.col // k).any():
         raise SingularMatrix("internal unknowns of two elements know each other")
     np.add.at(blocks, (element, entries.row % k, entries.col % k), entries.data)
-    sizes = np.abs(blocks).max(axis=(1, 2), initial=0.0)
-    try:
-        inverse = np.linalg.inv(blocks)
-    except np.linalg.LinAlgError:
-        inverse = np.full_like(blocks, np.nan)
+    inverse = inverses(blocks)
     if not np.isfinite(inverse).all():
-        bad = int(
-            np.argmin(np.abs(np.linalg.det(blocks / np.maximum(sizes, 1e-300)[:, None, None])))
-        )
+        bad = weakest(blocks)
         row = int(group[bad, 0])
         raise SingularMatrix(f"internal unknowns of element {bad} cannot be eliminated", row)
+    sizes = np.abs(blocks).max(axis=(1, 2), initial=0.0)
     uneven = np.abs(blocks - np.swapaxes(blocks, 1, 2)).max(initial=0.0)
     even = uneven <= _SYMMETRIC * sizes.max(initial=0.0)
     signs = np.asarray(np.linalg.eigvalsh(blocks)).reshape(-1) if even else None
     where = np.arange(n)
     return bsr_array((inverse, where, np.arange(n + 1)), shape=(n * k, n * k)), signs
+
+
+def inverses(blocks: Array) -> Array:
+    """Of matrices (n, k, k); not finite where one of them has none."""
+    try:
+        return np.asarray(np.linalg.inv(blocks))
+    except np.linalg.LinAlgError:
+        return np.full_like(blocks, np.nan)
+
+
+def weakest(blocks: Array) -> int:
+    """Number of the matrix of (n, k, k) that is closest to singular."""
+    sizes = np.abs(blocks).max(axis=(1, 2), initial=0.0)
+    return int(np.argmin(np.abs(np.linalg.det(blocks / np.maximum(sizes, 1e-300)[:, None, None]))))

@@ -19,7 +19,7 @@ from softehl import Mesh, Study
 from softehl.runtime.arrays import Array
 from softehl.runtime.mpi import world
 from softehl.runtime.result import Result
-from tests.mpi.problems import DOCS, STEEL
+from tests.mpi.problems import DOCS, STEEL, thick
 
 SIZE = (1.0, 1.3, 0.7)
 SHAPES = {
@@ -125,6 +125,9 @@ def solved(name: str, folder: Path) -> dict[str, Any]:
         parts = two(Mesh.read(GMSH, spread=True)).solve(engine="petsc")
         whole = two(Mesh.read(GMSH.with_name("parts_all.msh"))).solve()
         return compared(parts, whole, "hard", "left")
+    if name == "inner":
+        parts, whole = thick(4, spread=True).solve(engine="petsc"), thick(4).solve()
+        return compared(parts, whole, "body", "left")
     if name == "line":
         parts, whole = bar(spread=True).solve(engine="petsc"), bar(spread=False).solve()
         return compared(parts, whole, "body", "left")

@@ -106,6 +106,15 @@ def test_multigrid_by_options(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("processes", PROCESSES)
+def test_multigrid_sees_no_internal_unknowns(processes: int, tmp_path: Path) -> None:
+    """In the matrix they take 96 iterations."""
+    found, wanted = run("thick", processes, tmp_path), dict(serially("thick", tmp_path))
+    assert wanted.pop("krylov") == 0
+    assert 20 < found.pop("krylov") < 70
+    assert_equal(found, wanted, limit=1e-8)
+
+
+@pytest.mark.parametrize("processes", PROCESSES)
 def test_shell_matrices(processes: int, tmp_path: Path) -> None:
     found, wanted = run("pushed", processes, tmp_path), dict(serially("pushed"))
     assert 20 < found.pop("krylov") < 120

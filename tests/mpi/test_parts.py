@@ -32,7 +32,7 @@ def run(name: str, processes: int, folder: Path) -> dict[str, Any]:
     ("name", "processes"),
     [
         *(("hex", n) for n in PROCESSES),
-        *(("serendipity", 2), ("wedge", 3), ("tetrahedron", 2), ("line", 3)),
+        *(("serendipity", 2), ("wedge", 3), ("tetrahedron", 2), ("line", 3), ("inner", 3)),
         *((name, n) for name in ("files", "gmsh") for n in (2, 3)),
     ],
 )
