@@ -63,10 +63,11 @@ def _elements(system: System, block: Block, values: Mapping[str, Any]) -> Elemen
             "a page or the mass on cells, or write accelerations into the page"
         )
     nodes = block.nodes[:, :count]
-    centres = system.mesh.points[block.nodes].mean(axis=1)
-    density = datum(f"mass of {block.name}", "rho", values["rho"], centres)
-    if (density < 0.0).any():
-        raise StudyError(f"mass of {block.name!r}: rho = {density.min():g}, it cannot be negative")
+    centres = system.mesh.points[system.everywhere.blocks[block.name].nodes].mean(axis=1)
+    every = datum(f"mass of {block.name}", "rho", values["rho"], centres)
+    density = system.share.own_cells(block.name, every)
+    if (every < 0.0).any():
+        raise StudyError(f"mass of {block.name!r}: rho = {every.min():g}, it cannot be negative")
     ring = system.statement is not None and system.statement.ring
     cell, places = interpolation(block.kind, count), system.mesh.points[nodes]
     matrices = mass_matrices(cell, places, density, ring=ring)
@@ -101,7 +102,8 @@ def has_acceleration(system: System) -> bool:
 
 
 def mass_matrix(system: System, problem: Problem, x: Array, given: Masses | None) -> csc_array:
-    """M, (n, n), at unknowns x: of the densities, and of pages with accelerations.
+    """M, (n, n), at unknowns x: of the densities, and of pages with accelerations; of a system that
+    is spread over processes what the elements of this one add.
 
     Raises StudyError where there is none.
     """
@@ -115,7 +117,7 @@ def mass_matrix(system: System, problem: Problem, x: Array, given: Masses | None
         names = list(block.kernel.parameters)
         if PARAMETER in names and block.name in system.blocks:
             M = csc_array(M + _of_page(problem, block, x, names.index(PARAMETER)))
-    if not M.nnz:
+    if not system.share.largest(float(M.nnz)):
         raise StudyError(
             f"there is no mass: give densities, {_EXAMPLE}, or write accelerations into a page"
         )

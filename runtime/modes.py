@@ -55,10 +55,10 @@ def natural(
     _require_count(words, count)
     K = Tangent.at(problem, x, words).K
     M = mass_matrix(system, problem, x, mass)
-    free = Reduction.of(problem, K)
+    free = Reduction.of(problem)
     try:
         squares, found = lowest(
-            symmetric(free.matrix(K)), symmetric(free.matrix(M)), count, int(free.saddle.sum())
+            symmetric(free.matrix(K)), symmetric(free.matrix(M)), count, int(free.saddle(K).sum())
         )
     except (NoModes, SingularMatrix) as error:
         raise StudyError(f"{words}: {error}") from None
@@ -81,7 +81,7 @@ def buckled(
     h = _LENGTH * size / (float(np.abs(response).max()) or 1.0)
     ahead = Tangent.at(problem_at(t + h), x + h * response, words).K
     behind = Tangent.at(problem_at(t - h), x - h * response, words).K
-    free = Reduction.of(here.problem, here.K)
+    free = Reduction.of(here.problem)
     K, change = (symmetric(free.matrix(A)) for A in (here.K, (ahead - behind) / (2.0 * h)))
     try:
         factors, found = smallest_factors(K, change, count)

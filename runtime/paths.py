@@ -134,12 +134,13 @@ class Paths:
             raise StudyError("start and restart: give one of them, a result or a checkpoint")
         if method in METHODS:
             refused = {"tolerance": tolerance, "checkpoint": checkpoint, "restart": restart}
-            require_none(method, {**refused, "engine": None if engine == "serial" else engine})
+            require_none(method, refused)
         where = engine_of(engine, linear)
         if method in METHODS:
             system = where.spread(self.system())
             motions = Motions(method, dt, where.newton(system, newton), mass, velocity, rho_inf)
-            told = Telling(progress, True, "t", 0.0 if start is None else start.t, note_of(where))
+            begin = 0.0 if start is None else start.t
+            told = Telling(progress, system.share.first, "t", begin, note_of(where))
             found = motions.run(system, start, until)
             return watched(found, Watch(told.until(until), write))
         require_none(method, {"mass": mass, "velocity": velocity, "rho_inf": rho_inf})

@@ -8,14 +8,27 @@ something is asked of `Share`, so that all processes decide alike.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.reduction import Reduction
 
 T = TypeVar("T")
+
+
+class Free(Protocol):
+    """Free unknowns z of a problem: all change by T z; see `fem.reduction.Reduction`."""
+
+    def gather(self, forces: Array) -> Array:
+        """T' f of forces of the elements of this process: own sums over all."""
+        ...
+
+    def spread(self, z: Array) -> Array:
+        """T z at the unknowns of this process."""
+        ...
 
 
 class Share:
@@ -49,6 +62,30 @@ class Share:
     def whole_forces(self, forces: Array) -> Array:
         """Sums (n,) over all processes of what the elements of each add to every unknown."""
         return forces
+
+    def added(self, x: Array) -> Array:
+        """Sums over all processes, at the unknowns of this one, of what elements add to each."""
+        return x
+
+    def owned(self, size: int) -> Integers:
+        """Numbers of the process's own of so many unknowns: each is one process's own."""
+        return np.arange(size)
+
+    def total(self, values: Array) -> Array:
+        """Sums over processes."""
+        return values
+
+    def dot(self, a: Array, b: Array) -> float:
+        """Product of vectors of which each process has own values."""
+        return float(self.total(np.array([a @ b]))[0])
+
+    def free(self, problem: Problem) -> Free:
+        """What supports and ties leave free, of a problem that is not posed."""
+        return Reduction.of(problem)
+
+    def renewed(self) -> Share:
+        """The same distribution, for equations with other elements."""
+        return self
 
     def largest(self, value: float) -> float:
         """The largest of the numbers that the processes have."""

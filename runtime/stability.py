@@ -33,12 +33,12 @@ def negative_directions(problem: Any, x: Array) -> int | None:
         K = problem.assembler.linearise(x, problem.parameters)[1]
     if not np.isfinite(K.data).all() or not is_symmetric(K):
         return None
-    free = Reduction.of(problem, K)
+    free = Reduction.of(problem)
     try:
         pivots = Pivots.of(symmetric(free.matrix(K)))
     except SingularMatrix:
         return None
-    return max(pivots.negative - int(free.saddle.sum()), 0)
+    return max(pivots.negative - int(free.saddle(K).sum()), 0)
 
 
 def negative_by_factors(problem: Any, K: Any, factors: Any) -> int | None:

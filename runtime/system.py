@@ -125,7 +125,15 @@ class System:
         return after
 
     def problem(self, step: Step) -> Problem:
-        """The equations of a step.
+        """The equations of a step, as a solver sees them.
+
+        Raises StudyError as `part` does.
+        """
+        posed: Problem = self.share.posed(self.part(step))
+        return posed
+
+    def part(self, step: Step) -> Problem:
+        """The equations of a step, those of this process.
 
         Raises StudyError where prescribed values differ, or more was written down meanwhile.
         """
@@ -161,9 +169,7 @@ class System:
         if self.contacts:
             posed_on |= {"contacts": self.contacts, "old": step.old}
         kind = TouchingProblem if self.contacts else Problem
-        here = kind(assembler, layout, parameters, **posed_on)
-        posed: Problem = self.share.posed(here)
-        return posed
+        return kind(assembler, layout, parameters, **posed_on)
 
     def _data(self, page: Block, step: Step) -> Array | None:
         """Data of the elements of a page, (n, k), in the kernel's order."""

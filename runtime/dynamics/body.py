@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array
+from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Flags
 from softehl.runtime.dynamics.motion import Forces
@@ -16,13 +16,14 @@ from softehl.runtime.fem.averaged import Averaged, time_derivatives, with_old
 from softehl.runtime.fem.loads import Tie
 from softehl.runtime.fem.mass import Mass, lumped
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.reduction import Reduction
 from softehl.runtime.mass import Masses, mass_blocks, mass_matrix
-from softehl.runtime.solve.superlu import SuperLU
+from softehl.runtime.share import Share
+from softehl.runtime.solve.gradients import conjugate_gradients
 from softehl.runtime.statement.records import Block, StudyError
 from softehl.runtime.system import Step, System
 
 _BEFORE = "forces of the step before"
+_EXACT, _MOST = 1e-14, 1000  # of accelerations at the start; the mass is well conditioned
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +51,7 @@ class Body:
 
     plain: its equations without. moving: with elements of mass, and forces of the step before or
     averaged. M: consistent masses (n, n) at the start. lumps: (n,), of the explicit
-    scheme. heavy: unknowns with mass.
+    scheme; both are what elements of this process add. heavy: unknowns with mass.
     """
 
     plain: System
@@ -62,13 +63,13 @@ class Body:
     @classmethod
     def of(cls, system: System, mass: Masses | None, scheme: Scheme | None, at: Step) -> Body:
         """Raises StudyError where there is no mass, or where a rate belongs to none."""
-        problem, blocks = system.problem(at), mass_blocks(system, mass)
-        M = mass_matrix(system, problem, at.old, mass)
-        heavy = M.diagonal() > 0.0
+        problem, blocks = system.part(at), mass_blocks(system, mass)
+        share, M = system.share, mass_matrix(system, problem, at.old, mass)
+        heavy = share.added(M.diagonal()) > 0.0
         for block in system.blocks.values():
             for slot in block.rates.values():
                 numbers = system.numbering.nodal[slot.name]
-                if not heavy[numbers[numbers >= 0]].all():
+                if share.largest(float(not heavy[numbers[numbers >= 0]].all())):
                     raise StudyError(
                         f"{block.name!r} has a rate of {slot.name}, which has no mass everywhere: "
                         'give it one, or march by "euler" or "bdf2"'
@@ -76,19 +77,27 @@ class Body:
         own = list(system.assembler.blocks)
         if scheme is not None and scheme.averaged:
             own = [_averaged(b, system.blocks.get(b.name)) for b in own]
-        rows = np.flatnonzero(heavy)[:, None]
+        rows = share.owned(system.size)
+        rows = rows[heavy[rows]][:, None]
         before = ElementBlock(_BEFORE, _Known(), np.empty((0, 0)), rows, check_orientation=False)
         assembler = Assembler.build(system.size, [*own, *blocks, before])
         lumps = _lumped(system, M, blocks) if scheme is None else M.diagonal()
-        return cls(system, replace(system, assembler=assembler), M, lumps, heavy)
+        moving = replace(system, assembler=assembler, share=share.renewed())
+        return cls(system, moving, M, lumps, heavy)
+
+    @property
+    def share(self) -> Share:
+        """How its unknowns are spread over processes."""
+        return self.plain.share
 
     def problem(self, step: Step, place: float, before: Array) -> Problem:
         """Equations of a step that ends at step.t: loads of a place in it, supports of its end.
 
         before: (n,) forces that are added where there is mass.
         """
-        problem = self.moving.problem(replace(step, t=step.t - (1.0 - place) * step.dt))
-        end = problem if place == 1.0 else self.plain.problem(step)
+        before = self.share.added(before)
+        problem = self.moving.part(replace(step, t=step.t - (1.0 - place) * step.dt))
+        end = problem if place == 1.0 else self.plain.part(step)
         remainder = np.zeros(len(before)) if step.remainder is None else step.remainder
         blocks, parameters = [], dict(problem.parameters)
         for block in problem.assembler.blocks:
@@ -113,17 +122,22 @@ class Body:
 
     def at_end(self, step: Step, v: Array) -> Problem:
         """The plain equations at the end of a step, with velocities v, (n,)."""
-        return self.plain.problem(replace(step, rate=0.0, rest=v, acceleration=0.0, remainder=None))
+        return self.plain.part(replace(step, rate=0.0, rest=v, acceleration=0.0, remainder=None))
 
     def started(self, problem: Problem, x: Array) -> Array:
-        """Accelerations (n,) at the start x: M a = -f on what is free."""
-        free = Reduction.of(problem, problem.assembler.linearise(x, problem.parameters)[1])
-        M = free.matrix(self.M)
-        light = M.diagonal() <= 0.0
-        M = csc_array(M + diags_array(light.astype(np.float64)))
-        f = free.map.T @ Forces.of(problem, x).total
-        f[light] = 0.0
-        return np.asarray(free.map @ -SuperLU().factorise(M).solve(f))
+        """Accelerations (n,) at the start x: M a = -f on what is free.  Raises StudyError."""
+        free = self.share.free(problem)
+        diagonal = free.gather(self.M.diagonal())
+        inverse = 1.0 / np.where(diagonal > 0.0, diagonal, np.inf)
+        found = conjugate_gradients(
+            lambda z: free.gather(self.M @ free.spread(z)),
+            lambda r: inverse * r,
+            np.where(diagonal > 0.0, -free.gather(Forces.of(problem, x).total), 0.0),
+            *(_EXACT, _MOST, self.share.dot),
+        )
+        if not found.converged:
+            raise StudyError("the mass is not positive: no accelerations at the start are found")
+        return free.spread(found.x)
 
     def masked(self, values: Affine) -> Affine:
         """Zero in unknowns without mass, for their velocities and accelerations."""
@@ -153,14 +167,16 @@ def _lumped(system: System, M: csc_array, blocks: list[ElementBlock]) -> Array:
         m, components = block.kernel.matrices, block.kernel.components
         np.add.at(found, block.dofs, np.tile(lumped(m), (1, components)))
         np.add.at(consistent, block.dofs, np.tile(np.einsum("naa->na", m), (1, components)))
-    rest = M.diagonal() - consistent
-    if np.abs(rest).max(initial=0.0) <= 1e-12 * np.abs(M.diagonal()).max():
+    share, rest = system.share, M.diagonal() - consistent
+    most = share.largest(float(np.abs(M.diagonal()).max(initial=0.0)))
+    if share.largest(float(np.abs(rest).max(initial=0.0))) <= 1e-12 * most:
         return found
     total = np.asarray(M.sum(axis=1)).ravel()
     if blocks:
         raise StudyError("explicit: give all masses as mass=..., or all in pages, not both")
     for name in system.numbering.layout.names:
         part = system.numbering.layout.part(name)
-        if rest[part].any():
-            found[part] = rest[part] * total[part].sum() / rest[part].sum()
+        whole, known = share.total(np.array([total[part].sum(), rest[part].sum()])).tolist()
+        if known:
+            found[part] = rest[part] * whole / known
     return found

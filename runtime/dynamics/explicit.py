@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import diags_array
-from scipy.sparse.linalg import eigsh
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.dynamics.body import Body
@@ -15,8 +13,10 @@ from softehl.runtime.dynamics.implicit import Phase
 from softehl.runtime.dynamics.motion import Forces, Ledger, Motion, stored_energy
 from softehl.runtime.fem.loads import Tie
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.reduction import Reduction, symmetric
+from softehl.runtime.fem.reduction import symmetric
 from softehl.runtime.march import ROUNDING
+from softehl.runtime.share import Free
+from softehl.runtime.solve.eigen import highest
 from softehl.runtime.solve.solution import Branch, NotConverged, Point, Solution, Status
 from softehl.runtime.statement.records import StudyError
 
@@ -30,16 +30,18 @@ _APART = 1e-9  # of the size of the mesh: a tie that opens by more does not hold
 class Explicit:
     """Steps of at most SAFE times the stable one, which is looked at in each result.
 
-    dt: from result to result.
+    dt: from result to result. free: what supports and ties leave, and masses there.
     """
 
     dt: float
     body: Body
     here: Phase
+    free: Free
+    masses: Array
 
     def run(self, until: float) -> Iterator[Motion]:
         """Results every dt until the end.  Raises StudyError, NotConverged."""
-        body, ledger = self.body, Ledger()
+        body, ledger = self.body, Ledger(self.body.share)
         begin = body.at_end(self.here.step(self.here.t), self.here.v)
         self._told(begin, ledger)
         end, stable = begin, self._stable(begin)
@@ -55,9 +57,8 @@ class Explicit:
 
     def started(self, problem: Problem, until: float) -> Iterator[Motion]:
         """From rest or a state of which the accelerations are not known yet."""
-        self._require_masses()
         here = self.here
-        a = self._free(problem, Forces.of(problem, here.x).total)
+        a = self._accelerations(Forces.of(problem, here.x).total)
         self.here = Phase(here.t, here.x, here.v, a, here.histories)
         return self.run(until)
 
@@ -71,11 +72,12 @@ class Explicit:
         x[end.fixed] = end.values
         half[end.fixed] = (x - here.x)[end.fixed] / dt
         forces = Forces.of(end, x)
-        if not np.isfinite(forces.total).all():
-            words = f"t = {t:.6g}: the forces are not finite{end.where_not_finite(x)}"
+        if self.body.share.largest(float(not np.isfinite(forces.total).all())):
+            where = body.share.posed(end).where_not_finite(x)
+            words = f"t = {t:.6g}: the forces are not finite{where}"
             state = Solution(here.x, Status.NOT_FINITE, words, (), 0, 0)
             raise NotConverged(Branch((Point(here.t, state),), Status.NOT_FINITE, words))
-        a = self._free(end, forces.total)
+        a = self._accelerations(forces.total)
         moved = x - here.x
         old = Forces.of(before, here.x)
         parts = zip(vars(old).values(), vars(forces).values(), strict=True)
@@ -89,43 +91,22 @@ class Explicit:
         self.here = Phase(t, x, v, a, histories)
         return end
 
-    def _free(self, problem: Problem, forces: Array) -> Array:
+    def _accelerations(self, forces: Array) -> Array:
         """Accelerations (n,) of free unknowns; tied ones move as one."""
-        free = self._reduction(problem)
-        masses = free.map.T @ self.body.lumps
-        return np.asarray(free.map @ (-(free.map.T @ forces) / masses))
-
-    def _reduction(self, problem: Problem) -> Reduction:
-        return Reduction.of(problem, diags_array(np.ones(len(self.body.lumps))).tocsc())
+        return self.free.spread(-self.free.gather(forces) / self.masses)
 
     def _stable(self, problem: Problem) -> float:
         """2 over the highest frequency about the present state."""
-        K = problem.assembler.linearise(self.here.x, problem.parameters)[1]
-        free = self._reduction(problem)
-        root = diags_array(1.0 / np.sqrt(free.map.T @ self.body.lumps))
-        scaled = symmetric((root @ free.matrix(K) @ root).tocsc())
-        if scaled.shape[0] < 3:
-            highest = float(np.linalg.eigvalsh(scaled.toarray())[-1])
-        else:
-            begin = np.random.default_rng(0).uniform(-1.0, 1.0, scaled.shape[0])
-            found = eigsh(scaled, 1, which="LA", tol=_ACCURATE, v0=begin, return_eigenvectors=False)
-            highest = float(found[0])
-        return 2.0 / np.sqrt(highest) if highest > 0.0 else self.dt / SAFE
+        K = symmetric(problem.assembler.linearise(self.here.x, problem.parameters)[1])
+        free, root, share = self.free, 1.0 / np.sqrt(self.masses), self.body.share
 
-    def _require_masses(self) -> None:
-        """Raise StudyError where an unknown has no mass that needs one."""
-        system, ties = self.body.plain, np.zeros(len(self.body.lumps), dtype=bool)
-        for block in system.assembler.blocks:
-            if isinstance(block.kernel, Tie):
-                ties[block.dofs[:, 2]] = True
-        layout = system.numbering.layout
-        for name in layout.names:
-            part = layout.part(name)
-            if not (ties[part] | (self.body.lumps[part] > 0.0)).all():
-                raise StudyError(
-                    f'method = "explicit": {name} has no mass everywhere, and explicit steps are '
-                    "force over mass; an implicit method can do without"
-                )
+        def scaled(z: Array) -> Array:
+            forces: Array = K @ free.spread(root * z)
+            return root * free.gather(forces)
+
+        begin = np.random.default_rng(share.pieces[0]).uniform(-1.0, 1.0, len(root))
+        found = highest(scaled, begin, share.dot, _ACCURATE)
+        return 2.0 / np.sqrt(found) if found > 0.0 else self.dt / SAFE
 
     def _told(self, end: Problem, ledger: Ledger) -> dict[str, float]:
         kinetic = 0.5 * float(self.body.lumps @ self.here.v**2)
@@ -136,13 +117,33 @@ class Explicit:
         for block in end.assembler.blocks:
             if isinstance(block.kernel, Tie):
                 r = block.residual(here.x, end.parameters[block.name])[:, 2]
-                if np.abs(r).max(initial=0.0) > _APART * size:
+                apart = self.body.share.largest(float(np.abs(r).max(initial=0.0)))
+                if apart > _APART * size:
                     raise StudyError(
-                        f'{block.name}: opens by {np.abs(r).max():.3g}; method = "explicit" holds '
+                        f'{block.name}: opens by {apart:.3g}; method = "explicit" holds '
                         "ties of a constant offset, on no side of which a support moves"
                     )
         solution = Solution(here.x, Status.CONVERGED, f"{steps} steps", (), 0, 0)
+        posed = self.body.share.posed(end)
         return Motion(
-            *(self.body.plain, end, Point(here.t, solution), here.histories),
+            *(self.body.plain, posed, Point(here.t, solution), here.histories),
             v=here.v, a=here.a, energy=self._told(end, ledger), stable_step=stable,
         )  # fmt: skip
+
+
+def explicit(dt: float, body: Body, here: Phase, problem: Problem) -> Explicit:
+    """From a state.  Raises StudyError where an unknown has no mass that needs one."""
+    system, share = body.plain, body.share
+    without = share.added(body.lumps) <= 0.0
+    for block in problem.assembler.blocks:
+        if isinstance(block.kernel, Tie):
+            without[block.dofs[:, 2]] = False
+    layout = system.numbering.layout
+    for name in layout.names:
+        if share.largest(float(without[layout.part(name)].any())):
+            raise StudyError(
+                f'method = "explicit": {name} has no mass everywhere, and explicit steps are '
+                "force over mass; an implicit method can do without"
+            )
+    free = share.free(problem)
+    return Explicit(dt, body, here, free, free.gather(body.lumps))

@@ -47,7 +47,7 @@ class Implicit:
 
     def run(self, body: Body, begin: Phase, until: float) -> Iterator[Motion]:
         """Every converged step until the end.  Raises NotConverged."""
-        log, way = Record("t"), _Way(self, body, begin, until)
+        log, way = Record("t"), _Way(self, body, begin, until, Ledger(body.share))
         for _ in walk(way, StepRule(self.dt, SMALLEST * self.dt), log):
             log.points = log.points[-1:]
             if way.result is not None:
@@ -72,8 +72,8 @@ class _Way(Way):
     body: Body
     here: Phase
     until: float
+    ledger: Ledger
     result: Motion | None = None
-    ledger: Ledger = field(default_factory=Ledger)
     forces: Forces | None = None
     supports: Array = field(default_factory=lambda: np.empty(0))
     tried: _Tried | None = None
@@ -101,11 +101,11 @@ class _Way(Way):
         )
         assert self.forces is not None
         problem = self.body.problem(posed, scheme.place(), scheme.before() * self.forces.total)
-        newton = self.settings.newton
+        newton, asked = self.settings.newton, self.body.moving.share.posed(problem)
         with np.errstate(all="ignore"):
-            solution = newton.solve(problem, here.x + dt * here.v)
+            solution = newton.solve(asked, here.x + dt * here.v)
             if not solution.converged:  # it may be beyond what the body admits
-                solution = newton.solve(problem, here.x)
+                solution = newton.solve(asked, here.x)
         self.tried = _Tried(posed, problem)
         following = min(2.0 * dt, self.settings.dt) if solution.converged else 0.5 * dt
         return Trial(posed.t, solution, dt, following)
@@ -153,7 +153,7 @@ class _Way(Way):
 
     def _motion(self, end: Problem, phase: Phase, solution: Solution) -> Motion:
         point, energy = Point(phase.t, solution), self._energies(end)
-        system = self.body.plain
+        system, end = self.body.plain, self.body.share.posed(end)
         return Motion(system, end, point, phase.histories, v=phase.v, a=phase.a, energy=energy)
 
 

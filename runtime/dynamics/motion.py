@@ -14,6 +14,7 @@ from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import Kernel
 from softehl.runtime.names import listed, meant
 from softehl.runtime.result import Result
+from softehl.runtime.share import Share
 
 _EMPTY = np.empty(0)
 
@@ -43,7 +44,7 @@ class Motion(Result):
         return self._nodal(name, self.a)
 
     def _nodal(self, name: str, values: Array) -> Array:
-        nodal = self.system.numbering.nodal
+        nodal, values = self._whole.numbering.nodal, self.system.share.whole(values)
         if name not in nodal:
             raise KeyError(f"no unknown {name!r}{meant(name, nodal)}; at nodes: {listed(nodal)}")
         return np.where(nodal[name] >= 0, values[nodal[name]], np.nan)
@@ -51,7 +52,10 @@ class Motion(Result):
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """Forces on all unknowns, (n,) each: of loads, of what has an energy, and of all else."""
+    """Forces on all unknowns, (n,) each: of loads, of what has an energy, and of all else.
+
+    Where they are spread over processes, what the elements of this one add.
+    """
 
     loads: Array
     stored: Array
@@ -91,7 +95,7 @@ def has_energy(kernel: object) -> bool:
 
 
 def stored_energy(problem: Problem, x: Array) -> float:
-    """Energies of springs and pages at unknowns x, (n,)."""
+    """Energies of springs and pages of this process at unknowns x, (n,)."""
     found = 0.0
     for block in problem.assembler.blocks:
         kernel, u = block.kernel, x[block.dofs]
@@ -106,8 +110,12 @@ def stored_energy(problem: Problem, x: Array) -> float:
 
 @dataclass
 class Ledger:
-    """Energies of a march: work of loads and of forces without an energy, since the beginning."""
+    """Energies of a march: work of loads and of forces without an energy, since the beginning.
 
+    share: of the processes, of which each knows the work of its elements.
+    """
+
+    share: Share
     first: float = float("nan")
     external: float = 0.0
     others: float = 0.0
@@ -118,12 +126,14 @@ class Ledger:
         self.others += float(forces.others @ moved)
 
     def told(self, kinetic: float, stored: float) -> dict[str, float]:
-        """Energies now."""
-        internal = stored + self.others
+        """Energies now, of all processes."""
+        known = np.array([kinetic, stored, self.external, self.others])
+        kinetic, stored, external, others = self.share.total(known).tolist()
+        internal = stored + others
         if np.isnan(self.first):
             self.first = kinetic + internal
-        balance = kinetic + internal - self.first - self.external
+        balance = kinetic + internal - self.first - external
         return {
             **{"kinetic": kinetic, "internal": internal},
-            **{"external": self.external, "balance": balance},
+            **{"external": external, "balance": balance},
         }

@@ -151,6 +151,4 @@ def require_none(method: object, given: Mapping[str, object]) -> None:
     """Raise StudyError for an argument that the method does not have."""
     for name, value in given.items():
         if value is not None:
-            if name == "engine":
-                raise StudyError(f'method = "{method}": in one process only, engine = "serial"')
             raise StudyError(f'{name}: method = "{method}" has no such thing; leave it out')

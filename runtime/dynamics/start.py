@@ -10,7 +10,7 @@ import numpy as np
 from softehl.runtime.arrays import Array
 from softehl.runtime.begin import beginning
 from softehl.runtime.dynamics.body import Body
-from softehl.runtime.dynamics.explicit import Explicit
+from softehl.runtime.dynamics.explicit import explicit
 from softehl.runtime.dynamics.implicit import Implicit, Phase
 from softehl.runtime.dynamics.motion import Motion
 from softehl.runtime.dynamics.schemes import METHODS, scheme_of
@@ -46,13 +46,13 @@ class Motions:
         body = Body.of(system, self.mass, scheme, rest)
         problem = body.at_end(rest, v)
         x = problem.admissible(x)
-        soon = system.problem(Step(t + _MOMENT * self.dt, 1.0, x, 0.0, v, self.dt, histories))
+        soon = system.part(Step(t + _MOMENT * self.dt, 1.0, x, 0.0, v, self.dt, histories))
         v[problem.fixed] = (soon.values - problem.values) / (_MOMENT * self.dt)
         v[~body.heavy] = 0.0
         problem = body.at_end(Step(t, 1.0, x, 0.0, v, self.dt, histories), v)
         if scheme is None:
-            explicit = Explicit(self.dt, body, Phase(t, x, v, np.zeros_like(x), histories))
-            return explicit.started(problem, until)
+            here = Phase(t, x, v, np.zeros_like(x), histories)
+            return explicit(self.dt, body, here, problem).started(problem, until)
         begin = Phase(t, x, v, body.started(problem, x), histories)
         return Implicit(scheme, self.dt, self.newton).run(body, begin, until)
 

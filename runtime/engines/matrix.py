@@ -292,7 +292,7 @@ class Solver:
     near: Any = None
     fields: Mapping[str, Integers] = field(default_factory=dict)
     times: Times = field(default_factory=Times)
-    _ksp: Any = None
+    _ksp: Any = field(default=None, init=False, repr=False)
 
     def solve(self, tangent: Operator, r: Array) -> Array:
         """Local x of the matrix for own values r, both of `rows`.

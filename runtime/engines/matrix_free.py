@@ -27,6 +27,7 @@ from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import System
 
 _WHO = 'linear = "matrix-free"'
+NO_INERTIA = f"{_WHO}: inertia has no such products; leave linear out"
 
 TOLERANCE = 1e-4
 """Of linear solutions.  Iterations of a whole load step for 1e-6, 1e-5, 1e-4, 1e-3, all of which
@@ -101,6 +102,10 @@ class _Alone(Share):
 
     def __init__(self, levels: Levels, iteration: Iteration) -> None:
         self.levels, self.iteration = levels, iteration
+
+    def renewed(self) -> Share:
+        """See `Share`.  Raises StudyError."""
+        raise StudyError(NO_INERTIA)
 
     def posed(self, problem: Problem) -> Matrixless:
         """See `Share`."""

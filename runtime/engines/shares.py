@@ -9,10 +9,13 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.engines.exchange import largest, total
+from softehl.runtime.engines.matrix_free import NO_INERTIA
+from softehl.runtime.engines.reduced import Reduced
 from softehl.runtime.engines.spread import Spread, Team
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mpi import world
 from softehl.runtime.share import Share
+from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import System
 
 T = TypeVar("T")
@@ -63,6 +66,29 @@ class Processes(Share):
         own = self.team.exchange.added(forces)
         return _gathered(own, part.unknowns[part.owned], self._whole.size)
 
+    def added(self, x: Array) -> Array:
+        """See `Share`."""
+        exchange = self.team.exchange
+        return exchange.copied(exchange.added(x))
+
+    def owned(self, size: int) -> Integers:
+        """See `Share`."""
+        return self.team.part.owned
+
+    def total(self, values: Array) -> Array:
+        """See `Share`."""
+        return total(values)
+
+    def free(self, problem: Problem) -> Reduced:
+        """See `Share`."""
+        return Reduced.of(problem, self.team.part, self.team.exchange)
+
+    def renewed(self) -> Share:
+        """See `Share`.  Raises StudyError without matrices."""
+        if self.team.levels is not None:
+            raise StudyError(NO_INERTIA)
+        return type(self)(self.team.renewed())
+
     def largest(self, value: float) -> float:
         """See `Share`."""
         return largest(value)
@@ -98,8 +124,7 @@ class Parts(Processes):
 
     def whole_forces(self, forces: Array) -> Array:
         """See `Share`: sums at the unknowns of the part."""
-        exchange = self.team.exchange
-        return exchange.copied(exchange.added(forces))
+        return self.added(forces)
 
     def norm(self, x: Array) -> float:
         """See `Share`."""

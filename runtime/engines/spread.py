@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,11 @@ class Team:
     tangent: Operator | None = None
     reach: Array = field(default_factory=lambda: np.empty(0))
     counts: Array = field(default_factory=lambda: np.empty(0))
+
+    def renewed(self) -> Team:
+        """For other elements on the same unknowns."""
+        given = self.part, self.exchange, self.outer, self.interleaved
+        return Team(*given, replace(self.solver))
 
     def tangent_of(self, problem: Problem) -> Operator:
         """The matrix for the prescribed unknowns of a problem, or a new shell."""
@@ -195,7 +200,7 @@ class Spread:
         for block in self.problem.assembler.blocks:
             results = block.tangent(x, self.parameters[block.name])
             rows = rows_not_finite(*results)
-            if len(rows) and not words:
+            if len(rows) and not words and block.name in part.elements:
                 whole = part.system.everywhere.assembler.block(block.name)
                 words = element_name(whole, int(part.elements[block.name][rows[0]]))
         return _first(words)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
-from softehl.runtime.arrays import Flags, Integers
+from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.fem.loads import Tie
 from softehl.runtime.fem.problem import Problem
 
@@ -20,16 +20,15 @@ SYMMETRIC = 1e-8
 class Reduction:
     """Changes of all unknowns (n,) that supports and ties admit, T z with z (m,).
 
-    map: T, (n, m), of zeros and ones. saddle: (m,) unknowns in which the energy is not convex but
-    concave, by nature: pressures and other multipliers.
+    problem: of which. map: T, (n, m), of zeros and ones.
     """
 
+    problem: Problem
     map: csr_array
-    saddle: Flags
 
     @classmethod
-    def of(cls, problem: Problem, K: csc_array) -> Reduction:
-        """Of a problem and its tangent (n, n) before supports are eliminated."""
+    def of(cls, problem: Problem) -> Reduction:
+        """Of a problem."""
         n, ties = problem.assembler.size, [np.empty((0, 3), dtype=np.int64)]
         ties += [b.dofs for b in problem.assembler.blocks if isinstance(b.kernel, Tie)]
         a, b, multipliers = np.concatenate(ties).T
@@ -41,9 +40,21 @@ class Reduction:
         rows = np.flatnonzero(~held[group])
         columns = number[group[rows]]
         found = csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, int((~held).sum())))
-        saddle = np.zeros(found.shape[1], dtype=bool)
-        saddle[columns] = concave(problem, K)[rows]
-        return cls(found, saddle)
+        return cls(problem, found)
+
+    def gather(self, forces: Array) -> Array:
+        """T' f, (m,)."""
+        return np.asarray(self.map.T @ forces)
+
+    def spread(self, z: Array) -> Array:
+        """T z, (n,)."""
+        return np.asarray(self.map @ z)
+
+    def saddle(self, K: csc_array) -> Flags:
+        """Unknowns (m,) in which the energy is not convex but concave, by nature: pressures and
+        other multipliers. K: the tangent (n, n) before supports are eliminated.
+        """
+        return self.gather(concave(self.problem, K).astype(np.float64)) > 0.0
 
     def matrix(self, K: csc_array) -> csc_array:
         """T' K T, (m, m)."""

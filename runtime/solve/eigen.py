@@ -5,10 +5,12 @@ ARPACK (through SciPy) finds them by shift and inverse; SuperLU has the factors.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigh_tridiagonal
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse import linalg as sparse_linalg
 
@@ -171,6 +173,30 @@ def nearest_zero(K: csc_array) -> tuple[float, Array]:
     begin = np.random.default_rng(0).uniform(-1.0, 1.0, n)
     values, vectors = sparse_linalg.eigsh(K, 1, sigma=shift, OPinv=inverse, v0=begin)
     return float(values[0]), signed(vectors.T)[0]
+
+
+def highest(
+    apply: Callable[[Array], Array],
+    begin: Array,
+    dot: Callable[[Array, Array], float],
+    accuracy: float,
+) -> float:
+    """The highest eigenvalue of a symmetric operator, by Lanczos' method, to a relative accuracy.
+
+    begin: a random vector (n,). dot: of two vectors, which may be spread over processes.
+    """
+    v, before = begin / np.sqrt(dot(begin, begin)), np.zeros_like(begin)
+    alphas, betas = list[float](), list[float]()
+    while True:
+        w = apply(v) - (betas[-1] if betas else 0.0) * before
+        alphas.append(dot(w, v))
+        w -= alphas[-1] * v
+        betas.append(float(np.sqrt(dot(w, w))))
+        values, vectors = eigh_tridiagonal(np.array(alphas), np.array(betas[:-1]))
+        top = float(values[-1])
+        if betas[-1] * abs(vectors[-1, -1]) <= accuracy * abs(top):
+            return top
+        before, v = v, w / betas[-1]
 
 
 def signed(vectors: Array) -> Array:

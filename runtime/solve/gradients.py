@@ -29,24 +29,30 @@ class Found:
 
 
 def conjugate_gradients(
-    apply: Apply, precondition: Apply, b: Array, tolerance: float, most: int
+    apply: Apply,
+    precondition: Apply,
+    b: Array,
+    tolerance: float,
+    most: int,
+    dot: Callable[[Array, Array], float] = np.dot,
 ) -> Found:
     """x of A x = b from zero, until the residual is `tolerance` times b.
 
-    A is symmetric; where it turns out to be indefinite, that is the end.
+    A is symmetric; where it turns out to be indefinite, that is the end. dot: of two vectors, where
+    they are spread over processes.
     """
     x, r = np.zeros_like(b), b.copy()
-    target = tolerance * float(np.linalg.norm(b))
+    target = tolerance * float(np.sqrt(dot(b, b)))
     p, before = np.zeros_like(b), 1.0
     for k in range(most):
-        if float(np.linalg.norm(r)) <= target:
+        if float(np.sqrt(dot(r, r))) <= target:
             return Found(x, k, converged=True)
         z = precondition(r)
-        product = float(r @ z)
+        product = float(dot(r, z))
         p *= product / before
         p += z
         Ap = apply(p)
-        curvature = float(p @ Ap)
+        curvature = float(dot(p, Ap))
         if not curvature > 0.0 or not product > 0.0:
             return Found(x if k else z, k + 1, converged=False, negative=curvature <= 0.0)
         x += product / curvature * p

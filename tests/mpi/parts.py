@@ -17,6 +17,7 @@ import numpy as np
 
 from softehl import Mesh, Study
 from softehl.runtime.arrays import Array
+from softehl.runtime.dynamics.motion import Motion
 from softehl.runtime.mpi import world
 from softehl.runtime.result import Result
 from tests.mpi.problems import DOCS, STEEL, thick
@@ -128,6 +129,15 @@ def solved(name: str, folder: Path) -> dict[str, Any]:
     if name == "inner":
         parts, whole = thick(4, spread=True).solve(engine="petsc"), thick(4).solve()
         return compared(parts, whole, "body", "left")
+    if name == "motion":
+        given: dict[str, Any] = {"method": "newmark", "mass": {"body": {"rho": 1.0}}}
+        *_, moved = thick(4, spread=True).march(dt=0.3, until=0.9, engine="petsc", **given)
+        *_, end = thick(4).march(dt=0.3, until=0.9, **given)
+        assert isinstance(moved, Motion)
+        assert isinstance(end, Motion)
+        told = compared(moved, end, "body", "left")
+        told["apart"]["energy"] = _dicts(moved.energy, end.energy)
+        return told
     if name == "line":
         parts, whole = bar(spread=True).solve(engine="petsc"), bar(spread=False).solve()
         return compared(parts, whole, "body", "left")

@@ -21,6 +21,8 @@ import softehl
 from softehl import Mesh, Study
 from softehl.codegen.language.fields import Fields
 from softehl.runtime.arrays import Array
+from softehl.runtime.dynamics.motion import Motion
+from softehl.runtime.dynamics.schemes import METHODS
 from softehl.runtime.engines.petsc import Petsc
 from softehl.runtime.fem.loads import Amount
 from softehl.runtime.result import Result
@@ -121,6 +123,43 @@ def warm(cells: int = 40) -> Study:
     return study
 
 
+@softehl.page
+def moving(m: Fields) -> None:
+    """Compressible neo-Hooke with its inertia."""
+    u = m.vector("u")
+    rho, mu, lam = m.parameters(rho="density", mu="shear modulus", lam="Lame's constant")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    m.minimise(mu / 2 * ((F.T * F).trace() - 3) - mu * sp.log(J) + lam / 2 * sp.log(J) ** 2)
+    m.weak(rho * m.rate(u, order=2), u)
+
+
+def swinging(method: str, engine: Any) -> dict[str, float]:
+    """A tied strip on springs that is thrown and pressed, and a beam with inertia of its page."""
+    push: dict[str, Any] = {"u_r": lambda x: 0.3 * (x[:, 1] - 5.0)}
+    rho = np.linspace(0.5, 1.5, 72)
+    mass = {"body": {"rho": rho, "of": ["u_z", "u_r"]}}
+    given: dict[str, Any] = {"method": method, "engine": engine}
+    *_, strip = tied().march(dt=0.1, until=0.3, mass=mass, velocity=push, **given)
+    study = Study(Mesh.rectangle(4.0, 1.0, cells=(6, 2)))
+    study.add("body", moving, rho=1.0, mu=1.0, lam=2.0)
+    study.fix("left", u_x=0, u_y=lambda x, t: np.full(len(x), 0.01 * t))
+    *_, beam = study.march(dt=0.2, until=0.6, velocity={"u_y": lambda x: 0.02 * x[:, 0]}, **given)
+    *_, beam = study.march(dt=0.2, until=1.0, start=beam, **given)
+    found: dict[str, float] = {}
+    for name, result in (("strip", strip), ("beam", beam)):
+        assert isinstance(result, Motion)
+        kinds = numbers(result, "body")
+        known = list(result.system.everywhere.numbering.nodal)
+        rates = {n: float(np.abs(result.velocity(n)).sum()) for n in known}
+        rates |= {f"{n}, second": float(np.abs(result.acceleration(n)).sum()) for n in known}
+        every = {**kinds, **rates, **result.energy}
+        if method == "explicit":
+            every["stable"] = result.stable_step
+        found |= {f"{method}, {name}, {key}": value for key, value in every.items()}
+    return found
+
+
 def condensed() -> Study:
     """A cantilever of enhanced quadrilaterals, whose modes are unknowns of single elements."""
     mesh = Mesh.rectangle(4.0, 1.0, cells=(10, 4)).map(_skewed)
@@ -198,6 +237,8 @@ def solved(name: str, engine: Any, folder: Path) -> dict[str, Any]:
         result = pushed().solve(engine=engine)
         krylov = engine.times.iterations if isinstance(engine, Petsc) else 0
         return {**numbers(result, "body"), "krylov": krylov}
+    if name == "swinging":
+        return {k: v for method in METHODS for k, v in swinging(method, engine).items()}
     if name in ("march", "restart", "slow"):
         return _marched(name, engine, folder)
     if name == "split":

@@ -68,9 +68,9 @@ def serially(name: str) -> dict[str, Any]:
 def assert_equal(found: dict[str, Any], expected: dict[str, Any], limit: float = 1e-10) -> None:
     """All numbers, relative to the largest of their kind."""
     assert found.keys() == expected.keys()
-    size = max(abs(value) for name, value in expected.items() if name.startswith("force"))
+    size = max(abs(value) for name, value in expected.items() if "force" in name)
     for name, value in expected.items():
-        scale = max(size if name.startswith("force") else abs(value), 1e-3)
+        scale = max(size if "force" in name else abs(value), 1e-3)
         assert abs(found[name] - value) <= limit * scale, (name, found[name], value)
 
 
@@ -94,6 +94,17 @@ def test_any_number_of_processes_gives_what_one_gives(
     assert_equal(run(name, processes, tmp_path), serially(name))
 
 
+@pytest.mark.parametrize("processes", PROCESSES)
+def test_motions(processes: int, tmp_path: Path) -> None:
+    """By all methods, tied, with densities and with inertia of a page; the stable step comes from
+    Lanczos' method, which ends at 1e-3 and begins differently.
+    """
+    found, wanted = run("swinging", processes, tmp_path), dict(serially("swinging"))
+    for name in [name for name in wanted if name.endswith("stable")]:
+        assert found.pop(name) == pytest.approx(wanted.pop(name), rel=2e-3)
+    assert_equal(found, wanted, limit=1e-8)
+
+
 def test_another_problem_is_seen() -> None:
     with pytest.raises(AssertionError):
         assert_equal(serially("contact"), {**serially("contact"), "norm": 1.0})
@@ -108,7 +119,7 @@ def test_multigrid_by_options(tmp_path: Path) -> None:
 @pytest.mark.parametrize("processes", PROCESSES)
 def test_multigrid_sees_no_internal_unknowns(processes: int, tmp_path: Path) -> None:
     """In the matrix they take 96 iterations."""
-    found, wanted = run("thick", processes, tmp_path), dict(serially("thick", tmp_path))
+    found, wanted = run("thick", processes, tmp_path), dict(serially("thick"))
     assert wanted.pop("krylov") == 0
     assert 20 < found.pop("krylov") < 70
     assert_equal(found, wanted, limit=1e-8)

@@ -33,7 +33,7 @@ def run(name: str, processes: int, folder: Path) -> dict[str, Any]:
     [
         *(("hex", n) for n in PROCESSES),
         *(("serendipity", 2), ("wedge", 3), ("tetrahedron", 2), ("line", 3), ("inner", 3)),
-        *((name, n) for name in ("files", "gmsh") for n in (2, 3)),
+        *((name, n) for name in ("motion", "files", "gmsh") for n in (2, 3)),
     ],
 )
 def test_parts_give_what_the_whole_gives(name: str, processes: int, tmp_path: Path) -> None:

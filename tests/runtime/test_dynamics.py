@@ -240,7 +240,6 @@ def test_a_march_goes_on_from_a_motion() -> None:
         ({"method": "newmark", "mass": MASS, "velocity": {"u_a": 1.0}}, "velocity has no unknown"),
         ({"method": "newmark", "mass": MASS, "tolerance": 1e-3}, "tolerance: .* leave it out$"),
         ({"method": "bdf2", "mass": MASS}, "mass: method = .bdf2. has no such thing"),
-        ({"method": "newmark", "mass": MASS, "engine": "petsc"}, "in one process only"),
         ({"method": "newmark", "mass": MASS, "until": -1.0}, "must be positive"),
     ],
 )

@@ -162,6 +162,9 @@ def test_what_it_cannot_solve_is_refused() -> None:
         study.solve(linear="gamg")  # type: ignore[arg-type]
     with pytest.raises(StudyError, match="is allowed, or leave engine out"):
         study.solve(linear="matrix-free", engine="serial")
+    mass = {"body": {"rho": 1}}
+    with pytest.raises(StudyError, match="inertia has no such products; leave linear out"):
+        list(study.march(dt=1, until=1, method="newmark", mass=mass, linear="matrix-free"))
     triangles = Study(Mesh.rectangle(1, 1, cells=(2, 2), shape="triangle"))
     triangles.add("body", solid, mu=1, lam=1)
     with pytest.raises(StudyError, match="on quadrilaterals and hexahedra"):
