@@ -42,6 +42,7 @@ def linear_buckling(system: System, start: Beginning, count: int, newton: Newton
         solution = newton.solve(problem, x0)
     if not solution.converged:
         raise NotConverged(solution)
-    state = Result(system, problem, Point(t, solution), histories)
-    factors, modes = buckled(system, problem_at, t, solution.x, count)
+    point = Point(t, solution)
+    state = Result(system, problem, point, histories)
+    factors, modes = buckled(system, problem_at, point, count, newton)
     return Buckling(factors, tuple(Shape.of(state, mode) for mode in modes))

@@ -50,6 +50,21 @@ def petsc() -> Any:
     return PETSc
 
 
+@cache
+def slepc() -> Any:
+    """The module slepc4py.SLEPc.  Raises MissingPetsc where it is not installed."""
+    petsc()
+    try:
+        import slepc4py
+    except ImportError as error:
+        raise MissingPetsc(
+            f'eigenvalues with engine = "petsc": {error}; install slepc4py, which the extra `mpi` '
+            "brings on Python 3.12 or newer"
+        ) from None
+    slepc4py.init()
+    return importlib.import_module("slepc4py.SLEPc")
+
+
 def _bundled() -> None:
     """Let the wheel that brings PETSc, MPI and mpiexec put its libraries in order, if it is one."""
     try:

@@ -214,15 +214,21 @@ class Paths:
         return periodic(self._statement, self.system(), pairs, tolerance)
 
     def buckling(
-        self, count: int = 1, *, start: Result | None = None, newton: Newton | None = None
+        self,
+        count: int = 1,
+        *,
+        start: Result | None = None,
+        newton: Newton | None = None,
+        engine: AnyEngine = None,
     ) -> Buckling:
         """The smallest load factors of linear buckling, and their modes.
 
         The tangent at rest, or at the load of `start` (a result), changes as along the linear
         response to loads and prescribed values that grow in proportion; where it becomes singular
-        is a factor. Closer to the truth from a start near by. Raises StudyError, NotConverged.
+        is a factor. Closer to the truth from a start near by. engine: as in `solve`. Raises
+        StudyError, NotConverged.
         """
-        where = engine_of(None)
+        where = engine_of(engine)
         system = where.spread(self.system())
         return linear_buckling(
             system, beginning(system, start), count, where.newton(system, newton)

@@ -11,10 +11,12 @@ from collections.abc import Mapping
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
+from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.reduction import Reduction
+from softehl.runtime.fem.reduction import Reduction, symmetric
+from softehl.runtime.solve.eigen import lowest, smallest_factors
 
 T = TypeVar("T")
 
@@ -82,6 +84,33 @@ class Share:
     def free(self, problem: Problem) -> Free:
         """What supports and ties leave free, of a problem that is not posed."""
         return Reduction.of(problem)
+
+    def part(self, posed: Any) -> Problem:
+        """Of what `posed` gave, the equations of this process."""
+        found: Problem = posed
+        return found
+
+    def lowest(
+        self, problem: Problem, K: csc_array, M: csc_array, count: int
+    ) -> tuple[Array, Array]:
+        """Lowest eigenvalues (count,) of K x = w M x and vectors (count, n): `eigen.lowest`.
+
+        problem: whose supports and ties hold. K, M: (n, n), of the elements of this process.
+        """
+        free = Reduction.of(problem)
+        given = symmetric(free.matrix(K)), symmetric(free.matrix(M))
+        values, found = lowest(*given, count, int(free.saddle(K).sum()))
+        return values, np.asarray((free.map @ found.T).T)
+
+    def buckling(
+        self, problem: Problem, K: csc_array, G: csc_array, count: int
+    ) -> tuple[Array, Array]:
+        """Smallest positive f of (K + f G) x = 0, and vectors: `eigen.smallest_factors`."""
+        free = Reduction.of(problem)
+        factors, found = smallest_factors(
+            symmetric(free.matrix(K)), symmetric(free.matrix(G)), count
+        )
+        return factors, np.asarray((free.map @ found.T).T)
 
     def renewed(self) -> Share:
         """The same distribution, for equations with other elements."""

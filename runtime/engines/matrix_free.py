@@ -103,6 +103,10 @@ class _Alone(Share):
     def __init__(self, levels: Levels, iteration: Iteration) -> None:
         self.levels, self.iteration = levels, iteration
 
+    def part(self, posed: Matrixless) -> Problem:
+        """See `Share`."""
+        return posed.problem
+
     def renewed(self) -> Share:
         """See `Share`.  Raises StudyError."""
         raise StudyError(NO_INERTIA)

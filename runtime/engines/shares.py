@@ -6,13 +6,16 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
+from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.engines.exchange import largest, total
 from softehl.runtime.engines.matrix_free import NO_INERTIA
 from softehl.runtime.engines.reduced import Reduced
+from softehl.runtime.engines.slepc import Pencil
 from softehl.runtime.engines.spread import Spread, Team
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.reduction import concave
 from softehl.runtime.mpi import world
 from softehl.runtime.share import Share
 from softehl.runtime.statement.records import StudyError
@@ -82,6 +85,25 @@ class Processes(Share):
     def free(self, problem: Problem) -> Reduced:
         """See `Share`."""
         return Reduced.of(problem, self.team.part, self.team.exchange)
+
+    def part(self, posed: Spread) -> Problem:
+        """See `Share`."""
+        return posed.problem
+
+    def lowest(
+        self, problem: Problem, K: csc_array, M: csc_array, count: int
+    ) -> tuple[Array, Array]:
+        """See `Share`."""
+        free = self.free(problem)
+        rising = concave(problem, K, self.added, lambda here: bool(largest(float(here))))
+        negative = total(np.array([(free.gather(rising.astype(np.float64)) > 0.0).sum()]))
+        return Pencil(free, K, M).lowest(count, int(negative[0]))
+
+    def buckling(
+        self, problem: Problem, K: csc_array, G: csc_array, count: int
+    ) -> tuple[Array, Array]:
+        """See `Share`."""
+        return Pencil(self.free(problem), K, G).factors(count)
 
     def renewed(self) -> Share:
         """See `Share`.  Raises StudyError without matrices."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,25 +62,32 @@ class Reduction:
         return csc_array(self.map.T @ K @ self.map)
 
 
-def concave(problem: Problem, K: csc_array) -> Flags:
+def concave(
+    problem: Problem,
+    K: csc_array,
+    added: Callable[[Array], Array] = np.asarray,
+    anywhere: Callable[[bool], bool] = bool,
+) -> Flags:
     """Unknowns (n,) of the fields no diagonal entry of which is positive, without fixed ones.
 
     One that is coupled to no other field is no multiplier, it is unstable, where its pages have
-    energies; the sign of an equation that a page writes down itself says nothing.
+    energies; the sign of an equation that a page writes down itself says nothing. added, anywhere:
+    sums over processes that have a part each, and whether something is true on any.
     """
     layout, fixed = problem.layout, problem.fixed
     found: Flags = np.zeros(layout.total, dtype=bool)
     free = ~found
     free[fixed] = False
-    diagonal = K.diagonal()
+    diagonal = added(K.diagonal())
     for part in layout.fields:
-        own, held = diagonal[part], not free[part].any()
-        found[part] = bool((own < 0.0).all() if held else (own[free[part]] <= 0.0).all())
-    others = abs(K) @ (~found).astype(np.float64)  # a fixed unknown is no other field
+        own, held = diagonal[part], not anywhere(bool(free[part].any()))
+        convex = (own >= 0.0).any() if held else (own[free[part]] > 0.0).any()
+        found[part] = not anywhere(bool(convex))
+    others = added(abs(K) @ (~found).astype(np.float64))  # a fixed unknown is no other field
     found[fixed] = False
     others[_written(problem)] = 1.0
     for part in layout.fields:
-        if not others[part].any():
+        if not anywhere(bool(others[part].any())):
             found[part] = False
     return found
 

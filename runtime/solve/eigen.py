@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse import linalg as sparse_linalg
 
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.solve.linear import SingularMatrix
 from softehl.runtime.solve.ordering import without_zeros
 
@@ -74,11 +74,15 @@ def lowest(K: csc_array, M: csc_array, count: int, saddle: int = 0) -> tuple[Arr
     eigenvalues that K has by nature, in multipliers without mass. Vectors have x' M x = 1. Raises
     NoModes, SingularMatrix.
     """
-    heavy = int((M.diagonal() > 0.0).sum())
-    if not 0 < count < heavy:
-        raise NoModes(f"{count} modes: from 1 to {heavy - 1} are possible here")
-    shift, pivots = _below(K, M, saddle)
-    n = K.shape[0]
+    n, held = K.shape[0], M.diagonal() > 0.0
+    heavy = int(held.sum())
+    require_count(count, heavy)
+    shift, pivots = below(
+        lambda shift: Pivots.of(csc_array(K - shift * M)),
+        lambda pivots: _nearly_singular(pivots, K),
+        float(np.abs(K.diagonal()[held] / M.diagonal()[held]).max()),
+        saddle,
+    )
     inverse = sparse_linalg.LinearOperator((n, n), matvec=pivots.solve, dtype=np.float64)
     begin = pivots.solve(M @ np.random.default_rng(0).uniform(-1.0, 1.0, n))
     try:
@@ -94,20 +98,43 @@ def lowest(K: csc_array, M: csc_array, count: int, saddle: int = 0) -> tuple[Arr
     return values[order], signed(shapes / sizes[:, None])
 
 
-def _below(K: csc_array, M: csc_array, saddle: int) -> tuple[float, Pivots]:
-    """A shift w below all eigenvalues, zero if it can be, and factors of K - w M."""
-    ratio = K.diagonal()[M.diagonal() > 0.0] / M.diagonal()[M.diagonal() > 0.0]
+def require_count(count: int, heavy: int) -> None:
+    """Raise NoModes where so many unknowns with mass have no so many modes."""
+    if not 0 < count < heavy:
+        raise NoModes(f"{count} modes: from 1 to {heavy - 1} are possible here")
+
+
+class Counted(Protocol):
+    """Factors that know how many eigenvalues are negative."""
+
+    @property
+    def negative(self) -> int:
+        """See `Pivots`."""
+        ...
+
+
+P = TypeVar("P", bound=Counted)
+
+
+def below(
+    pivots_of: Callable[[float], P], singular: Callable[[P], bool], ratio: float, saddle: int
+) -> tuple[float, P]:
+    """A shift w below all eigenvalues, zero if it can be, and factors of K - w M.
+
+    singular: tells of factors of K whether it nearly is. ratio: largest of the diagonals. saddle:
+    see `lowest`. Raises NoModes.
+    """
     shift, reason = 0.0, ""
     for k in range(_SHIFTS + 1):
         try:
-            pivots = Pivots.of(csc_array(K - shift * M))
-            singular = k == 0 and _nearly_singular(pivots, K)
-            if pivots.negative == saddle and not singular:
+            pivots = pivots_of(shift)
+            near = k == 0 and singular(pivots)
+            if pivots.negative == saddle and not near:
                 return shift, pivots
             reason = f"{pivots.negative - saddle} eigenvalues below {shift:.3g}"
         except SingularMatrix as error:
             reason = str(error)
-        shift = -_SMALL_SHIFT * 100.0**k * float(np.abs(ratio).max())
+        shift = -_SMALL_SHIFT * 100.0**k * ratio
     raise NoModes(f"no shift below all eigenvalues was found: {reason}")
 
 
@@ -145,12 +172,21 @@ def smallest_factors(K: csc_array, G: csc_array, count: int) -> tuple[Array, Arr
         )
     except sparse_linalg.ArpackError as error:
         raise NoModes(f"{count} buckling factors: {error}") from error
+    factors_found, order = buckling_factors(inverse)
+    shapes = signed(vectors[:, order].real.T)
+    return factors_found, shapes / np.abs(shapes).max(axis=1, keepdims=True)
+
+
+def buckling_factors(inverse: Any) -> tuple[Array, Integers]:
+    """Positive factors, rising, of which these complex numbers are the inverses; and their places.
+
+    Raises NoModes where there are none.
+    """
     real = np.flatnonzero((inverse.real > 0.0) & (np.abs(inverse.imag) <= 1e-6 * inverse.real))
     if not len(real):
         raise NoModes("no factor of these loads buckles it: they pull, or nothing is slender")
     order = real[np.argsort(-inverse.real[real])]
-    shapes = signed(vectors[:, order].real.T)
-    return 1.0 / inverse.real[order], shapes / np.abs(shapes).max(axis=1, keepdims=True)
+    return 1.0 / inverse.real[order], order
 
 
 def nearest_zero(K: csc_array) -> tuple[float, Array]:

@@ -134,6 +134,16 @@ def moving(m: Fields) -> None:
     m.weak(rho * m.rate(u, order=2), u)
 
 
+@softehl.page
+def mixed(m: Fields) -> None:
+    """Neo-Hooke with a pressure of lower order."""
+    u, p = m.vector("u"), m.scalar("p", order=1)
+    mu, K = m.parameters(mu="shear modulus", K="bulk modulus")
+    F = m.deformation_gradient(u)
+    J = m.define("J", F.det())
+    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + p * (J - 1) - p**2 / (2 * K))
+
+
 def swinging(method: str, engine: Any) -> dict[str, float]:
     """A tied strip on springs that is thrown and pressed, and a beam with inertia of its page."""
     push: dict[str, Any] = {"u_r": lambda x: 0.3 * (x[:, 1] - 5.0)}
@@ -158,6 +168,39 @@ def swinging(method: str, engine: Any) -> dict[str, float]:
             every["stable"] = result.stable_step
         found |= {f"{method}, {name}, {key}": value for key, value in every.items()}
     return found
+
+
+def column() -> Study:
+    """A slender column with a pressure of lower order, pressed at its end."""
+    study = Study(Mesh.rectangle(10.0, 1.0, cells=(10, 2), order=2))
+    study.add("body", mixed, mu=1.0, K=50.0)
+    study.fix("left", u_x=0, u_y=0)
+    study.load("right", u_x=-1.0)
+    return study
+
+
+def vibrating(engine: Any) -> dict[str, float]:
+    """Modes of a body on springs, of one that is tied, of a loaded one with pressures as unknowns;
+    and linear buckling of this.
+    """
+    free = Study(Mesh.rectangle(3.0, 1.0, cells=(9, 3)))
+    free.add("body", moving, rho=1.0, mu=1.0, lam=2.0)
+    free.spring("left", u_x=1e-3, u_y=2e-3)
+    strip, slender = tied().solve(until=0.0, engine=engine), column()
+    pressed = slender.solve(until=0.002, engine=engine)
+    told = {
+        "free": free.solve(until=0.0, engine=engine).modes(4),
+        "strip": strip.modes(4, mass={"body": {"rho": 1.0, "of": ["u_z", "u_r"]}}),
+        "pressed": pressed.modes(3, mass={"body": {"rho": 2.0}}),
+    }
+    found = {"force": 1.0}
+    for name, modes in told.items():
+        found |= {f"{name} {k}": float(w) for k, w in enumerate(modes.squares)}
+        found |= {f"{name} {k}, shape": float(np.abs(s.x).sum()) for k, s in enumerate(modes)}
+    buckling = slender.buckling(2, start=pressed, engine=engine)
+    found |= {f"factor {k}": float(f) for k, f in enumerate(buckling.factors)}
+    shapes = enumerate(buckling.shapes)
+    return {**found, **{f"factor {k}, shape": float(np.abs(s.x).sum()) for k, s in shapes}}
 
 
 def condensed() -> Study:
@@ -237,6 +280,8 @@ def solved(name: str, engine: Any, folder: Path) -> dict[str, Any]:
         result = pushed().solve(engine=engine)
         krylov = engine.times.iterations if isinstance(engine, Petsc) else 0
         return {**numbers(result, "body"), "krylov": krylov}
+    if name == "vibrating":
+        return vibrating(engine)
     if name == "swinging":
         return {k: v for method in METHODS for k, v in swinging(method, engine).items()}
     if name in ("march", "restart", "slow"):

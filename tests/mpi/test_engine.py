@@ -105,6 +105,13 @@ def test_motions(processes: int, tmp_path: Path) -> None:
     assert_equal(found, wanted, limit=1e-8)
 
 
+@pytest.mark.parametrize("processes", PROCESSES)
+def test_modes_and_buckling(processes: int, tmp_path: Path) -> None:
+    """With springs, ties, pressures as unknowns; shapes are as good as they are far apart."""
+    found, wanted = run("vibrating", processes, tmp_path), serially("vibrating")
+    assert_equal(found, wanted, limit=1e-7)
+
+
 def test_another_problem_is_seen() -> None:
     with pytest.raises(AssertionError):
         assert_equal(serially("contact"), {**serially("contact"), "norm": 1.0})
