@@ -16,7 +16,7 @@ from softehl.runtime.engines.local import Part
 from softehl.runtime.engines.matrix import Operator, Solver, Tangent
 from softehl.runtime.engines.shell import Shell
 from softehl.runtime.fem.checks import element_name, rows_not_finite, unknown_name
-from softehl.runtime.fem.measure import ROUNDING, Balance, is_lost, size
+from softehl.runtime.fem.measure import ROUNDING, Balance, hides, is_far, size
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mpi import world
 from softehl.runtime.solve.held import SINGULAR, moving, signs
@@ -242,11 +242,13 @@ class Spread:
     def _is_lost(self, x: Array, forces: Array, K: Factors) -> bool:
         """See `Problem`."""
         reach = self._reach()
-        noise = ROUNDING * K.tangent.times_magnitudes(np.abs(x)[self.team.part.owned] + reach)
         values = np.abs(self.problem.values).max(initial=0.0)
         known = largest(max(float(reach.max(initial=0.0)), float(values)))
+        if not is_far(largest(float(np.abs(x).max(initial=0.0))), known):
+            return False
+        noise = ROUNDING * K.tangent.times_magnitudes(np.abs(x)[self.team.part.owned] + reach)
         norms = np.sqrt(total(np.array([noise @ noise, forces @ forces])))
-        return is_lost(largest(float(np.abs(x).max(initial=0.0))), known, *norms.tolist())
+        return hides(*norms.tolist())
 
     def _fields(self) -> list[Integers]:
         """For each field the places of its unknowns among own ones."""

@@ -74,13 +74,16 @@ def size(squares: Array, worst: float) -> float:
     return float(max(found))
 
 
-def is_lost(largest: float, known: float, noise: float, size: float) -> bool:
-    """True if the largest unknown is far beyond the known ones and rounding hides the loads.
-
-    noise: the rounding. size: the loads and internal forces. If a body floats, a tangent that
+def is_far(largest: float, known: float) -> bool:
+    """True if the largest unknown is far beyond the known ones: if a body floats, a tangent that
     rounding alone keeps regular moves it by any amount.
     """
-    return largest > _FAR * known > 0.0 and noise > _SWAMPED * size
+    return largest > _FAR * known > 0.0
+
+
+def hides(noise: float, size: float) -> bool:
+    """True if rounding of this size hides the loads and internal forces."""
+    return noise > _SWAMPED * size
 
 
 def _ratio(off: float, size: float) -> float:

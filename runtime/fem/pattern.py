@@ -138,7 +138,9 @@ class _NewEntries:
 def _sorted_entries(size: int, parts: Sequence[_NewEntries]) -> tuple[Small, Small, Small]:
     """Entries (m,) by column, then row: their numbers (m,), rows (m,), starts of columns."""
     rows, columns = (
-        np.concatenate([part.dofs.astype(np.int32)[:, part.local[k]].ravel() for part in parts])
+        np.concatenate(
+            [part.dofs.astype(np.int32).take(part.local[k], 1).ravel() for part in parts]
+        )
         for k in (0, 1)
     )
     numbers = np.arange(len(rows), dtype=np.int32)

@@ -26,7 +26,7 @@ from softehl.runtime.fem.checks import (
 )
 from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.guards import Guard
-from softehl.runtime.fem.measure import ROUNDING, Balance, is_lost, size
+from softehl.runtime.fem.measure import ROUNDING, Balance, hides, is_far, size
 from softehl.runtime.names import listed
 
 
@@ -209,7 +209,7 @@ class Problem:
         root = np.sqrt(np.abs(K.diagonal()))
         root[self.fixed] = 0.0
         around = self.assembler.around(root * magnitudes, self.parameters)
-        return np.asarray(abs(K) @ magnitudes) + root * around
+        return np.asarray(_sizes(K) @ magnitudes) + root * around
 
     def _by_scales(self, defect: Array) -> float:
         """Largest norm of the residuals of a field over the scale that is given for it."""
@@ -229,10 +229,12 @@ class Problem:
     def _is_lost(self, x: Array, forces: Array, K: csc_array[np.float64]) -> bool:
         """True if unknowns have grown until rounding is as large as the loads."""
         reach = self.assembler.reach()
-        noise = ROUNDING * np.asarray(abs(K) @ (np.abs(x) + reach))
         known = max(float(reach.max()), float(np.abs(self.values).max(initial=0.0)))
         largest = float(np.abs(x).max(initial=0.0))
-        return is_lost(largest, known, float(np.linalg.norm(noise)), float(np.linalg.norm(forces)))
+        if not is_far(largest, known):
+            return False
+        noise = ROUNDING * np.asarray(abs(K) @ (np.abs(x) + reach))
+        return hides(float(np.linalg.norm(noise)), float(np.linalg.norm(forces)))
 
     def _require_determined(self) -> None:
         loose = np.setdiff1d(self.assembler.loose(self.parameters), self.fixed)
@@ -309,3 +311,10 @@ class Problem:
         K.data[self.assembler.cross(self.fixed)] = 0.0
         K.data[self.assembler.pattern.diagonal[self.fixed]] = 1.0
         return K
+
+
+def _sizes(K: Any) -> Any:
+    """|K|; of a matrix without a copy of its structure."""
+    if not isinstance(K, csc_array):  # of an operator a bound
+        return abs(K)
+    return csc_array((np.abs(K.data), K.indices, K.indptr), shape=K.shape)

@@ -71,11 +71,13 @@ class Multigrid:
 
     def factorise(self, K: SparseMatrix) -> Preconditioned:
         """The hierarchy of K, (n, n); raises SingularMatrix."""
+        from pyamg.util.utils import scale_columns, scale_rows
+
         sums = checked_row_sums(K)
         order, diagonal = self.modes.order, np.abs(K.diagonal())
         held = (sums == diagonal)[order]  # prescribed: nothing else in the row
         if self._entries is None or not self._entries.fit(K):
-            self._entries = Entries.of(K, order)
+            self._entries = Entries.of(K, order, self.modes.block)
         A, symmetric = self._entries.taken(K)
         grids = self._grids
         if grids is None or not (symmetric and grids.serve(held)):
@@ -85,9 +87,9 @@ class Multigrid:
             smoother = CHEBYSHEV if symmetric else GAUSS_SEIDEL
             grids = Grids(scale, near, held, self.modes.block, smoother)
             self._grids = grids if symmetric else None
-        A.data *= np.repeat(grids.scale, np.diff(A.indptr)) * grids.scale[A.indices]
-        blocks = A.tobsr((self.modes.block,) * 2)
-        return Preconditioned(blocks, grids, order, symmetric, self.tolerance, self.most)
+        for scaled in (scale_rows, scale_columns):
+            scaled(A, grids.scale, copy=False)
+        return Preconditioned(A, grids, order, symmetric, self.tolerance, self.most)
 
 
 @dataclass(eq=False)

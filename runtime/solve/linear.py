@@ -207,7 +207,8 @@ def checked_row_sums(K: SparseMatrix) -> Array:
     """Sums (n,) of |K| along rows; raises SingularMatrix for a zero row or entries not finite."""
     if not np.isfinite(K.data).all():
         raise SingularMatrix("the matrix has entries that are not finite")
-    sums = np.bincount(K.indices, weights=np.abs(K.data), minlength=K.shape[0])
+    sizes = csc_array((np.abs(K.data), K.indices, K.indptr), shape=K.shape)
+    sums = sizes @ np.ones(K.shape[1])
     if not sums.all():
         row = int(np.flatnonzero(sums == 0.0)[0])
         raise SingularMatrix(f"row {row} of the matrix is zero", row)
