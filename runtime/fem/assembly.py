@@ -15,6 +15,7 @@ from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.checks import not_finite, require_sound_elements
+from softehl.runtime.fem.mass import Mass
 from softehl.runtime.fem.pattern import Pattern, Structure
 from softehl.runtime.kernels import Kernel, Rule
 
@@ -159,6 +160,8 @@ class ElementBlock:
             history = None if self.point_data is None else self.point_data[part]
             coordinates, dofs = self.coordinates[part], self.dofs[part]
             piece = replace(self, coordinates=coordinates, dofs=dofs, data=data, point_data=history)
+            if isinstance(self.kernel, Mass):
+                piece = replace(piece, kernel=self.kernel.part(part))
             yield piece, scatter[width * first : width * (first + step)]
 
     def since(self, x: Array) -> ElementBlock:

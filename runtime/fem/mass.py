@@ -65,6 +65,10 @@ class Mass:
     parameters = (PARAMETER,)
     fields: tuple[str, ...] = ()
 
+    def part(self, rows: slice) -> Mass:
+        """Of some of the elements."""
+        return Mass(self.matrices[rows], self.components)
+
     def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """Virtual work of inertia, (n, components k)."""
         a = float(given["parameters"][0]) * dofs

@@ -11,6 +11,7 @@ from scipy.linalg import eigh
 
 import softehl
 from softehl.runtime.fem.mass import lumped, mass_matrices
+from softehl.runtime.mass import mass_matrix
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.result import Result
@@ -186,6 +187,14 @@ def test_masses_of_cells_add_up() -> None:
         assert found.sum() == pytest.approx(3.0 * volume, rel=1e-12)
         assert (lumped(found) > 0.0).all()
         assert lumped(found).sum() == pytest.approx(3.0 * volume, rel=1e-12)
+
+
+def test_masses_of_more_elements_than_are_evaluated_at_once() -> None:
+    study = Study(Mesh.box((2.0, 1.0, 0.5), cells=(8, 8, 8)))
+    study.add("body", material="neo_hooke", mu=1.0, kappa=1.0)
+    system = study.system()
+    M = mass_matrix(system, system.resting(), system.at_rest(), MASS)
+    assert M.sum() == pytest.approx(3.0 * RHO, rel=1e-12)
 
 
 def test_mass_of_rings() -> None:
