@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, TypeAlias
 
-from softehl.runtime.engines.sizes import Linear, linear_solver
+from softehl.runtime.engines.large import Large
+from softehl.runtime.engines.sizes import Linear, linear_solver, modes_by_multigrid
 from softehl.runtime.solve.kept import Kept
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.statement.records import StudyError
@@ -42,7 +43,8 @@ class Serial:
     def spread(self, system: System) -> System:
         """See `Engine`."""
         system.mesh.require_whole('engine = "serial"')
-        return system
+        near = modes_by_multigrid(system, self.linear)
+        return system if near is None else replace(system, share=Large(near))
 
     def newton(self, system: System, given: Newton | None) -> Newton:
         """See `Engine`."""

@@ -78,6 +78,14 @@ def _of_rest(system: System, linear: Linear, count: int) -> tuple[LinearSolver, 
     return direct, lambda: f"factors by {direct.name} in spite of {size}: {why}"
 
 
+def modes_by_multigrid(system: System, linear: Linear) -> Modes | None:
+    """What multigrid should know of where natural modes are found by it; None: by factors."""
+    large = linear == "auto" and system.size > FACTORS_UP_TO[system.mesh.dimension]
+    if not (large or linear == "amg") or internal(system.assembler) or not amg.available():
+        return None
+    return nodal_modes(system)
+
+
 def nodal_modes(system: System) -> Modes | None:
     """Rigid-body motions of displacements, or a constant; None where there is more at the nodes.
 

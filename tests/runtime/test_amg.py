@@ -209,6 +209,20 @@ def test_stability_needs_no_factors_beside_multigrid(monkeypatch: pytest.MonkeyP
     cube().solve(linear="amg")
 
 
+def test_modes_by_multigrid(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those that factors find, equal ones as well, without any; a spring and a load are in them."""
+    study, mass = cube(), {"rubber": {"rho": 2.0}}
+    study.spring("right", u_y=0.01)
+    wanted = study.solve(linear="direct").modes(6, mass=mass)
+    state = study.solve(linear="amg")
+    monkeypatch.setattr(Pivots, "of", None)
+    found = state.modes(6, mass=mass)
+    np.testing.assert_allclose(found.squares, wanted.squares, rtol=1e-8)
+    for one, other in zip(found, wanted, strict=True):
+        assert one.norm() == pytest.approx(other.norm(), rel=1e-4)
+    assert np.abs(found[0].x - wanted[0].x).max() < 1e-4 * np.abs(wanted[0].x).max()
+
+
 def test_entries_in_another_order() -> None:
     """By numbers that are kept while the pattern is the same; an unsymmetric matrix is seen."""
     random = np.random.default_rng(0)
