@@ -82,7 +82,7 @@ class Share:
         return float(self.total(np.array([a @ b]))[0])
 
     def free(self, problem: Problem) -> Free:
-        """What supports and ties leave free, of a problem that is not posed."""
+        """Free unknowns of the equations of this process."""
         return Reduction.of(problem)
 
     def part(self, posed: Any) -> Problem:
@@ -113,7 +113,7 @@ class Share:
         return factors, np.asarray((free.map @ found.T).T)
 
     def renewed(self) -> Share:
-        """The same distribution, for equations with other elements."""
+        """A distribution of the same unknowns, for equations with other elements."""
         return self
 
     def largest(self, value: float) -> float:

@@ -87,7 +87,7 @@ class Body:
 
     @property
     def share(self) -> Share:
-        """How its unknowns are spread over processes."""
+        """Distribution of its unknowns over processes."""
         return self.plain.share
 
     def problem(self, step: Step, place: float, before: Array) -> Problem:

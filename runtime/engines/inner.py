@@ -23,7 +23,7 @@ from softehl.runtime.solve.linear import SingularMatrix
 
 @dataclass(frozen=True, eq=False)
 class Outer:
-    """What PETSc's vectors have: all unknowns but internal ones.
+    """Unknowns of PETSc's vectors: all but internal ones.
 
     kept: (k,) local numbers. exchange: of these, numbered as they stand there.
     """

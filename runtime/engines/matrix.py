@@ -134,7 +134,7 @@ class Tangent:
         return r
 
     def _condensed(self, piece: ElementBlock, K: Array, free: Flags) -> Array:
-        """What is left of tangents K without internal unknowns."""
+        """Tangents of the other unknowns, internal ones being condensed."""
         columns = self.columns.get(piece.name)
         if columns is None:
             return K

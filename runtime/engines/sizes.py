@@ -79,7 +79,7 @@ def _of_rest(system: System, linear: Linear, count: int) -> tuple[LinearSolver, 
 
 
 def modes_by_multigrid(system: System, linear: Linear) -> Modes | None:
-    """What multigrid should know of where natural modes are found by it; None: by factors."""
+    """Motions that multigrid keeps where it finds natural modes; None where factors do."""
     large = linear == "auto" and system.size > FACTORS_UP_TO[system.mesh.dimension]
     if not (large or linear == "amg") or internal(system.assembler) or not amg.available():
         return None
