@@ -13,7 +13,7 @@ from softehl.runtime.fem.touching import Contact, Side
 from softehl.runtime.fem.touching_faces import FaceContact
 from softehl.runtime.fem.unknowns import Numbering
 from softehl.runtime.kernels import load_kernel
-from softehl.runtime.mesh.cells import CELLS, measures
+from softehl.runtime.mesh.cells import CELLS, Cell, measures
 from softehl.runtime.mesh.thickness import inner_radii, thickness
 from softehl.runtime.names import listed, meant
 from softehl.runtime.statement.contacts import MULTIPLIERS, Touch
@@ -21,9 +21,11 @@ from softehl.runtime.statement.records import Statement, StudyError
 from softehl.runtime.system import Step, System
 
 AnyContact: TypeAlias = Contact | FaceContact
-_SOFTER = 0.25
-"""Of the stiffness of the bodies at their sides. Blocks, discs and dies with and without friction
-need as many iterations from 0.03 to 0.25; from 0.5 on sticking and slipping may cycle."""
+_SOFTER, _SOFTEST = 0.25, 0.1
+"""Of the stiffness of the bodies at their sides; of quadratic faces in 3-D, whose gap varies inside
+them. Blocks, discs and dies with and without friction need as many iterations from 0.03 to 0.25;
+from 0.5 on, of quadratic faces from 0.25 on, sticking and slipping may cycle."""
+_NOTHING = 1e-9  # of the parent face, of order 1: exact shares are 0, or more than a tenth
 
 
 def contact_of(statement: Statement, numbering: Numbering, touch: Touch) -> AnyContact:
@@ -105,9 +107,8 @@ def _rho(system: System, touch: Touch, contact: AnyContact, side: Side, K: Array
     """Stiffness per area, (n,), about that of the softer of the two bodies beneath a side."""
     if touch.stiffness is not None:
         return np.full(len(side.faces), touch.stiffness)
-    own = _per_area(contact, [(side.kind, side.faces)], K)[
-        side.faces[:, : CELLS[side.kind].corners]
-    ].mean(axis=1)
+    at_nodes = _per_area(contact, [(side.kind, side.faces)], K)[side.faces]
+    own = at_nodes[:, _loaded(CELLS[side.kind])].mean(axis=1)
     theirs = _per_area(contact, contact.others, K)
     rho = np.minimum(own, np.median(theirs[theirs > 0.0]) if (theirs > 0.0).any() else np.inf)
     if not (np.isfinite(rho) & (rho > 0.0)).all():
@@ -115,7 +116,8 @@ def _rho(system: System, touch: Touch, contact: AnyContact, side: Side, K: Array
             f"{touch.name!r}: the bodies have no stiffness at rest; give stiffness=..., about "
             "Young's modulus over the length of a side"
         )
-    return np.asarray(_SOFTER * rho)
+    curved = isinstance(contact, FaceContact) and CELLS[side.kind].order > 1
+    return np.asarray((_SOFTEST if curved else _SOFTER) * rho)
 
 
 def _per_area(contact: AnyContact, faces: object, K: Array) -> Array:
@@ -128,8 +130,17 @@ def _per_area(contact: AnyContact, faces: object, K: Array) -> Array:
         shape = CELLS[kind].shape(at)
         if isinstance(contact, Contact) and contact.ring:
             density = density * 2.0 * np.pi * np.einsum("qk,nk->nq", shape, places[:, :, 1])
-        np.add.at(area, nodes, np.einsum("nq,q,qk->nk", density, weights, shape))
+        shares = np.einsum("nq,q,qk->nk", density, weights, shape)
+        first = _loaded(CELLS[kind]).start
+        np.add.at(area, nodes[:, first:], shares[:, first:])
     there = area > 0.0
     own = np.zeros(len(area))
     own[there] = K[contact.displacements[there]].mean(axis=1) / area[there]
     return own
+
+
+def _loaded(cell: Cell) -> slice:
+    """Corners of a face; or its other nodes, where a uniform pressure does not load the corners."""
+    at, weights = cell.rule(2)
+    corners = (weights @ cell.shape(at))[: cell.corners]
+    return slice(0, cell.corners) if (corners > _NOTHING).all() else slice(cell.corners, None)

@@ -39,7 +39,10 @@ SHIPPED = {
     **{f"mortar_{a}{b}": Shipped(a + b, 2 * (a + b) + 4) for a in (2, 3) for b in (2, 3)},
     **{f"mortar_side_{a}": Shipped(a, 2 * a + 4, fields=True) for a in (2, 3)},
     "touch": Shipped(1, 16),
-    **{f"touch_side_{a}": Shipped(a, 7 * a, fields=True) for a in (3, 4)},
+    **{
+        f"touch_side_{a}": Shipped(a, 3 * a + 4 * (3 if a in (3, 6) else 4), fields=True)
+        for a in (3, 4, 6, 8, 9)
+    },
     "film": Shipped(2, 4, fields=True),
     "film_upwind": Shipped(2, 4),
     "film_facet": Shipped(3, 6, fields=True),

@@ -54,7 +54,7 @@ ALL: dict[str, Callable[[], Definition]] = {
     **{f"mortar_{a}{b}": partial(mortar.pair, a, b) for a in (2, 3) for b in (2, 3)},
     **{f"mortar_side_{a}": partial(mortar.side, a) for a in (2, 3)},
     "touch": touch.touch,
-    **{f"touch_side_{a}": partial(touch.face, a) for a in (3, 4)},
+    **{f"touch_side_{a}": partial(touch.face, a) for a in (3, 4, 6, 8, 9)},
     "film": film.reynolds_segment,
     "film_upwind": film.bubble_load,
     "film_facet": film.reynolds_facet,

@@ -8,8 +8,8 @@ from typing import Any
 import sympy as sp
 
 from softehl.codegen.language.definition import Definition
-from softehl.codegen.language.elements import quadrature
-from softehl.codegen.language.elements.shapes import interpolate, quad4, quad4_gradient
+from softehl.codegen.language.elements import cells, quadrature
+from softehl.codegen.language.elements.shapes import interpolate
 from softehl.codegen.language.model import Model
 
 _AXES = ((0, "x"), (1, "y"), (2, "z"))
@@ -67,43 +67,34 @@ def touch() -> Definition:
 def face(nodes: int) -> Definition:
     """The whole face of `touch`: its multipliers where nothing meets it, and what they mean.
 
-    lambda and tau are per reference area; the fields are per deformed area, and `area` is that of
-    a quadrature point: sum(pressure * area) is the force.
+    lambda and tau are those of its corners, per reference area; the fields are per deformed area,
+    and `area` is that of a quadrature point: sum(pressure * area) is the force.
     """
     name, doc = f"touch_side_{nodes}", face.__doc__ or ""
-    rule = quadrature.triangle(4) if nodes == 3 else quadrature.gauss(3, 2)
+    cell = cells.element({3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8", 9: "quad9"}[nodes])
+    flat = cells.element("tri3" if nodes in (3, 6) else "quad4")
+    rule = quadrature.triangle(4) if nodes in (3, 6) else quadrature.gauss(3, 2)
     m = Model(name, nodes=nodes, rule=rule, unroll=False, doc=doc)
     X = m.coordinates("X", "Y", "Z")
     u = m.nodal_unknowns("u_x", "u_y", "u_z", idle=("u_x", "u_y", "u_z"))
-    multipliers = m.nodal_unknowns("lambda", "tau_x", "tau_y", "tau_z", nodes=nodes)
+    multipliers = m.nodal_unknowns("lambda", "tau_x", "tau_y", "tau_z", nodes=len(flat.nodes))
     (rho,) = m.data(rho="augmentation parameter [MPa/mm]")
     at, x = m.point(), _moved(X, u)
-    N = _shape(nodes, *at)
-    area, now = m.define("area", _area(X, at)), m.define("area_now", _area(x, at))
-    values = [m.define(f"value_{k}", interpolate(N, v)) for k, v in enumerate(multipliers)]
+    N, L, slopes = cell.shape(*at), flat.shape(*at), cell.gradient(*at)
+    area, now = m.define("area", _area(X, slopes)), m.define("area_now", _area(x, slopes))
+    values = [m.define(f"value_{k}", interpolate(L, v)) for k, v in enumerate(multipliers)]
     pairs = zip(values, multipliers, strict=True)
-    m.weak_form([(-area * p * v / rho, t[a]) for p, t in pairs for a, v in enumerate(N)])
+    m.weak_form([(-area * p * v / rho, t[a]) for p, t in pairs for a, v in enumerate(L)])
     names = ("pressure", *(f"shear_{c}" for _, c in _AXES))
     m.fields(**{name: v * area / now for name, v in zip(names, values, strict=True)})
     m.fields(**{c: interpolate(N, x[k]) for k, c in _AXES}, area=now * m.weight)
     return m.finish()
 
 
-def _shape(nodes: int, xi: Any, eta: Any) -> list[Any]:
-    return [1 - xi - eta, xi, eta] if nodes == 3 else quad4(xi, eta)
-
-
-def _slopes(x: _Columns, at: Sequence[Any]) -> tuple[list[Any], list[Any]]:
-    """Derivatives of the place by both parent coordinates."""
-    if len(x[0]) == 3:
-        return [c[1] - c[0] for c in x], [c[2] - c[0] for c in x]
-    gradient = quad4_gradient(*at)
-    first, second = ([interpolate([g[d] for g in gradient], c) for c in x] for d in (0, 1))
-    return first, second
-
-
-def _area(x: _Columns, at: Sequence[Any]) -> Any:
-    across = _cross(*_slopes(x, at))
+def _area(x: _Columns, slopes: Sequence[Sequence[Any]]) -> Any:
+    """Per parent area, by the derivatives of the shape functions."""
+    first, second = ([interpolate([g[d] for g in slopes], c) for c in x] for d in (0, 1))
+    across = _cross(first, second)
     return sp.sqrt(_dot(across, across))
 
 

@@ -135,6 +135,16 @@ class _Places:
         return int(self.x.shape[1])
 
     @property
+    def mine(self) -> slice:
+        """Nodes of the face."""
+        return slice(0, len(self.pair.one.nodes))
+
+    @property
+    def theirs(self) -> slice:
+        """Nodes of the other one."""
+        return slice(len(self.pair.one.nodes), None)
+
+    @property
     def ndof(self) -> int:
         """Unknowns of an element."""
         return 3 * self.nodes + MULTIPLIERS * int(self.multipliers.shape[1])
@@ -142,29 +152,25 @@ class _Places:
     def points(self) -> Iterator[tuple[_Varied, _Point]]:
         """Weights and points of the rule of a triangle."""
         normal = self._normal()
-        ends = [self._corner(k, normal) for k in range(3)]
-        (a, da), (b, db), (c, dc) = ends
-        one, two, done, dtwo = b - a, c - a, db - da, dc - da
-        part = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-        dpart = done[:, 0] * two[:, 1, None] + one[:, 0, None] * dtwo[:, 1]
-        dpart -= done[:, 1] * two[:, 0, None] + one[:, 1, None] * dtwo[:, 0]
-        there = part > 0.0
-        part, dpart = part * there, dpart * there[:, None]
+        start, *ends = (self._corner(k, normal) for k in range(3))
+        along, across = (_minus(end, start) for end in ends)
+        part = _triple(along, across, normal)
+        there = part[0] > 0.0
+        part = part[0] * there, part[1] * there[:, None]
         for (s, t), weight in zip(*_rule(self.pair), strict=True):
-            xi, dxi = a + s * one + t * two, da + s * done + t * dtwo
-            area, darea = self._area(xi, dxi)
-            total = weight * part * area
+            z = _plus(start, _plus(_times(s, along), _times(t, across)))
+            xi = self._met(self.pair.one, self.mine, z, normal)
+            slope = self._slopes(self.pair.one, self.mine, xi)
+            first, second = ((slope[0][:, :, d], slope[1][:, :, d]) for d in (0, 1))
+            share = _over(self._area(*xi), _triple(first, second, normal))
             yield (
-                (total, weight * (dpart * area[:, None] + part[:, None] * darea)),
-                self._point((xi, dxi), normal),
+                _product(_times(weight, part), share),
+                self._point(xi, self._met(self.pair.other, self.theirs, z, normal), first, second),
             )
 
-    def _point(self, xi: _Varied, normal: _Varied) -> _Point:
-        one, other, k = self.pair.one, self.pair.other, len(self.pair.one.nodes)
-        eta = self._partner(xi, normal)
-        mine, theirs = slice(0, k), slice(k, None)
-        x, slope = self._place(one, self.x, mine, xi), self._slopes(one, mine, xi)
-        y = self._place(other, self.x, theirs, eta)
+    def _point(self, xi: _Varied, eta: _Varied, first: _Varied, second: _Varied) -> _Point:
+        one, other, mine, theirs = self.pair.one, self.pair.other, self.mine, self.theirs
+        x, y = self._place(one, self.x, mine, xi), self._place(other, self.x, theirs, eta)
         was, were = (
             self._held(cell, self.before[:, part], at)
             for cell, part, at in ((one, mine, xi), (other, theirs, eta))
@@ -176,13 +182,7 @@ class _Places:
         dlam = np.einsum("nkm,nkc->ncm", dL, self.multipliers)
         for c in range(MULTIPLIERS):
             dlam[:, c, 3 * self.nodes + c :: MULTIPLIERS] += L
-        parts = [
-            (y[0] - x[0], y[1] - x[1]),
-            (slope[0][:, :, 0], slope[1][:, :, 0]),
-            (slope[0][:, :, 1], slope[1][:, :, 1]),
-            (were[0] - was[0], were[1] - was[1]),
-            (lam, dlam),
-        ]
+        parts = [_minus(y, x), first, second, _minus(were, was), (lam, dlam)]
         z, dz = (np.concatenate([p[i] for p in parts], axis=1) for i in (0, 1))
         shares = np.concatenate([N, -M], axis=1), np.concatenate([dN, -dM], axis=1)
         return _Point((z, dz), shares, (L, dL))
@@ -243,7 +243,7 @@ class _Places:
         return n, moved / length[:, :, None]
 
     def _corner(self, k: int, normal: _Varied) -> _Varied:
-        """Parent coordinates of a corner of the triangle on the face."""
+        """Place of a corner of the triangle."""
         told = self.corners[:, k]
         A = told[:, 2:6].reshape(-1, 2, 2).transpose(0, 2, 1)
         B = told[:, 8:12].reshape(-1, 2, 2).transpose(0, 2, 1)
@@ -255,25 +255,54 @@ class _Places:
         x, y = self._place(flat, self.x, mine, xi), self._place(far, self.x, theirs, eta)
         K = self._slopes(flat, mine, xi)[0] @ A - self._slopes(far, theirs, eta)[0] @ B
         v, dv = _along(K, (y[0] - x[0], y[1] - x[1]), normal)
-        return told[:, :2] + np.einsum("ndv,nv->nd", A, v), np.einsum("ndv,nvm->ndm", A, dv)
+        at = told[:, :2] + np.einsum("ndv,nv->nd", A, v), np.einsum("ndv,nvm->ndm", A, dv)
+        return self._place(flat, self.x, mine, at)
 
-    def _partner(self, xi: _Varied, normal: _Varied) -> _Varied:
-        """Parent coordinates on the other face of what lies on the line along the mean normal."""
-        one, other = self.pair.one, self.pair.other
-        k = len(one.nodes)
-        x = self._place(one, self.x, slice(0, k), xi)
-        eta = np.tile(other.nodes[: other.corners].mean(axis=0), (len(self.x), 1))
-        theirs, still = slice(k, None), np.zeros((len(eta), 2, self.ndof))
+    def _met(self, cell: Cell, part: slice, z: _Varied, normal: _Varied) -> _Varied:
+        """Parent coordinates on a face of what lies on the line through z along the normal."""
+        at = np.tile(cell.nodes[: cell.corners].mean(axis=0), (len(self.x), 1))
+        still = np.zeros((len(at), 2, self.ndof))
         for _ in range(_ITERATIONS):
-            there = self._held(other, self.x[:, theirs], (eta, still))[0]
-            K = -np.einsum("nkd,nkc->ncd", other.gradient(eta), self.x[:, theirs])
-            step = _solved(K, normal[0], there - x[0])[:, :2]
-            eta = eta + np.clip(step, -2.0, 2.0)
+            there = self._held(cell, self.x[:, part], (at, still))[0]
+            K = -np.einsum("nkd,nkc->ncd", cell.gradient(at), self.x[:, part])
+            step = _solved(K, normal[0], there - z[0])[:, :2]
+            at = at + np.clip(step, -2.0, 2.0)
             if np.abs(step).max(initial=0.0) < 1e-14:
                 break
-        y = self._place(other, self.x, theirs, (eta, still))
-        K = -self._slopes(other, theirs, (eta, still))[0]
-        return eta, _along(K, (y[0] - x[0], y[1] - x[1]), normal)[1]
+        K = -self._slopes(cell, part, (at, still))[0]
+        return at, _along(K, _minus(self._place(cell, self.x, part, (at, still)), z), normal)[1]
+
+
+def _plus(a: _Varied, b: _Varied) -> _Varied:
+    return a[0] + b[0], a[1] + b[1]
+
+
+def _minus(a: _Varied, b: _Varied) -> _Varied:
+    return a[0] - b[0], a[1] - b[1]
+
+
+def _times(number: float, a: _Varied) -> _Varied:
+    return number * a[0], number * a[1]
+
+
+def _product(a: _Varied, b: _Varied) -> _Varied:
+    """Of scalars (n,)."""
+    return a[0] * b[0], a[0][:, None] * b[1] + b[0][:, None] * a[1]
+
+
+def _over(a: _Varied, b: _Varied) -> _Varied:
+    """Of scalars (n,)."""
+    found = a[0] / b[0]
+    return found, (a[1] - found[:, None] * b[1]) / b[0][:, None]
+
+
+def _triple(a: _Varied, b: _Varied, c: _Varied) -> _Varied:
+    """(a x b) . c of vectors (n, 3)."""
+    changes = (
+        np.einsum("nc,ncm->nm", np.cross(v[0], w[0]), u[1])
+        for u, v, w in ((a, b, c), (b, c, a), (c, a, b))
+    )
+    return np.einsum("nc,nc->n", np.cross(a[0], b[0]), c[0]), sum(changes)
 
 
 def _along(K: Array, off: _Varied, normal: _Varied) -> _Varied:

@@ -10,13 +10,14 @@ from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, Predicate
 from softehl.runtime.mesh.thickness import by_normals, in_chains
+from softehl.runtime.names import listed
 from softehl.runtime.statement.given import finite
 from softehl.runtime.statement.pages import page_on
 from softehl.runtime.statement.records import Block, Form, StudyError, shown
 
 MULTIPLIERS = {2: ("lambda", "tau"), 3: ("lambda", "tau_x", "tau_y", "tau_z")}
 """Unknowns of a contact by the dimension of its mesh."""
-KINDS = {2: ("line2", "line3"), 3: ("tri3", "quad4")}
+KINDS = {2: ("line2", "line3"), 3: ("tri3", "quad4", "tri6", "quad8", "quad9")}
 """Faces that may touch."""
 
 
@@ -71,9 +72,7 @@ def touch(
     alone = theirs is mine
     for kind in (*mine, *theirs):
         if kind not in KINDS[mesh.dimension]:
-            raise StudyError(
-                f"{words}: {kind} cannot touch; {' and '.join(KINDS[mesh.dimension])} can"
-            )
+            raise StudyError(f"{words}: {kind} cannot touch; {listed(KINDS[mesh.dimension])} can")
     if alone:
         mine = theirs = {k: _in_order(mesh, faces) for k, faces in mine.items()}
     blocks = {}

@@ -217,7 +217,12 @@ def mortar_states() -> Iterator[State]:
 
 def touch_states() -> Iterator[State]:
     """Points that stick, slip, are open or too deep, their face turned; faces alone."""
-    corners = {3: UNIT[[0, 1, 2]], 4: UNIT}
+    middle = (UNIT + np.roll(UNIT, -1, axis=0)) / 2
+    triangle = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    edges = (triangle + np.roll(triangle, -1, axis=0)) / 2
+    places = {3: UNIT[[0, 1, 2]], 4: UNIT, 6: np.vstack([triangle, edges])}
+    places[8] = np.vstack([UNIT, middle])
+    places[9] = np.vstack([places[8], UNIT.mean(axis=0)])
     turn = np.linalg.qr(np.array([[1.0, 0.3, -0.2], [-0.1, 1.0, 0.4], [0.3, -0.2, 1.0]]))[0]
     turn *= np.sign(np.linalg.det(turn))
     for label, gap, came, friction in (
@@ -230,11 +235,11 @@ def touch_states() -> Iterator[State]:
         rows = [[0.02, -0.01, gap], [1.1, 0.2, 0.0], [-0.1, 0.9, 0.0], [*came, 1e-3]]
         dofs = (*_tuple(np.array(rows) @ turn.T), 0.4, 0.02, -0.03, 0.01)
         yield State("touch", label, (), dofs, (), (10.0, friction, 0.5, 1.0))
-    for a in (3, 4):
-        rng = np.random.default_rng(2016)
-        now = np.column_stack([corners[a], 0.1 * rng.uniform(-1, 1, a)]) @ turn.T
+    for a, flat in places.items():
+        rng, corners = np.random.default_rng(2016), 3 if a in (3, 6) else 4
+        now = np.column_stack([flat, 0.1 * rng.uniform(-1, 1, a)]) @ turn.T
         u = 0.1 * rng.uniform(-1, 1, now.shape)
-        dofs = (*_tuple(u), *_tuple(rng.uniform(0.2, 0.6, (a, 4))))
+        dofs = (*_tuple(u), *_tuple(rng.uniform(0.2, 0.6, (corners, 4))))
         yield State(f"touch_side_{a}", "turned", _tuple(now - u), dofs, (), (10.0,))
 
 

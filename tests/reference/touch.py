@@ -48,10 +48,10 @@ def residual_side(
     rest = _places(X, [mpf(0)] * len(X), range(nodes))
     found, multipliers = [mpf(0)] * len(dofs), dofs[3 * nodes :]
     for at, weight in _rule(nodes):
-        N, area = _shape(nodes, at), weight * _length(_cross(*_slopes(rest, at)))
+        L, area = _shape(_corners(nodes), at), weight * _length(_cross(*_slopes(rest, at)))
         for k in range(4):
-            value = sum((a * v for a, v in zip(N, multipliers[k::4], strict=True)), mpf(0))
-            for a, share in enumerate(N):
+            value = sum((a * v for a, v in zip(L, multipliers[k::4], strict=True)), mpf(0))
+            for a, share in enumerate(L):
                 found[3 * nodes + 4 * a + k] -= area * share * value / rho
     return found
 
@@ -70,17 +70,18 @@ def fields_side(
     rest, moved = (_places(X, u, range(nodes)) for u in ([mpf(0)] * len(X), dofs))
     rows, multipliers = [], dofs[3 * nodes :]
     for at, weight in _rule(nodes):
-        N = _shape(nodes, at)
+        L = _shape(_corners(nodes), at)
         before, now = (_length(_cross(*_slopes(p, at))) for p in (rest, moved))
         values = [
-            sum((a * v for a, v in zip(N, multipliers[k::4], strict=True)), mpf(0))
+            sum((a * v for a, v in zip(L, multipliers[k::4], strict=True)), mpf(0))
             for k in range(4)
         ]
-        rows.append([*(v * before / now for v in values), *_sum(N, moved), now * weight])
+        place = _sum(_shape(nodes, at), moved)
+        rows.append([*(v * before / now for v in values), *place, now * weight])
     return rows
 
 
-SIDES = {f"touch_side_{a}": a for a in (3, 4)}
+SIDES = {f"touch_side_{a}": a for a in (3, 4, 6, 8, 9)}
 RESIDUALS = {
     "touch": partial(residual_point),
     **{name: partial(residual_side, a) for name, a in SIDES.items()},
@@ -95,7 +96,7 @@ FIELDS = {name: partial(fields_side, a) for name, a in SIDES.items()}
 def _rule(nodes: int) -> list[tuple[Vector, Number]]:
     """Three by three points; on a triangle Gauss's, and Jacobi's for the weight 1 - y."""
     line = list(zip(*gauss(3), strict=True))
-    if nodes == 4:
+    if _corners(nodes) == 4:
         return [([x, y], v * w) for x, v in line for y, w in line]
     found = []
     for y, w in _jacobi():
@@ -120,16 +121,33 @@ def _places(X: Sequence[Number], u: Sequence[Number], nodes: range) -> Points:
     return [[X[3 * a + c] + u[3 * a + c] for c in range(3)] for a in nodes]
 
 
+def _corners(nodes: int) -> int:
+    return 3 if nodes in (3, 6) else 4
+
+
 def _shape(nodes: int, at: Sequence[Number]) -> Vector:
+    """The linear ones, less shares of those in the middle of edges and of the face."""
     x, y = at
-    if nodes == 3:
-        return [1 - x - y, x, y]
-    ends = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-    return [(1 + a * x) * (1 + b * y) / 4 for a, b in ends]
+    if nodes in (3, 6):
+        linear = [1 - x - y, x, y]
+        edges = [4 * linear[a] * linear[a - 2] for a in range(3)]
+    else:
+        ends = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+        linear = [(1 + a * x) * (1 + b * y) / 4 for a, b in ends]
+        edges = [(1 - x**2) * (1 - y) / 2, (1 - y**2) * (1 + x) / 2]
+        edges += [(1 - x**2) * (1 + y) / 2, (1 - y**2) * (1 - x) / 2]
+    if nodes in (3, 4):
+        return linear
+    inner = [(1 - x**2) * (1 - y**2)] if nodes == 9 else []
+    edges = [e - sum(inner) / 2 for e in edges]
+    return [v - (edges[a] + edges[a - 1]) / 2 - sum(inner) / 4 for a, v in enumerate(linear)] + [
+        *edges,
+        *inner,
+    ]
 
 
 def _slopes(points: Points, at: Sequence[Number]) -> tuple[Vector, Vector]:
-    """Exact as central differences: along each parent coordinate the place is linear."""
+    """Exact as central differences: along each parent coordinate the place is quadratic."""
     found = []
     for d in (0, 1):
         ahead, behind = ([v + s * (k == d) for k, v in enumerate(at)] for s in (1, -1))
