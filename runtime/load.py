@@ -17,6 +17,8 @@ from softehl.runtime.result import Result
 from softehl.runtime.solve.arclength import Arclength
 from softehl.runtime.solve.held import FirstStep, Remembering
 from softehl.runtime.solve.homotopy import Continuation
+from softehl.runtime.solve.kept import iterating
+from softehl.runtime.solve.linear import LinearSolver
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point
 from softehl.runtime.solve.steps import StepRule
@@ -59,6 +61,7 @@ class _Reached:
     kept: Remembering | None = None
     before: Trail | None = None
     record: bool = False
+    linear: LinearSolver | None = None
     results: list[Result] = field(default_factory=list)
 
     def problem_at(self, t: float) -> Problem:
@@ -74,7 +77,8 @@ class _Reached:
         self.histories = self.system.committed(problem, self.x, self.histories)
         problem = problem.at(self.x)
         earlier = before if self.record else None
-        trail = Trail(self.system, step, problem, self.x, earlier, self.kept)
+        known = earlier, self.kept, None if self.linear is None else iterating(self.linear)
+        trail = Trail(self.system, step, problem, self.x, *known)
         result = Result(self.system, problem, point, self.histories, trail)
         if not self.keep_all:
             self.results.clear()
@@ -108,7 +112,8 @@ class LoadSteps:
         begin, x0, histories = start
         first_step = FirstStep(self.newton)
         kept = first_step.memory if self.record or system.size <= _KEPT else None
-        at = _Reached(*(system, x0, histories, self.on_step, False, kept, self.before, self.record))
+        kinds = kept, self.before, self.record, self.newton.linear
+        at = _Reached(system, x0, histories, self.on_step, False, *kinds)
 
         def keep(point: Point) -> None:
             first_step.check(at.problem_at(point.parameter), point.solution)

@@ -22,6 +22,7 @@ from softehl.runtime.share import Share
 from softehl.runtime.solve.differences import differences
 from softehl.runtime.solve.held import FirstStep, Remembering
 from softehl.runtime.solve.homotopy import Trial, Way, walk
+from softehl.runtime.solve.kept import iterating
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.predictor import through
 from softehl.runtime.solve.record import End, Record
@@ -250,7 +251,7 @@ class _ByTime(Way):
         self.clock = Clock(times, states, after, trial.following)
         problem = problem.at(solution.x)
         before = self.result.trail if self.result else self.march.before
-        known = (before, self.kept) if self.kept else ()
+        known = before if self.kept else None, self.kept, iterating(self.march.newton.linear)
         trail = Trail(system, posed, problem, solution.x, *known)
         self.result = Result(system, problem, Point(posed.t, solution), after, trail)
 

@@ -69,7 +69,7 @@ def _step(
         )
         for name, elements in linear.blocks.items()
     }
-    held_slope = slope - linear.full.T @ adjoint
+    held_slope = slope - linear.transposed_times(adjoint)
     for item, total in zip(inputs, found, strict=True):
         moves = item.moves(linear.trail)
         for column in moves.columns:

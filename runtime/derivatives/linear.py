@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.derivatives.elements import Elements
-from softehl.runtime.derivatives.trail import Trail
+from softehl.runtime.derivatives.trail import Trail, WithoutMatrix
 from softehl.runtime.fem.loads import Spring, Tie
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.linear import Factorisation, Factors, SingularMatrix
+from softehl.runtime.statement.records import StudyError
 
 _EXACT, _ROUNDING = 1e-15, 1e-14
 """Errors of an equation relative to its terms: nothing is left, and only rounding can be left."""
@@ -43,15 +45,31 @@ class Linear:
         return tangent
 
     @cached_property
-    def _reduced(self) -> csc_array[np.float64]:
-        reduced: csc_array[np.float64] = self.trail.problem.eliminated(self.full.copy())
-        return reduced
+    def _reduced(self) -> Any:
+        """The tangent that is solved with: a matrix, or products."""
+        posed = self.trail.posed
+        if isinstance(posed, WithoutMatrix):
+            return posed.linearise(self.trail.x)[1]
+        return self.trail.problem.eliminated(self.full.copy())
 
     def solve(self, b: Array, held: Array) -> Array:
         """dx (n,) of -R_p dp = b, with the rates of prescribed unknowns in held (n,)."""
-        right = b - self.full @ held if held.any() else b.copy()
+        right = b - self._times(held) if held.any() else b.copy()
         right[self.fixed] = held[self.fixed]
         return self._solved(right, transposed=False)
+
+    def _times(self, v: Array) -> Array:
+        """The tangent of all unknowns times v, (n,)."""
+        found = self._reduced.times(v) if self._without_matrix else self.full @ v
+        return np.asarray(found)
+
+    def transposed_times(self, v: Array) -> Array:
+        """The transpose of the tangent of all unknowns times v, (n,)."""
+        return self._times(v) if self._without_matrix else np.asarray(self.full.T @ v)
+
+    @property
+    def _without_matrix(self) -> bool:
+        return isinstance(self.trail.posed, WithoutMatrix)
 
     def adjoint(self, gradient: Array) -> Array:
         """l (n,) of K^T l = gradient, zero at prescribed unknowns."""
@@ -74,8 +92,12 @@ class Linear:
 
     def by_unknowns(self, weights: Array) -> Array:
         """Derivative (n,) of weights (n,) times the forces that make reactions."""
-        K = self.trail.problem.assembler.linearise(self.trail.x, self._others())[1]
-        return np.asarray(K.T @ weights)
+        found, none = np.zeros(len(weights)), np.empty(0, dtype=np.int64)
+        for name, given in self._others().items():
+            for piece, _ in self.blocks[name].block.pieces(none):
+                K = piece.tangent(self.trail.x, given)[1]
+                np.add.at(found, piece.dofs, np.einsum("nij,ni->nj", K, weights[piece.dofs]))
+        return found
 
     def _others(self) -> dict[str, Array]:
         acting = self.reacting()
@@ -89,9 +111,13 @@ class Linear:
         return total
 
     def _solved(self, b: Array, *, transposed: bool) -> Array:
-        """By factors of this tangent, or by those of the last iteration if they are near enough."""
+        """By factors of this tangent, or by those of the last iteration if they are near enough; by
+        iterations where the path was solved so.
+        """
         memo, kept = self.trail.memo, self.trail.kept
         turned = transposed and not self._symmetric
+        if self._without_matrix or self.trail.linear is not None:
+            return self._iterated(b, turned=turned)
         key = "transposed" if turned else "plain"
         if key not in memo:
             K = csc_array(self._reduced.T) if turned else self._reduced
@@ -104,11 +130,34 @@ class Linear:
             memo[key] = plain or choose("auto").factorise(K)
         return np.asarray(memo[key].solve(b))
 
+    def _iterated(self, b: Array, *, turned: bool) -> Array:
+        """Without factors.  Raises StudyError where that does not work."""
+        memo, key, K = self.trail.memo, "turned" if turned else "straight", self._reduced
+        linear = self.trail.linear
+        if turned and linear is None:
+            raise StudyError(
+                'derivatives after linear="matrix-free" need a symmetric tangent, this one is not: '
+                'solve with linear="amg" or linear="direct"'
+            )
+        K = csc_array(K.T) if turned else K
+        if key not in memo:
+            memo[key] = K if linear is None else linear.factorise(K)
+        found = refined(memo[key], K, b)
+        if found is None:
+            raise StudyError(
+                'the iterations for derivatives do not converge: solve with linear="direct"'
+            )
+        return found
+
     @property
     def _symmetric(self) -> bool:
         memo, K = self.trail.memo, self._reduced
         if "symmetric" not in memo:
-            memo["symmetric"] = abs(K - K.T).max() <= _SYMMETRIC * abs(K).max()
+            memo["symmetric"] = (
+                K.is_symmetric()
+                if self._without_matrix
+                else abs(K - K.T).max() <= _SYMMETRIC * abs(K).max()
+            )
         return bool(memo["symmetric"])
 
 
@@ -117,7 +166,7 @@ def _turned(factors: Factors | None) -> Factors | None:
     return factors.transposed() if isinstance(factors, Factorisation) else None
 
 
-def refined(factors: Factors, K: csc_array[np.float64], b: Array) -> Array | None:
+def refined(factors: Factors, K: Any, b: Array) -> Array | None:
     """x (n,) of K x = b by factors of a matrix near K; None where they are not near enough.
 
     Each correction must make the error of the equations a tenth, until rounding is left: relative

@@ -3,15 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.held import Remembering
+from softehl.runtime.solve.linear import LinearSolver
 from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import Step, System
+
+
+@runtime_checkable
+class WithoutMatrix(Protocol):
+    """Equations in this process whose tangent is known by its products."""
+
+    @property
+    def equations(self) -> Problem:
+        """With a matrix."""
+        ...
+
+    def linearise(self, x: Array) -> tuple[Array, Any]:
+        """The residual and the tangent at x, (n,)."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,17 +34,25 @@ class Trail:
     """A converged step: its equations, its unknowns x (n,), and the step before it.
 
     before: None at the beginning, and where the path was not recorded. kept: the linear solver of
-    the path with the factors of its latest step, None if it was not recorded. memo: factors that
-    may be needed again. Both save time only.
+    the path with the factors of its latest step, None if it was not recorded. linear: the solver of
+    the path if it iterates. memo: factors that may be needed again. kept and memo save time only.
     """
 
     system: System
     step: Step
-    problem: Any
+    posed: Any
     x: Array
     before: Trail | None = None
     kept: Remembering | None = None
+    linear: LinearSolver | None = None
     memo: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def problem(self) -> Problem:
+        """Its equations, with a matrix."""
+        posed = self.posed.equations if isinstance(self.posed, WithoutMatrix) else self.posed
+        assert isinstance(posed, Problem)
+        return posed
 
     def chain(self) -> list[Trail]:
         """The steps on which the unknowns depend, first to last.
@@ -38,7 +61,7 @@ class Trail:
         or the study was changed.
         """
         system = self.system
-        if not isinstance(self.problem, Problem):
+        if not isinstance(self.posed, Problem | WithoutMatrix):
             raise StudyError(
                 'derivatives need engine="serial": this result is of several processes'
             )

@@ -125,6 +125,11 @@ class Matrixless:
     iteration: Iteration
 
     @property
+    def equations(self) -> Problem:
+        """With a matrix."""
+        return self.problem
+
+    @property
     def assembler(self) -> Assembler:
         """See `Problem`."""
         return self.problem.assembler

@@ -119,6 +119,15 @@ class Tangent:
         y[self.held] = v[self.held]
         return y
 
+    def __matmul__(self, v: Array) -> Array:
+        """K v as `solve` has it: prescribed unknowns have equations of their own."""
+        fixed = self.problem.fixed
+        moving = v.copy()
+        moving[fixed] = 0.0
+        found = self.times(moving)
+        found[fixed] = v[fixed]
+        return found
+
     def diagonal(self) -> Array:
         """Of K."""
         return self.diagonals
@@ -148,7 +157,7 @@ class Tangent:
     def _iterated(self, b: Array) -> Array:
         """z of T' K T z = b, node by node; zero for what does not move by itself."""
         given, cycle = self.iteration, self._multigrid()
-        method = conjugate_gradients if self._is_symmetric() else minimal_residuals
+        method = conjugate_gradients if self.is_symmetric() else minimal_residuals
         found = method(self.apply, cycle, b, given.tolerance, given.most)
         given.counts.append(found.iterations)
         # up to a negative curvature it is a direction of descent, which Newton's method may take
@@ -159,7 +168,8 @@ class Tangent:
             )
         return found.x
 
-    def _is_symmetric(self) -> bool:
+    def is_symmetric(self) -> bool:
+        """True if two random vectors say so."""
         u, v = np.random.default_rng(0).uniform(-1.0, 1.0, (2, len(self.diagonals)))
         Ku, Kv = self.apply(u), self.apply(v)
         size = np.linalg.norm(u) * np.linalg.norm(Kv)

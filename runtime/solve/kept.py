@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from softehl.runtime.solve.amg import Multigrid, OrFactors
+from softehl.runtime.solve.internal import Condensing
 from softehl.runtime.solve.linear import Factors, LinearSolver, SparseMatrix
 
 
@@ -35,3 +37,11 @@ def _same(A: SparseMatrix, B: SparseMatrix) -> bool:
     """True if all entries of matrices, which nobody changes, are the same."""
     parts = ((getattr(K, name) for K in (A, B)) for name in ("data", "indices", "indptr"))
     return all(a is b or np.array_equal(a, b) for a, b in parts)
+
+
+def iterating(solver: LinearSolver) -> LinearSolver | None:
+    """The solver, without a matrix that it keeps, if it makes no factors; else None."""
+    plain = solver.solver if isinstance(solver, Kept) else solver
+    inner = plain.solver if isinstance(plain, Condensing) else plain
+    iterates = isinstance(inner, Multigrid) or (isinstance(inner, OrFactors) and not inner.taken)
+    return plain if iterates else None

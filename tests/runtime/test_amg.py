@@ -14,6 +14,7 @@ from scipy.sparse import csc_array, diags_array
 
 import softehl
 from softehl.runtime.arrays import Array, Flags
+from softehl.runtime.derivatives import linear
 from softehl.runtime.engines import sizes
 from softehl.runtime.solve import amg
 from softehl.runtime.solve.eigen import Pivots
@@ -239,3 +240,19 @@ def test_entries_in_another_order() -> None:
         assert even == (matrix is even_now)
         assert entries.fit(K)
         assert not entries.fit(csc_array(np.eye(6)))
+
+
+def test_derivatives_after_multigrid_need_no_factors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where they do not get there, as with air that carries heat, one line says so."""
+    cases: list[tuple[Any, Any, dict[str, Any]]] = [
+        (cube, {"rubber": ["mu", "K"], "nodes": ["x"]}, {"what": "u_y", "at": (1, 1, 1)}),
+        (cube, {"rubber": ["mu", "K"], "nodes": ["x"]}, {"what": "u_x", "reaction": "left"}),
+    ]
+    wanted = [make().solve().sensitivity(by=by, **what) for make, by, what in cases]
+    monkeypatch.setattr(linear, "choose", None)
+    for (make, by, what), expected in zip(cases, wanted, strict=True):
+        slopes = make().solve(linear="amg").sensitivity(by=by, **what)
+        for key, slope in expected.items():
+            np.testing.assert_allclose(slopes[key], slope, rtol=1e-8, atol=1e-11)
+    with pytest.raises(StudyError, match=r'iterations .* do not converge: .* linear="direct"'):
+        stream().solve(linear="amg").sensitivity("T", at=(1, 0.5), by={"nodes": ["x"]})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -11,9 +13,11 @@ import softehl
 from softehl import Mesh, Study
 from softehl.codegen.language.fields import Fields
 from softehl.runtime.arrays import Array
+from softehl.runtime.derivatives import linear
 from softehl.runtime.engines.matrix_free import MatrixFree
 from softehl.runtime.result import Result
 from softehl.runtime.solve import coarse, multigrid
+from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.gradients import conjugate_gradients, minimal_residuals
 from softehl.runtime.solve.multigrid import Level, Multigrid
 from softehl.runtime.solve.solution import NotConverged
@@ -256,3 +260,36 @@ def test_a_march_without_matrices() -> None:
     *_, wanted = study.march(dt=0.01, until=0.05)
     *_, found = study.march(dt=0.01, until=0.05, engine=MatrixFree())
     assert apart(wanted, found, ("T",)) < 1e-8
+
+
+def test_derivatives_need_no_factors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By an adjoint and directly, at a place and of a reaction."""
+
+    def pushed() -> Study:
+        study = Study(Mesh.box((1, 1, 1), cells=(2, 2, 2), order=2))
+        study.add("body", solid, mu=1.0, lam=1.5)
+        study.fix("bottom", u_x=0, u_y=0, u_z=0)
+        study.fix("top", u_z=-0.02)
+        study.load("top", u_x=0.02)
+        study.spring("back", u_y=0.1)
+        return study
+
+    by = {"body": ["mu", "lam"], "load:top": ["u_x"], "fix:top": ["u_z"], "nodes": ["x"]}
+    wanted, whole = pushed().solve(), pushed().solve().derivative(by={"body": ["mu"]})
+    monkeypatch.setattr(linear, "choose", None)
+    found = pushed().solve(linear="matrix-free")
+    asked: tuple[dict[str, Any], ...] = ({"at": (1, 1, 0.5)}, {"reaction": "bottom"})
+    for where in asked:
+        slopes = found.sensitivity("u_x", by=by, **where)
+        with monkeypatch.context() as with_factors:
+            with_factors.setattr(linear, "choose", choose)
+            expected = wanted.sensitivity("u_x", by=by, **where)
+        for key, slope in expected.items():
+            np.testing.assert_allclose(slopes[key], slope, rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(found.derivative(by={"body": ["mu"]}), whole, atol=1e-10)
+
+
+def test_adjoints_of_what_is_not_symmetric_are_refused() -> None:
+    result = block(1, 0.3).solve(linear="matrix-free")
+    with pytest.raises(StudyError, match=r'need a symmetric tangent, this one is not: .*"amg"'):
+        result.sensitivity("u_x", at=(1, 1, 1), by={"body": ["mu", "lam"], "nodes": ["x"]})
