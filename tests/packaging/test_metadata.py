@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 OPTIONAL = {
     **{"distributed": "cluster", "pypardiso": "fast", "petsc4py": "mpi", "mpi4py": "mpi"},
+    "slepc4py": "mpi",
     "ezdxf": "cad",
     **dict.fromkeys(("bokeh", "jinja2", "openpyxl"), "report"),
     **dict.fromkeys(("panel", "panel_material_ui", "pandas", "tornado"), "app"),
@@ -21,6 +22,7 @@ OPTIONAL = {
 DISTRIBUTION = {"PIL": "pillow"}
 BROUGHT = {
     **{"petsc4py": "dolfinx-solver-real", "mpi4py": "dolfinx-solver-real"},
+    "slepc4py": "dolfinx-solver-real",
     **{"tornado": "panel", "panel_material_ui": "panel-material-ui"},
 }
 """Packages that come with another one."""
