@@ -1,4 +1,4 @@
-"""Glands drawn at random, by number: the sample of docs/validation/glands.md.
+"""Glands drawn at random, by number: the O-rings of docs/validation/glands.md.
 
 `python -m tests.cases.gland_matrix FIRST LAST FILE` solves some, prints a line for each and adds
 it to a file of JSON lines; those that are there already are not solved again. `--density 4` solves

@@ -1,4 +1,4 @@
-"""Seals of every section drawn at random, by number: the sample of docs/validation/sections.md.
+"""Seals of every section drawn at random, by number: the others of docs/validation/glands.md.
 
 `python -m tests.cases.section_matrix FIRST LAST FILE`; see `tests.cases.gland_matrix`.
 """

@@ -171,7 +171,7 @@ def test_an_inlet_that_is_cut_off_lacks_pressure() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [2, 3, 4])
 def test_glands_of_the_random_sample(number: int) -> None:
-    """Some of those that docs/validation/glands.md has; others take minutes."""
+    """Some of the O-rings drawn at random; others take minutes."""
     p = drawn(number)
     outcome = run(p, Silent())
     assert outcome.states

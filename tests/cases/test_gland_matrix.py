@@ -1,4 +1,4 @@
-"""A tenth of the sample of docs/validation/glands.md: every tenth up to three shear moduli."""
+"""Every tenth of 300 random O-rings up to three shear moduli."""
 
 from __future__ import annotations
 
