@@ -34,9 +34,9 @@ EXPONENT = 1.5
 """a of the local time steps. On X-rings at the slowest speed 1 found no film and 2 was as good."""
 
 FIRST, AGAIN = 1e-3, 0.1
-"""First step, of T: from contact between smooth surfaces where it leaves a gap as thin as the film (a
-thicker one flows sooner), and from all else. With 1e-2 for both, rings 9, 26 and 250 have no `ok`
-at -10 mm/s and ring 50 has no estimate; a rough U-cup has no film from 1e-3, the same from 0.1."""
+"""First step, of T: from contact between smooth surfaces where it leaves a gap as thin as the film
+(a thicker one flows sooner), and from all else. With 1e-2 for both, rings 9, 26 and 250 have no
+`ok` at -10 mm/s and ring 50 has no estimate; a rough U-cup has no film from 1e-3."""
 
 _NO_WIDTH = 1e-6
 """Of the widest part of the arc around a node, below which it is between segments on a wall."""
