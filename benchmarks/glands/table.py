@@ -49,7 +49,7 @@ def head(columns: str) -> list[str]:
 
 
 def results(runs: Runs) -> str:
-    """What one program reached: by p_s / mu, by section, and all."""
+    """The states that one program reached: by p_s / mu, by section, and all."""
     lines = [
         result(name, [run for (run,) in some])
         for name, some in grouped([(run,) for run in runs.values()])

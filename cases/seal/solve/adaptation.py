@@ -66,8 +66,8 @@ class Adaptation:
     def adapted(self, found: Film | NoFilm, last: Sequence[Adapted] = ()) -> Adapted | NoFilm:
         """A film on a mesh that fits it, from that on another mesh.
 
-        last: films at other speeds. Where a mesh does not bear the film all the way, it is squeezed
-        out anew on one that is made for what was reached.
+        last: films at other speeds. A film that ends early on a mesh is squeezed out anew on one
+        that is made for the state it has reached.
         """
         found, fits = self._settled(found, Fraction(self.p.density))
         if isinstance(found, NoFilm):
@@ -141,8 +141,8 @@ class Adaptation:
     def _carried(self, found: Film | NoFilm, system: SealSystem) -> Film | NoFilm | None:
         """The film on the mesh of a system; None where there is no contact state on it.
 
-        Where none was found, or does not lead on, it is squeezed out anew from the contact; without
-        that two of three O-rings that take it have no `ok` at -10 mm/s (docs/validation).
+        It is squeezed out from the contact if none was found, or if the carried one ends. Two of
+        three O-rings that take this have no `ok` at -10 mm/s without it (docs/validation).
         """
         assert found.begun is not None
         squeeze_film, now = found.begun
