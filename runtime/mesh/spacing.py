@@ -30,13 +30,11 @@ _STEPS = 27 * 64  # of the table of a map: nodes of every density up to 64 are e
 class Spot:
     """A place to be resolved: s_k in mm, a_k the size there relative to that of other spots.
 
-    rates: growth of the size before and behind it, None for that of the line. most: largest size
-    there, mm.
+    most: largest size there, mm.
     """
 
     place: float
     size: float = 1.0
-    rates: tuple[float, float] | None = None
     most: float = np.inf
 
 
@@ -86,7 +84,7 @@ def graded(
             f"the coarsest size must be larger than {length / count:g} mm"
         )
     s = np.linspace(0.0, length, STATIONS)
-    away = [_growth(s - spot.place, *(spot.rates or (rate, rate))) for spot in spots]
+    away = [rate * np.abs(s - spot.place) for spot in spots]
 
     def segments(log_finest: float) -> Array:
         """Number of segments (stations,) from the beginning of the line to s."""
@@ -99,8 +97,3 @@ def graded(
     bounds = np.log(1e-6 * coarsest), np.log(coarsest)
     index = segments(brentq(lambda finest: segments(finest)[-1] - count, *bounds))
     return Spacing.of(s, index)
-
-
-def _growth(beyond: Array, before: float, behind: float) -> Array:
-    """Growth of a size at signed distances (n,) from a place, at these rates."""
-    return np.where(beyond < 0.0, -before * beyond, behind * beyond)

@@ -10,7 +10,7 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.section.uniform_layout import uniform_layout
-from softehl.cases.seal.solve.contact_layout import graded_layout
+from softehl.cases.seal.solve.contact_layout import contact_layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.method import run
@@ -54,7 +54,7 @@ def test_the_edge_of_a_pressure_like_a_square_root_is_found_exactly() -> None:
 def test_a_section_that_does_not_touch_keeps_equal_segments() -> None:
     system = build_system(oring(density=1))
     assert contact_edges(system, system.at_rest()) == []
-    assert graded_layout(system, system.at_rest()) == system.section.layout
+    assert contact_layout(system, system.at_rest(), system.parameters) == system.section.layout
 
 
 def test_segments_are_finest_at_the_edges_of_the_contact() -> None:
@@ -76,7 +76,7 @@ def test_a_graded_mesh_is_valid_and_its_boundary_is_round() -> None:
     radii = np.hypot(*(system.mesh.points[system.mesh.boundary] - centre).T)
     assert radii == pytest.approx(np.full(len(radii), radius), rel=1e-13)
     assert corner_jacobians(system.mesh).min() > 0.1
-    assert graded_layout(system, x).spacing is not None
+    assert contact_layout(system, x, system.parameters).spacing is not None
 
 
 def test_the_same_contact_is_found_on_both_meshes() -> None:

@@ -12,7 +12,7 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.system import BORE, ROD
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.section.layout import Layout
-from softehl.cases.seal.solve.contact_layout import placed_layout
+from softehl.cases.seal.solve.contact_layout import contact_layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
 from softehl.cases.seal.solve.path import PathDriver, StageFailed
@@ -105,7 +105,7 @@ def test_meshes_are_made_until_the_pressure_ends_in_the_contact() -> None:
     assert not isinstance(found, StageFailed)
     system, x = found
     assert unsealed(system, x) == ""
-    layout = placed_layout(*start, P)
+    layout = contact_layout(*start, P)
     assert layout.pressure_boundaries[0] is not None
     assert system.section.layout.pressure_boundaries[0] == layout.pressure_boundaries[0]
 

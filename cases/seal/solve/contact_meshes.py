@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.contact_layout import MOST_SEGMENTS, graded_layout, placed_layout
+from softehl.cases.seal.solve.contact_layout import contact_layout
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
 from softehl.cases.seal.solve.contact_store import ContactStore, stored_contact
 from softehl.cases.seal.solve.path import Followed, StageFailed
@@ -62,8 +62,7 @@ class ContactMeshes:
         x = self._begun(uniform)
         state: State | StageFailed = x if isinstance(x, StageFailed) else (uniform, x)
         for number in range(1, PASSES):
-            # the edges are seen only roughly: no reason for many segments
-            state = self._next(state, _at(p, coarse if number == 1 else guide), number, most=0)
+            state = self._next(state, _at(p, coarse if number == 1 else guide), number)
         state = self._sealed(_at(p, guide), state)
         return state if isinstance(state, StageFailed) else self._finer(*state, p.density)
 
@@ -75,16 +74,12 @@ class ContactMeshes:
                 break
         return state
 
-    def _next(
-        self, state: State | StageFailed, p: Seal, number: int, most: int = MOST_SEGMENTS
-    ) -> State | StageFailed:
-        """On a mesh that is made for the contact on another one; most: as of `placed_layout`."""
+    def _next(self, state: State | StageFailed, p: Seal, number: int) -> State | StageFailed:
+        """On a mesh that is made for the contact on another one."""
         if isinstance(state, StageFailed):
             return state
-        layout = graded_layout(*state) if p.given_arc else placed_layout(*state, p, most)
-        return self.solver.from_mesh(
-            *state, build_system(p, layout), f"contact on graded mesh {number}"
-        )
+        system = build_system(p, contact_layout(*state, p))
+        return self.solver.from_mesh(*state, system, f"contact on graded mesh {number}")
 
     def _begun(self, system: SealSystem) -> Followed:
         """Unknowns (n,) on the first mesh: a stored state if there is a good one, else the path."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -24,14 +24,10 @@ GRAZED = 1e-3
 
 @dataclass(frozen=True)
 class Edge:
-    """An edge of the contact: its place on the arc, mm, and K^2 of its pressure, MPa^2/mm.
-
-    sealed: whether the contact begins there, coming from the sealed side.
-    """
+    """An edge of the contact: its place on the arc, mm, and K^2 of its pressure, MPa^2/mm."""
 
     place: float
     rise: float
-    sealed: bool = True
 
 
 def groups(h: Array, inside: Flags, apart: float = CONTACT_FILM) -> list[Integers]:
@@ -92,7 +88,7 @@ def _edges(system: SealSystem, x: Array, touching: Integers) -> Iterator[Edge]:
         if system.section.layout.flat:
             outside = s[min(max(i[0] + way, 0), len(s) - 1)]
             edge = _bracketed(edge, (outside, s[i[0]]), (s[i[1]], pressure[i[1]] ** 2), -way)
-        yield replace(edge, sealed=way < 0)
+        yield edge
 
 
 def _edge(s: Array, y: Array) -> Edge:
