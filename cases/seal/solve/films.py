@@ -20,7 +20,7 @@ from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.solve.film_correctors import FilmCorrectors
 from softehl.cases.seal.solve.inlet import POWER, InletScales
 from softehl.cases.seal.solve.path import PathDriver
-from softehl.cases.seal.solve.squeeze_film import AGAIN, SqueezeFilm, film_loads, pressed_film
+from softehl.cases.seal.solve.squeeze_film import FIRST, SqueezeFilm, film_loads, pressed_film
 from softehl.cases.seal.states.results import film_numbers
 from softehl.cases.seal.states.state import StageRecord, place
 from softehl.cases.seal.states.verdict import FilmNumbers
@@ -65,7 +65,7 @@ class Film:
     @property
     def begun(self) -> tuple[SqueezeFilm, Moment]:
         """The moment from which it is squeezed out where it is not found at once."""
-        return self.squeeze_film, Moment(self.x, AGAIN, 1.0)
+        return self.squeeze_film, Moment(self.x, FIRST, 1.0)
 
     @property
     def solution(self) -> Solution:
@@ -154,7 +154,7 @@ class FilmSolver:
         if branch.converged and squeeze_film.change(film.x, branch.last.x) < inf:
             return self._entered(squeeze_film, correctors, branch.last)
         x = branch.last.x if branch.points else film.x
-        return self._followed(squeeze_film, Moment(x, AGAIN, 1.0), correctors)
+        return self._followed(squeeze_film, Moment(x, FIRST, 1.0), correctors)
 
     def from_film(self, carried: SqueezeFilm, start: Moment, pressures: Array) -> Film | NoFilm:
         """The steady film of another mesh, carried to ours: at once, else squeezed out from there.

@@ -33,10 +33,8 @@ from softehl.runtime.fem.rules import content_rule, pressure_nodes
 EXPONENT = 1.5
 """a of the local time steps. On X-rings at the slowest speed 1 found no film and 2 was as good."""
 
-FIRST, AGAIN = 1e-3, 0.1
-"""First step, of T: from contact between smooth surfaces where it leaves a gap as thin as the film
-(a thicker one flows sooner), and from all else. With 1e-2 for both, rings 9, 26 and 250 have no
-`ok` at -10 mm/s and ring 50 has no estimate; a rough U-cup has no film from 1e-3."""
+FIRST = 1e-2
+"""First step, of T."""
 
 _NO_WIDTH = 1e-6
 """Of the widest part of the arc around a node, below which it is between segments on a wall."""
@@ -110,9 +108,8 @@ class SqueezeFilm:
 
     @property
     def first(self) -> float:
-        """Length of the first step from the contact state; see `FIRST`."""
-        first = AGAIN if self.system.parameters.rough else FIRST
-        return float(first * min(1.0, self.scales.thickness / OFFSET) ** EXPONENT)
+        """Length of the first step from the contact, where a thicker film flows sooner."""
+        return float(FIRST * min(1.0, self.scales.thickness / OFFSET) ** EXPONENT)
 
     def _masses(self, x: Array) -> csc_array[np.float64]:
         """Rates of what the film holds, by the local time steps; see `gap_masses`."""
