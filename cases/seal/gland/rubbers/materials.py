@@ -105,10 +105,10 @@ SECOND = {"uniaxial": -0.5, "biaxial": 1.0, "shear": 0.0}
 """Test -> logarithmic strain across over that along; `shear` is planar tension, pure shear."""
 
 
-def strains(test: str, stretch: Array) -> Array:
-    """Principal logarithmic strains (n, 2) of a test at its stretches (n,)."""
+def strains(test: str | Array, stretch: Array) -> Array:
+    """Principal logarithmic strains (n, 2) of a test, or of the tests (n,), at stretches (n,)."""
     along = np.log(stretch)
-    return np.stack([along, SECOND[test] * along], axis=1)
+    return np.stack([along, np.vectorize(SECOND.get)(test) * along], axis=1)
 
 
 def nominal_stress(material: Material, values: Values, e: Array, stretch: Array) -> Array:

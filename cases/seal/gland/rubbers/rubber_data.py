@@ -7,7 +7,7 @@ tension), `stretch` and `stress_MPa` (nominal), and `temperature_degC` where the
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,8 +19,8 @@ from softehl.cases.seal.gland.rubbers.materials import (
     MATERIALS,
     SECOND,
     TERMS,
-    Material,
     nominal_stress,
+    strains,
     stress_by,
     unstable_at,
 )
@@ -46,9 +46,7 @@ class RubberData:
     @property
     def strains(self) -> Array:
         """Principal logarithmic strains (n, 2)."""
-        second = np.array([SECOND[test] for test in self.test])
-        along = np.log(self.stretch)
-        return np.stack([along, second * along], axis=1)
+        return strains(self.test, self.stretch)
 
     @property
     def temperatures(self) -> list[float]:
@@ -57,10 +55,8 @@ class RubberData:
 
     def part(self, chosen: Array) -> RubberData:
         """Some of the points."""
-        return RubberData(*(getattr(self, f)[chosen] for f in _FIELDS))
-
-
-_FIELDS = ("test", "stretch", "stress", "temperature")
+        points = self.test, self.stretch, self.stress, self.temperature
+        return RubberData(*(of_all[chosen] for of_all in points))
 
 
 def read_data(path: Path) -> RubberData:
@@ -119,16 +115,14 @@ class Fit:
     """A material fitted to tests.
 
     values: of its keys, at the temperature that was asked for. model: (n,) its nominal stress at
-    the points, at the temperature of each, MPa. factors: temperature (degC) -> factor on all
-    stresses, 1 where the shape was fitted; empty without temperatures. unstable: as `unstable_at`,
-    also within the stretches of the data.
+    the points, at the temperature of each, MPa. unstable: as `unstable_at`, also within the
+    stretches of the data.
     """
 
     material: str
     data: RubberData
     values: Mapping[str, Any]
     model: Array
-    factors: Mapping[float, float]
     unstable: tuple[str, float] | None
 
     @property
@@ -151,9 +145,8 @@ def fit(name: str, data: RubberData, terms: int = TERMS, temperature: float | No
     """
     material, heats = MATERIALS[name], data.temperatures
     if heats and temperature is None and len(heats) > 1:
-        raise ValueError(
-            f"the tests are at {_listed(heats)} degC: give the temperature of the seal"
-        )
+        listed = ", ".join(f"{heat:g}" for heat in heats)
+        raise ValueError(f"the tests are at {listed} degC: give the temperature of the seal")
     counts = [int((data.temperature == heat).sum()) for heat in heats]
     base = data.part(data.temperature == heats[int(np.argmax(counts))]) if heats else data
     wanted = 2 * terms if name == "ogden" else len(material.keys)
@@ -161,20 +154,21 @@ def fit(name: str, data: RubberData, terms: int = TERMS, temperature: float | No
         raise ValueError(
             f"{len(base.stretch)} points are too few for the {wanted} parameters of {name}"
         )
-    given = _SOLVERS[name](material, base, terms)
+    given = _fitted(name, base, terms)
     values = material.kernel_values(given)
     model = nominal_stress(material, values, data.strains, data.stretch)
-    factors: dict[float, float] = {}
+    factors: dict[float, float] = {}  # on all stresses, 1 where the shape was fitted
     for heat in heats:
         at = data.temperature == heat
         factors[heat] = float(model[at] @ data.stress[at] / (model[at] @ model[at]))
         model[at] *= factors[heat]
     if factors:
-        given = _scaled(material, given, _factor(factors, temperature))
+        factor = _factor(factors, temperature)
+        given |= {key: times(given[key], factor) for key in material.moduli}
     tested = {test: data.stretch[data.test == test] for test in set(data.test.tolist())}
     limits = {test: (float(at.min()), float(at.max())) for test, at in tested.items()}
     found = unstable_at(material, material.kernel_values(given), limits)
-    return Fit(name, data, given, model, factors, found)
+    return Fit(name, data, given, model, found)
 
 
 def _factor(factors: Mapping[float, float], temperature: float | None) -> float:
@@ -189,113 +183,61 @@ def _factor(factors: Mapping[float, float], temperature: float | None) -> float:
     return float(np.interp(at, heats, [factors[heat] for heat in heats]))
 
 
-def _scaled(material: Material, given: Mapping[str, Any], factor: float) -> dict[str, Any]:
-    return {k: times(v, factor) if k in material.moduli else v for k, v in given.items()}
-
-
-def _listed(numbers: list[float]) -> str:
-    return ", ".join(f"{n:g}" for n in numbers)
-
-
 # --- least squares --------------------------------------------------------------------------------
 
-
-def _linear(material: Material, data: RubberData, _: int) -> dict[str, Any]:
-    """Energies that are linear in their parameters; moduli of Mooney-Rivlin are not negative."""
-    from scipy.optimize import lsq_linear
-
-    names = material.kernel_values(dict.fromkeys(material.keys, 1.0))
-    names = {n: v for n, v in names.items() if v == 1.0}
-    e, stretch = data.strains, data.stretch
-    zero = dict.fromkeys(material.sheet.parameters, 0.0)
-    columns = [stress_by(material, n, zero, e, stretch) for n in names]
-    lower = -np.inf if material.energy == "yeoh" else 0.0
-    found = lsq_linear(np.stack(columns, axis=1), data.stress, (lower, np.inf))
-    return dict(zip(material.keys, map(float, found.x), strict=True))
-
-
-def _locking(material: Material, data: RubberData, _: int) -> dict[str, Any]:
-    """A modulus and what locks the chains: J_m above all I1 - 3 of the data, or lambda_m > 1."""
-    from scipy.optimize import least_squares
-
-    squares = np.exp(2.0 * data.strains)
-    first = float((squares.sum(axis=1) + 1.0 / squares.prod(axis=1)).max()) - 3.0
-    least = 1.001 * first if material.energy == "gent" else 1.001
-    names = material.keys
-    residual, slopes = _problem(material, data, lambda x: dict(zip(names, x, strict=True)))
-    best = min(
-        (
-            least_squares(residual, (1.0, c * least), slopes, ((1e-6, least), (np.inf, np.inf)))
-            for c in (1.1, 2.0, 10.0)
-        ),
-        key=lambda found: found.cost,
-    )
-    return dict(zip(names, map(float, best.x), strict=True))
-
-
-_EXPONENTS = ((1.3, 5.0, -2.0), (2.0, 8.0, -1.0), (0.6, 3.0, -4.0))
+_EXPONENTS = np.array([(1.3, 5.0, -2.0), (2.0, 8.0, -1.0), (0.6, 3.0, -4.0)])
 """Exponents alpha of three terms with which fits are begun: the first are Ogden's of 1972; the best
 of the three fits counts."""
 
-_BOUNDS = ((0.05, 20.0), (0.05, 20.0), (-20.0, -0.05))
-"""Least and largest exponent of each term; at 0 a term has no stress."""
+_SIZES = (0.05, 20.0)
+"""Least and largest size of an exponent; at 0 a term has no stress."""
 
 
-def _ogden(material: Material, data: RubberData, terms: int) -> dict[str, Any]:
-    """Ogden's terms with mu alpha >= 0, which makes each of them stable at every stretch."""
+def _fitted(name: str, data: RubberData, terms: int) -> dict[str, Any]:
+    """The keys of a material with the least squares, the best of several starts."""
     from scipy.optimize import least_squares
 
-    def values(x: Array) -> dict[str, float]:
-        g, alpha = x[:terms], x[terms:]
-        return material.kernel_values({"ogden_mu": list(g / alpha), "ogden_alpha": list(alpha)})
+    material, e, stretch = MATERIALS[name], data.strains, data.stretch
+    starts, limits = _starts(name, data, terms)
+    ends = limits[:, 0], limits[:, 1]
+    if name == "ogden":
+        names = [f"{letter}_{k + 1}" for letter in ("mu", "alpha") for k in range(terms)]
+    else:  # the kernel of neo-hooke has a modulus more, which is 0
+        names = list(material.kernel_values(dict.fromkeys(material.keys, 1.0)))[: len(limits)]
 
-    plain, slopes_of = _problem(material, data, values)
-
-    def slopes(x: Array) -> Array:
-        g, alpha = x[:terms], x[terms:]
-        by = slopes_of(x)
-        by_mu, by_alpha = by[:, 0 : 2 * terms : 2], by[:, 1 : 2 * terms : 2]
-        return np.hstack([by_mu / alpha, by_alpha - by_mu * g / alpha**2])
-
-    lower = [0.0] * terms + [low for low, _ in _BOUNDS[:terms]]
-    upper = [np.inf] * terms + [high for _, high in _BOUNDS[:terms]]
-    found = [
-        least_squares(
-            plain,
-            [1.0 / 4**k for k in range(terms)] + list(start[:terms]),
-            slopes,
-            (lower, upper),
-            x_scale="jac",
-            max_nfev=2000,
-        )
-        for start in _EXPONENTS
-    ]
-    best = min(found, key=lambda one: one.cost).x
-    mu = tuple(map(float, best[:terms] / best[terms:]))
-    return {"ogden_mu": mu, "ogden_alpha": tuple(map(float, best[terms:]))}
-
-
-def _problem(
-    material: Material, data: RubberData, values: Callable[[Array], Mapping[str, float]]
-) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
-    """Differences (n,) of the stresses, and their derivatives by the parameters of the kernel."""
-    e, stretch = data.strains, data.stretch
+    def given(x: Array) -> dict[str, Any]:
+        numbers = tuple(map(float, x))
+        if name == "ogden":
+            return {"ogden_mu": numbers[:terms], "ogden_alpha": numbers[terms:]}
+        return dict(zip(material.keys, numbers, strict=True))
 
     def residual(x: Array) -> Array:
-        return nominal_stress(material, values(x), e, stretch) - data.stress
+        values = material.kernel_values(given(x))
+        return nominal_stress(material, values, e, stretch) - data.stress
 
     def slopes(x: Array) -> Array:
-        at = values(x)
-        return np.stack([stress_by(material, n, at, e, stretch) for n in at], axis=1)
+        values = material.kernel_values(given(x))
+        return np.stack([stress_by(material, n, values, e, stretch) for n in names], axis=1)
 
-    return residual, slopes
+    found = (
+        least_squares(residual, start, slopes, ends, x_scale="jac", max_nfev=2000)
+        for start in starts
+    )
+    return given(min(found, key=lambda one: one.cost).x)
 
 
-_SOLVERS: dict[str, Callable[[Material, RubberData, int], dict[str, Any]]] = {
-    "mooney-rivlin": _linear,
-    "neo-hooke": _linear,
-    "yeoh": _linear,
-    "ogden": _ogden,
-    "arruda-boyce": _locking,
-    "gent": _locking,
-}
+def _starts(name: str, data: RubberData, terms: int) -> tuple[Array, Array]:
+    """Where fits begin, (starts, n), and the limits of the parameters, (n, 2)."""
+    if name == "ogden":  # mu alpha >= 0 makes each term stable at every stretch
+        alpha = _EXPONENTS[:, :terms]
+        ends = [np.outer(np.sign(alpha[0]), sizes) for sizes in ((0.0, np.inf), _SIZES)]
+        mu = 0.25 ** np.arange(terms) / alpha
+        return np.hstack([mu, alpha]), np.sort(np.vstack(ends), axis=1)
+    if name in ("gent", "arruda-boyce"):  # J_m above all I1 - 3 of the data, lambda_m above 1
+        squares = np.exp(2.0 * data.strains)
+        first = float((squares.sum(axis=1) + 1.0 / squares.prod(axis=1)).max()) - 3.0
+        least = 1.001 * (first if name == "gent" else 1.0)
+        starts = [(1.0, part * least) for part in (1.1, 2.0, 10.0)]
+        return np.array(starts), np.array([(0.0, np.inf), (least, np.inf)])
+    count = len(MATERIALS[name].keys)
+    return np.ones((1, count)), np.array([(-np.inf if name == "yeoh" else 0.0, np.inf)] * count)
