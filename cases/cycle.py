@@ -21,10 +21,9 @@ from softehl.cases.seal.gland.assumed import assumed
 from softehl.cases.seal.gland.headings import CYCLE
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.reach import beyond_reach, reach
-from softehl.cases.seal.gland.rubbers.rubber import outside
 from softehl.cases.seal.gland.surfaces import MIXED
 from softehl.cases.seal.gland.trade.said import understood
-from softehl.cases.seal.gland.unused_keys import unused_keys
+from softehl.cases.seal.gland.warnings import warnings
 from softehl.cases.seal.report.limits import LEFT_OUT
 from softehl.cases.seal.report.title import titled
 from softehl.cases.seal.states.answer import far, leaks
@@ -243,8 +242,8 @@ class CycleCase(Case[Cycle, CycleRow]):
     def warnings(self, parameters: Cycle) -> list[str]:
         """See :class:`Case`."""
         highest = parameters.path.pressure.largest
-        words = [*beyond_reach(parameters, highest), *unused_keys(parameters), *unused(parameters)]
-        words += [*outside(parameters.compound, parameters.temperature), *parameters.path.defects()]
+        words = [*beyond_reach(parameters, highest), *warnings(parameters), *unused(parameters)]
+        words += parameters.path.defects()
         if parameters.rough:
             return words
         return [

@@ -9,13 +9,11 @@ from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.harness.pictures import KINDS
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import Record
-from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.assumed import assumed
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.reach import beyond_reach, reach
-from softehl.cases.seal.gland.rubbers.rubber import outside, soft
 from softehl.cases.seal.gland.trade.said import understood
-from softehl.cases.seal.gland.unused_keys import unused_keys
+from softehl.cases.seal.gland.warnings import warnings
 from softehl.cases.seal.report import PICTURES, SOME, paraview, write_plots
 from softehl.cases.seal.report.limits import LEFT_OUT
 from softehl.cases.seal.report.title import titled
@@ -96,10 +94,7 @@ class ORingCase(Case[Seal, FilmRow]):
     def warnings(self, parameters: Seal) -> list[str]:
         """See :class:`Case`."""
         p = parameters
-        gland = p.rod_diameter, p.housing_diameter, p.groove_width
-        advised = catalogue.warnings(p.free_ring, *gland)
-        unusual = [*soft(p), *outside(p.compound, p.temperature), *advised]
-        return [*beyond_reach(p, p.sealed_pressure), *unused_keys(p), *unusual]
+        return [*beyond_reach(p, p.sealed_pressure), *warnings(p)]
 
     def answer(self, parameters: Seal, rows: Sequence[FilmRow]) -> list[str]:
         """See :class:`Case`."""

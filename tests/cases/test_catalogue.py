@@ -4,9 +4,11 @@ from itertools import pairwise
 
 import pytest
 
-from softehl.cases.seal.gland import catalogue
-from softehl.cases.seal.gland.catalogue import UnknownRingError, as568, ring
-from softehl.cases.seal.gland.grooves import INCH, Range
+from softehl.cases.seal.gland.catalogue import as568, ring
+from softehl.cases.seal.gland.grooves import INCH, squeeze
+from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.trade.text import NotUnderstoodError
+from softehl.cases.seal.gland.warnings import handbook
 
 SERIES = {0: (1, 50), 1: (102, 178), 2: (201, 284), 3: (309, 395), 4: (425, 475)}
 SECTIONS = {0: 0.070, 1: 0.103, 2: 0.139, 3: 0.210, 4: 0.275}
@@ -105,41 +107,48 @@ def test_metric_rings(name: str) -> None:
     ],
 )
 def test_unknown_rings_name_the_nearest(name: str, says: str) -> None:
-    with pytest.raises(UnknownRingError) as caught:
+    with pytest.raises(NotUnderstoodError) as caught:
         ring(name)
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
+def seated(inner: float, section: float, rod: float, housing: float, width: float) -> Gland:
+    return Gland(
+        inner_diameter=inner,
+        section_diameter=section,
+        rod_diameter=rod,
+        housing_diameter=housing,
+        groove_width=width,
+    )
+
+
 def test_fill_of_a_square_gland_is_that_of_a_circle_in_a_square() -> None:
-    free = catalogue.Ring("", inner_diameter=50.0, section_diameter=4.0)
-    assert catalogue.fill(free, 50.0, 58.0, 4.0) == pytest.approx(100 * 0.7853981634)
+    p = seated(50.0, 4.0, 50.0, 58.0, 4.0)
+    assert p.fill_percent == pytest.approx(100 * 0.7853981634)
 
 
-def test_stretch_and_squeeze() -> None:
-    on_rod, loose = catalogue.Ring("", 50.0, 4.0), catalogue.Ring("", 50.39, 4.0)
-    assert catalogue.stretch(on_rod, 51.0, 58.0) == pytest.approx(2.0)
-    assert catalogue.stretch(loose, 50.0, 57.0) == 0.0
+def test_stretch() -> None:
+    assert seated(50.0, 4.0, 51.0, 58.0, 5.0).stretch_percent == pytest.approx(2.0)
+    assert seated(50.39, 4.0, 50.0, 57.0, 5.0).stretch_percent == 0.0
 
 
 def test_a_ring_is_stretched_on_the_ground_of_a_piston() -> None:
-    outside = catalogue.Ring("", -40.0, 4.0)  # an inside diameter of 32 mm
-    assert catalogue.stretch(outside, -40.0, -33.0) == pytest.approx(100.0 / 32.0)
-    assert catalogue.fill(outside, -40.0, -33.0, 5.2) == pytest.approx(68.1, abs=0.1)
+    p = seated(-40.0, 4.0, -40.0, -33.0, 5.2)  # an inside diameter of 32 mm
+    assert p.stretch_percent == pytest.approx(100.0 / 32.0)
+    assert p.fill_percent == pytest.approx(68.1, abs=0.1)
 
 
 def test_squeeze() -> None:
-    assert catalogue.squeeze(3.53, 3.15) == pytest.approx(10.765, abs=1e-3)
+    assert squeeze(3.53, 3.15) == pytest.approx(10.765, abs=1e-3)
 
 
-def test_warnings() -> None:
-    found = ring("-226")
-    fits = {"housing_diameter": 56.15, "width": 4.7}
-    assert catalogue.warnings(found, 50.0, **fits) == ()
-    (over,) = catalogue.warnings(found, 50.0, 56.15, 3.3)
+def test_warnings_of_handbooks() -> None:
+    ring_226 = 50.3936, 3.5306
+    assert not [*handbook(seated(*ring_226, 50.0, 56.15, 4.7))]
+    (over,) = handbook(seated(*ring_226, 50.0, 56.15, 3.3))
     assert over == "the ring fills 98 % of its gland; handbooks advise 60 to 95 %"
-    (wide,) = catalogue.warnings(found, 50.0, 56.15, 9.0)
+    (wide,) = handbook(seated(*ring_226, 50.0, 56.15, 9.0))
     assert wide.startswith("the ring fills 36 %")
-    (tight,) = catalogue.warnings(found, 53.5, 59.65, 4.7)
-    assert "stretched by 6.2 %" in tight
-    assert Range(1.0, 2.0).middle == 1.5
+    (tight,) = handbook(seated(*ring_226, 53.5, 59.65, 4.7))
+    assert "stretched by 6.2 % on its rod" in tight

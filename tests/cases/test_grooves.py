@@ -12,13 +12,15 @@ from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.catalogue import as568
 from softehl.cases.seal.gland.grooves import (
     INCH,
-    UnknownGlandError,
+    KINDS,
     cup_gland,
     gland,
     squeeze,
 )
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.tolerances import read_tolerances
+from softehl.cases.seal.gland.warnings import handbook
 
 METRIC = {
     1.8: (1.45, 2.4),
@@ -58,16 +60,16 @@ def assumed(**given: Any) -> str:
 
 def test_glands_of_inch_sections() -> None:
     found = gland(0.139 * INCH)
-    assert found.depth == pytest.approx((0.119 * INCH, 0.123 * INCH), abs=1e-4)
-    assert found.width.middle == pytest.approx(0.185 * INCH, abs=1e-4)
-    assert gland(6.99).depth == pytest.approx((0.234 * INCH, 0.240 * INCH), abs=1e-4)
+    assert found.depth == pytest.approx(0.121 * INCH, abs=1e-4)
+    assert found.width == pytest.approx(0.185 * INCH, abs=1e-4)
+    assert gland(6.99).depth == pytest.approx(0.237 * INCH, abs=1e-4)
 
 
 def test_glands_of_metric_sections() -> None:
-    for chart, kind in ((METRIC, "dynamic"), (METRIC, "hydraulic"), (PNEUMATIC, "pneumatic")):
+    for chart, kind in zip((METRIC, METRIC, PNEUMATIC), KINDS, strict=True):
         for section, (depth, width) in chart.items():
             found = gland(section, kind)
-            assert (found.depth.middle, found.width.middle) == (depth, width)
+            assert (found.depth, found.width) == (depth, width)
             assert not found.by_rule
     for section in METRIC:
         assert squeeze(section, PNEUMATIC[section][0]) < squeeze(section, METRIC[section][0])
@@ -76,32 +78,32 @@ def test_glands_of_metric_sections() -> None:
 def test_glands_of_x_rings_are_deeper_and_narrower() -> None:
     for section in (1.78, 2.62, 3.53, 5.33, 6.99):
         ring, quad = gland(section), gland(section, section="x_ring")
-        assert quad.depth.middle > ring.depth.middle
-        assert quad.width.middle < ring.width.middle
-    assert gland(3.53, section="x_ring").depth.middle == pytest.approx(3.25, abs=0.005)
-    assert gland(3.53, section="x_ring").width.low == pytest.approx(3.94, abs=0.005)
+        assert quad.depth > ring.depth
+        assert quad.width < ring.width
+    assert gland(3.53, section="x_ring").depth == pytest.approx(3.25, abs=0.005)
+    assert gland(3.53, section="x_ring").width == pytest.approx(4.0, abs=0.1)
 
 
 def test_a_section_between_two_of_a_chart_has_proportions_between_theirs() -> None:
     found = gland(4.0, section="x_ring")
     assert found.by_rule
-    assert squeeze(5.33, 4.978) < squeeze(4.0, found.depth.middle) < squeeze(3.53, 3.251)
-    assert 4.0 * 1.115 < found.width.middle < 4.0 * 1.145
+    assert squeeze(5.33, 4.978) < squeeze(4.0, found.depth) < squeeze(3.53, 3.251)
+    assert 4.0 * 1.115 < found.width < 4.0 * 1.145
 
 
 def test_a_u_cup_stands_between_heel_and_lips() -> None:
     found = cup_gland(5.5, 4.6, 7.15)
-    assert found.depth.middle == pytest.approx(5.05)
-    assert found.width.middle == pytest.approx(7.865)
+    assert found.depth == pytest.approx(5.05)
+    assert found.width == pytest.approx(7.865)
 
 
 def test_what_has_no_gland_is_told_what_to_give() -> None:
-    with pytest.raises(
-        UnknownGlandError, match=r"section of 9 mm .* give squeeze and groove_width"
-    ):
+    with pytest.raises(ValueError, match=r"section of 9 mm .* give squeeze and groove_width"):
         gland(9.0)
-    with pytest.raises(UnknownGlandError, match='there is "dynamic" and "hydraulic"'):
-        gland(3.53, "rotary")
+    with pytest.raises(ValueError, match=r"gland\n.*'dynamic', 'hydraulic' or 'pneumatic'"):
+        made(ring="36x4", rod=36, gland="rotary")
+    with pytest.raises(ValueError, match=r"fill\n.*greater than or equal to 30"):
+        made(fill=0.0)
 
 
 def test_the_standard_gland_of_every_ring_is_sound() -> None:
@@ -110,10 +112,13 @@ def test_the_standard_gland_of_every_ring_is_sound() -> None:
     for found in [*as568().values(), *metric]:
         if found.section_diameter < 1.6 or found.inner_diameter < 3.0:
             continue
-        for kind in ("dynamic", "pneumatic"):
-            groove, rod = gland(found.section_diameter, kind), 1.02 * found.inner_diameter
-            housing = rod + 2.0 * groove.depth.middle
-            assert not catalogue.warnings(found, rod, housing, groove.width.middle)
+        rod = 1.02 * found.inner_diameter
+        inner, section = found.inner_diameter, found.section_diameter
+        ring: dict[str, Any] = {"inner_diameter": inner, "section_diameter": section}
+        for groove in (gland(found.section_diameter, k) for k in KINDS):
+            housing, width = rod + 2.0 * groove.depth, groove.width
+            p = Gland(**ring, rod_diameter=rod, housing_diameter=housing, groove_width=width)
+            assert not [*handbook(p)]
 
 
 def test_a_metric_ring_has_its_gland() -> None:
@@ -173,8 +178,7 @@ def test_depth_and_fill_decide_housing_and_width() -> None:
     assert volume / (0.25 * pi * (42.8**2 - 36.0**2) * p.groove_width) == pytest.approx(0.75)
     assert Seal(**p.model_dump()) == p
     square = made(section="rectangular", groove_depth=3.2, fill=80.0)
-    filled = catalogue.fill(square.free_ring, 50.0, 56.4, square.groove_width)
-    assert filled == pytest.approx(80.0)
+    assert square.fill_percent == pytest.approx(80.0)
 
 
 @pytest.mark.parametrize(

@@ -79,7 +79,7 @@ def test_sizes_are_those_of_the_trade() -> None:
     assert p.ring_diameter == pytest.approx(32.0)
     assert p.rod_diameter == pytest.approx(-40.0195)
     assert p.housing_diameter == pytest.approx(-33.0)  # by the nominal bore of the chart
-    assert p.free_ring.volume / Seal(ring="32x4", rod=33).free_ring.volume == pytest.approx(-1.0)
+    assert p.volume / Seal(ring="32x4", rod=33).volume == pytest.approx(-1.0)
     assert Seal(**p.settled()).rod_diameter == p.rod_diameter
 
 

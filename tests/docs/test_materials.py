@@ -63,8 +63,8 @@ def test_polymers() -> None:
 
 def test_glands() -> None:
     for section, *sizes in rows("glands.md", "glands")[1:]:
-        hydraulic, pneumatic = (gland(float(section), kind) for kind in ("dynamic", "pneumatic"))
-        found = [getattr(g, k).middle for g in (hydraulic, pneumatic) for k in ("depth", "width")]
+        hydraulic, pneumatic = gland(float(section)), gland(float(section), "pneumatic")
+        found = [size for g in (hydraulic, pneumatic) for size in (g.depth, g.width)]
         assert list(map(float, sizes)) == found
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 
-from softehl.cases.seal.gland.grooves import UnknownGlandError, gland
+from softehl.cases.seal.gland.grooves import gland
 from softehl.cases.seal.gland.oils import is_improved
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.gland import Gland
@@ -77,11 +77,7 @@ def _kind(p: Gland) -> tuple[str, bool]:
         return "the gland of a U-cup by rule, its ground half way between heel and lips", False
     if p.section not in (ROUND, "x_ring") or p.outline:
         return f"the gland of an O-ring, as none is known for this {p.named}", False
-    try:
-        by_rule = gland(p.section_diameter, p.gland, p.section).by_rule
-    except UnknownGlandError:
-        return "a gland", True
-    if by_rule:
+    if gland(p.section_diameter, p.gland, p.section).by_rule:
         return "a gland in proportions between those of the neighbouring sections", False
     return "its standard gland", True
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.given import number, put
-from softehl.cases.seal.gland.grooves import Groove, cup_gland, gland
+from softehl.cases.seal.gland.grooves import KINDS, Groove, cup_gland, gland
 from softehl.cases.seal.gland.records.free_seal import FreeSeal
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.sections.base import parts_of
@@ -22,10 +22,12 @@ from softehl.cases.seal.gland.sections.u_cup import UCup
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.said import bands
 
-_GLAND = ("squeeze", "groove_depth", "fill")
-
-UCUP = parts_of(UCup)
-"""Proportions of a U-cup."""
+_DIAMETERS = {
+    "rod": "rod_diameter",
+    "bore": "rod_diameter",
+    "groove_diameter": "housing_diameter",
+}
+"""Key of a diameter as it is measured -> key that is negative in a piston."""
 
 
 def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -39,18 +41,14 @@ def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(values.get("ring"), int):
         values["ring"] = str(values["ring"])  # "-226" is a number to a reader of TOML
     side = _side(values)
-    for name in ("rod", "bore"):
+    for name, key in _DIAMETERS.items():
         if number(values.get(name)):
-            _follow(values, "rod_diameter", side * float(values[name]), name)
-    if number(values.get("groove_diameter")):
-        ground = side * float(values["groove_diameter"])
-        _follow(values, "housing_diameter", ground, "groove_diameter")
+            _follow(values, key, side * float(values[name]), name)
     if side < 0.0:
         _in_piston(values)
     if isinstance(values.get("ring"), str):
         _with_ring(values)
-    if isinstance(values.get("gland"), str) or any(number(values.get(k)) for k in _GLAND):
-        _with_gland(values)
+    _with_gland(values)
     return values
 
 
@@ -141,13 +139,14 @@ def _with_cup(values: dict[str, Any], rod: float, groove: float, width: float) -
     values.setdefault("rod_diameter", rod)
     values.setdefault("housing_diameter", groove)
     values.setdefault("groove_width", width)
-    depth, heel = 0.5 * (groove - rod), UCUP["heel_height"]
+    depth, heel = 0.5 * (groove - rod), parts_of(UCup)["heel_height"]
     height = values.setdefault("section_diameter", round(depth / (0.5 * (1.0 + heel)), 3))
     if number(height):
         values.setdefault("inner_diameter", rod - (height - depth))
 
 
 def _with_gland(values: dict[str, Any]) -> None:
+    """Ground and width of the groove by squeeze, depth, a standard gland and fill."""
     section, rod = _size(values, "section_diameter"), _size(values, "rod_diameter")
     if not (number(section) and number(rod)):
         return
@@ -156,35 +155,29 @@ def _with_gland(values: dict[str, Any]) -> None:
         _follow(values, "housing_diameter", rod + 2.0 * depth, "squeeze")
     if number(values.get("groove_depth")):
         _follow(values, "housing_diameter", rod + 2.0 * values["groove_depth"], "groove_depth")
-    if isinstance(values.get("gland"), str):
-        gland = _gland(values, section)
+    if values.get("gland") in KINDS:
+        groove = _groove(values, section)
         if values.get("housing_diameter") is None:
             limited = dict(bands(tuple(values.get("said", ()))))
             nominal = limited.get("bore" if rod < 0.0 else "rod")
             rod_of_chart = math.copysign(nominal.nominal, rod) if nominal else rod
-            values["housing_diameter"] = round(rod_of_chart + 2.0 * gland.depth.middle, 4)
+            values["housing_diameter"] = round(rod_of_chart + 2.0 * groove.depth, 4)
         if values.get("groove_width") is None and values.get("fill") is None:
-            values["groove_width"] = round(gland.width.middle, 4)
-    if number(values.get("fill")):
-        _follow(values, "groove_width", _filled(values), "fill")
+            values["groove_width"] = round(groove.width, 4)
+    if number(fill := values.get("fill")) and fill > 0.0:
+        free = FreeSeal(**{k: values[k] for k in FreeSeal.model_fields if k in values})
+        around = 0.25 * math.pi * (_size(values, "housing_diameter") ** 2 - rod**2)
+        width = 100.0 * free.volume / (around * fill)
+        _follow(values, "groove_width", width, "fill")
 
 
-def _gland(values: Mapping[str, Any], section: float) -> Groove:
+def _groove(values: Mapping[str, Any], section: float) -> Groove:
     """The standard gland of a section."""
     if values.get("section") != "u_cup":
         return gland(section, values["gland"], values.get("section", "round"))
-    sizes = {
-        key: values.get(key) or part * section
-        for key, part in (("heel_height", UCUP["heel_height"]), ("section_width", UCUP["width"]))
-    }
-    return cup_gland(section, sizes["heel_height"], sizes["section_width"])
-
-
-def _filled(values: Mapping[str, Any]) -> float:
-    """Width of the groove that a ring fills to its share, mm."""
-    free = FreeSeal(**{k: values[k] for k in FreeSeal.model_fields if k in values})
-    rod, housing = _size(values, "rod_diameter"), _size(values, "housing_diameter")
-    return catalogue.fill(free.free_ring, rod, housing, 1.0) / float(values["fill"])
+    parts = parts_of(UCup)
+    heel = values.get("heel_height") or parts["heel_height"] * section
+    return cup_gland(section, heel, values.get("section_width") or parts["width"] * section)
 
 
 def _follow(values: dict[str, Any], key: str, value: float, source: str) -> None:

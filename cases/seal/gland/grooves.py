@@ -18,86 +18,62 @@ and lips, and the groove is a tenth wider than the seal.
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import Literal, get_args
 
 INCH = 25.4
 """mm"""
 
 Kind = Literal["dynamic", "hydraulic", "pneumatic"]
-
-KINDS: tuple[Kind, ...] = ("dynamic", "hydraulic", "pneumatic")
 """Uses of a reciprocating seal; "dynamic" is "hydraulic"."""
 
-_SIZES = ("section", "depth_low", "depth_high", "width_low", "width_high")
+KINDS: tuple[Kind, ...] = get_args(Kind)
 
-SAME = 0.03
+_SAME = 0.03
 """Relative difference of two sections that have the same groove."""
-
-
-class UnknownGlandError(ValueError):
-    """A section for which no gland is known; its text says what to give instead."""
-
-
-class Range(NamedTuple):
-    """Least and largest value, mm."""
-
-    low: float
-    high: float
-
-    @property
-    def middle(self) -> float:
-        """Mean of both ends, mm."""
-        return 0.5 * (self.low + self.high)
 
 
 @dataclass(frozen=True)
 class Groove:
     """A groove for one section, mm: depth from the rod to its ground, axial width.
 
-    The depth holds the clearance between rod and housing; the width is one without back-up rings.
-    by_rule: whether it follows from a rule, not from a chart.
+    Both are the middles of what a chart allows. The depth holds the clearance between rod and
+    housing; the width is one without back-up rings. by_rule: whether it follows from a rule, not
+    from a chart.
     """
 
     section_diameter: float
-    depth: Range
-    width: Range
+    depth: float
+    width: float
     by_rule: bool = False
 
 
-def gland(section_diameter: float, kind: str = "dynamic", section: str = "round") -> Groove:
-    """The gland for a section (mm) of this shape; kind: one of KINDS.
-
-    Raises UnknownGlandError. A U-cup: `cup_gland`.
-    """
-    if kind not in KINDS:
-        raise UnknownGlandError(f'gland = "{kind}" is not known; there is {_quoted(KINDS)}')
+def gland(section_diameter: float, kind: Kind = "dynamic", section: str = "round") -> Groove:
+    """The gland for a section (mm) of this shape; a U-cup has `cup_gland`.  ValueError."""
     round_rings = "pneumatic" if kind == "pneumatic" else "dynamic"
     chart = _chart("x_ring" if section == "x_ring" else round_rings)
     near = min(chart, key=lambda g: abs(g.section_diameter - section_diameter))
-    if abs(section_diameter - near.section_diameter) <= SAME * near.section_diameter:
+    if abs(section_diameter - near.section_diameter) <= _SAME * near.section_diameter:
         return near
     for below, above in pairwise(chart):
         if below.section_diameter < section_diameter < above.section_diameter:
             return _between(below, above, section_diameter)
     scale = section_diameter / near.section_diameter
-    raise UnknownGlandError(
+    raise ValueError(
         f'gland = "{kind}" has no groove for a section of {section_diameter:g} mm (only '
         f"{chart[0].section_diameter:.3g} to {chart[-1].section_diameter:.3g} mm); give squeeze "
         "and groove_width instead: in the proportions of the nearest one, squeeze = "
-        f"{squeeze(near.section_diameter, near.depth.middle):.3g} and groove_width = "
-        f"{scale * near.width.middle:.3g}"
+        f"{squeeze(near.section_diameter, near.depth):.3g} and groove_width = "
+        f"{scale * near.width:.3g}"
     )
 
 
 def cup_gland(height: float, heel_height: float, width: float) -> Groove:
     """The gland of a U-cup whose free lips and heel have these heights, mm."""
-    depth, groove = 0.5 * (height + heel_height), 1.1 * width
-    return Groove(height, Range(depth, depth), Range(groove, groove), by_rule=True)
+    return Groove(height, 0.5 * (height + heel_height), 1.1 * width, by_rule=True)
 
 
 def squeeze(section_diameter: float, depth: float) -> float:
@@ -109,12 +85,12 @@ def _between(below: Groove, above: Groove, section: float) -> Groove:
     """A gland in proportions that are interpolated between two sections."""
     part = (section - below.section_diameter) / (above.section_diameter - below.section_diameter)
 
-    def size(name: Literal["depth", "width"]) -> Range:
-        low, high = (getattr(g, name).middle / g.section_diameter for g in (below, above))
-        length = round(section * ((1.0 - part) * low + part * high), 2)
-        return Range(length, length)
+    def size(low: float, high: float) -> float:
+        low, high = low / below.section_diameter, high / above.section_diameter
+        return round(section * ((1.0 - part) * low + part * high), 2)
 
-    return Groove(section, size("depth"), size("width"), by_rule=True)
+    depth, width = size(below.depth, above.depth), size(below.width, above.width)
+    return Groove(section, depth, width, by_rule=True)
 
 
 @cache
@@ -127,9 +103,6 @@ def _chart(name: str) -> tuple[Groove, ...]:
 
 def _groove(row: dict[str, str]) -> Groove:
     unit = INCH if row["unit"] == "in" else 1.0
-    section, *ends = (round(unit * float(row[name]), 4) for name in _SIZES)
-    return Groove(section, Range(*ends[:2]), Range(*ends[2:]))
-
-
-def _quoted(names: Iterable[str]) -> str:
-    return " and ".join(f'"{n}"' for n in names)
+    names = ("section", "depth_low", "depth_high", "width_low", "width_high")
+    section, *ends = (round(unit * float(row[name]), 4) for name in names)
+    return Groove(section, 0.5 * (ends[0] + ends[1]), 0.5 * (ends[2] + ends[3]))

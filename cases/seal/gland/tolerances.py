@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from softehl.cases.harness.row import Record, column
-from softehl.cases.seal.gland.catalogue import UnknownRingError, ring
+from softehl.cases.seal.gland.catalogue import ring
 from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.said import LENGTHS as LIMITED
 from softehl.cases.seal.gland.trade.said import bands
 from softehl.cases.seal.gland.varied import LENGTHS, MEASURES, NUMBERS, PRESSURE_KEY
@@ -117,12 +118,9 @@ def _moved(name: str, p: Seal) -> tuple[str, ...]:
 
 def ring_sizes(name: str | None) -> list[tuple[str, float, float]]:
     """Sizes of a ring of the catalogue that have a tolerance: key, mm, +- mm; none of a U-cup."""
-    if name is None:
+    if name is None or read_ring(name).kind == "u_cup":
         return []
-    try:
-        known = ring(name)
-    except UnknownRingError:
-        return []
+    known = ring(name)
     sizes = (
         ("section_diameter", known.section_diameter, known.section_tolerance),
         ("inner_diameter", known.inner_diameter, known.inner_tolerance),

@@ -1,9 +1,9 @@
 """The seal before it is fitted: its section and its diameters."""
 
+from math import pi
 from pathlib import Path
 
 from softehl.cases.harness.parameters import key
-from softehl.cases.seal.gland.catalogue import Ring
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.base import HEIGHT
 from softehl.cases.seal.gland.sections.keys import (
@@ -47,29 +47,23 @@ class FreeSeal(SectionKeys):
     )
 
     @property
-    def free_ring(self) -> Ring:
-        """The seal as it is sold."""
-        if self.round:
-            return Ring("", self.inner_diameter, self.section_diameter)
+    def volume(self) -> float:
+        """Of the free seal, mm^3; of a piston seal, whose diameters are negative, negative."""
         outline = self.free_section.outline
-        sizes = {"area": outline.area, "middle": outline.centroid[1]}
-        return Ring("", self.inner_diameter, self.section_diameter, **sizes)
+        return 2.0 * pi * outline.centroid[1] * outline.area
 
     @property
     def free_section(self) -> Shape:
         """The free section where it is.  ValueError where there is none."""
-        shape = self._whole
-        return shape if self.cap_thickness is None else capped(shape, self.cap_thickness)
-
-    @property
-    def _whole(self) -> Shape:
         sizes = self.sizes
         if self.outline is None:
-            return shape_of(self.section, sizes, self.inner_diameter)
-        if self.section != ROUND or len(sizes) > 1:
+            shape = shape_of(self.section, sizes, self.inner_diameter)
+        elif self.section != ROUND or len(sizes) > 1:
             others = [name for name in sizes if name != "height"] or ["section"]
             raise ValueError(f"outline and {', '.join(others)}: give one of them")
-        return shape_of_file(Path(self.outline), self.inner_diameter)
+        else:
+            shape = shape_of_file(Path(self.outline), self.inner_diameter)
+        return shape if self.cap_thickness is None else capped(shape, self.cap_thickness)
 
     @property
     def sizes(self) -> dict[str, float]:

@@ -1,10 +1,11 @@
 """The gland: what a seal slides on, its groove, and how it sits in there."""
 
+from math import pi
+
 from pydantic import field_validator
 
 from softehl.cases.harness.parameters import key
-from softehl.cases.seal.gland import catalogue
-from softehl.cases.seal.gland.grooves import Kind
+from softehl.cases.seal.gland.grooves import Kind, squeeze
 from softehl.cases.seal.gland.records.free_seal import SIGNED, FreeSeal
 
 
@@ -120,18 +121,21 @@ class Gland(FreeSeal):
     @property
     def squeeze_percent(self) -> float:
         """Part of the free section that the gland takes away, %."""
-        return catalogue.squeeze(self.section_diameter, self.depth)
+        return squeeze(self.section_diameter, self.depth)
 
     @property
     def stretch_percent(self) -> float:
-        """Circumferential stretch of the free ring on what carries it, %."""
-        return catalogue.stretch(self.free_ring, self.rod_diameter, self.housing_diameter)
+        """Circumferential stretch of the free ring on its rod, or on the ground of the groove of
+        its piston, %; 0 if it is loose.
+        """
+        on = -self.housing_diameter if self.piston else self.rod_diameter
+        return 100.0 * max(on / self.ring_diameter - 1.0, 0.0)
 
     @property
     def fill_percent(self) -> float:
         """Volume of the free ring over that of the gland, %."""
-        sizes = self.rod_diameter, self.housing_diameter, self.groove_width
-        return catalogue.fill(self.free_ring, *sizes)
+        around = 0.25 * pi * (self.housing_diameter**2 - self.rod_diameter**2)
+        return 100.0 * self.volume / (around * self.groove_width)
 
     @property
     def sealed_wall(self) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from softehl.cases.seal.gland.given import number, put, shown
 from softehl.cases.seal.gland.rubbers.hardness import limits, youngs_modulus
@@ -20,11 +20,8 @@ from softehl.cases.seal.gland.rubbers.materials import (
     unstable_at,
 )
 from softehl.cases.seal.gland.rubbers.rubber_data import fit, read_data
-from softehl.cases.seal.gland.trade.rubber_names import RANGES, read_rubber
+from softehl.cases.seal.gland.trade.rubber_names import read_rubber
 from softehl.cases.seal.gland.trade.text import refused
-
-if TYPE_CHECKING:
-    from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
 
 PAPER = {"mu_1": 3.04, "mu_2": 0.62}
 """Moduli of Table 1 of the paper, MPa."""
@@ -85,18 +82,6 @@ def polymer_of(text: str | None) -> str | None:
     """The polymer of a rubber that is named."""
     found = None if text is None else read_rubber("compound", text)
     return None if found is None else found.polymer
-
-
-def outside(text: str | None, temperature: float | None) -> list[str]:
-    """A warning of a temperature outside the range of a rubber that is named."""
-    polymer = polymer_of(text)
-    used = RANGES[polymer] if polymer else None
-    if used is None or temperature is None or used[0] <= temperature <= used[1]:
-        return []
-    return [
-        f"temperature = {temperature:g} degC: {polymer} is used from {used[0]:g} to "
-        f"{used[1]:g} degC"
-    ]
 
 
 def _source(values: Mapping[str, Any], material: Material) -> str:
@@ -182,18 +167,3 @@ def _require_pairs(mu: tuple[float, ...], alpha: tuple[float, ...]) -> None:
         )
     if 0.0 in alpha:
         raise ValueError("ogden_alpha has a 0: an exponent of 0 is no term; leave it out")
-
-
-_LEAST_BULK = 20.0
-"""Bulk over shear modulus of a rubber at least; Poisson's ratio is 0.475 there."""
-
-
-def soft(p: Rubber) -> list[str]:
-    """Unusual properties of a rubber, in words."""
-    ratio = p.bulk_modulus / p.shear_modulus
-    if ratio >= _LEAST_BULK:
-        return []
-    return [
-        f"bulk_modulus = {p.bulk_modulus:g} MPa is {ratio:.3g} shear moduli: "
-        "rubbers have hundreds to thousands"
-    ]
