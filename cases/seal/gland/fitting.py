@@ -17,7 +17,7 @@ from softehl.cases.seal.gland.grooves import KINDS, Groove, cup_gland, gland
 from softehl.cases.seal.gland.records.free_seal import FreeSeal
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.sections.base import parts_of
-from softehl.cases.seal.gland.sections.keys import shape_of_file
+from softehl.cases.seal.gland.sections.keys import section_of_file
 from softehl.cases.seal.gland.sections.u_cup import UCup
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.said import bands
@@ -58,7 +58,8 @@ def _with_outline(values: dict[str, Any]) -> None:
         inner = _size(values, "inner_diameter")
         if not number(inner) or inner == 0.0:
             return  # refused with its key
-        _, low, _, high = shape_of_file(Path(values["outline"]), float(inner)).outline.box
+        shape, _ = section_of_file(Path(values["outline"]), float(inner))
+        _, low, _, high = shape.outline.box
         put(values, "section_diameter", high - low, f"outline = {values['outline']}")
 
 

@@ -11,6 +11,7 @@ from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
 from softehl.cases.seal.gland.sections.keys import SectionKeys
 from softehl.cases.seal.gland.shear_thinning import ThinningKeys
 from softehl.cases.seal.gland.surfaces import Surfaces
+from softehl.cases.seal.gland.varied import MEASURES
 
 _HARDNESS = ("compound", "shore_A")
 
@@ -21,7 +22,7 @@ def own(record: type[Parameters]) -> tuple[str, ...]:
 
 
 SEAL = {
-    "ring": (*own(FreeSeal), *SectionKeys.model_fields),
+    "ring": (*own(FreeSeal), *own(SectionKeys), *MEASURES),
     "gland": own(Gland),
     "rubber": (
         *_HARDNESS,

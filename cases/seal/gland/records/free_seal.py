@@ -12,9 +12,8 @@ from softehl.cases.seal.gland.sections.keys import (
     capped,
     dimensions,
     lobes,
-    mesh_of_file,
+    section_of_file,
     shape_of,
-    shape_of_file,
 )
 from softehl.runtime.mesh.outline import Shape
 from softehl.runtime.mesh.sections import SectionMesh
@@ -57,12 +56,12 @@ class FreeSeal(SectionKeys):
         """The free section where it is.  ValueError where there is none."""
         sizes = self.sizes
         if self.outline is None:
-            shape = shape_of(self.section, sizes, self.inner_diameter)
+            shape = shape_of(self.section, tuple(sizes.items()), self.inner_diameter)
         elif self.section != ROUND or len(sizes) > 1:
             others = [name for name in sizes if name != "height"] or ["section"]
             raise ValueError(f"outline and {', '.join(others)}: give one of them")
         else:
-            shape = shape_of_file(Path(self.outline), self.inner_diameter)
+            shape, _ = section_of_file(Path(self.outline), self.inner_diameter)
         return shape if self.cap_thickness is None else capped(shape, self.cap_thickness)
 
     @property
@@ -105,4 +104,6 @@ class FreeSeal(SectionKeys):
     @property
     def file_mesh(self) -> SectionMesh:
         """The mesh of the file that outline names, where it is."""
-        return mesh_of_file(Path(self.outline or ""), self.inner_diameter)
+        _, mesh = section_of_file(Path(self.outline or ""), self.inner_diameter)
+        assert mesh is not None
+        return mesh

@@ -1,13 +1,12 @@
 """The solid of a seal: its section, the mesh of it, and its materials."""
 
-from pathlib import Path
+import numpy as np
 
 from softehl.cases.harness.parameters import key
 from softehl.cases.seal.gland.records.discretisation import Discretisation
 from softehl.cases.seal.gland.records.free_seal import FreeSeal
 from softehl.cases.seal.gland.rubbers.regions import MATERIALS, Region
 from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
-from softehl.cases.seal.gland.sections.keys import surface_of
 from softehl.runtime.mesh.parted_mesh import CAP
 
 
@@ -19,8 +18,16 @@ class Solid(FreeSeal, Rubber, Discretisation):
     @property
     def surface_modulus(self) -> float:
         """Shear modulus of what the film is on [MPa]."""
-        under = surface_of(Path(self.outline or "")) if self.mesh == "file" else CAP
+        under = self._surface if self.mesh == "file" else CAP
         return self.rubber(under if under in self.materials else "").shear_modulus
+
+    @property
+    def _surface(self) -> str:
+        """The region of the mesh file that the lowest point of its film is on, "" if of none."""
+        mesh = self.file_mesh
+        lowest = mesh.arc_nodes[int(np.argmin(mesh.points[mesh.arc_nodes, 1]))]
+        of_it = (name for name, cells in mesh.regions.items() if lowest in mesh.quads[cells])
+        return next(of_it, "")
 
     @property
     def regions(self) -> tuple[str, ...]:

@@ -34,23 +34,18 @@ class Section(Parameters):
 
         Raises OutlineError, a ValueError, where the dimensions do not go together.
         """
-        drawn, (z, r) = self.drawn(), self.crown()
-        aside, lift = seat(drawn, inner_diameter)
-        outline = drawn.moved(shift=(aside, lift))
-        return Shape.facing(outline, (z + aside, r + lift), self.called())
-
-    @classmethod
-    def called(cls) -> str:
-        """The name of the section, that of its file."""
-        return cls.__module__.rpartition(".")[2]
+        drawn = self.drawn()
+        (z, r), (aside, lift) = self.crown(drawn), seat(drawn, inner_diameter)
+        name = type(self).__module__.rpartition(".")[2]
+        return Shape.facing(drawn.moved(shift=(aside, lift)), (z + aside, r + lift), name)
 
     def drawn(self) -> Outline:
         """The outline as the section's own page draws it, anywhere in the plane."""
         raise NotImplementedError
 
-    def crown(self) -> Point:
-        """Place in that drawing at which the housing ends the sealed pressure."""
-        raise NotImplementedError
+    def crown(self, drawn: Outline) -> Point:
+        """Place in that drawing at which the housing ends the sealed pressure: top, middle."""
+        return 0.0, drawn.box[3]
 
 
 def part(share: float, meaning: str, **limits: Any) -> Any:

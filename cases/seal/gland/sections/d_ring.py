@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import sqrt
 
 from softehl.cases.seal.gland.sections.base import Section, joined, part, require
-from softehl.runtime.mesh.outline import Arc, Line, Outline, Point
+from softehl.runtime.mesh.outline import Arc, Line, Outline
 
 
 class DRing(Section):
@@ -51,7 +51,3 @@ class DRing(Section):
             Line((-half, top), (-half, rise)),
             Arc((-half, rise), (-touch[0], touch[1]), (-low, rise)),
         )
-
-    def crown(self) -> Point:
-        """The middle of the back."""
-        return 0.0, self.height

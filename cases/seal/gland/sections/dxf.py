@@ -7,6 +7,8 @@ from math import cos, dist, radians, sin
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from softehl.cases.seal.gland.sections.seated import Named, mirrored, named_shape
 from softehl.runtime.mesh.outline import Arc, Line, OutlineError, Piece, Point, Shape
 from softehl.runtime.mesh.outline_checks import CLOSED
@@ -20,9 +22,9 @@ def read_dxf(path: Path, inner_diameter: float | None = None) -> Shape:
     """The section of a drawing, x to the air side and y away from the rod, in its units.
 
     One closed contour; the layers FILM and PRESSURE name its lubricated and its sealed part. A
-    drawing whose sealed side is on the right is mirrored. Raises OutlineError, one line.
+    drawing whose sealed side is on the right is mirrored. Raises OutlineError.
     """
-    return named_shape(_chained(_pieces(path), path.name), inner_diameter, path.name)
+    return named_shape(_chained(_pieces(path)), inner_diameter, path.stem)
 
 
 def _pieces(path: Path) -> list[Named]:
@@ -31,29 +33,24 @@ def _pieces(path: Path) -> list[Named]:
         from ezdxf.filemanagement import readfile
         from ezdxf.lldxf.const import DXFError
     except ImportError:
-        raise OutlineError(
-            f"{path.name}: DXF files are read by ezdxf; pip install 'softehl[cad]'"
-        ) from None
-    if not path.is_file():
-        raise OutlineError(f"no drawing {str(path)!r}")
+        raise OutlineError("DXF files are read by ezdxf; pip install 'softehl[cad]'") from None
     try:
         document = readfile(path)
     except (OSError, DXFError, UnicodeError) as error:
-        words = " ".join(str(error).split()) or "not a DXF file"
-        raise OutlineError(f"{path.name}: {words}") from None
+        raise OutlineError(" ".join(str(error).split()) or "not a DXF file") from None
     unit = int(document.header.get("$INSUNITS", 0))
     if unit not in _UNITS:
-        raise OutlineError(f"{path.name}: $INSUNITS = {unit} is no metric unit or inch; use mm")
+        raise OutlineError(f"$INSUNITS = {unit} is no metric unit or inch; use mm")
     found: list[Named] = []
     for entity in document.modelspace():
         layer = str(entity.dxf.layer)
-        found += [(p.moved(_UNITS[unit], (0.0, 0.0)), layer) for p in _converted(entity, path.name)]
+        found += [(p.moved(_UNITS[unit], (0.0, 0.0)), layer) for p in _converted(entity)]
     if not found:
-        raise OutlineError(f"{path.name}: there is no contour of lines and arcs")
+        raise OutlineError("there is no contour of lines and arcs")
     return found
 
 
-def _converted(entity: Any, file: str) -> Iterator[Piece]:
+def _converted(entity: Any) -> Iterator[Piece]:
     """The pieces of one entity; text and dimensions have none."""
     kind = entity.dxftype()
     if kind in _WORDS:
@@ -72,7 +69,7 @@ def _converted(entity: Any, file: str) -> Iterator[Piece]:
         found = _polyline(corners, entity.is_closed)
     else:
         raise OutlineError(
-            f"{file}: {kind} on layer {entity.dxf.layer!r} is no line, arc, circle or flat "
+            f"{kind} on layer {entity.dxf.layer!r} is no line, arc, circle or flat "
             "polyline; explode it or draw it as arcs"
         )
     behind = entity.dxf.hasattr("extrusion") and entity.dxf.extrusion.z < 0.0
@@ -99,12 +96,11 @@ def _polyline(corners: list[tuple[float, float, float]], closed: bool) -> list[P
     return [bulge_arc(a, b, float(bulge)) for a, b, bulge in pairs if a != b]
 
 
-def _chained(named: list[Named], file: str) -> list[Named]:
+def _chained(named: list[Named]) -> list[Named]:
     """The pieces, turned and in order, so that each begins where the one before ends."""
     left, chain = list(named[1:]), [named[0]]
-    boxes = [piece.box for piece, _ in named]
-    size = dist((min(b[0] for b in boxes), min(b[1] for b in boxes)),
-                (max(b[2] for b in boxes), max(b[3] for b in boxes)))  # fmt: skip
+    boxes = np.array([piece.box for piece, _ in named])
+    size = dist(boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0))
     while dist(chain[-1][0].end, chain[0][0].start) > CLOSED * size:
         end = chain[-1][0].end
         gaps = [min(dist(end, p.start), dist(end, p.end)) for p, _ in left]
@@ -113,8 +109,8 @@ def _chained(named: list[Named], file: str) -> list[Named]:
         k = gaps.index(gap)
         if gap > CLOSED * size or k == len(left):
             raise OutlineError(
-                f"{file}: the contour is open: a gap of {gap:.4g} mm at ({end[0]:.6g}, "
-                f"{end[1]:.6g}); close it"
+                f"the contour is open: a gap of {gap:.4g} mm at ({end[0]:.6g}, {end[1]:.6g}); "
+                "close it"
             )
         piece, layer = left.pop(k)
         forward = dist(end, piece.start) <= dist(end, piece.end)
@@ -122,7 +118,7 @@ def _chained(named: list[Named], file: str) -> list[Named]:
     if left:
         z, r = left[0][0].start
         raise OutlineError(
-            f"{file}: there is more than one contour, such as at ({z:.6g}, {r:.6g}); holes and "
-            "second parts are not allowed"
+            f"there is more than one contour, such as at ({z:.6g}, {r:.6g}); holes and second "
+            "parts are not allowed"
         )
     return chain

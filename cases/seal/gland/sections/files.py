@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,17 +12,19 @@ from softehl.cases.seal.gland.sections.dxf import read_dxf
 from softehl.cases.seal.gland.sections.seated import (
     FILM,
     PRESSURE,
+    film_below,
     named_shape,
-    outline_in,
-    require_film_below,
+    read_from,
     runs,
     seated,
 )
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.mesh.mesh import Mesh, MeshError
+from softehl.runtime.mesh.faces import once
+from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.mesh.outline import Line, Outline, OutlineError, Point, Shape
 from softehl.runtime.mesh.sections import SectionMesh, corner_jacobians
 from softehl.runtime.mesh.subdivide import subdivided
+from softehl.runtime.mesh.thickness import in_chains
 
 COLUMNS = ("z_mm", "r_mm", "part")
 """Of a CSV file: points in order; part, of the side from a point to the next, may be left out."""
@@ -38,26 +39,27 @@ def read_outline(path: Path, inner_diameter: float | None = None) -> Shape:
     Raises OutlineError, one line.
     """
     readers = {".dxf": read_dxf, ".csv": read_points}
-    if path.suffix.lower() not in readers:
-        raise OutlineError(f"{path.name}: an outline is a .dxf or a .csv file")
-    return readers[path.suffix.lower()](path, inner_diameter)
+    with read_from(path):
+        if path.suffix.lower() not in readers:
+            raise OutlineError("an outline is a .dxf or a .csv file")
+        return readers[path.suffix.lower()](path, inner_diameter)
 
 
 def read_points(path: Path, inner_diameter: float | None = None) -> Shape:
-    """The section of a CSV file with the columns of COLUMNS.  Raises OutlineError, one line."""
+    """The section of a CSV file with the columns of COLUMNS.  Raises OutlineError."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
         points = [(float(row["z_mm"]), float(row["r_mm"])) for row in rows]
-    except OSError:
-        raise OutlineError(f"no file {str(path)!r}") from None
-    except (KeyError, TypeError, ValueError, UnicodeDecodeError):
+    except OSError as error:
+        raise OutlineError(f"it cannot be read: {error.strerror}") from None
+    except (KeyError, TypeError, ValueError):
         raise OutlineError(
-            f"{path.name}: a file of points has the columns {', '.join(COLUMNS)} (the last may be "
-            "left out), numbers in the first two"
+            f"a file of points has the columns {', '.join(COLUMNS)} (the last may be left out), "
+            "numbers in the first two"
         ) from None
     parts = [(row.get("part") or "").strip() for row in rows]
-    return outline_of(points, inner_diameter, parts if any(parts) else None, path.name)
+    return outline_of(points, inner_diameter, parts if any(parts) else None, path.stem)
 
 
 def outline_of(
@@ -71,19 +73,17 @@ def outline_of(
     parts: FILM, PRESSURE or else of the side behind each point. Without: film where the polygon
     faces the rod, sealed pressure from its highest point on. Raises OutlineError.
     """
-    if len(points) > 1 and points[0] == points[-1]:
-        points = points[:-1]
-    if len(points) < 3:
-        raise OutlineError(f"{name}: {len(points)} points make no outline; at least 3 are needed")
-    lines = [Line(a, b) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
     if parts is not None:
-        return named_shape(list(zip(lines, parts, strict=False)), inner_diameter, name)
-    outline = seated(outline_in(name, lines), inner_diameter)
+        lines = [Line(a, b) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
+        closed = points[0] == points[-1]  # the last line is a point then
+        return named_shape(
+            list(zip(lines[:-1] if closed else lines, parts, strict=False)), inner_diameter, name
+        )
+    outline = seated(Outline.polygon(points), inner_diameter)
     z, r = np.array([piece.start for piece in outline.pieces]).T
     highest = np.flatnonzero(r >= r.max() - 1e-6 * outline.size)
     crown = highest[int(np.argmin(z[highest]))]
-    shape = Shape.facing(outline, (float(z[crown]), float(r[crown])), Path(name).stem)
-    return require_film_below(shape, name)
+    return film_below(Shape.facing(outline, (float(z[crown]), float(r[crown])), name))
 
 
 def read_mesh(path: Path, inner_diameter: float | None = None) -> tuple[Shape, SectionMesh]:
@@ -91,33 +91,38 @@ def read_mesh(path: Path, inner_diameter: float | None = None) -> tuple[Shape, S
 
     Groups of cells become regions. Raises OutlineError or MeshError, one line.
     """
-    mesh, file = Mesh.read(path), path.name
+    mesh = Mesh.read(path)
+    with read_from(path):
+        return _section_of(mesh, inner_diameter, path.stem)
+
+
+def _section_of(mesh: Mesh, inner_diameter: float | None, name: str) -> tuple[Shape, SectionMesh]:
     if set(mesh.cells) != {"quad4"}:
-        raise MeshError(
-            f"{file}: it has cells of the kinds {', '.join(mesh.cells)}; a section is meshed by "
+        raise OutlineError(
+            f"it has cells of the kinds {', '.join(mesh.cells)}; a section is meshed by "
             "quadrilaterals of four nodes alone (Gmsh: Mesh.RecombineAll = 1)"
         )
-    quads = _counterclockwise(mesh.points, mesh.cells["quad4"])
-    loop = _loop(mesh.boundary["line2"], mesh.points, file)
+    points, quads = mesh.points, _counterclockwise(mesh.points, mesh.cells["quad4"])
+    loop = _loop(points, quads)
     names = _names(mesh, loop)
-    points, found = mesh.points, runs(names, file)
+    found = runs(names)
     if found.mirrored:
         points, quads = points * [-1.0, 1.0], quads[:, ::-1]
         loop, names = loop[::-1], [*names[-2::-1], names[-1]]
-        found = runs(names, file)
+        found = runs(names)
     first, arc = found.film
     loop = np.roll(loop, -first)
-    drawn = Outline.polygon([(float(z), float(r)) for z, r in points[loop]])
+    drawn = Outline.polygon(points[loop])
     outline = seated(drawn, inner_diameter)
     points = points + np.subtract(outline.pieces[0].start, drawn.pieces[0].start)
     places = outline.starts
     begin, count = (found.pressure[0] - first) % len(loop), found.pressure[1]
     pressure = float(places[begin]), float(places[(begin + count) % len(loop)])
-    shape = Shape(outline, (0.0, float(places[arc])), pressure, path.stem)
-    regions = {name: group["quad4"] for name, group in mesh.groups.items() if "quad4" in group}
-    found_mesh = SectionMesh(points, quads, loop, arc, places[:-1], outline.length, regions)
-    _require_sound(found_mesh, file)
-    return require_film_below(shape, file), found_mesh
+    shape = Shape(outline, (0.0, float(places[arc])), pressure, name)
+    regions = {group: cells["quad4"] for group, cells in mesh.groups.items() if "quad4" in cells}
+    section = SectionMesh(points, quads, loop, arc, places[:-1], outline.length, regions)
+    _require_sound(section)
+    return film_below(shape), section
 
 
 def _counterclockwise(points: Array, quads: Integers) -> Integers:
@@ -127,34 +132,21 @@ def _counterclockwise(points: Array, quads: Integers) -> Integers:
     return np.where(clockwise[:, None], quads[:, ::-1], quads)
 
 
-def _loop(edges: Integers, points: Array, file: str) -> Integers:
-    """Nodes (B,) of the boundary, counterclockwise.  Raises MeshError where it is not one loop."""
-    neighbours: dict[int, list[int]] = {}
-    for a, b in edges.tolist():
-        neighbours.setdefault(a, []).append(b)
-        neighbours.setdefault(b, []).append(a)
-    for node, others in neighbours.items():
-        if len(others) != 2:
-            z, r = points[node]
-            raise MeshError(f"{file}: the boundary meets itself at ({z:.6g}, {r:.6g}); part it")
-    start = int(edges[0, 0])
-    loop, before = [start], -1
-    while True:
-        here = loop[-1]
-        after = next((n for n in neighbours[here] if n != before), before)
-        if after == start:
-            break
-        before = here
-        loop.append(after)
-    if len(loop) < len(neighbours):
-        raise MeshError(
-            f"{file}: the boundary is more than one loop: {len(loop)} of {len(neighbours)} nodes "
-            "are on one; a section has no holes and is one part"
+def _loop(points: Array, quads: Integers) -> Integers:
+    """Nodes (B,) of the boundary, counterclockwise.  Raises OutlineError where it is no loop."""
+    edges = once(np.concatenate([quads[:, [k, (k + 1) % 4]] for k in range(4)]), 2)
+    starts, times = np.unique(edges[:, 0], return_counts=True)
+    if times.max() > 1:
+        z, r = points[starts[times.argmax()]]
+        raise OutlineError(f"the boundary meets itself at ({z:.6g}, {r:.6g}); part it")
+    begin, end = in_chains(edges).T
+    ends = np.flatnonzero(end == begin[0])[0] + 1
+    if ends < len(edges):
+        raise OutlineError(
+            f"the boundary is more than one loop: {ends} of {len(edges)} nodes are on one; a "
+            "section has no holes and is one part"
         )
-    nodes = np.array(loop, dtype=np.int64)
-    z, r = (points[nodes] - points[nodes].mean(axis=0)).T
-    area = float((z * np.roll(r, -1) - r * np.roll(z, -1)).sum())
-    return nodes if area > 0.0 else nodes[::-1]
+    return np.asarray(begin)
 
 
 def _names(mesh: Mesh, loop: Integers) -> list[str]:
@@ -169,13 +161,13 @@ def _names(mesh: Mesh, loop: Integers) -> list[str]:
     return [known.get(frozenset(pair), "") for pair in pairs]
 
 
-def _require_sound(mesh: SectionMesh, file: str) -> None:
+def _require_sound(mesh: SectionMesh) -> None:
     shares = corner_jacobians(mesh).min(axis=1)
     worst = int(shares.argmin())
     if shares[worst] < _LEAST:
         z, r = mesh.points[mesh.quads[worst]].mean(axis=0)
-        raise MeshError(
-            f"{file}: an element at ({z:.6g}, {r:.6g}) is folded or nearly so, a corner of it has "
+        raise OutlineError(
+            f"an element at ({z:.6g}, {r:.6g}) is folded or nearly so, a corner of it has "
             f"{shares[worst]:.3g} of its share; mend the mesh there"
         )
 
@@ -192,12 +184,4 @@ def finer(mesh: SectionMesh, k: int) -> SectionMesh:
         name: (cells[:, None] * k**2 + np.arange(k**2)).ravel()
         for name, cells in mesh.regions.items()
     }
-    return replace(
-        mesh,
-        points=points,
-        quads=quads,
-        boundary=border,
-        arc=mesh.arc * k,
-        places=places,
-        regions=regions,
-    )
+    return SectionMesh(points, quads, border, mesh.arc * k, places, mesh.length, regions)

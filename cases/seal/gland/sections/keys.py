@@ -49,59 +49,48 @@ def dimensions(section: str) -> dict[str, str]:
     return {_RENAMED.get(name, name): name for name in names}
 
 
-def _declared() -> dict[str, Any]:
-    """Which section, and every dimension of every section once, with what it means in each."""
-    found: dict[str, list[tuple[str, str, float]]] = {}
-    for section in SECTIONS:
+def _dimensions() -> dict[str, Any]:
+    """Every dimension of every section as a key, once, with what it means in each."""
+    uses: dict[str, dict[str, dict[str, Any]]] = {}
+    for section, page in SECTIONS.items():
         for name, own in dimensions(section).items():
-            extra = SECTIONS[section].model_fields[own].json_schema_extra
+            extra = page.model_fields[own].json_schema_extra
             assert isinstance(extra, dict)
-            use = section, str(extra["meaning"]), float(str(extra["part"]))
-            found.setdefault(name, []).append(use)
-    keys = {name: (float | None, _key(uses)) for name, uses in found.items()}
-    section = key(ROUND, "section of the seal (docs/sections.md)")
-    outline = key(
+            uses.setdefault(name, {})[section] = extra
+    return {name: (float | None, _key(of)) for name, of in uses.items()}
+
+
+def _key(uses: Mapping[str, Mapping[str, Any]]) -> Any:
+    """A key of the sections that have this dimension."""
+    first, *_ = uses.values()
+    shares = " or ".join(dict.fromkeys(f"{extra['part']:g}" for extra in uses.values()))
+    bounds = f"left out = {shares} of section_diameter"
+    return key(None, f"{', '.join(uses)}: {first['meaning']}", unit="mm", bounds=bounds, ge=0)
+
+
+if TYPE_CHECKING:
+    _Dimensions = Parameters
+else:
+    _Dimensions = create_model("_Dimensions", __base__=Parameters, **_dimensions())
+
+
+class SectionKeys(_Dimensions):
+    """Which section a seal has, and the dimensions of it."""
+
+    section: Name = key(ROUND, "section of the seal (docs/sections.md)")
+    outline: str | None = key(
         None,
         "instead of `section`: one that is drawn, given by points, or bounds a mesh",
         bounds="a .dxf, .csv or mesh file (.msh, .vtu, ...), see docs/sections.md",
         file=True,
     )
-    cap = key(
+    cap_thickness: float | None = key(
         None,
         "thickness of a cap of its own material (materials.cap, PTFE) on the side of the rod",
         unit="mm",
         bounds="left out = none; it holds the whole film",
         gt=0,
     )
-    return {
-        "section": (Name, section),
-        "outline": (str | None, outline),
-        "cap_thickness": (float | None, cap),
-        **keys,
-    }
-
-
-def _key(uses: list[tuple[str, str, float]]) -> Any:
-    """A key of the sections that have this dimension."""
-    meaning = f"{', '.join(section for section, _, _ in uses)}: {uses[0][1]}"
-    shares = " or ".join(dict.fromkeys(f"{share:g}" for _, _, share in uses))
-    bounds = f"left out = {shares} of section_diameter"
-    return key(None, meaning, unit="mm", bounds=bounds, ge=0)
-
-
-if TYPE_CHECKING:
-
-    class _Keys(Parameters):
-        section: Name = ROUND
-        outline: str | None = None
-        cap_thickness: float | None = None
-
-else:
-    _Keys = create_model("_Keys", __base__=Parameters, **_declared())
-
-
-class SectionKeys(_Keys):
-    """Which section a seal has, and the dimensions of it."""
 
     @property
     def round(self) -> bool:
@@ -114,32 +103,27 @@ class SectionKeys(_Keys):
         return NAMES[self.section] if self.outline is None else f"ring of {Path(self.outline).name}"
 
 
-def shape_of(section: str, sizes: Mapping[str, float], inner_diameter: float) -> Shape:
-    """The shape of a section of these dimensions.  ValueError where they bound none."""
-    return _shape(section, tuple(sorted(sizes.items())), inner_diameter)
+def section_of_file(
+    path: Path, inner_diameter: float | None = None
+) -> tuple[Shape, SectionMesh | None]:
+    """The shape of a file, and its mesh if it has one; without inner_diameter where it was drawn.
 
-
-def shape_of_file(path: Path, inner_diameter: float | None = None) -> Shape:
-    """The shape of a file; where it was drawn without an inner_diameter.  ValueError, one line."""
+    Raises ValueError, one line.
+    """
     try:
         changed = path.stat().st_mtime_ns
     except OSError:
         raise ValueError(f'outline = "{path}": there is no such file') from None
-    return _shape_of_file(path, changed, inner_diameter)
+    return _section_of_file(path, changed, inner_diameter)
 
 
 @lru_cache(maxsize=32)
-def _shape_of_file(path: Path, changed: int, inner_diameter: float | None) -> Shape:
-    if not is_mesh(str(path)):
-        return read_outline(path, inner_diameter)
-    return _mesh_of_file(path, changed, inner_diameter)[0]
-
-
-@lru_cache(maxsize=32)
-def _mesh_of_file(
+def _section_of_file(
     path: Path, _changed: int, inner_diameter: float | None
-) -> tuple[Shape, SectionMesh]:
-    return read_mesh(path, inner_diameter)
+) -> tuple[Shape, SectionMesh | None]:
+    if is_mesh(str(path)):
+        return read_mesh(path, inner_diameter)
+    return read_outline(path, inner_diameter), None
 
 
 def is_mesh(outline: str | None) -> bool:
@@ -147,22 +131,9 @@ def is_mesh(outline: str | None) -> bool:
     return outline is not None and Path(outline).suffix.lower() not in (".dxf", ".csv")
 
 
-def mesh_of_file(path: Path, inner_diameter: float) -> SectionMesh:
-    """The mesh of a file, its lowest point at half the diameter.  ValueError, one line."""
-    return _mesh_of_file(path, path.stat().st_mtime_ns, inner_diameter)[1]
-
-
-def surface_of(path: Path) -> str:
-    """The region of a mesh file that the lowest point of its film is on, "" if of none."""
-    mesh = _mesh_of_file(path, path.stat().st_mtime_ns, None)[1]
-    nodes = mesh.arc_nodes
-    lowest = nodes[int(np.argmin(mesh.points[nodes, 1]))]
-    found = [name for name, cells in mesh.regions.items() if (mesh.quads[cells] == lowest).any()]
-    return found[0] if found else ""
-
-
 @lru_cache(maxsize=32)
-def _shape(section: str, sizes: tuple[tuple[str, float], ...], inner_diameter: float) -> Shape:
+def shape_of(section: str, sizes: tuple[tuple[str, float], ...], inner_diameter: float) -> Shape:
+    """The shape of a section of these dimensions.  ValueError where they bound none."""
     try:
         return SECTIONS[section](**dict(sizes)).shape(inner_diameter)
     except ValidationError as error:
@@ -198,17 +169,13 @@ def capped(shape: Shape, thickness: float) -> Shape:
 @lru_cache(maxsize=32)
 def lobes(shape: Shape) -> int:
     """Number of parts of its film that a section rests on: minima of r with a groove between."""
-    first, last = shape.film
-    r = shape.outline.at(np.linspace(first, last, _STATIONS))[:, 1]
-    deep, found, lowest, highest = _BETWEEN * float(np.ptp(r)), 1, r[0], r[0]
-    rising = False
+    r = shape.outline.at(np.linspace(*shape.film, _STATIONS))[:, 1]
+    found, deep, bottom, top = 1, _BETWEEN * float(np.ptp(r)), r[0], r[0]
     for value in r:
-        if rising:
-            highest = max(highest, value)
-            if value < highest - deep:
-                found, rising, lowest = found + 1, False, value
+        if min(top - bottom, top - value) > deep:  # behind a groove
+            found, bottom, top = found + 1, value, value
+        elif value < bottom:
+            bottom, top = value, value
         else:
-            lowest = min(lowest, value)
-            if value > lowest + deep:
-                rising, highest = True, value
+            top = max(top, value)
     return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from softehl.cases.seal.gland.sections.base import Section, part, require
-from softehl.runtime.mesh.outline import Outline, Point, rounded
+from softehl.runtime.mesh.outline import Outline, rounded
 
 
 class Rectangular(Section):
@@ -23,7 +23,3 @@ class Rectangular(Section):
         )
         z, r = 0.5 * self.width, 0.5 * self.height
         return Outline(rounded([(-z, -r), (z, -r), (z, r), (-z, r)], self.corner_radius))
-
-    def crown(self) -> Point:
-        """The middle of the upper side."""
-        return 0.0, 0.5 * self.height

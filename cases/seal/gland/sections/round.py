@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from softehl.cases.seal.gland.sections.base import Section
-from softehl.runtime.mesh.outline import Outline, Point
+from softehl.runtime.mesh.outline import Outline
 
 
 class Round(Section):
@@ -12,7 +12,3 @@ class Round(Section):
     def drawn(self) -> Outline:
         """About the origin."""
         return Outline.circle((0.0, 0.0), 0.5 * self.height)
-
-    def crown(self) -> Point:
-        """The highest point."""
-        return 0.0, 0.5 * self.height

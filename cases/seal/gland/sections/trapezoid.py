@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from softehl.cases.seal.gland.sections.base import Section, part, require
-from softehl.runtime.mesh.outline import Outline, Point, rounded
+from softehl.runtime.mesh.outline import Outline, rounded
 
 
 class Trapezoid(Section):
@@ -29,7 +29,3 @@ class Trapezoid(Section):
         )
         a, b, h = 0.5 * self.rod_width, 0.5 * self.width, self.height
         return Outline(rounded([(-a, 0.0), (a, 0.0), (b, h), (-b, h)], self.corner_radius))
-
-    def crown(self) -> Point:
-        """The middle of the upper side."""
-        return 0.0, self.height

@@ -70,8 +70,8 @@ class UCup(Section):
         """Distance of the front of the lips' bevels from the middle."""
         return 0.5 * self.height - self.bevel
 
-    def crown(self) -> Point:
+    def crown(self, drawn: Outline) -> Point:
         """The highest point of the lip in the housing, on its rounded sealing edge."""
-        top = max(self.drawn().pieces, key=lambda piece: piece.box[3])
+        top = max(drawn.pieces, key=lambda piece: piece.box[3])
         z = top.centre[0] if isinstance(top, Arc) else self.bevel
         return z, top.box[3]

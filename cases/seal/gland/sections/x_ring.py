@@ -44,9 +44,9 @@ class XRing(Section):
         )
         return joined(*self._arcs(z, r, reach))
 
-    def crown(self) -> Point:
+    def crown(self, drawn: Outline) -> Point:
         """The crest of the upper lobe on the sealed side."""
-        return -self._lobes[0], 0.5 * self.height
+        return -self._lobes[0], drawn.box[3]
 
     @property
     def _lobes(self) -> Point:
