@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import isfinite, nan, pi
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -18,7 +18,6 @@ from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import OK, Row, column
 from softehl.cases.seal.cycle.motion import Motion, motion_keys, motion_of
 from softehl.cases.seal.gland.assumed import assumed
-from softehl.cases.seal.gland.headings import CYCLE
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.reach import beyond_reach, reach
 from softehl.cases.seal.gland.surfaces import MIXED
@@ -42,7 +41,14 @@ Points = tuple[Annotated[tuple[float, float], Field(strict=False)], ...]
 class Cycle(Seal):
     """An O-ring and how its rod moves; the film conserves mass. `speeds`, `stroke` are not used."""
 
-    headings = CYCLE
+    headings: ClassVar = {
+        **Seal.headings,
+        "motion": (
+            *("sealed_pressure", "pressures", "travel", "frequency", "shape", "ramp", "motion"),
+            *("cycles", "supply", "speeds", "stroke"),
+        ),
+        "numerics": (*Seal.headings["numerics"], "time_order", "time_tolerance", "animation"),
+    }
 
     motion: Points | None = key(
         None,

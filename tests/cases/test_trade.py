@@ -9,11 +9,9 @@ import pytest
 from softehl.cases.harness.case_file import read_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.oring import CASE
-from softehl.cases.seal.gland.headings import WORDS
-from softehl.cases.seal.gland.oils import density
+from softehl.cases.seal.gland.oils import at_100_of_index, density, viscosity_index
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.tolerances import read_tolerances
-from softehl.cases.seal.gland.viscosity_index import at_100_of_index, viscosity_index
 from softehl.cases.shipped import SHIPPED
 
 CAP = "materials.cap=PU 95"
@@ -152,7 +150,7 @@ def test_what_is_not_read_is_answered_with_what_to_write(
 
 def test_every_word_that_is_no_key_is_answered_with_one() -> None:
     keys = Seal.model_fields
-    assert not set(WORDS) & set(keys)
-    for answer in WORDS.values():
+    assert not set(Seal.words) & set(keys)
+    for answer in Seal.words.values():
         names = re.findall(r"write (\w+)", answer)
         assert "piston" in answer or (names and set(names) <= set(keys)), answer

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 
 from softehl.cases.seal.gland.grooves import gland
-from softehl.cases.seal.gland.oils import is_improved
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.rubbers import materials
 from softehl.cases.seal.gland.rubbers.hardness import shore_band
 from softehl.cases.seal.gland.sections.keys import ROUND, dimensions
-from softehl.cases.seal.gland.trade.oil_names import IMPROVED
+from softehl.cases.seal.gland.trade.oil_names import IMPROVED, read_oil_name
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 
 _RUBBER = {"fit", "shore_A"}.union(*(m.keys for m in materials.MATERIALS.values()))
@@ -88,5 +87,5 @@ def _fluids(p: Seal, said: frozenset[str]) -> Iterator[str]:
         yield f"a sealed pressure of {p.sealed_pressure:g} MPa"
     if not said & {"viscosity", "oil"}:
         yield f"an oil of {1e9 * p.viscosity:.3g} mPa s"
-    if p.oil and is_improved(p.oil):
+    if p.oil and read_oil_name(p.oil).improved:
         yield f"a viscosity index of {IMPROVED:g}, the least that HVLP oils have (DIN 51524-3)"

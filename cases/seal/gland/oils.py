@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isclose, log, log10
+from math import log, log10
 from typing import Any
+
+from scipy.optimize import brentq
 
 from softehl.cases.seal.gland.given import number, put
 from softehl.cases.seal.gland.records.oil import Oil
 from softehl.cases.seal.gland.trade.oil_names import GRADES, read_oil_name
-from softehl.cases.seal.gland.viscosity_index import at_100_of_index
 
 DENSITY = 870.0
 """At 15 degC, of a mineral oil, kg/m^3."""
@@ -23,7 +24,8 @@ EXPANSION = 0.65
 """Fall of the density of a mineral oil, kg/m^3 for each degC."""
 
 _KELVIN = 273.15
-_SAME = 1e-6  # relative: two ways to a viscosity differ by less through rounding
+
+# --- viscosity over temperature -----------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -59,11 +61,6 @@ def is_grade(text: str) -> bool:
     return read_oil_name(text).grade is not None
 
 
-def is_improved(text: str) -> bool:
-    """True if a name says that an oil has a viscosity improver, but not its index."""
-    return read_oil_name(text).improved
-
-
 def read_oil(text: str) -> Walther:
     """An oil from its name (trade.oil_names).  Raises ValueError.
 
@@ -79,15 +76,60 @@ def read_oil(text: str) -> Walther:
             f"{' and '.join(f'ISO VG {g}' for g in sorted(near))}"
         )
     at_40 = float(name.grade)
-    at_100 = GRADES[name.grade] if name.index is None else _of_index(text, at_40, name.index)
+    at_100 = GRADES[name.grade] if name.index is None else at_100_of_index(at_40, name.index)
     return Walther.through((at_40, 40.0), (at_100, 100.0))
 
 
-def _of_index(text: str, at_40: float, index: float) -> float:
-    try:
-        return at_100_of_index(at_40, index)
-    except ValueError as error:
-        raise ValueError(f'oil = "{text}": {error}') from None
+# --- viscosity index, ASTM D2270: a high one means little fall with temperature -----------------
+
+_H = (
+    (2.0, 0.84155, 1.5521, -0.077),
+    (3.8, 0.78571, 1.7929, -0.183),
+    (4.4, 0.82143, 1.5679, 0.119),
+    (5.0, 0.04985, 9.1613, -18.557),
+    (6.4, 0.22619, 7.7369, -16.656),
+    (7.0, 0.79762, -0.7321, 14.610),
+    (7.7, 0.05794, 10.5156, -28.240),
+    (9.0, 0.26665, 6.7015, -10.810),
+    (12.0, 0.20073, 8.4658, -22.490),
+    (15.0, 0.28889, 5.9741, -4.930),
+    (18.0, 0.24504, 7.4160, -16.730),
+    (22.0, 0.20323, 9.1267, -34.230),
+    (28.0, 0.18411, 10.1015, -46.750),
+)
+"""From a viscosity at 100 degC on: H = d Y^2 + e Y + f, of the standard's annex."""
+
+_OF_INDUSTRY = 2.0, 40.0
+"""Viscosities at 100 degC of the oils of the industry, cSt; the table goes on to 70."""
+
+_INDICES = 100.0, 400.0
+"""Indices of the standard's procedure B that are read; polyglycols have up to 280."""
+
+
+def at_40_of_100(at_100: float) -> float:
+    """Viscosity at 40 degC of an oil of index 100 from that at 100 degC, 2 to 40 cSt."""
+    _, d, e, f = max(row for row in _H if row[0] <= at_100)
+    return d * at_100**2 + e * at_100 + f
+
+
+def viscosity_index(at_40: float, at_100: float) -> float:
+    """The index of an oil, 100 or more, from its two viscosities."""
+    n = (log10(at_40_of_100(at_100)) - log10(at_40)) / log10(at_100)
+    return float((10.0**n - 1.0) / 0.00715 + 100.0)
+
+
+def at_100_of_index(at_40: float, index: float) -> float:
+    """Viscosity at 100 degC of an oil of this index and viscosity at 40 degC.  ValueError."""
+    low, high = _INDICES
+    if not low <= index <= high:
+        raise ValueError(f"a viscosity index is read from {low:g} to {high:g}, given {index:g}")
+    ends = [viscosity_index(at_40, y) - index for y in _OF_INDUSTRY]
+    if ends[0] * ends[1] > 0.0:
+        raise ValueError(f"there is no oil of index {index:g} and {at_40:g} cSt at 40 degC here")
+    return float(brentq(lambda y: viscosity_index(at_40, y) - index, *_OF_INDUSTRY, xtol=1e-9))
+
+
+# --- the keys of a case -------------------------------------------------------------------------
 
 
 def density(temperature: float, at_15: float = DENSITY) -> float:
@@ -148,12 +190,6 @@ def _with_grade(values: dict[str, Any], oil: str, heat: Any) -> None:
     at_15 = values.get("oil_density")
     rho = density(heat, at_15 if number(at_15) else DENSITY)
     eta = law(heat) * rho * 1e-12
-    before = values.get("viscosity")
-    if number(before) and not isclose(before, eta, rel_tol=_SAME):
-        raise ValueError(
-            f'viscosity = {before:g} and oil = "{oil}" contradict: at {heat:g} degC '
-            f"it has {eta * 1e9:.4g} mPa s; leave one of them out"
-        )
-    values.setdefault("viscosity", eta)
+    put(values, "viscosity", eta, f'oil = "{oil}" at {heat:g} degC ({1e9 * eta:.4g} mPa s)')
     if values.get("pressure_viscosity") is None and values.get("roelands") is None:
         values["pressure_viscosity"] = barus(eta)

@@ -1,12 +1,11 @@
 """The parameters of the slider: profiles of a gap, and what is asked of its film."""
 
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
 
 from softehl.cases.harness.parameters import Nonzeros, key
-from softehl.cases.seal.gland.headings import SLIDER
 from softehl.cases.seal.gland.shear_thinning import ThinningKeys
 from softehl.cases.seal.gland.surfaces import ROUGHNESS, Roughness
 from softehl.runtime.arrays import Array
@@ -15,7 +14,20 @@ from softehl.runtime.arrays import Array
 class Slider(ThinningKeys):
     """Everything that defines one run of the slider."""
 
-    headings = SLIDER
+    headings: ClassVar = {
+        "gap": (
+            *("profile", "h0", "radius", "amplitude", "ratio", "pocket_start", "pocket_end"),
+            *("start", "end"),
+        ),
+        "oil": ("viscosity", "pressure_viscosity", *ThinningKeys.model_fields),
+        "motion": ("speeds", "start_pressure", "end_pressure"),
+        "film": (
+            *("roughness", "asperity_stiffness", "boundary_friction"),
+            *("cavitation", "cavitation_pressure", "cavitation_penalty", "supply"),
+        ),
+        "mesh": ("segments",),
+        "numerics": ("pressure_order", "reynolds"),
+    }
 
     profile: Literal["wedge", "parabola", "cosine", "exponential", "pocket"] = key(
         "parabola", "gap h(x)"

@@ -81,25 +81,19 @@ class Surfaces(Parameters):
         """True if the film knows roughness."""
         return any(self.roughness)
 
-    def pair(self, modulus: float) -> SurfacePair:
-        """Both of them, by the seal's shear modulus G: on rigid asperities E* = 4 G."""
-        stiffness = self.asperity_stiffness or 4.0 * modulus
-        return SurfacePair.of(self.roughness, stiffness, self.boundary_friction)
-
 
 @dataclass(frozen=True)
 class SurfacePair:
     """Two rough surfaces.
 
     moving, resting: rms heights, mm. stiffness: K of the asperities, MPa. friction: their
-    coefficient. slip: speed (mm/s) at which it has 0.7 of its value.
+    coefficient.
     """
 
     moving: float = 0.0
     resting: float = 0.0
     stiffness: float = 0.0
     friction: float = 0.0
-    slip: float = SLIP
 
     @classmethod
     def of(cls, roughness: tuple[float, float], stiffness: float, friction: float) -> SurfacePair:
@@ -121,7 +115,7 @@ class SurfacePair:
             "roughness_difference": (self.moving**2 - self.resting**2) / self.sigma**2,
             "asperity_stiffness": self.stiffness,
             "boundary_friction": self.friction,
-            "boundary_speed": self.slip,
+            "boundary_speed": SLIP,
         }
 
 
