@@ -8,7 +8,6 @@ import numpy as np
 
 from softehl.cases.seal.gland.reach import MOST, ratio
 from softehl.cases.seal.gland.records.discretisation import Discretisation
-from softehl.cases.seal.gland.records.film_model import FilmModel
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.records.solid import Solid
 from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
@@ -69,12 +68,22 @@ def _sensitivity_has_a_meaning(p: Seal) -> None:
         )
 
 
-def _rule_is_rich_enough(p: Discretisation) -> None:
+def _discretisation_is_rich_enough(p: Discretisation) -> None:
     points, order = p.quadrature_points, p.pressure_order
     if points is not None and points < order:
         raise ValueError(
             f"quadrature_points = {points} cannot hold {order + 1} pressures of a segment "
             f"(pressure_order = {order}); give at least {order}, or leave it out"
+        )
+    if p.tolerance is not None and not (p.error_estimate and p.mesh == "graded"):
+        raise ValueError(
+            f"tolerance = {p.tolerance:g} needs an estimate of the error; "
+            'set error_estimate = true and mesh = "graded"'
+        )
+    if p.tolerance is not None and order < _LOWEST_ESTIMATED:
+        raise ValueError(
+            f"tolerance = {p.tolerance:g}: meshes do not show the error of pressure_order = "
+            f"{order}; use an order of at least {_LOWEST_ESTIMATED}"
         )
 
 
@@ -90,19 +99,8 @@ def _film_has_its_model(p: Seal) -> None:
     if p.conserving and p.reynolds == "dg":
         raise ValueError('reynolds = "dg" works with cavitation = "penalty" only; use "fe"')
     p.require_smooth_film(dg=p.reynolds == "dg", rough=p.rough)
-
-
-def _tolerance_has_an_estimate(p: Discretisation) -> None:
-    if p.tolerance is not None and not (p.error_estimate and p.mesh == "graded"):
-        raise ValueError(
-            f"tolerance = {p.tolerance:g} needs an estimate of the error; "
-            'set error_estimate = true and mesh = "graded"'
-        )
-    if p.tolerance is not None and p.pressure_order < _LOWEST_ESTIMATED:
-        raise ValueError(
-            f"tolerance = {p.tolerance:g}: meshes do not show the error of pressure_order = "
-            f"{p.pressure_order}; use an order of at least {_LOWEST_ESTIMATED}"
-        )
+    if (p.arc_start is None) != (p.arc_end is None):
+        raise ValueError("arc_start and arc_end: give both, or none to have them found")
 
 
 def _air_side_is_closed_or_open(p: Gland) -> None:
@@ -127,11 +125,6 @@ def _air_side_is_closed_or_open(p: Gland) -> None:
             f"extrusion_gap = {gap:g} and housing_friction = {p.housing_friction:g}: the "
             "edge of the gap has no friction; give one of them"
         )
-
-
-def _arc_has_two_ends(p: FilmModel) -> None:
-    if (p.arc_start is None) != (p.arc_end is None):
-        raise ValueError("arc_start and arc_end: give both, or none to have them found")
 
 
 def _section_is_one(p: Seal) -> None:
@@ -160,16 +153,13 @@ def _section_is_one(p: Seal) -> None:
         )
 
 
-def _diameters_have_one_sign(p: Gland) -> None:
+def _seal_is_squeezed(p: Gland) -> None:
     if p.rod_diameter * p.inner_diameter < 0.0 or p.rod_diameter * p.housing_diameter < 0.0:
         raise ValueError(
             f"rod_diameter = {p.rod_diameter:g}, housing_diameter = {p.housing_diameter:g} and "
             f"inner_diameter = {p.inner_diameter:g} mm have different signs; those of a piston "
             "seal are negative: give bore and ring instead"
         )
-
-
-def _seal_is_squeezed(p: Gland) -> None:
     between, keys = "rod and housing", "rod_diameter, housing_diameter"
     if p.piston:
         between, keys = "bore and ground of the groove", "bore, groove_diameter"
@@ -184,16 +174,18 @@ def _seal_is_squeezed(p: Gland) -> None:
 
 def _ring_fits_the_rod(p: Gland) -> None:
     stretch = p.rod_diameter / p.inner_diameter - 1.0
-    if p.piston and not -0.1 <= stretch <= 0.2:
-        raise ValueError(
+    if -0.1 <= stretch <= 0.2:
+        return
+    words = (
+        f"rod_diameter = {p.rod_diameter:g} mm stretches inner_diameter = {p.inner_diameter:g} mm "
+        f"by {100 * stretch:.3g} %"
+    )
+    if p.piston:
+        words = (
             f"bore = {-p.rod_diameter:g} mm is {100 * stretch:.3g} % larger than the ring outside, "
-            f"{-p.inner_diameter:g} mm; allowed are -10 to 20 %"
+            f"{-p.inner_diameter:g} mm"
         )
-    if not -0.1 <= stretch <= 0.2:
-        raise ValueError(
-            f"rod_diameter = {p.rod_diameter:g} mm stretches inner_diameter = "
-            f"{p.inner_diameter:g} mm by {100 * stretch:.3g} %; allowed are -10 to 20 %"
-        )
+    raise ValueError(f"{words}; allowed are -10 to 20 %")
 
 
 def _section_is_between_the_walls(p: Gland) -> None:
@@ -225,13 +217,10 @@ def _pressure_is_within_reach(p: Seal) -> None:
 _CHECKS = (
     _mesh_is_there,
     _rubber_has_an_element,
-    _rule_is_rich_enough,
+    _discretisation_is_rich_enough,
     _film_has_its_model,
-    _tolerance_has_an_estimate,
     _air_side_is_closed_or_open,
-    _arc_has_two_ends,
     _section_is_one,
-    _diameters_have_one_sign,
     _seal_is_squeezed,
     _ring_fits_the_rod,
     _section_is_between_the_walls,

@@ -22,7 +22,7 @@ from softehl.cases.seal.gland.sections.u_cup import UCup
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.said import bands
 
-_DIAMETERS = {
+DIAMETERS = {
     "rod": "rod_diameter",
     "bore": "rod_diameter",
     "groove_diameter": "housing_diameter",
@@ -41,7 +41,7 @@ def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(values.get("ring"), int):
         values["ring"] = str(values["ring"])  # "-226" is a number to a reader of TOML
     side = _side(values)
-    for name, key in _DIAMETERS.items():
+    for name, key in DIAMETERS.items():
         if number(values.get(name)):
             _follow(values, key, side * float(values[name]), name)
     if side < 0.0:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from softehl.cases.harness.row import Record, column
 from softehl.cases.seal.gland.catalogue import ring
+from softehl.cases.seal.gland.fitting import DIAMETERS
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.said import LENGTHS as LIMITED
@@ -24,12 +25,10 @@ from softehl.cases.seal.gland.varied import LENGTHS, MEASURES, NUMBERS, PRESSURE
 if TYPE_CHECKING:
     from softehl.cases.seal.gland.parameters import Seal
 
-_SURFACES = {
-    "rod": ("rod_diameter",),
-    "bore": ("rod_diameter",),
-    "groove_diameter": ("housing_diameter",),
+_ALIASES = {
+    "modulus": ("mu_1", "mu_2", "mu", "c_10", "c_20", "c_30"),
+    **{name: (key,) for name, key in DIAMETERS.items()},
 }
-_ALIASES = {"modulus": ("mu_1", "mu_2", "mu", "c_10", "c_20", "c_30"), **_SURFACES}
 """Names for other keys: all that a rubber has are off by the same share."""
 
 _IN_MM = frozenset((*LENGTHS, *MEASURES))

@@ -13,11 +13,9 @@ RMS_OF_RA = sqrt(0.5 * pi)
 
 _UNIT = "um|nm|uin|microinch(?:es)?|mm"
 _SMOOTH = 1.0  # rms height below which a number without a unit is in um, not in microinches
-_FINISH = re.compile(
-    rf"(?P<kind>R[a-z]{{1,3}}\d?)(?: max\.?)?[ =<\u2264:]*(?P<height>{NUMBER}) ?(?P<unit>{_UNIT})?"
-    rf"|(?P<height2>{NUMBER}) ?(?P<unit2>{_UNIT})? ?(?P<kind2>R[a-z]{{1,3}}\d?)",
-    re.IGNORECASE,
-)
+_KIND, _HEIGHT = r"(?P<kind>R[a-z]{1,3}\d?)", rf"(?P<height>{NUMBER}) ?(?P<unit>{_UNIT})?"
+_FINISH = re.compile(rf"{_KIND}(?: max\.?)?[ =<\u2264:]*{_HEIGHT}", re.IGNORECASE)
+_TURNED = re.compile(rf"{_HEIGHT} ?{_KIND}", re.IGNORECASE)
 
 
 def read_finish(given: str) -> float | None:
@@ -28,7 +26,7 @@ def read_finish(given: str) -> float | None:
     text = plain(given)
     if re.fullmatch(rf"{NUMBER} ?({_UNIT})?", text):
         return None
-    found = _FINISH.fullmatch(text)
+    found = _FINISH.fullmatch(text) or _TURNED.fullmatch(text)
     if not found:
         if re.search(r"\d ?/ ?R", text):
             why = "has two finishes; write those of rod and seal"
@@ -36,16 +34,13 @@ def read_finish(given: str) -> float | None:
         if re.fullmatch(r"N ?(1[0-2]|[1-9])", text, re.IGNORECASE):
             raise refused("roughness", given, "is a grade of ISO 1302, a band of Ra", "Ra 0.2")
         raise refused("roughness", given, "is no finish in um", "Ra 0.2", "Rq 0.25", "0.25 um")
-    kind, unit = found["kind"] or found["kind2"], found["unit"] or found["unit2"] or "um"
-    height = read_quantity(f"{found['height'] or found['height2']} {unit.lower()}", "um")
-    if kind.lower() == "rms" and height >= _SMOOTH and not (found["unit"] or found["unit2"]):
+    kind, unit = found["kind"].lower(), (found["unit"] or "um").lower()
+    height = read_quantity(f"{found['height']} {unit}", "um")
+    if kind == "rms" and height >= _SMOOTH and not found["unit"]:
         why = "is in micrometres or in microinches; write the unit"
         raise refused("roughness", given, why, f"Rq {height:g} um", f"Rq {height:g} uin")
-    if kind.lower() == "ra":
+    if kind == "ra":
         return round(RMS_OF_RA * height, 6)
-    if kind.lower() in ("rq", "rms"):
+    if kind in ("rq", "rms"):
         return height
-    raise refused(
-        *("roughness", given, "gives neither Ra nor Rq"),
-        *("Ra 0.2", "Rq 0.25"),
-    )
+    raise refused("roughness", given, "gives neither Ra nor Rq", "Ra 0.2", "Rq 0.25")

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from softehl.cases.harness.parameters import Parameters, key
@@ -18,12 +18,11 @@ from softehl.cases.seal.gland.trade.oil_names import dynamic
 from softehl.cases.seal.gland.trade.rubber_names import read_rubber
 from softehl.cases.seal.gland.trade.text import NUMBER, NotUnderstoodError, plain, refused
 
-LENGTHS = {
-    **{"rod": "rod_diameter", "rod_diameter": "rod_diameter"},
-    **{k: k for k in ("bore", "groove_diameter", "housing_diameter", "groove_width")},
-    "groove_depth": "groove_depth",
-    **{k: k for k in ("section_diameter", "inner_diameter")},
-}
+_SIZES = (
+    *("rod_diameter", "bore", "groove_diameter", "housing_diameter", "groove_width"),
+    *("groove_depth", "section_diameter", "inner_diameter"),
+)
+LENGTHS = {"rod": "rod_diameter", **{name: name for name in _SIZES}}
 """Key that may be given with a tolerance -> the key that it means."""
 
 _SHAFTS = ("rod", "rod_diameter", "groove_diameter")
@@ -63,35 +62,42 @@ class SaidKeys(Parameters):
         return super().worded({**values, "said": tuple(dict.fromkeys(said))} if said else values)
 
 
-def bands(said: tuple[str, ...]) -> Iterator[tuple[str, Band]]:
+def bands(said: Sequence[str]) -> Iterator[tuple[str, Band]]:
     """Keys that were given with limits, and these."""
-    for text in said:
-        name, _, value = text.partition(" = ")
-        if name in LENGTHS:
-            found = read_fit(name, value, hole=name not in _SHAFTS)
-            if found is None:
-                raise NotUnderstoodError(
-                    f'said = "{text}" is not understood; write it in its own key'
-                )
-            yield name, found
+    return ((name, _band(name, value)) for name, value in _lengths(said))
+
+
+def _lengths(said: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Keys that were given with limits, and what was said."""
+    pairs = (text.partition(" = ")[::2] for text in said)
+    return (pair for pair in pairs if pair[0] in LENGTHS)
+
+
+def _band(name: str, value: str) -> Band:
+    found = read_fit(name, value, hole=name not in _SHAFTS)
+    if found is None:
+        raise NotUnderstoodError(
+            f'said = "{name} = {value}" is not understood; write it in its own key'
+        )
+    return found
 
 
 def with_limits(values: dict[str, Any]) -> dict[str, Any]:
     """The values with the middles of what has limits.  ValueError."""
-    for name, found in bands(tuple(values.get("said", ()))):
-        source = f'{name} = "{_value(tuple(values["said"]), name)}"'
+    for name, value in _lengths(values.get("said", ())):
         for key_of in dict.fromkeys((name, LENGTHS[name])):
-            put(values, key_of, found.middle, source)
+            put(values, key_of, _band(name, value).middle, f'{name} = "{value}"')
     return values
 
 
-def understood(said: tuple[str, ...]) -> list[str]:
+def understood(said: Sequence[str]) -> list[str]:
     """Lines that say how words of the trade were understood."""
     words = []
-    for name, found in bands(said):
+    for name, value in _lengths(said):
+        found = _band(name, value)
         words.append(
-            f"{name} = {_value(said, name)}: {found.low:.10g} to {found.high:.10g} mm, solved at "
-            f"the middle, {found.middle:.10g}"
+            f"{name} = {value}: {found.low:.10g} to {found.high:.10g} mm, solved at the middle, "
+            f"{found.middle:.10g}"
         )
     for text in said:
         name, _, value = text.partition(" = ")
@@ -99,10 +105,6 @@ def understood(said: tuple[str, ...]) -> list[str]:
             factor = f", {RMS_OF_RA:.4g} Ra (normal distribution)" if "Ra" in value else ""
             words.append(f"{name} of the {value}: {height:.4g} um rms{factor}")
     return words
-
-
-def _value(said: tuple[str, ...], name: str) -> str:
-    return next(text.partition(" = ")[2] for text in said if text.startswith(f"{name} = "))
 
 
 def _length(name: str, values: dict[str, Any]) -> list[str]:
