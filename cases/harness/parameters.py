@@ -13,7 +13,8 @@ from softehl.cases.harness.units import is_quantity, read_quantity
 _BOUNDS = {"gt": "> {:g}", "ge": ">= {:g}", "lt": "< {:g}", "le": "<= {:g}"}
 
 
-def _different(numbers: tuple[float, ...]) -> tuple[float, ...]:
+def different(numbers: tuple[float, ...]) -> tuple[float, ...]:
+    """The numbers, none 0 and none twice.  ValueError."""
     if len(set(numbers)) < len(numbers):
         raise ValueError("a number is given twice")
     if 0.0 in numbers:
@@ -24,7 +25,7 @@ def _different(numbers: tuple[float, ...]) -> tuple[float, ...]:
 # strict again on the item: the list itself is lax so that a TOML array becomes a tuple
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Nonzeros = Annotated[
-    tuple[Number, ...], Field(min_length=1, strict=False), AfterValidator(_different)
+    tuple[Number, ...], Field(min_length=1, strict=False), AfterValidator(different)
 ]
 """One or more different numbers that are not 0."""
 

@@ -229,7 +229,8 @@ class Shape:
     """A section: its outline, the part that may carry a film, that which sealed pressure acts on.
 
     film: (s0, s1), from the sealed to the air side, counterclockwise. pressure: (s, s0), from the
-    housing round to the start of the film, counterclockwise. All modulo the length of the outline.
+    housing round to the start of the film, counterclockwise. All modulo the length of the outline,
+    s0 < s1.
     chord: places between which, counterclockwise and with the film, a straight cut parts it.
     """
 

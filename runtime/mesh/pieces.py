@@ -170,16 +170,6 @@ def _ends(piece: Piece, begin: float, end: float) -> tuple[Point, Point]:
     return piece.start if begin <= 0.0 else (a, b), piece.end if end >= piece.length else (c, d)
 
 
-def bulge_arc(start: Point, end: Point, bulge: float) -> Piece:
-    """The piece of a polyline with a bulge, the tangent of a quarter of its angle; exact."""
-    if bulge == 0.0:
-        return Line(start, end)
-    z, r = end[0] - start[0], end[1] - start[1]
-    away = (1.0 / bulge - bulge) / 4.0  # of the centre from the chord, in chords, to the left
-    centre = (start[0] + end[0]) / 2.0 - away * r, (start[1] + end[1]) / 2.0 + away * z
-    return Arc(start, end, centre, bulge > 0.0)
-
-
 def rounded(points: Sequence[Point], radii: Sequence[float] | float) -> list[Piece]:
     """The closed polygon of the points with fillets of these radii, 0 = a corner.
 

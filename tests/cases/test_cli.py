@@ -286,7 +286,7 @@ BAD = {
     "no speeds": (["oring", "--set", "speeds=[]"], "speeds = []"),
     "zero speed": (["oring", "--set", "speeds=[100, 0]"], "speeds = [100, 0]"),
     "negative speed": (["oring", "--set", "speeds=[-100]"], "speeds = [-100]"),
-    "speed twice": (["oring", "--set", "speeds=[100, 100.0]"], "a speed is given twice"),
+    "speed twice": (["oring", "--set", "speeds=[100, 100.0]"], "a number is given twice"),
     "density": (["oring", "--set", "density=3"], "allowed: mesh density d"),
     "bool for number": (["oring", "--set", "mu_1=true"], "mu_1 = true"),
     "no TOML value": (["oring", "--set", "speeds=[100"], "not a TOML value"),

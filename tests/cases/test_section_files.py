@@ -17,6 +17,7 @@ from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.files import finer, outline_of, read_mesh, read_outline
+from softehl.cases.seal.gland.sections.keys import lobes
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.method import run
@@ -85,6 +86,8 @@ def test_a_drawing_of_a_section_is_that_section(name: str, tmp_path: Path) -> No
     found = read_outline(draw(drawn, tmp_path / "seal.dxf"), inner_diameter=80.0)
     assert found.outline.box[1] == pytest.approx(40.0)
     assert found.name == "seal"
+    mirrored = read_outline(draw(drawn, tmp_path / "seal.dxf", mirror=-1.0))
+    assert lobes(found) == lobes(mirrored) == lobes(drawn)  # also where the film passes the start
 
 
 @pytest.mark.parametrize("name", ["d_ring", "u_cup"])
@@ -123,6 +126,19 @@ def test_bulges_are_converted_exactly(tmp_path: Path) -> None:
         side = 2.0 if cos(angle) > 0 else -2.0
         there = np.array([[side + cos(angle), 25.0 + sin(angle)]])
         assert shape.outline.at(shape.outline.place(there)) == pytest.approx(there, abs=1e-12)
+
+
+def turn(space: Any) -> None:
+    """The film drawn from behind: x is -x, and its arcs run clockwise."""
+    film = next(e for e in space if e.dxf.layer == "FILM")
+    film.dxf.extrusion = (0, 0, -1)
+    film.set_points([(-x, y, -b) for x, y, b in film.get_points("xyb")], format="xyb")
+
+
+def test_a_polyline_may_be_drawn_from_behind(tmp_path: Path) -> None:
+    shape = read_outline(stadium(tmp_path / "seal.dxf", turn))
+    assert shape.outline.area == pytest.approx(pi + 8.0, rel=1e-12)
+    assert shape.film[1] - shape.film[0] == pytest.approx(pi + 4.0, rel=1e-12)
 
 
 def remove(space: Any, layer: str) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from softehl.runtime.mesh.outline import Arc, Line, Outline, OutlineError, Piece, Shape, rounded
-from softehl.runtime.mesh.pieces import bulge_arc
 
 SQUARE = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)]
 RING = Outline.circle((0.3, 26.0), 1.7)
@@ -84,14 +83,6 @@ def test_a_rounded_square() -> None:
     full = Outline(rounded(SQUARE, 1.0))
     assert full.area == pytest.approx(pi, rel=1e-14)
     assert len(full.pieces) == 4
-
-
-@pytest.mark.parametrize("bulge", [0.1, 0.4142, 1.0, 3.0, -0.2, -1.7])
-def test_a_bulge_is_the_tangent_of_a_quarter_of_the_angle(bulge: float) -> None:
-    arc = bulge_arc((1.0, 2.0), (4.0, -1.0), bulge)
-    assert isinstance(arc, Arc)
-    assert np.tan(arc.sweep / 4.0) == pytest.approx(bulge, rel=1e-12)
-    assert arc.at(np.array([arc.length]))[0] == pytest.approx([4.0, -1.0], abs=1e-12)
 
 
 BAD: dict[str, Callable[[], object]] = {

@@ -21,11 +21,10 @@ from softehl.cases.seal.gland.records.solid import Solid
 from softehl.cases.seal.gland.rubbers.regions import with_regions
 from softehl.cases.seal.gland.rubbers.rubber import with_rubber
 from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
-from softehl.cases.seal.gland.sections.keys import SectionKeys
+from softehl.cases.seal.gland.sections.keys import MEASURES, SectionKeys
 from softehl.cases.seal.gland.shear_thinning import ThinningKeys
 from softehl.cases.seal.gland.surfaces import SurfacePair, Surfaces
 from softehl.cases.seal.gland.trade.said import SaidKeys, with_limits
-from softehl.cases.seal.gland.varied import MEASURES
 
 
 def _own(record: type[Parameters]) -> tuple[str, ...]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from softehl.cases.seal.gland import shear_thinning
 from softehl.cases.seal.gland.rubbers import materials
-from softehl.cases.seal.gland.sections import SECTIONS
-from softehl.cases.seal.gland.sections.keys import dimensions
 
 PRESSURE_KEY = "sealed_pressure"
 """The sealed pressure, which belongs to a film and not to the case alone."""
@@ -22,9 +20,6 @@ NUMBERS = (
     *("viscosity", "pressure_viscosity", "cavitation_penalty", *shear_thinning.NUMBERS),
 )
 """Physical and geometric keys of a case; the terms of an Ogden rubber count as one."""
-
-MEASURES = tuple(dict.fromkeys(key for section in SECTIONS for key in dimensions(section)))
-"""Dimensions of sections that are not round, which are lengths too."""
 
 BASES = {
     "groove_depth": ("housing_diameter", "depth"),

@@ -2,12 +2,13 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field
 
-from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.harness.parameters import Parameters, different, key
 
 # strict again on the item: the list itself is lax so that a TOML array becomes a tuple
 Speed = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
+Speeds = Annotated[tuple[Speed, ...], Field(min_length=1, strict=False), AfterValidator(different)]
 
 
 class Duty(Parameters):
@@ -17,21 +18,12 @@ class Duty(Parameters):
     stroke: Literal["out", "in", "both"] = key(
         "both", "direction of the rod", bounds='"out" (to the air side), "in" or "both"'
     )
-    speeds: tuple[Speed, ...] = key(
+    speeds: Speeds = key(
         (1600.0, 800.0, 400.0, 200.0, 100.0),
         "rod speeds |U|",
         unit="mm/s",
         bounds="a number > 0, or a list of different ones in any order",
-        min_length=1,
-        strict=False,
     )
     travel: float = key(
         100.0, "way of the rod from end to end, for leakage in a cycle", unit="mm", gt=0
     )
-
-    @field_validator("speeds")
-    @classmethod
-    def _speeds_differ(cls, speeds: tuple[float, ...]) -> tuple[float, ...]:
-        if len(set(speeds)) < len(speeds):
-            raise ValueError("a speed is given twice")
-        return speeds

@@ -7,6 +7,7 @@ from softehl.cases.harness.parameters import key
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.base import HEIGHT
 from softehl.cases.seal.gland.sections.keys import (
+    MEASURES,
     ROUND,
     SectionKeys,
     capped,
@@ -68,12 +69,7 @@ class FreeSeal(SectionKeys):
     def sizes(self) -> dict[str, float]:
         """The dimensions that are given, as their page calls them.  ValueError for others'."""
         known = dimensions(self.section)
-        given = {
-            name: value
-            for section in SECTIONS
-            for name in dimensions(section)
-            if (value := getattr(self, name)) is not None
-        }
+        given = {name: size for name in MEASURES if (size := getattr(self, name)) is not None}
         for name in given:
             if name not in known:
                 has = ", ".join(known) or "section_diameter alone"

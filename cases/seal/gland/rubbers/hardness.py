@@ -14,11 +14,6 @@ _SHORE_A, _SHORE_D = (80.0, 85.0, 90.0, 95.0, 100.0), (29.0, 33.0, 39.0, 46.0, 5
 """Equal hardnesses in both scales, of the conversion chart of ASTM D2240."""
 
 
-def limits(polymer: str | None) -> tuple[float, float]:
-    """Hardness Shore A between which a rule is known."""
-    return HARD if polymer == "PU" else RANGE
-
-
 def youngs_modulus(shore_A: float, polymer: str | None = None) -> float:
     """Young's modulus from a hardness Shore A, MPa; polymer: "PU" has a rule of its own.
 

@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from softehl.cases.seal.gland.given import number, put, shown
-from softehl.cases.seal.gland.rubbers.hardness import limits, youngs_modulus
+from softehl.cases.seal.gland.rubbers.hardness import HARD, RANGE, youngs_modulus
 from softehl.cases.seal.gland.rubbers.materials import (
     KEYS,
     MATERIALS,
     Material,
     shear_modulus,
-    unstable_at,
 )
 from softehl.cases.seal.gland.rubbers.rubber_data import fit, read_data
 from softehl.cases.seal.gland.trade.rubber_names import read_rubber
@@ -43,8 +42,7 @@ def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
     material = MATERIALS.get(values["material"]) if isinstance(values["material"], str) else None
     if material is None:
         return values
-    source = _source(values, material)
-    _require_own(values, material, source)
+    _require_own(values, material)
     if number(shore):
         _with_shore(values, material)
     if isinstance(table, str):
@@ -57,8 +55,7 @@ def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
 
 def _with_hardness(values: dict[str, Any]) -> None:
     """The hardness of a rubber that is given by its name, "NBR 70", and whether it can be used."""
-    text, shore = values.get("compound"), values.get("shore_A")
-    polymer = None
+    text, polymer = values.get("compound"), None
     if isinstance(text, str):
         found = read_rubber("compound", text)
         if found is None:
@@ -68,7 +65,7 @@ def _with_hardness(values: dict[str, Any]) -> None:
     shore = values.get("shore_A")
     if isinstance(shore, str):
         raise ValueError(f'shore_A = "{shore}" is not understood; write shore_A = 70 or "NBR 70"')
-    low, high = limits(polymer)
+    low, high = HARD if polymer == "PU" else RANGE
     if number(shore) and not low <= shore <= high:
         named = f"of {polymer} " if polymer else ""
         raise ValueError(
@@ -84,21 +81,17 @@ def polymer_of(text: str | None) -> str | None:
     return None if found is None else found.polymer
 
 
-def _source(values: Mapping[str, Any], material: Material) -> str:
-    """Key that says which material it is."""
-    if values.get("shore_A") is not None:
+def _require_own(values: dict[str, Any], material: Material) -> None:
+    """No key of another material; those that have a default elsewhere are emptied."""
+    source, shore = f'material = "{values["material"]}"', values.get("shore_A")
+    if shore is not None:
         if not material.shore:
             names = ", ".join(f'"{n}"' for n, m in MATERIALS.items() if m.shore)
             raise ValueError(
-                f'shore_A = {values["shore_A"]} and material = "{values["material"]}" contradict: '
-                f"a hardness gives one modulus; allowed are {names}"
+                f"shore_A = {shore} and {source} contradict: a hardness gives one modulus; "
+                f"allowed are {names}"
             )
-        return f'shore_A = {values["shore_A"]} (material = "{values["material"]}")'
-    return f'material = "{values["material"]}"'
-
-
-def _require_own(values: dict[str, Any], material: Material, source: str) -> None:
-    """No key of another material; those that have a default elsewhere are emptied."""
+        source = f"shore_A = {shore} ({source})"
     for key in KEYS:
         if key in material.keys:
             continue
@@ -113,11 +106,9 @@ def _require_own(values: dict[str, Any], material: Material, source: str) -> Non
 
 def _with_shore(values: dict[str, Any], material: Material) -> None:
     mu = youngs_modulus(float(values["shore_A"]), polymer_of(values.get("compound"))) / 3.0
-    others = [key for key in material.keys if key != "mu"]
-    if any(not number(values.get(key)) for key in others):
-        return
-    unit = shear_modulus(material, {**values, "mu": 1.0})
-    put(values, "mu", mu / unit, f"shore_A = {values['shore_A']:g}")
+    if all(number(values.get(key)) for key in material.keys if key != "mu"):
+        unit = shear_modulus(material, {**values, "mu": 1.0})
+        put(values, "mu", mu / unit, f"shore_A = {values['shore_A']:g}")
 
 
 def _with_fit(values: dict[str, Any], material: Material, path: Path) -> None:
@@ -142,28 +133,3 @@ def _require_complete(values: dict[str, Any], material: Material) -> None:
             f'material = "{values["material"]}" needs {" and ".join(missing)}{other}, '
             'or fit = "tests.csv"'
         )
-
-
-def require_stable(name: str, given: Mapping[str, Any]) -> None:
-    """Raise ValueError where a rubber with these keys is not stable where a seal needs it."""
-    material = MATERIALS[name]
-    if material.energy == "mooney_rivlin":
-        return  # with moduli that are not negative it always is
-    if name == "ogden":
-        _require_pairs(given["ogden_mu"], given["ogden_alpha"])
-    keys = ", ".join(f"{key} = {shown(given[key])}" for key in material.keys)
-    found = unstable_at(material, material.kernel_values(given))
-    if found:
-        raise ValueError(
-            f'material = "{name}" ({keys}) is not stable in {found[0]} tension at a stretch of '
-            f"{found[1]:.3g} (its stress falls there, or it locks); a seal needs 0.6 to 1.6"
-        )
-
-
-def _require_pairs(mu: tuple[float, ...], alpha: tuple[float, ...]) -> None:
-    if len(mu) != len(alpha):
-        raise ValueError(
-            f"ogden_mu has {len(mu)} and ogden_alpha {len(alpha)} values: a term is a pair of them"
-        )
-    if 0.0 in alpha:
-        raise ValueError("ogden_alpha has a 0: an exponent of 0 is no term; leave it out")

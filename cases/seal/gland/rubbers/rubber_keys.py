@@ -7,8 +7,9 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.seal.gland.given import shown
 from softehl.cases.seal.gland.rubbers import materials
-from softehl.cases.seal.gland.rubbers.rubber import PAPER, polymer_of, require_stable
+from softehl.cases.seal.gland.rubbers.rubber import PAPER, polymer_of
 from softehl.cases.seal.gland.trade.said import rubber_named
 
 Terms = Annotated[
@@ -101,6 +102,24 @@ class Rubber(Parameters):
         return {key: getattr(self, key) for key in materials.KEYS}
 
     @model_validator(mode="after")
-    def _rubber_is_stable(self) -> Self:
-        require_stable(self.material, self._rubber)
+    def _is_stable(self) -> Self:
+        material, given = materials.MATERIALS[self.material], self._rubber
+        if self.energy == "mooney_rivlin":
+            return self  # with moduli that are not negative it always is
+        if self.material == "ogden":
+            mu, alpha = given["ogden_mu"], given["ogden_alpha"]
+            if len(mu) != len(alpha):
+                raise ValueError(
+                    f"ogden_mu has {len(mu)} and ogden_alpha {len(alpha)} values: a term is a pair "
+                    "of them"
+                )
+            if 0.0 in alpha:
+                raise ValueError("ogden_alpha has a 0: an exponent of 0 is no term; leave it out")
+        if found := materials.unstable_at(material, material.kernel_values(given)):
+            keys = ", ".join(f"{key} = {shown(given[key])}" for key in material.keys)
+            raise ValueError(
+                f'material = "{self.material}" ({keys}) is not stable in {found[0]} tension at a '
+                f"stretch of {found[1]:.3g} (its stress falls there, or it locks); a seal needs "
+                "0.6 to 1.6"
+            )
         return self

@@ -12,7 +12,6 @@ import numpy as np
 from softehl.cases.seal.gland.sections.seated import Named, mirrored, named_shape
 from softehl.runtime.mesh.outline import Arc, Line, OutlineError, Piece, Point, Shape
 from softehl.runtime.mesh.outline_checks import CLOSED
-from softehl.runtime.mesh.pieces import bulge_arc
 
 _UNITS = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0, 13: 1e-3}  # $INSUNITS of DXF -> mm
 _WORDS = ("DIMENSION", "HATCH", "LEADER", "MTEXT", "MULTILEADER", "POINT", "TEXT", "VIEWPORT")
@@ -56,24 +55,23 @@ def _converted(entity: Any) -> Iterator[Piece]:
     if kind in _WORDS:
         return
     if kind == "LINE":
-        yield Line(_flat(entity.dxf.start), _flat(entity.dxf.end))
-        return
-    if kind == "ARC":
-        found: list[Piece] = [_arc(entity, entity.dxf.start_angle, entity.dxf.end_angle)]
-    elif kind == "CIRCLE":
-        found = [_arc(entity, 0.0, 180.0), _arc(entity, 180.0, 360.0)]
-    elif kind == "LWPOLYLINE":
-        found = _polyline([(p[0], p[1], p[2]) for p in entity.get_points("xyb")], entity.closed)
-    elif kind == "POLYLINE" and entity.is_2d_polyline:
-        corners = [(*_flat(v.dxf.location), v.dxf.bulge) for v in entity.vertices]
-        found = _polyline(corners, entity.is_closed)
+        start, end = _flat(entity.dxf.start), _flat(entity.dxf.end)
+        if start != end:  # a last corner upon the first closes a polyline as well
+            yield Line(start, end)
+    elif kind == "LWPOLYLINE" or (kind == "POLYLINE" and entity.is_2d_polyline):
+        for part in entity.virtual_entities():
+            yield from _converted(part)
+    elif kind in ("ARC", "CIRCLE"):
+        d = entity.dxf
+        ends = [(d.start_angle, d.end_angle)] if kind == "ARC" else [(0.0, 180.0), (180.0, 360.0)]
+        arcs = [_arc(entity, *angles) for angles in ends]
+        behind = d.hasattr("extrusion") and d.extrusion.z < 0.0
+        yield from (map(mirrored, arcs) if behind else arcs)
     else:
         raise OutlineError(
-            f"{kind} on layer {entity.dxf.layer!r} is no line, arc, circle or flat "
-            "polyline; explode it or draw it as arcs"
+            f"{kind} on layer {entity.dxf.layer!r} is no line, arc, circle or flat polyline; "
+            "explode it or draw it as arcs"
         )
-    behind = entity.dxf.hasattr("extrusion") and entity.dxf.extrusion.z < 0.0
-    yield from (map(mirrored, found) if behind else found)
 
 
 def _flat(point: Any) -> Point:
@@ -86,14 +84,6 @@ def _arc(entity: Any, start: float, end: float) -> Arc:
     R = float(entity.dxf.radius)
     a, b = ((z + R * cos(radians(t)), r + R * sin(radians(t))) for t in (start, end))
     return Arc(a, b, (z, r))
-
-
-def _polyline(corners: list[tuple[float, float, float]], closed: bool) -> list[Piece]:
-    """A last corner upon the first closes a polyline as well."""
-    points = [(float(z), float(r)) for z, r, _ in corners]
-    ends = [*points[1:], points[0]] if closed else points[1:]
-    pairs = zip(points, ends, (bulge for _, _, bulge in corners), strict=False)
-    return [bulge_arc(a, b, float(bulge)) for a, b, bulge in pairs if a != b]
 
 
 def _chained(named: list[Named]) -> list[Named]:

@@ -68,6 +68,9 @@ def _key(uses: Mapping[str, Mapping[str, Any]]) -> Any:
     return key(None, f"{', '.join(uses)}: {first['meaning']}", unit="mm", bounds=bounds, ge=0)
 
 
+MEASURES = tuple(_dimensions())
+"""Keys of the dimensions of sections."""
+
 if TYPE_CHECKING:
     _Dimensions = Parameters
 else:

@@ -85,8 +85,9 @@ def named_shape(named: Sequence[Named], inner_diameter: float | None, name: str)
         outline = Outline([piece for piece, _ in named])
         found = runs([side for _, side in named])
     outline = seated(outline, inner_diameter)
+    places = np.append(outline.starts, outline.length + outline.starts[1:])
     film, pressure = (
-        (float(outline.starts[first]), float(outline.starts[(first + count) % len(named)]))
+        (float(places[first]), float(places[first + count]))
         for first, count in (found.film, found.pressure)
     )
     return film_below(Shape(outline, film, pressure, name))
@@ -120,9 +121,8 @@ def seat(outline: Outline, inner_diameter: float | None) -> Point:
 
 def film_below(shape: Shape) -> Shape:
     """The shape, if its film holds its lowest point.  Raises OutlineError."""
-    outline, (begin, end) = shape.outline, shape.film
-    s = np.linspace(begin, begin + (end - begin) % outline.length, 2001)
-    low = outline.box[1]
+    outline = shape.outline
+    low, s = outline.box[1], np.linspace(*shape.film, 2001)
     if outline.at(s)[:, 1].min() > low + 1e-3 * outline.size:
         raise OutlineError(
             f"{FILM} does not hold the lowest point of the contour; the rod is below, at small r "
