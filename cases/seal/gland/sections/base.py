@@ -39,6 +39,13 @@ class Section(Parameters):
         name = type(self).__module__.rpartition(".")[2]
         return Shape.facing(drawn.moved(shift=(aside, lift)), (z + aside, r + lift), name)
 
+    def at_most(self, name: str, limit: float, words: str) -> None:
+        """Raises OutlineError for a dimension beyond a limit that others set, but for rounding."""
+        size = getattr(self, name)
+        require(
+            size <= (1.0 + 1e-9) * limit, f"{name} = {size:g} mm; at most {words}, {limit:.4g} mm"
+        )
+
     def drawn(self) -> Outline:
         """The outline as the section's own page draws it, anywhere in the plane."""
         raise NotImplementedError

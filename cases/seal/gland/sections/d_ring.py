@@ -26,11 +26,8 @@ class DRing(Section):
             half * (1.0 - 1e-9) <= R <= 20.0 * half,
             f"nose_radius = {R:g} mm; half the width to ten widths, {half:g} to {20 * half:g} mm",
         )
-        require(
-            f <= 0.25 * min(self.width, self.height),
-            f"corner_radius = {f:g} mm; at most a quarter of the smaller side, "
-            f"{0.25 * min(self.width, self.height):g} mm",
-        )
+        smaller = min(self.width, self.height)
+        self.at_most("corner_radius", 0.25 * smaller, "a quarter of the smaller side")
         rise = R - sqrt(max((R - f) ** 2 - (half - f) ** 2, 0.0))  # of the lower corners' centres
         top = self.height - f
         require(

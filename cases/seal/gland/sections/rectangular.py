@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from softehl.cases.seal.gland.sections.base import Section, part, require
+from softehl.cases.seal.gland.sections.base import Section, part
 from softehl.runtime.mesh.outline import Outline, rounded
 
 
@@ -16,10 +16,8 @@ class Rectangular(Section):
 
     def drawn(self) -> Outline:
         """About the origin."""
-        require(
-            self.corner_radius <= 0.5 * min(self.width, self.height),
-            f"corner_radius = {self.corner_radius:g} mm; at most half of the smaller side, "
-            f"{0.5 * min(self.width, self.height):g} mm",
+        self.at_most(
+            "corner_radius", 0.5 * min(self.width, self.height), "half of the smaller side"
         )
         z, r = 0.5 * self.width, 0.5 * self.height
         return Outline(rounded([(-z, -r), (z, -r), (z, r), (-z, r)], self.corner_radius))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from softehl.cases.seal.gland.sections.base import Section, part, require
+from softehl.cases.seal.gland.sections.base import Section, part
 from softehl.runtime.mesh.outline import Outline, rounded
 
 
@@ -18,14 +18,7 @@ class Trapezoid(Section):
     def drawn(self) -> Outline:
         """The middle of the lower side at the origin."""
         smallest = min(self.width, self.rod_width, self.height)
-        require(
-            self.corner_radius <= smallest / 3.0,
-            f"corner_radius = {self.corner_radius:g} mm; at most a third of the smallest side, "
-            f"{smallest / 3.0:.4g} mm",
-        )
-        require(
-            self.rod_width <= 2.0 * self.width,
-            f"rod_width = {self.rod_width:g} mm; at most twice the width, {2 * self.width:g} mm",
-        )
+        self.at_most("corner_radius", smallest / 3.0, "a third of the smallest side")
+        self.at_most("rod_width", 2.0 * self.width, "twice the width")
         a, b, h = 0.5 * self.rod_width, 0.5 * self.width, self.height
         return Outline(rounded([(-a, 0.0), (a, 0.0), (b, h), (-b, h)], self.corner_radius))

@@ -31,14 +31,8 @@ class UCup(Section):
         opening, root, depth = 0.5 * self.mouth_opening, 0.5 * self.mouth_root, self.mouth_depth
         lip, back = self._tip - opening, w - depth
         least = 2.0 * self.edge_radius
-        require(
-            heel <= h,
-            f"heel_height = {2 * heel:g} mm; at most the height over the lips, {2 * h:g} mm",
-        )
-        require(
-            root <= opening,
-            f"mouth_root = {2 * root:g} mm; at most the mouth_opening, {2 * opening:g} mm",
-        )
+        self.at_most("heel_height", self.height, "the height over the lips")
+        self.at_most("mouth_root", self.mouth_opening, "the mouth_opening")
         require(
             lip > least,
             f"the tips of the lips are {lip:.4g} mm thick; (height - mouth_opening) / 2 - bevel "

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from math import hypot, sqrt
+from collections.abc import Sequence
+from math import sqrt
 
 from softehl.cases.seal.gland.sections.base import Section, joined, part, require
 from softehl.runtime.mesh.outline import Arc, Outline, Point
-
-_ROUND = 1e-9  # part of the radius at which four lobes are one circle
 
 
 class XRing(Section):
@@ -21,12 +20,8 @@ class XRing(Section):
 
     def drawn(self) -> Outline:
         """About the origin; a circle where the lobes have grown together."""
-        z, r = self._lobes
-        require(
-            min(z, r) >= -_ROUND * self.height,
-            f"lobe_radius = {self.lobe_radius:g} mm; at most half of the smaller side, "
-            f"{0.5 * min(self.width, self.height):g} mm",
-        )
+        z, r = 0.5 * self.width - self.lobe_radius, 0.5 * self.height - self.lobe_radius
+        self.at_most("lobe_radius", 0.5 * min(self.width, self.height), "half of the smaller side")
         if max(z, r) <= 1e-5 * self.height:
             return Outline.circle((0.0, 0.0), self.lobe_radius)
         reach = self.lobe_radius + self.fillet_radius
@@ -35,44 +30,27 @@ class XRing(Section):
             f"fillet_radius = {self.fillet_radius:g} mm does not reach from lobe to lobe; more "
             f"than {max(z, r) - self.lobe_radius:.4g} mm is needed",
         )
-        deep = (sqrt(reach**2 - r**2) - z, sqrt(reach**2 - z**2) - r)
+        under, beside = sqrt(reach**2 - z**2), sqrt(reach**2 - r**2)
+        waist = 2.0 * (min(z + beside, r + under) - self.fillet_radius)
         require(
-            hypot(z + max(deep[0], 0.0), r + max(deep[1], 0.0)) > 0.0
-            and self._waist(deep) > 0.1 * self.height,
+            waist > 0.1 * self.height,
             f"lobe_radius = {self.lobe_radius:g} and fillet_radius = {self.fillet_radius:g} mm "
             "leave no rubber between the grooves; make one of them larger",
         )
-        return joined(*self._arcs(z, r, reach))
+        grooves = [(0.0, -r - under), (z + beside, 0.0), (0.0, r + under), (-z - beside, 0.0)]
+        return joined(*self._arcs([(z, -r), (z, r), (-z, r), (-z, -r)], grooves))
 
     def crown(self, drawn: Outline) -> Point:
         """The crest of the upper lobe on the sealed side."""
-        return -self._lobes[0], drawn.box[3]
+        return self.lobe_radius - 0.5 * self.width, drawn.box[3]
 
-    @property
-    def _lobes(self) -> Point:
-        """Distance of the centres of the lobes from the middle, axially and radially."""
-        z, r = 0.5 * self.width - self.lobe_radius, 0.5 * self.height - self.lobe_radius
-        return z, r
-
-    def _waist(self, deep: Point) -> float:
-        """The least thickness between opposite grooves."""
-        z, r = self._lobes
-        across = 2.0 * (z + deep[0] + z - self.fillet_radius)
-        along = 2.0 * (r + deep[1] + r - self.fillet_radius)
-        return min(across, along)
-
-    def _arcs(self, z: float, r: float, reach: float) -> list[Arc]:
-        """From the groove at the bottom on, counterclockwise: lobe, groove, ..."""
-        under, beside = sqrt(reach**2 - z**2), sqrt(reach**2 - r**2)
-        lobes = [(z, -r), (z, r), (-z, r), (-z, -r)]
-        grooves = [(0.0, -r - under), (z + beside, 0.0), (0.0, r + under), (-z - beside, 0.0)]
-        part = self.lobe_radius / reach
+    def _arcs(self, lobes: Sequence[Point], grooves: Sequence[Point]) -> list[Arc]:
+        """About these centres from the groove at the bottom on, counterclockwise: lobe, groove."""
+        part = self.lobe_radius / (self.lobe_radius + self.fillet_radius)
 
         def touch(lobe: Point, groove: Point) -> Point:
-            return (
-                lobe[0] + part * (groove[0] - lobe[0]),
-                lobe[1] + part * (groove[1] - lobe[1]),
-            )
+            (a, b), (c, d) = lobe, groove
+            return a + part * (c - a), b + part * (d - b)
 
         arcs = []
         for k, lobe in enumerate(lobes):
