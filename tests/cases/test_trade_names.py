@@ -234,6 +234,7 @@ RUBBERS = {
         ("70 Shore A", "70 ShA", "70A", "Shore A 70", "70 sh", "Sh A 70", "Shore 70 A", "JIS A 70"),
         (None, 70.0),
     ),
+    **dict.fromkeys(("70\u00b0", "70 IRHD", "70 deg Shore A"), (None, 70.0)),
 }
 NO_RUBBERS = {
     "NBR": "NBR 70",

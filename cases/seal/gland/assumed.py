@@ -46,26 +46,19 @@ def _gland(p: Gland, said: frozenset[str]) -> Iterator[str]:
         said |= {"rod", "housing_diameter", "groove_width"}  # a U-cup is named by its groove
     if not said & {"rod", "rod_diameter", "bore"}:
         yield f"a rod of {p.rod_diameter:g} mm"
-    sizes = {
-        "housing_diameter": (
-            p.housing_diameter,
-            {"squeeze", "groove_depth", "gland", "groove_diameter"},
-        ),
-        "groove_width": (p.groove_width, {"fill", "gland"}),
-    }
-    unsaid = [k for k, (_, others) in sizes.items() if not said & {k, *others}]
     kind, charted = _kind(p)
-    if not charted:
-        unsaid = [k for k in sizes if k not in said]  # also where the gland was asked for by name
-    if unsaid:
-        yield f"{kind} ({', '.join(f'{_called(p, k)} = {abs(sizes[k][0]):g} mm' for k in unsaid)})"
+    decided = {
+        "housing_diameter": {"squeeze", "groove_depth", "gland", "groove_diameter"},
+        "groove_width": {"fill", "gland"},
+    }
+    if not charted:  # assumed even if the gland was asked for by name
+        decided = {key: set() for key in decided}
+    if unsaid := [key for key, others in decided.items() if not said & {key, *others}]:
+        called = {"housing_diameter": "groove_diameter"} if p.piston else {}
+        words = (f"{called.get(key, key)} = {abs(getattr(p, key)):g} mm" for key in unsaid)
+        yield f"{kind} ({', '.join(words)})"
     if not said & {"backup", "extrusion_gap"}:
         yield "a back-up ring"
-
-
-def _called(p: Gland, key: str) -> str:
-    """A key of the groove as the user of a piston seal knows it."""
-    return "groove_diameter" if p.piston and key == "housing_diameter" else key
 
 
 def _kind(p: Gland) -> tuple[str, bool]:

@@ -16,8 +16,6 @@ class Rectangular(Section):
 
     def drawn(self) -> Outline:
         """About the origin."""
-        self.at_most(
-            "corner_radius", 0.5 * min(self.width, self.height), "half of the smaller side"
-        )
         z, r = 0.5 * self.width, 0.5 * self.height
+        self.at_most("corner_radius", min(z, r), "half of the smaller side")
         return Outline(rounded([(-z, -r), (z, -r), (z, r), (-z, r)], self.corner_radius))

@@ -6,7 +6,7 @@ import re
 from math import pi, sqrt
 
 from softehl.cases.harness.units import read_quantity
-from softehl.cases.seal.gland.trade.text import NUMBER, plain, refused
+from softehl.cases.seal.gland.trade.text import NUMBER, form, plain, refused
 
 RMS_OF_RA = sqrt(0.5 * pi)
 """Rms height over mean height (Ra) of a surface whose heights have a normal distribution."""
@@ -14,8 +14,8 @@ RMS_OF_RA = sqrt(0.5 * pi)
 _UNIT = "um|nm|uin|microinch(?:es)?|mm"
 _SMOOTH = 1.0  # rms height below which a number without a unit is in um, not in microinches
 _KIND, _HEIGHT = r"(?P<kind>R[a-z]{1,3}\d?)", rf"(?P<height>{NUMBER}) ?(?P<unit>{_UNIT})?"
-_FINISH = re.compile(rf"{_KIND}(?: max\.?)?[ =<\u2264:]*{_HEIGHT}", re.IGNORECASE)
-_TURNED = re.compile(rf"{_HEIGHT} ?{_KIND}", re.IGNORECASE)
+_FINISH = form(rf"{_KIND}(?: max\.?)?[ =<\u2264:]*{_HEIGHT}")
+_TURNED = form(rf"{_HEIGHT} ?{_KIND}")
 
 
 def read_finish(given: str) -> float | None:

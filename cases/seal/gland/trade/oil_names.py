@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from softehl.cases.harness.units import read_quantity
-from softehl.cases.seal.gland.trade.text import NUMBER, plain, refused
+from softehl.cases.seal.gland.trade.text import NUMBER, form, plain, refused
 
 IMPROVED = 140.0
 """Least viscosity index of HVLP oils, DIN 51524-3."""
@@ -40,30 +40,23 @@ class OilName:
     improved: bool = False
 
 
-_STANDARD = re.compile(
-    r"(?:DIN ?51524(?:-\d)?|ISO ?(?:6743|11158)(?:-\d)?|JIS)[ ,:]*", re.IGNORECASE
-)
+_STANDARD = form(r"(?:DIN ?51524(?:-\d)?|ISO ?(?:6743|11158)(?:-\d)?|JIS)[ ,:]*")
 _MINERAL = r"HLP-?D|HLP|HL|(?:L-)?HM|CLP|CL|HH|AW|hydraulic oil"
 _IMPROVED = r"HVLP-?D|HVLP"
 _ISO = r"ISO[ -]?VG|VG|ISO"
 _DEGREE = r"(?:deg ?C|° ?C|C)"
 _WARM = rf"(?P<at>-?{NUMBER}) ?(?:{_DEGREE}|(?P<f>(?:deg ?|° ?)?F))"
 _AT = rf"(?:[ ,]*(?:at|@|/|bei)? ?[(]?{_WARM}[)]?)?"
-_GRADE = re.compile(
+_GRADE = form(
     rf"(?P<plain>ISO[ -]?)?(?:(?P<improved>{_IMPROVED})|(?P<mineral>{_MINERAL}))?[ -]*"
     rf"(?P<iso>{_ISO})?[ -]*"
-    rf"(?P<grade>\d{{1,5}})(?:[ ,(]*VI ?=? ?(?P<index>{NUMBER})\)?)?{_AT}",
-    re.IGNORECASE,
+    rf"(?P<grade>\d{{1,5}})(?:[ ,(]*VI ?=? ?(?P<index>{NUMBER})\)?)?{_AT}"
 )
-_POINT = re.compile(
-    rf"(?P<nu>{NUMBER}) ?(?:cSt|mm\^?2/s) ?(?:at|@|/|bei)? ?{_WARM}",
-    re.IGNORECASE,
-)
-_GREASE = re.compile(r".*\b(?:grease|NLGI|Fett|lithium soap|molykote)\b.*", re.IGNORECASE)
-_OTHER = re.compile(
+_POINT = form(rf"(?P<nu>{NUMBER}) ?(?:cSt|mm\^?2/s) ?(?:at|@|/|bei)? ?{_WARM}")
+_GREASE = form(r".*\b(?:grease|NLGI|Fett|lithium soap|molykote)\b.*")
+_OTHER = form(
     r"(?:ISO )?(?P<kind>HV|HFA[ES]?|HFB|HFC|HFD[RU]?|HEES|HETG|HEPG|HEPR|ATF|PAO|DOT ?\d|SAE)\b.*"
-    r"|(?P<word>water|air|emulsion|skydrol).*",
-    re.IGNORECASE,
+    r"|(?P<word>water|air|emulsion|skydrol).*"
 )
 
 

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from softehl.cases.seal.gland.trade.text import NUMBER, plain, refused
+from softehl.cases.seal.gland.trade.text import NUMBER, form, plain, refused
 
 Kind = Literal["round", "x_ring", "u_cup"]
 
@@ -35,31 +35,26 @@ _KINDS: tuple[tuple[str, Kind], ...] = (
     ),
     (r"U[- ]?cups?|U[- ]?rings?|U[- ]?seals?|lip seals?|Nutring", "u_cup"),
 )
-_STANDARD = re.compile(
+_STANDARD = form(
     r"\b(?:(?:DIN|EN|BS|GOST R)[ -]?)*ISO[ -]?3601(?:-[1-5][AB]?(?!\d))?(?:[:-](?:19|20)\d\d)?"
-    r"|\bDIN[ -]?377[01](?:-[1-5](?!\d))?|\bGB/?T[ -]?3452(?:\.1)?",
-    re.IGNORECASE,
+    r"|\bDIN[ -]?377[01](?:-[1-5](?!\d))?|\bGB/?T[ -]?3452(?:\.1)?"
 )
-_DASH = re.compile(
+_DASH = form(
     r"(?P<said>(?:SAE )?AS[ -]?568[A-G]?(?: dash| no\.?)?|ARP ?568|#|BS(?: ?1806)?|Parker"
     r"|dash|size|no\.?)?"
-    r"[ -]*?(?P<dash>2-|-)?(?P<number>\d{1,3})[AB]?",
-    re.IGNORECASE,
+    r"[ -]*?(?P<dash>2-|-)?(?P<number>\d{1,3})[AB]?"
 )
 _QUAD = re.compile(r"4(?P<number>\d{3})")
-_COMPOUND = re.compile(
-    r"(?P<ring>.*\d)[ ,;/-]+(?P<rubber>(?:[XH]?NBR|F?FKM|FPM|EPDM|F?VMQ|PUR?|CR|ACM)[ -]?\d\d\b.*)",
-    re.IGNORECASE,
+_COMPOUND = form(
+    r"(?P<ring>.*\d)[ ,;/-]+(?P<rubber>(?:[XH]?NBR|F?FKM|FPM|EPDM|F?VMQ|PUR?|CR|ACM)[ -]?\d\d\b.*)"
 )
-_SIZE = re.compile(
+_SIZE = form(
     rf"(?:\d{{3}}[AB][ -]+)?(?:ID|d1)?[ =]*(?P<inner>{NUMBER}) ?(?:mm)?x(?P<section>{NUMBER})"
-    rf" ?(?:mm)?(?:x(?P<third>{NUMBER}) ?(?:mm)?)?(?:[ -]+[NS])?",
-    re.IGNORECASE,
+    rf" ?(?:mm)?(?:x(?P<third>{NUMBER}) ?(?:mm)?)?(?:[ -]+[NS])?"
 )
-_WORDS = re.compile(
+_WORDS = form(
     rf"(?:ID|d1|inside|inner)?[ =]*(?P<inner>{NUMBER}) ?(?:mm)?[ ,;/]+(?:CS|d2|section)[ =]*"
-    rf"(?P<section>{NUMBER}) ?(?:mm)?",
-    re.IGNORECASE,
+    rf"(?P<section>{NUMBER}) ?(?:mm)?"
 )
 
 

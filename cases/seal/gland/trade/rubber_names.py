@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from softehl.cases.seal.gland.trade.text import NUMBER, number_text, plain, refused
+from softehl.cases.seal.gland.trade.text import NUMBER, form, number_text, plain, refused
 
 RANGES: dict[str, tuple[float, float] | None] = {
     "NBR": (-40.0, 120.0),
@@ -37,23 +37,20 @@ _ALIASES = {
 _SPELT = {word: name for name in RANGES for word in (name, *_ALIASES.get(name, ()))}
 _POLYMER = rf"(?P<name>{'|'.join(sorted(_SPELT, key=len, reverse=True))})"
 _UNIT = (
-    r"(?:°|deg)? ?(?:(?:sh(?:ore)?\.?)? ?-?(?P<scale>[AD])|sh(?:ore)?|IRHD|duro(?:meter)?"
-    r"|JIS[ -]?A|Hs)|°"
+    r"(?:(?:°|deg)? ?(?:(?:sh(?:ore)?\.?)? ?-?(?P<scale>[AD])|sh(?:ore)?|IRHD|duro(?:meter)?"
+    r"|JIS[ -]?A|Hs)|°)"
 )
 _SHORE = rf"(?P<shore>{NUMBER})(?: ?{_UNIT})?"
-_FORMS = tuple(
-    re.compile(form, re.IGNORECASE)
-    for form in (
-        rf"{_POLYMER}(?:[ /-]*{_SHORE})?",
-        rf"{_SHORE}[ /-]*{_POLYMER}",
-        rf"{_POLYMER}[ ,/-]+(?:sh(?:ore)?) ?(?P<scale>[AD])[ =]*(?P<shore>{NUMBER})",
-        r"(?P<shore>\d+(?:\.\d+)?) ?" + _UNIT,
-        rf"(?:sh(?:ore)?\.?|JIS) ?(?P<scale>[AD])[ =]*(?P<shore>{NUMBER})",
-        rf"sh(?:ore)? ?(?P<shore>{NUMBER}) ?(?P<scale>[AD])",
-    )
+_FORMS = (
+    form(rf"{_POLYMER}(?:[ /-]*{_SHORE})?"),
+    form(rf"{_SHORE}[ /-]*{_POLYMER}"),
+    form(rf"{_POLYMER}[ ,/-]+(?:sh(?:ore)?) ?(?P<scale>[AD])[ =]*(?P<shore>{NUMBER})"),
+    form(rf"(?P<shore>{NUMBER}) ?{_UNIT}"),
+    form(rf"(?:sh(?:ore)?\.?|JIS) ?(?P<scale>[AD])[ =]*(?P<shore>{NUMBER})"),
+    form(rf"sh(?:ore)? ?(?P<shore>{NUMBER}) ?(?P<scale>[AD])"),
 )
 _SHORT = {"N": "NBR", "V": "FKM", "E": "EPDM", "S": "VMQ"}
-_PLASTICS = re.compile(r"(?:PTFE|Teflon|POM|PA ?6?|PEEK|UHMW-?PE)\b.*", re.IGNORECASE)
+_PLASTICS = form(r"(?:PTFE|Teflon|POM|PA ?6?|PEEK|UHMW-?PE)\b.*")
 
 
 @dataclass(frozen=True)
@@ -73,8 +70,8 @@ class RubberName:
 def read_rubber(key: str, given: str) -> RubberName | None:
     """The rubber of a name, None where the text is not like one.  Raises NotUnderstoodError."""
     text = plain(given)
-    for form in _FORMS:
-        if found := form.fullmatch(text):
+    for known in _FORMS:
+        if found := known.fullmatch(text):
             return _read(key, given, found.groupdict())
     if is_plastic(text):
         raise refused(

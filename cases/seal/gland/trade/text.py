@@ -19,6 +19,11 @@ NUMBER = r"\d+(?:\.\d+)?"
 """A number in a pattern, after `plain`."""
 
 
+def form(pattern: str) -> re.Pattern[str]:
+    """A form of names, in small or capital letters."""
+    return re.compile(pattern, re.IGNORECASE)
+
+
 class NotUnderstoodError(ValueError):
     """A name of the trade that is not understood; its text says what to write."""
 
