@@ -88,17 +88,8 @@ def _discretisation_is_rich_enough(p: Discretisation) -> None:
 
 
 def _film_has_its_model(p: Seal) -> None:
-    for name, given in (
-        ("roughness", p.rough),
-        ("cavitation_pressure", p.cavitation_pressure < 0.0),
-    ):
-        if given and not p.conserving:
-            raise ValueError(
-                f'cavitation = "penalty" does not work with {name}; leave cavitation out'
-            )
-    if p.conserving and p.reynolds == "dg":
-        raise ValueError('reynolds = "dg" works with cavitation = "penalty" only; use "fe"')
-    p.require_smooth_film(dg=p.reynolds == "dg", rough=p.rough)
+    asks = {"roughness": p.rough, "cavitation_pressure": p.cavitation_pressure < 0.0}
+    p.require_model(conserving=p.conserving, dg=p.reynolds == "dg", asks=asks)
     if (p.arc_start is None) != (p.arc_end is None):
         raise ValueError("arc_start and arc_end: give both, or none to have them found")
 

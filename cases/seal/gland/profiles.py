@@ -92,27 +92,26 @@ class Slider(ThinningKeys):
                 f"the pocket, {first:g} to {last:g} mm, must lie between {self.start:g} and "
                 f"{self.end:g} mm, the ends of the film: give pocket_start and pocket_end"
             )
-        if self.conserving and self.reynolds == "dg":
-            raise ValueError('reynolds = "dg" works with cavitation = "penalty" only; use "fe"')
-        if not self.conserving and self._beyond_penalty:
-            raise ValueError(
-                'cavitation = "penalty" does not work with roughness, supply, a pocket or '
-                "cavitation_pressure; leave cavitation out"
-            )
-        self.require_smooth_film(dg=self.reynolds == "dg", rough=any(self.roughness))
+        self.require_model(
+            conserving=self.conserving, dg=self.reynolds == "dg", asks=self._beyond_penalty
+        )
         return self
 
     @property
     def conserving(self) -> bool:
         """True if the film conserves mass where it ruptures."""
         if self.cavitation is None:
-            return self._beyond_penalty
+            return any(self._beyond_penalty.values())
         return self.cavitation == "mass-conserving"
 
     @property
-    def _beyond_penalty(self) -> bool:
-        asked = any(self.roughness) or self.supply is not None or self.cavitation_pressure < 0.0
-        return asked or self.profile == "pocket"
+    def _beyond_penalty(self) -> dict[str, bool]:
+        return {
+            "roughness": any(self.roughness),
+            "supply": self.supply is not None,
+            "cavitation_pressure": self.cavitation_pressure < 0.0,
+            "a pocket": self.profile == "pocket",
+        }
 
     @property
     def pocket(self) -> tuple[float, float]:

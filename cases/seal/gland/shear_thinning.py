@@ -81,9 +81,20 @@ class ThinningKeys(Parameters):
         """Suffix of the names of kernels of smooth films; empty for Newtonian oils."""
         return f"_{self.thins}" if self.thins else ""
 
-    def require_smooth_film(self, *, dg: bool, rough: bool) -> None:
-        """Films whose flow factors or facets are those of a Newtonian oil.  ValueError."""
-        for given, what in ((dg, 'reynolds = "dg"'), (rough, "roughness")):
+    def require_model(self, *, conserving: bool, dg: bool, asks: Mapping[str, bool]) -> None:
+        """ValueError for films of which there is no model.
+
+        asks: what cannot be had with a penalty -> whether it is given; "roughness" is one. Flow
+        factors and facets are those of a Newtonian oil.
+        """
+        for what, given in asks.items():
+            if given and not conserving:
+                raise ValueError(
+                    f'cavitation = "penalty" does not work with {what}; leave cavitation out'
+                )
+        if conserving and dg:
+            raise ValueError('reynolds = "dg" works with cavitation = "penalty" only; use "fe"')
+        for what, given in (('reynolds = "dg"', dg), ("roughness", asks["roughness"])):
             if given and self.thins:
                 raise ValueError(
                     f"{what} needs a Newtonian oil; leave it or the keys of {self.thins} out"
