@@ -17,12 +17,9 @@ from softehl.cases.harness.pictures import KINDS, draw_columns, save
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import OK, Row, column
 from softehl.cases.seal.cycle.motion import Motion, motion_keys, motion_of
-from softehl.cases.seal.gland.assumed import assumed
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.reach import beyond_reach, reach
 from softehl.cases.seal.gland.surfaces import MIXED
-from softehl.cases.seal.gland.trade.said import understood
-from softehl.cases.seal.gland.warnings import warnings
+from softehl.cases.seal.gland.told import assumed, foreword, warnings
 from softehl.cases.seal.report.limits import LEFT_OUT
 from softehl.cases.seal.report.title import titled
 from softehl.cases.seal.states.answer import far, leaks
@@ -248,8 +245,7 @@ class CycleCase(Case[Cycle, CycleRow]):
     def warnings(self, parameters: Cycle) -> list[str]:
         """See :class:`Case`."""
         highest = parameters.path.pressure.largest
-        words = [*beyond_reach(parameters, highest), *warnings(parameters), *unused(parameters)]
-        words += parameters.path.defects()
+        words = [*warnings(parameters, highest), *unused(parameters), *parameters.path.defects()]
         if parameters.rough:
             return words
         return [
@@ -296,7 +292,7 @@ class CycleCase(Case[Cycle, CycleRow]):
 
     def foreword(self, parameters: Cycle) -> list[str]:
         """See :class:`Case`."""
-        return [*understood(parameters.said), *reach(parameters, parameters.path.pressure.largest)]
+        return foreword(parameters, parameters.path.pressure.largest)
 
     def requested(self, parameters: Cycle) -> list[float]:
         """See :class:`Case`."""

@@ -9,11 +9,8 @@ from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.harness.pictures import KINDS
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import Record
-from softehl.cases.seal.gland.assumed import assumed
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.reach import beyond_reach, reach
-from softehl.cases.seal.gland.trade.said import understood
-from softehl.cases.seal.gland.warnings import warnings
+from softehl.cases.seal.gland.told import assumed, foreword, warnings
 from softehl.cases.seal.report import PICTURES, SOME, paraview, write_plots
 from softehl.cases.seal.report.limits import LEFT_OUT
 from softehl.cases.seal.report.title import titled
@@ -93,8 +90,7 @@ class ORingCase(Case[Seal, FilmRow]):
 
     def warnings(self, parameters: Seal) -> list[str]:
         """See :class:`Case`."""
-        p = parameters
-        return [*beyond_reach(p, p.sealed_pressure), *warnings(p)]
+        return warnings(parameters, parameters.sealed_pressure)
 
     def answer(self, parameters: Seal, rows: Sequence[FilmRow]) -> list[str]:
         """See :class:`Case`."""
@@ -128,7 +124,7 @@ class ORingCase(Case[Seal, FilmRow]):
 
     def foreword(self, parameters: Seal) -> list[str]:
         """See :class:`Case`."""
-        return [*understood(parameters.said), *reach(parameters, parameters.sealed_pressure)]
+        return foreword(parameters, parameters.sealed_pressure)
 
     def notes(
         self, rows: Sequence[FilmRow], advice: Mapping[float, str] = MappingProxyType({})

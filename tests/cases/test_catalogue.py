@@ -7,8 +7,8 @@ import pytest
 from softehl.cases.seal.gland.catalogue import as568, ring
 from softehl.cases.seal.gland.grooves import INCH, squeeze
 from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.told import handbook
 from softehl.cases.seal.gland.trade.text import NotUnderstoodError
-from softehl.cases.seal.gland.warnings import handbook
 
 SERIES = {0: (1, 50), 1: (102, 178), 2: (201, 284), 3: (309, 395), 4: (425, 475)}
 SECTIONS = {0: 0.070, 1: 0.103, 2: 0.139, 3: 0.210, 4: 0.275}

@@ -19,8 +19,8 @@ from softehl.cases.seal.gland.grooves import (
 )
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.told import handbook
 from softehl.cases.seal.gland.tolerances import read_tolerances
-from softehl.cases.seal.gland.warnings import handbook
 
 METRIC = {
     1.8: (1.45, 2.4),

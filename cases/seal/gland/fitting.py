@@ -159,7 +159,7 @@ def _with_gland(values: dict[str, Any]) -> None:
     if values.get("gland") in KINDS:
         groove = _groove(values, section)
         if values.get("housing_diameter") is None:
-            limited = dict(bands(tuple(values.get("said", ()))))
+            limited = dict(bands(values.get("said", ())))
             nominal = limited.get("bore" if rod < 0.0 else "rod")
             rod_of_chart = math.copysign(nominal.nominal, rod) if nominal else rod
             values["housing_diameter"] = round(rod_of_chart + 2.0 * groove.depth, 4)

@@ -38,11 +38,9 @@ def read_outline(path: Path, inner_diameter: float | None = None) -> Shape:
     inner_diameter: twice the radius of its lowest point, mm; None leaves it where it was drawn.
     Raises OutlineError, one line.
     """
-    readers = {".dxf": read_dxf, ".csv": read_points}
+    reader = read_dxf if path.suffix.lower() == ".dxf" else read_points
     with read_from(path):
-        if path.suffix.lower() not in readers:
-            raise OutlineError("an outline is a .dxf or a .csv file")
-        return readers[path.suffix.lower()](path, inner_diameter)
+        return reader(path, inner_diameter)
 
 
 def read_points(path: Path, inner_diameter: float | None = None) -> Shape:
@@ -74,11 +72,10 @@ def outline_of(
     faces the rod, sealed pressure from its highest point on. Raises OutlineError.
     """
     if parts is not None:
-        lines = [Line(a, b) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
-        closed = points[0] == points[-1]  # the last line is a point then
-        return named_shape(
-            list(zip(lines[:-1] if closed else lines, parts, strict=False)), inner_diameter, name
-        )
+        if points[0] == points[-1]:
+            points, parts = points[:-1], parts[:-1]
+        sides = zip(points, [*points[1:], points[0]], parts, strict=True)
+        return named_shape([(Line(a, b), part) for a, b, part in sides], inner_diameter, name)
     outline = seated(Outline.polygon(points), inner_diameter)
     z, r = np.array([piece.start for piece in outline.pieces]).T
     highest = np.flatnonzero(r >= r.max() - 1e-6 * outline.size)

@@ -1,0 +1,194 @@
+"""What is told of a seal before it is run: how it was understood, values assumed, warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import Any
+
+from softehl.cases.seal.gland.given import shown
+from softehl.cases.seal.gland.grooves import gland
+from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.reach import ratio
+from softehl.cases.seal.gland.records.free_seal import FreeSeal
+from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.rubbers import materials
+from softehl.cases.seal.gland.rubbers.hardness import shore_band
+from softehl.cases.seal.gland.sections.keys import ROUND, dimensions
+from softehl.cases.seal.gland.trade.oil_names import IMPROVED, read_oil_name
+from softehl.cases.seal.gland.trade.ring_names import read_ring
+from softehl.cases.seal.gland.trade.rubber_names import RANGES
+from softehl.cases.seal.gland.trade.said import understood
+
+_SURE, _TRIED = 3.0, 5.4
+"""p_s / mu up to which every film of an O-ring was right, and the largest that was tried."""
+
+_OTHER = 2.0
+"""Largest p_s / mu at which other sections were tried."""
+
+_DO = "the run may take minutes and end without a film; a harder rubber or a lower pressure helps"
+
+
+def foreword(p: Seal, pressure: float) -> list[str]:
+    """How words of the trade were understood, and what a ratio of pressure to modulus means.
+
+    Nothing of the latter without a pressure or beyond what is known to run, where `warnings` has
+    it. pressure: the largest sealed pressure, MPa.
+    """
+    found = ratio(p, pressure)
+    return [*understood(p.said), *([_ratio(p, found)] if 0.0 < found <= _most(p) else [])]
+
+
+def warnings(p: Seal, pressure: float) -> list[str]:
+    """A pressure above what is known to run, keys without effect, what is unusual, a line each."""
+    found = ratio(p, pressure)
+    beyond = [f"{_ratio(p, found)}; {_DO}"] if found > _most(p) else []
+    return [*beyond, *_unused(p), *_unusual(p), *handbook(p)]
+
+
+def _most(p: FreeSeal) -> float:
+    return _SURE if p.round else _OTHER
+
+
+def _ratio(p: FreeSeal, found: float) -> str:
+    words = f"sections other than round were tried up to {_OTHER:g}, not above"
+    if p.round:
+        words = (
+            f"in a sample of O-rings all films were right at ratios to {_SURE:g}, 98 % at 3 to 4, "
+            "89 % at 4 to 5; above 5 states are uncertain, and nothing was tried above "
+            f"{_TRIED:g}"
+        )
+    return f"sealed pressure / shear modulus = {found:.2g}: {words} (docs/limits.md)"
+
+
+# --- warnings -----------------------------------------------------------------------------------
+
+_NEEDS: Mapping[str, tuple[Callable[[Seal], Any], str]] = {
+    "temperature": (lambda p: p.oil or p.fit, "an oil or a fit"),
+    "ogden_terms": (lambda p: p.fit, "a fit"),
+    "corner_fillet": (lambda p: p.opens, "an extrusion_gap"),
+    "cavitation_penalty": (lambda p: not p.conserving, 'cavitation = "penalty"'),
+    "asperity_stiffness": (lambda p: p.rough, "a roughness"),
+    "boundary_friction": (lambda p: p.rough, "a roughness"),
+}
+"""Key -> whether it has an effect, and what it has none without."""
+
+_FILL = (60.0, 95.0)
+"""Volume of the ring over that of its gland that handbooks advise, %."""
+
+_STRETCH = 5.0
+"""Largest stretch that handbooks advise, %."""
+
+_LEAST_BULK = 20.0
+"""Bulk over shear modulus of a rubber at least; Poisson's ratio is 0.475 there."""
+
+
+def _unused(p: Seal) -> Iterator[str]:
+    """Keys with a value of their own that change nothing: another one is missing."""
+    for key, (used, needed) in _NEEDS.items():
+        value = getattr(p, key)
+        if value != type(p).model_fields[key].default and not used(p):
+            yield f"{key} = {shown(value)} has no effect without {needed}"
+
+
+def _unusual(p: Seal) -> Iterator[str]:
+    """Its compressibility, and a temperature outside the range of its polymer."""
+    stiffness = p.bulk_modulus / p.shear_modulus
+    if stiffness < _LEAST_BULK:
+        yield (
+            f"bulk_modulus = {p.bulk_modulus:g} MPa is {stiffness:.3g} shear moduli: "
+            "rubbers have hundreds to thousands"
+        )
+    used = RANGES[p.polymer] if p.polymer else None
+    if used and p.temperature is not None and not used[0] <= p.temperature <= used[1]:
+        yield (
+            f"temperature = {p.temperature:g} degC: {p.polymer} is used from {used[0]:g} to "
+            f"{used[1]:g} degC"
+        )
+
+
+def handbook(p: Gland) -> Iterator[str]:
+    """What handbooks warn of in a ring and its gland."""
+    low, high = _FILL
+    if not low <= p.fill_percent <= high:
+        yield (
+            f"the ring fills {p.fill_percent:.0f} % of its gland; handbooks advise {low:g} to "
+            f"{high:g} %"
+        )
+    if p.stretch_percent > _STRETCH:
+        yield (
+            f"the ring is stretched by {p.stretch_percent:.1f} % on its "
+            f"{'piston' if p.piston else 'rod'}; handbooks advise at most {_STRETCH:g} %"
+        )
+
+
+# --- values assumed where keys were not given ---------------------------------------------------
+
+_RUBBER = {"fit", "shore_A"}.union(*(m.keys for m in materials.MATERIALS.values()))
+
+
+def assumed(p: Seal, given: Collection[str]) -> list[str]:
+    """Important values that were not given.  given: the keys that were."""
+    said = frozenset(given)
+    return [*_ring(p, said), *_gland(p, said), *_fluids(p, said)]
+
+
+def _ring(p: Seal, said: frozenset[str]) -> Iterator[str]:
+    """Ring and rubber."""
+    if not said & {"ring", "section_diameter", "outline"}:
+        yield f"a section of {p.section_diameter:g} mm"
+    if p.section != ROUND and not said & set(dimensions(p.section)):
+        yield f"the usual proportions of section {p.section}"
+    if not said & {"ring", "inner_diameter"}:
+        yield f"inner diameter {p.ring_diameter:g} mm"
+    if p.shore_A is not None:
+        low, high = shore_band(p.shore_A, p.polymer)
+        yield (
+            f"a shear modulus of {p.shear_modulus:.3g} MPa by hardness, known to {low:+.0f} and "
+            f"{high:+.0f} %"
+        )
+    elif not said & _RUBBER:
+        yield f"a rubber of shear modulus {p.shear_modulus:.3g} MPa"
+
+
+def _gland(p: Gland, said: frozenset[str]) -> Iterator[str]:
+    """Rod and groove."""
+    if p.ring and read_ring(p.ring).outer is not None:
+        said |= {"rod", "housing_diameter", "groove_width"}  # a U-cup is named by its groove
+    if not said & {"rod", "rod_diameter", "bore"}:
+        yield f"a rod of {p.rod_diameter:g} mm"
+    kind, charted = _kind(p)
+    decided = {
+        "housing_diameter": {"squeeze", "groove_depth", "gland", "groove_diameter"},
+        "groove_width": {"fill", "gland"},
+    }
+    if not charted:  # assumed even if the gland was asked for by name
+        decided = {key: set() for key in decided}
+    if unsaid := [key for key, others in decided.items() if not said & {key, *others}]:
+        called = {"housing_diameter": "groove_diameter"} if p.piston else {}
+        words = (f"{called.get(key, key)} = {abs(getattr(p, key)):g} mm" for key in unsaid)
+        yield f"{kind} ({', '.join(words)})"
+    if not said & {"backup", "extrusion_gap"}:
+        yield "a back-up ring"
+
+
+def _kind(p: Gland) -> tuple[str, bool]:
+    """A gland in words, and whether it is one of a chart or was given."""
+    if not p.gland:
+        return "a gland", True
+    if p.section == "u_cup":
+        return "the gland of a U-cup by rule, its ground half way between heel and lips", False
+    if p.section not in (ROUND, "x_ring") or p.outline:
+        return f"the gland of an O-ring, as none is known for this {p.named}", False
+    if gland(p.section_diameter, p.gland, p.section).by_rule:
+        return "a gland in proportions between those of the neighbouring sections", False
+    return "its standard gland", True
+
+
+def _fluids(p: Seal, said: frozenset[str]) -> Iterator[str]:
+    """Pressure and oil."""
+    if "sealed_pressure" not in said:
+        yield f"a sealed pressure of {p.sealed_pressure:g} MPa"
+    if not said & {"viscosity", "oil"}:
+        yield f"an oil of {1e9 * p.viscosity:.3g} mPa s"
+    if p.oil and read_oil_name(p.oil).improved:
+        yield f"a viscosity index of {IMPROVED:g}, the least that HVLP oils have (DIN 51524-3)"
