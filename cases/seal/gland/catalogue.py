@@ -1,11 +1,10 @@
 """Standard rings by name.
 
 `as568.csv` holds the 349 general sizes of SAE AS568 (-001 to -475, inch): inside diameter, section
-and their tolerances. Dimensions are facts; the rows were written by series and step and compared,
-one by one, with the public ISO 3601-1 class A table of bell-jamie/o-ring-studio: every inside
-diameter agrees within rounding, so does every tolerance but those of -228 to -231, where that
-table has no band for 0.020 in, which the other series have at these diameters.
-ISO 3601-1 class B tolerances: its rule (A.1) and its steps of the section.
+and their tolerances. They were compared, one by one, with the public ISO 3601-1 class A table of
+bell-jamie/o-ring-studio. Every inside diameter agrees within rounding. So does every tolerance but
+those of -228 to -231: that table has no band for 0.020 in, which other series have at these
+diameters. ISO 3601-1 class B tolerances: its rule (A.1) and its steps of the section.
 """
 
 from __future__ import annotations

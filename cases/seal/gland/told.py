@@ -1,4 +1,4 @@
-"""What is told of a seal before it is run: how it was understood, values assumed, warnings."""
+"""Words about a seal before it is run: as it was understood, values assumed, warnings."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ _DO = "the run may take minutes and end without a film; a harder rubber or a low
 
 
 def foreword(p: Seal, pressure: float) -> list[str]:
-    """How words of the trade were understood, and what a ratio of pressure to modulus means.
+    """Words of the trade as they were understood, and the ratio of pressure to modulus.
 
-    Nothing of the latter without a pressure or beyond what is known to run, where `warnings` has
-    it. pressure: the largest sealed pressure, MPa.
+    The latter is left out without a pressure, and where `warnings` has it: beyond what is known to
+    run. pressure: the largest sealed pressure, MPa.
     """
     found = ratio(p, pressure)
     return [*understood(p.said), *([_ratio(p, found)] if 0.0 < found <= _most(p) else [])]
@@ -107,7 +107,7 @@ def _unusual(p: Seal) -> Iterator[str]:
 
 
 def handbook(p: Gland) -> Iterator[str]:
-    """What handbooks warn of in a ring and its gland."""
+    """Warnings of handbooks about a ring and its gland."""
     low, high = _FILL
     if not low <= p.fill_percent <= high:
         yield (

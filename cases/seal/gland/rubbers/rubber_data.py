@@ -227,7 +227,7 @@ def _fitted(name: str, data: RubberData, terms: int) -> dict[str, Any]:
 
 
 def _starts(name: str, data: RubberData, terms: int) -> tuple[Array, Array]:
-    """Where fits begin, (starts, n), and the limits of the parameters, (n, 2)."""
+    """Starts (starts, n) of fits, and the limits (n, 2) of their parameters."""
     if name == "ogden":  # mu alpha >= 0 makes each term stable at every stretch
         alpha = _EXPONENTS[:, :terms]
         ends = [np.outer(np.sign(alpha[0]), sizes) for sizes in ((0.0, np.inf), _SIZES)]
