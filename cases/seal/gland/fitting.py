@@ -22,11 +22,7 @@ from softehl.cases.seal.gland.sections.u_cup import UCup
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.said import bands
 
-DIAMETERS = {
-    "rod": "rod_diameter",
-    "bore": "rod_diameter",
-    "groove_diameter": "housing_diameter",
-}
+DIAMETERS = {"rod": "rod_diameter", "bore": "rod_diameter", "groove_diameter": "housing_diameter"}
 """Key of a diameter as it is measured -> key that is negative in a piston."""
 
 

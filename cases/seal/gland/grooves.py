@@ -33,7 +33,8 @@ Kind = Literal["dynamic", "hydraulic", "pneumatic"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 _SAME = 0.03
-"""Relative difference of two sections that have the same groove."""
+"""Relative difference of two sections that have the same groove: ISO 3601 and AS568 are to 1.2 %
+apart, 2.65 and 2.62 mm."""
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,7 @@ from pydantic import model_validator
 from softehl.cases.harness.parameters import Parameters, key
 
 _EYRING, _CARREAU = ("eyring_stress",), ("carreau_stress", "carreau_rate")
-_OF_LAW = {
-    "eyring": _EYRING,
-    "carreau": (*_CARREAU, "carreau_exponent", "carreau_plateau"),
-}
+_OF_LAW = {"eyring": _EYRING, "carreau": (*_CARREAU, "carreau_exponent", "carreau_plateau")}
 _USUAL = {
     "eyring": 'eyring_stress = "5 MPa"',
     "carreau": 'carreau_rate = "1e6 1/s" (or carreau_stress) and carreau_exponent = 0.5',

@@ -13,6 +13,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.seal.gland.given import number
 from softehl.cases.seal.gland.trade.finish_names import read_finish
 
 MICROMETRE = 1e-3  # mm
@@ -29,8 +30,7 @@ def _pair(given: object) -> object:
     if isinstance(given, (list, tuple)):
         return [_height(item) for item in given]
     height = _height(given)
-    single = isinstance(height, (int, float)) and not isinstance(height, bool)
-    return (0.0, height) if single else height
+    return (0.0, height) if number(height) else height
 
 
 def _height(item: object) -> object:

@@ -24,11 +24,7 @@ class Oil(ThinningKeys):
         le=1e-3,
     )
     pressure_viscosity: float = key(
-        0.02,
-        "coefficient alpha of eta = eta_0 exp(alpha p)",
-        unit="1/MPa",
-        ge=0,
-        le=1,
+        0.02, "coefficient alpha of eta = eta_0 exp(alpha p)", unit="1/MPa", ge=0, le=1
     )
     roelands: float | None = key(
         None,

@@ -14,7 +14,7 @@ from softehl.cases.seal.gland.trade.rubber_names import is_plastic
 from softehl.runtime.mesh.parted_mesh import CAP
 
 PRESETS: dict[str, dict[str, Any]] = {
-    "ptfe": {"material": "neo-hooke", "mu": 171.0, "bulk_modulus": 2080.0},
+    "ptfe": {"material": "neo-hooke", "mu": 171.0, "bulk_modulus": 2080.0}
 }
 """Materials by name. PTFE as an elastic solid, E = 500 MPa and nu = 0.46 at room temperature; it
 neither yields nor creeps here."""

@@ -12,12 +12,7 @@ from typing import Any
 
 from softehl.cases.seal.gland.given import number, put, shown
 from softehl.cases.seal.gland.rubbers.hardness import HARD, RANGE, youngs_modulus
-from softehl.cases.seal.gland.rubbers.materials import (
-    KEYS,
-    MATERIALS,
-    Material,
-    shear_modulus,
-)
+from softehl.cases.seal.gland.rubbers.materials import KEYS, MATERIALS, Material, shear_modulus
 from softehl.cases.seal.gland.rubbers.rubber_data import fit, read_data
 from softehl.cases.seal.gland.trade.rubber_names import read_rubber
 from softehl.cases.seal.gland.trade.text import refused
