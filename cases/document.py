@@ -12,7 +12,7 @@ import re
 from pathlib import Path
 
 from softehl.cases.harness.case import load_case
-from softehl.cases.harness.parameters import keys_of
+from softehl.cases.harness.parameters import declared, keys_of
 from softehl.cases.harness.table import column_lines, key_lines
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.keys import dimensions
@@ -47,9 +47,8 @@ def section_lines(name: str) -> list[str]:
     rows = ["| key | left out | bounds [mm] | what it is |", "|---|---|---|---|"]
     fields = SECTIONS[name].model_fields
     for key, own in dimensions(name).items():
-        extra = fields[own].json_schema_extra
-        assert isinstance(extra, dict)
-        bounds = str(extra["bounds"]).partition(";")[0]
+        extra = declared(fields[own])
+        bounds = extra["bounds"].partition(";")[0]
         share = f"{extra['part']:g} section_diameter"
         rows.append(f"| `{key}` | {share} | {bounds} | {extra['meaning']} |")
     return rows

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic.fields import FieldInfo
 
 from softehl.cases.harness.units import is_quantity, read_quantity
 
@@ -84,9 +85,8 @@ class Parameters(BaseModel):
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         """Describe every key once its type is known."""
-        for name, field in cls.model_fields.items():
-            extra = field.json_schema_extra
-            assert isinstance(extra, dict), f"{name} is not declared by key()"
+        for field in cls.model_fields.values():
+            extra = declared(field)
             extra["bounds"] = bounds = extra["bounds"] or _values(field.annotation)
             unit = f" [{extra['unit']}]" if extra["unit"] else ""
             field.description = f"{extra['meaning']}{unit}" + (f"; {bounds}" if bounds else "")
@@ -97,8 +97,7 @@ def without_unit(kind: type[Parameters], name: str, value: object) -> object:
     if isinstance(value, list | tuple):
         return [without_unit(kind, name, item) for item in value]
     field = kind.model_fields.get(name)
-    extra = field.json_schema_extra if field else None
-    unit = str(extra["unit"]) if isinstance(extra, dict) else ""
+    unit = declared(field)["unit"] if field else ""
     if not unit or not isinstance(value, str) or not is_quantity(value):
         return value
     try:
@@ -167,6 +166,13 @@ def key(
     return Field(default=default, json_schema_extra=extra, **limits)
 
 
+def declared(field: FieldInfo) -> dict[str, Any]:
+    """Unit, bounds, meaning and file of a field that was declared by `key`."""
+    extra = field.json_schema_extra
+    assert isinstance(extra, dict), "a field is not declared by key()"
+    return extra
+
+
 def _values(kind: Any) -> str:
     """Allowed values of a type in words, if it has a few values or is a list of numbers."""
     if kind is bool:
@@ -181,8 +187,7 @@ def _values(kind: Any) -> str:
 
 def files_of(kind: type[Parameters]) -> tuple[str, ...]:
     """The keys that are paths of files."""
-    extras = {name: field.json_schema_extra for name, field in kind.model_fields.items()}
-    return tuple(n for n, extra in extras.items() if isinstance(extra, dict) and extra["file"])
+    return tuple(name for name, field in kind.model_fields.items() if declared(field)["file"])
 
 
 def keys_of(kind: type[Parameters]) -> Iterator[Key]:
@@ -190,7 +195,5 @@ def keys_of(kind: type[Parameters]) -> Iterator[Key]:
     under = {name: heading for heading, names in kind.headings.items() for name in names}
     for name in [*under, *(name for name in kind.model_fields if name not in under)]:
         field = kind.model_fields[name]
-        extra = field.json_schema_extra
-        assert isinstance(extra, dict)
-        unit, bounds, meaning = (str(extra[k]) for k in ("unit", "bounds", "meaning"))
+        unit, bounds, meaning = (declared(field)[k] for k in ("unit", "bounds", "meaning"))
         yield Key(name, field.default, unit, bounds, meaning, under.get(name, ""))

@@ -21,7 +21,7 @@ DENSITY = 870.0
 """At 15 degC, of a mineral oil, kg/m^3."""
 
 EXPANSION = 0.65
-"""Fall of the density of a mineral oil, kg/m^3 for each degC; ASTM D1250 has 0.63 for lubricants."""
+"""Fall of the density of a mineral oil, kg/m^3 for each degC; of lubricants 0.63 by ASTM D1250."""
 
 _KELVIN = 273.15
 

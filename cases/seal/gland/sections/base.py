@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import dist
 from typing import Any
 
-from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.harness.parameters import Parameters, declared, key
 from softehl.cases.seal.gland.sections.seated import seat
 from softehl.runtime.mesh.outline import Outline, OutlineError, Piece, Point, Shape
 
@@ -65,18 +65,14 @@ def part(share: float, meaning: str, **limits: Any) -> Any:
         bounds=f"{bounds}; left out = {share:g} x height",
         **(limits or {"gt": 0}),
     )
-    field.json_schema_extra["part"] = share
+    declared(field)["part"] = share
     return field
 
 
 def parts_of(kind: type[Section]) -> dict[str, float]:
     """Dimensions of a section that are parts of its height, and which part."""
-    extras = {name: field.json_schema_extra for name, field in kind.model_fields.items()}
-    return {
-        name: float(str(extra["part"]))
-        for name, extra in extras.items()
-        if isinstance(extra, dict) and "part" in extra
-    }
+    extras = {name: declared(field) for name, field in kind.model_fields.items()}
+    return {name: extra["part"] for name, extra in extras.items() if "part" in extra}
 
 
 def require(holds: bool, words: str) -> None:

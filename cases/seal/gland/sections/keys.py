@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from pydantic import ValidationError, create_model
 
-from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.harness.parameters import Parameters, declared, key
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.files import read_mesh, read_outline
 from softehl.runtime.mesh.outline import Shape
@@ -54,9 +54,7 @@ def _dimensions() -> dict[str, Any]:
     uses: dict[str, dict[str, dict[str, Any]]] = {}
     for section, page in SECTIONS.items():
         for name, own in dimensions(section).items():
-            extra = page.model_fields[own].json_schema_extra
-            assert isinstance(extra, dict)
-            uses.setdefault(name, {})[section] = extra
+            uses.setdefault(name, {})[section] = declared(page.model_fields[own])
     return {name: (float | None, _key(of)) for name, of in uses.items()}
 
 
