@@ -57,23 +57,25 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
         ),
     }
     words: ClassVar = {
-        **dict.fromkeys(
-            ("piston", "cylinder", "piston_diameter", "bore_diameter"), 'write bore = "40 H8"'
-        ),
-        **dict.fromkeys(("pressure", "p", "p_s"), "write sealed_pressure"),
-        **dict.fromkeys(("speed", "velocity", "u"), "write speeds"),
-        **dict.fromkeys(("hardness", "rubber", "polymer"), 'write material = "NBR 70"'),
-        **dict.fromkeys(("fluid", "lubricant", "grease"), 'write oil = "HLP 46 at 50 degC"'),
-        **dict.fromkeys(("eta", "dynamic_viscosity"), "write viscosity"),
-        **dict.fromkeys(("seal", "profile", "type"), 'write ring = "36x4" or section = "u_cup"'),
-        **dict.fromkeys(("temp", "t"), "write temperature"),
-        **dict.fromkeys(("housing", "gland_diameter"), "write housing_diameter"),
-        **dict.fromkeys(("depth", "gland_depth"), "write groove_depth"),
-        **dict.fromkeys(("width", "gland_width", "groove_length"), "write groove_width"),
-        **dict.fromkeys(("surface", "finish", "ra", "rq"), 'write roughness = "Ra 0.2"'),
-        **dict.fromkeys(("stroke_length", "length"), "write travel"),
-        **dict.fromkeys(("gap", "clearance"), "write extrusion_gap"),
-        **dict.fromkeys(("compression", "interference"), "write squeeze"),
+        word: f"write {answer}"
+        for answer, words in {
+            'bore = "40 H8"': ("piston", "cylinder", "piston_diameter", "bore_diameter"),
+            "sealed_pressure": ("pressure", "p", "p_s"),
+            "speeds": ("speed", "velocity", "u"),
+            'material = "NBR 70"': ("hardness", "rubber", "polymer"),
+            'oil = "HLP 46 at 50 degC"': ("fluid", "lubricant", "grease"),
+            "viscosity": ("eta", "dynamic_viscosity"),
+            'ring = "36x4" or section = "u_cup"': ("seal", "profile", "type"),
+            "temperature": ("temp", "t"),
+            "housing_diameter": ("housing", "gland_diameter"),
+            "groove_depth": ("depth", "gland_depth"),
+            "groove_width": ("width", "gland_width", "groove_length"),
+            'roughness = "Ra 0.2"': ("surface", "finish", "ra", "rq"),
+            "travel": ("stroke_length", "length"),
+            "extrusion_gap": ("gap", "clearance"),
+            "squeeze": ("compression", "interference"),
+        }.items()
+        for word in words
     }
 
     @classmethod
