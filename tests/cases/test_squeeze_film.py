@@ -109,9 +109,9 @@ def test_the_first_step_holds_the_film_where_it_is(
     steps, first = FilmCorrectors.of(system, dry.newton).steps(), begun.first
     found = steps.solve(begun.step(start, first, 0.0), start)
     assert found.converged, found.message
-    assert 0.0 < begun.change(start, found.x) < 0.3
+    assert 0.0 < begun.change(start, found.x) < 0.7
     longer = steps.solve(begun.step(start, 1e5 * first, 0.0), start)
-    assert not longer.converged or begun.change(start, longer.x) > 0.3
+    assert not longer.converged or begun.change(start, longer.x) > 0.7
 
 
 def test_a_rod_that_nothing_touches_has_no_film(dry: DryContact) -> None:

@@ -21,10 +21,11 @@ from softehl.cases.seal.states.estimate import coarser_density, system_at
 from softehl.cases.seal.states.verdict import FilmNumbers, fewest_inlet_segments
 from softehl.runtime.mesh.mesh import MeshError
 
-FITS = 2.2
-"""Segments that a film may ask for in the place of one. Where it asked for at most three, h*
-changed by 0.5 % or less on the mesh that was made for it; where for nine, by 7 %. With 2.5 thin
-films of easy glands had estimates above 2 %."""
+FITS, SHOWS = 2.2, 3.0
+"""Segments that a film may ask for in the place of one, before its mesh is made anew and before it
+does not count. Where it asked for at most three, h* changed by 0.5 % or less on the mesh that was
+made for it; where for nine, by 7 %. Made anew from 2.5 on, thin films of easy glands had estimates
+above 2 %."""
 
 ALIKE = 1.25
 """Ratio of the segments that two meshes have for a film, relative to their densities: what they
@@ -69,36 +70,37 @@ class Adaptation:
         last: films at other speeds. A film that ends early on a mesh is squeezed out anew on one
         that is made for the state it has reached.
         """
-        found, fits = self._settled(found, Fraction(self.p.density))
+        density = Fraction(self.p.density)
+        found = self._settled(found, density)
         if isinstance(found, NoFilm):
             return found
-        return Adapted(found, self._coarser(found, last), fits)
+        return Adapted(found, self._coarser(found, last), self._fits(found, density, most=SHOWS))
 
     def _settled(
         self, found: Film | NoFilm, density: Fraction, like: Film | None = None
-    ) -> tuple[Film | NoFilm, bool]:
-        """The film on a mesh of that density that fits it, and whether it does.
-
-        like: see `_fits`.
-        """
-        fits = isinstance(found, Film) and self._fits(found, density, like)
+    ) -> Film | NoFilm:
+        """The film on a mesh of that density that fits it, if there is one; like: see `_fits`."""
         for _ in range(CYCLES):
-            again = None if fits else self._remeshed(found, density)
+            if isinstance(found, Film) and self._fits(found, density, like):
+                break
+            again = self._remeshed(found, density)
             if not isinstance(again, Film):
                 break
-            found, fits = again, self._fits(again, density, like)
-        return found, fits
+            found = again
+        return found
 
-    def _fits(self, film: Film, density: Fraction, like: Film | None = None) -> bool:
+    def _fits(
+        self, film: Film, density: Fraction, like: Film | None = None, most: float = FITS
+    ) -> bool:
         """True if a mesh fits its film; a mesh that is given is as it is.
 
-        like: the film on another mesh, which this one must resolve as well for its density.
+        like: the film on another mesh, which this one must resolve as well for its density. most:
+        segments that it may ask for in the place of one, without that.
         """
         p, segments = film.system.parameters, film.numbers.inlet_segments
         if p.mesh != "graded":
             return True
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
-        most = FITS
         if like is not None:
             fewest = like.numbers.inlet_segments * float(density / p.density) / ALIKE
             most = ALIKE * _misfit(like, p.density)
@@ -135,7 +137,7 @@ class Adaptation:
         if not isinstance(found, Film):
             found = self._carried(film, system)
         if isinstance(found, Film):
-            found, _ = self._settled(found, density, film)
+            found = self._settled(found, density, film)
         return found if isinstance(found, Film) else None
 
     def _carried(self, found: Film | NoFilm, system: SealSystem) -> Film | NoFilm | None:

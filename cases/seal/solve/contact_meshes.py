@@ -23,9 +23,6 @@ COARSE = 1
 GUIDE = 2
 """Density of the last graded mesh; finer ones have its layout."""
 
-PASSES = 3
-"""Graded meshes."""
-
 SEALS = 3
 """How often a mesh is made anew because the sealed pressure ends where nothing touches."""
 
@@ -61,25 +58,23 @@ class ContactMeshes:
         uniform = build_system(_at(p.model_copy(update={"mesh": "uniform"}), coarse))
         x = self._begun(uniform)
         state: State | StageFailed = x if isinstance(x, StageFailed) else (uniform, x)
-        for number in range(1, PASSES):
-            state = self._next(state, _at(p, coarse if number == 1 else guide), number)
-        state = self._sealed(_at(p, guide), state)
+        state = self._sealed(_at(p, guide), self._next(state, _at(p, coarse)))
         return state if isinstance(state, StageFailed) else self._finer(*state, p.density)
 
     def _sealed(self, p: Seal, state: State | StageFailed) -> State | StageFailed:
         """On the last of the graded meshes; on more where pressure ends outside the contact."""
-        for number in range(PASSES, PASSES + SEALS):
-            state = self._next(state, p, number)
+        for _ in range(SEALS):
+            state = self._next(state, p)
             if isinstance(state, StageFailed) or p.given_arc or not unsealed(*state):
                 break
         return state
 
-    def _next(self, state: State | StageFailed, p: Seal, number: int) -> State | StageFailed:
+    def _next(self, state: State | StageFailed, p: Seal) -> State | StageFailed:
         """On a mesh that is made for the contact on another one."""
         if isinstance(state, StageFailed):
             return state
         system = build_system(p, contact_layout(*state, p))
-        return self.solver.from_mesh(*state, system, f"contact on graded mesh {number}")
+        return self.solver.from_mesh(*state, system, "contact on a graded mesh")
 
     def _begun(self, system: SealSystem) -> Followed:
         """Unknowns (n,) on the first mesh: a stored state if there is a good one, else the path."""

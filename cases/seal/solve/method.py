@@ -32,10 +32,6 @@ from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Status
 
-FASTER = 4.0
-"""Speed, of one that the contact does not lead to, at which a thicker film is begun with. An X-ring
-(36 of the sample) has no instroke from contact at 1000 mm/s, and all of them from 4000 mm/s."""
-
 
 @dataclass(frozen=True, eq=False)
 class DryContact:
@@ -87,14 +83,8 @@ class DryContact:
         return FilmSolver(self.system, self.solver.driver)
 
     def film(self, stroke: Stroke, speed: float) -> Film | NoFilm:
-        """The film at |U|, mm/s, on the mesh of the contact; from a faster one where it must be."""
-        films = self.films
-        found = films.from_contact(stroke, speed, self.x)
-        if isinstance(found, NoFilm):
-            above = films.from_contact(stroke, FASTER * speed, self.x)
-            below = films.from_neighbour([above], speed) if isinstance(above, Film) else found
-            found = below if isinstance(below, Film) else found
-        return found
+        """The film at |U|, mm/s, on the mesh of the contact."""
+        return self.films.from_contact(stroke, speed, self.x)
 
     def adapted(
         self, stroke: Stroke, speed: float, last: Sequence[Adapted] = ()
