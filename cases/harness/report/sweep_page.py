@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, nan
 from pathlib import Path
-from textwrap import wrap
 from typing import Any
 
 from softehl.cases.harness.case import AnyCase, load_case
@@ -18,10 +17,7 @@ from softehl.cases.harness.report.part import FinishedRun, Part, Table
 from softehl.cases.harness.responses import titled, titled_value
 from softehl.runtime.io import Cell, read_json
 
-_HEIGHT, _WIDTH, _LEAST = 320, 620, 300  # px
-_LABEL = 26  # letters of a line along the axis
 _COLUMNS = 12  # of a table at most: random points have a value of their own each
-_COLOURS = ("#1b6ca8", "#c8553d", "#4f8a52", "#7a5195", "#b58900", "#444444")
 
 
 @dataclass(frozen=True)
@@ -167,23 +163,13 @@ def _pivot(sweep: FinishedSweep, name: str) -> Table:
 
 def _plot(sweep: FinishedSweep, name: str) -> Any:
     """A number over the first key, a line for each value of the others."""
-    from bokeh.plotting import figure
+    from softehl.cases.harness.report.plot import COLOURS, plot, put_legend_above
 
     first, *others = sweep.keys
     along = list(dict.fromkeys(p.values[first] for p in sweep.points))
     numbers = all(isinstance(value, float) for value in along)
     size: dict[str, Any] = {} if numbers else {"x_range": [str(value) for value in along]}
-    panel = figure(
-        height=_HEIGHT,
-        width_policy="max",
-        max_width=_WIDTH,
-        min_width=_LEAST,
-        x_axis_label=titled(_plain(first), sweep.keys[first]),
-        y_axis_label="\n".join(wrap(name, _LABEL)),
-        tools="pan,box_zoom,wheel_zoom,reset,save",
-        **size,
-    )
-    panel.toolbar.logo = None
+    panel = plot(titled(_plain(first), sweep.keys[first]), name, **size)
     lines: dict[str, list[tuple[Any, float]]] = {}
     for p in sweep.points:
         if isfinite(p.merit(name)):
@@ -191,13 +177,13 @@ def _plot(sweep: FinishedSweep, name: str) -> Any:
             lines.setdefault(sweep.words(p, others), []).append((at, p.merit(name)))
     for number, (words, points) in enumerate(lines.items()):
         x, y = zip(*(sorted(points) if numbers else points), strict=True)
-        look: dict[str, Any] = {"color": _COLOURS[number % len(_COLOURS)]}
-        if words and len(lines) <= len(_COLOURS):
+        look: dict[str, Any] = {"color": COLOURS[number % len(COLOURS)]}
+        if words and len(lines) <= len(COLOURS):
             look["legend_label"] = words
         panel.line(x, y, **look)
         panel.scatter(x, y, size=6, **look)
     if panel.legend:
-        panel.add_layout(panel.legend[0], "above")
+        put_legend_above(panel, columns=1)
     return panel
 
 
