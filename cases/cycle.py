@@ -20,8 +20,7 @@ from softehl.cases.seal.cycle.motion import Motion, motion_keys, motion_of
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import MIXED
 from softehl.cases.seal.gland.told import assumed, foreword, warnings
-from softehl.cases.seal.report.limits import LEFT_OUT
-from softehl.cases.seal.report.title import titled
+from softehl.cases.seal.report.words import LEFT_OUT, titled
 from softehl.cases.seal.states.answer import far, leaks
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_table
@@ -286,9 +285,9 @@ class CycleCase(Case[Cycle, CycleRow]):
 
     def report(self, runs: Sequence[FinishedRun]) -> Sequence[Part]:
         """See :class:`Case`."""
-        from softehl.cases.seal.report.cycle_parts import cycle_parts
+        from softehl.cases.seal.report.parts import cycle_parts
 
-        return cycle_parts(runs, PICTURES)
+        return cycle_parts(runs)
 
     def foreword(self, parameters: Cycle) -> list[str]:
         """See :class:`Case`."""
@@ -328,17 +327,15 @@ class CycleCase(Case[Cycle, CycleRow]):
         """See :class:`Case`: friction loops, and the film of the last cycle."""
         if not kinds:
             return
-        import matplotlib
-
         from softehl.cases.seal.report.cycle import loop_figure, map_figure, write_animation
-        from softehl.cases.seal.report.style import STYLE
+        from softehl.cases.seal.report.style import drawing
 
         loops = {row.label(row.key): read_table(folder / row.file_names()[0]) for row in rows}
         shown = ("place_mm", "friction_N", "flux_air_mm2_s")
         draw_columns(folder / "rows", loops, shown, kinds)
         names, last = rows[-1].file_names(), [*loops.values()][-1]
         film, outline = (read_table(folder / names[k]) for k in (1, 3))
-        with matplotlib.rc_context(STYLE):
+        with drawing():
             save(loop_figure(loops, [row.energy_mJ for row in rows]), folder / PICTURES[0], kinds)
             save(map_figure(film, last), folder / PICTURES[1], kinds)
             if parameters.animation:

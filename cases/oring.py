@@ -11,9 +11,8 @@ from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import Record
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.told import assumed, foreword, warnings
-from softehl.cases.seal.report import PICTURES, SOME, paraview, write_plots
-from softehl.cases.seal.report.limits import LEFT_OUT
-from softehl.cases.seal.report.title import titled
+from softehl.cases.seal.report import paraview, tables
+from softehl.cases.seal.report.words import LEFT_OUT, titled
 from softehl.cases.seal.states import plan
 from softehl.cases.seal.states.answer import answer
 from softehl.cases.seal.states.leakage import net_leakage
@@ -22,6 +21,11 @@ from softehl.cases.seal.states.sensitivity_table import resolved
 from softehl.cases.seal.states.state import FilmRow
 from softehl.cases.seal.states.state import Observer as SealObserver
 from softehl.cases.seal.states.state import Outcome as SealOutcome
+
+PICTURES = ("curve", "profiles", "section")
+"""Names of the files, each .png or .svg or both, of every run."""
+SOME = ("fit", "stribeck", "tornado")
+"""Pictures of rubbers that were fitted to tests, of rough surfaces, of sensitivities."""
 
 _THINNEST = "thinnest film [um]"
 
@@ -38,7 +42,7 @@ class ORingCase(Case[Seal, FilmRow]):
     files = (
         *("sensitivity.csv", "sensitivity_*.csv", "tolerances.csv"),
         *("leakage.csv", "fit.csv", "contact_*.csv", "contact_*.vtu", *paraview.FILES),
-        *(f"{name}.{kind}" for name in (*PICTURES, *SOME, "tornado") for kind in KINDS),
+        *(f"{name}.{kind}" for name in (*PICTURES, *SOME) for kind in KINDS),
     )
     shared = "contacts"
     left_out = LEFT_OUT
@@ -98,9 +102,7 @@ class ORingCase(Case[Seal, FilmRow]):
 
     def told(self, folder: Path) -> list[str]:
         """See :class:`Case`: tolerances and sensitivities."""
-        from softehl.cases.seal.report.sensitivity import told
-
-        return told(folder)
+        return tables.told(folder)
 
     def merits(self, parameters: Seal, rows: Sequence[FilmRow]) -> Mapping[str, float]:
         """See :class:`Case`; of all speeds the worst."""
@@ -148,11 +150,13 @@ class ORingCase(Case[Seal, FilmRow]):
     ) -> None:
         """See :class:`Case`."""
         paraview.write_paraview(parameters, folder, rows)
-        write_plots(parameters, folder, rows, rejected, kinds)
+        tables.write_fit(parameters, folder)
         if parameters.sensitivity:
-            from softehl.cases.seal.report.sensitivity import write_sensitivities
+            tables.write_sensitivities(parameters, folder, rows)
+        if kinds:
+            from softehl.cases.seal.report.pictures import write_plots
 
-            write_sensitivities(parameters, folder, rows, kinds)
+            write_plots(parameters, folder, rows, rejected, kinds)
 
     def report(self, runs: Sequence[FinishedRun]) -> Sequence[Part]:
         """See :class:`Case`."""

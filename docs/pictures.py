@@ -18,9 +18,10 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import softehl
+from softehl.cases.oring import PICTURES
 from softehl.cases.paper.states import PAPER
-from softehl.cases.seal.report import PICTURES, style, write_plots
-from softehl.cases.seal.report.curve import plain_ticks
+from softehl.cases.seal.report import style
+from softehl.cases.seal.report.pictures import write_plots
 from softehl.cases.seal.report.section import Scale, View, draw_view
 from softehl.cases.seal.states.observer_adapter import read_profile, read_section
 
@@ -108,9 +109,7 @@ def section(curve: softehl.Curve) -> Figure:
     axes.set_title(f"{curve.parameters.sealed_pressure:g} MPa from the left")
     for spine in axes.spines.values():
         spine.set_visible(False)
-    style.set_margins(figure, left=0.05, right=0.55, bottom=0.08, top=0.25)
-    bar = figure.add_axes((0.8, 0.12, 0.035, 0.7))
-    figure.colorbar(shown, cax=bar, label="von Mises stress [MPa]")
+    figure.colorbar(shown, ax=axes, label="von Mises stress [MPa]")
     return figure
 
 
@@ -124,12 +123,9 @@ def films(curve: softehl.Curve) -> Figure:
         label = f"{abs(row.rod_speed_mm_s):g}"
         axes.plot(profile.x_mm, profile.h_um, color=tuple(colour), label=label)
     axes.set(xlim=(-0.8, 1.3), ylim=(0.3, 30.0), yscale="log")
-    axes.yaxis.set_ticks(plain_ticks(0.3, 30.0))
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_locator(matplotlib.ticker.NullLocator())
+    style.tick_plainly(axes.yaxis)
     axes.set(xlabel="position $x$ [mm]", ylabel=style.FILM, title="instroke, 1 MPa")
     axes.legend(title="$|U|$ [mm/s]", title_fontsize=6.5, loc="upper center", ncols=2)
-    style.set_margins(figure, left=0.42, right=0.06, bottom=0.36, top=0.25)
     return figure
 
 
@@ -144,7 +140,6 @@ def stabilised(papers: softehl.Curve, ours: softehl.Curve) -> Figure:
     axes.set(xlabel="position $x$ [mm]", ylabel=style.FILM)
     axes.set_title("100 mm/s, equal number of unknowns")
     axes.legend(loc="upper center")
-    style.set_margins(figure, left=0.42, right=0.06, bottom=0.36, top=0.25)
     return figure
 
 
@@ -162,7 +157,6 @@ def kernels(page: str) -> Figure:
     axes.set_title("hyperelastic element, one core")
     axes.invert_yaxis()
     axes.grid(visible=False, axis="y")
-    style.set_margins(figure, left=0.52, right=0.08, bottom=0.36, top=0.25)
     return figure
 
 

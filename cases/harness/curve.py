@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 from softehl.cases.harness.files import file_digest, write_content
 from softehl.cases.harness.observer import State
 from softehl.cases.harness.row import Row
-from softehl.runtime.io import read_csv, write_csv
+from softehl.runtime.io import write_csv
 
 R = TypeVar("R", bound=Row)
 
@@ -24,10 +24,8 @@ class CurveFolder(Generic[R]):
 
     def load(self) -> None:
         """Take over the rows whose files are there.  Raises OSError, ValueError."""
-        curve = self.path / "curve.csv"
-        if curve.exists():
-            rows = [self.kind.parse(cells) for cells in read_csv(curve, self.kind.header())]
-            self.rows = [row for row in rows if self._is_there(row)]
+        rows = self.kind.read(self.path / "curve.csv")
+        self.rows = [row for row in rows if self._is_there(row)]
 
     def add(self, state: State) -> R:
         """Write the files of a state, then the curve with its row."""

@@ -9,9 +9,10 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import isnan, nan
+from pathlib import Path
 from typing import Any, ClassVar, Self, get_type_hints
 
-from softehl.runtime.io import Cell, number_text
+from softehl.runtime.io import Cell, number_text, read_csv
 
 OK = "ok"
 """Verdict of a row that may be used as a result."""
@@ -86,6 +87,11 @@ class Record:
         """The record from the text of its cells.  Raises ValueError."""
         given = zip(cls.columns(), cells, strict=True)
         return cls(**{column.name: column.read(text) for column, text in given})
+
+    @classmethod
+    def read(cls, path: Path) -> list[Self]:
+        """The records of a table, none where there is no such file.  Raises OSError, ValueError."""
+        return [cls.parse(cells) for cells in read_csv(path, cls.header())] if path.exists() else []
 
     @classmethod
     def part_of(cls, other: Any) -> Self:

@@ -23,9 +23,9 @@ from softehl.cases.harness.record import RunRecord
 from softehl.cases.harness.report.page import read_finished
 from softehl.cases.harness.row import OK
 from softehl.cases.harness.session import NOT_CONVERGED
-from softehl.cases.oring import ORingCase
+from softehl.cases.oring import PICTURES, ORingCase
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.report import PICTURES
+from softehl.cases.seal.report import pictures
 from softehl.cases.seal.solve.method import run as solve_really
 from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.cases.seal.states.state import (
@@ -240,7 +240,7 @@ def invoke(
     def run(*arguments: str, solver: Solve = solve, plots: bool = False) -> Result:
         monkeypatch.setattr(oring, "CASE", Fake(solver))
         if not plots:
-            monkeypatch.setattr(oring, "write_plots", lambda *_: None)
+            monkeypatch.setattr(pictures, "write_plots", lambda *_: None)
         code = softehl.main(arguments)
         captured = capfd.readouterr()
         return code, captured.out.splitlines(), captured.err.splitlines()

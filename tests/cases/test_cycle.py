@@ -25,10 +25,10 @@ from softehl.cases.seal.cycle.transient import Reading
 from softehl.cases.seal.equations.system import FILM, PRESSURE, SQUEEZE, VOID
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report.cycle import (
-    MovingSection,
     film_map,
     loop_figure,
     map_figure,
+    moving_section,
     write_animation,
 )
 from softehl.runtime.arrays import Array
@@ -382,12 +382,12 @@ def test_the_section_and_the_rod_of_an_animation_move() -> None:
         "z_mm": np.tile([-1.0, 1.0, 1.0, -1.0], 2),
         "r_mm": np.array([25.0, 25.0, 28.0, 28.0, 25.1, 25.1, 28.0, 28.0]),
     }
-    section = MovingSection.on(axes, p, outline)
-    ring, marks = section.show(0.9, 0.3)
+    show = moving_section(axes, p, outline)
+    ring, marks = show(0.9, 0.3)
     np.testing.assert_allclose(ring.get_xy()[:4, 1], [25.1, 25.1, 28.0, 28.0])
-    first = np.array(marks.get_segments())[:, 0, 0]
-    _, marks = section.show(0.9, 0.8)
-    np.testing.assert_allclose(np.array(marks.get_segments())[:, 0, 0], first + 0.5)
+    first = np.array(marks.get_xdata())
+    _, marks = show(0.9, 0.8)
+    np.testing.assert_allclose(np.array(marks.get_xdata()), first + 0.5)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.keys import dimensions
 from softehl.cases.seal.gland.tolerances import ToleranceRow, band, read_tolerances
 from softehl.cases.seal.gland.varied import LENGTHS
-from softehl.cases.seal.report.sensitivity import told
+from softehl.cases.seal.report.tables import told
 from softehl.cases.seal.sensitivity.quantities import QUANTITIES
 from softehl.cases.seal.sensitivity.sensitivity import rates_of, sensitivities
 from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase

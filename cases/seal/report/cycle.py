@@ -3,61 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.markers import TICKDOWN
+from matplotlib.patches import Polygon
+from PIL.Image import Image, fromarray
 
+from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.section import draw_gland
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import replacing
 
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.collections import LineCollection
-    from matplotlib.figure import Figure
-    from matplotlib.patches import Polygon
-    from PIL.Image import Image
-
-    from softehl.cases.seal.gland.parameters import Seal
-
-Table = Mapping[str, Array]
+Columns = Mapping[str, Array]
 
 _THICKEST = 20.0  # um, of the film that is shown
-_FRAMES, _PER_SECOND = 80, 16
-_RUBBER, _LINE = "#f0b86a", "#3b3f45"
-_MARKS = (0.6, 0.12, 8)
-"""Marks on the rod: between two, and their depth, in section diameters; how many to either side."""
 _PLACE = "place of the rod [mm]   (+ = to the air side)"
 
 
-def loop_figure(loops: Mapping[str, Table], work: Sequence[float]) -> Figure:
+def loop_figure(loops: Mapping[str, Columns], work: Sequence[float]) -> Figure:
     """Friction on the rod over its place, a line a cycle, with the work it takes.
 
     loops: label -> readings of a cycle, one cycle after the other. A line begins with the last
     reading of the cycle before. work: mJ, of each cycle, as in curve.csv.
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(5.4, 3.6), layout="constrained")
+    figure = Figure(figsize=(5.4, 3.6))
     axes = figure.subplots()
-    begun: list[Array] = [np.empty(0), np.empty(0)]
-    for number, ((label, loop), energy) in enumerate(zip(loops.items(), work, strict=True)):
-        shade = 0.25 + 0.75 * (number + 1) / len(loops)
-        columns = [loop["place_mm"], loop["friction_N"]]
-        line = [np.concatenate(pair) for pair in zip(begun, columns, strict=True)]
+    shades, begun = np.linspace(0.25, 1.0, len(loops) + 1)[1:], np.empty((2, 0))
+    for shade, energy, (label, loop) in zip(shades, work, loops.items(), strict=True):
+        line = np.hstack([begun, [loop["place_mm"], loop["friction_N"]]])
         axes.plot(*line, color="#1b6ca8", alpha=shade, label=f"{label}: {energy:.4g} mJ")
-        begun = [column[-1:] for column in columns]
+        begun = line[:, -1:]
     axes.axhline(0.0, color="0.4", linewidth=0.7)
-    axes.set(xlabel=_PLACE, ylabel="friction on the rod [N]")
+    axes.set(xlabel=_PLACE, ylabel=style.FRICTION)
     axes.legend(title="work of a cycle")
     return figure
 
 
-def film_map(film: Table) -> tuple[Array, Array, Array, Array]:
+def film_map(film: Columns) -> tuple[Array, Array, Array, Array]:
     """Times (n,), places (m,), mm, film thickness (n, m), um, and pressure (n, m), MPa.
 
     film: a line for every time and node, as a run of cycles writes it; nodes hardly move.
@@ -67,13 +58,10 @@ def film_map(film: Table) -> tuple[Array, Array, Array, Array]:
     return times, x.mean(axis=0), h, p
 
 
-def map_figure(film: Table, loop: Table) -> Figure:
+def map_figure(film: Columns, loop: Columns) -> Figure:
     """Film thickness over time and place, and beside it the speed of the rod."""
-    from matplotlib.colors import LogNorm
-    from matplotlib.figure import Figure
-
     times, x, h, _ = film_map(film)
-    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
+    figure = Figure(figsize=(6.4, 4.4))
     speed, axes = figure.subplots(1, 2, sharey=True, width_ratios=(1, 4))
     speed.plot(loop["rod_speed_mm_s"], loop["t_s"], color="#1b6ca8")
     speed.axvline(0.0, color="0.4", linewidth=0.7)
@@ -88,56 +76,40 @@ def map_figure(film: Table, loop: Table) -> Figure:
     return figure
 
 
-@dataclass(frozen=True, eq=False)
-class MovingSection:
-    """The section in its gland, with marks on the rod, to be shown at one time after another.
+def moving_section(
+    axes: Axes, p: Seal, outline: Columns
+) -> Callable[[float, float], tuple[Polygon, Line2D]]:
+    """Draw the section in its gland, with marks on the rod; how they move, and what moves.
 
-    times: (n,). outlines: (n, B, 2), mm.
+    outline: a line for every time and node. The function that moves takes a time (s) and the place
+    of the rod (mm).
     """
+    times = np.unique(outline["t_s"])
+    points = np.stack([outline["z_mm"], outline["r_mm"]], axis=1).reshape(len(times), -1, 2)
+    draw_gland(axes, p)
+    ring = Polygon(points[0], facecolor="#f0b86a", edgecolor="#3b3f45", linewidth=0.9)
+    axes.add_patch(ring)
+    apart = 0.6 * p.section_diameter
+    (marks,) = axes.plot([], [], color="#3b3f45", linestyle="", marker=TICKDOWN, markersize=6)
 
-    parameters: Seal
-    times: Array
-    outlines: Array
-    ring: Polygon
-    marks: LineCollection
+    def show(t: float, place: float) -> tuple[Polygon, Line2D]:
+        ring.set_xy(points[int(np.argmin(abs(times - t)))])
+        z = place % apart + apart * np.arange(-8.0, 8.0)
+        marks.set_data(z, np.full_like(z, 0.5 * p.rod_diameter))
+        return ring, marks
 
-    @classmethod
-    def on(cls, axes: Axes, p: Seal, outline: Table) -> MovingSection:
-        """On axes; outline: a line for every time and node."""
-        from matplotlib.collections import LineCollection
-        from matplotlib.patches import Polygon
-
-        times = np.unique(outline["t_s"])
-        points = np.stack([outline["z_mm"], outline["r_mm"]], axis=1).reshape(len(times), -1, 2)
-        draw_gland(axes, p)
-        ring = Polygon(points[0], facecolor=_RUBBER, edgecolor=_LINE, linewidth=0.9)
-        marks = LineCollection([], colors=_LINE, linewidths=0.9)
-        axes.add_patch(ring)
-        axes.add_collection(marks)
-        return cls(p, times, points, ring, marks)
-
-    def show(self, t: float, place: float) -> tuple[Polygon, LineCollection]:
-        """At a time, with the rod at a place (mm)."""
-        self.ring.set_xy(self.outlines[int(np.argmin(abs(self.times - t)))])
-        p, depth = self.parameters, _MARKS[1] * self.parameters.section_diameter
-        apart = _MARKS[0] * p.section_diameter
-        z = place % apart + apart * np.arange(-_MARKS[2], _MARKS[2])
-        rod = np.full_like(z, 0.5 * p.rod_diameter)
-        self.marks.set_segments(list(np.stack([[z, rod], [z, rod - depth]]).transpose(2, 0, 1)))
-        return self.ring, self.marks
+    return show
 
 
-def write_animation(path: Path, p: Seal, film: Table, loop: Table, outline: Table) -> None:
+def write_animation(path: Path, p: Seal, film: Columns, loop: Columns, outline: Columns) -> None:
     """Section, film and pressure through a cycle with the place of the rod, as a GIF.  OSError.
 
     outline: the deformed outline of the section, a line for every time and node of it.
     """
-    from matplotlib.figure import Figure
-
     times, x, h, pressures = film_map(film)
-    figure = Figure(figsize=(5.0, 7.4), dpi=80, layout="constrained")
+    figure = Figure(figsize=(5.0, 7.4), dpi=80)
     gland, pressure, thickness, place = figure.subplots(4, 1, height_ratios=(4.5, 3, 3, 1))
-    section = MovingSection.on(gland, p, outline)
+    move = moving_section(gland, p, outline)
     gland.set(xlabel="$z$ [mm]", ylabel="$r$ [mm]")
     limits, most = _wetted(x, h), float(pressures.max())
     (line_p,) = pressure.plot(x, pressures[0], color="#c8553d")
@@ -154,29 +126,24 @@ def write_animation(path: Path, p: Seal, film: Table, loop: Table, outline: Tabl
         line_p.set_ydata(pressures[at])
         line_h.set_ydata(np.maximum(h[at], 1e-3))
         dot.set_data([loop["place_mm"][at]], [loop["friction_N"][at]])
-        section.show(t, float(loop["place_mm"][at]))
+        move(t, float(loop["place_mm"][at]))
 
-    moments = np.linspace(times[0], times[-1], _FRAMES)
-    moving = (line_p, line_h, dot, section.ring, section.marks)
+    moving = (line_p, line_h, dot, *move(float(times[0]), 0.0))
+    moments = np.linspace(times[0], times[-1], 80)
     first, *others = _frames(figure, moving, show, moments)
     with replacing(path) as temporary:
-        pause = round(1000 / _PER_SECOND)
-        first.save(temporary, "GIF", save_all=True, append_images=others, duration=pause, loop=0)
+        first.save(temporary, "GIF", save_all=True, append_images=others, duration=62, loop=0)
 
 
 def _frames(
     figure: Figure, moving: Sequence[Artist], show: Callable[[float], None], moments: Array
 ) -> list[Image]:
     """Pictures of a figure after show(t) for each moment; only what moves is drawn again."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from PIL.Image import fromarray
-
     canvas: Any = FigureCanvasAgg(figure)
-    found = []
     for artist in moving:
         artist.set_animated(True)
     canvas.draw()
-    still = canvas.copy_from_bbox(figure.bbox)
+    still, found = canvas.copy_from_bbox(figure.bbox), []
     for t in moments.tolist():
         show(t)
         canvas.restore_region(still)

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+
+from softehl.cases.harness.case import AnyCase
 from softehl.cases.harness.report.page import all_keys, asked, left_out
 from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
+from softehl.cases.harness.report.plot import plot, put_legend_above
 from softehl.cases.seal.report import style
-from softehl.cases.seal.report.interactive import narrow
 from softehl.cases.seal.report.parts import gland, png
 from softehl.cases.seal.report.section import View, section_figure
 from softehl.cases.seal.sensitivity.design import value_of
+from softehl.cases.seal.sensitivity.design_command import Design
 from softehl.cases.seal.sensitivity.quantities import CALLED
 from softehl.cases.seal.states.state import FilmRow, FilmState
-
-if TYPE_CHECKING:
-    from softehl.cases.harness.case import AnyCase
-    from softehl.cases.seal.sensitivity.design_command import Design
-
-_NEAR = 1e-6  # relative step of a key, for the rate of a measure that follows from it
-_STEPS = {"mm": 0.01, "%": 1.0}  # of a key, by its unit: what a workshop thinks in
-_LABEL, _CURVE = 30, 40  # letters of a line along an axis; points of a curve
-_WIDTH, _HEIGHT = 620, 340  # px
 
 
 def design_title(design: Design, run: str) -> str:
@@ -34,13 +28,11 @@ def design_title(design: Design, run: str) -> str:
 
 def design_parts(design: Design, case: AnyCase) -> list[Part]:
     """Answer, curve of the design, results before and after, gland, section, keys, limits."""
-    import matplotlib
-
     runs = [
         FinishedRun(Path(name), case, p, [], content={"status": "converged"})
         for name, p in (("before", design.parameters), ("after", design.met))
     ]
-    with matplotlib.rc_context(style.STYLE):
+    with style.drawing():
         pictures = [gland(runs), _section(design)]
     tables = [asked(runs), *left_out(case), all_keys(runs)]
     return [_answer(design), _curve(design), _both(design), *pictures, *tables]
@@ -48,35 +40,34 @@ def design_parts(design: Design, case: AnyCase) -> list[Part]:
 
 def _answer(design: Design) -> Part:
     p, first, last = design.parameters, design.steps[0], design.steps[-1]
-    values = [design.measure(step.value) for step in (first, last)]
+    before, after = (design.measure(step.value) for step in (first, last))
     unit, size = f" {design.unit}".rstrip(), CALLED[design.target.quantity][1]
-    stroke = style.STROKES[p.stroke]
     return Part(
         "Answer",
         lines=[
-            f"{_key(design)} {values[1]:.5g}{unit} instead of {values[0]:.5g}{unit}: "
+            f"{_key(design)} {after:.5g}{unit} instead of {before:.5g}{unit}: "
             f"{_quantity(design)} {last.quantity:.4g} {size} instead of {first.quantity:.4g} "
             f"{size}, {design.change:+.2f} % (wanted {design.target.percent:+g} %)",
-            *_rate(design),
-            f"this is the {stroke} at {p.speeds[0]:g} mm/s and {p.sealed_pressure:g} MPa; softehl "
-            f"run with {design.asked} = {values[1]:.5g} shows both strokes and other speeds",
+            _rate(design),
+            f"this is the {style.STROKES[p.stroke]} at {p.speeds[0]:g} mm/s and "
+            f"{p.sealed_pressure:g} MPa; softehl run with {design.asked} = {after:.5g} shows both "
+            "strokes and other speeds",
         ],
     )
 
 
-def _rate(design: Design) -> list[str]:
-    """The change of the quantity with a step of the key, where the target is met."""
-    value, slope = design.steps[-1].value, _slopes(design)[design.target.quantity]
-    move = design.measure(value * (1.0 + _NEAR)) - design.measure(value)
-    step = _STEPS.get(design.unit, 0.01 * abs(design.measure(value)))
-    percent = 100.0 * slope * _NEAR * step / move
+def _rate(design: Design) -> str:
+    """The change of the quantity with a step of the key that a workshop thinks in."""
+    value, slope, near = design.steps[-1].value, _slope(design, design.target.quantity), 1e-6
+    measure = design.measure(value)
+    step = {"mm": 0.01, "%": 1.0}.get(design.unit, 0.01 * abs(measure))
+    percent = 100.0 * slope * near * step / (design.measure(value * (1.0 + near)) - measure)
     unit = f" {design.unit}".rstrip()
-    return [f"{step:.3g}{unit} more {_key(design)} there: {_quantity(design)} {percent:+.2g} %"]
+    return f"{step:.3g}{unit} more {_key(design)} there: {_quantity(design)} {percent:+.2g} %"
 
 
 def _curve(design: Design) -> Part:
     """The quantity over the key: what was solved, what was wanted, the first prediction."""
-    unit, size = design.unit, CALLED[design.target.quantity][1]
     rows = [
         (
             number,
@@ -86,62 +77,45 @@ def _curve(design: Design) -> Part:
         )
         for number, step in enumerate(design.steps, 1)
     ]
-    key = f"{_key(design)} [{unit}]" if unit else _key(design)
-    header = ("solve", key, f"{_quantity(design)} [{size}]", "mesh")
+    key = f"{_key(design)} [{design.unit}]" if design.unit else _key(design)
+    quantity = f"{_quantity(design)} [{CALLED[design.target.quantity][1]}]"
     text = (
         "Each mark is a nonlinear solve; the line is what the sensitivities of the first one "
         "predict; the full mark meets the target."
     )
-    table = Table("The way to the target", header, rows)
-    return Part("Design curve", text, plots=[_plot(design, key)], tables=[table])
+    table = Table("The way to the target", ("solve", key, quantity, "mesh"), rows)
+    panel = plot(key, quantity)
+    _draw(panel, design)
+    return Part("Design curve", text, plots=[panel], tables=[table])
 
 
-def _plot(design: Design, key: str) -> Any:
-    from bokeh.plotting import figure
-
-    steps, quantity = design.steps, design.target.quantity
-    panel = figure(
-        **narrow(_WIDTH),
-        height=_HEIGHT,
-        x_axis_label=key,
-        y_axis_label="\n".join(wrap(f"{_quantity(design)} [{CALLED[quantity][1]}]", _LABEL)),
-        tools="pan,box_zoom,wheel_zoom,reset,save",
-    )
-    panel.toolbar.logo = None
-    x, y = [design.measure(s.value) for s in steps], [s.quantity for s in steps]
-    wanted = design.target.factor * steps[0].quantity
-    panel.line(*_predicted(design), color=style.COLOURS["out"], legend_label="first prediction")
-    ends = [min(x), max(x)]
-    look: dict[str, Any] = {"color": style.COLOURS["in"], "line_dash": "dashed"}
-    panel.line(ends, [wanted, wanted], **look, legend_label="target")
-    marks: dict[str, Any] = {"size": 9, "line_color": style.COLOURS["out"]}
-    panel.scatter(x[:-1], y[:-1], fill_color="white", **marks, legend_label="solved")
-    panel.scatter(x[-1:], y[-1:], fill_color=style.COLOURS["out"], **marks, legend_label="design")
-    panel.legend.ncols = 2
-    panel.add_layout(panel.legend[0], "above")
-    return panel
-
-
-def _predicted(design: Design) -> tuple[list[float], list[float]]:
-    """The quantity over the key by the sensitivity of the first film, between the steps."""
+def _draw(panel: Any, design: Design) -> None:
     first = design.steps[0]
-    assert first.state is not None
-    assert first.state.sensitivity is not None
-    slope = first.state.sensitivity[design.target.quantity].get(design.key, 0.0)
-    low, high = (choose(s.value for s in design.steps) for choose in (min, max))
-    values = [low + (high - low) * k / _CURVE for k in range(_CURVE + 1)]
-    found = [(v / first.value) ** slope * first.quantity for v in values]
-    return [design.measure(v) for v in values], found
+    (_, film), _ = _films(design)
+    assert film.sensitivity is not None
+    slope = film.sensitivity[design.target.quantity].get(design.key, 0.0)
+    values = [step.value for step in design.steps]
+    between = np.linspace(min(values), max(values), 41)
+    predicted = first.quantity * (between / first.value) ** slope
+    colour, wanted = style.COLOURS["out"], design.target.factor * first.quantity
+    along = [design.measure(value) for value in between.tolist()]
+    panel.line(along, predicted, color=colour, legend_label="first prediction")
+    dashes: dict[str, Any] = {"color": style.COLOURS["in"], "line_dash": "dashed"}
+    panel.line([along[0], along[-1]], [wanted, wanted], **dashes, legend_label="target")
+    x, y = [design.measure(value) for value in values], [step.quantity for step in design.steps]
+    marks: dict[str, Any] = {"size": 9, "line_color": colour}
+    panel.scatter(x[:-1], y[:-1], fill_color="white", **marks, legend_label="solved")
+    panel.scatter(x[-1:], y[-1:], fill_color=colour, **marks, legend_label="design")
+    put_legend_above(panel, columns=2)
 
 
 def _both(design: Design) -> Part:
     """All results with the first value of the key and with the last one."""
     (_, first), (at, last) = _films(design)
-    slopes, value = _slopes(design), design.steps[-1].value
     rows = []
     for name, (words, unit) in CALLED.items():
         before, after = value_of(first, name), value_of(last, name)
-        after *= (value / at) ** slopes[name]
+        after *= (design.steps[-1].value / at) ** _slope(design, name)
         rows.append((words, before, after, f"{100.0 * (after / before - 1.0):+.3g} %", unit))
     header = ("", "before", "after", "change", "unit")
     text = "Also what was not asked for changes; leakage of the stroke is not that of a cycle."
@@ -163,10 +137,10 @@ def _films(design: Design) -> tuple[tuple[float, FilmState], tuple[float, FilmSt
     return found[0], found[-1]
 
 
-def _slopes(design: Design) -> dict[str, float]:
-    """Log derivatives of all results by the key, of the last film."""
-    found = _films(design)[1][1].sensitivity or {}
-    return {name: found.get(name, {}).get(design.key, 0.0) for name in CALLED}
+def _slope(design: Design, quantity: str) -> float:
+    """Log derivative of a result by the key, of the last film."""
+    _, (_, film) = _films(design)
+    return (film.sensitivity or {}).get(quantity, {}).get(design.key, 0.0)
 
 
 def _key(design: Design) -> str:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from io import BytesIO
 from math import isfinite
-from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
 
 from softehl.cases.harness.earlier import advice_of
 from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
-from softehl.cases.harness.row import Record
 from softehl.cases.seal.gland.oils import is_grade
 from softehl.cases.seal.gland.rubbers.hardness import shore_band
 from softehl.cases.seal.gland.tolerances import ToleranceRow, ring_sizes
@@ -17,31 +17,43 @@ from softehl.cases.seal.gland.trade.said import bands
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure
 from softehl.cases.seal.report.drawing import fit_numbers, gland_figure
-from softehl.cases.seal.report.fit import fit_figure, fit_of
+from softehl.cases.seal.report.fit import fit_figure
 from softehl.cases.seal.report.interactive import curve_plot, film_plot, friction_plot
-from softehl.cases.seal.report.section import View, section_figure
+from softehl.cases.seal.report.section import section_figure, views_of
 from softehl.cases.seal.report.stribeck import stribeck_figure
+from softehl.cases.seal.report.tables import fit_of
 from softehl.cases.seal.sensitivity.quantities import CALLED
 from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
-from softehl.cases.seal.states.observer_adapter import read_profile, read_section
 from softehl.cases.seal.states.state import FilmRow
-from softehl.runtime.io import read_csv
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from softehl.runtime.io import Cell
+from softehl.runtime.io import Cell
 
 
 def parts(runs: Sequence[FinishedRun]) -> list[Part]:
     """Gland, deformed section, film, curve, friction, leakage, surfaces, tolerances."""
-    import matplotlib
-
-    with matplotlib.rc_context(style.STYLE):
+    with style.drawing():
         found = [gland(runs), *_rubber(runs), _section(runs)]
         surfaces, curve = _surfaces(runs), _curve(runs)
     found += [_film(runs), curve, _friction(runs), *_leakage(runs), *surfaces]
     return [*_compared(runs), *found, tolerances(runs)]
+
+
+def cycle_parts(runs: Sequence[FinishedRun]) -> list[Part]:
+    """Cycles in numbers, the pictures that the runs have, the glands."""
+    columns = [c for c in runs[0].case.row.columns() if c.head]
+    units = [f" [{c.unit}]" if c.unit else "" for c in columns]
+    heads = [c.meaning + unit for c, unit in zip(columns, units, strict=True)]
+    rows: list[Sequence[Cell]] = [
+        (run.name, *(getattr(row, c.name) for c in columns), row.verdict)
+        for run in runs
+        for row in run.rows
+    ]
+    text = "A cycle is periodic where it differs from the one before by less than 1 %."
+    tables = [Table("Every cycle", ["run", *heads, "verdict"], rows)]
+    shown = {"friction_loop": "Friction loop", "film_map": "Film over time and place"}
+    pictures = (Part(title, pictures=_drawn(runs, name)) for name, title in shown.items())
+    with style.drawing():
+        seals = gland(runs)
+    return [Part("Cycles", text, tables=tables), *(p for p in pictures if p.pictures), seals]
 
 
 def _compared(runs: Sequence[FinishedRun]) -> list[Part]:
@@ -93,28 +105,21 @@ def _rubber(runs: Sequence[FinishedRun]) -> list[Part]:
     pictures = []
     for run in runs:
         try:
-            found = fit_of(run.parameters, run.parameters.temperature)
+            found = fit_of(run.parameters)
         except ValueError:
             continue  # the table of tests is elsewhere now
         if found:
-            pictures.append(Picture(f"{run.name}: {run.parameters.fit}", png(fit_figure([found]))))
+            pictures.append(Picture(f"{run.name}: {run.parameters.fit}", png(fit_figure(found))))
     return [Part("Rubber", "Tests and the material fitted to them.", pictures)] if pictures else []
 
 
 def _section(runs: Sequence[FinishedRun]) -> Part:
     """The fastest state of each stroke."""
-    pictures = []
-    for run in runs:
-        views = []
-        for stroke in style.STROKES:
-            rows = [row for row in run.rows if row.stroke == stroke]
-            if rows:
-                row = max(rows, key=lambda r: abs(r.rod_speed_mm_s))
-                profile, section = read_profile(run.folder, row), read_section(run.folder, row)
-                views.append(View(row, profile, section))
-        views = [view for view in views if view.complete]
-        if views:
-            pictures.append(Picture(run.name, png(section_figure(run.parameters, views))))
+    pictures = [
+        Picture(run.name, png(section_figure(run.parameters, views)))
+        for run in runs
+        if (views := views_of(run.folder, run.rows))
+    ]
     text = "Stress in the ring, film pressure on the rod, contact pressure on housing and walls."
     return Part("Deformed section", text, pictures=pictures)
 
@@ -189,7 +194,8 @@ def _surfaces(runs: Sequence[FinishedRun]) -> list[Part]:
             pictures.append(Picture(run.name, png(figure)))
         if any(isfinite(row.lambda_ratio) for row in run.rows):
             rows = [[getattr(row, name) for name in _SURFACE] for row in run.rows]
-            tables.append(Table(run.name, _titles(FilmRow, _SURFACE), rows))
+            heads = [c.title for c in FilmRow.columns() if c.name in _SURFACE]
+            tables.append(Table(run.name, heads, rows))
     text = (
         "Friction over eta U / p with the regimes, and what asperities carry. Lambda is the mean "
         "gap over the roughness of both surfaces."
@@ -201,11 +207,6 @@ _SURFACE = (
     *("rod_speed_mm_s", "lambda_ratio", "regime", "mean_gap_um"),
     *("asperity_load_percent", "boundary_friction_percent"),
 )
-
-
-def _titles(kind: type[Record], names: Sequence[str]) -> list[str]:
-    """Heads of some columns for readers."""
-    return [column.title for column in kind.columns() if column.name in names]
 
 
 def tolerances(runs: Sequence[FinishedRun]) -> Part:
@@ -231,16 +232,12 @@ def tolerances(runs: Sequence[FinishedRun]) -> Part:
     tables = [Table("Of what was given", ("run", "key", "tolerance"), rows)] if rows else []
     tables += [table for run in runs for table in _bands(run)]
     text = "" if tables else "No key of these runs has a tolerance that is known here."
-    return Part("Tolerances", text, pictures=_tornados(runs), tables=tables)
+    return Part("Tolerances", text, pictures=_drawn(runs, "tornado"), tables=tables)
 
 
 def _bands(run: FinishedRun) -> list[Table]:
     """Bands of the results by the tolerances, if the run has sensitivities."""
-    try:
-        cells = read_csv(run.folder / "tolerances.csv", ToleranceRow.header())
-        found = [ToleranceRow.parse(row) for row in cells]
-    except (OSError, ValueError):
-        return []
+    found = ToleranceRow.read(run.folder / "tolerances.csv")
     header = ("", "rod speed U [mm/s]", "likely change [%]", "at worst [%]", "most of it by")
     rows = [
         (
@@ -249,12 +246,13 @@ def _bands(run: FinishedRun) -> list[Table]:
         )
         for row in found
     ]
-    return [Table(f"{run.name}: changes that follow", header, rows)]
+    return [Table(f"{run.name}: changes that follow", header, rows)] if rows else []
 
 
-def _tornados(runs: Sequence[FinishedRun]) -> list[Picture]:
-    paths = [(run.name, run.folder / "tornado.png") for run in runs]
-    return [Picture(name, path.read_bytes()) for name, path in paths if path.exists()]
+def _drawn(runs: Sequence[FinishedRun], name: str) -> list[Picture]:
+    """The pictures of this name that the runs have."""
+    paths = [(run.name, run.folder / f"{name}.png") for run in runs]
+    return [Picture(title, path.read_bytes()) for title, path in paths if path.exists()]
 
 
 def png(figure: Figure) -> bytes:

@@ -4,35 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from matplotlib.tri import Triangulation, TriContourSet
 
+from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.free_seal import FreeSeal
+from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.report import style
+from softehl.cases.seal.states.observer_adapter import read_profile, read_section
 from softehl.cases.seal.states.state import FilmRow, Profile, Section
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.postprocess import von_mises
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.tri import TriContourSet
-
-    from softehl.cases.seal.gland.parameters import Seal
-    from softehl.cases.seal.gland.records.free_seal import FreeSeal
-    from softehl.cases.seal.gland.records.gland import Gland
-
+from softehl.runtime.mesh.faces import once
 
 _METAL, _FLUID, _FILM, _CONTACT, _LINE = "#d9dadd", "#d3e6f5", "#1b6ca8", "#8a8f98", "#3b3f45"
-_LEVELS = 14  # colours of the stress
-_NEEDED = {"contact_pressure", *(f"sigma_{name}" for name in ("zz", "rr", "tt", "zr"))}
-# in section diameters
-_BAND = 0.26
-"""Height of the largest pressure."""
-_CLEARANCE = 0.06
-"""Between a wall and the rod: the walls of the model are planes without an end."""
-_AROUND = (0.33, 0.44, 0.4)
-"""Margins of the picture beside, below and above the gland."""
+_STRESSES = tuple(f"sigma_{name}" for name in ("zz", "rr", "tt", "zr"))
+_AROUND = 0.44
+"""Margin of the picture around the gland, in section diameters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,21 +41,28 @@ class View:
     @property
     def complete(self) -> bool:
         """True if the section has all fields to draw; one of another version may lack some."""
-        return self.section.point_data.keys() >= _NEEDED
+        return self.section.point_data.keys() >= {"contact_pressure", *_STRESSES}
+
+
+def views_of(folder: Path, rows: Sequence[FilmRow]) -> list[View]:
+    """Of each stroke the row of the highest speed, where the film changes the contact most.
+
+    Those whose files in the folder are complete.  Raises OSError, ValueError.
+    """
+    fastest = sorted(rows, key=lambda row: -abs(row.rod_speed_mm_s))
+    firsts = (next((r for r in fastest if r.stroke == stroke), None) for stroke in style.STROKES)
+    views = [View(r, read_profile(folder, r), read_section(folder, r)) for r in firsts if r]
+    return [view for view in views if view.complete]
 
 
 def nodal_von_mises(section: Section) -> Array:
     """Von Mises stress (n,) at the nodes of a section that has its Cauchy stresses, MPa."""
-    return von_mises(*(section.point_data[f"sigma_{name}"] for name in ("zz", "rr", "tt", "zr")))
+    return von_mises(*(section.point_data[name] for name in _STRESSES))
 
 
 def boundary_edges(cells: Integers) -> Integers:
     """Edges (b, 2) that only one of the cells (m, 4) has, in the sense of the cells."""
-    edges = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
-    _, first, count = np.unique(
-        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
-    )
-    return np.asarray(edges[first[count == 1]])
+    return once(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), corners=2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,24 +74,19 @@ class Scale:
 
     @classmethod
     def of(cls, p: FreeSeal, views: Sequence[View]) -> Scale:
-        """One scale for several states."""
-        from matplotlib.ticker import MaxNLocator
-
+        """One scale for several states; the largest pressure is a quarter of a section high."""
         stress = max(float(nodal_von_mises(view.section).max()) for view in views)
         pressure = max(
             float(max(view.profile.p_MPa.max(), view.section.point_data["contact_pressure"].max()))
             for view in views
         )
-        levels = np.asarray(MaxNLocator(_LEVELS).tick_values(0.0, stress))
-        return cls(levels, _BAND * p.section_diameter / pressure)
+        levels = np.asarray(MaxNLocator(14).tick_values(0.0, stress))
+        return cls(levels, 0.25 * p.section_diameter / pressure)
 
 
 def section_figure(p: Seal, views: Sequence[View]) -> Figure:
     """A panel for each state, all with one scale of stress and one of pressure."""
-    from matplotlib.figure import Figure
-
-    scale, left, panel, bar = Scale.of(p, views), 0.5, 3.3, 1.0  # room for "100.0" and the label
-    figure = Figure(figsize=(left + panel * len(views) + bar, 4.3))
+    scale, figure = Scale.of(p, views), Figure(figsize=(3.3 * len(views) + 1.5, 4.0))
     panels = figure.subplots(1, len(views), sharey=True, squeeze=False)[0]
     for axes, view in zip(panels, views, strict=True):
         shown = draw_view(axes, p, view, scale)
@@ -98,12 +95,9 @@ def section_figure(p: Seal, views: Sequence[View]) -> Figure:
         axes.set_title(f"{style.STROKES[view.row.stroke]}, {film}")
         axes.set_xlabel("z [mm]")
     style.radial_axis(panels[0], p)
-    style.set_margins(figure, left=left, right=bar, bottom=0.48, top=0.82, between=0.05)
-    _, low, right, high = panels[-1].get_position(original=True).extents
-    width = figure.get_size_inches()[0]
-    colours = figure.add_axes((right + 0.1 / width, low, 0.13 / width, high - low))
-    figure.colorbar(shown, cax=colours, label="von Mises stress [MPa]")
-    style.write_head(figure, style.subject(p), left)
+    beside = panels[-1].inset_axes((1.04, 0.0, 0.04, 1.0))
+    figure.colorbar(shown, cax=beside, label="von Mises stress [MPa]")
+    style.write_head(figure, style.subject(p))
     return figure
 
 
@@ -120,11 +114,11 @@ def draw_view(axes: Axes, p: Seal, view: View, scale: Scale) -> TriContourSet:
 def draw_gland(axes: Axes, p: Seal, middle: float | None = None) -> None:
     """Rod, housing with its walls, and the fluid on the sealed side; limits of the picture.
 
-    middle: where the seal touches the rod and hides the end of the fluid, mm; that of the groove.
+    The walls, which have no end in the model, end just above the rod. middle: where the seal
+    touches the rod and hides the end of the fluid, mm; that of the groove.
     """
-    size, lip = p.section_diameter, 0.5 * p.rod_diameter + _CLEARANCE * p.section_diameter
-    rod, housing = 0.5 * p.rod_diameter, 0.5 * p.housing_diameter
-    beside, below, above = (share * size for share in _AROUND)
+    size, rod, housing = p.section_diameter, 0.5 * p.rod_diameter, 0.5 * p.housing_diameter
+    lip, around = rod + 0.06 * size, _AROUND * size
     start, end = p.sealed_wall, p.air_wall
     left, right, bottom, top = start - size, end + size, rod - size, housing + size  # out of sight
     if p.sealed_pressure:
@@ -137,16 +131,13 @@ def draw_gland(axes: Axes, p: Seal, middle: float | None = None) -> None:
         [lip, lip, housing, housing, lip, lip, top, top],
         **metal,
     )
-    axes.set(xlim=(start - beside, end + beside), ylim=(rod - below, housing + above))
+    axes.set(xlim=(start - around, end + around), ylim=(rod - around, housing + around))
     axes.set_aspect("equal")
     axes.grid(visible=False)
 
 
 def _draw_ring(axes: Axes, section: Section, levels: Array) -> TriContourSet:
     """The stress in bands of colour, and the outline."""
-    from matplotlib.collections import LineCollection
-    from matplotlib.tri import Triangulation
-
     cells = section.cells
     triangles = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
     grid = Triangulation(section.points[:, 0], section.points[:, 1], triangles)
@@ -161,19 +152,12 @@ def _draw_film(axes: Axes, p: Gland, profile: Profile, height: float) -> None:
     """Film pressure as a band in the rod.  height: mm for 1 MPa."""
     rod, x, film = 0.5 * p.rod_diameter, profile.x_mm, np.maximum(profile.p_MPa, 0.0)
     axes.fill_between(x, rod, rod - height * film, color=_FILM, lw=0)
-    below = rod - height * film.max()
-    _write(
-        axes,
-        (p.groove_centre, below),
-        f"film pressure, max {film.max():.3g} MPa",
-        3 if p.piston else -3,
-    )
+    text, below = f"film pressure, max {film.max():.3g} MPa", rod - height * film.max()
+    _write(axes, (p.groove_centre, below), text, 3 if p.piston else -3)
 
 
 def _draw_contact(axes: Axes, p: Gland, section: Section, height: float) -> None:
     """Contact pressure as bands in the housing and its walls.  height: mm for 1 MPa."""
-    from matplotlib.collections import PolyCollection
-
     pressure = section.point_data["contact_pressure"]
     edges = boundary_edges(section.cells)
     tips = section.points + height * pressure[:, None] * _normals(section.points, edges)
@@ -201,7 +185,7 @@ def _normals(points: Array, edges: Integers) -> Array:
 def _draw_motion(axes: Axes, p: Gland, speed: float) -> None:
     """An arrow the way the rod goes."""
     half = 0.3 * p.section_diameter * np.sign(speed)
-    level = 0.5 * p.rod_diameter - (_AROUND[1] - 0.05) * p.section_diameter
+    level = 0.5 * p.rod_diameter - (_AROUND - 0.05) * p.section_diameter
     axes.annotate(
         "",
         (p.groove_centre + half, level),

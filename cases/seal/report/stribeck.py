@@ -4,26 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.oil import Oil
 from softehl.cases.seal.gland.surfaces import FULL, MIXED
 from softehl.cases.seal.report import style
-from softehl.cases.seal.report.curve import tick_plainly
 from softehl.cases.seal.states.state import FilmRow
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from softehl.cases.seal.gland.parameters import Seal
-    from softehl.cases.seal.gland.records.oil import Oil
-    from softehl.cases.seal.gland.surfaces import Surfaces
 
 _HERSEY = "$\\eta_0 |U| / p_{\\mathrm{dry}}$ [µm]   ($p_{\\mathrm{dry}}$ largest dry pressure)"
 _REGIMES = {MIXED: "boundary | mixed", FULL: "mixed | full"}
-_PANELS = (2.2, 1.0)  # heights of friction and of shares of asperities
 
 
 def hersey_um(p: Oil, row: FilmRow) -> float:
@@ -46,29 +39,24 @@ def crossing(p: Oil, rows: Sequence[FilmRow], ratio: float) -> float | None:
 
 def stribeck_figure(p: Seal, rows: Sequence[FilmRow]) -> Figure | None:
     """Friction of both strokes and the shares of asperities; None for smooth ones or one speed."""
-    from matplotlib.figure import Figure
-
-    strokes = {
-        stroke: sorted(found, key=lambda row: abs(row.rod_speed_mm_s))
-        for stroke in style.STROKES
-        if (found := [row for row in rows if row.regime and row.stroke == stroke])
-    }
-    if len({abs(row.rod_speed_mm_s) for found in strokes.values() for row in found}) < 2:
+    rough = sorted((row for row in rows if row.regime), key=lambda row: abs(row.rod_speed_mm_s))
+    if len({abs(row.rod_speed_mm_s) for row in rough}) < 2:
         return None
     figure = Figure(figsize=(5.4, 5.6))
-    friction, shares = figure.subplots(2, 1, sharex=True, height_ratios=_PANELS)
-    for stroke, chosen in strokes.items():
-        _draw_stroke(p, friction, shares, stroke, chosen)
-    friction.set(xscale="log", yscale="log", ylabel="friction on the rod [N]")
+    friction, shares = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
+    for stroke in style.STROKES:
+        if chosen := [row for row in rough if row.stroke == stroke]:
+            _draw_stroke(p, friction, shares, stroke, chosen)
+    friction.set(xscale="log", yscale="log", ylabel=style.FRICTION)
     shares.set(ylim=(-4.0, 104.0), ylabel="asperities [%]", xlabel=_HERSEY)
-    tick_plainly(friction.yaxis, friction.get_ylim())
+    style.tick_plainly(friction.yaxis)
     friction.legend(loc="lower left")
     shares.legend(loc="best", title="share of load (line), of friction (dashes)")
     speed = 1e3 * p.viscosity / rows[0].contact_p_max_MPa
     above = friction.secondary_xaxis("top", functions=(lambda x: x / speed, lambda u: u * speed))
     above.set_xlabel(style.SPEED)
-    style.set_margins(figure, left=0.62, right=0.12, bottom=0.5, top=1.05, between=0.08)
-    style.write_head(figure, style.subject(p) + f"; {_surfaces(p)}", left=0.62)
+    rod, seal = p.roughness
+    style.write_head(figure, style.subject(p) + f"; rms rod {rod:g}, seal {seal:g} µm")
     return figure
 
 
@@ -77,34 +65,22 @@ def _draw_stroke(
 ) -> None:
     x = [hersey_um(p, row) for row in rows]
     colour, label = style.COLOURS[stroke], style.STROKES[stroke]
-    friction.plot(
-        x,
-        [abs(row.rod_friction_N) for row in rows],
-        color=colour,
-        marker=style.MARKERS[stroke],
-        label=label,
-    )
+    forces = [abs(row.rod_friction_N) for row in rows]
+    friction.plot(x, forces, color=colour, marker=style.MARKERS[stroke], label=label)
     shares.plot(x, [row.asperity_load_percent for row in rows], color=colour, label=label)
-    boundary = [row.boundary_friction_percent for row in rows]
-    shares.plot(x, boundary, color=colour, linestyle="--")
+    shares.plot(x, [row.boundary_friction_percent for row in rows], "--", color=colour)
     for ratio, words in _REGIMES.items():
         place = crossing(p, rows, ratio)
         if place is None:
             continue
         for axes in (friction, shares):
             axes.axvline(place, color=colour, linestyle=":", linewidth=1.0)
-        side = "right" if stroke == "out" else "left"
         friction.text(
             *(place, 0.98, f"{words} "),
             transform=friction.get_xaxis_transform(),
             rotation=90,
-            ha=side,
+            ha="right" if stroke == "out" else "left",
             va="top",
             fontsize="x-small",
             color=colour,
         )
-
-
-def _surfaces(p: Surfaces) -> str:
-    rod, seal = p.roughness
-    return f"rms rod {rod:g}, seal {seal:g} µm"

@@ -1,15 +1,20 @@
-"""The look that the pictures of a run share."""
+"""The look and the words that the pictures of a run share."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from contextlib import AbstractContextManager
+from typing import Any
 
-if TYPE_CHECKING:  # imported late: matplotlib is slow to import
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.ticker import AutoLocator, LogLocator, NullLocator
 
-    from softehl.cases.seal.gland.parameters import Seal
-    from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.records.gland import Gland
+from softehl.runtime.arrays import Array
 
 STYLE: Any = {
     "axes.axisbelow": True,
@@ -18,6 +23,7 @@ STYLE: Any = {
     "axes.spines.top": False,
     "axes.titlesize": "medium",
     "axes.titley": 1.0,  # else every drawing looks for room three times
+    "figure.constrained_layout.use": True,
     "figure.dpi": 160,
     "font.size": 9,
     "grid.alpha": 0.35,
@@ -38,7 +44,13 @@ POSITION = "x [mm]   (sealed side left, air side right)"
 PRESSURE = "pressure p [MPa]"
 FILM = "film thickness h [µm]"
 H_STAR = "film thickness h* = 2q / |U| [µm]"
+FRICTION = "friction on the rod [N]"
 SPEED = "rod speed |U| [mm/s]"
+
+
+def drawing() -> AbstractContextManager[None]:
+    """Figures that are made and saved in this context have the look."""
+    return matplotlib.rc_context(STYLE)
 
 
 def subject(p: Seal) -> str:
@@ -59,6 +71,11 @@ def between(p: Gland) -> str:
     return f"{slides} {abs(p.rod_diameter):.6g} mm, {holds} {abs(p.housing_diameter):.6g} mm"
 
 
+def write_head(figure: Figure, text: str) -> None:
+    """Write what a picture is about at its top."""
+    figure.suptitle(text, x=0.01, ha="left", fontsize=7.5, color="0.25")
+
+
 def radial_axis(axes: Axes, p: Gland) -> None:
     """Radii at the axis of a picture, upwards: those of a piston seal are counted negative."""
     axes.set_ylabel("r [mm]")
@@ -67,24 +84,18 @@ def radial_axis(axes: Axes, p: Gland) -> None:
         axes.invert_yaxis()
 
 
-def write_head(figure: Figure, text: str, left: float) -> None:
-    """Write what a picture is about at its top, from `left` (inches) on."""
-    width, height = figure.get_size_inches()
-    figure.text(
-        left / width, 1.0 - 0.08 / height, text, ha="left", va="top", fontsize=7.5, color="0.25"
-    )
+def plain_ticks(low: float, high: float) -> Array:
+    """Three round numbers (n,) or more for a logarithmic axis from low to high, both > 0."""
+    for locator in (LogLocator(), LogLocator(subs=(1.0, 2.0, 5.0)), AutoLocator()):
+        ticks = np.asarray(locator.tick_values(low, high))
+        ticks = ticks[(low <= ticks) & (ticks <= high)]
+        if len(ticks) > 2:
+            break
+    return ticks
 
 
-def set_margins(
-    figure: Figure, left: float, right: float, bottom: float, top: float, between: float = 0.0
-) -> None:
-    """Margins of the panels in inches; a layout that is computed costs as much as the drawing."""
-    width, height = figure.get_size_inches()
-    figure.subplots_adjust(
-        left=left / width,
-        right=1.0 - right / width,
-        bottom=bottom / height,
-        top=1.0 - top / height,
-        wspace=between,
-        hspace=between,
-    )
+def tick_plainly(axis: Axis) -> None:
+    """Round numbers, written out, on an axis whose limits are set."""
+    axis.set_ticks(plain_ticks(*axis.get_view_interval()).tolist())
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_locator(NullLocator())

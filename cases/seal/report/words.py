@@ -1,4 +1,9 @@
-"""Limits of the model of a seal, in words for a reader of results."""
+"""Words of the cases of a seal: the title of a run, the limits of the model."""
+
+from __future__ import annotations
+
+from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.sections.keys import NAMES, ROUND
 
 LEFT_OUT = (
     "Time: every speed is a steady state; no start, no stop, no dwell.",
@@ -15,3 +20,11 @@ LEFT_OUT = (
     "Wear, swelling and ageing: dimensions and moduli are those given.",
 )
 """A report ends with these."""
+
+
+def titled(title: str, p: Seal) -> str:
+    """The title of a case with the seal of a run: its shape, its size and its rubber."""
+    size = f"{p.ring_diameter:g} \N{MULTIPLICATION SIGN} {p.section_diameter:g} mm"
+    rubber = f" of {p.compound}" if p.compound else ""
+    named = title.replace(NAMES[ROUND], f"{p.named} {size}{rubber}")
+    return named.replace("a rod seal", "a piston seal") if p.piston else named
