@@ -1,15 +1,13 @@
 """`python -m benchmarks.sensitivities [RUNS]`: what the sensitivities of a default run cost.
 
-Seconds of CPU of a solved curve, and what all quantities and one quantity take of it, by all
-parameters; the least of some runs of one session, on one thread.
+Seconds of CPU of a solved curve, and what all quantities by all parameters take of it; the least of
+some runs of one session, on one thread.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
-from functools import partial
 from typing import Any
 from unittest.mock import patch
 
@@ -18,20 +16,16 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded
 from benchmarks.clock import Clock
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.sensitivity import sensitivity
-from softehl.cases.seal.sensitivity.quantities import QUANTITIES
 from softehl.cases.seal.solve import method
 from softehl.cases.seal.states.state import Silent
 
 
-def measured(p: Seal, wanted: Sequence[str]) -> tuple[float, float, int]:
-    """Seconds of a run without its sensitivities, those of these quantities, its states."""
+def measured(p: Seal) -> tuple[float, float, int]:
+    """Seconds of a run without its sensitivities, those of the sensitivities, its states."""
     clock = Clock(("sensitivities", "solving"))
-    works: dict[str, Any] = {
-        "rates_of": sensitivity.rates_of,
-        "sensitivities": partial(sensitivity.sensitivities, wanted=wanted),
-    }
     timed: dict[str, Any] = {
-        name: clock.timed(work, lambda *_: "sensitivities") for name, work in works.items()
+        name: clock.timed(getattr(sensitivity, name), lambda *_: "sensitivities")
+        for name in ("rates_of", "sensitivities")
     }
     with patch.multiple(sensitivity, **timed):
         states = method.run(p, Silent(), differentiate=sensitivity.differentiation(p)).states
@@ -40,15 +34,13 @@ def measured(p: Seal, wanted: Sequence[str]) -> tuple[float, float, int]:
 
 
 def main(runs: int) -> None:
-    """Print a line for all quantities, and one for h* alone."""
-    p = Seal(sensitivity=True)
-    for wanted in (QUANTITIES, ("h_star",)):
-        found = [measured(p, wanted) for _ in range(runs)]
-        solving, spent = (min(times) for times in list(zip(*found, strict=True))[:2])
-        print(
-            f"{len(wanted)} of {len(QUANTITIES)} quantities, {found[0][2]} states: solving "
-            f"{solving:.2f} s, sensitivities {spent:.2f} s ({100.0 * spent / solving:.0f} %)"
-        )
+    """Print a line."""
+    found = [measured(Seal(sensitivity=True)) for _ in range(runs)]
+    solving, spent = (min(times) for times in list(zip(*found, strict=True))[:2])
+    print(
+        f"{found[0][2]} states: solving {solving:.2f} s, sensitivities {spent:.2f} s "
+        f"({100.0 * spent / solving:.0f} %)"
+    )
 
 
 if __name__ == "__main__":

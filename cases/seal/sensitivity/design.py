@@ -63,14 +63,13 @@ class Target:
 
 @dataclass(frozen=True)
 class Step:
-    """A value of the key, the quantity there by a nonlinear solve, and what was predicted.
+    """A value of the key, and the quantity there by a nonlinear solve.
 
     state: the film; None on a mesh that is held, where only the quantity is known.
     """
 
     value: float
     quantity: float
-    predicted: float
     state: FilmState | None = None
 
 
@@ -101,7 +100,7 @@ def designed(
     """
     state, value = _film(p, key, solve), float(getattr(p, key))
     wanted = target.factor * value_of(state, target.quantity)
-    steps = [Step(value, value_of(state, target.quantity), math.nan, state)]
+    steps = [Step(value, value_of(state, target.quantity), state)]
     for _ in range(STEPS):
         assert state.sensitivity is not None
         slope = state.sensitivity[target.quantity].get(key, 0.0)
@@ -113,7 +112,7 @@ def designed(
             )
         value *= math.exp(way / slope)
         state = _film(Seal(**{**p.settled(), key: value}), key, solve)
-        steps.append(Step(value, value_of(state, target.quantity), wanted, state))
+        steps.append(Step(value, value_of(state, target.quantity), state))
         if abs(steps[-1].quantity / wanted - 1.0) <= TOLERANCE:
             change = hold(Seal(**{**p.settled(), key: value}))
             return [*steps, *settled(steps[-1], wanted, slope, change)]
@@ -134,7 +133,7 @@ def settled(near: Step, wanted: float, slope: float, change: Change | None) -> l
         found = change(value / near.value)
         if found is None:
             break
-        step = Step(value, near.quantity * found, wanted)
+        step = Step(value, near.quantity * found)
         rise = math.log(step.quantity / steps[-1].quantity) / math.log(value / steps[-1].value)
         steps.append(step)
         if rise * slope <= 0.0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -13,12 +14,18 @@ from softehl.cases.harness.parameters import keys_of
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.varied import BASES, NUMBERS, PRESSURE_KEY
 from softehl.cases.seal.sensitivity.design import Change, NoDesignError, Step, Target, designed
-from softehl.cases.seal.sensitivity.held import HeldFilm
-from softehl.cases.seal.sensitivity.quantities import CALLED
+from softehl.cases.seal.sensitivity.quantities import CALLED, quantities
 from softehl.cases.seal.sensitivity.sensitivity import differentiation
-from softehl.cases.seal.solve.method import run
+from softehl.cases.seal.sensitivity.variation import FilmCase
+from softehl.cases.seal.solve.films import NoFilm
+from softehl.cases.seal.solve.method import DryContact, run
+from softehl.cases.seal.solve.path import StageFailed
 from softehl.cases.seal.states.state import FilmState, Observer, Silent
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.design import Tangent
 from softehl.runtime.names import meant
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.sensitivity import direct
 
 _OF_PISTON = {"bore": "rod_diameter", "groove_diameter": "housing_diameter"}
 """Diameters of a piston seal, whose keys are less than 0."""
@@ -124,6 +131,50 @@ def _solve(observer: Observer, p: Seal) -> FilmState | None:
 def _hold(p: Seal, quantity: str, key: str) -> Change | None:
     held = HeldFilm.of(p)
     return None if held is None else lambda factor: held.change(quantity, key, factor)
+
+
+@dataclass(frozen=True, eq=False)
+class HeldFilm:
+    """A converged film x (n,) of a case with one stroke and one speed."""
+
+    case: FilmCase
+    x: Array
+    newton: Newton
+
+    @classmethod
+    def of(cls, p: Seal) -> HeldFilm | None:
+        """The film of a case; None where it is not reached."""
+        assert p.stroke != "both"
+        contact = DryContact.of(p, Silent())
+        if isinstance(contact, StageFailed):
+            return None
+        found = contact.adapted(p.stroke, p.speeds[0])
+        if isinstance(found, NoFilm):
+            return None
+        film = found.film
+        return cls(FilmCase(film.system, film.loads), film.x, contact.newton)
+
+    def change(self, quantity: str, key: str, factor: float) -> float | None:
+        """A quantity over its value here, where a key is `factor` times as large; None if that film
+        is not reached from this one.
+        """
+        moved = self.case.scaled(key, factor - 1.0)
+        # a hundredth of a millimetre is many films: the start has to follow the key
+        start = self.x + math.log(factor) * self._slope(key)
+        solution = self.newton.solve(moved.system.film_problem(moved.film), start)
+        if not solution.converged:
+            return None
+        return _value(moved, solution.x, quantity) / _value(self.case, self.x, quantity)
+
+    def _slope(self, key: str) -> Array:
+        """Rate (n,) of the film by the logarithm of a key."""
+        tangent = Tangent.at(self.case.system.film_problem(self.case.film), self.x)
+        load = tangent.load(self.case.rate(key))
+        return direct(self.newton.linear, tangent.reduced, load[:, None])[:, 0]
+
+
+def _value(case: FilmCase, x: Array, quantity: str) -> float:
+    return quantities(case, case.system.film_problem(case.film), x)[quantity].value
 
 
 def told(design: Design) -> list[str]:

@@ -7,22 +7,15 @@ began from.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.gland.records.numerics import Numerics
-from softehl.cases.seal.sensitivity.quantities import (
-    QUANTITIES,
-    along,
-    by_unknowns,
-    fields_along,
-    quantities,
-)
+from softehl.cases.seal.sensitivity.quantities import along, by_unknowns, fields_along, quantities
 from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
 from softehl.cases.seal.solve.films import Film
 from softehl.cases.seal.solve.judging import Differentiate
@@ -30,7 +23,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Inputs, Tangent
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.linear import LinearSolver, SingularMatrix
-from softehl.runtime.solve.sensitivity import adjoints, direct
+from softehl.runtime.solve.sensitivity import adjoints
 
 
 def rates_of(
@@ -51,25 +44,16 @@ def sensitivities(
     x: Array,
     linear: LinearSolver,
     rates: Mapping[str, Inputs],
-    *,
-    method: str = "adjoint",
-    wanted: Sequence[str] = QUANTITIES,
 ) -> dict[str, dict[str, float]]:
     """Quantity -> parameter -> d log quantity / d log parameter at a converged film x (n,).
 
-    rates: of the parameters, by `rates_of` at this film. method: "adjoint", a solve for each
-    quantity, or "direct", one for each parameter. wanted: names of quantities. Raises
-    SingularMatrix.
+    rates: of the parameters, by `rates_of` at this film. Raises SingularMatrix.
     """
     case, problem = FilmCase(system, film), system.film_problem(film)
-    values, tangent = quantities(case, problem, x), Tangent.at(problem, x)
-    found = {name: values[name] for name in wanted}
+    found, tangent = quantities(case, problem, x), Tangent.at(problem, x)
     gradients = np.stack([by_unknowns(case, problem, x, q) for q in found.values()], axis=1)
     loads = np.stack([tangent.load(rate) for rate in rates.values()], axis=1)
-    if method == "adjoint":
-        through = -adjoints(linear, tangent.reduced, gradients).T @ loads
-    else:
-        through = gradients.T @ direct(linear, tangent.reduced, loads)
+    through = -adjoints(linear, tangent.reduced, gradients).T @ loads
     slopes: dict[str, dict[str, float]] = {name: {} for name in found}
     for j, (key, rate) in enumerate(rates.items()):
         moved = fields_along(problem, x, rate, found.values())
@@ -85,12 +69,12 @@ def differentiation(p: Numerics) -> Differentiate | None:
     """
     if not p.sensitivity:
         return None
-    linear, last = choose(p.linear), dict[str, Any]()
+    linear, known, last = choose(p.linear), dict[str, Inputs](), None
 
     def differentiate(film: Film) -> Mapping[str, Mapping[str, float]] | None:
-        known = last["rates"] if last.get("system") is film.system else {}
-        rates = rates_of(film.system, film.loads, known)
-        last.update(system=film.system, rates=rates)
+        nonlocal known, last
+        rates = known = rates_of(film.system, film.loads, known if film.system is last else {})
+        last = film.system
         try:
             return sensitivities(film.system, film.loads, film.x, linear, rates)
         except SingularMatrix:

@@ -23,8 +23,6 @@ from softehl.runtime.mesh.carried_mesh import carried_mesh, carried_places
 SPEED = "U"
 """The rod speed as it is named in tables: a parameter of a film that is no key of a case."""
 
-_WIDE = 0.01  # relative step: what follows from a key is a polynomial of low degree
-
 
 @dataclass(frozen=True, eq=False)
 class FilmCase:
@@ -51,10 +49,6 @@ class FilmCase:
         held = p.measures if name == "section_diameter" else {}
         return FilmCase(frozen(self.system, p.model_copy(update={**held, name: value})), film)
 
-    def inputs(self) -> Inputs:
-        """Input of its equations."""
-        return Inputs.of(self.system.film_problem(self.film))
-
     def rate(self, name: str) -> Inputs:
         """The rate of its inputs by the logarithm of a parameter.
 
@@ -62,9 +56,13 @@ class FilmCase:
         section), linear in the others. Two are not: the augmentation of contacts, on which no
         converged state depends, and arcs, where the step leaves an error of 1e-7.
         """
+
+        def inputs(by: float) -> Inputs:
+            moved = self.scaled(name, by)
+            return Inputs.of(moved.system.film_problem(moved.film))
+
         lengths = *LENGTHS, *self.system.parameters.measures
-        degree = 4 if name in lengths else 2
-        return rate_of(lambda by: self.scaled(name, by).inputs(), _WIDE, degree)
+        return rate_of(inputs, step=0.01, degree=4 if name in lengths else 2)
 
 
 def _varies(value: Any) -> bool:
