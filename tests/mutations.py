@@ -367,8 +367,8 @@ FAULTS = (
     ),
     Fault(
         "cases/seal/cycle/transient.py",
-        "return 2.0 * reading.flux_air_mm2_s / max",
-        "return 1.0 * reading.flux_air_mm2_s / max",
+        "return 2.0 * reading.flux_air_mm2_s / U",
+        "return 1.0 * reading.flux_air_mm2_s / U",
         "tests/cases/test_cycle.py tests/cases/test_leakage.py",
     ),
     Fault(

@@ -32,7 +32,10 @@ from softehl.cases.seal.report.cycle import (
     write_animation,
 )
 from softehl.runtime.arrays import Array
+from softehl.runtime.fem import rules
+from softehl.runtime.fem.problem import Problem
 from softehl.runtime.io import read_arrays, read_table
+from softehl.runtime.kernels import load_kernel
 from softehl.runtime.solve.differences import differences
 from softehl.runtime.solve.newton import Newton
 from tests.reference.calling import fitted_order
@@ -49,22 +52,34 @@ def strip(h: float, segments: int = 8, length: float = 1.0) -> Strip:
     return Strip(x, np.full_like(x, h), 4, Oil(ETA))
 
 
+def problem_of(one: Strip, speed: float) -> Problem:
+    """The film of a strip, and what it holds as a block of its own, at rest."""
+    study, content = one.study(speed), load_kernel("film_squeeze")
+    along, rule = {PRESSURE: one.rows, VOID: one.rows}, rules.content_rule(one.order)
+    resting = dict[str, Any](dict.fromkeys(content.parameters, 0.0))
+    study.add(SQUEEZE, content, along=along, rule=rule, **resting)
+    return one.posed(study, speed).with_parameters(**{SQUEEZE: None})
+
+
 def march(gap: Gap, times: Array, order: int, ends: float) -> list[tuple[Array, Array, float]]:
     """Pressures, void fractions and the defect of mass at every time, of plates h(t) apart."""
     one, found = strip(gap(float(times[0]))), []
-    x = np.zeros(one.problem(0.0).layout.total)
+    x = np.zeros(problem_of(one, 0.0).layout.total)
     contents: list[Array] = []
     volumes = [0.0]
     for k, t in enumerate(times):
         now = strip(gap(float(t)))
-        problem = now.between(now.problem(1.0), np.array([ends, ends]), np.zeros(2))
+        problem = now.between(problem_of(now, 1.0), np.array([ends, ends]), np.zeros(2))
         content = problem.with_parameters(**{SQUEEZE: {"rod_radius": 0.0, "rate": 0.0}})
         if k:
             steps = [times[k] - times[k - 1]]
             steps += [times[k - 1] - times[k - 2]] if order == 2 and k > 1 else []
             w = differences(steps)
             before = sum(a * c for a, c in zip(w[1:], contents, strict=False))
-            problem = now.moving(problem, float(w[0]), np.asarray(before))
+            points = np.asarray(before)[:, :, None]
+            squeezed = problem.assembler.with_data(SQUEEZE, point_data=points)
+            rate = {SQUEEZE: {"rod_radius": 0.0, "rate": float(w[0])}}
+            problem = replace(problem, assembler=squeezed).with_parameters(**rate)
             problem = problem.with_parameters(**{FILM: {"rod_speed": 0.0}})
             solution = Newton(tolerance=1e-13, stagnation=1e5, max_iterations=200).solve(problem, x)
             assert solution.converged
@@ -134,7 +149,7 @@ def test_the_frame_does_not_matter() -> None:
     one = Strip(x, h, 4, Oil(ETA))
     results = []
     for w in (0.0, 137.0):
-        problem = one.between(one.problem(400.0 + w), np.zeros(2), np.zeros(2))
+        problem = one.between(problem_of(one, 400.0 + w), np.zeros(2), np.zeros(2))
         moving = problem.assembler.with_data(FILM, data=np.full((8, 2), w))
         results.append(
             Newton(tolerance=1e-12, stagnation=1e4, max_iterations=60)

@@ -10,6 +10,7 @@ from softehl.cases.seal.cycle.strip import Oil, Strip
 from softehl.cases.seal.equations.system import DISPLACEMENT, FILM, MOVED, PRESSURE
 from softehl.cases.seal.gland.profiles import Slider
 from softehl.cases.seal.gland.surfaces import SurfacePair
+from softehl.runtime.arrays import Array
 from softehl.runtime.fem import dofs, rules
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
@@ -19,9 +20,6 @@ from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Solution, Status
 from softehl.runtime.solve.steps import StepRule
 from softehl.runtime.study import Study
-
-_SOFT = 1e-8  # of the penalty, where the path begins
-_STIFFER = StepRule(log(100.0), log(2.0))  # longer first steps cost twice the iterations
 
 
 def strip_of(p: Slider, alpha: float) -> Strip:
@@ -35,11 +33,16 @@ def strip_of(p: Slider, alpha: float) -> Strip:
 def conserving_problem(p: Slider, speed: float, alpha: float) -> Problem:
     """The film with void fractions between its end pressures."""
     strip = strip_of(p, alpha)
-    problem = strip.problem(speed)
+    problem = strip.posed(strip.study(speed), speed)
+    return strip.between(problem, _ends(p, alpha), strip.starved(speed, p.supply))
+
+
+def _ends(p: Slider, alpha: float) -> Array:
+    """Pressures (2,) at both ends; reduced ones for a film without Barus' law (alpha = 0)."""
     ends = np.array([p.start_pressure, p.end_pressure])
     if p.pressure_viscosity and not alpha:
-        ends = -np.expm1(-p.pressure_viscosity * ends) / p.pressure_viscosity
-    return strip.between(problem, ends, strip.starved(speed, p.supply))
+        return np.asarray(-np.expm1(-p.pressure_viscosity * ends) / p.pressure_viscosity)
+    return ends
 
 
 def film_problem(p: Slider, speed: float, alpha: float) -> Problem:
@@ -60,11 +63,8 @@ def film_problem(p: Slider, speed: float, alpha: float) -> Problem:
         facet, inner = load_kernel("film_facet"), chain[:-1]
         study.add("film_facet", facet, on=inner, along={PRESSURE: sides}, rule=rule, **oil)
     study.fix(np.arange(len(x)), u_z=0.0, u_r=0.0)
-    ends = np.array([p.start_pressure, p.end_pressure])
-    if p.pressure_viscosity and not alpha:
-        ends = -np.expm1(-p.pressure_viscosity * ends) / p.pressure_viscosity
     problem = study.system({DISPLACEMENT: MOVED}).resting()
-    return problem.also_fixed(problem.layout.dofs(PRESSURE)[[0, -1]], ends)
+    return problem.also_fixed(problem.layout.dofs(PRESSURE)[[0, -1]], _ends(p, alpha))
 
 
 def conserving_solution(p: Slider, speed: float) -> tuple[Problem, Solution]:
@@ -97,9 +97,9 @@ def penalty_solution(p: Slider, speed: float) -> tuple[Problem, Solution]:
     def softened(t: float) -> Problem:
         return problem.with_parameters(film={"cavitation_penalty": exp(t) * p.cavitation_penalty})
 
-    path = Continuation(newton, _STIFFER, "previous", name="log of the penalty")
-    branch = path.follow(softened, log(_SOFT), 0.0, np.zeros(problem.layout.total))
-    solution = branch.end
+    steps = StepRule(first=log(100.0), smallest=log(2.0))
+    path = Continuation(newton, steps, "previous", name="log of the penalty")
+    solution = path.follow(softened, log(1e-8), 0.0, np.zeros(problem.layout.total)).end
     if not alpha or not solution.converged:
         return problem, solution
     return transformed(film_problem(p, speed, alpha), alpha, newton, solution)

@@ -9,14 +9,7 @@ from typing import Any
 import numpy as np
 
 from softehl.cases.seal.equations import scales
-from softehl.cases.seal.equations.system import (
-    DISPLACEMENT,
-    FILM,
-    MOVED,
-    PRESSURE,
-    SQUEEZE,
-    VOID,
-)
+from softehl.cases.seal.equations.system import DISPLACEMENT, FILM, MOVED, PRESSURE, VOID
 from softehl.cases.seal.gland.surfaces import PRESSURE_SCALE, VOID_SCALE, SurfacePair, void_values
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem import dofs, rules
@@ -24,12 +17,6 @@ from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.study import Study
-
-CAVITATION = "cavitation"
-"""Block of the condition of cavitation."""
-
-
-_EVEN = 1e-9  # relative rise of the void fraction that counts as none
 
 
 @dataclass(frozen=True)
@@ -72,15 +59,16 @@ class Strip:
         inner = self.x[:, :1] + share * np.diff(self.x, axis=1)
         return np.append(inner.ravel(), self.x[-1, 1])
 
-    def problem(self, speed: float) -> Problem:
-        """The film between surfaces at rest, one of which slides at a speed (mm/s).
+    @property
+    def rows(self) -> Integers:
+        """Unknowns (segments, order + 1) of a field in the segments, from 0."""
+        return dofs.chain_dofs(len(self.x), self.order, 0)
 
-        Everything is free but the place of the surfaces; `between` prescribes the ends.
-        """
-        n, order = len(self.x), self.order
-        places, each = dofs.chain_dofs(n, order, 0), np.arange(self.unknowns)[:, None]
-        rough = bool(self.surfaces.sigma)
-        flow = load_kernel("film_rough" if rough else f"film_conserving{self.oil.suffix}")
+    def study(self, speed: float) -> Study:
+        """The film between surfaces at rest, one of which slides at a speed (mm/s)."""
+        n, along = len(self.x), {PRESSURE: self.rows, VOID: self.rows}
+        smooth = f"film_conserving{self.oil.suffix}"
+        flow = load_kernel("film_rough" if self.surfaces.sigma else smooth)
         values: dict[str, Any] = {
             **{"rod_radius": 0.0, "rod_speed": speed, "viscosity": self.oil.viscosity},
             **{"pressure_viscosity": self.oil.alpha, "force_weight": 0.0, "shear_weight": 0.0},
@@ -89,31 +77,31 @@ class Strip:
         }
         points = np.stack([self.x, self.h], axis=2).reshape(2 * n, 2)
         study = Study(Mesh(points, {"line2": np.arange(2 * n).reshape(n, 2)}))
-        along, rule = {PRESSURE: places, VOID: places}, rules.rupture_rule(order, polynomial=False)
+        rule, each = rules.rupture_rule(self.order, polynomial=False), np.arange(self.unknowns)
         known = {name: value for name, value in values.items() if name in flow.parameters}
         study.add(FILM, flow, along=along, rule=rule, **known)
         study.add(
-            *(CAVITATION, load_kernel("film_void")),
+            *("cavitation", load_kernel("film_void")),
             on=np.empty((len(each), 0), np.int64),
             called={"p": PRESSURE, "v": VOID},
-            along={PRESSURE: each, VOID: each},
+            along={PRESSURE: each[:, None], VOID: each[:, None]},
             **dict[str, Any](void_values(self.oil.cavitation_pressure)),
         )
-        content = load_kernel("film_squeeze_rough" if rough else "film_squeeze")
-        held = {name: values.get(name, 0.0) for name in content.parameters}
-        study.add(SQUEEZE, content, along=along, rule=rules.content_rule(order), **held)
-        problem = study.system({DISPLACEMENT: MOVED}).resting()
-        sizes: dict[str, float | Array] = {DISPLACEMENT: 1.0, VOID: 1.0}
-        sizes[PRESSURE] = self._fluxes(speed, places)
-        return replace(problem, scales=sizes, absolute=True).with_parameters(**{SQUEEZE: None})
+        return study
 
-    def _fluxes(self, speed: float, rows: Integers) -> Array:
-        """Sizes (unknowns,) of the fluxes, mm^2/s; rows: unknowns of the segments, from 0."""
+    def posed(self, study: Study, speed: float) -> Problem:
+        """The problem of a study of it, with the sizes of its fluxes (mm^2/s) at a speed.
+
+        Everything is free but the place of the surfaces; `between` prescribes the ends.
+        """
         h, dx = self.h.max(axis=1), np.diff(self.x, axis=1)[:, 0]
         driven = scales.pressure_flux(h, dx, self.order, self.oil.viscosity)
-        largest = np.zeros(self.unknowns)
-        np.maximum.at(largest, rows, driven[:, None])
-        return 0.5 * abs(speed) * float(self.h.min()) + largest
+        fluxes = np.zeros(self.unknowns)
+        np.maximum.at(fluxes, self.rows, driven[:, None])
+        fluxes += 0.5 * abs(speed) * float(self.h.min())
+        problem = study.system({DISPLACEMENT: MOVED}).resting()
+        sizes: dict[str, float | Array] = {DISPLACEMENT: 1.0, VOID: 1.0, PRESSURE: fluxes}
+        return replace(problem, scales=sizes, absolute=True)
 
     def between(self, problem: Problem, ends: Array, inflow: Array) -> Problem:
         """The problem with pressures (MPa) and void fractions (2,) prescribed at both ends."""
@@ -132,14 +120,6 @@ class Strip:
         h, end = (self.h[0], 0) if speed > 0.0 else (self.h[-1, ::-1], 1)
         void[end] = missing(supply, h[0], h[1], self.order)
         return void
-
-    def moving(self, problem: Problem, rate: float, before: Array) -> Problem:
-        """The problem with its squeeze: d/dt of a content is rate times it and `before` (n, m)."""
-        given = {"rod_radius": 0.0, "rate": rate, **self.surfaces.values()}
-        names = problem.assembler.block(SQUEEZE).kernel.parameters
-        assembler = problem.assembler.with_data(SQUEEZE, point_data=before[:, :, None])
-        changed = replace(problem, assembler=assembler)
-        return changed.with_parameters(**{SQUEEZE: {name: given[name] for name in names}})
 
 
 def missing(supply: float, outer: float, inner: float, order: int) -> float:
@@ -171,7 +151,7 @@ def fronts(x: Array, p: Array, v: Array, p_c: float) -> tuple[float, float]:
 
 def _rupture(x: Array, v: Array, i: int) -> float:
     """Void fractions belong to the middle of the subcell behind their node."""
-    if i + 2 >= len(x) or not v[i + 1] > v[i] * (1.0 + _EVEN):
+    if i + 2 >= len(x) or not v[i + 1] > v[i]:
         return float(x[i])
     middle, behind = 0.5 * (x[i] + x[i + 1]), 0.5 * (x[i + 1] + x[i + 2])
     found = middle - v[i] * (behind - middle) / (v[i + 1] - v[i])

@@ -29,13 +29,7 @@ from softehl.runtime.solve.predictor import through
 from softehl.runtime.solve.record import End, Record
 from softehl.runtime.solve.schur import SchurCorrector
 from softehl.runtime.solve.solution import Branch, Status
-from softehl.runtime.solve.steps import StepRule
-
-_ROUGH = 4.0  # tolerances: a larger error is refused
-_FAILED, _REFUSED = 0.25, 0.5  # of a step: the next one, where it failed or its error is large
-
-_TOUCHING = 0.05
-"""Film thickness (um) below which any surfaces touch."""
+from softehl.runtime.solve.steps import StepRule, next_parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,20 +70,6 @@ class Reading:
     lambda_ratio: float = nan
 
 
-@dataclass(frozen=True)
-class TimeSteps:
-    """Control of the steps: error of the film thickness, relative to it, that one may have.
-
-    first, smallest, largest: in periods.
-    """
-
-    tolerance: float = 0.02
-    first: float = 1e-3
-    smallest: float = 1e-8
-    largest: float = 0.02
-    order: int = 2
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Step(Trial):
     """A step that may be accepted, with the problem and the loads at its end."""
@@ -103,7 +83,9 @@ class _Step(Trial):
 class March(Way):
     """A march in time; `behind` holds the last instants, newest first, and changes with steps.
 
-    film: loads that do not change. returned: whether the instroke finds what the outstroke left.
+    film: loads that do not change. tolerance: error of the film thickness, relative to it, that a
+    step aims at. order: 1 is backward Euler, 2 is BDF2. returned: whether the instroke finds what
+    the outstroke left.
     condensed_at: time of the problem whose body the corrector's tangent has condensed, s.
     """
 
@@ -111,7 +93,8 @@ class March(Way):
     motion: Motion
     film: FilmLoads
     corrector: SchurCorrector
-    steps: TimeSteps = field(default_factory=TimeSteps)
+    tolerance: float = 0.02
+    order: int = 2
     returned: bool = False
     rod: RodFilm = field(default_factory=lambda: RodFilm([], []))
     behind: list[Instant] = field(default_factory=list)
@@ -123,7 +106,7 @@ class March(Way):
 
     def begin(self, x: Array, t: float = 0.0) -> Reading:
         """From the steady film x (n,) at a time; its reading."""
-        self.dt = self.steps.first * self.motion.period
+        self.dt = 1e-3 * self.motion.period
         film = self._loads(t)
         problem = self.system.film_problem(film)
         first = Instant(t, x, *self._content(x), self._fluxes(problem, x), np.zeros(2))
@@ -134,14 +117,14 @@ class March(Way):
     def until(self, goal: float, on_step: Callable[[Instant, Reading], None]) -> Branch:
         """March to a time; every step is told."""
         self.goal, self.told = goal, on_step
-        smallest = self.steps.smallest * self.motion.period
+        smallest = 1e-8 * self.motion.period
         branch = followed(self, StepRule(max(self.dt, smallest), smallest), Record("t"))
         return branch if branch.converged else replace(branch, message=self._stuck())
 
     def left(self, reading: Reading) -> float | None:
         """Film (mm) that an outstroke leaves on the rod, None at instroke."""
         U = reading.rod_speed_mm_s
-        return 2.0 * reading.flux_air_mm2_s / max(U, 1e-3 * self._fastest) if U > 0.0 else None
+        return 2.0 * reading.flux_air_mm2_s / U if U > 0.0 else None
 
     def condense(self, t: float, state: Array) -> None:
         """Condense the section at a state (n,) as the problem of a time has it."""
@@ -157,29 +140,33 @@ class March(Way):
         return Trial.known(self.behind[0].t, self.behind[0].x, self.dt)
 
     def attempt(self, step: float) -> Trial:
-        """Solve for the film a step later, or where the speed has a corner, or at the goal."""
+        """Solve for the film a step later, or where the speed has a corner, or at the goal.
+
+        Steps are at most 0.02 of a period: longer ones changed the work of a cycle by one per cent.
+        One with an error of three tolerances is refused, as behind a corner; to refuse errors above
+        one costs a tenth more steps.
+        """
         now = self.behind[0].t
         corner = self.motion.speed.next_corner(now) if self.motion.corners else self.goal
-        dt = min(step, self.steps.largest * self.motion.period)
-        left = min(corner, self.goal) - now
-        dt = left if dt >= left * (1.0 - 1e-9) else min(dt, 0.5 * left)
-        guess, film = self._predicted(dt), self._loads(now + dt)
+        longest = min(step, 0.02 * self.motion.period)
+        t = next_parameter(now, min(corner, self.goal), longest)
+        guess = through([i.t for i in self.behind], [i.x for i in self.behind], t)
+        dt, film = t - now, self._loads(t)
         problem, layer = self._problem(film, dt)
         tangent = self.corrector.tangent.state
         layered = Layered(problem, layer, (self.system.film_guard(),))
         solution = self.corrector.solve(layered, guess)
         if self.corrector.tangent.state is not tangent:
-            self.condensed_at = now + dt
+            self.condensed_at = t
         if not solution.converged:
-            return Trial(now + dt, solution, dt, _FAILED * dt)
+            return Trial(t, solution, dt)
         error = self._error(solution.x, guess)
-        if error > _ROUGH:
-            words = f"its error is {error:.2g} tolerances"
-            refused = replace(solution, status=Status.REFUSED, message=words)
-            return Trial(now + dt, refused, dt, _REFUSED * dt)
         power = 1.0 / 3.0 if len(self.behind) > 1 else 0.5
-        following = dt * float(np.clip(0.8 * max(error, 1e-4) ** -power, 0.3, 1.8))
-        return _Step(now + dt, solution, dt, following=following, problem=problem, film=film)
+        following = 0.8 * dt / max(error**power, 0.45)
+        if error > 3.0:
+            words = f"its error is {error:.2g} tolerances"
+            solution = replace(solution, status=Status.REFUSED, message=words)
+        return _Step(t, solution, dt, following=following, problem=problem, film=film)
 
     def accept(self, trial: Trial) -> None:
         """See `Way`."""
@@ -201,23 +188,16 @@ class March(Way):
 
     def _stuck(self) -> str:
         """From when on there is no step, and what may help."""
-        now = self.behind[0].t
-        speed = self.motion.speed.at(now)
-        return f"no step from t = {now:.6g} s on, U = {speed:.4g} mm/s: {self._advice()}"
-
-    def _advice(self) -> str:
-        """Advice where a step was not found."""
-        least = 1e3 * float(self.system.arc_film(self.behind[0].x)[1].min())
-        if not self.system.parameters.rough and least < _TOUCHING:
-            return (
+        now = self.behind[0]
+        least = 1e3 * float(self.system.arc_film(now.x)[1].min())
+        advice = "try time_order = 1, a smaller time_tolerance, roughness or a finer mesh (density)"
+        if not self.system.parameters.rough and least < 0.05:
+            advice = (
                 f"the film is {least:.2g} um thin there, where real surfaces touch; give a "
                 "roughness (0.2 to 0.4 um is usual), or time_order = 1"
             )
-        return "try time_order = 1, a smaller time_tolerance, roughness or a finer mesh (density)"
-
-    @property
-    def _fastest(self) -> float:
-        return self.motion.speed.largest
+        speed = self.motion.speed.at(now.t)
+        return f"no step from t = {now.t:.6g} s on, U = {speed:.4g} mm/s: {advice}"
 
     def _loads(self, t: float) -> FilmLoads:
         U, p_s = self.motion.speed.at(t), self.motion.pressure.at(t)
@@ -226,8 +206,7 @@ class March(Way):
             stroke="out" if U >= 0.0 else "in",
             speed=abs(U),
             sealed_pressure=p_s,
-            slip=0.01 * self._fastest,
-            least_speed=0.02 * self._fastest,
+            slip=0.01 * self.motion.speed.largest,
         )
         supply = self.rod.found(self.motion.place(t)) if self.returned and U < 0.0 else None
         if supply is None:
@@ -238,14 +217,12 @@ class March(Way):
 
     def _problem(self, film: FilmLoads, dt: float) -> tuple[Problem, Layer]:
         """The film at the end of a step, and its layer, both with what was before."""
-        weights = self._weights(dt)
-        known = self.behind[: len(weights) - 1]
-        problem = self.system.film_problem(replace(film, rate=float(weights[0])))
-        problem = problem.with_parameters(**self.system.squeeze_values(float(weights[0])))
-        pairs = list(zip(weights[1:], known, strict=True))
-        content = sum(w * i.content for w, i in pairs)
+        rate, past = self._differences(dt)
+        problem = self.system.film_problem(replace(film, rate=rate))
+        problem = problem.with_parameters(**self.system.squeeze_values(rate))
+        content = sum(w * i.content for w, i in past)
         arc = self.system.mesh.arc_segments
-        moved = sum(w * self.system.displacements(i.x)[arc, 0] for w, i in pairs)
+        moved = sum(w * self.system.displacements(i.x)[arc, 0] for w, i in past)
         layer = self._layer
         assert layer is not None, "begin() comes first"
         assemblers = [
@@ -256,31 +233,25 @@ class March(Way):
         ]
         return replace(problem, assembler=assemblers[0]), replace(layer, assembler=assemblers[1])
 
-    def _weights(self, dt: float) -> Array:
+    def _differences(self, dt: float) -> tuple[float, list[tuple[float, Instant]]]:
+        """Weights of d/dt at the end of a step: its own, those of the instants before."""
         steps = [dt]
-        if self.steps.order > 1 and len(self.behind) > 1:
+        if self.order > 1 and len(self.behind) > 1:
             steps.append(self.behind[0].t - self.behind[1].t)
-        return differences(steps)
-
-    def _predicted(self, dt: float) -> Array:
-        """Polynomial through the last instants, at the end of the step."""
-        times, states = [i.t for i in self.behind], [i.x for i in self.behind]
-        return through(times, states, times[0] + dt)
+        rate, *weights = differences(steps).tolist()
+        return rate, list(zip(weights, self.behind, strict=False))
 
     def _error(self, x: Array, guess: Array) -> float:
         """Prediction and result differ by so many tolerances in the film thickness."""
         if len(self.behind) < 2:
             return 1.0
         (_, h), (_, foreseen) = self.system.arc_film(x), self.system.arc_film(guess)
-        size = np.abs(h) + max(self.system.parameters.surfaces.sigma, 1e-5)
-        inside = h < max(50.0 * float(np.abs(h).min()), 2e-3)
-        return float((np.abs(h - foreseen) / size)[inside].max() / self.steps.tolerance)
+        size = np.abs(h) + self.system.parameters.surfaces.sigma
+        return float((np.abs(h - foreseen) / size).max() / self.tolerance)
 
     def _instant(self, problem: Problem, x: Array, dt: float) -> Instant:
-        weights = self._weights(dt)
-        fluxes, known = self._fluxes(problem, x), self.behind[: len(weights) - 1]
-        before = sum(w * i.volumes for w, i in zip(weights[1:], known, strict=True))
-        volumes = (fluxes - before) / weights[0]
+        (rate, past), fluxes = self._differences(dt), self._fluxes(problem, x)
+        volumes = (fluxes - sum(w * i.volumes for w, i in past)) / rate
         return Instant(self.behind[0].t + dt, x, *self._content(x), fluxes, volumes)
 
     def _fluxes(self, problem: Problem, x: Array) -> Array:

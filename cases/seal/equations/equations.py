@@ -147,7 +147,7 @@ class SealSystem(SealUnknowns):
         if film.moment is not None:
             fixed.append(self.layout.dofs(ROTATION))
             values.append(film.moment)
-        fluxes = self.flux_scales(max(film.speed, film.least_speed), film.gap)
+        fluxes = self.flux_scales(film.speed, film.gap)
         return replace(
             problem.with_fixed(fixed, values),
             scales={**problem.scales, PRESSURE: fluxes},

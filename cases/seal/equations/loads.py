@@ -40,8 +40,7 @@ class FilmLoads:
     is free to roll, None if its rotation is held. place: as of the contact state. rate: coefficient
     of time derivatives, 1/s, 0 where nothing changes. inflow: void fractions at the sealed and the
     air end, where oil comes in. entrance: pressure that oil has built up before the arc, MPa. slip:
-    speed at which the friction of asperities has 0.7 of its value, mm/s. least_speed: that the
-    sizes of fluxes are taken at, mm/s.
+    speed at which the friction of asperities has 0.7 of its value, mm/s.
     """
 
     sealed_pressure: float
@@ -55,7 +54,6 @@ class FilmLoads:
     inflow: tuple[float, float] = (0.0, 0.0)
     entrance: float = 0.0
     slip: float = SLIP
-    least_speed: float = 0.0
 
     @property
     def ends(self) -> Array:
