@@ -110,15 +110,8 @@ def _draw_stroke(axes: Axes, stroke: str, rows: Sequence[FilmRow]) -> None:
             continue
         place = abs(row.rod_speed_mm_s), row.h_star_um
         axes.plot(*place, style.MARKERS[stroke], color=colour, markerfacecolor="white")
-        axes.annotate(
-            row.verdict,
-            place,
-            xytext=(-5, 4) if stroke == "out" else (5, -9),
-            textcoords="offset points",
-            ha="right" if stroke == "out" else "left",
-            fontsize="x-small",
-            color=colour,
-        )
+        shift = (-5, 4) if stroke == "out" else (5, -4)
+        style.write_beside(axes, place, row.verdict, shift, color=colour)
 
 
 def _draw_slope(axes: Axes, rows: Sequence[FilmRow]) -> None:

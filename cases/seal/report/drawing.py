@@ -11,8 +11,6 @@ from softehl.cases.seal.report import style
 from softehl.cases.seal.report.section import draw_gland
 from softehl.cases.seal.section.uniform_layout import uniform_layout
 
-Place = tuple[float, float]
-
 
 def gland_figure(p: Seal) -> Figure:
     """The section as it is made, at its radius on the rod, and the gland that it goes into."""
@@ -44,18 +42,10 @@ def fit_numbers(p: Seal) -> list[tuple[str, float, str]]:
     ]
 
 
-def _measure(axes: Axes, start: Place, end: Place, length: float) -> None:
+def _measure(axes: Axes, start: style.Place, end: style.Place, length: float) -> None:
     """An arrow with both ends and its length, above it or, if it is upright, beside it."""
     arrow = {"arrowstyle": "<|-|>", "linewidth": 0.7, "color": "0.2"}
     axes.annotate("", end, start, arrowprops=arrow)
     middle = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
-    upright = start[0] == end[0]
-    axes.annotate(
-        f"{length:.4g}",
-        middle,
-        xytext=(5, 0) if upright else (0, 5),
-        textcoords="offset points",
-        fontsize="small",
-        ha="left" if upright else "center",
-        va="center" if upright else "bottom",
-    )
+    shift = (5, 0) if start[0] == end[0] else (0, 5)
+    style.write_beside(axes, middle, f"{length:.4g}", shift, fontsize="small")

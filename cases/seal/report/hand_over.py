@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.report.part import FinishedRun
@@ -22,9 +23,8 @@ from softehl.runtime.io import write_csv, write_text
 FILES = ("seal.csv", "seal_modelica.txt", "cylinder_friction.txt")
 HEADER = ("sealed_pressure_MPa", "rod_speed_mm_s", "friction_N", "leakage_mm3_s")
 _MOTION = ("sealed_pressure", "speeds", "stroke", "travel", "tolerance", "solver", "linear")
-_PA, _M_S, _M3 = 1e6, 1e-3, 1e-9  # of one MPa, mm/s, mm^3
-_LEAST = 5  # films that a fit of a friction law needs
-_BLENDS = (0.003, 0.01, 0.03, 0.1, 0.3)  # s/mm, where fits of the transition begin
+_LEAST = 5
+"""Films that a fit of a friction law needs: it has as many numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,31 +109,30 @@ class FrictionLaw:
     @property
     def numbers(self) -> dict[str, tuple[float, str]]:
         """Numbers that the block asks for, in SI units."""
-        last = {
-            "Cylinder Friction": (
-                *("Breakaway friction increase coefficient", "Transition coefficient"),
-                *(self.rate / _M_S, "s/m"),
-            ),
-            "Cylinder Friction (IL)": (
-                *("Breakaway to Coulomb friction force ratio", "Breakaway friction velocity"),
-                *(_M_S / self.rate, "m/s"),
-            ),
+        own = {
+            "Cylinder Friction": {
+                "Breakaway friction increase coefficient": (self.breakaway, ""),
+                "Transition coefficient": (1e3 * self.rate, "s/m"),
+            },
+            "Cylinder Friction (IL)": {
+                "Breakaway to Coulomb friction force ratio": (self.breakaway, ""),
+                "Breakaway friction velocity": (1e-3 / self.rate, "m/s"),
+            },
         }
-        ratio, fading, value, unit = last[self.block]
         return {
             "Preload force": (self.preload, "N"),
-            "Coulomb friction coefficient": (self.coulomb / _PA, "N/Pa"),
-            ratio: (self.breakaway, ""),
-            fading: (value, unit),
-            "Viscous friction coefficient": (self.viscous / _M_S, "N/(m/s)"),
+            "Coulomb friction coefficient": (1e-6 * self.coulomb, "N/Pa"),
+            **own[self.block],
+            "Viscous friction coefficient": (1e3 * self.viscous, "N/(m/s)"),
             "largest misfit": (100.0 * self.misfit, "%"),
         }
 
     @classmethod
     def fitted(cls, seal: SealMap, block: str) -> FrictionLaw | None:
-        """The law nearest to the films, None where they are too few: least squares of parts."""
-        from scipy.optimize import least_squares
+        """The law nearest to the films, None where they are too few: least squares of parts.
 
+        From starts with and without a breakaway, that fades over 3 to 300 mm/s: some end elsewhere.
+        """
         u, p = (a.ravel() for a in np.meshgrid(seal.speeds, seal.pressures, indexing="ij"))
         force = seal.friction.ravel()
         if len(force) < _LEAST or len(set(np.abs(u))) < 2:
@@ -148,12 +147,14 @@ class FrictionLaw:
             return law(x).friction(u, p) / force - 1.0
 
         size, fast = float(np.abs(force).mean()), float(np.abs(u).max())
-        starts = [(size, 0.0, more, c, 0.1 * size / fast) for c in _BLENDS for more in (0.0, 1.0)]
-        low = [0.0, 0.0, 0.0, 1e-4, 0.0]
-        high = [np.inf, np.inf, 100.0, 100.0, np.inf]
+        bounds = [0.0, 0.0, 0.0, 1e-4, 0.0], [np.inf, np.inf, 100.0, 100.0, np.inf]
+        scale = size, size, 1.0, 0.1, size / fast
         fits = [
-            least_squares(parts, s, bounds=(low, high), x_scale=(size, size, 1, 0.1, size / fast))
-            for s in starts
+            least_squares(
+                parts, (size, 0.0, more, rate, 0.1 * size / fast), bounds=bounds, x_scale=scale
+            )
+            for rate in (0.003, 0.01, 0.03, 0.1, 0.3)
+            for more in (0.0, 1.0)
         ]
         best = min(fits, key=lambda fit: float(fit.cost)).x
         return law(best, float(np.abs(parts(best)).max()))
@@ -179,8 +180,7 @@ def write_hand_over(folder: Path, runs: Sequence[FinishedRun]) -> list[str]:
     if not laws:
         said.append(f"no friction law: a fit needs {_LEAST} films at two speeds |U| or more")
     for name, law in laws.items():
-        misfit = f"within {100.0 * law.misfit:.2g} % of every film"
-        said.append(f"{name}: {misfit}")
+        said.append(f"{name}: within {100.0 * law.misfit:.2g} % of every film")
     doubtful = sum(row.verdict != "ok" for run in runs for row in run.rows)
     return [*said, f"films with a verdict other than ok: {doubtful}"] if doubtful else said
 
@@ -188,12 +188,13 @@ def write_hand_over(folder: Path, runs: Sequence[FinishedRun]) -> list[str]:
 def modelica(seal: SealMap) -> str:
     """Text of tables for CombiTable2Ds, in SI units: u1 is the speed, u2 the sealed pressure."""
     shape = f"({len(seal.speeds) + 1},{len(seal.pressures) + 1})"
-    tables = {"friction": ("N", seal.friction), "leakage": ("m3/s", _M3 * seal.leakage)}
+    tables = {"friction": ("N", seal.friction), "leakage": ("m3/s", 1e-9 * seal.leakage)}
     lines = ["#1"]
     for name, (unit, values) in tables.items():
         lines.append(f"double {name}{shape} # [{unit}] over rod speed [m/s] and pressure [Pa]")
-        lines.append(_numbers([0.0, *(_PA * seal.pressures)]))
-        lines += [_numbers([_M_S * u, *row]) for u, row in zip(seal.speeds, values, strict=True)]
+        head, speeds = [0.0, *(1e6 * seal.pressures)], 1e-3 * seal.speeds
+        rows = [head, *([u, *row] for u, row in zip(speeds, values, strict=True))]
+        lines += [" ".join(f"{v:.9g}" for v in row) for row in rows]
     return "\n".join([*lines, ""])
 
 
@@ -216,10 +217,6 @@ def friction_laws(seal: SealMap) -> dict[str, FrictionLaw]:
         for block in BLOCKS
     }
     return {name: law for name, law in found.items() if law is not None}
-
-
-def _numbers(values: Sequence[float]) -> str:
-    return " ".join(f"{v:.9g}" for v in values)
 
 
 def _require_one_seal(runs: Sequence[FinishedRun]) -> None:

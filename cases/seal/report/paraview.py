@@ -22,8 +22,6 @@ FILES = ("gland.vtu", "section_out.pvd", "section_in.pvd")
 PARTS = ("rod", "groove", "housing")
 """Names of the values of `part` in gland.vtu, from 0."""
 
-_FILLET = np.linspace(0.0, 0.5 * pi, 17)
-
 
 def write_paraview(p: Gland, folder: Path, rows: Sequence[FilmRow]) -> None:
     """Write the gland, and a series over |U| in mm/s for each stroke that has rows."""
@@ -62,5 +60,7 @@ def _edge(p: Gland, wall: float, rod: float) -> list[list[float]]:
     if not p.opens:
         return [[wall, rod]]
     fillet, lip = p.corner_fillet, rod + p.extrusion_gap
-    across, up = fillet * (1.0 - np.cos(_FILLET)), fillet * (1.0 - np.sin(_FILLET))
-    return [[wall + a, lip + u] for a, u in zip(across.tolist(), up.tolist(), strict=True)]
+    angles = np.linspace(0.0, 0.5 * pi, 17)
+    across, up = wall + fillet * (1.0 - np.cos(angles)), lip + fillet * (1.0 - np.sin(angles))
+    edge: list[list[float]] = np.stack([across, up], axis=1).tolist()
+    return edge

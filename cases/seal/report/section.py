@@ -153,7 +153,7 @@ def _draw_film(axes: Axes, p: Gland, profile: Profile, height: float) -> None:
     rod, x, film = 0.5 * p.rod_diameter, profile.x_mm, np.maximum(profile.p_MPa, 0.0)
     axes.fill_between(x, rod, rod - height * film, color=_FILM, lw=0)
     text, below = f"film pressure, max {film.max():.3g} MPa", rod - height * film.max()
-    _write(axes, (p.groove_centre, below), text, 3 if p.piston else -3)
+    style.write_beside(axes, (p.groove_centre, below), text, (0, 3 if p.piston else -3))
 
 
 def _draw_contact(axes: Axes, p: Gland, section: Section, height: float) -> None:
@@ -168,7 +168,7 @@ def _draw_contact(axes: Axes, p: Gland, section: Section, height: float) -> None
     axes.add_collection(bands)
     above = 0.5 * p.housing_diameter + height * pressure.max()
     text = f"contact pressure, max {pressure.max():.3g} MPa"
-    _write(axes, (p.groove_centre, above), text, -3 if p.piston else 3)
+    style.write_beside(axes, (p.groove_centre, above), text, (0, -3 if p.piston else 3))
 
 
 def _normals(points: Array, edges: Integers) -> Array:
@@ -191,17 +191,4 @@ def _draw_motion(axes: Axes, p: Gland, speed: float) -> None:
         (p.groove_centre + half, level),
         (p.groove_centre - half, level),
         arrowprops={"arrowstyle": "-|>", "color": _LINE, "linewidth": 1.2},
-    )
-
-
-def _write(axes: Axes, place: tuple[float, float], text: str, above: float) -> None:
-    """Small letters above or below a place, by so many points."""
-    axes.annotate(
-        text,
-        place,
-        xytext=(0, above),
-        textcoords="offset points",
-        ha="center",
-        va="bottom" if above > 0 else "top",
-        fontsize="x-small",
     )

@@ -36,6 +36,8 @@ STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "softehl",
 }
+Place = tuple[float, float]
+
 STROKES = {"out": "outstroke", "in": "instroke"}
 COLOURS = {"out": "#1b6ca8", "in": "#c8553d"}
 MARKERS = {"out": "o", "in": "s"}
@@ -74,6 +76,14 @@ def between(p: Gland) -> str:
 def write_head(figure: Figure, text: str) -> None:
     """Write what a picture is about at its top."""
     figure.suptitle(text, x=0.01, ha="left", fontsize=7.5, color="0.25")
+
+
+def write_beside(axes: Axes, place: Place, text: str, shift: Place, **look: Any) -> None:
+    """Small letters that stand to this side of a place, by so many points."""
+    across = {0: "center", 1: "left", -1: "right"}[int(np.sign(shift[0]))]
+    up = {0: "center", 1: "bottom", -1: "top"}[int(np.sign(shift[1]))]
+    where = {"xytext": shift, "textcoords": "offset points", "ha": across, "va": up}
+    axes.annotate(text, place, **{"fontsize": "x-small", **where, **look})
 
 
 def radial_axis(axes: Axes, p: Gland) -> None:
