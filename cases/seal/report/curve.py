@@ -35,6 +35,7 @@ def curve_figure(head: str, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]
 
 def _draw_lines(axes: Axes, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]) -> None:
     axes.set(xscale="log", yscale="log", xlabel=style.SPEED)
+    axes.margins(x=0.07)
     for stroke in style.STROKES:
         chosen = [row for row in rows if row.stroke == stroke]
         if chosen:
