@@ -22,7 +22,7 @@ from softehl.cases.oring import PICTURES
 from softehl.cases.paper.states import PAPER
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.pictures import write_plots
-from softehl.cases.seal.report.section import Scale, View, draw_view
+from softehl.cases.seal.report.section import Scale, View, draw_view, write_colours
 from softehl.cases.seal.states.observer_adapter import read_profile, read_section
 
 SIZE = (2.5, 2.3)
@@ -102,14 +102,14 @@ def section(curve: softehl.Curve) -> Figure:
     """The deformed section in its gland."""
     (row,) = curve.rows
     view = View(row, read_profile(curve.folder, row), read_section(curve.folder, row))
-    figure = Figure(figsize=SIZE)
+    figure = Figure(figsize=SIZE, layout="compressed")
     axes = figure.subplots()
     shown = draw_view(axes, curve.parameters, view, Scale.of(curve.parameters, [view]))
     axes.set(xticks=[], yticks=[])
     axes.set_title(f"{curve.parameters.sealed_pressure:g} MPa from the left")
     for spine in axes.spines.values():
         spine.set_visible(False)
-    figure.colorbar(shown, ax=axes, label="von Mises stress [MPa]")
+    write_colours(figure, axes, shown)
     return figure
 
 
@@ -136,7 +136,7 @@ def stabilised(papers: softehl.Curve, ours: softehl.Curve) -> Figure:
     for curve, label, colour in ((papers, "paper's scheme", "#c8553d"), (ours, "ours", "#1b6ca8")):
         profile = read_profile(curve.folder, curve.rows[0])
         axes.plot(profile.x_mm, profile.h_um, color=colour, label=label, linewidth=1.0)
-    axes.set(xlim=(-0.65, 1.1), ylim=(0.0, 1.2))
+    axes.set(xlim=(-0.65, 1.1), ylim=(0.0, 1.2), xticks=(-0.5, 0.0, 0.5, 1.0))
     axes.set(xlabel="position $x$ [mm]", ylabel=style.FILM)
     axes.set_title("100 mm/s, equal number of unknowns")
     axes.legend(loc="upper center")

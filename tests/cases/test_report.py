@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from math import nan
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -19,6 +20,7 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import regime
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure, fitted_exponent
+from softehl.cases.seal.report.drawing import gland_figure
 from softehl.cases.seal.report.profiles import profiles_figure
 from softehl.cases.seal.report.section import (
     View,
@@ -277,16 +279,23 @@ def test_the_section_shows_both_strokes_with_one_scale() -> None:
     assert (out.get_xlabel(), out.get_ylabel()) == ("z [mm]", "r [mm]")
 
 
-@pytest.mark.parametrize("factor", [1.0, 40.0, 400.0])
-def test_the_label_of_the_colours_is_on_the_picture(factor: float) -> None:
-    r, section = power_law(0.6)[2], square()
-    data = {name: factor * values for name, values in section.point_data.items()}
-    figure = section_figure(
-        SEAL, [View(r, profile(r.h_star_um), replace(section, point_data=data))]
-    )
-    figure.draw_without_rendering()
-    label = figure.axes[-1].child_axes[0].yaxis.label.get_window_extent()
-    assert label.x1 < figure.bbox.x1
+GLANDS: tuple[dict[str, Any], ...] = (
+    {},
+    {"bore": 40.0, "ring": "32x4"},
+    {"section": "u_cup", "groove_width": 6.0, "housing_diameter": 56.4},
+)
+
+
+@pytest.mark.parametrize("given", GLANDS)
+def test_nothing_of_a_picture_is_cut_off(given: dict[str, Any]) -> None:
+    p, r, section = Seal(**given), power_law(0.6)[2], square()
+    data = {name: 400.0 * values for name, values in section.point_data.items()}
+    view = View(r, profile(r.h_star_um), replace(section, point_data=data))
+    for figure in (gland_figure(p), section_figure(p, [view]), section_figure(p, [view, view])):
+        figure.draw_without_rendering()
+        drawn, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+        assert -0.02 < drawn.x0 < drawn.x1 < width + 0.02
+        assert -0.02 < drawn.y0 < drawn.y1 < height + 0.02
 
 
 def test_the_legend_of_a_tornado_is_beside_its_bars() -> None:

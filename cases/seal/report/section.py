@@ -86,7 +86,7 @@ class Scale:
 
 def section_figure(p: Seal, views: Sequence[View]) -> Figure:
     """A panel for each state, all with one scale of stress and one of pressure."""
-    scale, figure = Scale.of(p, views), Figure(figsize=(3.3 * len(views) + 1.5, 4.0))
+    scale, figure = Scale.of(p, views), Figure((3.3 * len(views) + 1.5, 4.2), layout="compressed")
     panels = figure.subplots(1, len(views), sharey=True, squeeze=False)[0]
     for axes, view in zip(panels, views, strict=True):
         shown = draw_view(axes, p, view, scale)
@@ -95,10 +95,15 @@ def section_figure(p: Seal, views: Sequence[View]) -> Figure:
         axes.set_title(f"{style.STROKES[view.row.stroke]}, {film}")
         axes.set_xlabel("z [mm]")
     style.radial_axis(panels[0], p)
-    beside = panels[-1].inset_axes((1.04, 0.0, 0.04, 1.0))
-    figure.colorbar(shown, cax=beside, label="von Mises stress [MPa]")
+    write_colours(figure, panels[-1], shown)
     style.write_head(figure, style.subject(p))
     return figure
+
+
+def write_colours(figure: Figure, axes: Axes, shown: TriContourSet) -> None:
+    """The colours of the stress beside a panel, as high as it."""
+    beside = axes.inset_axes((1.04, 0.0, 0.04, 1.0))
+    figure.colorbar(shown, cax=beside, label="von Mises stress [MPa]")
 
 
 def draw_view(axes: Axes, p: Seal, view: View, scale: Scale) -> TriContourSet:
