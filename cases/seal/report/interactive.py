@@ -87,8 +87,8 @@ def _over_speed(
 ) -> Any:
     """A result over speed with bars of its error, a line a stroke.
 
-    of: the result of a state, and its error in per cent. What is not `ok` is a hollow mark. Colours
-    are strokes for one run, runs for several.
+    of: the result of a state, and its error in per cent. A state that is not `ok` is a hollow mark.
+    Colours are strokes for one run, runs for several.
     """
     panel = plot(style.SPEED, label, height=360, x_axis_type="log", y_axis_type="log")
     tips = [("|U|", "@x{0.###} mm/s"), (label, "@y{0.####}")]

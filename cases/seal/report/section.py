@@ -47,7 +47,7 @@ class View:
 def views_of(folder: Path, rows: Sequence[FilmRow]) -> list[View]:
     """Of each stroke the row of the highest speed, where the film changes the contact most.
 
-    Those whose files in the folder are complete.  Raises OSError, ValueError.
+    Sections that lack a field are left out.  Raises OSError, ValueError.
     """
     fastest = sorted(rows, key=lambda row: -abs(row.rod_speed_mm_s))
     firsts = (next((r for r in fastest if r.stroke == stroke), None) for stroke in style.STROKES)
