@@ -133,6 +133,15 @@ def test_what_a_case_had_is_read_back() -> None:
         assert Seal(**p.model_dump()) == p
 
 
+def test_a_fit_of_another_machine_agrees() -> None:
+    """Its moduli may differ by the tolerance of least squares, but not more."""
+    p = Seal(fit=str(TRELOAR), material="neo-hooke")
+    kept = p.model_dump()
+    assert Seal(**kept | {"mu": kept["mu"] * (1 + 1e-5)}).mu != p.mu
+    with pytest.raises(ValueError, match="contradict"):
+        Seal(**kept | {"mu": kept["mu"] * 1.01})
+
+
 # --- contradictions -----------------------------------------------------------------------------
 
 

@@ -11,11 +11,12 @@ def number(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def put(values: dict[str, Any], key: str, value: Any, source: str) -> None:
-    """Set a key, or see that what was given agrees to 1e-6, less than tables and units round.
+def put(values: dict[str, Any], key: str, value: Any, source: str, within: float = 1e-6) -> None:
+    """Set a key, or see that what was given agrees.
 
-    value: a number or several. source: what it follows from, in words. A value of another
-    type stays, to be refused with its key. Raises ValueError for a contradiction.
+    value: a number or several. source: what it follows from, in words. within: relative difference
+    that agrees, usually less than tables and units round. A value of another type stays, to be
+    refused with its key. Raises ValueError for a contradiction.
     """
     before = values.get(key)
     if before is None:
@@ -25,7 +26,7 @@ def put(values: dict[str, Any], key: str, value: Any, source: str) -> None:
     if not all(map(number, given)):
         return
     if len(given) != len(expected) or not all(
-        isclose(a, b, rel_tol=1e-6, abs_tol=1e-12) for a, b in zip(given, expected, strict=True)
+        isclose(a, b, rel_tol=within, abs_tol=1e-12) for a, b in zip(given, expected, strict=True)
     ):
         raise ValueError(
             f"{key} = {shown(before)} and {source} contradict: the latter gives {shown(value)}; "
