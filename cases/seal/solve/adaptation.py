@@ -17,15 +17,14 @@ from softehl.cases.seal.solve.film_layout import film_layout, misfit
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
 from softehl.cases.seal.solve.path import StageFailed
 from softehl.cases.seal.solve.transfer import FilmTransfer
-from softehl.cases.seal.states.estimate import coarser_density, system_at
-from softehl.cases.seal.states.verdict import FilmNumbers, fewest_inlet_segments
+from softehl.cases.seal.states.estimate import coarser_density, friction_bound, system_at
+from softehl.cases.seal.states.verdict import LARGEST_ERROR, FilmNumbers, fewest_inlet_segments
 from softehl.runtime.mesh.mesh import MeshError
 
 FITS, SHOWS = 2.2, 3.0
 """Segments that a film may ask for in the place of one, before its mesh is made anew and before it
 does not count. Where it asked for at most three, h* changed by 0.5 % or less on the mesh that was
-made for it; where for nine, by 7 %. Made anew from 2.5 on, thin films of easy glands had estimates
-above 2 %."""
+made for it; where for nine, by 7 %. Made anew from 3 on, an X-ring went to another film."""
 
 ALIKE = 1.25
 """Ratio of the segments that two meshes have for a film, relative to their densities: what they
@@ -68,13 +67,19 @@ class Adaptation:
         """A film on a mesh that fits it, from that on another mesh.
 
         last: films at other speeds. A film that ends early on a mesh is squeezed out anew on one
-        that is made for the state it has reached.
+        that is made for the state it has reached. The mesh of another film, which fits too, is left
+        where its estimated error is too large.
         """
-        density = Fraction(self.p.density)
-        found = self._settled(found, density)
+        density, given = Fraction(self.p.density), found
+        found = self._settled(given, density)
         if isinstance(found, NoFilm):
             return found
-        return Adapted(found, self._coarser(found, last), self._fits(found, density, most=SHOWS))
+        coarser = self._coarser(found, last)
+        if found is given and self.p.error_estimate and not _sure(found, coarser):
+            own = self._remeshed(found, density)
+            if isinstance(own, Film):
+                found, coarser = own, self._coarser(own, last)
+        return Adapted(found, coarser, self._fits(found, density, most=SHOWS))
 
     def _settled(
         self, found: Film | NoFilm, density: Fraction, like: Film | None = None
@@ -160,6 +165,14 @@ class Adaptation:
             if isinstance(again, Film):
                 return again
         return solver.from_contact(film.stroke, film.speed, dry[1])
+
+
+def _sure(film: Film, coarser: Film | None) -> bool:
+    """True if the estimated errors are as small as those of a state that is `ok`."""
+    if coarser is None:
+        return False
+    bound = friction_bound(film.system.parameters.density, film.numbers, coarser.numbers)
+    return bound <= LARGEST_ERROR
 
 
 def _misfit(film: Film, density: float) -> float:
