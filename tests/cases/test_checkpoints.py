@@ -10,7 +10,7 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact import contact_problem
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import Checkpoint, Checkpoints, ContactSolver
-from softehl.cases.seal.solve.path import PathDriver, StageFailed
+from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.states.state import Silent
 
 LOADED = Seal(sealed_pressure=10.0, density=1)
@@ -72,7 +72,6 @@ def test_contact_above_three_shear_moduli_is_not_walked_from_rest_on_every_mesh(
     )
     driver = PathDriver(Silent())
     found = ContactMeshes(ContactSolver(driver)).contact(p)
-    assert not isinstance(found, StageFailed)
     assert sum(record.factorisations or 0 for record in driver.records) < 250
     system, x = found
     problem = contact_problem(system, p.sealed_pressure)

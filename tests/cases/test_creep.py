@@ -10,7 +10,7 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact import approach_stage, at_air_wall, contact_problem
 from softehl.cases.seal.solve.contact_relaxation import CreepCorrector, Creeping
 from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.path import PathDriver, StageFailed
+from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.newton import Newton
@@ -23,7 +23,6 @@ def squeezed() -> tuple[SealSystem, Array]:
     """A section in its gland, moved to the wall, without pressure."""
     system = build_system(P)
     x = PathDriver(Silent()).follow(approach_stage(system), system.at_rest())
-    assert not isinstance(x, StageFailed)
     return system, at_air_wall(system, x)[0]
 
 
@@ -35,7 +34,6 @@ def test_all_of_the_pressure_at_once_leads_to_the_contact_of_its_path(
     found = CreepCorrector(system, Newton()).solve(problem, x)
     assert found.converged
     path = ContactSolver(PathDriver(Silent())).from_rest(system)
-    assert not isinstance(path, StageFailed)
     np.testing.assert_allclose(found.x, path, rtol=0.0, atol=1e-7)
 
 

@@ -16,7 +16,7 @@ from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.film_layout import film_layout, misfit
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
 from softehl.cases.seal.solve.method import DryContact, run
-from softehl.cases.seal.solve.path import PathDriver, StageFailed
+from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.solve.transfer import FilmTransfer
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
@@ -38,7 +38,6 @@ THIN = Seal(
 
 def contact_of(p: Seal) -> DryContact:
     found = DryContact.of(p, Silent())
-    assert not isinstance(found, StageFailed)
     return found
 
 
@@ -110,7 +109,6 @@ def test_a_film_that_is_carried_is_that_from_the_contact_of_its_mesh(
     carried = adaptation(P, dry)._carried(film, new)
     assert isinstance(carried, Film)
     contact = ContactSolver(PathDriver(Silent())).from_mesh(dry.system, dry.x, new)
-    assert not isinstance(contact, StageFailed)
     own = a_film(solver(dry, new).from_contact("out", 400.0, contact[1]))
     assert gap(carried) == pytest.approx(gap(own), rel=1e-6)
     assert carried.numbers.h_star != pytest.approx(film.numbers.h_star, rel=1e-5)

@@ -18,7 +18,7 @@ from softehl.cases.seal.solve.failure import explained, without_films
 from softehl.cases.seal.solve.films import NoFilm
 from softehl.cases.seal.solve.inlet import film_thickness
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver, StageFailed
+from softehl.cases.seal.solve.path import PathDriver, StageError
 from softehl.cases.seal.states.contact_results import unsealed
 from softehl.cases.seal.states.contacts import contact_edges
 from softehl.cases.seal.states.state import (
@@ -80,7 +80,7 @@ def test_what_cannot_be_reached_is_told_in_words_of_the_problem() -> None:
         "sealed pressure 9 MPa was not reached": load_stage(system),
     }
     for says, stage in stages.items():
-        failed = StageFailed(stage, Branch((), Status.MAX_ITERATIONS, "last norms"))
+        failed = StageError(stage, Branch((), Status.MAX_ITERATIONS, "last norms"))
         status, message = explained(failed, "contact", p)
         assert status is Status.MAX_ITERATIONS
         assert says in message
@@ -143,7 +143,7 @@ def test_a_path_from_rest_takes_few_steps_however_incompressible_the_rubber() ->
     p = drawn(0)
     system = build_system(p.model_copy(update={"mesh": "uniform", "density": 1}))
     driver = PathDriver(Silent())
-    assert not isinstance(ContactSolver(driver).from_rest(system), StageFailed)
+    ContactSolver(driver).from_rest(system)
     assert driver.records[0].iterations < 60
 
 
@@ -241,7 +241,6 @@ def _by_the_law(**given: Any) -> tuple[float, float]:
     """h* (um) of an outstroke, and that over `film_thickness` at the edge of its inlet."""
     p = Seal(**given, stroke="out", error_estimate=False)
     found = ContactMeshes(ContactSolver(PathDriver(Silent()))).contact(p)
-    assert not isinstance(found, StageFailed)
     state = run(p, Silent()).states[0]
     assert state.verdict == OK
     h = 1e3 * film_thickness(p, contact_edges(*found)[:1], state.rod_speed_mm_s)

@@ -14,7 +14,7 @@ from softehl.cases.seal.solve.contact_layout import contact_layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver, StageFailed
+from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.states.contacts import contact_edges
 from softehl.cases.seal.states.state import Outcome, Silent
 from softehl.runtime.arrays import Array
@@ -31,7 +31,6 @@ _RADIUS = 0.5 * Seal().section_diameter
 def _contact(density: int, mesh: str = "graded", p_s: float = 1.0) -> tuple[SealSystem, Array]:
     route = ContactMeshes(ContactSolver(PathDriver(Silent())))
     found = route.contact(oring(density=density, mesh=mesh, sealed_pressure=p_s))
-    assert not isinstance(found, StageFailed)
     return found
 
 

@@ -15,7 +15,7 @@ from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.solve.contact_layout import contact_layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
-from softehl.cases.seal.solve.path import PathDriver, StageFailed
+from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.states.contact_results import contact_pressure, unsealed
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
@@ -32,14 +32,12 @@ def route() -> ContactMeshes:
 def elsewhere(system: SealSystem, x: Array, new: SealSystem) -> Array:
     """The contact state x on another mesh: carried to it, else from rest."""
     found = ContactSolver(PathDriver(Silent())).from_mesh(system, x, new)
-    assert not isinstance(found, StageFailed)
     return found[1]
 
 
 @cache
 def usual() -> State:
     found = route().contact(P)
-    assert not isinstance(found, StageFailed)
     return found
 
 
@@ -102,7 +100,6 @@ def test_meshes_are_made_until_the_pressure_ends_in_the_contact() -> None:
     """The whole route, from a state whose pressure ends before the contact begins."""
     start = ending_at(-33.0, None)
     found = route()._sealed(P, start)
-    assert not isinstance(found, StageFailed)
     system, x = found
     assert unsealed(system, x) == ""
     layout = contact_layout(*start, P)

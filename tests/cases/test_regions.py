@@ -14,7 +14,7 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.rubbers.regions import PRESETS
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.inlet import inlet_length
-from softehl.cases.seal.solve.path import PathDriver, StageFailed
+from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.states.contact_results import contact_pressure
 from softehl.cases.seal.states.state import Silent
 from softehl.cases.shipped import SHIPPED
@@ -136,7 +136,6 @@ WIDE = 28.0
 def _squeezed(**changes: Any) -> tuple[SealSystem, Array]:
     system = build_system(Seal(**changes))
     x = ContactSolver(PathDriver(Silent())).from_rest(system)
-    assert not isinstance(x, StageFailed)
     return system, x
 
 

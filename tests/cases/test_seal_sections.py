@@ -21,7 +21,7 @@ from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.contact_store import contact_key
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver, StageFailed
+from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.states.contact_results import contact_peaks, contact_pressure
 from softehl.cases.seal.states.contacts import (
     CONTACT_FILM,
@@ -50,7 +50,6 @@ X_RING: dict[str, Any] = {"section": "x_ring", "lobe_radius": 0.9, "fillet_radiu
 def _contact(**changes: Any) -> tuple[SealSystem, Array]:
     route = ContactMeshes(ContactSolver(PathDriver(Silent())))
     found = route.contact(Seal(**changes))
-    assert not isinstance(found, StageFailed)
     return found
 
 
@@ -362,7 +361,6 @@ def test_without_pressure_the_mirror_image_of_a_state_is_one(section: str) -> No
         Seal(**{**X_RING, **_plain(section), "density": 1, "sealed_pressure": 0.0})
     )
     x = ContactSolver(PathDriver(Silent())).from_rest(system)
-    assert not isinstance(x, StageFailed)
     norms = []
     for one, state in ((system, x), mirrored(system, x)):
         problem = contact_problem(one, 0.0)

@@ -21,7 +21,7 @@ from softehl.cases.seal.gland.sections.keys import lobes
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.path import PathDriver, StageFailed
+from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.states.state import FilmState, Silent
 from softehl.cases.shipped import solve_cases
 from softehl.runtime.mesh.outline import Arc, Outline, Shape
@@ -319,7 +319,6 @@ def saved_as_it_is(p: Seal, path: Path) -> tuple[Seal, FilmState]:
     """A case with the mesh that a graded run came to as its file, and what that run found."""
     route = ContactMeshes(ContactSolver(PathDriver(Silent())))
     found = route.contact(p)
-    assert not isinstance(found, StageFailed)
     section = found[0].section
     mesh, pressed = section.mesh, section.elements["sealed_side"]
     cells = [(name, mesh.quads[mesh.regions[name]]) for name in p.materials]

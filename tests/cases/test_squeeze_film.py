@@ -14,7 +14,6 @@ from softehl.cases.seal.solve.film_correctors import FilmCorrectors
 from softehl.cases.seal.solve.films import NoFilm
 from softehl.cases.seal.solve.inlet import InletScales
 from softehl.cases.seal.solve.method import DryContact
-from softehl.cases.seal.solve.path import StageFailed
 from softehl.cases.seal.solve.squeeze_film import SqueezeFilm, gap_masses, pressed_film
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
@@ -27,7 +26,6 @@ P = Seal(ring="AS568-210", rod=19.0, sealed_pressure=3.0, density=1, speeds=(400
 def dry() -> DryContact:
     """AS568-210 under 3 MPa on a coarse mesh."""
     found = DryContact.of(P, Silent())
-    assert not isinstance(found, StageFailed)
     return found
 
 

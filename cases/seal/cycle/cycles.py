@@ -26,7 +26,7 @@ from softehl.cases.seal.solve.failure import explained
 from softehl.cases.seal.solve.film_correctors import film_corrector
 from softehl.cases.seal.solve.films import NoFilm
 from softehl.cases.seal.solve.method import DryContact
-from softehl.cases.seal.solve.path import StageFailed
+from softehl.cases.seal.solve.path import StageError
 from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import Condenser
@@ -66,9 +66,10 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
     speed = motion.speed.at(0.0)
     changes = {"speeds": (speed,), "stroke": "out", "error_estimate": False, "tolerance": None}
     p: Seal = parameters.model_copy(update={**changes, "sealed_pressure": motion.pressure.at(0.0)})
-    contact = DryContact.of(p, ObserverAdapter(observer))
-    if isinstance(contact, StageFailed):
-        return _outcome(p, *explained(contact, "contact", p))
+    try:
+        contact = DryContact.of(p, ObserverAdapter(observer))
+    except StageError as failed:
+        return _outcome(p, *explained(failed, "contact", p))
     begun, linear = contact.film("out", speed), contact.newton.linear
     if isinstance(begun, NoFilm) or not isinstance(linear, Condenser):
         words = f"no steady film at U = {speed:g} mm/s to begin with; use a finer mesh (density)"

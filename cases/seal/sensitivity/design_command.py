@@ -19,7 +19,7 @@ from softehl.cases.seal.sensitivity.sensitivity import differentiation
 from softehl.cases.seal.sensitivity.variation import FilmCase
 from softehl.cases.seal.solve.films import NoFilm
 from softehl.cases.seal.solve.method import DryContact, run
-from softehl.cases.seal.solve.path import StageFailed
+from softehl.cases.seal.solve.path import StageError
 from softehl.cases.seal.states.state import FilmState, Observer, Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Tangent
@@ -145,8 +145,9 @@ class HeldFilm:
     def of(cls, p: Seal) -> HeldFilm | None:
         """The film of a case; None where it is not reached."""
         assert p.stroke != "both"
-        contact = DryContact.of(p, Silent())
-        if isinstance(contact, StageFailed):
+        try:
+            contact = DryContact.of(p, Silent())
+        except StageError:
             return None
         found = contact.adapted(p.stroke, p.speeds[0])
         if isinstance(found, NoFilm):

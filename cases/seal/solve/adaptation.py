@@ -15,7 +15,7 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.film_layout import film_layout, misfit
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
-from softehl.cases.seal.solve.path import StageFailed
+from softehl.cases.seal.solve.path import StageError
 from softehl.cases.seal.solve.transfer import FilmTransfer
 from softehl.cases.seal.states.estimate import coarser_density, friction_bound, system_at
 from softehl.cases.seal.states.verdict import LARGEST_ERROR, FilmNumbers, fewest_inlet_segments
@@ -153,8 +153,9 @@ class Adaptation:
         """
         assert found.begun is not None
         squeeze_film, now = found.begun
-        dry = self.contacts.from_mesh(squeeze_film.system, squeeze_film.dry, system)
-        if isinstance(dry, StageFailed):
+        try:
+            dry = self.contacts.from_mesh(squeeze_film.system, squeeze_film.dry, system)
+        except StageError:
             return None
         solver, film = self.films.on(system), squeeze_film.film
         if isinstance(found, Film):

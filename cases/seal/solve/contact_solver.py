@@ -12,6 +12,7 @@ half of the pressure the pockets are wide.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
@@ -28,7 +29,7 @@ from softehl.cases.seal.solve.contact import (
     release_stage,
 )
 from softehl.cases.seal.solve.contact_relaxation import CreepCorrector
-from softehl.cases.seal.solve.path import Followed, PathDriver, Stage, StageFailed
+from softehl.cases.seal.solve.path import PathDriver, Stage, StageError
 from softehl.cases.seal.solve.transfer import carried_contact
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.solution import Point
@@ -79,40 +80,42 @@ class ContactSolver:
     driver: PathDriver
     checkpoints: Checkpoints = field(default_factory=Checkpoints)
 
-    def from_rest(self, system: SealSystem) -> Followed:
-        """The contact state (n,) by its path: rod approach, then the sealed pressure."""
-        x = self._follow(system, approach_stage(system), system.at_rest())
-        if isinstance(x, StageFailed) or held_place(system.parameters) is not None:
+    def from_rest(self, system: SealSystem) -> Array:
+        """The contact state (n,) by its path: rod approach, then the sealed pressure.
+
+        Raises StageError.
+        """
+        x, place = self._follow(system, approach_stage(system), system.at_rest()), None
+        if held_place(system.parameters) is not None:
             return x
-        place = None
         if system.parameters.sealed_pressure > 0.0:
             x, place = at_air_wall(system, x)
         if system.parameters.rubs:
             x, place = self._follow(system, release_stage(system, x), x), None
-        return x if isinstance(x, StageFailed) else self._loaded(system, x, place=place)
+        return self._loaded(system, x, place=place)
 
-    def from_mesh(
-        self, old: SealSystem, x: Array, new: SealSystem, name: str = ""
-    ) -> State | StageFailed:
-        """The contact state x (n,) of one mesh on another; name: of the stage."""
+    def from_mesh(self, old: SealSystem, x: Array, new: SealSystem, name: str = "") -> State:
+        """The contact state x (n,) of one mesh on another; name: of the stage.
+
+        Raises StageError.
+        """
         p_s, before = new.parameters.sealed_pressure, self.checkpoints.restart(new.parameters)
-        found = self._corrected(Checkpoint(old, p_s, x), new, name)
-        if isinstance(found, StageFailed) and before:
-            found = self._corrected(before, new, f"contact at {before.pressure:.4g} MPa")
-            if not isinstance(found, StageFailed):
-                found = self._loaded(new, found, before.pressure)
-        if isinstance(found, StageFailed):
-            found = self.from_rest(new)
-        return found if isinstance(found, StageFailed) else (new, found)
+        with suppress(StageError):
+            return new, self._corrected(Checkpoint(old, p_s, x), new, name)
+        if before:
+            with suppress(StageError):
+                start = self._corrected(before, new, f"contact at {before.pressure:.4g} MPa")
+                return new, self._loaded(new, start, before.pressure)
+        return new, self.from_rest(new)
 
-    def _corrected(self, state: Checkpoint, new: SealSystem, name: str) -> Followed:
+    def _corrected(self, state: Checkpoint, new: SealSystem, name: str) -> Array:
         """A state of another mesh on ours, (n,), under the same pressure."""
         stage, start = carried_contact(state.system, new, state.x, state.pressure, name)
         return self.driver.follow(stage, start)
 
     def _loaded(
         self, system: SealSystem, x: Array, begin: float = 0.0, place: float | None = None
-    ) -> Followed:
+    ) -> Array:
         """From the section x (n,) to the sealed pressure; begin, place: as of `load_stage`."""
         self.checkpoints.begin(begin)
 
@@ -120,12 +123,14 @@ class ContactSolver:
             self.checkpoints.keep(Checkpoint(system, point.parameter, point.solution.x))
 
         stage = replace(load_stage(system, begin, place), on_point=keep)
-        found = self._follow(system, stage, x)
-        if not isinstance(found, StageFailed) or system.parameters.rubs:
-            return found  # what slips remembers its path
-        last = found.branch.last.x if found.branch.points else x
-        crept = self.driver.follow(self._creep(system), last)
-        return found if isinstance(crept, StageFailed) else crept
+        try:
+            return self._follow(system, stage, x)
+        except StageError as failed:
+            if not system.parameters.rubs:  # friction remembers its path
+                last = failed.branch.last.x if failed.branch.points else x
+                with suppress(StageError):
+                    return self.driver.follow(self._creep(system), last)
+            raise
 
     def _creep(self, system: SealSystem) -> Stage:
         """From a state under any pressure to the sealed pressure."""
@@ -135,7 +140,7 @@ class ContactSolver:
         )
         return replace(stage, corrector=CreepCorrector(system, self.driver.newton))
 
-    def _follow(self, system: SealSystem, stage: Stage, x: Array) -> Followed:
+    def _follow(self, system: SealSystem, stage: Stage, x: Array) -> Array:
         """To the end of a stage, by the corrector of paths."""
         corrector = path_corrector(system, self.driver.newton)
         return self.driver.follow(replace(stage, corrector=corrector), x)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.numerics import Numerics
 from softehl.cases.seal.solve.films import NoFilm
-from softehl.cases.seal.solve.path import StageFailed
+from softehl.cases.seal.solve.path import StageError
 from softehl.runtime.solve.solution import Status
 
 ROLLING = (
@@ -25,13 +25,13 @@ _THICK = "try a finer mesh (larger density), or lower speeds or a thinner oil wh
 _HIGH = 1.5  # shear moduli
 
 
-def explained(failed: StageFailed, where: str, p: Numerics) -> tuple[Status, str]:
+def explained(failed: StageError, where: str, p: Numerics) -> tuple[Status, str]:
     """Status and message of a run that ends with this stage.
 
     where: which part of the run it was.
     """
     advice = f"; {ROLLING}" if p.rotation == "free" else ""
-    return failed.branch.status, f"{where}: {failed.message}{advice}"
+    return failed.branch.status, f"{where}: {failed}{advice}"
 
 
 def without_films(missed: Sequence[NoFilm], p: Seal) -> tuple[Status, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
@@ -17,7 +17,7 @@ from softehl.cases.seal.solve.contact_store import ContactStore
 from softehl.cases.seal.solve.failure import explained, without_films
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
 from softehl.cases.seal.solve.judging import Differentiate, Judge, verdict_of_contact
-from softehl.cases.seal.solve.path import PathDriver, StageFailed
+from softehl.cases.seal.solve.path import PathDriver, StageError
 from softehl.cases.seal.states.contact_results import contact_numbers, contact_state
 from softehl.cases.seal.states.plan import strokes_of
 from softehl.cases.seal.states.state import (
@@ -45,16 +45,15 @@ class DryContact:
     solver: ContactSolver
 
     @classmethod
-    def of(
-        cls, p: Seal, observer: Observer, contacts: Path | None = None
-    ) -> DryContact | StageFailed:
-        """The dry contact of a case; contacts: see `run`."""
+    def of(cls, p: Seal, observer: Observer, contacts: Path | None = None) -> DryContact:
+        """The dry contact of a case; contacts: see `run`.  Raises StageError."""
         driver = PathDriver(observer, Newton(max_iterations=10, linear=choose(p.linear)))
         solver = ContactSolver(driver)
-        found = ContactMeshes(solver, ContactStore(contacts)).contact(p)
-        if isinstance(found, StageFailed):
-            return replace(found, records=tuple(driver.records))
-        return cls(*found, solver)
+        try:
+            return cls(*ContactMeshes(solver, ContactStore(contacts)).contact(p), solver)
+        except StageError as failed:
+            failed.records = tuple(driver.records)
+            raise
 
     @property
     def parameters(self) -> Seal:
@@ -110,10 +109,11 @@ def run(
     contacts: folder of contact states (`cases.seal.solve.contact_store`) to start from and add to.
     differentiate: makes the sensitivities of a film, where they are asked for.
     """
-    contact = DryContact.of(parameters, observer, contacts)
-    if isinstance(contact, StageFailed):  # the size of the problem alone is reported
-        failures = [explained(contact, "contact", parameters)]
-        return _outcome(build_system(parameters), contact.records, [], failures)
+    try:
+        contact = DryContact.of(parameters, observer, contacts)
+    except StageError as failed:  # the size of the problem alone is reported
+        failures = [explained(failed, "contact", parameters)]
+        return _outcome(build_system(parameters), failed.records, [], failures)
     observer.contact_state(contact.state)
     judge = Judge(verdict_of_contact(contact.system, contact.x), differentiate)
     states, failures = list[FilmState](), list[tuple[Status, str]]()

@@ -1,7 +1,7 @@
 """Following a path of contact states stage by stage (section 4 of the paper).
 
-A stage is a family of problems in one parameter. A stage that does not reach its end is a value,
-`StageFailed`, that says how far it came and what may help.
+A stage is a family of problems in one parameter. One that does not reach its end raises
+`StageError`, which says how far it came and what may help.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TypeAlias
 
 from softehl.cases.seal.states.state import Observer, StageRecord, place
 from softehl.runtime.arrays import Array
@@ -53,16 +52,15 @@ class Stage:
         return (parameter - self.start) / way if way else 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class StageFailed:
+@dataclass(eq=False)
+class StageError(Exception):
     """A stage that did not reach its end. records: what all stages so far have cost."""
 
     stage: Stage
     branch: Branch
     records: tuple[StageRecord, ...] = ()
 
-    @property
-    def message(self) -> str:
+    def __str__(self) -> str:
         """Words on how far the stage came, and what may help."""
         return self.stage.ended(self.reached)
 
@@ -71,10 +69,6 @@ class StageFailed:
         """Parameter of the last state; of the beginning, if there is none."""
         points = self.branch.points
         return points[-1].parameter if points else self.stage.start
-
-
-Followed: TypeAlias = Array | StageFailed
-"""Unknowns at the end of a stage, or why it was not reached."""
 
 
 @dataclass
@@ -89,10 +83,11 @@ class PathDriver:
     newton: Newton = field(default_factory=lambda: Newton(max_iterations=10))
     records: list[StageRecord] = field(default_factory=list)
 
-    def follow(self, stage: Stage, x0: Array) -> Followed:
-        """Solve at the start of a stage from x0 (n,), then follow it to its end.
+    def follow(self, stage: Stage, x0: Array) -> Array:
+        """Unknowns (n,) at the end of a stage that begins with a solution near x0 (n,).
 
-        What slips on a wall slips from where it was after the step before, first of all in x0.
+        A wall's friction is that of the way since the step before, in the first one since x0.
+        Raises StageError.
         """
         begin = time.perf_counter()
         self.observer.stage(
@@ -119,7 +114,9 @@ class PathDriver:
         continuation = Continuation(stage.corrector or self.newton, stage.steps, name=stage.name)
         branch = continuation.follow(problem_at, stage.start, stage.stop, x0, on_point=report)
         self.records.append(_record(stage, branch, points, time.perf_counter() - begin))
-        return branch.last.x if branch.converged else StageFailed(stage, branch)
+        if not branch.converged:
+            raise StageError(stage, branch)
+        return branch.last.x
 
 
 def _record(stage: Stage, branch: Branch, points: list[Point], seconds: float) -> StageRecord:
