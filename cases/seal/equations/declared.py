@@ -38,8 +38,8 @@ class Field:
 class Block:
     """Elements of one kernel.
 
-    kernel: its name; {solid} stands for the solid of its region, "" where it is the case's, {oil}
-    for how the oil thins.
+    kernel: its name, with words of the case (see `kernel_of`); the solid is that of its region, ""
+    where it is the case's.
     elements: a set of `SealSection.elements`. fields: of its unknowns that are not displacements,
     in the order in which the kernel has them. group: which values its parameters are taken from.
     layer: whether it belongs to the film in the modified Newton iteration, which then treats it
@@ -60,5 +60,10 @@ class Block:
 
     def kernel_of(self, p: Seal) -> str:
         """Name of the kernel in a case."""
-        solid = p.rubber(self.region).solid_kernel(p.solid)
-        return self.kernel.format(solid=solid, oil=p.film_suffix)
+        return self.kernel.format(
+            solid=p.rubber(self.region).solid_kernel(p.solid),
+            edge="_corner" if p.opens else "",
+            oil=p.film_suffix,
+            rough="_rough" if p.rough else "",
+            conserving="rough" if p.rough else f"conserving{p.film_suffix}",
+        )

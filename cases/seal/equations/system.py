@@ -7,7 +7,7 @@ section, and nobody else knows how fields are called and where their unknowns st
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from math import copysign
 from typing import TypeAlias
@@ -33,10 +33,6 @@ Values: TypeAlias = Mapping[str, float]
 """Parameters of a kernel by their names."""
 
 
-def _segment_rule(p: Discretisation) -> Rule:
-    return film_rule(p.pressure_order, p.quadrature, p.quadrature_points)
-
-
 DISPLACEMENT, PRESSURE, ROD = "displacement", "pressure", "rod"
 """Displacements; film pressures; contact multipliers of the rod."""
 
@@ -57,34 +53,9 @@ BORE, SEALED_WALL, AIR_WALL = "housing", "sealed_wall", "air_wall"
 WALLS: dict[str, Place] = {BORE: "outer_nodes", SEALED_WALL: "wall_nodes", AIR_WALL: "wall_nodes"}
 """The other obstacles, and what may touch them; each has a field of multipliers of its own."""
 
-FRICTION, CORNER = "contact_friction", "contact_corner"
+FRICTION = "contact_friction"
 SHEAR = {name: f"{name}_shear" for name in WALLS}
-"""Tangential stresses of the obstacles that have friction."""
-
-
-def _rubs(p: Gland) -> bool:
-    return p.rubs
-
-
-_RUPTURING: tuple[tuple[str, Callable[[Seal], bool]], ...] = (
-    ("conserving{oil}", lambda p: p.conserving and not p.rough),
-    ("rough", lambda p: p.rough),
-)
-
-
-def _walls() -> Iterator[Block]:
-    """Contact with each wall: plain, or with friction, or with the edge of an open gap."""
-    for name, on in WALLS.items():
-        cornered, fields = name == AIR_WALL, (name,)
-
-        def plain(p: Gland, cornered: bool = cornered) -> bool:
-            return not p.rubs and not (cornered and p.opens)
-
-        yield Block(name, "contact", on, fields, "contact", needed=plain)
-        yield Block(name, FRICTION, on, (*fields, SHEAR[name]), "contact", needed=_rubs)
-        if cornered:
-            yield Block(name, CORNER, on, fields, "contact", needed=lambda p: p.opens)
-
+"""Kernel of contact with friction, and the tangential stresses that it adds to each obstacle."""
 
 FIELDS = (
     Field(DISPLACEMENT, "nodes", scales.force, MOVED),
@@ -97,51 +68,51 @@ FIELDS = (
     Field(AXIAL, "section", scales.place),
 )
 
+
+def _segment_rule(p: Discretisation) -> Rule:
+    return film_rule(p.pressure_order, p.quadrature, p.quadrature_points)
+
+
 BLOCKS = (
     Block(SOLID, "{solid}", BODY, (), "solid"),
     Block("sealed_side", "follower_pressure", "sealed_side", (), "load"),
     Block("sealed_arc", "follower_pressure", "sealed_arc", (), "load", layer=True),
     Block(ROD, "contact", "arc_nodes", (ROD,), "contact", layer=True),
-    *_walls(),
+    *(
+        Block(name, kernel, WALLS[name], (name,), "contact", needed=lambda p: not p.rubs)
+        for name, kernel in zip(WALLS, ("contact", "contact", "contact{edge}"), strict=True)
+    ),
+    *(
+        Block(name, FRICTION, on, (name, SHEAR[name]), "contact", needed=lambda p: p.rubs)
+        for name, on in WALLS.items()
+    ),
     Block(
         *(FILM, "film{oil}", "arc", (PRESSURE,), "film"),
         layer=True,
         needed=lambda p: not p.conserving,
         rule=_segment_rule,
     ),
-    *(
-        Block(
-            *(FILM, f"film_{kind}", "arc", (PRESSURE, VOID), "film"),
-            layer=True,
-            needed=needed,
-            rule=lambda p: rupture_rule(p.pressure_order),
-        )
-        for kind, needed in _RUPTURING
+    Block(
+        *(FILM, "film_{conserving}", "arc", (PRESSURE, VOID), "film"),
+        layer=True,
+        needed=lambda p: p.conserving,
+        rule=lambda p: rupture_rule(p.pressure_order),
     ),
     Block(
         *("cavitation", "film_void", "film_nodes", (PRESSURE, VOID), "film"),
         layer=True,
         needed=lambda p: p.conserving,
     ),
-    *(
-        Block(
-            *(SQUEEZE, f"film_squeeze{kind}", "arc", (PRESSURE, VOID), "squeeze"),
-            layer=True,
-            needed=needed,
-            rule=lambda p: content_rule(p.pressure_order),
-        )
-        for kind, needed in zip(("", "_rough"), (n for _, n in _RUPTURING), strict=True)
+    Block(
+        *(SQUEEZE, "film_squeeze{rough}", "arc", (PRESSURE, VOID), "squeeze"),
+        layer=True,
+        needed=lambda p: p.conserving,
+        rule=lambda p: content_rule(p.pressure_order),
     ),
     Block(
-        *("upwind", "film_upwind", "arc", (PRESSURE,), "film"),
+        *("upwind", "film_upwind{rough}", "arc", (PRESSURE,), "film"),
         layer=True,
-        needed=lambda p: p.upwinding != 0.0 and not p.rough,
-        rule=_segment_rule,
-    ),
-    Block(
-        *("upwind", "film_upwind_rough", "arc", (PRESSURE,), "film"),
-        layer=True,
-        needed=lambda p: p.upwinding != 0.0 and p.rough,
+        needed=lambda p: p.upwinding != 0.0,
         rule=_segment_rule,
     ),
     Block(
