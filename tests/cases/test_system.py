@@ -11,7 +11,8 @@ from softehl.cases.seal.equations.declared import Block
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.scales import film_flux
-from softehl.cases.seal.equations.system import BLOCKS, PRESSURE, ROD
+from softehl.cases.seal.equations.study import seal_study
+from softehl.cases.seal.equations.system import PRESSURE, ROD, blocks_of
 from softehl.cases.seal.section.section import seal_section
 from tests.cases.oring_cases import oring
 
@@ -231,4 +232,4 @@ def test_a_kernel_that_asks_for_what_nobody_gives_is_named() -> None:
     with pytest.raises(
         KeyError, match=r"'stranger' asks for offset; cases/seal/equations/system.py gives"
     ):
-        SealSystem.of(p, seal_section(p), blocks=(*BLOCKS, stranger))
+        seal_study(p, seal_section(p), (*blocks_of(p), stranger))

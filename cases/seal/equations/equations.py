@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from softehl.cases.seal.equations import scales
-from softehl.cases.seal.equations.declared import Block
+from softehl.cases.seal.equations.declared import Block, Group
 from softehl.cases.seal.equations.loads import ContactLoads, FilmLoads
 from softehl.cases.seal.equations.study import NUMBERED, chosen, seal_study
 from softehl.cases.seal.equations.system import (
@@ -34,7 +34,7 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.section.section import SealSection, seal_section
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.contact import Obstacle, tributary_areas
+from softehl.runtime.fem.contact import Obstacle
 from softehl.runtime.fem.guards import ChangesLittle, Guard, KeepsOrientation, StaysPositive
 from softehl.runtime.fem.problem import Problem
 
@@ -56,11 +56,9 @@ class SealSystem(SealUnknowns):
     problem: Problem
 
     @classmethod
-    def of(
-        cls, p: Seal, section: SealSection, blocks: tuple[Block, ...] | None = None
-    ) -> SealSystem:
+    def of(cls, p: Seal, section: SealSection) -> SealSystem:
         """The system of a case on a section."""
-        present = tuple(b for b in blocks or blocks_of(p) if b.needed(p))
+        present = blocks_of(p)
         posed = seal_study(p, section, present).system(NUMBERED)
         numbering = posed.numbering
         cells = section.coordinates("cells"), numbering.at(MOVED, section.mesh.quads)
@@ -77,7 +75,7 @@ class SealSystem(SealUnknowns):
 
     def moved(self, p: Seal, section: SealSection) -> SealSystem:
         """The system of other numbers on the same mesh with its nodes moved."""
-        found = SealSystem.of(p, section, self.blocks)
+        found = SealSystem.of(p, section)
         structure = self.problem.assembler.structure  # what is known of its pattern stays
         assembler = replace(found.problem.assembler, structure=structure)
         return replace(found, problem=replace(found.problem, assembler=assembler))
@@ -97,16 +95,9 @@ class SealSystem(SealUnknowns):
     @property
     def bulk_moduli(self) -> Array:
         """Bulk modulus (elements,) of each element, MPa."""
-        blocks = [block for block in self.blocks if block.group == "solid"]
-        return np.concatenate(
-            [
-                np.full(
-                    len(self.section.elements[b.elements]),
-                    self.parameters.rubber(b.region).bulk_modulus,
-                )
-                for b in blocks
-            ]
-        )
+        solids = [block for block in self.blocks if block.group == "solid"]
+        moduli = [self.parameters.rubber(block.region).bulk_modulus for block in solids]
+        return np.repeat(moduli, [len(self.section.elements[b.elements]) for b in solids])
 
     def reaction(self, name: str, x: Array) -> float:
         """Axial force of a wall on the section, the sum of normal forces on the bore, N."""
@@ -114,16 +105,13 @@ class SealSystem(SealUnknowns):
             block = self.problem.assembler.block(name)
             residual = block.residual(x, self.problem.parameters[name])
             return self.side * float(residual[:, 0].sum())
-        nodes, segments = self.section.chains[WALLS[name]]
-        areas = tributary_areas(self.mesh.points, segments, nodes)
-        return float(self.pressing(name, x) @ areas)
+        return float(self.pressing(name, x) @ self.areas(WALLS[name]))
 
     # --- loads ------------------------------------------------------------------------------------
 
     def contact_problem(self, loads: ContactLoads) -> Problem:
         """Frictionless contact (9)-(10) under a sealed pressure (8)."""
-        values = self._present(contact_values(loads))
-        problem = self.problem.with_parameters(**values)
+        problem = self.problem.with_parameters(**contact_values(loads))
         if loads.moment is not None:
             problem = problem.also_fixed(self.layout.dofs(ROTATION), loads.moment)
         if loads.place is not None:
@@ -134,7 +122,7 @@ class SealSystem(SealUnknowns):
         """Film forces (18) and the Reynolds equation (25); the contact with the rod is without."""
         contact = self.contact_problem(ContactLoads(film.sealed_pressure, place=film.place))
         problem = contact.with_parameters(
-            **self._present(without_contact()), **self._film_parameters(film)
+            **without_contact(), **self._given("film", film_values(self.parameters, film))
         )
         fixed = [self.film_ends, self.layout.dofs(ROD)]
         values: list[Array | float] = [film.ends, 0.0]
@@ -156,8 +144,8 @@ class SealSystem(SealUnknowns):
 
     def squeeze_values(self, rate: float) -> dict[str, Values]:
         """Parameters of the block of what the film holds; rate: coefficient of d/dt, 1/s."""
-        given = {"rod_radius": self.rod_radius, "rate": rate, **self.parameters.surfaces.values()}
-        return {b.name: self._chosen(b, given) for b in self.blocks if b.group == "squeeze"}
+        values = {"rod_radius": self.rod_radius, "rate": rate, **self.parameters.surfaces.values()}
+        return self._given("squeeze", values)
 
     def film_guard(self) -> Guard:
         """Film thickness at the nodes of the arc: positive in every iterate between smooth
@@ -184,25 +172,13 @@ class SealSystem(SealUnknowns):
         )
         return scales.film_flux(speed) + largest
 
-    # --- inside -----------------------------------------------------------------------------------
-
-    def _film_parameters(self, film: FilmLoads) -> dict[str, Values]:
-        """Parameters of every term of the film."""
-        values = film_values(self.parameters, film)
-        return {block.name: self._chosen(block, values) for block in self._film_blocks}
-
-    def _present(self, values: Mapping[str, Values | None]) -> dict[str, Values | None]:
-        """Values by block, of the blocks that there are."""
-        names = {block.name for block in self.blocks}
-        return {name: value for name, value in values.items() if name in names}
-
-    def _chosen(self, block: Block, values: Values) -> Values:
-        """Values that the kernel of a block asks for."""
-        return chosen(block, self.problem.assembler.block(block.name).kernel, values)
-
-    @property
-    def _film_blocks(self) -> list[Block]:
-        return [block for block in self.blocks if block.group == "film"]
+    def _given(self, group: Group, values: Values) -> dict[str, Values]:
+        """What the blocks of a group ask for of these values, by block."""
+        return {
+            block.name: chosen(block, self.problem.assembler.block(block.name).kernel, values)
+            for block in self.blocks
+            if block.group == group
+        }
 
 
 def build_system(

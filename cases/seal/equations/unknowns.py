@@ -7,7 +7,7 @@ from math import pi
 
 import numpy as np
 
-from softehl.cases.seal.equations.declared import Field
+from softehl.cases.seal.equations.declared import Field, Place
 from softehl.cases.seal.equations.system import (
     AXIAL,
     BORE,
@@ -60,7 +60,12 @@ class SealUnknowns:
     @property
     def rod_areas(self) -> Array:
         """Tributary areas (arc nodes,) of the rod multipliers, mm^2."""
-        return tributary_areas(self.mesh.points, self.mesh.arc_segments, self.mesh.arc_nodes)
+        return self.areas("arc_nodes")
+
+    def areas(self, on: Place) -> Array:
+        """Tributary areas (n,) of the nodes that may meet the rod, the housing or a wall, mm^2."""
+        nodes, segments = self.section.chains[on]
+        return tributary_areas(self.mesh.points, segments, nodes)
 
     @property
     def layout(self) -> DofLayout:
@@ -96,9 +101,9 @@ class SealUnknowns:
         """Numbers (segments, m_p + 1) of the pressure unknowns of each segment of the film."""
         return self.numbering.rows(FILM, field)
 
-    def pressures(self, x: Array, field: str = PRESSURE) -> Array:
+    def pressures(self, x: Array) -> Array:
         """All pressure unknowns, MPa."""
-        return x[self.layout.part(field)]
+        return x[self.layout.part(PRESSURE)]
 
     @property
     def pressure_count(self) -> int:
@@ -114,9 +119,7 @@ class SealUnknowns:
         """Normal forces (nodes,) of the housing and its walls on the nodes, N."""
         total = np.zeros(len(self.mesh.points))
         for name, on in WALLS.items():
-            nodes, segments = self.section.chains[on]
-            areas = tributary_areas(self.mesh.points, segments, nodes)
-            total[nodes] += self.pressing(name, x) * areas
+            total[self.section.chains[on][0]] += self.pressing(name, x) * self.areas(on)
         return total
 
     def pressing(self, name: str, x: Array) -> Array:
@@ -127,9 +130,7 @@ class SealUnknowns:
         """Axial force of friction of the housing on the section, to the air side, N."""
         if not self.parameters.rubs:
             return 0.0
-        nodes, segments = self.section.chains[WALLS[BORE]]
-        areas = tributary_areas(self.mesh.points, segments, nodes)
-        return float(x[self.layout.part(SHEAR[BORE])] @ areas)
+        return float(x[self.layout.part(SHEAR[BORE])] @ self.areas(WALLS[BORE]))
 
     def axial_force(self, x: Array) -> float:
         """Force that the hold exerts on the section, to the air side, N."""
