@@ -75,7 +75,7 @@ def test_a_graded_mesh_is_valid_and_its_boundary_is_round() -> None:
     radii = np.hypot(*(system.mesh.points[system.mesh.boundary] - centre).T)
     assert radii == pytest.approx(np.full(len(radii), radius), rel=1e-13)
     assert corner_jacobians(system.mesh).min() > 0.1
-    assert contact_layout(system, x, system.parameters).spacing is not None
+    assert contact_layout(system, x, system.parameters).sizes.spacing is not None
 
 
 def test_the_same_contact_is_found_on_both_meshes() -> None:
@@ -106,7 +106,7 @@ def test_a_graded_film_needs_no_finer_mesh_at_low_speed() -> None:
 
 def test_a_mesh_may_be_asked_for() -> None:
     assert Seal().mesh == "graded"
-    assert _contact(1, "uniform")[0].section.layout.spacing is None
+    assert _contact(1, "uniform")[0].section.layout.sizes.spacing is None
 
 
 @pytest.mark.parametrize(("depth", "layers"), [(inf, 3), (5e-2, 3), (1e-2, 3), (1e-3, 6)])

@@ -10,39 +10,27 @@ from softehl.cases.seal.gland.records.duty import Duty
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.runtime.arrays import Array
 
-# 1 MPa on 1 mm of rod, a gap of 10 micrometres, 1 milliradian.
-_PRESSURE, _GAP, _ROTATION = 1.0, 0.01, 1e-3
-_DIFFERENCE = 1e-4  # MPa between the ends of a segment
+PRESSURE, GAP, ROTATION, VOID = 1.0, 0.01, 1e-3, 1.0
+"""1 MPa on 1 mm of rod; 10 micrometres; 1 milliradian; a void fraction as of `surfaces`."""
+
+DIFFERENCE = 1e-4
+"""Difference of pressure along a segment, MPa: 1e-9 of it, to which Newton's method solves, is a
+hundred times the last digit of 5 MPa."""
 
 
 def force(p: Gland) -> float:
     """A pressure on the rod, N."""
-    return pi * abs(p.rod_diameter) * _PRESSURE
+    return pi * abs(p.rod_diameter) * PRESSURE
 
 
 def gap(p: Gland) -> float:
     """A gap times an area of the rod, mm^3."""
-    return pi * abs(p.rod_diameter) * _GAP
-
-
-def rotation(_: object) -> float:
-    """A mean rotation."""
-    return _ROTATION
-
-
-def place(_: object) -> float:
-    """A mean axial displacement, mm."""
-    return _GAP
-
-
-def void(_: object) -> float:
-    """The condition of cavitation: a pressure and a void fraction of `surfaces`."""
-    return 1.0
+    return pi * abs(p.rod_diameter) * GAP
 
 
 def film_flux(speed: float) -> float:
     """Flux (mm^2/s) of a film at |U| (mm/s): mean velocity times 10 micrometres."""
-    return 0.5 * speed * _GAP
+    return 0.5 * speed * GAP
 
 
 def largest_flux(p: Duty) -> float:
@@ -57,4 +45,4 @@ def pressure_flux(thickness: Array, dx: Array, order: int, viscosity: float) -> 
     count as small. thickness, dx: (n,), mm.
     """
     conductance = order**2 * np.maximum(thickness, 0.0) ** 3 / (12.0 * viscosity * dx)
-    return np.asarray(_DIFFERENCE * conductance)
+    return np.asarray(DIFFERENCE * conductance)

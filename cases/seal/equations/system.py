@@ -60,12 +60,12 @@ SHEAR = {name: f"{name}_shear" for name in WALLS}
 FIELDS = (
     Field(DISPLACEMENT, "nodes", scales.force, MOVED),
     Field(PRESSURE, "film", scales.largest_flux),
-    Field(VOID, "film", scales.void),
+    Field(VOID, "film", lambda _: scales.VOID),
     Field(ROD, "arc_nodes", scales.gap),
     *(Field(name, nodes, scales.gap) for name, nodes in WALLS.items()),
     *(Field(SHEAR[name], nodes, scales.gap) for name, nodes in WALLS.items()),
-    Field(ROTATION, "section", scales.rotation),
-    Field(AXIAL, "section", scales.place),
+    Field(ROTATION, "section", lambda _: scales.ROTATION),
+    Field(AXIAL, "section", lambda _: scales.GAP),
 )
 
 

@@ -45,11 +45,6 @@ class Layout:
         return self.sizes.long
 
     @property
-    def spacing(self) -> Spacing | None:
-        """Spacing of the nodes along the arc, None where they are equally spaced."""
-        return self.sizes.spacing
-
-    @property
     def flat(self) -> bool:
         """True if a contact may have flats, at whose corners pressure peaks."""
         return self.shape.outline.disc is None
@@ -106,13 +101,8 @@ class Layout:
         if lip is not None:
             on_rod = float(mesh.places[lip])
         if crown is not None:
-            on_housing = float(mesh.places[self._outer(mesh, last - crown)])
+            on_housing = float(mesh.places[(mesh.arc + last - crown) % len(mesh.boundary)])
         return replace(self, pressure_boundaries=(on_rod, on_housing))
-
-    @staticmethod
-    def _outer(mesh: SectionMesh, index: int) -> int:
-        """Index in the boundary of an outer node."""
-        return (mesh.arc + index) % len(mesh.boundary)
 
     def bounds(self, old: Layout) -> tuple[float, float]:
         """Places (mm) on the arc of another one between which the arc may be laid.
