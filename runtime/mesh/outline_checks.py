@@ -1,4 +1,4 @@
-"""Checks of the outline of a section: closed, simple, without pieces of no length."""
+"""Checks of the outline of a section: closed, simple, without pieces of no length; of polygons."""
 
 from __future__ import annotations
 
@@ -71,3 +71,22 @@ def _near(pieces: Sequence[Piece], within: float) -> Integers:
     meet: Flags = low_z[:, None] <= high_z[None] + within
     meet &= low_r[:, None] <= high_r[None] + within
     return np.argwhere(np.triu(meet & meet.T, 1))
+
+
+def crossing(loop: Array) -> Array | None:
+    """A point (2,) at which the closed polygon of points (n, 2) crosses itself, None if nowhere."""
+    along = np.roll(loop, -1, axis=0) - loop
+    i, j = np.triu_indices(len(loop), 2)
+    apart = j - i < len(loop) - 1  # the last side is a neighbour of the first
+    i, j = i[apart], j[apart]
+    between, turn = loop[j] - loop[i], cross(along[i], along[j])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s, t = cross(between, along[j]) / turn, cross(between, along[i]) / turn
+    for k in np.flatnonzero((s >= 0.0) & (s <= 1.0) & (t >= 0.0) & (t <= 1.0)):
+        return np.asarray(loop[i[k]] + s[k] * along[i[k]])
+    return None
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross products (...,) of vectors (..., 2)."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

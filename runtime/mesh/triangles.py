@@ -12,6 +12,7 @@ from scipy.spatial import Delaunay
 
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.mesh.mesh import MeshError
+from softehl.runtime.mesh.outline_checks import cross
 
 GRADE = 0.35
 """Growth of the size of triangles with the distance from the edges."""
@@ -78,14 +79,10 @@ class _Field:
         """Delaunay triangles (t, 3) of points whose middles are inside, counterclockwise."""
         triangles = Delaunay(points).simplices.astype(np.int64)
         x = points[triangles]
-        area = _cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+        area = cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
         triangles[area < 0.0] = triangles[area < 0.0][:, ::-1]
         kept = self.inside(x.mean(axis=1)) & (np.abs(area) > 1e-14 * np.abs(area).max())
         return np.asarray(triangles[kept])
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def _circles(x: Array) -> tuple[Array, Array]:
@@ -93,7 +90,7 @@ def _circles(x: Array) -> tuple[Array, Array]:
     b, c = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
     bb, cc = (b**2).sum(axis=1), (c**2).sum(axis=1)
     middle = np.stack([c[:, 1] * bb - b[:, 1] * cc, b[:, 0] * cc - c[:, 0] * bb], axis=1)
-    middle /= 2.0 * _cross(b, c)[:, None]
+    middle /= 2.0 * cross(b, c)[:, None]
     return x[:, 0] + middle, np.linalg.norm(middle, axis=1)
 
 

@@ -22,7 +22,7 @@ from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.contact_store import contact_key
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.solve.path import PathDriver
-from softehl.cases.seal.states.contact_results import contact_peaks, contact_pressure
+from softehl.cases.seal.states.contact_results import contact_peaks, contact_pressure, overlap
 from softehl.cases.seal.states.contacts import (
     CONTACT_FILM,
     contact_edges,
@@ -30,7 +30,6 @@ from softehl.cases.seal.states.contacts import (
     contacts,
     groups,
 )
-from softehl.cases.seal.states.overlap import crossing, overlap
 from softehl.cases.seal.states.results import filled_ratio, film_parts, metering
 from softehl.cases.seal.states.state import OSCILLATING, Outcome, Silent
 from softehl.cases.seal.states.verdict import (
@@ -152,13 +151,6 @@ def test_a_pressure_goes_on_to_where_contact_holds_it_back() -> None:
     assert pressure_boundary(excess, 2, 1.0) == 4  # less than 1 MPa: the fluid goes on
     assert pressure_boundary(excess, 7, 1.0) in (4, 5)  # nothing touches there
     assert pressure_boundary(np.zeros(8), 2, 1.0) is None
-
-
-def test_an_outline_that_runs_into_itself_is_seen() -> None:
-    square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
-    assert crossing(square) is None
-    cup = np.array([[0, 0], [6, 0], [6, 4], [0, 4], [0, 1.5], [4, 2.5], [4, 1.5], [0, 2.5]])
-    assert crossing(cup.astype(float)) is not None
 
 
 def test_a_section_that_reaches_into_the_rod_beyond_its_film_is_seen() -> None:

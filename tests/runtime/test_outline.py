@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from softehl.runtime.mesh.outline import Arc, Line, Outline, OutlineError, Piece, Shape, rounded
+from softehl.runtime.mesh.outline_checks import crossing
 
 SQUARE = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)]
 RING = Outline.circle((0.3, 26.0), 1.7)
@@ -135,3 +136,9 @@ def test_the_film_may_be_where_the_section_faces_the_rod() -> None:
     assert ends[1] == pytest.approx([1.7 + 0.3 * sin(pi / 3), 0.15])
     sharp = Shape.facing(Outline.polygon(SQUARE), (1.0, 2.0), "square")
     assert sharp.film == pytest.approx((0.0, 2.0))
+
+
+def test_a_polygon_that_runs_into_itself_is_seen() -> None:
+    square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
+    assert crossing(square) is None
+    assert crossing(square[[0, 2, 1, 3]]) == pytest.approx([1.0, 1.0])

@@ -9,9 +9,13 @@ from math import nan
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.solve.adaptation import Adapted
 from softehl.cases.seal.solve.films import Film
-from softehl.cases.seal.states.contact_results import contact_peaks, contact_pressure, unsealed
+from softehl.cases.seal.states.contact_results import (
+    contact_peaks,
+    contact_pressure,
+    overlap,
+    unsealed,
+)
 from softehl.cases.seal.states.estimate import estimated_error, reservation
-from softehl.cases.seal.states.overlap import overlap
 from softehl.cases.seal.states.results import film_state
 from softehl.cases.seal.states.sensitivity_table import resolved
 from softehl.cases.seal.states.state import FilmState

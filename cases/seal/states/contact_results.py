@@ -7,19 +7,14 @@ from math import pi
 import numpy as np
 
 from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.equations.system import (
-    AIR_WALL,
-    BORE,
-    ROD,
-    SEALED_WALL,
-    WALLS,
-)
+from softehl.cases.seal.equations.system import AIR_WALL, BORE, ROD, SEALED_WALL, WALLS
 from softehl.cases.seal.states.contacts import contacts
 from softehl.cases.seal.states.section_view import section_view
 from softehl.cases.seal.states.state import ContactState
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.contact import tributary_areas
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.mesh.outline_checks import crossing
 
 
 def contact_state(
@@ -62,6 +57,23 @@ def unsealed(system: SealSystem, x: Array) -> str:
         return "at the lowest point of the section"
     crown = system.section.chains[WALLS[BORE]][0] == system.section.pressed_ends[1]
     return "" if (system.pressing(BORE, x)[crown] > 0.0).all() else "at its crown"
+
+
+def overlap(system: SealSystem, x: Array) -> str:
+    """Bodies that the deformed outline of the state x overlaps, in words; empty if none.
+
+    Contact of a section with itself, as of the lips of a cup, is not modelled, nor with the rod
+    beyond the film.
+    """
+    deformed = system.deformed(x)
+    place = crossing(deformed[system.mesh.boundary])
+    if place is not None:
+        return f"into itself at z = {place[0]:.3g}, r = {place[1]:.4g} mm"
+    z, r = deformed[system.mesh.outer_nodes].T
+    within = int(np.argmin(r))
+    if r[within] < system.rod_radius:
+        return f"into the rod beyond its film at z = {z[within]:.3g} mm"
+    return ""
 
 
 def contact_peaks(system: SealSystem, sealed_pressure: float, x: Array) -> tuple[float, ...]:

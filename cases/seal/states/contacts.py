@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -72,41 +71,26 @@ def contact_edges(system: SealSystem, x: Array) -> list[Edge]:
     The square of the pressure is a straight line there, taken from the second and third node that
     touch; none where fewer than three do. Two edges of each contact, from the sealed side on.
     """
-    found: list[Edge] = []
+    s, squares = system.section.places, system.rod_multipliers(x) ** 2
+    flat, found = system.section.layout.flat, list[Edge]()
     for touching in contacts(system, x):
-        found += _edges(system, x, touching)
+        for out, i in ((-1, touching), (1, touching[::-1])):
+            if len(i) >= 3:
+                outside = s[min(max(i[0] + out, 0), len(s) - 1)]
+                found.append(_edge(s[i[:3]], squares[i[1:3]], outside if flat else None))
     return found
 
 
-def _edges(system: SealSystem, x: Array, touching: Integers) -> Iterator[Edge]:
-    """Both edges of a contact that these nodes of the arc belong to."""
-    s, pressure = system.section.places, -system.rod_multipliers(x)
-    if len(touching) < 3:
-        return
-    for way, i in ((-1, touching), (1, touching[::-1])):
-        edge = _edge(s[i[1:3]], pressure[i[1:3]] ** 2)
-        if system.section.layout.flat:
-            outside = s[min(max(i[0] + way, 0), len(s) - 1)]
-            edge = _bracketed(edge, (outside, s[i[0]]), (s[i[1]], pressure[i[1]] ** 2), -way)
-        yield edge
+def _edge(s: Array, squares: Array, outside: float | None) -> Edge:
+    """The edge of a contact whose first three nodes are at s, by the squares of the last two.
 
-
-def _edge(s: Array, y: Array) -> Edge:
-    """The zero of the straight line through two points, and its slope."""
-    slope = (y[1] - y[0]) / (s[1] - s[0])
-    return Edge(float(s[0] - y[0] / slope), abs(float(slope)))
-
-
-def _bracketed(
-    edge: Edge, between: tuple[float, float], second: tuple[float, float], inwards: int
-) -> Edge:
-    """An edge between the first node that touches and its neighbour outside.
-
-    The corner of a flat has a peak, behind which pressure falls: a straight line through it leads
-    anywhere. Then half way between the two, and as steep as it must be for the second node.
+    outside: place of the node before them, where a flat may end: its corner has a peak, behind
+    which pressure falls, and a straight line through it leads anywhere. Then the edge is half way
+    between this node and the first, as steep as it must be for the second.
     """
-    low, high = sorted(between)
-    if low <= edge.place <= high and np.isfinite(edge.rise):
-        return edge
-    place = 0.5 * (low + high)
-    return Edge(place, second[1] / max(inwards * (second[0] - place), 1e-12))
+    slope = (squares[1] - squares[0]) / (s[2] - s[1])
+    place = s[1] - squares[0] / slope
+    if outside is not None and not min(outside, s[0]) <= place <= max(outside, s[0]):
+        place = 0.5 * (outside + s[0])
+        slope = squares[0] / (s[1] - place)
+    return Edge(float(place), abs(float(slope)))

@@ -14,6 +14,9 @@ from softehl.runtime.fem.contact import tributary_areas
 from softehl.runtime.fem.postprocess import nodal_average, von_mises
 from softehl.runtime.fem.problem import Problem
 
+_SLOPES = np.array([[-1, 1, 1, -1], [-1, -1, 1, 1]])
+"""Derivatives of a cell's corners by its own coordinates, in its middle, times 4."""
+
 
 def section_view(system: SealSystem, problem: Problem, x: Array, rod_pressure: Array) -> Section:
     """The deformed section in a state x, with the pressure (arc nodes,) between it and the rod.
@@ -53,26 +56,16 @@ def principal_stretches(points: Array, deformed: Array, quads: Integers) -> dict
     section, stretch_hoop that around the axis.
     """
     before, after = points[quads], deformed[quads]
-    slopes = _middle_slopes(before).transpose(0, 2, 1), _middle_slopes(after).transpose(0, 2, 1)
-    a, b, c, d = np.linalg.solve(*slopes).reshape(-1, 4).T  # F^T
-    spin, shear = np.hypot(a + d, b - c), np.hypot(a - d, b + c)
-    first, second = 0.5 * (spin + shear), 0.5 * (spin - shear)  # its singular values
+    gradient = np.linalg.solve(_SLOPES @ before, _SLOPES @ after)  # transposed
+    first, second = np.linalg.svd(gradient, compute_uv=False).T
     hoop = after[:, :, 1].mean(axis=1) / before[:, :, 1].mean(axis=1)
     return {"stretch_1": first, "stretch_2": second, "stretch_hoop": hoop}
 
 
-def _middle_slopes(corners: Array) -> Array:
-    """Derivatives (cells, 2, 2) of places by the cell's own coordinates, in columns, times 4."""
-    one, two, three, four = corners.transpose(1, 0, 2)
-    return np.stack([two + three - one - four, three + four - one - two], axis=2)
-
-
 def film_pressure(system: SealSystem, x: Array) -> Array:
     """Pressure (arc nodes,) of the film in a state x, the mean of both sides of a facet, MPa."""
-    ends = x[system.pressure_dofs()[:, [0, -1]]]
-    sides = np.full((len(ends) + 1, 2), np.nan)
-    sides[:-1, 0], sides[1:, 1] = ends.T
-    return np.asarray(np.nanmean(sides, axis=1))
+    first, last = x[system.pressure_dofs()[:, [0, -1]]].T
+    return np.asarray(0.5 * (np.append(first, last[-1]) + np.insert(last, 0, first[0])))
 
 
 def housing_pressure(system: SealSystem, x: Array) -> Array:
