@@ -10,17 +10,17 @@ from __future__ import annotations
 import numpy as np
 
 from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.equations.loads import FilmLoads
+from softehl.cases.seal.equations.loads import Stroke
 from softehl.runtime.arrays import Array
 
 
-def wedge(system: SealSystem, film: FilmLoads, x: Array) -> tuple[Array, Array]:
-    """Way and gap (n,), mm, from the inlet end of the film x (n,) outwards.
+def wedge(system: SealSystem, stroke: Stroke, x: Array) -> tuple[Array, Array]:
+    """Way and gap (n,), mm, from the end of the film x (n,) at which a stroke has its inlet.
 
     As far as the surface faces the rod and leaves it; a step of no length where it turns away at
     once, as one that is pressed against a wall.
     """
-    loop, out = system.deformed(x)[system.mesh.boundary], film.stroke == "out"
+    loop, out = system.deformed(x)[system.mesh.boundary], stroke == "out"
     z, r = (np.concatenate([loop[:1], loop[:0:-1]]) if out else loop[system.mesh.arc :]).T
     way, gap = (z[0] - z if out else z - z[0]), r - system.rod_radius
     return facing(way, gap)

@@ -1,12 +1,12 @@
 """An estimate of the errors of h*, friction and leakage, from the same curve on another mesh.
 
-Where h* converges with order p, the difference between two meshes whose sizes have the ratio r < 1
-is 1 / r^p - 1 times the error of the finer one. From density 4 on the coarser mesh has half the
+Two meshes whose sizes have the ratio r < 1 differ in h*, which converges with order p, by
+1 / r^p - 1 times the error of the finer one. From density 4 on the coarser mesh has half the
 density; below that this would be too coarse to be wrong in the same way, and it has five sixths.
 
-Leakage is h* times what is exactly known, and has its relative error. Friction is what slides and
-what the slope of the pressure does: where these cancel, both may be far off and their sum be right
-on two meshes by chance, so that their errors are added up.
+Leakage is h* times what is exactly known, and has its relative error. Friction is a part of the
+sliding and one of the slope of the pressure. Where these cancel, their sum may be right on two
+meshes by chance, so that their errors are added up.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.reach import ratio
 from softehl.cases.seal.states.verdict import (
+    FINER,
     INLET_RATIO,
     INLET_SEGMENTS_OF_LOW_ORDERS,
     LARGEST_ERROR,
@@ -27,8 +28,6 @@ from softehl.cases.seal.states.verdict import (
 
 ORDER = 2.5
 """Order of convergence of h*: 2 in theory, 2.1 to 3.2 were measured between densities 2 and 4."""
-
-_FINER = "use a finer mesh (larger density)"
 
 LEAST_DENSITY = 2
 """Density from which two meshes show an error. At 1 h* of a square ring was 13.9 % off with an
@@ -57,8 +56,7 @@ def estimated_error(density: int, value: float, other: float) -> float:
 
 def _percent(density: int) -> float:
     """Error of a value at `density`, %, of a relative difference to that of the coarser mesh."""
-    ratio = density / float(coarser_density(density))
-    return 100.0 / (math.pow(ratio, ORDER) - 1.0)
+    return 100.0 / (math.pow(density / coarser_density(density), ORDER) - 1.0)
 
 
 def unseen(p: Seal) -> str:
@@ -93,18 +91,18 @@ def friction_bound(density: int, film: FilmNumbers, other: FilmNumbers) -> float
 def reservation(p: Seal, film: FilmNumbers, other: FilmNumbers | None) -> str:
     """Why a state whose estimated error of h* is small is not `ok` all the same; empty if it is.
 
-    other: the film on the coarser mesh. Where no estimate is wanted
-    nothing is said.
+    other: the film on the coarser mesh, None where there is no estimate.
     """
-    if not p.error_estimate or (words := unseen(p)) or other is None:
-        return words if p.error_estimate else ""
+    words = unseen(p) if p.error_estimate else ""
+    if words or other is None:
+        return words
     fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
     short = other.inlet_segments < fewest and not other.touching
     if short or not INLET_RATIO[0] <= other.inlet_ratio <= INLET_RATIO[1]:
-        return f"the mesh of the estimate does not show the inlet; {_FINER}"
+        return f"the mesh of the estimate does not show the inlet; {FINER}"
     error = friction_bound(p.density, film, other)
     if not error <= LARGEST_ERROR:
-        return f"friction may be off by {error:.2g} %, h* is not; {_FINER}"
+        return f"friction may be off by {error:.2g} %, h* is not; {FINER}"
     if not error + 100.0 * film.beyond <= LARGEST_ERROR:
         return (
             f"friction lacks {100.0 * film.beyond:.2g} %, that of the oil beyond the ends of the "

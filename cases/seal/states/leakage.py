@@ -3,17 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from softehl.cases.harness.row import OK, Record, column
-from softehl.cases.seal.states.state import (
-    CLIPPED,
-    COLLAPSED,
-    OSCILLATING,
-    UNCERTAIN,
-    UNDER_RESOLVED,
-    FilmRow,
-)
-
-_WORST_LAST = (OK, OSCILLATING, UNCERTAIN, CLIPPED, UNDER_RESOLVED, COLLAPSED)
+from softehl.cases.harness.row import Record, column
+from softehl.cases.seal.states.state import VERDICTS, FilmRow
 
 
 @dataclass(frozen=True)
@@ -65,9 +56,5 @@ def _cycle(out: FilmRow, back: FilmRow) -> LeakageRow:
         net_mm3_per_mm=net,
         net_film_um=out.h_star_um - back.h_star_um,
         net_mm3_per_100_m=per_100_m(net, 1.0),
-        verdict=max(out.verdict, back.verdict, key=_severity),
+        verdict=min(out.verdict, back.verdict, key=VERDICTS.index),
     )
-
-
-def _severity(verdict: str) -> int:
-    return _WORST_LAST.index(verdict) if verdict in _WORST_LAST else len(_WORST_LAST)

@@ -7,7 +7,7 @@ from typing import Unpack
 import numpy as np
 
 from softehl.cases.harness import observer as harness
-from softehl.cases.seal.states.sensitivity_table import rows_of
+from softehl.cases.seal.states.sensitivity_table import SensitivityRow, rows_of
 from softehl.cases.seal.states.state import (
     PROFILE_COLUMNS,
     ContactState,
@@ -44,14 +44,12 @@ class ObserverAdapter(Observer):
 
     def film_state(self, state: FilmState) -> None:
         """A row, its profile and its section, and a file of its sensitivities."""
+        row = FilmRow.part_of(state)
         if state.sensitivity:
-            row = FilmRow.part_of(state)
             table = rows_of(row, state.sensitivity)
-            columns = {n: np.array([getattr(r, n) for r in table]) for n in table[0].header()}
+            columns = {n: np.array([getattr(r, n) for r in table]) for n in SensitivityRow.header()}
             self.to.files({f"sensitivity_{row.name}.csv": columns})
-        profile = {name: getattr(state.profile, name) for name in PROFILE_COLUMNS}
-        row, contents = FilmRow.part_of(state), (profile, state.section)
-        self.to.state(harness.State(row, contents, state.advice))
+        self.to.state(harness.State(row, (vars(state.profile), state.section), state.advice))
 
 
 def read_profile(folder: Path, row: FilmRow) -> Profile:

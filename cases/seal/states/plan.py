@@ -8,7 +8,7 @@ from softehl.cases.seal.gland.records.discretisation import DENSITIES, Discretis
 from softehl.cases.seal.gland.records.duty import Duty
 from softehl.cases.seal.gland.surfaces import FULL
 from softehl.cases.seal.states.state import CLIPPED, OSCILLATING, UNCERTAIN, UNDER_RESOLVED, FilmRow
-from softehl.cases.seal.states.verdict import DOUBTFUL
+from softehl.cases.seal.states.verdict import DOUBTFUL, FINER
 
 SIGNS: dict[Stroke, float] = {"out": 1.0, "in": -1.0}
 """Stroke -> sign of its rod speed U."""
@@ -18,8 +18,6 @@ USUAL = 0.2
 
 THIN = FULL * USUAL
 """Film thickness below which these would touch, um."""
-
-FINER = "use a finer mesh (larger density)"
 
 DOUBTS = {
     UNDER_RESOLVED: f"the inlet is too short for this mesh, h* may be far off; {FINER}",

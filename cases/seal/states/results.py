@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from math import nan
+from typing import Any
 
 import numpy as np
 
@@ -74,13 +75,17 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         float(system.around * (tau * at["dx"]).sum())
         for tau in (0.5 * (at["tau_rod"] + at["tau"]), at["tau_rod"])
     )
-    end = 0 if film.stroke == "out" else -1
-    before, flow = wedge(system, film, x), float(at["eta"].ravel()[end]) * film.speed
+    flow = float(at["eta"].ravel()[0 if film.stroke == "out" else -1]) * film.speed
+    sides: tuple[Stroke, Stroke] = ("out", "in") if film.stroke == "out" else ("in", "out")
+    before, behind = (wedge(system, side, x) for side in sides)
     entrance = built_up(*before, flow, h_star)
+    sliding, rubbed = wedge_friction(system, *before, flow, h_star)
+    beyond = wedge_friction(system, *behind, flow, h_star)[0]  # no pressure is built up there
     if film.entrance:
-        sliding, rubbed = wedge_friction(system, *before, flow, h_star)
         drag += np.copysign(sliding, film.rod_speed)
         friction += np.copysign(rubbed, film.rod_speed)
+    else:
+        beyond += abs(rubbed)
     return FilmNumbers(
         speed=film.speed,
         flux=q,
@@ -99,20 +104,8 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         **rough_numbers(system, at),
         contacts=_contacts(at, (z, h), parts, film, level) if len(parts) > 1 else (),
         drag=drag,
-        beyond=_beyond(system, film, x, flow, h_star) / abs(friction),
+        beyond=beyond / abs(friction),
     )
-
-
-def _beyond(system: SealSystem, film: FilmLoads, x: Array, flow: float, h_star: float) -> float:
-    """Friction (N) of the oil beyond the ends of the arc, as far as the section faces the rod.
-
-    flow: eta |U|, N/mm. Before the inlet oil fills the gap; behind the exit its sliding counts.
-    """
-    behind = wedge(system, replace(film, stroke="in" if film.stroke == "out" else "out"), x)
-    friction = abs(wedge_friction(system, *behind, flow, h_star)[0])
-    if not film.entrance:
-        friction += abs(wedge_friction(system, *wedge(system, film, x), flow, h_star)[1])
-    return friction
 
 
 def film_parts(h: Array, level: float = CONTACT_FILM) -> list[slice]:
@@ -228,10 +221,10 @@ def film_state(
     iterations: int,
 ) -> FilmState:
     """The record of a converged film whose numbers are the last of `verdict`."""
-    numbers = verdict.last or film_numbers(system, problem, film, x)
-    z, h = system.arc_film(x)
+    assert verdict.last is not None
+    numbers, (z, h) = verdict.last, system.arc_film(x)
     limits = interval_below(z, h, contact_level(h))
-    state = FilmState(
+    return FilmState(
         sealed_pressure_MPa=film.sealed_pressure,
         rod_speed_mm_s=film.rod_speed,
         h_star_um=numbers.h_star / MICROMETRE,
@@ -255,26 +248,27 @@ def film_state(
         regime=regime(numbers.lambda_ratio) if system.parameters.rough else "",
         asperity_load_percent=100.0 * numbers.asperity_load,
         boundary_friction_percent=100.0 * numbers.boundary_friction,
+        **_groove(numbers),
         verdict=verdict.word,
         advice=verdict.advice,
         profile=_profile(system, problem, x),
         section=section_view(system, problem, x, film_pressure(system, x)),
     )
-    return _with_groove(state, numbers) if len(numbers.contacts) > 1 else state
 
 
-def _with_groove(state: FilmState, numbers: FilmNumbers) -> FilmState:
-    """The record with what is between two contacts, and how they differ."""
+def _groove(numbers: FilmNumbers) -> dict[str, Any]:
+    """Columns of the groove between two contacts, and how these differ; none of one contact."""
+    if not numbers.contacts:
+        return {}
     sealed, air = numbers.contacts[0], numbers.contacts[-1]
-    return replace(
-        state,
-        groove_start_mm=sealed.end,
-        groove_end_mm=air.start,
-        groove_pressure_MPa=air.p_before,
-        h_min_sealed_um=sealed.h_min / MICROMETRE,
-        h_min_air_um=air.h_min / MICROMETRE,
-        flux_mismatch_percent=numbers.mismatch,
-    )
+    return {
+        "groove_start_mm": sealed.end,
+        "groove_end_mm": air.start,
+        "groove_pressure_MPa": air.p_before,
+        "h_min_sealed_um": sealed.h_min / MICROMETRE,
+        "h_min_air_um": air.h_min / MICROMETRE,
+        "flux_mismatch_percent": numbers.mismatch,
+    }
 
 
 def _profile(system: SealSystem, problem: Problem, x: Array) -> Profile:

@@ -18,14 +18,16 @@ COLLAPSED = "collapsed"
 """Verdict of a state on the spurious collapsed branch of a too coarse mesh: never a result."""
 UNDER_RESOLVED = "under-resolved"
 """Verdict of a state whose inlet is shorter than the mesh can show: h* may be far off."""
-OSCILLATING = "oscillating"
-"""Verdict of a state whose film zigzags from node to node: h* is sound, the profile is not."""
-
 CLIPPED = "clipped"
 """Verdict of a state whose arc ends within its film: the inlet may be cut off."""
 UNCERTAIN = "uncertain"
 """Verdict of a state whose estimated error is too large, or is not known though it was wanted, or
 is small where two meshes do not show it."""
+OSCILLATING = "oscillating"
+"""Verdict of a state whose film zigzags from node to node: h* is sound, the profile is not."""
+
+VERDICTS = (COLLAPSED, UNDER_RESOLVED, CLIPPED, UNCERTAIN, OSCILLATING, OK)
+"""Verdicts of states, the worst first."""
 
 Section = Cells
 """A deformed section: points are (z, r)."""

@@ -1,4 +1,4 @@
-"""Verdict on a film on the path of falling speed, from its numbers alone."""
+"""Verdict on a film, from its numbers and those of the next faster one."""
 
 from __future__ import annotations
 
@@ -62,17 +62,17 @@ LARGEST_ERROR = 2.0
 STRONG_OSCILLATION = 0.2
 """Oscillation index from which on a profile is not to be taken at face value: about 5 % of h."""
 
-DOUBTFUL = "the estimated error of h* is large or not known; use a finer mesh (larger density)"
+FINER = "use a finer mesh (larger density)"
 
-FINER_MESH = "the film collapsed on this mesh; use a finer mesh (larger density)"
+DOUBTFUL = f"the estimated error of h* is large or not known; {FINER}"
 
 _SHORT = (
     "the inlet is only {:.2g} segments long, it needs {:g} with this pressure_order: h* may be "
-    "wrong by tens of per cent; use a finer mesh (larger density)"
+    f"wrong by tens of per cent; {FINER}"
 )
 _UNSEEN = (
     "h* is {:.3g} of what the steepest slope of {} inlet gives, it must be near 1: the mesh does "
-    "not show it; use a finer mesh (larger density)"
+    f"not show it; {FINER}"
 )
 _UNSEALED = (
     "the sealed pressure is taken to end {}, where the ring touches nothing; try more squeeze or a "
@@ -88,7 +88,7 @@ _MISMATCH = (
 )
 _ZIGZAG = (
     "the film oscillates from node to node (index {:.2g}): h* holds to a few per cent, the profile "
-    "does not; use a finer mesh (larger density)"
+    f"does not; {FINER}"
 )
 
 
@@ -192,18 +192,16 @@ def fewest_inlet_segments(reynolds: str, m_p: int, lobes: int = 1) -> float:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Verdict on the films met so far on a path of falling speed.
+    """Verdict on a film over a dry contact.
 
-    reference: maximum contact pressure without film, MPa. last: the latest film. collapsed: what
-    gave a spurious collapsed film away, if anything did: a pressure well above the contact's, a
-    drag that rises while the speed falls, or a thickness that falls too fast. A path that
-    has once collapsed does not recover; too few segments in the inlet or an oscillating film
-    are judged for each film alone. fewest: segments that the inlet needs. ratios: credible
-    inlet_ratio. error: estimated error of the last film's h*, %, None where none is wanted. rough:
-    between rough surfaces friction may rise while the speed falls, and h may be negative.
-    unsealed: where the sealed pressure ends although nothing is touched there. references: maximum
-    contact pressures of each contact, from the sealed side on. overlap: what the section runs into:
-    itself, or the rod beyond its film.
+    reference: maximum contact pressure without film, MPa. last: the film. collapsed: what gave it
+    away as a spurious collapsed one, if anything did: a pressure well above the contact's, a drag
+    that rises while the speed falls, or a thickness that falls too fast. fewest: segments that the
+    inlet needs. ratios: credible inlet_ratio. error: estimated error of h*, %, None where none is
+    wanted. rough: between rough surfaces friction may rise while the speed falls, and h may be
+    negative. unsealed: where the sealed pressure ends although nothing is touched there.
+    references: maximum contact pressures of each contact, from the sealed side on. overlap: what
+    the section runs into: itself, or the rod beyond its film.
     """
 
     reference: float
@@ -218,9 +216,8 @@ class Verdict:
     overlap: str = ""
 
     def after(self, film: FilmNumbers) -> Verdict:
-        """The verdict that includes one more film; `collapsed` says what gave it away."""
-        reason = self.collapsed or self._suspicion(film)
-        return replace(self, last=film, collapsed=reason)
+        """The verdict on a film, `last` being that of the same stroke at a higher speed, if any."""
+        return replace(self, last=film, collapsed=self._suspicion(film))
 
     @property
     def word(self) -> str:
@@ -235,7 +232,7 @@ class Verdict:
     def _doubts(self) -> Iterator[tuple[str, str]]:
         """Verdicts that stand against the last film, worst first, each with its advice."""
         if self.collapsed:
-            yield COLLAPSED, f"{FINER_MESH}: {self.collapsed}"
+            yield COLLAPSED, f"the film collapsed on this mesh; {FINER}: {self.collapsed}"
         film = self.last
         if film is None:
             return
@@ -259,33 +256,24 @@ class Verdict:
             yield OSCILLATING, _ZIGZAG.format(film.oscillation)
 
     def _suspicion(self, film: FilmNumbers) -> str:
+        last, peaks = self.last, [(film.p_max, self.reference)]
         if film.h_min <= 0.0 and not self.rough:
             return f"its least thickness is {1e3 * film.h_min:.2g} um"
-        for peak, reference in self._peaks(film):
-            excess = peak - reference
-            if excess > EXCESS_PRESSURE * reference:
-                return (
-                    f"the maximum pressure is {excess:.2f} MPa above that of frictionless contact"
-                )
-        if self.rough or self.last is None or not film.speed < self.last.speed:
+        if len(film.contacts) == len(self.references) > 1:
+            own = [contact.p_max for contact in film.contacts]
+            peaks = list(zip(own, self.references, strict=True))
+        for peak, reference in peaks:
+            if peak - reference > EXCESS_PRESSURE * reference:
+                excess = f"{peak - reference:.2f} MPa above that of frictionless contact"
+                return f"the maximum pressure is {excess}"
+        if self.rough or last is None or not film.speed < last.speed:
             return ""
-        if abs(film.drag) > abs(self.last.drag):
+        if abs(film.drag) > abs(last.drag):
             return "the drag on the rod rises while the speed falls"
-        if film.h_star <= 0.0 or self._exponent(film) > LARGEST_EXPONENT:
+        both = last.speed, last.h_star, film.speed, film.h_star
+        if not min(both) > 0.0 or local_exponent(*both) > LARGEST_EXPONENT:
             return "its thickness falls too fast with the speed"
         return ""
-
-    def _peaks(self, film: FilmNumbers) -> list[tuple[float, float]]:
-        """Maximum pressures, each with that of contact: one by one if there are as many."""
-        if len(film.contacts) > 1 and len(film.contacts) == len(self.references):
-            peaks = [contact.p_max for contact in film.contacts]
-            return list(zip(peaks, self.references, strict=True))
-        return [(film.p_max, self.reference)]
-
-    def _exponent(self, film: FilmNumbers) -> float:
-        if self.last is None or self.last.h_star <= 0.0:
-            return inf
-        return local_exponent(self.last.speed, self.last.h_star, film.speed, film.h_star)
 
 
 def _cut(film: FilmNumbers) -> str:
