@@ -5,13 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.equations.system import (
-    AIR_WALL,
-    MOVED,
-    ROTATION,
-    SEALED_WALL,
-    WALLS,
-)
+from softehl.cases.seal.equations.system import AIR_WALL, MOVED, ROTATION, SEALED_WALL, WALLS
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.layered import Layer
 
@@ -33,7 +27,7 @@ def film_layer(system: SealSystem, x: Array) -> Layer:
     if system.parameters.conserving:  # side by side along the film: their matrix is a band
         inner = np.stack([pressures[1:-1] for pressures in own], axis=1).ravel()
     inner = inner[~np.isin(inner, system.film_ends)]
-    names = [block.name for block in system.blocks if block.layer]
+    names = [block.name for block in system.blocks if block.on_arc]
     return Layer.of(system.problem.assembler, names, shared, inner)
 
 

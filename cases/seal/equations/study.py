@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from softehl.cases.seal.equations.declared import Block
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.system import (
     FIELDS,
+    Block,
     Values,
     film_values,
     obstacles_of,

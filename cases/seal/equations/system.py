@@ -7,13 +7,12 @@ section, and nobody else knows how fields are called and where their unknowns st
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from math import copysign
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 from softehl.cases.seal.equations import scales
-from softehl.cases.seal.equations.declared import Block, Field, Place
 from softehl.cases.seal.equations.loads import ContactLoads, FilmLoads
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.discretisation import Discretisation
@@ -21,16 +20,78 @@ from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.surfaces import void_values
 from softehl.cases.seal.section.section import BODY, SealSection
 from softehl.runtime.fem.contact import Obstacle, inner_cylinder, outer_cylinder, plane
-from softehl.runtime.fem.rules import (
-    content_rule,
-    facet_rule,
-    film_rule,
-    rupture_rule,
-)
+from softehl.runtime.fem.rules import content_rule, facet_rule, film_rule, rupture_rule
 from softehl.runtime.kernels import Rule
 
 Values: TypeAlias = Mapping[str, float]
 """Parameters of a kernel by their names."""
+
+Place = Literal["nodes", "film", "arc_nodes", "outer_nodes", "wall_nodes", "section"]
+Group = Literal["solid", "load", "contact", "film", "squeeze", "support"]
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of unknowns; a case has those that its blocks know.
+
+    on: things that have one of them. A node has two displacements, a segment of the film the
+    coefficients of a polynomial; other fields are of the nodes of the arc, of the other boundary,
+    of what may touch a wall, or of the section.
+    scale: reference size of its residuals. of: names of its unknowns, left out: one, its own.
+    """
+
+    name: str
+    on: Place
+    scale: Callable[[Seal], float]
+    of: tuple[str, ...] = ()
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """Names of its unknowns."""
+        return self.of or (self.name,)
+
+
+@dataclass(frozen=True)
+class Block:
+    """Elements of one kernel.
+
+    kernel: its name, with words of the case (see `kernel_of`); the solid is that of its region, ""
+    where it is the case's.
+    elements: a set of `SealSection.elements`. fields: of its unknowns that are not displacements,
+    in the order in which the kernel has them. group: which values its parameters are taken from.
+    needed: whether a case has it. rule: its quadrature, None for the kernel's own.
+    constant: the tangent depends on parameters alone.
+    """
+
+    name: str
+    kernel: str
+    elements: str
+    fields: tuple[str, ...]
+    group: Group
+    needed: Callable[[Seal], bool] = lambda _: True
+    rule: Callable[[Seal], Rule] | None = None
+    constant: bool = False
+    region: str = ""
+
+    @property
+    def on_arc(self) -> bool:
+        """True for what the modified Newton iteration treats exactly, with the film."""
+        return self.elements in ("arc", "arc_nodes", "facets", "film_nodes", "sealed_arc")
+
+    @property
+    def of_film(self) -> bool:
+        """True for what contact knows nothing of."""
+        return self.group in ("film", "squeeze")
+
+    def kernel_of(self, p: Seal) -> str:
+        """Name of the kernel in a case."""
+        return self.kernel.format(
+            solid=p.rubber(self.region).solid_kernel(p.solid),
+            edge="_corner" if p.opens else "",
+            oil=p.film_suffix,
+            rough="_rough" if p.rough else "",
+            conserving="rough" if p.rough else f"conserving{p.film_suffix}",
+        )
 
 
 DISPLACEMENT, PRESSURE, ROD = "displacement", "pressure", "rod"
@@ -76,8 +137,8 @@ def _segment_rule(p: Discretisation) -> Rule:
 BLOCKS = (
     Block(SOLID, "{solid}", BODY, (), "solid"),
     Block("sealed_side", "follower_pressure", "sealed_side", (), "load"),
-    Block("sealed_arc", "follower_pressure", "sealed_arc", (), "load", layer=True),
-    Block(ROD, "contact", "arc_nodes", (ROD,), "contact", layer=True),
+    Block("sealed_arc", "follower_pressure", "sealed_arc", (), "load"),
+    Block(ROD, "contact", "arc_nodes", (ROD,), "contact"),
     *(
         Block(name, kernel, WALLS[name], (name,), "contact", needed=lambda p: not p.rubs)
         for name, kernel in zip(WALLS, ("contact", "contact", "contact{edge}"), strict=True)
@@ -88,36 +149,30 @@ BLOCKS = (
     ),
     Block(
         *(FILM, "film{oil}", "arc", (PRESSURE,), "film"),
-        layer=True,
         needed=lambda p: not p.conserving,
         rule=_segment_rule,
     ),
     Block(
         *(FILM, "film_{conserving}", "arc", (PRESSURE, VOID), "film"),
-        layer=True,
         needed=lambda p: p.conserving,
         rule=lambda p: rupture_rule(p.pressure_order),
     ),
     Block(
         *("cavitation", "film_void", "film_nodes", (PRESSURE, VOID), "film"),
-        layer=True,
         needed=lambda p: p.conserving,
     ),
     Block(
         *(SQUEEZE, "film_squeeze{rough}", "arc", (PRESSURE, VOID), "squeeze"),
-        layer=True,
         needed=lambda p: p.conserving,
         rule=lambda p: content_rule(p.pressure_order),
     ),
     Block(
         *("upwind", "film_upwind{rough}", "arc", (PRESSURE,), "film"),
-        layer=True,
         needed=lambda p: p.upwinding != 0.0,
         rule=_segment_rule,
     ),
     Block(
         *(FACET, "film_facet", "facets", (PRESSURE,), "film"),
-        layer=True,
         needed=lambda p: p.reynolds == "dg",
         rule=lambda p: facet_rule(p.pressure_order),
     ),
@@ -204,10 +259,7 @@ def film_values(p: Seal, film: FilmLoads) -> Values:
     }
 
 
-_FILM = ("film", "squeeze")
-
-
 def contact_kernels(p: Seal) -> tuple[str, ...]:
     """Names of the kernels that the contact problem of a case depends on, each once."""
-    kernels = [b.kernel_of(p) for b in blocks_of(p) if b.group not in _FILM]
+    kernels = [b.kernel_of(p) for b in blocks_of(p) if not b.of_film]
     return tuple(dict.fromkeys(kernels))

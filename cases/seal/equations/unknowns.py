@@ -7,7 +7,6 @@ from math import pi
 
 import numpy as np
 
-from softehl.cases.seal.equations.declared import Field, Place
 from softehl.cases.seal.equations.system import (
     AXIAL,
     BORE,
@@ -19,6 +18,8 @@ from softehl.cases.seal.equations.system import (
     ROTATION,
     SHEAR,
     WALLS,
+    Field,
+    Place,
 )
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.section.section import SealSection
