@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from softehl.cases.harness.case import Alarm
 from softehl.cases.harness.row import OK
@@ -14,8 +15,24 @@ from softehl.cases.seal.states.verdict import LARGEST_ERROR
 
 RETURNS = "returns what it takes out"
 
-_Place = tuple[float, float]
-_Strokes = Mapping[str, FilmRow]
+
+@dataclass(frozen=True)
+class _Speed:
+    """A sealed pressure and a speed |U|: its strokes, and their cycle where it has both."""
+
+    sealed_pressure: float
+    speed: float
+    strokes: Mapping[str, FilmRow]
+    net: LeakageRow | None
+
+    @property
+    def kind(self) -> str:
+        """Leakage in words: "leaks", "returns", or "even" where both are the same within errors."""
+        if self.net is None:
+            return ""
+        if abs(self.net.net_film_um) <= 0.01 * LARGEST_ERROR * self.strokes["out"].h_star_um:
+            return "even"
+        return "leaks" if self.net.net_mm3_per_mm > 0.0 else "returns"
 
 
 def answer(rows: Sequence[FilmRow], travel: float) -> list[str]:
@@ -26,19 +43,14 @@ def answer(rows: Sequence[FilmRow], travel: float) -> list[str]:
     """
     if not rows:
         return []
-    found = {(row.sealed_pressure_MPa, row.rod_speed_mm_s): row for row in rows}
     nets = {(net.sealed_pressure_MPa, net.speed_mm_s): net for net in net_leakage(rows)}
-    places = sorted({(p, abs(u)) for p, u in found}, key=lambda at: (at[0], -at[1]))
-    strokes: dict[_Place, _Strokes] = {
-        (p, speed): {
-            stroke: found[p, u] for stroke, u in (("out", speed), ("in", -speed)) if (p, u) in found
-        }
-        for p, speed in places
-    }
-    kinds = {at: _kind(net, strokes[at]["out"]) for at, net in nets.items()}
-    head = _whether(kinds, nets, travel, several_pressures=len({p for p, _ in places}) > 1)
-    lines = [_line(at, strokes[at], nets.get(at), kinds.get(at, ""), travel) for at in places]
-    return [head, *lines]
+    strokes = dict[tuple[float, float], dict[str, FilmRow]]()
+    for row in sorted(rows, key=lambda row: row.order):
+        at = row.sealed_pressure_MPa, abs(row.rod_speed_mm_s)
+        strokes.setdefault(at, {})[row.stroke] = row
+    places = sorted(strokes, key=lambda at: (at[0], -at[1]))
+    speeds = [_Speed(*at, strokes[at], nets.get(at)) for at in places]
+    return [_whether(speeds, travel), *(_line(speed, travel) for speed in speeds)]
 
 
 def leaks(volume: float) -> str:
@@ -51,48 +63,39 @@ def far(volume: float, travel: float) -> str:
     return f"{1e-3 * per_100_m(volume, travel):.3g} cm3 in 100 m of travel"
 
 
-def _kind(net: LeakageRow, out: FilmRow) -> str:
-    """Leakage of a cycle in words; "even" where both strokes carry the same within the error."""
-    if abs(net.net_film_um) <= 0.01 * LARGEST_ERROR * out.h_star_um:
-        return "even"
-    return "leaks" if net.net_mm3_per_mm > 0.0 else "returns"
-
-
-def _whether(
-    kinds: Mapping[_Place, str],
-    nets: Mapping[_Place, LeakageRow],
-    travel: float,
-    *,
-    several_pressures: bool,
-) -> str:
+def _whether(speeds: Sequence[_Speed], travel: float) -> str:
     """One line: leaks, how much and where most, or returns what it takes out."""
+    kinds = [speed.kind for speed in speeds if speed.kind]
     if not kinds:
         return "leakage is not known: no speed has a film of both strokes"
     cycle = f"in a cycle of {travel:g} mm out and back"
-    leaking = [at for at, kind in kinds.items() if kind == "leaks"]
+    leaking = [(s.net.net_mm3_per_mm, s) for s in speeds if s.net and s.kind == "leaks"]
     if not leaking:
-        even = all(kind == "even" for kind in kinds.values())
+        even = set(kinds) == {"even"}
         return f"{'takes back as much as it takes out' if even else RETURNS} {cycle}"
-    most = max(leaking, key=lambda at: nets[at].net_mm3_per_mm)
-    volume = f"{travel * nets[most].net_mm3_per_mm:.3g} mm3 {cycle}"
+    rate, most = max(leaking, key=lambda item: item[0])
+    volume = f"{travel * rate:.3g} mm3 {cycle}"
     if len(kinds) == 1:
         return f"leaks {volume}"
-    at = f"{most[0]:g} MPa and {most[1]:g} mm/s" if several_pressures else f"{most[1]:g} mm/s"
+    several = len({speed.sealed_pressure for speed in speeds}) > 1
+    at = f"{most.sealed_pressure:g} MPa and " * several + f"{most.speed:g} mm/s"
     tight = len(kinds) - len(leaking)
     return f"leaks, most at {at}: {volume}" + (f"; not at {tight} of {len(kinds)}" if tight else "")
 
 
-def _line(at: _Place, strokes: _Strokes, net: LeakageRow | None, kind: str, travel: float) -> str:
+def _line(speed: _Speed, travel: float) -> str:
     """A speed: leakage, friction, least lambda."""
-    parts = [_leakage(net, kind, travel), _friction(strokes)]
+    strokes = speed.strokes
+    forces = [f"{abs(row.rod_friction_N):.3g} N {stroke}" for stroke, row in strokes.items()]
+    parts = [_leakage(speed, travel), f"friction {', '.join(forces)}", *_ratio(strokes)]
     doubts = [f"{stroke} {row.verdict}" for stroke, row in strokes.items() if row.verdict != OK]
-    parts += list(_ratio(strokes))
     doubt = f" ({', '.join(doubts)})" if doubts else ""
-    line, thin = f"  {at[1]:g} mm/s: {'; '.join(parts)}{doubt}", _thin(strokes)
+    line, thin = f"  {speed.speed:g} mm/s: {'; '.join(parts)}{doubt}", _thin(strokes)
     return Alarm(f"{line}; {thin}") if thin else line
 
 
-def _leakage(net: LeakageRow | None, kind: str, travel: float) -> str:
+def _leakage(speed: _Speed, travel: float) -> str:
+    net, kind = speed.net, speed.kind
     if net is None:
         return "leakage needs both strokes"
     out, back = (
@@ -107,12 +110,7 @@ def _leakage(net: LeakageRow | None, kind: str, travel: float) -> str:
     return f"{leaks(volume)} ({both}), {far(volume, travel)}"
 
 
-def _friction(strokes: _Strokes) -> str:
-    forces = [f"{abs(row.rod_friction_N):.3g} N {stroke}" for stroke, row in strokes.items()]
-    return f"friction {', '.join(forces)}"
-
-
-def _ratio(strokes: _Strokes) -> Iterator[str]:
+def _ratio(strokes: Mapping[str, FilmRow]) -> Iterator[str]:
     """The least lambda ratio, of rough surfaces."""
     rough = {s: row for s, row in strokes.items() if row.regime}
     if rough:
@@ -120,7 +118,7 @@ def _ratio(strokes: _Strokes) -> Iterator[str]:
         yield f"least lambda {row.lambda_ratio:.3g} ({row.regime}, {stroke}stroke)"
 
 
-def _thin(strokes: _Strokes) -> str:
+def _thin(strokes: Mapping[str, FilmRow]) -> str:
     """Which films are thinner than the roughness of the surfaces, in words."""
     rough = [s for s, row in strokes.items() if row.regime and row.lambda_ratio < MIXED]
     smooth = [s for s, row in strokes.items() if not row.regime and row.h_min_um < USUAL]
