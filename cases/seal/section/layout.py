@@ -20,7 +20,10 @@ from softehl.runtime.mesh.section_mesh import Sizes, section_mesh
 from softehl.runtime.mesh.sections import SectionMesh
 from softehl.runtime.mesh.spacing import Spacing
 
-_LEVEL, _LOOKED_AT = 1e-6, 4001  # of the height: what is level; places of a film that are compared
+_LEVEL, _LOOKED_AT = 1e-6, 4001
+"""Part of the height that two lobes as low may differ by, and places of a film that are compared.
+These find the lowest of an X-ring to 1e-8, from 1001 to 16001 the same; at 1e-8 the film of the
+other lobe is 1.2 % off."""
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,16 @@ from softehl.runtime.mesh.section_mesh import Sizes
 from softehl.runtime.mesh.spacing import Spacing, Spot, graded
 
 EDGE_ANGLES = range(27, 70, 3)
-"""Places where a section may meet the edge of the gap under pressure, degrees from the bottom."""
+"""Places where a section may meet the edge of the gap under pressure, degrees from the bottom:
+every 6 degrees, or from 15 to 81, change h* and friction of an O-ring by 0.003 and 0.14 %."""
 
 LONG_PLACED = 33
 """Segments at density 1 of an arc that the contact has placed: 27 or 42 change h* of an O-ring by
 0.03 %."""
 
 LONG_OPEN = 42
-"""Segments where the edge of an open gap is to be resolved too."""
+"""Segments where the edge of an open gap is to be resolved too: 33 or 54 change h* and friction of
+an O-ring by 0.03 and 0.07 %."""
 
 BEYOND = 0.3
 """Length beyond a film as drawn in which contact is looked for on the air side, in heights of a

@@ -5,8 +5,8 @@ Two meshes whose sizes have the ratio r < 1 differ in h*, which converges with o
 density; below that this would be too coarse to be wrong in the same way, and it has five sixths.
 
 Leakage is h* times what is exactly known, and has its relative error. Friction is a part of the
-sliding and one of the slope of the pressure. Where these cancel, their sum may be right on two
-meshes by chance, so that their errors are added up.
+sliding and one of the slope of the pressure. Their sum may be right on two meshes by chance where
+they cancel, so that their errors are added up.
 """
 
 from __future__ import annotations

@@ -12,10 +12,7 @@ import numpy as np
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
-from softehl.cases.seal.equations.system import (
-    FACET,
-    FILM,
-)
+from softehl.cases.seal.equations.system import FACET, FILM
 from softehl.cases.seal.gland.surfaces import MICROMETRE, regime
 from softehl.cases.seal.states.contacts import CONTACT_FILM, contact_film, contact_level, groups
 from softehl.cases.seal.states.entrance import built_up, wedge, wedge_friction
@@ -47,11 +44,7 @@ _TORN = 1e-6  # void fraction of a film that has ruptured
 def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array) -> FilmNumbers:
     """Scalars of a converged film with the unknowns x.
 
-    The flux is that at the largest pressure, of several contacts in the first on the way of the
-    oil that is not lifted (see `metering`): the mean over the segment for continuous, the mean
-    of (23) at the facets of the segment for discontinuous pressures, which (21) and (22) make
-    constant. Its relative spread is taken over the neighbours on both sides up to where the film
-    cavitates, eqs. (16) and (25).
+    The flux is that at the largest pressure; of several contacts in the one that `metering` finds.
     """
     at = problem.fields(FILM, x)
     z, h = system.arc_film(x)
@@ -60,15 +53,7 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
     first = metering(at, parts, film.stroke)
     top, inlet = _top(at, first), {name: values[first] for name, values in at.items()}
     narrows = h[_nodes(first)][:: 1 if film.stroke == "out" else -1]
-    whole = run_around(at["p"].min(axis=1) >= 0.0, top)
-    jump = 0.0
-    if system.parameters.reynolds == "dg":
-        facets = problem.fields(FACET, x)
-        flux, jump = facets["flux"][:, 0], float(np.abs(facets["jump"]).max())
-        around, whole = slice(max(top - 1, 0), top + 1), slice(max(whole.start - 1, 0), whole.stop)
-    else:
-        flux, around = element_means(at["flux"], at["dx"]), slice(top, top + 1)
-    q = float(flux[around].mean())
+    q, variation, jump = _flux(system, problem, at, x, top)
     h_star = q / (0.5 * film.rod_speed)
     within = min(level, THIN * h_star) if h_star > 0.0 else level
     drag, friction = (
@@ -93,7 +78,7 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         h_min=float(h.min()),
         p_max=float(at["p"].max()),
         friction=friction,
-        flux_variation=relative_spread(flux[whole]),
+        flux_variation=variation,
         jump=jump,
         oscillation=max(oscillation(z[_nodes(k)], h[_nodes(k)], within) for k in parts),
         inlet_segments=inlet_segments(narrows, h_star),
@@ -106,6 +91,24 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         drag=drag,
         beyond=beyond / abs(friction),
     )
+
+
+def _flux(
+    system: SealSystem, problem: Problem, at: Mapping[str, Array], x: Array, top: int
+) -> tuple[float, float, float]:
+    """Flux at a segment, its relative spread, and the largest jump of the pressure at a facet.
+
+    Of continuous pressures the flux is the mean over the segment. Of discontinuous ones it is that
+    of (23) at its facets, which (21) and (22) make constant. The spread is taken over the
+    neighbours on both sides up to where the film cavitates, eqs. (16) and (25).
+    """
+    around, whole = slice(top, top + 1), run_around(at["p"].min(axis=1) >= 0.0, top)
+    flux, jump = element_means(at["flux"], at["dx"]), 0.0
+    if system.parameters.reynolds == "dg":
+        facets = problem.fields(FACET, x)
+        flux, jump = facets["flux"][:, 0], float(np.abs(facets["jump"]).max())
+        around, whole = (slice(max(k.start - 1, 0), k.stop) for k in (around, whole))
+    return float(flux[around].mean()), relative_spread(flux[whole]), jump
 
 
 def film_parts(h: Array, level: float = CONTACT_FILM) -> list[slice]:

@@ -18,7 +18,8 @@ from softehl.cases.seal.states.state import (
 from softehl.runtime.fem.postprocess import local_exponent
 
 EXCESS_PRESSURE = 0.1
-"""Largest credible excess of the film's maximum pressure over the contact's, relative."""
+"""Largest credible excess of the film's maximum pressure over the contact's, relative: that of 27
+films of twelve seals is at most 0.033, of an X-ring."""
 
 LARGEST_EXPONENT = 0.85
 """Largest credible d log h* / d log U: theory and fine meshes give 0.55 to 0.65."""
