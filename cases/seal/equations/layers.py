@@ -9,7 +9,10 @@ from softehl.cases.seal.equations.system import AIR_WALL, MOVED, ROTATION, SEALE
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.layered import Layer
 
-_AT_WALL = 0.02  # of the section: as near to a wall it may come to touch it
+_AT_WALL = 0.02
+"""Part of the section within which a node counts as one at a wall. Without these an O-ring at
+14 MPa takes 64 % more factorisations; with all nodes of the arc, four seals take 3 to 11 % more
+time."""
 
 
 def film_layer(system: SealSystem, x: Array) -> Layer:

@@ -22,8 +22,8 @@ from softehl.runtime.mesh.spacing import Spacing
 
 _LEVEL, _LOOKED_AT = 1e-6, 4001
 """Part of the height that two lobes as low may differ by, and places of a film that are compared.
-These find the lowest of an X-ring to 1e-8, from 1001 to 16001 the same; at 1e-8 the film of the
-other lobe is 1.2 % off."""
+These find the lobes of an X-ring to be as low within 4e-8, 1001 within 4e-7; at 1e-8 the pressure
+ends at the other lobe, and h* is 1.2 % off."""
 
 
 @dataclass(frozen=True)

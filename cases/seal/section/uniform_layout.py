@@ -24,7 +24,8 @@ an O-ring by 0.03 and 0.07 %."""
 
 BEYOND = 0.3
 """Length beyond a film as drawn in which contact is looked for on the air side, in heights of a
-section."""
+section. Without it one film of thirty, of five sections at 2 to 12 MPa, is not found: the instroke
+of a trapezoid at 12 MPa."""
 
 
 def uniform_layout(p: Seal) -> Layout:

@@ -18,7 +18,8 @@ GROOVE = 2.0
 what counts as contact of a film that is nowhere much thinner than that."""
 
 GRAZED = 1e-3
-"""Gap that parts two dry contacts, mm: a film opens a groove whose ground is so near to the rod."""
+"""Gap that parts two dry contacts, mm: a film opens a groove whose ground is so near to the rod.
+From 1e-5 to 1e-2 the films of an X-ring, a U-cup and a square ring are the same."""
 
 
 @dataclass(frozen=True)
