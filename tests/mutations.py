@@ -288,7 +288,7 @@ FAULTS = (
     ),
     Fault(
         "runtime/stability.py",
-        "pivots.negative - int(free.saddle.sum())",
+        "pivots.negative - int(free.saddle(K).sum())",
         "pivots.negative",
         "tests/runtime/test_modes.py",
     ),
