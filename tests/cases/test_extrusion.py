@@ -22,8 +22,7 @@ from softehl.runtime.solve.solution import Branch, Status
 def found(**changes: Any) -> State:
     driver = PathDriver(Silent())
     p = Seal(**{"density": 1, "extrusion_gap": 0.1, **changes})
-    state = ContactMeshes(ContactSolver(driver)).contact(p)
-    return state
+    return ContactMeshes(ContactSolver(driver)).contact(p)
 
 
 def distance(places: np.ndarray, p: Seal) -> np.ndarray:

@@ -37,8 +37,7 @@ THIN = Seal(
 
 
 def contact_of(p: Seal) -> DryContact:
-    found = DryContact.of(p, Silent())
-    return found
+    return DryContact.of(p, Silent())
 
 
 @pytest.fixture(scope="module")
@@ -135,6 +134,20 @@ def test_a_mesh_that_does_not_fit_is_made_anew_and_h_star_moves_to_its_limit() -
         assert (asked <= FITS) is fits
     assert 1e3 * found.film.numbers.h_star == pytest.approx(0.0403, rel=5e-3)
     assert 1e3 * film.numbers.h_star != pytest.approx(0.0403, rel=5e-3)
+
+
+@pytest.mark.parametrize(("bound", "own"), [(1.0, False), (3.0, True)], ids=["small", "large"])
+def test_a_film_with_a_large_error_gets_a_mesh_of_its_own(
+    monkeypatch: pytest.MonkeyPatch, bound: float, own: bool
+) -> None:
+    monkeypatch.setattr("softehl.cases.seal.solve.adaptation.friction_bound", lambda *_: bound)
+    p = P.model_copy(update={"error_estimate": True, "density": 2})
+    contact = contact_of(p)
+    film = a_film(contact.film("out", 400.0))
+    found = adaptation(p, contact).adapted(film)
+    assert isinstance(found, Adapted)
+    assert found.coarser is not None
+    assert (found.film.system is not film.system) is own
 
 
 def test_a_mesh_that_is_given_is_not_made_anew(dry: DryContact, films: dict[float, Film]) -> None:

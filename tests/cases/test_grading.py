@@ -30,8 +30,7 @@ _RADIUS = 0.5 * Seal().section_diameter
 @cache
 def _contact(density: int, mesh: str = "graded", p_s: float = 1.0) -> tuple[SealSystem, Array]:
     route = ContactMeshes(ContactSolver(PathDriver(Silent())))
-    found = route.contact(oring(density=density, mesh=mesh, sealed_pressure=p_s))
-    return found
+    return route.contact(oring(density=density, mesh=mesh, sealed_pressure=p_s))
 
 
 @cache

@@ -37,8 +37,7 @@ def elsewhere(system: SealSystem, x: Array, new: SealSystem) -> Array:
 
 @cache
 def usual() -> State:
-    found = route().contact(P)
-    return found
+    return route().contact(P)
 
 
 def place(angle: float | None) -> float | None:
@@ -57,8 +56,7 @@ def ending_at(lip: float | None, crown: float | None) -> State:
 
 def corrected(system: SealSystem, x: Array) -> Layout:
     rod, housing = (system.pressing(name, x) for name in (ROD, BORE))
-    layout = system.section.layout.held(system.mesh, rod, housing, P.sealed_pressure)
-    return layout
+    return system.section.layout.held(system.mesh, rod, housing, P.sealed_pressure)
 
 
 def test_where_in_the_contact_pressure_ends_does_not_matter() -> None:

@@ -48,8 +48,7 @@ X_RING: dict[str, Any] = {"section": "x_ring", "lobe_radius": 0.9, "fillet_radiu
 @cache
 def _contact(**changes: Any) -> tuple[SealSystem, Array]:
     route = ContactMeshes(ContactSolver(PathDriver(Silent())))
-    found = route.contact(Seal(**changes))
-    return found
+    return route.contact(Seal(**changes))
 
 
 @cache

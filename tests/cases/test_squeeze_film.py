@@ -25,8 +25,7 @@ P = Seal(ring="AS568-210", rod=19.0, sealed_pressure=3.0, density=1, speeds=(400
 @pytest.fixture(scope="module")
 def dry() -> DryContact:
     """AS568-210 under 3 MPa on a coarse mesh."""
-    found = DryContact.of(P, Silent())
-    return found
+    return DryContact.of(P, Silent())
 
 
 @pytest.fixture(scope="module")

@@ -169,11 +169,15 @@ class Adaptation:
 
 
 def _sure(film: Film, coarser: Film | None) -> bool:
-    """True if the estimated errors are as small as those of a state that is `ok`."""
+    """True if the estimated errors leave a state `ok`, as far as a mesh decides it.
+
+    Another mesh of the same arc does not add the oil beyond its ends.
+    """
     if coarser is None:
         return False
     bound = friction_bound(film.system.parameters.density, film.numbers, coarser.numbers)
-    return bound <= LARGEST_ERROR
+    left = LARGEST_ERROR - 100.0 * film.numbers.beyond
+    return bound <= (left if left > 0.0 else LARGEST_ERROR)
 
 
 def _misfit(film: Film, density: float) -> float:
