@@ -230,4 +230,4 @@ def test_how_much_uncertain_coefficients_matter(what: str, keys: dict[str, Any])
     for number, speed in enumerate(speeds):
         for name, column in zip(("mean_gap_um", "rod_friction_N"), said, strict=True):
             found = getattr(varied[speed], name) / getattr(usual[speed], name)
-            assert 100.0 * (found - 1.0) == pytest.approx(column[number], abs=0.3)
+            assert 100.0 * (found - 1.0) == pytest.approx(column[number], abs=0.5)
