@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,15 +9,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.newton import Corrector, Informed, norm_at
-from softehl.runtime.solve.solution import Solution, Status
-
-Guard = Callable[[Array], str]
-"""Words against a solution (n,) of the equations; empty where it counts."""
-
-
-def _counts(x: Array) -> str:
-    """Refuse nothing."""
-    return ""
+from softehl.runtime.solve.solution import Solution
 
 
 @dataclass(frozen=True)
@@ -26,13 +17,11 @@ class Ladder:
     """Escalation within one solve; itself a corrector.
 
     rungs: correctors, the cheapest first. A rung begins with the best iterate of the one before it
-    if the residual is smaller there than at the start, else at the start. guard: a solution that it
-    refuses counts as a failure, and the next rung begins at the start. Rungs that are `Informed`
+    if the residual is smaller there than at the start, else at the start. Rungs that are `Informed`
     are told of a solution that another rung found.
     """
 
     rungs: tuple[Corrector, ...]
-    guard: Guard = _counts
 
     def __post_init__(self) -> None:
         """Raise ValueError if there is no rung."""
@@ -45,7 +34,7 @@ class Ladder:
         """
         start, factorisations, iterations, words = x0, 0, 0, list[str]()
         for number, corrector in enumerate(self.rungs):
-            found = replace(self._judged(corrector.solve(problem, start)), rung=number)
+            found = replace(corrector.solve(problem, start), rung=number)
             factorisations += found.factorisations
             iterations += found.iterations
             if found.converged:
@@ -57,13 +46,6 @@ class Ladder:
             self._tell(problem, found.x, found.rung)
         return replace(found, message=message, factorisations=factorisations, iterations=iterations)
 
-    def _judged(self, solution: Solution) -> Solution:
-        """The solution, a failure if the guard refuses it."""
-        words = self.guard(solution.x) if solution.converged else ""
-        if not words:
-            return solution
-        return replace(solution, status=Status.REFUSED, message=words)
-
     def _tell(self, problem: Any, x: Array, finder: int) -> None:
         for number, corrector in enumerate(self.rungs):
             if number != finder and isinstance(corrector, Informed):
@@ -72,8 +54,6 @@ class Ladder:
 
 def _warmer(problem: Any, failed: Solution, start: Array) -> Array:
     """The iterate from which the next corrector begins, (n,)."""
-    if failed.status is Status.REFUSED:
-        return start
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         nearer = norm_at(problem, failed.nearest) < norm_at(problem, start)
     return failed.nearest if nearer else start

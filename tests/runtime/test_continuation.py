@@ -17,7 +17,6 @@ from scipy.sparse import csc_array
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.arclength import Arclength
 from softehl.runtime.solve.homotopy import Continuation
-from softehl.runtime.solve.ladder import Ladder
 from softehl.runtime.solve.linear import SparseMatrix
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.predictor import Predictor
@@ -305,13 +304,6 @@ def test_a_path_that_ends_says_what_stands_there(failure: Status, end: Status) -
     assert branch.status is end
     assert 0.0 <= 1.0 - branch.parameters[-1] < 4.0 * STEPS.smallest
     assert branch.failures[-1].solution.status.value in branch.message
-
-
-def test_a_guard_ends_a_path_by_its_words() -> None:
-    ladder = Ladder((Newton(),), lambda x: "" if x[0] <= 1.0 else f"x = {x[0]:.3f} is too large")
-    branch = Continuation(ladder, STEPS).follow(line, 0.5, 2.0, np.full(1, 0.5))
-    assert branch.status is Status.REFUSED
-    assert "is too large" in branch.message
 
 
 def test_a_step_that_rounding_swallows_ends_a_path() -> None:

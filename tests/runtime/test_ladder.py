@@ -115,19 +115,6 @@ def test_a_ladder_that_fails_says_what_each_rung_met() -> None:
     assert (solution.iterations, solution.factorisations) == (5, 3)
 
 
-def test_a_guard_refuses_what_solves_the_equations() -> None:
-    def positive(x: Array) -> str:
-        return "" if x[0] > 0.0 else f"x = {x[0]:.3f}"
-
-    start = np.array([-1.0])
-    refused = Ladder((Newton(),), positive).solve(Root(), start)
-    assert (refused.status, refused.message) == (Status.REFUSED, "x = -1.414")
-    assert refused.status.advice
-    second = Noted(Newton())
-    assert not Ladder((Newton(), second), positive).solve(Root(), start).converged
-    assert second.starts == [-1.0]
-
-
 def test_rungs_with_a_memory_learn_what_another_one_found() -> None:
     first, last = Noted(Newton(max_iterations=1)), Noted(Newton())
     ladder = Ladder((first, last))

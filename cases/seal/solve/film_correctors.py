@@ -62,7 +62,7 @@ class FilmCorrectors:
         """Solves steps in time; pressures: as of `whole`."""
         newton = replace(self.newton, tolerance=TOLERANCE, stagnation=1.0)
         fast = (self.fast.with_tolerance(TOLERANCE),) if self.fast else ()
-        return Ladder((*fast, PressureNewton(newton, self.system, pressures)), self._refused)
+        return Ladder((*fast, PressureNewton(newton, self.system, pressures)))
 
     @property
     def first(self) -> Corrector:
@@ -77,8 +77,3 @@ class FilmCorrectors:
         """The steady film from the last step in time, x (n,)."""
         fast = (self.fast,) if self.fast else ()
         return Ladder((*fast, self.whole())).solve(self.layered(problem, layer), x)
-
-    def _refused(self, x: Array) -> str:
-        if self.system.parameters.rough or self.system.arc_film(x)[1].min() > 0.0:
-            return ""
-        return "the film would be closed at a node"
