@@ -71,7 +71,7 @@ class PseudoTransient:
     shortest: float = 0.5
     longest: float = 10.0
     cut: float = 0.25
-    failures: tuple[int, int] = (4, 12)
+    failures: tuple[int, int] = (3, 12)
     most: int = 100
 
     def follow(
