@@ -31,12 +31,17 @@ _DENSITY = 2  # for which the sizes are chosen; other densities divide or join i
 REACH, FILMS = 0.15, 60.0
 """The arc that the contact places ends where the gap is this wide, mm, or so many films."""
 
-STEEPEST = 60.0
-"""Or where the surface is this steep, degrees: beyond it is no film."""
+STEEPEST, STEEPEST_NARROW = 55.0, 68.0
+"""Or where the surface is this steep, degrees: beyond it is no film. The second where the gap is
+narrower there than half of those films."""
 
 _UPRIGHT = 85.0
 """A surface as steep as this lies on a wall. The arc ends before it: a film that rises along it has
 no length, and on a finer mesh the section may touch the wall nearer to the rod."""
+
+_FAR_SHORT, _GENTLE = 0.8, 35.0
+"""An arc that ends at a gap of less than so much of what it is to have is made longer, where its
+surface is not steeper than this, degrees: a wall is near where it is."""
 
 
 def contact_layout(system: SealSystem, x: Array, p: Seal) -> Layout:
@@ -98,10 +103,12 @@ def _way_out(system: SealSystem, x: Array, side: int, bound: float) -> float:
         z, h, s, first = -z[::-1], h[::-1], s[::-1], len(s) - 1 - touching[0]
     else:
         first = touching[-1]
-    reach = max(REACH, FILMS * film_thickness(p, contact_edges(system, x), max(p.speeds)))
+    films = FILMS * film_thickness(p, contact_edges(system, x), max(p.speeds))
+    reach = max(REACH, films)
     steep = np.arctan2(np.diff(h), np.diff(z))
     for i in range(first, len(s) - 1):
-        if np.degrees(steep[i]) >= STEEPEST:
+        narrow = h[i] < 0.5 * films
+        if np.degrees(steep[i]) >= (STEEPEST_NARROW if narrow else STEEPEST):
             # on a coarse mesh next to the contact, which the arc has to contain
             end = max(i, first + 1)
             upright = np.degrees(steep[i]) >= _UPRIGHT and not system.section.layout.flat
@@ -109,7 +116,7 @@ def _way_out(system: SealSystem, x: Array, side: int, bound: float) -> float:
             return float(0.5 * (s[end - 1] + s[end]) if on_wall else s[end])
         if h[i + 1] >= reach:
             return float(np.interp(reach, h[i : i + 2], s[i : i + 2]))
-    if steep[-1] <= 0.0:
+    if h[-1] >= _FAR_SHORT * reach or not 0.0 < steep[-1] < np.radians(_GENTLE):
         return float(s[-1])
     wanted = (reach - h[-1]) / np.sin(steep[-1])
     longer = min(wanted, abs(bound - s[-1]), _free(system, x, side))
