@@ -20,7 +20,7 @@ from softehl.cases.seal.gland.trade.rubber_names import RANGES
 from softehl.cases.seal.gland.trade.said import understood
 
 _SURE, _TRIED = 3.0, 5.4
-"""p_s / mu up to which every film of an O-ring was right, and the largest that was tried."""
+"""p_s / mu up to which films of O-rings were `ok` but for some fast ones; the largest tried."""
 
 _OTHER = 2.0
 """Largest p_s / mu at which other sections were tried."""
@@ -53,8 +53,8 @@ def _ratio(p: FreeSeal, found: float) -> str:
     words = f"sections other than round were tried up to {_OTHER:g}, not above"
     if p.round:
         words = (
-            f"in a sample of O-rings all films were right at ratios to {_SURE:g}, 98 % at 3 to 4, "
-            "89 % at 4 to 5; above 5 states are uncertain, and nothing was tried above "
+            "in a sample of O-rings all films were found at ratios to 4, nine of ten at 4 to 5; "
+            "above 5 states are uncertain, and nothing was tried above "
             f"{_TRIED:g}"
         )
     return f"sealed pressure / shear modulus = {found:.2g}: {words} (docs/limits.md)"

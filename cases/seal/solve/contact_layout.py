@@ -44,6 +44,10 @@ _FAR_SHORT, _GENTLE = 0.8, 35.0
 surface is not steeper than this, degrees: a wall is near where it is."""
 
 
+NO_WIDTH = 1e-6
+"""Of the widest part of an arc, below which a part lies on a wall."""
+
+
 def contact_layout(system: SealSystem, x: Array, p: Seal) -> Layout:
     """The layout of a case for the contact state x (n,) on another mesh.
 
@@ -67,6 +71,12 @@ def contact_layout(system: SealSystem, x: Array, p: Seal) -> Layout:
         spots.append(_edge_spot(system, x, p, (begin, begin + length)))
     spacing = graded(length, spots, layout.long * _DENSITY, coarsest=length / COARSEST, rate=RATE)
     return layout.graded(spacing, layout.long, first=first)
+
+
+def on_wall(system: SealSystem, x: Array) -> bool:
+    """True if the arc in the contact state x (n,) goes up a wall, where a film has no length."""
+    widths = np.diff(system.arc_film(x)[0])
+    return bool(widths.min() <= NO_WIDTH * widths.max())
 
 
 def _placed(system: SealSystem, x: Array, layout: Layout) -> Layout:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.contact_layout import contact_layout
+from softehl.cases.seal.solve.contact_layout import contact_layout, on_wall
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
 from softehl.cases.seal.solve.contact_store import ContactStore, stored_contact
 from softehl.cases.seal.solve.path import StageError
@@ -26,7 +26,7 @@ GUIDE = 2
 """Density of the last graded mesh; finer ones have its layout."""
 
 SEALS = 3
-"""How often a mesh is made anew because the sealed pressure ends where nothing touches."""
+"""Meshes, at most, until the sealed pressure ends where something touches and the arc off walls."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,10 +62,10 @@ class ContactMeshes:
         return self._finer(*self._sealed(_at(p, guide), seen), p.density)
 
     def _sealed(self, p: Seal, state: State) -> State:
-        """On the last of the graded meshes; on more where pressure ends outside the contact."""
+        """On the last of the graded meshes; on more where its arc or the pressure ends badly."""
         for _ in range(SEALS):
             state = self._next(state, p)
-            if p.given_arc or not unsealed(*state):
+            if p.given_arc or not (unsealed(*state) or on_wall(*state)):
                 break
         return state
 

@@ -24,6 +24,7 @@ from softehl.cases.seal.equations.layers import film_layer
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.equations.system import DISPLACEMENT
 from softehl.cases.seal.solve.contact import OFFSET, held_moment, held_place
+from softehl.cases.seal.solve.contact_layout import NO_WIDTH
 from softehl.cases.seal.solve.inlet import InletScales
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layer
@@ -35,9 +36,6 @@ EXPONENT = 1.5
 
 FIRST = 1e-2
 """First step, of T."""
-
-_NO_WIDTH = 1e-6
-"""Of the widest part of the arc around a node, below which it is between segments on a wall."""
 
 
 def film_loads(system: SealSystem, stroke: Stroke, speed: float, x: Array) -> FilmLoads:
@@ -129,7 +127,7 @@ def pressed_film(system: SealSystem, x: Array, p_s: float) -> Array:
     sealed[:low] = p_s
     if 0 < low < len(dz):
         sealed[low] = p_s * dz[low - 1] / (dz[low - 1] + dz[low])
-    wide = width > _NO_WIDTH * width.max()
+    wide = width > NO_WIDTH * width.max()
     pressures = (
         np.divide(force, 2.0 * pi * np.abs(r) * width, out=np.zeros_like(r), where=wide) + sealed
     )
