@@ -1,11 +1,11 @@
 """Tables of docs/ that follow from declarations: `python -m softehl.cases.document` renews them.
 
-A table stands between one of these lines and `<!-- end -->`:
+A table begins with one of these lines and ends with `<!-- end -->`.
 
-    <!-- columns CASE -->            columns of a row
-    <!-- keys CASE -->               keys
-    <!-- keys CASE beyond OTHER -->  keys that the other case does not have
-    <!-- section NAME -->            dimensions of a section of a seal
+`<!-- columns CASE -->`: the columns of a row.
+`<!-- keys CASE -->`: the keys of a case.
+`<!-- keys CASE beyond OTHER -->`: its keys that the other case does not have.
+`<!-- section NAME -->`: the dimensions of a section of a seal.
 """
 
 import re

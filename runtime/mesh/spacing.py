@@ -51,10 +51,6 @@ class Spacing:
         """Relative positions (n,) of the relative indices t (n,)."""
         return np.interp(t, self._indices, self.places)
 
-    def smallest(self, count: int) -> float:
-        """The smallest of `count` segments, relative to the length of the line."""
-        return float(np.diff(self(np.linspace(0.0, 1.0, count + 1))).min())
-
     @classmethod
     def of(cls, s: Array, index: Array) -> Self:
         """Map of a line with so many segments (n,), rising, from its beginning to s (n,)."""

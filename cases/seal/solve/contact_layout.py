@@ -43,7 +43,6 @@ _FAR_SHORT, _GENTLE = 0.8, 35.0
 """An arc that ends at a gap of less than so much of what it is to have is made longer, where its
 surface is not steeper than this, degrees: a wall is near where it is."""
 
-
 NO_WIDTH = 1e-6
 """Of the widest part of an arc, below which a part lies on a wall."""
 
@@ -67,8 +66,8 @@ def contact_layout(system: SealSystem, x: Array, p: Seal) -> Layout:
     ]
     first = np.inf
     if p.opens:
-        first = 0.25 * p.corner_fillet
         spots.append(_edge_spot(system, x, p, (begin, begin + length)))
+        first = spots[-1].most
     spacing = graded(length, spots, layout.long * _DENSITY, coarsest=length / COARSEST, rate=RATE)
     return layout.graded(spacing, layout.long, first=first)
 
