@@ -24,7 +24,6 @@ import numpy as np
 
 from benchmarks.marked import renew
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.reach import ratio
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import FilmState, Silent
 
@@ -152,7 +151,7 @@ def told(line: Line) -> str:
     shown = " | ".join(f"{value:+.2f}" for value in off)
     estimates = row["h_star_error_percent"], row["rod_friction_error_percent"]
     said = ", ".join("-" if np.isnan(value) else f"{value:+.2f}" for value in estimates)
-    p_s = ratio(Seal(**given), given["sealed_pressure"])
+    p_s = Seal(**given).load_ratio(given["sealed_pressure"])
     where = f"{number} | {given.get('section', 'round')} | {numerics} | {p_s:.1f} | {u:+g}"
     return f"| {where} | {shown} | {said} | {row['verdict']} |"
 

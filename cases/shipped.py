@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # so that `softehl run --help` loads nothing heavy
 
 SHIPPED = {
     "oring": "softehl.cases.oring",
-    "slider": "softehl.cases.slider",
+    "slider": "softehl.cases.slider.case",
     "cycle": "softehl.cases.cycle",
 }
 """Name of a case -> the module that declares it, imported when the case is needed."""

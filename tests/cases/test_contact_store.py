@@ -15,7 +15,7 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.keys import dimensions
 from softehl.cases.seal.solve.contact import contact_problem
-from softehl.cases.seal.solve.contact_store import (
+from softehl.cases.seal.solve.contact_meshes import (
     WITHOUT_INFLUENCE,
     ContactStore,
     contact_key,

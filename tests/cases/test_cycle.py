@@ -20,7 +20,6 @@ from softehl.cases.harness.pictures import titled
 from softehl.cases.seal.cycle import cycles
 from softehl.cases.seal.cycle.cycles import Films
 from softehl.cases.seal.cycle.motion import Motion, RodFilm, Table
-from softehl.cases.seal.cycle.strip import Oil, Strip
 from softehl.cases.seal.cycle.transient import Reading
 from softehl.cases.seal.equations.system import FILM, PRESSURE, SQUEEZE, VOID
 from softehl.cases.seal.gland.parameters import Seal
@@ -31,6 +30,7 @@ from softehl.cases.seal.report.cycle import (
     moving_section,
     write_animation,
 )
+from softehl.cases.slider.strip import Oil, Strip
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem import rules
 from softehl.runtime.fem.problem import Problem

@@ -12,9 +12,9 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact import load_stage
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
-from softehl.cases.seal.solve.failure import explained
 from softehl.cases.seal.solve.path import PathDriver, StageError
-from softehl.cases.seal.states.contact_results import contact_numbers
+from softehl.cases.seal.solve.remedies import explained
+from softehl.cases.seal.states.contacts import contact_numbers
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.solve.solution import Branch, Status
 

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.equations.equations import build_system
-from softehl.cases.seal.equations.layers import film_layer
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve import film_correctors
+from softehl.cases.seal.solve import correctors
 from softehl.cases.seal.solve.method import run
-from softehl.cases.seal.solve.squeeze_film import film_loads
+from softehl.cases.seal.solve.squeeze_film import film_layer, film_loads
 from softehl.cases.seal.states.state import Outcome
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layered
@@ -110,7 +109,7 @@ class VeryTired(Tired):
 def test_where_it_gives_up_newton_goes_on(
     monkeypatch: pytest.MonkeyPatch, corrector: type[Tired]
 ) -> None:
-    monkeypatch.setattr(film_correctors, "SchurCorrector", corrector)
+    monkeypatch.setattr(correctors, "SchurCorrector", corrector)
     parameters = oring(density=1, sealed_pressure=1.0, stroke="out", speeds=SPEEDS)
     outcome = run(parameters, Recorder())
     assert outcome.converged, outcome.message

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
-from softehl.cases.seal.solve.contact_layout import RATE
-from softehl.cases.seal.solve.film_layout import (
+from softehl.cases.seal.solve.layouts import (
     COARSEST,
+    RATE,
     RISE,
     THIN,
     THINNING,

@@ -14,13 +14,12 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact import approach_stage, load_stage, release_stage
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.failure import explained, without_films
 from softehl.cases.seal.solve.films import NoFilm
 from softehl.cases.seal.solve.inlet import film_thickness
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.solve.path import PathDriver, StageError
-from softehl.cases.seal.states.contact_results import unsealed
-from softehl.cases.seal.states.contacts import contact_edges
+from softehl.cases.seal.solve.remedies import explained, without_films
+from softehl.cases.seal.states.contacts import contact_edges, unsealed
 from softehl.cases.seal.states.state import (
     CLIPPED,
     COLLAPSED,

@@ -8,11 +8,10 @@ import pytest
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.section.layout import Layout
-from softehl.cases.seal.section.uniform_layout import uniform_layout
-from softehl.cases.seal.solve.contact_layout import contact_layout
+from softehl.cases.seal.section.layout import Layout, uniform_layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
+from softehl.cases.seal.solve.layouts import contact_layout
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.states.contacts import contact_edges

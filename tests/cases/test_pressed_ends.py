@@ -12,11 +12,11 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.system import BORE, ROD
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.section.layout import Layout
-from softehl.cases.seal.solve.contact_layout import contact_layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
+from softehl.cases.seal.solve.layouts import contact_layout
 from softehl.cases.seal.solve.path import PathDriver
-from softehl.cases.seal.states.contact_results import contact_pressure, unsealed
+from softehl.cases.seal.states.contacts import contact_pressure, unsealed
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.outline import Outline, Shape

@@ -15,7 +15,7 @@ from softehl.cases.seal.gland.rubbers.regions import PRESETS
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.inlet import inlet_length
 from softehl.cases.seal.solve.path import PathDriver
-from softehl.cases.seal.states.contact_results import contact_pressure
+from softehl.cases.seal.states.contacts import contact_pressure
 from softehl.cases.seal.states.state import Silent
 from softehl.cases.shipped import SHIPPED
 from softehl.runtime.arrays import Array

@@ -11,7 +11,7 @@ from softehl.cases.harness.row import OK
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.solve.contact import contact_problem
-from softehl.cases.seal.states.contact_results import contact_pressure
+from softehl.cases.seal.states.contacts import contact_pressure
 from softehl.cases.seal.states.film_signs import (
     THIN,
     end_gap,

@@ -14,21 +14,21 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.sections import SECTIONS
-from softehl.cases.seal.section.layout import pressure_boundary
-from softehl.cases.seal.section.uniform_layout import uniform_layout
+from softehl.cases.seal.section.layout import pressure_boundary, uniform_layout
 from softehl.cases.seal.solve.contact import contact_problem
-from softehl.cases.seal.solve.contact_meshes import ContactMeshes
+from softehl.cases.seal.solve.contact_meshes import ContactMeshes, contact_key
 from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.contact_store import contact_key
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.solve.path import PathDriver
-from softehl.cases.seal.states.contact_results import contact_peaks, contact_pressure, overlap
 from softehl.cases.seal.states.contacts import (
     CONTACT_FILM,
     contact_edges,
     contact_film,
+    contact_peaks,
+    contact_pressure,
     contacts,
     groups,
+    overlap,
 )
 from softehl.cases.seal.states.results import filled_ratio, film_parts, metering
 from softehl.cases.seal.states.state import OSCILLATING, Outcome, Silent

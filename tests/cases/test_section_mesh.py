@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softehl.cases.seal.section.layout import Layout
-from softehl.cases.seal.section.uniform_layout import uniform_layout
+from softehl.cases.seal.section.layout import Layout, uniform_layout
 from softehl.runtime.mesh.outline import Outline, Shape
 from softehl.runtime.mesh.section_mesh import Sizes, section_mesh
 from softehl.runtime.mesh.sections import corner_jacobians

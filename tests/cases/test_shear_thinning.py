@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from softehl.cases.cycle import Cycle
 from softehl.cases.seal.equations.system import FILM, blocks_of
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.profiles import Slider
+from softehl.cases.slider.parameters import Slider
 from tests.cases.test_slider import row
 
 POLYMER: dict[str, Any] = {

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 import softehl
 from softehl.cases.harness.observer import State
 from softehl.cases.harness.parameters import Parameters
-from softehl.cases.slider import CASE, Slider, SliderRow
+from softehl.cases.slider.case import CASE, Slider, SliderRow
 from softehl.runtime.arrays import Array
 from tests.reference import slider as reference
 from tests.reference.calling import fitted_order

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 import softehl
 from softehl.cases.harness.observer import State
-from softehl.cases.slider import CASE, Slider, SliderRow
+from softehl.cases.slider.case import CASE, Slider, SliderRow
 from softehl.runtime.io import read_table
 from tests.reference import mixed
 from tests.reference.calling import fitted_order

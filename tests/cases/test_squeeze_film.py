@@ -10,7 +10,7 @@ import pytest
 from softehl.cases.seal.equations.system import DISPLACEMENT
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact import OFFSET
-from softehl.cases.seal.solve.film_correctors import FilmCorrectors
+from softehl.cases.seal.solve.correctors import FilmCorrectors
 from softehl.cases.seal.solve.films import NoFilm
 from softehl.cases.seal.solve.inlet import InletScales
 from softehl.cases.seal.solve.method import DryContact

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.equations.equations import SealSystem, build_system, seal_study
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.scales import film_flux
-from softehl.cases.seal.equations.study import seal_study
 from softehl.cases.seal.equations.system import PRESSURE, ROD, Block, blocks_of
 from softehl.cases.seal.section.section import seal_section
 from tests.cases.oring_cases import oring

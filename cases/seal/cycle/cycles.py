@@ -22,11 +22,11 @@ from softehl.cases.seal.cycle.restart import (
 from softehl.cases.seal.cycle.transient import Instant, March, Reading
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.solve.failure import explained
-from softehl.cases.seal.solve.film_correctors import film_corrector
+from softehl.cases.seal.solve.correctors import film_corrector
 from softehl.cases.seal.solve.films import NoFilm
 from softehl.cases.seal.solve.method import DryContact
 from softehl.cases.seal.solve.path import StageError
+from softehl.cases.seal.solve.remedies import explained
 from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import Condenser

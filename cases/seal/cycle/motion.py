@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
+from softehl.runtime.fem import rules
 from softehl.runtime.io import read_table
 
 
@@ -180,3 +181,14 @@ def motion_of(
     if isinstance(pressure, (int, float)):
         return motion
     return replace(motion, pressure=Table.of(pressure))
+
+
+def missing(supply: float, outer: float, inner: float, order: int) -> float:
+    """Void fraction of an end of the film to which the rod brings a film of this thickness (mm).
+
+    outer, inner: h at this end and at the other of its segment, mm, which has `order` subcells.
+    Of the outmost one the rod carries h_1 h_2 over their mean (`codegen/models/mixed_film.py`).
+    """
+    share = 0.5 * (1.0 + rules.pressure_nodes(order)[1])
+    next_to = outer + share * (inner - outer)
+    return float(max(0.0, 1.0 - supply * 0.5 * (outer + next_to) / (outer * next_to)))

@@ -13,12 +13,11 @@ from math import nan
 
 import numpy as np
 
-from softehl.cases.seal.cycle.motion import Motion, RodFilm
-from softehl.cases.seal.cycle.strip import missing
+from softehl.cases.seal.cycle.motion import Motion, RodFilm, missing
 from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.equations.layers import film_layer
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.system import FILM, PRESSURE, SQUEEZE
+from softehl.cases.seal.solve.squeeze_film import film_layer
 from softehl.cases.seal.states.results import rough_numbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layer, Layered

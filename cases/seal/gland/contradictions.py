@@ -6,16 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softehl.cases.seal.gland.reach import MOST, ratio
 from softehl.cases.seal.gland.records.discretisation import Discretisation
+from softehl.cases.seal.gland.records.free_seal import Solid
 from softehl.cases.seal.gland.records.gland import Gland
-from softehl.cases.seal.gland.records.solid import Solid
 from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
 from softehl.cases.seal.gland.sections.keys import is_mesh
 from softehl.cases.seal.gland.tolerances import read_tolerances
 
 if TYPE_CHECKING:
     from softehl.cases.seal.gland.parameters import Seal
+
+_MOST = 6.0
+"""Largest p_s / mu that is not refused: runs above it take minutes to `uncertain` states."""
 
 _LOWEST_ESTIMATED = 3
 """Least pressure order whose error is well below what the meshes differ by."""
@@ -196,11 +198,11 @@ def _section_is_between_the_walls(p: Gland) -> None:
 
 
 def _pressure_is_within_reach(p: Seal) -> None:
-    found = ratio(p, p.sealed_pressure)
-    if found > MOST:
+    found = p.load_ratio(p.sealed_pressure)
+    if found > _MOST:
         raise ValueError(
             f"sealed_pressure = {p.sealed_pressure:g} MPa is {found:.2g} times the shear modulus "
-            f"of the rubber; films are found up to {MOST:g} times (docs/limits.md); take a harder "
+            f"of the rubber; films are found up to {_MOST:g} times (docs/limits.md); take a harder "
             "rubber or a lower pressure"
         )
 

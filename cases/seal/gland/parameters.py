@@ -13,11 +13,10 @@ from softehl.cases.seal.gland.fitting import fitted
 from softehl.cases.seal.gland.oils import with_oil
 from softehl.cases.seal.gland.records.duty import Duty
 from softehl.cases.seal.gland.records.film_model import FilmModel
-from softehl.cases.seal.gland.records.free_seal import FreeSeal
+from softehl.cases.seal.gland.records.free_seal import FreeSeal, Solid
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.records.numerics import Numerics
 from softehl.cases.seal.gland.records.oil import Oil
-from softehl.cases.seal.gland.records.solid import Solid
 from softehl.cases.seal.gland.rubbers.regions import with_regions
 from softehl.cases.seal.gland.rubbers.rubber import with_rubber
 from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber

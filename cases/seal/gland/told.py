@@ -8,7 +8,6 @@ from typing import Any
 from softehl.cases.seal.gland.given import shown
 from softehl.cases.seal.gland.grooves import gland
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.reach import ratio
 from softehl.cases.seal.gland.records.free_seal import FreeSeal
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.rubbers import materials
@@ -34,13 +33,13 @@ def foreword(p: Seal, pressure: float) -> list[str]:
     The latter is left out without a pressure, and where `warnings` has it: beyond what is known to
     run. pressure: the largest sealed pressure, MPa.
     """
-    found = ratio(p, pressure)
+    found = p.load_ratio(pressure)
     return [*understood(p.said), *([_ratio(p, found)] if 0.0 < found <= _most(p) else [])]
 
 
 def warnings(p: Seal, pressure: float) -> list[str]:
     """A pressure above what is known to run, keys without effect, what is unusual, a line each."""
-    found = ratio(p, pressure)
+    found = p.load_ratio(pressure)
     beyond = [f"{_ratio(p, found)}; {_DO}"] if found > _most(p) else []
     return [*beyond, *_unused(p), *_unusual(p), *handbook(p)]
 

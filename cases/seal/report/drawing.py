@@ -9,7 +9,7 @@ from matplotlib.patches import Polygon
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.section import draw_gland
-from softehl.cases.seal.section.uniform_layout import uniform_layout
+from softehl.cases.seal.section.layout import uniform_layout
 
 
 def gland_figure(p: Seal) -> Figure:

@@ -14,9 +14,8 @@ from functools import cached_property
 import numpy as np
 
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.records.solid import Solid
-from softehl.cases.seal.section.layout import Layout
-from softehl.cases.seal.section.uniform_layout import uniform_layout
+from softehl.cases.seal.gland.records.free_seal import Solid
+from softehl.cases.seal.section.layout import Layout, uniform_layout
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.sections import SectionMesh
 

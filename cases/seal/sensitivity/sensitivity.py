@@ -18,7 +18,7 @@ from softehl.cases.seal.gland.records.numerics import Numerics
 from softehl.cases.seal.sensitivity.quantities import along, by_unknowns, fields_along, quantities
 from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
 from softehl.cases.seal.solve.films import Film
-from softehl.cases.seal.solve.judging import Differentiate
+from softehl.cases.seal.solve.method import Differentiate
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import Inputs, Tangent
 from softehl.runtime.solve.backends import choose

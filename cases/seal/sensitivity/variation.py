@@ -16,7 +16,7 @@ from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.gland.given import number, times
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.varied import LENGTHS, NUMBERS, PRESSURE_KEY
-from softehl.cases.seal.section.uniform_layout import uniform_layout
+from softehl.cases.seal.section.layout import uniform_layout
 from softehl.runtime.fem.design import Inputs, rate_of
 from softehl.runtime.mesh.carried_mesh import carried_mesh, carried_places
 

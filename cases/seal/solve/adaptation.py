@@ -13,8 +13,8 @@ from fractions import Fraction
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact_solver import ContactSolver
-from softehl.cases.seal.solve.film_layout import film_layout, misfit
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
+from softehl.cases.seal.solve.layouts import film_layout, misfit
 from softehl.cases.seal.solve.path import StageError
 from softehl.cases.seal.solve.transfer import FilmTransfer
 from softehl.cases.seal.states.estimate import coarser_density, friction_bound, system_at

@@ -15,8 +15,8 @@ from softehl.cases.seal.equations.system import BORE, ROD
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.solve import remedies
+from softehl.cases.seal.solve.correctors import PressureNewton
 from softehl.cases.seal.solve.path import Stage
-from softehl.cases.seal.solve.pressure_newton import PressureNewton
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem

@@ -16,7 +16,7 @@ from scipy.sparse import csc_array, diags_array
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.solve.contact import contact_problem
-from softehl.cases.seal.solve.pressure_newton import PressureNewton
+from softehl.cases.seal.solve.correctors import PressureNewton
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.mass import lumped, mass_matrices
 from softehl.runtime.fem.problem import Problem

@@ -15,12 +15,17 @@ from functools import cached_property
 from math import inf
 
 from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.equations.layers import film_layer
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
-from softehl.cases.seal.solve.film_correctors import FilmCorrectors
+from softehl.cases.seal.solve.correctors import FilmCorrectors
 from softehl.cases.seal.solve.inlet import POWER, InletScales
 from softehl.cases.seal.solve.path import PathDriver
-from softehl.cases.seal.solve.squeeze_film import FIRST, SqueezeFilm, film_loads, pressed_film
+from softehl.cases.seal.solve.squeeze_film import (
+    FIRST,
+    SqueezeFilm,
+    film_layer,
+    film_loads,
+    pressed_film,
+)
 from softehl.cases.seal.states.results import film_numbers
 from softehl.cases.seal.states.state import StageRecord, place
 from softehl.cases.seal.states.verdict import FilmNumbers

@@ -1,9 +1,18 @@
-"""Ends of a path of the contact, and what may help, in words of ring, gland and pressure."""
+"""Why a run ended early, and what may help, in words of ring, gland, pressure and film."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.records.numerics import Numerics
+from softehl.runtime.solve.solution import Status
+
+if TYPE_CHECKING:  # both import the ends of a path
+    from softehl.cases.seal.solve.films import NoFilm
+    from softehl.cases.seal.solve.path import StageError
 
 _GLAND = (
     "glands with a squeeze of 6 to 30 %, a stretch of 0 to 6 % and a width of 1.02 to 2 sections "
@@ -19,6 +28,24 @@ _EXTRUSION = (
     "harder rubber (mu_1, mu_2)"
 )
 _RELEASE = "try a smaller housing_friction or a finer mesh (larger density)"
+
+
+ROLLING = (
+    'with rotation = "free" hardly anything but the film turns or holds the section: use "fixed"'
+)
+
+_FILM = (
+    "films are hard to find at this sealed pressure, {:.2g} times the shear modulus; try a finer "
+    "mesh (larger density), a lower sealed_pressure or a harder rubber"
+)
+
+_ARC = (
+    "part of it may be beyond the given arc, {:g} to {:g} degrees; leave arc_start and arc_end out"
+)
+
+_THICK = "try a finer mesh (larger density), or lower speeds or a thinner oil where films are thick"
+
+_HIGH = 1.5  # shear moduli
 
 
 def not_squeezed(p: Gland, share: float) -> str:
@@ -60,3 +87,28 @@ def _ring(p: Gland) -> str:
 
 def _gland(p: Gland) -> str:
     return f"squeeze {p.squeeze_percent:.3g} %, width {p.groove_width:g} mm"
+
+
+def explained(failed: StageError, where: str, p: Numerics) -> tuple[Status, str]:
+    """Status and message of a run that ends with this stage.
+
+    where: which part of the run it was.
+    """
+    advice = f"; {ROLLING}" if p.rotation == "free" else ""
+    return failed.branch.status, f"{where}: {failed}{advice}"
+
+
+def without_films(missed: Sequence[NoFilm], p: Seal) -> tuple[Status, str]:
+    """Status and message of a stroke that lacks the films of these speeds."""
+    first, speeds = missed[0], ", ".join(f"{film.speed:g}" for film in missed)
+    advice = ROLLING if p.rotation == "free" else _film_advice(p)
+    words = f"{first.stroke}stroke: no film was found at {speeds} mm/s; {advice}"
+    return first.status, f"{words}; the solver says: {first.message}"
+
+
+def _film_advice(p: Seal) -> str:
+    """Advice for a film that was not found."""
+    if p.given_arc:
+        return _ARC.format(*p.given_arc)
+    times = p.sealed_pressure / p.shear_modulus
+    return _FILM.format(times) if times > _HIGH else _THICK

@@ -21,8 +21,8 @@ from scipy.interpolate import PchipInterpolator
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.solve.contact import contact_problem, correction_stage
+from softehl.cases.seal.solve.correctors import lagged
 from softehl.cases.seal.solve.path import Stage
-from softehl.cases.seal.solve.pressure_newton import lagged
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.fem.lagged_pressure import element_pressures
 from softehl.runtime.fem.rules import lagrange, pressure_nodes

@@ -16,7 +16,6 @@ from fractions import Fraction
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.reach import ratio
 from softehl.cases.seal.states.verdict import (
     FINER,
     INLET_RATIO,
@@ -73,7 +72,7 @@ def unseen(p: Seal) -> str:
             f'the error of pressure_order = {p.pressure_order} with reynolds = "{p.reynolds}" '
             "cannot be estimated; use an order of 3 or more"
         )
-    if (above := ratio(p, p.sealed_pressure)) > COMPARED:
+    if (above := p.load_ratio(p.sealed_pressure)) > COMPARED:
         return (
             f"sealed pressure / shear modulus = {above:.2g} is above {COMPARED:g}, where two "
             "meshes may agree on a wrong film; use a harder rubber or a lower pressure"

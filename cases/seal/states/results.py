@@ -15,15 +15,17 @@ from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.equations.system import FACET, FILM
 from softehl.cases.seal.gland.surfaces import MICROMETRE, regime
 from softehl.cases.seal.states.contacts import CONTACT_FILM, contact_film, contact_level, groups
-from softehl.cases.seal.states.entrance import built_up, wedge, wedge_friction
 from softehl.cases.seal.states.film_signs import (
     INLET,
     THIN,
+    built_up,
     end_gap,
     inlet_ratio,
     inlet_segments,
     lacking,
     oscillation,
+    wedge,
+    wedge_friction,
 )
 from softehl.cases.seal.states.section_view import film_pressure, section_view
 from softehl.cases.seal.states.state import FilmState, Profile

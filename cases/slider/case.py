@@ -7,9 +7,9 @@ import numpy as np
 from softehl.cases.harness.observer import State
 from softehl.cases.harness.row import OK, Row, column
 from softehl.cases.harness.row_by_row import RowByRow
-from softehl.cases.seal.cycle.rigid import conserving_solution, penalty_solution, strip_of
-from softehl.cases.seal.cycle.strip import beyond_front, fronts
-from softehl.cases.seal.gland.profiles import Slider
+from softehl.cases.slider.film import conserving_solution, penalty_solution, strip_of
+from softehl.cases.slider.parameters import Slider
+from softehl.cases.slider.strip import beyond_front, fronts
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.postprocess import element_means, interval_below
 from softehl.runtime.fem.problem import Problem

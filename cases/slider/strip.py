@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from softehl.cases.seal.cycle.motion import missing
 from softehl.cases.seal.equations import scales
 from softehl.cases.seal.equations.system import DISPLACEMENT, FILM, MOVED, PRESSURE, VOID
 from softehl.cases.seal.gland.surfaces import PRESSURE_SCALE, VOID_SCALE, SurfacePair, void_values
@@ -120,17 +121,6 @@ class Strip:
         h, end = (self.h[0], 0) if speed > 0.0 else (self.h[-1, ::-1], 1)
         void[end] = missing(supply, h[0], h[1], self.order)
         return void
-
-
-def missing(supply: float, outer: float, inner: float, order: int) -> float:
-    """Void fraction of an end of the film to which the rod brings a film of this thickness (mm).
-
-    outer, inner: h at this end and at the other of its segment, mm, which has `order` subcells.
-    Of the outmost one the rod carries h_1 h_2 over their mean (`codegen/models/mixed_film.py`).
-    """
-    share = 0.5 * (1.0 + rules.pressure_nodes(order)[1])
-    next_to = outer + share * (inner - outer)
-    return float(max(0.0, 1.0 - supply * 0.5 * (outer + next_to) / (outer * next_to)))
 
 
 def fronts(x: Array, p: Array, v: Array, p_c: float) -> tuple[float, float]:

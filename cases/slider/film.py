@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from softehl.cases.seal.cycle.strip import Oil, Strip
 from softehl.cases.seal.equations.system import DISPLACEMENT, FILM, MOVED, PRESSURE
-from softehl.cases.seal.gland.profiles import Slider
 from softehl.cases.seal.gland.surfaces import SurfacePair
+from softehl.cases.slider.parameters import Slider
+from softehl.cases.slider.strip import Oil, Strip
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem import dofs, rules
 from softehl.runtime.fem.problem import Problem

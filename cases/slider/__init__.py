@@ -1,0 +1,1 @@
+"""A rigid profile over a moving plane: the film of a given gap, under the kernels of the seal."""
