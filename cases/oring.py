@@ -17,7 +17,7 @@ from softehl.cases.seal.states import plan
 from softehl.cases.seal.states.answer import answer
 from softehl.cases.seal.states.leakage import net_leakage
 from softehl.cases.seal.states.observer_adapter import ObserverAdapter
-from softehl.cases.seal.states.sensitivity_table import resolved
+from softehl.cases.seal.states.sensitivity_table import differentiable, resolved
 from softehl.cases.seal.states.state import FilmRow
 from softehl.cases.seal.states.state import Observer as SealObserver
 from softehl.cases.seal.states.state import Outcome as SealOutcome
@@ -166,7 +166,7 @@ class ORingCase(Case[Seal, FilmRow]):
 
     def share(self, parameters: Seal) -> tuple[float, str]:
         """See :class:`Case`."""
-        from softehl.cases.seal.solve.contact_store import contact_key
+        from softehl.cases.seal.solve.contact_meshes import contact_key
 
         return parameters.density, contact_key(parameters)
 
@@ -186,14 +186,17 @@ def run_oring(
 
 def _not_differentiated(rows: Sequence[FilmRow]) -> list[str]:
     """Why states have no sensitivities, in words; empty where all have them."""
-    left_out = [row for row in rows if not resolved(row)]
-    if not left_out:
-        return []
-    return [
-        f"no sensitivities of {CASE.named(left_out)}: the mesh does not show the film well enough "
-        "to differentiate it (verdict and inlet_ratio in curve.csv); use a graded mesh or a larger "
-        "density"
-    ]
+    left_out = [row for row in rows if not differentiable(row)]
+    unseen = [row for row in left_out if not resolved(row)]
+    cut = [row for row in left_out if resolved(row)]
+    reasons = (
+        "the mesh does not show the film well enough to differentiate it (verdict and inlet_ratio "
+        "in curve.csv); use a graded mesh or a larger density",
+        "the film begins before its arc, with the pressure built up there (entrance_pressure_MPa "
+        "in curve.csv); lower speeds or a thinner oil have a shorter inlet",
+    )
+    both = zip((unseen, cut), reasons, strict=True)
+    return [f"no sensitivities of {CASE.named(of)}: {why}" for of, why in both if of]
 
 
 CASE = ORingCase()

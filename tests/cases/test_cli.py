@@ -53,7 +53,8 @@ HEADER = (
     "contact_start_mm,contact_end_mm,newton_iterations,flux_variation,moment_N_mm,contact_p_max_MPa,oscillation_index,"
     "inlet_segments,inlet_ratio,mean_gap_um,lambda_ratio,regime,"
     "asperity_load_percent,boundary_friction_percent,groove_start_mm,groove_end_mm,"
-    "groove_pressure_MPa,h_min_sealed_um,h_min_air_um,flux_mismatch_percent,density,verdict"
+    "groove_pressure_MPa,h_min_sealed_um,h_min_air_um,flux_mismatch_percent,"
+    "entrance_pressure_MPa,density,verdict"
 )
 FAST = ("--set", "speeds=[400, 100]")
 PLOTS = {f"{name}.png" for name in PICTURES}

@@ -34,7 +34,7 @@ from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
 from softehl.cases.seal.solve.films import Film
 from softehl.cases.seal.solve.method import DryContact
 from softehl.cases.seal.states.results import film_numbers, film_state
-from softehl.cases.seal.states.sensitivity_table import SensitivityRow, resolved
+from softehl.cases.seal.states.sensitivity_table import SensitivityRow, differentiable, resolved
 from softehl.cases.seal.states.state import FilmRow, Silent
 from softehl.cases.seal.states.verdict import Verdict
 from softehl.runtime.arrays import Array
@@ -255,6 +255,15 @@ def test_only_states_that_the_mesh_shows_are_differentiated() -> None:
     (words,) = CASE.complaints(p, [replace(row, inlet_ratio=0.9)], [], "")
     assert "the mesh does not show the film well enough" in words
     assert CASE.complaints(p, [row], [], "") == []
+
+
+def test_films_that_begin_before_their_arc_are_said_to_have_no_sensitivities() -> None:
+    row = FilmRow(**film_values(verdict="ok", inlet_ratio=0.997))
+    cut = replace(row, entrance_pressure_MPa=0.1)
+    assert differentiable(row)
+    assert not differentiable(cut)
+    (words,) = CASE.complaints(Seal(sensitivity=True), [row, cut], [], "")
+    assert "the film begins before its arc" in words
 
 
 # ------------------------------------------------------------------------------------- tolerances

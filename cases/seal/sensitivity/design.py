@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.sensitivity.quantities import QUANTITIES
-from softehl.cases.seal.states.sensitivity_table import resolved
+from softehl.cases.seal.states.sensitivity_table import differentiable
 from softehl.cases.seal.states.state import FilmState
 from softehl.runtime.names import meant
 
@@ -149,7 +149,7 @@ def settled(near: Step, wanted: float, slope: float, change: Change | None) -> l
 
 def _film(p: Seal, key: str, solve: Callable[[Seal], FilmState | None]) -> FilmState:
     state = solve(p)
-    if state is None or not resolved(state) or state.sensitivity is None:
+    if state is None or not differentiable(state) or state.sensitivity is None:
         verdict = "did not converge" if state is None else f"has the verdict {state.verdict}"
         raise NoDesignError(
             f"with {key} = {getattr(p, key):g} the film {verdict}: no sensitivities of it; use a "

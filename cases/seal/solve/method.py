@@ -28,7 +28,7 @@ from softehl.cases.seal.states.contacts import (
 from softehl.cases.seal.states.estimate import estimated_error, reservation
 from softehl.cases.seal.states.plan import strokes_of
 from softehl.cases.seal.states.results import film_state
-from softehl.cases.seal.states.sensitivity_table import resolved
+from softehl.cases.seal.states.sensitivity_table import differentiable
 from softehl.cases.seal.states.state import (
     ContactState,
     FilmState,
@@ -97,7 +97,7 @@ class Judge:
             rod_friction_error_percent=friction,
             reservation=reservation(p, numbers, other) if adapted.fits else UNFIT,
         )
-        if self.differentiate and resolved(state.settled) and not film.loads.entrance:
+        if self.differentiate and differentiable(state.settled):
             state = replace(state, sensitivity=self.differentiate(film))
         return state.settled
 

@@ -255,6 +255,7 @@ def film_state(
         asperity_load_percent=100.0 * numbers.asperity_load,
         boundary_friction_percent=100.0 * numbers.boundary_friction,
         **_groove(numbers),
+        entrance_pressure_MPa=film.entrance,
         verdict=verdict.word,
         advice=verdict.advice,
         profile=_profile(system, problem, x),

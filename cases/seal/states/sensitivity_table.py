@@ -24,6 +24,14 @@ class SensitivityRow(Record):
     )
 
 
+def differentiable(row: FilmRow) -> bool:
+    """True if a state has derivatives: its arc holds the whole inlet, and the mesh shows it.
+
+    The pressure that oil builds up before an arc is held while a film is solved.
+    """
+    return resolved(row) and row.entrance_pressure_MPa == 0.0
+
+
 def resolved(row: FilmRow) -> bool:
     """True if the mesh shows the film well enough to differentiate it.
 

@@ -142,6 +142,9 @@ class FilmRow(Row):
     flux_mismatch_percent: float = column(
         "%", "difference between the fluxes of two contacts; 0 where mass is conserved", default=nan
     )
+    entrance_pressure_MPa: float = column(
+        "MPa", "built up before the arc, where that begins within the film; else 0", default=0.0
+    )
     density: int = column("", "density of the mesh that the state was solved on")
     verdict: str = column(
         "",
