@@ -338,5 +338,5 @@ def test_a_sweep_of_two_cases(tmp_path: Path) -> None:
 
 
 def test_the_case_is_one_short_file() -> None:
-    source = Path(softehl.__file__).parents[2] / "cases" / "slider.py"
+    source = Path(softehl.__file__).parents[2] / "cases" / "slider" / "case.py"
     assert len(source.read_text(encoding="utf-8").splitlines()) < 150

@@ -1,9 +1,9 @@
 """The dry contact beyond the end of its load path, by pseudo-transient continuation.
 
-Where a section snaps over, or a node is in contact by neither of its two states, no step of the
-pressure is short enough. Implicit steps in time under the whole pressure go on from there: every
-node is held where it was by a spring, mu V / (d^2 tau) with its volume V and the section diameter
-d. A short tau makes the next state unique; a long one leaves the contact alone.
+No step of the pressure is short enough for a section that snaps over, or for a node that is in
+contact by neither of its two states. Implicit steps in time under the whole pressure go on from
+there. A spring mu V / (d^2 tau) holds every node where it was, with its volume V and the section
+diameter d. A short tau makes the next state unique; a long one leaves the contact alone.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 """The dry contact on one mesh: by its path from rest, or from the state of another mesh.
 
-A loaded state of another mesh is carried over and corrected by Newton's method. Where that fails
-the path is taken up at a checkpoint under less pressure, carried in the same way; where that does
-not lead on either, at rest, which is the same on every mesh. Where a path of the pressure ends, the
-section creeps on from there (`solve.contact_relaxation`).
+A loaded state of another mesh is carried over and corrected by Newton's method. If that fails, the
+path is taken up at a checkpoint under less pressure, carried in the same way; if that does not lead
+on either, at rest, which is the same on every mesh. From the end of a path of the pressure the
+section creeps on (`solve.contact_relaxation`).
 
 Above two or three shear moduli the section fills the corners of its groove but for pockets of a few
-elements. What interpolation leaves there Newton's method does not correct on another mesh. Under
-half of the pressure the pockets are wide.
+elements. Newton's method does not correct the errors that interpolation leaves there. Under half of
+the pressure the pockets are wide.
 """
 
 from __future__ import annotations

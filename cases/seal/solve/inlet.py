@@ -1,10 +1,9 @@
 """The scales of a film at the edge of the dry contact where it is drawn in.
 
 The dry pressure begins like a square root there, p = K sqrt(distance): the inlet draws the film in
-just outside one edge, the exit dip lies just inside the other. Balance of viscous and elastic
-forces, K / sqrt(l) = eta U / h^2 with h = K l^(3/2) / E, gives the length
-l = (eta U E^2 / K^3)^(2/5) at every speed (Snoeijer, Eggers and Venner, Phys. Fluids 25, 2013,
-101705).
+just outside one edge, the exit dip lies just inside the other. Viscous and elastic forces balance,
+K / sqrt(l) = eta U / h^2 with h = K l^(3/2) / E. This gives the length l = (eta U E^2 / K^3)^(2/5)
+at every speed (Snoeijer, Eggers, Venner: Phys. Fluids 25, 101705, 2013).
 """
 
 from __future__ import annotations

@@ -2,13 +2,13 @@
 
 Displacements, multipliers and element pressures of a contact are carried over and corrected by
 Newton's method, which holds on to the pressures in its tangent (`runtime.fem.lagged_pressure`).
-The multipliers are unknowns, so contact is stiff from the first iteration on. What is solved is the
-same as on the path of `cases.seal.solve.path`; only the start is another one.
+The multipliers are unknowns, so contact is stiff from the first iteration on. The equations are
+those of a path (`cases.seal.solve.path`); only the start is another one.
 
-The contact of a film is known on both meshes. What is carried is the change from contact to film:
-it is small and smooth where the state itself is not, as in the corners of a groove. A gap of a
-micrometre does not survive that, so the film thickness is carried by itself, ln h over the place on
-the arc, and what that changes is spread into the body.
+The contact of a film is known on both meshes. The change from contact to film is carried: it is
+small and smooth where the state itself is not, as in the corners of a groove. A gap of a micrometre
+does not survive that, so the film thickness is carried by itself, ln h over the place on the arc,
+and the change of it is spread into the body.
 """
 
 from __future__ import annotations
