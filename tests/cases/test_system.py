@@ -170,7 +170,7 @@ def test_a_pressure_is_rounded_to_far_less_than_the_tolerance() -> None:
 # --- declared once --------------------------------------------------------------------------------
 
 CASES = Path(__file__).parents[2] / "cases"
-DECLARATIONS = (CASES / "seal" / "equations" / "system.py", CASES / "slider.py")
+DECLARATIONS = (CASES / "seal" / "equations" / "system.py", CASES / "slider" / "case.py")
 """The system of a seal, and the slider, which has one of its own."""
 ASKED = ("part", "dofs", "count", "rows", "columns", "block", "fields", "pressures")
 """Methods that take the name of a field or of a block."""
