@@ -8,7 +8,7 @@ from softehl.cases.harness.case import Case
 from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.harness.pictures import KINDS
 from softehl.cases.harness.report.part import FinishedRun, Part
-from softehl.cases.harness.row import Record
+from softehl.cases.harness.row import OK, Record
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.told import assumed, foreword, warnings
 from softehl.cases.seal.report import paraview, tables
@@ -187,16 +187,18 @@ def run_oring(
 def _not_differentiated(rows: Sequence[FilmRow]) -> list[str]:
     """Why states have no sensitivities, in words; empty where all have them."""
     left_out = [row for row in rows if not differentiable(row)]
-    unseen = [row for row in left_out if not resolved(row)]
+    doubted = [row for row in left_out if row.verdict != OK]
+    unseen = [row for row in left_out if row.verdict == OK and not resolved(row)]
     cut = [row for row in left_out if resolved(row)]
     reasons = (
-        "the mesh does not show the film well enough to differentiate it (verdict and inlet_ratio "
-        "in curve.csv); use a graded mesh or a larger density",
+        "only states that are ok are differentiated",
+        "the mesh does not show the film well enough to differentiate it (inlet_ratio in "
+        "curve.csv); use a graded mesh or a larger density",
         "the film begins before its arc, with the pressure built up there (entrance_pressure_MPa "
         "in curve.csv); lower speeds or a thinner oil have a shorter inlet",
     )
-    both = zip((unseen, cut), reasons, strict=True)
-    return [f"no sensitivities of {CASE.named(of)}: {why}" for of, why in both if of]
+    groups = zip((doubted, unseen, cut), reasons, strict=True)
+    return [f"no sensitivities of {CASE.named(of)}: {why}" for of, why in groups if of]
 
 
 CASE = ORingCase()

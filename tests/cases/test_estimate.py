@@ -138,7 +138,7 @@ def test_settings_whose_error_two_meshes_do_not_show(keys: dict[str, Any], words
         ({}, {"friction": 9.9, "drag": 9.9}, ""),
         ({}, {"friction": 9.8, "drag": 9.8}, "friction may be off by 3.5 %"),
         ({}, {"friction": 10.0, "drag": 9.8}, "friction may be off by 6.9 %"),  # parts cancel
-        ({"beyond": 0.021}, {}, "friction lacks 2.1 %"),
+        ({"beyond": 0.021}, {}, "it lacks 2.1 %"),
         ({}, {"inlet_segments": 1.4}, "does not show the inlet"),
         ({}, {"inlet_ratio": 0.97}, "does not show the inlet"),
     ],

@@ -203,8 +203,8 @@ def test_sealed_pressure_changes_the_load_of_the_contact_problem_only() -> None:
     [
         ({}, 0.3, OK, ""),
         ({}, None, OK, ""),
-        ({}, -2.1, UNCERTAIN, "the estimated error of h* is large"),
-        ({}, float("nan"), UNCERTAIN, "the estimated error of h* is large or not known"),
+        ({}, -2.1, UNCERTAIN, "the estimated error of h* is above 2 %"),
+        ({}, float("nan"), UNCERTAIN, "the estimated error of h* is above 2 % or not known"),
         ({"inlet_ratio": 0.957}, 0.3, UNDER_RESOLVED, "steepest slope"),
         ({"inlet_ratio": 1.03}, 0.3, UNDER_RESOLVED, "steepest slope"),
         ({"inlet_ratio": float("nan")}, 0.3, UNDER_RESOLVED, "steepest slope"),

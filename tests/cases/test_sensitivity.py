@@ -254,6 +254,8 @@ def test_only_states_that_the_mesh_shows_are_differentiated() -> None:
     p = Seal(sensitivity=True)
     (words,) = CASE.complaints(p, [replace(row, inlet_ratio=0.9)], [], "")
     assert "the mesh does not show the film well enough" in words
+    (words,) = CASE.complaints(p, [replace(row, verdict="uncertain")], [], "")
+    assert "only states that are ok" in words
     assert CASE.complaints(p, [row], [], "") == []
 
 

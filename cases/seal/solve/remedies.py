@@ -43,7 +43,10 @@ _ARC = (
     "part of it may be beyond the given arc, {:g} to {:g} degrees; leave arc_start and arc_end out"
 )
 
-_THICK = "try a finer mesh (larger density), or lower speeds or a thinner oil where films are thick"
+_OTHER_SPEEDS = (
+    "try a finer mesh (larger density); where films are thick lower speeds or a thinner oil help, "
+    "where they are thin higher speeds"
+)
 
 _HIGH = 1.5  # shear moduli
 
@@ -111,4 +114,4 @@ def _film_advice(p: Seal) -> str:
     if p.given_arc:
         return _ARC.format(*p.given_arc)
     times = p.sealed_pressure / p.shear_modulus
-    return _FILM.format(times) if times > _HIGH else _THICK
+    return _FILM.format(times) if times > _HIGH else _OTHER_SPEEDS

@@ -102,9 +102,10 @@ def reservation(p: Seal, film: FilmNumbers, other: FilmNumbers | None) -> str:
     error = friction_bound(p.density, film, other)
     if not error <= LARGEST_ERROR:
         return f"friction may be off by {error:.2g} %, h* is not; {FINER}"
-    if not error + 100.0 * film.beyond <= LARGEST_ERROR:
+    lacks = 100.0 * film.beyond
+    if not error + lacks <= LARGEST_ERROR:
         return (
-            f"friction lacks {100.0 * film.beyond:.2g} %, that of the oil beyond the ends of the "
-            "arc; h* and leakage hold"
+            f"friction may be off by {error + lacks:.2g} %: it lacks {lacks:.2g} %, that of the "
+            "oil beyond the ends of the arc; h* and leakage hold"
         )
     return ""

@@ -65,7 +65,7 @@ STRONG_OSCILLATION = 0.2
 
 FINER = "use a finer mesh (larger density)"
 
-DOUBTFUL = f"the estimated error of h* is large or not known; {FINER}"
+DOUBTFUL = f"the estimated error of h* is above {LARGEST_ERROR:g} % or not known; {FINER}"
 
 _SHORT = (
     "the inlet is only {:.2g} segments long, it needs {:g} with this pressure_order: h* may be "
