@@ -1,8 +1,7 @@
-"""Sensitivities of what solves R(x, s) = 0: directly, or by the adjoint.
+"""Sensitivities of what solves R(x, s) = 0, by the adjoint.
 
 With K = dR/dx and the load b = dR/ds of a variation, dx = -K^-1 b, and a quantity q(x, s) has
-dq/ds = q_s + q_x . dx = q_s - l . b with K^T l = q_x: one solve for each variation, or for each
-quantity.
+dq/ds = q_s + q_x . dx = q_s - l . b with K^T l = q_x: one solve for each quantity.
 """
 
 from __future__ import annotations
@@ -12,12 +11,6 @@ from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import LinearSolver, SparseMatrix
-
-
-def direct(linear: LinearSolver, K: SparseMatrix, loads: Array) -> Array:
-    """dx (n, k) of loads b (n, k); raises SingularMatrix."""
-    factors = linear.factorise(K)
-    return np.stack([-factors.solve(b) for b in loads.T], axis=1)
 
 
 def adjoints(linear: LinearSolver, K: SparseMatrix, gradients: Array) -> Array:

@@ -22,8 +22,10 @@ from softehl.cases.seal.sensitivity.design import (
     settled,
 )
 from softehl.cases.seal.sensitivity.design_command import Design, HeldFilm, told
+from softehl.cases.seal.sensitivity.quantities import quantities
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import FilmState, Silent
+from softehl.runtime.solve.newton import Newton
 from tests.cases.oring_cases import film_values
 
 P = Seal()
@@ -186,6 +188,23 @@ def test_the_held_mesh_gives_what_the_run_did() -> None:
     changed = held_film.change("friction", "rod_diameter", 0.9995)
     assert changed is not None
     assert 0.95 < changed < 0.99
+
+
+@pytest.mark.slow
+def test_a_held_film_follows_a_key_further_than_one_solve() -> None:
+    """Newton's method with more iterations than a step has finds the same film at once."""
+    held_film = HeldFilm.of(P.model_copy(update={**ONE, "density": 1}))
+    assert held_film is not None
+    moved = held_film.case.scaled("rod_diameter", -0.003)
+    problem, quantity = moved.system.film_problem(moved.film), "friction"
+    at_once = Newton(max_iterations=50).solve(problem, held_film.x)
+    assert at_once.converged
+    assert at_once.iterations > held_film.newton.max_iterations
+    here = held_film.case.system.film_problem(held_film.case.film)
+    before = quantities(held_film.case, here, held_film.x)[quantity].value
+    after = quantities(moved, problem, at_once.x)[quantity].value
+    changed = held_film.change(quantity, "rod_diameter", 0.997)
+    assert changed == pytest.approx(after / before, rel=1e-7)
 
 
 def test_a_piston_seal_is_told_by_its_own_sizes(capsys: pytest.CaptureFixture[str]) -> None:

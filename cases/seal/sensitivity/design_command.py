@@ -13,7 +13,14 @@ from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.varied import BASES, NUMBERS, PRESSURE_KEY
-from softehl.cases.seal.sensitivity.design import Change, NoDesignError, Step, Target, designed
+from softehl.cases.seal.sensitivity.design import (
+    SETTLED,
+    Change,
+    NoDesignError,
+    Step,
+    Target,
+    designed,
+)
 from softehl.cases.seal.sensitivity.quantities import CALLED, quantities
 from softehl.cases.seal.sensitivity.sensitivity import differentiation
 from softehl.cases.seal.sensitivity.variation import FilmCase
@@ -22,10 +29,10 @@ from softehl.cases.seal.solve.method import DryContact, run
 from softehl.cases.seal.solve.path import StageError
 from softehl.cases.seal.states.state import FilmState, Observer, Silent
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.design import Tangent
 from softehl.runtime.names import meant
-from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.sensitivity import direct
+from softehl.runtime.solve.homotopy import Continuation
+from softehl.runtime.solve.newton import Newton, NonlinearProblem
+from softehl.runtime.solve.steps import StepRule
 
 _OF_PISTON = {"bore": "rod_diameter", "groove_diameter": "housing_diameter"}
 """Diameters of a piston seal, whose keys are less than 0."""
@@ -45,6 +52,9 @@ INSTEAD = {
     "temperature": "viscosity follows from it",
 }
 """Keys that cannot be chosen freely: what to do instead."""
+
+_LEAST = 0.1 * SETTLED
+"""Least step of the logarithm of a key: it moves a quantity that follows tenfold by `SETTLED`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,19 +169,19 @@ class HeldFilm:
         """A quantity over its value here, where a key is `factor` times as large; None if that film
         is not reached from this one.
         """
-        moved = self.case.scaled(key, factor - 1.0)
-        # a hundredth of a millimetre is many films: the start has to follow the key
-        start = self.x + math.log(factor) * self._slope(key)
-        solution = self.newton.solve(moved.system.film_problem(moved.film), start)
-        if not solution.converged:
-            return None
-        return _value(moved, solution.x, quantity) / _value(self.case, self.x, quantity)
 
-    def _slope(self, key: str) -> Array:
-        """Rate (n,) of the film by the logarithm of a key."""
-        tangent = Tangent.at(self.case.system.film_problem(self.case.film), self.x)
-        load = tangent.load(self.case.rate(key))
-        return direct(self.newton.linear, tangent.reduced, load[:, None])[:, 0]
+        def problem_at(logarithm: float) -> NonlinearProblem:
+            moved = self.case.scaled(key, math.expm1(logarithm))
+            return moved.system.film_problem(moved.film)
+
+        # a hundredth of a millimetre is many films
+        way = math.log(factor)
+        path = Continuation(self.newton, StepRule(max(abs(way), _LEAST), _LEAST), name=key)
+        branch = path.follow(problem_at, 0.0, way, self.x)
+        if not branch.converged:
+            return None
+        moved = self.case.scaled(key, factor - 1.0)
+        return _value(moved, branch.last.x, quantity) / _value(self.case, self.x, quantity)
 
 
 def _value(case: FilmCase, x: Array, quantity: str) -> float:
