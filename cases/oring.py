@@ -100,9 +100,9 @@ class ORingCase(Case[Seal, FilmRow]):
         """See :class:`Case`."""
         return answer(rows, parameters.travel)
 
-    def told(self, folder: Path) -> list[str]:
+    def told(self, parameters: Seal, folder: Path) -> list[str]:
         """See :class:`Case`: tolerances and sensitivities."""
-        return tables.told(folder)
+        return tables.told(parameters, folder)
 
     def merits(self, parameters: Seal, rows: Sequence[FilmRow]) -> Mapping[str, float]:
         """See :class:`Case`; of all speeds the worst."""

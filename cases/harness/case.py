@@ -111,7 +111,7 @@ class Case(Generic[P, R]):
         """The main results in words, a line each; what should alarm a reader is an Alarm."""
         return []
 
-    def told(self, folder: Path) -> list[str]:
+    def told(self, parameters: P, folder: Path) -> list[str]:
         """Lines that follow the answer, from other files of a finished run."""
         return []
 

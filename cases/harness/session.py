@@ -193,7 +193,7 @@ def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
         table.print_rows(case, rows, rejected)
         for line in case.answer(record.run.parameters, rows):
             click.secho(line, fg="red" if isinstance(line, Alarm) else None)
-        for line in case.told(record.folder):
+        for line in case.told(record.run.parameters, record.folder):
             click.echo(line)
         if words := case.assumed(record.run.parameters, record.run.given):
             click.echo(f"assumed: {', '.join(words)}")

@@ -15,6 +15,7 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.sensitivity import design_command
 from softehl.cases.seal.sensitivity.design import (
     Change,
+    Lever,
     NoDesignError,
     Step,
     Target,
@@ -30,6 +31,7 @@ from tests.cases.oring_cases import film_values
 
 P = Seal()
 POWER = -3.0
+BY = Lever("rod_diameter", "rod_diameter")
 
 
 def power_law(p: Seal, slope: float = POWER, **given: Any) -> FilmState:
@@ -53,7 +55,7 @@ def held(p: Seal) -> Change:
 
 
 def steps(target: Target, solve: Callable[[Seal], FilmState | None]) -> list[Step]:
-    return designed(P, target, "rod_diameter", solve, held)
+    return designed(P, target, BY, solve, held)
 
 
 def test_a_power_law_is_met_in_one_step() -> None:
@@ -77,13 +79,18 @@ def test_a_wrong_slope_needs_more_steps_and_a_wrong_sign_never_ends() -> None:
 def test_the_last_steps_settle_on_a_mesh_that_is_held() -> None:
     """A first step within one per cent is not the end; a film that is lost there is said."""
     near, wanted = Step(50.0, 5.03), 5.0
-    found = settled(near, wanted, POWER, lambda factor: factor ** (1.3 * POWER))
+    found = settled(near, wanted, POWER, lambda factor: factor ** (1.3 * POWER), "missed")
     assert len(found) >= 2
     assert found[-1].quantity == pytest.approx(wanted, rel=1e-4)
     assert 5.03 * (found[-1].value / 50.0) ** (1.3 * POWER) == pytest.approx(wanted, rel=1e-4)
-    for lost in (None, lambda _: None, lambda _: 1.001):
-        with pytest.raises(NoDesignError, match="near 50 no value gives 5 on one mesh"):
-            settled(near, wanted, POWER, lost)
+    at_end: tuple[tuple[Change | None, str], ...] = (
+        (None, "missed: no film is found on the way"),
+        (lambda _: None, "missed: no film is found on the way"),
+        (lambda _: 1.001, "missed: the film is at a kink"),
+    )
+    for change, words in at_end:
+        with pytest.raises(NoDesignError, match=words):
+            settled(near, wanted, POWER, change, "missed")
 
 
 def test_what_is_out_of_reach_is_said() -> None:
@@ -145,8 +152,8 @@ def test_a_measure_of_the_gland_is_designed_by_the_key_that_it_decides(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    def found(p: Seal, _target: Target, by: str, *_: object) -> list[Step]:
-        first, last = {"housing_diameter": (56.3, 56.4), "groove_width": (3.74, 4.0)}[by]
+    def found(p: Seal, _target: Target, by: Lever, *_: object) -> list[Step]:
+        first, last = {"housing_diameter": (56.3, 56.4), "groove_width": (3.74, 4.0)}[by.key]
         return [Step(first, 5.0), Step(last, 4.5)]
 
     monkeypatch.setattr(design_command, "designed", found)
@@ -207,14 +214,43 @@ def test_a_held_film_follows_a_key_further_than_one_solve() -> None:
     assert changed == pytest.approx(after / before, rel=1e-7)
 
 
-def test_a_piston_seal_is_told_by_its_own_sizes(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("by", "ends", "words"),
+    [
+        (Lever("groove_diameter", "housing_diameter"), (-33.0, -32.9), ("33 mm", "32.9 mm")),
+        (Lever("bore", "rod_diameter"), (-40.0, -40.1), ("40 mm", "40.1 mm")),
+        (Lever("inner_diameter", "inner_diameter"), (-40.0, -39.9), ("32 mm", "31.9 mm")),
+        (Lever("groove_depth", "housing_diameter"), (-33.0, -33.6), ("3.5 mm", "3.2 mm")),
+    ],
+)
+def test_a_piston_seal_is_told_by_its_own_sizes(
+    by: Lever, ends: tuple[float, float], words: tuple[str, str]
+) -> None:
     """Diameters are counted negative inside; no sign of it is told."""
-    steps = [Step(-33.0, 3.2), Step(-32.9, 2.9)]
-    target, p = Target.of("friction -10%"), Seal(bore=40.0, ring="32x4")
-    words = "\n".join(told(Design(p, target, "housing_diameter", "groove_diameter", steps)))
-    assert "groove_diameter = 33 mm: friction = 3.2 N" in words
-    assert "by groove_diameter = 32.9 mm (-0.303 %)" in words
-    assert "= -3" not in words
+    p = Seal(bore=40.0, ring="32x4")
+    steps = [Step(ends[0], 3.2), Step(ends[1], 2.9)]
+    lines = told(Design(p, Target.of("friction -10%"), by, steps))
+    assert lines[1] == f"  {by.name} = {words[0]}: friction = 3.2 N"
+    assert f"by {by.name} = {words[1]} (" in lines[3]
+    last = ["groove_diameter from 33 to 33.6 mm"] if by.name == "groove_depth" else []
+    assert lines[4:] == last
+
+
+def test_a_design_of_a_piston_seal_that_fails_is_told_by_its_own_sizes() -> None:
+    """Key, value and quantity with their units, where no film is found beside that of a step."""
+    by, p = Lever("groove_depth", "housing_diameter"), Seal(bore=40.0, ring="32x4")
+    power = {"friction": {"housing_diameter": 20.0}}
+
+    def solve(p: Seal) -> FilmState:
+        friction = -5.02 * (p.housing_diameter / -33.0) ** 20.1
+        return replace(power_law(P), rod_friction_N=friction, sensitivity=power)
+
+    with pytest.raises(NoDesignError) as caught:
+        designed(p, Target.of("friction -10%"), by, solve, lambda _: lambda _: None)
+    depth = 0.5 * (40.0 - 33.0 * 0.9 ** (1.0 / 20.0))
+    assert str(caught.value).startswith(
+        f"near groove_depth = {depth:.6g} mm no value gives friction = 4.518 N on one mesh: no film"
+    )
 
 
 def test_a_design_is_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

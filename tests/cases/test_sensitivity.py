@@ -21,7 +21,8 @@ from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.keys import dimensions
 from softehl.cases.seal.gland.tolerances import ToleranceRow, band, read_tolerances
 from softehl.cases.seal.gland.varied import LENGTHS
-from softehl.cases.seal.report.tables import told
+from softehl.cases.seal.report.tables import SHOWN, read_slopes, told
+from softehl.cases.seal.report.tornado import tornado_figure
 from softehl.cases.seal.sensitivity.quantities import (
     QUANTITIES,
     along,
@@ -346,7 +347,7 @@ def test_what_makes_no_sense_is_refused(given: dict[str, object], message: str) 
 
 def test_a_run_tells_its_tolerances(tmp_path: Path) -> None:
     """The largest three keys of each quantity, and the band; nothing without the files."""
-    assert told(tmp_path) == []
+    assert told(Seal(), tmp_path) == []
     slopes = {"rod_diameter": -40.0, "mu_1": 0.4, "viscosity": 0.5, "U": -0.01}
     rows = [
         (1.0, 200.0, quantity, name, slope)
@@ -357,11 +358,25 @@ def test_a_run_tells_its_tolerances(tmp_path: Path) -> None:
     band_row = (1.0, 200.0, "friction", 23.4, 17.6, "section_diameter", 16.9)
     write_csv(tmp_path / "tolerances.csv", ToleranceRow.header(), [band_row])
     most = "rod_diameter -40 %, viscosity +0.5 %, mu_1 +0.4 %"
-    assert told(tmp_path) == [
+    assert told(Seal(), tmp_path) == [
         "  +200 mm/s, likely changes by tolerances: friction 18 % (at worst 23 %, most of it "
         "section_diameter)",
         f"  +200 mm/s, for 1 % of a key: h*: {most}; friction: {most}; leakage: {most}",
     ]
+
+
+def test_those_of_a_piston_seal_are_told_by_its_own_sizes(tmp_path: Path) -> None:
+    """What is negative inside has other names in files; picture and terminal say what is meant."""
+    p = Seal(bore=40, ring="32x4")
+    slopes = {"rod_diameter": 14.0, "housing_diameter": -9.9, "inner_diameter": -1.8}
+    rows = [(1.0, 400.0, quantity, *slope) for quantity in SHOWN for slope in slopes.items()]
+    write_csv(tmp_path / "sensitivity.csv", SensitivityRow.header(), rows)
+    (line,) = told(p, tmp_path)
+    most = "bore +14 %, groove_diameter -9.9 %, outside diameter of the ring -1.8 %"
+    assert f"h*: {most}; " in line
+    figure = tornado_figure("", read_slopes(p, tmp_path))
+    drawn = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert drawn == ["outside diameter of the ring", "groove diameter", "bore"]
 
 
 @pytest.mark.slow

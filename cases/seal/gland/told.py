@@ -165,8 +165,7 @@ def _gland(p: Gland, said: frozenset[str]) -> Iterator[str]:
     if not charted:  # assumed even if the gland was asked for by name
         decided = {key: set() for key in decided}
     if unsaid := [key for key, others in decided.items() if not said & {key, *others}]:
-        called = {"housing_diameter": "groove_diameter"} if p.piston else {}
-        words = (f"{called.get(key, key)} = {abs(getattr(p, key)):g} mm" for key in unsaid)
+        words = (f"{p.called(key)} = {abs(getattr(p, key)):g} mm" for key in unsaid)
         yield f"{kind} ({', '.join(words)})"
     if not said & {"backup", "extrusion_gap"}:
         yield "a back-up ring"

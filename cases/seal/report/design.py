@@ -41,7 +41,7 @@ def design_parts(design: Design, case: AnyCase) -> list[Part]:
 def _answer(design: Design) -> Part:
     p, first, last = design.parameters, design.steps[0], design.steps[-1]
     before, after = (design.measure(step.value) for step in (first, last))
-    unit, size = f" {design.unit}".rstrip(), CALLED[design.target.quantity][1]
+    unit, size = f" {design.by.unit}".rstrip(), CALLED[design.target.quantity][1]
     return Part(
         "Answer",
         lines=[
@@ -50,8 +50,8 @@ def _answer(design: Design) -> Part:
             f"{size}, {design.change:+.2f} % (wanted {design.target.percent:+g} %)",
             _rate(design),
             f"this is the {style.STROKES[p.stroke]} at {p.speeds[0]:g} mm/s and "
-            f"{p.sealed_pressure:g} MPa; softehl run with {design.asked} = {after:.5g} shows both "
-            "strokes and other speeds",
+            f"{p.sealed_pressure:g} MPa; softehl run with {design.by.name} = {after:.5g} shows "
+            "both strokes and other speeds",
         ],
     )
 
@@ -60,9 +60,9 @@ def _rate(design: Design) -> str:
     """The change of the quantity with a step of the key that a workshop thinks in."""
     value, slope, near = design.steps[-1].value, _slope(design, design.target.quantity), 1e-6
     measure = design.measure(value)
-    step = {"mm": 0.01, "%": 1.0}.get(design.unit, 0.01 * abs(measure))
+    step = {"mm": 0.01, "%": 1.0}.get(design.by.unit, 0.01 * abs(measure))
     percent = 100.0 * slope * near * step / (design.measure(value * (1.0 + near)) - measure)
-    unit = f" {design.unit}".rstrip()
+    unit = f" {design.by.unit}".rstrip()
     return f"{step:.3g}{unit} more {_key(design)} there: {_quantity(design)} {percent:+.2g} %"
 
 
@@ -77,7 +77,7 @@ def _curve(design: Design) -> Part:
         )
         for number, step in enumerate(design.steps, 1)
     ]
-    key = f"{_key(design)} [{design.unit}]" if design.unit else _key(design)
+    key = f"{_key(design)} [{design.by.unit}]" if design.by.unit else _key(design)
     quantity = f"{_quantity(design)} [{CALLED[design.target.quantity][1]}]"
     text = (
         "Each mark is a nonlinear solve; the line is what the sensitivities of the first one "
@@ -93,7 +93,7 @@ def _draw(panel: Any, design: Design) -> None:
     first = design.steps[0]
     (_, film), _ = _films(design)
     assert film.sensitivity is not None
-    slope = film.sensitivity[design.target.quantity].get(design.key, 0.0)
+    slope = film.sensitivity[design.target.quantity].get(design.by.key, 0.0)
     values = [step.value for step in design.steps]
     between = np.linspace(min(values), max(values), 41)
     predicted = first.quantity * (between / first.value) ** slope
@@ -140,11 +140,11 @@ def _films(design: Design) -> tuple[tuple[float, FilmState], tuple[float, FilmSt
 def _slope(design: Design, quantity: str) -> float:
     """Log derivative of a result by the key, of the last film."""
     _, (_, film) = _films(design)
-    return (film.sensitivity or {}).get(quantity, {}).get(design.key, 0.0)
+    return (film.sensitivity or {}).get(quantity, {}).get(design.by.key, 0.0)
 
 
 def _key(design: Design) -> str:
-    return design.asked.replace("_", " ")
+    return design.by.name.replace("_", " ")
 
 
 def _quantity(design: Design) -> str:

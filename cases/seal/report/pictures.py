@@ -32,7 +32,7 @@ def write_plots(
     be read back.
     """
     results, views = [(row, read_profile(folder, row)) for row in rows], views_of(folder, rows)
-    head, slopes = style.subject(p), read_slopes(folder) if p.sensitivity else {}
+    head, slopes = style.subject(p), read_slopes(p, folder) if p.sensitivity else {}
     with style.drawing():
         figures = {
             "curve": curve_figure(head, rows, rejected),

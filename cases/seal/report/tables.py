@@ -37,9 +37,12 @@ def write_fit(p: Seal, folder: Path) -> None:
         write_csv(folder / "fit.csv", (*COLUMNS, "model_MPa", "difference_MPa"), rows)
 
 
-def read_slopes(folder: Path) -> Slopes:
-    """The sensitivities of a run; none where it has no table of them.  OSError, ValueError."""
-    return _slopes(SensitivityRow.read(folder / "sensitivity.csv"))
+def read_slopes(p: Seal, folder: Path) -> Slopes:
+    """The sensitivities of a run, parameters in the words of its seal; none where it has no table
+    of them.  OSError, ValueError.
+    """
+    found = _slopes(SensitivityRow.read(folder / "sensitivity.csv"))
+    return {at: {_named(p, key): s for key, s in of.items()} for at, of in found.items()}
 
 
 def write_sensitivities(p: Seal, folder: Path, rows: Sequence[FilmRow]) -> None:
@@ -57,9 +60,9 @@ def write_sensitivities(p: Seal, folder: Path, rows: Sequence[FilmRow]) -> None:
         write_csv(folder / "tolerances.csv", ToleranceRow.header(), [b.cells() for b in bands])
 
 
-def told(folder: Path) -> list[str]:
+def told(p: Seal, folder: Path) -> list[str]:
     """A line for each speed: the effect of tolerances, and the three keys that matter most."""
-    bands, slopes = ToleranceRow.read(folder / "tolerances.csv"), read_slopes(folder)
+    bands, slopes = ToleranceRow.read(folder / "tolerances.csv"), read_slopes(p, folder)
     lines = []
     for speed in dict.fromkeys(speed for speed, _ in slopes):
         words = [
@@ -77,6 +80,12 @@ def told(folder: Path) -> list[str]:
             words.append(f"{_called(quantity)}: {named}")
         lines.append(f"  {speed:+g} mm/s, for 1 % of a key: {'; '.join(words)}")
     return lines
+
+
+def _named(p: Seal, key: str) -> str:
+    """A parameter in plain text; a piston seal has an outside diameter in place of the inner."""
+    of_piston = p.piston and key == "inner_diameter"
+    return "outside diameter of the ring" if of_piston else p.called(key)
 
 
 def _called(quantity: str) -> str:

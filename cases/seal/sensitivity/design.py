@@ -11,8 +11,10 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from softehl.cases.harness.parameters import keys_of
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.sensitivity.quantities import QUANTITIES
+from softehl.cases.seal.gland.varied import BASES
+from softehl.cases.seal.sensitivity.quantities import CALLED, QUANTITIES
 from softehl.cases.seal.states.sensitivity_table import differentiable
 from softehl.cases.seal.states.state import FilmState
 from softehl.runtime.names import meant
@@ -60,6 +62,36 @@ class Target:
             )
         return cls(found["name"], 1.0 + 0.01 * float(found["change"]))
 
+    def told(self, value: float) -> str:
+        """A value of the quantity in words."""
+        return f"{self.quantity} = {value:.5g} {CALLED[self.quantity][1]}"
+
+
+@dataclass(frozen=True)
+class Lever:
+    """What a user changes: a key or a measure of the gland by its name, and the key behind it."""
+
+    name: str
+    key: str
+
+    def value(self, p: Seal) -> float:
+        """Its value as a user gives it: of a piston seal, too, a diameter is not negative."""
+        if self.name in BASES:
+            return float(getattr(p, BASES[self.name][1]))
+        if self.key == "inner_diameter":
+            return p.ring_diameter
+        value = float(getattr(p, self.key))
+        return value if p.called(self.key) == self.key else -value
+
+    @property
+    def unit(self) -> str:
+        """Of its value."""
+        return next(one.unit for one in keys_of(Seal) if one.name == self.name)
+
+    def told(self, p: Seal) -> str:
+        """Its value in words."""
+        return f"{self.name} = {self.value(p):.6g} {self.unit}".rstrip()
+
 
 @dataclass(frozen=True)
 class Step:
@@ -88,17 +120,18 @@ def value_of(state: FilmState, quantity: str) -> float:
 def designed(
     p: Seal,
     target: Target,
-    key: str,
+    by: Lever,
     solve: Callable[[Seal], FilmState | None],
     hold: Callable[[Seal], Change | None],
 ) -> list[Step]:
-    """Steps to the value of a key of p that meets the target; the last one does.
+    """Steps to the value of the key of a lever that meets the target; the last one does.
 
     solve: the one film of a case with its sensitivities, None where there is none. hold: how its
     quantity changes with the key on its mesh. Raises NoDesignError, and
     pydantic.ValidationError for a value that a case cannot have.
     """
-    state, value = _film(p, key, solve), float(getattr(p, key))
+    key = by.key
+    state, value = _film(p, by, solve), float(getattr(p, key))
     wanted = target.factor * value_of(state, target.quantity)
     steps = [Step(value, value_of(state, target.quantity), state)]
     for _ in range(STEPS):
@@ -107,31 +140,36 @@ def designed(
         way = math.log(wanted / steps[-1].quantity)
         if abs(way) > 0.5 * abs(slope):  # the key would change by more than half
             raise NoDesignError(
-                f"{target.quantity} follows {key} by {slope:.2g} % for 1 %: that is too little for "
-                "this target; choose another key (sensitivity.csv shows which have an influence)"
+                f"{target.quantity} follows {p.called(key)} by {slope:.2g} % for 1 %: that is too "
+                "little for this target; choose another key (sensitivity.csv shows which have an "
+                "influence)"
             )
         value *= math.exp(way / slope)
-        state = _film(Seal(**{**p.settled(), key: value}), key, solve)
+        near = Seal(**{**p.settled(), key: value})
+        state = _film(near, by, solve)
         steps.append(Step(value, value_of(state, target.quantity), state))
         if abs(steps[-1].quantity / wanted - 1.0) <= TOLERANCE:
-            change = hold(Seal(**{**p.settled(), key: value}))
-            return [*steps, *settled(steps[-1], wanted, slope, change)]
+            missed = f"near {by.told(near)} no value gives {target.told(wanted)} on one mesh"
+            return [*steps, *settled(steps[-1], wanted, slope, hold(near), missed)]
     raise NoDesignError(
-        f"after {STEPS} solves {target.quantity} is still {steps[-1].quantity:.4g}, wanted was "
-        f"{wanted:.4g}: ask for a smaller change"
+        f"{target.told(steps[-1].quantity)} after {STEPS} solves, wanted was {wanted:.5g}: ask for "
+        "a smaller change"
     )
 
 
-def settled(near: Step, wanted: float, slope: float, change: Change | None) -> list[Step]:
+def settled(
+    near: Step, wanted: float, slope: float, change: Change | None, missed: str
+) -> list[Step]:
     """Steps on the mesh of `near`, until the quantity is what was wanted, to `SETTLED`.
 
-    slope: d log quantity / d log key. Raises NoDesignError.
+    slope: d log quantity / d log key. missed: words of the NoDesignError where it is not reached.
     """
-    steps = [near]
+    steps, lost = [near], change is None
     while change and abs(steps[-1].quantity / wanted - 1.0) > SETTLED and len(steps) <= STEPS:
         value = steps[-1].value * (wanted / steps[-1].quantity) ** (1.0 / slope)
         found = change(value / near.value)
         if found is None:
+            lost = True
             break
         step = Step(value, near.quantity * found)
         rise = math.log(step.quantity / steps[-1].quantity) / math.log(value / steps[-1].value)
@@ -140,19 +178,17 @@ def settled(near: Step, wanted: float, slope: float, change: Change | None) -> l
             break
         slope = rise
     if abs(steps[-1].quantity / wanted - 1.0) > SETTLED:
-        raise NoDesignError(
-            f"near {near.value:.6g} no value gives {wanted:.5g} on one mesh: the film is at a kink "
-            "or an end; use a larger density, or ask for another change"
-        )
+        why = "no film is found on the way" if lost else "the film is at a kink"
+        raise NoDesignError(f"{missed}: {why}; use a larger density, or ask for another change")
     return steps[1:]
 
 
-def _film(p: Seal, key: str, solve: Callable[[Seal], FilmState | None]) -> FilmState:
+def _film(p: Seal, by: Lever, solve: Callable[[Seal], FilmState | None]) -> FilmState:
     state = solve(p)
     if state is None or not differentiable(state) or state.sensitivity is None:
         verdict = "did not converge" if state is None else f"has the verdict {state.verdict}"
         raise NoDesignError(
-            f"with {key} = {getattr(p, key):g} the film {verdict}: no sensitivities of it; use a "
+            f"with {by.told(p)} the film {verdict}: no sensitivities of it; use a "
             "larger density, or ask for a smaller change"
         )
     return state

@@ -10,12 +10,13 @@ from functools import partial
 from pydantic import ValidationError
 
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.harness.parameters import keys_of
+from softehl.cases.seal.gland.fitting import DIAMETERS
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.varied import BASES, NUMBERS, PRESSURE_KEY
 from softehl.cases.seal.sensitivity.design import (
     SETTLED,
     Change,
+    Lever,
     NoDesignError,
     Step,
     Target,
@@ -33,12 +34,6 @@ from softehl.runtime.names import meant
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Newton, NonlinearProblem
 from softehl.runtime.solve.steps import StepRule
-
-_OF_PISTON = {"bore": "rod_diameter", "groove_diameter": "housing_diameter"}
-"""Diameters of a piston seal, whose keys are less than 0."""
-
-SAME = {"rod": "rod_diameter", **_OF_PISTON}
-"""Names of a key."""
 
 _SPEED = "not by the speed: sensitivity.csv has U, and each of `speeds` is a row of a run"
 _MODULUS = "the modulus follows from it: use mu, or mu_1 and mu_2"
@@ -61,14 +56,12 @@ _LEAST = 0.1 * SETTLED
 class Design:
     """A target that is met.
 
-    parameters: the case of one film that it began with. key: what was changed. asked: the key or
-    measure of the gland that a user named, which follows from it.
+    parameters: the case of one film that it began with. by: what was changed.
     """
 
     parameters: Seal
     target: Target
-    key: str
-    asked: str
+    by: Lever
     steps: Sequence[Step]
 
     @property
@@ -78,18 +71,11 @@ class Design:
 
     def at(self, value: float) -> Seal:
         """The case with another value of the key."""
-        return self.parameters.model_copy(update={self.key: value})
+        return self.parameters.model_copy(update={self.by.key: value})
 
     def measure(self, value: float) -> float:
-        """The value of what a user named, where the key has this one; of a piston not negative."""
-        if self.asked in BASES:
-            return float(getattr(self.at(value), BASES[self.asked][1]))
-        return abs(value) if self.asked in _OF_PISTON else value
-
-    @property
-    def unit(self) -> str:
-        """Of what a user named."""
-        return next(one.unit for one in keys_of(Seal) if one.name == self.asked)
+        """The value of what a user named, where the key has this one."""
+        return self.by.value(self.at(value))
 
     @property
     def change(self) -> float:
@@ -99,24 +85,24 @@ class Design:
 
 def design_case(p: Seal, target: str, key: str, observer: Observer | None = None) -> Design:
     """The way to a target by a key.  Raises BadInput, also where it is not reached."""
-    asked = SAME.get(key, key)
+    asked = DIAMETERS.get(key, key)
     base, _ = BASES.get(asked, (asked, asked))
     known = [k for k in (*NUMBERS, PRESSURE_KEY) if isinstance(getattr(p, k), float)]
     if base not in known:
         hint = f" ({INSTEAD[base]})" if base in INSTEAD else meant(base, known)
         raise BadInput(f"--by {base}{hint}: allowed: {', '.join([*known, *BASES])}")
     p = _one_film(p)
+    by = Lever(asked if asked in BASES else p.called(base), base)
     solve = partial(_solve, observer or Silent())
     try:
         wanted = Target.of(target)
-        steps = designed(p, wanted, base, solve, lambda q: _hold(q, wanted.quantity, base))
+        steps = designed(p, wanted, by, solve, lambda q: _hold(q, wanted.quantity, base))
     except NoDesignError as error:
         raise BadInput(str(error)) from None
     except ValidationError as error:
-        wrong = f"the target needs a {base} that a case cannot have: {_reason(error)}"
+        wrong = f"the target needs a {p.called(base)} that a case cannot have: {_reason(error)}"
         raise BadInput(wrong) from None
-    of_piston = {of: said for said, of in _OF_PISTON.items()} if p.piston else {}
-    return Design(p, wanted, base, of_piston.get(asked, asked), steps)
+    return Design(p, wanted, by, steps)
 
 
 def _one_film(p: Seal) -> Seal:
@@ -193,7 +179,7 @@ def told(design: Design) -> list[str]:
     p, target, steps = design.parameters, design.target, design.steps
     first, last = steps[0], steps[-1]
     sign = 1.0 if p.stroke == "out" else -1.0
-    name, unit = design.asked, f" {design.unit}".rstrip()
+    name, unit = design.by.name, f" {design.by.unit}".rstrip()
     values = [design.measure(step.value) for step in steps]
     lines = [f"p_s = {p.sealed_pressure:g} MPa, U = {sign * p.speeds[0]:+g} mm/s"]
     lines += [
@@ -207,8 +193,10 @@ def told(design: Design) -> list[str]:
         f"{values[-1]:.8g}{unit} ({moved:+.3f} %); by the first sensitivity alone: "
         f"{values[1]:.8g}{unit}, which gives {alone:+.2f} %"
     )
-    if design.asked in BASES:
-        lines.append(f"{design.key} from {first.value:.5g} to {last.value:.5g} mm")
+    if name in BASES:
+        decided = Lever(p.called(design.by.key), design.by.key)
+        before, after = (decided.value(design.at(step.value)) for step in (first, last))
+        lines.append(f"{decided.name} from {before:.5g} to {after:.5g} mm")
     return lines
 
 
