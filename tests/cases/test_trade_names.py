@@ -87,6 +87,7 @@ NO_RINGS = {
     "quad ring": "36x4",
     "U-cup 25x5": "U-cup 25x35x8",
     "25x35x8x2": "AS568-226",
+    "-36x4": 'write "36x4"',
     "AS568-2100": 'is no size of AS568, which have three digits; write "AS568-226"',
 }
 FITS = {

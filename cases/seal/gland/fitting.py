@@ -105,6 +105,12 @@ def _with_ring(values: dict[str, Any]) -> None:
     if said.outer is not None:
         ends = said.inner, said.outer
         rod, ground = ends if _side(values) > 0.0 else (-ends[1], -ends[0])
+        if said.bore_first and rod > 0.0:
+            raise ValueError(
+                f'ring = "{values["ring"]}" names a piston seal, its bore first; give '
+                f'bore = {said.outer:g}, or write "U-cup {said.inner:g}x{said.outer:g}x'
+                f'{said.width:g}" for a rod seal'
+            )
         _with_cup(values, rod, ground, said.width or 0.0)
         return
     ring = catalogue.ring(values["ring"])

@@ -16,7 +16,8 @@ class RingName:
     """A ring as its name says, mm.  kind: of the section, None where the name does not say it.
 
     number: of SAE AS568; else inner and section; a U-cup is named by its groove instead: rod
-    (inner), groove diameter (outer) and groove width.
+    (inner), groove diameter (outer) and groove width. bore_first: named as a piston seal is, by its
+    bore (outer), groove diameter (inner) and width.
     """
 
     number: int | None = None
@@ -25,6 +26,7 @@ class RingName:
     kind: Kind | None = None
     outer: float | None = None
     width: float | None = None
+    bore_first: bool = False
 
 
 _KINDS: tuple[tuple[str, Kind], ...] = (
@@ -62,7 +64,8 @@ def read_ring(given: str) -> RingName:
     """The ring of a name.  Raises NotUnderstoodError."""
     text = plain(given)
     rest, kind = _without_kind(_STANDARD.sub(" ", text))
-    if (found := _SIZE.fullmatch(rest)) or (found := _WORDS.fullmatch(rest)):
+    found = None if text.startswith("-") else _SIZE.fullmatch(rest) or _WORDS.fullmatch(rest)
+    if found:
         sizes = found.groupdict()
         third = sizes.get("third")
         a, b = float(sizes["inner"]), float(sizes["section"])
@@ -73,11 +76,9 @@ def read_ring(given: str) -> RingName:
                     f"U-cup {a:g}x{a + 2 * b:g}x{round(1.6 * b, 1):g}",
                 )
             return RingName(inner=a, section=b, kind=kind)
-        if (kind is None and b > a) or (
-            kind == "u_cup" and b != a
-        ):  # a piston seal: the bore first
-            a, b = sorted((a, b))
-            return RingName(inner=a, kind="u_cup", outer=b, width=float(third))
+        if (kind is None and b > a) or (kind == "u_cup" and b != a):
+            inner, outer, width = min(a, b), max(a, b), float(third)
+            return RingName(inner=inner, kind="u_cup", outer=outer, width=width, bore_first=a > b)
     if kind == "x_ring" and (found := _QUAD.fullmatch(rest)):
         return RingName(number=int(found["number"]), kind=kind)
     if (found := _DASH.fullmatch(rest)) and kind != "u_cup":
