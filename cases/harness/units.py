@@ -5,6 +5,7 @@ of the same kind is converted to it. There is no arithmetic of units here.
 """
 
 import re
+from collections.abc import Collection
 
 _QUANTITY = re.compile(
     r"""[ ]*([+-]?(?:\d+,\d{1,2}(?!\d)|\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
@@ -37,11 +38,11 @@ _KINDS = {
 }
 
 _SPELT = {
-    **dict.fromkeys(("Bar", "BAR", "barg", "bar(g)", "bar g"), "bar"),
-    **dict.fromkeys(("PSI", "Psi", "psig", "psi g", "lbf/in2"), "psi"),
-    **dict.fromkeys(("Mpa", "MPA", "N/mm²"), "MPa"),
+    **dict.fromkeys(("Bar", "barg", "bar(g)", "bar g"), "bar"),
+    **dict.fromkeys(("Psi", "psig", "psi g", "lbf/in2"), "psi"),
+    **dict.fromkeys(("Mpa", "N/mm²"), "MPa"),
     **dict.fromkeys(("kgf/cm²", "kg/cm2", "kg/cm²", "kp/cm2", "kp/cm²"), "kgf/cm2"),
-    **dict.fromkeys(("cps", "cp", "mPaS"), "cP"),
+    **dict.fromkeys(("cps", "mPaS"), "cP"),
     **dict.fromkeys(("microinch", "microinches", "μin"), "uin"),
     **dict.fromkeys(("ips", "in/sec"), "in/s"),
     '"': "in",
@@ -67,7 +68,7 @@ def read_quantity(text: str, unit: str) -> float:
     known, found = _KINDS.get(unit, {unit: 1.0}), _QUANTITY.fullmatch(text)
     given = found[2].replace("·", " ").replace("*", " ") if found else ""
     number = float(found[1].replace(",", ".")) if found else 0.0
-    if (given := given if given in known else _SPELT.get(given, given)) in known:
+    if (given := _spelt(given, known)) in known:
         return number * known[given]
     if unit == "degC" and given in _FAHRENHEIT:
         return round((number - 32.0) / 1.8, 9)
@@ -83,3 +84,11 @@ def read_quantity(text: str, unit: str) -> float:
         )
     units = [*known, *(_FAHRENHEIT if unit == "degC" else ())]
     raise ValueError(f'"{text}" is not a number in {unit}; allowed units: {", ".join(units)}')
+
+
+def _spelt(given: str, known: Collection[str]) -> str:
+    """A unit as it is known: also from capitals or small letters alone, if they mean one unit."""
+    if given in known or (given := _SPELT.get(given, given)) in known:
+        return given
+    same = [unit for unit in known if unit.lower() == given.lower()]
+    return same[0] if len(same) == 1 and given in (given.lower(), given.upper()) else given

@@ -15,6 +15,8 @@ from softehl.cases.seal.gland.parameters import Seal
         ("435.113 PSI", "MPa", 3.0),
         ("30 Bar", "MPa", 3.0),
         ("3,0 Mpa", "MPa", 3.0),
+        ("3 mpa", "MPa", 3.0),
+        ("3E3 KPA", "MPa", 3.0),
         ("30.5914865 kgf/cm²", "MPa", 3.0),
         ("122 °F", "degC", 50.0),
         ('2"', "mm", 50.8),
@@ -45,6 +47,9 @@ def test_other_texts_are_no_quantities(text: str) -> None:
 def test_a_wrong_unit_names_those_that_fit() -> None:
     with pytest.raises(ValueError, match='"3 mm" is not a number in MPa; allowed units: MPa, GPa'):
         read_quantity("3 mm", "MPa")
+    for text, unit in (("3 mPa", "MPa"), ("40 mpa s", "MPa s"), ("40 MPAS", "MPa s")):
+        with pytest.raises(ValueError, match="is not a number in MPa"):
+            read_quantity(text, unit)
     with pytest.raises(ValueError, match="allowed units: degC, °C, C, F, degF"):
         read_quantity("350 K", "degC")
     with pytest.raises(ValueError, match="is a kinematic viscosity"):

@@ -40,7 +40,7 @@ A hole of the same letter has its lower limit as far above it; js and JS lie aro
 
 _SIZE = rf"(?:d ?|dia\.? ?)?(?P<size>{NUMBER}) ?(?:mm)?"
 _CLASS = re.compile(rf"{_SIZE}[ -]*(?P<letter>[A-Za-z]{{1,2}}) ?(?P<grade>\d{{1,2}})")
-_ENDS = re.compile(rf"(?P<low>{NUMBER}) ?(?:mm)? ?(?:to|\.\.+|-|bis) ?(?P<high>{NUMBER}) ?(?:mm)?")
+_ENDS = re.compile(rf"({NUMBER}) ?(?:mm)? ?(?:to|\.\.+|-|bis) ?({NUMBER}) ?(?:mm)?")
 _BOTH = re.compile(rf"{_SIZE} ?[A-Za-z]{{1,2}} ?\d{{1,2}} ?/ ?[A-Za-z]{{1,2}} ?\d{{1,2}}")
 _EQUAL = re.compile(rf"{_SIZE} ?(?:±|\+ ?/? ?-) ?(?P<by>{NUMBER}) ?(?:mm)?")
 _LIMITS = re.compile(
@@ -76,8 +76,8 @@ def read_fit(key: str, given: str, *, hole: bool = False) -> Band | None:
         r" ?[(](?:ISO 286[^)]*|(?P<limits>[^)]*))[)]$", r" \g<limits>", plain(given)
     ).strip()
     if found := _ENDS.fullmatch(text):
-        low, high = float(found["low"]), float(found["high"])
-        if 0.9 * high < low <= high:
+        low, high = sorted(map(float, found.groups()))
+        if 0.9 * high < low:
             return Band(round(0.5 * (low + high), 6), low, high)
     if found := _CLASS.fullmatch(text):
         return _class(key, given, found, hole)
