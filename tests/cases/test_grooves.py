@@ -185,7 +185,7 @@ def test_depth_and_fill_decide_housing_and_width() -> None:
     ("given", "says"),
     [
         ({"groove_depth": 3.2, "housing_diameter": 57.0}, "contradict"),
-        ({"groove_depth": 3.2, "squeeze": 20.0}, "contradict"),
+        ({"groove_depth": 3.2, "squeeze": 20.0}, "squeeze = 20 and groove_depth = 3.2 contradict"),
         ({"fill": 75.0, "groove_width": 9.0}, "contradict"),
         ({"fill": 100.0}, "groove_width = .* must be at least"),
     ],

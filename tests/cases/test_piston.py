@@ -88,6 +88,14 @@ def test_sizes_are_those_of_the_trade() -> None:
     [
         {"bore": 40, "groove_diameter": 33, "ring": "32x4", "groove_width": 5.2},
         {"bore": 40, "groove_depth": 3.5, "ring": "32x4", "groove_width": 5.2},
+        {
+            "bore": 40,
+            "groove_depth": 3.5,
+            "ring": "32x4",
+            "groove_width": 5.2,
+            "inner_diameter": 32,
+        },
+        {"bore": 40, "groove_diameter": 33, "housing_diameter": 33, "ring": "32x4"},
         {"bore": 40, "inner_diameter": 32, "section_diameter": 4.0, "squeeze": 12.5},
         {"bore": 40, "housing_diameter": 33, "ring": "32x4", "groove_width": 5.2},
     ],
@@ -112,6 +120,10 @@ def test_a_cup_is_named_by_bore_groove_and_width() -> None:
         ({"bore": 60, "ring": "32x4"}, "bore = 60 mm is 50 % larger"),
         ({"bore": 40, "groove_diameter": 39, "ring": "32x4"}, "bore and ground of the groove"),
         ({"ring": "U-cup 40x30x8"}, 'give bore = 40, or write "U-cup 30x40x8" for a rod seal'),
+        (
+            {"bore": 40, "ring": "32x4", "squeeze": 12, "groove_diameter": 33.5},
+            "groove_diameter = 33.5 and squeeze = 12 .* diameters of 33.5 and 32.96 mm",
+        ),
         ({"rod_diameter": -40.0}, "different signs"),
         ({"rod_diameter": 0.0}, "a diameter is not 0"),
     ],

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from softehl.cases.seal.gland import catalogue
-from softehl.cases.seal.gland.given import number, put
+from softehl.cases.seal.gland.given import number, put, shown
 from softehl.cases.seal.gland.grooves import KINDS, Groove, cup_gland, gland
 from softehl.cases.seal.gland.records.free_seal import FreeSeal
 from softehl.cases.seal.gland.records.gland import Gland
@@ -25,6 +25,9 @@ from softehl.cases.seal.gland.trade.said import bands
 DIAMETERS = {"rod": "rod_diameter", "bore": "rod_diameter", "groove_diameter": "housing_diameter"}
 """Key of a diameter as it is measured -> key that is negative in a piston."""
 
+_GROUND = ("groove_diameter", "squeeze", "groove_depth")
+"""Keys that housing_diameter follows from, in the order in which they are read."""
+
 
 def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
     """The keys of a case with those that follow from ring, rod, squeeze and gland filled in.
@@ -36,14 +39,16 @@ def fitted(given: Mapping[str, Any]) -> dict[str, Any]:
     _with_outline(values)
     if isinstance(values.get("ring"), int):
         values["ring"] = str(values["ring"])  # "-226" is a number to a reader of TOML
-    side = _side(values)
+    side, ground = _side(values), values.get("housing_diameter")
+    if side < 0.0 and number(ground) and ground > 0.0:
+        values["housing_diameter"] = -float(ground)
     for name, key in DIAMETERS.items():
         if number(values.get(name)):
             _follow(values, key, side * float(values[name]), name)
-    if side < 0.0:
-        _in_piston(values)
     if isinstance(values.get("ring"), str):
         _with_ring(values)
+    if side < 0.0:
+        _in_piston(values)
     _with_gland(values)
     return values
 
@@ -78,14 +83,12 @@ def _side(values: Mapping[str, Any]) -> float:
 
 
 def _in_piston(values: dict[str, Any]) -> None:
-    """The diameters of a piston seal that were given as they are measured, negative.
+    """The inner diameter of a piston seal as less its outside one, and its usual gland.
 
-    inner_diameter: of the ring; without one it is just as large as the bore outside.
+    Without one the ring is just as large as the bore outside.
     """
     bore, inner = values.get("rod_diameter"), values.get("inner_diameter")
-    section, ground = _size(values, "section_diameter"), values.get("housing_diameter")
-    if number(ground) and ground > 0.0:
-        values["housing_diameter"] = -float(ground)
+    section = _size(values, "section_diameter")
     if number(inner) and inner > 0.0 and number(section):
         values["inner_diameter"] = -(inner + 2.0 * section)
     if inner is None and not values.get("ring") and number(bore):
@@ -120,7 +123,9 @@ def _with_ring(values: dict[str, Any]) -> None:
             f'ring = "{values["ring"]}" needs the rod that it seals, as in rod = {rod:g}, '
             f"or the bore of a piston seal, as in bore = {bore:g}"
         )
-    inner = ring.inner_diameter if _side(values) > 0.0 else -ring.outer_diameter
+    before, inner = values.get("inner_diameter"), ring.inner_diameter
+    if _side(values) < 0.0 and not (number(before) and before > 0.0):
+        inner = -ring.outer_diameter
     _follow(values, "inner_diameter", inner, "ring")
     _follow(values, "section_diameter", ring.section_diameter, "ring")
     _with_usual_gland(values)
@@ -184,5 +189,16 @@ def _groove(values: Mapping[str, Any], section: float) -> Groove:
 
 
 def _follow(values: dict[str, Any], key: str, value: float, source: str) -> None:
-    """`put` of a length that follows from another key."""
-    put(values, key, value, f"{source} = {values[source]}")
+    """`put` of a length that follows from another key; ValueError names what was given."""
+    latter = f"{source} = {values[source]}"
+    try:
+        put(values, key, value, latter)
+    except ValueError:
+        earlier = _GROUND[: _GROUND.index(source)] if source in _GROUND else ()
+        former = next((name for name in earlier if number(values.get(name))), None)
+        before, after = shown(abs(values[key])), shown(abs(value))
+        words = f"{key} = {before} and {latter} contradict: the latter gives {after}"
+        if former:
+            given = f"{former} = {shown(values[former])}"
+            words = f"{given} and {latter} contradict: they give diameters of {before} and {after}"
+        raise ValueError(f"{words} mm; leave one of them out") from None
