@@ -7,6 +7,7 @@ import numpy as np
 from softehl.cases.harness.observer import State
 from softehl.cases.harness.row import OK, Row, column
 from softehl.cases.harness.row_by_row import RowByRow
+from softehl.cases.seal.equations.system import PRESSURE
 from softehl.cases.slider.film import conserving_solution, penalty_solution, strip_of
 from softehl.cases.slider.parameters import Slider
 from softehl.cases.slider.strip import beyond_front, fronts
@@ -54,7 +55,8 @@ def results(problem: Problem, solution: Solution) -> tuple[SliderRow, dict[str, 
     x, h, p, dx, tau = (at[name].ravel() for name in ("x", "h", "p", "dx", "tau_rod"))
     way = -1 if problem.parameters["film"][1] < 0.0 else 1
     along, carried = way * x[::way], p[::way]
-    rupture, _ = interval_below(along[carried.argmax() :], carried[carried.argmax() :], 0.0)
+    first = int(carried.argmax()) if p.max() > 0.0 else 0
+    rupture, _ = interval_below(along[first:], carried[first:], 0.0)
     row = SliderRow(
         rod_speed_mm_s=float(problem.parameters["film"][1]),
         flux_mm2_s=float(flux[min(top, len(flux) - 1)]),
@@ -64,6 +66,18 @@ def results(problem: Problem, solution: Solution) -> tuple[SliderRow, dict[str, 
         rupture_mm=way * rupture,
     )
     return row, {"x_mm": x, "h_um": 1e3 * h, "p_MPa": p}
+
+
+def without_noise(p: Slider, problem: Problem, solution: Solution) -> Solution:
+    """The solution; its pressures are zero if the largest is rounding: 2e-15 of `unit` at most."""
+    part, speed = problem.layout.part(PRESSURE), abs(problem.parameters["film"][1])
+    unit = 12.0 * p.viscosity * speed * (p.end - p.start) / p.ends[1].min() ** 2
+    pressures, noise = solution.x[part], 1e-12 * unit
+    if pressures.max() > noise:
+        return solution
+    x = solution.x.copy()
+    x[part] = np.where(np.abs(pressures) > noise, pressures, 0.0)
+    return replace(solution, x=x)
 
 
 def conserving_results(
@@ -104,6 +118,7 @@ class SliderCase(RowByRow[Slider, SliderRow]):
         def found(
             p: Slider, problem: Problem, solution: Solution
         ) -> tuple[SliderRow, dict[str, Array]]:
+            solution = without_noise(p, problem, solution)
             if p.conserving:
                 return conserving_results(p, problem, solution)
             return results(problem, solution)

@@ -127,10 +127,11 @@ def fronts(x: Array, p: Array, v: Array, p_c: float) -> tuple[float, float]:
     """Places where a film first ruptures and first forms again, along its flow; nan if none.
 
     x, p, v: (n,) at the nodes of subcells, downstream. Behind its rupture v grows from zero, before
-    its end p grows from p_c: both are drawn on to zero, linearly, within a subcell or two.
+    its end p grows from p_c: both are drawn on to zero, linearly, within a subcell or two. Where a
+    film has neither pressure nor void, v has a rounding error of 1e-12: less than 1e-9 is none.
     """
     v = np.append(v[:-1], v[-2])  # nothing flows out of the last node
-    torn = v / VOID_SCALE > (p - p_c) / PRESSURE_SCALE
+    torn = v / VOID_SCALE > np.maximum((p - p_c) / PRESSURE_SCALE, 1e-9 / VOID_SCALE)
     starts = np.flatnonzero(~torn[:-1] & torn[1:]) + 1
     ends = np.flatnonzero(torn[:-1] & ~torn[1:]) + 1
     return (

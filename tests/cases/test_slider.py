@@ -221,6 +221,15 @@ def test_the_penalty_converges() -> None:
     assert flux != pytest.approx(FLUX, rel=2e-4)  # a nearer inlet starves the film
 
 
+def test_a_film_without_pressure_has_no_load_and_is_torn_where_its_gap_widens() -> None:
+    plain = row(Slider(profile="wedge", ratio=1.0, segments=64))
+    assert plain.load_N_per_mm == plain.p_max_MPa == 0.0
+    assert math.isnan(plain.rupture_mm)
+    assert plain.error_percent < 1e-9
+    widening = row(Slider(profile="wedge", ratio=0.5, segments=64))
+    assert widening.rupture_mm == pytest.approx(-1.5, abs=0.01)
+
+
 def test_both_ways_are_mirror_images() -> None:
     there = Slider()
     back = there.model_copy(update={"start": -there.end, "end": -there.start})

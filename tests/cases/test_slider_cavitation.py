@@ -191,6 +191,21 @@ def test_the_pocket_is_exact_on_any_mesh_with_nodes_at_its_steps(segments: int) 
     assert found.load_N_per_mm == pytest.approx(load * unit, rel=1e-12)
 
 
+@pytest.mark.parametrize(("speed", "behind"), [(SPEED, 0.0), (-SPEED, 0.0), (SPEED, 1.0)])
+def test_a_pocket_without_inlet_pressure_is_torn_at_its_step(speed: float, behind: float) -> None:
+    """The first land brings U h0 / 2, which fills the second: p is that behind it, all along it."""
+    p = Slider(profile="pocket", segments=50, end_pressure=behind)
+    found, H = row(p, speed), p.ratio
+    filling = behind * p.h0**2 / (6.0 * p.viscosity * SPEED * (H - 1.0) / H**3)  # mm of the pocket
+    torn, formed = (-0.75, -filling) if speed > 0.0 else (0.0, -0.75)
+    assert found.rupture_mm == torn
+    assert found.reformation_mm == pytest.approx(formed, abs=1e-12)
+    assert found.load_N_per_mm == pytest.approx(behind * (0.75 + filling / 2.0), rel=1e-12)
+    assert found.p_max_MPa == pytest.approx(behind, rel=1e-12)
+    assert found.flux_mm2_s == pytest.approx(0.5 * speed * p.h0, rel=1e-12)
+    assert found.error_percent < 1e-6
+
+
 # --- roughness ------------------------------------------------------------------------------------
 
 
