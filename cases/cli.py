@@ -275,13 +275,15 @@ def _write(
     from softehl.cases.harness.report.page import write_page, write_xlsx
 
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         size = write_page(runs, parts, path, title)
         if xlsx:
             write_xlsx(parts, path.with_suffix(".xlsx"))
     except OSError as error:
         raise BadInput(f"cannot write {path}: {error.strerror or error}") from None
     if not quiet:
-        click.echo(f"written to {path} ({size / 1e6:.1f} MB)")
+        told = f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.0f} kB"
+        click.echo(f"written to {path} ({told})")
 
 
 def _by_petsc(case: str) -> str:

@@ -37,8 +37,9 @@ class Column:
 
     @property
     def title(self) -> str:
-        """The head of a column for readers: the beginning of its meaning, and its unit."""
-        words = re.split(r"[,;:] |, | \(|: ", self.meaning)[0]
+        """The head of a column for readers: its name in words, and its unit."""
+        unit = self.unit.replace("%", "percent").replace(" ", "_").replace("/", "_(per_)?")
+        words = re.sub(f"_{unit}(?=_|$)", "", self.name, count=1).replace("_", " ")
         return f"{words} [{self.unit}]" if self.unit else words
 
     def read(self, text: str) -> Cell:

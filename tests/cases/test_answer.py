@@ -116,8 +116,17 @@ def test_a_report_of_cycles_has_their_numbers() -> None:
     assert parts_of([run])[0].title == "Answer"
     page = render([run], parts_of([run]))
     assert said in page
-    assert "work of friction on the rod [mJ]" in page
+    assert ">energy [mJ]</th>" in page
     assert "every speed is a steady state" not in page
+
+
+def test_a_rod_that_does_not_come_back_returns_nothing() -> None:
+    run = cycles()
+    back = replace(run.rows[0], leak_mm3=-0.51)
+    assert "returns what it takes out" in run.case.answer(run.parameters, [back])[0]
+    motion = ((0.0, 100.0), (0.2, 100.0), (0.25, -100.0))
+    (line,) = run.case.answer(cycle.Cycle(motion=motion), [back])
+    assert line.startswith("cycle 3: -0.51 mm3 past the air end, by a rod that does not come back")
 
 
 def test_rough_cycles_say_how_they_break_away() -> None:

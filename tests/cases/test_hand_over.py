@@ -86,6 +86,8 @@ def test_modelica_reads_friction_between_films() -> None:
 
 def test_files_of_a_hand_over(tmp_path: Path) -> None:
     law = LAWS["Cylinder Friction"]
+    one = write_hand_over(tmp_path / "seal", [run(1.0, law)])
+    assert one[0] == f"8 speeds at 1 pressure written to {tmp_path / 'seal'}"
     said = write_hand_over(tmp_path / "seal", [run(1.0, law), run(5.0, law, SPEEDS[1:])])
     assert sorted(path.name for path in (tmp_path / "seal").iterdir()) == sorted(FILES)
     header = ("sealed_pressure_MPa", "rod_speed_mm_s", "friction_N", "leakage_mm3_s")

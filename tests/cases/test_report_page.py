@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 
 from softehl.__main__ import main
+from softehl.cases.seal.states.leakage import LeakageRow
+from softehl.cases.seal.states.state import FilmRow
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 LARGEST = 5_000_000
@@ -75,6 +77,26 @@ def both(runs: tuple[Path, Path]) -> Path:
     return out
 
 
+def test_a_report_without_plots_is_small_and_makes_its_folders(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, out = str(tmp_path / "s"), tmp_path / "a" / "b" / "c.html"
+    keys = ["--set=profile=wedge", "--set=segments=8", "--set=speeds=100"]
+    assert main(["run", "slider", *keys, "--quiet", "--out", folder]) == 0
+    assert main(["report", folder, "--out", str(out)]) == 0
+    assert re.search(r"c\.html \(\d\d? kB\)", capsys.readouterr().out)
+    heads = re.findall(r"<th\b[^>]*>(.*?)</th>", out.read_text(encoding="utf-8"))
+    assert {"rod speed [mm/s]", "load [N/mm]", "error [%]", "verdict"} <= set(heads)
+
+
+def test_headings_are_the_names_of_columns() -> None:
+    titles = FilmRow.titles()
+    wanted = {"leak rate [mm3/s]", "moment [N mm]", "entrance pressure [MPa]", "lambda ratio"}
+    assert {*wanted, "h star error [%]", "regime", "verdict"} <= set(titles)
+    assert "net per 100 m [mm3]" in LeakageRow.titles()
+    assert len(set(titles)) == len(titles)
+
+
 def test_two_folders_side_by_side(runs: tuple[Path, Path], both: Path) -> None:
     from openpyxl import load_workbook
 
@@ -100,7 +122,7 @@ def test_runs_side_by_side_have_materials_and_leakage(runs: tuple[Path, Path], b
         content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
         assert f"<td>{content['parameters']['mu']:.4g}</td>" in text
         assert f"<td>{100.0 * content['leakage'][0]['net_mm3_per_mm']:.4g}</td>" in text
-    heads = re.findall(r"<th[^>]*>([^<]*)</th>", text)
+    heads = re.findall(r"<th\b[^>]*>([^<]*)</th>", text)
     assert [head for head in heads if re.search(r"_(um|mm|mm_s|MPa|N|percent)\b", head)] == []
 
 

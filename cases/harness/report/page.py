@@ -217,7 +217,7 @@ def _side_by_side(runs: Sequence[FinishedRun]) -> Part:
             rows.append([at, *values, *changes])
         header = [f"{key.head} [{key.unit}]", *(run.name for run in runs)]
         header += [f"{run.name}, difference in %" for run in others]
-        tables.append(Table(column.title, header, rows))
+        tables.append(Table(f"{column.title}: {column.meaning}", header, rows))
     words = "" if common else "The runs share no row."
     return Part("Side by side", words, tables=tables if common else [])
 

@@ -174,7 +174,9 @@ def write_hand_over(folder: Path, runs: Sequence[FinishedRun]) -> list[str]:
     laws = friction_laws(seal)
     title = runs[0].case.titled(runs[0].parameters)
     write_text(folder / FILES[2], simscape(laws, title))
-    said = [f"{len(seal.speeds)} speeds at {len(seal.pressures)} pressures written to {folder}"]
+    sizes = (len(seal.speeds), "speed"), (len(seal.pressures), "pressure")
+    counts = " at ".join(f"{count} {what}{'s' * (count != 1)}" for count, what in sizes)
+    said = [f"{counts} written to {folder}"]
     if seal.left_out:
         said.append(f"left out, as not every pressure has them: {seal.left_out}")
     if not laws:
