@@ -25,6 +25,9 @@ from softehl.runtime.names import meant
 Shipped = Mapping[str, str]
 """Name of a case that ships -> its module, which is imported when the case is needed."""
 
+WAYS = ("grid", "list", "latin_hypercube", "random")
+"""Tables of a study, which is no case but many: how its keys vary."""
+
 _BARE_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _FILE = re.compile(r"(\.{0,2}/)?[A-Za-z_][A-Za-z0-9_./-]*\.[A-Za-z]{1,5}")
 _PHRASE = re.compile(
@@ -123,6 +126,8 @@ def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
     table = read_toml(
         given, "no case or file", f"a TOML file or one of {', '.join(shipped)}", shipped
     )
+    if any(isinstance(table.get(way), dict | list) for way in WAYS):
+        raise BadInput(f"{given} is a study of many runs: softehl sweep {given}")
     name = table.pop("case", None)
     if not isinstance(name, str) or name not in shipped:
         told = "no case" if name is None else f"case = {shown(name)}"
@@ -160,10 +165,8 @@ def require_known(kind: type[Parameters], keys: Iterable[str], origins: Mapping[
             near = (
                 f" ({kind.words[key.lower()]})" if key.lower() in kind.words else meant(key, known)
             )
-            allowed = "what `softehl keys` lists" if near else ", ".join(known)
-            raise BadInput(
-                f"{origins[key]}: unknown key {shortened(key)!r}{near}; allowed: {allowed}"
-            )
+            told = f"{origins[key]}: unknown key {shortened(key)!r}{near}"
+            raise BadInput(f"{told}; allowed: what `softehl keys` lists")
 
 
 def validated(

@@ -17,6 +17,7 @@ from typing import Any
 from softehl.cases.harness import sampling
 from softehl.cases.harness.case import AnyCase
 from softehl.cases.harness.case_file import (
+    WAYS,
     Contradiction,
     Shipped,
     find_case,
@@ -30,7 +31,6 @@ from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import Parameters, files_of, without_unit
 from softehl.cases.harness.sampling import Hypercube, Points, Random
 
-WAYS = ("grid", "list", "latin_hypercube", "random")
 _REPLACING = ("grid", "latin_hypercube")  # a list falls back on what is fixed, tolerances are of it
 _WANTED = "one of [grid], [[list]], [latin_hypercube], [random]"
 

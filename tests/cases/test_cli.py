@@ -273,6 +273,8 @@ def names(folder: Path) -> set[str]:
 
 BAD = {
     "unknown key": (["oring", "--set", "densty=4"], "did you mean 'density'"),
+    "no such key": (["oring", "--set", "xyzzy=1"], "'xyzzy'; allowed: what `softehl keys` lists"),
+    "study": (["many.toml"], "many.toml is a study of many runs: softehl sweep many.toml"),
     "half a key": (["oring", "--set", "corner=0.1"], "'corner_radius' or 'corner_fillet'"),
     "wrong type": (["oring", "--set", "sealed_pressure=high"], 'sealed_pressure = "high"'),
     "negative pressure": (["oring", "--set", "sealed_pressure=-1"], "sealed_pressure = -1"),
@@ -324,6 +326,7 @@ CASE_FILES: Mapping[str, bytes] = {
     "nameless.toml": b"density = 4",
     "other.toml": b'case = "piston"',
     "typo.toml": b'case = "oring"\nspeed = 3',
+    "many.toml": b'case = "oring"\n[random]\nruns = 3',
     "code.toml": b'case = "oring"\n'
     b"sealed_pressure = \"__import__('os').system('touch ran') or 1.0\"",
     "nested.toml": b'case = "oring"\n[density]\nvalue = 4',

@@ -22,8 +22,9 @@ from scipy.stats import kstest, norm, uniform
 import softehl
 from softehl.cases.harness import sampling
 from softehl.cases.harness.case import load_case
+from softehl.cases.harness.case_file import WAYS
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.harness.study_file import WAYS, Study, read_study
+from softehl.cases.harness.study_file import Study, read_study
 from softehl.cases.seal.gland.tolerances import band
 from softehl.cases.shipped import SHIPPED
 from softehl.cases.slider import case as slider
