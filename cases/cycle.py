@@ -260,7 +260,9 @@ class CycleCase(Case[Cycle, CycleRow]):
         row = rows[-1]
         end = "" if row.verdict == OK else f" ({row.verdict}: more cycles may change it)"
         leak = leaks(row.leak_mm3)
-        if row.leak_mm3 > 0.0 and parameters.motion is None:
+        if parameters.path.drift:
+            leak = f"{row.leak_mm3:+.3g} mm3 past the air end, by a rod that does not come back"
+        elif row.leak_mm3 > 0.0 and parameters.motion is None:
             leak += f", {far(row.leak_mm3, parameters.travel)}"
         back = f", {-row.friction_in_N:.3g} N in" if row.friction_in_N < 0.0 else ""
         friction = f"friction {row.friction_out_N:.3g} N out{back} at most"
