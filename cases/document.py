@@ -2,24 +2,29 @@
 
 A table begins with one of these lines and ends with `<!-- end -->`.
 
-`<!-- columns CASE -->`: the columns of a row.
+`<!-- columns CASE -->`: the columns of a row; of `leakage` and `tolerances`: of these tables.
 `<!-- keys CASE -->`: the keys of a case.
 `<!-- keys CASE beyond OTHER -->`: its keys that the other case does not have.
 `<!-- section NAME -->`: the dimensions of a section of a seal.
 """
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 from softehl.cases.harness.case import load_case
 from softehl.cases.harness.parameters import declared, keys_of
+from softehl.cases.harness.row import Record
 from softehl.cases.harness.table import column_lines, key_lines
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.keys import dimensions
+from softehl.cases.seal.gland.tolerances import ToleranceRow
+from softehl.cases.seal.states.leakage import LeakageRow
 from softehl.cases.shipped import SHIPPED
 from softehl.runtime.io import write_text
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
+TABLES: Mapping[str, type[Record]] = {"leakage": LeakageRow, "tolerances": ToleranceRow}
 _TABLE = re.compile(
     r"<!-- (columns|keys|section) (\w+)( beyond (\w+))? -->\n.*?<!-- end -->", re.DOTALL
 )
@@ -38,7 +43,7 @@ def _table(found: re.Match[str]) -> str:
         known = tuple(keys_of(load_case(SHIPPED[other]).parameters)) if other else ()
         lines = key_lines(load_case(SHIPPED[name]).parameters, known)
     else:
-        lines = column_lines(load_case(SHIPPED[name]).row)
+        lines = column_lines(TABLES.get(name) or load_case(SHIPPED[name]).row)
     return "\n".join([f"<!-- {what} {name}{beyond or ''} -->", *lines, "<!-- end -->"])
 
 
