@@ -127,15 +127,6 @@ class Layout:
             on_housing = float(mesh.places[(mesh.arc + last - crown) % len(mesh.boundary)])
         return replace(self, pressure_boundaries=(on_rod, on_housing))
 
-    def bounds(self, old: Layout) -> tuple[float, float]:
-        """Places (mm) on the arc of another one between which the arc may be laid.
-
-        The ends of this one on a circle; elsewhere those of the other one, as what lies beyond may
-        be a corner or a wall.
-        """
-        begin, end = old.film if self.flat else self.film
-        return begin - old.film[0], end - old.film[0]
-
     def between(self, old: Layout, ends: tuple[float, float]) -> Layout:
         """Layout with the pressure boundaries of another one, and its arc between these places on
         the arc of that one, unless its mesh is that of a file.
