@@ -7,7 +7,7 @@ import pytest
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.solve.layouts import (
-    COARSEST,
+    COARSEST_OF_FILM,
     RATE,
     RISE,
     THIN,
@@ -41,7 +41,7 @@ def test_a_film_that_does_not_change_has_the_longest_segments(system: SealSystem
     s = system.section.places
     still = np.full(len(s), THICKNESS)
     _, size = sizes(system, film(system, still, np.ones(len(s))), THICKNESS)
-    assert size == pytest.approx(np.full(len(size), s[-1] / COARSEST))
+    assert size == pytest.approx(np.full(len(size), s[-1] / COARSEST_OF_FILM))
 
 
 def test_thickness_and_pressure_ask_for_so_much_of_their_change(system: SealSystem) -> None:
@@ -53,7 +53,7 @@ def test_thickness_and_pressure_ask_for_so_much_of_their_change(system: SealSyst
     at, size = sizes(system, x, THICKNESS)
     inside = (k * at - 6.0 < np.log(THIN) - 0.5) & (k * at - 6.0 > np.log(1e-3) + 0.5)
     assert size[inside] == pytest.approx(np.full(inside.sum(), THINNING / k))
-    assert size[-1] == pytest.approx(s[-1] / COARSEST)  # too thick to matter
+    assert size[-1] == pytest.approx(s[-1] / COARSEST_OF_FILM)  # too thick to matter
     peak = np.minimum(rise * s, 1.0)
     _, size = sizes(system, film(system, np.full(len(s), THICKNESS), peak), THICKNESS)
     assert size[at < 0.2 * s[-1]] == pytest.approx(np.full((at < 0.2 * s[-1]).sum(), RISE / rise))
@@ -68,7 +68,7 @@ def test_segments_grow_away_from_a_step(system: SealSystem) -> None:
     at, size = sizes(system, film(system, h, np.ones(len(s))), THICKNESS)
     least = THINNING / np.log(3.0) * (s[node] - s[node - 1])
     away = np.maximum(np.maximum(s[node - 1] - at, at - s[node]), 0.0)
-    expected = np.minimum(least + RATE * away, s[-1] / COARSEST)
+    expected = np.minimum(least + RATE * away, s[-1] / COARSEST_OF_FILM)
     assert size == pytest.approx(expected, rel=0.02)
 
 
