@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import nan
+from math import copysign, nan
 from typing import Any
 
 import numpy as np
@@ -70,8 +70,8 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
     sliding, rubbed = wedge_friction(system, *before, flow, h_star)
     beyond = wedge_friction(system, *behind, flow, h_star)[0]  # no pressure is built up there
     if film.entrance:
-        drag += np.copysign(sliding, film.rod_speed)
-        friction += np.copysign(rubbed, film.rod_speed)
+        drag += copysign(sliding, film.rod_speed)
+        friction += copysign(rubbed, film.rod_speed)
     else:
         beyond += abs(rubbed)
     return FilmNumbers(
