@@ -24,7 +24,7 @@ from softehl.runtime.mesh.mesh import MeshError
 FITS, SHOWS = 2.2, 3.0
 """Segments that a film may ask for in the place of one, before its mesh is made anew and before it
 does not count. Films that asked for at most three changed h* by 0.5 % or less on the mesh that was
-made for them, one that asked for nine by 7 %. Made anew from 3 on, X-ring 36 of the sample takes
+made for them, one that asked for nine by 7 %. Made anew from 3 on, an X-ring of the sample takes
 three times as long, and one of 13 other seals loses a state."""
 
 ALIKE = 1.25
