@@ -4,8 +4,8 @@ A line of length L is to have `count` segments whose size at s is
 
     dx(s) = min(coarsest, min_k [min(a_k finest, most_k) + rate |s - s_k|])
 
-(the rate may differ from place to place and between the two sides of one) with `finest` chosen such
-that they fill it. The map is that of the limit of many segments, so that the nodes of a mesh are
+with `finest` chosen such that they fill it. The rate may differ from place to place and between the
+two sides of one. The map is that of the limit of many segments, so that the nodes of a mesh are
 among those of the mesh of twice its density.
 """
 

@@ -52,7 +52,6 @@ NUMBERED = {field.name: field.unknowns for field in FIELDS}
 _ON = {field.name: field.on for field in FIELDS}
 _STILL = FilmLoads(0.0, "out", 0.0, np.empty(0))
 
-
 _STEP = 0.9
 """Share of its thickness that a film may lose in an iteration. Nine seals take 1.5 % more of them
 with 0.7, 2 % fewer with 0.97; a rough film, which may change by sigma in any case, none."""

@@ -15,14 +15,14 @@ from softehl.cases.seal.gland import catalogue
 from softehl.cases.seal.gland.given import number, put, shown
 from softehl.cases.seal.gland.grooves import KINDS, Groove, cup_gland, gland
 from softehl.cases.seal.gland.records.free_seal import FreeSeal
-from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.records.gland import OF_PISTON, Gland
 from softehl.cases.seal.gland.sections.base import parts_of
 from softehl.cases.seal.gland.sections.keys import section_of_file
 from softehl.cases.seal.gland.sections.u_cup import UCup
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.said import bands
 
-DIAMETERS = {"rod": "rod_diameter", "bore": "rod_diameter", "groove_diameter": "housing_diameter"}
+DIAMETERS = {"rod": "rod_diameter", **{name: key for key, name in OF_PISTON.items()}}
 """Key of a diameter as it is measured -> key that is negative in a piston."""
 
 _GROUND = ("groove_diameter", "squeeze", "groove_depth")

@@ -50,8 +50,9 @@ def _most(p: FreeSeal) -> float:
 
 def _ratio(p: FreeSeal, found: float) -> str:
     words = (
-        "in a sample of sections other than round all films were found at ratios to 2, four of "
-        f"five at 2 to 4, half of them at 4 to 5; nothing was tried above {_OTHER_TRIED:g}"
+        f"in a sample of sections other than round all films were found at ratios to {_OTHER:g}, "
+        f"four of five at {_OTHER:g} to 4, half of them at 4 to 5; nothing was tried above "
+        f"{_OTHER_TRIED:g}"
     )
     if p.round:
         words = (

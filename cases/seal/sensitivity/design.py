@@ -69,7 +69,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Lever:
-    """What a user changes: a key or a measure of the gland by its name, and the key behind it."""
+    """A key or a measure of the gland that a user changes, by its name, and the key behind it."""
 
     name: str
     key: str

@@ -45,7 +45,6 @@ WITHOUT_INFLUENCE = (
 )
 """Parameters that the contact stage does not know."""
 
-
 COARSE = 1
 """Density of the mesh on which the path from rest is followed."""
 

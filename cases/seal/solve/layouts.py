@@ -48,7 +48,6 @@ narrower there than half of those films: without it films of 40 um lack 2 % of t
 NO_WIDTH = 1e-6
 """Of the widest part of an arc, below which a part lies on a wall."""
 
-
 THINNING, RISE = 0.3, 0.05
 """Changes along a segment at density 2: of ln h where the film is thin, of p over its maximum."""
 

@@ -29,7 +29,6 @@ _EXTRUSION = (
 )
 _RELEASE = "try a smaller housing_friction or a finer mesh (larger density)"
 
-
 ROLLING = (
     'with rotation = "free" hardly anything but the film turns or holds the section: use "fixed"'
 )

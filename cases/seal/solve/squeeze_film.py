@@ -42,7 +42,6 @@ _AT_WALL = 0.02
 14 MPa takes 64 % more factorisations; with all nodes of the arc, four seals take 3 to 11 % more
 time."""
 
-
 EXPONENT = 1.5
 """a of the local time steps. On X-rings at the slowest speed 1 found no film and 2 was as good."""
 

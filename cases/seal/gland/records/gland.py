@@ -8,7 +8,7 @@ from softehl.cases.harness.parameters import key
 from softehl.cases.seal.gland.grooves import Kind, squeeze
 from softehl.cases.seal.gland.records.free_seal import SIGNED, FreeSeal
 
-_OF_PISTON = {"rod_diameter": "bore", "housing_diameter": "groove_diameter"}
+OF_PISTON = {"rod_diameter": "bore", "housing_diameter": "groove_diameter"}
 """Key that is less than 0 in a piston seal -> the key that it is given by."""
 
 
@@ -112,7 +112,7 @@ class Gland(FreeSeal):
 
     def called(self, key: str) -> str:
         """The key that a user of this seal knows: of a piston seal its bore and its groove."""
-        return _OF_PISTON.get(key, key) if self.piston else key
+        return OF_PISTON.get(key, key) if self.piston else key
 
     @property
     def ring_diameter(self) -> float:
