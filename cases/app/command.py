@@ -28,7 +28,7 @@ def app(folder: Path, port: int, no_browser: bool) -> int:
     """Choose a seal, run it and compare runs, in a browser on this machine.
 
     Prints the address, which holds a token: nothing is answered without it. Ctrl-C ends the
-    desk and the runs that it started; what was reached is saved.
+    app and the runs that it started; their computed states are saved.
     """
     from softehl.cases.harness.errors import BadInput
 
