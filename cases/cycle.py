@@ -53,7 +53,7 @@ class Cycle(Seal):
         bounds="t rising from 0; left out = by travel, frequency and shape",
         strict=False,
     )
-    travel: float = key(20.0, "way of the rod from end to end", unit="mm", gt=0)
+    travel: float = key(20.0, "stroke length of the rod", unit="mm", gt=0)
     frequency: float = key(2.0, "cycles in a second", unit="1/s", gt=0)
     shape: Literal["sine", "trapezoidal"] = key("sine", "speed over time")
     ramp: float = key(0.1, "trapezoidal: share of the cycle of each ramp", gt=0, lt=0.5)

@@ -24,6 +24,4 @@ class Duty(Parameters):
         unit="mm/s",
         bounds="a number > 0, or a list of different ones in any order",
     )
-    travel: float = key(
-        100.0, "way of the rod from end to end, for leakage in a cycle", unit="mm", gt=0
-    )
+    travel: float = key(100.0, "stroke length of the rod, for leakage in a cycle", unit="mm", gt=0)

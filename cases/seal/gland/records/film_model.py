@@ -13,7 +13,7 @@ class FilmModel(FreeSeal, Surfaces):
     cavitation: Literal["penalty", "mass-conserving"] | None = key(
         None,
         "model of cavitation",
-        bounds='"penalty" or "mass-conserving", left out = the latter with roughness, '
+        bounds='"penalty" or "mass-conserving", left out = mass-conserving with roughness, '
         "with a cavitation_pressure and where a section has two lobes",
     )
     cavitation_pressure: float = key(

@@ -39,7 +39,7 @@ class FreeSeal(SectionKeys):
     )
     inner_diameter: float = key(
         50.39,
-        "inner diameter of the seal D_inner; of a piston seal less its outside diameter",
+        "inner diameter of the seal D_inner; of a piston seal minus its outside diameter",
         unit="mm",
         bounds=SIGNED,
         ge=-5000,

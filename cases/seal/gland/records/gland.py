@@ -34,14 +34,14 @@ class Gland(FreeSeal):
     )
     groove_depth: float | None = key(
         None,
-        "radial depth of the gland, from rod or bore to its ground, for housing_diameter",
+        "radial depth of the groove, from rod or bore to its bottom, for housing_diameter",
         unit="mm",
         bounds="> 0, left out = by housing_diameter",
         gt=0,
     )
     squeeze: float | None = key(
         None,
-        "part of section_diameter that the gland takes away, for housing_diameter",
+        "reduction of section_diameter by the gland, for housing_diameter",
         unit="%",
         bounds="> 0 to 50, left out = by housing_diameter",
         gt=0,
@@ -49,7 +49,7 @@ class Gland(FreeSeal):
     )
     groove_diameter: float | None = key(
         None,
-        "diameter of the ground of the groove, for housing_diameter",
+        "diameter of the bottom of the groove, for housing_diameter",
         unit="mm",
         bounds='> 0, or "33 h9"',
         gt=0,

@@ -9,7 +9,7 @@ class Numerics(Parameters):
     """Solvers, support, sensitivities."""
 
     sensitivity: bool = key(
-        False, "whether sensitivity.csv is written: how results follow every parameter"
+        False, "whether sensitivity.csv is written: derivatives of the results by every parameter"
     )
     tolerances: tuple[str, ...] = key(
         (),
@@ -22,7 +22,7 @@ class Numerics(Parameters):
     )
     solver: Literal["auto", "monolithic"] = key(
         "auto",
-        "way to the solution",
+        "method of solution",
         bounds='"auto" (fast, checks itself) or "monolithic" (reference)',
     )
     linear: Literal["auto", "superlu", "pardiso", "petsc"] = key(
