@@ -38,10 +38,10 @@ def _jobs(words: str) -> Callable[[_Command], _Command]:
     A seal sits in the housing and slides on a rod (rod = "36 f7"), or in a piston and slides on a
     bore (bore = "40 H8").
 
-    Writes curve.csv, the files of its rows, plots and run.json to DIR, each state as soon as it is
-    there. Without --out, --resume and --overwrite mean the folder that was written to last.
-    `softehl keys CASE` lists what can be set. Exit code: 0 done, 2 bad input, 3 not converged
-    (what was reached is saved).
+    Writes curve.csv, files of each state, plots and run.json to DIR, each state as soon as it is
+    computed. Without --out, --resume and --overwrite use the folder that was written to last.
+    `softehl keys CASE` lists the keys. Exit code: 0 done, 2 bad input, 3 some states did not
+    converge (the others are saved).
     """
 )
 @click.argument("case", metavar="CASE")
@@ -50,28 +50,28 @@ def _jobs(words: str) -> Callable[[_Command], _Command]:
     "assignments",
     metavar="KEY=VALUE",
     multiple=True,
-    help="Change a parameter; VALUE is a TOML value, a bare word is a string. Repeatable.",
+    help="Set a key; VALUE is a TOML value, a bare word is a string. Repeatable.",
 )
 @_into("Folder for the files  [default: results/CASE, or results/CASE-2, ... if that is taken]")
 @click.option(
     "--tolerance",
     metavar="PERCENT",
-    help="Largest estimated error of h*, as in 1%: speeds that miss it run on finer meshes.",
+    help="Largest estimated error of h*, as in 1%; states with a larger one run on finer meshes.",
 )
 @click.option(
     "--sensitivity",
     is_flag=True,
-    help="Also write sensitivity.csv: per cent for one per cent of every parameter, exactly.",
+    help="Also write sensitivity.csv: exact derivatives by every parameter, in % for 1 %.",
 )
-@click.option("--resume", is_flag=True, help="Keep the rows that DIR has and run the others.")
-@click.option("--overwrite", is_flag=True, help="Begin anew in a DIR that holds a run.")
-@_jobs("Up to N parts of the run (such as the two strokes) side by side, in a process each.")
+@click.option("--resume", is_flag=True, help="Keep the states in DIR and compute the others.")
+@click.option("--overwrite", is_flag=True, help="Replace the run in DIR.")
+@_jobs("Run up to N parts (such as the two strokes) in parallel processes.")
 @click.option(
     "--engine",
     type=click.Choice(["serial", "petsc"]),
     default="serial",
     show_default=True,
-    help="petsc: factors by MUMPS on all processes that mpirun started (the key linear).",
+    help="petsc: factorise with MUMPS on all processes of mpirun (sets the key linear).",
 )
 @click.option("--quiet", is_flag=True, help="No progress and no table.")
 @click.option(
@@ -79,7 +79,7 @@ def _jobs(words: str) -> Callable[[_Command], _Command]:
     type=click.Choice(["png", "svg", "both", "none"]),
     default="png",
     show_default=True,
-    help="Files of the pictures; with --resume a finished run draws them again.",
+    help="Format of the pictures; with --resume a finished run draws them again.",
 )
 @click.option("--report", is_flag=True, help="Write report.html, as `softehl report DIR` does.")
 def run(
@@ -127,9 +127,9 @@ def run(
     "--set", "assignments", metavar="KEY=VALUE", multiple=True, help="As in `softehl run`."
 )
 @_into("Folder for table, pictures and runs  [default: results/STUDY, results/STUDY-2, ...]")
-@click.option("--resume", is_flag=True, help="Keep the runs that DIR has and run the others.")
-@click.option("--overwrite", is_flag=True, help="Begin anew in a DIR that holds a sweep.")
-@_jobs("N runs side by side, in a process each.")
+@click.option("--resume", is_flag=True, help="Keep the runs in DIR and run the others.")
+@click.option("--overwrite", is_flag=True, help="Replace the sweep in DIR.")
+@_jobs("Run N runs in parallel processes.")
 @click.option("--dask", metavar="ADDRESS", help="Run on the workers of this Dask scheduler.")
 @click.option("--mpi", is_flag=True, help="Run on the processes that mpiexec started.")
 @click.option("--quiet", is_flag=True, help="No progress.")
@@ -171,22 +171,22 @@ def sweep(
     type=click.Path(path_type=Path),
     help="File of the report  [default: report.html in the first DIR]",
 )
-@click.option("--xlsx", is_flag=True, help="Write its tables beside it, as .xlsx.")
+@click.option("--xlsx", is_flag=True, help="Also write its tables as .xlsx.")
 @click.option(
     "--system",
     metavar="FOLDER",
     type=click.Path(path_type=Path, file_okay=False),
-    help="Write friction and leakage over speed and pressure there instead: tables for Modelica, "
-    "numbers for Simscape, CSV.",
+    help="Write friction and leakage over speed and pressure to FOLDER instead of a report: tables "
+    "for Modelica, parameters for Simscape, CSV.",
 )
 def report_runs(
     folders: tuple[Path, ...], out: Path | None, xlsx: bool, system: Path | None
 ) -> int:
-    """Report the run in DIR, several side by side, or a sweep: one file of HTML, works offline.
+    """Write one HTML file on the run in DIR, on several runs side by side, or on a sweep.
 
-    It has what was asked, the gland, the deformed section and the film with a slider over the
-    speeds; the curve with errors and verdicts, friction, leakage, tolerances, limits and versions.
-    Of several runs it also has the differences from the first, in per cent.
+    The report works offline. It has the input, the gland, the deformed section and the film for
+    each speed, the curve with errors and verdicts, friction, leakage, tolerances, limits and
+    versions. For several runs it also has the differences from the first, in per cent.
     """
     if system is not None:
         return _hand_over(folders, system)
@@ -301,7 +301,7 @@ def _by_petsc(case: str) -> str:
 
 
 @click.command(
-    help=f"""Every key of CASE, a TOML file or one of {_NAMES}: default, unit, bounds, meaning.
+    help=f"""List the keys of CASE, a TOML file or one of {_NAMES}: default, unit, bounds, meaning.
 
     A key is set by `softehl run CASE --set KEY=VALUE` or in a TOML file.
     """
@@ -317,17 +317,17 @@ def keys(case: str) -> int:
 
 
 @click.command(
-    help="""The value of one key that gives a film of CASE a wanted change.
+    help="""Find the value of one key that changes a result of CASE by TARGET.
 
-    As in `softehl design oring "friction -10%" --by rod_diameter`: by exact sensitivities, checked
-    by a nonlinear solve. The film is that of the first speed, at outstroke unless stroke = in. Exit
-    code: 0 done, 2 bad input or out of reach.
+    Example: `softehl design oring "friction -10%" --by rod_diameter`. Exact sensitivities give the
+    value, and a nonlinear solve checks it. The state is that of the first speed, at outstroke
+    unless stroke = in. Exit code: 0 done, 2 bad input, or a target that cannot be met.
     """,
     context_settings={"ignore_unknown_options": True},  # a target that begins with a minus sign
 )
 @click.argument("case", metavar="CASE")
 @click.argument("words", metavar="TARGET", nargs=-1, required=True)
-@click.option("--by", "key", metavar="KEY", required=True, help="The key that is to be changed.")
+@click.option("--by", "key", metavar="KEY", required=True, help="The key to change.")
 @click.option(
     "--set", "assignments", metavar="KEY=VALUE", multiple=True, help="As in `softehl run`."
 )
@@ -336,7 +336,7 @@ def keys(case: str) -> int:
     "page",
     metavar="FILE",
     type=click.Path(path_type=Path),
-    help="Write a page on it: curve of the design, results, gland and section before and after.",
+    help="Also write a page: curve of the design; results, gland and section before and after.",
 )
 def design(
     case: str, words: tuple[str, ...], key: str, assignments: tuple[str, ...], page: Path | None
@@ -387,8 +387,8 @@ def design(
     show_default=True,
     help="Folder for pictures, tables and runs.",
 )
-@click.option("--resume", is_flag=True, help="Keep the states that DIR has and run the rest.")
-@_jobs("Number of runs side by side, in a process each.")
+@click.option("--resume", is_flag=True, help="Keep the states in DIR and compute the others.")
+@_jobs("Run N runs in parallel processes.")
 def reproduce(
     items: tuple[str, ...], density: str | None, folder: Path, resume: bool, jobs: int
 ) -> int:

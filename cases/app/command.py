@@ -14,7 +14,7 @@ _MISSING = "softehl app needs Panel: pip install 'softehl[app]'"
     default="results",
     show_default=True,
     type=click.Path(path_type=Path, file_okay=False),
-    help="Folder of the runs; those that are there can be compared.",
+    help="Folder of the runs; the app also shows runs that it already has.",
 )
 @click.option(
     "--port",
@@ -27,7 +27,7 @@ _MISSING = "softehl app needs Panel: pip install 'softehl[app]'"
 def app(folder: Path, port: int, no_browser: bool) -> int:
     """Choose a seal, run it and compare runs, in a browser on this machine.
 
-    Prints the address, which holds a token: nothing is answered without it. Ctrl-C ends the
+    Prints the address with its token; the server refuses requests without it. Ctrl-C ends the
     app and the runs that it started; their computed states are saved.
     """
     from softehl.cases.harness.errors import BadInput

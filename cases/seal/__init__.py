@@ -1,1 +1,1 @@
-"""The method for lubricated seals: contact, film, path of falling speed, verdict, results."""
+"""The seal program: input, mesh, equations, solution, verdict, results."""

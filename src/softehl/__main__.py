@@ -72,8 +72,8 @@ def _commands() -> "click.Group":
 
     @commands.command()
     @click.argument("models", metavar="[MODEL.py]...", nargs=-1, type=click.Path(path_type=Path))
-    @click.option("--check", is_flag=True, help="Write nothing; exit 1 if anything is stale.")
-    @click.option("--trace", metavar="KERNEL", help="Show what each pass did to a kernel.")
+    @click.option("--check", is_flag=True, help="Write nothing; exit 1 if a file is out of date.")
+    @click.option("--trace", metavar="KERNEL", help="Show KERNEL before and after each pass.")
     @click.option(
         "--target",
         type=click.Choice(
@@ -81,7 +81,7 @@ def _commands() -> "click.Group":
         ),
         default="simd",
         show_default=True,
-        help="Four elements at once, one at a time, cells for DOLFINx, or another host.",
+        help="C for several elements at once (simd) or one (scalar), or code for another program.",
     )
     @click.option(
         "--out",
@@ -94,15 +94,15 @@ def _commands() -> "click.Group":
         type=click.FloatRange(min=0, min_open=True),
         default=10.0,
         show_default=True,
-        help="For comparing each kernel with its page.",
+        help="Time limit for the check of each kernel against its page.",
     )
     @click.option(
-        "--cell", "cells", multiple=True, help="Cell of pages of fields, e.g. hex8; several times."
+        "--cell", "cells", multiple=True, help="Cell for pages of fields, e.g. hex8. Repeatable."
     )
     @click.option(
         "--geometry",
         type=click.Choice(["plane strain", "axisymmetric", "solid"]),
-        help="Of pages of fields in two dimensions  [default: plane strain]",
+        help="Geometry for pages of fields in two dimensions  [default: plane strain]",
     )
     def generate(
         models: tuple[Path, ...],
@@ -114,7 +114,7 @@ def _commands() -> "click.Group":
         cells: tuple[str, ...],
         geometry: str | None,
     ) -> int:
-        """Derive, compile and check the kernels of your own models, in MODEL.py.
+        """Derive, compile and check the kernels of the models in MODEL.py.
 
         The file is run; a model is a function under `@softehl.page`, for each --cell, or one
         without arguments annotated `-> Definition`.

@@ -1,1 +1,1 @@
-"""Strokes in time: how the rod moves, and the film that follows it."""
+"""Strokes in time: the motion of the rod, and the film over time."""

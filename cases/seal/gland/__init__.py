@@ -1,1 +1,1 @@
-"""Everything a user says of a seal: keys, catalogue, rubbers, oils, surfaces, sections."""
+"""The input of a user: keys, catalogue, rubbers, oils, surfaces, sections."""

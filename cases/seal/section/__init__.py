@@ -1,1 +1,1 @@
-"""The cross-section and its mesh: how it is laid out, and the parts of its boundary."""
+"""The cross-section and its mesh: nodes, elements and the parts of its boundary."""

@@ -1,1 +1,1 @@
-"""Derivatives of a film by the parameters, and design by them."""
+"""Derivatives of results by parameters, tolerances, and design by derivatives."""

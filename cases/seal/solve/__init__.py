@@ -1,1 +1,1 @@
-"""The way to a state: dry contact, film, falling speed, and the mesh that suits them."""
+"""The solution of a state: dry contact, film, next speed, and a mesh that resolves them."""

@@ -1,1 +1,1 @@
-"""The meaning of a state, and how far to trust it: films, contacts, verdict, leakage."""
+"""Results of a state and their verdict: films, contacts, estimate of the error, leakage."""

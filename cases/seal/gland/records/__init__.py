@@ -1,1 +1,1 @@
-"""The records of a seal: keys that belong together, with what follows from them alone."""
+"""Records of a seal: groups of keys, with the values that follow from them alone."""

@@ -1,1 +1,1 @@
-"""Rubbers: from a hardness, tests or numbers to a material and its kernels."""
+"""Rubbers: a material and its kernels from a hardness, tests or parameters."""

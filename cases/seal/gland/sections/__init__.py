@@ -1,4 +1,4 @@
-"""Sections of seals by name, each a file: its dimensions, and the shape that follows from them."""
+"""Sections of seals by name, one file each: the dimensions and the outline."""
 
 from softehl.cases.seal.gland.sections.base import Section
 from softehl.cases.seal.gland.sections.d_ring import DRing

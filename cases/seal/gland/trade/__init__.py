@@ -1,5 +1,5 @@
-"""The language of the trade: names of rings, fits, oils, rubbers and finishes, read from texts.
+"""Trade names of rings, fits, oils, rubbers and finishes, read from texts.
 
-Each file reads one kind of name, and answers what it does not understand with the nearest forms
-that it does.
+Each file reads one kind of name. A name that it does not understand is an error with the nearest
+known forms.
 """
