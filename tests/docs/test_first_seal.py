@@ -73,7 +73,7 @@ def test_every_block_and_table_is_in_a_chapter() -> None:
     assert PAGE.count("\n```") == 2 * len(inside)
     assert {b.kind for b in inside} == {"console", "toml"}
     counts = {name: len(list(shown(text))) for name, text in CHAPTERS.items()}
-    expected = {"Ask": 10, "A cylinder rod at 10 MPa": 24, "Other sections": 16}
+    expected = {"Run it": 10, "A cylinder rod at 10 MPa": 24, "Other sections": 16}
     assert {name: n for name, n in counts.items() if n} == expected
 
 

@@ -67,7 +67,7 @@ def test_every_entry_has_its_parts() -> None:
     for entry in ENTRIES:
         assert f"](pictures/{entry}.png)" in written(entry)
         assert (GALLERY / "pictures" / f"{entry}.png").stat().st_size < 80_000
-        for heading in ("Numbers from elsewhere", "Where it departs"):
+        for heading in ("Comparison with published results", "Differences and limits"):
             assert f"\n## {heading}\n" in written(entry), entry
 
 
