@@ -64,7 +64,7 @@ class Cycle(Seal):
         strict=False,
     )
     supply: Literal["flooded", "returned"] = key(
-        "flooded", "what the instroke finds: oil, or what the outstroke left on the rod"
+        "flooded", "supply of the instroke: flooded, or the film that the outstroke left on the rod"
     )
     cycles: int = key(3, "cycles to compute", ge=1, le=1000)
     time_order: Literal[1, 2] = key(2, "1: backward Euler, 2: BDF2", bounds="1 or 2")
@@ -163,7 +163,7 @@ class CycleRow(Row):
     lambda_ratio: float = column(
         "", "least mean gap of the film over the roughness", head="lambda", shown=".2g", default=nan
     )
-    mass_error: float = column("", "largest defect of the balance of oil over what the film holds")
+    mass_error: float = column("", "largest error of the balance of oil, relative to the oil in the film")
     steps: int = column("", "steps in time", head="steps")
     newton_iterations: int = column("", "iterations of Newton's method")
     verdict: str = column("", "`ok`; `transient` where the change is above 1 % or not known")
