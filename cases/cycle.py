@@ -163,7 +163,9 @@ class CycleRow(Row):
     lambda_ratio: float = column(
         "", "least mean gap of the film over the roughness", head="lambda", shown=".2g", default=nan
     )
-    mass_error: float = column("", "largest error of the balance of oil, relative to the oil in the film")
+    mass_error: float = column(
+        "", "largest error of the balance of oil, relative to the oil in the film"
+    )
     steps: int = column("", "steps in time", head="steps")
     newton_iterations: int = column("", "iterations of Newton's method")
     verdict: str = column("", "`ok`; `transient` where the change is above 1 % or not known")
