@@ -9,12 +9,11 @@ diameters. ISO 3601-1 class B tolerances: its rule (A.1) and its steps of the se
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 from softehl.cases.seal.gland.grooves import INCH
+from softehl.cases.seal.gland.tables import rows
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.text import NotUnderstoodError, refused
 
@@ -52,8 +51,7 @@ def ring(name: str) -> Ring:
 @cache
 def as568() -> dict[int, Ring]:
     """The 349 general sizes by number, mm."""
-    text = files(__package__).joinpath("as568.csv").read_text(encoding="utf-8")
-    return {int(row["number"]): _ring(row) for row in csv.DictReader(text.splitlines())}
+    return {int(row["number"]): _ring(row) for row in rows("as568.csv")}
 
 
 def _ring(row: dict[str, str]) -> Ring:

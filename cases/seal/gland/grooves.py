@@ -17,12 +17,12 @@ and lips, and the groove is a tenth wider than the seal.
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from itertools import pairwise
 from typing import Literal, get_args
+
+from softehl.cases.seal.gland.tables import rows
 
 INCH = 25.4
 """mm"""
@@ -97,9 +97,8 @@ def _between(below: Groove, above: Groove, section: float) -> Groove:
 @cache
 def _chart(name: str) -> tuple[Groove, ...]:
     """The grooves of a chart by their sections: "dynamic", "pneumatic" or "x_ring"."""
-    text = files(__package__).joinpath("grooves.csv").read_text(encoding="utf-8")
-    rows = (_groove(row) for row in csv.DictReader(text.splitlines()) if row["chart"] == name)
-    return tuple(sorted(rows, key=lambda groove: groove.section_diameter))
+    grooves = (_groove(row) for row in rows("grooves.csv") if row["chart"] == name)
+    return tuple(sorted(grooves, key=lambda groove: groove.section_diameter))
 
 
 def _groove(row: dict[str, str]) -> Groove:

@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 
 from softehl.cases.seal.gland.given import number, put
 from softehl.cases.seal.gland.records.oil import Oil
+from softehl.cases.seal.gland.tables import rows
 from softehl.cases.seal.gland.trade.oil_names import GRADES, read_oil_name
 
 DENSITY = 870.0
@@ -82,21 +83,7 @@ def read_oil(text: str) -> Walther:
 
 # --- viscosity index, ASTM D2270: a high one means little fall with temperature -----------------
 
-_H = (
-    (2.0, 0.84155, 1.5521, -0.077),
-    (3.8, 0.78571, 1.7929, -0.183),
-    (4.4, 0.82143, 1.5679, 0.119),
-    (5.0, 0.04985, 9.1613, -18.557),
-    (6.4, 0.22619, 7.7369, -16.656),
-    (7.0, 0.79762, -0.7321, 14.610),
-    (7.7, 0.05794, 10.5156, -28.240),
-    (9.0, 0.26665, 6.7015, -10.810),
-    (12.0, 0.20073, 8.4658, -22.490),
-    (15.0, 0.28889, 5.9741, -4.930),
-    (18.0, 0.24504, 7.4160, -16.730),
-    (22.0, 0.20323, 9.1267, -34.230),
-    (28.0, 0.18411, 10.1015, -46.750),
-)
+_H = [tuple(map(float, row.values())) for row in rows("astm_d2270.csv")]
 """From a viscosity at 100 degC on: H = d Y^2 + e Y + f, of the standard's annex."""
 
 _OF_INDUSTRY = 2.0, 40.0

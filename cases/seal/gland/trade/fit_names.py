@@ -1,6 +1,6 @@
 """Sizes with a tolerance: classes of ISO 286 ("36 f7", "40 H8") and limits ("36 -0.025/-0.05").
 
-Standard tolerances and fundamental deviations are those of the tables of ISO 286-1, up to 500 mm.
+`iso286.csv` holds the standard tolerances and fundamental deviations of ISO 286-1 up to 500 mm, um.
 """
 
 from __future__ import annotations
@@ -9,30 +9,25 @@ import re
 from bisect import bisect_left
 from dataclasses import dataclass
 
+from softehl.cases.seal.gland.tables import rows
 from softehl.cases.seal.gland.trade.text import NUMBER, number_text, plain, refused
 
-STEPS = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)
+_TABLE = rows("iso286.csv")
+
+
+def _column(name: str) -> tuple[int, ...]:
+    return tuple(int(row[name]) for row in _TABLE)
+
+
+STEPS = _column("to_mm")
 """Upper ends of the steps of the nominal size, mm."""
 
-GRADES: dict[int, tuple[int, ...]] = {
-    5: (4, 5, 6, 8, 9, 11, 13, 15, 18, 20, 23, 25, 27),
-    6: (6, 8, 9, 11, 13, 16, 19, 22, 25, 29, 32, 36, 40),
-    7: (10, 12, 15, 18, 21, 25, 30, 35, 40, 46, 52, 57, 63),
-    8: (14, 18, 22, 27, 33, 39, 46, 54, 63, 72, 81, 89, 97),
-    9: (25, 30, 36, 43, 52, 62, 74, 87, 100, 115, 130, 140, 155),
-    10: (40, 48, 58, 70, 84, 100, 120, 140, 160, 185, 210, 230, 250),
-    11: (60, 75, 90, 110, 130, 160, 190, 220, 250, 290, 320, 360, 400),
-    12: (100, 120, 150, 180, 210, 250, 300, 350, 400, 460, 520, 570, 630),
+GRADES = {
+    int(name.removeprefix("IT")): _column(name) for name in _TABLE[0] if name.startswith("IT")
 }
 """Grade IT -> standard tolerance in each step, um."""
 
-DEVIATIONS: dict[str, tuple[int, ...]] = {
-    "d": (20, 30, 40, 50, 65, 80, 100, 120, 145, 170, 190, 210, 230),
-    "e": (14, 20, 25, 32, 40, 50, 60, 72, 85, 100, 110, 125, 135),
-    "f": (6, 10, 13, 16, 20, 25, 30, 36, 43, 50, 56, 62, 68),
-    "g": (2, 4, 5, 6, 7, 9, 10, 12, 14, 15, 17, 18, 20),
-    "h": (0,) * 13,
-}
+DEVIATIONS = {letter: _column(letter) for letter in "defgh"}
 """Letter of a shaft -> how far its upper limit is below the nominal size in each step, um.
 
 A hole of the same letter has its lower limit as far above it; js and JS lie around it.

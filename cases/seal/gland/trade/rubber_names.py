@@ -5,36 +5,22 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from softehl.cases.seal.gland.tables import rows
 from softehl.cases.seal.gland.trade.text import NUMBER, form, number_text, plain, refused
 
-RANGES: dict[str, tuple[float, float] | None] = {
-    "NBR": (-40.0, 120.0),
-    "HNBR": (-30.0, 150.0),
-    "FKM": (-20.0, 200.0),
-    "EPDM": (-50.0, 150.0),
-    "VMQ": (-60.0, 200.0),
-    "FVMQ": (-60.0, 175.0),
-    "FFKM": (-25.0, 325.0),
-    "PU": (-30.0, 80.0),
-    "CR": (-40.0, 120.0),
-    "ACM": (-20.0, 150.0),
-    **dict.fromkeys(("XNBR", "AEM", "FEPM", "IIR", "SBR", "NR")),
+_TABLE = rows("polymers.csv")
+
+RANGES = {
+    row["polymer"]: (float(row["from_degC"]), float(row["to_degC"])) if row["to_degC"] else None
+    for row in _TABLE
 }
 """Polymer -> temperatures at which a common chart of makers lets it be used for long, degC."""
 
-_ALIASES = {
-    "NBR": ("nitrile", "Buna[ -]?N", "Perbunan", "acrylonitrile"),
-    "FKM": ("FPM", "Viton"),
-    "HNBR": ("H-NBR",),
-    "EPDM": ("EPM",),
-    "VMQ": ("MVQ", "silicone"),
-    "PU": ("PUR", "TPU", "AU", "EU", "TPE-?U", "polyurethane?", "urethane"),
-    "ACM": ("polyacrylate",),
-    "CR": ("neoprene", "chloroprene"),
-    "FFKM": ("Kalrez",),
-    "NR": ("natural rubber",),
+_SPELT = {
+    word: row["polymer"]
+    for row in _TABLE
+    for word in (row["polymer"], *filter(None, row["also"].split("|")))
 }
-_SPELT = {word: name for name in RANGES for word in (name, *_ALIASES.get(name, ()))}
 _POLYMER = rf"(?P<name>{'|'.join(sorted(_SPELT, key=len, reverse=True))})"
 _UNIT = (
     r"(?:(?:°|deg)? ?(?:(?:sh(?:ore)?\.?)? ?-?(?P<scale>[AD])|sh(?:ore)?|IRHD|duro(?:meter)?"
