@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from softehl.cases.seal.gland import catalogue
-from softehl.cases.seal.gland.given import number, put, shown
+from softehl.cases.seal.gland.given import agree, number, put, shown
 from softehl.cases.seal.gland.grooves import KINDS, Groove, cup_gland, gland
 from softehl.cases.seal.gland.records.free_seal import FreeSeal
 from softehl.cases.seal.gland.records.gland import OF_PISTON, Gland
@@ -166,10 +166,10 @@ def _with_gland(values: dict[str, Any]) -> None:
     if values.get("gland") in KINDS:
         groove = _groove(values, section)
         if values.get("housing_diameter") is None:
-            limited = dict(bands(values.get("said", ())))
-            nominal = limited.get("bore" if rod < 0.0 else "rod")
-            rod_of_chart = math.copysign(nominal.nominal, rod) if nominal else rod
-            values["housing_diameter"] = round(rod_of_chart + 2.0 * groove.depth, 4)
+            limits = {name: found for name, _, found in bands(values.get("said", ()))}
+            named = limits.get("bore" if rod < 0.0 else "rod")
+            of_chart = math.copysign(named.nominal, rod) if named else rod
+            values["housing_diameter"] = round(of_chart + 2.0 * groove.depth, 4)
         if values.get("groove_width") is None and values.get("fill") is None:
             values["groove_width"] = round(groove.width, 4)
     if number(fill := values.get("fill")) and fill > 0.0:
@@ -189,16 +189,17 @@ def _groove(values: Mapping[str, Any], section: float) -> Groove:
 
 
 def _follow(values: dict[str, Any], key: str, value: float, source: str) -> None:
-    """`put` of a length that follows from another key; ValueError names what was given."""
-    latter = f"{source} = {values[source]}"
-    try:
-        put(values, key, value, latter)
-    except ValueError:
-        earlier = _GROUND[: _GROUND.index(source)] if source in _GROUND else ()
-        former = next((name for name in earlier if number(values.get(name))), None)
-        before, after = shown(abs(values[key])), shown(abs(value))
-        words = f"{key} = {before} and {latter} contradict: the latter gives {after}"
-        if former:
-            given = f"{former} = {shown(values[former])}"
-            words = f"{given} and {latter} contradict: they give diameters of {before} and {after}"
-        raise ValueError(f"{words} mm; leave one of them out") from None
+    """A length that follows from another key, set or seen to agree.  ValueError names both."""
+    if values.get(key) is None:
+        values[key] = value
+    before, latter = values[key], f"{source} = {values[source]}"
+    if agree(before, value):
+        return
+    earlier = _GROUND[: _GROUND.index(source)] if source in _GROUND else ()
+    former = next((name for name in earlier if number(values.get(name))), None)
+    was, new = shown(abs(before)), shown(abs(value))
+    words = f"{key} = {was} and {latter} contradict: the latter gives {new}"
+    if former:
+        given = f"{former} = {shown(values[former])}"
+        words = f"{given} and {latter} contradict: they give diameters of {was} and {new}"
+    raise ValueError(f"{words} mm; leave one of them out")

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from math import isclose
+from types import MappingProxyType
 from typing import Any, TypeGuard
+
+from pydantic import ValidationError
 
 
 def number(value: object) -> TypeGuard[float]:
@@ -14,24 +19,46 @@ def number(value: object) -> TypeGuard[float]:
 def put(values: dict[str, Any], key: str, value: Any, source: str, within: float = 1e-6) -> None:
     """Set a key, or see that what was given agrees.
 
-    value: a number or several. source: what it follows from, in words. within: relative difference
-    that agrees, usually less than tables and units round. A value of another type stays, to be
-    refused with its key. Raises ValueError for a contradiction.
+    source: what it follows from, in words. within: as in `agree`. Raises ValueError for a
+    contradiction.
     """
     before = values.get(key)
     if before is None:
         values[key] = value
-        return
-    given, expected = _numbers(before), _numbers(value)
-    if not all(map(number, given)):
-        return
-    if len(given) != len(expected) or not all(
-        isclose(a, b, rel_tol=within, abs_tol=1e-12) for a, b in zip(given, expected, strict=True)
-    ):
+    elif not agree(before, value, within):
         raise ValueError(
             f"{key} = {shown(before)} and {source} contradict: the latter gives {shown(value)}; "
             "leave one of them out"
         )
+
+
+def agree(before: object, value: object, within: float = 1e-6) -> bool:
+    """True if what was given, a number or several, is what follows, or has yet to be refused.
+
+    A value of another type is refused with its key. within: relative difference that agrees,
+    usually less than tables and units round.
+    """
+    given, expected = _numbers(before), _numbers(value)
+    if not all(map(number, given)):
+        return True
+    return len(given) == len(expected) and all(
+        isclose(a, b, rel_tol=within, abs_tol=1e-12) for a, b in zip(given, expected, strict=True)
+    )
+
+
+@contextmanager
+def one_line(where: str, also: Mapping[str, str] = MappingProxyType({})) -> Iterator[None]:
+    """The first complaint about a record, its key behind `where`.  Raises ValueError.
+
+    also: key -> what its complaint ends with.
+    """
+    try:
+        yield
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        key, words = ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
+        at = f"{where}{key}".rstrip(" .:")
+        raise ValueError(f"{at}: {words[0].lower()}{words[1:]}{also.get(key, '')}") from None
 
 
 def shown(value: object) -> str:

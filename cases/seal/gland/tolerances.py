@@ -70,7 +70,7 @@ def read_tolerances(p: Seal) -> Shares:
     if twice:
         raise ValueError(f"tolerances: {twice[0]} is given twice; leave one of them out")
     of_ring = [f"{key} {tolerance!r} mm" for key, _, tolerance in ring_sizes(p.ring)]
-    of_limits = [f"{LIMITED[name]} {found.half:.9f} mm" for name, found in bands(p.said)]
+    of_limits = [f"{LIMITED[name]} {found.half:.9f} mm" for name, _, found in bands(p.said)]
     return dict([*(_share(text, p) for text in (*of_ring, *of_limits)), *typed])
 
 

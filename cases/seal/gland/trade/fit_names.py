@@ -108,15 +108,16 @@ def band(nominal: float, letter: str, grade: int) -> Band:
 def _class(key: str, given: str, found: re.Match[str], hole: bool) -> Band:
     size, letter, grade = float(found["size"]), found["letter"], int(found["grade"])
     shown, usual = number_text(size), "H8" if hole else "f7"
-    small, other = letter.lower(), letter.upper() if hole else letter.lower()
-    if small not in (*DEVIATIONS, "js") or grade not in GRADES:
-        letters = ", ".join((*DEVIATIONS, "js"))
+    letters = (*DEVIATIONS, "js")
+    if letter.lower() not in letters or grade not in GRADES:
         raise refused(
-            *(key, given, f"is beyond the tables here: {letters} and grades 5 to 12"),
+            *(key, given, f"is beyond the tables here: {', '.join(letters)} and grades 5 to 12"),
             *(f"{shown} {usual}", f"{shown} ±0.05"),
         )
-    if letter not in (small, small.upper()) or letter != other:
-        part, case = ("hole", "capital") if hole else ("shaft", "small")
+    part, case, other = ("hole", "capital", letter.upper())
+    if not hole:
+        part, case, other = ("shaft", "small", letter.lower())
+    if letter != other:
         raise refused(key, given, f"a {part} has {case} letters", f"{shown} {other}{grade}")
     if not 0.0 < size <= STEPS[-1]:
         raise refused(key, given, "ISO 286 classes are read up to 500 mm", f"{shown} ±0.05")

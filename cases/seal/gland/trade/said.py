@@ -62,43 +62,37 @@ class SaidKeys(Parameters):
         return super().worded({**values, "said": tuple(dict.fromkeys(said))} if said else values)
 
 
-def bands(said: Sequence[str]) -> Iterator[tuple[str, Band]]:
-    """Keys that were given with limits, and these."""
-    return ((name, _band(name, value)) for name, value in _lengths(said))
+def bands(said: Sequence[str]) -> Iterator[tuple[str, str, Band]]:
+    """Keys that were given with limits, what was said, and these.  Raises NotUnderstoodError."""
+    for name, _, value in (text.partition(" = ") for text in said):
+        if name not in LENGTHS:
+            continue
+        if (found := _fit(name, value)) is None:
+            raise NotUnderstoodError(
+                f'said = "{name} = {value}" is not understood; write it in its own key'
+            )
+        yield name, value, found
 
 
-def _lengths(said: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Keys that were given with limits, and what was said."""
-    pairs = (text.partition(" = ")[::2] for text in said)
-    return (pair for pair in pairs if pair[0] in LENGTHS)
-
-
-def _band(name: str, value: str) -> Band:
-    found = read_fit(name, value, hole=name not in _SHAFTS)
-    if found is None:
-        raise NotUnderstoodError(
-            f'said = "{name} = {value}" is not understood; write it in its own key'
-        )
-    return found
+def _fit(name: str, value: str) -> Band | None:
+    return read_fit(name, value, hole=name not in _SHAFTS)
 
 
 def with_limits(values: dict[str, Any]) -> dict[str, Any]:
     """The values with the middles of what has limits.  ValueError."""
-    for name, value in _lengths(values.get("said", ())):
+    for name, value, found in bands(values.get("said", ())):
         for key_of in dict.fromkeys((name, LENGTHS[name])):
-            put(values, key_of, _band(name, value).middle, f'{name} = "{value}"')
+            put(values, key_of, found.middle, f'{name} = "{value}"')
     return values
 
 
 def understood(said: Sequence[str]) -> list[str]:
     """Lines that say how words of the trade were understood."""
-    words = []
-    for name, value in _lengths(said):
-        found = _band(name, value)
-        words.append(
-            f"{name} = {value}: {found.low:.10g} to {found.high:.10g} mm, solved at the middle, "
-            f"{found.middle:.10g}"
-        )
+    words = [
+        f"{name} = {value}: {found.low:.10g} to {found.high:.10g} mm, solved at the middle, "
+        f"{found.middle:.10g}"
+        for name, value, found in bands(said)
+    ]
     for text in said:
         name, _, value = text.partition(" = ")
         if name == "roughness" and (height := read_finish(value.partition(" ")[2])):
@@ -113,13 +107,13 @@ def _length(name: str, values: dict[str, Any]) -> list[str]:
     if re.fullmatch(rf"{NUMBER} ?(mm)?", text):
         values[name] = float(text.removesuffix("mm"))
         return []
-    hole = name not in _SHAFTS
-    if read_fit(name, values[name], hole=hole) is None:
-        if is_quantity(text):
-            return []
-        raise refused(name, values[name], "is no size", "36 mm", f"36 {'H8' if hole else 'f7'}")
-    del values[name]
-    return [f"{name} = {text}"]
+    if _fit(name, values[name]):
+        del values[name]
+        return [f"{name} = {text}"]
+    if is_quantity(text):
+        return []
+    usual = "36 f7" if name in _SHAFTS else "36 H8"
+    raise refused(name, values[name], "is no size", "36 mm", usual)
 
 
 def rubber_named(given: dict[str, Any]) -> dict[str, Any]:
