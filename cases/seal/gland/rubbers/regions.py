@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import ValidationError
-
-from softehl.cases.seal.gland.given import number
+from softehl.cases.seal.gland.given import number, one_line
 from softehl.cases.seal.gland.rubbers.rubber import with_rubber
 from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
 from softehl.cases.seal.gland.trade.rubber_names import is_plastic
@@ -68,11 +66,5 @@ def _region(name: str, table: object) -> Region:
             raise ValueError(f"materials.{name}: {key} is for the whole section; give moduli")
     if name == CAP and set(table) <= set(PRESETS["ptfe"]) - {"material"}:
         table = {"material": "ptfe", **table}
-    try:
+    with one_line(f"materials.{name}.", {"material": f"; or {', '.join(PRESETS)}"}):
         return Region(**table)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
-        words = first["msg"].removeprefix("Value error, ")
-        at = ".".join(["materials", name, *map(str, first["loc"])])
-        also = f"; or {', '.join(PRESETS)}" if first["loc"] == ("material",) else ""
-        raise ValueError(f"{at}: {words[0].lower()}{words[1:]}{also}") from None

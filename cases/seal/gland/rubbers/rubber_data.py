@@ -24,11 +24,11 @@ from softehl.cases.seal.gland.rubbers.materials import (
     stress_by,
     unstable_at,
 )
+from softehl.cases.seal.gland.tables import reading
 from softehl.runtime.arrays import Array
 
 COLUMNS = ("test", "stretch", "stress_MPa")
 TEMPERATURE = "temperature_degC"
-_LARGEST = 1 << 20  # bytes of a table; tests of a rubber have some 10 kB
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,52 +61,45 @@ class RubberData:
 
 def read_data(path: Path) -> RubberData:
     """The tests in a table.  Raises ValueError, which names the line."""
-    try:
-        if path.stat().st_size > _LARGEST:
-            raise ValueError(f"{path} is no table of tests: it has more than 1 MB")
+    with reading(path):
         lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not UTF-8 text"
-        raise ValueError(f"{path} cannot be read: {reason}") from None
-    rows = [
-        (number, row)
-        for number, row in enumerate(csv.reader(lines), 1)
-        if row and not row[0].lstrip().startswith("#")
-    ]
-    header = [name.strip() for name in rows[0][1]] if rows else []
-    if not set(COLUMNS) <= set(header):
-        raise ValueError(f"{path}: its first line must name the columns {', '.join(COLUMNS)}")
-    points = [
-        _point(f"{path}, line {n}", dict(zip(header, row, strict=False))) for n, row in rows[1:]
-    ]
-    if not points:
-        raise ValueError(f"{path} holds no test; write a line for each measured point")
+        rows = [
+            (number, row)
+            for number, row in enumerate(csv.reader(lines), 1)
+            if row and not row[0].lstrip().startswith("#")
+        ]
+        header = [name.strip() for name in rows[0][1]] if rows else []
+        if not set(COLUMNS) <= set(header):
+            raise ValueError(f"its first line must name the columns {', '.join(COLUMNS)}")
+        points = [_point(n, dict(zip(header, row, strict=False))) for n, row in rows[1:]]
+        if not points:
+            raise ValueError("it holds no test; write a line for each measured point")
     test, *numbers = zip(*points, strict=True)
     return RubberData(np.array(test), *(np.array(column, dtype=np.float64) for column in numbers))
 
 
-def _point(where: str, row: Mapping[str, str]) -> tuple[str, float, float, float]:
+def _point(line: int, row: Mapping[str, str]) -> tuple[str, float, float, float]:
     test = row.get("test", "").strip()
     if test not in SECOND:
-        raise ValueError(f"{where}: test = {test!r}; allowed are {', '.join(SECOND)}")
-    stretch, stress = (_number(where, row, name) for name in COLUMNS[1:])
+        raise ValueError(f"line {line}: test = {test!r}; allowed are {', '.join(SECOND)}")
+    stretch, stress = (_number(line, row, name) for name in COLUMNS[1:])
     if not stretch > 0.0:
         raise ValueError(
-            f"{where}: stretch = {stretch:g}; a stretch is length over unloaded length, > 0 "
+            f"line {line}: stretch = {stretch:g}; a stretch is length over unloaded length, > 0 "
             "(a strain of 10 % is a stretch of 1.1)"
         )
-    heat = _number(where, row, TEMPERATURE) if row.get(TEMPERATURE, "").strip() else np.nan
+    heat = _number(line, row, TEMPERATURE) if row.get(TEMPERATURE, "").strip() else np.nan
     return test, stretch, stress, heat
 
 
-def _number(where: str, row: Mapping[str, str], name: str) -> float:
+def _number(line: int, row: Mapping[str, str], name: str) -> float:
     text = row.get(name, "").strip()
     try:
         value = float(text)
     except ValueError:
-        raise ValueError(f"{where}: {name} = {text!r} is no number") from None
+        raise ValueError(f"line {line}: {name} = {text!r} is no number") from None
     if not np.isfinite(value):
-        raise ValueError(f"{where}: {name} = {text} is not finite")
+        raise ValueError(f"line {line}: {name} = {text} is not finite")
     return value
 
 

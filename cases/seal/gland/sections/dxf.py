@@ -35,7 +35,7 @@ def _pieces(path: Path) -> list[Named]:
         raise OutlineError("DXF files are read by ezdxf; pip install 'softehl[cad]'") from None
     try:
         document = readfile(path)
-    except (OSError, DXFError, UnicodeError) as error:
+    except DXFError as error:
         raise OutlineError(" ".join(str(error).split()) or "not a DXF file") from None
     unit = int(document.header.get("$INSUNITS", 0))
     if unit not in _UNITS:

@@ -14,10 +14,10 @@ from softehl.cases.seal.gland.sections.seated import (
     PRESSURE,
     film_below,
     named_shape,
-    read_from,
     runs,
     seated,
 )
+from softehl.cases.seal.gland.tables import reading
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.faces import once
 from softehl.runtime.mesh.mesh import Mesh
@@ -36,21 +36,18 @@ def read_outline(path: Path, inner_diameter: float | None = None) -> Shape:
     """The section of a drawing (.dxf) or of points (.csv).
 
     inner_diameter: twice the radius of its lowest point, mm; None leaves it where it was drawn.
-    Raises OutlineError, one line.
+    Raises ValueError, one line.
     """
     reader = read_dxf if path.suffix.lower() == ".dxf" else read_points
-    with read_from(path):
+    with reading(path.name):
         return reader(path, inner_diameter)
 
 
 def read_points(path: Path, inner_diameter: float | None = None) -> Shape:
     """The section of a CSV file with the columns of COLUMNS.  Raises OutlineError."""
+    rows = list(csv.DictReader(path.read_text(encoding="utf-8-sig").splitlines()))
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.DictReader(file))
         points = [(float(row["z_mm"]), float(row["r_mm"])) for row in rows]
-    except OSError as error:
-        raise OutlineError(f"it cannot be read: {error.strerror}") from None
     except (KeyError, TypeError, ValueError):
         raise OutlineError(
             f"a file of points has the columns {', '.join(COLUMNS)} (the last may be left out), "
@@ -86,10 +83,10 @@ def outline_of(
 def read_mesh(path: Path, inner_diameter: float | None = None) -> tuple[Shape, SectionMesh]:
     """The section of a mesh file, and its mesh: quadrilaterals, sides FILM and PRESSURE.
 
-    Groups of cells become regions. Raises OutlineError or MeshError, one line.
+    Groups of cells become regions. Raises ValueError, one line.
     """
     mesh = Mesh.read(path)
-    with read_from(path):
+    with reading(path.name):
         return _section_of(mesh, inner_diameter, path.stem)
 
 

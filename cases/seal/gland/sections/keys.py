@@ -10,13 +10,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
+from os.path import isfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from pydantic import ValidationError, create_model
+from pydantic import create_model
 
 from softehl.cases.harness.parameters import Parameters, declared, key
+from softehl.cases.seal.gland.given import one_line
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.files import read_mesh, read_outline
 from softehl.runtime.mesh.outline import Shape
@@ -111,11 +113,9 @@ def section_of_file(
 
     Raises ValueError, one line.
     """
-    try:
-        changed = path.stat().st_mtime_ns
-    except OSError:
-        raise ValueError(f'outline = "{path}": there is no such file') from None
-    return _section_of_file(path, changed, inner_diameter)
+    if not isfile(path):
+        raise ValueError(f'outline = "{path}": there is no such file')
+    return _section_of_file(path, path.stat().st_mtime_ns, inner_diameter)
 
 
 @lru_cache(maxsize=32)
@@ -135,13 +135,8 @@ def is_mesh(outline: str | None) -> bool:
 @lru_cache(maxsize=32)
 def shape_of(section: str, sizes: tuple[tuple[str, float], ...], inner_diameter: float) -> Shape:
     """The shape of a section of these dimensions.  ValueError where they bound none."""
-    try:
+    with one_line(f'section = "{section}": '):
         return SECTIONS[section](**dict(sizes)).shape(inner_diameter)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
-        name = ".".join(str(part) for part in first["loc"])
-        words = first["msg"].removeprefix("Value error, ")
-        raise ValueError(f'section = "{section}": {name} {words}'.replace("  ", " ")) from None
 
 
 @lru_cache(maxsize=32)

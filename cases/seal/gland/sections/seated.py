@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -16,15 +14,6 @@ Named = tuple[Piece, str]
 
 FILM, PRESSURE = "FILM", "PRESSURE"
 """Layers of a drawing, or named sides of a mesh: what may carry film, what p_s acts on."""
-
-
-@contextmanager
-def read_from(path: Path) -> Iterator[None]:
-    """Names the file in an OutlineError, a line."""
-    try:
-        yield
-    except OutlineError as error:
-        raise OutlineError(f"{path.name}: {error}") from None
 
 
 @dataclass(frozen=True)
