@@ -4,7 +4,7 @@
 and their tolerances. They were compared, one by one, with the public ISO 3601-1 class A table of
 bell-jamie/o-ring-studio. Every inside diameter agrees within rounding. So does every tolerance but
 those of -228 to -231: that table has no band for 0.020 in, which other series have at these
-diameters. ISO 3601-1 class B tolerances: its rule (A.1) and its steps of the section.
+diameters.
 """
 
 from __future__ import annotations
@@ -59,19 +59,17 @@ def _ring(row: dict[str, str]) -> Ring:
     return Ring(f"AS568-{row['number']}", *(round(float(row[name]) * INCH, 4) for name in names))
 
 
-# ISO 3601-1 class B: tolerance of the section up to a diameter, mm
-_CLASS_B = ((2.25, 0.08), (3.15, 0.09), (4.50, 0.10), (6.30, 0.13), (8.40, 0.15))
-
-
 def _metric(name: str, inner: float, section: float) -> Ring:
+    """A ring with the tolerances of class B: its rule (A.1) and its steps of the section."""
     if not 0.5 * section <= inner <= 1500.0 or not 0.5 <= section <= 20.0:
         raise NotUnderstoodError(
             f'ring = "{name}" has an inside diameter of {inner:g} and a section of {section:g} mm; '
             "write inside diameter x section in mm, the section 0.5 to 20 mm"
         )
-    band = next((t for most, t in _CLASS_B if section <= most), None)
+    steps = {2.25: 0.08, 3.15: 0.09, 4.50: 0.10, 6.30: 0.13, 8.40: 0.15}
     tolerance = round(0.009 * inner**0.95 + 0.11, 2)
-    return Ring(f"ISO 3601 {inner:g}x{section:g}", inner, section, tolerance, band)
+    of_section = next((steps[most] for most in steps if section <= most), None)
+    return Ring(f"ISO 3601 {inner:g}x{section:g}", inner, section, tolerance, of_section)
 
 
 def _by_number(text: str, number: int) -> Ring:

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 _MOST = 6.0
 """Largest p_s / mu that is not refused: runs above it take minutes to `uncertain` states."""
 
-_LOWEST_ESTIMATED = 3
-"""Least pressure order whose error is well below what the meshes differ by."""
-
 
 def require_consistent(p: Seal) -> None:
     """ValueError for the first contradiction: what was given, what is allowed, what to do."""
@@ -82,10 +79,10 @@ def _discretisation_is_rich_enough(p: Discretisation) -> None:
             f"tolerance = {p.tolerance:g} needs an estimate of the error; "
             'set error_estimate = true and mesh = "graded"'
         )
-    if p.tolerance is not None and order < _LOWEST_ESTIMATED:
+    if p.tolerance is not None and order < 3:  # the error is not well below what meshes differ by
         raise ValueError(
             f"tolerance = {p.tolerance:g}: meshes do not show the error of pressure_order = "
-            f"{order}; use an order of at least {_LOWEST_ESTIMATED}"
+            f"{order}; use an order of at least 3"
         )
 
 

@@ -32,10 +32,6 @@ Kind = Literal["dynamic", "hydraulic", "pneumatic"]
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
-_SAME = 0.03
-"""Relative difference of two sections that have the same groove: ISO 3601 and AS568 are to 1.2 %
-apart, 2.65 and 2.62 mm."""
-
 
 @dataclass(frozen=True)
 class Groove:
@@ -57,7 +53,8 @@ def gland(section_diameter: float, kind: Kind = "dynamic", section: str = "round
     round_rings = "pneumatic" if kind == "pneumatic" else "dynamic"
     chart = _chart("x_ring" if section == "x_ring" else round_rings)
     near = min(chart, key=lambda g: abs(g.section_diameter - section_diameter))
-    if abs(section_diameter - near.section_diameter) <= _SAME * near.section_diameter:
+    # ISO 3601 and AS568 have the same grooves for sections to 1.2 % apart, 2.65 and 2.62 mm
+    if abs(section_diameter - near.section_diameter) <= 0.03 * near.section_diameter:
         return near
     for below, above in pairwise(chart):
         if below.section_diameter < section_diameter < above.section_diameter:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from math import log, log10
 from typing import Any
 
+from scipy.constants import zero_Celsius
 from scipy.optimize import brentq
 
 from softehl.cases.seal.gland.given import number, put
@@ -20,11 +21,6 @@ from softehl.cases.seal.gland.trade.oil_names import GRADES, read_oil_name
 
 DENSITY = 870.0
 """At 15 degC, of a mineral oil, kg/m^3."""
-
-EXPANSION = 0.65
-"""Fall of the density of a mineral oil, kg/m^3 for each degC; of lubricants 0.63 by ASTM D1250."""
-
-_KELVIN = 273.15
 
 # --- viscosity over temperature -----------------------------------------------------------------
 
@@ -48,13 +44,13 @@ class Walther:
                 "thinner where it is warmer"
             )
         y_1, y_2 = (log10(log10(nu + 0.7)) for nu in (nu_1, nu_2))
-        x_1, x_2 = (log10(t + _KELVIN) for t in (t_1, t_2))
+        x_1, x_2 = (log10(t + zero_Celsius) for t in (t_1, t_2))
         B = (y_1 - y_2) / (x_2 - x_1)
         return cls(y_1 + B * x_1, B)
 
     def __call__(self, temperature: float) -> float:
         """Kinematic viscosity, cSt."""
-        return float(10.0 ** (10.0 ** (self.A - self.B * log10(temperature + _KELVIN))) - 0.7)
+        return float(10.0 ** (10.0 ** (self.A - self.B * log10(temperature + zero_Celsius))) - 0.7)
 
 
 def is_grade(text: str) -> bool:
@@ -86,12 +82,6 @@ def read_oil(text: str) -> Walther:
 _H = [tuple(map(float, row.values())) for row in rows("astm_d2270.csv")]
 """From a viscosity at 100 degC on: H = d Y^2 + e Y + f, of the standard's annex."""
 
-_OF_INDUSTRY = 2.0, 40.0
-"""Viscosities at 100 degC of the oils of the industry, cSt; the table goes on to 70."""
-
-_INDICES = 100.0, 400.0
-"""Indices of the standard's procedure B that are read; polyglycols have up to 280."""
-
 
 def at_40_of_100(at_100: float) -> float:
     """Viscosity at 40 degC of an oil of index 100 from that at 100 degC, 2 to 40 cSt."""
@@ -106,22 +96,30 @@ def viscosity_index(at_40: float, at_100: float) -> float:
 
 
 def at_100_of_index(at_40: float, index: float) -> float:
-    """Viscosity at 100 degC of an oil of this index and viscosity at 40 degC.  ValueError."""
-    low, high = _INDICES
-    if not low <= index <= high:
-        raise ValueError(f"a viscosity index is read from {low:g} to {high:g}, given {index:g}")
-    ends = [viscosity_index(at_40, y) - index for y in _OF_INDUSTRY]
-    if ends[0] * ends[1] > 0.0:
+    """Viscosity at 100 degC of an oil of this index and viscosity at 40 degC.  ValueError.
+
+    Oils of the industry have 2 to 40 cSt there, and polyglycols indices up to 280.
+    """
+    if not 100.0 <= index <= 400.0:
+        raise ValueError(f"a viscosity index is read from 100 to 400, given {index:g}")
+
+    def beyond(at_100: float) -> float:
+        return viscosity_index(at_40, at_100) - index
+
+    if beyond(2.0) * beyond(40.0) > 0.0:
         raise ValueError(f"there is no oil of index {index:g} and {at_40:g} cSt at 40 degC here")
-    return float(brentq(lambda y: viscosity_index(at_40, y) - index, *_OF_INDUSTRY, xtol=1e-9))
+    return float(brentq(beyond, 2.0, 40.0, xtol=1e-9))
 
 
 # --- the keys of a case -------------------------------------------------------------------------
 
 
 def density(temperature: float, at_15: float = DENSITY) -> float:
-    """Density of a mineral oil at a temperature from that at 15 degC, kg/m^3."""
-    return at_15 - EXPANSION * (temperature - 15.0)
+    """Density of a mineral oil at a temperature from that at 15 degC, kg/m^3.
+
+    It falls by 0.65 kg/m^3 for each degC; that of lubricants by 0.63 in ASTM D1250.
+    """
+    return at_15 - 0.65 * (temperature - 15.0)
 
 
 def barus(viscosity: float) -> float:

@@ -41,13 +41,10 @@ def _height(item: object) -> object:
 
 def _some(rms: float) -> float:
     """Less than a nanometre is a slip of the unit; no film was found above such asperities."""
-    if 0.0 < rms < LEAST:
-        raise ValueError(f"a roughness is 0 or at least {LEAST:g} um")
+    if 0.0 < rms < 0.001:
+        raise ValueError("a roughness is 0 or at least 0.001 um")
     return rms
 
-
-LEAST = 1e-3
-"""Least rms height of a surface that is not smooth, um."""
 
 Rms = Annotated[float, Field(ge=0, le=20), AfterValidator(_some)]
 Roughness = Annotated[tuple[Rms, Rms], Field(strict=False), BeforeValidator(_pair)]

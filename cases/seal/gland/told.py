@@ -8,7 +8,6 @@ from typing import Any
 from softehl.cases.seal.gland.given import shown
 from softehl.cases.seal.gland.grooves import gland
 from softehl.cases.seal.gland.parameters import Seal
-from softehl.cases.seal.gland.records.free_seal import FreeSeal
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.rubbers import materials
 from softehl.cases.seal.gland.rubbers.hardness import shore_band
@@ -18,14 +17,6 @@ from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.rubber_names import RANGES
 from softehl.cases.seal.gland.trade.said import understood
 
-_SURE, _TRIED = 3.0, 5.4
-"""p_s / mu up to which films of O-rings were `ok` but for some fast ones; the largest tried."""
-
-_OTHER, _OTHER_TRIED = 2.0, 4.9
-"""p_s / mu up to which all films of other sections were found; the largest tried."""
-
-_DO = "the run may take minutes and end without a film; a harder rubber or a lower pressure helps"
-
 
 def foreword(p: Seal, pressure: float) -> list[str]:
     """Words of the trade as they were understood, and the ratio of pressure to modulus.
@@ -33,33 +24,35 @@ def foreword(p: Seal, pressure: float) -> list[str]:
     The latter is left out without a pressure, and where `warnings` has it: beyond what is known to
     run. pressure: the largest sealed pressure, MPa.
     """
-    found = p.load_ratio(pressure)
-    return [*understood(p.said), *([_ratio(p, found)] if 0.0 < found <= _most(p) else [])]
+    load, beyond = _load(p, pressure)
+    return [*understood(p.said), *([] if beyond or not pressure else [load])]
 
 
 def warnings(p: Seal, pressure: float) -> list[str]:
     """A pressure above what is known to run, keys without effect, what is unusual, a line each."""
+    load, beyond = _load(p, pressure)
+    words = "the run may take minutes and end without a film; a harder rubber or a lower pressure"
+    first = [f"{load}; {words} helps"] if beyond else []
+    return [*first, *_unused(p), *_unusual(p), *handbook(p)]
+
+
+def _load(p: Seal, pressure: float) -> tuple[str, bool]:
+    """The ratio of pressure to modulus in words, and whether it is above what is known to run."""
     found = p.load_ratio(pressure)
-    beyond = [f"{_ratio(p, found)}; {_DO}"] if found > _most(p) else []
-    return [*beyond, *_unused(p), *_unusual(p), *handbook(p)]
-
-
-def _most(p: FreeSeal) -> float:
-    return _SURE if p.round else _OTHER
-
-
-def _ratio(p: FreeSeal, found: float) -> str:
-    words = (
-        f"in a sample of sections other than round all films were found at ratios to {_OTHER:g}, "
-        f"four of five at {_OTHER:g} to 4, half of them at 4 to 5; nothing was tried above "
-        f"{_OTHER_TRIED:g}"
-    )
     if p.round:
-        words = (
+        most = 3.0
+        sample = (
             "in a sample of O-rings all films were found at ratios to 4, nine of ten at 4 to 5; "
-            f"above 5 states are uncertain, and nothing was tried above {_TRIED:g}"
+            "above 5 states are uncertain, and nothing was tried above 5.4"
         )
-    return f"sealed pressure / shear modulus = {found:.2g}: {words} (docs/limits.md)"
+    else:
+        most = 2.0
+        sample = (
+            "in a sample of sections other than round all films were found at ratios to 2, "
+            "four of five at 2 to 4, half of them at 4 to 5; nothing was tried above 4.9"
+        )
+    words = f"sealed pressure / shear modulus = {found:.2g}: {sample} (docs/limits.md)"
+    return words, found > most
 
 
 # --- warnings -----------------------------------------------------------------------------------
@@ -74,15 +67,6 @@ _NEEDS: Mapping[str, tuple[Callable[[Seal], Any], str]] = {
 }
 """Key -> whether it has an effect, and what it has none without."""
 
-_FILL = (60.0, 95.0)
-"""Volume of the ring over that of its gland that handbooks advise, %."""
-
-_STRETCH = 5.0
-"""Largest stretch that handbooks advise, %."""
-
-_LEAST_BULK = 20.0
-"""Bulk over shear modulus of a rubber at least; Poisson's ratio is 0.475 there."""
-
 
 def _unused(p: Seal) -> Iterator[str]:
     """Keys with a value of their own that change nothing: another one is missing."""
@@ -95,7 +79,7 @@ def _unused(p: Seal) -> Iterator[str]:
 def _unusual(p: Seal) -> Iterator[str]:
     """Its compressibility, and a temperature outside the range of its polymer."""
     stiffness = p.bulk_modulus / p.shear_modulus
-    if stiffness < _LEAST_BULK:
+    if stiffness < 20.0:  # Poisson's ratio 0.475
         yield (
             f"bulk_modulus = {p.bulk_modulus:g} MPa is {stiffness:.3g} shear moduli: "
             "rubbers have hundreds to thousands"
@@ -110,16 +94,12 @@ def _unusual(p: Seal) -> Iterator[str]:
 
 def handbook(p: Gland) -> Iterator[str]:
     """Warnings of handbooks about a ring and its gland."""
-    low, high = _FILL
-    if not low <= p.fill_percent <= high:
-        yield (
-            f"the ring fills {p.fill_percent:.0f} % of its gland; handbooks advise {low:g} to "
-            f"{high:g} %"
-        )
-    if p.stretch_percent > _STRETCH:
+    if not 60.0 <= p.fill_percent <= 95.0:
+        yield f"the ring fills {p.fill_percent:.0f} % of its gland; handbooks advise 60 to 95 %"
+    if p.stretch_percent > 5.0:
         yield (
             f"the ring is stretched by {p.stretch_percent:.1f} % on its "
-            f"{'piston' if p.piston else 'rod'}; handbooks advise at most {_STRETCH:g} %"
+            f"{'piston' if p.piston else 'rod'}; handbooks advise at most 5 %"
         )
 
 

@@ -4,15 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-RANGE = (20.0, 90.0)
-"""Hardness Shore A between which Gent's rule is taken."""
-
-HARD = (60.0, 98.0)
-"""Hardness Shore A of polyurethanes, between which the rule of Qi and others is taken."""
-
-_SHORE_A, _SHORE_D = (80.0, 85.0, 90.0, 95.0, 100.0), (29.0, 33.0, 39.0, 46.0, 58.0)
-"""Equal hardnesses in both scales, of the conversion chart of ASTM D2240."""
-
 
 def youngs_modulus(shore_A: float, polymer: str | None = None) -> float:
     """Young's modulus from a hardness Shore A, MPa; polymer: "PU" has a rule of its own.
@@ -26,10 +17,15 @@ def youngs_modulus(shore_A: float, polymer: str | None = None) -> float:
     """
     if polymer == "PU":
         hard = shore_A
-        if shore_A > _SHORE_A[0]:
-            hard = 50.0 + float(np.interp(shore_A, _SHORE_A, _SHORE_D))
+        if shore_A > 80.0:  # both scales in the conversion chart of ASTM D2240
+            hard = 50.0 + np.interp(shore_A, (80, 85, 90, 95, 100), (29, 33, 39, 46, 58))
         return float(10.0 ** (0.0235 * hard - 0.6403))
     return 0.0981 * (56.0 + 7.62336 * shore_A) / (0.137505 * (254.0 - 2.54 * shore_A))
+
+
+def shore_range(polymer: str | None) -> tuple[float, float]:
+    """Hardnesses Shore A between which the rule of a polymer is taken."""
+    return (60.0, 98.0) if polymer == "PU" else (20.0, 90.0)
 
 
 def shore_band(shore_A: float, polymer: str | None = None) -> tuple[float, float]:

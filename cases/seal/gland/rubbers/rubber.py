@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from softehl.cases.seal.gland.given import number, put, shown
-from softehl.cases.seal.gland.rubbers.hardness import HARD, RANGE, youngs_modulus
+from softehl.cases.seal.gland.rubbers.hardness import shore_range, youngs_modulus
 from softehl.cases.seal.gland.rubbers.materials import KEYS, MATERIALS, Material, shear_modulus
 from softehl.cases.seal.gland.rubbers.rubber_data import fit, read_data
 from softehl.cases.seal.gland.trade.rubber_names import read_rubber
@@ -60,7 +60,7 @@ def _with_hardness(values: dict[str, Any]) -> None:
     shore = values.get("shore_A")
     if isinstance(shore, str):
         raise ValueError(f'shore_A = "{shore}" is not understood; write shore_A = 70 or "NBR 70"')
-    low, high = HARD if polymer == "PU" else RANGE
+    low, high = shore_range(polymer)
     if number(shore) and not low <= shore <= high:
         named = f"of {polymer} " if polymer else ""
         raise ValueError(

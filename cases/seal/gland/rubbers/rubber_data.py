@@ -178,13 +178,6 @@ def _factor(factors: Mapping[float, float], temperature: float | None) -> float:
 
 # --- least squares --------------------------------------------------------------------------------
 
-_EXPONENTS = np.array([(1.3, 5.0, -2.0), (2.0, 8.0, -1.0), (0.6, 3.0, -4.0)])
-"""Exponents alpha of three terms with which fits are begun: the first are Ogden's of 1972; the best
-of the three fits counts."""
-
-_SIZES = (0.05, 20.0)
-"""Least and largest size of an exponent; at 0 a term has no stress."""
-
 
 def _fitted(name: str, data: RubberData, terms: int) -> dict[str, Any]:
     """The keys of a material with the least squares, the best of several starts."""
@@ -220,10 +213,14 @@ def _fitted(name: str, data: RubberData, terms: int) -> dict[str, Any]:
 
 
 def _starts(name: str, data: RubberData, terms: int) -> tuple[Array, Array]:
-    """Starts (starts, n) of fits, and the limits (n, 2) of their parameters."""
-    if name == "ogden":  # mu alpha >= 0 makes each term stable at every stretch
-        alpha = _EXPONENTS[:, :terms]
-        ends = [np.outer(np.sign(alpha[0]), sizes) for sizes in ((0.0, np.inf), _SIZES)]
+    """Starts (starts, n) of fits, and the limits (n, 2) of their parameters.
+
+    The first exponents are Ogden's of 1972; at an exponent of 0 a term has no stress, and with
+    mu alpha >= 0 it is stable at every stretch.
+    """
+    if name == "ogden":
+        alpha = np.array([(1.3, 5.0, -2.0), (2.0, 8.0, -1.0), (0.6, 3.0, -4.0)])[:, :terms]
+        ends = [np.outer(np.sign(alpha[0]), sizes) for sizes in ((0.0, np.inf), (0.05, 20.0))]
         mu = 0.25 ** np.arange(terms) / alpha
         return np.hstack([mu, alpha]), np.sort(np.vstack(ends), axis=1)
     if name in ("gent", "arruda-boyce"):  # J_m above all I1 - 3 of the data, lambda_m above 1

@@ -29,8 +29,6 @@ from softehl.runtime.mesh.thickness import in_chains
 COLUMNS = ("z_mm", "r_mm", "part")
 """Of a CSV file: points in order; part, of the side from a point to the next, may be left out."""
 
-_LEAST = 0.02  # share of its element that a corner of a mesh from a file must have
-
 
 def read_outline(path: Path, inner_diameter: float | None = None) -> Shape:
     """The section of a drawing (.dxf) or of points (.csv).
@@ -158,7 +156,7 @@ def _names(mesh: Mesh, loop: Integers) -> list[str]:
 def _require_sound(mesh: SectionMesh) -> None:
     shares = corner_jacobians(mesh).min(axis=1)
     worst = int(shares.argmin())
-    if shares[worst] < _LEAST:
+    if shares[worst] < 0.02:
         z, r = mesh.points[mesh.quads[worst]].mean(axis=0)
         raise OutlineError(
             f"an element at ({z:.6g}, {r:.6g}) is folded or nearly so, a corner of it has "

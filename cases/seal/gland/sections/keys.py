@@ -40,9 +40,6 @@ NAMES = {
 """Names of seals of these sections."""
 
 _RENAMED = {"width": "section_width"}  # what a page calls a dimension -> its key
-_STATIONS = 2000  # points of a film that are looked at for lobes: one in some 3 um
-_STEEP = 0.5  # sine of the angle between the sides and the edge of a cap, at least
-_BETWEEN = 0.01  # of the height: two lobes have a groove at least so deep between them
 
 
 def dimensions(section: str) -> dict[str, str]:
@@ -156,17 +153,19 @@ def capped(shape: Shape, thickness: float) -> Shape:
     if not inside[0] < inside[1] < (end - begin) % outline.length:
         least = float(outline.at(np.array(shape.film))[:, 1].max()) - low
         raise ValueError(f"{given}: it must hold the film, which needs more than {least:.4g} mm")
-    turn = np.abs(np.sin(outline.heading(at)))
-    if turn.min() < _STEEP:
+    if np.abs(np.sin(outline.heading(at))).min() < 0.5:  # 30 degrees between sides and edge
         raise ValueError(f"{given}: the sides are too flat there; make it thicker or thinner")
     return replace(shape, chord=(begin, end))
 
 
 @lru_cache(maxsize=32)
 def lobes(shape: Shape) -> int:
-    """Number of parts of its film that a section rests on: minima of r with a groove between."""
-    r = shape.outline.at(np.linspace(*shape.film, _STATIONS))[:, 1]
-    found, deep, bottom, top = 1, _BETWEEN * float(np.ptp(r)), r[0], r[0]
+    """Number of parts of its film that a section rests on: minima of r with a groove between.
+
+    The film is looked at every 3 um or so; a groove has a hundredth of its height.
+    """
+    r = shape.outline.at(np.linspace(*shape.film, 2000))[:, 1]
+    found, deep, bottom, top = 1, 0.01 * float(np.ptp(r)), r[0], r[0]
     for value in r:
         if min(top - bottom, top - value) > deep:  # behind a groove
             found, bottom, top = found + 1, value, value

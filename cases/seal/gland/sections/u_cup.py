@@ -5,8 +5,6 @@ from __future__ import annotations
 from softehl.cases.seal.gland.sections.base import Section, part, require
 from softehl.runtime.mesh.outline import Arc, Outline, Point, rounded
 
-_ROUNDS = 12  # in which the height over the rounded edges settles
-
 
 class UCup(Section):
     """A heel at +z, two lips towards the sealed side, alike on the rod and in the housing.
@@ -43,8 +41,8 @@ class UCup(Section):
             f"mouth_depth = {depth:g} and mouth_root = {2 * root:g} mm leave no heel of a width "
             f"of {w:g} and a heel_height of {2 * heel:g} mm",
         )
-        missing = 0.0
-        for _ in range(_ROUNDS):  # a rounded edge lies within the corner that it was cut from
+        missing = 0.0  # a rounded edge lies within the corner that it was cut from
+        for _ in range(12):  # the height settles
             outline = self._with_edges_at(h + missing)
             missing += h - outline.box[3]
         return outline

@@ -12,7 +12,6 @@ RMS_OF_RA = sqrt(0.5 * pi)
 """Rms height over mean height (Ra) of a surface whose heights have a normal distribution."""
 
 _UNIT = "um|nm|uin|microinch(?:es)?|mm"
-_SMOOTH = 1.0  # rms height below which a number without a unit is in um, not in microinches
 _KIND, _HEIGHT = r"(?P<kind>R[a-z]{1,3}\d?)", rf"(?P<height>{NUMBER}) ?(?P<unit>{_UNIT})?"
 _FINISH = form(rf"{_KIND}(?: max\.?)?[ =<\u2264:]*{_HEIGHT}")
 _TURNED = form(rf"{_HEIGHT} ?{_KIND}")
@@ -36,7 +35,7 @@ def read_finish(given: str) -> float | None:
         raise refused("roughness", given, "is no finish in um", "Ra 0.2", "Rq 0.25", "0.25 um")
     kind, unit = found["kind"].lower(), (found["unit"] or "um").lower()
     height = read_quantity(f"{found['height']} {unit}", "um")
-    if kind == "rms" and height >= _SMOOTH and not found["unit"]:
+    if kind == "rms" and height >= 1.0 and not found["unit"]:  # less would be um
         why = "is in micrometres or in microinches; write the unit"
         raise refused("roughness", given, why, f"Rq {height:g} um", f"Rq {height:g} uin")
     if kind == "ra":
