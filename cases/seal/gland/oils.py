@@ -53,11 +53,6 @@ class Walther:
         return float(10.0 ** (10.0 ** (self.A - self.B * log10(temperature + zero_Celsius))) - 0.7)
 
 
-def is_grade(text: str) -> bool:
-    """True if an oil is given by its ISO grade, which says its viscosity to +-10 %."""
-    return read_oil_name(text).grade is not None
-
-
 def read_oil(text: str) -> Walther:
     """An oil from its name (trade.oil_names).  Raises ValueError.
 

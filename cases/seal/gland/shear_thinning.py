@@ -9,15 +9,11 @@ from pydantic import model_validator
 
 from softehl.cases.harness.parameters import Parameters, key
 
-_EYRING, _CARREAU = ("eyring_stress",), ("carreau_stress", "carreau_rate")
-_OF_LAW = {"eyring": _EYRING, "carreau": (*_CARREAU, "carreau_exponent", "carreau_plateau")}
 _USUAL = {
     "eyring": 'eyring_stress = "5 MPa"',
     "carreau": 'carreau_rate = "1e6 1/s" (or carreau_stress) and carreau_exponent = 0.5',
 }
-
-NUMBERS = tuple(name for names in _OF_LAW.values() for name in names)
-"""Keys of both laws."""
+"""Law -> what it needs at least; its keys begin with its name."""
 
 
 class ThinningKeys(Parameters):
@@ -58,8 +54,7 @@ class ThinningKeys(Parameters):
     @property
     def thins(self) -> str:
         """Name of the law, empty for a Newtonian oil."""
-        given = (law for law, keys in _OF_LAW.items() if self._given(keys))
-        return self.shear_thinning or next(given, "")
+        return self.shear_thinning or next(filter(self._given, _USUAL), "")
 
     def thinning_values(self, viscosity: float) -> Mapping[str, float]:
         """Parameters of the kernels of films that thin; viscosity: at rest and zero pressure."""
@@ -97,16 +92,17 @@ class ThinningKeys(Parameters):
                     f"{what} needs a Newtonian oil; leave it or the keys of {self.thins} out"
                 )
 
-    def _given(self, keys: tuple[str, ...]) -> list[str]:
-        return [name for name in keys if getattr(self, name) is not None]
+    def _given(self, law: str) -> list[str]:
+        """Keys of a law that have a value."""
+        return [n for n in NUMBERS if n.startswith(law) and getattr(self, n) is not None]
 
     @model_validator(mode="after")
     def _thins_by_one_law(self) -> Self:
         law = self.thins
         if not law:
             return self
-        for other, keys in _OF_LAW.items():
-            if other != law and (wrong := self._given(keys)):
+        for other in _USUAL:
+            if other != law and (wrong := self._given(other)):
                 also = f'shear_thinning = "{law}"' if self.shear_thinning else law
                 raise ValueError(f"{wrong[0]} is no key of {also}; leave one of them out")
         if self.carreau_stress and self.carreau_rate:
@@ -114,7 +110,11 @@ class ThinningKeys(Parameters):
                 f"carreau_stress = {self.carreau_stress:g} and carreau_rate = "
                 f"{self.carreau_rate:g}: one follows from the other; leave one of them out"
             )
-        needed = [_EYRING] if law == "eyring" else [_CARREAU, ("carreau_exponent",)]
-        if not all(self._given(keys) for keys in needed):
+        carreau = self.carreau_exponent and (self.carreau_stress or self.carreau_rate)
+        if not (self.eyring_stress or carreau):
             raise ValueError(f'shear_thinning = "{law}" needs more, as in {_USUAL[law]}')
         return self
+
+
+NUMBERS = tuple(name for name in ThinningKeys.model_fields if name != "shear_thinning")
+"""Keys of both laws."""

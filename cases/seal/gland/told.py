@@ -105,8 +105,6 @@ def handbook(p: Gland) -> Iterator[str]:
 
 # --- values assumed where keys were not given ---------------------------------------------------
 
-_RUBBER = {"fit", "shore_A"}.union(*(m.keys for m in materials.MATERIALS.values()))
-
 
 def assumed(p: Seal, given: Collection[str]) -> list[str]:
     """Important values that were not given.  given: the keys that were."""
@@ -128,7 +126,7 @@ def _ring(p: Seal, said: frozenset[str]) -> Iterator[str]:
             f"a shear modulus of {p.shear_modulus:.3g} MPa by hardness, known to {low:+.0f} and "
             f"{high:+.0f} %"
         )
-    elif not said & _RUBBER:
+    elif not said & {"fit", "shore_A", *materials.KEYS}:
         yield f"a rubber of shear modulus {p.shear_modulus:.3g} MPa"
 
 

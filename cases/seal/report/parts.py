@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from softehl.cases.harness.earlier import advice_of
 from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
-from softehl.cases.seal.gland.oils import is_grade
 from softehl.cases.seal.gland.rubbers.hardness import shore_band
 from softehl.cases.seal.gland.tolerances import ToleranceRow, ring_sizes
+from softehl.cases.seal.gland.trade.oil_names import read_oil_name
 from softehl.cases.seal.gland.trade.said import bands
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.curve import curve_figure
@@ -227,7 +227,7 @@ def tolerances(runs: Sequence[FinishedRun]) -> Part:
             rows.append(
                 (run.name, f"shore_A = {p.shore_A:g}", f"+- 5: modulus {low:+.0f} to {high:+.0f} %")
             )
-        if p.oil and is_grade(p.oil):
+        if p.oil and read_oil_name(p.oil).grade:
             rows.append((run.name, f"oil = {p.oil}", "viscosity +- 10 % (ISO 3448)"))
     tables = [Table("Of what was given", ("run", "key", "tolerance"), rows)] if rows else []
     tables += [table for run in runs for table in _bands(run)]

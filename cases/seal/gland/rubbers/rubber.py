@@ -28,7 +28,7 @@ def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
     refused with their keys.
     """
     values = dict(given)
-    _with_hardness(values)
+    polymer = _with_hardness(values)
     shore, table = values.get("shore_A"), values.get("fit")
     if shore is not None and table is not None:
         raise ValueError(f"shore_A = {shore} and fit = {table!r} contradict: leave one of them out")
@@ -39,7 +39,7 @@ def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
         return values
     _require_own(values, material)
     if number(shore):
-        _with_shore(values, material)
+        _with_shore(values, material, polymer)
     if isinstance(table, str):
         _with_fit(values, material, Path(table))
     if values["material"] == "mooney-rivlin":
@@ -48,8 +48,8 @@ def with_rubber(given: Mapping[str, Any]) -> dict[str, Any]:
     return values
 
 
-def _with_hardness(values: dict[str, Any]) -> None:
-    """The hardness of a rubber that is given by its name, "NBR 70", and whether it can be used."""
+def _with_hardness(values: dict[str, Any]) -> str | None:
+    """The hardness of a rubber that is given by its name, "NBR 70"; returns its polymer."""
     text, polymer = values.get("compound"), None
     if isinstance(text, str):
         found = read_rubber("compound", text)
@@ -68,12 +68,7 @@ def _with_hardness(values: dict[str, Any]) -> None:
             'Shore A; harder ones are polyurethane, "PU 95", or have their modulus given, as in '
             'material = "neo-hooke" and mu = "15 MPa", a third of Young\'s modulus'
         )
-
-
-def polymer_of(text: str | None) -> str | None:
-    """The polymer of a rubber that is named."""
-    found = None if text is None else read_rubber("compound", text)
-    return None if found is None else found.polymer
+    return polymer
 
 
 def _require_own(values: dict[str, Any], material: Material) -> None:
@@ -99,8 +94,8 @@ def _require_own(values: dict[str, Any], material: Material) -> None:
         values[key] = None
 
 
-def _with_shore(values: dict[str, Any], material: Material) -> None:
-    mu = youngs_modulus(float(values["shore_A"]), polymer_of(values.get("compound"))) / 3.0
+def _with_shore(values: dict[str, Any], material: Material, polymer: str | None) -> None:
+    mu = youngs_modulus(float(values["shore_A"]), polymer) / 3.0
     if all(number(values.get(key)) for key in material.keys if key != "mu"):
         unit = shear_modulus(material, {**values, "mu": 1.0})
         put(values, "mu", mu / unit, f"shore_A = {values['shore_A']:g}")

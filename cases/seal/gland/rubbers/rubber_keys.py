@@ -9,7 +9,8 @@ from pydantic import Field, model_validator
 from softehl.cases.harness.parameters import Parameters, key
 from softehl.cases.seal.gland.given import shown
 from softehl.cases.seal.gland.rubbers import materials
-from softehl.cases.seal.gland.rubbers.rubber import PAPER, polymer_of
+from softehl.cases.seal.gland.rubbers.rubber import PAPER
+from softehl.cases.seal.gland.trade.rubber_names import read_rubber
 from softehl.cases.seal.gland.trade.said import rubber_named
 
 Terms = Annotated[
@@ -75,7 +76,8 @@ class Rubber(Parameters):
     @property
     def polymer(self) -> str | None:
         """Of the rubber that is named."""
-        return polymer_of(self.compound)
+        found = read_rubber("compound", self.compound) if self.compound else None
+        return found.polymer if found else None
 
     @property
     def energy(self) -> str:

@@ -39,13 +39,11 @@ NAMES = {
 }
 """Names of seals of these sections."""
 
-_RENAMED = {"width": "section_width"}  # what a page calls a dimension -> its key
-
 
 def dimensions(section: str) -> dict[str, str]:
     """Keys of the dimensions of a section, and what its page calls them."""
     names = [name for name in SECTIONS[section].model_fields if name != "height"]
-    return {_RENAMED.get(name, name): name for name in names}
+    return {"section_width" if name == "width" else name: name for name in names}
 
 
 def _dimensions() -> dict[str, Any]:
