@@ -17,6 +17,7 @@ from softehl.cases.harness.row import Record, column
 from softehl.cases.seal.gland.catalogue import ring
 from softehl.cases.seal.gland.fitting import DIAMETERS
 from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.gland.rubbers.materials import MODULI
 from softehl.cases.seal.gland.sections.keys import MEASURES
 from softehl.cases.seal.gland.trade.ring_names import read_ring
 from softehl.cases.seal.gland.trade.said import LENGTHS as LIMITED
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from softehl.cases.seal.gland.parameters import Seal
 
 _ALIASES = {
-    "modulus": ("mu_1", "mu_2", "mu", "c_10", "c_20", "c_30"),
+    "modulus": MODULI,
     **{name: (key,) for name, key in DIAMETERS.items()},
 }
 """Names for other keys: all that a rubber has are off by the same share."""

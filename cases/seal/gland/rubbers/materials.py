@@ -31,16 +31,10 @@ RANGE = (0.6, 1.6)
 
 @dataclass(frozen=True)
 class Material:
-    """A material: its keys in a case, and the energy of its kernels.
-
-    moduli: those of its keys that are stresses. shore: whether one modulus and the other keys make
-    it, so that a hardness may stand for the modulus.
-    """
+    """A material: its keys in a case, and the energy of its kernels."""
 
     energy: str
     keys: tuple[str, ...]
-    moduli: tuple[str, ...]
-    shore: bool = False
 
     @property
     def sheet(self) -> Kernel:
@@ -70,14 +64,17 @@ def _ogden(mu: Sequence[float], alpha: Sequence[float]) -> dict[str, float]:
 
 
 MATERIALS: dict[str, Material] = {
-    "mooney-rivlin": Material("mooney_rivlin", ("mu_1", "mu_2"), ("mu_1", "mu_2")),
-    "neo-hooke": Material("mooney_rivlin", ("mu",), ("mu",), shore=True),
-    "yeoh": Material("yeoh", ("c_10", "c_20", "c_30"), ("c_10", "c_20", "c_30")),
-    "ogden": Material("ogden", ("ogden_mu", "ogden_alpha"), ("ogden_mu",)),
-    "arruda-boyce": Material("arruda_boyce", ("mu", "lambda_m"), ("mu",), shore=True),
-    "gent": Material("gent", ("mu", "J_m"), ("mu",), shore=True),
+    "mooney-rivlin": Material("mooney_rivlin", ("mu_1", "mu_2")),
+    "neo-hooke": Material("mooney_rivlin", ("mu",)),
+    "yeoh": Material("yeoh", ("c_10", "c_20", "c_30")),
+    "ogden": Material("ogden", ("ogden_mu", "ogden_alpha")),
+    "arruda-boyce": Material("arruda_boyce", ("mu", "lambda_m")),
+    "gent": Material("gent", ("mu", "J_m")),
 }
-"""Materials by the names that a case gives them."""
+"""Materials by the names that a case gives them.  A hardness may stand for a single modulus, mu."""
+
+MODULI = ("mu_1", "mu_2", "mu", "c_10", "c_20", "c_30", "ogden_mu")
+"""Keys that are stresses."""
 
 KEYS = tuple(dict.fromkeys(key for m in MATERIALS.values() for key in m.keys))
 """Every key of a material."""

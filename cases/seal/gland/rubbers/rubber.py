@@ -75,8 +75,8 @@ def _require_own(values: dict[str, Any], material: Material) -> None:
     """No key of another material; those that have a default elsewhere are emptied."""
     source, shore = f'material = "{values["material"]}"', values.get("shore_A")
     if shore is not None:
-        if not material.shore:
-            names = ", ".join(f'"{n}"' for n, m in MATERIALS.items() if m.shore)
+        if "mu" not in material.keys:
+            names = ", ".join(f'"{n}"' for n, m in MATERIALS.items() if "mu" in m.keys)
             raise ValueError(
                 f"shore_A = {shore} and {source} contradict: a hardness gives one modulus; "
                 f"allowed are {names}"
@@ -119,7 +119,7 @@ def _with_fit(values: dict[str, Any], material: Material, path: Path) -> None:
 def _require_complete(values: dict[str, Any], material: Material) -> None:
     missing = [key for key in material.keys if values.get(key) is None]
     if missing:
-        other = ", or shore_A" if material.shore and missing == ["mu"] else ""
+        other = ", or shore_A" if missing == ["mu"] else ""
         raise ValueError(
             f'material = "{values["material"]}" needs {" and ".join(missing)}{other}, '
             'or fit = "tests.csv"'

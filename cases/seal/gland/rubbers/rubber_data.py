@@ -17,6 +17,7 @@ import numpy as np
 from softehl.cases.seal.gland.given import times
 from softehl.cases.seal.gland.rubbers.materials import (
     MATERIALS,
+    MODULI,
     SECOND,
     TERMS,
     nominal_stress,
@@ -157,7 +158,7 @@ def fit(name: str, data: RubberData, terms: int = TERMS, temperature: float | No
         model[at] *= factors[heat]
     if factors:
         factor = _factor(factors, temperature)
-        given |= {key: times(given[key], factor) for key in material.moduli}
+        given |= {k: times(v, factor) for k, v in given.items() if k in MODULI}
     tested = {test: data.stretch[data.test == test] for test in set(data.test.tolist())}
     limits = {test: (float(at.min()), float(at.max())) for test, at in tested.items()}
     found = unstable_at(material, material.kernel_values(given), limits)

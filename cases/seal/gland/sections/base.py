@@ -25,8 +25,6 @@ class Section(Parameters):
     def completed(cls, given: dict[str, Any]) -> dict[str, Any]:
         """The dimensions with those left out as parts of the height."""
         height = given.get("height", HEIGHT)
-        if not isinstance(height, int | float):
-            return given
         return {name: part * height for name, part in parts_of(cls).items()} | given
 
     def shape(self, inner_diameter: float) -> Shape:
