@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from softehl.cases.seal.gland.trade.text import NUMBER, form, plain, refused
 
@@ -29,14 +29,17 @@ class RingName:
     bore_first: bool = False
 
 
-_KINDS: tuple[tuple[str, Kind], ...] = (
-    (r"O[- ]?rings?|ORs?|O[- ]?seals?|RORs?|toroidal seals?", "round"),
-    (
-        r"X[- ]?rings?|XRs?|quad[- ]?(?:rings?|seals?)|4[- ]?lobe(?:d)?(?: rings?)?|Q-?(?=4\d\d\d)",
-        "x_ring",
-    ),
-    (r"U[- ]?cups?|U[- ]?rings?|U[- ]?seals?|lip seals?|Nutring", "u_cup"),
-)
+_SECTIONS = {
+    "round": r"O[- ]?rings?|ORs?|O[- ]?seals?|RORs?|toroidal seals?|circular",
+    "x_ring": r"X[- ]?rings?|XRs?|quad(?:[- ]?(?:rings?|seals?))?|4[- ]?lobe(?:d)?(?: rings?)?"
+    r"|Q-?(?=4\d\d\d)",
+    "u_cup": r"U[- ]?cups?|U[- ]?rings?|U[- ]?seals?|lip seals?|Nutring",
+    "d_ring": r"D[- ]?rings?",
+    "rectangular": r"square(?:[- ]rings?)?|rectangle",
+    "trapezoid": r"trapezoid(?:al)?(?: rings?)?",
+}
+"""Section -> what it is called."""
+
 _STANDARD = form(
     r"\b(?:(?:DIN|EN|BS|GOST R)[ -]?)*ISO[ -]?3601(?:-[1-5][AB]?(?!\d))?(?:[:-](?:19|20)\d\d)?"
     r"|\bDIN[ -]?377[01](?:-[1-5](?!\d))?|\bGB/?T[ -]?3452(?:\.1)?"
@@ -91,10 +94,18 @@ def read_ring(given: str) -> RingName:
     raise _unknown(given, rest, kind)
 
 
+def read_section(given: str) -> str:
+    """The section that a word of the trade means; any other text as it is."""
+    text = plain(given)
+    found = (name for name, words in _SECTIONS.items() if re.fullmatch(words, text, re.IGNORECASE))
+    return next(found, given)
+
+
 def _without_kind(text: str) -> tuple[str, Kind | None]:
     """A text without the word for a section, and which it is."""
-    for pattern, kind in _KINDS:
-        found = re.search(rf"(?<![A-Za-z])(?:{pattern})(?![A-Za-z])", text, re.IGNORECASE)
+    kinds: tuple[Kind, ...] = get_args(Kind)
+    for kind in kinds:
+        found = re.search(rf"(?<![A-Za-z])(?:{_SECTIONS[kind]})(?![A-Za-z])", text, re.IGNORECASE)
         if found:
             text = f"{text[: found.start()]} {text[found.end() :]}"
             return " ".join(text.split()).strip(" ,;:-") or "", kind

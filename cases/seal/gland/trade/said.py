@@ -15,6 +15,7 @@ from softehl.cases.seal.gland.given import put
 from softehl.cases.seal.gland.trade.finish_names import RMS_OF_RA, read_finish
 from softehl.cases.seal.gland.trade.fit_names import Band, read_fit
 from softehl.cases.seal.gland.trade.oil_names import dynamic
+from softehl.cases.seal.gland.trade.ring_names import read_section
 from softehl.cases.seal.gland.trade.rubber_names import read_rubber
 from softehl.cases.seal.gland.trade.text import NUMBER, NotUnderstoodError, plain, refused
 
@@ -26,15 +27,6 @@ LENGTHS = {"rod": "rod_diameter", **{name: name for name in _SIZES}}
 """Key that may be given with a tolerance -> the key that it means."""
 
 _SHAFTS = ("rod", "rod_diameter", "groove_diameter")
-
-_SECTIONS = {
-    **dict.fromkeys(("o-ring", "oring", "o ring", "circular"), "round"),
-    **dict.fromkeys(("x-ring", "x ring", "xring", "quad ring", "quad-ring", "quad"), "x_ring"),
-    **dict.fromkeys(("u-cup", "u cup", "ucup", "u-ring", "u ring", "lip seal"), "u_cup"),
-    **dict.fromkeys(("d-ring", "d ring"), "d_ring"),
-    **dict.fromkeys(("square ring", "square", "rectangle", "square-ring"), "rectangular"),
-    **dict.fromkeys(("trapezoidal", "trapezoidal ring", "trapezoid ring"), "trapezoid"),
-}
 
 
 class SaidKeys(Parameters):
@@ -58,7 +50,7 @@ class SaidKeys(Parameters):
             said += _finishes(values)
         _oil(values)
         if isinstance(section := values.get("section"), str):
-            values["section"] = _SECTIONS.get(plain(section).lower(), section)
+            values["section"] = read_section(section)
         return super().worded({**values, "said": tuple(dict.fromkeys(said))} if said else values)
 
 
