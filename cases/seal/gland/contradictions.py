@@ -130,12 +130,9 @@ def _section_is_one(p: Seal) -> None:
     for name in p.materials:
         if name not in p.regions:
             raise ValueError(f"materials.{name}: the section has {has}")
-    for name, given in (
-        ("arc_start and arc_end", p.arc_start is not None),
-        ("extrusion_gap", p.opens),
-    ):
-        if given:
-            raise ValueError(f'{name}: for section = "round" only; leave it out')
+    if p.arc_start is not None or p.opens:
+        name = "extrusion_gap" if p.arc_start is None else "arc_start and arc_end"
+        raise ValueError(f'{name}: for section = "round" only; leave it out')
     if p.sensitivity and (p.outline is not None or p.cap_thickness is not None):
         raise ValueError(
             "sensitivity = true: not of an outline of a file, which has no dimensions, and not "

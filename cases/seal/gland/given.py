@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from math import isclose
-from types import MappingProxyType
 from typing import Any, TypeGuard
 
 from pydantic import ValidationError
@@ -47,7 +46,7 @@ def agree(before: object, value: object, within: float = 1e-6) -> bool:
 
 
 @contextmanager
-def one_line(where: str, also: Mapping[str, str] = MappingProxyType({})) -> Iterator[None]:
+def one_line(where: str, **also: str) -> Iterator[None]:
     """The first complaint about a record, its key behind `where`.  Raises ValueError.
 
     also: key -> what its complaint ends with.

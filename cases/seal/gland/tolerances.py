@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -67,8 +66,8 @@ def read_tolerances(p: Seal) -> Shares:
     Raises ValueError.
     """
     typed = [_share(text, p) for text in p.tolerances]
-    twice = [name for name, times in Counter(name for name, _ in typed).items() if times > 1]
-    if twice:
+    names = [name for name, _ in typed]
+    if twice := [name for name in names if names.count(name) > 1]:
         raise ValueError(f"tolerances: {twice[0]} is given twice; leave one of them out")
     of_ring = [f"{key} {tolerance!r} mm" for key, _, tolerance in ring_sizes(p.ring)]
     of_limits = [f"{LIMITED[name]} {found.half:.9f} mm" for name, _, found in bands(p.said)]
@@ -80,7 +79,8 @@ def _share(text: str, p: Seal) -> tuple[str, dict[str, float]]:
     found = _ITEM.fullmatch(text.strip())
     if found and found["name"] in _OF_THE_GLAND:
         return found["name"], _of_the_gland(found, p)
-    names = _moved(found["name"], p) if found else ()
+    names = _ALIASES.get(found["name"], (found["name"],)) if found else ()
+    names = tuple(name for name in names if name in _VARIED and getattr(p, name))
     known = [value for name in names if isinstance(value := getattr(p, name), float)]
     metric = found is None or found["unit"] != "mm" or _IN_MM.issuperset(names)
     if not found or not known or len(known) < len(names) or not metric:
@@ -109,12 +109,6 @@ def _of_the_gland(found: re.Match[str], p: Gland) -> dict[str, float]:
         return {"groove_width": size / p.fill_percent}
     wrong = 0.01 * size * (p.section_diameter if name == "squeeze" else p.depth)
     return {"housing_diameter": 2.0 * (wrong if unit == "%" else size) / abs(p.housing_diameter)}
-
-
-def _moved(name: str, p: Seal) -> tuple[str, ...]:
-    """The keys that a tolerance moves: those of its name that have a value and a sensitivity."""
-    names = _ALIASES.get(name, (name,))
-    return tuple(key for key in names if key in _VARIED and getattr(p, key))
 
 
 def ring_sizes(name: str | None) -> list[tuple[str, float, float]]:

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import log
-from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -122,9 +121,7 @@ def stress_by(material: Material, name: str, values: Values, e: Array, stretch: 
 
 
 def unstable_at(
-    material: Material,
-    values: Values,
-    limits: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+    material: Material, values: Values, limits: Mapping[str, tuple[float, float]] | None = None
 ) -> tuple[str, float] | None:
     """The test and the stretch nearest to 1 at which Drucker's criterion fails, if one does.
 
@@ -133,7 +130,7 @@ def unstable_at(
     """
     found = []
     for test in SECOND:
-        low, high = limits.get(test, RANGE)
+        low, high = (limits or {}).get(test, RANGE)
         steps = np.linspace(log(min(low, RANGE[0])), log(max(high, RANGE[1])), 241)
         e = strains(test, np.exp(steps))
         _, K = material.sheet.tangent(np.ones((len(e), 2)), e, parameters=dict(values))

@@ -66,5 +66,5 @@ def _region(name: str, table: object) -> Region:
             raise ValueError(f"materials.{name}: {key} is for the whole section; give moduli")
     if name == CAP and set(table) <= set(PRESETS["ptfe"]) - {"material"}:
         table = {"material": "ptfe", **table}
-    with one_line(f"materials.{name}.", {"material": f"; or {', '.join(PRESETS)}"}):
+    with one_line(f"materials.{name}.", material=f"; or {', '.join(PRESETS)}"):
         return Region(**table)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import sqrt
 
 from softehl.cases.seal.gland.sections.base import Section, joined, part, require
+from softehl.cases.seal.gland.sections.seated import mirrored
 from softehl.runtime.mesh.outline import Arc, Line, Outline
 
 
@@ -38,13 +39,11 @@ class DRing(Section):
         part_of_nose = R / (R - f)
         touch = part_of_nose * (half - f), R + part_of_nose * (rise - R)
         low, high = half - f, self.height
-        return joined(
-            Arc((-touch[0], touch[1]), touch, (0.0, R)),
+        right = [
             Arc(touch, (half, rise), (low, rise)),
             Line((half, rise), (half, top)),
             Arc((half, top), (low, high), (low, top)),
-            Line((low, high), (-low, high)),
-            Arc((-low, high), (-half, top), (-low, top)),
-            Line((-half, top), (-half, rise)),
-            Arc((-half, rise), (-touch[0], touch[1]), (-low, rise)),
-        )
+        ]
+        left = [mirrored(piece).reversed() for piece in reversed(right)]
+        nose, back = Arc((-touch[0], touch[1]), touch, (0.0, R)), Line((low, high), (-low, high))
+        return joined(nose, *right, back, *left)

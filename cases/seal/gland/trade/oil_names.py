@@ -7,15 +7,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from softehl.cases.harness.units import read_quantity
+from softehl.cases.seal.gland.tables import rows
 from softehl.cases.seal.gland.trade.text import NUMBER, form, plain, refused
 
 IMPROVED = 140.0
 """Least viscosity index of HVLP oils, DIN 51524-3."""
 
-GRADES = {
-    **{10: 2.6, 15: 3.4, 22: 4.3, 32: 5.4, 46: 6.8, 68: 8.6},
-    **{100: 11.1, 150: 14.7, 220: 19.0, 320: 24.0},
-}
+GRADES = {int(row["grade"]): float(row["at_100_degC_cSt"]) for row in rows("iso_vg.csv")}
 """ISO 3448 grade, its viscosity at 40 degC (+-10 %) -> at 100 degC, of a mineral oil, cSt.
 
 Typical of hydraulic oils without viscosity improver, viscosity index 90 to 105.
