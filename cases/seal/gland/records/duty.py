@@ -4,10 +4,9 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from softehl.cases.harness.parameters import Parameters, different, key
+from softehl.cases.harness.parameters import Number, Parameters, different, key
 
-# strict again on the item: the list itself is lax so that a TOML array becomes a tuple
-Speed = Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)]
+Speed = Annotated[Number, Field(gt=0)]
 Speeds = Annotated[tuple[Speed, ...], Field(min_length=1, strict=False), AfterValidator(different)]
 
 

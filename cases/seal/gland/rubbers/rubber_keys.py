@@ -6,17 +6,14 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from softehl.cases.harness.parameters import Parameters, key
+from softehl.cases.harness.parameters import Number, Parameters, key
 from softehl.cases.seal.gland.given import shown
 from softehl.cases.seal.gland.rubbers import materials
 from softehl.cases.seal.gland.rubbers.rubber import PAPER
 from softehl.cases.seal.gland.trade.rubber_names import read_rubber
 from softehl.cases.seal.gland.trade.said import rubber_named
 
-Terms = Annotated[
-    tuple[Annotated[float, Field(strict=True, allow_inf_nan=False)], ...],
-    Field(min_length=1, max_length=3, strict=False),
-]
+Terms = Annotated[tuple[Number, ...], Field(min_length=1, max_length=3, strict=False)]
 
 
 class Rubber(Parameters):
