@@ -110,10 +110,8 @@ def _class(key: str, given: str, found: re.Match[str], hole: bool) -> Band:
     shown, usual = number_text(size), "H8" if hole else "f7"
     letters = (*DEVIATIONS, "js")
     if letter.lower() not in letters or grade not in GRADES:
-        raise refused(
-            *(key, given, f"is beyond the tables here: {', '.join(letters)} and grades 5 to 12"),
-            *(f"{shown} {usual}", f"{shown} ±0.05"),
-        )
+        why = f"is beyond the tables here: {', '.join(letters)} and grades 5 to 12"
+        raise refused(key, given, why, f"{shown} {usual}", f"{shown} ±0.05")
     part, case, other = ("hole", "capital", letter.upper())
     if not hole:
         part, case, other = ("shaft", "small", letter.lower())

@@ -74,10 +74,9 @@ def read_ring(given: str) -> RingName:
         a, b = float(sizes["inner"]), float(sizes["section"])
         if third is None:
             if kind == "u_cup":
-                raise refused(
-                    *("ring", given, "is a U-cup, which is named by rod x groove diameter x width"),
-                    f"U-cup {a:g}x{a + 2 * b:g}x{round(1.6 * b, 1):g}",
-                )
+                why = "is a U-cup, which is named by rod x groove diameter x width"
+                usual = f"U-cup {a:g}x{a + 2 * b:g}x{round(1.6 * b, 1):g}"
+                raise refused("ring", given, why, usual)
             return RingName(inner=a, section=b, kind=kind)
         if (kind is None and b > a) or (kind == "u_cup" and b != a):
             inner, outer, width = min(a, b), max(a, b), float(third)
@@ -85,12 +84,11 @@ def read_ring(given: str) -> RingName:
     if kind == "x_ring" and (found := _QUAD.fullmatch(rest)):
         return RingName(number=int(found["number"]), kind=kind)
     if (found := _DASH.fullmatch(rest)) and kind != "u_cup":
-        if not (found["said"] or found["dash"] or len(found["number"]) == 3):
-            raise refused(
-                *("ring", given, "is a number of AS568 or a diameter"),
-                *(f"AS568-{int(found['number']):03d}", f"{found['number']}x3.55"),
-            )
-        return RingName(number=int(found["number"]), kind=kind)
+        number = found["number"]
+        if not (found["said"] or found["dash"] or len(number) == 3):
+            why = "is a number of AS568 or a diameter"
+            raise refused("ring", given, why, f"AS568-{int(number):03d}", f"{number}x3.55")
+        return RingName(number=int(number), kind=kind)
     raise _unknown(given, rest, kind)
 
 

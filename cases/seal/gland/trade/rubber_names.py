@@ -60,9 +60,8 @@ def read_rubber(key: str, given: str) -> RubberName | None:
         if found := known.fullmatch(text):
             return _read(key, given, found.groupdict())
     if is_plastic(text):
-        raise refused(
-            key, given, "is a plastic, no rubber: it may be a cap, cap_thickness and materials.cap"
-        )
+        why = "is a plastic, no rubber: it may be a cap, cap_thickness and materials.cap"
+        raise refused(key, given, why)
     if short := re.fullmatch(r"([NVES]) ?-?(\d\d)", text, re.IGNORECASE):
         name = _SHORT[short[1].upper()]
         raise refused(key, given, "is a maker's short name", f"{name} {short[2]}")
@@ -88,10 +87,8 @@ def _read(key: str, given: str, found: dict[str, str | None]) -> RubberName:
         raise refused(key, given, "needs its hardness in Shore A", f"{polymer} {usual}")
     shore, scale = float(found["shore"]), (found.get("scale") or "A").upper()
     if scale == "D":
-        raise refused(
-            *(key, given, "is a hardness Shore D; write that in Shore A, or the shear modulus, mu"),
-            f"{polymer or 'PU'} 95",
-        )
+        why = "is a hardness Shore D; write that in Shore A, or the shear modulus, mu"
+        raise refused(key, given, why, f"{polymer or 'PU'} 95")
     if not 10.0 <= shore < 100.0:
         raise refused(key, given, "is no hardness Shore A", f"{polymer or 'NBR'} 70")
     return RubberName(polymer, shore)
