@@ -127,8 +127,7 @@ class Fit:
     @property
     def quality(self) -> float:
         """R^2: 1 less squares of the differences over those of the stresses about their mean."""
-        spread = self.data.stress - self.data.stress.mean()
-        return float(1.0 - np.sum((self.model - self.data.stress) ** 2) / np.sum(spread**2))
+        return 1.0 - self.error**2 / float(self.data.stress.var())
 
 
 def fit(name: str, data: RubberData, terms: int = TERMS, temperature: float | None = None) -> Fit:

@@ -6,7 +6,7 @@ from math import sqrt
 
 from softehl.cases.seal.gland.sections.base import Section, joined, part, require
 from softehl.cases.seal.gland.sections.seated import mirrored
-from softehl.runtime.mesh.outline import Arc, Line, Outline
+from softehl.runtime.mesh.outline import Arc, Line, Outline, Piece
 
 
 class DRing(Section):
@@ -39,7 +39,7 @@ class DRing(Section):
         part_of_nose = R / (R - f)
         touch = part_of_nose * (half - f), R + part_of_nose * (rise - R)
         low, high = half - f, self.height
-        right = [
+        right: list[Piece] = [
             Arc(touch, (half, rise), (low, rise)),
             Line((half, rise), (half, top)),
             Arc((half, top), (low, high), (low, top)),
