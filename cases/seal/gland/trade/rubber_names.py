@@ -1,4 +1,7 @@
-"""Names of rubbers: polymer and hardness, "NBR 70", "FKM 75 Shore A", "PU 95"."""
+"""Names of rubbers: polymer and hardness, "NBR 70", "FKM 75 Shore A", "PU 95".
+
+`polymers.csv` has the polymers, with their temperatures and patterns of their other names.
+"""
 
 from __future__ import annotations
 
