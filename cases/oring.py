@@ -156,7 +156,7 @@ class ORingCase(Case[Seal, FilmRow]):
         if kinds:
             from softehl.cases.seal.report.pictures import write_plots
 
-            write_plots(parameters, folder, rows, rejected, kinds)
+            write_plots(FinishedRun(folder, self, parameters, rows, rejected), kinds)
 
     def report(self, runs: Sequence[FinishedRun]) -> Sequence[Part]:
         """See :class:`Case`."""

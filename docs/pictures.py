@@ -18,7 +18,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import softehl
-from softehl.cases.oring import PICTURES
+from softehl.cases.harness.report.part import FinishedRun
+from softehl.cases.oring import CASE, PICTURES
 from softehl.cases.paper.states import PAPER
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.pictures import write_plots
@@ -88,7 +89,7 @@ def main(folder: Path) -> None:
             for name, figure in pictures.items():
                 figure.savefig(folder / f"{name}.png", pil_kwargs={"optimize": True})
         default = curves["default"]
-        write_plots(DEFAULT, default.folder, default.rows)
+        write_plots(FinishedRun(default.folder, CASE, DEFAULT, default.rows))
         for name in PICTURES:
             shrink(default.folder / f"{name}.png", folder / f"run_{name}.png")
 

@@ -221,10 +221,8 @@ def _cells(state: RunState) -> dict[str, str]:
 
 def _drawing(run: Run) -> str:
     """The gland of a run as SVG."""
-    import matplotlib
-
     found = StringIO()
-    with matplotlib.rc_context(style.STYLE):
+    with style.drawing():
         gland_figure(run.parameters).savefig(found, format="svg")
     text = found.getvalue()
     text = text[text.index("<svg") :]  # without the head of a file

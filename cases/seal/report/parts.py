@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from io import BytesIO
 from math import isfinite
-
-from matplotlib.figure import Figure
 
 from softehl.cases.harness.earlier import advice_of
 from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
@@ -15,13 +12,9 @@ from softehl.cases.seal.gland.tolerances import ToleranceRow, ring_sizes
 from softehl.cases.seal.gland.trade.oil_names import read_oil_name
 from softehl.cases.seal.gland.trade.said import bands
 from softehl.cases.seal.report import style
-from softehl.cases.seal.report.curve import curve_figure
 from softehl.cases.seal.report.drawing import fit_numbers, gland_figure
-from softehl.cases.seal.report.fit import fit_figure
 from softehl.cases.seal.report.interactive import curve_plot, film_plot, friction_plot
-from softehl.cases.seal.report.section import section_figure, views_of
-from softehl.cases.seal.report.stribeck import stribeck_figure
-from softehl.cases.seal.report.tables import fit_of
+from softehl.cases.seal.report.pictures import FIGURES, pictures_of
 from softehl.cases.seal.sensitivity.quantities import CALLED
 from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
 from softehl.cases.seal.states.state import FilmRow
@@ -30,11 +23,10 @@ from softehl.runtime.io import Cell
 
 def parts(runs: Sequence[FinishedRun]) -> list[Part]:
     """Gland, deformed section, film, curve, friction, leakage, surfaces, tolerances."""
-    with style.drawing():
-        found = [gland(runs), *_rubber(runs), _section(runs)]
-        surfaces, curve = _surfaces(runs), _curve(runs)
-    found += [_film(runs), curve, _friction(runs), *_leakage(runs), *surfaces]
-    return [*_compared(runs), *found, tolerances(runs)]
+    return [
+        *(*_compared(runs), gland(runs), *_rubber(runs), _section(runs), _film(runs)),
+        *(_curve(runs), _friction(runs), *_leakage(runs), *_surfaces(runs), tolerances(runs)),
+    ]
 
 
 def cycle_parts(runs: Sequence[FinishedRun]) -> list[Part]:
@@ -51,9 +43,7 @@ def cycle_parts(runs: Sequence[FinishedRun]) -> list[Part]:
     tables = [Table("Every cycle", ["run", *heads, "verdict"], rows)]
     shown = {"friction_loop": "Friction loop", "film_map": "Film over time and place"}
     pictures = (Part(title, pictures=_drawn(runs, name)) for name, title in shown.items())
-    with style.drawing():
-        seals = gland(runs)
-    return [Part("Cycles", text, tables=tables), *(p for p in pictures if p.pictures), seals]
+    return [Part("Cycles", text, tables=tables), *(p for p in pictures if p.pictures), gland(runs)]
 
 
 def _compared(runs: Sequence[FinishedRun]) -> list[Part]:
@@ -85,7 +75,7 @@ def _compared(runs: Sequence[FinishedRun]) -> list[Part]:
 
 def gland(runs: Sequence[FinishedRun]) -> Part:
     """The seals in their glands, and how they sit."""
-    pictures = [Picture(run.name, png(gland_figure(run.parameters))) for run in runs]
+    pictures = pictures_of(runs, lambda run: gland_figure(run.parameters))
     numbers = [fit_numbers(run.parameters) for run in runs]
     rows: list[tuple[Cell, ...]] = [
         (name, *(found[k][1] for found in numbers), unit)
@@ -102,26 +92,17 @@ def gland(runs: Sequence[FinishedRun]) -> Part:
 
 def _rubber(runs: Sequence[FinishedRun]) -> list[Part]:
     """The fit of a rubber, where a run has one."""
-    pictures = []
-    for run in runs:
-        try:
-            found = fit_of(run.parameters)
-        except ValueError:
-            continue  # the table of tests is elsewhere now
-        if found:
-            pictures.append(Picture(f"{run.name}: {run.parameters.fit}", png(fit_figure(found))))
+    pictures = pictures_of(runs, FIGURES["fit"], lambda run: f"{run.name}: {run.parameters.fit}")
     return [Part("Rubber", "Tests and the material fitted to them.", pictures)] if pictures else []
 
 
 def _section(runs: Sequence[FinishedRun]) -> Part:
     """The fastest state of each stroke."""
-    pictures = [
-        Picture(run.name, png(section_figure(run.parameters, views)))
-        for run in runs
-        if (views := views_of(run.folder, run.rows))
-    ]
-    text = "Stress in the ring, film pressure on the rod, contact pressure on housing and walls."
-    return Part("Deformed section", text, pictures=pictures)
+    return Part("Deformed section", PRESSURES, pictures=pictures_of(runs, FIGURES["section"]))
+
+
+PRESSURES = "Stress in the ring, film pressure on the rod, contact pressure on housing and walls."
+"""Text of the part of deformed sections."""
 
 
 def _film(runs: Sequence[FinishedRun]) -> Part:
@@ -143,11 +124,7 @@ def _curve(runs: Sequence[FinishedRun]) -> Part:
     )
     if _several_speeds(runs):
         return Part("Film thickness", text, plots=[curve_plot(runs)], lines=lines)
-    pictures = [
-        Picture(run.name, png(curve_figure(style.subject(run.parameters), run.rows)))
-        for run in runs
-    ]
-    return Part("Film thickness", text, pictures=pictures, lines=lines)
+    return Part("Film thickness", text, pictures_of(runs, FIGURES["curve"]), lines=lines)
 
 
 def _friction(runs: Sequence[FinishedRun]) -> Part:
@@ -188,19 +165,18 @@ def _leakage(runs: Sequence[FinishedRun]) -> list[Part]:
 
 def _surfaces(runs: Sequence[FinishedRun]) -> list[Part]:
     """Stribeck curves and regimes, of the runs whose surfaces are rough."""
-    tables, pictures = [], []
-    for run in runs:
-        if figure := stribeck_figure(run.parameters, run.rows):
-            pictures.append(Picture(run.name, png(figure)))
-        if any(isfinite(row.lambda_ratio) for row in run.rows):
-            rows = [[getattr(row, name) for name in _SURFACE] for row in run.rows]
-            heads = [c.title for c in FilmRow.columns() if c.name in _SURFACE]
-            tables.append(Table(run.name, heads, rows))
+    heads = [c.title for c in FilmRow.columns() if c.name in _SURFACE]
+    tables = [
+        Table(run.name, heads, [[getattr(row, name) for name in _SURFACE] for row in run.rows])
+        for run in runs
+        if any(isfinite(row.lambda_ratio) for row in run.rows)
+    ]
     text = (
         "Friction over eta U / p with the regimes, and what asperities carry. Lambda is the mean "
         "gap over the roughness of both surfaces."
     )
-    return [Part("Surfaces", text, pictures=pictures, tables=tables)] if tables else []
+    pictures = pictures_of(runs, FIGURES["stribeck"])
+    return [Part("Surfaces", text, pictures, tables=tables)] if tables else []
 
 
 _SURFACE = (
@@ -232,7 +208,7 @@ def tolerances(runs: Sequence[FinishedRun]) -> Part:
     tables = [Table("Of what was given", ("run", "key", "tolerance"), rows)] if rows else []
     tables += [table for run in runs for table in _bands(run)]
     text = "" if tables else "No key of these runs has a tolerance that is known here."
-    return Part("Tolerances", text, pictures=_drawn(runs, "tornado"), tables=tables)
+    return Part("Tolerances", text, pictures_of(runs, FIGURES["tornado"]), tables=tables)
 
 
 def _bands(run: FinishedRun) -> list[Table]:
@@ -253,10 +229,3 @@ def _drawn(runs: Sequence[FinishedRun], name: str) -> list[Picture]:
     """The pictures of this name that the runs have."""
     paths = [(run.name, run.folder / f"{name}.png") for run in runs]
     return [Picture(title, path.read_bytes()) for title, path in paths if path.exists()]
-
-
-def png(figure: Figure) -> bytes:
-    """A picture for a page."""
-    found = BytesIO()
-    figure.savefig(found, format="png", dpi=130)
-    return found.getvalue()

@@ -38,21 +38,15 @@ class View:
     profile: Profile
     section: Section
 
-    @property
-    def complete(self) -> bool:
-        """True if the section has all fields to draw; one of another version may lack some."""
-        return self.section.point_data.keys() >= {"contact_pressure", *_STRESSES}
-
 
 def views_of(folder: Path, rows: Sequence[FilmRow]) -> list[View]:
     """Of each stroke the row of the highest speed, where the film changes the contact most.
 
-    Sections that lack a field are left out.  Raises OSError, ValueError.
+    Raises OSError, ValueError.
     """
-    fastest = sorted(rows, key=lambda row: -abs(row.rod_speed_mm_s))
-    firsts = (next((r for r in fastest if r.stroke == stroke), None) for stroke in style.STROKES)
-    views = [View(r, read_profile(folder, r), read_section(folder, r)) for r in firsts if r]
-    return [view for view in views if view.complete]
+    fastest = {row.stroke: row for row in sorted(rows, key=lambda row: abs(row.rod_speed_mm_s))}
+    chosen = [fastest[stroke] for stroke in style.STROKES if stroke in fastest]
+    return [View(row, read_profile(folder, row), read_section(folder, row)) for row in chosen]
 
 
 def nodal_von_mises(section: Section) -> Array:
