@@ -189,7 +189,7 @@ ONE = {"speeds": (400.0,), "stroke": "out", "error_estimate": False}
 
 @pytest.mark.slow
 def test_the_held_mesh_gives_what_the_run_did() -> None:
-    held_film = HeldFilm.of(P.model_copy(update={**ONE, "density": 1}))
+    held_film = HeldFilm.of(P.model_copy(update={**ONE, "density": 1}), Silent())
     assert held_film is not None
     assert held_film.change("friction", "rod_diameter", 1.0) == pytest.approx(1.0, abs=1e-7)
     changed = held_film.change("friction", "rod_diameter", 0.9995)
@@ -200,7 +200,7 @@ def test_the_held_mesh_gives_what_the_run_did() -> None:
 @pytest.mark.slow
 def test_a_held_film_follows_a_key_further_than_one_solve() -> None:
     """Newton's method with more iterations than a step has finds the same film at once."""
-    held_film = HeldFilm.of(P.model_copy(update={**ONE, "density": 1}))
+    held_film = HeldFilm.of(P.model_copy(update={**ONE, "density": 1}), Silent())
     assert held_film is not None
     moved = held_film.case.scaled("rod_diameter", -0.003)
     problem, quantity = moved.system.film_problem(moved.film), "friction"

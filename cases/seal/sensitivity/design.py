@@ -10,7 +10,11 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
+from pydantic import ValidationError
+
+from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.varied import BASES
@@ -34,7 +38,7 @@ STEPS = 6
 _TARGET = re.compile(r"(?P<name>\w+)\s*=?\s*(?P<change>[-+]\d+(\.\d*)?)\s*%")
 
 
-class NoDesignError(ValueError):
+class NoDesignError(BadInput):
     """A target that cannot be reached; the text says why and what to do."""
 
 
@@ -62,9 +66,19 @@ class Target:
             )
         return cls(found["name"], 1.0 + 0.01 * float(found["change"]))
 
+    @property
+    def words(self) -> str:
+        """What a reader calls the quantity."""
+        return CALLED[self.quantity][0]
+
+    @property
+    def unit(self) -> str:
+        """Of the quantity."""
+        return CALLED[self.quantity][1]
+
     def told(self, value: float) -> str:
-        """A value of the quantity in words."""
-        return f"{self.quantity} = {value:.5g} {CALLED[self.quantity][1]}"
+        """A value of the quantity as it is typed."""
+        return f"{self.quantity} = {value:.5g} {self.unit}"
 
 
 @dataclass(frozen=True)
@@ -82,6 +96,11 @@ class Lever:
             return p.ring_diameter
         value = float(getattr(p, self.key))
         return value if p.called(self.key) == self.key else -value
+
+    @property
+    def words(self) -> str:
+        """What a reader calls it."""
+        return self.name.replace("_", " ")
 
     @property
     def unit(self) -> str:
@@ -117,6 +136,24 @@ def value_of(state: FilmState, quantity: str) -> float:
     return abs(found[quantity])
 
 
+def slope_of(state: FilmState, quantity: str, key: str) -> float:
+    """Log derivative of a quantity of a film by a key; 0 where it does not depend on it."""
+    assert state.sensitivity is not None
+    return state.sensitivity.get(quantity, {}).get(key, 0.0)
+
+
+def changed(p: Seal, wrong: str, **keys: Any) -> Seal:
+    """The case with other values of some keys.
+
+    wrong: words of the NoDesignError where a case cannot have them.
+    """
+    try:
+        return Seal(**{**p.settled(), **keys})
+    except ValidationError as error:
+        reason = error.errors()[0]["msg"].removeprefix("Value error, ")
+        raise NoDesignError(f"{wrong}: {reason}") from None
+
+
 def designed(
     p: Seal,
     target: Target,
@@ -127,25 +164,23 @@ def designed(
     """Steps to the value of the key of a lever that meets the target; the last one does.
 
     solve: the one film of a case with its sensitivities, None where there is none. hold: how its
-    quantity changes with the key on its mesh. Raises NoDesignError, and
-    pydantic.ValidationError for a value that a case cannot have.
+    quantity changes with the key on its mesh. Raises NoDesignError.
     """
-    key = by.key
+    key, called = by.key, p.called(by.key)
     state, value = _film(p, by, solve), float(getattr(p, key))
     wanted = target.factor * value_of(state, target.quantity)
     steps = [Step(value, value_of(state, target.quantity), state)]
     for _ in range(STEPS):
-        assert state.sensitivity is not None
-        slope = state.sensitivity[target.quantity].get(key, 0.0)
+        slope = slope_of(state, target.quantity, key)
         way = math.log(wanted / steps[-1].quantity)
         if abs(way) > 0.5 * abs(slope):  # the key would change by more than half
             raise NoDesignError(
-                f"{target.quantity} follows {p.called(key)} by {slope:.2g} % for 1 %: that is too "
+                f"{target.quantity} follows {called} by {slope:.2g} % for 1 %: that is too "
                 "little for this target; choose another key (sensitivity.csv shows which have an "
                 "influence)"
             )
         value *= math.exp(way / slope)
-        near = Seal(**{**p.settled(), key: value})
+        near = changed(p, f"the target needs a {called} that a case cannot have", **{key: value})
         state = _film(near, by, solve)
         steps.append(Step(value, value_of(state, target.quantity), state))
         if abs(steps[-1].quantity / wanted - 1.0) <= TOLERANCE:

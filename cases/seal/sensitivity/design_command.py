@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-
-from pydantic import ValidationError
+from functools import lru_cache, partial
 
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.seal.gland.fitting import DIAMETERS
@@ -17,16 +15,16 @@ from softehl.cases.seal.sensitivity.design import (
     SETTLED,
     Change,
     Lever,
-    NoDesignError,
     Step,
     Target,
+    changed,
     designed,
 )
-from softehl.cases.seal.sensitivity.quantities import CALLED, quantities
+from softehl.cases.seal.sensitivity.quantities import quantities
 from softehl.cases.seal.sensitivity.sensitivity import differentiation
 from softehl.cases.seal.sensitivity.variation import FilmCase
 from softehl.cases.seal.solve.films import NoFilm
-from softehl.cases.seal.solve.method import DryContact, run
+from softehl.cases.seal.solve.method import DryContact, Judge, verdict_of_contact
 from softehl.cases.seal.solve.path import StageError
 from softehl.cases.seal.states.state import FilmState, Observer, Silent
 from softehl.runtime.arrays import Array
@@ -47,9 +45,6 @@ INSTEAD = {
     "temperature": "viscosity follows from it",
 }
 """Keys that cannot be chosen freely: what to do instead."""
-
-_LEAST = 0.1 * SETTLED
-"""Least step of the logarithm of a key: it moves a quantity that follows tenfold by `SETTLED`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +73,11 @@ class Design:
         return self.by.value(self.at(value))
 
     @property
+    def films(self) -> list[tuple[float, FilmState]]:
+        """The films on meshes of their own, each with its value of the key."""
+        return [(step.value, step.state) for step in self.steps if step.state]
+
+    @property
     def change(self) -> float:
         """Of the quantity, %."""
         return 100.0 * (self.steps[-1].quantity / self.steps[0].quantity - 1.0)
@@ -92,64 +92,51 @@ def design_case(p: Seal, target: str, key: str, observer: Observer | None = None
         hint = f" ({INSTEAD[base]})" if base in INSTEAD else meant(base, known)
         raise BadInput(f"--by {base}{hint}: allowed: {', '.join([*known, *BASES])}")
     p = _one_film(p)
-    by = Lever(asked if asked in BASES else p.called(base), base)
-    solve = partial(_solve, observer or Silent())
-    try:
-        wanted = Target.of(target)
-        steps = designed(p, wanted, by, solve, lambda q: _hold(q, wanted.quantity, base))
-    except NoDesignError as error:
-        raise BadInput(str(error)) from None
-    except ValidationError as error:
-        wrong = f"the target needs a {p.called(base)} that a case cannot have: {_reason(error)}"
-        raise BadInput(wrong) from None
-    return Design(p, wanted, by, steps)
+    by, wanted = Lever(asked if asked in BASES else p.called(base), base), Target.of(target)
+    film_of = lru_cache(maxsize=1)(partial(HeldFilm.of, observer=observer or Silent()))
+
+    def solve(q: Seal) -> FilmState | None:
+        film = film_of(q)
+        return film.state if film else None
+
+    def hold(q: Seal) -> Change | None:
+        film = film_of(q)
+        return partial(film.change, wanted.quantity, base) if film else None
+
+    return Design(p, wanted, by, designed(p, wanted, by, solve, hold))
 
 
 def _one_film(p: Seal) -> Seal:
     """The case of its first speed, at outstroke unless it has one stroke.  Raises BadInput."""
     stroke = "out" if p.stroke == "both" else p.stroke
     given = {"speeds": p.speeds[:1], "stroke": stroke, "error_estimate": False}
-    try:
-        return Seal(**{**p.settled(), **given, "sensitivity": True})
-    except ValidationError as error:
-        raise BadInput(f"a design needs the sensitivities: {_reason(error)}") from None
-
-
-def _reason(error: ValidationError) -> str:
-    return error.errors()[0]["msg"].removeprefix("Value error, ")
-
-
-def _solve(observer: Observer, p: Seal) -> FilmState | None:
-    states = run(p, observer, differentiate=differentiation(p)).states
-    return states[0] if states else None
-
-
-def _hold(p: Seal, quantity: str, key: str) -> Change | None:
-    held = HeldFilm.of(p)
-    return None if held is None else lambda factor: held.change(quantity, key, factor)
+    return changed(p, "a design needs the sensitivities", **given, sensitivity=True)
 
 
 @dataclass(frozen=True, eq=False)
 class HeldFilm:
-    """A converged film x (n,) of a case with one stroke and one speed."""
+    """The film of a case with one stroke and one speed: its state, and its unknowns x (n,)."""
 
     case: FilmCase
     x: Array
     newton: Newton
+    state: FilmState
 
     @classmethod
-    def of(cls, p: Seal) -> HeldFilm | None:
+    def of(cls, p: Seal, observer: Observer) -> HeldFilm | None:
         """The film of a case; None where it is not reached."""
         assert p.stroke != "both"
         try:
-            contact = DryContact.of(p, Silent())
+            contact = DryContact.of(p, observer)
         except StageError:
             return None
         found = contact.adapted(p.stroke, p.speeds[0])
         if isinstance(found, NoFilm):
             return None
-        film = found.film
-        return cls(FilmCase(film.system, film.loads), film.x, contact.newton)
+        judge = Judge(verdict_of_contact(contact.system, contact.x), differentiation(p))
+        film, state = found.film, judge.state(found, None)
+        observer.film_state(state)
+        return cls(FilmCase(film.system, film.loads), film.x, contact.newton, state)
 
     def change(self, quantity: str, key: str, factor: float) -> float | None:
         """A quantity over its value here, where a key is `factor` times as large; None if that film
@@ -160,9 +147,10 @@ class HeldFilm:
             moved = self.case.scaled(key, math.expm1(logarithm))
             return moved.system.film_problem(moved.film)
 
-        # a hundredth of a millimetre is many films
-        way = math.log(factor)
-        path = Continuation(self.newton, StepRule(max(abs(way), _LEAST), _LEAST), name=key)
+        # a hundredth of a millimetre is many films; the least step moves a quantity that follows
+        # tenfold by `SETTLED`
+        way, least = math.log(factor), 0.1 * SETTLED
+        path = Continuation(self.newton, StepRule(max(abs(way), least), least), name=key)
         branch = path.follow(problem_at, 0.0, way, self.x)
         if not branch.converged:
             return None
@@ -183,7 +171,7 @@ def told(design: Design) -> list[str]:
     values = [design.measure(step.value) for step in steps]
     lines = [f"p_s = {p.sealed_pressure:g} MPa, U = {sign * p.speeds[0]:+g} mm/s"]
     lines += [
-        f"  {name} = {value:.8g}{unit}: {target.quantity} = {step.quantity:.5g} {_of(target)}"
+        f"  {name} = {value:.8g}{unit}: {target.told(step.quantity)}"
         for step, value in zip(steps, values, strict=True)
     ]
     moved = 100.0 * (values[-1] / values[0] - 1.0)
@@ -198,7 +186,3 @@ def told(design: Design) -> list[str]:
         before, after = (decided.value(design.at(step.value)) for step in (first, last))
         lines.append(f"{decided.name} from {before:.5g} to {after:.5g} mm")
     return lines
-
-
-def _of(target: Target) -> str:
-    return CALLED[target.quantity][1]
