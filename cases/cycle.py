@@ -1,7 +1,7 @@
 """The O-ring on a rod that goes to and fro: film, friction and leakage in time, cycle by cycle."""
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from math import isfinite, nan, pi
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -16,7 +16,7 @@ from softehl.cases.harness.parameters import key
 from softehl.cases.harness.pictures import KINDS, draw_columns, save
 from softehl.cases.harness.report.part import FinishedRun, Part
 from softehl.cases.harness.row import OK, Row, column
-from softehl.cases.seal.cycle.motion import Motion, motion_keys, motion_of
+from softehl.cases.seal.cycle.motion import Motion, motion_keys
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import MIXED
 from softehl.cases.seal.gland.told import assumed, foreword, warnings
@@ -99,12 +99,12 @@ class Cycle(Seal):
     @property
     def path(self) -> Motion:
         """The motion of the rod."""
-        return motion_of(
-            self.motion,
-            self.pressures or self.sealed_pressure,
-            *(self.travel, self.frequency),
-            self.ramp if self.shape == "trapezoidal" else None,
-        )
+        pressure = self.pressures or self.sealed_pressure
+        if self.motion is not None:
+            return Motion.of(self.motion, pressure)
+        if self.shape == "sine":
+            return Motion.sine(self.travel, self.frequency, pressure)
+        return Motion.trapezoid(self.travel, self.frequency, self.ramp, pressure)
 
 
 _OF_STEADY_FILMS = (
@@ -218,14 +218,8 @@ def cycle_tables(films: Any) -> list[dict[str, Array]]:
     """The friction loop with all readings, the film over time and place, where the next starts,
     and the outline of the section over time.
     """
-    names = asdict(films.readings[0])
-    loop = {n: np.array([getattr(r, n) for r in films.readings], dtype=float) for n in names}
-    return [loop, joined(films.films), films.end, joined(films.outlines)]
-
-
-def joined(tables: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
-    """Tables of the same columns in one."""
-    return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+    loop, film, outline = films.tables.values()
+    return [loop, film, films.end, outline]
 
 
 class CycleCase(Case[Cycle, CycleRow]):

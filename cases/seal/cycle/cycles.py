@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from softehl.cases.harness.observer import Observer, Outcome
 from softehl.cases.seal.cycle.motion import Motion
-from softehl.cases.seal.cycle.restart import (
-    drafted,
-    leave_films,
-    packed,
-    readings,
-    taken_up,
-    unpacked,
-)
+from softehl.cases.seal.cycle.restart import drafted, packed, repeated, taken_up, unpacked
 from softehl.cases.seal.cycle.transient import Instant, March, Reading
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.gland.parameters import Seal
@@ -27,6 +20,7 @@ from softehl.cases.seal.solve.films import NoFilm
 from softehl.cases.seal.solve.method import DryContact
 from softehl.cases.seal.solve.path import StageError
 from softehl.cases.seal.solve.remedies import explained
+from softehl.cases.seal.solve.squeeze_film import film_layer
 from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import Condenser
@@ -38,7 +32,6 @@ OUTLINES = 48
 
 BETWEEN_DRAFTS = 2.0
 """Seconds of work that are lost at most where a run is killed within a cycle."""
-
 
 _STALE = 0.1
 """See `SchurCorrector`: many films follow each other, and 0.35 takes a quarter more time."""
@@ -52,9 +45,21 @@ class Films:
     """
 
     readings: list[Reading] = field(default_factory=list)
-    films: list[dict[str, Array]] = field(default_factory=list)
-    outlines: list[dict[str, Array]] = field(default_factory=list)
+    films: list[Mapping[str, Array]] = field(default_factory=list)
+    outlines: list[Mapping[str, Array]] = field(default_factory=list)
     end: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def tables(self) -> dict[str, dict[str, Array]]:
+        """All readings, and film and outline over time and place: name -> column -> values."""
+        rows = [asdict(reading) for reading in self.readings]
+        loop = {name: np.array([row[name] for row in rows], dtype=float) for name in rows[0]}
+        return {"loop": loop, "film": joined(self.films), "outline": joined(self.outlines)}
+
+
+def joined(tables: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+    """Tables of the same columns in one."""
+    return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
 
 
 Log = Callable[[int, Films, Reading, Any], Any]
@@ -76,14 +81,14 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
         return _outcome(p, Status.MAX_ITERATIONS, words)
     corrector = replace(film_corrector(p, linear), stale=_STALE)
     march = March(
-        *(begun.system, motion, begun.loads, corrector),
+        *(begun.system, motion, begun.loads, corrector, film_layer(begun.system, begun.x)),
         tolerance=parameters.time_tolerance,
         order=parameters.time_order,
         returned=parameters.supply == "returned",
     )
     stuck = _cycles(march, begun.x, parameters.cycles, observer, log)
     if stuck is not None:
-        return _outcome(p, stuck.status, stuck.message)
+        return _outcome(p, stuck.status, march.stuck)
     return _outcome(p, Status.CONVERGED, "all cycles")
 
 
@@ -92,10 +97,8 @@ def _cycles(march: March, x: Array, count: int, observer: Observer, log: Log) ->
     before, done, last = march.begin(x), 0, None
     while (kept := observer.kept(float(done + 1))) is not None:
         last, (loop, _, state, _) = kept
-        past = readings(loop)
-        leave_films(march, past)
+        before, done = repeated(march, loop)[-1], done + 1
         unpacked(march, state)
-        before, done = past[-1], done + 1
     for number in range(done + 1, count + 1):
         films, branch = _cycle(march, number, observer)
         if not branch.converged:
@@ -112,8 +115,8 @@ def _cycle(march: March, number: int, observer: Observer) -> tuple[Films, Branch
     march.corrector = replace(march.corrector, tangent=StaleTangent())
     observer.stage(f"cycle {number}", title=f"cycle {number}", where={})
     if (draft := observer.drafted(key)) is not None:
-        films.readings, tables = taken_up(march, draft)
-        films.films, films.outlines = [tables["film"]], [tables["outline"]]
+        tables = taken_up(march, draft)
+        films = Films(repeated(march, tables["loop"]), [tables["film"]], [tables["outline"]])
 
     def told(instant: Instant, reading: Reading) -> None:
         nonlocal saved
@@ -122,8 +125,7 @@ def _cycle(march: March, number: int, observer: Observer) -> tuple[Films, Branch
         if not films.outlines or instant.t - films.outlines[-1]["t_s"][-1] >= period / OUTLINES:
             films.outlines.append(_outline(march, instant))
         if time.monotonic() - saved > BETWEEN_DRAFTS:
-            tables = {"film": films.films, "outline": films.outlines}
-            observer.draft(key, drafted(march, films.readings, tables))
+            observer.draft(key, drafted(march, films.tables))
             saved = time.monotonic()
         observer.step(
             label="t",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from math import pi
 from pathlib import Path
@@ -24,7 +24,7 @@ class Table:
     values: tuple[float, ...]
 
     @classmethod
-    def of(cls, rows: Sequence[Sequence[float]]) -> Table:
+    def of(cls, rows: Rows) -> Table:
         """From rows (time, value).  ValueError for times that do not rise from 0."""
         times, values = (tuple(float(v) for v in column) for column in zip(*rows, strict=True))
         if times[0] != 0.0 or len(times) < 2 or not np.all(np.diff(times) > 0.0):
@@ -52,6 +52,17 @@ class Table:
         return max(abs(v) for v in self.values)
 
 
+Rows = Sequence[Sequence[float]]
+"""Times and values of a table."""
+
+
+def _repeated(pressure: Rows | float, period: float) -> Table:
+    """A pressure over time from its rows, or one that is the same all the time.  ValueError."""
+    if isinstance(pressure, int | float):
+        return Table.of([(0.0, pressure), (period, pressure)])
+    return Table.of(pressure)
+
+
 @dataclass(frozen=True)
 class Motion:
     """A rod that moves at U(t), mm/s, + to the air side, under p_s(t), MPa.
@@ -64,23 +75,31 @@ class Motion:
     corners: bool = True
 
     @classmethod
-    def sine(cls, stroke: float, frequency: float, pressure: float) -> Motion:
+    def sine(cls, stroke: float, frequency: float, pressure: Rows | float) -> Motion:
         """U = pi f S cos(2 pi f t): the rod starts in the middle of its way, at outstroke.
 
         Straight between 241 times: right to 1e-4 of the largest speed.
         """
         t = np.linspace(0.0, 1.0 / frequency, 241)
         speed = pi * frequency * stroke * np.cos(2.0 * pi * frequency * t)
-        return cls(Table(tuple(t), tuple(speed)), _constant(pressure, 1.0 / frequency), False)
+        return cls(Table(tuple(t), tuple(speed)), _repeated(pressure, 1.0 / frequency), False)
 
     @classmethod
-    def trapezoid(cls, stroke: float, frequency: float, ramp: float, pressure: float) -> Motion:
+    def trapezoid(
+        cls, stroke: float, frequency: float, ramp: float, pressure: Rows | float
+    ) -> Motion:
         """Constant speeds with ramps of a share of the period each, from the middle of a way."""
         T = 1.0 / frequency
         U = stroke / (T * 0.5 * (1.0 - ramp))
         shares = (0.0, 0.25 - ramp / 2, 0.25 + ramp / 2, 0.75 - ramp / 2, 0.75 + ramp / 2, 1.0)
         values = (U, U, -U, -U, U, U)
-        return cls(Table(tuple(T * s for s in shares), values), _constant(pressure, T))
+        return cls(Table(tuple(T * s for s in shares), values), _repeated(pressure, T))
+
+    @classmethod
+    def of(cls, rows: Rows, pressure: Rows | float) -> Motion:
+        """From rows (time, speed).  ValueError."""
+        speed = Table.of(rows)
+        return cls(speed, _repeated(pressure, speed.period))
 
     @property
     def period(self) -> float:
@@ -118,10 +137,6 @@ class Motion:
     @cached_property
     def _way(self) -> BSpline:
         return make_interp_spline(self.speed.times, self.speed.values, k=1).antiderivative()
-
-
-def _constant(value: float, period: float) -> Table:
-    return Table((0.0, period), (value, value))
 
 
 @dataclass
@@ -167,27 +182,6 @@ def motion_keys(given: dict[str, Any]) -> dict[str, Any]:
             raise ValueError(f"motion = {motion!r}: no CSV with t_s, U_mm_s ({error})") from None
         return {**given, "motion": rows}
     return given
-
-
-def motion_of(
-    rows: Sequence[Sequence[float]] | None,
-    pressure: Sequence[Sequence[float]] | float,
-    travel: float,
-    frequency: float,
-    ramp: float | None,
-) -> Motion:
-    """A motion from a table, or by travel (mm), frequency (1/s) and shape.  ValueError."""
-    constant = pressure if isinstance(pressure, (int, float)) else 0.0
-    if rows is not None:
-        speed = Table.of(rows)
-        motion = Motion(speed, _constant(constant, speed.period))
-    elif ramp is None:
-        motion = Motion.sine(travel, frequency, constant)
-    else:
-        motion = Motion.trapezoid(travel, frequency, ramp, constant)
-    if isinstance(pressure, (int, float)):
-        return motion
-    return replace(motion, pressure=Table.of(pressure))
 
 
 def missing(supply: float, outer: float, inner: float, order: int) -> float:

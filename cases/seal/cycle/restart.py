@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields, replace
+from collections.abc import Mapping
+from dataclasses import fields
 
 import numpy as np
 
-from softehl.cases.seal.cycle.transient import March, Reading
+from softehl.cases.seal.cycle.transient import Instant, March, Reading
 from softehl.runtime.arrays import Array
 
 STEP = "next_step_s"
 """Column of the step that comes next, the same in every line."""
+
+Tables = Mapping[str, Mapping[str, Array]]
+"""Name of a table -> column -> values (n,)."""
 
 
 def packed(march: March) -> dict[str, Array]:
@@ -29,81 +32,50 @@ def packed(march: March) -> dict[str, Array]:
 
 def unpacked(march: March, table: Mapping[str, Array]) -> None:
     """Put a march where `packed` took it; it has begun.  ValueError for another mesh."""
-    begun = march.behind[0]
-    shape, size = begun.content.shape, len(begun.x)
-    length = 6 + begun.content.size + size
+    content = march.behind[0].content
+    length = 6 + content.size + len(march.behind[0].x)
     if len(table[STEP]) != length:
         raise ValueError(f"a state of {len(table[STEP])} numbers does not fit {length}")
-    names = sorted(name for name in table if name != STEP)
-    march.behind = [
-        replace(
-            begun,
-            t=float(column[0]),
-            held=float(column[1]),
-            fluxes=column[2:4],
-            volumes=column[4:6],
-            content=column[6:-size].reshape(shape),
-            x=column[-size:],
-        )
-        for column in (table[name] for name in names)
-    ]
-    march.dt = float(table[STEP][0])
+    ends = 2, 4, 6, 6 + content.size
+    behind = []
+    for name in sorted(name for name in table if name != STEP):
+        (t, held), fluxes, volumes, filled, x = np.split(table[name], ends)
+        filled = filled.reshape(content.shape)
+        behind.append(Instant(float(t), x, filled, float(held), fluxes, volumes))
+    march.behind, march.dt = behind, float(table[STEP][0])
 
 
-def readings(loop: Mapping[str, Array]) -> list[Reading]:
-    """The readings of a cycle from its table."""
+def repeated(march: March, loop: Mapping[str, Array]) -> list[Reading]:
+    """The readings of a cycle from its table; what its outstrokes left is on the rod again."""
     names = [field.name for field in fields(Reading)]
     rows = zip(*(loop[name].tolist() for name in names), strict=True)
-    return [Reading(**dict(zip(names, row, strict=True))) for row in rows]
-
-
-def leave_films(march: March, past: list[Reading]) -> None:
-    """Put what these outstrokes left back on the rod."""
+    past = [Reading(*row) for row in rows]
     for reading in past:
-        left = march.left(reading)
-        if left is not None:
-            march.rod.leave(reading.place_mm, left)
+        march.leave(reading)
+    return past
 
 
-def drafted(
-    march: March, past: Sequence[Reading], parts: Mapping[str, Sequence[Mapping[str, Array]]]
-) -> dict[str, Array]:
-    """A cycle in the middle of it: its readings so far, the march and its tangent.
-
-    parts: name -> tables of the same columns that are kept as one.
-    """
-    tangent, loop = march.corrector.tangent, [asdict(reading) for reading in past]
+def drafted(march: March, cycle: Tables) -> dict[str, Array]:
+    """A cycle in the middle of it: its tables so far, the march and its tangent."""
+    tangent = march.corrector.tangent
     assert tangent.state is not None
     assert tangent.accepted is not None
-    tables = {
-        "loop": {name: np.array([r[name] for r in loop], dtype=float) for name in loop[0]},
-        **{
-            part: {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
-            for part, tables in parts.items()
-        },
-        "march": packed(march),
-        "tangent": {
-            "state": tangent.state,
-            "accepted": tangent.accepted,
-            "numbers": np.array([march.condensed_at, float(tangent.outdated)]),
-        },
-    }
+    numbers = np.array([march.condensed_at, float(tangent.outdated)])
+    held = {"state": tangent.state, "accepted": tangent.accepted, "numbers": numbers}
+    tables: Tables = {**cycle, "march": packed(march), "tangent": held}
     return {f"{t}/{name}": column for t, table in tables.items() for name, column in table.items()}
 
 
-def taken_up(
-    march: March, arrays: Mapping[str, Array]
-) -> tuple[list[Reading], Mapping[str, dict[str, Array]]]:
-    """Put a march where `drafted` took it; the readings and the tables of the cycle so far."""
+def taken_up(march: March, arrays: Mapping[str, Array]) -> Tables:
+    """Put a march where `drafted` took it; the tables of the cycle so far."""
     tables: dict[str, dict[str, Array]] = {}
     for name, column in arrays.items():
         table, _, own = name.partition("/")
         tables.setdefault(table, {})[own] = column
     unpacked(march, tables["march"])
-    past, tangent = readings(tables["loop"]), tables["tangent"]
-    leave_films(march, past)
+    tangent = tables["tangent"]
     t, outdated = tangent["numbers"].tolist()
     march.condense(t, tangent["state"])
     march.corrector.tangent.accepted = tangent["accepted"]
     march.corrector.tangent.outdated = bool(outdated)
-    return past, tables
+    return tables

@@ -17,7 +17,6 @@ from softehl.cases.seal.cycle.motion import Motion, RodFilm, missing
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.system import FILM, PRESSURE, SQUEEZE
-from softehl.cases.seal.solve.squeeze_film import film_layer
 from softehl.cases.seal.states.results import rough_numbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.layered import Layer, Layered
@@ -84,51 +83,54 @@ class March(Way):
 
     film: loads that do not change. tolerance: error of the film thickness, relative to it, that a
     step aims at. order: 1 is backward Euler, 2 is BDF2. returned: whether the instroke finds what
-    the outstroke left.
-    condensed_at: time of the problem whose body the corrector's tangent has condensed, s.
+    the outstroke left. layer: of the film, near its first state. condensed_at: time of the problem
+    whose body the corrector's tangent has condensed, s.
     """
 
     system: SealSystem
     motion: Motion
     film: FilmLoads
     corrector: SchurCorrector
-    tolerance: float = 0.02
-    order: int = 2
-    returned: bool = False
+    layer: Layer
+    tolerance: float
+    order: int
+    returned: bool
     rod: RodFilm = field(default_factory=lambda: RodFilm([], []))
     behind: list[Instant] = field(default_factory=list)
     dt: float = 0.0
     condensed_at: float = 0.0
     goal: float = 0.0
     told: Callable[[Instant, Reading], None] = lambda instant, reading: None
-    _layer: Layer | None = None
 
-    def begin(self, x: Array, t: float = 0.0) -> Reading:
-        """From the steady film x (n,) at a time; its reading."""
+    def begin(self, x: Array) -> Reading:
+        """From the steady film x (n,) at t = 0; its reading."""
         self.dt = 1e-3 * self.motion.period
-        film = self._loads(t)
+        film = self._loads(0.0)
         problem = self.system.film_problem(film)
-        first = Instant(t, x, *self._content(x), self._fluxes(problem, x), np.zeros(2))
+        first = Instant(0.0, x, *self._content(x), self._fluxes(problem, x), np.zeros(2))
         self.behind = [first]
-        self._layer = film_layer(self.system, x)
         return self._reading(problem, film, first, 0)
 
     def until(self, goal: float, on_step: Callable[[Instant, Reading], None]) -> Branch:
         """March to a time; every step is told."""
         self.goal, self.told = goal, on_step
         smallest = 1e-8 * self.motion.period
-        branch = followed(self, StepRule(max(self.dt, smallest), smallest), Record("t"))
-        return branch if branch.converged else replace(branch, message=self._stuck())
+        return followed(self, StepRule(max(self.dt, smallest), smallest), Record("t"))
 
     def left(self, reading: Reading) -> float | None:
         """Film (mm) that an outstroke leaves on the rod, None at instroke."""
         U = reading.rod_speed_mm_s
         return 2.0 * reading.flux_air_mm2_s / U if U > 0.0 else None
 
+    def leave(self, reading: Reading) -> None:
+        """Put what an outstroke leaves on the rod."""
+        left = self.left(reading)
+        if left is not None:
+            self.rod.leave(reading.place_mm, left)
+
     def condense(self, t: float, state: Array) -> None:
         """Condense the section at a state (n,) as the problem of a time has it."""
-        assert self._layer is not None
-        body = Layered(self.system.film_problem(self._loads(t)), self._layer)
+        body = Layered(self.system.film_problem(self._loads(t)), self.layer)
         self.corrector.tangent.renew(self.corrector.linear, body, state)
         self.condensed_at = t
 
@@ -174,9 +176,7 @@ class March(Way):
         instant = self._instant(trial.problem, trial.solution.x, trial.taken)
         reading = self._reading(trial.problem, trial.film, instant, trial.solution.iterations)
         self.behind, self.dt = [instant, *self.behind[:2]], trial.following
-        left = self.left(reading)
-        if left is not None:
-            self.rod.leave(reading.place_mm, left)
+        self.leave(reading)
         self.told(instant, reading)
 
     def end(self) -> End | None:
@@ -185,7 +185,8 @@ class March(Way):
         going = now < self.goal * (1.0 - 1e-12)
         return None if going else (Status.CONVERGED, f"reached t = {now:.9g}")
 
-    def _stuck(self) -> str:
+    @property
+    def stuck(self) -> str:
         """From when on there is no step, and what may help."""
         now = self.behind[0]
         least = 1e3 * float(self.system.arc_film(now.x)[1].min())
@@ -222,15 +223,14 @@ class March(Way):
         content = sum(w * i.content for w, i in past)
         arc = self.system.mesh.arc_segments
         moved = sum(w * self.system.displacements(i.x)[arc, 0] for w, i in past)
-        layer = self._layer
-        assert layer is not None, "begin() comes first"
         assemblers = [
             a.with_data(FILM, data=np.ascontiguousarray(moved)).with_data(
                 SQUEEZE, point_data=np.ascontiguousarray(content)[:, :, None]
             )
-            for a in (problem.assembler, layer.assembler)
+            for a in (problem.assembler, self.layer.assembler)
         ]
-        return replace(problem, assembler=assemblers[0]), replace(layer, assembler=assemblers[1])
+        layer = replace(self.layer, assembler=assemblers[1])
+        return replace(problem, assembler=assemblers[0]), layer
 
     def _differences(self, dt: float) -> tuple[float, list[tuple[float, Instant]]]:
         """Weights of d/dt at the end of a step: its own, those of the instants before."""

@@ -68,7 +68,7 @@ class Target:
 
     @property
     def words(self) -> str:
-        """What a reader calls the quantity."""
+        """Name of the quantity for readers."""
         return CALLED[self.quantity][0]
 
     @property
@@ -99,7 +99,7 @@ class Lever:
 
     @property
     def words(self) -> str:
-        """What a reader calls it."""
+        """Its name for readers."""
         return self.name.replace("_", " ")
 
     @property
