@@ -154,24 +154,24 @@ def changed(p: Seal, wrong: str, **keys: Any) -> Seal:
         raise NoDesignError(f"{wrong}: {reason}") from None
 
 
-def designed(
-    p: Seal,
-    target: Target,
-    by: Lever,
-    solve: Callable[[Seal], FilmState | None],
-    hold: Callable[[Seal], Change | None],
-) -> list[Step]:
+Film = tuple[FilmState, Change]
+"""A film with its sensitivities, and how it changes on its mesh with the key of a target."""
+
+Solve = Callable[[Seal], Film | None]
+"""The one film of a case, None where there is none."""
+
+
+def designed(p: Seal, target: Target, by: Lever, solve: Solve) -> list[Step]:
     """Steps to the value of the key of a lever that meets the target; the last one does.
 
-    solve: the one film of a case with its sensitivities, None where there is none. hold: how its
-    quantity changes with the key on its mesh. Raises NoDesignError.
+    Raises NoDesignError.
     """
-    key, called = by.key, p.called(by.key)
-    state, value = _film(p, by, solve), float(getattr(p, key))
-    wanted = target.factor * value_of(state, target.quantity)
+    called, value = p.called(by.key), float(getattr(p, by.key))
+    state, _ = _film(p, by, solve)
     steps = [Step(value, value_of(state, target.quantity), state)]
+    wanted = target.factor * steps[0].quantity
     for _ in range(STEPS):
-        slope = slope_of(state, target.quantity, key)
+        slope = slope_of(state, target.quantity, by.key)
         way = math.log(wanted / steps[-1].quantity)
         if abs(way) > 0.5 * abs(slope):  # the key would change by more than half
             raise NoDesignError(
@@ -180,50 +180,45 @@ def designed(
                 "influence)"
             )
         value *= math.exp(way / slope)
-        near = changed(p, f"the target needs a {called} that a case cannot have", **{key: value})
-        state = _film(near, by, solve)
+        wrong = f"the target needs a {called} that a case cannot have"
+        near = changed(p, wrong, **{by.key: value})
+        state, change = _film(near, by, solve)
         steps.append(Step(value, value_of(state, target.quantity), state))
         if abs(steps[-1].quantity / wanted - 1.0) <= TOLERANCE:
             missed = f"near {by.told(near)} no value gives {target.told(wanted)} on one mesh"
-            return [*steps, *settled(steps[-1], wanted, slope, hold(near), missed)]
+            return [*steps, *settled(steps[-1], wanted, slope, change, missed)]
     raise NoDesignError(
         f"{target.told(steps[-1].quantity)} after {STEPS} solves, wanted was {wanted:.5g}: ask for "
         "a smaller change"
     )
 
 
-def settled(
-    near: Step, wanted: float, slope: float, change: Change | None, missed: str
-) -> list[Step]:
+def settled(near: Step, wanted: float, slope: float, change: Change, missed: str) -> list[Step]:
     """Steps on the mesh of `near`, until the quantity is what was wanted, to `SETTLED`.
 
     slope: d log quantity / d log key. missed: words of the NoDesignError where it is not reached.
     """
-    steps, lost = [near], change is None
-    while change and abs(steps[-1].quantity / wanted - 1.0) > SETTLED and len(steps) <= STEPS:
-        value = steps[-1].value * (wanted / steps[-1].quantity) ** (1.0 / slope)
+    steps, rise = [near], slope
+    advice = "use a larger density, or ask for another change"
+    while abs(steps[-1].quantity / wanted - 1.0) > SETTLED:
+        if rise * slope <= 0.0 or len(steps) > STEPS:
+            raise NoDesignError(f"{missed}: the film is at a kink; {advice}")
+        last = steps[-1]
+        value = last.value * (wanted / last.quantity) ** (1.0 / rise)
         found = change(value / near.value)
         if found is None:
-            lost = True
-            break
-        step = Step(value, near.quantity * found)
-        rise = math.log(step.quantity / steps[-1].quantity) / math.log(value / steps[-1].value)
-        steps.append(step)
-        if rise * slope <= 0.0:
-            break
-        slope = rise
-    if abs(steps[-1].quantity / wanted - 1.0) > SETTLED:
-        why = "no film is found on the way" if lost else "the film is at a kink"
-        raise NoDesignError(f"{missed}: {why}; use a larger density, or ask for another change")
+            raise NoDesignError(f"{missed}: no film is found on the way; {advice}")
+        steps.append(Step(value, near.quantity * found))
+        rise = math.log(steps[-1].quantity / last.quantity) / math.log(value / last.value)
     return steps[1:]
 
 
-def _film(p: Seal, by: Lever, solve: Callable[[Seal], FilmState | None]) -> FilmState:
-    state = solve(p)
-    if state is None or not differentiable(state) or state.sensitivity is None:
-        verdict = "did not converge" if state is None else f"has the verdict {state.verdict}"
+def _film(p: Seal, by: Lever, solve: Solve) -> Film:
+    film = solve(p)
+    if film is None or not differentiable(film[0]) or film[0].sensitivity is None:
+        verdict = "did not converge" if film is None else f"has the verdict {film[0].verdict}"
         raise NoDesignError(
             f"with {by.told(p)} the film {verdict}: no sensitivities of it; use a "
             "larger density, or ask for a smaller change"
         )
-    return state
+    return film

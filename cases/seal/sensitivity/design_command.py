@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.seal.gland.fitting import DIAMETERS
@@ -13,7 +13,7 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.varied import BASES, NUMBERS, PRESSURE_KEY
 from softehl.cases.seal.sensitivity.design import (
     SETTLED,
-    Change,
+    Film,
     Lever,
     Step,
     Target,
@@ -93,17 +93,12 @@ def design_case(p: Seal, target: str, key: str, observer: Observer | None = None
         raise BadInput(f"--by {base}{hint}: allowed: {', '.join([*known, *BASES])}")
     p = _one_film(p)
     by, wanted = Lever(asked if asked in BASES else p.called(base), base), Target.of(target)
-    film_of = lru_cache(maxsize=1)(partial(HeldFilm.of, observer=observer or Silent()))
 
-    def solve(q: Seal) -> FilmState | None:
-        film = film_of(q)
-        return film.state if film else None
+    def solve(q: Seal) -> Film | None:
+        film = HeldFilm.of(q, observer or Silent())
+        return (film.state, partial(film.change, wanted.quantity, base)) if film else None
 
-    def hold(q: Seal) -> Change | None:
-        film = film_of(q)
-        return partial(film.change, wanted.quantity, base) if film else None
-
-    return Design(p, wanted, by, designed(p, wanted, by, solve, hold))
+    return Design(p, wanted, by, designed(p, wanted, by, solve))
 
 
 def _one_film(p: Seal) -> Seal:
