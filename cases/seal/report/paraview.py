@@ -12,6 +12,7 @@ import numpy as np
 
 from softehl.cases.harness.files import Cells, write_content
 from softehl.cases.seal.states.state import FilmRow
+from softehl.runtime.arrays import Array
 from softehl.runtime.io import write_pvd
 
 if TYPE_CHECKING:
@@ -33,21 +34,8 @@ def write_paraview(p: Gland, folder: Path, rows: Sequence[FilmRow]) -> None:
 
 
 def gland_outlines(p: Gland) -> Cells:
-    """Lines of the rod, the groove and the housing beside it, as they are modelled; part: which.
-
-    The walls end at the rod, and where there is an extrusion gap, in the fillet at its edge.
-    """
-    rod, housing = 0.5 * p.rod_diameter, 0.5 * p.housing_diameter
-    start, end = p.sealed_wall, p.air_wall
-    left, right = start - p.section_diameter, end + p.section_diameter
-    top, edge = housing + p.section_diameter, _edge(p, end, rod)
-    foot = [start, rod]
-    outside = [foot, [left, rod], [left, top], [right, top], [right, edge[-1][1]], edge[-1]]
-    lines = (
-        [[left, rod], [right, rod]],
-        [foot, [start, housing], [end, housing], *edge],
-        outside,
-    )
+    """Lines of the gland; part: which of `PARTS`."""
+    lines = gland_lines(p)
     first = np.cumsum([0, *map(len, lines)])
     pieces = [np.arange(a, b - 1) for a, b in pairwise(first.tolist())]
     nodes = np.concatenate(pieces)
@@ -55,12 +43,23 @@ def gland_outlines(p: Gland) -> Cells:
     return Cells(np.concatenate(lines), np.stack([nodes, nodes + 1], axis=1), {}, {"part": part})
 
 
-def _edge(p: Gland, wall: float, rod: float) -> list[list[float]]:
-    """Points of the end of the air wall, from the wall on: at the rod, or the fillet."""
-    if not p.opens:
-        return [[wall, rod]]
-    fillet, lip = p.corner_fillet, rod + p.extrusion_gap
-    angles = np.linspace(0.0, 0.5 * pi, 17)
-    across, up = wall + fillet * (1.0 - np.cos(angles)), lip + fillet * (1.0 - np.sin(angles))
-    edge: list[list[float]] = np.stack([across, up], axis=1).tolist()
-    return edge
+def gland_lines(p: Gland, clearance: float = 0.0) -> tuple[Array, Array, Array]:
+    """Points (n, 2) of the rod, the groove and the housing beside it, as they are modelled.
+
+    The walls end so much above the rod, mm; that of the air side in the fillet at its edge where
+    there is an extrusion gap.
+    """
+    size, rod, housing = p.section_diameter, 0.5 * p.rod_diameter, 0.5 * p.housing_diameter
+    start, end = p.sealed_wall, p.air_wall
+    left, right, top, lip = start - size, end + size, housing + size, rod + clearance
+    foot, edge = np.array([[start, lip]]), np.array([[end, lip]])
+    if p.opens:
+        angles = np.linspace(0.0, 0.5 * pi, 17)
+        around = 1.0 - np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        edge = [end, rod + p.extrusion_gap] + p.corner_fillet * around
+    beside = [[left, lip], [left, top], [right, top], [right, edge[-1, 1]]]
+    return (
+        np.array([[left, rod], [right, rod]]),
+        np.concatenate([foot, [[start, housing], [end, housing]], edge]),
+        np.concatenate([foot, beside, edge[-1:]]),
+    )

@@ -18,6 +18,7 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.free_seal import FreeSeal
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.report import style
+from softehl.cases.seal.report.paraview import gland_lines
 from softehl.cases.seal.states.observer_adapter import read_profile, read_section
 from softehl.cases.seal.states.state import FilmRow, Profile, Section
 from softehl.runtime.arrays import Array, Integers
@@ -113,24 +114,21 @@ def draw_view(axes: Axes, p: Seal, view: View, scale: Scale) -> TriContourSet:
 def draw_gland(axes: Axes, p: Seal, middle: float | None = None) -> None:
     """Rod, housing with its walls, and the fluid on the sealed side; limits of the picture.
 
-    The walls, which have no end in the model, end just above the rod. middle: where the seal
-    touches the rod and hides the end of the fluid, mm; that of the groove.
+    Walls that have no end in the model end just above the rod. middle: where the seal touches the
+    rod and hides the end of the fluid, mm; that of the groove.
     """
     size, rod, housing = p.section_diameter, 0.5 * p.rod_diameter, 0.5 * p.housing_diameter
-    lip, around = rod + 0.06 * size, _AROUND * size
-    start, end = p.sealed_wall, p.air_wall
-    left, right, bottom, top = start - size, end + size, rod - size, housing + size  # out of sight
+    line, groove, beside = gland_lines(p, clearance=0.06 * size)
+    around = _AROUND * size
     if p.sealed_pressure:
         edge = p.groove_centre if middle is None else middle
+        left = line[0, 0]
         axes.fill([left, edge, edge, left], [rod, rod, housing, housing], color=_FLUID, lw=0)
     metal: Any = {"facecolor": _METAL, "edgecolor": _LINE, "linewidth": 0.9}
-    axes.fill([left, right, right, left], [bottom, bottom, rod, rod], **metal)
-    axes.fill(
-        [left, start, start, end, end, right, right, left],
-        [lip, lip, housing, housing, lip, lip, top, top],
-        **metal,
-    )
-    axes.set(xlim=(start - around, end + around), ylim=(rod - around, housing + around))
+    axes.fill(*np.concatenate([line, line[::-1] - [0.0, size]]).T, **metal)
+    axes.fill(*np.concatenate([groove, beside[::-1]]).T, **metal)
+    sides = p.sealed_wall - around, p.air_wall + around
+    axes.set(xlim=sides, ylim=(rod - around, housing + around))
     axes.set_aspect("equal")
     axes.grid(visible=False)
 
