@@ -232,7 +232,7 @@ def _drawing(run: Run) -> str:
 def _told(run: Run) -> str:
     """Fit, warnings and what is assumed of a run, as the command line has them."""
     case, p = run.case, run.parameters
-    fits = [f"{name} {value:.4g} {unit}" for name, value, unit in fit_numbers(p)]
+    fits = [f"{name} {value:.4g} {unit}" for name, (value, unit) in fit_numbers(p).items()]
     words = [*case.warnings(p), *case.foreword(p)]
     if assumed := case.assumed(p, run.given):
         words.append(f"assumed: {', '.join(assumed)}")

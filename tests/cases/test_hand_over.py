@@ -11,6 +11,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.report.part import FinishedRun
+from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.report.hand_over import (
     BLOCKS,
@@ -45,7 +46,7 @@ def run(pressure: float, law: FrictionLaw, speeds: tuple[float, ...] = SPEEDS) -
         )
         for u in speeds
     ]
-    case = SimpleNamespace(titled=lambda _: "a seal")
+    case = SimpleNamespace(titled=lambda _: "a seal", selection=CASE.selection)
     return FinishedRun(Path("run"), case, Seal(sealed_pressure=pressure), rows)
 
 

@@ -18,14 +18,17 @@ from matplotlib.patches import Polygon
 from PIL.Image import Image, fromarray
 
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.gland.surfaces import MICROMETRE
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.section import draw_gland
+from softehl.cases.seal.states.contacts import CONTACT_FILM
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import replacing
 
 Columns = Mapping[str, Array]
 
-_THICKEST = 20.0  # um, of the film that is shown
+_THICKEST = CONTACT_FILM / MICROMETRE
+"""Film thickness up to which a film is shown, um."""
 _PLACE = "place of the rod [mm]   (+ = to the air side)"
 
 

@@ -31,15 +31,15 @@ def gland_figure(p: Seal) -> Figure:
     return figure
 
 
-def fit_numbers(p: Seal) -> list[tuple[str, float, str]]:
-    """Fit of the ring in its gland: name, value, unit."""
-    return [
-        ("squeeze", p.squeeze_percent, "%"),
-        ("stretch", p.stretch_percent, "%"),
-        ("gland fill", p.fill_percent, "%"),
-        ("shear modulus of the rubber", p.shear_modulus, "MPa"),
-        ("viscosity of the oil", p.viscosity * 1e9, "mPa s"),
-    ]
+def fit_numbers(p: Seal) -> dict[str, tuple[float, str]]:
+    """Fit of the ring in its gland: name -> value, unit."""
+    return {
+        "squeeze": (p.squeeze_percent, "%"),
+        "stretch": (p.stretch_percent, "%"),
+        "gland fill": (p.fill_percent, "%"),
+        "shear modulus of the rubber": (p.shear_modulus, "MPa"),
+        "viscosity of the oil": (p.viscosity * 1e9, "mPa s"),
+    }
 
 
 def _measure(axes: Axes, start: style.Place, end: style.Place, length: float) -> None:

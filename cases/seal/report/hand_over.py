@@ -22,9 +22,6 @@ from softehl.runtime.io import write_csv, write_text
 
 FILES = ("seal.csv", "seal_modelica.txt", "cylinder_friction.txt")
 HEADER = ("sealed_pressure_MPa", "rod_speed_mm_s", "friction_N", "leakage_mm3_s")
-_MOTION = ("sealed_pressure", "speeds", "stroke", "travel", "tolerance", "solver", "linear")
-_LEAST = 5
-"""Films that a fit of a friction law needs: it has as many numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +132,7 @@ class FrictionLaw:
         """
         u, p = (a.ravel() for a in np.meshgrid(seal.speeds, seal.pressures, indexing="ij"))
         force = seal.friction.ravel()
-        if len(force) < _LEAST or len(set(np.abs(u))) < 2:
+        if len(force) < 5 or len(set(np.abs(u))) < 2:  # the law has as many numbers
             return None
         one = len(seal.pressures) == 1
 
@@ -180,7 +177,7 @@ def write_hand_over(folder: Path, runs: Sequence[FinishedRun]) -> list[str]:
     if seal.left_out:
         said.append(f"left out, as not every pressure has them: {seal.left_out}")
     if not laws:
-        said.append(f"no friction law: a fit needs {_LEAST} films at two speeds |U| or more")
+        said.append("no friction law: a fit needs 5 films at two speeds |U| or more")
     for name, law in laws.items():
         said.append(f"{name}: within {100.0 * law.misfit:.2g} % of every film")
     doubtful = sum(row.verdict != "ok" for run in runs for row in run.rows)
@@ -223,12 +220,12 @@ def friction_laws(seal: SealMap) -> dict[str, FrictionLaw]:
 
 def _require_one_seal(runs: Sequence[FinishedRun]) -> None:
     """Raises BadInput unless runs are of one seal but for its pressure and its motion."""
-    first = runs[0]
+    first, free = runs[0], {"sealed_pressure", *runs[0].case.selection}
     for run in runs:
         if type(run.parameters) is not Seal:
             raise BadInput(f"{run.folder} is no curve of a seal; allowed: runs of oring")
         one, other = first.parameters.settled(), run.parameters.settled()
-        differing = [k for k, v in one.items() if k not in _MOTION and other[k] != v]
+        differing = [k for k, v in one.items() if k not in free and other[k] != v]
         if differing:
             raise BadInput(
                 f"{first.folder} and {run.folder} differ in {', '.join(differing)}; allowed: runs "

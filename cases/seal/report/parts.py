@@ -7,6 +7,7 @@ from math import isfinite
 
 from softehl.cases.harness.earlier import advice_of
 from softehl.cases.harness.report.part import FinishedRun, Part, Picture, Table
+from softehl.cases.harness.responses import titled
 from softehl.cases.seal.gland.rubbers.hardness import shore_band
 from softehl.cases.seal.gland.tolerances import ToleranceRow, ring_sizes
 from softehl.cases.seal.gland.trade.oil_names import read_oil_name
@@ -32,8 +33,7 @@ def parts(runs: Sequence[FinishedRun]) -> list[Part]:
 def cycle_parts(runs: Sequence[FinishedRun]) -> list[Part]:
     """Cycles in numbers, the pictures that the runs have, the glands."""
     columns = [c for c in runs[0].case.row.columns() if c.head]
-    units = [f" [{c.unit}]" if c.unit else "" for c in columns]
-    heads = [c.meaning + unit for c, unit in zip(columns, units, strict=True)]
+    heads = [titled(c.meaning, c.unit) for c in columns]
     rows: list[Sequence[Cell]] = [
         (run.name, *(getattr(row, c.name) for c in columns), row.verdict)
         for run in runs
@@ -78,13 +78,12 @@ def gland(runs: Sequence[FinishedRun]) -> Part:
     pictures = pictures_of(runs, lambda run: gland_figure(run.parameters))
     numbers = [fit_numbers(run.parameters) for run in runs]
     rows: list[tuple[Cell, ...]] = [
-        (name, *(found[k][1] for found in numbers), unit)
-        for k, (name, _, unit) in enumerate(numbers[0])
+        (name, *(found[name][0] for found in numbers), unit)
+        for name, (_, unit) in numbers[0].items()
     ]
-    for run in runs:
-        contact = run.content.get("numbers") or {}
-        if contact.get("air_wall_N") is not None and len(runs) == 1:
-            rows.append(("force on the wall of the air side", -float(contact["air_wall_N"]), "N"))
+    force = (runs[0].content.get("numbers") or {}).get("air_wall_N")
+    if force is not None and len(runs) == 1:
+        rows.append(("force on the wall of the air side", -float(force), "N"))
     table = Table("How the ring sits", ("", *(run.name for run in runs), "unit"), rows)
     text = "The free section where it slides, and the gland it is pressed into; lengths in mm."
     return Part("Gland and ring", text, pictures=pictures, tables=[table])
@@ -148,15 +147,11 @@ def _leakage(runs: Sequence[FinishedRun]) -> list[Part]:
     """Leakage of a cycle, also for the travel of the run."""
     tables = []
     for run in runs:
-        rows = net_leakage(run.rows)
+        travel, titles, rows = run.parameters.travel, LeakageRow.titles(), net_leakage(run.rows)
+        cycle = f"net in a cycle of {travel:g} mm out and back [mm3]"
+        cells = [(*row.cells()[:2], travel * row.net_mm3_per_mm, *row.cells()[2:]) for row in rows]
         if rows:
-            travel = run.parameters.travel
-            header = list(LeakageRow.titles())
-            header.insert(2, f"net in a cycle of {travel:g} mm out and back [mm3]")
-            cells = [list(row.cells()) for row in rows]
-            for line, row in zip(cells, rows, strict=True):
-                line.insert(2, travel * row.net_mm3_per_mm)
-            tables.append(Table(run.name, header, cells))
+            tables.append(Table(run.name, (*titles[:2], cycle, *titles[2:]), cells))
     text = (
         "Out minus in; negative: the instroke could take back more than there is, dry on balance."
     )

@@ -14,9 +14,9 @@ def tornado_figure(head: str, slopes: Slopes) -> Figure:
 
     Of each quantity the ten keys that matter most.
     """
-    slowest = sorted((speed for speed, _ in slopes), key=abs)
-    first = {"out": [u for u in slowest if u > 0.0][:1], "in": [u for u in slowest if u < 0.0][:1]}
-    bars = [(stroke, u) for stroke, speeds in first.items() for u in speeds]
+    fast_first = sorted((speed for speed, _ in slopes), key=abs, reverse=True)
+    slowest = {"out" if u > 0.0 else "in": u for u in fast_first}
+    bars = [(stroke, slowest[stroke]) for stroke in style.STROKES if stroke in slowest]
     figure = Figure(figsize=(3.3 * len(SHOWN) + 1.2, 4.2))
     panels = figure.subplots(1, len(SHOWN))
     for axes, quantity in zip(panels, SHOWN, strict=True):
