@@ -207,13 +207,12 @@ def test_a_held_film_follows_a_key_further_than_one_solve() -> None:
     held_film = HeldFilm.of(P.model_copy(update={**ONE, "density": 1}), Silent())
     assert held_film is not None
     moved = held_film.case.scaled("rod_diameter", -0.003)
-    problem, quantity = moved.system.film_problem(moved.film), "friction"
+    problem, quantity = moved.problem, "friction"
     at_once = Newton(max_iterations=50).solve(problem, held_film.x)
     assert at_once.converged
     assert at_once.iterations > held_film.newton.max_iterations
-    here = held_film.case.system.film_problem(held_film.case.film)
-    before = quantities(held_film.case, here, held_film.x)[quantity].value
-    after = quantities(moved, problem, at_once.x)[quantity].value
+    before = quantities(held_film.case, held_film.x)[quantity].value
+    after = quantities(moved, at_once.x)[quantity].value
     changed = held_film.change(quantity, "rod_diameter", 0.997)
     assert changed == pytest.approx(after / before, rel=1e-7)
 

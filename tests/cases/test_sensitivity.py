@@ -90,16 +90,15 @@ def state(name: str) -> tuple[FilmCase, Array]:
 
 
 def solved(case: FilmCase, x: Array) -> Array:
-    solution = Newton(tolerance=1e-11, stagnation=1e3).solve(case.system.film_problem(case.film), x)
+    solution = Newton(tolerance=1e-11, stagnation=1e3).solve(case.problem, x)
     assert solution.converged, solution.message
     return solution.x
 
 
 def reported(case: FilmCase, x: Array) -> dict[str, float]:
     """What `film_state` reports."""
-    problem = case.system.film_problem(case.film)
-    numbers = film_numbers(case.system, problem, case.film, x)
-    state = film_state(case.system, problem, case.film, x, Verdict(1.0, last=numbers), 0)
+    numbers = film_numbers(case.system, case.problem, case.film, x)
+    state = film_state(case.system, case.problem, case.film, x, Verdict(1.0, last=numbers), 0)
     return {
         "h_star": numbers.h_star,
         "friction": numbers.friction,
@@ -112,7 +111,7 @@ def reported(case: FilmCase, x: Array) -> dict[str, float]:
 @cache
 def slopes(name: str) -> SLOPES:
     case, x = state(name)
-    return sensitivities(case.system, case.film, x, SuperLU(), rates_of(case.system, case.film))
+    return sensitivities(case, x, SuperLU(), rates_of(case))
 
 
 def differences(name: str, key: str) -> dict[str, float]:
@@ -144,13 +143,12 @@ def test_every_derivative_agrees_with_central_differences(name: str) -> None:
 def test_direct_and_adjoint_agree(name: str) -> None:
     """How the film moves with each parameter is solved for, instead of the adjoints."""
     case, x = state(name)
-    problem = case.system.film_problem(case.film)
-    tangent, found = Tangent.at(problem, x), quantities(case, problem, x)
-    for key, rate in rates_of(case.system, case.film).items():
+    tangent, found = Tangent.at(case.problem, x), quantities(case, x)
+    for key, rate in rates_of(case).items():
         dx = -SuperLU().factorise(tangent.reduced).solve(tangent.load(rate))
-        moved = fields_along(problem, x, rate, found.values())
+        moved = fields_along(case, x, rate, found.values())
         for quantity, q in found.items():
-            value = by_unknowns(case, problem, x, q) @ dx + along(problem, q, key, rate, moved)
+            value = by_unknowns(case, x, q) @ dx + along(case, q, key, rate, moved)
             assert slopes(name)[quantity][key] == pytest.approx(value, abs=1e-7, rel=1e-7)
 
 
@@ -176,13 +174,13 @@ def test_dimensions_are_kept(name: str) -> None:
 def test_dimensions_show_a_mesh_that_does_not_move() -> None:
     """The oracle itself: without the velocities of the nodes lengths do not add up."""
     case, x = state("out")
-    rates = rates_of(case.system, case.film)
+    rates = rates_of(case)
     still = {}
     for key, rate in rates.items():
         rows = {name: value.copy() for name, value in rate.blocks.items()}
         rows["solid"][:, :8] = 0.0
         still[key] = Inputs(rows, rate.values)
-    found = sensitivities(case.system, case.film, x, SuperLU(), still)
+    found = sensitivities(case, x, SuperLU(), still)
     assert abs(defects(found)["h_star length"]) > 1e-3
     wrong = {q: {**s, "mu_2": 1.01 * s["mu_2"]} for q, s in slopes("out").items()}
     assert abs(defects(wrong)["h_star stress"]) > 1e-5
@@ -190,11 +188,10 @@ def test_dimensions_show_a_mesh_that_does_not_move() -> None:
 
 def test_the_rates_of_one_speed_serve_another() -> None:
     case, x = state("out")
-    slower = replace(case.film, speed=0.9 * case.film.speed)
-    y = solved(FilmCase(case.system, slower), x)
-    known = rates_of(case.system, slower, rates_of(case.system, case.film))
-    new = rates_of(case.system, slower)
-    one, other = (sensitivities(case.system, slower, y, SuperLU(), r) for r in (known, new))
+    slower = case.scaled(SPEED, -0.1)
+    y = solved(slower, x)
+    known, new = rates_of(slower, rates_of(case)), rates_of(slower)
+    one, other = (sensitivities(slower, y, SuperLU(), r) for r in (known, new))
     for quantity in QUANTITIES:
         assert one[quantity] == pytest.approx(other[quantity], rel=1e-9, abs=1e-9)
 
@@ -202,7 +199,7 @@ def test_the_rates_of_one_speed_serve_another() -> None:
 def test_the_rates_of_one_stroke_serve_the_other() -> None:
     case, _ = state("out")
     inward = replace(case.film, stroke="in")
-    out, back = rates_of(case.system, case.film), rates_of(case.system, inward)
+    out, back = rates_of(case), rates_of(FilmCase(case.system, inward))
     for key in set(out) - {SPEED}:
         for name, rows in out[key].blocks.items():
             assert rows == pytest.approx(back[key].blocks[name], rel=1e-9, abs=1e-9)
@@ -225,8 +222,8 @@ def test_one_factorisation_serves_all_quantities_and_parameters() -> None:
     """And a kernel is called for a parameter only where this moves its elements."""
     case, x = state("in")
     counted, called = Counting(), Counter[str]()
-    rates = rates_of(case.system, case.film)
-    sensitivities(case.system, case.film, x, counted, rates)
+    rates = rates_of(case)
+    sensitivities(case, x, counted, rates)
     assert counted.made == 1
     for rate in rates.values():
         called.update(name for name, rows in rate.blocks.items() if rows.any())

@@ -26,7 +26,7 @@ from softehl.cases.seal.sensitivity.variation import FilmCase
 from softehl.cases.seal.solve.films import NoFilm
 from softehl.cases.seal.solve.method import DryContact, Judge, verdict_of_contact
 from softehl.cases.seal.solve.path import StageError
-from softehl.cases.seal.states.state import FilmState, Observer, Silent
+from softehl.cases.seal.states.state import FilmState, Observer
 from softehl.runtime.arrays import Array
 from softehl.runtime.names import meant
 from softehl.runtime.solve.homotopy import Continuation
@@ -83,7 +83,7 @@ class Design:
         return 100.0 * (self.steps[-1].quantity / self.steps[0].quantity - 1.0)
 
 
-def design_case(p: Seal, target: str, key: str, observer: Observer | None = None) -> Design:
+def design_case(p: Seal, target: str, key: str, observer: Observer) -> Design:
     """The way to a target by a key.  Raises BadInput, also where it is not reached."""
     asked = DIAMETERS.get(key, key)
     base, _ = BASES.get(asked, (asked, asked))
@@ -95,7 +95,7 @@ def design_case(p: Seal, target: str, key: str, observer: Observer | None = None
     by, wanted = Lever(asked if asked in BASES else p.called(base), base), Target.of(target)
 
     def solve(q: Seal) -> Film | None:
-        film = HeldFilm.of(q, observer or Silent())
+        film = HeldFilm.of(q, observer)
         return (film.state, partial(film.change, wanted.quantity, base)) if film else None
 
     return Design(p, wanted, by, designed(p, wanted, by, solve))
@@ -139,8 +139,7 @@ class HeldFilm:
         """
 
         def problem_at(logarithm: float) -> NonlinearProblem:
-            moved = self.case.scaled(key, math.expm1(logarithm))
-            return moved.system.film_problem(moved.film)
+            return self.case.scaled(key, math.expm1(logarithm)).problem
 
         # a hundredth of a millimetre is many films; the least step moves a quantity that follows
         # tenfold by `SETTLED`
@@ -149,12 +148,8 @@ class HeldFilm:
         branch = path.follow(problem_at, 0.0, way, self.x)
         if not branch.converged:
             return None
-        moved = self.case.scaled(key, factor - 1.0)
-        return _value(moved, branch.last.x, quantity) / _value(self.case, self.x, quantity)
-
-
-def _value(case: FilmCase, x: Array, quantity: str) -> float:
-    return quantities(case, case.system.film_problem(case.film), x)[quantity].value
+        there = quantities(self.case.scaled(key, factor - 1.0), branch.last.x)
+        return there[quantity].value / quantities(self.case, self.x)[quantity].value
 
 
 def told(design: Design) -> list[str]:

@@ -17,7 +17,6 @@ from softehl.cases.seal.states.contacts import CONTACT_FILM, GROOVE, contact_fil
 from softehl.cases.seal.states.results import film_parts, metering
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.design import FieldRates, Inputs, weighted
-from softehl.runtime.fem.problem import Problem
 
 CALLED = {
     "h_star": ("film thickness h*", "um"),
@@ -49,10 +48,10 @@ class Quantity:
     speed: float = 0.0
 
 
-def quantities(case: FilmCase, problem: Problem, x: Array) -> dict[str, Quantity]:
+def quantities(case: FilmCase, x: Array) -> dict[str, Quantity]:
     """All quantities of a converged film x (n,)."""
-    at = problem.fields(FILM, x)
-    flux, by_flux = _flux(case, problem, at, x)
+    at = case.problem.fields(FILM, x)
+    flux, by_flux = _flux(case, at, x)
     ring = case.system.around
     friction = float((at["tau_rod"] * at["dx"]).sum())
     shear = {"tau_rod": at["dx"] / friction, "dx": at["tau_rod"] / friction}
@@ -69,7 +68,7 @@ def quantities(case: FilmCase, problem: Problem, x: Array) -> dict[str, Quantity
 
 
 def _flux(
-    case: FilmCase, problem: Problem, at: Mapping[str, Array], x: Array
+    case: FilmCase, at: Mapping[str, Array], x: Array
 ) -> tuple[float, dict[str, dict[str, Array]]]:
     """The flux at the largest pressure and the weights of its logarithm; see `film_numbers`."""
     h = case.system.arc_film(x)[1]
@@ -77,7 +76,7 @@ def _flux(
     first = metering(at, parts, case.film.stroke)
     top = int(first.start + np.argmax(at["p"][first].max(axis=1)))
     if case.system.parameters.reynolds == "dg":
-        flux = problem.fields(FACET, x)["flux"]
+        flux = case.problem.fields(FACET, x)["flux"]
         chosen = slice(max(top - 1, 0), top + 1)
         q, weights = float(flux[chosen].mean()), np.zeros_like(flux)
         weights[chosen] = 1.0 / flux[chosen].size / q
@@ -115,11 +114,11 @@ def _width(case: FilmCase, x: Array) -> Quantity:
     return Quantity(width, z=by_z / width, h=by_h / width)
 
 
-def by_unknowns(case: FilmCase, problem: Problem, x: Array, q: Quantity) -> Array:
+def by_unknowns(case: FilmCase, x: Array, q: Quantity) -> Array:
     """Derivative (n,) of the logarithm of a quantity by the unknowns x (n,)."""
     gradient = np.zeros(len(x))
     for name, weights in q.fields.items():
-        gradient += FieldRates(problem, name, x).by_unknowns(weights)
+        gradient += FieldRates(case.problem, name, x).by_unknowns(weights)
     start, nodes = case.system.layout.part(DISPLACEMENT).start, case.system.mesh.arc_nodes
     for component, nodal in enumerate((q.z, q.h)):
         if nodal is not None:
@@ -132,17 +131,17 @@ Moved = Mapping[str, Mapping[str, Array]]
 
 
 def fields_along(
-    problem: Problem, x: Array, rate: Inputs, of: Iterable[Quantity]
+    case: FilmCase, x: Array, rate: Inputs, of: Iterable[Quantity]
 ) -> dict[str, dict[str, Array]]:
     """Change of the fields of these quantities with a parameter, the unknowns held.
 
     rate: that of the inputs, see `FilmCase.rate`.
     """
     blocks = {block for q in of for block in q.fields if rate.blocks[block].any()}
-    return {b: FieldRates(problem, b, x).along(rate.blocks[b]) for b in blocks}
+    return {b: FieldRates(case.problem, b, x).along(rate.blocks[b]) for b in blocks}
 
 
-def along(problem: Problem, q: Quantity, name: str, rate: Inputs, moved: Moved) -> float:
+def along(case: FilmCase, q: Quantity, name: str, rate: Inputs, moved: Moved) -> float:
     """Derivative of the logarithm of a quantity by that of a parameter, the unknowns held.
 
     rate, moved: of the inputs and of the fields that follow from these alone, see `fields_along`.
@@ -154,7 +153,7 @@ def along(problem: Problem, q: Quantity, name: str, rate: Inputs, moved: Moved) 
     if q.z is not None and q.h is not None:
         ends = rate.blocks[FILM][:, :4].reshape(-1, 2, 2)  # (segments, both nodes, (z, r))
         nodes = np.concatenate([ends[:, 0], ends[-1:, 1]])
-        names = problem.assembler.block(FILM).kernel.parameters
+        names = case.problem.assembler.block(FILM).kernel.parameters
         rod = rate.blocks[FILM][0, names.index("rod_radius") - len(names)]
         total += float(q.z @ nodes[:, 0] + q.h @ (nodes[:, 1] - rod))
     return float(total)

@@ -12,8 +12,6 @@ from types import MappingProxyType
 
 import numpy as np
 
-from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.gland.records.numerics import Numerics
 from softehl.cases.seal.sensitivity.quantities import along, by_unknowns, fields_along, quantities
 from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
@@ -27,38 +25,32 @@ from softehl.runtime.solve.sensitivity import adjoints
 
 
 def rates_of(
-    system: SealSystem, film: FilmLoads, known: Mapping[str, Inputs] = MappingProxyType({})
+    case: FilmCase, known: Mapping[str, Inputs] = MappingProxyType({})
 ) -> dict[str, Inputs]:
     """Parameter -> rate of the inputs of a film by its logarithm.
 
     known: the rates of another film of the system; of these only that of the speed is another.
     """
-    case = FilmCase(system, film)
     kept = {name: rate for name, rate in known.items() if name != SPEED}
     return {name: kept.get(name) or case.rate(name) for name in case.parameters}
 
 
 def sensitivities(
-    system: SealSystem,
-    film: FilmLoads,
-    x: Array,
-    linear: LinearSolver,
-    rates: Mapping[str, Inputs],
+    case: FilmCase, x: Array, linear: LinearSolver, rates: Mapping[str, Inputs]
 ) -> dict[str, dict[str, float]]:
     """Quantity -> parameter -> d log quantity / d log parameter at a converged film x (n,).
 
     rates: of the parameters, by `rates_of` at this film. Raises SingularMatrix.
     """
-    case, problem = FilmCase(system, film), system.film_problem(film)
-    found, tangent = quantities(case, problem, x), Tangent.at(problem, x)
-    gradients = np.stack([by_unknowns(case, problem, x, q) for q in found.values()], axis=1)
+    found, tangent = quantities(case, x), Tangent.at(case.problem, x)
+    gradients = np.stack([by_unknowns(case, x, q) for q in found.values()], axis=1)
     loads = np.stack([tangent.load(rate) for rate in rates.values()], axis=1)
     through = -adjoints(linear, tangent.reduced, gradients).T @ loads
     slopes: dict[str, dict[str, float]] = {name: {} for name in found}
     for j, (key, rate) in enumerate(rates.items()):
-        moved = fields_along(problem, x, rate, found.values())
+        moved = fields_along(case, x, rate, found.values())
         for i, (name, q) in enumerate(found.items()):
-            slopes[name][key] = float(through[i, j]) + along(problem, q, key, rate, moved)
+            slopes[name][key] = float(through[i, j]) + along(case, q, key, rate, moved)
     return slopes
 
 
@@ -73,10 +65,10 @@ def differentiation(p: Numerics) -> Differentiate | None:
 
     def differentiate(film: Film) -> Mapping[str, Mapping[str, float]] | None:
         nonlocal known, last
-        rates = known = rates_of(film.system, film.loads, known if film.system is last else {})
-        last = film.system
+        case = FilmCase(film.system, film.loads)
+        known, last = rates_of(case, known if film.system is last else {}), film.system
         try:
-            return sensitivities(film.system, film.loads, film.x, linear, rates)
+            return sensitivities(case, film.x, linear, known)
         except SingularMatrix:
             return None
 

@@ -7,6 +7,7 @@ arc. A remeshed run differs from that by the error of its mesh.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.varied import LENGTHS, NUMBERS, PRESSURE_KEY
 from softehl.cases.seal.section.layout import uniform_layout
 from softehl.runtime.fem.design import Inputs, rate_of
+from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mesh.carried_mesh import carried_mesh, carried_places
 
 SPEED = "U"
@@ -30,6 +32,11 @@ class FilmCase:
 
     system: SealSystem
     film: FilmLoads
+
+    @cached_property
+    def problem(self) -> Problem:
+        """Its equations."""
+        return self.system.film_problem(self.film)
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -58,8 +65,7 @@ class FilmCase:
         """
 
         def inputs(by: float) -> Inputs:
-            moved = self.scaled(name, by)
-            return Inputs.of(moved.system.film_problem(moved.film))
+            return Inputs.of(self.scaled(name, by).problem)
 
         lengths = *LENGTHS, *self.system.parameters.measures
         return rate_of(inputs, step=0.01, degree=4 if name in lengths else 2)
