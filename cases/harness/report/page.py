@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import os
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -131,7 +131,7 @@ def write_xlsx(parts: Sequence[Part], path: Path) -> None:
         raise BadInput(f"{_MISSING} ({error})") from None
     book, names = Workbook(), dict[str, int]()
     book.remove(book.worksheets[0])
-    for title, table in _tables(parts):
+    for title, table in ((part.title, table) for part in parts for table in part.tables):
         name = "".join(c for c in title if c not in "[]:*?/\\")[: _SHEET_NAME - 3]
         names[name] = names.get(name, 0) + 1
         sheet = book.create_sheet(name if names[name] == 1 else f"{name} {names[name]}")
@@ -144,12 +144,6 @@ def write_xlsx(parts: Sequence[Part], path: Path) -> None:
                 cell.quotePrefix = cell.value.startswith(("=", "+", "-", "@"))
     with replacing(path) as temporary, temporary.open("wb") as file:
         book.save(file)
-
-
-def _tables(parts: Sequence[Part]) -> Iterator[tuple[str, Table]]:
-    for part in parts:
-        for table in part.tables:
-            yield part.title, table
 
 
 # --- parts that every case has ------------------------------------------------------------------
@@ -227,10 +221,10 @@ def _percent(value: float, reference: float) -> float:
 
 
 def _all_rows(runs: Sequence[FinishedRun]) -> Part:
-    tables = []
-    for run in runs:
-        header, cells = run.case.row.titles(), [row.cells() for row in run.rows]
-        tables.append(Table(f"{run.name}: every state", header, cells))
+    tables = [
+        Table(f"{run.name}: every state", run.case.row.titles(), [row.cells() for row in run.rows])
+        for run in runs
+    ]
     return Part("All columns", tables=tables, folded=True)
 
 
