@@ -36,20 +36,16 @@ def curve_figure(head: str, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]
 def _draw_lines(axes: Axes, rows: Sequence[FilmRow], rejected: Sequence[FilmRow]) -> None:
     axes.set(xscale="log", yscale="log", xlabel=style.SPEED)
     axes.margins(x=0.07)
-    for stroke in style.STROKES:
-        chosen = [row for row in rows if row.stroke == stroke]
-        if chosen:
-            _draw_stroke(axes, stroke, chosen)
+    for stroke, chosen in style.by_stroke(rows).items():
+        _draw_stroke(axes, stroke, chosen)
     _draw_slope(axes, rows)
-    for stroke, name in style.STROKES.items():
-        speeds = [abs(row.rod_speed_mm_s) for row in rejected if row.stroke == stroke]
-        if speeds:  # crosses on the lower axis
-            axes.plot(
-                *(speeds, [0.02] * len(speeds), "x"),
-                color=style.COLOURS[stroke],
-                transform=axes.get_xaxis_transform(),
-                label=f"{name}, film collapsed: no result",
-            )
+    for stroke, chosen in style.by_stroke(rejected).items():  # crosses on the lower axis
+        axes.plot(
+            *([abs(row.rod_speed_mm_s) for row in chosen], [0.02] * len(chosen), "x"),
+            color=style.COLOURS[stroke],
+            transform=axes.get_xaxis_transform(),
+            label=f"{style.STROKES[stroke]}, film collapsed: no result",
+        )
     if rows:  # room for the legend
         axes.set_ylim(top=1.7 * max(row.h_star_um for row in rows))
     style.tick_plainly(axes.xaxis)
@@ -87,12 +83,10 @@ def fitted_exponent(rows: Sequence[FilmRow]) -> float | None:
     Only states that are ok count. None where no stroke has two of them.
     """
     products = squares = 0.0
-    for stroke in style.STROKES:
-        chosen = [row for row in rows if row.stroke == stroke and row.verdict == OK]
-        if len(chosen) > 1:
-            x, y = np.log(_columns(chosen)[:2])
-            products += float((x - x.mean()) @ (y - y.mean()))
-            squares += float((x - x.mean()) @ (x - x.mean()))
+    for chosen in style.by_stroke(row for row in rows if row.verdict == OK).values():
+        x, y = np.log(_columns(chosen)[:2])
+        products += float((x - x.mean()) @ (y - y.mean()))
+        squares += float((x - x.mean()) @ (x - x.mean()))
     return products / squares if squares else None
 
 

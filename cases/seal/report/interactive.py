@@ -95,11 +95,7 @@ def _over_speed(
     tips += [("error", "@error{0.##} %"), ("verdict", "@verdict")]
     panel.add_tools(HoverTool(tooltips=tips))
     for number, run in enumerate(runs):
-        for stroke, words in style.STROKES.items():
-            rows = [row for row in run.rows if row.stroke == stroke]
-            if not rows:
-                continue
-            rows.sort(key=lambda row: abs(row.rod_speed_mm_s))
+        for stroke, rows in style.by_stroke(run.rows).items():
             values, errors = np.array([of(row) for row in rows]).T
             bars = np.nan_to_num(0.01 * np.abs(errors)) * values
             colour = style.COLOURS[stroke] if len(runs) == 1 else COLOURS[number % len(COLOURS)]
@@ -110,8 +106,8 @@ def _over_speed(
                 "fill": [colour if row.verdict == OK else "white" for row in rows],
             }
             source, look = ColumnDataSource(columns), dict[str, Any](line_color=colour)
-            named = {"legend_label": f"{run.name}, {words}", "line_dash": _DASHES[stroke]}
-            panel.line("x", "y", source=source, **look, **named)
+            label, dash = f"{run.name}, {style.STROKES[stroke]}", _DASHES[stroke]
+            panel.line("x", "y", source=source, legend_label=label, line_dash=dash, **look)
             panel.scatter("x", "y", source=source, size=7, fill_color="fill", **look)
             panel.add_layout(Whisker(base="x", lower="low", upper="high", source=source, **look))
     if len(runs) > 1:

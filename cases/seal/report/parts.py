@@ -21,11 +21,17 @@ from softehl.cases.seal.states.leakage import LeakageRow, net_leakage
 from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.io import Cell
 
+PRESSURES = "Stress in the ring, film pressure on the rod, contact pressure on housing and walls."
+"""Text of the part of deformed sections."""
+
 
 def parts(runs: Sequence[FinishedRun]) -> list[Part]:
     """Gland, deformed section, film, curve, friction, leakage, surfaces, tolerances."""
+    section = Part("Deformed section", PRESSURES, pictures_of(runs, FIGURES["section"]))
+    text = "The slider chooses the rod speed." if any(_several_speeds([r]) for r in runs) else ""
+    film = Part("Film and pressure", text, plots=[film_plot(run) for run in runs])
     return [
-        *(*_compared(runs), gland(runs), *_rubber(runs), _section(runs), _film(runs)),
+        *(*_compared(runs), gland(runs), *_rubber(runs), section, film),
         *(_curve(runs), _friction(runs), *_leakage(runs), *_surfaces(runs), tolerances(runs)),
     ]
 
@@ -93,20 +99,6 @@ def _rubber(runs: Sequence[FinishedRun]) -> list[Part]:
     """The fit of a rubber, where a run has one."""
     pictures = pictures_of(runs, FIGURES["fit"], lambda run: f"{run.name}: {run.parameters.fit}")
     return [Part("Rubber", "Tests and the material fitted to them.", pictures)] if pictures else []
-
-
-def _section(runs: Sequence[FinishedRun]) -> Part:
-    """The fastest state of each stroke."""
-    return Part("Deformed section", PRESSURES, pictures=pictures_of(runs, FIGURES["section"]))
-
-
-PRESSURES = "Stress in the ring, film pressure on the rod, contact pressure on housing and walls."
-"""Text of the part of deformed sections."""
-
-
-def _film(runs: Sequence[FinishedRun]) -> Part:
-    text = "The slider chooses the rod speed."
-    return Part("Film and pressure", text, plots=[film_plot(run) for run in runs])
 
 
 def _curve(runs: Sequence[FinishedRun]) -> Part:

@@ -23,7 +23,7 @@ def profiles_figure(head: str, results: Results) -> Figure:
     film are shown: beside it h is a hundred times larger.
     """
     rows = [row for row, _ in results]
-    strokes = [stroke for stroke in style.STROKES if any(row.stroke == stroke for row in rows)]
+    strokes = list(style.by_stroke(rows))
     speeds = sorted({abs(row.rod_speed_mm_s) for row in rows}, reverse=True)
     shades = colormaps["viridis"](np.linspace(0.05, 0.85, len(speeds)))
     colours = dict(zip(speeds, map(tuple, shades), strict=True))

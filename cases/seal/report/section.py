@@ -45,9 +45,8 @@ def views_of(folder: Path, rows: Sequence[FilmRow]) -> list[View]:
 
     Raises OSError, ValueError.
     """
-    fastest = {row.stroke: row for row in sorted(rows, key=lambda row: abs(row.rod_speed_mm_s))}
-    chosen = [fastest[stroke] for stroke in style.STROKES if stroke in fastest]
-    return [View(row, read_profile(folder, row), read_section(folder, row)) for row in chosen]
+    fastest = [rising[-1] for rising in style.by_stroke(rows).values()]
+    return [View(row, read_profile(folder, row), read_section(folder, row)) for row in fastest]
 
 
 def nodal_von_mises(section: Section) -> Array:

@@ -39,14 +39,13 @@ def crossing(p: Oil, rows: Sequence[FilmRow], ratio: float) -> float | None:
 
 def stribeck_figure(p: Seal, rows: Sequence[FilmRow]) -> Figure | None:
     """Friction of both strokes and the shares of asperities; None for smooth ones or one speed."""
-    rough = sorted((row for row in rows if row.regime), key=lambda row: abs(row.rod_speed_mm_s))
+    rough = [row for row in rows if row.regime]
     if len({abs(row.rod_speed_mm_s) for row in rough}) < 2:
         return None
     figure = Figure(figsize=(5.4, 5.6))
     friction, shares = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
-    for stroke in style.STROKES:
-        if chosen := [row for row in rough if row.stroke == stroke]:
-            _draw_stroke(p, friction, shares, stroke, chosen)
+    for stroke, chosen in style.by_stroke(rough).items():
+        _draw_stroke(p, friction, shares, stroke, chosen)
     friction.set(xscale="log", yscale="log", ylabel=style.FRICTION)
     shares.set(ylim=(-4.0, 104.0), ylabel="asperities [%]", xlabel=_HERSEY)
     style.tick_plainly(friction.yaxis)

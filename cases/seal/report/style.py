@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from typing import Any
 
@@ -14,6 +15,7 @@ from matplotlib.ticker import AutoLocator, LogLocator, NullLocator
 
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.states.state import FilmRow
 from softehl.runtime.arrays import Array
 
 STYLE: Any = {
@@ -71,6 +73,13 @@ def between(p: Gland) -> str:
     """The two surfaces that the seal is squeezed between, in words."""
     slides, holds = ("bore", "groove of the piston") if p.piston else ("rod", "housing")
     return f"{slides} {abs(p.rod_diameter):.6g} mm, {holds} {abs(p.housing_diameter):.6g} mm"
+
+
+def by_stroke(rows: Iterable[FilmRow]) -> dict[str, list[FilmRow]]:
+    """Stroke -> its rows by rising |U|, of the strokes that have any."""
+    rising = sorted(rows, key=lambda row: abs(row.rod_speed_mm_s))
+    found = {stroke: [row for row in rising if row.stroke == stroke] for stroke in STROKES}
+    return {stroke: some for stroke, some in found.items() if some}
 
 
 def write_head(figure: Figure, text: str) -> None:
