@@ -15,6 +15,9 @@ from scipy.interpolate import BSpline, make_interp_spline
 from softehl.runtime.fem import rules
 from softehl.runtime.io import read_table
 
+Rows = Sequence[Sequence[float]]
+"""Times and values of a table."""
+
 
 @dataclass(frozen=True)
 class Table:
@@ -50,10 +53,6 @@ class Table:
     def largest(self) -> float:
         """Largest magnitude."""
         return max(abs(v) for v in self.values)
-
-
-Rows = Sequence[Sequence[float]]
-"""Times and values of a table."""
 
 
 def _repeated(pressure: Rows | float, period: float) -> Table:
