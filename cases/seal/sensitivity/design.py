@@ -29,9 +29,6 @@ TOLERANCE = 0.01
 SETTLED = 1e-4
 """Of the quantity, relative, on one mesh."""
 
-Change = Callable[[float], float | None]
-"""Factor of a key -> that of the quantity on the held mesh, None where there is no film."""
-
 STEPS = 6
 """Nonlinear solves after the first."""
 
@@ -154,8 +151,11 @@ def changed(p: Seal, wrong: str, **keys: Any) -> Seal:
         raise NoDesignError(f"{wrong}: {reason}") from None
 
 
+Change = Callable[[float], float | None]
+"""Factor of a key -> that of the quantity on the held mesh, None where there is no film."""
+
 Film = tuple[FilmState, Change]
-"""A film with its sensitivities, and how it changes on its mesh with the key of a target."""
+"""A film with its sensitivities, and how its quantity changes with the key of a target."""
 
 Solve = Callable[[Seal], Film | None]
 """The one film of a case, None where there is none."""
