@@ -46,8 +46,8 @@ def gland_outlines(p: Gland) -> Cells:
 def gland_lines(p: Gland, clearance: float = 0.0) -> tuple[Array, Array, Array]:
     """Points (n, 2) of the rod, the groove and the housing beside it, as they are modelled.
 
-    clearance: of the ends of the walls from the rod, mm. Where there is an extrusion gap, the wall
-    of the air side ends in the fillet at its edge instead.
+    clearance: of the ends of the walls from the rod, mm. Beside an extrusion gap the wall of the
+    air side ends in the fillet at its edge instead.
     """
     size, rod, housing = p.section_diameter, 0.5 * p.rod_diameter, 0.5 * p.housing_diameter
     start, end = p.sealed_wall, p.air_wall
