@@ -13,16 +13,20 @@ pass it quickly where it does not.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.homotopy import Trial, Way, followed
 from softehl.runtime.solve.newton import Corrector, NonlinearProblem
 from softehl.runtime.solve.record import End, OnPoint, Record
-from softehl.runtime.solve.solution import Branch, Status
+from softehl.runtime.solve.solution import Branch, Solution, Status
 from softehl.runtime.solve.steps import StepRule
+
+Finish: TypeAlias = Callable[[Array], Solution]
+"""Solves the steady equations from the last state (n,) of a path."""
 
 _LEAST = 1e-300  # no step and no change is less
 
@@ -75,13 +79,28 @@ class PseudoTransient:
     most: int = 100
 
     def follow(
-        self, transient: Transient, start: Moment, on_point: OnPoint | None = None
+        self,
+        transient: Transient,
+        start: Moment,
+        on_point: OnPoint | None = None,
+        finish: Finish | None = None,
     ) -> tuple[Branch, Moment]:
-        """To the steady state, and the last moment that was reached."""
+        """To the steady state, and the last moment that was reached.
+
+        finish: makes the last point of the branch, the state without a rate of change.
+        """
         way = _Steps(self, transient, start, self.load_step)
-        rule = StepRule(start.tau, min(_LEAST, start.tau))
-        branch = followed(way, rule, Record("time", keep_all=False, on_point=on_point))
-        return branch, way.now
+        rule, log = StepRule(start.tau, min(_LEAST, start.tau)), Record("time", on_point=on_point)
+        branch = followed(way, rule, log)
+        if finish is None or not branch.converged:
+            return branch, way.now
+        end = log.count(finish(way.now.x))
+        if end.converged:
+            log.accept(way.time, end)
+        else:
+            log.refuse(way.time, end)
+            log.end = end.status, f"steady state: {end.message}"
+        return log.branch(), way.now
 
 
 @dataclass(eq=False)

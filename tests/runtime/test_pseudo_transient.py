@@ -123,3 +123,23 @@ def test_a_path_goes_on_from_the_moment_that_was_reached() -> None:
     assert branch.converged
     assert [*first.asked, *rest.asked] == whole.asked
     assert reached.x == pytest.approx([2.0], rel=1e-6)
+
+
+@pytest.mark.parametrize("iterations", [30, 0], ids=["found", "not found"])
+def test_the_steady_equations_are_the_last_point_of_a_path(iterations: int) -> None:
+    """Their cost is that of the path, and if they fail, so does it."""
+    steady = Algebraic(lambda x: x**3 + x - 10.0, lambda x: np.diag(3.0 * x**2 + 1.0))
+    corrector = Newton(max_iterations=iterations, tolerance=1e-14)
+    plain, _ = followed(Decay())
+    branch, reached = PseudoTransient(Newton(max_iterations=30)).follow(
+        Decay(), START, finish=lambda x: corrector.solve(steady, x)
+    )
+    assert branch.converged is (iterations > 0)
+    if branch.converged:
+        assert branch.last.x == pytest.approx([2.0], rel=1e-14)
+        assert len(branch.points) == len(plain.points) + 1
+        assert branch.iterations == plain.iterations + branch.last.iterations
+    else:
+        assert branch.status is Status.MAX_ITERATIONS
+        assert branch.message.startswith("steady state: ")
+        assert reached.x == pytest.approx([2.0], rel=1e-6)

@@ -78,13 +78,10 @@ class CreepCorrector:
         """See `Corrector`."""
         settings = replace(self.newton, tolerance=_TOLERANCE, stagnation=1.0)
         steps = PseudoTransient(PressureNewton(settings, self.system), last=LAST)
-        branch, reached = steps.follow(Creeping(self.system), Moment(x0, FIRST, 1.0))
-        made, spent = branch.factorisations, branch.iterations
-        if not branch.converged:
-            return Solution(x0, branch.status, branch.message, (), made, spent)
-        end = PressureNewton(self.newton, self.system).solve(problem, reached.x)
-        return replace(
-            end,
-            iterations=end.iterations + spent,
-            factorisations=end.factorisations + made,
+        branch, _ = steps.follow(
+            Creeping(self.system),
+            Moment(x0, FIRST, 1.0),
+            finish=lambda x: PressureNewton(self.newton, self.system).solve(problem, x),
         )
+        made, spent = branch.factorisations, branch.iterations
+        return replace(branch.end, factorisations=made, iterations=spent)

@@ -12,7 +12,7 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
-from softehl.runtime.fem.layered import Layer, Layered
+from softehl.runtime.fem.layered import Layered
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.relaxed import Anchored, Relaxed
 from softehl.runtime.kernels import load_kernel
@@ -102,22 +102,18 @@ class FilmCorrectors:
         """Solves for all unknowns; pressures: (Q,) of a state that another mesh has left."""
         return PressureNewton(self.newton, self.system, pressures)
 
+    @property
+    def first(self) -> Corrector:
+        """Solves steady films from others near by."""
+        return self.fast or self.whole()
+
+    def steady(self, pressures: Array | None = None) -> Corrector:
+        """Solves the steady film from the last step in time; pressures: as of `whole`."""
+        fast = (self.fast,) if self.fast else ()
+        return Ladder((*fast, self.whole(pressures)))
+
     def steps(self, pressures: Array | None = None) -> Corrector:
         """Solves steps in time; pressures: as of `whole`."""
         newton = replace(self.newton, tolerance=TOLERANCE, stagnation=1.0)
-        fast = (self.fast.with_tolerance(TOLERANCE),) if self.fast else ()
-        return Ladder((*fast, PressureNewton(newton, self.system, pressures)))
-
-    @property
-    def first(self) -> Corrector:
-        """Solves steady films that are `layered`, from others near by."""
-        return self.fast or self.whole()
-
-    def layered(self, problem: Problem, layer: Layer) -> Layered:
-        """A steady film as its correctors take it."""
-        return Layered(problem, layer, (self.system.film_guard(),))
-
-    def steady(self, problem: Problem, layer: Layer, x: Array) -> Solution:
-        """The steady film from the last step in time, x (n,)."""
-        fast = (self.fast,) if self.fast else ()
-        return Ladder((*fast, self.whole())).solve(self.layered(problem, layer), x)
+        fast = self.fast and self.fast.with_tolerance(TOLERANCE)
+        return replace(self, newton=newton, fast=fast).steady(pressures)

@@ -7,9 +7,7 @@ elements (`runtime.fem.lagged_pressure`).
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
@@ -18,7 +16,7 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.solve.correctors import FilmCorrectors
 from softehl.cases.seal.solve.inlet import POWER, InletScales
-from softehl.cases.seal.solve.path import PathDriver
+from softehl.cases.seal.solve.path import PathDriver, Told
 from softehl.cases.seal.solve.squeeze_film import (
     FIRST,
     SqueezeFilm,
@@ -27,14 +25,13 @@ from softehl.cases.seal.solve.squeeze_film import (
     pressed_film,
 )
 from softehl.cases.seal.states.results import film_numbers
-from softehl.cases.seal.states.state import StageRecord, place
 from softehl.cases.seal.states.verdict import FilmNumbers
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import NonlinearProblem
 from softehl.runtime.solve.pseudo_transient import Moment, PseudoTransient
-from softehl.runtime.solve.solution import Branch, Point, Solution, Status
+from softehl.runtime.solve.solution import Point, Solution, Status
 from softehl.runtime.solve.steps import StepRule
 
 _LEAST = 0.06
@@ -47,15 +44,19 @@ _USUAL = 12
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """A steady film on a mesh, its unknowns x (n,).
+    """A steady film on a mesh.
 
     squeeze_film: how it was squeezed out. correctors: what solved it, for films near by.
     """
 
     squeeze_film: SqueezeFilm
-    x: Array
-    iterations: int
+    solution: Solution
     correctors: FilmCorrectors
+
+    @property
+    def x(self) -> Array:
+        """Its unknowns (n,)."""
+        return self.solution.x
 
     @property
     def system(self) -> SealSystem:
@@ -71,11 +72,6 @@ class Film:
     def begun(self) -> tuple[SqueezeFilm, Moment]:
         """The moment from which it is squeezed out where it is not found at once."""
         return self.squeeze_film, Moment(self.x, FIRST, 1.0)
-
-    @property
-    def solution(self) -> Solution:
-        """The film as a point of a path."""
-        return Solution(self.x, Status.CONVERGED, "", (), 0, 0)
 
     @cached_property
     def problem(self) -> Problem:
@@ -139,42 +135,50 @@ class FilmSolver:
         squeeze_film, before = film.squeeze_film.at(speed), [film.x]
         known = [Point(f.loads.speed**POWER, f.solution) for f in last if f.system is film.system]
         start, stop = known[-1].parameter, speed**POWER
+        told = self._told(squeeze_film)
 
         def problem_at(t: float) -> NonlinearProblem:
-            loads = replace(squeeze_film.film, speed=speed if t == stop else t ** (1.0 / POWER))
-            problem = self.system.film_problem(loads).since(before[0])
-            return correctors.layered(problem, squeeze_film.layer)
+            now = speed if t == stop else t ** (1.0 / POWER)
+            loads = replace(squeeze_film.film, speed=now)
+            return replace(squeeze_film, film=loads).steady(before[0])
 
-        with self._told(squeeze_film.film) as (told, costs):
+        def tell(point: Point) -> None:
+            told.step(point.solution)
+            before[0] = point.solution.x
 
-            def tell(point: Point) -> None:
-                before[0] = told(point.solution).x
-
-            span, least = abs(stop - start), _LEAST * max(start, stop)
-            rule = StepRule(span, min(least, span), target_iterations=_USUAL)
-            path = Continuation(correctors.first, rule, name="U^0.6")
-            previous = known[-2] if len(known) > 1 else None
-            branch = path.follow(problem_at, start, stop, film.x, on_point=tell, previous=previous)
-            costs.append(branch)
-        if branch.converged and squeeze_film.change(film.x, branch.last.x) < inf:
-            return self._entered(squeeze_film, correctors, branch.last)
+        span, least = abs(stop - start), _LEAST * max(start, stop)
+        rule = StepRule(span, min(least, span), target_iterations=_USUAL)
+        path = Continuation(correctors.first, rule, name="U^0.6")
+        previous = known[-2] if len(known) > 1 else None
+        branch = path.follow(problem_at, start, stop, film.x, on_point=tell, previous=previous)
+        told.end(branch)
         x = branch.last.x if branch.points else film.x
-        return self._followed(squeeze_film, Moment(x, FIRST, 1.0), correctors)
+        return self._reached(squeeze_film, branch.end, Moment(x, FIRST, 1.0), correctors)
 
     def from_film(self, carried: SqueezeFilm, start: Moment, pressures: Array) -> Film | NoFilm:
         """The steady film of another mesh, carried to ours: at once, else squeezed out from there.
 
         pressures: (Q,) of the elements.
         """
-        correctors, x = FilmCorrectors.of(self.system, self.driver.newton), start.x
-        with self._told(carried.film) as (told, costs):
-            problem = self.system.film_problem(carried.film).since(x)
-            layered = correctors.layered(problem, carried.layer)
-            found = told(correctors.whole(pressures).solve(layered, x))
-            costs.append(found)
-        if found.converged and carried.change(x, found.x) < inf:
-            return self._entered(carried, correctors, found)
-        return self._followed(carried, start, correctors, pressures)
+        correctors = FilmCorrectors.of(self.system, self.driver.newton)
+        told = self._told(carried)
+        found = correctors.whole(pressures).solve(carried.steady(start.x), start.x)
+        told.step(found)
+        told.end(found)
+        return self._reached(carried, found, start, correctors, pressures)
+
+    def _reached(
+        self,
+        squeeze_film: SqueezeFilm,
+        found: Solution,
+        start: Moment,
+        correctors: FilmCorrectors,
+        pressures: Array | None = None,
+    ) -> Film | NoFilm:
+        """The film that was found, if there is one and it is admissible; else see `_followed`."""
+        if found.converged and squeeze_film.change(start.x, found.x) < inf:
+            return self._entered(squeeze_film, correctors, found)
+        return self._followed(squeeze_film, start, correctors, pressures)
 
     def _followed(
         self,
@@ -183,22 +187,19 @@ class FilmSolver:
         correctors: FilmCorrectors,
         pressures: Array | None = None,
     ) -> Film | NoFilm:
-        film = squeeze_film.film
-        steps = PseudoTransient(correctors.steps(pressures))
-        with self._told(film) as (told, costs):
-            branch, reached = steps.follow(squeeze_film, start, on_point=lambda p: told(p.solution))
-            costs.append(branch)
-            if not branch.converged:
-                words = branch.message
-                begun = None if reached is start else (squeeze_film, reached)
-                return NoFilm(film.stroke, film.speed, branch.status, words, begun)
-            problem = self.system.film_problem(film).since(reached.x)
-            end = told(correctors.steady(problem, squeeze_film.layer, reached.x))
-            costs.append(end)
-        if not end.converged:
-            words = f"steady film: {end.message}"
-            return NoFilm(film.stroke, film.speed, end.status, words, (squeeze_film, reached))
-        return self._entered(squeeze_film, correctors, end)
+        """The film squeezed out from a moment; pressures: as of `from_film`."""
+        film, told = squeeze_film.film, self._told(squeeze_film)
+        branch, reached = PseudoTransient(correctors.steps(pressures)).follow(
+            squeeze_film,
+            start,
+            on_point=lambda point: told.step(point.solution),
+            finish=lambda x: correctors.steady().solve(squeeze_film.steady(x), x),
+        )
+        told.end(branch)
+        if branch.converged:
+            return self._entered(squeeze_film, correctors, branch.last)
+        begun = None if reached is start else (squeeze_film, reached)
+        return NoFilm(film.stroke, film.speed, branch.status, branch.message, begun)
 
     def _entered(
         self, squeeze_film: SqueezeFilm, correctors: FilmCorrectors, found: Solution
@@ -207,47 +208,15 @@ class FilmSolver:
 
         Without it where no such film is found.
         """
-        film = Film(squeeze_film, found.x, found.iterations, correctors)
+        film = Film(squeeze_film, found, correctors)
         if not film.numbers.enters:
             return film
         more = replace(squeeze_film, film=replace(film.loads, entrance=film.numbers.entrance))
-        problem = self.system.film_problem(more.film).since(found.x)
-        end = correctors.steady(problem, more.layer, found.x)
-        return Film(more, end.x, end.iterations, correctors) if end.converged else film
+        end = correctors.steady().solve(more.steady(film.x), film.x)
+        return Film(more, end, correctors) if end.converged else film
 
-    @contextmanager
-    def _told(
-        self, film: FilmLoads
-    ) -> Iterator[tuple[Callable[[Solution], Solution], list[Branch | Solution]]]:
-        """Tell the observer of solutions, and keep a record of them and of what is spent."""
-        costs = list[Branch | Solution]()
-        name, begin, found = f"film at {film.rod_speed:+g} mm/s", time.perf_counter(), []
-        p_s, stroke = film.sealed_pressure, film.stroke
-        self.driver.observer.stage(name, sealed_pressure=p_s, stroke=stroke, steps=None)
-
-        def told(solution: Solution) -> Solution:
-            found.append(solution.forget())
-            self.driver.observer.step(
-                label=name,
-                parameter=float(len(found)),
-                iterations=solution.iterations,
-                residuals=solution.residual_norms,
-                fraction=None,
-            )
-            return solution
-
-        try:
-            yield told, costs
-        finally:
-            self.driver.records.append(
-                StageRecord(
-                    name=name,
-                    seconds=time.perf_counter() - begin,
-                    factorisations=sum(cost.factorisations for cost in costs),
-                    iterations=sum(cost.iterations for cost in costs),
-                    residual_histories=tuple(s.residual_norms for s in found),
-                    parameters=tuple(float(n) for n in range(1, len(found) + 1)),
-                    where=place(p_s, stroke),
-                    method="pseudo-transient continuation",
-                )
-            )
+    def _told(self, squeeze_film: SqueezeFilm) -> Told:
+        """A stage on the way to a film."""
+        film, method = squeeze_film.film, "pseudo-transient continuation"
+        name = f"film at {film.rod_speed:+g} mm/s"
+        return Told(self.driver, name, film.sealed_pressure, film.stroke, method)

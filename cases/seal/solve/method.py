@@ -90,7 +90,9 @@ class Judge:
         wanted = p.error_estimate and p.mesh == "graded"
         verdict = replace(self.contact, last=faster).after(numbers)
         verdict = replace(verdict, error=error if wanted else None)
-        state = film_state(film.system, film.problem, film.loads, film.x, verdict, film.iterations)
+        state = film_state(
+            *(film.system, film.problem, film.loads, film.x), verdict, film.solution.iterations
+        )
         state = replace(
             state,
             h_star_error_percent=error,
@@ -128,11 +130,7 @@ class DryContact:
         """The dry contact of a case; contacts: see `run`.  Raises StageError."""
         driver = PathDriver(observer, Newton(max_iterations=10, linear=choose(p.linear)))
         solver = ContactSolver(driver)
-        try:
-            return cls(*ContactMeshes(solver, ContactStore(contacts)).contact(p), solver)
-        except StageError as failed:
-            failed.records = tuple(driver.records)
-            raise
+        return cls(*ContactMeshes(solver, ContactStore(contacts)).contact(p), solver)
 
     @property
     def parameters(self) -> Seal:
@@ -145,7 +143,7 @@ class DryContact:
         return self.solver.driver.newton
 
     @property
-    def records(self) -> list[StageRecord]:
+    def records(self) -> Sequence[StageRecord]:
         """Cost of all that is solved; it grows."""
         return self.solver.driver.records
 
@@ -214,7 +212,7 @@ def run(
 
 def _outcome(
     system: SealSystem,
-    records: tuple[StageRecord, ...] | list[StageRecord],
+    records: Sequence[StageRecord],
     states: list[FilmState],
     failures: list[tuple[Status, str]],
     numbers: Mapping[str, float] | None = None,

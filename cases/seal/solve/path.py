@@ -7,19 +7,16 @@ A stage is a family of problems in one parameter. One that does not reach its en
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
 from softehl.cases.seal.states.state import Observer, StageRecord, place
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
-from softehl.runtime.solve.solution import Branch, Point
+from softehl.runtime.solve.solution import Branch, Point, Solution
 from softehl.runtime.solve.steps import StepRule
-
-_BOTH = "both"
-"""Strokes that a contact state serves."""
 
 
 def _nothing(point: Point) -> None:
@@ -54,11 +51,11 @@ class Stage:
 
 @dataclass(eq=False)
 class StageError(Exception):
-    """A stage that did not reach its end. records: what all stages so far have cost."""
+    """A stage that did not reach its end. records: what all stages have cost; it grows."""
 
     stage: Stage
     branch: Branch
-    records: tuple[StageRecord, ...] = ()
+    records: Sequence[StageRecord] = ()
 
     def __str__(self) -> str:
         """Words on how far the stage came, and what may help."""
@@ -89,44 +86,74 @@ class PathDriver:
         A wall's friction is that of the way since the step before, in the first one since x0.
         Raises StageError.
         """
-        begin = time.perf_counter()
-        self.observer.stage(
-            stage.name, sealed_pressure=stage.sealed_pressure, stroke=_BOTH, steps=None
-        )
-        points, before = list[Point](), [x0]
+        told = Told(self, stage.name, stage.sealed_pressure, "both", stage.method)
+        before = [x0]
 
         def problem_at(parameter: float) -> NonlinearProblem:
             problem = stage.problem_at(parameter)
             return problem.since(before[0]) if isinstance(problem, Problem) else problem
 
         def report(point: Point) -> None:
-            points.append(replace(point, solution=point.solution.forget()))
-            self.observer.step(
-                label=stage.name,
-                parameter=point.parameter,
-                iterations=point.solution.iterations,
-                residuals=point.solution.residual_norms,
-                fraction=stage.fraction(point.parameter),
-            )
+            told.step(point.solution, point.parameter, stage.fraction(point.parameter))
             before[0] = point.solution.x
             stage.on_point(point)
 
         continuation = Continuation(stage.corrector or self.newton, stage.steps, name=stage.name)
         branch = continuation.follow(problem_at, stage.start, stage.stop, x0, on_point=report)
-        self.records.append(_record(stage, branch, points, time.perf_counter() - begin))
-        if not branch.converged:
-            raise StageError(stage, branch)
+        failed = None if branch.converged else StageError(stage, branch, self.records)
+        told.end(branch, f"; ended: {branch.message}" if failed else "")
+        if failed:
+            raise failed
         return branch.last.x
 
 
-def _record(stage: Stage, branch: Branch, points: list[Point], seconds: float) -> StageRecord:
-    return StageRecord(
-        name=stage.name,
-        seconds=seconds,
-        factorisations=branch.factorisations,
-        iterations=branch.iterations,
-        residual_histories=tuple(p.solution.residual_norms for p in points),
-        parameters=tuple(p.parameter for p in points),
-        where=place(stage.sealed_pressure, _BOTH),
-        method=stage.method if branch.converged else f"{stage.method}; ended: {branch.message}",
-    )
+@dataclass(eq=False)
+class Told:
+    """A stage while it is solved: the observer hears of its steps, and its cost is recorded.
+
+    stroke: "both" where a contact state serves both. method: how it is solved.
+    """
+
+    driver: PathDriver
+    name: str
+    sealed_pressure: float
+    stroke: str
+    method: str
+    parameters: list[float] = field(default_factory=list)
+    histories: list[tuple[float, ...]] = field(default_factory=list)
+    begun: float = field(default_factory=time.perf_counter)
+
+    def __post_init__(self) -> None:
+        """Tell that it begins."""
+        p_s, stroke = self.sealed_pressure, self.stroke
+        self.driver.observer.stage(self.name, sealed_pressure=p_s, stroke=stroke, steps=None)
+
+    def step(
+        self, solution: Solution, parameter: float | None = None, fraction: float | None = None
+    ) -> None:
+        """A solution at a parameter, which counts them where there is none; share of the way."""
+        at = len(self.parameters) + 1.0 if parameter is None else parameter
+        self.parameters.append(at)
+        self.histories.append(solution.residual_norms)
+        self.driver.observer.step(
+            label=self.name,
+            parameter=at,
+            iterations=solution.iterations,
+            residuals=solution.residual_norms,
+            fraction=fraction,
+        )
+
+    def end(self, spent: Branch | Solution, ended: str = "") -> None:
+        """Record what was spent; ended: words on a stage that failed."""
+        self.driver.records.append(
+            StageRecord(
+                name=self.name,
+                seconds=time.perf_counter() - self.begun,
+                factorisations=spent.factorisations,
+                iterations=spent.iterations,
+                residual_histories=tuple(self.histories),
+                parameters=tuple(self.parameters),
+                where=place(self.sealed_pressure, self.stroke),
+                method=self.method + ended,
+            )
+        )

@@ -33,7 +33,7 @@ from softehl.cases.seal.solve.contact import OFFSET, held_moment, held_place
 from softehl.cases.seal.solve.inlet import InletScales
 from softehl.cases.seal.solve.layouts import NO_WIDTH
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.layered import Layer
+from softehl.runtime.fem.layered import Layer, Layered
 from softehl.runtime.fem.relaxed import Relaxed
 from softehl.runtime.fem.rules import content_rule, pressure_nodes
 
@@ -117,11 +117,7 @@ class SqueezeFilm:
 
     def carried(self, system: SealSystem, x: Array, dry: Array) -> SqueezeFilm:
         """Film on the mesh of another system; x: (n,) carried to it, dry: contact."""
-        film = replace(
-            self.film,
-            gap=system.arc_film(x)[1] + OFFSET,
-            entrance=0.0,
-        )
+        film = replace(self.film, gap=system.arc_film(x)[1] + OFFSET, entrance=0.0)
         return replace(self, system=system, layer=film_layer(system, x), film=film, dry=dry)
 
     def step(self, before: Array, tau: float, load: float) -> Relaxed:
@@ -137,6 +133,11 @@ class SqueezeFilm:
             state=before,
             rate=-1.0 / (tau * self.scales.time),
         )
+
+    def steady(self, before: Array) -> Layered:
+        """The equations of the steady film, from a state (n,) near by."""
+        problem = self.system.film_problem(self.film).since(before)
+        return Layered(problem, self.layer, (self.system.film_guard(),))
 
     def change(self, before: Array, after: Array) -> float:
         """Largest change of ln h along the arc; of h over its size between rough surfaces."""
