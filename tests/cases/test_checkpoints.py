@@ -9,16 +9,12 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact import contact_problem
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
-from softehl.cases.seal.solve.contact_solver import Checkpoint, Checkpoints, ContactSolver
+from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.states.state import Silent
+from softehl.runtime.solve.solution import Point, Solution, Status
 
 LOADED = Seal(sealed_pressure=10.0, density=1)
-
-
-def at(system: SealSystem, share: float) -> Checkpoint:
-    """A state under a share of the sealed pressure; its unknown is that."""
-    return Checkpoint(system, share * LOADED.sealed_pressure, np.array([share]))
 
 
 @pytest.fixture(scope="module")
@@ -27,32 +23,55 @@ def system() -> SealSystem:
     return build_system(LOADED)
 
 
-def share(checkpoints: Checkpoints, p: Seal = LOADED) -> float | None:
-    found = checkpoints.restart(p)
-    return found.pressure / p.sealed_pressure if found else None
+def at(share: float) -> Point:
+    """A state under a share of the sealed pressure; its unknown is that."""
+    solution = Solution(np.array([share]), Status.CONVERGED, "", (), 0, 0)
+    return Point(share * LOADED.sealed_pressure, solution)
+
+
+def share(solver: ContactSolver) -> float | None:
+    found = solver.checkpoint
+    return found.pressure / LOADED.sealed_pressure if found else None
 
 
 def test_a_path_is_taken_up_again_under_half_of_the_pressure(system: SealSystem) -> None:
-    checkpoints = Checkpoints()
-    assert share(checkpoints) is None
-    checkpoints.keep(at(system, 0.0))
-    assert share(checkpoints) is None  # at rest
+    solver = ContactSolver(PathDriver(Silent()))
+    assert share(solver) is None
+    solver.keep(system, at(0.0))
+    assert share(solver) is None  # at rest
     for pressure in (0.2, 0.4, 0.45, 0.7, 1.0):
-        checkpoints.keep(at(system, pressure))
-    assert share(checkpoints) == pytest.approx(0.45)
-    assert share(checkpoints, LOADED.model_copy(update={"housing_friction": 0.2})) is None
+        solver.keep(system, at(pressure))
+    assert share(solver) == pytest.approx(0.45)
 
 
-def test_a_new_path_replaces_what_lies_beyond_its_start(system: SealSystem) -> None:
-    checkpoints, finer = Checkpoints(), build_system(LOADED.model_copy(update={"density": 2}))
+def test_a_path_with_friction_is_not_taken_up_again() -> None:
+    solver = ContactSolver(PathDriver(Silent()))
+    solver.keep(build_system(LOADED.model_copy(update={"housing_friction": 0.2})), at(0.4))
+    assert share(solver) is None
+
+
+def test_a_new_path_replaces_the_last_one(system: SealSystem) -> None:
+    solver, finer = (
+        ContactSolver(PathDriver(Silent())),
+        build_system(LOADED.model_copy(update={"density": 2})),
+    )
     for pressure in (0.2, 0.4, 0.9):
-        checkpoints.keep(at(system, pressure))
-    checkpoints.begin(0.4 * LOADED.sealed_pressure)
-    assert share(checkpoints) == pytest.approx(0.2)
-    checkpoints.keep(at(finer, 0.5))
-    found = checkpoints.restart(LOADED)
-    assert found is not None
-    assert found.system is finer
+        solver.keep(system, at(pressure))
+    assert solver.checkpoint is not None
+    assert solver.checkpoint.system is system
+    solver.keep(finer, at(0.4))
+    assert solver.checkpoint.system is finer
+    assert share(solver) == pytest.approx(0.4)
+
+
+def test_a_path_from_rest_leaves_its_own_state(system: SealSystem) -> None:
+    light = build_system(LOADED.model_copy(update={"sealed_pressure": 1.0, "mesh": "uniform"}))
+    solver = ContactSolver(PathDriver(Silent()))
+    solver.keep(system, at(0.5))
+    solver.from_rest(light)
+    assert solver.checkpoint is not None
+    assert solver.checkpoint.system is light
+    assert 0.0 < solver.checkpoint.pressure <= 0.5
 
 
 def test_contact_above_three_shear_moduli_is_not_walked_from_rest_on_every_mesh() -> None:

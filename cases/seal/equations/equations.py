@@ -50,7 +50,6 @@ NUMBERED = {field.name: field.unknowns for field in FIELDS}
 """Fields with the names of their unknowns, in the order of the vector."""
 
 _ON = {field.name: field.on for field in FIELDS}
-_STILL = FilmLoads(0.0, "out", 0.0, np.empty(0))
 
 _STEP = 0.9
 """Share of its thickness that a film may lose in an iteration. Nine seals take 1.5 % more of them
@@ -62,7 +61,8 @@ def seal_study(p: Seal, section: SealSection, blocks: Sequence[Block]) -> Study:
 
     Raises KeyError for a kernel that asks for a value that nobody gives.
     """
-    places, still = _film_places(p, section), film_values(p, _STILL)
+    places = _film_places(p, section)
+    still = film_values(p, FilmLoads(0.0, "out", 0.0, np.empty(0)))
     elements = {
         **section.elements,
         "film_nodes": np.empty((len(places["film_nodes"]), 0), np.int64),

@@ -10,8 +10,8 @@ from softehl.cases.seal.gland.records.duty import Duty
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.runtime.arrays import Array
 
-PRESSURE, GAP, ROTATION, VOID = 1.0, 0.01, 1e-3, 1.0
-"""1 MPa on 1 mm of rod; 10 micrometres; 1 milliradian; a void fraction as of `surfaces`."""
+GAP, ROTATION, VOID = 0.01, 1e-3, 1.0
+"""10 micrometres; 1 milliradian; a void fraction as of `surfaces`."""
 
 DIFFERENCE = 1e-4
 """Difference of pressure along a segment, MPa: 1e-9 of it, to which Newton's method solves, is a
@@ -19,8 +19,8 @@ hundred times the last digit of 5 MPa."""
 
 
 def force(p: Gland) -> float:
-    """A pressure on the rod, N."""
-    return pi * abs(p.rod_diameter) * PRESSURE
+    """1 MPa on 1 mm of the rod, N."""
+    return pi * abs(p.rod_diameter)
 
 
 def gap(p: Gland) -> float:

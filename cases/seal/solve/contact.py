@@ -11,26 +11,23 @@ from __future__ import annotations
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import ContactLoads
+from softehl.cases.seal.equations.scales import GAP
 from softehl.cases.seal.equations.system import BORE, ROD
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.solve import remedies
-from softehl.cases.seal.solve.correctors import PressureNewton
-from softehl.cases.seal.solve.path import Stage
+from softehl.cases.seal.solve.path import STEPS, Stage
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
+from softehl.runtime.solve.newton import NonlinearProblem
 from softehl.runtime.solve.steps import StepRule
 
-OFFSET = 0.01
+OFFSET = GAP
 """Distance of the rod in contact, mm."""
 
 TOUCH = 1e-4
 """How far the section is moved into the wall before the pressure holds it there, in section
 diameters: enough to tell which nodes touch."""
-
-STEPS = StepRule(0.05, 3e-4, 0.3)
-"""Steps of the way of the rod, of the pressure over the shear modulus, of what friction takes."""
 
 COARSE_STEPS = StepRule(0.05, 1e-2, 0.3)
 """Steps of the pressure where a section can creep on (`solve.contact_relaxation`): it takes 10
@@ -62,37 +59,31 @@ def assembly(p: Seal) -> str:
     return words + (", loaded by the pressure from 0" if p.sealed_pressure > 0.0 else "")
 
 
-def approach_problem(system: SealSystem, closed: float) -> Problem:
-    """Rod and housing on their way from touching the free section (0) to their radii (1)."""
+def contact_problem(
+    system: SealSystem, sealed_pressure: float, place: float | None = None
+) -> Problem:
+    """Contact under a sealed pressure; place: where the section is held, left out: as of a film."""
     p = system.parameters
-    rod_gap = 0.5 * (p.inner_diameter - p.rod_diameter)
-    housing_gap = 0.5 * (p.housing_diameter - p.inner_diameter) - p.section_diameter
-    offsets = {
-        ROD: closed * OFFSET + (1.0 - closed) * rod_gap,
-        BORE: (1.0 - closed) * housing_gap,
-    }
-    return system.contact_problem(ContactLoads(offsets=offsets, place=0.0))
-
-
-def contact_problem(system: SealSystem, sealed_pressure: float) -> Problem:
-    """Contact under a sealed pressure."""
-    p = system.parameters
-    loads = ContactLoads(sealed_pressure, {ROD: OFFSET}, place=held_place(p), moment=held_moment(p))
+    place = held_place(p) if place is None else place
+    loads = ContactLoads(sealed_pressure, {ROD: OFFSET}, place=place, moment=held_moment(p))
     return system.contact_problem(loads)
 
 
 def approach_stage(system: SealSystem) -> Stage:
-    """First stage, without pressure: from the free section into the groove."""
+    """First stage, without pressure: rod and housing come to their radii, and squeeze the section.
+
+    They come from where they touch the free section.
+    """
     p = system.parameters
-    return Stage(
-        name="rod approach",
-        problem_at=lambda closed: approach_problem(system, closed),
-        start=0.0,
-        stop=1.0,
-        steps=STEPS,
-        sealed_pressure=0.0,
-        ended=lambda share: remedies.not_squeezed(p, share),
-    )
+    rod_gap = 0.5 * (p.inner_diameter - p.rod_diameter)
+    housing_gap = 0.5 * (p.housing_diameter - p.inner_diameter) - p.section_diameter
+
+    def at(closed: float) -> Problem:
+        left = 1.0 - closed
+        offsets = {ROD: closed * OFFSET + left * rod_gap, BORE: left * housing_gap}
+        return system.contact_problem(ContactLoads(offsets=offsets, place=0.0))
+
+    return Stage("rod approach", at, lambda share: remedies.not_squeezed(p, share))
 
 
 def at_air_wall(system: SealSystem, x: Array) -> tuple[Array, float]:
@@ -116,15 +107,7 @@ def release_stage(system: SealSystem, x: Array) -> Stage:
             ContactLoads(0.0, {ROD: OFFSET}, None, left * force, left * moment)
         )
 
-    return Stage(
-        name="release",
-        problem_at=at,
-        start=0.0,
-        stop=1.0,
-        steps=STEPS,
-        sealed_pressure=0.0,
-        ended=lambda _: remedies.not_released(p),
-    )
+    return Stage("release", at, lambda _: remedies.not_released(p))
 
 
 def load_stage(system: SealSystem, begin: float = 0.0, place: float | None = None) -> Stage:
@@ -133,29 +116,19 @@ def load_stage(system: SealSystem, begin: float = 0.0, place: float | None = Non
     place: where the section is held as long as there is no pressure, mm.
     """
     p = system.parameters
-
-    def at(p_s: float) -> Problem:
-        if p_s > 0.0 or place is None:
-            return contact_problem(system, p_s)
-        return system.contact_problem(ContactLoads(0.0, {ROD: OFFSET}, place))
-
     return Stage(
         name="sealed pressure",
-        problem_at=at,
+        problem_at=lambda p_s: contact_problem(system, p_s, None if p_s > 0.0 else place),
+        ended=lambda reached: remedies.not_loaded(p, reached),
         start=begin,
         stop=p.sealed_pressure,
         steps=(STEPS if p.rubs else COARSE_STEPS).scaled(p.shear_modulus),
         sealed_pressure=p.sealed_pressure,
-        ended=lambda reached: remedies.not_loaded(p, reached),
     )
 
 
 def correction_stage(
-    system: SealSystem,
-    problem: NonlinearProblem,
-    *,
-    method: str,
-    name: str = "",
+    system: SealSystem, problem: NonlinearProblem, method: str, name: str = ""
 ) -> Stage:
     """A stage of one step, from a state that is near; its name is by the density if left out.
 
@@ -166,18 +139,9 @@ def correction_stage(
     return Stage(
         name=label,
         problem_at=lambda _: problem,
+        ended=lambda _: remedies.not_carried(p, label),
         start=p.sealed_pressure,
         stop=p.sealed_pressure,
-        steps=StepRule(1.0, 1.0),
         sealed_pressure=p.sealed_pressure,
-        ended=lambda _: remedies.not_carried(p, label),
         method=method,
     )
-
-
-def path_corrector(system: SealSystem, newton: Newton) -> Corrector | None:
-    """Corrector of the steps of a contact path, None for Newton's method as it stands."""
-    p = system.parameters
-    if p.solver != "auto" or p.rubs:
-        return None
-    return PressureNewton(newton, system)

@@ -13,11 +13,10 @@ the pressure the pockets are wide.
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact import (
     approach_stage,
     at_air_wall,
@@ -25,10 +24,10 @@ from softehl.cases.seal.solve.contact import (
     correction_stage,
     held_place,
     load_stage,
-    path_corrector,
     release_stage,
 )
 from softehl.cases.seal.solve.contact_relaxation import CreepCorrector
+from softehl.cases.seal.solve.correctors import PressureNewton
 from softehl.cases.seal.solve.path import PathDriver, Stage, StageError
 from softehl.cases.seal.solve.transfer import carried_contact
 from softehl.runtime.arrays import Array
@@ -49,36 +48,16 @@ class Checkpoint:
     x: Array
 
 
-@dataclass
-class Checkpoints:
-    """States on the way to the sealed pressure, the pressures rising; they grow with a path."""
-
-    states: list[Checkpoint] = field(default_factory=list)
-
-    def begin(self, pressure: float) -> None:
-        """A path that begins at a pressure, MPa, replaces what lies beyond."""
-        self.states = [state for state in self.states if state.pressure < pressure]
-
-    def keep(self, state: Checkpoint) -> None:
-        """The next state of a path."""
-        self.states.append(state)
-
-    def restart(self, p: Seal) -> Checkpoint | None:
-        """State at which to take up the path of a case; None where there is nothing but rest.
-
-        With friction there is not: what slips remembers its path.
-        """
-        most = 0.0 if p.rubs else _SHARE * p.sealed_pressure
-        below = [state for state in self.states if 0.0 < state.pressure <= most]
-        return below[-1] if below else None
-
-
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class ContactSolver:
-    """Finds contact states. driver: follows their paths; checkpoints: of the last of these."""
+    """Finds contact states.
+
+    driver: follows their paths. checkpoint: where the last path may be taken up again, under at
+    most half of the sealed pressure, None where there is nothing but rest; it changes with a path.
+    """
 
     driver: PathDriver
-    checkpoints: Checkpoints = field(default_factory=Checkpoints)
+    checkpoint: Checkpoint | None = None
 
     def from_rest(self, system: SealSystem) -> Array:
         """The contact state (n,) by its path: rod approach, then the sealed pressure.
@@ -99,7 +78,7 @@ class ContactSolver:
 
         Raises StageError.
         """
-        p_s, before = new.parameters.sealed_pressure, self.checkpoints.restart(new.parameters)
+        p_s, before = new.parameters.sealed_pressure, self.checkpoint
         with suppress(StageError):
             return new, self._corrected(Checkpoint(old, p_s, x), new, name)
         if before:
@@ -117,12 +96,10 @@ class ContactSolver:
         self, system: SealSystem, x: Array, begin: float = 0.0, place: float | None = None
     ) -> Array:
         """From the section x (n,) to the sealed pressure; begin, place: as of `load_stage`."""
-        self.checkpoints.begin(begin)
-
-        def keep(point: Point) -> None:
-            self.checkpoints.keep(Checkpoint(system, point.parameter, point.solution.x))
-
-        stage = replace(load_stage(system, begin, place), on_point=keep)
+        if not begin:
+            self.checkpoint = None
+        stage = load_stage(system, begin, place)
+        stage = replace(stage, on_point=lambda point: self.keep(system, point))
         try:
             return self._follow(system, stage, x)
         except StageError as failed:
@@ -132,15 +109,22 @@ class ContactSolver:
                     return self.driver.follow(self._creep(system), last)
             raise
 
+    def keep(self, system: SealSystem, point: Point) -> None:
+        """A state of a path of the pressure. With friction none: what slips remembers its path."""
+        p = system.parameters
+        if 0.0 < point.parameter <= _SHARE * p.sealed_pressure and not p.rubs:
+            self.checkpoint = Checkpoint(system, point.parameter, point.solution.x)
+
     def _creep(self, system: SealSystem) -> Stage:
         """From a state under any pressure to the sealed pressure."""
         problem = contact_problem(system, system.parameters.sealed_pressure)
-        stage = correction_stage(
-            system, problem, method="pseudo-transient continuation", name="creep to the contact"
-        )
+        method, name = "pseudo-transient continuation", "creep to the contact"
+        stage = correction_stage(system, problem, method, name)
         return replace(stage, corrector=CreepCorrector(system, self.driver.newton))
 
     def _follow(self, system: SealSystem, stage: Stage, x: Array) -> Array:
         """To the end of a stage, by the corrector of paths."""
-        corrector = path_corrector(system, self.driver.newton)
-        return self.driver.follow(replace(stage, corrector=corrector), x)
+        p = system.parameters
+        if p.solver == "auto" and not p.rubs:
+            stage = replace(stage, corrector=PressureNewton(self.driver.newton, system))
+        return self.driver.follow(stage, x)

@@ -18,30 +18,29 @@ from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
 from softehl.runtime.solve.solution import Branch, Point, Solution
 from softehl.runtime.solve.steps import StepRule
 
-
-def _nothing(point: Point) -> None:
-    """Default of Stage.on_point."""
+STEPS = StepRule(0.05, 3e-4, 0.3)
+"""Steps of the way of the rod, of the pressure over the shear modulus, of what friction takes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
     """A family of problems in one parameter, to be followed from `start` to `stop`.
 
-    name, sealed_pressure: labels for observers and records. method: how it is solved, for the
-    record. ended: words for a path that ends at a parameter. corrector: what solves it, None for
-    the driver's Newton.
+    Where these are the same it has one step. name, sealed_pressure: labels for observers and
+    records. ended: words for a path that ends at a parameter. method: how it is solved, for the
+    record. corrector: what solves it, None for the driver's Newton.
     """
 
     name: str
     problem_at: Callable[[float], NonlinearProblem]
-    start: float
-    stop: float
-    steps: StepRule
-    sealed_pressure: float
     ended: Callable[[float], str]
+    start: float = 0.0
+    stop: float = 1.0
+    steps: StepRule = STEPS
+    sealed_pressure: float = 0.0
     method: str = "newton"
     corrector: Corrector | None = None
-    on_point: Callable[[Point], None] = _nothing
+    on_point: Callable[[Point], None] | None = None
 
     def fraction(self, parameter: float) -> float:
         """Share of the way, 0 to 1."""
@@ -96,7 +95,8 @@ class PathDriver:
         def report(point: Point) -> None:
             told.step(point.solution, point.parameter, stage.fraction(point.parameter))
             before[0] = point.solution.x
-            stage.on_point(point)
+            if stage.on_point:
+                stage.on_point(point)
 
         continuation = Continuation(stage.corrector or self.newton, stage.steps, name=stage.name)
         branch = continuation.follow(problem_at, stage.start, stage.stop, x0, on_point=report)

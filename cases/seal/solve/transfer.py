@@ -51,8 +51,7 @@ def carried_contact(
     y = carried_unknowns(old, new, x)
     bare = contact_problem(new, sealed_pressure).since(y)
     problem = lagged(new, bare, transfer_elements(old.mesh, new.mesh, pressures))
-    stage = correction_stage(new, problem, method="newton, carried from another mesh", name=name)
-    return stage, y
+    return correction_stage(new, problem, "newton, carried from another mesh", name), y
 
 
 def carried_unknowns(old: SealSystem, new: SealSystem, x: Array) -> Array:
