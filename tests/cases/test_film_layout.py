@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
+from softehl.cases.seal.section.layout import RATE
 from softehl.cases.seal.solve.layouts import (
     COARSEST_OF_FILM,
-    RATE,
     RISE,
-    THIN,
     THINNING,
     film_layout,
     misfit,
     sizes,
 )
+from softehl.cases.seal.states.film_signs import INLET
 from softehl.runtime.arrays import Array
 from tests.cases.oring_cases import oring
 
@@ -51,7 +51,7 @@ def test_thickness_and_pressure_ask_for_so_much_of_their_change(system: SealSyst
     thin = THICKNESS * np.exp(k * s - 6.0)  # from 1/400 of it to 400 times
     x = film(system, thin, np.ones(len(s)))
     at, size = sizes(system, x, THICKNESS)
-    inside = (k * at - 6.0 < np.log(THIN) - 0.5) & (k * at - 6.0 > np.log(1e-3) + 0.5)
+    inside = (k * at - 6.0 < np.log(INLET[0]) - 0.5) & (k * at - 6.0 > np.log(1e-3) + 0.5)
     assert size[inside] == pytest.approx(np.full(inside.sum(), THINNING / k))
     assert size[-1] == pytest.approx(s[-1] / COARSEST_OF_FILM)  # too thick to matter
     peak = np.minimum(rise * s, 1.0)

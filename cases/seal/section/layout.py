@@ -27,6 +27,9 @@ _LEVEL, _LOOKED_AT = 1e-6, 4001
 These find the lobes of an X-ring to be as low within 4e-8, 1001 within 4e-7; at 1e-8 the pressure
 ends at the other lobe, and h* is 1.2 % off."""
 
+RATE = 0.3
+"""Growth of the segments with the distance from what they resolve."""
+
 EDGE_ANGLES = range(27, 70, 3)
 """Places where a section may meet the edge of the gap under pressure, degrees from the bottom:
 every 6 degrees, or from 15 to 81, change h* and friction of an O-ring by 0.003 and 0.14 %."""
@@ -189,4 +192,4 @@ def _fine_at_edge(shape: Shape) -> Spacing:
     degree = radians(0.5) * (shape.outline.box[2] - shape.outline.box[0])
     spots = [Spot(angle * degree - begin) for angle in EDGE_ANGLES]
     length = end - begin
-    return graded(length, spots, 2 * LONG_OPEN, coarsest=0.05 * length, rate=0.3)
+    return graded(length, spots, 2 * LONG_OPEN, coarsest=0.05 * length, rate=RATE)

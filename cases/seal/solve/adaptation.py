@@ -12,12 +12,13 @@ from fractions import Fraction
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
-from softehl.cases.seal.solve.layouts import film_layout, misfit
+from softehl.cases.seal.solve.layouts import CYCLES, film_layout, misfit
 from softehl.cases.seal.solve.path import StageError
 from softehl.cases.seal.solve.transfer import FilmTransfer
-from softehl.cases.seal.states.estimate import coarser_density, friction_bound, system_at
+from softehl.cases.seal.states.estimate import coarser_density, friction_bound
 from softehl.cases.seal.states.verdict import LARGEST_ERROR, FilmNumbers, fewest_inlet_segments
 from softehl.runtime.mesh.mesh import MeshError
 
@@ -30,9 +31,6 @@ three times as long, and one of 13 other seals loses a state."""
 ALIKE = 1.25
 """Ratio of the segments that two meshes have for a film, relative to their densities: what they
 differ by shows the error of both only where they resolve the same things alike."""
-
-CYCLES = 3
-"""Meshes that are made for a film, at most, and for the coarser one of its estimate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +101,7 @@ class Adaptation:
         like: the film on another mesh, which this one must resolve as well for its density. most:
         segments that it may ask for in the place of one, without that.
         """
-        p, segments = film.system.parameters, film.numbers.inlet_segments
+        p, segments = self.p, film.numbers.inlet_segments
         if p.mesh != "graded":
             return True
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
@@ -119,40 +117,41 @@ class Adaptation:
             return None
         squeeze_film, now = found.begun
         layout = film_layout(squeeze_film.system, now.x, squeeze_film.scales.thickness)
-        try:
-            return self._carried(found, build_system(self.p, layout, density))
-        except MeshError:
-            return None
+        return self._carried(found, self._system(layout, density))
 
     def _coarser(self, film: Film, last: Sequence[Adapted]) -> Film | None:
         """The film on a coarser mesh that fits it, too, for the estimate; None without one."""
-        p = film.system.parameters
-        if not (p.error_estimate and p.mesh == "graded"):
+        if not (self.p.error_estimate and self.p.mesh == "graded"):
             return None
-        density = coarser_density(p.density)
+        density = coarser_density(self.p.density)
         before = [a.coarser for a in last if a.coarser and a.film.system is film.system]
-        found: Film | NoFilm | None = None
         if before:
-            system = before[-1].system
-            found = self.films.on(system).from_neighbour(before, film.loads.speed)
+            solver = self.films.on(before[-1].system)
+            found = solver.from_neighbour(before, film.loads.speed)
+            system: SealSystem | None = solver.system
         else:
-            try:
-                system = system_at(film.system, density)
-            except MeshError:
-                return None  # too coarse for the corners of a section
+            found, system = None, self._system(film.system.section.layout, density)
         if not isinstance(found, Film):
             found = self._carried(film, system)
         if isinstance(found, Film):
             found = self._settled(found, density, film)
         return found if isinstance(found, Film) else None
 
-    def _carried(self, found: Film | NoFilm, system: SealSystem) -> Film | NoFilm | None:
-        """The film on the mesh of a system; None where there is no contact state on it.
+    def _system(self, layout: Layout, density: Fraction) -> SealSystem | None:
+        """The system on a mesh; None where that is too coarse for the corners of a section."""
+        try:
+            return build_system(self.p, layout, density)
+        except MeshError:
+            return None
+
+    def _carried(self, found: Film | NoFilm, system: SealSystem | None) -> Film | NoFilm | None:
+        """The film on the mesh of a system; None where there is no mesh, or no contact state on it.
 
         It is squeezed out from the contact if none was found, or if the carried one ends. Two of
         three O-rings that take this have no `ok` at -10 mm/s without it (docs/validation).
         """
-        assert found.begun is not None
+        if system is None or found.begun is None:
+            return None
         squeeze_film, now = found.begun
         try:
             dry = self.contacts.from_mesh(squeeze_film.system, squeeze_film.dry, system)

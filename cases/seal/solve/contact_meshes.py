@@ -29,7 +29,7 @@ from softehl.cases.seal.gland.records.oil import Oil
 from softehl.cases.seal.gland.surfaces import Surfaces
 from softehl.cases.seal.solve.contact import contact_problem, correction_stage
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
-from softehl.cases.seal.solve.layouts import contact_layout, on_wall
+from softehl.cases.seal.solve.layouts import CYCLES, DENSITY, contact_layout, on_wall
 from softehl.cases.seal.solve.path import Stage, StageError
 from softehl.cases.seal.states.contacts import unsealed
 from softehl.runtime.arrays import Array
@@ -47,12 +47,6 @@ WITHOUT_INFLUENCE = (
 
 COARSE = 1
 """Density of the mesh on which the path from rest is followed."""
-
-GUIDE = 2
-"""Density of the last graded mesh; finer ones have its layout."""
-
-SEALS = 3
-"""Meshes, at most, until the sealed pressure ends where something touches and the arc off walls."""
 
 
 def contact_key(parameters: Seal) -> str:
@@ -109,11 +103,8 @@ def _fields(system: SealSystem) -> tuple[str, ...]:
 
 def stored_contact(system: SealSystem) -> Stage:
     """A stage of one step that verifies a stored state, or corrects it in a few iterations."""
-    return correction_stage(
-        system,
-        contact_problem(system, system.parameters.sealed_pressure),
-        method="newton, from a stored contact state",
-    )
+    problem = contact_problem(system, system.parameters.sealed_pressure)
+    return correction_stage(system, problem, "newton, from a stored contact state")
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +133,7 @@ class ContactMeshes:
     def _graded(self, p: Seal) -> State:
         """On meshes that the contact places, the last of which is finer."""
         # what sticks keeps the rotation of the mesh on which it began to
-        guide = min(GUIDE, p.density)
+        guide = min(DENSITY, p.density)
         coarse = guide if p.rubs else COARSE
         uniform = build_system(_at(p.model_copy(update={"mesh": "uniform"}), coarse))
         seen = self._next((uniform, self._begun(uniform)), _at(p, coarse))
@@ -150,7 +141,7 @@ class ContactMeshes:
 
     def _sealed(self, p: Seal, state: State) -> State:
         """On the last of the graded meshes; on more where its arc or the pressure ends badly."""
-        for _ in range(SEALS):
+        for _ in range(CYCLES):
             state = self._next(state, p)
             if p.given_arc or not (unsealed(*state) or on_wall(*state)):
                 break

@@ -20,7 +20,7 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.system import BORE, ROD
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.gland import Gland
-from softehl.cases.seal.section.layout import Layout, uniform_layout
+from softehl.cases.seal.section.layout import RATE, Layout, uniform_layout
 from softehl.cases.seal.solve.inlet import film_thickness
 from softehl.cases.seal.states.contacts import contact_edges
 from softehl.cases.seal.states.film_signs import INLET
@@ -28,13 +28,13 @@ from softehl.cases.seal.states.section_view import film_pressure
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.spacing import STATIONS, Spacing, Spot, graded
 
-RATE = 0.3
-"""Growth of the segments with the distance from the edges."""
-
 COARSEST, COARSEST_OF_FILM = 18, 24
 """An arc is at least as many of its longest segments long at density 2: for contact, for a film."""
 
-_DENSITY, _THIRDS = 2, 3
+CYCLES = 3
+"""Meshes that are made, at most, for a contact, for a film, for the coarser one of its estimate."""
+
+DENSITY, _THIRDS = 2, 3
 """Density that the sizes are for; others divide or join segments. Segments at density 1 are a
 multiple of three, because meshes exist for thirds of a density."""
 
@@ -50,9 +50,6 @@ NO_WIDTH = 1e-6
 
 THINNING, RISE = 0.3, 0.05
 """Changes along a segment at density 2: of ln h where the film is thin, of p over its maximum."""
-
-THIN = INLET[0]
-"""Film, of that at the inlet, from which on its thickness does not decide about the segments."""
 
 DEPTH = 2.5
 """Elements below the arc are nowhere thicker than so many of its shortest segments: with ten h* was
@@ -82,7 +79,7 @@ def contact_layout(system: SealSystem, x: Array, p: Seal) -> Layout:
     if p.opens:
         spots.append(_edge_spot(system, x, p, (begin, begin + length)))
         first = spots[-1].most
-    spacing = graded(length, spots, layout.long * _DENSITY, coarsest=length / COARSEST, rate=RATE)
+    spacing = graded(length, spots, layout.long * DENSITY, coarsest=length / COARSEST, rate=RATE)
     return layout.graded(spacing, layout.long, first=first)
 
 
@@ -142,10 +139,10 @@ def film_layout(system: SealSystem, x: Array, thickness: float) -> Layout:
     """
     s, size = sizes(system, x, thickness)
     at, long_before = system.section.places, system.section.layout.long
-    before = np.diff(at) * system.mesh.arc / (long_before * _DENSITY)
+    before = np.diff(at) * system.mesh.arc / (long_before * DENSITY)
     size = np.minimum(size, before[_segments(at, s)])
     index = _index(s, size)
-    long = _THIRDS * ceil(index[-1] / (_DENSITY * _THIRDS))
+    long = _THIRDS * ceil(index[-1] / (DENSITY * _THIRDS))
     layout = system.section.layout
     return layout.graded(Spacing.of(s, index), long, DEPTH * float(size.min()))
 
@@ -154,7 +151,7 @@ def misfit(system: SealSystem, x: Array, thickness: float, density: float) -> fl
     """Largest number of segments that a film x (n,) asks for in the place of one of its mesh."""
     s, size = sizes(system, x, thickness)
     wanted = np.diff(np.interp(system.section.places, s, _index(s, size)))
-    return float(wanted.max()) * density / _DENSITY
+    return float(wanted.max()) * density / DENSITY
 
 
 def _index(s: Array, size: Array) -> Array:
@@ -168,7 +165,7 @@ def sizes(system: SealSystem, x: Array, thickness: float) -> tuple[Array, Array]
     dx = np.diff(at)
     log_h = np.log(np.maximum(h, _CLOSED * thickness))
     slope_h = np.abs(np.diff(log_h)) / dx
-    slope_h[np.minimum(h[:-1], h[1:]) > THIN * thickness] = 0.0
+    slope_h[np.minimum(h[:-1], h[1:]) > INLET[0] * thickness] = 0.0  # too thick to decide
     slope_p = np.abs(np.diff(p)) / dx
     wanted = np.maximum(slope_h / THINNING, slope_p / (RISE * np.abs(p).max()))
     longest = at[-1] / COARSEST_OF_FILM

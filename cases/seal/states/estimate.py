@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.verdict import (
     FINER,
@@ -38,11 +37,6 @@ COMPARED = 5.0
 def coarser_density(density: int) -> Fraction:
     """Density of the coarser mesh; meshes exist for multiples of one third."""
     return Fraction(density, 2) if density >= 4 else Fraction(5 * density // 2, 3)
-
-
-def system_at(system: SealSystem, density: Fraction) -> SealSystem:
-    """The system on a mesh of the same spacing and another density."""
-    return build_system(system.parameters, system.section.layout, density)
 
 
 def estimated_error(density: int, value: float, other: float) -> float:
