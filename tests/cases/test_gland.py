@@ -80,7 +80,7 @@ def test_what_cannot_be_reached_is_told_in_words_of_the_problem() -> None:
     }
     for says, stage in stages.items():
         failed = StageError(stage, Branch((), Status.MAX_ITERATIONS, "last norms"))
-        status, message = explained(failed, "contact", p)
+        status, message = explained(failed, p)
         assert status is Status.MAX_ITERATIONS
         assert says in message
         assert "squeeze 12.9 %, width 4.699 mm" in message

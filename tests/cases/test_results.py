@@ -28,7 +28,6 @@ from softehl.cases.seal.states.state import (
     UNDER_RESOLVED,
 )
 from softehl.cases.seal.states.verdict import (
-    INLET_RATIO,
     FilmNumbers,
     Verdict,
     fewest_inlet_segments,
@@ -218,7 +217,7 @@ def test_ok_is_a_promise(
     changes: dict[str, Any], error: float | None, word: str, says: str
 ) -> None:
     """Nothing is ok whose inlet, arc, thickness or estimated error speaks against it."""
-    start = Verdict(reference=4.0, ratios=INLET_RATIO, error=error)
+    start = Verdict(reference=4.0, slopes=True, error=error)
     verdict = start.after(replace(HEALTHY, **changes))
     assert verdict.word == word
     assert says in verdict.advice

@@ -33,7 +33,6 @@ from softehl.cases.seal.states.contacts import (
 from softehl.cases.seal.states.results import filled_ratio, film_parts, metering
 from softehl.cases.seal.states.state import OSCILLATING, Outcome, Silent
 from softehl.cases.seal.states.verdict import (
-    INLET_RATIO,
     ContactNumbers,
     FilmNumbers,
     Verdict,
@@ -246,7 +245,7 @@ def test_two_contacts_that_carry_different_fluxes_are_not_believed() -> None:
 
 
 def test_the_second_inlet_is_to_be_seen_too_where_it_is_filled() -> None:
-    verdict = Verdict(3.8, references=(2.1, 3.8), ratios=INLET_RATIO)
+    verdict = Verdict(3.8, references=(2.1, 3.8), slopes=True)
     film = _numbers(0.27, 0.27)
     sealed, air = film.contacts
     rough = verdict.after(replace(film, contacts=(sealed, replace(air, inlet_ratio=0.74))))

@@ -74,7 +74,7 @@ def run_cycles(parameters: Any, motion: Motion, observer: Observer, log: Log) ->
     try:
         contact = DryContact.of(p, ObserverAdapter(observer))
     except StageError as failed:
-        return _outcome(p, *explained(failed, "contact", p))
+        return _outcome(p, *explained(failed, p))
     begun, linear = contact.film("out", speed), contact.newton.linear
     if isinstance(begun, NoFilm) or not isinstance(linear, Condenser):
         words = f"no steady film at U = {speed:g} mm/s to begin with; use a finer mesh (density)"

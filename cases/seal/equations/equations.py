@@ -41,6 +41,7 @@ from softehl.runtime.fem.assembly import ElementKernel
 from softehl.runtime.fem.contact import Obstacle, contact_data
 from softehl.runtime.fem.dofs import chain_dofs, separate_dofs
 from softehl.runtime.fem.guards import ChangesLittle, Guard, KeepsOrientation, StaysPositive
+from softehl.runtime.fem.lagged_pressure import element_pressures
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.mesh import Mesh
@@ -179,6 +180,10 @@ class SealSystem(SealUnknowns):
         solids = [block for block in self.blocks if block.group == "solid"]
         moduli = [self.parameters.rubber(block.region).bulk_modulus for block in solids]
         return np.repeat(moduli, [len(self.section.elements[b.elements]) for b in solids])
+
+    def element_pressures(self, x: Array) -> Array:
+        """Mean stress (elements,) of the section x (n,), MPa, positive in tension."""
+        return element_pressures(self.problem, self.solids, x)
 
     def reaction(self, name: str, x: Array) -> float:
         """Axial force of a wall on the section, the sum of normal forces on the bore, N."""

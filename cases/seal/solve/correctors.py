@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
+from softehl.runtime.fem.lagged_pressure import LaggedPressure
 from softehl.runtime.fem.layered import Layered
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.relaxed import Anchored, Relaxed
@@ -60,14 +60,14 @@ class PressureNewton:
         """Solve R(x) = 0 from x0, (n,); of an anchored problem the one within is lagged."""
         bare = problem if isinstance(problem, Problem) else problem.problem
         if self.pressures is None:
-            self.pressures = element_pressures(bare, self.system.solids, x0)
+            self.pressures = self.system.element_pressures(x0)
         held: NonlinearProblem = lagged(self.system, bare, self.pressures)
         if isinstance(problem, Relaxed | Anchored):
             held = Anchored(held, problem.term, problem.state)
         start = problem.admissible(x0) if isinstance(problem, Layered) else x0
         solution = self.newton.solve(held, start)
         if solution.converged:
-            self.pressures = element_pressures(bare, self.system.solids, solution.x)
+            self.pressures = self.system.element_pressures(solution.x)
         return solution
 
     def take_up(self, problem: Problem | Layered | Anchored, x: Array) -> None:

@@ -11,7 +11,7 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.loads import Stroke
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.adaptation import Adaptation, Adapted
-from softehl.cases.seal.solve.contact import assembly, contact_problem
+from softehl.cases.seal.solve.contact import assembly
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes, ContactStore
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
@@ -37,8 +37,6 @@ from softehl.cases.seal.states.state import (
     StageRecord,
 )
 from softehl.cases.seal.states.verdict import (
-    ANY_RATIO,
-    INLET_RATIO,
     FilmNumbers,
     Verdict,
     fewest_inlet_segments,
@@ -62,7 +60,7 @@ def verdict_of_contact(system: SealSystem, x: Array) -> Verdict:
     return Verdict(
         float(contact_pressure(system, p.sealed_pressure, x).max()),
         fewest=fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes),
-        ratios=ANY_RATIO if p.mesh == "uniform" else INLET_RATIO,
+        slopes=p.mesh != "uniform",
         rough=p.rough,
         unsealed=unsealed(system, x),
         references=contact_peaks(system, p.sealed_pressure, x),
@@ -150,8 +148,7 @@ class DryContact:
     @property
     def state(self) -> ContactState:
         """The state that is reported."""
-        p_s = self.parameters.sealed_pressure
-        return contact_state(self.system, contact_problem(self.system, p_s), p_s, self.x)
+        return contact_state(self.system, self.x)
 
     @property
     def films(self) -> FilmSolver:
@@ -189,7 +186,7 @@ def run(
     try:
         contact = DryContact.of(parameters, observer, contacts)
     except StageError as failed:  # the size of the problem alone is reported
-        failures = [explained(failed, "contact", parameters)]
+        failures = [explained(failed, parameters)]
         return _outcome(build_system(parameters), failed.records, [], failures)
     observer.contact_state(contact.state)
     judge = Judge(verdict_of_contact(contact.system, contact.x), differentiate)

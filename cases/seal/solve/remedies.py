@@ -91,13 +91,10 @@ def _gland(p: Gland) -> str:
     return f"squeeze {p.squeeze_percent:.3g} %, width {p.groove_width:g} mm"
 
 
-def explained(failed: StageError, where: str, p: Numerics) -> tuple[Status, str]:
-    """Status and message of a run that ends with this stage.
-
-    where: which part of the run it was.
-    """
+def explained(failed: StageError, p: Numerics) -> tuple[Status, str]:
+    """Status and message of a run that ends with this stage of the contact."""
     advice = f"; {ROLLING}" if p.rotation == "free" else ""
-    return failed.branch.status, f"{where}: {failed}{advice}"
+    return failed.branch.status, f"contact: {failed}{advice}"
 
 
 def without_films(missed: Sequence[NoFilm], p: Seal) -> tuple[Status, str]:

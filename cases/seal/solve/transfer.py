@@ -24,7 +24,6 @@ from softehl.cases.seal.solve.contact import contact_problem, correction_stage
 from softehl.cases.seal.solve.correctors import lagged
 from softehl.cases.seal.solve.path import Stage
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.fem.lagged_pressure import element_pressures
 from softehl.runtime.fem.rules import lagrange, pressure_nodes
 from softehl.runtime.mesh.carried_mesh import potential
 from softehl.runtime.mesh.transfer import (
@@ -47,8 +46,7 @@ def carried_contact(
     x: unknowns of the contact state on the old mesh, under a sealed pressure, MPa. name: of the
     stage, by the density if left out.
     """
-    pressures = element_pressures(contact_problem(old, sealed_pressure), old.solids, x)
-    y = carried_unknowns(old, new, x)
+    pressures, y = old.element_pressures(x), carried_unknowns(old, new, x)
     bare = contact_problem(new, sealed_pressure).since(y)
     problem = lagged(new, bare, transfer_elements(old.mesh, new.mesh, pressures))
     return correction_stage(new, problem, "newton, carried from another mesh", name), y
@@ -92,8 +90,8 @@ class FilmTransfer:
 
     def pressures(self, x: Array) -> Array:
         """Mean stresses (Q',) of the elements."""
-        change = _pressures(self.old, x) - _pressures(self.old, self.dry[0])
-        there = _pressures(self.new, self.dry[1])
+        change = self.old.element_pressures(x) - self.old.element_pressures(self.dry[0])
+        there = self.new.element_pressures(self.dry[1])
         return there + transfer_elements(self.old.mesh, self.new.mesh, change)
 
     def _thickness(self, x: Array, places: Array) -> Array:
@@ -104,10 +102,16 @@ class FilmTransfer:
         return np.asarray(np.exp(PchipInterpolator(before, np.log(h))(places)))
 
     def _film(self, x: Array, y: Array) -> None:
-        """Film pressures, by the segment of the old mesh that each of the new ones is in."""
+        """Write the film pressures of x (n,) into y (n',).
+
+        Each segment takes them from that of the old mesh in which it is.
+        """
         nodes, places = pressure_nodes(self.new.parameters.pressure_order), self._places
         at = places[:-1, None] + np.diff(places)[:, None] * (0.5 * (1.0 + nodes))
-        carry_pressures(self.old, self.new, x, y, modes_at(self.old.section.places, nodes, at))
+        segment, weights = modes_at(self.old.section.places, nodes, at)
+        for film in self.old.film_fields():
+            rows = x[self.old.pressure_dofs(film.name)]
+            y[self.new.pressure_dofs(film.name)] = np.einsum("skm,skm->sk", weights, rows[segment])
 
     @cached_property
     def _places(self) -> Array:
@@ -128,11 +132,6 @@ class FilmTransfer:
         return np.asarray((self._places >= first) & (self._places <= last))
 
 
-def _pressures(system: SealSystem, x: Array) -> Array:
-    """Mean stress (Q,) of the elements of the section x (n,)."""
-    return element_pressures(system.problem, system.solids, x)
-
-
 def modes_at(before: Array, nodes: Array, at: Array) -> tuple[Integers, Array]:
     """Segment (s, m) of an arc with nodes at these places that holds a place, (s, m); its modes
     there, (s, m, n). nodes: (n,) parent coordinates of its pressures.
@@ -141,13 +140,3 @@ def modes_at(before: Array, nodes: Array, at: Array) -> tuple[Integers, Array]:
     local = 2.0 * (at - before[segment]) / np.diff(before)[segment] - 1.0
     modes = lagrange(nodes, np.clip(local.ravel(), -1.0, 1.0))[:, :, 0]
     return segment, modes.reshape(*segment.shape, -1)
-
-
-def carry_pressures(
-    old: SealSystem, new: SealSystem, x: Array, y: Array, at: tuple[Integers, Array]
-) -> None:
-    """Write the film pressures of x (n,) into y (n',), by `modes_at` the new ones."""
-    segment, weights = at
-    for film in old.film_fields():
-        rows = x[old.pressure_dofs(film.name)]
-        y[new.pressure_dofs(film.name)] = np.einsum("skm,skm->sk", weights, rows[segment])

@@ -14,7 +14,6 @@ from softehl.cases.seal.states.section_view import section_view
 from softehl.cases.seal.states.state import ContactState
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.fem.contact import tributary_areas
-from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mesh.outline_checks import crossing
 
 CONTACT_FILM = 0.02
@@ -104,14 +103,11 @@ def _edge(s: Array, squares: Array, outside: float | None) -> Edge:
     return Edge(float(place), abs(float(slope)))
 
 
-def contact_state(
-    system: SealSystem, problem: Problem, sealed_pressure: float, x: Array
-) -> ContactState:
+def contact_state(system: SealSystem, x: Array) -> ContactState:
     """The frictionless contact state with the unknowns x."""
-    mesh = system.mesh
-    deformed = system.deformed(x)
-    arc = deformed[mesh.arc_nodes]
+    sealed_pressure = system.parameters.sealed_pressure
     pressure = contact_pressure(system, sealed_pressure, x)
+    arc = system.deformed(x)[system.mesh.arc_nodes]
     touching = np.flatnonzero(system.rod_multipliers(x) < 0.0)
     ends = arc[touching[[0, -1]], 0] if len(touching) else np.full(2, np.nan)
     return ContactState(
@@ -121,7 +117,7 @@ def contact_state(
         contact_end_mm=float(ends[1]),
         x_mm=arc[:, 0].copy(),
         p_MPa=pressure,
-        section=section_view(system, problem, x, pressure),
+        section=section_view(system, x, pressure),
     )
 
 

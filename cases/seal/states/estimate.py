@@ -17,11 +17,11 @@ from fractions import Fraction
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.verdict import (
     FINER,
-    INLET_RATIO,
     INLET_SEGMENTS_OF_LOW_ORDERS,
     LARGEST_ERROR,
     FilmNumbers,
     fewest_inlet_segments,
+    shows_inlet,
 )
 
 ORDER = 2.5
@@ -91,7 +91,7 @@ def reservation(p: Seal, film: FilmNumbers, other: FilmNumbers | None) -> str:
         return words
     fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
     short = other.inlet_segments < fewest and not other.touching
-    if short or not INLET_RATIO[0] <= other.inlet_ratio <= INLET_RATIO[1]:
+    if short or not shows_inlet(other.inlet_ratio):
         return f"the mesh of the estimate does not show the inlet; {FINER}"
     error = friction_bound(p.density, film, other)
     if not error <= LARGEST_ERROR:

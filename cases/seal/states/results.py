@@ -259,7 +259,7 @@ def film_state(
         verdict=verdict.word,
         advice=verdict.advice,
         profile=_profile(system, problem, x),
-        section=section_view(system, problem, x, film_pressure(system, x)),
+        section=section_view(system, x, film_pressure(system, x)),
     )
 
 

@@ -12,13 +12,12 @@ from softehl.cases.seal.states.state import Section
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.contact import tributary_areas
 from softehl.runtime.fem.postprocess import nodal_average, von_mises
-from softehl.runtime.fem.problem import Problem
 
 _SLOPES = np.array([[-1, 1, 1, -1], [-1, -1, 1, 1]])
 """Derivatives of a cell's corners by its own coordinates, in its middle, times 4."""
 
 
-def section_view(system: SealSystem, problem: Problem, x: Array, rod_pressure: Array) -> Section:
+def section_view(system: SealSystem, x: Array, rod_pressure: Array) -> Section:
     """The deformed section in a state x, with the pressure (arc nodes,) between it and the rod.
 
     At nodes: displacement, Cauchy stresses, contact_pressure (of the housing and its walls) and
@@ -26,7 +25,7 @@ def section_view(system: SealSystem, problem: Problem, x: Array, rod_pressure: A
     principal stretches in their middle.
     """
     mesh = system.mesh
-    found = [problem.fields(solid, x) for solid in system.solids]
+    found = [system.problem.fields(solid, x) for solid in system.solids]
     fields = {name: np.concatenate([f[name] for f in found]) for name in found[0]}
     stresses = {name: fields[f"sigma_{name}"] for name in ("zz", "rr", "tt", "zr")}
     kept = {name: value for name, value in fields.items() if name not in ("z", "r")}

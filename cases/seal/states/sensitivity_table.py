@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from softehl.cases.harness.row import OK, Record, column
 from softehl.cases.seal.states.state import FilmRow
-from softehl.cases.seal.states.verdict import INLET_RATIO
+from softehl.cases.seal.states.verdict import shows_inlet
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ def resolved(row: FilmRow) -> bool:
 
     Stricter than the verdict: uniform meshes, too, must show the slope of the inlet.
     """
-    return row.verdict == OK and INLET_RATIO[0] <= row.inlet_ratio <= INLET_RATIO[1]
+    return row.verdict == OK and shows_inlet(row.inlet_ratio)
 
 
 def rows_of(row: FilmRow, found: Mapping[str, Mapping[str, float]]) -> list[SensitivityRow]:

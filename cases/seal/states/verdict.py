@@ -25,40 +25,27 @@ LARGEST_EXPONENT = 0.85
 """Largest credible d log h* / d log U: theory and fine meshes give 0.55 to 0.65."""
 
 FEWEST_INLET_SEGMENTS = 1.5
-"""Segments that the inlet needs: with more, h* was within 4 % of a finer mesh in all cases tried
-(docs/film-resolution.md); with fewer, anything between -94 % and +59 % occurs."""
-
-FEWEST_OF_LOBES = 3.0
-"""Segments of a section with two lobes: an X-ring with 1.7 was 4 % off, its `inlet_ratio` 1.002."""
+"""Segments that the inlet of each lobe needs: with more, h* was within 4 % of a finer mesh in all
+cases tried (docs/film-resolution.md); with fewer, anything between -94 % and +59 % occurs. An
+X-ring with 1.7 for its two lobes was 4 % off, its `inlet_ratio` 1.002."""
 
 INLET_SEGMENTS_OF_LOW_ORDERS = {("fe", 1): 3.0, ("dg", 1): 5.0, ("dg", 2): 2.0}
 """Segments for low orders m_p, by treatment of the Reynolds equation: they need more."""
-
-INLET_RATIO = (0.98, 1.02)
-"""Credible h* over that of the film's own steepest inlet slope: 0.995 to 1.002 where an inlet is
-resolved, 0.83 to 0.957 where h* was 10 % wrong. Judged on graded meshes."""
 
 NEXT_RATIO = 0.15
 """Farthest from 1 that the inlet ratio of a contact may be which does not meter h*: the pressure
 of the groove before it and friction depend on it. Of an X-ring 0.894 at density 2 left h* right
 within 0.2 % and friction within 1.1 %, 0.736 at density 1 within 1.8 and 9 %."""
 
-ANY_RATIO = (-inf, inf)
-"""Ratios of meshes where they are not judged."""
-
 EXIT_FILMS, END_GAP = 5.0, 0.1
 """At its exit the arc is outside the film where the gap is so many h*, or so many mm."""
-
-MOST_LACKING = 0.02
-"""Largest share of its pressure that an inlet may lack because the arc begins within the film: h*
-was too small by 0.22 to 0.25 of it where arcs of a ring were cut, by 0.07 to 0.13 under lips."""
 
 MOST_WEDGE = 0.2
 """Largest share of the pressure of its inlet that a film may be given where its arc begins: h* that
 was 3.1 % too small without 0.14 of it was 0.8 % too large with it."""
 
 LARGEST_ERROR = 2.0
-"""Largest estimated error of h*, %, of a state that is `ok`."""
+"""Largest error, %, of a state that is `ok`: of h* and friction, of what shows the error of h*."""
 
 STRONG_OSCILLATION = 0.2
 """Oscillation index from which on a profile is not to be taken at face value: about 5 % of h."""
@@ -174,21 +161,37 @@ class FilmNumbers:
         return self.lambda_ratio < FULL
 
     @property
+    def lacks(self) -> bool:
+        """True if an inlet lacks too much of its pressure because the arc begins within the film.
+
+        h* was too small by 0.22 to 0.25 of what it lacks where arcs of a ring were cut, by 0.07 to
+        0.13 under lips.
+        """
+        return not self.lacking <= 0.01 * LARGEST_ERROR
+
+    @property
     def enters(self) -> bool:
         """True if the film is to begin with the pressure of the wedge before its arc."""
-        return MOST_LACKING < self.lacking <= MOST_WEDGE
+        return self.lacks and self.lacking <= MOST_WEDGE
 
     @property
     def clipped(self) -> bool:
         """True if the arc ends within the film."""
-        short = self.end_gap < min(EXIT_FILMS * self.h_star, END_GAP)
-        return short or not self.lacking <= MOST_LACKING
+        return self.lacks or self.end_gap < min(EXIT_FILMS * self.h_star, END_GAP)
 
 
 def fewest_inlet_segments(reynolds: str, m_p: int, lobes: int = 1) -> float:
     """Segments that the inlet needs with pressures of order m_p, "fe" or "dg"."""
-    least = FEWEST_OF_LOBES if lobes > 1 else FEWEST_INLET_SEGMENTS
+    least = FEWEST_INLET_SEGMENTS * min(lobes, 2)
     return max(INLET_SEGMENTS_OF_LOW_ORDERS.get((reynolds, m_p), least), least)
+
+
+def shows_inlet(ratio: float) -> bool:
+    """True if the mesh of a film with this `inlet_ratio` shows its inlet.
+
+    It was 0.995 to 1.002 where an inlet is resolved, 0.83 to 0.957 where h* was 10 % wrong.
+    """
+    return abs(ratio - 1.0) <= 0.01 * LARGEST_ERROR
 
 
 @dataclass(frozen=True)
@@ -198,18 +201,18 @@ class Verdict:
     reference: maximum contact pressure without film, MPa. last: the film. collapsed: what gave it
     away as a spurious collapsed one, if anything did: a pressure well above the contact's, a drag
     that rises while the speed falls, or a thickness that falls too fast. fewest: segments that the
-    inlet needs. ratios: credible inlet_ratio. error: estimated error of h*, %, None where none is
-    wanted. rough: between rough surfaces friction may rise while the speed falls, and h may be
-    negative. unsealed: where the sealed pressure ends although nothing is touched there.
-    references: maximum contact pressures of each contact, from the sealed side on. overlap: what
-    the section runs into: itself, or the rod beyond its film.
+    inlet needs. slopes: whether the slope of an inlet is judged. error: estimated error of h*, %,
+    None where none is wanted. rough: between rough surfaces friction may rise while the speed
+    falls, and h may be negative. unsealed: where the sealed pressure ends although nothing is
+    touched there. references: maximum contact pressures of each contact, from the sealed side on.
+    overlap: what the section runs into: itself, or the rod beyond its film.
     """
 
     reference: float
     last: FilmNumbers | None = None
     collapsed: str = ""
     fewest: float = FEWEST_INLET_SEGMENTS
-    ratios: tuple[float, float] = ANY_RATIO
+    slopes: bool = False
     error: float | None = None
     rough: bool = False
     unsealed: str = ""
@@ -241,9 +244,9 @@ class Verdict:
             yield UNDER_RESOLVED, _SHORT.format(film.inlet_segments, self.fewest)
         if film.clipped:
             yield CLIPPED, _cut(film)
-        if not self.ratios[0] <= film.inlet_ratio <= self.ratios[1]:
+        if self.slopes and not shows_inlet(film.inlet_ratio):
             yield UNDER_RESOLVED, _UNSEEN.format(film.inlet_ratio, "its")
-        if self.ratios != ANY_RATIO and abs(film.next_ratio - 1.0) > NEXT_RATIO:
+        if self.slopes and abs(film.next_ratio - 1.0) > NEXT_RATIO:
             yield UNDER_RESOLVED, _UNSEEN.format(film.next_ratio, "the next contact's")
         if self.unsealed:
             yield UNCERTAIN, _UNSEALED.format(self.unsealed)
@@ -279,10 +282,10 @@ class Verdict:
 
 def _cut(film: FilmNumbers) -> str:
     """Advice for a film whose arc ends within it."""
-    if film.lacking <= MOST_LACKING:
-        where = f"the arc ends where the film is only {1e3 * film.end_gap:.3g} um thick"
-    else:
+    if film.lacks:
         where = f"the arc cuts off {100.0 * film.lacking:.2g} % of the inlet's pressure"
+    else:
+        where = f"the arc ends where the film is only {1e3 * film.end_gap:.3g} um thick"
     return (
         f"{where}; leave arc_start and arc_end out, or move them outwards; where they are left "
         "out, the section has no room for so thick a film"
