@@ -397,8 +397,8 @@ FAULTS = (
     ),
     Fault(
         "cases/seal/states/results.py",
-        'h[_nodes(first)][:: 1 if film.stroke == "out" else -1]',
-        'h[_nodes(first)][:: -1 if film.stroke == "out" else 1]',
+        "film.along(h[_nodes(first)])",
+        "h[_nodes(first)]",
         "tests/cases/test_results.py tests/cases/test_method.py",
     ),
     Fault(

@@ -29,7 +29,6 @@ from softehl.cases.seal.equations.system import (
     film_values,
     obstacles_of,
     values_at_rest,
-    without_contact,
 )
 from softehl.cases.seal.equations.unknowns import SealUnknowns
 from softehl.cases.seal.gland.parameters import Seal
@@ -208,7 +207,8 @@ class SealSystem(SealUnknowns):
         """Film forces (18) and the Reynolds equation (25); the contact with the rod is without."""
         contact = self.contact_problem(ContactLoads(film.sealed_pressure, place=film.place))
         problem = contact.with_parameters(
-            **without_contact(), **self._given("film", film_values(self.parameters, film))
+            **{ROD: None, "sealed_arc": {"pressure": 0.0}},  # the film bears the arc
+            **self._given("film", film_values(self.parameters, film)),
         )
         fixed = [self.film_ends, self.layout.dofs(ROD)]
         values: list[Array | float] = [film.ends, 0.0]

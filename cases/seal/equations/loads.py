@@ -61,6 +61,10 @@ class FilmLoads:
         out, here = self.stroke == "out", self.entrance
         return np.array([self.sealed_pressure + here, 0.0] if out else [self.sealed_pressure, here])
 
+    def along(self, values: Array) -> Array:
+        """Values (n,) at places from the sealed side on, in the order in which oil passes them."""
+        return values if self.stroke == "out" else values[::-1]
+
     @property
     def rod_speed(self) -> float:
         """U, positive for outstroke, mm/s."""

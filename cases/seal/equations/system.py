@@ -234,11 +234,6 @@ def contact_values(loads: ContactLoads) -> dict[str, Values | None]:
     }
 
 
-def without_contact() -> dict[str, Values | None]:
-    """Forces on the arc that remain where a film bears it, by block."""
-    return {ROD: None, "sealed_arc": {"pressure": 0.0}}
-
-
 def film_values(p: Seal, film: FilmLoads) -> Values:
     """Parameters of the terms of the film."""
     return {

@@ -101,15 +101,14 @@ class Adaptation:
         like: the film on another mesh, which this one must resolve as well for its density. most:
         segments that it may ask for in the place of one, without that.
         """
-        p, segments = self.p, film.numbers.inlet_segments
+        p = self.p
         if p.mesh != "graded":
             return True
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
         if like is not None:
             fewest = like.numbers.inlet_segments * float(density / p.density) / ALIKE
             most = ALIKE * _misfit(like, p.density)
-        shown = segments >= fewest or film.numbers.touching
-        return shown and _misfit(film, float(density)) <= most
+        return not film.numbers.short(fewest) and _misfit(film, float(density)) <= most
 
     def _remeshed(self, found: Film | NoFilm, density: Fraction) -> Film | NoFilm | None:
         """The film on the mesh that is made for it; None where there is none."""

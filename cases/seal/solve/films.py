@@ -38,9 +38,6 @@ _LEAST = 0.06
 """Least step on the way from the film at another speed, of the larger power of U. Of the smaller
 one films that do not go on cost as much again as all of their seal."""
 
-_USUAL = 12
-"""Iterations of a step that is not too long: modified ones, two for one of Newton's."""
-
 
 @dataclass(frozen=True, eq=False)
 class Film:
@@ -147,7 +144,8 @@ class FilmSolver:
             before[0] = point.solution.x
 
         span, least = abs(stop - start), _LEAST * max(start, stop)
-        rule = StepRule(span, min(least, span), target_iterations=_USUAL)
+        usual = 2 * StepRule.target_iterations  # modified ones, two for one of Newton's
+        rule = StepRule(span, min(least, span), target_iterations=usual)
         path = Continuation(correctors.first, rule, name="U^0.6")
         previous = known[-2] if len(known) > 1 else None
         branch = path.follow(problem_at, start, stop, film.x, on_point=tell, previous=previous)

@@ -85,21 +85,20 @@ class Judge:
         film, other, p = adapted.film, adapted.other, adapted.film.system.parameters
         numbers = film.numbers
         error, friction = errors(p.density, numbers, other)
-        wanted = p.error_estimate and p.mesh == "graded"
-        verdict = replace(self.contact, last=faster).after(numbers)
-        verdict = replace(verdict, error=error if wanted else None)
-        state = film_state(
-            *(film.system, film.problem, film.loads, film.x), verdict, film.solution.iterations
-        )
-        state = replace(
-            state,
-            h_star_error_percent=error,
-            rod_friction_error_percent=friction,
+        verdict = replace(
+            replace(self.contact, last=faster).after(numbers),
+            error=error if p.error_estimate and p.mesh == "graded" else None,
             reservation=reservation(p, numbers, other) if adapted.fits else UNFIT,
         )
-        if self.differentiate and differentiable(state.settled):
+        equations = film.system, film.problem, film.loads, film.x
+        state = replace(
+            film_state(*equations, verdict, film.solution.iterations),
+            h_star_error_percent=error,
+            rod_friction_error_percent=friction,
+        )
+        if self.differentiate and differentiable(state):
             state = replace(state, sensitivity=self.differentiate(film))
-        return state.settled
+        return state
 
 
 def errors(density: int, film: FilmNumbers, other: FilmNumbers | None) -> tuple[float, float]:
@@ -131,19 +130,9 @@ class DryContact:
         return cls(*ContactMeshes(solver, ContactStore(contacts)).contact(p), solver)
 
     @property
-    def parameters(self) -> Seal:
-        """The case."""
-        return self.system.parameters
-
-    @property
     def newton(self) -> Newton:
         """The method that finished it."""
         return self.solver.driver.newton
-
-    @property
-    def records(self) -> Sequence[StageRecord]:
-        """Cost of all that is solved; it grows."""
-        return self.solver.driver.records
 
     @property
     def state(self) -> ContactState:
@@ -169,7 +158,7 @@ class DryContact:
             found = self.films.on(near[-1].system).from_neighbour(near, speed)
         if not isinstance(found, Film):
             found = self.film(stroke, speed)
-        return Adaptation(self.parameters, self.solver, self.films).adapted(found, last)
+        return Adaptation(self.system.parameters, self.solver, self.films).adapted(found, last)
 
 
 def run(
@@ -204,7 +193,7 @@ def run(
         if missed:
             failures.append(without_films(missed, parameters))
     numbers = contact_numbers(contact.system, contact.x)
-    return _outcome(contact.system, contact.records, states, failures, numbers)
+    return _outcome(contact.system, contact.solver.driver.records, states, failures, numbers)
 
 
 def _outcome(

@@ -90,8 +90,7 @@ def reservation(p: Seal, film: FilmNumbers, other: FilmNumbers | None) -> str:
     if words or other is None:
         return words
     fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
-    short = other.inlet_segments < fewest and not other.touching
-    if short or not shows_inlet(other.inlet_ratio):
+    if other.short(fewest) or not shows_inlet(other.inlet_ratio):
         return f"the mesh of the estimate does not show the inlet; {FINER}"
     error = friction_bound(p.density, film, other)
     if not error <= LARGEST_ERROR:

@@ -104,7 +104,7 @@ def lacking(at: Mapping[str, Array], film: FilmLoads, entrance: float) -> float:
     steepest = _steepest(at, film)
     if steepest is None:
         return inf
-    outside = at["p"].ravel()[0 if film.stroke == "out" else -1] - film.entrance
+    outside = film.along(at["p"].ravel())[0] - film.entrance
     inlet = float(at["p"].ravel()[steepest] - outside)
     return abs(entrance - film.entrance) / inlet if inlet > 0.0 else inf
 

@@ -55,7 +55,6 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
     parts = film_parts(h, level)
     first = metering(at, parts, film.stroke)
     top, inlet = _top(at, first), {name: values[first] for name, values in at.items()}
-    narrows = h[_nodes(first)][:: 1 if film.stroke == "out" else -1]
     q, variation, jump = _flux(system, problem, at, x, top)
     h_star = q / (0.5 * film.rod_speed)
     within = min(level, THIN * h_star) if h_star > 0.0 else level
@@ -63,9 +62,9 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         float(system.around * (tau * at["dx"]).sum())
         for tau in (0.5 * (at["tau_rod"] + at["tau"]), at["tau_rod"])
     )
-    flow = float(at["eta"].ravel()[0 if film.stroke == "out" else -1]) * film.speed
-    sides: tuple[Stroke, Stroke] = ("out", "in") if film.stroke == "out" else ("in", "out")
-    before, behind = (wedge(system, side, x) for side in sides)
+    flow = float(film.along(at["eta"].ravel())[0]) * film.speed
+    before = wedge(system, film.stroke, x)
+    behind = wedge(system, "in" if film.stroke == "out" else "out", x)
     entrance = built_up(*before, flow, h_star)
     sliding, rubbed = wedge_friction(system, *before, flow, h_star)
     beyond = wedge_friction(system, *behind, flow, h_star)[0]  # no pressure is built up there
@@ -84,9 +83,9 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         flux_variation=variation,
         jump=jump,
         oscillation=max(oscillation(z[_nodes(k)], h[_nodes(k)], within) for k in parts),
-        inlet_segments=inlet_segments(narrows, h_star),
+        inlet_segments=inlet_segments(film.along(h[_nodes(first)]), h_star),
         inlet_ratio=1.0 if system.parameters.rough else inlet_ratio(inlet, film, h_star),
-        end_gap=end_gap(*((z, h) if film.stroke == "out" else (-z[::-1], h[::-1]))),
+        end_gap=end_gap(film.along(copysign(1.0, film.rod_speed) * z), film.along(h)),
         entrance=entrance,
         lacking=0.0 if system.parameters.rough else lacking(inlet, film, entrance),
         **rough_numbers(system, at),
@@ -185,12 +184,11 @@ def filled_ratio(at: Mapping[str, Array], film: FilmLoads) -> float:
     at: fields of its part of the film, (segments, points) each. nan too where they do not say
     whether oil is missing, and over a lobe that is lifted.
     """
-    if _lifted(at, slice(0, len(at["p"])), film.stroke):
-        return nan
+    whole = slice(0, len(at["p"]))
     void = at.get("v_out" if film.stroke == "out" else "v_in")
-    if void is None:
+    if void is None or _lifted(at, whole, film.stroke):
         return nan
-    top = int(np.argmax(at["p"].max(axis=1)))
+    top = _top(at, whole)
     h_star = float(element_means(at["flux"], at["dx"])[top] / (0.5 * film.rod_speed))
     before = slice(None, top + 1) if film.stroke == "out" else slice(top, None)
     torn = at["h"][before][void[before] > _TORN]

@@ -4,7 +4,7 @@ Units are mm, MPa, N, s; film thicknesses are in micrometres.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from math import nan
 from typing import Any, Protocol, Unpack
 
@@ -188,22 +188,13 @@ class FilmState(FilmRow):
     """One converged soft-EHL state: its row, and the fields that it comes from.
 
     advice: what to do about a verdict that is not "ok". sensitivity: quantity -> parameter ->
-    d log quantity / d log parameter, where it was asked for and the mesh shows it. reservation: why
-    it is not `ok` although nothing that another mesh may better stands against it, see `settled`.
+    d log quantity / d log parameter, where it was asked for and the mesh shows it.
     """
 
     advice: str
     profile: Profile
     section: Section
     sensitivity: Mapping[str, Mapping[str, float]] | None = None
-    reservation: str = ""
-
-    @property
-    def settled(self) -> "FilmState":
-        """The state as it is reported: `uncertain` instead of `ok` where it has a reservation."""
-        if self.verdict != OK or not self.reservation:
-            return self
-        return replace(self, verdict=UNCERTAIN, advice=self.reservation)
 
     @property
     def sealed_pressure(self) -> float:

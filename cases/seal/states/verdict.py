@@ -160,6 +160,10 @@ class FilmNumbers:
         """True if asperities decide about the film too: its inlet is not that of (14)."""
         return self.lambda_ratio < FULL
 
+    def short(self, fewest: float) -> bool:
+        """True if the inlet has too few segments for a film that it alone decides about."""
+        return self.inlet_segments < fewest and not self.touching
+
     @property
     def lacks(self) -> bool:
         """True if an inlet lacks too much of its pressure because the arc begins within the film.
@@ -205,7 +209,8 @@ class Verdict:
     None where none is wanted. rough: between rough surfaces friction may rise while the speed
     falls, and h may be negative. unsealed: where the sealed pressure ends although nothing is
     touched there. references: maximum contact pressures of each contact, from the sealed side on.
-    overlap: what the section runs into: itself, or the rod beyond its film.
+    overlap: what the section runs into: itself, or the rod beyond its film. reservation: why it is
+    not `ok` although nothing that another mesh may better stands against it.
     """
 
     reference: float
@@ -218,6 +223,7 @@ class Verdict:
     unsealed: str = ""
     references: tuple[float, ...] = ()
     overlap: str = ""
+    reservation: str = ""
 
     def after(self, film: FilmNumbers) -> Verdict:
         """The verdict on a film, `last` being that of the same stroke at a higher speed, if any."""
@@ -240,7 +246,7 @@ class Verdict:
         film = self.last
         if film is None:
             return
-        if film.inlet_segments < self.fewest and not film.touching:
+        if film.short(self.fewest):
             yield UNDER_RESOLVED, _SHORT.format(film.inlet_segments, self.fewest)
         if film.clipped:
             yield CLIPPED, _cut(film)
@@ -258,6 +264,8 @@ class Verdict:
             yield UNCERTAIN, DOUBTFUL
         if film.oscillation > STRONG_OSCILLATION:
             yield OSCILLATING, _ZIGZAG.format(film.oscillation)
+        if self.reservation:
+            yield UNCERTAIN, self.reservation
 
     def _suspicion(self, film: FilmNumbers) -> str:
         last, peaks = self.last, [(film.p_max, self.reference)]
