@@ -128,7 +128,7 @@ def solve(parameters: Seal, observer: Observer) -> Outcome:
     x = np.array([-1.0, 0.0, 1.0])
     observer.stage("contact", sealed_pressure=p, stroke=parameters.stroke, steps=1)
     observer.step(label="load", parameter=1.0, iterations=3, residuals=(1.0, 1e-12), fraction=1.0)
-    observer.contact_state(ContactState(p, 4.1, -0.9, 0.8, x, 4.1 - x**2, section()))
+    observer.contact_state(ContactState(p, x, 4.1 - x**2, section()))
     strokes = {"out": [1.0], "in": [-1.0], "both": [1.0, -1.0]}[parameters.stroke]
     states = []
     for sign in strokes:

@@ -60,7 +60,7 @@ def test_pressures_of_the_film_add_up_to_the_force_of_the_contact(
 ) -> None:
     system, x = dry.system, dry.x.copy()
     z, _ = system.arc_film(x)
-    before, z0 = z[system.pressure_boundary - 1 :][:2]
+    before, z0 = z[system.section.lowest - 1 :][:2]
     low = 0.5 * (before + z0) + 0.5 * (z0 - before)  # half of a segment beyond has no pressure
     pressing = -float((system.rod_multipliers(x) * system.rod_areas).sum())
     r = system.rod_radius + OFFSET

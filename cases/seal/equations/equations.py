@@ -161,11 +161,6 @@ class SealSystem(SealUnknowns):
         assembler = replace(found.problem.assembler, structure=structure)
         return replace(found, problem=replace(found.problem, assembler=assembler))
 
-    @property
-    def pressure_boundary(self) -> int:
-        """Index of the arc node at which the sealed pressure of the contact ends."""
-        return self.section.lowest
-
     # --- blocks -----------------------------------------------------------------------------------
 
     @property

@@ -70,10 +70,7 @@ def contact_problem(
 
 
 def approach_stage(system: SealSystem) -> Stage:
-    """First stage, without pressure: rod and housing come to their radii, and squeeze the section.
-
-    They come from where they touch the free section.
-    """
+    """First stage, without pressure: from the free section into the groove."""
     p = system.parameters
     rod_gap = 0.5 * (p.inner_diameter - p.rod_diameter)
     housing_gap = 0.5 * (p.housing_diameter - p.inner_diameter) - p.section_diameter

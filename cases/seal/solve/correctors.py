@@ -1,7 +1,7 @@
 """Newton's method for a nearly incompressible solid, and the correctors of a film in time.
 
-A film is solved by modified Newton iterations, and by Newton's method for all unknowns where
-these fail.
+A film is solved by modified Newton iterations on the Schur complement of the section, and by
+Newton's method for all unknowns where these fail.
 """
 
 from __future__ import annotations

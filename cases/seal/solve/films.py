@@ -1,8 +1,6 @@
 """The steady film at a speed: from contact, from another speed, from another mesh.
 
-Each step in time is solved by modified Newton iterations on the Schur complement of the section;
-where these fail, by Newton's method for all unknowns, which holds on to the pressures of the
-elements (`runtime.fem.lagged_pressure`).
+It is squeezed out (`solve.squeeze_film`), in steps that are solved by `solve.correctors`.
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.solve.correctors import FilmCorrectors
 from softehl.cases.seal.solve.inlet import POWER, InletScales
-from softehl.cases.seal.solve.path import PathDriver, Told
+from softehl.cases.seal.solve.path import PathDriver, StageLog
 from softehl.cases.seal.solve.squeeze_film import (
     FIRST,
     SqueezeFilm,
@@ -132,7 +130,7 @@ class FilmSolver:
         squeeze_film, before = film.squeeze_film.at(speed), [film.x]
         known = [Point(f.loads.speed**POWER, f.solution) for f in last if f.system is film.system]
         start, stop = known[-1].parameter, speed**POWER
-        told = self._told(squeeze_film)
+        log = self._log(squeeze_film)
 
         def problem_at(t: float) -> NonlinearProblem:
             now = speed if t == stop else t ** (1.0 / POWER)
@@ -140,7 +138,7 @@ class FilmSolver:
             return replace(squeeze_film, film=loads).steady(before[0])
 
         def tell(point: Point) -> None:
-            told.step(point.solution)
+            log.step(point.solution)
             before[0] = point.solution.x
 
         span, least = abs(stop - start), _LEAST * max(start, stop)
@@ -149,7 +147,7 @@ class FilmSolver:
         path = Continuation(correctors.first, rule, name="U^0.6")
         previous = known[-2] if len(known) > 1 else None
         branch = path.follow(problem_at, start, stop, film.x, on_point=tell, previous=previous)
-        told.end(branch)
+        log.end(branch)
         x = branch.last.x if branch.points else film.x
         return self._reached(squeeze_film, branch.end, Moment(x, FIRST, 1.0), correctors)
 
@@ -159,10 +157,10 @@ class FilmSolver:
         pressures: (Q,) of the elements.
         """
         correctors = FilmCorrectors.of(self.system, self.driver.newton)
-        told = self._told(carried)
+        log = self._log(carried)
         found = correctors.whole(pressures).solve(carried.steady(start.x), start.x)
-        told.step(found)
-        told.end(found)
+        log.step(found)
+        log.end(found)
         return self._reached(carried, found, start, correctors, pressures)
 
     def _reached(
@@ -186,14 +184,14 @@ class FilmSolver:
         pressures: Array | None = None,
     ) -> Film | NoFilm:
         """The film squeezed out from a moment; pressures: as of `from_film`."""
-        film, told = squeeze_film.film, self._told(squeeze_film)
+        film, log = squeeze_film.film, self._log(squeeze_film)
         branch, reached = PseudoTransient(correctors.steps(pressures)).follow(
             squeeze_film,
             start,
-            on_point=lambda point: told.step(point.solution),
+            on_point=lambda point: log.step(point.solution),
             finish=lambda x: correctors.steady().solve(squeeze_film.steady(x), x),
         )
-        told.end(branch)
+        log.end(branch)
         if branch.converged:
             return self._entered(squeeze_film, correctors, branch.last)
         begun = None if reached is start else (squeeze_film, reached)
@@ -213,8 +211,8 @@ class FilmSolver:
         end = correctors.steady().solve(more.steady(film.x), film.x)
         return Film(more, end, correctors) if end.converged else film
 
-    def _told(self, squeeze_film: SqueezeFilm) -> Told:
+    def _log(self, squeeze_film: SqueezeFilm) -> StageLog:
         """A stage on the way to a film."""
         film, method = squeeze_film.film, "pseudo-transient continuation"
         name = f"film at {film.rod_speed:+g} mm/s"
-        return Told(self.driver, name, film.sealed_pressure, film.stroke, method)
+        return StageLog(self.driver, name, film.sealed_pressure, film.stroke, method)

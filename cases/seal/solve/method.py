@@ -84,7 +84,10 @@ class Judge:
         """The state of a film; faster: of the same stroke at the next higher speed, if there is."""
         film, other, p = adapted.film, adapted.other, adapted.film.system.parameters
         numbers = film.numbers
-        error, friction = errors(p.density, numbers, other)
+        error = friction = nan
+        if other:
+            error = estimated_error(p.density, numbers.h_star, other.h_star)
+            friction = estimated_error(p.density, numbers.friction, other.friction)
         verdict = replace(
             replace(self.contact, last=faster).after(numbers),
             error=error if p.error_estimate and p.mesh == "graded" else None,
@@ -99,16 +102,6 @@ class Judge:
         if self.differentiate and differentiable(state):
             state = replace(state, sensitivity=self.differentiate(film))
         return state
-
-
-def errors(density: int, film: FilmNumbers, other: FilmNumbers | None) -> tuple[float, float]:
-    """Estimated errors of h* and of friction, %, from the film of the coarser mesh."""
-    if other is None:
-        return nan, nan
-    return (
-        estimated_error(density, film.h_star, other.h_star),
-        estimated_error(density, film.friction, other.friction),
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,9 +204,6 @@ def _outcome(
         unknowns=system.counts,
         kernel_signatures={b.kernel.name: b.kernel.signature for b in blocks},
         stages=tuple(records),
-        solvers={
-            **{"solver": p.solver, "linear": choose(p.linear).name},
-            "assembly": assembly(p),
-        },
+        solvers={"solver": p.solver, "linear": choose(p.linear).name, "assembly": assembly(p)},
         numbers=numbers or {},
     )

@@ -85,7 +85,7 @@ class PathDriver:
         A wall's friction is that of the way since the step before, in the first one since x0.
         Raises StageError.
         """
-        told = Told(self, stage.name, stage.sealed_pressure, "both", stage.method)
+        log = StageLog(self, stage.name, stage.sealed_pressure, "both", stage.method)
         before = [x0]
 
         def problem_at(parameter: float) -> NonlinearProblem:
@@ -93,7 +93,7 @@ class PathDriver:
             return problem.since(before[0]) if isinstance(problem, Problem) else problem
 
         def report(point: Point) -> None:
-            told.step(point.solution, point.parameter, stage.fraction(point.parameter))
+            log.step(point.solution, point.parameter, stage.fraction(point.parameter))
             before[0] = point.solution.x
             if stage.on_point:
                 stage.on_point(point)
@@ -101,14 +101,14 @@ class PathDriver:
         continuation = Continuation(stage.corrector or self.newton, stage.steps, name=stage.name)
         branch = continuation.follow(problem_at, stage.start, stage.stop, x0, on_point=report)
         failed = None if branch.converged else StageError(stage, branch, self.records)
-        told.end(branch, f"; ended: {branch.message}" if failed else "")
+        log.end(branch, f"; ended: {branch.message}" if failed else "")
         if failed:
             raise failed
         return branch.last.x
 
 
 @dataclass(eq=False)
-class Told:
+class StageLog:
     """A stage while it is solved: the observer hears of its steps, and its cost is recorded.
 
     stroke: "both" where a contact state serves both. method: how it is solved.

@@ -166,7 +166,7 @@ def pressed_film(system: SealSystem, x: Array, p_s: float) -> Array:
     dz = np.diff(z)
     width = 0.5 * (np.append(dz, 0.0) + np.append(0.0, dz))
     force = np.maximum(-system.rod_multipliers(x), 0.0) * system.rod_areas
-    low, sealed = system.pressure_boundary, np.zeros(len(nodes))
+    low, sealed = system.section.lowest, np.zeros(len(nodes))
     sealed[:low] = p_s
     if 0 < low < len(dz):
         sealed[low] = p_s * dz[low - 1] / (dz[low - 1] + dz[low])

@@ -10,6 +10,7 @@ import numpy as np
 
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.system import AIR_WALL, BORE, ROD, SEALED_WALL, WALLS
+from softehl.cases.seal.gland.surfaces import MICROMETRE
 from softehl.cases.seal.states.section_view import section_view
 from softehl.cases.seal.states.state import ContactState
 from softehl.runtime.arrays import Array, Flags, Integers
@@ -23,8 +24,8 @@ GROOVE = 2.0
 """Of the thinnest film: what parts two lobes whose groove is not as deep as `CONTACT_FILM`, and
 what counts as contact of a film that is nowhere much thinner than that."""
 
-GRAZED = 1e-3
-"""Gap that parts two dry contacts, mm: a film opens a groove whose ground is so near to the rod.
+GRAZED = MICROMETRE
+"""Gap that parts two dry contacts: a film opens a groove whose ground is so near to the rod.
 From 1e-5 to 1e-2 the films of an X-ring, a U-cup and a square ring are the same."""
 
 
@@ -108,13 +109,8 @@ def contact_state(system: SealSystem, x: Array) -> ContactState:
     sealed_pressure = system.parameters.sealed_pressure
     pressure = contact_pressure(system, sealed_pressure, x)
     arc = system.deformed(x)[system.mesh.arc_nodes]
-    touching = np.flatnonzero(system.rod_multipliers(x) < 0.0)
-    ends = arc[touching[[0, -1]], 0] if len(touching) else np.full(2, np.nan)
     return ContactState(
         sealed_pressure=sealed_pressure,
-        p_max_MPa=float(pressure.max()),
-        contact_start_mm=float(ends[0]),
-        contact_end_mm=float(ends[1]),
         x_mm=arc[:, 0].copy(),
         p_MPa=pressure,
         section=section_view(system, x, pressure),
@@ -127,8 +123,8 @@ def contact_pressure(system: SealSystem, sealed_pressure: float, x: Array) -> Ar
     current = tributary_areas(system.deformed(x), mesh.arc_segments, mesh.arc_nodes)
     multipliers = np.minimum(system.rod_multipliers(x), 0.0)
     pressure = -multipliers * system.rod_areas / current
-    pressure[: system.pressure_boundary] += sealed_pressure
-    pressure[system.pressure_boundary] += 0.5 * sealed_pressure  # the pressure ends at this node
+    pressure[: system.section.lowest] += sealed_pressure
+    pressure[system.section.lowest] += 0.5 * sealed_pressure  # the pressure ends at this node
     return np.asarray(pressure)
 
 
@@ -136,7 +132,7 @@ def unsealed(system: SealSystem, x: Array) -> str:
     """Places where the sealed pressure ends outside the contact of the state x; empty if none."""
     if system.parameters.sealed_pressure == 0.0:
         return ""
-    if not system.pressing(ROD, x)[system.pressure_boundary] > 0.0:
+    if not system.pressing(ROD, x)[system.section.lowest] > 0.0:
         return "at the lowest point of the section"
     crown = system.section.chains[WALLS[BORE]][0] == system.section.pressed_ends[1]
     return "" if (system.pressing(BORE, x)[crown] > 0.0).all() else "at its crown"

@@ -215,9 +215,6 @@ class ContactState:
     """
 
     sealed_pressure: float
-    p_max_MPa: float
-    contact_start_mm: float
-    contact_end_mm: float
     x_mm: Array
     p_MPa: Array
     section: Section
