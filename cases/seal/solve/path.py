@@ -26,9 +26,9 @@ STEPS = StepRule(0.05, 3e-4, 0.3)
 class Stage:
     """A family of problems in one parameter, to be followed from `start` to `stop`.
 
-    Where these are the same it has one step. name, sealed_pressure: labels for observers and
-    records. ended: words for a path that ends at a parameter. method: how it is solved, for the
-    record. corrector: what solves it, None for the driver's Newton.
+    A stage with the same start and stop has one step. name, sealed_pressure: labels for observers
+    and records. ended: words for a path that ends at a parameter. method: how it is solved, for
+    the record. corrector: what solves it, None for the driver's Newton.
     """
 
     name: str
