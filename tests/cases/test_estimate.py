@@ -14,8 +14,8 @@ from softehl.cases.seal.gland.records.discretisation import DENSITIES
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.estimate import (
     ORDER,
+    Estimate,
     coarser_density,
-    estimated_error,
     reservation,
 )
 from softehl.cases.seal.states.state import (
@@ -46,6 +46,11 @@ NUMBERS = FilmNumbers(
 )
 
 
+def estimated(h_star: float, other: float, ratio: float) -> Estimate:
+    """Of the error of h* from two meshes."""
+    return Estimate(replace(NUMBERS, h_star=h_star), replace(NUMBERS, h_star=other), ratio)
+
+
 @pytest.fixture(scope="module")
 def curve() -> Outcome:
     return run(_case(), Silent())
@@ -71,14 +76,16 @@ def test_an_error_of_that_order_is_found_exactly(density: int) -> None:
         return 0.7 - 0.02 / math.pow(d, ORDER)
 
     h = thickness(density)
-    estimate = estimated_error(density, h, thickness(float(coarser_density(density))))
-    assert estimate == pytest.approx(100.0 * (h - 0.7) / h, rel=1e-9)
+    for other in (float(coarser_density(density)), density / 1.5):
+        estimate = estimated(h, thickness(other), other / density).h_star
+        assert estimate == pytest.approx(100.0 * (h - 0.7) / h, rel=1e-9)
 
 
 def test_an_error_of_another_order_is_not() -> None:
-    coarser = 0.7 - 0.02 / float(coarser_density(2)) ** 4
+    other = float(coarser_density(2))
     error = 100.0 * (0.02 / 2**4) / 0.7
-    assert abs(estimated_error(2, 0.7 - 0.02 / 2**4, coarser)) > 1.5 * error
+    found = estimated(0.7 - 0.02 / 2**4, 0.7 - 0.02 / other**4, other / 2)
+    assert abs(found.h_star) > 1.5 * error
 
 
 def test_the_estimate_is_within_a_factor_of_two(curve: Outcome) -> None:
@@ -100,7 +107,7 @@ def test_without_an_estimate_only_the_way_is_another(curve: Outcome) -> None:
         [s.h_star_um for s in curve.states], rel=1e-9
     )
     assert all(isnan(s.h_star_error_percent) for s in plain.states)
-    assert isnan(estimated_error(2, 1.0, nan))
+    assert isnan(estimated(1.0, nan, 5 / 6).h_star)
 
 
 @pytest.mark.parametrize("density", [1, 2])
@@ -127,7 +134,7 @@ def test_density_one_is_not_ok(density: Literal[1, 2]) -> None:
     ],
 )
 def test_settings_whose_error_two_meshes_do_not_show(keys: dict[str, Any], words: str) -> None:
-    said = reservation(Seal(**keys), NUMBERS, NUMBERS)
+    said = reservation(Seal(**keys), Estimate(NUMBERS, NUMBERS, 5 / 6))
     assert words in said
     assert bool(said) == bool(words)
 
@@ -146,6 +153,7 @@ def test_settings_whose_error_two_meshes_do_not_show(keys: dict[str, Any], words
 def test_a_small_error_of_the_thickness_is_not_enough(
     film: dict[str, Any], other: dict[str, Any], words: str
 ) -> None:
-    said = reservation(Seal(), replace(NUMBERS, **film), replace(NUMBERS, **other))
+    two = replace(NUMBERS, **film), replace(NUMBERS, **other)
+    said = reservation(Seal(), Estimate(*two, 5 / 6))
     assert said.startswith(words) if words.startswith("friction") else words in said
     assert bool(said) == bool(words)

@@ -77,10 +77,9 @@ def test_the_misfit_is_the_number_of_segments_in_the_place_of_one(system: SealSy
     h = np.where(np.arange(len(s)) < node, THICKNESS, 9.0 * THICKNESS)
     x = film(system, h, np.ones(len(s)))
     asked = np.log(9.0) / THINNING
-    assert misfit(system, x, THICKNESS, 2) == pytest.approx(asked, rel=0.02)
-    assert misfit(system, x, THICKNESS, 1) == pytest.approx(0.5 * asked, rel=0.02)
+    assert misfit(system, x, THICKNESS) == pytest.approx(asked, rel=0.02)
     fine = film(system, np.full(len(s), THICKNESS), np.ones(len(s)))
-    assert misfit(system, fine, THICKNESS, 2) < 1.0
+    assert misfit(system, fine, THICKNESS) < 1.0
 
 
 def test_a_mesh_that_is_made_for_a_film_fits_it(system: SealSystem) -> None:

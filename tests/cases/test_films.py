@@ -18,6 +18,7 @@ from softehl.cases.seal.solve.layouts import film_layout, misfit
 from softehl.cases.seal.solve.method import DryContact, run
 from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.solve.transfer import FilmTransfer
+from softehl.cases.seal.states.estimate import Estimate
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.solution import Status
@@ -130,24 +131,29 @@ def test_a_mesh_that_does_not_fit_is_made_anew_and_h_star_moves_to_its_limit() -
     assert isinstance(found, Adapted)
     assert found.fits
     for one, fits in ((film, False), (found.film, True)):
-        asked = misfit(one.system, one.x, one.squeeze_film.scales.thickness, 2)
+        asked = misfit(one.system, one.x, one.squeeze_film.scales.thickness)
         assert (asked <= FITS) is fits
     assert 1e3 * found.film.numbers.h_star == pytest.approx(0.0403, rel=5e-3)
     assert 1e3 * film.numbers.h_star != pytest.approx(0.0403, rel=5e-3)
 
 
-@pytest.mark.parametrize(("bound", "own"), [(1.0, False), (3.0, True)], ids=["small", "large"])
-def test_a_film_with_a_large_error_gets_a_mesh_of_its_own(
-    monkeypatch: pytest.MonkeyPatch, bound: float, own: bool
+@pytest.mark.parametrize(("bound", "density"), [(1.0, 2), (3.0, 5)], ids=["small", "large"])
+def test_a_film_with_a_large_error_is_solved_on_finer_meshes(
+    monkeypatch: pytest.MonkeyPatch, bound: float, density: int
 ) -> None:
-    monkeypatch.setattr("softehl.cases.seal.solve.adaptation.friction_bound", lambda *_: bound)
+    """The estimate compares the two finest, and the next film goes on from there."""
+    monkeypatch.setattr(Estimate, "friction_bound", bound)
     p = P.model_copy(update={"error_estimate": True, "density": 2})
     contact = contact_of(p)
     film = a_film(contact.film("out", 400.0))
     found = adaptation(p, contact).adapted(film)
     assert isinstance(found, Adapted)
+    assert found.film.system.section.density == density
     assert found.coarser is not None
-    assert (found.film.system is not film.system) is own
+    assert found.estimate is not None
+    assert found.estimate.ratio == (3 / 5 if density == 5 else 5 / 6)
+    assert found.film.numbers.h_star == pytest.approx(film.numbers.h_star, rel=5e-3)
+    assert found.sure is (bound < 2.0)
 
 
 def test_a_mesh_that_is_given_is_not_made_anew(dry: DryContact, films: dict[float, Film]) -> None:

@@ -30,10 +30,12 @@ class SealSection:
     layout: of the mesh. placed: whether its arc was placed by the contact; then every
     boundary node may touch the walls of the groove, else (the paper's scheme) those off the arc.
     own: regions with materials of their own, whose elements come first, in this order.
+    density: of the mesh.
     """
 
     layout: Layout
     mesh: SectionMesh
+    density: Fraction
     placed: bool = False
     own: tuple[str, ...] = ()
 
@@ -139,9 +141,10 @@ def seal_section(
 
     layout: of the mesh, with equal segments if left out. density: instead of the case's.
     """
-    layout = layout or uniform_layout(p)
-    mesh, own = layout.mesh(density or p.density), tuple(p.materials)
-    return SealSection(layout, _ordered(mesh, own), placed=p.given_arc is None, own=own)
+    layout, density = layout or uniform_layout(p), density or Fraction(p.density)
+    own = tuple(p.materials)
+    mesh = _ordered(layout.mesh(density), own)
+    return SealSection(layout, mesh, density, placed=p.given_arc is None, own=own)
 
 
 def _ordered(mesh: SectionMesh, own: tuple[str, ...]) -> SectionMesh:

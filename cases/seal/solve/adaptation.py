@@ -1,7 +1,8 @@
 """A film and its mesh: solved, the mesh made for it, carried there and solved again.
 
-The loop ends where the mesh fits the film that is solved on it. The errors that are left are
-estimated from the same film on a coarser mesh of the same spacing (`states.estimate`).
+The loop ends where the mesh fits the film that is solved on it, and where the errors that are left
+are small enough. These are estimated from the same film on a coarser mesh of the same spacing
+(`states.estimate`); where they are too large, the film is solved on a finer one, too.
 """
 
 from __future__ import annotations
@@ -18,8 +19,14 @@ from softehl.cases.seal.solve.films import Film, FilmSolver, NoFilm
 from softehl.cases.seal.solve.layouts import CYCLES, film_layout, misfit
 from softehl.cases.seal.solve.path import StageError
 from softehl.cases.seal.solve.transfer import FilmTransfer
-from softehl.cases.seal.states.estimate import coarser_density, friction_bound
-from softehl.cases.seal.states.verdict import LARGEST_ERROR, FilmNumbers, fewest_inlet_segments
+from softehl.cases.seal.states.estimate import (
+    Estimate,
+    coarser_density,
+    finer_density,
+    reservation,
+    unseen,
+)
+from softehl.cases.seal.states.verdict import LARGEST_ERROR, fewest_inlet_segments, shows_inlet
 from softehl.runtime.mesh.mesh import MeshError
 
 FITS, SHOWS = 2.2, 3.0
@@ -28,9 +35,9 @@ does not count. Films that asked for at most three changed h* by 0.5 % or less o
 made for them, one that asked for nine by 7 %. Made anew from 3 on, an X-ring of the sample takes
 three times as long, and one of 13 other seals loses a state."""
 
-ALIKE = 1.25
-"""Ratio of the segments that two meshes have for a film, relative to their densities: what they
-differ by shows the error of both only where they resolve the same things alike."""
+FINEST = 2.5
+"""Largest density on which a film is solved because of its error, over that of its case: two finer
+meshes, as h* of most films is then known to 2 % (docs/validation/films-method.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,16 +53,32 @@ class Adapted:
     fits: bool = True
 
     @property
-    def other(self) -> FilmNumbers | None:
-        """The numbers of the coarser film."""
-        return self.coarser.numbers if self.coarser else None
+    def estimate(self) -> Estimate | None:
+        """Of its errors, None without the coarser film."""
+        if self.coarser is None:
+            return None
+        coarse, fine = (film.system.section.density for film in (self.coarser, self.film))
+        return Estimate(self.film.numbers, self.coarser.numbers, float(coarse / fine))
+
+    @property
+    def sure(self) -> bool:
+        """True if the estimated errors leave a state `ok`, as far as a mesh decides it.
+
+        A finer mesh of the same arc does not add the oil beyond its ends.
+        """
+        found, p = self.estimate, self.film.system.parameters
+        if found is None or not self.fits or not abs(found.h_star) <= LARGEST_ERROR:
+            return False
+        if not shows_inlet(found.film.inlet_ratio):
+            return False
+        return found.beyond > LARGEST_ERROR or not reservation(p, found)
 
 
 @dataclass(frozen=True, eq=False)
 class Adaptation:
     """Makes meshes for films.
 
-    p: the case, whose density they have. contacts, films: solve for either on them.
+    p: the case. contacts, films: solve for either on them.
     """
 
     p: Seal
@@ -66,75 +89,78 @@ class Adaptation:
         """A film on a mesh that fits it, from that on another mesh.
 
         last: films at other speeds. A film that ends early on a mesh is squeezed out anew on one
-        that is made for the state it has reached. The mesh of another film, which fits too, is left
-        where its estimated error is too large.
+        that is made for the state it has reached. Where the estimated error is too large, the film
+        is solved on finer meshes, and the estimate compares these.
         """
-        density, given = Fraction(self.p.density), found
-        found = self._settled(given, density)
+        found = self._settled(found)
         if isinstance(found, NoFilm):
             return found
-        coarser = self._coarser(found, last)
-        if found is given and self.p.error_estimate and not _sure(found, coarser):
-            own = self._remeshed(found, density)
-            if isinstance(own, Film):
-                found, coarser = own, self._coarser(own, last)
-        return Adapted(found, coarser, self._fits(found, density, most=SHOWS))
-
-    def _settled(
-        self, found: Film | NoFilm, density: Fraction, like: Film | None = None
-    ) -> Film | NoFilm:
-        """The film on a mesh of that density that fits it, if there is one; like: see `_fits`."""
-        for _ in range(CYCLES):
-            if isinstance(found, Film) and self._fits(found, density, like):
+        adapted = Adapted(found, self._coarser(found, last), self._fits(found, SHOWS))
+        while not adapted.sure:
+            finer = self._finer(adapted.film)
+            if not isinstance(finer, Film):
                 break
-            again = self._remeshed(found, density)
+            adapted = Adapted(finer, adapted.film, self._fits(finer, SHOWS))
+        return adapted
+
+    def _settled(self, found: Film | NoFilm) -> Film | NoFilm:
+        """The film on a mesh of its density that fits it, if there is one."""
+        for _ in range(CYCLES):
+            if isinstance(found, Film) and self._fits(found):
+                break
+            again = self._remeshed(found)
             if not isinstance(again, Film):
                 break
             found = again
         return found
 
-    def _fits(
-        self, film: Film, density: Fraction, like: Film | None = None, most: float = FITS
-    ) -> bool:
+    def _fits(self, film: Film, most: float = FITS) -> bool:
         """True if a mesh fits its film; a mesh that is given is as it is.
 
-        like: the film on another mesh, which this one must resolve as well for its density. most:
-        segments that it may ask for in the place of one, without that.
+        most: segments that the film may ask for in the place of one.
         """
         p = self.p
         if p.mesh != "graded":
             return True
         fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
-        if like is not None:
-            fewest = like.numbers.inlet_segments * float(density / p.density) / ALIKE
-            most = ALIKE * _misfit(like, p.density)
-        return not film.numbers.short(fewest) and _misfit(film, float(density)) <= most
+        return not film.numbers.short(fewest) and self._misfit(film) <= most
 
-    def _remeshed(self, found: Film | NoFilm, density: Fraction) -> Film | NoFilm | None:
+    def _misfit(self, film: Film) -> float:
+        return misfit(film.system, film.x, film.squeeze_film.scales.thickness)
+
+    def _remeshed(self, found: Film | NoFilm) -> Film | NoFilm | None:
         """The film on the mesh that is made for it; None where there is none."""
         if found.begun is None or self.p.mesh != "graded":
             return None
         squeeze_film, now = found.begun
-        layout = film_layout(squeeze_film.system, now.x, squeeze_film.scales.thickness)
-        return self._carried(found, self._system(layout, density))
+        system, thickness = squeeze_film.system, squeeze_film.scales.thickness
+        layout = film_layout(system, now.x, thickness)
+        return self._carried(found, self._system(layout, system.section.density))
 
     def _coarser(self, film: Film, last: Sequence[Adapted]) -> Film | None:
-        """The film on a coarser mesh that fits it, too, for the estimate; None without one."""
+        """The film on a coarser mesh, for the estimate; None without one."""
         if not (self.p.error_estimate and self.p.mesh == "graded"):
             return None
-        density = coarser_density(self.p.density)
         before = [a.coarser for a in last if a.coarser and a.film.system is film.system]
+        found: Film | NoFilm | None = None
         if before:
             solver = self.films.on(before[-1].system)
             found = solver.from_neighbour(before, film.loads.speed)
             system: SealSystem | None = solver.system
         else:
-            found, system = None, self._system(film.system.section.layout, density)
+            density = coarser_density(film.system.section.density)
+            system = self._system(film.system.section.layout, density)
         if not isinstance(found, Film):
             found = self._carried(film, system)
-        if isinstance(found, Film):
-            found = self._settled(found, density, film)
         return found if isinstance(found, Film) else None
+
+    def _finer(self, film: Film) -> Film | NoFilm | None:
+        """The film on a finer mesh of the same spacing; None where no such mesh would help."""
+        density = finer_density(film.system.section.density)
+        estimated = self.p.error_estimate and not unseen(self.p)
+        if not estimated or density > FINEST * self.p.density:
+            return None
+        return self._carried(film, self._system(film.system.section.layout, density))
 
     def _system(self, layout: Layout, density: Fraction) -> SealSystem | None:
         """The system on a mesh; None where that is too coarse for the corners of a section."""
@@ -165,19 +191,3 @@ class Adaptation:
             if isinstance(again, Film):
                 return again
         return solver.from_contact(film.stroke, film.speed, dry[1])
-
-
-def _sure(film: Film, coarser: Film | None) -> bool:
-    """True if the estimated errors leave a state `ok`, as far as a mesh decides it.
-
-    Another mesh of the same arc does not add the oil beyond its ends.
-    """
-    if coarser is None:
-        return False
-    bound = friction_bound(film.system.parameters.density, film.numbers, coarser.numbers)
-    left = LARGEST_ERROR - 100.0 * film.numbers.beyond
-    return bound <= (left if left > 0.0 else LARGEST_ERROR)
-
-
-def _misfit(film: Film, density: float) -> float:
-    return misfit(film.system, film.x, film.squeeze_film.scales.thickness, density)

@@ -147,11 +147,11 @@ def film_layout(system: SealSystem, x: Array, thickness: float) -> Layout:
     return layout.graded(Spacing.of(s, index), long, DEPTH * float(size.min()))
 
 
-def misfit(system: SealSystem, x: Array, thickness: float, density: float) -> float:
+def misfit(system: SealSystem, x: Array, thickness: float) -> float:
     """Largest number of segments that a film x (n,) asks for in the place of one of its mesh."""
     s, size = sizes(system, x, thickness)
     wanted = np.diff(np.interp(system.section.places, s, _index(s, size)))
-    return float(wanted.max()) * density / DENSITY
+    return float(wanted.max()) * float(system.section.density) / DENSITY
 
 
 def _index(s: Array, size: Array) -> Array:

@@ -25,7 +25,7 @@ from softehl.cases.seal.states.contacts import (
     overlap,
     unsealed,
 )
-from softehl.cases.seal.states.estimate import estimated_error, reservation
+from softehl.cases.seal.states.estimate import reservation
 from softehl.cases.seal.states.plan import strokes_of
 from softehl.cases.seal.states.results import film_state
 from softehl.cases.seal.states.sensitivity_table import differentiable
@@ -82,22 +82,18 @@ class Judge:
 
     def state(self, adapted: Adapted, faster: FilmNumbers | None) -> FilmState:
         """The state of a film; faster: of the same stroke at the next higher speed, if there is."""
-        film, other, p = adapted.film, adapted.other, adapted.film.system.parameters
-        numbers = film.numbers
-        error = friction = nan
-        if other:
-            error = estimated_error(p.density, numbers.h_star, other.h_star)
-            friction = estimated_error(p.density, numbers.friction, other.friction)
+        film, estimate, p = adapted.film, adapted.estimate, adapted.film.system.parameters
+        error = estimate.h_star if estimate else nan
         verdict = replace(
-            replace(self.contact, last=faster).after(numbers),
+            replace(self.contact, last=faster).after(film.numbers),
             error=error if p.error_estimate and p.mesh == "graded" else None,
-            reservation=reservation(p, numbers, other) if adapted.fits else UNFIT,
+            reservation=reservation(p, estimate) if adapted.fits else UNFIT,
         )
         equations = film.system, film.problem, film.loads, film.x
         state = replace(
             film_state(*equations, verdict, film.solution.iterations),
             h_star_error_percent=error,
-            rod_friction_error_percent=friction,
+            rod_friction_error_percent=estimate.friction if estimate else nan,
         )
         if self.differentiate and differentiable(state):
             state = replace(state, sensitivity=self.differentiate(film))

@@ -11,8 +11,9 @@ they cancel, so that their errors are added up.
 
 from __future__ import annotations
 
-import math
+from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil, fsum
 
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.verdict import (
@@ -34,22 +35,53 @@ COMPARED = 5.0
 """Largest p_s / mu of the sample of glands. At 5.4 an instroke was 9 % off, its estimate 0.1 %."""
 
 
-def coarser_density(density: int) -> Fraction:
+def coarser_density(density: int | Fraction) -> Fraction:
     """Density of the coarser mesh; meshes exist for multiples of one third."""
     return Fraction(density, 2) if density >= 4 else Fraction(5 * density // 2, 3)
 
 
-def estimated_error(density: int, value: float, other: float) -> float:
-    """Estimated error of h* or of friction in per cent of it, + where it is too large.
+def finer_density(density: Fraction) -> Fraction:
+    """Density of the mesh on which a film is solved again whose error is too large."""
+    return Fraction(ceil(1.5 * density))
 
-    value: at `density`; other: at `coarser_density`.
+
+@dataclass(frozen=True)
+class Estimate:
+    """Errors of a film, %, from its numbers on two meshes.
+
+    other: on the coarser one. ratio: of their densities, below 1.
     """
-    return _percent(density) * (other / value - 1.0)
 
+    film: FilmNumbers
+    other: FilmNumbers
+    ratio: float
 
-def _percent(density: int) -> float:
-    """Error of a value at `density`, %, of a relative difference to that of the coarser mesh."""
-    return 100.0 / (math.pow(density / coarser_density(density), ORDER) - 1.0)
+    @property
+    def h_star(self) -> float:
+        """Estimated error of h*, + where it is too large."""
+        return self._factor * (self.other.h_star / self.film.h_star - 1.0)
+
+    @property
+    def friction(self) -> float:
+        """Estimated error of the friction, + where it is too large."""
+        return self._factor * (self.other.friction / self.film.friction - 1.0)
+
+    @property
+    def friction_bound(self) -> float:
+        """Largest error of friction, by its two parts."""
+        parts = [(k.drag, k.friction - k.drag) for k in (self.film, self.other)]
+        apart = fsum(abs(a - b) for a, b in zip(*parts, strict=True))
+        return self._factor * apart / abs(self.film.friction)
+
+    @property
+    def beyond(self) -> float:
+        """Friction of the oil beyond both ends of the arc, which no mesh of it has."""
+        return 100.0 * self.film.beyond
+
+    @property
+    def _factor(self) -> float:
+        """Error, %, of a relative difference between the meshes."""
+        return float(100.0 / (self.ratio**-ORDER - 1.0))
 
 
 def unseen(p: Seal) -> str:
@@ -74,28 +106,19 @@ def unseen(p: Seal) -> str:
     return ""
 
 
-def friction_bound(density: int, film: FilmNumbers, other: FilmNumbers) -> float:
-    """Largest error of friction, %, by its two parts on two meshes; see `estimated_error`."""
-    parts = [(k.drag, k.friction - k.drag) for k in (film, other)]
-    apart = math.fsum(abs(a - b) for a, b in zip(*parts, strict=True))
-    return abs(_percent(density)) * apart / abs(film.friction)
-
-
-def reservation(p: Seal, film: FilmNumbers, other: FilmNumbers | None) -> str:
-    """Why a state whose estimated error of h* is small is not `ok` all the same; empty if it is.
-
-    other: the film on the coarser mesh, None where there is no estimate.
-    """
+def reservation(p: Seal, estimate: Estimate | None) -> str:
+    """Why a state whose estimated error of h* is small is not `ok` all the same; empty if it is."""
     words = unseen(p) if p.error_estimate else ""
-    if words or other is None:
+    if words or estimate is None:
         return words
+    other = estimate.other
     fewest = fewest_inlet_segments(p.reynolds, p.pressure_order, p.lobes)
     if other.short(fewest) or not shows_inlet(other.inlet_ratio):
         return f"the mesh of the estimate does not show the inlet; {FINER}"
-    error = friction_bound(p.density, film, other)
+    error = estimate.friction_bound
     if not error <= LARGEST_ERROR:
         return f"friction may be off by {error:.2g} %, h* is not; {FINER}"
-    lacks = 100.0 * film.beyond
+    lacks = estimate.beyond
     if not error + lacks <= LARGEST_ERROR:
         return (
             f"friction may be off by {error + lacks:.2g} %: it lacks {lacks:.2g} %, that of the "

@@ -232,7 +232,7 @@ def film_state(
         sealed_pressure_MPa=film.sealed_pressure,
         rod_speed_mm_s=film.rod_speed,
         h_star_um=numbers.h_star / MICROMETRE,
-        density=system.parameters.density,
+        density=int(system.section.density),
         h_min_um=numbers.h_min / MICROMETRE,
         p_max_MPa=numbers.p_max,
         pressure_jump_max_MPa=numbers.jump,

@@ -145,7 +145,9 @@ class FilmRow(Row):
     entrance_pressure_MPa: float = column(
         "MPa", "built up before the arc, where that begins within the film; else 0", default=0.0
     )
-    density: int = column("", "density of the mesh that the state was solved on")
+    density: int = column(
+        "", "density of the mesh of the state: above that of the run where its error was too large"
+    )
     verdict: str = column(
         "",
         "`ok`, `oscillating`, `uncertain`, `clipped` or `under-resolved`; `collapsed` is no result",
