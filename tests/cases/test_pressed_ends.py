@@ -115,3 +115,10 @@ def test_places_are_measured_round_the_circle() -> None:
     assert np.degrees(np.arctan2(z, -r)) == pytest.approx(-20.0, abs=2.0)
     z, r = (mesh.points[mesh.outer_nodes[layout.pressed(mesh)]] - [0.0, 10.0]).T
     assert abs(np.degrees(np.arctan2(z, -r))) == pytest.approx(179.5, abs=5.0)
+
+
+@pytest.mark.slow
+def test_pressure_ends_in_the_contact_on_finer_meshes_too() -> None:
+    """The contact of a cup presses hardly more than the oil: at density 4 p_s ended beside it."""
+    cup = Seal(ring="U-cup 25x35x8", density=4, sealed_pressure=1.0, speeds=(400.0,), stroke="out")
+    assert unsealed(*route().contact(cup)) == ""

@@ -137,14 +137,14 @@ class ContactMeshes:
         coarse = guide if p.rubs else COARSE
         uniform = build_system(_at(p.model_copy(update={"mesh": "uniform"}), coarse))
         seen = self._next((uniform, self._begun(uniform)), _at(p, coarse))
-        return self._finer(*self._sealed(_at(p, guide), seen), p.density)
+        return self._sealed(p, self._finer(*self._next(seen, _at(p, guide)), p.density))
 
     def _sealed(self, p: Seal, state: State) -> State:
-        """On the last of the graded meshes; on more where its arc or the pressure ends badly."""
-        for _ in range(CYCLES):
-            state = self._next(state, p)
+        """On a mesh whose arc and whose sealed pressure end well, of a few that are made for it."""
+        for _ in range(CYCLES - 1):
             if p.given_arc or not (unsealed(*state) or on_wall(*state)):
                 break
+            state = self._next(state, p)
         return state
 
     def _next(self, state: State, p: Seal) -> State:
