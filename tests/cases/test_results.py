@@ -28,6 +28,7 @@ from softehl.cases.seal.states.state import (
     UNDER_RESOLVED,
 )
 from softehl.cases.seal.states.verdict import (
+    ContactNumbers,
     FilmNumbers,
     Verdict,
     fewest_inlet_segments,
@@ -48,6 +49,11 @@ HEALTHY = FilmNumbers(
     drag=5.0,
 )
 SLOWER = replace(HEALTHY, speed=200.0, h_star=1.36e-3 * 0.5**0.6, friction=3.7, drag=3.7)
+
+
+def _contact(ratio: float) -> ContactNumbers:
+    """A contact with this inlet ratio."""
+    return ContactNumbers(0.27, 3.71, 1e-3, 0.0, 1.0, 0.0, inlet_ratio=ratio)
 
 
 def _verdict(*films: FilmNumbers) -> Verdict:
@@ -105,6 +111,20 @@ def test_doubtful_films_are_labelled_each_for_itself(
     assert "larger density" in verdict.advice
     slower = replace(SLOWER, speed=100.0, h_star=0.6e-3, friction=2.7, drag=2.7)
     assert verdict.after(slower).word == OK
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"inlet_ratio": 0.9}, {"inlet_segments": 1.2}, {"contacts": (_contact(1.0), _contact(0.8))}],
+)
+def test_pressure_above_the_contact_is_no_collapse_where_inlets_are_shown(
+    change: dict[str, Any],
+) -> None:
+    """A film that is as thick as an inlet gives may move load from one lobe to another."""
+    film = replace(HEALTHY, p_max=4.8, inlet_ratio=0.9999)
+    verdict = Verdict(reference=3.74, slopes=True)
+    assert verdict.after(film).word == OK
+    assert verdict.after(replace(film, **change)).word == COLLAPSED
 
 
 def test_low_orders_need_a_longer_inlet() -> None:

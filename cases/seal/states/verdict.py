@@ -267,6 +267,15 @@ class Verdict:
         if self.reservation:
             yield UNCERTAIN, self.reservation
 
+    def _shown(self, film: FilmNumbers) -> bool:
+        """True if the mesh shows the inlets of a film: it has not collapsed on it.
+
+        A thick film moves load from one contact to another: at 7 um an X-ring had 11 % more
+        pressure under one lobe, with the same h* at density 4.
+        """
+        inlets = shows_inlet(film.inlet_ratio) and abs(film.next_ratio - 1.0) <= NEXT_RATIO
+        return self.slopes and inlets and not film.short(self.fewest)
+
     def _suspicion(self, film: FilmNumbers) -> str:
         last, peaks = self.last, [(film.p_max, self.reference)]
         if film.h_min <= 0.0 and not self.rough:
@@ -274,7 +283,7 @@ class Verdict:
         if len(film.contacts) == len(self.references) > 1:
             own = [contact.p_max for contact in film.contacts]
             peaks = list(zip(own, self.references, strict=True))
-        for peak, reference in peaks:
+        for peak, reference in [] if self._shown(film) else peaks:
             if peak - reference > EXCESS_PRESSURE * reference:
                 excess = f"{peak - reference:.2f} MPa above that of frictionless contact"
                 return f"the maximum pressure is {excess}"
