@@ -41,6 +41,10 @@ def test_an_outstroke_leaves_the_film_that_its_flux_has() -> None:
         assert March.left(of, at) == left
 
 
+ERRORS = ((100.0, 0.6, 1.0), (-100.0, 0.5, -0.6))
+"""U in mm/s, h* in um, estimated error in per cent."""
+
+
 def test_net_leakage_is_the_difference_of_the_two_films() -> None:
     rows = [row(100.0, 0.6), row(400.0, 1.4, OSCILLATING), row(-400.0, 1.1), row(-100.0, 0.5)]
     fast, slow = net_leakage(rows)
@@ -51,6 +55,13 @@ def test_net_leakage_is_the_difference_of_the_two_films() -> None:
     assert slow.net_mm3_per_mm == pytest.approx(math.pi * RADIUS * 0.1e-3)
     assert fast.leak_out_mm3_s > 0.0 > fast.leak_in_mm3_s
     assert (fast.verdict, slow.verdict) == (OSCILLATING, OK)
+
+
+def test_the_error_of_the_net_volume_is_that_of_a_difference() -> None:
+    out, back = (replace(row(u, h), h_star_error_percent=e) for u, h, e in ERRORS)
+    assert net_leakage([out, back])[0].net_error_percent == pytest.approx(0.9 / 0.1)
+    unknown = replace(back, h_star_error_percent=math.nan)
+    assert math.isnan(net_leakage([out, unknown])[0].net_error_percent)
 
 
 def test_only_speeds_with_both_strokes_at_one_pressure_count() -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 
 from softehl.cases.harness.row import Record, column
 from softehl.cases.seal.states.state import VERDICTS, FilmRow
@@ -26,6 +27,11 @@ class LeakageRow(Record):
     net_mm3_per_100_m: float = column(
         "mm3", "net volume that leaves in 100 m of travel, out and back together"
     )
+    net_error_percent: float = column(
+        "%",
+        "largest error of the net volume by the estimated errors of both h*; as a difference, it "
+        "is less certain than either film; nan where not known",
+    )
     verdict: str = column("", "the worse one of the two states")
 
 
@@ -48,13 +54,16 @@ def per_100_m(volume: float, travel: float) -> float:
 
 def _cycle(out: FilmRow, back: FilmRow) -> LeakageRow:
     net = out.leak_rate_mm3_s / out.rod_speed_mm_s - back.leak_rate_mm3_s / back.rod_speed_mm_s
+    film = out.h_star_um - back.h_star_um
+    errors = sum(abs(row.h_star_error_percent) * row.h_star_um for row in (out, back))
     return LeakageRow(
         sealed_pressure_MPa=out.sealed_pressure_MPa,
         speed_mm_s=out.rod_speed_mm_s,
         leak_out_mm3_s=out.leak_rate_mm3_s,
         leak_in_mm3_s=back.leak_rate_mm3_s,
         net_mm3_per_mm=net,
-        net_film_um=out.h_star_um - back.h_star_um,
+        net_film_um=film,
         net_mm3_per_100_m=per_100_m(net, 1.0),
+        net_error_percent=errors / abs(film) if film else inf,
         verdict=min(out.verdict, back.verdict, key=VERDICTS.index),
     )
