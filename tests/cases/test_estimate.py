@@ -16,6 +16,7 @@ from softehl.cases.seal.states.estimate import (
     ORDER,
     Estimate,
     coarser_density,
+    finer_density,
     reservation,
 )
 from softehl.cases.seal.states.state import (
@@ -64,6 +65,11 @@ def _case(**changes: object) -> Seal:
 def test_coarser_meshes_exist() -> None:
     densities = [coarser_density(d) for d in DENSITIES]
     assert densities == [Fraction(2, 3), Fraction(5, 3), 2, 4, 8]
+    finer = [Fraction(d) for d in DENSITIES]
+    for _ in range(2):
+        finer = [finer_density(d) for d in finer]
+        assert all(3 * coarser_density(d) % 1 == 0 for d in finer)
+        assert all(0.4 < coarser_density(d) / d < 0.9 for d in finer)
     disc = Disc(0.0, 26.0, 1.7, -34.0, 43.0)
     assert [disc_mesh(disc, d).arc for d in densities[:3]] == [18, 45, 54]
     with pytest.raises(ValueError, match="a multiple of 1/3"):

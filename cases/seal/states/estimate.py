@@ -37,7 +37,7 @@ COMPARED = 5.0
 
 def coarser_density(density: int | Fraction) -> Fraction:
     """Density of the coarser mesh; meshes exist for multiples of one third."""
-    return Fraction(density, 2) if density >= 4 else Fraction(5 * density // 2, 3)
+    return Fraction((3 if density >= 4 else 5) * density // 2, 3)
 
 
 def finer_density(density: Fraction) -> Fraction:
