@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import panel as pn
@@ -72,14 +72,13 @@ class Form:
             widget = self.widgets[key]
             typed = widget.value_input
             if typed and widget.value != typed:
-                _list(widget, typed)
-                widget.value = typed
+                _take(widget, typed, widget.options)
 
     def keep_in(self, address: Any) -> None:
         """Keep all values in the address of the page, so that they are there after a reload."""
         for key, widget in self.widgets.items():
             if key in _TEXTS and (text := address.query_params.get(key)):
-                _list(widget, str(text))
+                _take(widget, str(text), widget.options)
             address.sync(widget, {"value": key})
 
     def values(self) -> dict[str, Any]:
@@ -115,15 +114,16 @@ class Form:
         """Offer the rods that a new ring goes with, and take the usual one."""
         offered = rods(event.new or "")
         if offered:
-            self.widgets["rod"].options = offered
-            if self.widgets["rod"].value not in offered:
-                self.widgets["rod"].value = offered[0]
+            rod = self.widgets["rod"]
+            _take(rod, rod.value if rod.value in offered else offered[0], offered)
 
 
-def _list(widget: Any, text: str) -> None:
-    """Put a text among those that a field offers: it drops a value that is not among them."""
-    if text not in widget.options:
-        widget.options = [*widget.options, text]
+def _take(widget: Any, text: str, offered: Sequence[str]) -> None:
+    """Give a field its text and what it offers, in one change: it drops a value that is not among
+    its options, also one that was refused, as soon as these change.
+    """
+    options = list(offered) if text in offered else [*offered, text]
+    widget.param.update(options=options, value=text)
 
 
 def _show_text(widget: Any) -> None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import sys
 import time
 import tomllib
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,6 +15,7 @@ from softehl.__main__ import main
 from softehl.cases.app.choices import CHOICES, rods, slides_on
 from softehl.cases.app.runs import Desk, case_text
 from softehl.cases.harness.case_file import read_case
+from softehl.cases.harness.errors import BadInput
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.shipped import SHIPPED
 
@@ -102,3 +105,45 @@ def test_without_panel_one_line_says_what_to_install(
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert "pip install 'softehl[app]'" in error
+
+
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # of Panel
+def test_a_field_keeps_what_is_typed_after_a_text_that_was_refused() -> None:
+    form = _form_on_a_page()
+    pressure = form.widgets["sealed_pressure"]
+    pressure.value = "5 bra"  # entered
+    shown = []
+    pressure.param.watch(lambda event: shown.append(event.new), ["value", "value_input"])
+    _type(form, "sealed_pressure", "20 bar")
+    assert all(shown), shown  # a browser that hears of an empty field in between leaves it empty
+    assert (pressure.value, pressure.value_input) == ("20 bar", "20 bar")
+    assert form.values()["sealed_pressure"] == "20 bar"
+
+
+def _form_on_a_page() -> Any:
+    """A form whose widgets have models, as in a browser, and that takes over what it can read."""
+    for module in ("panel", "panel_material_ui"):
+        pytest.importorskip(module)
+    from softehl.cases.app.form import Form
+
+    form = Form()
+    for widget in form.widgets.values():
+        widget.get_root()
+
+    def look(_: object) -> None:
+        with suppress(BadInput):
+            form.run()
+            form.settle()
+
+    form.watch(look)
+    return form
+
+
+def _type(form: Any, key: str, text: str) -> None:
+    """Type into a field letter by letter, without Enter."""
+    from panel.util import edit_readonly
+
+    widget = form.widgets[key]
+    for end in range(1, len(text) + 1):
+        with edit_readonly(widget):
+            widget.value_input = text[:end]
