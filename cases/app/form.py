@@ -56,7 +56,8 @@ class Form:
             placeholder="stroke = out",
             sizing_mode="stretch_width",
         )
-        self.widgets["ring"].param.watch(self._offer_rods, "value")
+        for shown in ("value", "value_input"):
+            self.widgets["ring"].param.watch(self._offer_rods, shown)
 
     def watch(self, told: Callable[[Any], None]) -> None:
         """Call a function whenever a value changes, or what is typed in a field."""

@@ -120,6 +120,14 @@ def test_a_field_keeps_what_is_typed_after_a_text_that_was_refused() -> None:
     assert form.values()["sealed_pressure"] == "20 bar"
 
 
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # of Panel
+def test_the_rod_follows_a_ring_that_is_only_typed() -> None:
+    form = _form_on_a_page()
+    _type(form, "ring", "ISO 3601 20x2.65")
+    rod = form.widgets["rod"]
+    assert (rod.value, rod.value_input) == ("20 f7", "20 f7")
+
+
 def _form_on_a_page() -> Any:
     """A form whose widgets have models, as in a browser, and that takes over what it can read."""
     for module in ("panel", "panel_material_ui"):
