@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from softehl.cases.harness.case import AnyCase, Run, load_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import Parameters, files_of, keys_of
-from softehl.cases.harness.units import is_quantity
+from softehl.cases.harness.units import is_number, is_quantity
 from softehl.runtime.library import KernelError
 from softehl.runtime.names import meant
 
@@ -97,6 +97,8 @@ def read_assignment(text: str, origin: str = "--set") -> tuple[str, object]:
     if not key or not equals:
         raise BadInput(f"{origin} {shortened(text)}: allowed is KEY=VALUE, as in length=4")
     plain = (_BARE_WORD, _PHRASE, _FILE)
+    if "," in value and is_number(value) and not value.endswith(","):
+        return key, value  # a number with a decimal comma or two numbers, as the key has it
     if (read := _toml_value(value)) is not None:
         return key, read
     if is_quantity(value) or any(form.fullmatch(value) for form in plain):

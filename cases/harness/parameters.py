@@ -3,13 +3,13 @@
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
+from types import MappingProxyType, NoneType
 from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic.fields import FieldInfo
 
-from softehl.cases.harness.units import is_quantity, read_quantity
+from softehl.cases.harness.units import is_number, is_quantity, read_number, read_quantity
 
 _BOUNDS = {"gt": "> {:g}", "ge": ">= {:g}", "lt": "< {:g}", "le": "<= {:g}"}
 
@@ -34,9 +34,9 @@ Nonzeros = Annotated[
 class Parameters(BaseModel):
     """Base of a parameter set: frozen, checked on construction, of strict types.
 
-    An integer is accepted where a real number is meant, a text with a unit where a key has one
-    ("50 bar"), one value where a key wants a list of any length; nothing else is converted.  Every
-    key has a default, and is declared by :func:`key`.
+    An integer is accepted where a real number is meant, the text of a number ("5", "5,5"), a text
+    with a unit where a key has one ("50 bar"), one value where a key wants a list of any length;
+    nothing else is converted.  Every key has a default, and is declared by :func:`key`.
     Raises pydantic.ValidationError where a value is of the wrong type, out of its range or not
     finite, and for an unknown key.
     """
@@ -97,13 +97,27 @@ def without_unit(kind: type[Parameters], name: str, value: object) -> object:
     if isinstance(value, list | tuple):
         return [without_unit(kind, name, item) for item in value]
     field = kind.model_fields.get(name)
-    unit = declared(field)["unit"] if field else ""
-    if not unit or not isinstance(value, str) or not is_quantity(value):
+    if field is None or not isinstance(value, str):
         return value
+    unit = declared(field)["unit"]
     try:
-        return read_quantity(value, unit)
+        if unit and is_quantity(value):
+            return read_quantity(value, unit)
+        if is_number(value) and _numeric(field.annotation):
+            return read_number(value)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
+    return value
+
+
+def _numeric(kind: Any) -> bool:
+    """True if a type has numbers, or lists of numbers, and nothing else but None."""
+    if get_origin(kind) is Literal:
+        return all(type(value) is int for value in get_args(kind))
+    if get_origin(kind) is Annotated:
+        return _numeric(get_args(kind)[0])
+    parts = [part for part in get_args(kind) if part not in (NoneType, ...)]
+    return kind in (int, float) or (bool(parts) and all(map(_numeric, parts)))
 
 
 def _listed(kind: type[Parameters], name: str, value: object) -> object:
@@ -112,12 +126,35 @@ def _listed(kind: type[Parameters], name: str, value: object) -> object:
     item = _item(field.annotation) if field else None
     if isinstance(value, str):
         parts = [part.strip() for part in value.split(",")]
+        if field and _list_of_numbers(field.annotation) and is_number(value) and len(parts) > 1:
+            return _comma(name, value, parts, any_length=item is float)
         if item is float and len(parts) > 1 and all(map(is_quantity, parts)):
             return parts
-        single = item is str or (item is float and is_quantity(value))
+        single = item is str or (item is float and (is_quantity(value) or is_number(value)))
     else:
         single = item is float and type(value) in (int, float)
     return [value] if single else value
+
+
+def _comma(name: str, text: str, parts: list[str], *, any_length: bool) -> list[str]:
+    """The two numbers of "400,100", for a key that wants a list.
+
+    Raises ValueError where that is rather a number with a decimal comma.
+    """
+    first, second = map(read_number, parts)
+    if any_length and 0 not in (first, second) and first != second:
+        return parts
+    raise ValueError(
+        f'{name} = "{text}": write a number as {text.replace(",", ".")}, a list as '
+        f"[{', '.join(parts)}]"
+    )
+
+
+def _list_of_numbers(kind: Any) -> bool:
+    """True if a type, or one of a union, is a list of numbers."""
+    if get_origin(kind) is tuple:
+        return _numeric(kind)
+    return any(map(_list_of_numbers, get_args(kind)))
 
 
 def _item(kind: Any) -> Any:

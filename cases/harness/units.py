@@ -13,6 +13,9 @@ _QUANTITY = re.compile(
     re.VERBOSE,
 )
 
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eE][+-]?\d+)?")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+
 _KINDS = {
     "mm": {"mm": 1.0, "m": 1e3, "cm": 10.0, "um": 1e-3, "µm": 1e-3, "in": 25.4, "inch": 25.4},
     "MPa": {
@@ -58,6 +61,26 @@ _KINEMATIC = ("cSt", "St", "mm2/s", "mm^2/s", "mm²/s", "m2/s")
 def is_quantity(text: str) -> bool:
     """True if a text is a number and something behind it."""
     return _QUANTITY.fullmatch(text) is not None
+
+
+def is_number(text: str) -> bool:
+    """True if a text is a number alone, with a decimal point or comma."""
+    return _NUMBER.fullmatch(text.strip()) is not None
+
+
+def read_number(text: str) -> float | int:
+    """The number that a text is.
+
+    Raises ValueError, in words, for a text that is none or whose comma may be one of thousands.
+    """
+    plain = text.strip()
+    if _THOUSANDS.fullmatch(plain):
+        point, without = plain.replace(",", "."), plain.replace(",", "")
+        raise ValueError(f'"{text}" is {point} or {without}; write one of them')
+    try:
+        return int(plain)
+    except ValueError:
+        return float(plain.replace(",", "."))
 
 
 def read_quantity(text: str, unit: str) -> float:

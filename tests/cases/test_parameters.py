@@ -70,6 +70,45 @@ def test_one_term_of_ogden_is_a_list_of_one() -> None:
     assert (ring.ogden_mu, ring.ogden_alpha) == ((1.2,), (2.0,))
 
 
+@pytest.mark.parametrize(
+    ("key", "text", "value"),
+    [
+        ("sealed_pressure", "5", 5.0),
+        ("sealed_pressure", " 5.5 ", 5.5),
+        ("sealed_pressure", "5,5", 5.5),
+        ("viscosity", "6,59e-8", 6.59e-8),
+        ("temperature", "-5", -5.0),
+        ("tolerance", "0,2", 0.2),
+        ("density", "4", 4),
+        ("quadrature_points", "7", 7),
+        ("speeds", "5", (5.0,)),
+        ("speeds", ["100", "25"], (100.0, 25.0)),
+        ("speeds", "400,100", (400.0, 100.0)),
+        ("groove_width", "5,2", 5.2),
+    ],
+)
+def test_the_text_of_a_number_is_this_number(key: str, text: Any, value: object) -> None:
+    given = {key: text} | ({"oil": "HLP 46"} if key == "temperature" else {})
+    found = getattr(Seal.model_validate(given), key)
+    assert (type(found), found) == (type(value), value)
+
+
+def test_a_decimal_comma_in_what_is_typed() -> None:
+    given = ["sealed_pressure=5,5", "ring=18x2,65", "rod=19,05", "gland=hydraulic"]
+    p = read_case("oring", SHIPPED, given, {"tolerance": "0,2 "}).parameters
+    assert isinstance(p, Seal)
+    assert (p.sealed_pressure, p.rod_diameter, p.tolerance) == (5.5, 19.05, 0.2)
+    for key, text, says in (
+        ("speeds", "0,2", r'speeds = "0,2": write a number as 0.2, a list as \[0, 2\]'),
+        ("speeds", "5,5", r"write a number as 5.5, a list as \[5, 5\]"),
+        ("roughness", "0,2", r"write a number as 0.2, a list as \[0, 2\]"),
+        ("sealed_pressure", "1,600", 'sealed_pressure: "1,600" is 1.600 or 1600; write one'),
+        ("sealed_pressure", '"-5"', r'sealed_pressure = "-5": input should be greater .* 0'),
+    ):
+        with pytest.raises(BadInput, match=says):
+            read_case("oring", SHIPPED, [f"{key}={text}"])
+
+
 def test_parameters_are_frozen() -> None:
     with pytest.raises(ValidationError, match="frozen"):
         Seal().density = 4
@@ -89,7 +128,12 @@ def test_every_density_of_the_list(density: int) -> None:
         ("pressure_order", 0),
         ("pressure_order", 4.0),
         ("sealed_pressure", True),
-        ("sealed_pressure", "1"),
+        ("sealed_pressure", "-1"),
+        ("sealed_pressure", "1 2"),
+        ("sealed_pressure", "1,600"),
+        ("density", "3"),
+        ("pressure_order", "4.0"),
+        ("error_estimate", "1"),
         ("sealed_pressure", -1e-9),
         ("sealed_pressure", float("nan")),
         ("sealed_pressure", float("inf")),
@@ -101,7 +145,7 @@ def test_every_density_of_the_list(density: int) -> None:
         ("speeds", [100.0, 0.0]),
         ("speeds", [100.0, float("nan")]),
         ("speeds", [100.0, True]),
-        ("speeds", [100.0, "25"]),
+        ("speeds", [100.0, "fast"]),
         ("speeds", [100.0, 100]),
         ("shear_traction", 1),
         ("rotation", "loose"),
@@ -142,6 +186,9 @@ def test_a_seal_that_cannot_be_mounted(changes: dict[str, Any], reason: str) -> 
         ("a=[400, 100]", [400, 100]),
         ("a=400, 100", [400, 100]),
         ("a=400,", [400]),
+        ("a=5,5", "5,5"),
+        ("a=19,05", "19,05"),
+        ("a=0.1,0.4", [0.1, 0.4]),
         ("a=rod_diameter 0.05 mm", "rod_diameter 0.05 mm"),
         ("a=viscosity 10 %", "viscosity 10 %"),
         ("a=x=1", None),
