@@ -140,14 +140,34 @@ def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
 
 def read_toml(given: str, missing: str, allowed: str, known: Iterable[str] = ()) -> dict[str, Any]:
     """Content of a TOML file; the words are for a file that is not there.  Raises BadInput."""
+    text = ""
     try:
-        return tomllib.loads(_text(Path(given)))
+        text = _text(Path(given))
+        return tomllib.loads(text)
     except FileNotFoundError:
         raise BadInput(f"{missing} {given!r}{meant(given, known)}; allowed: {allowed}") from None
     except OSError as error:
         raise BadInput(f"cannot read the case file {given!r}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
-        raise BadInput(f"{given}: not a TOML file: {shortened(str(error), 200)}") from None
+        words = f"{shortened(str(error), 200)}{_slip(str(error), text)}"
+        raise BadInput(f"{given}: not a TOML file: {words}") from None
+
+
+def _slip(error: str, text: str) -> str:
+    """The key of a usual slip in the line that an error of TOML names, and what to write."""
+    lines = text.splitlines()
+    number = int(found[1]) if (found := re.search(r"at line (\d+)", error)) else 0
+    if not 0 < number <= len(lines):
+        return ""
+    key, _, value = (part.strip() for part in lines[number - 1].partition("="))
+    value = value.partition("#")[0].strip()
+    if error.startswith("Cannot overwrite"):
+        return f": {key} is given twice"
+    if "," in value and is_number(value):
+        return f": write {key} = {value.replace(',', '.')}"
+    if "," in value and all(is_number(item) for item in value.split(",")):
+        return f": write {key} = [{value}]"
+    return ""
 
 
 def _text(path: Path) -> str:
@@ -156,7 +176,7 @@ def _text(path: Path) -> str:
         content = file.read(_LARGEST + 1)
     if len(content) > _LARGEST:
         raise ValueError(f"it is longer than {_LARGEST} bytes")
-    return content.decode("utf-8")
+    return content.decode("utf-8-sig")
 
 
 def require_known(kind: type[Parameters], keys: Iterable[str], origins: Mapping[str, str]) -> None:

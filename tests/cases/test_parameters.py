@@ -215,6 +215,21 @@ def test_case_file_and_set(tmp_path: Path) -> None:
     assert run.parameters == Seal(density=4, speeds=(800.0, 25.0), stroke="both")
 
 
+def test_slips_in_a_case_file_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_bytes(b'\xef\xbb\xbfcase = "oring"\r\ndensity = 4\r\n')  # as Windows has it
+    assert read_case(str(path), SHIPPED).parameters == Seal(density=4)
+    for line, says in (
+        ("sealed_pressure = 2,0", r"line 3, .*: write sealed_pressure = 2.0"),
+        ("sealed_pressure = 2,0  # MPa", "write sealed_pressure = 2.0"),
+        ("density = 2", "line 3, .*: density is given twice"),
+        ("speeds = 400, 100", r"write speeds = \[400, 100\]"),
+    ):
+        path.write_text(f'case = "oring"\ndensity = 4\n{line}\n')
+        with pytest.raises(BadInput, match=says):
+            read_case(str(path), SHIPPED)
+
+
 def test_a_key_is_set_once() -> None:
     with pytest.raises(BadInput, match='--set stroke: "out" and "both"; allowed: one of them'):
         read_case("oring", SHIPPED, ["stroke=out", "stroke=both"])
