@@ -154,3 +154,18 @@ def test_every_word_that_is_no_key_is_answered_with_one() -> None:
     for answer in Seal.words.values():
         names = re.findall(r"write (\w+)", answer)
         assert "piston" in answer or (names and set(names) <= set(keys)), answer
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        (("rod=36 f7",), r"is a U-cup for a rod of 25 mm, not of 35.9625; give rod = 25, or a U-"),
+        (("rod=36 f7",), 'as in "U-cup 36x46x8"'),
+        (("rod=20",), r"is a U-cup for a rod of 25 mm, not of 20; .* \"U-cup 20x30x8\""),
+        (("bore=50 H8",), r"is a U-cup for a bore of 35 mm, not of 50.0195; .*\"U-cup 40x50x8\""),
+    ],
+)
+def test_a_u_cup_for_another_rod_is_named(given: tuple[str, ...], says: str) -> None:
+    with pytest.raises(BadInput, match=says):
+        typed("ring=U-cup 25x35x8", *given)
+    assert typed("ring=U-cup 25x35x8", "rod=25 f7").section == "u_cup"

@@ -151,6 +151,25 @@ def _with_cup(values: dict[str, Any], rod: float, groove: float, width: float) -
     height = values.setdefault("section_diameter", round(depth / (0.5 * (1.0 + heel)), 3))
     if number(height):
         values.setdefault("inner_diameter", rod - (height - depth))
+        _require_rod_of_cup(values, rod, groove, width)
+
+
+def _require_rod_of_cup(values: Mapping[str, Any], rod: float, groove: float, width: float) -> None:
+    """ValueError for a U-cup that is named by another rod, or bore, than the one that is given."""
+    given, ground = values["rod_diameter"], values["housing_diameter"]
+    section = values["section_diameter"]
+    if not (number(given) and number(ground)) or 0.98 <= given / rod <= 1.02:
+        return
+    if 0.5 * section < 0.5 * (ground - given) < section and -0.1 <= given / rod - 1.0 <= 0.2:
+        return
+    what, size, depth = "rod" if rod > 0.0 else "bore", abs(given), round(groove - rod, 4)
+    near = round(size)
+    ends = (near, near + depth) if rod > 0.0 else (near - depth, near)
+    raise ValueError(
+        f'ring = "{values["ring"]}" is a U-cup for a {what} of {abs(rod):g} mm, not of '
+        f"{shown(float(size))}; give {what} = {abs(rod):g}, or a U-cup for this {what}, as in "
+        f'"U-cup {ends[0]:g}x{ends[1]:g}x{width:g}"'
+    )
 
 
 def _with_gland(values: dict[str, Any]) -> None:
