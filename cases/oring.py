@@ -98,7 +98,7 @@ class ORingCase(Case[Seal, FilmRow]):
 
     def answer(self, parameters: Seal, rows: Sequence[FilmRow]) -> list[str]:
         """See :class:`Case`."""
-        return answer(rows, parameters.travel)
+        return answer(rows, parameters.travel, parameters.stroke)
 
     def told(self, parameters: Seal, folder: Path) -> list[str]:
         """See :class:`Case`: tolerances and sensitivities."""

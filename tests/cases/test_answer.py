@@ -61,6 +61,16 @@ def test_whether_a_seal_leaks_and_what_friction_it_has(
     assert not isinstance(line, Alarm)
 
 
+def test_one_stroke_that_was_asked_for_is_no_failure() -> None:
+    for sign, stroke in ((1.0, "out"), (-1.0, "in")):
+        rows = [row(sign * 400.0, 1.4), row(sign * 100.0, 0.5)]
+        first, *lines = oring.CASE.answer(Seal(stroke=stroke), rows)  # type: ignore[arg-type]
+        assert first == f'{stroke}stroke alone, as asked for; leakage needs stroke = "both"'
+        assert lines[0].startswith(f"  400 mm/s: friction 3 N {stroke}")
+        assert not any("leakage" in line for line in lines)
+    assert "leaks" in answer([row(400.0, 1.4), row(-400.0, 1.1)], 100.0, "out")[0]
+
+
 def test_several_speeds_have_one_line_that_says_where_it_leaks_most() -> None:
     rows = [row(400.0, 1.4), row(-400.0, 1.1), row(100.0, 0.5), row(-100.0, 0.6)]
     assert answer(rows, 50.0)[0] == (

@@ -35,11 +35,11 @@ class _Speed:
         return "leaks" if self.net.net_mm3_per_mm > 0.0 else "returns"
 
 
-def answer(rows: Sequence[FilmRow], travel: float) -> list[str]:
+def answer(rows: Sequence[FilmRow], travel: float, stroke: str = "both") -> list[str]:
     """Answer if the seal leaks, and a line for each sealed pressure and speed |U|, fast ones first.
 
-    travel: way of the rod from end to end, mm. A line with a film that is thinner than the
-    roughness is an Alarm.
+    travel: way of the rod from end to end, mm. stroke: what was asked for. A line with a film that
+    is thinner than the roughness is an Alarm.
     """
     if not rows:
         return []
@@ -50,7 +50,10 @@ def answer(rows: Sequence[FilmRow], travel: float) -> list[str]:
         strokes.setdefault(at, {})[row.stroke] = row
     places = sorted(strokes, key=lambda at: (at[0], -at[1]))
     speeds = [_Speed(*at, strokes[at], nets.get(at)) for at in places]
-    return [_whether(speeds, travel), *(_line(speed, travel) for speed in speeds)]
+    first = _whether(speeds, travel)
+    if stroke != "both" and not nets:
+        first = f'{stroke}stroke alone, as asked for; leakage needs stroke = "both"'
+    return [first, *(_line(speed, travel, stroke) for speed in speeds)]
 
 
 def leaks(volume: float) -> str:
@@ -83,11 +86,13 @@ def _whether(speeds: Sequence[_Speed], travel: float) -> str:
     return f"leaks, most at {at}: {volume}" + (f"; not at {tight} of {len(kinds)}" if tight else "")
 
 
-def _line(speed: _Speed, travel: float) -> str:
+def _line(speed: _Speed, travel: float, stroke: str) -> str:
     """A speed: leakage, friction, least lambda."""
     strokes = speed.strokes
     forces = [f"{abs(row.rod_friction_N):.3g} N {stroke}" for stroke, row in strokes.items()]
-    parts = [_leakage(speed, travel), f"friction {', '.join(forces)}", *_ratio(strokes)]
+    parts = [f"friction {', '.join(forces)}", *_ratio(strokes)]
+    if speed.net is not None or stroke == "both":
+        parts.insert(0, _leakage(speed, travel))
     doubts = [f"{stroke} {row.verdict}" for stroke, row in strokes.items() if row.verdict != OK]
     doubt = f" ({', '.join(doubts)})" if doubts else ""
     line, thin = f"  {speed.speed:g} mm/s: {'; '.join(parts)}{doubt}", _thin(strokes)
