@@ -136,7 +136,7 @@ HOLES = {
     "40 0/+0.039": (40.0, 40.039),
 }
 NO_FITS = {
-    "36 F7": "36 f7",
+    "36 F7": '"36 F7" has the letter of a hole: a shaft has small letters; write "36 f7"',
     "36 k6": "36 ±0.05",
     "36 u8": "36 f7",
     "36 f4": "36 f7",

@@ -116,7 +116,9 @@ def _class(key: str, given: str, found: re.Match[str], hole: bool) -> Band:
     if not hole:
         part, case, other = ("shaft", "small", letter.lower())
     if letter != other:
-        raise refused(key, given, f"a {part} has {case} letters", f"{shown} {other}{grade}")
+        why = f"has the letter of a {'shaft' if hole else 'hole'}: a {part} has {case} letters"
+        raise refused(key, given, why, f"{shown} {other}{grade}")
     if not 0.0 < size <= STEPS[-1]:
-        raise refused(key, given, "ISO 286 classes are read up to 500 mm", f"{shown} ±0.05")
+        why = "is beyond the tables: ISO 286 classes are read up to 500 mm"
+        raise refused(key, given, why, f"{shown} ±0.05")
     return band(size, letter, grade)
