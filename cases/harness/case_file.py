@@ -11,7 +11,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic import ValidationError
 
@@ -125,9 +125,10 @@ def _toml_value(text: str) -> Any:
 
 def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
     """The case name and the remaining keys of a TOML file."""
-    table = read_toml(
-        given, "no case or file", f"a TOML file or one of {', '.join(shipped)}", shipped
-    )
+    allowed = f"a TOML file or one of {', '.join(shipped)}"
+    if not Path(given).exists():
+        allowed += _as_value(given, shipped)
+    table = read_toml(given, "no case or file", allowed, shipped)
     if any(isinstance(table.get(way), dict | list) for way in WAYS):
         raise BadInput(f"{given} is a study of many runs: softehl sweep {given}")
     name = table.pop("case", None)
@@ -136,6 +137,16 @@ def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
         allowed = " or ".join(f'case = "{known}"' for known in shipped)
         raise BadInput(f"{given}: {told}{meant(str(name), shipped)}; allowed: {allowed}")
     return name, table
+
+
+def _as_value(given: str, shipped: Shipped) -> str:
+    """How to run a case with a word that is no case but a value of one of its keys, else ""."""
+    word = given.lower().replace("-", "_")
+    for name, module in shipped.items():
+        for key, field in load_case(module).parameters.model_fields.items():
+            if get_origin(field.annotation) is Literal and word in get_args(field.annotation):
+                return f", as in softehl run {name} --set {key}={word}"
+    return ""
 
 
 def read_toml(given: str, missing: str, allowed: str, known: Iterable[str] = ()) -> dict[str, Any]:

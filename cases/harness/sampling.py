@@ -197,7 +197,10 @@ def _tolerance(name: str, given: object, values: Mapping[str, Any], read: Read) 
     for key in keys:
         read(key, 1.0)
         if not _is_number(values.get(key)) or not values[key]:
-            raise BadInput(f"{where}: {key} = {values.get(key)!r}; allowed: a number that is not 0")
+            near = [k for k in values if k.startswith(f"{key}_") and _is_number(values[k])]
+            instead = f", as {' or '.join(near)} has" if near else ""
+            told = f"{where}: {key} = {values.get(key)!r}"
+            raise BadInput(f"{told}; allowed: a key with a number that is not 0{instead}")
     percent = _SHARE.fullmatch(given.strip()) if isinstance(given, str) else None
     if percent:
         return Tolerance(keys, 0.01 * float(percent["size"]))

@@ -45,18 +45,42 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _hint(error: "click.ClickException") -> str:
-    """Hint at `--set`, for a word on the command line that looks like a key."""
+    """What is allowed, or how a key is set, for a word on the command line that looks like one."""
     import click
 
     if not isinstance(error, click.UsageError) or error.ctx is None:
         return ""
-    if "assignments" not in [option.name for option in error.ctx.command.params]:
-        return ""
+    command = error.ctx.command
+    if "assignments" not in [option.name for option in command.params] or isinstance(
+        error, click.BadParameter
+    ):
+        return _allowed(error, error.ctx, command)
     how = "a key of the case is set by --set KEY=VALUE"
     if isinstance(error, click.NoSuchOption):
         key = error.option_name.lstrip("-")
         return "" if error.possibilities else f"{how}, as in --set {key}=..."
     return how if "unexpected extra argument" in error.format_message() else ""
+
+
+def _allowed(error: "click.UsageError", context: "click.Context", command: "click.Command") -> str:
+    """What is allowed in place of a command, an argument or a whole number."""
+    import click
+
+    from softehl.cases.shipped import SHIPPED
+
+    if isinstance(command, click.Group):
+        no_command = "command" in error.format_message().lower()
+        return f"allowed: {', '.join(command.list_commands(context))}" if no_command else ""
+    arguments = [p.make_metavar(context) for p in command.params if isinstance(p, click.Argument)]
+    if isinstance(error, click.MissingParameter):
+        missed = error.param is not None and error.param.name == "case"
+        return f"allowed: {', '.join(SHIPPED)} or a TOML file" if missed else ""
+    if isinstance(error, click.BadParameter):
+        kind = error.param.type if error.param is not None else None
+        whole = isinstance(kind, click.IntRange) and "is not a valid" in error.format_message()
+        return "allowed: a whole number from 1" if whole else ""
+    extra = "unexpected extra argument" in error.format_message()
+    return f"allowed: {context.command_path} {' '.join(arguments)}".rstrip() if extra else ""
 
 
 def _commands() -> "click.Group":

@@ -318,7 +318,14 @@ BAD = {
     "out cannot be": (["oring", "--out", "/proc/softehl/oring"], "/proc"),
     "unknown option": (["oring", "--dens", "4"], "--dens"),
     "jobs": (["oring", "--jobs", "0"], "--jobs"),
-    "no case": ([], "CASE"),
+    "jobs in words": (["oring", "--jobs", "two"], "; allowed: a whole number from 1"),
+    "no case": ([], "CASE'; allowed: oring, slider, cycle or a TOML file"),
+    "section for a case": (["u_cup"], "cycle, as in softehl run oring --set section=u_cup"),
+    "one time": (["cycle", "--set", "motion=[[0,100]]"], "motion: times 0: at least two, rising"),
+    "times that stand": (
+        ["cycle", "--set", "pressures=[[0,1],[0,2]]"],
+        "pressures: times 0, 0: at least two, rising",
+    ),
 }
 CASE_FILES: Mapping[str, bytes] = {
     "broken.toml": b'case = "oring\ndensity = 4',
@@ -344,6 +351,26 @@ def test_bad_input(what: str, here: Path, invoke: Invoke) -> None:
     assert words.replace("\\", "") in err[0].replace("\\", "")
     assert names(here) == set(CASE_FILES)
     assert [path for path in here.iterdir() if path.is_dir()] == []
+
+
+COMMANDS = "app, design, generate, kernels, keys, report, reproduce, run, sweep"
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ((), f"Missing command; allowed: {COMMANDS}"),
+        (("frobnicate",), f"No such command 'frobnicate'; allowed: {COMMANDS}"),
+        (("keys",), "Missing argument 'CASE'; allowed: oring, slider, cycle or a TOML file"),
+        (("keys", "oring", "pressure"), "argument (pressure); allowed: softehl keys CASE"),
+    ],
+)
+def test_a_wrong_command_says_what_is_allowed(
+    given: tuple[str, ...], says: str, invoke: Invoke
+) -> None:
+    code, _, err = invoke(*given)
+    assert (code, len(err)) == (2, 1)
+    assert err[0].endswith(says)
 
 
 def test_no_kernels(here: Path, invoke: Invoke) -> None:

@@ -204,6 +204,10 @@ HEAD = 'case = "slider"\n'
         (HEAD + "[latin_hypercube]\nnumber = 2\nbetween.h0 = [1, 2]", "unknown 'number'"),
         (HEAD + '[random]\ncount = 2\ntolerances.h0 = "ten"', "allowed: a share"),
         (HEAD + '[random]\ncount = 2\ntolerances.profile = "5 %"', 'profile = \'parabola\''),
+        (
+            'case = "oring"\n[random]\ncount = 2\ntolerances.rod = "0.05 mm"',
+            "rod = None; allowed: a key with a number that is not 0, as rod_diameter has",
+        ),
         (HEAD + '[random]\ncount = 2\ntolerances.start_pressure = "5 %"', "number that is not 0"),
         (HEAD + '[random]\ncount = 2\ntolerances."h0, ratio" = 0.1', "allowed: a share"),
         (HEAD + '[random]\ncount = 2\ntolerances.h0 = "5 %"\ntolerances."h0, ratio" = "5 %"',

@@ -27,11 +27,12 @@ class Table:
     values: tuple[float, ...]
 
     @classmethod
-    def of(cls, rows: Rows) -> Table:
-        """From rows (time, value).  ValueError for times that do not rise from 0."""
+    def of(cls, rows: Rows, key: str = "motion") -> Table:
+        """From rows (time, value) of a key.  ValueError for times that do not rise from 0."""
         times, values = (tuple(float(v) for v in column) for column in zip(*rows, strict=True))
         if times[0] != 0.0 or len(times) < 2 or not np.all(np.diff(times) > 0.0):
-            raise ValueError(f"times {list(times)[:4]}...: at least two, rising from 0, in seconds")
+            given = ", ".join(f"{t:g}" for t in times[:4]) + ", ..." * (len(times) > 4)
+            raise ValueError(f"{key}: times {given}: at least two, rising from 0, in seconds")
         return cls(times, values)
 
     @property
@@ -59,7 +60,7 @@ def _repeated(pressure: Rows | float, period: float) -> Table:
     """A pressure over time from its rows, or one that is the same all the time.  ValueError."""
     if isinstance(pressure, int | float):
         return Table.of([(0.0, pressure), (period, pressure)])
-    return Table.of(pressure)
+    return Table.of(pressure, "pressures")
 
 
 @dataclass(frozen=True)
