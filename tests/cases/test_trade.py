@@ -169,3 +169,12 @@ def test_a_u_cup_for_another_rod_is_named(given: tuple[str, ...], says: str) -> 
     with pytest.raises(BadInput, match=says):
         typed("ring=U-cup 25x35x8", *given)
     assert typed("ring=U-cup 25x35x8", "rod=25 f7").section == "u_cup"
+
+
+@pytest.mark.parametrize(
+    ("word", "stroke"),
+    [("outstroke", "out"), ("extend", "out"), ("Retract", "in"), ("instroke", "in")],
+)
+def test_another_word_for_a_stroke_has_the_one_to_write(word: str, stroke: str) -> None:
+    with pytest.raises(BadInput, match=f'stroke = "{word}" .*; write "{stroke}"'):
+        typed(f"stroke={word}")

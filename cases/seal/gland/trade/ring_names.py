@@ -53,6 +53,9 @@ _QUAD = re.compile(r"4(?P<number>\d{3})")
 _COMPOUND = form(
     r"(?P<ring>.*\d)[ ,;/-]+(?P<rubber>(?:[XH]?NBR|F?FKM|FPM|EPDM|F?VMQ|PUR?|CR|ACM)[ -]?\d\d\b.*)"
 )
+_POLYMER = form(
+    r"(?P<ring>.*\d)[ ,;/-]+(?P<rubber>(?:[XH]?NBR|F?FKM|FPM|EPDM|F?VMQ|PUR?|CR|ACM|Viton)\b.*)"
+)
 _SIZE = form(
     rf"(?:\d{{3}}[AB][ -]+)?(?:ID|d1)?[ =]*(?P<inner>{NUMBER}) ?(?:mm)?x(?P<section>{NUMBER})"
     rf" ?(?:mm)?(?:x(?P<third>{NUMBER}) ?(?:mm)?)?(?:[ -]+[NS])?"
@@ -117,6 +120,15 @@ def _unknown(given: str, rest: str, kind: Kind | None) -> Exception:
         ring = found["ring"].strip(" ,;-/")
         why = f"has its rubber in it, which is another key: material = {found['rubber']!r}"
         return refused("ring", given, why.replace("'", '"'), ring)
+    if found := _POLYMER.fullmatch(rest):
+        why = "has its rubber in it, which is another key: material, polymer and hardness"
+        return refused("ring", given, why, found["ring"].strip(" ,;-/"))
+    for section in ("d_ring", "rectangular", "trapezoid"):
+        if found := re.search(rf"\b(?:{_SECTIONS[section]})\b", rest, re.IGNORECASE):
+            size = f"{rest[: found.start()]} {rest[found.end() :]}".strip(" ,;-")
+            why = f'has its section in it, which is another key: section = "{section}"'
+            readable = _SIZE.fullmatch(size) or _DASH.fullmatch(size)
+            return refused("ring", given, why, size if readable else usual[0])
     if found := re.fullmatch(r"(?:JIS ?(?:B ?2401)? ?)?([PGVS])-? ?(\d+)A?", rest, re.IGNORECASE):
         size = f"{found[1].upper()}{found[2]}"
         why = f"is a size of JIS B 2401 ({size}), whose diameters are not in the catalogue"

@@ -28,6 +28,13 @@ LENGTHS = {"rod": "rod_diameter", **{name: name for name in _SIZES}}
 
 _SHAFTS = ("rod", "rod_diameter", "groove_diameter")
 
+_STROKES = {
+    "out": r"out[- ]?strokes?|outwards?|extend(?:ing)?|extension|push(?:ing)?",
+    "in": r"in[- ]?strokes?|inwards?|retract(?:ing|ion)?|pull(?:ing)?",
+    "both": r"both strokes|all|(?:out|in)(?: ?[,/+&] ?| and )(?:out|in)|out ?in|in ?out",
+}
+"""Stroke -> other words for it."""
+
 
 class SaidKeys(Parameters):
     """The key of what was said."""
@@ -49,6 +56,7 @@ class SaidKeys(Parameters):
         if "roughness" in given:
             said += _finishes(values)
         _oil(values)
+        _require_stroke(values.get("stroke"))
         if isinstance(section := values.get("section"), str):
             values["section"] = read_section(section)
         return super().worded({**values, "said": tuple(dict.fromkeys(said))} if said else values)
@@ -91,6 +99,13 @@ def understood(said: Sequence[str]) -> list[str]:
             factor = f", {RMS_OF_RA:.4g} Ra (normal distribution)" if "Ra" in value else ""
             words.append(f"{name} of the {value}: {height:.4g} um rms{factor}")
     return words
+
+
+def _require_stroke(given: object) -> None:
+    """Raise NotUnderstoodError for another word for a stroke."""
+    for stroke, words in _STROKES.items():
+        if isinstance(given, str) and re.fullmatch(words, plain(given), re.IGNORECASE):
+            raise refused("stroke", given, "is another word for it", stroke)
 
 
 def _length(name: str, values: dict[str, Any]) -> list[str]:
