@@ -15,7 +15,9 @@ import panel as pn
 from softehl.cases.app.form import Form
 from softehl.cases.app.runs import Desk, RunState
 from softehl.cases.harness.case import Alarm, Run
+from softehl.cases.harness.earlier import advice_of
 from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.report.part import FinishedRun
 from softehl.cases.seal.report import style
 from softehl.cases.seal.report.drawing import fit_numbers, gland_figure
 from softehl.cases.seal.report.interactive import curve_plot, friction_plot
@@ -54,7 +56,9 @@ class Page:
             disabled=True,
             theme="bootstrap5",
             theme_classes=["table-sm"],
-            layout="fit_data_stretch",
+            layout="fit_columns",
+            widths=_COLUMNS,
+            formatters={name: {"type": "textarea"} for name in _COLUMNS},  # which wraps its text
             **_WIDE,
         )
         self.stop = pn.widgets.Button(name="Stop", button_type="danger", disabled=True)
@@ -191,15 +195,25 @@ class Page:
                 alert_type="danger" if any(isinstance(x, Alarm) for x in lines) else "light",
             )
             for run in found
-            if (lines := run.case.answer(run.parameters, run.rows))
+            if (lines := _lines(run))
         ]
         plots = (curve_plot(found), friction_plot(found)) if found else (None, None)
         for pane, plot in zip(self.plots, plots, strict=True):
             pane.object = plot
 
 
+def _lines(run: FinishedRun) -> list[str]:
+    """The answer of a run, and the reasons for states that are not ok."""
+    answer: list[str] = run.case.answer(run.parameters, run.rows)
+    return [*answer, *run.case.notes(run.rows, advice_of(run.content, run.rows))]
+
+
 _SAVED = "stopped; what it reached is saved"
-_COLUMNS = ("run", "seal", "rubber", "pressure", "status", "states", "answer")
+_COLUMNS = {
+    **{"run": "16%", "seal": "14%", "rubber": "10%", "pressure": "12%"},
+    **{"status": "10%", "states": "10%", "answer": "22%"},
+}
+"""Column of the list of runs -> its width."""
 
 
 def _cells(state: RunState) -> dict[str, str]:

@@ -16,8 +16,12 @@ from softehl.cases.app.choices import CHOICES, rods, slides_on
 from softehl.cases.app.runs import Desk, case_text
 from softehl.cases.harness.case_file import read_case
 from softehl.cases.harness.errors import BadInput
+from softehl.cases.harness.report.part import FinishedRun
+from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.states.state import UNCERTAIN
 from softehl.cases.shipped import SHIPPED
+from tests.cases.test_leakage import row
 
 GIVEN = {
     **{"ring": "36x4", "rod": "36 f7", "compound": "NBR 70", "density": 1},
@@ -105,6 +109,17 @@ def test_without_panel_one_line_says_what_to_install(
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert "pip install 'softehl[app]'" in error
+
+
+def test_a_state_that_is_not_ok_has_its_reason_beside_the_answer(tmp_path: Path) -> None:
+    for module in ("panel", "panel_material_ui"):
+        pytest.importorskip(module)
+    from softehl.cases.app.page import _lines
+
+    rows = [row(400.0, 1.4), row(-400.0, 1.1, UNCERTAIN)]
+    lines = _lines(FinishedRun(tmp_path, CASE, Seal(), rows))
+    assert any("(in uncertain)" in line for line in lines)
+    assert any(line.startswith("uncertain: ") and "U = -400 mm/s" in line for line in lines)
 
 
 @pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # of Panel
