@@ -1,7 +1,8 @@
 """Exact sensitivities of a film: what a change of any parameter by one per cent does, in per cent.
 
-All derivatives are those of the discrete equations at the converged state, d log q / d log s, with
-the mesh frozen (`cases.seal.sensitivity.variation`). The film does not depend on the contact it
+All derivatives are those of the discrete equations at the converged state, d log q / d log s, on a
+mesh that moves with the section (`cases.seal.sensitivity.variation`) and, as reported, with the
+edges of the film (`cases.seal.sensitivity.following`). The film does not depend on the contact it
 began from.
 """
 
@@ -13,7 +14,14 @@ from types import MappingProxyType
 import numpy as np
 
 from softehl.cases.seal.gland.records.numerics import Numerics
-from softehl.cases.seal.sensitivity.quantities import along, by_unknowns, fields_along, quantities
+from softehl.cases.seal.sensitivity.following import edges, shift_rate, velocities
+from softehl.cases.seal.sensitivity.quantities import (
+    Quantity,
+    along,
+    by_unknowns,
+    fields_along,
+    quantities,
+)
 from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
 from softehl.cases.seal.solve.films import Film
 from softehl.cases.seal.solve.method import Differentiate
@@ -35,21 +43,56 @@ def rates_of(
     return {name: kept.get(name) or case.rate(name) for name in case.parameters}
 
 
+Slopes = dict[str, dict[str, float]]
+"""Quantity -> parameter -> d log quantity / d log parameter."""
+
+
 def sensitivities(
     case: FilmCase, x: Array, linear: LinearSolver, rates: Mapping[str, Inputs]
-) -> dict[str, dict[str, float]]:
-    """Quantity -> parameter -> d log quantity / d log parameter at a converged film x (n,).
+) -> Slopes:
+    """Those of a converged film x (n,), on a mesh that follows its edges.
 
     rates: of the parameters, by `rates_of` at this film. Raises SingularMatrix.
     """
-    found, tangent = quantities(case, x), Tangent.at(case.problem, x)
-    gradients = np.stack([by_unknowns(case, x, q) for q in found.values()], axis=1)
+    found = quantities(case, x)
+    moving = {f"edge {k}": e for k, e in enumerate(edges(case, x, found["h_star"].value))}
+    nodes = zip(moving, velocities(case, list(moving.values())), strict=True)
+    shifts = {name: shift_rate(case, velocity) for name, velocity in nodes}
+    of = {**found, **{name: edge.moved for name, edge in moving.items()}}
+    slopes = frozen_slopes(case, x, linear, {**rates, **shifts}, of)
+    for_parameters = {q: {key: slopes[q][key] for key in rates} for q in slopes}
+    ways = {
+        name: edge.velocities(for_parameters[name], for_parameters["h_star"])
+        for name, edge in moving.items()
+    }
+    return {
+        q: {
+            key: slope + sum(ways[name][key] * slopes[q][name] for name in moving)
+            for key, slope in for_parameters[q].items()
+        }
+        for q in found
+    }
+
+
+def frozen_slopes(
+    case: FilmCase,
+    x: Array,
+    linear: LinearSolver,
+    rates: Mapping[str, Inputs],
+    of: Mapping[str, Quantity],
+) -> Slopes:
+    """Derivatives of these quantities of a film x (n,) on a mesh that moves with the section alone.
+
+    Raises SingularMatrix.
+    """
+    tangent = Tangent.at(case.problem, x)
+    gradients = np.stack([by_unknowns(case, x, q) for q in of.values()], axis=1)
     loads = np.stack([tangent.load(rate) for rate in rates.values()], axis=1)
     through = -adjoints(linear, tangent.reduced, gradients).T @ loads
-    slopes: dict[str, dict[str, float]] = {name: {} for name in found}
+    slopes: Slopes = {name: {} for name in of}
     for j, (key, rate) in enumerate(rates.items()):
-        moved = fields_along(case, x, rate, found.values())
-        for i, (name, q) in enumerate(found.items()):
+        moved = fields_along(case, x, rate, of.values())
+        for i, (name, q) in enumerate(of.items()):
             slopes[name][key] = float(through[i, j]) + along(case, q, key, rate, moved)
     return slopes
 

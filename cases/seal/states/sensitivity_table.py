@@ -20,7 +20,7 @@ class SensitivityRow(Record):
     )
     parameter: str = column("", "a key of the case, or `U`")
     log_derivative: float = column(
-        "", "d log quantity / d log parameter: per cent for one per cent; the mesh is frozen"
+        "", "d log quantity / d log parameter: per cent for one per cent"
     )
 
 
