@@ -24,7 +24,7 @@ WITH_EDGE = 0.25
 """Part of a contact whose nodes move as its edge does, from either edge on."""
 
 _STEP = 1e-4
-"""Step of the nodes, in lengths of the arc: lengths of segments are linear in it to rounding."""
+"""Step of the nodes, in lengths of the arc; it leaves an error of 1e-8."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def shifted(case: FilmCase, velocity: Array, by: float) -> FilmCase:
 def shift_rate(case: FilmCase, velocity: Array) -> Inputs:
     """The rate of the inputs of a film as its nodes move at this velocity (nodes, 2), per mm."""
     step = _STEP * float(case.system.section.places[-1])
-    return rate_of(lambda by: Inputs.of(shifted(case, velocity, by).problem), step)
+    return rate_of(lambda by: Inputs.of(shifted(case, velocity, by).problem), step, degree=2)
 
 
 def _parts(case: FilmCase, found: Sequence[Edge]) -> Array:
