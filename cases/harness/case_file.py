@@ -140,7 +140,7 @@ def _read_file(given: str, shipped: Shipped) -> tuple[str, dict[str, Any]]:
 
 
 def _as_value(given: str, shipped: Shipped) -> str:
-    """How to run a case with a word that is no case but a value of one of its keys, else ""."""
+    """Hint how to run a case whose key has a value of this name, "" where there is none."""
     word = given.lower().replace("-", "_")
     for name, module in shipped.items():
         for key, field in load_case(module).parameters.model_fields.items():

@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _hint(error: "click.ClickException") -> str:
-    """What is allowed, or how a key is set, for a word on the command line that looks like one."""
+    """Say what is allowed, or how a key is set, for a word on the command line."""
     import click
 
     if not isinstance(error, click.UsageError) or error.ctx is None:
@@ -63,7 +63,7 @@ def _hint(error: "click.ClickException") -> str:
 
 
 def _allowed(error: "click.UsageError", context: "click.Context", command: "click.Command") -> str:
-    """What is allowed in place of a command, an argument or a whole number."""
+    """Say what is allowed in place of a command, an argument or a whole number."""
     import click
 
     from softehl.cases.shipped import SHIPPED

@@ -50,7 +50,7 @@ Slopes = dict[str, dict[str, float]]
 def sensitivities(
     case: FilmCase, x: Array, linear: LinearSolver, rates: Mapping[str, Inputs]
 ) -> Slopes:
-    """Those of a converged film x (n,), on a mesh that follows its edges.
+    """The sensitivities of a converged film x (n,), on a mesh that follows its edges.
 
     rates: of the parameters, by `rates_of` at this film. Raises SingularMatrix.
     """
