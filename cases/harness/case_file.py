@@ -95,7 +95,7 @@ def read_assignment(text: str, origin: str = "--set") -> tuple[str, object]:
     """Split KEY=VALUE and read VALUE as a TOML value; a bare word is a string.  BadInput."""
     key, equals, value = (part.strip() for part in text.partition("="))
     if not key or not equals:
-        raise BadInput(f"{origin} {shortened(text)}: allowed is KEY=VALUE, as in density=4")
+        raise BadInput(f"{origin} {shortened(text)}: allowed is KEY=VALUE, see softehl keys")
     plain = (_BARE_WORD, _PHRASE, _FILE)
     if "," in value and is_number(value) and not value.endswith(","):
         return key, value  # a number with a decimal comma or two numbers, as the key has it

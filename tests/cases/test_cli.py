@@ -293,7 +293,7 @@ BAD = {
     "density": (["oring", "--set", "density=3"], "allowed: mesh density d"),
     "bool for number": (["oring", "--set", "mu_1=true"], "mu_1 = true"),
     "no TOML value": (["oring", "--set", "speeds=[100"], "not a TOML value"),
-    "no value": (["oring", "--set", "density"], "KEY=VALUE, as in density=4"),
+    "no value": (["oring", "--set", "density"], "allowed is KEY=VALUE, see softehl keys"),
     "geometry": (["oring", "--set", "rod_diameter=40"], "gap between rod and housing"),
     "unknown case": (["o-ring"], "did you mean 'oring'"),
     "capitals": (["ORING"], "did you mean 'oring'"),

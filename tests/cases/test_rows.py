@@ -97,7 +97,7 @@ def test_bounds_come_from_limits_and_types() -> None:
     assert Stone.model_fields["mass"].description == "mass [kg]; > 0 and <= 5"
 
 
-@pytest.mark.parametrize("heights", [(), (1.0, 1), (0.0,), (True,), ("1",), (nan,)])
+@pytest.mark.parametrize("heights", [(), (1.0, 1), (0.0,), (True,), ("one",), (nan,)])
 def test_a_list_of_numbers_is_checked(heights: object) -> None:
     with pytest.raises(ValidationError, match="heights"):
         Stone.model_validate({"heights": heights})
