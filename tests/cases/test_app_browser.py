@@ -148,7 +148,8 @@ class Hand:
             ".tabulator-row",
         )
         rows = [dict(row) for row in kept]
-        return {r["run"]: (r["status"], r["states"]) for r in rows if r.get("run")}
+        # an empty cell holds a space that does not break
+        return {r["run"]: (r["status"], r["states"].strip()) for r in rows if r.get("run")}
 
     def points(self) -> int:
         """Points of the curves of film thickness."""
