@@ -34,9 +34,9 @@ Nonzeros = Annotated[
 class Parameters(BaseModel):
     """Base of a parameter set: frozen, checked on construction, of strict types.
 
-    An integer is accepted where a real number is meant, the text of a number ("5", "5,5"), a text
-    with a unit where a key has one ("50 bar"), one value where a key wants a list of any length;
-    nothing else is converted.  Every key has a default, and is declared by :func:`key`.
+    Accepted are an integer for a real number, the text of a number ("5", "5,5"), and one value for
+    a list of any length. A key with a unit also takes a text with a unit ("50 bar"). Nothing else
+    is converted.  Every key has a default, and is declared by :func:`key`.
     Raises pydantic.ValidationError where a value is of the wrong type, out of its range or not
     finite, and for an unknown key.
     """

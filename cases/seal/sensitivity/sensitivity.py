@@ -1,9 +1,9 @@
 """Exact sensitivities of a film: what a change of any parameter by one per cent does, in per cent.
 
-All derivatives are those of the discrete equations at the converged state, d log q / d log s, on a
-mesh that moves with the section (`cases.seal.sensitivity.variation`) and, as reported, with the
-edges of the film (`cases.seal.sensitivity.following`). The film does not depend on the contact it
-began from.
+All derivatives are those of the discrete equations at the converged state, d log q / d log s. The
+mesh moves with the section (`cases.seal.sensitivity.variation`). For what a run reports it moves
+with the edges of the film, too (`cases.seal.sensitivity.following`). The film does not
+depend on the contact it began from.
 """
 
 from __future__ import annotations

@@ -89,8 +89,8 @@ class Adaptation:
         """A film on a mesh that fits it, from that on another mesh.
 
         last: films at other speeds. A film that ends early on a mesh is squeezed out anew on one
-        that is made for the state it has reached. Where the estimated error is too large, the film
-        is solved on finer meshes, and the estimate compares these.
+        that is made for the state it has reached. A film whose estimated error is too large is
+        solved on finer meshes, which the estimate then compares.
         """
         found = self._settled(found)
         if isinstance(found, NoFilm):
