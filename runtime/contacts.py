@@ -124,11 +124,12 @@ def _per_area(contact: AnyContact, faces: object, K: Array) -> Array:
     """Entries of the diagonal of K over the area of each node, (points,); zero elsewhere."""
     area = np.zeros(len(contact.points))
     for kind, nodes in faces:  # type: ignore[attr-defined]
-        at, weights = CELLS[kind].rule(3)
+        ring = isinstance(contact, Contact) and contact.ring
+        at, weights = CELLS[kind].measured_rule(CELLS[kind].order, ring=ring)
         places = contact.points[nodes]
         density = measures(CELLS[kind], places, at)
         shape = CELLS[kind].shape(at)
-        if isinstance(contact, Contact) and contact.ring:
+        if ring:
             density = density * 2.0 * np.pi * np.einsum("qk,nk->nq", shape, places[:, :, 1])
         shares = np.einsum("nq,q,qk->nk", density, weights, shape)
         first = _loaded(CELLS[kind]).start
@@ -141,6 +142,6 @@ def _per_area(contact: AnyContact, faces: object, K: Array) -> Array:
 
 def _loaded(cell: Cell) -> slice:
     """Corners of a face; or its other nodes, where a uniform pressure does not load the corners."""
-    at, weights = cell.rule(2)
+    at, weights = cell.rule(cell.order)
     corners = (weights @ cell.shape(at))[: cell.corners]
     return slice(0, cell.corners) if (corners > _NOTHING).all() else slice(cell.corners, None)

@@ -69,12 +69,13 @@ def _elements(system: System, block: Block, values: Mapping[str, Any]) -> Elemen
     if (every < 0.0).any():
         raise StudyError(f"mass of {block.name!r}: rho = {every.min():g}, it cannot be negative")
     ring = system.statement is not None and system.statement.ring
-    cell, places = interpolation(block.kind, count), system.mesh.points[nodes]
-    matrices = mass_matrices(cell, places, density, ring=ring)
+    cell, geometry = interpolation(block.kind, count), CELLS[block.kind]
+    every_place = system.mesh.points[block.nodes[:, : len(geometry.nodes)]]
+    matrices = mass_matrices(cell, every_place, density, ring=ring, geometry=geometry)
     dofs = np.concatenate([system.numbering.nodal[name][nodes] for name in names], axis=1)
     kernel = Mass(matrices, len(names))
     return ElementBlock(
-        f"mass of {block.name}", kernel, places.reshape(len(nodes), -1), dofs,
+        f"mass of {block.name}", kernel, system.mesh.points[nodes].reshape(len(nodes), -1), dofs,
         check_orientation=False,
     )  # fmt: skip
 

@@ -86,7 +86,7 @@ def require_sound_elements(block: ElementBlock) -> None:
         return
     places = np.asarray(block.coordinates, dtype=np.float64)
     places = places.reshape(len(places), len(cell.nodes), cell.dimension)
-    smallest = jacobians(cell, places, cell.rule(2)[0]).min(axis=1)
+    smallest = jacobians(cell, places, cell.rule(2 * cell.order)[0]).min(axis=1)
     wrong = smallest <= 0.0
     if wrong.any():
         row = int(smallest.argmin())

@@ -14,19 +14,33 @@ PARAMETER = "acceleration"
 """Coefficient c of an acceleration c u + rest, by which pages and masses are told of it."""
 
 
-def mass_matrices(cell: Cell, places: Array, density: Array, *, ring: bool) -> Array:
-    """Integrals (n, k, k) of density N_a N_b over cells with nodes at `places` (n, k, dim).
+_AT_ONCE = 1_000_000
+"""Numbers of shape functions at points of cells that are evaluated at once: 8 MB."""
 
-    density: (n,) per reference measure of the cell. ring: over rings around the x axis.
+
+def mass_matrices(
+    cell: Cell, places: Array, density: Array, *, ring: bool, geometry: Cell | None = None
+) -> Array:
+    """Integrals (n, k, k) of density N_a N_b over cells, exact on bent ones, too.
+
+    cell: of the field, with k nodes. places: (n, m, dim) of the nodes of the geometry, which is the
+    cell unless given. density: (n,) per reference measure of the cell. ring: over rings around the
+    x axis.
     """
-    points, weights = cell.rule(2 * max(map(max, cell.exponents), default=0) + 2)
-    shape = cell.shape(points)
-    volume = measures(cell, places, points) if cell.dimension else np.ones((len(places), 1))
-    if ring:
-        volume = volume * 2.0 * np.pi * (places[:, :, 1] @ shape.T)
-    pairs = np.einsum("q,qa,qb->qab", weights, shape, shape).reshape(len(weights), -1)
-    found = (density[:, None] * volume) @ pairs
-    return np.asarray(found.reshape(len(places), shape.shape[1], shape.shape[1]))
+    outline = geometry or cell
+    points, weights = outline.measured_rule(2 * cell.order, ring=ring)
+    shape, position = cell.shape(points), outline.shape(points)
+    found = np.empty((len(places), shape.shape[1], shape.shape[1]))
+    step = max(_AT_ONCE // shape.size, 1)
+    for first in range(0, len(places), step):
+        some = slice(first, first + step)
+        mass = density[some, None] * weights
+        if outline.dimension:
+            mass = mass * measures(outline, places[some], points)
+        if ring:
+            mass = mass * 2.0 * np.pi * (places[some, :, 1] @ position.T)
+        found[some] = (mass[:, None, :] * shape.T) @ shape
+    return found
 
 
 def lumped(matrices: Array) -> Array:

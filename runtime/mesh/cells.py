@@ -142,6 +142,16 @@ class Cell:
         """Points (q, dim) and weights (q,) that integrate polynomials of a degree exactly."""
         return _rule(self.corners, self.dimension, degree)
 
+    def measured_rule(self, degree: int, *, ring: bool = False) -> tuple[Array, Array]:
+        """A rule, exact for polynomials of a degree times the volume of bent cells.
+
+        The volume per parent volume, or the normal of a face, is a polynomial: the determinant
+        of slopes of the shape functions. ring: times the radius, as on rings.
+        """
+        order, simplex = self.order, self.corners == self.dimension + 1
+        volume = self.dimension * order - (self.dimension if simplex else 1)
+        return self.rule(degree + max(volume, 0) + (order if ring else 0))
+
 
 def lagrange(nodes: Array, x: Array) -> tuple[Array, Array]:
     """Lagrange's polynomials of nodes (k,) and their derivatives at x (q,): both (q, k)."""

@@ -49,7 +49,7 @@ def _require_upright(mesh: Mesh, kind: str, nodes: Integers) -> None:
     if cell.dimension != mesh.dimension or not len(nodes):
         return
     places = mesh.points[nodes]
-    smallest = jacobians(cell, places, cell.rule(2)[0]).min(axis=1)
+    smallest = jacobians(cell, places, cell.rule(2 * cell.order)[0]).min(axis=1)
     worst = int(smallest.argmin())
     if smallest[worst] <= 0.0:
         count = int((smallest <= 0.0).sum())

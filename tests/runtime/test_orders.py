@@ -1,0 +1,216 @@
+"""Integrals outside pages on cells of every order: mass, loads, pressures, orientation, contact."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.polynomial.legendre import leggauss
+
+from softehl import Mesh, Study, page
+from softehl.runtime.arrays import Array
+from softehl.runtime.fem.loads import DeadLoad, Pressure
+from softehl.runtime.fem.mass import lumped, mass_matrices
+from softehl.runtime.mass import mass_matrix
+from softehl.runtime.mesh.cells import CELLS, Cell, lobatto
+from softehl.runtime.mesh.mesh import MeshError
+from softehl.runtime.study import StudyError
+
+LARGE = ("hex125", "hex216", "hex343")
+KINDS = [k for k, c in CELLS.items() if c.dimension and k not in LARGE]
+FACES = [k for k in KINDS if CELLS[k].dimension < 3]
+
+
+def fine(cell: Cell) -> tuple[Array, Array]:
+    """A rule far finer than any integrand here: Gauss, simplices by collapsed squares and cubes."""
+    n = 20 if cell.dimension < 3 else 12
+    x, w = leggauss(n)
+    points = np.array(list(product(x, repeat=cell.dimension)))
+    weights = np.prod(np.array(list(product(w, repeat=cell.dimension))), axis=1)
+    flat = {3: 2, 4: 3, 6: 2}.get(cell.corners, 0) if cell.corners != 2**cell.dimension else 0
+    for d in range(flat):
+        points[:, d], weights = (points[:, d] + 1) / 2, weights / 2
+    for d in range(1, flat):
+        for e in range(d):
+            weights = weights * (1 - points[:, d])
+            points[:, e] *= 1 - points[:, d]
+    return points, weights
+
+
+def curved(cell: Cell, dimension: int, seed: int = 3) -> Array:
+    """Places (2, k, dimension) of the nodes of two bent cells, away from the axis y = 0."""
+    rng = np.random.default_rng(seed)
+    flat = np.pad(cell.nodes, ((0, 0), (0, dimension - cell.dimension)))
+    size = 0.1 / cell.order**2
+    places = flat[None] + size * rng.uniform(-1, 1, (2, *flat.shape))
+    if dimension > 1:
+        places[:, :, 1] += 3.0
+    return np.asarray(places)
+
+
+def measure(cell: Cell, places: Array, at: Array) -> Array:
+    """Length, area or volume per parent one, (n, q)."""
+    J = np.einsum("qkd,nkc->nqcd", cell.gradient(at), places)
+    return np.asarray(np.sqrt(np.linalg.det(np.swapaxes(J, 2, 3) @ J)))
+
+
+@pytest.mark.parametrize("ring", [False, True])
+def test_mass_of_bent_cells_of_every_kind_is_exact(ring: bool) -> None:
+    for kind in KINDS:
+        cell = CELLS[kind]
+        if ring and cell.dimension != 2:
+            continue
+        places = curved(cell, cell.dimension)
+        at, weights = fine(cell)
+        N = cell.shape(at)
+        volume = measure(cell, places, at) * weights
+        if ring:
+            volume = volume * 2 * np.pi * (places[:, :, 1] @ N.T)
+        want = np.einsum("nq,qa,qb->nab", volume, N, N, optimize=True)
+        found = mass_matrices(cell, places, np.ones(2), ring=ring)
+        assert np.abs(found - want).max() < 1e-12 * np.abs(want).max(), kind
+
+
+def test_mass_of_a_field_at_the_corners_of_bent_cells_has_their_volume() -> None:
+    for kind, flat in (("quad9", "quad4"), ("quad36", "quad4"), ("tet10", "tet4")):
+        cell = CELLS[kind]
+        places = curved(cell, cell.dimension)
+        at, weights = fine(cell)
+        volume = (measure(cell, places, at) * weights).sum(axis=1)
+        found = mass_matrices(CELLS[flat], places, np.ones(2), ring=False, geometry=cell)
+        np.testing.assert_allclose(found.sum(axis=(1, 2)), volume, rtol=1e-12)
+
+
+def test_lumped_masses_of_lobatto_nodes_are_the_weights_of_their_rule() -> None:
+    """2 / (p (p + 1) P_p(x)^2): explicit motions are then those of spectral elements."""
+    for kind in ("line2", "line5", "quad9", "quad16", "quad49", "hex64"):
+        cell = CELLS[kind]
+        p = cell.order
+        legendre = np.polynomial.Legendre.basis(p)
+        places = np.round(cell.nodes, 12)
+        want = np.prod(2 / (p * (p + 1) * legendre(places) ** 2), axis=1)
+        mass = mass_matrices(cell, cell.nodes[None], np.ones(1), ring=False)
+        np.testing.assert_allclose(lumped(mass)[0], want, rtol=1e-9)
+
+
+def polynomial(degree: int) -> Any:
+    """A function of places, of a degree in each coordinate, times t."""
+    return lambda x, t: t * (1 + x[:, 0] ** degree - 0.5 * x[:, -1] ** degree)
+
+
+@pytest.mark.parametrize("ring", [False, True])
+def test_loads_of_the_order_of_the_face_have_exact_nodal_forces(ring: bool) -> None:
+    for kind in FACES:
+        face = CELLS[kind]
+        if ring and face.dimension != 1:
+            continue
+        space = face.dimension + 1
+        turn = np.linalg.qr(np.arange(space**2).reshape(space, space) % 5 + np.eye(space))[0]
+        flat = np.pad(face.nodes, ((0, 0), (0, 1)))
+        places = (flat @ turn.T + 3.0)[None]
+        at, weights = fine(face)
+        N = face.shape(at)
+        x = np.einsum("qk,nkc->nqc", N, places)
+        load = polynomial(face.order)(x[0], 0.7)
+        area = measure(face, places, at)[0] * weights * (2 * np.pi * x[0, :, 1] if ring else 1)
+        want = (load * area) @ N
+        kernel = DeadLoad(face, polynomial(face.order), ring)
+        given = {"parameters": np.array([0.7, 1.0])}
+        found = -kernel.residual(places.reshape(1, -1), np.zeros((1, len(N[0]))), **given)[0]
+        assert np.abs(found - want).max() < 1e-12 * np.abs(want).max(), kind
+
+
+@pytest.mark.parametrize("ring", [False, True])
+def test_pressures_of_the_order_of_the_face_have_exact_nodal_forces(ring: bool) -> None:
+    """On faces that are straight at rest and bent now."""
+    for kind in FACES:
+        face = CELLS[kind]
+        if ring and face.dimension != 1:
+            continue
+        space = face.dimension + 1
+        X = np.pad(face.nodes, ((0, 0), (0, 1)))[None] + 2.0
+        u = curved(face, space)[:1] - np.pad(face.nodes, ((0, 0), (0, 1))) + 0.3
+        at, weights = fine(face)
+        N = face.shape(at)
+        load = polynomial(face.order)((N @ X[0]), 0.7)
+        a = np.einsum("qkd,kc->qcd", face.gradient(at), (X + u)[0])
+        if space == 2:
+            normal = np.stack([a[:, 1, 0], -a[:, 0, 0]], axis=1)
+        else:
+            normal = np.cross(a[:, :, 0], a[:, :, 1])
+        around = 2 * np.pi * (N @ (X + u)[0, :, 1]) if ring else 1.0
+        want = np.einsum("q,qk,qc->kc", load * weights * around, N, normal).ravel()
+        kernel = Pressure(face, polynomial(face.order), ring)
+        given = {"parameters": np.array([0.7, 1.0])}
+        found = kernel.residual(X.reshape(1, -1), u.reshape(1, -1), **given)[0]
+        assert np.abs(found - want).max() < 1e-12 * np.abs(want).max(), kind
+
+
+@pytest.mark.parametrize(("kind", "ring"), [("line7", True), ("quad16", False)])
+def test_the_tangent_of_a_pressure_on_high_orders(kind: str, ring: bool) -> None:
+    face = CELLS[kind]
+    X = curved(face, face.dimension + 1)[:1].reshape(1, -1)
+    u = 0.01 * np.random.default_rng(5).uniform(-1, 1, X.shape)
+    kernel, given = Pressure(face, 0.7, ring), {"parameters": np.array([1.0, 1.0])}
+    K = kernel.tangent(X, u, **given)[1]
+    for j in range(0, X.shape[1], 5):
+        step = np.zeros_like(u)
+        step[:, j] = h = 1e-6
+        rise = kernel.residual(X, u + step, **given) - kernel.residual(X, u - step, **given)
+        np.testing.assert_allclose(K[:, :, j], rise / (2 * h), atol=1e-7)
+
+
+@page
+def membrane(m: Any) -> None:
+    """d2u/dt2 = div grad u."""
+    u = m.scalar("u")
+    m.weak(m.rate(u, order=2), u)
+    m.weak(m.grad(u), m.grad(u))
+
+
+@pytest.mark.parametrize(
+    "order", [3, 6, *(pytest.param(p, marks=pytest.mark.slow) for p in (1, 2, 4, 5))]
+)
+def test_fluxes_and_masses_of_a_study(order: int) -> None:
+    """A harmonic polynomial of the order by its flux at two sides; the mass of the page by rho."""
+    mesh = Mesh.rectangle(1.2, 1.0, cells=(2, 1), order=order)
+    study = Study(mesh)
+    study.add("body", membrane)
+
+    def slope(x: Array) -> Array:
+        return order * (x[:, 0] + 1j * x[:, 1]) ** (order - 1)
+
+    study.fix("left", u=lambda x, t: t * np.real((x[:, 0] + 1j * x[:, 1]) ** order))
+    study.load("right", u=lambda x, t: t * np.real(slope(x)))
+    study.load("top", u=lambda x, t: -t * np.imag(slope(x)))
+    study.load("bottom", u=lambda x, t: t * np.imag(slope(x)))
+    result = study.solve()
+    want = np.real((mesh.points[:, 0] + 1j * mesh.points[:, 1]) ** order)
+    np.testing.assert_allclose(result.values("u"), want, atol=1e-12)
+    system = study.system()
+    given = system, system.resting(), system.at_rest()
+    own = mass_matrix(*given, None).toarray()
+    both = mass_matrix(*given, {"body": {"rho": 2.0, "of": ["u"]}}).toarray()
+    assert own.sum() == pytest.approx(1.2, rel=1e-12)
+    np.testing.assert_allclose(both, 3.0 * own, atol=1e-13)
+
+
+def test_a_cell_that_folds_between_the_corners_is_refused() -> None:
+    """A node inside moved over its neighbour: 2 points a direction do not see it."""
+    mesh = Mesh.rectangle(1.0, 1.0, cells=(1, 1), order=6)
+    points = mesh.points.copy()
+    x = lobatto(6)
+    middle = int(np.abs(points - 0.5 * (1 + np.array([x[3], x[3]]))).sum(axis=1).argmin())
+    points[middle] += [0.2, 0.0]
+    with pytest.raises(MeshError, match="1 of 1 quad49 are turned inside out"):
+        Study(Mesh(points, mesh.cells))
+
+
+@pytest.mark.parametrize("order", [3, 6])
+def test_contact_of_sides_of_high_order_is_refused(order: int) -> None:
+    low = Mesh.rectangle(1.0, 1.0, cells=(1, 1), order=order)
+    study = Study(Mesh.union(low=low, high=low.map(lambda x: x + np.eye(2)[1])))
+    with pytest.raises(StudyError, match=f"line{order + 1} cannot touch; line2, line3 can"):
+        study.contact("low:top", "high:bottom")
