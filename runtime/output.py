@@ -12,7 +12,7 @@ import numpy as np
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.dofs import AXES
 from softehl.runtime.io import replacing, write_text
-from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.cells import CELLS, for_vtk
 from softehl.runtime.statement.records import Block
 
 
@@ -102,7 +102,7 @@ def _small(kind: str, nodes: Integers) -> tuple[str, Integers]:
     """Cells for a file; those of order 3 and more as linear ones between their nodes."""
     cell = CELLS[kind]
     if cell.exponents:
-        return cell.meshio, nodes
+        return cell.meshio, for_vtk(kind, nodes)
     linear = CELLS[{1: "line2", 2: "quad4", 3: "hex8"}[cell.dimension]]
     rank = np.argsort(np.argsort(cell.line))[cell.lines]
     at = np.empty((cell.order + 1,) * cell.dimension, dtype=np.int64)

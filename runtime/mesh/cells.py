@@ -1,9 +1,10 @@
-"""The kinds of cells: parent nodes, shape functions and faces, in the node order of VTK and meshio.
+"""The kinds of cells: parent nodes, shape functions and faces, in the node order of meshio.
 
-Corners first, then the middles of edges, of faces, of the cell. Quadrilaterals and hexahedra live
-on [-1, 1]^d, triangles and tetrahedra on the unit simplex, wedges on triangle x [-1, 1]. Lines,
-quadrilaterals and hexahedra of order 3 to 6 have the nodes of Gauss and Lobatto along every line;
-those inside an edge, a face or the cell follow one another with x running first, then y, then z.
+It is that of VTK, but for wedges. Corners first, then the middles of edges, of faces, of the cell.
+Quadrilaterals and hexahedra live on [-1, 1]^d, triangles and tetrahedra on the unit simplex, wedges
+on triangle x [-1, 1]. Lines, quadrilaterals and hexahedra of order 3 to 6 have the nodes of Gauss
+and Lobatto along every line; those inside an edge, a face or the cell follow one another with x
+running first, then y, then z.
 """
 
 from __future__ import annotations
@@ -303,8 +304,28 @@ _LINEAR = {(1, 0): "point1", (2, 1): "line2", (3, 2): "tri3", (4, 2): "quad4"}
 CELLS = _cells()
 """Every kind of cell by its name."""
 
+VTK_ORDER = {"wedge6": (0, 2, 1, 3, 5, 4)}
+"""Nodes of a cell in the order of VTK where that is another one: the first triangle of a wedge
+looks outwards, volumes are negative otherwise. Each order is its own inverse.
+"""
+
 BY_FILE = {cell.meshio: cell for cell in CELLS.values()}
 """Every kind of cell by meshio's name for it."""
+
+
+def for_vtk(kind: str, nodes: Integers) -> Integers:
+    """Nodes (n, k) of cells in the order that VTK has for their kind."""
+    return nodes[:, VTK_ORDER[kind]] if kind in VTK_ORDER else nodes
+
+
+def from_vtk(kind: str, nodes: Integers, points: Array) -> Integers:
+    """Nodes (n, k) of cells from a file of VTK, which other programs write in our order, too."""
+    if kind not in VTK_ORDER:
+        return nodes
+    cell = CELLS[kind]
+    middle = cell.nodes.mean(axis=0, keepdims=True)
+    turned = jacobians(cell, points[nodes], middle)[:, 0] < 0.0
+    return np.where(turned[:, None], for_vtk(kind, nodes), nodes)
 
 
 def jacobians(cell: Cell, places: Array, at: Array) -> Array:

@@ -10,10 +10,11 @@ import numpy as np
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.io import write_text
 from softehl.runtime.mesh import gmsh
-from softehl.runtime.mesh.cells import BY_FILE, CELLS
+from softehl.runtime.mesh.cells import BY_FILE, CELLS, for_vtk, from_vtk
 from softehl.runtime.mesh.mesh import Mesh, MeshError
 
 _DEFECTS = (OSError, ValueError, KeyError, IndexError, TypeError, AssertionError, SystemExit)
+_VTK = (".vtu", ".vtk")
 
 Names = Mapping[str, Mapping[str, Integers]]
 """Name -> kind of cell -> numbers of cells of that kind."""
@@ -65,7 +66,8 @@ def _by_meshio(path: Path) -> gmsh.Content:
         for name, members in found.cell_sets.items():
             chosen = np.asarray(members[number], dtype=np.int64)
             names[name].setdefault(kind, []).append(first + chosen)
-        before.append(np.asarray(block.data, dtype=np.int64))
+        nodes = np.asarray(block.data, dtype=np.int64)
+        before.append(from_vtk(kind, nodes, found.points) if path.suffix in _VTK else nodes)
     return gmsh.Content(
         np.asarray(found.points, dtype=np.float64),
         {kind: np.concatenate(parts) for kind, parts in cells.items()},
@@ -125,7 +127,8 @@ def write(mesh: Mesh, path: Path) -> None:
         return
     import meshio
 
-    cells = [(CELLS[kind].meshio, nodes) for kind, nodes in mesh.cells.items()]
+    vtk = path.suffix in _VTK
+    cells = [(CELLS[k].meshio, for_vtk(k, n) if vtk else n) for k, n in mesh.cells.items()]
     try:
         meshio.write(path, meshio.Mesh(points, cells))
     except (*_DEFECTS, meshio.WriteError) as error:
