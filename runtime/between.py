@@ -5,6 +5,7 @@ A field of lower order than its cells stands at their corners only: a pressure o
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
@@ -37,6 +38,20 @@ def shares(system: System, place: Array) -> dict[str, tuple[Integers, Array]] | 
                 linear = _linear(block.kind)
                 found[name] = there[: linear.shape[1]], weights @ linear
     return found
+
+
+def between_nodes(
+    system: System, place: Array, nodal: Mapping[str, Array]
+) -> dict[str, float] | None:
+    """Values at a place (dim,) of fields by their values at nodes, (points,); nan where one that
+    matters is nan; None where no cell is there.
+    """
+    holding = system.mesh.holding(place)
+    if holding is None:
+        return None
+    nodes, weights = holding
+    some = np.abs(weights) > _NOTHING  # at a side between blocks only nodes of the side matter
+    return {name: float(v[nodes[some]] @ weights[some]) for name, v in nodal.items()}
 
 
 def at_every_node(system: System, x: Array) -> dict[str, Array]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.between import at_every_node, shares
+from softehl.runtime.between import at_every_node, between_nodes, shares
 from softehl.runtime.derivatives.asked import By, inputs
 from softehl.runtime.derivatives.inputs import Input, Key
 from softehl.runtime.derivatives.quantities import quantity
@@ -20,10 +20,12 @@ from softehl.runtime.derivatives.trail import Trail
 from softehl.runtime.fem.loads import Spring, Tie
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mass import Masses
+from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import MeshError, place_text
 from softehl.runtime.modes import natural
 from softehl.runtime.names import meant
 from softehl.runtime.output import Picture, piece_names
+from softehl.runtime.recovery import nodal_operator
 from softehl.runtime.solve.solution import Point, Solution, Status
 from softehl.runtime.stability import negative_directions
 from softehl.runtime.statement.records import StudyError
@@ -102,38 +104,57 @@ class Result:
             raise KeyError(f"no unknown {name!r} at nodes; there are {known}")
         return self.system.share.at_all_nodes(self.values(name))
 
-    def at(self, place: tuple[float, ...]) -> dict[str, float]:
+    def at(self, place: tuple[float, ...], *, block: str | None = None) -> dict[str, float]:
         """Values of the unknowns at a place of the undeformed mesh, interpolated within a cell.
 
+        block: instead, of its fields, between their values `at_nodes`; nan away from the block.
         Raises MeshError if the place lies outside.
         """
-        x = np.asarray(place, dtype=np.float64)
-        known = shares(self._whole, x)
-        here = None
-        if known is not None:
+        return self._at(place, None if block is None else self.at_nodes(block))
+
+    def _at(self, place: tuple[float, ...], nodal: Mapping[str, Array] | None) -> dict[str, float]:
+        """Values at a place of the unknowns, or of fields by their values at nodes (points,)."""
+        x, here = np.asarray(place, dtype=np.float64), None
+        if nodal is not None:
+            here = between_nodes(self._whole, x, nodal)
+        elif (known := shares(self._whole, x)) is not None:
             here = {n: float(self.x[numbers] @ w) for n, (numbers, w) in known.items()}
         found = self.system.share.found(here)
         if found is None:
             raise MeshError(f"{place_text(x)} lies outside the mesh")
         return found
 
-    def along(self, start: tuple[float, ...], end: tuple[float, ...], count: int = 100) -> Any:
-        """Values along a straight line: name -> (count,), and "s", the distance from the start."""
+    def along(
+        self,
+        start: tuple[float, ...],
+        end: tuple[float, ...],
+        count: int = 100,
+        *,
+        block: str | None = None,
+    ) -> Any:
+        """Values along a straight line: name -> (count,), and "s", the distance from the start.
+
+        block: of its fields instead of the unknowns, see `at`.
+        """
+        nodal = None if block is None else self.at_nodes(block)
         a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
         shares = np.linspace(0.0, 1.0, count)
-        rows = [self.at(tuple(a + s * (b - a))) for s in shares]
+        rows = [self._at(tuple(a + s * (b - a)), nodal) for s in shares]
         names = [name for name in rows[0] if all(name in row for row in rows)]
         columns = {name: np.array([row[name] for row in rows]) for name in names}
         return {"s": shares * float(np.linalg.norm(b - a)), **columns}
 
     def fields(self, block: str) -> dict[str, Array]:
         """Fields of a block's page at its quadrature points: name -> (cells, points)."""
+        self._require_block(block)
+        share = self.system.share
+        return {n: share.whole_cells(block, v) for n, v in self._own_fields(block).items()}
+
+    def _require_block(self, block: str) -> None:
         blocks = self._whole.blocks
         if block not in blocks:
             known = ", ".join(blocks)
             raise KeyError(f"no block {block!r}{meant(block, blocks)}; there are {known}")
-        share = self.system.share
-        return {n: share.whole_cells(block, v) for n, v in self._own_fields(block).items()}
 
     def _own_fields(self, block: str) -> dict[str, Array]:
         """Fields at the points of this process's elements."""
@@ -141,25 +162,27 @@ class Result:
         new = [f"new_{name}" for name in self.system.blocks[block].kernel.history]
         return {name: values for name, values in found.items() if name not in new}
 
-    def at_nodes(self, block: str) -> dict[str, Array]:
-        """Fields of a block averaged to nodes: name -> (points,), nan away from the block.
+    def at_nodes(self, block: str, *, recovery: str = "projection") -> dict[str, Array]:
+        """Fields of a block at nodes: name -> (points,), nan away from the block.
 
-        Every cell counts with the mean of its points.
+        recovery: "projection" fits a polynomial to the points of each cell by least squares; its
+        degree is one below that of the shape functions, at least 1. "mean" is the mean of the
+        points of a cell. A node has the mean of the cells of this block around it, and nothing of
+        other blocks. Elements without a cell have means. Raises KeyError, StudyError.
         """
-        nodes = self._whole.blocks[block].nodes
+        self._require_block(block)
+        nodes, operator = nodal_operator(self.system.blocks[block], recovery)
         points, piece = len(self.system.mesh.points), self.system.mesh.piece
 
         def sums(weights: Array) -> Array:
-            here = np.bincount(nodes.ravel(), weights, points).astype(np.float64, copy=False)
-            return here if piece is None else piece.added(here)
+            here = np.bincount(nodes.ravel(), weights.ravel(), points).astype(np.float64)
+            return self.system.share.total(here) if piece is None else piece.added(here)
 
-        count = sums(np.ones(nodes.size))
-        found = {}
-        for name, values in self.fields(block).items():
-            means = np.repeat(values.mean(axis=1), nodes.shape[1])
-            total = sums(means)
-            found[name] = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-        return found
+        count = sums(np.ones(nodes.shape))
+        return {
+            name: np.where(count > 0, sums(values @ operator.T) / np.maximum(count, 1), np.nan)
+            for name, values in self._own_fields(block).items()
+        }
 
     @cached_property
     def _forces(self) -> Array:
@@ -247,7 +270,8 @@ class Result:
         return np.asarray(self.system.mesh.points + moved)
 
     def write(self, path: str | Path) -> None:
-        """Write the mesh with unknowns at nodes and fields in cells (means), atomically.
+        """Write the mesh with unknowns and fields at nodes, and the means of fields in cells,
+        atomically. Fields are BLOCK.NAME, at nodes as by `at_nodes`, nan away from the block.
 
         .vtu: one file. .pvtu: one for each process beside it, written by all at once; no process
         then needs to have the whole, and of a mesh in parts this alone is possible. Unknowns u_x,
@@ -274,6 +298,9 @@ class Result:
     def _picture(self, system: System, cells: Mapping[str, Integers], x: Array) -> Picture:
         """Of all unknowns x, or of those of this process with its own fields."""
         nodal = at_every_node(system, x)
+        for name, block in self._whole.blocks.items():
+            if block.kernel.fields and CELLS[block.kind].dimension:
+                nodal |= {f"{name}.{label}": v for label, v in self.at_nodes(name).items()}
         fields = self.fields if system is self._whole else self._own_fields
         return Picture.of(system.mesh.points, cells, nodal, system.blocks, fields)
 

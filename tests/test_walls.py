@@ -42,7 +42,7 @@ ORDER = {
             "statement",
             "system",
             "contacts",
-            "between equations output mass",
+            "between equations output mass recovery",
             "modes stability derivatives",
             "result",
             "begin bifurcation fit",
