@@ -43,10 +43,9 @@ def meshed(kind: str, n: int) -> Mesh:
         wave = np.sin(2.0 * x + np.arange(x.shape[1]))
         return np.asarray(x + 0.15 * np.prod(4 * x * (1 - x), axis=1, keepdims=True) * wave)
 
-    size = (1.0,) * CELLS[kind].dimension
-    make = Mesh.rectangle if len(size) == 2 else Mesh.box
-    args = size if len(size) == 2 else (size,)
-    return make(*args, cells=(n,) * len(size), **MESHES[kind]).map(bent)
+    if CELLS[kind].dimension == 2:
+        return Mesh.rectangle(1.0, 1.0, cells=(n, n), **MESHES[kind]).map(bent)
+    return Mesh.box((1.0, 1.0, 1.0), cells=(n, n, n), **MESHES[kind]).map(bent)
 
 
 def wave(x: Array) -> Array:
@@ -169,7 +168,8 @@ def hole(n: int) -> Result:
         def f(x: Array, t: float) -> Array:
             xx, yy, xy = kirsch(x)
             n = x / np.linalg.norm(x, axis=1, keepdims=True)
-            return t * (np.stack([xx, xy] if k == 0 else [xy, yy], axis=1) * n).sum(axis=1)
+            components = [xx, xy] if k == 0 else [xy, yy]
+            return np.asarray(t * (np.stack(components, axis=1) * n).sum(axis=1))
 
         return f
 
@@ -183,7 +183,7 @@ def hole(n: int) -> Result:
 
 def test_stress_at_a_hole() -> None:
     result = hole(8)
-    top = result.system.mesh.node_at((0.0, 1.0))
+    top = result.system.mesh.node_at(np.array([0.0, 1.0]))
     found = result.at_nodes("plate")["sigma_xx"][top]
     assert found == pytest.approx(3.0, rel=0.01)
     assert result.at_nodes("plate", recovery="mean")["sigma_xx"][top] < 2.7
@@ -251,7 +251,7 @@ def test_elements_by_their_nodes_have_means(tmp_path: Path) -> None:
     mesh = Mesh.rectangle(1.0, 1.0, cells=(1, 1), order=2)
     study = Study(mesh)
     study.add("body", conduction, k=1.0)
-    ends = [mesh.node_at((0, 0)), mesh.node_at((1, 1))]
+    ends = [mesh.node_at(np.array([c, c])) for c in (0.0, 1.0)]
     study.add("rope", m.finish(), on=[ends], called={"u": "T"})
     study.fix("left", T=0)
     study.fix("right", T=1)
