@@ -62,6 +62,12 @@ def _elements(system: System, block: Block, values: Mapping[str, Any]) -> Elemen
             f"mass of {block.name!r}: its elements are given by their nodes and have no cells; put "
             "a page or the mass on cells, or write accelerations into the page"
         )
+    if count not in (len(CELLS[block.kind].nodes), CELLS[block.kind].corners):
+        raise StudyError(
+            f"mass of {block.name!r}: {names[0]} stands at {count} nodes of {block.kind}, neither "
+            "at all nor at the corners, and has no shape functions; write accelerations into the "
+            "page"
+        )
     nodes = block.nodes[:, :count]
     centres = system.mesh.points[system.everywhere.blocks[block.name].nodes].mean(axis=1)
     every = datum(f"mass of {block.name}", "rho", values["rho"], centres)

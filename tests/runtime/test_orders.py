@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
 
-from softehl import Mesh, Study, page
+from softehl import Mesh, Model, Study, page, quadrature
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.loads import DeadLoad, Pressure
 from softehl.runtime.fem.mass import lumped, mass_matrices
@@ -206,6 +206,17 @@ def test_a_cell_that_folds_between_the_corners_is_refused() -> None:
     points[middle] += [0.2, 0.0]
     with pytest.raises(MeshError, match="1 of 1 quad49 are turned inside out"):
         Study(Mesh(points, mesh.cells))
+
+
+def test_a_mass_without_shape_functions_is_refused() -> None:
+    m = Model("odd", nodes=4, rule=quadrature.gauss(2, 2))
+    m.coordinates("X", "Y")
+    (u,) = m.nodal_unknowns("u", nodes=3)
+    m.potential(m.integral("Pi", sum(v**2 for v in u)))
+    study = Study(Mesh.rectangle(1.0, 1.0, cells=(1, 1)))
+    study.add("body", m.finish())
+    with pytest.raises(StudyError, match="u stands at 3 nodes of quad4, neither at all nor"):
+        study.solve(until=0.0).modes(1, mass={"body": {"rho": 1.0, "of": ["u"]}})
 
 
 @pytest.mark.parametrize("order", [3, 6])
