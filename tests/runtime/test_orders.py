@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
+from scipy.special import eval_legendre
 
 from softehl import Mesh, Model, Study, page, quadrature
 from softehl.runtime.arrays import Array
@@ -170,30 +171,43 @@ def membrane(m: Any) -> None:
     m.weak(m.grad(u), m.grad(u))
 
 
+def harmonic(n: int, x: Array, *, ring: bool) -> tuple[Array, Array, Array]:
+    """A polynomial of degree n without sources, and its slopes along x and y: the real part of
+    (x + i y)^n; on rings R^n P_n(x / R) with the distance R from the origin.
+    """
+    z = x[:, 0] + 1j * x[:, 1]
+    if not ring:
+        slope = n * z ** (n - 1)
+        return np.real(z**n), np.real(slope), -np.imag(slope)
+    R = np.abs(z)
+    value, lower = (R**k * eval_legendre(k, x[:, 0] / R) for k in (n, n - 1))
+    return value, n * lower, n * (value - x[:, 0] * lower) / x[:, 1]
+
+
+CASES = [(p, ring) for ring in (False, True) for p in range(1, 7)]
+QUICK = [(3, False), (6, True)]
+
+
 @pytest.mark.parametrize(
-    "order", [3, 6, *(pytest.param(p, marks=pytest.mark.slow) for p in (1, 2, 4, 5))]
+    ("order", "ring"),
+    [pytest.param(*c, marks=[] if c in QUICK else [pytest.mark.slow]) for c in CASES],
 )
-def test_fluxes_and_masses_of_a_study(order: int) -> None:
-    """A harmonic polynomial of the order by its flux at two sides; the mass of the page by rho."""
-    mesh = Mesh.rectangle(1.2, 1.0, cells=(2, 1), order=order)
-    study = Study(mesh)
+def test_fluxes_and_masses_of_a_study(order: int, ring: bool) -> None:
+    """A harmonic polynomial of the order by its fluxes; the mass of the page and that by rho."""
+    mesh = Mesh.rectangle(1.2, 1.0, cells=(2, 1), order=order).map(lambda x: x + 0.2 * np.eye(2)[1])
+    study = Study(mesh, geometry="axisymmetric" if ring else None)
     study.add("body", membrane)
-
-    def slope(x: Array) -> Array:
-        return order * (x[:, 0] + 1j * x[:, 1]) ** (order - 1)
-
-    study.fix("left", u=lambda x, t: t * np.real((x[:, 0] + 1j * x[:, 1]) ** order))
-    study.load("right", u=lambda x, t: t * np.real(slope(x)))
-    study.load("top", u=lambda x, t: -t * np.imag(slope(x)))
-    study.load("bottom", u=lambda x, t: t * np.imag(slope(x)))
-    result = study.solve()
-    want = np.real((mesh.points[:, 0] + 1j * mesh.points[:, 1]) ** order)
-    np.testing.assert_allclose(result.values("u"), want, atol=1e-12)
+    study.fix("left", u=lambda x, t: t * harmonic(order, x, ring=ring)[0])
+    study.load("right", u=lambda x, t: t * harmonic(order, x, ring=ring)[1])
+    study.load("top", u=lambda x, t: t * harmonic(order, x, ring=ring)[2])
+    study.load("bottom", u=lambda x, t: -t * harmonic(order, x, ring=ring)[2])
+    want = harmonic(order, mesh.points, ring=ring)[0]
+    np.testing.assert_allclose(study.solve().values("u"), want, atol=1e-11)
     system = study.system()
     given = system, system.resting(), system.at_rest()
     own = mass_matrix(*given, None).toarray()
     both = mass_matrix(*given, {"body": {"rho": 2.0, "of": ["u"]}}).toarray()
-    assert own.sum() == pytest.approx(1.2, rel=1e-12)
+    assert own.sum() == pytest.approx(1.2 * (2 * np.pi * 0.7 if ring else 1.0), rel=1e-12)
     np.testing.assert_allclose(both, 3.0 * own, atol=1e-13)
 
 
