@@ -131,7 +131,8 @@ class Study(Paths, Fitted):
         """Dead loads per reference length or area of a side, or forces at a place or nodes.
 
         A number grows with the load factor (in `march` it is constant); a function
-        f(x (n, dim), t) gives the load itself.
+        f(x (n, dim), t) gives the load itself; of cells of order p polynomials of degree p + 2 are
+        integrated exactly on straight sides.
         where: a side, or a predicate of places, for the faces of the boundary all of whose nodes it
         chooses; a tuple of coordinates or node numbers for forces. A body force is a page.
         """
