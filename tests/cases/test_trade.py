@@ -178,3 +178,45 @@ def test_a_u_cup_for_another_rod_is_named(given: tuple[str, ...], says: str) -> 
 def test_another_word_for_a_stroke_has_the_one_to_write(word: str, stroke: str) -> None:
     with pytest.raises(BadInput, match=f'stroke = "{word}" .*; write "{stroke}"'):
         typed(f"stroke={word}")
+
+
+GROUNDS = {
+    ("rod=36", "groove_diameter=43 H11"): 43.08,
+    ("rod=36", "housing_diameter=43 H11"): 43.08,
+    ("bore=43", "groove_diameter=36 h11"): -35.92,
+    ("bore=43 H8", "groove_diameter=36 h11"): -35.92,
+    ("bore=43 H8", "housing_diameter=36 h11"): -35.92,
+    ("bore=43", "groove_depth=3.5", "inner_diameter=35 ±0.2", "section_diameter=4"): -36.0,
+    ("rod=36", "groove_depth=3.5 h11"): 36 + 2 * (3.5 - 0.5 * 0.075),
+    ("rod=36", "groove_depth=3.5 H11"): 36 + 2 * (3.5 + 0.5 * 0.075),
+}
+"""Sizes of a groove with a class of ISO 286 -> housing_diameter, at the middle of the limits: IT11
+is 0.16 mm from 30 to 50 mm and 0.075 mm from 3 to 6 mm."""
+
+
+@pytest.mark.parametrize("given", GROUNDS, ids=" ".join)
+def test_the_groove_of_a_rod_seal_is_a_hole_that_of_a_piston_seal_a_shaft(
+    given: tuple[str, ...],
+) -> None:
+    ring = "ring=36x4" if given[0].startswith("rod") else "ring=35x4"
+    p = typed(*(given if "section_diameter=4" in given else (ring, *given)))
+    assert p.housing_diameter == pytest.approx(GROUNDS[given], abs=1e-9)
+    assert Seal(**p.model_dump()) == p
+    assert p.said
+
+
+@pytest.mark.parametrize(
+    ("given", "answer"),
+    [
+        (("rod=36", "groove_diameter=43 h11"), 'a hole has capital letters; write "43 H11"'),
+        (("rod=36", "housing_diameter=43 h11"), 'a hole has capital letters; write "43 H11"'),
+        (("bore=43", "groove_diameter=36 H11"), 'a shaft has small letters; write "36 h11"'),
+        (("bore=43 H8", "housing_diameter=36 H11"), 'a shaft has small letters; write "36 h11"'),
+        (("bore=43 h8",), 'a hole has capital letters; write "43 H8"'),
+        (("rod=36", "section_diameter=4 H11"), 'a shaft has small letters; write "4 h11"'),
+    ],
+)
+def test_a_class_of_the_wrong_letter_has_the_right_one(given: tuple[str, ...], answer: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        typed("ring=36x4", *given)
+    assert answer in str(caught.value)

@@ -185,7 +185,8 @@ def _with_gland(values: dict[str, Any]) -> None:
     if values.get("gland") in KINDS:
         groove = _groove(values, section)
         if values.get("housing_diameter") is None:
-            limits = {name: found for name, _, found in bands(values.get("said", ()))}
+            said = values.get("said", ())
+            limits = {name: found for name, _, found in bands(said, piston=rod < 0.0)}
             named = limits.get("bore" if rod < 0.0 else "rod")
             of_chart = math.copysign(named.nominal, rod) if named else rod
             values["housing_diameter"] = round(of_chart + 2.0 * groove.depth, 4)

@@ -25,7 +25,7 @@ def foreword(p: Seal, pressure: float) -> list[str]:
     run. pressure: the largest sealed pressure, MPa.
     """
     load, beyond = _load(p, pressure)
-    return [*understood(p.said), *([] if beyond or not pressure else [load])]
+    return [*understood(p.said, piston=p.piston), *([] if beyond or not pressure else [load])]
 
 
 def warnings(p: Seal, pressure: float) -> list[str]:

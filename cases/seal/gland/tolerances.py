@@ -70,7 +70,9 @@ def read_tolerances(p: Seal) -> Shares:
     if twice := [name for name in names if names.count(name) > 1]:
         raise ValueError(f"tolerances: {twice[0]} is given twice; leave one of them out")
     of_ring = [f"{key} {tolerance!r} mm" for key, _, tolerance in ring_sizes(p.ring)]
-    of_limits = [f"{LIMITED[name]} {found.half:.9f} mm" for name, _, found in bands(p.said)]
+    of_limits = [
+        f"{LIMITED[name]} {found.half:.9f} mm" for name, _, found in bands(p.said, piston=p.piston)
+    ]
     return dict([*(_share(text, p) for text in (*of_ring, *of_limits)), *typed])
 
 

@@ -183,7 +183,7 @@ def tolerances(runs: Sequence[FinishedRun]) -> Part:
         ]
         rows += [
             (run.name, f"{name} = {found.nominal:g} mm", f"{found.low:g} to {found.high:g} mm")
-            for name, _, found in bands(p.said)
+            for name, _, found in bands(p.said, piston=p.piston)
         ]
         if p.shore_A is not None:
             low, high = shore_band(p.shore_A, p.polymer)

@@ -51,7 +51,7 @@ class Gland(FreeSeal):
         None,
         "diameter of the bottom of the groove, for housing_diameter",
         unit="mm",
-        bounds='> 0, or "33 h9"',
+        bounds='> 0, or "43 H9" of a rod seal, "33 h9" of a piston seal',
         gt=0,
     )
     housing_diameter: float = key(

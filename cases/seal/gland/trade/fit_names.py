@@ -62,10 +62,11 @@ class Band:
         return 0.5 * (self.high - self.low)
 
 
-def read_fit(key: str, given: str, *, hole: bool = False) -> Band | None:
+def read_fit(key: str, given: str, *, hole: bool | None = False) -> Band | None:
     """The limits of a size; None for a text without a tolerance.  Raises NotUnderstoodError.
 
-    hole: whether the size is that of a hole, whose classes have capital letters.
+    hole: whether the size is that of a hole, whose classes have capital letters; None for a size
+    that is neither a hole nor a shaft and takes both.
     """
     text = re.sub(
         r" ?[(](?:ISO 286[^)]*|(?P<limits>[^)]*))[)]$", r" \g<limits>", plain(given)
@@ -105,7 +106,7 @@ def band(nominal: float, letter: str, grade: int) -> Band:
     return Band(nominal, nominal + away, nominal + away + width)
 
 
-def _class(key: str, given: str, found: re.Match[str], hole: bool) -> Band:
+def _class(key: str, given: str, found: re.Match[str], hole: bool | None) -> Band:
     size, letter, grade = float(found["size"]), found["letter"], int(found["grade"])
     shown, usual = number_text(size), "H8" if hole else "f7"
     letters = (*DEVIATIONS, "js")
@@ -115,7 +116,7 @@ def _class(key: str, given: str, found: re.Match[str], hole: bool) -> Band:
     part, case, other = ("hole", "capital", letter.upper())
     if not hole:
         part, case, other = ("shaft", "small", letter.lower())
-    if letter != other:
+    if hole is not None and letter != other:
         why = f"has the letter of a {'shaft' if hole else 'hole'}: a {part} has {case} letters"
         raise refused(key, given, why, f"{shown} {other}{grade}")
     if not 0.0 < size <= STEPS[-1]:

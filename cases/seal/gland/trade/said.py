@@ -6,12 +6,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from softehl.cases.harness.parameters import Parameters, key
 from softehl.cases.harness.units import is_quantity
-from softehl.cases.seal.gland.given import put
+from softehl.cases.seal.gland.given import number, put
 from softehl.cases.seal.gland.trade.finish_names import RMS_OF_RA, read_finish
 from softehl.cases.seal.gland.trade.fit_names import Band, read_fit
 from softehl.cases.seal.gland.trade.oil_names import dynamic
@@ -26,7 +26,10 @@ _SIZES = (
 LENGTHS = {"rod": "rod_diameter", **{name: name for name in _SIZES}}
 """Key that may be given with a tolerance -> the key that it means."""
 
-_SHAFTS = ("rod", "rod_diameter", "groove_diameter")
+_SHAFTS = ("rod", "rod_diameter", "section_diameter")
+"""Keys of outside sizes, which have classes of shafts."""
+_GROUNDS = ("groove_diameter", "housing_diameter")
+"""Keys of the bottom of the groove: a hole around a rod seal, a shaft in a piston seal."""
 
 _STROKES = {
     "out": r"out[- ]?strokes?|outwards?|extend(?:ing)?|extension|push(?:ing)?",
@@ -49,10 +52,10 @@ class SaidKeys(Parameters):
     @classmethod
     def worded(cls, given: dict[str, Any]) -> dict[str, Any]:
         """The values without words of the trade, which are kept in `said`.  ValueError."""
-        values, said = dict(given), [*given.get("said", ())]
+        values, said, piston = dict(given), [*given.get("said", ())], of_piston(given)
         for name in given:
             if name in LENGTHS and isinstance(values[name], str):
-                said += _length(name, values)
+                said += _length(name, values, piston)
         if "roughness" in given:
             said += _finishes(values)
         _oil(values)
@@ -62,36 +65,53 @@ class SaidKeys(Parameters):
         return super().worded({**values, "said": tuple(dict.fromkeys(said))} if said else values)
 
 
-def bands(said: Sequence[str]) -> Iterator[tuple[str, str, Band]]:
+def of_piston(values: Mapping[str, Any]) -> bool:
+    """True if the values are those of a piston seal: a bore, or a negative rod_diameter."""
+    rod = values.get("rod_diameter")
+    return values.get("bore") is not None or (number(rod) and rod < 0.0)
+
+
+def bands(said: Sequence[str], *, piston: bool) -> Iterator[tuple[str, str, Band]]:
     """Keys that were given with limits, what was said, and these.  Raises NotUnderstoodError."""
     for name, _, value in (text.partition(" = ") for text in said):
         if name not in LENGTHS:
             continue
-        if (found := _fit(name, value)) is None:
+        if (found := _fit(name, value, piston)) is None:
             raise NotUnderstoodError(
                 f'said = "{name} = {value}" is not understood; write it in its own key'
             )
         yield name, value, found
 
 
-def _fit(name: str, value: str) -> Band | None:
-    return read_fit(name, value, hole=name not in _SHAFTS)
+def _fit(name: str, value: str, piston: bool) -> Band | None:
+    return read_fit(name, value, hole=_hole(name, piston))
+
+
+def _hole(name: str, piston: bool) -> bool | None:
+    """True if the size of this key is that of a hole; None for a depth, which is neither."""
+    if name == "groove_depth":
+        return None
+    return not piston if name in _GROUNDS else name not in _SHAFTS
 
 
 def with_limits(values: dict[str, Any]) -> dict[str, Any]:
     """The values with the middles of what has limits.  ValueError."""
-    for name, value, found in bands(values.get("said", ())):
+    said = values.get("said", ())
+    piston = of_piston(values) or any(text.startswith("bore = ") for text in said)
+    for name, value, found in bands(said, piston=piston):
         for key_of in dict.fromkeys((name, LENGTHS[name])):
+            if number(before := values.get(key_of)) and before < 0.0:
+                continue  # of a piston seal that is complete: minus this size, or minus its outside
             put(values, key_of, found.middle, f'{name} = "{value}"')
     return values
 
 
-def understood(said: Sequence[str]) -> list[str]:
+def understood(said: Sequence[str], *, piston: bool) -> list[str]:
     """Lines that say how words of the trade were understood."""
     words = [
         f"{name} = {value}: {found.low:.10g} to {found.high:.10g} mm, solved at the middle, "
         f"{found.middle:.10g}"
-        for name, value, found in bands(said)
+        for name, value, found in bands(said, piston=piston)
     ]
     for text in said:
         name, _, value = text.partition(" = ")
@@ -108,18 +128,18 @@ def _require_stroke(given: object) -> None:
             raise refused("stroke", given, "is another word for it", stroke)
 
 
-def _length(name: str, values: dict[str, Any]) -> list[str]:
+def _length(name: str, values: dict[str, Any], piston: bool) -> list[str]:
     """A size with a tolerance."""
     text = plain(values[name])
     if re.fullmatch(rf"{NUMBER} ?(mm)?", text):
         values[name] = float(text.removesuffix("mm"))
         return []
-    if _fit(name, values[name]):
+    if _fit(name, values[name], piston):
         del values[name]
         return [f"{name} = {text}"]
     if is_quantity(text):
         return []
-    usual = "36 f7" if name in _SHAFTS else "36 H8"
+    usual = "36 H8" if _hole(name, piston) else "36 f7"
     raise refused(name, values[name], "is no size", "36 mm", usual)
 
 
