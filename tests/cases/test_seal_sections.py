@@ -14,6 +14,7 @@ from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.sections import SECTIONS
+from softehl.cases.seal.gland.sections.keys import shape_of
 from softehl.cases.seal.section.layout import pressure_boundary, uniform_layout
 from softehl.cases.seal.solve.contact import contact_problem
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes, contact_key
@@ -30,7 +31,7 @@ from softehl.cases.seal.states.contacts import (
     groups,
     overlap,
 )
-from softehl.cases.seal.states.results import filled_ratio, film_parts, metering
+from softehl.cases.seal.states.results import filled_ratio, film_parts, metering, parted_fluxes
 from softehl.cases.seal.states.state import OSCILLATING, Outcome, Silent
 from softehl.cases.seal.states.verdict import (
     ContactNumbers,
@@ -242,6 +243,63 @@ def test_two_contacts_that_carry_different_fluxes_are_not_believed() -> None:
     assert apart.word == "uncertain"
     assert "differ by 11 %" in apart.advice
     assert 'cavitation = "mass-conserving"' in apart.advice
+
+
+def _torn_film(behind: float) -> dict[str, Array]:
+    """Fields of a film whose pressure has two humps, 4 MPa and `behind`, below zero between them.
+
+    Its oil goes to -z: behind the first hump (z > 0) it has 0.0583 um, behind the second 0.1109 um.
+    """
+    z = np.linspace(1.0, -1.0, 201)[:, None]
+    p = np.where(
+        np.abs(z) < 0.05, -1e-5, np.where(z > 0.0, 4.0, behind) * np.abs(np.sin(np.pi * z))
+    )
+    flux = np.where(z > 0.0, 0.0583e-3, 0.1109e-3) * -25.0
+    tau = np.where(p > 0.0, p, 0.0)
+    return {"p": p, "flux": flux, "dx": np.full_like(z, 0.01), "tau_rod": tau}
+
+
+def test_a_film_that_takes_in_oil_where_it_cavitates_is_not_believed() -> None:
+    fluxes = parted_fluxes(_torn_film(2.0))
+    assert fluxes == pytest.approx((-25.0 * 0.0583e-3, -25.0 * 0.1109e-3))
+    assert parted_fluxes(_torn_film(0.05)) == ()  # at 1.25 % of load and friction
+    film = FilmNumbers(-50.0, fluxes[0], 0.0583e-3, 1e-5, 4.0, -7.6, 4.5e-11, 0.0, 0.03, 5.0)
+    verdict = Verdict(4.1).after(replace(film, fluxes=fluxes))
+    assert verdict.word == "uncertain"
+    assert "differ by 90 %" in verdict.advice
+    assert 'cavitation = "mass-conserving"' in verdict.advice
+    assert Verdict(4.1).after(film).word == OK
+    assert film.friction_known
+    assert not replace(film, fluxes=fluxes).friction_known
+    assert not replace(film, oscillation=0.3).friction_known
+
+
+def test_a_drawn_section_conserves_mass_unless_a_penalty_is_asked_for(tmp_path: Path) -> None:
+    file = tmp_path / "square.csv"
+    file.write_text("z_mm,r_mm\n0,0\n3,0\n3,3.4\n0,3.4\n")
+    drawn = Seal(outline=str(file))
+    assert drawn.lobes == 1
+    assert drawn.conserving
+    assert not drawn.model_copy(update={"cavitation": "penalty"}).conserving
+
+
+@pytest.mark.slow
+def test_a_drawn_u_cup_that_cavitates_between_heel_and_lip(tmp_path: Path) -> None:
+    """One contact of 2.4 mm; the penalty lets in twice the oil that the heel lets pass."""
+    cup = shape_of("u_cup", (("height", 3.53), ("heel_height", 3.4)), 50.0).outline
+    places = np.union1d(np.linspace(cup.starts[0], cup.starts[-1], 400)[:-1], cup.starts[:-1])
+    points = "".join(f"{z:.5f},{r:.5f}\n" for z, r in cup.at(places))
+    file = tmp_path / "cup.csv"
+    file.write_text("z_mm,r_mm\n" + points)
+    given: dict[str, Any] = {"housing_diameter": 56.4, "groove_width": 6.0, "sealed_pressure": 0.5}
+    given |= {"speeds": (50.0,), "stroke": "in", "density": 1, "error_estimate": False}
+    p = Seal(outline=str(file), **given)
+    (lossy,) = run(p.model_copy(update={"cavitation": "penalty"}), Silent()).states
+    (sound,) = run(p, Silent()).states
+    assert lossy.verdict == "uncertain"
+    assert lossy.flux_mismatch_percent > 100.0
+    assert "cavitates" in lossy.advice
+    assert sound.verdict == OK
 
 
 def test_the_second_inlet_is_to_be_seen_too_where_it_is_filled() -> None:

@@ -89,11 +89,12 @@ class Judge:
             error=error if p.error_estimate and p.mesh == "graded" else None,
             reservation=reservation(p, estimate) if adapted.fits else UNFIT,
         )
+        known = film.numbers.friction_known
         equations = film.system, film.problem, film.loads, film.x
         state = replace(
             film_state(*equations, verdict, film.solution.iterations),
             h_star_error_percent=error,
-            rod_friction_error_percent=estimate.friction if estimate else nan,
+            rod_friction_error_percent=estimate.friction if estimate and known else nan,
         )
         if self.differentiate and differentiable(state):
             state = replace(state, sensitivity=self.differentiate(film))

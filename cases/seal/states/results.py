@@ -29,7 +29,12 @@ from softehl.cases.seal.states.film_signs import (
 )
 from softehl.cases.seal.states.section_view import film_pressure, section_view
 from softehl.cases.seal.states.state import FilmState, Profile
-from softehl.cases.seal.states.verdict import ContactNumbers, FilmNumbers, Verdict
+from softehl.cases.seal.states.verdict import (
+    LARGEST_ERROR,
+    ContactNumbers,
+    FilmNumbers,
+    Verdict,
+)
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.postprocess import (
     element_means,
@@ -90,6 +95,7 @@ def film_numbers(system: SealSystem, problem: Problem, film: FilmLoads, x: Array
         lacking=0.0 if system.parameters.rough else lacking(inlet, film, entrance),
         **rough_numbers(system, at),
         contacts=_contacts(at, (z, h), parts, film, level) if len(parts) > 1 else (),
+        fluxes=() if system.parameters.conserving else parted_fluxes(at),
         drag=drag,
         beyond=beyond / abs(friction),
     )
@@ -111,6 +117,24 @@ def _flux(
         flux, jump = facets["flux"][:, 0], float(np.abs(facets["jump"]).max())
         around, whole = (slice(max(k.start - 1, 0), k.stop) for k in (around, whole))
     return float(flux[around].mean()), relative_spread(flux[whole]), jump
+
+
+def parted_fluxes(at: Mapping[str, Array]) -> tuple[float, ...]:
+    """Flux of each part of a film that is whole, between places where it cavitates.
+
+    at: fields of the film, (segments, points) each. A penalty lets oil in or out where the pressure
+    is below zero. Parts with less than `LARGEST_ERROR` per cent of both load and friction are left
+    out, as behind the exit: their oil changes neither by more. None of a film with one part.
+    """
+    whole = np.flatnonzero(at["p"].min(axis=1) >= 0.0)
+    parts = [part for part in np.split(whole, np.flatnonzero(np.diff(whole) > 1) + 1) if len(part)]
+    shares = [np.abs(at[name] * at["dx"]).sum(axis=1) for name in ("p", "tau_rod")]
+    least = 0.01 * LARGEST_ERROR
+    found = [part for part in parts if any(v[part].sum() > least * v.sum() for v in shares)]
+    if len(found) < 2:
+        return ()
+    flux = element_means(at["flux"], at["dx"])
+    return tuple(float(flux[part[int(at["p"][part].max(axis=1).argmax())]]) for part in found)
 
 
 def film_parts(h: Array, level: float = CONTACT_FILM) -> list[slice]:
@@ -252,6 +276,7 @@ def film_state(
         regime=regime(numbers.lambda_ratio) if system.parameters.rough else "",
         asperity_load_percent=100.0 * numbers.asperity_load,
         boundary_friction_percent=100.0 * numbers.boundary_friction,
+        flux_mismatch_percent=numbers.mismatch if numbers.fluxes or numbers.contacts else nan,
         **_groove(numbers),
         entrance_pressure_MPa=film.entrance,
         verdict=verdict.word,
@@ -262,7 +287,7 @@ def film_state(
 
 
 def _groove(numbers: FilmNumbers) -> dict[str, Any]:
-    """Columns of the groove between two contacts, and how these differ; none of one contact."""
+    """Columns of the groove between two contacts; none of one contact."""
     if not numbers.contacts:
         return {}
     sealed, air = numbers.contacts[0], numbers.contacts[-1]
@@ -272,7 +297,6 @@ def _groove(numbers: FilmNumbers) -> dict[str, Any]:
         "groove_pressure_MPa": air.p_before,
         "h_min_sealed_um": sealed.h_min / MICROMETRE,
         "h_min_air_um": air.h_min / MICROMETRE,
-        "flux_mismatch_percent": numbers.mismatch,
     }
 
 

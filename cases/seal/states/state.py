@@ -140,7 +140,10 @@ class FilmRow(Row):
         "um", "least film thickness of the contact on the air side; nan for one", default=nan
     )
     flux_mismatch_percent: float = column(
-        "%", "difference between the fluxes of two contacts; 0 where mass is conserved", default=nan
+        "%",
+        "largest difference between the fluxes of two contacts, or on both sides of a place where "
+        "the film cavitates; 0 where mass is conserved, nan for one contact that is whole",
+        default=nan,
     )
     entrance_pressure_MPa: float = column(
         "MPa", "built up before the arc, where that begins within the film; else 0", default=0.0

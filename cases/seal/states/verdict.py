@@ -71,7 +71,8 @@ _OVERLAP = (
     "rubber or a wider mouth"
 )
 _MISMATCH = (
-    "the fluxes of the two contacts differ by {:.2g} %: oil is lost in the groove between them; "
+    "the fluxes on both sides of a place where the film cavitates differ by {:.2g} %: the penalty "
+    "lets oil in or out there, and friction is not known; "
     'use cavitation = "mass-conserving"'
 )
 _ZIGZAG = (
@@ -111,8 +112,9 @@ class FilmNumbers:
     that of the inlet. mean_gap: least h_T, mm. lambda_ratio: that over sigma, nan between smooth
     surfaces. asperity_load, boundary_friction: shares of asperities. contacts: from the sealed side
     on, where there are several; h_star is then that of the first one on the way of the oil that has
-    a peak of its own. drag: the part of the friction that is not of the slope of the pressure.
-    beyond: friction of the oil beyond both ends of the arc, which it does not have, relative to it.
+    a peak of its own. fluxes: of the parts of a film that cavitates between them. drag: the part of
+    the friction that is not of the slope of the pressure. beyond: friction of the oil beyond both
+    ends of the arc, which it does not have, relative to it.
     """
 
     speed: float
@@ -134,14 +136,33 @@ class FilmNumbers:
     asperity_load: float = 0.0
     boundary_friction: float = 0.0
     contacts: tuple[ContactNumbers, ...] = ()
+    fluxes: tuple[float, ...] = ()
     drag: float = nan
     beyond: float = 0.0
 
     @property
     def mismatch(self) -> float:
-        """Largest difference between the flux of a contact and that of h*, %; 0 for one contact."""
-        apart = (abs(contact.flux / self.flux - 1.0) for contact in self.contacts)
-        return 100.0 * max(apart, default=0.0)
+        """Largest difference between the flux of a part of the film and that of h*, %.
+
+        A part is a contact, or is whole between places where the film cavitates; 0 for one alone.
+        """
+        fluxes = [*(contact.flux for contact in self.contacts), *self.fluxes]
+        return 100.0 * max((abs(flux / self.flux - 1.0) for flux in fluxes), default=0.0)
+
+    @property
+    def loses_oil(self) -> bool:
+        """True if the fluxes of two parts of the film differ too much."""
+        return self.mismatch > LARGEST_ERROR
+
+    @property
+    def zigzags(self) -> bool:
+        """True if the film zigzags from node to node."""
+        return self.oscillation > STRONG_OSCILLATION
+
+    @property
+    def friction_known(self) -> bool:
+        """True if meshes can show the error of the friction: no oil is lost, nothing zigzags."""
+        return not (self.loses_oil or self.zigzags)
 
     @property
     def next_ratio(self) -> float:
@@ -258,11 +279,11 @@ class Verdict:
             yield UNCERTAIN, _UNSEALED.format(self.unsealed)
         if self.overlap:
             yield UNCERTAIN, _OVERLAP.format(self.overlap)
-        if film.mismatch > LARGEST_ERROR:
+        if film.loses_oil:
             yield UNCERTAIN, _MISMATCH.format(film.mismatch)
         if self.error is not None and not abs(self.error) <= LARGEST_ERROR:
             yield UNCERTAIN, DOUBTFUL
-        if film.oscillation > STRONG_OSCILLATION:
+        if film.zigzags:
             yield OSCILLATING, _ZIGZAG.format(film.oscillation)
         if self.reservation:
             yield UNCERTAIN, self.reservation

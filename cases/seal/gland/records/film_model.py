@@ -14,7 +14,7 @@ class FilmModel(FreeSeal, Surfaces):
         None,
         "model of cavitation",
         bounds='"penalty" or "mass-conserving", left out = mass-conserving with roughness, '
-        "with a cavitation_pressure and where a section has two lobes",
+        "with a cavitation_pressure, with an outline and where a section has two lobes",
     )
     cavitation_pressure: float = key(
         0.0, "mass-conserving: pressure of the ruptured film", unit="MPa", ge=-0.1, le=0
@@ -50,5 +50,8 @@ class FilmModel(FreeSeal, Surfaces):
     def conserving(self) -> bool:
         """True if the film conserves mass where it ruptures."""
         if self.cavitation is None:
-            return self.rough or self.lobes > 1 or self.cavitation_pressure < 0.0
+            drawn = (
+                self.outline is not None
+            )  # its pressure may fall to zero anywhere in the contact
+            return self.rough or drawn or self.lobes > 1 or self.cavitation_pressure < 0.0
         return self.cavitation == "mass-conserving"
