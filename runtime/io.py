@@ -6,6 +6,7 @@ new one, never half of one.  CSV numbers are the shortest text that reads back t
 
 import contextlib
 import csv
+import hashlib
 import io
 import json
 import math
@@ -21,6 +22,9 @@ import numpy as np
 from softehl.runtime.arrays import Array, Integers
 
 Cell = float | int | str
+
+_DIGEST = "sha256"
+"""Name of the array that holds the digest of the others."""
 
 
 @contextlib.contextmanager
@@ -53,19 +57,36 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Array], *, shared: bool = True) -> None:
-    """Write named arrays (.npz), atomically; shared: also by several processes.  OSError."""
-    named: dict[str, Any] = dict(arrays)
+    """Write named arrays (.npz) and their digest, atomically; shared: also by several processes.
+
+    Raises OSError.
+    """
+    named: dict[str, Any] = {name: np.asarray(array) for name, array in arrays.items()}
+    named[_DIGEST] = _digest_of(named)
     with replacing(path, shared=shared) as temporary, temporary.open("wb") as file:
         np.savez(file, **named)
 
 
 def read_arrays(path: Path) -> dict[str, Array] | None:
-    """Arrays that :func:`write_arrays` wrote; None if the file is missing or damaged."""
+    """Arrays that :func:`write_arrays` wrote; None if the file is missing, damaged or edited."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as content:
-            return {name: np.asarray(content[name], dtype=np.float64) for name in content.files}
+            named = {name: content[name] for name in content.files}
+        if not np.array_equal(named.pop(_DIGEST), _digest_of(named)):
+            return None
+        return {name: np.asarray(array, dtype=np.float64) for name, array in named.items()}
     except Exception:  # damage may show as almost anything: in the archive, a header, the data
         return None
+
+
+def _digest_of(arrays: Mapping[str, Any]) -> Integers:
+    """SHA-256 (32,) of names, types, shapes and values, in the order of the names."""
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name}|{array.dtype.str}|{np.shape(arrays[name])}|".encode())
+        digest.update(array.data)
+    return np.frombuffer(digest.digest(), dtype=np.uint8)
 
 
 def number_text(value: float) -> str:

@@ -89,7 +89,7 @@ def read_earlier(folder: Path, run: Run, version: str | None) -> Earlier:
         return Earlier()
     try:
         content = read_json(folder / "run.json")
-        states = _states(content)
+        _states(content)
     except FileNotFoundError:
         if not _has_rows(folder / "curve.csv"):
             return Earlier()  # a run that was ended before it had anything
@@ -104,7 +104,7 @@ def read_earlier(folder: Path, run: Run, version: str | None) -> Earlier:
             f"--resume: {folder} holds a run with {difference}; allowed to differ: "
             f"{', '.join(run.case.selection) or 'nothing'}; {ANEW}"
         )
-    rows, doubts = _believed(folder, run, states)
+    rows, doubts = _believed(folder, run, content)
     return Earlier(content, tuple(rows), tuple(doubts))
 
 
@@ -144,11 +144,9 @@ def _difference(content: Mapping[str, Any], run: Run, version: str | None) -> st
     return f"other kernels: {', '.join(map(str, other))}" if other else ""
 
 
-def _believed(
-    folder: Path, run: Run, states: Sequence[Mapping[str, Any]]
-) -> tuple[list[Row], list[str]]:
+def _believed(folder: Path, run: Run, content: Mapping[str, Any]) -> tuple[list[Row], list[str]]:
     """Rows that can be kept, and words on those that cannot."""
-    kept, doubts = [], []
+    states, kept, doubts = _states(content), list[Row](), list[str]()
     try:
         table = read_csv(folder / "curve.csv", run.case.row.header())
     except (OSError, ValueError) as error:
@@ -163,7 +161,8 @@ def _believed(
             doubts.append(f"line {number + 1} of curve.csv is no row: it is computed again")
     count = Counter(row.key for row in rows)
     for row in rows:
-        reason = "it is there twice" if count[row.key] > 1 else _disbelief(folder, row, states)
+        reason = "it is there twice" if count[row.key] > 1 else disbelief(folder, row, states)
+        reason = reason or edited_table(folder, content, f"_{row.name}.csv")
         if reason:
             doubts.append(f"{row.label(row.key)}: {reason}; computed again")
         else:
@@ -171,7 +170,20 @@ def _believed(
     return kept, list(dict.fromkeys(doubts))
 
 
-def _disbelief(folder: Path, row: Row, states: Sequence[Mapping[str, Any]]) -> str:
+def edited_table(folder: Path, content: Mapping[str, Any], ending: str = ".csv") -> str:
+    """What is wrong with the tables of these names beside the curve, empty if nothing is.
+
+    content: of run.json. A table that is not there is not believed either.
+    """
+    digests = content.get("tables")
+    for name, wanted in digests.items() if isinstance(digests, dict) else ():
+        path = folder / name
+        if name.endswith(ending) and path.exists() and file_digest(path) != wanted:
+            return f"{name} is not what was written"
+    return ""
+
+
+def disbelief(folder: Path, row: Row, states: Sequence[Mapping[str, Any]]) -> str:
     """Why a row of curve.csv cannot be believed, empty if it can."""
     given = _plain(row.as_dict())
     same = [state for state in states if {k: state.get(k) for k in given} == given]

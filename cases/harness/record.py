@@ -27,7 +27,7 @@ from softehl.cases.harness.earlier import (
     read_earlier,
 )
 from softehl.cases.harness.errors import BadInput
-from softehl.cases.harness.files import Content, write_content
+from softehl.cases.harness.files import Content, file_digest, write_content
 from softehl.cases.harness.lock import FolderLock
 from softehl.cases.harness.observer import Outcome, StageRecord, State
 from softehl.cases.harness.row import Record, Row
@@ -212,6 +212,7 @@ class RunRecord:
             **{name: [record.as_dict() for record in some] for name, some in tables.items()},
             "states": [self._row_json(row, self.curve, ".") for row in self.curve.rows],
             "rejected": [self._row_json(r, self.rejected, "rejected") for r in self.rejected.rows],
+            "tables": table_digests(self.folder, self.run.case),
         }
         write_json(self.folder / "run.json", content)
 
@@ -246,6 +247,12 @@ class RunRecord:
         files = [str(Path(folder, name)) for name in names]
         words = {"advice": self.advice.get(row.key, "")}
         return row.as_dict() | words | {"files": files, "digests": digests}
+
+
+def table_digests(folder: Path, case: AnyCase) -> dict[str, str]:
+    """Digests of the tables of a case that are in a folder, beside the curve and its files."""
+    paths = {path for name in case.files if name.endswith(".csv") for path in folder.glob(name)}
+    return {path.name: file_digest(path) for path in sorted(paths)}
 
 
 def refusal(folder: Path, kept: str) -> BadInput:

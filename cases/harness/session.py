@@ -180,8 +180,12 @@ def _conclude(record: RunRecord, outcomes: Sequence[Outcome]) -> list[str]:
     record.begin()
     record.set_outcomes(outcomes)
     complaints = [*_failures(outcomes), *_gaps(record)]
-    record.save("not converged" if complaints else "converged", "; ".join(complaints))
+    _save(record, complaints)
     return complaints
+
+
+def _save(record: RunRecord, complaints: Sequence[str]) -> None:
+    record.save("not converged" if complaints else "converged", "; ".join(complaints))
 
 
 def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
@@ -189,6 +193,7 @@ def _finish(record: RunRecord, complaints: list[str], *, quiet: bool) -> int:
     case, rows, rejected = record.run.case, record.curve.rows, record.rejected.rows
     if rows:
         case.draw(record.run.parameters, record.folder, rows, rejected, record.run.pictures)
+        _save(record, complaints)  # with the tables that were written meanwhile
     if not quiet and (rows or rejected):
         table.print_rows(case, rows, rejected)
         for line in case.answer(record.run.parameters, rows):

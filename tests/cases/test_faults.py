@@ -22,9 +22,12 @@ from softehl.cases import oring
 from softehl.cases.harness import table
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.lock import FolderLock
+from softehl.cases.harness.record import table_digests
+from softehl.cases.harness.report.page import read_finished
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.states.state import FilmRow, Observer
+from softehl.cases.shipped import SHIPPED
 from tests.cases.test_cli import FAST, Fake, film_state, solve
 
 FOLDER = ("run", "oring", *FAST, "--out", "a")
@@ -97,6 +100,40 @@ def test_a_row_that_cannot_be_believed_is_computed_again(
     assert code == 0
     assert computed == [("in", 400.0)]
     assert (done / "curve.csv").read_bytes() == before
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_a_row_that_cannot_be_believed_is_not_reported(
+    damage: Callable[[Path], object], done: Path
+) -> None:
+    assert len(read_finished(done, SHIPPED).rows) == 4
+    damage(done)
+    with pytest.raises(BadInput, match=r"holds no run that can be read|--resume computes"):
+        read_finished(done, SHIPPED)
+
+
+def test_a_table_of_sensitivities_that_was_edited_is_not_believed(
+    done: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its state is computed again, and no report has it."""
+    slopes = done / "sensitivity_1_-400.csv"
+    slopes.write_text("a,b\n1,2\n")
+    content = json.loads((done / "run.json").read_text())
+    content["tables"] = table_digests(done, CASE)
+    assert set(content["tables"]) >= {slopes.name, "leakage.csv"}
+    (done / "run.json").write_text(json.dumps(content))
+    assert len(read_finished(done, SHIPPED).rows) == 4
+    slopes.write_text("a,b\n1,3\n")
+    with pytest.raises(BadInput, match=r"sensitivity_1_-400\.csv is not what was written"):
+        read_finished(done, SHIPPED)
+    assert resumed(monkeypatch) == (0, [("in", 400.0)])
+
+
+def test_of_a_run_that_is_under_way_complete_rows_are_reported(done: Path) -> None:
+    content = json.loads((done / "run.json").read_text())
+    content["states"], content["status"] = content["states"][:-1], "running"
+    (done / "run.json").write_text(json.dumps(content))
+    assert len(read_finished(done, SHIPPED).rows) == 3
 
 
 @pytest.mark.parametrize("cut", [1, 2, 40, 100_000])

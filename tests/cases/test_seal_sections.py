@@ -285,19 +285,20 @@ def test_a_drawn_section_conserves_mass_unless_a_penalty_is_asked_for(tmp_path: 
 
 @pytest.mark.slow
 def test_a_drawn_u_cup_that_cavitates_between_heel_and_lip(tmp_path: Path) -> None:
-    """One contact of 2.4 mm; the penalty lets in twice the oil that the heel lets pass."""
-    cup = shape_of("u_cup", (("height", 3.53), ("heel_height", 3.4)), 50.0).outline
+    """One contact; the penalty lets in many times the oil that the heel lets pass."""
+    cup = shape_of("u_cup", (("height", 3.53), ("heel_height", 3.45)), 50.0).outline
     places = np.union1d(np.linspace(cup.starts[0], cup.starts[-1], 400)[:-1], cup.starts[:-1])
     points = "".join(f"{z:.5f},{r:.5f}\n" for z, r in cup.at(places))
     file = tmp_path / "cup.csv"
     file.write_text("z_mm,r_mm\n" + points)
-    given: dict[str, Any] = {"housing_diameter": 56.4, "groove_width": 6.0, "sealed_pressure": 0.5}
+    given: dict[str, Any] = {"housing_diameter": 56.4, "groove_width": 6.0, "sealed_pressure": 0.2}
     given |= {"speeds": (50.0,), "stroke": "in", "density": 1, "error_estimate": False}
     p = Seal(outline=str(file), **given)
     (lossy,) = run(p.model_copy(update={"cavitation": "penalty"}), Silent()).states
     (sound,) = run(p, Silent()).states
     assert lossy.verdict == "uncertain"
     assert lossy.flux_mismatch_percent > 100.0
+    assert abs(lossy.rod_friction_N / sound.rod_friction_N - 1.0) > 0.2
     assert "cavitates" in lossy.advice
     assert sound.verdict == OK
 

@@ -221,6 +221,23 @@ def test_a_checkpoint_knows_its_mesh_and_its_pages(tmp_path: Path) -> None:
     assert step.t == pytest.approx(0.2)
 
 
+def test_a_checkpoint_that_was_edited_is_refused(tmp_path: Path) -> None:
+    """Temperatures, a time, a name: whatever a restart believes."""
+    file = tmp_path / "rod.npz"
+    list(rod(4).march(dt=0.1, until=0.1, checkpoint=file))
+    with np.load(file) as content:
+        good = {name: content[name] for name in content.files}
+    for name in good:
+        edited = good[name].copy()
+        edited.flat[-1] += 1
+        np.savez(file, **{**good, name: edited})  # type: ignore[arg-type]
+        with pytest.raises(StudyError, match="missing or damaged"):
+            rod(4).march(dt=0.1, until=0.2, restart=file)
+    np.savez(file, **good)  # type: ignore[arg-type]
+    (step,) = rod(4).march(dt=0.1, until=0.2, restart=file)
+    assert step.t == pytest.approx(0.2)
+
+
 def test_a_step_that_is_given_at_a_restart_is_used(tmp_path: Path) -> None:
     file = tmp_path / "rod.npz"
     list(rod(4).march(dt=0.1, until=0.2, checkpoint=file))

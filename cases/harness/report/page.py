@@ -12,6 +12,7 @@ from typing import Any
 
 from softehl.cases.harness.case import Alarm, AnyCase, load_case
 from softehl.cases.harness.curve import CurveFolder
+from softehl.cases.harness.earlier import disbelief, edited_table
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
 from softehl.cases.harness.report.part import FinishedRun, Part, Table
@@ -19,6 +20,7 @@ from softehl.runtime.io import Cell, read_json, replacing, write_text
 
 _HERE = Path(__file__).parent
 _SHEET_NAME = 31  # letters, by the file format
+_AGAIN = "softehl run --resume computes it again"
 _MISSING = "softehl report needs Bokeh and openpyxl: pip install 'softehl[report]'"
 
 
@@ -36,12 +38,35 @@ def read_finished(folder: Path, shipped: Mapping[str, str]) -> FinishedRun:
         case = load_case(shipped[content["case"]])
         parameters = case.parameters(**content["parameters"])
         curve, rejected = (CurveFolder(f, case.row) for f in (folder, folder / "rejected"))
-        for rows in (curve, rejected):
+        for rows, name in ((curve, "states"), (rejected, "rejected")):
             rows.load()
+            _require_written(rows, content, name)
+        if edited := edited_table(folder, content):
+            raise BadInput(f"{folder}: {edited}; {_AGAIN}")
     except (OSError, ValueError, KeyError, TypeError) as error:
         reason = " ".join(str(error).split())[:120]
         raise BadInput(f"{folder} holds no run that can be read: {reason}") from None
     return FinishedRun(folder, case, parameters, curve.rows, rejected.rows, content)
+
+
+def _require_written(rows: CurveFolder[Any], content: Mapping[str, Any], name: str) -> None:
+    """Leave the rows that run.json has too, with their files as they were written.
+
+    name: of these rows in run.json. Raises BadInput where a row is another one or missing, but of a
+    run that is under way: its curve is written before its run.json.
+    """
+    states = [state for state in content.get(name, ()) if isinstance(state, dict)]
+    doubts = {row.key: disbelief(rows.path, row, states) for row in rows.rows}
+    name_of_key = rows.kind.key_column().name
+    lost = [s[name_of_key] for s in states if s.get(name_of_key) not in doubts]
+    wrong = [(key, doubt) for key, doubt in doubts.items() if doubt]
+    count = Counter(row.key for row in rows.rows)
+    wrong += [(key, "it is there twice") for key, times in count.items() if times > 1]
+    wrong += [(key, "its row or a file of it is missing") for key in lost]
+    if wrong and content.get("status") != "running":
+        (key, doubt), *_ = wrong
+        raise BadInput(f"{rows.path}: {rows.kind.label(key)}: {doubt}; {_AGAIN}")
+    rows.rows = [row for row in rows.rows if not doubts[row.key]]
 
 
 def write_page(
