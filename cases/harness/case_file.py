@@ -29,6 +29,8 @@ WAYS = ("grid", "list", "latin_hypercube", "random")
 """Tables of a study, which is no case but many: how its keys vary."""
 
 _BARE_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+_DASHED = re.compile(r"[-+]?0\d+")
+"""A number that TOML does not read, as in the name of a ring, "-010"."""
 _FILE = re.compile(r"(\.{0,2}/)?[A-Za-z_][A-Za-z0-9_./-]*\.[A-Za-z]{1,5}")
 _PHRASE = re.compile(
     r"""(?=.*[^\W\d_]|.*[\u00b1\u00d7\u00d8\u2300\#\"]|.*\d ?[+(-])(?!["'])"""
@@ -96,7 +98,7 @@ def read_assignment(text: str, origin: str = "--set") -> tuple[str, object]:
     key, equals, value = (part.strip() for part in text.partition("="))
     if not key or not equals:
         raise BadInput(f"{origin} {shortened(text)}: allowed is KEY=VALUE, see softehl keys")
-    plain = (_BARE_WORD, _PHRASE, _FILE)
+    plain = (_BARE_WORD, _PHRASE, _FILE, _DASHED)
     if "," in value and is_number(value) and not value.endswith(","):
         return key, value  # a number with a decimal comma or two numbers, as the key has it
     if (read := _toml_value(value)) is not None:
@@ -174,6 +176,8 @@ def _slip(error: str, text: str) -> str:
     value = value.partition("#")[0].strip()
     if error.startswith("Cannot overwrite"):
         return f": {key} is given twice"
+    if _DASHED.fullmatch(value):
+        return f': write {key} = "{value}"'
     if "," in value and is_number(value):
         return f": write {key} = {value.replace(',', '.')}"
     if "," in value and all(is_number(item) for item in value.split(",")):
@@ -228,6 +232,8 @@ def _one_line(
 ) -> str:
     """The first complaint of pydantic in the user's words, and how many more there are."""
     complaints = error.errors(include_url=False, include_context=False)
+    # what was given before what follows from it
+    complaints.sort(key=lambda one: bool(one["loc"]) and str(one["loc"][0]) not in origins)
     first, keys = complaints[0], {c["loc"][:1] for c in complaints}
     more = f" (and {len(keys) - 1} more)" if len(keys) > 1 else ""
     reason = first["msg"].removeprefix("Value error, ")
@@ -235,10 +241,12 @@ def _one_line(
     if not first["loc"]:  # a relation between several keys
         return f"{' and '.join(sorted(set(origins.values())))}: {reason}"
     key = str(first["loc"][0])
-    return (
-        f"{origins[key]}: {key} = {shown(values[key])}: {reason}{more}; "
-        f"allowed: {kind.model_fields[key].description}"
-    )
+    if key in origins:
+        told = f"{origins[key]}: {key} = {shown(values[key])}"
+    else:
+        places = " and ".join(sorted(set(origins.values())))
+        told = f"{places}: {key} = {shown(first['input'])}, which follows from what was given"
+    return f"{told}: {reason}{more}; allowed: {kind.model_fields[key].description}"
 
 
 def shown(value: object) -> str:

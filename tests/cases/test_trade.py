@@ -138,6 +138,17 @@ def test_the_examples_of_astm_d2270() -> None:
         (("section=lip ring",), "input should be 'round'"),
         (("material=PTFE",), "is a plastic, no rubber: it may be a cap"),
         (("ring=OR 36-4", "rod=36"), 'write "36x4" or "AS568-226"'),
+        (
+            ("ring=MS28775-210", "rod=19"),
+            'in the rubber of MS28775; give its material too; write "A',
+        ),
+        (("ring=M83248/1-010", "rod=6"), 'write "AS568-010"'),
+        (("ring=AN6227-15", "rod=19"), 'is not known; write "36x4", "ISO 3601'),
+        (("youngs_modulus=5.5",), 'write material = "neo-hooke" and mu, a third of Young\'s'),
+        (("nu=0.49",), "write bulk_modulus, 2 mu (1 + nu) / (3 - 6 nu)"),
+        (("shore_A=10",), 'softer ones have their modulus given, as in material = "neo-hooke"'),
+        (("material=PU 99",), "Shore A; harder ones have their modulus given"),
+        (("pressure_viscosity=3",), "pressure_viscosity = 3"),
     ],
 )
 def test_what_is_not_read_is_answered_with_what_to_write(
@@ -220,3 +231,34 @@ def test_a_class_of_the_wrong_letter_has_the_right_one(given: tuple[str, ...], a
     with pytest.raises(BadInput) as caught:
         typed("ring=36x4", *given)
     assert answer in str(caught.value)
+
+
+def test_names_of_rings_with_a_leading_zero_and_of_quad_rings() -> None:
+    for name in ("-010", "010", "AS568-010"):
+        assert typed(f"ring={name}", "rod=6.2").section_diameter == pytest.approx(1.778)
+    assert typed("ring=Q4-210", "rod=19") == typed("ring=X-ring 210", "rod=19").model_copy(
+        update={"ring": "Q4-210"}
+    )
+
+
+EXTREME = {
+    ("oil=46 cSt at 40 degC, 6.8 cSt at 100 degC", "temperature=-60"): "viscosity = ",
+    ("bore=-1e300",): "bore = -1e+300: input should be greater than 0",
+    ("ring=36x4", "rod=36", "inner_diameter=[]"): "inner_diameter = []: input should be a valid",
+    ("ring=36x4", "rod=36", "inner_diameter=[1]"): "inner_diameter = [1]: input should be a valid",
+    ("ring=U-cup 25x35x8", "rod=inf"): "rod = Infinity: input should be a finite number",
+    ("section=x_ring", "section_diameter=1e300"): "less than or equal to 500",
+    ("section=x_ring", "fillet_radius=1e300"): "less than or equal to 500",
+    ("section=u_cup", "section_diameter=1e300"): "less than or equal to 500",
+    ("said=-1e300",): "said = -1e+300: input should be a valid list",
+    ("said=[1]",): "said = [1]: input should be a valid string",
+    ("bore=40", "said=[1]"): "said = [1]: input should be a valid string",
+}
+"""Assignments -> what is wrong with them."""
+
+
+@pytest.mark.parametrize("given", EXTREME, ids=" ".join)
+def test_a_value_out_of_all_ranges_is_refused_in_one_line(given: tuple[str, ...]) -> None:
+    with pytest.raises(BadInput) as caught:
+        typed(*given)
+    assert EXTREME[given] in str(caught.value)

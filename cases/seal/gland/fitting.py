@@ -20,7 +20,7 @@ from softehl.cases.seal.gland.sections.base import parts_of
 from softehl.cases.seal.gland.sections.keys import section_of_file
 from softehl.cases.seal.gland.sections.u_cup import UCup
 from softehl.cases.seal.gland.trade.ring_names import read_ring
-from softehl.cases.seal.gland.trade.said import bands
+from softehl.cases.seal.gland.trade.said import bands, texts
 
 DIAMETERS = {"rod": "rod_diameter", **{name: key for key, name in OF_PISTON.items()}}
 """Key of a diameter as it is measured -> key that is negative in a piston."""
@@ -185,7 +185,7 @@ def _with_gland(values: dict[str, Any]) -> None:
     if values.get("gland") in KINDS:
         groove = _groove(values, section)
         if values.get("housing_diameter") is None:
-            said = values.get("said", ())
+            said = texts(values.get("said"))
             limits = {name: found for name, _, found in bands(said, piston=rod < 0.0)}
             named = limits.get("bore" if rod < 0.0 else "rod")
             of_chart = math.copysign(named.nominal, rod) if named else rod
@@ -213,8 +213,8 @@ def _follow(values: dict[str, Any], key: str, value: float, source: str) -> None
     if values.get(key) is None:
         values[key] = value
     before, latter = values[key], f"{source} = {values[source]}"
-    if agree(before, value):
-        return
+    if not number(before) or agree(before, value):
+        return  # what is no number is refused with its key
     earlier = _GROUND[: _GROUND.index(source)] if source in _GROUND else ()
     former = next((name for name in earlier if number(values.get(name))), None)
     was, new = shown(abs(before)), shown(abs(value))

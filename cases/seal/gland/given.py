@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import isclose
+from sys import float_info
 from typing import Any, TypeGuard
 
 from pydantic import ValidationError
 
 
 def number(value: object) -> TypeGuard[float]:
-    """True if a value is a number; True and False are none."""
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    """True if a value is a finite number; True and False are none."""
+    real = isinstance(value, int | float) and not isinstance(value, bool)
+    return real and abs(value) <= float_info.max
 
 
 def put(values: dict[str, Any], key: str, value: Any, source: str, within: float = 1e-6) -> None:
@@ -38,7 +40,7 @@ def agree(before: object, value: object, within: float = 1e-6) -> bool:
     usually less than tables and units round.
     """
     given, expected = _numbers(before), _numbers(value)
-    if not all(map(number, given)):
+    if not given or not all(map(number, given)):
         return True
     return len(given) == len(expected) and all(
         isclose(a, b, rel_tol=within, abs_tol=1e-12) for a, b in zip(given, expected, strict=True)

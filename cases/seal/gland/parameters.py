@@ -73,6 +73,12 @@ class Seal(FilmModel, Oil, Numerics, Duty, Solid, Gland, SaidKeys):
             "travel": ("stroke_length", "length"),
             "extrusion_gap": ("gap", "clearance"),
             "squeeze": ("compression", "interference"),
+            'material = "neo-hooke" and mu, a third of Young\'s modulus': (
+                *("youngs_modulus", "young", "young_modulus", "e", "e_modulus", "elastic_modulus"),
+                "elasticity",
+            ),
+            'material = "neo-hooke" and mu': ("shear_modulus", "g"),
+            "bulk_modulus, 2 mu (1 + nu) / (3 - 6 nu)": ("nu", "poisson", "poissons_ratio"),
         }.items()
         for word in words
     }

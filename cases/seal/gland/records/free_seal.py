@@ -50,6 +50,7 @@ class FreeSeal(SectionKeys):
         "diameter of the section D_seal; radial height of one that is not round",
         unit="mm",
         gt=0,
+        le=500,
     )
 
     @property

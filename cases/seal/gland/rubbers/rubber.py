@@ -63,10 +63,15 @@ def _with_hardness(values: dict[str, Any]) -> str | None:
     low, high = shore_range(polymer)
     if number(shore) and not low <= shore <= high:
         named = f"of {polymer} " if polymer else ""
+        others, mu = 'harder ones are polyurethane, "PU 95", or', "15 MPa"
+        if shore < low:
+            others, mu = "softer ones", "0.2 MPa"
+        elif polymer == "PU":
+            others = "harder ones"
         raise ValueError(
             f"shore_A = {shore:g}: a hardness {named}gives a modulus from {low:g} to {high:g} "
-            'Shore A; harder ones are polyurethane, "PU 95", or have their modulus given, as in '
-            'material = "neo-hooke" and mu = "15 MPa", a third of Young\'s modulus'
+            f'Shore A; {others} have their modulus given, as in material = "neo-hooke" and '
+            f'mu = "{mu}", a third of Young\'s modulus'
         )
     return polymer
 

@@ -60,7 +60,9 @@ def _key(uses: Mapping[str, Mapping[str, Any]]) -> Any:
     first, *_ = uses.values()
     shares = " or ".join(dict.fromkeys(f"{extra['part']:g}" for extra in uses.values()))
     bounds = f"left out = {shares} of section_diameter"
-    return key(None, f"{', '.join(uses)}: {first['meaning']}", unit="mm", bounds=bounds, ge=0)
+    return key(
+        None, f"{', '.join(uses)}: {first['meaning']}", unit="mm", bounds=bounds, ge=0, le=500
+    )
 
 
 MEASURES = tuple(_dimensions())

@@ -32,7 +32,7 @@ class RingName:
 _SECTIONS = {
     "round": r"O[- ]?rings?|ORs?|O[- ]?seals?|RORs?|toroidal seals?|circular",
     "x_ring": r"X[- ]?rings?|XRs?|quad(?:[- ]?(?:rings?|seals?))?|4[- ]?lobe(?:d)?(?: rings?)?"
-    r"|Q-?(?=4\d\d\d)",
+    r"|Q-?(?=4-?\d\d\d)",
     "u_cup": r"U[- ]?cups?|U[- ]?rings?|U[- ]?seals?|lip seals?|Nutring",
     "d_ring": r"D[- ]?rings?",
     "rectangular": r"square(?:[- ]rings?)?|rectangle",
@@ -49,7 +49,13 @@ _DASH = form(
     r"|dash|size|no\.?)?"
     r"[ -]*?(?P<dash>2-|-)?(?P<number>\d{1,3})[AB]?"
 )
-_QUAD = re.compile(r"4(?P<number>\d{3})")
+_QUAD = re.compile(r"4-?(?P<number>\d{3})")
+_MILITARY = form(
+    r"(?P<name>MS ?-?(?:28775|29513)|M ?-?(?:25988|83248|83461|83485)(?:/\d)?"
+    r"|NAS ?-?(?:1593|1594|1611))"
+    r"[ -]+(?P<number>\d{3})"
+)
+"""Standards of rubbers whose rings have the dash numbers of AS568."""
 _COMPOUND = form(
     r"(?P<ring>.*\d)[ ,;/-]+(?P<rubber>(?:[XH]?NBR|F?FKM|FPM|EPDM|F?VMQ|PUR?|CR|ACM)[ -]?\d\d\b.*)"
 )
@@ -133,6 +139,9 @@ def _unknown(given: str, rest: str, kind: Kind | None) -> Exception:
         size = f"{found[1].upper()}{found[2]}"
         why = f"is a size of JIS B 2401 ({size}), whose diameters are not in the catalogue"
         return refused("ring", given, why, *usual[:2])
+    if found := _MILITARY.fullmatch(rest):
+        why = f"is a size of AS568 in the rubber of {found['name']}; give its material too"
+        return refused("ring", given, why, f"AS568-{found['number']}")
     if re.match(r"AS[ -]?568", rest, re.IGNORECASE):
         return refused("ring", given, "is no size of AS568, which have three digits", usual[2])
     sizes = re.findall(NUMBER, rest)
@@ -140,5 +149,6 @@ def _unknown(given: str, rest: str, kind: Kind | None) -> Exception:
         return refused("ring", given, "is not known", f"U-cup {'x'.join(sizes)}")
     if len(sizes) == 2 and not re.search(r'"|/|\bin', rest):
         large, small = sorted(map(float, sizes), reverse=True)
-        return refused("ring", given, "is not known", f"{large:g}x{small:g}", usual[2])
+        if 0.5 <= small <= min(20.0, 2.0 * large) and not re.search(r"[A-Za-z]\d", rest):
+            return refused("ring", given, "is not known", f"{large:g}x{small:g}", usual[2])
     return refused("ring", given, "is not known", *usual)

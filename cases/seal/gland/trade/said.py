@@ -52,7 +52,7 @@ class SaidKeys(Parameters):
     @classmethod
     def worded(cls, given: dict[str, Any]) -> dict[str, Any]:
         """The values without words of the trade, which are kept in `said`.  ValueError."""
-        values, said, piston = dict(given), [*given.get("said", ())], of_piston(given)
+        values, said, piston = dict(given), texts(given.get("said")), of_piston(given)
         for name in given:
             if name in LENGTHS and isinstance(values[name], str):
                 said += _length(name, values, piston)
@@ -63,6 +63,13 @@ class SaidKeys(Parameters):
         if isinstance(section := values.get("section"), str):
             values["section"] = read_section(section)
         return super().worded({**values, "said": tuple(dict.fromkeys(said))} if said else values)
+
+
+def texts(said: object) -> list[str]:
+    """What was said; anything else than texts is refused with its key."""
+    return (
+        [text for text in said if isinstance(text, str)] if isinstance(said, list | tuple) else []
+    )
 
 
 def of_piston(values: Mapping[str, Any]) -> bool:
@@ -96,7 +103,7 @@ def _hole(name: str, piston: bool) -> bool | None:
 
 def with_limits(values: dict[str, Any]) -> dict[str, Any]:
     """The values with the middles of what has limits.  ValueError."""
-    said = values.get("said", ())
+    said = texts(values.get("said"))
     piston = of_piston(values) or any(text.startswith("bore = ") for text in said)
     for name, value, found in bands(said, piston=piston):
         for key_of in dict.fromkeys((name, LENGTHS[name])):
