@@ -242,7 +242,9 @@ def test_names_of_rings_with_a_leading_zero_and_of_quad_rings() -> None:
 
 
 EXTREME = {
-    ("oil=46 cSt at 40 degC, 6.8 cSt at 100 degC", "temperature=-60"): "viscosity = ",
+    ("oil=46 cSt at 40 degC, 6.8 cSt at 100 degC", "temperature=-60"): "does not flow",
+    ("oil=HLP 32", "temperature=-60"): "would have 2.3e+06 mPa s at -60 degC, where it does not",
+    ("temperature=-35", "material=FKM 75"): "FKM 75 is a glass below about -20 degC",
     ("bore=-1e300",): "bore = -1e+300: input should be greater than 0",
     ("ring=36x4", "rod=36", "inner_diameter=[]"): "inner_diameter = []: input should be a valid",
     ("ring=36x4", "rod=36", "inner_diameter=[1]"): "inner_diameter = [1]: input should be a valid",

@@ -15,7 +15,7 @@ from scipy.constants import zero_Celsius
 from scipy.optimize import brentq
 
 from softehl.cases.seal.gland.given import number, put
-from softehl.cases.seal.gland.records.oil import Oil
+from softehl.cases.seal.gland.records.oil import THICKEST, Oil
 from softehl.cases.seal.gland.tables import rows
 from softehl.cases.seal.gland.trade.oil_names import GRADES, read_oil_name
 
@@ -170,6 +170,11 @@ def _with_grade(values: dict[str, Any], oil: str, heat: Any) -> None:
     at_15 = values.get("oil_density")
     rho = density(heat, at_15 if number(at_15) else DENSITY)
     eta = law(heat) * rho * 1e-12
+    if eta > THICKEST:
+        raise ValueError(
+            f'oil = "{oil}" would have {1e9 * eta:.2g} mPa s at {heat:g} degC, where it does not '
+            f"flow; allowed are up to {1e9 * THICKEST:g} mPa s, at a higher temperature"
+        )
     put(values, "viscosity", eta, f'oil = "{oil}" at {heat:g} degC ({1e9 * eta:.4g} mPa s)')
     if values.get("pressure_viscosity") is None and values.get("roelands") is None:
         values["pressure_viscosity"] = barus(eta)

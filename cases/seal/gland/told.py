@@ -7,14 +7,15 @@ from typing import Any
 
 from softehl.cases.seal.gland.given import shown
 from softehl.cases.seal.gland.grooves import gland
+from softehl.cases.seal.gland.oils import DENSITY
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.rubbers import materials
 from softehl.cases.seal.gland.rubbers.hardness import shore_band
 from softehl.cases.seal.gland.sections.keys import ROUND, dimensions
-from softehl.cases.seal.gland.trade.oil_names import IMPROVED, read_oil_name
+from softehl.cases.seal.gland.trade.oil_names import IMPROVED, POUR, read_oil_name
 from softehl.cases.seal.gland.trade.ring_names import read_ring
-from softehl.cases.seal.gland.trade.rubber_names import RANGES
+from softehl.cases.seal.gland.trade.rubber_names import GLASS, RANGES
 from softehl.cases.seal.gland.trade.said import understood
 
 
@@ -84,11 +85,40 @@ def _unusual(p: Seal) -> Iterator[str]:
             f"bulk_modulus = {p.bulk_modulus:g} MPa is {stiffness:.3g} shear moduli: "
             "rubbers have hundreds to thousands"
         )
+    yield from _cold(p)
     used = RANGES[p.polymer] if p.polymer else None
     if used and p.temperature is not None and not used[0] <= p.temperature <= used[1]:
         yield (
             f"temperature = {p.temperature:g} degC: {p.polymer} is used from {used[0]:g} to "
             f"{used[1]:g} degC"
+        )
+
+
+def _cold(p: Seal) -> Iterator[str]:
+    """A rubber by its hardness and an oil that are colder than what is known of them."""
+    heat = p.temperature
+    if heat is None:
+        return
+    if p.shore_A is not None and heat < 0.0:
+        near = f", the more the nearer to {GLASS[p.polymer]:g} degC" if p.polymer in GLASS else ""
+        yield (
+            f"temperature = {heat:g} degC: the modulus is that of a hardness at room temperature; "
+            f"rubber is stiffer in the cold{near}; give mu at this temperature, or tests (fit)"
+        )
+    if p.oil is None:
+        return
+    name = read_oil_name(p.oil)
+    if name.points and heat < min(0.0, *(at for _, at in name.points)):
+        yield (
+            f"temperature = {heat:g} degC is below both viscosities of the oil: it is "
+            "extrapolated, and below its pour point the oil does not flow (see its data sheet)"
+        )
+    improved = name.index is not None and name.index >= IMPROVED
+    pour = POUR.get((name.grade or 0, improved))
+    if pour is not None and heat < pour:
+        yield (
+            f"temperature = {heat:g} degC: the pour point of {p.oil} may be as high as {pour:g} "
+            "degC (DIN 51524); below its pour point an oil does not flow (see its data sheet)"
         )
 
 
@@ -126,6 +156,8 @@ def _ring(p: Seal, said: frozenset[str]) -> Iterator[str]:
             f"a shear modulus of {p.shear_modulus:.3g} MPa by hardness, known to {low:+.0f} and "
             f"{high:+.0f} %"
         )
+        if p.temperature is not None:
+            yield f"its modulus at room temperature, not at {p.temperature:g} degC"
     elif not said & {"fit", "shore_A", *materials.KEYS}:
         yield f"a rubber of shear modulus {p.shear_modulus:.3g} MPa"
 
@@ -169,5 +201,13 @@ def _fluids(p: Seal, said: frozenset[str]) -> Iterator[str]:
         yield f"a sealed pressure of {p.sealed_pressure:g} MPa"
     if not said & {"viscosity", "oil"}:
         yield f"an oil of {1e9 * p.viscosity:.3g} mPa s"
+    if p.oil is not None and read_oil_name(p.oil).points:
+        words = [] if "oil_density" in said else [f"the density {DENSITY:g} kg/m3 at 15 degC"]
+        if not said & {"pressure_viscosity", "roelands"}:
+            words.append(f"the pressure-viscosity coefficient {p.pressure_viscosity:.3g} 1/MPa")
+        if words:
+            yield f"{' and '.join(words)}, of a mineral oil"
+    elif "viscosity" in said and not said & {"pressure_viscosity", "roelands"}:
+        yield f"a pressure-viscosity coefficient of {p.pressure_viscosity:g} 1/MPa"
     if p.oil and read_oil_name(p.oil).improved:
         yield f"a viscosity index of {IMPROVED:g}, the least that HVLP oils have (DIN 51524-3)"

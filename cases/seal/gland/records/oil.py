@@ -3,6 +3,9 @@
 from softehl.cases.harness.parameters import key
 from softehl.cases.seal.gland.shear_thinning import ThinningKeys
 
+THICKEST = 1e-3
+"""Largest viscosity, MPa s."""
+
 
 class Oil(ThinningKeys):
     """The oil at the temperature of the seal."""
@@ -21,7 +24,7 @@ class Oil(ThinningKeys):
         unit="MPa s",
         bounds='1e-12 to 1e-3; 1e-9 MPa s is 1 mPa s, and "46 mPa s" may be written too',
         ge=1e-12,
-        le=1e-3,
+        le=THICKEST,
     )
     pressure_viscosity: float = key(
         0.02, "coefficient alpha of eta = eta_0 exp(alpha p)", unit="1/MPa", ge=0, le=1

@@ -19,6 +19,15 @@ GRADES = {int(row["grade"]): float(row["at_100_degC_cSt"]) for row in rows("iso_
 Typical of hydraulic oils without viscosity improver, viscosity index 90 to 105.
 """
 
+POUR = {
+    (int(row["grade"]), improved): float(row[column])
+    for row in rows("iso_vg.csv")
+    for improved, column in ((False, "pour_degC"), (True, "pour_improved_degC"))
+    if row[column]
+}
+"""ISO 3448 grade, and whether its oil is improved (HVLP) -> the highest pour point that DIN 51524-2
+or -3 allows, degC. Many oils have a lower one."""
+
 TWO = "46 cSt at 40 degC, 6.8 cSt at 100 degC"
 """Two viscosities, as an example."""
 
@@ -109,7 +118,10 @@ def _unknown(given: str, text: str) -> Exception:
         kind = found["kind"] or found["word"]
         if kind.upper() == "HV":
             return refused("oil", given, "does not say its viscosity index", *forms[2:])
-        why = "does not say its viscosity: take two values from its data sheet"
+        why = (
+            "does not say its viscosity: take two values from its data sheet, with oil_density and "
+            "pressure_viscosity"
+        )
         return refused("oil", given, why, TWO)
     if re.search(r"cSt|mm\^?2/s", text, re.IGNORECASE):
         why = "is not understood (one viscosity says nothing of another temperature)"

@@ -19,6 +19,18 @@ RANGES = {
 }
 """Polymer -> temperatures at which a common chart of makers lets it be used for long, degC."""
 
+GLASS = {
+    row["polymer"]: min(float(row["glass_degC"]), float(row["from_degC"] or row["glass_degC"]))
+    for row in _TABLE
+    if row["glass_degC"]
+}
+"""Polymer -> temperature below which none of its common rubbers is one, degC.
+
+The lowest glass transition of two tables (Encyclopaedia Britannica, "elastomer", table 1; C. A.
+Harper, Handbook of Plastics Technologies, 2006, table 4.2), or the lower end of the range if that
+is lower.
+"""
+
 _SPELT = {
     word: row["polymer"]
     for row in _TABLE
