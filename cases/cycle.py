@@ -20,7 +20,7 @@ from softehl.cases.seal.cycle.motion import Motion, motion_keys
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.surfaces import MIXED
 from softehl.cases.seal.gland.told import assumed, foreword, warnings
-from softehl.cases.seal.report.words import LEFT_OUT, titled
+from softehl.cases.seal.report.words import LEFT_OUT, cautions, titled
 from softehl.cases.seal.states.answer import far, leaks
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_table
@@ -313,6 +313,10 @@ class CycleCase(Case[Cycle, CycleRow]):
             return row
 
         return run_cycles(parameters, parameters.path, observer, log)
+
+    def cautions(self, parameters: Cycle) -> list[str]:
+        """See :class:`Case`."""
+        return cautions(parameters)
 
     def draw(
         self,

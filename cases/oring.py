@@ -12,7 +12,7 @@ from softehl.cases.harness.row import OK, Record
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.told import assumed, foreword, warnings
 from softehl.cases.seal.report import paraview, tables
-from softehl.cases.seal.report.words import LEFT_OUT, titled
+from softehl.cases.seal.report.words import LEFT_OUT, cautions, titled
 from softehl.cases.seal.states import plan
 from softehl.cases.seal.states.answer import answer
 from softehl.cases.seal.states.leakage import net_leakage
@@ -139,6 +139,10 @@ class ORingCase(Case[Seal, FilmRow]):
             return doubts
         words = f"films below {plan.THIN:g} um, where surfaces of {plan.USUAL:g} um rms touch"
         return [*doubts, f"smooth surfaces: {words}: {self.named(thin)}; give their roughness"]
+
+    def cautions(self, parameters: Seal) -> list[str]:
+        """See :class:`Case`."""
+        return cautions(parameters)
 
     def draw(
         self,

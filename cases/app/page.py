@@ -204,8 +204,7 @@ class Page:
 
 def _lines(run: FinishedRun) -> list[str]:
     """The answer of a run, and the reasons for states that are not ok."""
-    answer: list[str] = run.case.answer(run.parameters, run.rows)
-    return [*answer, *run.case.notes(run.rows, advice_of(run.content, run.rows))]
+    return [*run.answer, *run.case.notes(run.rows, advice_of(run.content, run.rows))]
 
 
 _SAVED = "stopped; what it reached is saved"
@@ -223,7 +222,7 @@ def _cells(state: RunState) -> dict[str, str]:
     if state.run is None:
         return cells
     run, p = state.run, state.run.parameters
-    answer = run.case.answer(p, run.rows)
+    answer = run.answer
     return cells | {
         "seal": p.ring or f"{p.named} {p.ring_diameter:g}x{p.section_diameter:g}",
         "rubber": p.compound or f"{p.shear_modulus:.3g} MPa",

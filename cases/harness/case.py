@@ -147,6 +147,10 @@ class Case(Generic[P, R]):
         """
         return []
 
+    def cautions(self, parameters: P) -> list[str]:
+        """What is known of the answers of such a run beside measurements, a line each."""
+        return []
+
     def draw(
         self,
         parameters: P,

@@ -204,6 +204,7 @@ class RunRecord:
             "status": status,
             "message": message,
             "warnings": self.run.case.warnings(self.run.parameters),
+            "assumed": self.run.case.assumed(self.run.parameters, self.run.given),
             "parameters": self.run.parameters.model_dump(),
             "versions": package_versions(),
             **self._size,

@@ -6,14 +6,17 @@ import json
 import re
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from softehl.__main__ import main
+from softehl.cases.harness.report.page import parts_of, read_finished
 from softehl.cases.seal.states.leakage import LeakageRow
 from softehl.cases.seal.states.state import FilmRow
+from softehl.cases.shipped import SHIPPED
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 LARGEST = 5_000_000
@@ -52,6 +55,27 @@ def page(runs: tuple[Path, Path]) -> str:
 )
 def test_a_report_says(page: str, words: str) -> None:
     assert words in page
+
+
+def test_the_answer_says_what_it_rests_on(page: str) -> None:
+    """What was assumed, what is doubtful, and how far off friction may be."""
+    answer = page[page.index("<h2>Answer") :].partition("</section>")[0]
+    for words in ("assumed: ", "a back-up ring", "a measured one by several times", "friction "):
+        assert words in answer, words
+
+
+def test_films_below_the_roughness_are_noted_in_the_answer(runs: tuple[Path, Path]) -> None:
+    run = read_finished(runs[0], SHIPPED)
+    thin = replace(run, rows=[replace(run.rows[0], h_min_um=0.01), *run.rows[1:]])
+    (answer,) = (part for part in parts_of([thin]) if part.title == "Answer")
+    assert any("smooth surfaces: films below" in line for line in answer.lines)
+
+
+def test_a_run_that_goes_on_has_an_answer_so_far(runs: tuple[Path, Path]) -> None:
+    run = read_finished(runs[0], SHIPPED)
+    begun = replace(run, rows=run.rows[:2], content={**run.content, "status": "running"})
+    assert begun.answer[0].startswith("so far, of 2 states: leakage is not known")
+    assert not run.answer[0].startswith("so far")
 
 
 def test_a_report_is_one_file_below_5_mb(page: str) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from softehl.cases.harness.case import Alarm, AnyCase, load_case
 from softehl.cases.harness.curve import CurveFolder
-from softehl.cases.harness.earlier import disbelief, edited_table
+from softehl.cases.harness.earlier import advice_of, disbelief, edited_table
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import keys_of
 from softehl.cases.harness.report.part import FinishedRun, Part, Table
@@ -180,9 +180,24 @@ def _answers(runs: Sequence[FinishedRun]) -> list[Part]:
     lines = [
         type(line)(f"{run.name}: {line.strip()}" if several else line.strip())
         for run in runs
-        for line in run.case.answer(run.parameters, run.rows)
+        for line in _answer(run)
     ]
     return [Part("Answer", lines=lines)] if lines else []
+
+
+def _answer(run: FinishedRun) -> list[str]:
+    """The answer of a run, then what it rests on: notes, warnings, assumptions, measurements."""
+    answer = run.answer
+    if not answer:
+        return []
+    assumed = run.content.get("assumed") or ()
+    return [
+        *answer,
+        *run.case.notes(run.rows, advice_of(run.content, run.rows)),
+        *(run.content.get("warnings") or ()),
+        *([f"assumed: {', '.join(assumed)}"] if assumed else []),
+        *run.case.cautions(run.parameters),
+    ]
 
 
 def left_out(case: AnyCase) -> list[Part]:

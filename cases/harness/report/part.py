@@ -67,3 +67,11 @@ class FinishedRun:
     def name(self) -> str:
         """Name of the run in a report."""
         return self.folder.resolve().name
+
+    @property
+    def answer(self) -> list[str]:
+        """The main results in words; those of a run that goes on are of the rows so far."""
+        lines: list[str] = self.case.answer(self.parameters, self.rows)
+        if lines and self.content.get("status") == "running":
+            lines[0] = type(lines[0])(f"so far, of {len(self.rows)} states: {lines[0].strip()}")
+        return lines

@@ -22,6 +22,16 @@ LEFT_OUT = (
 """A report ends with these."""
 
 
+def cautions(p: Seal) -> list[str]:
+    """What is known of friction beside measurements (docs/validation/measurements.md)."""
+    if not p.round:
+        return []
+    return [
+        "the friction of an O-ring may differ from a measured one by several times: it depends on "
+        "the roughness and on the friction of what touches (docs/validation/measurements.md)"
+    ]
+
+
 def titled(title: str, p: Seal) -> str:
     """The title of a case with the seal of a run: its shape, its size and its rubber."""
     size = f"{p.ring_diameter:g} \N{MULTIPLICATION SIGN} {p.section_diameter:g} mm"
