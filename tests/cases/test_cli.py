@@ -117,7 +117,7 @@ def film_state(parameters: Seal, speed: float, verdict: str = OK) -> FilmState:
     return FilmState(
         **values,
         advice="" if verdict == OK else "Use a finer mesh.",
-        profile=Profile(x, h_star + 50 * x**2, 4 - 4 * x**2, 0.01 * x, h_star * speed + 0 * x),
+        profile=Profile(x, h_star + 50 * x**2, 4 - 4 * x**2, 0.01 * x, h_star * speed + 0 * x, x),
         section=section(),
     )
 
@@ -392,7 +392,7 @@ def test_a_run_writes_its_files(here: Path, invoke: Invoke) -> None:
     assert rows(folder)[0][2:5] == ["2", "nan", "1.6"]
     assert {row[-1] for row in rows(folder)} == {OK}
     profile = (folder / "profile_1_-100.csv").read_text().splitlines()
-    assert profile[0] == "x_mm,h_um,p_MPa,tau_MPa,flux_mm2_s"
+    assert profile[0] == "x_mm,h_um,p_MPa,tau_MPa,flux_mm2_s,tau_rod_MPa"
     assert len(profile) == 6
     assert any("h*" in line and "friction" in line for line in out)
     assert sum("ok" in line for line in out) == 4

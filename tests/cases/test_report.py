@@ -69,7 +69,7 @@ def power_law(exponent: float) -> list[FilmRow]:
 def profile(h_star: float) -> Profile:
     x = np.linspace(-0.9, 1.3, 23)
     p = np.maximum(3.7 - 4.0 * (x - 0.2) ** 2, 0.0)
-    return Profile(x, h_star + 40.0 * (x - 0.2) ** 4, p, 0.01 * x, h_star + 0.0 * x)
+    return Profile(x, h_star + 40.0 * (x - 0.2) ** 4, p, 0.01 * x, h_star + 0.0 * x, 0.01 * x)
 
 
 def square(pressure: float = 3.0) -> Section:

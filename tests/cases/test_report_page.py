@@ -10,11 +10,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from softehl.__main__ import main
 from softehl.cases.harness.report.page import parts_of, read_finished
 from softehl.cases.seal.states.leakage import LeakageRow
+from softehl.cases.seal.states.observer_adapter import read_profile
 from softehl.cases.seal.states.state import FilmRow
 from softehl.cases.shipped import SHIPPED
 
@@ -55,6 +57,19 @@ def page(runs: tuple[Path, Path]) -> str:
 )
 def test_a_report_says(page: str, words: str) -> None:
     assert words in page
+
+
+def test_the_stress_on_the_rod_is_its_friction(runs: tuple[Path, Path]) -> None:
+    """By the trapezoidal rule; that on the seal lacks h p', far from its edges on both sides."""
+    run = read_finished(runs[0], SHIPPED)
+    for row in run.rows:
+        profile = read_profile(run.folder, row)
+        around = np.pi * run.parameters.rod_diameter
+        friction = around * np.trapezoid(profile.tau_rod_MPa, profile.x_mm)
+        assert friction == pytest.approx(row.rod_friction_N, rel=0.01)
+        pushed = np.gradient(profile.p_MPa, profile.x_mm) * profile.h_um * 1e-3
+        difference = np.abs(profile.tau_rod_MPa - profile.tau_MPa - pushed)
+        assert np.median(difference) < 1e-2 * np.abs(profile.tau_rod_MPa).max()
 
 
 def test_the_answer_says_what_it_rests_on(page: str) -> None:

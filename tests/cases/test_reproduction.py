@@ -186,10 +186,12 @@ def write_state(
         "newton_iterations": 3,
     }
     write_csv(folder / "curve.csv", FilmRow.header(), [[*list(values.values())[:-1], verdict]])
-    header = ("x_mm", "h_um", "p_MPa", "tau_MPa", "flux_mm2_s")
+    header = ("x_mm", "h_um", "p_MPa", "tau_MPa", "flux_mm2_s", "tau_rod_MPa")
     name = f"profile_{parameters.sealed_pressure:g}_{speed:g}.csv"
     places = np.linspace(-1.0, 1.0, len(h)).tolist()
-    write_csv(folder / name, header, [[x, t, x, 0.0, 1.0] for x, t in zip(places, h, strict=True)])
+    write_csv(
+        folder / name, header, [[x, t, x, 0.0, 1.0, 0.0] for x, t in zip(places, h, strict=True)]
+    )
     (folder / name.replace("profile", "section")).with_suffix(".vtu").touch()  # a row needs it too
 
 

@@ -317,4 +317,5 @@ def _profile(system: SealSystem, problem: Problem, x: Array) -> Profile:
         p_MPa=at["p"],
         tau_MPa=at["tau"],
         flux_mm2_s=at["flux"],
+        tau_rod_MPa=at["tau_rod"],
     )

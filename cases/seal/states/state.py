@@ -35,13 +35,17 @@ Section = Cells
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """Fields along the film, sealed side first; five arrays of one length (n,)."""
+    """Fields along the film, sealed side first; six arrays of one length (n,).
+
+    tau_MPa: shear stress on the seal. tau_rod_MPa: that on the rod, whose integral is friction.
+    """
 
     x_mm: Array
     h_um: Array
     p_MPa: Array
     tau_MPa: Array
     flux_mm2_s: Array
+    tau_rod_MPa: Array
 
 
 PROFILE_COLUMNS = tuple(field.name for field in fields(Profile))
