@@ -183,7 +183,8 @@ def _ring_fits_the_rod(p: Gland) -> None:
     )
     if p.piston:
         words = (
-            f"bore = {-p.rod_diameter:g} mm is {100 * stretch:.3g} % larger than the ring outside, "
+            f"bore = {-p.rod_diameter:g} mm is {100 * abs(stretch):.3g} % "
+            f"{'larger' if stretch > 0.0 else 'smaller'} than the ring outside, "
             f"{-p.inner_diameter:g} mm"
         )
     raise ValueError(f"{words}; allowed are -10 to 20 %")

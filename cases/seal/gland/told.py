@@ -69,6 +69,14 @@ _NEEDS: Mapping[str, tuple[Callable[[Seal], Any], str]] = {
 """Key -> whether it has an effect, and what it has none without."""
 
 
+ALPHAS = 1e-3, 0.06
+"""Pressure-viscosity coefficients beyond which no fluid is usual, 1/MPa."""
+SWOLLEN = ("EPDM", "IIR", "SBR", "NR")
+"""Polymers that are not resistant to mineral oil."""
+FASTEST = 15_000.0
+"""Largest speed in catalogues of reciprocating seals (filled PTFE), mm/s."""
+
+
 def _unused(p: Seal) -> Iterator[str]:
     """Keys with a value of their own that change nothing: another one is missing."""
     for key, (used, needed) in _NEEDS.items():
@@ -84,6 +92,19 @@ def _unusual(p: Seal) -> Iterator[str]:
         yield (
             f"bulk_modulus = {p.bulk_modulus:g} MPa is {stiffness:.3g} shear moduli: "
             "rubbers have hundreds to thousands"
+        )
+    alpha = p.pressure_viscosity
+    if alpha and not ALPHAS[0] <= alpha <= ALPHAS[1]:
+        yield (
+            f"pressure_viscosity = {alpha:g} 1/MPa: oils have 0.01 to 0.04, water-glycols about "
+            "0.003 (1e-8 1/Pa is 0.01 1/MPa)"
+        )
+    if p.polymer in SWOLLEN and p.oil and read_oil_name(p.oil).grade:
+        yield f"{p.polymer} swells in mineral oil, and its modulus falls; {p.oil} is one"
+    if "speeds" in type(p).model_fields and max(p.speeds) > FASTEST:
+        yield (
+            f"a speed of {max(p.speeds):g} mm/s: reciprocating seals are used to {FASTEST:g} mm/s, "
+            "and the heat of the film is left out"
         )
     yield from _cold(p)
     used = RANGES[p.polymer] if p.polymer else None
@@ -158,6 +179,9 @@ def _ring(p: Seal, said: frozenset[str]) -> Iterator[str]:
         )
         if p.temperature is not None:
             yield f"its modulus at room temperature, not at {p.temperature:g} degC"
+    elif p.energy == "mooney_rivlin" and len(unsaid := {"mu_1", "mu_2"} - said) == 1:
+        (name,) = unsaid
+        yield f"{name} = {getattr(p, name):g} MPa"
     elif not said & {"fit", "shore_A", *materials.KEYS}:
         yield f"a rubber of shear modulus {p.shear_modulus:.3g} MPa"
 

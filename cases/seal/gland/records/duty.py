@@ -13,7 +13,14 @@ Speeds = Annotated[tuple[Speed, ...], Field(min_length=1, strict=False), AfterVa
 class Duty(Parameters):
     """Sealed pressure, speeds and strokes."""
 
-    sealed_pressure: float = key(1.0, "sealed pressure p_s", unit="MPa", ge=0, le=100)
+    sealed_pressure: float = key(
+        1.0,
+        "sealed pressure p_s",
+        unit="MPa",
+        bounds='0 to 100; "160 bar" may be written too',
+        ge=0,
+        le=100,
+    )
     stroke: Literal["out", "in", "both"] = key(
         "both", "direction of the rod", bounds='"out" (to the air side), "in" or "both"'
     )
