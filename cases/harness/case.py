@@ -148,7 +148,7 @@ class Case(Generic[P, R]):
         return []
 
     def cautions(self, parameters: P) -> list[str]:
-        """What is known of the answers of such a run beside measurements, a line each."""
+        """Differences of such a run from measurements, in words, a line each."""
         return []
 
     def draw(

@@ -30,7 +30,7 @@ WAYS = ("grid", "list", "latin_hypercube", "random")
 
 _BARE_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _DASHED = re.compile(r"[-+]?0\d+")
-"""A number that TOML does not read, as in the name of a ring, "-010"."""
+"""A number that TOML does not read, as in the name of a part, "-010"."""
 _FILE = re.compile(r"(\.{0,2}/)?[A-Za-z_][A-Za-z0-9_./-]*\.[A-Za-z]{1,5}")
 _PHRASE = re.compile(
     r"""(?=.*[^\W\d_]|.*[\u00b1\u00d7\u00d8\u2300\#\"]|.*\d ?[+(-])(?!["'])"""

@@ -171,7 +171,7 @@ def _believed(folder: Path, run: Run, content: Mapping[str, Any]) -> tuple[list[
 
 
 def edited_table(folder: Path, content: Mapping[str, Any], ending: str = ".csv") -> str:
-    """What is wrong with the tables of these names beside the curve, empty if nothing is.
+    """Return a fault of the tables of these names beside the curve, empty if there is none.
 
     content: of run.json. A table that is not there is not believed either.
     """

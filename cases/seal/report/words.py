@@ -23,7 +23,7 @@ LEFT_OUT = (
 
 
 def cautions(p: Seal) -> list[str]:
-    """What is known of friction beside measurements (docs/validation/measurements.md)."""
+    """Differences of friction from measurements (docs/validation/measurements.md)."""
     if not p.round:
         return []
     return [

@@ -66,7 +66,7 @@ class SaidKeys(Parameters):
 
 
 def texts(said: object) -> list[str]:
-    """What was said; anything else than texts is refused with its key."""
+    """Return the texts of `said`; anything else is refused with its key."""
     return (
         [text for text in said if isinstance(text, str)] if isinstance(said, list | tuple) else []
     )
