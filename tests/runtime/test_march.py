@@ -230,10 +230,10 @@ def test_a_checkpoint_that_was_edited_is_refused(tmp_path: Path) -> None:
     for name in good:
         edited = good[name].copy()
         edited.flat[-1] += 1
-        np.savez(file, **{**good, name: edited})  # type: ignore[arg-type]
+        np.savez(file, **{**good, name: edited})
         with pytest.raises(StudyError, match="missing or damaged"):
             rod(4).march(dt=0.1, until=0.2, restart=file)
-    np.savez(file, **good)  # type: ignore[arg-type]
+    np.savez(file, **good)
     (step,) = rod(4).march(dt=0.1, until=0.2, restart=file)
     assert step.t == pytest.approx(0.2)
 

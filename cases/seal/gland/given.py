@@ -13,8 +13,9 @@ from pydantic import ValidationError
 
 def number(value: object) -> TypeGuard[float]:
     """True if a value is a finite number; True and False are none."""
-    real = isinstance(value, int | float) and not isinstance(value, bool)
-    return real and abs(value) <= float_info.max
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    return abs(value) <= float_info.max
 
 
 def put(values: dict[str, Any], key: str, value: Any, source: str, within: float = 1e-6) -> None:
