@@ -287,7 +287,8 @@ def test_a_drawn_section_conserves_mass_unless_a_penalty_is_asked_for(tmp_path: 
 def test_a_drawn_u_cup_that_cavitates_between_heel_and_lip(tmp_path: Path) -> None:
     """One contact; the penalty lets in many times the oil that the heel lets pass."""
     cup = shape_of("u_cup", (("height", 3.53), ("heel_height", 3.45)), 50.0).outline
-    places = np.union1d(np.linspace(cup.starts[0], cup.starts[-1], 400)[:-1], cup.starts[:-1])
+    ends = cup.starts[0], cup.starts[-1]
+    places = np.union1d(np.linspace(*ends, 400, endpoint=False), cup.starts[:-1])
     points = "".join(f"{z:.5f},{r:.5f}\n" for z, r in cup.at(places))
     file = tmp_path / "cup.csv"
     file.write_text("z_mm,r_mm\n" + points)
