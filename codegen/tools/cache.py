@@ -28,6 +28,7 @@ from pathlib import Path
 
 from softehl.codegen.tools import location
 from softehl.codegen.tools.location import CacheError, own, root, writable
+from softehl.codegen.tools.model_text import digest_of
 
 try:
     import fcntl
@@ -58,21 +59,28 @@ def content(files: Files) -> str:
 
 
 def recall(key: str) -> dict[str, str] | None:
-    """The files stored under a key; None if there are none or they were damaged."""
+    """The files stored under a key; None if there are none, they were damaged, or one of the files
+    that they depend on is another one now.
+    """
     try:
         derived = root() / "derived"
         if location.fault(derived):
             return None
         stored = json.loads((derived / f"{key}.json").read_text(encoding="utf-8"))
         files: dict[str, str] = stored["files"]
-        return files if stored["content"] == content(files) else None
+        current = all(digest_of(path) == told for path, told in stored["read"].items())
+        return files if current and stored["content"] == content(files) else None
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
 
 
-def remember(key: str, files: Files) -> None:
-    """Store files under a key.  Raises `CacheError`, OSError."""
-    text = json.dumps({"content": content(files), "files": dict(files)})
+def remember(key: str, files: Files, read: Mapping[str, str] | None = None) -> None:
+    """Store files under a key.  Raises `CacheError`, OSError.
+
+    read: SHA-256 of files that they depend on beside what the key says, by path.
+    """
+    stored = {"content": content(files), "files": dict(files), "read": dict(read or {})}
+    text = json.dumps(stored)
     write(own(root() / "derived") / f"{key}.json", text.encode(), mode=0o644)
 
 

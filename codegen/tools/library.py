@@ -3,8 +3,11 @@
 Two keys, so that nothing is derived or compiled twice: what the C was derived from (the text of
 the model file or the graph of a definition, the text of this generator, the version of SymPy), and
 what the library was compiled from (the C, the compiler, its flags, the processor, the ABI).
-A model that reads anything else than Python of its own folder (a table of constants, the time)
-is not seen to change by `folder_of`; `softehl generate` runs it in any case.
+What else a model has read (a table of constants, a module that it imports by a computed name) is
+stored beside the C with its digest. A model that imports a module of another folder which the
+process had imported before is run every time: that module may be older than its file. Nobody sees
+whether a model asks for the time, its environment, or the names in a folder; `softehl generate`
+runs it in any case.
 """
 
 from __future__ import annotations
@@ -63,39 +66,47 @@ def folder_of(
         return _for_derivatives(source, where)
     if not isinstance(source, Path):
         return library(_definitions(source, where)).folder
-    anywhere = _file_key(source)
-    here = _file_key(source, *cells, geometry, "materials" if materials else "")
+    known = model_text.sources(source)
+    anywhere = _file_key(known)
+    here = _file_key(known, *cells, geometry, "materials" if materials else "")
     files = (None if materials else store.recall(anywhere)) or store.recall(here)
     if files is None:
         from softehl.codegen.language.pages import On
         from softehl.codegen.tools import user
 
-        found = user.definitions(source, On(cells, geometry or None, materials))
-        return library(found, here if any(d.cell for d in found) else anywhere).folder
+        on = On(cells, geometry or None, materials)
+        found, inputs = user.definitions_and_inputs(source, on)
+        read = inputs.beyond(source, known)
+        key = None if read is None else here if any(d.cell for d in found) else anywhere
+        return library(found, key, read).folder
     return compiled(files)[0]
 
 
 def _for_derivatives(source: Path | Definition | Page | Law, where: Where) -> Path:
     """Folder of the kernels of what derivatives of results are made of."""
     cells, geometry, materials = where
-    key = None
+    key, read = None, None
     if isinstance(source, Path):
         told = geometry, "materials" if materials else "", "derivatives"
-        key = _file_key(source, *cells, *told)
+        known = model_text.sources(source)
+        key = _file_key(known, *cells, *told)
         files = store.recall(key)
         if files is not None:
             return compiled(files)[0]
         from softehl.codegen.language.pages import On
         from softehl.codegen.tools import user
 
-        found = user.definitions(source, On(cells, geometry or None, materials))
+        on = On(cells, geometry or None, materials)
+        found, inputs = user.definitions_and_inputs(source, on)
+        read = inputs.beyond(source, known)
+        key = None if read is None else key
     else:
         found = _definitions(source, where)
     free = [d for d in found if not d.given]
     if not free:
         names = ", ".join(d.name for d in found)
         raise ModelFileError(f"{names}: gives derivatives of its own, and results have none by it")
-    return library([d.for_derivatives() for d in free], key).folder
+    return library([d.for_derivatives() for d in free], key, read).folder
 
 
 def of_law(name: str, where: Where, *, derivatives: bool = False) -> Path:
@@ -131,17 +142,28 @@ def of_files(paths: Sequence[Path], on: On | None = None) -> tuple[list[Definiti
     from softehl.codegen.tools import user
 
     on = on or NOWHERE
-    keys = [_file_key(p, *on.told()) for p in paths]
-    found = [d for p in paths for d in user.definitions(p, on)]
+    known = [model_text.sources(p) for p in paths]
+    runs = [user.definitions_and_inputs(p, on) for p in paths]
+    found = [d for definitions, _ in runs for d in definitions]
     user.check_names(" ".join(p.name for p in paths), found)
-    return found, library(found, keys[0] if len(keys) == 1 else None)
+    if len(paths) > 1:
+        return found, library(found)
+    read = runs[0][1].beyond(paths[0], known[0])
+    return found, library(found, None if read is None else _file_key(known[0], *on.told()), read)
 
 
-def library(definitions: Sequence[Definition], key: str | None = None) -> Library:
-    """The library of some models; what was derived is remembered under `key` as well."""
+def library(
+    definitions: Sequence[Definition],
+    key: str | None = None,
+    read: Mapping[str, str] | None = None,
+) -> Library:
+    """The library of some models; what was derived is remembered under `key` as well.
+
+    read: as in `cache.remember`.
+    """
     files, derived = derive(definitions)
     if key is not None:
-        store.remember(key, files)
+        store.remember(key, files, read)
     folder, seconds = compiled(files)
     return Library(folder, files, derived, seconds)
 
@@ -199,8 +221,8 @@ def _content_of(folder: Path, files: Mapping[str, str]) -> str | None:
         return None
 
 
-def _file_key(path: Path, *on: str) -> str:
-    return store.digest("file", generator(), model_text.digest(path), *on)
+def _file_key(texts: Mapping[str, str], *on: str) -> str:
+    return store.digest("file", generator(), model_text.digest(texts), *on)
 
 
 _CODEGEN = Path(__file__).parents[1]

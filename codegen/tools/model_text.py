@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 
@@ -40,20 +40,29 @@ def sources(path: Path) -> dict[str, str]:
         name = file.relative_to(path.parent).as_posix()
         if name not in out:
             out[name] = read(file)
-            waiting += _imported(path.parent, file, out[name])
+            names = imported(path.parent, file, out[name])
+            waiting += [p for name in names for p in _files_of(path.parent, name)]
     return dict(sorted(out.items()))
 
 
-def digest(path: Path) -> str:
+def digest(texts: Mapping[str, str]) -> str:
     """SHA-256 of `sources`."""
     total = hashlib.sha256()
-    for name, text in sources(path).items():
+    for name, text in texts.items():
         total.update(f"{name}\0{len(text)}\0{text}".encode())
     return total.hexdigest()
 
 
-def _imported(folder: Path, file: Path, text: str) -> list[Path]:
-    """Files of `folder` that the import statements of `file` may mean."""
+def digest_of(path: str) -> str:
+    """SHA-256 of a file, empty where it cannot be read."""
+    try:
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except OSError:
+        return ""
+
+
+def imported(folder: Path, file: Path, text: str) -> list[str]:
+    """Modules that the import statements of `file` may mean, as seen from `folder`."""
     try:
         tree = ast.parse(text)
     except (SyntaxError, ValueError):
@@ -68,7 +77,7 @@ def _imported(folder: Path, file: Path, text: str) -> list[Path]:
             prefix = ".".join(package.relative_to(folder).parts) + "." if inside else ""
             base = prefix + (node.module or "")
             names += [base, *(f"{base.rstrip('.')}.{a.name}" for a in node.names)]
-    return [p for name in names for p in _files_of(folder, name)]
+    return names
 
 
 def _files_of(folder: Path, name: str) -> Iterator[Path]:

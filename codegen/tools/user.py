@@ -16,7 +16,6 @@ begin with an underscore are left out.
 from __future__ import annotations
 
 import inspect
-import linecache
 import math
 import re
 import sys
@@ -38,6 +37,7 @@ from softehl.codegen.language.material import Law
 from softehl.codegen.language.model import Model
 from softehl.codegen.language.pages import NOWHERE, On, Page
 from softehl.codegen.tools.model_text import ModelFileError, read
+from softehl.codegen.tools.neighbours import Inputs, code_of, imports_from
 
 _RECIPE = (
     "write `def my_model() -> Definition:` that ends in `return m.finish()`, or `@softehl.page` "
@@ -61,20 +61,26 @@ def definitions(path: Path, on: On = NOWHERE) -> list[Definition]:
 
     on: where its pages of fields stand.
     """
-    return [d for d in _found(path, on, by_itself=False) if isinstance(d, Definition)]
+    return definitions_and_inputs(path, on)[0]
+
+
+def definitions_and_inputs(path: Path, on: On = NOWHERE) -> tuple[list[Definition], Inputs]:
+    """As `definitions`, with what the run has read."""
+    found, inputs = _found(path, on, by_itself=False)
+    return [d for d in found if isinstance(d, Definition)], inputs
 
 
 def pages(path: Path, on: On = NOWHERE) -> list[Definition | Law]:
     """The models and the materials of a file, which is run; raises `ModelFileError`."""
-    return _found(path, on, by_itself=True)
+    return _found(path, on, by_itself=True)[0]
 
 
-def _found(path: Path, on: On, *, by_itself: bool) -> list[Definition | Law]:
+def _found(path: Path, on: On, *, by_itself: bool) -> tuple[list[Definition | Law], Inputs]:
     """Models, with materials by themselves or as bodies where there is nothing else."""
     path = path.resolve()
     text = read(path)
-    with _imports_from(path.parent), _errors_of(path):
-        entries = _entries(path, _run(path, text))
+    with imports_from(path.parent) as inputs, _errors_of(path):
+        entries = _entries(path, _run(path, text, inputs))
         laws = [entry for entry in entries if isinstance(entry, Law)]
         others = [entry for entry in entries if not isinstance(entry, Law)]
         if on.materials and not laws:
@@ -92,7 +98,7 @@ def _found(path: Path, on: On, *, by_itself: bool) -> list[Definition | Law]:
     if not found:
         raise ModelFileError(f"{path.name} has no model: {_RECIPE}")
     check_names(path.name, found)
-    return found
+    return found, inputs
 
 
 def written_out(path: Path, seconds: float = math.inf, on: On = NOWHERE) -> dict[str, Definition]:
@@ -141,12 +147,11 @@ def check_names(where: str, found: Iterable[Definition | Law]) -> None:
 # ------------------------------------------------------------------------------------- running it
 
 
-def _run(path: Path, text: str) -> ModuleType:
+def _run(path: Path, text: str, inputs: Inputs) -> ModuleType:
     module = ModuleType(f"softehl_model_{path.stem}")
     module.__file__ = str(path)
-    linecache.checkcache(str(path))
     sys.modules[module.__name__] = module  # dataclasses look there; removed with the neighbours
-    exec(compile(text, str(path), "exec", dont_inherit=True), module.__dict__)
+    exec(code_of(path, text, inputs), module.__dict__)
     return module
 
 
@@ -212,23 +217,6 @@ def _made(entry: Any, on: On) -> list[Definition | Law]:
         what = "a Model that is not finished" if isinstance(made, Model) else type(made).__name__
         raise ModelFileError(f"{where}{label} gives {what}, not a Definition: {_RECIPE}")
     return [made]
-
-
-@contextmanager
-def _imports_from(folder: Path) -> Iterator[None]:
-    """Let a model import its neighbours, as a script may; they are read anew the next time."""
-    before, writing = set(sys.modules), sys.dont_write_bytecode
-    sys.path.insert(0, str(folder))
-    sys.dont_write_bytecode = True
-    try:
-        yield
-    finally:
-        sys.path.remove(str(folder))
-        sys.dont_write_bytecode = writing
-        for name in set(sys.modules) - before:
-            file = getattr(sys.modules[name], "__file__", None)
-            if file is not None and Path(file).is_relative_to(folder):
-                del sys.modules[name]
 
 
 @contextmanager

@@ -173,12 +173,12 @@ def test_sources_are_the_file_and_what_it_imports_from_its_folder() -> None:
     expected = ["a.py", "b.py", "c.py", "late.py"]
     expected += ["pack/__init__.py", "pack/beside.py", "pack/inner.py"]
     assert list(model_text.sources(Path("a.py"))) == expected
-    before = model_text.digest(Path("a.py"))
+    before = model_text.sources(Path("a.py"))
     model_file("y = 2\n", "pack/beside.py")
-    assert model_text.digest(Path("a.py")) != before
+    assert model_text.sources(Path("a.py")) != before
     model_file("y = 1\n", "pack/beside.py")
     model_file("z = 1\n", "unrelated.py")
-    assert model_text.digest(Path("a.py")) == before
+    assert model_text.sources(Path("a.py")) == before
 
 
 # ------------------------------------------------------------------------------- the command line
