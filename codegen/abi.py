@@ -97,6 +97,8 @@ from __future__ import annotations
 
 from enum import StrEnum
 
+from softehl.errors import SoftehlError
+
 
 class Task(StrEnum):
     """Task of a kernel of a family."""
@@ -118,7 +120,7 @@ ROLLED = (*AT_POINTS, Task.PSEUDO_LOAD)
 """Tasks whose loop over the points is never written out: they are called once a state."""
 
 
-class TargetError(ValueError):
+class TargetError(SoftehlError, ValueError):
     """The page has something that the target cannot hold; the message names it."""
 
 

@@ -20,6 +20,7 @@ from typing import Any
 
 import cffi
 
+from softehl.errors import SoftehlError
 from softehl.runtime import tuning
 from softehl.runtime.arrays import Array
 
@@ -48,7 +49,7 @@ Action = Callable[[tuple[int, int], Array, Array, Any, Array, Array], None]
 """Elements (first, last), parameters, what was kept, node numbers, x, and y, which it adds to."""
 
 
-class KernelError(RuntimeError):
+class KernelError(SoftehlError, RuntimeError):
     """A kernel cannot be used; the message says what to do."""
 
 

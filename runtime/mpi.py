@@ -14,8 +14,10 @@ from functools import cache
 from types import TracebackType
 from typing import Any, TextIO
 
+from softehl.errors import SoftehlError
 
-class MissingPetsc(ValueError):  # noqa: N818 (named after what it is)
+
+class MissingPetsc(SoftehlError, ValueError):  # noqa: N818 (named after what it is)
     """PETSc is not installed; the message says what to do."""
 
 

@@ -14,6 +14,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from softehl.errors import SoftehlError
+
 _PACKAGES = Path(__file__).parents[2]
 """The folder in which `import softehl` finds it."""
 _BUILD = ("-P", "-m", "softehl.codegen.tools.build")
@@ -21,7 +23,7 @@ _NO_COMPILER = 3
 _SOON, _PATIENCE = 1.0, 900.0
 
 
-class NotTunedError(RuntimeError):
+class NotTunedError(SoftehlError, RuntimeError):
     """There is no tuned library.  expected: there is no compiler, or none is wanted."""
 
     def __init__(self, reason: str, expected: bool = False) -> None:

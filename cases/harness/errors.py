@@ -2,8 +2,10 @@
 
 import click
 
+from softehl.errors import SoftehlError
 
-class BadInput(click.ClickException):
+
+class BadInput(SoftehlError, click.ClickException):  # noqa: N818 (named after what it is)
     """Input that cannot be used; the message is one line.  Exit code 2."""
 
     exit_code = 2

@@ -5,11 +5,12 @@ from __future__ import annotations
 from fractions import Fraction
 
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, Routine
+from softehl.errors import SoftehlError
 
 Partials = list[tuple[Node, Node]]
 
 
-class DifferentiationError(ValueError):
+class DifferentiationError(SoftehlError, ValueError):
     """The model asks for a derivative that has no meaning in a kernel."""
 
 

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 from softehl.codegen.graph.graph import BOOLEAN, ELEMENTARY, Input, Node, Op, Place, Routine
 from softehl.codegen.graph.traverse import reachable
+from softehl.errors import SoftehlError
 
 ARITY: dict[Op, int] = {
     **dict.fromkeys((Op.CONST, Op.PI, Op.INPUT), 0),
@@ -32,7 +33,7 @@ PAYLOAD: dict[Op, type] = {
 }
 
 
-class IllegalGraphError(ValueError):
+class IllegalGraphError(SoftehlError, ValueError):
     """A node breaks the specification; the message shows it."""
 
 

@@ -7,8 +7,10 @@ import warnings
 from pathlib import Path
 from types import FrameType
 
+from softehl.errors import SoftehlError
 
-class ModelError(ValueError):
+
+class ModelError(SoftehlError, ValueError):
     """The model says something a kernel cannot hold; the message names it and the page's line.
 
     `where` is the file and line; left out, it is found among the callers: the first one that is

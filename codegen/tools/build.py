@@ -27,6 +27,7 @@ from time import perf_counter
 from softehl.codegen.abi import VERSION
 from softehl.codegen.emit import support
 from softehl.codegen.tools import cache
+from softehl.errors import SoftehlError
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 COMMON = (
@@ -56,7 +57,7 @@ LIBRARY = "kernels" + (sysconfig.get_config_var("SHLIB_SUFFIX") or ".so")
 DIGEST = f"{LIBRARY}.sha256"
 
 
-class BuildError(RuntimeError):
+class BuildError(SoftehlError, RuntimeError):
     """The compiler failed; the message holds what is wrong, its command line and its words."""
 
 

@@ -16,10 +16,12 @@ import warnings
 from functools import cache
 from pathlib import Path
 
+from softehl.errors import SoftehlError
+
 _REMEDY = "set SOFTEHL_CACHE to a folder of yours that can be written"
 
 
-class CacheError(RuntimeError):
+class CacheError(SoftehlError, RuntimeError):
     """The cache cannot be used; the message is one line with a remedy."""
 
 

@@ -7,8 +7,10 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from softehl.errors import SoftehlError
 
-class ModelFileError(ValueError):
+
+class ModelFileError(SoftehlError, ValueError):
     """A model file cannot be used; the message names the file, the line and the remedy."""
 
 

@@ -25,6 +25,7 @@ from softehl.codegen.language.elements.cells import ELEMENTS
 from softehl.codegen.tools.digits import Doubles
 from softehl.codegen.tools.exact import Evaluator
 from softehl.codegen.tools.written import program
+from softehl.errors import SoftehlError
 
 ATTEMPTS = 40
 DIGITS = 30
@@ -50,7 +51,7 @@ def unit_cell(d: Definition) -> tuple[tuple[float, ...], ...] | None:
     return CELLS.get((d.nodes, width))
 
 
-class NoStateError(ValueError):
+class NoStateError(SoftehlError, ValueError):
     """No admissible state of a model was found; the message says what the model must give."""
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.kernels import Kernel
 from softehl.runtime.mesh.cells import CELLS, Cell, jacobians
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 _CELLS = {(cell.dimension, len(cell.nodes)): cell for cell in CELLS.values()}
 
 
-class ProblemError(ValueError):
+class ProblemError(SoftehlError, ValueError):
     """A problem cannot be posed; the message names what was given and what is allowed."""
 
 

@@ -16,6 +16,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.fem.assembly import ElementBlock
 from softehl.runtime.kernels import Kernel
@@ -29,7 +30,7 @@ _LINE = 8  # numbers in a line of the cache
 _CHUNK = 512  # groups whose points are evaluated at once
 
 
-class NoProductError(ValueError):
+class NoProductError(SoftehlError, ValueError):
     """A block has no product by sum factorisation; the message says why."""
 
 

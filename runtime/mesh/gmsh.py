@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.faces import firsts
@@ -33,7 +34,7 @@ Group = tuple[int, int]
 """Dimension and number of a physical group."""
 
 
-class GmshError(ValueError):
+class GmshError(SoftehlError, ValueError):
     """Error about a file."""
 
 

@@ -17,7 +17,8 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.errors import SoftehlError
+from softehl.runtime.arrays import Array, Flags, Integers, frozen
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.faces import as_known, matched, once
 from softehl.runtime.mesh.piece import Piece
@@ -33,7 +34,7 @@ Predicate = Callable[[Array], Flags]
 _NEAR = 1e-9  # of the size of a mesh: places closer than that are the same
 
 
-class MeshError(ValueError):
+class MeshError(SoftehlError, ValueError):
     """A mesh, or a name in it, cannot be used; the message says what is there."""
 
 

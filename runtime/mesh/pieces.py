@@ -10,6 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array
 
 Point: TypeAlias = tuple[float, float]
@@ -17,7 +18,7 @@ Point: TypeAlias = tuple[float, float]
 _STRAIGHT, _BACK = radians(0.5), radians(179.9)  # turns at which a fillet is none, or impossible
 
 
-class OutlineError(ValueError):
+class OutlineError(SoftehlError, ValueError):
     """An outline that bounds no section: what is wrong, and where."""
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias
 
+from softehl.errors import SoftehlError
 from softehl.runtime.mpi import MissingPetsc
 from softehl.runtime.solve import mumps, pardiso
 from softehl.runtime.solve.linear import Condenser
@@ -14,7 +15,7 @@ from softehl.runtime.solve.superlu import SuperLU
 Backend: TypeAlias = Literal["auto", "superlu", "pardiso", "petsc"]
 
 
-class MissingBackend(ValueError):  # noqa: N818 (named after what it is)
+class MissingBackend(SoftehlError, ValueError):  # noqa: N818 (named after what it is)
     """The linear solver that was asked for is not installed; the message says what to do."""
 
 

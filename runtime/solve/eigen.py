@@ -14,6 +14,7 @@ from scipy.linalg import eigh_tridiagonal
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse import linalg as sparse_linalg
 
+from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.solve.linear import SingularMatrix
 from softehl.runtime.solve.ordering import without_zeros
@@ -27,7 +28,7 @@ _RESIDUAL = 1e-6
 """Of a solution by pivots on the diagonal: beyond, their signs are not those of the matrix."""
 
 
-class NoModes(ArithmeticError):  # noqa: N818 (named after what it is)
+class NoModes(SoftehlError, ArithmeticError):  # noqa: N818 (named after what it is)
     """There are no such eigenvalues; the message says why."""
 
 

@@ -12,6 +12,7 @@ from typing import Any, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 from scipy.sparse import csc_array, csc_matrix
 
+from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Integers
 
 SparseMatrix: TypeAlias = "csc_array[np.float64] | csc_matrix[np.float64]"
@@ -22,7 +23,7 @@ _UNLIKE = 1e-2
 compared in units that have nothing to do with each other. It is SuperLU's threshold of a pivot."""
 
 
-class SingularMatrix(ArithmeticError):  # noqa: N818 (named after what it is)
+class SingularMatrix(SoftehlError, ArithmeticError):  # noqa: N818 (named after what it is)
     """The matrix has no usable factors; Newton turns it into Status.SINGULAR.
 
     row: a row of zeros, if there is one.

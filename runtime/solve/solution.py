@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array
 
 
@@ -70,7 +71,7 @@ _ADVICE = {
 }
 
 
-class NotConverged(RuntimeError):  # noqa: N818 (named after what it is)
+class NotConverged(SoftehlError, RuntimeError):  # noqa: N818 (named after what it is)
     """Raised for the outermost caller only; `result` is the Solution or Branch that failed.
 
     reached: the last state that was reached, where there is one (a study's Result).

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.errors import SoftehlError
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.fem.unknowns import Slot
 from softehl.runtime.kernels import Kernel, Rule
@@ -22,7 +23,7 @@ Datum: TypeAlias = float | Array | Callable[[Array], Array]
 """Data of elements: one number, (n,) numbers, or a function of their centres (n, dim)."""
 
 
-class StudyError(ValueError):
+class StudyError(SoftehlError, ValueError):
     """A request that a study cannot meet; the message says what was given and what is allowed."""
 
 

@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from softehl.errors import SoftehlError
+
 if TYPE_CHECKING:
     from softehl.__main__ import main
     from softehl.cases.harness.processes import processes
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from softehl.cases.seal.states.state import FilmState, Observer, Outcome, Silent
     from softehl.cases.shipped import solve_cases
     from softehl.codegen.language import kinematics
+    from softehl.codegen.language.complaints import ModelError
     from softehl.codegen.language.definition import Definition
     from softehl.codegen.language.elements import quadrature, shapes
     from softehl.codegen.language.elements.cells import element
@@ -30,14 +33,16 @@ if TYPE_CHECKING:
     from softehl.runtime.fem.checks import ProblemError
     from softehl.runtime.fem.dofs import DofLayout
     from softehl.runtime.fem.problem import Problem
-    from softehl.runtime.kernels import Kernel
-    from softehl.runtime.mesh.mesh import Mesh
+    from softehl.runtime.kernels import Kernel, KernelError
+    from softehl.runtime.mesh.mesh import Mesh, MeshError
+    from softehl.runtime.result import Result
     from softehl.runtime.solve.arclength import Arclength
     from softehl.runtime.solve.homotopy import Continuation
     from softehl.runtime.solve.ladder import Ladder
     from softehl.runtime.solve.newton import Newton
-    from softehl.runtime.solve.solution import Branch, Solution, Status
+    from softehl.runtime.solve.solution import Branch, NotConverged, Solution, Status
     from softehl.runtime.solve.steps import StepRule
+    from softehl.runtime.statement.records import StudyError
     from softehl.runtime.study import Study
 
 __version__ = "0.2.0"
@@ -52,20 +57,25 @@ _PUBLIC = {
     "ElementBlock": "softehl.runtime.fem.assembly",
     "FilmState": "softehl.cases.seal.states.state",
     "Kernel": "softehl.runtime.kernels",
+    "KernelError": "softehl.runtime.library",
     "Ladder": "softehl.runtime.solve.ladder",
     "Mesh": "softehl.runtime.mesh.mesh",
+    "MeshError": "softehl.runtime.mesh.mesh",
     "Newton": "softehl.runtime.solve.newton",
+    "NotConverged": "softehl.runtime.solve.solution",
     "ORing": "softehl.cases.seal.gland.parameters",
     "Observer": "softehl.cases.seal.states.state",
     "Outcome": "softehl.cases.seal.states.state",
     "Problem": "softehl.runtime.fem.problem",
     "ProblemError": "softehl.runtime.fem.checks",
+    "Result": "softehl.runtime.result",
     "Seal": "softehl.cases.seal.gland.parameters",
     "Silent": "softehl.cases.seal.states.state",
     "Solution": "softehl.runtime.solve.solution",
     "Status": "softehl.runtime.solve.solution",
     "StepRule": "softehl.runtime.solve.steps",
     "Study": "softehl.runtime.study",
+    "StudyError": "softehl.runtime.statement.records",
     "main": "softehl.__main__",
     "processes": "softehl.cases.harness.processes",
     "run_oring": "softehl.cases.oring",
@@ -74,6 +84,7 @@ _PUBLIC = {
 _MODELLING = {
     "Definition": "softehl.codegen.language.definition",
     "Model": "softehl.codegen.language.model",
+    "ModelError": "softehl.codegen.language.complaints",
     "element": "softehl.codegen.language.elements.cells",
     "kinematics": "softehl.codegen.language.kinematics:",
     "material": "softehl.codegen.language.material",
@@ -94,21 +105,28 @@ __all__ = [
     "ElementBlock",
     "FilmState",
     "Kernel",
+    "KernelError",
     "Ladder",
     "Mesh",
+    "MeshError",
     "Model",
+    "ModelError",
     "Newton",
+    "NotConverged",
     "ORing",
     "Observer",
     "Outcome",
     "Problem",
     "ProblemError",
+    "Result",
     "Seal",
     "Silent",
+    "SoftehlError",
     "Solution",
     "Status",
     "StepRule",
     "Study",
+    "StudyError",
     "element",
     "kinematics",
     "load_kernel",
@@ -140,7 +158,7 @@ def __dir__() -> list[str]:
     return [*globals(), *_PUBLIC, *_MODELLING]
 
 
-class SymPyNeededError(ModuleNotFoundError):
+class SymPyNeededError(SoftehlError, ModuleNotFoundError):
     """Kernels can be derived only where SymPy and mpmath are installed."""
 
 

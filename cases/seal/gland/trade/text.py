@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import unicodedata
 
+from softehl.errors import SoftehlError
+
 _SIGNS = str.maketrans(
     {"\u00d7": "x", "\u2715": "x", "\u03bc": "u"}
     | dict.fromkeys("\u2300\u2205\u00d8\u00f8\u03a6\u03c6\u00ae\u2122", " ")
@@ -24,7 +26,7 @@ def form(pattern: str) -> re.Pattern[str]:
     return re.compile(pattern, re.IGNORECASE)
 
 
-class NotUnderstoodError(ValueError):
+class NotUnderstoodError(SoftehlError, ValueError):
     """A name of the trade that is not understood; its text says what to write."""
 
 
