@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, read_only
 from softehl.runtime.begin import Beginning
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.held import require_held
@@ -45,4 +45,4 @@ def linear_buckling(system: System, start: Beginning, count: int, newton: Newton
     point = Point(t, solution)
     state = Result(system, problem, point, histories)
     factors, modes = buckled(system, problem_at, point, count, newton)
-    return Buckling(factors, tuple(Shape.of(state, mode) for mode in modes))
+    return Buckling(read_only(factors), tuple(Shape.of(state, mode) for mode in modes))

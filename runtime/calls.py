@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, frozen
 from softehl.runtime.library import KernelError, Library
 
 
@@ -37,9 +37,9 @@ class Rule:
     basis: Array | None = None
 
     def __post_init__(self) -> None:
-        for array in (self.points, self.weights, self.basis):
-            if array is not None:
-                array.setflags(write=False)
+        for name in ("points", "weights", "basis"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(np.asarray(getattr(self, name))))
 
     @cached_property
     def table(self) -> Array:

@@ -44,7 +44,12 @@ class Kernel(Family):
     """One kernel family, compiled; see `Family` for the arrays.
 
     Calls also take, by name, what the family needs: data, point_data, parameters, rule.
+    A kernel is pickled by its key, the folder of its library: another process loads that.
     """
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For `copy` and `pickle`."""
+        return _reloaded, (self.name, _place(self.library), self.signature)
 
     def call(self, task: str, coordinates: Array, dofs: Array, **given: Any) -> Call:
         """A checked call of a task, which may be made again with other unknowns."""
@@ -112,6 +117,23 @@ def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
         return _kernel(name, entries[name], library)
     except (KeyError, TypeError, ValueError):
         raise damaged_manifest(directory) from None
+
+
+def _place(library: Library) -> Path | None:
+    """Folder of a library; None for the kernels that ship, which each installation has."""
+    return None if library.directory == GENERATED else library.directory
+
+
+def _reloaded(name: str, directory: Path | None, signature: str) -> Kernel:
+    """The kernel of that name and signature.  Raises `KernelError` where it is not there."""
+    place = GENERATED if directory is None else directory
+    remedy = "run the script that made it again on this machine"
+    if not (place / "manifest.json").exists():
+        raise MissingKernelsError(f"the kernel {name} is not in {place}: {remedy}")
+    kernel = load_kernel(name, place)
+    if kernel.signature != signature:
+        raise StaleKernelsError(f"the kernel {name} in {place} is another one now: {remedy}")
+    return kernel
 
 
 def _kernel(name: str, entry: Mapping[str, Any], library: Library) -> Kernel:

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.arrays import Array, Integers, read_only
 from softehl.runtime.between import at_every_node, between_nodes, shares
 from softehl.runtime.derivatives.asked import By, inputs
 from softehl.runtime.derivatives.inputs import Input, Key
@@ -51,6 +51,19 @@ class Result:
     histories: Mapping[str, Array] = field(default_factory=dict)
     trail: Trail | None = field(default=None, repr=False)
 
+    def __post_init__(self) -> None:
+        """Histories that cannot be written to."""
+        histories = {name: read_only(values) for name, values in self.histories.items()}
+        object.__setattr__(self, "histories", histories)
+
+    def __copy__(self) -> Self:
+        """Itself, as nothing of it changes."""
+        return self
+
+    def __deepcopy__(self, memo: object) -> Self:
+        """Itself, as nothing of it changes."""
+        return self
+
     @property
     def t(self) -> float:
         """The load factor, or the time."""
@@ -59,7 +72,7 @@ class Result:
     @cached_property
     def x(self) -> Array:
         """All unknowns, (n,)."""
-        return self.system.share.whole(self.point.solution.x)
+        return read_only(self.system.share.whole(self.point.solution.x))
 
     @property
     def state(self) -> dict[str, Array]:
@@ -227,7 +240,7 @@ class Result:
         """
         x = self.point.solution.x
         squares, found = natural(self.system, self.problem, x, count, mass)
-        return Modes(squares, tuple(Shape.of(self, mode) for mode in found))
+        return Modes(read_only(squares), tuple(Shape.of(self, mode) for mode in found))
 
     def sensitivity(
         self,

@@ -71,6 +71,24 @@ class Study(Paths, Fitted):
         geometry_of(self.mesh, self.geometry)
         self._statement = Statement(self.mesh, self._ring)
 
+    def __setattr__(self, name: str, value: object) -> None:
+        """Raises AttributeError for what a study is of."""
+        if name in ("mesh", "geometry") and name in vars(self):
+            raise AttributeError(
+                f"{name} of a study cannot be changed: make another one, Study(mesh, geometry)"
+            )
+        super().__setattr__(name, value)
+
+    def __copy__(self) -> Study:
+        """A study with the same statements so far, on the same mesh."""
+        other = object.__new__(type(self))
+        vars(other).update({**vars(self), "_statement": self._statement.copied()})
+        return other
+
+    def __deepcopy__(self, memo: object) -> Study:
+        """As a copy: what was written down does not change."""
+        return self.__copy__()
+
     # the problem --------------------------------------------------------------------------------
 
     def add(

@@ -7,7 +7,6 @@ factor of it, which is 1.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeAlias
 
@@ -264,10 +263,7 @@ class Places:
 
 def varied(statement: Statement, changes: Sequence[tuple[Input, Array]]) -> Statement:
     """A copy of a statement with other values of inputs."""
-    changed = copy(statement)
-    for name, value in vars(statement).items():
-        if isinstance(value, dict | list):
-            setattr(changed, name, copy(value))
+    changed = statement.copied()
     for item, value in changes:
         item.put(changed, value)
     return changed

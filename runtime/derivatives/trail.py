@@ -47,6 +47,10 @@ class Trail:
     linear: LinearSolver | None = None
     memo: dict[str, Any] = field(default_factory=dict, repr=False)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """For `copy` and `pickle`: this step alone, without what only saves time."""
+        return {**vars(self), "before": None, "kept": None, "linear": None, "memo": {}}
+
     @property
     def problem(self) -> Problem:
         """Its equations, with a matrix."""
@@ -83,7 +87,8 @@ class Trail:
         if not _at_rest(steps[-1]):
             raise StudyError(
                 "the result depends on the steps before it, which were not recorded: give "
-                "record=True to solve or march, and to what it began with"
+                "record=True to solve or march, and to what it began with; copies and pickles of "
+                "results are without them"
             )
         return steps[::-1]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.sparse import csc_array
@@ -29,6 +29,13 @@ class Processes(Share):
     """See `Share`: what a process of several has."""
 
     team: Team
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Raises StudyError."""
+        raise StudyError(
+            "results of several processes are not pickled: write(...) them, or pickle what "
+            "gathered(...) gives"
+        )
 
     @property
     def first(self) -> bool:  # type: ignore[override]

@@ -114,6 +114,10 @@ class ElementBlock:
         default_factory=dict, init=False, repr=False, compare=False
     )
 
+    def __getstate__(self) -> dict[str, Any]:
+        """For `copy` and `pickle`: without its latest calls."""
+        return {**vars(self), "calls": {}}
+
     def residual(self, x: Array, parameters: Array) -> Array:
         """Element residuals (n, ndof) at the global vector x."""
         again, dofs = self._again("residual", parameters), self._gathered(x)
@@ -249,6 +253,10 @@ class Assembler:
     blocks: tuple[ElementBlock, ...]
     structure: Structure
     memo: Memo = field(default_factory=Memo)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For `copy` and `pickle`: without what only saves time."""
+        return {**vars(self), "memo": Memo()}
 
     @classmethod
     def build(cls, size: int, blocks: Sequence[ElementBlock]) -> Assembler:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
+from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -18,7 +19,7 @@ from softehl.runtime.fit.in_jax import Operation
 from softehl.runtime.fit.measured import Data, Measured
 from softehl.runtime.fit.scale import Bounds
 from softehl.runtime.fit.squares import Fit, LeastSquares
-from softehl.runtime.fit.trials import Objective, Run, Trials
+from softehl.runtime.fit.trials import Objective, Trials
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.result import Result
 from softehl.runtime.stability import Unstable
@@ -72,7 +73,7 @@ class Fitted:
         `march` where there is a `dt`.
         """
         items = asked.inputs(self._statement, by)
-        return Objective(Trials(items, _runner(self, path)), quantity(what, at, reaction))
+        return Objective(Trials(items, _Runner(self, path)), quantity(what, at, reaction))
 
     def in_jax(self: Solvable, *, by: By, **path: Any) -> Operation:
         """All unknowns as a function of inputs (k,), for JAX: `solve = study.in_jax(by=...)`.
@@ -80,7 +81,7 @@ class Fitted:
         by: as in `Result.sensitivity`; inputs stand one after the other, `solve.start` has their
         values. path: arguments of `solve`, or of `march` where there is a `dt`.
         """
-        return Operation(Trials(asked.inputs(self._statement, by), _runner(self, path)))
+        return Operation(Trials(asked.inputs(self._statement, by), _Runner(self, path)))
 
     def fit(
         self: Solvable,
@@ -110,28 +111,31 @@ class Fitted:
             times = path["dt"] * np.arange(1, round(until / path["dt"]) + 1)
         data = Data.read(measured, times)
         scales = None if sigma is None else np.broadcast_to(sigma, data.numbers.shape).copy()
-        trials = Trials(asked.inputs(self._statement, by), _runner(self, path))
+        trials = Trials(asked.inputs(self._statement, by), _Runner(self, path))
         return LeastSquares(trials, data, scales).fit(bounds, most)
 
 
 def _changed(study: S, changes: Sequence[tuple[Input, Array]]) -> S:
     """A copy of a study with other values of inputs."""
     statement, other = varied(study._statement, changes), copy(study)
-    other.mesh, other._statement = statement.mesh, statement
+    vars(other).update(mesh=statement.mesh, _statement=statement)
     return other
 
 
-def _runner(study: Solvable, path: Mapping[str, Any]) -> Run:
-    """Results of all steps with other values of inputs."""
+@dataclass(frozen=True, eq=False)
+class _Runner:
+    """Solves a study with other values of inputs; path: arguments of its path."""
 
-    def run(changes: Sequence[tuple[Input, Array]]) -> list[Result]:
-        other, found = _changed(study, changes), list[Result]()
-        given = {"progress": False, "record": True, **path}
+    study: Solvable
+    path: Mapping[str, Any]
+
+    def __call__(self, changes: Sequence[tuple[Input, Array]]) -> list[Result]:
+        """Results of all steps."""
+        other, found = _changed(self.study, changes), list[Result]()
+        given = {"progress": False, "record": True, **self.path}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Unstable)  # of values on the way
-            if "dt" in path:
+            if "dt" in self.path:
                 return list(other.march(**given))
             other.solve(on_step=found.append, **given)
         return found
-
-    return run

@@ -13,9 +13,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Literal, TypeAlias
+from types import MappingProxyType
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Flags, Integers, frozen
@@ -47,6 +49,7 @@ class Mesh:
     gives them from outside counterclockwise. numbers: (n,) nodes with the same number are at one
     place of which every cell has its own copy; None: there are no copies. piece: of a mesh that is
     in parts under mpirun, of which this is that of this process; None: it is the whole.
+    All arrays are copied where others can write to them, and are read-only.
     """
 
     points: Array
@@ -60,8 +63,7 @@ class Mesh:
         """Raises MeshError for an unknown kind of cell or a wrong number of nodes."""
         if not isinstance(self.cells, Mapping):
             raise MeshError('cells are given by their kinds, {"quad4": nodes}')
-        object.__setattr__(self, "points", np.asarray(self.points))
-        object.__setattr__(self, "cells", {k: np.asarray(n) for k, n in self.cells.items()})
+        self._own_arrays()
         if self.points.ndim != 2 or self.points.dtype.kind not in "fiu":
             given = f"{self.points.dtype} of shape {self.points.shape}"
             raise MeshError(f"points are {given}, must be real numbers of shape (n, dim)")
@@ -81,6 +83,39 @@ class Mesh:
                     f"{name}: node numbers from {nodes.min()} to {nodes.max()}, must be from 0 to "
                     f"{len(self.points) - 1}"
                 )
+        numbers, shape = self.numbers, self.points.shape[:1]
+        if numbers is not None and (numbers.dtype.kind not in "iu" or numbers.shape != shape):
+            wrong = f"{numbers.dtype} of shape {numbers.shape}"
+            raise MeshError(f"numbers of nodes are {wrong}, must be integers of shape {shape}")
+
+    def _own_arrays(self) -> None:
+        """Copies of all arrays that can be written to by others; read-only, as are the mappings."""
+        groups = {name: _owned(group, f"group {name!r}: ") for name, group in self.groups.items()}
+        sides = {name: _owned(side, f"side {name!r}: ") for name, side in self.sides.items()}
+        own = {
+            "points": _frozen("points", self.points),
+            "cells": _owned(self.cells, ""),
+            "groups": MappingProxyType(groups),
+            "sides": MappingProxyType(sides),
+        }
+        if self.numbers is not None:
+            own["numbers"] = _frozen("numbers of nodes", self.numbers)
+        for name, value in own.items():
+            object.__setattr__(self, name, value)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For `pickle`."""
+        self.require_whole("pickle")
+        groups, sides = ({n: dict(v) for n, v in m.items()} for m in (self.groups, self.sides))
+        return Mesh, (self.points, dict(self.cells), groups, sides, self.numbers)
+
+    def __copy__(self) -> Mesh:
+        """Itself, as nothing of it changes."""
+        return self
+
+    def __deepcopy__(self, memo: object) -> Mesh:
+        """Itself, as nothing of it changes."""
+        return self
 
     # making one ---------------------------------------------------------------------------------
 
@@ -237,10 +272,10 @@ class Mesh:
             k: once(np.concatenate(parts), CELLS[k].corners, self.numbers)
             for k, parts in found.items()
         }
-        if self.piece is None:
-            return faces
-        cuts = self.piece.cuts
-        return {k: f[matched(f, cuts[k], CELLS[k].corners) < 0] for k, f in faces.items()}
+        if self.piece is not None:
+            cuts = self.piece.cuts
+            faces = {k: f[matched(f, cuts[k], CELLS[k].corners) < 0] for k, f in faces.items()}
+        return _owned(faces, "")
 
     def faces(self, where: str | Predicate) -> Faces:
         """Faces of a named side, or those of the boundary all of whose nodes are meant.
@@ -348,6 +383,8 @@ class Mesh:
 
     def _placed(self, given: Array) -> Array:
         """A place as an array, which may be given as a tuple.  Raises MeshError."""
+        if isinstance(given, np.ma.MaskedArray) or np.asarray(given).dtype == np.bool_:
+            raise MeshError(f"a place has {self.dimension} numbers, given {given!r}")
         place = np.asarray(given, dtype=np.float64)
         if place.shape != (self.dimension,) or not np.isfinite(place).all():
             raise MeshError(f"a place has {self.dimension} coordinates, given {place.tolist()}")
@@ -369,6 +406,18 @@ class Mesh:
         if not there:
             raise MeshError(f"side {name!r}: no face of the boundary has all its nodes there")
         return there
+
+
+def _frozen(name: str, given: Any) -> NDArray[Any]:
+    """An array of numbers that nobody can write to.  Raises MeshError."""
+    if isinstance(given, np.ma.MaskedArray):
+        raise MeshError(f"{name} are a masked array, whose mask says nothing here: fill it first")
+    return frozen(np.asarray(given))
+
+
+def _owned(arrays: Mapping[str, Any], words: str) -> Mapping[str, Any]:
+    """Arrays by kind, none of which anybody can write to.  Raises MeshError."""
+    return MappingProxyType({k: _frozen(f"{words}{k}", n) for k, n in arrays.items()})
 
 
 def _told(where: Predicate, places: Array, name: str) -> Flags:

@@ -44,7 +44,7 @@ def elements_on(name: str, on: Any) -> On:
 
 def _mapping(name: str, word: str, given: Any, example: str) -> Mapping[str, Any]:
     if given is None or isinstance(given, Mapping):
-        return given or {}
+        return dict(given or {})
     raise StudyError(f"{name!r}: {word} = {given!r}: a dict is needed, as in {word}={example}")
 
 

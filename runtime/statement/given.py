@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Real
@@ -62,6 +63,14 @@ class Told:
     words: str
     function: Callable[[Array, float], Array | float]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For `pickle`.  Raises StudyError."""
+        return type(self), (self.words, _pickled(self.words, self.function))
+
+    def __deepcopy__(self, memo: object) -> Told:
+        """Itself."""
+        return self
+
     def __call__(self, places: Array, t: float) -> Array:
         """One number, or (n,) of them.  Raises StudyError."""
         return _real(f"{self.words} at t = {t:g}", self.function(places, t), places)
@@ -73,6 +82,14 @@ class Rising:
 
     words: str
     function: Callable[[float], float]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For `pickle`.  Raises StudyError."""
+        return type(self), (self.words, _pickled(self.words, self.function))
+
+    def __deepcopy__(self, memo: object) -> Rising:
+        """Itself."""
+        return self
 
     def __call__(self, t: float) -> float:
         """Raises StudyError."""
@@ -87,6 +104,19 @@ class Rising:
         return float(_real(words, found, ()))
 
 
+def _pickled(words: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function that can be pickled.  Raises StudyError."""
+    try:
+        pickle.dumps(function)
+    except (pickle.PicklingError, AttributeError, TypeError):
+        name = getattr(function, "__name__", repr(function))
+        raise StudyError(
+            f"{words}: {name} cannot be pickled: write it as a function of a module (def at the "
+            "left margin of a file)"
+        ) from None
+    return function
+
+
 def function(words: str, given: Callable[..., Any], *arguments: str) -> Callable[..., Any]:
     """A function, if it can be called with these.  Raises StudyError."""
     wrong = misfit(given, *arguments)
@@ -97,6 +127,8 @@ def function(words: str, given: Callable[..., Any], *arguments: str) -> Callable
 
 def _real(words: str, value: object, places: Array | tuple[()]) -> Array:
     """One finite real number, or one for each place: () or (n,).  Raises StudyError."""
+    if isinstance(value, np.ma.MaskedArray):
+        raise StudyError(f"{words}: a masked array, whose mask says nothing here: fill it first")
     found = np.asarray(value)
     shapes = [(), (len(places),)] if isinstance(places, np.ndarray) else [()]
     many = f", or ({len(places)},) of them" if len(shapes) > 1 else ""
@@ -105,7 +137,7 @@ def _real(words: str, value: object, places: Array | tuple[()]) -> Array:
             found = found.astype(np.float64)
         except (TypeError, ValueError):
             found = found.astype(str)
-    if found.dtype.kind not in "fiub" or found.shape not in shapes:
+    if found.dtype.kind not in "fiu" or found.shape not in shapes:
         columns = ""
         shape = np.shape(places)
         if many and len(shape) == 2 and found.shape in (shape, shape[1:]):
@@ -141,6 +173,8 @@ def nodes_of(mesh: Mesh, where: Where) -> Integers:
     """Node numbers that are meant.  Raises StudyError, MeshError."""
     if isinstance(where, str) or callable(where):
         return mesh.nodes(where)
+    if isinstance(where, np.ma.MaskedArray):
+        raise StudyError("node numbers are a masked array, whose mask says nothing here")
     given = np.asarray(where)
     if isinstance(where, tuple) or given.dtype.kind == "f":
         return mesh.nodes_at(given)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from softehl.runtime.arrays import Array, Integers
 from softehl.errors import SoftehlError
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.fem.unknowns import Slot
 from softehl.runtime.kernels import Kernel, Rule
@@ -139,6 +140,13 @@ class Statement:
     forces: list[Force] = field(default_factory=list)
     start: list[Start] = field(default_factory=list)
     contacts: list[Any] = field(default_factory=list)
+
+    def copied(self) -> Statement:
+        """A copy, to which more can be added."""
+        own: dict[str, Any] = {
+            n: copy(v) for n, v in vars(self).items() if isinstance(v, dict | list)
+        }
+        return replace(self, **own)
 
     @property
     def count(self) -> int:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from softehl.runtime.kernels import Kernel
 from softehl.runtime.statement.pages import is_folder, require_page
+from softehl.runtime.statement.records import StudyError
 
 Source: TypeAlias = "str | Path | Kernel | object"
 """A model file, a folder of generated C, the name of a shipped kernel, a kernel, a Definition, or a
@@ -42,15 +43,52 @@ class Origin:
             return None
         if "pseudo_load" in kernel.tasks and not kernel.point_data:
             return None  # it comes with what is needed
+        return Derived(self, kernel)
+
+
+@dataclass(frozen=True, eq=False)
+class Derived:
+    """Maker of the kernel of derivatives of the page that a kernel was made of."""
+
+    origin: Origin | None
+    kernel: Kernel
+
+    def __call__(self) -> Kernel:
+        """That kernel.  Raises StudyError where the page is another one meanwhile."""
+        return self._kernel
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For `pickle`: a page that stands in no file stays behind."""
+        origin = self.origin
+        if origin is None or not isinstance(origin.source, str | Path):
+            return {"origin": None, "kernel": self.kernel}
+        in_file = str(origin.source).endswith(".py")
+        source = Path(origin.source).absolute() if in_file else origin.source
+        return {"origin": replace(origin, source=source), "kernel": self.kernel}
+
+    @cached_property
+    def _kernel(self) -> Kernel:
+        if self.origin is None:
+            raise StudyError(
+                f"derivatives of a study from a pickle need the page of {self.kernel.name}: add it "
+                "from a model file"
+            )
+        if self._loaded(self.origin).signature != self.kernel.signature:
+            raise StudyError(
+                f"the page of {self.kernel.name} is another one than the study was made with, and "
+                "derivatives would be those of another model: make the study again"
+            )
+        return self._loaded(self.origin, derivatives=True)
+
+    def _loaded(self, origin: Origin, *, derivatives: bool = False) -> Kernel:
         import softehl
 
-        return cache(
-            lambda: softehl.load_kernel(
-                self.source,
-                self.model or (None if kernel.cell else kernel.name),
-                cell=kernel.cell or None,
-                geometry=self.geometry,
-                materials=self.law,
-                derivatives=True,
-            )
+        kernel = self.kernel
+        return softehl.load_kernel(
+            origin.source,
+            origin.model or (None if kernel.cell else kernel.name),
+            cell=kernel.cell or None,
+            geometry=origin.geometry,
+            materials=origin.law,
+            derivatives=derivatives,
         )
