@@ -11,8 +11,10 @@ import io
 import json
 import math
 import os
+import tempfile
 import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from errno import EISDIR, ENOTDIR
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -42,6 +44,18 @@ def replacing(path: Path, *, shared: bool = False) -> Iterator[Path]:
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def require_writable(path: Path) -> None:
+    """Make the folder of a file.  Raises OSError where the file could not be written there."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:  # a file in the place of the folder
+        raise NotADirectoryError(ENOTDIR, os.strerror(ENOTDIR), error.filename) from None
+    if path.is_dir():
+        raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(path))
+    with tempfile.TemporaryFile(dir=path.parent):
+        pass
 
 
 def _flush(path: Path) -> None:

@@ -158,7 +158,9 @@ class Paths:
             where.newton(system, newton),
         )
         settings = March(cast(Method, method), tolerance, dt, newton, record, before)
-        file = None if checkpoint is None else Path(checkpoint)
+        file = None
+        if checkpoint is not None:
+            file = read.writable(f"checkpoint = {str(checkpoint)!r}", Path(checkpoint))
         series = None if write is None else Series(Path(write), clock.t if clock.t > 0.0 else None)
         told = Telling(progress, system.share.first, "t", clock.t, note_of(where))
         return watched(settings.run(system, clock, until, file), Watch(told.until(until), series))

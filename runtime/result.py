@@ -28,6 +28,7 @@ from softehl.runtime.output import Picture, piece_names
 from softehl.runtime.recovery import nodal_operator
 from softehl.runtime.solve.solution import Point, Solution, Status
 from softehl.runtime.stability import negative_directions
+from softehl.runtime.statement.given import writable
 from softehl.runtime.statement.records import StudyError
 
 if TYPE_CHECKING:
@@ -284,13 +285,19 @@ class Result:
 
     def write(self, path: str | Path) -> None:
         """Write the mesh with unknowns and fields at nodes, and the means of fields in cells,
-        atomically. Fields are BLOCK.NAME, at nodes as by `at_nodes`, nan away from the block.
+        atomically; its folder is made. Fields are BLOCK.NAME, at nodes as by `at_nodes`, nan away
+        from the block. Raises StudyError.
 
         .vtu: one file. .pvtu: one for each process beside it, written by all at once; no process
         then needs to have the whole, and of a mesh in parts this alone is possible. Unknowns u_x,
         u_y, u_z are written as one vector u as well.
         """
-        target, share = Path(path), self.system.share
+        words, target, share = f"write({str(path)!r})", Path(path), self.system.share
+        if target.suffix not in (".vtu", ".pvtu"):
+            raise StudyError(f"{words}: results are written as .vtu or .pvtu")
+        if target.suffix == ".vtu" and self.system.mesh.piece is not None:
+            raise StudyError(f"{words}: of a mesh in parts results are .pvtu")
+        writable(words, target)
         if target.suffix == ".pvtu":
             pieces = piece_names(target, share.pieces[1])
             piece = self._picture(self.system, self._own_cells(), self.point.solution.x).compact()
@@ -298,14 +305,10 @@ class Result:
             share.together()
             if share.first:
                 piece.write_index(target, pieces)
-        elif target.suffix == ".vtu" and self.system.mesh.piece is not None:
-            raise ValueError(f"write({str(path)!r}): of a mesh in parts results are .pvtu")
-        elif target.suffix == ".vtu":
+        else:
             picture = self._picture(self._whole, self.system.mesh.cells, self.x)
             if share.first:
                 picture.write(target)
-        else:
-            raise ValueError(f"write({str(path)!r}): results are written as .vtu or .pvtu")
         share.together()
 
     def _picture(self, system: System, cells: Mapping[str, Integers], x: Array) -> Picture:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from softehl.runtime.io import write_pvd
 from softehl.runtime.result import Result
+from softehl.runtime.statement.given import writable
 from softehl.runtime.statement.records import StudyError
 
 OnStep = Callable[[Result], object]
@@ -28,10 +29,11 @@ class Series:
     entries: list[tuple[float, str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        """Raises StudyError for a name that does not end in .pvd."""
+        """Raises StudyError for a name that does not end in .pvd, or cannot be written."""
         self.path = Path(self.path)
         if self.path.suffix != ".pvd":
             raise StudyError(f"write = {str(self.path)!r}: a series of results is written as .pvd")
+        writable(f"write = {str(self.path)!r}", self.path)
         if self.since is not None and self.path.exists():
             self.entries = [e for e in read_series(self.path) if e[0] <= self.since]
 

@@ -6,12 +6,14 @@ import pickle
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.loads import Amount
+from softehl.runtime.io import require_writable
 from softehl.runtime.mesh.mesh import Mesh, place_text
 from softehl.runtime.names import listed, meant, misfit
 from softehl.runtime.statement.records import Datum, Number, StudyError, Where, shown
@@ -25,6 +27,15 @@ def finite(name: str, value: object) -> float:
     if not np.isfinite(float(found)):
         raise StudyError(f"{name} = {value!r}: the number must be finite")
     return float(found)
+
+
+def writable(words: str, path: Path) -> Path:
+    """A file that can be written; its folder is made.  Raises StudyError."""
+    try:
+        require_writable(path)
+    except OSError as error:
+        raise StudyError(f"{words}: cannot write to {error.filename}: {error.strerror}") from None
+    return path
 
 
 def amount(words: str, name: str, value: Amount) -> Amount:
