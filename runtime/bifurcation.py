@@ -41,6 +41,10 @@ class Bifurcation:
     directions: int
     located: bool
 
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        return f"<Bifurcation at t = {self.t:.6g}: {self.directions} directions>"
+
     @property
     def t(self) -> float:
         """The load factor."""

@@ -11,6 +11,7 @@ from softehl.runtime.begin import Beginning
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.held import require_held
 from softehl.runtime.modes import buckled
+from softehl.runtime.names import few
 from softehl.runtime.result import Result, Shape
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point
@@ -27,6 +28,10 @@ class Buckling:
 
     factors: Array
     shapes: tuple[Shape, ...]
+
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        return f"<Buckling: factors {few(f'{f:.6g}' for f in self.factors)}>"
 
 
 def linear_buckling(system: System, start: Beginning, count: int, newton: Newton) -> Buckling:

@@ -26,6 +26,7 @@ from softehl.runtime.library import (
     library_of,
     manifest,
 )
+from softehl.runtime.names import few
 
 __all__ = [
     "ArgumentError",
@@ -46,6 +47,13 @@ class Kernel(Family):
     Calls also take, by name, what the family needs: data, point_data, parameters, rule.
     A kernel is pickled by its key, the folder of its library: another process loads that.
     """
+
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        return (
+            f"<Kernel {self.name}: {self.nodes} nodes; unknowns: {few(self.unknowns)}; parameters: "
+            f"{few(self.parameters)}; data: {few(self.data)}>"
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For `copy` and `pickle`."""

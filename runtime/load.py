@@ -43,6 +43,15 @@ class LoadPath:
     limits: tuple[LimitPoint, ...]
     bifurcations: tuple[Bifurcation, ...] = ()
 
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        ends = [result.t for result in (*self.results[:1], *self.results[-1:])]
+        return (
+            f"<LoadPath: {len(self.results)} results, {_NAME} "
+            f"{' to '.join(f'{t:.6g}' for t in ends)}; {len(self.limits)} limits, "
+            f"{len(self.bifurcations)} bifurcations>"
+        )
+
 
 @dataclass(eq=False)
 class _Reached:

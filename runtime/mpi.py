@@ -40,8 +40,7 @@ def petsc() -> Any:
         import petsc4py
     except ImportError as error:
         raise MissingPetsc(
-            f'"petsc": {error}; install the extra `mpi` on Python 3.12 or newer '
-            "(pip install 'softehl[mpi]'), or petsc4py and mpi4py of your cluster"
+            f'"petsc": {error}; {_extra()}, or install petsc4py and mpi4py of your cluster'
         ) from None
     # one dash is PETSc's, two are of softehl or the script
     petsc4py.init([word for word in sys.argv if not word.startswith("--")])
@@ -52,6 +51,15 @@ def petsc() -> Any:
     return PETSc
 
 
+def _extra() -> str:
+    """Way to the extra that brings PETSc; pip installs nothing of it, silently, on older Python."""
+    extra = "pip install 'softehl[mpi]'"
+    if sys.version_info >= (3, 12):
+        return extra
+    this = ".".join(map(str, sys.version_info[:2]))
+    return f"{extra} needs Python 3.12 or newer, this is {this}"
+
+
 @cache
 def slepc() -> Any:
     """The module slepc4py.SLEPc.  Raises MissingPetsc where it is not installed."""
@@ -60,8 +68,8 @@ def slepc() -> Any:
         import slepc4py
     except ImportError as error:
         raise MissingPetsc(
-            f'eigenvalues with engine = "petsc": {error}; install slepc4py, which the extra `mpi` '
-            "brings on Python 3.12 or newer"
+            f'eigenvalues with engine = "petsc": {error}; {_extra()}, or install slepc4py of your '
+            "cluster"
         ) from None
     slepc4py.init()
     return importlib.import_module("slepc4py.SLEPc")

@@ -33,6 +33,14 @@ def listed(known: Iterable[str]) -> str:
     return ", ".join(known) or "none"
 
 
+def few(known: Iterable[str], most: int = 5) -> str:
+    """The first of many names and how many there are."""
+    names = list(known)
+    return (
+        listed(names) if len(names) <= most + 1 else f"{listed(names[:most])}, ... ({len(names)})"
+    )
+
+
 def misfit(function: object, *arguments: str) -> str:
     """Arguments of a function, for a message, if it cannot be called with these; else ""."""
     if not callable(function):

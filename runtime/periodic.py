@@ -50,6 +50,10 @@ class Homogenised:
     F: Array
     result: Result
 
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        return f"<Homogenised: F = {self.F.tolist()}, P = {self.P.tolist()}>"
+
     @property
     def P(self) -> Array:
         """See the class."""
@@ -81,6 +85,10 @@ class Cell:
     fluctuations: csc_array[np.float64]
     modes: Array
     volume: float
+
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        return f"<Cell: volume {self.volume:.6g}, {self.system.mesh!r}>"
 
     def solve(
         self,

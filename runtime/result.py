@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from softehl.errors import UnknownNameError
 from softehl.runtime.arrays import Array, Integers, read_only
 from softehl.runtime.between import at_every_node, between_nodes, shares
 from softehl.runtime.derivatives.asked import By, inputs
@@ -23,13 +24,13 @@ from softehl.runtime.mass import Masses
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import MeshError, place_text
 from softehl.runtime.modes import natural
-from softehl.runtime.names import meant
+from softehl.runtime.names import few, listed, meant
 from softehl.runtime.output import Picture, piece_names
 from softehl.runtime.recovery import nodal_operator
 from softehl.runtime.solve.solution import Point, Solution, Status
 from softehl.runtime.stability import negative_directions
 from softehl.runtime.statement.given import writable
-from softehl.runtime.statement.records import StudyError
+from softehl.runtime.statement.records import Block, StudyError
 
 if TYPE_CHECKING:
     from softehl.runtime.mesh.mesh import Predicate
@@ -56,6 +57,14 @@ class Result:
         """Histories that cannot be written to."""
         histories = {name: read_only(values) for name, values in self.histories.items()}
         object.__setattr__(self, "histories", histories)
+
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        whole = self._whole
+        return (
+            f"<{type(self).__name__} at t = {self.t:.6g}: {whole.size} unknowns "
+            f"({few(whole.numbering.layout.names)}); blocks: {few(whole.blocks)}>"
+        )
 
     def __copy__(self) -> Self:
         """Itself, as nothing of it changes."""
@@ -103,10 +112,20 @@ class Result:
         if numbers is None:
             layout = self._whole.numbering.layout
             if name not in layout.names:
-                known = ", ".join(layout.names)
-                raise KeyError(f"no unknown {name!r}{meant(name, layout.names)}; there are {known}")
+                known = f"{meant(name, layout.names)}; there are {listed(layout.names)}"
+                raise UnknownNameError(f"no unknown {name!r}{self._field_called(name) or known}")
             return self.x[layout.part(name)]
         return np.where(numbers >= 0, self.x[numbers], np.nan)
+
+    def _field_called(self, name: str) -> str:
+        """A hint at the block whose field a name is, for messages."""
+        for label, block in self._whole.blocks.items():
+            if name in (*block.kernel.fields, *block.kernel.internal):
+                return (
+                    f", but a field: fields({label!r})[{name!r}] has it at the points, "
+                    f"at_nodes({label!r})[{name!r}] at the nodes"
+                )
+        return ""
 
     def gathered(self, name: str) -> Array:
         """An unknown at every node of the whole mesh, also where each process has a part of it.
@@ -115,7 +134,7 @@ class Result:
         """
         if name not in self._whole.numbering.nodal:
             known = ", ".join(self._whole.numbering.nodal)
-            raise KeyError(f"no unknown {name!r} at nodes; there are {known}")
+            raise UnknownNameError(f"no unknown {name!r} at nodes; there are {known}")
         return self.system.share.at_all_nodes(self.values(name))
 
     def at(self, place: tuple[float, ...], *, block: str | None = None) -> dict[str, float]:
@@ -160,15 +179,17 @@ class Result:
 
     def fields(self, block: str) -> dict[str, Array]:
         """Fields of a block's page at its quadrature points: name -> (cells, points)."""
-        self._require_block(block)
+        self._block(block)
         share = self.system.share
         return {n: share.whole_cells(block, v) for n, v in self._own_fields(block).items()}
 
-    def _require_block(self, block: str) -> None:
+    def _block(self, name: str) -> Block:
+        """The block of a name, of all processes.  Raises KeyError that names what there is."""
         blocks = self._whole.blocks
-        if block not in blocks:
-            known = ", ".join(blocks)
-            raise KeyError(f"no block {block!r}{meant(block, blocks)}; there are {known}")
+        if name not in blocks:
+            known = listed(blocks)
+            raise UnknownNameError(f"no block {name!r}{meant(name, blocks)}; there are {known}")
+        return blocks[name]
 
     def _own_fields(self, block: str) -> dict[str, Array]:
         """Fields at the points of this process's elements."""
@@ -184,7 +205,7 @@ class Result:
         points of a cell. A node has the mean of the cells of this block around it, and nothing of
         other blocks. Elements without a cell have means. Raises KeyError, StudyError.
         """
-        self._require_block(block)
+        self._block(block)
         nodes, operator = nodal_operator(self.system.blocks[block], recovery)
         points, piece = len(self.system.mesh.points), self.system.mesh.piece
 
@@ -364,6 +385,10 @@ class Modes:
 
     squares: Array
     shapes: tuple[Shape, ...]
+
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        return f"<Modes: frequencies {few(f'{f:.6g}' for f in self.frequencies)}>"
 
     @property
     def frequencies(self) -> Array:

@@ -12,6 +12,7 @@ Unknowns have the names that the pages give them; equal names on equal nodes are
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -24,7 +25,7 @@ from softehl.runtime.fit.fitted import Fitted
 from softehl.runtime.kernels import Kernel
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
-from softehl.runtime.names import listed
+from softehl.runtime.names import few, listed
 from softehl.runtime.paths import Paths
 from softehl.runtime.statement import given as read
 from softehl.runtime.statement.along import require_apart
@@ -78,6 +79,16 @@ class Study(Paths, Fitted):
                 f"{name} of a study cannot be changed: make another one, Study(mesh, geometry)"
             )
         super().__setattr__(name, value)
+
+    def __repr__(self) -> str:
+        """What was written down, in a line."""
+        written = self._statement
+        blocks = few(f"{b.name} ({b.kernel.name})" for b in written.blocks.values())
+        calls = Counter(["fix"] * len(written.conditions) + [f.what for f in written.forces])
+        calls.update(start=len(written.start), contact=len(written.contacts))
+        told = ", ".join(f"{count} {name}" for name, count in calls.items() if count) or "no loads"
+        kinds = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in self.mesh.cells.items())
+        return f"<Study: {kinds}; blocks: {blocks}; {told}>"
 
     def __copy__(self) -> Study:
         """A study with the same statements so far, on the same mesh."""

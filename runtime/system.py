@@ -15,6 +15,7 @@ from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.touching import Sought, TouchingProblem
 from softehl.runtime.fem.unknowns import Numbering
 from softehl.runtime.mesh.mesh import Mesh, place_text
+from softehl.runtime.names import few
 from softehl.runtime.share import ALONE, Share
 from softehl.runtime.statement.records import (
     Block,
@@ -71,6 +72,11 @@ class System:
     statement: Statement | None = field(default=None, repr=False)
     written: int = 0
     contacts: tuple[Sought, ...] = ()
+
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        names = few(self.numbering.layout.names)
+        return f"<System: {self.size} unknowns ({names}); blocks: {few(self.blocks)}>"
 
     @property
     def everywhere(self) -> System:

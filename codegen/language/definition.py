@@ -122,6 +122,13 @@ class Definition:
     record: Record = field(default_factory=Record, repr=False, compare=False)
     """The page as written, by which kernels are checked; nothing is derived from it."""
 
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        shown = self.unknowns if len(self.unknowns) <= 6 else self.unknowns[:5]
+        more = f", ... ({len(self.unknowns)})" if len(self.unknowns) > 6 else ""
+        names = ", ".join(shown) or "none"
+        return f"<Definition {self.name}: {self.nodes} nodes; unknowns: {names}{more}>"
+
     @property
     def coordinate_width(self) -> int:
         """Coordinates of one element: components times nodes."""

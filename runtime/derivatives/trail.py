@@ -47,6 +47,10 @@ class Trail:
     linear: LinearSolver | None = None
     memo: dict[str, Any] = field(default_factory=dict, repr=False)
 
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        return f"<Trail at t = {self.step.t:.6g}: {self.system!r}>"
+
     def __getstate__(self) -> dict[str, Any]:
         """For `copy` and `pickle`: this step alone, without what only saves time."""
         return {**vars(self), "before": None, "kept": None, "linear": None, "memo": {}}

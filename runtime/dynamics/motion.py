@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from softehl.errors import UnknownNameError
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.loads import DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.fem.mass import Mass
@@ -19,7 +20,7 @@ from softehl.runtime.share import Share
 _EMPTY = np.empty(0)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Motion(Result):
     """A result with velocities and accelerations.
 
@@ -46,7 +47,9 @@ class Motion(Result):
     def _nodal(self, name: str, values: Array) -> Array:
         nodal, values = self._whole.numbering.nodal, self.system.share.whole(values)
         if name not in nodal:
-            raise KeyError(f"no unknown {name!r}{meant(name, nodal)}; at nodes: {listed(nodal)}")
+            raise UnknownNameError(
+                f"no unknown {name!r}{meant(name, nodal)}; at nodes: {listed(nodal)}"
+            )
         return np.where(nodal[name] >= 0, values[nodal[name]], np.nan)
 
 

@@ -13,11 +13,13 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 from scipy.sparse import csc_array
 
+from softehl.errors import UnknownNameError
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.checks import not_finite, require_sound_elements
 from softehl.runtime.fem.mass import Mass
 from softehl.runtime.fem.pattern import Pattern, Structure
 from softehl.runtime.kernels import Kernel, Rule
+from softehl.runtime.names import few
 
 Again: TypeAlias = Callable[[Array, Array, Array | None], None]
 """A task of a kernel: of its unknowns, and of the values and the tangent that it writes."""
@@ -113,6 +115,10 @@ class ElementBlock:
     calls: dict[str, tuple[Array, Again]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
+
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        return f"<ElementBlock {self.name}: {len(self.dofs)} elements of {self.kernel.name}>"
 
     def __getstate__(self) -> dict[str, Any]:
         """For `copy` and `pickle`: without its latest calls."""
@@ -254,6 +260,10 @@ class Assembler:
     structure: Structure
     memo: Memo = field(default_factory=Memo)
 
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        return f"<Assembler: {self.size} unknowns; blocks: {few(b.name for b in self.blocks)}>"
+
     def __getstate__(self) -> dict[str, Any]:
         """For `copy` and `pickle`: without what only saves time."""
         return {**vars(self), "memo": Memo()}
@@ -281,7 +291,9 @@ class Assembler:
         for block in self.blocks:
             if block.name == name:
                 return block
-        raise KeyError(f"no block {name!r}; there are {', '.join(b.name for b in self.blocks)}")
+        raise UnknownNameError(
+            f"no block {name!r}; there are {', '.join(b.name for b in self.blocks)}"
+        )
 
     def with_data(
         self, name: str, *, data: Array | None = None, point_data: Array | None = None

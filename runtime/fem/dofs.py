@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from softehl.errors import UnknownNameError
 from softehl.runtime.arrays import Integers
 
 AXES = ("x", "y", "z", "r")
@@ -46,7 +47,7 @@ class DofLayout:
             return self._parts[name]
         except KeyError:
             known = ", ".join(self.names)
-            raise KeyError(f"no field {name!r}; there are {known}") from None
+            raise UnknownNameError(f"no field {name!r}; there are {known}") from None
 
     def dofs(self, name: str) -> Integers:
         """Numbers (count,) of the unknowns of a field; KeyError for an unknown name."""

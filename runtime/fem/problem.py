@@ -27,7 +27,7 @@ from softehl.runtime.fem.checks import (
 from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.guards import Guard
 from softehl.runtime.fem.measure import ROUNDING, Balance, hides, is_far, size
-from softehl.runtime.names import listed
+from softehl.runtime.names import few, listed
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +73,13 @@ class Problem:
         ordered = {n: in_order(self.assembler.block(n), v) for n, v in self.parameters.items()}
         object.__setattr__(self, "parameters", ordered)
         self._require_prescribed()
+
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        return (
+            f"<{type(self).__name__}: {self.layout.total} unknowns ({few(self.layout.names)}), "
+            f"{len(self.fixed)} prescribed; blocks: {few(self.parameters)}>"
+        )
 
     def _require_prescribed(self) -> None:
         fixed, n = self.fixed, self.layout.total

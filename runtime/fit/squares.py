@@ -16,6 +16,7 @@ from softehl.runtime.fem.checks import ProblemError
 from softehl.runtime.fit.measured import Data
 from softehl.runtime.fit.scale import Bounds, Scale
 from softehl.runtime.fit.trials import Trials
+from softehl.runtime.names import few
 from softehl.runtime.result import Result
 from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.statement.records import StudyError
@@ -41,6 +42,15 @@ class Fit:
     evaluations: int
     result: Result
     message: str
+
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        values = [
+            f"{key} = {value:.6g}" if np.ndim(value) == 0 else f"{key}: {len(value)} values"  # type: ignore[arg-type]
+            for key, value in self.values.items()
+        ]
+        worst = float(np.abs(self.residuals).max(initial=0.0))
+        return f"<Fit: {few(values)}; residuals up to {worst:.3g}; {self.evaluations} evaluations>"
 
     @property
     def deviations(self) -> Array:

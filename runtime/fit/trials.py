@@ -9,9 +9,10 @@ from typing import TypeAlias
 import numpy as np
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.derivatives.inputs import Input
+from softehl.runtime.derivatives.inputs import Input, Key
 from softehl.runtime.derivatives.quantities import Quantity
 from softehl.runtime.derivatives.results import jacobian
+from softehl.runtime.names import few
 from softehl.runtime.result import Result
 
 Run: TypeAlias = Callable[[Sequence[tuple[Input, Array]]], list[Result]]
@@ -53,6 +54,14 @@ class Objective:
 
     trials: Trials
     quantity: Quantity
+
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        return f"<Objective: {type(self.quantity).__name__} by {few(map(str, self._keys))}>"
+
+    @property
+    def _keys(self) -> list[Key]:
+        return [item.key for item in self.trials.inputs]
 
     @property
     def start(self) -> Array:

@@ -24,7 +24,7 @@ from softehl.runtime.arrays import Array, Flags, Integers, frozen
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.faces import as_known, matched, once
 from softehl.runtime.mesh.piece import Piece
-from softehl.runtime.names import meant, misfit
+from softehl.runtime.names import few, listed, meant, misfit
 
 Faces: TypeAlias = Mapping[str, Integers]
 """Kind of face -> node numbers (n, k), seen from outside counterclockwise."""
@@ -102,6 +102,14 @@ class Mesh:
             own["numbers"] = _frozen("numbers of nodes", self.numbers)
         for name, value in own.items():
             object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        kinds = listed(f"{len(nodes)} {kind}" for kind, nodes in self.cells.items())
+        return (
+            f"<Mesh: {len(self.points)} points in {self.dimension}-D, {kinds}; groups: "
+            f"{few(self.groups)}; sides: {few(self.sides)}>"
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For `pickle`."""

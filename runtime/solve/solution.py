@@ -8,7 +8,7 @@ Newton returns a `Solution`, continuation a `Branch` of them. Inner layers read 
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -96,13 +96,13 @@ class Solution:
     rung: number of the corrector of a `Ladder` that this is the end of; others were tried before.
     """
 
-    x: Array
+    x: Array = field(repr=False)
     status: Status
     message: str
-    residual_norms: tuple[float, ...]
+    residual_norms: tuple[float, ...] = field(repr=False)
     factorisations: int
     iterations: int
-    best: Array | None = None
+    best: Array | None = field(default=None, repr=False)
     rung: int = 0
 
     @property
@@ -143,7 +143,7 @@ class LimitPoint:
     """
 
     parameter: float
-    x: Array
+    x: Array = field(repr=False)
     kind: str
     index: int
     located: bool
@@ -167,6 +167,14 @@ class Branch:
     iterations: int = 0
     failures: tuple[Point, ...] = ()
     limit_points: tuple[LimitPoint, ...] = ()
+
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        ends = " to ".join(f"{t:.6g}" for t in (*self.parameters[:1], *self.parameters[-1:]))
+        return (
+            f"<Branch: {len(self.points)} points, {ends or 'none'}; {self.status.value}; "
+            f"{len(self.failures)} failures, {len(self.limit_points)} limit points>"
+        )
 
     @property
     def converged(self) -> bool:

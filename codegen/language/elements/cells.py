@@ -39,6 +39,10 @@ class Element:
     shape: Shape
     rule: QuadratureRule
 
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        return f"<Element {self.name}: {len(self.nodes)} nodes>"
+
     @property
     def dimension(self) -> int:
         """Of the parent element."""

@@ -24,6 +24,10 @@ class QuadratureRule:
     points: tuple[tuple[sp.Expr, ...], ...]
     weights: tuple[sp.Expr, ...]
 
+    def __repr__(self) -> str:
+        """What it is, in a line."""
+        return f"<QuadratureRule: {len(self.weights)} points in {self.dimension}-D>"
+
     def rows(self) -> list[list[Fraction]]:
         """(coordinates..., weight) of each point, to 60 digits or more."""
         pairs = zip(self.points, self.weights, strict=True)
