@@ -31,20 +31,23 @@ class Isoparametric:
     matrix: Any
 
 
-def isoparametric(m: Model, X: Any, parent: Any) -> Isoparametric:
+def isoparametric(m: Model, X: Any, parent: Any, label: str = "") -> Isoparametric:
     """Geometry at the point from nodal coordinates [component][node] and parent gradients.
 
     Works in one, two and three dimensions; `parent` is e.g. `shapes.hex8_gradient(xi, eta, zeta)`.
+    label: begins the names dX, detJ, dX_inverse and dN, for pages that use these names themselves.
     """
     size = len(X)
     _require_parent(m, size, parent)
     J = sp.Matrix(size, size, lambda i, k: shapes.interpolate([g[k] for g in parent], X[i]))
-    J = m.define("dX", J)
-    detJ = m.define("detJ", J.det(method="berkowitz"))
-    inverse = m.define("dX_inverse", J.adjugate() / detJ)
+    J = m.define(f"{label}dX", J)
+    detJ = m.define(f"{label}detJ", J.det(method="berkowitz"))
+    inverse = m.define(f"{label}dX_inverse", J.adjugate() / detJ)
     m.measure(detJ, inverse)
     dN = [list(sp.Matrix([list(g)]) * inverse) for g in parent]
-    slopes = [[m.define(f"dN_{a}{k}", v) for k, v in enumerate(row)] for a, row in enumerate(dN)]
+    slopes = [
+        [m.define(f"{label}dN_{a}{k}", v) for k, v in enumerate(row)] for a, row in enumerate(dN)
+    ]
     rows = (
         Listed(row, f"dN[{a}], the gradient of a shape function") for a, row in enumerate(slopes)
     )

@@ -82,15 +82,15 @@ class Model(Draft):
         """
         return self._arguments.interpolated_sides(names)
 
-    def parameters(self, **meanings: str) -> list[sp.Symbol]:
+    def parameters(self, /, **meanings: str) -> list[sp.Symbol]:
         """Arguments that are the same for all elements of a call."""
         return self._arguments.declare("parameters", meanings)
 
-    def data(self, **meanings: str) -> list[sp.Symbol]:
+    def data(self, /, **meanings: str) -> list[sp.Symbol]:
         """Arguments that differ from element to element."""
         return self._arguments.declare("data", meanings)
 
-    def point_data(self, **meanings: str) -> list[sp.Symbol]:
+    def point_data(self, /, **meanings: str) -> list[sp.Symbol]:
         """Arguments that differ from quadrature point to point, e.g. history variables."""
         return self._arguments.declare("point data", meanings, varying=True)
 
@@ -111,7 +111,7 @@ class Model(Draft):
         """
         return self._arguments.rates(names, order)
 
-    def history(self, **new: Any) -> None:
+    def history(self, /, **new: Any) -> None:
         """Declare new values of `point_data` after a converged step: m.history(v_old=v).
 
         Each is a field of the kernel, named new_v_old.
@@ -240,7 +240,7 @@ class Model(Draft):
 
     # what is made of it -------------------------------------------------------------------------
 
-    def fields(self, **values: Any) -> None:
+    def fields(self, /, **values: Any) -> None:
         """Quantities to be evaluated at the quadrature points; further calls add more."""
         self._outputs.add_fields(values)
 
@@ -267,7 +267,7 @@ class Model(Draft):
         self._outputs.fields_rate |= fields_rate
         self._outputs.derive_by(derivatives)
 
-    def example(self, **values: float) -> None:
+    def example(self, /, **values: float) -> None:
         """Values near which the model makes sense, by name; the check of its kernel starts there.
 
         Names of parameters, data, unknowns (`u_x1`) and coordinates (`X1`).  Values that are not

@@ -98,7 +98,7 @@ class Site(Fields):
     def _total_of(self, name: str, density: Any) -> Any:
         return self.define(name, density)
 
-    def point_data(self, **meanings: str) -> list[sp.Symbol]:
+    def point_data(self, /, **meanings: str) -> list[sp.Symbol]:
         """As of any model; here they do not vary, there is one point."""
         return self._arguments.declare("point data", meanings)
 

@@ -66,9 +66,28 @@ class Symbols:
 
     def _bind(self, symbol: Any, node: Node) -> Any:
         label = str(symbol)
-        if self.bound.get(self._by_label.setdefault(label, symbol), node) is not node:
-            raise ModelError(f"the name {label} is used twice in model {self.model}")
+        before = self.bound.get(self._by_label.setdefault(label, symbol), node)
+        if before is not node:
+            kinds = " and ".join(dict.fromkeys(map(_kind, (before, node))))
+            raise ModelError(
+                f"the name {label} is used twice in model {self.model}, for {kinds}: rename one"
+            )
         self.bound[symbol] = node
         if isinstance(node.payload, Input):
             self.record.inputs[symbol] = (node.payload.array, node.payload.index)
         return symbol
+
+
+_KINDS = {
+    "dofs": "an unknown",
+    "coordinates": "a coordinate",
+    "parameters": "a parameter",
+    "rule": "the quadrature",
+}
+
+
+def _kind(node: Node) -> str:
+    """What a name stands for, in words."""
+    if not isinstance(node.payload, Input):
+        return "an intermediate"
+    return _KINDS.get(node.payload.array, node.payload.array)

@@ -24,7 +24,8 @@ class Whole(Nodal):
         self, name: str, cell: Element, geometry: str, rule: QuadratureRule, doc: str
     ) -> None:
         super().__init__(name, cell, geometry, rule, doc, dimension=cell.dimension)
-        self._map = kinematics.isoparametric(self, self._X, self._parent(self.order)[1])
+        slopes = self._parent(self.order)[1]
+        self._map = kinematics.isoparametric(self, self._X, slopes, "parent_")
         self._centroids = 0
         self._slopes_by_order = {self.order: self._map.dN}
 

@@ -385,3 +385,28 @@ def test_cells_geometries_and_forms_are_checked() -> None:
         softehl.load_kernel(field_pages.rubber)
     with pytest.raises(ModelError, match='allowed are "whole" and "point"'):
         softehl.page(form="fast")  # type: ignore[call-overload]
+
+
+@pytest.mark.parametrize("kind", ["parameters", "data", "point_data", "define", "scalar"])
+def test_names_of_the_geometry_are_free_on_a_page_of_fields(kind: str) -> None:
+    for name in ("detJ", "dX_00", "dN_00", "weight", "xi", "J", "N", "p", "self"):
+
+        def page(m: Fields, name: str = name) -> None:
+            """A page."""
+            T = m.scalar("T")
+            if kind in ("define", "scalar"):
+                a = m.define(name, 1 + T**2) if kind == "define" else m.scalar(name)
+            else:
+                (a,) = getattr(m, kind)(**{name: "as the user likes"})
+            m.minimise((1 + a**2) * m.grad(T).dot(m.grad(T)))
+
+        assert softehl.page(page).definition("quad4").nodes == 4
+
+
+def test_a_name_for_two_things_says_which() -> None:
+    def page(m: Fields) -> None:
+        p = m.scalar("p")
+        m.minimise(p**2 * m.parameters(p="pressure outside")[0])
+
+    with pytest.raises(ModelError, match=r"name p is used twice .* an unknown and a parameter"):
+        softehl.page(page).definition("quad4")
