@@ -132,7 +132,8 @@ class Study(Paths, Fitted):
         rule: of quadrature, instead of the page's own, as in `softehl.quadrature.gauss(4, 1)`.
         constant: the tangent does not depend on unknowns; it is evaluated once.
         given: parameters of the page (numbers, or functions of the load factor) and its data (a
-        number, (n,) numbers or a function of the elements' centres (n, dim)). A page of fields on
+        number, (n,) numbers or a function of the elements' centres (n, dim); `Model.nodal_data` by
+        their name, one for each node of the mesh or a function of places). A page of fields on
         several kinds of cells makes a block of each, "body:quad4", "body:tri3". Two are not given:
         `dt` is the length of a step of `march`, `rate` comes from `Model.rates`.
         Raises StudyError, MeshError, or what is wrong with the page.

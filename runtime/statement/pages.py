@@ -127,7 +127,9 @@ def page_on(
     form = replace(form, shared=frozenset(form.called.get(s, s) for s in form.shared))
     previous, rates, accelerations = _automatic(kernel, found, told)
     told, form = placed(name, kernel, len(nodes), told, form)
-    known("argument", given, _arguments(kernel), kernel.name)
+    at_nodes = _nodal_data(kernel)
+    known("argument", given, [*at_nodes, *_arguments(kernel)], kernel.name)
+    given = _by_node(mesh, name, nodes, at_nodes, given)
     timed = {"rate": rates, "acceleration": accelerations}
     automatic = ("dt", *(p for p, slots_of in timed.items() if slots_of))
     for parameter_of_time in automatic[1:]:
@@ -139,6 +141,9 @@ def page_on(
     needed = [p for p in kernel.parameters if p not in automatic]
     needed += [d for d in kernel.data if d not in filled]
     missing = [a for a in needed if a not in given]
+    for whole, labels in at_nodes.items():
+        if set(labels) <= set(missing):
+            missing = [whole if a == labels[0] else a for a in missing if a not in labels[1:]]
     if missing:
         hint = "; where t is the time or load factor, give t=lambda t: t" if "t" in missing else ""
         raise StudyError(f"{name!r}: {kernel.name} needs {', '.join(missing)}{hint}")
@@ -179,6 +184,37 @@ def _require_fit(mesh: Mesh, kernel: Kernel) -> None:
 
 def _arguments(kernel: Kernel) -> list[str]:
     return [*kernel.parameters, *kernel.data, *kernel.point_data]
+
+
+def _nodal_data(kernel: Kernel) -> dict[str, list[str]]:
+    """Data that there are for each node of an element, D1, D2, ..., by their common name D."""
+    found = {}
+    for label in kernel.data:
+        if label.endswith("1") and label[:-1].isidentifier():
+            labels = [f"{label[:-1]}{node + 1}" for node in range(kernel.nodes)]
+            if kernel.nodes > 1 and set(labels) <= set(kernel.data):
+                found[label[:-1]] = labels
+    return found
+
+
+def _by_node(
+    mesh: Mesh,
+    block: str,
+    nodes: Integers,
+    at_nodes: Mapping[str, Sequence[str]],
+    given: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Data as the kernel calls them, where nodal ones are given by their common name: a number, one
+    for each node of the mesh, or a function of the places of nodes.  Raises StudyError.
+    """
+    found = dict(given)
+    for name in at_nodes.keys() & given.keys():
+        twice = [label for label in at_nodes[name] if label in given]
+        if twice:
+            raise StudyError(f"{block!r}: {name!r} and {twice[0]!r}: the same data twice")
+        values = datum(block, name, found.pop(name), mesh.points)
+        found |= {label: values[nodes[:, k]] for k, label in enumerate(at_nodes[name])}
+    return found
 
 
 def _automatic(

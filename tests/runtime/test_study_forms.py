@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -257,3 +258,46 @@ def test_a_rule_of_a_page_and_lists_of_nodes_serve_a_field_under_another_name() 
     assert found["x"].shape == (2, 5)
     x = found["x"]
     assert found["p"] == pytest.approx(x**2 * (3 - 2 * x), abs=1e-12)
+
+
+SPRINGS = """
+from softehl import Definition, Model, quadrature
+
+def spring() -> Definition:
+    m = Model("spring", nodes=2, rule=quadrature.point_rule())
+    (X,) = m.coordinates("X")
+    (u,) = m.nodal_unknowns("u")
+    (k,) = m.nodal_data("k")
+    m.potential((k[0] + k[1]) / 2 * (u[1] - u[0])**2 / (X[1] - X[0]) / 2)
+    return m.finish()
+"""
+
+
+def test_data_at_nodes_are_given_by_their_name(tmp_path: Path) -> None:
+    page = tmp_path / "springs.py"
+    page.write_text(SPRINGS)
+    stiffness = np.array([1.0, 3.0, 2.0])  # nodes at 0, 1/2, 1: springs of (1 + 3), (3 + 2)
+
+    def pulled(**given: Any) -> float:
+        study = Study(Mesh.line(1, cells=2))
+        study.add("springs", page, **given)
+        study.fix("left", u=0)
+        study.load("right", u=1.0)
+        return study.solve().at((1,))["u"]
+
+    order = np.argsort(np.argsort(Mesh.line(1, cells=2).points[:, 0]))
+    want = 1 / 4 + 1 / 5
+    np.testing.assert_allclose(pulled(k=stiffness[order]), want, rtol=1e-14)
+    by_place = pulled(k=lambda x: np.interp(x[:, 0], [0, 0.5, 1], stiffness))
+    np.testing.assert_allclose(by_place, want, rtol=1e-14)
+    np.testing.assert_allclose(pulled(k=2.0), 1 / 2, rtol=1e-14)
+    np.testing.assert_allclose(pulled(k1=2.0, k2=np.array([2.0, 2.0])), 1 / 2, rtol=1e-14)
+    for given, message in (
+        ({}, r"spring needs k$"),
+        ({"k1": 1.0}, r"spring needs k2"),
+        ({"k": 1.0, "k1": 2.0}, r"'k' and 'k1': the same data twice"),
+        ({"k": np.ones(2)}, r"k: one real number, or \(3,\) of them is needed"),
+        ({"q": 1.0}, r"no argument 'q'; it has k, k1, k2"),
+    ):
+        with pytest.raises(StudyError, match=message):
+            pulled(**given)
