@@ -40,11 +40,10 @@ html_math_renderer = "mathml"
 myst_links_external_new_tab = True
 
 autodoc_member_order = "bysource"
-autodoc_typehints = "signature"
-autodoc_typehints_format = "short"
+autodoc_typehints = "none"  # docstrings say shapes and units; types of arrays say less, at length
+python_maximum_signature_line_length = 88
 autodoc_class_signature = "mixed"
 autodoc_preserve_defaults = True
-autodoc_type_aliases = {name: name for name in ("Array", "Integers", "Where", "Amount")}
 smartquotes = False
 
 html_theme = "furo"

@@ -42,7 +42,7 @@ class Bifurcation:
     located: bool
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         return f"<Bifurcation at t = {self.t:.6g}: {self.directions} directions>"
 
     @property

@@ -30,7 +30,7 @@ class Buckling:
     shapes: tuple[Shape, ...]
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         return f"<Buckling: factors {few(f'{f:.6g}' for f in self.factors)}>"
 
 

@@ -49,7 +49,7 @@ class Kernel(Family):
     """
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         return (
             f"<Kernel {self.name}: {self.nodes} nodes; unknowns: {few(self.unknowns)}; parameters: "
             f"{few(self.parameters)}; data: {few(self.data)}>"

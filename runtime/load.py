@@ -44,7 +44,7 @@ class LoadPath:
     bifurcations: tuple[Bifurcation, ...] = ()
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         ends = [result.t for result in (*self.results[:1], *self.results[-1:])]
         return (
             f"<LoadPath: {len(self.results)} results, {_NAME} "

@@ -51,7 +51,7 @@ class Homogenised:
     result: Result
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         return f"<Homogenised: F = {self.F.tolist()}, P = {self.P.tolist()}>"
 
     @property
@@ -87,7 +87,7 @@ class Cell:
     volume: float
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         return f"<Cell: volume {self.volume:.6g}, {self.system.mesh!r}>"
 
     def solve(

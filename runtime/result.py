@@ -59,7 +59,7 @@ class Result:
         object.__setattr__(self, "histories", histories)
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         whole = self._whole
         return (
             f"<{type(self).__name__} at t = {self.t:.6g}: {whole.size} unknowns "
@@ -387,7 +387,7 @@ class Modes:
     shapes: tuple[Shape, ...]
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         return f"<Modes: frequencies {few(f'{f:.6g}' for f in self.frequencies)}>"
 
     @property

@@ -81,7 +81,7 @@ class Study(Paths, Fitted):
         super().__setattr__(name, value)
 
     def __repr__(self) -> str:
-        """What was written down, in a line."""
+        """Summary in one line."""
         written = self._statement
         blocks = few(f"{b.name} ({b.kernel.name})" for b in written.blocks.values())
         calls = Counter(["fix"] * len(written.conditions) + [f.what for f in written.forces])

@@ -74,7 +74,7 @@ class System:
     contacts: tuple[Sought, ...] = ()
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         names = few(self.numbering.layout.names)
         return f"<System: {self.size} unknowns ({names}); blocks: {few(self.blocks)}>"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -58,12 +59,17 @@ def read_series(path: Path) -> list[tuple[float, str]]:
         raise StudyError(f"{str(path)!r} is no series of results; remove it") from None
 
 
+LOG = logging.getLogger("softehl")
+"""Every step, at the level INFO; nobody listens unless a script asks for it."""
+
+
 @dataclass(eq=False)
 class Progress:
     """One line on the terminal that tells where a path is; a line for each step elsewhere.
 
     name: of what grows, such as "load factor", from `begin` to `until` (None: it is not known).
-    inplace: rewrite the one line. note: gives what is said at the end of each.
+    inplace: rewrite the one line. note: gives what is said at the end of each. shown: on the
+    terminal; what is not goes to the log alone.
     """
 
     name: str
@@ -71,6 +77,7 @@ class Progress:
     until: float | None
     inplace: bool
     note: Callable[[], str] = str
+    shown: bool = True
     steps: int = 0
     since: float = field(default_factory=time.monotonic)
 
@@ -79,18 +86,23 @@ class Progress:
         if not self.steps and result.t == self.begin:
             return  # where the path begins
         self.steps += 1
+        if not (self.shown or LOG.isEnabledFor(logging.INFO)):
+            return
         end = "" if self.until is None else f" of {self.until:g}"
         note = self.note()
         text = (
             f"step {self.steps}: {self.name} {result.t:.4g}{end}, {result.iterations} iterations, "
             f"{time.monotonic() - self.since:.1f} s{f' ({note})' if note else ''}"
         )
+        LOG.info(text)
+        if not self.shown:
+            return
         sys.stderr.write(f"\r\x1b[K{text}" if self.inplace else f"{text}\n")
         sys.stderr.flush()
 
     def close(self) -> None:
         """Leave the line as it is."""
-        if self.inplace and self.steps:
+        if self.shown and self.inplace and self.steps:
             sys.stderr.write("\n")
 
 
@@ -143,8 +155,9 @@ class Telling:
     note: Callable[[], str] = str
 
     def until(self, end: float | None) -> Progress | None:
-        """Progress up to an end, where it is wanted."""
-        terminal = sys.stderr.isatty()
-        if not self.speaks or not (terminal if self.wanted is None else self.wanted):
+        """Progress up to an end, shown where it is wanted; None on the other processes."""
+        if not self.speaks:
             return None
-        return Progress(self.name, self.begin, end, terminal, self.note)
+        terminal = sys.stderr.isatty()
+        shown = terminal if self.wanted is None else self.wanted
+        return Progress(self.name, self.begin, end, terminal, self.note, shown)

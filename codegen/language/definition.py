@@ -123,7 +123,7 @@ class Definition:
     """The page as written, by which kernels are checked; nothing is derived from it."""
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         shown = self.unknowns if len(self.unknowns) <= 6 else self.unknowns[:5]
         more = f", ... ({len(self.unknowns)})" if len(self.unknowns) > 6 else ""
         names = ", ".join(shown) or "none"

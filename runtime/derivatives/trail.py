@@ -48,7 +48,7 @@ class Trail:
     memo: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         return f"<Trail at t = {self.step.t:.6g}: {self.system!r}>"
 
     def __getstate__(self) -> dict[str, Any]:

@@ -117,7 +117,7 @@ class ElementBlock:
     )
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         return f"<ElementBlock {self.name}: {len(self.dofs)} elements of {self.kernel.name}>"
 
     def __getstate__(self) -> dict[str, Any]:
@@ -261,7 +261,7 @@ class Assembler:
     memo: Memo = field(default_factory=Memo)
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         return f"<Assembler: {self.size} unknowns; blocks: {few(b.name for b in self.blocks)}>"
 
     def __getstate__(self) -> dict[str, Any]:

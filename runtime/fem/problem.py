@@ -75,7 +75,7 @@ class Problem:
         self._require_prescribed()
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         return (
             f"<{type(self).__name__}: {self.layout.total} unknowns ({few(self.layout.names)}), "
             f"{len(self.fixed)} prescribed; blocks: {few(self.parameters)}>"

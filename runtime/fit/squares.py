@@ -44,7 +44,7 @@ class Fit:
     message: str
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         values = [
             f"{key} = {value:.6g}" if np.ndim(value) == 0 else f"{key}: {len(value)} values"  # type: ignore[arg-type]
             for key, value in self.values.items()

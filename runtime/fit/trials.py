@@ -56,7 +56,7 @@ class Objective:
     quantity: Quantity
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         return f"<Objective: {type(self.quantity).__name__} by {few(map(str, self._keys))}>"
 
     @property

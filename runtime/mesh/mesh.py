@@ -104,7 +104,7 @@ class Mesh:
             object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         kinds = listed(f"{len(nodes)} {kind}" for kind, nodes in self.cells.items())
         return (
             f"<Mesh: {len(self.points)} points in {self.dimension}-D, {kinds}; groups: "

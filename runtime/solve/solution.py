@@ -169,7 +169,7 @@ class Branch:
     limit_points: tuple[LimitPoint, ...] = ()
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         ends = " to ".join(f"{t:.6g}" for t in (*self.parameters[:1], *self.parameters[-1:]))
         return (
             f"<Branch: {len(self.points)} points, {ends or 'none'}; {self.status.value}; "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import os
 from pathlib import Path
 from typing import Any
@@ -139,3 +140,16 @@ def test_a_march_tells_its_time(capsys: pytest.CaptureFixture[str]) -> None:
         "step 1: t 0.5 of 1",
         "step 2: t 1 of 1",
     ]
+
+
+def test_steps_go_to_the_log_whether_they_are_shown_or_not(
+    caplog: pytest.LogCaptureFixture, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pulled().solve(steps=2)
+    assert caplog.messages == []
+    with caplog.at_level(logging.INFO, logger="softehl"):
+        pulled().solve(steps=2)
+        pulled().solve(steps=2, progress=True)
+    steps = [message.partition(",")[0] for message in caplog.messages]
+    assert steps == 2 * ["step 1: load factor 0.5 of 1", "step 2: load factor 1 of 1"]
+    assert len(capsys.readouterr().err.splitlines()) == 2

@@ -40,7 +40,7 @@ class Element:
     rule: QuadratureRule
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         return f"<Element {self.name}: {len(self.nodes)} nodes>"
 
     @property

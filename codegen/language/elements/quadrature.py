@@ -25,7 +25,7 @@ class QuadratureRule:
     weights: tuple[sp.Expr, ...]
 
     def __repr__(self) -> str:
-        """What it is, in a line."""
+        """Summary in one line."""
         return f"<QuadratureRule: {len(self.weights)} points in {self.dimension}-D>"
 
     def rows(self) -> list[list[Fraction]]:
