@@ -59,9 +59,19 @@ class Inputs:
         return None if self.foreign else found
 
 
+_ONE = threading.RLock()
+"""Modules and the path of imports are those of the process: one thread runs models at a time."""
+
+
 @contextmanager
 def imports_from(folder: Path) -> Iterator[Inputs]:
     """Let a model import its neighbours, and put the modules back that were there before."""
+    with _ONE, _isolated(folder) as inputs:
+        yield inputs
+
+
+@contextmanager
+def _isolated(folder: Path) -> Iterator[Inputs]:
     inputs, finder = Inputs(), _Finder(folder)
     finder.inputs = inputs
     before = _modules_in(folder, finder)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import ModuleType
 
@@ -179,3 +180,15 @@ def test_a_page_is_what_it_closes_over() -> None:
     factor = 6
     six = softehl.load_kernel(flow, cell="line2").energy(X, T)
     np.testing.assert_allclose([three[0], six[0]], [3.0, 6.0], rtol=1e-15)
+
+
+def test_threads_run_models_one_at_a_time() -> None:
+    for value in (1, 2, 3, 4):
+        write(f"folder_{value}/consts.py", f"import time\ntime.sleep(0.02)\nFACTOR = {value}\n")
+        model("from consts import FACTOR\n", name=f"folder_{value}/mine.py")
+    write("consts.py", "FACTOR = 7\n")
+    before = imported("consts")
+    paths = [Path(f"folder_{value}/mine.py") for value in (1, 2, 3, 4) * 2]
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(said, paths)) == [factor(value) for value in (1, 2, 3, 4) * 2]
+    assert sys.modules["consts"] is before
