@@ -228,6 +228,8 @@ class Call:
         return [parameters[p] for p in self.kernel.parameters]
 
     def _array(self, what: str, value: Any, shape: tuple[int, ...]) -> Array:
+        if isinstance(value, np.ma.MaskedArray):
+            raise ArgumentError(f"{self.kernel.name}: {what} is a masked array: fill it first")
         given = np.asarray(value)
         if given.dtype.kind not in "fiu":
             raise ArgumentError(

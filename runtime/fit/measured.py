@@ -47,6 +47,8 @@ def _series(words: str, given: Any, times: Array) -> list[tuple[float, float]]:
     if isinstance(given, Mapping):
         pairs = [(float(t), float(v)) for t, v in given.items()]
     else:
+        if isinstance(given, np.ma.MaskedArray):
+            raise StudyError(f"{words} is a masked array: give {{t: number}} of what was measured")
         row = np.asarray(given, dtype=np.float64)
         if row.ndim and row.shape != times.shape:
             raise StudyError(

@@ -216,7 +216,7 @@ class Mesh:
 
     def map(self, move: Callable[[Array], Array]) -> Mesh:
         """The mesh with nodes at `move(points)`, (n, dim) -> (n, dim)."""
-        moved = np.asarray(move(self.points))
+        moved = _frozen("moved points", move(self.points))
         if moved.ndim != 2 or len(moved) != len(self.points):
             raise MeshError(f"map: shape {moved.shape} from {self.points.shape}")
         return replace(self, points=moved)

@@ -34,6 +34,8 @@ def form_of(
 def elements_on(name: str, on: Any) -> On:
     """A side, or node numbers as an array, which may be given as lists.  Raises StudyError."""
     given: On = on
+    if isinstance(on, np.ma.MaskedArray):
+        raise StudyError(f"{name!r}: on is a masked array, whose mask says nothing here")
     if not isinstance(on, list | tuple):
         return given
     try:

@@ -332,3 +332,17 @@ def test_a_page_of_a_script_is_pickled_as_its_kernel() -> None:
     assert result.at((1,)) == {"u": 0.5}
     with pytest.raises(StudyError, match="need the page of rod_line2: add it from a model file"):
         result.sensitivity("u", by={"rod": ["k"]}, at=(1,))
+
+
+def test_masks_are_refused_wherever_numbers_are_taken() -> None:
+    study = bar(load=1.0)
+    mesh, masked = study.mesh, np.ma.masked_array([1.0, 2.0], [True, False])
+    for ask in (
+        lambda: mesh.map(lambda x: np.ma.masked_less(x, 0.5)),
+        lambda: study.add("more", rod, on=np.ma.masked_array([[0, 1]], False), k=1.0),
+        lambda: study.fit({(2, 0): {"u_x": masked}}, by={"bar": ["E"]}, steps=2),
+        lambda: softehl.load_kernel(rod, cell="line2").energy(masked[None], masked[None]),
+    ):
+        with pytest.raises(softehl.SoftehlError, match="masked array") as caught:
+            ask()
+        assert "\n" not in str(caught.value)
