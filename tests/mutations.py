@@ -486,6 +486,25 @@ FAULTS = (
         "stress[i] = fields[i] - beta[i];",
         "tests/codegen/hosts/test_materials.py",
     ),
+    # what runs and what is held are what was given
+    Fault(
+        "codegen/tools/neighbours.py",
+        "    for name in before:\n        del sys.modules[name]\n",
+        "",
+        "tests/codegen/test_neighbours.py",
+    ),
+    Fault(
+        "codegen/tools/cache.py",
+        'for path, told in stored["read"].items()',
+        "for path, told in ()",
+        "tests/codegen/test_neighbours.py -k table",
+    ),
+    Fault(
+        "runtime/arrays.py",
+        "copied = np.array(array, subok=False)",
+        "copied = np.asarray(array)",
+        "tests/runtime/test_ownership.py -k arrays",
+    ),
 )
 
 
