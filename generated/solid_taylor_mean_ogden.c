@@ -144,26 +144,31 @@ static void softehl_solid_taylor_mean_ogden_isochoric_1_lanes(
     }
 }
 
-/* (w_a - w_b) / (c_a - c_b) of a symmetric function; w holds w_1, w_2, w_3, w_11, ...
-   Where c_a and c_b differ by less than 5 %, as the mean of (w_aa - 2 w_ab + w_bb) / 2 on the line
-   between (c_a, c_b) and (c_b, c_a), by Gauss's rule of four points: exact to rounding. */
-static double softehl_divided(
-    int (*of_eigenvalues)(const double *, const double *, double *), const double *c,
-    const double *p, const double *w, int a, int b)
+/* (log(u) - log(v)) / (u - v) */
+static int softehl_solid_taylor_mean_ogden_divided_log(const double *restrict p, double *restrict s)
 {
-    const double gap = c[a] - c[b], middle = 0.5 * (c[a] + c[b]);
-    if (fabs(gap) > 0.05 * middle) return (w[a] - w[b]) / gap;
-    static const double at[2] = {0.33998104358485626, 0.86113631159405258};
-    static const double weight[2] = {0.65214515486254614, 0.34785484513745386};
-    double mean = 0.0;
-    for (int k = 0; k < 2; ++k) {
-        double near[3] = {c[0], c[1], c[2]}, there[12];
-        near[a] = middle + 0.5 * at[k] * gap, near[b] = middle - 0.5 * at[k] * gap;
-        if (of_eigenvalues(near, p, there)) return NAN;
-        const double *second = there + 3;
-        mean += weight[k] * (second[4 * a] - 2.0 * second[3 * a + b] + second[4 * b]);
+    const double u = p[0], v = p[1], f = p[2], g = p[3], d = u - v;
+    (void)f, (void)g;
+    if (fabs(f - g) > 0.25 * (fabs(f) + fabs(g))) {
+        s[0] = (f - g) / d;
+        return 0;
     }
-    return 0.5 * mean;
+    const double z = d / v;
+    s[0] = z == 0.0 ? 1.0 / v : log1p(z) / d;
+    return 0;
+}
+
+/* (exp(u) - exp(v)) / (u - v) */
+static int softehl_solid_taylor_mean_ogden_divided_exp(const double *restrict p, double *restrict s)
+{
+    const double u = p[0], v = p[1], f = p[2], g = p[3], d = u - v;
+    (void)f, (void)g;
+    if (fabs(f - g) > 0.25 * (fabs(f) + fabs(g))) {
+        s[0] = (f - g) / d;
+        return 0;
+    }
+    s[0] = d == 0.0 ? f : g * expm1(d) / d;
+    return 0;
 }
 
 /* isochoric_1_2: first and second derivatives by the eigenvalues */
@@ -172,19 +177,51 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_2_of_eigenvalues(
 {
     int failed = 0;
     (void)s, (void)p;
-    const double v1 = log(s[0]), v2 = exp(p[5] * v1), v3 = p[1] * p[6], v4 = exp(p[7] * v1),
-        v5 = p[2] * p[8], v6 = exp(p[3] * v1), v7 = p[0] * p[4], v8 = 1.0 / s[0],
-        v9 = v8 * (v5 * (p[7] * v4) + v3 * (p[5] * v2) + v7 * (p[3] * v6)), v10 = log(s[1]),
-        v11 = exp(p[5] * v10), v12 = exp(p[7] * v10), v13 = exp(p[3] * v10), v14 = 1.0 / s[1],
-        v15 = v14 * (v5 * (p[7] * v12) + v3 * (p[5] * v11) + v7 * (p[3] * v13)), v16 = log(s[2]),
-        v17 = exp(p[5] * v16), v18 = exp(p[7] * v16), v19 = exp(p[3] * v16), v20 = 1.0 / s[2],
-        v21 = v20 * (v5 * (p[7] * v18) + v3 * (p[5] * v17) + v7 * (p[3] * v19)), v22 = p[5] * p[5],
-        v23 = p[7] * p[7], v24 = p[3] * p[3],
-        v25 = v8 * (v8 * (v4 * v5 * v23 + v2 * v3 * v22 + v6 * v7 * v24) - v9),
-        v26 = v14 * (v14 * (v12 * v5 * v23 + v11 * v3 * v22 + v13 * v7 * v24) - v15),
-        v27 = v20 * (v20 * (v18 * v5 * v23 + v17 * v3 * v22 + v19 * v7 * v24) - v21);
-    w[0] = v9; w[1] = v15; w[2] = v21; w[3] = v25; w[4] = 0.0; w[5] = 0.0; w[6] = 0.0; w[7] = v26;
-    w[8] = 0.0; w[9] = 0.0; w[10] = 0.0; w[11] = v27;
+    const double v1 = log(s[0]), v2 = p[5] * v1, v3 = exp(v2), v4 = p[1] * p[6], v5 = p[7] * v1,
+        v6 = exp(v5), v7 = p[2] * p[8], v8 = p[3] * v1, v9 = exp(v8), v10 = p[0] * p[4],
+        v11 = 1.0 / s[0], v12 = v11 * (v7 * (p[7] * v6) + v4 * (p[5] * v3) + v10 * (p[3] * v9)),
+        v13 = log(s[1]), v14 = p[5] * v13, v15 = exp(v14), v16 = p[7] * v13, v17 = exp(v16),
+        v18 = p[3] * v13, v19 = exp(v18), v20 = 1.0 / s[1],
+        v21 = v20 * (v7 * (p[7] * v17) + v4 * (p[5] * v15) + v10 * (p[3] * v19)), v22 = log(s[2]),
+        v23 = p[5] * v22, v24 = exp(v23), v25 = p[7] * v22, v26 = exp(v25), v27 = p[3] * v22,
+        v28 = exp(v27), v29 = 1.0 / s[2],
+        v30 = v29 * (v7 * (p[7] * v26) + v4 * (p[5] * v24) + v10 * (p[3] * v28)), v31 = p[5] * p[5],
+        v32 = p[7] * p[7], v33 = p[3] * p[3],
+        v34 = v11 * (v11 * (v6 * v7 * v32 + v3 * v4 * v31 + v9 * v10 * v33) - v12),
+        v35 = v20 * (v20 * (v17 * v7 * v32 + v15 * v4 * v31 + v19 * v10 * v33) - v21),
+        v36 = v29 * (v29 * (v26 * v7 * v32 + v24 * v4 * v31 + v28 * v10 * v33) - v30);
+    double v37[1];
+    failed |= softehl_solid_taylor_mean_ogden_divided_exp((const double[]){v2, v14, v3, v15}, v37);
+    const double v38 = v37[0], v39 = v4 * v31;
+    double v40[1];
+    failed |= softehl_solid_taylor_mean_ogden_divided_exp((const double[]){v5, v16, v6, v17}, v40);
+    const double v41 = v40[0], v42 = v7 * v32;
+    double v43[1];
+    failed |= softehl_solid_taylor_mean_ogden_divided_exp((const double[]){v8, v18, v9, v19}, v43);
+    const double v44 = v43[0], v45 = v10 * v33;
+    double v46[1];
+    failed |= softehl_solid_taylor_mean_ogden_divided_log((const double[]){s[0], s[1], v1, v13}, v46);
+    const double v47 = v46[0], v48 = v20 * (v47 * (v41 * v42 + v38 * v39 + v44 * v45) - v12);
+    double v49[1];
+    failed |= softehl_solid_taylor_mean_ogden_divided_exp((const double[]){v2, v23, v3, v24}, v49);
+    const double v50 = v49[0]; double v51[1];
+    failed |= softehl_solid_taylor_mean_ogden_divided_exp((const double[]){v5, v25, v6, v26}, v51);
+    const double v52 = v51[0]; double v53[1];
+    failed |= softehl_solid_taylor_mean_ogden_divided_exp((const double[]){v8, v27, v9, v28}, v53);
+    const double v54 = v53[0]; double v55[1];
+    failed |= softehl_solid_taylor_mean_ogden_divided_log((const double[]){s[0], s[2], v1, v22}, v55);
+    const double v56 = v55[0], v57 = v29 * (v56 * (v52 * v42 + v50 * v39 + v54 * v45) - v12);
+    double v58[1];
+    failed |= softehl_solid_taylor_mean_ogden_divided_exp((const double[]){v14, v23, v15, v24}, v58);
+    const double v59 = v58[0]; double v60[1];
+    failed |= softehl_solid_taylor_mean_ogden_divided_exp((const double[]){v16, v25, v17, v26}, v60);
+    const double v61 = v60[0]; double v62[1];
+    failed |= softehl_solid_taylor_mean_ogden_divided_exp((const double[]){v18, v27, v19, v28}, v62);
+    const double v63 = v62[0]; double v64[1];
+    failed |= softehl_solid_taylor_mean_ogden_divided_log((const double[]){s[1], s[2], v13, v22}, v64);
+    const double v65 = v64[0], v66 = v29 * (v65 * (v61 * v42 + v59 * v39 + v63 * v45) - v21);
+    w[0] = v12; w[1] = v21; w[2] = v30; w[3] = v34; w[4] = 0.0; w[5] = 0.0; w[6] = v35; w[7] = 0.0;
+    w[8] = v36; w[9] = v48; w[10] = v57; w[11] = v66;
     return failed;
 }
 
@@ -196,24 +233,26 @@ static int softehl_solid_taylor_mean_ogden_isochoric_1_2(const double *restrict 
         return 1;
     }
     static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
-    double E[6][6], H[6][6] = {{0.0}};
+    static const int at[3][3] = {{3, 4, 5}, {4, 6, 7}, {5, 7, 8}};
+    double E[6][6], H[6][6];
     for (int k = 0, a = 0; a < 3; ++a)
-        for (int b = a; b < 3; ++b, ++k) {
+        for (int b = a; b < 3; ++b) {
+            const int n = a == b ? a : 3 + k++;
             for (int i = 0; i < 6; ++i) {
                 const double *x = Q + 3 * row[i], *y = Q + 3 * column[i];
-                E[k][i] = (i > 2 ? 1.0 : 0.5) * (x[a] * y[b] + x[b] * y[a]);
+                E[n][i] = (i > 2 ? 1.0 : 0.5) * (x[a] * y[b] + x[b] * y[a]);
             }
-            if (a != b)
-                H[k][k] = 2.0 * softehl_divided(softehl_solid_taylor_mean_ogden_isochoric_1_2_of_eigenvalues, c, p + 6, w, a, b);
         }
-    static const int own[3] = {0, 3, 5};
-    for (int a = 0; a < 3; ++a)
-        for (int b = 0; b < 3; ++b) H[own[a]][own[b]] = w[3 + 3 * a + b];
+    for (int i = 0; i < 6; ++i)
+        for (int a = 0; a < 3; ++a) {
+            H[a][i] = 0.0;
+            for (int b = 0; b < 3; ++b) H[a][i] += w[at[a][b]] * E[b][i];
+            H[3 + a][i] = 2.0 * w[9 + a] * E[3 + a][i];
+        }
     for (int n = 0, i = 0; i < 6; ++i)
         for (int j = i; j < 6; ++j, ++n) {
             s[n] = 0.0;
-            for (int k = 0; k < 6; ++k)
-                for (int l = 0; l < 6; ++l) s[n] += H[k][l] * E[k][i] * E[l][j];
+            for (int k = 0; k < 6; ++k) s[n] += E[k][i] * H[k][j];
         }
     return 0;
 }

@@ -9,8 +9,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Sequence
 
+from softehl.codegen.emit.divided import quotient
 from softehl.codegen.emit.printer import Printer, number
 from softehl.codegen.emit.schedule import schedule
+from softehl.codegen.graph.divide import Quotient
 from softehl.codegen.graph.graph import Graph, Node, Op, Routine
 from softehl.codegen.graph.routines import Inverse, Isotropic, Newton, derivatives_of_energy
 from softehl.codegen.graph.traverse import reachable
@@ -43,7 +45,9 @@ def _text(d: Definition, r: Routine) -> list[str]:
         case Inverse():
             return [_ELIMINATE, _inverse(d, r)]
         case Isotropic():
-            return [_JACOBI, *([_DIVIDED] if r.order == 2 else []), *_isotropic(d, r)]
+            return [_JACOBI, *_isotropic(d, r)]
+        case Quotient():
+            return quotient(r.op, _signature(d, r))
     raise TypeError(f"no C for {r}")
 
 
@@ -152,7 +156,7 @@ static int {name}(
         for (int k = 0; k < {r.outputs}; ++k) s[k] = NAN;
         return 1;
     }}
-{_ASSEMBLE[r.order].replace("OF_EIGENVALUES", name)}    return 0;
+{_ASSEMBLE[r.order]}    return 0;
 }}
 """
     return [*texts(d, body.called), local, text]
@@ -239,29 +243,6 @@ static int softehl_eigenvalues(const double *restrict C, double *restrict c, dou
 }
 """
 
-_DIVIDED = """/* (w_a - w_b) / (c_a - c_b) of a symmetric function; w holds w_1, w_2, w_3, w_11, ...
-   Where c_a and c_b differ by less than 5 %, as the mean of (w_aa - 2 w_ab + w_bb) / 2 on the line
-   between (c_a, c_b) and (c_b, c_a), by Gauss's rule of four points: exact to rounding. */
-static double softehl_divided(
-    int (*of_eigenvalues)(const double *, const double *, double *), const double *c,
-    const double *p, const double *w, int a, int b)
-{
-    const double gap = c[a] - c[b], middle = 0.5 * (c[a] + c[b]);
-    if (fabs(gap) > 0.05 * middle) return (w[a] - w[b]) / gap;
-    static const double at[2] = {0.33998104358485626, 0.86113631159405258};
-    static const double weight[2] = {0.65214515486254614, 0.34785484513745386};
-    double mean = 0.0;
-    for (int k = 0; k < 2; ++k) {
-        double near[3] = {c[0], c[1], c[2]}, there[12];
-        near[a] = middle + 0.5 * at[k] * gap, near[b] = middle - 0.5 * at[k] * gap;
-        if (of_eigenvalues(near, p, there)) return NAN;
-        const double *second = there + 3;
-        mean += weight[k] * (second[4 * a] - 2.0 * second[3 * a + b] + second[4 * b]);
-    }
-    return 0.5 * mean;
-}
-"""
-
 _ENTRIES = """    static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
 """
 _ASSEMBLE = (
@@ -273,24 +254,26 @@ _ASSEMBLE = (
         if (i > 2) s[i] *= 2.0;
     }}
 """,
-    f"""{_ENTRIES}    double E[6][6], H[6][6] = {{{{0.0}}}};
+    f"""{_ENTRIES}    static const int at[3][3] = {{{{3, 4, 5}}, {{4, 6, 7}}, {{5, 7, 8}}}};
+    double E[6][6], H[6][6];
     for (int k = 0, a = 0; a < 3; ++a)
-        for (int b = a; b < 3; ++b, ++k) {{
+        for (int b = a; b < 3; ++b) {{
+            const int n = a == b ? a : 3 + k++;
             for (int i = 0; i < 6; ++i) {{
                 const double *x = Q + 3 * row[i], *y = Q + 3 * column[i];
-                E[k][i] = (i > 2 ? 1.0 : 0.5) * (x[a] * y[b] + x[b] * y[a]);
+                E[n][i] = (i > 2 ? 1.0 : 0.5) * (x[a] * y[b] + x[b] * y[a]);
             }}
-            if (a != b)
-                H[k][k] = 2.0 * softehl_divided(OF_EIGENVALUES, c, p + 6, w, a, b);
         }}
-    static const int own[3] = {{0, 3, 5}};
-    for (int a = 0; a < 3; ++a)
-        for (int b = 0; b < 3; ++b) H[own[a]][own[b]] = w[3 + 3 * a + b];
+    for (int i = 0; i < 6; ++i)
+        for (int a = 0; a < 3; ++a) {{
+            H[a][i] = 0.0;
+            for (int b = 0; b < 3; ++b) H[a][i] += w[at[a][b]] * E[b][i];
+            H[3 + a][i] = 2.0 * w[9 + a] * E[3 + a][i];
+        }}
     for (int n = 0, i = 0; i < 6; ++i)
         for (int j = i; j < 6; ++j, ++n) {{
             s[n] = 0.0;
-            for (int k = 0; k < 6; ++k)
-                for (int l = 0; l < 6; ++l) s[n] += H[k][l] * E[k][i] * E[l][j];
+            for (int k = 0; k < 6; ++k) s[n] += E[k][i] * H[k][j];
         }}
 """,
 )

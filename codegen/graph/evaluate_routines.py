@@ -6,13 +6,17 @@ of stretches are differences of the function of the matrix.
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import mpmath
+from mpmath.libmp import NoConvergence
 
-from softehl.codegen.graph.graph import Node, Routine
-from softehl.codegen.graph.routines import Inverse, Isotropic, Newton
+from softehl.codegen.graph.arithmetic import number
+from softehl.codegen.graph.graph import Input, Node, Op, Place, Routine
+from softehl.codegen.graph.routines import Inverse, Isotropic, Newton, depends
+from softehl.codegen.graph.traverse import reachable
 
 Number = Any
 Vector = list[Number]
@@ -97,3 +101,76 @@ def _energy(r: Isotropic, args: Vector, evaluate: Evaluate) -> Number:
     a, b, c, d, e, f = args[:6]
     eigenvalues = mpmath.eigsy(mpmath.matrix([[a, d, e], [d, b, f], [e, f, c]]), eigvals_only=True)
     return evaluate([r.energy], list(eigenvalues), args[6:])[0]
+
+
+def symmetric(value: Node, unknowns: Sequence[Node]) -> bool:
+    """True when `value` does not change under exchanges of `unknowns`.
+
+    It is compared at random points between 1/64 and 64, where a function that is one-sided far
+    from 1 shows it; points without a real value are left out.
+    """
+    rng = random.Random(0)
+    inside = depends([value], unknowns)
+    leaves = (Op.INPUT, Op.SUM, Op.ITEM)
+    inputs = [n for n in reachable([value]) if n.op in leaves and n not in inside]
+    with mpmath.workdps(30):
+        for width in (0.5, 2, 4, 6, 6, 6, 6, 6):
+            point = [mpmath.mpf(2) ** rng.uniform(-width, width) for _ in unknowns]
+            at = {n: mpmath.mpf(2) ** rng.uniform(-width, width) for n in inputs}
+            turns = [list(reversed(point))]
+            turns += [[*point[k:], *point[:k]] for k in range(len(unknowns))]
+            found = [_value_at(value, {**at, **dict(zip(unknowns, t, strict=True))}) for t in turns]
+            if any(v is None for v in found):
+                if any(v is not None for v in found):
+                    return False
+            elif any(abs(v - found[0]) > 1e-20 * (1 + abs(found[0])) for v in found):
+                return False
+    return True
+
+
+def alike(a: Node, b: Node) -> bool:
+    """True when two values are equal at random values of all that enters them."""
+    rng = random.Random(1)
+    leaves = [n for n in reachable([a, b]) if n.op in (Op.INPUT, Op.SUM, Op.ITEM)]
+    with mpmath.workdps(30):
+        at = {n: mpmath.mpf(rng.uniform(-1, 1)) for n in leaves}
+        one, other = _value_at(a, dict(at)), _value_at(b, dict(at))
+        return None in (one, other) or abs(one - other) <= 1e-20 * (1 + abs(one))
+
+
+def _value_at(value: Node, at: dict[Node, Any]) -> Any:
+    """A value from those of the inputs; None where it is not real."""
+    for n in reachable([value], stop=at.__contains__):
+        if n not in at:
+            try:
+                at[n] = _operation(n, [at[a] for a in n.args])
+            except (ArithmeticError, TypeError, ValueError, NoConvergence):
+                return None
+    real = not isinstance(at[value], mpmath.mpc) and not mpmath.isnan(at[value])
+    return at[value] if real else None
+
+
+def _operation(n: Node, args: Vector) -> Any:
+    if n.op is Op.ITEM:
+        assert isinstance(n.payload, Place)
+        return args[0][n.payload.index]
+    if n.op is Op.CALL:
+        assert isinstance(n.payload, Routine)
+        return results(n.payload, args, _localised)
+    return number(n, args)
+
+
+def _localised(values: Sequence[Node], local: Vector, external: Vector) -> Vector:
+    """Values of a routine from its arguments."""
+    at: dict[Node, Any] = {}
+    arrays = {"local": local, "external": external}
+    found = []
+    for n in reachable(values):
+        if n.op is Op.INPUT:
+            assert isinstance(n.payload, Input)
+            at[n] = arrays[n.payload.array][n.payload.index]
+    for value in values:
+        found.append(_value_at(value, at))
+        if found[-1] is None:
+            raise ValueError("a local equation has no real value")
+    return found

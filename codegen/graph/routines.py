@@ -6,16 +6,12 @@ derivatives are results of routines and ordinary nodes, so that they can be diff
 
 from __future__ import annotations
 
-import random
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
 
-import mpmath
-
-from softehl.codegen.graph.arithmetic import number
 from softehl.codegen.graph.differentiate import gradient, guarded, plus
+from softehl.codegen.graph.divide import Divided, exchanged
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, Place, Routine
 from softehl.codegen.graph.partials import DifferentiationError
 from softehl.codegen.graph.traverse import reachable, substitute, written_out
@@ -149,6 +145,20 @@ class Newton(Routine):
         columns = list(zip(*B, strict=True))
         return [[_contracted(g, [g.neg(x) for x in row], c) for c in columns] for row in X]
 
+    def divided(self, between: Divided, call: Node) -> list[Node]:
+        """Divided differences of the results: the equations have none."""
+        g, there = between.g, between.other[call]
+        s, p = items(g, call), call.args[: self.inputs - self.outputs]
+        other = dict(zip([*s, *p], [*items(g, there), *there.args], strict=False))
+        rows, same = between.slopes(lifted(g, self.equations, s, p), other)
+        X = inverse(g, [row[: len(s)] for row in rows])
+        moved = [_contracted(g, row[len(s) :], [between.rates[a] for a in p]) for row in rows]
+        found = [g.neg(_contracted(g, row, moved)) for row in X]
+        if same is None:
+            return found
+        apart = [g.div(g.sub(a, other[a]), between.gap) for a in s]
+        return [g.branch(same, a, b) for a, b in zip(found, apart, strict=True)]
+
 
 def _contracted(g: Graph, a: Sequence[Node], b: Sequence[Node]) -> Node:
     """Sum of a_i b_i, in one branch where the b_i have one: its other side stays unseen."""
@@ -196,6 +206,13 @@ class Inverse(Routine):
             out.append((a, g.neg(g.mul(X[i * self.size + k], X[l * self.size + j]))))
         return out
 
+    def divided(self, between: Divided, call: Node) -> list[Node]:
+        """Divided differences of the results: X - X' = -X (A - A') X'."""
+        g, n = between.g, self.size
+        X, Y = items(g, call), items(g, between.other[call])
+        half = _product(g, n, X, [between.rates[a] for a in call.args])
+        return [g.neg(v) for v in _product(g, n, half, Y)]
+
 
 _INVERSES = {n: Inverse(f"inverse_{n}", n * n, n * n, n) for n in range(4, 33)}
 
@@ -229,6 +246,12 @@ def _sum(g: Graph, products: Iterable[tuple[Node, Node]]) -> Node:
     for a, b in products:
         total = g.add(total, g.mul(a, b))
     return total
+
+
+def _product(g: Graph, n: int, A: Sequence[Node], B: Sequence[Node]) -> list[Node]:
+    """Product of two matrices, row by row."""
+    rows = [A[n * i : n * i + n] for i in range(n)]
+    return [_sum(g, zip(row, B[j::n], strict=True)) for row in rows for j in range(n)]
 
 
 # ------------------------------------------------------------------------ functions of stretches
@@ -277,53 +300,28 @@ def isotropic(name: str, inputs: int, energy: Node, order: int = 0) -> Isotropic
     return Isotropic(name, inputs, (1, 6, 21)[order], energy, order)
 
 
-def symmetric(value: Node, unknowns: Sequence[Node]) -> bool:
-    """True when `value` does not change under exchanges of `unknowns`.
-
-    It is compared at random points between 1/64 and 64, where a function that is one-sided far
-    from 1 shows it; points without a real value are left out.
-    """
-    rng = random.Random(0)
-    inputs = [n for n in reachable([value]) if n.op in (Op.INPUT, Op.SUM, Op.ITEM)]
-    with mpmath.workdps(30):
-        for width in (0.5, 2, 4, 6, 6, 6, 6, 6):
-            point = [mpmath.mpf(2) ** rng.uniform(-width, width) for _ in unknowns]
-            at = {n: mpmath.mpf(2) ** rng.uniform(-width, width) for n in inputs}
-            turns = [list(reversed(point))]
-            turns += [[*point[k:], *point[:k]] for k in range(len(unknowns))]
-            found = [_value_at(value, {**at, **dict(zip(unknowns, t, strict=True))}) for t in turns]
-            if any(v is None for v in found):
-                if any(v is not None for v in found):
-                    return False
-            elif any(abs(v - found[0]) > 1e-20 * (1 + abs(found[0])) for v in found):
-                return False
-    return True
-
-
-def _value_at(value: Node, at: dict[Node, Any]) -> Any:
-    """A value from those of the inputs; None where it is not real."""
-    for n in reachable([value]):
-        if n not in at and n.op is not Op.CALL:
-            try:
-                at[n] = number(n, [at[a] for a in n.args])
-            except (ArithmeticError, TypeError, ValueError):
-                return None
-    return None if isinstance(at[value], mpmath.mpc) else at[value]
-
-
 def upper(i: int, j: int) -> int:
     """Position of entry (i, j) in the upper triangle of a symmetric 6x6 matrix."""
     i, j = min(i, j), max(i, j)
     return i * 6 - i * (i - 1) // 2 + j - i
 
 
+PAIRS = ((0, 1), (0, 2), (1, 2))
+"""Order of the pairs of eigenvalues."""
+
+
 def derivatives_of_energy(g: Graph, r: Isotropic) -> list[Node]:
-    """Values that the C function of order 0, 1 or 2 needs: w; w_a; w_a, then the rows of w_ab."""
+    """Values that the C function of order 0, 1 or 2 needs: w; w_a; w_a, then those below.
+
+    The upper triangle of w_ab, row by row, then (w_a - w_b) / (c_a - c_b) of every pair: w_b is
+    w_a with the two exchanged.
+    """
     if r.order == 0:
         return [r.energy]
     c = [g.input("local", k) for k in range(3)]
     first = gradient(g, r.energy, c)
     if r.order == 1:
         return [first[a] for a in c]
-    second = [[gradient(g, first[a], c)[b] for b in c] for a in c]
-    return [*(first[a] for a in c), *(n for row in second for n in row)]
+    second = [gradient(g, first[a], c)[b] for k, a in enumerate(c) for b in c[k:]]
+    divided = [exchanged(g, [first[c[a]]], c[a], c[b])(first[c[a]]) for a, b in PAIRS]
+    return [*(first[a] for a in c), *second, *divided]

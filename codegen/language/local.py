@@ -8,16 +8,17 @@ from typing import Any
 
 import sympy as sp
 
+from softehl.codegen.graph.evaluate_routines import alike, symmetric
 from softehl.codegen.graph.graph import Graph, Input, Node, Op
 from softehl.codegen.graph.routines import (
     SYMMETRIC,
     Control,
+    Isotropic,
     depends,
     isotropic,
     localise,
     newton,
     sums_written_out,
-    symmetric,
 )
 from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.complaints import ModelError
@@ -110,22 +111,44 @@ def written_out(
 
 
 def principal(
-    symbols: Symbols, name: str, C: Any, energy: Callable[[Any, Any, Any], Any]
+    symbols: Symbols, name: str, C: Any, energy: Callable[[Any, Any, Any], Any] | None
 ) -> sp.Symbol:
     """Name of an isotropic energy of the roots of the eigenvalues of C."""
-    if sp.Matrix(C).shape != (3, 3):
-        raise ModelError(f"{name}: C has shape {sp.Matrix(C).shape}, must be (3, 3)")
+    if energy is None or not callable(energy):
+        raise ModelError(
+            f"{name}: write m.principal({name!r}, C, lambda a, b, c: ...), e.g. with C = F.T * F"
+        )
+    entries = _symmetric_entries(symbols, name, C)
     squares = Entries([sp.Dummy(positive=True) for _ in range(3)], ("", "", ""), list)
     local = symbols.placeholders(name, squares)
     written = applied(name, energy, *(sp.sqrt(c) for c in squares.values))
     value = symbols.lower(written)
+    if any(isinstance(n.payload, Isotropic) for n in depends([value], local)):
+        raise ModelError(f"{name}: its energy holds an energy of other stretches; add them outside")
     if not symmetric(value, local):
         raise ModelError(f"{name}: the energy changes when two stretches are exchanged")
     system = localise(symbols.graph, [value], local)
     routine = isotropic(name, 6 + len(system.external), system.values[0])
-    args = [*(symbols.lower(C[i, j]) for i, j in SYMMETRIC), *system.external]
+    args = [*entries, *system.external]
     node = symbols.graph.name(name, symbols.graph.run(routine, args)[0])
     symbol: sp.Symbol = symbols.record.principal(
         symbols.name(name, node, [*C, written], known=False), written, squares.values, C
     )
     return symbol
+
+
+def _symmetric_entries(symbols: Symbols, name: str, C: Any) -> list[Node]:
+    """Entries of the symmetric part of C, which has those of C: both triangles vary alike."""
+    if getattr(C, "shape", None) != (3, 3):
+        shape = getattr(C, "shape", "that of a scalar or list")
+        raise ModelError(f"{name}: C has shape {shape}, must be (3, 3)")
+    entries = []
+    for i, j in SYMMETRIC:
+        upper, lower = symbols.lower(C[i, j]), symbols.lower(C[j, i])
+        if not alike(upper, lower):
+            raise ModelError(
+                f"{name}: C is not symmetric, C[{i}, {j}] is not C[{j}, {i}]; e.g. C = F.T * F"
+            )
+        same = upper is lower
+        entries.append(upper if same else symbols.lower((C[i, j] + C[j, i]) / 2))
+    return entries

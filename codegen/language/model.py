@@ -190,12 +190,12 @@ class Model(Draft):
         condensed = partial(self._condensed, name)
         return local.implicit(self._symbols, name, equations, start, iteration, condensed)
 
-    def principal(self, name: str, C: Any, energy: Callable[[Any, Any, Any], Any]) -> sp.Symbol:
+    def principal(self, name: str, C: Any, energy: Any = None) -> sp.Symbol:
         """An isotropic energy of the principal stretches: energy(lambda_1, lambda_2, lambda_3).
 
-        C is the symmetric right Cauchy-Green matrix, 3x3 (its upper triangle is read), the
-        stretches are the roots of its eigenvalues, and `energy` must not change when they are
-        exchanged.  First and second derivatives by C are exact also where stretches are equal.
+        C is the symmetric right Cauchy-Green matrix, 3x3, the stretches are the roots of its
+        eigenvalues, and `energy` must not change when they are exchanged.  First and second
+        derivatives by C are exact to rounding also where stretches are equal or nearly so.
         """
         return local.principal(self._symbols, name, C, energy)
 
@@ -203,6 +203,7 @@ class Model(Draft):
         """Derivatives of a scalar by one named symbol, a list or a matrix of them, e.g. P = dW/dF.
 
         The symbols are those of `define` or of arguments; all else is differentiated through.
+        Entries of a matrix that are one symbol share its derivative, so that dW = P_ij dF_ij.
         """
         return self._intermediates.derivative(name, value, by)
 

@@ -26,9 +26,6 @@ from softehl.codegen.tools.written import program
 BOUND = 1e-10
 """Largest relative error that is rounding; a wrong derivative is off by far more."""
 ROWS = 8
-STRETCHES = 1e-6
-"""Allowed at far states of pages with functions of stretches: their kernels integrate over the gap
-between nearly equal ones by a rule that is exact to rounding only for ordinary exponents."""
 FLOOR = 1e-6
 SHOWN = 5
 """Unreached places that are named; of others their number is told."""
@@ -95,7 +92,6 @@ class Comparison:
         self.rounded = Evaluator(self.program, Rounded(), deadline)
         self.rng = random.Random(f"{d.name} direction")
         self.moving: set[int] = set()
-        self.stretches = any(s.name == "stretches" for s in self.program.steps)
         self.size = 0
 
     def batch(self, states: Sequence[State]) -> Batch:
@@ -166,8 +162,7 @@ class Comparison:
             spread = max(doubles, view.spread(task, page))
         except NotRealError:
             return None if far else 0.0
-        allowed = STRETCHES if far and self.stretches else 0.0
-        return ROUNDINGS * spread + allowed if spread <= LOST else None
+        return ROUNDINGS * spread if spread <= LOST else None
 
 
 class _View:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
 import sympy as sp
@@ -114,16 +115,135 @@ def test_a_matrix_that_is_not_positive_definite_is_a_failure(kernel: Kernel) -> 
     assert np.isnan(K[1:]).all()
 
 
-def test_the_branch_is_needed(tmp_path: Path) -> None:
-    """Without the mean over nearly equal stretches the tangent is far off: the oracle says so."""
+def test_the_rules_of_divided_differences_are_needed(tmp_path: Path) -> None:
+    """With quotients of close values alone the tangent is far off: the oracle says so."""
     write(stretches(), tmp_path)
     source = tmp_path / "stretches.c"
     text = source.read_text()
-    assert text.count("0.05 * middle") == 1
-    source.write_text(text.replace("0.05 * middle", "0.0"))
+    assert text.count("0.25 * (fabs") == 2  # logarithm and exponential function
+    source.write_text(text.replace("0.25 * (fabs", "0.0 * (fabs"))
     build.build(tmp_path, extra=("-O1",))
     naive = load_kernel("stretches", tmp_path)
     assert errors(naive, turned(1.44 * (1 + 1e-9), 1.44, 0.7))[1] > 1e-9
+
+
+def shear(kernel: Kernel, a: float, b: float, c: float) -> tuple[float, mpmath.mpf, mpmath.mpf]:
+    """d2W/dC_12^2 at diagonal C, whose eigenvalues have no error: 2 (w_a - w_b) / (c_a - c_b).
+
+    Also c_a and c_b, exactly.
+    """
+    C = np.diag(np.square([a, b, c]))
+    K = kernel.tangent(np.zeros((1, 0)), np.array([unknowns(C)]))[1]
+    return float(K[0, 3, 3]) / 2, mpmath.mpf(C[0, 0]), mpmath.mpf(C[1, 1])
+
+
+def of_stretches(name: str, energy: Any, folder: Path, *, inner: bool = False) -> Kernel:
+    """Kernel of an energy without parameters; with `inner`, a function of the model too."""
+    m = Model(name, nodes=1, rule=quadrature.point_rule())
+    a, b, c, d, e, f = (m.unknown(n) for n in ENTRIES)
+    C = sp.Matrix([[a, d, e], [d, b, f], [e, f, c]])
+    m.potential(m.principal("W", C, energy(m) if inner else energy))
+    return compiled(m.finish(), folder)
+
+
+SMOOTH = (
+    *("exp", "log", "sin", "cos", "tan", "atan", "sinh", "cosh", "tanh", "asinh", "erf", "erfc"),
+    *("sqrt", "cbrt"),
+)
+"""Functions of a stretch; others need another argument."""
+OTHERS = {
+    "asin": lambda x: x / 4,
+    "acos": lambda x: (x - 2) / 4,
+    "atanh": lambda x: x / 4,
+    "acosh": lambda x: x + 1,
+}
+
+
+def every(library: Any, x: Any) -> Any:
+    """A sum of all functions of SymPy or mpmath that a page may use, and powers of all kinds."""
+    total = sum(getattr(library, f)(x) for f in SMOOTH)
+    total += sum(getattr(library, f)(argument(x)) for f, argument in OTHERS.items())
+    powers = x**7 + 1 / x**3 + library.root(1 + x**2, 7) ** 5 + 1 / library.root(x, 3) ** 2
+    return total + powers + library.atan2(x, x**2 + 2)
+
+
+def test_every_function_at_every_gap(tmp_path: Path) -> None:
+    """Against a quotient in 60 digits; every term is of the size of the sum or some per cent."""
+    kernel = of_stretches("every", lambda *s: sum(every(sp, x) for x in s), tmp_path)
+    with mpmath.workdps(60):
+
+        def first(c: Any) -> Any:
+            return mpmath.diff(lambda c: every(mpmath, mpmath.sqrt(c)), c)
+
+        for gap in (0.4, 0.06, 1e-2, 1e-3, 1e-5, 1e-8, 1e-11, 2e-16, 0.0):
+            found, a, b = shear(kernel, 1.3, 1.3 * (1 + gap), 0.8)
+            right = (first(a) - first(b)) / (a - b) if gap else mpmath.diff(first, a)
+            assert abs(found / right - 1) < 3e-15, gap
+
+
+def test_a_condition_between_two_stretches(tmp_path: Path) -> None:
+    """Split of tension and compression: a quotient where one side has no stress, for any gap."""
+    half = sp.Rational(1, 2)
+    kernel = of_stretches(
+        "split", lambda *s: 2 * sum(sp.Max((x**2 - 1) * half, 0) ** 2 for x in s), tmp_path
+    )
+    for gap in (0.3, 0.03, 1e-3, 1e-5):
+        for a, b in ((1 + gap, 1 - gap / 3), (1 - gap, 1 + gap), (1 + gap, 1 + gap / 2)):
+            found, x, y = shear(kernel, a, b, 1.01)
+            right = (max(x - 1, 0) - max(y - 1, 0)) / (x - y)
+            assert abs(found - right) < 1e-15
+    for c in (0.9, 1.1):
+        assert shear(kernel, c, c, 1.01)[0] == (c > 1)
+
+
+def test_near_a_limiting_stretch(tmp_path: Path) -> None:
+    """-sum ln(1 - l / 2): 1 - l / 2 has lost a digit or two of l, and nothing else is lost."""
+    kernel = of_stretches("limiting", lambda *s: -sum(sp.log(1 - x / 2) for x in s), tmp_path)
+    with mpmath.workdps(60):
+        for a, b in ((1.9, 1.87), (1.96, 1.93), (1.99, 1.945), (1.999, 1.998), (1.9999, 1.9)):
+            found, x, y = shear(kernel, a, b, 1.2)
+            first = [1 / (2 * mpmath.sqrt(c) * (2 - mpmath.sqrt(c))) for c in (x, y)]
+            right = (first[0] - first[1]) / (x - y)
+            lost = 1 / (2 - a) + 1 / (2 - b)
+            assert abs(found / right - 1) < 2**-52 * (4 + lost), (a, b)
+
+
+def test_local_unknowns_of_a_stretch(tmp_path: Path) -> None:
+    """s^3 + s = l - 1, or 2 s = l - 1 in compression, solved in the energy s l."""
+
+    def energy(m: Model) -> Any:
+        def one(x: Any) -> Any:
+            def g(s: Any) -> Any:
+                return sp.Piecewise((s**3 + s - x + 1, x > 1), (2 * s - x + 1, True))
+
+            return x * m.implicit(f"s_{next(numbers)}", g, start=x - 1)
+
+        numbers = iter(range(3))
+        return lambda a, b, c: one(a) + one(b) + one(c)
+
+    kernel = of_stretches("solved", energy, tmp_path, inner=True)
+
+    def first(c: Any) -> Any:
+        x = mpmath.sqrt(c)
+        if x <= 1:
+            return (2 * x - 1) / (4 * x)
+        s = mpmath.findroot(lambda s: s**3 + s - x + 1, x - 1)
+        return (s + x / (3 * s**2 + 1)) / (2 * x)
+
+    with mpmath.workdps(40):
+        for a, b in ((1.3, 1.25), (1.25 * (1 + 1e-9), 1.25), (1.2, 0.7), (1.001, 0.999)):
+            found, x, y = shear(kernel, a, b, 0.8)
+            assert abs(found / ((first(x) - first(y)) / (x - y)) - 1) < 1e-14, (a, b)
+
+
+def test_an_invariant_that_is_the_same_for_both_needs_no_quotient(tmp_path: Path) -> None:
+    """A condition on J is decided once: where its rounding decides, at J = 1, nothing is lost."""
+    kernel = of_stretches("volume", lambda a, b, c: sp.Max(a * b * c - 1, 0) ** 2, tmp_path)
+    for a in (1.1, 1.3, 0.7, 1.0):
+        for gap in (0.0, 1e-15, 1e-12):
+            found, x, y = shear(kernel, a, a * (1 + gap), 1 / a**2)
+            J = mpmath.sqrt(x * y * np.square(1 / a**2))
+            assert abs(found + max(J - 1, 0) * J / (x * y)) < 1e-15
 
 
 def test_order_of_the_second_derivatives() -> None:
