@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import Any
 
 import sympy as sp
@@ -63,7 +64,10 @@ class Intermediates:
         return sp.Piecewise((sp.sqrt(square), square > 0), (sp.Integer(0), True))
 
     def derivative(self, name: str, value: Any, by: Any) -> Any:
-        """Names of the derivatives of a scalar, arranged like `by`."""
+        """Names of the derivatives of a scalar, arranged like `by`.
+
+        Entries of a matrix that are one symbol share its derivative, so that dW = P_ij dF_ij.
+        """
         symbols = Entries.of(by)
         lower = self._symbols.lower
         sources = [lower(s) for s in symbols.values]
@@ -74,6 +78,14 @@ class Intermediates:
             raise ModelError(f"{name}: {value} depends on an integral; give it a name of its own")
         slopes = gradient(self._symbols.graph, root, sources, given=self.given, flat=local)
         below = [value, *symbols.values]
-        derivatives = self._symbols.named(name, symbols, [slopes[s] for s in sources], below)
-        self._symbols.record.slopes(value, symbols.values, Entries.of(derivatives).values)
+        matrix = isinstance(by, sp.MatrixBase)
+        times = [sources.count(s) if matrix else 1 for s in sources]
+        graph = self._symbols.graph
+        parts = [
+            graph.mul(graph.const(Fraction(1, n)), slopes[s])
+            for s, n in zip(sources, times, strict=True)
+        ]
+        derivatives = self._symbols.named(name, symbols, parts, below)
+        named = Entries.of(derivatives).values
+        self._symbols.record.slopes(value, symbols.values, named, times)
         return derivatives

@@ -82,9 +82,8 @@ class Material:
         """Local unknowns, as `Model.implicit`."""
         return self.model.implicit(f"{self.name}_{name}", equations, **settings)
 
-    def principal(self, name: str, energy: Callable[[Any, Any, Any], Any]) -> Any:
-        """An isotropic energy of the principal stretches of F, as `Model.principal`."""
-        C = self.define(f"{name}_C", self.F.T * self.F)
+    def principal(self, name: str, C: Any, energy: Any = None) -> Any:
+        """An isotropic energy of principal stretches, as `Model.principal`; C is m.F.T * m.F."""
         return self.model.principal(f"{self.name}_{name}", C, energy)
 
     def energy(self, W: Any) -> None:

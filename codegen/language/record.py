@@ -81,10 +81,17 @@ class Record:
         """Note an energy of stretches; returns its name."""
         for s in squares:
             self.meanings[s] = Local()
-        entries = tuple(sp.sympify(C[min(i, j), max(i, j)]) for i in range(3) for j in range(3))
+        pairs = [(C[i, j], C[j, i]) for i in range(3) for j in range(3)]
+        entries = tuple(sp.sympify(a if a is b else (a + b) / 2) for a, b in pairs)
         return self.define(symbol, Principal(energy, tuple(squares), entries))
 
-    def slopes(self, value: Any, by: Sequence[Any], found: Sequence[Any]) -> None:
-        """Note the names of derivatives of a value."""
-        for symbol, s in zip(found, by, strict=True):
-            self.define(symbol, Slope(value, s))
+    def slopes(
+        self, value: Any, by: Sequence[Any], found: Sequence[Any], shared: Sequence[int]
+    ) -> None:
+        """Note the names of derivatives of a value, divided by how many entries share them."""
+        for symbol, s, n in zip(found, by, shared, strict=True):
+            if n == 1:
+                self.define(symbol, Slope(value, s))
+            else:
+                whole = self.define(sp.Dummy(real=True), Slope(value, s))
+                self.define(symbol, whole / n)

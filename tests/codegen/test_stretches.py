@@ -20,7 +20,7 @@ from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
-from softehl.codegen.tools import build
+from softehl.codegen.tools import build, verify
 from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.arrays import Array
 from softehl.runtime.kernels import Kernel, load_kernel
@@ -262,6 +262,51 @@ def test_what_is_no_isotropic_energy_is_refused() -> None:
     m = Model("flat", nodes=1, rule=quadrature.point_rule())
     with pytest.raises(ModelError, match=r"C has shape \(2, 2\), must be \(3, 3\)"):
         m.principal("W", sp.eye(2), lambda x, y, z: x + y + z)
+
+
+def test_a_matrix_that_is_not_symmetric_and_energies_in_energies_are_refused() -> None:
+    m = Model("skew", nodes=1, rule=quadrature.point_rule())
+    F = sp.Matrix(3, 3, [m.unknown(f"F_{k}") for k in range(9)])
+
+    def total(a: Any, b: Any, c: Any) -> Any:
+        return a + b + c
+
+    with pytest.raises(ModelError, match=r"V: C is not symmetric, C\[0, 1\] is not C\[1, 0\]"):
+        m.principal("V", m.define("F", F), total)
+    C = F.T * F
+    with pytest.raises(ModelError, match=r"V: write m.principal\('V', C, lambda a, b, c: ...\)"):
+        m.principal("V", total)
+    with pytest.raises(ModelError, match="U: its energy holds an energy of other stretches"):
+        m.principal("U", C, lambda a, b, c: m.principal("V", a * b * c * sp.eye(3), total))
+
+
+def test_the_derivative_by_a_matrix_is_symmetric(tmp_path: Path) -> None:
+    """W = tr(U)^3 / 3, S = dW/dC = tr(U)^2 U^-1 / 2; entries of C have nine names or six."""
+    m = Model("by_matrix", nodes=1, rule=quadrature.point_rule())
+    F = sp.Matrix(3, 3, [m.unknown(f"F_{k}") for k in range(9)])
+    C = m.define("C", F.T * F)
+    six = {(i, j): m.define(f"c_{i}{j}", (F.T * F)[i, j]) for i in range(3) for j in range(i, 3)}
+    C_6 = sp.Matrix(3, 3, lambda i, j: six[min(i, j), max(i, j)])
+
+    def energy(a: Any, b: Any, c: Any) -> Any:
+        return (a + b + c) ** 3 / 3
+
+    W, V = m.principal("W", C, energy), m.principal("V", C_6, energy)
+    S, T = m.derivative("S", W, C), m.derivative("T", V, C_6)
+    m.potential(W + V)
+    m.fields(**{f"{A}_{k}": v for A, B in (("S", S), ("T", T)) for k, v in enumerate(B)})
+    d = m.finish()
+    kernel = compiled(d, tmp_path)
+    F_at = np.array([[1.1, 0.2, 0.1], [-0.1, 0.9, 0.15], [0.05, 0.02, 1.2]])
+    squares, N = np.linalg.eigh(F_at.T @ F_at)
+    U = np.sqrt(squares)
+    right = N @ np.diag(U.sum() ** 2 / (2 * U)) @ N.T
+    at = np.zeros((1, 0)), F_at.reshape(1, 9)
+    found = kernel.fields_at(*at).reshape(2, 3, 3)
+    np.testing.assert_allclose(found, [right, right], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(kernel.residual(*at).reshape(3, 3), 4 * F_at @ right, atol=1e-13)
+    checked = verify.check(d, ("residual", "fields"), tmp_path / build.LIBRARY, seconds=1)
+    assert max(checked.errors.values()) <= verify.BOUND
 
 
 def test_derivatives_of_the_oracle_are_differences() -> None:

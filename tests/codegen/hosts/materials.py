@@ -22,7 +22,8 @@ def ogden_1(m: Material) -> None:
     """Ogden's rubber with one term."""
     mu, alpha, K = m.parameters(mu="modulus [MPa]", alpha="exponent", K="bulk modulus [MPa]")
     J = m.define("J", m.F.det())
-    m.energy(m.principal("W", lambda a, b, c: mu / alpha * (a**alpha + b**alpha + c**alpha - 3)))
+    C = m.define("C", m.F.T * m.F)
+    m.energy(m.principal("W", C, lambda a, b, c: mu / alpha * (a**alpha + b**alpha + c**alpha - 3)))
     m.energy(K / 2 * (J - 1) ** 2 - mu * sp.log(J))
 
 
