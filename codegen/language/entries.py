@@ -13,6 +13,24 @@ import sympy as sp
 from softehl.codegen.language.complaints import ModelError
 
 
+class Matrix(sp.MutableDenseMatrix):  # type: ignore[misc]
+    """Matrix of a page: its inverse is written out up to 3x3.
+
+    SymPy eliminates, and looks for proof that a pivot is not zero: minutes for names of sums.
+    """
+
+    _class_priority = 5  # sums and products with SymPy's matrices are of this class
+
+    def inv(self, method: str | None = None, **settings: Any) -> Any:
+        """Inverse; of more than three rows, or by a `method`, as SymPy has it."""
+        if method is not None or self.rows != self.cols or self.rows > 3:
+            return super().inv(method, **settings)
+        det = self.det()
+        if det is sp.S.Zero:
+            raise ModelError(f"inv: the determinant of a matrix {self.shape} is zero")
+        return self.adjugate() / det
+
+
 @dataclass(frozen=True)
 class Entries:
     """Entries of a value, what each adds to its name, and the function that puts them back."""
@@ -27,7 +45,7 @@ class Entries:
         if isinstance(value, sp.MatrixBase):
             rows, columns = value.shape
             suffixes = [f"_{i}{j}" for i in range(rows) for j in range(columns)]
-            return Entries(list(value), suffixes, lambda v: sp.Matrix(rows, columns, list(v)))
+            return Entries(list(value), suffixes, lambda v: Matrix(rows, columns, list(v)))
         if isinstance(value, (list, tuple)):
             return Entries(list(value), [f"_{k}" for k in range(len(value))], list)
         return Entries([value], [""], lambda v: v[0])

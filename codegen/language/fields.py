@@ -20,7 +20,7 @@ from softehl.codegen.language.complaints import Elsewhere, ModelError, NeedsElem
 from softehl.codegen.language.definition import Component
 from softehl.codegen.language.elements.cells import Element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
-from softehl.codegen.language.entries import Entries
+from softehl.codegen.language.entries import Entries, Matrix
 from softehl.codegen.language.model import Model
 
 PLANE, AXISYMMETRIC, SOLID = "plane strain", "axisymmetric", "solid"
@@ -84,7 +84,7 @@ class Fields(Model):
         the cell.
         """
         names = [f"{name}_{axis}" for axis in AXES[: self.dimension]]
-        return sp.Matrix(self._declared_fields(names, order, given=False))
+        return Matrix(self._declared_fields(names, order, given=False))
 
     def scalar(self, name: str, *, order: int | None = None) -> Any:
         """A scalar field; its value at the point is a symbol. order: as in `vector`."""
@@ -141,8 +141,8 @@ class Fields(Model):
         """
         rows = [self._slopes(v) for v in Entries.of(value).values]
         if isinstance(value, sp.MatrixBase):
-            return sp.Matrix(rows)
-        return sp.Matrix(rows[0])
+            return Matrix(rows)
+        return Matrix(rows[0])
 
     @property
     def normal(self) -> Any:
@@ -156,7 +156,7 @@ class Fields(Model):
     @property
     def position(self) -> Any:
         """Reference coordinates of the point, (dimension, 1); in axisymmetry axis and radius."""
-        return sp.Matrix(self._place())
+        return Matrix(self._place())
 
     def deformation_gradient(self, u: Any, name: str = "F") -> Any:
         """F = 1 + Grad u, 3 x 3, with names F_00, F_01, ...; what the mesh has no axis for is said
@@ -177,7 +177,7 @@ class Fields(Model):
             for k in range(3):
                 if F[i, k] not in (0, 1):
                     named[i][k] = self.define(f"{name}_{i}{k}", F[i, k], interface=True)
-        return sp.Matrix(named)
+        return Matrix(named)
 
     # equations ----------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from softehl.codegen.graph.differentiate import gradient
 from softehl.codegen.graph.graph import Node, Op
 from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.complaints import ModelError
-from softehl.codegen.language.entries import Entries
+from softehl.codegen.language.entries import Entries, Matrix
 from softehl.codegen.language.symbols import Symbols
 
 
@@ -41,7 +41,7 @@ class Intermediates:
             if derivative is not None:
                 raise ModelError(f"{name}: give the derivative of each entry, not of the matrix")
             rows, columns = expression.shape
-            return sp.Matrix(
+            return Matrix(
                 rows,
                 columns,
                 lambda i, j: self.define(f"{name}_{i}{j}", expression[i, j], interface=interface),

@@ -22,6 +22,7 @@ import sympy as sp
 from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import PointForm
 from softehl.codegen.language.draft import NAME
+from softehl.codegen.language.entries import Matrix
 from softehl.codegen.language.fields import AXES, Fields
 from softehl.codegen.language.model import Model
 from softehl.codegen.language.pages import Page
@@ -38,7 +39,7 @@ class Material:
         self.W: Any = None
         self.P: Any = None
         self.small: bool | None = None
-        self._F = sp.Matrix(F)
+        self._F = Matrix(F)
         if self._F.shape != (3, 3):
             raise ModelError(f"{name}: F has shape {self._F.shape}, must be (3, 3)")
         self._green: Any = None
@@ -66,7 +67,7 @@ class Material:
             names = {}
             for i, k in _SYMMETRIC:
                 names[i, k] = names[k, i] = self.define(f"green_{i}{k}", E[i, k])
-            self._green = sp.Matrix(3, 3, lambda i, k: names[i, k])
+            self._green = Matrix(3, 3, lambda i, k: names[i, k])
         return self._green
 
     def _kinematics(self, *, small: bool) -> None:
@@ -140,7 +141,7 @@ class Law:
 
     def _at(self, m: Fields, F: Any) -> tuple[Any, Any, bool]:
         """P, the energy or None, and True for a law of small strains."""
-        names = sp.Matrix(3, 3, lambda i, k: m.define(f"{self.name}_F_{i}{k}", F[i, k]))
+        names = Matrix(3, 3, lambda i, k: m.define(f"{self.name}_F_{i}{k}", F[i, k]))
         law = self.on(m, names)
         if law.W is None:
             return m.define(f"{self.name}_P", law.P), None, bool(law.small)

@@ -12,7 +12,7 @@ from softehl.codegen.language.definition import Component
 from softehl.codegen.language.elements.cells import Element
 from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.elements.shapes import interpolate
-from softehl.codegen.language.entries import Entries
+from softehl.codegen.language.entries import Entries, Matrix
 from softehl.codegen.language.fields import AXISYMMETRIC
 from softehl.codegen.language.nodal import Nodal
 
@@ -32,7 +32,7 @@ class Whole(Nodal):
     @property
     def parent(self) -> Any:
         """Parent coordinates of the point, (dimension, 1)."""
-        return sp.Matrix(self._at)
+        return Matrix(self._at)
 
     @property
     def jacobian(self) -> Any:

@@ -6,12 +6,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import sympy as sp
 
-from softehl.codegen.language import names, symbols
+from softehl.codegen.language import names, pages, symbols
 from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import files, user
 
@@ -193,3 +195,22 @@ def test_a_page_that_cannot_be_written_out_is_compared_with_itself(tmp_path: Pat
     path.write_text(BAR.replace("W = mu", "I1.name\n    W = mu"))
     assert user.written_out(path) == {}
     assert [d.name for d in user.definitions(path)] == ["bar"]
+
+
+def test_the_inverse_of_a_matrix_of_a_page_is_written_out() -> None:
+    """SymPy's elimination would prove for minutes that sums of 24 unknowns are not zero."""
+
+    def write(m: Fields) -> None:
+        F = m.deformation_gradient(m.vector("u"))
+        for A in (F, F.T * F, sp.eye(3) + F, F[:2, :2], F[:1, :1]):
+            found = A.inv()
+            at = {s: sp.Rational(k + 2, 7 + k * k) for k, s in enumerate(F)}
+            right = np.linalg.inv(np.array(sp.Matrix(A).xreplace(at).tolist(), dtype=float))
+            values = np.array(sp.Matrix(found).xreplace(at).tolist(), dtype=float)
+            np.testing.assert_allclose(values, right, rtol=1e-12)
+        assert F.inv() == F**-1
+        with pytest.raises(ModelError, match=r"inv: the determinant of a matrix \(2, 2\) is zero"):
+            (F[:2, :2] * 0).inv()
+        m.minimise((F.inv() * F.inv().T).trace())
+
+    assert pages.Page("write", write).definition("hex8").name == "write_hex8"
