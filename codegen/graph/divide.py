@@ -14,8 +14,7 @@ from fractions import Fraction
 from typing import Any
 
 from softehl.codegen.graph.differentiate import guarded, plus
-from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, Routine
-from softehl.codegen.graph.partials import DifferentiationError
+from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, Place, Routine
 from softehl.codegen.graph.traverse import reachable
 
 ROUNDING = Fraction(1, 2**48)
@@ -169,15 +168,12 @@ class Divided:
         return g.branch(c, g.branch(there, then, first), g.branch(there, second, otherwise))
 
     def _result(self, n: Node) -> Node:
-        call = n.args[0]
-        routine: Any = call.payload
+        call, routine = n.args[0], n.args[0].payload
+        assert isinstance(n.payload, Place)
+        assert isinstance(routine, Routine)
         if call not in self.calls:
-            if not hasattr(routine, "divided"):
-                raise DifferentiationError(
-                    f"{routine.name}: an energy of stretches in the energy of other stretches"
-                )
             self.calls[call] = routine.divided(self, call)
-        return self.calls[call][n.payload.index]  # type: ignore[union-attr]
+        return self.calls[call][n.payload.index]
 
     def slopes(
         self, values: Sequence[Node], other: Mapping[Node, Node]

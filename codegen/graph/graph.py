@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
+from typing import Any
 
 
 class Op(StrEnum):
@@ -106,6 +107,10 @@ class Routine:
 
     def partials(self, g: Graph, item: Node) -> list[tuple[Node, Node]]:
         """Derivatives of one result with respect to the operands it depends on."""
+        raise NotImplementedError
+
+    def divided(self, between: Any, call: Node) -> list[Node]:
+        """Divided differences of all results between two states (`codegen.graph.divide`)."""
         raise NotImplementedError
 
 

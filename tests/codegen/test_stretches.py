@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -151,7 +152,7 @@ SMOOTH = (
     *("sqrt", "cbrt"),
 )
 """Functions of a stretch; others need another argument."""
-OTHERS = {
+OTHERS: dict[str, Callable[[Any], Any]] = {
     "asin": lambda x: x / 4,
     "acos": lambda x: (x - 2) / 4,
     "atanh": lambda x: x / 4,
