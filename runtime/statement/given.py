@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.loads import Amount
@@ -203,10 +204,15 @@ def partners(ours: Array, theirs: Array, tolerance: float) -> Integers:
     shift between both centres.  Raises StudyError where there is none.
     """
     a, b = ours - ours.mean(axis=0), theirs - theirs.mean(axis=0)
-    distance = np.linalg.norm(a[:, None] - b[None], axis=2)
-    chosen = distance.argmin(axis=1)
+    distance, chosen = cKDTree(b).query(a)
     size = max(float(np.ptp(ours, axis=0).max()), float(np.abs(ours - theirs).max()))
-    worst = float(distance.min(axis=1).max())
-    if worst > tolerance * size or len(set(chosen.tolist())) < len(chosen):
+    worst = float(distance.max())
+    if worst > tolerance * size:
         raise StudyError(f"tie: the nodes of both sides do not fit, they are {worst:.3g} apart")
+    if len(np.unique(chosen)) < len(chosen):
+        twice = ours[np.bincount(chosen)[chosen] > 1][0]
+        raise StudyError(
+            f"tie: two nodes at {place_text(twice)} have the same partner: a tie joins each node "
+            "with one other, copies of a node cannot be told apart"
+        )
     return np.asarray(chosen, dtype=np.int64)
