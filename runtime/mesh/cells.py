@@ -131,6 +131,15 @@ class Cell:
             found.append((kind, tuple(int(k) for k in distance.argmin(axis=1))))
         return tuple(found)
 
+    @cached_property
+    def mirrored(self) -> tuple[int, ...]:
+        """Nodes (k,) of the same cell seen in a mirror, from the same first node where it has two
+        dimensions or three.
+        """
+        seen = -self.nodes if self.dimension == 1 else self.nodes[:, [1, 0, 2][: self.dimension]]
+        distance = np.linalg.norm(self.nodes[None] - seen[:, None], axis=2)
+        return tuple(int(k) for k in distance.argmin(axis=1))
+
     def holds(self, at: Array, margin: float) -> bool:
         """True if a parent point (dim,) lies in the parent element, or no further out than that."""
         if self.corners == 2**self.dimension:
@@ -304,28 +313,13 @@ _LINEAR = {(1, 0): "point1", (2, 1): "line2", (3, 2): "tri3", (4, 2): "quad4"}
 CELLS = _cells()
 """Every kind of cell by its name."""
 
-VTK_ORDER = {"wedge6": (0, 2, 1, 3, 5, 4)}
-"""Nodes of a cell in the order of VTK where that is another one: the first triangle of a wedge
-looks outwards, volumes are negative otherwise. Each order is its own inverse.
-"""
-
 BY_FILE = {cell.meshio: cell for cell in CELLS.values()}
 """Every kind of cell by meshio's name for it."""
 
 
 def for_vtk(kind: str, nodes: Integers) -> Integers:
-    """Nodes (n, k) of cells in the order that VTK has for their kind."""
-    return nodes[:, VTK_ORDER[kind]] if kind in VTK_ORDER else nodes
-
-
-def from_vtk(kind: str, nodes: Integers, points: Array) -> Integers:
-    """Nodes (n, k) of cells from a file of VTK, which other programs write in our order, too."""
-    if kind not in VTK_ORDER:
-        return nodes
-    cell = CELLS[kind]
-    middle = cell.nodes.mean(axis=0, keepdims=True)
-    turned = jacobians(cell, points[nodes], middle)[:, 0] < 0.0
-    return np.where(turned[:, None], for_vtk(kind, nodes), nodes)
+    """Nodes (n, k) of cells in the order of VTK: the first triangle of its wedges looks outwards."""
+    return nodes[:, list(CELLS[kind].mirrored)] if kind == "wedge6" else nodes
 
 
 def jacobians(cell: Cell, places: Array, at: Array) -> Array:

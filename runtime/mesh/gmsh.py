@@ -15,6 +15,7 @@ import numpy as np
 from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.content import Content
 from softehl.runtime.mesh.faces import firsts
 
 _KINDS = {
@@ -36,18 +37,6 @@ Group = tuple[int, int]
 
 class GmshError(SoftehlError, ValueError):
     """Error about a file."""
-
-
-@dataclass(frozen=True)
-class Content:
-    """Content of a file: points (n, 3); kind -> cells (m, k), each once; name -> kind -> numbers of
-    cells of that kind, rising. tags: (n,) numbers of the points in the file, if it has some.
-    """
-
-    points: Array
-    cells: Mapping[str, Integers]
-    names: Mapping[str, Mapping[str, Integers]]
-    tags: Integers | None = None
 
 
 @dataclass
@@ -174,6 +163,19 @@ def _nodes_2(source: _Source, found: _Parts, version: str) -> None:
         found.points.append(lines[:, 1:])
 
 
+def _parametric_2(source: _Source, found: _Parts, version: str) -> None:
+    """Nodes with the dimension and number of their entity, and their parameters on it."""
+    count = int(source.line()) if source.binary else source.one("u8")
+    tags, points = [], []
+    for _ in range(count):
+        tags.append(source.one("i4"))
+        points.append(source.reals(3))
+        dimension = int(source.whole("i4", 2)[0])
+        source.reals(dimension if dimension < 3 else 0)
+    found.tags.append(np.array(tags, dtype=np.int64))
+    found.points.append(np.array(points).reshape(-1, 3))
+
+
 def _cells_2(source: _Source, found: _Parts, version: str) -> None:
     left = int(source.line()) if source.binary else source.one("u8")
     while left > 0:
@@ -222,10 +224,11 @@ def _partitions_4(source: _Source, found: _Parts, version: str) -> None:
 def _nodes_4(source: _Source, found: _Parts, version: str) -> None:
     if version != "4.1":
         for _ in range(int(source.whole("u8", 2)[0])):
-            source.whole("i4", 3)
-            lines = source.reals(4 * (count := source.one("u8"))).reshape(count, 4)
+            _, dimension, parametric = source.whole("i4", 3).tolist()
+            width = 4 + (dimension if parametric else 0)
+            lines = source.reals(width * (count := source.one("u8"))).reshape(count, width)
             found.tags.append(lines[:, 0].astype(np.int64))
-            found.points.append(lines[:, 1:])
+            found.points.append(lines[:, 1:4])
         return
     for _ in range(int(source.whole("u8", 4)[0])):
         dimension, _, parametric = source.whole("i4", 3).tolist()
@@ -246,10 +249,12 @@ def _cells_4(source: _Source, found: _Parts, version: str) -> None:
 
 _SECTIONS = {
     ("2", "Nodes"): _nodes_2,
+    ("2", "ParametricNodes"): _parametric_2,
     ("2", "Elements"): _cells_2,
     ("4", "Entities"): _entities_4,
     ("4", "PartitionedEntities"): _partitions_4,
     ("4", "Nodes"): _nodes_4,
+    ("4", "ParametricNodes"): _nodes_4,
     ("4", "Elements"): _cells_4,
 }
 

@@ -186,8 +186,10 @@ class Mesh:
 
     @classmethod
     def read(cls, path: str | Path, *, spread: bool = False) -> Mesh:
-        """A mesh file of any format that meshio reads; its groups become names.
+        """A mesh file of Gmsh, of Abaqus or CalculiX (.inp), or of a format that meshio reads.
 
+        Its groups, sets and surfaces become names of cells and of sides; a set of nodes is a side
+        of points. What cannot be a name or a cell is told in a warning.
         spread: of "part.msh" or "part.npz" each process reads its share of the files part_1.msh,
         part_2.msh, ..., as `gmsh -part_split` or `write(parts=...)` made them; there must be as
         many as processes, or more.
@@ -199,7 +201,7 @@ class Mesh:
         return read_parts(Path(path)) if spread else read(Path(path))
 
     def write(self, path: str | Path, *, parts: int | None = None) -> None:
-        """Write the mesh in the format of the file name; Gmsh's .msh keeps the names.
+        """Write the mesh in the format of the file name; .msh, .inp, .vtu and .vtk keep the names.
 
         parts: into so many files of NumPy, part_1.npz, ... for "part.npz", each of which holds
         cells that are close together, for `read(spread=True)`. Raises MeshError.

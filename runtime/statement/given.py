@@ -204,7 +204,7 @@ def partners(ours: Array, theirs: Array, tolerance: float) -> Integers:
     shift between both centres.  Raises StudyError where there is none.
     """
     a, b = ours - ours.mean(axis=0), theirs - theirs.mean(axis=0)
-    distance, chosen = cKDTree(b).query(a)
+    distance, chosen = map(np.asarray, cKDTree(b).query(a))
     size = max(float(np.ptp(ours, axis=0).max()), float(np.abs(ours - theirs).max()))
     worst = float(distance.max())
     if worst > tolerance * size:

@@ -30,7 +30,9 @@ def misplaced(mesh: Mesh) -> float:
     worst = 0.0
     for kind, nodes in mesh.cells.items():
         cell = CELLS[kind]
-        flat = {3: "tri3", 4: "quad4" if cell.dimension == 2 else "tet4", 8: "hex8"}[cell.corners]
+        flat = {3: "tri3", 4: "quad4" if cell.dimension == 2 else "tet4", 6: "wedge6", 8: "hex8"}[
+            cell.corners
+        ]
         expected = np.einsum(
             "ak,nkc->nac", CELLS[flat].shape(cell.nodes), mesh.points[nodes[:, : cell.corners]]
         )

@@ -164,6 +164,6 @@ def test_many_nodes_a_side_take_little_memory_and_time() -> None:
 def test_sides_that_do_not_fit_and_copies_of_a_node_are_refused() -> None:
     side = np.array([[0.0, 0.0], [0.0, 1.0], [0.0, 2.0]])
     with pytest.raises(StudyError, match=r"do not fit, they are 0\.1 apart"):
-        partners(side, side + [[1.0, 0.0], [1.0, 0.1], [1.0, 0.2]], 1e-6)
+        partners(side, side * [1.0, 1.1] + [1.0, 0.0], 1e-6)
     with pytest.raises(StudyError, match=r"two nodes at \(0, 0\) have the same partner"):
         partners(side[[0, 0, 2]], side[[0, 0, 2]] + [1.0, 0.0], 1e-6)

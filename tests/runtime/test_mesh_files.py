@@ -1,0 +1,347 @@
+"""Mesh files of Abaqus and CalculiX with all their sets; names in other formats, and back."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+import pytest
+
+from softehl import Mesh, Study
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.mesh import MeshError
+from tests.runtime.test_gmsh import misplaced, volume
+
+FOLDER = Path(__file__).parent / "inp"
+
+GROUPS: dict[str, dict[str, float]] = {
+    "cae_assembly": {
+        **{"Block-1": 1, "Block-2": 1, "Block-1.Set-1": 1, "Block-2.Set-1": 1},
+    },
+    "calculix_beam": {"Eall": 2, "LAST": 1, "E1": 1, "AGAIN": 2},
+    "gmsh_plate": {"Surface1": 2.5, "body": 2.5},
+    "heat_and_membranes": {"SOLID": 8, "MIXED": 8},
+    "includes": {"TETS": 1 / 6, "ALL": 7 / 6},
+    "plate_by_hand": {"QUADS": 2, "Body": 2.5},
+    "quadratic": {"BRICK": 8, "TET": 2},
+    "ring": {"SEAL": 1, "BACK UP": 1, "every": 2},
+    "shells": {"SKIN": 1 + np.sqrt(2)},
+    "spelling": {"left, lower": 1},
+}
+"""File -> group -> its volume, or its area of plane cells and shells."""
+SIDES: dict[str, dict[str, tuple[float, tuple[float, ...]]]] = {
+    "cae_assembly": {
+        **{"Front": (2, (1.5, 0.5, 0.5)), "Free": (6, (2.5, 0.5, 0.5))},
+        **{"Block-1.Upper": (1, (0.5, 0.5, 1)), "Block-2.Upper": (1, (2.5, 0.5, 1))},
+        **{"Held": (5, (0.6, 0.4, 0.4)), "Set-1": (8, (0.5, 0.5, 0.5))},
+        **{"Block-1.Set-1": (8, (0.5, 0.5, 0.5)), "Block-2.Set-1": (8, (2.5, 0.5, 0.5))},
+    },
+    "calculix_beam": {
+        **{"TOP": (1, (0.5, 0.5, 2)), "SIDE": (2, (0.5, 0, 1)), "NODES": (8, (0.5, 0.5, 0))},
+        **{"Nall": (32, (0.5, 0.5, 1)), "FIX": (8, (0.5, 0.5, 0))},
+        **{"FIRST": (20, (0.5, 0.5, 0.5)), "BOTH": (20, (0.5, 0.5, 0.5))},
+    },
+    "gmsh_plate": {"Line1": (1, (0, 0.5)), "wall": (1, (0, 0.5)), "tip": (1, (3, 0.5))},
+    "heat_and_membranes": {
+        **{"FREE": (24, (1, 1, 1)), "SKIN": (4, (1, 1, 2)), "PLATE": (4, (1, 1, 0))},
+        **{"BAR": (2, (0, 0, 1)), "MIXED": (2, (0, 0, 1))},
+    },
+    "includes": {
+        **{"END": (1, (1 / 3, 1 / 3, 1)), "SLANTED": (np.sqrt(8), (0.5, 0.5, 1))},
+        "BOTH": (1 + np.sqrt(8), (0.4, 0.4, 1)),
+    },
+    "plate_by_hand": {"wall": (1, (0, 0.5)), "NALL": (7, (9 / 7, 0.5)), "TIP": (1, (3, 0.5))},
+    "quadratic": {
+        **{"F1": (4, (0, 0, -1)), "F2": (4, (0, 0, 1)), "F3": (4, (0, -1, 0))},
+        **{"F4": (4, (1, 0, 0)), "F5": (4, (0, 1, 0)), "F6": (4, (-1, 0, 0))},
+        **{"T1": (2, (1, -1 / 3, -1 / 3)), "T2": (3, (2, -1 / 3, -1))},
+        **{"T3": (np.sqrt(22), (2, -1 / 3, -1 / 3)), "T4": (3, (2, -1, -1 / 3))},
+        "EDGE": (2, (0, -1, -1)),
+    },
+    "ring": {
+        **{"BORE": (2, (1, 0.9)), "BASE": (1, (1.5, 0)), "Part of it": (1, (1.5, 0))},
+        **{"LOW": (3, (1.5, 0)), "Inner": (4, (1, 0.875)), "FROM CELLS": (8, (1.5, 0.5))},
+        "PART OF IT.nodes": (1, (1, 0)),
+    },
+    "shells": {
+        **{"OUTER": (1 + np.sqrt(2), (1.1, 0.5, 1.3)), "INNER": (1 + np.sqrt(2), (1.1, 0.5, 1.3))},
+        **{"RIM": (2, (1, 0.5, 1.5)), "PLAIN": (1, (0.5, 0.5, 1)), "RIB": (1, (0.5, 0, 1))},
+        "LOWER": (2, (1 / 3, 0.5, 1)),
+    },
+    "spelling": {
+        **{"two nodes": (3, (1 / 3, 2 / 3)), "WEIGHT": (1, (1, 1)), "all of it": (4, (0.5, 0.5))},
+        **{"corner": (2, (0.5, 0.5)), "LOOP": (2, (0.5, 0.5))},
+    },
+}
+"""File -> side -> its area or length, or number of nodes, and the mean place of the nodes of all
+its faces.
+"""
+WARNINGS = {"cae_assembly": "'RP': nodes of none", "shells": "'CURVED': nodes of none"}
+
+
+def loaded(name: str) -> Mesh:
+    path = FOLDER / f"{name}.inp"
+    if name in WARNINGS:
+        with pytest.warns(UserWarning, match=WARNINGS[name]):
+            return Mesh.read(path)
+    return Mesh.read(path)
+
+
+@pytest.mark.parametrize("name", GROUPS)
+def test_files_of_abaqus_and_calculix_have_all_their_sets(name: str) -> None:
+    mesh = loaded(name)
+    mesh.check()
+    assert misplaced(mesh) < 1e-12
+    sizes = {g: sum(volume(mesh, v, k) for k, v in mesh.cells_of(g).items()) for g in mesh.groups}
+    assert sizes == pytest.approx(GROUPS[name])
+    assert mesh.sides.keys() == SIDES[name].keys()
+    for side, (size, centre) in SIDES[name].items():
+        faces = mesh.faces(side)
+        found = sum(len(v) if k == "point1" else volume(mesh, v, k) for k, v in faces.items())
+        assert found == pytest.approx(size), side
+        points = np.concatenate(
+            [mesh.points[v].reshape(-1, mesh.dimension) for v in faces.values()]
+        )
+        assert points.mean(axis=0) == pytest.approx(np.array(centre), abs=1e-12), side
+
+
+def test_both_sides_of_a_shell() -> None:
+    mesh = loaded("shells")
+    for side, sign in (("OUTER", 1.0), ("INNER", -1.0), ("PLAIN", 1.0)):
+        a, b, c = mesh.points[mesh.sides[side]["quad4"][0, :3]]
+        np.testing.assert_allclose(np.cross(b - a, c - a), [0.0, 0.0, sign])
+
+
+def test_two_ways_to_write_a_plate_are_one_body() -> None:
+    """A set over two kinds of elements, and in two pieces: no cell is lost."""
+    forces = []
+    for name, body, tip in (("gmsh_plate", "body", "tip"), ("plate_by_hand", "Body", "TIP")):
+        study = Study(loaded(name))
+        study.add("plate", material="hooke", cells=body, E=100.0, nu=0.3)
+        study.fix("wall", u_x=0, u_y=0)
+        study.fix(tip, u_y=0.1)
+        forces.append(study.solve().reaction("wall")["u_y"])
+    assert forces[0] == pytest.approx(forces[1], rel=1e-12)
+    whole = Study(loaded("plate_by_hand"))
+    whole.add("plate", material="hooke", E=100.0, nu=0.3)
+    whole.fix("wall", u_x=0, u_y=0)
+    whole.fix((3.0, 0.5), u_y=0.1)
+    assert forces[0] == pytest.approx(whole.solve().reaction("wall")["u_y"], rel=1e-12)
+
+
+NODES = "*NODE\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n"
+QUAD = "*ELEMENT, TYPE=CPS4, ELSET=E\n1, 1, 2, 3, 4\n"
+REFUSED = {
+    "*NGEN, NSET=X\n1, 4\n": "line 8: *NGEN makes nodes by a rule, which is not read",
+    "*ELGEN\n1, 2\n": "*ELGEN makes elements by a rule",
+    "*SYSTEM\n0, 0, 0\n": "*SYSTEM makes a mesh by a rule",
+    "*NODE, SYSTEM=C\n9, 1, 90\n": "SYSTEM=C is not read",
+    "*ELEMENT, TYPE=C3D15\n2, 1\n": "elements C3D15 have no cell here; there are C3D4, C3D10",
+    "*ELEMENT, TYPE=U1\n2, 1\n": "elements U1 have no cell here",
+    "*ELEMENT, TYPE=CPS3\n2, 1, 2\n": "line 9: element 2 has 2 nodes, CPS3 has 3",
+    "*ELEMENT, TYPE=CPS3\n2, 1, 2, 3, 4\n": "element 2 has 4 nodes, CPS3 has 3",
+    "*ELEMENT, TYPE=CPS3\n2, 1, 2, 7\n": "element 2 has node 7, which is not in the file",
+    "*ELEMENT, TYPE=CPS3\n1, 1, 2, 3\n": "element 1 is given again, as another one",
+    "*ELEMENT\n1, 1, 2, 3\n": "*ELEMENT needs TYPE=",
+    "*NODE\n1, 5, 5\n": "node 1 is given again, at another place",
+    "*NODE\n7, five\n": "'five' is no number",
+    "*NSET, NSET=X\n1, 9\n": "node 9, which is not in the file",
+    "*NSET, NSET=X\nY\n": "there is no NSET 'Y'",
+    "*NSET, NSET=X, INSTANCE=P\n1\n": "there is no instance 'P'",
+    "*NSET, NSET=X, GENERATE\n1, 9, 0\n": "GENERATE in steps of 0",
+    "*SURFACE, NAME=X\nE, S5\n": "a quad4 has no face 'S5'",
+    "*SURFACE, NAME=X\nE, E1\n": "a quad4 has no face 'E1'",
+    "*SURFACE, NAME=X\nNO, S1\n": "there is no ELSET 'NO'",
+    "*INCLUDE, INPUT=none.inp\n": "line 8: there is no file 'none.inp' to include",
+    "*INCLUDE, INPUT=part.inp\n": "part.inp includes itself",
+    "*INSTANCE, NAME=A, PART=B\n": "there is no part 'B'",
+}
+
+
+@pytest.mark.parametrize("more", REFUSED)
+def test_what_cannot_be_read_is_named(more: str, tmp_path: Path) -> None:
+    path = tmp_path / "part.inp"
+    path.write_text(NODES + QUAD + more)
+    with pytest.raises(MeshError, match=re.escape(REFUSED[more])) as info:
+        Mesh.read(path)
+    assert "\n" not in str(info.value)
+    path.write_text("*HEADING\nnothing\n")
+    with pytest.raises(MeshError, match="there are no nodes or no elements"):
+        Mesh.read(path)
+
+
+def test_an_analytical_surface_is_said_to_be_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "part.inp"
+    path.write_text(NODES + QUAD + "*SURFACE, NAME=RIGID, TYPE=SEGMENTS\nSTART, 0, 0\n")
+    with pytest.warns(UserWarning, match=r"line 8: the surface 'RIGID' is left out, SEGMENTS"):
+        Mesh.read(path)
+
+
+def every_kind(shape: str, order: int) -> Mesh:
+    if shape in ("quad", "triangle"):
+        mesh = Mesh.rectangle(2.0, 1.0, cells=(2, 1), order=order, shape=shape)  # type: ignore[arg-type]
+    else:
+        mesh = Mesh.box((2.0, 1.0, 1.0), cells=(2, 1, 1), order=order, shape=shape)  # type: ignore[arg-type]
+    mesh = mesh.with_group("low half", lambda x: x[:, 0] < 1.0)
+    corners = {"point1": mesh.nodes(lambda x: x[:, 0] == 0.0)[:, None]}
+    return Mesh(mesh.points, mesh.cells, mesh.groups, {**mesh.sides, "corners": corners})
+
+
+def sorted_rows(rows: Any) -> list[list[int]]:
+    return sorted(np.sort(rows, axis=1).tolist())
+
+
+SHAPES = [("quad", 1), ("quad", 2), ("triangle", 1), ("triangle", 2), ("hex", 1), ("hex", 2)]
+SHAPES += [("serendipity", 2), ("tetrahedron", 1), ("tetrahedron", 2), ("wedge", 1)]
+
+
+@pytest.mark.parametrize(("shape", "order"), SHAPES)
+@pytest.mark.parametrize("ending", ["inp", "msh", "vtu", "vtk"])
+def test_a_mesh_that_is_written_reads_back_with_its_names(
+    shape: str, order: int, ending: str, tmp_path: Path
+) -> None:
+    mesh = every_kind(shape, order)
+    path = tmp_path / f"part.{ending}"
+    mesh.write(path)
+    again = Mesh.read(path)
+    np.testing.assert_array_equal(again.points, mesh.points)
+    assert again.cells.keys() == mesh.cells.keys()
+    for kind, nodes in mesh.cells.items():
+        np.testing.assert_array_equal(again.cells[kind], nodes)
+        np.testing.assert_array_equal(again.groups["low half"][kind], mesh.groups["low half"][kind])
+    assert again.sides.keys() == mesh.sides.keys()
+    for name in mesh.sides:
+        faces = again.faces(name)
+        assert faces.keys() == {k for k, v in mesh.faces(name).items() if len(v)}
+        for kind, nodes in faces.items():
+            assert sorted_rows(nodes) == sorted_rows(mesh.faces(name)[kind])
+
+
+def test_shells_and_names_that_need_quotes_are_written(tmp_path: Path) -> None:
+    mesh = loaded("shells")
+    path = tmp_path / "part.inp"
+    mesh.write(path)
+    again = Mesh.read(path)
+    assert again.sides.keys() == mesh.sides.keys()
+    for name, side in mesh.sides.items():
+        for kind, nodes in side.items():
+            np.testing.assert_array_equal(again.sides[name][kind][:, :2], nodes[:, :2], name)
+    mesh = Mesh.rectangle(1.0, 1.0, cells=(1, 1)).with_side("a, 1", lambda x: x[:, 0] == 0)
+    mesh.write(path)
+    assert "a, 1" in Mesh.read(path).sides
+    twice = mesh.with_side("LEFT", lambda x: x[:, 0] == 0)
+    with pytest.raises(MeshError, match="'left' and 'LEFT' are one name in a file of Abaqus"):
+        twice.write(path)
+
+
+def test_a_format_without_names_says_so(tmp_path: Path) -> None:
+    mesh = every_kind("triangle", 1)
+    with pytest.warns(
+        UserWarning, match=r"part.stl: names are not written \(low half, left, right"
+    ):
+        mesh.write(tmp_path / "part.stl")
+
+
+def test_numbers_of_cells_become_names(tmp_path: Path) -> None:
+    """Physical groups in a .vtu that meshio made, properties of Nastran."""
+    points = Mesh.rectangle(3.0, 1.0, cells=(3, 1)).points
+    blocks = [("quad", [[0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6]]), ("line", [[4, 0]])]
+    numbers = [np.array([1, 2, 1]), np.array([7])]
+    data = {"gmsh:physical": numbers, "number": [np.array([1, 2, 3]), np.array([4])]}
+    points = np.pad(points, ((0, 0), (0, 1)))
+    meshio.write(tmp_path / "part.vtu", meshio.Mesh(points, blocks, cell_data=data))
+    meshio.write(
+        tmp_path / "part.bdf", meshio.Mesh(points, blocks, cell_data={"nastran:ref": numbers})
+    )
+    for ending, name in (("vtu", "physical"), ("bdf", "property")):
+        mesh = Mesh.read(tmp_path / f"part.{ending}")
+        assert set(mesh.groups) == {f"{name} 1", f"{name} 2"}
+        np.testing.assert_array_equal(mesh.groups[f"{name} 1"]["quad4"], [0, 2])
+        assert mesh.points[mesh.nodes(f"{name} 7"), 0].tolist() == [0.0, 0.0]
+
+
+def test_files_that_meshio_cannot_read_give_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "part.bdf"
+    path.write_text("GRID,1,,0.,0.,0.\n")
+    with pytest.raises(MeshError, match=r'part\.bdf: "BEGIN BULK" statement not found'):
+        Mesh.read(path)
+    path = tmp_path / "part.med"
+    path.write_text("")
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(MeshError, match=r"reads \.med with the package h5py: pip install h5py"):
+        Mesh.read(path)
+    with (
+        pytest.raises(MeshError, match="the package h5py: pip install h5py"),
+        pytest.warns(UserWarning, match="names are not written"),
+    ):
+        Mesh.rectangle(1.0, 1.0, cells=(1, 1)).write(path)
+
+
+def test_families_of_med_become_names(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """As meshio hands them on; its cells are the other way round."""
+    mesh = Mesh.box((2.0, 1.0, 1.0), cells=(2, 1, 1))
+    faces = mesh.faces("left")["quad4"]
+    found = meshio.Mesh(
+        mesh.points,
+        [("hexahedron", mesh.cells["hex8"][:, [0, 3, 2, 1, 4, 7, 6, 5]]), ("quad", faces)],
+        cell_data={"cell_tags": [np.array([-1, -2]), np.array([-3])]},
+        point_data={"point_tags": np.arange(len(mesh.points)) % 2},
+    )
+    found.cell_tags = {-1: ["soft"], -2: ["soft", "end"], -3: ["held"]}
+    found.point_tags = {1: ["odd"]}
+    (tmp_path / "part.med").write_text("")
+    monkeypatch.setattr(meshio, "read", lambda path: found)
+    again = Mesh.read(tmp_path / "part.med")
+    again.check()
+    assert {name: v["hex8"].tolist() for name, v in again.groups.items()} == {
+        "soft": [0, 1],
+        "end": [1],
+    }
+    np.testing.assert_array_equal(again.nodes("odd"), np.arange(1, len(mesh.points), 2))
+    np.testing.assert_array_equal(again.nodes("held"), mesh.nodes("left"))
+
+
+@pytest.mark.parametrize("ending", ["vtu", "vtk"])
+def test_wedges_of_vtk_have_the_positive_volume_that_vtk_gives_them(
+    ending: str, tmp_path: Path
+) -> None:
+    """VTK sees the first triangle of a wedge from outside against the clock."""
+    mesh = every_kind("wedge", 1)
+    path = tmp_path / f"part.{ending}"
+    mesh.write(path)
+    nodes = meshio.read(path).cells_dict["wedge"]
+    a, b, c, d = (mesh.points[nodes[:, k]] for k in (0, 1, 2, 3))
+    assert (np.einsum("nd,nd->n", np.cross(b - a, c - a), d - a) < 0.0).all()
+
+
+@pytest.mark.parametrize("title", ["Nodes", "ParametricNodes"])
+def test_parametric_nodes_of_gmsh(title: str, tmp_path: Path) -> None:
+    """With the entity of each node, and its parameters on curves and surfaces."""
+    more = ["0 1", "1 1 0.5", "2 1 0.5 0.25", "3 1"]
+    places = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"]
+    lines = [
+        f"{k} {x}" + f" {m}" * (title != "Nodes")
+        for k, (x, m) in enumerate(zip(places, more, strict=True), start=1)
+    ]
+    path = tmp_path / "part.msh"
+    path.write_text(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
+        f"${title}\n4\n" + "\n".join(lines) + f"\n$End{title}\n"
+        "$Elements\n1\n1 3 2 1 1 1 2 3 4\n$EndElements\n"
+    )
+    np.testing.assert_array_equal(Mesh.read(path).points, [[0, 0], [1, 0], [1, 1], [0, 1]])
+
+
+def test_kinds_and_mirrors() -> None:
+    """A cell seen in a mirror is the same cell the other way round."""
+    for cell in CELLS.values():
+        if cell.dimension:
+            order = list(cell.mirrored)
+            assert sorted(order) == list(range(len(order)))
+            assert np.array(order)[order].tolist() == list(range(len(order)))
