@@ -6,52 +6,135 @@ A field of lower order than its cells stands at their corners only: a pressure o
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 
-from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.point_location import Located
 from softehl.runtime.statement.records import Block
 from softehl.runtime.system import System
 
 _NOTHING = 1e-9  # a shape function below that is zero but for rounding
+_APART = 1e-9  # of the terms of two values: they differ by more than rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Interpolation:
+    """Values of unknowns in cells that hold places.
+
+    located: pairs of a place and a cell. entries: unknown -> pairs, unknowns and weights (e,) each.
+    known: unknown -> whether a pair (m,) has a value of it.
+    """
+
+    located: Located
+    entries: Mapping[str, tuple[Integers, Integers, Array]]
+    known: Mapping[str, Flags]
+
+    def values(self, x: Array) -> dict[str, Array]:
+        """Unknown -> values (m,) of x, (n,), nan where a cell has none."""
+        pairs = len(self.located.point)
+        return {
+            name: np.where(self.known[name], np.bincount(pair, weight * x[dof], pairs), np.nan)
+            for name, (pair, dof, weight) in self.entries.items()
+        }
+
+    def jump(self, x: Array) -> tuple[str, Integers] | None:
+        """An unknown of x that differs between two cells at a place where they have copies of
+        nodes, and these two pairs; None where all unknowns are continuous.
+        """
+        located = self.located
+        if len(located.first) == len(located.point):
+            return None
+        first = located.first[np.searchsorted(located.point[located.first], located.point)]
+        values = self.values(x)
+        for name, (pair, dof, weight) in self.entries.items():
+            apart = np.abs(values[name] - values[name][first])
+            scale = np.bincount(pair, np.abs(weight * x[dof]), len(first))
+            for k in np.flatnonzero(apart > _APART * np.maximum(scale, scale[first])):
+                both = [set(dof[(pair == p) & (np.abs(weight) > _NOTHING)]) for p in (k, first[k])]
+                if both[0] != both[1]:
+                    return name, np.array([first[k], k])
+        return None
+
+
+def interpolation(system: System, places: Array, group: str | None = None) -> Interpolation:
+    """Unknowns at places (n, dim), in the cells, of a group, that hold them."""
+    located = system.mesh.holding(places, group)
+    entries: dict[str, list[tuple[Integers, Integers, Array]]] = {}
+    known: dict[str, Any] = {
+        name: np.zeros(len(located.point), np.bool_) for name in system.numbering.nodal
+    }
+    for kind, pairs in located.by_kind():
+        cell, nodes = CELLS[kind], system.mesh.cells[kind][located.row[pairs]]
+        weights = cell.shape(located.parent[pairs, : cell.dimension])
+        for name, numbers in system.numbering.nodal.items():
+            dofs = numbers[nodes]
+            inside = np.asarray(((dofs >= 0) | (np.abs(weights) <= _NOTHING)).all(axis=1))
+            parts = [(np.flatnonzero(inside), weights)]
+            for block in _at_corners(system, name) if not inside.all() else ():
+                if block.kind == kind:
+                    lower = np.flatnonzero(~inside & _among(nodes, block.nodes))
+                    linear = _linear(kind)
+                    corners = np.zeros_like(weights)
+                    corners[:, : linear.shape[1]] = weights @ linear
+                    parts.append((lower, corners))
+                    inside[lower] = True
+            for rows, own in parts:
+                row, column = np.nonzero(dofs[rows] >= 0)
+                row = rows[row]
+                entry = pairs[row], dofs[row, column], own[row, column]
+                entries.setdefault(name, []).append(entry)
+            known[name][pairs] = inside
+    joined = {
+        n: tuple(map(np.concatenate, zip(*parts, strict=True))) for n, parts in entries.items()
+    }
+    return Interpolation(located, joined, known)  # type: ignore[arg-type]
+
+
+def _among(rows: Integers, known: Integers) -> Flags:
+    """Which rows (m, k) are among the known ones (n, k)."""
+    near = known[np.isin(known[:, 0], rows[:, 0])]
+    there = set(map(tuple, near.tolist()))
+    return np.array([tuple(row) in there for row in rows.tolist()], dtype=np.bool_)
 
 
 def shares(system: System, place: Array) -> dict[str, tuple[Integers, Array]] | None:
-    """Unknown -> numbers (k,) and weights (k,) that make its value at a place (dim,).
+    """Unknown -> numbers (k,) and weights (k,) that make its value at a place (dim,), in the first
+    cell that holds it.
 
-    Without unknowns that the cell at the place does not have; None where no cell is there.
+    Without unknowns that this cell does not have; None where no cell is there.
     """
-    holding = system.mesh.holding(place)
-    if holding is None:
+    found = interpolation(system, np.asarray(place)[None])
+    if not len(found.located.point):
         return None
-    nodes, weights = holding
-    found = {}
-    for name, numbers in system.numbering.nodal.items():
-        there = numbers[nodes]
-        if (there[np.abs(weights) > _NOTHING] >= 0).all():
-            found[name] = there[there >= 0], weights[there >= 0]
-            continue
-        for block in _at_corners(system, name):
-            if nodes.shape == block.nodes.shape[1:] and (block.nodes == nodes).all(axis=1).any():
-                linear = _linear(block.kind)
-                found[name] = there[: linear.shape[1]], weights @ linear
-    return found
+    chosen = {name: entry[0] == 0 for name, entry in found.entries.items() if found.known[name][0]}
+    return {n: (found.entries[n][1][rows], found.entries[n][2][rows]) for n, rows in chosen.items()}
 
 
 def between_nodes(
-    system: System, place: Array, nodal: Mapping[str, Array]
-) -> dict[str, float] | None:
-    """Values at a place (dim,) of fields by their values at nodes, (points,); nan where one that
-    matters is nan; None where no cell is there.
+    system: System, places: Array, nodal: Mapping[str, Array], group: str | None = None
+) -> list[dict[str, float] | None]:
+    """Values at places (n, dim) of fields by their values at nodes, (points,), in the first cell
+    of a group that has them; nan where none has, None where no cell is there.
     """
-    holding = system.mesh.holding(place)
-    if holding is None:
-        return None
-    nodes, weights = holding
-    some = np.abs(weights) > _NOTHING  # at a side between blocks only nodes of the side matter
-    return {name: float(v[nodes[some]] @ weights[some]) for name, v in nodal.items()}
+    located = system.mesh.holding(places, group)
+    values = {name: np.empty(len(located.point)) for name in nodal}
+    for kind, pairs in located.by_kind():
+        cell, nodes = CELLS[kind], system.mesh.cells[kind][located.row[pairs]]
+        weights = cell.shape(located.parent[pairs, : cell.dimension])
+        some = np.abs(weights) > _NOTHING  # at a side between blocks only nodes of the side matter
+        for name, field in nodal.items():
+            values[name][pairs] = np.where(some, field[nodes] * weights, 0.0).sum(axis=1)
+    rows: list[dict[str, float] | None] = [None] * len(places)
+    for pair, point in enumerate(located.point.tolist()):
+        known = rows[point]
+        if known is None or all(map(np.isnan, known.values())):
+            rows[point] = {name: float(field[pair]) for name, field in values.items()}
+    return rows
 
 
 def at_every_node(system: System, x: Array) -> dict[str, Array]:

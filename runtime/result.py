@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,7 +13,7 @@ import numpy as np
 
 from softehl.errors import UnknownNameError
 from softehl.runtime.arrays import Array, Integers, read_only
-from softehl.runtime.between import at_every_node, between_nodes, shares
+from softehl.runtime.between import at_every_node, between_nodes, interpolation
 from softehl.runtime.derivatives.asked import By, inputs
 from softehl.runtime.derivatives.inputs import Input, Key
 from softehl.runtime.derivatives.quantities import quantity
@@ -137,25 +138,17 @@ class Result:
             raise UnknownNameError(f"no unknown {name!r} at nodes; there are {known}")
         return self.system.share.at_all_nodes(self.values(name))
 
-    def at(self, place: tuple[float, ...], *, block: str | None = None) -> dict[str, float]:
+    def at(
+        self, place: tuple[float, ...], *, cells: str | None = None, block: str | None = None
+    ) -> dict[str, float]:
         """Values of the unknowns at a place of the undeformed mesh, interpolated within a cell.
 
+        cells: a group in which the cell is, where bodies meet that do not share their nodes.
         block: instead, of its fields, between their values `at_nodes`; nan away from the block.
         Raises MeshError if the place lies outside.
         """
-        return self._at(place, None if block is None else self.at_nodes(block))
-
-    def _at(self, place: tuple[float, ...], nodal: Mapping[str, Array] | None) -> dict[str, float]:
-        """Values at a place of the unknowns, or of fields by their values at nodes (points,)."""
-        x, here = np.asarray(place, dtype=np.float64), None
-        if nodal is not None:
-            here = between_nodes(self._whole, x, nodal)
-        elif (known := shares(self._whole, x)) is not None:
-            here = {n: float(self.x[numbers] @ w) for n, (numbers, w) in known.items()}
-        found = self.system.share.found(here)
-        if found is None:
-            raise MeshError(f"{place_text(x)} lies outside the mesh")
-        return found
+        (row,) = self._at_places(np.asarray(place, dtype=np.float64)[None], cells, block)
+        return row
 
     def along(
         self,
@@ -163,19 +156,58 @@ class Result:
         end: tuple[float, ...],
         count: int = 100,
         *,
+        cells: str | None = None,
         block: str | None = None,
     ) -> Any:
         """Values along a straight line: name -> (count,), and "s", the distance from the start.
 
-        block: of its fields instead of the unknowns, see `at`.
+        cells, block: as in `at`.
         """
-        nodal = None if block is None else self.at_nodes(block)
         a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
         shares = np.linspace(0.0, 1.0, count)
-        rows = [self._at(tuple(a + s * (b - a)), nodal) for s in shares]
+        rows = self._at_places(a + shares[:, None] * (b - a), cells, block)
         names = [name for name in rows[0] if all(name in row for row in rows)]
         columns = {name: np.array([row[name] for row in rows]) for name in names}
         return {"s": shares * float(np.linalg.norm(b - a)), **columns}
+
+    def _at_places(
+        self, places: Array, group: str | None, block: str | None
+    ) -> list[dict[str, float]]:
+        """Unknowns, or fields of a block, at each place (n, dim).  Raises MeshError for one
+        outside.
+        """
+        if block is None:
+            here = self._unknowns_at(places, group)
+        else:
+            here = between_nodes(self._whole, places, self.at_nodes(block), group)
+        rows = self.system.share.found_each(here)
+        for place, row in zip(places, rows, strict=True):
+            if row is None:
+                where = "the mesh" if group is None else f"the cells {group!r}"
+                raise MeshError(f"{place_text(place)} lies outside {where}")
+        return [row for row in rows if row is not None]
+
+    def _unknowns_at(self, places: Array, group: str | None) -> list[dict[str, float] | None]:
+        """Unknowns at each place (n, dim), None outside; a warning where bodies differ."""
+        mesh, found = self._whole.mesh, interpolation(self._whole, places, group)
+        located, values = found.located, found.values(self.x)
+        jump = found.jump(self.x)
+        if jump is not None:
+            name, pairs = jump
+            a, b = values[name][pairs]
+            point = place_text(places[located.point[pairs[0]]])
+            warnings.warn(
+                f"{name} at {point} is {a:.6g} in one cell and {b:.6g} in another, which do not "
+                f'share their nodes; the first is taken: name a group, cells="..." '
+                f"({listed(mesh.groups)})",
+                stacklevel=4,
+            )
+        here: list[dict[str, float] | None] = [None] * len(places)
+        for pair in located.first.tolist():
+            here[located.point[pair]] = {
+                n: float(values[n][pair]) for n, known in found.known.items() if known[pair]
+            }
+        return here
 
     def fields(self, block: str) -> dict[str, Array]:
         """Fields of a block's page at its quadrature points: name -> (cells, points)."""

@@ -128,9 +128,9 @@ class Share:
         """Sum of values at these unknowns, each counted once."""
         return float(values[numbers].sum())
 
-    def found(self, value: T | None) -> T | None:
-        """Value that one process has found, on all of them."""
-        return value
+    def found_each(self, values: list[T | None]) -> list[T | None]:
+        """Of each value that of the first process that has found it, on all of them."""
+        return values
 
     def at_all_nodes(self, values: Array) -> Array:
         """Values (n,) at the nodes of this process's mesh as those at all nodes of the whole."""

@@ -166,9 +166,10 @@ class Parts(Processes):
         own[self.team.part.owned] = True
         return float(total(np.array([values[numbers[own[numbers]]].sum()]))[0])
 
-    def found(self, value: T | None) -> T | None:
+    def found_each(self, values: list[T | None]) -> list[T | None]:
         """See `Share`."""
-        return next((v for v in world().allgather(value) if v is not None), None)
+        told = zip(*world().allgather(values), strict=True)
+        return [next((v for v in row if v is not None), None) for row in told]
 
     def at_all_nodes(self, values: Array) -> Array:
         """See `Share`."""

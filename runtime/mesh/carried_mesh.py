@@ -13,11 +13,12 @@ from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import splu
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.mesh.location import CORNERS
+from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.outline import Outline, OutlineError
 from softehl.runtime.mesh.sections import SectionMesh
 
 _GAUSS = 1.0 / np.sqrt(3.0)
+_CORNERS = CELLS["quad4"].nodes
 
 
 def carried_places(s: Array, old: Outline, new: Outline) -> Array:
@@ -55,8 +56,8 @@ def potential(mesh: SectionMesh, values: Array) -> Array:
 def _laplacian(mesh: SectionMesh) -> csc_array:
     """Of bilinear shape functions, (V, V): it has none but linear fields to hold still."""
     corners, K = mesh.points[mesh.quads], np.zeros((len(mesh.quads), 4, 4))
-    for at in _GAUSS * CORNERS:
-        slopes = 0.25 * CORNERS * (1.0 + CORNERS[:, ::-1] * at[::-1])
+    for at in _GAUSS * _CORNERS:
+        slopes = 0.25 * _CORNERS * (1.0 + _CORNERS[:, ::-1] * at[::-1])
         jacobian = np.einsum("ak,eai->eki", slopes, corners)
         gradient = np.linalg.solve(jacobian, np.broadcast_to(slopes.T, (len(K), 2, 4)))
         K += np.einsum("eia,eib,e->eab", gradient, gradient, np.linalg.det(jacobian))

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,9 @@ from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.faces import as_known, matched, once
 from softehl.runtime.mesh.piece import Piece
 from softehl.runtime.names import few, listed, meant, misfit
+
+if TYPE_CHECKING:
+    from softehl.runtime.mesh.point_location import Located, PointLocator
 
 Faces: TypeAlias = Mapping[str, Integers]
 """Kind of face -> node numbers (n, k), seen from outside counterclockwise."""
@@ -348,7 +351,9 @@ class Mesh:
         return {kind: self.cells[kind][chosen] for kind, chosen in self.groups[group].items()}
 
     def node_at(self, place: Array) -> int:
-        """Number of the node at a place (dim,).  Raises MeshError that names the nearest one."""
+        """Number of the node at a place (dim,).  Raises MeshError that names the nearest one, or
+        those that are all there.
+        """
         place = self._placed(place)
         distance = np.linalg.norm(self.points - place, axis=1)
         nearest = int(distance.argmin())
@@ -357,35 +362,66 @@ class Mesh:
                 f"no node at {place_text(place)}; the nearest is number {nearest} at "
                 f"{place_text(self.points[nearest])}"
             )
+        self._require_one(np.flatnonzero(distance <= _NEAR * self._size), place)
         return nearest
 
     def nodes_at(self, place: Array) -> Integers:
-        """The node at a place (dim,); of a mesh in parts none where it is on another process."""
-        if self.piece is None:
-            return np.array([self.node_at(place)])
+        """The node at a place (dim,), with all copies that `split` made of it; of a mesh in parts
+        none where it is on another process.  Raises MeshError.
+        """
         place = self._placed(place)
         near = np.linalg.norm(self.points - place, axis=1) <= _NEAR * self._size
-        found = self.piece.everywhere(np.flatnonzero(near))
-        if not self.anywhere(len(found)):
-            raise MeshError(f"no node at {place_text(place)}, in any part of the mesh")
+        found = np.flatnonzero(near)
+        if self.piece is not None:
+            found = self.piece.everywhere(found)
+            if not self.anywhere(len(found)):
+                raise MeshError(f"no node at {place_text(place)}, in any part of the mesh")
+        elif self.numbers is None or not len(found):
+            return np.array([self.node_at(place)])
+        if len(np.unique(self.origin[found])) > 1:
+            self._require_one(found, place)
         return found
+
+    def _require_one(self, nodes: Integers, place: Array) -> None:
+        if len(nodes) > 1:
+            raise MeshError(
+                f"{len(nodes)} nodes are at {place_text(place)}: name one by its number, "
+                f"{listed(map(str, nodes))}, or a side of one body"
+            )
 
     def locate(self, place: Array) -> tuple[Integers, Array]:
         """The nodes (k,) of the cell that holds a place (dim,), and their shape functions there.
 
         Raises MeshError if the place lies outside the mesh.
         """
-        found = self.holding(place)
-        if found is None:
-            raise MeshError(f"{place_text(place)} lies outside the mesh")
-        return found
+        found = self.holding(self._placed(place)[None])
+        if not len(found.point):
+            raise MeshError(f"{place_text(np.asarray(place))} lies outside the mesh")
+        cell = CELLS[found.kinds[found.kind[0]]]
+        weights = cell.shape(found.parent[:1, : cell.dimension])[0]
+        return self.cells[cell.name][found.row[0]], weights
 
-    def holding(self, place: Array) -> tuple[Integers, Array] | None:
-        """As `locate`; None where no cell, of a mesh in parts of this process, holds the place."""
-        place = self._placed(place)
-        from softehl.runtime.mesh.cell_at import cell_at
+    def holding(self, places: Array, group: str | None = None) -> Located:
+        """The cells that hold places (n, dim); of a group, of a mesh in parts of this process.
 
-        return cell_at(self.points, self.cells, place, _NEAR * self._size)
+        Raises MeshError.
+        """
+        places = np.asarray(places, dtype=np.float64)
+        if places.ndim != 2 or places.shape[1] != self.dimension or not np.isfinite(places).all():
+            places = np.stack([self._placed(place) for place in places])
+        if group is None:
+            return self._locator.holding(places)
+        self.cells_of(group)
+        chosen = {kind: np.zeros(len(nodes), np.bool_) for kind, nodes in self.cells.items()}
+        for kind, rows in self.groups[group].items():
+            chosen[kind][rows] = True
+        return self._locator.holding(places, chosen)
+
+    @cached_property
+    def _locator(self) -> PointLocator:
+        from softehl.runtime.mesh.point_location import PointLocator
+
+        return PointLocator(self.points, self.cells, _NEAR * self._size)
 
     @cached_property
     def _size(self) -> float:

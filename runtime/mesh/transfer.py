@@ -11,19 +11,29 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.mesh.location import interpolated, located
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.point_location import Located, PointLocator
 from softehl.runtime.mesh.sections import SectionMesh
+
+_WITHIN = 1e-12  # of the size of the mesh: a point so near to a cell is in it
 
 
 def transfer_nodes(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
     """Nodal values (V', k) on the new mesh from those, (V, k), on the old: bilinear."""
-    return interpolated(old.points, old.quads, values, new.points)
+    found = _nearest(old, new.points)
+    weights = CELLS["quad4"].shape(found.parent[:, :2])
+    return np.asarray(np.einsum("na,nak->nk", weights, values[old.quads[found.row]]))
 
 
 def transfer_elements(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
     """Element values (Q',) on the new mesh from those, (Q,), on the old, by their middles."""
-    cell, _ = located(old.points, old.quads, new.points[new.quads].mean(axis=1))
-    return np.asarray(values[cell])
+    return np.asarray(values[_nearest(old, new.points[new.quads].mean(axis=1)).row])
+
+
+def _nearest(mesh: SectionMesh, places: Array) -> Located:
+    """The cell that holds each place (n, 2), or is nearest to it."""
+    near = _WITHIN * float(np.ptp(mesh.points, axis=0).max())
+    return PointLocator(mesh.points, {"quad4": mesh.quads}, near).nearest(places)
 
 
 def transfer_boundary(old: SectionMesh, new: SectionMesh, values: Array) -> Array:
