@@ -5,6 +5,7 @@ is no working C compiler the wheel is built without it, for all platforms.  An e
 compiles nothing: its kernels are tuned at their first use.
 """
 
+import atexit
 import platform
 import shutil
 import sys
@@ -28,10 +29,11 @@ COMPILED = (build.LIBRARY, build.DIGEST)
 def plain_library() -> Path | None:
     """A temporary folder with the plain library; None where there is no working compiler."""
     folder = Path(tempfile.mkdtemp(prefix="softehl-build-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     for source in build.GENERATED.glob("*.[ch]"):
         shutil.copy(source, folder)
     try:
-        build.build(folder, flags=build.PLAIN)
+        build.build_plain(folder)
     except build.BuildError as error:
         print(f"softehl: {error}", file=sys.stderr)
         print(

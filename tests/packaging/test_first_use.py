@@ -50,7 +50,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
             path.write_text(json.dumps({"kernels": {"contact": kernels["contact"]}}))
         elif path.name not in KEPT:
             path.unlink()
-    build.build(generated, flags=build.PLAIN)
+    build.build_plain(generated)
     return place
 
 
