@@ -97,7 +97,24 @@ def split(mesh: Mesh) -> Mesh:
                         known.append(nodes[:, list(local)])
                         found.append(cells[kind][:, list(local)])
             if not known:
-                raise MeshError(f"split: side {name!r} is of no cells")
+                sides[name][face] = _copies(mesh, cells, there)
+                continue
             rows = matched(there, np.concatenate(known), CELLS[face].corners)
             sides[name][face] = np.concatenate(found)[rows]
     return Mesh(mesh.points[old], cells, mesh.groups, sides, mesh.origin[old])
+
+
+def _copies(mesh: Mesh, cells: dict[str, Integers], rows: Integers) -> Integers:
+    """Points, edges or cells (m, k), which are no faces of cells, in each of the cells (new nodes
+    by kind) that have them.
+    """
+    found = [np.empty((0, rows.shape[1]), dtype=np.int64)]
+    for kind, nodes in mesh.cells.items():
+        if rows.shape[1] == 1:
+            found.append(cells[kind][np.isin(nodes, rows)][:, None])
+            continue
+        for row in rows:
+            own = np.flatnonzero(np.isin(nodes, row).sum(axis=1) == len(row))
+            local = (nodes[own][:, None] == row[:, None]).argmax(axis=2)
+            found.append(np.take_along_axis(cells[kind][own], local, axis=1))
+    return np.concatenate(found)

@@ -179,8 +179,11 @@ class _Chosen:
                 found[f"group:{kind}:{name}"] = at
         for name, side in left.items():
             for kind, there in side.items():
-                known = np.concatenate(faces.get(kind, [there[:0]]))
-                own = matched(there, known, CELLS[kind].corners) >= 0
+                if kind in faces:
+                    known = np.concatenate(faces[kind])
+                    own = matched(there, known, CELLS[kind].corners) >= 0
+                else:  # points or edges: in the first part that has them
+                    own = np.asarray((self.place[there] >= 0).all(axis=1))
                 found[f"side:{kind}:{name}"] = self.place[there[own]]
                 side[kind] = there[~own]
         return found

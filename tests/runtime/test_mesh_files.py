@@ -133,6 +133,21 @@ def test_two_ways_to_write_a_plate_are_one_body() -> None:
     assert forces[0] == pytest.approx(whole.solve().reaction("wall")["u_y"], rel=1e-12)
 
 
+def test_cells_without_elements_are_told() -> None:
+    """A hole in the body; not where pages stand on nodes or sides alone."""
+    mesh = Mesh.rectangle(3.0, 1.0, cells=(3, 1)).with_group("ring", lambda x: x[:, 0] < 2.0)
+    study = Study(mesh.with_group("pad", lambda x: x[:, 0] > 2.0))
+    study.add("ring", material="hooke", cells="ring", E=1.0, nu=0.0)
+    study.fix("left", u_x=0, u_y=0)
+    study.load((1.0, 0.0), u_x=1.0)
+    with pytest.warns(
+        UserWarning, match="1 of 3 cells of the mesh have no elements, those of 'pad'"
+    ):
+        study.solve()
+    study.add("pad", material="hooke", cells="pad", E=1.0, nu=0.0)
+    study.solve()
+
+
 NODES = "*NODE\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n"
 QUAD = "*ELEMENT, TYPE=CPS4, ELSET=E\n1, 1, 2, 3, 4\n"
 REFUSED = {
@@ -236,6 +251,22 @@ def test_shells_and_names_that_need_quotes_are_written(tmp_path: Path) -> None:
     twice = mesh.with_side("LEFT", lambda x: x[:, 0] == 0)
     with pytest.raises(MeshError, match="'left' and 'LEFT' are one name in a file of Abaqus"):
         twice.write(path)
+
+
+def test_sides_of_points_and_edges_stay_where_a_mesh_is_split_or_cut(tmp_path: Path) -> None:
+    mesh = every_kind("hex", 1)
+    edge = {"line2": mesh.cells["hex8"][:1, 1:3]}  # of both cells
+    mesh = Mesh(mesh.points, mesh.cells, mesh.groups, {**mesh.sides, "edge": edge})
+    split = mesh.split()
+    split.check()
+    np.testing.assert_array_equal(split.points[split.nodes("corners"), 0], [0.0] * 4)
+    np.testing.assert_allclose(split.points[split.sides["edge"]["line2"]][..., 0], 1.0)
+    assert split.sides["edge"]["line2"].shape == (2, 2)
+    mesh.write(tmp_path / "part.npz", parts=2)
+    parts = [np.load(tmp_path / f"part_{k}.npz") for k in (1, 2)]
+    for name, kind in (("corners", "point1"), ("edge", "line2")):
+        rows = np.concatenate([p["numbers"][p[f"side:{kind}:{name}"]] for p in parts])
+        np.testing.assert_array_equal(rows, mesh.sides[name][kind])
 
 
 def test_a_format_without_names_says_so(tmp_path: Path) -> None:
