@@ -101,6 +101,8 @@ class Picture:
 def _small(kind: str, nodes: Integers) -> tuple[str, Integers]:
     """Cells for a file; those of order 3 and more as linear ones between their nodes."""
     cell = CELLS[kind]
+    if kind == "wedge6":  # VTK's first triangle runs the other way round
+        return cell.meshio, nodes[:, list(cell.mirrored)]
     if cell.exponents:
         return cell.meshio, for_vtk(kind, nodes)
     linear = CELLS[{1: "line2", 2: "quad4", 3: "hex8"}[cell.dimension]]
