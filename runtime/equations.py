@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.contacts import contact_of, with_contacts
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.fem.loads import Spring, Tie
 from softehl.runtime.fem.unknowns import Elements, Numbering
+from softehl.runtime.mesh.faces import matched
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.names import listed, meant
 from softehl.runtime.statement.pages import facet_nodes
@@ -27,6 +29,7 @@ def equations(statement: Statement, fields: Mapping[str, Sequence[str]] | None =
     if not statement.blocks:
         raise StudyError("there are no elements: add a page, study.add('body', 'solid.py')")
     mesh, pages = statement.mesh, statement.blocks.values()
+    _warn_of_holes(statement)
     elements = [Elements(b.name, b.nodes, b.slots, b.shared, b.form.places) for b in pages]
     try:
         numbering = Numbering.of(len(mesh.points), elements, fields)
@@ -57,6 +60,33 @@ def equations(statement: Statement, fields: Mapping[str, Sequence[str]] | None =
         written=statement.count,
     )
     return with_contacts(system, contacts)
+
+
+def _warn_of_holes(statement: Statement) -> None:
+    """Warn of cells without elements, where other cells have some: a body with a hole."""
+    mesh = statement.mesh
+    bare: dict[str, Flags] = {}
+    for kind, nodes in mesh.cells.items():
+        own = [block.nodes for block in statement.blocks.values() if block.kind == kind]
+        if any(part is nodes or np.array_equal(part, nodes) for part in own):
+            continue
+        known = np.concatenate([nodes[:0], *own])
+        bare[kind] = matched(nodes, known, nodes.shape[1]) < 0 if len(known) else nodes[:, 0] >= 0
+    count, total = sum(map(np.sum, bare.values())), sum(map(len, mesh.cells.values()))
+    if not 0 < count < total:  # pages on sides or nodes alone leave no hole
+        return
+    groups = [
+        name
+        for name, group in mesh.groups.items()
+        if any(map(len, group.values()))
+        and all(k in bare and bare[k][rows].all() for k, rows in group.items() if len(rows))
+    ]
+    of = f", those of {listed(map(repr, groups))}" if groups else ""
+    warnings.warn(
+        f"{count} of {total} cells of the mesh have no elements{of}: they are no part of the body; "
+        "study.add(...) is for all cells or for a group, cells=...",
+        stacklevel=4,
+    )
 
 
 def _forces(
