@@ -54,9 +54,9 @@ def content_of(path: Path) -> Content:
     if path.suffix == ".npz":
         raise MeshError(f"{path}: one part of a mesh; all of them: Mesh.read(..., spread=True)")
     try:
-        if path.suffix.lower() == ".inp":
-            return abaqus.read(path)
         data = path.read_bytes() if path.suffix == ".msh" else b""
+        if path.suffix.lower() == ".inp" or data.lstrip().startswith(b"*"):  # or of CalculiX's cgx
+            return abaqus.read(path)
         return gmsh.parse(data) if b"$MeshFormat" in data else _by_meshio(path)
     except ModuleNotFoundError as error:
         raise MeshError(

@@ -248,6 +248,7 @@ def test_shells_and_names_that_need_quotes_are_written(tmp_path: Path) -> None:
     mesh = Mesh.rectangle(1.0, 1.0, cells=(1, 1)).with_side("a, 1", lambda x: x[:, 0] == 0)
     mesh.write(path)
     assert "a, 1" in Mesh.read(path).sides
+    assert "a, 1" in Mesh.read(path.rename(tmp_path / "all.msh")).sides  # as CalculiX's cgx says
     twice = mesh.with_side("LEFT", lambda x: x[:, 0] == 0)
     with pytest.raises(MeshError, match="'left' and 'LEFT' are one name in a file of Abaqus"):
         twice.write(path)
