@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.content import Content
@@ -64,7 +65,7 @@ _TYPES = {
 _ADVICE = "save the mesh with all its nodes and elements written out"
 
 
-class AbaqusError(ValueError):
+class AbaqusError(SoftehlError, ValueError):
     """Error about a file."""
 
 

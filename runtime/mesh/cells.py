@@ -318,7 +318,7 @@ BY_FILE = {cell.meshio: cell for cell in CELLS.values()}
 
 
 def for_vtk(kind: str, nodes: Integers) -> Integers:
-    """Nodes (n, k) of cells in the order of VTK: the first triangle of its wedges looks outwards."""
+    """Nodes (n, k) of cells in VTK's order: the first triangle of a wedge looks outwards."""
     return nodes[:, list(CELLS[kind].mirrored)] if kind == "wedge6" else nodes
 
 
