@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Flags
 from softehl.runtime.begin import SMALLEST, Beginning
 from softehl.runtime.bifurcation import Bifurcation, Detector
 from softehl.runtime.derivatives.trail import Trail
+from softehl.runtime.fem.loads import Tie
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.held import require_held
 from softehl.runtime.result import Result
@@ -18,9 +19,9 @@ from softehl.runtime.solve.arclength import Arclength
 from softehl.runtime.solve.held import FirstStep, Remembering
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.kept import iterating
-from softehl.runtime.solve.linear import LinearSolver
+from softehl.runtime.solve.linear import LinearSolver, SingularMatrix
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point
+from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point, Status
 from softehl.runtime.solve.steps import StepRule
 from softehl.runtime.stability import warn_unstable
 from softehl.runtime.system import Step, System
@@ -35,7 +36,7 @@ nonlinear solution instead of a third."""
 class LoadPath:
     """Converged results in order, and where the load factor turned.
 
-    limits: each with `parameter` (the load factor), `kind` ("maximum" or "minimum") and `x`.
+    limits: each with `t` (the load factor), `kind` ("maximum" or "minimum") and `x`.
     bifurcations: those that were asked for, in order.
     """
 
@@ -167,15 +168,22 @@ class ArcSteps:
         """Path of `Study.follow`.  Raises NotConverged."""
         begin, x0, histories = start
         at, first_step = _Reached(system, x0, histories, self.on_step, True), FirstStep(self.newton)
+        problem = at.problem_at(begin)
         with np.errstate(all="ignore"):
-            problem = at.problem_at(begin + self.step)
             require_held(system, problem, x0)
             first = first_step.newton.solve(problem, x0)
         if not first.converged:
             raise NotConverged(first)
+        try:
+            probe = replace(self._path(1.0), newton=first_step.newton)
+            response = probe.response(at.problem_at, begin, first.x)
+        except SingularMatrix as error:
+            words = f"at the start of the path: {error}"
+            raise NotConverged(replace(first, status=Status.SINGULAR, message=words)) from None
         first_step.check(problem, first)
-        scale = float(np.sqrt(np.mean((first.x - x0) ** 2))) / self.step
-        return self._followed(at, self._path(scale or 1.0), Arc(begin, x0), until)
+        counted = _counted(system)
+        scale = float(np.sqrt(np.mean(response[counted] ** 2))) or 1.0
+        return self._followed(at, self._path(_scales(counted, scale)), Arc(begin, first.x), until)
 
     def leave(
         self, system: System, start: Beginning, other: Bifurcation, until: Callable[[Result], bool]
@@ -185,11 +193,13 @@ class ArcSteps:
         at = _Reached(system, x0, histories, self.on_step, True)
         size = float(np.ptp(system.mesh.points, axis=0).max())
         mode = other.mode.x
-        path = self._path(size * float(np.sqrt(np.mean(mode**2))), abs(begin) or 1.0)
+        counted = _counted(system)
+        scale = size * float(np.sqrt(np.mean(mode[counted] ** 2)))
+        path = self._path(_scales(counted, scale), abs(begin) or 1.0)
         return self._followed(at, path, Arc(begin, x0, np.append(mode, 0.0)), until)
 
-    def _path(self, x_scale: float, parameter_scale: float = 1.0) -> Arclength:
-        rule = StepRule(self.step, 1e-6 * self.step, self.step)
+    def _path(self, x_scale: Array | float, parameter_scale: float = 1.0) -> Arclength:
+        rule = StepRule(1e-2 * self.step, 1e-6 * self.step, self.step)
         return Arclength(
             *(self.newton, rule, x_scale, parameter_scale), max_points=self.most, name=_NAME
         )
@@ -209,3 +219,17 @@ class ArcSteps:
         )
         at.require_end(branch)
         return LoadPath((*at.results,), branch.limit_points, (*detector.found,))
+
+
+def _counted(system: System) -> Flags:
+    """Unknowns (n,) that count in the length of a path: all but the forces of ties."""
+    found: Flags = np.ones(system.size, dtype=bool)
+    for block in system.assembler.blocks:
+        if isinstance(block.kernel, Tie):
+            found[block.dofs[:, 2]] = False
+    return found
+
+
+def _scales(counted: Flags, scale: float) -> Array | float:
+    """The scale of each unknown (n,), infinite for those that do not count."""
+    return scale if counted.all() else np.where(counted, scale, np.inf)

@@ -182,21 +182,24 @@ class Paths:
 
         start: a result to begin with, as in `solve`, or a bifurcation, whose other branch is
         followed; `start.reversed` is the other side of it. detect="bifurcation": look for them, at
-        the cost of a factorisation a point; the path has `bifurcations`. step: length of the first
-        and longest step. A length counts the load factor, and the unknowns in units of what they
-        change by per load factor in the beginning; from a bifurcation the load factor relative to
+        the cost of a factorisation a point; the path has `bifurcations`. step: length of the
+        longest step, the first is a hundredth of it. Steps are cut where the path bends, so that it
+        does not depend on them: see docs/study.md. A length counts the load factor, and the
+        unknowns in units of what they change by per load factor in the beginning; from a
+        bifurcation the load factor relative to
         that, and displacements relative to the size of the mesh. until: is given each result; the
         path ends where it says True. most: points at most. History is committed after each point.
-        linear, write, progress: as in `solve`. Raises StudyError; NotConverged if the end is not
-        reached: its `reached` is the last Result, or None.
+        linear: one that factorises. write, progress: as in `solve`. Raises StudyError; NotConverged
+        if the end is not reached: its `reached` is the last Result, or None.
         """
         if read.finite("step", step) <= 0.0:
             raise StudyError(f"step = {step}: must be positive")
         read.function("until", until, "result")
         require_detect(detect)
-        if linear == "matrix-free":
-            raise StudyError('follow takes no linear = "matrix-free"; leave it out')
-        where, other = engine_of(None, linear), start if isinstance(start, Bifurcation) else None
+        if linear in ("amg", "matrix-free"):  # these need a tangent that is positive definite
+            raise StudyError(f'follow takes no linear = "{linear}", it factorises; leave it out')
+        where = engine_of(None, "direct" if linear == "auto" and newton is None else linear)
+        other = start if isinstance(start, Bifurcation) else None
         system = where.spread(self.system())
         begin = beginning(system, start.state if isinstance(start, Bifurcation) else start)
         newton = where.newton(system, newton)

@@ -134,15 +134,27 @@ class Problem:
         self, x: Array, addition: Array | None
     ) -> tuple[Array, csc_array[np.float64]]:
         """As `linearise`, with `addition` (nnz,) to the entries of K before the elimination."""
+        return self._linearised(x, addition, None)[:2]
+
+    def linearise_along(self, x: Array, rate: Array) -> tuple[Array, csc_array[np.float64], Array]:
+        """As `linearise`, and K times the rate (n,) before the elimination, zero where fixed."""
+        return self._linearised(x, None, rate)
+
+    def _linearised(
+        self, x: Array, addition: Array | None, rate: Array | None
+    ) -> tuple[Array, csc_array[np.float64], Array]:
         r, K = self.assembler.linearise(x, self.parameters)
         if addition is not None:
             K.data += addition
-        defect = np.zeros_like(r)
+        defect, along = np.zeros_like(r), np.zeros_like(r)
         defect[self.fixed] = x[self.fixed] - self.values
         if defect.any():
             r = r - K @ defect
         r[self.fixed] = defect[self.fixed]
-        return r, self.eliminated(K)
+        if rate is not None and rate.any():
+            along = np.asarray(K @ rate)
+            along[self.fixed] = 0.0
+        return r, self.eliminated(K), along
 
     def norm(self, r: Array) -> float:
         """Root of the sum over fields of |R / scale|^2, 2-norms; every field needs a scale."""

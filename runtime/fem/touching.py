@@ -249,6 +249,10 @@ class TouchingProblem(Problem):
         """See `Problem`; an addition has the pattern at x."""
         return self.at(x).linearise_with(x, addition)
 
+    def linearise_along(self, x: Array, rate: Array) -> tuple[Array, Sparse, Array]:
+        """See `Problem`."""
+        return self.at(x).linearise_along(x, rate)
+
     def measure(self, x: Array, K: Sparse | None, *, rounded: bool = False) -> float:
         """See `Problem`."""
         return self.at(x).measure(x, K, rounded=rounded)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TypeAlias
+from functools import cached_property
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from scipy.sparse import csc_array, hstack, vstack
 
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.solve.homotopy import ProblemAt, Trial, Way, followed
 from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMatrix
 from softehl.runtime.solve.newton import MeasuredProblem, Newton, NonlinearProblem
@@ -21,24 +22,50 @@ from softehl.runtime.solve.steps import StepRule
 
 Derivative: TypeAlias = Callable[[float, Array], Array]
 _FOLD_ITERATIONS = 20
+_RESOLUTION = 1e-3
+"""Of the extent of the path so far: a chord that is shorter passes a kink, whatever its angle. From
+1e-2 to 1e-4 a snap-back and a shallow roof have the same limits, and costs within a tenth."""
+_NARROW = 1e-2
+"""Least ratio of the sides of that extent: a path may begin along one of them. From 1e-1 to 1e-3
+limits are the same, and costs within a thirtieth."""
+_AIM = 0.5
+"""Of the largest angle: at which the next step aims. From 0.5 to 1 the same limits take from 318 to
+435 Newton steps in a snap-back, from 552 to 596 in a shallow roof."""
+
+
+@runtime_checkable
+class DrivenProblem(NonlinearProblem, Protocol):
+    """A problem with prescribed unknowns, which it eliminates from its matrix."""
+
+    @property
+    def fixed(self) -> Integers:
+        """Numbers of the prescribed unknowns."""
+        ...
+
+    def linearise_along(self, x: Array, rate: Array) -> tuple[Array, SparseMatrix, Array]:
+        """As `linearise`, and K times the rate (n,) before the elimination, free rows only."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
 class _Trial(Trial):
     """A point of arc-length continuation, accepted or refused.
 
-    t: unit tangent, shape (n + 1,); leaves: it is the last one, on a bound of the parameter.
+    t: unit tangent, shape (n + 1,). side: sign of the determinant of the bordered matrix, None
+    where it is not known. leaves: it is the last one, on a bound of the parameter.
     """
 
     t: Array = field(default_factory=lambda: np.empty(0))
+    side: float | None = None
     leaves: bool = False
 
     @property
     def y(self) -> Array:
         return np.append(self.solution.x, self.parameter)
 
-    def refuse(self, status: Status, message: str) -> _Trial:
-        return replace(self, solution=replace(self.solution, status=status, message=message))
+    def refuse(self, status: Status, message: str, following: float | None = None) -> _Trial:
+        solution = replace(self.solution, status=status, message=message)
+        return replace(self, solution=solution, following=following)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +74,27 @@ class _Path:
 
     problem_at: ProblemAt
     derivative: Derivative | None
-    x_scale: float
+    x_scale: float | Array
     parameter_scale: float
     difference: float
 
+    @cached_property
+    def x_weights(self) -> Array | float:
+        """Of the squares of changes of x: one for all, or one for each, (n,)."""
+        scale = np.asarray(self.x_scale)
+        return scale**-2.0 / np.isfinite(scale).sum() if scale.ndim else float(scale**-2.0)
+
     def weigh(self, t: Array) -> Array:
         """Covector of t: weigh(t) @ y is the scalar product of the metric."""
-        weights = np.full(t.size, 1.0 / ((t.size - 1) * self.x_scale**2))
+        weights = np.empty(t.size)
+        weights[:-1] = self.x_weights
+        weights[:-1] /= 1.0 if np.ndim(self.x_scale) else t.size - 1
         weights[-1] = self.parameter_scale**-2
         return weights * t
+
+    def length(self, t: Array) -> float:
+        """Length of t in the metric."""
+        return math.sqrt(float(self.weigh(t) @ t))
 
     def parameter_derivative(self, y: Array) -> Array:
         """dR/dparameter at y, shape (n,); a central difference unless a derivative is given."""
@@ -67,20 +106,87 @@ class _Path:
         behind = self.problem_at(parameter - h).residual(x)
         return (ahead - behind) / (2.0 * h)
 
+    def linearise(self, y: Array) -> tuple[Array, SparseMatrix, Array]:
+        """R at y, dR/dx, and what R changes by per parameter, (n,), prescribed unknowns following.
+
+        Prescribed unknowns u(parameter) are eliminated from dR/dx, so that the change of the other
+        residuals has their share K u'.
+        """
+        x, problem = y[:-1], self.problem_at(float(y[-1]))
+        column = self.parameter_derivative(y)
+        if not isinstance(problem, DrivenProblem):
+            return *problem.linearise(x), column
+        rate = np.zeros_like(column)
+        rate[problem.fixed] = -column[problem.fixed]
+        r, K, along = problem.linearise_along(x, rate)
+        return r, K, column + along
+
     def bordered(self, y: Array, row: Array) -> tuple[Array, SparseMatrix]:
         """R at y, and [[dR/dx, dR/dparameter], [row]], regular at a simple limit point."""
-        r, K = self.problem_at(float(y[-1])).linearise(y[:-1])
-        column = self.parameter_derivative(y)[:, None]
-        upper = hstack([csc_array(K), csc_array(column)])
+        r, K, column = self.linearise(y)
+        upper = hstack([csc_array(K), csc_array(column[:, None])])
         return r, vstack([upper, csc_array(row[None, :])], format="csc")
 
-    def tangent(self, y: Array, along: Array, linear: LinearSolver) -> Array:
-        """Unit tangent at y on the side of the covector `along`; may raise SingularMatrix."""
+    def tangent(self, y: Array, along: Array, linear: LinearSolver) -> tuple[Array, float | None]:
+        """Unit tangent at y on the side of the covector `along`, and the sign of the determinant of
+        the bordered matrix, None where it is not known; may raise SingularMatrix.
+        """
         _, matrix = self.bordered(y, along)
         unit = np.zeros(y.size)
         unit[-1] = 1.0
-        t = linear.factorise(matrix).solve(unit)
-        return t / math.sqrt(float(self.weigh(t) @ t))
+        factors = linear.factorise(matrix)
+        t = factors.solve(unit)
+        sign = getattr(factors, "sign", None)
+        return t / self.length(t), None if sign is None else sign()
+
+    def response(self, y: Array, linear: LinearSolver) -> Array:
+        """dx/dparameter at y, (n,); may raise SingularMatrix."""
+        _, K, column = self.linearise(y)
+        return -linear.factorise(K).solve(column)
+
+
+@dataclass(frozen=True, eq=False)
+class _Extent:
+    """Extent of a path so far: a box in the plane of |x| and the parameter.
+
+    Angles and lengths are those of a diagram of the path that is drawn into this box.
+    begin: (n + 1,) where the path begins. x, parameter: sides of the box in units of the metric,
+    zero in the beginning.
+    """
+
+    path: _Path
+    begin: Array
+    x: float = 0.0
+    parameter: float = 0.0
+
+    def with_point(self, y: Array) -> _Extent:
+        """The box that has a further point in it."""
+        x, parameter = self._sizes(y - self.begin)
+        return replace(self, x=max(self.x, x), parameter=max(self.parameter, parameter))
+
+    def length(self, dy: Array) -> float:
+        """Of a change (n + 1,), relative to the box."""
+        return math.hypot(
+            *(a / b if b else 0.0 for a, b in zip(self._sizes(dy), self._box, strict=True))
+        )
+
+    def angle(self, a: Array, b: Array) -> float:
+        """Angle between two changes (n + 1,) [degrees]."""
+        x, parameter = self._box
+        weighed = self.path.weigh(a) * b
+        product = float(weighed[:-1].sum()) / (x**2 or 1.0) + float(weighed[-1]) / (
+            parameter**2 or 1.0
+        )
+        sizes = self.length(a) * self.length(b)
+        return math.degrees(math.acos(min(max(product / sizes, -1.0), 1.0))) if sizes else 0.0
+
+    @property
+    def _box(self) -> tuple[float, float]:
+        return max(self.x, _NARROW * self.parameter), max(self.parameter, _NARROW * self.x)
+
+    def _sizes(self, dy: Array) -> tuple[float, float]:
+        weighed = self.path.weigh(dy) * dy
+        return math.sqrt(float(weighed[:-1].sum())), math.sqrt(float(weighed[-1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,8 +233,13 @@ class Arclength:
 
     newton: corrector on the plane normal to the tangent; steps: step rule, lengths in the metric
     |dy|^2 = |dx|^2 / (n x_scale^2) + (dparameter / parameter_scale)^2;
-    turn: largest angle between successive tangents [degrees]; a sharper turn (often a jump to
-    another branch, or two folds in one step) is refused and the step cut;
+    x_scale: one for all, or one for each (n,): inf for unknowns that do not count in lengths;
+    turn: largest angle between successive tangents [degrees], the half of it between the chord of a
+    step and the tangent at either end, as on a circle. These angles are of the diagram of |x| over
+    the parameter that is drawn to the size of the path so far, so that they do not depend on units
+    or on the first step. A step with a sharper angle, or after which the number of negative pivots
+    is odd where it was even without a fold, has jumped to another part of the path or passed two
+    folds: it is cut. Steps below 1e-3 of the diagram pass: there is a kink, or a bifurcation;
     difference: relative step of the central difference for dR/dparameter, about eps^(1/3);
     fold_tolerance: parameter component of the unit tangent at which a fold counts as located
     (the error of its parameter is of second order in this);
@@ -137,7 +248,7 @@ class Arclength:
 
     newton: Newton
     steps: StepRule
-    x_scale: float = 1.0
+    x_scale: float | Array = 1.0
     parameter_scale: float = 1.0
     turn: float = 30.0
     difference: float = 6e-6
@@ -171,7 +282,7 @@ class Arclength:
         """
         if not within[0] <= start <= within[1]:
             raise ValueError(f"start {start} lies outside {within}")
-        path = _Path(problem_at, derivative, self.x_scale, self.parameter_scale, self.difference)
+        path = self._path(problem_at, derivative)
         log = Record(self.name, self.keep_all, on_point)
         return followed(
             _ByLength(self, path, log, start, x0, direction, within, until, leave),
@@ -179,10 +290,18 @@ class Arclength:
             log,
         )
 
+    def response(self, problem_at: ProblemAt, start: float, x: Array) -> Array:
+        """dx/dparameter, (n,), of the path through a solution x, (n,); raises SingularMatrix."""
+        return self._path(problem_at, None).response(np.append(x, start), self.newton.linear)
+
+    def _path(self, problem_at: ProblemAt, derivative: Derivative | None) -> _Path:
+        scales = self.x_scale, self.parameter_scale
+        return _Path(problem_at, derivative, *scales, self.difference)
+
 
 @dataclass(eq=False)
 class _ByLength(Way):
-    """here: where it stands."""
+    """here: where it stands; extent: of the path so far."""
 
     settings: Arclength
     path: _Path
@@ -194,22 +313,24 @@ class _ByLength(Way):
     until: Callable[[Branch], bool] | None
     leave: Array | None = None
     here: _Trial | None = None
+    extent: _Extent | None = None
 
     def start(self) -> _Trial:
         """Solve at the start and find the tangent on which the parameter changes as asked."""
         newton = self.settings.newton
         if self.leave is not None:
-            size = math.sqrt(float(self.path.weigh(self.leave) @ self.leave))
             known = Solution(self.x0, Status.CONVERGED, "", (), 0, 0)
-            return _Trial(self.begin, known, t=self.leave / size)
+            return _Trial(self.begin, known, t=self.leave / self.path.length(self.leave))
         trial = _Trial(self.begin, newton.solve(self.path.problem_at(self.begin), self.x0))
         along = np.zeros(trial.y.size)
         along[-1] = math.copysign(1.0 / self.settings.parameter_scale, self.direction)
-        return self._with_tangent(trial, along, cosine=0.0)
+        return self._with_tangent(trial, along)
 
     def attempt(self, step: float) -> _Trial:
         """Predict and correct; onto the bound of the parameter where that is passed."""
         trial = self._trial(step)
+        if trial.converged:
+            trial = self._judged(trial, step)
         if not trial.converged or self.within[0] <= trial.parameter <= self.within[1]:
             return trial
         self.log.count(trial.solution)
@@ -221,6 +342,10 @@ class _ByLength(Way):
         if self.here is not None and not trial.leaves and _turns(self.here, trial):
             self.log.limit_points.append(self._locate(self.here, trial))
         self.here = trial
+        if self.extent is None:
+            unit = 0.0 if self.leave is None else 1.0  # off a bifurcation the scales are the box
+            self.extent = _Extent(self.path, trial.y, unit, unit)
+        self.extent = self.extent.with_point(trial.y)
 
     def end(self) -> End | None:
         """See `Way`."""
@@ -245,23 +370,39 @@ class _ByLength(Way):
         dy = length * here.t
         end = newton.solve(corrector, here.y + admissible_fraction(corrector, here.y, dy) * dy)
         trial = _Trial(float(end.x[-1]), replace(end, x=end.x[:-1]), length)
-        cosine = math.cos(math.radians(self.settings.turn))
-        return self._with_tangent(trial, corrector.covector, cosine)
+        return self._with_tangent(trial, corrector.covector)
 
-    def _with_tangent(self, trial: _Trial, along: Array, cosine: float) -> _Trial:
-        """The trial with its tangent; refused if there is none or it turns away from `along`."""
+    def _with_tangent(self, trial: _Trial, along: Array) -> _Trial:
+        """The trial with its tangent on the side of `along`; refused if there is none."""
         if not trial.converged:
             return trial
         count = trial.solution.factorisations + 1
         trial = replace(trial, solution=replace(trial.solution, factorisations=count))
         try:
-            t = self.path.tangent(trial.y, along, self.settings.newton.linear)
+            t, side = self.path.tangent(trial.y, along, self.settings.newton.linear)
         except SingularMatrix as error:
             return trial.refuse(Status.SINGULAR, f"no tangent of the path: {error}")
-        if along @ t < cosine:
-            angle = math.degrees(math.acos(float(along @ t)))
-            return trial.refuse(Status.DIVERGED, f"the path turned by {angle:.0f} degrees")
-        return replace(trial, t=t)
+        return replace(trial, t=t, side=side)
+
+    def _judged(self, trial: _Trial, step: float) -> _Trial:
+        """The trial with the length of the next step; refused if the path between is not smooth."""
+        here, steps, limit = self._here, self.settings.steps, 0.5 * self.settings.turn
+        assert self.extent is not None, "accept() comes first"
+        box, chord = self.extent.with_point(trial.y), trial.y - here.y
+        angle = max(box.angle(here.t, chord), box.angle(chord, trial.t))
+        part = _AIM * limit / max(angle, 1e-3 * limit)
+        short = box.length(chord) <= _RESOLUTION or trial.taken <= steps.smallest / steps.cut
+        known = None not in (here.side, trial.side)
+        if (angle <= limit and not (known and here.side != trial.side)) or short:
+            following = steps.after_success(step, trial.taken, trial.solution.iterations)
+            if not short:
+                following = min(following, max(part * trial.taken, steps.smallest))
+            return replace(trial, following=following)
+        words = "the number of negative pivots changes"
+        if angle > limit:
+            words = f"the path turned by {angle:.0f} degrees from the chord of the step"
+        following = trial.taken * min(max(part, steps.cut**2), steps.cut)
+        return trial.refuse(Status.DIVERGED, words, following)
 
     def _leave(self, trial: _Trial) -> _Trial:
         """The point on the bound that the path crosses before the trial."""

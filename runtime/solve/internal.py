@@ -48,10 +48,10 @@ class Condensing:
         S = rows[E][:, E]
         for group in self.groups:
             inner = group.ravel()
-            inverse, signs = inverted(rows[inner][:, inner], group)
+            inverse, signs, sign = inverted(rows[inner][:, inner], group)
             out, back = rows[inner][:, E], rows[E][:, inner]
             S = S - back @ (inverse @ out)
-            parts.append(_Group(inner, inverse, csr_array(out), csr_array(back), signs))
+            parts.append(_Group(inner, inverse, csr_array(out), csr_array(back), signs, sign))
         if not np.isfinite(S.data).all():
             raise SingularMatrix("the matrix has entries that are not finite")
         return Eliminated(E, tuple(parts), self.solver.factorise(csc_array(S)))
@@ -60,7 +60,7 @@ class Condensing:
 @dataclass(frozen=True, eq=False)
 class _Group:
     """Like elements: numbers of internal unknowns (m,), K_II^-1, K_IE, K_EI, and the eigenvalues
-    of K_II where it is symmetric, else None.
+    of K_II where it is symmetric, else None; sign of the determinant of K_II.
     """
 
     inner: Integers
@@ -68,6 +68,7 @@ class _Group:
     out: csr_array
     back: csr_array
     signs: Array | None
+    sign: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +97,12 @@ class Eliminated:
             return None
         return np.concatenate([found, *(p.signs for p in self.parts if p.signs is not None)])
 
+    def sign(self) -> float | None:
+        """Sign of the determinant; None where it is not known."""
+        known = getattr(self.rest, "sign", None)
+        found = None if known is None else known()
+        return None if found is None else found * float(np.prod([p.sign for p in self.parts]))
+
     def indefinite(self) -> bool | None:
         """True if the rest has a negative eigenvalue; None where it is not known."""
         known = getattr(self.rest, "indefinite", None)
@@ -111,8 +118,9 @@ class Eliminated:
         return None if matrix is None else loosest(matrix, self.rest)
 
 
-def inverted(K: csr_array, group: Integers) -> tuple[bsr_array, Array | None]:
-    """Inverse of a matrix of one block for each of n elements, and its eigenvalues if symmetric.
+def inverted(K: csr_array, group: Integers) -> tuple[bsr_array, Array | None, float]:
+    """Inverse of a matrix of one block for each of n elements, its eigenvalues if symmetric, and
+    the sign of its determinant.
 
     Raises SingularMatrix.
     """
@@ -132,7 +140,8 @@ def inverted(K: csr_array, group: Integers) -> tuple[bsr_array, Array | None]:
     even = uneven <= _SYMMETRIC * sizes.max(initial=0.0)
     signs = np.asarray(np.linalg.eigvalsh(blocks)).reshape(-1) if even else None
     where = np.arange(n)
-    return bsr_array((inverse, where, np.arange(n + 1)), shape=(n * k, n * k)), signs
+    sign = float(np.prod(np.linalg.slogdet(blocks)[0]))
+    return bsr_array((inverse, where, np.arange(n + 1)), shape=(n * k, n * k)), signs, sign
 
 
 def inverses(blocks: Array) -> Array:

@@ -152,6 +152,11 @@ class Factorisation:
         known = getattr(self.factors, "pivots", None)
         return None if known is None else known()
 
+    def sign(self) -> float | None:
+        """Sign of the determinant; None where it is not known."""
+        known = getattr(self.factors, "sign", None)
+        return None if known is None else known()
+
     def _backward_error(self, x: Array, b: Array) -> float:
         """Largest |b - A x|_i / (|A|_i |x|_max + |b|_i); each row has its own units."""
         size = float(np.abs(x).max(initial=0.0))

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, csr_array
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import SuperLU
 
 from softehl.runtime.arrays import Array, Flags, Integers
@@ -112,6 +113,23 @@ class Arranged:
             return None
         on_diagonal = np.array_equal(made.perm_r, made.perm_c)
         return np.asarray(made.U.diagonal()) if on_diagonal else None
+
+    def sign(self) -> float | None:
+        """Sign of the determinant, by SuperLU's pivots and exchanges of rows and columns."""
+        made = self.factors
+        if not isinstance(made, SuperLU) or made.nnz > MOST_COPIED:
+            return None
+        negative = int((made.U.diagonal() < 0.0).sum()) + sum(
+            _exchanges(order) for order in (made.perm_r, made.perm_c)
+        )
+        return -1.0 if negative % 2 else 1.0
+
+
+def _exchanges(order: Integers) -> int:
+    """Number of exchanges that make a permutation: its length less the number of its cycles."""
+    n = len(order)
+    graph = csr_array((np.ones(n), (np.arange(n), order)), shape=(n, n))
+    return n - int(connected_components(graph)[0])
 
 
 @dataclass(frozen=True)

@@ -148,6 +148,11 @@ class LimitPoint:
     index: int
     located: bool
 
+    @property
+    def t(self) -> float:
+        """The parameter, as results of a study call it."""
+        return self.parameter
+
 
 @dataclass(frozen=True, eq=False)
 class Branch:
