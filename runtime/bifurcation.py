@@ -143,7 +143,7 @@ def place(problem: Problem, t: float, x: Array) -> Place:
     """Of a problem at unknowns x, (n,), with the contacts that it has there."""
     here = problem.at(x)
     K = here.assembler.linearise(x, here.parameters)[1]
-    free = Reduction.of(here)
+    free = Reduction.of(here, K)
     value, mode = nearest_zero(symmetric(free.matrix(K)))
     return Place(t, x, value, free.map @ mode)
 

@@ -97,16 +97,16 @@ class Share:
 
         problem: whose supports and ties hold. K, M: (n, n), of the elements of this process.
         """
-        free = Reduction.of(problem)
+        free = Reduction.of(problem, K)
         given = symmetric(free.matrix(K)), symmetric(free.matrix(M))
-        values, found = lowest(*given, count, int(free.saddle(K).sum()))
+        values, found = lowest(*given, count, free.saddle(K))
         return values, np.asarray((free.map @ found.T).T)
 
     def buckling(
         self, problem: Problem, K: csc_array, G: csc_array, count: int
     ) -> tuple[Array, Array]:
         """Smallest positive f of (K + f G) x = 0, and vectors: `eigen.smallest_factors`."""
-        free = Reduction.of(problem)
+        free = Reduction.of(problem, K)
         factors, found = smallest_factors(
             symmetric(free.matrix(K)), symmetric(free.matrix(G)), count
         )

@@ -8,10 +8,16 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_array
 
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Flags
 from softehl.runtime.fem.loads import Tie
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.reduction import Reduction, concave, is_symmetric, symmetric
+from softehl.runtime.fem.reduction import (
+    Reduction,
+    concave,
+    internal_negative,
+    is_symmetric,
+    symmetric,
+)
 from softehl.runtime.solve.eigen import Pivots
 from softehl.runtime.solve.linear import SingularMatrix
 
@@ -23,9 +29,9 @@ class Unstable(RuntimeWarning):
 def negative_directions(problem: Any, x: Array) -> int | None:
     """Number of independent motions along which the energy about a state x, (n,), falls.
 
-    By the signs of the pivots of the tangent, less those of multipliers, which are negative by
-    nature. None where there is no such number: no symmetric tangent, one that is singular, or a
-    problem that is spread over processes.
+    By the signs of the pivots of the tangent, internal unknowns condensed, less those of
+    multipliers, which are negative by nature. None where there is no such number: no symmetric
+    tangent, one that is singular, or a problem that is spread over processes.
     """
     if not isinstance(problem, Problem):
         return None
@@ -33,12 +39,15 @@ def negative_directions(problem: Any, x: Array) -> int | None:
         K = problem.assembler.linearise(x, problem.parameters)[1]
     if not np.isfinite(K.data).all() or not is_symmetric(K):
         return None
-    free = Reduction.of(problem)
+    free = Reduction.of(problem, K)
+    if not free.map.shape[1]:
+        return 0
+    saddle = free.saddle(K)
     try:
-        pivots = Pivots.of(symmetric(free.matrix(K)))
+        pivots = Pivots.of(symmetric(free.matrix(K)), saddle)
     except SingularMatrix:
         return None
-    return max(pivots.negative - int(free.saddle(K).sum()), 0)
+    return max(pivots.negative - int(saddle.sum()), 0)
 
 
 def negative_by_factors(problem: Any, K: Any, factors: Any) -> int | None:
@@ -47,16 +56,28 @@ def negative_by_factors(problem: Any, K: Any, factors: Any) -> int | None:
     None where they do not tell: pivots beside the diagonal, ties, an unsymmetric tangent.
     """
     pivots = getattr(factors, "pivots", None)
-    ties = isinstance(problem, Problem) and any(
-        isinstance(b.kernel, Tie) and len(b.dofs) for b in problem.assembler.blocks
-    )
-    if pivots is None or ties or not isinstance(K, csc_array) or not is_symmetric(K):
+    if pivots is None or not isinstance(problem, Problem) or _hidden(problem):
+        return None
+    if not isinstance(K, csc_array) or not is_symmetric(K):
         return None
     found = pivots()
     if found is None:
         return None
-    natural = concave(problem, K)
-    return max(int((found < 0.0).sum()) - int(natural.sum()), 0)
+    natural = int(concave(problem, K).sum())
+    if len(found) == K.shape[0]:  # else internal unknowns are condensed
+        natural += internal_negative(problem, K)
+    return max(int((found < 0.0).sum()) - natural, 0)
+
+
+def _hidden(problem: Problem) -> bool:
+    """True if a tangent without the rows of supports does not show what multipliers join: ties, and
+    fields that are wholly prescribed.
+    """
+    if any(isinstance(b.kernel, Tie) and len(b.dofs) for b in problem.assembler.blocks):
+        return True
+    fixed: Flags = np.zeros(problem.layout.total, dtype=bool)
+    fixed[problem.fixed] = True
+    return any(bool(fixed[part].all()) for part in problem.layout.fields)
 
 
 def warn_unstable(problem: Any, x: Array, factors: tuple[Any, Any] | None, words: str) -> None:

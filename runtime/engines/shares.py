@@ -15,7 +15,7 @@ from softehl.runtime.engines.reduced import Reduced
 from softehl.runtime.engines.slepc import Pencil
 from softehl.runtime.engines.spread import Spread, Team
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.reduction import concave
+from softehl.runtime.fem.reduction import concave, internal_negative
 from softehl.runtime.mpi import world
 from softehl.runtime.share import Share
 from softehl.runtime.statement.records import StudyError
@@ -103,7 +103,8 @@ class Processes(Share):
         """See `Share`."""
         free = self.free(problem)
         rising = concave(problem, K, self.added, lambda here: bool(largest(float(here))))
-        negative = total(np.array([(free.gather(rising.astype(np.float64)) > 0.0).sum()]))
+        natural = int((free.gather(rising.astype(np.float64)) > 0.0).sum())
+        negative = total(np.array([natural + internal_negative(problem, K)]))
         return Pencil(free, K, M).lowest(count, int(negative[0]))
 
     def buckling(

@@ -1,4 +1,6 @@
-"""Free unknowns of a problem: without prescribed ones, tied ones as one, no multipliers of ties."""
+"""Free unknowns of a problem: without prescribed ones, tied ones as one, no multipliers of ties,
+internal unknowns of elements condensed.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +18,9 @@ from softehl.runtime.fem.problem import Problem
 SYMMETRIC = 1e-8
 """Of the largest entry: a tangent that differs by less from its transpose is symmetric."""
 
+DISPLACEMENTS = ("u_x", "u_y", "u_z")
+"""Unknowns that are motions, whatever the signs of their stiffness."""
+
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
@@ -28,8 +33,10 @@ class Reduction:
     map: csr_array
 
     @classmethod
-    def of(cls, problem: Problem) -> Reduction:
-        """Of a problem."""
+    def of(cls, problem: Problem, K: csc_array | None = None) -> Reduction:
+        """Of a problem. K: the tangent (n, n) by which internal unknowns of elements follow the
+        others: T' K T is then condensed. Left out, they are free unknowns as all others are.
+        """
         n, ties = problem.assembler.size, [np.empty((0, 3), dtype=np.int64)]
         ties += [b.dofs for b in problem.assembler.blocks if isinstance(b.kernel, Tie)]
         a, b, multipliers = np.concatenate(ties).T
@@ -37,10 +44,17 @@ class Reduction:
         count, group = connected_components(graph, directed=False)
         held: Flags = np.zeros(count, dtype=bool)
         held[group[problem.fixed]] = held[group[multipliers]] = True
+        inner = [] if K is None else _internal(problem, K)
+        for numbers, _ in inner:
+            held[group[numbers]] = True
         number = np.cumsum(~held) - 1
         rows = np.flatnonzero(~held[group])
         columns = number[group[rows]]
         found = csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, int((~held).sum())))
+        if inner:
+            assert K is not None
+            moved = [-_spread(inverse, numbers, n) @ K @ found for numbers, inverse in inner]
+            found = csr_array(found + sum(moved))
         return cls(problem, found)
 
     def gather(self, forces: Array) -> Array:
@@ -55,11 +69,64 @@ class Reduction:
         """Unknowns (m,) in which the energy is not convex but concave, by nature: pressures and
         other multipliers. K: the tangent (n, n) before supports are eliminated.
         """
-        return self.gather(concave(self.problem, K).astype(np.float64)) > 0.0
+        return np.asarray(abs(self.map).T @ concave(self.problem, K).astype(np.float64)) > 0.0
 
     def matrix(self, K: csc_array) -> csc_array:
         """T' K T, (m, m)."""
         return csc_array(self.map.T @ K @ self.map)
+
+
+def _internal(problem: Problem, K: csc_array) -> list[tuple[Integers, Array]]:
+    """Numbers (n, k) of the internal unknowns of each block with some, and the inverses (n, k, k)
+    of their tangents; without blocks where these have none.
+    """
+    found = []
+    for numbers in _groups(problem):
+        inverse = _inverses(_blocks(K, numbers))
+        if np.isfinite(inverse).all():
+            found.append((numbers, inverse))
+    return found
+
+
+def _groups(problem: Problem) -> list[Integers]:
+    blocks = [b for b in problem.assembler.blocks if b.internal and len(b.dofs)]
+    return [np.stack(list(b.internal.values()), axis=1) for b in blocks]
+
+
+def _blocks(K: csc_array, numbers: Integers) -> Array:
+    """Entries of K (n, k, k) among numbers (n, k) of each element."""
+    n, k = numbers.shape
+    rows, columns = np.repeat(numbers, k, axis=1).ravel(), np.tile(numbers, k).ravel()
+    return np.asarray(csr_array(K)[rows, columns]).reshape(n, k, k)
+
+
+def _inverses(blocks: Array) -> Array:
+    try:
+        return np.asarray(np.linalg.inv(blocks))
+    except np.linalg.LinAlgError:
+        return np.full_like(blocks, np.nan)
+
+
+def _spread(blocks: Array, numbers: Integers, n: int) -> csr_array:
+    """A matrix (n, n) of blocks (., k, k) at numbers (., k)."""
+    k = numbers.shape[1]
+    rows, columns = np.repeat(numbers, k, axis=1).ravel(), np.tile(numbers, k).ravel()
+    return csr_array((blocks.ravel(), (rows, columns)), shape=(n, n))
+
+
+def internal_negative(problem: Problem, K: csc_array) -> int:
+    """Number of negative eigenvalues that internal unknowns of elements have by themselves."""
+    blocks = [_blocks(K, numbers) for numbers in _groups(problem)]
+    return sum(int((np.linalg.eigvalsh(b) < 0.0).sum()) for b in blocks)
+
+
+def _condensed(problem: Problem, K: csc_array) -> csc_array:
+    """K (n, n) with internal unknowns of elements condensed, whose rows and columns are zero."""
+    kept, n = np.ones(problem.assembler.size), problem.assembler.size
+    for numbers, inverse in _internal(problem, K):
+        K = csc_array(K - K @ _spread(inverse, numbers, n) @ K)
+        kept[numbers] = 0.0
+    return K if kept.all() else csc_array(K.multiply(kept[:, None]).multiply(kept[None]))
 
 
 def concave(
@@ -68,25 +135,34 @@ def concave(
     added: Callable[[Array], Array] = np.asarray,
     anywhere: Callable[[bool], bool] = bool,
 ) -> Flags:
-    """Unknowns (n,) of the fields no diagonal entry of which is positive, without fixed ones.
+    """Unknowns (n,) of multipliers and other fields over which the energy is largest, without fixed
+    ones and internal ones of elements: fields no diagonal entry of which is positive when internal
+    unknowns are condensed, displacements excepted. K: before supports are eliminated.
 
+    If no field has a positive entry, those of zeros are convex (stresses beside displacements).
     One that is coupled to no other field is no multiplier, it is unstable, where its pages have
     energies; the sign of an equation that a page writes down itself says nothing. added, anywhere:
     sums over processes that have a part each, and whether something is true on any.
     """
-    layout, fixed = problem.layout, problem.fixed
+    layout, fixed, K = problem.layout, problem.fixed, _condensed(problem, K)
     found: Flags = np.zeros(layout.total, dtype=bool)
     free = ~found
     free[fixed] = False
     diagonal = added(K.diagonal())
-    for part in layout.fields:
+    inner = {name for block in problem.assembler.blocks for name in block.internal}
+    named = [(name, layout.part(name)) for name in layout.names if name not in inner]
+    fields = [part for name, part in named if name not in DISPLACEMENTS]
+    for part in fields:
         own, held = diagonal[part], not anywhere(bool(free[part].any()))
         convex = (own >= 0.0).any() if held else (own[free[part]] > 0.0).any()
         found[part] = not anywhere(bool(convex))
+    if all(anywhere(bool(found[part].any())) for _, part in named):
+        for part in fields:
+            found[part] = anywhere(bool((diagonal[part] < 0.0).any()))
     others = added(abs(K) @ (~found).astype(np.float64))  # a fixed unknown is no other field
     found[fixed] = False
     others[_written(problem)] = 1.0
-    for part in layout.fields:
+    for part in fields:
         if not anywhere(bool(others[part].any())):
             found[part] = False
     return found

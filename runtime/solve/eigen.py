@@ -11,11 +11,11 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
-from scipy.sparse import csc_array, eye_array
+from scipy.sparse import csc_array, diags_array, eye_array
 from scipy.sparse import linalg as sparse_linalg
 
 from softehl.errors import SoftehlError
-from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.solve.linear import SingularMatrix
 from softehl.runtime.solve.ordering import without_zeros
 
@@ -24,6 +24,11 @@ _SMALL_SHIFT = 1e-7
 _SHIFTS = 6
 _BESIDE = 1e-12  # of the largest entry: a shift that rounding may have made
 _DENSE = 20  # unknowns: fewer need no sparse eigenvalues, or cannot have them
+_WEAK = 1e-8
+"""Of the pivot that a multiplier without an energy of its own has when the others are eliminated:
+it gets as much on the diagonal. Below the accuracy of pivots on the diagonal, above rounding; from
+1e-6 to 1e-10 frequencies of incompressible cells are the same to 1e-11."""
+_REFINEMENTS = 3  # of a solution with such pivots, each by a factor of about _WEAK
 _RESIDUAL = 1e-6
 """Of a solution by pivots on the diagonal: beyond, their signs are not those of the matrix."""
 
@@ -37,17 +42,25 @@ class Pivots:
     """Factors of a symmetric matrix with pivots on the diagonal only, as in L D L'.
 
     negative: number of negative pivots, which is that of negative eigenvalues (Sylvester).
+    matrix: (n, n) where the factors are those of a matrix near by.
     """
 
     factors: Any
     negative: int
+    matrix: csc_array | None = None
 
     @classmethod
-    def of(cls, K: csc_array) -> Pivots:
-        """Of K, symmetric, (n, n); raises SingularMatrix where pivots on the diagonal fail."""
+    def of(cls, K: csc_array, saddle: Flags | None = None) -> Pivots:
+        """Of K, symmetric, (n, n); raises SingularMatrix where pivots on the diagonal fail.
+
+        saddle: (n,) multipliers, whose diagonal may be zero: a small negative number takes its
+        place, a small positive one that of other unknowns. This changes no sign.
+        """
+        weak = np.zeros(K.shape[0]) if saddle is None else _weak(K, saddle)
+        near = csc_array(K - diags_array(weak)) if weak.any() else K
         try:
             factors = sparse_linalg.splu(
-                without_zeros(K),
+                without_zeros(near),
                 permc_spec="MMD_AT_PLUS_A",
                 diag_pivot_thresh=0.0,
                 options={"SymmetricMode": True},
@@ -56,33 +69,55 @@ class Pivots:
             raise SingularMatrix(f"no LU factors: {error}") from error
         if not np.array_equal(factors.perm_r, factors.perm_c):
             raise SingularMatrix("a pivot on the diagonal is zero")
+        negative = int((factors.U.diagonal() < 0.0).sum())
+        found = cls(factors, negative, K if weak.any() else None)
         b = np.random.default_rng(0).uniform(-1.0, 1.0, K.shape[0])
-        x = factors.solve(b)
+        x = found.solve(b)
         scale = np.asarray(abs(K).sum(axis=1)) * np.abs(x).max(initial=0.0) + np.abs(b)
         if not np.abs(K @ x - b).max(initial=0.0) <= _RESIDUAL * scale.max(initial=0.0):
             raise SingularMatrix("the pivots on the diagonal are too weak")
-        return cls(factors, int((factors.U.diagonal() < 0.0).sum()))
+        return found
 
     def solve(self, b: Array) -> Array:
         """x of K x = b, shapes (n,)."""
-        return np.asarray(self.factors.solve(b))
+        x = np.asarray(self.factors.solve(b))
+        if self.matrix is not None:
+            for _ in range(_REFINEMENTS):
+                x = x + self.factors.solve(b - self.matrix @ x)
+        return x
 
 
-def lowest(K: csc_array, M: csc_array, count: int, saddle: int = 0) -> tuple[Array, Array]:
+def _weak(K: csc_array, saddle: Flags) -> Array:
+    """Numbers (n,) that the diagonal of K has too much where it is zero: multipliers get less, and
+    displacements beside stresses more.
+    """
+    diagonal, found = np.abs(K.diagonal()), np.zeros(K.shape[0])
+    squares = csc_array(K.multiply(K))
+    for chosen, sign in ((saddle, 1.0), (~saddle, -1.0)):
+        known = ~chosen & (diagonal > 0.0)
+        stiff = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=known)
+        pivot = _WEAK * np.asarray(squares @ stiff)
+        found += np.where(chosen & (diagonal < pivot), sign * pivot, 0.0)
+    return found
+
+
+def lowest(
+    K: csc_array, M: csc_array, count: int, saddle: Flags | None = None
+) -> tuple[Array, Array]:
     """The algebraically smallest eigenvalues (count,) of K x = w M x, and vectors (count, n).
 
-    K, M: symmetric, (n, n); M positive but for unknowns without mass. saddle: number of negative
-    eigenvalues that K has by nature, in multipliers without mass. Vectors have x' M x = 1. Raises
-    NoModes, SingularMatrix.
+    K, M: symmetric, (n, n); M positive but for unknowns without mass. saddle: (n,) multipliers
+    without mass, each of which makes an eigenvalue of K negative by nature. Vectors have
+    x' M x = 1. Raises NoModes, SingularMatrix.
     """
     n, held = K.shape[0], M.diagonal() > 0.0
     heavy = int(held.sum())
     require_count(count, heavy)
     shift, pivots = below(
-        lambda shift: Pivots.of(csc_array(K - shift * M)),
+        lambda shift: Pivots.of(csc_array(K - shift * M), saddle),
         lambda pivots: _nearly_singular(pivots, K),
         float(np.abs(K.diagonal()[held] / M.diagonal()[held]).max()),
-        saddle,
+        0 if saddle is None else int(saddle.sum()),
     )
     inverse = sparse_linalg.LinearOperator((n, n), matvec=pivots.solve, dtype=np.float64)
     begin = pivots.solve(M @ np.random.default_rng(0).uniform(-1.0, 1.0, n))
@@ -101,6 +136,8 @@ def lowest(K: csc_array, M: csc_array, count: int, saddle: int = 0) -> tuple[Arr
 
 def require_count(count: int, heavy: int) -> None:
     """Raise NoModes where so many unknowns with mass have no so many modes."""
+    if heavy < 2:
+        raise NoModes(f"{count} modes: of the unknowns that have a mass {heavy} can move")
     if not 0 < count < heavy:
         raise NoModes(f"{count} modes: from 1 to {heavy - 1} are possible here")
 
@@ -123,7 +160,7 @@ def below(
     """A shift w below all eigenvalues, zero if it can be, and factors of K - w M.
 
     singular: tells of factors of K whether it nearly is. ratio: largest of the diagonals. saddle:
-    see `lowest`. Raises NoModes.
+    number of eigenvalues that are negative by nature. Raises NoModes.
     """
     shift, reason = 0.0, ""
     for k in range(_SHIFTS + 1):

@@ -16,8 +16,6 @@ from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.solve.held import Judging, loosest
 from softehl.runtime.solve.linear import Factors, LinearSolver, SingularMatrix, SparseMatrix
 
-_SYMMETRIC = 1e-8  # of the largest entry
-
 
 @dataclass(frozen=True, eq=False)
 class Condensing:
@@ -48,10 +46,10 @@ class Condensing:
         S = rows[E][:, E]
         for group in self.groups:
             inner = group.ravel()
-            inverse, signs, sign = inverted(rows[inner][:, inner], group)
+            inverse, sign = inverted(rows[inner][:, inner], group)
             out, back = rows[inner][:, E], rows[E][:, inner]
             S = S - back @ (inverse @ out)
-            parts.append(_Group(inner, inverse, csr_array(out), csr_array(back), signs, sign))
+            parts.append(_Group(inner, inverse, csr_array(out), csr_array(back), sign))
         if not np.isfinite(S.data).all():
             raise SingularMatrix("the matrix has entries that are not finite")
         return Eliminated(E, tuple(parts), self.solver.factorise(csc_array(S)))
@@ -59,15 +57,14 @@ class Condensing:
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Like elements: numbers of internal unknowns (m,), K_II^-1, K_IE, K_EI, and the eigenvalues
-    of K_II where it is symmetric, else None; sign of the determinant of K_II.
+    """Like elements: numbers of internal unknowns (m,), K_II^-1, K_IE, K_EI, and the sign of the
+    determinant of K_II.
     """
 
     inner: Integers
     inverse: bsr_array
     out: csr_array
     back: csr_array
-    signs: Array | None
     sign: float
 
 
@@ -90,12 +87,9 @@ class Eliminated:
         return x
 
     def pivots(self) -> Array | None:
-        """Numbers (n,) with the signs of the eigenvalues; None where not known."""
+        """Pivots of the rest (m,), see `Factorisation.pivots`."""
         known = getattr(self.rest, "pivots", None)
-        found = None if known is None else known()
-        if found is None or any(part.signs is None for part in self.parts):
-            return None
-        return np.concatenate([found, *(p.signs for p in self.parts if p.signs is not None)])
+        return None if known is None else known()
 
     def sign(self) -> float | None:
         """Sign of the determinant; None where it is not known."""
@@ -118,9 +112,8 @@ class Eliminated:
         return None if matrix is None else loosest(matrix, self.rest)
 
 
-def inverted(K: csr_array, group: Integers) -> tuple[bsr_array, Array | None, float]:
-    """Inverse of a matrix of one block for each of n elements, its eigenvalues if symmetric, and
-    the sign of its determinant.
+def inverted(K: csr_array, group: Integers) -> tuple[bsr_array, float]:
+    """Inverse of a matrix of one block for each of n elements, and the sign of its determinant.
 
     Raises SingularMatrix.
     """
@@ -135,13 +128,9 @@ def inverted(K: csr_array, group: Integers) -> tuple[bsr_array, Array | None, fl
         bad = weakest(blocks)
         row = int(group[bad, 0])
         raise SingularMatrix(f"internal unknowns of element {bad} cannot be eliminated", row)
-    sizes = np.abs(blocks).max(axis=(1, 2), initial=0.0)
-    uneven = np.abs(blocks - np.swapaxes(blocks, 1, 2)).max(initial=0.0)
-    even = uneven <= _SYMMETRIC * sizes.max(initial=0.0)
-    signs = np.asarray(np.linalg.eigvalsh(blocks)).reshape(-1) if even else None
     where = np.arange(n)
     sign = float(np.prod(np.linalg.slogdet(blocks)[0]))
-    return bsr_array((inverse, where, np.arange(n + 1)), shape=(n * k, n * k)), signs, sign
+    return bsr_array((inverse, where, np.arange(n + 1)), shape=(n * k, n * k)), sign
 
 
 def inverses(blocks: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,47 @@ def mixed(m: Any) -> None:
     J = m.define("J", F.det())
     W = mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J))
     m.minimise(W + p * (J - 1) - p**2 / (2 * K))
+
+
+@softehl.page
+def stresses(m: Any) -> None:
+    """Hellinger and Reissner's energy; five stresses of Pian and Sumihara in each rectangle."""
+    u, b = m.vector("u"), m.internal("b", 5)
+    lame, mu = m.parameters(lame="Lame's first", mu="shear modulus")
+    xi, eta = m.parent
+    s = sp.Matrix([[b[0] + b[3] * eta, b[2]], [b[2], b[1] + b[4] * xi]])
+    complementary = ((s * s).trace() - lame / (2 * mu + 2 * lame) * s.trace() ** 2) / (4 * mu)
+    m.minimise((s * m.grad(u)).trace() - complementary)
+
+
+@softehl.page
+def mean_stress(m: Any) -> None:
+    """The same with three stresses that are one for each cell, as unknowns of the study."""
+    u, b = m.vector("u"), [m.scalar(f"b_{k}", order=0) for k in range(3)]
+    lame, mu = m.parameters(lame="Lame's first", mu="shear modulus")
+    s = sp.Matrix([[b[0], b[2]], [b[2], b[1]]])
+    complementary = ((s * s).trace() - lame / (2 * mu + 2 * lame) * s.trace() ** 2) / (4 * mu)
+    m.minimise((s * m.grad(u)).trace() - complementary)
+
+
+@softehl.page
+def strains(m: Any) -> None:
+    """Four enhanced strains of Simo and Rifai, which give that of the stresses in rectangles."""
+    u, a = m.vector("u"), sp.Matrix(2, 2, m.internal("a", 4))
+    lame, mu = m.parameters(lame="Lame's first", mu="shear modulus")
+    middle = m.centroid(m.jacobian)
+    H = m.grad(u) + a * sp.diag(*m.parent) * middle.inv()
+    e = (H + H.T) / 2
+    m.minimise(lame / 2 * e.trace() ** 2 + mu * (e * e).trace())
+
+
+@softehl.page
+def incompressible(m: Any) -> None:
+    """Taylor and Hood's: a pressure without an energy of its own."""
+    u, p = m.vector("u"), m.scalar("p", order=1)
+    (mu,) = m.parameters(mu="shear modulus")
+    e = (m.grad(u) + m.grad(u).T) / 2
+    m.minimise(mu * (e * e).trace() + p * e.trace())
 
 
 @softehl.page
@@ -258,6 +300,57 @@ def test_ties_and_pressures_are_not_taken_for_instabilities() -> None:
     assert at_rest(study).unstable == 0
     study.tie("top", "bottom", "u_x")
     assert at_rest(study).unstable == 0
+
+
+def beam(page: Any, order: int = 1, load: float = 1e-3, **given: Any) -> Result:
+    study = Study(Mesh.rectangle(4.0, 1.0, cells=(4, 2), order=order))
+    study.add("body", page, **given)
+    study.fix("left", u_x=0, u_y=0)
+    study.load("right", u_y=load)
+    return study.solve()
+
+
+def test_stresses_as_unknowns_are_not_taken_for_instabilities() -> None:
+    """Both elements are the same one in rectangles (Andelfinger and Ramm, 1993)."""
+    mass = {"body": {"rho": 1.0}}
+    mixed_one, other = (beam(page, lame=0.6, mu=0.4) for page in (stresses, strains))
+    assert mixed_one.unstable == other.unstable == 0
+    squares = [result.modes(4, mass=mass).squares for result in (mixed_one, other)]
+    np.testing.assert_allclose(squares[0], squares[1], rtol=1e-9)
+    simple = beam(mean_stress, lame=0.6, mu=0.4)
+    assert simple.unstable == 0  # softer: one point in each cell
+    assert simple.modes(1, mass=mass).squares[0] == pytest.approx(squares[0][0], rel=0.3)
+
+
+def test_what_is_incompressible_has_a_stability_and_modes() -> None:
+    mass = {"body": {"rho": 1.0}}
+    exact = beam(incompressible, 2, mu=1.0)
+    assert exact.unstable == 0
+    nearly = beam(mixed, 2, load=1e-9, mu=1.0, K=1e6).modes(3, mass=mass).squares
+    np.testing.assert_allclose(exact.modes(3, mass=mass).squares, nearly, rtol=1e-4)
+
+
+def test_a_cell_whose_displacements_are_prescribed_is_stable() -> None:
+    study = Study(Mesh.rectangle(1.0, 1.0, cells=(1, 1), order=2))
+    study.add("body", mixed, mu=1.0, K=10.0)
+    study.fix(lambda x: x[:, 0] >= 0.0, u_x=lambda x, t: 0.01 * x[:, 0], u_y=0)
+    result = study.solve()
+    assert result.unstable == 0
+    with pytest.raises(StudyError, match="of the unknowns that have a mass 0 can move"):
+        result.modes(1, mass=MASS)
+
+
+def test_condensed_and_mixed_columns_buckle() -> None:
+    page = Path(__file__).parents[2] / "docs" / "models" / "enhanced.py"
+    study = Study(Mesh.rectangle(LENGTH, HEIGHT, cells=(30, 1)))
+    study.add("body", page, mu=YOUNG / 2, lame=0.0)
+    study.fix("left", u_x=0, u_y=0)
+    study.load("right", u_x=-1.0 / HEIGHT)
+    assert study.solve(until=0.97 * EULER).unstable == 0
+    with pytest.warns(Unstable, match="one direction"):
+        assert study.solve(until=1.03 * EULER).unstable == 1
+    with pytest.warns(Unstable, match="one direction"):
+        assert column(mixed, mu=YOUNG / 2, K=YOUNG).solve(until=1.6 * EULER).unstable == 1
 
 
 @pytest.mark.parametrize(
