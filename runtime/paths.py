@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Literal, cast
 
+import numpy as np
+
 from softehl.runtime.arrays import count_of
 from softehl.runtime.begin import beginning
 from softehl.runtime.bifurcation import Bifurcation, require_detect
@@ -21,12 +23,16 @@ from softehl.runtime.load import ArcSteps, LoadPath, LoadSteps
 from softehl.runtime.march import Clock, March, Method
 from softehl.runtime.mass import Masses
 from softehl.runtime.periodic import Cell, periodic
-from softehl.runtime.result import Result
+from softehl.runtime.result import Modes, Result
 from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.solution import Point, Solution, Status
 from softehl.runtime.statement import given as read
 from softehl.runtime.statement.records import Datum, Statement, StudyError, Where
 from softehl.runtime.system import System
 from softehl.runtime.watch import Series, Telling, Watch, watched
+
+_BALANCED = 1e-6
+"""Of the forces: a state whose residuals are smaller is one of equilibrium."""
 
 
 class Paths:
@@ -217,6 +223,35 @@ class Paths:
         same nodes but for a shift; `tolerance` is relative to their size. Raises StudyError.
         """
         return periodic(self._statement, self.system(), pairs, tolerance)
+
+    def modes(
+        self,
+        count: int = 6,
+        *,
+        mass: Masses | None = None,
+        start: Result | None = None,
+        engine: AnyEngine = None,
+        linear: Linear = "auto",
+    ) -> Modes:
+        """Natural modes at rest, or about `start` (a result), the lowest first.
+
+        A body that nothing holds has its rigid motions first, of frequency zero: three in the
+        plane, six in space. mass: as of `Result.modes`. engine, linear: as in `solve`. Raises
+        StudyError, also where the study is not in equilibrium at rest.
+        """
+        where = engine_of(engine, linear)
+        where.newton(system := where.spread(self.system()), None)
+        t, x, histories = beginning(system, start)
+        problem = system.problem(system.still(t, x, histories))
+        with np.errstate(all="ignore"):
+            off = problem.measure(x, None)
+        if not off <= _BALANCED:
+            raise StudyError(
+                f"modes({count}): loads or prescribed values are not zero at load factor {t:g}; "
+                "solve for the state first, study.solve(until=...).modes(...)"
+            )
+        solution = Solution(x, Status.CONVERGED, "", (), 0, 0)
+        return Result(system, problem, Point(t, solution), histories).modes(count, mass=mass)
 
     def buckling(
         self,

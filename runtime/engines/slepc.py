@@ -13,7 +13,14 @@ from softehl.runtime.engines.exchange import Exchange, largest, total
 from softehl.runtime.engines.reduced import Reduced
 from softehl.runtime.fem.reduction import symmetric
 from softehl.runtime.mpi import petsc, slepc, world
-from softehl.runtime.solve.eigen import NoModes, below, buckling_factors, require_count
+from softehl.runtime.solve.eigen import (
+    NoModes,
+    below,
+    buckling_factors,
+    require_count,
+    terms,
+    without_rounding,
+)
 from softehl.runtime.solve.linear import SingularMatrix
 
 _EXACT = 1e-11  # of eigenvalues
@@ -51,7 +58,8 @@ class Pencil:
             mass.mult(shape, right)
             shape.scale(1.0 / np.sqrt(shape.dot(right)))
             mode[:] = self._local(shape)
-        return values.real[order], signed(modes)
+        size = total(terms(self.K, modes))
+        return without_rounding(values.real[order], size), signed(modes)
 
     def factors(self, count: int) -> tuple[Array, Array]:
         """See `solve.eigen.smallest_factors` of K and M; vectors as in `lowest`."""

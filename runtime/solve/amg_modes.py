@@ -10,7 +10,7 @@ from scipy.sparse.linalg import LinearOperator, lobpcg
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.amg import Modes, Multigrid
-from softehl.runtime.solve.eigen import NoModes, require_count, signed
+from softehl.runtime.solve.eigen import NoModes, require_count, signed, terms, without_rounding
 
 _EXACT = 1e-5
 """Of the residual of a mode, relative to its inertia: the error of its square is about the square
@@ -58,4 +58,5 @@ def lowest(K: csc_array, M: csc_array, modes: Modes, count: int) -> tuple[Array,
     chosen, shapes = np.argsort(values)[:count], np.zeros((count, len(order)))
     shapes[:, order] = ((grids.scale * moving)[:, None] * X[:, chosen]).T
     sizes = np.sqrt(np.einsum("kn,kn->k", shapes, (M @ shapes.T).T))
-    return values[chosen], signed(shapes / sizes[:, None])
+    shapes /= sizes[:, None]
+    return without_rounding(values[chosen], terms(K, shapes)), signed(shapes)

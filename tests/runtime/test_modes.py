@@ -157,6 +157,33 @@ def test_a_free_body_has_modes_of_no_frequency() -> None:
     assert held.unstable == 0
 
 
+def free_body(mesh: Mesh, page: Any = rubber, **given: Any) -> Study:
+    study = Study(mesh)
+    study.add("body", page, **(given or {"mu": 0.5, "lame": 0.0}))
+    return study
+
+
+def test_a_body_that_nothing_holds() -> None:
+    """Rigid motions, then those of a free beam (1 = cos k cosh k) and of a bar."""
+    mass, L = {"body": {"rho": 1.0}}, 40.0
+    bending = np.array([4.730040744862704, 7.853204624095838]) ** 4 / 12 / L**4
+    plane = free_body(Mesh.rectangle(L, 1.0, cells=(20, 1), order=2)).modes(12, mass=mass)
+    np.testing.assert_array_equal(plane.frequencies[:3], 0.0)
+    np.testing.assert_allclose(plane.squares[3:5], bending, rtol=2e-2)
+    assert (np.abs(plane.squares / (np.pi / L) ** 2 - 1) < 1e-4).any()
+    box = free_body(Mesh.box((L, 1.0, 1.0), cells=(8, 1, 1), order=2)).modes(8, mass=mass)
+    np.testing.assert_array_equal(box.frequencies[:6], 0.0)
+    np.testing.assert_allclose(box.squares[6:], bending[0], rtol=2e-2)
+    cell = Mesh.rectangle(L, 1.0, cells=(20, 1))
+    stressed = free_body(cell, stresses, mu=0.5, lame=0.0).modes(4, mass=mass)
+    np.testing.assert_array_equal(stressed.frequencies[:3], 0.0)
+    assert stressed.squares[3] == pytest.approx(bending[0], rel=2e-2)
+    study = free_body(cell)
+    study.load("right", u_y=lambda x, t: 0.1)
+    with pytest.raises(StudyError, match="loads or prescribed values are not zero at load factor"):
+        study.modes(1, mass=mass)
+
+
 def still(study: Study) -> Any:
     system = study.system()
     return system.still(1.0, system.at_rest(), system.histories())
