@@ -66,10 +66,12 @@ class Homogenised:
         problem, modes = self.result.problem, self.cell.modes
         K = problem.assembler.linearise(self.result.x, problem.parameters)[1]
         T = self.cell.fluctuations
-        stiff, coupled = K @ modes, csc_array(T.T @ K @ T)
-        factors = choose("auto").factorise(coupled)
-        bent = np.stack([factors.solve(column) for column in np.asarray(T.T @ stiff).T], axis=1)
-        found = modes.T @ stiff - modes.T @ (K @ (T @ bent))
+        stiff = K @ modes
+        found = modes.T @ stiff
+        if T.shape[1]:  # else nothing fluctuates: one linear cell
+            factors = choose("auto").factorise(csc_array(T.T @ K @ T))
+            bent = np.stack([factors.solve(row) for row in np.asarray(T.T @ stiff).T], axis=1)
+            found = found - modes.T @ (K @ (T @ bent))
         return np.asarray(found).reshape(2 * self.F.shape) / self.cell.volume
 
 

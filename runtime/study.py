@@ -228,17 +228,27 @@ class Study(Paths, Fitted):
         """Tie unknowns of one side to those of another, u(where) = u(to) + offset: periodicity.
 
         The sides must have the same nodes but for a shift; `tolerance` is relative to their size.
+        Or `to` is one place, at which all nodes of the side are tied: they move as one.
         """
         words = f"tie({shown(where)}, {shown(to)})"
         self.mesh.require_whole(words)
         read.named(words, names, f'tie({shown(where)}, {shown(to)}, "u_x", "u_y")')
         offset = read.amount(words, "offset", offset)
         ours, theirs = read.nodes_of(self.mesh, where), read.nodes_of(self.mesh, to)
-        if len(ours) != len(theirs):
-            raise StudyError(f"{words}: {len(ours)} and {len(theirs)} nodes")
-        partners = theirs[
-            read.partners(self.mesh.points[ours], self.mesh.points[theirs], tolerance)
-        ]
+        if len(theirs) == 1 < len(ours):
+            if offset == 0.0:
+                ours = ours[ours != theirs[0]]  # a node of the side itself
+            if theirs[0] in ours:
+                raise StudyError(f"{words}: the place is a node of the side: offset must be 0")
+            partners = np.repeat(theirs, len(ours))
+        elif len(ours) != len(theirs):
+            raise StudyError(
+                f"{words}: {len(ours)} and {len(theirs)} nodes; sides of equal nodes but for a "
+                "shift are tied, or a side to one place"
+            )
+        else:
+            chosen = read.partners(self.mesh.points[ours], self.mesh.points[theirs], tolerance)
+            partners = theirs[chosen]
         for name in names:
             pairs = np.stack([ours, partners], axis=1)
             self._add_force("tie", where, Tie(offset), pairs, (name,))

@@ -24,7 +24,7 @@ from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.result import Result
 from softehl.runtime.stability import Unstable
 from softehl.runtime.statement.given import finite
-from softehl.runtime.statement.records import Statement
+from softehl.runtime.statement.records import Statement, StudyError
 
 
 class Solvable(Protocol):
@@ -56,7 +56,9 @@ class Fitted:
         A function is multiplied by the value. Raises StudyError for a name that is not there.
         """
         items = asked.of_keys(self._statement, list(values))
-        return _changed(self, [*zip(items, map(np.atleast_1d, values.values()), strict=True)])
+        return _changed(
+            self, [(i, _numbers(i, v)) for i, v in zip(items, values.values(), strict=True)]
+        )
 
     def objective(
         self: Solvable,
@@ -113,6 +115,22 @@ class Fitted:
         scales = None if sigma is None else np.broadcast_to(sigma, data.numbers.shape).copy()
         trials = Trials(asked.inputs(self._statement, by), _Runner(self, path))
         return LeastSquares(trials, data, scales).fit(bounds, most)
+
+
+def _numbers(item: Input, value: object) -> Array:
+    """Numbers of an input, one for all or one for each.  Raises StudyError."""
+    words, n = f"varied({item.key!r}: ...)", item.value.size
+    given = np.asarray(value)
+    if given.dtype.kind not in "fiu":
+        raise StudyError(
+            f"{words}: a number is needed, which replaces a number of the study and multiplies a "
+            f"function; given {type(value).__name__}; for another function write the study anew"
+        )
+    found = given.astype(np.float64)
+    if found.size not in (1, n) or not np.isfinite(found).all():
+        many = f", or {n} of them" if n > 1 else ""
+        raise StudyError(f"{words}: one finite number{many} is needed; given {value!r}")
+    return np.broadcast_to(found.ravel(), n).copy()
 
 
 def _changed(study: S, changes: Sequence[tuple[Input, Array]]) -> S:

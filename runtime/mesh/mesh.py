@@ -342,13 +342,20 @@ class Mesh:
         return found if self.piece is None else self.piece.everywhere(found)
 
     def cells_of(self, group: str | None) -> Mapping[str, Integers]:
-        """Kind -> node numbers (m, k) of the cells of a group, of all cells for None."""
+        """Kind -> node numbers (m, k) of the cells of a group, of all cells for None.
+
+        A kind of which the group has no cells is left out.
+        """
         if group is None:
             return self.cells
         if group not in self.groups:
             known = ", ".join(self.groups) or "none"
             raise MeshError(f"no group {group!r}{meant(group, self.groups)}; there are {known}")
-        return {kind: self.cells[kind][chosen] for kind, chosen in self.groups[group].items()}
+        return {
+            kind: self.cells[kind][chosen]
+            for kind, chosen in self.groups[group].items()
+            if self.anywhere(len(chosen))
+        }
 
     def node_at(self, place: Array) -> int:
         """Number of the node at a place (dim,).  Raises MeshError that names the nearest one, or

@@ -1,0 +1,93 @@
+"""Rare combinations of a study: groups of one kind of cells, ties to a place, one cell alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from softehl import Mesh, Study
+from softehl.runtime.study import StudyError
+
+MODELS = Path(__file__).parents[2] / "docs" / "models"
+
+
+def two_kinds() -> Mesh:
+    """A square cell beside two triangles."""
+    points = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1.0]])
+    cells = {"quad4": np.array([[0, 1, 4, 3]]), "tri3": np.array([[1, 2, 5], [1, 5, 4]])}
+    mesh = Mesh(points, cells).with_group("square", lambda x: x[:, 0] < 1)
+    return mesh.with_group("triangles", lambda x: x[:, 0] > 1)
+
+
+def test_a_group_of_one_kind_of_cells_in_a_mesh_of_two_kinds() -> None:
+    """Under uniform tension both kinds have the same exact solution."""
+    study = Study(two_kinds())
+    study.add("a", MODELS / "mean_pressure.py", cells="square", mu=0.5, K=1e-9)
+    study.add("b", material="hooke", cells="triangles", E=1.0, nu=0.0)
+    study.fix(lambda x: x[:, 0] == 0, u_x=0)
+    study.fix((0.0, 0.0), u_y=0)
+    study.load(lambda x: x[:, 0] == 2, u_x=1e-6)
+    result = study.solve()
+    assert list(study.system().blocks) == ["a", "b"]
+    np.testing.assert_allclose(result.values("u_x"), 1e-6 * study.mesh.points[:, 0], rtol=1e-4)
+    assert result.fields("a")["p"].shape[0] == 1
+
+
+def test_a_periodic_cell_of_one_element() -> None:
+    """Nothing fluctuates there; four of them are as stiff."""
+    A = []
+    for cells in ((1, 1), (2, 2)):
+        study = Study(Mesh.rectangle(1, 1, cells=cells))
+        study.add("body", material="neo_hooke", mu=1.0, kappa=2.0)
+        cell = study.periodic(("left", "right"), ("bottom", "top"))
+        A.append(cell.solve(np.array([[1.1, 0.2], [0.0, 1.0]])).A)
+    np.testing.assert_allclose(A[0], A[1], rtol=1e-9, atol=1e-12)
+
+
+def plate() -> Study:
+    study = Study(Mesh.rectangle(2, 1, cells=(4, 4)))
+    study.add("body", material="hooke", E=1.0, nu=0.3)
+    study.fix("left", u_x=0, u_y=0)
+    return study
+
+
+def test_a_side_that_is_tied_to_a_place_moves_as_one() -> None:
+    tied, prescribed = plate(), plate()
+    tied.tie("right", (2.0, 0.5), "u_x")
+    tied.load((2.0, 0.5), u_x=0.01)
+    result = tied.solve()
+    moved = result.values("u_x")[tied.mesh.nodes("right")]
+    assert np.ptp(moved) < 1e-15
+    prescribed.fix("right", u_x=lambda x, t: t * moved[0])
+    other = prescribed.solve()
+    assert other.reaction("right")["u_x"] == pytest.approx(0.01, rel=1e-12)
+    np.testing.assert_allclose(result.values("u_y"), other.values("u_y"), atol=1e-15)
+    tied.tie("top", (0.0, 0.0), "u_y", offset=0.1)  # a place elsewhere may be apart
+    with pytest.raises(StudyError, match="the place is a node of the side: offset must be 0"):
+        tied.tie("right", (2.0, 0.0), "u_x", offset=0.1)
+    with pytest.raises(StudyError, match=r"9 and 5 nodes; sides of equal nodes .* or a side to"):
+        tied.tie(np.arange(9), "left", "u_x")
+
+
+def test_prescribed_values_that_differ_by_rounding_are_one() -> None:
+    free = Study(Mesh.rectangle(2, 1, cells=(4, 4)))
+    free.add("body", material="hooke", E=1.0, nu=0.3)
+    free.fix("bottom", u_x=0, u_y=0)
+    free.fix("top", u_x=lambda x, t: t * 0.1 * 3 * np.sin(np.pi * x[:, 0]), u_y=0.3)
+    free.fix("right", u_x=0, u_y=lambda x, t: t * (0.1 + 0.2) * x[:, 1])
+    assert free.solve().at((2.0, 1.0))["u_y"] == pytest.approx(0.3)
+    free.fix((2.0, 1.0), u_y=0.3 + 1e-9)
+    with pytest.raises(StudyError, match="is prescribed twice"):
+        free.solve()
+
+
+def test_what_cannot_be_varied_by_a_function() -> None:
+    study = plate()
+    study.load("right", u_x=0.1)
+    for value in (lambda x, t: t, "0.1", float("nan"), [1.0, 2.0]):
+        with pytest.raises(StudyError, match=r"varied\(.*(number is|number) needed"):
+            study.varied({("load:right", "u_x"): value})  # type: ignore[dict-item]
+    twice = study.varied({("load:right", "u_x"): 0.2}).solve()
+    np.testing.assert_allclose(twice.x, 2 * study.solve().x, rtol=1e-12)
