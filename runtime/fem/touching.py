@@ -8,7 +8,7 @@ unknowns alone, although the list is another one in each iteration.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from itertools import product
 from typing import Protocol, TypeAlias
 
@@ -24,6 +24,9 @@ from softehl.runtime.kernels import Kernel
 
 Sparse = csc_array
 FACING = -0.1  # cosine between normals; sides that meet more steeply do not press
+_BACK = 0.5
+"""Of a step: how far it may differ from the opposite of the last one to count as taking it back.
+With 0.1 to 0.9 all of 48 pairs of blocks that just touch are solved, without it 44."""
 _STRIDE = 0.9  # of the depth to which sides notice each other
 SLANTED = 2.0  # a line along the normal is at most so many times as long as the distance
 
@@ -204,11 +207,12 @@ class TouchingProblem(Problem):
     """A problem with contacts, whose elements are looked for wherever it is evaluated.
 
     old: (n,) unknowns of the step before. latest: the last problem without a search; it only
-    saves time.
+    saves time. change: (n,) of the unknowns in the last iteration, empty before the first.
     """
 
     contacts: tuple[Sought, ...] = ()
     old: Array = field(default_factory=lambda: np.empty(0))
+    change: Array = field(default_factory=lambda: np.empty(0), repr=False)
     latest: list[Problem] = field(default_factory=list, repr=False)
 
     def at(self, x: Array) -> Problem:
@@ -229,13 +233,23 @@ class TouchingProblem(Problem):
         return self.latest[0]
 
     def step_limit(self, x: Array, dx: Array) -> float:
-        """A body must not jump over the side that it should touch."""
+        """A body must not jump over the side that it should touch.
+
+        A step that takes the last one back is halved: where bodies exactly touch at the start,
+        states of sticking and slipping may alternate, however short the load step is.
+        """
         limit = Problem.step_limit(self, x, dx)
+        if self.change.size and np.linalg.norm(dx + self.change) <= _BACK * np.linalg.norm(dx):
+            limit *= 0.5
         for contact in self.contacts:
             moved = np.where(contact.displacements >= 0, dx[contact.displacements], 0.0)
             largest = float(np.linalg.norm(moved, axis=1).max())
             limit = min(limit, stride(contact.sides) / max(largest, 1e-300))
         return limit
+
+    def after(self, before: Array, x: Array) -> TouchingProblem:
+        """The problem as it is after a step from `before` to x, (n,)."""
+        return replace(self, change=x - before)
 
     def where_not_finite(self, x: Array) -> str:
         """See `Problem`."""

@@ -295,3 +295,19 @@ def test_how_thick_a_body_is() -> None:
 def test_chains_are_put_in_order() -> None:
     lines = np.array([[3, 4], [0, 1], [1, 2], [4, 3], [2, 5]])
     assert in_chains(lines).tolist() == [[0, 1], [1, 2], [2, 5], [3, 4], [4, 3]]
+
+
+@pytest.mark.parametrize("sides", [("upper:bottom", "lower:top"), ("lower:top", "upper:bottom")])
+def test_bodies_that_exactly_touch_at_the_start_with_friction(sides: tuple[str, str]) -> None:
+    """There sticking and slipping alternate, in load steps of any length."""
+    upper = Mesh.rectangle(1, 1, cells=(3, 3)).map(lambda x: np.add(x, [0, 1]))
+    lower = Mesh.rectangle(2, 1, cells=(6, 6)).map(lambda x: np.add(x, [-0.5, 0]))
+    study = Study(Mesh.union(upper=upper, lower=lower))
+    study.add("body", material="neo_hooke", mu=1.0, kappa=3.0)
+    study.contact(*sides, friction=0.3)
+    study.fix("lower:bottom", u_x=0, u_y=0)
+    study.fix("upper:top", u_x=0, u_y=-0.02)
+    result = study.solve(steps=4)
+    found = result.fields("contact")
+    pressed = (found["pressure"] * found["area"]).sum()
+    assert pressed == pytest.approx(result.reaction("lower:bottom")["u_y"], rel=1e-3)
