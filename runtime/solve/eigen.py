@@ -145,7 +145,7 @@ def without_rounding(values: Array, terms: Array) -> Array:
 
 def terms(K: csc_array, shapes: Array) -> Array:
     """Sums (k,) of the magnitudes of the terms of x' K x, of vectors (k, n)."""
-    return np.einsum("kn,kn->k", np.abs(shapes), (abs(K) @ np.abs(shapes.T)).T)
+    return np.asarray(np.einsum("kn,kn->k", np.abs(shapes), (abs(K) @ np.abs(shapes.T)).T))
 
 
 def require_count(count: int, heavy: int) -> None:

@@ -151,7 +151,7 @@ def test_what_is_refused() -> None:
             shallow().follow(step=step, until=lambda r: True)
     for linear in ("amg", "matrix-free"):
         with pytest.raises(StudyError, match=f'no linear = "{linear}", it factorises'):
-            shallow().follow(step=0.1, until=lambda r: True, linear=linear)  # type: ignore[arg-type]
+            shallow().follow(step=0.1, until=lambda r: True, linear=linear)
 
 
 def test_history_is_committed_along_the_path() -> None:
