@@ -75,6 +75,11 @@ class Multigrid:
 
         sums = checked_row_sums(K)
         order, diagonal = self.modes.order, np.abs(K.diagonal())
+        if len(order) != K.shape[0]:
+            raise SingularMatrix(
+                f"multigrid knows {len(order)} unknowns, the matrix has {K.shape[0]}: paths by arc "
+                'length and the like need linear = "direct"'
+            )
         held = (sums == diagonal)[order]  # prescribed: nothing else in the row
         if self._entries is None or not self._entries.fit(K):
             self._entries = Entries.of(K, order, self.modes.block)

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from softehl import Definition, Model, quadrature
+from softehl import Definition, Model, Newton, quadrature
+from softehl.runtime.engines.sizes import nodal_modes
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.result import Result
+from softehl.runtime.solve.amg import Multigrid
 from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.study import Study, StudyError
 
@@ -152,6 +154,17 @@ def test_what_is_refused() -> None:
     for linear in ("amg", "matrix-free"):
         with pytest.raises(StudyError, match=f'no linear = "{linear}", it factorises'):
             shallow().follow(step=0.1, until=lambda r: True, linear=linear)
+
+
+def test_multigrid_that_is_given_is_refused_by_name() -> None:
+    study = Study(Mesh.rectangle(2, 1, cells=(4, 2)))
+    study.add("body", material="neo_hooke", mu=1.0, kappa=3.0)
+    study.fix("left", u_x=0, u_y=0)
+    study.load("right", u_x=0.1)
+    modes = nodal_modes(study.system())
+    assert modes is not None
+    with pytest.raises(NotConverged, match="multigrid knows 30 unknowns, the matrix has 31"):
+        study.follow(step=1.0, until=lambda r: True, newton=Newton(linear=Multigrid(modes)))
 
 
 def test_history_is_committed_along_the_path() -> None:
