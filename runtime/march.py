@@ -173,8 +173,12 @@ class March:
         old, history = clock.states[0], clock.histories
         return Step(clock.t + dt, 1.0, old, rate, rest, dt, history, weights=tuple(weights))
 
-    def factor(self, system: System, clock: Clock, step: Step, x: Array) -> float:
-        """By how much the next step may be longer; below 1 where the error is too large."""
+    def factor(self, system: System, clock: Clock, step: Step, problem: Any, x: Array) -> float:
+        """By how much the next step may be longer; below 1 where the error is too large.
+
+        Components of a vector are one field. A field whose error Newton's method does not see in
+        the equations, beside their loads, has none.
+        """
         order = _ORDER[self.method] if len(clock.times) > 1 else 1
         if self.tolerance is None or len(clock.times) <= order:
             return 1.0
@@ -185,12 +189,19 @@ class March:
             share = step.dt / (step.dt + clock.times[0] - clock.times[1])
         worst = 0.0
         rated = {slot.name for block in system.blocks.values() for slot in block.rates.values()}
-        for name in system.numbering.layout.names:
-            if rated and name not in rated:
+        layout = system.numbering.layout
+        for names, part in zip(layout.vectors, layout.fields, strict=True):
+            if rated and rated.isdisjoint(names):
                 continue  # it follows from the others, and its start may be anything
-            part = system.numbering.layout.part(name)
             size, off = (_largest(system, values[part]) for values in (x, difference))
-            worst = max(worst, share * off / max(size, 1e-300))
+            error = share * off / max(size, 1e-300)
+            if error > self.tolerance:
+                wrong = x.copy()
+                wrong[part] -= share * difference[part]
+                with np.errstate(all="ignore"):
+                    seen = problem.measure(wrong, problem.linearise(x)[1])
+                error = error if seen > self.newton.tolerance else 0.0
+            worst = max(worst, error)
         if worst == 0.0:
             return _GROWTH
         return float(_SAFETY * math.pow(self.tolerance / worst, 1.0 / (order + 1)))
@@ -230,7 +241,7 @@ class _ByTime(Way):
         self._tried = posed, problem
         following = 0.5 * dt
         if solution.converged:
-            factor = self.march.factor(self.system, self.clock, posed, solution.x)
+            factor = self.march.factor(self.system, self.clock, posed, problem, solution.x)
             following = self._following(dt, step, factor)
             if factor < 1.0:
                 words = "the local error is above its tolerance"

@@ -57,11 +57,16 @@ class DofLayout:
     @cached_property
     def fields(self) -> tuple[Integers, ...]:
         """Numbers of the unknowns of each field; components u_x, u_y, ... of one are together."""
-        found: dict[str, list[Integers]] = {}
+        return tuple(np.concatenate([self.dofs(n) for n in names]) for names in self.vectors)
+
+    @cached_property
+    def vectors(self) -> tuple[tuple[str, ...], ...]:
+        """Names of the fields, those of the components of a vector together."""
+        found: dict[str, list[str]] = {}
         for name in self.names:
             stem, _, axis = name.rpartition("_")
-            found.setdefault(stem if stem and axis in AXES else name, []).append(self.dofs(name))
-        return tuple(np.concatenate(parts) for parts in found.values())
+            found.setdefault(stem if stem and axis in AXES else name, []).append(name)
+        return tuple(map(tuple, found.values()))
 
     @cached_property
     def _parts(self) -> dict[str, slice]:

@@ -348,6 +348,24 @@ def test_units_of_time_change_nothing_either() -> None:
     assert pressures(1e-6, 1e11, 1e-18) == pytest.approx(pressures(1.0, 1.0, 1.0), rel=1e-9)
 
 
+def test_a_component_that_is_zero_to_rounding_does_not_choose_the_steps() -> None:
+    """Terzaghi's series at the closed end; u_x is free in the middle, and 1e-20."""
+    study = Study(Mesh.rectangle(0.25, 1, cells=(1, 4), order=2))
+    study.add("soil", biot, E=1.0, k=1.0)
+    study.fix("left", u_x=0)
+    study.fix("right", u_x=0)
+    study.fix("bottom", u_y=0)
+    study.fix("top", p=0)
+    study.load("top", u_y=-1e-3)
+    t = 0.2
+    *_, result = study.march(dt=1e-3, until=t, method="bdf2", tolerance=1e-3)
+    odd = np.arange(1, 20, 2)
+    signs = np.where(odd % 4 == 1, 1.0, -1.0)
+    series = 4 / np.pi * np.sum(signs / odd * np.exp(-((odd * np.pi / 2) ** 2) * t))
+    assert result.at((0.1, 0.0))["p"] / 1e-3 == pytest.approx(series, rel=0.015)
+    assert 0.0 < np.abs(result.values("u_x")).max() < 1e-15
+
+
 @pytest.mark.parametrize("shape", ["quad", "serendipity", "triangle"])
 def test_a_field_of_lower_order_has_values_between_its_nodes(shape: str, tmp_path: Path) -> None:
     """A pressure that is linear: at any place, its derivative too, and in the file."""
