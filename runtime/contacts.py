@@ -8,8 +8,9 @@ from typing import TypeAlias
 import numpy as np
 
 from softehl.runtime.arrays import Array
+from softehl.runtime.fem.assembly import ElementBlock
 from softehl.runtime.fem.face_pair import FacePair
-from softehl.runtime.fem.touching import Contact, Side
+from softehl.runtime.fem.touching import Contact, Side, Sought
 from softehl.runtime.fem.touching_faces import FaceContact
 from softehl.runtime.fem.unknowns import Numbering
 from softehl.runtime.kernels import load_kernel
@@ -101,6 +102,46 @@ def with_contacts(system: System, contacts: dict[str, AnyContact]) -> System:
         sides = tuple(replace(s, rho=r) for s, r in zip(contact.sides, rho, strict=True))
         found.append(replace(contact, sides=sides))
     return replace(system, assembler=assembler, blocks=blocks, contacts=tuple(found))
+
+
+def contact_blocks(system: System) -> dict[str, float]:
+    """Friction of each block of a contact, by name: those of its sides and of its pairs."""
+    touches = [] if system.statement is None else system.statement.contacts
+    found = {label: touch.friction for touch in touches for label in touch.labels}
+    pairs = {b.name: c.friction for c in system.contacts for b in c.empty()}
+    return {**found, **pairs}
+
+
+def sliding(system: System, x: Array) -> Array:
+    """Unknowns (n,) with a shear stress of the least size on sides in the plane without friction:
+    those that have not slipped at all would count as sticking.
+    """
+    found = x.copy()
+    for contact in system.contacts:
+        if isinstance(contact, Contact) and contact.friction == 0.0:
+            shear = contact.multipliers[:, 1]
+            shear = shear[shear >= 0]
+            found[shear[found[shear] == 0.0]] = np.finfo(np.float64).tiny
+    return found
+
+
+def weighted(system: System, weight: float) -> tuple[tuple[Sought, ...], dict[str, ElementBlock]]:
+    """Contacts and the blocks of their sides by name with a stiffness times `weight`.
+
+    Their unknowns times the same number then have forces times this number and the same gaps.
+    """
+    contacts, blocks = [], {}
+    for contact in system.contacts:
+        sides = tuple(replace(side, rho=weight * side.rho) for side in contact.sides)
+        contacts.append(replace(contact, sides=sides))  # type: ignore[type-var]
+    labels = [] if system.statement is None else system.statement.contacts
+    for label in (label for touch in labels for label in touch.labels):
+        block = system.assembler.block(label)
+        assert block.data is not None
+        data = block.data.copy()
+        data[:, list(system.blocks[label].kernel.data).index("rho")] *= weight
+        blocks[label] = replace(block, data=data)
+    return tuple(contacts), blocks
 
 
 def _rho(system: System, touch: Touch, contact: AnyContact, side: Side, K: Array) -> Array:

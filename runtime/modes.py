@@ -10,10 +10,10 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, count_of
+from softehl.runtime.contacts import contact_blocks, sliding
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.reduction import is_symmetric
 from softehl.runtime.mass import Masses, mass_matrix
-from softehl.runtime.share import Share
 from softehl.runtime.solve.eigen import NoModes
 from softehl.runtime.solve.linear import SingularMatrix
 from softehl.runtime.solve.newton import Newton
@@ -37,14 +37,24 @@ class Tangent:
     K: csc_array
 
     @classmethod
-    def at(cls, share: Share, posed: Any, x: Array, words: str) -> Tangent:
-        """Raises StudyError where it is not finite or not symmetric."""
-        problem = share.part(posed)
+    def at(cls, system: System, posed: Any, x: Array, words: str) -> Tangent:
+        """Raises StudyError where it is not finite or not symmetric.
+
+        That of a contact without friction is symmetric but for the error of its mesh, which changes
+        eigenvalues in the second order.
+        """
+        share = system.share
+        problem, x = share.part(posed).at(x), sliding(system, x)
         with np.errstate(all="ignore"):
             K = problem.assembler.linearise(x, problem.parameters)[1]
         if share.largest(float(not np.isfinite(K.data).all())):
             raise StudyError(f"{words}: the tangent is not finite")
-        if share.largest(float(not is_symmetric(K))):
+        smooth = [name for name, friction in contact_blocks(system).items() if friction == 0.0]
+        whole = K
+        if smooth:
+            rest = {n: v for n, v in problem.parameters.items() if n not in smooth}
+            whole = problem.assembler.linearise(x, rest)[1]
+        if share.largest(float(not is_symmetric(whole))):
             raise StudyError(
                 f"{words}: the tangent is not symmetric (friction, pressure that follows an open "
                 "side, or a page without a potential), and frequencies are those of a potential"
@@ -58,7 +68,7 @@ def natural(
     """Squares of angular frequencies (k,) and modes (k, n) about a state x, the lowest first."""
     words = f"modes({count})"
     _require_count(words, count)
-    here = Tangent.at(system.share, posed, x, words)
+    here = Tangent.at(system, posed, x, words)
     M = mass_matrix(system, here.problem, x, mass)
     try:
         return system.share.lowest(here.problem, here.K, M, count)
@@ -79,7 +89,7 @@ def buckled(
     words = f"buckling({count})"
     _require_count(words, count)
     share, t, x = system.share, state.parameter, state.solution.x
-    here = Tangent.at(share, problem_at(t), x, words)
+    here = Tangent.at(system, problem_at(t), x, words)
     r, K = problem_at(t + 1.0).linearise(x)
     try:
         response = -newton.linear.factorise(K).solve(r)
@@ -89,8 +99,8 @@ def buckled(
     if not most > 0.0:
         raise StudyError(f"{words}: nothing changes with the load factor; give loads or fix(...)")
     h = _LENGTH * share.largest(float(np.ptp(system.mesh.points, axis=0).max())) / most
-    ahead = Tangent.at(share, problem_at(t + h), x + h * response, words).K
-    behind = Tangent.at(share, problem_at(t - h), x - h * response, words).K
+    ahead = Tangent.at(system, problem_at(t + h), x + h * response, words).K
+    behind = Tangent.at(system, problem_at(t - h), x - h * response, words).K
     change = csc_array((ahead - behind) / (2.0 * h))
     try:
         factors, found = share.buckling(here.problem, here.K, change, count)

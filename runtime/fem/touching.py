@@ -188,6 +188,20 @@ class Sought(Protocol):
     """Elements that depend on the unknowns."""
 
     @property
+    def friction(self) -> float:
+        """Coulomb's coefficient."""
+        ...
+
+    @property
+    def multipliers(self) -> Integers:
+        """Numbers of the multipliers at each node, (points, k), -1 where there are none."""
+        ...
+
+    def empty(self) -> list[ElementBlock]:
+        """Its blocks without elements."""
+        ...
+
+    @property
     def displacements(self) -> Integers:
         """Numbers of the unknowns that move the nodes, (points, dim), -1 where there are none."""
         ...
