@@ -8,15 +8,18 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_array
 
-from softehl.runtime.arrays import Array, Flags
-from softehl.runtime.dynamics.motion import Forces
+from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.contacts import weighted
+from softehl.runtime.dynamics.motion import Forces, Roles
 from softehl.runtime.dynamics.schemes import Affine, Scheme
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.fem.averaged import Averaged, time_derivatives, with_old
 from softehl.runtime.fem.loads import Tie
 from softehl.runtime.fem.mass import Mass, lumped
 from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.touching import TouchingProblem
 from softehl.runtime.mass import Masses, mass_blocks, mass_matrix
+from softehl.runtime.names import listed
 from softehl.runtime.share import Share
 from softehl.runtime.solve.gradients import conjugate_gradients
 from softehl.runtime.statement.records import Block, StudyError
@@ -51,7 +54,10 @@ class Body:
 
     plain: its equations without. moving: with elements of mass, and forces of the step before or
     averaged. M: consistent masses (n, n) at the start. lumps: (n,), of the explicit
-    scheme; both are what elements of this process add. heavy: unknowns with mass.
+    scheme; both are what elements of this process add. heavy: unknowns with mass. roles: of its
+    blocks. weight: of the forces at the end of a step in `moving`; ties and contacts act through
+    the whole step, so that their unknowns there are those of the study over the weight. mass:
+    densities as they were given.
     """
 
     plain: System
@@ -59,6 +65,9 @@ class Body:
     M: csc_array
     lumps: Array
     heavy: Flags
+    roles: Roles
+    weight: float = 1.0
+    mass: Masses | None = None
 
     @classmethod
     def of(cls, system: System, mass: Masses | None, scheme: Scheme | None, at: Step) -> Body:
@@ -74,16 +83,28 @@ class Body:
                         f"{block.name!r} has a rate of {slot.name}, which has no mass everywhere: "
                         'give it one, or march by "euler" or "bdf2"'
                     )
+        roles, weight = Roles.in_system(system), 1.0 if scheme is None else scheme.weight()
         own = list(system.assembler.blocks)
+        massless = _multipliers(system, problem, at.old, heavy, roles)
         if scheme is not None and scheme.averaged:
-            own = [_averaged(b, system.blocks.get(b.name)) for b in own]
+            free = [b for b in own if roles.of[b.name] not in ("tie", "contact")]
+            changed = {b.name: _averaged(b, system.blocks.get(b.name), massless) for b in free}
+            own = [changed.get(b.name, b) for b in own]
+        elif scheme is not None and not scheme.damps and share.largest(float(massless.any())):
+            raise StudyError(
+                f"{_name_of(system, massless)} is a multiplier of equations without it, whose "
+                'error grows in steps that damp nothing: take method = "generalised-alpha" with '
+                'rho_inf below 1, or "midpoint"'
+            )
+        contacts, stiffer = weighted(system, 1.0 / weight)
+        own = [stiffer.get(b.name, b) for b in own]
         rows = share.owned(system.size)
         rows = rows[heavy[rows]][:, None]
         before = ElementBlock(_BEFORE, _Known(), np.empty((0, 0)), rows, check_orientation=False)
         assembler = Assembler.build(system.size, [*own, *blocks, before])
         lumps = _lumped(system, M, blocks) if scheme is None else M.diagonal()
-        moving = replace(system, assembler=assembler, share=share.renewed())
-        return cls(system, moving, M, lumps, heavy)
+        moving = replace(system, assembler=assembler, contacts=contacts, share=share.renewed())
+        return cls(system, moving, M, lumps, heavy, roles, weight, mass)
 
     @property
     def share(self) -> Share:
@@ -120,19 +141,42 @@ class Body:
             values=end.values,
         )
 
+    def constrained(self, problem: Problem) -> bool:
+        """True if there are unknowns without mass, which no acceleration determines."""
+        massless = ~self.heavy
+        massless[problem.fixed] = False
+        return bool(massless.any())
+
+    def weighted(self, x: Array, weight: float) -> Array:
+        """Unknowns (n,) with those of ties and contacts times a number."""
+        found = x.copy()
+        found[self.roles.multipliers] *= weight
+        return found
+
+    def friction(self, problem: Problem, x: Array, moved: Array) -> float:
+        """Work of friction at the end x of a step in which the unknowns moved (n,)."""
+        if not any(contact.friction for contact in self.plain.contacts):
+            return 0.0
+        assert isinstance(problem, TouchingProblem)
+        smooth = tuple(replace(c, friction=0.0) for c in self.plain.contacts)  # type: ignore[type-var]
+        other = replace(problem, contacts=smooth, latest=[])
+        whole, normal = (Forces.of(p, x, self.roles).contact for p in (problem, other))
+        return float((whole - normal) @ moved)
+
     def at_end(self, step: Step, v: Array) -> Problem:
         """The plain equations at the end of a step, with velocities v, (n,)."""
         return self.plain.part(replace(step, rate=0.0, rest=v, acceleration=0.0, remainder=None))
 
     def started(self, problem: Problem, x: Array) -> Array:
         """Accelerations (n,) at the start x: M a = -f on what is free.  Raises StudyError."""
+        forces = Forces.of(problem, x, self.roles)
         free = self.share.free(problem)
         diagonal = free.gather(self.M.diagonal())
         inverse = 1.0 / np.where(diagonal > 0.0, diagonal, np.inf)
         found = conjugate_gradients(
             lambda z: free.gather(self.M @ free.spread(z)),
             lambda r: inverse * r,
-            np.where(diagonal > 0.0, -free.gather(Forces.of(problem, x).total), 0.0),
+            np.where(diagonal > 0.0, -free.gather(forces.total + forces.constraints), 0.0),
             *(_EXACT, _MOST, self.share.dot),
         )
         if not found.converged:
@@ -144,11 +188,29 @@ class Body:
         return Affine(values.c, np.where(self.heavy, values.rest, 0.0))
 
 
-def _averaged(block: ElementBlock, page: Block | None) -> ElementBlock:
-    """A block that is averaged along a step; ties are not, they hold at its end."""
-    if isinstance(block.kernel, Tie):
-        return block
-    timed: tuple[object, ...] = ()
+def _multipliers(system: System, problem: Problem, x: Array, heavy: Flags, roles: Roles) -> Flags:
+    """Unknowns (n,) of pages without mass that stand in no equation without mass, at x, (n,)."""
+    massless = ~heavy
+    massless[problem.fixed] = massless[roles.multipliers] = False
+    if not system.share.largest(float(massless.any())):
+        return massless
+    here = problem.at(x)
+    with np.errstate(all="ignore"):
+        K = here.assembler.linearise(x, here.parameters)[1]
+    among = system.share.added(np.asarray(abs(K) @ massless.astype(np.float64)))
+    found: Flags = massless & (among == 0.0)
+    return found
+
+
+def _name_of(system: System, numbers: Flags) -> str:
+    """Names of the unknowns among these, (n,)."""
+    layout = system.numbering.layout
+    return listed([repr(name) for name in layout.names if numbers[layout.part(name)].any()])
+
+
+def _averaged(block: ElementBlock, page: Block | None, multipliers: Flags) -> ElementBlock:
+    """A block that is averaged along a step; multipliers: (n,) unknowns that are one in it."""
+    timed: tuple[tuple[int, Integers, Integers], ...] = ()
     if page is not None:
         number = {slot: k for k, slot in enumerate(page.slots)}
         tables = {"rate": page.rates, "acceleration": page.accelerations}
@@ -156,7 +218,12 @@ def _averaged(block: ElementBlock, page: Block | None) -> ElementBlock:
             block.kernel,
             [(p, {d: number[s] for d, s in table.items()}) for p, table in tables.items()],
         )
-    return replace(block, kernel=Averaged(block.kernel, timed), constant=False)  # type: ignore[arg-type]
+    length = None
+    if page is not None and "dt" in block.kernel.parameters and "dt" not in page.parameters:
+        length = list(block.kernel.parameters).index("dt")
+    columns = np.flatnonzero(multipliers[block.dofs].any(axis=0))
+    averaged = Averaged(block.kernel, timed, length, columns)
+    return replace(block, kernel=averaged, constant=False)
 
 
 def _lumped(system: System, M: csc_array, blocks: list[ElementBlock]) -> Array:

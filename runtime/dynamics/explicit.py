@@ -10,7 +10,13 @@ import numpy as np
 from softehl.runtime.arrays import Array
 from softehl.runtime.dynamics.body import Body
 from softehl.runtime.dynamics.implicit import Phase
-from softehl.runtime.dynamics.motion import Forces, Ledger, Motion, stored_energy
+from softehl.runtime.dynamics.motion import (
+    Forces,
+    Ledger,
+    Motion,
+    parameter_work,
+    stored_energy,
+)
 from softehl.runtime.fem.loads import Tie
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.reduction import symmetric
@@ -42,7 +48,7 @@ class Explicit:
     def run(self, until: float) -> Iterator[Motion]:
         """Results every dt until the end.  Raises StudyError, NotConverged."""
         body, ledger = self.body, Ledger(self.body.share)
-        begin = body.at_end(self.here.step(self.here.t), self.here.v)
+        begin = body.at_end(self.here.standing(self.dt), self.here.v)
         self._told(begin, ledger)
         end, stable = begin, self._stable(begin)
         count = max(int(np.ceil((until - self.here.t) / self.dt * (1.0 - ROUNDING))), 1)
@@ -58,7 +64,7 @@ class Explicit:
     def started(self, problem: Problem, until: float) -> Iterator[Motion]:
         """From rest or a state of which the accelerations are not known yet."""
         here = self.here
-        a = self._accelerations(Forces.of(problem, here.x).total)
+        a = self._accelerations(Forces.of(problem, here.x, self.body.roles).total)
         self.here = Phase(here.t, here.x, here.v, a, here.histories)
         return self.run(until)
 
@@ -71,7 +77,7 @@ class Explicit:
         end = body.at_end(here.step(t), half)
         x[end.fixed] = end.values
         half[end.fixed] = (x - here.x)[end.fixed] / dt
-        forces = Forces.of(end, x)
+        forces = Forces.of(end, x, body.roles)
         if self.body.share.largest(float(not np.isfinite(forces.total).all())):
             where = body.share.posed(end).where_not_finite(x)
             words = f"t = {t:.6g}: the forces are not finite{where}"
@@ -79,13 +85,13 @@ class Explicit:
             raise NotConverged(Branch((Point(here.t, state),), Status.NOT_FINITE, words))
         a = self._accelerations(forces.total)
         moved = x - here.x
-        old = Forces.of(before, here.x)
-        parts = zip(vars(old).values(), vars(forces).values(), strict=True)
+        old = Forces.of(before, here.x, body.roles)
         supports = np.zeros(len(x))
         total = 0.5 * (old.total + forces.total)
         inertia = self.body.lumps * (half - here.v) / dt
         supports[end.fixed] = (total + inertia)[end.fixed]
-        ledger.add(Forces(*(0.5 * (one + other) for one, other in parts)), supports, moved)
+        ledger.add(old.mean(forces), supports, moved)
+        ledger.external += parameter_work(before, end, body.roles, (here.x, x), None)
         v = half + 0.5 * dt * a
         histories = body.plain.committed(end, x, here.histories)
         self.here = Phase(t, x, v, a, histories)
@@ -110,7 +116,9 @@ class Explicit:
 
     def _told(self, end: Problem, ledger: Ledger) -> dict[str, float]:
         kinetic = 0.5 * float(self.body.lumps @ self.here.v**2)
-        return ledger.told(kinetic, stored_energy(end, self.here.x))
+        stored = stored_energy(end, self.here.x, self.body.roles)
+        forces = Forces.of(end, self.here.x, self.body.roles)
+        return ledger.told(self.here.t, kinetic, stored, forces, self.here.x)
 
     def _motion(self, end: Problem, ledger: Ledger, steps: int, stable: float) -> Motion:
         here, size = self.here, float(np.ptp(self.body.plain.mesh.points, axis=0).max())
@@ -139,8 +147,20 @@ def explicit(dt: float, body: Body, here: Phase, problem: Problem) -> Explicit:
         if isinstance(block.kernel, Tie):
             without[block.dofs[:, 2]] = False
     layout = system.numbering.layout
+    touches = [] if system.statement is None else system.statement.contacts
+    internal = {n for b in system.blocks.values() for n in getattr(b.kernel, "internal", ())}
     for name in layout.names:
         if share.largest(float(without[layout.part(name)].any())):
+            if any(name == touch.unknown(m) for touch in touches for m in ("lambda", "tau")):
+                raise StudyError(
+                    'method = "explicit" takes no contact: take "generalised-alpha", which damps '
+                    'what impacts leave, or "newmark" or "midpoint"'
+                )
+            if name in internal:
+                raise StudyError(
+                    f'method = "explicit": {name} belongs to elements (m.internal), whose '
+                    "equations every step would have to solve; an implicit method does"
+                )
             raise StudyError(
                 f'method = "explicit": {name} has no mass everywhere, and explicit steps are '
                 "force over mass; an implicit method can do without"

@@ -10,7 +10,13 @@ import numpy as np
 from softehl.runtime.arrays import Array
 from softehl.runtime.begin import SMALLEST
 from softehl.runtime.dynamics.body import Body
-from softehl.runtime.dynamics.motion import Forces, Ledger, Motion, stored_energy
+from softehl.runtime.dynamics.motion import (
+    Forces,
+    Ledger,
+    Motion,
+    parameter_work,
+    stored_energy,
+)
 from softehl.runtime.dynamics.schemes import Scheme
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.march import ROUNDING, towards
@@ -36,6 +42,10 @@ class Phase:
         """A step to t in which nothing moves yet."""
         return Step(t, 1.0, self.x, 0.0, self.v, t - self.t, self.histories)
 
+    def standing(self, dt: float) -> Step:
+        """The present, as the end of a step of length dt with the present velocities."""
+        return Step(self.t, 1.0, self.x - dt * self.v, 0.0, self.v, dt, self.histories)
+
 
 @dataclass(frozen=True)
 class Implicit:
@@ -45,9 +55,14 @@ class Implicit:
     dt: float
     newton: Newton
 
-    def run(self, body: Body, begin: Phase, until: float) -> Iterator[Motion]:
-        """Every converged step until the end.  Raises NotConverged."""
-        log, way = Record("t"), _Way(self, body, begin, until, Ledger(body.share))
+    def run(
+        self, body: Body, begin: Phase, until: float, end: Problem | None = None
+    ) -> Iterator[Motion]:
+        """Every converged step until the end.  Raises NotConverged.
+
+        end: equations without inertia of a step that ended at the beginning, if there was one.
+        """
+        log, way = Record("t"), _Way(self, body, begin, until, Ledger(body.share), plain=end)
         for _ in walk(way, StepRule(self.dt, SMALLEST * self.dt), log):
             log.points = log.points[-1:]
             if way.result is not None:
@@ -66,7 +81,9 @@ class _Tried:
 
 @dataclass(eq=False)
 class _Way(Way):
-    """here: where it stands; forces, supports: there, (n,), but for averaged ones."""
+    """here: where it stands; plain: its equations without inertia; forces, supports: there, (n,),
+    without ties and contacts, and but for averaged ones.
+    """
 
     settings: Implicit
     body: Body
@@ -74,6 +91,7 @@ class _Way(Way):
     until: float
     ledger: Ledger
     result: Motion | None = None
+    plain: Problem | None = None
     forces: Forces | None = None
     supports: Array = field(default_factory=lambda: np.empty(0))
     tried: _Tried | None = None
@@ -81,8 +99,8 @@ class _Way(Way):
     def start(self) -> Trial:
         """See `Way`."""
         here = self.here
-        end = self.body.at_end(here.step(here.t), here.v)
-        self._stand(end, here, Forces.of(end, here.x))
+        end = self.plain or self.body.at_end(here.standing(self.settings.dt), here.v)
+        self._stand(end, here, Forces.of(end, here.x, self.body.roles))
         self._energies(end)
         return Trial.known(here.t, here.x, self.settings.dt)
 
@@ -102,10 +120,12 @@ class _Way(Way):
         assert self.forces is not None
         problem = self.body.problem(posed, scheme.place(), scheme.before() * self.forces.total)
         newton, asked = self.settings.newton, self.body.moving.share.posed(problem)
+        x = self.body.weighted(here.x, 1.0 / self.body.weight)
         with np.errstate(all="ignore"):
-            solution = newton.solve(asked, here.x + dt * here.v)
+            solution = newton.solve(asked, x + dt * here.v)
             if not solution.converged:  # it may be beyond what the body admits
-                solution = newton.solve(asked, here.x)
+                solution = newton.solve(asked, x)
+        solution = replace(solution, x=self.body.weighted(solution.x, self.body.weight))
         self.tried = _Tried(posed, problem)
         following = min(2.0 * dt, self.settings.dt) if solution.converged else 0.5 * dt
         return Trial(posed.t, solution, dt, following)
@@ -122,19 +142,25 @@ class _Way(Way):
         end = self.body.at_end(tried.step, v)
         histories = self.body.plain.committed(end, x, here.histories)
         after = Phase(tried.step.t, x, v, a, histories)
-        before, held = self.forces, self.supports
-        self._stand(end, after, Forces.of(end, x))
+        before, held, plain = self.forces, self.supports, self.plain
+        self._stand(end, after, Forces.of(end, x, self.body.roles))
         assert before is not None
+        assert plain is not None
         assert self.forces is not None
+        middle = None
         if scheme.averaged:
             still = replace(tried.step, acceleration=0.0, remainder=None)
-            mean = Forces.of(self.body.problem(still, scheme.place(), 0.0 * x), x)
-            held = _at(tried.problem, tried.problem.assembler.residual(x, tried.problem.parameters))
+            middle = self.body.problem(still, scheme.place(), 0.0 * x)
+            mean = Forces.of(middle, x, self.body.roles)
+            held = _at(end, mean.total + self.body.M @ scheme.acceleration(*state).at(x))
         else:
-            parts = zip(vars(before).values(), vars(self.forces).values(), strict=True)
-            mean = Forces(*(0.5 * (one + other) for one, other in parts))
+            mean = before.mean(self.forces)
             held = 0.5 * (held + self.supports)
-        self.ledger.add(mean, held, x - here.x)
+        held = held + _at(end, mean.constraints)
+        moved = x - here.x
+        self.ledger.add(mean, held, moved)
+        self.ledger.others += self.body.friction(end, x, moved)
+        self.ledger.external += parameter_work(plain, end, self.body.roles, (here.x, x), middle)
         self.result = self._motion(end, after, trial.solution)
 
     def end(self) -> End | None:
@@ -144,17 +170,24 @@ class _Way(Way):
         return Status.CONVERGED, f"reached t = {self.here.t:.9g}"
 
     def _stand(self, end: Problem, phase: Phase, forces: Forces) -> None:
-        self.here, self.forces = phase, forces
+        self.here, self.plain, self.forces = phase, end, forces
         self.supports = _at(end, forces.total + self.body.M @ phase.a)
 
     def _energies(self, end: Problem) -> dict[str, float]:
         v, x = self.here.v, self.here.x
-        return self.ledger.told(0.5 * float(v @ (self.body.M @ v)), stored_energy(end, x))
+        kinetic = 0.5 * float(v @ (self.body.M @ v))
+        stored = stored_energy(end, x, self.body.roles)
+        assert self.forces is not None
+        return self.ledger.told(self.here.t, kinetic, stored, self.forces, x)
 
     def _motion(self, end: Problem, phase: Phase, solution: Solution) -> Motion:
         point, energy = Point(phase.t, solution), self._energies(end)
-        system, end = self.body.plain, self.body.share.posed(end)
-        return Motion(system, end, point, phase.histories, v=phase.v, a=phase.a, energy=energy)
+        system, end = self.body.plain, self.body.share.posed(end.at(phase.x))
+        return Motion(
+            *(system, end, point, phase.histories),
+            v=phase.v, a=phase.a, energy=energy, scheme=self.settings.scheme,
+            mass=self.body.mass,
+        )  # fmt: skip
 
 
 def _at(problem: Problem, forces: Array) -> Array:

@@ -37,11 +37,13 @@ class Affine:
 @dataclass(frozen=True)
 class Weighted:
     """Generalised-alpha (Chung and Hulbert 1993), in which forces at both ends of a step are
-    weighted; Newmark's trapezoidal rule where both alphas are zero.
+    weighted; Newmark's trapezoidal rule where both alphas are one half.
 
-        (1 - am) M a1 + am M a0 + (1 - af) f1 + af f0 = 0
+        (1 - am) M a1 + am M a0 + (1 - af) f1 + af f0 + c = 0
 
-    Equations without inertia, of supports and ties above all, hold at the end of the step.
+    Forces c of ties and contacts are one for the step: so an impact gains no energy, and with a
+    radius below 1 what it leaves on the surface is damped. Equations without inertia, of supports,
+    ties and contacts above all, hold at the end of the step.
     """
 
     am: float
@@ -53,6 +55,11 @@ class Weighted:
     def of(cls, radius: float) -> Weighted:
         """With a spectral radius at infinite frequency in [0, 1]; order 2."""
         return cls((2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0))
+
+    @property
+    def damps(self) -> bool:
+        """True if fast motions lose amplitude."""
+        return self.af < 0.5
 
     @property
     def gamma(self) -> float:
@@ -91,12 +98,17 @@ class Weighted:
         """Factor of the forces at the beginning of the step in the equation."""
         return self.af / (1.0 - self.af)
 
+    def weight(self) -> float:
+        """Of the forces at the end."""
+        return 1.0 - self.af
+
 
 @dataclass(frozen=True)
 class Midpoint:
     """The midpoint rule with forces averaged along the step (`fem.averaged`): energy stays."""
 
     averaged = True
+    damps = False
 
     def place(self) -> float:
         """Loads are those of the middle."""
@@ -122,8 +134,48 @@ class Midpoint:
         """No forces of the beginning."""
         return 0.0
 
+    def weight(self) -> float:
+        """All forces are means of the step."""
+        return 1.0
 
-Scheme: TypeAlias = Weighted | Midpoint
+
+@dataclass(frozen=True)
+class Backward:
+    """Backward Euler steps, which find what belongs to an inconsistent beginning."""
+
+    averaged = False
+    damps = True
+
+    def place(self) -> float:
+        """Loads are those of the end."""
+        return 1.0
+
+    def velocity(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
+        """At the end of a step."""
+        return Affine(1.0 / dt, -u / dt)
+
+    def acceleration(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
+        """Likewise."""
+        return Affine(1.0 / dt**2, -(u / dt + v) / dt)
+
+    def inertial(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
+        """The acceleration in the equation."""
+        return self.acceleration(dt, u, v, a)
+
+    def rate(self, dt: float, u: Array, v: Array, a: Array) -> Affine:
+        """The velocity in the equation."""
+        return self.velocity(dt, u, v, a)
+
+    def before(self) -> float:
+        """No forces of the beginning."""
+        return 0.0
+
+    def weight(self) -> float:
+        """All forces are those of the end."""
+        return 1.0
+
+
+Scheme: TypeAlias = Weighted | Midpoint | Backward
 
 
 def scheme_of(method: str, radius: float | None) -> Scheme | None:
@@ -135,7 +187,7 @@ def scheme_of(method: str, radius: float | None) -> Scheme | None:
     if method == "generalised-alpha":
         return Weighted.of(DAMPED if radius is None else radius)
     if method == "newmark":
-        return Weighted(0.0, 0.0)
+        return Weighted.of(1.0)  # with consistent accelerations it is the same
     return Midpoint() if method == "midpoint" else None
 
 

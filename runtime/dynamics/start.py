@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from softehl.runtime.dynamics.body import Body
 from softehl.runtime.dynamics.explicit import explicit
 from softehl.runtime.dynamics.implicit import Implicit, Phase
 from softehl.runtime.dynamics.motion import Motion
-from softehl.runtime.dynamics.schemes import METHODS, scheme_of
+from softehl.runtime.dynamics.schemes import METHODS, Backward, Scheme, scheme_of
 from softehl.runtime.mass import Masses
 from softehl.runtime.result import Result
 from softehl.runtime.solve.newton import Newton
@@ -22,6 +22,7 @@ from softehl.runtime.statement.records import Datum, StudyError
 from softehl.runtime.system import Step, System
 
 _MOMENT = 1e-6  # of a step: how fast supports move at the start is a difference over that
+_SHORT = 0.1  # of a step: shorter ones find a consistent start, but for an error of this order
 
 
 @dataclass(frozen=True)
@@ -44,17 +45,70 @@ class Motions:
         v = self._velocities(system, start)
         rest = Step(t, 1.0, x, 0.0, v, self.dt, histories)
         body = Body.of(system, self.mass, scheme, rest)
+        if (
+            scheme is not None
+            and isinstance(start, Motion)
+            and self._goes_on(system, start, scheme)
+        ):
+            here = Phase(t, start.x, start.v, start.a, histories)
+            run = Implicit(scheme, self.dt, self.newton).run
+            return run(body, here, until, system.share.part(start.problem))
         problem = body.at_end(rest, v)
         x = problem.admissible(x)
         soon = system.part(Step(t + _MOMENT * self.dt, 1.0, x, 0.0, v, self.dt, histories))
         v[problem.fixed] = (soon.values - problem.values) / (_MOMENT * self.dt)
         v[~body.heavy] = 0.0
-        problem = body.at_end(Step(t, 1.0, x, 0.0, v, self.dt, histories), v)
+        here = Phase(t, x, v, np.zeros_like(x), histories)
         if scheme is None:
-            here = Phase(t, x, v, np.zeros_like(x), histories)
+            problem = body.at_end(here.standing(self.dt), v)
             return explicit(self.dt, body, here, problem).started(problem, until)
-        begin = Phase(t, x, v, body.started(problem, x), histories)
+        if system.share.largest(float(body.constrained(problem))):
+            here = self._consistent(system, body, here)
+        problem = body.at_end(here.standing(self.dt), here.v)
+        begin = replace(here, a=body.started(problem, here.x))
         return Implicit(scheme, self.dt, self.newton).run(body, begin, until)
+
+    def _goes_on(self, system: System, start: Motion, scheme: Scheme) -> bool:
+        """True if the start is a motion of the same study by the same scheme, which goes on as if
+        it had not stopped.
+        """
+        if start.scheme != scheme or self.velocity:
+            return False
+        before = start.system
+        same = before.statement is system.statement and before.written == system.written
+        if start.mass is not self.mass and repr(start.mass) != repr(self.mass):
+            return False
+        return same and system.statement is not None and system.share.pieces[1] == 1
+
+    def _consistent(self, system: System, body: Body, here: Phase) -> Phase:
+        """The beginning with the unknowns without mass, and the velocities, that go with it.
+
+        Of two short steps of backward Euler the first finds velocities that supports, ties and
+        contacts admit, the second their forces and the accelerations.
+        """
+        scheme, h = Backward(), _SHORT * self.dt
+        short = Body.of(system, self.mass, scheme, here.standing(self.dt))
+        x, v = here.x, [here.v]
+        for k in (1, 2):
+            state = (h, x, v[-1], here.a)
+            rate, inertial = scheme.rate(*state), body.masked(scheme.inertial(*state))
+            step = Step(
+                *(here.t + k * h, 1.0, x, rate.c, rate.rest, h, here.histories),
+                acceleration=inertial.c,
+                remainder=inertial.rest,
+            )
+            problem = short.moving.share.posed(short.problem(step, 1.0, 0.0 * x))
+            with np.errstate(all="ignore"):
+                solution = self.newton.solve(problem, x)
+            if not solution.converged:
+                raise StudyError(
+                    f"t = {here.t:.6g}: no accelerations at the start go with its supports, ties "
+                    f"and contacts: {solution.message}"
+                )
+            v.append(np.where(body.heavy, rate.at(solution.x), 0.0))
+            x = solution.x
+        moved = np.where(body.heavy, here.x, x)
+        return replace(here, x=moved, v=2.0 * v[1] - v[2])
 
     def _velocities(self, system: System, start: Result | None) -> Array:
         """Velocities at the start, (n,): those of `start`, and those that are given."""

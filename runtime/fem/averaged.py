@@ -11,7 +11,7 @@ that the error of the energy is of the seventh order in the step.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -30,11 +30,15 @@ class Averaged:
     """A kernel at the points of a step from unknowns `old`, which are the last columns of its data.
 
     timed: (number of a parameter, columns of data, unknowns that they belong to): coefficient c and
-    rest r of time derivatives c u + r, which are constant in a step.
+    rest r of time derivatives c u + r, which are constant in a step. length: number of the
+    parameter that is the length of the step, None where there is none. multipliers: columns of
+    unknowns that are one number in a step, and whose equations hold at its end.
     """
 
     kernel: Any
     timed: tuple[tuple[int, Integers, Integers], ...] = ()
+    length: int | None = None
+    multipliers: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     def __getattr__(self, name: str) -> Any:
         """Everything else, names above all, is the kernel's."""
@@ -47,6 +51,9 @@ class Averaged:
         found = np.zeros(dofs.shape)
         for _, weight, at, values in self._points(dofs, given):
             found += weight * self.kernel.residual(coordinates, at, **values)
+        if (own := self.multipliers).size:
+            end = self.kernel.residual(coordinates, dofs, **self._end(dofs, given))
+            found[:, own] = end[:, own]
         return found
 
     def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
@@ -55,12 +62,22 @@ class Averaged:
         for s, weight, at, values in self._points(dofs, given):
             r, K = self.kernel.tangent(coordinates, at, **values)
             found += weight * r
-            slopes += weight * s * K
+            moving = np.full(dofs.shape[1], weight * s)
+            moving[self.multipliers] = weight
+            slopes += moving * K
+        if (own := self.multipliers).size:
+            r, K = self.kernel.tangent(coordinates, dofs, **self._end(dofs, given))
+            found[:, own], slopes[:, own] = r[:, own], K[:, own]
         return found, slopes
 
     def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
         """None, (n, 0, 0): fields belong to states."""
         return np.empty((len(dofs), 0, 0))
+
+    def _end(self, dofs: Array, given: dict[str, Any]) -> dict[str, Any]:
+        """Arguments at the end of the step."""
+        before = given["data"][:, : -dofs.shape[1]]
+        return {**given, "data": np.ascontiguousarray(before) if before.shape[1] else None}
 
     def _points(self, dofs: Array, given: dict[str, Any]) -> Any:
         """Place along the step, weight, unknowns and other arguments at each point."""
@@ -72,8 +89,11 @@ class Averaged:
                 # (c / s) u(s) + r' is c u + r for every s
                 data[:, columns] -= parameters[number] * (1.0 / s - 1.0) * old[:, unknowns]
                 parameters[number] /= s
+            if self.length is not None:
+                parameters[self.length] *= s
             known = data if data.shape[1] else None
             at = np.ascontiguousarray(old + s * (dofs - old))
+            at[:, self.multipliers] = dofs[:, self.multipliers]
             yield s, 0.5 * weight, at, {**given, "data": known, "parameters": parameters}
 
 
