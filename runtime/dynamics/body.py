@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,39 @@ class _Known:
 
 
 @dataclass(frozen=True, eq=False)
+class _Scaled:
+    """A kernel whose equations are multiplied by the last columns of its data."""
+
+    kernel: Any
+
+    def __getattr__(self, name: str) -> Any:
+        """Everything else, names above all, is the kernel's."""
+        if name == "kernel":
+            raise AttributeError(name)
+        return getattr(self.kernel, name)
+
+    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        """Residuals (n, ndof)."""
+        own, factors = self._parted(dofs, given)
+        return np.asarray(factors * self.kernel.residual(coordinates, dofs, **own))
+
+    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+        """Residuals and tangents (n, ndof, ndof)."""
+        own, factors = self._parted(dofs, given)
+        r, K = self.kernel.tangent(coordinates, dofs, **own)
+        return factors * r, factors[:, :, None] * K
+
+    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        """None, (n, 0, 0)."""
+        return np.empty((len(dofs), 0, 0))
+
+    def _parted(self, dofs: Array, given: dict[str, Any]) -> tuple[dict[str, Any], Array]:
+        own, factors = np.split(given["data"], [-dofs.shape[1]], axis=1)
+        data = np.ascontiguousarray(own) if own.shape[1] else None
+        return {**given, "data": data}, factors
+
+
+@dataclass(frozen=True, eq=False)
 class Body:
     """A study with inertia.
 
@@ -57,7 +90,8 @@ class Body:
     scheme; both are what elements of this process add. heavy: unknowns with mass. roles: of its
     blocks. weight: of the forces at the end of a step in `moving`; ties and contacts act through
     the whole step, so that their unknowns there are those of the study over the weight. mass:
-    densities as they were given.
+    densities as they were given. factors: (n,) of equations in `moving`: the forces of ties and
+    contacts on unknowns without mass, too, are those of the study over the weight.
     """
 
     plain: System
@@ -68,6 +102,7 @@ class Body:
     roles: Roles
     weight: float = 1.0
     mass: Masses | None = None
+    factors: Array = field(default_factory=lambda: np.empty(0))
 
     @classmethod
     def of(cls, system: System, mass: Masses | None, scheme: Scheme | None, at: Step) -> Body:
@@ -92,19 +127,22 @@ class Body:
             own = [changed.get(b.name, b) for b in own]
         elif scheme is not None and not scheme.damps and share.largest(float(massless.any())):
             raise StudyError(
-                f"{_name_of(system, massless)} is a multiplier of equations without it, whose "
-                'error grows in steps that damp nothing: take method = "generalised-alpha" with '
-                'rho_inf below 1, or "midpoint"'
+                f"{_name_of(system, massless)} is a multiplier, whose error grows in steps of "
+                'method = "newmark" or of rho_inf = 1, which damp nothing: take '
+                '"generalised-alpha" with rho_inf below 1, or "midpoint"'
             )
         contacts, stiffer = weighted(system, 1.0 / weight)
         own = [stiffer.get(b.name, b) for b in own]
+        factors = np.ones(system.size)
+        factors[roles.bound[~heavy[roles.bound]]] = 1.0 / weight
+        own = [b if roles.of[b.name] in ("tie", "contact") else _scaled(b, factors) for b in own]
         rows = share.owned(system.size)
         rows = rows[heavy[rows]][:, None]
         before = ElementBlock(_BEFORE, _Known(), np.empty((0, 0)), rows, check_orientation=False)
         assembler = Assembler.build(system.size, [*own, *blocks, before])
         lumps = _lumped(system, M, blocks) if scheme is None else M.diagonal()
         moving = replace(system, assembler=assembler, contacts=contacts, share=share.renewed())
-        return cls(system, moving, M, lumps, heavy, roles, weight, mass)
+        return cls(system, moving, M, lumps, heavy, roles, weight, mass, factors)
 
     @property
     def share(self) -> Share:
@@ -131,6 +169,10 @@ class Body:
                 known = replace(block, data=before[block.dofs])
             elif isinstance(block.kernel, Tie):
                 parameters[block.name] = end.parameters[block.name]
+            if isinstance(block.kernel, _Scaled):
+                columns = self.factors[block.dofs]
+                data = [columns] if block.data is None else [block.data, columns]
+                known = replace(block, data=np.ascontiguousarray(np.concatenate(data, axis=1)))
             blocks.append(known)
         assembler = replace(problem.assembler, blocks=tuple(blocks))
         return replace(
@@ -186,6 +228,13 @@ class Body:
     def masked(self, values: Affine) -> Affine:
         """Zero in unknowns without mass, for their velocities and accelerations."""
         return Affine(values.c, np.where(self.heavy, values.rest, 0.0))
+
+
+def _scaled(block: ElementBlock, factors: Array) -> ElementBlock:
+    """A block whose equations have these factors, (n,)."""
+    if (factors[block.dofs] == 1.0).all():
+        return block
+    return replace(block, kernel=_Scaled(block.kernel), constant=False)
 
 
 def _multipliers(system: System, problem: Problem, x: Array, heavy: Flags, roles: Roles) -> Flags:

@@ -75,11 +75,13 @@ it has none, only the work of its forces counts.
 class Roles:
     """What the blocks of a system are in the account of energies.
 
-    of: block -> its role. multipliers: numbers of the unknowns of ties and contacts.
+    of: block -> its role. multipliers: numbers of the unknowns of ties and contacts. bound: of the
+    unknowns on which these act.
     """
 
     of: Mapping[str, Role]
     multipliers: Integers
+    bound: Integers
 
     @classmethod
     def in_system(cls, system: System) -> Roles:
@@ -87,6 +89,7 @@ class Roles:
         names = contact_blocks(system)
         found: dict[str, Role] = {}
         multipliers = [c.multipliers[c.multipliers >= 0] for c in system.contacts]
+        bound = [n[n >= 0] for n in (c.displacements[c.nodes] for c in system.contacts)]
         for block in system.assembler.blocks:
             kernel, page = block.kernel, system.blocks.get(block.name)
             if block.name in names:
@@ -94,13 +97,15 @@ class Roles:
             elif isinstance(kernel, Tie):
                 found[block.name] = "tie"
                 multipliers.append(block.dofs[:, 2])
+                bound.append(block.dofs[:, :2].ravel())
             elif isinstance(kernel, DeadLoad | NodalForce | Pressure):
                 found[block.name] = "load"
             else:
                 past = page is not None and page.previous
                 found[block.name] = "energy" if has_energy(kernel) and not past else "work"
         none = np.empty(0, dtype=np.int64)
-        return cls(found, np.unique(np.concatenate([none, *multipliers])))
+        numbers = [np.unique(np.concatenate([none, *parts])) for parts in (multipliers, bound)]
+        return cls(found, *numbers)
 
 
 @dataclass(frozen=True, eq=False)

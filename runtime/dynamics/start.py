@@ -81,34 +81,40 @@ class Motions:
         return same and system.statement is not None and system.share.pieces[1] == 1
 
     def _consistent(self, system: System, body: Body, here: Phase) -> Phase:
-        """The beginning with the unknowns without mass, and the velocities, that go with it.
+        """The beginning that supports, ties and contacts admit, with the unknowns without mass.
 
-        Of two short steps of backward Euler the first finds velocities that supports, ties and
-        contacts admit, the second their forces and the accelerations.
+        Of three short steps of backward Euler the first finds the places, the second, again with
+        the given velocities, the velocities, and the third the forces.
         """
-        scheme, h = Backward(), _SHORT * self.dt
-        short = Body.of(system, self.mass, scheme, here.standing(self.dt))
-        x, v = here.x, [here.v]
-        for k in (1, 2):
-            state = (h, x, v[-1], here.a)
-            rate, inertial = scheme.rate(*state), body.masked(scheme.inertial(*state))
-            step = Step(
-                *(here.t + k * h, 1.0, x, rate.c, rate.rest, h, here.histories),
-                acceleration=inertial.c,
-                remainder=inertial.rest,
+        h = _SHORT * self.dt
+        short = Body.of(system, self.mass, Backward(), here.standing(self.dt))
+        place, _ = self._short(short, here, h)
+        second, v = self._short(short, replace(place, v=here.v), h)
+        third, after = self._short(short, replace(second, v=v), h)
+        x = np.where(body.heavy, place.x - h * v, third.x)
+        return replace(here, x=x, v=2.0 * v - after)
+
+    def _short(self, body: Body, here: Phase, h: float) -> tuple[Phase, Array]:
+        """The end of a step of length h, and the velocities there.  Raises StudyError."""
+        state = (h, here.x, here.v, here.a)
+        rate, inertial = Backward().rate(*state), body.masked(Backward().inertial(*state))
+        step = replace(
+            here.step(here.t + h),
+            rate=rate.c,
+            rest=rate.rest,
+            acceleration=inertial.c,
+            remainder=inertial.rest,
+        )
+        problem = body.moving.share.posed(body.problem(step, 1.0, 0.0 * here.x))
+        with np.errstate(all="ignore"):
+            solution = self.newton.solve(problem, here.x)
+        if not solution.converged:
+            raise StudyError(
+                f"t = {here.t:.6g}: no accelerations at the start go with its supports, ties and "
+                f"contacts: {solution.message}"
             )
-            problem = short.moving.share.posed(short.problem(step, 1.0, 0.0 * x))
-            with np.errstate(all="ignore"):
-                solution = self.newton.solve(problem, x)
-            if not solution.converged:
-                raise StudyError(
-                    f"t = {here.t:.6g}: no accelerations at the start go with its supports, ties "
-                    f"and contacts: {solution.message}"
-                )
-            v.append(np.where(body.heavy, rate.at(solution.x), 0.0))
-            x = solution.x
-        moved = np.where(body.heavy, here.x, x)
-        return replace(here, x=moved, v=2.0 * v[1] - v[2])
+        v = np.where(body.heavy, rate.at(solution.x), 0.0)
+        return replace(here, t=here.t + h, x=solution.x), v
 
     def _velocities(self, system: System, start: Result | None) -> Array:
         """Velocities at the start, (n,): those of `start`, and those that are given."""

@@ -62,6 +62,11 @@ class Contact:
     ring: bool = False
     alone: bool = False
 
+    @property
+    def nodes(self) -> Integers:
+        """Of all its faces."""
+        return nodes_of(self.sides, self.others)
+
     def empty(self) -> list[ElementBlock]:
         """Its blocks without elements, which keep their places."""
         none = np.empty(0, dtype=np.int64)
@@ -179,6 +184,12 @@ def _balls(ends: Array) -> Balls:
     return ends.mean(axis=1), 0.5 * length, along / np.maximum(length, 1e-300)[:, None]
 
 
+def nodes_of(sides: Sequence[Side], others: Sequence[tuple[str, Integers]]) -> Integers:
+    """Nodes of the faces of all kinds, rising."""
+    faces = [*(s.faces for s in sides), *(f for _, f in others)]
+    return np.unique(np.concatenate([f.ravel() for f in faces]))
+
+
 def stride(sides: Sequence[Side]) -> float:
     """Motion of an iteration that most of the sides cannot overlook."""
     return _STRIDE * float(np.median(np.concatenate([side.depth for side in sides])))
@@ -195,6 +206,11 @@ class Sought(Protocol):
     @property
     def multipliers(self) -> Integers:
         """Numbers of the multipliers at each node, (points, k), -1 where there are none."""
+        ...
+
+    @property
+    def nodes(self) -> Integers:
+        """Of all its faces."""
         ...
 
     def empty(self) -> list[ElementBlock]:

@@ -11,7 +11,7 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.assembly import ElementBlock
 from softehl.runtime.fem.common_part import CORNER, common_part, mean_normal
 from softehl.runtime.fem.face_pair import MULTIPLIERS, FacePair
-from softehl.runtime.fem.touching import Balls, Side, apart, by_kind, facing, limits
+from softehl.runtime.fem.touching import Balls, Side, apart, by_kind, facing, limits, nodes_of
 from softehl.runtime.mesh.cells import CELLS
 
 
@@ -33,6 +33,11 @@ class FaceContact:
     kernels: dict[tuple[str, str], FacePair]
     friction: float = 0.0
     alone: bool = False
+
+    @property
+    def nodes(self) -> Integers:
+        """Of all its faces."""
+        return nodes_of(self.sides, self.others)
 
     def empty(self) -> list[ElementBlock]:
         """Its blocks without elements, which keep their places."""

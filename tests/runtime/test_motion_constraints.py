@@ -88,6 +88,41 @@ def test_a_slow_motion_is_static(scheme: str) -> None:
             assert abs(result.energy["balance"]) < 1e-4 * stored
 
 
+@every_scheme
+def test_a_wall_without_mass_is_a_spring(scheme: str) -> None:
+    """Pressed slowly it has the whole force; an impact on it gains no energy."""
+    mass, until = {"bar": {"rho": RHO}}, 60.0 * LENGTH / SPEED
+    study = bars(cells=1)
+    study.load("bar:right", u_x=lambda x, t: -(np.sin(0.5 * np.pi * t / until) ** 2))
+    result = moved(study, dt=until / 30, until=until, mass=mass, **SCHEMES[scheme])[-1]
+    assert force(result) == pytest.approx(1.0, abs=0.02)
+    assert result.at((LENGTH, 0.5))["u_x"] == pytest.approx(-LENGTH / E, rel=0.03)
+    push = {"u_x": lambda x: np.where(x[:, 0] > LENGTH + 0.005, -10.0, 0.0)}
+    given: dict[str, Any] = {**SCHEMES[scheme], "mass": mass, "velocity": push}
+    dt = 0.1 * LENGTH / SPEED
+    results = moved(bars(cells=3, gap=0.01), dt=dt, until=25 * dt, **given)
+    total = np.array([r.energy["kinetic"] + r.energy["internal"] for r in results])
+    first = 0.5 * RHO * LENGTH * 10.0**2
+    assert total.max() < 1.001 * first
+    assert total.min() > 0.9 * first
+
+
+def test_a_start_that_its_constraints_do_not_admit() -> None:
+    """Tied masses get the velocity of their momentum, bodies that overlap no energy."""
+    study = Study(Mesh.line(1.0, cells=1))
+    for mass, place in ((2.0, 0.0), (1.0, 1.0)):
+        spring = {"mass": mass, "k": 1e-9}
+        study.add(f"m{place}", mass_on_spring(), on=lambda x, p=place: x[:, 0] == p, **spring)
+    study.tie((1.0,), (0.0,), "w", offset=lambda x, t: 0.1, tolerance=2.0)
+    given: dict[str, Any] = {"velocity": {"w": lambda x: 3.0 * x[:, 0]}, "dt": 0.1, "until": 0.4}
+    for scheme in SCHEMES:
+        speed = moved(study, **SCHEMES[scheme], **given)[-1].velocity("w")
+        np.testing.assert_allclose(speed, 1.0, rtol=1e-6)
+        wave = {"mass": MASS, "dt": 0.1 * LENGTH / SPEED, "until": 0.5 * LENGTH / SPEED}
+        energy = moved(bars(gap=-1e-3), **SCHEMES[scheme], **wave)[-1].energy
+        assert energy["kinetic"] + energy["internal"] < 1e-12
+
+
 FEATURES: dict[str, dict[str, Any]] = {
     "smooth": {},
     "friction": {"friction": 0.3},
@@ -262,7 +297,7 @@ def test_multipliers_of_pages_begin_right_and_stay_so(scheme: str) -> None:
 @pytest.mark.parametrize("given", [{}, {"method": "generalised-alpha", "rho_inf": 1.0}])
 def test_multipliers_of_pages_are_refused_where_nothing_damps(given: dict[str, Any]) -> None:
     with pytest.raises(
-        StudyError, match=r"'force' is a multiplier .* rho_inf below 1, or"
+        StudyError, match=r"'force' is a multiplier.* .newmark. .* rho_inf below 1, or"
     ) as error:
         moved(pendulum(0.6, -0.8), dt=0.1, until=1.0, **{"method": "newmark", **given})
     assert "\n" not in str(error.value)
