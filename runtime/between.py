@@ -13,23 +13,25 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.point_location import Located
 from softehl.runtime.statement.records import Block
 from softehl.runtime.system import System
 
 _NOTHING = 1e-9  # a shape function below that is zero but for rounding
-_APART = 1e-9  # of the terms of two values: they differ by more than rounding
+_APART = 1e-9  # of the largest component of a vector: values differ by more than rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Interpolation:
     """Values of unknowns in cells that hold places.
 
-    located: pairs of a place and a cell. entries: unknown -> pairs, unknowns and weights (e,) each.
-    known: unknown -> whether a pair (m,) has a value of it.
+    layout: of the unknowns. located: pairs of a place and a cell. entries: unknown -> pairs,
+    unknowns and weights (e,) each. known: unknown -> whether a pair (m,) has a value of it.
     """
 
+    layout: DofLayout
     located: Located
     entries: Mapping[str, tuple[Integers, Integers, Array]]
     known: Mapping[str, Flags]
@@ -51,10 +53,11 @@ class Interpolation:
             return None
         first = located.first[np.searchsorted(located.point[located.first], located.point)]
         values = self.values(x)
+        vectors = zip(self.layout.vectors, self.layout.fields, strict=True)
+        sizes = {name: np.abs(x[part]).max() for names, part in vectors for name in names}
         for name, (pair, dof, weight) in self.entries.items():
             apart = np.abs(values[name] - values[name][first])
-            scale = np.bincount(pair, np.abs(weight * x[dof]), len(first))
-            for k in np.flatnonzero(apart > _APART * np.maximum(scale, scale[first])):
+            for k in np.flatnonzero(apart > _APART * sizes[name]):
                 both = [set(dof[(pair == p) & (np.abs(weight) > _NOTHING)]) for p in (k, first[k])]
                 if both[0] != both[1]:
                     return name, np.array([first[k], k])
@@ -92,7 +95,7 @@ def interpolation(system: System, places: Array, group: str | None = None) -> In
     joined = {
         n: tuple(map(np.concatenate, zip(*parts, strict=True))) for n, parts in entries.items()
     }
-    return Interpolation(located, joined, known)  # type: ignore[arg-type]
+    return Interpolation(system.numbering.layout, located, joined, known)  # type: ignore[arg-type]
 
 
 def _among(rows: Integers, known: Integers) -> Flags:

@@ -31,7 +31,7 @@ it gets as much on the diagonal. Below the accuracy of pivots on the diagonal, a
 _NOTHING = 100 * float(np.finfo(np.float64).eps)
 """Of the terms of x' K x: a smaller eigenvalue is zero. Those of rigid motions are below 1e-16, the
 lowest elastic one of a free beam of 1000 cells in a row is 1.5e-12."""
-_ROUNDING = 1e-14  # of a right side: a smaller residual is not refined
+_REFINEMENTS = 3  # of a solution with such pivots, each by a factor of about _WEAK
 _RESIDUAL = 1e-6
 """Of a solution by pivots on the diagonal: beyond, their signs are not those of the matrix."""
 
@@ -44,13 +44,13 @@ class NoModes(SoftehlError, ArithmeticError):  # noqa: N818 (named after what it
 class Pivots:
     """Factors of a symmetric matrix with pivots on the diagonal only, as in L D L'.
 
-    matrix: whose they are, but for small pivots of multipliers. negative: number of negative pivots,
-    which is that of negative eigenvalues (Sylvester).
+    negative: number of negative pivots, which is that of negative eigenvalues (Sylvester).
+    matrix: (n, n) where the factors are those of a matrix near by.
     """
 
     factors: Any
     negative: int
-    matrix: csc_array
+    matrix: csc_array | None = None
 
     @classmethod
     def of(cls, K: csc_array, saddle: Flags | None = None) -> Pivots:
@@ -73,7 +73,7 @@ class Pivots:
         if not np.array_equal(factors.perm_r, factors.perm_c):
             raise SingularMatrix("a pivot on the diagonal is zero")
         negative = int((factors.U.diagonal() < 0.0).sum())
-        found = cls(factors, negative, K)
+        found = cls(factors, negative, K if weak.any() else None)
         b = np.random.default_rng(0).uniform(-1.0, 1.0, K.shape[0])
         x = found.solve(b)
         scale = np.asarray(abs(K).sum(axis=1)) * np.abs(x).max(initial=0.0) + np.abs(b)
@@ -82,13 +82,11 @@ class Pivots:
         return found
 
     def solve(self, b: Array) -> Array:
-        """x of K x = b, shapes (n,), refined for what weak pivots of multipliers leave of b."""
-        x, size = np.asarray(self.factors.solve(b)), np.inf
-        small = _ROUNDING * float(np.linalg.norm(b))
-        rest = b - self.matrix @ x
-        while small < (left := float(np.linalg.norm(rest))) < 0.5 * size:
-            x, size = x + self.factors.solve(rest), left
-            rest = b - self.matrix @ x
+        """x of K x = b, shapes (n,)."""
+        x = np.asarray(self.factors.solve(b))
+        if self.matrix is not None:
+            for _ in range(_REFINEMENTS):
+                x = x + self.factors.solve(b - self.matrix @ x)
         return x
 
 
@@ -97,12 +95,14 @@ def _weak(K: csc_array, saddle: Flags) -> Array:
     displacements beside stresses more.
     """
     diagonal, found = np.abs(K.diagonal()), np.zeros(K.shape[0])
-    squares = csc_array(K.multiply(K))
+    squares, strong = csc_array(K.multiply(K)), diagonal > 0.0
     for chosen, sign in ((saddle, 1.0), (~saddle, -1.0)):
-        known = ~chosen & (diagonal > 0.0)
+        known = ~chosen & strong
         stiff = np.divide(1.0, diagonal, out=np.zeros_like(diagonal), where=known)
         pivot = _WEAK * np.asarray(squares @ stiff)
-        found += np.where(chosen & (diagonal < pivot), sign * pivot, 0.0)
+        small = chosen & (diagonal < pivot)
+        found[small] = sign * pivot[small]
+        strong &= ~small  # what is left there is rounding
     return found
 
 
