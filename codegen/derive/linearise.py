@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from softehl.codegen.graph.differentiate import Dependence, Given, guarded, plus
+from softehl.codegen.graph.differentiate import Dependence, Given
 from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.graph.guards import Certain, guarded, plus, shielded
 from softehl.codegen.graph.partials import DifferentiationError, Partials, partials
 from softehl.codegen.graph.traverse import Recursion, reachable, recursion
 
@@ -24,7 +25,8 @@ class Linearisation:
     mixed second derivatives are then taken once.  `upper` holds further interfaces above the
     first, lowest first; `gates` maps the adjoint of a node of `upper` to the number of its
     interface (1, 2, ...): such a value is differentiated with respect to that interface and the
-    chain rule then leads down, so that no more derivatives are taken than it has values.
+    chain rule then leads down, so that no more derivatives are taken than it has values.  `certain`
+    are values that every side of branches needs.
     """
 
     g: Graph
@@ -35,6 +37,7 @@ class Linearisation:
     given: Given = field(default_factory=dict)
     upper: Sequence[Collection[Node]] = ()
     gates: Mapping[Node, int] = field(default_factory=dict)
+    certain: Certain = field(default_factory=Certain)
     _totals: dict[tuple[Node, int], Node] = field(default_factory=dict)
     _locals: dict[tuple[Node, int], dict[Node, Node]] = field(default_factory=dict)
 
@@ -90,7 +93,12 @@ class Linearisation:
                     "a value summed over points may not enter a sum again when it depends on an "
                     "interpolated unknown"
                 )
-            result = plus(self.g, result, guarded(self.g, p, slope))
+            # a value that does not vary may stand inside branches in the loop over the points
+            if z.varying or z in self.certain.nodes:
+                term = guarded(self.g, p, slope)
+            else:
+                term = shielded(self.g, p, slope, self.certain)
+            result = plus(self.g, result, term)
         return result
 
     def _chain(self, n: Node) -> Partials:

@@ -11,6 +11,7 @@ from softehl.codegen.derive.outputs import Entry, Slot
 from softehl.codegen.derive.structure import Structure
 from softehl.codegen.graph.differentiate import Given, gradient
 from softehl.codegen.graph.graph import FREE, Graph, Node
+from softehl.codegen.graph.guards import Certain
 from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Definition
 
@@ -127,6 +128,7 @@ class Modal:
             given=self.slopes,
             upper=levels[1:],
             gates={adjoint[z]: k for k, level in enumerate(levels) for z in level if z in adjoint},
+            certain=Certain([self.s.root]),
         )
 
     def _spread(self, modal: Sequence[Node]) -> list[Node]:

@@ -13,6 +13,7 @@ from softehl.codegen.derive.outputs import Entry, Slot
 from softehl.codegen.derive.structure import Structure, found_in
 from softehl.codegen.graph.differentiate import directional, gradient
 from softehl.codegen.graph.graph import Input, Node
+from softehl.codegen.graph.guards import Certain
 from softehl.codegen.graph.traverse import reachable
 from softehl.codegen.language.definition import Definition
 
@@ -152,7 +153,14 @@ def _tangent(
 ) -> list[Entry]:
     interface = [z for z in d.interface if z.varying]
     mirror = {adjoint[z]: z for z in interface if z in adjoint} if d.conservative else {}
-    forward = Linearisation(d.graph, d.directions, d.interface, symmetric=mirror, given=d.given)
+    forward = Linearisation(
+        d.graph,
+        d.directions,
+        d.interface,
+        symmetric=mirror,
+        given=d.given,
+        certain=Certain([d.potential]),
+    )
     entries: dict[tuple[int, int], Node] = {}
     for i, row in enumerate(rows):
         for j in range(len(slots)):

@@ -13,6 +13,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.graph.guards import Certain, guarded, plus, shielded
 from softehl.codegen.graph.partials import Partials, partials
 from softehl.codegen.graph.traverse import reachable
 
@@ -84,9 +85,11 @@ class _Reverse:
     named: Collection[Node] = ()
     adjoint: dict[Node, Node] = field(default_factory=dict)
     summands: dict[Node, Node] = field(default_factory=dict)
+    _certain: Certain = field(default_factory=Certain)
 
     def run(self, root: Node) -> dict[Node, Node]:
         self.adjoint[root] = self.g.one
+        self._certain = Certain([root])
         for n in reversed(reachable([root, *self._hidden()])):
             if not self.depends(n):
                 continue
@@ -107,10 +110,16 @@ class _Reverse:
         if n.op is Op.SUM:
             self._accumulate(self.adjoint, n.args[0], seed)
             return
+        # where a value that every side needs is not-a-number, the root is as well
+        certain = n in self._certain.nodes
         for a, p in self._local(n):
             if self.depends(a):
                 into = self.summands if n.varying > a.varying and not self.flat else self.adjoint
-                self._accumulate(into, a, guarded(self.g, seed, p))
+                if certain:
+                    term = guarded(self.g, seed, p)
+                else:
+                    term = shielded(self.g, seed, p, self._certain)
+                self._accumulate(into, a, term)
 
     def _local(self, n: Node) -> Partials:
         if n in self.depends.given:
@@ -164,25 +173,3 @@ def directional(
             for a, p in pairs:
                 rate[n] = plus(g, rate[n], guarded(g, p, rate[a]))
     return [rate[r] for r in roots]
-
-
-def guarded(g: Graph, a: Node, b: Node) -> Node:
-    """Product that goes inside a branch with a zero side: what is not taken is never evaluated."""
-    for x, y in ((a, b), (b, a)):
-        if x.op is Op.NEG and x.args[0].op is Op.BRANCH:
-            return g.neg(guarded(g, x.args[0], y))
-        if x.op is Op.BRANCH and g.zero in x.args[1:]:
-            c, then, otherwise = x.args
-            return g.branch(c, guarded(g, then, y), guarded(g, otherwise, y))
-    return g.mul(a, b)
-
-
-def plus(g: Graph, a: Node, b: Node) -> Node:
-    """Sum that joins two branches with a zero on the same side of the same condition."""
-    if a.op is Op.BRANCH and b.op is Op.BRANCH and a.args[0] is b.args[0]:
-        for k in (1, 2):
-            if a.args[k] is g.zero and b.args[k] is g.zero:
-                return g.branch(
-                    a.args[0], plus(g, a.args[1], b.args[1]), plus(g, a.args[2], b.args[2])
-                )
-    return g.add(a, b)

@@ -10,9 +10,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from softehl.codegen.graph.differentiate import gradient, guarded, plus
+from softehl.codegen.graph.differentiate import gradient
 from softehl.codegen.graph.divide import Divided, exchanged
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Input, Node, Op, Place, Routine
+from softehl.codegen.graph.guards import guarded, plus
 from softehl.codegen.graph.partials import DifferentiationError
 from softehl.codegen.graph.traverse import reachable, substitute, written_out
 

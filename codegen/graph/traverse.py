@@ -48,15 +48,19 @@ def reachable(roots: Iterable[Node], stop: Callable[[Node], bool] | None = None)
     return [seen[i] for i in sorted(seen)]
 
 
-def always(roots: Iterable[Node]) -> list[Node]:
-    """Nodes that are computed whichever side is taken of every branch, ids ascending."""
+def always(roots: Iterable[Node], *, conditions: bool = True) -> list[Node]:
+    """Nodes that are computed whichever side is taken of every branch, ids ascending.
+
+    conditions: those that only decide a branch as well.
+    """
     seen: dict[int, Node] = {}
     stack = list(roots)
     while stack:
         n = stack.pop()
         if n.id not in seen:
             seen[n.id] = n
-            stack += n.args[:1] if n.op is Op.BRANCH else n.args
+            branch = n.op is Op.BRANCH
+            stack += n.args[: int(conditions)] if branch else n.args
     return [seen[i] for i in sorted(seen)]
 
 
