@@ -29,27 +29,22 @@ SOFTEHL_GROUP(softehl_contact_corner_energy)
     if (softehl_any(m6)) {
         V v7 = v1; const M m8 = v4 & m6;
         if (softehl_any(m8)) {
-            const V v9 = v1 * v1 + v2 * v2; const M v10 = softehl_lt(softehl_splat(0.0), v9);
-            V v11 = softehl_splat(0.0); const M m12 = v10 & m8;
-            if (softehl_any(m12)) {
-                const V v13 = softehl_vsqrt(v9); v11 = softehl_blend(m12, v13, v11);
-            }
-            v7 = softehl_blend(m8, v11, v7);
+            const V v9 = softehl_vsqrt(v1 * v1 + v2 * v2); v7 = softehl_blend(m8, v9, v7);
         }
         v5 = softehl_blend(m6, v7, v5);
     }
-    const M m14 = ~v3;
-    if (softehl_any(m14)) {
-        V v15 = v2; const M m16 = ~v4 & m14;
-        if (softehl_any(m16)) {
-            const M v17 = softehl_lt(v1, v2); const V v18 = softehl_blend(v17, v2, v1);
-            v15 = softehl_blend(m16, v18, v15);
+    const M m10 = ~v3;
+    if (softehl_any(m10)) {
+        V v11 = v2; const M m12 = ~v4 & m10;
+        if (softehl_any(m12)) {
+            const M v13 = softehl_lt(v1, v2); const V v14 = softehl_blend(v13, v2, v1);
+            v11 = softehl_blend(m12, v14, v11);
         }
-        v5 = softehl_blend(m14, v15, v5);
+        v5 = softehl_blend(m10, v11, v5);
     }
-    const V v19 = d2 + a1 * (v5 - parameters[2]); const M v20 = softehl_lt(softehl_splat(0.0), v19);
-    const V v21 = softehl_blend(v20, softehl_splat(0.0), v19);
-    softehl_store1(R + 0, 1, (v21 * v21 - d2 * d2) * (0.5 * a0 * (1.0 / a1)));
+    const V v15 = d2 + a1 * (v5 - parameters[2]); const M v16 = softehl_lt(softehl_splat(0.0), v15);
+    const V v17 = softehl_blend(v16, softehl_splat(0.0), v15);
+    softehl_store1(R + 0, 1, (v17 * v17 - d2 * d2) * (0.5 * a0 * (1.0 / a1)));
 }
 SOFTEHL_BATCH(softehl_contact_corner_energy, 2, 3, 2, 0, 1, 0)
 
@@ -62,64 +57,60 @@ SOFTEHL_GROUP(softehl_contact_corner_residual)
     softehl_load3(d + 0, 3, &d0, &d1, &d2);
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    const V v1 = 0.5 * a0 * (1.0 / a1), v2 = parameters[2] + (parameters[0] - X0 - d0),
-        v3 = parameters[2] + (parameters[1] - X1 - d1);
-    const M v4 = softehl_lt(softehl_splat(0.0), v2), v5 = softehl_lt(softehl_splat(0.0), v3),
-        v6 = softehl_lt(v2, v3);
-    const V v7 = v2 * v2 + v3 * v3; const M v8 = softehl_lt(softehl_splat(0.0), v7);
-    const V v9 = softehl_vsqrt(v7); V v10 = v3; const M m11 = ~v5;
-    if (softehl_any(m11)) {
-        const V v12 = softehl_blend(v6, v3, v2); v10 = softehl_blend(m11, v12, v10);
-    }
-    V v13 = v10; const M m14 = v4;
-    if (softehl_any(m14)) {
-        V v15 = v2; const M m16 = v5 & m14;
-        if (softehl_any(m16)) {
-            const V v17 = softehl_blend(v8, v9, softehl_splat(0.0));
-            v15 = softehl_blend(m16, v17, v15);
+    const V v1 = parameters[2] + (parameters[0] - X0 - d0),
+        v2 = parameters[2] + (parameters[1] - X1 - d1);
+    const M v3 = softehl_lt(softehl_splat(0.0), v1), v4 = softehl_lt(softehl_splat(0.0), v2),
+        v5 = softehl_lt(v1, v2);
+    const V v6 = v1 * v1 + v2 * v2; V v7 = softehl_splat(0.0); const M m8 = v3;
+    if (softehl_any(m8)) {
+        V v9 = v1; const M m10 = v4 & m8;
+        if (softehl_any(m10)) {
+            const V v11 = softehl_vsqrt(v6); v9 = softehl_blend(m10, v11, v9);
         }
-        v13 = softehl_blend(m14, v15, v13);
+        v7 = softehl_blend(m8, v9, v7);
     }
-    const V v18 = d2 + a1 * (v13 - parameters[2]);
-    const M v19 = softehl_lt(softehl_splat(0.0), v18);
-    V v20 = softehl_splat(0.0), v21 = softehl_splat(0.0), v22 = softehl_splat(0.0),
-        v23 = softehl_splat(0.0);
-    const M m24 = ~v19;
-    if (softehl_any(m24)) {
-        V v25 = softehl_splat(0.0), v26 = softehl_splat(0.0), v27 = softehl_splat(0.0);
-        const M m28 = v4 & m24;
-        if (softehl_any(m28)) {
-            V v29 = softehl_splat(0.0), v30 = softehl_splat(1.0);
-            const M m31 = v5 & m28;
-            if (softehl_any(m31)) {
-                V v32 = softehl_splat(0.0); const M m33 = v8 & m31;
-                if (softehl_any(m33)) {
-                    const V v34 = softehl_vsqrt(1.0 / v7),
-                        v35 = (d2 + a1 * (v9 - parameters[2])) * (v34 * (a1 * v1));
-                    v32 = softehl_blend(m33, v35, v32);
-                }
-                v29 = softehl_blend(m31, v32, v29);
-                v30 = softehl_blend(m31, softehl_splat(0.0), v30);
+    const M m12 = ~v3;
+    if (softehl_any(m12)) {
+        V v13 = v2; const M m14 = ~v4 & m12;
+        if (softehl_any(m14)) {
+            const V v15 = softehl_blend(v5, v2, v1); v13 = softehl_blend(m14, v15, v13);
+        }
+        v7 = softehl_blend(m12, v13, v7);
+    }
+    const V v16 = d2 + a1 * (v7 - parameters[2]), v17 = 0.5 * a0 * (1.0 / a1);
+    const M v18 = softehl_lt(softehl_splat(0.0), v16);
+    V v19 = softehl_splat(0.0), v20 = softehl_splat(0.0), v21 = softehl_splat(0.0);
+    const M m22 = ~v18;
+    if (softehl_any(m22)) {
+        const V v23 = v17 * (2.0 * v16), v24 = a1 * v23;
+        V v25 = softehl_splat(0.0), v26 = softehl_splat(0.0);
+        const M m27 = v3 & m22;
+        if (softehl_any(m27)) {
+            V v28 = softehl_splat(1.0), v29 = softehl_splat(0.0);
+            const M m30 = v4 & m27;
+            if (softehl_any(m30)) {
+                const V v31 = softehl_vsqrt(1.0 / v6), v32 = 0.5 * v31, v33 = 2.0 * v2 * v32,
+                    v34 = 2.0 * v1 * v32;
+                v28 = softehl_blend(m30, v34, v28); v29 = softehl_blend(m30, v33, v29);
             }
-            v25 = softehl_blend(m28, v29, v25); v26 = softehl_blend(m28, v30, v26);
+            v25 = softehl_blend(m27, v28, v25); v26 = softehl_blend(m27, v29, v26);
         }
-        const M m36 = ~v4 & m24;
-        if (softehl_any(m36)) {
-            V v37 = softehl_splat(0.0), v38 = softehl_splat(1.0);
-            const M m39 = ~v5 & m36;
-            if (softehl_any(m39)) {
-                const V v40 = softehl_blend(v6, softehl_splat(0.0), softehl_splat(1.0)),
-                    v41 = softehl_blend(v6, softehl_splat(1.0), softehl_splat(0.0));
-                v37 = softehl_blend(m39, v40, v37); v38 = softehl_blend(m39, v41, v38);
+        const M m35 = ~v3 & m22;
+        if (softehl_any(m35)) {
+            V v36 = softehl_splat(0.0), v37 = softehl_splat(1.0);
+            const M m38 = ~v4 & m35;
+            if (softehl_any(m38)) {
+                const V v39 = softehl_blend(v5, softehl_splat(0.0), softehl_splat(1.0)),
+                    v40 = softehl_blend(v5, softehl_splat(1.0), softehl_splat(0.0));
+                v36 = softehl_blend(m38, v39, v36); v37 = softehl_blend(m38, v40, v37);
             }
-            const V v42 = (d2 + a1 * (v10 - parameters[2])) * (v38 * (v1 * (2.0 * a1)));
-            v26 = softehl_blend(m36, v37, v26); v27 = softehl_blend(m36, v42, v27);
+            v25 = softehl_blend(m35, v36, v25); v26 = softehl_blend(m35, v37, v26);
         }
-        const V v43 = v1 * (2.0 * v18), v44 = a1 * v26 * v43;
-        v20 = softehl_blend(m24, v25, v20); v21 = softehl_blend(m24, v44, v21);
-        v22 = softehl_blend(m24, v27, v22); v23 = softehl_blend(m24, v43, v23);
+        const V v41 = -(v26 * v24), v42 = -(v25 * v24);
+        v19 = softehl_blend(m22, v42, v19); v20 = softehl_blend(m22, v41, v20);
+        v21 = softehl_blend(m22, v23, v21);
     }
-    softehl_store3(R + 0, 3, -(v21 + 2.0 * v2 * v20), -(v22 + 2.0 * v3 * v20), v23 - v1 * (2.0 * d2));
+    softehl_store3(R + 0, 3, v19, v20, v21 - v17 * (2.0 * d2));
 }
 SOFTEHL_BATCH(softehl_contact_corner_residual, 2, 3, 2, 0, 3, 0)
 
@@ -132,104 +123,85 @@ SOFTEHL_GROUP(softehl_contact_corner_tangent)
     softehl_load3(d + 0, 3, &d0, &d1, &d2);
     V a0, a1;
     softehl_load2(a + 0, 2, &a0, &a1);
-    const V v1 = 0.5 * a0 * (1.0 / a1), v2 = parameters[2] + (parameters[0] - X0 - d0),
-        v3 = parameters[2] + (parameters[1] - X1 - d1);
-    const M v4 = softehl_lt(softehl_splat(0.0), v2), v5 = softehl_lt(softehl_splat(0.0), v3),
-        v6 = softehl_lt(v2, v3);
-    const V v7 = v2 * v2 + v3 * v3, v8 = 2.0 * v1;
-    const M v9 = softehl_lt(softehl_splat(0.0), v7); const V v10 = softehl_vsqrt(v7); V v11 = v3;
-    const M m12 = ~v5;
-    if (softehl_any(m12)) {
-        const V v13 = softehl_blend(v6, v3, v2); v11 = softehl_blend(m12, v13, v11);
+    const V v1 = parameters[2] + (parameters[0] - X0 - d0),
+        v2 = parameters[2] + (parameters[1] - X1 - d1);
+    const M v3 = softehl_lt(softehl_splat(0.0), v1), v4 = softehl_lt(softehl_splat(0.0), v2),
+        v5 = softehl_lt(v1, v2);
+    const V v6 = v1 * v1 + v2 * v2, v7 = softehl_vsqrt(v6);
+    V v8 = softehl_splat(0.0); const M m9 = v3;
+    if (softehl_any(m9)) {
+        const V v10 = softehl_blend(v4, v7, v1); v8 = softehl_blend(m9, v10, v8);
     }
-    V v14 = v11; const M m15 = v4;
-    if (softehl_any(m15)) {
-        V v16 = v2; const M m17 = v5 & m15;
-        if (softehl_any(m17)) {
-            const V v18 = softehl_blend(v9, v10, softehl_splat(0.0));
-            v16 = softehl_blend(m17, v18, v16);
+    const M m11 = ~v3;
+    if (softehl_any(m11)) {
+        V v12 = v2; const M m13 = ~v4 & m11;
+        if (softehl_any(m13)) {
+            const V v14 = softehl_blend(v5, v2, v1); v12 = softehl_blend(m13, v14, v12);
         }
-        v14 = softehl_blend(m15, v16, v14);
+        v8 = softehl_blend(m11, v12, v8);
     }
-    const V v19 = 2.0 * v3, v20 = 2.0 * v2, v21 = d2 + a1 * (v14 - parameters[2]);
-    const M v22 = softehl_lt(softehl_splat(0.0), v21);
-    V v23 = softehl_splat(0.0), v24 = softehl_splat(0.0), v25 = softehl_splat(0.0),
-        v26 = softehl_splat(0.0), v27 = softehl_splat(0.0), v28 = softehl_splat(0.0),
-        v29 = softehl_splat(0.0), v30 = softehl_splat(0.0), v31 = softehl_splat(0.0),
-        v32 = softehl_splat(0.0), v33 = softehl_splat(0.0), v34 = v8;
-    const M m35 = v22;
-    if (softehl_any(m35)) {
-        v34 = softehl_blend(m35, softehl_splat(0.0), v34);
+    const V v15 = d2 + a1 * (v8 - parameters[2]), v16 = 0.5 * a0 * (1.0 / a1);
+    const M v17 = softehl_lt(softehl_splat(0.0), v15); const V v18 = 2.0 * v16;
+    V v19 = softehl_splat(0.0), v20 = softehl_splat(0.0), v21 = softehl_splat(0.0),
+        v22 = softehl_splat(0.0), v23 = softehl_splat(0.0), v24 = softehl_splat(0.0),
+        v25 = softehl_splat(0.0), v26 = softehl_splat(0.0), v27 = v18;
+    const M m28 = v17;
+    if (softehl_any(m28)) {
+        v27 = softehl_blend(m28, softehl_splat(0.0), v27);
     }
-    const M m36 = ~v22;
-    if (softehl_any(m36)) {
-        const V v37 = v1 * (2.0 * a1);
-        V v38 = softehl_splat(0.0), v39 = softehl_splat(0.0), v40 = softehl_splat(0.0),
-            v41 = softehl_splat(0.0), v42 = softehl_splat(0.0), v43 = softehl_splat(0.0),
-            v44 = softehl_splat(0.0), v45 = softehl_splat(0.0), v46 = softehl_splat(0.0);
-        const M m47 = v4 & m36;
-        if (softehl_any(m47)) {
-            V v48 = softehl_splat(0.0), v49 = softehl_splat(1.0), v50 = softehl_splat(0.0),
-                v51 = softehl_splat((-1.0)), v52 = softehl_splat(0.0), v53 = softehl_splat(0.0),
-                v54 = softehl_splat(0.0);
-            const M m55 = v5 & m47;
-            if (softehl_any(m55)) {
-                V v56 = softehl_splat(0.0), v57 = softehl_splat(0.0), v58 = softehl_splat(0.0),
-                    v59 = softehl_splat(0.0), v60 = softehl_splat(0.0), v61 = softehl_splat(0.0);
-                const M m62 = v9 & m55;
-                if (softehl_any(m62)) {
-                    const V v63 = softehl_vsqrt(1.0 / v7), v64 = 0.5 * v63, v65 = a1 * v64,
-                        v66 = (d2 + a1 * (v10 - parameters[2])) * v8, v67 = v65 * v8,
-                        v68 = v65 * v66, v69 = v20 * v64, v70 = -v69, v71 = v63 * (v63 * v64),
-                        v72 = v19 * v64, v73 = -v72,
-                        v74 = (v71 * (v2 * v66) - v69 * v67) * (a1 * v20),
-                        v75 = a1 * (v71 * (v3 * v66) - v72 * v67), v76 = v20 * v75, v77 = v19 * v75;
-                    v56 = softehl_blend(m62, v68, v56); v57 = softehl_blend(m62, v74, v57);
-                    v58 = softehl_blend(m62, v70, v58); v59 = softehl_blend(m62, v76, v59);
-                    v60 = softehl_blend(m62, v73, v60); v61 = softehl_blend(m62, v77, v61);
-                }
-                v48 = softehl_blend(m55, v56, v48);
-                v49 = softehl_blend(m55, softehl_splat(0.0), v49);
-                v50 = softehl_blend(m55, v57, v50); v51 = softehl_blend(m55, v58, v51);
-                v52 = softehl_blend(m55, v59, v52); v53 = softehl_blend(m55, v60, v53);
-                v54 = softehl_blend(m55, v61, v54);
+    const M m29 = ~v17;
+    if (softehl_any(m29)) {
+        const V v30 = v16 * (2.0 * v15), v31 = 2.0 * a1, v32 = a1 * v30;
+        V v33 = softehl_splat(0.0), v34 = softehl_splat(0.0), v35 = softehl_splat(0.0),
+            v36 = softehl_splat(0.0), v37 = softehl_splat(0.0), v38 = softehl_splat(0.0),
+            v39 = softehl_splat(0.0);
+        const M m40 = v3 & m29;
+        if (softehl_any(m40)) {
+            V v41 = softehl_splat(1.0), v42 = softehl_splat(0.0), v43 = softehl_splat(0.0),
+                v44 = softehl_splat((-1.0)), v45 = softehl_splat(0.0), v46 = softehl_splat(0.0),
+                v47 = softehl_splat(0.0);
+            const M m48 = v4 & m40;
+            if (softehl_any(m48)) {
+                const V v49 = 2.0 * v2, v50 = 2.0 * v1, v51 = softehl_vsqrt(1.0 / v6),
+                    v52 = (d2 + a1 * (v7 - parameters[2])) * (v16 * v31), v53 = 0.5 * v51,
+                    v54 = v49 * v53, v55 = -v54, v56 = v50 * v53, v57 = -v56,
+                    v58 = v51 * (v51 * v53), v59 = v2 * v58, v60 = (v58 * (v1 * v50) - v51) * v52,
+                    v61 = v50 * v59 * v52, v62 = (v49 * v59 - v51) * v52;
+                v41 = softehl_blend(m48, v56, v41); v42 = softehl_blend(m48, v54, v42);
+                v43 = softehl_blend(m48, v60, v43); v44 = softehl_blend(m48, v57, v44);
+                v45 = softehl_blend(m48, v61, v45); v46 = softehl_blend(m48, v55, v46);
+                v47 = softehl_blend(m48, v62, v47);
             }
-            v38 = softehl_blend(m47, v48, v38); v39 = softehl_blend(m47, v49, v39);
-            v41 = softehl_blend(m47, v50, v41); v42 = softehl_blend(m47, v51, v42);
-            v43 = softehl_blend(m47, v52, v43); v44 = softehl_blend(m47, v53, v44);
-            v45 = softehl_blend(m47, v54, v45);
+            v33 = softehl_blend(m40, v41, v33); v34 = softehl_blend(m40, v42, v34);
+            v35 = softehl_blend(m40, v43, v35); v36 = softehl_blend(m40, v44, v36);
+            v37 = softehl_blend(m40, v45, v37); v38 = softehl_blend(m40, v46, v38);
+            v39 = softehl_blend(m40, v47, v39);
         }
-        const M m78 = ~v4 & m36;
-        if (softehl_any(m78)) {
-            V v79 = softehl_splat(0.0), v80 = softehl_splat(1.0), v81 = softehl_splat(0.0),
-                v82 = softehl_splat((-1.0));
-            const M m83 = ~v5 & m78;
-            if (softehl_any(m83)) {
-                const V v84 = softehl_blend(v6, softehl_splat(0.0), softehl_splat(1.0)),
-                    v85 = softehl_blend(v6, softehl_splat(1.0), softehl_splat(0.0)),
-                    v86 = softehl_blend(v6, softehl_splat(0.0), softehl_splat((-1.0))),
-                    v87 = softehl_blend(v6, softehl_splat((-1.0)), softehl_splat(0.0));
-                v79 = softehl_blend(m83, v84, v79); v80 = softehl_blend(m83, v85, v80);
-                v81 = softehl_blend(m83, v86, v81); v82 = softehl_blend(m83, v87, v82);
+        const M m63 = ~v3 & m29;
+        if (softehl_any(m63)) {
+            V v64 = softehl_splat(0.0), v65 = softehl_splat(1.0), v66 = softehl_splat(0.0),
+                v67 = softehl_splat((-1.0));
+            const M m68 = ~v4 & m63;
+            if (softehl_any(m68)) {
+                const V v69 = softehl_blend(v5, softehl_splat(0.0), softehl_splat(1.0)),
+                    v70 = softehl_blend(v5, softehl_splat(1.0), softehl_splat(0.0)),
+                    v71 = softehl_blend(v5, softehl_splat(0.0), softehl_splat((-1.0))),
+                    v72 = softehl_blend(v5, softehl_splat((-1.0)), softehl_splat(0.0));
+                v64 = softehl_blend(m68, v69, v64); v65 = softehl_blend(m68, v70, v65);
+                v66 = softehl_blend(m68, v71, v66); v67 = softehl_blend(m68, v72, v67);
             }
-            const V v88 = a1 * v80, v89 = (d2 + a1 * (v11 - parameters[2])) * (v88 * v8),
-                v90 = v82 * (v88 * v37);
-            v39 = softehl_blend(m78, v79, v39); v40 = softehl_blend(m78, v89, v40);
-            v42 = softehl_blend(m78, v81, v42); v44 = softehl_blend(m78, v82, v44);
-            v46 = softehl_blend(m78, v90, v46);
+            v33 = softehl_blend(m63, v64, v33); v34 = softehl_blend(m63, v65, v34);
+            v36 = softehl_blend(m63, v66, v36); v38 = softehl_blend(m63, v67, v38);
         }
-        const V v91 = a1 * v39, v92 = v1 * (2.0 * v21), v93 = v37 * v42, v94 = v37 * v44,
-            v95 = v91 * v93, v96 = v91 * v92, v97 = -(v91 * v94 + v43);
-        v23 = softehl_blend(m36, v38, v23); v24 = softehl_blend(m36, v96, v24);
-        v25 = softehl_blend(m36, v40, v25); v26 = softehl_blend(m36, v92, v26);
-        v27 = softehl_blend(m36, v41, v27); v28 = softehl_blend(m36, v95, v28);
-        v29 = softehl_blend(m36, v97, v29); v30 = softehl_blend(m36, v93, v30);
-        v31 = softehl_blend(m36, v45, v31); v32 = softehl_blend(m36, v46, v32);
-        v33 = softehl_blend(m36, v94, v33);
+        const V v73 = v16 * (a1 * v31), v74 = -(v34 * v32), v75 = -(v33 * v32), v76 = -(a0 * v33),
+            v77 = -(a0 * v34), v78 = v38 * v73, v79 = -(v36 * (v33 * v73) + v35),
+            v80 = -(v33 * v78 + v37), v81 = -(v34 * v78 + v39);
+        v19 = softehl_blend(m29, v75, v19); v20 = softehl_blend(m29, v74, v20);
+        v21 = softehl_blend(m29, v30, v21); v22 = softehl_blend(m29, v79, v22);
+        v23 = softehl_blend(m29, v80, v23); v24 = softehl_blend(m29, v76, v24);
+        v25 = softehl_blend(m29, v81, v25); v26 = softehl_blend(m29, v77, v26);
     }
-    softehl_store1(K + 8, 9, v34 - v8); const V v98 = 2.0 * v23;
-    softehl_store3(R + 0, 3, -(v24 + v20 * v23), -(v25 + v19 * v23), v26 - v1 * (2.0 * d2));
-    const V v99 = v98 - v28 - v27; softehl_store4(K + 0, 9, v99, v29, v30, v29);
-    const V v100 = v98 - v32 - v31; softehl_store4(K + 4, 9, v100, v33, v30, v33);
+    softehl_store4(K + 0, 9, v22, v23, v24, v23); softehl_store4(K + 4, 9, v25, v26, v24, v26);
+    softehl_store3(R + 0, 3, v19, v20, v21 - v16 * (2.0 * d2)); softehl_store1(K + 8, 9, v27 - v18);
 }
 SOFTEHL_BATCH(softehl_contact_corner_tangent, 2, 3, 2, 0, 3, (3 * 3))

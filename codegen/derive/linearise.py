@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from softehl.codegen.graph.differentiate import Dependence, Given
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.guards import Certain, guarded, plus, shielded
+from softehl.codegen.graph.norms import square_of
 from softehl.codegen.graph.partials import DifferentiationError, Partials, partials
 from softehl.codegen.graph.traverse import Recursion, reachable, recursion
 
@@ -71,7 +72,7 @@ class Linearisation:
         if n.op is Op.SUM:
             inner = yield self._over(self.local(n.args[0]), j)
             return inner if j in self._points else g.sum(inner)
-        if n.op is Op.BRANCH:
+        if n.op is Op.BRANCH and square_of(n) is None:
             c, a, b = n.args
             return g.branch(c, (yield self._total(a, j)), (yield self._total(b, j)))
         result = g.zero
@@ -129,7 +130,7 @@ class Linearisation:
         gate = self.gates.get(n, 0)
         if gate > level:
             return self._mirrored(n, self._lowered(self.local(n, gate), level), level)
-        if n.op is Op.BRANCH:
+        if n.op is Op.BRANCH and square_of(n) is None:
             c, a, b = n.args
             keys = _merged(self.local(a, level), self.local(b, level))
             return {

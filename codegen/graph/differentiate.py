@@ -11,9 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 
 from softehl.codegen.graph.graph import Graph, Node, Op
 from softehl.codegen.graph.guards import Certain, guarded, plus, shielded
+from softehl.codegen.graph.norms import by_square, slope, square_of
 from softehl.codegen.graph.partials import Partials, partials
 from softehl.codegen.graph.traverse import reachable
 
@@ -110,16 +112,19 @@ class _Reverse:
         if n.op is Op.SUM:
             self._accumulate(self.adjoint, n.args[0], seed)
             return
-        # where a value that every side needs is not-a-number, the root is as well
-        certain = n in self._certain.nodes
+        if square_of(n) is not None and n not in self.depends.given:
+            self._accumulate(self.adjoint, n.args[0].args[1], self._by_square(n, seed))
+            return
         for a, p in self._local(n):
             if self.depends(a):
                 into = self.summands if n.varying > a.varying and not self.flat else self.adjoint
-                if certain:
-                    term = guarded(self.g, seed, p)
-                else:
-                    term = shielded(self.g, seed, p, self._certain)
-                self._accumulate(into, a, term)
+                self._accumulate(into, a, self._times(n, seed, p))
+
+    def _times(self, n: Node, seed: Node, p: Node) -> Node:
+        """Adjoint of a value times one of its derivatives."""
+        if n in self._certain.nodes:  # where it is not-a-number, the root is as well
+            return guarded(self.g, seed, p)
+        return shielded(self.g, seed, p, self._certain)
 
     def _local(self, n: Node) -> Partials:
         if n in self.depends.given:
@@ -128,13 +133,27 @@ class _Reverse:
             return self._branch(n)
         return partials(self.g, n)
 
+    def _by_square(self, n: Node, seed: Node) -> Node:
+        """Adjoint of the square of a length, from that of the length."""
+        g = self.g
+        if seed.op is Op.NEG:
+            return g.neg(self._by_square(n, seed.args[0]))
+        if seed.op is Op.BRANCH and g.zero in seed.args[1:] and seed.args[0] is not n.args[0]:
+            c, *sides = seed.args
+            return g.branch(c, *(s if s is g.zero else self._by_square(n, s) for s in sides))
+        (curvature,) = directional(g, [seed], {n: g.one}, self.depends.given)
+        if curvature is g.zero:  # a kink
+            return self._times(n, seed, slope(g, n))
+        inverse = g.mul(g.const(Fraction(1, 2)), g.recip(n.args[1]))
+        return by_square(g, n, seed, curvature, self._times(n, seed, inverse))
+
     def _branch(self, n: Node) -> Partials:
         """Both sides differentiated with respect to the nearest named values and inputs."""
         condition, then, otherwise = n.args
 
         def leaf(m: Node) -> bool:
             named = m.op in (Op.NAME, Op.INPUT, Op.SUM) or m in self.depends.sources
-            return m is not n and (named or m in self.stop)
+            return m is not n and (named or m in self.stop or square_of(m) is not None)
 
         frontier = [m for m in reachable([then, otherwise], stop=leaf) if leaf(m)]
         frontier = [m for m in frontier if self.depends(m)]
@@ -165,11 +184,15 @@ def directional(
             rate[n] = g.zero
         elif n.op is Op.SUM:
             rate[n] = g.sum(rate[n.args[0]])
-        elif n.op is Op.BRANCH:
+        elif n.op is Op.BRANCH and square_of(n) is None:
             rate[n] = g.branch(n.args[0], rate[n.args[1]], rate[n.args[2]])
         else:
             rate[n] = g.zero
             pairs = list(depends.given[n].items()) if n in depends.given else partials(g, n)
             for a, p in pairs:
-                rate[n] = plus(g, rate[n], guarded(g, p, rate[a]))
+                term = guarded(g, p, rate[a])
+                if n.op is Op.POWER and a is n.args[1] and rate[a].op is not Op.CONST:
+                    # of a negative base it does not exist, and is not needed where a stays
+                    term = g.branch(g.compare(Op.EQ, rate[a], g.zero), g.zero, term)
+                rate[n] = plus(g, rate[n], term)
     return [rate[r] for r in roots]

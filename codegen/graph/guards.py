@@ -12,6 +12,7 @@ from weakref import WeakKeyDictionary
 
 from softehl.codegen.graph.domain import EVERYWHERE, Domain
 from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.graph.norms import square_of
 from softehl.codegen.graph.traverse import Recursion, always, reachable, recursion
 
 _SEEN_THROUGH = frozenset({Op.NEG, Op.NAME, Op.SUM, Op.ADD, Op.SUB, Op.MUL, Op.BRANCH})
@@ -25,6 +26,9 @@ def guarded(g: Graph, a: Node, b: Node) -> Node:
             return g.neg(guarded(g, x.args[0], y))
         if x.op is Op.BRANCH and g.zero in x.args[1:]:
             c, then, otherwise = x.args
+            if square_of(x) is not None:  # a length stays whole: by it is differentiated again
+                exists = _known_of(g).domain.exists(y)
+                return g.mul(x, y) if exists else g.branch(c, g.mul(x, y), g.zero)
             return g.branch(c, guarded(g, then, y), guarded(g, otherwise, y))
     return g.mul(a, b)
 
@@ -52,7 +56,7 @@ def shielded(g: Graph, seed: Node, partial: Node, certain: Certain) -> Node:
     The zeros of sides may stand anywhere in the adjoint: in terms of different branches, in
     branches of branches, in sums over points.
     """
-    known = _KNOWN.get(g) or _KNOWN.setdefault(g, _Known(g))
+    known = _known_of(g)
     direct = seed.op is Op.BRANCH and g.zero in seed.args[1:]
     if direct or not recursion(known.vanishes(seed)) or known.exists(partial, certain):
         return guarded(g, seed, partial)
@@ -166,6 +170,10 @@ def _combined(g: Graph, n: Node, sides: list[Node | None]) -> Node | None:
 
 def _joined(g: Graph, op: Op, a: Node, b: Node | None) -> Node:
     return a if b is None or a is b else g.node(op, (a, b))
+
+
+def _known_of(g: Graph) -> _Known:
+    return _KNOWN.get(g) or _KNOWN.setdefault(g, _Known(g))
 
 
 _KNOWN: WeakKeyDictionary[Graph, _Known] = WeakKeyDictionary()

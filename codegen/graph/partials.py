@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, Routine
+from softehl.codegen.graph.norms import slope, square_of
 from softehl.errors import SoftehlError
 
 Partials = list[tuple[Node, Node]]
@@ -15,13 +16,16 @@ class DifferentiationError(SoftehlError, ValueError):
 
 
 def partials(g: Graph, n: Node) -> Partials:
-    """Local derivatives of `n` with respect to its operands (not for BRANCH and SUM)."""
+    """Local derivatives of `n` with respect to its operands (of no SUM, of lengths of BRANCH)."""
     if not n.args or n.op in BOOLEAN or n.op is Op.CALL:
         return []
     if n.op is Op.ITEM:
         routine = n.args[0].payload
         assert isinstance(routine, Routine)
         return routine.partials(g, n)
+    square = square_of(n)
+    if square is not None:
+        return [(square, slope(g, n))]
     a = n.args[0]
     match n.op:
         case Op.NAME:
@@ -40,11 +44,18 @@ def partials(g: Graph, n: Node) -> Partials:
             scale = g.recip(g.add(g.mul(a, a), g.mul(x, x)))
             return [(a, g.mul(x, scale)), (x, g.neg(g.mul(a, scale)))]
         case Op.POWER:
-            e = n.args[1]
-            slope = g.mul(e, g.general_power(a, g.sub(e, g.one)))
-            return [(a, slope), (e, g.mul(n, g.call(Op.LOG, a)))]
+            return _of_power(g, n, a, n.args[1])
         case _:
             return [(a, _derivative_of_call(g, n, a))]
+
+
+def _of_power(g: Graph, n: Node, a: Node, e: Node) -> Partials:
+    """Derivatives of a^e by both; at a = 0 that by e >= 0 is 0, and e a^(e-1) is 0 for e = 0."""
+    zero, origin = g.zero, g.compare(Op.EQ, a, g.zero)
+    ended = g.node(Op.AND, (origin, g.compare(Op.EQ, e, zero)))
+    by_base = g.branch(ended, zero, g.mul(e, g.general_power(a, g.sub(e, g.one))))
+    rooted = g.node(Op.AND, (origin, g.compare(Op.LE, zero, e)))
+    return [(a, by_base), (e, g.branch(rooted, zero, g.mul(n, g.call(Op.LOG, a))))]
 
 
 def _derivative_of_call(g: Graph, n: Node, a: Node) -> Node:

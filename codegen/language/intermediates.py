@@ -57,11 +57,15 @@ class Intermediates:
         )
 
     def norm(self, values: Any) -> Any:
-        """Root of the sum of squares, with zero derivatives where it is zero."""
+        """Name of the root of the sum of squares.
+
+        Its derivatives are zero where it is zero; see `graph.norms` for those of what it is in.
+        """
         self._norms += 1
         squares = sum(v**2 for v in Entries.of(values).values)
         square = self.define(f"norm_{self._norms}_squared", squares)
-        return sp.Piecewise((sp.sqrt(square), square > 0), (sp.Integer(0), True))
+        root = sp.Piecewise((sp.sqrt(square), square > 0), (sp.Integer(0), True))
+        return self.define(f"norm_{self._norms}", root)
 
     def derivative(self, name: str, value: Any, by: Any) -> Any:
         """Names of the derivatives of a scalar, arranged like `by`.

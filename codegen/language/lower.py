@@ -10,6 +10,7 @@ import sympy as sp
 
 from softehl.codegen.graph.domain import Domain, decidable
 from softehl.codegen.graph.graph import Graph, Node, Op
+from softehl.codegen.graph.norms import length
 from softehl.codegen.graph.traverse import Recursion, recursion
 from softehl.codegen.language.complaints import ModelError
 
@@ -163,20 +164,34 @@ class Lowering:
 
     def _pow(self, e: Any) -> Recursion[Node]:
         base, exponent = e.base, e.exp
-        if isinstance(base, sp.Abs) and isinstance(exponent, sp.Rational):
+        if isinstance(base, sp.Abs) and isinstance(exponent, sp.Rational) and exponent < 1:
             # SymPy makes |x|^(2/3) of (x^2)^(1/3); the square needs no branch
             base, exponent = base.args[0] ** 2, exponent / 2
         base = yield self._lower(base)
         if exponent.is_negative:
             self._divisor(base, e)
         if isinstance(exponent, sp.Float):
-            return self.g.power(base, _decimal(exponent))
+            return self._fixed_power(base, _decimal(exponent))
         if isinstance(exponent, sp.Rational):
-            return self.g.power(base, Fraction(int(exponent.p), int(exponent.q)))
+            return self._fixed_power(base, Fraction(int(exponent.p), int(exponent.q)))
         power = yield self._lower(exponent)
         if e.base.is_positive or self.domain.positive(base):
             return self.g.call(Op.EXP, self.g.mul(power, self.g.call(Op.LOG, base)))
+        if self._may_end(base):
+            return self.g.general_power(length(self.g, base), self.g.mul(self.g.const(2), power))
         return self.g.general_power(base, power)
+
+    def _fixed_power(self, base: Node, e: Fraction) -> Node:
+        if e > 1 and e.denominator > 1 and self._may_end(base):
+            return self.g.power(length(self.g, base), 2 * e)
+        return self.g.power(base, e)
+
+    def _may_end(self, base: Node) -> bool:
+        """True for a sum of squares: at zero, derivatives of its powers are those of a length."""
+        while base.op is Op.NAME:
+            base = base.args[0]
+        squares = base.op is Op.ADD and self.domain.nonnegative(base)
+        return squares and not self.domain.positive(base)
 
     def _pieces(self, e: Any) -> Recursion[Node]:
         if len(e.args) > PIECES:
@@ -188,12 +203,18 @@ class Lowering:
     def _piecewise(self, pairs: list[Any], whole: Any) -> Recursion[Node]:
         value, condition = pairs[0].args
         if condition is sp.true:
-            return (yield self._lower(value))
+            return (yield self._side(value))
         if len(pairs) == 1:
             raise ModelError(f"a branch without a last condition: {whole}; end it with (.., True)")
-        decides, then = (yield self._lower(condition)), (yield self._lower(value))
+        decides, then = (yield self._lower(condition)), (yield self._side(value))
         rest = yield self._piecewise(pairs[1:], whole)
         return self._decided(decides, self.g.branch(decides, then, rest))
+
+    def _side(self, value: Any) -> Recursion[Node]:
+        """A side; SymPy makes zoo of 1 / Piecewise((a, c), (0, True)) where c does not hold."""
+        if value is sp.zoo:
+            return self.g.node(Op.RECIP, (self.g.zero,))
+        return (yield self._lower(value))
 
     def _decided(self, condition: Node, value: Node) -> Node:
         """`value`, or not-a-number where its condition compares what is not-a-number.

@@ -122,7 +122,7 @@ def corner() -> Definition:
     # towards the body, from the centre of the fillet
     a = m.define("a", wall + fillet - (z + u_z))
     b = m.define("b", lip + fillet - (r + u_r))
-    round_off = sp.Piecewise((m.norm([a, b]), b > 0), (a, True))
+    round_off = sp.Piecewise((sp.sqrt(a**2 + b**2), b > 0), (a, True))
     behind = sp.Piecewise((b, b > 0), (sp.Max(a, b), True))
     gap = m.define("gap", sp.Piecewise((round_off, a > 0), (behind, True)) - fillet, interface=True)
     trial = m.define("trial", lam + rho * gap)
