@@ -71,7 +71,7 @@ class Domain:
             case Op.CBRT:
                 return True
             case Op.RECIP:
-                return self.positive(a, known) or self._given(a)
+                return self.positive(a, known) or (self._given(a) and a is not self.zero)
             case Op.LOG | Op.RCBRT | Op.POWER:
                 return self.positive(a, known)
             case Op.POW:

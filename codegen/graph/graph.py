@@ -319,6 +319,9 @@ class Graph:
         """`then` where the condition holds; only the taken side is ever evaluated."""
         if then is otherwise:
             return then
+        holds = truth(condition)
+        if holds is not None:
+            return then if holds else otherwise
         if condition.op is Op.NOT:
             return self.branch(condition.args[0], otherwise, then)
         return self.node(Op.BRANCH, (condition, then, otherwise))
@@ -337,7 +340,16 @@ class Graph:
         return [self.node(Op.ITEM, (call,), Place(k)) for k in range(routine.outputs)]
 
     def rebuild(self, op: Op, args: Sequence[Node], payload: Payload) -> Node:
-        """The constructor of `op`, with its identities, on new operands."""
+        """The constructor of `op`, with its identities, on new operands.
+
+        A division by zero stays what it is: it may stand on a side that is never taken.
+        """
+        try:
+            return self._rebuilt(op, args, payload)
+        except ZeroDivisionError:
+            return self.node(op, tuple(args), payload)
+
+    def _rebuilt(self, op: Op, args: Sequence[Node], payload: Payload) -> Node:
         if op in FREE and op is not Op.NAME:
             return self.node(op, (), payload)
         if op is Op.POW:
@@ -352,6 +364,22 @@ class Graph:
         if op in _CALLS:
             return self.call(op, args[0])
         return self.node(op, tuple(args), payload)
+
+
+def truth(condition: Node) -> bool | None:
+    """What a condition on constants says; None for others."""
+    match condition.op:
+        case Op.NOT:
+            inner = truth(condition.args[0])
+            return None if inner is None else not inner
+        case Op.AND | Op.OR:
+            decides = condition.op is Op.OR
+            sides = [truth(a) for a in condition.args]
+            return decides if decides in sides else None if None in sides else not decides
+    if any(a.op is not Op.CONST for a in condition.args):
+        return None
+    a, b = (x.value for x in condition.args)
+    return {Op.LT: a < b, Op.LE: a <= b, Op.EQ: a == b}[condition.op]
 
 
 def _ordered(a: Node, b: Node) -> tuple[Node, Node]:

@@ -22,7 +22,7 @@ import sympy as sp
 from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import PointForm
 from softehl.codegen.language.draft import NAME
-from softehl.codegen.language.entries import Matrix
+from softehl.codegen.language.entries import Matrix, applied
 from softehl.codegen.language.fields import AXES, Fields
 from softehl.codegen.language.model import Model
 from softehl.codegen.language.pages import Page
@@ -128,7 +128,7 @@ class Law:
         Its parameters become those of the page.
         """
         m = Material(self.name, model, F)
-        self.write(m)
+        applied(self.name, self.write, m, write=f"`def {self.name}(m):`")
         if m.W is None and m.P is None:
             raise ModelError(f"the material {self.name} has neither m.energy(W) nor m.stress(P)")
         if m.small is None:
@@ -150,7 +150,7 @@ class Law:
 
     def page(self) -> Page:
         """A body of this material: displacements, equilibrium, Cauchy stresses as fields."""
-        return Page(self.name, self._body, doc=self.doc)
+        return Page(self.name, self._body, doc=self.doc, source=self.write)
 
     def at_point(self) -> PointForm:
         """The law by itself: its residual is P, its tangent dP/dF, by displacement gradients."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from types import CodeType
 from typing import Any, Literal, TypeVar, get_args, overload
 
 from softehl.codegen.language.complaints import Empty, ModelError, NeedsElement
@@ -62,6 +63,7 @@ class Page:
     degree: of polynomials that the quadrature integrates on the parent cell; None: the rule of the
     cell, or on triangles and tetrahedra one that integrates products of values, where they occur.
     form: of its kernels, "whole" element or loops around a "point"; None: the faster one.
+    source: the function whose file and line errors name, where that is not `write`.
     """
 
     name: str
@@ -69,6 +71,13 @@ class Page:
     degree: int | None = None
     doc: str = ""
     form: Form | None = None
+    source: Callable[..., Any] | None = None
+
+    @property
+    def code(self) -> CodeType:
+        """Code of its author."""
+        code: CodeType = (self.source or self.write).__code__
+        return code
 
     def definition(self, cell: str, geometry: str | None = None) -> Definition:
         """The model of an element of a cell, by its name, in a geometry (None: the usual one).
@@ -133,7 +142,7 @@ class Page:
 
     def _made(self, onto: Fields, finish: Callable[[], T]) -> T:
         """Result of the page on `onto`.  Raises ModelError with a line of the page."""
-        code = self.write.__code__
+        code = self.code
         where = f"{code.co_filename}:{code.co_firstlineno}"
         value = None
         try:

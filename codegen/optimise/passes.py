@@ -6,6 +6,7 @@ runs them.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -82,6 +83,8 @@ def powers(g: Graph, roots: Roots) -> Roots:
             return g.rebuild(n.op, args, n.payload)
         e = n.payload
         assert isinstance(e, Fraction)
+        if args[0] is g.zero:
+            return g.rebuild(n.op, args, e) if e < 0 else g.zero
         value = _power(g, args[0], e)
         if e.denominator == 3 and e > 0 and n.args[0] not in inverted:
             return g.branch(g.compare(Op.EQ, args[0], g.zero), g.zero, value)
@@ -203,11 +206,24 @@ def literals(g: Graph, roots: Roots) -> Roots:
         if not known or n.op in (Op.SUM, Op.BRANCH, Op.CALL) or n.op in BOOLEAN:
             return g.rebuild(n.op, args, n.payload)
         with mpmath.workdps(50):
-            result = number(n, [value.get(o, _exact(a)) for o, a in zip(n.args, args, strict=True)])
+            exact = [value.get(o, _exact(a)) for o, a in zip(n.args, args, strict=True)]
+            result = _real(n, exact)
+            if result is None:
+                return g.node(n.op, args, n.payload)
             value[n] = result
             return g.const(Fraction(float(result)))
 
     return rewrite(g, roots, rule)
+
+
+def _real(n: Node, args: Sequence[mpmath.mpf]) -> mpmath.mpf | None:
+    """Value of an operation; None where that is no real number, on a side that is not taken."""
+    try:
+        result = number(n, args)
+    except (ArithmeticError, ValueError):
+        return None
+    real = isinstance(result, mpmath.mpf) and mpmath.isfinite(result)
+    return result if real and abs(result) <= sys.float_info.max else None
 
 
 def _exact(n: Node) -> mpmath.mpf:

@@ -227,7 +227,7 @@ def errors_of(page: Page) -> Iterator[None]:
     except ModelError:
         raise
     except Exception as error:
-        with _errors_of(Path(page.write.__code__.co_filename)):
+        with _errors_of(Path(page.code.co_filename)):
             raise error
 
 
@@ -251,7 +251,7 @@ def _errors_of(path: Path) -> Iterator[None]:
         where, written = _line(path, error)
         if isinstance(error, TypeError) and "truth value of Relational" in what:
             kind, what = "", _TRUTH
-        if isinstance(error, TypeError) and "'list'" in what:
+        if isinstance(error, TypeError) and ("'list'" in what or "sequence by" in what):
             what += " (m.parameters, m.data and m.rates give a list: (mu,) = m.parameters(...))"
         if isinstance(error, ShapeError):
             what += " (m.grad(u) has as many columns as the mesh has dimensions; "
