@@ -43,6 +43,7 @@ class Arguments:
         self.conditions: list[Condition] = []
         self.example: dict[str, float] = {}
         self._declared: dict[str, tuple[Node, str]] = {}
+        self._idle: set[str] = set()
 
     # coordinates and unknowns -------------------------------------------------------------------
 
@@ -73,6 +74,7 @@ class Arguments:
                 columns[c].append(self.unknown(f"{name}{a + 1}"))
                 self.places[-1] = (name, a)
                 if name in idle:
+                    self._idle.add(name)
                     self._declared.pop(f"{name}{a + 1}", None)
         return _columns("the unknowns", names, columns)
 
@@ -136,6 +138,9 @@ class Arguments:
                 raise ModelError(f"rates: {name} is no unknown at the nodes")
             values = [sp.Symbol(f"{name}{a + 1}", real=True) for a in range(count)]
             (rest,) = self.nodal_data([f"{name}_{suffix}"], "of the steps before", count)
+            if name in self._idle:
+                for unused in (str(coefficient), *map(str, rest)):
+                    self._declared.pop(unused, None)
             found.append([coefficient * u + v for u, v in zip(values, rest, strict=True)])
         return found
 

@@ -265,12 +265,22 @@ def of(nodes: int, dimension: int) -> tuple[Element, quadrature.Region] | None:
     return None
 
 
+_THICK = {"line": "square", "square": "cube", "triangle": "wedge"}
+
+
 def foreign(rule: QuadratureRule, nodes: int) -> str:
-    """Message for a rule of another cell than the one with so many nodes."""
+    """Message for a rule of another cell than the one with so many nodes.
+
+    A line, triangle or quadrilateral that is integrated over its thickness has the rule of the cell
+    with one dimension more.
+    """
     mine = of(nodes, rule.dimension)
     if mine is None or mine[1].fits(rule):
         return ""
     others = [r for r in quadrature.REGIONS[rule.dimension] if r.fits(rule)]
+    middle = of(nodes, rule.dimension - 1)
+    if middle and others and others[0].name == _THICK.get(middle[1].name):
+        return ""
     return misfit(mine[1], others[0].name) if others else ""
 
 
