@@ -12,6 +12,7 @@ runs it in any case.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, dataclass, fields, is_dataclass
 from functools import cache
@@ -147,25 +148,44 @@ def of_files(paths: Sequence[Path], on: On | None = None) -> tuple[list[Definiti
     found = [d for definitions, _ in runs for d in definitions]
     user.check_names(" ".join(p.name for p in paths), found)
     if len(paths) > 1:
-        return found, library(found)
+        return found, library(found, check=False)
     read = runs[0][1].beyond(paths[0], known[0])
-    return found, library(found, None if read is None else _file_key(known[0], *on.told()), read)
+    key = None if read is None else _file_key(known[0], *on.told())
+    return found, library(found, key, read, check=False)
 
 
 def library(
     definitions: Sequence[Definition],
     key: str | None = None,
     read: Mapping[str, str] | None = None,
+    *,
+    check: bool = True,
 ) -> Library:
     """The library of some models; what was derived is remembered under `key` as well.
 
-    read: as in `cache.remember`.
+    read: as in `cache.remember`. check: with the quick check of kernels that have not been through
+    it (`tools.quick`).
     """
     files, derived = derive(definitions)
+    folder, seconds = compiled(files)
+    if check:
+        _checked(definitions, files, folder)
     if key is not None:
         store.remember(key, files, read)
-    folder, seconds = compiled(files)
     return Library(folder, files, derived, seconds)
+
+
+def _checked(definitions: Sequence[Definition], files: Mapping[str, str], folder: Path) -> None:
+    """Check kernels once for each text of theirs; raises `quick.WrongKernelError`."""
+    passed = store.digest("checked", generator(), store.content(files))
+    if store.recall(passed) is not None:
+        return
+    from softehl.codegen.tools import quick
+
+    kernels = json.loads(files["manifest.json"])["kernels"]
+    for d in definitions:
+        quick.check(d, list(kernels[d.name]["tasks"]), folder / build.LIBRARY)
+    store.remember(passed, {"checked": ""})
 
 
 def derive(definitions: Sequence[Definition]) -> tuple[dict[str, str], dict[str, float]]:
