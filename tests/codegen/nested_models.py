@@ -8,7 +8,7 @@ or of the generator is in it.
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,10 +17,14 @@ import sympy as sp
 
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
+from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.model import Model
+from softehl.codegen.language.pages import Page
 
 Tree = tuple[Any, ...]
 LEAVES = ("T", "x", "g", "k")
+FIELDS = ("T", "u", "u_x", "u_y", "X", "k", "cosh", "cube", "power")
+"""Leaves of a page of fields: values, a gradient, a coordinate and even functions of its length."""
 KINDS = ["+", "-", "*", "pieces", "pieces", "pieces", "sqrt", "log", "1/", "3/2", "named", "max"]
 DIGITS, STEP = 80, mpmath.mpf(10) ** -20
 RULE = quadrature.gauss(2, 1)
@@ -30,12 +34,12 @@ class NoValueError(ArithmeticError):
     """A state without a value, or so near to a kink that the side cannot be told."""
 
 
-def drawn(rng: random.Random, depth: int) -> Tree:
+def drawn(rng: random.Random, depth: int, leaves: Sequence[str] = LEAVES) -> Tree:
     """A tree of operations."""
     if depth == 0 or rng.random() < 0.1:
         if rng.random() < 0.3:
             return ("number", sp.Rational(rng.randint(-9, 9), rng.randint(2, 7)))
-        return (rng.choice(LEAVES),)
+        return (rng.choice(leaves),)
     kinds = [
         "+",
         "-",
@@ -52,7 +56,7 @@ def drawn(rng: random.Random, depth: int) -> Tree:
     ]
     kind = rng.choice(kinds)
     count = {"sqrt": 1, "log": 1, "1/": 1, "3/2": 1, "named": 1, "pieces": 4}.get(kind, 2)
-    inside = [drawn(rng, depth - 1) for _ in range(count)]
+    inside = [drawn(rng, depth - 1, leaves) for _ in range(count)]
     return (kind, *inside, *([rng.random() < 0.5] if kind == "pieces" else []))
 
 
@@ -61,7 +65,7 @@ def value(tree: Tree, at: Mapping[str, Any]) -> Any:
     kind, *parts = tree
     if kind == "number":
         return mpmath.mpf(int(parts[0].p)) / int(parts[0].q)
-    if kind in LEAVES:
+    if kind in at:
         return at[kind]
     if kind == "pieces":
         a, b, then, otherwise, _strict = parts
@@ -84,10 +88,61 @@ def value(tree: Tree, at: Mapping[str, Any]) -> Any:
     }[kind](*args)
 
 
+Derivatives = tuple[list[Any], list[list[Any]]]
+
+
+def derivatives(f: Callable[[list[Any]], Any], at: Sequence[float]) -> Derivatives:
+    """First and second derivatives of a function, without those by the last value first."""
+    with mpmath.workdps(DIGITS):
+        base, n = [mpmath.mpf(v) for v in at], len(at)
+
+        def moved(*moves: tuple[int, int]) -> Any:
+            place = list(base)
+            for i, s in moves:
+                place[i] += s * STEP
+            return f(place)
+
+        pairs = [(1, 1, 1), (-1, -1, 1), (1, -1, -1), (-1, 1, -1)]
+        R = [(moved((i, 1)) - moved((i, -1))) / (2 * STEP) for i in range(n - 1)]
+        K = [
+            [sum(c * moved((i, a), (j, b)) for a, b, c in pairs) / (4 * STEP**2) for j in range(n)]
+            for i in range(n - 1)
+        ]
+        return R, K
+
+
 def _less(a: Any, b: Any) -> bool:
     if abs(a - b) < mpmath.mpf(10) ** -9:
         raise NoValueError
     return bool(a < b)
+
+
+def written(m: Model, tree: Tree, known: Mapping[str, Any], names: dict[Tree, Any]) -> Any:
+    """The tree in SymPy, on a page."""
+    kind, *parts = tree
+    if kind == "number":
+        return parts[0]
+    if kind in known:
+        return known[kind]
+    args = [written(m, p, known, names) for p in parts if isinstance(p, tuple)]
+    match kind:
+        case "pieces":
+            condition = args[0] < args[1] if parts[-1] else args[0] <= args[1]
+            return sp.Piecewise((args[2], condition), (args[3], True))
+        case "named":
+            if tree not in names:
+                names[tree] = m.define(f"named_{len(names)}", args[0])
+            return names[tree]
+    return {
+        "+": lambda a, b: a + b,
+        "-": lambda a, b: a - b,
+        "*": lambda a, b: a * b,
+        "sqrt": sp.sqrt,
+        "log": sp.log,
+        "1/": lambda a: 1 / a,
+        "3/2": lambda a: a ** sp.Rational(3, 2),
+        "max": sp.Max,
+    }[kind](*args)
 
 
 @dataclass
@@ -106,38 +161,10 @@ class Nested:
         (xi,) = m.point()
         field = m.define("field", (1 - xi) / 2 * x[0] + (1 + xi) / 2 * x[1])
         known = {"T": T, "x": field, "g": xi + T, "k": k}
-        written = self._written(m, self.energy, known, {})
-        m.potential(m.integral("Pi", written + (T**2 + field**2) / 2 + k * T))
+        tree = written(m, self.energy, known, {})
+        m.potential(m.integral("Pi", tree + (T**2 + field**2) / 2 + k * T))
         m.offer(product=True, pseudo_load=True, derivatives=[k])
         return m.finish()
-
-    def _written(
-        self, m: Model, tree: Tree, known: Mapping[str, Any], names: dict[Tree, Any]
-    ) -> Any:
-        kind, *parts = tree
-        if kind == "number":
-            return parts[0]
-        if kind in LEAVES:
-            return known[kind]
-        args = [self._written(m, p, known, names) for p in parts if isinstance(p, tuple)]
-        match kind:
-            case "pieces":
-                condition = args[0] < args[1] if parts[-1] else args[0] <= args[1]
-                return sp.Piecewise((args[2], condition), (args[3], True))
-            case "named":
-                if tree not in names:
-                    names[tree] = m.define(f"named_{len(names)}", args[0])
-                return names[tree]
-        return {
-            "+": lambda a, b: a + b,
-            "-": lambda a, b: a - b,
-            "*": lambda a, b: a * b,
-            "sqrt": sp.sqrt,
-            "log": sp.log,
-            "1/": lambda a: 1 / a,
-            "3/2": lambda a: a ** sp.Rational(3, 2),
-            "max": sp.Max,
-        }[kind](*args)
 
     # the meaning ----------------------------------------------------------------------------------
 
@@ -152,23 +179,56 @@ class Nested:
             found += (T**2 + x**2) / 2 + k * T
         return found
 
-    def tangent(self, dofs: Sequence[float], k: float) -> tuple[list[Any], list[list[Any]]]:
+    def tangent(self, dofs: Sequence[float], k: float) -> Derivatives:
         """Residual and its derivatives by the unknowns and, in the last column, by k."""
-        with mpmath.workdps(DIGITS):
-            base = [mpmath.mpf(v) for v in (*dofs, k)]
-            n, h = len(base), STEP
+        return derivatives(lambda v: self.total(v[:-1], v[-1]), [*dofs, k])
 
-            def at(*moves: tuple[int, int]) -> Any:
-                moved = list(base)
-                for i, s in moves:
-                    moved[i] += s * h
-                return self.total(moved[:-1], moved[-1])
 
-            R = [(at((i, 1)) - at((i, -1))) / (2 * h) for i in range(n - 1)]
-            K = [[self._second(at, i, j) / (4 * h * h) for j in range(n)] for i in range(n - 1)]
-            return R, K
+CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
-    @staticmethod
-    def _second(at: Any, i: int, j: int) -> Any:
-        pairs = [(1, 1, 1), (-1, -1, 1), (1, -1, -1), (-1, 1, -1)]
-        return sum(sign * at((i, a), (j, b)) for a, b, sign in pairs)
+
+@dataclass
+class OnCell:
+    """A page of a value of the cell and a field with a gradient, on quad4 with 2 x 2 points."""
+
+    name: str
+    energy: Tree
+
+    def page(self, form: Any) -> Page:
+        """The page, with kernels of a `form`."""
+
+        def write(m: Fields) -> None:
+            T, u = m.scalar("T", order=0), m.scalar("u")
+            k, p = m.parameters(k="number", p="exponent")
+            g = m.grad(u)
+            n = m.norm(g)
+            known = {"T": T, "u": u, "u_x": g[0], "u_y": g[1], "X": m.position[0], "k": k}
+            known |= {"cosh": sp.cosh(n), "cube": n**3, "power": n**p}
+            tree = written(m, self.energy, known, {})
+            m.minimise(tree + (T**2 + u**2 + n**2) / 2 + k * T + n**p)
+
+        return Page(self.name, write, form=form)
+
+    def at(self, X: Sequence[Any], p: int, values: Sequence[Any]) -> Any:
+        """Energy in many digits; values: T, u at the corners, the number k."""
+        T, *u, number = values
+        r, found = 1 / mpmath.sqrt(3), mpmath.mpf(0)
+        for xi, eta in ((s * r, t * r) for s, t in CORNERS):
+            N = [(1 + s * xi) * (1 + t * eta) / 4 for s, t in CORNERS]
+            by = [(s * (1 + t * eta) / 4, t * (1 + s * xi) / 4) for s, t in CORNERS]
+            a, b, c, d = (
+                sum(X[2 * k + i] * slopes[j] for k, slopes in enumerate(by))
+                for i in (0, 1)
+                for j in (0, 1)
+            )
+            det = a * d - b * c
+            u_xi, u_eta = (sum(v * s[j] for v, s in zip(u, by, strict=True)) for j in (0, 1))
+            g = (u_xi * d - u_eta * c) / det, (u_eta * a - u_xi * b) / det
+            n = mpmath.sqrt(g[0] ** 2 + g[1] ** 2)
+            value_u = sum(v * w for v, w in zip(u, N, strict=True))
+            at = {"T": T, "u": value_u, "u_x": g[0], "u_y": g[1], "k": number}
+            at |= {"X": sum(X[2 * c] * w for c, w in enumerate(N))}
+            at |= {"cosh": mpmath.cosh(n), "cube": n**3, "power": n**p}
+            density = value(self.energy, at) + (T**2 + value_u**2 + n**2) / 2 + number * T + n**p
+            found += density * det
+        return found

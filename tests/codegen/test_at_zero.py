@@ -156,16 +156,26 @@ def by_norm(m: Fields) -> None:
     m.minimise(k / 2 * n**2 + k / 2 * n**p - T)
 
 
-def conduction(**parameters: float) -> Study:
+def conduction() -> Study:
     study = Study(Mesh.rectangle(2, 1, cells=(4, 2)))
-    study.add("body", by_norm, **parameters)
+    study.add("body", by_norm, k=0.5, p=2.0)
     study.fix("left", T=0.0)
     return study
 
 
 def test_conduction_by_a_norm_is_solved_from_rest() -> None:
     """k (n^2 + n^2) / 2 with k = 1/2 is one conductivity: T = 2 x - x^2 / 2."""
-    study = conduction(k=0.5, p=2.0)
+    study = conduction()
     x, result = study.mesh.points[:, 0], study.solve()
     np.testing.assert_allclose(result.values("T"), 2 * x - x**2 / 2, atol=1e-13)
     assert result.iterations == 1
+
+
+def test_sensitivities_at_points_without_a_gradient() -> None:
+    """T is as 1 / k; the exponent and the places of nodes have sensitivities, too."""
+    result = conduction().solve()
+    found = result.sensitivity("T", at=(2.0, 0.5), by={"body": ["k", "p"], "nodes": ["x"]})
+    assert found["body", "k"] == pytest.approx(-4.0, rel=1e-12)
+    assert np.isfinite(found["body", "p"])
+    # moving the body sideways changes nothing
+    assert np.sum(found["nodes", "x"]) == pytest.approx(0.0, abs=1e-12)
