@@ -170,4 +170,4 @@ def test_random_pages_of_fields_at_rest_and_elsewhere(tmp_path: Path, form: str)
     found = sum(
         cells_checked(m, load_kernel(n, tmp_path), rng, 2 + n.count("1")) for m, n in models
     )
-    assert found > 200
+    assert found > 4 * PAGES

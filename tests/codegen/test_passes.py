@@ -317,7 +317,9 @@ def test_literals_keep_exact_constants_exact_and_conditions_logical() -> None:
     root = g.add(g.mul(g.const(Fraction(1, 3)), x), y)
     assert passes.literals(g, [root]) == [root]
     decided = g.branch(g.compare(Op.LT, g.pi(), g.const(3)), x, y)
-    (kept,) = passes.literals(g, [decided])
+    assert passes.literals(g, [decided]) == [y]
+    open_ = g.branch(g.compare(Op.LT, g.pi(), x), x, y)
+    (kept,) = passes.literals(g, [open_])
     check([kept])
     assert kept.op is Op.BRANCH
 
