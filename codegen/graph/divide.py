@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from softehl.codegen.graph.guards import guarded, plus
 from softehl.codegen.graph.graph import BOOLEAN, Graph, Node, Op, Place, Routine
+from softehl.codegen.graph.guards import guarded, plus
 from softehl.codegen.graph.traverse import reachable
 
 ROUNDING = Fraction(1, 2**48)
