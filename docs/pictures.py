@@ -14,6 +14,7 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -25,6 +26,7 @@ from softehl.cases.seal.report import style
 from softehl.cases.seal.report.pictures import write_plots
 from softehl.cases.seal.report.section import Scale, View, draw_view, write_colours
 from softehl.cases.seal.states.observer_adapter import read_profile, read_section
+from softehl.runtime.result import Result
 
 SIZE = (2.5, 2.3)
 """Of each picture, inches: four stand side by side."""
@@ -46,6 +48,7 @@ FIRST = {
 }
 """The worked designs of docs/first-seal.md, by the names of their pictures."""
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks" / "README.md"
+README = Path(__file__).parents[1] / "README.md"
 
 _STYLE: Any = {
     **style.STYLE,
@@ -83,6 +86,7 @@ def main(folder: Path) -> None:
                 "films": films(curves["swept"]),
                 "stabilised": stabilised(curves["papers"], curves["stable"]),
                 "kernels": kernels(BENCHMARKS.read_text(encoding="utf-8")),
+                "front": front(*(p.read_text(encoding="utf-8") for p in (README, BENCHMARKS))),
                 **{name: section(curves[name]) for name in FIRST},
             }
             folder.mkdir(parents=True, exist_ok=True)
@@ -146,19 +150,65 @@ def stabilised(papers: softehl.Curve, ours: softehl.Curve) -> Figure:
 
 def kernels(page: str) -> Figure:
     """Times of one tangent of the plain quadrilateral, each generator at its best."""
+    figure = Figure(figsize=SIZE)
+    draw_times(figure.subplots(), page)
+    return figure
+
+
+def draw_times(axes: Any, page: str) -> None:
+    """Bars of the table in the page of benchmarks."""
     found = re.findall(
         r"^\| Q4 B \| ([A-Za-z]+)[^|]*\| (\d+) \| \d+ \| [\d.]+ \|", page, re.MULTILINE
     )
     names, times = [name for name, _ in found], [float(time) for _, time in found]
-    figure = Figure(figsize=SIZE)
-    axes = figure.subplots()
     bars = axes.barh(names, times, color=["#1b6ca8", "#b9bdc4", "#b9bdc4"], height=0.6)
     axes.bar_label(bars, [f"{time:g} ns" for time in times], padding=2)
     axes.set(xlim=(0.0, 1.28 * max(times)), xlabel="time of one tangent [ns]")
     axes.set_title("hyperelastic element, one core")
     axes.invert_yaxis()
     axes.grid(visible=False, axis="y")
+
+
+def front(readme: str, page: str) -> Figure:
+    """First screen of README: its page, its beam and the time of a tangent."""
+    (code,) = re.findall(r"^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
+    written: dict[str, Any] = {}
+    exec(compile(code, "README.md", "exec"), written)  # prints the number of README
+    figure = Figure(figsize=(10.0, 2.1), layout="none")
+    text, body, bars = figure.subplots(1, 3, width_ratios=(5.2, 3.0, 2.2))
+    law = re.search(r"@softehl\.page\n.*?(?=\n\n)", code, re.DOTALL)
+    assert law is not None
+    text.text(0.0, 0.5, law[0], family="monospace", fontsize=6.0, va="center", linespacing=1.5)
+    text.set_axis_off()
+    draw_deformed(figure, body, written["result"])
+    draw_times(bars, page)
+    text.set_title("the energy of an element, in SymPy", loc="left")
+    body.set_title("a beam of it under a load")
+    bars.set_title("its tangent, one core")
+    figure.subplots_adjust(left=0.01, right=0.985, bottom=0.17, top=0.88, wspace=0.18)
     return figure
+
+
+def draw_deformed(figure: Figure, axes: Any, result: Result) -> None:
+    """Deformed quadrilaterals, coloured by the change of their areas."""
+    mesh, moved = result.system.mesh, result.deformed(("u_x", "u_y"))
+    cells = mesh.cells["quad4"]
+
+    def areas(points: Any) -> Any:
+        x, y = points[cells][..., 0], points[cells][..., 1]
+        return 0.5 * (x * (np.roll(y, -1, 1) - np.roll(y, 1, 1))).sum(axis=1)
+
+    ratio = areas(moved) / areas(mesh.points)
+    far = float(np.abs(ratio - 1).max())
+    drawn = PolyCollection(
+        list(moved[cells]), array=ratio, cmap="coolwarm", edgecolor="#40404080", linewidth=0.3
+    )
+    drawn.set_clim(1 - far, 1 + far)
+    axes.add_collection(drawn)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.autoscale_view()
+    axes.set_axis_off()
+    figure.colorbar(drawn, ax=axes, label="volume ratio $J$", shrink=0.7, pad=0.02)
 
 
 if __name__ == "__main__":
