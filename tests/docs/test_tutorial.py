@@ -12,7 +12,7 @@ from tests.docs.pages import Block, Reader, blocks
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = (
     *("tutorial.md", "study.md", "fields.md", "contact.md", "modes.md", "dynamics.md"),
-    *("matrix-free.md", "facets.md"),
+    *("matrix-free.md", "facets.md", "umat.md", "how-to.md"),
 )
 TUTORIAL = "\n".join((DOCS / page).read_text(encoding="utf-8") for page in PAGES)
 CHAPTERS = dict(re.findall(r"^## (.+?)\n(.*?)(?=^## |\Z)", TUTORIAL, re.MULTILINE | re.DOTALL))
