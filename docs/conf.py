@@ -18,7 +18,7 @@ author = "softehl developers"
 copyright = "softehl developers, BSD-3-Clause"
 version = release = softehl.__version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton"]
 root_doc = "docs/index"
 include_patterns = [
     "docs/*.md",
@@ -48,8 +48,10 @@ smartquotes = False
 
 html_theme = "furo"
 html_title = f"softehl {release}"
-html_static_path: list[str] = []
+html_static_path = ["_static"]
+html_css_files = ["formulas.css"]
 html_copy_source = False
+copybutton_prompt_text = "$ "
 html_theme_options = {"navigation_with_keys": True, "top_of_page_buttons": []}
 
 _MARKUP = re.compile(r"(``?[^`]*``?|:\w+:`[^`]*`)|([|*_\\])")
