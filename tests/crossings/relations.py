@@ -353,14 +353,14 @@ RELATIONS: dict[str, Relation] = {
     "static state": Relation(
         static,
         ("analysis", *_ALL),
-        tuple(("analysis", axis) for axis in _ALL),
+        tuple(("analysis", axis) for axis in _ALL if axis != "cell"),
         tolerance=1e-6,
         looser={"midpoint": 1e-2, "explicit": 3e-3, "adaptive": 1e-5, "plastic": 3e-2},
     ),
     "equilibrium": Relation(
         equilibrium,
         ("load", "analysis", *_ALL),
-        (("analysis", "load"), ("load", "cell"), ("load", "law"), ("load", "constraint")),
+        (("analysis", "load"), ("load", "cell"), ("load", "constraint")),
         quick=("load", "analysis", "constraint"),
         tolerance=1e-7,
         looser={"midpoint": 1e-2, "explicit": 3e-3, "newmark": 1e-5, "generalised-alpha": 1e-5},
@@ -371,8 +371,7 @@ RELATIONS: dict[str, Relation] = {
     "force and displacement": Relation(
         control,
         ("analysis", "law", "cell", "solver"),
-        (("analysis", "law"),),
-        replace(Problem(), load="force"),
+        base=replace(Problem(), load="force"),
         quick=("analysis",),
         tolerance=1e-6,
         looser={"midpoint": 2e-2, "explicit": 3e-3, "plastic": 3e-2},
@@ -380,7 +379,6 @@ RELATIONS: dict[str, Relation] = {
     "turned": Relation(
         turned,
         ("law", "cell", "load", "analysis", "solver"),
-        (("law", "load"), ("cell", "load")),
         quick=("law", "load"),
         tolerance=1e-7,
         looser={"midpoint": 1e-5, "explicit": 1e-5},
@@ -389,7 +387,7 @@ RELATIONS: dict[str, Relation] = {
     "units": Relation(
         units,
         ("law", "cell", "load", "constraint", "solver", "geometry"),
-        (("law", "load"), ("law", "constraint")),
+        (("law", "constraint"),),
         quick=("law", "load", "constraint"),
         tolerance=1e-6,
     ),
@@ -412,7 +410,7 @@ RELATIONS: dict[str, Relation] = {
     "tied halves": Relation(
         tied,
         ("law", "cell", "load", "constraint", "analysis", "solver"),
-        (("analysis", "law"), ("analysis", "constraint")),
+        (("analysis", "constraint"),),
         quick=("law", "load", "analysis", "constraint"),
         tolerance=1e-6,
         looser={"explicit": 1e-4, "midpoint": 1e-4},
@@ -438,7 +436,7 @@ RELATIONS: dict[str, Relation] = {
     "large ring": Relation(
         ring,
         ("law", "cell", "load", "constraint", "analysis"),
-        (("law", "load"), ("cell", "load")),
+        (("cell", "load"),),
         quick=("load", "constraint"),
         tolerance=1e-4,
         of=lambda at: at.dimension == 2 and at.load != "force" and at.constraint != "spring",
@@ -446,7 +444,7 @@ RELATIONS: dict[str, Relation] = {
     "slab": Relation(
         slab,
         ("law", "cell", "load", "analysis"),
-        (("law", "load"), ("cell", "load")),
+        (("cell", "load"),),
         quick=("load",),
         tolerance=1e-6,
         looser={"midpoint": 1e-4, "explicit": 1e-4},
@@ -455,22 +453,21 @@ RELATIONS: dict[str, Relation] = {
     "sensitivity": Relation(
         sensitivity,
         ("law", "load", "constraint", "analysis", "solver"),
-        (("law", "analysis"), ("law", "load"), ("law", "constraint"), ("analysis", "load")),
+        (("law", "analysis"), ("law", "constraint"), ("analysis", "load")),
         quick=("load", "constraint", "analysis"),
         tolerance=1e-4,
     ),
     "restart": Relation(
         restarted,
         ("law", "load", "constraint"),
-        (("law", "load"),),
-        replace(Problem(), analysis="bdf2"),
+        base=replace(Problem(), analysis="bdf2"),
         quick=("law",),
         tolerance=1e-14,
     ),
     "energies": Relation(
         energies,
         ("law", "load", "constraint", "geometry", "analysis"),
-        (("law", "load"), ("load", "constraint"), ("analysis", "load"), ("analysis", "law")),
+        (("load", "constraint"), ("analysis", "load"), ("analysis", "law")),
         replace(Problem(), analysis="midpoint"),
         quick=("load", "constraint"),
         tolerance=2e-2,
@@ -479,7 +476,7 @@ RELATIONS: dict[str, Relation] = {
     "stability": Relation(
         stable,
         ("law", "cell", "load", "constraint", "analysis", "solver"),
-        (("law", "load"), ("law", "constraint")),
+        (("law", "constraint"),),
         quick=("law", "constraint"),
         tolerance=1e-12,
         of=lambda at: at.load != "pressure",  # it has no energy
@@ -495,7 +492,7 @@ RELATIONS: dict[str, Relation] = {
     "refinement": Relation(
         refined,
         ("cell", "load", "constraint", "geometry"),
-        (("cell", "load"), ("cell", "constraint")),
+        (("cell", "load"),),
         quick=("load",),
         tolerance=0.05,
         looser=_COARSE,
