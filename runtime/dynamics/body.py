@@ -91,7 +91,8 @@ class Body:
     blocks. weight: of the forces at the end of a step in `moving`; ties and contacts act through
     the whole step, so that their unknowns there are those of the study over the weight. mass:
     densities as they were given. factors: (n,) of equations in `moving`: the forces of ties and
-    contacts on unknowns without mass, too, are those of the study over the weight.
+    contacts on unknowns without mass, too, are those of the study over the weight. constrained:
+    (n,) multipliers of ties, contacts and pages.
     """
 
     plain: System
@@ -103,6 +104,7 @@ class Body:
     weight: float = 1.0
     mass: Masses | None = None
     factors: Array = field(default_factory=lambda: np.empty(0))
+    constrained: Flags = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
     @classmethod
     def of(cls, system: System, mass: Masses | None, scheme: Scheme | None, at: Step) -> Body:
@@ -142,7 +144,9 @@ class Body:
         assembler = Assembler.build(system.size, [*own, *blocks, before])
         lumps = _lumped(system, M, blocks) if scheme is None else M.diagonal()
         moving = replace(system, assembler=assembler, contacts=contacts, share=share.renewed())
-        return cls(system, moving, M, lumps, heavy, roles, weight, mass, factors)
+        constrained = massless.copy()
+        constrained[roles.multipliers] = True
+        return cls(system, moving, M, lumps, heavy, roles, weight, mass, factors, constrained)
 
     @property
     def share(self) -> Share:
@@ -183,11 +187,21 @@ class Body:
             values=end.values,
         )
 
-    def constrained(self, problem: Problem) -> bool:
-        """True if there are unknowns without mass, which no acceleration determines."""
+    def algebraic(self, problem: Problem) -> Flags:
+        """Free unknowns (n,) without mass, which follow from the others without rates."""
         massless = ~self.heavy
         massless[problem.fixed] = False
-        return bool(massless.any())
+        return massless
+
+    def fastest(self, at: Step) -> float:
+        """Highest angular frequency of the mesh, estimated by the diagonals of the tangent."""
+        problem = self.plain.part(at)
+        with np.errstate(all="ignore"):
+            K = problem.assembler.linearise(at.old, problem.parameters)[1]
+        stiff, mass = (self.share.added(A.diagonal()) for A in (K, self.M))
+        known = (mass > 0.0) & np.isfinite(stiff)
+        ratio = float((np.abs(stiff[known]) / mass[known]).max(initial=0.0))
+        return float(np.sqrt(max(self.share.largest(ratio), np.finfo(np.float64).tiny)))
 
     def weighted(self, x: Array, weight: float) -> Array:
         """Unknowns (n,) with those of ties and contacts times a number."""

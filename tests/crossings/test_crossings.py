@@ -75,10 +75,8 @@ def _long(relation: str, at: Problem) -> bool:
 
 def refusal(crossing: Crossing) -> str | None:
     """Message with which a combination is refused."""
-    for relations, features, message in REFUSED:
-        if relations and crossing.name not in relations:
-            continue
-        if all(crossing.features[a] in fs for a, fs in features.items()):
+    for relations, condition, message in REFUSED:
+        if (not relations or crossing.name in relations) and condition(crossing.problem):
             return message
     return None
 
