@@ -143,7 +143,7 @@ def plastic(m):
     m.history(**dict(zip([*(f"p_{n}" for n in names), "alpha"], after, strict=True)))
 
 
-@softehl.page
+@softehl.page(form="point")
 def weight(m):
     """A force per undeformed volume."""
     u = m.vector("u")

@@ -21,8 +21,28 @@ def _mixed(at: Problem) -> bool:
     return at.law in ("mixed", "condensed", "taylor-hood", "enhanced")
 
 
+def _again(at: Problem) -> bool:
+    """Whether corners of the body would have two prescribed values."""
+    return at.load == "prescribed" and at.constraint == "sliding side"
+
+
 REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
-    (("sensitivity",), lambda at: at.analysis != "solve" and _moves(at), "has no derivatives"),
+    ((), lambda at: at.solver == "matrix-free" and at.analysis == "follow", "it factorises"),
+    ((), lambda at: at.solver == "amg" and at.analysis == "follow", "it factorises"),
     ((), lambda at: at.solver == "matrix-free" and at.law != "product", "no product by sum"),
+    (("sensitivity",), _moves, "has no derivatives"),
+    ((), _again, "prescribed twice"),
+    (
+        ("static state", "equilibrium"),
+        lambda at: at.analysis == "explicit" and _mixed(at),
+        "explicit.*(no mass everywhere|belongs to elements)",
+    ),
+    (
+        ("static state",),  # the stable step before an extension is that of a shortening
+        lambda at: at.analysis == "explicit" and at.law == "split",
+        "come from the scheme",
+    ),
+    (("tied halves",), lambda at: at.solver == "amg", "multigrid needs"),
+    (("tied halves",), lambda at: at.constraint == "tied sides", "the same partner"),
 )
 """What a user reads."""

@@ -407,6 +407,7 @@ RELATIONS: dict[str, Relation] = {
         quick=("load", "constraint"),
         tolerance=1e-7,
         looser={"explicit": 1e-5, "midpoint": 1e-6},
+        of=lambda at: at.cell != "hex64",
     ),
     "tied halves": Relation(
         tied,
