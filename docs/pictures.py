@@ -174,7 +174,8 @@ def front(readme: str, page: str) -> Figure:
     (code,) = re.findall(r"^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
     written: dict[str, Any] = {}
     exec(compile(code, "README.md", "exec"), written)  # prints the number of README
-    figure = Figure(figsize=(10.0, 2.1), layout="none")
+    figure = Figure(figsize=(10.0, 2.1))
+    figure.set_layout_engine("none")
     text, body, bars = figure.subplots(1, 3, width_ratios=(5.2, 3.0, 2.2))
     law = re.search(r"@softehl\.page\n.*?(?=\n\n)", code, re.DOTALL)
     assert law is not None

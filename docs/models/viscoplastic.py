@@ -26,5 +26,5 @@ def viscoplastic(m):
     m.stress(K * volume * sp.eye(3) + (1 - 2 * G * flow) * s)
     new = p + flow * s
     places = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
-    m.history(**{f"p_{n}": new[ij] for n, ij in zip(names, places)}, alpha=alpha + dg)
+    m.history(**{f"p_{n}": new[ij] for n, ij in zip(names, places, strict=True)}, alpha=alpha + dg)
     m.example(E=200000, nu=sp.Rational(3, 10), sy=250, H=2000, eta=100, dt=1)

@@ -176,7 +176,8 @@ def _force(study: Study, at: Problem) -> None:
 def _weight(study: Study, at: Problem) -> None:
     size = 0.003 * at.stress / at.length
     force = size * at.turned(np.eye(at.dimension)[1])
-    given = {f"w{name[1:]}": _grown(at.ramp, f) for name, f in zip(at.axes, force, strict=True)}
+    named = zip(at.axes, force, strict=True)
+    given: Any = {f"w{name[1:]}": _grown(at.ramp, f) for name, f in named}
     (kind,) = study.mesh.cells
     study.add("weight", _weight_kernel(kind, study.geometry), **given)
 
@@ -320,7 +321,7 @@ class Problem:
     def study(self, mesh: Mesh | None = None, *, again: bool = False, **constants: float) -> Study:
         """The problem written down; on another mesh, or with other constants; again: see `Law`."""
         study = Study(self.mesh() if mesh is None else mesh, geometry=GEOMETRIES[self.geometry])
-        given = {**self.properties.constants(self.stress), **constants}
+        given: Any = {**self.properties.constants(self.stress), **constants}
         self.properties.add(study, again=again, **given)
         self.hold(study)
         return study

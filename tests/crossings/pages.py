@@ -1,6 +1,6 @@
 """Model pages and materials of the crossings: one body, written in every way that a user may."""
 
-# mypy: disable-error-code="no-untyped-def"
+# mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
 import sympy as sp
 

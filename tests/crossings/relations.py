@@ -11,11 +11,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
 from softehl import Mesh, Study
 from softehl.runtime.arrays import Array
+from softehl.runtime.mesh.mesh import Predicate
 from softehl.runtime.result import Result
 from tests.crossings.features import FAST, LAWS, SIZE, Problem
 
@@ -179,8 +181,8 @@ def _side_planes(dimension: int) -> dict[str, tuple[int, float]]:
     return {n: (k // 2, (0.0, SIZE[k // 2])[k % 2]) for k, n in enumerate(names)}
 
 
-def _plane(axis: int, value: float) -> Callable[[Array], Array]:
-    return lambda x: abs(x[:, axis] - value) < 1e-9
+def _plane(axis: int, value: float) -> Predicate:
+    return lambda x: np.asarray(abs(x[:, axis] - value) < 1e-9)
 
 
 def one_body(at: Problem) -> Pairs:
@@ -237,7 +239,8 @@ def sensitivity(at: Problem) -> Pairs:
     size = at.properties.given[name]
 
     def value(change: float) -> Array:
-        result = at.run(at.study(**{name: size * (1.0 + change)}))
+        constants: Any = {name: size * (1.0 + change)}
+        result = at.run(at.study(**constants))
         return np.array([result.at(at.corner)["u_y"], result.reaction("left")["u_y"]])
 
     result, by = at.run(at.study(again=True)), {"body": [name]}
@@ -255,11 +258,11 @@ def restarted(at: Problem) -> Pairs:
     study = at.study()
     with TemporaryDirectory() as folder:
         file = Path(folder) / "checkpoint.npz"
-        options = {"method": at.analysis, **at.options}
-        *_, known = study.march(dt=0.125, until=1.0, **options)  # type: ignore[arg-type]
-        for _ in study.march(dt=0.125, until=0.5, checkpoint=file, **options):  # type: ignore[arg-type]
+        options: Any = {"method": at.analysis, **at.options}
+        *_, known = study.march(dt=0.125, until=1.0, **options)
+        for _ in study.march(dt=0.125, until=0.5, checkpoint=file, **options):
             pass
-        *_, result = study.march(dt=0.125, until=1.0, restart=file, **options)  # type: ignore[arg-type]
+        *_, result = study.march(dt=0.125, until=1.0, restart=file, **options)
     yield result.x, known.x
 
 
@@ -282,8 +285,8 @@ def frequencies(at: Problem) -> Pairs:
     modes = at.study().solve(until=0.0, **at.options).modes(2, mass={"body": {"rho": FAST}})
     reference = replace(at, cell="quad25" if at.dimension == 2 else "hex64", solver="auto")
     law = "energy" if at.law in ONE_BODY else at.law
-    known = replace(reference, law=law).study().solve(until=0.0)
-    known = known.modes(2, mass={"body": {"rho": FAST}})
+    state = replace(reference, law=law).study().solve(until=0.0)
+    known = state.modes(2, mass={"body": {"rho": FAST}})
     yield modes.frequencies, known.frequencies
 
 
