@@ -142,7 +142,7 @@ class Linear:
         K = csc_array(K.T) if turned else K
         if key not in memo:
             memo[key] = K if linear is None else linear.factorise(K)
-        found = refined(memo[key], K, b)
+        found = refined(memo[key], K, b, self.fixed)
         if found is None:
             raise StudyError(
                 'the iterations for derivatives do not converge: solve with linear="direct"'
@@ -166,8 +166,10 @@ def _turned(factors: Factors | None) -> Factors | None:
     return factors.transposed() if isinstance(factors, Factorisation) else None
 
 
-def refined(factors: Factors, K: Any, b: Array) -> Array | None:
+def refined(factors: Factors, K: Any, b: Array, fixed: Integers | None = None) -> Array | None:
     """x (n,) of K x = b by factors of a matrix near K; None where they are not near enough.
+
+    fixed: unknowns with rows of the unit matrix, in which iterations leave errors of their own.
 
     Each correction must make the error of the equations a tenth, until rounding is left: relative
     to the terms of each, as after a factorisation of K itself.
@@ -185,5 +187,7 @@ def refined(factors: Factors, K: Any, b: Array) -> Array | None:
             if not error < 0.1 * before:
                 return x if error <= _ROUNDING else None
             x, before = x + factors.solve(r), error
+            if fixed is not None:
+                x[fixed] = b[fixed]
     except SingularMatrix:
         return None

@@ -361,8 +361,8 @@ class Steps:
         steps, half = self.factor * at.steps, None
         if self.halves:
             steps //= 2
-            half = study.solve(steps=steps, until=0.5, **at.options)
-        return study.solve(steps=steps, start=half, record=not self.halves, **at.options)
+            half = study.solve(steps=steps, until=0.5, record=True, **at.options)
+        return study.solve(steps=steps, start=half, record=True, **at.options)
 
 
 @dataclass(frozen=True)

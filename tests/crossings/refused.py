@@ -31,6 +31,11 @@ REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
     ((), lambda at: at.solver == "amg" and at.analysis == "follow", "it factorises"),
     ((), lambda at: at.solver == "matrix-free" and at.law != "product", "no product by sum"),
     (("sensitivity",), _moves, "has no derivatives"),
+    (
+        ("sensitivity",),
+        lambda at: at.analysis == "follow" and at.properties.history,
+        "depends on the steps before it",
+    ),
     ((), _again, "prescribed twice"),
     (
         ("static state", "equilibrium"),
