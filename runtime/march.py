@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
+from scipy.sparse import csc_array
 
-from softehl.runtime.arrays import Array
+from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.begin import SMALLEST, beginning
 from softehl.runtime.derivatives.trail import Trail
 from softehl.runtime.held import require_held
@@ -177,7 +178,7 @@ class March:
         """By how much the next step may be longer; below 1 where the error is too large.
 
         Components of a vector are one field. A field whose error Newton's method does not see in
-        the equations, beside their loads, has none.
+        the equations, beside their loads, has none; nor has one whose work is rounding.
         """
         order = _ORDER[self.method] if len(clock.times) > 1 else 1
         if self.tolerance is None or len(clock.times) <= order:
@@ -199,8 +200,10 @@ class March:
                 wrong = x.copy()
                 wrong[part] -= share * difference[part]
                 with np.errstate(all="ignore"):
-                    seen = problem.measure(wrong, problem.linearise(x)[1])
-                error = error if seen > self.newton.tolerance else 0.0
+                    K = problem.linearise(x)[1]
+                    seen = problem.measure(wrong, K)
+                if seen <= self.newton.tolerance or _is_rounding(K, x, part, difference):
+                    error = 0.0
             worst = max(worst, error)
         if worst == 0.0:
             return _GROWTH
@@ -278,6 +281,18 @@ class _ByTime(Way):
             return min(max(factor, _CUT), _GROWTH) * dt
         wanted = dt if self.again else max(step, dt)
         return min(_GROWTH * wanted, self.march.dt) if wanted < self.march.dt else wanted
+
+
+def _is_rounding(K: Any, x: Array, part: Integers, difference: Array) -> bool:
+    """True if a difference of the unknowns `part` does no work beside all unknowns x, (n,).
+
+    So it is for a multiplier that is zero, whose own equation has no other terms to compare with.
+    """
+    if not isinstance(K, csc_array):
+        return False
+    terms = np.asarray(abs(K) @ np.abs(x))
+    work = float(np.abs(difference[part]) @ terms[part])
+    return work <= np.finfo(np.float64).eps * float(np.abs(x) @ terms)
 
 
 def _largest(system: System, values: Array) -> float:

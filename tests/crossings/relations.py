@@ -293,7 +293,9 @@ def frequencies(at: Problem) -> Pairs:
 def refined(at: Problem) -> Pairs:
     """The end of the body moves alike, whatever the kind of its cells."""
     reference = replace(at, cell="quad25" if at.dimension == 2 else "hex64")
-    yield at.run().at(at.corner)["u_y"], reference.run().at(at.corner)["u_y"]
+    ends = [result.at(at.corner) for result in (at.run(), reference.run())]
+    one, other = (np.array([end[name] for name in at.axes]) for end in ends)
+    yield one, other
 
 
 def homogeneous(at: Problem) -> Pairs:
