@@ -354,7 +354,11 @@ def written(at: Problem) -> Pairs:
 
 
 _ALL = ("law", "cell", "load", "constraint", "geometry", "solver")
-_COARSE = {"quad4": 0.3, "tri3": 0.7, "hex8": 0.6, "tet4": 1.0, "wedge6": 0.8}
+_COARSE = {
+    **{"quad4": 0.3, "tri3": 0.7, "hex8": 0.6, "tet4": 1.2, "wedge6": 0.8},
+    **dict.fromkeys(("quad8", "quad9", "tri6", "hex20", "hex27", "tet10"), 0.15),
+}
+"""What coarse meshes of orders 1 and 2 may be off by."""
 RELATIONS: dict[str, Relation] = {
     "static state": Relation(
         static,
@@ -494,17 +498,18 @@ RELATIONS: dict[str, Relation] = {
         ("cell", "law", "constraint"),
         (("cell", "constraint"),),
         quick=("constraint",),
-        tolerance=0.06,
+        tolerance=0.03,
         looser=_COARSE,
+        of=lambda at: at.constraint != "spring",  # one at each node
     ),
     "refinement": Relation(
         refined,
         ("cell", "load", "constraint", "geometry"),
         (("cell", "load"),),
         quick=("load",),
-        tolerance=0.05,
+        tolerance=0.03,
         looser=_COARSE,
-        of=lambda at: at.load != "force",
+        of=lambda at: at.load != "force" and at.constraint != "spring",
     ),
     "periodic cell": Relation(homogeneous, ("law", "cell"), quick=("law",), tolerance=1e-5),
     "contact": Relation(
