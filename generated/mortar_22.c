@@ -41,136 +41,144 @@ SOFTEHL_GROUP(softehl_mortar_22_residual)
     V a0, a1, a2, a3, a4, a5, a6, a7, a8, a9, a10, a11, a12;
     softehl_load4(a + 0, 13, &a0, &a1, &a2, &a3); softehl_load4(a + 4, 13, &a4, &a5, &a6, &a7);
     softehl_load4(a + 8, 13, &a8, &a9, &a10, &a11); softehl_load1(a + 12, 13, &a12);
-    const V v1 = 1.0 / a8, v2 = X0 + d0, v3 = X1 + d1, v4 = X2 + d2, v5 = X0 + a0, v6 = X1 + a4,
-        v7 = X6 + d6, v8 = X2 + a1, v9 = X3 + d3, v10 = 0.5 * (X2 - X0), v11 = X6 + a3,
-        v12 = X7 + d7, v13 = X3 + a5, v14 = 0.5 * (X3 - X1), v15 = X7 + a7, v16 = X4 + a2,
-        v17 = X5 + a6, v18 = X4 + d4, v19 = X5 + d5, v20 = 0.5 * (v3 + v9), v21 = 0.5 * (v9 - v3),
-        v22 = 0.5 * (v2 + v4), v23 = 0.5 * (v4 - v2), v24 = v23 * v23 + v21 * v21, v25 = 1.0 / v24,
-        v26 = (v23 * (v7 - v22) + v21 * (v12 - v20)) * v25;
-    const M v27 = softehl_lt(softehl_splat(1.0), v26);
-    const V v28 = softehl_blend(v27, softehl_splat(1.0), v26); const M v29 = softehl_eq(v28, v28);
-    const V v30 = (v23 * (v18 - v22) + v21 * (v19 - v20)) * v25;
-    const M v31 = softehl_lt(softehl_splat(1.0), v30);
-    const V v32 = softehl_blend(v31, softehl_splat(1.0), v30); const M v33 = softehl_eq(v32, v32);
-    const V v34 = softehl_vsqrt(v10 * v10 + v14 * v14), v35 = softehl_vsqrt(v24), v36 = 1.0 / v35,
-        v37 = v23 * v36, v38 = v21 * v36;
-    V v39 = softehl_splat(0.0); const M m40 = v29;
-    if (softehl_any(m40)) {
-        const M v41 = softehl_lt(softehl_splat((-1.0)), v28);
-        const V v42 = softehl_blend(v41, v28, softehl_splat((-1.0)));
-        v39 = softehl_blend(m40, v42, v39);
+    const M v1 = softehl_lt(softehl_splat(0.0), a9);
+    const V v2 = 1.0 / a8, v3 = X0 + d0, v4 = X2 + d2, v5 = X6 + d6, v6 = X0 + a0, v7 = X2 + a1,
+        v8 = X1 + d1, v9 = X6 + a3, v10 = 0.5 * (X2 - X0), v11 = X3 + d3, v12 = X1 + a4,
+        v13 = X7 + d7, v14 = X3 + a5, v15 = 0.5 * (X3 - X1), v16 = X7 + a7, v17 = X4 + a2,
+        v18 = X5 + a6, v19 = X4 + d4, v20 = X5 + d5, v21 = 0.5 * (v8 + v11), v22 = 0.5 * (v11 - v8),
+        v23 = 0.5 * (v3 + v4), v24 = 0.5 * (v4 - v3), v25 = v24 * v24 + v22 * v22, v26 = 1.0 / v25,
+        v27 = (v24 * (v5 - v23) + v22 * (v13 - v21)) * v26;
+    const M v28 = softehl_lt(softehl_splat(1.0), v27);
+    const V v29 = softehl_blend(v28, softehl_splat(1.0), v27); const M v30 = softehl_eq(v29, v29);
+    const V v31 = (v24 * (v19 - v23) + v22 * (v20 - v21)) * v26;
+    const M v32 = softehl_lt(softehl_splat(1.0), v31);
+    const V v33 = softehl_blend(v32, softehl_splat(1.0), v31); const M v34 = softehl_eq(v33, v33);
+    const V v35 = softehl_vsqrt(v10 * v10 + v15 * v15), v36 = softehl_vsqrt(v25), v37 = 1.0 / v36,
+        v38 = v24 * v37, v39 = v22 * v37;
+    V v40 = softehl_splat(0.0); const M m41 = v30;
+    if (softehl_any(m41)) {
+        const M v42 = softehl_lt(softehl_splat((-1.0)), v29);
+        const V v43 = softehl_blend(v42, v29, softehl_splat((-1.0)));
+        v40 = softehl_blend(m41, v43, v40);
     }
-    const M m43 = ~v29;
-    if (softehl_any(m43)) {
-        const V v44 = (-1.0) - v28, v45 = v44 * (v44 * v44);
-        v39 = softehl_blend(m43, v45, v39);
+    const M m44 = ~v30;
+    if (softehl_any(m44)) {
+        const V v45 = (-1.0) - v29, v46 = v45 * (v45 * v45);
+        v40 = softehl_blend(m44, v46, v40);
     }
-    V v46 = softehl_splat(0.0); const M m47 = v33;
-    if (softehl_any(m47)) {
-        const M v48 = softehl_lt(softehl_splat((-1.0)), v32);
-        const V v49 = softehl_blend(v48, v32, softehl_splat((-1.0)));
-        v46 = softehl_blend(m47, v49, v46);
+    V v47 = softehl_splat(0.0); const M m48 = v34;
+    if (softehl_any(m48)) {
+        const M v49 = softehl_lt(softehl_splat((-1.0)), v33);
+        const V v50 = softehl_blend(v49, v33, softehl_splat((-1.0)));
+        v47 = softehl_blend(m48, v50, v47);
     }
-    const M m50 = ~v33;
-    if (softehl_any(m50)) {
-        const V v51 = (-1.0) - v32, v52 = v51 * (v51 * v51);
-        v46 = softehl_blend(m50, v52, v46);
+    const M m51 = ~v34;
+    if (softehl_any(m51)) {
+        const V v52 = (-1.0) - v33, v53 = v52 * (v52 * v52);
+        v47 = softehl_blend(m51, v53, v47);
     }
-    const V v53 = v46 - v39; const M v54 = softehl_eq(v53, v53); V v55 = softehl_splat(0.0);
-    const M m56 = v54;
-    if (softehl_any(m56)) {
-        const M v57 = softehl_lt(softehl_splat(0.0), v53);
-        const V v58 = softehl_blend(v57, v53, softehl_splat(0.0));
-        v55 = softehl_blend(m56, v58, v55);
+    const V v54 = v47 - v40; const M v55 = softehl_eq(v54, v54); V v56 = softehl_splat(0.0);
+    const M m57 = v55;
+    if (softehl_any(m57)) {
+        const M v58 = softehl_lt(softehl_splat(0.0), v54);
+        const V v59 = softehl_blend(v58, v54, softehl_splat(0.0));
+        v56 = softehl_blend(m57, v59, v56);
     }
-    const M m59 = ~v54;
-    if (softehl_any(m59)) {
-        const V v60 = v39 - v46, v61 = v60 * (v60 * v60);
-        v55 = softehl_blend(m59, v61, v55);
+    const M m60 = ~v55;
+    if (softehl_any(m60)) {
+        const V v61 = v40 - v47, v62 = v61 * (v61 * v61);
+        v56 = softehl_blend(m60, v62, v56);
     }
-    const V v62 = 0.5 * v55, v63 = v34 * v62, v64 = 0.5 * (v39 + v46),
-        v65 = 0.5 * (d6 + (d4 + (X4 + X6))), v66 = 0.5 * (d7 + (d5 + (X5 + X7))),
-        v67 = 0.5 * (1.0 / (0.5 * ((v7 - X4 - d4) * v37 + (v12 - X5 - d5) * v38)));
-    V s68 = {0}, s69 = {0}, s70 = {0}, s71 = {0}, s72 = {0}, s73 = {0}, s74 = {0}, s75 = {0},
-        s76 = {0}, s77 = {0}, s78 = {0}, s79 = {0};
+    const V v63 = 0.5 * v56, v64 = v35 * v63, v65 = 0.5 * (v40 + v47),
+        v66 = 0.5 * (d6 + (d4 + (X4 + X6))), v67 = 0.5 * (d7 + (d5 + (X5 + X7))),
+        v68 = 0.5 * (1.0 / (0.5 * ((v5 - X4 - d4) * v38 + (v13 - X5 - d5) * v39)));
+    V s69 = {0}, s70 = {0}, s71 = {0}, s72 = {0}, s73 = {0}, s74 = {0}, s75 = {0}, s76 = {0},
+        s77 = {0}, s78 = {0}, s79 = {0}, s80 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
         const double *restrict w = rule + 2 * q; (void)w;
-        const V v80 = 0.5 * (w[0] * v62 + v64), v81 = 0.5 - v80, v82 = 0.5 + v80,
-            v83 = v2 * v81 + v4 * v82, v84 = v3 * v81 + v9 * v82, v85 = d8 * v81 + d10 * v82,
-            v86 = (v37 * (v83 - v65) + v38 * (v84 - v66)) * v67, v87 = 0.5 - v86, v88 = 0.5 + v86,
-            v89 = v38 * (v7 * v88 + (v18 * v87 - v83)) - v37 * (v12 * v88 + (v19 * v87 - v84)),
-            v90 = a8 * v89, v91 = v85 - v90;
-        const M v92 = softehl_eq(v91, v91);
-        V v93 = softehl_splat(0.0), v94 = softehl_splat(0.0);
-        const M m95 = v92;
-        if (softehl_any(m95)) {
-            const M v96 = softehl_le(softehl_splat(0.0), v91);
-            V v97 = softehl_splat(0.0), v98 = softehl_splat(0.0);
-            const M m99 = v96 & m95;
-            if (softehl_any(m99)) {
-                const V v100 = (a10 + v89) * (v89 - a11); const M v101 = softehl_eq(v100, v100);
-                V v102 = softehl_splat(0.0); const M m103 = v101 & m99;
-                if (softehl_any(m103)) {
-                    const M v104 = softehl_lt(v100, softehl_splat(0.0));
-                    const V v105 = softehl_blend(v104, v91, softehl_splat(0.0));
-                    v102 = softehl_blend(m103, v105, v102);
+        const V v81 = 0.5 * (w[0] * v63 + v65), v82 = 0.5 - v81, v83 = 0.5 + v81,
+            v84 = v3 * v82 + v4 * v83, v85 = v8 * v82 + v11 * v83, v86 = d8 * v82 + d10 * v83,
+            v87 = (v38 * (v84 - v66) + v39 * (v85 - v67)) * v68, v88 = 0.5 - v87, v89 = 0.5 + v87,
+            v90 = v39 * (v5 * v89 + (v19 * v88 - v84)) - v38 * (v13 * v89 + (v20 * v88 - v85)),
+            v91 = a8 * v90, v92 = v86 - v91;
+        const M v93 = softehl_eq(v92, v92);
+        V v94 = softehl_splat(0.0), v95 = softehl_splat(0.0);
+        const M m96 = v93;
+        if (softehl_any(m96)) {
+            const M v97 = softehl_le(softehl_splat(0.0), v92);
+            V v98 = softehl_splat(0.0), v99 = softehl_splat(0.0);
+            const M m100 = v97 & m96;
+            if (softehl_any(m100)) {
+                const V v101 = (a10 + v90) * (v90 - a11); const M v102 = softehl_eq(v101, v101);
+                V v103 = softehl_splat(0.0); const M m104 = v102 & m100;
+                if (softehl_any(m104)) {
+                    const M v105 = softehl_lt(v101, softehl_splat(0.0));
+                    const V v106 = softehl_blend(v105, v92, softehl_splat(0.0));
+                    v103 = softehl_blend(m104, v106, v103);
                 }
-                const M m106 = ~v101 & m99;
-                if (softehl_any(m106)) {
-                    const V v107 = v100 * (v100 * v100); v102 = softehl_blend(m106, v107, v102);
+                const M m107 = ~v102 & m100;
+                if (softehl_any(m107)) {
+                    const V v108 = v101 * (v101 * v101); v103 = softehl_blend(m107, v108, v103);
                 }
-                const V v108 = a9 * v102; const M v109 = softehl_eq(v108, v108);
-                const V v110 = v37 * (v11 * v88 + (v16 * v87 - v5 * v81 - v8 * v82)) + v38 * (v15 * v88 + (v17 * v87 - v6 * v81 - v13 * v82)),
-                    v111 = d9 * v81 + d11 * v82 + a8 * v110;
-                const M v112 = softehl_eq(v111, v111), v113 = v109 & v112;
-                V v114 = softehl_splat(0.0); const M m115 = v113 & m99;
-                if (softehl_any(m115)) {
-                    const M v116 = softehl_lt(v108, v111); V v117 = v108;
-                    const M m118 = ~v116 & m115;
-                    if (softehl_any(m118)) {
-                        V v119 = softehl_splat(0.0); const M m120 = v109 & m118;
-                        if (softehl_any(m120)) {
-                            const M v121 = softehl_lt(v108, -v111); V v122 = v111;
-                            const M m123 = v121 & m120;
-                            if (softehl_any(m123)) {
-                                const V v124 = -v108; v122 = softehl_blend(m123, v124, v122);
+                const V v109 = a9 * v103; const M v110 = softehl_eq(v109, v109);
+                const V v111 = v38 * (v9 * v89 + (v17 * v88 - v6 * v82 - v7 * v83)) + v39 * (v16 * v89 + (v18 * v88 - v12 * v82 - v14 * v83)),
+                    v112 = d9 * v82 + d11 * v83 + a8 * v111;
+                const M v113 = softehl_eq(v112, v112), v114 = v110 & v113;
+                V v115 = softehl_splat(0.0); const M m116 = v114 & m100;
+                if (softehl_any(m116)) {
+                    const M v117 = softehl_lt(v109, v112); V v118 = v109;
+                    const M m119 = ~v117 & m116;
+                    if (softehl_any(m119)) {
+                        const V v120 = -v112;
+                        const M v121 = softehl_eq(v120, v120), v122 = v110 & v121;
+                        V v123 = softehl_splat(0.0); const M m124 = v122 & m119;
+                        if (softehl_any(m124)) {
+                            const M v125 = softehl_lt(v109, v120); V v126 = softehl_splat(0.0);
+                            const M m127 = v125 & m124;
+                            if (softehl_any(m127)) {
+                                const V v128 = -v109; v126 = softehl_blend(m127, v128, v126);
                             }
-                            v119 = softehl_blend(m120, v122, v119);
+                            const M m129 = ~v125 & m124;
+                            if (softehl_any(m129)) {
+                                const V v130 = softehl_blend(v1, v112, softehl_splat(0.0));
+                                v126 = softehl_blend(m129, v130, v126);
+                            }
+                            v123 = softehl_blend(m124, v126, v123);
                         }
-                        const M m125 = ~v109 & m118;
-                        if (softehl_any(m125)) {
-                            const V v126 = v111 + v108, v127 = v126 * (v126 * v126);
-                            v119 = softehl_blend(m125, v127, v119);
+                        const M m131 = ~v122 & m119;
+                        if (softehl_any(m131)) {
+                            const V v132 = v112 + v109, v133 = v132 * (v132 * v132);
+                            v123 = softehl_blend(m131, v133, v123);
                         }
-                        v117 = softehl_blend(m118, v119, v117);
+                        v118 = softehl_blend(m119, v123, v118);
                     }
-                    v114 = softehl_blend(m115, v117, v114);
+                    v115 = softehl_blend(m116, v118, v115);
                 }
-                const M m128 = ~v113 & m99;
-                if (softehl_any(m128)) {
-                    const V v129 = v108 - v111, v130 = v129 * (v129 * v129);
-                    v114 = softehl_blend(m128, v130, v114);
+                const M m134 = ~v114 & m100;
+                if (softehl_any(m134)) {
+                    const V v135 = v109 - v112, v136 = v135 * (v135 * v135);
+                    v115 = softehl_blend(m134, v136, v115);
                 }
-                v97 = softehl_blend(m99, v102, v97); v98 = softehl_blend(m99, v114, v98);
+                v98 = softehl_blend(m100, v103, v98); v99 = softehl_blend(m100, v115, v99);
             }
-            v93 = softehl_blend(m95, v97, v93); v94 = softehl_blend(m95, v98, v94);
+            v94 = softehl_blend(m96, v98, v94); v95 = softehl_blend(m96, v99, v95);
         }
-        const M m131 = ~v92;
-        if (softehl_any(m131)) {
-            const V v132 = v90 - v85, v133 = v132 * (v132 * v132);
-            v93 = softehl_blend(m131, v133, v93); v94 = softehl_blend(m131, v133, v94);
+        const M m137 = ~v93;
+        if (softehl_any(m137)) {
+            const V v138 = v91 - v86, v139 = v138 * (v138 * v138);
+            v94 = softehl_blend(m137, v139, v94); v95 = softehl_blend(m137, v139, v95);
         }
-        const V v134 = v1 * w[1], v135 = w[1] * v88, v136 = w[1] * v87, v137 = w[1] * v82,
-            v138 = w[1] * v81, v139 = v134 * v81, v140 = v134 * v82,
-            v141 = v63 * (1.0 + a12 * ((-1.0) + 6.283185307179586 * (X1 * v81 + X3 * v82))),
-            v142 = v93 * v141, v143 = v94 * v141, v144 = (v38 * v93 + v37 * v94) * v141,
-            v145 = (v38 * v94 - v37 * v93) * v141;
-        s68 += v140 * v142; s69 += v139 * v142; s70 += v140 * v143; s71 += v139 * v143;
-        s72 += v135 * v145; s73 += v135 * v144; s74 += v136 * v145; s75 += v136 * v144;
-        s76 += v137 * v145; s78 += v138 * v145; s77 += v137 * v144; s79 += v138 * v144;
+        const V v140 = v2 * w[1], v141 = w[1] * v89, v142 = w[1] * v88, v143 = w[1] * v83,
+            v144 = w[1] * v82, v145 = v140 * v82, v146 = v140 * v83,
+            v147 = v64 * (1.0 + a12 * ((-1.0) + 6.283185307179586 * (X1 * v82 + X3 * v83))),
+            v148 = v94 * v147, v149 = v95 * v147, v150 = (v39 * v94 + v38 * v95) * v147,
+            v151 = (v39 * v95 - v38 * v94) * v147;
+        s69 += v146 * v148; s70 += v145 * v148; s71 += v146 * v149; s72 += v145 * v149;
+        s73 += v141 * v151; s74 += v141 * v150; s75 += v142 * v151; s76 += v142 * v150;
+        s77 += v143 * v151; s79 += v144 * v151; s78 += v143 * v150; s80 += v144 * v150;
     }
-    softehl_store4(R + 8, 12, s69, s71, s68, s70); softehl_store4(R + 0, 12, s79, s78, s77, s76);
-    softehl_store4(R + 4, 12, -s75, -s74, -s73, -s72);
+    softehl_store4(R + 8, 12, s70, s72, s69, s71); softehl_store4(R + 0, 12, s80, s79, s78, s77);
+    softehl_store4(R + 4, 12, -s76, -s75, -s74, -s73);
 }
 SOFTEHL_BATCH(softehl_mortar_22_residual, 8, 12, 13, 0, 12, 0)
 
@@ -185,257 +193,258 @@ SOFTEHL_GROUP(softehl_mortar_22_tangent)
     V a0, a1, a2, a3, a4, a5, a6, a7, a8, a9, a10, a11, a12;
     softehl_load4(a + 0, 13, &a0, &a1, &a2, &a3); softehl_load4(a + 4, 13, &a4, &a5, &a6, &a7);
     softehl_load4(a + 8, 13, &a8, &a9, &a10, &a11); softehl_load1(a + 12, 13, &a12);
-    const V v1 = X2 + d2, v2 = X2 + a1, v3 = X0 + a0, v4 = X4 + a2, v5 = X6 + a3,
-        v6 = 0.5 * (X2 - X0), v7 = X1 + a4, v8 = X3 + d3, v9 = X3 + a5, v10 = X0 + d0,
-        v11 = 0.5 * (X3 - X1), v12 = X1 + d1, v13 = -a9, v14 = X5 + a6, v15 = X7 + a7,
-        v16 = 0.5 * (v12 + v8), v17 = X5 + d5, v18 = v8 - X1, v19 = 0.5 * (v8 - v12), v20 = X7 + d7,
-        v21 = v18 - d1, v22 = 0.5 * (d7 + (d5 + (X5 + X7))), v23 = v17 - v16,
-        v24 = softehl_vsqrt(v6 * v6 + v11 * v11), v25 = 0.5 * v21, v26 = 0.25 * v21,
-        v27 = v20 - v16, v28 = 0.5 * (v20 - X5 - d5), v29 = 0.5 * v23, v30 = 0.5 * v27,
-        v31 = 0.5 * (v10 + v1), v32 = v1 - X0, v33 = 0.5 * (v1 - v10), v34 = v32 - d0,
-        v35 = 1.0 / a8, v36 = -a8, v37 = 0.5 * v34, v38 = 0.25 * v34, v39 = 0.5 * (d8 - d10),
-        v40 = 0.5 * (d10 - d8), v41 = 0.5 * (d9 - d11), v42 = 0.5 * (d11 - d9),
-        v43 = v37 * v37 + v25 * v25, v44 = 1.0 / v43, v45 = X4 + d4, v46 = X6 + d6,
-        v47 = 0.5 * (d6 + (d4 + (X4 + X6))), v48 = 0.5 * (v46 - d4 - X4), v49 = v45 - v31,
-        v50 = v46 - v31, v51 = 0.5 * v49, v52 = v49 * v37 + v23 * v25, v53 = 0.5 * v50,
-        v54 = v50 * v37 + v27 * v25, v55 = v54 * v44;
-    const M v56 = softehl_lt(softehl_splat(1.0), v55);
-    const V v57 = softehl_blend(v56, softehl_splat(1.0), v55); const M v58 = softehl_eq(v57, v57);
-    const V v59 = v52 * v44; const M v60 = softehl_lt(softehl_splat(1.0), v59);
-    const V v61 = softehl_blend(v60, softehl_splat(1.0), v59); const M v62 = softehl_eq(v61, v61);
-    const V v63 = softehl_vsqrt(v43), v64 = v44 * v44, v65 = (v51 - v38) * v44,
-        v66 = (v53 - v38) * v44, v67 = (v29 - v26) * v44, v68 = (v30 - v26) * v44,
-        v69 = 0.5 * (d0 - v32) * v64, v70 = 0.5 * (d1 - v18) * v64, v71 = softehl_vsqrt(v44),
-        v72 = v37 * v64, v73 = v25 * v64, v74 = v37 * v44, v75 = v25 * v44,
-        v76 = v52 * v69 + (v51 + v38) * v44, v77 = (v53 + v38) * v44 + v54 * v69,
-        v78 = v52 * v70 + (v29 + v26) * v44, v79 = (v30 + v26) * v44 + v54 * v70, v80 = v52 * v72,
-        v81 = v54 * v72, v82 = v52 * v73, v83 = v54 * v73, v84 = 0.5 * v71, v85 = 1.0 / v63,
-        v86 = v37 * v85, v87 = v25 * v85, v88 = v85 * v85, v89 = 0.5 * v85, v90 = v84 * (v37 * v88),
-        v91 = v84 * (v25 * v88), v92 = v25 * v90, v93 = v28 * v92, v94 = v37 * v90, v95 = v25 * v91,
-        v96 = v37 * v91, v97 = v48 * v96, v98 = v89 - v94, v99 = v94 - v89, v100 = v89 - v95,
-        v101 = v95 - v89;
-    V v102 = softehl_splat(0.0), v103 = softehl_splat(0.0), v104 = softehl_splat(0.0),
-        v105 = softehl_splat(0.0), v106 = softehl_splat(0.0), v107 = softehl_splat(0.0),
-        v108 = softehl_splat(0.0);
-    const M m109 = v58;
-    if (softehl_any(m109)) {
-        const M v110 = softehl_lt(softehl_splat((-1.0)), v57);
-        V v111 = softehl_splat((-1.0)), v112 = softehl_splat(0.0), v113 = softehl_splat(0.0),
-            v114 = softehl_splat(0.0), v115 = softehl_splat(0.0), v116 = softehl_splat(0.0),
-            v117 = softehl_splat(0.0);
-        const M m118 = v110 & m109;
-        if (softehl_any(m118)) {
-            V v119 = v74, v120 = v75, v121 = softehl_splat(0.0), v122 = softehl_splat(0.0),
-                v123 = softehl_splat(0.0), v124 = softehl_splat(0.0);
-            const M m125 = v56 & m118;
-            if (softehl_any(m125)) {
-                v119 = softehl_blend(m125, softehl_splat(0.0), v119);
-                v120 = softehl_blend(m125, softehl_splat(0.0), v120);
+    const V v1 = X0 + d0, v2 = X1 + d1, v3 = X0 + a0, v4 = X2 + d2, v5 = X2 + a1, v6 = X4 + a2,
+        v7 = 0.5 * (d11 - d9), v8 = X1 + a4, v9 = X3 + d3, v10 = 0.5 * (X2 - X0), v11 = X4 + d4,
+        v12 = X3 + a5, v13 = 0.5 * (X3 - X1), v14 = X6 + a3, v15 = X5 + a6, v16 = X6 + d6,
+        v17 = X7 + a7, v18 = softehl_vsqrt(v10 * v10 + v13 * v13), v19 = 0.5 * (d6 + (X6 + v11)),
+        v20 = X5 + d5, v21 = 0.5 * (v2 + v9), v22 = 0.5 * (v9 - v2), v23 = X7 + d7;
+    const M v24 = softehl_lt(softehl_splat(0.0), a9);
+    const V v25 = -a9, v26 = 0.5 * (d7 + (d5 + (X5 + X7))), v27 = 0.5 * (v16 - X4 - d4),
+        v28 = v20 - v21, v29 = v23 - v21, v30 = 0.5 * (v23 - X5 - d5), v31 = 1.0 / a8, v32 = -a8,
+        v33 = 0.5 * (v1 + v4), v34 = 0.5 * (v4 - v1), v35 = v16 - v33, v36 = v11 - v33,
+        v37 = softehl_blend(v24, a8, softehl_splat(0.0)),
+        v38 = softehl_blend(v24, v7, softehl_splat(0.0)), v39 = v4 - X0, v40 = v9 - X1,
+        v41 = 0.5 * (d9 - d11), v42 = v39 - d0, v43 = v40 - d1, v44 = 0.5 * v42, v45 = 0.25 * v42,
+        v46 = 0.5 * v43, v47 = 0.25 * v43, v48 = 0.5 * (d8 - d10), v49 = 0.5 * (d10 - d8),
+        v50 = v44 * v44 + v46 * v46, v51 = 0.5 * v36, v52 = 0.5 * v35, v53 = 1.0 / v50,
+        v54 = v36 * v44 + v28 * v46, v55 = 0.5 * v28, v56 = v35 * v44 + v29 * v46, v57 = 0.5 * v29,
+        v58 = v56 * v53;
+    const M v59 = softehl_lt(softehl_splat(1.0), v58);
+    const V v60 = softehl_blend(v59, softehl_splat(1.0), v58); const M v61 = softehl_eq(v60, v60);
+    const V v62 = v54 * v53; const M v63 = softehl_lt(softehl_splat(1.0), v62);
+    const V v64 = softehl_blend(v63, softehl_splat(1.0), v62); const M v65 = softehl_eq(v64, v64);
+    const V v66 = softehl_vsqrt(v50), v67 = v53 * v53, v68 = (v51 - v45) * v53,
+        v69 = (v52 - v45) * v53, v70 = (v55 - v47) * v53, v71 = (v57 - v47) * v53,
+        v72 = 0.5 * (d0 - v39) * v67, v73 = 0.5 * (d1 - v40) * v67, v74 = softehl_vsqrt(v53),
+        v75 = v44 * v67, v76 = v46 * v67, v77 = v44 * v53, v78 = v46 * v53,
+        v79 = v54 * v72 + (v51 + v45) * v53, v80 = (v52 + v45) * v53 + v56 * v72,
+        v81 = v54 * v73 + (v55 + v47) * v53, v82 = (v57 + v47) * v53 + v56 * v73, v83 = v54 * v75,
+        v84 = v56 * v75, v85 = v54 * v76, v86 = v56 * v76, v87 = 0.5 * v74, v88 = 1.0 / v66,
+        v89 = v44 * v88, v90 = v46 * v88, v91 = v88 * v88, v92 = 0.5 * v88, v93 = v87 * (v44 * v91),
+        v94 = v87 * (v46 * v91), v95 = v46 * v93, v96 = v30 * v95, v97 = v44 * v93, v98 = v46 * v94,
+        v99 = v44 * v94, v100 = v27 * v99, v101 = v92 - v97, v102 = v97 - v92, v103 = v92 - v98,
+        v104 = v98 - v92;
+    V v105 = softehl_splat(0.0), v106 = softehl_splat(0.0), v107 = softehl_splat(0.0),
+        v108 = softehl_splat(0.0), v109 = softehl_splat(0.0), v110 = softehl_splat(0.0),
+        v111 = softehl_splat(0.0);
+    const M m112 = v61;
+    if (softehl_any(m112)) {
+        const M v113 = softehl_lt(softehl_splat((-1.0)), v60);
+        V v114 = softehl_splat((-1.0)), v115 = softehl_splat(0.0), v116 = softehl_splat(0.0),
+            v117 = softehl_splat(0.0), v118 = softehl_splat(0.0), v119 = softehl_splat(0.0),
+            v120 = softehl_splat(0.0);
+        const M m121 = v113 & m112;
+        if (softehl_any(m121)) {
+            V v122 = v77, v123 = v78, v124 = softehl_splat(0.0), v125 = softehl_splat(0.0),
+                v126 = softehl_splat(0.0), v127 = softehl_splat(0.0);
+            const M m128 = v59 & m121;
+            if (softehl_any(m128)) {
+                v122 = softehl_blend(m128, softehl_splat(0.0), v122);
+                v123 = softehl_blend(m128, softehl_splat(0.0), v123);
             }
-            const M m126 = ~v56 & m118;
-            if (softehl_any(m126)) {
-                const V v127 = -v77, v128 = -v79, v129 = v66 - v81, v130 = v68 - v83;
-                v121 = softehl_blend(m126, v127, v121); v122 = softehl_blend(m126, v128, v122);
-                v123 = softehl_blend(m126, v129, v123); v124 = softehl_blend(m126, v130, v124);
+            const M m129 = ~v59 & m121;
+            if (softehl_any(m129)) {
+                const V v130 = -v80, v131 = -v82, v132 = v69 - v84, v133 = v71 - v86;
+                v124 = softehl_blend(m129, v130, v124); v125 = softehl_blend(m129, v131, v125);
+                v126 = softehl_blend(m129, v132, v126); v127 = softehl_blend(m129, v133, v127);
             }
-            v111 = softehl_blend(m118, v57, v111); v112 = softehl_blend(m118, v119, v112);
-            v113 = softehl_blend(m118, v120, v113); v114 = softehl_blend(m118, v121, v114);
-            v115 = softehl_blend(m118, v122, v115); v116 = softehl_blend(m118, v123, v116);
-            v117 = softehl_blend(m118, v124, v117);
+            v114 = softehl_blend(m121, v60, v114); v115 = softehl_blend(m121, v122, v115);
+            v116 = softehl_blend(m121, v123, v116); v117 = softehl_blend(m121, v124, v117);
+            v118 = softehl_blend(m121, v125, v118); v119 = softehl_blend(m121, v126, v119);
+            v120 = softehl_blend(m121, v127, v120);
         }
-        v102 = softehl_blend(m109, v111, v102); v103 = softehl_blend(m109, v114, v103);
-        v104 = softehl_blend(m109, v115, v104); v105 = softehl_blend(m109, v116, v105);
-        v106 = softehl_blend(m109, v117, v106); v107 = softehl_blend(m109, v112, v107);
-        v108 = softehl_blend(m109, v113, v108);
+        v105 = softehl_blend(m112, v114, v105); v106 = softehl_blend(m112, v117, v106);
+        v107 = softehl_blend(m112, v118, v107); v108 = softehl_blend(m112, v119, v108);
+        v109 = softehl_blend(m112, v120, v109); v110 = softehl_blend(m112, v115, v110);
+        v111 = softehl_blend(m112, v116, v111);
     }
-    const M m131 = ~v58;
-    if (softehl_any(m131)) {
-        const V v132 = (-1.0) - v57, v133 = v132 * (v132 * v132);
-        V v134 = softehl_splat(0.0), v135 = softehl_splat(0.0), v136 = softehl_splat(0.0),
-            v137 = softehl_splat(0.0), v138 = softehl_splat(0.0), v139 = softehl_splat(0.0);
-        const M m140 = ~v56 & m131;
-        if (softehl_any(m140)) {
-            const V v141 = (-1.0) - v55, v142 = v141 * (3.0 * v141), v143 = (v81 - v66) * v142,
-                v144 = (v83 - v68) * v142, v145 = v77 * v142, v146 = v79 * v142,
-                v147 = -(v74 * v142), v148 = -(v75 * v142);
-            v134 = softehl_blend(m140, v145, v134); v135 = softehl_blend(m140, v146, v135);
-            v136 = softehl_blend(m140, v143, v136); v137 = softehl_blend(m140, v144, v137);
-            v138 = softehl_blend(m140, v147, v138); v139 = softehl_blend(m140, v148, v139);
+    const M m134 = ~v61;
+    if (softehl_any(m134)) {
+        const V v135 = (-1.0) - v60, v136 = v135 * (v135 * v135);
+        V v137 = softehl_splat(0.0), v138 = softehl_splat(0.0), v139 = softehl_splat(0.0),
+            v140 = softehl_splat(0.0), v141 = softehl_splat(0.0), v142 = softehl_splat(0.0);
+        const M m143 = ~v59 & m134;
+        if (softehl_any(m143)) {
+            const V v144 = (-1.0) - v58, v145 = v144 * (3.0 * v144), v146 = (v84 - v69) * v145,
+                v147 = (v86 - v71) * v145, v148 = v80 * v145, v149 = v82 * v145,
+                v150 = -(v77 * v145), v151 = -(v78 * v145);
+            v137 = softehl_blend(m143, v148, v137); v138 = softehl_blend(m143, v149, v138);
+            v139 = softehl_blend(m143, v146, v139); v140 = softehl_blend(m143, v147, v140);
+            v141 = softehl_blend(m143, v150, v141); v142 = softehl_blend(m143, v151, v142);
         }
-        v102 = softehl_blend(m131, v133, v102); v103 = softehl_blend(m131, v134, v103);
-        v104 = softehl_blend(m131, v135, v104); v105 = softehl_blend(m131, v136, v105);
-        v106 = softehl_blend(m131, v137, v106); v107 = softehl_blend(m131, v138, v107);
-        v108 = softehl_blend(m131, v139, v108);
+        v105 = softehl_blend(m134, v136, v105); v106 = softehl_blend(m134, v137, v106);
+        v107 = softehl_blend(m134, v138, v107); v108 = softehl_blend(m134, v139, v108);
+        v109 = softehl_blend(m134, v140, v109); v110 = softehl_blend(m134, v141, v110);
+        v111 = softehl_blend(m134, v142, v111);
     }
-    V v149 = softehl_splat(0.0), v150 = softehl_splat(0.0), v151 = softehl_splat(0.0),
-        v152 = softehl_splat(0.0), v153 = softehl_splat(0.0), v154 = softehl_splat(0.0),
-        v155 = softehl_splat(0.0);
-    const M m156 = v62;
-    if (softehl_any(m156)) {
-        const M v157 = softehl_lt(softehl_splat((-1.0)), v61);
-        V v158 = softehl_splat((-1.0)), v159 = softehl_splat(0.0), v160 = softehl_splat(0.0),
-            v161 = softehl_splat(0.0), v162 = softehl_splat(0.0), v163 = softehl_splat(0.0),
-            v164 = softehl_splat(0.0);
-        const M m165 = v157 & m156;
-        if (softehl_any(m165)) {
-            V v166 = v74, v167 = v75, v168 = softehl_splat(0.0), v169 = softehl_splat(0.0),
-                v170 = softehl_splat(0.0), v171 = softehl_splat(0.0);
-            const M m172 = v60 & m165;
-            if (softehl_any(m172)) {
-                v166 = softehl_blend(m172, softehl_splat(0.0), v166);
-                v167 = softehl_blend(m172, softehl_splat(0.0), v167);
+    V v152 = softehl_splat(0.0), v153 = softehl_splat(0.0), v154 = softehl_splat(0.0),
+        v155 = softehl_splat(0.0), v156 = softehl_splat(0.0), v157 = softehl_splat(0.0),
+        v158 = softehl_splat(0.0);
+    const M m159 = v65;
+    if (softehl_any(m159)) {
+        const M v160 = softehl_lt(softehl_splat((-1.0)), v64);
+        V v161 = softehl_splat((-1.0)), v162 = softehl_splat(0.0), v163 = softehl_splat(0.0),
+            v164 = softehl_splat(0.0), v165 = softehl_splat(0.0), v166 = softehl_splat(0.0),
+            v167 = softehl_splat(0.0);
+        const M m168 = v160 & m159;
+        if (softehl_any(m168)) {
+            V v169 = v77, v170 = v78, v171 = softehl_splat(0.0), v172 = softehl_splat(0.0),
+                v173 = softehl_splat(0.0), v174 = softehl_splat(0.0);
+            const M m175 = v63 & m168;
+            if (softehl_any(m175)) {
+                v169 = softehl_blend(m175, softehl_splat(0.0), v169);
+                v170 = softehl_blend(m175, softehl_splat(0.0), v170);
             }
-            const M m173 = ~v60 & m165;
-            if (softehl_any(m173)) {
-                const V v174 = -v76, v175 = -v78, v176 = v65 - v80, v177 = v67 - v82;
-                v168 = softehl_blend(m173, v174, v168); v169 = softehl_blend(m173, v175, v169);
-                v170 = softehl_blend(m173, v176, v170); v171 = softehl_blend(m173, v177, v171);
+            const M m176 = ~v63 & m168;
+            if (softehl_any(m176)) {
+                const V v177 = -v79, v178 = -v81, v179 = v68 - v83, v180 = v70 - v85;
+                v171 = softehl_blend(m176, v177, v171); v172 = softehl_blend(m176, v178, v172);
+                v173 = softehl_blend(m176, v179, v173); v174 = softehl_blend(m176, v180, v174);
             }
-            v158 = softehl_blend(m165, v61, v158); v159 = softehl_blend(m165, v166, v159);
-            v160 = softehl_blend(m165, v167, v160); v161 = softehl_blend(m165, v168, v161);
-            v162 = softehl_blend(m165, v169, v162); v163 = softehl_blend(m165, v170, v163);
-            v164 = softehl_blend(m165, v171, v164);
+            v161 = softehl_blend(m168, v64, v161); v162 = softehl_blend(m168, v169, v162);
+            v163 = softehl_blend(m168, v170, v163); v164 = softehl_blend(m168, v171, v164);
+            v165 = softehl_blend(m168, v172, v165); v166 = softehl_blend(m168, v173, v166);
+            v167 = softehl_blend(m168, v174, v167);
         }
-        v149 = softehl_blend(m156, v158, v149); v150 = softehl_blend(m156, v161, v150);
-        v151 = softehl_blend(m156, v162, v151); v152 = softehl_blend(m156, v163, v152);
-        v153 = softehl_blend(m156, v164, v153); v154 = softehl_blend(m156, v159, v154);
-        v155 = softehl_blend(m156, v160, v155);
+        v152 = softehl_blend(m159, v161, v152); v153 = softehl_blend(m159, v164, v153);
+        v154 = softehl_blend(m159, v165, v154); v155 = softehl_blend(m159, v166, v155);
+        v156 = softehl_blend(m159, v167, v156); v157 = softehl_blend(m159, v162, v157);
+        v158 = softehl_blend(m159, v163, v158);
     }
-    const M m178 = ~v62;
-    if (softehl_any(m178)) {
-        const V v179 = (-1.0) - v61, v180 = v179 * (v179 * v179);
-        V v181 = softehl_splat(0.0), v182 = softehl_splat(0.0), v183 = softehl_splat(0.0),
-            v184 = softehl_splat(0.0), v185 = softehl_splat(0.0), v186 = softehl_splat(0.0);
-        const M m187 = ~v60 & m178;
-        if (softehl_any(m187)) {
-            const V v188 = (-1.0) - v59, v189 = v188 * (3.0 * v188), v190 = (v80 - v65) * v189,
-                v191 = (v82 - v67) * v189, v192 = v76 * v189, v193 = v78 * v189,
-                v194 = -(v74 * v189), v195 = -(v75 * v189);
-            v181 = softehl_blend(m187, v192, v181); v182 = softehl_blend(m187, v193, v182);
-            v183 = softehl_blend(m187, v190, v183); v184 = softehl_blend(m187, v191, v184);
-            v185 = softehl_blend(m187, v194, v185); v186 = softehl_blend(m187, v195, v186);
+    const M m181 = ~v65;
+    if (softehl_any(m181)) {
+        const V v182 = (-1.0) - v64, v183 = v182 * (v182 * v182);
+        V v184 = softehl_splat(0.0), v185 = softehl_splat(0.0), v186 = softehl_splat(0.0),
+            v187 = softehl_splat(0.0), v188 = softehl_splat(0.0), v189 = softehl_splat(0.0);
+        const M m190 = ~v63 & m181;
+        if (softehl_any(m190)) {
+            const V v191 = (-1.0) - v62, v192 = v191 * (3.0 * v191), v193 = (v83 - v68) * v192,
+                v194 = (v85 - v70) * v192, v195 = v79 * v192, v196 = v81 * v192,
+                v197 = -(v77 * v192), v198 = -(v78 * v192);
+            v184 = softehl_blend(m190, v195, v184); v185 = softehl_blend(m190, v196, v185);
+            v186 = softehl_blend(m190, v193, v186); v187 = softehl_blend(m190, v194, v187);
+            v188 = softehl_blend(m190, v197, v188); v189 = softehl_blend(m190, v198, v189);
         }
-        v149 = softehl_blend(m178, v180, v149); v150 = softehl_blend(m178, v181, v150);
-        v151 = softehl_blend(m178, v182, v151); v152 = softehl_blend(m178, v183, v152);
-        v153 = softehl_blend(m178, v184, v153); v154 = softehl_blend(m178, v185, v154);
-        v155 = softehl_blend(m178, v186, v155);
+        v152 = softehl_blend(m181, v183, v152); v153 = softehl_blend(m181, v184, v153);
+        v154 = softehl_blend(m181, v185, v154); v155 = softehl_blend(m181, v186, v155);
+        v156 = softehl_blend(m181, v187, v156); v157 = softehl_blend(m181, v188, v157);
+        v158 = softehl_blend(m181, v189, v158);
     }
-    const V v196 = 1.0 / (v48 * v86 + v28 * v87), v197 = v149 - v102;
-    const M v198 = softehl_eq(v197, v197);
-    const V v199 = 0.5 * v196, v200 = v86 * v196, v201 = 0.5 * v200, v202 = v87 * v196,
-        v203 = v196 * v196, v204 = 0.5 * v202, v205 = 0.5 * v86 * v203, v206 = 0.5 * v87 * v203;
-    V v207 = softehl_splat(0.0), v208 = softehl_splat(0.0), v209 = softehl_splat(0.0),
-        v210 = softehl_splat(0.0), v211 = softehl_splat(0.0), v212 = softehl_splat(0.0),
-        v213 = softehl_splat(0.0), v214 = softehl_splat(0.0), v215 = softehl_splat(0.0);
-    const M m216 = v198;
-    if (softehl_any(m216)) {
-        const M v217 = softehl_lt(softehl_splat(0.0), v197);
-        V v218 = softehl_splat(0.0), v219 = softehl_splat(0.0), v220 = softehl_splat(0.0),
-            v221 = softehl_splat(0.0), v222 = softehl_splat(0.0), v223 = softehl_splat(0.0),
-            v224 = softehl_splat(0.0), v225 = softehl_splat(0.0), v226 = softehl_splat(0.0);
-        const M m227 = v217 & m216;
-        if (softehl_any(m227)) {
-            const V v228 = -v107, v229 = v150 - v103, v230 = -v108, v231 = v151 - v104,
-                v232 = v152 - v105, v233 = v153 - v106;
-            v218 = softehl_blend(m227, v197, v218); v219 = softehl_blend(m227, v229, v219);
-            v220 = softehl_blend(m227, v231, v220); v221 = softehl_blend(m227, v232, v221);
-            v222 = softehl_blend(m227, v233, v222); v223 = softehl_blend(m227, v154, v223);
-            v224 = softehl_blend(m227, v155, v224); v225 = softehl_blend(m227, v228, v225);
-            v226 = softehl_blend(m227, v230, v226);
+    const V v199 = 1.0 / (v27 * v89 + v30 * v90), v200 = v152 - v105;
+    const M v201 = softehl_eq(v200, v200);
+    const V v202 = 0.5 * v199, v203 = v89 * v199, v204 = 0.5 * v203, v205 = v90 * v199,
+        v206 = v199 * v199, v207 = 0.5 * v205, v208 = 0.5 * v89 * v206, v209 = 0.5 * v90 * v206;
+    V v210 = softehl_splat(0.0), v211 = softehl_splat(0.0), v212 = softehl_splat(0.0),
+        v213 = softehl_splat(0.0), v214 = softehl_splat(0.0), v215 = softehl_splat(0.0),
+        v216 = softehl_splat(0.0), v217 = softehl_splat(0.0), v218 = softehl_splat(0.0);
+    const M m219 = v201;
+    if (softehl_any(m219)) {
+        const M v220 = softehl_lt(softehl_splat(0.0), v200);
+        V v221 = softehl_splat(0.0), v222 = softehl_splat(0.0), v223 = softehl_splat(0.0),
+            v224 = softehl_splat(0.0), v225 = softehl_splat(0.0), v226 = softehl_splat(0.0),
+            v227 = softehl_splat(0.0), v228 = softehl_splat(0.0), v229 = softehl_splat(0.0);
+        const M m230 = v220 & m219;
+        if (softehl_any(m230)) {
+            const V v231 = -v110, v232 = v153 - v106, v233 = -v111, v234 = v154 - v107,
+                v235 = v155 - v108, v236 = v156 - v109;
+            v221 = softehl_blend(m230, v200, v221); v222 = softehl_blend(m230, v232, v222);
+            v223 = softehl_blend(m230, v234, v223); v224 = softehl_blend(m230, v235, v224);
+            v225 = softehl_blend(m230, v236, v225); v226 = softehl_blend(m230, v157, v226);
+            v227 = softehl_blend(m230, v158, v227); v228 = softehl_blend(m230, v231, v228);
+            v229 = softehl_blend(m230, v233, v229);
         }
-        v207 = softehl_blend(m216, v218, v207); v208 = softehl_blend(m216, v219, v208);
-        v209 = softehl_blend(m216, v220, v209); v210 = softehl_blend(m216, v221, v210);
-        v211 = softehl_blend(m216, v222, v211); v212 = softehl_blend(m216, v223, v212);
-        v213 = softehl_blend(m216, v224, v213); v214 = softehl_blend(m216, v225, v214);
-        v215 = softehl_blend(m216, v226, v215);
+        v210 = softehl_blend(m219, v221, v210); v211 = softehl_blend(m219, v222, v211);
+        v212 = softehl_blend(m219, v223, v212); v213 = softehl_blend(m219, v224, v213);
+        v214 = softehl_blend(m219, v225, v214); v215 = softehl_blend(m219, v226, v215);
+        v216 = softehl_blend(m219, v227, v216); v217 = softehl_blend(m219, v228, v217);
+        v218 = softehl_blend(m219, v229, v218);
     }
-    const M m234 = ~v198;
-    if (softehl_any(m234)) {
-        const V v235 = v102 - v149, v236 = v235 * v235, v237 = v235 * v236, v238 = 3.0 * v236,
-            v239 = (v103 - v150) * v238, v240 = (v104 - v151) * v238, v241 = (v105 - v152) * v238,
-            v242 = (v106 - v153) * v238, v243 = -(v154 * v238), v244 = -(v155 * v238),
-            v245 = v107 * v238, v246 = v108 * v238;
-        v207 = softehl_blend(m234, v237, v207); v208 = softehl_blend(m234, v239, v208);
-        v209 = softehl_blend(m234, v240, v209); v210 = softehl_blend(m234, v241, v210);
-        v211 = softehl_blend(m234, v242, v211); v212 = softehl_blend(m234, v243, v212);
-        v213 = softehl_blend(m234, v244, v213); v214 = softehl_blend(m234, v245, v214);
-        v215 = softehl_blend(m234, v246, v215);
+    const M m237 = ~v201;
+    if (softehl_any(m237)) {
+        const V v238 = v105 - v152, v239 = v238 * v238, v240 = v238 * v239, v241 = 3.0 * v239,
+            v242 = (v106 - v153) * v241, v243 = (v107 - v154) * v241, v244 = (v108 - v155) * v241,
+            v245 = (v109 - v156) * v241, v246 = -(v157 * v241), v247 = -(v158 * v241),
+            v248 = v110 * v241, v249 = v111 * v241;
+        v210 = softehl_blend(m237, v240, v210); v211 = softehl_blend(m237, v242, v211);
+        v212 = softehl_blend(m237, v243, v212); v213 = softehl_blend(m237, v244, v213);
+        v214 = softehl_blend(m237, v245, v214); v215 = softehl_blend(m237, v246, v215);
+        v216 = softehl_blend(m237, v247, v216); v217 = softehl_blend(m237, v248, v217);
+        v218 = softehl_blend(m237, v249, v218);
     }
-    const V v247 = 0.5 * v207, v248 = 0.5 * v208, v249 = 0.5 * v209, v250 = 0.5 * v210,
-        v251 = v24 * v247, v252 = v24 * v248, v253 = v24 * v249, v254 = v24 * v250,
-        v255 = 0.5 * (v102 + v149), v256 = 0.5 * (v150 + v103), v257 = 0.5 * v211,
-        v258 = 0.5 * (v151 + v104), v259 = 0.5 * v212, v260 = v24 * v257, v261 = 0.5 * v213,
-        v262 = 0.5 * v214, v263 = v24 * v259, v264 = 0.5 * (v152 + v105), v265 = v24 * v261,
-        v266 = v24 * v262, v267 = 0.5 * v215, v268 = 0.5 * (v153 + v106), v269 = v24 * v267,
-        v270 = 0.5 * v154, v271 = 0.5 * v155, v272 = 0.5 * v107, v273 = 0.5 * v108,
-        v274 = v203 * (v93 + v48 * v99), v275 = v203 * (v97 + v28 * v101),
-        v276 = v203 * (v48 * v98 - v93), v277 = v203 * (v28 * v100 - v97),
-        v278 = v251 * (6.283185307179586 * (a12 * v11)),
-        v279 = 0.5 * ((v46 - v45) * v87 - (v20 - v17) * v86),
-        v280 = 0.5 * ((v5 - v4) * v86 + (v15 - v14) * v87),
-        v281 = 0.5 * ((v3 - v2) * v86 + (v7 - v9) * v87);
-    V s282 = {0}, s283 = {0}, s284 = {0}, s285 = {0}, s286 = {0}, s287 = {0}, s288 = {0},
-        s289 = {0}, s290 = {0}, s291 = {0}, s292 = {0}, s293 = {0}, s294 = {0}, s295 = {0},
-        s296 = {0}, s297 = {0}, s298 = {0}, s299 = {0}, s300 = {0}, s301 = {0}, s302 = {0},
-        s303 = {0}, s304 = {0}, s305 = {0}, s306 = {0}, s307 = {0}, s308 = {0}, s309 = {0},
-        s310 = {0}, s311 = {0}, s312 = {0}, s313 = {0}, s314 = {0}, s315 = {0}, s316 = {0},
-        s317 = {0}, s318 = {0}, s319 = {0}, s320 = {0}, s321 = {0}, s322 = {0}, s323 = {0},
-        s324 = {0}, s325 = {0}, s326 = {0}, s327 = {0}, s328 = {0}, s329 = {0}, s330 = {0},
-        s331 = {0}, s332 = {0}, s333 = {0}, s334 = {0}, s335 = {0}, s336 = {0}, s337 = {0},
-        s338 = {0}, s339 = {0}, s340 = {0}, s341 = {0}, s342 = {0}, s343 = {0}, s344 = {0},
-        s345 = {0}, s346 = {0}, s347 = {0}, s348 = {0}, s349 = {0}, s350 = {0}, s351 = {0},
-        s352 = {0}, s353 = {0}, s354 = {0}, s355 = {0}, s356 = {0}, s357 = {0}, s358 = {0},
-        s359 = {0}, s360 = {0}, s361 = {0}, s362 = {0}, s363 = {0}, s364 = {0}, s365 = {0},
-        s366 = {0}, s367 = {0}, s368 = {0}, s369 = {0}, s370 = {0}, s371 = {0}, s372 = {0},
-        s373 = {0}, s374 = {0}, s375 = {0}, s376 = {0}, s377 = {0}, s378 = {0}, s379 = {0},
-        s380 = {0}, s381 = {0}, s382 = {0}, s383 = {0}, s384 = {0}, s385 = {0}, s386 = {0},
-        s387 = {0}, s388 = {0}, s389 = {0}, s390 = {0}, s391 = {0}, s392 = {0}, s393 = {0},
-        s394 = {0}, s395 = {0}, s396 = {0}, s397 = {0}, s398 = {0}, s399 = {0}, s400 = {0},
-        s401 = {0}, s402 = {0}, s403 = {0}, s404 = {0}, s405 = {0}, s406 = {0}, s407 = {0},
-        s408 = {0}, s409 = {0}, s410 = {0}, s411 = {0}, s412 = {0}, s413 = {0}, s414 = {0},
-        s415 = {0}, s416 = {0}, s417 = {0}, s418 = {0}, s419 = {0}, s420 = {0}, s421 = {0},
-        s422 = {0}, s423 = {0}, s424 = {0}, s425 = {0}, s426 = {0}, s427 = {0}, s428 = {0},
-        s429 = {0}, s430 = {0}, s431 = {0}, s432 = {0}, s433 = {0};
+    const V v250 = 0.5 * v210, v251 = 0.5 * v211, v252 = 0.5 * v212, v253 = 0.5 * v213,
+        v254 = v18 * v250, v255 = v18 * v251, v256 = v18 * v252, v257 = v18 * v253,
+        v258 = 0.5 * (v105 + v152), v259 = 0.5 * (v153 + v106), v260 = 0.5 * v214,
+        v261 = 0.5 * (v154 + v107), v262 = 0.5 * v215, v263 = v18 * v260, v264 = 0.5 * v216,
+        v265 = 0.5 * v217, v266 = v18 * v262, v267 = 0.5 * (v155 + v108), v268 = v18 * v264,
+        v269 = v18 * v265, v270 = 0.5 * v218, v271 = 0.5 * (v156 + v109), v272 = v18 * v270,
+        v273 = 0.5 * v157, v274 = 0.5 * v158, v275 = 0.5 * v110, v276 = 0.5 * v111,
+        v277 = v206 * (v96 + v27 * v102), v278 = v206 * (v100 + v30 * v104),
+        v279 = v206 * (v27 * v101 - v96), v280 = v206 * (v30 * v103 - v100),
+        v281 = v254 * (6.283185307179586 * (a12 * v13)),
+        v282 = 0.5 * ((v16 - v11) * v90 - (v23 - v20) * v89),
+        v283 = 0.5 * ((v14 - v6) * v89 + (v17 - v15) * v90),
+        v284 = 0.5 * ((v3 - v5) * v89 + (v8 - v12) * v90);
+    V s285 = {0}, s286 = {0}, s287 = {0}, s288 = {0}, s289 = {0}, s290 = {0}, s291 = {0},
+        s292 = {0}, s293 = {0}, s294 = {0}, s295 = {0}, s296 = {0}, s297 = {0}, s298 = {0},
+        s299 = {0}, s300 = {0}, s301 = {0}, s302 = {0}, s303 = {0}, s304 = {0}, s305 = {0},
+        s306 = {0}, s307 = {0}, s308 = {0}, s309 = {0}, s310 = {0}, s311 = {0}, s312 = {0},
+        s313 = {0}, s314 = {0}, s315 = {0}, s316 = {0}, s317 = {0}, s318 = {0}, s319 = {0},
+        s320 = {0}, s321 = {0}, s322 = {0}, s323 = {0}, s324 = {0}, s325 = {0}, s326 = {0},
+        s327 = {0}, s328 = {0}, s329 = {0}, s330 = {0}, s331 = {0}, s332 = {0}, s333 = {0},
+        s334 = {0}, s335 = {0}, s336 = {0}, s337 = {0}, s338 = {0}, s339 = {0}, s340 = {0},
+        s341 = {0}, s342 = {0}, s343 = {0}, s344 = {0}, s345 = {0}, s346 = {0}, s347 = {0},
+        s348 = {0}, s349 = {0}, s350 = {0}, s351 = {0}, s352 = {0}, s353 = {0}, s354 = {0},
+        s355 = {0}, s356 = {0}, s357 = {0}, s358 = {0}, s359 = {0}, s360 = {0}, s361 = {0},
+        s362 = {0}, s363 = {0}, s364 = {0}, s365 = {0}, s366 = {0}, s367 = {0}, s368 = {0},
+        s369 = {0}, s370 = {0}, s371 = {0}, s372 = {0}, s373 = {0}, s374 = {0}, s375 = {0},
+        s376 = {0}, s377 = {0}, s378 = {0}, s379 = {0}, s380 = {0}, s381 = {0}, s382 = {0},
+        s383 = {0}, s384 = {0}, s385 = {0}, s386 = {0}, s387 = {0}, s388 = {0}, s389 = {0},
+        s390 = {0}, s391 = {0}, s392 = {0}, s393 = {0}, s394 = {0}, s395 = {0}, s396 = {0},
+        s397 = {0}, s398 = {0}, s399 = {0}, s400 = {0}, s401 = {0}, s402 = {0}, s403 = {0},
+        s404 = {0}, s405 = {0}, s406 = {0}, s407 = {0}, s408 = {0}, s409 = {0}, s410 = {0},
+        s411 = {0}, s412 = {0}, s413 = {0}, s414 = {0}, s415 = {0}, s416 = {0}, s417 = {0},
+        s418 = {0}, s419 = {0}, s420 = {0}, s421 = {0}, s422 = {0}, s423 = {0}, s424 = {0},
+        s425 = {0}, s426 = {0}, s427 = {0}, s428 = {0}, s429 = {0}, s430 = {0}, s431 = {0},
+        s432 = {0}, s433 = {0}, s434 = {0}, s435 = {0}, s436 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
         const double *restrict w = rule + 2 * q; (void)w;
-        const V v434 = w[0] * v259 + v270, v435 = w[0] * v261 + v271, v436 = w[0] * v262 + v272,
-            v437 = w[0] * v248 + v256, v438 = w[0] * v249 + v258, v439 = w[0] * v250 + v264,
-            v440 = w[0] * v257 + v268, v441 = w[0] * v267 + v273, v442 = 0.5 * (w[0] * v247 + v255),
-            v443 = v33 * v434, v444 = v19 * v434, v445 = v19 * v437, v446 = v33 * v438,
-            v447 = v19 * v439, v448 = v33 * v440, v449 = v33 * v435, v450 = v19 * v435,
-            v451 = v33 * v441, v452 = v19 * v441, v453 = v33 * v436, v454 = v19 * v436,
-            v455 = 0.5 - v442, v456 = 0.5 + v442, v457 = v442 - 0.5, v458 = v19 * v440 + v456,
-            v459 = v10 * v455 + v1 * v456, v460 = v12 * v455 + v8 * v456,
-            v461 = d8 * v455 + d10 * v456, v462 = v459 - v47, v463 = v460 - v22,
-            v464 = v33 * v437 + v455, v465 = v19 * v438 + v455, v466 = v33 * v439 + v456,
-            v467 = v196 * v462, v468 = v196 * v463,
-            v469 = 1.0 + a12 * ((-1.0) + 6.283185307179586 * (X1 * v455 + X3 * v456)),
-            v470 = v86 * v462 + v87 * v463, v471 = v251 * v469, v472 = w[1] * v456,
-            v473 = w[1] * v455, v474 = v35 * v455, v475 = v35 * v456, v476 = v199 * v470,
-            v477 = v205 * v470, v478 = v206 * v470, v479 = v474 * v471, v480 = v475 * v471,
-            v481 = v87 * v471, v482 = v86 * v471, v483 = w[1] * v479, v484 = w[1] * v480,
-            v485 = v200 * v453 + (v202 * v454 - v201 - v477),
-            v486 = v200 * v443 + (v202 * v444 + (v477 - v201)), v487 = v92 * v468,
-            v488 = v96 * v467, v489 = 0.5 - v476, v490 = 0.5 + v476, v491 = w[1] * v489,
-            v492 = w[1] * v490, v493 = v87 * (v489 - v443) + (v86 * v444 + v279 * v486),
-            v494 = v87 * (v490 - v453) + (v86 * v454 + v279 * v485),
-            v495 = v46 * v490 + (v45 * v489 - v459), v496 = v20 * v490 + (v17 * v489 - v460),
-            v497 = v92 * v495, v498 = v96 * v496, v499 = v87 * v495 - v86 * v496, v500 = a8 * v499,
-            v501 = v478 + (v200 * v449 + (v202 * v450 - v204)),
-            v502 = v200 * v451 + (v202 * v452 - v204) - v478,
-            v503 = v86 * (v450 - v489) - v87 * v449 + v279 * v501,
-            v504 = v86 * (v452 - v490) - v87 * v451 + v279 * v502, v505 = v461 - v500;
-        const M v506 = softehl_eq(v505, v505);
-        const V v507 = v100 * v468 + (v200 * v448 + (v202 * v458 - v488 - v277 * v470)),
-            v508 = v101 * v468 + (v488 + (v200 * v446 + (v202 * v465 - v275 * v470))),
-            v509 = v498 + (v86 * v458 - v87 * v448) + v100 * v495 + v279 * v507,
-            v510 = v86 * v465 - v87 * v446 - v498 + v101 * v495 + v279 * v508,
-            v511 = v99 * v467 + (v487 + (v202 * v445 + v200 * v464) - v274 * v470),
-            v512 = v98 * v467 + (v200 * v466 + (v202 * v447 - v487 - v276 * v470)),
-            v513 = v86 * v445 - v87 * v464 + v497 - v99 * v496 + v279 * v511,
-            v514 = v86 * v447 - v87 * v466 - v497 - v98 * v496 + v279 * v512;
-        V v515 = softehl_splat(0.0), v516 = softehl_splat(0.0), v517 = softehl_splat(0.0),
-            v518 = softehl_splat(0.0), v519 = softehl_splat(0.0), v520 = softehl_splat(0.0),
+        const V v437 = w[0] * v262 + v273, v438 = w[0] * v264 + v274, v439 = w[0] * v265 + v275,
+            v440 = w[0] * v251 + v259, v441 = w[0] * v252 + v261, v442 = w[0] * v253 + v267,
+            v443 = w[0] * v260 + v271, v444 = w[0] * v270 + v276, v445 = 0.5 * (w[0] * v250 + v258),
+            v446 = v34 * v437, v447 = v22 * v437, v448 = v22 * v440, v449 = v34 * v441,
+            v450 = v22 * v442, v451 = v34 * v443, v452 = v34 * v438, v453 = v22 * v438,
+            v454 = v34 * v444, v455 = v22 * v444, v456 = v34 * v439, v457 = v22 * v439,
+            v458 = 0.5 - v445, v459 = 0.5 + v445, v460 = v445 - 0.5, v461 = v22 * v443 + v459,
+            v462 = v1 * v458 + v4 * v459, v463 = v2 * v458 + v9 * v459,
+            v464 = d8 * v458 + d10 * v459, v465 = v462 - v19, v466 = v463 - v26,
+            v467 = v34 * v440 + v458, v468 = v22 * v441 + v458, v469 = v34 * v442 + v459,
+            v470 = v199 * v465, v471 = v199 * v466,
+            v472 = 1.0 + a12 * ((-1.0) + 6.283185307179586 * (X1 * v458 + X3 * v459)),
+            v473 = v89 * v465 + v90 * v466, v474 = v254 * v472, v475 = w[1] * v459,
+            v476 = w[1] * v458, v477 = v31 * v458, v478 = v31 * v459, v479 = v202 * v473,
+            v480 = v208 * v473, v481 = v209 * v473, v482 = v477 * v474, v483 = v478 * v474,
+            v484 = v90 * v474, v485 = v89 * v474, v486 = w[1] * v482, v487 = w[1] * v483,
+            v488 = v203 * v456 + (v205 * v457 - v204 - v480),
+            v489 = v203 * v446 + (v205 * v447 + (v480 - v204)), v490 = v95 * v471,
+            v491 = v99 * v470, v492 = 0.5 - v479, v493 = 0.5 + v479, v494 = w[1] * v492,
+            v495 = w[1] * v493, v496 = v90 * (v492 - v446) + (v89 * v447 + v282 * v489),
+            v497 = v90 * (v493 - v456) + (v89 * v457 + v282 * v488),
+            v498 = v16 * v493 + (v11 * v492 - v462), v499 = v23 * v493 + (v20 * v492 - v463),
+            v500 = v95 * v498, v501 = v99 * v499, v502 = v90 * v498 - v89 * v499, v503 = a8 * v502,
+            v504 = v481 + (v203 * v452 + (v205 * v453 - v207)),
+            v505 = v203 * v454 + (v205 * v455 - v207) - v481,
+            v506 = v89 * (v453 - v492) - v90 * v452 + v282 * v504,
+            v507 = v89 * (v455 - v493) - v90 * v454 + v282 * v505, v508 = v464 - v503;
+        const M v509 = softehl_eq(v508, v508);
+        const V v510 = v103 * v471 + (v203 * v451 + (v205 * v461 - v491 - v280 * v473)),
+            v511 = v104 * v471 + (v491 + (v203 * v449 + (v205 * v468 - v278 * v473))),
+            v512 = v501 + (v89 * v461 - v90 * v451) + v103 * v498 + v282 * v510,
+            v513 = v89 * v468 - v90 * v449 - v501 + v104 * v498 + v282 * v511,
+            v514 = v102 * v470 + (v490 + (v205 * v448 + v203 * v467) - v277 * v473),
+            v515 = v101 * v470 + (v203 * v469 + (v205 * v450 - v490 - v279 * v473)),
+            v516 = v89 * v448 - v90 * v467 + v500 - v102 * v499 + v282 * v514,
+            v517 = v89 * v450 - v90 * v469 - v500 - v101 * v499 + v282 * v515;
+        V v518 = softehl_splat(0.0), v519 = softehl_splat(0.0), v520 = softehl_splat(0.0),
             v521 = softehl_splat(0.0), v522 = softehl_splat(0.0), v523 = softehl_splat(0.0),
             v524 = softehl_splat(0.0), v525 = softehl_splat(0.0), v526 = softehl_splat(0.0),
             v527 = softehl_splat(0.0), v528 = softehl_splat(0.0), v529 = softehl_splat(0.0),
@@ -449,12 +458,12 @@ SOFTEHL_GROUP(softehl_mortar_22_tangent)
             v551 = softehl_splat(0.0), v552 = softehl_splat(0.0), v553 = softehl_splat(0.0),
             v554 = softehl_splat(0.0), v555 = softehl_splat(0.0), v556 = softehl_splat(0.0),
             v557 = softehl_splat(0.0), v558 = softehl_splat(0.0), v559 = softehl_splat(0.0),
-            v560 = softehl_splat(0.0), v561 = softehl_splat(0.0);
-        const M m562 = v506;
-        if (softehl_any(m562)) {
-            const M v563 = softehl_le(softehl_splat(0.0), v505);
-            V v564 = softehl_splat(0.0), v565 = softehl_splat(0.0), v566 = softehl_splat(0.0),
-                v567 = softehl_splat(0.0), v568 = softehl_splat(0.0), v569 = softehl_splat(0.0),
+            v560 = softehl_splat(0.0), v561 = softehl_splat(0.0), v562 = softehl_splat(0.0),
+            v563 = softehl_splat(0.0), v564 = softehl_splat(0.0);
+        const M m565 = v509;
+        if (softehl_any(m565)) {
+            const M v566 = softehl_le(softehl_splat(0.0), v508);
+            V v567 = softehl_splat(0.0), v568 = softehl_splat(0.0), v569 = softehl_splat(0.0),
                 v570 = softehl_splat(0.0), v571 = softehl_splat(0.0), v572 = softehl_splat(0.0),
                 v573 = softehl_splat(0.0), v574 = softehl_splat(0.0), v575 = softehl_splat(0.0),
                 v576 = softehl_splat(0.0), v577 = softehl_splat(0.0), v578 = softehl_splat(0.0),
@@ -465,370 +474,381 @@ SOFTEHL_GROUP(softehl_mortar_22_tangent)
                 v591 = softehl_splat(0.0), v592 = softehl_splat(0.0), v593 = softehl_splat(0.0),
                 v594 = softehl_splat(0.0), v595 = softehl_splat(0.0), v596 = softehl_splat(0.0),
                 v597 = softehl_splat(0.0), v598 = softehl_splat(0.0), v599 = softehl_splat(0.0),
-                v600 = softehl_splat(0.0);
-            const M m601 = v563 & m562;
-            if (softehl_any(m601)) {
-                const V v602 = a10 + v499, v603 = v499 - a11, v604 = v602 * v603;
-                const M v605 = softehl_eq(v604, v604);
-                V v606 = softehl_splat(0.0), v607 = softehl_splat(0.0), v608 = softehl_splat(0.0),
-                    v609 = softehl_splat(0.0), v610 = softehl_splat(0.0);
-                const M m611 = v605 & m601;
-                if (softehl_any(m611)) {
-                    const M v612 = softehl_lt(v604, softehl_splat(0.0));
-                    const V v613 = softehl_blend(v612, v505, softehl_splat(0.0)),
-                        v614 = softehl_blend(v612, v455, softehl_splat(0.0)),
-                        v615 = softehl_blend(v612, v456, softehl_splat(0.0)),
-                        v616 = softehl_blend(v612, v36, softehl_splat(0.0)),
-                        v617 = softehl_blend(v612, v40, softehl_splat(0.0));
-                    v606 = softehl_blend(m611, v613, v606); v607 = softehl_blend(m611, v614, v607);
-                    v608 = softehl_blend(m611, v615, v608); v609 = softehl_blend(m611, v616, v609);
-                    v610 = softehl_blend(m611, v617, v610);
+                v600 = softehl_splat(0.0), v601 = softehl_splat(0.0), v602 = softehl_splat(0.0),
+                v603 = softehl_splat(0.0);
+            const M m604 = v566 & m565;
+            if (softehl_any(m604)) {
+                const V v605 = a10 + v502, v606 = v502 - a11, v607 = v605 * v606;
+                const M v608 = softehl_eq(v607, v607);
+                V v609 = softehl_splat(0.0), v610 = softehl_splat(0.0), v611 = softehl_splat(0.0),
+                    v612 = softehl_splat(0.0), v613 = softehl_splat(0.0);
+                const M m614 = v608 & m604;
+                if (softehl_any(m614)) {
+                    const M v615 = softehl_lt(v607, softehl_splat(0.0));
+                    const V v616 = softehl_blend(v615, v508, softehl_splat(0.0)),
+                        v617 = softehl_blend(v615, v458, softehl_splat(0.0)),
+                        v618 = softehl_blend(v615, v459, softehl_splat(0.0)),
+                        v619 = softehl_blend(v615, v32, softehl_splat(0.0)),
+                        v620 = softehl_blend(v615, v49, softehl_splat(0.0));
+                    v609 = softehl_blend(m614, v616, v609); v610 = softehl_blend(m614, v617, v610);
+                    v611 = softehl_blend(m614, v618, v611); v612 = softehl_blend(m614, v619, v612);
+                    v613 = softehl_blend(m614, v620, v613);
                 }
-                const M m618 = ~v605 & m601;
-                if (softehl_any(m618)) {
-                    const V v619 = v604 * v604, v620 = v604 * v619,
-                        v621 = 3.0 * v619 * (v602 + v603);
-                    v606 = softehl_blend(m618, v620, v606); v609 = softehl_blend(m618, v621, v609);
+                const M m621 = ~v608 & m604;
+                if (softehl_any(m621)) {
+                    const V v622 = v607 * v607, v623 = v607 * v622,
+                        v624 = 3.0 * v622 * (v605 + v606);
+                    v609 = softehl_blend(m621, v623, v609); v612 = softehl_blend(m621, v624, v612);
                 }
-                const V v622 = a9 * v606; const M v623 = softehl_eq(v622, v622);
-                const V v624 = v5 * v490 + (v4 * v489 - v3 * v455 - v2 * v456),
-                    v625 = v15 * v490 + (v14 * v489 - v7 * v455 - v9 * v456),
-                    v626 = d9 * v455 + d11 * v456 + a8 * (v86 * v624 + v87 * v625);
-                const M v627 = softehl_eq(v626, v626), v628 = v623 & v627;
-                V v629 = softehl_splat(0.0), v630 = softehl_splat(0.0), v631 = softehl_splat(0.0),
-                    v632 = softehl_splat(0.0), v633 = softehl_splat(0.0), v634 = softehl_splat(0.0);
-                const M m635 = v628 & m601;
-                if (softehl_any(m635)) {
-                    const M v636 = softehl_lt(v622, v626);
-                    V v637 = v622, v638 = softehl_splat(0.0), v639 = softehl_splat(0.0), v640 = a9,
-                        v641 = softehl_splat(0.0), v642 = softehl_splat(0.0);
-                    const M m643 = ~v636 & m635;
-                    if (softehl_any(m643)) {
-                        V v644 = softehl_splat(0.0), v645 = softehl_splat(0.0),
-                            v646 = softehl_splat(0.0), v647 = softehl_splat(0.0),
-                            v648 = softehl_splat(0.0), v649 = softehl_splat(0.0);
-                        const M m650 = v623 & m643;
-                        if (softehl_any(m650)) {
-                            const M v651 = softehl_lt(v622, -v626);
-                            V v652 = v626, v653 = v455, v654 = v456, v655 = softehl_splat(0.0),
-                                v656 = a8, v657 = v42;
-                            const M m658 = v651 & m650;
-                            if (softehl_any(m658)) {
-                                const V v659 = -v622; v652 = softehl_blend(m658, v659, v652);
-                                v653 = softehl_blend(m658, softehl_splat(0.0), v653);
-                                v654 = softehl_blend(m658, softehl_splat(0.0), v654);
-                                v655 = softehl_blend(m658, v13, v655);
-                                v656 = softehl_blend(m658, softehl_splat(0.0), v656);
-                                v657 = softehl_blend(m658, softehl_splat(0.0), v657);
+                const V v625 = a9 * v609; const M v626 = softehl_eq(v625, v625);
+                const V v627 = v14 * v493 + (v6 * v492 - v3 * v458 - v5 * v459),
+                    v628 = v17 * v493 + (v15 * v492 - v8 * v458 - v12 * v459),
+                    v629 = d9 * v458 + d11 * v459 + a8 * (v89 * v627 + v90 * v628);
+                const M v630 = softehl_eq(v629, v629), v631 = v626 & v630;
+                V v632 = softehl_splat(0.0), v633 = softehl_splat(0.0), v634 = softehl_splat(0.0),
+                    v635 = softehl_splat(0.0), v636 = softehl_splat(0.0), v637 = softehl_splat(0.0);
+                const M m638 = v631 & m604;
+                if (softehl_any(m638)) {
+                    const M v639 = softehl_lt(v625, v629);
+                    V v640 = v625, v641 = softehl_splat(0.0), v642 = softehl_splat(0.0), v643 = a9,
+                        v644 = softehl_splat(0.0), v645 = softehl_splat(0.0);
+                    const M m646 = ~v639 & m638;
+                    if (softehl_any(m646)) {
+                        const V v647 = -v629;
+                        const M v648 = softehl_eq(v647, v647), v649 = v626 & v648;
+                        V v650 = softehl_splat(0.0), v651 = softehl_splat(0.0),
+                            v652 = softehl_splat(0.0), v653 = softehl_splat(0.0),
+                            v654 = softehl_splat(0.0), v655 = softehl_splat(0.0);
+                        const M m656 = v649 & m646;
+                        if (softehl_any(m656)) {
+                            const M v657 = softehl_lt(v625, v647);
+                            V v658 = softehl_splat(0.0), v659 = softehl_splat(0.0),
+                                v660 = softehl_splat(0.0), v661 = softehl_splat(0.0), v662 = v37,
+                                v663 = v38;
+                            const M m664 = v657 & m656;
+                            if (softehl_any(m664)) {
+                                const V v665 = -v625; v658 = softehl_blend(m664, v665, v658);
+                                v661 = softehl_blend(m664, v25, v661);
+                                v662 = softehl_blend(m664, softehl_splat(0.0), v662);
+                                v663 = softehl_blend(m664, softehl_splat(0.0), v663);
                             }
-                            v644 = softehl_blend(m650, v652, v644);
-                            v645 = softehl_blend(m650, v653, v645);
-                            v646 = softehl_blend(m650, v654, v646);
-                            v647 = softehl_blend(m650, v655, v647);
-                            v648 = softehl_blend(m650, v656, v648);
-                            v649 = softehl_blend(m650, v657, v649);
+                            const M m666 = ~v657 & m656;
+                            if (softehl_any(m666)) {
+                                const V v667 = softehl_blend(v24, v629, softehl_splat(0.0)),
+                                    v668 = softehl_blend(v24, v458, softehl_splat(0.0)),
+                                    v669 = softehl_blend(v24, v459, softehl_splat(0.0));
+                                v658 = softehl_blend(m666, v667, v658);
+                                v659 = softehl_blend(m666, v668, v659);
+                                v660 = softehl_blend(m666, v669, v660);
+                            }
+                            v650 = softehl_blend(m656, v658, v650);
+                            v651 = softehl_blend(m656, v659, v651);
+                            v652 = softehl_blend(m656, v660, v652);
+                            v653 = softehl_blend(m656, v661, v653);
+                            v654 = softehl_blend(m656, v662, v654);
+                            v655 = softehl_blend(m656, v663, v655);
                         }
-                        const M m660 = ~v623 & m643;
-                        if (softehl_any(m660)) {
-                            const V v661 = v626 + v622, v662 = v661 * v661, v663 = v661 * v662,
-                                v664 = 3.0 * v662, v665 = v42 * v664, v666 = a9 * v664,
-                                v667 = a8 * v664, v668 = v455 * v664, v669 = v456 * v664;
-                            v644 = softehl_blend(m660, v663, v644);
-                            v645 = softehl_blend(m660, v668, v645);
-                            v646 = softehl_blend(m660, v669, v646);
-                            v647 = softehl_blend(m660, v666, v647);
-                            v648 = softehl_blend(m660, v667, v648);
-                            v649 = softehl_blend(m660, v665, v649);
+                        const M m670 = ~v649 & m646;
+                        if (softehl_any(m670)) {
+                            const V v671 = v629 + v625, v672 = v671 * v671, v673 = v671 * v672,
+                                v674 = 3.0 * v672, v675 = v7 * v674, v676 = a9 * v674,
+                                v677 = a8 * v674, v678 = v458 * v674, v679 = v459 * v674;
+                            v650 = softehl_blend(m670, v673, v650);
+                            v651 = softehl_blend(m670, v678, v651);
+                            v652 = softehl_blend(m670, v679, v652);
+                            v653 = softehl_blend(m670, v676, v653);
+                            v654 = softehl_blend(m670, v677, v654);
+                            v655 = softehl_blend(m670, v675, v655);
                         }
-                        v637 = softehl_blend(m643, v644, v637);
-                        v638 = softehl_blend(m643, v645, v638);
-                        v639 = softehl_blend(m643, v646, v639);
-                        v640 = softehl_blend(m643, v647, v640);
-                        v641 = softehl_blend(m643, v648, v641);
-                        v642 = softehl_blend(m643, v649, v642);
+                        v640 = softehl_blend(m646, v650, v640);
+                        v641 = softehl_blend(m646, v651, v641);
+                        v642 = softehl_blend(m646, v652, v642);
+                        v643 = softehl_blend(m646, v653, v643);
+                        v644 = softehl_blend(m646, v654, v644);
+                        v645 = softehl_blend(m646, v655, v645);
                     }
-                    v629 = softehl_blend(m635, v637, v629); v630 = softehl_blend(m635, v638, v630);
-                    v631 = softehl_blend(m635, v639, v631); v632 = softehl_blend(m635, v640, v632);
-                    v633 = softehl_blend(m635, v641, v633); v634 = softehl_blend(m635, v642, v634);
+                    v632 = softehl_blend(m638, v640, v632); v633 = softehl_blend(m638, v641, v633);
+                    v634 = softehl_blend(m638, v642, v634); v635 = softehl_blend(m638, v643, v635);
+                    v636 = softehl_blend(m638, v644, v636); v637 = softehl_blend(m638, v645, v637);
                 }
-                const M m670 = ~v628 & m601;
-                if (softehl_any(m670)) {
-                    const V v671 = v622 - v626, v672 = v671 * v671, v673 = v671 * v672,
-                        v674 = 3.0 * v672, v675 = v41 * v674, v676 = a9 * v674, v677 = -(a8 * v674),
-                        v678 = v457 * v674, v679 = -(v456 * v674);
-                    v629 = softehl_blend(m670, v673, v629); v630 = softehl_blend(m670, v678, v630);
-                    v631 = softehl_blend(m670, v679, v631); v632 = softehl_blend(m670, v676, v632);
-                    v633 = softehl_blend(m670, v677, v633); v634 = softehl_blend(m670, v675, v634);
+                const M m680 = ~v631 & m604;
+                if (softehl_any(m680)) {
+                    const V v681 = v625 - v629, v682 = v681 * v681, v683 = v681 * v682,
+                        v684 = 3.0 * v682, v685 = v41 * v684, v686 = a9 * v684, v687 = -(a8 * v684),
+                        v688 = v460 * v684, v689 = -(v459 * v684);
+                    v632 = softehl_blend(m680, v683, v632); v633 = softehl_blend(m680, v688, v633);
+                    v634 = softehl_blend(m680, v689, v634); v635 = softehl_blend(m680, v686, v635);
+                    v636 = softehl_blend(m680, v687, v636); v637 = softehl_blend(m680, v685, v637);
                 }
-                const V v680 = v92 * v625, v681 = v96 * v624, v682 = v607 * v632,
-                    v683 = v608 * v632,
-                    v684 = v632 * (v438 * v610 + v609 * v510) + v633 * (v438 * v281 + (v508 * v280 + (v681 + v101 * v625))),
-                    v685 = v632 * (v439 * v610 + v609 * v514) + v633 * (v439 * v281 + (v512 * v280 + (v98 * v624 - v680))),
-                    v686 = v632 * (v440 * v610 + v609 * v509) + v633 * (v440 * v281 + (v507 * v280 + (v100 * v625 - v681))),
-                    v687 = v633 * (v434 * v281 + v486 * v280) + v632 * (v434 * v610 + v609 * v493),
-                    v688 = v633 * (v435 * v281 + v501 * v280) + v632 * (v435 * v610 + v609 * v503),
-                    v689 = v633 * (v436 * v281 + v485 * v280) + v632 * (v436 * v610 + v609 * v494),
-                    v690 = v632 * (v437 * v610 + v609 * v513) + v633 * (v437 * v281 + (v511 * v280 + (v99 * v624 + v680))),
-                    v691 = v633 * (v441 * v281 + v502 * v280) + v632 * (v441 * v610 + v609 * v504),
-                    v692 = v630 * v482, v693 = v631 * v482, v694 = v630 * v481, v695 = v631 * v481,
-                    v696 = v630 * v483, v697 = v631 * v483, v698 = v630 * v484, v699 = v631 * v484,
-                    v700 = v473 * v692, v701 = v473 * v693, v702 = v473 * v694, v703 = v473 * v695,
-                    v704 = v472 * v692, v705 = v472 * v693, v706 = v472 * v694, v707 = v472 * v695,
-                    v708 = -(v491 * v692), v709 = -(v491 * v693), v710 = -(v491 * v694),
-                    v711 = -(v491 * v695), v712 = -(v492 * v692), v713 = -(v492 * v693),
-                    v714 = -(v492 * v694), v715 = -(v492 * v695);
-                v564 = softehl_blend(m601, v606, v564); v565 = softehl_blend(m601, v607, v565);
-                v566 = softehl_blend(m601, v608, v566); v567 = softehl_blend(m601, v629, v567);
-                v568 = softehl_blend(m601, v700, v568); v569 = softehl_blend(m601, v701, v569);
-                v570 = softehl_blend(m601, v702, v570); v571 = softehl_blend(m601, v703, v571);
-                v572 = softehl_blend(m601, v704, v572); v573 = softehl_blend(m601, v705, v573);
-                v574 = softehl_blend(m601, v706, v574); v575 = softehl_blend(m601, v707, v575);
-                v576 = softehl_blend(m601, v708, v576); v577 = softehl_blend(m601, v709, v577);
-                v578 = softehl_blend(m601, v710, v578); v579 = softehl_blend(m601, v711, v579);
-                v580 = softehl_blend(m601, v712, v580); v581 = softehl_blend(m601, v713, v581);
-                v582 = softehl_blend(m601, v714, v582); v583 = softehl_blend(m601, v715, v583);
-                v584 = softehl_blend(m601, v696, v584); v585 = softehl_blend(m601, v697, v585);
-                v586 = softehl_blend(m601, v698, v586); v587 = softehl_blend(m601, v699, v587);
-                v588 = softehl_blend(m601, v682, v588); v589 = softehl_blend(m601, v683, v589);
-                v590 = softehl_blend(m601, v609, v590); v591 = softehl_blend(m601, v610, v591);
-                v592 = softehl_blend(m601, v690, v592); v593 = softehl_blend(m601, v634, v593);
-                v594 = softehl_blend(m601, v684, v594); v595 = softehl_blend(m601, v685, v595);
-                v596 = softehl_blend(m601, v686, v596); v597 = softehl_blend(m601, v687, v597);
-                v598 = softehl_blend(m601, v688, v598); v599 = softehl_blend(m601, v689, v599);
-                v600 = softehl_blend(m601, v691, v600);
+                const V v690 = v95 * v628, v691 = v99 * v627, v692 = v610 * v635,
+                    v693 = v611 * v635,
+                    v694 = v635 * (v441 * v613 + v612 * v513) + v636 * (v441 * v284 + (v511 * v283 + (v691 + v104 * v628))),
+                    v695 = v635 * (v442 * v613 + v612 * v517) + v636 * (v442 * v284 + (v515 * v283 + (v101 * v627 - v690))),
+                    v696 = v635 * (v443 * v613 + v612 * v512) + v636 * (v443 * v284 + (v510 * v283 + (v103 * v628 - v691))),
+                    v697 = v636 * (v437 * v284 + v489 * v283) + v635 * (v437 * v613 + v612 * v496),
+                    v698 = v636 * (v438 * v284 + v504 * v283) + v635 * (v438 * v613 + v612 * v506),
+                    v699 = v636 * (v439 * v284 + v488 * v283) + v635 * (v439 * v613 + v612 * v497),
+                    v700 = v635 * (v440 * v613 + v612 * v516) + v636 * (v440 * v284 + (v514 * v283 + (v102 * v627 + v690))),
+                    v701 = v636 * (v444 * v284 + v505 * v283) + v635 * (v444 * v613 + v612 * v507),
+                    v702 = v633 * v485, v703 = v634 * v485, v704 = v633 * v484, v705 = v634 * v484,
+                    v706 = v633 * v486, v707 = v634 * v486, v708 = v633 * v487, v709 = v634 * v487,
+                    v710 = v476 * v702, v711 = v476 * v703, v712 = v476 * v704, v713 = v476 * v705,
+                    v714 = v475 * v702, v715 = v475 * v703, v716 = v475 * v704, v717 = v475 * v705,
+                    v718 = -(v494 * v702), v719 = -(v494 * v703), v720 = -(v494 * v704),
+                    v721 = -(v494 * v705), v722 = -(v495 * v702), v723 = -(v495 * v703),
+                    v724 = -(v495 * v704), v725 = -(v495 * v705);
+                v567 = softehl_blend(m604, v609, v567); v568 = softehl_blend(m604, v610, v568);
+                v569 = softehl_blend(m604, v611, v569); v570 = softehl_blend(m604, v632, v570);
+                v571 = softehl_blend(m604, v710, v571); v572 = softehl_blend(m604, v711, v572);
+                v573 = softehl_blend(m604, v712, v573); v574 = softehl_blend(m604, v713, v574);
+                v575 = softehl_blend(m604, v714, v575); v576 = softehl_blend(m604, v715, v576);
+                v577 = softehl_blend(m604, v716, v577); v578 = softehl_blend(m604, v717, v578);
+                v579 = softehl_blend(m604, v718, v579); v580 = softehl_blend(m604, v719, v580);
+                v581 = softehl_blend(m604, v720, v581); v582 = softehl_blend(m604, v721, v582);
+                v583 = softehl_blend(m604, v722, v583); v584 = softehl_blend(m604, v723, v584);
+                v585 = softehl_blend(m604, v724, v585); v586 = softehl_blend(m604, v725, v586);
+                v587 = softehl_blend(m604, v706, v587); v588 = softehl_blend(m604, v707, v588);
+                v589 = softehl_blend(m604, v708, v589); v590 = softehl_blend(m604, v709, v590);
+                v591 = softehl_blend(m604, v692, v591); v592 = softehl_blend(m604, v693, v592);
+                v593 = softehl_blend(m604, v612, v593); v594 = softehl_blend(m604, v613, v594);
+                v595 = softehl_blend(m604, v700, v595); v596 = softehl_blend(m604, v637, v596);
+                v597 = softehl_blend(m604, v694, v597); v598 = softehl_blend(m604, v695, v598);
+                v599 = softehl_blend(m604, v696, v599); v600 = softehl_blend(m604, v697, v600);
+                v601 = softehl_blend(m604, v698, v601); v602 = softehl_blend(m604, v699, v602);
+                v603 = softehl_blend(m604, v701, v603);
             }
-            v515 = softehl_blend(m562, v564, v515); v516 = softehl_blend(m562, v565, v516);
-            v517 = softehl_blend(m562, v566, v517); v518 = softehl_blend(m562, v567, v518);
-            v519 = softehl_blend(m562, v568, v519); v520 = softehl_blend(m562, v569, v520);
-            v521 = softehl_blend(m562, v570, v521); v522 = softehl_blend(m562, v571, v522);
-            v523 = softehl_blend(m562, v572, v523); v524 = softehl_blend(m562, v573, v524);
-            v525 = softehl_blend(m562, v574, v525); v526 = softehl_blend(m562, v575, v526);
-            v527 = softehl_blend(m562, v576, v527); v528 = softehl_blend(m562, v577, v528);
-            v529 = softehl_blend(m562, v578, v529); v530 = softehl_blend(m562, v579, v530);
-            v531 = softehl_blend(m562, v580, v531); v532 = softehl_blend(m562, v581, v532);
-            v533 = softehl_blend(m562, v582, v533); v534 = softehl_blend(m562, v583, v534);
-            v535 = softehl_blend(m562, v584, v535); v536 = softehl_blend(m562, v585, v536);
-            v537 = softehl_blend(m562, v586, v537); v538 = softehl_blend(m562, v587, v538);
-            v539 = softehl_blend(m562, v588, v539); v541 = softehl_blend(m562, v589, v541);
-            v543 = softehl_blend(m562, v590, v543); v544 = softehl_blend(m562, v591, v544);
-            v545 = softehl_blend(m562, v592, v545); v546 = softehl_blend(m562, v593, v546);
-            v548 = softehl_blend(m562, v594, v548); v550 = softehl_blend(m562, v595, v550);
-            v552 = softehl_blend(m562, v596, v552); v554 = softehl_blend(m562, v597, v554);
-            v556 = softehl_blend(m562, v598, v556); v558 = softehl_blend(m562, v599, v558);
-            v560 = softehl_blend(m562, v600, v560);
+            v518 = softehl_blend(m565, v567, v518); v519 = softehl_blend(m565, v568, v519);
+            v520 = softehl_blend(m565, v569, v520); v521 = softehl_blend(m565, v570, v521);
+            v522 = softehl_blend(m565, v571, v522); v523 = softehl_blend(m565, v572, v523);
+            v524 = softehl_blend(m565, v573, v524); v525 = softehl_blend(m565, v574, v525);
+            v526 = softehl_blend(m565, v575, v526); v527 = softehl_blend(m565, v576, v527);
+            v528 = softehl_blend(m565, v577, v528); v529 = softehl_blend(m565, v578, v529);
+            v530 = softehl_blend(m565, v579, v530); v531 = softehl_blend(m565, v580, v531);
+            v532 = softehl_blend(m565, v581, v532); v533 = softehl_blend(m565, v582, v533);
+            v534 = softehl_blend(m565, v583, v534); v535 = softehl_blend(m565, v584, v535);
+            v536 = softehl_blend(m565, v585, v536); v537 = softehl_blend(m565, v586, v537);
+            v538 = softehl_blend(m565, v587, v538); v539 = softehl_blend(m565, v588, v539);
+            v540 = softehl_blend(m565, v589, v540); v541 = softehl_blend(m565, v590, v541);
+            v542 = softehl_blend(m565, v591, v542); v544 = softehl_blend(m565, v592, v544);
+            v546 = softehl_blend(m565, v593, v546); v547 = softehl_blend(m565, v594, v547);
+            v548 = softehl_blend(m565, v595, v548); v549 = softehl_blend(m565, v596, v549);
+            v551 = softehl_blend(m565, v597, v551); v553 = softehl_blend(m565, v598, v553);
+            v555 = softehl_blend(m565, v599, v555); v557 = softehl_blend(m565, v600, v557);
+            v559 = softehl_blend(m565, v601, v559); v561 = softehl_blend(m565, v602, v561);
+            v563 = softehl_blend(m565, v603, v563);
         }
-        const M m716 = ~v506;
-        if (softehl_any(m716)) {
-            const V v717 = v500 - v461, v718 = v717 * v717, v719 = v717 * v718, v720 = 3.0 * v718,
-                v721 = v457 * v720, v722 = v39 * v720, v723 = -(v456 * v720), v724 = a8 * v720,
-                v725 = v724 * v513, v726 = v724 * v510, v727 = v724 * v514, v728 = v724 * v509,
-                v729 = v724 * v493, v730 = v724 * v503, v731 = v724 * v494, v732 = v724 * v504;
-            v515 = softehl_blend(m716, v719, v515); v516 = softehl_blend(m716, v721, v516);
-            v517 = softehl_blend(m716, v723, v517); v518 = softehl_blend(m716, v719, v518);
-            v540 = softehl_blend(m716, v721, v540); v542 = softehl_blend(m716, v723, v542);
-            v543 = softehl_blend(m716, v724, v543); v544 = softehl_blend(m716, v722, v544);
-            v546 = softehl_blend(m716, v722, v546); v547 = softehl_blend(m716, v725, v547);
-            v549 = softehl_blend(m716, v726, v549); v551 = softehl_blend(m716, v727, v551);
-            v553 = softehl_blend(m716, v728, v553); v555 = softehl_blend(m716, v729, v555);
-            v557 = softehl_blend(m716, v730, v557); v559 = softehl_blend(m716, v731, v559);
-            v561 = softehl_blend(m716, v732, v561);
+        const M m726 = ~v509;
+        if (softehl_any(m726)) {
+            const V v727 = v503 - v464, v728 = v727 * v727, v729 = v727 * v728, v730 = 3.0 * v728,
+                v731 = v460 * v730, v732 = v48 * v730, v733 = -(v459 * v730), v734 = a8 * v730,
+                v735 = v734 * v516, v736 = v734 * v513, v737 = v734 * v517, v738 = v734 * v512,
+                v739 = v734 * v496, v740 = v734 * v506, v741 = v734 * v497, v742 = v734 * v507;
+            v518 = softehl_blend(m726, v729, v518); v519 = softehl_blend(m726, v731, v519);
+            v520 = softehl_blend(m726, v733, v520); v521 = softehl_blend(m726, v729, v521);
+            v543 = softehl_blend(m726, v731, v543); v545 = softehl_blend(m726, v733, v545);
+            v546 = softehl_blend(m726, v734, v546); v547 = softehl_blend(m726, v732, v547);
+            v549 = softehl_blend(m726, v732, v549); v550 = softehl_blend(m726, v735, v550);
+            v552 = softehl_blend(m726, v736, v552); v554 = softehl_blend(m726, v737, v554);
+            v556 = softehl_blend(m726, v738, v556); v558 = softehl_blend(m726, v739, v558);
+            v560 = softehl_blend(m726, v740, v560); v562 = softehl_blend(m726, v741, v562);
+            v564 = softehl_blend(m726, v742, v564);
         }
-        s290 += v519; s291 += v520; s292 += v521; s293 += v522; s294 += v523; s295 += v524;
-        s296 += v525; s297 += v526; s298 += v527; s299 += v528; s300 += v529; s301 += v530;
-        s302 += v531; s303 += v532; s304 += v533; s305 += v534; s306 += v535; s307 += v536;
-        s308 += v537; s309 += v538;
-        const V v733 = v540 + v539, v734 = v542 + v541, v735 = v437 * v544 + v543 * v513,
-            v736 = v438 * v544 + v543 * v510, v737 = v439 * v544 + v543 * v514,
-            v738 = v440 * v544 + v543 * v509, v739 = v434 * v544 + v543 * v493,
-            v740 = v435 * v544 + v543 * v503, v741 = v436 * v544 + v543 * v494,
-            v742 = v441 * v544 + v543 * v504, v743 = w[1] * v516, v744 = v35 * w[1],
-            v745 = w[1] * v517, v746 = v516 * v481 + v733 * v482, v747 = v733 * v481 - v516 * v482;
-        s284 += v743 * v479; s286 += v743 * v480; s285 += v745 * v479; s287 += v745 * v480;
-        const V v748 = v517 * v481 + v734 * v482, v749 = v734 * v481 - v517 * v482;
-        s318 += v733 * v483; s319 += v734 * v483; s320 += v733 * v484; s321 += v734 * v484;
-        s324 += v473 * v747; s323 += v473 * v748; s325 += v473 * v749; s322 += v473 * v746;
-        s326 += v472 * v746; s327 += v472 * v748; s328 += v472 * v747; s329 += v472 * v749;
-        s330 += v491 * v746; s331 += v491 * v748; s332 += v491 * v747; s333 += v491 * v749;
-        s334 += v492 * v746; s335 += v492 * v748; s336 += v492 * v747; s337 += v492 * v749;
-        const V v750 = v744 * v456, v751 = v744 * v455, v752 = v515 * v471, v753 = v515 * v469,
-            v754 = v515 * v278, v755 = v518 * v471, v756 = v518 * v469, v757 = v518 * v278;
-        s282 += v750 * v752; s288 += v750 * v755; s283 += v751 * v752; s289 += v751 * v755;
-        const V v758 = 0.5 * v752, v759 = 0.5 * v755, v760 = v92 * v752, v761 = v92 * v755,
-            v762 = v96 * v752, v763 = v96 * v755, v764 = v35 * (v758 + v456 * v754),
-            v765 = v35 * (v759 + v456 * v757), v766 = v35 * (v455 * v754 - v758),
-            v767 = v35 * (v455 * v757 - v759), v768 = v437 * v546 + (v547 + v545),
-            v769 = v438 * v546 + (v549 + v548), v770 = v439 * v546 + (v551 + v550),
-            v771 = v440 * v546 + (v553 + v552), v772 = v441 * v546 + (v561 + v560),
-            v773 = v434 * v546 + (v555 + v554), v774 = v435 * v546 + (v557 + v556),
-            v775 = v436 * v546 + (v559 + v558), v776 = v474 * v753, v777 = v475 * v753,
-            v778 = v474 * v756, v779 = v475 * v756, v780 = v87 * v515 + v86 * v518,
-            v781 = v87 * v518 - v86 * v515, v782 = v780 * v471, v783 = v781 * v471,
-            v784 = v780 * v469, v785 = v781 * v469, v786 = v780 * v278, v787 = v781 * v278,
-            v788 = 0.5 * v782, v789 = 0.5 * v783;
-        s311 += v492 * v782; s310 += v492 * v783; s312 += v491 * v783; s313 += v491 * v782;
-        s314 += v472 * v783; s315 += v472 * v782; s316 += v473 * v783; s317 += v473 * v782;
-        const V v790 = v437 * v788, v791 = v437 * v789, v792 = v438 * v788, v793 = v438 * v789,
-            v794 = v439 * v788, v795 = v439 * v789, v796 = v440 * v788, v797 = v440 * v789,
-            v798 = v434 * v788, v799 = v434 * v789, v800 = v435 * v788, v801 = v435 * v789,
-            v802 = v436 * v788, v803 = v436 * v789, v804 = v441 * v788, v805 = v441 * v789,
-            v806 = v511 * v788, v807 = v511 * v789, v808 = v508 * v788, v809 = v508 * v789,
-            v810 = v512 * v788, v811 = v512 * v789, v812 = v507 * v788, v813 = v507 * v789,
-            v814 = v486 * v788, v815 = v486 * v789, v816 = v501 * v788, v817 = v501 * v789,
-            v818 = v485 * v788, v819 = v485 * v789, v820 = v502 * v788, v821 = v502 * v789,
-            v822 = v441 * v787 + (v269 * v785 + (v481 * v772 - v742 * v482)),
-            v823 = v252 * v784 + (v437 * v786 + (v99 * v755 + (v760 + v735 * v481))),
-            v824 = w[1] * (v455 * v822 - v805);
-        s385 += v824; const V v825 = w[1] * (v805 + v456 * v822); s401 += v825;
-        const V v826 = w[1] * (v821 - v489 * v822); s417 += v826;
-        const V v827 = w[1] * (v821 + v490 * v822); s433 += v827;
-        const V v828 = v269 * v784 + (v441 * v786 + v742 * v481) + v482 * v772,
-            v829 = v823 + v482 * v768,
-            v830 = v252 * v785 + (v437 * v787 + (v761 - v99 * v752)) - v735 * v482 + v481 * v768;
-        s338 += w[1] * (v252 * v776 + v437 * v766 + v735 * v479);
-        const V v831 = w[1] * (v455 * v828 - v804); s377 += v831;
-        s339 += w[1] * (v253 * v776 + v438 * v766 + v736 * v479);
-        s340 += w[1] * (v254 * v776 + v439 * v766 + v737 * v479);
-        const V v832 = w[1] * (v455 * v830 - v791); s378 += v832;
-        const V v833 = w[1] * (v455 * v829 - v790); s370 += v833;
-        const V v834 = w[1] * (v790 + v456 * v829); s386 += v834;
-        const V v835 = w[1] * (v791 + v456 * v830); s394 += v835;
-        const V v836 = w[1] * (v252 * v777 + (v437 * v764 + v735 * v480)); s346 += v836;
-        const V v837 = w[1] * (v254 * v777 + (v439 * v764 + v737 * v480)); s348 += v837;
-        const V v838 = w[1] * (v253 * v777 + (v438 * v764 + v736 * v480)); s347 += v838;
-        const V v839 = v439 * v787 + (v254 * v785 + (v481 * v770 - v98 * v752 - v761 - v737 * v482)),
-            v840 = v434 * v787 + (v263 * v785 + (v481 * v773 - v739 * v482)),
-            v841 = w[1] * (v455 * v839 - v795);
-        s380 += v841; s350 += w[1] * (v263 * v777 + v434 * v764 + v739 * v480);
-        s342 += w[1] * (v263 * v776 + v434 * v766 + v739 * v479);
-        const V v842 = w[1] * (v455 * v840 - v799); s382 += v842;
-        const V v843 = v253 * v784 + (v438 * v786 + (v763 + (v101 * v752 + v736 * v481)));
-        s341 += w[1] * (v260 * v776 + v440 * v766 + v738 * v479);
-        s349 += w[1] * (v260 * v777 + v440 * v764 + v738 * v480);
-        const V v844 = v843 + v482 * v769,
-            v845 = v263 * v784 + (v434 * v786 + v739 * v481) + v482 * v773,
-            v846 = w[1] * (v253 * v778 + (v438 * v767 + v479 * v769));
-        s355 += v846; const V v847 = w[1] * (v263 * v778 + (v434 * v767 + v479 * v773));
-        s358 += v847; const V v848 = w[1] * (v263 * v779 + (v434 * v765 + v480 * v773));
-        s366 += v848; const V v849 = w[1] * (v253 * v779 + v438 * v765 + v480 * v769); s363 += v849;
-        const V v850 = v438 * v787 + (v253 * v785 + (v101 * v755 - v762 - v736 * v482)) + v481 * v769,
-            v851 = v440 * v787 + (v260 * v785 + (v762 + v100 * v755)) - v738 * v482 + v481 * v771,
-            v852 = w[1] * (v455 * v844 - v792);
-        s371 += v852; const V v853 = w[1] * (v455 * v845 - v798); s374 += v853;
-        const V v854 = w[1] * (v455 * v850 - v793); s379 += v854;
-        const V v855 = w[1] * (v455 * v851 - v797); s381 += v855;
-        const V v856 = w[1] * (v792 + v456 * v844); s387 += v856;
-        const V v857 = w[1] * (v798 + v456 * v845); s390 += v857;
-        const V v858 = w[1] * (v793 + v456 * v850); s395 += v858;
-        const V v859 = w[1] * (v797 + v456 * v851); s397 += v859;
-        const V v860 = w[1] * (v260 * v779 + (v440 * v765 + v480 * v771)); s365 += v860;
-        const V v861 = v260 * v784 + (v440 * v786 + (v100 * v752 + (v738 * v481 - v763))),
-            v862 = v254 * v784 + (v439 * v786 + (v98 * v755 + (v737 * v481 - v760))),
-            v863 = v861 + v482 * v771, v864 = w[1] * (v260 * v778 + v440 * v767 + v479 * v771);
-        s357 += v864;
-        const V v865 = v862 + v482 * v770, v866 = w[1] * (v252 * v778 + v437 * v767 + v479 * v768);
-        s354 += v866; const V v867 = w[1] * (v252 * v779 + v437 * v765 + v480 * v768); s362 += v867;
-        const V v868 = w[1] * (v254 * v778 + v439 * v767 + v479 * v770); s356 += v868;
-        const V v869 = w[1] * (v254 * v779 + v439 * v765 + v480 * v770); s364 += v869;
-        const V v870 = w[1] * (v455 * v863 - v796); s373 += v870;
-        const V v871 = w[1] * (v455 * v865 - v794); s372 += v871;
-        s343 += w[1] * (v265 * v776 + v435 * v766 + v740 * v479);
-        s351 += w[1] * (v265 * v777 + v435 * v764 + v740 * v480);
-        s344 += w[1] * (v266 * v776 + v436 * v766 + v741 * v479);
-        s352 += w[1] * (v266 * v777 + v436 * v764 + v741 * v480);
-        s345 += w[1] * (v269 * v776 + v441 * v766 + v742 * v479);
-        s353 += w[1] * (v269 * v777 + v441 * v764 + v742 * v480);
-        const V v872 = w[1] * (v265 * v778 + v435 * v767 + v479 * v774); s359 += v872;
-        const V v873 = w[1] * (v266 * v778 + v436 * v767 + v479 * v775); s360 += v873;
-        const V v874 = w[1] * (v269 * v778 + v441 * v767 + v479 * v772); s361 += v874;
-        const V v875 = w[1] * (v269 * v779 + v441 * v765 + v480 * v772); s369 += v875;
-        const V v876 = w[1] * (v265 * v779 + v435 * v765 + v480 * v774); s367 += v876;
-        const V v877 = w[1] * (v266 * v779 + v436 * v765 + v480 * v775); s368 += v877;
-        const V v878 = w[1] * (v794 + v456 * v865); s388 += v878;
-        const V v879 = w[1] * (v796 + v456 * v863); s389 += v879;
-        const V v880 = w[1] * (v804 + v456 * v828); s393 += v880;
-        const V v881 = w[1] * (v795 + v456 * v839); s396 += v881;
-        const V v882 = v435 * v786 + (v265 * v784 + (v740 * v481 + v482 * v774)),
-            v883 = v436 * v786 + (v266 * v784 + (v741 * v481 + v482 * v775)),
-            v884 = v435 * v787 + (v265 * v785 + (v481 * v774 - v740 * v482)),
-            v885 = v436 * v787 + (v266 * v785 + (v481 * v775 - v741 * v482)),
-            v886 = w[1] * (v799 + v456 * v840);
-        s398 += v886; const V v887 = w[1] * (v800 + v456 * v882); s391 += v887;
-        const V v888 = w[1] * (v455 * v882 - v800); s375 += v888;
-        const V v889 = w[1] * (v455 * v883 - v802); s376 += v889;
-        const V v890 = w[1] * (v455 * v884 - v801); s383 += v890;
-        const V v891 = w[1] * (v455 * v885 - v803); s384 += v891;
-        const V v892 = w[1] * (v802 + v456 * v883); s392 += v892;
-        const V v893 = w[1] * (v801 + v456 * v884); s399 += v893;
-        const V v894 = w[1] * (v803 + v456 * v885); s400 += v894;
-        const V v895 = w[1] * (v816 - v489 * v882); s407 += v895;
-        const V v896 = w[1] * (v818 - v489 * v883); s408 += v896;
-        const V v897 = w[1] * (v817 - v489 * v884); s415 += v897;
-        const V v898 = w[1] * (v819 - v489 * v885); s416 += v898;
-        const V v899 = w[1] * (v816 + v490 * v882); s423 += v899;
-        const V v900 = w[1] * (v818 + v490 * v883); s424 += v900;
-        const V v901 = w[1] * (v817 + v490 * v884); s431 += v901;
-        const V v902 = w[1] * (v819 + v490 * v885); s432 += v902;
-        const V v903 = w[1] * (v806 - v489 * v829); s402 += v903;
-        const V v904 = w[1] * (v806 + v490 * v829); s418 += v904;
-        const V v905 = w[1] * (v808 - v489 * v844); s403 += v905;
-        const V v906 = w[1] * (v808 + v490 * v844); s419 += v906;
-        const V v907 = w[1] * (v810 - v489 * v865); s404 += v907;
-        const V v908 = w[1] * (v810 + v490 * v865); s420 += v908;
-        const V v909 = w[1] * (v812 - v489 * v863); s405 += v909;
-        const V v910 = w[1] * (v812 + v490 * v863); s421 += v910;
-        const V v911 = w[1] * (v814 - v489 * v845); s406 += v911;
-        const V v912 = w[1] * (v814 + v490 * v845); s422 += v912;
-        const V v913 = w[1] * (v820 - v489 * v828); s409 += v913;
-        const V v914 = w[1] * (v820 + v490 * v828); s425 += v914;
-        const V v915 = w[1] * (v807 - v489 * v830); s410 += v915;
-        const V v916 = w[1] * (v807 + v490 * v830); s426 += v916;
-        const V v917 = w[1] * (v809 - v489 * v850); s411 += v917;
-        const V v918 = w[1] * (v809 + v490 * v850); s427 += v918;
-        const V v919 = w[1] * (v811 - v489 * v839); s412 += v919;
-        const V v920 = w[1] * (v811 + v490 * v839); s428 += v920;
-        const V v921 = w[1] * (v813 - v489 * v851); s413 += v921;
-        const V v922 = w[1] * (v813 + v490 * v851); s429 += v922;
-        const V v923 = w[1] * (v815 - v489 * v840); s414 += v923;
-        const V v924 = w[1] * (v815 + v490 * v840); s430 += v924;
+        s293 += v522; s294 += v523; s295 += v524; s296 += v525; s297 += v526; s298 += v527;
+        s299 += v528; s300 += v529; s301 += v530; s302 += v531; s303 += v532; s304 += v533;
+        s305 += v534; s306 += v535; s307 += v536; s308 += v537; s309 += v538; s310 += v539;
+        s311 += v540; s312 += v541;
+        const V v743 = v543 + v542, v744 = v545 + v544, v745 = v440 * v547 + v546 * v516,
+            v746 = v441 * v547 + v546 * v513, v747 = v442 * v547 + v546 * v517,
+            v748 = v443 * v547 + v546 * v512, v749 = v437 * v547 + v546 * v496,
+            v750 = v438 * v547 + v546 * v506, v751 = v439 * v547 + v546 * v497,
+            v752 = v444 * v547 + v546 * v507, v753 = w[1] * v519, v754 = v31 * w[1],
+            v755 = w[1] * v520, v756 = v519 * v484 + v743 * v485, v757 = v743 * v484 - v519 * v485;
+        s287 += v753 * v482; s289 += v753 * v483; s288 += v755 * v482; s290 += v755 * v483;
+        const V v758 = v520 * v484 + v744 * v485, v759 = v744 * v484 - v520 * v485;
+        s321 += v743 * v486; s322 += v744 * v486; s323 += v743 * v487; s324 += v744 * v487;
+        s327 += v476 * v757; s326 += v476 * v758; s328 += v476 * v759; s325 += v476 * v756;
+        s329 += v475 * v756; s330 += v475 * v758; s331 += v475 * v757; s332 += v475 * v759;
+        s333 += v494 * v756; s334 += v494 * v758; s335 += v494 * v757; s336 += v494 * v759;
+        s337 += v495 * v756; s338 += v495 * v758; s339 += v495 * v757; s340 += v495 * v759;
+        const V v760 = v754 * v459, v761 = v754 * v458, v762 = v518 * v474, v763 = v518 * v472,
+            v764 = v518 * v281, v765 = v521 * v474, v766 = v521 * v472, v767 = v521 * v281;
+        s285 += v760 * v762; s291 += v760 * v765; s286 += v761 * v762; s292 += v761 * v765;
+        const V v768 = 0.5 * v762, v769 = 0.5 * v765, v770 = v95 * v762, v771 = v95 * v765,
+            v772 = v99 * v762, v773 = v99 * v765, v774 = v31 * (v768 + v459 * v764),
+            v775 = v31 * (v769 + v459 * v767), v776 = v31 * (v458 * v764 - v768),
+            v777 = v31 * (v458 * v767 - v769), v778 = v440 * v549 + (v550 + v548),
+            v779 = v441 * v549 + (v552 + v551), v780 = v442 * v549 + (v554 + v553),
+            v781 = v443 * v549 + (v556 + v555), v782 = v444 * v549 + (v564 + v563),
+            v783 = v437 * v549 + (v558 + v557), v784 = v438 * v549 + (v560 + v559),
+            v785 = v439 * v549 + (v562 + v561), v786 = v477 * v763, v787 = v478 * v763,
+            v788 = v477 * v766, v789 = v478 * v766, v790 = v90 * v518 + v89 * v521,
+            v791 = v90 * v521 - v89 * v518, v792 = v790 * v474, v793 = v791 * v474,
+            v794 = v790 * v472, v795 = v791 * v472, v796 = v790 * v281, v797 = v791 * v281,
+            v798 = 0.5 * v792, v799 = 0.5 * v793;
+        s314 += v495 * v792; s313 += v495 * v793; s315 += v494 * v793; s316 += v494 * v792;
+        s317 += v475 * v793; s318 += v475 * v792; s319 += v476 * v793; s320 += v476 * v792;
+        const V v800 = v440 * v798, v801 = v440 * v799, v802 = v441 * v798, v803 = v441 * v799,
+            v804 = v442 * v798, v805 = v442 * v799, v806 = v443 * v798, v807 = v443 * v799,
+            v808 = v437 * v798, v809 = v437 * v799, v810 = v438 * v798, v811 = v438 * v799,
+            v812 = v439 * v798, v813 = v439 * v799, v814 = v444 * v798, v815 = v444 * v799,
+            v816 = v514 * v798, v817 = v514 * v799, v818 = v511 * v798, v819 = v511 * v799,
+            v820 = v515 * v798, v821 = v515 * v799, v822 = v510 * v798, v823 = v510 * v799,
+            v824 = v489 * v798, v825 = v489 * v799, v826 = v504 * v798, v827 = v504 * v799,
+            v828 = v488 * v798, v829 = v488 * v799, v830 = v505 * v798, v831 = v505 * v799,
+            v832 = v444 * v797 + (v272 * v795 + (v484 * v782 - v752 * v485)),
+            v833 = v255 * v794 + (v440 * v796 + (v102 * v765 + (v770 + v745 * v484))),
+            v834 = w[1] * (v458 * v832 - v815);
+        s388 += v834; const V v835 = w[1] * (v815 + v459 * v832); s404 += v835;
+        const V v836 = w[1] * (v831 - v492 * v832); s420 += v836;
+        const V v837 = w[1] * (v831 + v493 * v832); s436 += v837;
+        const V v838 = v272 * v794 + (v444 * v796 + v752 * v484) + v485 * v782,
+            v839 = v833 + v485 * v778,
+            v840 = v255 * v795 + (v440 * v797 + (v771 - v102 * v762)) - v745 * v485 + v484 * v778;
+        s341 += w[1] * (v255 * v786 + v440 * v776 + v745 * v482);
+        const V v841 = w[1] * (v458 * v838 - v814); s380 += v841;
+        s342 += w[1] * (v256 * v786 + v441 * v776 + v746 * v482);
+        s343 += w[1] * (v257 * v786 + v442 * v776 + v747 * v482);
+        const V v842 = w[1] * (v458 * v840 - v801); s381 += v842;
+        const V v843 = w[1] * (v458 * v839 - v800); s373 += v843;
+        const V v844 = w[1] * (v800 + v459 * v839); s389 += v844;
+        const V v845 = w[1] * (v801 + v459 * v840); s397 += v845;
+        const V v846 = w[1] * (v255 * v787 + (v440 * v774 + v745 * v483)); s349 += v846;
+        const V v847 = w[1] * (v257 * v787 + (v442 * v774 + v747 * v483)); s351 += v847;
+        const V v848 = w[1] * (v256 * v787 + (v441 * v774 + v746 * v483)); s350 += v848;
+        const V v849 = v442 * v797 + (v257 * v795 + (v484 * v780 - v101 * v762 - v771 - v747 * v485)),
+            v850 = v437 * v797 + (v266 * v795 + (v484 * v783 - v749 * v485)),
+            v851 = w[1] * (v458 * v849 - v805);
+        s383 += v851; s353 += w[1] * (v266 * v787 + v437 * v774 + v749 * v483);
+        s345 += w[1] * (v266 * v786 + v437 * v776 + v749 * v482);
+        const V v852 = w[1] * (v458 * v850 - v809); s385 += v852;
+        const V v853 = v256 * v794 + (v441 * v796 + (v773 + (v104 * v762 + v746 * v484)));
+        s344 += w[1] * (v263 * v786 + v443 * v776 + v748 * v482);
+        s352 += w[1] * (v263 * v787 + v443 * v774 + v748 * v483);
+        const V v854 = v853 + v485 * v779,
+            v855 = v266 * v794 + (v437 * v796 + v749 * v484) + v485 * v783,
+            v856 = w[1] * (v256 * v788 + (v441 * v777 + v482 * v779));
+        s358 += v856; const V v857 = w[1] * (v266 * v788 + (v437 * v777 + v482 * v783));
+        s361 += v857; const V v858 = w[1] * (v266 * v789 + (v437 * v775 + v483 * v783));
+        s369 += v858; const V v859 = w[1] * (v256 * v789 + v441 * v775 + v483 * v779); s366 += v859;
+        const V v860 = v441 * v797 + (v256 * v795 + (v104 * v765 - v772 - v746 * v485)) + v484 * v779,
+            v861 = v443 * v797 + (v263 * v795 + (v772 + v103 * v765)) - v748 * v485 + v484 * v781,
+            v862 = w[1] * (v458 * v854 - v802);
+        s374 += v862; const V v863 = w[1] * (v458 * v855 - v808); s377 += v863;
+        const V v864 = w[1] * (v458 * v860 - v803); s382 += v864;
+        const V v865 = w[1] * (v458 * v861 - v807); s384 += v865;
+        const V v866 = w[1] * (v802 + v459 * v854); s390 += v866;
+        const V v867 = w[1] * (v808 + v459 * v855); s393 += v867;
+        const V v868 = w[1] * (v803 + v459 * v860); s398 += v868;
+        const V v869 = w[1] * (v807 + v459 * v861); s400 += v869;
+        const V v870 = w[1] * (v263 * v789 + (v443 * v775 + v483 * v781)); s368 += v870;
+        const V v871 = v263 * v794 + (v443 * v796 + (v103 * v762 + (v748 * v484 - v773))),
+            v872 = v257 * v794 + (v442 * v796 + (v101 * v765 + (v747 * v484 - v770))),
+            v873 = v871 + v485 * v781, v874 = w[1] * (v263 * v788 + v443 * v777 + v482 * v781);
+        s360 += v874;
+        const V v875 = v872 + v485 * v780, v876 = w[1] * (v255 * v788 + v440 * v777 + v482 * v778);
+        s357 += v876; const V v877 = w[1] * (v255 * v789 + v440 * v775 + v483 * v778); s365 += v877;
+        const V v878 = w[1] * (v257 * v788 + v442 * v777 + v482 * v780); s359 += v878;
+        const V v879 = w[1] * (v257 * v789 + v442 * v775 + v483 * v780); s367 += v879;
+        const V v880 = w[1] * (v458 * v873 - v806); s376 += v880;
+        const V v881 = w[1] * (v458 * v875 - v804); s375 += v881;
+        s346 += w[1] * (v268 * v786 + v438 * v776 + v750 * v482);
+        s354 += w[1] * (v268 * v787 + v438 * v774 + v750 * v483);
+        s347 += w[1] * (v269 * v786 + v439 * v776 + v751 * v482);
+        s355 += w[1] * (v269 * v787 + v439 * v774 + v751 * v483);
+        s348 += w[1] * (v272 * v786 + v444 * v776 + v752 * v482);
+        s356 += w[1] * (v272 * v787 + v444 * v774 + v752 * v483);
+        const V v882 = w[1] * (v268 * v788 + v438 * v777 + v482 * v784); s362 += v882;
+        const V v883 = w[1] * (v269 * v788 + v439 * v777 + v482 * v785); s363 += v883;
+        const V v884 = w[1] * (v272 * v788 + v444 * v777 + v482 * v782); s364 += v884;
+        const V v885 = w[1] * (v272 * v789 + v444 * v775 + v483 * v782); s372 += v885;
+        const V v886 = w[1] * (v268 * v789 + v438 * v775 + v483 * v784); s370 += v886;
+        const V v887 = w[1] * (v269 * v789 + v439 * v775 + v483 * v785); s371 += v887;
+        const V v888 = w[1] * (v804 + v459 * v875); s391 += v888;
+        const V v889 = w[1] * (v806 + v459 * v873); s392 += v889;
+        const V v890 = w[1] * (v814 + v459 * v838); s396 += v890;
+        const V v891 = w[1] * (v805 + v459 * v849); s399 += v891;
+        const V v892 = v438 * v796 + (v268 * v794 + (v750 * v484 + v485 * v784)),
+            v893 = v439 * v796 + (v269 * v794 + (v751 * v484 + v485 * v785)),
+            v894 = v438 * v797 + (v268 * v795 + (v484 * v784 - v750 * v485)),
+            v895 = v439 * v797 + (v269 * v795 + (v484 * v785 - v751 * v485)),
+            v896 = w[1] * (v809 + v459 * v850);
+        s401 += v896; const V v897 = w[1] * (v810 + v459 * v892); s394 += v897;
+        const V v898 = w[1] * (v458 * v892 - v810); s378 += v898;
+        const V v899 = w[1] * (v458 * v893 - v812); s379 += v899;
+        const V v900 = w[1] * (v458 * v894 - v811); s386 += v900;
+        const V v901 = w[1] * (v458 * v895 - v813); s387 += v901;
+        const V v902 = w[1] * (v812 + v459 * v893); s395 += v902;
+        const V v903 = w[1] * (v811 + v459 * v894); s402 += v903;
+        const V v904 = w[1] * (v813 + v459 * v895); s403 += v904;
+        const V v905 = w[1] * (v826 - v492 * v892); s410 += v905;
+        const V v906 = w[1] * (v828 - v492 * v893); s411 += v906;
+        const V v907 = w[1] * (v827 - v492 * v894); s418 += v907;
+        const V v908 = w[1] * (v829 - v492 * v895); s419 += v908;
+        const V v909 = w[1] * (v826 + v493 * v892); s426 += v909;
+        const V v910 = w[1] * (v828 + v493 * v893); s427 += v910;
+        const V v911 = w[1] * (v827 + v493 * v894); s434 += v911;
+        const V v912 = w[1] * (v829 + v493 * v895); s435 += v912;
+        const V v913 = w[1] * (v816 - v492 * v839); s405 += v913;
+        const V v914 = w[1] * (v816 + v493 * v839); s421 += v914;
+        const V v915 = w[1] * (v818 - v492 * v854); s406 += v915;
+        const V v916 = w[1] * (v818 + v493 * v854); s422 += v916;
+        const V v917 = w[1] * (v820 - v492 * v875); s407 += v917;
+        const V v918 = w[1] * (v820 + v493 * v875); s423 += v918;
+        const V v919 = w[1] * (v822 - v492 * v873); s408 += v919;
+        const V v920 = w[1] * (v822 + v493 * v873); s424 += v920;
+        const V v921 = w[1] * (v824 - v492 * v855); s409 += v921;
+        const V v922 = w[1] * (v824 + v493 * v855); s425 += v922;
+        const V v923 = w[1] * (v830 - v492 * v838); s412 += v923;
+        const V v924 = w[1] * (v830 + v493 * v838); s428 += v924;
+        const V v925 = w[1] * (v817 - v492 * v840); s413 += v925;
+        const V v926 = w[1] * (v817 + v493 * v840); s429 += v926;
+        const V v927 = w[1] * (v819 - v492 * v860); s414 += v927;
+        const V v928 = w[1] * (v819 + v493 * v860); s430 += v928;
+        const V v929 = w[1] * (v821 - v492 * v849); s415 += v929;
+        const V v930 = w[1] * (v821 + v493 * v849); s431 += v930;
+        const V v931 = w[1] * (v823 - v492 * v861); s416 += v931;
+        const V v932 = w[1] * (v823 + v493 * v861); s432 += v932;
+        const V v933 = w[1] * (v825 - v492 * v850); s417 += v933;
+        const V v934 = w[1] * (v825 + v493 * v850); s433 += v934;
     }
-    softehl_store4(K + 104, 144, s284, softehl_splat(0.0), s285, softehl_splat(0.0));
-    softehl_store4(K + 128, 144, s286, softehl_splat(0.0), s287, softehl_splat(0.0));
-    softehl_store4(R + 8, 12, s283, s289, s282, s288);
-    softehl_store4(R + 0, 12, s317, s316, s315, s314);
-    softehl_store4(K + 116, 144, s318, s306, s319, s307);
-    softehl_store4(K + 140, 144, s320, s308, s321, s309);
-    softehl_store4(K + 8, 144, s322, s290, s323, s291);
-    softehl_store4(K + 20, 144, s324, s292, s325, s293);
-    softehl_store4(K + 32, 144, s326, s294, s327, s295);
-    softehl_store4(K + 44, 144, s328, s296, s329, s297);
-    softehl_store4(K + 96, 144, s338, s339, s340, s341);
-    softehl_store4(K + 100, 144, s342, s343, s344, s345);
-    softehl_store4(K + 120, 144, s346, s347, s348, s349);
-    softehl_store4(K + 124, 144, s350, s351, s352, s353);
-    softehl_store4(K + 108, 144, s354, s355, s356, s357);
-    softehl_store4(K + 112, 144, s358, s359, s360, s361);
-    softehl_store4(K + 132, 144, s362, s363, s364, s365);
-    softehl_store4(K + 136, 144, s366, s367, s368, s369);
-    softehl_store4(K + 0, 144, s370, s371, s372, s373);
-    softehl_store4(K + 4, 144, s374, s375, s376, s377);
-    softehl_store4(K + 12, 144, s378, s379, s380, s381);
-    softehl_store4(K + 16, 144, s382, s383, s384, s385);
-    softehl_store4(K + 24, 144, s386, s387, s388, s389);
-    softehl_store4(K + 28, 144, s390, s391, s392, s393);
-    softehl_store4(K + 36, 144, s394, s395, s396, s397);
-    softehl_store4(K + 40, 144, s398, s399, s400, s401);
-    softehl_store4(K + 48, 144, s402, s403, s404, s405);
-    softehl_store4(K + 52, 144, s406, s407, s408, s409);
-    softehl_store4(K + 60, 144, s410, s411, s412, s413);
-    softehl_store4(K + 64, 144, s414, s415, s416, s417);
-    softehl_store4(R + 4, 12, -s313, -s312, -s311, -s310);
-    softehl_store4(K + 56, 144, -s330, s298, -s331, s299);
-    softehl_store4(K + 68, 144, -s332, s300, -s333, s301);
-    softehl_store4(K + 80, 144, -s334, s302, -s335, s303);
-    softehl_store4(K + 92, 144, -s336, s304, -s337, s305);
-    softehl_store4(K + 72, 144, -s418, -s419, -s420, -s421);
-    softehl_store4(K + 76, 144, -s422, -s423, -s424, -s425);
-    softehl_store4(K + 84, 144, -s426, -s427, -s428, -s429);
-    softehl_store4(K + 88, 144, -s430, -s431, -s432, -s433);
+    softehl_store4(K + 104, 144, s287, softehl_splat(0.0), s288, softehl_splat(0.0));
+    softehl_store4(K + 128, 144, s289, softehl_splat(0.0), s290, softehl_splat(0.0));
+    softehl_store4(R + 8, 12, s286, s292, s285, s291);
+    softehl_store4(R + 0, 12, s320, s319, s318, s317);
+    softehl_store4(K + 116, 144, s321, s309, s322, s310);
+    softehl_store4(K + 140, 144, s323, s311, s324, s312);
+    softehl_store4(K + 8, 144, s325, s293, s326, s294);
+    softehl_store4(K + 20, 144, s327, s295, s328, s296);
+    softehl_store4(K + 32, 144, s329, s297, s330, s298);
+    softehl_store4(K + 44, 144, s331, s299, s332, s300);
+    softehl_store4(K + 96, 144, s341, s342, s343, s344);
+    softehl_store4(K + 100, 144, s345, s346, s347, s348);
+    softehl_store4(K + 120, 144, s349, s350, s351, s352);
+    softehl_store4(K + 124, 144, s353, s354, s355, s356);
+    softehl_store4(K + 108, 144, s357, s358, s359, s360);
+    softehl_store4(K + 112, 144, s361, s362, s363, s364);
+    softehl_store4(K + 132, 144, s365, s366, s367, s368);
+    softehl_store4(K + 136, 144, s369, s370, s371, s372);
+    softehl_store4(K + 0, 144, s373, s374, s375, s376);
+    softehl_store4(K + 4, 144, s377, s378, s379, s380);
+    softehl_store4(K + 12, 144, s381, s382, s383, s384);
+    softehl_store4(K + 16, 144, s385, s386, s387, s388);
+    softehl_store4(K + 24, 144, s389, s390, s391, s392);
+    softehl_store4(K + 28, 144, s393, s394, s395, s396);
+    softehl_store4(K + 36, 144, s397, s398, s399, s400);
+    softehl_store4(K + 40, 144, s401, s402, s403, s404);
+    softehl_store4(K + 48, 144, s405, s406, s407, s408);
+    softehl_store4(K + 52, 144, s409, s410, s411, s412);
+    softehl_store4(K + 60, 144, s413, s414, s415, s416);
+    softehl_store4(K + 64, 144, s417, s418, s419, s420);
+    softehl_store4(R + 4, 12, -s316, -s315, -s314, -s313);
+    softehl_store4(K + 56, 144, -s333, s301, -s334, s302);
+    softehl_store4(K + 68, 144, -s335, s303, -s336, s304);
+    softehl_store4(K + 80, 144, -s337, s305, -s338, s306);
+    softehl_store4(K + 92, 144, -s339, s307, -s340, s308);
+    softehl_store4(K + 72, 144, -s421, -s422, -s423, -s424);
+    softehl_store4(K + 76, 144, -s425, -s426, -s427, -s428);
+    softehl_store4(K + 84, 144, -s429, -s430, -s431, -s432);
+    softehl_store4(K + 88, 144, -s433, -s434, -s435, -s436);
 }
 SOFTEHL_BATCH(softehl_mortar_22_tangent, 8, 12, 13, 0, 12, (12 * 12))

@@ -47,151 +47,160 @@ SOFTEHL_GROUP(softehl_mortar_23_residual)
     softehl_load4(a + 0, 15, &a0, &a1, &a2, &a3); softehl_load4(a + 4, 15, &a4, &a5, &a6, &a7);
     softehl_load4(a + 8, 15, &a8, &a9, &a10, &a11); softehl_load3(a + 12, 15, &a12, &a13, &a14);
     const V v1 = X0 + d0, v2 = X2 + d2, v3 = X4 + d4, v4 = X0 + a0, v5 = X2 + a1, v6 = X6 + d6,
-        v7 = X4 + a2, v8 = 0.5 * (X2 - X0), v9 = X1 + d1, v10 = X6 + a3, v11 = X3 + d3,
-        v12 = X1 + a5, v13 = X8 + d8, v14 = X3 + a6, v15 = 0.5 * (X3 - X1), v16 = 1.0 / a10,
-        v17 = X8 + a4, v18 = X9 + d9, v19 = X9 + a9, v20 = X5 + a7, v21 = X5 + d5, v22 = X7 + a8,
-        v23 = X7 + d7, v24 = 0.5 * (v9 + v11), v25 = 0.5 * (v11 - v9), v26 = 0.5 * (v1 + v2),
-        v27 = 0.5 * (v2 - v1), v28 = v27 * v27 + v25 * v25, v29 = 1.0 / v28,
-        v30 = (v27 * (v6 - v26) + v25 * (v23 - v24)) * v29;
-    const M v31 = softehl_lt(softehl_splat(1.0), v30);
-    const V v32 = softehl_blend(v31, softehl_splat(1.0), v30); const M v33 = softehl_eq(v32, v32);
-    const V v34 = (v27 * (v3 - v26) + v25 * (v21 - v24)) * v29;
-    const M v35 = softehl_lt(softehl_splat(1.0), v34);
-    const V v36 = softehl_blend(v35, softehl_splat(1.0), v34); const M v37 = softehl_eq(v36, v36);
-    const V v38 = softehl_vsqrt(v8 * v8 + v15 * v15), v39 = softehl_vsqrt(v28), v40 = 1.0 / v39,
-        v41 = v27 * v40, v42 = v25 * v40;
-    V v43 = softehl_splat(0.0); const M m44 = v33;
-    if (softehl_any(m44)) {
-        const M v45 = softehl_lt(softehl_splat((-1.0)), v32);
-        const V v46 = softehl_blend(v45, v32, softehl_splat((-1.0)));
-        v43 = softehl_blend(m44, v46, v43);
+        v7 = X4 + a2, v8 = 0.5 * (X2 - X0), v9 = X1 + d1, v10 = X6 + a3, v11 = X5 + d5,
+        v12 = X1 + a5, v13 = X8 + d8, v14 = X8 + a4, v15 = X5 + a7;
+    const M v16 = softehl_lt(softehl_splat(0.0), a11);
+    const V v17 = 1.0 / a10, v18 = X9 + d9, v19 = X9 + a9, v20 = X3 + a6, v21 = X3 + d3,
+        v22 = X7 + a8, v23 = X7 + d7, v24 = 0.5 * (X3 - X1), v25 = 0.5 * (v9 + v21),
+        v26 = 0.5 * (v21 - v9), v27 = 0.5 * (v1 + v2), v28 = 0.5 * (v2 - v1),
+        v29 = v28 * v28 + v26 * v26, v30 = 1.0 / v29,
+        v31 = (v28 * (v6 - v27) + v26 * (v23 - v25)) * v30;
+    const M v32 = softehl_lt(softehl_splat(1.0), v31);
+    const V v33 = softehl_blend(v32, softehl_splat(1.0), v31); const M v34 = softehl_eq(v33, v33);
+    const V v35 = (v28 * (v3 - v27) + v26 * (v11 - v25)) * v30;
+    const M v36 = softehl_lt(softehl_splat(1.0), v35);
+    const V v37 = softehl_blend(v36, softehl_splat(1.0), v35); const M v38 = softehl_eq(v37, v37);
+    const V v39 = softehl_vsqrt(v8 * v8 + v24 * v24), v40 = softehl_vsqrt(v29), v41 = 1.0 / v40,
+        v42 = v28 * v41, v43 = v26 * v41;
+    V v44 = softehl_splat(0.0); const M m45 = v34;
+    if (softehl_any(m45)) {
+        const M v46 = softehl_lt(softehl_splat((-1.0)), v33);
+        const V v47 = softehl_blend(v46, v33, softehl_splat((-1.0)));
+        v44 = softehl_blend(m45, v47, v44);
     }
-    const M m47 = ~v33;
-    if (softehl_any(m47)) {
-        const V v48 = (-1.0) - v32, v49 = v48 * (v48 * v48);
-        v43 = softehl_blend(m47, v49, v43);
+    const M m48 = ~v34;
+    if (softehl_any(m48)) {
+        const V v49 = (-1.0) - v33, v50 = v49 * (v49 * v49);
+        v44 = softehl_blend(m48, v50, v44);
     }
-    V v50 = softehl_splat(0.0); const M m51 = v37;
-    if (softehl_any(m51)) {
-        const M v52 = softehl_lt(softehl_splat((-1.0)), v36);
-        const V v53 = softehl_blend(v52, v36, softehl_splat((-1.0)));
-        v50 = softehl_blend(m51, v53, v50);
+    V v51 = softehl_splat(0.0); const M m52 = v38;
+    if (softehl_any(m52)) {
+        const M v53 = softehl_lt(softehl_splat((-1.0)), v37);
+        const V v54 = softehl_blend(v53, v37, softehl_splat((-1.0)));
+        v51 = softehl_blend(m52, v54, v51);
     }
-    const M m54 = ~v37;
-    if (softehl_any(m54)) {
-        const V v55 = (-1.0) - v36, v56 = v55 * (v55 * v55);
-        v50 = softehl_blend(m54, v56, v50);
+    const M m55 = ~v38;
+    if (softehl_any(m55)) {
+        const V v56 = (-1.0) - v37, v57 = v56 * (v56 * v56);
+        v51 = softehl_blend(m55, v57, v51);
     }
-    const V v57 = 4.0 * ((0.5 * (v6 + v3) - v13) * v41 + (0.5 * (v23 + v21) - v18) * v42),
-        v58 = v50 - v43;
-    const M v59 = softehl_eq(v58, v58); V v60 = softehl_splat(0.0); const M m61 = v59;
-    if (softehl_any(m61)) {
-        const M v62 = softehl_lt(softehl_splat(0.0), v58);
-        const V v63 = softehl_blend(v62, v58, softehl_splat(0.0));
-        v60 = softehl_blend(m61, v63, v60);
+    const V v58 = 4.0 * ((0.5 * (v6 + v3) - v13) * v42 + (0.5 * (v23 + v11) - v18) * v43),
+        v59 = v51 - v44;
+    const M v60 = softehl_eq(v59, v59); V v61 = softehl_splat(0.0); const M m62 = v60;
+    if (softehl_any(m62)) {
+        const M v63 = softehl_lt(softehl_splat(0.0), v59);
+        const V v64 = softehl_blend(v63, v59, softehl_splat(0.0));
+        v61 = softehl_blend(m62, v64, v61);
     }
-    const M m64 = ~v59;
-    if (softehl_any(m64)) {
-        const V v65 = v43 - v50, v66 = v65 * (v65 * v65);
-        v60 = softehl_blend(m64, v66, v60);
+    const M m65 = ~v60;
+    if (softehl_any(m65)) {
+        const V v66 = v44 - v51, v67 = v66 * (v66 * v66);
+        v61 = softehl_blend(m65, v67, v61);
     }
-    const V v67 = 0.5 * v60, v68 = v38 * v67, v69 = 0.5 * (v43 + v50),
-        v70 = 0.5 * ((v6 - v3) * v41 + (v23 - v21) * v42), v71 = v70 * v70, v72 = 0.01 * v71;
-    V s73 = {0}, s74 = {0}, s75 = {0}, s76 = {0}, s77 = {0}, s78 = {0}, s79 = {0}, s80 = {0},
-        s81 = {0}, s82 = {0}, s83 = {0}, s84 = {0}, s85 = {0}, s86 = {0};
+    const V v68 = 0.5 * v61, v69 = v39 * v68, v70 = 0.5 * (v44 + v51),
+        v71 = 0.5 * ((v6 - v3) * v42 + (v23 - v11) * v43), v72 = v71 * v71, v73 = 0.01 * v72;
+    V s74 = {0}, s75 = {0}, s76 = {0}, s77 = {0}, s78 = {0}, s79 = {0}, s80 = {0}, s81 = {0},
+        s82 = {0}, s83 = {0}, s84 = {0}, s85 = {0}, s86 = {0}, s87 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
         const double *restrict w = rule + 2 * q; (void)w;
-        const V v87 = 0.5 * (w[0] * v67 + v69), v88 = 0.5 - v87, v89 = 0.5 + v87,
-            v90 = v1 * v88 + v2 * v89, v91 = v9 * v88 + v11 * v89,
-            v92 = v41 * (v13 - v90) + v42 * (v18 - v91), v93 = v71 - v57 * v92;
-        const M v94 = softehl_eq(v93, v93); V v95 = softehl_splat(0.0); const M m96 = v94;
-        if (softehl_any(m96)) {
-            const M v97 = softehl_lt(v72, v93); const V v98 = softehl_blend(v97, v93, v72);
-            v95 = softehl_blend(m96, v98, v95);
+        const V v88 = 0.5 * (w[0] * v68 + v70), v89 = 0.5 - v88, v90 = 0.5 + v88,
+            v91 = v1 * v89 + v2 * v90, v92 = v9 * v89 + v21 * v90,
+            v93 = v42 * (v13 - v91) + v43 * (v18 - v92), v94 = v72 - v58 * v93;
+        const M v95 = softehl_eq(v94, v94); V v96 = softehl_splat(0.0); const M m97 = v95;
+        if (softehl_any(m97)) {
+            const M v98 = softehl_lt(v73, v94); const V v99 = softehl_blend(v98, v94, v73);
+            v96 = softehl_blend(m97, v99, v96);
         }
-        const M m99 = ~v94;
-        if (softehl_any(m99)) {
-            const V v100 = v72 - v93, v101 = v100 * (v100 * v100);
-            v95 = softehl_blend(m99, v101, v95);
+        const M m100 = ~v95;
+        if (softehl_any(m100)) {
+            const V v101 = v73 - v94, v102 = v101 * (v101 * v101);
+            v96 = softehl_blend(m100, v102, v96);
         }
-        const V v102 = softehl_vsqrt(v95), v103 = d10 * v88 + d12 * v89,
-            v104 = 2.0 * v92 * (1.0 / (v70 - v102)), v105 = 1.0 - v104 * v104, v106 = 0.5 * v104,
-            v107 = v106 * ((-1.0) - v104), v108 = v106 * (1.0 - v104),
-            v109 = v42 * (v13 * v105 - v90 - v3 * v107 - v6 * v108) - v41 * (v18 * v105 - v91 - v21 * v107 - v23 * v108),
-            v110 = a10 * v109, v111 = v103 - v110;
-        const M v112 = softehl_eq(v111, v111);
-        V v113 = softehl_splat(0.0), v114 = softehl_splat(0.0);
-        const M m115 = v112;
-        if (softehl_any(m115)) {
-            const M v116 = softehl_le(softehl_splat(0.0), v111);
-            V v117 = softehl_splat(0.0), v118 = softehl_splat(0.0);
-            const M m119 = v116 & m115;
-            if (softehl_any(m119)) {
-                const V v120 = (a12 + v109) * (v109 - a13); const M v121 = softehl_eq(v120, v120);
-                V v122 = softehl_splat(0.0); const M m123 = v121 & m119;
-                if (softehl_any(m123)) {
-                    const M v124 = softehl_lt(v120, softehl_splat(0.0));
-                    const V v125 = softehl_blend(v124, v111, softehl_splat(0.0));
-                    v122 = softehl_blend(m123, v125, v122);
+        const V v103 = softehl_vsqrt(v96), v104 = d10 * v89 + d12 * v90,
+            v105 = 2.0 * v93 * (1.0 / (v71 - v103)), v106 = 1.0 - v105 * v105, v107 = 0.5 * v105,
+            v108 = v107 * ((-1.0) - v105), v109 = v107 * (1.0 - v105),
+            v110 = v43 * (v13 * v106 - v91 - v3 * v108 - v6 * v109) - v42 * (v18 * v106 - v92 - v11 * v108 - v23 * v109),
+            v111 = a10 * v110, v112 = v104 - v111;
+        const M v113 = softehl_eq(v112, v112);
+        V v114 = softehl_splat(0.0), v115 = softehl_splat(0.0);
+        const M m116 = v113;
+        if (softehl_any(m116)) {
+            const M v117 = softehl_le(softehl_splat(0.0), v112);
+            V v118 = softehl_splat(0.0), v119 = softehl_splat(0.0);
+            const M m120 = v117 & m116;
+            if (softehl_any(m120)) {
+                const V v121 = (a12 + v110) * (v110 - a13); const M v122 = softehl_eq(v121, v121);
+                V v123 = softehl_splat(0.0); const M m124 = v122 & m120;
+                if (softehl_any(m124)) {
+                    const M v125 = softehl_lt(v121, softehl_splat(0.0));
+                    const V v126 = softehl_blend(v125, v112, softehl_splat(0.0));
+                    v123 = softehl_blend(m124, v126, v123);
                 }
-                const M m126 = ~v121 & m119;
-                if (softehl_any(m126)) {
-                    const V v127 = v120 * (v120 * v120); v122 = softehl_blend(m126, v127, v122);
+                const M m127 = ~v122 & m120;
+                if (softehl_any(m127)) {
+                    const V v128 = v121 * (v121 * v121); v123 = softehl_blend(m127, v128, v123);
                 }
-                const V v128 = a11 * v122; const M v129 = softehl_eq(v128, v128);
-                const V v130 = v41 * (v17 * v105 - v4 * v88 - v5 * v89 - v7 * v107 - v10 * v108),
-                    v131 = v42 * (v19 * v105 - v12 * v88 - v14 * v89 - v20 * v107 - v22 * v108),
-                    v132 = d11 * v88 + d13 * v89 + a10 * (v130 + v131);
-                const M v133 = softehl_eq(v132, v132), v134 = v129 & v133;
-                V v135 = softehl_splat(0.0); const M m136 = v134 & m119;
-                if (softehl_any(m136)) {
-                    const M v137 = softehl_lt(v128, v132); V v138 = v128;
-                    const M m139 = ~v137 & m136;
-                    if (softehl_any(m139)) {
-                        V v140 = softehl_splat(0.0); const M m141 = v129 & m139;
-                        if (softehl_any(m141)) {
-                            const M v142 = softehl_lt(v128, -v132); V v143 = v132;
-                            const M m144 = v142 & m141;
-                            if (softehl_any(m144)) {
-                                const V v145 = -v128; v143 = softehl_blend(m144, v145, v143);
+                const V v129 = a11 * v123; const M v130 = softehl_eq(v129, v129);
+                const V v131 = v42 * (v14 * v106 - v4 * v89 - v5 * v90 - v7 * v108 - v10 * v109),
+                    v132 = v43 * (v19 * v106 - v12 * v89 - v20 * v90 - v15 * v108 - v22 * v109),
+                    v133 = d11 * v89 + d13 * v90 + a10 * (v131 + v132);
+                const M v134 = softehl_eq(v133, v133), v135 = v130 & v134;
+                V v136 = softehl_splat(0.0); const M m137 = v135 & m120;
+                if (softehl_any(m137)) {
+                    const M v138 = softehl_lt(v129, v133); V v139 = v129;
+                    const M m140 = ~v138 & m137;
+                    if (softehl_any(m140)) {
+                        const V v141 = -v133;
+                        const M v142 = softehl_eq(v141, v141), v143 = v130 & v142;
+                        V v144 = softehl_splat(0.0); const M m145 = v143 & m140;
+                        if (softehl_any(m145)) {
+                            const M v146 = softehl_lt(v129, v141); V v147 = softehl_splat(0.0);
+                            const M m148 = v146 & m145;
+                            if (softehl_any(m148)) {
+                                const V v149 = -v129; v147 = softehl_blend(m148, v149, v147);
                             }
-                            v140 = softehl_blend(m141, v143, v140);
+                            const M m150 = ~v146 & m145;
+                            if (softehl_any(m150)) {
+                                const V v151 = softehl_blend(v16, v133, softehl_splat(0.0));
+                                v147 = softehl_blend(m150, v151, v147);
+                            }
+                            v144 = softehl_blend(m145, v147, v144);
                         }
-                        const M m146 = ~v129 & m139;
-                        if (softehl_any(m146)) {
-                            const V v147 = v132 + v128, v148 = v147 * (v147 * v147);
-                            v140 = softehl_blend(m146, v148, v140);
+                        const M m152 = ~v143 & m140;
+                        if (softehl_any(m152)) {
+                            const V v153 = v133 + v129, v154 = v153 * (v153 * v153);
+                            v144 = softehl_blend(m152, v154, v144);
                         }
-                        v138 = softehl_blend(m139, v140, v138);
+                        v139 = softehl_blend(m140, v144, v139);
                     }
-                    v135 = softehl_blend(m136, v138, v135);
+                    v136 = softehl_blend(m137, v139, v136);
                 }
-                const M m149 = ~v134 & m119;
-                if (softehl_any(m149)) {
-                    const V v150 = v128 - v132, v151 = v150 * (v150 * v150);
-                    v135 = softehl_blend(m149, v151, v135);
+                const M m155 = ~v135 & m120;
+                if (softehl_any(m155)) {
+                    const V v156 = v129 - v133, v157 = v156 * (v156 * v156);
+                    v136 = softehl_blend(m155, v157, v136);
                 }
-                v117 = softehl_blend(m119, v122, v117); v118 = softehl_blend(m119, v135, v118);
+                v118 = softehl_blend(m120, v123, v118); v119 = softehl_blend(m120, v136, v119);
             }
-            v113 = softehl_blend(m115, v117, v113); v114 = softehl_blend(m115, v118, v114);
+            v114 = softehl_blend(m116, v118, v114); v115 = softehl_blend(m116, v119, v115);
         }
-        const M m152 = ~v112;
-        if (softehl_any(m152)) {
-            const V v153 = v110 - v103, v154 = v153 * (v153 * v153);
-            v113 = softehl_blend(m152, v154, v113); v114 = softehl_blend(m152, v154, v114);
+        const M m158 = ~v113;
+        if (softehl_any(m158)) {
+            const V v159 = v111 - v104, v160 = v159 * (v159 * v159);
+            v114 = softehl_blend(m158, v160, v114); v115 = softehl_blend(m158, v160, v115);
         }
-        const V v155 = v16 * w[1], v156 = w[1] * v105, v157 = w[1] * v108, v158 = w[1] * v107,
-            v159 = w[1] * v89, v160 = w[1] * v88, v161 = v155 * v88, v162 = v155 * v89,
-            v163 = v68 * (1.0 + a14 * ((-1.0) + 6.283185307179586 * (X1 * v88 + X3 * v89))),
-            v164 = v113 * v163, v165 = v114 * v163, v166 = (v42 * v113 + v41 * v114) * v163,
-            v167 = (v42 * v114 - v41 * v113) * v163;
-        s73 += v162 * v164; s74 += v161 * v164; s75 += v162 * v165; s76 += v161 * v165;
-        s77 += v156 * v167; s78 += v156 * v166; s79 += v157 * v167; s80 += v157 * v166;
-        s81 += v158 * v167; s82 += v158 * v166; s83 += v159 * v167; s85 += v160 * v167;
-        s84 += v159 * v166; s86 += v160 * v166;
+        const V v161 = v17 * w[1], v162 = w[1] * v106, v163 = w[1] * v109, v164 = w[1] * v108,
+            v165 = w[1] * v90, v166 = w[1] * v89, v167 = v161 * v89, v168 = v161 * v90,
+            v169 = v69 * (1.0 + a14 * ((-1.0) + 6.283185307179586 * (X1 * v89 + X3 * v90))),
+            v170 = v114 * v169, v171 = v115 * v169, v172 = (v43 * v114 + v42 * v115) * v169,
+            v173 = (v43 * v115 - v42 * v114) * v169;
+        s74 += v168 * v170; s75 += v167 * v170; s76 += v168 * v171; s77 += v167 * v171;
+        s78 += v162 * v173; s79 += v162 * v172; s80 += v163 * v173; s81 += v163 * v172;
+        s82 += v164 * v173; s83 += v164 * v172; s84 += v165 * v173; s86 += v166 * v173;
+        s85 += v165 * v172; s87 += v166 * v172;
     }
-    softehl_store2(R + 12, 14, s73, s75); softehl_store4(R + 4, 14, s82, s81, s80, s79);
-    softehl_store4(R + 0, 14, s86, s85, s84, s83); softehl_store4(R + 8, 14, -s78, -s77, s74, s76);
+    softehl_store2(R + 12, 14, s74, s76); softehl_store4(R + 4, 14, s83, s82, s81, s80);
+    softehl_store4(R + 0, 14, s87, s86, s85, s84); softehl_store4(R + 8, 14, -s79, -s78, s75, s77);
 }
 SOFTEHL_BATCH(softehl_mortar_23_residual, 10, 14, 15, 0, 14, 0)
 
@@ -207,322 +216,325 @@ SOFTEHL_GROUP(softehl_mortar_23_tangent)
     V a0, a1, a2, a3, a4, a5, a6, a7, a8, a9, a10, a11, a12, a13, a14;
     softehl_load4(a + 0, 15, &a0, &a1, &a2, &a3); softehl_load4(a + 4, 15, &a4, &a5, &a6, &a7);
     softehl_load4(a + 8, 15, &a8, &a9, &a10, &a11); softehl_load3(a + 12, 15, &a12, &a13, &a14);
-    const V v1 = X2 + d2, v2 = X4 + d4, v3 = X6 + d6, v4 = X2 + a1, v5 = X8 + d8, v6 = X4 + a2,
-        v7 = X6 + a3, v8 = X8 + a4, v9 = 0.5 * (X2 - X0), v10 = X3 + d3, v11 = X0 + a0,
-        v12 = X0 + d0, v13 = X3 + a6, v14 = X1 + a5, v15 = X5 + a7, v16 = X5 + d5,
-        v17 = 0.5 * (X3 - X1), v18 = X1 + d1, v19 = -a11, v20 = X7 + a8, v21 = X7 + d7,
-        v22 = X9 + a9, v23 = X9 + d9, v24 = softehl_vsqrt(v9 * v9 + v17 * v17),
-        v25 = 0.5 * (v21 - v16), v26 = 0.5 * (v18 + v10), v27 = 0.5 * (v21 + v16) - v23,
-        v28 = v10 - X1, v29 = 0.5 * (v10 - v18), v30 = 0.5 * (d10 - d12), v31 = v21 - v26,
-        v32 = v16 - v26, v33 = 0.5 * (d12 - d10), v34 = 1.0 / a10, v35 = -a10, v36 = v28 - d1,
-        v37 = 0.5 * v32, v38 = 0.5 * v31, v39 = 0.5 * v36, v40 = 0.25 * v36,
-        v41 = 0.5 * (d11 - d13), v42 = 0.5 * (d13 - d11), v43 = 0.5 * (v3 - v2), v44 = v1 - X0,
-        v45 = 0.5 * (v12 + v1), v46 = 0.5 * (v1 - v12), v47 = 0.5 * (v3 + v2) - v5, v48 = v3 - v45,
-        v49 = v2 - v45, v50 = v44 - d0, v51 = 0.5 * v50, v52 = 0.25 * v50, v53 = 0.5 * v49,
-        v54 = v49 * v51 + v32 * v39, v55 = 0.5 * v48, v56 = v48 * v51 + v31 * v39,
-        v57 = v51 * v51 + v39 * v39, v58 = 1.0 / v57, v59 = v56 * v58;
-    const M v60 = softehl_lt(softehl_splat(1.0), v59);
-    const V v61 = softehl_blend(v60, softehl_splat(1.0), v59); const M v62 = softehl_eq(v61, v61);
-    const V v63 = v54 * v58; const M v64 = softehl_lt(softehl_splat(1.0), v63);
-    const V v65 = softehl_blend(v64, softehl_splat(1.0), v63); const M v66 = softehl_eq(v65, v65);
-    const V v67 = softehl_vsqrt(v57), v68 = v58 * v58, v69 = (v53 - v52) * v58,
-        v70 = (v55 - v52) * v58, v71 = (v37 - v40) * v58, v72 = (v38 - v40) * v58,
-        v73 = 0.5 * (d0 - v44) * v68, v74 = 0.5 * (d1 - v28) * v68, v75 = softehl_vsqrt(v58),
-        v76 = v51 * v68, v77 = v39 * v68, v78 = v51 * v58, v79 = v39 * v58,
-        v80 = v54 * v73 + (v53 + v52) * v58, v81 = (v55 + v52) * v58 + v56 * v73,
-        v82 = v54 * v74 + (v37 + v40) * v58, v83 = (v38 + v40) * v58 + v56 * v74, v84 = v54 * v76,
-        v85 = v56 * v76, v86 = v54 * v77, v87 = v56 * v77, v88 = 0.5 * v75, v89 = 1.0 / v67,
-        v90 = v51 * v89, v91 = v39 * v89, v92 = v89 * v89, v93 = 0.5 * v89, v94 = 2.0 * v90,
-        v95 = 2.0 * v91, v96 = 0.5 * v90, v97 = 0.5 * v91, v98 = v88 * (v51 * v92),
-        v99 = v88 * (v39 * v92), v100 = v39 * v98, v101 = v51 * v98, v102 = v39 * v99,
-        v103 = v51 * v99, v104 = v93 - v101, v105 = v101 - v93, v106 = v93 - v102,
-        v107 = v102 - v93, v108 = v43 * v103, v109 = v47 * v103, v110 = v43 * v90 + v25 * v91,
-        v111 = v47 * v90 + v27 * v91, v112 = v25 * v100, v113 = v27 * v100;
-    V v114 = softehl_splat(0.0), v115 = softehl_splat(0.0), v116 = softehl_splat(0.0),
-        v117 = softehl_splat(0.0), v118 = softehl_splat(0.0), v119 = softehl_splat(0.0),
-        v120 = softehl_splat(0.0);
-    const M m121 = v62;
-    if (softehl_any(m121)) {
-        const M v122 = softehl_lt(softehl_splat((-1.0)), v61);
-        V v123 = softehl_splat((-1.0)), v124 = softehl_splat(0.0), v125 = softehl_splat(0.0),
-            v126 = softehl_splat(0.0), v127 = softehl_splat(0.0), v128 = softehl_splat(0.0),
-            v129 = softehl_splat(0.0);
-        const M m130 = v122 & m121;
-        if (softehl_any(m130)) {
-            V v131 = v78, v132 = v79, v133 = softehl_splat(0.0), v134 = softehl_splat(0.0),
-                v135 = softehl_splat(0.0), v136 = softehl_splat(0.0);
-            const M m137 = v60 & m130;
-            if (softehl_any(m137)) {
-                v131 = softehl_blend(m137, softehl_splat(0.0), v131);
-                v132 = softehl_blend(m137, softehl_splat(0.0), v132);
+    const V v1 = X0 + d0, v2 = X2 + d2, v3 = X4 + d4, v4 = X0 + a0, v5 = X2 + a1, v6 = X6 + d6,
+        v7 = X4 + a2, v8 = 0.5 * (X2 - X0), v9 = X1 + d1, v10 = X6 + a3, v11 = X3 + d3,
+        v12 = X1 + a5, v13 = X8 + d8, v14 = X3 + a6, v15 = 0.5 * (X3 - X1), v16 = X8 + a4,
+        v17 = X9 + d9, v18 = X9 + a9, v19 = X5 + a7, v20 = X5 + d5, v21 = X7 + a8, v22 = X7 + d7,
+        v23 = 0.5 * (d13 - d11), v24 = softehl_vsqrt(v8 * v8 + v15 * v15), v25 = 0.5 * (v9 + v11),
+        v26 = 0.5 * (v11 - v9), v27 = 0.5 * (v22 - v20), v28 = v22 - v25, v29 = v20 - v25,
+        v30 = 0.5 * (v22 + v20) - v17;
+    const M v31 = softehl_lt(softehl_splat(0.0), a11);
+    const V v32 = -a11, v33 = 1.0 / a10, v34 = -a10, v35 = 0.5 * (v6 - v3), v36 = 0.5 * (v1 + v2),
+        v37 = 0.5 * (v2 - v1), v38 = 0.5 * (v6 + v3) - v13, v39 = v6 - v36, v40 = v3 - v36,
+        v41 = softehl_blend(v31, a10, softehl_splat(0.0)),
+        v42 = softehl_blend(v31, v23, softehl_splat(0.0)), v43 = v2 - X0, v44 = v11 - X1,
+        v45 = 0.5 * (d11 - d13), v46 = v43 - d0, v47 = v44 - d1, v48 = 0.5 * v46, v49 = 0.25 * v46,
+        v50 = 0.5 * v47, v51 = 0.25 * v47, v52 = 0.5 * v40, v53 = 0.5 * v39,
+        v54 = 0.5 * (d10 - d12), v55 = v48 * v48 + v50 * v50, v56 = 0.5 * (d12 - d10),
+        v57 = 1.0 / v55, v58 = v39 * v48 + v28 * v50, v59 = 0.5 * v28, v60 = v40 * v48 + v29 * v50,
+        v61 = 0.5 * v29, v62 = v58 * v57;
+    const M v63 = softehl_lt(softehl_splat(1.0), v62);
+    const V v64 = softehl_blend(v63, softehl_splat(1.0), v62); const M v65 = softehl_eq(v64, v64);
+    const V v66 = v60 * v57; const M v67 = softehl_lt(softehl_splat(1.0), v66);
+    const V v68 = softehl_blend(v67, softehl_splat(1.0), v66); const M v69 = softehl_eq(v68, v68);
+    const V v70 = softehl_vsqrt(v55), v71 = v57 * v57, v72 = (v52 - v49) * v57,
+        v73 = (v53 - v49) * v57, v74 = (v61 - v51) * v57, v75 = (v59 - v51) * v57,
+        v76 = 0.5 * (d0 - v43) * v71, v77 = 0.5 * (d1 - v44) * v71, v78 = softehl_vsqrt(v57),
+        v79 = v48 * v71, v80 = v50 * v71, v81 = v48 * v57, v82 = v50 * v57,
+        v83 = v60 * v76 + (v52 + v49) * v57, v84 = (v53 + v49) * v57 + v58 * v76,
+        v85 = v60 * v77 + (v61 + v51) * v57, v86 = (v59 + v51) * v57 + v58 * v77, v87 = v60 * v79,
+        v88 = v58 * v79, v89 = v60 * v80, v90 = v58 * v80, v91 = 0.5 * v78, v92 = 1.0 / v70,
+        v93 = v48 * v92, v94 = v50 * v92, v95 = v92 * v92, v96 = 0.5 * v92, v97 = 2.0 * v93,
+        v98 = 2.0 * v94, v99 = 0.5 * v93, v100 = 0.5 * v94, v101 = v91 * (v48 * v95),
+        v102 = v91 * (v50 * v95), v103 = v50 * v101, v104 = v48 * v101, v105 = v50 * v102,
+        v106 = v48 * v102, v107 = v96 - v104, v108 = v104 - v96, v109 = v96 - v105,
+        v110 = v105 - v96, v111 = v35 * v106, v112 = v38 * v106, v113 = v35 * v93 + v27 * v94,
+        v114 = v38 * v93 + v30 * v94, v115 = v27 * v103, v116 = v30 * v103;
+    V v117 = softehl_splat(0.0), v118 = softehl_splat(0.0), v119 = softehl_splat(0.0),
+        v120 = softehl_splat(0.0), v121 = softehl_splat(0.0), v122 = softehl_splat(0.0),
+        v123 = softehl_splat(0.0);
+    const M m124 = v65;
+    if (softehl_any(m124)) {
+        const M v125 = softehl_lt(softehl_splat((-1.0)), v64);
+        V v126 = softehl_splat((-1.0)), v127 = softehl_splat(0.0), v128 = softehl_splat(0.0),
+            v129 = softehl_splat(0.0), v130 = softehl_splat(0.0), v131 = softehl_splat(0.0),
+            v132 = softehl_splat(0.0);
+        const M m133 = v125 & m124;
+        if (softehl_any(m133)) {
+            V v134 = v81, v135 = v82, v136 = softehl_splat(0.0), v137 = softehl_splat(0.0),
+                v138 = softehl_splat(0.0), v139 = softehl_splat(0.0);
+            const M m140 = v63 & m133;
+            if (softehl_any(m140)) {
+                v134 = softehl_blend(m140, softehl_splat(0.0), v134);
+                v135 = softehl_blend(m140, softehl_splat(0.0), v135);
             }
-            const M m138 = ~v60 & m130;
-            if (softehl_any(m138)) {
-                const V v139 = -v81, v140 = -v83, v141 = v70 - v85, v142 = v72 - v87;
-                v133 = softehl_blend(m138, v139, v133); v134 = softehl_blend(m138, v140, v134);
-                v135 = softehl_blend(m138, v141, v135); v136 = softehl_blend(m138, v142, v136);
+            const M m141 = ~v63 & m133;
+            if (softehl_any(m141)) {
+                const V v142 = -v84, v143 = -v86, v144 = v73 - v88, v145 = v75 - v90;
+                v136 = softehl_blend(m141, v142, v136); v137 = softehl_blend(m141, v143, v137);
+                v138 = softehl_blend(m141, v144, v138); v139 = softehl_blend(m141, v145, v139);
             }
-            v123 = softehl_blend(m130, v61, v123); v124 = softehl_blend(m130, v131, v124);
-            v125 = softehl_blend(m130, v132, v125); v126 = softehl_blend(m130, v133, v126);
-            v127 = softehl_blend(m130, v134, v127); v128 = softehl_blend(m130, v135, v128);
-            v129 = softehl_blend(m130, v136, v129);
+            v126 = softehl_blend(m133, v64, v126); v127 = softehl_blend(m133, v134, v127);
+            v128 = softehl_blend(m133, v135, v128); v129 = softehl_blend(m133, v136, v129);
+            v130 = softehl_blend(m133, v137, v130); v131 = softehl_blend(m133, v138, v131);
+            v132 = softehl_blend(m133, v139, v132);
         }
-        v114 = softehl_blend(m121, v123, v114); v115 = softehl_blend(m121, v126, v115);
-        v116 = softehl_blend(m121, v127, v116); v117 = softehl_blend(m121, v128, v117);
-        v118 = softehl_blend(m121, v129, v118); v119 = softehl_blend(m121, v124, v119);
-        v120 = softehl_blend(m121, v125, v120);
+        v117 = softehl_blend(m124, v126, v117); v118 = softehl_blend(m124, v129, v118);
+        v119 = softehl_blend(m124, v130, v119); v120 = softehl_blend(m124, v131, v120);
+        v121 = softehl_blend(m124, v132, v121); v122 = softehl_blend(m124, v127, v122);
+        v123 = softehl_blend(m124, v128, v123);
     }
-    const M m143 = ~v62;
-    if (softehl_any(m143)) {
-        const V v144 = (-1.0) - v61, v145 = v144 * (v144 * v144);
-        V v146 = softehl_splat(0.0), v147 = softehl_splat(0.0), v148 = softehl_splat(0.0),
-            v149 = softehl_splat(0.0), v150 = softehl_splat(0.0), v151 = softehl_splat(0.0);
-        const M m152 = ~v60 & m143;
-        if (softehl_any(m152)) {
-            const V v153 = (-1.0) - v59, v154 = v153 * (3.0 * v153), v155 = (v85 - v70) * v154,
-                v156 = (v87 - v72) * v154, v157 = v81 * v154, v158 = v83 * v154,
-                v159 = -(v78 * v154), v160 = -(v79 * v154);
-            v146 = softehl_blend(m152, v157, v146); v147 = softehl_blend(m152, v158, v147);
-            v148 = softehl_blend(m152, v155, v148); v149 = softehl_blend(m152, v156, v149);
-            v150 = softehl_blend(m152, v159, v150); v151 = softehl_blend(m152, v160, v151);
+    const M m146 = ~v65;
+    if (softehl_any(m146)) {
+        const V v147 = (-1.0) - v64, v148 = v147 * (v147 * v147);
+        V v149 = softehl_splat(0.0), v150 = softehl_splat(0.0), v151 = softehl_splat(0.0),
+            v152 = softehl_splat(0.0), v153 = softehl_splat(0.0), v154 = softehl_splat(0.0);
+        const M m155 = ~v63 & m146;
+        if (softehl_any(m155)) {
+            const V v156 = (-1.0) - v62, v157 = v156 * (3.0 * v156), v158 = (v88 - v73) * v157,
+                v159 = (v90 - v75) * v157, v160 = v84 * v157, v161 = v86 * v157,
+                v162 = -(v81 * v157), v163 = -(v82 * v157);
+            v149 = softehl_blend(m155, v160, v149); v150 = softehl_blend(m155, v161, v150);
+            v151 = softehl_blend(m155, v158, v151); v152 = softehl_blend(m155, v159, v152);
+            v153 = softehl_blend(m155, v162, v153); v154 = softehl_blend(m155, v163, v154);
         }
-        v114 = softehl_blend(m143, v145, v114); v115 = softehl_blend(m143, v146, v115);
-        v116 = softehl_blend(m143, v147, v116); v117 = softehl_blend(m143, v148, v117);
-        v118 = softehl_blend(m143, v149, v118); v119 = softehl_blend(m143, v150, v119);
-        v120 = softehl_blend(m143, v151, v120);
+        v117 = softehl_blend(m146, v148, v117); v118 = softehl_blend(m146, v149, v118);
+        v119 = softehl_blend(m146, v150, v119); v120 = softehl_blend(m146, v151, v120);
+        v121 = softehl_blend(m146, v152, v121); v122 = softehl_blend(m146, v153, v122);
+        v123 = softehl_blend(m146, v154, v123);
     }
-    V v161 = softehl_splat(0.0), v162 = softehl_splat(0.0), v163 = softehl_splat(0.0),
-        v164 = softehl_splat(0.0), v165 = softehl_splat(0.0), v166 = softehl_splat(0.0),
-        v167 = softehl_splat(0.0);
-    const M m168 = v66;
-    if (softehl_any(m168)) {
-        const M v169 = softehl_lt(softehl_splat((-1.0)), v65);
-        V v170 = softehl_splat((-1.0)), v171 = softehl_splat(0.0), v172 = softehl_splat(0.0),
-            v173 = softehl_splat(0.0), v174 = softehl_splat(0.0), v175 = softehl_splat(0.0),
-            v176 = softehl_splat(0.0);
-        const M m177 = v169 & m168;
-        if (softehl_any(m177)) {
-            V v178 = v78, v179 = v79, v180 = softehl_splat(0.0), v181 = softehl_splat(0.0),
-                v182 = softehl_splat(0.0), v183 = softehl_splat(0.0);
-            const M m184 = v64 & m177;
-            if (softehl_any(m184)) {
-                v178 = softehl_blend(m184, softehl_splat(0.0), v178);
-                v179 = softehl_blend(m184, softehl_splat(0.0), v179);
+    V v164 = softehl_splat(0.0), v165 = softehl_splat(0.0), v166 = softehl_splat(0.0),
+        v167 = softehl_splat(0.0), v168 = softehl_splat(0.0), v169 = softehl_splat(0.0),
+        v170 = softehl_splat(0.0);
+    const M m171 = v69;
+    if (softehl_any(m171)) {
+        const M v172 = softehl_lt(softehl_splat((-1.0)), v68);
+        V v173 = softehl_splat((-1.0)), v174 = softehl_splat(0.0), v175 = softehl_splat(0.0),
+            v176 = softehl_splat(0.0), v177 = softehl_splat(0.0), v178 = softehl_splat(0.0),
+            v179 = softehl_splat(0.0);
+        const M m180 = v172 & m171;
+        if (softehl_any(m180)) {
+            V v181 = v81, v182 = v82, v183 = softehl_splat(0.0), v184 = softehl_splat(0.0),
+                v185 = softehl_splat(0.0), v186 = softehl_splat(0.0);
+            const M m187 = v67 & m180;
+            if (softehl_any(m187)) {
+                v181 = softehl_blend(m187, softehl_splat(0.0), v181);
+                v182 = softehl_blend(m187, softehl_splat(0.0), v182);
             }
-            const M m185 = ~v64 & m177;
-            if (softehl_any(m185)) {
-                const V v186 = -v80, v187 = -v82, v188 = v69 - v84, v189 = v71 - v86;
-                v180 = softehl_blend(m185, v186, v180); v181 = softehl_blend(m185, v187, v181);
-                v182 = softehl_blend(m185, v188, v182); v183 = softehl_blend(m185, v189, v183);
+            const M m188 = ~v67 & m180;
+            if (softehl_any(m188)) {
+                const V v189 = -v83, v190 = -v85, v191 = v72 - v87, v192 = v74 - v89;
+                v183 = softehl_blend(m188, v189, v183); v184 = softehl_blend(m188, v190, v184);
+                v185 = softehl_blend(m188, v191, v185); v186 = softehl_blend(m188, v192, v186);
             }
-            v170 = softehl_blend(m177, v65, v170); v171 = softehl_blend(m177, v178, v171);
-            v172 = softehl_blend(m177, v179, v172); v173 = softehl_blend(m177, v180, v173);
-            v174 = softehl_blend(m177, v181, v174); v175 = softehl_blend(m177, v182, v175);
-            v176 = softehl_blend(m177, v183, v176);
+            v173 = softehl_blend(m180, v68, v173); v174 = softehl_blend(m180, v181, v174);
+            v175 = softehl_blend(m180, v182, v175); v176 = softehl_blend(m180, v183, v176);
+            v177 = softehl_blend(m180, v184, v177); v178 = softehl_blend(m180, v185, v178);
+            v179 = softehl_blend(m180, v186, v179);
         }
-        v161 = softehl_blend(m168, v170, v161); v162 = softehl_blend(m168, v173, v162);
-        v163 = softehl_blend(m168, v174, v163); v164 = softehl_blend(m168, v175, v164);
-        v165 = softehl_blend(m168, v176, v165); v166 = softehl_blend(m168, v171, v166);
-        v167 = softehl_blend(m168, v172, v167);
+        v164 = softehl_blend(m171, v173, v164); v165 = softehl_blend(m171, v176, v165);
+        v166 = softehl_blend(m171, v177, v166); v167 = softehl_blend(m171, v178, v167);
+        v168 = softehl_blend(m171, v179, v168); v169 = softehl_blend(m171, v174, v169);
+        v170 = softehl_blend(m171, v175, v170);
     }
-    const M m190 = ~v66;
-    if (softehl_any(m190)) {
-        const V v191 = (-1.0) - v65, v192 = v191 * (v191 * v191);
-        V v193 = softehl_splat(0.0), v194 = softehl_splat(0.0), v195 = softehl_splat(0.0),
-            v196 = softehl_splat(0.0), v197 = softehl_splat(0.0), v198 = softehl_splat(0.0);
-        const M m199 = ~v64 & m190;
-        if (softehl_any(m199)) {
-            const V v200 = (-1.0) - v63, v201 = v200 * (3.0 * v200), v202 = (v84 - v69) * v201,
-                v203 = (v86 - v71) * v201, v204 = v80 * v201, v205 = v82 * v201,
-                v206 = -(v78 * v201), v207 = -(v79 * v201);
-            v193 = softehl_blend(m199, v204, v193); v194 = softehl_blend(m199, v205, v194);
-            v195 = softehl_blend(m199, v202, v195); v196 = softehl_blend(m199, v203, v196);
-            v197 = softehl_blend(m199, v206, v197); v198 = softehl_blend(m199, v207, v198);
+    const M m193 = ~v69;
+    if (softehl_any(m193)) {
+        const V v194 = (-1.0) - v68, v195 = v194 * (v194 * v194);
+        V v196 = softehl_splat(0.0), v197 = softehl_splat(0.0), v198 = softehl_splat(0.0),
+            v199 = softehl_splat(0.0), v200 = softehl_splat(0.0), v201 = softehl_splat(0.0);
+        const M m202 = ~v67 & m193;
+        if (softehl_any(m202)) {
+            const V v203 = (-1.0) - v66, v204 = v203 * (3.0 * v203), v205 = (v87 - v72) * v204,
+                v206 = (v89 - v74) * v204, v207 = v83 * v204, v208 = v85 * v204,
+                v209 = -(v81 * v204), v210 = -(v82 * v204);
+            v196 = softehl_blend(m202, v207, v196); v197 = softehl_blend(m202, v208, v197);
+            v198 = softehl_blend(m202, v205, v198); v199 = softehl_blend(m202, v206, v199);
+            v200 = softehl_blend(m202, v209, v200); v201 = softehl_blend(m202, v210, v201);
         }
-        v161 = softehl_blend(m190, v192, v161); v162 = softehl_blend(m190, v193, v162);
-        v163 = softehl_blend(m190, v194, v163); v164 = softehl_blend(m190, v195, v164);
-        v165 = softehl_blend(m190, v196, v165); v166 = softehl_blend(m190, v197, v166);
-        v167 = softehl_blend(m190, v198, v167);
+        v164 = softehl_blend(m193, v195, v164); v165 = softehl_blend(m193, v196, v165);
+        v166 = softehl_blend(m193, v197, v166); v167 = softehl_blend(m193, v198, v167);
+        v168 = softehl_blend(m193, v199, v168); v169 = softehl_blend(m193, v200, v169);
+        v170 = softehl_blend(m193, v201, v170);
     }
-    const V v208 = v110 * v110, v209 = 2.0 * v110, v210 = v161 - v114, v211 = 0.01 * v208,
-        v212 = 4.0 * v111, v213 = 4.0 * v90 * v111, v214 = 4.0 * v91 * v111;
-    const M v215 = softehl_eq(v210, v210);
-    const V v216 = v96 * v209, v217 = v97 * v209, v218 = -v213, v219 = -v214,
-        v220 = v112 + v43 * v105, v221 = v113 + v47 * v105, v222 = v47 * v104 - v113,
-        v223 = v43 * v104 - v112, v224 = v108 + v25 * v107, v225 = v109 + v27 * v107,
-        v226 = v25 * v106 - v108, v227 = v27 * v106 - v109;
-    V v228 = softehl_splat(0.0), v229 = softehl_splat(0.0), v230 = softehl_splat(0.0),
-        v231 = softehl_splat(0.0), v232 = softehl_splat(0.0), v233 = softehl_splat(0.0),
-        v234 = softehl_splat(0.0), v235 = softehl_splat(0.0), v236 = softehl_splat(0.0);
-    const M m237 = v215;
-    if (softehl_any(m237)) {
-        const M v238 = softehl_lt(softehl_splat(0.0), v210);
-        V v239 = softehl_splat(0.0), v240 = softehl_splat(0.0), v241 = softehl_splat(0.0),
-            v242 = softehl_splat(0.0), v243 = softehl_splat(0.0), v244 = softehl_splat(0.0),
-            v245 = softehl_splat(0.0), v246 = softehl_splat(0.0), v247 = softehl_splat(0.0);
-        const M m248 = v238 & m237;
-        if (softehl_any(m248)) {
-            const V v249 = -v119, v250 = v162 - v115, v251 = -v120, v252 = v163 - v116,
-                v253 = v164 - v117, v254 = v165 - v118;
-            v239 = softehl_blend(m248, v210, v239); v240 = softehl_blend(m248, v250, v240);
-            v241 = softehl_blend(m248, v252, v241); v242 = softehl_blend(m248, v253, v242);
-            v243 = softehl_blend(m248, v254, v243); v244 = softehl_blend(m248, v166, v244);
-            v245 = softehl_blend(m248, v167, v245); v246 = softehl_blend(m248, v249, v246);
-            v247 = softehl_blend(m248, v251, v247);
+    const V v211 = v113 * v113, v212 = 2.0 * v113, v213 = v164 - v117, v214 = 0.01 * v211,
+        v215 = 4.0 * v114, v216 = 4.0 * v93 * v114, v217 = 4.0 * v94 * v114;
+    const M v218 = softehl_eq(v213, v213);
+    const V v219 = v99 * v212, v220 = v100 * v212, v221 = -v216, v222 = -v217,
+        v223 = v115 + v35 * v108, v224 = v116 + v38 * v108, v225 = v38 * v107 - v116,
+        v226 = v35 * v107 - v115, v227 = v111 + v27 * v110, v228 = v112 + v30 * v110,
+        v229 = v27 * v109 - v111, v230 = v30 * v109 - v112;
+    V v231 = softehl_splat(0.0), v232 = softehl_splat(0.0), v233 = softehl_splat(0.0),
+        v234 = softehl_splat(0.0), v235 = softehl_splat(0.0), v236 = softehl_splat(0.0),
+        v237 = softehl_splat(0.0), v238 = softehl_splat(0.0), v239 = softehl_splat(0.0);
+    const M m240 = v218;
+    if (softehl_any(m240)) {
+        const M v241 = softehl_lt(softehl_splat(0.0), v213);
+        V v242 = softehl_splat(0.0), v243 = softehl_splat(0.0), v244 = softehl_splat(0.0),
+            v245 = softehl_splat(0.0), v246 = softehl_splat(0.0), v247 = softehl_splat(0.0),
+            v248 = softehl_splat(0.0), v249 = softehl_splat(0.0), v250 = softehl_splat(0.0);
+        const M m251 = v241 & m240;
+        if (softehl_any(m251)) {
+            const V v252 = -v122, v253 = v165 - v118, v254 = -v123, v255 = v166 - v119,
+                v256 = v167 - v120, v257 = v168 - v121;
+            v242 = softehl_blend(m251, v213, v242); v243 = softehl_blend(m251, v253, v243);
+            v244 = softehl_blend(m251, v255, v244); v245 = softehl_blend(m251, v256, v245);
+            v246 = softehl_blend(m251, v257, v246); v247 = softehl_blend(m251, v169, v247);
+            v248 = softehl_blend(m251, v170, v248); v249 = softehl_blend(m251, v252, v249);
+            v250 = softehl_blend(m251, v254, v250);
         }
-        v228 = softehl_blend(m237, v239, v228); v229 = softehl_blend(m237, v240, v229);
-        v230 = softehl_blend(m237, v241, v230); v231 = softehl_blend(m237, v242, v231);
-        v232 = softehl_blend(m237, v243, v232); v233 = softehl_blend(m237, v244, v233);
-        v234 = softehl_blend(m237, v245, v234); v235 = softehl_blend(m237, v246, v235);
-        v236 = softehl_blend(m237, v247, v236);
+        v231 = softehl_blend(m240, v242, v231); v232 = softehl_blend(m240, v243, v232);
+        v233 = softehl_blend(m240, v244, v233); v234 = softehl_blend(m240, v245, v234);
+        v235 = softehl_blend(m240, v246, v235); v236 = softehl_blend(m240, v247, v236);
+        v237 = softehl_blend(m240, v248, v237); v238 = softehl_blend(m240, v249, v238);
+        v239 = softehl_blend(m240, v250, v239);
     }
-    const M m255 = ~v215;
-    if (softehl_any(m255)) {
-        const V v256 = v114 - v161, v257 = v256 * v256, v258 = v256 * v257, v259 = 3.0 * v257,
-            v260 = (v115 - v162) * v259, v261 = (v116 - v163) * v259, v262 = (v117 - v164) * v259,
-            v263 = (v118 - v165) * v259, v264 = -(v166 * v259), v265 = -(v167 * v259),
-            v266 = v119 * v259, v267 = v120 * v259;
-        v228 = softehl_blend(m255, v258, v228); v229 = softehl_blend(m255, v260, v229);
-        v230 = softehl_blend(m255, v261, v230); v231 = softehl_blend(m255, v262, v231);
-        v232 = softehl_blend(m255, v263, v232); v233 = softehl_blend(m255, v264, v233);
-        v234 = softehl_blend(m255, v265, v234); v235 = softehl_blend(m255, v266, v235);
-        v236 = softehl_blend(m255, v267, v236);
+    const M m258 = ~v218;
+    if (softehl_any(m258)) {
+        const V v259 = v117 - v164, v260 = v259 * v259, v261 = v259 * v260, v262 = 3.0 * v260,
+            v263 = (v118 - v165) * v262, v264 = (v119 - v166) * v262, v265 = (v120 - v167) * v262,
+            v266 = (v121 - v168) * v262, v267 = -(v169 * v262), v268 = -(v170 * v262),
+            v269 = v122 * v262, v270 = v123 * v262;
+        v231 = softehl_blend(m258, v261, v231); v232 = softehl_blend(m258, v263, v232);
+        v233 = softehl_blend(m258, v264, v233); v234 = softehl_blend(m258, v265, v234);
+        v235 = softehl_blend(m258, v266, v235); v236 = softehl_blend(m258, v267, v236);
+        v237 = softehl_blend(m258, v268, v237); v238 = softehl_blend(m258, v269, v238);
+        v239 = softehl_blend(m258, v270, v239);
     }
-    const V v268 = 0.5 * v228, v269 = 0.5 * v229, v270 = 0.5 * v230, v271 = 0.5 * v231,
-        v272 = v24 * v268, v273 = v24 * v269, v274 = v24 * v270, v275 = v24 * v271,
-        v276 = 0.5 * (v114 + v161), v277 = 0.5 * v232, v278 = 0.5 * (v162 + v115),
-        v279 = 0.5 * v233, v280 = 0.5 * (v163 + v116), v281 = v24 * v277, v282 = v24 * v279,
-        v283 = 0.5 * v234, v284 = 0.5 * v235, v285 = 0.5 * v236, v286 = 0.5 * (v164 + v117),
-        v287 = v24 * v283, v288 = v24 * v284, v289 = v24 * v285, v290 = 0.5 * (v165 + v118),
-        v291 = 0.5 * v166, v292 = 0.5 * v167, v293 = 0.5 * v119, v294 = 0.5 * v120,
-        v295 = v272 * (6.283185307179586 * (a14 * v17)),
-        v296 = 0.5 * ((v11 - v4) * v90 + (v14 - v13) * v91);
-    V s297 = {0}, s298 = {0}, s299 = {0}, s300 = {0}, s301 = {0}, s302 = {0}, s303 = {0},
-        s304 = {0}, s305 = {0}, s306 = {0}, s307 = {0}, s308 = {0}, s309 = {0}, s310 = {0},
-        s311 = {0}, s312 = {0}, s313 = {0}, s314 = {0}, s315 = {0}, s316 = {0}, s317 = {0},
-        s318 = {0}, s319 = {0}, s320 = {0}, s321 = {0}, s322 = {0}, s323 = {0}, s324 = {0},
-        s325 = {0}, s326 = {0}, s327 = {0}, s328 = {0}, s329 = {0}, s330 = {0}, s331 = {0},
-        s332 = {0}, s333 = {0}, s334 = {0}, s335 = {0}, s336 = {0}, s337 = {0}, s338 = {0},
-        s339 = {0}, s340 = {0}, s341 = {0}, s342 = {0}, s343 = {0}, s344 = {0}, s345 = {0},
-        s346 = {0}, s347 = {0}, s348 = {0}, s349 = {0}, s350 = {0}, s351 = {0}, s352 = {0},
-        s353 = {0}, s354 = {0}, s355 = {0}, s356 = {0}, s357 = {0}, s358 = {0}, s359 = {0},
-        s360 = {0}, s361 = {0}, s362 = {0}, s363 = {0}, s364 = {0}, s365 = {0}, s366 = {0},
-        s367 = {0}, s368 = {0}, s369 = {0}, s370 = {0}, s371 = {0}, s372 = {0}, s373 = {0},
-        s374 = {0}, s375 = {0}, s376 = {0}, s377 = {0}, s378 = {0}, s379 = {0}, s380 = {0},
-        s381 = {0}, s382 = {0}, s383 = {0}, s384 = {0}, s385 = {0}, s386 = {0}, s387 = {0},
-        s388 = {0}, s389 = {0}, s390 = {0}, s391 = {0}, s392 = {0}, s393 = {0}, s394 = {0},
-        s395 = {0}, s396 = {0}, s397 = {0}, s398 = {0}, s399 = {0}, s400 = {0}, s401 = {0},
-        s402 = {0}, s403 = {0}, s404 = {0}, s405 = {0}, s406 = {0}, s407 = {0}, s408 = {0},
-        s409 = {0}, s410 = {0}, s411 = {0}, s412 = {0}, s413 = {0}, s414 = {0}, s415 = {0},
-        s416 = {0}, s417 = {0}, s418 = {0}, s419 = {0}, s420 = {0}, s421 = {0}, s422 = {0},
-        s423 = {0}, s424 = {0}, s425 = {0}, s426 = {0}, s427 = {0}, s428 = {0}, s429 = {0},
-        s430 = {0}, s431 = {0}, s432 = {0}, s433 = {0}, s434 = {0}, s435 = {0}, s436 = {0},
-        s437 = {0}, s438 = {0}, s439 = {0}, s440 = {0}, s441 = {0}, s442 = {0}, s443 = {0},
-        s444 = {0}, s445 = {0}, s446 = {0}, s447 = {0}, s448 = {0}, s449 = {0}, s450 = {0},
-        s451 = {0}, s452 = {0}, s453 = {0}, s454 = {0}, s455 = {0}, s456 = {0}, s457 = {0},
-        s458 = {0}, s459 = {0}, s460 = {0}, s461 = {0}, s462 = {0}, s463 = {0}, s464 = {0},
-        s465 = {0}, s466 = {0}, s467 = {0}, s468 = {0}, s469 = {0}, s470 = {0}, s471 = {0},
-        s472 = {0}, s473 = {0}, s474 = {0}, s475 = {0}, s476 = {0}, s477 = {0}, s478 = {0},
-        s479 = {0}, s480 = {0}, s481 = {0}, s482 = {0}, s483 = {0}, s484 = {0}, s485 = {0},
-        s486 = {0}, s487 = {0}, s488 = {0}, s489 = {0}, s490 = {0}, s491 = {0}, s492 = {0},
-        s493 = {0}, s494 = {0}, s495 = {0}, s496 = {0}, s497 = {0}, s498 = {0}, s499 = {0},
-        s500 = {0}, s501 = {0}, s502 = {0};
+    const V v271 = 0.5 * v231, v272 = 0.5 * v232, v273 = 0.5 * v233, v274 = 0.5 * v234,
+        v275 = v24 * v271, v276 = v24 * v272, v277 = v24 * v273, v278 = v24 * v274,
+        v279 = 0.5 * (v117 + v164), v280 = 0.5 * v235, v281 = 0.5 * (v165 + v118),
+        v282 = 0.5 * v236, v283 = 0.5 * (v166 + v119), v284 = v24 * v280, v285 = v24 * v282,
+        v286 = 0.5 * v237, v287 = 0.5 * v238, v288 = 0.5 * v239, v289 = 0.5 * (v167 + v120),
+        v290 = v24 * v286, v291 = v24 * v287, v292 = v24 * v288, v293 = 0.5 * (v168 + v121),
+        v294 = 0.5 * v169, v295 = 0.5 * v170, v296 = 0.5 * v122, v297 = 0.5 * v123,
+        v298 = v275 * (6.283185307179586 * (a14 * v15)),
+        v299 = 0.5 * ((v4 - v5) * v93 + (v12 - v14) * v94);
+    V s300 = {0}, s301 = {0}, s302 = {0}, s303 = {0}, s304 = {0}, s305 = {0}, s306 = {0},
+        s307 = {0}, s308 = {0}, s309 = {0}, s310 = {0}, s311 = {0}, s312 = {0}, s313 = {0},
+        s314 = {0}, s315 = {0}, s316 = {0}, s317 = {0}, s318 = {0}, s319 = {0}, s320 = {0},
+        s321 = {0}, s322 = {0}, s323 = {0}, s324 = {0}, s325 = {0}, s326 = {0}, s327 = {0},
+        s328 = {0}, s329 = {0}, s330 = {0}, s331 = {0}, s332 = {0}, s333 = {0}, s334 = {0},
+        s335 = {0}, s336 = {0}, s337 = {0}, s338 = {0}, s339 = {0}, s340 = {0}, s341 = {0},
+        s342 = {0}, s343 = {0}, s344 = {0}, s345 = {0}, s346 = {0}, s347 = {0}, s348 = {0},
+        s349 = {0}, s350 = {0}, s351 = {0}, s352 = {0}, s353 = {0}, s354 = {0}, s355 = {0},
+        s356 = {0}, s357 = {0}, s358 = {0}, s359 = {0}, s360 = {0}, s361 = {0}, s362 = {0},
+        s363 = {0}, s364 = {0}, s365 = {0}, s366 = {0}, s367 = {0}, s368 = {0}, s369 = {0},
+        s370 = {0}, s371 = {0}, s372 = {0}, s373 = {0}, s374 = {0}, s375 = {0}, s376 = {0},
+        s377 = {0}, s378 = {0}, s379 = {0}, s380 = {0}, s381 = {0}, s382 = {0}, s383 = {0},
+        s384 = {0}, s385 = {0}, s386 = {0}, s387 = {0}, s388 = {0}, s389 = {0}, s390 = {0},
+        s391 = {0}, s392 = {0}, s393 = {0}, s394 = {0}, s395 = {0}, s396 = {0}, s397 = {0},
+        s398 = {0}, s399 = {0}, s400 = {0}, s401 = {0}, s402 = {0}, s403 = {0}, s404 = {0},
+        s405 = {0}, s406 = {0}, s407 = {0}, s408 = {0}, s409 = {0}, s410 = {0}, s411 = {0},
+        s412 = {0}, s413 = {0}, s414 = {0}, s415 = {0}, s416 = {0}, s417 = {0}, s418 = {0},
+        s419 = {0}, s420 = {0}, s421 = {0}, s422 = {0}, s423 = {0}, s424 = {0}, s425 = {0},
+        s426 = {0}, s427 = {0}, s428 = {0}, s429 = {0}, s430 = {0}, s431 = {0}, s432 = {0},
+        s433 = {0}, s434 = {0}, s435 = {0}, s436 = {0}, s437 = {0}, s438 = {0}, s439 = {0},
+        s440 = {0}, s441 = {0}, s442 = {0}, s443 = {0}, s444 = {0}, s445 = {0}, s446 = {0},
+        s447 = {0}, s448 = {0}, s449 = {0}, s450 = {0}, s451 = {0}, s452 = {0}, s453 = {0},
+        s454 = {0}, s455 = {0}, s456 = {0}, s457 = {0}, s458 = {0}, s459 = {0}, s460 = {0},
+        s461 = {0}, s462 = {0}, s463 = {0}, s464 = {0}, s465 = {0}, s466 = {0}, s467 = {0},
+        s468 = {0}, s469 = {0}, s470 = {0}, s471 = {0}, s472 = {0}, s473 = {0}, s474 = {0},
+        s475 = {0}, s476 = {0}, s477 = {0}, s478 = {0}, s479 = {0}, s480 = {0}, s481 = {0},
+        s482 = {0}, s483 = {0}, s484 = {0}, s485 = {0}, s486 = {0}, s487 = {0}, s488 = {0},
+        s489 = {0}, s490 = {0}, s491 = {0}, s492 = {0}, s493 = {0}, s494 = {0}, s495 = {0},
+        s496 = {0}, s497 = {0}, s498 = {0}, s499 = {0}, s500 = {0}, s501 = {0}, s502 = {0},
+        s503 = {0}, s504 = {0}, s505 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
         const double *restrict w = rule + 2 * q; (void)w;
-        const V v503 = 0.5 * (w[0] * v268 + v276), v504 = 0.5 - v503, v505 = 0.5 + v503,
-            v506 = v12 * v504 + v1 * v505, v507 = v18 * v504 + v10 * v505, v508 = v5 - v506,
-            v509 = v23 - v507, v510 = v90 * v508 + v91 * v509, v511 = 4.0 * v510,
-            v512 = v208 - v111 * v511;
-        const M v513 = softehl_eq(v512, v512);
-        const V v514 = v212 * v508, v515 = v212 * v509;
-        V v516 = softehl_splat(0.0), v517 = softehl_splat(0.0), v518 = softehl_splat(0.0),
-            v519 = softehl_splat(0.0), v520 = softehl_splat(0.0), v521 = softehl_splat(0.0),
+        const V v506 = 0.5 * (w[0] * v271 + v279), v507 = 0.5 - v506, v508 = 0.5 + v506,
+            v509 = v1 * v507 + v2 * v508, v510 = v9 * v507 + v11 * v508, v511 = v13 - v509,
+            v512 = v17 - v510, v513 = v93 * v511 + v94 * v512, v514 = 4.0 * v513,
+            v515 = v211 - v114 * v514;
+        const M v516 = softehl_eq(v515, v515);
+        const V v517 = v215 * v511, v518 = v215 * v512;
+        V v519 = softehl_splat(0.0), v520 = softehl_splat(0.0), v521 = softehl_splat(0.0),
             v522 = softehl_splat(0.0), v523 = softehl_splat(0.0), v524 = softehl_splat(0.0),
-            v525 = softehl_splat(0.0);
-        const M m526 = v513;
-        if (softehl_any(m526)) {
-            const M v527 = softehl_lt(v211, v512);
-            V v528 = v211, v529 = softehl_splat(0.0), v530 = softehl_splat(0.0),
-                v531 = softehl_splat(0.0), v532 = softehl_splat(0.0), v533 = softehl_splat(0.0),
-                v534 = softehl_splat(0.0), v535 = softehl_splat(0.0), v536 = softehl_splat(1.0),
-                v537 = softehl_splat(0.0);
-            const M m538 = v527 & m526;
-            if (softehl_any(m538)) {
-                const V v539 = -v514, v540 = -v515, v541 = -v511;
-                v528 = softehl_blend(m538, v512, v528); v529 = softehl_blend(m538, v541, v529);
-                v530 = softehl_blend(m538, v218, v530); v531 = softehl_blend(m538, v219, v531);
-                v532 = softehl_blend(m538, v214, v532); v533 = softehl_blend(m538, v213, v533);
-                v534 = softehl_blend(m538, v539, v534); v535 = softehl_blend(m538, v540, v535);
-                v536 = softehl_blend(m538, softehl_splat(0.0), v536);
-                v537 = softehl_blend(m538, softehl_splat(1.0), v537);
+            v525 = softehl_splat(0.0), v526 = softehl_splat(0.0), v527 = softehl_splat(0.0),
+            v528 = softehl_splat(0.0);
+        const M m529 = v516;
+        if (softehl_any(m529)) {
+            const M v530 = softehl_lt(v214, v515);
+            V v531 = v214, v532 = softehl_splat(0.0), v533 = softehl_splat(0.0),
+                v534 = softehl_splat(0.0), v535 = softehl_splat(0.0), v536 = softehl_splat(0.0),
+                v537 = softehl_splat(0.0), v538 = softehl_splat(0.0), v539 = softehl_splat(1.0),
+                v540 = softehl_splat(0.0);
+            const M m541 = v530 & m529;
+            if (softehl_any(m541)) {
+                const V v542 = -v517, v543 = -v518, v544 = -v514;
+                v531 = softehl_blend(m541, v515, v531); v532 = softehl_blend(m541, v544, v532);
+                v533 = softehl_blend(m541, v221, v533); v534 = softehl_blend(m541, v222, v534);
+                v535 = softehl_blend(m541, v217, v535); v536 = softehl_blend(m541, v216, v536);
+                v537 = softehl_blend(m541, v542, v537); v538 = softehl_blend(m541, v543, v538);
+                v539 = softehl_blend(m541, softehl_splat(0.0), v539);
+                v540 = softehl_blend(m541, softehl_splat(1.0), v540);
             }
-            v516 = softehl_blend(m526, v528, v516); v517 = softehl_blend(m526, v529, v517);
-            v518 = softehl_blend(m526, v530, v518); v519 = softehl_blend(m526, v531, v519);
-            v520 = softehl_blend(m526, v532, v520); v521 = softehl_blend(m526, v533, v521);
-            v522 = softehl_blend(m526, v534, v522); v523 = softehl_blend(m526, v535, v523);
-            v524 = softehl_blend(m526, v536, v524); v525 = softehl_blend(m526, v537, v525);
+            v519 = softehl_blend(m529, v531, v519); v520 = softehl_blend(m529, v532, v520);
+            v521 = softehl_blend(m529, v533, v521); v522 = softehl_blend(m529, v534, v522);
+            v523 = softehl_blend(m529, v535, v523); v524 = softehl_blend(m529, v536, v524);
+            v525 = softehl_blend(m529, v537, v525); v526 = softehl_blend(m529, v538, v526);
+            v527 = softehl_blend(m529, v539, v527); v528 = softehl_blend(m529, v540, v528);
         }
-        const M m542 = ~v513;
-        if (softehl_any(m542)) {
-            const V v543 = v211 - v512, v544 = v543 * v543, v545 = v543 * v544, v546 = 3.0 * v544,
-                v547 = -v546, v548 = v511 * v546, v549 = v213 * v546, v550 = -v549,
-                v551 = v214 * v546, v552 = -v551, v553 = v514 * v546, v554 = v515 * v546;
-            v516 = softehl_blend(m542, v545, v516); v517 = softehl_blend(m542, v548, v517);
-            v518 = softehl_blend(m542, v549, v518); v519 = softehl_blend(m542, v551, v519);
-            v520 = softehl_blend(m542, v552, v520); v521 = softehl_blend(m542, v550, v521);
-            v522 = softehl_blend(m542, v553, v522); v523 = softehl_blend(m542, v554, v523);
-            v524 = softehl_blend(m542, v546, v524); v525 = softehl_blend(m542, v547, v525);
+        const M m545 = ~v516;
+        if (softehl_any(m545)) {
+            const V v546 = v214 - v515, v547 = v546 * v546, v548 = v546 * v547, v549 = 3.0 * v547,
+                v550 = -v549, v551 = v514 * v549, v552 = v216 * v549, v553 = -v552,
+                v554 = v217 * v549, v555 = -v554, v556 = v517 * v549, v557 = v518 * v549;
+            v519 = softehl_blend(m545, v548, v519); v520 = softehl_blend(m545, v551, v520);
+            v521 = softehl_blend(m545, v552, v521); v522 = softehl_blend(m545, v554, v522);
+            v523 = softehl_blend(m545, v555, v523); v524 = softehl_blend(m545, v553, v524);
+            v525 = softehl_blend(m545, v556, v525); v526 = softehl_blend(m545, v557, v526);
+            v527 = softehl_blend(m545, v549, v527); v528 = softehl_blend(m545, v550, v528);
         }
-        const V v555 = 2.0 * v510, v556 = w[0] * v283 + v292, v557 = w[0] * v284 + v293,
-            v558 = w[0] * v269 + v278, v559 = w[0] * v285 + v294, v560 = w[0] * v270 + v280,
-            v561 = w[0] * v271 + v286, v562 = w[0] * v277 + v290, v563 = v503 - 0.5,
-            v564 = w[0] * v279 + v291, v565 = v46 * v556, v566 = v29 * v556, v567 = v29 * v558,
-            v568 = v46 * v560, v569 = v29 * v561, v570 = v46 * v562, v571 = v46 * v564,
-            v572 = v29 * v564, v573 = v46 * v559, v574 = v29 * v559, v575 = v46 * v557,
-            v576 = v29 * v557, v577 = v46 * v558 + v504, v578 = v29 * v560 + v504,
-            v579 = w[1] * v504, v580 = v34 * v504, v581 = v34 * v505,
-            v582 = d10 * v504 + d12 * v505, v583 = w[1] * v505, v584 = v46 * v561 + v505,
-            v585 = v29 * v562 + v505, v586 = softehl_vsqrt(v516),
-            v587 = 1.0 + a14 * ((-1.0) + 6.283185307179586 * (X1 * v504 + X3 * v505)),
-            v588 = v272 * v587, v589 = softehl_vsqrt(1.0 / v516), v590 = 0.5 * v589,
-            v591 = v91 * v588, v592 = v90 * v588, v593 = v580 * v588, v594 = v581 * v588,
-            v595 = 1.0 / (v110 - v586), v596 = v555 * v595, v597 = 0.5 * v596, v598 = 2.0 * v596,
-            v599 = v595 * v595, v600 = v555 * v599, v601 = v555 * v590 * v599,
-            v602 = v590 * (v555 * v525) * v599 + 0.01 * (v590 * (v555 * v524) * v599),
-            v603 = v94 * v595, v604 = v95 * v595, v605 = v590 * (v555 * v517) * v599,
-            v606 = 2.0 * v508 * v595 + v522 * v601, v607 = 2.0 * v509 * v595 + v523 * v601,
-            v608 = v603 - v590 * (v555 * v521) * v599, v609 = v604 - v590 * (v555 * v520) * v599,
-            v610 = v600 - v209 * v602, v611 = v216 * v602 - v96 * v600, v612 = v96 * v605,
-            v613 = v217 * v602 - v97 * v600, v614 = v97 * v605,
-            v615 = v611 + (v571 * v608 + v572 * v609 - v612),
-            v616 = v575 * v608 + v576 * v609 - v612 - v611,
-            v617 = v565 * v608 + (v613 + (v566 * v609 - v614)),
-            v618 = v573 * v608 + (v574 * v609 - v614 - v613),
-            v619 = v90 * v605 - v603 - v590 * (v555 * v518) * v599,
-            v620 = v91 * v605 - v604 - v590 * (v555 * v519) * v599, v621 = (-1.0) - v596,
-            v622 = 0.5 * (v621 - v596), v623 = v597 * v621, v624 = 1.0 - v596, v625 = v597 * v624,
-            v626 = 1.0 - v596 * v596, v627 = 0.5 * (v624 - v596), v628 = w[1] * v626,
-            v629 = w[1] * v625, v630 = w[1] * v623, v631 = v100 * v607, v632 = v103 * v606,
-            v633 = v585 * v609 + (v570 * v608 + (v226 * v610 - v227 * v605)) - v106 * v607,
-            v634 = v632 + v633, v635 = v5 * v626 - v506 - v2 * v623 - v3 * v625, v636 = v100 * v635,
-            v637 = v23 * v626 - v507 - v16 * v623 - v21 * v625, v638 = v103 * v637,
-            v639 = v224 * v610 + (v578 * v609 + (v568 * v608 - v225 * v605)) - v632 - v107 * v607,
-            v640 = v91 * (v3 * v627 + (v5 * v598 + v2 * v622)) - v90 * (v21 * v627 + (v23 * v598 + v16 * v622)),
-            v641 = v91 * v635 - v90 * v637,
-            v642 = v638 + (v106 * v635 + (v90 * v585 - v91 * v570)) + v640 * v634,
-            v643 = a10 * v641, v644 = v107 * v635 + (v90 * v578 - v91 * v568) - v638 + v640 * v639,
-            v645 = v90 * (v566 + v623) - v91 * v565 + v640 * v617,
-            v646 = v90 * (v574 + v625) - v91 * v573 + v640 * v618, v647 = v620 * v640 - v90 * v626,
-            v648 = v91 * v626 + v619 * v640, v649 = v90 * v572 - v91 * (v571 + v623) + v640 * v615,
-            v650 = v582 - v643, v651 = v640 * v616 + (v90 * v576 - v91 * (v575 + v625));
-        const M v652 = softehl_eq(v650, v650);
-        const V v653 = v631 + (v223 * v610 + (v569 * v609 + (v584 * v608 - v222 * v605))),
-            v654 = v220 * v610 + (v567 * v609 + (v577 * v608 - v221 * v605)) - v631 - v105 * v606,
-            v655 = v653 - v104 * v606,
-            v656 = v636 + (v90 * v567 - v91 * v577) - v105 * v637 + v640 * v654,
-            v657 = v90 * v569 - v91 * v584 - v636 - v104 * v637 + v640 * v655;
-        V v658 = softehl_splat(0.0), v659 = softehl_splat(0.0), v660 = softehl_splat(0.0),
-            v661 = softehl_splat(0.0), v662 = softehl_splat(0.0), v663 = softehl_splat(0.0),
+        const V v558 = 2.0 * v513, v559 = w[0] * v286 + v295, v560 = w[0] * v287 + v296,
+            v561 = w[0] * v272 + v281, v562 = w[0] * v288 + v297, v563 = w[0] * v273 + v283,
+            v564 = w[0] * v274 + v289, v565 = w[0] * v280 + v293, v566 = v506 - 0.5,
+            v567 = w[0] * v282 + v294, v568 = v37 * v559, v569 = v26 * v559, v570 = v26 * v561,
+            v571 = v37 * v563, v572 = v26 * v564, v573 = v37 * v565, v574 = v37 * v567,
+            v575 = v26 * v567, v576 = v37 * v562, v577 = v26 * v562, v578 = v37 * v560,
+            v579 = v26 * v560, v580 = v37 * v561 + v507, v581 = v26 * v563 + v507,
+            v582 = w[1] * v507, v583 = v33 * v507, v584 = v33 * v508,
+            v585 = d10 * v507 + d12 * v508, v586 = w[1] * v508, v587 = v37 * v564 + v508,
+            v588 = v26 * v565 + v508, v589 = softehl_vsqrt(v519),
+            v590 = 1.0 + a14 * ((-1.0) + 6.283185307179586 * (X1 * v507 + X3 * v508)),
+            v591 = v275 * v590, v592 = softehl_vsqrt(1.0 / v519), v593 = 0.5 * v592,
+            v594 = v94 * v591, v595 = v93 * v591, v596 = v583 * v591, v597 = v584 * v591,
+            v598 = 1.0 / (v113 - v589), v599 = v558 * v598, v600 = 0.5 * v599, v601 = 2.0 * v599,
+            v602 = v598 * v598, v603 = v558 * v602, v604 = v558 * v593 * v602,
+            v605 = v593 * (v558 * v528) * v602 + 0.01 * (v593 * (v558 * v527) * v602),
+            v606 = v97 * v598, v607 = v98 * v598, v608 = v593 * (v558 * v520) * v602,
+            v609 = 2.0 * v511 * v598 + v525 * v604, v610 = 2.0 * v512 * v598 + v526 * v604,
+            v611 = v606 - v593 * (v558 * v524) * v602, v612 = v607 - v593 * (v558 * v523) * v602,
+            v613 = v603 - v212 * v605, v614 = v219 * v605 - v99 * v603, v615 = v99 * v608,
+            v616 = v220 * v605 - v100 * v603, v617 = v100 * v608,
+            v618 = v614 + (v574 * v611 + v575 * v612 - v615),
+            v619 = v578 * v611 + v579 * v612 - v615 - v614,
+            v620 = v568 * v611 + (v616 + (v569 * v612 - v617)),
+            v621 = v576 * v611 + (v577 * v612 - v617 - v616),
+            v622 = v93 * v608 - v606 - v593 * (v558 * v521) * v602,
+            v623 = v94 * v608 - v607 - v593 * (v558 * v522) * v602, v624 = (-1.0) - v599,
+            v625 = 0.5 * (v624 - v599), v626 = v600 * v624, v627 = 1.0 - v599, v628 = v600 * v627,
+            v629 = 1.0 - v599 * v599, v630 = 0.5 * (v627 - v599), v631 = w[1] * v629,
+            v632 = w[1] * v628, v633 = w[1] * v626, v634 = v103 * v610, v635 = v106 * v609,
+            v636 = v588 * v612 + (v573 * v611 + (v229 * v613 - v230 * v608)) - v109 * v610,
+            v637 = v635 + v636, v638 = v13 * v629 - v509 - v3 * v626 - v6 * v628,
+            v639 = v103 * v638, v640 = v17 * v629 - v510 - v20 * v626 - v22 * v628,
+            v641 = v106 * v640,
+            v642 = v227 * v613 + (v581 * v612 + (v571 * v611 - v228 * v608)) - v635 - v110 * v610,
+            v643 = v94 * (v6 * v630 + (v13 * v601 + v3 * v625)) - v93 * (v22 * v630 + (v17 * v601 + v20 * v625)),
+            v644 = v94 * v638 - v93 * v640,
+            v645 = v641 + (v109 * v638 + (v93 * v588 - v94 * v573)) + v643 * v637,
+            v646 = a10 * v644, v647 = v110 * v638 + (v93 * v581 - v94 * v571) - v641 + v643 * v642,
+            v648 = v93 * (v569 + v626) - v94 * v568 + v643 * v620,
+            v649 = v93 * (v577 + v628) - v94 * v576 + v643 * v621, v650 = v623 * v643 - v93 * v629,
+            v651 = v94 * v629 + v622 * v643, v652 = v93 * v575 - v94 * (v574 + v626) + v643 * v618,
+            v653 = v585 - v646, v654 = v643 * v619 + (v93 * v579 - v94 * (v578 + v628));
+        const M v655 = softehl_eq(v653, v653);
+        const V v656 = v634 + (v226 * v613 + (v572 * v612 + (v587 * v611 - v225 * v608))),
+            v657 = v223 * v613 + (v570 * v612 + (v580 * v611 - v224 * v608)) - v634 - v108 * v609,
+            v658 = v656 - v107 * v609,
+            v659 = v639 + (v93 * v570 - v94 * v580) - v108 * v640 + v643 * v657,
+            v660 = v93 * v572 - v94 * v587 - v639 - v107 * v640 + v643 * v658;
+        V v661 = softehl_splat(0.0), v662 = softehl_splat(0.0), v663 = softehl_splat(0.0),
             v664 = softehl_splat(0.0), v665 = softehl_splat(0.0), v666 = softehl_splat(0.0),
             v667 = softehl_splat(0.0), v668 = softehl_splat(0.0), v669 = softehl_splat(0.0),
             v670 = softehl_splat(0.0), v671 = softehl_splat(0.0), v672 = softehl_splat(0.0),
@@ -539,12 +551,12 @@ SOFTEHL_GROUP(softehl_mortar_23_tangent)
             v703 = softehl_splat(0.0), v704 = softehl_splat(0.0), v705 = softehl_splat(0.0),
             v706 = softehl_splat(0.0), v707 = softehl_splat(0.0), v708 = softehl_splat(0.0),
             v709 = softehl_splat(0.0), v710 = softehl_splat(0.0), v711 = softehl_splat(0.0),
-            v712 = softehl_splat(0.0);
-        const M m713 = v652;
-        if (softehl_any(m713)) {
-            const M v714 = softehl_le(softehl_splat(0.0), v650);
-            V v715 = softehl_splat(0.0), v716 = softehl_splat(0.0), v717 = softehl_splat(0.0),
-                v718 = softehl_splat(0.0), v719 = softehl_splat(0.0), v720 = softehl_splat(0.0),
+            v712 = softehl_splat(0.0), v713 = softehl_splat(0.0), v714 = softehl_splat(0.0),
+            v715 = softehl_splat(0.0);
+        const M m716 = v655;
+        if (softehl_any(m716)) {
+            const M v717 = softehl_le(softehl_splat(0.0), v653);
+            V v718 = softehl_splat(0.0), v719 = softehl_splat(0.0), v720 = softehl_splat(0.0),
                 v721 = softehl_splat(0.0), v722 = softehl_splat(0.0), v723 = softehl_splat(0.0),
                 v724 = softehl_splat(0.0), v725 = softehl_splat(0.0), v726 = softehl_splat(0.0),
                 v727 = softehl_splat(0.0), v728 = softehl_splat(0.0), v729 = softehl_splat(0.0),
@@ -557,428 +569,439 @@ SOFTEHL_GROUP(softehl_mortar_23_tangent)
                 v748 = softehl_splat(0.0), v749 = softehl_splat(0.0), v750 = softehl_splat(0.0),
                 v751 = softehl_splat(0.0), v752 = softehl_splat(0.0), v753 = softehl_splat(0.0),
                 v754 = softehl_splat(0.0), v755 = softehl_splat(0.0), v756 = softehl_splat(0.0),
-                v757 = softehl_splat(0.0);
-            const M m758 = v714 & m713;
-            if (softehl_any(m758)) {
-                const V v759 = a12 + v641, v760 = v641 - a13, v761 = v759 * v760;
-                const M v762 = softehl_eq(v761, v761);
-                V v763 = softehl_splat(0.0), v764 = softehl_splat(0.0), v765 = softehl_splat(0.0),
-                    v766 = softehl_splat(0.0), v767 = softehl_splat(0.0);
-                const M m768 = v762 & m758;
-                if (softehl_any(m768)) {
-                    const M v769 = softehl_lt(v761, softehl_splat(0.0));
-                    const V v770 = softehl_blend(v769, v650, softehl_splat(0.0)),
-                        v771 = softehl_blend(v769, v504, softehl_splat(0.0)),
-                        v772 = softehl_blend(v769, v505, softehl_splat(0.0)),
-                        v773 = softehl_blend(v769, v35, softehl_splat(0.0)),
-                        v774 = softehl_blend(v769, v33, softehl_splat(0.0));
-                    v763 = softehl_blend(m768, v770, v763); v764 = softehl_blend(m768, v771, v764);
-                    v765 = softehl_blend(m768, v772, v765); v766 = softehl_blend(m768, v773, v766);
-                    v767 = softehl_blend(m768, v774, v767);
+                v757 = softehl_splat(0.0), v758 = softehl_splat(0.0), v759 = softehl_splat(0.0),
+                v760 = softehl_splat(0.0);
+            const M m761 = v717 & m716;
+            if (softehl_any(m761)) {
+                const V v762 = a12 + v644, v763 = v644 - a13, v764 = v762 * v763;
+                const M v765 = softehl_eq(v764, v764);
+                V v766 = softehl_splat(0.0), v767 = softehl_splat(0.0), v768 = softehl_splat(0.0),
+                    v769 = softehl_splat(0.0), v770 = softehl_splat(0.0);
+                const M m771 = v765 & m761;
+                if (softehl_any(m771)) {
+                    const M v772 = softehl_lt(v764, softehl_splat(0.0));
+                    const V v773 = softehl_blend(v772, v653, softehl_splat(0.0)),
+                        v774 = softehl_blend(v772, v507, softehl_splat(0.0)),
+                        v775 = softehl_blend(v772, v508, softehl_splat(0.0)),
+                        v776 = softehl_blend(v772, v34, softehl_splat(0.0)),
+                        v777 = softehl_blend(v772, v56, softehl_splat(0.0));
+                    v766 = softehl_blend(m771, v773, v766); v767 = softehl_blend(m771, v774, v767);
+                    v768 = softehl_blend(m771, v775, v768); v769 = softehl_blend(m771, v776, v769);
+                    v770 = softehl_blend(m771, v777, v770);
                 }
-                const M m775 = ~v762 & m758;
-                if (softehl_any(m775)) {
-                    const V v776 = v761 * v761, v777 = v761 * v776,
-                        v778 = 3.0 * v776 * (v759 + v760);
-                    v763 = softehl_blend(m775, v777, v763); v766 = softehl_blend(m775, v778, v766);
+                const M m778 = ~v765 & m761;
+                if (softehl_any(m778)) {
+                    const V v779 = v764 * v764, v780 = v764 * v779,
+                        v781 = 3.0 * v779 * (v762 + v763);
+                    v766 = softehl_blend(m778, v780, v766); v769 = softehl_blend(m778, v781, v769);
                 }
-                const V v779 = a11 * v763; const M v780 = softehl_eq(v779, v779);
-                const V v781 = v8 * v626 - v11 * v504 - v4 * v505 - v6 * v623 - v7 * v625,
-                    v782 = v22 * v626 - v14 * v504 - v13 * v505 - v15 * v623 - v20 * v625,
-                    v783 = a10 * (v90 * v781 + v91 * v782) + (d11 * v504 + d13 * v505);
-                const M v784 = softehl_eq(v783, v783), v785 = v780 & v784;
-                V v786 = softehl_splat(0.0), v787 = softehl_splat(0.0), v788 = softehl_splat(0.0),
-                    v789 = softehl_splat(0.0), v790 = softehl_splat(0.0), v791 = softehl_splat(0.0);
-                const M m792 = v785 & m758;
-                if (softehl_any(m792)) {
-                    const M v793 = softehl_lt(v779, v783);
-                    V v794 = v779, v795 = softehl_splat(0.0), v796 = softehl_splat(0.0), v797 = a11,
-                        v798 = softehl_splat(0.0), v799 = softehl_splat(0.0);
-                    const M m800 = ~v793 & m792;
-                    if (softehl_any(m800)) {
-                        V v801 = softehl_splat(0.0), v802 = softehl_splat(0.0),
-                            v803 = softehl_splat(0.0), v804 = softehl_splat(0.0),
-                            v805 = softehl_splat(0.0), v806 = softehl_splat(0.0);
-                        const M m807 = v780 & m800;
-                        if (softehl_any(m807)) {
-                            const M v808 = softehl_lt(v779, -v783);
-                            V v809 = v783, v810 = v504, v811 = v505, v812 = softehl_splat(0.0),
-                                v813 = a10, v814 = v42;
-                            const M m815 = v808 & m807;
-                            if (softehl_any(m815)) {
-                                const V v816 = -v779; v809 = softehl_blend(m815, v816, v809);
-                                v810 = softehl_blend(m815, softehl_splat(0.0), v810);
-                                v811 = softehl_blend(m815, softehl_splat(0.0), v811);
-                                v812 = softehl_blend(m815, v19, v812);
-                                v813 = softehl_blend(m815, softehl_splat(0.0), v813);
-                                v814 = softehl_blend(m815, softehl_splat(0.0), v814);
+                const V v782 = a11 * v766; const M v783 = softehl_eq(v782, v782);
+                const V v784 = v16 * v629 - v4 * v507 - v5 * v508 - v7 * v626 - v10 * v628,
+                    v785 = v18 * v629 - v12 * v507 - v14 * v508 - v19 * v626 - v21 * v628,
+                    v786 = a10 * (v93 * v784 + v94 * v785) + (d11 * v507 + d13 * v508);
+                const M v787 = softehl_eq(v786, v786), v788 = v783 & v787;
+                V v789 = softehl_splat(0.0), v790 = softehl_splat(0.0), v791 = softehl_splat(0.0),
+                    v792 = softehl_splat(0.0), v793 = softehl_splat(0.0), v794 = softehl_splat(0.0);
+                const M m795 = v788 & m761;
+                if (softehl_any(m795)) {
+                    const M v796 = softehl_lt(v782, v786);
+                    V v797 = v782, v798 = softehl_splat(0.0), v799 = softehl_splat(0.0), v800 = a11,
+                        v801 = softehl_splat(0.0), v802 = softehl_splat(0.0);
+                    const M m803 = ~v796 & m795;
+                    if (softehl_any(m803)) {
+                        const V v804 = -v786;
+                        const M v805 = softehl_eq(v804, v804), v806 = v783 & v805;
+                        V v807 = softehl_splat(0.0), v808 = softehl_splat(0.0),
+                            v809 = softehl_splat(0.0), v810 = softehl_splat(0.0),
+                            v811 = softehl_splat(0.0), v812 = softehl_splat(0.0);
+                        const M m813 = v806 & m803;
+                        if (softehl_any(m813)) {
+                            const M v814 = softehl_lt(v782, v804);
+                            V v815 = softehl_splat(0.0), v816 = softehl_splat(0.0),
+                                v817 = softehl_splat(0.0), v818 = softehl_splat(0.0), v819 = v41,
+                                v820 = v42;
+                            const M m821 = v814 & m813;
+                            if (softehl_any(m821)) {
+                                const V v822 = -v782; v815 = softehl_blend(m821, v822, v815);
+                                v818 = softehl_blend(m821, v32, v818);
+                                v819 = softehl_blend(m821, softehl_splat(0.0), v819);
+                                v820 = softehl_blend(m821, softehl_splat(0.0), v820);
                             }
-                            v801 = softehl_blend(m807, v809, v801);
-                            v802 = softehl_blend(m807, v810, v802);
-                            v803 = softehl_blend(m807, v811, v803);
-                            v804 = softehl_blend(m807, v812, v804);
-                            v805 = softehl_blend(m807, v813, v805);
-                            v806 = softehl_blend(m807, v814, v806);
+                            const M m823 = ~v814 & m813;
+                            if (softehl_any(m823)) {
+                                const V v824 = softehl_blend(v31, v786, softehl_splat(0.0)),
+                                    v825 = softehl_blend(v31, v507, softehl_splat(0.0)),
+                                    v826 = softehl_blend(v31, v508, softehl_splat(0.0));
+                                v815 = softehl_blend(m823, v824, v815);
+                                v816 = softehl_blend(m823, v825, v816);
+                                v817 = softehl_blend(m823, v826, v817);
+                            }
+                            v807 = softehl_blend(m813, v815, v807);
+                            v808 = softehl_blend(m813, v816, v808);
+                            v809 = softehl_blend(m813, v817, v809);
+                            v810 = softehl_blend(m813, v818, v810);
+                            v811 = softehl_blend(m813, v819, v811);
+                            v812 = softehl_blend(m813, v820, v812);
                         }
-                        const M m817 = ~v780 & m800;
-                        if (softehl_any(m817)) {
-                            const V v818 = v783 + v779, v819 = v818 * v818, v820 = v818 * v819,
-                                v821 = 3.0 * v819, v822 = v42 * v821, v823 = a11 * v821,
-                                v824 = a10 * v821, v825 = v504 * v821, v826 = v505 * v821;
-                            v801 = softehl_blend(m817, v820, v801);
-                            v802 = softehl_blend(m817, v825, v802);
-                            v803 = softehl_blend(m817, v826, v803);
-                            v804 = softehl_blend(m817, v823, v804);
-                            v805 = softehl_blend(m817, v824, v805);
-                            v806 = softehl_blend(m817, v822, v806);
+                        const M m827 = ~v806 & m803;
+                        if (softehl_any(m827)) {
+                            const V v828 = v786 + v782, v829 = v828 * v828, v830 = v828 * v829,
+                                v831 = 3.0 * v829, v832 = v23 * v831, v833 = a11 * v831,
+                                v834 = a10 * v831, v835 = v507 * v831, v836 = v508 * v831;
+                            v807 = softehl_blend(m827, v830, v807);
+                            v808 = softehl_blend(m827, v835, v808);
+                            v809 = softehl_blend(m827, v836, v809);
+                            v810 = softehl_blend(m827, v833, v810);
+                            v811 = softehl_blend(m827, v834, v811);
+                            v812 = softehl_blend(m827, v832, v812);
                         }
-                        v794 = softehl_blend(m800, v801, v794);
-                        v795 = softehl_blend(m800, v802, v795);
-                        v796 = softehl_blend(m800, v803, v796);
-                        v797 = softehl_blend(m800, v804, v797);
-                        v798 = softehl_blend(m800, v805, v798);
-                        v799 = softehl_blend(m800, v806, v799);
+                        v797 = softehl_blend(m803, v807, v797);
+                        v798 = softehl_blend(m803, v808, v798);
+                        v799 = softehl_blend(m803, v809, v799);
+                        v800 = softehl_blend(m803, v810, v800);
+                        v801 = softehl_blend(m803, v811, v801);
+                        v802 = softehl_blend(m803, v812, v802);
                     }
-                    v786 = softehl_blend(m792, v794, v786); v787 = softehl_blend(m792, v795, v787);
-                    v788 = softehl_blend(m792, v796, v788); v789 = softehl_blend(m792, v797, v789);
-                    v790 = softehl_blend(m792, v798, v790); v791 = softehl_blend(m792, v799, v791);
+                    v789 = softehl_blend(m795, v797, v789); v790 = softehl_blend(m795, v798, v790);
+                    v791 = softehl_blend(m795, v799, v791); v792 = softehl_blend(m795, v800, v792);
+                    v793 = softehl_blend(m795, v801, v793); v794 = softehl_blend(m795, v802, v794);
                 }
-                const M m827 = ~v785 & m758;
-                if (softehl_any(m827)) {
-                    const V v828 = v779 - v783, v829 = v828 * v828, v830 = v828 * v829,
-                        v831 = 3.0 * v829, v832 = v41 * v831, v833 = a11 * v831,
-                        v834 = -(a10 * v831), v835 = v563 * v831, v836 = -(v505 * v831);
-                    v786 = softehl_blend(m827, v830, v786); v787 = softehl_blend(m827, v835, v787);
-                    v788 = softehl_blend(m827, v836, v788); v789 = softehl_blend(m827, v833, v789);
-                    v790 = softehl_blend(m827, v834, v790); v791 = softehl_blend(m827, v832, v791);
+                const M m837 = ~v788 & m761;
+                if (softehl_any(m837)) {
+                    const V v838 = v782 - v786, v839 = v838 * v838, v840 = v838 * v839,
+                        v841 = 3.0 * v839, v842 = v45 * v841, v843 = a11 * v841,
+                        v844 = -(a10 * v841), v845 = v566 * v841, v846 = -(v508 * v841);
+                    v789 = softehl_blend(m837, v840, v789); v790 = softehl_blend(m837, v845, v790);
+                    v791 = softehl_blend(m837, v846, v791); v792 = softehl_blend(m837, v843, v792);
+                    v793 = softehl_blend(m837, v844, v793); v794 = softehl_blend(m837, v842, v794);
                 }
-                const V v837 = v100 * v782, v838 = v103 * v781, v839 = v764 * v789,
-                    v840 = v765 * v789, v841 = v766 * v789,
-                    v842 = v90 * (v7 * v627 + (v8 * v598 + v6 * v622)) + v91 * (v20 * v627 + (v22 * v598 + v15 * v622)),
-                    v843 = w[1] * v787, v844 = w[1] * v788, v845 = v787 * v592, v846 = v788 * v592,
-                    v847 = v787 * v591, v848 = v788 * v591, v849 = v843 * v593, v850 = v844 * v593,
-                    v851 = v843 * v594, v852 = v844 * v594, v853 = v842 * v790,
-                    v854 = v790 * (v564 * v296 + v842 * v615) + v789 * (v564 * v767 + v766 * v649),
-                    v855 = v790 * (v559 * v296 + v842 * v618) + v789 * (v559 * v767 + v766 * v646),
-                    v856 = v789 * (v558 * v767 + v766 * v656) + v790 * (v842 * v654 + (v558 * v296 + (v105 * v781 + v837))),
-                    v857 = v789 * (v560 * v767 + v766 * v644) + v790 * (v842 * v639 + (v560 * v296 + (v838 + v107 * v782))),
-                    v858 = v789 * (v561 * v767 + v766 * v657) + v790 * (v842 * v655 + (v561 * v296 + (v104 * v781 - v837))),
-                    v859 = v789 * (v562 * v767 + v766 * v642) + v790 * (v842 * v634 + (v562 * v296 + (v106 * v782 - v838))),
-                    v860 = v790 * (v556 * v296 + v842 * v617) + v789 * (v556 * v767 + v766 * v645),
-                    v861 = v790 * (v557 * v296 + v842 * v616) + v789 * (v557 * v767 + v766 * v651),
-                    v862 = v648 * v841 + v619 * v853, v863 = v647 * v841 + v620 * v853,
-                    v864 = v579 * v848, v865 = v579 * v845, v866 = v579 * v846, v867 = v579 * v847,
-                    v868 = v583 * v845, v869 = v583 * v846, v870 = v583 * v847, v871 = v583 * v848,
-                    v872 = v630 * v845, v873 = v630 * v846, v874 = v630 * v847, v875 = v630 * v848,
-                    v876 = v629 * v845, v877 = v629 * v846, v878 = v629 * v847, v879 = v629 * v848,
-                    v880 = -(v628 * v845), v881 = -(v628 * v846), v882 = -(v628 * v847),
-                    v883 = -(v628 * v848);
-                v715 = softehl_blend(m758, v763, v715); v716 = softehl_blend(m758, v764, v716);
-                v717 = softehl_blend(m758, v765, v717); v718 = softehl_blend(m758, v786, v718);
-                v719 = softehl_blend(m758, v766, v719); v720 = softehl_blend(m758, v865, v720);
-                v721 = softehl_blend(m758, v866, v721); v722 = softehl_blend(m758, v867, v722);
-                v723 = softehl_blend(m758, v864, v723); v724 = softehl_blend(m758, v868, v724);
-                v725 = softehl_blend(m758, v869, v725); v726 = softehl_blend(m758, v870, v726);
-                v727 = softehl_blend(m758, v871, v727); v728 = softehl_blend(m758, v872, v728);
-                v729 = softehl_blend(m758, v873, v729); v730 = softehl_blend(m758, v874, v730);
-                v731 = softehl_blend(m758, v875, v731); v732 = softehl_blend(m758, v876, v732);
-                v733 = softehl_blend(m758, v877, v733); v734 = softehl_blend(m758, v878, v734);
-                v735 = softehl_blend(m758, v879, v735); v736 = softehl_blend(m758, v880, v736);
-                v737 = softehl_blend(m758, v881, v737); v738 = softehl_blend(m758, v882, v738);
-                v739 = softehl_blend(m758, v883, v739); v740 = softehl_blend(m758, v849, v740);
-                v741 = softehl_blend(m758, v850, v741); v742 = softehl_blend(m758, v851, v742);
-                v743 = softehl_blend(m758, v852, v743); v744 = softehl_blend(m758, v839, v744);
-                v745 = softehl_blend(m758, v840, v745); v746 = softehl_blend(m758, v862, v746);
-                v747 = softehl_blend(m758, v863, v747); v748 = softehl_blend(m758, v767, v748);
-                v749 = softehl_blend(m758, v856, v749); v750 = softehl_blend(m758, v791, v750);
-                v751 = softehl_blend(m758, v857, v751); v752 = softehl_blend(m758, v858, v752);
-                v753 = softehl_blend(m758, v859, v753); v754 = softehl_blend(m758, v854, v754);
-                v755 = softehl_blend(m758, v860, v755); v756 = softehl_blend(m758, v861, v756);
-                v757 = softehl_blend(m758, v855, v757);
+                const V v847 = v103 * v785, v848 = v106 * v784, v849 = v767 * v792,
+                    v850 = v768 * v792, v851 = v769 * v792,
+                    v852 = v93 * (v10 * v630 + (v16 * v601 + v7 * v625)) + v94 * (v21 * v630 + (v18 * v601 + v19 * v625)),
+                    v853 = w[1] * v790, v854 = w[1] * v791, v855 = v790 * v595, v856 = v791 * v595,
+                    v857 = v790 * v594, v858 = v791 * v594, v859 = v853 * v596, v860 = v854 * v596,
+                    v861 = v853 * v597, v862 = v854 * v597, v863 = v852 * v793,
+                    v864 = v793 * (v567 * v299 + v852 * v618) + v792 * (v567 * v770 + v769 * v652),
+                    v865 = v793 * (v562 * v299 + v852 * v621) + v792 * (v562 * v770 + v769 * v649),
+                    v866 = v792 * (v561 * v770 + v769 * v659) + v793 * (v852 * v657 + (v561 * v299 + (v108 * v784 + v847))),
+                    v867 = v792 * (v563 * v770 + v769 * v647) + v793 * (v852 * v642 + (v563 * v299 + (v848 + v110 * v785))),
+                    v868 = v792 * (v564 * v770 + v769 * v660) + v793 * (v852 * v658 + (v564 * v299 + (v107 * v784 - v847))),
+                    v869 = v792 * (v565 * v770 + v769 * v645) + v793 * (v852 * v637 + (v565 * v299 + (v109 * v785 - v848))),
+                    v870 = v793 * (v559 * v299 + v852 * v620) + v792 * (v559 * v770 + v769 * v648),
+                    v871 = v793 * (v560 * v299 + v852 * v619) + v792 * (v560 * v770 + v769 * v654),
+                    v872 = v651 * v851 + v622 * v863, v873 = v650 * v851 + v623 * v863,
+                    v874 = v582 * v858, v875 = v582 * v855, v876 = v582 * v856, v877 = v582 * v857,
+                    v878 = v586 * v855, v879 = v586 * v856, v880 = v586 * v857, v881 = v586 * v858,
+                    v882 = v633 * v855, v883 = v633 * v856, v884 = v633 * v857, v885 = v633 * v858,
+                    v886 = v632 * v855, v887 = v632 * v856, v888 = v632 * v857, v889 = v632 * v858,
+                    v890 = -(v631 * v855), v891 = -(v631 * v856), v892 = -(v631 * v857),
+                    v893 = -(v631 * v858);
+                v718 = softehl_blend(m761, v766, v718); v719 = softehl_blend(m761, v767, v719);
+                v720 = softehl_blend(m761, v768, v720); v721 = softehl_blend(m761, v789, v721);
+                v722 = softehl_blend(m761, v769, v722); v723 = softehl_blend(m761, v875, v723);
+                v724 = softehl_blend(m761, v876, v724); v725 = softehl_blend(m761, v877, v725);
+                v726 = softehl_blend(m761, v874, v726); v727 = softehl_blend(m761, v878, v727);
+                v728 = softehl_blend(m761, v879, v728); v729 = softehl_blend(m761, v880, v729);
+                v730 = softehl_blend(m761, v881, v730); v731 = softehl_blend(m761, v882, v731);
+                v732 = softehl_blend(m761, v883, v732); v733 = softehl_blend(m761, v884, v733);
+                v734 = softehl_blend(m761, v885, v734); v735 = softehl_blend(m761, v886, v735);
+                v736 = softehl_blend(m761, v887, v736); v737 = softehl_blend(m761, v888, v737);
+                v738 = softehl_blend(m761, v889, v738); v739 = softehl_blend(m761, v890, v739);
+                v740 = softehl_blend(m761, v891, v740); v741 = softehl_blend(m761, v892, v741);
+                v742 = softehl_blend(m761, v893, v742); v743 = softehl_blend(m761, v859, v743);
+                v744 = softehl_blend(m761, v860, v744); v745 = softehl_blend(m761, v861, v745);
+                v746 = softehl_blend(m761, v862, v746); v747 = softehl_blend(m761, v849, v747);
+                v748 = softehl_blend(m761, v850, v748); v749 = softehl_blend(m761, v872, v749);
+                v750 = softehl_blend(m761, v873, v750); v751 = softehl_blend(m761, v770, v751);
+                v752 = softehl_blend(m761, v866, v752); v753 = softehl_blend(m761, v794, v753);
+                v754 = softehl_blend(m761, v867, v754); v755 = softehl_blend(m761, v868, v755);
+                v756 = softehl_blend(m761, v869, v756); v757 = softehl_blend(m761, v864, v757);
+                v758 = softehl_blend(m761, v870, v758); v759 = softehl_blend(m761, v871, v759);
+                v760 = softehl_blend(m761, v865, v760);
             }
-            v658 = softehl_blend(m713, v715, v658); v659 = softehl_blend(m713, v716, v659);
-            v660 = softehl_blend(m713, v717, v660); v661 = softehl_blend(m713, v718, v661);
-            v662 = softehl_blend(m713, v719, v662); v663 = softehl_blend(m713, v720, v663);
-            v664 = softehl_blend(m713, v721, v664); v665 = softehl_blend(m713, v722, v665);
-            v666 = softehl_blend(m713, v723, v666); v667 = softehl_blend(m713, v724, v667);
-            v668 = softehl_blend(m713, v725, v668); v669 = softehl_blend(m713, v726, v669);
-            v670 = softehl_blend(m713, v727, v670); v671 = softehl_blend(m713, v728, v671);
-            v672 = softehl_blend(m713, v729, v672); v673 = softehl_blend(m713, v730, v673);
-            v674 = softehl_blend(m713, v731, v674); v675 = softehl_blend(m713, v732, v675);
-            v676 = softehl_blend(m713, v733, v676); v677 = softehl_blend(m713, v734, v677);
-            v678 = softehl_blend(m713, v735, v678); v679 = softehl_blend(m713, v736, v679);
-            v680 = softehl_blend(m713, v737, v680); v681 = softehl_blend(m713, v738, v681);
-            v682 = softehl_blend(m713, v739, v682); v683 = softehl_blend(m713, v740, v683);
-            v684 = softehl_blend(m713, v741, v684); v685 = softehl_blend(m713, v742, v685);
-            v686 = softehl_blend(m713, v743, v686); v687 = softehl_blend(m713, v744, v687);
-            v689 = softehl_blend(m713, v745, v689); v691 = softehl_blend(m713, v746, v691);
-            v693 = softehl_blend(m713, v747, v693); v695 = softehl_blend(m713, v748, v695);
-            v696 = softehl_blend(m713, v749, v696); v697 = softehl_blend(m713, v750, v697);
-            v699 = softehl_blend(m713, v751, v699); v701 = softehl_blend(m713, v752, v701);
-            v703 = softehl_blend(m713, v753, v703); v705 = softehl_blend(m713, v754, v705);
-            v707 = softehl_blend(m713, v755, v707); v709 = softehl_blend(m713, v756, v709);
-            v711 = softehl_blend(m713, v757, v711);
+            v661 = softehl_blend(m716, v718, v661); v662 = softehl_blend(m716, v719, v662);
+            v663 = softehl_blend(m716, v720, v663); v664 = softehl_blend(m716, v721, v664);
+            v665 = softehl_blend(m716, v722, v665); v666 = softehl_blend(m716, v723, v666);
+            v667 = softehl_blend(m716, v724, v667); v668 = softehl_blend(m716, v725, v668);
+            v669 = softehl_blend(m716, v726, v669); v670 = softehl_blend(m716, v727, v670);
+            v671 = softehl_blend(m716, v728, v671); v672 = softehl_blend(m716, v729, v672);
+            v673 = softehl_blend(m716, v730, v673); v674 = softehl_blend(m716, v731, v674);
+            v675 = softehl_blend(m716, v732, v675); v676 = softehl_blend(m716, v733, v676);
+            v677 = softehl_blend(m716, v734, v677); v678 = softehl_blend(m716, v735, v678);
+            v679 = softehl_blend(m716, v736, v679); v680 = softehl_blend(m716, v737, v680);
+            v681 = softehl_blend(m716, v738, v681); v682 = softehl_blend(m716, v739, v682);
+            v683 = softehl_blend(m716, v740, v683); v684 = softehl_blend(m716, v741, v684);
+            v685 = softehl_blend(m716, v742, v685); v686 = softehl_blend(m716, v743, v686);
+            v687 = softehl_blend(m716, v744, v687); v688 = softehl_blend(m716, v745, v688);
+            v689 = softehl_blend(m716, v746, v689); v690 = softehl_blend(m716, v747, v690);
+            v692 = softehl_blend(m716, v748, v692); v694 = softehl_blend(m716, v749, v694);
+            v696 = softehl_blend(m716, v750, v696); v698 = softehl_blend(m716, v751, v698);
+            v699 = softehl_blend(m716, v752, v699); v700 = softehl_blend(m716, v753, v700);
+            v702 = softehl_blend(m716, v754, v702); v704 = softehl_blend(m716, v755, v704);
+            v706 = softehl_blend(m716, v756, v706); v708 = softehl_blend(m716, v757, v708);
+            v710 = softehl_blend(m716, v758, v710); v712 = softehl_blend(m716, v759, v712);
+            v714 = softehl_blend(m716, v760, v714);
         }
-        const M m884 = ~v652;
-        if (softehl_any(m884)) {
-            const V v885 = v643 - v582, v886 = v885 * v885, v887 = v885 * v886, v888 = 3.0 * v886,
-                v889 = v563 * v888, v890 = v30 * v888, v891 = -(v505 * v888), v892 = a10 * v888,
-                v893 = v892 * v648, v894 = v892 * v647, v895 = v892 * v656, v896 = v892 * v644,
-                v897 = v892 * v657, v898 = v892 * v642, v899 = v892 * v649, v900 = v892 * v645,
-                v901 = v892 * v651, v902 = v892 * v646;
-            v658 = softehl_blend(m884, v887, v658); v659 = softehl_blend(m884, v889, v659);
-            v660 = softehl_blend(m884, v891, v660); v661 = softehl_blend(m884, v887, v661);
-            v662 = softehl_blend(m884, v892, v662); v688 = softehl_blend(m884, v889, v688);
-            v690 = softehl_blend(m884, v891, v690); v692 = softehl_blend(m884, v893, v692);
-            v694 = softehl_blend(m884, v894, v694); v695 = softehl_blend(m884, v890, v695);
-            v697 = softehl_blend(m884, v890, v697); v698 = softehl_blend(m884, v895, v698);
-            v700 = softehl_blend(m884, v896, v700); v702 = softehl_blend(m884, v897, v702);
-            v704 = softehl_blend(m884, v898, v704); v706 = softehl_blend(m884, v899, v706);
-            v708 = softehl_blend(m884, v900, v708); v710 = softehl_blend(m884, v901, v710);
-            v712 = softehl_blend(m884, v902, v712);
+        const M m894 = ~v655;
+        if (softehl_any(m894)) {
+            const V v895 = v646 - v585, v896 = v895 * v895, v897 = v895 * v896, v898 = 3.0 * v896,
+                v899 = v566 * v898, v900 = v54 * v898, v901 = -(v508 * v898), v902 = a10 * v898,
+                v903 = v902 * v651, v904 = v902 * v650, v905 = v902 * v659, v906 = v902 * v647,
+                v907 = v902 * v660, v908 = v902 * v645, v909 = v902 * v652, v910 = v902 * v648,
+                v911 = v902 * v654, v912 = v902 * v649;
+            v661 = softehl_blend(m894, v897, v661); v662 = softehl_blend(m894, v899, v662);
+            v663 = softehl_blend(m894, v901, v663); v664 = softehl_blend(m894, v897, v664);
+            v665 = softehl_blend(m894, v902, v665); v691 = softehl_blend(m894, v899, v691);
+            v693 = softehl_blend(m894, v901, v693); v695 = softehl_blend(m894, v903, v695);
+            v697 = softehl_blend(m894, v904, v697); v698 = softehl_blend(m894, v900, v698);
+            v700 = softehl_blend(m894, v900, v700); v701 = softehl_blend(m894, v905, v701);
+            v703 = softehl_blend(m894, v906, v703); v705 = softehl_blend(m894, v907, v705);
+            v707 = softehl_blend(m894, v908, v707); v709 = softehl_blend(m894, v909, v709);
+            v711 = softehl_blend(m894, v910, v711); v713 = softehl_blend(m894, v911, v713);
+            v715 = softehl_blend(m894, v912, v715);
         }
-        s309 += v663; s310 += v664; s311 += v665; s312 += v666; s313 += v667; s314 += v668;
-        s315 += v669; s316 += v670; s317 += v671; s318 += v672; s319 += v673; s320 += v674;
-        s321 += v675; s322 += v676; s323 += v677; s324 += v678; s325 += v679; s326 += v680;
-        s327 += v681; s328 += v682; s329 += v683; s330 += v684; s331 += v685; s332 += v686;
-        const V v903 = v688 + v687, v904 = v690 + v689, v905 = v692 + v691, v906 = v694 + v693,
-            v907 = v648 * v662, v908 = v647 * v662, v909 = w[1] * v907, v910 = w[1] * v908,
-            v911 = v34 * w[1], v912 = w[1] * v659, v913 = w[1] * v660, v914 = w[1] * v903,
-            v915 = w[1] * v904, v916 = w[1] * v593;
-        s305 += v909 * v593; s306 += v910 * v593; s307 += v909 * v594; s308 += v910 * v594;
-        const V v917 = w[1] * v594; s299 += v912 * v593; s301 += v912 * v594; s300 += v913 * v593;
-        s302 += v913 * v594; s343 += v914 * v593; s345 += v914 * v594; s344 += v915 * v593;
-        s346 += v915 * v594; s369 += v905 * v917; s370 += v906 * v917; s367 += v905 * v916;
-        s368 += v906 * v916;
-        const V v918 = v907 * v591 + v905 * v592, v919 = v905 * v591 - v907 * v592,
-            v920 = v908 * v591 + v906 * v592, v921 = v906 * v591 - v908 * v592,
-            v922 = v659 * v591 + v903 * v592, v923 = v903 * v591 - v659 * v592,
-            v924 = v660 * v591 + v904 * v592, v925 = v904 * v591 - v660 * v592;
-        s371 += v579 * v918; s372 += v579 * v920; s347 += v579 * v922; s373 += v579 * v919;
-        s349 += v579 * v923; s348 += v579 * v924; s350 += v579 * v925; s351 += v583 * v922;
-        s352 += v583 * v924; s353 += v583 * v923; s354 += v583 * v925; s377 += v583 * v919;
-        s355 += v630 * v922; s356 += v630 * v924; s357 += v630 * v923; s358 += v630 * v925;
-        s359 += v629 * v922; s360 += v629 * v924; s361 += v629 * v923; s362 += v629 * v925;
-        s363 += v628 * v922; s364 += v628 * v924; s365 += v628 * v923; s366 += v628 * v925;
-        const V v926 = v911 * v505, v927 = v911 * v504, v928 = v658 * v588, v929 = v658 * v587,
-            v930 = v658 * v295, v931 = v661 * v588, v932 = v661 * v587, v933 = v661 * v295,
-            v934 = 0.5 * v928;
-        s297 += v926 * v928; s303 += v926 * v931; s298 += v927 * v928; s304 += v927 * v931;
-        const V v935 = 0.5 * v931, v936 = v100 * v928, v937 = v100 * v931, v938 = v103 * v928,
-            v939 = v103 * v931, v940 = v34 * (v934 + v505 * v930),
-            v941 = v34 * (v935 + v505 * v933), v942 = v34 * (v504 * v930 - v934),
-            v943 = v34 * (v504 * v933 - v935), v944 = v580 * v929, v945 = v581 * v929,
-            v946 = v580 * v932, v947 = v581 * v932, v948 = v562 * v695 + v662 * v642,
-            v949 = v564 * v695 + v662 * v649, v950 = v557 * v695 + v662 * v651,
-            v951 = v556 * v695 + v662 * v645, v952 = v558 * v695 + v662 * v656,
-            v953 = v560 * v695 + v662 * v644;
-        s402 += w[1] * (v281 * v945 + v562 * v940 + v948 * v594);
-        const V v954 = v561 * v695 + v662 * v657, v955 = v559 * v695 + v662 * v646,
-            v956 = v560 * v697 + (v700 + v699), v957 = v561 * v697 + (v702 + v701),
-            v958 = v559 * v697 + (v712 + v711), v959 = v558 * v697 + (v698 + v696),
-            v960 = v562 * v697 + (v704 + v703), v961 = v564 * v697 + (v706 + v705),
-            v962 = v556 * v697 + (v708 + v707), v963 = v557 * v697 + (v710 + v709),
-            v964 = v91 * v658 + v90 * v661, v965 = v91 * v661 - v90 * v658;
-        s374 += v579 * v921; s378 += v583 * v921; s375 += v583 * v918; s376 += v583 * v920;
-        const V v966 = v964 * v588, v967 = v965 * v588, v968 = v964 * v587, v969 = v965 * v587,
-            v970 = v964 * v295, v971 = v965 * v295, v972 = 0.5 * v966;
-        s340 += v583 * v966; s339 += v583 * v967;
-        const V v973 = 0.5 * v967, v974 = v622 * v966, v975 = v622 * v967, v976 = v627 * v966,
-            v977 = v627 * v967, v978 = v598 * v966, v979 = v598 * v967;
-        s333 += v628 * v967; s334 += v628 * v966; s335 += v629 * v967; s336 += v629 * v966;
-        s337 += v630 * v967; s338 += v630 * v966; s341 += v579 * v967; s342 += v579 * v966;
-        const V v980 = v558 * v973, v981 = v558 * v972, v982 = v560 * v972, v983 = v560 * v973,
-            v984 = v561 * v972, v985 = v561 * v973, v986 = v562 * v972, v987 = v562 * v973,
-            v988 = v564 * v972, v989 = v564 * v973, v990 = v556 * v972, v991 = v556 * v973,
-            v992 = v557 * v972, v993 = v559 * v972, v994 = v557 * v973, v995 = v559 * v973;
-        s379 += w[1] * (v619 * v974 - v623 * v918); s380 += w[1] * (v620 * v974 - v623 * v920);
-        s381 += w[1] * (v619 * v975 - v623 * v919); s382 += w[1] * (v620 * v975 - v623 * v921);
-        s383 += w[1] * (v619 * v976 - v625 * v918); s384 += w[1] * (v620 * v976 - v625 * v920);
-        s385 += w[1] * (v619 * v977 - v625 * v919); s386 += w[1] * (v620 * v977 - v625 * v921);
-        s387 += w[1] * (v619 * v978 + v626 * v918); s388 += w[1] * (v620 * v978 + v626 * v920);
-        s389 += w[1] * (v619 * v979 + v626 * v919); s390 += w[1] * (v620 * v979 + v626 * v921);
-        s391 += w[1] * (v273 * v944 + v558 * v942 + v952 * v593);
-        s392 += w[1] * (v274 * v944 + v560 * v942 + v953 * v593);
-        s393 += w[1] * (v275 * v944 + v561 * v942 + v954 * v593);
-        s394 += w[1] * (v281 * v944 + v562 * v942 + v948 * v593);
-        const V v996 = w[1] * (v561 * v940 + (v275 * v945 + v954 * v594)); s401 += v996;
-        const V v997 = w[1] * (v273 * v945 + (v558 * v940 + v952 * v594)); s399 += v997;
-        const V v998 = w[1] * (v274 * v945 + (v560 * v940 + v953 * v594)); s400 += v998;
-        s395 += w[1] * (v282 * v944 + v564 * v942 + v949 * v593);
-        const V v999 = w[1] * (v564 * v940 + (v282 * v945 + v949 * v594)); s403 += v999;
-        const V v1000 = v282 * v969 + (v564 * v971 + (v591 * v961 - v949 * v592)),
-            v1001 = v282 * v968 + (v564 * v970 + (v949 * v591 + v592 * v961)),
-            v1002 = v281 * v968 + (v562 * v970 + (v948 * v591 + (v106 * v928 - v939))),
-            v1003 = v287 * v968 + (v556 * v970 + (v951 * v591 + v592 * v962)),
-            v1004 = w[1] * (v504 * v1000 - v989);
-        s435 += v1004; const V v1005 = w[1] * (v504 * v1001 - v988); s427 += v1005;
-        const V v1006 = v287 * v969 + (v556 * v971 + v591 * v962) - v951 * v592;
-        s404 += w[1] * (v287 * v945 + v556 * v940 + v951 * v594);
-        s396 += w[1] * (v287 * v944 + v556 * v942 + v951 * v593);
-        const V v1007 = w[1] * (v504 * v1003 - v990); s428 += v1007;
-        const V v1008 = w[1] * (v504 * v1006 - v991); s436 += v1008;
-        s397 += w[1] * (v288 * v944 + v557 * v942 + v950 * v593);
-        s398 += w[1] * (v289 * v944 + v559 * v942 + v955 * v593);
-        const V v1009 = v1002 + v592 * v960,
-            v1010 = w[1] * (v281 * v946 + v562 * v943 + v593 * v960);
-        s410 += v1010; const V v1011 = w[1] * (v281 * v947 + v562 * v941 + v594 * v960);
-        s418 += v1011;
-        const V v1012 = v281 * v969 + (v562 * v971 + (v938 + v106 * v931 - v948 * v592)) + v591 * v960,
-            v1013 = w[1] * (v557 * v940 + (v288 * v945 + v950 * v594));
-        s405 += v1013; const V v1014 = w[1] * (v559 * v940 + (v289 * v945 + v955 * v594));
-        s406 += v1014; const V v1015 = w[1] * (v504 * v1009 - v986); s426 += v1015;
-        const V v1016 = w[1] * (v504 * v1012 - v987); s434 += v1016;
-        const V v1017 = v288 * v969 + (v557 * v971 + (v591 * v963 - v950 * v592)),
-            v1018 = v289 * v969 + (v559 * v971 + (v591 * v958 - v955 * v592)),
-            v1019 = v559 * v970 + (v289 * v968 + (v955 * v591 + v592 * v958)),
-            v1020 = v557 * v970 + (v288 * v968 + (v950 * v591 + v592 * v963)),
-            v1021 = w[1] * (v504 * v1017 - v994);
-        s437 += v1021; const V v1022 = w[1] * (v504 * v1018 - v995); s438 += v1022;
-        const V v1023 = w[1] * (v504 * v1019 - v993); s430 += v1023;
-        const V v1024 = w[1] * (v504 * v1020 - v992); s429 += v1024;
-        const V v1025 = w[1] * (v289 * v947 + v559 * v941 + v594 * v958); s422 += v1025;
-        const V v1026 = w[1] * (v289 * v946 + v559 * v943 + v593 * v958); s414 += v1026;
-        const V v1027 = w[1] * (v275 * v947 + v561 * v941 + v594 * v957); s417 += v1027;
-        const V v1028 = w[1] * (v275 * v946 + v561 * v943 + v593 * v957); s409 += v1028;
-        const V v1029 = v275 * v968 + (v561 * v970 + (v954 * v591 + (v104 * v931 - v936) + v592 * v957)),
-            v1030 = v275 * v969 + (v561 * v971 + (v591 * v957 - v104 * v928 - v937 - v954 * v592)),
-            v1031 = w[1] * (v282 * v946 + v564 * v943 + v593 * v961);
-        s411 += v1031; const V v1032 = w[1] * (v282 * v947 + v564 * v941 + v594 * v961);
-        s419 += v1032; const V v1033 = w[1] * (v504 * v1029 - v984); s425 += v1033;
-        const V v1034 = w[1] * (v504 * v1030 - v985); s433 += v1034;
-        const V v1035 = w[1] * (v287 * v946 + v556 * v943 + v593 * v962); s412 += v1035;
-        const V v1036 = w[1] * (v287 * v947 + v556 * v941 + v594 * v962); s420 += v1036;
-        const V v1037 = w[1] * (v288 * v946 + v557 * v943 + v593 * v963); s413 += v1037;
-        const V v1038 = w[1] * (v288 * v947 + v557 * v941 + v594 * v963); s421 += v1038;
-        const V v1039 = w[1] * (v984 + v505 * v1029); s441 += v1039;
-        const V v1040 = w[1] * (v985 + v505 * v1030); s449 += v1040;
-        const V v1041 = w[1] * (v986 + v505 * v1009); s442 += v1041;
-        const V v1042 = w[1] * (v988 + v505 * v1001); s443 += v1042;
-        const V v1043 = w[1] * (v990 + v505 * v1003); s444 += v1043;
-        const V v1044 = w[1] * (v992 + v505 * v1020); s445 += v1044;
-        const V v1045 = w[1] * (v993 + v505 * v1019); s446 += v1045;
-        const V v1046 = w[1] * (v987 + v505 * v1012); s450 += v1046;
-        const V v1047 = w[1] * (v989 + v505 * v1000); s451 += v1047;
-        const V v1048 = w[1] * (v991 + v505 * v1006); s452 += v1048;
-        const V v1049 = w[1] * (v994 + v505 * v1017); s453 += v1049;
-        const V v1050 = w[1] * (v995 + v505 * v1018); s454 += v1050;
-        const V v1051 = w[1] * (v616 * v974 - v623 * v1020); s461 += v1051;
-        const V v1052 = w[1] * (v634 * v975 - v623 * v1012); s466 += v1052;
-        const V v1053 = w[1] * (v615 * v975 - v623 * v1000); s467 += v1053;
-        const V v1054 = w[1] * (v617 * v975 - v623 * v1006); s468 += v1054;
-        const V v1055 = w[1] * (v616 * v975 - v623 * v1017); s469 += v1055;
-        const V v1056 = w[1] * (v618 * v975 - v623 * v1018); s470 += v1056;
-        const V v1057 = w[1] * (v655 * v974 - v623 * v1029); s457 += v1057;
-        const V v1058 = w[1] * (v634 * v974 - v623 * v1009); s458 += v1058;
-        const V v1059 = w[1] * (v615 * v974 - v623 * v1001); s459 += v1059;
-        const V v1060 = w[1] * (v617 * v974 - v623 * v1003); s460 += v1060;
-        const V v1061 = w[1] * (v618 * v974 - v623 * v1019); s462 += v1061;
-        const V v1062 = w[1] * (v655 * v975 - v623 * v1030); s465 += v1062;
-        const V v1063 = w[1] * (v655 * v976 - v625 * v1029); s473 += v1063;
-        const V v1064 = w[1] * (v634 * v976 - v625 * v1009); s474 += v1064;
-        const V v1065 = w[1] * (v615 * v976 - v625 * v1001); s475 += v1065;
-        const V v1066 = w[1] * (v617 * v976 - v625 * v1003); s476 += v1066;
-        const V v1067 = w[1] * (v618 * v976 - v625 * v1019); s478 += v1067;
-        const V v1068 = w[1] * (v655 * v977 - v625 * v1030); s481 += v1068;
-        const V v1069 = w[1] * (v655 * v978 + v626 * v1029); s489 += v1069;
-        const V v1070 = w[1] * (v634 * v978 + v626 * v1009); s490 += v1070;
-        const V v1071 = w[1] * (v615 * v978 + v626 * v1001); s491 += v1071;
-        const V v1072 = w[1] * (v617 * v978 + v626 * v1003); s492 += v1072;
-        const V v1073 = w[1] * (v618 * v978 + v626 * v1019); s494 += v1073;
-        const V v1074 = w[1] * (v655 * v979 + v626 * v1030); s497 += v1074;
-        const V v1075 = w[1] * (v616 * v976 - v625 * v1020); s477 += v1075;
-        const V v1076 = w[1] * (v616 * v978 + v626 * v1020); s493 += v1076;
-        const V v1077 = w[1] * (v634 * v977 - v625 * v1012); s482 += v1077;
-        const V v1078 = w[1] * (v634 * v979 + v626 * v1012); s498 += v1078;
-        const V v1079 = w[1] * (v615 * v977 - v625 * v1000); s483 += v1079;
-        const V v1080 = w[1] * (v615 * v979 + v626 * v1000); s499 += v1080;
-        const V v1081 = w[1] * (v617 * v977 - v625 * v1006); s484 += v1081;
-        const V v1082 = w[1] * (v617 * v979 + v626 * v1006); s500 += v1082;
-        const V v1083 = w[1] * (v616 * v977 - v625 * v1017); s485 += v1083;
-        const V v1084 = w[1] * (v616 * v979 + v626 * v1017); s501 += v1084;
-        const V v1085 = w[1] * (v618 * v977 - v625 * v1018); s486 += v1085;
-        const V v1086 = w[1] * (v618 * v979 + v626 * v1018); s502 += v1086;
-        const V v1087 = w[1] * (v273 * v947 + v558 * v941 + v594 * v959); s415 += v1087;
-        const V v1088 = w[1] * (v274 * v947 + v560 * v941 + v594 * v956); s416 += v1088;
-        const V v1089 = v558 * v970 + (v952 * v591 + (v273 * v968 + (v936 + v105 * v931) + v592 * v959)),
-            v1090 = v560 * v970 + (v953 * v591 + (v274 * v968 + (v107 * v928 + v939) + v592 * v956)),
-            v1091 = v558 * v971 + (v273 * v969 + (v937 - v105 * v928) - v952 * v592 + v591 * v959),
-            v1092 = v560 * v971 + (v274 * v969 + (v107 * v931 - v938) - v953 * v592 + v591 * v956),
-            v1093 = w[1] * (v558 * v943 + (v273 * v946 + v593 * v959));
-        s407 += v1093; const V v1094 = w[1] * (v560 * v943 + (v274 * v946 + v593 * v956));
-        s408 += v1094; const V v1095 = w[1] * (v654 * v976 - v625 * v1089); s471 += v1095;
-        const V v1096 = w[1] * (v639 * v976 - v625 * v1090); s472 += v1096;
-        const V v1097 = w[1] * (v654 * v977 - v625 * v1091); s479 += v1097;
-        const V v1098 = w[1] * (v639 * v977 - v625 * v1092); s480 += v1098;
-        const V v1099 = w[1] * (v654 * v978 + v626 * v1089); s487 += v1099;
-        const V v1100 = w[1] * (v639 * v978 + v626 * v1090); s488 += v1100;
-        const V v1101 = w[1] * (v654 * v979 + v626 * v1091); s495 += v1101;
-        const V v1102 = w[1] * (v639 * v979 + v626 * v1092); s496 += v1102;
-        const V v1103 = w[1] * (v504 * v1089 - v981); s423 += v1103;
-        const V v1104 = w[1] * (v504 * v1090 - v982); s424 += v1104;
-        const V v1105 = w[1] * (v504 * v1091 - v980); s431 += v1105;
-        const V v1106 = w[1] * (v504 * v1092 - v983); s432 += v1106;
-        const V v1107 = w[1] * (v981 + v505 * v1089); s439 += v1107;
-        const V v1108 = w[1] * (v982 + v505 * v1090); s440 += v1108;
-        const V v1109 = w[1] * (v980 + v505 * v1091); s447 += v1109;
-        const V v1110 = w[1] * (v983 + v505 * v1092); s448 += v1110;
-        const V v1111 = w[1] * (v654 * v974 - v623 * v1089); s455 += v1111;
-        const V v1112 = w[1] * (v639 * v974 - v623 * v1090); s456 += v1112;
-        const V v1113 = w[1] * (v654 * v975 - v623 * v1091); s463 += v1113;
-        const V v1114 = w[1] * (v639 * v975 - v623 * v1092); s464 += v1114;
+        s312 += v666; s313 += v667; s314 += v668; s315 += v669; s316 += v670; s317 += v671;
+        s318 += v672; s319 += v673; s320 += v674; s321 += v675; s322 += v676; s323 += v677;
+        s324 += v678; s325 += v679; s326 += v680; s327 += v681; s328 += v682; s329 += v683;
+        s330 += v684; s331 += v685; s332 += v686; s333 += v687; s334 += v688; s335 += v689;
+        const V v913 = v691 + v690, v914 = v693 + v692, v915 = v695 + v694, v916 = v697 + v696,
+            v917 = v651 * v665, v918 = v650 * v665, v919 = w[1] * v917, v920 = w[1] * v918,
+            v921 = v33 * w[1], v922 = w[1] * v662, v923 = w[1] * v663, v924 = w[1] * v913,
+            v925 = w[1] * v914, v926 = w[1] * v596;
+        s308 += v919 * v596; s309 += v920 * v596; s310 += v919 * v597; s311 += v920 * v597;
+        const V v927 = w[1] * v597; s302 += v922 * v596; s304 += v922 * v597; s303 += v923 * v596;
+        s305 += v923 * v597; s346 += v924 * v596; s348 += v924 * v597; s347 += v925 * v596;
+        s349 += v925 * v597; s372 += v915 * v927; s373 += v916 * v927; s370 += v915 * v926;
+        s371 += v916 * v926;
+        const V v928 = v917 * v594 + v915 * v595, v929 = v915 * v594 - v917 * v595,
+            v930 = v918 * v594 + v916 * v595, v931 = v916 * v594 - v918 * v595,
+            v932 = v662 * v594 + v913 * v595, v933 = v913 * v594 - v662 * v595,
+            v934 = v663 * v594 + v914 * v595, v935 = v914 * v594 - v663 * v595;
+        s374 += v582 * v928; s375 += v582 * v930; s350 += v582 * v932; s376 += v582 * v929;
+        s352 += v582 * v933; s351 += v582 * v934; s353 += v582 * v935; s354 += v586 * v932;
+        s355 += v586 * v934; s356 += v586 * v933; s357 += v586 * v935; s380 += v586 * v929;
+        s358 += v633 * v932; s359 += v633 * v934; s360 += v633 * v933; s361 += v633 * v935;
+        s362 += v632 * v932; s363 += v632 * v934; s364 += v632 * v933; s365 += v632 * v935;
+        s366 += v631 * v932; s367 += v631 * v934; s368 += v631 * v933; s369 += v631 * v935;
+        const V v936 = v921 * v508, v937 = v921 * v507, v938 = v661 * v591, v939 = v661 * v590,
+            v940 = v661 * v298, v941 = v664 * v591, v942 = v664 * v590, v943 = v664 * v298,
+            v944 = 0.5 * v938;
+        s300 += v936 * v938; s306 += v936 * v941; s301 += v937 * v938; s307 += v937 * v941;
+        const V v945 = 0.5 * v941, v946 = v103 * v938, v947 = v103 * v941, v948 = v106 * v938,
+            v949 = v106 * v941, v950 = v33 * (v944 + v508 * v940),
+            v951 = v33 * (v945 + v508 * v943), v952 = v33 * (v507 * v940 - v944),
+            v953 = v33 * (v507 * v943 - v945), v954 = v583 * v939, v955 = v584 * v939,
+            v956 = v583 * v942, v957 = v584 * v942, v958 = v565 * v698 + v665 * v645,
+            v959 = v567 * v698 + v665 * v652, v960 = v560 * v698 + v665 * v654,
+            v961 = v559 * v698 + v665 * v648, v962 = v561 * v698 + v665 * v659,
+            v963 = v563 * v698 + v665 * v647;
+        s405 += w[1] * (v284 * v955 + v565 * v950 + v958 * v597);
+        const V v964 = v564 * v698 + v665 * v660, v965 = v562 * v698 + v665 * v649,
+            v966 = v563 * v700 + (v703 + v702), v967 = v564 * v700 + (v705 + v704),
+            v968 = v562 * v700 + (v715 + v714), v969 = v561 * v700 + (v701 + v699),
+            v970 = v565 * v700 + (v707 + v706), v971 = v567 * v700 + (v709 + v708),
+            v972 = v559 * v700 + (v711 + v710), v973 = v560 * v700 + (v713 + v712),
+            v974 = v94 * v661 + v93 * v664, v975 = v94 * v664 - v93 * v661;
+        s377 += v582 * v931; s381 += v586 * v931; s378 += v586 * v928; s379 += v586 * v930;
+        const V v976 = v974 * v591, v977 = v975 * v591, v978 = v974 * v590, v979 = v975 * v590,
+            v980 = v974 * v298, v981 = v975 * v298, v982 = 0.5 * v976;
+        s343 += v586 * v976; s342 += v586 * v977;
+        const V v983 = 0.5 * v977, v984 = v625 * v976, v985 = v625 * v977, v986 = v630 * v976,
+            v987 = v630 * v977, v988 = v601 * v976, v989 = v601 * v977;
+        s336 += v631 * v977; s337 += v631 * v976; s338 += v632 * v977; s339 += v632 * v976;
+        s340 += v633 * v977; s341 += v633 * v976; s344 += v582 * v977; s345 += v582 * v976;
+        const V v990 = v561 * v983, v991 = v561 * v982, v992 = v563 * v982, v993 = v563 * v983,
+            v994 = v564 * v982, v995 = v564 * v983, v996 = v565 * v982, v997 = v565 * v983,
+            v998 = v567 * v982, v999 = v567 * v983, v1000 = v559 * v982, v1001 = v559 * v983,
+            v1002 = v560 * v982, v1003 = v562 * v982, v1004 = v560 * v983, v1005 = v562 * v983;
+        s382 += w[1] * (v622 * v984 - v626 * v928); s383 += w[1] * (v623 * v984 - v626 * v930);
+        s384 += w[1] * (v622 * v985 - v626 * v929); s385 += w[1] * (v623 * v985 - v626 * v931);
+        s386 += w[1] * (v622 * v986 - v628 * v928); s387 += w[1] * (v623 * v986 - v628 * v930);
+        s388 += w[1] * (v622 * v987 - v628 * v929); s389 += w[1] * (v623 * v987 - v628 * v931);
+        s390 += w[1] * (v622 * v988 + v629 * v928); s391 += w[1] * (v623 * v988 + v629 * v930);
+        s392 += w[1] * (v622 * v989 + v629 * v929); s393 += w[1] * (v623 * v989 + v629 * v931);
+        s394 += w[1] * (v276 * v954 + v561 * v952 + v962 * v596);
+        s395 += w[1] * (v277 * v954 + v563 * v952 + v963 * v596);
+        s396 += w[1] * (v278 * v954 + v564 * v952 + v964 * v596);
+        s397 += w[1] * (v284 * v954 + v565 * v952 + v958 * v596);
+        const V v1006 = w[1] * (v564 * v950 + (v278 * v955 + v964 * v597)); s404 += v1006;
+        const V v1007 = w[1] * (v276 * v955 + (v561 * v950 + v962 * v597)); s402 += v1007;
+        const V v1008 = w[1] * (v277 * v955 + (v563 * v950 + v963 * v597)); s403 += v1008;
+        s398 += w[1] * (v285 * v954 + v567 * v952 + v959 * v596);
+        const V v1009 = w[1] * (v567 * v950 + (v285 * v955 + v959 * v597)); s406 += v1009;
+        const V v1010 = v285 * v979 + (v567 * v981 + (v594 * v971 - v959 * v595)),
+            v1011 = v285 * v978 + (v567 * v980 + (v959 * v594 + v595 * v971)),
+            v1012 = v284 * v978 + (v565 * v980 + (v958 * v594 + (v109 * v938 - v949))),
+            v1013 = v290 * v978 + (v559 * v980 + (v961 * v594 + v595 * v972)),
+            v1014 = w[1] * (v507 * v1010 - v999);
+        s438 += v1014; const V v1015 = w[1] * (v507 * v1011 - v998); s430 += v1015;
+        const V v1016 = v290 * v979 + (v559 * v981 + v594 * v972) - v961 * v595;
+        s407 += w[1] * (v290 * v955 + v559 * v950 + v961 * v597);
+        s399 += w[1] * (v290 * v954 + v559 * v952 + v961 * v596);
+        const V v1017 = w[1] * (v507 * v1013 - v1000); s431 += v1017;
+        const V v1018 = w[1] * (v507 * v1016 - v1001); s439 += v1018;
+        s400 += w[1] * (v291 * v954 + v560 * v952 + v960 * v596);
+        s401 += w[1] * (v292 * v954 + v562 * v952 + v965 * v596);
+        const V v1019 = v1012 + v595 * v970,
+            v1020 = w[1] * (v284 * v956 + v565 * v953 + v596 * v970);
+        s413 += v1020; const V v1021 = w[1] * (v284 * v957 + v565 * v951 + v597 * v970);
+        s421 += v1021;
+        const V v1022 = v284 * v979 + (v565 * v981 + (v948 + v109 * v941 - v958 * v595)) + v594 * v970,
+            v1023 = w[1] * (v560 * v950 + (v291 * v955 + v960 * v597));
+        s408 += v1023; const V v1024 = w[1] * (v562 * v950 + (v292 * v955 + v965 * v597));
+        s409 += v1024; const V v1025 = w[1] * (v507 * v1019 - v996); s429 += v1025;
+        const V v1026 = w[1] * (v507 * v1022 - v997); s437 += v1026;
+        const V v1027 = v291 * v979 + (v560 * v981 + (v594 * v973 - v960 * v595)),
+            v1028 = v292 * v979 + (v562 * v981 + (v594 * v968 - v965 * v595)),
+            v1029 = v562 * v980 + (v292 * v978 + (v965 * v594 + v595 * v968)),
+            v1030 = v560 * v980 + (v291 * v978 + (v960 * v594 + v595 * v973)),
+            v1031 = w[1] * (v507 * v1027 - v1004);
+        s440 += v1031; const V v1032 = w[1] * (v507 * v1028 - v1005); s441 += v1032;
+        const V v1033 = w[1] * (v507 * v1029 - v1003); s433 += v1033;
+        const V v1034 = w[1] * (v507 * v1030 - v1002); s432 += v1034;
+        const V v1035 = w[1] * (v292 * v957 + v562 * v951 + v597 * v968); s425 += v1035;
+        const V v1036 = w[1] * (v292 * v956 + v562 * v953 + v596 * v968); s417 += v1036;
+        const V v1037 = w[1] * (v278 * v957 + v564 * v951 + v597 * v967); s420 += v1037;
+        const V v1038 = w[1] * (v278 * v956 + v564 * v953 + v596 * v967); s412 += v1038;
+        const V v1039 = v278 * v978 + (v564 * v980 + (v964 * v594 + (v107 * v941 - v946) + v595 * v967)),
+            v1040 = v278 * v979 + (v564 * v981 + (v594 * v967 - v107 * v938 - v947 - v964 * v595)),
+            v1041 = w[1] * (v285 * v956 + v567 * v953 + v596 * v971);
+        s414 += v1041; const V v1042 = w[1] * (v285 * v957 + v567 * v951 + v597 * v971);
+        s422 += v1042; const V v1043 = w[1] * (v507 * v1039 - v994); s428 += v1043;
+        const V v1044 = w[1] * (v507 * v1040 - v995); s436 += v1044;
+        const V v1045 = w[1] * (v290 * v956 + v559 * v953 + v596 * v972); s415 += v1045;
+        const V v1046 = w[1] * (v290 * v957 + v559 * v951 + v597 * v972); s423 += v1046;
+        const V v1047 = w[1] * (v291 * v956 + v560 * v953 + v596 * v973); s416 += v1047;
+        const V v1048 = w[1] * (v291 * v957 + v560 * v951 + v597 * v973); s424 += v1048;
+        const V v1049 = w[1] * (v994 + v508 * v1039); s444 += v1049;
+        const V v1050 = w[1] * (v995 + v508 * v1040); s452 += v1050;
+        const V v1051 = w[1] * (v996 + v508 * v1019); s445 += v1051;
+        const V v1052 = w[1] * (v998 + v508 * v1011); s446 += v1052;
+        const V v1053 = w[1] * (v1000 + v508 * v1013); s447 += v1053;
+        const V v1054 = w[1] * (v1002 + v508 * v1030); s448 += v1054;
+        const V v1055 = w[1] * (v1003 + v508 * v1029); s449 += v1055;
+        const V v1056 = w[1] * (v997 + v508 * v1022); s453 += v1056;
+        const V v1057 = w[1] * (v999 + v508 * v1010); s454 += v1057;
+        const V v1058 = w[1] * (v1001 + v508 * v1016); s455 += v1058;
+        const V v1059 = w[1] * (v1004 + v508 * v1027); s456 += v1059;
+        const V v1060 = w[1] * (v1005 + v508 * v1028); s457 += v1060;
+        const V v1061 = w[1] * (v619 * v984 - v626 * v1030); s464 += v1061;
+        const V v1062 = w[1] * (v637 * v985 - v626 * v1022); s469 += v1062;
+        const V v1063 = w[1] * (v618 * v985 - v626 * v1010); s470 += v1063;
+        const V v1064 = w[1] * (v620 * v985 - v626 * v1016); s471 += v1064;
+        const V v1065 = w[1] * (v619 * v985 - v626 * v1027); s472 += v1065;
+        const V v1066 = w[1] * (v621 * v985 - v626 * v1028); s473 += v1066;
+        const V v1067 = w[1] * (v658 * v984 - v626 * v1039); s460 += v1067;
+        const V v1068 = w[1] * (v637 * v984 - v626 * v1019); s461 += v1068;
+        const V v1069 = w[1] * (v618 * v984 - v626 * v1011); s462 += v1069;
+        const V v1070 = w[1] * (v620 * v984 - v626 * v1013); s463 += v1070;
+        const V v1071 = w[1] * (v621 * v984 - v626 * v1029); s465 += v1071;
+        const V v1072 = w[1] * (v658 * v985 - v626 * v1040); s468 += v1072;
+        const V v1073 = w[1] * (v658 * v986 - v628 * v1039); s476 += v1073;
+        const V v1074 = w[1] * (v637 * v986 - v628 * v1019); s477 += v1074;
+        const V v1075 = w[1] * (v618 * v986 - v628 * v1011); s478 += v1075;
+        const V v1076 = w[1] * (v620 * v986 - v628 * v1013); s479 += v1076;
+        const V v1077 = w[1] * (v621 * v986 - v628 * v1029); s481 += v1077;
+        const V v1078 = w[1] * (v658 * v987 - v628 * v1040); s484 += v1078;
+        const V v1079 = w[1] * (v658 * v988 + v629 * v1039); s492 += v1079;
+        const V v1080 = w[1] * (v637 * v988 + v629 * v1019); s493 += v1080;
+        const V v1081 = w[1] * (v618 * v988 + v629 * v1011); s494 += v1081;
+        const V v1082 = w[1] * (v620 * v988 + v629 * v1013); s495 += v1082;
+        const V v1083 = w[1] * (v621 * v988 + v629 * v1029); s497 += v1083;
+        const V v1084 = w[1] * (v658 * v989 + v629 * v1040); s500 += v1084;
+        const V v1085 = w[1] * (v619 * v986 - v628 * v1030); s480 += v1085;
+        const V v1086 = w[1] * (v619 * v988 + v629 * v1030); s496 += v1086;
+        const V v1087 = w[1] * (v637 * v987 - v628 * v1022); s485 += v1087;
+        const V v1088 = w[1] * (v637 * v989 + v629 * v1022); s501 += v1088;
+        const V v1089 = w[1] * (v618 * v987 - v628 * v1010); s486 += v1089;
+        const V v1090 = w[1] * (v618 * v989 + v629 * v1010); s502 += v1090;
+        const V v1091 = w[1] * (v620 * v987 - v628 * v1016); s487 += v1091;
+        const V v1092 = w[1] * (v620 * v989 + v629 * v1016); s503 += v1092;
+        const V v1093 = w[1] * (v619 * v987 - v628 * v1027); s488 += v1093;
+        const V v1094 = w[1] * (v619 * v989 + v629 * v1027); s504 += v1094;
+        const V v1095 = w[1] * (v621 * v987 - v628 * v1028); s489 += v1095;
+        const V v1096 = w[1] * (v621 * v989 + v629 * v1028); s505 += v1096;
+        const V v1097 = w[1] * (v276 * v957 + v561 * v951 + v597 * v969); s418 += v1097;
+        const V v1098 = w[1] * (v277 * v957 + v563 * v951 + v597 * v966); s419 += v1098;
+        const V v1099 = v561 * v980 + (v962 * v594 + (v276 * v978 + (v946 + v108 * v941) + v595 * v969)),
+            v1100 = v563 * v980 + (v963 * v594 + (v277 * v978 + (v110 * v938 + v949) + v595 * v966)),
+            v1101 = v561 * v981 + (v276 * v979 + (v947 - v108 * v938) - v962 * v595 + v594 * v969),
+            v1102 = v563 * v981 + (v277 * v979 + (v110 * v941 - v948) - v963 * v595 + v594 * v966),
+            v1103 = w[1] * (v561 * v953 + (v276 * v956 + v596 * v969));
+        s410 += v1103; const V v1104 = w[1] * (v563 * v953 + (v277 * v956 + v596 * v966));
+        s411 += v1104; const V v1105 = w[1] * (v657 * v986 - v628 * v1099); s474 += v1105;
+        const V v1106 = w[1] * (v642 * v986 - v628 * v1100); s475 += v1106;
+        const V v1107 = w[1] * (v657 * v987 - v628 * v1101); s482 += v1107;
+        const V v1108 = w[1] * (v642 * v987 - v628 * v1102); s483 += v1108;
+        const V v1109 = w[1] * (v657 * v988 + v629 * v1099); s490 += v1109;
+        const V v1110 = w[1] * (v642 * v988 + v629 * v1100); s491 += v1110;
+        const V v1111 = w[1] * (v657 * v989 + v629 * v1101); s498 += v1111;
+        const V v1112 = w[1] * (v642 * v989 + v629 * v1102); s499 += v1112;
+        const V v1113 = w[1] * (v507 * v1099 - v991); s426 += v1113;
+        const V v1114 = w[1] * (v507 * v1100 - v992); s427 += v1114;
+        const V v1115 = w[1] * (v507 * v1101 - v990); s434 += v1115;
+        const V v1116 = w[1] * (v507 * v1102 - v993); s435 += v1116;
+        const V v1117 = w[1] * (v991 + v508 * v1099); s442 += v1117;
+        const V v1118 = w[1] * (v992 + v508 * v1100); s443 += v1118;
+        const V v1119 = w[1] * (v990 + v508 * v1101); s450 += v1119;
+        const V v1120 = w[1] * (v993 + v508 * v1102); s451 += v1120;
+        const V v1121 = w[1] * (v657 * v984 - v626 * v1099); s458 += v1121;
+        const V v1122 = w[1] * (v642 * v984 - v626 * v1100); s459 += v1122;
+        const V v1123 = w[1] * (v657 * v985 - v626 * v1101); s466 += v1123;
+        const V v1124 = w[1] * (v642 * v985 - v626 * v1102); s467 += v1124;
     }
-    softehl_store2(R + 12, 14, s297, s303);
-    softehl_store4(K + 148, 196, s305, s306, s299, softehl_splat(0.0));
-    softehl_store4(K + 176, 196, s307, s308, s301, softehl_splat(0.0));
-    softehl_store4(R + 4, 14, s338, s337, s336, s335);
-    softehl_store4(R + 0, 14, s342, s341, s340, s339);
-    softehl_store4(K + 164, 196, s343, s329, s344, s330);
-    softehl_store4(K + 192, 196, s345, s331, s346, s332);
-    softehl_store4(K + 24, 196, s349, s311, s350, s312);
-    softehl_store4(K + 52, 196, s353, s315, s354, s316);
-    softehl_store4(K + 80, 196, s357, s319, s358, s320);
-    softehl_store4(K + 108, 196, s361, s323, s362, s324);
-    softehl_store4(K + 8, 196, s371, s372, s347, s309);
-    softehl_store4(K + 36, 196, s375, s376, s351, s313);
-    softehl_store4(K + 140, 196, s391, s392, s393, s394);
-    softehl_store4(K + 144, 196, s395, s396, s397, s398);
-    softehl_store4(K + 168, 196, s399, s400, s401, s402);
-    softehl_store4(K + 172, 196, s403, s404, s405, s406);
-    softehl_store4(K + 152, 196, s300, softehl_splat(0.0), s407, s408);
-    softehl_store4(K + 156, 196, s409, s410, s411, s412);
-    softehl_store4(K + 160, 196, s413, s414, s367, s368);
-    softehl_store4(K + 180, 196, s302, softehl_splat(0.0), s415, s416);
-    softehl_store4(K + 184, 196, s417, s418, s419, s420);
-    softehl_store4(K + 188, 196, s421, s422, s369, s370);
-    softehl_store4(K + 0, 196, s423, s424, s425, s426);
-    softehl_store4(K + 4, 196, s427, s428, s429, s430);
-    softehl_store4(K + 12, 196, s348, s310, s431, s432);
-    softehl_store4(K + 16, 196, s433, s434, s435, s436);
-    softehl_store4(K + 20, 196, s437, s438, s373, s374);
-    softehl_store4(K + 28, 196, s439, s440, s441, s442);
-    softehl_store4(K + 32, 196, s443, s444, s445, s446);
-    softehl_store4(K + 40, 196, s352, s314, s447, s448);
-    softehl_store4(K + 44, 196, s449, s450, s451, s452);
-    softehl_store4(K + 48, 196, s453, s454, s377, s378);
-    softehl_store4(R + 8, 14, -s334, -s333, s298, s304);
-    softehl_store4(K + 136, 196, -s365, s327, -s366, s328);
-    softehl_store4(K + 64, 196, -s379, -s380, s355, s317);
-    softehl_store4(K + 92, 196, -s383, -s384, s359, s321);
-    softehl_store4(K + 120, 196, -s387, -s388, -s363, s325);
-    softehl_store4(K + 56, 196, -s455, -s456, -s457, -s458);
-    softehl_store4(K + 60, 196, -s459, -s460, -s461, -s462);
-    softehl_store4(K + 68, 196, s356, s318, -s463, -s464);
-    softehl_store4(K + 72, 196, -s465, -s466, -s467, -s468);
-    softehl_store4(K + 76, 196, -s469, -s470, -s381, -s382);
-    softehl_store4(K + 84, 196, -s471, -s472, -s473, -s474);
-    softehl_store4(K + 88, 196, -s475, -s476, -s477, -s478);
-    softehl_store4(K + 96, 196, s360, s322, -s479, -s480);
-    softehl_store4(K + 100, 196, -s481, -s482, -s483, -s484);
-    softehl_store4(K + 104, 196, -s485, -s486, -s385, -s386);
-    softehl_store4(K + 112, 196, -s487, -s488, -s489, -s490);
-    softehl_store4(K + 116, 196, -s491, -s492, -s493, -s494);
-    softehl_store4(K + 124, 196, -s364, s326, -s495, -s496);
-    softehl_store4(K + 128, 196, -s497, -s498, -s499, -s500);
-    softehl_store4(K + 132, 196, -s501, -s502, -s389, -s390);
+    softehl_store2(R + 12, 14, s300, s306);
+    softehl_store4(K + 148, 196, s308, s309, s302, softehl_splat(0.0));
+    softehl_store4(K + 176, 196, s310, s311, s304, softehl_splat(0.0));
+    softehl_store4(R + 4, 14, s341, s340, s339, s338);
+    softehl_store4(R + 0, 14, s345, s344, s343, s342);
+    softehl_store4(K + 164, 196, s346, s332, s347, s333);
+    softehl_store4(K + 192, 196, s348, s334, s349, s335);
+    softehl_store4(K + 24, 196, s352, s314, s353, s315);
+    softehl_store4(K + 52, 196, s356, s318, s357, s319);
+    softehl_store4(K + 80, 196, s360, s322, s361, s323);
+    softehl_store4(K + 108, 196, s364, s326, s365, s327);
+    softehl_store4(K + 8, 196, s374, s375, s350, s312);
+    softehl_store4(K + 36, 196, s378, s379, s354, s316);
+    softehl_store4(K + 140, 196, s394, s395, s396, s397);
+    softehl_store4(K + 144, 196, s398, s399, s400, s401);
+    softehl_store4(K + 168, 196, s402, s403, s404, s405);
+    softehl_store4(K + 172, 196, s406, s407, s408, s409);
+    softehl_store4(K + 152, 196, s303, softehl_splat(0.0), s410, s411);
+    softehl_store4(K + 156, 196, s412, s413, s414, s415);
+    softehl_store4(K + 160, 196, s416, s417, s370, s371);
+    softehl_store4(K + 180, 196, s305, softehl_splat(0.0), s418, s419);
+    softehl_store4(K + 184, 196, s420, s421, s422, s423);
+    softehl_store4(K + 188, 196, s424, s425, s372, s373);
+    softehl_store4(K + 0, 196, s426, s427, s428, s429);
+    softehl_store4(K + 4, 196, s430, s431, s432, s433);
+    softehl_store4(K + 12, 196, s351, s313, s434, s435);
+    softehl_store4(K + 16, 196, s436, s437, s438, s439);
+    softehl_store4(K + 20, 196, s440, s441, s376, s377);
+    softehl_store4(K + 28, 196, s442, s443, s444, s445);
+    softehl_store4(K + 32, 196, s446, s447, s448, s449);
+    softehl_store4(K + 40, 196, s355, s317, s450, s451);
+    softehl_store4(K + 44, 196, s452, s453, s454, s455);
+    softehl_store4(K + 48, 196, s456, s457, s380, s381);
+    softehl_store4(R + 8, 14, -s337, -s336, s301, s307);
+    softehl_store4(K + 136, 196, -s368, s330, -s369, s331);
+    softehl_store4(K + 64, 196, -s382, -s383, s358, s320);
+    softehl_store4(K + 92, 196, -s386, -s387, s362, s324);
+    softehl_store4(K + 120, 196, -s390, -s391, -s366, s328);
+    softehl_store4(K + 56, 196, -s458, -s459, -s460, -s461);
+    softehl_store4(K + 60, 196, -s462, -s463, -s464, -s465);
+    softehl_store4(K + 68, 196, s359, s321, -s466, -s467);
+    softehl_store4(K + 72, 196, -s468, -s469, -s470, -s471);
+    softehl_store4(K + 76, 196, -s472, -s473, -s384, -s385);
+    softehl_store4(K + 84, 196, -s474, -s475, -s476, -s477);
+    softehl_store4(K + 88, 196, -s478, -s479, -s480, -s481);
+    softehl_store4(K + 96, 196, s363, s325, -s482, -s483);
+    softehl_store4(K + 100, 196, -s484, -s485, -s486, -s487);
+    softehl_store4(K + 104, 196, -s488, -s489, -s388, -s389);
+    softehl_store4(K + 112, 196, -s490, -s491, -s492, -s493);
+    softehl_store4(K + 116, 196, -s494, -s495, -s496, -s497);
+    softehl_store4(K + 124, 196, -s367, s329, -s498, -s499);
+    softehl_store4(K + 128, 196, -s500, -s501, -s502, -s503);
+    softehl_store4(K + 132, 196, -s504, -s505, -s392, -s393);
 }
 SOFTEHL_BATCH(softehl_mortar_23_tangent, 10, 14, 15, 0, 14, (14 * 14))

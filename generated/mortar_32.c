@@ -48,185 +48,193 @@ SOFTEHL_GROUP(softehl_mortar_32_residual)
     softehl_load4(a + 8, 15, &a8, &a9, &a10, &a11); softehl_load3(a + 12, 15, &a12, &a13, &a14);
     const V v1 = X0 + d0, v2 = X2 + d2, v3 = X4 + d4, v4 = 2.0 * X4, v5 = X0 + a0, v6 = X8 + d8,
         v7 = X2 + a1, v8 = X4 + a2, v9 = X1 + d1, v10 = X3 + d3, v11 = X8 + a4, v12 = X5 + d5,
-        v13 = 2.0 * X5, v14 = X1 + a5, v15 = X3 + a6, v16 = 1.0 / a10, v17 = X5 + a7, v18 = X6 + a3,
-        v19 = X7 + a8, v20 = X9 + a9, v21 = X9 + d9, v22 = X6 + d6, v23 = v6 - X6 - d6,
-        v24 = 0.5 * (v10 + v9), v25 = X7 + d7, v26 = 0.5 * (v10 - v9), v27 = v21 - X7 - d7,
-        v28 = 0.5 * (v2 + v1), v29 = 0.5 * (v2 - v1), v30 = 1.0 / (v29 * v29 + v26 * v26),
-        v31 = (v29 * (v6 - v28) + v26 * (v21 - v24)) * v30;
-    const M v32 = softehl_lt(softehl_splat(1.0), v31);
-    const V v33 = softehl_blend(v32, softehl_splat(1.0), v31); const M v34 = softehl_eq(v33, v33);
-    const V v35 = (v29 * (v22 - v28) + v26 * (v25 - v24)) * v30;
-    const M v36 = softehl_lt(softehl_splat(1.0), v35);
-    const V v37 = softehl_blend(v36, softehl_splat(1.0), v35); const M v38 = softehl_eq(v37, v37);
-    V v39 = softehl_splat(0.0); const M m40 = v34;
-    if (softehl_any(m40)) {
-        const M v41 = softehl_lt(softehl_splat((-1.0)), v33);
-        const V v42 = softehl_blend(v41, v33, softehl_splat((-1.0)));
-        v39 = softehl_blend(m40, v42, v39);
+        v13 = 2.0 * X5, v14 = X1 + a5, v15 = X3 + a6;
+    const M v16 = softehl_lt(softehl_splat(0.0), a11);
+    const V v17 = X5 + a7, v18 = 1.0 / a10, v19 = X6 + a3, v20 = X7 + a8, v21 = X9 + a9,
+        v22 = X9 + d9, v23 = X6 + d6, v24 = v6 - X6 - d6, v25 = X7 + d7, v26 = 0.5 * (v10 + v9),
+        v27 = 0.5 * (v10 - v9), v28 = v22 - X7 - d7, v29 = 0.5 * (v2 + v1), v30 = 0.5 * (v2 - v1),
+        v31 = 1.0 / (v30 * v30 + v27 * v27), v32 = (v30 * (v6 - v29) + v27 * (v22 - v26)) * v31;
+    const M v33 = softehl_lt(softehl_splat(1.0), v32);
+    const V v34 = softehl_blend(v33, softehl_splat(1.0), v32); const M v35 = softehl_eq(v34, v34);
+    const V v36 = (v30 * (v23 - v29) + v27 * (v25 - v26)) * v31;
+    const M v37 = softehl_lt(softehl_splat(1.0), v36);
+    const V v38 = softehl_blend(v37, softehl_splat(1.0), v36); const M v39 = softehl_eq(v38, v38);
+    V v40 = softehl_splat(0.0); const M m41 = v35;
+    if (softehl_any(m41)) {
+        const M v42 = softehl_lt(softehl_splat((-1.0)), v34);
+        const V v43 = softehl_blend(v42, v34, softehl_splat((-1.0)));
+        v40 = softehl_blend(m41, v43, v40);
     }
-    const M m43 = ~v34;
-    if (softehl_any(m43)) {
-        const V v44 = (-1.0) - v33, v45 = v44 * (v44 * v44);
-        v39 = softehl_blend(m43, v45, v39);
+    const M m44 = ~v35;
+    if (softehl_any(m44)) {
+        const V v45 = (-1.0) - v34, v46 = v45 * (v45 * v45);
+        v40 = softehl_blend(m44, v46, v40);
     }
-    V v46 = softehl_splat(0.0); const M m47 = v38;
-    if (softehl_any(m47)) {
-        const M v48 = softehl_lt(softehl_splat((-1.0)), v37);
-        const V v49 = softehl_blend(v48, v37, softehl_splat((-1.0)));
-        v46 = softehl_blend(m47, v49, v46);
+    V v47 = softehl_splat(0.0); const M m48 = v39;
+    if (softehl_any(m48)) {
+        const M v49 = softehl_lt(softehl_splat((-1.0)), v38);
+        const V v50 = softehl_blend(v49, v38, softehl_splat((-1.0)));
+        v47 = softehl_blend(m48, v50, v47);
     }
-    const M m50 = ~v38;
-    if (softehl_any(m50)) {
-        const V v51 = (-1.0) - v37, v52 = v51 * (v51 * v51);
-        v46 = softehl_blend(m50, v52, v46);
+    const M m51 = ~v39;
+    if (softehl_any(m51)) {
+        const V v52 = (-1.0) - v38, v53 = v52 * (v52 * v52);
+        v47 = softehl_blend(m51, v53, v47);
     }
-    const V v53 = 0.5 + v39, v54 = 2.0 * v39, v55 = 0.5 * v39, v56 = v55 * (1.0 + v39),
-        v57 = v39 - 0.5, v58 = v55 * (v39 - 1.0), v59 = v39 * v39 - 1.0, v60 = 0.5 + v46,
-        v61 = 2.0 * v46, v62 = 0.5 * v46, v63 = v62 * (1.0 + v46), v64 = v46 - 0.5,
-        v65 = v46 * v46 - 1.0, v66 = v62 * (v46 - 1.0), v67 = v1 * v64 + (v2 * v60 - v3 * v61),
-        v68 = v9 * v64 + (v10 * v60 - v12 * v61), v69 = v1 * v57 + (v2 * v53 - v3 * v54),
-        v70 = v9 * v57 + (v10 * v53 - v12 * v54),
-        v71 = v67 * (v3 * v65 + (v22 - v2 * v63) - v1 * v66) + v68 * (v12 * v65 + (v25 - v10 * v63) - v9 * v66),
-        v72 = (v3 * v59 + (v6 - v2 * v56) - v1 * v58) * v69 + (v12 * v59 + (v21 - v10 * v56) - v9 * v58) * v70,
-        v73 = v46 + v71 * (1.0 / (v67 * v67 + v68 * v68)),
-        v74 = v39 + v72 * (1.0 / (v69 * v69 + v70 * v70));
-    const M v75 = softehl_lt(softehl_splat(1.0), v74);
-    const V v76 = softehl_blend(v75, softehl_splat(1.0), v74);
-    const M v77 = softehl_eq(v76, v76), v78 = softehl_lt(softehl_splat(1.0), v73);
-    const V v79 = softehl_blend(v78, softehl_splat(1.0), v73); const M v80 = softehl_eq(v79, v79);
-    V v81 = softehl_splat(0.0); const M m82 = v77;
-    if (softehl_any(m82)) {
-        const M v83 = softehl_lt(softehl_splat((-1.0)), v76);
-        const V v84 = softehl_blend(v83, v76, softehl_splat((-1.0)));
-        v81 = softehl_blend(m82, v84, v81);
+    const V v54 = 0.5 + v40, v55 = 2.0 * v40, v56 = 0.5 * v40, v57 = v56 * (1.0 + v40),
+        v58 = v40 - 0.5, v59 = v56 * (v40 - 1.0), v60 = v40 * v40 - 1.0, v61 = 0.5 + v47,
+        v62 = 2.0 * v47, v63 = 0.5 * v47, v64 = v63 * (1.0 + v47), v65 = v47 - 0.5,
+        v66 = v47 * v47 - 1.0, v67 = v63 * (v47 - 1.0), v68 = v1 * v65 + (v2 * v61 - v3 * v62),
+        v69 = v9 * v65 + (v10 * v61 - v12 * v62), v70 = v1 * v58 + (v2 * v54 - v3 * v55),
+        v71 = v9 * v58 + (v10 * v54 - v12 * v55),
+        v72 = v68 * (v3 * v66 + (v23 - v2 * v64) - v1 * v67) + v69 * (v12 * v66 + (v25 - v10 * v64) - v9 * v67),
+        v73 = (v3 * v60 + (v6 - v2 * v57) - v1 * v59) * v70 + (v12 * v60 + (v22 - v10 * v57) - v9 * v59) * v71,
+        v74 = v47 + v72 * (1.0 / (v68 * v68 + v69 * v69)),
+        v75 = v40 + v73 * (1.0 / (v70 * v70 + v71 * v71));
+    const M v76 = softehl_lt(softehl_splat(1.0), v75);
+    const V v77 = softehl_blend(v76, softehl_splat(1.0), v75);
+    const M v78 = softehl_eq(v77, v77), v79 = softehl_lt(softehl_splat(1.0), v74);
+    const V v80 = softehl_blend(v79, softehl_splat(1.0), v74); const M v81 = softehl_eq(v80, v80);
+    V v82 = softehl_splat(0.0); const M m83 = v78;
+    if (softehl_any(m83)) {
+        const M v84 = softehl_lt(softehl_splat((-1.0)), v77);
+        const V v85 = softehl_blend(v84, v77, softehl_splat((-1.0)));
+        v82 = softehl_blend(m83, v85, v82);
     }
-    const M m85 = ~v77;
-    if (softehl_any(m85)) {
-        const V v86 = (-1.0) - v76, v87 = v86 * (v86 * v86);
-        v81 = softehl_blend(m85, v87, v81);
+    const M m86 = ~v78;
+    if (softehl_any(m86)) {
+        const V v87 = (-1.0) - v77, v88 = v87 * (v87 * v87);
+        v82 = softehl_blend(m86, v88, v82);
     }
-    V v88 = softehl_splat(0.0); const M m89 = v80;
-    if (softehl_any(m89)) {
-        const M v90 = softehl_lt(softehl_splat((-1.0)), v79);
-        const V v91 = softehl_blend(v90, v79, softehl_splat((-1.0)));
-        v88 = softehl_blend(m89, v91, v88);
+    V v89 = softehl_splat(0.0); const M m90 = v81;
+    if (softehl_any(m90)) {
+        const M v91 = softehl_lt(softehl_splat((-1.0)), v80);
+        const V v92 = softehl_blend(v91, v80, softehl_splat((-1.0)));
+        v89 = softehl_blend(m90, v92, v89);
     }
-    const M m92 = ~v80;
-    if (softehl_any(m92)) {
-        const V v93 = (-1.0) - v79, v94 = v93 * (v93 * v93);
-        v88 = softehl_blend(m92, v94, v88);
+    const M m93 = ~v81;
+    if (softehl_any(m93)) {
+        const V v94 = (-1.0) - v80, v95 = v94 * (v94 * v94);
+        v89 = softehl_blend(m93, v95, v89);
     }
-    const V v95 = v88 - v81; const M v96 = softehl_eq(v95, v95); V v97 = softehl_splat(0.0);
-    const M m98 = v96;
-    if (softehl_any(m98)) {
-        const M v99 = softehl_lt(softehl_splat(0.0), v95);
-        const V v100 = softehl_blend(v99, v95, softehl_splat(0.0));
-        v97 = softehl_blend(m98, v100, v97);
+    const V v96 = v89 - v82; const M v97 = softehl_eq(v96, v96); V v98 = softehl_splat(0.0);
+    const M m99 = v97;
+    if (softehl_any(m99)) {
+        const M v100 = softehl_lt(softehl_splat(0.0), v96);
+        const V v101 = softehl_blend(v100, v96, softehl_splat(0.0));
+        v98 = softehl_blend(m99, v101, v98);
     }
-    const M m101 = ~v96;
-    if (softehl_any(m101)) {
-        const V v102 = v81 - v88, v103 = v102 * (v102 * v102);
-        v97 = softehl_blend(m101, v103, v97);
+    const M m102 = ~v97;
+    if (softehl_any(m102)) {
+        const V v103 = v82 - v89, v104 = v103 * (v103 * v103);
+        v98 = softehl_blend(m102, v104, v98);
     }
-    const V v104 = 0.5 * v97, v105 = 0.5 * (v81 + v88), v106 = 0.5 * (d8 + (d6 + (X6 + X8))),
-        v107 = 0.5 * (d9 + (d7 + (X7 + X9)));
-    V s108 = {0}, s109 = {0}, s110 = {0}, s111 = {0}, s112 = {0}, s113 = {0}, s114 = {0},
-        s115 = {0}, s116 = {0}, s117 = {0}, s118 = {0}, s119 = {0}, s120 = {0}, s121 = {0};
+    const V v105 = 0.5 * v98, v106 = 0.5 * (v82 + v89), v107 = 0.5 * (d8 + (d6 + (X6 + X8))),
+        v108 = 0.5 * (d9 + (d7 + (X7 + X9)));
+    V s109 = {0}, s110 = {0}, s111 = {0}, s112 = {0}, s113 = {0}, s114 = {0}, s115 = {0},
+        s116 = {0}, s117 = {0}, s118 = {0}, s119 = {0}, s120 = {0}, s121 = {0}, s122 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
         const double *restrict w = rule + 2 * q; (void)w;
-        const V v122 = w[0] * v104 + v105, v123 = (-1.0) + v122, v124 = 1.0 + v122,
-            v125 = 0.5 + v122, v126 = (-0.5) + v122, v127 = 1.0 - v122 * v122, v128 = 0.5 * v122,
-            v129 = 2.0 * v122, v130 = v128 * v123, v131 = v128 * v124, v132 = 0.5 - v128,
-            v133 = 0.5 + v128, v134 = v1 * v126 + (v2 * v125 - v3 * v129),
-            v135 = v9 * v126 + (v10 * v125 - v12 * v129),
-            v136 = v1 * v130 + (v2 * v131 + v3 * v127),
-            v137 = v9 * v130 + (v10 * v131 + v12 * v127), v138 = d10 * v132 + d12 * v133,
-            v139 = softehl_vsqrt(v134 * v134 + v135 * v135), v140 = 1.0 / v139, v141 = v134 * v140,
-            v142 = v135 * v140,
-            v143 = 0.5 * ((v136 - v106) * v141 + (v137 - v107) * v142) * (1.0 / (0.5 * (v23 * v141 + v27 * v142))),
-            v144 = 0.5 - v143, v145 = 0.5 + v143,
-            v146 = v142 * (v22 * v144 - v136 + v6 * v145) - v141 * (v25 * v144 - v137 + v21 * v145),
-            v147 = a10 * v146, v148 = v138 - v147;
-        const M v149 = softehl_eq(v148, v148);
-        V v150 = softehl_splat(0.0), v151 = softehl_splat(0.0);
-        const M m152 = v149;
-        if (softehl_any(m152)) {
-            const M v153 = softehl_le(softehl_splat(0.0), v148);
-            V v154 = softehl_splat(0.0), v155 = softehl_splat(0.0);
-            const M m156 = v153 & m152;
-            if (softehl_any(m156)) {
-                const V v157 = (a12 + v146) * (v146 - a13); const M v158 = softehl_eq(v157, v157);
-                V v159 = softehl_splat(0.0); const M m160 = v158 & m156;
-                if (softehl_any(m160)) {
-                    const M v161 = softehl_lt(v157, softehl_splat(0.0));
-                    const V v162 = softehl_blend(v161, v148, softehl_splat(0.0));
-                    v159 = softehl_blend(m160, v162, v159);
+        const V v123 = w[0] * v105 + v106, v124 = (-1.0) + v123, v125 = 1.0 + v123,
+            v126 = 0.5 + v123, v127 = (-0.5) + v123, v128 = 1.0 - v123 * v123, v129 = 0.5 * v123,
+            v130 = 2.0 * v123, v131 = v129 * v124, v132 = v129 * v125, v133 = 0.5 - v129,
+            v134 = 0.5 + v129, v135 = v1 * v127 + (v2 * v126 - v3 * v130),
+            v136 = v9 * v127 + (v10 * v126 - v12 * v130),
+            v137 = v1 * v131 + (v2 * v132 + v3 * v128),
+            v138 = v9 * v131 + (v10 * v132 + v12 * v128), v139 = d10 * v133 + d12 * v134,
+            v140 = softehl_vsqrt(v135 * v135 + v136 * v136), v141 = 1.0 / v140, v142 = v135 * v141,
+            v143 = v136 * v141,
+            v144 = 0.5 * ((v137 - v107) * v142 + (v138 - v108) * v143) * (1.0 / (0.5 * (v24 * v142 + v28 * v143))),
+            v145 = 0.5 - v144, v146 = 0.5 + v144,
+            v147 = v143 * (v23 * v145 - v137 + v6 * v146) - v142 * (v25 * v145 - v138 + v22 * v146),
+            v148 = a10 * v147, v149 = v139 - v148;
+        const M v150 = softehl_eq(v149, v149);
+        V v151 = softehl_splat(0.0), v152 = softehl_splat(0.0);
+        const M m153 = v150;
+        if (softehl_any(m153)) {
+            const M v154 = softehl_le(softehl_splat(0.0), v149);
+            V v155 = softehl_splat(0.0), v156 = softehl_splat(0.0);
+            const M m157 = v154 & m153;
+            if (softehl_any(m157)) {
+                const V v158 = (a12 + v147) * (v147 - a13); const M v159 = softehl_eq(v158, v158);
+                V v160 = softehl_splat(0.0); const M m161 = v159 & m157;
+                if (softehl_any(m161)) {
+                    const M v162 = softehl_lt(v158, softehl_splat(0.0));
+                    const V v163 = softehl_blend(v162, v149, softehl_splat(0.0));
+                    v160 = softehl_blend(m161, v163, v160);
                 }
-                const M m163 = ~v158 & m156;
-                if (softehl_any(m163)) {
-                    const V v164 = v157 * (v157 * v157); v159 = softehl_blend(m163, v164, v159);
+                const M m164 = ~v159 & m157;
+                if (softehl_any(m164)) {
+                    const V v165 = v158 * (v158 * v158); v160 = softehl_blend(m164, v165, v160);
                 }
-                const V v165 = a11 * v159; const M v166 = softehl_eq(v165, v165);
-                const V v167 = v141 * (v11 * v145 + (v18 * v144 - v5 * v130 - v7 * v131 - v8 * v127)),
-                    v168 = v142 * (v20 * v145 + (v19 * v144 - v14 * v130 - v15 * v131 - v17 * v127)),
-                    v169 = d11 * v132 + d13 * v133 + a10 * (v167 + v168);
-                const M v170 = softehl_eq(v169, v169), v171 = v166 & v170;
-                V v172 = softehl_splat(0.0); const M m173 = v171 & m156;
-                if (softehl_any(m173)) {
-                    const M v174 = softehl_lt(v165, v169); V v175 = v165;
-                    const M m176 = ~v174 & m173;
-                    if (softehl_any(m176)) {
-                        V v177 = softehl_splat(0.0); const M m178 = v166 & m176;
-                        if (softehl_any(m178)) {
-                            const M v179 = softehl_lt(v165, -v169); V v180 = v169;
-                            const M m181 = v179 & m178;
-                            if (softehl_any(m181)) {
-                                const V v182 = -v165; v180 = softehl_blend(m181, v182, v180);
+                const V v166 = a11 * v160; const M v167 = softehl_eq(v166, v166);
+                const V v168 = v142 * (v11 * v146 + (v19 * v145 - v5 * v131 - v7 * v132 - v8 * v128)),
+                    v169 = v143 * (v21 * v146 + (v20 * v145 - v14 * v131 - v15 * v132 - v17 * v128)),
+                    v170 = d11 * v133 + d13 * v134 + a10 * (v168 + v169);
+                const M v171 = softehl_eq(v170, v170), v172 = v167 & v171;
+                V v173 = softehl_splat(0.0); const M m174 = v172 & m157;
+                if (softehl_any(m174)) {
+                    const M v175 = softehl_lt(v166, v170); V v176 = v166;
+                    const M m177 = ~v175 & m174;
+                    if (softehl_any(m177)) {
+                        const V v178 = -v170;
+                        const M v179 = softehl_eq(v178, v178), v180 = v167 & v179;
+                        V v181 = softehl_splat(0.0); const M m182 = v180 & m177;
+                        if (softehl_any(m182)) {
+                            const M v183 = softehl_lt(v166, v178); V v184 = softehl_splat(0.0);
+                            const M m185 = v183 & m182;
+                            if (softehl_any(m185)) {
+                                const V v186 = -v166; v184 = softehl_blend(m185, v186, v184);
                             }
-                            v177 = softehl_blend(m178, v180, v177);
+                            const M m187 = ~v183 & m182;
+                            if (softehl_any(m187)) {
+                                const V v188 = softehl_blend(v16, v170, softehl_splat(0.0));
+                                v184 = softehl_blend(m187, v188, v184);
+                            }
+                            v181 = softehl_blend(m182, v184, v181);
                         }
-                        const M m183 = ~v166 & m176;
-                        if (softehl_any(m183)) {
-                            const V v184 = v169 + v165, v185 = v184 * (v184 * v184);
-                            v177 = softehl_blend(m183, v185, v177);
+                        const M m189 = ~v180 & m177;
+                        if (softehl_any(m189)) {
+                            const V v190 = v170 + v166, v191 = v190 * (v190 * v190);
+                            v181 = softehl_blend(m189, v191, v181);
                         }
-                        v175 = softehl_blend(m176, v177, v175);
+                        v176 = softehl_blend(m177, v181, v176);
                     }
-                    v172 = softehl_blend(m173, v175, v172);
+                    v173 = softehl_blend(m174, v176, v173);
                 }
-                const M m186 = ~v171 & m156;
-                if (softehl_any(m186)) {
-                    const V v187 = v165 - v169, v188 = v187 * (v187 * v187);
-                    v172 = softehl_blend(m186, v188, v172);
+                const M m192 = ~v172 & m157;
+                if (softehl_any(m192)) {
+                    const V v193 = v166 - v170, v194 = v193 * (v193 * v193);
+                    v173 = softehl_blend(m192, v194, v173);
                 }
-                v154 = softehl_blend(m156, v159, v154); v155 = softehl_blend(m156, v172, v155);
+                v155 = softehl_blend(m157, v160, v155); v156 = softehl_blend(m157, v173, v156);
             }
-            v150 = softehl_blend(m152, v154, v150); v151 = softehl_blend(m152, v155, v151);
+            v151 = softehl_blend(m153, v155, v151); v152 = softehl_blend(m153, v156, v152);
         }
-        const M m189 = ~v149;
-        if (softehl_any(m189)) {
-            const V v190 = v147 - v138, v191 = v190 * (v190 * v190);
-            v150 = softehl_blend(m189, v191, v150); v151 = softehl_blend(m189, v191, v151);
+        const M m195 = ~v150;
+        if (softehl_any(m195)) {
+            const V v196 = v148 - v139, v197 = v196 * (v196 * v196);
+            v151 = softehl_blend(m195, v197, v151); v152 = softehl_blend(m195, v197, v152);
         }
-        const V v192 = v16 * w[1], v193 = w[1] * v131, v194 = w[1] * v130, v195 = w[1] * v145,
-            v196 = w[1] * v144, v197 = w[1] * v127, v198 = v192 * v133, v199 = v192 * v132,
-            v200 = X3 * v125 + (X1 * v126 - v13 * v122), v201 = X2 * v125 + (X0 * v126 - v4 * v122),
-            v202 = softehl_vsqrt(v200 * v200 + v201 * v201),
-            v203 = 6.283185307179586 * (X5 * v127 + v122 * (0.5 * (X1 * v123 + X3 * v124))),
-            v204 = (1.0 + a14 * ((-1.0) + v203)) * (v104 * v202), v205 = v150 * v204,
-            v206 = v151 * v204, v207 = (v142 * v150 + v141 * v151) * v204,
-            v208 = (v142 * v151 - v141 * v150) * v204, v209 = v198 * v205;
-        s108 += v209; const V v210 = v199 * v205; s109 += v210; const V v211 = v198 * v206;
-        s110 += v211; const V v212 = v199 * v206; s111 += v212; const V v213 = v195 * v208;
-        s112 += v213; const V v214 = v195 * v207; s113 += v214; const V v215 = v196 * v208;
-        s114 += v215; const V v216 = v196 * v207; s115 += v216; const V v217 = v197 * v208;
-        s116 += v217; const V v218 = v197 * v207; s117 += v218; const V v219 = v193 * v208;
-        s118 += v219; const V v220 = v194 * v208; s120 += v220; const V v221 = v193 * v207;
-        s119 += v221; const V v222 = v194 * v207; s121 += v222;
+        const V v198 = v18 * w[1], v199 = w[1] * v132, v200 = w[1] * v131, v201 = w[1] * v146,
+            v202 = w[1] * v145, v203 = w[1] * v128, v204 = v198 * v134, v205 = v198 * v133,
+            v206 = X3 * v126 + (X1 * v127 - v13 * v123), v207 = X2 * v126 + (X0 * v127 - v4 * v123),
+            v208 = softehl_vsqrt(v206 * v206 + v207 * v207),
+            v209 = 6.283185307179586 * (X5 * v128 + v123 * (0.5 * (X1 * v124 + X3 * v125))),
+            v210 = (1.0 + a14 * ((-1.0) + v209)) * (v105 * v208), v211 = v151 * v210,
+            v212 = v152 * v210, v213 = (v143 * v151 + v142 * v152) * v210,
+            v214 = (v143 * v152 - v142 * v151) * v210, v215 = v204 * v211;
+        s109 += v215; const V v216 = v205 * v211; s110 += v216; const V v217 = v204 * v212;
+        s111 += v217; const V v218 = v205 * v212; s112 += v218; const V v219 = v201 * v214;
+        s113 += v219; const V v220 = v201 * v213; s114 += v220; const V v221 = v202 * v214;
+        s115 += v221; const V v222 = v202 * v213; s116 += v222; const V v223 = v203 * v214;
+        s117 += v223; const V v224 = v203 * v213; s118 += v224; const V v225 = v199 * v214;
+        s119 += v225; const V v226 = v200 * v214; s121 += v226; const V v227 = v199 * v213;
+        s120 += v227; const V v228 = v200 * v213; s122 += v228;
     }
-    softehl_store2(R + 12, 14, s108, s110); softehl_store4(R + 0, 14, s121, s120, s119, s118);
-    softehl_store4(R + 8, 14, -s113, -s112, s109, s111);
-    softehl_store4(R + 4, 14, s117, s116, -s115, -s114);
+    softehl_store2(R + 12, 14, s109, s111); softehl_store4(R + 0, 14, s122, s121, s120, s119);
+    softehl_store4(R + 8, 14, -s114, -s113, s110, s112);
+    softehl_store4(R + 4, 14, s118, s117, -s116, -s115);
 }
 SOFTEHL_BATCH(softehl_mortar_32_residual, 10, 14, 15, 0, 14, 0)
 
@@ -242,1017 +250,1028 @@ SOFTEHL_GROUP(softehl_mortar_32_tangent)
     V a0, a1, a2, a3, a4, a5, a6, a7, a8, a9, a10, a11, a12, a13, a14;
     softehl_load4(a + 0, 15, &a0, &a1, &a2, &a3); softehl_load4(a + 4, 15, &a4, &a5, &a6, &a7);
     softehl_load4(a + 8, 15, &a8, &a9, &a10, &a11); softehl_load3(a + 12, 15, &a12, &a13, &a14);
-    const V v1 = -a11, v2 = X4 + d4, v3 = 2.0 * X4, v4 = X4 + a2, v5 = X0 + a0, v6 = X2 + a1,
-        v7 = X0 + X2, v8 = X6 + a3, v9 = X8 + a4, v10 = X0 + d0, v11 = v9 - v8, v12 = X1 + a5,
-        v13 = 0.5 * X1, v14 = X3 + a6, v15 = v7 - v3, v16 = 0.5 * X3, v17 = X1 + X3, v18 = X5 + a7,
-        v19 = 2.0 * X5, v20 = X5 + d5, v21 = X7 + a8, v22 = X1 + d1, v23 = X3 + d3, v24 = X7 + d7,
-        v25 = X9 + a9, v26 = v17 - v19, v27 = v23 + v22, v28 = 0.5 * (d1 + d3 + v17),
-        v29 = v23 - X1, v30 = v25 - v21, v31 = X9 + d9, v32 = v24 - v28, v33 = v27 - 2.0 * v20,
-        v34 = 0.5 * (d9 + (X9 + v24)), v35 = v29 - d1, v36 = v31 - v24, v37 = v31 - v28,
-        v38 = 0.5 * v32, v39 = 0.5 * v35, v40 = 0.25 * v35, v41 = 0.5 * (v31 - X7 - d7),
-        v42 = 0.5 * v37, v43 = 1.0 / a10, v44 = -a10, v45 = 0.5 * (d10 - d12),
-        v46 = 0.5 * (d12 - d10), v47 = 0.5 * (d11 - d13), v48 = 0.5 * (d13 - d11), v49 = X2 + d2,
-        v50 = 0.5 * (d2 + (d0 + v7)), v51 = X6 + d6, v52 = v49 + v10, v53 = v49 - X0, v54 = X8 + d8,
-        v55 = 0.5 * (d8 + (d6 + (X6 + X8))), v56 = v51 - v50, v57 = v54 - v51, v58 = v53 - d0,
-        v59 = v54 - v50, v60 = v52 - 2.0 * v2, v61 = 0.5 * v56, v62 = 0.5 * v58, v63 = 0.25 * v58,
-        v64 = 0.5 * v59, v65 = 0.5 * (v54 - d6 - X6), v66 = v37 * v39 + v62 * v59,
-        v67 = v32 * v39 + v62 * v56, v68 = v63 + v64, v69 = v63 + v61, v70 = v61 - v63,
-        v71 = v64 - v63, v72 = 1.0 / (v62 * v62 + v39 * v39), v73 = v72 * v66;
-    const M v74 = softehl_lt(softehl_splat(1.0), v73);
-    const V v75 = softehl_blend(v74, softehl_splat(1.0), v73); const M v76 = softehl_eq(v75, v75);
-    const V v77 = v67 * v72; const M v78 = softehl_lt(softehl_splat(1.0), v77);
-    const V v79 = softehl_blend(v78, softehl_splat(1.0), v77); const M v80 = softehl_eq(v79, v79);
-    const V v81 = v72 * v72, v82 = v70 * v72, v83 = v71 * v72, v84 = 0.5 * (d0 - v53) * v81,
-        v85 = 0.5 * (d1 - v29) * v81, v86 = (v38 - v40) * v72, v87 = (v42 - v40) * v72,
-        v88 = v62 * v81, v89 = v62 * v72, v90 = v39 * v81, v91 = v39 * v72,
-        v92 = v67 * v84 + v69 * v72, v93 = v68 * v72 + v66 * v84,
-        v94 = v67 * v85 + (v38 + v40) * v72, v95 = (v42 + v40) * v72 + v66 * v85, v96 = v67 * v88,
-        v97 = v66 * v88, v98 = v67 * v90, v99 = v66 * v90;
-    V v100 = softehl_splat(0.0), v101 = softehl_splat(0.0), v102 = softehl_splat(0.0),
-        v103 = softehl_splat(0.0), v104 = softehl_splat(0.0), v105 = softehl_splat(0.0),
-        v106 = softehl_splat(0.0);
-    const M m107 = v76;
-    if (softehl_any(m107)) {
-        const M v108 = softehl_lt(softehl_splat((-1.0)), v75);
-        V v109 = softehl_splat((-1.0)), v110 = softehl_splat(0.0), v111 = softehl_splat(0.0),
-            v112 = softehl_splat(0.0), v113 = softehl_splat(0.0), v114 = softehl_splat(0.0),
-            v115 = softehl_splat(0.0);
-        const M m116 = v108 & m107;
-        if (softehl_any(m116)) {
-            V v117 = v89, v118 = v91, v119 = softehl_splat(0.0), v120 = softehl_splat(0.0),
-                v121 = softehl_splat(0.0), v122 = softehl_splat(0.0);
-            const M m123 = v74 & m116;
+    const V v1 = X4 + d4, v2 = X5 + d5, v3 = X4 + a2, v4 = 2.0 * X4, v5 = X0 + a0,
+        v6 = 0.5 * (d13 - d11), v7 = X2 + a1, v8 = X0 + X2, v9 = 2.0 * X5, v10 = X6 + a3,
+        v11 = X5 + a7, v12 = X0 + d0, v13 = X2 + d2, v14 = v8 - v4, v15 = X6 + d6, v16 = v13 + v12,
+        v17 = X8 + a4, v18 = X1 + a5, v19 = 0.5 * X1, v20 = X3 + a6, v21 = X1 + X3, v22 = 0.5 * X3,
+        v23 = X1 + d1, v24 = v16 - 2.0 * v1, v25 = X3 + d3, v26 = X8 + d8, v27 = v25 + v23,
+        v28 = X7 + a8, v29 = v21 - v9, v30 = 0.5 * (d8 + (X8 + v15)), v31 = X9 + a9, v32 = X7 + d7,
+        v33 = X9 + d9, v34 = v27 - 2.0 * v2, v35 = 0.5 * (d9 + (d7 + (X7 + X9))),
+        v36 = 0.5 * (v26 - X6 - d6);
+    const M v37 = softehl_lt(softehl_splat(0.0), a11);
+    const V v38 = -a11, v39 = 1.0 / a10, v40 = -a10, v41 = 0.5 * (v33 - X7 - d7),
+        v42 = softehl_blend(v37, a10, softehl_splat(0.0)),
+        v43 = softehl_blend(v37, v6, softehl_splat(0.0)), v44 = v13 - X0, v45 = v25 - X1,
+        v46 = v17 - v10, v47 = v31 - v28, v48 = 0.5 * (d11 - d13), v49 = 0.5 * (d0 + d2 + v8),
+        v50 = v44 - d0, v51 = 0.5 * (d1 + d3 + v21), v52 = v45 - d1, v53 = 0.5 * v50,
+        v54 = 0.25 * v50, v55 = 0.5 * v52, v56 = 0.25 * v52, v57 = 0.5 * (d10 - d12),
+        v58 = 0.5 * (d12 - d10), v59 = 1.0 / (v53 * v53 + v55 * v55), v60 = v26 - v15,
+        v61 = v26 - v49, v62 = v15 - v49, v63 = v33 - v32, v64 = v33 - v51, v65 = v32 - v51,
+        v66 = 0.5 * v61, v67 = 0.5 * v62, v68 = 0.5 * v64, v69 = v61 * v53 + v64 * v55,
+        v70 = v62 * v53 + v65 * v55, v71 = 0.5 * v65, v72 = v69 * v59;
+    const M v73 = softehl_lt(softehl_splat(1.0), v72);
+    const V v74 = softehl_blend(v73, softehl_splat(1.0), v72); const M v75 = softehl_eq(v74, v74);
+    const V v76 = v70 * v59; const M v77 = softehl_lt(softehl_splat(1.0), v76);
+    const V v78 = softehl_blend(v77, softehl_splat(1.0), v76); const M v79 = softehl_eq(v78, v78);
+    const V v80 = v59 * v59, v81 = (v67 - v54) * v59, v82 = (v66 - v54) * v59,
+        v83 = 0.5 * (d0 - v44) * v80, v84 = 0.5 * (d1 - v45) * v80, v85 = (v71 - v56) * v59,
+        v86 = (v68 - v56) * v59, v87 = v53 * v80, v88 = v53 * v59, v89 = v55 * v80, v90 = v55 * v59,
+        v91 = v70 * v83 + (v67 + v54) * v59, v92 = (v66 + v54) * v59 + v69 * v83,
+        v93 = v70 * v84 + (v71 + v56) * v59, v94 = (v68 + v56) * v59 + v69 * v84, v95 = v70 * v87,
+        v96 = v69 * v87, v97 = v70 * v89, v98 = v69 * v89;
+    V v99 = softehl_splat(0.0), v100 = softehl_splat(0.0), v101 = softehl_splat(0.0),
+        v102 = softehl_splat(0.0), v103 = softehl_splat(0.0), v104 = softehl_splat(0.0),
+        v105 = softehl_splat(0.0);
+    const M m106 = v75;
+    if (softehl_any(m106)) {
+        const M v107 = softehl_lt(softehl_splat((-1.0)), v74);
+        V v108 = softehl_splat((-1.0)), v109 = softehl_splat(0.0), v110 = softehl_splat(0.0),
+            v111 = softehl_splat(0.0), v112 = softehl_splat(0.0), v113 = softehl_splat(0.0),
+            v114 = softehl_splat(0.0);
+        const M m115 = v107 & m106;
+        if (softehl_any(m115)) {
+            V v116 = v88, v117 = v90, v118 = softehl_splat(0.0), v119 = softehl_splat(0.0),
+                v120 = softehl_splat(0.0), v121 = softehl_splat(0.0);
+            const M m122 = v73 & m115;
+            if (softehl_any(m122)) {
+                v116 = softehl_blend(m122, softehl_splat(0.0), v116);
+                v117 = softehl_blend(m122, softehl_splat(0.0), v117);
+            }
+            const M m123 = ~v73 & m115;
             if (softehl_any(m123)) {
-                v117 = softehl_blend(m123, softehl_splat(0.0), v117);
-                v118 = softehl_blend(m123, softehl_splat(0.0), v118);
+                const V v124 = -v92, v125 = -v94, v126 = v82 - v96, v127 = v86 - v98;
+                v118 = softehl_blend(m123, v124, v118); v119 = softehl_blend(m123, v125, v119);
+                v120 = softehl_blend(m123, v126, v120); v121 = softehl_blend(m123, v127, v121);
             }
-            const M m124 = ~v74 & m116;
-            if (softehl_any(m124)) {
-                const V v125 = -v93, v126 = -v95, v127 = v83 - v97, v128 = v87 - v99;
-                v119 = softehl_blend(m124, v125, v119); v120 = softehl_blend(m124, v126, v120);
-                v121 = softehl_blend(m124, v127, v121); v122 = softehl_blend(m124, v128, v122);
+            v108 = softehl_blend(m115, v74, v108); v109 = softehl_blend(m115, v116, v109);
+            v110 = softehl_blend(m115, v117, v110); v111 = softehl_blend(m115, v118, v111);
+            v112 = softehl_blend(m115, v119, v112); v113 = softehl_blend(m115, v120, v113);
+            v114 = softehl_blend(m115, v121, v114);
+        }
+        v99 = softehl_blend(m106, v108, v99); v100 = softehl_blend(m106, v111, v100);
+        v101 = softehl_blend(m106, v112, v101); v102 = softehl_blend(m106, v113, v102);
+        v103 = softehl_blend(m106, v114, v103); v104 = softehl_blend(m106, v109, v104);
+        v105 = softehl_blend(m106, v110, v105);
+    }
+    const M m128 = ~v75;
+    if (softehl_any(m128)) {
+        const V v129 = (-1.0) - v74, v130 = v129 * (v129 * v129);
+        V v131 = softehl_splat(0.0), v132 = softehl_splat(0.0), v133 = softehl_splat(0.0),
+            v134 = softehl_splat(0.0), v135 = softehl_splat(0.0), v136 = softehl_splat(0.0);
+        const M m137 = ~v73 & m128;
+        if (softehl_any(m137)) {
+            const V v138 = (-1.0) - v72, v139 = v138 * (3.0 * v138), v140 = (v96 - v82) * v139,
+                v141 = (v98 - v86) * v139, v142 = v92 * v139, v143 = v94 * v139,
+                v144 = -(v88 * v139), v145 = -(v90 * v139);
+            v131 = softehl_blend(m137, v142, v131); v132 = softehl_blend(m137, v143, v132);
+            v133 = softehl_blend(m137, v140, v133); v134 = softehl_blend(m137, v141, v134);
+            v135 = softehl_blend(m137, v144, v135); v136 = softehl_blend(m137, v145, v136);
+        }
+        v99 = softehl_blend(m128, v130, v99); v100 = softehl_blend(m128, v131, v100);
+        v101 = softehl_blend(m128, v132, v101); v102 = softehl_blend(m128, v133, v102);
+        v103 = softehl_blend(m128, v134, v103); v104 = softehl_blend(m128, v135, v104);
+        v105 = softehl_blend(m128, v136, v105);
+    }
+    V v146 = softehl_splat(0.0), v147 = softehl_splat(0.0), v148 = softehl_splat(0.0),
+        v149 = softehl_splat(0.0), v150 = softehl_splat(0.0), v151 = softehl_splat(0.0),
+        v152 = softehl_splat(0.0);
+    const M m153 = v79;
+    if (softehl_any(m153)) {
+        const M v154 = softehl_lt(softehl_splat((-1.0)), v78);
+        V v155 = softehl_splat((-1.0)), v156 = softehl_splat(0.0), v157 = softehl_splat(0.0),
+            v158 = softehl_splat(0.0), v159 = softehl_splat(0.0), v160 = softehl_splat(0.0),
+            v161 = softehl_splat(0.0);
+        const M m162 = v154 & m153;
+        if (softehl_any(m162)) {
+            V v163 = v88, v164 = v90, v165 = softehl_splat(0.0), v166 = softehl_splat(0.0),
+                v167 = softehl_splat(0.0), v168 = softehl_splat(0.0);
+            const M m169 = v77 & m162;
+            if (softehl_any(m169)) {
+                v163 = softehl_blend(m169, softehl_splat(0.0), v163);
+                v164 = softehl_blend(m169, softehl_splat(0.0), v164);
             }
-            v109 = softehl_blend(m116, v75, v109); v110 = softehl_blend(m116, v117, v110);
-            v111 = softehl_blend(m116, v118, v111); v112 = softehl_blend(m116, v119, v112);
-            v113 = softehl_blend(m116, v120, v113); v114 = softehl_blend(m116, v121, v114);
-            v115 = softehl_blend(m116, v122, v115);
-        }
-        v100 = softehl_blend(m107, v109, v100); v101 = softehl_blend(m107, v112, v101);
-        v102 = softehl_blend(m107, v113, v102); v103 = softehl_blend(m107, v114, v103);
-        v104 = softehl_blend(m107, v115, v104); v105 = softehl_blend(m107, v110, v105);
-        v106 = softehl_blend(m107, v111, v106);
-    }
-    const M m129 = ~v76;
-    if (softehl_any(m129)) {
-        const V v130 = (-1.0) - v75, v131 = v130 * (v130 * v130);
-        V v132 = softehl_splat(0.0), v133 = softehl_splat(0.0), v134 = softehl_splat(0.0),
-            v135 = softehl_splat(0.0), v136 = softehl_splat(0.0), v137 = softehl_splat(0.0);
-        const M m138 = ~v74 & m129;
-        if (softehl_any(m138)) {
-            const V v139 = (-1.0) - v73, v140 = v139 * (3.0 * v139), v141 = (v97 - v83) * v140,
-                v142 = (v99 - v87) * v140, v143 = v93 * v140, v144 = v95 * v140,
-                v145 = -(v89 * v140), v146 = -(v91 * v140);
-            v132 = softehl_blend(m138, v143, v132); v133 = softehl_blend(m138, v144, v133);
-            v134 = softehl_blend(m138, v141, v134); v135 = softehl_blend(m138, v142, v135);
-            v136 = softehl_blend(m138, v145, v136); v137 = softehl_blend(m138, v146, v137);
-        }
-        v100 = softehl_blend(m129, v131, v100); v101 = softehl_blend(m129, v132, v101);
-        v102 = softehl_blend(m129, v133, v102); v103 = softehl_blend(m129, v134, v103);
-        v104 = softehl_blend(m129, v135, v104); v105 = softehl_blend(m129, v136, v105);
-        v106 = softehl_blend(m129, v137, v106);
-    }
-    V v147 = softehl_splat(0.0), v148 = softehl_splat(0.0), v149 = softehl_splat(0.0),
-        v150 = softehl_splat(0.0), v151 = softehl_splat(0.0), v152 = softehl_splat(0.0),
-        v153 = softehl_splat(0.0);
-    const M m154 = v80;
-    if (softehl_any(m154)) {
-        const M v155 = softehl_lt(softehl_splat((-1.0)), v79);
-        V v156 = softehl_splat((-1.0)), v157 = softehl_splat(0.0), v158 = softehl_splat(0.0),
-            v159 = softehl_splat(0.0), v160 = softehl_splat(0.0), v161 = softehl_splat(0.0),
-            v162 = softehl_splat(0.0);
-        const M m163 = v155 & m154;
-        if (softehl_any(m163)) {
-            V v164 = v89, v165 = v91, v166 = softehl_splat(0.0), v167 = softehl_splat(0.0),
-                v168 = softehl_splat(0.0), v169 = softehl_splat(0.0);
-            const M m170 = v78 & m163;
+            const M m170 = ~v77 & m162;
             if (softehl_any(m170)) {
-                v164 = softehl_blend(m170, softehl_splat(0.0), v164);
-                v165 = softehl_blend(m170, softehl_splat(0.0), v165);
+                const V v171 = -v91, v172 = -v93, v173 = v81 - v95, v174 = v85 - v97;
+                v165 = softehl_blend(m170, v171, v165); v166 = softehl_blend(m170, v172, v166);
+                v167 = softehl_blend(m170, v173, v167); v168 = softehl_blend(m170, v174, v168);
             }
-            const M m171 = ~v78 & m163;
-            if (softehl_any(m171)) {
-                const V v172 = -v92, v173 = -v94, v174 = v82 - v96, v175 = v86 - v98;
-                v166 = softehl_blend(m171, v172, v166); v167 = softehl_blend(m171, v173, v167);
-                v168 = softehl_blend(m171, v174, v168); v169 = softehl_blend(m171, v175, v169);
-            }
-            v156 = softehl_blend(m163, v79, v156); v157 = softehl_blend(m163, v164, v157);
-            v158 = softehl_blend(m163, v165, v158); v159 = softehl_blend(m163, v166, v159);
-            v160 = softehl_blend(m163, v167, v160); v161 = softehl_blend(m163, v168, v161);
-            v162 = softehl_blend(m163, v169, v162);
+            v155 = softehl_blend(m162, v78, v155); v156 = softehl_blend(m162, v163, v156);
+            v157 = softehl_blend(m162, v164, v157); v158 = softehl_blend(m162, v165, v158);
+            v159 = softehl_blend(m162, v166, v159); v160 = softehl_blend(m162, v167, v160);
+            v161 = softehl_blend(m162, v168, v161);
         }
-        v147 = softehl_blend(m154, v156, v147); v148 = softehl_blend(m154, v159, v148);
-        v149 = softehl_blend(m154, v160, v149); v150 = softehl_blend(m154, v161, v150);
-        v151 = softehl_blend(m154, v162, v151); v152 = softehl_blend(m154, v157, v152);
-        v153 = softehl_blend(m154, v158, v153);
+        v146 = softehl_blend(m153, v155, v146); v147 = softehl_blend(m153, v158, v147);
+        v148 = softehl_blend(m153, v159, v148); v149 = softehl_blend(m153, v160, v149);
+        v150 = softehl_blend(m153, v161, v150); v151 = softehl_blend(m153, v156, v151);
+        v152 = softehl_blend(m153, v157, v152);
     }
-    const M m176 = ~v80;
-    if (softehl_any(m176)) {
-        const V v177 = (-1.0) - v79, v178 = v177 * (v177 * v177);
-        V v179 = softehl_splat(0.0), v180 = softehl_splat(0.0), v181 = softehl_splat(0.0),
-            v182 = softehl_splat(0.0), v183 = softehl_splat(0.0), v184 = softehl_splat(0.0);
-        const M m185 = ~v78 & m176;
-        if (softehl_any(m185)) {
-            const V v186 = (-1.0) - v77, v187 = v186 * (3.0 * v186), v188 = (v96 - v82) * v187,
-                v189 = (v98 - v86) * v187, v190 = v92 * v187, v191 = v94 * v187,
-                v192 = -(v89 * v187), v193 = -(v91 * v187);
-            v179 = softehl_blend(m185, v190, v179); v180 = softehl_blend(m185, v191, v180);
-            v181 = softehl_blend(m185, v188, v181); v182 = softehl_blend(m185, v189, v182);
-            v183 = softehl_blend(m185, v192, v183); v184 = softehl_blend(m185, v193, v184);
+    const M m175 = ~v79;
+    if (softehl_any(m175)) {
+        const V v176 = (-1.0) - v78, v177 = v176 * (v176 * v176);
+        V v178 = softehl_splat(0.0), v179 = softehl_splat(0.0), v180 = softehl_splat(0.0),
+            v181 = softehl_splat(0.0), v182 = softehl_splat(0.0), v183 = softehl_splat(0.0);
+        const M m184 = ~v77 & m175;
+        if (softehl_any(m184)) {
+            const V v185 = (-1.0) - v76, v186 = v185 * (3.0 * v185), v187 = (v95 - v81) * v186,
+                v188 = (v97 - v85) * v186, v189 = v91 * v186, v190 = v93 * v186,
+                v191 = -(v88 * v186), v192 = -(v90 * v186);
+            v178 = softehl_blend(m184, v189, v178); v179 = softehl_blend(m184, v190, v179);
+            v180 = softehl_blend(m184, v187, v180); v181 = softehl_blend(m184, v188, v181);
+            v182 = softehl_blend(m184, v191, v182); v183 = softehl_blend(m184, v192, v183);
         }
-        v147 = softehl_blend(m176, v178, v147); v148 = softehl_blend(m176, v179, v148);
-        v149 = softehl_blend(m176, v180, v149); v150 = softehl_blend(m176, v181, v150);
-        v151 = softehl_blend(m176, v182, v151); v152 = softehl_blend(m176, v183, v152);
-        v153 = softehl_blend(m176, v184, v153);
+        v146 = softehl_blend(m175, v177, v146); v147 = softehl_blend(m175, v178, v147);
+        v148 = softehl_blend(m175, v179, v148); v149 = softehl_blend(m175, v180, v149);
+        v150 = softehl_blend(m175, v181, v150); v151 = softehl_blend(m175, v182, v151);
+        v152 = softehl_blend(m175, v183, v152);
     }
-    const V v194 = 1.0 + v100, v195 = 0.5 + v100, v196 = 2.0 * v100, v197 = 0.5 * v100,
-        v198 = 0.5 + v147, v199 = 2.0 * v147, v200 = 0.5 * v147, v201 = v100 - 0.5,
-        v202 = v100 - 1.0, v203 = v100 * v100 - 1.0, v204 = 1.0 + v147, v205 = v147 - 0.5,
-        v206 = v147 - 1.0, v207 = v197 * v194, v208 = v147 * v147 - 1.0, v209 = v197 * v202,
-        v210 = v200 * v204, v211 = v200 * v206, v212 = 2.0 * v148, v213 = 0.5 * v148,
-        v214 = v200 * v148, v215 = 2.0 * v101, v216 = 0.5 * v101, v217 = 2.0 * v149,
-        v218 = 0.5 * v149, v219 = v200 * v149, v220 = 2.0 * v102, v221 = 0.5 * v102,
-        v222 = 2.0 * v150, v223 = 0.5 * v150, v224 = v200 * v150, v225 = 2.0 * v103,
-        v226 = 0.5 * v103, v227 = 2.0 * v151, v228 = 0.5 * v151, v229 = v200 * v151,
-        v230 = 2.0 * v104, v231 = 0.5 * v104, v232 = 2.0 * v152, v233 = 0.5 * v152,
-        v234 = v200 * v152, v235 = v200 * v153, v236 = 2.0 * v153, v237 = 0.5 * v153,
-        v238 = 2.0 * v105, v239 = 0.5 * v105, v240 = 2.0 * v106, v241 = 0.5 * v106,
-        v242 = v199 * v152, v243 = v199 * v148, v244 = v199 * v149, v245 = v199 * v150,
-        v246 = v199 * v151, v247 = v199 * v153, v248 = v196 * v106, v249 = v196 * v101,
-        v250 = v197 * v101, v251 = v197 * v106, v252 = v196 * v102, v253 = v197 * v102,
-        v254 = v196 * v103, v255 = v197 * v103, v256 = v196 * v104, v257 = v197 * v104,
-        v258 = v197 * v105, v259 = v196 * v105, v260 = v27 * v103 - v20 * v225,
-        v261 = v52 * v104 - v2 * v230, v262 = v52 * v105 - v2 * v238,
-        v263 = v27 * v105 - v20 * v238, v264 = v195 + (v52 * v103 - v2 * v225),
-        v265 = v195 + (v27 * v104 - v20 * v230), v266 = v52 * v150 + (v198 - v2 * v222),
-        v267 = v27 * v150 - v20 * v222, v268 = v27 * v151 + (v198 - v20 * v227),
-        v269 = v52 * v151 - v2 * v227, v270 = v27 * v148 - v20 * v212,
-        v271 = v52 * v148 + v205 - v2 * v212, v272 = v27 * v101 - v20 * v215,
-        v273 = v52 * v101 + v201 - v2 * v215, v274 = v52 * v149 - v2 * v217,
-        v275 = v27 * v149 + v205 - v20 * v217, v276 = v52 * v102 - v2 * v220,
-        v277 = v27 * v102 + v201 - v20 * v220, v278 = v52 * v152 - v2 * v232,
-        v279 = v27 * v152 - v20 * v232, v280 = v52 * v153 - v2 * v236,
-        v281 = v27 * v153 - v20 * v236, v282 = v52 * v106 - v2 * v240,
-        v283 = v27 * v106 - v20 * v240, v284 = v10 * v201 + (v49 * v195 - v2 * v196),
-        v285 = v22 * v201 + (v23 * v195 - v20 * v196), v286 = 2.0 * v284, v287 = 2.0 * v285,
-        v288 = 1.0 / (v284 * v284 + v285 * v285), v289 = v54 + v2 * v203 - v10 * v209 - v49 * v207,
-        v290 = v31 + v20 * v203 - v22 * v209 - v23 * v207,
-        v291 = v51 + v2 * v208 - v10 * v211 - v49 * v210,
-        v292 = v24 + v20 * v208 - v22 * v211 - v23 * v210, v293 = v284 * v289 + v285 * v290,
-        v294 = v288 * v288, v295 = v196 * v293 * v294, v296 = v293 * v294,
-        v297 = v100 + v288 * v293, v298 = v288 * (v203 * v284 - v196 * v289) + v286 * v295,
-        v299 = v288 * (v203 * v285 - v196 * v290) + v287 * v295,
-        v300 = (v261 * v286 + v265 * v287) * v296, v301 = (v262 * v286 + v263 * v287) * v296,
-        v302 = (v282 * v286 + v283 * v287) * v296;
-    const M v303 = softehl_lt(softehl_splat(1.0), v297);
-    const V v304 = (v276 * v286 + v277 * v287) * v296, v305 = (v264 * v286 + v260 * v287) * v296,
-        v306 = v296 * (v273 * v286 + v272 * v287), v307 = v10 * v205 + (v49 * v198 - v2 * v199),
-        v308 = v22 * v205 + (v23 * v198 - v20 * v199), v309 = 2.0 * v307, v310 = 2.0 * v308,
-        v311 = 1.0 / (v307 * v307 + v308 * v308), v312 = v291 * v307 + v292 * v308,
-        v313 = v214 + v213 * v204, v314 = v214 + v213 * v206, v315 = v219 + v218 * v204,
-        v316 = v219 + v218 * v206, v317 = v224 + v223 * v204, v318 = v224 + v223 * v206,
-        v319 = v229 + v228 * v204, v320 = v229 + v228 * v206, v321 = v234 + v233 * v204,
-        v322 = v234 + v233 * v206, v323 = v235 + v237 * v204, v324 = v235 + v237 * v206,
-        v325 = v311 * v311, v326 = v147 + v311 * v312, v327 = v312 * v325,
-        v328 = v199 * v312 * v325, v329 = (v208 * v307 - v199 * v291) * v311 + v309 * v328,
-        v330 = v311 * (v208 * v308 - v199 * v292) + v310 * v328,
-        v331 = (v271 * v309 + v270 * v310) * v327, v332 = (v274 * v309 + v275 * v310) * v327,
-        v333 = (v266 * v309 + v267 * v310) * v327, v334 = (v269 * v309 + v268 * v310) * v327,
-        v335 = (v278 * v309 + v279 * v310) * v327, v336 = (v280 * v309 + v281 * v310) * v327,
-        v337 = v271 * v291 + v270 * v292 + v307 * (v2 * v243 - v211 - v10 * v314 - v49 * v313),
-        v338 = v266 * v291 + v267 * v292 + v307 * (v2 * v245 - v210 - v10 * v318 - v49 * v317),
-        v339 = v337 + v308 * (v20 * v243 - v22 * v314 - v23 * v313),
-        v340 = v338 + v308 * (v20 * v245 - v22 * v318 - v23 * v317),
-        v341 = v274 * v291 + v275 * v292 + (v2 * v244 - v49 * v315 - v10 * v316) * v307,
-        v342 = v341 + (v20 * v244 - v211 - v23 * v315 - v22 * v316) * v308,
-        v343 = v269 * v291 + v268 * v292 + (v2 * v246 - v49 * v319 - v10 * v320) * v307,
-        v344 = v343 + (v20 * v246 - v210 - v23 * v319 - v22 * v320) * v308,
-        v345 = v278 * v291 + v279 * v292 + (1.0 + v2 * v242 - v49 * v321 - v10 * v322) * v307,
-        v346 = v345 + (v20 * v242 - v23 * v321 - v22 * v322) * v308,
-        v347 = v280 * v291 + v281 * v292 + (v2 * v247 - v49 * v323 - v10 * v324) * v307,
-        v348 = v347 + (1.0 + v20 * v247 - v23 * v323 - v22 * v324) * v308,
-        v349 = v250 + v216 * v194, v350 = v250 + v216 * v202, v351 = v253 + v221 * v194,
-        v352 = v253 + v221 * v202, v353 = v255 + v226 * v194, v354 = v255 + v226 * v202,
-        v355 = v257 + v231 * v194, v356 = v257 + v231 * v202,
-        v357 = v273 * v289 + v272 * v290 + (v2 * v249 - v209 - v49 * v349 - v10 * v350) * v284,
-        v358 = v276 * v289 + v277 * v290 + (v2 * v252 - v49 * v351 - v10 * v352) * v284,
-        v359 = v264 * v289 + v260 * v290 + (v2 * v254 - v207 - v49 * v353 - v10 * v354) * v284,
-        v360 = v357 + (v20 * v249 - v23 * v349 - v22 * v350) * v285,
-        v361 = v358 + (v20 * v252 - v209 - v23 * v351 - v22 * v352) * v285,
-        v362 = v359 + (v20 * v254 - v23 * v353 - v22 * v354) * v285,
-        v363 = v261 * v289 + v265 * v290 + (v2 * v256 - v49 * v355 - v10 * v356) * v284,
-        v364 = v363 + (v20 * v256 - v207 - v23 * v355 - v22 * v356) * v285,
-        v365 = v258 + v239 * v194, v366 = v258 + v239 * v202, v367 = v251 + v241 * v194,
-        v368 = v251 + v241 * v202,
-        v369 = v262 * v289 + v263 * v290 + (1.0 + v2 * v259 - v49 * v365 - v10 * v366) * v284,
-        v370 = v282 * v289 + v283 * v290 + (v2 * v248 - v49 * v367 - v10 * v368) * v284,
-        v371 = v369 + (v20 * v259 - v23 * v365 - v22 * v366) * v285,
-        v372 = v370 + (1.0 + v20 * v248 - v23 * v367 - v22 * v368) * v285,
-        v373 = softehl_blend(v303, softehl_splat(1.0), v297);
-    const M v374 = softehl_eq(v373, v373), v375 = softehl_lt(softehl_splat(1.0), v326);
-    const V v376 = softehl_blend(v375, softehl_splat(1.0), v326);
-    const M v377 = softehl_eq(v376, v376);
-    const V v378 = v311 * v339 + (v148 - v331), v379 = v311 * v342 + (v149 - v332),
-        v380 = v311 * v340 + (v150 - v333), v381 = v311 * v344 + (v151 - v334),
-        v382 = v288 * v360 + (v101 - v306), v383 = v288 * v361 + (v102 - v304),
-        v384 = v288 * v362 + (v103 - v305), v385 = v288 * v364 + (v104 - v300),
-        v386 = v311 * v346 + (v152 - v335), v387 = v311 * v348 + (v153 - v336),
-        v388 = v288 * v371 + (v105 - v301), v389 = v288 * v372 + (v106 - v302);
-    V v390 = softehl_splat(0.0), v391 = softehl_splat(0.0), v392 = softehl_splat(0.0),
-        v393 = softehl_splat(0.0), v394 = softehl_splat(0.0), v395 = softehl_splat(0.0),
-        v396 = softehl_splat(0.0), v397 = softehl_splat(0.0), v398 = softehl_splat(0.0);
-    const M m399 = v374;
-    if (softehl_any(m399)) {
-        const M v400 = softehl_lt(softehl_splat((-1.0)), v373);
-        V v401 = softehl_splat((-1.0)), v402 = softehl_splat(0.0), v403 = softehl_splat(0.0),
-            v404 = softehl_splat(0.0), v405 = softehl_splat(0.0), v406 = softehl_splat(0.0),
-            v407 = softehl_splat(0.0), v408 = softehl_splat(0.0), v409 = softehl_splat(0.0);
-        const M m410 = v400 & m399;
-        if (softehl_any(m410)) {
-            const V v411 = softehl_blend(v303, softehl_splat(0.0), v298),
-                v412 = softehl_blend(v303, softehl_splat(0.0), v299),
-                v413 = softehl_blend(v303, softehl_splat(0.0), v382),
-                v414 = softehl_blend(v303, softehl_splat(0.0), v383),
-                v415 = softehl_blend(v303, softehl_splat(0.0), v384),
-                v416 = softehl_blend(v303, softehl_splat(0.0), v385),
-                v417 = softehl_blend(v303, softehl_splat(0.0), v388),
-                v418 = softehl_blend(v303, softehl_splat(0.0), v389);
-            v401 = softehl_blend(m410, v373, v401); v402 = softehl_blend(m410, v411, v402);
-            v403 = softehl_blend(m410, v412, v403); v404 = softehl_blend(m410, v413, v404);
-            v405 = softehl_blend(m410, v414, v405); v406 = softehl_blend(m410, v415, v406);
-            v407 = softehl_blend(m410, v416, v407); v408 = softehl_blend(m410, v417, v408);
-            v409 = softehl_blend(m410, v418, v409);
+    const V v193 = 1.0 + v99, v194 = 0.5 + v99, v195 = 2.0 * v99, v196 = 0.5 * v99,
+        v197 = 0.5 + v146, v198 = 2.0 * v146, v199 = 0.5 * v146, v200 = v99 - 0.5, v201 = v99 - 1.0,
+        v202 = v99 * v99 - 1.0, v203 = 1.0 + v146, v204 = v146 - 0.5, v205 = v146 - 1.0,
+        v206 = v196 * v193, v207 = v146 * v146 - 1.0, v208 = v196 * v201, v209 = v199 * v203,
+        v210 = v199 * v205, v211 = 2.0 * v147, v212 = 0.5 * v147, v213 = v199 * v147,
+        v214 = 2.0 * v100, v215 = 0.5 * v100, v216 = 2.0 * v148, v217 = 0.5 * v148,
+        v218 = v199 * v148, v219 = 2.0 * v101, v220 = 0.5 * v101, v221 = 2.0 * v149,
+        v222 = 0.5 * v149, v223 = v199 * v149, v224 = 2.0 * v102, v225 = 0.5 * v102,
+        v226 = 2.0 * v150, v227 = 0.5 * v150, v228 = v199 * v150, v229 = 2.0 * v103,
+        v230 = 0.5 * v103, v231 = 2.0 * v151, v232 = 0.5 * v151, v233 = v199 * v151,
+        v234 = v199 * v152, v235 = 2.0 * v152, v236 = 0.5 * v152, v237 = 2.0 * v104,
+        v238 = 0.5 * v104, v239 = 2.0 * v105, v240 = 0.5 * v105, v241 = v198 * v151,
+        v242 = v198 * v147, v243 = v198 * v148, v244 = v198 * v149, v245 = v198 * v150,
+        v246 = v198 * v152, v247 = v195 * v105, v248 = v195 * v100, v249 = v196 * v100,
+        v250 = v196 * v105, v251 = v195 * v101, v252 = v196 * v101, v253 = v195 * v102,
+        v254 = v196 * v102, v255 = v195 * v103, v256 = v196 * v103, v257 = v196 * v104,
+        v258 = v195 * v104, v259 = v27 * v102 - v2 * v224, v260 = v16 * v103 - v1 * v229,
+        v261 = v16 * v104 - v1 * v237, v262 = v27 * v104 - v2 * v237,
+        v263 = v194 + (v16 * v102 - v1 * v224), v264 = v194 + (v27 * v103 - v2 * v229),
+        v265 = v16 * v149 + (v197 - v1 * v221), v266 = v27 * v149 - v2 * v221,
+        v267 = v27 * v150 + (v197 - v2 * v226), v268 = v16 * v150 - v1 * v226,
+        v269 = v27 * v147 - v2 * v211, v270 = v16 * v147 + v204 - v1 * v211,
+        v271 = v27 * v100 - v2 * v214, v272 = v16 * v100 + v200 - v1 * v214,
+        v273 = v16 * v148 - v1 * v216, v274 = v27 * v148 + v204 - v2 * v216,
+        v275 = v16 * v101 - v1 * v219, v276 = v27 * v101 + v200 - v2 * v219,
+        v277 = v16 * v151 - v1 * v231, v278 = v27 * v151 - v2 * v231, v279 = v16 * v152 - v1 * v235,
+        v280 = v27 * v152 - v2 * v235, v281 = v16 * v105 - v1 * v239, v282 = v27 * v105 - v2 * v239,
+        v283 = v12 * v200 + (v13 * v194 - v1 * v195), v284 = v23 * v200 + (v25 * v194 - v2 * v195),
+        v285 = 2.0 * v283, v286 = 2.0 * v284, v287 = 1.0 / (v283 * v283 + v284 * v284),
+        v288 = v26 + v1 * v202 - v12 * v208 - v13 * v206,
+        v289 = v33 + v2 * v202 - v23 * v208 - v25 * v206,
+        v290 = v15 + v1 * v207 - v12 * v210 - v13 * v209,
+        v291 = v32 + v2 * v207 - v23 * v210 - v25 * v209, v292 = v283 * v288 + v284 * v289,
+        v293 = v287 * v287, v294 = v195 * v292 * v293, v295 = v292 * v293, v296 = v99 + v287 * v292,
+        v297 = v287 * (v202 * v283 - v195 * v288) + v285 * v294,
+        v298 = v287 * (v202 * v284 - v195 * v289) + v286 * v294,
+        v299 = (v260 * v285 + v264 * v286) * v295, v300 = (v261 * v285 + v262 * v286) * v295,
+        v301 = (v281 * v285 + v282 * v286) * v295;
+    const M v302 = softehl_lt(softehl_splat(1.0), v296);
+    const V v303 = (v275 * v285 + v276 * v286) * v295, v304 = (v263 * v285 + v259 * v286) * v295,
+        v305 = v295 * (v272 * v285 + v271 * v286), v306 = v12 * v204 + (v13 * v197 - v1 * v198),
+        v307 = v23 * v204 + (v25 * v197 - v2 * v198), v308 = 2.0 * v306, v309 = 2.0 * v307,
+        v310 = 1.0 / (v306 * v306 + v307 * v307), v311 = v290 * v306 + v291 * v307,
+        v312 = v213 + v212 * v203, v313 = v213 + v212 * v205, v314 = v218 + v217 * v203,
+        v315 = v218 + v217 * v205, v316 = v223 + v222 * v203, v317 = v223 + v222 * v205,
+        v318 = v228 + v227 * v203, v319 = v228 + v227 * v205, v320 = v233 + v232 * v203,
+        v321 = v233 + v232 * v205, v322 = v234 + v236 * v203, v323 = v234 + v236 * v205,
+        v324 = v310 * v310, v325 = v146 + v310 * v311, v326 = v311 * v324,
+        v327 = v198 * v311 * v324, v328 = (v207 * v306 - v198 * v290) * v310 + v308 * v327,
+        v329 = v310 * (v207 * v307 - v198 * v291) + v309 * v327,
+        v330 = (v270 * v308 + v269 * v309) * v326, v331 = (v273 * v308 + v274 * v309) * v326,
+        v332 = (v265 * v308 + v266 * v309) * v326, v333 = (v268 * v308 + v267 * v309) * v326,
+        v334 = (v277 * v308 + v278 * v309) * v326, v335 = (v279 * v308 + v280 * v309) * v326,
+        v336 = v270 * v290 + v269 * v291 + v306 * (v1 * v242 - v210 - v12 * v313 - v13 * v312),
+        v337 = v265 * v290 + v266 * v291 + v306 * (v1 * v244 - v209 - v12 * v317 - v13 * v316),
+        v338 = v336 + v307 * (v2 * v242 - v23 * v313 - v25 * v312),
+        v339 = v337 + v307 * (v2 * v244 - v23 * v317 - v25 * v316),
+        v340 = v273 * v290 + v274 * v291 + (v1 * v243 - v13 * v314 - v12 * v315) * v306,
+        v341 = v340 + (v2 * v243 - v210 - v25 * v314 - v23 * v315) * v307,
+        v342 = v268 * v290 + v267 * v291 + (v1 * v245 - v13 * v318 - v12 * v319) * v306,
+        v343 = v342 + (v2 * v245 - v209 - v25 * v318 - v23 * v319) * v307,
+        v344 = v277 * v290 + v278 * v291 + (1.0 + v1 * v241 - v13 * v320 - v12 * v321) * v306,
+        v345 = v344 + (v2 * v241 - v25 * v320 - v23 * v321) * v307,
+        v346 = v279 * v290 + v280 * v291 + (v1 * v246 - v13 * v322 - v12 * v323) * v306,
+        v347 = v346 + (1.0 + v2 * v246 - v25 * v322 - v23 * v323) * v307, v348 = v249 + v215 * v193,
+        v349 = v249 + v215 * v201, v350 = v252 + v220 * v193, v351 = v252 + v220 * v201,
+        v352 = v254 + v225 * v193, v353 = v254 + v225 * v201, v354 = v256 + v230 * v193,
+        v355 = v256 + v230 * v201,
+        v356 = v272 * v288 + v271 * v289 + (v1 * v248 - v208 - v13 * v348 - v12 * v349) * v283,
+        v357 = v275 * v288 + v276 * v289 + (v1 * v251 - v13 * v350 - v12 * v351) * v283,
+        v358 = v263 * v288 + v259 * v289 + (v1 * v253 - v206 - v13 * v352 - v12 * v353) * v283,
+        v359 = v356 + (v2 * v248 - v25 * v348 - v23 * v349) * v284,
+        v360 = v357 + (v2 * v251 - v208 - v25 * v350 - v23 * v351) * v284,
+        v361 = v358 + (v2 * v253 - v25 * v352 - v23 * v353) * v284,
+        v362 = v260 * v288 + v264 * v289 + (v1 * v255 - v13 * v354 - v12 * v355) * v283,
+        v363 = v362 + (v2 * v255 - v206 - v25 * v354 - v23 * v355) * v284,
+        v364 = v257 + v238 * v193, v365 = v257 + v238 * v201, v366 = v250 + v240 * v193,
+        v367 = v250 + v240 * v201,
+        v368 = v261 * v288 + v262 * v289 + (1.0 + v1 * v258 - v13 * v364 - v12 * v365) * v283,
+        v369 = v281 * v288 + v282 * v289 + (v1 * v247 - v13 * v366 - v12 * v367) * v283,
+        v370 = v368 + (v2 * v258 - v25 * v364 - v23 * v365) * v284,
+        v371 = v369 + (1.0 + v2 * v247 - v25 * v366 - v23 * v367) * v284,
+        v372 = softehl_blend(v302, softehl_splat(1.0), v296);
+    const M v373 = softehl_eq(v372, v372), v374 = softehl_lt(softehl_splat(1.0), v325);
+    const V v375 = softehl_blend(v374, softehl_splat(1.0), v325);
+    const M v376 = softehl_eq(v375, v375);
+    const V v377 = v310 * v338 + (v147 - v330), v378 = v310 * v341 + (v148 - v331),
+        v379 = v310 * v339 + (v149 - v332), v380 = v310 * v343 + (v150 - v333),
+        v381 = v287 * v359 + (v100 - v305), v382 = v287 * v360 + (v101 - v303),
+        v383 = v287 * v361 + (v102 - v304), v384 = v287 * v363 + (v103 - v299),
+        v385 = v310 * v345 + (v151 - v334), v386 = v310 * v347 + (v152 - v335),
+        v387 = v287 * v370 + (v104 - v300), v388 = v287 * v371 + (v105 - v301);
+    V v389 = softehl_splat(0.0), v390 = softehl_splat(0.0), v391 = softehl_splat(0.0),
+        v392 = softehl_splat(0.0), v393 = softehl_splat(0.0), v394 = softehl_splat(0.0),
+        v395 = softehl_splat(0.0), v396 = softehl_splat(0.0), v397 = softehl_splat(0.0);
+    const M m398 = v373;
+    if (softehl_any(m398)) {
+        const M v399 = softehl_lt(softehl_splat((-1.0)), v372);
+        V v400 = softehl_splat((-1.0)), v401 = softehl_splat(0.0), v402 = softehl_splat(0.0),
+            v403 = softehl_splat(0.0), v404 = softehl_splat(0.0), v405 = softehl_splat(0.0),
+            v406 = softehl_splat(0.0), v407 = softehl_splat(0.0), v408 = softehl_splat(0.0);
+        const M m409 = v399 & m398;
+        if (softehl_any(m409)) {
+            const V v410 = softehl_blend(v302, softehl_splat(0.0), v297),
+                v411 = softehl_blend(v302, softehl_splat(0.0), v298),
+                v412 = softehl_blend(v302, softehl_splat(0.0), v381),
+                v413 = softehl_blend(v302, softehl_splat(0.0), v382),
+                v414 = softehl_blend(v302, softehl_splat(0.0), v383),
+                v415 = softehl_blend(v302, softehl_splat(0.0), v384),
+                v416 = softehl_blend(v302, softehl_splat(0.0), v387),
+                v417 = softehl_blend(v302, softehl_splat(0.0), v388);
+            v400 = softehl_blend(m409, v372, v400); v401 = softehl_blend(m409, v410, v401);
+            v402 = softehl_blend(m409, v411, v402); v403 = softehl_blend(m409, v412, v403);
+            v404 = softehl_blend(m409, v413, v404); v405 = softehl_blend(m409, v414, v405);
+            v406 = softehl_blend(m409, v415, v406); v407 = softehl_blend(m409, v416, v407);
+            v408 = softehl_blend(m409, v417, v408);
         }
-        v390 = softehl_blend(m399, v401, v390); v391 = softehl_blend(m399, v402, v391);
-        v392 = softehl_blend(m399, v403, v392); v393 = softehl_blend(m399, v404, v393);
-        v394 = softehl_blend(m399, v405, v394); v395 = softehl_blend(m399, v406, v395);
-        v396 = softehl_blend(m399, v407, v396); v397 = softehl_blend(m399, v408, v397);
-        v398 = softehl_blend(m399, v409, v398);
+        v389 = softehl_blend(m398, v400, v389); v390 = softehl_blend(m398, v401, v390);
+        v391 = softehl_blend(m398, v402, v391); v392 = softehl_blend(m398, v403, v392);
+        v393 = softehl_blend(m398, v404, v393); v394 = softehl_blend(m398, v405, v394);
+        v395 = softehl_blend(m398, v406, v395); v396 = softehl_blend(m398, v407, v396);
+        v397 = softehl_blend(m398, v408, v397);
     }
-    const M m419 = ~v374;
-    if (softehl_any(m419)) {
-        const V v420 = (-1.0) - v373, v421 = v420 * (v420 * v420);
-        V v422 = softehl_splat(0.0), v423 = softehl_splat(0.0), v424 = softehl_splat(0.0),
-            v425 = softehl_splat(0.0), v426 = softehl_splat(0.0), v427 = softehl_splat(0.0),
-            v428 = softehl_splat(0.0), v429 = softehl_splat(0.0);
-        const M m430 = ~v303 & m419;
-        if (softehl_any(m430)) {
-            const V v431 = (-1.0) - v297, v432 = v431 * (3.0 * v431), v433 = -(v298 * v432),
-                v434 = -(v299 * v432), v435 = -(v382 * v432), v436 = -(v383 * v432),
-                v437 = -(v384 * v432), v438 = -(v385 * v432), v439 = -(v388 * v432),
-                v440 = -(v389 * v432);
-            v422 = softehl_blend(m430, v433, v422); v423 = softehl_blend(m430, v434, v423);
-            v424 = softehl_blend(m430, v435, v424); v425 = softehl_blend(m430, v436, v425);
-            v426 = softehl_blend(m430, v437, v426); v427 = softehl_blend(m430, v438, v427);
-            v428 = softehl_blend(m430, v439, v428); v429 = softehl_blend(m430, v440, v429);
+    const M m418 = ~v373;
+    if (softehl_any(m418)) {
+        const V v419 = (-1.0) - v372, v420 = v419 * (v419 * v419);
+        V v421 = softehl_splat(0.0), v422 = softehl_splat(0.0), v423 = softehl_splat(0.0),
+            v424 = softehl_splat(0.0), v425 = softehl_splat(0.0), v426 = softehl_splat(0.0),
+            v427 = softehl_splat(0.0), v428 = softehl_splat(0.0);
+        const M m429 = ~v302 & m418;
+        if (softehl_any(m429)) {
+            const V v430 = (-1.0) - v296, v431 = v430 * (3.0 * v430), v432 = -(v297 * v431),
+                v433 = -(v298 * v431), v434 = -(v381 * v431), v435 = -(v382 * v431),
+                v436 = -(v383 * v431), v437 = -(v384 * v431), v438 = -(v387 * v431),
+                v439 = -(v388 * v431);
+            v421 = softehl_blend(m429, v432, v421); v422 = softehl_blend(m429, v433, v422);
+            v423 = softehl_blend(m429, v434, v423); v424 = softehl_blend(m429, v435, v424);
+            v425 = softehl_blend(m429, v436, v425); v426 = softehl_blend(m429, v437, v426);
+            v427 = softehl_blend(m429, v438, v427); v428 = softehl_blend(m429, v439, v428);
         }
-        v390 = softehl_blend(m419, v421, v390); v391 = softehl_blend(m419, v422, v391);
-        v392 = softehl_blend(m419, v423, v392); v393 = softehl_blend(m419, v424, v393);
-        v394 = softehl_blend(m419, v425, v394); v395 = softehl_blend(m419, v426, v395);
-        v396 = softehl_blend(m419, v427, v396); v397 = softehl_blend(m419, v428, v397);
-        v398 = softehl_blend(m419, v429, v398);
+        v389 = softehl_blend(m418, v420, v389); v390 = softehl_blend(m418, v421, v390);
+        v391 = softehl_blend(m418, v422, v391); v392 = softehl_blend(m418, v423, v392);
+        v393 = softehl_blend(m418, v424, v393); v394 = softehl_blend(m418, v425, v394);
+        v395 = softehl_blend(m418, v426, v395); v396 = softehl_blend(m418, v427, v396);
+        v397 = softehl_blend(m418, v428, v397);
     }
-    V v441 = softehl_splat(0.0), v442 = softehl_splat(0.0), v443 = softehl_splat(0.0),
-        v444 = softehl_splat(0.0), v445 = softehl_splat(0.0), v446 = softehl_splat(0.0),
-        v447 = softehl_splat(0.0), v448 = softehl_splat(0.0), v449 = softehl_splat(0.0);
-    const M m450 = v377;
-    if (softehl_any(m450)) {
-        const M v451 = softehl_lt(softehl_splat((-1.0)), v376);
-        V v452 = softehl_splat((-1.0)), v453 = softehl_splat(0.0), v454 = softehl_splat(0.0),
-            v455 = softehl_splat(0.0), v456 = softehl_splat(0.0), v457 = softehl_splat(0.0),
-            v458 = softehl_splat(0.0), v459 = softehl_splat(0.0), v460 = softehl_splat(0.0);
-        const M m461 = v451 & m450;
-        if (softehl_any(m461)) {
-            const V v462 = softehl_blend(v375, softehl_splat(0.0), v329),
-                v463 = softehl_blend(v375, softehl_splat(0.0), v330),
-                v464 = softehl_blend(v375, softehl_splat(0.0), v378),
-                v465 = softehl_blend(v375, softehl_splat(0.0), v379),
-                v466 = softehl_blend(v375, softehl_splat(0.0), v380),
-                v467 = softehl_blend(v375, softehl_splat(0.0), v381),
-                v468 = softehl_blend(v375, softehl_splat(0.0), v386),
-                v469 = softehl_blend(v375, softehl_splat(0.0), v387);
-            v452 = softehl_blend(m461, v376, v452); v453 = softehl_blend(m461, v462, v453);
-            v454 = softehl_blend(m461, v463, v454); v455 = softehl_blend(m461, v464, v455);
-            v456 = softehl_blend(m461, v465, v456); v457 = softehl_blend(m461, v466, v457);
-            v458 = softehl_blend(m461, v467, v458); v459 = softehl_blend(m461, v468, v459);
-            v460 = softehl_blend(m461, v469, v460);
+    V v440 = softehl_splat(0.0), v441 = softehl_splat(0.0), v442 = softehl_splat(0.0),
+        v443 = softehl_splat(0.0), v444 = softehl_splat(0.0), v445 = softehl_splat(0.0),
+        v446 = softehl_splat(0.0), v447 = softehl_splat(0.0), v448 = softehl_splat(0.0);
+    const M m449 = v376;
+    if (softehl_any(m449)) {
+        const M v450 = softehl_lt(softehl_splat((-1.0)), v375);
+        V v451 = softehl_splat((-1.0)), v452 = softehl_splat(0.0), v453 = softehl_splat(0.0),
+            v454 = softehl_splat(0.0), v455 = softehl_splat(0.0), v456 = softehl_splat(0.0),
+            v457 = softehl_splat(0.0), v458 = softehl_splat(0.0), v459 = softehl_splat(0.0);
+        const M m460 = v450 & m449;
+        if (softehl_any(m460)) {
+            const V v461 = softehl_blend(v374, softehl_splat(0.0), v328),
+                v462 = softehl_blend(v374, softehl_splat(0.0), v329),
+                v463 = softehl_blend(v374, softehl_splat(0.0), v377),
+                v464 = softehl_blend(v374, softehl_splat(0.0), v378),
+                v465 = softehl_blend(v374, softehl_splat(0.0), v379),
+                v466 = softehl_blend(v374, softehl_splat(0.0), v380),
+                v467 = softehl_blend(v374, softehl_splat(0.0), v385),
+                v468 = softehl_blend(v374, softehl_splat(0.0), v386);
+            v451 = softehl_blend(m460, v375, v451); v452 = softehl_blend(m460, v461, v452);
+            v453 = softehl_blend(m460, v462, v453); v454 = softehl_blend(m460, v463, v454);
+            v455 = softehl_blend(m460, v464, v455); v456 = softehl_blend(m460, v465, v456);
+            v457 = softehl_blend(m460, v466, v457); v458 = softehl_blend(m460, v467, v458);
+            v459 = softehl_blend(m460, v468, v459);
         }
-        v441 = softehl_blend(m450, v452, v441); v442 = softehl_blend(m450, v453, v442);
-        v443 = softehl_blend(m450, v454, v443); v444 = softehl_blend(m450, v455, v444);
-        v445 = softehl_blend(m450, v456, v445); v446 = softehl_blend(m450, v457, v446);
-        v447 = softehl_blend(m450, v458, v447); v448 = softehl_blend(m450, v459, v448);
-        v449 = softehl_blend(m450, v460, v449);
+        v440 = softehl_blend(m449, v451, v440); v441 = softehl_blend(m449, v452, v441);
+        v442 = softehl_blend(m449, v453, v442); v443 = softehl_blend(m449, v454, v443);
+        v444 = softehl_blend(m449, v455, v444); v445 = softehl_blend(m449, v456, v445);
+        v446 = softehl_blend(m449, v457, v446); v447 = softehl_blend(m449, v458, v447);
+        v448 = softehl_blend(m449, v459, v448);
     }
-    const M m470 = ~v377;
-    if (softehl_any(m470)) {
-        const V v471 = (-1.0) - v376, v472 = v471 * (v471 * v471);
-        V v473 = softehl_splat(0.0), v474 = softehl_splat(0.0), v475 = softehl_splat(0.0),
-            v476 = softehl_splat(0.0), v477 = softehl_splat(0.0), v478 = softehl_splat(0.0),
-            v479 = softehl_splat(0.0), v480 = softehl_splat(0.0);
-        const M m481 = ~v375 & m470;
-        if (softehl_any(m481)) {
-            const V v482 = (-1.0) - v326, v483 = v482 * (3.0 * v482), v484 = -(v329 * v483),
-                v485 = -(v330 * v483), v486 = -(v378 * v483), v487 = -(v379 * v483),
-                v488 = -(v380 * v483), v489 = -(v381 * v483), v490 = -(v386 * v483),
-                v491 = -(v387 * v483);
-            v473 = softehl_blend(m481, v484, v473); v474 = softehl_blend(m481, v485, v474);
-            v475 = softehl_blend(m481, v486, v475); v476 = softehl_blend(m481, v487, v476);
-            v477 = softehl_blend(m481, v488, v477); v478 = softehl_blend(m481, v489, v478);
-            v479 = softehl_blend(m481, v490, v479); v480 = softehl_blend(m481, v491, v480);
+    const M m469 = ~v376;
+    if (softehl_any(m469)) {
+        const V v470 = (-1.0) - v375, v471 = v470 * (v470 * v470);
+        V v472 = softehl_splat(0.0), v473 = softehl_splat(0.0), v474 = softehl_splat(0.0),
+            v475 = softehl_splat(0.0), v476 = softehl_splat(0.0), v477 = softehl_splat(0.0),
+            v478 = softehl_splat(0.0), v479 = softehl_splat(0.0);
+        const M m480 = ~v374 & m469;
+        if (softehl_any(m480)) {
+            const V v481 = (-1.0) - v325, v482 = v481 * (3.0 * v481), v483 = -(v328 * v482),
+                v484 = -(v329 * v482), v485 = -(v377 * v482), v486 = -(v378 * v482),
+                v487 = -(v379 * v482), v488 = -(v380 * v482), v489 = -(v385 * v482),
+                v490 = -(v386 * v482);
+            v472 = softehl_blend(m480, v483, v472); v473 = softehl_blend(m480, v484, v473);
+            v474 = softehl_blend(m480, v485, v474); v475 = softehl_blend(m480, v486, v475);
+            v476 = softehl_blend(m480, v487, v476); v477 = softehl_blend(m480, v488, v477);
+            v478 = softehl_blend(m480, v489, v478); v479 = softehl_blend(m480, v490, v479);
         }
-        v441 = softehl_blend(m470, v472, v441); v442 = softehl_blend(m470, v473, v442);
-        v443 = softehl_blend(m470, v474, v443); v444 = softehl_blend(m470, v475, v444);
-        v445 = softehl_blend(m470, v476, v445); v446 = softehl_blend(m470, v477, v446);
-        v447 = softehl_blend(m470, v478, v447); v448 = softehl_blend(m470, v479, v448);
-        v449 = softehl_blend(m470, v480, v449);
+        v440 = softehl_blend(m469, v471, v440); v441 = softehl_blend(m469, v472, v441);
+        v442 = softehl_blend(m469, v473, v442); v443 = softehl_blend(m469, v474, v443);
+        v444 = softehl_blend(m469, v475, v444); v445 = softehl_blend(m469, v476, v445);
+        v446 = softehl_blend(m469, v477, v446); v447 = softehl_blend(m469, v478, v447);
+        v448 = softehl_blend(m469, v479, v448);
     }
-    const V v492 = v441 - v390; const M v493 = softehl_eq(v492, v492);
-    V v494 = softehl_splat(0.0), v495 = softehl_splat(0.0), v496 = softehl_splat(0.0),
-        v497 = softehl_splat(0.0), v498 = softehl_splat(0.0), v499 = softehl_splat(0.0),
-        v500 = softehl_splat(0.0), v501 = softehl_splat(0.0), v502 = softehl_splat(0.0),
-        v503 = softehl_splat(0.0), v504 = softehl_splat(0.0);
-    const M m505 = v493;
-    if (softehl_any(m505)) {
-        const M v506 = softehl_lt(softehl_splat(0.0), v492);
-        V v507 = softehl_splat(0.0), v508 = softehl_splat(0.0), v509 = softehl_splat(0.0),
-            v510 = softehl_splat(0.0), v511 = softehl_splat(0.0), v512 = softehl_splat(0.0),
-            v513 = softehl_splat(0.0), v514 = softehl_splat(0.0), v515 = softehl_splat(0.0),
-            v516 = softehl_splat(0.0), v517 = softehl_splat(0.0);
-        const M m518 = v506 & m505;
-        if (softehl_any(m518)) {
-            const V v519 = v442 - v391, v520 = -v397, v521 = v443 - v392, v522 = v444 - v393,
-                v523 = v445 - v394, v524 = -v398, v525 = v446 - v395, v526 = v447 - v396;
-            v507 = softehl_blend(m518, v492, v507); v508 = softehl_blend(m518, v519, v508);
-            v509 = softehl_blend(m518, v521, v509); v510 = softehl_blend(m518, v522, v510);
-            v511 = softehl_blend(m518, v523, v511); v512 = softehl_blend(m518, v525, v512);
-            v513 = softehl_blend(m518, v526, v513); v514 = softehl_blend(m518, v448, v514);
-            v515 = softehl_blend(m518, v449, v515); v516 = softehl_blend(m518, v520, v516);
-            v517 = softehl_blend(m518, v524, v517);
+    const V v491 = v440 - v389; const M v492 = softehl_eq(v491, v491);
+    V v493 = softehl_splat(0.0), v494 = softehl_splat(0.0), v495 = softehl_splat(0.0),
+        v496 = softehl_splat(0.0), v497 = softehl_splat(0.0), v498 = softehl_splat(0.0),
+        v499 = softehl_splat(0.0), v500 = softehl_splat(0.0), v501 = softehl_splat(0.0),
+        v502 = softehl_splat(0.0), v503 = softehl_splat(0.0);
+    const M m504 = v492;
+    if (softehl_any(m504)) {
+        const M v505 = softehl_lt(softehl_splat(0.0), v491);
+        V v506 = softehl_splat(0.0), v507 = softehl_splat(0.0), v508 = softehl_splat(0.0),
+            v509 = softehl_splat(0.0), v510 = softehl_splat(0.0), v511 = softehl_splat(0.0),
+            v512 = softehl_splat(0.0), v513 = softehl_splat(0.0), v514 = softehl_splat(0.0),
+            v515 = softehl_splat(0.0), v516 = softehl_splat(0.0);
+        const M m517 = v505 & m504;
+        if (softehl_any(m517)) {
+            const V v518 = v441 - v390, v519 = -v396, v520 = v442 - v391, v521 = v443 - v392,
+                v522 = v444 - v393, v523 = -v397, v524 = v445 - v394, v525 = v446 - v395;
+            v506 = softehl_blend(m517, v491, v506); v507 = softehl_blend(m517, v518, v507);
+            v508 = softehl_blend(m517, v520, v508); v509 = softehl_blend(m517, v521, v509);
+            v510 = softehl_blend(m517, v522, v510); v511 = softehl_blend(m517, v524, v511);
+            v512 = softehl_blend(m517, v525, v512); v513 = softehl_blend(m517, v447, v513);
+            v514 = softehl_blend(m517, v448, v514); v515 = softehl_blend(m517, v519, v515);
+            v516 = softehl_blend(m517, v523, v516);
         }
-        v494 = softehl_blend(m505, v507, v494); v495 = softehl_blend(m505, v508, v495);
-        v496 = softehl_blend(m505, v509, v496); v497 = softehl_blend(m505, v510, v497);
-        v498 = softehl_blend(m505, v511, v498); v499 = softehl_blend(m505, v512, v499);
-        v500 = softehl_blend(m505, v513, v500); v501 = softehl_blend(m505, v514, v501);
-        v502 = softehl_blend(m505, v515, v502); v503 = softehl_blend(m505, v516, v503);
-        v504 = softehl_blend(m505, v517, v504);
+        v493 = softehl_blend(m504, v506, v493); v494 = softehl_blend(m504, v507, v494);
+        v495 = softehl_blend(m504, v508, v495); v496 = softehl_blend(m504, v509, v496);
+        v497 = softehl_blend(m504, v510, v497); v498 = softehl_blend(m504, v511, v498);
+        v499 = softehl_blend(m504, v512, v499); v500 = softehl_blend(m504, v513, v500);
+        v501 = softehl_blend(m504, v514, v501); v502 = softehl_blend(m504, v515, v502);
+        v503 = softehl_blend(m504, v516, v503);
     }
-    const M m527 = ~v493;
-    if (softehl_any(m527)) {
-        const V v528 = v390 - v441, v529 = v528 * v528, v530 = v528 * v529, v531 = 3.0 * v529,
-            v532 = (v391 - v442) * v531, v533 = (v392 - v443) * v531, v534 = (v393 - v444) * v531,
-            v535 = (v394 - v445) * v531, v536 = (v395 - v446) * v531, v537 = (v396 - v447) * v531,
-            v538 = v397 * v531, v539 = v398 * v531, v540 = -(v448 * v531), v541 = -(v449 * v531);
-        v494 = softehl_blend(m527, v530, v494); v495 = softehl_blend(m527, v532, v495);
-        v496 = softehl_blend(m527, v533, v496); v497 = softehl_blend(m527, v534, v497);
-        v498 = softehl_blend(m527, v535, v498); v499 = softehl_blend(m527, v536, v499);
-        v500 = softehl_blend(m527, v537, v500); v501 = softehl_blend(m527, v540, v501);
-        v502 = softehl_blend(m527, v541, v502); v503 = softehl_blend(m527, v538, v503);
-        v504 = softehl_blend(m527, v539, v504);
+    const M m526 = ~v492;
+    if (softehl_any(m526)) {
+        const V v527 = v389 - v440, v528 = v527 * v527, v529 = v527 * v528, v530 = 3.0 * v528,
+            v531 = (v390 - v441) * v530, v532 = (v391 - v442) * v530, v533 = (v392 - v443) * v530,
+            v534 = (v393 - v444) * v530, v535 = (v394 - v445) * v530, v536 = (v395 - v446) * v530,
+            v537 = v396 * v530, v538 = v397 * v530, v539 = -(v447 * v530), v540 = -(v448 * v530);
+        v493 = softehl_blend(m526, v529, v493); v494 = softehl_blend(m526, v531, v494);
+        v495 = softehl_blend(m526, v532, v495); v496 = softehl_blend(m526, v533, v496);
+        v497 = softehl_blend(m526, v534, v497); v498 = softehl_blend(m526, v535, v498);
+        v499 = softehl_blend(m526, v536, v499); v500 = softehl_blend(m526, v539, v500);
+        v501 = softehl_blend(m526, v540, v501); v502 = softehl_blend(m526, v537, v502);
+        v503 = softehl_blend(m526, v538, v503);
     }
-    const V v542 = 0.5 * v495, v543 = 0.5 * v496, v544 = 0.5 * v497, v545 = 0.5 * v498,
-        v546 = 0.5 * (v390 + v441), v547 = 0.5 * (v442 + v391), v548 = 0.5 * (v443 + v392),
-        v549 = 0.5 * v499, v550 = 0.5 * v500, v551 = 0.5 * (v444 + v393), v552 = 0.5 * v501,
-        v553 = 0.5 * v502, v554 = 0.5 * v503, v555 = 0.5 * (v445 + v394), v556 = 0.5 * v504,
-        v557 = 0.5 * v448, v558 = 0.5 * v449, v559 = 0.5 * v397, v560 = 0.5 * (v446 + v395),
-        v561 = 0.5 * v398, v562 = 0.5 * (v447 + v396), v563 = 6.283185307179586 * a14,
-        v564 = 0.5 * v494, v565 = 0.25 * v494;
-    V s566 = {0}, s567 = {0}, s568 = {0}, s569 = {0}, s570 = {0}, s571 = {0}, s572 = {0},
-        s573 = {0}, s574 = {0}, s575 = {0}, s576 = {0}, s577 = {0}, s578 = {0}, s579 = {0},
-        s580 = {0}, s581 = {0}, s582 = {0}, s583 = {0}, s584 = {0}, s585 = {0}, s586 = {0},
-        s587 = {0}, s588 = {0}, s589 = {0}, s590 = {0}, s591 = {0}, s592 = {0}, s593 = {0},
-        s594 = {0}, s595 = {0}, s596 = {0}, s597 = {0}, s598 = {0}, s599 = {0}, s600 = {0},
-        s601 = {0}, s602 = {0}, s603 = {0}, s604 = {0}, s605 = {0}, s606 = {0}, s607 = {0},
-        s608 = {0}, s609 = {0}, s610 = {0}, s611 = {0}, s612 = {0}, s613 = {0}, s614 = {0},
-        s615 = {0}, s616 = {0}, s617 = {0}, s618 = {0}, s619 = {0}, s620 = {0}, s621 = {0},
-        s622 = {0}, s623 = {0}, s624 = {0}, s625 = {0}, s626 = {0}, s627 = {0}, s628 = {0},
-        s629 = {0}, s630 = {0}, s631 = {0}, s632 = {0}, s633 = {0}, s634 = {0}, s635 = {0},
-        s636 = {0}, s637 = {0}, s638 = {0}, s639 = {0}, s640 = {0}, s641 = {0}, s642 = {0},
-        s643 = {0}, s644 = {0}, s645 = {0}, s646 = {0}, s647 = {0}, s648 = {0}, s649 = {0},
-        s650 = {0}, s651 = {0}, s652 = {0}, s653 = {0}, s654 = {0}, s655 = {0}, s656 = {0},
-        s657 = {0}, s658 = {0}, s659 = {0}, s660 = {0}, s661 = {0}, s662 = {0}, s663 = {0},
-        s664 = {0}, s665 = {0}, s666 = {0}, s667 = {0}, s668 = {0}, s669 = {0}, s670 = {0},
-        s671 = {0}, s672 = {0}, s673 = {0}, s674 = {0}, s675 = {0}, s676 = {0}, s677 = {0},
-        s678 = {0}, s679 = {0}, s680 = {0}, s681 = {0}, s682 = {0}, s683 = {0}, s684 = {0},
-        s685 = {0}, s686 = {0}, s687 = {0}, s688 = {0}, s689 = {0}, s690 = {0}, s691 = {0},
-        s692 = {0}, s693 = {0}, s694 = {0}, s695 = {0}, s696 = {0}, s697 = {0}, s698 = {0},
-        s699 = {0}, s700 = {0}, s701 = {0}, s702 = {0}, s703 = {0}, s704 = {0}, s705 = {0},
-        s706 = {0}, s707 = {0}, s708 = {0}, s709 = {0}, s710 = {0}, s711 = {0}, s712 = {0},
-        s713 = {0}, s714 = {0}, s715 = {0}, s716 = {0}, s717 = {0}, s718 = {0}, s719 = {0},
-        s720 = {0}, s721 = {0}, s722 = {0}, s723 = {0}, s724 = {0}, s725 = {0}, s726 = {0},
-        s727 = {0}, s728 = {0}, s729 = {0}, s730 = {0}, s731 = {0}, s732 = {0}, s733 = {0},
-        s734 = {0}, s735 = {0}, s736 = {0}, s737 = {0}, s738 = {0}, s739 = {0}, s740 = {0},
-        s741 = {0}, s742 = {0}, s743 = {0}, s744 = {0}, s745 = {0}, s746 = {0}, s747 = {0},
-        s748 = {0}, s749 = {0}, s750 = {0}, s751 = {0}, s752 = {0}, s753 = {0}, s754 = {0},
-        s755 = {0}, s756 = {0}, s757 = {0}, s758 = {0}, s759 = {0}, s760 = {0}, s761 = {0},
-        s762 = {0}, s763 = {0}, s764 = {0}, s765 = {0}, s766 = {0}, s767 = {0}, s768 = {0},
-        s769 = {0}, s770 = {0}, s771 = {0};
+    const V v541 = 0.5 * v494, v542 = 0.5 * v495, v543 = 0.5 * v496, v544 = 0.5 * v497,
+        v545 = 0.5 * (v389 + v440), v546 = 0.5 * (v441 + v390), v547 = 0.5 * (v442 + v391),
+        v548 = 0.5 * v498, v549 = 0.5 * v499, v550 = 0.5 * (v443 + v392), v551 = 0.5 * v500,
+        v552 = 0.5 * v501, v553 = 0.5 * v502, v554 = 0.5 * (v444 + v393), v555 = 0.5 * v503,
+        v556 = 0.5 * v447, v557 = 0.5 * v448, v558 = 0.5 * v396, v559 = 0.5 * (v445 + v394),
+        v560 = 0.5 * v397, v561 = 0.5 * (v446 + v395), v562 = 6.283185307179586 * a14,
+        v563 = 0.5 * v493, v564 = 0.25 * v493;
+    V s565 = {0}, s566 = {0}, s567 = {0}, s568 = {0}, s569 = {0}, s570 = {0}, s571 = {0},
+        s572 = {0}, s573 = {0}, s574 = {0}, s575 = {0}, s576 = {0}, s577 = {0}, s578 = {0},
+        s579 = {0}, s580 = {0}, s581 = {0}, s582 = {0}, s583 = {0}, s584 = {0}, s585 = {0},
+        s586 = {0}, s587 = {0}, s588 = {0}, s589 = {0}, s590 = {0}, s591 = {0}, s592 = {0},
+        s593 = {0}, s594 = {0}, s595 = {0}, s596 = {0}, s597 = {0}, s598 = {0}, s599 = {0},
+        s600 = {0}, s601 = {0}, s602 = {0}, s603 = {0}, s604 = {0}, s605 = {0}, s606 = {0},
+        s607 = {0}, s608 = {0}, s609 = {0}, s610 = {0}, s611 = {0}, s612 = {0}, s613 = {0},
+        s614 = {0}, s615 = {0}, s616 = {0}, s617 = {0}, s618 = {0}, s619 = {0}, s620 = {0},
+        s621 = {0}, s622 = {0}, s623 = {0}, s624 = {0}, s625 = {0}, s626 = {0}, s627 = {0},
+        s628 = {0}, s629 = {0}, s630 = {0}, s631 = {0}, s632 = {0}, s633 = {0}, s634 = {0},
+        s635 = {0}, s636 = {0}, s637 = {0}, s638 = {0}, s639 = {0}, s640 = {0}, s641 = {0},
+        s642 = {0}, s643 = {0}, s644 = {0}, s645 = {0}, s646 = {0}, s647 = {0}, s648 = {0},
+        s649 = {0}, s650 = {0}, s651 = {0}, s652 = {0}, s653 = {0}, s654 = {0}, s655 = {0},
+        s656 = {0}, s657 = {0}, s658 = {0}, s659 = {0}, s660 = {0}, s661 = {0}, s662 = {0},
+        s663 = {0}, s664 = {0}, s665 = {0}, s666 = {0}, s667 = {0}, s668 = {0}, s669 = {0},
+        s670 = {0}, s671 = {0}, s672 = {0}, s673 = {0}, s674 = {0}, s675 = {0}, s676 = {0},
+        s677 = {0}, s678 = {0}, s679 = {0}, s680 = {0}, s681 = {0}, s682 = {0}, s683 = {0},
+        s684 = {0}, s685 = {0}, s686 = {0}, s687 = {0}, s688 = {0}, s689 = {0}, s690 = {0},
+        s691 = {0}, s692 = {0}, s693 = {0}, s694 = {0}, s695 = {0}, s696 = {0}, s697 = {0},
+        s698 = {0}, s699 = {0}, s700 = {0}, s701 = {0}, s702 = {0}, s703 = {0}, s704 = {0},
+        s705 = {0}, s706 = {0}, s707 = {0}, s708 = {0}, s709 = {0}, s710 = {0}, s711 = {0},
+        s712 = {0}, s713 = {0}, s714 = {0}, s715 = {0}, s716 = {0}, s717 = {0}, s718 = {0},
+        s719 = {0}, s720 = {0}, s721 = {0}, s722 = {0}, s723 = {0}, s724 = {0}, s725 = {0},
+        s726 = {0}, s727 = {0}, s728 = {0}, s729 = {0}, s730 = {0}, s731 = {0}, s732 = {0},
+        s733 = {0}, s734 = {0}, s735 = {0}, s736 = {0}, s737 = {0}, s738 = {0}, s739 = {0},
+        s740 = {0}, s741 = {0}, s742 = {0}, s743 = {0}, s744 = {0}, s745 = {0}, s746 = {0},
+        s747 = {0}, s748 = {0}, s749 = {0}, s750 = {0}, s751 = {0}, s752 = {0}, s753 = {0},
+        s754 = {0}, s755 = {0}, s756 = {0}, s757 = {0}, s758 = {0}, s759 = {0}, s760 = {0},
+        s761 = {0}, s762 = {0}, s763 = {0}, s764 = {0}, s765 = {0}, s766 = {0}, s767 = {0},
+        s768 = {0}, s769 = {0}, s770 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
         const double *restrict w = rule + 2 * q; (void)w;
-        const V v772 = w[0] * v552 + v557, v773 = w[0] * v553 + v558, v774 = w[0] * v544 + v551,
-            v775 = w[0] * v545 + v555, v776 = w[0] * v549 + v560, v777 = w[0] * v550 + v562,
-            v778 = w[0] * v542 + v547, v779 = w[0] * v543 + v548, v780 = w[0] * v554 + v559,
-            v781 = w[0] * v556 + v561, v782 = w[0] * v564 + v546, v783 = v33 * v774,
-            v784 = v33 * v776, v785 = v33 * v772, v786 = v33 * v778, v787 = v33 * v780,
-            v788 = v33 * v781, v789 = 0.5 * v782, v790 = 2.0 * v782, v791 = v13 * v782,
-            v792 = v16 * v782, v793 = (-1.0) + v782, v794 = 1.0 + v782, v795 = 0.5 + v782,
-            v796 = (-0.5) + v782, v797 = v789 * v793, v798 = v789 - 0.5, v799 = v789 * v794,
-            v800 = 0.5 * (v782 + v793), v801 = 0.5 * (v782 + v794), v802 = v33 * v775 + v796,
-            v803 = w[1] * v799, v804 = w[1] * v797, v805 = 1.0 - v782 * v782,
-            v806 = X2 * v795 + (X0 * v796 - v3 * v782), v807 = X3 * v795 + (X1 * v796 - v19 * v782),
-            v808 = w[1] * v805, v809 = v2 * v805 + (v10 * v797 + v49 * v799), v810 = v2 * v790,
-            v811 = v806 * v806 + v807 * v807, v812 = v20 * v805 + (v22 * v797 + v23 * v799),
-            v813 = v20 * v790, v814 = v49 * v795 + v10 * v796 - v810,
-            v815 = v10 * v800 + v49 * v801 - v810, v816 = softehl_vsqrt(v811),
-            v817 = v23 * v795 + v22 * v796 - v813, v818 = v22 * v800 + v23 * v801 - v813,
-            v819 = (-1.0) + 6.283185307179586 * (X5 * v805 + (v791 * v793 + v792 * v794)),
-            v820 = v809 - v55, v821 = v812 - v34, v822 = v805 + v778 * v815, v823 = v778 * v818,
-            v824 = v814 * v814 + v817 * v817, v825 = 1.0 + a14 * v819, v826 = v60 * v775,
-            v827 = v775 * v815, v828 = v797 + v775 * v818, v829 = v60 * v777, v830 = v777 * v815,
-            v831 = v60 * v778 - v790, v832 = softehl_vsqrt(v824), v833 = v60 * v779,
-            v834 = v779 * v815, v835 = v60 * v772, v836 = v772 * v815, v837 = v772 * v818,
-            v838 = v60 * v773, v839 = v773 * v815, v840 = v773 * v818, v841 = v33 * v773,
-            v842 = v805 + v779 * v818, v843 = v33 * v777 + v795, v844 = v799 + v777 * v818,
-            v845 = v33 * v779 - v790, v846 = v60 * v780, v847 = v780 * v815, v848 = v780 * v818,
-            v849 = v564 * v816, v850 = v60 * v781, v851 = v781 * v815, v852 = v781 * v818,
-            v853 = v825 * v849, v854 = softehl_vsqrt(1.0 / v824), v855 = v774 * v818,
-            v856 = v776 * v818, v857 = v60 * v774 + v796, v858 = v60 * v776 + v795,
-            v859 = v797 + v774 * v815, v860 = v799 + v776 * v815, v861 = 0.5 - v789,
-            v862 = 0.5 + v789, v863 = 1.0 / v832, v864 = v43 * v861, v865 = v43 * v862,
-            v866 = d10 * v861 + d12 * v862, v867 = v864 * v853, v868 = v865 * v853,
-            v869 = 0.5 * v854, v870 = v863 * v863, v871 = 2.0 * v814 * v869 * v870,
-            v872 = 2.0 * v817 * v869 * v870, v873 = w[1] * v867, v874 = w[1] * v868,
-            v875 = v863 - v814 * v871, v876 = v814 * v863, v877 = v814 * v872, v878 = v817 * v863,
-            v879 = v863 - v817 * v872, v880 = v817 * v871, v881 = v878 * v853, v882 = v876 * v853,
-            v883 = 0.5 * (v57 * v878 - v36 * v876), v884 = 1.0 / (v65 * v876 + v41 * v878),
-            v885 = v820 * v876 + v821 * v878, v886 = v884 * (0.5 * v885), v887 = v884 * v884,
-            v888 = v887 * (0.5 * v876 * v885), v889 = v887 * (0.5 * v878 * v885),
-            v890 = v878 * v884,
-            v891 = v884 * (v820 * v875 - v821 * v880) - v887 * (v885 * (v65 * v875 - v41 * v880)),
-            v892 = v884 * (v821 * v879 - v820 * v877) - v887 * (v885 * (v41 * v879 - v65 * v877)),
-            v893 = v876 * v884, v894 = 0.5 * v893, v895 = 0.5 * v890, v896 = 0.5 - v886,
-            v897 = 0.5 + v886, v898 = v54 * v897 + (v51 * v896 - v809), v899 = w[1] * v896,
-            v900 = w[1] * v897, v901 = v31 * v897 + (v24 * v896 - v812),
-            v902 = v878 * v898 - v876 * v901, v903 = v880 * v898 + v875 * v901,
-            v904 = v879 * v898 + v877 * v901, v905 = a10 * v902, v906 = v866 - v905,
-            v907 = v785 * v892 + (v835 * v891 + (v836 * v893 + (v837 * v890 + (v888 - v894))));
-        const M v908 = softehl_eq(v906, v906);
-        const V v909 = v845 * v892 + (v833 * v891 + (v834 * v893 + v842 * v890)),
-            v910 = v876 * v837 + v878 * (v896 - v836) - v835 * v903 + v785 * v904 + v883 * v907,
-            v911 = v909 * v883 + (v876 * v842 - v878 * v834 - v833 * v903 + v845 * v904),
-            v912 = v838 * v891 + (v841 * v892 + (v889 + (v839 * v893 + (v840 * v890 - v895)))),
-            v913 = v876 * (v840 - v896) - v878 * v839 + v841 * v904 - v838 * v903 + v883 * v912,
-            v914 = v788 * v892 + (v850 * v891 + (v851 * v893 + (v852 * v890 - v895) - v889)),
-            v915 = v876 * (v852 - v897) - v878 * v851 - v850 * v903 + v788 * v904 + v883 * v914,
-            v916 = v846 * v891 + (v787 * v892 + (v847 * v893 + (v848 * v890 - v894 - v888))),
-            v917 = v876 * v848 + v878 * (v897 - v847) + v787 * v904 - v846 * v903 + v883 * v916,
-            v918 = v783 * v892 + (v857 * v891 + (v859 * v893 + v855 * v890)),
-            v919 = v918 * v883 + (v876 * v855 - v878 * v859 - v857 * v903 + v783 * v904),
-            v920 = v802 * v892 + (v826 * v891 + (v827 * v893 + v828 * v890)),
-            v921 = v920 * v883 + (v876 * v828 - v878 * v827 - v826 * v903 + v802 * v904),
-            v922 = v784 * v892 + (v858 * v891 + (v860 * v893 + v856 * v890)),
-            v923 = v922 * v883 + (v876 * v856 - v878 * v860 - v858 * v903 + v784 * v904),
-            v924 = v843 * v892 + (v829 * v891 + (v830 * v893 + v844 * v890)),
-            v925 = v786 * v892 + (v831 * v891 + (v822 * v893 + v823 * v890)),
-            v926 = v924 * v883 + (v876 * v844 - v878 * v830 - v829 * v903 + v843 * v904),
-            v927 = v925 * v883 + (v876 * v823 - v878 * v822 - v831 * v903 + v786 * v904);
-        V v928 = softehl_splat(0.0), v929 = softehl_splat(0.0), v930 = softehl_splat(0.0),
-            v931 = softehl_splat(0.0), v932 = softehl_splat(0.0), v933 = softehl_splat(0.0),
-            v934 = softehl_splat(0.0), v935 = softehl_splat(0.0), v936 = softehl_splat(0.0),
-            v937 = softehl_splat(0.0), v938 = softehl_splat(0.0), v939 = softehl_splat(0.0),
-            v940 = softehl_splat(0.0), v941 = softehl_splat(0.0), v942 = softehl_splat(0.0),
-            v943 = softehl_splat(0.0), v944 = softehl_splat(0.0), v945 = softehl_splat(0.0),
-            v946 = softehl_splat(0.0), v947 = softehl_splat(0.0), v948 = softehl_splat(0.0),
-            v949 = softehl_splat(0.0), v950 = softehl_splat(0.0), v951 = softehl_splat(0.0),
-            v952 = softehl_splat(0.0), v953 = softehl_splat(0.0), v954 = softehl_splat(0.0),
-            v955 = softehl_splat(0.0), v956 = softehl_splat(0.0), v957 = softehl_splat(0.0),
-            v958 = softehl_splat(0.0), v959 = softehl_splat(0.0), v960 = softehl_splat(0.0),
-            v961 = softehl_splat(0.0), v962 = softehl_splat(0.0), v963 = softehl_splat(0.0),
-            v964 = softehl_splat(0.0), v965 = softehl_splat(0.0), v966 = softehl_splat(0.0),
-            v967 = softehl_splat(0.0), v968 = softehl_splat(0.0), v969 = softehl_splat(0.0),
-            v970 = softehl_splat(0.0), v971 = softehl_splat(0.0), v972 = softehl_splat(0.0),
-            v973 = softehl_splat(0.0), v974 = softehl_splat(0.0), v975 = softehl_splat(0.0),
-            v976 = softehl_splat(0.0), v977 = softehl_splat(0.0), v978 = softehl_splat(0.0),
-            v979 = softehl_splat(0.0), v980 = softehl_splat(0.0), v981 = softehl_splat(0.0),
-            v982 = softehl_splat(0.0);
-        const M m983 = v908;
-        if (softehl_any(m983)) {
-            const M v984 = softehl_le(softehl_splat(0.0), v906);
-            V v985 = softehl_splat(0.0), v986 = softehl_splat(0.0), v987 = softehl_splat(0.0),
-                v988 = softehl_splat(0.0), v989 = softehl_splat(0.0), v990 = softehl_splat(0.0),
-                v991 = softehl_splat(0.0), v992 = softehl_splat(0.0), v993 = softehl_splat(0.0),
-                v994 = softehl_splat(0.0), v995 = softehl_splat(0.0), v996 = softehl_splat(0.0),
-                v997 = softehl_splat(0.0), v998 = softehl_splat(0.0), v999 = softehl_splat(0.0),
-                v1000 = softehl_splat(0.0), v1001 = softehl_splat(0.0), v1002 = softehl_splat(0.0),
-                v1003 = softehl_splat(0.0), v1004 = softehl_splat(0.0), v1005 = softehl_splat(0.0),
-                v1006 = softehl_splat(0.0), v1007 = softehl_splat(0.0), v1008 = softehl_splat(0.0),
-                v1009 = softehl_splat(0.0), v1010 = softehl_splat(0.0), v1011 = softehl_splat(0.0),
-                v1012 = softehl_splat(0.0), v1013 = softehl_splat(0.0), v1014 = softehl_splat(0.0),
-                v1015 = softehl_splat(0.0), v1016 = softehl_splat(0.0), v1017 = softehl_splat(0.0),
-                v1018 = softehl_splat(0.0), v1019 = softehl_splat(0.0), v1020 = softehl_splat(0.0),
-                v1021 = softehl_splat(0.0), v1022 = softehl_splat(0.0), v1023 = softehl_splat(0.0),
-                v1024 = softehl_splat(0.0), v1025 = softehl_splat(0.0), v1026 = softehl_splat(0.0),
-                v1027 = softehl_splat(0.0);
-            const M m1028 = v984 & m983;
-            if (softehl_any(m1028)) {
-                const V v1029 = a12 + v902, v1030 = v902 - a13, v1031 = v1029 * v1030;
-                const M v1032 = softehl_eq(v1031, v1031);
-                V v1033 = softehl_splat(0.0), v1034 = softehl_splat(0.0),
-                    v1035 = softehl_splat(0.0), v1036 = softehl_splat(0.0),
-                    v1037 = softehl_splat(0.0);
-                const M m1038 = v1032 & m1028;
-                if (softehl_any(m1038)) {
-                    const M v1039 = softehl_lt(v1031, softehl_splat(0.0));
-                    const V v1040 = softehl_blend(v1039, v906, softehl_splat(0.0)),
-                        v1041 = softehl_blend(v1039, v861, softehl_splat(0.0)),
-                        v1042 = softehl_blend(v1039, v862, softehl_splat(0.0)),
-                        v1043 = softehl_blend(v1039, v44, softehl_splat(0.0)),
-                        v1044 = softehl_blend(v1039, v46, softehl_splat(0.0));
-                    v1033 = softehl_blend(m1038, v1040, v1033);
-                    v1034 = softehl_blend(m1038, v1041, v1034);
-                    v1035 = softehl_blend(m1038, v1042, v1035);
-                    v1036 = softehl_blend(m1038, v1043, v1036);
-                    v1037 = softehl_blend(m1038, v1044, v1037);
+        const V v771 = w[0] * v551 + v556, v772 = w[0] * v552 + v557, v773 = w[0] * v543 + v550,
+            v774 = w[0] * v544 + v554, v775 = w[0] * v548 + v559, v776 = w[0] * v549 + v561,
+            v777 = w[0] * v541 + v546, v778 = w[0] * v542 + v547, v779 = w[0] * v553 + v558,
+            v780 = w[0] * v555 + v560, v781 = w[0] * v563 + v545, v782 = v34 * v773,
+            v783 = v34 * v775, v784 = v34 * v771, v785 = v34 * v777, v786 = v34 * v779,
+            v787 = v34 * v780, v788 = 0.5 * v781, v789 = 2.0 * v781, v790 = v19 * v781,
+            v791 = v22 * v781, v792 = (-1.0) + v781, v793 = 1.0 + v781, v794 = 0.5 + v781,
+            v795 = (-0.5) + v781, v796 = v788 * v792, v797 = v788 - 0.5, v798 = v788 * v793,
+            v799 = 0.5 * (v781 + v792), v800 = 0.5 * (v781 + v793), v801 = v34 * v774 + v795,
+            v802 = w[1] * v798, v803 = w[1] * v796, v804 = 1.0 - v781 * v781,
+            v805 = X2 * v794 + (X0 * v795 - v4 * v781), v806 = X3 * v794 + (X1 * v795 - v9 * v781),
+            v807 = w[1] * v804, v808 = v1 * v804 + (v12 * v796 + v13 * v798), v809 = v1 * v789,
+            v810 = v805 * v805 + v806 * v806, v811 = v2 * v804 + (v23 * v796 + v25 * v798),
+            v812 = v2 * v789, v813 = v13 * v794 + v12 * v795 - v809,
+            v814 = v12 * v799 + v13 * v800 - v809, v815 = softehl_vsqrt(v810),
+            v816 = v25 * v794 + v23 * v795 - v812, v817 = v23 * v799 + v25 * v800 - v812,
+            v818 = (-1.0) + 6.283185307179586 * (X5 * v804 + (v790 * v792 + v791 * v793)),
+            v819 = v808 - v30, v820 = v811 - v35, v821 = v804 + v777 * v814, v822 = v777 * v817,
+            v823 = v813 * v813 + v816 * v816, v824 = 1.0 + a14 * v818, v825 = v24 * v774,
+            v826 = v774 * v814, v827 = v796 + v774 * v817, v828 = v24 * v776, v829 = v776 * v814,
+            v830 = v24 * v777 - v789, v831 = softehl_vsqrt(v823), v832 = v24 * v778,
+            v833 = v778 * v814, v834 = v24 * v771, v835 = v771 * v814, v836 = v771 * v817,
+            v837 = v24 * v772, v838 = v772 * v814, v839 = v772 * v817, v840 = v34 * v772,
+            v841 = v804 + v778 * v817, v842 = v34 * v776 + v794, v843 = v798 + v776 * v817,
+            v844 = v34 * v778 - v789, v845 = v24 * v779, v846 = v779 * v814, v847 = v779 * v817,
+            v848 = v563 * v815, v849 = v24 * v780, v850 = v780 * v814, v851 = v780 * v817,
+            v852 = v824 * v848, v853 = softehl_vsqrt(1.0 / v823), v854 = v773 * v817,
+            v855 = v775 * v817, v856 = v24 * v773 + v795, v857 = v24 * v775 + v794,
+            v858 = v796 + v773 * v814, v859 = v798 + v775 * v814, v860 = 0.5 - v788,
+            v861 = 0.5 + v788, v862 = 1.0 / v831, v863 = v39 * v860, v864 = v39 * v861,
+            v865 = d10 * v860 + d12 * v861, v866 = v863 * v852, v867 = v864 * v852,
+            v868 = 0.5 * v853, v869 = v862 * v862, v870 = 2.0 * v813 * v868 * v869,
+            v871 = 2.0 * v816 * v868 * v869, v872 = w[1] * v866, v873 = w[1] * v867,
+            v874 = v862 - v813 * v870, v875 = v813 * v862, v876 = v813 * v871, v877 = v816 * v862,
+            v878 = v862 - v816 * v871, v879 = v816 * v870, v880 = v877 * v852, v881 = v875 * v852,
+            v882 = 0.5 * (v60 * v877 - v63 * v875), v883 = 1.0 / (v36 * v875 + v41 * v877),
+            v884 = v819 * v875 + v820 * v877, v885 = v883 * (0.5 * v884), v886 = v883 * v883,
+            v887 = v886 * (0.5 * v875 * v884), v888 = v886 * (0.5 * v877 * v884),
+            v889 = v877 * v883,
+            v890 = v883 * (v819 * v874 - v820 * v879) - v886 * (v884 * (v36 * v874 - v41 * v879)),
+            v891 = v883 * (v820 * v878 - v819 * v876) - v886 * (v884 * (v41 * v878 - v36 * v876)),
+            v892 = v875 * v883, v893 = 0.5 * v892, v894 = 0.5 * v889, v895 = 0.5 - v885,
+            v896 = 0.5 + v885, v897 = v26 * v896 + (v15 * v895 - v808), v898 = w[1] * v895,
+            v899 = w[1] * v896, v900 = v33 * v896 + (v32 * v895 - v811),
+            v901 = v877 * v897 - v875 * v900, v902 = v879 * v897 + v874 * v900,
+            v903 = v878 * v897 + v876 * v900, v904 = a10 * v901, v905 = v865 - v904,
+            v906 = v784 * v891 + (v834 * v890 + (v835 * v892 + (v836 * v889 + (v887 - v893))));
+        const M v907 = softehl_eq(v905, v905);
+        const V v908 = v844 * v891 + (v832 * v890 + (v833 * v892 + v841 * v889)),
+            v909 = v875 * v836 + v877 * (v895 - v835) - v834 * v902 + v784 * v903 + v882 * v906,
+            v910 = v908 * v882 + (v875 * v841 - v877 * v833 - v832 * v902 + v844 * v903),
+            v911 = v837 * v890 + (v840 * v891 + (v888 + (v838 * v892 + (v839 * v889 - v894)))),
+            v912 = v875 * (v839 - v895) - v877 * v838 + v840 * v903 - v837 * v902 + v882 * v911,
+            v913 = v787 * v891 + (v849 * v890 + (v850 * v892 + (v851 * v889 - v894) - v888)),
+            v914 = v875 * (v851 - v896) - v877 * v850 - v849 * v902 + v787 * v903 + v882 * v913,
+            v915 = v845 * v890 + (v786 * v891 + (v846 * v892 + (v847 * v889 - v893 - v887))),
+            v916 = v875 * v847 + v877 * (v896 - v846) + v786 * v903 - v845 * v902 + v882 * v915,
+            v917 = v782 * v891 + (v856 * v890 + (v858 * v892 + v854 * v889)),
+            v918 = v917 * v882 + (v875 * v854 - v877 * v858 - v856 * v902 + v782 * v903),
+            v919 = v801 * v891 + (v825 * v890 + (v826 * v892 + v827 * v889)),
+            v920 = v919 * v882 + (v875 * v827 - v877 * v826 - v825 * v902 + v801 * v903),
+            v921 = v783 * v891 + (v857 * v890 + (v859 * v892 + v855 * v889)),
+            v922 = v921 * v882 + (v875 * v855 - v877 * v859 - v857 * v902 + v783 * v903),
+            v923 = v842 * v891 + (v828 * v890 + (v829 * v892 + v843 * v889)),
+            v924 = v785 * v891 + (v830 * v890 + (v821 * v892 + v822 * v889)),
+            v925 = v923 * v882 + (v875 * v843 - v877 * v829 - v828 * v902 + v842 * v903),
+            v926 = v924 * v882 + (v875 * v822 - v877 * v821 - v830 * v902 + v785 * v903);
+        V v927 = softehl_splat(0.0), v928 = softehl_splat(0.0), v929 = softehl_splat(0.0),
+            v930 = softehl_splat(0.0), v931 = softehl_splat(0.0), v932 = softehl_splat(0.0),
+            v933 = softehl_splat(0.0), v934 = softehl_splat(0.0), v935 = softehl_splat(0.0),
+            v936 = softehl_splat(0.0), v937 = softehl_splat(0.0), v938 = softehl_splat(0.0),
+            v939 = softehl_splat(0.0), v940 = softehl_splat(0.0), v941 = softehl_splat(0.0),
+            v942 = softehl_splat(0.0), v943 = softehl_splat(0.0), v944 = softehl_splat(0.0),
+            v945 = softehl_splat(0.0), v946 = softehl_splat(0.0), v947 = softehl_splat(0.0),
+            v948 = softehl_splat(0.0), v949 = softehl_splat(0.0), v950 = softehl_splat(0.0),
+            v951 = softehl_splat(0.0), v952 = softehl_splat(0.0), v953 = softehl_splat(0.0),
+            v954 = softehl_splat(0.0), v955 = softehl_splat(0.0), v956 = softehl_splat(0.0),
+            v957 = softehl_splat(0.0), v958 = softehl_splat(0.0), v959 = softehl_splat(0.0),
+            v960 = softehl_splat(0.0), v961 = softehl_splat(0.0), v962 = softehl_splat(0.0),
+            v963 = softehl_splat(0.0), v964 = softehl_splat(0.0), v965 = softehl_splat(0.0),
+            v966 = softehl_splat(0.0), v967 = softehl_splat(0.0), v968 = softehl_splat(0.0),
+            v969 = softehl_splat(0.0), v970 = softehl_splat(0.0), v971 = softehl_splat(0.0),
+            v972 = softehl_splat(0.0), v973 = softehl_splat(0.0), v974 = softehl_splat(0.0),
+            v975 = softehl_splat(0.0), v976 = softehl_splat(0.0), v977 = softehl_splat(0.0),
+            v978 = softehl_splat(0.0), v979 = softehl_splat(0.0), v980 = softehl_splat(0.0),
+            v981 = softehl_splat(0.0);
+        const M m982 = v907;
+        if (softehl_any(m982)) {
+            const M v983 = softehl_le(softehl_splat(0.0), v905);
+            V v984 = softehl_splat(0.0), v985 = softehl_splat(0.0), v986 = softehl_splat(0.0),
+                v987 = softehl_splat(0.0), v988 = softehl_splat(0.0), v989 = softehl_splat(0.0),
+                v990 = softehl_splat(0.0), v991 = softehl_splat(0.0), v992 = softehl_splat(0.0),
+                v993 = softehl_splat(0.0), v994 = softehl_splat(0.0), v995 = softehl_splat(0.0),
+                v996 = softehl_splat(0.0), v997 = softehl_splat(0.0), v998 = softehl_splat(0.0),
+                v999 = softehl_splat(0.0), v1000 = softehl_splat(0.0), v1001 = softehl_splat(0.0),
+                v1002 = softehl_splat(0.0), v1003 = softehl_splat(0.0), v1004 = softehl_splat(0.0),
+                v1005 = softehl_splat(0.0), v1006 = softehl_splat(0.0), v1007 = softehl_splat(0.0),
+                v1008 = softehl_splat(0.0), v1009 = softehl_splat(0.0), v1010 = softehl_splat(0.0),
+                v1011 = softehl_splat(0.0), v1012 = softehl_splat(0.0), v1013 = softehl_splat(0.0),
+                v1014 = softehl_splat(0.0), v1015 = softehl_splat(0.0), v1016 = softehl_splat(0.0),
+                v1017 = softehl_splat(0.0), v1018 = softehl_splat(0.0), v1019 = softehl_splat(0.0),
+                v1020 = softehl_splat(0.0), v1021 = softehl_splat(0.0), v1022 = softehl_splat(0.0),
+                v1023 = softehl_splat(0.0), v1024 = softehl_splat(0.0), v1025 = softehl_splat(0.0),
+                v1026 = softehl_splat(0.0);
+            const M m1027 = v983 & m982;
+            if (softehl_any(m1027)) {
+                const V v1028 = a12 + v901, v1029 = v901 - a13, v1030 = v1028 * v1029;
+                const M v1031 = softehl_eq(v1030, v1030);
+                V v1032 = softehl_splat(0.0), v1033 = softehl_splat(0.0),
+                    v1034 = softehl_splat(0.0), v1035 = softehl_splat(0.0),
+                    v1036 = softehl_splat(0.0);
+                const M m1037 = v1031 & m1027;
+                if (softehl_any(m1037)) {
+                    const M v1038 = softehl_lt(v1030, softehl_splat(0.0));
+                    const V v1039 = softehl_blend(v1038, v905, softehl_splat(0.0)),
+                        v1040 = softehl_blend(v1038, v860, softehl_splat(0.0)),
+                        v1041 = softehl_blend(v1038, v861, softehl_splat(0.0)),
+                        v1042 = softehl_blend(v1038, v40, softehl_splat(0.0)),
+                        v1043 = softehl_blend(v1038, v58, softehl_splat(0.0));
+                    v1032 = softehl_blend(m1037, v1039, v1032);
+                    v1033 = softehl_blend(m1037, v1040, v1033);
+                    v1034 = softehl_blend(m1037, v1041, v1034);
+                    v1035 = softehl_blend(m1037, v1042, v1035);
+                    v1036 = softehl_blend(m1037, v1043, v1036);
                 }
-                const M m1045 = ~v1032 & m1028;
-                if (softehl_any(m1045)) {
-                    const V v1046 = v1031 * v1031, v1047 = v1031 * v1046,
-                        v1048 = 3.0 * v1046 * (v1029 + v1030);
-                    v1033 = softehl_blend(m1045, v1047, v1033);
-                    v1036 = softehl_blend(m1045, v1048, v1036);
+                const M m1044 = ~v1031 & m1027;
+                if (softehl_any(m1044)) {
+                    const V v1045 = v1030 * v1030, v1046 = v1030 * v1045,
+                        v1047 = 3.0 * v1045 * (v1028 + v1029);
+                    v1032 = softehl_blend(m1044, v1046, v1032);
+                    v1035 = softehl_blend(m1044, v1047, v1035);
                 }
-                const V v1049 = a11 * v1033; const M v1050 = softehl_eq(v1049, v1049);
-                const V v1051 = v9 * v897 + (v8 * v896 - v5 * v797 - v6 * v799 - v4 * v805),
-                    v1052 = v25 * v897 + (v21 * v896 - v12 * v797 - v14 * v799 - v18 * v805),
-                    v1053 = d11 * v861 + d13 * v862 + a10 * (v876 * v1051 + v878 * v1052);
-                const M v1054 = softehl_eq(v1053, v1053), v1055 = v1050 & v1054;
-                V v1056 = softehl_splat(0.0), v1057 = softehl_splat(0.0),
-                    v1058 = softehl_splat(0.0), v1059 = softehl_splat(0.0),
-                    v1060 = softehl_splat(0.0), v1061 = softehl_splat(0.0);
-                const M m1062 = v1055 & m1028;
-                if (softehl_any(m1062)) {
-                    const M v1063 = softehl_lt(v1049, v1053);
-                    V v1064 = v1049, v1065 = softehl_splat(0.0), v1066 = softehl_splat(0.0),
-                        v1067 = a11, v1068 = softehl_splat(0.0), v1069 = softehl_splat(0.0);
-                    const M m1070 = ~v1063 & m1062;
-                    if (softehl_any(m1070)) {
-                        V v1071 = softehl_splat(0.0), v1072 = softehl_splat(0.0),
-                            v1073 = softehl_splat(0.0), v1074 = softehl_splat(0.0),
-                            v1075 = softehl_splat(0.0), v1076 = softehl_splat(0.0);
-                        const M m1077 = v1050 & m1070;
-                        if (softehl_any(m1077)) {
-                            const M v1078 = softehl_lt(v1049, -v1053);
-                            V v1079 = v1053, v1080 = v861, v1081 = v862, v1082 = softehl_splat(0.0),
-                                v1083 = a10, v1084 = v48;
-                            const M m1085 = v1078 & m1077;
-                            if (softehl_any(m1085)) {
-                                const V v1086 = -v1049; v1079 = softehl_blend(m1085, v1086, v1079);
-                                v1080 = softehl_blend(m1085, softehl_splat(0.0), v1080);
-                                v1081 = softehl_blend(m1085, softehl_splat(0.0), v1081);
-                                v1082 = softehl_blend(m1085, v1, v1082);
-                                v1083 = softehl_blend(m1085, softehl_splat(0.0), v1083);
-                                v1084 = softehl_blend(m1085, softehl_splat(0.0), v1084);
+                const V v1048 = a11 * v1032; const M v1049 = softehl_eq(v1048, v1048);
+                const V v1050 = v17 * v896 + (v10 * v895 - v5 * v796 - v7 * v798 - v3 * v804),
+                    v1051 = v31 * v896 + (v28 * v895 - v18 * v796 - v20 * v798 - v11 * v804),
+                    v1052 = d11 * v860 + d13 * v861 + a10 * (v875 * v1050 + v877 * v1051);
+                const M v1053 = softehl_eq(v1052, v1052), v1054 = v1049 & v1053;
+                V v1055 = softehl_splat(0.0), v1056 = softehl_splat(0.0),
+                    v1057 = softehl_splat(0.0), v1058 = softehl_splat(0.0),
+                    v1059 = softehl_splat(0.0), v1060 = softehl_splat(0.0);
+                const M m1061 = v1054 & m1027;
+                if (softehl_any(m1061)) {
+                    const M v1062 = softehl_lt(v1048, v1052);
+                    V v1063 = v1048, v1064 = softehl_splat(0.0), v1065 = softehl_splat(0.0),
+                        v1066 = a11, v1067 = softehl_splat(0.0), v1068 = softehl_splat(0.0);
+                    const M m1069 = ~v1062 & m1061;
+                    if (softehl_any(m1069)) {
+                        const V v1070 = -v1052;
+                        const M v1071 = softehl_eq(v1070, v1070), v1072 = v1049 & v1071;
+                        V v1073 = softehl_splat(0.0), v1074 = softehl_splat(0.0),
+                            v1075 = softehl_splat(0.0), v1076 = softehl_splat(0.0),
+                            v1077 = softehl_splat(0.0), v1078 = softehl_splat(0.0);
+                        const M m1079 = v1072 & m1069;
+                        if (softehl_any(m1079)) {
+                            const M v1080 = softehl_lt(v1048, v1070);
+                            V v1081 = softehl_splat(0.0), v1082 = softehl_splat(0.0),
+                                v1083 = softehl_splat(0.0), v1084 = softehl_splat(0.0), v1085 = v42,
+                                v1086 = v43;
+                            const M m1087 = v1080 & m1079;
+                            if (softehl_any(m1087)) {
+                                const V v1088 = -v1048; v1081 = softehl_blend(m1087, v1088, v1081);
+                                v1084 = softehl_blend(m1087, v38, v1084);
+                                v1085 = softehl_blend(m1087, softehl_splat(0.0), v1085);
+                                v1086 = softehl_blend(m1087, softehl_splat(0.0), v1086);
                             }
-                            v1071 = softehl_blend(m1077, v1079, v1071);
-                            v1072 = softehl_blend(m1077, v1080, v1072);
-                            v1073 = softehl_blend(m1077, v1081, v1073);
-                            v1074 = softehl_blend(m1077, v1082, v1074);
-                            v1075 = softehl_blend(m1077, v1083, v1075);
-                            v1076 = softehl_blend(m1077, v1084, v1076);
+                            const M m1089 = ~v1080 & m1079;
+                            if (softehl_any(m1089)) {
+                                const V v1090 = softehl_blend(v37, v1052, softehl_splat(0.0)),
+                                    v1091 = softehl_blend(v37, v860, softehl_splat(0.0)),
+                                    v1092 = softehl_blend(v37, v861, softehl_splat(0.0));
+                                v1081 = softehl_blend(m1089, v1090, v1081);
+                                v1082 = softehl_blend(m1089, v1091, v1082);
+                                v1083 = softehl_blend(m1089, v1092, v1083);
+                            }
+                            v1073 = softehl_blend(m1079, v1081, v1073);
+                            v1074 = softehl_blend(m1079, v1082, v1074);
+                            v1075 = softehl_blend(m1079, v1083, v1075);
+                            v1076 = softehl_blend(m1079, v1084, v1076);
+                            v1077 = softehl_blend(m1079, v1085, v1077);
+                            v1078 = softehl_blend(m1079, v1086, v1078);
                         }
-                        const M m1087 = ~v1050 & m1070;
-                        if (softehl_any(m1087)) {
-                            const V v1088 = v1053 + v1049, v1089 = v1088 * v1088,
-                                v1090 = v1088 * v1089, v1091 = 3.0 * v1089, v1092 = v48 * v1091,
-                                v1093 = a11 * v1091, v1094 = a10 * v1091, v1095 = v861 * v1091,
-                                v1096 = v862 * v1091;
-                            v1071 = softehl_blend(m1087, v1090, v1071);
-                            v1072 = softehl_blend(m1087, v1095, v1072);
-                            v1073 = softehl_blend(m1087, v1096, v1073);
-                            v1074 = softehl_blend(m1087, v1093, v1074);
-                            v1075 = softehl_blend(m1087, v1094, v1075);
-                            v1076 = softehl_blend(m1087, v1092, v1076);
+                        const M m1093 = ~v1072 & m1069;
+                        if (softehl_any(m1093)) {
+                            const V v1094 = v1052 + v1048, v1095 = v1094 * v1094,
+                                v1096 = v1094 * v1095, v1097 = 3.0 * v1095, v1098 = v6 * v1097,
+                                v1099 = a11 * v1097, v1100 = a10 * v1097, v1101 = v860 * v1097,
+                                v1102 = v861 * v1097;
+                            v1073 = softehl_blend(m1093, v1096, v1073);
+                            v1074 = softehl_blend(m1093, v1101, v1074);
+                            v1075 = softehl_blend(m1093, v1102, v1075);
+                            v1076 = softehl_blend(m1093, v1099, v1076);
+                            v1077 = softehl_blend(m1093, v1100, v1077);
+                            v1078 = softehl_blend(m1093, v1098, v1078);
                         }
-                        v1064 = softehl_blend(m1070, v1071, v1064);
-                        v1065 = softehl_blend(m1070, v1072, v1065);
-                        v1066 = softehl_blend(m1070, v1073, v1066);
-                        v1067 = softehl_blend(m1070, v1074, v1067);
-                        v1068 = softehl_blend(m1070, v1075, v1068);
-                        v1069 = softehl_blend(m1070, v1076, v1069);
+                        v1063 = softehl_blend(m1069, v1073, v1063);
+                        v1064 = softehl_blend(m1069, v1074, v1064);
+                        v1065 = softehl_blend(m1069, v1075, v1065);
+                        v1066 = softehl_blend(m1069, v1076, v1066);
+                        v1067 = softehl_blend(m1069, v1077, v1067);
+                        v1068 = softehl_blend(m1069, v1078, v1068);
                     }
-                    v1056 = softehl_blend(m1062, v1064, v1056);
-                    v1057 = softehl_blend(m1062, v1065, v1057);
-                    v1058 = softehl_blend(m1062, v1066, v1058);
-                    v1059 = softehl_blend(m1062, v1067, v1059);
-                    v1060 = softehl_blend(m1062, v1068, v1060);
-                    v1061 = softehl_blend(m1062, v1069, v1061);
+                    v1055 = softehl_blend(m1061, v1063, v1055);
+                    v1056 = softehl_blend(m1061, v1064, v1056);
+                    v1057 = softehl_blend(m1061, v1065, v1057);
+                    v1058 = softehl_blend(m1061, v1066, v1058);
+                    v1059 = softehl_blend(m1061, v1067, v1059);
+                    v1060 = softehl_blend(m1061, v1068, v1060);
                 }
-                const M m1097 = ~v1055 & m1028;
-                if (softehl_any(m1097)) {
-                    const V v1098 = v1049 - v1053, v1099 = v1098 * v1098, v1100 = v1098 * v1099,
-                        v1101 = 3.0 * v1099, v1102 = v47 * v1101, v1103 = a11 * v1101,
-                        v1104 = -(a10 * v1101), v1105 = v798 * v1101, v1106 = -(v862 * v1101);
-                    v1056 = softehl_blend(m1097, v1100, v1056);
-                    v1057 = softehl_blend(m1097, v1105, v1057);
-                    v1058 = softehl_blend(m1097, v1106, v1058);
-                    v1059 = softehl_blend(m1097, v1103, v1059);
-                    v1060 = softehl_blend(m1097, v1104, v1060);
-                    v1061 = softehl_blend(m1097, v1102, v1061);
+                const M m1103 = ~v1054 & m1027;
+                if (softehl_any(m1103)) {
+                    const V v1104 = v1048 - v1052, v1105 = v1104 * v1104, v1106 = v1104 * v1105,
+                        v1107 = 3.0 * v1105, v1108 = v48 * v1107, v1109 = a11 * v1107,
+                        v1110 = -(a10 * v1107), v1111 = v797 * v1107, v1112 = -(v861 * v1107);
+                    v1055 = softehl_blend(m1103, v1106, v1055);
+                    v1056 = softehl_blend(m1103, v1111, v1056);
+                    v1057 = softehl_blend(m1103, v1112, v1057);
+                    v1058 = softehl_blend(m1103, v1109, v1058);
+                    v1059 = softehl_blend(m1103, v1110, v1059);
+                    v1060 = softehl_blend(m1103, v1108, v1060);
                 }
-                const V v1107 = v1034 * v1059, v1108 = v1035 * v1059,
-                    v1109 = v875 * v1051 - v880 * v1052, v1110 = v879 * v1052 - v877 * v1051,
-                    v1111 = (v4 * v790 - v5 * v800 - v6 * v801) * v876 + (v18 * v790 - v12 * v800 - v14 * v801) * v878,
-                    v1112 = 0.5 * (v11 * v876 + v30 * v878),
-                    v1113 = v1060 * (v918 * v1112 + (v774 * v1111 + (v857 * v1109 + v783 * v1110))),
-                    v1114 = v1060 * (v907 * v1112 + (v772 * v1111 + (v835 * v1109 + v785 * v1110))),
-                    v1115 = v1060 * (v920 * v1112 + (v775 * v1111 + (v826 * v1109 + v802 * v1110))),
-                    v1116 = v1060 * (v781 * v1111 + (v914 * v1112 + (v850 * v1109 + v788 * v1110))),
-                    v1117 = v1060 * (v924 * v1112 + (v777 * v1111 + (v829 * v1109 + v843 * v1110))),
-                    v1118 = v1059 * (v774 * v1037 + v1036 * v919) + v1113,
-                    v1119 = v1059 * (v772 * v1037 + v1036 * v910) + v1114,
-                    v1120 = v1059 * (v775 * v1037 + v1036 * v921) + v1115,
-                    v1121 = v1059 * (v781 * v1037 + v1036 * v915) + v1116,
-                    v1122 = v1059 * (v777 * v1037 + v1036 * v926) + v1117,
-                    v1123 = v1060 * (v912 * v1112 + (v773 * v1111 + (v838 * v1109 + v841 * v1110))),
-                    v1124 = v1059 * (v773 * v1037 + v1036 * v913) + v1123,
-                    v1125 = v1060 * (v776 * v1111 + (v922 * v1112 + (v858 * v1109 + v784 * v1110))),
-                    v1126 = v1060 * (v778 * v1111 + (v925 * v1112 + (v831 * v1109 + v786 * v1110))),
-                    v1127 = v1060 * (v779 * v1111 + (v909 * v1112 + (v833 * v1109 + v845 * v1110))),
-                    v1128 = v1060 * (v780 * v1111 + (v916 * v1112 + (v846 * v1109 + v787 * v1110))),
-                    v1129 = v1059 * (v776 * v1037 + v1036 * v923) + v1125,
-                    v1130 = v1059 * (v778 * v1037 + v1036 * v927) + v1126,
-                    v1131 = v1059 * (v779 * v1037 + v1036 * v911) + v1127,
-                    v1132 = v1059 * (v780 * v1037 + v1036 * v917) + v1128, v1133 = v1057 * v882,
-                    v1134 = v1058 * v882, v1135 = v1057 * v881, v1136 = v1058 * v881,
-                    v1137 = v1057 * v873, v1138 = v1058 * v873, v1139 = v1057 * v874,
-                    v1140 = v1058 * v874, v1141 = v804 * v1133, v1142 = v804 * v1134,
-                    v1143 = v804 * v1135, v1144 = v804 * v1136, v1145 = v803 * v1133,
-                    v1146 = v803 * v1134, v1147 = v803 * v1135, v1148 = v803 * v1136,
-                    v1149 = v808 * v1133, v1150 = v808 * v1134, v1151 = v808 * v1135,
-                    v1152 = v808 * v1136, v1153 = -(v899 * v1133), v1154 = -(v899 * v1134),
-                    v1155 = -(v899 * v1135), v1156 = -(v899 * v1136), v1157 = -(v900 * v1133),
-                    v1158 = -(v900 * v1134), v1159 = -(v900 * v1135), v1160 = -(v900 * v1136);
-                v985 = softehl_blend(m1028, v1033, v985); v986 = softehl_blend(m1028, v1034, v986);
-                v987 = softehl_blend(m1028, v1035, v987); v988 = softehl_blend(m1028, v1056, v988);
-                v989 = softehl_blend(m1028, v1141, v989); v990 = softehl_blend(m1028, v1142, v990);
-                v991 = softehl_blend(m1028, v1143, v991); v992 = softehl_blend(m1028, v1144, v992);
-                v993 = softehl_blend(m1028, v1145, v993); v994 = softehl_blend(m1028, v1146, v994);
-                v995 = softehl_blend(m1028, v1147, v995); v996 = softehl_blend(m1028, v1148, v996);
-                v997 = softehl_blend(m1028, v1149, v997); v998 = softehl_blend(m1028, v1150, v998);
-                v999 = softehl_blend(m1028, v1151, v999);
-                v1000 = softehl_blend(m1028, v1152, v1000);
-                v1001 = softehl_blend(m1028, v1153, v1001);
-                v1002 = softehl_blend(m1028, v1154, v1002);
-                v1003 = softehl_blend(m1028, v1155, v1003);
-                v1004 = softehl_blend(m1028, v1156, v1004);
-                v1005 = softehl_blend(m1028, v1157, v1005);
-                v1006 = softehl_blend(m1028, v1158, v1006);
-                v1007 = softehl_blend(m1028, v1159, v1007);
-                v1008 = softehl_blend(m1028, v1160, v1008);
-                v1009 = softehl_blend(m1028, v1137, v1009);
-                v1010 = softehl_blend(m1028, v1138, v1010);
-                v1011 = softehl_blend(m1028, v1139, v1011);
-                v1012 = softehl_blend(m1028, v1140, v1012);
-                v1013 = softehl_blend(m1028, v1107, v1013);
-                v1014 = softehl_blend(m1028, v1108, v1014);
-                v1015 = softehl_blend(m1028, v1036, v1015);
-                v1016 = softehl_blend(m1028, v1037, v1016);
-                v1017 = softehl_blend(m1028, v1118, v1017);
-                v1018 = softehl_blend(m1028, v1061, v1018);
-                v1019 = softehl_blend(m1028, v1120, v1019);
-                v1020 = softehl_blend(m1028, v1129, v1020);
-                v1021 = softehl_blend(m1028, v1122, v1021);
-                v1022 = softehl_blend(m1028, v1130, v1022);
-                v1023 = softehl_blend(m1028, v1131, v1023);
-                v1024 = softehl_blend(m1028, v1119, v1024);
-                v1025 = softehl_blend(m1028, v1124, v1025);
-                v1026 = softehl_blend(m1028, v1132, v1026);
-                v1027 = softehl_blend(m1028, v1121, v1027);
+                const V v1113 = v1033 * v1058, v1114 = v1034 * v1058,
+                    v1115 = v874 * v1050 - v879 * v1051, v1116 = v878 * v1051 - v876 * v1050,
+                    v1117 = (v3 * v789 - v5 * v799 - v7 * v800) * v875 + (v11 * v789 - v18 * v799 - v20 * v800) * v877,
+                    v1118 = 0.5 * (v46 * v875 + v47 * v877),
+                    v1119 = v1059 * (v917 * v1118 + (v773 * v1117 + (v856 * v1115 + v782 * v1116))),
+                    v1120 = v1059 * (v906 * v1118 + (v771 * v1117 + (v834 * v1115 + v784 * v1116))),
+                    v1121 = v1059 * (v919 * v1118 + (v774 * v1117 + (v825 * v1115 + v801 * v1116))),
+                    v1122 = v1059 * (v780 * v1117 + (v913 * v1118 + (v849 * v1115 + v787 * v1116))),
+                    v1123 = v1059 * (v923 * v1118 + (v776 * v1117 + (v828 * v1115 + v842 * v1116))),
+                    v1124 = v1058 * (v773 * v1036 + v1035 * v918) + v1119,
+                    v1125 = v1058 * (v771 * v1036 + v1035 * v909) + v1120,
+                    v1126 = v1058 * (v774 * v1036 + v1035 * v920) + v1121,
+                    v1127 = v1058 * (v780 * v1036 + v1035 * v914) + v1122,
+                    v1128 = v1058 * (v776 * v1036 + v1035 * v925) + v1123,
+                    v1129 = v1059 * (v911 * v1118 + (v772 * v1117 + (v837 * v1115 + v840 * v1116))),
+                    v1130 = v1058 * (v772 * v1036 + v1035 * v912) + v1129,
+                    v1131 = v1059 * (v775 * v1117 + (v921 * v1118 + (v857 * v1115 + v783 * v1116))),
+                    v1132 = v1059 * (v777 * v1117 + (v924 * v1118 + (v830 * v1115 + v785 * v1116))),
+                    v1133 = v1059 * (v778 * v1117 + (v908 * v1118 + (v832 * v1115 + v844 * v1116))),
+                    v1134 = v1059 * (v779 * v1117 + (v915 * v1118 + (v845 * v1115 + v786 * v1116))),
+                    v1135 = v1058 * (v775 * v1036 + v1035 * v922) + v1131,
+                    v1136 = v1058 * (v777 * v1036 + v1035 * v926) + v1132,
+                    v1137 = v1058 * (v778 * v1036 + v1035 * v910) + v1133,
+                    v1138 = v1058 * (v779 * v1036 + v1035 * v916) + v1134, v1139 = v1056 * v881,
+                    v1140 = v1057 * v881, v1141 = v1056 * v880, v1142 = v1057 * v880,
+                    v1143 = v1056 * v872, v1144 = v1057 * v872, v1145 = v1056 * v873,
+                    v1146 = v1057 * v873, v1147 = v803 * v1139, v1148 = v803 * v1140,
+                    v1149 = v803 * v1141, v1150 = v803 * v1142, v1151 = v802 * v1139,
+                    v1152 = v802 * v1140, v1153 = v802 * v1141, v1154 = v802 * v1142,
+                    v1155 = v807 * v1139, v1156 = v807 * v1140, v1157 = v807 * v1141,
+                    v1158 = v807 * v1142, v1159 = -(v898 * v1139), v1160 = -(v898 * v1140),
+                    v1161 = -(v898 * v1141), v1162 = -(v898 * v1142), v1163 = -(v899 * v1139),
+                    v1164 = -(v899 * v1140), v1165 = -(v899 * v1141), v1166 = -(v899 * v1142);
+                v984 = softehl_blend(m1027, v1032, v984); v985 = softehl_blend(m1027, v1033, v985);
+                v986 = softehl_blend(m1027, v1034, v986); v987 = softehl_blend(m1027, v1055, v987);
+                v988 = softehl_blend(m1027, v1147, v988); v989 = softehl_blend(m1027, v1148, v989);
+                v990 = softehl_blend(m1027, v1149, v990); v991 = softehl_blend(m1027, v1150, v991);
+                v992 = softehl_blend(m1027, v1151, v992); v993 = softehl_blend(m1027, v1152, v993);
+                v994 = softehl_blend(m1027, v1153, v994); v995 = softehl_blend(m1027, v1154, v995);
+                v996 = softehl_blend(m1027, v1155, v996); v997 = softehl_blend(m1027, v1156, v997);
+                v998 = softehl_blend(m1027, v1157, v998); v999 = softehl_blend(m1027, v1158, v999);
+                v1000 = softehl_blend(m1027, v1159, v1000);
+                v1001 = softehl_blend(m1027, v1160, v1001);
+                v1002 = softehl_blend(m1027, v1161, v1002);
+                v1003 = softehl_blend(m1027, v1162, v1003);
+                v1004 = softehl_blend(m1027, v1163, v1004);
+                v1005 = softehl_blend(m1027, v1164, v1005);
+                v1006 = softehl_blend(m1027, v1165, v1006);
+                v1007 = softehl_blend(m1027, v1166, v1007);
+                v1008 = softehl_blend(m1027, v1143, v1008);
+                v1009 = softehl_blend(m1027, v1144, v1009);
+                v1010 = softehl_blend(m1027, v1145, v1010);
+                v1011 = softehl_blend(m1027, v1146, v1011);
+                v1012 = softehl_blend(m1027, v1113, v1012);
+                v1013 = softehl_blend(m1027, v1114, v1013);
+                v1014 = softehl_blend(m1027, v1035, v1014);
+                v1015 = softehl_blend(m1027, v1036, v1015);
+                v1016 = softehl_blend(m1027, v1124, v1016);
+                v1017 = softehl_blend(m1027, v1060, v1017);
+                v1018 = softehl_blend(m1027, v1126, v1018);
+                v1019 = softehl_blend(m1027, v1135, v1019);
+                v1020 = softehl_blend(m1027, v1128, v1020);
+                v1021 = softehl_blend(m1027, v1136, v1021);
+                v1022 = softehl_blend(m1027, v1137, v1022);
+                v1023 = softehl_blend(m1027, v1125, v1023);
+                v1024 = softehl_blend(m1027, v1130, v1024);
+                v1025 = softehl_blend(m1027, v1138, v1025);
+                v1026 = softehl_blend(m1027, v1127, v1026);
             }
-            v928 = softehl_blend(m983, v985, v928); v929 = softehl_blend(m983, v986, v929);
-            v930 = softehl_blend(m983, v987, v930); v931 = softehl_blend(m983, v988, v931);
-            v932 = softehl_blend(m983, v989, v932); v933 = softehl_blend(m983, v990, v933);
-            v934 = softehl_blend(m983, v991, v934); v935 = softehl_blend(m983, v992, v935);
-            v936 = softehl_blend(m983, v993, v936); v937 = softehl_blend(m983, v994, v937);
-            v938 = softehl_blend(m983, v995, v938); v939 = softehl_blend(m983, v996, v939);
-            v940 = softehl_blend(m983, v997, v940); v941 = softehl_blend(m983, v998, v941);
-            v942 = softehl_blend(m983, v999, v942); v943 = softehl_blend(m983, v1000, v943);
-            v944 = softehl_blend(m983, v1001, v944); v945 = softehl_blend(m983, v1002, v945);
-            v946 = softehl_blend(m983, v1003, v946); v947 = softehl_blend(m983, v1004, v947);
-            v948 = softehl_blend(m983, v1005, v948); v949 = softehl_blend(m983, v1006, v949);
-            v950 = softehl_blend(m983, v1007, v950); v951 = softehl_blend(m983, v1008, v951);
-            v952 = softehl_blend(m983, v1009, v952); v953 = softehl_blend(m983, v1010, v953);
-            v954 = softehl_blend(m983, v1011, v954); v955 = softehl_blend(m983, v1012, v955);
-            v956 = softehl_blend(m983, v1013, v956); v958 = softehl_blend(m983, v1014, v958);
-            v960 = softehl_blend(m983, v1015, v960); v961 = softehl_blend(m983, v1016, v961);
-            v962 = softehl_blend(m983, v1017, v962); v963 = softehl_blend(m983, v1018, v963);
-            v965 = softehl_blend(m983, v1019, v965); v967 = softehl_blend(m983, v1020, v967);
-            v969 = softehl_blend(m983, v1021, v969); v971 = softehl_blend(m983, v1022, v971);
-            v973 = softehl_blend(m983, v1023, v973); v975 = softehl_blend(m983, v1024, v975);
-            v977 = softehl_blend(m983, v1025, v977); v979 = softehl_blend(m983, v1026, v979);
-            v981 = softehl_blend(m983, v1027, v981);
+            v927 = softehl_blend(m982, v984, v927); v928 = softehl_blend(m982, v985, v928);
+            v929 = softehl_blend(m982, v986, v929); v930 = softehl_blend(m982, v987, v930);
+            v931 = softehl_blend(m982, v988, v931); v932 = softehl_blend(m982, v989, v932);
+            v933 = softehl_blend(m982, v990, v933); v934 = softehl_blend(m982, v991, v934);
+            v935 = softehl_blend(m982, v992, v935); v936 = softehl_blend(m982, v993, v936);
+            v937 = softehl_blend(m982, v994, v937); v938 = softehl_blend(m982, v995, v938);
+            v939 = softehl_blend(m982, v996, v939); v940 = softehl_blend(m982, v997, v940);
+            v941 = softehl_blend(m982, v998, v941); v942 = softehl_blend(m982, v999, v942);
+            v943 = softehl_blend(m982, v1000, v943); v944 = softehl_blend(m982, v1001, v944);
+            v945 = softehl_blend(m982, v1002, v945); v946 = softehl_blend(m982, v1003, v946);
+            v947 = softehl_blend(m982, v1004, v947); v948 = softehl_blend(m982, v1005, v948);
+            v949 = softehl_blend(m982, v1006, v949); v950 = softehl_blend(m982, v1007, v950);
+            v951 = softehl_blend(m982, v1008, v951); v952 = softehl_blend(m982, v1009, v952);
+            v953 = softehl_blend(m982, v1010, v953); v954 = softehl_blend(m982, v1011, v954);
+            v955 = softehl_blend(m982, v1012, v955); v957 = softehl_blend(m982, v1013, v957);
+            v959 = softehl_blend(m982, v1014, v959); v960 = softehl_blend(m982, v1015, v960);
+            v961 = softehl_blend(m982, v1016, v961); v962 = softehl_blend(m982, v1017, v962);
+            v964 = softehl_blend(m982, v1018, v964); v966 = softehl_blend(m982, v1019, v966);
+            v968 = softehl_blend(m982, v1020, v968); v970 = softehl_blend(m982, v1021, v970);
+            v972 = softehl_blend(m982, v1022, v972); v974 = softehl_blend(m982, v1023, v974);
+            v976 = softehl_blend(m982, v1024, v976); v978 = softehl_blend(m982, v1025, v978);
+            v980 = softehl_blend(m982, v1026, v980);
         }
-        const M m1161 = ~v908;
-        if (softehl_any(m1161)) {
-            const V v1162 = v905 - v866, v1163 = v1162 * v1162, v1164 = v1162 * v1163,
-                v1165 = 3.0 * v1163, v1166 = v798 * v1165, v1167 = v45 * v1165,
-                v1168 = -(v862 * v1165), v1169 = a10 * v1165, v1170 = v1169 * v919,
-                v1171 = v1169 * v921, v1172 = v1169 * v923, v1173 = v1169 * v926,
-                v1174 = v1169 * v927, v1175 = v1169 * v911, v1176 = v1169 * v910,
-                v1177 = v1169 * v913, v1178 = v1169 * v917, v1179 = v1169 * v915;
-            v928 = softehl_blend(m1161, v1164, v928); v929 = softehl_blend(m1161, v1166, v929);
-            v930 = softehl_blend(m1161, v1168, v930); v931 = softehl_blend(m1161, v1164, v931);
-            v957 = softehl_blend(m1161, v1166, v957); v959 = softehl_blend(m1161, v1168, v959);
-            v960 = softehl_blend(m1161, v1169, v960); v961 = softehl_blend(m1161, v1167, v961);
-            v963 = softehl_blend(m1161, v1167, v963); v964 = softehl_blend(m1161, v1170, v964);
-            v966 = softehl_blend(m1161, v1171, v966); v968 = softehl_blend(m1161, v1172, v968);
-            v970 = softehl_blend(m1161, v1173, v970); v972 = softehl_blend(m1161, v1174, v972);
-            v974 = softehl_blend(m1161, v1175, v974); v976 = softehl_blend(m1161, v1176, v976);
-            v978 = softehl_blend(m1161, v1177, v978); v980 = softehl_blend(m1161, v1178, v980);
-            v982 = softehl_blend(m1161, v1179, v982);
+        const M m1167 = ~v907;
+        if (softehl_any(m1167)) {
+            const V v1168 = v904 - v865, v1169 = v1168 * v1168, v1170 = v1168 * v1169,
+                v1171 = 3.0 * v1169, v1172 = v797 * v1171, v1173 = v57 * v1171,
+                v1174 = -(v861 * v1171), v1175 = a10 * v1171, v1176 = v1175 * v918,
+                v1177 = v1175 * v920, v1178 = v1175 * v922, v1179 = v1175 * v925,
+                v1180 = v1175 * v926, v1181 = v1175 * v910, v1182 = v1175 * v909,
+                v1183 = v1175 * v912, v1184 = v1175 * v916, v1185 = v1175 * v914;
+            v927 = softehl_blend(m1167, v1170, v927); v928 = softehl_blend(m1167, v1172, v928);
+            v929 = softehl_blend(m1167, v1174, v929); v930 = softehl_blend(m1167, v1170, v930);
+            v956 = softehl_blend(m1167, v1172, v956); v958 = softehl_blend(m1167, v1174, v958);
+            v959 = softehl_blend(m1167, v1175, v959); v960 = softehl_blend(m1167, v1173, v960);
+            v962 = softehl_blend(m1167, v1173, v962); v963 = softehl_blend(m1167, v1176, v963);
+            v965 = softehl_blend(m1167, v1177, v965); v967 = softehl_blend(m1167, v1178, v967);
+            v969 = softehl_blend(m1167, v1179, v969); v971 = softehl_blend(m1167, v1180, v971);
+            v973 = softehl_blend(m1167, v1181, v973); v975 = softehl_blend(m1167, v1182, v975);
+            v977 = softehl_blend(m1167, v1183, v977); v979 = softehl_blend(m1167, v1184, v979);
+            v981 = softehl_blend(m1167, v1185, v981);
         }
-        s574 += v932; s575 += v933; s576 += v934; s577 += v935; s578 += v936; s579 += v937;
-        s580 += v938; s581 += v939; s582 += v940; s583 += v941; s584 += v942; s585 += v943;
-        s586 += v944; s587 += v945; s588 += v946; s589 += v947; s590 += v948; s591 += v949;
-        s592 += v950; s593 += v951; s594 += v952; s595 += v953; s596 += v954; s597 += v955;
-        const V v1180 = v957 + v956, v1181 = v959 + v958, v1182 = softehl_vsqrt(1.0 / v811),
-            v1183 = v816 * v825,
-            v1184 = (v16 * v794 + (v13 * v793 + (v791 + v792)) - X5 * v790) * (v849 * v563),
-            v1185 = v928 * v1183, v1186 = v928 * v853, v1187 = v931 * v853, v1188 = v931 * v1183,
-            v1189 = 0.5 * v1186, v1190 = 0.5 * v1187, v1191 = v864 * v1185, v1192 = v864 * v1188,
-            v1193 = v865 * v1185, v1194 = v865 * v1188, v1195 = v878 * v928 + v876 * v931,
-            v1196 = v878 * v931 - v876 * v928, v1197 = v1195 * v1183, v1198 = v1196 * v1183,
-            v1199 = v1195 * v853, v1200 = v1196 * v853,
-            v1201 = v1184 + 2.0 * (v15 * v806 + v26 * v807) * (v1182 * (v565 * v825)),
-            v1202 = 0.5 * v1199, v1203 = v1195 * v1201, v1204 = (v879 * v928 - v877 * v931) * v853,
-            v1205 = v1196 * v1201, v1206 = (v877 * v928 + v879 * v931) * v853, v1207 = v928 * v1201,
-            v1208 = v931 * v1201, v1209 = 0.5 * v1200, v1210 = (v875 * v931 - v880 * v928) * v853,
-            v1211 = (v875 * v928 + v880 * v931) * v853;
-        s598 += v900 * v1200; s599 += v900 * v1199; s600 += v899 * v1200; s601 += v899 * v1199;
-        s602 += v808 * v1200; s603 += v808 * v1199; s604 += v803 * v1200; s605 += v803 * v1199;
-        s606 += v804 * v1200; s607 += v804 * v1199;
-        const V v1212 = v800 * v1199, v1213 = v800 * v1200, v1214 = v801 * v1199,
-            v1215 = v801 * v1200, v1216 = v790 * v1199, v1217 = v790 * v1200, v1218 = v43 * w[1],
-            v1219 = w[1] * v929, v1220 = w[1] * v930, v1221 = v1218 * v862, v1222 = v1218 * v861,
-            v1223 = v43 * (v1189 + v862 * v1207), v1224 = v43 * (v861 * v1207 - v1189),
-            v1225 = v43 * (v1190 + v862 * v1208), v1226 = v43 * (v861 * v1208 - v1190);
-        s566 += v1221 * v1186; s567 += v1222 * v1186; s572 += v1221 * v1187; s573 += v1222 * v1187;
-        const V v1227 = v774 * v961 + v960 * v919, v1228 = v776 * v961 + v960 * v923,
-            v1229 = v777 * v961 + v960 * v926, v1230 = v773 * v961 + v960 * v913,
-            v1231 = v780 * v961 + v960 * v917, v1232 = v781 * v961 + v960 * v915,
-            v1233 = v775 * v961 + v960 * v921, v1234 = v778 * v961 + v960 * v927,
-            v1235 = v779 * v961 + v960 * v911, v1236 = v772 * v961 + v960 * v910,
-            v1237 = v775 * v963 + (v966 + v965), v1238 = v778 * v963 + (v972 + v971),
-            v1239 = v779 * v963 + (v974 + v973), v1240 = v772 * v963 + (v976 + v975),
-            v1241 = v781 * v963 + (v982 + v981), v1242 = v774 * v963 + (v964 + v962),
-            v1243 = v776 * v963 + (v968 + v967), v1244 = v777 * v963 + (v970 + v969),
-            v1245 = v773 * v963 + (v978 + v977), v1246 = v780 * v963 + (v980 + v979);
-        s568 += v1219 * v867; s570 += v1219 * v868; s569 += v1220 * v867; s571 += v1220 * v868;
-        const V v1247 = w[1] * (v544 * v1192 + (v774 * v1226 + v867 * v1242)); s652 += v1247;
-        const V v1248 = w[1] * (v549 * v1192 + (v776 * v1226 + v867 * v1243)); s654 += v1248;
-        const V v1249 = w[1] * (v550 * v1192 + (v777 * v1226 + v867 * v1244)); s655 += v1249;
-        const V v1250 = w[1] * (v553 * v1192 + (v773 * v1226 + v867 * v1245)); s659 += v1250;
-        const V v1251 = w[1] * (v554 * v1192 + (v780 * v1226 + v867 * v1246)); s660 += v1251;
-        const V v1252 = w[1] * (v544 * v1194 + (v774 * v1225 + v868 * v1242)); s662 += v1252;
-        const V v1253 = w[1] * (v549 * v1194 + (v776 * v1225 + v868 * v1243)); s664 += v1253;
-        const V v1254 = v918 * v1202, v1255 = v918 * v1209, v1256 = v920 * v1202,
-            v1257 = v920 * v1209, v1258 = v922 * v1202, v1259 = v922 * v1209, v1260 = v924 * v1202,
-            v1261 = v924 * v1209, v1262 = v925 * v1202, v1263 = v925 * v1209, v1264 = v909 * v1202,
-            v1265 = v909 * v1209, v1266 = v907 * v1202, v1267 = v907 * v1209, v1268 = v912 * v1202,
-            v1269 = v912 * v1209, v1270 = v916 * v1202, v1271 = v916 * v1209, v1272 = v914 * v1202,
-            v1273 = v914 * v1209;
-        s608 += v1180 * v873; s609 += v1181 * v873; s610 += v1180 * v874; s611 += v1181 * v874;
-        const V v1274 = v929 * v881 + v1180 * v882, v1275 = v930 * v881 + v1181 * v882,
-            v1276 = v1180 * v881 - v929 * v882, v1277 = v1181 * v881 - v930 * v882;
-        s612 += v804 * v1274; s613 += v804 * v1275; s614 += v804 * v1276; s615 += v804 * v1277;
-        s616 += v803 * v1274; s617 += v803 * v1275; s618 += v803 * v1276; s619 += v803 * v1277;
-        s620 += v808 * v1274; s621 += v808 * v1275; s622 += v808 * v1276; s623 += v808 * v1277;
-        s624 += v899 * v1274; s625 += v899 * v1275; s626 += v899 * v1276; s627 += v899 * v1277;
-        s628 += v900 * v1274; s629 += v900 * v1275; s630 += v900 * v1276; s631 += v900 * v1277;
-        s632 += w[1] * (v544 * v1191 + v774 * v1224 + v1227 * v867);
-        s633 += w[1] * (v545 * v1191 + v775 * v1224 + v1233 * v867);
-        s634 += w[1] * (v549 * v1191 + v776 * v1224 + v1228 * v867);
-        s635 += w[1] * (v550 * v1191 + v777 * v1224 + v1229 * v867);
-        s636 += w[1] * (v542 * v1191 + v778 * v1224 + v1234 * v867);
-        s637 += w[1] * (v543 * v1191 + v779 * v1224 + v1235 * v867);
-        s638 += w[1] * (v552 * v1191 + v772 * v1224 + v1236 * v867);
-        s643 += w[1] * (v545 * v1193 + v775 * v1223 + v1233 * v868);
-        s647 += w[1] * (v543 * v1193 + v779 * v1223 + v1235 * v868);
-        s648 += w[1] * (v552 * v1193 + v772 * v1223 + v1236 * v868);
-        s644 += w[1] * (v549 * v1193 + v776 * v1223 + v1228 * v868);
-        s645 += w[1] * (v550 * v1193 + v777 * v1223 + v1229 * v868);
-        const V v1278 = v802 * v1206 + (v545 * v1198 + v775 * v1205 - v1233 * v882) - v826 * v1211,
-            v1279 = v826 * v1210 + (v802 * v1204 + (v545 * v1197 + (v775 * v1203 + v1233 * v881))),
-            v1280 = v784 * v1206 + (v549 * v1198 + v776 * v1205 - v1228 * v882) - v858 * v1211,
-            v1281 = v858 * v1210 + (v784 * v1204 + (v549 * v1197 + (v776 * v1203 + v1228 * v881))),
-            v1282 = v843 * v1206 + (v550 * v1198 + v777 * v1205 - v1229 * v882) - v829 * v1211,
-            v1283 = v829 * v1210 + (v843 * v1204 + (v550 * v1197 + (v777 * v1203 + v1229 * v881))),
-            v1284 = v845 * v1206 + (v543 * v1198 + v779 * v1205 - v1235 * v882) - v833 * v1211,
-            v1285 = v833 * v1210 + (v845 * v1204 + (v543 * v1197 + (v779 * v1203 + v1235 * v881))),
-            v1286 = v1278 + v881 * v1237, v1287 = v1279 + v882 * v1237,
-            v1288 = v1280 + v881 * v1243, v1289 = v1281 + v882 * v1243,
-            v1290 = v1282 + v881 * v1244, v1291 = v1283 + v882 * v1244,
-            v1292 = v1284 + v881 * v1239, v1293 = v1285 + v882 * v1239,
-            v1294 = w[1] * (v550 * v1194 + v777 * v1225 + v868 * v1244);
-        s665 += v1294; const V v1295 = w[1] * (v805 * v1287 - v775 * v1216); s713 += v1295;
-        const V v1296 = w[1] * (v805 * v1289 - v776 * v1216); s714 += v1296;
-        const V v1297 = w[1] * (v805 * v1286 - v775 * v1217); s723 += v1297;
-        const V v1298 = w[1] * (v805 * v1290 - v777 * v1217); s725 += v1298;
-        const V v1299 = w[1] * (v805 * v1291 - v777 * v1216); s715 += v1299;
-        const V v1300 = w[1] * (v805 * v1293 - v779 * v1216); s717 += v1300;
-        const V v1301 = w[1] * (v805 * v1292 - v779 * v1217); s727 += v1301;
-        const V v1302 = w[1] * (v805 * v1288 - v776 * v1217); s724 += v1302;
-        const V v1303 = w[1] * (v777 * v1212 + v797 * v1291); s675 += v1303;
-        const V v1304 = w[1] * (v776 * v1213 + v797 * v1288); s684 += v1304;
-        const V v1305 = w[1] * (v775 * v1212 + v797 * v1287); s673 += v1305;
-        const V v1306 = w[1] * (v776 * v1212 + v797 * v1289); s674 += v1306;
-        const V v1307 = w[1] * (v779 * v1212 + v797 * v1293); s677 += v1307;
-        const V v1308 = w[1] * (v775 * v1213 + v797 * v1286); s683 += v1308;
-        const V v1309 = w[1] * (v777 * v1213 + v797 * v1290); s685 += v1309;
-        const V v1310 = w[1] * (v779 * v1213 + v797 * v1292); s687 += v1310;
-        const V v1311 = w[1] * (v775 * v1214 + v799 * v1287); s693 += v1311;
-        const V v1312 = w[1] * (v776 * v1214 + v799 * v1289); s694 += v1312;
-        const V v1313 = w[1] * (v779 * v1214 + v799 * v1293); s697 += v1313;
-        const V v1314 = w[1] * (v775 * v1215 + v799 * v1286); s703 += v1314;
-        const V v1315 = w[1] * (v777 * v1215 + v799 * v1290); s705 += v1315;
-        const V v1316 = w[1] * (v779 * v1215 + v799 * v1292); s707 += v1316;
-        const V v1317 = w[1] * (v777 * v1214 + v799 * v1291); s695 += v1317;
-        const V v1318 = w[1] * (v776 * v1215 + v799 * v1288); s704 += v1318;
-        const V v1319 = w[1] * (v1260 - v896 * v1291); s735 += v1319;
-        const V v1320 = w[1] * (v1264 - v896 * v1293); s737 += v1320;
-        const V v1321 = w[1] * (v1259 - v896 * v1288); s744 += v1321;
-        const V v1322 = w[1] * (v1261 - v896 * v1290); s745 += v1322;
-        const V v1323 = w[1] * (v1265 - v896 * v1292); s747 += v1323;
-        const V v1324 = w[1] * (v1260 + v897 * v1291); s755 += v1324;
-        const V v1325 = w[1] * (v1264 + v897 * v1293); s757 += v1325;
-        const V v1326 = w[1] * (v1259 + v897 * v1288); s764 += v1326;
-        const V v1327 = w[1] * (v1261 + v897 * v1290); s765 += v1327;
-        const V v1328 = w[1] * (v1265 + v897 * v1292); s767 += v1328;
-        const V v1329 = w[1] * (v1256 - v896 * v1287); s733 += v1329;
-        const V v1330 = w[1] * (v1256 + v897 * v1287); s753 += v1330;
-        const V v1331 = w[1] * (v1258 - v896 * v1289); s734 += v1331;
-        const V v1332 = w[1] * (v1258 + v897 * v1289); s754 += v1332;
-        const V v1333 = w[1] * (v1257 - v896 * v1286); s743 += v1333;
-        const V v1334 = w[1] * (v1257 + v897 * v1286); s763 += v1334;
-        s642 += w[1] * (v544 * v1193 + v774 * v1223 + v1227 * v868);
-        const V v1335 = w[1] * (v553 * v1194 + v773 * v1225 + v868 * v1245); s669 += v1335;
-        const V v1336 = v783 * v1206 + (v544 * v1198 + v774 * v1205 - v1227 * v882 + v881 * v1242),
-            v1337 = v783 * v1204 + (v544 * v1197 + (v774 * v1203 + v1227 * v881) + v882 * v1242),
-            v1338 = v1336 - v857 * v1211, v1339 = v857 * v1210 + v1337,
-            v1340 = w[1] * (v553 * v1193 + (v773 * v1223 + v1230 * v868));
-        s649 += v1340; const V v1341 = w[1] * (v553 * v1191 + (v773 * v1224 + v1230 * v867));
-        s639 += v1341;
-        const V v1342 = v553 * v1197 + (v841 * v1204 + (v1230 * v881 + (v773 * v1203 + v882 * v1245))),
-            v1343 = v553 * v1198 + (v841 * v1206 + (v773 * v1205 + v881 * v1245 - v1230 * v882)),
-            v1344 = v838 * v1210 + v1342, v1345 = v1343 - v838 * v1211,
-            v1346 = w[1] * (v774 * v1212 + v797 * v1339);
-        s672 += v1346; const V v1347 = w[1] * (v774 * v1213 + v797 * v1338); s682 += v1347;
-        const V v1348 = w[1] * (v773 * v1212 + v797 * v1344); s679 += v1348;
-        const V v1349 = w[1] * (v773 * v1213 + v797 * v1345); s689 += v1349;
-        const V v1350 = w[1] * (v805 * v1338 - v774 * v1217); s722 += v1350;
-        const V v1351 = w[1] * (v805 * v1339 - v774 * v1216); s712 += v1351;
-        const V v1352 = w[1] * (v805 * v1345 - v773 * v1217); s729 += v1352;
-        const V v1353 = w[1] * (v805 * v1344 - v773 * v1216); s719 += v1353;
-        const V v1354 = w[1] * (v774 * v1214 + v799 * v1339); s692 += v1354;
-        const V v1355 = w[1] * (v773 * v1215 + v799 * v1345); s709 += v1355;
-        const V v1356 = w[1] * (v773 * v1214 + v799 * v1344); s699 += v1356;
-        const V v1357 = w[1] * (v774 * v1215 + v799 * v1338); s702 += v1357;
-        const V v1358 = w[1] * (v1254 - v896 * v1339); s732 += v1358;
-        const V v1359 = w[1] * (v1268 - v896 * v1344); s739 += v1359;
-        const V v1360 = w[1] * (v1255 - v896 * v1338); s742 += v1360;
-        const V v1361 = w[1] * (v1269 - v896 * v1345); s749 += v1361;
-        const V v1362 = w[1] * (v1254 + v897 * v1339); s752 += v1362;
-        const V v1363 = w[1] * (v1268 + v897 * v1344); s759 += v1363;
-        const V v1364 = w[1] * (v1255 + v897 * v1338); s762 += v1364;
-        const V v1365 = w[1] * (v1269 + v897 * v1345); s769 += v1365;
-        s640 += w[1] * (v554 * v1191 + v780 * v1224 + v1231 * v867);
-        s641 += w[1] * (v556 * v1191 + v781 * v1224 + v1232 * v867);
-        s650 += w[1] * (v554 * v1193 + v780 * v1223 + v1231 * v868);
-        s651 += w[1] * (v556 * v1193 + v781 * v1223 + v1232 * v868);
-        s646 += w[1] * (v542 * v1193 + v778 * v1223 + v1234 * v868);
-        const V v1366 = w[1] * (v542 * v1192 + v778 * v1226 + v867 * v1238); s656 += v1366;
-        const V v1367 = w[1] * (v556 * v1192 + v781 * v1226 + v867 * v1241); s661 += v1367;
-        const V v1368 = w[1] * (v542 * v1194 + (v778 * v1225 + v868 * v1238)); s666 += v1368;
-        const V v1369 = w[1] * (v556 * v1194 + (v781 * v1225 + v868 * v1241)); s671 += v1369;
-        const V v1370 = v786 * v1204 + (v542 * v1197 + (v778 * v1203 + v1234 * v881 + v882 * v1238)),
-            v1371 = v786 * v1206 + (v542 * v1198 + (v778 * v1205 - v1234 * v882 + v881 * v1238)),
-            v1372 = v788 * v1204 + (v1232 * v881 + (v556 * v1197 + (v781 * v1203 + v882 * v1241))),
-            v1373 = v788 * v1206 + (v556 * v1198 + (v781 * v1205 + v881 * v1241) - v1232 * v882),
-            v1374 = v831 * v1210 + v1370, v1375 = v1371 - v831 * v1211,
-            v1376 = v850 * v1210 + v1372, v1377 = v1373 - v850 * v1211,
-            v1378 = v835 * v1210 + (v785 * v1204 + (v552 * v1197 + (v772 * v1203 + v1236 * v881))),
-            v1379 = v785 * v1206 + (v552 * v1198 + v772 * v1205 - v1236 * v882) - v835 * v1211,
-            v1380 = v846 * v1210 + (v787 * v1204 + (v554 * v1197 + v780 * v1203)) + v1231 * v881,
-            v1381 = v787 * v1206 + (v554 * v1198 + v780 * v1205) - v846 * v1211 - v1231 * v882,
-            v1382 = v1378 + v882 * v1240, v1383 = v1379 + v881 * v1240,
-            v1384 = v1380 + v882 * v1246, v1385 = v1381 + v881 * v1246,
-            v1386 = w[1] * (v554 * v1194 + v780 * v1225 + v868 * v1246);
-        s670 += v1386; const V v1387 = w[1] * (v805 * v1374 - v778 * v1216); s716 += v1387;
-        const V v1388 = w[1] * (v805 * v1376 - v781 * v1216); s721 += v1388;
-        const V v1389 = w[1] * (v805 * v1375 - v778 * v1217); s726 += v1389;
-        const V v1390 = w[1] * (v805 * v1377 - v781 * v1217); s731 += v1390;
-        const V v1391 = w[1] * (v805 * v1382 - v772 * v1216); s718 += v1391;
-        const V v1392 = w[1] * (v805 * v1384 - v780 * v1216); s720 += v1392;
-        const V v1393 = w[1] * (v805 * v1383 - v772 * v1217); s728 += v1393;
-        const V v1394 = w[1] * (v805 * v1385 - v780 * v1217); s730 += v1394;
-        const V v1395 = w[1] * (v772 * v1212 + v797 * v1382); s678 += v1395;
-        const V v1396 = w[1] * (v780 * v1212 + v797 * v1384); s680 += v1396;
-        const V v1397 = w[1] * (v780 * v1213 + v797 * v1385); s690 += v1397;
-        const V v1398 = w[1] * (v778 * v1212 + v797 * v1374); s676 += v1398;
-        const V v1399 = w[1] * (v781 * v1212 + v797 * v1376); s681 += v1399;
-        const V v1400 = w[1] * (v778 * v1213 + v797 * v1375); s686 += v1400;
-        const V v1401 = w[1] * (v772 * v1213 + v797 * v1383); s688 += v1401;
-        const V v1402 = w[1] * (v781 * v1213 + v797 * v1377); s691 += v1402;
-        const V v1403 = w[1] * (v778 * v1214 + v799 * v1374); s696 += v1403;
-        const V v1404 = w[1] * (v781 * v1214 + v799 * v1376); s701 += v1404;
-        const V v1405 = w[1] * (v778 * v1215 + v799 * v1375); s706 += v1405;
-        const V v1406 = w[1] * (v772 * v1215 + v799 * v1383); s708 += v1406;
-        const V v1407 = w[1] * (v781 * v1215 + v799 * v1377); s711 += v1407;
-        const V v1408 = w[1] * (v772 * v1214 + v799 * v1382); s698 += v1408;
-        const V v1409 = w[1] * (v780 * v1214 + v799 * v1384); s700 += v1409;
-        const V v1410 = w[1] * (v780 * v1215 + v799 * v1385); s710 += v1410;
-        const V v1411 = w[1] * (v1266 - v896 * v1382); s738 += v1411;
-        const V v1412 = w[1] * (v1270 - v896 * v1384); s740 += v1412;
-        const V v1413 = w[1] * (v1263 - v896 * v1375); s746 += v1413;
-        const V v1414 = w[1] * (v1271 - v896 * v1385); s750 += v1414;
-        const V v1415 = w[1] * (v1273 - v896 * v1377); s751 += v1415;
-        const V v1416 = w[1] * (v1266 + v897 * v1382); s758 += v1416;
-        const V v1417 = w[1] * (v1270 + v897 * v1384); s760 += v1417;
-        const V v1418 = w[1] * (v1263 + v897 * v1375); s766 += v1418;
-        const V v1419 = w[1] * (v1271 + v897 * v1385); s770 += v1419;
-        const V v1420 = w[1] * (v1273 + v897 * v1377); s771 += v1420;
-        const V v1421 = w[1] * (v1262 - v896 * v1374); s736 += v1421;
-        const V v1422 = w[1] * (v1262 + v897 * v1374); s756 += v1422;
-        const V v1423 = w[1] * (v1272 - v896 * v1376); s741 += v1423;
-        const V v1424 = w[1] * (v1272 + v897 * v1376); s761 += v1424;
-        const V v1425 = w[1] * (v1267 - v896 * v1383); s748 += v1425;
-        const V v1426 = w[1] * (v1267 + v897 * v1383); s768 += v1426;
-        const V v1427 = w[1] * (v545 * v1192 + v775 * v1226 + v867 * v1237); s653 += v1427;
-        const V v1428 = w[1] * (v545 * v1194 + v775 * v1225 + v868 * v1237); s663 += v1428;
-        const V v1429 = w[1] * (v543 * v1192 + v779 * v1226 + v867 * v1239); s657 += v1429;
-        const V v1430 = w[1] * (v543 * v1194 + v779 * v1225 + v868 * v1239); s667 += v1430;
-        const V v1431 = w[1] * (v552 * v1192 + v772 * v1226 + v867 * v1240); s658 += v1431;
-        const V v1432 = w[1] * (v552 * v1194 + v772 * v1225 + v868 * v1240); s668 += v1432;
+        s573 += v931; s574 += v932; s575 += v933; s576 += v934; s577 += v935; s578 += v936;
+        s579 += v937; s580 += v938; s581 += v939; s582 += v940; s583 += v941; s584 += v942;
+        s585 += v943; s586 += v944; s587 += v945; s588 += v946; s589 += v947; s590 += v948;
+        s591 += v949; s592 += v950; s593 += v951; s594 += v952; s595 += v953; s596 += v954;
+        const V v1186 = v956 + v955, v1187 = v958 + v957, v1188 = softehl_vsqrt(1.0 / v810),
+            v1189 = v815 * v824,
+            v1190 = (v22 * v793 + (v19 * v792 + (v790 + v791)) - X5 * v789) * (v848 * v562),
+            v1191 = v927 * v1189, v1192 = v927 * v852, v1193 = v930 * v852, v1194 = v930 * v1189,
+            v1195 = 0.5 * v1192, v1196 = 0.5 * v1193, v1197 = v863 * v1191, v1198 = v863 * v1194,
+            v1199 = v864 * v1191, v1200 = v864 * v1194, v1201 = v877 * v927 + v875 * v930,
+            v1202 = v877 * v930 - v875 * v927, v1203 = v1201 * v1189, v1204 = v1202 * v1189,
+            v1205 = v1201 * v852, v1206 = v1202 * v852,
+            v1207 = v1190 + 2.0 * (v14 * v805 + v29 * v806) * (v1188 * (v564 * v824)),
+            v1208 = 0.5 * v1205, v1209 = v1201 * v1207, v1210 = (v878 * v927 - v876 * v930) * v852,
+            v1211 = v1202 * v1207, v1212 = (v876 * v927 + v878 * v930) * v852, v1213 = v927 * v1207,
+            v1214 = v930 * v1207, v1215 = 0.5 * v1206, v1216 = (v874 * v930 - v879 * v927) * v852,
+            v1217 = (v874 * v927 + v879 * v930) * v852;
+        s597 += v899 * v1206; s598 += v899 * v1205; s599 += v898 * v1206; s600 += v898 * v1205;
+        s601 += v807 * v1206; s602 += v807 * v1205; s603 += v802 * v1206; s604 += v802 * v1205;
+        s605 += v803 * v1206; s606 += v803 * v1205;
+        const V v1218 = v799 * v1205, v1219 = v799 * v1206, v1220 = v800 * v1205,
+            v1221 = v800 * v1206, v1222 = v789 * v1205, v1223 = v789 * v1206, v1224 = v39 * w[1],
+            v1225 = w[1] * v928, v1226 = w[1] * v929, v1227 = v1224 * v861, v1228 = v1224 * v860,
+            v1229 = v39 * (v1195 + v861 * v1213), v1230 = v39 * (v860 * v1213 - v1195),
+            v1231 = v39 * (v1196 + v861 * v1214), v1232 = v39 * (v860 * v1214 - v1196);
+        s565 += v1227 * v1192; s566 += v1228 * v1192; s571 += v1227 * v1193; s572 += v1228 * v1193;
+        const V v1233 = v773 * v960 + v959 * v918, v1234 = v775 * v960 + v959 * v922,
+            v1235 = v776 * v960 + v959 * v925, v1236 = v772 * v960 + v959 * v912,
+            v1237 = v779 * v960 + v959 * v916, v1238 = v780 * v960 + v959 * v914,
+            v1239 = v774 * v960 + v959 * v920, v1240 = v777 * v960 + v959 * v926,
+            v1241 = v778 * v960 + v959 * v910, v1242 = v771 * v960 + v959 * v909,
+            v1243 = v774 * v962 + (v965 + v964), v1244 = v777 * v962 + (v971 + v970),
+            v1245 = v778 * v962 + (v973 + v972), v1246 = v771 * v962 + (v975 + v974),
+            v1247 = v780 * v962 + (v981 + v980), v1248 = v773 * v962 + (v963 + v961),
+            v1249 = v775 * v962 + (v967 + v966), v1250 = v776 * v962 + (v969 + v968),
+            v1251 = v772 * v962 + (v977 + v976), v1252 = v779 * v962 + (v979 + v978);
+        s567 += v1225 * v866; s569 += v1225 * v867; s568 += v1226 * v866; s570 += v1226 * v867;
+        const V v1253 = w[1] * (v543 * v1198 + (v773 * v1232 + v866 * v1248)); s651 += v1253;
+        const V v1254 = w[1] * (v548 * v1198 + (v775 * v1232 + v866 * v1249)); s653 += v1254;
+        const V v1255 = w[1] * (v549 * v1198 + (v776 * v1232 + v866 * v1250)); s654 += v1255;
+        const V v1256 = w[1] * (v552 * v1198 + (v772 * v1232 + v866 * v1251)); s658 += v1256;
+        const V v1257 = w[1] * (v553 * v1198 + (v779 * v1232 + v866 * v1252)); s659 += v1257;
+        const V v1258 = w[1] * (v543 * v1200 + (v773 * v1231 + v867 * v1248)); s661 += v1258;
+        const V v1259 = w[1] * (v548 * v1200 + (v775 * v1231 + v867 * v1249)); s663 += v1259;
+        const V v1260 = v917 * v1208, v1261 = v917 * v1215, v1262 = v919 * v1208,
+            v1263 = v919 * v1215, v1264 = v921 * v1208, v1265 = v921 * v1215, v1266 = v923 * v1208,
+            v1267 = v923 * v1215, v1268 = v924 * v1208, v1269 = v924 * v1215, v1270 = v908 * v1208,
+            v1271 = v908 * v1215, v1272 = v906 * v1208, v1273 = v906 * v1215, v1274 = v911 * v1208,
+            v1275 = v911 * v1215, v1276 = v915 * v1208, v1277 = v915 * v1215, v1278 = v913 * v1208,
+            v1279 = v913 * v1215;
+        s607 += v1186 * v872; s608 += v1187 * v872; s609 += v1186 * v873; s610 += v1187 * v873;
+        const V v1280 = v928 * v880 + v1186 * v881, v1281 = v929 * v880 + v1187 * v881,
+            v1282 = v1186 * v880 - v928 * v881, v1283 = v1187 * v880 - v929 * v881;
+        s611 += v803 * v1280; s612 += v803 * v1281; s613 += v803 * v1282; s614 += v803 * v1283;
+        s615 += v802 * v1280; s616 += v802 * v1281; s617 += v802 * v1282; s618 += v802 * v1283;
+        s619 += v807 * v1280; s620 += v807 * v1281; s621 += v807 * v1282; s622 += v807 * v1283;
+        s623 += v898 * v1280; s624 += v898 * v1281; s625 += v898 * v1282; s626 += v898 * v1283;
+        s627 += v899 * v1280; s628 += v899 * v1281; s629 += v899 * v1282; s630 += v899 * v1283;
+        s631 += w[1] * (v543 * v1197 + v773 * v1230 + v1233 * v866);
+        s632 += w[1] * (v544 * v1197 + v774 * v1230 + v1239 * v866);
+        s633 += w[1] * (v548 * v1197 + v775 * v1230 + v1234 * v866);
+        s634 += w[1] * (v549 * v1197 + v776 * v1230 + v1235 * v866);
+        s635 += w[1] * (v541 * v1197 + v777 * v1230 + v1240 * v866);
+        s636 += w[1] * (v542 * v1197 + v778 * v1230 + v1241 * v866);
+        s637 += w[1] * (v551 * v1197 + v771 * v1230 + v1242 * v866);
+        s642 += w[1] * (v544 * v1199 + v774 * v1229 + v1239 * v867);
+        s646 += w[1] * (v542 * v1199 + v778 * v1229 + v1241 * v867);
+        s647 += w[1] * (v551 * v1199 + v771 * v1229 + v1242 * v867);
+        s643 += w[1] * (v548 * v1199 + v775 * v1229 + v1234 * v867);
+        s644 += w[1] * (v549 * v1199 + v776 * v1229 + v1235 * v867);
+        const V v1284 = v801 * v1212 + (v544 * v1204 + v774 * v1211 - v1239 * v881) - v825 * v1217,
+            v1285 = v825 * v1216 + (v801 * v1210 + (v544 * v1203 + (v774 * v1209 + v1239 * v880))),
+            v1286 = v783 * v1212 + (v548 * v1204 + v775 * v1211 - v1234 * v881) - v857 * v1217,
+            v1287 = v857 * v1216 + (v783 * v1210 + (v548 * v1203 + (v775 * v1209 + v1234 * v880))),
+            v1288 = v842 * v1212 + (v549 * v1204 + v776 * v1211 - v1235 * v881) - v828 * v1217,
+            v1289 = v828 * v1216 + (v842 * v1210 + (v549 * v1203 + (v776 * v1209 + v1235 * v880))),
+            v1290 = v844 * v1212 + (v542 * v1204 + v778 * v1211 - v1241 * v881) - v832 * v1217,
+            v1291 = v832 * v1216 + (v844 * v1210 + (v542 * v1203 + (v778 * v1209 + v1241 * v880))),
+            v1292 = v1284 + v880 * v1243, v1293 = v1285 + v881 * v1243,
+            v1294 = v1286 + v880 * v1249, v1295 = v1287 + v881 * v1249,
+            v1296 = v1288 + v880 * v1250, v1297 = v1289 + v881 * v1250,
+            v1298 = v1290 + v880 * v1245, v1299 = v1291 + v881 * v1245,
+            v1300 = w[1] * (v549 * v1200 + v776 * v1231 + v867 * v1250);
+        s664 += v1300; const V v1301 = w[1] * (v804 * v1293 - v774 * v1222); s712 += v1301;
+        const V v1302 = w[1] * (v804 * v1295 - v775 * v1222); s713 += v1302;
+        const V v1303 = w[1] * (v804 * v1292 - v774 * v1223); s722 += v1303;
+        const V v1304 = w[1] * (v804 * v1296 - v776 * v1223); s724 += v1304;
+        const V v1305 = w[1] * (v804 * v1297 - v776 * v1222); s714 += v1305;
+        const V v1306 = w[1] * (v804 * v1299 - v778 * v1222); s716 += v1306;
+        const V v1307 = w[1] * (v804 * v1298 - v778 * v1223); s726 += v1307;
+        const V v1308 = w[1] * (v804 * v1294 - v775 * v1223); s723 += v1308;
+        const V v1309 = w[1] * (v776 * v1218 + v796 * v1297); s674 += v1309;
+        const V v1310 = w[1] * (v775 * v1219 + v796 * v1294); s683 += v1310;
+        const V v1311 = w[1] * (v774 * v1218 + v796 * v1293); s672 += v1311;
+        const V v1312 = w[1] * (v775 * v1218 + v796 * v1295); s673 += v1312;
+        const V v1313 = w[1] * (v778 * v1218 + v796 * v1299); s676 += v1313;
+        const V v1314 = w[1] * (v774 * v1219 + v796 * v1292); s682 += v1314;
+        const V v1315 = w[1] * (v776 * v1219 + v796 * v1296); s684 += v1315;
+        const V v1316 = w[1] * (v778 * v1219 + v796 * v1298); s686 += v1316;
+        const V v1317 = w[1] * (v774 * v1220 + v798 * v1293); s692 += v1317;
+        const V v1318 = w[1] * (v775 * v1220 + v798 * v1295); s693 += v1318;
+        const V v1319 = w[1] * (v778 * v1220 + v798 * v1299); s696 += v1319;
+        const V v1320 = w[1] * (v774 * v1221 + v798 * v1292); s702 += v1320;
+        const V v1321 = w[1] * (v776 * v1221 + v798 * v1296); s704 += v1321;
+        const V v1322 = w[1] * (v778 * v1221 + v798 * v1298); s706 += v1322;
+        const V v1323 = w[1] * (v776 * v1220 + v798 * v1297); s694 += v1323;
+        const V v1324 = w[1] * (v775 * v1221 + v798 * v1294); s703 += v1324;
+        const V v1325 = w[1] * (v1266 - v895 * v1297); s734 += v1325;
+        const V v1326 = w[1] * (v1270 - v895 * v1299); s736 += v1326;
+        const V v1327 = w[1] * (v1265 - v895 * v1294); s743 += v1327;
+        const V v1328 = w[1] * (v1267 - v895 * v1296); s744 += v1328;
+        const V v1329 = w[1] * (v1271 - v895 * v1298); s746 += v1329;
+        const V v1330 = w[1] * (v1266 + v896 * v1297); s754 += v1330;
+        const V v1331 = w[1] * (v1270 + v896 * v1299); s756 += v1331;
+        const V v1332 = w[1] * (v1265 + v896 * v1294); s763 += v1332;
+        const V v1333 = w[1] * (v1267 + v896 * v1296); s764 += v1333;
+        const V v1334 = w[1] * (v1271 + v896 * v1298); s766 += v1334;
+        const V v1335 = w[1] * (v1262 - v895 * v1293); s732 += v1335;
+        const V v1336 = w[1] * (v1262 + v896 * v1293); s752 += v1336;
+        const V v1337 = w[1] * (v1264 - v895 * v1295); s733 += v1337;
+        const V v1338 = w[1] * (v1264 + v896 * v1295); s753 += v1338;
+        const V v1339 = w[1] * (v1263 - v895 * v1292); s742 += v1339;
+        const V v1340 = w[1] * (v1263 + v896 * v1292); s762 += v1340;
+        s641 += w[1] * (v543 * v1199 + v773 * v1229 + v1233 * v867);
+        const V v1341 = w[1] * (v552 * v1200 + v772 * v1231 + v867 * v1251); s668 += v1341;
+        const V v1342 = v782 * v1212 + (v543 * v1204 + v773 * v1211 - v1233 * v881 + v880 * v1248),
+            v1343 = v782 * v1210 + (v543 * v1203 + (v773 * v1209 + v1233 * v880) + v881 * v1248),
+            v1344 = v1342 - v856 * v1217, v1345 = v856 * v1216 + v1343,
+            v1346 = w[1] * (v552 * v1199 + (v772 * v1229 + v1236 * v867));
+        s648 += v1346; const V v1347 = w[1] * (v552 * v1197 + (v772 * v1230 + v1236 * v866));
+        s638 += v1347;
+        const V v1348 = v552 * v1203 + (v840 * v1210 + (v1236 * v880 + (v772 * v1209 + v881 * v1251))),
+            v1349 = v552 * v1204 + (v840 * v1212 + (v772 * v1211 + v880 * v1251 - v1236 * v881)),
+            v1350 = v837 * v1216 + v1348, v1351 = v1349 - v837 * v1217,
+            v1352 = w[1] * (v773 * v1218 + v796 * v1345);
+        s671 += v1352; const V v1353 = w[1] * (v773 * v1219 + v796 * v1344); s681 += v1353;
+        const V v1354 = w[1] * (v772 * v1218 + v796 * v1350); s678 += v1354;
+        const V v1355 = w[1] * (v772 * v1219 + v796 * v1351); s688 += v1355;
+        const V v1356 = w[1] * (v804 * v1344 - v773 * v1223); s721 += v1356;
+        const V v1357 = w[1] * (v804 * v1345 - v773 * v1222); s711 += v1357;
+        const V v1358 = w[1] * (v804 * v1351 - v772 * v1223); s728 += v1358;
+        const V v1359 = w[1] * (v804 * v1350 - v772 * v1222); s718 += v1359;
+        const V v1360 = w[1] * (v773 * v1220 + v798 * v1345); s691 += v1360;
+        const V v1361 = w[1] * (v772 * v1221 + v798 * v1351); s708 += v1361;
+        const V v1362 = w[1] * (v772 * v1220 + v798 * v1350); s698 += v1362;
+        const V v1363 = w[1] * (v773 * v1221 + v798 * v1344); s701 += v1363;
+        const V v1364 = w[1] * (v1260 - v895 * v1345); s731 += v1364;
+        const V v1365 = w[1] * (v1274 - v895 * v1350); s738 += v1365;
+        const V v1366 = w[1] * (v1261 - v895 * v1344); s741 += v1366;
+        const V v1367 = w[1] * (v1275 - v895 * v1351); s748 += v1367;
+        const V v1368 = w[1] * (v1260 + v896 * v1345); s751 += v1368;
+        const V v1369 = w[1] * (v1274 + v896 * v1350); s758 += v1369;
+        const V v1370 = w[1] * (v1261 + v896 * v1344); s761 += v1370;
+        const V v1371 = w[1] * (v1275 + v896 * v1351); s768 += v1371;
+        s639 += w[1] * (v553 * v1197 + v779 * v1230 + v1237 * v866);
+        s640 += w[1] * (v555 * v1197 + v780 * v1230 + v1238 * v866);
+        s649 += w[1] * (v553 * v1199 + v779 * v1229 + v1237 * v867);
+        s650 += w[1] * (v555 * v1199 + v780 * v1229 + v1238 * v867);
+        s645 += w[1] * (v541 * v1199 + v777 * v1229 + v1240 * v867);
+        const V v1372 = w[1] * (v541 * v1198 + v777 * v1232 + v866 * v1244); s655 += v1372;
+        const V v1373 = w[1] * (v555 * v1198 + v780 * v1232 + v866 * v1247); s660 += v1373;
+        const V v1374 = w[1] * (v541 * v1200 + (v777 * v1231 + v867 * v1244)); s665 += v1374;
+        const V v1375 = w[1] * (v555 * v1200 + (v780 * v1231 + v867 * v1247)); s670 += v1375;
+        const V v1376 = v785 * v1210 + (v541 * v1203 + (v777 * v1209 + v1240 * v880 + v881 * v1244)),
+            v1377 = v785 * v1212 + (v541 * v1204 + (v777 * v1211 - v1240 * v881 + v880 * v1244)),
+            v1378 = v787 * v1210 + (v1238 * v880 + (v555 * v1203 + (v780 * v1209 + v881 * v1247))),
+            v1379 = v787 * v1212 + (v555 * v1204 + (v780 * v1211 + v880 * v1247) - v1238 * v881),
+            v1380 = v830 * v1216 + v1376, v1381 = v1377 - v830 * v1217,
+            v1382 = v849 * v1216 + v1378, v1383 = v1379 - v849 * v1217,
+            v1384 = v834 * v1216 + (v784 * v1210 + (v551 * v1203 + (v771 * v1209 + v1242 * v880))),
+            v1385 = v784 * v1212 + (v551 * v1204 + v771 * v1211 - v1242 * v881) - v834 * v1217,
+            v1386 = v845 * v1216 + (v786 * v1210 + (v553 * v1203 + v779 * v1209)) + v1237 * v880,
+            v1387 = v786 * v1212 + (v553 * v1204 + v779 * v1211) - v845 * v1217 - v1237 * v881,
+            v1388 = v1384 + v881 * v1246, v1389 = v1385 + v880 * v1246,
+            v1390 = v1386 + v881 * v1252, v1391 = v1387 + v880 * v1252,
+            v1392 = w[1] * (v553 * v1200 + v779 * v1231 + v867 * v1252);
+        s669 += v1392; const V v1393 = w[1] * (v804 * v1380 - v777 * v1222); s715 += v1393;
+        const V v1394 = w[1] * (v804 * v1382 - v780 * v1222); s720 += v1394;
+        const V v1395 = w[1] * (v804 * v1381 - v777 * v1223); s725 += v1395;
+        const V v1396 = w[1] * (v804 * v1383 - v780 * v1223); s730 += v1396;
+        const V v1397 = w[1] * (v804 * v1388 - v771 * v1222); s717 += v1397;
+        const V v1398 = w[1] * (v804 * v1390 - v779 * v1222); s719 += v1398;
+        const V v1399 = w[1] * (v804 * v1389 - v771 * v1223); s727 += v1399;
+        const V v1400 = w[1] * (v804 * v1391 - v779 * v1223); s729 += v1400;
+        const V v1401 = w[1] * (v771 * v1218 + v796 * v1388); s677 += v1401;
+        const V v1402 = w[1] * (v779 * v1218 + v796 * v1390); s679 += v1402;
+        const V v1403 = w[1] * (v779 * v1219 + v796 * v1391); s689 += v1403;
+        const V v1404 = w[1] * (v777 * v1218 + v796 * v1380); s675 += v1404;
+        const V v1405 = w[1] * (v780 * v1218 + v796 * v1382); s680 += v1405;
+        const V v1406 = w[1] * (v777 * v1219 + v796 * v1381); s685 += v1406;
+        const V v1407 = w[1] * (v771 * v1219 + v796 * v1389); s687 += v1407;
+        const V v1408 = w[1] * (v780 * v1219 + v796 * v1383); s690 += v1408;
+        const V v1409 = w[1] * (v777 * v1220 + v798 * v1380); s695 += v1409;
+        const V v1410 = w[1] * (v780 * v1220 + v798 * v1382); s700 += v1410;
+        const V v1411 = w[1] * (v777 * v1221 + v798 * v1381); s705 += v1411;
+        const V v1412 = w[1] * (v771 * v1221 + v798 * v1389); s707 += v1412;
+        const V v1413 = w[1] * (v780 * v1221 + v798 * v1383); s710 += v1413;
+        const V v1414 = w[1] * (v771 * v1220 + v798 * v1388); s697 += v1414;
+        const V v1415 = w[1] * (v779 * v1220 + v798 * v1390); s699 += v1415;
+        const V v1416 = w[1] * (v779 * v1221 + v798 * v1391); s709 += v1416;
+        const V v1417 = w[1] * (v1272 - v895 * v1388); s737 += v1417;
+        const V v1418 = w[1] * (v1276 - v895 * v1390); s739 += v1418;
+        const V v1419 = w[1] * (v1269 - v895 * v1381); s745 += v1419;
+        const V v1420 = w[1] * (v1277 - v895 * v1391); s749 += v1420;
+        const V v1421 = w[1] * (v1279 - v895 * v1383); s750 += v1421;
+        const V v1422 = w[1] * (v1272 + v896 * v1388); s757 += v1422;
+        const V v1423 = w[1] * (v1276 + v896 * v1390); s759 += v1423;
+        const V v1424 = w[1] * (v1269 + v896 * v1381); s765 += v1424;
+        const V v1425 = w[1] * (v1277 + v896 * v1391); s769 += v1425;
+        const V v1426 = w[1] * (v1279 + v896 * v1383); s770 += v1426;
+        const V v1427 = w[1] * (v1268 - v895 * v1380); s735 += v1427;
+        const V v1428 = w[1] * (v1268 + v896 * v1380); s755 += v1428;
+        const V v1429 = w[1] * (v1278 - v895 * v1382); s740 += v1429;
+        const V v1430 = w[1] * (v1278 + v896 * v1382); s760 += v1430;
+        const V v1431 = w[1] * (v1273 - v895 * v1389); s747 += v1431;
+        const V v1432 = w[1] * (v1273 + v896 * v1389); s767 += v1432;
+        const V v1433 = w[1] * (v544 * v1198 + v774 * v1232 + v866 * v1243); s652 += v1433;
+        const V v1434 = w[1] * (v544 * v1200 + v774 * v1231 + v867 * v1243); s662 += v1434;
+        const V v1435 = w[1] * (v542 * v1198 + v778 * v1232 + v866 * v1245); s656 += v1435;
+        const V v1436 = w[1] * (v542 * v1200 + v778 * v1231 + v867 * v1245); s666 += v1436;
+        const V v1437 = w[1] * (v551 * v1198 + v771 * v1232 + v866 * v1246); s657 += v1437;
+        const V v1438 = w[1] * (v551 * v1200 + v771 * v1231 + v867 * v1246); s667 += v1438;
     }
-    softehl_store2(R + 12, 14, s566, s572); softehl_store4(R + 0, 14, s607, s606, s605, s604);
-    softehl_store4(K + 164, 196, s608, s594, s609, s595);
-    softehl_store4(K + 192, 196, s610, s596, s611, s597);
-    softehl_store4(K + 24, 196, s614, s576, s615, s577);
-    softehl_store4(K + 52, 196, s618, s580, s619, s581);
-    softehl_store4(K + 80, 196, s622, s584, s623, s585);
-    softehl_store4(K + 140, 196, s632, s633, s634, s635);
-    softehl_store4(K + 144, 196, s636, s637, s638, s639);
-    softehl_store4(K + 148, 196, s640, s641, s568, softehl_splat(0.0));
-    softehl_store4(K + 168, 196, s642, s643, s644, s645);
-    softehl_store4(K + 172, 196, s646, s647, s648, s649);
-    softehl_store4(K + 176, 196, s650, s651, s570, softehl_splat(0.0));
-    softehl_store4(K + 152, 196, s569, softehl_splat(0.0), s652, s653);
-    softehl_store4(K + 156, 196, s654, s655, s656, s657);
-    softehl_store4(K + 160, 196, s658, s659, s660, s661);
-    softehl_store4(K + 180, 196, s571, softehl_splat(0.0), s662, s663);
-    softehl_store4(K + 184, 196, s664, s665, s666, s667);
-    softehl_store4(K + 188, 196, s668, s669, s670, s671);
-    softehl_store4(K + 0, 196, s672, s673, s674, s675);
-    softehl_store4(K + 4, 196, s676, s677, s678, s679);
-    softehl_store4(K + 8, 196, s680, s681, s612, s574);
-    softehl_store4(K + 12, 196, s613, s575, s682, s683);
-    softehl_store4(K + 16, 196, s684, s685, s686, s687);
-    softehl_store4(K + 20, 196, s688, s689, s690, s691);
-    softehl_store4(K + 28, 196, s692, s693, s694, s695);
-    softehl_store4(K + 32, 196, s696, s697, s698, s699);
-    softehl_store4(K + 36, 196, s700, s701, s616, s578);
-    softehl_store4(K + 40, 196, s617, s579, s702, s703);
-    softehl_store4(K + 44, 196, s704, s705, s706, s707);
-    softehl_store4(K + 48, 196, s708, s709, s710, s711);
-    softehl_store4(K + 56, 196, s712, s713, s714, s715);
-    softehl_store4(K + 60, 196, s716, s717, s718, s719);
-    softehl_store4(K + 64, 196, s720, s721, s620, s582);
-    softehl_store4(K + 68, 196, s621, s583, s722, s723);
-    softehl_store4(K + 72, 196, s724, s725, s726, s727);
-    softehl_store4(K + 76, 196, s728, s729, s730, s731);
-    softehl_store4(K + 84, 196, s732, s733, s734, s735);
-    softehl_store4(K + 88, 196, s736, s737, s738, s739);
-    softehl_store4(K + 100, 196, s744, s745, s746, s747);
-    softehl_store4(K + 104, 196, s748, s749, s750, s751);
-    softehl_store4(R + 8, 14, -s599, -s598, s567, s573);
-    softehl_store4(R + 4, 14, s603, s602, -s601, -s600);
-    softehl_store4(K + 92, 196, s740, s741, -s624, s586);
-    softehl_store4(K + 96, 196, -s625, s587, s742, s743);
-    softehl_store4(K + 108, 196, -s626, s588, -s627, s589);
-    softehl_store4(K + 136, 196, -s630, s592, -s631, s593);
-    softehl_store4(K + 112, 196, -s752, -s753, -s754, -s755);
-    softehl_store4(K + 116, 196, -s756, -s757, -s758, -s759);
-    softehl_store4(K + 120, 196, -s760, -s761, -s628, s590);
-    softehl_store4(K + 124, 196, -s629, s591, -s762, -s763);
-    softehl_store4(K + 128, 196, -s764, -s765, -s766, -s767);
-    softehl_store4(K + 132, 196, -s768, -s769, -s770, -s771);
+    softehl_store2(R + 12, 14, s565, s571); softehl_store4(R + 0, 14, s606, s605, s604, s603);
+    softehl_store4(K + 164, 196, s607, s593, s608, s594);
+    softehl_store4(K + 192, 196, s609, s595, s610, s596);
+    softehl_store4(K + 24, 196, s613, s575, s614, s576);
+    softehl_store4(K + 52, 196, s617, s579, s618, s580);
+    softehl_store4(K + 80, 196, s621, s583, s622, s584);
+    softehl_store4(K + 140, 196, s631, s632, s633, s634);
+    softehl_store4(K + 144, 196, s635, s636, s637, s638);
+    softehl_store4(K + 148, 196, s639, s640, s567, softehl_splat(0.0));
+    softehl_store4(K + 168, 196, s641, s642, s643, s644);
+    softehl_store4(K + 172, 196, s645, s646, s647, s648);
+    softehl_store4(K + 176, 196, s649, s650, s569, softehl_splat(0.0));
+    softehl_store4(K + 152, 196, s568, softehl_splat(0.0), s651, s652);
+    softehl_store4(K + 156, 196, s653, s654, s655, s656);
+    softehl_store4(K + 160, 196, s657, s658, s659, s660);
+    softehl_store4(K + 180, 196, s570, softehl_splat(0.0), s661, s662);
+    softehl_store4(K + 184, 196, s663, s664, s665, s666);
+    softehl_store4(K + 188, 196, s667, s668, s669, s670);
+    softehl_store4(K + 0, 196, s671, s672, s673, s674);
+    softehl_store4(K + 4, 196, s675, s676, s677, s678);
+    softehl_store4(K + 8, 196, s679, s680, s611, s573);
+    softehl_store4(K + 12, 196, s612, s574, s681, s682);
+    softehl_store4(K + 16, 196, s683, s684, s685, s686);
+    softehl_store4(K + 20, 196, s687, s688, s689, s690);
+    softehl_store4(K + 28, 196, s691, s692, s693, s694);
+    softehl_store4(K + 32, 196, s695, s696, s697, s698);
+    softehl_store4(K + 36, 196, s699, s700, s615, s577);
+    softehl_store4(K + 40, 196, s616, s578, s701, s702);
+    softehl_store4(K + 44, 196, s703, s704, s705, s706);
+    softehl_store4(K + 48, 196, s707, s708, s709, s710);
+    softehl_store4(K + 56, 196, s711, s712, s713, s714);
+    softehl_store4(K + 60, 196, s715, s716, s717, s718);
+    softehl_store4(K + 64, 196, s719, s720, s619, s581);
+    softehl_store4(K + 68, 196, s620, s582, s721, s722);
+    softehl_store4(K + 72, 196, s723, s724, s725, s726);
+    softehl_store4(K + 76, 196, s727, s728, s729, s730);
+    softehl_store4(K + 84, 196, s731, s732, s733, s734);
+    softehl_store4(K + 88, 196, s735, s736, s737, s738);
+    softehl_store4(K + 100, 196, s743, s744, s745, s746);
+    softehl_store4(K + 104, 196, s747, s748, s749, s750);
+    softehl_store4(R + 8, 14, -s598, -s597, s566, s572);
+    softehl_store4(R + 4, 14, s602, s601, -s600, -s599);
+    softehl_store4(K + 92, 196, s739, s740, -s623, s585);
+    softehl_store4(K + 96, 196, -s624, s586, s741, s742);
+    softehl_store4(K + 108, 196, -s625, s587, -s626, s588);
+    softehl_store4(K + 136, 196, -s629, s591, -s630, s592);
+    softehl_store4(K + 112, 196, -s751, -s752, -s753, -s754);
+    softehl_store4(K + 116, 196, -s755, -s756, -s757, -s758);
+    softehl_store4(K + 120, 196, -s759, -s760, -s627, s589);
+    softehl_store4(K + 124, 196, -s628, s590, -s761, -s762);
+    softehl_store4(K + 128, 196, -s763, -s764, -s765, -s766);
+    softehl_store4(K + 132, 196, -s767, -s768, -s769, -s770);
 }
 SOFTEHL_BATCH(softehl_mortar_32_tangent, 10, 14, 15, 0, 14, (14 * 14))

@@ -55,193 +55,202 @@ SOFTEHL_GROUP(softehl_mortar_33_residual)
     const V v1 = X0 + d0, v2 = X2 + d2, v3 = X4 + d4, v4 = 2.0 * X4, v5 = X0 + a0, v6 = X6 + d6,
         v7 = X2 + a1, v8 = X4 + a2, v9 = X1 + d1, v10 = X6 + a3, v11 = X3 + d3, v12 = X1 + a6,
         v13 = X8 + d8, v14 = X3 + a7, v15 = X9 + d9, v16 = X10 + d10, v17 = X10 + a5, v18 = X8 + a4,
-        v19 = X11 + d11, v20 = X9 + a10, v21 = 1.0 / a12, v22 = X11 + a11, v23 = X5 + a8,
-        v24 = 2.0 * X5, v25 = X5 + d5, v26 = X7 + a9, v27 = X7 + d7, v28 = v13 - v6,
-        v29 = v15 - v27, v30 = 0.5 * (v13 + v6) - v16, v31 = 0.5 * (v2 + v1), v32 = 0.5 * (v2 - v1),
-        v33 = 0.5 * (v15 + v27) - v19, v34 = 0.5 * (v11 + v9), v35 = 0.5 * (v11 - v9),
-        v36 = 1.0 / (v32 * v32 + v35 * v35), v37 = (v32 * (v13 - v31) + v35 * (v15 - v34)) * v36;
-    const M v38 = softehl_lt(softehl_splat(1.0), v37);
-    const V v39 = softehl_blend(v38, softehl_splat(1.0), v37); const M v40 = softehl_eq(v39, v39);
-    const V v41 = (v32 * (v6 - v31) + v35 * (v27 - v34)) * v36;
-    const M v42 = softehl_lt(softehl_splat(1.0), v41);
-    const V v43 = softehl_blend(v42, softehl_splat(1.0), v41); const M v44 = softehl_eq(v43, v43);
-    V v45 = softehl_splat(0.0); const M m46 = v40;
-    if (softehl_any(m46)) {
-        const M v47 = softehl_lt(softehl_splat((-1.0)), v39);
-        const V v48 = softehl_blend(v47, v39, softehl_splat((-1.0)));
-        v45 = softehl_blend(m46, v48, v45);
+        v19 = X11 + d11, v20 = X9 + a10;
+    const M v21 = softehl_lt(softehl_splat(0.0), a13);
+    const V v22 = 1.0 / a12, v23 = X11 + a11, v24 = X5 + a8, v25 = X7 + a9, v26 = X7 + d7,
+        v27 = 2.0 * X5, v28 = X5 + d5, v29 = v15 - v26, v30 = v13 - v6,
+        v31 = 0.5 * (v13 + v6) - v16, v32 = 0.5 * (v2 + v1), v33 = 0.5 * (v15 + v26) - v19,
+        v34 = 0.5 * (v2 - v1), v35 = 0.5 * (v11 + v9), v36 = 0.5 * (v11 - v9),
+        v37 = 1.0 / (v34 * v34 + v36 * v36), v38 = (v34 * (v13 - v32) + v36 * (v15 - v35)) * v37;
+    const M v39 = softehl_lt(softehl_splat(1.0), v38);
+    const V v40 = softehl_blend(v39, softehl_splat(1.0), v38); const M v41 = softehl_eq(v40, v40);
+    const V v42 = (v34 * (v6 - v32) + v36 * (v26 - v35)) * v37;
+    const M v43 = softehl_lt(softehl_splat(1.0), v42);
+    const V v44 = softehl_blend(v43, softehl_splat(1.0), v42); const M v45 = softehl_eq(v44, v44);
+    V v46 = softehl_splat(0.0); const M m47 = v41;
+    if (softehl_any(m47)) {
+        const M v48 = softehl_lt(softehl_splat((-1.0)), v40);
+        const V v49 = softehl_blend(v48, v40, softehl_splat((-1.0)));
+        v46 = softehl_blend(m47, v49, v46);
     }
-    const M m49 = ~v40;
-    if (softehl_any(m49)) {
-        const V v50 = (-1.0) - v39, v51 = v50 * (v50 * v50);
-        v45 = softehl_blend(m49, v51, v45);
+    const M m50 = ~v41;
+    if (softehl_any(m50)) {
+        const V v51 = (-1.0) - v40, v52 = v51 * (v51 * v51);
+        v46 = softehl_blend(m50, v52, v46);
     }
-    V v52 = softehl_splat(0.0); const M m53 = v44;
-    if (softehl_any(m53)) {
-        const M v54 = softehl_lt(softehl_splat((-1.0)), v43);
-        const V v55 = softehl_blend(v54, v43, softehl_splat((-1.0)));
-        v52 = softehl_blend(m53, v55, v52);
+    V v53 = softehl_splat(0.0); const M m54 = v45;
+    if (softehl_any(m54)) {
+        const M v55 = softehl_lt(softehl_splat((-1.0)), v44);
+        const V v56 = softehl_blend(v55, v44, softehl_splat((-1.0)));
+        v53 = softehl_blend(m54, v56, v53);
     }
-    const M m56 = ~v44;
-    if (softehl_any(m56)) {
-        const V v57 = (-1.0) - v43, v58 = v57 * (v57 * v57);
-        v52 = softehl_blend(m56, v58, v52);
+    const M m57 = ~v45;
+    if (softehl_any(m57)) {
+        const V v58 = (-1.0) - v44, v59 = v58 * (v58 * v58);
+        v53 = softehl_blend(m57, v59, v53);
     }
-    const V v59 = 0.5 + v45, v60 = 2.0 * v45, v61 = 0.5 * v45, v62 = v61 * (1.0 + v45),
-        v63 = v45 - 0.5, v64 = v61 * (v45 - 1.0), v65 = v45 * v45 - 1.0, v66 = 0.5 + v52,
-        v67 = 2.0 * v52, v68 = 0.5 * v52, v69 = v68 * (1.0 + v52), v70 = v52 - 0.5,
-        v71 = v52 * v52 - 1.0, v72 = v68 * (v52 - 1.0), v73 = v1 * v70 + (v2 * v66 - v3 * v67),
-        v74 = v9 * v70 + (v11 * v66 - v25 * v67), v75 = v1 * v63 + (v2 * v59 - v3 * v60),
-        v76 = v9 * v63 + (v11 * v59 - v25 * v60),
-        v77 = v73 * (v3 * v71 + (v6 - v2 * v69) - v1 * v72) + v74 * (v25 * v71 + (v27 - v11 * v69) - v9 * v72),
-        v78 = (v3 * v65 + (v13 - v2 * v62) - v1 * v64) * v75 + (v25 * v65 + (v15 - v11 * v62) - v9 * v64) * v76,
-        v79 = v52 + v77 * (1.0 / (v73 * v73 + v74 * v74)),
-        v80 = v45 + v78 * (1.0 / (v75 * v75 + v76 * v76));
-    const M v81 = softehl_lt(softehl_splat(1.0), v80);
-    const V v82 = softehl_blend(v81, softehl_splat(1.0), v80);
-    const M v83 = softehl_eq(v82, v82), v84 = softehl_lt(softehl_splat(1.0), v79);
-    const V v85 = softehl_blend(v84, softehl_splat(1.0), v79); const M v86 = softehl_eq(v85, v85);
-    V v87 = softehl_splat(0.0); const M m88 = v83;
-    if (softehl_any(m88)) {
-        const M v89 = softehl_lt(softehl_splat((-1.0)), v82);
-        const V v90 = softehl_blend(v89, v82, softehl_splat((-1.0)));
-        v87 = softehl_blend(m88, v90, v87);
+    const V v60 = 0.5 + v46, v61 = 2.0 * v46, v62 = 0.5 * v46, v63 = v62 * (1.0 + v46),
+        v64 = v46 - 0.5, v65 = v62 * (v46 - 1.0), v66 = v46 * v46 - 1.0, v67 = 0.5 + v53,
+        v68 = 2.0 * v53, v69 = 0.5 * v53, v70 = v69 * (1.0 + v53), v71 = v53 - 0.5,
+        v72 = v53 * v53 - 1.0, v73 = v69 * (v53 - 1.0), v74 = v1 * v71 + (v2 * v67 - v3 * v68),
+        v75 = v9 * v71 + (v11 * v67 - v28 * v68), v76 = v1 * v64 + (v2 * v60 - v3 * v61),
+        v77 = v9 * v64 + (v11 * v60 - v28 * v61),
+        v78 = v74 * (v3 * v72 + (v6 - v2 * v70) - v1 * v73) + v75 * (v28 * v72 + (v26 - v11 * v70) - v9 * v73),
+        v79 = (v3 * v66 + (v13 - v2 * v63) - v1 * v65) * v76 + (v28 * v66 + (v15 - v11 * v63) - v9 * v65) * v77,
+        v80 = v53 + v78 * (1.0 / (v74 * v74 + v75 * v75)),
+        v81 = v46 + v79 * (1.0 / (v76 * v76 + v77 * v77));
+    const M v82 = softehl_lt(softehl_splat(1.0), v81);
+    const V v83 = softehl_blend(v82, softehl_splat(1.0), v81);
+    const M v84 = softehl_eq(v83, v83), v85 = softehl_lt(softehl_splat(1.0), v80);
+    const V v86 = softehl_blend(v85, softehl_splat(1.0), v80); const M v87 = softehl_eq(v86, v86);
+    V v88 = softehl_splat(0.0); const M m89 = v84;
+    if (softehl_any(m89)) {
+        const M v90 = softehl_lt(softehl_splat((-1.0)), v83);
+        const V v91 = softehl_blend(v90, v83, softehl_splat((-1.0)));
+        v88 = softehl_blend(m89, v91, v88);
     }
-    const M m91 = ~v83;
-    if (softehl_any(m91)) {
-        const V v92 = (-1.0) - v82, v93 = v92 * (v92 * v92);
-        v87 = softehl_blend(m91, v93, v87);
+    const M m92 = ~v84;
+    if (softehl_any(m92)) {
+        const V v93 = (-1.0) - v83, v94 = v93 * (v93 * v93);
+        v88 = softehl_blend(m92, v94, v88);
     }
-    V v94 = softehl_splat(0.0); const M m95 = v86;
-    if (softehl_any(m95)) {
-        const M v96 = softehl_lt(softehl_splat((-1.0)), v85);
-        const V v97 = softehl_blend(v96, v85, softehl_splat((-1.0)));
-        v94 = softehl_blend(m95, v97, v94);
+    V v95 = softehl_splat(0.0); const M m96 = v87;
+    if (softehl_any(m96)) {
+        const M v97 = softehl_lt(softehl_splat((-1.0)), v86);
+        const V v98 = softehl_blend(v97, v86, softehl_splat((-1.0)));
+        v95 = softehl_blend(m96, v98, v95);
     }
-    const M m98 = ~v86;
-    if (softehl_any(m98)) {
-        const V v99 = (-1.0) - v85, v100 = v99 * (v99 * v99);
-        v94 = softehl_blend(m98, v100, v94);
+    const M m99 = ~v87;
+    if (softehl_any(m99)) {
+        const V v100 = (-1.0) - v86, v101 = v100 * (v100 * v100);
+        v95 = softehl_blend(m99, v101, v95);
     }
-    const V v101 = v94 - v87; const M v102 = softehl_eq(v101, v101); V v103 = softehl_splat(0.0);
-    const M m104 = v102;
-    if (softehl_any(m104)) {
-        const M v105 = softehl_lt(softehl_splat(0.0), v101);
-        const V v106 = softehl_blend(v105, v101, softehl_splat(0.0));
-        v103 = softehl_blend(m104, v106, v103);
+    const V v102 = v95 - v88; const M v103 = softehl_eq(v102, v102); V v104 = softehl_splat(0.0);
+    const M m105 = v103;
+    if (softehl_any(m105)) {
+        const M v106 = softehl_lt(softehl_splat(0.0), v102);
+        const V v107 = softehl_blend(v106, v102, softehl_splat(0.0));
+        v104 = softehl_blend(m105, v107, v104);
     }
-    const M m107 = ~v102;
-    if (softehl_any(m107)) {
-        const V v108 = v87 - v94, v109 = v108 * (v108 * v108);
-        v103 = softehl_blend(m107, v109, v103);
+    const M m108 = ~v103;
+    if (softehl_any(m108)) {
+        const V v109 = v88 - v95, v110 = v109 * (v109 * v109);
+        v104 = softehl_blend(m108, v110, v104);
     }
-    const V v110 = 0.5 * v103, v111 = 0.5 * (v87 + v94);
-    V s112 = {0}, s113 = {0}, s114 = {0}, s115 = {0}, s116 = {0}, s117 = {0}, s118 = {0},
-        s119 = {0}, s120 = {0}, s121 = {0}, s122 = {0}, s123 = {0}, s124 = {0}, s125 = {0},
-        s126 = {0}, s127 = {0};
+    const V v111 = 0.5 * v104, v112 = 0.5 * (v88 + v95);
+    V s113 = {0}, s114 = {0}, s115 = {0}, s116 = {0}, s117 = {0}, s118 = {0}, s119 = {0},
+        s120 = {0}, s121 = {0}, s122 = {0}, s123 = {0}, s124 = {0}, s125 = {0}, s126 = {0},
+        s127 = {0}, s128 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
         const double *restrict w = rule + 2 * q; (void)w;
-        const V v128 = w[0] * v110 + v111, v129 = (-1.0) + v128, v130 = 1.0 + v128,
-            v131 = 0.5 + v128, v132 = (-0.5) + v128, v133 = 1.0 - v128 * v128, v134 = 0.5 * v128,
-            v135 = 2.0 * v128, v136 = v134 * v129, v137 = v134 * v130,
-            v138 = v1 * v132 + (v2 * v131 - v3 * v135),
-            v139 = v9 * v132 + (v11 * v131 - v25 * v135),
-            v140 = v1 * v136 + (v2 * v137 + v3 * v133),
-            v141 = v9 * v136 + (v11 * v137 + v25 * v133),
-            v142 = softehl_vsqrt(v138 * v138 + v139 * v139), v143 = 1.0 / v142, v144 = v138 * v143,
-            v145 = v139 * v143, v146 = (v16 - v140) * v144 + (v19 - v141) * v145,
-            v147 = 0.5 * (v28 * v144 + v29 * v145), v148 = v147 * v147, v149 = 0.01 * v148,
-            v150 = v148 - v146 * (4.0 * (v30 * v144 + v33 * v145));
-        const M v151 = softehl_lt(v149, v150);
-        const V v152 = softehl_blend(v151, v150, v149), v153 = softehl_vsqrt(v152),
-            v154 = 0.5 - v134, v155 = 0.5 + v134, v156 = d12 * v154 + d14 * v155,
-            v157 = 2.0 * v146 * (1.0 / (v147 - v153)), v158 = 1.0 - v157 * v157, v159 = 0.5 * v157,
-            v160 = v159 * ((-1.0) - v157), v161 = v159 * (1.0 - v157),
-            v162 = v145 * (v16 * v158 - v140 - v6 * v160 - v13 * v161) - v144 * (v19 * v158 - v141 - v27 * v160 - v15 * v161),
-            v163 = a12 * v162, v164 = v156 - v163;
-        const M v165 = softehl_eq(v164, v164);
-        V v166 = softehl_splat(0.0), v167 = softehl_splat(0.0);
-        const M m168 = v165;
-        if (softehl_any(m168)) {
-            const M v169 = softehl_le(softehl_splat(0.0), v164);
-            V v170 = softehl_splat(0.0), v171 = softehl_splat(0.0);
-            const M m172 = v169 & m168;
-            if (softehl_any(m172)) {
-                const V v173 = (a14 + v162) * (v162 - a15); const M v174 = softehl_eq(v173, v173);
-                V v175 = softehl_splat(0.0); const M m176 = v174 & m172;
-                if (softehl_any(m176)) {
-                    const M v177 = softehl_lt(v173, softehl_splat(0.0));
-                    const V v178 = softehl_blend(v177, v164, softehl_splat(0.0));
-                    v175 = softehl_blend(m176, v178, v175);
+        const V v129 = w[0] * v111 + v112, v130 = (-1.0) + v129, v131 = 1.0 + v129,
+            v132 = 0.5 + v129, v133 = (-0.5) + v129, v134 = 1.0 - v129 * v129, v135 = 0.5 * v129,
+            v136 = 2.0 * v129, v137 = v135 * v130, v138 = v135 * v131,
+            v139 = v1 * v133 + (v2 * v132 - v3 * v136),
+            v140 = v9 * v133 + (v11 * v132 - v28 * v136),
+            v141 = v1 * v137 + (v2 * v138 + v3 * v134),
+            v142 = v9 * v137 + (v11 * v138 + v28 * v134),
+            v143 = softehl_vsqrt(v139 * v139 + v140 * v140), v144 = 1.0 / v143, v145 = v139 * v144,
+            v146 = v140 * v144, v147 = (v16 - v141) * v145 + (v19 - v142) * v146,
+            v148 = 0.5 * (v30 * v145 + v29 * v146), v149 = v148 * v148, v150 = 0.01 * v149,
+            v151 = v149 - v147 * (4.0 * (v31 * v145 + v33 * v146));
+        const M v152 = softehl_lt(v150, v151);
+        const V v153 = softehl_blend(v152, v151, v150), v154 = softehl_vsqrt(v153),
+            v155 = 0.5 - v135, v156 = 0.5 + v135, v157 = d12 * v155 + d14 * v156,
+            v158 = 2.0 * v147 * (1.0 / (v148 - v154)), v159 = 1.0 - v158 * v158, v160 = 0.5 * v158,
+            v161 = v160 * ((-1.0) - v158), v162 = v160 * (1.0 - v158),
+            v163 = v146 * (v16 * v159 - v141 - v6 * v161 - v13 * v162) - v145 * (v19 * v159 - v142 - v26 * v161 - v15 * v162),
+            v164 = a12 * v163, v165 = v157 - v164;
+        const M v166 = softehl_eq(v165, v165);
+        V v167 = softehl_splat(0.0), v168 = softehl_splat(0.0);
+        const M m169 = v166;
+        if (softehl_any(m169)) {
+            const M v170 = softehl_le(softehl_splat(0.0), v165);
+            V v171 = softehl_splat(0.0), v172 = softehl_splat(0.0);
+            const M m173 = v170 & m169;
+            if (softehl_any(m173)) {
+                const V v174 = (a14 + v163) * (v163 - a15); const M v175 = softehl_eq(v174, v174);
+                V v176 = softehl_splat(0.0); const M m177 = v175 & m173;
+                if (softehl_any(m177)) {
+                    const M v178 = softehl_lt(v174, softehl_splat(0.0));
+                    const V v179 = softehl_blend(v178, v165, softehl_splat(0.0));
+                    v176 = softehl_blend(m177, v179, v176);
                 }
-                const M m179 = ~v174 & m172;
-                if (softehl_any(m179)) {
-                    const V v180 = v173 * (v173 * v173); v175 = softehl_blend(m179, v180, v175);
+                const M m180 = ~v175 & m173;
+                if (softehl_any(m180)) {
+                    const V v181 = v174 * (v174 * v174); v176 = softehl_blend(m180, v181, v176);
                 }
-                const V v181 = a13 * v175; const M v182 = softehl_eq(v181, v181);
-                const V v183 = v17 * v158 - v5 * v136 - v7 * v137 - v8 * v133 - v10 * v160 - v18 * v161,
-                    v184 = v22 * v158 - v12 * v136 - v14 * v137 - v23 * v133 - v26 * v160 - v20 * v161,
-                    v185 = d13 * v154 + d15 * v155 + a12 * (v144 * v183 + v145 * v184);
-                const M v186 = softehl_eq(v185, v185), v187 = v182 & v186;
-                V v188 = softehl_splat(0.0); const M m189 = v187 & m172;
-                if (softehl_any(m189)) {
-                    const M v190 = softehl_lt(v181, v185); V v191 = v181;
-                    const M m192 = ~v190 & m189;
-                    if (softehl_any(m192)) {
-                        V v193 = softehl_splat(0.0); const M m194 = v182 & m192;
-                        if (softehl_any(m194)) {
-                            const M v195 = softehl_lt(v181, -v185); V v196 = v185;
-                            const M m197 = v195 & m194;
-                            if (softehl_any(m197)) {
-                                const V v198 = -v181; v196 = softehl_blend(m197, v198, v196);
+                const V v182 = a13 * v176; const M v183 = softehl_eq(v182, v182);
+                const V v184 = v17 * v159 - v5 * v137 - v7 * v138 - v8 * v134 - v10 * v161 - v18 * v162,
+                    v185 = v23 * v159 - v12 * v137 - v14 * v138 - v24 * v134 - v25 * v161 - v20 * v162,
+                    v186 = d13 * v155 + d15 * v156 + a12 * (v145 * v184 + v146 * v185);
+                const M v187 = softehl_eq(v186, v186), v188 = v183 & v187;
+                V v189 = softehl_splat(0.0); const M m190 = v188 & m173;
+                if (softehl_any(m190)) {
+                    const M v191 = softehl_lt(v182, v186); V v192 = v182;
+                    const M m193 = ~v191 & m190;
+                    if (softehl_any(m193)) {
+                        const V v194 = -v186;
+                        const M v195 = softehl_eq(v194, v194), v196 = v183 & v195;
+                        V v197 = softehl_splat(0.0); const M m198 = v196 & m193;
+                        if (softehl_any(m198)) {
+                            const M v199 = softehl_lt(v182, v194); V v200 = softehl_splat(0.0);
+                            const M m201 = v199 & m198;
+                            if (softehl_any(m201)) {
+                                const V v202 = -v182; v200 = softehl_blend(m201, v202, v200);
                             }
-                            v193 = softehl_blend(m194, v196, v193);
+                            const M m203 = ~v199 & m198;
+                            if (softehl_any(m203)) {
+                                const V v204 = softehl_blend(v21, v186, softehl_splat(0.0));
+                                v200 = softehl_blend(m203, v204, v200);
+                            }
+                            v197 = softehl_blend(m198, v200, v197);
                         }
-                        const M m199 = ~v182 & m192;
-                        if (softehl_any(m199)) {
-                            const V v200 = v185 + v181, v201 = v200 * (v200 * v200);
-                            v193 = softehl_blend(m199, v201, v193);
+                        const M m205 = ~v196 & m193;
+                        if (softehl_any(m205)) {
+                            const V v206 = v186 + v182, v207 = v206 * (v206 * v206);
+                            v197 = softehl_blend(m205, v207, v197);
                         }
-                        v191 = softehl_blend(m192, v193, v191);
+                        v192 = softehl_blend(m193, v197, v192);
                     }
-                    v188 = softehl_blend(m189, v191, v188);
+                    v189 = softehl_blend(m190, v192, v189);
                 }
-                const M m202 = ~v187 & m172;
-                if (softehl_any(m202)) {
-                    const V v203 = v181 - v185, v204 = v203 * (v203 * v203);
-                    v188 = softehl_blend(m202, v204, v188);
+                const M m208 = ~v188 & m173;
+                if (softehl_any(m208)) {
+                    const V v209 = v182 - v186, v210 = v209 * (v209 * v209);
+                    v189 = softehl_blend(m208, v210, v189);
                 }
-                v170 = softehl_blend(m172, v175, v170); v171 = softehl_blend(m172, v188, v171);
+                v171 = softehl_blend(m173, v176, v171); v172 = softehl_blend(m173, v189, v172);
             }
-            v166 = softehl_blend(m168, v170, v166); v167 = softehl_blend(m168, v171, v167);
+            v167 = softehl_blend(m169, v171, v167); v168 = softehl_blend(m169, v172, v168);
         }
-        const M m205 = ~v165;
-        if (softehl_any(m205)) {
-            const V v206 = v163 - v156, v207 = v206 * (v206 * v206);
-            v166 = softehl_blend(m205, v207, v166); v167 = softehl_blend(m205, v207, v167);
+        const M m211 = ~v166;
+        if (softehl_any(m211)) {
+            const V v212 = v164 - v157, v213 = v212 * (v212 * v212);
+            v167 = softehl_blend(m211, v213, v167); v168 = softehl_blend(m211, v213, v168);
         }
-        const V v208 = v21 * w[1], v209 = w[1] * v137, v210 = w[1] * v136, v211 = w[1] * v160,
-            v212 = w[1] * v158, v213 = w[1] * v161, v214 = w[1] * v133, v215 = v208 * v155,
-            v216 = v208 * v154, v217 = X3 * v131 + (X1 * v132 - v24 * v128),
-            v218 = X2 * v131 + (X0 * v132 - v4 * v128),
-            v219 = softehl_vsqrt(v217 * v217 + v218 * v218),
-            v220 = 6.283185307179586 * (X5 * v133 + v128 * (0.5 * (X1 * v129 + X3 * v130))),
-            v221 = (1.0 + a16 * ((-1.0) + v220)) * (v110 * v219), v222 = v166 * v221,
-            v223 = v167 * v221, v224 = (v145 * v166 + v144 * v167) * v221,
-            v225 = (v145 * v167 - v144 * v166) * v221, v226 = v215 * v222;
-        s112 += v226; const V v227 = v216 * v222; s113 += v227; const V v228 = v215 * v223;
-        s114 += v228; const V v229 = v216 * v223; s115 += v229; const V v230 = v211 * v225;
-        s120 += v230; const V v231 = v211 * v224; s121 += v231; const V v232 = v214 * v225;
-        s122 += v232; const V v233 = v214 * v224; s123 += v233; const V v234 = v209 * v225;
-        s124 += v234; const V v235 = v209 * v224; s125 += v235; const V v236 = v210 * v225;
-        s126 += v236; const V v237 = v210 * v224; s127 += v237; const V v238 = v212 * v224;
-        s117 += v238; const V v239 = v212 * v225; s116 += v239; const V v240 = v213 * v224;
-        s119 += v240; const V v241 = v213 * v225; s118 += v241;
+        const V v214 = v22 * w[1], v215 = w[1] * v138, v216 = w[1] * v137, v217 = w[1] * v161,
+            v218 = w[1] * v159, v219 = w[1] * v162, v220 = w[1] * v134, v221 = v214 * v156,
+            v222 = v214 * v155, v223 = X3 * v132 + (X1 * v133 - v27 * v129),
+            v224 = X2 * v132 + (X0 * v133 - v4 * v129),
+            v225 = softehl_vsqrt(v223 * v223 + v224 * v224),
+            v226 = 6.283185307179586 * (X5 * v134 + v129 * (0.5 * (X1 * v130 + X3 * v131))),
+            v227 = (1.0 + a16 * ((-1.0) + v226)) * (v111 * v225), v228 = v167 * v227,
+            v229 = v168 * v227, v230 = (v146 * v167 + v145 * v168) * v227,
+            v231 = (v146 * v168 - v145 * v167) * v227, v232 = v221 * v228;
+        s113 += v232; const V v233 = v222 * v228; s114 += v233; const V v234 = v221 * v229;
+        s115 += v234; const V v235 = v222 * v229; s116 += v235; const V v236 = v217 * v231;
+        s121 += v236; const V v237 = v217 * v230; s122 += v237; const V v238 = v220 * v231;
+        s123 += v238; const V v239 = v220 * v230; s124 += v239; const V v240 = v215 * v231;
+        s125 += v240; const V v241 = v215 * v230; s126 += v241; const V v242 = v216 * v231;
+        s127 += v242; const V v243 = v216 * v230; s128 += v243; const V v244 = v218 * v230;
+        s118 += v244; const V v245 = v218 * v231; s117 += v245; const V v246 = v219 * v230;
+        s120 += v246; const V v247 = v219 * v231; s119 += v247;
     }
-    softehl_store4(R + 12, 16, s113, s115, s112, s114);
-    softehl_store4(R + 4, 16, s123, s122, s121, s120);
-    softehl_store4(R + 0, 16, s127, s126, s125, s124);
-    softehl_store4(R + 8, 16, s119, s118, -s117, -s116);
+    softehl_store4(R + 12, 16, s114, s116, s113, s115);
+    softehl_store4(R + 4, 16, s124, s123, s122, s121);
+    softehl_store4(R + 0, 16, s128, s127, s126, s125);
+    softehl_store4(R + 8, 16, s120, s119, -s118, -s117);
 }
 SOFTEHL_BATCH(softehl_mortar_33_residual, 12, 16, 17, 0, 16, 0)
 
@@ -261,541 +270,544 @@ SOFTEHL_GROUP(softehl_mortar_33_tangent)
     softehl_load4(a + 12, 17, &a12, &a13, &a14, &a15); softehl_load1(a + 16, 17, &a16);
     const V v1 = X4 + d4, v2 = 2.0 * X4, v3 = X6 + d6, v4 = X8 + d8, v5 = X4 + a2, v6 = X10 + d10,
         v7 = X6 + a3, v8 = X5 + d5, v9 = 2.0 * X5, v10 = X8 + a4, v11 = X10 + a5, v12 = X7 + d7,
-        v13 = X5 + a8, v14 = X9 + d9, v15 = X7 + a9, v16 = -a13, v17 = X9 + a10, v18 = X0 + a0,
-        v19 = X2 + a1, v20 = X0 + X2, v21 = X1 + a6, v22 = 0.5 * X1, v23 = X3 + a7, v24 = 0.5 * X3,
-        v25 = X1 + X3, v26 = X11 + a11, v27 = X11 + d11, v28 = X0 + d0, v29 = X1 + d1,
-        v30 = X3 + d3, v31 = X2 + d2, v32 = v30 + v29, v33 = 0.5 * (d1 + d3 + v25), v34 = v25 - v9,
-        v35 = v31 + v28, v36 = v30 - X1, v37 = v31 - X0, v38 = 0.5 * (d0 + d2 + v20),
-        v39 = v20 - v2, v40 = v32 - 2.0 * v8, v41 = v36 - d1, v42 = v37 - d0, v43 = v35 - 2.0 * v1,
-        v44 = 0.5 * v41, v45 = 0.25 * v41, v46 = 1.0 / a12, v47 = -a12, v48 = 0.5 * v42,
-        v49 = 0.25 * v42, v50 = 0.5 * (d12 - d14), v51 = 0.5 * (d14 - d12), v52 = 0.5 * (d13 - d15),
-        v53 = 1.0 / (v48 * v48 + v44 * v44), v54 = 0.5 * (d15 - d13), v55 = 0.5 * (v4 - v3),
-        v56 = v4 - v38, v57 = v3 - v38, v58 = 0.5 * (v14 - v12), v59 = 0.5 * v56, v60 = 0.5 * v57,
-        v61 = 0.5 * (v4 + v3) - v6, v62 = 0.5 * (v14 + v12) - v27, v63 = v14 - v33, v64 = v12 - v33,
-        v65 = 0.5 * v63, v66 = v56 * v48 + v63 * v44, v67 = v57 * v48 + v64 * v44, v68 = 0.5 * v64,
-        v69 = v66 * v53;
-    const M v70 = softehl_lt(softehl_splat(1.0), v69);
-    const V v71 = softehl_blend(v70, softehl_splat(1.0), v69); const M v72 = softehl_eq(v71, v71);
-    const V v73 = v67 * v53; const M v74 = softehl_lt(softehl_splat(1.0), v73);
-    const V v75 = softehl_blend(v74, softehl_splat(1.0), v73); const M v76 = softehl_eq(v75, v75);
-    const V v77 = v53 * v53, v78 = (v60 - v49) * v53, v79 = (v59 - v49) * v53,
-        v80 = 0.5 * (d0 - v37) * v77, v81 = 0.5 * (d1 - v36) * v77, v82 = (v68 - v45) * v53,
-        v83 = (v65 - v45) * v53, v84 = v48 * v77, v85 = v48 * v53, v86 = v44 * v77, v87 = v44 * v53,
-        v88 = v67 * v80 + (v60 + v49) * v53, v89 = (v59 + v49) * v53 + v66 * v80,
-        v90 = v67 * v81 + (v68 + v45) * v53, v91 = (v65 + v45) * v53 + v66 * v81, v92 = v67 * v84,
-        v93 = v66 * v84, v94 = v67 * v86, v95 = v66 * v86;
-    V v96 = softehl_splat(0.0), v97 = softehl_splat(0.0), v98 = softehl_splat(0.0),
-        v99 = softehl_splat(0.0), v100 = softehl_splat(0.0), v101 = softehl_splat(0.0),
-        v102 = softehl_splat(0.0);
-    const M m103 = v72;
-    if (softehl_any(m103)) {
-        const M v104 = softehl_lt(softehl_splat((-1.0)), v71);
-        V v105 = softehl_splat((-1.0)), v106 = softehl_splat(0.0), v107 = softehl_splat(0.0),
-            v108 = softehl_splat(0.0), v109 = softehl_splat(0.0), v110 = softehl_splat(0.0),
-            v111 = softehl_splat(0.0);
-        const M m112 = v104 & m103;
-        if (softehl_any(m112)) {
-            V v113 = v85, v114 = v87, v115 = softehl_splat(0.0), v116 = softehl_splat(0.0),
-                v117 = softehl_splat(0.0), v118 = softehl_splat(0.0);
-            const M m119 = v70 & m112;
-            if (softehl_any(m119)) {
-                v113 = softehl_blend(m119, softehl_splat(0.0), v113);
-                v114 = softehl_blend(m119, softehl_splat(0.0), v114);
+        v13 = X5 + a8, v14 = X9 + d9, v15 = X7 + a9, v16 = X9 + a10, v17 = X0 + a0, v18 = X2 + a1,
+        v19 = X0 + X2, v20 = 0.5 * (d15 - d13), v21 = X1 + a6, v22 = 0.5 * X1, v23 = X3 + a7,
+        v24 = X1 + X3, v25 = 0.5 * X3, v26 = X0 + d0, v27 = X1 + d1, v28 = v19 - v2, v29 = X2 + d2,
+        v30 = X3 + d3, v31 = v29 + v26, v32 = v24 - v9, v33 = v30 + v27;
+    const M v34 = softehl_lt(softehl_splat(0.0), a13);
+    const V v35 = -a13, v36 = 1.0 / a12, v37 = -a12, v38 = X11 + a11, v39 = X11 + d11,
+        v40 = v31 - 2.0 * v1, v41 = v33 - 2.0 * v8, v42 = 0.5 * (v4 - v3), v43 = 0.5 * (v14 - v12),
+        v44 = 0.5 * (v14 + v12) - v39, v45 = 0.5 * (v4 + v3) - v6,
+        v46 = softehl_blend(v34, a12, softehl_splat(0.0)),
+        v47 = softehl_blend(v34, v20, softehl_splat(0.0)), v48 = v29 - X0, v49 = v30 - X1,
+        v50 = 0.5 * (d13 - d15), v51 = 0.5 * (d0 + d2 + v19), v52 = v48 - d0,
+        v53 = 0.5 * (d1 + d3 + v24), v54 = v49 - d1, v55 = v4 - v51, v56 = v3 - v51,
+        v57 = 0.5 * v52, v58 = 0.25 * v52, v59 = v14 - v53, v60 = v12 - v53, v61 = 0.5 * v54,
+        v62 = 0.25 * v54, v63 = 0.5 * v56, v64 = 0.5 * v55, v65 = 0.5 * v60,
+        v66 = v56 * v57 + v60 * v61, v67 = 0.5 * v59, v68 = v55 * v57 + v59 * v61,
+        v69 = 1.0 / (v57 * v57 + v61 * v61), v70 = 0.5 * (d12 - d14), v71 = 0.5 * (d14 - d12),
+        v72 = v68 * v69;
+    const M v73 = softehl_lt(softehl_splat(1.0), v72);
+    const V v74 = softehl_blend(v73, softehl_splat(1.0), v72); const M v75 = softehl_eq(v74, v74);
+    const V v76 = v66 * v69; const M v77 = softehl_lt(softehl_splat(1.0), v76);
+    const V v78 = softehl_blend(v77, softehl_splat(1.0), v76); const M v79 = softehl_eq(v78, v78);
+    const V v80 = v69 * v69, v81 = (v63 - v58) * v69, v82 = (v64 - v58) * v69,
+        v83 = 0.5 * (d0 - v48) * v80, v84 = 0.5 * (d1 - v49) * v80, v85 = (v65 - v62) * v69,
+        v86 = (v67 - v62) * v69, v87 = v57 * v80, v88 = v57 * v69, v89 = v61 * v80, v90 = v61 * v69,
+        v91 = v66 * v83 + (v63 + v58) * v69, v92 = (v64 + v58) * v69 + v68 * v83,
+        v93 = v66 * v84 + (v65 + v62) * v69, v94 = (v67 + v62) * v69 + v68 * v84, v95 = v66 * v87,
+        v96 = v68 * v87, v97 = v66 * v89, v98 = v68 * v89;
+    V v99 = softehl_splat(0.0), v100 = softehl_splat(0.0), v101 = softehl_splat(0.0),
+        v102 = softehl_splat(0.0), v103 = softehl_splat(0.0), v104 = softehl_splat(0.0),
+        v105 = softehl_splat(0.0);
+    const M m106 = v75;
+    if (softehl_any(m106)) {
+        const M v107 = softehl_lt(softehl_splat((-1.0)), v74);
+        V v108 = softehl_splat((-1.0)), v109 = softehl_splat(0.0), v110 = softehl_splat(0.0),
+            v111 = softehl_splat(0.0), v112 = softehl_splat(0.0), v113 = softehl_splat(0.0),
+            v114 = softehl_splat(0.0);
+        const M m115 = v107 & m106;
+        if (softehl_any(m115)) {
+            V v116 = v88, v117 = v90, v118 = softehl_splat(0.0), v119 = softehl_splat(0.0),
+                v120 = softehl_splat(0.0), v121 = softehl_splat(0.0);
+            const M m122 = v73 & m115;
+            if (softehl_any(m122)) {
+                v116 = softehl_blend(m122, softehl_splat(0.0), v116);
+                v117 = softehl_blend(m122, softehl_splat(0.0), v117);
             }
-            const M m120 = ~v70 & m112;
-            if (softehl_any(m120)) {
-                const V v121 = -v89, v122 = -v91, v123 = v79 - v93, v124 = v83 - v95;
-                v115 = softehl_blend(m120, v121, v115); v116 = softehl_blend(m120, v122, v116);
-                v117 = softehl_blend(m120, v123, v117); v118 = softehl_blend(m120, v124, v118);
+            const M m123 = ~v73 & m115;
+            if (softehl_any(m123)) {
+                const V v124 = -v92, v125 = -v94, v126 = v82 - v96, v127 = v86 - v98;
+                v118 = softehl_blend(m123, v124, v118); v119 = softehl_blend(m123, v125, v119);
+                v120 = softehl_blend(m123, v126, v120); v121 = softehl_blend(m123, v127, v121);
             }
-            v105 = softehl_blend(m112, v71, v105); v106 = softehl_blend(m112, v113, v106);
-            v107 = softehl_blend(m112, v114, v107); v108 = softehl_blend(m112, v115, v108);
-            v109 = softehl_blend(m112, v116, v109); v110 = softehl_blend(m112, v117, v110);
-            v111 = softehl_blend(m112, v118, v111);
+            v108 = softehl_blend(m115, v74, v108); v109 = softehl_blend(m115, v116, v109);
+            v110 = softehl_blend(m115, v117, v110); v111 = softehl_blend(m115, v118, v111);
+            v112 = softehl_blend(m115, v119, v112); v113 = softehl_blend(m115, v120, v113);
+            v114 = softehl_blend(m115, v121, v114);
         }
-        v96 = softehl_blend(m103, v105, v96); v97 = softehl_blend(m103, v108, v97);
-        v98 = softehl_blend(m103, v109, v98); v99 = softehl_blend(m103, v110, v99);
-        v100 = softehl_blend(m103, v111, v100); v101 = softehl_blend(m103, v106, v101);
-        v102 = softehl_blend(m103, v107, v102);
+        v99 = softehl_blend(m106, v108, v99); v100 = softehl_blend(m106, v111, v100);
+        v101 = softehl_blend(m106, v112, v101); v102 = softehl_blend(m106, v113, v102);
+        v103 = softehl_blend(m106, v114, v103); v104 = softehl_blend(m106, v109, v104);
+        v105 = softehl_blend(m106, v110, v105);
     }
-    const M m125 = ~v72;
-    if (softehl_any(m125)) {
-        const V v126 = (-1.0) - v71, v127 = v126 * (v126 * v126);
-        V v128 = softehl_splat(0.0), v129 = softehl_splat(0.0), v130 = softehl_splat(0.0),
-            v131 = softehl_splat(0.0), v132 = softehl_splat(0.0), v133 = softehl_splat(0.0);
-        const M m134 = ~v70 & m125;
-        if (softehl_any(m134)) {
-            const V v135 = (-1.0) - v69, v136 = v135 * (3.0 * v135), v137 = (v93 - v79) * v136,
-                v138 = (v95 - v83) * v136, v139 = v89 * v136, v140 = v91 * v136,
-                v141 = -(v85 * v136), v142 = -(v87 * v136);
-            v128 = softehl_blend(m134, v139, v128); v129 = softehl_blend(m134, v140, v129);
-            v130 = softehl_blend(m134, v137, v130); v131 = softehl_blend(m134, v138, v131);
-            v132 = softehl_blend(m134, v141, v132); v133 = softehl_blend(m134, v142, v133);
+    const M m128 = ~v75;
+    if (softehl_any(m128)) {
+        const V v129 = (-1.0) - v74, v130 = v129 * (v129 * v129);
+        V v131 = softehl_splat(0.0), v132 = softehl_splat(0.0), v133 = softehl_splat(0.0),
+            v134 = softehl_splat(0.0), v135 = softehl_splat(0.0), v136 = softehl_splat(0.0);
+        const M m137 = ~v73 & m128;
+        if (softehl_any(m137)) {
+            const V v138 = (-1.0) - v72, v139 = v138 * (3.0 * v138), v140 = (v96 - v82) * v139,
+                v141 = (v98 - v86) * v139, v142 = v92 * v139, v143 = v94 * v139,
+                v144 = -(v88 * v139), v145 = -(v90 * v139);
+            v131 = softehl_blend(m137, v142, v131); v132 = softehl_blend(m137, v143, v132);
+            v133 = softehl_blend(m137, v140, v133); v134 = softehl_blend(m137, v141, v134);
+            v135 = softehl_blend(m137, v144, v135); v136 = softehl_blend(m137, v145, v136);
         }
-        v96 = softehl_blend(m125, v127, v96); v97 = softehl_blend(m125, v128, v97);
-        v98 = softehl_blend(m125, v129, v98); v99 = softehl_blend(m125, v130, v99);
-        v100 = softehl_blend(m125, v131, v100); v101 = softehl_blend(m125, v132, v101);
-        v102 = softehl_blend(m125, v133, v102);
+        v99 = softehl_blend(m128, v130, v99); v100 = softehl_blend(m128, v131, v100);
+        v101 = softehl_blend(m128, v132, v101); v102 = softehl_blend(m128, v133, v102);
+        v103 = softehl_blend(m128, v134, v103); v104 = softehl_blend(m128, v135, v104);
+        v105 = softehl_blend(m128, v136, v105);
     }
-    V v143 = softehl_splat(0.0), v144 = softehl_splat(0.0), v145 = softehl_splat(0.0),
-        v146 = softehl_splat(0.0), v147 = softehl_splat(0.0), v148 = softehl_splat(0.0),
-        v149 = softehl_splat(0.0);
-    const M m150 = v76;
-    if (softehl_any(m150)) {
-        const M v151 = softehl_lt(softehl_splat((-1.0)), v75);
-        V v152 = softehl_splat((-1.0)), v153 = softehl_splat(0.0), v154 = softehl_splat(0.0),
-            v155 = softehl_splat(0.0), v156 = softehl_splat(0.0), v157 = softehl_splat(0.0),
-            v158 = softehl_splat(0.0);
-        const M m159 = v151 & m150;
-        if (softehl_any(m159)) {
-            V v160 = v85, v161 = v87, v162 = softehl_splat(0.0), v163 = softehl_splat(0.0),
-                v164 = softehl_splat(0.0), v165 = softehl_splat(0.0);
-            const M m166 = v74 & m159;
-            if (softehl_any(m166)) {
-                v160 = softehl_blend(m166, softehl_splat(0.0), v160);
-                v161 = softehl_blend(m166, softehl_splat(0.0), v161);
+    V v146 = softehl_splat(0.0), v147 = softehl_splat(0.0), v148 = softehl_splat(0.0),
+        v149 = softehl_splat(0.0), v150 = softehl_splat(0.0), v151 = softehl_splat(0.0),
+        v152 = softehl_splat(0.0);
+    const M m153 = v79;
+    if (softehl_any(m153)) {
+        const M v154 = softehl_lt(softehl_splat((-1.0)), v78);
+        V v155 = softehl_splat((-1.0)), v156 = softehl_splat(0.0), v157 = softehl_splat(0.0),
+            v158 = softehl_splat(0.0), v159 = softehl_splat(0.0), v160 = softehl_splat(0.0),
+            v161 = softehl_splat(0.0);
+        const M m162 = v154 & m153;
+        if (softehl_any(m162)) {
+            V v163 = v88, v164 = v90, v165 = softehl_splat(0.0), v166 = softehl_splat(0.0),
+                v167 = softehl_splat(0.0), v168 = softehl_splat(0.0);
+            const M m169 = v77 & m162;
+            if (softehl_any(m169)) {
+                v163 = softehl_blend(m169, softehl_splat(0.0), v163);
+                v164 = softehl_blend(m169, softehl_splat(0.0), v164);
             }
-            const M m167 = ~v74 & m159;
-            if (softehl_any(m167)) {
-                const V v168 = -v88, v169 = -v90, v170 = v78 - v92, v171 = v82 - v94;
-                v162 = softehl_blend(m167, v168, v162); v163 = softehl_blend(m167, v169, v163);
-                v164 = softehl_blend(m167, v170, v164); v165 = softehl_blend(m167, v171, v165);
+            const M m170 = ~v77 & m162;
+            if (softehl_any(m170)) {
+                const V v171 = -v91, v172 = -v93, v173 = v81 - v95, v174 = v85 - v97;
+                v165 = softehl_blend(m170, v171, v165); v166 = softehl_blend(m170, v172, v166);
+                v167 = softehl_blend(m170, v173, v167); v168 = softehl_blend(m170, v174, v168);
             }
-            v152 = softehl_blend(m159, v75, v152); v153 = softehl_blend(m159, v160, v153);
-            v154 = softehl_blend(m159, v161, v154); v155 = softehl_blend(m159, v162, v155);
-            v156 = softehl_blend(m159, v163, v156); v157 = softehl_blend(m159, v164, v157);
-            v158 = softehl_blend(m159, v165, v158);
+            v155 = softehl_blend(m162, v78, v155); v156 = softehl_blend(m162, v163, v156);
+            v157 = softehl_blend(m162, v164, v157); v158 = softehl_blend(m162, v165, v158);
+            v159 = softehl_blend(m162, v166, v159); v160 = softehl_blend(m162, v167, v160);
+            v161 = softehl_blend(m162, v168, v161);
         }
-        v143 = softehl_blend(m150, v152, v143); v144 = softehl_blend(m150, v155, v144);
-        v145 = softehl_blend(m150, v156, v145); v146 = softehl_blend(m150, v157, v146);
-        v147 = softehl_blend(m150, v158, v147); v148 = softehl_blend(m150, v153, v148);
-        v149 = softehl_blend(m150, v154, v149);
+        v146 = softehl_blend(m153, v155, v146); v147 = softehl_blend(m153, v158, v147);
+        v148 = softehl_blend(m153, v159, v148); v149 = softehl_blend(m153, v160, v149);
+        v150 = softehl_blend(m153, v161, v150); v151 = softehl_blend(m153, v156, v151);
+        v152 = softehl_blend(m153, v157, v152);
     }
-    const M m172 = ~v76;
-    if (softehl_any(m172)) {
-        const V v173 = (-1.0) - v75, v174 = v173 * (v173 * v173);
-        V v175 = softehl_splat(0.0), v176 = softehl_splat(0.0), v177 = softehl_splat(0.0),
-            v178 = softehl_splat(0.0), v179 = softehl_splat(0.0), v180 = softehl_splat(0.0);
-        const M m181 = ~v74 & m172;
-        if (softehl_any(m181)) {
-            const V v182 = (-1.0) - v73, v183 = v182 * (3.0 * v182), v184 = (v92 - v78) * v183,
-                v185 = (v94 - v82) * v183, v186 = v88 * v183, v187 = v90 * v183,
-                v188 = -(v85 * v183), v189 = -(v87 * v183);
-            v175 = softehl_blend(m181, v186, v175); v176 = softehl_blend(m181, v187, v176);
-            v177 = softehl_blend(m181, v184, v177); v178 = softehl_blend(m181, v185, v178);
-            v179 = softehl_blend(m181, v188, v179); v180 = softehl_blend(m181, v189, v180);
+    const M m175 = ~v79;
+    if (softehl_any(m175)) {
+        const V v176 = (-1.0) - v78, v177 = v176 * (v176 * v176);
+        V v178 = softehl_splat(0.0), v179 = softehl_splat(0.0), v180 = softehl_splat(0.0),
+            v181 = softehl_splat(0.0), v182 = softehl_splat(0.0), v183 = softehl_splat(0.0);
+        const M m184 = ~v77 & m175;
+        if (softehl_any(m184)) {
+            const V v185 = (-1.0) - v76, v186 = v185 * (3.0 * v185), v187 = (v95 - v81) * v186,
+                v188 = (v97 - v85) * v186, v189 = v91 * v186, v190 = v93 * v186,
+                v191 = -(v88 * v186), v192 = -(v90 * v186);
+            v178 = softehl_blend(m184, v189, v178); v179 = softehl_blend(m184, v190, v179);
+            v180 = softehl_blend(m184, v187, v180); v181 = softehl_blend(m184, v188, v181);
+            v182 = softehl_blend(m184, v191, v182); v183 = softehl_blend(m184, v192, v183);
         }
-        v143 = softehl_blend(m172, v174, v143); v144 = softehl_blend(m172, v175, v144);
-        v145 = softehl_blend(m172, v176, v145); v146 = softehl_blend(m172, v177, v146);
-        v147 = softehl_blend(m172, v178, v147); v148 = softehl_blend(m172, v179, v148);
-        v149 = softehl_blend(m172, v180, v149);
+        v146 = softehl_blend(m175, v177, v146); v147 = softehl_blend(m175, v178, v147);
+        v148 = softehl_blend(m175, v179, v148); v149 = softehl_blend(m175, v180, v149);
+        v150 = softehl_blend(m175, v181, v150); v151 = softehl_blend(m175, v182, v151);
+        v152 = softehl_blend(m175, v183, v152);
     }
-    const V v190 = 1.0 + v96, v191 = 0.5 + v96, v192 = 2.0 * v96, v193 = 0.5 * v96,
-        v194 = 0.5 + v143, v195 = 2.0 * v143, v196 = 0.5 * v143, v197 = v96 - 0.5, v198 = v96 - 1.0,
-        v199 = v96 * v96 - 1.0, v200 = 1.0 + v143, v201 = v143 - 0.5, v202 = v143 - 1.0,
-        v203 = v193 * v190, v204 = v143 * v143 - 1.0, v205 = v193 * v198, v206 = v196 * v200,
-        v207 = v196 * v202, v208 = 2.0 * v144, v209 = 0.5 * v144, v210 = v196 * v144,
-        v211 = 2.0 * v97, v212 = 0.5 * v97, v213 = 2.0 * v145, v214 = 0.5 * v145,
-        v215 = v196 * v145, v216 = 2.0 * v98, v217 = 0.5 * v98, v218 = 2.0 * v146,
-        v219 = 0.5 * v146, v220 = v196 * v146, v221 = 2.0 * v99, v222 = 0.5 * v99,
-        v223 = 2.0 * v147, v224 = 0.5 * v147, v225 = v196 * v147, v226 = 2.0 * v100,
-        v227 = 0.5 * v100, v228 = 2.0 * v148, v229 = 0.5 * v148, v230 = v196 * v148,
-        v231 = v196 * v149, v232 = 2.0 * v149, v233 = 0.5 * v149, v234 = 2.0 * v101,
-        v235 = 0.5 * v101, v236 = 2.0 * v102, v237 = 0.5 * v102, v238 = v195 * v148,
-        v239 = v195 * v144, v240 = v195 * v145, v241 = v195 * v146, v242 = v195 * v147,
-        v243 = v195 * v149, v244 = v192 * v102, v245 = v192 * v97, v246 = v193 * v97,
-        v247 = v193 * v102, v248 = v192 * v98, v249 = v193 * v98, v250 = v192 * v99,
-        v251 = v193 * v99, v252 = v192 * v100, v253 = v193 * v100, v254 = v193 * v101,
-        v255 = v192 * v101, v256 = v32 * v99 - v8 * v221, v257 = v35 * v100 - v1 * v226,
-        v258 = v35 * v101 - v1 * v234, v259 = v32 * v101 - v8 * v234,
-        v260 = v191 + (v35 * v99 - v1 * v221), v261 = v191 + (v32 * v100 - v8 * v226),
-        v262 = v35 * v146 + (v194 - v1 * v218), v263 = v32 * v146 - v8 * v218,
-        v264 = v32 * v147 + (v194 - v8 * v223), v265 = v35 * v147 - v1 * v223,
-        v266 = v32 * v144 - v8 * v208, v267 = v35 * v144 + v201 - v1 * v208,
-        v268 = v32 * v97 - v8 * v211, v269 = v35 * v97 + v197 - v1 * v211,
-        v270 = v35 * v145 - v1 * v213, v271 = v32 * v145 + v201 - v8 * v213,
-        v272 = v35 * v98 - v1 * v216, v273 = v32 * v98 + v197 - v8 * v216,
-        v274 = v35 * v148 - v1 * v228, v275 = v32 * v148 - v8 * v228, v276 = v35 * v149 - v1 * v232,
-        v277 = v32 * v149 - v8 * v232, v278 = v35 * v102 - v1 * v236, v279 = v32 * v102 - v8 * v236,
-        v280 = v28 * v197 + (v31 * v191 - v1 * v192), v281 = v29 * v197 + (v30 * v191 - v8 * v192),
-        v282 = 2.0 * v280, v283 = 2.0 * v281, v284 = 1.0 / (v280 * v280 + v281 * v281),
-        v285 = v4 + v1 * v199 - v28 * v205 - v31 * v203,
-        v286 = v14 + v8 * v199 - v29 * v205 - v30 * v203,
-        v287 = v3 + v1 * v204 - v28 * v207 - v31 * v206,
-        v288 = v12 + v8 * v204 - v29 * v207 - v30 * v206, v289 = v280 * v285 + v281 * v286,
-        v290 = v284 * v284, v291 = v192 * v289 * v290, v292 = v289 * v290, v293 = v96 + v284 * v289,
-        v294 = v284 * (v199 * v280 - v192 * v285) + v282 * v291,
-        v295 = v284 * (v199 * v281 - v192 * v286) + v283 * v291,
-        v296 = (v257 * v282 + v261 * v283) * v292, v297 = (v258 * v282 + v259 * v283) * v292,
-        v298 = (v278 * v282 + v279 * v283) * v292;
-    const M v299 = softehl_lt(softehl_splat(1.0), v293);
-    const V v300 = (v272 * v282 + v273 * v283) * v292, v301 = (v260 * v282 + v256 * v283) * v292,
-        v302 = v292 * (v269 * v282 + v268 * v283), v303 = v28 * v201 + (v31 * v194 - v1 * v195),
-        v304 = v29 * v201 + (v30 * v194 - v8 * v195), v305 = 2.0 * v303, v306 = 2.0 * v304,
-        v307 = 1.0 / (v303 * v303 + v304 * v304), v308 = v287 * v303 + v288 * v304,
-        v309 = v210 + v209 * v200, v310 = v210 + v209 * v202, v311 = v215 + v214 * v200,
-        v312 = v215 + v214 * v202, v313 = v220 + v219 * v200, v314 = v220 + v219 * v202,
-        v315 = v225 + v224 * v200, v316 = v225 + v224 * v202, v317 = v230 + v229 * v200,
-        v318 = v230 + v229 * v202, v319 = v231 + v233 * v200, v320 = v231 + v233 * v202,
-        v321 = v307 * v307, v322 = v143 + v307 * v308, v323 = v308 * v321,
-        v324 = v195 * v308 * v321, v325 = (v204 * v303 - v195 * v287) * v307 + v305 * v324,
-        v326 = v307 * (v204 * v304 - v195 * v288) + v306 * v324,
-        v327 = (v267 * v305 + v266 * v306) * v323, v328 = (v270 * v305 + v271 * v306) * v323,
-        v329 = (v262 * v305 + v263 * v306) * v323, v330 = (v265 * v305 + v264 * v306) * v323,
-        v331 = (v274 * v305 + v275 * v306) * v323, v332 = (v276 * v305 + v277 * v306) * v323,
-        v333 = v267 * v287 + v266 * v288 + v303 * (v1 * v239 - v207 - v28 * v310 - v31 * v309),
-        v334 = v262 * v287 + v263 * v288 + v303 * (v1 * v241 - v206 - v28 * v314 - v31 * v313),
-        v335 = v333 + v304 * (v8 * v239 - v29 * v310 - v30 * v309),
-        v336 = v334 + v304 * (v8 * v241 - v29 * v314 - v30 * v313),
-        v337 = v270 * v287 + v271 * v288 + (v1 * v240 - v31 * v311 - v28 * v312) * v303,
-        v338 = v337 + (v8 * v240 - v207 - v30 * v311 - v29 * v312) * v304,
-        v339 = v265 * v287 + v264 * v288 + (v1 * v242 - v31 * v315 - v28 * v316) * v303,
-        v340 = v339 + (v8 * v242 - v206 - v30 * v315 - v29 * v316) * v304,
-        v341 = v274 * v287 + v275 * v288 + (1.0 + v1 * v238 - v31 * v317 - v28 * v318) * v303,
-        v342 = v341 + (v8 * v238 - v30 * v317 - v29 * v318) * v304,
-        v343 = v276 * v287 + v277 * v288 + (v1 * v243 - v31 * v319 - v28 * v320) * v303,
-        v344 = v343 + (1.0 + v8 * v243 - v30 * v319 - v29 * v320) * v304, v345 = v246 + v212 * v190,
-        v346 = v246 + v212 * v198, v347 = v249 + v217 * v190, v348 = v249 + v217 * v198,
-        v349 = v251 + v222 * v190, v350 = v251 + v222 * v198, v351 = v253 + v227 * v190,
-        v352 = v253 + v227 * v198,
-        v353 = v269 * v285 + v268 * v286 + (v1 * v245 - v205 - v31 * v345 - v28 * v346) * v280,
-        v354 = v272 * v285 + v273 * v286 + (v1 * v248 - v31 * v347 - v28 * v348) * v280,
-        v355 = v260 * v285 + v256 * v286 + (v1 * v250 - v203 - v31 * v349 - v28 * v350) * v280,
-        v356 = v353 + (v8 * v245 - v30 * v345 - v29 * v346) * v281,
-        v357 = v354 + (v8 * v248 - v205 - v30 * v347 - v29 * v348) * v281,
-        v358 = v355 + (v8 * v250 - v30 * v349 - v29 * v350) * v281,
-        v359 = v257 * v285 + v261 * v286 + (v1 * v252 - v31 * v351 - v28 * v352) * v280,
-        v360 = v359 + (v8 * v252 - v203 - v30 * v351 - v29 * v352) * v281,
-        v361 = v254 + v235 * v190, v362 = v254 + v235 * v198, v363 = v247 + v237 * v190,
-        v364 = v247 + v237 * v198,
-        v365 = v258 * v285 + v259 * v286 + (1.0 + v1 * v255 - v31 * v361 - v28 * v362) * v280,
-        v366 = v278 * v285 + v279 * v286 + (v1 * v244 - v31 * v363 - v28 * v364) * v280,
-        v367 = v365 + (v8 * v255 - v30 * v361 - v29 * v362) * v281,
-        v368 = v366 + (1.0 + v8 * v244 - v30 * v363 - v29 * v364) * v281,
-        v369 = softehl_blend(v299, softehl_splat(1.0), v293);
-    const M v370 = softehl_eq(v369, v369), v371 = softehl_lt(softehl_splat(1.0), v322);
-    const V v372 = softehl_blend(v371, softehl_splat(1.0), v322);
-    const M v373 = softehl_eq(v372, v372);
-    const V v374 = v307 * v335 + (v144 - v327), v375 = v307 * v338 + (v145 - v328),
-        v376 = v307 * v336 + (v146 - v329), v377 = v307 * v340 + (v147 - v330),
-        v378 = v284 * v356 + (v97 - v302), v379 = v284 * v357 + (v98 - v300),
-        v380 = v284 * v358 + (v99 - v301), v381 = v284 * v360 + (v100 - v296),
-        v382 = v307 * v342 + (v148 - v331), v383 = v307 * v344 + (v149 - v332),
-        v384 = v284 * v367 + (v101 - v297), v385 = v284 * v368 + (v102 - v298);
-    V v386 = softehl_splat(0.0), v387 = softehl_splat(0.0), v388 = softehl_splat(0.0),
-        v389 = softehl_splat(0.0), v390 = softehl_splat(0.0), v391 = softehl_splat(0.0),
-        v392 = softehl_splat(0.0), v393 = softehl_splat(0.0), v394 = softehl_splat(0.0);
-    const M m395 = v370;
-    if (softehl_any(m395)) {
-        const M v396 = softehl_lt(softehl_splat((-1.0)), v369);
-        V v397 = softehl_splat((-1.0)), v398 = softehl_splat(0.0), v399 = softehl_splat(0.0),
-            v400 = softehl_splat(0.0), v401 = softehl_splat(0.0), v402 = softehl_splat(0.0),
-            v403 = softehl_splat(0.0), v404 = softehl_splat(0.0), v405 = softehl_splat(0.0);
-        const M m406 = v396 & m395;
-        if (softehl_any(m406)) {
-            const V v407 = softehl_blend(v299, softehl_splat(0.0), v294),
-                v408 = softehl_blend(v299, softehl_splat(0.0), v295),
-                v409 = softehl_blend(v299, softehl_splat(0.0), v378),
-                v410 = softehl_blend(v299, softehl_splat(0.0), v379),
-                v411 = softehl_blend(v299, softehl_splat(0.0), v380),
-                v412 = softehl_blend(v299, softehl_splat(0.0), v381),
-                v413 = softehl_blend(v299, softehl_splat(0.0), v384),
-                v414 = softehl_blend(v299, softehl_splat(0.0), v385);
-            v397 = softehl_blend(m406, v369, v397); v398 = softehl_blend(m406, v407, v398);
-            v399 = softehl_blend(m406, v408, v399); v400 = softehl_blend(m406, v409, v400);
-            v401 = softehl_blend(m406, v410, v401); v402 = softehl_blend(m406, v411, v402);
-            v403 = softehl_blend(m406, v412, v403); v404 = softehl_blend(m406, v413, v404);
-            v405 = softehl_blend(m406, v414, v405);
+    const V v193 = 1.0 + v99, v194 = 0.5 + v99, v195 = 2.0 * v99, v196 = 0.5 * v99,
+        v197 = 0.5 + v146, v198 = 2.0 * v146, v199 = 0.5 * v146, v200 = v99 - 0.5, v201 = v99 - 1.0,
+        v202 = v99 * v99 - 1.0, v203 = 1.0 + v146, v204 = v146 - 0.5, v205 = v146 - 1.0,
+        v206 = v196 * v193, v207 = v146 * v146 - 1.0, v208 = v196 * v201, v209 = v199 * v203,
+        v210 = v199 * v205, v211 = 2.0 * v147, v212 = 0.5 * v147, v213 = v199 * v147,
+        v214 = 2.0 * v100, v215 = 0.5 * v100, v216 = 2.0 * v148, v217 = 0.5 * v148,
+        v218 = v199 * v148, v219 = 2.0 * v101, v220 = 0.5 * v101, v221 = 2.0 * v149,
+        v222 = 0.5 * v149, v223 = v199 * v149, v224 = 2.0 * v102, v225 = 0.5 * v102,
+        v226 = 2.0 * v150, v227 = 0.5 * v150, v228 = v199 * v150, v229 = 2.0 * v103,
+        v230 = 0.5 * v103, v231 = 2.0 * v151, v232 = 0.5 * v151, v233 = v199 * v151,
+        v234 = v199 * v152, v235 = 2.0 * v152, v236 = 0.5 * v152, v237 = 2.0 * v104,
+        v238 = 0.5 * v104, v239 = 2.0 * v105, v240 = 0.5 * v105, v241 = v198 * v151,
+        v242 = v198 * v147, v243 = v198 * v148, v244 = v198 * v149, v245 = v198 * v150,
+        v246 = v198 * v152, v247 = v195 * v105, v248 = v195 * v100, v249 = v196 * v100,
+        v250 = v196 * v105, v251 = v195 * v101, v252 = v196 * v101, v253 = v195 * v102,
+        v254 = v196 * v102, v255 = v195 * v103, v256 = v196 * v103, v257 = v196 * v104,
+        v258 = v195 * v104, v259 = v33 * v102 - v8 * v224, v260 = v31 * v103 - v1 * v229,
+        v261 = v31 * v104 - v1 * v237, v262 = v33 * v104 - v8 * v237,
+        v263 = v194 + (v31 * v102 - v1 * v224), v264 = v194 + (v33 * v103 - v8 * v229),
+        v265 = v31 * v149 + (v197 - v1 * v221), v266 = v33 * v149 - v8 * v221,
+        v267 = v33 * v150 + (v197 - v8 * v226), v268 = v31 * v150 - v1 * v226,
+        v269 = v33 * v147 - v8 * v211, v270 = v31 * v147 + v204 - v1 * v211,
+        v271 = v33 * v100 - v8 * v214, v272 = v31 * v100 + v200 - v1 * v214,
+        v273 = v31 * v148 - v1 * v216, v274 = v33 * v148 + v204 - v8 * v216,
+        v275 = v31 * v101 - v1 * v219, v276 = v33 * v101 + v200 - v8 * v219,
+        v277 = v31 * v151 - v1 * v231, v278 = v33 * v151 - v8 * v231, v279 = v31 * v152 - v1 * v235,
+        v280 = v33 * v152 - v8 * v235, v281 = v31 * v105 - v1 * v239, v282 = v33 * v105 - v8 * v239,
+        v283 = v26 * v200 + (v29 * v194 - v1 * v195), v284 = v27 * v200 + (v30 * v194 - v8 * v195),
+        v285 = 2.0 * v283, v286 = 2.0 * v284, v287 = 1.0 / (v283 * v283 + v284 * v284),
+        v288 = v4 + v1 * v202 - v26 * v208 - v29 * v206,
+        v289 = v14 + v8 * v202 - v27 * v208 - v30 * v206,
+        v290 = v3 + v1 * v207 - v26 * v210 - v29 * v209,
+        v291 = v12 + v8 * v207 - v27 * v210 - v30 * v209, v292 = v283 * v288 + v284 * v289,
+        v293 = v287 * v287, v294 = v195 * v292 * v293, v295 = v292 * v293, v296 = v99 + v287 * v292,
+        v297 = v287 * (v202 * v283 - v195 * v288) + v285 * v294,
+        v298 = v287 * (v202 * v284 - v195 * v289) + v286 * v294,
+        v299 = (v260 * v285 + v264 * v286) * v295, v300 = (v261 * v285 + v262 * v286) * v295,
+        v301 = (v281 * v285 + v282 * v286) * v295;
+    const M v302 = softehl_lt(softehl_splat(1.0), v296);
+    const V v303 = (v275 * v285 + v276 * v286) * v295, v304 = (v263 * v285 + v259 * v286) * v295,
+        v305 = v295 * (v272 * v285 + v271 * v286), v306 = v26 * v204 + (v29 * v197 - v1 * v198),
+        v307 = v27 * v204 + (v30 * v197 - v8 * v198), v308 = 2.0 * v306, v309 = 2.0 * v307,
+        v310 = 1.0 / (v306 * v306 + v307 * v307), v311 = v290 * v306 + v291 * v307,
+        v312 = v213 + v212 * v203, v313 = v213 + v212 * v205, v314 = v218 + v217 * v203,
+        v315 = v218 + v217 * v205, v316 = v223 + v222 * v203, v317 = v223 + v222 * v205,
+        v318 = v228 + v227 * v203, v319 = v228 + v227 * v205, v320 = v233 + v232 * v203,
+        v321 = v233 + v232 * v205, v322 = v234 + v236 * v203, v323 = v234 + v236 * v205,
+        v324 = v310 * v310, v325 = v146 + v310 * v311, v326 = v311 * v324,
+        v327 = v198 * v311 * v324, v328 = (v207 * v306 - v198 * v290) * v310 + v308 * v327,
+        v329 = v310 * (v207 * v307 - v198 * v291) + v309 * v327,
+        v330 = (v270 * v308 + v269 * v309) * v326, v331 = (v273 * v308 + v274 * v309) * v326,
+        v332 = (v265 * v308 + v266 * v309) * v326, v333 = (v268 * v308 + v267 * v309) * v326,
+        v334 = (v277 * v308 + v278 * v309) * v326, v335 = (v279 * v308 + v280 * v309) * v326,
+        v336 = v270 * v290 + v269 * v291 + v306 * (v1 * v242 - v210 - v26 * v313 - v29 * v312),
+        v337 = v265 * v290 + v266 * v291 + v306 * (v1 * v244 - v209 - v26 * v317 - v29 * v316),
+        v338 = v336 + v307 * (v8 * v242 - v27 * v313 - v30 * v312),
+        v339 = v337 + v307 * (v8 * v244 - v27 * v317 - v30 * v316),
+        v340 = v273 * v290 + v274 * v291 + (v1 * v243 - v29 * v314 - v26 * v315) * v306,
+        v341 = v340 + (v8 * v243 - v210 - v30 * v314 - v27 * v315) * v307,
+        v342 = v268 * v290 + v267 * v291 + (v1 * v245 - v29 * v318 - v26 * v319) * v306,
+        v343 = v342 + (v8 * v245 - v209 - v30 * v318 - v27 * v319) * v307,
+        v344 = v277 * v290 + v278 * v291 + (1.0 + v1 * v241 - v29 * v320 - v26 * v321) * v306,
+        v345 = v344 + (v8 * v241 - v30 * v320 - v27 * v321) * v307,
+        v346 = v279 * v290 + v280 * v291 + (v1 * v246 - v29 * v322 - v26 * v323) * v306,
+        v347 = v346 + (1.0 + v8 * v246 - v30 * v322 - v27 * v323) * v307, v348 = v249 + v215 * v193,
+        v349 = v249 + v215 * v201, v350 = v252 + v220 * v193, v351 = v252 + v220 * v201,
+        v352 = v254 + v225 * v193, v353 = v254 + v225 * v201, v354 = v256 + v230 * v193,
+        v355 = v256 + v230 * v201,
+        v356 = v272 * v288 + v271 * v289 + (v1 * v248 - v208 - v29 * v348 - v26 * v349) * v283,
+        v357 = v275 * v288 + v276 * v289 + (v1 * v251 - v29 * v350 - v26 * v351) * v283,
+        v358 = v263 * v288 + v259 * v289 + (v1 * v253 - v206 - v29 * v352 - v26 * v353) * v283,
+        v359 = v356 + (v8 * v248 - v30 * v348 - v27 * v349) * v284,
+        v360 = v357 + (v8 * v251 - v208 - v30 * v350 - v27 * v351) * v284,
+        v361 = v358 + (v8 * v253 - v30 * v352 - v27 * v353) * v284,
+        v362 = v260 * v288 + v264 * v289 + (v1 * v255 - v29 * v354 - v26 * v355) * v283,
+        v363 = v362 + (v8 * v255 - v206 - v30 * v354 - v27 * v355) * v284,
+        v364 = v257 + v238 * v193, v365 = v257 + v238 * v201, v366 = v250 + v240 * v193,
+        v367 = v250 + v240 * v201,
+        v368 = v261 * v288 + v262 * v289 + (1.0 + v1 * v258 - v29 * v364 - v26 * v365) * v283,
+        v369 = v281 * v288 + v282 * v289 + (v1 * v247 - v29 * v366 - v26 * v367) * v283,
+        v370 = v368 + (v8 * v258 - v30 * v364 - v27 * v365) * v284,
+        v371 = v369 + (1.0 + v8 * v247 - v30 * v366 - v27 * v367) * v284,
+        v372 = softehl_blend(v302, softehl_splat(1.0), v296);
+    const M v373 = softehl_eq(v372, v372), v374 = softehl_lt(softehl_splat(1.0), v325);
+    const V v375 = softehl_blend(v374, softehl_splat(1.0), v325);
+    const M v376 = softehl_eq(v375, v375);
+    const V v377 = v310 * v338 + (v147 - v330), v378 = v310 * v341 + (v148 - v331),
+        v379 = v310 * v339 + (v149 - v332), v380 = v310 * v343 + (v150 - v333),
+        v381 = v287 * v359 + (v100 - v305), v382 = v287 * v360 + (v101 - v303),
+        v383 = v287 * v361 + (v102 - v304), v384 = v287 * v363 + (v103 - v299),
+        v385 = v310 * v345 + (v151 - v334), v386 = v310 * v347 + (v152 - v335),
+        v387 = v287 * v370 + (v104 - v300), v388 = v287 * v371 + (v105 - v301);
+    V v389 = softehl_splat(0.0), v390 = softehl_splat(0.0), v391 = softehl_splat(0.0),
+        v392 = softehl_splat(0.0), v393 = softehl_splat(0.0), v394 = softehl_splat(0.0),
+        v395 = softehl_splat(0.0), v396 = softehl_splat(0.0), v397 = softehl_splat(0.0);
+    const M m398 = v373;
+    if (softehl_any(m398)) {
+        const M v399 = softehl_lt(softehl_splat((-1.0)), v372);
+        V v400 = softehl_splat((-1.0)), v401 = softehl_splat(0.0), v402 = softehl_splat(0.0),
+            v403 = softehl_splat(0.0), v404 = softehl_splat(0.0), v405 = softehl_splat(0.0),
+            v406 = softehl_splat(0.0), v407 = softehl_splat(0.0), v408 = softehl_splat(0.0);
+        const M m409 = v399 & m398;
+        if (softehl_any(m409)) {
+            const V v410 = softehl_blend(v302, softehl_splat(0.0), v297),
+                v411 = softehl_blend(v302, softehl_splat(0.0), v298),
+                v412 = softehl_blend(v302, softehl_splat(0.0), v381),
+                v413 = softehl_blend(v302, softehl_splat(0.0), v382),
+                v414 = softehl_blend(v302, softehl_splat(0.0), v383),
+                v415 = softehl_blend(v302, softehl_splat(0.0), v384),
+                v416 = softehl_blend(v302, softehl_splat(0.0), v387),
+                v417 = softehl_blend(v302, softehl_splat(0.0), v388);
+            v400 = softehl_blend(m409, v372, v400); v401 = softehl_blend(m409, v410, v401);
+            v402 = softehl_blend(m409, v411, v402); v403 = softehl_blend(m409, v412, v403);
+            v404 = softehl_blend(m409, v413, v404); v405 = softehl_blend(m409, v414, v405);
+            v406 = softehl_blend(m409, v415, v406); v407 = softehl_blend(m409, v416, v407);
+            v408 = softehl_blend(m409, v417, v408);
         }
-        v386 = softehl_blend(m395, v397, v386); v387 = softehl_blend(m395, v398, v387);
-        v388 = softehl_blend(m395, v399, v388); v389 = softehl_blend(m395, v400, v389);
-        v390 = softehl_blend(m395, v401, v390); v391 = softehl_blend(m395, v402, v391);
-        v392 = softehl_blend(m395, v403, v392); v393 = softehl_blend(m395, v404, v393);
-        v394 = softehl_blend(m395, v405, v394);
+        v389 = softehl_blend(m398, v400, v389); v390 = softehl_blend(m398, v401, v390);
+        v391 = softehl_blend(m398, v402, v391); v392 = softehl_blend(m398, v403, v392);
+        v393 = softehl_blend(m398, v404, v393); v394 = softehl_blend(m398, v405, v394);
+        v395 = softehl_blend(m398, v406, v395); v396 = softehl_blend(m398, v407, v396);
+        v397 = softehl_blend(m398, v408, v397);
     }
-    const M m415 = ~v370;
-    if (softehl_any(m415)) {
-        const V v416 = (-1.0) - v369, v417 = v416 * (v416 * v416);
-        V v418 = softehl_splat(0.0), v419 = softehl_splat(0.0), v420 = softehl_splat(0.0),
-            v421 = softehl_splat(0.0), v422 = softehl_splat(0.0), v423 = softehl_splat(0.0),
-            v424 = softehl_splat(0.0), v425 = softehl_splat(0.0);
-        const M m426 = ~v299 & m415;
-        if (softehl_any(m426)) {
-            const V v427 = (-1.0) - v293, v428 = v427 * (3.0 * v427), v429 = -(v294 * v428),
-                v430 = -(v295 * v428), v431 = -(v378 * v428), v432 = -(v379 * v428),
-                v433 = -(v380 * v428), v434 = -(v381 * v428), v435 = -(v384 * v428),
-                v436 = -(v385 * v428);
-            v418 = softehl_blend(m426, v429, v418); v419 = softehl_blend(m426, v430, v419);
-            v420 = softehl_blend(m426, v431, v420); v421 = softehl_blend(m426, v432, v421);
-            v422 = softehl_blend(m426, v433, v422); v423 = softehl_blend(m426, v434, v423);
-            v424 = softehl_blend(m426, v435, v424); v425 = softehl_blend(m426, v436, v425);
+    const M m418 = ~v373;
+    if (softehl_any(m418)) {
+        const V v419 = (-1.0) - v372, v420 = v419 * (v419 * v419);
+        V v421 = softehl_splat(0.0), v422 = softehl_splat(0.0), v423 = softehl_splat(0.0),
+            v424 = softehl_splat(0.0), v425 = softehl_splat(0.0), v426 = softehl_splat(0.0),
+            v427 = softehl_splat(0.0), v428 = softehl_splat(0.0);
+        const M m429 = ~v302 & m418;
+        if (softehl_any(m429)) {
+            const V v430 = (-1.0) - v296, v431 = v430 * (3.0 * v430), v432 = -(v297 * v431),
+                v433 = -(v298 * v431), v434 = -(v381 * v431), v435 = -(v382 * v431),
+                v436 = -(v383 * v431), v437 = -(v384 * v431), v438 = -(v387 * v431),
+                v439 = -(v388 * v431);
+            v421 = softehl_blend(m429, v432, v421); v422 = softehl_blend(m429, v433, v422);
+            v423 = softehl_blend(m429, v434, v423); v424 = softehl_blend(m429, v435, v424);
+            v425 = softehl_blend(m429, v436, v425); v426 = softehl_blend(m429, v437, v426);
+            v427 = softehl_blend(m429, v438, v427); v428 = softehl_blend(m429, v439, v428);
         }
-        v386 = softehl_blend(m415, v417, v386); v387 = softehl_blend(m415, v418, v387);
-        v388 = softehl_blend(m415, v419, v388); v389 = softehl_blend(m415, v420, v389);
-        v390 = softehl_blend(m415, v421, v390); v391 = softehl_blend(m415, v422, v391);
-        v392 = softehl_blend(m415, v423, v392); v393 = softehl_blend(m415, v424, v393);
-        v394 = softehl_blend(m415, v425, v394);
+        v389 = softehl_blend(m418, v420, v389); v390 = softehl_blend(m418, v421, v390);
+        v391 = softehl_blend(m418, v422, v391); v392 = softehl_blend(m418, v423, v392);
+        v393 = softehl_blend(m418, v424, v393); v394 = softehl_blend(m418, v425, v394);
+        v395 = softehl_blend(m418, v426, v395); v396 = softehl_blend(m418, v427, v396);
+        v397 = softehl_blend(m418, v428, v397);
     }
-    V v437 = softehl_splat(0.0), v438 = softehl_splat(0.0), v439 = softehl_splat(0.0),
-        v440 = softehl_splat(0.0), v441 = softehl_splat(0.0), v442 = softehl_splat(0.0),
-        v443 = softehl_splat(0.0), v444 = softehl_splat(0.0), v445 = softehl_splat(0.0);
-    const M m446 = v373;
-    if (softehl_any(m446)) {
-        const M v447 = softehl_lt(softehl_splat((-1.0)), v372);
-        V v448 = softehl_splat((-1.0)), v449 = softehl_splat(0.0), v450 = softehl_splat(0.0),
-            v451 = softehl_splat(0.0), v452 = softehl_splat(0.0), v453 = softehl_splat(0.0),
-            v454 = softehl_splat(0.0), v455 = softehl_splat(0.0), v456 = softehl_splat(0.0);
-        const M m457 = v447 & m446;
-        if (softehl_any(m457)) {
-            const V v458 = softehl_blend(v371, softehl_splat(0.0), v325),
-                v459 = softehl_blend(v371, softehl_splat(0.0), v326),
-                v460 = softehl_blend(v371, softehl_splat(0.0), v374),
-                v461 = softehl_blend(v371, softehl_splat(0.0), v375),
-                v462 = softehl_blend(v371, softehl_splat(0.0), v376),
-                v463 = softehl_blend(v371, softehl_splat(0.0), v377),
-                v464 = softehl_blend(v371, softehl_splat(0.0), v382),
-                v465 = softehl_blend(v371, softehl_splat(0.0), v383);
-            v448 = softehl_blend(m457, v372, v448); v449 = softehl_blend(m457, v458, v449);
-            v450 = softehl_blend(m457, v459, v450); v451 = softehl_blend(m457, v460, v451);
-            v452 = softehl_blend(m457, v461, v452); v453 = softehl_blend(m457, v462, v453);
-            v454 = softehl_blend(m457, v463, v454); v455 = softehl_blend(m457, v464, v455);
-            v456 = softehl_blend(m457, v465, v456);
+    V v440 = softehl_splat(0.0), v441 = softehl_splat(0.0), v442 = softehl_splat(0.0),
+        v443 = softehl_splat(0.0), v444 = softehl_splat(0.0), v445 = softehl_splat(0.0),
+        v446 = softehl_splat(0.0), v447 = softehl_splat(0.0), v448 = softehl_splat(0.0);
+    const M m449 = v376;
+    if (softehl_any(m449)) {
+        const M v450 = softehl_lt(softehl_splat((-1.0)), v375);
+        V v451 = softehl_splat((-1.0)), v452 = softehl_splat(0.0), v453 = softehl_splat(0.0),
+            v454 = softehl_splat(0.0), v455 = softehl_splat(0.0), v456 = softehl_splat(0.0),
+            v457 = softehl_splat(0.0), v458 = softehl_splat(0.0), v459 = softehl_splat(0.0);
+        const M m460 = v450 & m449;
+        if (softehl_any(m460)) {
+            const V v461 = softehl_blend(v374, softehl_splat(0.0), v328),
+                v462 = softehl_blend(v374, softehl_splat(0.0), v329),
+                v463 = softehl_blend(v374, softehl_splat(0.0), v377),
+                v464 = softehl_blend(v374, softehl_splat(0.0), v378),
+                v465 = softehl_blend(v374, softehl_splat(0.0), v379),
+                v466 = softehl_blend(v374, softehl_splat(0.0), v380),
+                v467 = softehl_blend(v374, softehl_splat(0.0), v385),
+                v468 = softehl_blend(v374, softehl_splat(0.0), v386);
+            v451 = softehl_blend(m460, v375, v451); v452 = softehl_blend(m460, v461, v452);
+            v453 = softehl_blend(m460, v462, v453); v454 = softehl_blend(m460, v463, v454);
+            v455 = softehl_blend(m460, v464, v455); v456 = softehl_blend(m460, v465, v456);
+            v457 = softehl_blend(m460, v466, v457); v458 = softehl_blend(m460, v467, v458);
+            v459 = softehl_blend(m460, v468, v459);
         }
-        v437 = softehl_blend(m446, v448, v437); v438 = softehl_blend(m446, v449, v438);
-        v439 = softehl_blend(m446, v450, v439); v440 = softehl_blend(m446, v451, v440);
-        v441 = softehl_blend(m446, v452, v441); v442 = softehl_blend(m446, v453, v442);
-        v443 = softehl_blend(m446, v454, v443); v444 = softehl_blend(m446, v455, v444);
-        v445 = softehl_blend(m446, v456, v445);
+        v440 = softehl_blend(m449, v451, v440); v441 = softehl_blend(m449, v452, v441);
+        v442 = softehl_blend(m449, v453, v442); v443 = softehl_blend(m449, v454, v443);
+        v444 = softehl_blend(m449, v455, v444); v445 = softehl_blend(m449, v456, v445);
+        v446 = softehl_blend(m449, v457, v446); v447 = softehl_blend(m449, v458, v447);
+        v448 = softehl_blend(m449, v459, v448);
     }
-    const M m466 = ~v373;
-    if (softehl_any(m466)) {
-        const V v467 = (-1.0) - v372, v468 = v467 * (v467 * v467);
-        V v469 = softehl_splat(0.0), v470 = softehl_splat(0.0), v471 = softehl_splat(0.0),
-            v472 = softehl_splat(0.0), v473 = softehl_splat(0.0), v474 = softehl_splat(0.0),
-            v475 = softehl_splat(0.0), v476 = softehl_splat(0.0);
-        const M m477 = ~v371 & m466;
-        if (softehl_any(m477)) {
-            const V v478 = (-1.0) - v322, v479 = v478 * (3.0 * v478), v480 = -(v325 * v479),
-                v481 = -(v326 * v479), v482 = -(v374 * v479), v483 = -(v375 * v479),
-                v484 = -(v376 * v479), v485 = -(v377 * v479), v486 = -(v382 * v479),
-                v487 = -(v383 * v479);
-            v469 = softehl_blend(m477, v480, v469); v470 = softehl_blend(m477, v481, v470);
-            v471 = softehl_blend(m477, v482, v471); v472 = softehl_blend(m477, v483, v472);
-            v473 = softehl_blend(m477, v484, v473); v474 = softehl_blend(m477, v485, v474);
-            v475 = softehl_blend(m477, v486, v475); v476 = softehl_blend(m477, v487, v476);
+    const M m469 = ~v376;
+    if (softehl_any(m469)) {
+        const V v470 = (-1.0) - v375, v471 = v470 * (v470 * v470);
+        V v472 = softehl_splat(0.0), v473 = softehl_splat(0.0), v474 = softehl_splat(0.0),
+            v475 = softehl_splat(0.0), v476 = softehl_splat(0.0), v477 = softehl_splat(0.0),
+            v478 = softehl_splat(0.0), v479 = softehl_splat(0.0);
+        const M m480 = ~v374 & m469;
+        if (softehl_any(m480)) {
+            const V v481 = (-1.0) - v325, v482 = v481 * (3.0 * v481), v483 = -(v328 * v482),
+                v484 = -(v329 * v482), v485 = -(v377 * v482), v486 = -(v378 * v482),
+                v487 = -(v379 * v482), v488 = -(v380 * v482), v489 = -(v385 * v482),
+                v490 = -(v386 * v482);
+            v472 = softehl_blend(m480, v483, v472); v473 = softehl_blend(m480, v484, v473);
+            v474 = softehl_blend(m480, v485, v474); v475 = softehl_blend(m480, v486, v475);
+            v476 = softehl_blend(m480, v487, v476); v477 = softehl_blend(m480, v488, v477);
+            v478 = softehl_blend(m480, v489, v478); v479 = softehl_blend(m480, v490, v479);
         }
-        v437 = softehl_blend(m466, v468, v437); v438 = softehl_blend(m466, v469, v438);
-        v439 = softehl_blend(m466, v470, v439); v440 = softehl_blend(m466, v471, v440);
-        v441 = softehl_blend(m466, v472, v441); v442 = softehl_blend(m466, v473, v442);
-        v443 = softehl_blend(m466, v474, v443); v444 = softehl_blend(m466, v475, v444);
-        v445 = softehl_blend(m466, v476, v445);
+        v440 = softehl_blend(m469, v471, v440); v441 = softehl_blend(m469, v472, v441);
+        v442 = softehl_blend(m469, v473, v442); v443 = softehl_blend(m469, v474, v443);
+        v444 = softehl_blend(m469, v475, v444); v445 = softehl_blend(m469, v476, v445);
+        v446 = softehl_blend(m469, v477, v446); v447 = softehl_blend(m469, v478, v447);
+        v448 = softehl_blend(m469, v479, v448);
     }
-    const V v488 = v437 - v386; const M v489 = softehl_eq(v488, v488);
-    V v490 = softehl_splat(0.0), v491 = softehl_splat(0.0), v492 = softehl_splat(0.0),
-        v493 = softehl_splat(0.0), v494 = softehl_splat(0.0), v495 = softehl_splat(0.0),
+    const V v491 = v440 - v389; const M v492 = softehl_eq(v491, v491);
+    V v493 = softehl_splat(0.0), v494 = softehl_splat(0.0), v495 = softehl_splat(0.0),
         v496 = softehl_splat(0.0), v497 = softehl_splat(0.0), v498 = softehl_splat(0.0),
-        v499 = softehl_splat(0.0), v500 = softehl_splat(0.0);
-    const M m501 = v489;
-    if (softehl_any(m501)) {
-        const M v502 = softehl_lt(softehl_splat(0.0), v488);
-        V v503 = softehl_splat(0.0), v504 = softehl_splat(0.0), v505 = softehl_splat(0.0),
-            v506 = softehl_splat(0.0), v507 = softehl_splat(0.0), v508 = softehl_splat(0.0),
+        v499 = softehl_splat(0.0), v500 = softehl_splat(0.0), v501 = softehl_splat(0.0),
+        v502 = softehl_splat(0.0), v503 = softehl_splat(0.0);
+    const M m504 = v492;
+    if (softehl_any(m504)) {
+        const M v505 = softehl_lt(softehl_splat(0.0), v491);
+        V v506 = softehl_splat(0.0), v507 = softehl_splat(0.0), v508 = softehl_splat(0.0),
             v509 = softehl_splat(0.0), v510 = softehl_splat(0.0), v511 = softehl_splat(0.0),
-            v512 = softehl_splat(0.0), v513 = softehl_splat(0.0);
-        const M m514 = v502 & m501;
-        if (softehl_any(m514)) {
-            const V v515 = v438 - v387, v516 = -v393, v517 = v439 - v388, v518 = v440 - v389,
-                v519 = v441 - v390, v520 = -v394, v521 = v442 - v391, v522 = v443 - v392;
-            v503 = softehl_blend(m514, v488, v503); v504 = softehl_blend(m514, v515, v504);
-            v505 = softehl_blend(m514, v517, v505); v506 = softehl_blend(m514, v518, v506);
-            v507 = softehl_blend(m514, v519, v507); v508 = softehl_blend(m514, v521, v508);
-            v509 = softehl_blend(m514, v522, v509); v510 = softehl_blend(m514, v444, v510);
-            v511 = softehl_blend(m514, v445, v511); v512 = softehl_blend(m514, v516, v512);
-            v513 = softehl_blend(m514, v520, v513);
+            v512 = softehl_splat(0.0), v513 = softehl_splat(0.0), v514 = softehl_splat(0.0),
+            v515 = softehl_splat(0.0), v516 = softehl_splat(0.0);
+        const M m517 = v505 & m504;
+        if (softehl_any(m517)) {
+            const V v518 = v441 - v390, v519 = -v396, v520 = v442 - v391, v521 = v443 - v392,
+                v522 = v444 - v393, v523 = -v397, v524 = v445 - v394, v525 = v446 - v395;
+            v506 = softehl_blend(m517, v491, v506); v507 = softehl_blend(m517, v518, v507);
+            v508 = softehl_blend(m517, v520, v508); v509 = softehl_blend(m517, v521, v509);
+            v510 = softehl_blend(m517, v522, v510); v511 = softehl_blend(m517, v524, v511);
+            v512 = softehl_blend(m517, v525, v512); v513 = softehl_blend(m517, v447, v513);
+            v514 = softehl_blend(m517, v448, v514); v515 = softehl_blend(m517, v519, v515);
+            v516 = softehl_blend(m517, v523, v516);
         }
-        v490 = softehl_blend(m501, v503, v490); v491 = softehl_blend(m501, v504, v491);
-        v492 = softehl_blend(m501, v505, v492); v493 = softehl_blend(m501, v506, v493);
-        v494 = softehl_blend(m501, v507, v494); v495 = softehl_blend(m501, v508, v495);
-        v496 = softehl_blend(m501, v509, v496); v497 = softehl_blend(m501, v510, v497);
-        v498 = softehl_blend(m501, v511, v498); v499 = softehl_blend(m501, v512, v499);
-        v500 = softehl_blend(m501, v513, v500);
+        v493 = softehl_blend(m504, v506, v493); v494 = softehl_blend(m504, v507, v494);
+        v495 = softehl_blend(m504, v508, v495); v496 = softehl_blend(m504, v509, v496);
+        v497 = softehl_blend(m504, v510, v497); v498 = softehl_blend(m504, v511, v498);
+        v499 = softehl_blend(m504, v512, v499); v500 = softehl_blend(m504, v513, v500);
+        v501 = softehl_blend(m504, v514, v501); v502 = softehl_blend(m504, v515, v502);
+        v503 = softehl_blend(m504, v516, v503);
     }
-    const M m523 = ~v489;
-    if (softehl_any(m523)) {
-        const V v524 = v386 - v437, v525 = v524 * v524, v526 = v524 * v525, v527 = 3.0 * v525,
-            v528 = (v387 - v438) * v527, v529 = (v388 - v439) * v527, v530 = (v389 - v440) * v527,
-            v531 = (v390 - v441) * v527, v532 = (v391 - v442) * v527, v533 = (v392 - v443) * v527,
-            v534 = v393 * v527, v535 = v394 * v527, v536 = -(v444 * v527), v537 = -(v445 * v527);
-        v490 = softehl_blend(m523, v526, v490); v491 = softehl_blend(m523, v528, v491);
-        v492 = softehl_blend(m523, v529, v492); v493 = softehl_blend(m523, v530, v493);
-        v494 = softehl_blend(m523, v531, v494); v495 = softehl_blend(m523, v532, v495);
-        v496 = softehl_blend(m523, v533, v496); v497 = softehl_blend(m523, v536, v497);
-        v498 = softehl_blend(m523, v537, v498); v499 = softehl_blend(m523, v534, v499);
-        v500 = softehl_blend(m523, v535, v500);
+    const M m526 = ~v492;
+    if (softehl_any(m526)) {
+        const V v527 = v389 - v440, v528 = v527 * v527, v529 = v527 * v528, v530 = 3.0 * v528,
+            v531 = (v390 - v441) * v530, v532 = (v391 - v442) * v530, v533 = (v392 - v443) * v530,
+            v534 = (v393 - v444) * v530, v535 = (v394 - v445) * v530, v536 = (v395 - v446) * v530,
+            v537 = v396 * v530, v538 = v397 * v530, v539 = -(v447 * v530), v540 = -(v448 * v530);
+        v493 = softehl_blend(m526, v529, v493); v494 = softehl_blend(m526, v531, v494);
+        v495 = softehl_blend(m526, v532, v495); v496 = softehl_blend(m526, v533, v496);
+        v497 = softehl_blend(m526, v534, v497); v498 = softehl_blend(m526, v535, v498);
+        v499 = softehl_blend(m526, v536, v499); v500 = softehl_blend(m526, v539, v500);
+        v501 = softehl_blend(m526, v540, v501); v502 = softehl_blend(m526, v537, v502);
+        v503 = softehl_blend(m526, v538, v503);
     }
-    const V v538 = 0.5 * v491, v539 = 0.5 * v492, v540 = 0.5 * v493, v541 = 0.5 * v494,
-        v542 = 0.5 * (v386 + v437), v543 = 0.5 * (v438 + v387), v544 = 0.5 * (v439 + v388),
-        v545 = 0.5 * v495, v546 = 0.5 * v496, v547 = 0.5 * (v440 + v389), v548 = 0.5 * v497,
-        v549 = 0.5 * v498, v550 = 0.5 * v499, v551 = 0.5 * (v441 + v390), v552 = 0.5 * v500,
-        v553 = 0.5 * v444, v554 = 0.5 * v445, v555 = 0.5 * v393, v556 = 0.5 * (v442 + v391),
-        v557 = 0.5 * v394, v558 = 0.5 * (v443 + v392), v559 = 6.283185307179586 * a16,
-        v560 = 0.5 * v490, v561 = 0.25 * v490;
-    V s562 = {0}, s563 = {0}, s564 = {0}, s565 = {0}, s566 = {0}, s567 = {0}, s568 = {0},
-        s569 = {0}, s570 = {0}, s571 = {0}, s572 = {0}, s573 = {0}, s574 = {0}, s575 = {0},
-        s576 = {0}, s577 = {0}, s578 = {0}, s579 = {0}, s580 = {0}, s581 = {0}, s582 = {0},
-        s583 = {0}, s584 = {0}, s585 = {0}, s586 = {0}, s587 = {0}, s588 = {0}, s589 = {0},
-        s590 = {0}, s591 = {0}, s592 = {0}, s593 = {0}, s594 = {0}, s595 = {0}, s596 = {0},
-        s597 = {0}, s598 = {0}, s599 = {0}, s600 = {0}, s601 = {0}, s602 = {0}, s603 = {0},
-        s604 = {0}, s605 = {0}, s606 = {0}, s607 = {0}, s608 = {0}, s609 = {0}, s610 = {0},
-        s611 = {0}, s612 = {0}, s613 = {0}, s614 = {0}, s615 = {0}, s616 = {0}, s617 = {0},
-        s618 = {0}, s619 = {0}, s620 = {0}, s621 = {0}, s622 = {0}, s623 = {0}, s624 = {0},
-        s625 = {0}, s626 = {0}, s627 = {0}, s628 = {0}, s629 = {0}, s630 = {0}, s631 = {0},
-        s632 = {0}, s633 = {0}, s634 = {0}, s635 = {0}, s636 = {0}, s637 = {0}, s638 = {0},
-        s639 = {0}, s640 = {0}, s641 = {0}, s642 = {0}, s643 = {0}, s644 = {0}, s645 = {0},
-        s646 = {0}, s647 = {0}, s648 = {0}, s649 = {0}, s650 = {0}, s651 = {0}, s652 = {0},
-        s653 = {0}, s654 = {0}, s655 = {0}, s656 = {0}, s657 = {0}, s658 = {0}, s659 = {0},
-        s660 = {0}, s661 = {0}, s662 = {0}, s663 = {0}, s664 = {0}, s665 = {0}, s666 = {0},
-        s667 = {0}, s668 = {0}, s669 = {0}, s670 = {0}, s671 = {0}, s672 = {0}, s673 = {0},
-        s674 = {0}, s675 = {0}, s676 = {0}, s677 = {0}, s678 = {0}, s679 = {0}, s680 = {0},
-        s681 = {0}, s682 = {0}, s683 = {0}, s684 = {0}, s685 = {0}, s686 = {0}, s687 = {0},
-        s688 = {0}, s689 = {0}, s690 = {0}, s691 = {0}, s692 = {0}, s693 = {0}, s694 = {0},
-        s695 = {0}, s696 = {0}, s697 = {0}, s698 = {0}, s699 = {0}, s700 = {0}, s701 = {0},
-        s702 = {0}, s703 = {0}, s704 = {0}, s705 = {0}, s706 = {0}, s707 = {0}, s708 = {0},
-        s709 = {0}, s710 = {0}, s711 = {0}, s712 = {0}, s713 = {0}, s714 = {0}, s715 = {0},
-        s716 = {0}, s717 = {0}, s718 = {0}, s719 = {0}, s720 = {0}, s721 = {0}, s722 = {0},
-        s723 = {0}, s724 = {0}, s725 = {0}, s726 = {0}, s727 = {0}, s728 = {0}, s729 = {0},
-        s730 = {0}, s731 = {0}, s732 = {0}, s733 = {0}, s734 = {0}, s735 = {0}, s736 = {0},
-        s737 = {0}, s738 = {0}, s739 = {0}, s740 = {0}, s741 = {0}, s742 = {0}, s743 = {0},
-        s744 = {0}, s745 = {0}, s746 = {0}, s747 = {0}, s748 = {0}, s749 = {0}, s750 = {0},
-        s751 = {0}, s752 = {0}, s753 = {0}, s754 = {0}, s755 = {0}, s756 = {0}, s757 = {0},
-        s758 = {0}, s759 = {0}, s760 = {0}, s761 = {0}, s762 = {0}, s763 = {0}, s764 = {0},
-        s765 = {0}, s766 = {0}, s767 = {0}, s768 = {0}, s769 = {0}, s770 = {0}, s771 = {0},
-        s772 = {0}, s773 = {0}, s774 = {0}, s775 = {0}, s776 = {0}, s777 = {0}, s778 = {0},
-        s779 = {0}, s780 = {0}, s781 = {0}, s782 = {0}, s783 = {0}, s784 = {0}, s785 = {0},
-        s786 = {0}, s787 = {0}, s788 = {0}, s789 = {0}, s790 = {0}, s791 = {0}, s792 = {0},
-        s793 = {0}, s794 = {0}, s795 = {0}, s796 = {0}, s797 = {0}, s798 = {0}, s799 = {0},
-        s800 = {0}, s801 = {0}, s802 = {0}, s803 = {0}, s804 = {0}, s805 = {0}, s806 = {0},
-        s807 = {0}, s808 = {0}, s809 = {0}, s810 = {0}, s811 = {0}, s812 = {0}, s813 = {0},
-        s814 = {0}, s815 = {0}, s816 = {0}, s817 = {0}, s818 = {0}, s819 = {0}, s820 = {0},
-        s821 = {0}, s822 = {0}, s823 = {0}, s824 = {0}, s825 = {0}, s826 = {0}, s827 = {0},
-        s828 = {0}, s829 = {0};
+    const V v541 = 0.5 * v494, v542 = 0.5 * v495, v543 = 0.5 * v496, v544 = 0.5 * v497,
+        v545 = 0.5 * (v389 + v440), v546 = 0.5 * (v441 + v390), v547 = 0.5 * (v442 + v391),
+        v548 = 0.5 * v498, v549 = 0.5 * v499, v550 = 0.5 * (v443 + v392), v551 = 0.5 * v500,
+        v552 = 0.5 * v501, v553 = 0.5 * v502, v554 = 0.5 * (v444 + v393), v555 = 0.5 * v503,
+        v556 = 0.5 * v447, v557 = 0.5 * v448, v558 = 0.5 * v396, v559 = 0.5 * (v445 + v394),
+        v560 = 0.5 * v397, v561 = 0.5 * (v446 + v395), v562 = 6.283185307179586 * a16,
+        v563 = 0.5 * v493, v564 = 0.25 * v493;
+    V s565 = {0}, s566 = {0}, s567 = {0}, s568 = {0}, s569 = {0}, s570 = {0}, s571 = {0},
+        s572 = {0}, s573 = {0}, s574 = {0}, s575 = {0}, s576 = {0}, s577 = {0}, s578 = {0},
+        s579 = {0}, s580 = {0}, s581 = {0}, s582 = {0}, s583 = {0}, s584 = {0}, s585 = {0},
+        s586 = {0}, s587 = {0}, s588 = {0}, s589 = {0}, s590 = {0}, s591 = {0}, s592 = {0},
+        s593 = {0}, s594 = {0}, s595 = {0}, s596 = {0}, s597 = {0}, s598 = {0}, s599 = {0},
+        s600 = {0}, s601 = {0}, s602 = {0}, s603 = {0}, s604 = {0}, s605 = {0}, s606 = {0},
+        s607 = {0}, s608 = {0}, s609 = {0}, s610 = {0}, s611 = {0}, s612 = {0}, s613 = {0},
+        s614 = {0}, s615 = {0}, s616 = {0}, s617 = {0}, s618 = {0}, s619 = {0}, s620 = {0},
+        s621 = {0}, s622 = {0}, s623 = {0}, s624 = {0}, s625 = {0}, s626 = {0}, s627 = {0},
+        s628 = {0}, s629 = {0}, s630 = {0}, s631 = {0}, s632 = {0}, s633 = {0}, s634 = {0},
+        s635 = {0}, s636 = {0}, s637 = {0}, s638 = {0}, s639 = {0}, s640 = {0}, s641 = {0},
+        s642 = {0}, s643 = {0}, s644 = {0}, s645 = {0}, s646 = {0}, s647 = {0}, s648 = {0},
+        s649 = {0}, s650 = {0}, s651 = {0}, s652 = {0}, s653 = {0}, s654 = {0}, s655 = {0},
+        s656 = {0}, s657 = {0}, s658 = {0}, s659 = {0}, s660 = {0}, s661 = {0}, s662 = {0},
+        s663 = {0}, s664 = {0}, s665 = {0}, s666 = {0}, s667 = {0}, s668 = {0}, s669 = {0},
+        s670 = {0}, s671 = {0}, s672 = {0}, s673 = {0}, s674 = {0}, s675 = {0}, s676 = {0},
+        s677 = {0}, s678 = {0}, s679 = {0}, s680 = {0}, s681 = {0}, s682 = {0}, s683 = {0},
+        s684 = {0}, s685 = {0}, s686 = {0}, s687 = {0}, s688 = {0}, s689 = {0}, s690 = {0},
+        s691 = {0}, s692 = {0}, s693 = {0}, s694 = {0}, s695 = {0}, s696 = {0}, s697 = {0},
+        s698 = {0}, s699 = {0}, s700 = {0}, s701 = {0}, s702 = {0}, s703 = {0}, s704 = {0},
+        s705 = {0}, s706 = {0}, s707 = {0}, s708 = {0}, s709 = {0}, s710 = {0}, s711 = {0},
+        s712 = {0}, s713 = {0}, s714 = {0}, s715 = {0}, s716 = {0}, s717 = {0}, s718 = {0},
+        s719 = {0}, s720 = {0}, s721 = {0}, s722 = {0}, s723 = {0}, s724 = {0}, s725 = {0},
+        s726 = {0}, s727 = {0}, s728 = {0}, s729 = {0}, s730 = {0}, s731 = {0}, s732 = {0},
+        s733 = {0}, s734 = {0}, s735 = {0}, s736 = {0}, s737 = {0}, s738 = {0}, s739 = {0},
+        s740 = {0}, s741 = {0}, s742 = {0}, s743 = {0}, s744 = {0}, s745 = {0}, s746 = {0},
+        s747 = {0}, s748 = {0}, s749 = {0}, s750 = {0}, s751 = {0}, s752 = {0}, s753 = {0},
+        s754 = {0}, s755 = {0}, s756 = {0}, s757 = {0}, s758 = {0}, s759 = {0}, s760 = {0},
+        s761 = {0}, s762 = {0}, s763 = {0}, s764 = {0}, s765 = {0}, s766 = {0}, s767 = {0},
+        s768 = {0}, s769 = {0}, s770 = {0}, s771 = {0}, s772 = {0}, s773 = {0}, s774 = {0},
+        s775 = {0}, s776 = {0}, s777 = {0}, s778 = {0}, s779 = {0}, s780 = {0}, s781 = {0},
+        s782 = {0}, s783 = {0}, s784 = {0}, s785 = {0}, s786 = {0}, s787 = {0}, s788 = {0},
+        s789 = {0}, s790 = {0}, s791 = {0}, s792 = {0}, s793 = {0}, s794 = {0}, s795 = {0},
+        s796 = {0}, s797 = {0}, s798 = {0}, s799 = {0}, s800 = {0}, s801 = {0}, s802 = {0},
+        s803 = {0}, s804 = {0}, s805 = {0}, s806 = {0}, s807 = {0}, s808 = {0}, s809 = {0},
+        s810 = {0}, s811 = {0}, s812 = {0}, s813 = {0}, s814 = {0}, s815 = {0}, s816 = {0},
+        s817 = {0}, s818 = {0}, s819 = {0}, s820 = {0}, s821 = {0}, s822 = {0}, s823 = {0},
+        s824 = {0}, s825 = {0}, s826 = {0}, s827 = {0}, s828 = {0}, s829 = {0}, s830 = {0},
+        s831 = {0}, s832 = {0};
     for (ptrdiff_t q = 0; q < points; ++q) {
         const double *restrict w = rule + 2 * q; (void)w;
-        const V v830 = w[0] * v560 + v542, v831 = (-1.0) + v830, v832 = 1.0 + v830,
-            v833 = 0.5 + v830, v834 = (-0.5) + v830, v835 = 1.0 - v830 * v830, v836 = 0.5 * v830,
-            v837 = 2.0 * v830, v838 = v836 * v831, v839 = v836 * v832, v840 = v1 * v837,
-            v841 = v8 * v837, v842 = v28 * v838 + (v31 * v839 + v1 * v835),
-            v843 = v28 * v834 + (v31 * v833 - v840), v844 = v6 - v842,
-            v845 = v29 * v838 + (v30 * v839 + v8 * v835), v846 = v29 * v834 + (v30 * v833 - v841),
-            v847 = v27 - v845, v848 = v843 * v843 + v846 * v846, v849 = softehl_vsqrt(v848),
-            v850 = 1.0 / v849, v851 = softehl_vsqrt(1.0 / v848), v852 = 0.5 * v851,
-            v853 = v843 * v850, v854 = v846 * v850, v855 = v850 * v850,
-            v856 = 2.0 * v843 * v852 * v855, v857 = 2.0 * v846 * v852 * v855, v858 = v843 * v857,
-            v859 = v846 * v856, v860 = v850 - v843 * v856, v861 = v850 - v846 * v857,
-            v862 = v61 * v853 + v62 * v854, v863 = v844 * v853 + v847 * v854, v864 = 2.0 * v863,
-            v865 = 4.0 * v863, v866 = v844 * v860 - v847 * v859, v867 = v847 * v861 - v844 * v858,
-            v868 = v55 * v860 - v58 * v859, v869 = v58 * v861 - v55 * v858,
-            v870 = v55 * v853 + v58 * v854, v871 = v870 * v870, v872 = 2.0 * v870,
-            v873 = v853 * v872, v874 = v854 * v872, v875 = v868 * v872, v876 = v869 * v872,
-            v877 = 0.01 * v871, v878 = v871 - v862 * v865;
-        const M v879 = softehl_lt(v877, v878);
-        V v880 = v877, v881 = softehl_splat(0.0), v882 = softehl_splat(0.0),
-            v883 = softehl_splat(0.0), v884 = softehl_splat(0.0), v885 = softehl_splat(0.0),
+        const V v833 = w[0] * v563 + v545, v834 = (-1.0) + v833, v835 = 1.0 + v833,
+            v836 = 0.5 + v833, v837 = (-0.5) + v833, v838 = 1.0 - v833 * v833, v839 = 0.5 * v833,
+            v840 = 2.0 * v833, v841 = v839 * v834, v842 = v839 * v835, v843 = v1 * v840,
+            v844 = v8 * v840, v845 = v26 * v841 + (v29 * v842 + v1 * v838),
+            v846 = v26 * v837 + (v29 * v836 - v843), v847 = v6 - v845,
+            v848 = v27 * v841 + (v30 * v842 + v8 * v838), v849 = v27 * v837 + (v30 * v836 - v844),
+            v850 = v39 - v848, v851 = v846 * v846 + v849 * v849, v852 = softehl_vsqrt(v851),
+            v853 = 1.0 / v852, v854 = softehl_vsqrt(1.0 / v851), v855 = 0.5 * v854,
+            v856 = v846 * v853, v857 = v849 * v853, v858 = v853 * v853,
+            v859 = 2.0 * v846 * v855 * v858, v860 = 2.0 * v849 * v855 * v858, v861 = v846 * v860,
+            v862 = v849 * v859, v863 = v853 - v846 * v859, v864 = v853 - v849 * v860,
+            v865 = v45 * v856 + v44 * v857, v866 = v847 * v856 + v850 * v857, v867 = 2.0 * v866,
+            v868 = 4.0 * v866, v869 = v847 * v863 - v850 * v862, v870 = v850 * v864 - v847 * v861,
+            v871 = v42 * v863 - v43 * v862, v872 = v43 * v864 - v42 * v861,
+            v873 = v42 * v856 + v43 * v857, v874 = v873 * v873, v875 = 2.0 * v873,
+            v876 = v856 * v875, v877 = v857 * v875, v878 = v871 * v875, v879 = v872 * v875,
+            v880 = 0.01 * v874, v881 = v874 - v865 * v868;
+        const M v882 = softehl_lt(v880, v881);
+        V v883 = v880, v884 = softehl_splat(0.0), v885 = softehl_splat(0.0),
             v886 = softehl_splat(0.0), v887 = softehl_splat(0.0), v888 = softehl_splat(0.0),
-            v889 = softehl_splat(0.0), v890 = v873, v891 = softehl_splat(0.0), v892 = v874;
-        const M m893 = v879;
-        if (softehl_any(m893)) {
-            const V v894 = 4.0 * v862, v895 = v875 - v894 * v866 - v865 * (v61 * v860 - v62 * v859),
-                v896 = v876 - v894 * v867 - v865 * (v62 * v861 - v61 * v858),
-                v897 = softehl_vsqrt(v878), v898 = softehl_vsqrt(1.0 / v878), v899 = 0.5 * v898,
-                v900 = 1.0 / (v870 - v897), v901 = v900 * v900,
-                v902 = v865 * (v853 * v864) * v899 * v901,
-                v903 = v865 * (v854 * v864) * v899 * v901,
-                v904 = v864 * (4.0 * v853 * v862) * v899 * v901,
-                v905 = v864 * (4.0 * v854 * v862) * v899 * v901, v906 = -v904, v907 = -v905,
-                v908 = -v902, v909 = 0.5 * v902, v910 = -v903, v911 = 0.5 * v903;
-            v880 = softehl_blend(m893, v878, v880); v881 = softehl_blend(m893, v908, v881);
-            v882 = softehl_blend(m893, v906, v882); v883 = softehl_blend(m893, v910, v883);
-            v884 = softehl_blend(m893, v907, v884); v885 = softehl_blend(m893, v905, v885);
-            v886 = softehl_blend(m893, v904, v886); v887 = softehl_blend(m893, v895, v887);
-            v888 = softehl_blend(m893, v896, v888); v889 = softehl_blend(m893, v909, v889);
-            v891 = softehl_blend(m893, v911, v891);
+            v889 = softehl_splat(0.0), v890 = softehl_splat(0.0), v891 = softehl_splat(0.0),
+            v892 = softehl_splat(0.0), v893 = v876, v894 = softehl_splat(0.0), v895 = v877;
+        const M m896 = v882;
+        if (softehl_any(m896)) {
+            const V v897 = 4.0 * v865, v898 = v878 - v897 * v869 - v868 * (v45 * v863 - v44 * v862),
+                v899 = v879 - v897 * v870 - v868 * (v44 * v864 - v45 * v861),
+                v900 = softehl_vsqrt(v881), v901 = softehl_vsqrt(1.0 / v881), v902 = 0.5 * v901,
+                v903 = 1.0 / (v873 - v900), v904 = v903 * v903,
+                v905 = v868 * (v856 * v867) * v902 * v904,
+                v906 = v868 * (v857 * v867) * v902 * v904,
+                v907 = v867 * (4.0 * v856 * v865) * v902 * v904,
+                v908 = v867 * (4.0 * v857 * v865) * v902 * v904, v909 = -v907, v910 = -v908,
+                v911 = -v905, v912 = 0.5 * v905, v913 = -v906, v914 = 0.5 * v906;
+            v883 = softehl_blend(m896, v881, v883); v884 = softehl_blend(m896, v911, v884);
+            v885 = softehl_blend(m896, v909, v885); v886 = softehl_blend(m896, v913, v886);
+            v887 = softehl_blend(m896, v910, v887); v888 = softehl_blend(m896, v908, v888);
+            v889 = softehl_blend(m896, v907, v889); v890 = softehl_blend(m896, v898, v890);
+            v891 = softehl_blend(m896, v899, v891); v892 = softehl_blend(m896, v912, v892);
+            v894 = softehl_blend(m896, v914, v894);
         }
-        const M m912 = ~v879;
-        if (softehl_any(m912)) {
-            const V v913 = 0.01 * v873, v914 = 0.01 * v874, v915 = 0.01 * v875, v916 = 0.01 * v876;
-            v887 = softehl_blend(m912, v915, v887); v888 = softehl_blend(m912, v916, v888);
-            v890 = softehl_blend(m912, v913, v890); v892 = softehl_blend(m912, v914, v892);
+        const M m915 = ~v882;
+        if (softehl_any(m915)) {
+            const V v916 = 0.01 * v876, v917 = 0.01 * v877, v918 = 0.01 * v878, v919 = 0.01 * v879;
+            v890 = softehl_blend(m915, v918, v890); v891 = softehl_blend(m915, v919, v891);
+            v893 = softehl_blend(m915, v916, v893); v895 = softehl_blend(m915, v917, v895);
         }
-        const V v917 = w[0] * v548 + v553, v918 = w[0] * v549 + v554, v919 = w[0] * v540 + v547,
-            v920 = w[0] * v541 + v551, v921 = w[0] * v545 + v556, v922 = w[0] * v546 + v558,
-            v923 = w[0] * v538 + v543, v924 = w[0] * v539 + v544, v925 = w[0] * v550 + v555,
-            v926 = w[0] * v552 + v557, v927 = 0.5 - v836, v928 = 0.5 + v836, v929 = v836 - 0.5,
-            v930 = v46 * v927, v931 = v46 * v928, v932 = d12 * v927 + d14 * v928, v933 = v22 * v830,
-            v934 = v24 * v830, v935 = v40 * v926, v936 = 0.5 * (v830 + v831),
-            v937 = 0.5 * (v830 + v832), v938 = v40 * v919, v939 = v40 * v921, v940 = v40 * v923,
-            v941 = v40 * v917, v942 = v43 * v917, v943 = v43 * v926, v944 = v43 * v920,
-            v945 = v43 * v922, v946 = v43 * v919 + v834, v947 = v40 * v920 + v834,
-            v948 = v43 * v923 - v837, v949 = v43 * v921 + v833, v950 = v40 * v922 + v833,
-            v951 = v43 * v924, v952 = v40 * v924 - v837, v953 = v40 * v918, v954 = v43 * v918,
-            v955 = v40 * v925, v956 = v43 * v925, v957 = X0 * v834 + X2 * v833 - v2 * v830,
-            v958 = X1 * v834 + X3 * v833 - v9 * v830, v959 = softehl_vsqrt(v880),
-            v960 = v957 * v957 + v958 * v958, v961 = softehl_vsqrt(v960), v962 = w[1] * v835,
-            v963 = w[1] * v839, v964 = w[1] * v838,
-            v965 = (-1.0) + 6.283185307179586 * (X5 * v835 + (v933 * v831 + v934 * v832)),
-            v966 = 1.0 + a16 * v965, v967 = softehl_vsqrt(1.0 / v880),
-            v968 = v31 * v937 + (v28 * v936 - v840), v969 = v30 * v937 + (v29 * v936 - v841),
-            v970 = v838 + v919 * v968, v971 = v919 * v969, v972 = v839 + v921 * v968,
-            v973 = v921 * v969, v974 = v838 + v920 * v969, v975 = v920 * v968, v976 = v922 * v968,
-            v977 = v839 + v922 * v969, v978 = v923 * v969, v979 = v835 + v923 * v968,
-            v980 = v924 * v968, v981 = v835 + v924 * v969, v982 = v917 * v968, v983 = v917 * v969,
-            v984 = v918 * v968, v985 = v918 * v969, v986 = v925 * v968, v987 = v925 * v969,
-            v988 = v926 * v968, v989 = v926 * v969, v990 = v560 * v961, v991 = v990 * v966,
-            v992 = 0.5 * v967, v993 = v854 * v991, v994 = v930 * v991, v995 = v931 * v991,
-            v996 = v853 * v991, v997 = 1.0 / (v870 - v959), v998 = v997 * v997,
-            v999 = v998 * (v863 * (v853 - v890 * v992)),
-            v1000 = v998 * (v863 * (v854 - v892 * v992)), v1001 = 2.0 * v853 * v997,
-            v1002 = 2.0 * v854 * v997, v1003 = 2.0 * v997, v1004 = v864 * v997, v1005 = v864 * v998,
-            v1006 = v1005 * (v868 - v992 * v887) - v866 * v1003,
-            v1007 = v1005 * (v869 - v992 * v888) - v867 * v1003, v1008 = 0.5 * v1004,
-            v1009 = 2.0 * v1004, v1010 = v1001 - v886, v1011 = v881 - v882 - v1001,
-            v1012 = (-1.0) - v1004, v1013 = 0.5 * (v1012 - v1004), v1014 = v1008 * v1012,
-            v1015 = 1.0 - v1004, v1016 = v1008 * v1015, v1017 = 1.0 - v1004 * v1004,
-            v1018 = 0.5 * (v1015 - v1004), v1019 = v883 - v884 - v1002, v1020 = v1002 - v885,
-            v1021 = w[1] * v1017, v1022 = w[1] * v1014, v1023 = w[1] * v1016,
-            v1024 = v6 * v1017 - v842 - v3 * v1014 - v4 * v1016,
-            v1025 = v27 * v1017 - v845 - v12 * v1014 - v14 * v1016,
-            v1026 = v854 * (v4 * v1018 + (v6 * v1009 + v3 * v1013)) - v853 * (v14 * v1018 + (v27 * v1009 + v12 * v1013)),
-            v1027 = v854 * v1024 - v853 * v1025, v1028 = v859 * v1024 + v860 * v1025,
-            v1029 = v861 * v1024 + v858 * v1025, v1030 = a12 * v1027,
-            v1031 = v854 * v1017 + v1026 * v1011, v1032 = v1026 * v1019 - v853 * v1017,
-            v1033 = v932 - v1030,
-            v1034 = v941 * v1029 + (v853 * v983 - v854 * (v1014 + v982) - v942 * v1028),
-            v1035 = v941 * v1007 + (v942 * v1006 + (v889 + v1010 * v982 + v1020 * v983 - v999)),
-            v1036 = v1034 + v1026 * v1035;
-        const M v1037 = softehl_eq(v1033, v1033);
-        const V v1038 = v953 * v1007 + (v954 * v1006 + (v891 + v1010 * v984 + v1020 * v985 - v1000)),
-            v1039 = v953 * v1029 + (v853 * (v1014 + v985) - v854 * v984 - v954 * v1028),
-            v1040 = v955 * v1007 + (v956 * v1006 + (v999 + (v889 + v1010 * v986 + v1020 * v987))),
-            v1041 = v955 * v1029 + (v853 * v987 - v854 * (v1016 + v986) - v956 * v1028),
-            v1042 = v1039 + v1026 * v1038, v1043 = v1041 + v1026 * v1040,
-            v1044 = v943 * v1006 + (v935 * v1007 + (v1000 + (v891 + v1010 * v988 + v1020 * v989))),
-            v1045 = v935 * v1029 + (v853 * (v1016 + v989) - v854 * v988) - v943 * v1028,
-            v1046 = v1045 + v1026 * v1044,
-            v1047 = v938 * v1007 + (v946 * v1006 + (v1010 * v970 + v1020 * v971)),
-            v1048 = v938 * v1029 + (v853 * v971 - v854 * v970 - v946 * v1028) + v1026 * v1047,
-            v1049 = v947 * v1007 + (v944 * v1006 + (v1010 * v975 + v1020 * v974)),
-            v1050 = v947 * v1029 + (v853 * v974 - v854 * v975 - v944 * v1028) + v1026 * v1049,
-            v1051 = v939 * v1007 + (v949 * v1006 + (v1010 * v972 + v1020 * v973)),
-            v1052 = v939 * v1029 + (v853 * v973 - v854 * v972 - v949 * v1028) + v1026 * v1051,
-            v1053 = v950 * v1007 + (v945 * v1006 + (v1010 * v976 + v1020 * v977)),
-            v1054 = v950 * v1029 + (v853 * v977 - v854 * v976 - v945 * v1028) + v1026 * v1053,
-            v1055 = v940 * v1007 + (v948 * v1006 + (v1010 * v979 + v1020 * v978)),
-            v1056 = v952 * v1007 + (v951 * v1006 + (v1010 * v980 + v1020 * v981)),
-            v1057 = v940 * v1029 + (v853 * v978 - v854 * v979 - v948 * v1028) + v1026 * v1055,
-            v1058 = v952 * v1029 + (v853 * v981 - v854 * v980 - v951 * v1028) + v1026 * v1056;
-        V v1059 = softehl_splat(0.0), v1060 = softehl_splat(0.0), v1061 = softehl_splat(0.0),
-            v1062 = softehl_splat(0.0), v1063 = softehl_splat(0.0), v1064 = softehl_splat(0.0),
+        const V v920 = w[0] * v551 + v556, v921 = w[0] * v552 + v557, v922 = w[0] * v543 + v550,
+            v923 = w[0] * v544 + v554, v924 = w[0] * v548 + v559, v925 = w[0] * v549 + v561,
+            v926 = w[0] * v541 + v546, v927 = w[0] * v542 + v547, v928 = w[0] * v553 + v558,
+            v929 = w[0] * v555 + v560, v930 = 0.5 - v839, v931 = 0.5 + v839, v932 = v839 - 0.5,
+            v933 = v36 * v930, v934 = v36 * v931, v935 = d12 * v930 + d14 * v931, v936 = v22 * v833,
+            v937 = v25 * v833, v938 = v41 * v929, v939 = 0.5 * (v833 + v834),
+            v940 = 0.5 * (v833 + v835), v941 = v41 * v922, v942 = v41 * v924, v943 = v41 * v926,
+            v944 = v41 * v920, v945 = v40 * v920, v946 = v40 * v929, v947 = v40 * v923,
+            v948 = v40 * v925, v949 = v40 * v922 + v837, v950 = v41 * v923 + v837,
+            v951 = v40 * v926 - v840, v952 = v40 * v924 + v836, v953 = v41 * v925 + v836,
+            v954 = v40 * v927, v955 = v41 * v927 - v840, v956 = v41 * v921, v957 = v40 * v921,
+            v958 = v41 * v928, v959 = v40 * v928, v960 = X0 * v837 + X2 * v836 - v2 * v833,
+            v961 = X1 * v837 + X3 * v836 - v9 * v833, v962 = softehl_vsqrt(v883),
+            v963 = v960 * v960 + v961 * v961, v964 = softehl_vsqrt(v963), v965 = w[1] * v838,
+            v966 = w[1] * v842, v967 = w[1] * v841,
+            v968 = (-1.0) + 6.283185307179586 * (X5 * v838 + (v936 * v834 + v937 * v835)),
+            v969 = 1.0 + a16 * v968, v970 = softehl_vsqrt(1.0 / v883),
+            v971 = v29 * v940 + (v26 * v939 - v843), v972 = v30 * v940 + (v27 * v939 - v844),
+            v973 = v841 + v922 * v971, v974 = v922 * v972, v975 = v842 + v924 * v971,
+            v976 = v924 * v972, v977 = v841 + v923 * v972, v978 = v923 * v971, v979 = v925 * v971,
+            v980 = v842 + v925 * v972, v981 = v926 * v972, v982 = v838 + v926 * v971,
+            v983 = v927 * v971, v984 = v838 + v927 * v972, v985 = v920 * v971, v986 = v920 * v972,
+            v987 = v921 * v971, v988 = v921 * v972, v989 = v928 * v971, v990 = v928 * v972,
+            v991 = v929 * v971, v992 = v929 * v972, v993 = v563 * v964, v994 = v993 * v969,
+            v995 = 0.5 * v970, v996 = v857 * v994, v997 = v933 * v994, v998 = v934 * v994,
+            v999 = v856 * v994, v1000 = 1.0 / (v873 - v962), v1001 = v1000 * v1000,
+            v1002 = v1001 * (v866 * (v856 - v893 * v995)),
+            v1003 = v1001 * (v866 * (v857 - v895 * v995)), v1004 = 2.0 * v856 * v1000,
+            v1005 = 2.0 * v857 * v1000, v1006 = 2.0 * v1000, v1007 = v867 * v1000,
+            v1008 = v867 * v1001, v1009 = v1008 * (v871 - v995 * v890) - v869 * v1006,
+            v1010 = v1008 * (v872 - v995 * v891) - v870 * v1006, v1011 = 0.5 * v1007,
+            v1012 = 2.0 * v1007, v1013 = v1004 - v889, v1014 = v884 - v885 - v1004,
+            v1015 = (-1.0) - v1007, v1016 = 0.5 * (v1015 - v1007), v1017 = v1011 * v1015,
+            v1018 = 1.0 - v1007, v1019 = v1011 * v1018, v1020 = 1.0 - v1007 * v1007,
+            v1021 = 0.5 * (v1018 - v1007), v1022 = v886 - v887 - v1005, v1023 = v1005 - v888,
+            v1024 = w[1] * v1020, v1025 = w[1] * v1017, v1026 = w[1] * v1019,
+            v1027 = v6 * v1020 - v845 - v3 * v1017 - v4 * v1019,
+            v1028 = v39 * v1020 - v848 - v12 * v1017 - v14 * v1019,
+            v1029 = v857 * (v4 * v1021 + (v6 * v1012 + v3 * v1016)) - v856 * (v14 * v1021 + (v39 * v1012 + v12 * v1016)),
+            v1030 = v857 * v1027 - v856 * v1028, v1031 = v862 * v1027 + v863 * v1028,
+            v1032 = v864 * v1027 + v861 * v1028, v1033 = a12 * v1030,
+            v1034 = v857 * v1020 + v1029 * v1014, v1035 = v1029 * v1022 - v856 * v1020,
+            v1036 = v935 - v1033,
+            v1037 = v944 * v1032 + (v856 * v986 - v857 * (v1017 + v985) - v945 * v1031),
+            v1038 = v944 * v1010 + (v945 * v1009 + (v892 + v1013 * v985 + v1023 * v986 - v1002)),
+            v1039 = v1037 + v1029 * v1038;
+        const M v1040 = softehl_eq(v1036, v1036);
+        const V v1041 = v956 * v1010 + (v957 * v1009 + (v894 + v1013 * v987 + v1023 * v988 - v1003)),
+            v1042 = v956 * v1032 + (v856 * (v1017 + v988) - v857 * v987 - v957 * v1031),
+            v1043 = v958 * v1010 + (v959 * v1009 + (v1002 + (v892 + v1013 * v989 + v1023 * v990))),
+            v1044 = v958 * v1032 + (v856 * v990 - v857 * (v1019 + v989) - v959 * v1031),
+            v1045 = v1042 + v1029 * v1041, v1046 = v1044 + v1029 * v1043,
+            v1047 = v946 * v1009 + (v938 * v1010 + (v1003 + (v894 + v1013 * v991 + v1023 * v992))),
+            v1048 = v938 * v1032 + (v856 * (v1019 + v992) - v857 * v991) - v946 * v1031,
+            v1049 = v1048 + v1029 * v1047,
+            v1050 = v941 * v1010 + (v949 * v1009 + (v1013 * v973 + v1023 * v974)),
+            v1051 = v941 * v1032 + (v856 * v974 - v857 * v973 - v949 * v1031) + v1029 * v1050,
+            v1052 = v950 * v1010 + (v947 * v1009 + (v1013 * v978 + v1023 * v977)),
+            v1053 = v950 * v1032 + (v856 * v977 - v857 * v978 - v947 * v1031) + v1029 * v1052,
+            v1054 = v942 * v1010 + (v952 * v1009 + (v1013 * v975 + v1023 * v976)),
+            v1055 = v942 * v1032 + (v856 * v976 - v857 * v975 - v952 * v1031) + v1029 * v1054,
+            v1056 = v953 * v1010 + (v948 * v1009 + (v1013 * v979 + v1023 * v980)),
+            v1057 = v953 * v1032 + (v856 * v980 - v857 * v979 - v948 * v1031) + v1029 * v1056,
+            v1058 = v943 * v1010 + (v951 * v1009 + (v1013 * v982 + v1023 * v981)),
+            v1059 = v955 * v1010 + (v954 * v1009 + (v1013 * v983 + v1023 * v984)),
+            v1060 = v943 * v1032 + (v856 * v981 - v857 * v982 - v951 * v1031) + v1029 * v1058,
+            v1061 = v955 * v1032 + (v856 * v984 - v857 * v983 - v954 * v1031) + v1029 * v1059;
+        V v1062 = softehl_splat(0.0), v1063 = softehl_splat(0.0), v1064 = softehl_splat(0.0),
             v1065 = softehl_splat(0.0), v1066 = softehl_splat(0.0), v1067 = softehl_splat(0.0),
             v1068 = softehl_splat(0.0), v1069 = softehl_splat(0.0), v1070 = softehl_splat(0.0),
             v1071 = softehl_splat(0.0), v1072 = softehl_splat(0.0), v1073 = softehl_splat(0.0),
@@ -814,12 +826,12 @@ SOFTEHL_GROUP(softehl_mortar_33_tangent)
             v1110 = softehl_splat(0.0), v1111 = softehl_splat(0.0), v1112 = softehl_splat(0.0),
             v1113 = softehl_splat(0.0), v1114 = softehl_splat(0.0), v1115 = softehl_splat(0.0),
             v1116 = softehl_splat(0.0), v1117 = softehl_splat(0.0), v1118 = softehl_splat(0.0),
-            v1119 = softehl_splat(0.0), v1120 = softehl_splat(0.0), v1121 = softehl_splat(0.0);
-        const M m1122 = v1037;
-        if (softehl_any(m1122)) {
-            const M v1123 = softehl_le(softehl_splat(0.0), v1033);
-            V v1124 = softehl_splat(0.0), v1125 = softehl_splat(0.0), v1126 = softehl_splat(0.0),
-                v1127 = softehl_splat(0.0), v1128 = softehl_splat(0.0), v1129 = softehl_splat(0.0),
+            v1119 = softehl_splat(0.0), v1120 = softehl_splat(0.0), v1121 = softehl_splat(0.0),
+            v1122 = softehl_splat(0.0), v1123 = softehl_splat(0.0), v1124 = softehl_splat(0.0);
+        const M m1125 = v1040;
+        if (softehl_any(m1125)) {
+            const M v1126 = softehl_le(softehl_splat(0.0), v1036);
+            V v1127 = softehl_splat(0.0), v1128 = softehl_splat(0.0), v1129 = softehl_splat(0.0),
                 v1130 = softehl_splat(0.0), v1131 = softehl_splat(0.0), v1132 = softehl_splat(0.0),
                 v1133 = softehl_splat(0.0), v1134 = softehl_splat(0.0), v1135 = softehl_splat(0.0),
                 v1136 = softehl_splat(0.0), v1137 = softehl_splat(0.0), v1138 = softehl_splat(0.0),
@@ -834,582 +846,593 @@ SOFTEHL_GROUP(softehl_mortar_33_tangent)
                 v1163 = softehl_splat(0.0), v1164 = softehl_splat(0.0), v1165 = softehl_splat(0.0),
                 v1166 = softehl_splat(0.0), v1167 = softehl_splat(0.0), v1168 = softehl_splat(0.0),
                 v1169 = softehl_splat(0.0), v1170 = softehl_splat(0.0), v1171 = softehl_splat(0.0),
-                v1172 = softehl_splat(0.0);
-            const M m1173 = v1123 & m1122;
-            if (softehl_any(m1173)) {
-                const V v1174 = a14 + v1027, v1175 = v1027 - a15, v1176 = v1174 * v1175;
-                const M v1177 = softehl_eq(v1176, v1176);
-                V v1178 = softehl_splat(0.0), v1179 = softehl_splat(0.0),
-                    v1180 = softehl_splat(0.0), v1181 = softehl_splat(0.0),
-                    v1182 = softehl_splat(0.0);
-                const M m1183 = v1177 & m1173;
-                if (softehl_any(m1183)) {
-                    const M v1184 = softehl_lt(v1176, softehl_splat(0.0));
-                    const V v1185 = softehl_blend(v1184, v1033, softehl_splat(0.0)),
-                        v1186 = softehl_blend(v1184, v927, softehl_splat(0.0)),
-                        v1187 = softehl_blend(v1184, v928, softehl_splat(0.0)),
-                        v1188 = softehl_blend(v1184, v47, softehl_splat(0.0)),
-                        v1189 = softehl_blend(v1184, v51, softehl_splat(0.0));
-                    v1178 = softehl_blend(m1183, v1185, v1178);
-                    v1179 = softehl_blend(m1183, v1186, v1179);
-                    v1180 = softehl_blend(m1183, v1187, v1180);
-                    v1181 = softehl_blend(m1183, v1188, v1181);
-                    v1182 = softehl_blend(m1183, v1189, v1182);
+                v1172 = softehl_splat(0.0), v1173 = softehl_splat(0.0), v1174 = softehl_splat(0.0),
+                v1175 = softehl_splat(0.0);
+            const M m1176 = v1126 & m1125;
+            if (softehl_any(m1176)) {
+                const V v1177 = a14 + v1030, v1178 = v1030 - a15, v1179 = v1177 * v1178;
+                const M v1180 = softehl_eq(v1179, v1179);
+                V v1181 = softehl_splat(0.0), v1182 = softehl_splat(0.0),
+                    v1183 = softehl_splat(0.0), v1184 = softehl_splat(0.0),
+                    v1185 = softehl_splat(0.0);
+                const M m1186 = v1180 & m1176;
+                if (softehl_any(m1186)) {
+                    const M v1187 = softehl_lt(v1179, softehl_splat(0.0));
+                    const V v1188 = softehl_blend(v1187, v1036, softehl_splat(0.0)),
+                        v1189 = softehl_blend(v1187, v930, softehl_splat(0.0)),
+                        v1190 = softehl_blend(v1187, v931, softehl_splat(0.0)),
+                        v1191 = softehl_blend(v1187, v37, softehl_splat(0.0)),
+                        v1192 = softehl_blend(v1187, v71, softehl_splat(0.0));
+                    v1181 = softehl_blend(m1186, v1188, v1181);
+                    v1182 = softehl_blend(m1186, v1189, v1182);
+                    v1183 = softehl_blend(m1186, v1190, v1183);
+                    v1184 = softehl_blend(m1186, v1191, v1184);
+                    v1185 = softehl_blend(m1186, v1192, v1185);
                 }
-                const M m1190 = ~v1177 & m1173;
-                if (softehl_any(m1190)) {
-                    const V v1191 = v1176 * v1176, v1192 = v1176 * v1191,
-                        v1193 = 3.0 * v1191 * (v1174 + v1175);
-                    v1178 = softehl_blend(m1190, v1192, v1178);
-                    v1181 = softehl_blend(m1190, v1193, v1181);
+                const M m1193 = ~v1180 & m1176;
+                if (softehl_any(m1193)) {
+                    const V v1194 = v1179 * v1179, v1195 = v1179 * v1194,
+                        v1196 = 3.0 * v1194 * (v1177 + v1178);
+                    v1181 = softehl_blend(m1193, v1195, v1181);
+                    v1184 = softehl_blend(m1193, v1196, v1184);
                 }
-                const V v1194 = a13 * v1178; const M v1195 = softehl_eq(v1194, v1194);
-                const V v1196 = v11 * v1017 - v18 * v838 - v19 * v839 - v5 * v835 - v7 * v1014 - v10 * v1016,
-                    v1197 = v26 * v1017 - v21 * v838 - v23 * v839 - v13 * v835 - v15 * v1014 - v17 * v1016,
-                    v1198 = a12 * (v853 * v1196 + v854 * v1197) + (d13 * v927 + d15 * v928);
-                const M v1199 = softehl_eq(v1198, v1198), v1200 = v1195 & v1199;
-                V v1201 = softehl_splat(0.0), v1202 = softehl_splat(0.0),
-                    v1203 = softehl_splat(0.0), v1204 = softehl_splat(0.0),
-                    v1205 = softehl_splat(0.0), v1206 = softehl_splat(0.0);
-                const M m1207 = v1200 & m1173;
-                if (softehl_any(m1207)) {
-                    const M v1208 = softehl_lt(v1194, v1198);
-                    V v1209 = v1194, v1210 = softehl_splat(0.0), v1211 = softehl_splat(0.0),
-                        v1212 = a13, v1213 = softehl_splat(0.0), v1214 = softehl_splat(0.0);
-                    const M m1215 = ~v1208 & m1207;
-                    if (softehl_any(m1215)) {
-                        V v1216 = softehl_splat(0.0), v1217 = softehl_splat(0.0),
-                            v1218 = softehl_splat(0.0), v1219 = softehl_splat(0.0),
-                            v1220 = softehl_splat(0.0), v1221 = softehl_splat(0.0);
-                        const M m1222 = v1195 & m1215;
-                        if (softehl_any(m1222)) {
-                            const M v1223 = softehl_lt(v1194, -v1198);
-                            V v1224 = v1198, v1225 = v927, v1226 = v928, v1227 = softehl_splat(0.0),
-                                v1228 = a12, v1229 = v54;
-                            const M m1230 = v1223 & m1222;
-                            if (softehl_any(m1230)) {
-                                const V v1231 = -v1194; v1224 = softehl_blend(m1230, v1231, v1224);
-                                v1225 = softehl_blend(m1230, softehl_splat(0.0), v1225);
-                                v1226 = softehl_blend(m1230, softehl_splat(0.0), v1226);
-                                v1227 = softehl_blend(m1230, v16, v1227);
-                                v1228 = softehl_blend(m1230, softehl_splat(0.0), v1228);
-                                v1229 = softehl_blend(m1230, softehl_splat(0.0), v1229);
+                const V v1197 = a13 * v1181; const M v1198 = softehl_eq(v1197, v1197);
+                const V v1199 = v11 * v1020 - v17 * v841 - v18 * v842 - v5 * v838 - v7 * v1017 - v10 * v1019,
+                    v1200 = v38 * v1020 - v21 * v841 - v23 * v842 - v13 * v838 - v15 * v1017 - v16 * v1019,
+                    v1201 = a12 * (v856 * v1199 + v857 * v1200) + (d13 * v930 + d15 * v931);
+                const M v1202 = softehl_eq(v1201, v1201), v1203 = v1198 & v1202;
+                V v1204 = softehl_splat(0.0), v1205 = softehl_splat(0.0),
+                    v1206 = softehl_splat(0.0), v1207 = softehl_splat(0.0),
+                    v1208 = softehl_splat(0.0), v1209 = softehl_splat(0.0);
+                const M m1210 = v1203 & m1176;
+                if (softehl_any(m1210)) {
+                    const M v1211 = softehl_lt(v1197, v1201);
+                    V v1212 = v1197, v1213 = softehl_splat(0.0), v1214 = softehl_splat(0.0),
+                        v1215 = a13, v1216 = softehl_splat(0.0), v1217 = softehl_splat(0.0);
+                    const M m1218 = ~v1211 & m1210;
+                    if (softehl_any(m1218)) {
+                        const V v1219 = -v1201;
+                        const M v1220 = softehl_eq(v1219, v1219), v1221 = v1198 & v1220;
+                        V v1222 = softehl_splat(0.0), v1223 = softehl_splat(0.0),
+                            v1224 = softehl_splat(0.0), v1225 = softehl_splat(0.0),
+                            v1226 = softehl_splat(0.0), v1227 = softehl_splat(0.0);
+                        const M m1228 = v1221 & m1218;
+                        if (softehl_any(m1228)) {
+                            const M v1229 = softehl_lt(v1197, v1219);
+                            V v1230 = softehl_splat(0.0), v1231 = softehl_splat(0.0),
+                                v1232 = softehl_splat(0.0), v1233 = softehl_splat(0.0), v1234 = v46,
+                                v1235 = v47;
+                            const M m1236 = v1229 & m1228;
+                            if (softehl_any(m1236)) {
+                                const V v1237 = -v1197; v1230 = softehl_blend(m1236, v1237, v1230);
+                                v1233 = softehl_blend(m1236, v35, v1233);
+                                v1234 = softehl_blend(m1236, softehl_splat(0.0), v1234);
+                                v1235 = softehl_blend(m1236, softehl_splat(0.0), v1235);
                             }
-                            v1216 = softehl_blend(m1222, v1224, v1216);
-                            v1217 = softehl_blend(m1222, v1225, v1217);
-                            v1218 = softehl_blend(m1222, v1226, v1218);
-                            v1219 = softehl_blend(m1222, v1227, v1219);
-                            v1220 = softehl_blend(m1222, v1228, v1220);
-                            v1221 = softehl_blend(m1222, v1229, v1221);
+                            const M m1238 = ~v1229 & m1228;
+                            if (softehl_any(m1238)) {
+                                const V v1239 = softehl_blend(v34, v1201, softehl_splat(0.0)),
+                                    v1240 = softehl_blend(v34, v930, softehl_splat(0.0)),
+                                    v1241 = softehl_blend(v34, v931, softehl_splat(0.0));
+                                v1230 = softehl_blend(m1238, v1239, v1230);
+                                v1231 = softehl_blend(m1238, v1240, v1231);
+                                v1232 = softehl_blend(m1238, v1241, v1232);
+                            }
+                            v1222 = softehl_blend(m1228, v1230, v1222);
+                            v1223 = softehl_blend(m1228, v1231, v1223);
+                            v1224 = softehl_blend(m1228, v1232, v1224);
+                            v1225 = softehl_blend(m1228, v1233, v1225);
+                            v1226 = softehl_blend(m1228, v1234, v1226);
+                            v1227 = softehl_blend(m1228, v1235, v1227);
                         }
-                        const M m1232 = ~v1195 & m1215;
-                        if (softehl_any(m1232)) {
-                            const V v1233 = v1198 + v1194, v1234 = v1233 * v1233,
-                                v1235 = v1233 * v1234, v1236 = 3.0 * v1234, v1237 = v54 * v1236,
-                                v1238 = a13 * v1236, v1239 = a12 * v1236, v1240 = v927 * v1236,
-                                v1241 = v928 * v1236;
-                            v1216 = softehl_blend(m1232, v1235, v1216);
-                            v1217 = softehl_blend(m1232, v1240, v1217);
-                            v1218 = softehl_blend(m1232, v1241, v1218);
-                            v1219 = softehl_blend(m1232, v1238, v1219);
-                            v1220 = softehl_blend(m1232, v1239, v1220);
-                            v1221 = softehl_blend(m1232, v1237, v1221);
+                        const M m1242 = ~v1221 & m1218;
+                        if (softehl_any(m1242)) {
+                            const V v1243 = v1201 + v1197, v1244 = v1243 * v1243,
+                                v1245 = v1243 * v1244, v1246 = 3.0 * v1244, v1247 = v20 * v1246,
+                                v1248 = a13 * v1246, v1249 = a12 * v1246, v1250 = v930 * v1246,
+                                v1251 = v931 * v1246;
+                            v1222 = softehl_blend(m1242, v1245, v1222);
+                            v1223 = softehl_blend(m1242, v1250, v1223);
+                            v1224 = softehl_blend(m1242, v1251, v1224);
+                            v1225 = softehl_blend(m1242, v1248, v1225);
+                            v1226 = softehl_blend(m1242, v1249, v1226);
+                            v1227 = softehl_blend(m1242, v1247, v1227);
                         }
-                        v1209 = softehl_blend(m1215, v1216, v1209);
-                        v1210 = softehl_blend(m1215, v1217, v1210);
-                        v1211 = softehl_blend(m1215, v1218, v1211);
-                        v1212 = softehl_blend(m1215, v1219, v1212);
-                        v1213 = softehl_blend(m1215, v1220, v1213);
-                        v1214 = softehl_blend(m1215, v1221, v1214);
+                        v1212 = softehl_blend(m1218, v1222, v1212);
+                        v1213 = softehl_blend(m1218, v1223, v1213);
+                        v1214 = softehl_blend(m1218, v1224, v1214);
+                        v1215 = softehl_blend(m1218, v1225, v1215);
+                        v1216 = softehl_blend(m1218, v1226, v1216);
+                        v1217 = softehl_blend(m1218, v1227, v1217);
                     }
-                    v1201 = softehl_blend(m1207, v1209, v1201);
-                    v1202 = softehl_blend(m1207, v1210, v1202);
-                    v1203 = softehl_blend(m1207, v1211, v1203);
-                    v1204 = softehl_blend(m1207, v1212, v1204);
-                    v1205 = softehl_blend(m1207, v1213, v1205);
-                    v1206 = softehl_blend(m1207, v1214, v1206);
+                    v1204 = softehl_blend(m1210, v1212, v1204);
+                    v1205 = softehl_blend(m1210, v1213, v1205);
+                    v1206 = softehl_blend(m1210, v1214, v1206);
+                    v1207 = softehl_blend(m1210, v1215, v1207);
+                    v1208 = softehl_blend(m1210, v1216, v1208);
+                    v1209 = softehl_blend(m1210, v1217, v1209);
                 }
-                const M m1242 = ~v1200 & m1173;
-                if (softehl_any(m1242)) {
-                    const V v1243 = v1194 - v1198, v1244 = v1243 * v1243, v1245 = v1243 * v1244,
-                        v1246 = 3.0 * v1244, v1247 = v52 * v1246, v1248 = a13 * v1246,
-                        v1249 = -(a12 * v1246), v1250 = v929 * v1246, v1251 = -(v928 * v1246);
-                    v1201 = softehl_blend(m1242, v1245, v1201);
-                    v1202 = softehl_blend(m1242, v1250, v1202);
-                    v1203 = softehl_blend(m1242, v1251, v1203);
-                    v1204 = softehl_blend(m1242, v1248, v1204);
-                    v1205 = softehl_blend(m1242, v1249, v1205);
-                    v1206 = softehl_blend(m1242, v1247, v1206);
+                const M m1252 = ~v1203 & m1176;
+                if (softehl_any(m1252)) {
+                    const V v1253 = v1197 - v1201, v1254 = v1253 * v1253, v1255 = v1253 * v1254,
+                        v1256 = 3.0 * v1254, v1257 = v50 * v1256, v1258 = a13 * v1256,
+                        v1259 = -(a12 * v1256), v1260 = v932 * v1256, v1261 = -(v931 * v1256);
+                    v1204 = softehl_blend(m1252, v1255, v1204);
+                    v1205 = softehl_blend(m1252, v1260, v1205);
+                    v1206 = softehl_blend(m1252, v1261, v1206);
+                    v1207 = softehl_blend(m1252, v1258, v1207);
+                    v1208 = softehl_blend(m1252, v1259, v1208);
+                    v1209 = softehl_blend(m1252, v1257, v1209);
                 }
-                const V v1252 = v860 * v1196 - v859 * v1197, v1253 = v861 * v1197 - v858 * v1196,
-                    v1254 = (v5 * v837 - v18 * v936 - v19 * v937) * v853 + (v13 * v837 - v21 * v936 - v23 * v937) * v854,
-                    v1255 = v853 * (v10 * v1018 + (v11 * v1009 + v7 * v1013)) + v854 * (v17 * v1018 + (v26 * v1009 + v15 * v1013)),
-                    v1256 = v1181 * v1204,
-                    v1257 = v1205 * (v923 * v1254 + (v1055 * v1255 + (v948 * v1252 + v940 * v1253))),
-                    v1258 = v1204 * (v923 * v1182 + v1057 * v1181) + v1257,
-                    v1259 = v1205 * (v924 * v1254 + (v1056 * v1255 + (v951 * v1252 + v952 * v1253))),
-                    v1260 = v1204 * (v924 * v1182 + v1058 * v1181) + v1259,
-                    v1261 = v1205 * (v917 * v1254 + (v1035 * v1255 + (v942 * v1252 + v941 * v1253))),
-                    v1262 = v1204 * (v917 * v1182 + v1036 * v1181) + v1261,
-                    v1263 = v1205 * (v918 * v1254 + (v1038 * v1255 + (v954 * v1252 + v953 * v1253))),
-                    v1264 = v1204 * (v918 * v1182 + v1042 * v1181) + v1263,
-                    v1265 = v1205 * (v925 * v1254 + (v1040 * v1255 + (v956 * v1252 + v955 * v1253))),
-                    v1266 = v1204 * (v925 * v1182 + v1043 * v1181) + v1265,
-                    v1267 = v1205 * (v926 * v1254 + (v1044 * v1255 + (v943 * v1252 + v935 * v1253))),
-                    v1268 = v1204 * (v926 * v1182 + v1046 * v1181) + v1267, v1269 = v1179 * v1204,
-                    v1270 = v1180 * v1204,
-                    v1271 = v1205 * (v1049 * v1255 + (v920 * v1254 + (v944 * v1252 + v947 * v1253))),
-                    v1272 = v1205 * (v1051 * v1255 + (v921 * v1254 + (v949 * v1252 + v939 * v1253))),
-                    v1273 = v1205 * (v1053 * v1255 + (v922 * v1254 + (v945 * v1252 + v950 * v1253))),
-                    v1274 = v1255 * v1205,
-                    v1275 = v1205 * (v1047 * v1255 + (v919 * v1254 + (v946 * v1252 + v938 * v1253))),
-                    v1276 = v1204 * (v919 * v1182 + v1048 * v1181) + v1275,
-                    v1277 = v1204 * (v920 * v1182 + v1050 * v1181) + v1271,
-                    v1278 = v1204 * (v921 * v1182 + v1052 * v1181) + v1272,
-                    v1279 = v1204 * (v922 * v1182 + v1054 * v1181) + v1273, v1280 = w[1] * v1202,
-                    v1281 = w[1] * v1203, v1282 = v1202 * v996, v1283 = v1203 * v996,
-                    v1284 = v1202 * v993, v1285 = v1203 * v993,
-                    v1286 = v1031 * v1256 + v1011 * v1274, v1287 = v1032 * v1256 + v1019 * v1274,
-                    v1288 = v1280 * v994, v1289 = v1281 * v994, v1290 = v1280 * v995,
-                    v1291 = v1281 * v995, v1292 = v964 * v1282, v1293 = v964 * v1283,
-                    v1294 = v964 * v1284, v1295 = v964 * v1285, v1296 = v963 * v1282,
-                    v1297 = v963 * v1283, v1298 = v963 * v1284, v1299 = v963 * v1285,
-                    v1300 = v962 * v1282, v1301 = v962 * v1283, v1302 = v962 * v1284,
-                    v1303 = v962 * v1285, v1304 = v1022 * v1282, v1305 = v1022 * v1283,
-                    v1306 = v1022 * v1284, v1307 = v1022 * v1285, v1308 = v1023 * v1282,
-                    v1309 = v1023 * v1283, v1310 = v1023 * v1284, v1311 = v1023 * v1285,
-                    v1312 = -(v1021 * v1282), v1313 = -(v1021 * v1283), v1314 = -(v1021 * v1284),
-                    v1315 = -(v1021 * v1285);
-                v1124 = softehl_blend(m1173, v1178, v1124);
-                v1125 = softehl_blend(m1173, v1179, v1125);
-                v1126 = softehl_blend(m1173, v1180, v1126);
-                v1127 = softehl_blend(m1173, v1201, v1127);
-                v1128 = softehl_blend(m1173, v1292, v1128);
-                v1129 = softehl_blend(m1173, v1293, v1129);
-                v1130 = softehl_blend(m1173, v1294, v1130);
-                v1131 = softehl_blend(m1173, v1295, v1131);
-                v1132 = softehl_blend(m1173, v1296, v1132);
-                v1133 = softehl_blend(m1173, v1297, v1133);
-                v1134 = softehl_blend(m1173, v1298, v1134);
-                v1135 = softehl_blend(m1173, v1299, v1135);
-                v1136 = softehl_blend(m1173, v1300, v1136);
-                v1137 = softehl_blend(m1173, v1301, v1137);
-                v1138 = softehl_blend(m1173, v1302, v1138);
-                v1139 = softehl_blend(m1173, v1303, v1139);
-                v1140 = softehl_blend(m1173, v1304, v1140);
-                v1141 = softehl_blend(m1173, v1305, v1141);
-                v1142 = softehl_blend(m1173, v1306, v1142);
-                v1143 = softehl_blend(m1173, v1307, v1143);
-                v1144 = softehl_blend(m1173, v1308, v1144);
-                v1145 = softehl_blend(m1173, v1309, v1145);
-                v1146 = softehl_blend(m1173, v1310, v1146);
-                v1147 = softehl_blend(m1173, v1311, v1147);
-                v1148 = softehl_blend(m1173, v1312, v1148);
-                v1149 = softehl_blend(m1173, v1313, v1149);
-                v1150 = softehl_blend(m1173, v1314, v1150);
-                v1151 = softehl_blend(m1173, v1315, v1151);
-                v1152 = softehl_blend(m1173, v1181, v1152);
-                v1153 = softehl_blend(m1173, v1288, v1153);
-                v1154 = softehl_blend(m1173, v1289, v1154);
-                v1155 = softehl_blend(m1173, v1290, v1155);
-                v1156 = softehl_blend(m1173, v1291, v1156);
-                v1157 = softehl_blend(m1173, v1269, v1157);
-                v1158 = softehl_blend(m1173, v1270, v1158);
-                v1159 = softehl_blend(m1173, v1182, v1159);
-                v1160 = softehl_blend(m1173, v1286, v1160);
-                v1161 = softehl_blend(m1173, v1287, v1161);
-                v1162 = softehl_blend(m1173, v1276, v1162);
-                v1163 = softehl_blend(m1173, v1206, v1163);
-                v1164 = softehl_blend(m1173, v1277, v1164);
-                v1165 = softehl_blend(m1173, v1278, v1165);
-                v1166 = softehl_blend(m1173, v1279, v1166);
-                v1167 = softehl_blend(m1173, v1258, v1167);
-                v1168 = softehl_blend(m1173, v1260, v1168);
-                v1169 = softehl_blend(m1173, v1262, v1169);
-                v1170 = softehl_blend(m1173, v1264, v1170);
-                v1171 = softehl_blend(m1173, v1266, v1171);
-                v1172 = softehl_blend(m1173, v1268, v1172);
+                const V v1262 = v863 * v1199 - v862 * v1200, v1263 = v864 * v1200 - v861 * v1199,
+                    v1264 = (v5 * v840 - v17 * v939 - v18 * v940) * v856 + (v13 * v840 - v21 * v939 - v23 * v940) * v857,
+                    v1265 = v856 * (v10 * v1021 + (v11 * v1012 + v7 * v1016)) + v857 * (v16 * v1021 + (v38 * v1012 + v15 * v1016)),
+                    v1266 = v1184 * v1207,
+                    v1267 = v1208 * (v926 * v1264 + (v1058 * v1265 + (v951 * v1262 + v943 * v1263))),
+                    v1268 = v1207 * (v926 * v1185 + v1060 * v1184) + v1267,
+                    v1269 = v1208 * (v927 * v1264 + (v1059 * v1265 + (v954 * v1262 + v955 * v1263))),
+                    v1270 = v1207 * (v927 * v1185 + v1061 * v1184) + v1269,
+                    v1271 = v1208 * (v920 * v1264 + (v1038 * v1265 + (v945 * v1262 + v944 * v1263))),
+                    v1272 = v1207 * (v920 * v1185 + v1039 * v1184) + v1271,
+                    v1273 = v1208 * (v921 * v1264 + (v1041 * v1265 + (v957 * v1262 + v956 * v1263))),
+                    v1274 = v1207 * (v921 * v1185 + v1045 * v1184) + v1273,
+                    v1275 = v1208 * (v928 * v1264 + (v1043 * v1265 + (v959 * v1262 + v958 * v1263))),
+                    v1276 = v1207 * (v928 * v1185 + v1046 * v1184) + v1275,
+                    v1277 = v1208 * (v929 * v1264 + (v1047 * v1265 + (v946 * v1262 + v938 * v1263))),
+                    v1278 = v1207 * (v929 * v1185 + v1049 * v1184) + v1277, v1279 = v1182 * v1207,
+                    v1280 = v1183 * v1207,
+                    v1281 = v1208 * (v1052 * v1265 + (v923 * v1264 + (v947 * v1262 + v950 * v1263))),
+                    v1282 = v1208 * (v1054 * v1265 + (v924 * v1264 + (v952 * v1262 + v942 * v1263))),
+                    v1283 = v1208 * (v1056 * v1265 + (v925 * v1264 + (v948 * v1262 + v953 * v1263))),
+                    v1284 = v1265 * v1208,
+                    v1285 = v1208 * (v1050 * v1265 + (v922 * v1264 + (v949 * v1262 + v941 * v1263))),
+                    v1286 = v1207 * (v922 * v1185 + v1051 * v1184) + v1285,
+                    v1287 = v1207 * (v923 * v1185 + v1053 * v1184) + v1281,
+                    v1288 = v1207 * (v924 * v1185 + v1055 * v1184) + v1282,
+                    v1289 = v1207 * (v925 * v1185 + v1057 * v1184) + v1283, v1290 = w[1] * v1205,
+                    v1291 = w[1] * v1206, v1292 = v1205 * v999, v1293 = v1206 * v999,
+                    v1294 = v1205 * v996, v1295 = v1206 * v996,
+                    v1296 = v1034 * v1266 + v1014 * v1284, v1297 = v1035 * v1266 + v1022 * v1284,
+                    v1298 = v1290 * v997, v1299 = v1291 * v997, v1300 = v1290 * v998,
+                    v1301 = v1291 * v998, v1302 = v967 * v1292, v1303 = v967 * v1293,
+                    v1304 = v967 * v1294, v1305 = v967 * v1295, v1306 = v966 * v1292,
+                    v1307 = v966 * v1293, v1308 = v966 * v1294, v1309 = v966 * v1295,
+                    v1310 = v965 * v1292, v1311 = v965 * v1293, v1312 = v965 * v1294,
+                    v1313 = v965 * v1295, v1314 = v1025 * v1292, v1315 = v1025 * v1293,
+                    v1316 = v1025 * v1294, v1317 = v1025 * v1295, v1318 = v1026 * v1292,
+                    v1319 = v1026 * v1293, v1320 = v1026 * v1294, v1321 = v1026 * v1295,
+                    v1322 = -(v1024 * v1292), v1323 = -(v1024 * v1293), v1324 = -(v1024 * v1294),
+                    v1325 = -(v1024 * v1295);
+                v1127 = softehl_blend(m1176, v1181, v1127);
+                v1128 = softehl_blend(m1176, v1182, v1128);
+                v1129 = softehl_blend(m1176, v1183, v1129);
+                v1130 = softehl_blend(m1176, v1204, v1130);
+                v1131 = softehl_blend(m1176, v1302, v1131);
+                v1132 = softehl_blend(m1176, v1303, v1132);
+                v1133 = softehl_blend(m1176, v1304, v1133);
+                v1134 = softehl_blend(m1176, v1305, v1134);
+                v1135 = softehl_blend(m1176, v1306, v1135);
+                v1136 = softehl_blend(m1176, v1307, v1136);
+                v1137 = softehl_blend(m1176, v1308, v1137);
+                v1138 = softehl_blend(m1176, v1309, v1138);
+                v1139 = softehl_blend(m1176, v1310, v1139);
+                v1140 = softehl_blend(m1176, v1311, v1140);
+                v1141 = softehl_blend(m1176, v1312, v1141);
+                v1142 = softehl_blend(m1176, v1313, v1142);
+                v1143 = softehl_blend(m1176, v1314, v1143);
+                v1144 = softehl_blend(m1176, v1315, v1144);
+                v1145 = softehl_blend(m1176, v1316, v1145);
+                v1146 = softehl_blend(m1176, v1317, v1146);
+                v1147 = softehl_blend(m1176, v1318, v1147);
+                v1148 = softehl_blend(m1176, v1319, v1148);
+                v1149 = softehl_blend(m1176, v1320, v1149);
+                v1150 = softehl_blend(m1176, v1321, v1150);
+                v1151 = softehl_blend(m1176, v1322, v1151);
+                v1152 = softehl_blend(m1176, v1323, v1152);
+                v1153 = softehl_blend(m1176, v1324, v1153);
+                v1154 = softehl_blend(m1176, v1325, v1154);
+                v1155 = softehl_blend(m1176, v1184, v1155);
+                v1156 = softehl_blend(m1176, v1298, v1156);
+                v1157 = softehl_blend(m1176, v1299, v1157);
+                v1158 = softehl_blend(m1176, v1300, v1158);
+                v1159 = softehl_blend(m1176, v1301, v1159);
+                v1160 = softehl_blend(m1176, v1279, v1160);
+                v1161 = softehl_blend(m1176, v1280, v1161);
+                v1162 = softehl_blend(m1176, v1185, v1162);
+                v1163 = softehl_blend(m1176, v1296, v1163);
+                v1164 = softehl_blend(m1176, v1297, v1164);
+                v1165 = softehl_blend(m1176, v1286, v1165);
+                v1166 = softehl_blend(m1176, v1209, v1166);
+                v1167 = softehl_blend(m1176, v1287, v1167);
+                v1168 = softehl_blend(m1176, v1288, v1168);
+                v1169 = softehl_blend(m1176, v1289, v1169);
+                v1170 = softehl_blend(m1176, v1268, v1170);
+                v1171 = softehl_blend(m1176, v1270, v1171);
+                v1172 = softehl_blend(m1176, v1272, v1172);
+                v1173 = softehl_blend(m1176, v1274, v1173);
+                v1174 = softehl_blend(m1176, v1276, v1174);
+                v1175 = softehl_blend(m1176, v1278, v1175);
             }
-            v1059 = softehl_blend(m1122, v1124, v1059); v1060 = softehl_blend(m1122, v1125, v1060);
-            v1061 = softehl_blend(m1122, v1126, v1061); v1062 = softehl_blend(m1122, v1127, v1062);
-            v1063 = softehl_blend(m1122, v1128, v1063); v1064 = softehl_blend(m1122, v1129, v1064);
-            v1065 = softehl_blend(m1122, v1130, v1065); v1066 = softehl_blend(m1122, v1131, v1066);
-            v1067 = softehl_blend(m1122, v1132, v1067); v1068 = softehl_blend(m1122, v1133, v1068);
-            v1069 = softehl_blend(m1122, v1134, v1069); v1070 = softehl_blend(m1122, v1135, v1070);
-            v1071 = softehl_blend(m1122, v1136, v1071); v1072 = softehl_blend(m1122, v1137, v1072);
-            v1073 = softehl_blend(m1122, v1138, v1073); v1074 = softehl_blend(m1122, v1139, v1074);
-            v1075 = softehl_blend(m1122, v1140, v1075); v1076 = softehl_blend(m1122, v1141, v1076);
-            v1077 = softehl_blend(m1122, v1142, v1077); v1078 = softehl_blend(m1122, v1143, v1078);
-            v1079 = softehl_blend(m1122, v1144, v1079); v1080 = softehl_blend(m1122, v1145, v1080);
-            v1081 = softehl_blend(m1122, v1146, v1081); v1082 = softehl_blend(m1122, v1147, v1082);
-            v1083 = softehl_blend(m1122, v1148, v1083); v1084 = softehl_blend(m1122, v1149, v1084);
-            v1085 = softehl_blend(m1122, v1150, v1085); v1086 = softehl_blend(m1122, v1151, v1086);
-            v1087 = softehl_blend(m1122, v1152, v1087); v1088 = softehl_blend(m1122, v1153, v1088);
-            v1089 = softehl_blend(m1122, v1154, v1089); v1090 = softehl_blend(m1122, v1155, v1090);
-            v1091 = softehl_blend(m1122, v1156, v1091); v1092 = softehl_blend(m1122, v1157, v1092);
-            v1094 = softehl_blend(m1122, v1158, v1094); v1096 = softehl_blend(m1122, v1159, v1096);
-            v1097 = softehl_blend(m1122, v1160, v1097); v1099 = softehl_blend(m1122, v1161, v1099);
-            v1101 = softehl_blend(m1122, v1162, v1101); v1102 = softehl_blend(m1122, v1163, v1102);
-            v1104 = softehl_blend(m1122, v1164, v1104); v1106 = softehl_blend(m1122, v1165, v1106);
-            v1108 = softehl_blend(m1122, v1166, v1108); v1110 = softehl_blend(m1122, v1167, v1110);
-            v1112 = softehl_blend(m1122, v1168, v1112); v1114 = softehl_blend(m1122, v1169, v1114);
-            v1116 = softehl_blend(m1122, v1170, v1116); v1118 = softehl_blend(m1122, v1171, v1118);
-            v1120 = softehl_blend(m1122, v1172, v1120);
+            v1062 = softehl_blend(m1125, v1127, v1062); v1063 = softehl_blend(m1125, v1128, v1063);
+            v1064 = softehl_blend(m1125, v1129, v1064); v1065 = softehl_blend(m1125, v1130, v1065);
+            v1066 = softehl_blend(m1125, v1131, v1066); v1067 = softehl_blend(m1125, v1132, v1067);
+            v1068 = softehl_blend(m1125, v1133, v1068); v1069 = softehl_blend(m1125, v1134, v1069);
+            v1070 = softehl_blend(m1125, v1135, v1070); v1071 = softehl_blend(m1125, v1136, v1071);
+            v1072 = softehl_blend(m1125, v1137, v1072); v1073 = softehl_blend(m1125, v1138, v1073);
+            v1074 = softehl_blend(m1125, v1139, v1074); v1075 = softehl_blend(m1125, v1140, v1075);
+            v1076 = softehl_blend(m1125, v1141, v1076); v1077 = softehl_blend(m1125, v1142, v1077);
+            v1078 = softehl_blend(m1125, v1143, v1078); v1079 = softehl_blend(m1125, v1144, v1079);
+            v1080 = softehl_blend(m1125, v1145, v1080); v1081 = softehl_blend(m1125, v1146, v1081);
+            v1082 = softehl_blend(m1125, v1147, v1082); v1083 = softehl_blend(m1125, v1148, v1083);
+            v1084 = softehl_blend(m1125, v1149, v1084); v1085 = softehl_blend(m1125, v1150, v1085);
+            v1086 = softehl_blend(m1125, v1151, v1086); v1087 = softehl_blend(m1125, v1152, v1087);
+            v1088 = softehl_blend(m1125, v1153, v1088); v1089 = softehl_blend(m1125, v1154, v1089);
+            v1090 = softehl_blend(m1125, v1155, v1090); v1091 = softehl_blend(m1125, v1156, v1091);
+            v1092 = softehl_blend(m1125, v1157, v1092); v1093 = softehl_blend(m1125, v1158, v1093);
+            v1094 = softehl_blend(m1125, v1159, v1094); v1095 = softehl_blend(m1125, v1160, v1095);
+            v1097 = softehl_blend(m1125, v1161, v1097); v1099 = softehl_blend(m1125, v1162, v1099);
+            v1100 = softehl_blend(m1125, v1163, v1100); v1102 = softehl_blend(m1125, v1164, v1102);
+            v1104 = softehl_blend(m1125, v1165, v1104); v1105 = softehl_blend(m1125, v1166, v1105);
+            v1107 = softehl_blend(m1125, v1167, v1107); v1109 = softehl_blend(m1125, v1168, v1109);
+            v1111 = softehl_blend(m1125, v1169, v1111); v1113 = softehl_blend(m1125, v1170, v1113);
+            v1115 = softehl_blend(m1125, v1171, v1115); v1117 = softehl_blend(m1125, v1172, v1117);
+            v1119 = softehl_blend(m1125, v1173, v1119); v1121 = softehl_blend(m1125, v1174, v1121);
+            v1123 = softehl_blend(m1125, v1175, v1123);
         }
-        const M m1316 = ~v1037;
-        if (softehl_any(m1316)) {
-            const V v1317 = v1030 - v932, v1318 = v1317 * v1317, v1319 = v1317 * v1318,
-                v1320 = 3.0 * v1318, v1321 = v929 * v1320, v1322 = v50 * v1320,
-                v1323 = -(v928 * v1320), v1324 = a12 * v1320, v1325 = v1324 * v1048,
-                v1326 = v1324 * v1050, v1327 = v1324 * v1052, v1328 = v1324 * v1054,
-                v1329 = v1324 * v1057, v1330 = v1324 * v1058, v1331 = v1324 * v1036,
-                v1332 = v1324 * v1042, v1333 = v1324 * v1043, v1334 = v1324 * v1046,
-                v1335 = v1324 * v1031, v1336 = v1324 * v1032;
-            v1059 = softehl_blend(m1316, v1319, v1059); v1060 = softehl_blend(m1316, v1321, v1060);
-            v1061 = softehl_blend(m1316, v1323, v1061); v1062 = softehl_blend(m1316, v1319, v1062);
-            v1087 = softehl_blend(m1316, v1324, v1087); v1093 = softehl_blend(m1316, v1321, v1093);
-            v1095 = softehl_blend(m1316, v1323, v1095); v1096 = softehl_blend(m1316, v1322, v1096);
-            v1098 = softehl_blend(m1316, v1335, v1098); v1100 = softehl_blend(m1316, v1336, v1100);
-            v1102 = softehl_blend(m1316, v1322, v1102); v1103 = softehl_blend(m1316, v1325, v1103);
-            v1105 = softehl_blend(m1316, v1326, v1105); v1107 = softehl_blend(m1316, v1327, v1107);
-            v1109 = softehl_blend(m1316, v1328, v1109); v1111 = softehl_blend(m1316, v1329, v1111);
-            v1113 = softehl_blend(m1316, v1330, v1113); v1115 = softehl_blend(m1316, v1331, v1115);
-            v1117 = softehl_blend(m1316, v1332, v1117); v1119 = softehl_blend(m1316, v1333, v1119);
-            v1121 = softehl_blend(m1316, v1334, v1121);
+        const M m1326 = ~v1040;
+        if (softehl_any(m1326)) {
+            const V v1327 = v1033 - v935, v1328 = v1327 * v1327, v1329 = v1327 * v1328,
+                v1330 = 3.0 * v1328, v1331 = v932 * v1330, v1332 = v70 * v1330,
+                v1333 = -(v931 * v1330), v1334 = a12 * v1330, v1335 = v1334 * v1051,
+                v1336 = v1334 * v1053, v1337 = v1334 * v1055, v1338 = v1334 * v1057,
+                v1339 = v1334 * v1060, v1340 = v1334 * v1061, v1341 = v1334 * v1039,
+                v1342 = v1334 * v1045, v1343 = v1334 * v1046, v1344 = v1334 * v1049,
+                v1345 = v1334 * v1034, v1346 = v1334 * v1035;
+            v1062 = softehl_blend(m1326, v1329, v1062); v1063 = softehl_blend(m1326, v1331, v1063);
+            v1064 = softehl_blend(m1326, v1333, v1064); v1065 = softehl_blend(m1326, v1329, v1065);
+            v1090 = softehl_blend(m1326, v1334, v1090); v1096 = softehl_blend(m1326, v1331, v1096);
+            v1098 = softehl_blend(m1326, v1333, v1098); v1099 = softehl_blend(m1326, v1332, v1099);
+            v1101 = softehl_blend(m1326, v1345, v1101); v1103 = softehl_blend(m1326, v1346, v1103);
+            v1105 = softehl_blend(m1326, v1332, v1105); v1106 = softehl_blend(m1326, v1335, v1106);
+            v1108 = softehl_blend(m1326, v1336, v1108); v1110 = softehl_blend(m1326, v1337, v1110);
+            v1112 = softehl_blend(m1326, v1338, v1112); v1114 = softehl_blend(m1326, v1339, v1114);
+            v1116 = softehl_blend(m1326, v1340, v1116); v1118 = softehl_blend(m1326, v1341, v1118);
+            v1120 = softehl_blend(m1326, v1342, v1120); v1122 = softehl_blend(m1326, v1343, v1122);
+            v1124 = softehl_blend(m1326, v1344, v1124);
         }
-        s570 += v1063; s571 += v1064; s572 += v1065; s573 += v1066; s574 += v1067; s575 += v1068;
-        s576 += v1069; s577 += v1070; s578 += v1071; s579 += v1072; s580 += v1073; s581 += v1074;
-        s582 += v1075; s583 += v1076; s584 += v1077; s585 += v1078; s586 += v1079; s587 += v1080;
-        s588 += v1081; s589 += v1082; s590 += v1083; s591 += v1084; s592 += v1085; s593 += v1086;
-        s596 += v1088; s597 += v1089; s600 += v1090; s601 += v1091;
-        const V v1337 = v1093 + v1092, v1338 = v1095 + v1094, v1339 = softehl_vsqrt(1.0 / v960),
-            v1340 = v1098 + v1097, v1341 = v1100 + v1099,
-            v1342 = (v24 * v832 + (v22 * v831 + (v933 + v934)) - X5 * v837) * (v990 * v559),
-            v1343 = v1031 * v1087, v1344 = v1032 * v1087, v1345 = v961 * v966, v1346 = w[1] * v1060,
-            v1347 = v46 * w[1], v1348 = w[1] * v1061, v1349 = w[1] * v1337,
-            v1350 = v1060 * v993 + v1337 * v996, v1351 = v1337 * v993 - v1060 * v996,
-            v1352 = v1347 * v928, v1353 = v1347 * v927, v1354 = v1061 * v993 + v1338 * v996,
-            v1355 = w[1] * v1338, v1356 = v1338 * v993 - v1061 * v996,
-            v1357 = v1342 + 2.0 * (v39 * v957 + v34 * v958) * (v1339 * (v561 * v966)),
-            v1358 = w[1] * v994;
-        s614 += v1349 * v994; s616 += v1349 * v995; const V v1359 = w[1] * v995;
-        s615 += v1355 * v994; s617 += v1355 * v995; s564 += v1346 * v994; s566 += v1346 * v995;
-        s565 += v1348 * v994; s567 += v1348 * v995;
-        const V v1360 = v1059 * v1357, v1361 = v1059 * v991, v1362 = v1059 * v1345,
-            v1363 = v1062 * v991, v1364 = v1062 * v1345, v1365 = v1062 * v1357, v1366 = 0.5 * v1361,
-            v1367 = 0.5 * v1363;
-        s562 += v1352 * v1361; s568 += v1352 * v1363; s563 += v1353 * v1361; s569 += v1353 * v1363;
-        const V v1368 = v854 * v1059 + v853 * v1062, v1369 = v854 * v1062 - v853 * v1059,
-            v1370 = v930 * v1364, v1371 = v930 * v1362, v1372 = v931 * v1362, v1373 = v931 * v1364,
-            v1374 = v1368 * v991, v1375 = v1369 * v991, v1376 = v1368 * v1345,
-            v1377 = v1369 * v1345, v1378 = v1368 * v1357, v1379 = v1369 * v1357,
-            v1380 = v936 * v1375, v1381 = v936 * v1374, v1382 = v937 * v1374, v1383 = v937 * v1375,
-            v1384 = v837 * v1374, v1385 = v837 * v1375, v1386 = v1013 * v1374,
-            v1387 = v1013 * v1375, v1388 = v1018 * v1374, v1389 = v1018 * v1375,
-            v1390 = v1009 * v1374, v1391 = v1009 * v1375;
-        s606 += v1022 * v1375; s607 += v1022 * v1374; s608 += v962 * v1375; s609 += v962 * v1374;
-        s610 += v963 * v1375; s611 += v963 * v1374; s612 += v964 * v1375; s613 += v964 * v1374;
-        s603 += v1021 * v1374; s605 += v1023 * v1374; s602 += v1021 * v1375; s604 += v1023 * v1375;
-        s618 += v964 * v1350; s622 += v963 * v1350; s634 += v1023 * v1350; s638 += v1021 * v1350;
-        s619 += v964 * v1354; s623 += v963 * v1354; s635 += v1023 * v1354; s639 += v1021 * v1354;
-        s620 += v964 * v1351; s624 += v963 * v1351; s636 += v1023 * v1351; s637 += v1023 * v1356;
-        s621 += v964 * v1356; s625 += v963 * v1356; s640 += v1021 * v1351; s641 += v1021 * v1356;
-        s627 += v962 * v1354; s628 += v962 * v1351; s629 += v962 * v1356; s631 += v1022 * v1354;
-        s632 += v1022 * v1351; s633 += v1022 * v1356; s630 += v1022 * v1350; s626 += v962 * v1350;
-        s594 += v1343 * v1358; s595 += v1344 * v1358; s598 += v1343 * v1359; s599 += v1344 * v1359;
-        s652 += v1340 * v1358; s653 += v1341 * v1358; s664 += v1340 * v1359; s665 += v1341 * v1359;
-        const V v1392 = v1340 * v993 - v1343 * v996, v1393 = v1341 * v993 - v1344 * v996,
-            v1394 = v1343 * v993 + v1340 * v996, v1395 = v1344 * v993 + v1341 * v996;
-        s668 += v964 * v1392; s669 += v964 * v1393; s666 += v964 * v1394; s667 += v964 * v1395;
-        const V v1396 = (v861 * v1059 - v858 * v1062) * v991,
-            v1397 = (v858 * v1059 + v861 * v1062) * v991,
-            v1398 = (v860 * v1059 + v859 * v1062) * v991,
-            v1399 = (v860 * v1062 - v859 * v1059) * v991;
-        s670 += v963 * v1394; s671 += v963 * v1395; s672 += v963 * v1392; s673 += v963 * v1393;
-        s674 += v962 * v1394; s675 += v962 * v1395; s676 += v962 * v1392; s677 += v962 * v1393;
-        const V v1400 = v920 * v1096 + v1050 * v1087, v1401 = v921 * v1096 + v1052 * v1087,
-            v1402 = v922 * v1096 + v1054 * v1087, v1403 = v918 * v1096 + v1042 * v1087,
-            v1404 = v925 * v1096 + v1043 * v1087, v1405 = v919 * v1096 + v1048 * v1087,
-            v1406 = v923 * v1096 + v1057 * v1087, v1407 = v924 * v1096 + v1058 * v1087,
-            v1408 = v917 * v1096 + v1036 * v1087, v1409 = v926 * v1096 + v1046 * v1087,
-            v1410 = v919 * v1102 + (v1103 + v1101), v1411 = v923 * v1102 + (v1111 + v1110),
-            v1412 = v924 * v1102 + (v1113 + v1112), v1413 = v917 * v1102 + (v1115 + v1114),
-            v1414 = v926 * v1102 + (v1121 + v1120), v1415 = v920 * v1102 + (v1105 + v1104),
-            v1416 = v921 * v1102 + (v1107 + v1106), v1417 = v922 * v1102 + (v1109 + v1108),
-            v1418 = v918 * v1102 + (v1117 + v1116), v1419 = v925 * v1102 + (v1119 + v1118),
-            v1420 = v46 * (v1366 + v928 * v1360), v1421 = v46 * (v927 * v1360 - v1366),
-            v1422 = v46 * (v1367 + v928 * v1365), v1423 = v46 * (v927 * v1365 - v1367);
-        s686 += w[1] * (v1011 * v1390 + v1017 * v1394);
-        s688 += w[1] * (v1011 * v1391 + v1017 * v1392);
-        s687 += w[1] * (v1019 * v1390 + v1017 * v1395);
-        s689 += w[1] * (v1019 * v1391 + v1017 * v1393);
-        s678 += w[1] * (v1011 * v1386 - v1014 * v1394);
-        s679 += w[1] * (v1019 * v1386 - v1014 * v1395);
-        s680 += w[1] * (v1011 * v1387 - v1014 * v1392);
-        s681 += w[1] * (v1019 * v1387 - v1014 * v1393);
-        s682 += w[1] * (v1011 * v1388 - v1016 * v1394);
-        s683 += w[1] * (v1019 * v1388 - v1016 * v1395);
-        s684 += w[1] * (v1011 * v1389 - v1016 * v1392);
-        s685 += w[1] * (v1019 * v1389 - v1016 * v1393);
-        s642 += w[1] * (v1405 * v994 + (v540 * v1371 + v919 * v1421));
-        s643 += w[1] * (v1400 * v994 + (v541 * v1371 + v920 * v1421));
-        s644 += w[1] * (v1401 * v994 + (v545 * v1371 + v921 * v1421));
-        s645 += w[1] * (v1402 * v994 + (v546 * v1371 + v922 * v1421));
-        s646 += w[1] * (v1406 * v994 + (v538 * v1371 + v923 * v1421));
-        s647 += w[1] * (v1407 * v994 + (v539 * v1371 + v924 * v1421));
-        s648 += w[1] * (v1408 * v994 + (v548 * v1371 + v917 * v1421));
-        s649 += w[1] * (v1403 * v994 + (v549 * v1371 + v918 * v1421));
-        s650 += w[1] * (v1404 * v994 + (v550 * v1371 + v925 * v1421));
-        s651 += w[1] * (v1409 * v994 + (v552 * v1371 + v926 * v1421));
-        s663 += w[1] * (v1409 * v995 + (v552 * v1372 + v926 * v1420));
-        s660 += w[1] * (v1408 * v995 + (v548 * v1372 + v917 * v1420));
-        s661 += w[1] * (v1403 * v995 + (v549 * v1372 + v918 * v1420));
-        s654 += w[1] * (v1405 * v995 + (v540 * v1372 + v919 * v1420));
-        s655 += w[1] * (v1400 * v995 + (v541 * v1372 + v920 * v1420));
-        s656 += w[1] * (v1401 * v995 + (v545 * v1372 + v921 * v1420));
-        s657 += w[1] * (v1402 * v995 + (v546 * v1372 + v922 * v1420));
-        s658 += w[1] * (v1406 * v995 + (v538 * v1372 + v923 * v1420));
-        const V v1424 = v1401 * v993 + (v921 * v1378 + (v545 * v1376 + v939 * v1396)) + v996 * v1416,
-            v1425 = v921 * v1379 + (v545 * v1377 + v939 * v1397) - v1401 * v996 + v993 * v1416,
-            v1426 = v1402 * v993 + (v922 * v1378 + (v546 * v1376 + v950 * v1396)) + v996 * v1417,
-            v1427 = v922 * v1379 + (v546 * v1377 + v950 * v1397) - v1402 * v996 + v993 * v1417;
-        s659 += w[1] * (v1407 * v995 + (v539 * v1372 + v924 * v1420));
-        s662 += w[1] * (v1404 * v995 + (v550 * v1372 + v925 * v1420));
-        const V v1428 = v949 * v1399 + v1424, v1429 = v1425 - v949 * v1398,
-            v1430 = v945 * v1399 + v1426, v1431 = v1427 - v945 * v1398,
-            v1432 = v948 * v1399 + (v1406 * v993 + (v538 * v1376 + v940 * v1396) + v996 * v1411),
-            v1433 = v923 * v1379 + (v538 * v1377 + v940 * v1397) - v1406 * v996 - v948 * v1398,
-            v1434 = v924 * v1379 + (v539 * v1377 + v952 * v1397) - v1407 * v996 - v951 * v1398,
-            v1435 = v1433 + v993 * v1411, v1436 = v1434 + v993 * v1412,
-            v1437 = v951 * v1399 + (v1407 * v993 + (v539 * v1376 + v952 * v1396)) + v996 * v1412,
-            v1438 = w[1] * (v835 * v1428 - v921 * v1384);
-        s752 += v1438; const V v1439 = w[1] * (v835 * v1430 - v922 * v1384); s753 += v1439;
-        const V v1440 = w[1] * (v835 * v1429 - v921 * v1385); s762 += v1440;
-        const V v1441 = w[1] * (v835 * v1431 - v922 * v1385); s763 += v1441;
-        const V v1442 = v924 * v1378 + v1437, v1443 = v923 * v1378 + v1432,
-            v1444 = w[1] * (v835 * v1435 - v923 * v1385);
-        s764 += v1444; const V v1445 = w[1] * (v835 * v1436 - v924 * v1385); s765 += v1445;
-        const V v1446 = w[1] * (v924 * v1381 + v838 * v1442); s715 += v1446;
-        const V v1447 = w[1] * (v923 * v1381 + v838 * v1443); s714 += v1447;
-        const V v1448 = w[1] * (v921 * v1381 + v838 * v1428); s712 += v1448;
-        const V v1449 = w[1] * (v835 * v1442 - v924 * v1384); s755 += v1449;
-        const V v1450 = w[1] * (v835 * v1443 - v923 * v1384); s754 += v1450;
-        const V v1451 = w[1] * (v922 * v1381 + v838 * v1430); s713 += v1451;
-        const V v1452 = w[1] * (v921 * v1380 + v838 * v1429); s722 += v1452;
-        const V v1453 = w[1] * (v922 * v1380 + v838 * v1431); s723 += v1453;
-        const V v1454 = v1405 * v993 + (v946 * v1399 + (v919 * v1378 + (v540 * v1376 + v938 * v1396))),
-            v1455 = w[1] * (v923 * v1380 + v838 * v1435);
-        s724 += v1455;
-        const V v1456 = v1454 + v996 * v1410,
-            v1457 = v540 * v1377 + v938 * v1397 - v946 * v1398 - v1405 * v996 + v993 * v1410,
-            v1458 = w[1] * (v924 * v1380 + v838 * v1436);
-        s725 += v1458; const V v1459 = w[1] * (v921 * v1383 + v839 * v1429); s742 += v1459;
-        const V v1460 = w[1] * (v922 * v1383 + v839 * v1431); s743 += v1460;
-        const V v1461 = w[1] * (v919 * v1381 + v838 * v1456); s710 += v1461;
-        const V v1462 = w[1] * (v919 * v1382 + v839 * v1456); s730 += v1462;
-        const V v1463 = v919 * v1379 + v1457, v1464 = w[1] * (v924 * v1383 + v839 * v1436);
-        s745 += v1464; const V v1465 = w[1] * (v835 * v1456 - v919 * v1384); s750 += v1465;
-        const V v1466 = w[1] * (v919 * v1380 + v838 * v1463); s720 += v1466;
-        const V v1467 = w[1] * (v919 * v1383 + v839 * v1463); s740 += v1467;
-        const V v1468 = w[1] * (v921 * v1382 + v839 * v1428); s732 += v1468;
-        const V v1469 = w[1] * (v835 * v1463 - v919 * v1385); s760 += v1469;
-        const V v1470 = w[1] * (v922 * v1382 + v839 * v1430); s733 += v1470;
-        const V v1471 = w[1] * (v923 * v1382 + v839 * v1443); s734 += v1471;
-        const V v1472 = w[1] * (v924 * v1382 + v839 * v1442); s735 += v1472;
-        const V v1473 = w[1] * (v923 * v1383 + v839 * v1435); s744 += v1473;
-        const V v1474 = w[1] * (v1051 * v1386 - v1014 * v1428); s772 += v1474;
-        const V v1475 = w[1] * (v1053 * v1386 - v1014 * v1430); s773 += v1475;
-        const V v1476 = w[1] * (v1055 * v1386 - v1014 * v1443); s774 += v1476;
-        const V v1477 = w[1] * (v1056 * v1386 - v1014 * v1442); s775 += v1477;
-        const V v1478 = w[1] * (v1055 * v1387 - v1014 * v1435); s784 += v1478;
-        const V v1479 = w[1] * (v1047 * v1386 - v1014 * v1456); s770 += v1479;
-        const V v1480 = w[1] * (v1047 * v1387 - v1014 * v1463); s780 += v1480;
-        const V v1481 = w[1] * (v1051 * v1387 - v1014 * v1429); s782 += v1481;
-        const V v1482 = w[1] * (v1053 * v1387 - v1014 * v1431); s783 += v1482;
-        const V v1483 = w[1] * (v1056 * v1387 - v1014 * v1436); s785 += v1483;
-        const V v1484 = w[1] * (v1047 * v1388 - v1016 * v1456); s790 += v1484;
-        const V v1485 = w[1] * (v1047 * v1389 - v1016 * v1463); s800 += v1485;
-        const V v1486 = w[1] * (v1051 * v1389 - v1016 * v1429); s802 += v1486;
-        const V v1487 = w[1] * (v1053 * v1389 - v1016 * v1431); s803 += v1487;
-        const V v1488 = w[1] * (v1056 * v1389 - v1016 * v1436); s805 += v1488;
-        const V v1489 = w[1] * (v1047 * v1390 + v1017 * v1456); s810 += v1489;
-        const V v1490 = w[1] * (v1047 * v1391 + v1017 * v1463); s820 += v1490;
-        const V v1491 = w[1] * (v1051 * v1391 + v1017 * v1429); s822 += v1491;
-        const V v1492 = w[1] * (v1053 * v1391 + v1017 * v1431); s823 += v1492;
-        const V v1493 = w[1] * (v1056 * v1391 + v1017 * v1436); s825 += v1493;
-        const V v1494 = w[1] * (v1051 * v1388 - v1016 * v1428); s792 += v1494;
-        const V v1495 = w[1] * (v1051 * v1390 + v1017 * v1428); s812 += v1495;
-        const V v1496 = w[1] * (v1053 * v1388 - v1016 * v1430); s793 += v1496;
-        const V v1497 = w[1] * (v1053 * v1390 + v1017 * v1430); s813 += v1497;
-        const V v1498 = w[1] * (v1055 * v1388 - v1016 * v1443); s794 += v1498;
-        const V v1499 = w[1] * (v1055 * v1390 + v1017 * v1443); s814 += v1499;
-        const V v1500 = w[1] * (v1056 * v1388 - v1016 * v1442); s795 += v1500;
-        const V v1501 = w[1] * (v1056 * v1390 + v1017 * v1442); s815 += v1501;
-        const V v1502 = w[1] * (v1055 * v1389 - v1016 * v1435); s804 += v1502;
-        const V v1503 = w[1] * (v1055 * v1391 + v1017 * v1435); s824 += v1503;
-        const V v1504 = v1400 * v993 + (v944 * v1399 + (v920 * v1378 + (v541 * v1376 + v947 * v1396))),
-            v1505 = v920 * v1379 + (v541 * v1377 + v947 * v1397) - v944 * v1398 - v1400 * v996,
-            v1506 = v925 * v1379 + (v550 * v1377 + v955 * v1397) - v956 * v1398 - v1404 * v996,
-            v1507 = v1504 + v996 * v1415, v1508 = v1505 + v993 * v1415,
-            v1509 = v1408 * v993 + (v942 * v1399 + (v548 * v1376 + v941 * v1396)) + v996 * v1413,
-            v1510 = v548 * v1377 + v941 * v1397 - v942 * v1398 - v1408 * v996 + v993 * v1413,
-            v1511 = v1506 + v993 * v1419,
-            v1512 = v1404 * v993 + (v956 * v1399 + (v550 * v1376 + v955 * v1396)) + v996 * v1419,
-            v1513 = v1403 * v993 + (v954 * v1399 + (v549 * v1376 + v953 * v1396)) + v996 * v1418,
-            v1514 = v549 * v1377 + v953 * v1397 - v954 * v1398 - v1403 * v996 + v993 * v1418,
-            v1515 = v1409 * v993 + (v943 * v1399 + (v552 * v1376 + v935 * v1396)) + v996 * v1414,
-            v1516 = v552 * v1377 + v935 * v1397 - v943 * v1398 - v1409 * v996 + v993 * v1414,
-            v1517 = v917 * v1378 + v1509, v1518 = v917 * v1379 + v1510,
-            v1519 = v925 * v1378 + v1512, v1520 = v918 * v1378 + v1513,
-            v1521 = v918 * v1379 + v1514, v1522 = v926 * v1378 + v1515,
-            v1523 = v926 * v1379 + v1516, v1524 = w[1] * (v835 * v1511 - v925 * v1385);
-        s768 += v1524; const V v1525 = w[1] * (v835 * v1518 - v917 * v1385); s766 += v1525;
-        const V v1526 = w[1] * (v835 * v1519 - v925 * v1384); s758 += v1526;
-        const V v1527 = w[1] * (v835 * v1520 - v918 * v1384); s757 += v1527;
-        const V v1528 = w[1] * (v835 * v1521 - v918 * v1385); s767 += v1528;
-        const V v1529 = w[1] * (v835 * v1522 - v926 * v1384); s759 += v1529;
-        const V v1530 = w[1] * (v835 * v1523 - v926 * v1385); s769 += v1530;
-        const V v1531 = w[1] * (v835 * v1517 - v917 * v1384); s756 += v1531;
-        const V v1532 = w[1] * (v926 * v1380 + v838 * v1523); s729 += v1532;
-        const V v1533 = w[1] * (v920 * v1381 + v838 * v1507); s711 += v1533;
-        const V v1534 = w[1] * (v920 * v1380 + v838 * v1508); s721 += v1534;
-        const V v1535 = w[1] * (v835 * v1507 - v920 * v1384); s751 += v1535;
-        const V v1536 = w[1] * (v835 * v1508 - v920 * v1385); s761 += v1536;
-        const V v1537 = w[1] * (v917 * v1381 + v838 * v1517); s716 += v1537;
-        const V v1538 = w[1] * (v918 * v1381 + v838 * v1520); s717 += v1538;
-        const V v1539 = w[1] * (v925 * v1381 + v838 * v1519); s718 += v1539;
-        const V v1540 = w[1] * (v926 * v1381 + v838 * v1522); s719 += v1540;
-        const V v1541 = w[1] * (v917 * v1380 + v838 * v1518); s726 += v1541;
-        const V v1542 = w[1] * (v918 * v1380 + v838 * v1521); s727 += v1542;
-        const V v1543 = w[1] * (v925 * v1380 + v838 * v1511); s728 += v1543;
-        const V v1544 = w[1] * (v917 * v1382 + v839 * v1517); s736 += v1544;
-        const V v1545 = w[1] * (v918 * v1382 + v839 * v1520); s737 += v1545;
-        const V v1546 = w[1] * (v925 * v1382 + v839 * v1519); s738 += v1546;
-        const V v1547 = w[1] * (v926 * v1382 + v839 * v1522); s739 += v1547;
-        const V v1548 = w[1] * (v917 * v1383 + v839 * v1518); s746 += v1548;
-        const V v1549 = w[1] * (v918 * v1383 + v839 * v1521); s747 += v1549;
-        const V v1550 = w[1] * (v920 * v1382 + v839 * v1507); s731 += v1550;
-        const V v1551 = w[1] * (v920 * v1383 + v839 * v1508); s741 += v1551;
-        const V v1552 = w[1] * (v925 * v1383 + v839 * v1511); s748 += v1552;
-        const V v1553 = w[1] * (v926 * v1383 + v839 * v1523); s749 += v1553;
-        const V v1554 = w[1] * (v1049 * v1386 - v1014 * v1507); s771 += v1554;
-        const V v1555 = w[1] * (v1049 * v1387 - v1014 * v1508); s781 += v1555;
-        const V v1556 = w[1] * (v1035 * v1387 - v1014 * v1518); s786 += v1556;
-        const V v1557 = w[1] * (v1040 * v1387 - v1014 * v1511); s788 += v1557;
-        const V v1558 = w[1] * (v1044 * v1387 - v1014 * v1523); s789 += v1558;
-        const V v1559 = w[1] * (v1035 * v1386 - v1014 * v1517); s776 += v1559;
-        const V v1560 = w[1] * (v1038 * v1386 - v1014 * v1520); s777 += v1560;
-        const V v1561 = w[1] * (v1040 * v1386 - v1014 * v1519); s778 += v1561;
-        const V v1562 = w[1] * (v1044 * v1386 - v1014 * v1522); s779 += v1562;
-        const V v1563 = w[1] * (v1038 * v1387 - v1014 * v1521); s787 += v1563;
-        const V v1564 = w[1] * (v1035 * v1388 - v1016 * v1517); s796 += v1564;
-        const V v1565 = w[1] * (v1038 * v1388 - v1016 * v1520); s797 += v1565;
-        const V v1566 = w[1] * (v1040 * v1388 - v1016 * v1519); s798 += v1566;
-        const V v1567 = w[1] * (v1044 * v1388 - v1016 * v1522); s799 += v1567;
-        const V v1568 = w[1] * (v1038 * v1389 - v1016 * v1521); s807 += v1568;
-        const V v1569 = w[1] * (v1035 * v1390 + v1017 * v1517); s816 += v1569;
-        const V v1570 = w[1] * (v1038 * v1390 + v1017 * v1520); s817 += v1570;
-        const V v1571 = w[1] * (v1040 * v1390 + v1017 * v1519); s818 += v1571;
-        const V v1572 = w[1] * (v1044 * v1390 + v1017 * v1522); s819 += v1572;
-        const V v1573 = w[1] * (v1038 * v1391 + v1017 * v1521); s827 += v1573;
-        const V v1574 = w[1] * (v1049 * v1388 - v1016 * v1507); s791 += v1574;
-        const V v1575 = w[1] * (v1049 * v1390 + v1017 * v1507); s811 += v1575;
-        const V v1576 = w[1] * (v1049 * v1389 - v1016 * v1508); s801 += v1576;
-        const V v1577 = w[1] * (v1049 * v1391 + v1017 * v1508); s821 += v1577;
-        const V v1578 = w[1] * (v1035 * v1389 - v1016 * v1518); s806 += v1578;
-        const V v1579 = w[1] * (v1035 * v1391 + v1017 * v1518); s826 += v1579;
-        const V v1580 = w[1] * (v1040 * v1389 - v1016 * v1511); s808 += v1580;
-        const V v1581 = w[1] * (v1040 * v1391 + v1017 * v1511); s828 += v1581;
-        const V v1582 = w[1] * (v1044 * v1389 - v1016 * v1523); s809 += v1582;
-        const V v1583 = w[1] * (v1044 * v1391 + v1017 * v1523); s829 += v1583;
-        const V v1584 = w[1] * (v540 * v1370 + v919 * v1423 + v994 * v1410); s690 += v1584;
-        const V v1585 = w[1] * (v540 * v1373 + v919 * v1422 + v995 * v1410); s700 += v1585;
-        const V v1586 = w[1] * (v541 * v1370 + v920 * v1423 + v994 * v1415); s691 += v1586;
-        const V v1587 = w[1] * (v541 * v1373 + v920 * v1422 + v995 * v1415); s701 += v1587;
-        const V v1588 = w[1] * (v545 * v1370 + v921 * v1423 + v994 * v1416); s692 += v1588;
-        const V v1589 = w[1] * (v545 * v1373 + v921 * v1422 + v995 * v1416); s702 += v1589;
-        const V v1590 = w[1] * (v546 * v1370 + v922 * v1423 + v994 * v1417); s693 += v1590;
-        const V v1591 = w[1] * (v546 * v1373 + v922 * v1422 + v995 * v1417); s703 += v1591;
-        const V v1592 = w[1] * (v538 * v1370 + v923 * v1423 + v994 * v1411); s694 += v1592;
-        const V v1593 = w[1] * (v538 * v1373 + v923 * v1422 + v995 * v1411); s704 += v1593;
-        const V v1594 = w[1] * (v539 * v1370 + v924 * v1423 + v994 * v1412); s695 += v1594;
-        const V v1595 = w[1] * (v539 * v1373 + v924 * v1422 + v995 * v1412); s705 += v1595;
-        const V v1596 = w[1] * (v548 * v1370 + v917 * v1423 + v994 * v1413); s696 += v1596;
-        const V v1597 = w[1] * (v548 * v1373 + v917 * v1422 + v995 * v1413); s706 += v1597;
-        const V v1598 = w[1] * (v549 * v1370 + v918 * v1423 + v994 * v1418); s697 += v1598;
-        const V v1599 = w[1] * (v549 * v1373 + v918 * v1422 + v995 * v1418); s707 += v1599;
-        const V v1600 = w[1] * (v550 * v1370 + v925 * v1423 + v994 * v1419); s698 += v1600;
-        const V v1601 = w[1] * (v550 * v1373 + v925 * v1422 + v995 * v1419); s708 += v1601;
-        const V v1602 = w[1] * (v552 * v1370 + v926 * v1423 + v994 * v1414); s699 += v1602;
-        const V v1603 = w[1] * (v552 * v1373 + v926 * v1422 + v995 * v1414); s709 += v1603;
+        s573 += v1066; s574 += v1067; s575 += v1068; s576 += v1069; s577 += v1070; s578 += v1071;
+        s579 += v1072; s580 += v1073; s581 += v1074; s582 += v1075; s583 += v1076; s584 += v1077;
+        s585 += v1078; s586 += v1079; s587 += v1080; s588 += v1081; s589 += v1082; s590 += v1083;
+        s591 += v1084; s592 += v1085; s593 += v1086; s594 += v1087; s595 += v1088; s596 += v1089;
+        s599 += v1091; s600 += v1092; s603 += v1093; s604 += v1094;
+        const V v1347 = v1096 + v1095, v1348 = v1098 + v1097, v1349 = softehl_vsqrt(1.0 / v963),
+            v1350 = v1101 + v1100, v1351 = v1103 + v1102,
+            v1352 = (v25 * v835 + (v22 * v834 + (v936 + v937)) - X5 * v840) * (v993 * v562),
+            v1353 = v1034 * v1090, v1354 = v1035 * v1090, v1355 = v964 * v969, v1356 = w[1] * v1063,
+            v1357 = v36 * w[1], v1358 = w[1] * v1064, v1359 = w[1] * v1347,
+            v1360 = v1063 * v996 + v1347 * v999, v1361 = v1347 * v996 - v1063 * v999,
+            v1362 = v1357 * v931, v1363 = v1357 * v930, v1364 = v1064 * v996 + v1348 * v999,
+            v1365 = w[1] * v1348, v1366 = v1348 * v996 - v1064 * v999,
+            v1367 = v1352 + 2.0 * (v28 * v960 + v32 * v961) * (v1349 * (v564 * v969)),
+            v1368 = w[1] * v997;
+        s617 += v1359 * v997; s619 += v1359 * v998; const V v1369 = w[1] * v998;
+        s618 += v1365 * v997; s620 += v1365 * v998; s567 += v1356 * v997; s569 += v1356 * v998;
+        s568 += v1358 * v997; s570 += v1358 * v998;
+        const V v1370 = v1062 * v1367, v1371 = v1062 * v994, v1372 = v1062 * v1355,
+            v1373 = v1065 * v994, v1374 = v1065 * v1355, v1375 = v1065 * v1367, v1376 = 0.5 * v1371,
+            v1377 = 0.5 * v1373;
+        s565 += v1362 * v1371; s571 += v1362 * v1373; s566 += v1363 * v1371; s572 += v1363 * v1373;
+        const V v1378 = v857 * v1062 + v856 * v1065, v1379 = v857 * v1065 - v856 * v1062,
+            v1380 = v933 * v1374, v1381 = v933 * v1372, v1382 = v934 * v1372, v1383 = v934 * v1374,
+            v1384 = v1378 * v994, v1385 = v1379 * v994, v1386 = v1378 * v1355,
+            v1387 = v1379 * v1355, v1388 = v1378 * v1367, v1389 = v1379 * v1367,
+            v1390 = v939 * v1385, v1391 = v939 * v1384, v1392 = v940 * v1384, v1393 = v940 * v1385,
+            v1394 = v840 * v1384, v1395 = v840 * v1385, v1396 = v1016 * v1384,
+            v1397 = v1016 * v1385, v1398 = v1021 * v1384, v1399 = v1021 * v1385,
+            v1400 = v1012 * v1384, v1401 = v1012 * v1385;
+        s609 += v1025 * v1385; s610 += v1025 * v1384; s611 += v965 * v1385; s612 += v965 * v1384;
+        s613 += v966 * v1385; s614 += v966 * v1384; s615 += v967 * v1385; s616 += v967 * v1384;
+        s606 += v1024 * v1384; s608 += v1026 * v1384; s605 += v1024 * v1385; s607 += v1026 * v1385;
+        s621 += v967 * v1360; s625 += v966 * v1360; s637 += v1026 * v1360; s641 += v1024 * v1360;
+        s622 += v967 * v1364; s626 += v966 * v1364; s638 += v1026 * v1364; s642 += v1024 * v1364;
+        s623 += v967 * v1361; s627 += v966 * v1361; s639 += v1026 * v1361; s640 += v1026 * v1366;
+        s624 += v967 * v1366; s628 += v966 * v1366; s643 += v1024 * v1361; s644 += v1024 * v1366;
+        s630 += v965 * v1364; s631 += v965 * v1361; s632 += v965 * v1366; s634 += v1025 * v1364;
+        s635 += v1025 * v1361; s636 += v1025 * v1366; s633 += v1025 * v1360; s629 += v965 * v1360;
+        s597 += v1353 * v1368; s598 += v1354 * v1368; s601 += v1353 * v1369; s602 += v1354 * v1369;
+        s655 += v1350 * v1368; s656 += v1351 * v1368; s667 += v1350 * v1369; s668 += v1351 * v1369;
+        const V v1402 = v1350 * v996 - v1353 * v999, v1403 = v1351 * v996 - v1354 * v999,
+            v1404 = v1353 * v996 + v1350 * v999, v1405 = v1354 * v996 + v1351 * v999;
+        s671 += v967 * v1402; s672 += v967 * v1403; s669 += v967 * v1404; s670 += v967 * v1405;
+        const V v1406 = (v864 * v1062 - v861 * v1065) * v994,
+            v1407 = (v861 * v1062 + v864 * v1065) * v994,
+            v1408 = (v863 * v1062 + v862 * v1065) * v994,
+            v1409 = (v863 * v1065 - v862 * v1062) * v994;
+        s673 += v966 * v1404; s674 += v966 * v1405; s675 += v966 * v1402; s676 += v966 * v1403;
+        s677 += v965 * v1404; s678 += v965 * v1405; s679 += v965 * v1402; s680 += v965 * v1403;
+        const V v1410 = v923 * v1099 + v1053 * v1090, v1411 = v924 * v1099 + v1055 * v1090,
+            v1412 = v925 * v1099 + v1057 * v1090, v1413 = v921 * v1099 + v1045 * v1090,
+            v1414 = v928 * v1099 + v1046 * v1090, v1415 = v922 * v1099 + v1051 * v1090,
+            v1416 = v926 * v1099 + v1060 * v1090, v1417 = v927 * v1099 + v1061 * v1090,
+            v1418 = v920 * v1099 + v1039 * v1090, v1419 = v929 * v1099 + v1049 * v1090,
+            v1420 = v922 * v1105 + (v1106 + v1104), v1421 = v926 * v1105 + (v1114 + v1113),
+            v1422 = v927 * v1105 + (v1116 + v1115), v1423 = v920 * v1105 + (v1118 + v1117),
+            v1424 = v929 * v1105 + (v1124 + v1123), v1425 = v923 * v1105 + (v1108 + v1107),
+            v1426 = v924 * v1105 + (v1110 + v1109), v1427 = v925 * v1105 + (v1112 + v1111),
+            v1428 = v921 * v1105 + (v1120 + v1119), v1429 = v928 * v1105 + (v1122 + v1121),
+            v1430 = v36 * (v1376 + v931 * v1370), v1431 = v36 * (v930 * v1370 - v1376),
+            v1432 = v36 * (v1377 + v931 * v1375), v1433 = v36 * (v930 * v1375 - v1377);
+        s689 += w[1] * (v1014 * v1400 + v1020 * v1404);
+        s691 += w[1] * (v1014 * v1401 + v1020 * v1402);
+        s690 += w[1] * (v1022 * v1400 + v1020 * v1405);
+        s692 += w[1] * (v1022 * v1401 + v1020 * v1403);
+        s681 += w[1] * (v1014 * v1396 - v1017 * v1404);
+        s682 += w[1] * (v1022 * v1396 - v1017 * v1405);
+        s683 += w[1] * (v1014 * v1397 - v1017 * v1402);
+        s684 += w[1] * (v1022 * v1397 - v1017 * v1403);
+        s685 += w[1] * (v1014 * v1398 - v1019 * v1404);
+        s686 += w[1] * (v1022 * v1398 - v1019 * v1405);
+        s687 += w[1] * (v1014 * v1399 - v1019 * v1402);
+        s688 += w[1] * (v1022 * v1399 - v1019 * v1403);
+        s645 += w[1] * (v1415 * v997 + (v543 * v1381 + v922 * v1431));
+        s646 += w[1] * (v1410 * v997 + (v544 * v1381 + v923 * v1431));
+        s647 += w[1] * (v1411 * v997 + (v548 * v1381 + v924 * v1431));
+        s648 += w[1] * (v1412 * v997 + (v549 * v1381 + v925 * v1431));
+        s649 += w[1] * (v1416 * v997 + (v541 * v1381 + v926 * v1431));
+        s650 += w[1] * (v1417 * v997 + (v542 * v1381 + v927 * v1431));
+        s651 += w[1] * (v1418 * v997 + (v551 * v1381 + v920 * v1431));
+        s652 += w[1] * (v1413 * v997 + (v552 * v1381 + v921 * v1431));
+        s653 += w[1] * (v1414 * v997 + (v553 * v1381 + v928 * v1431));
+        s654 += w[1] * (v1419 * v997 + (v555 * v1381 + v929 * v1431));
+        s666 += w[1] * (v1419 * v998 + (v555 * v1382 + v929 * v1430));
+        s663 += w[1] * (v1418 * v998 + (v551 * v1382 + v920 * v1430));
+        s664 += w[1] * (v1413 * v998 + (v552 * v1382 + v921 * v1430));
+        s657 += w[1] * (v1415 * v998 + (v543 * v1382 + v922 * v1430));
+        s658 += w[1] * (v1410 * v998 + (v544 * v1382 + v923 * v1430));
+        s659 += w[1] * (v1411 * v998 + (v548 * v1382 + v924 * v1430));
+        s660 += w[1] * (v1412 * v998 + (v549 * v1382 + v925 * v1430));
+        s661 += w[1] * (v1416 * v998 + (v541 * v1382 + v926 * v1430));
+        const V v1434 = v1411 * v996 + (v924 * v1388 + (v548 * v1386 + v942 * v1406)) + v999 * v1426,
+            v1435 = v924 * v1389 + (v548 * v1387 + v942 * v1407) - v1411 * v999 + v996 * v1426,
+            v1436 = v1412 * v996 + (v925 * v1388 + (v549 * v1386 + v953 * v1406)) + v999 * v1427,
+            v1437 = v925 * v1389 + (v549 * v1387 + v953 * v1407) - v1412 * v999 + v996 * v1427;
+        s662 += w[1] * (v1417 * v998 + (v542 * v1382 + v927 * v1430));
+        s665 += w[1] * (v1414 * v998 + (v553 * v1382 + v928 * v1430));
+        const V v1438 = v952 * v1409 + v1434, v1439 = v1435 - v952 * v1408,
+            v1440 = v948 * v1409 + v1436, v1441 = v1437 - v948 * v1408,
+            v1442 = v951 * v1409 + (v1416 * v996 + (v541 * v1386 + v943 * v1406) + v999 * v1421),
+            v1443 = v926 * v1389 + (v541 * v1387 + v943 * v1407) - v1416 * v999 - v951 * v1408,
+            v1444 = v927 * v1389 + (v542 * v1387 + v955 * v1407) - v1417 * v999 - v954 * v1408,
+            v1445 = v1443 + v996 * v1421, v1446 = v1444 + v996 * v1422,
+            v1447 = v954 * v1409 + (v1417 * v996 + (v542 * v1386 + v955 * v1406)) + v999 * v1422,
+            v1448 = w[1] * (v838 * v1438 - v924 * v1394);
+        s755 += v1448; const V v1449 = w[1] * (v838 * v1440 - v925 * v1394); s756 += v1449;
+        const V v1450 = w[1] * (v838 * v1439 - v924 * v1395); s765 += v1450;
+        const V v1451 = w[1] * (v838 * v1441 - v925 * v1395); s766 += v1451;
+        const V v1452 = v927 * v1388 + v1447, v1453 = v926 * v1388 + v1442,
+            v1454 = w[1] * (v838 * v1445 - v926 * v1395);
+        s767 += v1454; const V v1455 = w[1] * (v838 * v1446 - v927 * v1395); s768 += v1455;
+        const V v1456 = w[1] * (v927 * v1391 + v841 * v1452); s718 += v1456;
+        const V v1457 = w[1] * (v926 * v1391 + v841 * v1453); s717 += v1457;
+        const V v1458 = w[1] * (v924 * v1391 + v841 * v1438); s715 += v1458;
+        const V v1459 = w[1] * (v838 * v1452 - v927 * v1394); s758 += v1459;
+        const V v1460 = w[1] * (v838 * v1453 - v926 * v1394); s757 += v1460;
+        const V v1461 = w[1] * (v925 * v1391 + v841 * v1440); s716 += v1461;
+        const V v1462 = w[1] * (v924 * v1390 + v841 * v1439); s725 += v1462;
+        const V v1463 = w[1] * (v925 * v1390 + v841 * v1441); s726 += v1463;
+        const V v1464 = v1415 * v996 + (v949 * v1409 + (v922 * v1388 + (v543 * v1386 + v941 * v1406))),
+            v1465 = w[1] * (v926 * v1390 + v841 * v1445);
+        s727 += v1465;
+        const V v1466 = v1464 + v999 * v1420,
+            v1467 = v543 * v1387 + v941 * v1407 - v949 * v1408 - v1415 * v999 + v996 * v1420,
+            v1468 = w[1] * (v927 * v1390 + v841 * v1446);
+        s728 += v1468; const V v1469 = w[1] * (v924 * v1393 + v842 * v1439); s745 += v1469;
+        const V v1470 = w[1] * (v925 * v1393 + v842 * v1441); s746 += v1470;
+        const V v1471 = w[1] * (v922 * v1391 + v841 * v1466); s713 += v1471;
+        const V v1472 = w[1] * (v922 * v1392 + v842 * v1466); s733 += v1472;
+        const V v1473 = v922 * v1389 + v1467, v1474 = w[1] * (v927 * v1393 + v842 * v1446);
+        s748 += v1474; const V v1475 = w[1] * (v838 * v1466 - v922 * v1394); s753 += v1475;
+        const V v1476 = w[1] * (v922 * v1390 + v841 * v1473); s723 += v1476;
+        const V v1477 = w[1] * (v922 * v1393 + v842 * v1473); s743 += v1477;
+        const V v1478 = w[1] * (v924 * v1392 + v842 * v1438); s735 += v1478;
+        const V v1479 = w[1] * (v838 * v1473 - v922 * v1395); s763 += v1479;
+        const V v1480 = w[1] * (v925 * v1392 + v842 * v1440); s736 += v1480;
+        const V v1481 = w[1] * (v926 * v1392 + v842 * v1453); s737 += v1481;
+        const V v1482 = w[1] * (v927 * v1392 + v842 * v1452); s738 += v1482;
+        const V v1483 = w[1] * (v926 * v1393 + v842 * v1445); s747 += v1483;
+        const V v1484 = w[1] * (v1054 * v1396 - v1017 * v1438); s775 += v1484;
+        const V v1485 = w[1] * (v1056 * v1396 - v1017 * v1440); s776 += v1485;
+        const V v1486 = w[1] * (v1058 * v1396 - v1017 * v1453); s777 += v1486;
+        const V v1487 = w[1] * (v1059 * v1396 - v1017 * v1452); s778 += v1487;
+        const V v1488 = w[1] * (v1058 * v1397 - v1017 * v1445); s787 += v1488;
+        const V v1489 = w[1] * (v1050 * v1396 - v1017 * v1466); s773 += v1489;
+        const V v1490 = w[1] * (v1050 * v1397 - v1017 * v1473); s783 += v1490;
+        const V v1491 = w[1] * (v1054 * v1397 - v1017 * v1439); s785 += v1491;
+        const V v1492 = w[1] * (v1056 * v1397 - v1017 * v1441); s786 += v1492;
+        const V v1493 = w[1] * (v1059 * v1397 - v1017 * v1446); s788 += v1493;
+        const V v1494 = w[1] * (v1050 * v1398 - v1019 * v1466); s793 += v1494;
+        const V v1495 = w[1] * (v1050 * v1399 - v1019 * v1473); s803 += v1495;
+        const V v1496 = w[1] * (v1054 * v1399 - v1019 * v1439); s805 += v1496;
+        const V v1497 = w[1] * (v1056 * v1399 - v1019 * v1441); s806 += v1497;
+        const V v1498 = w[1] * (v1059 * v1399 - v1019 * v1446); s808 += v1498;
+        const V v1499 = w[1] * (v1050 * v1400 + v1020 * v1466); s813 += v1499;
+        const V v1500 = w[1] * (v1050 * v1401 + v1020 * v1473); s823 += v1500;
+        const V v1501 = w[1] * (v1054 * v1401 + v1020 * v1439); s825 += v1501;
+        const V v1502 = w[1] * (v1056 * v1401 + v1020 * v1441); s826 += v1502;
+        const V v1503 = w[1] * (v1059 * v1401 + v1020 * v1446); s828 += v1503;
+        const V v1504 = w[1] * (v1054 * v1398 - v1019 * v1438); s795 += v1504;
+        const V v1505 = w[1] * (v1054 * v1400 + v1020 * v1438); s815 += v1505;
+        const V v1506 = w[1] * (v1056 * v1398 - v1019 * v1440); s796 += v1506;
+        const V v1507 = w[1] * (v1056 * v1400 + v1020 * v1440); s816 += v1507;
+        const V v1508 = w[1] * (v1058 * v1398 - v1019 * v1453); s797 += v1508;
+        const V v1509 = w[1] * (v1058 * v1400 + v1020 * v1453); s817 += v1509;
+        const V v1510 = w[1] * (v1059 * v1398 - v1019 * v1452); s798 += v1510;
+        const V v1511 = w[1] * (v1059 * v1400 + v1020 * v1452); s818 += v1511;
+        const V v1512 = w[1] * (v1058 * v1399 - v1019 * v1445); s807 += v1512;
+        const V v1513 = w[1] * (v1058 * v1401 + v1020 * v1445); s827 += v1513;
+        const V v1514 = v1410 * v996 + (v947 * v1409 + (v923 * v1388 + (v544 * v1386 + v950 * v1406))),
+            v1515 = v923 * v1389 + (v544 * v1387 + v950 * v1407) - v947 * v1408 - v1410 * v999,
+            v1516 = v928 * v1389 + (v553 * v1387 + v958 * v1407) - v959 * v1408 - v1414 * v999,
+            v1517 = v1514 + v999 * v1425, v1518 = v1515 + v996 * v1425,
+            v1519 = v1418 * v996 + (v945 * v1409 + (v551 * v1386 + v944 * v1406)) + v999 * v1423,
+            v1520 = v551 * v1387 + v944 * v1407 - v945 * v1408 - v1418 * v999 + v996 * v1423,
+            v1521 = v1516 + v996 * v1429,
+            v1522 = v1414 * v996 + (v959 * v1409 + (v553 * v1386 + v958 * v1406)) + v999 * v1429,
+            v1523 = v1413 * v996 + (v957 * v1409 + (v552 * v1386 + v956 * v1406)) + v999 * v1428,
+            v1524 = v552 * v1387 + v956 * v1407 - v957 * v1408 - v1413 * v999 + v996 * v1428,
+            v1525 = v1419 * v996 + (v946 * v1409 + (v555 * v1386 + v938 * v1406)) + v999 * v1424,
+            v1526 = v555 * v1387 + v938 * v1407 - v946 * v1408 - v1419 * v999 + v996 * v1424,
+            v1527 = v920 * v1388 + v1519, v1528 = v920 * v1389 + v1520,
+            v1529 = v928 * v1388 + v1522, v1530 = v921 * v1388 + v1523,
+            v1531 = v921 * v1389 + v1524, v1532 = v929 * v1388 + v1525,
+            v1533 = v929 * v1389 + v1526, v1534 = w[1] * (v838 * v1521 - v928 * v1395);
+        s771 += v1534; const V v1535 = w[1] * (v838 * v1528 - v920 * v1395); s769 += v1535;
+        const V v1536 = w[1] * (v838 * v1529 - v928 * v1394); s761 += v1536;
+        const V v1537 = w[1] * (v838 * v1530 - v921 * v1394); s760 += v1537;
+        const V v1538 = w[1] * (v838 * v1531 - v921 * v1395); s770 += v1538;
+        const V v1539 = w[1] * (v838 * v1532 - v929 * v1394); s762 += v1539;
+        const V v1540 = w[1] * (v838 * v1533 - v929 * v1395); s772 += v1540;
+        const V v1541 = w[1] * (v838 * v1527 - v920 * v1394); s759 += v1541;
+        const V v1542 = w[1] * (v929 * v1390 + v841 * v1533); s732 += v1542;
+        const V v1543 = w[1] * (v923 * v1391 + v841 * v1517); s714 += v1543;
+        const V v1544 = w[1] * (v923 * v1390 + v841 * v1518); s724 += v1544;
+        const V v1545 = w[1] * (v838 * v1517 - v923 * v1394); s754 += v1545;
+        const V v1546 = w[1] * (v838 * v1518 - v923 * v1395); s764 += v1546;
+        const V v1547 = w[1] * (v920 * v1391 + v841 * v1527); s719 += v1547;
+        const V v1548 = w[1] * (v921 * v1391 + v841 * v1530); s720 += v1548;
+        const V v1549 = w[1] * (v928 * v1391 + v841 * v1529); s721 += v1549;
+        const V v1550 = w[1] * (v929 * v1391 + v841 * v1532); s722 += v1550;
+        const V v1551 = w[1] * (v920 * v1390 + v841 * v1528); s729 += v1551;
+        const V v1552 = w[1] * (v921 * v1390 + v841 * v1531); s730 += v1552;
+        const V v1553 = w[1] * (v928 * v1390 + v841 * v1521); s731 += v1553;
+        const V v1554 = w[1] * (v920 * v1392 + v842 * v1527); s739 += v1554;
+        const V v1555 = w[1] * (v921 * v1392 + v842 * v1530); s740 += v1555;
+        const V v1556 = w[1] * (v928 * v1392 + v842 * v1529); s741 += v1556;
+        const V v1557 = w[1] * (v929 * v1392 + v842 * v1532); s742 += v1557;
+        const V v1558 = w[1] * (v920 * v1393 + v842 * v1528); s749 += v1558;
+        const V v1559 = w[1] * (v921 * v1393 + v842 * v1531); s750 += v1559;
+        const V v1560 = w[1] * (v923 * v1392 + v842 * v1517); s734 += v1560;
+        const V v1561 = w[1] * (v923 * v1393 + v842 * v1518); s744 += v1561;
+        const V v1562 = w[1] * (v928 * v1393 + v842 * v1521); s751 += v1562;
+        const V v1563 = w[1] * (v929 * v1393 + v842 * v1533); s752 += v1563;
+        const V v1564 = w[1] * (v1052 * v1396 - v1017 * v1517); s774 += v1564;
+        const V v1565 = w[1] * (v1052 * v1397 - v1017 * v1518); s784 += v1565;
+        const V v1566 = w[1] * (v1038 * v1397 - v1017 * v1528); s789 += v1566;
+        const V v1567 = w[1] * (v1043 * v1397 - v1017 * v1521); s791 += v1567;
+        const V v1568 = w[1] * (v1047 * v1397 - v1017 * v1533); s792 += v1568;
+        const V v1569 = w[1] * (v1038 * v1396 - v1017 * v1527); s779 += v1569;
+        const V v1570 = w[1] * (v1041 * v1396 - v1017 * v1530); s780 += v1570;
+        const V v1571 = w[1] * (v1043 * v1396 - v1017 * v1529); s781 += v1571;
+        const V v1572 = w[1] * (v1047 * v1396 - v1017 * v1532); s782 += v1572;
+        const V v1573 = w[1] * (v1041 * v1397 - v1017 * v1531); s790 += v1573;
+        const V v1574 = w[1] * (v1038 * v1398 - v1019 * v1527); s799 += v1574;
+        const V v1575 = w[1] * (v1041 * v1398 - v1019 * v1530); s800 += v1575;
+        const V v1576 = w[1] * (v1043 * v1398 - v1019 * v1529); s801 += v1576;
+        const V v1577 = w[1] * (v1047 * v1398 - v1019 * v1532); s802 += v1577;
+        const V v1578 = w[1] * (v1041 * v1399 - v1019 * v1531); s810 += v1578;
+        const V v1579 = w[1] * (v1038 * v1400 + v1020 * v1527); s819 += v1579;
+        const V v1580 = w[1] * (v1041 * v1400 + v1020 * v1530); s820 += v1580;
+        const V v1581 = w[1] * (v1043 * v1400 + v1020 * v1529); s821 += v1581;
+        const V v1582 = w[1] * (v1047 * v1400 + v1020 * v1532); s822 += v1582;
+        const V v1583 = w[1] * (v1041 * v1401 + v1020 * v1531); s830 += v1583;
+        const V v1584 = w[1] * (v1052 * v1398 - v1019 * v1517); s794 += v1584;
+        const V v1585 = w[1] * (v1052 * v1400 + v1020 * v1517); s814 += v1585;
+        const V v1586 = w[1] * (v1052 * v1399 - v1019 * v1518); s804 += v1586;
+        const V v1587 = w[1] * (v1052 * v1401 + v1020 * v1518); s824 += v1587;
+        const V v1588 = w[1] * (v1038 * v1399 - v1019 * v1528); s809 += v1588;
+        const V v1589 = w[1] * (v1038 * v1401 + v1020 * v1528); s829 += v1589;
+        const V v1590 = w[1] * (v1043 * v1399 - v1019 * v1521); s811 += v1590;
+        const V v1591 = w[1] * (v1043 * v1401 + v1020 * v1521); s831 += v1591;
+        const V v1592 = w[1] * (v1047 * v1399 - v1019 * v1533); s812 += v1592;
+        const V v1593 = w[1] * (v1047 * v1401 + v1020 * v1533); s832 += v1593;
+        const V v1594 = w[1] * (v543 * v1380 + v922 * v1433 + v997 * v1420); s693 += v1594;
+        const V v1595 = w[1] * (v543 * v1383 + v922 * v1432 + v998 * v1420); s703 += v1595;
+        const V v1596 = w[1] * (v544 * v1380 + v923 * v1433 + v997 * v1425); s694 += v1596;
+        const V v1597 = w[1] * (v544 * v1383 + v923 * v1432 + v998 * v1425); s704 += v1597;
+        const V v1598 = w[1] * (v548 * v1380 + v924 * v1433 + v997 * v1426); s695 += v1598;
+        const V v1599 = w[1] * (v548 * v1383 + v924 * v1432 + v998 * v1426); s705 += v1599;
+        const V v1600 = w[1] * (v549 * v1380 + v925 * v1433 + v997 * v1427); s696 += v1600;
+        const V v1601 = w[1] * (v549 * v1383 + v925 * v1432 + v998 * v1427); s706 += v1601;
+        const V v1602 = w[1] * (v541 * v1380 + v926 * v1433 + v997 * v1421); s697 += v1602;
+        const V v1603 = w[1] * (v541 * v1383 + v926 * v1432 + v998 * v1421); s707 += v1603;
+        const V v1604 = w[1] * (v542 * v1380 + v927 * v1433 + v997 * v1422); s698 += v1604;
+        const V v1605 = w[1] * (v542 * v1383 + v927 * v1432 + v998 * v1422); s708 += v1605;
+        const V v1606 = w[1] * (v551 * v1380 + v920 * v1433 + v997 * v1423); s699 += v1606;
+        const V v1607 = w[1] * (v551 * v1383 + v920 * v1432 + v998 * v1423); s709 += v1607;
+        const V v1608 = w[1] * (v552 * v1380 + v921 * v1433 + v997 * v1428); s700 += v1608;
+        const V v1609 = w[1] * (v552 * v1383 + v921 * v1432 + v998 * v1428); s710 += v1609;
+        const V v1610 = w[1] * (v553 * v1380 + v928 * v1433 + v997 * v1429); s701 += v1610;
+        const V v1611 = w[1] * (v553 * v1383 + v928 * v1432 + v998 * v1429); s711 += v1611;
+        const V v1612 = w[1] * (v555 * v1380 + v929 * v1433 + v997 * v1424); s702 += v1612;
+        const V v1613 = w[1] * (v555 * v1383 + v929 * v1432 + v998 * v1424); s712 += v1613;
     }
-    softehl_store4(K + 204, 256, s564, softehl_splat(0.0), s565, softehl_splat(0.0));
-    softehl_store4(K + 236, 256, s566, softehl_splat(0.0), s567, softehl_splat(0.0));
-    softehl_store4(R + 12, 16, s563, s569, s562, s568);
-    softehl_store4(R + 4, 16, s609, s608, s607, s606);
-    softehl_store4(R + 0, 16, s613, s612, s611, s610);
-    softehl_store4(K + 220, 256, s614, s596, s615, s597);
-    softehl_store4(K + 252, 256, s616, s600, s617, s601);
-    softehl_store4(K + 12, 256, s618, s570, s619, s571);
-    softehl_store4(K + 28, 256, s620, s572, s621, s573);
-    softehl_store4(K + 44, 256, s622, s574, s623, s575);
-    softehl_store4(K + 60, 256, s624, s576, s625, s577);
-    softehl_store4(K + 76, 256, s626, s578, s627, s579);
-    softehl_store4(K + 92, 256, s628, s580, s629, s581);
-    softehl_store4(K + 108, 256, s630, s582, s631, s583);
-    softehl_store4(K + 124, 256, s632, s584, s633, s585);
-    softehl_store4(K + 140, 256, s634, s586, s635, s587);
-    softehl_store4(K + 156, 256, s636, s588, s637, s589);
-    softehl_store4(K + 192, 256, s642, s643, s644, s645);
-    softehl_store4(K + 196, 256, s646, s647, s648, s649);
-    softehl_store4(K + 200, 256, s650, s651, s594, s595);
-    softehl_store4(K + 224, 256, s654, s655, s656, s657);
-    softehl_store4(K + 228, 256, s658, s659, s660, s661);
-    softehl_store4(K + 232, 256, s662, s663, s598, s599);
-    softehl_store4(K + 208, 256, s690, s691, s692, s693);
-    softehl_store4(K + 212, 256, s694, s695, s696, s697);
-    softehl_store4(K + 216, 256, s698, s699, s652, s653);
-    softehl_store4(K + 240, 256, s700, s701, s702, s703);
-    softehl_store4(K + 244, 256, s704, s705, s706, s707);
-    softehl_store4(K + 248, 256, s708, s709, s664, s665);
-    softehl_store4(K + 0, 256, s710, s711, s712, s713);
-    softehl_store4(K + 4, 256, s714, s715, s716, s717);
-    softehl_store4(K + 8, 256, s718, s719, s666, s667);
-    softehl_store4(K + 16, 256, s720, s721, s722, s723);
-    softehl_store4(K + 20, 256, s724, s725, s726, s727);
-    softehl_store4(K + 24, 256, s728, s729, s668, s669);
-    softehl_store4(K + 32, 256, s730, s731, s732, s733);
-    softehl_store4(K + 36, 256, s734, s735, s736, s737);
-    softehl_store4(K + 40, 256, s738, s739, s670, s671);
-    softehl_store4(K + 48, 256, s740, s741, s742, s743);
-    softehl_store4(K + 52, 256, s744, s745, s746, s747);
-    softehl_store4(K + 56, 256, s748, s749, s672, s673);
-    softehl_store4(K + 64, 256, s750, s751, s752, s753);
-    softehl_store4(K + 68, 256, s754, s755, s756, s757);
-    softehl_store4(K + 72, 256, s758, s759, s674, s675);
-    softehl_store4(K + 80, 256, s760, s761, s762, s763);
-    softehl_store4(K + 84, 256, s764, s765, s766, s767);
-    softehl_store4(K + 88, 256, s768, s769, s676, s677);
-    softehl_store4(R + 8, 16, s605, s604, -s603, -s602);
-    softehl_store4(K + 172, 256, -s638, s590, -s639, s591);
-    softehl_store4(K + 188, 256, -s640, s592, -s641, s593);
-    softehl_store4(K + 96, 256, -s770, -s771, -s772, -s773);
-    softehl_store4(K + 100, 256, -s774, -s775, -s776, -s777);
-    softehl_store4(K + 104, 256, -s778, -s779, -s678, -s679);
-    softehl_store4(K + 112, 256, -s780, -s781, -s782, -s783);
-    softehl_store4(K + 116, 256, -s784, -s785, -s786, -s787);
-    softehl_store4(K + 120, 256, -s788, -s789, -s680, -s681);
-    softehl_store4(K + 128, 256, -s790, -s791, -s792, -s793);
-    softehl_store4(K + 132, 256, -s794, -s795, -s796, -s797);
-    softehl_store4(K + 136, 256, -s798, -s799, -s682, -s683);
-    softehl_store4(K + 144, 256, -s800, -s801, -s802, -s803);
-    softehl_store4(K + 148, 256, -s804, -s805, -s806, -s807);
-    softehl_store4(K + 152, 256, -s808, -s809, -s684, -s685);
-    softehl_store4(K + 160, 256, -s810, -s811, -s812, -s813);
-    softehl_store4(K + 164, 256, -s814, -s815, -s816, -s817);
-    softehl_store4(K + 168, 256, -s818, -s819, -s686, -s687);
-    softehl_store4(K + 176, 256, -s820, -s821, -s822, -s823);
-    softehl_store4(K + 180, 256, -s824, -s825, -s826, -s827);
-    softehl_store4(K + 184, 256, -s828, -s829, -s688, -s689);
+    softehl_store4(K + 204, 256, s567, softehl_splat(0.0), s568, softehl_splat(0.0));
+    softehl_store4(K + 236, 256, s569, softehl_splat(0.0), s570, softehl_splat(0.0));
+    softehl_store4(R + 12, 16, s566, s572, s565, s571);
+    softehl_store4(R + 4, 16, s612, s611, s610, s609);
+    softehl_store4(R + 0, 16, s616, s615, s614, s613);
+    softehl_store4(K + 220, 256, s617, s599, s618, s600);
+    softehl_store4(K + 252, 256, s619, s603, s620, s604);
+    softehl_store4(K + 12, 256, s621, s573, s622, s574);
+    softehl_store4(K + 28, 256, s623, s575, s624, s576);
+    softehl_store4(K + 44, 256, s625, s577, s626, s578);
+    softehl_store4(K + 60, 256, s627, s579, s628, s580);
+    softehl_store4(K + 76, 256, s629, s581, s630, s582);
+    softehl_store4(K + 92, 256, s631, s583, s632, s584);
+    softehl_store4(K + 108, 256, s633, s585, s634, s586);
+    softehl_store4(K + 124, 256, s635, s587, s636, s588);
+    softehl_store4(K + 140, 256, s637, s589, s638, s590);
+    softehl_store4(K + 156, 256, s639, s591, s640, s592);
+    softehl_store4(K + 192, 256, s645, s646, s647, s648);
+    softehl_store4(K + 196, 256, s649, s650, s651, s652);
+    softehl_store4(K + 200, 256, s653, s654, s597, s598);
+    softehl_store4(K + 224, 256, s657, s658, s659, s660);
+    softehl_store4(K + 228, 256, s661, s662, s663, s664);
+    softehl_store4(K + 232, 256, s665, s666, s601, s602);
+    softehl_store4(K + 208, 256, s693, s694, s695, s696);
+    softehl_store4(K + 212, 256, s697, s698, s699, s700);
+    softehl_store4(K + 216, 256, s701, s702, s655, s656);
+    softehl_store4(K + 240, 256, s703, s704, s705, s706);
+    softehl_store4(K + 244, 256, s707, s708, s709, s710);
+    softehl_store4(K + 248, 256, s711, s712, s667, s668);
+    softehl_store4(K + 0, 256, s713, s714, s715, s716);
+    softehl_store4(K + 4, 256, s717, s718, s719, s720);
+    softehl_store4(K + 8, 256, s721, s722, s669, s670);
+    softehl_store4(K + 16, 256, s723, s724, s725, s726);
+    softehl_store4(K + 20, 256, s727, s728, s729, s730);
+    softehl_store4(K + 24, 256, s731, s732, s671, s672);
+    softehl_store4(K + 32, 256, s733, s734, s735, s736);
+    softehl_store4(K + 36, 256, s737, s738, s739, s740);
+    softehl_store4(K + 40, 256, s741, s742, s673, s674);
+    softehl_store4(K + 48, 256, s743, s744, s745, s746);
+    softehl_store4(K + 52, 256, s747, s748, s749, s750);
+    softehl_store4(K + 56, 256, s751, s752, s675, s676);
+    softehl_store4(K + 64, 256, s753, s754, s755, s756);
+    softehl_store4(K + 68, 256, s757, s758, s759, s760);
+    softehl_store4(K + 72, 256, s761, s762, s677, s678);
+    softehl_store4(K + 80, 256, s763, s764, s765, s766);
+    softehl_store4(K + 84, 256, s767, s768, s769, s770);
+    softehl_store4(K + 88, 256, s771, s772, s679, s680);
+    softehl_store4(R + 8, 16, s608, s607, -s606, -s605);
+    softehl_store4(K + 172, 256, -s641, s593, -s642, s594);
+    softehl_store4(K + 188, 256, -s643, s595, -s644, s596);
+    softehl_store4(K + 96, 256, -s773, -s774, -s775, -s776);
+    softehl_store4(K + 100, 256, -s777, -s778, -s779, -s780);
+    softehl_store4(K + 104, 256, -s781, -s782, -s681, -s682);
+    softehl_store4(K + 112, 256, -s783, -s784, -s785, -s786);
+    softehl_store4(K + 116, 256, -s787, -s788, -s789, -s790);
+    softehl_store4(K + 120, 256, -s791, -s792, -s683, -s684);
+    softehl_store4(K + 128, 256, -s793, -s794, -s795, -s796);
+    softehl_store4(K + 132, 256, -s797, -s798, -s799, -s800);
+    softehl_store4(K + 136, 256, -s801, -s802, -s685, -s686);
+    softehl_store4(K + 144, 256, -s803, -s804, -s805, -s806);
+    softehl_store4(K + 148, 256, -s807, -s808, -s809, -s810);
+    softehl_store4(K + 152, 256, -s811, -s812, -s687, -s688);
+    softehl_store4(K + 160, 256, -s813, -s814, -s815, -s816);
+    softehl_store4(K + 164, 256, -s817, -s818, -s819, -s820);
+    softehl_store4(K + 168, 256, -s821, -s822, -s689, -s690);
+    softehl_store4(K + 176, 256, -s823, -s824, -s825, -s826);
+    softehl_store4(K + 180, 256, -s827, -s828, -s829, -s830);
+    softehl_store4(K + 184, 256, -s831, -s832, -s691, -s692);
 }
 SOFTEHL_BATCH(softehl_mortar_33_tangent, 12, 16, 17, 0, 16, (16 * 16))

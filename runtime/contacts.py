@@ -112,19 +112,6 @@ def contact_blocks(system: System) -> dict[str, float]:
     return {**found, **pairs}
 
 
-def sliding(system: System, x: Array) -> Array:
-    """Unknowns (n,) with a shear stress of the least size on sides in the plane without friction:
-    those that have not slipped at all would count as sticking.
-    """
-    found = x.copy()
-    for contact in system.contacts:
-        if isinstance(contact, Contact) and contact.friction == 0.0:
-            shear = contact.multipliers[:, 1]
-            shear = shear[shear >= 0]
-            found[shear[found[shear] == 0.0]] = np.finfo(np.float64).tiny
-    return found
-
-
 def weighted(system: System, weight: float) -> tuple[tuple[Sought, ...], dict[str, ElementBlock]]:
     """Contacts and the blocks of their sides by name with a stiffness times `weight`.
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, count_of
-from softehl.runtime.contacts import contact_blocks, sliding
+from softehl.runtime.contacts import contact_blocks
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.reduction import is_symmetric
 from softehl.runtime.mass import Masses, mass_matrix
@@ -44,7 +44,7 @@ class Tangent:
         eigenvalues in the second order.
         """
         share = system.share
-        problem, x = share.part(posed).at(x), sliding(system, x)
+        problem = share.part(posed).at(x)
         with np.errstate(all="ignore"):
             K = problem.assembler.linearise(x, problem.parameters)[1]
         if share.largest(float(not np.isfinite(K.data).all())):

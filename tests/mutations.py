@@ -251,6 +251,13 @@ FAULTS = (
         ORACLE,
     ),
     Fault(
+        "codegen/models/mortar.py",
+        "(stick, friction > 0), (0, True)",
+        "(stick, True)",
+        "tests/runtime/test_motion_constraints.py -k bodies_in_contact",
+        "mortar_22",
+    ),
+    Fault(
         "runtime/fem/assembly.py",
         "else self.data[part]",
         "else self.data[: len(self.dofs[part])]",

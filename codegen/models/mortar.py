@@ -52,7 +52,9 @@ def pair(nodes: int, others: int) -> Definition:
     p = m.define("p", sp.Piecewise((near, trial >= 0), (0, True)), interface=True)
     limit = m.define("limit", friction * p)
     stick = m.define("stick", interpolate(at.L, tau) + rho * at.slip(m, _moved(X, old), nodes))
-    slides = sp.Piecewise((limit, stick > limit), (-limit, stick < -limit), (stick, True))
+    slides = sp.Piecewise(
+        (limit, stick > limit), (-limit, stick < -limit), (stick, friction > 0), (0, True)
+    )
     q = m.define("q", sp.Piecewise((slides, trial >= 0), (0, True)), interface=True)
     area = m.define("area", at.half * _area(nodes, at.xi, [c[:nodes] for c in X], ring))
     force = [

@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 
 import softehl
-from softehl import Definition, Mesh, Model, quadrature
+from softehl import Definition, Mesh, Model, NotConverged, quadrature
 from softehl.runtime.dynamics.motion import EnergyGain
 from softehl.runtime.study import Study, StudyError
 from tests.runtime.touching_bodies import force
@@ -381,16 +381,39 @@ def test_pages_that_divide_by_the_step(scheme: str) -> None:
         assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.2 * order)
 
 
+def in_a_tube(dimension: int, **contact: Any) -> Study:
+    """Bars of four cells that are fixed across everywhere, pressed on each other by 1e-3."""
+    study = bars(dimension=dimension, **contact)
+    study.fix("wall:boundary", **{f"u_{c}": 0 for c in "yz"[: dimension - 1]})
+    study.load("bar:right", u_x=-1e-3)
+    return study
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_bodies_in_contact_without_friction_are_one_along_its_normal(dimension: int) -> None:
+    """Points that do not slip do not stick: force and mode of a bar in closed form."""
+    result = in_a_tube(dimension).solve()
+    assert force(result) == pytest.approx(1e-3, rel=1e-9)
+    found = result.modes(1, mass=MASS).frequencies[0]
+    assert found == pytest.approx(lowest_of_four_cells(), rel=1e-7)
+    with pytest.raises(NotConverged, match="not held"):  # the shear stress is arbitrary
+        in_a_tube(dimension, friction=0.3).solve()
+
+
+def lowest_of_four_cells() -> float:
+    """The frequency of a bar fixed at one end, of linear cells with consistent mass."""
+    h = LENGTH / 2
+    turn = np.cos(np.pi / (4 * LENGTH) * h)
+    return float(SPEED / h * np.sqrt(6 * (1 - turn) / (2 + turn)) / (2 * np.pi))
+
+
 def test_modes_of_bodies_in_contact_are_those_of_one() -> None:
     """Four linear cells of a bar that is fixed at one end, in closed form."""
     study = bars()
     study.load("bar:right", u_x=-1e-3)
     along = {name: {"rho": RHO, "of": ["u_x"]} for name in ("bar", "wall")}
     found = study.solve().modes(4, mass=along).frequencies
-    h = LENGTH / 2
-    turn = np.cos(np.pi / (4 * LENGTH) * h)
-    truth = SPEED / h * np.sqrt(6 * (1 - turn) / (2 + turn)) / (2 * np.pi)
-    assert np.abs(found / truth - 1).min() < 1e-5
+    assert np.abs(found / lowest_of_four_cells() - 1).min() < 1e-5
     rough = bars(friction=0.3)
     rough.load("bar:right", u_x=-1e-3)
     with pytest.raises(StudyError, match=r"not symmetric .friction"):
