@@ -210,7 +210,9 @@ class Result:
         return here
 
     def fields(self, block: str) -> dict[str, Array]:
-        """Fields of a block's page at its quadrature points: name -> (cells, points)."""
+        """Fields of a block's page at its quadrature points: name -> (cells, points); empty where
+        the page declares none (`m.fields(...)`).
+        """
         self._block(block)
         share = self.system.share
         return {n: share.whole_cells(block, v) for n, v in self._own_fields(block).items()}

@@ -195,8 +195,8 @@ class ElementBlock:
         internal unknowns, the same at all points of an element.
         """
         internal = self.internal
-        if internal and not self.kernel.fields:
-            values = np.empty((len(self.dofs), len(self._rule.weights), 0))
+        if not self.kernel.fields:
+            values = np.empty((len(self.dofs), len(self._rule.weights) if internal else 0, 0))
         else:
             given = self.given(parameters)
             values = self.kernel.fields_at(self.coordinates, x[self.dofs], **given)

@@ -318,7 +318,13 @@ class Mesh:
         for kind, faces in found.items():
             cell, known = CELLS[kind], self.boundary.get(kind, faces[:0])
             if cell.dimension != self.dimension - 1:
-                raise MeshError(f"{kind} is no face of a mesh of {self.dimension} coordinates")
+                name = "the predicate" if callable(where) else f"side {where!r}"
+                what = {0: "nodes", 1: "lines", 2: "faces"}.get(cell.dimension, "cells")
+                wanted = {1: "nodes", 2: "lines"}.get(self.dimension, "faces")
+                raise MeshError(
+                    f"{name} is of {what} ({kind}); in {self.dimension}-D a side of {wanted} of "
+                    f"the boundary is needed, such as {few(self._outer_sides())}"
+                )
             lost = faces[matched(faces, known, cell.corners) < 0] if solid else faces[:0]
             if len(lost):
                 place = place_text(self.points[lost[0]].mean(axis=0))
@@ -326,6 +332,14 @@ class Mesh:
                     f"the face at {place} is of two cells or of none: it has no outside"
                 )
         return found
+
+    def _outer_sides(self) -> list[str]:
+        """Names of sides of faces of one dimension less than the mesh."""
+        names = [n for n, f in self.sides.items() if self._are_faces(f)]
+        return [*names, "boundary"]
+
+    def _are_faces(self, faces: Faces) -> bool:
+        return all(CELLS[kind].dimension == self.dimension - 1 for kind in faces)
 
     def nodes(self, where: str | Predicate) -> Integers:
         """Numbers of the nodes of a side or group, or of those that are meant; sorted."""

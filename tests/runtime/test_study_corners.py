@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+import softehl
 from softehl import Mesh, Study
+from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.study import StudyError
 
 MODELS = Path(__file__).parents[2] / "docs" / "models"
@@ -91,3 +94,38 @@ def test_what_cannot_be_varied_by_a_function() -> None:
             study.varied({("load:right", "u_x"): value})  # type: ignore[dict-item]
     twice = study.varied({("load:right", "u_x"): 0.2}).solve()
     np.testing.assert_allclose(twice.x, 2 * study.solve().x, rtol=1e-12)
+
+
+@softehl.page
+def bare(m: Any) -> None:
+    """A linear spring of a body, without fields."""
+    u = m.vector("u")
+    (E,) = m.parameters(E="modulus")
+    m.weak(E * (m.grad(u) + m.grad(u).T) / 2, m.grad(u))
+
+
+def test_a_page_without_fields_has_none(tmp_path: Path) -> None:
+    study = Study(Mesh.rectangle(1, 1, cells=(2, 1)))
+    study.add("body", bare, E=1.0)
+    study.fix("left", u_x=0, u_y=0)
+    study.load("right", u_x=0.1)
+    result = study.solve()
+    assert result.fields("body") == result.at_nodes("body") == {}
+    result.write(tmp_path / "bare.vtu")
+    with pytest.raises(KeyError, match="no block 'bodi'"):
+        result.fields("bodi")
+
+
+@pytest.mark.parametrize(("dimension", "kind"), [(2, "point1"), (3, "line2"), (3, "point1")])
+def test_a_side_without_faces_is_named(dimension: int, kind: str) -> None:
+    box = Mesh.box((1, 1, 1), cells=(1, 1, 1))
+    mesh = box if dimension == 3 else Mesh.rectangle(1, 1, cells=(1, 1))
+    nodes = np.arange(2 if kind == "line2" else 1)[None]
+    study = Study(Mesh(mesh.points, mesh.cells, sides={**mesh.sides, "rim": {kind: nodes}}))
+    words = {"point1": "nodes", "line2": "lines"}[kind]
+    needed = {2: "lines", 3: "faces"}[dimension]
+    message = rf"side 'rim' is of {words} \({kind}\); in {dimension}-D .* {needed} .* such as left"
+    with pytest.raises(MeshError, match=message):
+        study.pressure("rim", 1.0)
+    with pytest.raises(MeshError, match=message):
+        study.contact("left", "rim")
