@@ -288,9 +288,8 @@ def _images(
                 f"periodic({where!r}, {to!r}): {len(ours)} and {len(theirs)} nodes; the mesh of "
                 "both sides must be the same"
             )
-        found = read.partners(mesh.points[ours], mesh.points[theirs], tolerance)
         rows.append(ours)
-        columns.append(theirs[found])
+        columns.append(read.node_partners(mesh, ours, theirs, tolerance))
         shifts.append((mesh.points[theirs] - mesh.points[ours]).mean(axis=0))
     a, b, n = np.concatenate(rows), np.concatenate(columns), len(mesh.points)
     graph = coo_array((np.ones(len(a)), (a, b)), shape=(n, n))

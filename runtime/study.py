@@ -228,6 +228,7 @@ class Study(Paths, Fitted):
         """Tie unknowns of one side to those of another, u(where) = u(to) + offset: periodicity.
 
         The sides must have the same nodes but for a shift; `tolerance` is relative to their size.
+        Nodes at one place, of bodies that are not connected, are tied body by body.
         Or `to` is one place, at which all nodes of the side are tied: they move as one.
         """
         words = f"tie({shown(where)}, {shown(to)})"
@@ -247,8 +248,7 @@ class Study(Paths, Fitted):
                 "shift are tied, or a side to one place"
             )
         else:
-            chosen = read.partners(self.mesh.points[ours], self.mesh.points[theirs], tolerance)
-            partners = theirs[chosen]
+            partners = read.node_partners(self.mesh, ours, theirs, tolerance)
         for name in names:
             pairs = np.stack([ours, partners], axis=1)
             self._add_force("tie", where, Tie(offset), pairs, (name,))

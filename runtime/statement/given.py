@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from softehl.runtime.arrays import Array, Integers
@@ -199,20 +201,52 @@ def nodes_of(mesh: Mesh, where: Where) -> Integers:
     return given.astype(np.int64)
 
 
-def partners(ours: Array, theirs: Array, tolerance: float) -> Integers:
+def partners(
+    ours: Array,
+    theirs: Array,
+    tolerance: float,
+    bodies: Callable[[], tuple[Integers, Integers]] | None = None,
+) -> Integers:
     """For each of our places the number of the one of theirs that has the same place but for the
-    shift between both centres.  Raises StudyError where there is none.
+    shift between both centres. Nodes at one place have partners of their own body; bodies: numbers
+    of the bodies of ours and theirs, (n,).  Raises StudyError where there is none.
     """
     a, b = ours - ours.mean(axis=0), theirs - theirs.mean(axis=0)
     distance, chosen = map(np.asarray, cKDTree(b).query(a))
     size = max(float(np.ptp(ours, axis=0).max()), float(np.abs(ours - theirs).max()))
-    worst = float(distance.max())
-    if worst > tolerance * size:
-        raise StudyError(f"tie: the nodes of both sides do not fit, they are {worst:.3g} apart")
-    if len(np.unique(chosen)) < len(chosen):
-        twice = ours[np.bincount(chosen)[chosen] > 1][0]
+    worst, rounding = float(distance.max()), 8 * np.finfo(np.float64).eps * np.abs(ours).max()
+    limit = max(tolerance * size, float(rounding))
+    if not worst <= limit:
         raise StudyError(
-            f"tie: two nodes at {place_text(twice)} have the same partner: a tie joins each node "
-            "with one other, copies of a node cannot be told apart"
+            f"tie: the nodes of both sides do not fit, they are {worst:.3g} apart at "
+            f"{place_text(ours[int(distance.argmax())])} (allowed: {limit:.3g}); sides "
+            "of equal nodes but for a shift are tied, tolerance=... is relative to their size"
         )
-    return np.asarray(chosen, dtype=np.int64)
+    if len(np.unique(chosen)) == len(chosen):
+        return np.asarray(chosen, dtype=np.int64)
+    twice = ours[np.bincount(chosen)[chosen] > 1][0]
+    if bodies is not None:
+        far = 2.0 * (size or 1.0)
+        a, b = (np.column_stack([x, far * k]) for x, k in zip((a, b), bodies(), strict=True))
+        distance, chosen = map(np.asarray, cKDTree(b).query(a))
+        if distance.max() <= limit and len(np.unique(chosen)) == len(chosen):
+            return np.asarray(chosen, dtype=np.int64)
+    raise StudyError(
+        f"tie: two nodes at {place_text(twice)} have the same partner: nodes at one place are tied "
+        "body by body, one of each body, and here the bodies of both sides differ or one has two; "
+        "tie the sides of each body in a call of its own"
+    )
+
+
+def node_partners(mesh: Mesh, ours: Integers, theirs: Integers, tolerance: float) -> Integers:
+    """For each of our nodes its partner among theirs, node numbers (n,).  Raises StudyError."""
+
+    def bodies() -> tuple[Integers, Integers]:
+        pairs = [np.stack([np.repeat(c[:, 0], c.shape[1]), c.ravel()]) for c in mesh.cells.values()]
+        rows, columns = np.concatenate(pairs, axis=1)
+        size = len(mesh.points)
+        graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(size, size))
+        label = connected_components(graph, directed=False)[1].astype(np.int64)
+        return label[ours], label[theirs]
+
+    return theirs[partners(mesh.points[ours], mesh.points[theirs], tolerance, bodies)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from functools import partial
 from time import process_time
 from typing import Any
 
@@ -14,7 +15,7 @@ from scipy.optimize import fsolve
 import softehl
 from softehl.runtime.arrays import Array
 from softehl.runtime.periodic import Cell
-from softehl.runtime.statement.given import partners
+from softehl.runtime.statement.given import node_partners, partners
 from softehl.runtime.statement.records import StudyError
 
 SOFT, STIFF = (0.4, 1.3), (2.0, 5.0)
@@ -167,3 +168,20 @@ def test_sides_that_do_not_fit_and_copies_of_a_node_are_refused() -> None:
         partners(side, side * [1.0, 1.1] + [1.0, 0.0], 1e-6)
     with pytest.raises(StudyError, match=r"two nodes at \(0, 0\) have the same partner"):
         partners(side[[0, 0, 2]], side[[0, 0, 2]] + [1.0, 0.0], 1e-6)
+
+
+PLACES = {"low": (0, 0), "up": (0, 1), "far": (3, 0), "above it": (3, 1)}
+
+
+def test_nodes_at_one_place_are_tied_body_by_body() -> None:
+    """Of two blocks, one on the other, each has its own corner at the place of the other's."""
+    low = softehl.Mesh.rectangle(1.0, 1.0, cells=(2, 2))
+    blocks = {name: low.map(partial(np.add, by)) for name, by in PLACES.items()}
+    mesh = softehl.Mesh.union(**blocks)
+    left, right, third = (np.flatnonzero(mesh.points[:, 0] == x) for x in (0.0, 1.0, 3.0))
+    order = [3, 0, 5, 2, 4, 1]
+    np.testing.assert_array_equal(node_partners(mesh, left[order], right, 1e-6), right[order])
+    with pytest.raises(StudyError, match=r"at \(0, 1\) .* body by body, .* a call of its own"):
+        node_partners(mesh, left, third, 1e-6)  # which of both goes with which?
+    with pytest.raises(StudyError, match=r"0\.25 apart at \(0, 1\) \(allowed: 5e-07\)"):
+        node_partners(mesh, left[[2, 3]], left[[1, 2]], 1e-6)
