@@ -54,7 +54,7 @@ class Interpolation:
         first = located.first[np.searchsorted(located.point[located.first], located.point)]
         values = self.values(x)
         vectors = zip(self.layout.vectors, self.layout.fields, strict=True)
-        sizes = {name: np.abs(x[part]).max() for names, part in vectors for name in names}
+        sizes = {name: np.abs(x[part]).max(initial=0) for names, part in vectors for name in names}
         for name, (pair, dof, weight) in self.entries.items():
             apart = np.abs(values[name] - values[name][first])
             for k in np.flatnonzero(apart > _APART * sizes[name]):
