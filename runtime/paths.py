@@ -244,7 +244,7 @@ class Paths:
         t, x, histories = beginning(system, start)
         problem = system.problem(system.still(t, x, histories))
         with np.errstate(all="ignore"):
-            off = problem.measure(x, None)
+            off = problem.measure(x, problem.linearise(x)[1], rounded=True)
         if not off <= _BALANCED:
             raise StudyError(
                 f"modes({count}): loads or prescribed values are not zero at load factor {t:g}; "
