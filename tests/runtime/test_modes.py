@@ -189,6 +189,17 @@ def still(study: Study) -> Any:
     return system.still(1.0, system.at_rest(), system.histories())
 
 
+def test_a_ring_at_rest_but_for_rounding() -> None:
+    """A thin ring moves along its axis, turns its section, and breathes: 0, E/2 and E over
+    rho R^2.
+    """
+    ring = Mesh.rectangle(0.1, 0.1, cells=(2, 2)).map(lambda x: x + np.array([0.0, 9.95]))
+    study = Study(ring, geometry="axisymmetric")
+    study.add("body", material="neo_hooke", mu=1.0, kappa=2 / 3)  # E = 2, nu = 0
+    squares = study.modes(3, mass={"body": {"rho": 1.0}}).squares
+    np.testing.assert_allclose(squares, [0.0, 0.01, 0.02], rtol=2e-4, atol=1e-9)
+
+
 def test_tied_sides_move_as_one() -> None:
     """A periodic string has waves of the whole length, in pairs."""
     study = stretched(0.01)
@@ -298,6 +309,27 @@ def test_buckling_with_a_pressure_of_its_own() -> None:
     nu = 2 * YOUNG / (2 * (2 * YOUNG + YOUNG / 2))  # lame = 2 YOUNG, mu = YOUNG / 2
     plane = 2 * (YOUNG / 2) * (1 + nu) / (1 - nu**2) / YOUNG
     assert found == pytest.approx(plane * EULER, rel=5e-3)
+
+
+def test_a_ring_buckles_under_a_pressure_that_ends_at_supports() -> None:
+    """Levy's load of a ring, 3 E I / R^3, of a quarter between planes of symmetry."""
+    radius, thickness, young = 1.0, 0.04, 1000.0
+
+    def bent(x: Any) -> Any:
+        r = radius - thickness / 2 + x[:, 1]
+        return np.column_stack([r * np.sin(x[:, 0]), r * np.cos(x[:, 0])])
+
+    mesh = Mesh.rectangle(np.pi / 2, thickness, cells=(16, 1), order=2).map(bent)
+    study = Study(mesh)
+    study.add("ring", material="saint_venant", E=young, nu=0.0)
+    study.fix("left", u_x=0)
+    study.fix("right", u_y=0)
+    levy = 3 * young * thickness**3 / 12 / radius**3
+    study.pressure("top", levy)
+    assert study.buckling(1).factors[0] == pytest.approx(1.0, rel=0.01)
+    assert study.solve(until=0.9).unstable == 0
+    with pytest.warns(Unstable, match="along one direction"):
+        assert study.solve(until=1.1).unstable == 1
 
 
 def test_a_column_beyond_its_load_is_not_silent() -> None:
