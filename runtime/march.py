@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-from scipy.sparse import csc_array
 
-from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.arrays import Array
 from softehl.runtime.begin import SMALLEST, beginning
 from softehl.runtime.derivatives.trail import Trail
+from softehl.runtime.fem.loads import Tie
 from softehl.runtime.held import require_held
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.result import Result
@@ -29,6 +29,7 @@ from softehl.runtime.solve.predictor import through
 from softehl.runtime.solve.record import End, Record
 from softehl.runtime.solve.solution import NotConverged, Point, Status
 from softehl.runtime.solve.steps import StepRule
+from softehl.runtime.statement.contacts import MULTIPLIERS
 from softehl.runtime.statement.records import StudyError
 from softehl.runtime.system import Step, System
 
@@ -178,7 +179,8 @@ class March:
         """By how much the next step may be longer; below 1 where the error is too large.
 
         Components of a vector are one field. A field whose error Newton's method does not see in
-        the equations, beside their loads, has none; nor has one whose work is rounding.
+        the equations, beside their loads, has none. Nor have forces of contacts and ties, which
+        follow from the motion and jump where bodies meet.
         """
         order = _ORDER[self.method] if len(clock.times) > 1 else 1
         if self.tolerance is None or len(clock.times) <= order:
@@ -190,9 +192,9 @@ class March:
             share = step.dt / (step.dt + clock.times[0] - clock.times[1])
         worst = 0.0
         rated = {slot.name for block in system.blocks.values() for slot in block.rates.values()}
-        layout = system.numbering.layout
+        layout, forces = system.numbering.layout, _constraint_forces(system)
         for names, part in zip(layout.vectors, layout.fields, strict=True):
-            if rated and rated.isdisjoint(names):
+            if (rated and rated.isdisjoint(names)) or not forces.isdisjoint(names):
                 continue  # it follows from the others, and its start may be anything
             size, off = (_largest(system, values[part]) for values in (x, difference))
             error = share * off / max(size, 1e-300)
@@ -200,10 +202,8 @@ class March:
                 wrong = x.copy()
                 wrong[part] -= share * difference[part]
                 with np.errstate(all="ignore"):
-                    K = problem.linearise(x)[1]
-                    seen = problem.measure(wrong, K)
-                if seen <= self.newton.tolerance or _is_rounding(K, x, part, difference):
-                    error = 0.0
+                    seen = problem.measure(wrong, problem.linearise(x)[1])
+                error = error if seen > self.newton.tolerance else 0.0
             worst = max(worst, error)
         if worst == 0.0:
             return _GROWTH
@@ -283,16 +283,14 @@ class _ByTime(Way):
         return min(_GROWTH * wanted, self.march.dt) if wanted < self.march.dt else wanted
 
 
-def _is_rounding(K: Any, x: Array, part: Integers, difference: Array) -> bool:
-    """True if a difference of the unknowns `part` does no work beside all unknowns x, (n,).
-
-    So it is for a multiplier that is zero, whose own equation has no other terms to compare with.
-    """
-    if not isinstance(K, csc_array):
-        return False
-    terms = np.asarray(abs(K) @ np.abs(x))
-    work = float(np.abs(difference[part]) @ terms[part])
-    return work <= np.finfo(np.float64).eps * float(np.abs(x) @ terms)
+def _constraint_forces(system: System) -> set[str]:
+    """Names of the unknowns of contacts and ties."""
+    if system.statement is None:
+        return set()
+    found = {f.label for f in system.statement.forces if isinstance(f.kernel, Tie)}
+    for touch in system.statement.contacts:
+        found.update(map(touch.unknown, MULTIPLIERS[system.mesh.dimension]))
+    return found
 
 
 def _largest(system: System, values: Array) -> float:

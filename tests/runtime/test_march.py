@@ -5,11 +5,13 @@ from __future__ import annotations
 import itertools
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import sympy as sp
 
+import softehl
 from softehl import Definition, Mesh, Model, Study, element, kinematics, quadrature
 from softehl.runtime.result import Result
 from softehl.runtime.solve.differences import differences
@@ -326,6 +328,33 @@ def test_a_local_error_that_no_step_keeps_ends_a_march() -> None:
     march = study.march(dt=1e-2, until=0.1, tolerance=1e-2)
     with pytest.raises(NotConverged, match=r"refused.*the local error is above its tolerance"):
         list(march)
+
+
+@softehl.page
+def viscous(m: Any) -> None:
+    """E grad u + eta d(grad u)/dt, by the step before."""
+    u = m.vector("u")
+    E, eta, dt = m.parameters(E="stiffness", eta="viscosity", dt="length of the step")
+    now, before = m.grad(u), m.grad(m.previous(u))
+    m.weak(E * now + eta * (now - before) / dt, now)
+
+
+def test_adaptive_steps_pass_the_moment_of_touch() -> None:
+    """Two bars of Kelvin and Voigt, the gap of which closes at a speed: the force jumps."""
+    bars = [
+        Mesh.rectangle(1, 1, cells=(1, 1)).map(lambda x, d=d: x + np.array([d, 0.0]))
+        for d in (1.01, 0.0)
+    ]
+    study = Study(Mesh.union(a=bars[0], b=bars[1]))
+    for name in ("a", "b"):
+        study.add(name, viscous, cells=name, E=10.0, eta=2.0)
+    study.contact("a:left", "b:right")
+    study.fix("b:left", u_x=0, u_y=0)
+    study.fix("a:boundary", u_y=0)
+    study.fix("a:right", u_x=lambda x, t: np.full(len(x), -0.1 * np.sin(t)))
+    *_, last = study.march(dt=0.05, until=1.4, tolerance=3e-3)
+    exact = (10.0 * (0.1 * np.sin(1.4) - 0.01) + 2.0 * 0.1 * np.cos(1.4)) / 2
+    assert last.reaction("b:left")["u_x"] == pytest.approx(exact, rel=0.02)
 
 
 def test_differences_are_exact_for_straight_lines_and_parabolas() -> None:
