@@ -233,11 +233,15 @@ def _whole(text: str, place: str) -> int:
 
 @dataclass
 class _Model:
-    """State of reading: parts by names in capitals, instances, and what the model itself has."""
+    """State of reading: parts by names in capitals, instances, and what the model itself has.
+
+    rings: a type of axisymmetric elements, if there are some.
+    """
 
     root: _Scope = field(default_factory=_Scope)
     parts: dict[str, _Scope] = field(default_factory=dict)
     instances: dict[str, _Scope] = field(default_factory=dict)
+    rings: str = ""
     current: _Scope = field(init=False)
 
     def __post_init__(self) -> None:
@@ -274,6 +278,8 @@ class _Model:
     def elements(self, keyword: _Keyword, data: list[_Line]) -> None:
         """*ELEMENT: as many numbers as its nodes, on one line or several."""
         family, kind = _kind(keyword)
+        if "AX" in keyword.option("TYPE").upper():
+            self.rings = keyword.option("TYPE")
         count, known, labels = len(CELLS[kind].nodes), self.current.elements, []
         numbers: list[int] = []
         for line in data:
@@ -593,6 +599,12 @@ def read(path: Path) -> Content:
     model = _Model()
     for keyword, data in _blocks(_lines(path, path.parent)):
         model.read(keyword, data)
+    if model.rings:
+        warnings.warn(
+            f'elements {model.rings} are rings about y, those of geometry="axisymmetric" about x: '
+            "turn the mesh, mesh.map(lambda x: np.column_stack([-x[:, 1], x[:, 0]]))",
+            stacklevel=2,
+        )
     if model.parts and not model.instances:  # parts without an assembly, as they are
         model.instances = model.parts
     mesh = _Mesh({"": model.root, **model.instances})

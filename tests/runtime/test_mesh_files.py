@@ -80,7 +80,11 @@ SIDES: dict[str, dict[str, tuple[float, tuple[float, ...]]]] = {
 """File -> side -> its area or length, or number of nodes, and the mean place of the nodes of all
 its faces.
 """
-WARNINGS = {"cae_assembly": "'RP': nodes of none", "shells": "'CURVED': nodes of none"}
+WARNINGS = {
+    "cae_assembly": "'RP': nodes of none",
+    "ring": "CAX4 are rings about y",
+    "shells": "'CURVED': nodes of none",
+}
 
 
 def loaded(name: str) -> Mesh:
@@ -114,6 +118,17 @@ def test_both_sides_of_a_shell() -> None:
     for side, sign in (("OUTER", 1.0), ("INNER", -1.0), ("PLAIN", 1.0)):
         a, b, c = mesh.points[mesh.sides[side]["quad4"][0, :3]]
         np.testing.assert_allclose(np.cross(b - a, c - a), [0.0, 0.0, sign])
+
+
+def test_rings_of_a_file_are_turned_as_the_warning_says() -> None:
+    """A unit pressure on the base of a tube, of radii 1 and 2."""
+    mesh = loaded("ring").map(lambda x: np.column_stack([-x[:, 1], x[:, 0]]))
+    study = Study(mesh, geometry="axisymmetric")
+    study.add("tube", material="hooke", E=1e9, nu=0.0)
+    study.pressure("BASE", 1.0)
+    study.fix(lambda x: x[:, 0] == -2.0, u_x=0)
+    force = study.solve().reaction(lambda x: x[:, 0] == -2.0)["u_x"]
+    assert force == pytest.approx(3 * np.pi)
 
 
 def test_two_ways_to_write_a_plate_are_one_body() -> None:
