@@ -18,6 +18,9 @@ from softehl.runtime.fem.problem import Problem
 SYMMETRIC = 1e-8
 """Of the largest entry: a tangent that differs by less from its transpose is symmetric."""
 
+_NOTHING = 1e-12
+"""Of the pivot of a multiplier when displacements are eliminated: its own entry is rounding."""
+
 DISPLACEMENTS = ("u_x", "u_y", "u_z")
 """Unknowns that are motions, whatever the signs of their stiffness."""
 
@@ -141,14 +144,21 @@ def concave(
 
     If no field has a positive entry, those of zeros are convex (stresses beside displacements).
     One that is coupled to no other field is no multiplier, it is unstable, where its pages have
-    energies; the sign of an equation that a page writes down itself says nothing. added, anywhere:
-    sums over processes that have a part each, and whether something is true on any.
+    energies; the sign of an equation that a page writes down itself says nothing. Entries that are
+    rounding beside what displacements add are zero. added, anywhere: sums over processes that have
+    a part each, and whether something is true on any.
     """
     layout, fixed, K = problem.layout, problem.fixed, _condensed(problem, K)
     found: Flags = np.zeros(layout.total, dtype=bool)
     free = ~found
     free[fixed] = False
     diagonal = added(K.diagonal())
+    moving = np.zeros(layout.total)
+    for name in set(DISPLACEMENTS) & set(layout.names):
+        own = diagonal[layout.part(name)]
+        moving[layout.part(name)] = np.divide(1.0, own, out=np.zeros_like(own), where=own > 0.0)
+    pivots = added(K.multiply(K) @ moving)
+    diagonal = np.where(np.abs(diagonal) > _NOTHING * pivots, diagonal, 0.0)
     inner = {name for block in problem.assembler.blocks for name in block.internal}
     named = [(name, layout.part(name)) for name in layout.names if name not in inner]
     fields = [part for name, part in named if name not in DISPLACEMENTS]
