@@ -12,7 +12,7 @@ from scipy.sparse import csc_array
 from softehl.runtime.arrays import Array, count_of
 from softehl.runtime.contacts import contact_blocks
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.reduction import is_symmetric_between
+from softehl.runtime.fem.reduction import is_symmetric_where_free
 from softehl.runtime.mass import Masses, mass_matrix
 from softehl.runtime.solve.eigen import NoModes
 from softehl.runtime.solve.linear import SingularMatrix
@@ -54,7 +54,7 @@ class Tangent:
         if smooth:
             rest = {n: v for n, v in problem.parameters.items() if n not in smooth}
             whole = problem.assembler.linearise(x, rest)[1]
-        if share.largest(float(not is_symmetric_between(whole, problem.fixed))):
+        if share.largest(float(not is_symmetric_where_free(problem, whole))):
             raise StudyError(
                 f"{words}: the tangent is not symmetric (friction, pressure that follows an open "
                 "side, or a page without a potential), and frequencies are those of a potential"

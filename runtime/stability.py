@@ -16,7 +16,7 @@ from softehl.runtime.fem.reduction import (
     concave,
     internal_negative,
     is_symmetric,
-    is_symmetric_between,
+    is_symmetric_where_free,
     symmetric,
 )
 from softehl.runtime.solve.eigen import Pivots
@@ -38,7 +38,7 @@ def negative_directions(problem: Any, x: Array) -> int | None:
         return None
     with np.errstate(all="ignore"):
         K = problem.assembler.linearise(x, problem.parameters)[1]
-    if not np.isfinite(K.data).all() or not is_symmetric_between(K, problem.fixed):
+    if not np.isfinite(K.data).all() or not is_symmetric_where_free(problem, K):
         return None
     free = Reduction.of(problem, K)
     if not free.map.shape[1]:

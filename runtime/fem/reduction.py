@@ -190,15 +190,13 @@ def is_symmetric(K: csc_array) -> bool:
     return _largest(K - K.T) <= SYMMETRIC * _largest(K)
 
 
-def is_symmetric_between(K: csc_array, fixed: Integers) -> bool:
-    """True if K without rows and columns of fixed unknowns is its transpose but for rounding.
+def is_symmetric_where_free(problem: Problem, K: csc_array) -> bool:
+    """True if K is its transpose but for rounding, for changes that supports and ties admit.
 
     K: before supports are eliminated. A pressure that follows a side which ends at supports has a
     tangent that is not symmetric in the prescribed unknowns only.
     """
-    kept = np.ones(K.shape[0])
-    kept[fixed] = 0.0
-    skew = csc_array((K - K.T).multiply(kept[:, None]).multiply(kept[None]))
+    skew = Reduction.of(problem).matrix(csc_array(K - K.T))
     return _largest(skew) <= SYMMETRIC * _largest(K)
 
 

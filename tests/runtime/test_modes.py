@@ -224,6 +224,25 @@ def stretched(strain: float) -> Study:
 STRING = {"string": {"rho": 0.5, "of": ["u", "w"]}}
 
 
+def test_pressed_bodies_that_do_not_slip_are_one() -> None:
+    """Two rings in contact with equal motions along it, and one ring of both."""
+    found = []
+    for parted in (True, False):
+        mesh = Mesh.rectangle(2, 1, cells=(4, 3))
+        if parted:
+            left = Mesh.rectangle(1, 1, cells=(2, 3))
+            mesh = Mesh.union(left=left, right=left.map(lambda x: x + np.array([1.0, 0.0])))
+        study = Study(mesh, geometry="axisymmetric")
+        study.add("body", rubber, mu=1.0, lame=1.0)
+        study.fix("left:left" if parted else "left", u_x=0)
+        study.fix("right:right" if parted else "right", u_x=-0.2)
+        if parted:
+            study.contact("right:left", "left:right")
+            study.tie("right:left", "left:right", "u_y")
+        found.append(study.solve(steps=2).modes(3, mass={"body": {"rho": 1.0}}).squares)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-9)
+
+
 def test_unknowns_without_mass_follow() -> None:
     modes = at_rest(column(mixed, mu=YOUNG / 2, K=2 * YOUNG)).modes(2, mass=MASS)
     plain = at_rest(column(rubber, mu=YOUNG / 2, lame=2 * YOUNG)).modes(2, mass=MASS)
@@ -330,6 +349,34 @@ def test_a_ring_buckles_under_a_pressure_that_ends_at_supports() -> None:
     assert study.solve(until=0.9).unstable == 0
     with pytest.warns(Unstable, match="along one direction"):
         assert study.solve(until=1.1).unstable == 1
+
+
+def test_a_tied_ring_under_pressure_is_that_of_one_piece() -> None:
+    """The pressures of both parts end at the tie; supports hold the other ends."""
+    factors = []
+    for parts in (1, 2):
+        angle = np.pi / 2 / parts
+
+        def bent(x: Any, first: float) -> Any:
+            r, a = 0.98 + x[:, 1], x[:, 0] + first
+            return np.column_stack([r * np.sin(a), r * np.cos(a)])
+
+        arcs = {
+            "ab"[k]: Mesh.rectangle(angle, 0.04, cells=(8 // parts, 1), order=2).map(
+                lambda x, first=angle * k: bent(x, first)
+            )
+            for k in range(parts)
+        }
+        study = Study(Mesh.union(**arcs))
+        study.add("ring", material="saint_venant", E=1000.0, nu=0.0)
+        for name in arcs:
+            study.pressure(f"{name}:top", 0.01)
+        if parts == 2:
+            study.tie("a:right", "b:left", "u_x", "u_y")
+        study.fix("a:left", u_x=0)
+        study.fix(f"{'ab'[parts - 1]}:right", u_y=0)
+        factors.append(study.buckling(1).factors[0])
+    assert factors[1] == pytest.approx(factors[0], rel=1e-8)
 
 
 def test_a_column_beyond_its_load_is_not_silent() -> None:
