@@ -367,7 +367,7 @@ class Graph:
 
 
 def truth(condition: Node) -> bool | None:
-    """What a condition on constants says; None for others."""
+    """Value of a condition on constants; None for others."""
     match condition.op:
         case Op.NOT:
             inner = truth(condition.args[0])

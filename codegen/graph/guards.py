@@ -97,7 +97,7 @@ def _product(g: Graph, known: _Known, x: Node, y: Node) -> Recursion[Node]:
 
 
 class _Known:
-    """Where the values of one graph are used; what was found out is remembered."""
+    """Uses of the values of one graph, remembered once they are known."""
 
     def __init__(self, g: Graph) -> None:
         self.domain = Domain(g)

@@ -73,7 +73,7 @@ it has none, only the work of its forces counts.
 
 @dataclass(frozen=True, eq=False)
 class Roles:
-    """What the blocks of a system are in the account of energies.
+    """Roles of the blocks of a system in the account of energies.
 
     of: block -> its role. multipliers: numbers of the unknowns of ties and contacts. bound: of the
     unknowns on which these act.

@@ -654,7 +654,7 @@ def _nodes(side: Mapping[str, Integers]) -> Integers:
 
 @dataclass
 class _Names:
-    """What has a name in the model or in an instance: name, instance, kind -> numbers or faces."""
+    """Named members of the model or of an instance: name, instance, kind -> numbers or faces."""
 
     entries: list[tuple[str, str, Mapping[str, Integers]]] = field(default_factory=list)
 
