@@ -36,6 +36,7 @@ Gradient: TypeAlias = "Array | Sequence[Sequence[float | None]]"
 """Mean deformation gradient, (dim, dim); None where the mean stress is zero instead."""
 
 _AXES = "xyz"
+_NET = 1e-6  # of the sum of the terms: a larger net force is more than Newton's method leaves
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,11 +184,26 @@ class _Path:
         reduced, z = self.problem_at(point.parameter), point.solution.x
         F, x = reduced.shift.copy(), reduced.full(z)
         F[self.free] += z[len(z) - int(self.free.sum()) :]
+        self._require_balance(reduced.problem.at(x), x)
         self.x = x
         self.histories = self.cell.system.committed(reduced.problem, x, self.histories)
         whole = Point(point.parameter, replace(point.solution, x=x))
         result = Result(self.cell.system, reduced.problem.at(x), whole, self.histories)
         self.reached = Homogenised(self.cell, F, result)
+
+    def _require_balance(self, problem: Problem, x: Array) -> None:
+        """Raise StudyError where a net force acts, which the one node at rest would carry."""
+        r, sizes = problem.assembler.residual_and_size(x, problem.parameters)
+        nodal = self.cell.system.numbering.nodal
+        for axis in _AXES[: len(self.before)]:
+            numbers = nodal[f"u_{axis}"]
+            numbers = numbers[numbers >= 0]
+            net = float(r[numbers].sum())
+            if abs(net) > _NET * float(sizes[numbers].sum()):
+                raise StudyError(
+                    f"periodic: a net force of {-net:.4g} along {axis} acts on the cell; loads, "
+                    "body forces and springs of a periodic cell must balance"
+                )
 
 
 @dataclass(frozen=True, eq=False)

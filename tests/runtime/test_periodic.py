@@ -185,3 +185,16 @@ def test_nodes_at_one_place_are_tied_body_by_body() -> None:
         node_partners(mesh, left, third, 1e-6)  # which of both goes with which?
     with pytest.raises(StudyError, match=r"0\.25 apart at \(0, 1\) \(allowed: 5e-07\)"):
         node_partners(mesh, left[[2, 3]], left[[1, 2]], 1e-6)
+
+
+def test_a_cell_with_a_net_force_is_refused() -> None:
+    """Such a force would be carried by the one node that rests."""
+    study = softehl.Study(softehl.Mesh.rectangle(1, 1, cells=(2, 2)))
+    study.add("body", material="neo_hooke", mu=0.4, kappa=0.9)
+    study.load("top", u_x=0.1)
+    cell = study.periodic(("left", "right"), ("bottom", "top"))
+    with pytest.raises(StudyError, match=r"net force of 0\.1 along x .* must balance"):
+        cell.solve(np.eye(2))
+    study.load("bottom", u_x=-0.1)
+    balanced = study.periodic(("left", "right"), ("bottom", "top")).solve(np.eye(2))
+    assert balanced.F == pytest.approx(np.eye(2))
