@@ -17,14 +17,10 @@ import sympy as sp
 
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
-from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.model import Model
-from softehl.codegen.language.pages import Page
 
 Tree = tuple[Any, ...]
 LEAVES = ("T", "x", "g", "k")
-FIELDS = ("T", "u", "u_x", "u_y", "X", "k", "cosh", "cube", "power")
-"""Leaves of a page of fields: values, a gradient, a coordinate and even functions of its length."""
 KINDS = ["+", "-", "*", "pieces", "pieces", "pieces", "sqrt", "log", "1/", "3/2", "named", "max"]
 DIGITS, STEP = 80, mpmath.mpf(10) ** -20
 RULE = quadrature.gauss(2, 1)
@@ -40,28 +36,15 @@ def drawn(rng: random.Random, depth: int, leaves: Sequence[str] = LEAVES) -> Tre
         if rng.random() < 0.3:
             return ("number", sp.Rational(rng.randint(-9, 9), rng.randint(2, 7)))
         return (rng.choice(leaves),)
-    kinds = [
-        "+",
-        "-",
-        "*",
-        "pieces",
-        "pieces",
-        "pieces",
-        "sqrt",
-        "log",
-        "1/",
-        "3/2",
-        "named",
-        "max",
-    ]
-    kind = rng.choice(kinds)
+    kind = rng.choice(KINDS)
     count = {"sqrt": 1, "log": 1, "1/": 1, "3/2": 1, "named": 1, "pieces": 4}.get(kind, 2)
     inside = [drawn(rng, depth - 1, leaves) for _ in range(count)]
     return (kind, *inside, *([rng.random() < 0.5] if kind == "pieces" else []))
 
 
-def value(tree: Tree, at: Mapping[str, Any]) -> Any:
-    """Real value of a tree; raises NoValueError."""
+def value(tree: Tree, at: Mapping[str, Any], less: Callable[[Any, Any], bool] | None = None) -> Any:
+    """Real value of a tree; raises NoValueError.  less: decides a < b."""
+    less = less or _less
     kind, *parts = tree
     if kind == "number":
         return mpmath.mpf(int(parts[0].p)) / int(parts[0].q)
@@ -69,11 +52,11 @@ def value(tree: Tree, at: Mapping[str, Any]) -> Any:
         return at[kind]
     if kind == "pieces":
         a, b, then, otherwise, _strict = parts
-        left, right = value(a, at), value(b, at)
-        return value(then if _less(left, right) else otherwise, at)
-    args = [value(p, at) for p in parts]
+        left, right = value(a, at, less), value(b, at, less)
+        return value(then if less(left, right) else otherwise, at, less)
+    args = [value(p, at, less) for p in parts]
     if kind == "max":
-        return args[1] if _less(*args) else args[0]
+        return args[1] if less(*args) else args[0]
     if (kind in ("sqrt", "3/2", "log") and args[0] <= 0) or (kind == "1/" and args[0] == 0):
         raise NoValueError
     return {
@@ -182,53 +165,3 @@ class Nested:
     def tangent(self, dofs: Sequence[float], k: float) -> Derivatives:
         """Residual and its derivatives by the unknowns and, in the last column, by k."""
         return derivatives(lambda v: self.total(v[:-1], v[-1]), [*dofs, k])
-
-
-CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-
-
-@dataclass
-class OnCell:
-    """A page of a value of the cell and a field with a gradient, on quad4 with 2 x 2 points."""
-
-    name: str
-    energy: Tree
-
-    def page(self, form: Any) -> Page:
-        """The page, with kernels of a `form`."""
-
-        def write(m: Fields) -> None:
-            T, u = m.scalar("T", order=0), m.scalar("u")
-            k, p = m.parameters(k="number", p="exponent")
-            g = m.grad(u)
-            n = m.norm(g)
-            known = {"T": T, "u": u, "u_x": g[0], "u_y": g[1], "X": m.position[0], "k": k}
-            known |= {"cosh": sp.cosh(n), "cube": n**3, "power": n**p}
-            tree = written(m, self.energy, known, {})
-            m.minimise(tree + (T**2 + u**2 + n**2) / 2 + k * T + n**p)
-
-        return Page(self.name, write, form=form)
-
-    def at(self, X: Sequence[Any], p: int, values: Sequence[Any]) -> Any:
-        """Energy in many digits; values: T, u at the corners, the number k."""
-        T, *u, number = values
-        r, found = 1 / mpmath.sqrt(3), mpmath.mpf(0)
-        for xi, eta in ((s * r, t * r) for s, t in CORNERS):
-            N = [(1 + s * xi) * (1 + t * eta) / 4 for s, t in CORNERS]
-            by = [(s * (1 + t * eta) / 4, t * (1 + s * xi) / 4) for s, t in CORNERS]
-            a, b, c, d = (
-                sum(X[2 * k + i] * slopes[j] for k, slopes in enumerate(by))
-                for i in (0, 1)
-                for j in (0, 1)
-            )
-            det = a * d - b * c
-            u_xi, u_eta = (sum(v * s[j] for v, s in zip(u, by, strict=True)) for j in (0, 1))
-            g = (u_xi * d - u_eta * c) / det, (u_eta * a - u_xi * b) / det
-            n = mpmath.sqrt(g[0] ** 2 + g[1] ** 2)
-            value_u = sum(v * w for v, w in zip(u, N, strict=True))
-            at = {"T": T, "u": value_u, "u_x": g[0], "u_y": g[1], "k": number}
-            at |= {"X": sum(X[2 * c] * w for c, w in enumerate(N))}
-            at |= {"cosh": mpmath.cosh(n), "cube": n**3, "power": n**p}
-            density = value(self.energy, at) + (T**2 + value_u**2 + n**2) / 2 + number * T + n**p
-            found += density * det
-        return found

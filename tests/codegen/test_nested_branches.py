@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,20 +14,15 @@ from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
 from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.tools import build, product
-from softehl.runtime.kernels import Kernel, load_kernel
+from softehl.runtime.kernels import load_kernel
 from tests.codegen.nested_models import (
-    CORNERS,
-    FIELDS,
     Nested,
     NoValueError,
-    OnCell,
     Tree,
-    derivatives,
     drawn,
 )
 
 Q = sp.Rational
-PAGES = 24
 T, x = ("T",), ("x",)
 ROOT = ("sqrt", T)
 NAMED = ("named", ROOT)
@@ -122,52 +116,3 @@ def test_random_branches_in_branches(tmp_path: Path, target: Target) -> None:
         models.append(m)
     compiled(models, target, tmp_path)
     assert sum(checked(m, tmp_path, seed) for seed, m in enumerate(models)) > 200
-
-
-def cells_checked(m: OnCell, kernel: Kernel, rng: random.Random, p: int) -> int:
-    """Compare a page of fields at random states and at rest; the number of states with a value."""
-    done = 0
-    for k in range(12):
-        X = [c + rng.uniform(-0.2, 0.2) for corner in CORNERS for c in corner]
-        dofs = [0.0] * 5 if k < 2 else [rng.uniform(-1.5, 1.5) for _ in range(5)]
-        number = rng.uniform(-1, 1)
-        if k % 3 == 2:  # one gradient of the middle is zero
-            dofs[1:] = [dofs[1]] * 4
-        try:
-            expected = derivatives(partial(m.at, X, p), [*dofs, number])
-        except NoValueError:
-            continue
-        R, K = (np.array(v, dtype=float) for v in expected)
-        K = K[:, :5]
-        residual, tangent = kernel.tangent(
-            np.array([X] * 5), np.array([dofs] * 5), parameters=[number, p]
-        )
-        scale = max(1.0, abs(R).max(), abs(K).max())
-        if scale > 1e6:  # powers of a length below 2, where it is rounding
-            continue
-        np.testing.assert_allclose(residual[2], R, rtol=0, atol=1e-9 * scale)
-        np.testing.assert_allclose(tangent[2], K, rtol=0, atol=1e-9 * scale)
-        done += 1
-    return done
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("form", ["whole", "point"])
-def test_random_pages_of_fields_at_rest_and_elsewhere(tmp_path: Path, form: str) -> None:
-    models, made = [], []
-    for seed in range(PAGES):
-        m = OnCell(f"page_{seed}", drawn(random.Random(seed), 3, FIELDS))
-        try:
-            d = m.page(form).definition("quad4")
-        except (ModelError, TypeError):
-            continue
-        models.append((m, d.name))
-        made.append(pipeline.compile_model(d))
-    for name, text in product.files(made).items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    build.build(tmp_path, extra=(*build.STRICT, "-O1"))
-    rng = random.Random(form)
-    found = sum(
-        cells_checked(m, load_kernel(n, tmp_path), rng, 2 + n.count("1")) for m, n in models
-    )
-    assert found > 4 * PAGES
