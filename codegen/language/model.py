@@ -31,6 +31,8 @@ class Model(Draft):
     a kernel that takes any; with unroll=True it always does.
     """
 
+    _parent_names = ("xi", "eta", "zeta")
+
     # declarations -------------------------------------------------------------------------------
 
     def coordinates(self, *names: str) -> list[list[sp.Symbol]]:
@@ -127,7 +129,7 @@ class Model(Draft):
 
     def point(self) -> list[sp.Symbol]:
         """Coordinates of the quadrature point in the parent element."""
-        names = ("xi", "eta", "zeta")[: self.rule.dimension]
+        names = self._parent_names[: self.rule.dimension]
         point = [self._symbols.input(s, "rule", k, varying=True) for k, s in enumerate(names)]
         return Listed(point, "the point's coordinates")
 

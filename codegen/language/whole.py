@@ -20,6 +20,8 @@ from softehl.codegen.language.nodal import Nodal
 class Whole(Nodal):
     """Values and gradients are sums over nodes, densities are integrated over the cell."""
 
+    _parent_names = ("parent_xi", "parent_eta", "parent_zeta")  # pages use the short names
+
     def __init__(
         self, name: str, cell: Element, geometry: str, rule: QuadratureRule, doc: str
     ) -> None:

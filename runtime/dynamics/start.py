@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,8 +56,11 @@ class Motions:
             and isinstance(start, Motion)
             and self._goes_on(system, start, scheme)
         ):
-            here = Phase(t, start.x, start.v, start.a, histories)
             run = Implicit(scheme, self.dt, self.newton).run
+            if system.share.pieces[1] > 1:  # of which each has its own unknowns
+                a = _nodal_rates(system, start, start.acceleration)
+                return run(body, Phase(t, x, v, a, histories), until)
+            here = Phase(t, start.x, start.v, start.a, histories)
             return run(body, here, until, system.share.part(start.problem))
         problem = body.at_end(rest, v)
         x = problem.admissible(x)
@@ -86,7 +89,7 @@ class Motions:
         same = before.statement is system.statement and before.written == system.written
         if start.mass is not self.mass and repr(start.mass) != repr(self.mass):
             return False
-        return same and system.statement is not None and system.share.pieces[1] == 1
+        return same and system.statement is not None
 
     def _consistent(self, system: System, body: Body, here: Phase) -> Phase:
         """The beginning that supports, ties and contacts admit, with the unknowns without mass.
@@ -136,16 +139,26 @@ class Motions:
     def _velocities(self, system: System, start: Result | None) -> Array:
         """Velocities at the start, (n,): those of `start`, and those that are given."""
         found, nodal = np.zeros(system.size), system.numbering.nodal
+        if isinstance(start, Motion):
+            found = _nodal_rates(system, start, start.velocity)
         given = self.velocity or {}
         known("unknown", given, nodal, "velocity")
         for name, numbers in nodal.items():
             there = numbers >= 0
-            if isinstance(start, Motion) and name in start.system.numbering.nodal:
-                found[numbers[there]] = np.nan_to_num(start.velocity(name)[there])
             if name in given:
                 places = system.mesh.points[there]
                 found[numbers[there]] = datum("velocity", name, given[name], places)
         return found
+
+
+def _nodal_rates(system: System, start: Motion, rates: Callable[[str], Array]) -> Array:
+    """Rates (n,) of the unknowns of a system, by their names at the nodes of a motion."""
+    found = np.zeros(system.size)
+    for name, numbers in system.numbering.nodal.items():
+        if name in start.system.numbering.nodal:
+            there = numbers >= 0
+            found[numbers[there]] = np.nan_to_num(rates(name)[there])
+    return found
 
 
 def require_no_inertia(method: str, system: System) -> None:

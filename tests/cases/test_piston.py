@@ -116,7 +116,7 @@ def test_a_cup_is_named_by_bore_groove_and_width() -> None:
     ("given", "words"),
     [
         ({"bore": 40, "rod": 36}, "a seal slides on one of them"),
-        ({"bore": 40, "ring": "40x4"}, "bore = 40 mm is -16.7 % larger"),
+        ({"bore": 40, "ring": "40x4"}, "bore = 40 mm is 16.7 % smaller"),
         ({"bore": 60, "ring": "32x4"}, "bore = 60 mm is 50 % larger"),
         ({"bore": 40, "groove_diameter": 39, "ring": "32x4"}, "bore and ground of the groove"),
         ({"ring": "U-cup 40x30x8"}, 'give bore = 40, or write "U-cup 30x40x8" for a rod seal'),

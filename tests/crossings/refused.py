@@ -48,6 +48,8 @@ REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
         "come from the scheme",
     ),
     (("tied halves",), lambda at: at.solver == "amg", "multigrid needs"),
-    (("tied halves",), lambda at: at.constraint == "tied sides", "the same partner"),
+    (("tied halves",), lambda at: at.constraint == "tied sides", "[Ss]ingular"),  # ties in a loop
+    (("contact",), lambda at: at.analysis == "explicit", "takes no contact"),
+    (("contact",), lambda at: at.solver == "amg", "multigrid needs"),
 )
 """What a user reads."""

@@ -189,7 +189,7 @@ MEETINGS = (
 
 
 def mortar_states() -> Iterator[State]:
-    """Two sides, turned: pressed, slipping, apart, missed; rings and plane; sides alone."""
+    """Two sides, turned: pressed, slipping, apart, missed, smooth; rings and plane; sides alone."""
     c, s = np.cos(0.4), np.sin(0.4)
     turn, shift = np.array([[c, s], [-s, c]]), np.array([0.3, 3.0])
     for a, b in ((2, 2), (2, 3), (3, 2), (3, 3)):
@@ -204,9 +204,10 @@ def mortar_states() -> Iterator[State]:
             old[:a] -= slip * turn[0]
             tau = (0.02, -0.03) if label != "at-an-edge" else (0.5, 0.1)
             multipliers = np.stack([pressures, tau], axis=1)
-            data = (*_tuple(old.T), 10.0, 0.3, 0.5, 1.0, float(k % 2))
             dofs = (*_tuple(u), *_tuple(multipliers))
-            yield State(f"mortar_{a}{b}", label, _tuple(now - u), dofs, (), data)
+            for kind, friction in ((label, 0.3), *([("frictionless", 0.0)] if k == 0 else [])):
+                data = (*_tuple(old.T), 10.0, friction, 0.5, 1.0, float(k % 2))
+                yield State(f"mortar_{a}{b}", kind, _tuple(now - u), dofs, (), data)
     for a in (2, 3):
         now = np.array([[0.0, 0.01], [1.0, -0.01], [0.52, -0.03]])[:a] @ turn + shift
         u = np.array([[0.05, 0.02], [-0.03, 0.04], [0.01, 0.06]])[:a]
