@@ -24,7 +24,7 @@ from softehl.codegen.language import kinematics
 from softehl.codegen.language.definition import Argument, Definition
 from softehl.codegen.language.elements import cells, quadrature
 from softehl.codegen.language.material import Law, Material
-from softehl.codegen.language.model import Model
+from softehl.codegen.language.model import PARENT_NAMES, Model
 
 VOIGT = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Order of the components; shears of strains count twice."""
@@ -243,12 +243,18 @@ def point(law: Law) -> Definition:
     return m.finish()
 
 
+class _Solid(Model):
+    """A body of a law, which may use the names of parent coordinates itself."""
+
+    _parent_names = PARENT_NAMES
+
+
 def solid(law: Law, name: str = "tet4") -> Definition:
     """The law in a standard cell of three dimensions with displacements."""
     kind = cells.element(name)
-    m = Model(f"{law.name}_{name}", nodes=len(kind.nodes), rule=kind.rule, doc=law.doc)
+    m = _Solid(f"{law.name}_{name}", nodes=len(kind.nodes), rule=kind.rule, doc=law.doc)
     X, u = m.coordinates("X", "Y", "Z"), m.nodal_unknowns("u_x", "u_y", "u_z")
-    e = kinematics.isoparametric(m, X, kind.gradient(*m.point()))
+    e = kinematics.isoparametric(m, X, kind.gradient(*m.point()), "parent_")
     F = kinematics.deformation_gradient(m, e.dN, u)
     found = law.on(m, F)
     if found.W is not None:

@@ -23,6 +23,10 @@ from softehl.codegen.language.entries import Listed
 __all__ = ["Argument", "Definition", "Model"]
 
 
+PARENT_NAMES = ("parent_xi", "parent_eta", "parent_zeta")
+"""Names of parent coordinates where a page or a law may use the short ones itself."""
+
+
 class Model(Draft):
     """Builder of a `Definition`; every method declares or names something.
 

@@ -14,13 +14,14 @@ from softehl.codegen.language.elements.quadrature import QuadratureRule
 from softehl.codegen.language.elements.shapes import interpolate
 from softehl.codegen.language.entries import Entries, Matrix
 from softehl.codegen.language.fields import AXISYMMETRIC
+from softehl.codegen.language.model import PARENT_NAMES
 from softehl.codegen.language.nodal import Nodal
 
 
 class Whole(Nodal):
     """Values and gradients are sums over nodes, densities are integrated over the cell."""
 
-    _parent_names = ("parent_xi", "parent_eta", "parent_zeta")  # pages use the short names
+    _parent_names = PARENT_NAMES
 
     def __init__(
         self, name: str, cell: Element, geometry: str, rule: QuadratureRule, doc: str

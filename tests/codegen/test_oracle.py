@@ -34,7 +34,7 @@ for _case in all_cases():
 
 EMPTY = ("no pressure", "open", "beyond", "missed-right", "missed-left")
 """Cases whose tangent may be zero."""
-MEETINGS = ("sticking", "slipping", "slipping-back", *EMPTY[1:])
+MEETINGS = ("sticking", "slipping", "slipping-back", "frictionless", *EMPTY[1:])
 CHOSEN = {
     **{f"mortar_{a}{b}": MEETINGS for a in (2, 3) for b in (2, 3)},
     "touch": ("sticking", "slipping", "open", "beyond", "frictionless"),
