@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from softehl.codegen.graph.graph import Graph, Node, Op
-from softehl.codegen.graph.guards import Certain, guarded, plus, shielded
+from softehl.codegen.graph.guards import Certain, exists, guarded, plus, shielded
 from softehl.codegen.graph.norms import by_square, slope, square_of
 from softehl.codegen.graph.partials import Partials, partials
 from softehl.codegen.graph.traverse import reachable
@@ -145,7 +145,9 @@ class _Reverse:
         if curvature is g.zero:  # a kink
             return self._times(n, seed, slope(g, n))
         inverse = g.mul(g.const(Fraction(1, 2)), g.recip(n.args[1]))
-        return by_square(g, n, seed, curvature, self._times(n, seed, inverse))
+        weighted = self._times(n, seed, inverse)
+        known, kept = exists(g, curvature), self.depends.given
+        return by_square(g, n, (seed, curvature), weighted, exists=known, kept=kept)
 
     def _branch(self, n: Node) -> Partials:
         """Both sides differentiated with respect to the nearest named values and inputs."""

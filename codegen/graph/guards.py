@@ -27,10 +27,14 @@ def guarded(g: Graph, a: Node, b: Node) -> Node:
         if x.op is Op.BRANCH and g.zero in x.args[1:]:
             c, then, otherwise = x.args
             if square_of(x) is not None:  # a length stays whole: by it is differentiated again
-                exists = _known_of(g).domain.exists(y)
-                return g.mul(x, y) if exists else g.branch(c, g.mul(x, y), g.zero)
+                return g.mul(x, y) if exists(g, y) else g.branch(c, g.mul(x, y), g.zero)
             return g.branch(c, guarded(g, then, y), guarded(g, otherwise, y))
     return g.mul(a, b)
+
+
+def exists(g: Graph, n: Node) -> bool:
+    """True if a value is a number for all finite arguments (overflow apart)."""
+    return _known_of(g).domain.exists(n)
 
 
 class Certain:

@@ -52,6 +52,45 @@ POWERS: dict[str, tuple[Callable[[Any, Any, Any], Any], float]] = {
     "squares_parameter": (lambda a, b, p: (a**2 + b**2) ** (p / 2), np.nan),
 }
 """Energies of |a| where b is zero, with their exponents; nan: p."""
+NESTED: dict[str, tuple[Callable[[Any, Any, Any], Any], Callable[[float], float]]] = {
+    "named": (
+        lambda m, n, p: n**2 + p * n**2 + m.define("w", n**2) ** Q(3, 2),
+        lambda p: 2 + 2 * p,
+    ),
+    "powers": (lambda m, n, p: n**2 + (n**p) ** Q(3, 2), lambda p: 2),
+    "root_of_fourth": (lambda m, n, p: n**2 + sp.sqrt(m.define("w", n**4)), lambda p: 4),
+    "cosh_of_root": (lambda m, n, p: n**2 + sp.cosh(sp.sqrt(m.define("w", n**2))), lambda p: 3),
+    "times_root": (lambda m, n, p: n**2 + n**p * sp.sqrt(m.define("w", n**2)), lambda p: 2),
+    "nine_fourths": (lambda m, n, p: n**2 - m.define("w", n**2) ** Q(9, 8), lambda p: 2),
+    "root_of_powers": (
+        lambda m, n, p: n**2 + sp.sqrt((n**p) ** Q(3, 2) + n**4),
+        lambda p: 4 if p > 8 / 3 else 0,
+    ),
+    "log_in_pieces": (
+        lambda m, n, p: (
+            n**2 + sp.Piecewise((sp.log(1 + m.define("w", n**2) ** Q(3, 2)), n < 1), (n, True))
+        ),
+        lambda p: 2,
+    ),
+    "nested_kink": (lambda m, n, p: n**2 + sp.sqrt(m.define("w", n**2)), lambda p: 0),
+    "nested_halves": (lambda m, n, p: n**2 + m.define("w", n**2) ** Q(3, 4), lambda p: 0),
+}
+"""Energies with f'' = inf * 0 at zero, and the closed form of f''(0); 0 where it is infinite."""
+
+
+class Plain:
+    """A model whose names are their values."""
+
+    def define(self, label: str, value: Any) -> Any:
+        return value
+
+
+def of_nested(name: str, f: Callable[[Any, Any, Any], Any]) -> Model:
+    m = Model(name, nodes=1, rule=quadrature.point_rule())
+    s = [m.unknown(u) for u in "abc"]
+    (p,) = m.parameters(p="exponent")
+    m.potential(f(m, m.norm(s), p) + p * s[1] ** 4)
+    return m
 
 
 def of_length(name: str, f: Callable[[Any, Any], Any]) -> Model:
@@ -77,6 +116,7 @@ def kernels(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("zero")
     models = [of_length(k, f) for k, f in (SMOOTH | KINKED).items()]
     models += [of_power(k, f) for k, (f, _) in POWERS.items()]
+    models += [of_nested(k, f) for k, (f, _) in NESTED.items()]
     made = [pipeline.compile_model(m.finish(), Target.SIMD) for m in models]
     for name, text in product.files(made).items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -124,6 +164,24 @@ def test_a_kink_has_zero_derivatives_at_zero_and_those_of_the_length_elsewhere(
         R, _ = at(kernel, size * ALONG, 2.0)
         first, _, _ = slopes(KINKED[name], size, 2.0)
         np.testing.assert_allclose(R, first * ALONG, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", NESTED)
+@pytest.mark.parametrize("p", [2.0, 3.0, 4.0])
+def test_a_power_of_a_power_has_the_tangent_of_its_limit(
+    kernels: Path, name: str, p: float
+) -> None:
+    kernel, bent = load_kernel(name, kernels), NESTED[name][1](p)
+    smooth = [1e-300, 1e-120, 1e-70] if bent else []  # of a kink, the tangent is infinite there
+    for size in (0.0, *smooth):
+        R, K = at(kernel, size * ALONG, p)
+        np.testing.assert_allclose(R, bent * size * ALONG, rtol=1e-6, atol=1e-306)
+        np.testing.assert_allclose(K, bent * np.eye(3), rtol=1e-6, atol=1e-14)
+    size = 2.0**-20
+    R, _ = at(kernel, size * ALONG, p)
+    x = sp.Symbol("x", positive=True)
+    energy = NESTED[name][0](Plain(), x, sp.nsimplify(p))
+    np.testing.assert_allclose(R, float(sp.diff(energy, x).subs(x, Q(size))) * ALONG, rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", POWERS)
