@@ -10,9 +10,10 @@ its kernels are checked: the definition stands in the tree of the expression, wh
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import wraps
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
@@ -74,6 +75,10 @@ def _refuse_truth(symbol: Any, other: object) -> None:
                 f"{symbol} == {other} is neither true nor false while the page is read: write a "
                 "branch as sp.Piecewise((value, sp.Eq(...)), (other, True))"
             )
+
+
+class UnseenError(ModelError):
+    """A page asks SymPy for what lies behind a name without a definition."""
 
 
 class Name(sp.Symbol):  # type: ignore[misc]
@@ -139,8 +144,8 @@ class Name(sp.Symbol):  # type: ignore[misc]
                 found.append(n)
         return found if self in reached else []
 
-    def _refusal(self, what: str, remedy: str) -> ModelError:
-        return ModelError(f"{what} {self}, a name through which SymPy does not see: {remedy}")
+    def _refusal(self, what: str, remedy: str) -> UnseenError:
+        return UnseenError(f"{what} {self}, a name through which SymPy does not see: {remedy}")
 
     def _eval_derivative(self, s: Any) -> Any:
         if self is s:
@@ -204,6 +209,28 @@ class Name(sp.Symbol):  # type: ignore[misc]
             raise self._refusal(f"SymPy's series in {x} meets", "use m.derivative")
         return super()._eval_nseries(x, n, logx, cdir)
 
+
+def _undecided(question: Callable[..., Any]) -> Callable[..., Any]:
+    """A question of SymPy's simplification, with the answer None where it cannot be answered."""
+
+    @wraps(question)
+    def answer(*args: Any, **kwargs: Any) -> Any:
+        try:
+            return question(*args, **kwargs)
+        except UnseenError:
+            return None
+        except TypeError as failed:  # a comparison of the numbers that SymPy tries
+            if not str(failed).startswith(("Invalid NaN comparison", "Invalid comparison of non-")):
+                raise
+            return None
+
+    return answer
+
+
+# To fold branches in conditions, SymPy asks by substitution and derivatives whether both sides of a
+# comparison are equal.  None means there "not known"; a made-up derivative would stay in its cache.
+sp.Expr.equals = _undecided(sp.Expr.equals)
+sp.Expr.is_constant = _undecided(sp.Expr.is_constant)
 
 # SymPy orders terms by the names of classes first: the C is to be that of plain symbols.
 Name.__name__ = "Symbol"

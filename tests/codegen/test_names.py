@@ -49,6 +49,11 @@ def page(request: pytest.FixtureRequest) -> Iterator[Page]:
         yield Page()
 
 
+Q = sp.Rational
+POINTS = [
+    tuple(map(Q, p)) for p in [(2, -1, 1), (2, -1, 9), (-2, 0, 1), (-2, -1, 1), (Q(1, 2), 1, 0)]
+]
+"""x, q and s."""
 LAM = sp.Symbol("l", positive=True)
 W = LAM**4 + LAM**2 + LAM  # the branch that is taken
 
@@ -119,6 +124,25 @@ def test_implicit_names_refuse_also_through_other_names() -> None:
     with pytest.raises(ModelError, match="derivative by x meets s"):
         sp.diff(t, p.x)
     assert sp.diff(t, s) == 2 * s
+
+
+@pytest.mark.parametrize("seen", [lambda s, x, q: s, lambda s, x, q: s - q * x])
+def test_conditions_on_an_implicit_name_are_folded(seen: Callable[[Any, Any, Any], Any]) -> None:
+    """SymPy asks whether both sides are equal, which it cannot know: the branches stay."""
+    m = Model("folded", nodes=1, rule=quadrature.point_rule())
+    x, (q,) = m.unknown("x"), m.data(q="q")
+    s = m.implicit("s", lambda s: s**3 + s - q, start=q)
+    inner = sp.Piecewise((Q(-3, 2), seen(s, x, q) < x**3), (-3, True))
+    outer = sp.Piecewise((x, inner < sp.cosh(x) * q), (x**2, x < q), (-1, True))
+    folded = sp.Piecewise((1, x < outer), (2, True))
+    value = {(a, b, c): folded.xreplace({x: a, s: c}).xreplace({q: b}) for a, b, c in POINTS}
+    for (a, b, c), found in value.items():
+        low = -1.5 if seen(c, a, b) < a**3 else -3.0
+        side = a if low < sp.cosh(a) * b else a**2 if a < b else -1.0
+        assert found == (1 if a < side else 2)
+    assert (s - x**3).is_constant(q) is None
+    with pytest.raises(ModelError, match="does not see"):
+        sp.diff(s - x**3, q)  # nothing is remembered of what SymPy asked
 
 
 def test_names_of_two_models_are_different() -> None:
