@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -357,16 +358,12 @@ def test_a_tied_ring_under_pressure_is_that_of_one_piece() -> None:
     for parts in (1, 2):
         angle = np.pi / 2 / parts
 
-        def bent(x: Any, first: float) -> Any:
+        def bent(first: float, x: Any) -> Any:
             r, a = 0.98 + x[:, 1], x[:, 0] + first
             return np.column_stack([r * np.sin(a), r * np.cos(a)])
 
-        arcs = {
-            "ab"[k]: Mesh.rectangle(angle, 0.04, cells=(8 // parts, 1), order=2).map(
-                lambda x, first=angle * k: bent(x, first)
-            )
-            for k in range(parts)
-        }
+        flat = Mesh.rectangle(angle, 0.04, cells=(8 // parts, 1), order=2)
+        arcs = {"ab"[k]: flat.map(partial(bent, angle * k)) for k in range(parts)}
         study = Study(Mesh.union(**arcs))
         study.add("ring", material="saint_venant", E=1000.0, nu=0.0)
         for name in arcs:
