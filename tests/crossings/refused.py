@@ -49,7 +49,7 @@ REFUSED: tuple[tuple[tuple[str, ...], Callable[[Problem], bool], str], ...] = (
     ),
     (("tied halves",), lambda at: at.solver == "amg", "multigrid needs"),
     (("tied halves",), lambda at: at.constraint == "tied sides", "[Ss]ingular"),  # ties in a loop
-    (("contact",), lambda at: at.analysis == "explicit", "takes no contact"),
+    (("contact",), lambda at: at.analysis == "explicit", "takes no contact|explicit.*no mass"),
     (("contact",), lambda at: at.solver == "amg", "multigrid needs"),
 )
 """What a user reads."""

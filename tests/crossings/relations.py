@@ -284,7 +284,7 @@ def frequencies(at: Problem) -> Pairs:
     """Frequencies of the body do not depend on the kind of its cells."""
     modes = at.study().solve(until=0.0, **at.options).modes(2, mass={"body": {"rho": FAST}})
     reference = replace(at, cell="quad25" if at.dimension == 2 else "hex64", solver="auto")
-    law = "energy" if at.law in ONE_BODY else at.law
+    law = "energy" if at.properties.given == LAWS["energy"].given else at.law
     state = replace(reference, law=law).study().solve(until=0.0)
     known = state.modes(2, mass={"body": {"rho": FAST}})
     yield modes.frequencies, known.frequencies
