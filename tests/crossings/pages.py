@@ -20,13 +20,16 @@ def rubber_stress(F, J, mu, lame):
     return mu * (F - inverse) + lame * sp.log(J) * inverse
 
 
+def _minimised(m):
+    F = m.deformation_gradient(m.vector("u"))
+    J = m.define("J", F.det())
+    m.minimise(rubber_energy(F, J, *m.parameters(**RUBBER)))
+
+
 @softehl.page
 def energy(m):
     """The body by its energy."""
-    u = m.vector("u")
-    F = m.deformation_gradient(u)
-    J = m.define("J", F.det())
-    m.minimise(rubber_energy(F, J, *m.parameters(**RUBBER)))
+    _minimised(m)
 
 
 @softehl.page
@@ -41,19 +44,13 @@ def weak_form(m):
 @softehl.page(form="whole")
 def whole(m):
     """The body as straight code for the whole element."""
-    u = m.vector("u")
-    F = m.deformation_gradient(u)
-    J = m.define("J", F.det())
-    m.minimise(rubber_energy(F, J, *m.parameters(**RUBBER)))
+    _minimised(m)
 
 
 @softehl.page(form="point")
 def point(m):
     """The body with loops over points and nodes."""
-    u = m.vector("u")
-    F = m.deformation_gradient(u)
-    J = m.define("J", F.det())
-    m.minimise(rubber_energy(F, J, *m.parameters(**RUBBER)))
+    _minimised(m)
 
 
 @softehl.material
@@ -154,8 +151,5 @@ def weight(m):
 @softehl.page
 def product(m):
     """The body by its energy, with products by sum factorisation."""
-    u = m.vector("u")
-    F = m.deformation_gradient(u)
-    J = m.define("J", F.det())
-    m.minimise(rubber_energy(F, J, *m.parameters(**RUBBER)))
+    _minimised(m)
     m.offer(product=True)
