@@ -111,7 +111,7 @@ def test_random_branches_in_branches(tmp_path: Path, target: Target) -> None:
         m = Nested(f"drawn_{seed}", drawn(random.Random(seed), 4))
         try:
             m.definition()
-        except (ModelError, TypeError):  # SymPy has found numbers that are not real
+        except (ModelError, TypeError, ValueError):  # SymPy has found numbers that are not real
             continue
         models.append(m)
     compiled(models, target, tmp_path)
