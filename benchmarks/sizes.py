@@ -1,8 +1,7 @@
 """Sizes of files and functions by room: `python -m benchmarks.sizes [FOLDER|COMMIT ...] [--list]`.
 
 A line counts if there is anything on it.  A function is counted from `def` to its last line, with
-its docstring; the lines of functions inside it are its own, too.  Parameters are those that a call
-may give, without `self` and `cls`.
+its docstring; the lines of functions inside it are its own, too.
 """
 
 from __future__ import annotations
@@ -19,19 +18,18 @@ from pathlib import Path
 from statistics import median
 
 ROOMS = ("codegen", "runtime", "cases", "benchmarks", "docs", "tests")
-FILE, FUNCTION, PARAMETERS = 300, 40, 6
-"""Budgets: lines of a file, lines of a function, parameters."""
+FILE = 800
+"""Lines of a module, at most about."""
 
 Functions = ast.FunctionDef | ast.AsyncFunctionDef
 
 
 @dataclass(frozen=True)
 class Size:
-    """Something that is measured: where it is, its lines, its parameters (0 for a file)."""
+    """Something that is measured: where it is, its lines."""
 
     place: str
     lines: int
-    parameters: int = 0
 
 
 def files_of(folder: Path) -> list[Size]:
@@ -49,7 +47,7 @@ def _functions(path: Path) -> Iterator[Size]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, Functions):
             lines = len(filled & set(range(node.lineno, (node.end_lineno or node.lineno) + 1)))
-            yield Size(f"{path}:{node.lineno} {node.name}", lines, _parameters(node))
+            yield Size(f"{path}:{node.lineno} {node.name}", lines)
 
 
 def _filled(path: Path) -> set[int]:
@@ -58,31 +56,19 @@ def _filled(path: Path) -> set[int]:
     return {number for number, line in enumerate(lines, start=1) if line.strip()}
 
 
-def _parameters(node: Functions) -> int:
-    names = [a.arg for a in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
-    return len(names) - (names[:1] in (["self"], ["cls"]))
-
-
 def row(room: str, files: Sequence[Size], functions: Sequence[Size]) -> list[str]:
     """One line of the table."""
-    lengths = [f.lines for f in functions] or [0]
+    lines, lengths = [f.lines for f in files] or [0], [f.lines for f in functions] or [0]
     return [
         room,
-        *(str(n) for n in (len(files), sum(f.lines for f in files))),
-        *(str(n) for n in (max((f.lines for f in files), default=0), _over(files, FILE))),
+        *(str(n) for n in (len(files), sum(lines), max(lines), sum(n > FILE for n in lines))),
         *(str(n) for n in (len(functions), f"{median(lengths):g}", max(lengths))),
-        str(_over(functions, FUNCTION)),
-        str(sum(f.parameters > PARAMETERS for f in functions)),
     ]
-
-
-def _over(sizes: Sequence[Size], budget: int) -> int:
-    return sum(size.lines > budget for size in sizes)
 
 
 HEADER = (
     *("room", "files", "lines", "longest file", f"files > {FILE}"),
-    *("functions", "median", "longest", f"functions > {FUNCTION}", f"parameters > {PARAMETERS}"),
+    *("functions", "median", "longest"),
 )
 
 
@@ -95,17 +81,10 @@ def table(root: Path) -> list[list[str]]:
     ]
 
 
-def over_budget(root: Path) -> list[str]:
-    """Files and functions that are larger than their budget, outside the tests."""
-    found = []
-    for room in ROOMS[:-1]:
-        found += [f for f in files_of(root / room) if f.lines > FILE]
-        functions = functions_of(root / room)
-        found += [f for f in functions if f.lines > FUNCTION or f.parameters > PARAMETERS]
-    return [
-        f"{f.place.removeprefix(f'{root}/')}: {f.lines} lines, {f.parameters} parameters"
-        for f in found
-    ]
+def long_files(root: Path) -> list[str]:
+    """Files that are longer than a module should be."""
+    sizes = [size for room in ROOMS for size in files_of(root / room) if size.lines > FILE]
+    return [f"{size.place.removeprefix(f'{root}/')}: {size.lines} lines" for size in sizes]
 
 
 def unpacked(commit: str, folder: Path) -> Path:
@@ -128,7 +107,7 @@ def main(arguments: Sequence[str]) -> None:
             for line in (header, ["---"] * len(header), *rows):
                 print(f"| {' | '.join(line)} |")
             if "--list" in arguments:
-                print("", *over_budget(root), sep="\n")
+                print("", *long_files(root), sep="\n")
 
 
 if __name__ == "__main__":
