@@ -18,7 +18,7 @@ author = "softehl developers"
 copyright = "softehl developers, BSD-3-Clause"
 version = release = softehl.__version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
 root_doc = "docs/index"
 include_patterns = [
     "docs/*.md",
@@ -44,6 +44,9 @@ autodoc_typehints = "none"  # docstrings say shapes and units; types of arrays s
 python_maximum_signature_line_length = 88
 autodoc_class_signature = "mixed"
 autodoc_preserve_defaults = True
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
 smartquotes = False
 
 html_theme = "furo"
@@ -57,11 +60,15 @@ html_theme_options = {"navigation_with_keys": True, "top_of_page_buttons": []}
 _MARKUP = re.compile(r"(``?[^`]*``?|:\w+:`[^`]*`)|([|*_\\])")
 
 
+def _escaped(match: re.Match[str]) -> str:
+    return match[1] or "\\" + match[2]
+
+
 def _plain(paragraph: list[str]) -> list[str]:
     """The lines of a paragraph as reStructuredText: code, a list of `name: meaning`, or prose."""
     if paragraph[0].startswith(" "):  # nothing but indented lines: a formula, code
         return ["::", "", *("    " + line for line in paragraph)]
-    escaped = [_MARKUP.sub(lambda m: m[1] or "\\" + m[2], line) for line in paragraph]
+    escaped = [_MARKUP.sub(_escaped, line) for line in paragraph]
     if any(line.startswith(" ") for line in escaped) and not escaped[0].startswith("- "):
         return [f"  {line.strip()}" if line.startswith(" ") else f"* {line}" for line in escaped]
     return escaped
@@ -70,11 +77,17 @@ def _plain(paragraph: list[str]) -> list[str]:
 def _as_plain_text(
     app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]
 ) -> None:
-    """Our docstrings are plain text with `code`: |U| and h* in them are no markup."""
+    """Docstrings are plain text with `code`: |U| and h* in them are no markup.
+
+    Napoleon follows: it reads the sections of numpydoc, whose lines keep their indentation.
+    """
+    rules = [n for n, line in enumerate(lines) if re.fullmatch("-{3,}", line)]
+    prose = lines[: rules[0] - 1] if rules else lines
     result: list[str] = []
-    for blank, paragraph in groupby(lines, key=lambda line: not line.strip()):
+    for blank, paragraph in groupby(prose, key=lambda line: not line.strip()):
         result += [""] if blank else _plain(list(paragraph))
-    lines[:] = result
+    sections = (_MARKUP.sub(_escaped, line) for line in lines[len(prose) :])
+    lines[:] = [*result, *sections]
 
 
 def _inline(writer: Any, node: nodes.math) -> None:
@@ -90,4 +103,4 @@ def _display(writer: Any, node: nodes.math_block) -> None:
 def setup(app: Any) -> None:
     """Sphinx calls this; formulas become MathML here, so that no script draws them."""
     app.add_html_math_renderer("mathml", (_inline, None), (_display, None))
-    app.connect("autodoc-process-docstring", _as_plain_text)
+    app.connect("autodoc-process-docstring", _as_plain_text, priority=100)

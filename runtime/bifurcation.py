@@ -29,11 +29,18 @@ class Blind(RuntimeWarning):
 
 @dataclass(frozen=True, eq=False)
 class Bifurcation:
-    """A state from which another branch leaves, given to `Study.follow(start=...)` to go there.
+    """State from which another branch leaves; `Study.follow(start=...)` follows that branch.
 
-    state: the result there. mode: the way in which the other branch leaves, 1 at its largest
-    displacement. directions: how many motions lost or found stability in that step. located: False
-    if the search failed, so that the state is only the nearer end of the step.
+    Attributes
+    ----------
+    state : Result
+        The result there.
+    mode : Shape
+        Direction of the other branch, 1 at its largest displacement.
+    directions : int
+        Number of directions that lost or gained stability in this step.
+    located : bool
+        False if the search failed: the state is then the nearer end of the step.
     """
 
     state: Result
@@ -47,12 +54,12 @@ class Bifurcation:
 
     @property
     def t(self) -> float:
-        """The load factor."""
+        """Load factor."""
         return self.state.t
 
     @property
     def reversed(self) -> Bifurcation:
-        """Towards the other side of the branch, with the mode in the other direction."""
+        """The same state with the opposite direction of the other branch."""
         return replace(self, mode=Shape.of(self.state, -self.mode.x))
 
 

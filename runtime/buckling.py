@@ -20,10 +20,14 @@ from softehl.runtime.system import System
 
 @dataclass(frozen=True, eq=False)
 class Buckling:
-    """Linear buckling.
+    """Result of linear buckling.
 
-    factors: (k,) load factors, rising. shapes: a result for each, whose unknowns are the mode, 1 at
-    its largest.
+    Attributes
+    ----------
+    factors : array (k,)
+        Critical load factors, rising.
+    shapes : tuple of Shape
+        A Result for each, whose unknowns are the mode, 1 at its largest.
     """
 
     factors: Array

@@ -34,10 +34,17 @@ nonlinear solution instead of a third."""
 
 @dataclass(frozen=True, eq=False)
 class LoadPath:
-    """Converged results in order, and where the load factor turned.
+    """Path of `Study.follow`: converged results in order, limit points, bifurcations.
 
-    limits: each with `t` (the load factor), `kind` ("maximum" or "minimum") and `x`.
-    bifurcations: those that were asked for, in order.
+    Attributes
+    ----------
+    results : tuple of Result
+        The points of the path.
+    limits : tuple
+        Points at which the load factor turns, each with `t` (the load factor), `kind` ("maximum"
+        or "minimum") and `x`.
+    bifurcations : tuple of Bifurcation
+        In order, if `detect="bifurcation"`.
     """
 
     results: tuple[Result, ...]

@@ -41,10 +41,23 @@ class Paths:
     _statement: Statement
 
     def system(self, fields: Mapping[str, Sequence[str]] | None = None) -> System:
-        """Equations of the study.  Raises StudyError for what does not fit together.
+        """Return the discrete equations of the study.
 
-        fields: name of a field -> its unknowns, which are then numbered node by node, the fields in
-        this order and before all other unknowns; left out, each unknown is a field.
+        Parameters
+        ----------
+        fields : mapping of str to sequence of str, optional
+            Name of a field -> its unknowns, which are numbered node by node, the fields in this
+            order and before all other unknowns. Left out, each unknown is a field.
+
+        Returns
+        -------
+        System
+            Equations with their numbering of unknowns.
+
+        Raises
+        ------
+        StudyError
+            Statements contradict each other.
         """
         return equations(self._statement, fields)
 
@@ -62,21 +75,47 @@ class Paths:
         progress: bool | None = None,
         record: bool = False,
     ) -> Result:
-        """The solution at load factor `until`, from 0 (or from `start`) in `steps` steps.
+        """Return the solution at load factor `until`, reached in load steps.
 
-        start: a result of this or another study on the same mesh, whose values, history and load
-        factor the path begins with; the equations are those of this study. If `until` is the
-        load factor of the start, they are solved there once. Steps are cut where Newton's method
-        fails and grow again; history is committed after each. on_step is given the result of every
-        converged step, write: a .pvd file that names them all. progress: tell of each step on
-        stderr; None: in one line, on a terminal only. engine: "serial", "petsc" (on all processes
-        that mpirun started) or an engine with settings. linear: "direct", "superlu" and "pardiso"
-        factorise; "amg" is algebraic multigrid (pyamg) for displacements or one scalar; "auto"
-        takes it for large problems; "matrix-free" needs no matrix (docs/matrix-free.md). record:
-        results keep the steps before them, which derivatives need where pages have history, and
-        the last factors of large problems, which saves time.
-        Raises StudyError; NotConverged if the end is not reached: its `reached` is the last Result,
-        or None.
+        Parameters
+        ----------
+        steps : int
+            Number of load steps. They are cut where Newton's method fails, and grow again.
+        until : float
+            Load factor at the end.
+        start : Result, optional
+            A result of this or another study on the same mesh, which gives initial values, history
+            and load factor; the equations are those of this study. If `until` is its load factor,
+            the equations are solved there once.
+        newton : Newton, optional
+            Settings of Newton's method.
+        on_step : callable, optional
+            Called with the Result of each converged step.
+        engine : str or object, optional
+            "serial", "petsc" (all processes of mpirun), or an engine with settings.
+        linear : str
+            Linear solver. "direct", "superlu" and "pardiso" factorise; "amg" is algebraic multigrid
+            (pyamg) for displacements or one scalar; "matrix-free" assembles no matrix; "auto"
+            selects by the size of the problem.
+        write : str or Path, optional
+            A .pvd file; each converged step is written as a .vtu beside it.
+        progress : bool, optional
+            Report each step on stderr. Left out: in one line, if stderr is a terminal.
+        record : bool
+            Keep the previous steps, which derivatives need if pages have history, and the last
+            factors of large problems.
+
+        Returns
+        -------
+        Result
+            The state at the end.
+
+        Raises
+        ------
+        StudyError
+            An argument is not allowed, or nothing prevents a rigid motion.
+        NotConverged
+            The end is not reached; its `reached` is the last Result, or None.
         """
         count = count_of(steps)
         if count is None:
@@ -113,24 +152,66 @@ class Paths:
         progress: bool | None = None,
         record: bool = False,
     ) -> Iterator[Result]:
-        """Results of the steps in time up to `until`, from 0 or where `start` or `restart` stands.
+        """Yield the results of time steps up to `until`.
 
-        dt: length of the (first) step. start: a result, as in `solve`. method: "euler" (backward)
-        or "bdf2"; with inertia "generalised-alpha", "newmark" (trapezoidal rule), "midpoint"
-        (conserves energy) or "explicit" (central differences, as many steps from result to result
-        as are stable): results are then `Motion`, with velocities, accelerations and energies.
-        mass: densities by block, as of `Result.modes`; velocity: unknown -> at the start, a number
-        or a function of places; rho_inf: see generalised-alpha, 0.8 if left out. tolerance: largest
-        local error of a step, relative to the largest value of each unknown (of those with a rate,
-        where there are any); steps then adapt, else they are dt, but for those that Newton's method
-        needs shorter. History is committed and values of steps before (data u_old, `Model.rates`)
-        are renewed after every converged step.
-        checkpoint: file that is rewritten after each step; restart: such a file of the same mesh,
-        pages and unknowns, from which the march goes on bitwise as if it had not stopped, with
-        `engine` "petsc" on any number of processes; another `dt` than then is the next step.
-        write: a .pvd file that names the results of all steps (with start or restart, it
-        goes on). linear, progress, record: as in `solve`. Raises StudyError, and NotConverged as
-        `solve` does.
+        Parameters
+        ----------
+        dt : float
+            Length of a step, of the first one if steps adapt to `tolerance` [s].
+        until : float
+            Time at the end [s].
+        method : str
+            "euler" (backward) or "bdf2". With inertia: "generalised-alpha", "newmark" (trapezoidal
+            rule), "midpoint" (conserves energy) or "explicit" (central differences, with as many
+            stable steps as a result needs); results are then `Motion`.
+        mass : mapping, optional
+            Densities by block, as of `Result.modes`; for methods with inertia.
+        velocity : mapping of str to float or callable, optional
+            Unknown -> initial velocity, a number or a function of coordinates (n, dim); for methods
+            with inertia.
+        rho_inf : float, optional
+            Spectral radius of generalised-alpha at infinite frequency, in [0, 1]; 0.8 if left out.
+        tolerance : float, optional
+            Largest local error of a step, relative to the largest value of each unknown (of those
+            with a rate, if there are any). Steps adapt to it. Left out, they are `dt`, or shorter
+            where Newton's method fails.
+        start : Result, optional
+            State at the beginning, as in `solve`.
+        checkpoint : str or Path, optional
+            File that is rewritten after each step.
+        restart : str or Path, optional
+            A checkpoint of the same mesh, pages and unknowns. The march continues bitwise as if it
+            had not stopped, with engine "petsc" on any number of processes. Another `dt` than
+            before is the length of the next step.
+        newton : Newton, optional
+            Settings of Newton's method.
+        engine : str or object, optional
+            As in `solve`.
+        linear : str
+            As in `solve`.
+        write : str or Path, optional
+            As in `solve`; with `start` or `restart` the series continues.
+        progress : bool, optional
+            As in `solve`.
+        record : bool
+            As in `solve`.
+
+        Yields
+        ------
+        Result
+            State after each step; a `Motion` with inertia.
+
+        Raises
+        ------
+        StudyError
+            An argument is not allowed, or belongs to another method.
+        NotConverged
+            As in `solve`.
+
+        Notes
+        -----
+        After each converged step history is committed, and values of the previous step (data u_old,
+        `Model.rates`) are renewed.
         """
         require_method(method, ("euler", "bdf2"))
         for name, value in (("dt", dt), ("until", until), ("tolerance", tolerance)):
@@ -184,19 +265,49 @@ class Paths:
         write: str | Path | None = None,
         progress: bool | None = None,
     ) -> LoadPath:
-        """The path from load factor 0 on, by arc length: it passes limit points of the load.
+        """Return the path from load factor 0 on by arc length; it passes limit points of the load.
 
-        start: a result to begin with, as in `solve`, or a bifurcation, whose other branch is
-        followed; `start.reversed` is the other side of it. detect="bifurcation": look for them, at
-        the cost of a factorisation a point; the path has `bifurcations`. step: length of the
-        longest step, the first is a hundredth of it. Steps are cut where the path bends, so that it
-        does not depend on them: see docs/study.md. A length counts the load factor, and the
-        unknowns in units of what they change by per load factor in the beginning; from a
-        bifurcation the load factor relative to
-        that, and displacements relative to the size of the mesh. until: is given each result; the
-        path ends where it says True. most: points at most. History is committed after each point.
-        linear: one that factorises. write, progress: as in `solve`. Raises StudyError; NotConverged
-        if the end is not reached: its `reached` is the last Result, or None.
+        Parameters
+        ----------
+        step : float
+            Longest arc length of a step; the first is a hundredth of it.
+        until : callable
+            Called with each Result; the path ends where it returns True.
+        start : Result or Bifurcation, optional
+            A result to begin with, as in `solve`; or a bifurcation, whose other branch is followed
+            (`start.reversed`: to its other side).
+        detect : str, optional
+            "bifurcation": locate bifurcations, at the cost of a factorisation for each point. They
+            are in `bifurcations` of the path.
+        newton : Newton, optional
+            Settings of Newton's method.
+        most : int
+            Largest number of points.
+        linear : str
+            A linear solver that factorises.
+        write : str or Path, optional
+            As in `solve`.
+        progress : bool, optional
+            As in `solve`.
+
+        Returns
+        -------
+        LoadPath
+            Results in order, limit points and bifurcations.
+
+        Raises
+        ------
+        StudyError
+            An argument is not allowed.
+        NotConverged
+            The end is not reached; its `reached` is the last Result, or None.
+
+        Notes
+        -----
+        The arc length counts the load factor, and the unknowns in units of their initial change per
+        load factor; from a bifurcation on, the load factor relative to that of the bifurcation and
+        displacements relative to the size of the mesh. Steps are cut where the path bends, so that
+        the path does not depend on `step` (docs/study.md). History is committed after each point.
         """
         if read.finite("step", step) <= 0.0:
             raise StudyError(f"step = {step}: must be positive")
@@ -217,10 +328,24 @@ class Paths:
             return path.run(system, begin, until)
 
     def periodic(self, *pairs: tuple[Where, Where], tolerance: float = 1e-6) -> Cell:
-        """The study as a cell of a periodic material: opposite sides, a pair for each direction.
+        """Return the study as a unit cell of a periodic material.
 
-        `solve(F)` of it gives the mean stress P and its tangent A. Sides of a pair must have the
-        same nodes but for a shift; `tolerance` is relative to their size. Raises StudyError.
+        Parameters
+        ----------
+        *pairs : tuple of two sides
+            Opposite sides, a pair for each direction.
+        tolerance : float
+            Largest distance of partner nodes after a shift, relative to the size of the sides.
+
+        Returns
+        -------
+        Cell
+            `solve(F)` of it gives the mean stress P and its tangent A.
+
+        Raises
+        ------
+        StudyError
+            Sides of a pair have different nodes.
         """
         return periodic(self._statement, self.system(), pairs, tolerance)
 
@@ -233,11 +358,31 @@ class Paths:
         engine: AnyEngine = None,
         linear: Linear = "auto",
     ) -> Modes:
-        """Natural modes at rest, or about `start` (a result), the lowest first.
+        """Return natural modes at rest, or about a state, the lowest first.
 
-        A body that nothing holds has its rigid motions first, of frequency zero: three in the
-        plane, six in space. mass: as of `Result.modes`. engine, linear: as in `solve`. Raises
-        StudyError, also where the study is not in equilibrium at rest.
+        Parameters
+        ----------
+        count : int
+            Number of modes.
+        mass : mapping, optional
+            Densities by block, as of `Result.modes`.
+        start : Result, optional
+            State about which the modes are; at rest if left out.
+        engine : str or object, optional
+            As in `solve`.
+        linear : str
+            As in `solve`.
+
+        Returns
+        -------
+        Modes
+            Frequencies and shapes. An unconstrained body has its rigid motions first, of frequency
+            zero: three in 2-D, six in 3-D.
+
+        Raises
+        ------
+        StudyError
+            The state is not in equilibrium, or the body has no mass.
         """
         where = engine_of(engine, linear)
         where.newton(system := where.spread(self.system()), None)
@@ -261,12 +406,36 @@ class Paths:
         newton: Newton | None = None,
         engine: AnyEngine = None,
     ) -> Buckling:
-        """The smallest load factors of linear buckling, and their modes.
+        """Return the smallest load factors of linear buckling, with their modes.
 
-        The tangent at rest, or at the load of `start` (a result), changes as along the linear
-        response to loads and prescribed values that grow in proportion; where it becomes singular
-        is a factor. Closer to the truth from a start near by. engine: as in `solve`. Raises
-        StudyError, NotConverged.
+        Parameters
+        ----------
+        count : int
+            Number of factors.
+        start : Result, optional
+            State at which the tangent is linearised; at rest if left out. Factors are more exact
+            for a state near them.
+        newton : Newton, optional
+            Settings of Newton's method.
+        engine : str or object, optional
+            As in `solve`.
+
+        Returns
+        -------
+        Buckling
+            Load factors, rising, and their modes.
+
+        Raises
+        ------
+        StudyError
+            An argument is not allowed, or nothing prevents a rigid motion.
+        NotConverged
+            The linear response is not found.
+
+        Notes
+        -----
+        The tangent changes as along the linear response to loads and prescribed values that grow in
+        proportion; a factor is where it becomes singular.
         """
         where = engine_of(engine)
         system = where.spread(self.system())

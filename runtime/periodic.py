@@ -41,10 +41,16 @@ _NET = 1e-6  # of the sum of the terms: a larger net force is more than Newton's
 
 @dataclass(frozen=True, eq=False)
 class Homogenised:
-    """A converged state of a cell.
+    """Converged state of a unit cell.
 
-    F, P: mean deformation gradient and mean first Piola-Kirchhoff stress, (dim, dim). result: the
-    state of the cell, for its fields and files.
+    Attributes
+    ----------
+    cell : Cell
+        The unit cell.
+    F : array (dim, dim)
+        Mean deformation gradient.
+    result : Result
+        State of the cell, for its fields and files.
     """
 
     cell: Cell
@@ -57,13 +63,13 @@ class Homogenised:
 
     @property
     def P(self) -> Array:
-        """See the class."""
+        """Mean first Piola-Kirchhoff stress (dim, dim) [MPa]."""
         r = self.result.problem.assembler.residual(self.result.x, self.result.problem.parameters)
         return (self.cell.modes.T @ r).reshape(self.F.shape) / self.cell.volume
 
     @cached_property
     def A(self) -> Array:
-        """The tangent dP_iJ / dF_kL, (dim, dim, dim, dim), exact."""
+        """Exact tangent dP_iJ / dF_kL, (dim, dim, dim, dim) [MPa]."""
         problem, modes = self.result.problem, self.cell.modes
         K = problem.assembler.linearise(self.result.x, problem.parameters)[1]
         T = self.cell.fluctuations
@@ -78,10 +84,18 @@ class Homogenised:
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """A study whose opposite sides move alike.
+    """Study with periodic displacement fluctuations: the unit cell of a material.
 
-    fluctuations: (n, m) unknowns by free ones. modes: (n, dim dim) unknowns by the components of
-    the mean displacement gradient, row by row. volume: of the whole cell, holes included.
+    Attributes
+    ----------
+    system : System
+        Equations of the study.
+    fluctuations : sparse array (n, m)
+        All unknowns by the independent ones.
+    modes : array (n, dim dim)
+        Unknowns of the components of the mean displacement gradient, row by row.
+    volume : float
+        Of the cell, holes included [mm^3].
     """
 
     system: System
@@ -101,10 +115,30 @@ class Cell:
         start: Homogenised | None = None,
         newton: Newton | None = None,
     ) -> Homogenised:
-        """The state at a mean deformation gradient, from rest or from `start`, in `steps` steps.
+        """Return the state at a mean deformation gradient.
 
-        F: (dim, dim), with None where the mean stress vanishes instead. History is committed after
-        each step. Raises StudyError; NotConverged where the end is not reached.
+        Parameters
+        ----------
+        F : array (dim, dim)
+            Mean deformation gradient; None in place of a component whose mean stress vanishes.
+        steps : int
+            Number of load steps, from rest or from `start`; history is committed after each.
+        start : Homogenised, optional
+            State at the beginning.
+        newton : Newton, optional
+            Settings of Newton's method.
+
+        Returns
+        -------
+        Homogenised
+            Mean stress, its tangent, and the state of the cell.
+
+        Raises
+        ------
+        StudyError
+            F has a wrong shape, or `steps` is not allowed.
+        NotConverged
+            The end is not reached.
         """
         count = count_of(steps)
         if count is None:

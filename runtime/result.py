@@ -40,12 +40,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """A converged state of a study.
+    """Converged state of a study: values at places, fields, reactions, derivatives, files.
 
-    If it is spread over processes, all of them call every method and get the same
-    values; of a mesh in parts those at nodes and cells are of the process's own part. histories: of
-    the elements of this process. trail: the step with those before it, of which derivatives are
-    taken.
+    Attributes
+    ----------
+    system : System
+        Equations of the study.
+    problem : Problem
+        The equations at this load factor or time.
+    point : Point
+        Load factor or time, unknowns, and record of Newton's method.
+    histories : mapping of str to array
+        Block -> history of the elements of this process.
+    trail : optional
+        The step with the previous ones, from which derivatives are computed.
+
+    Notes
+    -----
+    Under mpirun all processes call every method and get the same values; of a distributed mesh,
+    values at nodes and cells are those of the own part.
     """
 
     system: System
@@ -77,7 +90,7 @@ class Result:
 
     @property
     def t(self) -> float:
-        """The load factor, or the time."""
+        """Load factor, or time [s]."""
         return self.point.parameter
 
     @cached_property
@@ -87,27 +100,46 @@ class Result:
 
     @property
     def state(self) -> dict[str, Array]:
-        """History of the points: block -> (cells, points, k)."""
+        """History of the quadrature points, block -> (cells, points, k)."""
         return self.system.share.whole_state(self.histories)
 
     @property
     def iterations(self) -> int:
-        """Newton iterations of the step that led here."""
+        """Newton iterations of the last step."""
         return self.point.solution.iterations
 
     @property
     def residual_norms(self) -> tuple[float, ...]:
-        """Of the iterates of that step."""
+        """Norms of the residuals of these iterations."""
         return self.point.solution.residual_norms
 
     def norm(self) -> float:
-        """2-norm of all unknowns."""
+        """Return the 2-norm of all unknowns.
+
+        Returns
+        -------
+        float
+            The norm.
+        """
         return self.system.share.norm(self.x)
 
     def values(self, name: str) -> Array:
-        """An unknown at every node, (points,), nan where there is none; else all of its values.
+        """Return the values of an unknown.
 
-        Raises KeyError that names what there is.
+        Parameters
+        ----------
+        name : str
+            Name of the unknown.
+
+        Returns
+        -------
+        array (points,)
+            At every node, nan where there is none; of an unknown without nodes all of its values.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such unknown; a KeyError.
         """
         numbers = self._whole.numbering.nodal.get(name)
         if numbers is None:
@@ -129,9 +161,22 @@ class Result:
         return ""
 
     def gathered(self, name: str) -> Array:
-        """An unknown at every node of the whole mesh, also where each process has a part of it.
+        """Return an unknown at every node of the whole mesh, also of a distributed one.
 
-        Raises KeyError for what is no unknown at nodes.
+        Parameters
+        ----------
+        name : str
+            Name of an unknown at nodes.
+
+        Returns
+        -------
+        array (points,)
+            The same on all processes.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such unknown at nodes; a KeyError.
         """
         if name not in self._whole.numbering.nodal:
             known = ", ".join(self._whole.numbering.nodal)
@@ -141,11 +186,27 @@ class Result:
     def at(
         self, place: tuple[float, ...], *, cells: str | None = None, block: str | None = None
     ) -> dict[str, float]:
-        """Values of the unknowns at a place of the undeformed mesh, interpolated within a cell.
+        """Return the unknowns, or fields of a block, at a place or at places.
 
-        cells: a group in which the cell is, where bodies meet that do not share their nodes.
-        block: instead, of its fields, between their values `at_nodes`; nan away from the block.
-        Raises MeshError if the place lies outside.
+        Parameters
+        ----------
+        place : tuple of float or array
+            Reference coordinates (dim,) [mm].
+        cells : str, optional
+            Group that contains the cell, where bodies meet that share no nodes.
+        block : str, optional
+            Block whose fields are returned in place of unknowns, interpolated between `at_nodes`;
+            nan outside the block.
+
+        Returns
+        -------
+        dict of str to float
+            Name -> value, interpolated by the shape functions of the cell.
+
+        Raises
+        ------
+        MeshError
+            The place lies outside the mesh or group.
         """
         (row,) = self._at_places(np.asarray(place, dtype=np.float64)[None], cells, block)
         return row
@@ -159,9 +220,30 @@ class Result:
         cells: str | None = None,
         block: str | None = None,
     ) -> Any:
-        """Values along a straight line: name -> (count,), and "s", the distance from the start.
+        """Return the unknowns, or fields of a block, along a straight line.
 
-        cells, block: as in `at`.
+        Parameters
+        ----------
+        start : tuple of float
+            Reference coordinates (dim,) of the first place [mm].
+        end : tuple of float
+            Those of the last place.
+        count : int
+            Number of places, at equal distances.
+        cells : str, optional
+            As in `at`.
+        block : str, optional
+            As in `at`.
+
+        Returns
+        -------
+        dict of str to array (count,)
+            Name -> values; "s" is the distance from the start [mm].
+
+        Raises
+        ------
+        MeshError
+            A place lies outside the mesh or group.
         """
         a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
         shares = np.linspace(0.0, 1.0, count)
@@ -210,8 +292,22 @@ class Result:
         return here
 
     def fields(self, block: str) -> dict[str, Array]:
-        """Fields of a block's page at its quadrature points: name -> (cells, points); empty where
-        the page declares none (`m.fields(...)`).
+        """Return the fields of a block at its quadrature points.
+
+        Parameters
+        ----------
+        block : str
+            Name of the block.
+
+        Returns
+        -------
+        dict of str to array (cells, points)
+            Field of the page (`m.fields(...)`) -> values; empty if the page declares none.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such block; a KeyError.
         """
         self._block(block)
         share = self.system.share
@@ -232,12 +328,28 @@ class Result:
         return {name: values for name, values in found.items() if name not in new}
 
     def at_nodes(self, block: str, *, recovery: str = "projection") -> dict[str, Array]:
-        """Fields of a block at nodes: name -> (points,), nan away from the block.
+        """Return the fields of a block at the nodes.
 
-        recovery: "projection" fits a polynomial to the points of each cell by least squares; its
-        degree is one below that of the shape functions, at least 1. "mean" is the mean of the
-        points of a cell. A node has the mean of the cells of this block around it, and nothing of
-        other blocks. Elements without a cell have means. Raises KeyError, StudyError.
+        Parameters
+        ----------
+        block : str
+            Name of the block.
+        recovery : str
+            "projection" fits a polynomial to the quadrature points of each cell by least squares,
+            of a degree one below the shape functions and at least 1; "mean" takes the mean of the
+            points. A node has the mean of the cells of the block around it.
+
+        Returns
+        -------
+        dict of str to array (points,)
+            Field -> values; nan outside the block.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such block; a KeyError.
+        StudyError
+            There is no such recovery.
         """
         self._block(block)
         nodes, operator = nodal_operator(self.system.blocks[block], recovery)
@@ -270,7 +382,23 @@ class Result:
         return self.system.everywhere
 
     def reaction(self, where: str | Predicate) -> dict[str, float]:
-        """Sums of what supports, ties and springs do at the nodes of a side: unknown -> force."""
+        """Return the sums of the forces of supports, ties and springs at the nodes of a side.
+
+        Parameters
+        ----------
+        where : str or callable
+            Side, group, or predicate of coordinates.
+
+        Returns
+        -------
+        dict of str to float
+            Unknown -> force [N].
+
+        Raises
+        ------
+        MeshError
+            There is no such side.
+        """
         nodes = self.system.mesh.nodes(where)
         found = {}
         for name, numbers in self._whole.numbering.nodal.items():
@@ -280,19 +408,34 @@ class Result:
 
     @cached_property
     def unstable(self) -> int | None:
-        """Number of independent motions along which the energy about this state falls; 0: stable.
+        """Number of independent directions in which the energy decreases; 0 of a stable state.
 
-        None where there is no such number: a tangent that is not symmetric, or is singular.
+        None if there is no such number: the tangent is unsymmetric or singular.
         """
         return negative_directions(self.problem, self.point.solution.x)
 
     def modes(self, count: int = 6, *, mass: Masses | None = None) -> Modes:
-        """Natural modes about this state, prestress and all, the lowest first.
+        """Return natural modes about this state, with its prestress, the lowest first.
 
-        mass: densities by block, {"body": {"rho": 1e-9}}: mass per reference volume (in 2-D per
-        area), a number or a function of places, of u_x, u_y, u_z or of the unknowns that "of"
-        names. Pages with accelerations (`Model.rates(order=2)`) bring their own. Supports hold,
-        tied sides move as one, unknowns without mass follow. Raises StudyError.
+        Parameters
+        ----------
+        count : int
+            Number of modes.
+        mass : mapping, optional
+            Block -> {"rho": density}, {"body": {"rho": 1e-9}}: mass per reference volume, in 2-D
+            per area, a number or a function of coordinates (n, dim). It is that of u_x, u_y, u_z,
+            or of the unknowns that "of" names. Pages with accelerations (`Model.rates(order=2)`)
+            have their own.
+
+        Returns
+        -------
+        Modes
+            Frequencies and shapes. Supports and ties hold; unknowns without mass follow statically.
+
+        Raises
+        ------
+        StudyError
+            There is no mass, or the tangent is unsymmetric.
         """
         x = self.point.solution.x
         squares, found = natural(self.system, self.problem, x, count, mass)
@@ -306,21 +449,60 @@ class Result:
         at: tuple[float, ...] | None = None,
         reaction: str | None = None,
     ) -> dict[Key, float | Array]:
-        """Derivatives of a quantity: {("rubber", "mu"): number, ...}.
+        """Return the derivatives of a quantity with respect to inputs.
 
-        what: an unknown `at` a place, or its `reaction` at a side, or a function of all unknowns
-        (n,) that returns its value and its gradient (n,). by: block -> parameters and data (of data
-        an array, one number an element), "load:right" -> unknowns, "pressure:right" ->
-        ["pressure"], "spring:foot", "tie:left", "fix:left" -> unknowns, "nodes" or "nodes:SIDE" ->
-        axes (an array, one number a node) or modes {name: (points, dim)}. Functions are
-        differentiated by a factor of them. Steps in time and of the load are held. Raises
-        StudyError, MeshError.
+        Parameters
+        ----------
+        what : str or callable
+            An unknown at the place `at`, or its `reaction` at a side; or a function of all unknowns
+            (n,) that returns its value and its gradient (n,).
+        by : mapping of str to sequence of str
+            The inputs: block -> parameters and data; "load:right" -> unknowns; "pressure:right" ->
+            ["pressure"]; "spring:foot", "tie:left" and "fix:left" -> unknowns; "nodes" or
+            "nodes:SIDE" -> axes, or modes {name: (points, dim)}.
+        at : tuple of float, optional
+            Reference coordinates (dim,).
+        reaction : str, optional
+            Name of a side.
+
+        Returns
+        -------
+        dict of tuple to float or array
+            {("rubber", "mu"): number, ...}. Data have a number for each element, axes one for each
+            node. An input that is a function is differentiated with respect to a factor of it.
+
+        Raises
+        ------
+        StudyError
+            The study has no such input, or the result no derivatives.
+        MeshError
+            The place lies outside the mesh.
+
+        Notes
+        -----
+        The adjoint method, through all steps of a path with history. Load and time steps are held.
         """
         trail, given = self._differentiated(by)
         return sensitivity(trail, quantity(what, at, reaction), given)
 
     def derivative(self, *, by: By) -> Array:
-        """Derivatives (n, k) of all unknowns; columns in the order of `by`, see `sensitivity`."""
+        """Return the derivatives of all unknowns with respect to inputs.
+
+        Parameters
+        ----------
+        by : mapping of str to sequence of str
+            The inputs, as in `sensitivity`.
+
+        Returns
+        -------
+        array (n, k)
+            Columns in the order of `by`.
+
+        Raises
+        ------
+        StudyError
+            As of `sensitivity`.
+        """
         return derivative(*self._differentiated(by))
 
     def _differentiated(self, by: By) -> tuple[Trail, list[Input]]:
@@ -334,18 +516,39 @@ class Result:
         return self.trail, inputs(statement, by)
 
     def deformed(self, names: tuple[str, ...]) -> Array:
-        """Places of the nodes moved by the unknowns of these names, (points, dim)."""
+        """Return the nodes' coordinates in the deformed state.
+
+        Parameters
+        ----------
+        names : tuple of str
+            Displacements along x, y, z.
+
+        Returns
+        -------
+        array (points, dim)
+            Reference coordinates plus displacements [mm].
+        """
         moved = np.stack([np.nan_to_num(self.values(name)) for name in names], axis=1)
         return np.asarray(self.system.mesh.points + moved)
 
     def write(self, path: str | Path) -> None:
-        """Write the mesh with unknowns and fields at nodes, and the means of fields in cells,
-        atomically; its folder is made. Fields are BLOCK.NAME, at nodes as by `at_nodes`, nan away
-        from the block. Raises StudyError.
+        """Write the mesh with unknowns and fields to a file for ParaView.
 
-        .vtu: one file. .pvtu: one for each process beside it, written by all at once; no process
-        then needs to have the whole, and of a mesh in parts this alone is possible. Unknowns u_x,
-        u_y, u_z are written as one vector u as well.
+        Parameters
+        ----------
+        path : str or Path
+            "NAME.vtu": one file. "NAME.pvtu": one file for each process beside it, the only format
+            of a distributed mesh. The folder is made.
+
+        Raises
+        ------
+        StudyError
+            The file has another ending, or cannot be written.
+
+        Notes
+        -----
+        Fields are named BLOCK.FIELD, at nodes as by `at_nodes` and in cells as means. Unknowns u_x,
+        u_y, u_z are also written as a vector u. The file is complete at any moment.
         """
         words, target, share = f"write({str(path)!r})", Path(path), self.system.share
         if target.suffix not in (".vtu", ".pvtu"):
@@ -391,9 +594,7 @@ class Result:
 
 
 class Shape(Result):
-    """A mode about a state: its unknowns are the mode. Fields in cells belong to states, it has
-    none.
-    """
+    """Mode about a state: a Result whose unknowns are the mode; it has no fields."""
 
     @classmethod
     def of(cls, state: Result, mode: Array) -> Shape:
@@ -411,10 +612,14 @@ class Shape(Result):
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Natural modes about a state, the lowest first.
+    """Natural modes about a state, the lowest first; a sequence of their shapes.
 
-    squares: (k,) squares of the angular frequencies; negative where the state is unstable. shapes:
-    a result for each, whose unknowns are the mode, of unit modal mass.
+    Attributes
+    ----------
+    squares : array (k,)
+        Squares of the angular frequencies [1/s^2]; negative in unstable directions.
+    shapes : tuple of Shape
+        A Result for each, whose unknowns are the mode, of unit modal mass.
     """
 
     squares: Array
@@ -426,7 +631,7 @@ class Modes:
 
     @property
     def frequencies(self) -> Array:
-        """Cycles per unit of time, (k,); nan where the state is unstable."""
+        """Frequencies (k,) [1/s]; nan in unstable directions."""
         with np.errstate(invalid="ignore"):
             return np.asarray(np.sqrt(self.squares) / (2.0 * np.pi))
 

@@ -55,11 +55,22 @@ from softehl.runtime.statement.sources import Origin, Source
 
 @dataclass(eq=False)
 class Study(Paths, Fitted):
-    """A boundary-value problem that is being written down; `solve` solves what is there.
+    """Boundary-value problem on a mesh: pages, loads, supports; `solve` and others solve it.
 
-    mesh: on which it lives; a cell that is turned inside out is a MeshError. geometry: what a page
-    of fields knows of dimensions that the mesh does not have: in 2-D "plane strain" (the default)
-    or "axisymmetric", around the x axis: then loads and pressures of sides act on whole rings.
+    Parameters
+    ----------
+    mesh : Mesh
+        Mesh of the problem, without inverted cells.
+    geometry : str, optional
+        Geometry of a mesh in 2-D for pages of fields: "plane strain" (the default) or
+        "axisymmetric", around the x axis. In the latter, loads and pressures act on whole rings.
+
+    Raises
+    ------
+    MeshError
+        A cell is inverted.
+    StudyError
+        The mesh does not allow the geometry.
     """
 
     mesh: Mesh
@@ -118,25 +129,53 @@ class Study(Paths, Fitted):
         constant: bool = False,
         **given: Any,
     ) -> None:
-        """Elements of a page on all cells, on a group of cells, or `on` a side.
+        """Add elements of a page to all cells, to a group of cells, or to a side.
 
-        source: a page (file or function), a folder that `softehl generate` wrote, a Definition, a
-        kernel, or the name of one that ships; a page of fields stands on any kind of cell.
-        material: instead, a stress law for a body of it: a file, a function, or the name of one
-        that ships ("neo_hooke"). model: which, where there are several. on: a side, on which a page
-        of one node has an element at each node; or the elements themselves, an array (n, k) of node
-        numbers. shared: unknowns without a node that are one for all elements, not one for each.
-        called: name of an unknown on the page -> its name in the study. along: fields that the page
-        interpolates along its lines -> order of their polynomials, which have nodal unknowns at
-        both ends of a line; or places (n, m) of their unknowns, counted from 0, which blocks share.
-        rule: of quadrature, instead of the page's own, as in `softehl.quadrature.gauss(4, 1)`.
-        constant: the tangent does not depend on unknowns; it is evaluated once.
-        given: parameters of the page (numbers, or functions of the load factor) and its data (a
-        number, (n,) numbers or a function of the elements' centres (n, dim); `Model.nodal_data` by
-        their name, one for each node of the mesh or a function of places). A page of fields on
-        several kinds of cells makes a block of each, "body:quad4", "body:tri3". Two are not given:
-        `dt` is the length of a step of `march`, `rate` comes from `Model.rates`.
-        Raises StudyError, MeshError, or what is wrong with the page.
+        Parameters
+        ----------
+        name : str
+            Name of the block of elements. A page of fields on several kinds of cells makes a block
+            for each, "body:quad4", "body:tri3".
+        source : str, Path, Definition, Page or Kernel, optional
+            The page: a file or function, a folder that `softehl generate` wrote, a Definition, a
+            kernel, or the name of a kernel that ships. A page of fields takes any kind of cell.
+        material : str, Path or Law, optional
+            Instead of `source`: a stress law, for a body of it. A file, a function, or the name of
+            a law that ships, such as "neo_hooke".
+        on : str, callable or array (n, k), optional
+            A side; a page of one node has an element at each of its nodes. "interior" are the
+            facets between cells. An array gives the elements themselves by their node numbers.
+        cells : str, optional
+            Group of cells. All cells if left out.
+        model : str, optional
+            Name of the model, if the source has several.
+        shared : sequence of str
+            Unknowns without a node that all elements share; else each element has its own.
+        called : mapping of str to str, optional
+            Name of an unknown on the page -> its name in the study.
+        along : mapping of str to int or array (n, m), optional
+            Fields that the page interpolates along its lines -> order of their polynomials, with
+            nodal unknowns at both ends of a line; or numbers of their unknowns, from 0, which
+            blocks share.
+        rule : QuadratureRule, optional
+            Quadrature in place of the page's own, as in `softehl.quadrature.gauss(4, 1)`.
+        constant : bool
+            True if the tangent does not depend on unknowns: it is evaluated once.
+        **given : float, array or callable
+            Parameters of the page: numbers, or functions f(t) of the load factor. Data of the page:
+            a number, numbers (n,) of the elements, or a function of the elements' centres (n, dim).
+            `Model.nodal_data` by their declared name: one number for each node of the mesh, or a
+            function of the nodes' coordinates. Two are set by `march` and not given: `dt`, the
+            length of a step, and the parameters of `Model.rates`.
+
+        Raises
+        ------
+        StudyError
+            An argument does not fit the page or the study.
+        MeshError
+            The mesh has no such side or group.
+        ModelError
+            The page is wrong.
         """
         blocks = self._statement.blocks
         if name in blocks:
@@ -158,13 +197,29 @@ class Study(Paths, Fitted):
             blocks[label] = replace(block, differentiated=origin.differentiated(kernel))
 
     def load(self, where: Where, **components: Amount) -> None:
-        """Dead loads per reference length or area of a side, or forces at a place or nodes.
+        """Add a dead load on a side, per reference length or area, or forces at nodes.
 
-        A number grows with the load factor (in `march` it is constant); a function
-        f(x (n, dim), t) gives the load itself; of cells of order p polynomials of degree p + 2 are
-        integrated exactly on straight sides.
-        where: a side, or a predicate of places, for the faces of the boundary all of whose nodes it
-        chooses; a tuple of coordinates or node numbers for forces. A body force is a page.
+        Parameters
+        ----------
+        where : str, callable, tuple of float or array of int
+            A side, or a predicate of coordinates (n, dim) for the faces of the boundary all of
+            whose nodes it selects. Coordinates of one node, or node numbers, for forces.
+        **components : float or callable
+            Unknown -> load in its direction [MPa on a side, N at a node]. A number is multiplied by
+            the load factor (in `march` it is constant); a function f(x, t) of coordinates (n, dim)
+            gives the load (n,) itself.
+
+        Raises
+        ------
+        StudyError
+            A value is not a finite number or function.
+        MeshError
+            The mesh has no such side or node.
+
+        Notes
+        -----
+        On straight sides of cells of order p, polynomials of degree p + 2 are integrated exactly. A
+        body force is a page.
         """
         words = f"load({shown(where)})"
         read.named(words, components, "u_x=1")
@@ -181,12 +236,25 @@ class Study(Paths, Fitted):
     def pressure(
         self, where: str | Predicate, value: Amount, *, of: Sequence[str] | None = None
     ) -> None:
-        """A pressure on a side, which follows the body: it acts on the deformed side, inwards.
+        """Add a follower pressure: it acts on the deformed side, inwards.
 
-        value: force per deformed length or area; a number grows with the load factor (in `march`
-        it is constant), a function f(x (n, dim), t) gives the pressure at undeformed places.
-        of: unknowns that are the displacements along x, y, z; left out, u_x, u_y, u_z. A face
-        of two cells or of none has no outside and is refused.
+        Parameters
+        ----------
+        where : str or callable
+            A side, or a predicate of coordinates for faces of the boundary.
+        value : float or callable
+            Force per deformed length or area [MPa]. A number is multiplied by the load factor (in
+            `march` it is constant); a function f(x, t) gives the pressure (n,) at reference
+            coordinates (n, dim).
+        of : sequence of str, optional
+            Unknowns that are the displacements along x, y, z; u_x, u_y, u_z if left out.
+
+        Raises
+        ------
+        StudyError
+            The displacements do not match the dimension of the mesh.
+        MeshError
+            A face belongs to two cells or to none: it has no outside.
         """
         value = read.amount(f"pressure({shown(where)})", "pressure", value)
         axes = "xyz"[: self.mesh.dimension]
@@ -201,7 +269,22 @@ class Study(Paths, Fitted):
             self._add_force("pressure", where, kernel, faces, names)
 
     def spring(self, where: Where, **stiffness: float) -> None:
-        """Springs to the ground at the nodes of a side, each of this stiffness."""
+        """Add a spring to the ground at each node of a side.
+
+        Parameters
+        ----------
+        where : str, callable, tuple of float or array of int
+            A side, a group, a predicate of coordinates, node numbers, or coordinates of one node.
+        **stiffness : float
+            Unknown -> stiffness of the spring of each node [N/mm].
+
+        Raises
+        ------
+        StudyError
+            A stiffness is not finite.
+        MeshError
+            The mesh has no such side or node.
+        """
         read.named(f"spring({shown(where)})", stiffness, "u_x=2")
         for name, value in stiffness.items():
             kernel = Spring(read.finite(name, value))
@@ -209,11 +292,22 @@ class Study(Paths, Fitted):
             self._add_force("spring", where, kernel, nodes[:, None], (name,))
 
     def fix(self, where: Where, **values: Amount) -> None:
-        """Prescribe unknowns: a number grows with the load factor (in `march` it is constant).
+        """Prescribe unknowns at nodes.
 
-        A function f(x (n, dim), t) gives the value itself.
+        Parameters
+        ----------
+        where : str, callable, tuple of float or array of int
+            A side, a group, a predicate of coordinates, node numbers, or coordinates of one node.
+        **values : float or callable
+            Unknown -> its value. A number is multiplied by the load factor (in `march` it is
+            constant); a function f(x, t) of coordinates (n, dim) gives the value (n,) itself.
 
-        where: a side, a group, a predicate of places, node numbers, or one place.
+        Raises
+        ------
+        StudyError
+            A value is not a finite number or function.
+        MeshError
+            The mesh has no such side or node.
         """
         words = f"fix({shown(where)})"
         read.named(words, values, "u_x=0")
@@ -227,9 +321,30 @@ class Study(Paths, Fitted):
     ) -> None:
         """Tie unknowns of one side to those of another, u(where) = u(to) + offset: periodicity.
 
-        The sides must have the same nodes but for a shift; `tolerance` is relative to their size.
-        Nodes at one place, of bodies that are not connected, are tied body by body.
-        Or `to` is one place, at which all nodes of the side are tied: they move as one.
+        Parameters
+        ----------
+        where : str, callable, tuple of float or array of int
+            The side that is tied.
+        to : str, callable, tuple of float or array of int
+            The side with the same nodes but for a shift; or one place, to which all nodes of
+            `where` are tied, so that they move as one.
+        *names : str
+            The unknowns.
+        offset : float or callable
+            Difference of the values; as a value of `fix`.
+        tolerance : float
+            Largest distance of partner nodes after the shift, relative to the size of the sides.
+
+        Raises
+        ------
+        StudyError
+            The sides have different nodes.
+        MeshError
+            The mesh has no such side, or is distributed over processes.
+
+        Notes
+        -----
+        Nodes at one place that belong to bodies without a connection are tied body by body.
         """
         words = f"tie({shown(where)}, {shown(to)})"
         self.mesh.require_whole(words)
@@ -264,15 +379,34 @@ class Study(Paths, Fitted):
         stiffness: float | None = None,
         depth: float | None = None,
     ) -> None:
-        """Contact of two sides of deformable bodies, which may slide far; of one side with itself
-        where there is no other.
+        """Add contact with finite sliding between two sides, or of one side with itself.
 
-        side: which has the pressure as an unknown, the finer or the softer one; `fields(name)` has
-        its pressure and shear stress. friction: Coulomb's coefficient. of: displacements, u_x and
-        u_y if left out. stiffness: of the augmented Lagrangian [MPa/mm], which changes iterations,
-        not results; left out, that of the bodies. depth: penetration beyond which sides do not
-        notice each other; left out, half of the thickness of the body.
-        Raises StudyError, MeshError.
+        Parameters
+        ----------
+        side : str or callable
+            Side with the contact pressure as an unknown: the finer or the softer one.
+            `Result.fields(name)` has its pressure and shear stress.
+        other : str or callable, optional
+            The other side; left out, `side` is in contact with itself.
+        friction : float
+            Coulomb's coefficient of friction.
+        name : str
+            Name of the block.
+        of : sequence of str, optional
+            Displacements along x, y, z; u_x, u_y, u_z if left out.
+        stiffness : float, optional
+            Of the augmented Lagrangian [MPa/mm]. It changes the iterations, not the result; derived
+            from the bodies if left out.
+        depth : float, optional
+            Penetration above which sides are not in contact [mm]; half of the body's thickness if
+            left out.
+
+        Raises
+        ------
+        StudyError
+            The name exists, or an argument is not allowed.
+        MeshError
+            The mesh has no such side.
         """
         if name in self._statement.blocks:
             known = listed(self._statement.blocks)
@@ -283,9 +417,22 @@ class Study(Paths, Fitted):
         self._statement.contacts.append(found)
 
     def start(self, where: Where | None = None, **values: Datum) -> None:
-        """Values of unknowns at the start, numbers or functions of places; zero if left out.
+        """Set initial values of unknowns; they are zero if left out.
 
-        Of two values for one node the later one counts.
+        Parameters
+        ----------
+        where : str, callable, tuple of float or array of int, optional
+            Nodes, as in `fix`; all nodes if left out.
+        **values : float or callable
+            Unknown -> number, or function of coordinates (n, dim) that gives (n,). Of two values
+            for one node the later one counts.
+
+        Raises
+        ------
+        StudyError
+            A value is not finite, or has a wrong shape.
+        MeshError
+            The mesh has no such side or node.
         """
         read.named("start()", values, "T=20")
         everywhere = np.arange(len(self.mesh.points))

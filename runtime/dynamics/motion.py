@@ -31,14 +31,26 @@ _EMPTY = np.empty(0)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Motion(Result):
-    """A result with velocities and accelerations.
+    """Result with velocities and accelerations.
 
-    v, a: (n,), zero where an unknown has no mass. energy: "kinetic", "internal" (energies of pages
-    and springs; of a page without one, and of friction, the work of its forces), "external" (the
-    work of loads, pressures, moving supports and ties, and parameters that change with time) and
-    "balance", what kinetic and internal energy have gained above that since the march began: zero
-    but for the error of the scheme, and what it and impacts damp.
-    stable_step: of the explicit scheme. scheme, mass: by which the march went.
+    Attributes
+    ----------
+    v : array (n,)
+        Velocities of the unknowns; zero without mass.
+    a : array (n,)
+        Accelerations; zero without mass.
+    energy : mapping of str to float
+        "kinetic"; "internal": energies of pages and springs, or the work of forces of pages
+        without energy and of friction; "external": the work of loads, pressures, moving supports
+        and ties, and parameters that depend on time; "balance": the gain of kinetic and internal
+        energy above the external work since the beginning, which is the error and the damping of
+        the integrator.
+    stable_step : float
+        Largest stable step of central differences [s]; nan for other methods.
+    scheme : optional
+        Time integrator.
+    mass : mapping, optional
+        Densities of `Study.march`.
     """
 
     v: Array = field(default_factory=lambda: _EMPTY)
@@ -49,11 +61,43 @@ class Motion(Result):
     mass: Masses | None = None
 
     def velocity(self, name: str) -> Array:
-        """Of an unknown at every node, (points,), nan where there is none."""
+        """Return the velocities of an unknown at every node.
+
+        Parameters
+        ----------
+        name : str
+            Name of the unknown.
+
+        Returns
+        -------
+        array (points,)
+            nan where there is none.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such unknown at nodes; a KeyError.
+        """
         return self._nodal(name, self.v)
 
     def acceleration(self, name: str) -> Array:
-        """Likewise."""
+        """Return the accelerations of an unknown at every node.
+
+        Parameters
+        ----------
+        name : str
+            Name of the unknown.
+
+        Returns
+        -------
+        array (points,)
+            nan where there is none.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such unknown at nodes; a KeyError.
+        """
         return self._nodal(name, self.a)
 
     def _nodal(self, name: str, values: Array) -> Array:

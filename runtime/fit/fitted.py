@@ -51,9 +51,23 @@ class Fitted:
     """Base of `Study`: see there for the arguments of paths."""
 
     def varied(self: S, values: Mapping[Key, float | Array]) -> S:
-        """A copy of the study with other values of inputs, {("rubber", "mu"): 0.5}.
+        """Return a copy of the study with other values of inputs.
 
-        A function is multiplied by the value. Raises StudyError for a name that is not there.
+        Parameters
+        ----------
+        values : mapping
+            Input -> value, {("rubber", "mu"): 0.5}; keys as of `Result.sensitivity`. A function of
+            the study is multiplied by its value.
+
+        Returns
+        -------
+        Study
+            The copy.
+
+        Raises
+        ------
+        StudyError
+            The study has no such input, or a value has a wrong shape.
         """
         items = asked.of_keys(self._statement, list(values))
         return _changed(
@@ -69,19 +83,56 @@ class Fitted:
         reaction: str | None = None,
         **path: Any,
     ) -> Objective:
-        """A quantity as a function of inputs (k,), with its gradient, for SciPy's optimisers.
+        """Return a quantity as a function of inputs (k,), with its gradient.
 
-        what, by, at, reaction: as in `Result.sensitivity`. path: arguments of `solve`, or of
-        `march` where there is a `dt`.
+        Optimisers of SciPy take it.
+
+        Parameters
+        ----------
+        what : str or callable
+            The quantity, as in `Result.sensitivity`.
+        by : mapping
+            The inputs, as in `Result.sensitivity`.
+        at : tuple of float, optional
+            As in `Result.sensitivity`.
+        reaction : str, optional
+            As in `Result.sensitivity`.
+        **path
+            Arguments of `solve`, or of `march` if there is a `dt`.
+
+        Returns
+        -------
+        Objective
+            Called with inputs (k,) it returns the value and its gradient (k,).
+
+        Raises
+        ------
+        StudyError
+            The study has no such input.
         """
         items = asked.inputs(self._statement, by)
         return Objective(Trials(items, _Runner(self, path)), quantity(what, at, reaction))
 
     def in_jax(self: Solvable, *, by: By, **path: Any) -> Operation:
-        """All unknowns as a function of inputs (k,), for JAX: `solve = study.in_jax(by=...)`.
+        """Return all unknowns as a function of inputs (k,), for JAX.
 
-        by: as in `Result.sensitivity`; inputs stand one after the other, `solve.start` has their
-        values. path: arguments of `solve`, or of `march` where there is a `dt`.
+        Parameters
+        ----------
+        by : mapping
+            The inputs, as in `Result.sensitivity`, one after the other; `start` of the operation
+            has their values.
+        **path
+            Arguments of `solve`, or of `march` if there is a `dt`.
+
+        Returns
+        -------
+        Operation
+            Function (k,) -> (n,) with an adjoint for `jax.grad`.
+
+        Raises
+        ------
+        StudyError
+            The study has no such input.
         """
         return Operation(Trials(asked.inputs(self._statement, by), _Runner(self, path)))
 
@@ -95,16 +146,38 @@ class Fitted:
         most: int = 100,
         **path: Any,
     ) -> Fit:
-        """Inputs with which results are what was measured, by least squares from those given here.
+        """Fit inputs to measurements by least squares, from their present values on.
 
-        measured: {(48, 60): {"u_y": 12.4}, "left": {"u_x": 0.3}}: unknowns at places, reactions at
-        sides, at the end, or a list of one number for each step, or {load factor or time: number}.
-        by: as in `Result.sensitivity`. bounds:
-        {("rubber", "mu"): (0, 1)}; parameters and data of pages that are positive stay so, unless
-        their bounds allow other values. sigma: standard deviation of the numbers, one or one for
-        each; without it all count alike, and the covariance comes from their scatter. most:
-        evaluations. path: arguments of `solve`, or of `march` where there is a `dt`. Raises
-        StudyError, and NotConverged where the study as it is given has no solution.
+        Parameters
+        ----------
+        measured : mapping
+            {(48, 60): {"u_y": 12.4}, "left": {"u_x": 0.3}}: unknowns at places, reactions at sides.
+            A number is measured at the end; a list has a number for each step; a mapping is
+            {load factor or time: number}.
+        by : mapping
+            The inputs, as in `Result.sensitivity`.
+        bounds : mapping, optional
+            Input -> (lower, upper), {("rubber", "mu"): (0, 1)}. Positive parameters and data of
+            pages stay positive, unless their bounds allow other values.
+        sigma : float or array, optional
+            Standard deviation of the measurements, one for all or one for each. Left out, all have
+            the same weight, and the covariance follows from the residuals.
+        most : int
+            Largest number of evaluations.
+        **path
+            Arguments of `solve`, or of `march` if there is a `dt`.
+
+        Returns
+        -------
+        Fit
+            Values, their covariance, residuals, and the last result.
+
+        Raises
+        ------
+        StudyError
+            The study has no such input, or the path no step at the time of a measurement.
+        NotConverged
+            The study has no solution for the present values.
         """
         until = finite("until", path.get("until", 1.0))
         count = path.get("steps", 1)

@@ -24,10 +24,15 @@ SECOND = (
 
 @dataclass(eq=False)
 class Operation:
-    """All unknowns (n,) as a function of inputs (k,); `jax.grad`, `jit` and `vmap` go through it.
+    """All unknowns (n,) as a function of inputs (k,); `jax.grad`, `jit` and `vmap` apply to it.
 
-    The derivative in reverse mode is one adjoint solution, whatever k. Forward mode and second
+    The derivative in reverse mode is one adjoint solution, for any k. Forward mode and second
     derivatives are refused.
+
+    Attributes
+    ----------
+    trials : object
+        The study, solved for values of inputs.
     """
 
     trials: Trials
@@ -38,7 +43,23 @@ class Operation:
         return self.trials.start
 
     def places(self, name: str) -> Integers:
-        """Numbers of an unknown among all, (points,), -1 at nodes that do not have it."""
+        """Return the numbers of an unknown among all unknowns.
+
+        Parameters
+        ----------
+        name : str
+            Name of an unknown at nodes.
+
+        Returns
+        -------
+        array of int (points,)
+            -1 at nodes without it.
+
+        Raises
+        ------
+        StudyError
+            There is no such unknown at nodes.
+        """
         nodal = self._first.system.numbering.nodal
         if name not in nodal:
             raise StudyError(f"no unknown {name!r} at nodes; there are {', '.join(nodal)}")
@@ -46,7 +67,18 @@ class Operation:
         return numbers
 
     def __call__(self, values: Any) -> Any:
-        """The unknowns; JAX reports a solution that is not found."""
+        """Return all unknowns; JAX reports a solution that is not found.
+
+        Parameters
+        ----------
+        values : array (k,)
+            Values of the inputs.
+
+        Returns
+        -------
+        array (n,)
+            The unknowns.
+        """
         return self._traced(values)
 
     @cached_property

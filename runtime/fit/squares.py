@@ -29,11 +29,22 @@ _RANK = 1e-12  # of the largest singular value: below, inputs are not determined
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Inputs that were found.
+    """Inputs that fit measurements.
 
-    values: numbers or arrays. covariance: (k, k) of all components in order, inf where the
-    measurements do not determine them. residuals: (m,) results less measurements. evaluations: how
-    often the study was solved. result: the last one. message: why it ended.
+    Attributes
+    ----------
+    values : dict
+        Input -> number or array.
+    covariance : array (k, k)
+        Of all components in order; inf where the measurements do not determine them.
+    residuals : array (m,)
+        Results less measurements.
+    evaluations : int
+        Number of solutions of the study.
+    result : Result
+        The last solution.
+    message : str
+        Reason of the end.
     """
 
     values: dict[Key, float | Array]

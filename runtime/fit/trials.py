@@ -47,9 +47,16 @@ class Trials:
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """A quantity as a function of inputs (k,) that gives its value and its gradient (k,).
+    """Quantity as a function of inputs (k,), which returns its value and its gradient (k,).
 
-    This is what `scipy.optimize.minimize(objective, objective.start, jac=True)` takes.
+    `scipy.optimize.minimize(objective, objective.start, jac=True)` takes it.
+
+    Attributes
+    ----------
+    trials : object
+        The study, solved for values of inputs.
+    quantity : object
+        The quantity.
     """
 
     trials: Trials
@@ -69,7 +76,25 @@ class Objective:
         return self.trials.start
 
     def __call__(self, values: Array) -> tuple[float, Array]:
-        """Value and gradient.  Raises NotConverged."""
+        """Return value and gradient.
+
+        Parameters
+        ----------
+        values : array (k,)
+            Values of the inputs.
+
+        Returns
+        -------
+        value : float
+            The quantity.
+        gradient : array (k,)
+            Its derivatives.
+
+        Raises
+        ------
+        NotConverged
+            The study has no solution for these values.
+        """
         trail = self.trials.solved(np.asarray(values, dtype=np.float64))[-1].trail
         assert trail is not None
         row = jacobian([(trail, self.quantity)], self.trials.inputs)[0]

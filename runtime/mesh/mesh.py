@@ -45,14 +45,31 @@ class MeshError(SoftehlError, ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Points and cells, with names.
+    """Points and cells with named groups of cells and named sides; immutable.
 
-    points: (n, dim) places of the nodes. cells: kind -> node numbers (m, k). groups: name -> kind
-    -> numbers of cells of that kind. sides: name -> faces, in any order of their nodes; `faces`
-    gives them from outside counterclockwise. numbers: (n,) nodes with the same number are at one
-    place of which every cell has its own copy; None: there are no copies. piece: of a mesh that is
-    in parts under mpirun, of which this is that of this process; None: it is the whole.
-    All arrays are copied where others can write to them, and are read-only.
+    Parameters
+    ----------
+    points : array (n, dim)
+        Coordinates of the nodes [mm].
+    cells : mapping of str to array (m, k)
+        Kind of cell -> node numbers, in the order of VTK.
+    groups : mapping, optional
+        Name -> kind -> numbers of the cells of that kind.
+    sides : mapping, optional
+        Name -> kind of face -> node numbers (m, k), in any orientation.
+    numbers : array (n,), optional
+        Nodes of the same number are copies of one node, at one place; see `split`.
+    piece : optional
+        Distribution of a mesh over the processes of mpirun; made by `spread=True`.
+
+    Raises
+    ------
+    MeshError
+        A kind of cell is unknown, or an array has a wrong shape or type.
+
+    Notes
+    -----
+    Arrays are copied where others can write to them, and are read-only.
     """
 
     points: Array
@@ -132,7 +149,29 @@ class Mesh:
 
     @classmethod
     def line(cls, length: float, *, cells: int, order: int = 1, spread: bool = False) -> Mesh:
-        """A line from 0 to `length`; sides "left" and "right". spread: see `box`."""
+        """Return a line from 0 to `length`, with the sides "left" and "right".
+
+        Parameters
+        ----------
+        length : float
+            Length [mm].
+        cells : int
+            Number of cells.
+        order : int
+            Order of the cells, 1 to 6.
+        spread : bool
+            As in `box`.
+
+        Returns
+        -------
+        Mesh
+            Cells line2, line3, up to line7.
+
+        Raises
+        ------
+        MeshError
+            A number is not allowed.
+        """
         from softehl.runtime.mesh.structured import grid
 
         return grid((length,), (cells,), order, "quad", spread=spread)
@@ -148,10 +187,32 @@ class Mesh:
         shape: Shape = "quad",
         spread: bool = False,
     ) -> Mesh:
-        """[0, width] x [0, height]; sides "left" "right" (x), "bottom" "top" (y).
+        """Return [0, width] x [0, height]; sides "left" and "right" (x), "bottom" and "top" (y).
 
-        shape: "quad" (quad4, quad9, up to quad49 of order 6), "serendipity" (quad8) or
-        "triangle" (tri3, tri6). spread: see `box`.
+        Parameters
+        ----------
+        width : float
+            Length along x [mm].
+        height : float
+            Length along y [mm].
+        cells : tuple of int
+            Number of cells along x and y.
+        order : int
+            Order of the cells, 1 to 6 of "quad", 1 and 2 of "triangle".
+        shape : str
+            "quad" (quad4, quad9, up to quad49), "serendipity" (quad8) or "triangle" (tri3, tri6).
+        spread : bool
+            As in `box`.
+
+        Returns
+        -------
+        Mesh
+            The mesh.
+
+        Raises
+        ------
+        MeshError
+            A number or shape is not allowed.
         """
         from softehl.runtime.mesh.structured import grid
 
@@ -167,11 +228,34 @@ class Mesh:
         shape: Shape = "hex",
         spread: bool = False,
     ) -> Mesh:
-        """[0, a] x [0, b] x [0, c]; "left" "right" (x), "front" "back" (y), "bottom" "top" (z).
+        """Return [0, a] x [0, b] x [0, c] with six named sides.
 
-        shape: "hex" (hex8, hex27, up to hex343 of order 6), "serendipity" (hex20), "tetrahedron"
-        (tet4, tet10) or "wedge" (wedge6). spread: under mpirun every process makes its own part
-        only (docs/cluster.md); of one process that is the whole.
+        The sides are "left" and "right" (x), "front" and "back" (y), "bottom" and "top" (z).
+
+        Parameters
+        ----------
+        size : sequence of float
+            Lengths a, b, c [mm].
+        cells : tuple of int
+            Number of cells along x, y and z.
+        order : int
+            Order of the cells, 1 to 6 of "hex", 1 and 2 of "tetrahedron", 1 of "wedge".
+        shape : str
+            "hex" (hex8, hex27, up to hex343), "serendipity" (hex20), "tetrahedron" (tet4, tet10) or
+            "wedge" (wedge6).
+        spread : bool
+            Under mpirun every process makes its own part only (docs/cluster.md); one process makes
+            the whole.
+
+        Returns
+        -------
+        Mesh
+            The mesh.
+
+        Raises
+        ------
+        MeshError
+            A number or shape is not allowed.
         """
         from softehl.runtime.mesh.structured import grid
 
@@ -179,9 +263,23 @@ class Mesh:
 
     @classmethod
     def union(cls, **parts: Mesh) -> Mesh:
-        """Meshes as one that share no nodes: cells "disc", sides "disc:bottom", "disc:boundary".
+        """Return meshes as one mesh; they share no nodes.
 
-        Groups of cells keep their names behind that of their mesh, too.
+        Parameters
+        ----------
+        **parts : Mesh
+            Name -> mesh. The cells of `disc` are the group "disc", its sides "disc:bottom",
+            "disc:boundary"; its groups are "disc:NAME".
+
+        Returns
+        -------
+        Mesh
+            All cells and nodes.
+
+        Raises
+        ------
+        MeshError
+            Dimensions differ, or a mesh is distributed over processes.
         """
         from softehl.runtime.mesh.union import union
 
@@ -189,14 +287,27 @@ class Mesh:
 
     @classmethod
     def read(cls, path: str | Path, *, spread: bool = False) -> Mesh:
-        """A mesh file of Gmsh, of Abaqus or CalculiX (.inp), or of a format that meshio reads.
+        """Read a mesh file of Gmsh, of Abaqus or CalculiX (.inp), or of a format of meshio.
 
-        Its groups, sets and surfaces become names of cells and of sides; a set of nodes is a side
-        of points. What cannot be a name or a cell is told in a warning.
-        spread: of "part.msh" or "part.npz" each process reads its share of the files part_1.msh,
-        part_2.msh, ..., as `gmsh -part_split` or `write(parts=...)` made them; there must be as
-        many as processes, or more.
-        Raises MeshError where the file cannot be read or holds other cells than ours.
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+        spread : bool
+            Each process reads its share of the files part_1.msh, part_2.msh, ... of "part.msh" (or
+            .npz), as `gmsh -part_split` or `write(parts=...)` made them; there must be as many
+            files as processes, or more.
+
+        Returns
+        -------
+        Mesh
+            Groups, sets and surfaces of the file are groups and sides; a set of nodes is a side of
+            points. A warning names what has no such form.
+
+        Raises
+        ------
+        MeshError
+            The file cannot be read, or has unknown cells.
         """
         from softehl.runtime.mesh.files import read
         from softehl.runtime.mesh.part_files import read_parts
@@ -204,10 +315,20 @@ class Mesh:
         return read_parts(Path(path)) if spread else read(Path(path))
 
     def write(self, path: str | Path, *, parts: int | None = None) -> None:
-        """Write the mesh in the format of the file name; .msh, .inp, .vtu and .vtk keep the names.
+        """Write the mesh in the format of the file name.
 
-        parts: into so many files of NumPy, part_1.npz, ... for "part.npz", each of which holds
-        cells that are close together, for `read(spread=True)`. Raises MeshError.
+        Parameters
+        ----------
+        path : str or Path
+            The file; .msh, .inp, .vtu and .vtk keep the names of groups and sides.
+        parts : int, optional
+            Write so many files, part_1.npz, ... for "part.npz", each with cells that are close
+            together, for `read(spread=True)`.
+
+        Raises
+        ------
+        MeshError
+            The file cannot be written.
         """
         from softehl.runtime.mesh.files import write
         from softehl.runtime.mesh.part_files import write_parts
@@ -220,18 +341,71 @@ class Mesh:
     # another one from it ------------------------------------------------------------------------
 
     def map(self, move: Callable[[Array], Array]) -> Mesh:
-        """The mesh with nodes at `move(points)`, (n, dim) -> (n, dim)."""
+        """Return the mesh with moved nodes.
+
+        Parameters
+        ----------
+        move : callable
+            Function of coordinates (n, dim) that gives the new ones (n, dim).
+
+        Returns
+        -------
+        Mesh
+            The same cells, groups and sides.
+
+        Raises
+        ------
+        MeshError
+            The coordinates have a wrong shape.
+        """
         moved = _frozen("moved points", move(self.points))
         if moved.ndim != 2 or len(moved) != len(self.points):
             raise MeshError(f"map: shape {moved.shape} from {self.points.shape}")
         return replace(self, points=moved)
 
     def with_side(self, name: str, where: Predicate) -> Mesh:
-        """The mesh with one more named side: faces of the boundary all of whose nodes are meant."""
+        """Return the mesh with one more named side.
+
+        Parameters
+        ----------
+        name : str
+            Name of the side.
+        where : callable
+            Predicate of coordinates (n, dim) -> (n,): faces of the boundary all of whose nodes it
+            selects.
+
+        Returns
+        -------
+        Mesh
+            The mesh with this side.
+
+        Raises
+        ------
+        MeshError
+            No face is selected.
+        """
         return replace(self, sides={**self.sides, name: self._meant_faces(where, name)})
 
     def with_group(self, name: str, where: Predicate) -> Mesh:
-        """The mesh with one more named group: the cells whose centre is meant."""
+        """Return the mesh with one more named group of cells.
+
+        Parameters
+        ----------
+        name : str
+            Name of the group.
+        where : callable
+            Predicate of coordinates (n, dim) -> (n,): cells whose centre it selects.
+
+        Returns
+        -------
+        Mesh
+            The mesh with this group.
+
+        Raises
+        ------
+        MeshError
+            No cell is selected.
+        """
         chosen = {}
         for kind, nodes in self.cells.items():
             inside = _told(where, self.points[nodes].mean(axis=1), name)
@@ -241,9 +415,13 @@ class Mesh:
         return replace(self, groups={**self.groups, name: chosen})
 
     def split(self) -> Mesh:
-        """The mesh with nodes of its own for every cell, so that fields may jump between them.
+        """Return the mesh with separate nodes for every cell, so that fields may jump.
 
-        on="interior" of `Study.add` finds the facets at which they meet.
+        Returns
+        -------
+        Mesh
+            The cells with copies of their nodes; `on="interior"` of `Study.add` selects the facets
+            between them.
         """
         from softehl.runtime.mesh.facets import split
 
@@ -258,25 +436,58 @@ class Mesh:
 
     @property
     def origin(self) -> Integers:
-        """(n,) the same number for all copies of a node; see `split`."""
+        """Number of the original of each node, (n,), the same for all copies; see `split`."""
         return np.arange(len(self.points)) if self.numbers is None else self.numbers
 
     def anywhere(self, something: object) -> bool:
-        """True if there is something, of a mesh in parts on any process."""
+        """Return True if a value is true on any process that has a part of the mesh.
+
+        Parameters
+        ----------
+        something : object
+            Value of this process.
+
+        Returns
+        -------
+        bool
+            The same on all processes.
+        """
         return bool(something) if self.piece is None else self.piece.anywhere(something)
 
     def own(self, nodes: Integers) -> Integers:
-        """Nodes of these that are this process's own; all, where the mesh is whole."""
+        """Return those nodes that this process owns; all of them, if the mesh is not distributed.
+
+        Parameters
+        ----------
+        nodes : array of int
+            Node numbers.
+
+        Returns
+        -------
+        array of int
+            The owned ones.
+        """
         return nodes if self.piece is None else nodes[self.piece.owned[nodes]]
 
     def require_whole(self, words: str) -> None:
-        """Raise MeshError where the mesh is in parts."""
+        """Require a mesh that is not distributed over processes.
+
+        Parameters
+        ----------
+        words : str
+            The call, for the message.
+
+        Raises
+        ------
+        MeshError
+            The mesh is distributed.
+        """
         if self.piece is not None:
             raise MeshError(f"{words}: not for a mesh in parts; leave out spread=True")
 
     @cached_property
     def boundary(self) -> Faces:
-        """Every face that belongs to one cell only."""
+        """Faces that belong to one cell only, kind -> node numbers (m, k), seen from outside."""
         found: dict[str, list[Integers]] = {}
         for kind, nodes in self.cells.items():
             for face, local in CELLS[kind].side_nodes:
@@ -291,9 +502,24 @@ class Mesh:
         return _owned(faces, "")
 
     def faces(self, where: str | Predicate) -> Faces:
-        """Faces of a named side, or those of the boundary all of whose nodes are meant.
+        """Return the faces of a side.
 
-        Those of the boundary have their nodes as seen from outside, others as they were given.
+        Parameters
+        ----------
+        where : str or callable
+            Name of a side, "boundary", or a predicate of coordinates for faces of the boundary all
+            of whose nodes it selects.
+
+        Returns
+        -------
+        mapping of str to array (m, k)
+            Kind of face -> node numbers. Those of the boundary are oriented as seen from outside,
+            others as they were given.
+
+        Raises
+        ------
+        MeshError
+            There is no such side.
         """
         if callable(where):
             return self._meant_faces(where, "the predicate")
@@ -310,8 +536,22 @@ class Mesh:
         }
 
     def outer_faces(self, where: str | Predicate) -> Faces:
-        """Faces of one dimension less than the mesh.  Raises MeshError for a face that is not
-        that of one cell alone, which has no outside; those of shells are as they were given.
+        """Return the faces of a side of the boundary, which have an outside.
+
+        Parameters
+        ----------
+        where : str or callable
+            As in `faces`.
+
+        Returns
+        -------
+        mapping of str to array (m, k)
+            As of `faces`; of shells as they were given.
+
+        Raises
+        ------
+        MeshError
+            A face has another dimension than the boundary, or belongs to two cells or none.
         """
         found = self.faces(where)
         solid = any(CELLS[kind].dimension == self.dimension for kind in self.cells)
@@ -342,7 +582,23 @@ class Mesh:
         return all(CELLS[kind].dimension == self.dimension - 1 for kind in faces)
 
     def nodes(self, where: str | Predicate) -> Integers:
-        """Numbers of the nodes of a side or group, or of those that are meant; sorted."""
+        """Return the nodes of a side or group, sorted.
+
+        Parameters
+        ----------
+        where : str or callable
+            Name of a side or group, or a predicate of coordinates (n, dim) -> (n,).
+
+        Returns
+        -------
+        array of int
+            Node numbers.
+
+        Raises
+        ------
+        MeshError
+            There is no such side or group, or no node is selected.
+        """
         if callable(where):
             chosen = np.flatnonzero(_told(where, self.points, "the predicate"))
             if not self.anywhere(len(chosen)):
@@ -356,9 +612,22 @@ class Mesh:
         return found if self.piece is None else self.piece.everywhere(found)
 
     def cells_of(self, group: str | None) -> Mapping[str, Integers]:
-        """Kind -> node numbers (m, k) of the cells of a group, of all cells for None.
+        """Return the cells of a group.
 
-        A kind of which the group has no cells is left out.
+        Parameters
+        ----------
+        group : str or None
+            Name of the group; None for all cells.
+
+        Returns
+        -------
+        mapping of str to array (m, k)
+            Kind -> node numbers; kinds without cells are left out.
+
+        Raises
+        ------
+        MeshError
+            There is no such group.
         """
         if group is None:
             return self.cells
@@ -372,8 +641,22 @@ class Mesh:
         }
 
     def node_at(self, place: Array) -> int:
-        """Number of the node at a place (dim,).  Raises MeshError that names the nearest one, or
-        those that are all there.
+        """Return the number of the node at a place.
+
+        Parameters
+        ----------
+        place : tuple of float or array (dim,)
+            Its coordinates.
+
+        Returns
+        -------
+        int
+            Node number.
+
+        Raises
+        ------
+        MeshError
+            There is no node, with the nearest one in the message; or there are several.
         """
         place = self._placed(place)
         distance = np.linalg.norm(self.points - place, axis=1)
@@ -387,8 +670,22 @@ class Mesh:
         return nearest
 
     def nodes_at(self, place: Array) -> Integers:
-        """The node at a place (dim,), with all copies that `split` made of it; of a mesh in parts
-        none where it is on another process.  Raises MeshError.
+        """Return the node at a place with all copies that `split` made of it.
+
+        Parameters
+        ----------
+        place : tuple of float or array (dim,)
+            Its coordinates.
+
+        Returns
+        -------
+        array of int
+            Node numbers; of a distributed mesh those on this process.
+
+        Raises
+        ------
+        MeshError
+            There is no node on any process, or there are nodes of several bodies.
         """
         place = self._placed(place)
         near = np.linalg.norm(self.points - place, axis=1) <= _NEAR * self._size
@@ -411,9 +708,24 @@ class Mesh:
             )
 
     def locate(self, place: Array) -> tuple[Integers, Array]:
-        """The nodes (k,) of the cell that holds a place (dim,), and their shape functions there.
+        """Return the nodes of the cell that contains a place, and their shape functions there.
 
-        Raises MeshError if the place lies outside the mesh.
+        Parameters
+        ----------
+        place : tuple of float or array (dim,)
+            Coordinates.
+
+        Returns
+        -------
+        nodes : array of int (k,)
+            Nodes of the cell.
+        weights : array (k,)
+            Values of their shape functions.
+
+        Raises
+        ------
+        MeshError
+            The place lies outside the mesh.
         """
         found = self.holding(self._placed(place)[None])
         if not len(found.point):
@@ -423,9 +735,24 @@ class Mesh:
         return self.cells[cell.name][found.row[0]], weights
 
     def holding(self, places: Array, group: str | None = None) -> Located:
-        """The cells that hold places (n, dim); of a group, of a mesh in parts of this process.
+        """Return the cells that contain places.
 
-        Raises MeshError.
+        Parameters
+        ----------
+        places : array (n, dim)
+            Coordinates.
+        group : str, optional
+            Group of cells in which to look.
+
+        Returns
+        -------
+        Located
+            Pairs of place and cell, with coordinates in the reference cell.
+
+        Raises
+        ------
+        MeshError
+            There is no such group, or places have a wrong shape.
         """
         places = np.asarray(places, dtype=np.float64)
         if places.ndim != 2 or places.shape[1] != self.dimension or not np.isfinite(places).all():
@@ -458,9 +785,12 @@ class Mesh:
         return place
 
     def check(self) -> None:
-        """Raise MeshError for a cell that is turned inside out: its number and place.
+        """Check that no cell is inverted, and that no cell or face of a side occurs twice.
 
-        Also for a cell, or a face of a side, that stands twice: it would count twice.
+        Raises
+        ------
+        MeshError
+            With number and place of the cell.
         """
         from softehl.runtime.mesh.checks import check
 
