@@ -9,12 +9,10 @@ import pytest
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem import assembly
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
-from softehl.runtime.fem.checks import ProblemError
 from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.guards import KeepsOrientation, StaysPositive
 from softehl.runtime.fem.pattern import build_pattern
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.solve.newton import Newton
 from tests.runtime.springs import Spring
 
 SIZE, ELEMENTS = 12, 25
@@ -59,24 +57,6 @@ def test_a_wrong_scatter_is_seen(rng: np.random.Generator) -> None:
     vars(assembler.structure)["pattern"] = pattern
     _, K = assembler.linearise(x, PARAMETERS)
     assert np.abs(K.toarray() - _dense(blocks, x)[1]).max() > 0.1
-
-
-def test_tangent_is_the_derivative_of_the_residual(rng: np.random.Generator) -> None:
-    assembler, x = Assembler.build(SIZE, _blocks(rng)), rng.normal(size=SIZE)
-    direction, step = rng.normal(size=SIZE), 1e-6
-    ahead = assembler.residual(x + step * direction, PARAMETERS)
-    behind = assembler.residual(x - step * direction, PARAMETERS)
-    _, K = assembler.linearise(x, PARAMETERS)
-    assert K @ direction == pytest.approx((ahead - behind) / (2 * step), rel=1e-7, abs=1e-7)
-
-
-def test_pattern_is_symmetric_with_a_full_diagonal(rng: np.random.Generator) -> None:
-    pattern = build_pattern(SIZE, [_blocks(rng)[1].dofs])
-    ones = pattern.matrix(np.ones(pattern.nnz)).toarray()
-    assert np.array_equal(ones, ones.T)
-    assert np.array_equal(np.diag(ones), np.ones(SIZE))
-    positions = pattern.matrix(np.arange(pattern.nnz, dtype=float)).toarray()
-    assert np.array_equal(np.diag(positions), pattern.diagonal)
 
 
 def _pattern_by_sorting(size: int, dof_maps: list[Integers]) -> tuple[Integers, Integers]:
@@ -164,18 +144,6 @@ def _problem(rng: np.random.Generator) -> Problem:
     return Problem(assembler, layout, PARAMETERS, {"u": 2.0, "p": 0.5})
 
 
-def test_prescribed_unknowns_get_their_values(rng: np.random.Generator) -> None:
-    problem = _problem(rng).with_fixed(
-        [np.array([1, 9]), np.array([4])], [np.array([0.2, -0.1]), 0.3]
-    )
-    solution = Newton().solve(problem, np.zeros(SIZE)).raise_for_status()
-    assert solution.x[[1, 9, 4]] == pytest.approx([0.2, -0.1, 0.3], abs=1e-15)
-    reactions = problem.assembler.residual(solution.x, PARAMETERS)
-    free = np.setdiff1d(np.arange(SIZE), [1, 4, 9])
-    assert reactions[free] == pytest.approx(np.zeros(len(free)), abs=1e-9)
-    assert np.abs(reactions[[1, 4, 9]]).min() > 1e-3
-
-
 def test_elimination_gives_the_newton_step_of_the_whole_system(rng: np.random.Generator) -> None:
     problem = _problem(rng).with_fixed([np.array([1, 9])], [np.array([0.2, -0.1])])
     x = rng.normal(size=SIZE)
@@ -187,19 +155,6 @@ def test_elimination_gives_the_newton_step_of_the_whole_system(rng: np.random.Ge
     step = np.linalg.solve(K.toarray(), r)
     assert step == pytest.approx(np.linalg.solve(dense, rows), rel=1e-10, abs=1e-12)
     assert problem.residual(x) == pytest.approx(rows, rel=1e-13)
-
-
-def test_changing_parameters_leaves_the_problem_as_it_was(rng: np.random.Generator) -> None:
-    problem = _problem(rng)
-    other = problem.with_parameters(a={"stiffness": 9.0}, b=None)
-    assert other.parameters["a"].tolist() == [9.0, 0.0]
-    assert "b" not in other.parameters
-    assert problem.parameters["a"].tolist() == [1.5, 0.0]
-    assert other.assembler is problem.assembler
-    with pytest.raises(ProblemError, match="no parameter of block 'a' 'viscosity'"):
-        problem.with_parameters(a={"viscosity": 1.0})
-    with pytest.raises(ProblemError, match="give all of stiffness, unused"):
-        other.with_parameters(b={"stiffness": 1.0})
 
 
 def test_norm_weighs_each_field_by_its_reference(rng: np.random.Generator) -> None:

@@ -51,14 +51,6 @@ def test_area_is_the_integral_of_the_shape_function() -> None:
     assert tributary_areas(POINTS, SEGMENTS, np.array([0])) == pytest.approx([exact], rel=1e-14)
 
 
-def test_an_end_node_has_only_its_own_segment() -> None:
-    whole = tributary_areas(POINTS, SEGMENTS, np.arange(4))
-    part = tributary_areas(POINTS, SEGMENTS[:2], np.arange(4))
-    assert part[:2] == pytest.approx(whole[:2])
-    assert part[2] < whole[2]
-    assert part[3] == 0.0
-
-
 def test_contact_elements_carry_normal_position_area_and_stiffness() -> None:
     nodes, multipliers = np.array([1, 2]), np.array([20, 21])
     block = contact_block(

@@ -6,49 +6,21 @@ import itertools
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.arclength import Arclength
 from softehl.runtime.solve.homotopy import Continuation
-from softehl.runtime.solve.linear import SparseMatrix
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.predictor import Predictor
 from softehl.runtime.solve.solution import Branch, NotConverged, Point, Status
 from softehl.runtime.solve.steps import StepRule
-
-
-def _full_step(x: Array, dx: Array) -> float:
-    return 1.0
-
-
-@dataclass(frozen=True)
-class Algebraic:
-    """R and dR/dx at one parameter; `visited` lists the x at which R was asked for."""
-
-    equations: Callable[[Array], Array]
-    jacobian: Callable[[Array], Array]
-    limit: Callable[[Array, Array], float] = _full_step
-    visited: list[Array] = field(default_factory=list)
-
-    def residual(self, x: Array) -> Array:
-        self.visited.append(x.copy())
-        return self.equations(x)
-
-    def linearise(self, x: Array) -> tuple[Array, SparseMatrix]:
-        return self.equations(x), csc_array(np.atleast_2d(self.jacobian(x)))
-
-    def norm(self, r: Array) -> float:
-        return float(np.abs(r).max())
-
-    def step_limit(self, x: Array, dx: Array) -> float:
-        return self.limit(x, dx)
+from tests.runtime.test_newton import Algebraic
 
 
 def line(p: float) -> Algebraic:
@@ -165,17 +137,6 @@ def test_every_point_is_reported_before_the_next_is_tried() -> None:
     assert events == [(what, p) for p in branch.parameters for what in ("try", "met")]
 
 
-def test_secant_needs_no_iteration_on_a_straight_path() -> None:
-    def iterations(predictor: Literal["secant", "previous"]) -> list[int]:
-        walk = Continuation(Newton(), StepRule(0.1, 0.1, 0.1), predictor)
-        points = walk.follow(line, 1.0, 2.0, np.ones(1)).points
-        return [point.solution.iterations for point in points]
-
-    assert iterations("secant")[:2] == iterations("previous")[:2]
-    assert iterations("secant")[2:] == [0] * 9
-    assert min(iterations("previous")[2:]) >= 3
-
-
 def bend(p: float) -> Algebraic:
     """x^3 = q^3 with q = 1 + p + p^2, a path without curvature but in its own parabola."""
     q = 1.0 + p + p**2
@@ -220,20 +181,6 @@ def test_a_walk_resumes_with_the_secant_of_its_previous_point() -> None:
     assert [point.solution.iterations for point in resumed.points] == [0] * len(resumed.points)
     cold = natural().follow(line, last.parameter, 2.0, last.solution.x)
     assert cold.points[1].solution.iterations > 0
-
-
-def test_a_transformed_parameter_is_followed_down() -> None:
-    # x^2 = U with U = exp(s), from 1600 down to 100.
-    speeds = [1600.0, 800.0, 400.0, 200.0, 100.0]
-    branch = Continuation(Newton(), StepRule(0.3, 0.01, 0.5), keep_all=True).follow(
-        lambda s: Algebraic(lambda x: x**2 - math.exp(s), lambda x: np.diag(2.0 * x)),
-        math.log(1600.0),
-        math.log(100.0),
-        np.array([40.0]),
-        waypoints=[math.log(speed) for speed in speeds],
-    )
-    found = {point.parameter: point.solution.x[0] for point in branch.points}
-    assert [found[math.log(speed)] for speed in speeds] == pytest.approx(np.sqrt(speeds))
 
 
 def test_a_step_too_long_is_cut_until_newton_converges() -> None:
@@ -319,17 +266,6 @@ def test_a_step_that_rounding_swallows_ends_a_path() -> None:
     assert branch.parameters[-1] == pytest.approx(far + 1.0, abs=1e-3)
 
 
-def test_every_end_but_the_wanted_one_has_a_remedy() -> None:
-    assert [status for status in Status if not status.advice] == [Status.CONVERGED]
-
-
-def test_no_solution_at_the_start_is_reported_as_it_is() -> None:
-    branch = natural().follow(parabola, 0.0, 1.0, np.zeros(1))
-    assert branch.status is Status.SINGULAR
-    assert branch.points == ()
-    assert "start, parameter = 0" in branch.message
-
-
 @pytest.mark.parametrize("keep_all", [False, True])
 def test_only_the_last_two_points_keep_their_vectors(keep_all: bool) -> None:
     branch = natural(keep_all=keep_all).follow(line, 1.0, 3.0, np.ones(1))
@@ -407,13 +343,6 @@ def test_circle_is_followed_round_through_both_folds(direction: float) -> None:
     assert second.located
     assert [first.parameter, second.parameter] == pytest.approx([direction, -direction], abs=2e-9)
     assert [first.x[0], second.x[0]] == pytest.approx([0.0, 0.0], abs=2e-7)
-
-
-def test_limit_point_index_counts_the_points_before_it() -> None:
-    branch = arc().follow(circle, 0.0, np.ones(1), until=after_folds(1))
-    (fold,) = branch.limit_points
-    before, after = branch.points[fold.index - 1 : fold.index + 1]
-    assert before.solution.x[0] > 0.0 >= after.solution.x[0]
 
 
 def test_a_skew_flat_fold_is_located() -> None:

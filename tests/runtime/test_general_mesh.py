@@ -104,12 +104,6 @@ def test_a_face_that_looks_inwards_is_seen() -> None:
     assert outflow(mesh) != pytest.approx(18.0, rel=1e-3)
 
 
-def test_line() -> None:
-    mesh = Mesh.line(2.0, cells=4, order=2)
-    assert mesh.cells["line3"].shape == (4, 3)
-    assert mesh.points[mesh.nodes("right"), 0] == pytest.approx([2.0])
-
-
 def test_map_and_names() -> None:
     mesh = made("quad", 1).map(lambda x: x * [2.0, 1.0])
     mesh = mesh.with_side("corner", lambda x: (x[:, 0] > 3.9) & (x[:, 1] < 0.1))
@@ -118,25 +112,6 @@ def test_map_and_names() -> None:
     assert len(mesh.cells_of("upper")["quad4"]) == 3
     assert set(mesh.points[mesh.nodes("upper"), 1]) == {1.0, 2.0}
     assert mesh.points[mesh.nodes(lambda x: x[:, 0] == 0.0), 0].max() == 0.0
-
-
-@pytest.mark.parametrize(("shape", "order"), [*PLANE, *SPACE])
-def test_gmsh_files_keep_everything(shape: str, order: int, tmp_path: Path) -> None:
-    mesh = made(shape, order)
-    mesh = mesh.with_group("half", lambda x: x[:, 0] < 1.5)
-    path = tmp_path / "part.msh"
-    mesh.write(path)
-    again = Mesh.read(path)
-    np.testing.assert_allclose(again.points, mesh.points, atol=1e-15)
-    assert again.cells.keys() == mesh.cells.keys()
-    for kind, nodes in mesh.cells.items():
-        np.testing.assert_array_equal(again.cells[kind], nodes)
-        np.testing.assert_array_equal(again.groups["half"][kind], mesh.groups["half"][kind])
-    assert again.sides.keys() == mesh.sides.keys()
-    for name, side in mesh.sides.items():
-        for kind, faces in side.items():
-            np.testing.assert_array_equal(np.sort(again.sides[name][kind]), np.sort(faces))
-    assert outflow(again) == pytest.approx(outflow(mesh))
 
 
 def test_other_formats_keep_points_and_cells(tmp_path: Path) -> None:

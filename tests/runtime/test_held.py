@@ -46,13 +46,6 @@ def test_a_body_in_balance_that_nothing_holds(held: dict[str, float], way: str) 
         WAYS[way](study)
 
 
-def test_three_supports_hold_it() -> None:
-    study = pulled()
-    study.fix((0.0, 0.0), u_x=0.0, u_y=0.0)
-    study.fix((2.0, 0.0), u_y=0.0)
-    assert study.solve().at((2.0, 0.0))["u_x"] > 0.0
-
-
 FREE: dict[str, tuple[Callable[[Study], object], str]] = {
     "nothing": (lambda s: None, "a translation along x, a translation along y, a rotation[.]"),
     "a roller": (lambda s: s.fix("bottom", u_y=0.0), "a translation along x[.]"),

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array
 
-from softehl import Mesh, Newton, Study, load_kernel
+from softehl import Mesh, Study, load_kernel
 from softehl.runtime.arrays import Array
-from softehl.runtime.derivatives import results
 from softehl.runtime.result import Result
 from softehl.runtime.solve.internal import Condensing
 from softehl.runtime.solve.linear import SingularMatrix
@@ -218,41 +217,3 @@ def bent(page: str, points: Array | None = None, **changes: float) -> Study:
     study.fix("left", u_x=0, u_y=0)
     study.load("right", u_y=given["lift"])
     return study
-
-
-@pytest.mark.parametrize("page", ["enhanced.py", "mean_pressure.py"])
-def test_derivatives_pass_through_internal_unknowns(
-    page: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Both ways, by moduli, a load and places, against differences of order 6 of studies anew."""
-    exact = Newton(tolerance=1e-13)
-    result = bent(page).solve(steps=2, newton=exact)
-    points = result.system.mesh.points
-    corner = int(points.sum(axis=1).argmax())
-    end = (float(points[corner, 0]), float(points[corner, 1]))
-    mode = np.sin(3.0 * points + 1.0)
-    mode[corner] = 0.0
-    second = {"enhanced.py": "lame", "mean_pressure.py": "K"}[page]
-    by = {"body": ["mu", second], "load:right": ["u_y"], "nodes": {"wavy": mode}}
-
-    def lifted(**changes: Any) -> float:
-        return bent(page, **changes).solve(steps=2, newton=exact).at(end)["u_y"]
-
-    def moved(s: float) -> float:
-        return lifted(points=points + s * mode)
-
-    def slope(value: Callable[[float], float], x: float, step: float) -> float:
-        rises = [value(x + k * step) - value(x - k * step) for k in (1, 2, 3)]
-        return float(np.dot([45.0, -9.0, 1.0], rises)) / (60.0 * step)
-
-    expected = [
-        slope(lambda v: lifted(mu=v), SHEAR, 1e-2),
-        slope(lambda v: lifted(second=v), LAME, 1e-1),
-        slope(lambda v: lifted(lift=v), 0.02, 1e-4),
-        slope(moved, 0.0, 1e-3),
-    ]
-    for cheaper in (True, False):
-        monkeypatch.setattr(results, "_direct_is_cheaper", lambda *_, c=cheaper: c)
-        found = result.sensitivity("u_y", at=end, by=by)
-        assert [*found.values()] == pytest.approx(expected, rel=1e-8)
-        assert [1.000001 * v for v in found.values()] != pytest.approx(expected, rel=1e-8)

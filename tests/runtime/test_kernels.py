@@ -18,7 +18,6 @@ from softehl.runtime.fem.rules import content_rule, facet_rule, film_rule, gauss
 from softehl.runtime.kernels import (
     ArgumentError,
     Kernel,
-    KernelError,
     MissingKernelsError,
     Rule,
     load_kernel,
@@ -112,30 +111,6 @@ def test_families_offer_what_the_contract_says() -> None:
         assert len(kernel.signature) == 16
         assert set(kernel.parameters) <= set(VALUES)
         assert load_kernel(name) is kernel
-
-
-def test_names_are_in_the_order_of_the_arrays() -> None:
-    film, contact = load_kernel("film"), load_kernel("contact")
-    assert film.parameters == (
-        "rod_radius",
-        "rod_speed",
-        "viscosity",
-        "pressure_viscosity",
-        "cavitation_penalty",
-        "force_weight",
-        "shear_weight",
-    )
-    assert film.unknowns == ("u_z1", "u_r1", "u_z2", "u_r2")
-    assert (film.interpolated, film.components) == ("p", 2)
-    facet = load_kernel("film_facet")
-    assert (facet.interpolated, facet.components) == ("p_minus, p_plus", 4)
-    assert facet.fields == ("x", "h", "jump", "flux", "flux_jump")
-    assert film.fields == ("x", "dx", "h", "p", "tau", "flux", "tau_rod", "eta")
-    assert contact.data == ("n_z", "n_r", "c", "area", "rho")
-    assert contact.unknowns[-1] == "lambda"
-    assert load_kernel("mean_rotation").unknowns[-1] == "moment"
-    stress = ("z", "r", "J", "sigma_zz", "sigma_rr", "sigma_tt", "sigma_zr")
-    assert load_kernel("solid_fbar").fields == stress
 
 
 # ----------------------------------------------------------------------------------- good calls
@@ -283,15 +258,6 @@ def test_the_rule_of_the_call_is_used(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(ends, positional[1][:, [4, -1]], rtol=1e-12)
 
 
-def test_the_number_of_modes_is_that_of_the_rule(rng: np.random.Generator) -> None:
-    kernel = load_kernel("film")
-    (X, u), named = arguments("film", 2, rng)
-    for m_p in (1, 2, 5):
-        dofs = np.column_stack([u[:, :4], np.ones((2, m_p + 1))])
-        _, K = kernel.tangent(X, dofs, **{**named, "rule": film_rule(m_p)})
-        assert K.shape == (2, 5 + m_p, 5 + m_p)
-
-
 # ----------------------------------------------------------------------------------- bad calls
 
 
@@ -366,12 +332,6 @@ def test_dofs_must_match_the_modes_of_the_rule(rng: np.random.Generator) -> None
     positional, named = arguments("film", 1, rng)
     with pytest.raises(ArgumentError, match=r"dofs has shape \(1, 8\), must be \(1, 9\)"):
         load_kernel("film").residual(*positional, **{**named, "rule": film_rule(4)})
-
-
-def test_errors_have_one_ancestor() -> None:
-    assert issubclass(ArgumentError, KernelError)
-    assert issubclass(ArgumentError, ValueError)
-    assert issubclass(MissingKernelsError, KernelError)
 
 
 def test_a_rule_of_another_dimension_is_refused(rng: np.random.Generator) -> None:

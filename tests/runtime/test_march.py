@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -164,30 +163,6 @@ def test_history_in_load_steps_is_committed_once_each() -> None:
     )
 
 
-def test_a_march_goes_on_bitwise(tmp_path: Path) -> None:
-    study, file = rod(), tmp_path / "rod.npz"
-    whole = list(study.march(dt=0.01, until=0.2, method="bdf2", tolerance=1e-3))
-    begun = study.march(dt=0.01, until=0.2, method="bdf2", tolerance=1e-3, checkpoint=file)
-    first = list(itertools.islice(begun, 4))
-    begun.close()  # type: ignore[attr-defined]
-    rest = list(study.march(dt=0.01, until=0.2, method="bdf2", tolerance=1e-3, restart=file))
-    assert [r.t for r in (*first, *rest)] == [r.t for r in whole]
-    np.testing.assert_array_equal(rest[-1].x, whole[-1].x)
-
-
-def test_history_goes_through_a_restart(tmp_path: Path) -> None:
-    study, file = Study(Mesh.line(2.0, cells=3)), tmp_path / "bar.npz"
-    study.add("bar", maxwell(), E=10.0, tau=0.5)
-    study.fix("left", u=0.0)
-    study.fix("right", u=0.02)
-    whole = list(study.march(dt=0.1, until=1.0))
-    list(study.march(dt=0.1, until=0.5, checkpoint=file))
-    rest = list(study.march(dt=0.1, until=1.0, restart=file))
-    np.testing.assert_array_equal(rest[-1].x, whole[-1].x)
-    after, without = (results[-1].fields("bar")["stress"] for results in (rest, whole))
-    np.testing.assert_array_equal(after, without)
-
-
 def test_what_is_refused(tmp_path: Path) -> None:
     study = rod(4)
     with pytest.raises(StudyError, match="dt = 0"):
@@ -288,19 +263,6 @@ def test_arguments_that_a_study_fills_and_those_it_does_not() -> None:
         study.solve()
     with pytest.raises(StudyError, match="rate comes from the steps in time"):
         rod(4).add("other", heat(), k=1.0, rate=2.0)
-
-
-def test_pages_that_are_refused() -> None:
-    from softehl.codegen.language.complaints import ModelError
-
-    m = Model("m", nodes=2, rule=quadrature.gauss(1, 1))
-    m.nodal_unknowns("u")
-    with pytest.raises(ModelError, match="history: v is no point data; there are none"):
-        m.history(v=0)
-    with pytest.raises(ModelError, match="w is no unknown at the nodes"):
-        m.rates("w")
-    with pytest.raises(ModelError, match="nodes = 3, must be 1 to 2"):
-        m.nodal_unknowns("p", nodes=3)
 
 
 def test_a_march_that_cannot_go_on_says_when_and_why() -> None:

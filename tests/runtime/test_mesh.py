@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 from softehl.runtime.mesh.o_grid import Disc, disc_mesh
 from softehl.runtime.mesh.sections import SectionMesh, corner_jacobians
@@ -84,12 +83,6 @@ def test_elements_on_the_arc_are_about_as_tall_as_wide_and_the_smallest(d: int) 
     assert ratio.min() > 0.4
     assert ratio.max() < 1.5
     assert on_arc[:, 1].max() < 0.5 * edges[:, 1].max()
-
-
-def test_doubling_keeps_every_node() -> None:
-    coarse, fine = disc_mesh(_disc(), 2), disc_mesh(_disc(), 4)
-    distance, _ = cKDTree(fine.points).query(coarse.points)
-    assert np.max(distance) < 1e-12
 
 
 def test_area_converges_to_the_circle_with_second_order() -> None:

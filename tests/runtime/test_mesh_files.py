@@ -354,25 +354,6 @@ def test_families_of_med_become_names(monkeypatch: pytest.MonkeyPatch, tmp_path:
     np.testing.assert_array_equal(again.nodes("held"), mesh.nodes("left"))
 
 
-@pytest.mark.parametrize("ending", ["vtu", "vtk", "result.vtu"])
-def test_wedges_of_vtk_have_the_positive_volume_that_vtk_gives_them(
-    ending: str, tmp_path: Path
-) -> None:
-    """VTK sees the first triangle of a wedge from outside against the clock."""
-    mesh = every_kind("wedge", 1)
-    path = tmp_path / f"part.{ending}"
-    if ending == "result.vtu":
-        study = Study(mesh)
-        study.add("body", material="hooke", E=1.0, nu=0.0)
-        study.fix("boundary", u_x=0, u_y=0, u_z=0)
-        study.solve().write(path)
-    else:
-        mesh.write(path)
-    nodes = meshio.read(path).cells_dict["wedge"]
-    a, b, c, d = (mesh.points[nodes[:, k]] for k in (0, 1, 2, 3))
-    assert (np.einsum("nd,nd->n", np.cross(b - a, c - a), d - a) < 0.0).all()
-
-
 @pytest.mark.parametrize("title", ["Nodes", "ParametricNodes"])
 def test_parametric_nodes_of_gmsh(title: str, tmp_path: Path) -> None:
     """With the entity of each node, and its parameters on curves and surfaces."""

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from softehl import Mesh, SoftehlError, Study
-from softehl.runtime import mpi
 
 
 @pytest.fixture(scope="module")
@@ -48,17 +46,3 @@ def test_a_name_that_is_not_there(result: Any, ask: Callable[[Any], object], mes
         ask(result)
     assert isinstance(caught.value, SoftehlError)
     assert str(caught.value).startswith(message)
-
-
-@pytest.mark.parametrize("version", [(3, 11), (3, 12)])
-def test_petsc_that_is_missing(version: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "version_info", (*version, 0))
-    monkeypatch.setitem(sys.modules, "petsc4py", None)
-    mpi.petsc.cache_clear()
-    study = Study(Mesh.rectangle(2, 1, cells=(2, 1)))
-    study.add("rubber", material="hooke", E=10.0, nu=0.0)
-    with pytest.raises(SoftehlError, match=r"pip install 'softehl\[mpi\]'") as caught:
-        study.solve(engine="petsc")
-    assert "\n" not in str(caught.value)
-    assert ("needs Python 3.12 or newer, this is 3.11" in str(caught.value)) == (version < (3, 12))
-    mpi.petsc.cache_clear()

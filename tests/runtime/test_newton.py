@@ -83,13 +83,6 @@ def test_each_residual_of_a_square_root_is_the_squared_last_one() -> None:
     assert order(solution) == pytest.approx(2.0, abs=0.05)
 
 
-def test_two_equations_converge_quadratically_to_the_closed_form() -> None:
-    solution = solve(circle_and_hyperbola(), 3.0, 0.1)
-    root = np.array([math.sqrt(6.0) + math.sqrt(2.0), math.sqrt(6.0) - math.sqrt(2.0)]) / 2.0
-    assert solution.x == pytest.approx(root, rel=1e-14)
-    assert order(solution) == pytest.approx(2.0, abs=0.15)
-
-
 @pytest.mark.parametrize(
     ("problem", "x0"),
     [(square_root(scale=1.05), (3.0,)), (circle_and_hyperbola(coupling=0.5), (3.0, 0.1))],
@@ -118,11 +111,6 @@ def test_history_and_counts_belong_to_the_iterates() -> None:
     assert solution.factorisations == solution.iterations == len(norms) - 1
     assert x0[0] == 3.0
     assert solution.raise_for_status() is solution
-
-
-def test_a_solved_start_costs_nothing() -> None:
-    solution = solve(square_root(), math.sqrt(2.0))
-    assert (solution.converged, solution.iterations, solution.factorisations) == (True, 0, 0)
 
 
 def test_full_step_passes_a_kink_although_the_norm_rises() -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tracemalloc
 from functools import partial
-from time import process_time
 from typing import Any
 
 import numpy as np
@@ -145,21 +143,6 @@ def test_what_is_no_cell_is_refused() -> None:
     study.fix("left", u_x=0)
     with pytest.raises(StudyError, match="the cell is moved by F alone"):
         study.periodic(("left", "right"), ("bottom", "top"))
-
-
-def test_many_nodes_a_side_take_little_memory_and_time() -> None:
-    """10^8 pairs would be 800 MB."""
-    rng = np.random.default_rng(1)
-    ours = rng.random((10_000, 3)) * [1.0, 1.0, 0.0]
-    order = rng.permutation(len(ours))
-    tracemalloc.start()
-    start = process_time()
-    found = partners(ours, ours[order] + [0.0, 0.0, 2.0], 1e-6)
-    seconds, size = process_time() - start, tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    np.testing.assert_array_equal(order[found], np.arange(len(ours)))
-    assert seconds < 1.0
-    assert size < 1e8
 
 
 def test_sides_that_do_not_fit_and_copies_of_a_node_are_refused() -> None:

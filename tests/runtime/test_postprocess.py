@@ -10,7 +10,6 @@ from softehl.runtime.fem.postprocess import (
     interval_below,
     local_exponent,
     nodal_average,
-    relative_spread,
     run_around,
 )
 
@@ -23,12 +22,6 @@ def test_element_means_use_the_weights() -> None:
 def test_element_means_without_weights_are_those_of_the_points() -> None:
     means = element_means(np.array([[1.0, 3.0], [2.0, 4.0]]), np.array([[0.0, 0.0], [1.0, 3.0]]))
     assert means.tolist() == [2.0, 3.5]
-
-
-def test_relative_spread() -> None:
-    assert relative_spread(np.array([-9.0, -11.0, -10.0])) == pytest.approx(0.2)
-    assert relative_spread(np.zeros(3)) == 0.0
-    assert relative_spread(np.array([-1.0, 1.0])) == math.inf
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.pseudo_transient import Moment, PseudoTransient
 from softehl.runtime.solve.solution import Branch, Status
-from tests.runtime.test_continuation import Algebraic
+from tests.runtime.test_newton import Algebraic
 
 START = Moment(np.array([-5.0]), 1e-3)
 

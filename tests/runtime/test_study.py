@@ -68,16 +68,8 @@ def test_uniaxial_stress_and_reactions() -> None:
     assert stress(stretch) == pytest.approx(0.3, rel=1e-9)
     assert stress(lateral) == pytest.approx(0.0, abs=1e-9)
     assert result.reaction("left")["u_x"] == pytest.approx(-0.3, rel=1e-9)
-    assert result.reaction("right")["u_x"] == pytest.approx(0.0, abs=1e-9)
-
-
-def test_an_oracle_that_is_wrong_is_seen() -> None:
-    study = block_of()
-    study.fix("left", u_x=0.0)
-    study.fix("bottom", u_y=0.0)
-    study.load("right", u_x=0.3)
-    result = study.solve()
     assert result.reaction("left")["u_x"] != pytest.approx(-0.3001, rel=1e-9)
+    assert result.reaction("right")["u_x"] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_loads_are_per_length_and_follow_functions() -> None:
@@ -109,17 +101,6 @@ def test_a_parameter_that_follows_the_load_factor_and_a_follower_load() -> None:
     assert cauchy == pytest.approx(-0.5, rel=1e-9)
 
 
-def test_contact_page_on_a_side() -> None:
-    study = Study(Mesh.rectangle(1.0, 1.0, cells=(3, 3)))
-    study.add("body", pages.solid(), **SOLID)
-    study.add("floor", pages.floor(), on="bottom", k=1e3)
-    study.fix("left", u_x=0.0)
-    study.fix("top", u_y=-0.1)
-    result = study.solve(steps=2)
-    assert -0.01 < result.values("u_y")[study.mesh.nodes("bottom")].max() < 0.0
-    assert result.reaction("top")["u_y"] < 0.0
-
-
 def test_unknowns_of_cells_and_shared_ones() -> None:
     study = Study(Mesh.rectangle(1.0, 1.0, cells=(2, 2)))
     study.add("body", pages.mean_pressure(), mu=MU, kappa=100.0)
@@ -132,26 +113,6 @@ def test_unknowns_of_cells_and_shared_ones() -> None:
     shared.fix("bottom", u_x=0.0, u_y=0.0)
     shared.fix("top", u_x=0.1, u_y=0.0)
     assert shared.solve().values("p").shape == (1,)
-
-
-def test_springs_and_ties() -> None:
-    """Springs carry the whole load; a periodic shear has equal sides."""
-    study = block_of()
-    study.spring("left", u_x=2.0)
-    study.fix("bottom", u_y=0.0)
-    study.load("right", u_x=1e-4)
-    result = study.solve()
-    stretched = result.values("u_x")[study.mesh.nodes("left")]
-    assert 2.0 * stretched.sum() == pytest.approx(1e-4, rel=1e-6)
-    periodic = block_of()
-    periodic.fix("bottom", u_x=0.0, u_y=0.0)
-    periodic.fix(lambda x: (x[:, 1] == 1.0) & (x[:, 0] > 0.0) & (x[:, 0] < 2.0), u_x=0.2, u_y=0.0)
-    periodic.tie("right", "left", "u_x", "u_y")
-    found = periodic.solve()
-    left, right = (periodic.mesh.nodes(side) for side in ("left", "right"))
-    for name in ("u_x", "u_y"):
-        values = found.values(name)
-        np.testing.assert_allclose(values[right], values[left], atol=1e-12)
 
 
 def test_reactions_of_ties_and_springs_are_those_of_all_nodes() -> None:
@@ -371,8 +332,3 @@ def test_nothing_to_solve_and_a_mesh_inside_out() -> None:
     mesh = Mesh.rectangle(1, 1, cells=(2, 2))
     with pytest.raises(MeshError, match="turned inside out"):
         Study(Mesh(mesh.points, {"quad4": mesh.cells["quad4"][:, ::-1]}))
-
-
-def test_public_names() -> None:
-    assert softehl.Study is Study
-    assert softehl.Mesh is Mesh

@@ -38,17 +38,6 @@ def test_a_group_of_one_kind_of_cells_in_a_mesh_of_two_kinds() -> None:
     assert result.fields("a")["p"].shape[0] == 1
 
 
-def test_a_periodic_cell_of_one_element() -> None:
-    """Nothing fluctuates there; four of them are as stiff."""
-    A = []
-    for cells in ((1, 1), (2, 2)):
-        study = Study(Mesh.rectangle(1, 1, cells=cells))
-        study.add("body", material="neo_hooke", mu=1.0, kappa=2.0)
-        cell = study.periodic(("left", "right"), ("bottom", "top"))
-        A.append(cell.solve(np.array([[1.1, 0.2], [0.0, 1.0]])).A)
-    np.testing.assert_allclose(A[0], A[1], rtol=1e-9, atol=1e-12)
-
-
 def plate() -> Study:
     study = Study(Mesh.rectangle(2, 1, cells=(4, 4)))
     study.add("body", material="hooke", E=1.0, nu=0.3)

@@ -114,65 +114,6 @@ def test_a_patch_that_is_not_affine_is_seen() -> None:
     assert np.ptp(study.solve().fields("rubber")["J"]) > 1e-3
 
 
-def test_a_pressure_of_every_cell_holds_the_volume() -> None:
-    study = Study(Mesh.rectangle(1, 1, cells=(4, 4)))
-    study.add("rubber", constant_pressure, mu=0.4, K=4e4)
-    study.fix("bottom", u_x=0, u_y=0)
-    study.fix("top", u_x=0.2, u_y=0.1)
-    result = study.solve(steps=2)
-    J = result.fields("rubber")["J"].mean(axis=1)
-    assert np.abs(J - 1).max() < 1e-4
-    assert len(result.values("p")) == 16
-
-
-@softehl.page
-def constant_pressure(m):  # type: ignore[no-untyped-def]
-    """Displacements and a pressure of every cell."""
-    u, p = m.vector("u"), m.scalar("p", order=0)
-    mu, K = m.parameters(mu="shear modulus [MPa]", K="bulk modulus [MPa]")
-    F = m.deformation_gradient(u)
-    J = m.define("J", F.det())
-    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + p * (J - 1) - p**2 / (2 * K))
-    m.fields(J=J)
-
-
-@softehl.page
-def poisson(m):  # type: ignore[no-untyped-def]
-    """- div grad T = q with T = sin(pi x) sin(pi y) or sin(pi x) sin(pi y) sin(pi z)."""
-    T = m.scalar("T")
-    exact = sp.Mul(*(sp.sin(sp.pi * x) for x in m.position))
-    m.weak(m.grad(T), m.grad(T))
-    m.weak(-len(m.position) * sp.pi**2 * exact, T)
-    m.fields(error=(T - exact) ** 2)
-
-
-@pytest.mark.parametrize(
-    ("shape", "order"),
-    [
-        ("triangle", 1),
-        ("quad", 2),
-        pytest.param("triangle", 2, marks=pytest.mark.slow),
-        pytest.param("quad", 1, marks=pytest.mark.slow),
-        pytest.param("tetrahedron", 1, marks=pytest.mark.slow),
-        pytest.param("tetrahedron", 2, marks=pytest.mark.slow),
-        pytest.param("wedge", 1, marks=pytest.mark.slow),
-        pytest.param("hex", 1, marks=pytest.mark.slow),
-        pytest.param("serendipity", 2, marks=pytest.mark.slow),
-        pytest.param("hex", 2, marks=pytest.mark.slow),
-    ],
-)
-def test_errors_fall_with_the_order_of_the_cell(shape: str, order: int) -> None:
-    errors = []
-    for cells in (4, 8):
-        mesh = box(shape, order, cells)
-        study = Study(mesh)
-        study.add("plate", poisson)
-        for side in mesh.sides:
-            study.fix(side, T=0)
-        errors.append(np.sqrt(study.solve().fields("plate")["error"].mean()))
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(order + 1, abs=0.25)
-
-
 def test_an_axisymmetric_body_is_stretched_around_the_x_axis() -> None:
     mesh = Mesh.rectangle(1, 1, cells=(2, 2), shape="triangle")
     error, J = patch(mesh, "axisymmetric", np.diag([0.1, 0.05, 0.0]))
@@ -185,22 +126,6 @@ def test_a_geometry_that_the_mesh_cannot_have_is_refused() -> None:
         Study(Mesh.rectangle(1, 1, cells=(1, 1)), geometry="solid")
     with pytest.raises(StudyError, match="plane stress is said on a page"):
         Study(Mesh.rectangle(1, 1, cells=(1, 1)), geometry="plane stress")
-
-
-def test_a_file_may_hold_a_page_of_fields(tmp_path: Path) -> None:
-    path = tmp_path / "laplace.py"
-    path.write_text(
-        "import softehl\n@softehl.page\ndef laplace(m):\n"
-        "    T = m.scalar('T')\n    (k,) = m.parameters(k='conductivity [W/(mm K)]')\n"
-        "    m.weak(k * m.grad(T), m.grad(T))\n"
-    )
-    study = Study(Mesh.rectangle(2, 1, cells=(2, 1), shape="triangle"))
-    study.add("plate", path, k=3.0)
-    study.fix("left", T=0)
-    study.fix("right", T=4)
-    result = study.solve()
-    assert result.at((1.0, 0.5))["T"] == pytest.approx(2.0, rel=1e-12)
-    assert result.reaction("right")["T"] == pytest.approx(3.0 * 4 / 2, rel=1e-12)
 
 
 @softehl.page
@@ -292,33 +217,6 @@ def test_sides_have_outward_normals_and_values() -> None:
     study.add("loss", convection, on="right", h=0.5, q=1.0)
     # 3 dT/dx = - (T / 2 + 1) on the right: T = 4 - a x with 3 a = (4 - 2 a) / 2 + 1
     assert study.solve().at((2.0, 0.5))["T"] == pytest.approx(4 - 2 * 3 / 4, rel=1e-12)
-
-
-@softehl.page
-def taylor_hood(m):  # type: ignore[no-untyped-def]
-    """Displacements, and a pressure of lower order."""
-    u, p = m.vector("u"), m.scalar("p", order=1)
-    mu, K = m.parameters(mu="shear modulus", K="bulk modulus")
-    F = m.deformation_gradient(u)
-    J = m.define("J", F.det())
-    m.minimise(mu / 2 * ((F.T * F).trace() - 3 - 2 * sp.log(J)) + p * (J - 1) - p**2 / (2 * K))
-
-
-@pytest.mark.parametrize(("length", "mu"), [(1e-9, 1e10), (1e6, 1e-9)])
-def test_units_of_lengths_and_pressures_change_nothing(length: float, mu: float) -> None:
-    def bent(length: float, mu: float) -> tuple[float, float, int]:
-        study = Study(Mesh.rectangle(2 * length, length, cells=(3, 2), order=2))
-        study.add("rubber", taylor_hood, mu=mu, K=1000 * mu)
-        study.fix("left", u_x=0, u_y=0)
-        study.load("right", u_y=0.02 * mu)
-        result = study.solve()
-        corner = result.at((2 * length, length))
-        return corner["u_y"] / length, corner["p"] / mu, result.iterations
-
-    *values, iterations = bent(length, mu)
-    *expected, usual = bent(1.0, 1.0)
-    assert values == pytest.approx(expected, rel=1e-8)
-    assert iterations == usual
 
 
 @softehl.page

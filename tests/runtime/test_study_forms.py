@@ -12,7 +12,6 @@ import pytest
 from softehl import Definition, Mesh, Model, Study, element, kinematics, load_kernel, quadrature
 from softehl.runtime.begin import beginning
 from softehl.runtime.dynamics.motion import stored_energy
-from softehl.runtime.fem.assembly import ElementBlock
 from softehl.runtime.fem.dofs import separate_dofs
 from softehl.runtime.fem.products import NoProductError, require_product
 from softehl.runtime.fem.rules import film_rule
@@ -122,28 +121,6 @@ def test_an_element_between_any_two_nodes_under_another_name() -> None:
     study.fix("left", u_x=0.0)
     study.load((1.0,), u_x=8.0)
     assert study.solve().at((1.0,))["u_x"] == pytest.approx(2.0, rel=1e-12)
-
-
-def test_a_constant_tangent_is_evaluated_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = []
-    tangent = ElementBlock.tangent
-
-    def counted(block: ElementBlock, x: Any, parameters: Any) -> Any:
-        calls.extend([block.name] if block.name == "chain" else [])
-        return tangent(block, x, parameters)
-
-    monkeypatch.setattr(ElementBlock, "tangent", counted)
-    found, numbers = [], []
-    for constant in (False, True):
-        study = line()
-        study.add("chain", rope(), constant=constant, k=2.0)
-        study.fix("left", u=0.0)
-        study.load((1.0,), u=1.0)
-        calls.clear()
-        found.append(study.solve(steps=4).values("u"))
-        numbers.append(len(calls))
-    assert found[0] == pytest.approx(found[1], rel=1e-14)
-    assert numbers[1] == 1 < numbers[0]
 
 
 def test_derivatives_and_energies_know_the_rule_of_a_block() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from softehl import Definition, Mesh, Model, Study, element, kinematics, quadrature
+from softehl import Definition, Mesh, Model, Study, quadrature
 from softehl.codegen.language.complaints import ModelError
 from softehl.runtime.solve.solution import NotConverged
 from tests.runtime import solid_page as pages
@@ -37,17 +37,6 @@ def solution(page: Definition, f: float, start: float = 0.0) -> float:
     study.add("rest", nodal(lambda m, u, f: u - f, "rest"), on="left", f=0.0)
     study.start(u=start)
     return float(study.solve().at((1.0,))["u"])
-
-
-def through_a_name(m: Model, u: Any, f: Any) -> Any:
-    """d/du of (1 + u)^4 / 4, written with SymPy's own diff through two names."""
-    a = m.define("a", 1 + u)
-    b = m.define("b", a**2)
-    return sp.diff(b**2 / 4, u) - f
-
-
-def test_derivatives_through_names() -> None:
-    assert solution(nodal(through_a_name, "named"), 8.0) == pytest.approx(1.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("f", [1e-11, 1e-6, 1.0])
@@ -73,16 +62,6 @@ def test_a_side_that_is_not_taken_needs_no_value() -> None:
     assert solution(page, 0.5) == pytest.approx(0.5, rel=1e-12)
     found = solution(page, 2.0, start=1.5)
     assert found + np.log(found) * np.sqrt(found - 1) == pytest.approx(2.0, rel=1e-9)
-
-
-def test_a_chain_of_many_names() -> None:
-    def law(m: Model, u: Any, f: Any) -> Any:
-        value = u
-        for k in range(300):
-            value = m.define(f"v{k}", value + u / 300)
-        return value - f
-
-    assert solution(nodal(law, "chain"), 3.0) == pytest.approx(1.5, rel=1e-12)
 
 
 @pytest.mark.parametrize("load", [4e-10, 4e-4])
@@ -121,20 +100,6 @@ def test_pages_that_say_what_no_kernel_can_hold(name: str) -> None:
     with pytest.raises((ModelError, TypeError)) as error:
         solution(nodal(ILLEGAL[name], "illegal"), 1.0)
     assert "\n" not in str(error.value)
-
-
-def test_a_page_of_another_element_is_refused() -> None:
-    """A page of 9 nodes on cells of 8, and one whose sides have another number of nodes."""
-    cell = element("quad9")
-    m = Model("nine", nodes=9, rule=cell.rule)
-    X = m.coordinates("X", "Y")
-    (u,) = m.nodal_unknowns("u")
-    e = kinematics.isoparametric(m, X, cell.gradient(*m.point()))
-    slope = sp.Matrix(e.dN).T * sp.Matrix(u)
-    m.potential(m.integral("Pi", slope.dot(slope) * e.detJ))
-    study = Study(Mesh.rectangle(1, 1, cells=(1, 1), order=2, shape="serendipity"))
-    with pytest.raises(ValueError, match="9 nodes, the mesh has 1 quad8"):
-        study.add("body", m.finish())
 
 
 def test_another_law_has_another_solution() -> None:

@@ -79,15 +79,6 @@ def test_a_body_that_only_contact_could_hold_is_told() -> None:
     assert force(study.solve(steps=2)) == pytest.approx(0.2, rel=1e-3)
 
 
-def test_bodies_that_stay_apart_do_not_notice_each_other() -> None:
-    study = stacked(1, 1, apart=0.3)
-    study.fix("lower:bottom", u_x=0, u_y=0)
-    study.fix("upper:top", u_x=0, u_y=-0.2)
-    result = study.solve()
-    assert force(result) == pytest.approx(0.0, abs=1e-12)
-    assert np.abs(result.values("u_y")[result.system.mesh.nodes("lower:top")]).max() < 1e-12
-
-
 def test_no_step_jumps_over_a_thin_body() -> None:
     """A plate 0.1 thick, moved by 0.4 at once, is stopped by what it meets after 0.2."""
     block = Mesh.rectangle(1, 1, cells=(3, 3))
