@@ -24,8 +24,8 @@ from softehl.cases.seal.gland.sections.rectangular import Rectangular
 from softehl.cases.seal.gland.sections.trapezoid import Trapezoid
 from softehl.cases.seal.gland.sections.u_cup import UCup
 from softehl.cases.seal.gland.sections.x_ring import XRing
-from softehl.runtime.mesh.outline import Point, Shape
-from softehl.runtime.mesh.outline_mesh import outline_mesh
+from softehl.cases.seal.meshing.outline import Point, Shape
+from softehl.cases.seal.meshing.outline_mesh import outline_mesh
 
 FILM, PRESSURE, BODY, CAP = "#1b6ca8", "#c8553d", "#f2e3c0", "#b9c4cf"
 CAP_THICKNESS = 0.6

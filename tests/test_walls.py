@@ -28,8 +28,7 @@ ORDER = {
     "runtime": (
         *(
             "arrays mpi names tuning",
-            "elimination",
-            "cut library",
+            "library",
             "io",
             "calls",
             "kernels",
@@ -52,7 +51,7 @@ ORDER = {
     ),
     "cases": ("harness", "seal", "oring slider cycle", "paper", "shipped", "app", "cli document"),
     "cases/seal": (
-        *("gland", "section", "equations", "states"),
+        *("meshing", "correctors", "gland", "section", "equations", "states"),
         *("solve", "sensitivity", "cycle", "report"),
     ),
 }
@@ -73,7 +72,7 @@ def imports_of(source: str) -> Iterator[str]:
             assert node.level == 0, "imports are absolute, by room"
             assert node.module is not None
             yield node.module
-            # `from runtime import mesh` imports softehl.runtime.mesh.sections
+            # `from runtime import mesh` imports softehl.runtime.mesh.mesh
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 

@@ -11,6 +11,7 @@ import pytest
 from softehl.cases.harness.row import OK
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.discretisation import DENSITIES
+from softehl.cases.seal.meshing.o_grid import Disc, disc_mesh
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.estimate import (
     ORDER,
@@ -25,7 +26,6 @@ from softehl.cases.seal.states.state import (
     Silent,
 )
 from softehl.cases.seal.states.verdict import FilmNumbers
-from softehl.runtime.mesh.o_grid import Disc, disc_mesh
 from tests.cases.oring_cases import oring
 
 CONVERGED = {1600.0: 3.1842, 100.0: 0.59552}

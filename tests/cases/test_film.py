@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from softehl.cases.seal.correctors.layer_split import Layered
+from softehl.cases.seal.correctors.schur_corrector import SchurCorrector
 from softehl.cases.seal.equations.equations import build_system
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve import correctors
@@ -15,9 +17,7 @@ from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.solve.squeeze_film import film_layer, film_loads
 from softehl.cases.seal.states.state import Outcome
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.layered import Layered
 from softehl.runtime.solve.backends import choose
-from softehl.runtime.solve.schur import SchurCorrector
 from softehl.runtime.solve.solution import Solution, Status
 from tests.cases.oring_cases import oring
 from tests.cases.test_method import Recorder

@@ -8,6 +8,10 @@ import pytest
 
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.meshing import o_grid
+from softehl.cases.seal.meshing.o_grid import MOST_LAYERS, SHORT, STEEPEST_GROWTH
+from softehl.cases.seal.meshing.section_mesh import corner_jacobians
+from softehl.cases.seal.meshing.spacing import Spacing, Spot, graded
 from softehl.cases.seal.section.layout import Layout, uniform_layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
@@ -17,10 +21,6 @@ from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.states.contacts import contact_edges
 from softehl.cases.seal.states.state import Outcome, Silent
 from softehl.runtime.arrays import Array
-from softehl.runtime.mesh import o_grid
-from softehl.runtime.mesh.o_grid import MOST_LAYERS, SHORT, STEEPEST_GROWTH
-from softehl.runtime.mesh.sections import corner_jacobians
-from softehl.runtime.mesh.spacing import Spacing, Spot, graded
 from tests.cases.oring_cases import oring
 
 _RADIUS = 0.5 * Seal().section_diameter

@@ -11,6 +11,8 @@ import pytest
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.equations.system import BORE, ROD
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.meshing.outline import Outline, Shape
+from softehl.cases.seal.meshing.section_mesher import Sizes
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver, State
@@ -19,8 +21,6 @@ from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.states.contacts import contact_pressure, unsealed
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
-from softehl.runtime.mesh.outline import Outline, Shape
-from softehl.runtime.mesh.section_mesh import Sizes
 
 P = Seal(ring="AS568-210", rod=19.0, gland="dynamic", density=1, sealed_pressure=3.0)
 

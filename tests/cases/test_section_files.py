@@ -18,15 +18,15 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.files import finer, outline_of, read_mesh, read_outline
 from softehl.cases.seal.gland.sections.keys import lobes
+from softehl.cases.seal.meshing.outline import Arc, Outline, Shape
+from softehl.cases.seal.meshing.outline_mesh import outline_mesh
+from softehl.cases.seal.meshing.section_mesh import SectionMesh, corner_jacobians
 from softehl.cases.seal.solve.contact_meshes import ContactMeshes
 from softehl.cases.seal.solve.contact_solver import ContactSolver
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.solve.path import PathDriver
 from softehl.cases.seal.states.state import FilmState, Silent
 from softehl.cases.shipped import solve_cases
-from softehl.runtime.mesh.outline import Arc, Outline, Shape
-from softehl.runtime.mesh.outline_mesh import outline_mesh
-from softehl.runtime.mesh.sections import SectionMesh, corner_jacobians
 
 DRAWN = {name: kind().shape(50.39) for name, kind in SECTIONS.items()}
 

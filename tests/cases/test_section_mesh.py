@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from softehl.cases.seal.meshing.outline import Outline, Shape
+from softehl.cases.seal.meshing.section_mesh import corner_jacobians
+from softehl.cases.seal.meshing.section_mesher import Sizes, section_mesh
+from softehl.cases.seal.meshing.spacing import Spot, graded
 from softehl.cases.seal.section.layout import Layout, uniform_layout
-from softehl.runtime.mesh.outline import Outline, Shape
-from softehl.runtime.mesh.section_mesh import Sizes, section_mesh
-from softehl.runtime.mesh.sections import corner_jacobians
-from softehl.runtime.mesh.spacing import Spot, graded
 from tests.cases.section_matrix import drawn
 from tests.runtime.test_outline_mesh import imbalance
 

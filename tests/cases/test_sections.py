@@ -17,10 +17,10 @@ from softehl.cases.seal.gland.sections.round import Round
 from softehl.cases.seal.gland.sections.trapezoid import Trapezoid
 from softehl.cases.seal.gland.sections.u_cup import UCup
 from softehl.cases.seal.gland.sections.x_ring import XRing
-from softehl.runtime.mesh.outline import Outline
-from softehl.runtime.mesh.outline_mesh import outline_mesh
-from softehl.runtime.mesh.sections import corner_jacobians
-from softehl.runtime.mesh.spacing import Spot, graded
+from softehl.cases.seal.meshing.outline import Outline
+from softehl.cases.seal.meshing.outline_mesh import outline_mesh
+from softehl.cases.seal.meshing.section_mesh import corner_jacobians
+from softehl.cases.seal.meshing.spacing import Spot, graded
 from tests.runtime.test_outline_mesh import imbalance
 
 

@@ -24,6 +24,7 @@ from softehl.cases.seal.gland.varied import LENGTHS
 from softehl.cases.seal.report.tables import SHOWN, read_slopes, told
 from softehl.cases.seal.report.tornado import tornado_figure
 from softehl.cases.seal.sensitivity.following import edges, shift_rate, shifted, velocities
+from softehl.cases.seal.sensitivity.pseudo_loads import Inputs, Tangent
 from softehl.cases.seal.sensitivity.quantities import (
     QUANTITIES,
     along,
@@ -45,7 +46,6 @@ from softehl.cases.seal.states.sensitivity_table import SensitivityRow, differen
 from softehl.cases.seal.states.state import FilmRow, Silent
 from softehl.cases.seal.states.verdict import Verdict
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.design import Inputs, Tangent
 from softehl.runtime.fem.postprocess import interval_below
 from softehl.runtime.io import read_csv, write_csv
 from softehl.runtime.solve.linear import Factorisation, SparseMatrix

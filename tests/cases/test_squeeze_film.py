@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from softehl.cases.seal.correctors.proximal_term import Anchored, Relaxed
 from softehl.cases.seal.equations.system import DISPLACEMENT
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.contact import OFFSET
@@ -17,7 +18,6 @@ from softehl.cases.seal.solve.method import DryContact
 from softehl.cases.seal.solve.squeeze_film import SqueezeFilm, gap_masses, pressed_film
 from softehl.cases.seal.states.state import Silent
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.relaxed import Anchored, Relaxed
 
 P = Seal(ring="AS568-210", rod=19.0, sealed_pressure=3.0, density=1, speeds=(400.0,), mu_1=1.5)
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array
 
-from softehl.runtime.cut import Cut, Parts
-from softehl.runtime.elimination import Elimination
-from softehl.runtime.solve.condensed import solved
+from softehl.cases.seal.correctors.chord_newton import solved
+from softehl.cases.seal.correctors.layer_split import Cut, Parts
+from softehl.cases.seal.correctors.nested_dissection import Elimination
 from softehl.runtime.solve.linear import SingularMatrix
 
 SEGMENTS, SHARED = 23, 26

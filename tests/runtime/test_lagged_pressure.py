@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from softehl.cases.seal.correctors.perturbed_lagrangian import LaggedPressure, element_pressures
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.solve.contact import contact_problem
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.lagged_pressure import LaggedPressure, element_pressures
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
 from tests.cases.oring_cases import oring

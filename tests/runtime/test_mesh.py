@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from softehl.runtime.mesh.o_grid import Disc, disc_mesh
-from softehl.runtime.mesh.sections import SectionMesh, corner_jacobians
+from softehl.cases.seal.meshing.o_grid import Disc, disc_mesh
+from softehl.cases.seal.meshing.section_mesh import SectionMesh, corner_jacobians
 
 ARCS = [(-34.0, 43.0), (-45.0, 45.0), (-60.0, 70.0)]
 DENSITIES = [1, 2, 4, 8, 16]

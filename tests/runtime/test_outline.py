@@ -7,8 +7,16 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
-from softehl.runtime.mesh.outline import Arc, Line, Outline, OutlineError, Piece, Shape, rounded
-from softehl.runtime.mesh.outline_checks import crossing
+from softehl.cases.seal.meshing.outline import (
+    Arc,
+    Line,
+    Outline,
+    OutlineError,
+    Piece,
+    Shape,
+    rounded,
+)
+from softehl.cases.seal.meshing.outline_checks import crossing
 
 SQUARE = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)]
 RING = Outline.circle((0.3, 26.0), 1.7)

@@ -5,11 +5,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from softehl.cases.seal.meshing.outline import Outline, Shape, rounded
+from softehl.cases.seal.meshing.outline_mesh import outline_mesh
+from softehl.cases.seal.meshing.section_mesh import SectionMesh, corner_jacobians
+from softehl.cases.seal.meshing.spacing import Spot, graded
 from softehl.runtime.mesh.mesh import MeshError
-from softehl.runtime.mesh.outline import Outline, Shape, rounded
-from softehl.runtime.mesh.outline_mesh import outline_mesh
-from softehl.runtime.mesh.sections import SectionMesh, corner_jacobians
-from softehl.runtime.mesh.spacing import Spot, graded
 from tests.reference.calling import Part
 
 DENSITIES = [Fraction(2, 3), 1, Fraction(5, 3), 2, 3, 4]

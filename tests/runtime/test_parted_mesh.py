@@ -6,10 +6,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from softehl.runtime.mesh.outline import Outline, Shape, rounded
-from softehl.runtime.mesh.parted_mesh import BODY, CAP, parted_mesh
-from softehl.runtime.mesh.sections import SectionMesh, corner_jacobians
-from softehl.runtime.mesh.spacing import Spacing, Spot, graded
+from softehl.cases.seal.meshing.outline import Outline, Shape, rounded
+from softehl.cases.seal.meshing.section_mesh import SectionMesh, corner_jacobians
+from softehl.cases.seal.meshing.spacing import Spacing, Spot, graded
+from softehl.cases.seal.meshing.two_region_mesh import BODY, CAP, parted_mesh
 from tests.runtime.test_outline_mesh import imbalance
 
 DENSITIES = [Fraction(5, 3), 1, 2, 4]

@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array
 
+from softehl.cases.seal.correctors.chord_newton import ModifiedNewton
+from softehl.cases.seal.correctors.layer_split import Cut, Parts
+from softehl.cases.seal.correctors.schur_corrector import SchurCorrector, StaleTangent
 from softehl.runtime.arrays import Array
-from softehl.runtime.cut import Cut, Parts
 from softehl.runtime.solve import pardiso
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.linear import Condenser, SingularMatrix
-from softehl.runtime.solve.modified_newton import ModifiedNewton
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.pardiso import Pardiso
-from softehl.runtime.solve.schur import SchurCorrector, StaleTangent
 from softehl.runtime.solve.solution import Status
 from softehl.runtime.solve.steps import StepRule
 from softehl.runtime.solve.superlu import SuperLU

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softehl.runtime.mesh.spacing import Spot, graded
+from softehl.cases.seal.meshing.spacing import Spot, graded
 
 LENGTH, SPOTS, COUNT = 2.4, (0.4, 1.8), 54
 TWO = tuple(Spot(place) for place in SPOTS)

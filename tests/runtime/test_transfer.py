@@ -5,17 +5,17 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from softehl.runtime.mesh.outline import Outline, Shape, rounded
-from softehl.runtime.mesh.section_mesh import Sizes, section_mesh
-from softehl.runtime.mesh.sections import SectionMesh
-from softehl.runtime.mesh.spacing import Spot, graded
-from softehl.runtime.mesh.transfer import (
+from softehl.cases.seal.meshing.mesh_transfer import (
     places_of,
     transfer_boundary,
     transfer_chain,
     transfer_elements,
     transfer_nodes,
 )
+from softehl.cases.seal.meshing.outline import Outline, Shape, rounded
+from softehl.cases.seal.meshing.section_mesh import SectionMesh
+from softehl.cases.seal.meshing.section_mesher import Sizes, section_mesh
+from softehl.cases.seal.meshing.spacing import Spot, graded
 from tests.runtime.test_outline_mesh import SHAPES
 
 FORK = [(0, 0), (4, 0), (4, 1.0), (0.5, 1.0), (0.5, 1.3), (4, 1.3), (4, 2.3), (0, 2.3)]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from softehl.cases.harness.observer import Observer, Outcome
+from softehl.cases.seal.correctors.schur_corrector import StaleTangent
 from softehl.cases.seal.cycle.motion import Motion
 from softehl.cases.seal.cycle.restart import drafted, packed, repeated, taken_up, unpacked
 from softehl.cases.seal.cycle.transient import Instant, March, Reading
@@ -24,7 +25,6 @@ from softehl.cases.seal.solve.squeeze_film import film_layer
 from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import Condenser
-from softehl.runtime.solve.schur import StaleTangent
 from softehl.runtime.solve.solution import Branch, Status
 
 OUTLINES = 48

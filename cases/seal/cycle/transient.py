@@ -13,19 +13,19 @@ from math import nan
 
 import numpy as np
 
+from softehl.cases.seal.correctors.layer_split import Layer, Layered
+from softehl.cases.seal.correctors.schur_corrector import SchurCorrector
 from softehl.cases.seal.cycle.motion import Motion, RodFilm, missing
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.system import FILM, PRESSURE, SQUEEZE
 from softehl.cases.seal.states.results import rough_numbers
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.layered import Layer, Layered
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.differences import differences
 from softehl.runtime.solve.homotopy import Trial, Way, followed
 from softehl.runtime.solve.predictor import through
 from softehl.runtime.solve.record import End, Record
-from softehl.runtime.solve.schur import SchurCorrector
 from softehl.runtime.solve.solution import Branch, Status
 from softehl.runtime.solve.steps import StepRule, next_parameter
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from softehl.cases.seal.correctors.perturbed_lagrangian import element_pressures
 from softehl.cases.seal.equations import scales
 from softehl.cases.seal.equations.loads import ContactLoads, FilmLoads
 from softehl.cases.seal.equations.system import (
@@ -40,7 +41,6 @@ from softehl.runtime.fem.assembly import ElementKernel
 from softehl.runtime.fem.contact import Obstacle, contact_data
 from softehl.runtime.fem.dofs import chain_dofs, separate_dofs
 from softehl.runtime.fem.guards import ChangesLittle, Guard, KeepsOrientation, StaysPositive
-from softehl.runtime.fem.lagged_pressure import element_pressures
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.mesh.mesh import Mesh

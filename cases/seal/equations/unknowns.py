@@ -22,12 +22,12 @@ from softehl.cases.seal.equations.system import (
     Place,
 )
 from softehl.cases.seal.gland.parameters import Seal
+from softehl.cases.seal.meshing.section_mesh import SectionMesh
 from softehl.cases.seal.section.section import SealSection
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.fem.contact import tributary_areas
 from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.unknowns import Numbering
-from softehl.runtime.mesh.sections import SectionMesh
 
 
 @dataclass(frozen=True, eq=False)

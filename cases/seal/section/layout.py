@@ -15,12 +15,12 @@ import numpy as np
 
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.sections.files import finer
+from softehl.cases.seal.meshing.outline import Shape, gentle
+from softehl.cases.seal.meshing.section_mesh import SectionMesh
+from softehl.cases.seal.meshing.section_mesher import Sizes, section_mesh
+from softehl.cases.seal.meshing.spacing import Spacing, Spot, graded
 from softehl.runtime.arrays import Array
 from softehl.runtime.fem.postprocess import run_around
-from softehl.runtime.mesh.outline import Shape, gentle
-from softehl.runtime.mesh.section_mesh import Sizes, section_mesh
-from softehl.runtime.mesh.sections import SectionMesh
-from softehl.runtime.mesh.spacing import Spacing, Spot, graded
 
 _LEVEL, _LOOKED_AT = 1e-6, 4001
 """Part of the height that two lobes as low may differ by, and places of a film that are compared.

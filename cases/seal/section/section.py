@@ -15,9 +15,9 @@ import numpy as np
 
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.free_seal import Solid
+from softehl.cases.seal.meshing.section_mesh import SectionMesh
 from softehl.cases.seal.section.layout import Layout, uniform_layout
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.mesh.sections import SectionMesh
 
 BODY = "body"
 """The elements without a material of their own: all of them, or what is left."""

@@ -13,12 +13,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from softehl.cases.seal.meshing.mesh_morphing import potential
+from softehl.cases.seal.sensitivity.pseudo_loads import Inputs, rate_of
 from softehl.cases.seal.sensitivity.quantities import Quantity
 from softehl.cases.seal.sensitivity.variation import FilmCase
 from softehl.cases.seal.states.film_signs import INLET
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.design import Inputs, rate_of
-from softehl.runtime.mesh.carried_mesh import potential
 
 WITH_EDGE = 0.25
 """Part of a contact whose nodes move as its edge does, from either edge on."""

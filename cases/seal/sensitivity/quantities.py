@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from softehl.cases.seal.equations.system import DISPLACEMENT, FACET, FILM
+from softehl.cases.seal.sensitivity.pseudo_loads import FieldRates, Inputs, weighted
 from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
 from softehl.cases.seal.states.contacts import CONTACT_FILM, GROOVE, contact_film, contact_level
 from softehl.cases.seal.states.results import film_parts, metering
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.design import FieldRates, Inputs, weighted
 
 CALLED = {
     "h_star": ("film thickness h*", "um"),

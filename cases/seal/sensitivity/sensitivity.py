@@ -4,6 +4,9 @@ All derivatives are those of the discrete equations at the converged state, d lo
 mesh moves with the section (`cases.seal.sensitivity.variation`). For what a run reports it moves
 with the edges of the film, too (`cases.seal.sensitivity.following`). The film does not
 depend on the contact it began from.
+
+With K = dR/dx and the load b = dR/ds of a variation, dx = -K^-1 b, and a quantity q(x, s) has
+dq/ds = q_s + q_x . dx = q_s - l . b with K^T l = q_x: one solve of the adjoint for each quantity.
 """
 
 from __future__ import annotations
@@ -12,9 +15,11 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
+from scipy.sparse import csc_array
 
 from softehl.cases.seal.gland.records.numerics import Numerics
 from softehl.cases.seal.sensitivity.following import edges, shift_rate, velocities
+from softehl.cases.seal.sensitivity.pseudo_loads import Inputs, Tangent
 from softehl.cases.seal.sensitivity.quantities import (
     Quantity,
     along,
@@ -26,10 +31,14 @@ from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
 from softehl.cases.seal.solve.films import Film
 from softehl.cases.seal.solve.method import Differentiate
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.design import Inputs, Tangent
 from softehl.runtime.solve.backends import choose
-from softehl.runtime.solve.linear import LinearSolver, SingularMatrix
-from softehl.runtime.solve.sensitivity import adjoints
+from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMatrix
+
+
+def adjoints(linear: LinearSolver, K: SparseMatrix, gradients: Array) -> Array:
+    """Adjoints l (n, k) of quantities with the gradients q_x (n, k); raises SingularMatrix."""
+    factors = linear.factorise(csc_array(K.T))
+    return np.stack([factors.solve(g) for g in gradients.T], axis=1)
 
 
 def rates_of(

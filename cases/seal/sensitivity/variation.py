@@ -17,10 +17,10 @@ from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.gland.given import number, times
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.varied import LENGTHS, NUMBERS, PRESSURE_KEY
+from softehl.cases.seal.meshing.mesh_morphing import carried_mesh, carried_places
 from softehl.cases.seal.section.layout import uniform_layout
-from softehl.runtime.fem.design import Inputs, rate_of
+from softehl.cases.seal.sensitivity.pseudo_loads import Inputs, rate_of
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.mesh.carried_mesh import carried_mesh, carried_places
 
 SPEED = "U"
 """The rod speed as it is named in tables: a parameter of a film that is no key of a case."""

@@ -8,19 +8,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from softehl.cases.seal.correctors.chord_newton import ModifiedNewton
+from softehl.cases.seal.correctors.layer_split import Layered
+from softehl.cases.seal.correctors.perturbed_lagrangian import LaggedPressure
+from softehl.cases.seal.correctors.proximal_term import Anchored, Relaxed
+from softehl.cases.seal.correctors.schur_corrector import SchurCorrector
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.lagged_pressure import LaggedPressure
-from softehl.runtime.fem.layered import Layered
 from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.relaxed import Anchored, Relaxed
 from softehl.runtime.kernels import load_kernel
 from softehl.runtime.solve.ladder import Ladder
 from softehl.runtime.solve.linear import Condenser
-from softehl.runtime.solve.modified_newton import ModifiedNewton
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
-from softehl.runtime.solve.schur import SchurCorrector
 from softehl.runtime.solve.solution import Solution
 
 TOLERANCE = 1e-5

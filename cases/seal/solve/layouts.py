@@ -20,13 +20,13 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.system import BORE, ROD
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.gland.records.gland import Gland
+from softehl.cases.seal.meshing.spacing import STATIONS, Spacing, Spot, graded
 from softehl.cases.seal.section.layout import RATE, Layout, uniform_layout
 from softehl.cases.seal.solve.inlet import film_thickness
 from softehl.cases.seal.states.contacts import contact_edges
 from softehl.cases.seal.states.film_signs import INLET
 from softehl.cases.seal.states.section_view import film_pressure
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.mesh.spacing import STATIONS, Spacing, Spot, graded
 
 COARSEST, COARSEST_OF_FILM = 18, 24
 """An arc is at least as many of its longest segments long at density 2: for contact, for a film."""

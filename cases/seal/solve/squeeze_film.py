@@ -19,6 +19,8 @@ from math import inf, pi
 import numpy as np
 from scipy.sparse import coo_array, csc_array
 
+from softehl.cases.seal.correctors.layer_split import Layer, Layered
+from softehl.cases.seal.correctors.proximal_term import Relaxed
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.equations.system import (
@@ -33,8 +35,6 @@ from softehl.cases.seal.solve.contact import OFFSET, held_moment, held_place
 from softehl.cases.seal.solve.inlet import InletScales
 from softehl.cases.seal.solve.layouts import NO_WIDTH
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.layered import Layer, Layered
-from softehl.runtime.fem.relaxed import Relaxed
 from softehl.runtime.fem.rules import content_rule, pressure_nodes
 
 _AT_WALL = 0.02

@@ -1,7 +1,8 @@
 """Contact and film of one mesh of a section on another one: the start of their solution there.
 
 Displacements, multipliers and element pressures of a contact are carried over and corrected by
-Newton's method, which holds on to the pressures in its tangent (`runtime.fem.lagged_pressure`).
+Newton's method, which holds on to the pressures in its tangent
+(`cases.seal.correctors.perturbed_lagrangian`).
 The multipliers are unknowns, so contact is stiff from the first iteration on. The equations are
 those of a path (`cases.seal.solve.path`); only the start is another one.
 
@@ -20,18 +21,18 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from softehl.cases.seal.equations.equations import SealSystem
-from softehl.cases.seal.solve.contact import contact_problem, correction_stage
-from softehl.cases.seal.solve.correctors import lagged
-from softehl.cases.seal.solve.path import Stage
-from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.fem.rules import lagrange, pressure_nodes
-from softehl.runtime.mesh.carried_mesh import potential
-from softehl.runtime.mesh.transfer import (
+from softehl.cases.seal.meshing.mesh_morphing import potential
+from softehl.cases.seal.meshing.mesh_transfer import (
     transfer_boundary,
     transfer_chain,
     transfer_elements,
     transfer_nodes,
 )
+from softehl.cases.seal.solve.contact import contact_problem, correction_stage
+from softehl.cases.seal.solve.correctors import lagged
+from softehl.cases.seal.solve.path import Stage
+from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.fem.rules import lagrange, pressure_nodes
 
 
 def carried_contact(

@@ -11,11 +11,11 @@ import numpy as np
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.system import AIR_WALL, BORE, ROD, SEALED_WALL, WALLS
 from softehl.cases.seal.gland.surfaces import MICROMETRE
+from softehl.cases.seal.meshing.outline_checks import crossing
 from softehl.cases.seal.states.section_view import section_view
 from softehl.cases.seal.states.state import ContactState
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.fem.contact import tributary_areas
-from softehl.runtime.mesh.outline_checks import crossing
 
 CONTACT_FILM = 0.02
 """Film thickness that counts as contact, mm; a gap above it parts two contacts of a film."""

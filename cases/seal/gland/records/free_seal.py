@@ -21,9 +21,9 @@ from softehl.cases.seal.gland.sections.keys import (
     section_of_file,
     shape_of,
 )
-from softehl.runtime.mesh.outline import Shape
-from softehl.runtime.mesh.parted_mesh import CAP
-from softehl.runtime.mesh.sections import SectionMesh
+from softehl.cases.seal.meshing.outline import Shape
+from softehl.cases.seal.meshing.section_mesh import SectionMesh
+from softehl.cases.seal.meshing.two_region_mesh import CAP
 
 SIGNED = "other than 0; of a piston seal negative: give bore"
 

@@ -9,7 +9,7 @@ from softehl.cases.seal.gland.given import number, one_line
 from softehl.cases.seal.gland.rubbers.rubber import with_rubber
 from softehl.cases.seal.gland.rubbers.rubber_keys import Rubber
 from softehl.cases.seal.gland.trade.rubber_names import is_plastic
-from softehl.runtime.mesh.parted_mesh import CAP
+from softehl.cases.seal.meshing.two_region_mesh import CAP
 
 PRESETS: dict[str, dict[str, Any]] = {
     "ptfe": {"material": "neo-hooke", "mu": 171.0, "bulk_modulus": 2080.0}

@@ -7,7 +7,7 @@ from typing import Any
 
 from softehl.cases.harness.parameters import Parameters, declared, key
 from softehl.cases.seal.gland.sections.seated import seat
-from softehl.runtime.mesh.outline import Outline, OutlineError, Piece, Point, Shape
+from softehl.cases.seal.meshing.outline import Outline, OutlineError, Piece, Point, Shape
 
 HEIGHT = 3.53
 """Radial height of a section whose height is not given, mm."""

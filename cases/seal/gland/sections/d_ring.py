@@ -6,7 +6,7 @@ from math import sqrt
 
 from softehl.cases.seal.gland.sections.base import Section, joined, part, require
 from softehl.cases.seal.gland.sections.seated import mirrored
-from softehl.runtime.mesh.outline import Arc, Line, Outline, Piece
+from softehl.cases.seal.meshing.outline import Arc, Line, Outline, Piece
 
 
 class DRing(Section):

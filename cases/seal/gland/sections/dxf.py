@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from softehl.cases.seal.gland.sections.seated import Named, mirrored, named_shape
-from softehl.runtime.mesh.outline import Arc, Line, OutlineError, Piece, Point, Shape
-from softehl.runtime.mesh.outline_checks import CLOSED
+from softehl.cases.seal.meshing.outline import Arc, Line, OutlineError, Piece, Point, Shape
+from softehl.cases.seal.meshing.outline_checks import CLOSED
 
 _UNITS = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0, 13: 1e-3}  # $INSUNITS of DXF -> mm
 _WORDS = ("DIMENSION", "HATCH", "LEADER", "MTEXT", "MULTILEADER", "POINT", "TEXT", "VIEWPORT")

@@ -18,12 +18,12 @@ from softehl.cases.seal.gland.sections.seated import (
     seated,
 )
 from softehl.cases.seal.gland.tables import reading
+from softehl.cases.seal.meshing.outline import Line, Outline, OutlineError, Point, Shape
+from softehl.cases.seal.meshing.section_mesh import SectionMesh, corner_jacobians
+from softehl.cases.seal.meshing.subdivision import subdivided
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.faces import once
 from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.mesh.outline import Line, Outline, OutlineError, Point, Shape
-from softehl.runtime.mesh.sections import SectionMesh, corner_jacobians
-from softehl.runtime.mesh.subdivide import subdivided
 from softehl.runtime.mesh.thickness import in_chains
 
 COLUMNS = ("z_mm", "r_mm", "part")

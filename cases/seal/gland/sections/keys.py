@@ -21,8 +21,8 @@ from softehl.cases.harness.parameters import Parameters, declared, key
 from softehl.cases.seal.gland.given import one_line
 from softehl.cases.seal.gland.sections import SECTIONS
 from softehl.cases.seal.gland.sections.files import read_mesh, read_outline
-from softehl.runtime.mesh.outline import Shape
-from softehl.runtime.mesh.sections import SectionMesh
+from softehl.cases.seal.meshing.outline import Shape
+from softehl.cases.seal.meshing.section_mesh import SectionMesh
 
 Name = Literal["round", "rectangular", "x_ring", "d_ring", "trapezoid", "u_cup"]
 

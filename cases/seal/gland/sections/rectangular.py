@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from softehl.cases.seal.gland.sections.base import Section, part
-from softehl.runtime.mesh.outline import Outline, rounded
+from softehl.cases.seal.meshing.outline import Outline, rounded
 
 
 class Rectangular(Section):

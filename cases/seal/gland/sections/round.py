@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from softehl.cases.seal.gland.sections.base import Section
-from softehl.runtime.mesh.outline import Outline
+from softehl.cases.seal.meshing.outline import Outline
 
 
 class Round(Section):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softehl.runtime.mesh.outline import Arc, Line, Outline, OutlineError, Piece, Point, Shape
+from softehl.cases.seal.meshing.outline import Arc, Line, Outline, OutlineError, Piece, Point, Shape
 
 Named = tuple[Piece, str]
 """A piece of a contour, and the name of its side."""

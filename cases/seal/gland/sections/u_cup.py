@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from softehl.cases.seal.gland.sections.base import Section, part, require
-from softehl.runtime.mesh.outline import Arc, Outline, Point, rounded
+from softehl.cases.seal.meshing.outline import Arc, Outline, Point, rounded
 
 
 class UCup(Section):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import sqrt
 
 from softehl.cases.seal.gland.sections.base import Section, joined, part, require
-from softehl.runtime.mesh.outline import Arc, Outline, Point
+from softehl.cases.seal.meshing.outline import Arc, Outline, Point
 
 
 class XRing(Section):

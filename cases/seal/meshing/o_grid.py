@@ -12,9 +12,9 @@ from math import inf, pi, radians
 
 import numpy as np
 
+from softehl.cases.seal.meshing.section_mesh import LAYERS, SectionMesh, graded_steps, grid_cells
+from softehl.cases.seal.meshing.spacing import Spacing
 from softehl.runtime.arrays import Array
-from softehl.runtime.mesh.sections import LAYERS, SectionMesh, graded_steps, grid_cells
-from softehl.runtime.mesh.spacing import Spacing
 
 LONG, SHORT = 27, 6
 """Segments at density 1: of the arc, and of each side block."""

@@ -12,12 +12,12 @@ from math import degrees, inf
 
 import numpy as np
 
-from softehl.runtime.mesh.o_grid import LONG, Disc, disc_mesh, fine_disc
-from softehl.runtime.mesh.outline import Outline, Shape
-from softehl.runtime.mesh.outline_mesh import outline_mesh
-from softehl.runtime.mesh.parted_mesh import parted_mesh
-from softehl.runtime.mesh.sections import SectionMesh
-from softehl.runtime.mesh.spacing import Spacing
+from softehl.cases.seal.meshing.o_grid import LONG, Disc, disc_mesh, fine_disc
+from softehl.cases.seal.meshing.outline import Outline, Shape
+from softehl.cases.seal.meshing.outline_mesh import outline_mesh
+from softehl.cases.seal.meshing.section_mesh import SectionMesh
+from softehl.cases.seal.meshing.spacing import Spacing
+from softehl.cases.seal.meshing.two_region_mesh import parted_mesh
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from math import degrees, hypot, radians
 
 import numpy as np
 
+from softehl.cases.seal.meshing.curve_segments import OutlineError, Piece, meetings
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.mesh.pieces import OutlineError, Piece, meetings
 
 CLOSED = 1e-6
 """Part of the size of an outline to which its pieces meet one another."""

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import Delaunay
 
+from softehl.cases.seal.meshing.outline_checks import cross
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.mesh.mesh import MeshError
-from softehl.runtime.mesh.outline_checks import cross
 
 GRADE = 0.35
 """Growth of the size of triangles with the distance from the edges."""

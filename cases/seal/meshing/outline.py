@@ -15,15 +15,7 @@ from math import hypot, pi, radians, tau
 import numpy as np
 from scipy.special import roots_legendre
 
-from softehl.runtime.arrays import Array
-from softehl.runtime.mesh.outline_checks import (
-    CLOSED,
-    require_closed,
-    require_lengths,
-    require_no_crossing,
-    require_no_spikes,
-)
-from softehl.runtime.mesh.pieces import (
+from softehl.cases.seal.meshing.curve_segments import (
     Arc,
     Line,
     OutlineError,
@@ -32,6 +24,14 @@ from softehl.runtime.mesh.pieces import (
     meetings,
     rounded,
 )
+from softehl.cases.seal.meshing.outline_checks import (
+    CLOSED,
+    require_closed,
+    require_lengths,
+    require_no_crossing,
+    require_no_spikes,
+)
+from softehl.runtime.arrays import Array
 
 __all__ = ["Arc", "Line", "Outline", "OutlineError", "Piece", "Point", "Shape", "rounded"]
 

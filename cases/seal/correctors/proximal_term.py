@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_array, csr_array
 
+from softehl.cases.seal.correctors.layer_split import Layered, Parts
 from softehl.runtime.arrays import Array
-from softehl.runtime.cut import Parts
-from softehl.runtime.fem.layered import Layered
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from softehl.cases.seal.meshing.section_mesh import SectionMesh
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.point_location import Located, PointLocator
-from softehl.runtime.mesh.sections import SectionMesh
 
 _WITHIN = 1e-12  # of the size of the mesh: a point so near to a cell is in it
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from softehl.cases.seal.correctors.chord_newton import LayeredProblem, ModifiedNewton
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.condensed import LayeredProblem
 from softehl.runtime.solve.linear import Condensed, Condenser, SingularMatrix
-from softehl.runtime.solve.modified_newton import ModifiedNewton
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Solution, Status
 

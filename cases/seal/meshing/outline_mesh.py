@@ -12,20 +12,20 @@ from fractions import Fraction
 
 import numpy as np
 
-from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.mesh.mesh import MeshError
-from softehl.runtime.mesh.outline import Shape
-from softehl.runtime.mesh.outline_layout import AROUND, SMOOTH, BoundaryLayout, normals
-from softehl.runtime.mesh.sections import (
+from softehl.cases.seal.meshing.boundary_layout import AROUND, SMOOTH, BoundaryLayout, normals
+from softehl.cases.seal.meshing.outline import Shape
+from softehl.cases.seal.meshing.section_mesh import (
     LAYERS,
     SectionMesh,
     corner_shares,
     graded_steps,
     grid_cells,
 )
-from softehl.runtime.mesh.spacing import Spacing
-from softehl.runtime.mesh.subdivide import subdivided
-from softehl.runtime.mesh.triangles import triangulate
+from softehl.cases.seal.meshing.spacing import Spacing
+from softehl.cases.seal.meshing.subdivision import subdivided
+from softehl.cases.seal.meshing.triangulation import triangulate
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.mesh.mesh import MeshError
 
 WORST = 0.3
 """Least Jacobian at a corner, relative to the area, that is looked for with thinner strips."""

@@ -15,9 +15,9 @@ from math import ceil, radians
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
+from softehl.cases.seal.meshing.outline import Outline
+from softehl.cases.seal.meshing.spacing import Spacing
 from softehl.runtime.arrays import Array
-from softehl.runtime.mesh.outline import Outline
-from softehl.runtime.mesh.spacing import Spacing
 
 AROUND = 60
 """The outline is at least so many of its longest segments long, at density 1."""

@@ -12,10 +12,10 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import splu
 
+from softehl.cases.seal.meshing.outline import Outline, OutlineError
+from softehl.cases.seal.meshing.section_mesh import SectionMesh
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.outline import Outline, OutlineError
-from softehl.runtime.mesh.sections import SectionMesh
 
 _GAUSS = 1.0 / np.sqrt(3.0)
 _CORNERS = CELLS["quad4"].nodes

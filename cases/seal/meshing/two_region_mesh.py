@@ -12,12 +12,12 @@ from math import isclose
 
 import numpy as np
 
+from softehl.cases.seal.meshing.boundary_layout import BoundaryLayout
+from softehl.cases.seal.meshing.outline import Shape
+from softehl.cases.seal.meshing.outline_mesh import Strip, outline_mesh
+from softehl.cases.seal.meshing.section_mesh import SectionMesh
+from softehl.cases.seal.meshing.spacing import Spacing
 from softehl.runtime.mesh.mesh import MeshError
-from softehl.runtime.mesh.outline import Shape
-from softehl.runtime.mesh.outline_layout import BoundaryLayout
-from softehl.runtime.mesh.outline_mesh import Strip, outline_mesh
-from softehl.runtime.mesh.sections import SectionMesh
-from softehl.runtime.mesh.spacing import Spacing
 
 CAP, BODY = "cap", "body"
 """Regions: what is on the film's side of the cut, and what is behind it."""
