@@ -178,9 +178,21 @@ class ORingCase(Case[Seal, FilmRow]):
 def run_oring(
     parameters: Seal, observer: SealObserver, contacts: Path | None = None
 ) -> SealOutcome:
-    """Solve a seal and report to the observer, with sensitivities where they are asked for.
+    """Solve a seal and report to the observer, with sensitivities if the parameters say so.
 
-    contacts: folder of contact states to start from and add to.
+    Parameters
+    ----------
+    parameters : Seal
+        The seal.
+    observer : Observer
+        Listener of stages, steps and states; `softehl.Silent()` does nothing.
+    contacts : Path, optional
+        Folder of contact states to start from and to add to.
+
+    Returns
+    -------
+    Outcome
+        States, their cost, and the reason of the end.
     """
     from softehl.cases.seal.sensitivity.sensitivity import differentiation
     from softehl.cases.seal.solve.method import run

@@ -48,19 +48,34 @@ def solve_cases(
     resume: bool = False,
     overwrite: bool = False,
 ) -> list[Curve]:
-    """Run every parameter set into a folder of its own below `folder`; curves in the same order.
+    """Run every parameter set in its own folder below `folder`.
 
-    cases: parameter sets, or folder name -> parameter set; without names a folder is called after
-    all that is not at its default, such as `density=4-sealed_pressure=2`. executor: any
-    `concurrent.futures.Executor` (its workers must see the same file system), None to run one after
-    the other in this process. resume: keep the rows that the folders have;
-    overwrite: begin anew there; without both a folder that holds a run is refused, or other
-        files.
+    Parameters
+    ----------
+    cases : iterable of Parameters, or mapping of str to Parameters
+        Parameter sets, such as `softehl.Seal`, or folder name -> parameter set. Without names a
+        folder is named after the keys that differ from their defaults, such as
+        `density=4-sealed_pressure=2`.
+    folder : str or Path
+        Folder of the runs. They share files in it (contact states in `folder/contacts`).
+    executor : Executor, optional
+        Any `concurrent.futures.Executor` whose workers see the same file system; left out, runs
+        follow one another in this process.
+    resume : bool
+        Keep the rows that the folders have.
+    overwrite : bool
+        Begin anew in folders that have a run. Without both, such a folder is refused.
 
-    Runs share files (the contact states of an O-ring in `folder/contacts`).
-    A run that does not reach everything is no error: see `Curve.complaints`. Raises BadInput, also
-    for two curves of one name, and whatever else ends a run; curves that have not begun are then
-    given up, what was reached is saved.
+    Returns
+    -------
+    list of Curve
+        In the order of `cases`. An incomplete run is no error: see `Curve.complaints`.
+
+    Raises
+    ------
+    BadInput
+        Folders are in use, have a run, or two runs have one name. Runs that have not begun are
+        cancelled; those that have are saved.
     """
     from softehl.cases.harness import sweep
     from softehl.cases.harness.earlier import existing_of

@@ -19,9 +19,17 @@ R = TypeVar("R")
 
 
 def processes(count: int) -> ProcessPoolExecutor:
-    """An executor of fresh processes on this machine, of one thread each.
+    """Return an executor of fresh processes on this machine, with one thread each.
 
-    They end when this one does, however it does, and leave Ctrl-C to it.
+    Parameters
+    ----------
+    count : int
+        Number of processes.
+
+    Returns
+    -------
+    ProcessPoolExecutor
+        Its processes end with this one, and ignore Ctrl-C.
     """
     # several processes of several threads each would only get in each other's way
     os.environ.setdefault("OMP_NUM_THREADS", "1")

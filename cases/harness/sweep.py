@@ -37,9 +37,18 @@ class Task:
 class Curve:
     """A curve that was computed.
 
-    parameters: of the class of the case.  rows: the rows of `curve.csv`, one for each state.
-    complaints: what was asked for and is not among them, and why, in words.  failed: whether the
-    program failed in it, which its complaint then says.
+    Attributes
+    ----------
+    parameters : Parameters
+        Of the class of the case, such as `softehl.Seal`.
+    folder : Path
+        Folder of its files.
+    rows : tuple of Row
+        The rows of `curve.csv`, one for each state.
+    complaints : tuple of str
+        Requested states that are missing, with reasons.
+    failed : bool
+        True if the program failed; a complaint has the error.
     """
 
     parameters: Any
@@ -50,7 +59,7 @@ class Curve:
 
     @property
     def converged(self) -> bool:
-        """True if everything asked for is there."""
+        """True if all requested states are there."""
         return not self.complaints
 
 

@@ -72,7 +72,18 @@ class Draft:
         return cells.foreign(rule, nodes)
 
     def finish(self) -> Definition:
-        """The frozen definition of the model."""
+        """Return the definition of the model.
+
+        Returns
+        -------
+        Definition
+            The model, for `softehl.load_kernel` and `Study.add`.
+
+        Raises
+        ------
+        ModelError
+            The model has no residual, or declares something that it does not use.
+        """
         potential, constant = self._equations.total()
         self._check_use(potential)
         a, o = self._arguments, self._outputs

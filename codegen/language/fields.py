@@ -41,7 +41,19 @@ class Traced:
 
 
 class Fields(Model):
-    """The model of a page of fields; the page gets it as its only argument."""
+    """Model at a quadrature point, of any cell and geometry: the argument of a page of fields.
+
+    Attributes
+    ----------
+    cell : Element
+        The reference cell.
+    geometry : str
+        "plane strain", "axisymmetric" or "solid".
+    dimension : int
+        Number of coordinates.
+    order : int
+        Order of the shape functions.
+    """
 
     _unused = 'a page that needs one component of a vector declares it, as in m.scalar("u_y")'
 
@@ -77,17 +89,49 @@ class Fields(Model):
     # fields -------------------------------------------------------------------------------------
 
     def vector(self, name: str, *, order: int | None = None) -> Any:
-        """A vector field u with the unknowns u_x, u_y, u_z, as many as the mesh has dimensions.
+        """Declare a vector field u with unknowns u_x, u_y, u_z, as many as the mesh has dimensions.
 
-        Its value at the point is a matrix (dimension, 1). order: 1 on a quadratic cell gives it
-        unknowns at the corners only, 0 one value of its own in every cell; left out, it is that of
-        the cell.
+        Parameters
+        ----------
+        name : str
+            Name of the field.
+        order : int, optional
+            Order of its shape functions: 1 on a quadratic cell has unknowns at the corners only, 0
+            has one value in every cell; that of the cell if left out.
+
+        Returns
+        -------
+        Matrix
+            Value at the point, (dimension, 1).
+
+        Raises
+        ------
+        ModelError
+            The cell does not allow the order.
         """
         names = [f"{name}_{axis}" for axis in AXES[: self.dimension]]
         return Matrix(self._declared_fields(names, order, given=False))
 
     def scalar(self, name: str, *, order: int | None = None) -> Any:
-        """A scalar field; its value at the point is a symbol. order: as in `vector`."""
+        """Declare a scalar field.
+
+        Parameters
+        ----------
+        name : str
+            Name of the field, and of its unknown.
+        order : int, optional
+            As in `vector`.
+
+        Returns
+        -------
+        Symbol
+            Value at the point.
+
+        Raises
+        ------
+        ModelError
+            The cell does not allow the order.
+        """
         return self._declared_fields([name], order, given=False)[0]
 
     def _internal_unknowns(self, names: Sequence[str]) -> list[sp.Symbol]:
@@ -96,38 +140,115 @@ class Fields(Model):
 
     @property
     def parent(self) -> Any:
-        """Parent coordinates of the point, (dimension of the cell, 1)."""
+        """Coordinates of the point in the reference cell, (dimension of the cell, 1)."""
         raise NeedsElement("m.parent")
 
     @property
     def jacobian(self) -> Any:
-        """Slopes of the reference coordinates (rows) along the parent ones (columns)."""
+        """Derivatives of reference coordinates (rows) by those of the cell (columns)."""
         raise NeedsElement("m.jacobian")
 
     def centroid(self, value: Any) -> Any:
-        """Value of a scalar, list or matrix at the centroid of the parent cell."""
+        """Return a value at the centroid of the reference cell.
+
+        Parameters
+        ----------
+        value : Expr, list or Matrix
+            The value at the point.
+
+        Returns
+        -------
+        Expr, list or Matrix
+            In the form of `value`.
+        """
         raise NeedsElement(f"m.centroid({value})")
 
     @property
     def size(self) -> Any:
-        """Volume of a cell at a facet per area of the facet: a length."""
+        """Volume of the cell at a facet per area of the facet, a length [mm]."""
         raise Elsewhere.no_facet("m.size", self.cell.name)
 
     def jump(self, value: Any) -> Any:
-        """A value on a facet in the cell that the normal leaves, less that in the other one."""
+        """Return the jump of a value on a facet.
+
+        It is the value in the cell that the normal leaves, less that in the other one.
+
+        Parameters
+        ----------
+        value : Expr, list or Matrix
+            The value at the point.
+
+        Returns
+        -------
+        Expr, list or Matrix
+            In the form of `value`.
+
+        Raises
+        ------
+        ModelError
+            The page stands on cells.
+        """
         raise Elsewhere.no_facet(f"m.jump({value})", self.cell.name)
 
     def average(self, value: Any) -> Any:
-        """Mean of a value in both cells at a facet."""
+        """Return the mean of a value in both cells at a facet.
+
+        Parameters
+        ----------
+        value : Expr, list or Matrix
+            The value at the point.
+
+        Returns
+        -------
+        Expr, list or Matrix
+            In the form of `value`.
+
+        Raises
+        ------
+        ModelError
+            The page stands on cells.
+        """
         raise Elsewhere.no_facet(f"m.average({value})", self.cell.name)
 
     def previous(self, field: Any) -> Any:
-        """A field at the beginning of the step; it has gradients, too."""
+        """Return a field at the beginning of the step; it has gradients, too.
+
+        Parameters
+        ----------
+        field : Symbol or Matrix
+            The value that `vector` or `scalar` returned.
+
+        Returns
+        -------
+        Symbol or Matrix
+            In the form of `field`.
+
+        Raises
+        ------
+        ModelError
+            It is no field, or has order 0.
+        """
         return self._of_step(field, "old")
 
     def rate(self, field: Any, order: int = 1) -> Any:
-        """Time derivative of a field, or its second one, by what `Study.march` gives: see
-        `Model.rates`.
+        """Return a time derivative of a field.
+
+        Parameters
+        ----------
+        field : Symbol or Matrix
+            The value that `vector` or `scalar` returned.
+        order : int
+            1 or 2; see `Model.rates`.
+
+        Returns
+        -------
+        Expr or Matrix
+            In the form of `field`; `Study.march` gives its values.
+
+        Raises
+        ------
+        ModelError
+            It is no field, or has order 0.
         """
         coefficient, suffix = self._arguments.of_time(order)
         rest = Entries.of(self._of_step(field, suffix)).values
@@ -135,9 +256,22 @@ class Fields(Model):
         return now.arrange([coefficient * a + b for a, b in zip(now.values, rest, strict=True)])
 
     def grad(self, value: Any) -> Any:
-        """Gradient by the reference coordinates: (dimension, 1), of a vector a row for each entry.
+        """Return the gradient by the reference coordinates.
 
-        value: a field, or an expression of fields and parameters.
+        Parameters
+        ----------
+        value : Expr or Matrix
+            A field, or an expression of fields and parameters.
+
+        Returns
+        -------
+        Matrix
+            (dimension, 1); of a vector a row for each entry.
+
+        Raises
+        ------
+        ModelError
+            The expression has other symbols.
         """
         rows = [self._slopes(v) for v in Entries.of(value).values]
         if isinstance(value, sp.MatrixBase):
@@ -146,11 +280,27 @@ class Fields(Model):
 
     @property
     def normal(self) -> Any:
-        """Unit normal (dimension, 1) of an undeformed side, outwards; a cell has none."""
+        """Unit normal (dimension, 1) of a side in the reference state, outwards."""
         raise ModelError(f"normal: {self.cell.name} is a cell here, only sides have normals")
 
     def area_vector(self, u: Any) -> Any:
-        """Area vector of a side displaced by u per undeformed area: see `normal`."""
+        """Return the area vector of a displaced side per reference area.
+
+        Parameters
+        ----------
+        u : Matrix
+            Displacement, (dimension, 1).
+
+        Returns
+        -------
+        Matrix
+            (dimension, 1), outwards.
+
+        Raises
+        ------
+        ModelError
+            The page stands on cells.
+        """
         raise ModelError(f"area_vector({u}): {self.cell.name} is a cell here, no side")
 
     @property
@@ -159,8 +309,25 @@ class Fields(Model):
         return Matrix(self._place())
 
     def deformation_gradient(self, u: Any, name: str = "F") -> Any:
-        """F = 1 + Grad u, 3 x 3, with names F_00, F_01, ...; what the mesh has no axis for is said
-        by the geometry: plane strain, or the hoop stretch 1 + u_y / y around the x axis.
+        """Return F = 1 + Grad u, (3, 3), with named entries F_00, F_01, ...
+
+        Parameters
+        ----------
+        u : Matrix
+            Displacement, (dimension, 1).
+        name : str
+            Name of the entries.
+
+        Returns
+        -------
+        Matrix
+            In 2-D with the third row of the geometry: 1 in plane strain, the hoop stretch 1 + u_y /
+            y around the x axis.
+
+        Raises
+        ------
+        ModelError
+            `u` has another shape.
         """
         size = self.dimension
         if getattr(u, "shape", None) != (size, 1):
@@ -182,16 +349,31 @@ class Fields(Model):
     # equations ----------------------------------------------------------------------------------
 
     def minimise(self, density: Any) -> None:
-        """The sum of these densities per reference volume, integrated, is stationary."""
+        """Make the integral of a density stationary; further densities add up.
+
+        Parameters
+        ----------
+        density : Expr
+            Energy per reference volume, of a side per reference area.
+        """
         self._densities += 1
         name = f"minimised_{self._densities}"
         self.potential(self._total_of(name, density * self._volume()))
 
     def weak(self, flux: Any, varied: Any) -> None:
-        """The integral of flux times the variation of `varied` is zero for every variation.
+        """Require that the integral of flux times the variation of a value vanishes.
 
-        Both are scalars, lists or matrices of the same shape, such as a flux and m.grad(T) of an
-        unknown field T. Further ones, and what is minimised, add up.
+        Parameters
+        ----------
+        flux : Expr, list or Matrix
+            Such as a heat flux. Further ones, and what is minimised, add up.
+        varied : Expr, list or Matrix
+            The value that is varied, in the form of `flux`, such as m.grad(T) of a field T.
+
+        Raises
+        ------
+        ModelError
+            The forms differ.
         """
         left, right = Entries.of(flux), Entries.of(varied)
         energy = self._energies.get((tuple(left.values), tuple(right.values)))
@@ -215,10 +397,24 @@ class Fields(Model):
         self.potential(total, constant=frozen)
 
     def stress(self, material: Any, F: Any) -> Any:
-        """First Piola-Kirchhoff stress P (3, 3) of a `softehl.material` at F, a matrix of names.
+        """Return the first Piola-Kirchhoff stress of a material.
 
-        `m.weak(m.stress(material, F), F)` is its equilibrium; where the material has an energy,
-        that is minimised, so that the tangent is symmetric.
+        Parameters
+        ----------
+        material : Law
+            A function decorated by `softehl.material`.
+        F : Matrix
+            Deformation gradient (3, 3) of names.
+
+        Returns
+        -------
+        Matrix
+            P, (3, 3) [MPa].
+
+        Notes
+        -----
+        `m.weak(m.stress(material, F), F)` is its equilibrium. The energy of the material, if it has
+        one, is then minimised, so that the tangent is symmetric.
         """
         P, energy = material.at(self, F)
         if energy is not None:
@@ -228,13 +424,37 @@ class Fields(Model):
     # what belongs to whole elements -------------------------------------------------------------
 
     def integral(self, name: str, integrand: Any) -> sp.Symbol:
-        """Refused: a page of fields knows the point only."""
+        """Refuse an integral: a page of fields has the values at one point.
+
+        Parameters
+        ----------
+        name : str
+            Name of the integral.
+        integrand : Expr
+            Its integrand.
+
+        Raises
+        ------
+        ModelError
+            Always.
+        """
         raise ModelError(
             f"integral {name}: {_IN_FIELDS}; element-wide integrals need softehl.Model"
         )
 
     def weak_form(self, terms: Sequence[tuple[Any, Any]]) -> None:
-        """Refused: it is `weak` here."""
+        """Refuse a weak form of `Model`: a page of fields has `weak`.
+
+        Parameters
+        ----------
+        terms : sequence of tuple
+            Its terms.
+
+        Raises
+        ------
+        ModelError
+            Always.
+        """
         raise ModelError(f"weak_form: {_IN_FIELDS}")
 
     # --------------------------------------------------------------------------------------------

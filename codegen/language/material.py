@@ -32,7 +32,22 @@ _SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 
 
 class Material:
-    """Argument of the function of a law: the deformation, and calls that say what the law is."""
+    """Argument of the function of a stress law: the deformation, and calls that define the law.
+
+    Attributes
+    ----------
+    name : str
+        Name of the law.
+    model : Model
+        Model that the law is part of. Its `parameters`, `require`, `point_data`, `history`,
+        `fields`, `norm`, `derivative` and `example` are methods here as well.
+    W : Expr or None
+        Energy per reference volume [MPa].
+    P : Matrix or None
+        First Piola-Kirchhoff stress (3, 3) [MPa].
+    small : bool or None
+        True for small strains, False for large ones, None before either is used.
+    """
 
     def __init__(self, name: str, model: Model, F: Any) -> None:
         self.name, self.model = name, model
@@ -49,19 +64,19 @@ class Material:
 
     @property
     def F(self) -> Any:
-        """Deformation gradient (3, 3); the law is one of large strains."""
+        """Deformation gradient (3, 3); makes the law one of large strains."""
         self._kinematics(small=False)
         return self._F
 
     @property
     def strain(self) -> Any:
-        """Small strain (3, 3), the symmetric part of F - 1; the law is one of small strains."""
+        """Small strain (3, 3), the symmetric part of F - 1; makes the law one of small strains."""
         self._kinematics(small=True)
         return (self._F + self._F.T) / 2 - sp.eye(3)
 
     @property
     def green(self) -> Any:
-        """Green's strain (F^T F - 1) / 2, (3, 3); the law is one of large strains."""
+        """Green's strain (F^T F - 1) / 2, (3, 3); makes the law one of large strains."""
         if self._green is None:
             E = (self.F.T * self.F - sp.eye(3)) / 2
             names = {}
@@ -76,27 +91,90 @@ class Material:
         self.small = small
 
     def define(self, name: str, expression: Any) -> Any:
-        """A name for an intermediate, scalar or matrix."""
+        """Name an intermediate value, scalar or matrix.
+
+        Parameters
+        ----------
+        name : str
+            Its name.
+        expression : Expr or Matrix
+            Its value.
+
+        Returns
+        -------
+        Symbol or Matrix
+            The name, as symbols.
+        """
         return self.model.define(f"{self.name}_{name}", expression)
 
     def implicit(self, name: str, equations: Callable[[Any], Any], **settings: Any) -> Any:
-        """Local unknowns, as `Model.implicit`."""
+        """Declare local unknowns, as `Model.implicit`.
+
+        Parameters
+        ----------
+        name : str
+            Name of the unknowns.
+        equations : callable
+            Function of the unknowns that returns their residuals.
+        **settings
+            `start`, `tolerance`, `size` and `iterations` of `Model.implicit`.
+
+        Returns
+        -------
+        Symbol, list or Matrix
+            The unknowns.
+        """
         return self.model.implicit(f"{self.name}_{name}", equations, **settings)
 
     def principal(self, name: str, C: Any, energy: Any = None) -> Any:
-        """An isotropic energy of principal stretches, as `Model.principal`; C is m.F.T * m.F."""
+        """Return an isotropic energy of principal stretches, as `Model.principal`.
+
+        Parameters
+        ----------
+        name : str
+            Name of the energy.
+        C : Matrix
+            m.F.T * m.F, or its isochoric part.
+        energy : callable
+            Function energy(lambda_1, lambda_2, lambda_3), symmetric in its arguments.
+
+        Returns
+        -------
+        Symbol
+            The energy.
+        """
         return self.model.principal(f"{self.name}_{name}", C, energy)
 
     def energy(self, W: Any) -> None:
-        """Energy per undeformed volume; further energies add up."""
+        """Define the energy; further energies add up.
+
+        Parameters
+        ----------
+        W : Expr
+            Energy per reference volume [MPa].
+
+        Raises
+        ------
+        ModelError
+            The law has a stress.
+        """
         if self.P is not None:
             raise ModelError(f"the material {self.name} has a stress: it cannot have an energy too")
         self.W = W if self.W is None else self.W + W
 
     def stress(self, P: Any) -> None:
-        """First Piola-Kirchhoff stress (3, 3) as a function of F, or the stress of a small strain.
+        """Define the stress; further stresses add up.
 
-        Further stresses add up.
+        Parameters
+        ----------
+        P : Matrix
+            First Piola-Kirchhoff stress (3, 3) as a function of F, or the stress of a small strain
+            [MPa].
+
+        Raises
+        ------
+        ModelError
+            The law has an energy, or P a wrong shape.
         """
         if self.W is not None:
             raise ModelError(f"the material {self.name} has an energy: it cannot have a stress too")
@@ -104,7 +182,18 @@ class Material:
         self.P = P if self.P is None else self.P + P
 
     def second_stress(self, S: Any) -> None:
-        """Second Piola-Kirchhoff stress (3, 3) of a law of large strains: P = F S."""
+        """Define the second Piola-Kirchhoff stress of a law of large strains: P = F S.
+
+        Parameters
+        ----------
+        S : Matrix
+            (3, 3) [MPa].
+
+        Raises
+        ------
+        ModelError
+            The law has an energy, or S a wrong shape.
+        """
         self.stress(self.F * self._square(S))
 
     def _square(self, P: Any) -> Any:
@@ -116,16 +205,41 @@ class Material:
 
 @dataclass(frozen=True)
 class Law:
-    """A material of a page: its name, its documentation, the function that writes it."""
+    """Stress law that a function defines; made by `softehl.material`.
+
+    Attributes
+    ----------
+    name : str
+        Name of the law.
+    doc : str
+        Description.
+    write : callable
+        The function, which takes a `Material`.
+    """
 
     name: str
     doc: str
     write: Callable[[Material], object]
 
     def on(self, model: Model, F: Any) -> Material:
-        """The law in a page, at the deformation gradient F (3, 3): its energy `W` or stress `P`.
+        """Add the law to a model.
 
-        Its parameters become those of the page.
+        Parameters
+        ----------
+        model : Model
+            The model; the law's parameters become parameters of it.
+        F : Matrix
+            Deformation gradient (3, 3).
+
+        Returns
+        -------
+        Material
+            With its energy `W` or stress `P`.
+
+        Raises
+        ------
+        ModelError
+            The function defines no energy and no stress.
         """
         m = Material(self.name, model, F)
         applied(self.name, self.write, m, write=f"`def {self.name}(m):`")
@@ -136,7 +250,22 @@ class Law:
         return m
 
     def at(self, m: Fields, F: Any) -> tuple[Any, Any]:
-        """P (3, 3) at F on a page of fields, and the energy or None."""
+        """Return the stress and the energy of the law on a page of fields.
+
+        Parameters
+        ----------
+        m : Fields
+            The page.
+        F : Matrix
+            Deformation gradient (3, 3).
+
+        Returns
+        -------
+        P : Matrix
+            First Piola-Kirchhoff stress (3, 3) [MPa].
+        W : Expr or None
+            Energy per reference volume [MPa].
+        """
         return self._at(m, F)[:2]
 
     def _at(self, m: Fields, F: Any) -> tuple[Any, Any, bool]:
@@ -149,11 +278,23 @@ class Law:
         return P, law.W, bool(law.small)
 
     def page(self) -> Page:
-        """A body of this material: displacements, equilibrium, Cauchy stresses as fields."""
+        """Return the page of a body of this material: equilibrium, and Cauchy stresses as fields.
+
+        Returns
+        -------
+        Page
+            The page, with the displacements u_x, u_y, u_z.
+        """
         return Page(self.name, self._body, doc=self.doc, source=self.write)
 
     def at_point(self) -> PointForm:
-        """The law by itself: its residual is P, its tangent dP/dF, by displacement gradients."""
+        """Return the law at a point: its residual is P, its tangent dP/dF.
+
+        Returns
+        -------
+        PointForm
+            The unknowns are the components of the displacement gradient.
+        """
         return self.page().at_point("hex8")
 
     def _body(self, m: Fields) -> None:
@@ -170,7 +311,23 @@ class Law:
 
 
 def material(function: Callable[[Material], object]) -> Law:
-    """The law that a function writes: a decorator."""
+    """Make a stress law of a function: `@softehl.material`.
+
+    Parameters
+    ----------
+    function : callable
+        Function that takes a `Material`.
+
+    Returns
+    -------
+    Law
+        The law, for `Study.add(material=...)` and `Fields.stress`.
+
+    Raises
+    ------
+    ModelError
+        The name of the function is not allowed.
+    """
     name = function.__name__
     if not NAME.fullmatch(name):
         raise ModelError(f"a material is called {name!r}; use letters, digits and underscores")

@@ -28,11 +28,27 @@ PARENT_NAMES = ("parent_xi", "parent_eta", "parent_zeta")
 
 
 class Model(Draft):
-    """Builder of a `Definition`; every method declares or names something.
+    """Builder of a `Definition`; methods declare arguments, name values and add equations.
 
-    The generator writes the loop over the points of `rule` out where that saves operations; the
-    rule is then part of the kernel.  With unroll=False it never does, and `rule` is the default of
-    a kernel that takes any; with unroll=True it always does.
+    Parameters
+    ----------
+    name : str
+        Name of the model, part of the names of C functions.
+    nodes : int
+        Number of nodes of the element.
+    rule : QuadratureRule, optional
+        Quadrature; one point without coordinates if left out.
+    unroll : bool, optional
+        True: the loop over the points of `rule` is always written out, and the rule is part of the
+        kernel. False: never; `rule` is the default of a kernel that takes any rule. Left out, it is
+        written out where that saves operations.
+    doc : str
+        Description of the model.
+
+    Raises
+    ------
+    ModelError
+        The name is not allowed.
     """
 
     _parent_names = ("xi", "eta", "zeta")
@@ -40,28 +56,81 @@ class Model(Draft):
     # declarations -------------------------------------------------------------------------------
 
     def coordinates(self, *names: str) -> list[list[sp.Symbol]]:
-        """Reference coordinates, any number of components: a list over the nodes for each."""
+        """Declare reference coordinates, of any number of components.
+
+        Parameters
+        ----------
+        *names : str
+            Components, such as "X", "Y".
+
+        Returns
+        -------
+        list of list of Symbol
+            [component][node].
+        """
         return self._arguments.declare_coordinates(names)
 
     def nodal_unknowns(
         self, *names: str, idle: Sequence[str] = (), nodes: int | None = None
     ) -> list[list[sp.Symbol]]:
-        """Unknowns at the nodes, numbered node by node; one list for each component.
+        """Declare unknowns at the nodes, numbered node by node.
 
-        The `idle` ones of `names` belong to the node but need not enter the mathematics. nodes:
-        at the first so many nodes only, such as a pressure at the corners of a quadratic cell.
+        Parameters
+        ----------
+        *names : str
+            Components, such as "u_x", "u_y".
+        idle : sequence of str
+            Those of `names` that need not occur in the mathematics.
+        nodes : int, optional
+            Number of the first nodes that have them, for instance a pressure at the corners of a
+            quadratic cell; all nodes if left out.
+
+        Returns
+        -------
+        list of list of Symbol
+            [component][node].
         """
         return self._arguments.nodal_unknowns(names, idle, nodes)
 
     def unknown(self, name: str) -> sp.Symbol:
-        """One more scalar unknown of the element."""
+        """Declare one more scalar unknown of the element.
+
+        Parameters
+        ----------
+        name : str
+            Its name.
+
+        Returns
+        -------
+        Symbol
+            The unknown.
+        """
         return self._arguments.unknown(name)
 
     def internal(self, name: str, count: int | None = None) -> Any:
-        """One unknown of an element, or a list of so many, called name_0, name_1, ...
+        """Declare internal unknowns of an element, which no other element shares.
 
-        No other element knows them. A study condenses them from its equations exactly, keeps their
-        values with the element, and has them in `result.fields`.
+        Parameters
+        ----------
+        name : str
+            Name; of several unknowns name_0, name_1, ...
+        count : int, optional
+            Number of unknowns; one symbol if left out.
+
+        Returns
+        -------
+        Symbol or list of Symbol
+            The unknowns.
+
+        Raises
+        ------
+        ModelError
+            `count` is no integer above zero.
+
+        Notes
+        -----
+        A study eliminates them exactly (static condensation), stores their values with the element,
+        and has them in `Result.fields`.
         """
         if count is None:
             return self._internal_unknowns([name])[0]
@@ -74,65 +143,158 @@ class Model(Draft):
         return Listed([self.unknown(name) for name in names], "the internal unknowns")
 
     def interpolated(self, name: str) -> tuple[sp.Symbol, sp.Symbol]:
-        """Value and xi-derivative of a field with any number of element unknowns (`modes`).
+        """Declare a field with any number of element unknowns (`modes`).
 
-        Each further field has modes of its own, which follow those of the fields before it.
+        Parameters
+        ----------
+        name : str
+            Name of the field. Each further field has its own modes, after those of previous fields.
+
+        Returns
+        -------
+        tuple of Symbol
+            Value and derivative by xi.
         """
         return self.interpolated_sides(name)[0]
 
     def interpolated_sides(self, *names: str) -> list[tuple[sp.Symbol, sp.Symbol]]:
-        """Value and xi-derivative of several fields that share the `modes` unknowns.
+        """Declare fields that share the `modes` unknowns, such as two traces at an interior facet.
 
-        An interior facet has two: the traces from its sides.  The basis holds both components
-        of each field for every mode, zero where a mode belongs to another field.
+        Parameters
+        ----------
+        *names : str
+            Names of the fields. The basis has both components of each field for every mode, zero
+            where a mode belongs to another field.
+
+        Returns
+        -------
+        list of tuple of Symbol
+            Value and derivative by xi of each field.
         """
         return self._arguments.interpolated_sides(names)
 
     def parameters(self, /, **meanings: str) -> list[sp.Symbol]:
-        """Arguments that are the same for all elements of a call."""
+        """Declare parameters: arguments that are the same for all elements.
+
+        Parameters
+        ----------
+        **meanings : str
+            Name -> meaning, with its unit.
+
+        Returns
+        -------
+        list of Symbol
+            The parameters, in this order.
+        """
         return self._arguments.declare("parameters", meanings)
 
     def data(self, /, **meanings: str) -> list[sp.Symbol]:
-        """Arguments that differ from element to element."""
+        """Declare data: arguments that differ from element to element.
+
+        Parameters
+        ----------
+        **meanings : str
+            Name -> meaning, with its unit.
+
+        Returns
+        -------
+        list of Symbol
+            The data, in this order.
+        """
         return self._arguments.declare("data", meanings)
 
     def point_data(self, /, **meanings: str) -> list[sp.Symbol]:
-        """Arguments that differ from quadrature point to point, e.g. history variables."""
+        """Declare data of the quadrature points, such as history variables.
+
+        Parameters
+        ----------
+        **meanings : str
+            Name -> meaning, with its unit.
+
+        Returns
+        -------
+        list of Symbol
+            The data, in this order.
+        """
         return self._arguments.declare("point data", meanings, varying=True)
 
     def nodal_data(
         self, *names: str, meaning: str = "at the nodes", nodes: int | None = None
     ) -> list[list[sp.Symbol]]:
-        """Data at the (first) nodes: a list over the nodes for each name, data name1, name2, ...
+        """Declare data at the nodes: data name1, name2, ...
 
-        A study fills `u_old` (for an unknown u) with the values of the step before.
+        Parameters
+        ----------
+        *names : str
+            Names. A study fills `u_old` (of an unknown u) with the values of the previous step.
+        meaning : str
+            Meaning, with its unit.
+        nodes : int, optional
+            Number of the first nodes that have them; all nodes if left out.
+
+        Returns
+        -------
+        list of list of Symbol
+            [name][node].
         """
         return self._arguments.nodal_data(names, meaning, nodes)
 
     def rates(self, *names: str, order: int = 1) -> list[list[sp.Expr]]:
-        """Time derivatives of nodal unknowns, in the order of `nodal_unknowns`.
+        """Return time derivatives of nodal unknowns.
 
-        du/dt = rate u + u_rate, with the parameter `rate` and the data `u_rate` at the nodes;
-        order=2: d2u/dt2 = acceleration u + u_acceleration. `Study.march` gives them.
+        Parameters
+        ----------
+        *names : str
+            Names of nodal unknowns.
+        order : int
+            1: du/dt = rate u + u_rate, with the parameter `rate` and the nodal data `u_rate`. 2:
+            d2u/dt2 = acceleration u + u_acceleration. `Study.march` gives their values.
+
+        Returns
+        -------
+        list of list of Expr
+            [name][node].
         """
         return self._arguments.rates(names, order)
 
     def history(self, /, **new: Any) -> None:
-        """Declare new values of `point_data` after a converged step: m.history(v_old=v).
+        """Declare the values of `point_data` after a converged step: m.history(v_old=v).
 
-        Each is a field of the kernel, named new_v_old.
+        Parameters
+        ----------
+        **new : Expr
+            Name of a point datum -> its new value, a field of the kernel called new_NAME.
+
+        Raises
+        ------
+        ModelError
+            There is no such point datum.
         """
         self._outputs.add_history(new, self._arguments.names("point data"))
 
     def require(self, *conditions: Any) -> None:
-        """Require conditions on parameters and data, e.g. `mu > 0`; checked at every call.
+        """Require conditions on parameters and data, such as `mu > 0`; every call checks them.
 
-        Each condition compares one parameter or datum with a number by <, <=, > or >=.
+        Parameters
+        ----------
+        *conditions : Relational
+            Each compares one parameter or datum with a number by <, <=, > or >=.
+
+        Raises
+        ------
+        ModelError
+            A condition has another form.
         """
         self._arguments.require(conditions)
 
     def point(self) -> list[sp.Symbol]:
-        """Coordinates of the quadrature point in the parent element."""
+        """Return the coordinates of the quadrature point in the reference cell.
+
+        Returns
+        -------
+        list of Symbol
+            xi, eta, zeta, as many as the rule has dimensions.
+        """
         names = self._parent_names[: self.rule.dimension]
         point = [self._symbols.input(s, "rule", k, varying=True) for k, s in enumerate(names)]
         return Listed(point, "the point's coordinates")
@@ -152,20 +314,45 @@ class Model(Draft):
         interface: bool = False,
         derivative: Mapping[sp.Symbol, Any] | None = None,
     ) -> Any:
-        """Name an intermediate (scalar or matrix); returns its symbol or matrix of symbols.
+        """Name an intermediate value, scalar or matrix.
 
-        A `interface` intermediate is one that derivatives are taken through.  `derivative` replaces
-        the true derivative by given ones with respect to chosen symbols.
+        Parameters
+        ----------
+        name : str
+            Its name.
+        expression : Expr or Matrix
+            Its value.
+        interface : bool
+            True: derivatives are computed through this value by the chain rule.
+        derivative : mapping of Symbol to Expr, optional
+            Symbol -> derivative of the value in place of the true one.
+
+        Returns
+        -------
+        Symbol or Matrix
+            The name, as symbols.
         """
         return self._intermediates.define(
             name, expression, interface=interface, derivative=derivative
         )
 
     def norm(self, values: Any) -> Any:
-        """Length of a scalar, list or matrix: the root of the sum of its squares.
+        """Return the length of a scalar, list or matrix: the root of the sum of its squares.
 
-        If it is zero, its first and second derivatives are zero too: a direction that does not
-        exist contributes nothing.  (Of lengths below 1e-154 the squares are zero.)
+        Parameters
+        ----------
+        values : Expr, list or Matrix
+            The entries.
+
+        Returns
+        -------
+        Expr
+            The length.
+
+        Notes
+        -----
+        Its first and second derivatives at zero are zero: a direction that does not exist
+        contributes nothing. The squares of lengths below 1e-154 are zero.
         """
         return self._intermediates.norm(values)
 
@@ -179,63 +366,147 @@ class Model(Draft):
         size: float = 0.0,
         iterations: int = 25,
     ) -> Any:
-        """Local unknowns s with equations(s) = 0, found by Newton's method inside the kernel.
+        """Declare local unknowns s with equations(s) = 0, solved by Newton's method in the kernel.
 
-        Equations that are integrals belong to the element: s is then one for all of its points
-        (condensation), and the rule becomes part of the kernel.
+        Parameters
+        ----------
+        name : str
+            Name of the unknowns.
+        equations : callable
+            Function of s that returns the residuals, in the form of s. Residuals that are integrals
+            belong to the element: s is then the same at all of its points (condensation), and the
+            rule is part of the kernel.
+        start : Expr, list or Matrix
+            Initial value, which gives s its form.
+        tolerance : float
+            The iteration ends when every residual is smaller than `tolerance` times its terms, and
+            a step changes every s_k by at most `tolerance` (`size` + abs(s_k)), or by rounding
+            only. The last step is applied, so that the error is of the order of its square.
+        size : float
+            Magnitude of s_k below which it is insignificant.
+        iterations : int
+            Largest number of steps; after it all outputs of the element are nan.
 
-        `start` is where the iteration begins: a scalar, a list, or a matrix, and s is alike; so is
-        what `equations` returns.  Derivatives of s follow from the implicit function theorem,
-        whatever the start.  The iteration ends when every equation is solved to `tolerance` of its
-        own terms and a step changes every s_k by no more than `tolerance` (`size` + |s_k|), or by
-        nothing but rounding; `size` is a magnitude of s_k below which it does not matter. The last
-        step is taken, so that the error is of the order of its square.  Without success after
-        `iterations` steps all outputs of the element are not-a-number.
+        Returns
+        -------
+        Symbol, list or Matrix
+            s. Its derivatives follow from the implicit function theorem, for any `start`.
+
+        Raises
+        ------
+        ModelError
+            The residuals have another form than `start`.
         """
         iteration = local.Iteration(tolerance, size, iterations)
         condensed = partial(self._condensed, name)
         return local.implicit(self._symbols, name, equations, start, iteration, condensed)
 
     def principal(self, name: str, C: Any, energy: Any = None) -> sp.Symbol:
-        """An isotropic energy of the principal stretches: energy(lambda_1, lambda_2, lambda_3).
+        """Return an isotropic energy of the principal stretches.
 
-        C is the symmetric right Cauchy-Green matrix, 3x3, the stretches are the roots of its
-        eigenvalues, and `energy` must not change when they are exchanged.  First and second
-        derivatives by C are exact to rounding also where stretches are equal or nearly so.
+        Parameters
+        ----------
+        name : str
+            Name of the energy.
+        C : Matrix
+            Symmetric right Cauchy-Green tensor (3, 3); the stretches are the roots of its
+            eigenvalues.
+        energy : callable
+            Function energy(lambda_1, lambda_2, lambda_3), symmetric in its arguments.
+
+        Returns
+        -------
+        Symbol
+            The energy. Its first and second derivatives by C are exact to rounding, also at equal
+            or nearly equal stretches.
+
+        Raises
+        ------
+        ModelError
+            C has a wrong shape, or the energy is not symmetric.
         """
         return local.principal(self._symbols, name, C, energy)
 
     def derivative(self, name: str, value: Any, by: Any) -> Any:
-        """Derivatives of a scalar by one named symbol, a list or a matrix of them, e.g. P = dW/dF.
+        """Return derivatives of a scalar, such as P = dW/dF.
 
-        The symbols are those of `define` or of arguments; all else is differentiated through.
-        Entries of a matrix that are one symbol share its derivative, so that dW = P_ij dF_ij.
+        Parameters
+        ----------
+        name : str
+            Name of the derivative.
+        value : Expr
+            The scalar.
+        by : Symbol, list or Matrix
+            Symbols of `define` or of arguments. Entries of a matrix that are one symbol share its
+            derivative, so that dW = P_ij dF_ij.
+
+        Returns
+        -------
+        Symbol, list or Matrix
+            In the form of `by`.
+
+        Raises
+        ------
+        ModelError
+            An entry of `by` is no such symbol.
         """
         return self._intermediates.derivative(name, value, by)
 
     def integral(self, name: str, integrand: Any) -> sp.Symbol:
-        """Quadrature of `integrand` over the parent element."""
+        """Return the integral over the reference cell by quadrature.
+
+        Parameters
+        ----------
+        name : str
+            Name of the integral.
+        integrand : Expr
+            Value at the point, including the Jacobian.
+
+        Returns
+        -------
+        Symbol
+            The integral.
+        """
         directions = self._arguments.directions
         return self._equations.integral(name, integrand, self.weight, directions)
 
     def measure(self, detJ: Any, gradients: Iterable[Any]) -> None:
-        """Say what an integrand is multiplied by, and which names only divide by it.
+        """Declare the factor of all integrands, and the names that only divide by it.
 
-        `kinematics` does; an integrand without such a factor is warned of.
+        Parameters
+        ----------
+        detJ : Expr
+            Jacobian; a warning names an integrand without it.
+        gradients : iterable of Expr
+            Gradients of shape functions, which have the Jacobian in a denominator.
+
+        Notes
+        -----
+        `softehl.kinematics` calls it.
         """
         self._equations.measure(detJ, gradients)
 
     def potential(self, expression: Any, *, constant: Iterable[Any] = ()) -> None:
-        """The residual is the gradient of `expression` with the `constant` symbols frozen.
+        """Add the gradient of an expression to the residual; further ones add up.
 
-        Further potentials and weak forms add up.
+        Parameters
+        ----------
+        expression : Expr
+            The potential.
+        constant : iterable of Symbol
+            Symbols without variation.
         """
         self._equations.potential(expression, constant)
 
     def weak_form(self, terms: Sequence[tuple[Any, Any]]) -> None:
-        """Residual = integral of sum(factor * variation of varied) over (factor, varied).
+        """Add the integral of sum(factor * variation of varied) to the residual.
 
         Further weak forms and potentials add up.
+
+        Parameters
+        ----------
+        terms : sequence of tuple
+            Pairs (factor, varied).
         """
         density, frozen = sp.Integer(0), []
         for factor, varied in terms:
@@ -248,7 +519,13 @@ class Model(Draft):
     # what is made of it -------------------------------------------------------------------------
 
     def fields(self, /, **values: Any) -> None:
-        """Quantities to be evaluated at the quadrature points; further calls add more."""
+        """Declare quantities that are evaluated at the quadrature points; further calls add more.
+
+        Parameters
+        ----------
+        **values : Expr
+            Name -> value.
+        """
         self._outputs.add_fields(values)
 
     def offer(
@@ -260,14 +537,27 @@ class Model(Draft):
         fields_rate: bool = False,
         derivatives: Sequence[Any] = (),
     ) -> None:
-        """Choose what is generated: tasks by name, derivatives of the residual by argument.
+        """Select what is generated; further calls add up.
 
-        `tasks` are chosen among energy, residual, tangent (residual and tangent together), fields
-        and product; left out, all but the product.  `product` adds the tangent times a vector.
-        `pseudo_load` adds the derivative of the residual along a variation of coordinates, data
-        and parameters, `fields_rate` that of the fields: for sensitivities of what a study
-        computes.  `derivatives` lists symbols of parameters, data or coordinates.  Further calls
-        add up.
+        Parameters
+        ----------
+        tasks : sequence of str, optional
+            Of energy, residual, tangent (with the residual), fields and product; all but the
+            product if left out.
+        product : bool
+            Add the product of the tangent with a vector.
+        pseudo_load : bool
+            Add the derivative of the residual along a variation of coordinates, data and
+            parameters, for sensitivities.
+        fields_rate : bool
+            Add that of the fields.
+        derivatives : sequence of Symbol
+            Parameters, data or coordinates by which the residual is differentiated.
+
+        Raises
+        ------
+        ModelError
+            There is no such task or argument.
         """
         self._outputs.choose(tasks, product=product)
         self._outputs.pseudo_load |= pseudo_load
@@ -275,10 +565,17 @@ class Model(Draft):
         self._outputs.derive_by(derivatives)
 
     def example(self, /, **values: float) -> None:
-        """Values near which the model makes sense, by name; the check of its kernel starts there.
+        """Give values near which the model makes sense; the check of its kernel starts there.
 
-        Names of parameters, data, unknowns (`u_x1`) and coordinates (`X1`).  Values that are not
-        named are about 1 (parameters, data), a few per cent (unknowns), the unit cell
-        (coordinates).
+        Parameters
+        ----------
+        **values : float
+            Names of parameters, data, unknowns (`u_x1`) and coordinates (`X1`) -> values. Others
+            are about 1 (parameters, data), a few per cent (unknowns), the unit cell (coordinates).
+
+        Raises
+        ------
+        ModelError
+            There is no such argument.
         """
         self._arguments.set_example(values)

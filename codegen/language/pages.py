@@ -58,12 +58,25 @@ NOWHERE = On()
 
 @dataclass(frozen=True)
 class Page:
-    """A page of fields: `write` says its mathematics.
+    """Page of fields: a function that defines the equations at a point; made by `softehl.page`.
 
-    degree: of polynomials that the quadrature integrates on the parent cell; None: the rule of the
-    cell, or on triangles and tetrahedra one that integrates products of values, where they occur.
-    form: of its kernels, "whole" element or loops around a "point"; None: the faster one.
-    source: the function whose file and line errors name, where that is not `write`.
+    Attributes
+    ----------
+    name : str
+        Name of the page.
+    write : callable
+        The function, which takes a `Fields`.
+    degree : int, optional
+        Degree of polynomials that the quadrature integrates exactly on the reference cell. Left
+        out: the rule of the cell; on triangles and tetrahedra one that integrates products of
+        values, where they occur.
+    doc : str
+        Description.
+    form : str, optional
+        Form of its kernels: "whole" elements, or loops around a "point"; the faster one if left
+        out.
+    source : callable, optional
+        Function whose file and line errors name, if that is not `write`.
     """
 
     name: str
@@ -75,16 +88,31 @@ class Page:
 
     @property
     def code(self) -> CodeType:
-        """Code of its author."""
+        """Code object of its function."""
         code: CodeType = (self.source or self.write).__code__
         return code
 
     def definition(self, cell: str, geometry: str | None = None) -> Definition:
-        """The model of an element of a cell, by its name, in a geometry (None: the usual one).
+        """Return the model of an element of a cell.
 
-        "quad4_interior" is a facet between two cells, "quad4_side" one with the cell beside it.
-        It is a side where the geometry has one dimension more: quad4 of a solid, line2 in plane
-        strain.
+        Parameters
+        ----------
+        cell : str
+            Name of a cell, such as "hex8"; "quad4_interior" is a facet between two cells,
+            "quad4_side" a side with gradients of the cell beside it. With a geometry of one
+            dimension more it is a side: quad4 of a solid, line2 in plane strain.
+        geometry : str, optional
+            "plane strain", "axisymmetric" or "solid"; the default of the dimension if left out.
+
+        Returns
+        -------
+        Definition
+            The model.
+
+        Raises
+        ------
+        ModelError
+            The page is wrong, with its line.
         """
         stem, _, facet = cell.partition("_")
         kind = element(stem)
@@ -118,7 +146,23 @@ class Page:
         return replace(self._made(on, on.finish), cell=f"{kind.name}_{facet}")
 
     def definitions(self, on: On) -> list[Definition]:
-        """Its models on all cells that are wanted."""
+        """Return the models of an element on all requested cells.
+
+        Parameters
+        ----------
+        on : On
+            Cells and geometry.
+
+        Returns
+        -------
+        list of Definition
+            A model for each cell.
+
+        Raises
+        ------
+        ModelError
+            There is no such cell, or the page is wrong.
+        """
         if not on.cells:
             raise PlaceError(
                 f"{self.name} is a page of fields, which stands on any cell: say which, as in "
@@ -132,7 +176,25 @@ class Page:
         return [self.definition(cell, on.geometry) for cell in on.cells]
 
     def at_point(self, cell: str, geometry: str | None = None) -> PointForm:
-        """The model at a point of a cell."""
+        """Return the model at a point of a cell.
+
+        Parameters
+        ----------
+        cell : str
+            Name of a cell.
+        geometry : str, optional
+            As in `definition`.
+
+        Returns
+        -------
+        PointForm
+            Residuals by values and gradients.
+
+        Raises
+        ------
+        ModelError
+            The page is wrong.
+        """
         kind = element(cell)
         return self._at_point(self.name, kind, geometry_of(kind.dimension, geometry))
 
@@ -157,7 +219,20 @@ class Page:
             raise ModelError(error.text, where) from error
 
     def rule(self, cell: Element, form: PointForm | None) -> QuadratureRule:
-        """The quadrature on a cell; form: at a point, None if it is not known there."""
+        """Return the quadrature on a cell.
+
+        Parameters
+        ----------
+        cell : Element
+            The cell.
+        form : PointForm or None
+            The model at a point, if it is known.
+
+        Returns
+        -------
+        QuadratureRule
+            The rule.
+        """
         if self.degree is not None:
             return rule_of(cell, self.degree)
         order = order_of(cell)
@@ -205,9 +280,26 @@ def page(*, degree: int | None = None, form: Form | None = None) -> Callable[[Wr
 def page(
     write: Write | None = None, /, *, degree: int | None = None, form: Form | None = None
 ) -> Any:
-    """Make a page of fields of a function that gets m, a `Fields`: `@softehl.page`.
+    """Make a page of fields of a function: `@softehl.page` or `@softehl.page(degree=4)`.
 
-    degree, form: as in `Page`, for `@softehl.page(degree=4)`.
+    Parameters
+    ----------
+    write : callable
+        Function that takes a `Fields`.
+    degree : int, optional
+        Degree of polynomials that the quadrature integrates, as in `Page`.
+    form : str, optional
+        "whole" or "point", as in `Page`.
+
+    Returns
+    -------
+    Page
+        The page, for `Study.add`, `softehl.load_kernel` and `softehl generate`.
+
+    Raises
+    ------
+    ModelError
+        There is no such form.
     """
     if form is not None and form not in get_args(Form):
         raise ModelError(f'form = {form!r}: allowed are "whole" and "point"')

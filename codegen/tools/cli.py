@@ -34,7 +34,30 @@ def generate(
     seconds: float = SECONDS,
     on: tuple[tuple[str, ...], str | None] = ((), None),
 ) -> int:
-    """See `_generate`; says what is wrong in one line.  on: cells and geometry of pages."""
+    """Generate kernels; `softehl generate`.
+
+    Parameters
+    ----------
+    models : sequence of Path
+        Model files; without them the kernels that ship.
+    check : bool
+        Write nothing, and return 1 if a file is out of date.
+    trace : str, optional
+        Kernel to show before and after each pass.
+    target : str
+        "simd", "scalar", or the name of a host.
+    out : Path, optional
+        Folder of the files.
+    seconds : float
+        Time limit for the check of each kernel [s].
+    on : tuple
+        Cells and geometry of pages of fields.
+
+    Returns
+    -------
+    int
+        Exit code; 2 after an error, which is one line on stderr.
+    """
     try:
         _require_printable(*models, *([out] if out else []))
         if target in HOSTS and (target != Target.UFCX or _materials(models, On(*on))):

@@ -184,21 +184,39 @@ def load_kernel(
     materials: bool = False,
     derivatives: bool = False,
 ) -> "Kernel":
-    """A compiled kernel, by any of
+    """Return a compiled kernel; derive and compile it if the cache does not have it.
 
-    - the name of one that ships: `load_kernel("solid_q4")`; with `materials`, that of a material
-      that ships, `load_kernel("neo_hooke", cell="hex8", materials=True)`;
-    - a model file: `load_kernel("my_model.py")`, with `name` where it has several models.  It is
-      derived and compiled if the cache does not have it; the file is run then;
-    - a folder that `softehl generate` wrote: `load_kernel("generated/my_model")`;
-    - a `Definition` or a function decorated by `softehl.page` or `softehl.material`, for notebooks.
+    Parameters
+    ----------
+    source : str, Path, Definition, Page or Law
+        The name of a kernel that ships, "solid_q4"; with `materials`, that of a material that
+        ships, "neo_hooke". A model file, "my_model.py", which is run. A folder that
+        `softehl generate` wrote. Or a Definition, page or material, for notebooks.
+    name : str, optional
+        Which model, if the file or folder has several.
+    cell : str, optional
+        Cell of a page of fields, cell="hex8". Others ignore it.
+    geometry : str, optional
+        Geometry of a page of fields: "plane strain" (the default), "axisymmetric" or "solid".
+    materials : bool
+        Take the stress laws of a file, as bodies, in place of its pages.
+    derivatives : bool
+        Add the tasks `pseudo_load` and `fields_rate`, for derivatives of results; the point data
+        are then those of the page and the rate of each.
 
-    cell, geometry: where a page of fields stands, as in `load_kernel(page, cell="hex8")`; the
-    geometry is "plane strain" (the default), "axisymmetric" or "solid". Others ignore them.
-    materials: take the stress laws of a file, as bodies, and not its pages.
-    derivatives: the kernel with the tasks `pseudo_load` and `fields_rate`, of which derivatives of
-    results are made; its point data are those of the page, then the rate of each.
-    Raises `runtime.kernels.KernelError`, or what is wrong with the model or the compiler.
+    Returns
+    -------
+    Kernel
+        The compiled kernel.
+
+    Raises
+    ------
+    KernelError
+        There is no such kernel.
+    ModelError
+        The model is wrong.
+    SymPyNeededError
+        The kernel must be derived, and SymPy is not installed.
     """
     from softehl.runtime import kernels
 

@@ -14,7 +14,18 @@ if TYPE_CHECKING:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code.  An error is one line on stderr."""
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Words after the program's name; those of the process if left out.
+
+    Returns
+    -------
+    int
+        Exit code. An error is one line on stderr.
+    """
     import click
 
     # One thread a process, before NumPy is loaded: the systems are small, the runs are parallel.

@@ -35,9 +35,22 @@ Section = Cells
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """Fields along the film, sealed side first; six arrays of one length (n,).
+    """Fields along the film, sealed side first; six arrays (n,).
 
-    tau_MPa: shear stress on the seal. tau_rod_MPa: that on the rod, whose integral is friction.
+    Attributes
+    ----------
+    x_mm : array (n,)
+        Coordinate [mm].
+    h_um : array (n,)
+        Film thickness [um].
+    p_MPa : array (n,)
+        Film pressure [MPa].
+    tau_MPa : array (n,)
+        Shear stress on the seal [MPa].
+    flux_mm2_s : array (n,)
+        Flux per circumference [mm^2/s].
+    tau_rod_MPa : array (n,)
+        Shear stress on the rod [MPa]; its integral is the friction.
     """
 
     x_mm: Array
@@ -194,10 +207,19 @@ class FilmRow(Row):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FilmState(FilmRow):
-    """One converged soft-EHL state: its row, and the fields that it comes from.
+    """One converged film: its row of `curve.csv`, and its fields.
 
-    advice: what to do about a verdict that is not "ok". sensitivity: quantity -> parameter ->
-    d log quantity / d log parameter, where it was asked for and the mesh shows it.
+    Attributes
+    ----------
+    advice : str
+        Remedy for a verdict that is not "ok".
+    profile : Profile
+        Fields along the film.
+    section : Section
+        Deformed section; points are (z, r).
+    sensitivity : mapping, optional
+        Quantity -> parameter -> d log quantity / d log parameter; None if not requested, or if
+        the mesh does not resolve it.
     """
 
     advice: str
@@ -207,20 +229,29 @@ class FilmState(FilmRow):
 
     @property
     def sealed_pressure(self) -> float:
-        """Sealed pressure p_s, MPa."""
+        """Sealed pressure p_s [MPa]."""
         return self.sealed_pressure_MPa
 
     @property
     def rod_speed(self) -> float:
-        """U in mm/s, + = outstroke."""
+        """Rod speed U [mm/s], + = outstroke."""
         return self.rod_speed_mm_s
 
 
 @dataclass(frozen=True, eq=False)
 class ContactState:
-    """The frictionless contact solution (9)-(10) at one sealed pressure, before any film.
+    """Frictionless contact (9)-(10) at one sealed pressure, before any film.
 
-    x_mm, p_MPa: (n,), contact pressure along the lubricated arc, sealed side first.
+    Attributes
+    ----------
+    sealed_pressure : float
+        Sealed pressure [MPa].
+    x_mm : array (n,)
+        Coordinate along the lubricated arc [mm], sealed side first.
+    p_MPa : array (n,)
+        Contact pressure [MPa].
+    section : Section
+        Deformed section.
     """
 
     sealed_pressure: float
@@ -246,31 +277,82 @@ class StageRecord(harness.StageRecord):
 
 @dataclass(frozen=True)
 class Outcome(harness.Outcome):
-    """Result of a run: its film states, and the cost of its stages."""
+    """Result of a run: its films, and the cost of its stages.
+
+    Attributes
+    ----------
+    states : tuple of FilmState
+        Films in the order of the run.
+    status : Status
+        Whether all states were reached.
+    message : str
+        Reason, if they were not.
+    unknowns : mapping of str to int
+        Number of unknowns, "total" and of parts.
+    kernel_signatures : mapping of str to str
+        Kernel -> signature of the compiled kernel.
+    stages : tuple of StageRecord
+        Cost of each stage.
+    solvers : mapping of str to str
+        "linear" -> the linear solver in use, "solver" -> the method that was requested.
+    numbers : mapping of str to float
+        Further results, name with unit -> value.
+    """
 
     states: tuple[FilmState, ...]
     stages: tuple[StageRecord, ...] = ()
 
 
 class Observer(Protocol):
-    """The listener a run of a seal reports to.  Calls come in order, from one thread."""
+    """Listener of a run of a seal; calls come in order, from one thread."""
 
     def stage(self, name: str, *, sealed_pressure: float, stroke: str, steps: int | None) -> None:
-        """A stage begins.  steps: how many are expected, None if the path decides."""
+        """Begin a stage.
+
+        Parameters
+        ----------
+        name : str
+            Name of the stage.
+        sealed_pressure : float
+            Sealed pressure [MPa].
+        stroke : str
+            "out", "in" or "both".
+        steps : int or None
+            Number of expected steps; None if the path decides.
+        """
         return None
 
     def step(self, **step: Unpack[harness.Step]) -> None:
-        """A step of the path converged; its label is for instance "U [mm/s]" or "load"."""
+        """Report a converged step of the path.
+
+        Parameters
+        ----------
+        **step
+            `label`, `parameter`, `iterations`, `residuals` and `fraction` of the step; the label is
+            for instance "U [mm/s]" or "load".
+        """
         return None
 
     def contact_state(self, state: ContactState) -> None:
-        """The contact stage is done."""
+        """Report the frictionless contact.
+
+        Parameters
+        ----------
+        state : ContactState
+            Contact pressure and section.
+        """
         return None
 
     def film_state(self, state: FilmState) -> None:
-        """A requested speed converged: keep it now."""
+        """Report a converged film at a requested speed, to be saved now.
+
+        Parameters
+        ----------
+        state : FilmState
+            The film.
+        """
         return None
 
 
 class Silent(Observer):
-    """The observer that does nothing (for tests and scripts)."""
+    """Observer that does nothing, for tests and scripts."""

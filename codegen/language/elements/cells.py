@@ -28,10 +28,18 @@ _HALF = sp.Rational(1, 2)
 
 @dataclass(frozen=True)
 class Element:
-    """An element.
+    """Reference cell: nodes, shape functions, default quadrature.
 
-    nodes: parent coordinates of each. shape(*point): shape functions. rule: that integrates the
-    stiffness of an undistorted element exactly.
+    Attributes
+    ----------
+    name : str
+        Such as "hex8".
+    nodes : tuple of tuple
+        Coordinates of each node.
+    shape : callable
+        Shape functions at a point, shape(xi, eta, zeta).
+    rule : QuadratureRule
+        Rule that integrates the stiffness of an undistorted element exactly.
     """
 
     name: str
@@ -45,7 +53,7 @@ class Element:
 
     @property
     def dimension(self) -> int:
-        """Of the parent element."""
+        """Dimension of the reference cell."""
         return self.rule.dimension
 
     @property
@@ -58,11 +66,33 @@ class Element:
         return tuple(tuple(number[c] for c in place) for place in self.nodes)
 
     def along(self, x: Any) -> list[Any]:
-        """Shape functions of a line at x, in the numbers of `lines`."""
+        """Return the shape functions of a line, in the order of `lines`.
+
+        Parameters
+        ----------
+        x : Expr
+            Coordinate in [-1, 1].
+
+        Returns
+        -------
+        list of Expr
+            Values.
+        """
         return _line(len({place[0] for place in self.nodes}) - 1, x)
 
     def gradient(self, *point: Any) -> list[tuple[Any, ...]]:
-        """(dN_a/dxi, dN_a/deta, ...) of every shape function."""
+        """Return the derivatives (dN_a/dxi, dN_a/deta, ...) of every shape function.
+
+        Parameters
+        ----------
+        *point : Expr
+            Coordinates in the reference cell.
+
+        Returns
+        -------
+        list of tuple of Expr
+            [node][direction].
+        """
         places, slopes = self._slopes
         values = dict(zip(places, point, strict=True))
         return [tuple(slope.xreplace(values) for slope in row) for row in slopes]
@@ -75,10 +105,25 @@ class Element:
 
 
 def element(name: str, order: int | None = None) -> Element:
-    """The element of a name, such as "hex20", or of a shape and an order: element("hex", order=4).
+    """Return the element of a name, or of a shape and an order.
 
-    Shapes are "line", "quad" and "hex" (orders 1 to 6), "tri" and "tet" (1 and 2), "wedge" (1).
-    Raises ValueError that names what there is.
+    Parameters
+    ----------
+    name : str
+        "hex20", or a shape: "line", "quad" and "hex" (orders 1 to 6), "tri" and "tet" (1 and 2),
+        "wedge" (1).
+    order : int, optional
+        Order of the shape, element("hex", order=4).
+
+    Returns
+    -------
+    Element
+        The element.
+
+    Raises
+    ------
+    ValueError
+        There is no such element; the message names those that there are.
     """
     if order is not None:
         if name not in SHAPES:
