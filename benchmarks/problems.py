@@ -22,7 +22,7 @@ import numpy as np
 import sympy as sp
 
 from softehl import Definition, Mesh, Model, Newton, Study, element, kinematics, load_kernel
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 from softehl.runtime.solve.backends import choose
 
 MU, K, LOAD = 0.4225, 0.9154166666666667, 1 / 16

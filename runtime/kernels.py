@@ -26,7 +26,7 @@ from softehl.runtime.library import (
     library_of,
     manifest,
 )
-from softehl.runtime.names import few
+from softehl.runtime.suggestions import few
 
 __all__ = [
     "ArgumentError",

@@ -8,28 +8,28 @@ from typing import Literal, cast
 
 import numpy as np
 
+from softehl.runtime.analyses.bifurcation import Bifurcation, require_detect
+from softehl.runtime.analyses.buckling import Buckling, linear_buckling
+from softehl.runtime.analyses.callbacks import Series, Telling, Watch, watched
+from softehl.runtime.analyses.dynamics import Motions, require_no_inertia
+from softehl.runtime.analyses.homogenisation import Cell, periodic
+from softehl.runtime.analyses.initial_state import beginning
+from softehl.runtime.analyses.load_stepping import ArcSteps, LoadPath, LoadSteps
+from softehl.runtime.analyses.time_integrators import METHODS, require_method, require_none
+from softehl.runtime.analyses.time_integrators import Method as Dynamic
+from softehl.runtime.analyses.time_stepping import Clock, March, Method
 from softehl.runtime.arrays import count_of
-from softehl.runtime.begin import beginning
-from softehl.runtime.bifurcation import Bifurcation, require_detect
-from softehl.runtime.buckling import Buckling, linear_buckling
-from softehl.runtime.derivatives.trail import continued
-from softehl.runtime.dynamics.schemes import METHODS, require_method, require_none
-from softehl.runtime.dynamics.schemes import Method as Dynamic
-from softehl.runtime.dynamics.start import Motions, require_no_inertia
+from softehl.runtime.definition import argument_checks as read
+from softehl.runtime.definition.problem_definition import Datum, Statement, StudyError, Where
 from softehl.runtime.engines.engine import AnyEngine, engine_of, note_of
 from softehl.runtime.engines.sizes import Linear
-from softehl.runtime.equations import equations
-from softehl.runtime.load import ArcSteps, LoadPath, LoadSteps
-from softehl.runtime.march import Clock, March, Method
-from softehl.runtime.mass import Masses
-from softehl.runtime.periodic import Cell, periodic
-from softehl.runtime.result import Modes, Result
+from softehl.runtime.equations.mass_matrix import Masses
+from softehl.runtime.equations.system import System
+from softehl.runtime.equations.system_builder import equations
+from softehl.runtime.results.result import Modes, Result
+from softehl.runtime.sensitivity.tape import continued
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Point, Solution, Status
-from softehl.runtime.statement import given as read
-from softehl.runtime.statement.records import Datum, Statement, StudyError, Where
-from softehl.runtime.system import System
-from softehl.runtime.watch import Series, Telling, Watch, watched
 
 _BALANCED = 1e-6
 """Of the forces: a state whose residuals are smaller is one of equilibrium."""

@@ -20,18 +20,10 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Integers
-from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
-from softehl.runtime.fit.fitted import Fitted
-from softehl.runtime.kernels import Kernel
-from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
-from softehl.runtime.names import few, listed
-from softehl.runtime.paths import Paths
-from softehl.runtime.statement import given as read
-from softehl.runtime.statement.along import require_apart
-from softehl.runtime.statement.contacts import touch
-from softehl.runtime.statement.forms import elements_on, form_of
-from softehl.runtime.statement.pages import (
+from softehl.runtime.definition import argument_checks as read
+from softehl.runtime.definition.block_options import elements_on, form_of
+from softehl.runtime.definition.contact_sides import touch
+from softehl.runtime.definition.element_blocks import (
     On,
     beside_of,
     elements_of,
@@ -40,7 +32,9 @@ from softehl.runtime.statement.pages import (
     page_on,
     wants_traces,
 )
-from softehl.runtime.statement.records import (
+from softehl.runtime.definition.kernel_loading import Origin, Source
+from softehl.runtime.definition.line_fields import require_apart
+from softehl.runtime.definition.problem_definition import (
     Condition,
     Datum,
     Force,
@@ -50,7 +44,13 @@ from softehl.runtime.statement.records import (
     Where,
     shown,
 )
-from softehl.runtime.statement.sources import Origin, Source
+from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
+from softehl.runtime.fit.fitted import Fitted
+from softehl.runtime.kernels import Kernel
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
+from softehl.runtime.paths import Paths
+from softehl.runtime.suggestions import few, listed
 
 
 @dataclass(eq=False)

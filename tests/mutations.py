@@ -318,13 +318,13 @@ FAULTS = (
         "tests/runtime/test_orders.py",
     ),
     Fault(
-        "runtime/recovery.py",
+        "runtime/results/recovery.py",
         "max(_order(block, cell) - 1, 1)",
         "max(_order(block, cell) - 2, 0)",
         "tests/runtime/test_recovery.py",
     ),
     Fault(
-        "runtime/recovery.py",
+        "runtime/results/recovery.py",
         "operator[_mirrored(cell)]",
         "operator",
         "tests/runtime/test_recovery.py",
@@ -336,7 +336,7 @@ FAULTS = (
         "tests/runtime/test_output.py",
     ),
     Fault(
-        "runtime/stability.py",
+        "runtime/equations/stability.py",
         "pivots.negative - int(saddle.sum())",
         "pivots.negative",
         "tests/runtime/test_modes.py",
@@ -372,25 +372,25 @@ FAULTS = (
         "tests/runtime/test_dynamics.py",
     ),
     Fault(
-        "runtime/dynamics/schemes.py",
+        "runtime/analyses/time_integrators.py",
         "return 0.5 - self.am + self.af",
         "return 0.5 + self.am - self.af",
         "tests/runtime/test_dynamics.py",
     ),
     Fault(
-        "runtime/bifurcation.py",
+        "runtime/analyses/bifurcation.py",
         "if change and not (folds == 1 and abs(change) == 1):",
         "if change:",
         "tests/runtime/test_bifurcation.py",
     ),
     Fault(
-        "runtime/derivatives/linear.py",
+        "runtime/sensitivity/linearised_step.py",
         "csc_array(self._reduced.T) if turned",
         "self._reduced if turned",
         "tests/runtime/test_derivatives.py",
     ),
     Fault(
-        "runtime/derivatives/adjoint.py",
+        "runtime/sensitivity/adjoint.py",
         "found[:, :, k] += (self.mu * after)",
         "found[:, :, k] -= (self.mu * after)",
         "tests/runtime/test_derivatives.py",
@@ -421,7 +421,7 @@ FAULTS = (
         "tests/cases/test_cycle.py",
     ),
     Fault(
-        "runtime/statement/along.py",
+        "runtime/definition/line_fields.py",
         "return (Slot(name, 0), *inner, Slot(name, 1))",
         "return (Slot(name, 0), Slot(name, 1), *inner)",
         "tests/runtime/test_study_forms.py",

@@ -20,7 +20,7 @@ from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import Parameters, files_of, keys_of
 from softehl.cases.harness.units import is_number, is_quantity
 from softehl.runtime.library import KernelError
-from softehl.runtime.names import meant
+from softehl.runtime.suggestions import meant
 
 Shipped = Mapping[str, str]
 """Name of a case that ships -> its module, which is imported when the case is needed."""

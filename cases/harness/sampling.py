@@ -16,7 +16,7 @@ from scipy.stats import qmc
 
 from softehl.cases.harness.errors import BadInput
 from softehl.runtime.arrays import Array
-from softehl.runtime.names import meant
+from softehl.runtime.suggestions import meant
 
 F = TypeVar("F", bound="Form")
 Points: TypeAlias = list[dict[str, Any]]

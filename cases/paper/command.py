@@ -12,7 +12,7 @@ from softehl.cases.paper.drawing import write_picture
 from softehl.cases.paper.item import Item, Scope
 from softehl.cases.paper.states import Store, merged
 from softehl.runtime.io import write_csv, write_text
-from softehl.runtime.names import meant
+from softehl.runtime.suggestions import meant
 
 
 def chosen(names: Sequence[str]) -> list[Item]:

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeAlias
 
+from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.engines.large import Large
 from softehl.runtime.engines.sizes import Linear, linear_solver, modes_by_multigrid
+from softehl.runtime.equations.system import System
 from softehl.runtime.solve.kept import Kept
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.statement.records import StudyError
-from softehl.runtime.system import System
 
 
 class Engine(Protocol):

@@ -11,11 +11,11 @@ from scipy.sparse import csr_array
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.engines.motions import motions
+from softehl.runtime.equations.system import System
 from softehl.runtime.fem.assembly import ElementBlock
 from softehl.runtime.fem.orders import LOWER, Transfer, cell_of, interpolation
 from softehl.runtime.fem.products import Places, require_product
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.system import System
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.definition.problem_definition import Block, Force
 from softehl.runtime.engines.partition import Partition
+from softehl.runtime.equations.system import System
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.fem.unknowns import Numbering
-from softehl.runtime.statement.records import Block, Force
-from softehl.runtime.system import System
 
 
 @dataclass(frozen=True, eq=False)

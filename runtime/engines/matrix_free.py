@@ -14,17 +14,17 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Array
+from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.engines.levels import Levels
 from softehl.runtime.engines.tangent import Iteration, Tangent
 from softehl.runtime.engines.tied import Ties
+from softehl.runtime.equations.system import System
 from softehl.runtime.fem.assembly import Assembler, ElementBlock
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.products import NoProductError, require_product, threads
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.share import Share
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.statement.records import StudyError
-from softehl.runtime.system import System
 
 _WHO = 'linear = "matrix-free"'
 NO_INERTIA = f"{_WHO}: inertia has no such products; leave linear out"

@@ -9,8 +9,8 @@ from scipy.sparse import csr_array
 
 from softehl.runtime.arrays import Flags, Integers
 from softehl.runtime.engines.sizes import internal
+from softehl.runtime.equations.system import System
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.system import System
 
 
 @dataclass(frozen=True, eq=False)

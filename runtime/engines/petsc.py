@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Flags, Integers
+from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.engines.exchange import Exchange
 from softehl.runtime.engines.inner import Outer
 from softehl.runtime.engines.levels import Levels
@@ -19,11 +20,10 @@ from softehl.runtime.engines.partition import Cells, partition
 from softehl.runtime.engines.pieces import part_here
 from softehl.runtime.engines.shares import Parts, Processes
 from softehl.runtime.engines.spread import Distributed, Team
+from softehl.runtime.equations.system import System
 from softehl.runtime.fem.loads import Tie
 from softehl.runtime.mpi import petsc, world
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.statement.records import StudyError
-from softehl.runtime.system import System
 
 _AXES = ("x", "y", "z")
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.engines.exchange import Exchange
 from softehl.runtime.engines.local import Part
 from softehl.runtime.engines.partition import nodes_of_unknowns, numbered
+from softehl.runtime.equations.system import System
 from softehl.runtime.fem.loads import Tie
 from softehl.runtime.mesh.piece import Piece
 from softehl.runtime.mpi import world
-from softehl.runtime.statement.records import StudyError
-from softehl.runtime.system import System
 
 
 def part_here(system: System, piece: Piece) -> tuple[Part, Exchange, int]:

@@ -11,10 +11,10 @@ from scipy.sparse.csgraph import connected_components
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.engines.exchange import Exchange
 from softehl.runtime.engines.local import Part
+from softehl.runtime.equations.system import System
 from softehl.runtime.fem.loads import Tie
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mpi import world
-from softehl.runtime.system import System
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,17 +9,17 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.engines.exchange import largest, total
 from softehl.runtime.engines.matrix_free import NO_INERTIA
 from softehl.runtime.engines.reduced import Reduced
 from softehl.runtime.engines.slepc import Pencil
 from softehl.runtime.engines.spread import Spread, Team
+from softehl.runtime.equations.system import System
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.fem.reduction import concave, internal_negative
 from softehl.runtime.mpi import world
 from softehl.runtime.share import Share
-from softehl.runtime.statement.records import StudyError
-from softehl.runtime.system import System
 
 T = TypeVar("T")
 

@@ -8,16 +8,16 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 
 from softehl.runtime.arrays import Flags, Integers
+from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.engines.motions import is_vector, motions
+from softehl.runtime.equations.system import System
 from softehl.runtime.fem.assembly import Assembler
-from softehl.runtime.names import listed
 from softehl.runtime.solve import amg, pardiso
 from softehl.runtime.solve.amg import Modes, Multigrid, OrFactors
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.internal import Condensing
 from softehl.runtime.solve.linear import LinearSolver
-from softehl.runtime.statement.records import StudyError
-from softehl.runtime.system import System
+from softehl.runtime.suggestions import listed
 
 Linear: TypeAlias = Literal["auto", "direct", "superlu", "pardiso", "amg", "matrix-free"]
 

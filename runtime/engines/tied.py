@@ -15,11 +15,11 @@ from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.fem.loads import Tie
 from softehl.runtime.fem.problem import Problem
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.linear import Factors
-from softehl.runtime.statement.records import StudyError
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from softehl.runtime.fem.checks import not_finite, require_sound_elements
 from softehl.runtime.fem.mass import Mass
 from softehl.runtime.fem.pattern import Pattern, Structure
 from softehl.runtime.kernels import Kernel, Rule
-from softehl.runtime.names import few
+from softehl.runtime.suggestions import few
 
 Again: TypeAlias = Callable[[Array, Array, Array | None], None]
 """A task of a kernel: of its unknowns, and of the values and the tangent that it writes."""

@@ -11,7 +11,7 @@ from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.kernels import Kernel
 from softehl.runtime.mesh.cells import CELLS, Cell, jacobians
-from softehl.runtime.names import listed, meant
+from softehl.runtime.suggestions import listed, meant
 
 if TYPE_CHECKING:
     from softehl.runtime.fem.assembly import ElementBlock

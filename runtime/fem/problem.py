@@ -27,7 +27,7 @@ from softehl.runtime.fem.checks import (
 from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.fem.guards import Guard
 from softehl.runtime.fem.measure import ROUNDING, Balance, hides, is_far, size
-from softehl.runtime.names import few, listed
+from softehl.runtime.suggestions import few, listed
 
 
 @dataclass(frozen=True, eq=False)

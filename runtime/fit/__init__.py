@@ -1,1 +1,1 @@
-"""Inputs of a study that make its results what was measured; functions for optimisers."""
+"""Inverse problems: objectives, least-squares fits of measurements, a study as a JAX operation."""

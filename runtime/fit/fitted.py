@@ -11,20 +11,20 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.derivatives import asked
-from softehl.runtime.derivatives.asked import By
-from softehl.runtime.derivatives.inputs import Input, Key, varied
-from softehl.runtime.derivatives.quantities import quantity
-from softehl.runtime.fit.in_jax import Operation
-from softehl.runtime.fit.measured import Data, Measured
-from softehl.runtime.fit.scale import Bounds
-from softehl.runtime.fit.squares import Fit, LeastSquares
-from softehl.runtime.fit.trials import Objective, Trials
+from softehl.runtime.definition.argument_checks import finite
+from softehl.runtime.definition.problem_definition import Statement, StudyError
+from softehl.runtime.equations.stability import Unstable
+from softehl.runtime.fit.jax_operation import Operation
+from softehl.runtime.fit.least_squares import Fit, LeastSquares
+from softehl.runtime.fit.measurements import Data, Measured
+from softehl.runtime.fit.objective import Objective, Trials
+from softehl.runtime.fit.scaling import Bounds
 from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.result import Result
-from softehl.runtime.stability import Unstable
-from softehl.runtime.statement.given import finite
-from softehl.runtime.statement.records import Statement, StudyError
+from softehl.runtime.results.result import Result
+from softehl.runtime.sensitivity import input_parsing
+from softehl.runtime.sensitivity.input_parsing import By
+from softehl.runtime.sensitivity.inputs import Input, Key, varied
+from softehl.runtime.sensitivity.quantities import quantity
 
 
 class Solvable(Protocol):
@@ -69,7 +69,7 @@ class Fitted:
         StudyError
             The study has no such input, or a value has a wrong shape.
         """
-        items = asked.of_keys(self._statement, list(values))
+        items = input_parsing.of_keys(self._statement, list(values))
         return _changed(
             self, [(i, _numbers(i, v)) for i, v in zip(items, values.values(), strict=True)]
         )
@@ -110,7 +110,7 @@ class Fitted:
         StudyError
             The study has no such input.
         """
-        items = asked.inputs(self._statement, by)
+        items = input_parsing.inputs(self._statement, by)
         return Objective(Trials(items, _Runner(self, path)), quantity(what, at, reaction))
 
     def in_jax(self: Solvable, *, by: By, **path: Any) -> Operation:
@@ -134,7 +134,7 @@ class Fitted:
         StudyError
             The study has no such input.
         """
-        return Operation(Trials(asked.inputs(self._statement, by), _Runner(self, path)))
+        return Operation(Trials(input_parsing.inputs(self._statement, by), _Runner(self, path)))
 
     def fit(
         self: Solvable,
@@ -186,7 +186,7 @@ class Fitted:
             times = path["dt"] * np.arange(1, round(until / path["dt"]) + 1)
         data = Data.read(measured, times)
         scales = None if sigma is None else np.broadcast_to(sigma, data.numbers.shape).copy()
-        trials = Trials(asked.inputs(self._statement, by), _Runner(self, path))
+        trials = Trials(input_parsing.inputs(self._statement, by), _Runner(self, path))
         return LeastSquares(trials, data, scales).fit(bounds, most)
 
 

@@ -18,7 +18,7 @@ from softehl.runtime.mesh import abaqus, gmsh
 from softehl.runtime.mesh.cells import BY_FILE, CELLS, for_vtk, jacobians
 from softehl.runtime.mesh.content import Content
 from softehl.runtime.mesh.mesh import Mesh, MeshError
-from softehl.runtime.names import listed
+from softehl.runtime.suggestions import listed
 
 _DEFECTS = (
     *(OSError, ValueError, KeyError, IndexError, TypeError, AssertionError, SystemExit),

@@ -24,7 +24,7 @@ from softehl.runtime.arrays import Array, Flags, Integers, frozen
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.faces import as_known, matched, once
 from softehl.runtime.mesh.piece import Piece
-from softehl.runtime.names import few, listed, meant, misfit
+from softehl.runtime.suggestions import few, listed, meant, misfit
 
 if TYPE_CHECKING:
     from softehl.runtime.mesh.point_location import Located, PointLocator

@@ -2,8 +2,8 @@
 
 There is one driver, `walk`. A `Way` makes the steps: by the parameter of the path
 (`Continuation`), by its arc length where the parameter turns back (`solve.arclength`), by time
-(`runtime.march`). Predictors are in `solve.predictor`, the step rule is in `solve.steps`. A
-corrector is Newton's method, a relative, or a `Ladder` of them: escalation within a step is its
+(`analyses.time_stepping`). Predictors are in `solve.predictor`, the step rule is in `solve.steps`.
+A corrector is Newton's method, a relative, or a `Ladder` of them: escalation within a step is its
 business, a shorter step is ours.
 """
 

@@ -29,20 +29,20 @@ if TYPE_CHECKING:
     from softehl.codegen.language.material import Law, material
     from softehl.codegen.language.model import Model
     from softehl.codegen.language.pages import Page, page
+    from softehl.runtime.definition.problem_definition import StudyError
     from softehl.runtime.fem.assembly import Assembler, ElementBlock
     from softehl.runtime.fem.checks import ProblemError
     from softehl.runtime.fem.dofs import DofLayout
     from softehl.runtime.fem.problem import Problem
     from softehl.runtime.kernels import Kernel, KernelError
     from softehl.runtime.mesh.mesh import Mesh, MeshError
-    from softehl.runtime.result import Result
+    from softehl.runtime.results.result import Result
     from softehl.runtime.solve.arclength import Arclength
     from softehl.runtime.solve.homotopy import Continuation
     from softehl.runtime.solve.ladder import Ladder
     from softehl.runtime.solve.newton import Newton
     from softehl.runtime.solve.solution import Branch, NotConverged, Solution, Status
     from softehl.runtime.solve.steps import StepRule
-    from softehl.runtime.statement.records import StudyError
     from softehl.runtime.study import Study
 
 __version__ = "0.2.0"
@@ -68,14 +68,14 @@ _PUBLIC = {
     "Outcome": "softehl.cases.seal.states.state",
     "Problem": "softehl.runtime.fem.problem",
     "ProblemError": "softehl.runtime.fem.checks",
-    "Result": "softehl.runtime.result",
+    "Result": "softehl.runtime.results.result",
     "Seal": "softehl.cases.seal.gland.parameters",
     "Silent": "softehl.cases.seal.states.state",
     "Solution": "softehl.runtime.solve.solution",
     "Status": "softehl.runtime.solve.solution",
     "StepRule": "softehl.runtime.solve.steps",
     "Study": "softehl.runtime.study",
-    "StudyError": "softehl.runtime.statement.records",
+    "StudyError": "softehl.runtime.definition.problem_definition",
     "main": "softehl.__main__",
     "processes": "softehl.cases.harness.processes",
     "run_oring": "softehl.cases.oring",

@@ -14,8 +14,8 @@ from softehl.cases.seal.report.paraview import PARTS, gland_outlines, write_para
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.section_view import film_pressure, principal_stretches, section_view
 from softehl.cases.seal.states.state import FilmRow, Silent
+from softehl.runtime.analyses.callbacks import read_series
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.watch import read_series
 from tests.cases.oring_cases import film_values, oring
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -15,7 +15,7 @@ import numpy as np
 
 from softehl import Kernel, Mesh, Study, load_kernel
 from softehl.runtime.arrays import Array
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 from tests.crossings import pages
 
 SIZE = (2.0, 1.0, 1.0)

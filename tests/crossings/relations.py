@@ -18,7 +18,7 @@ import numpy as np
 from softehl import Mesh, Study
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.mesh import Predicate
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 from tests.crossings.features import FAST, LAWS, SIZE, Problem
 
 Pairs = Iterator[tuple[Array | float, Array | float]]

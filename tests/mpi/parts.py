@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from softehl import Mesh, Study
+from softehl.runtime.analyses.motion import Motion
 from softehl.runtime.arrays import Array
-from softehl.runtime.dynamics.motion import Motion
 from softehl.runtime.mpi import world
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 from tests.mpi.problems import DOCS, STEEL, thick
 
 SIZE = (1.0, 1.3, 0.7)

@@ -20,12 +20,12 @@ import sympy as sp
 import softehl
 from softehl import Mesh, Study
 from softehl.codegen.language.fields import Fields
+from softehl.runtime.analyses.motion import Motion
+from softehl.runtime.analyses.time_integrators import METHODS
 from softehl.runtime.arrays import Array
-from softehl.runtime.dynamics.motion import Motion
-from softehl.runtime.dynamics.schemes import METHODS
 from softehl.runtime.engines.petsc import Petsc
 from softehl.runtime.fem.loads import Amount
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 
 DOCS = Path(__file__).parents[2] / "docs"
 OGDEN: dict[str, Any] = {"mu_1": 0.63, "mu_2": -0.01, "alpha_1": 1.3, "alpha_2": -2.0, "lame": 20.0}

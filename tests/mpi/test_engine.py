@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.io import read_arrays
-from softehl.runtime.statement.records import StudyError
 from tests.mpi.problems import tied
 
 MARKS = [

@@ -10,7 +10,7 @@ import pytest
 
 from softehl import Mesh, Study
 from softehl.runtime.arrays import Array
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 
 PAGE = Path(__file__).parents[2] / "docs" / "gallery" / "models" / "block.py"
 MU, G, NU, RADIUS = 0.3, 1.0, 0.4999, 10.0

@@ -14,14 +14,14 @@ from scipy.sparse import csc_array, diags_array
 
 import softehl
 from softehl.runtime.arrays import Array, Flags
-from softehl.runtime.derivatives import linear
+from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.engines import sizes
+from softehl.runtime.sensitivity import linearised_step as linear
 from softehl.runtime.solve import amg
 from softehl.runtime.solve.eigen import Pivots
 from softehl.runtime.solve.reordered import Entries
 from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.solve.superlu import SuperLU
-from softehl.runtime.statement.records import StudyError
 
 HEAT = Path(__file__).parents[2] / "docs" / "models" / "heat_fields.py"
 

@@ -12,7 +12,7 @@ from scipy.special import ellipe, ellipk
 
 import softehl
 from softehl import Definition, Model, quadrature
-from softehl.runtime.bifurcation import Blind, place
+from softehl.runtime.analyses.bifurcation import Blind, place
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.study import Study, StudyError
 from tests.runtime.test_follow import shallow

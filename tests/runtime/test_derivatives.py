@@ -14,9 +14,9 @@ from scipy.sparse import csc_array
 
 from softehl import Definition, Mesh, Model, Newton, Study, page, quadrature
 from softehl.runtime.arrays import Array
-from softehl.runtime.derivatives import linear, results
-from softehl.runtime.derivatives.linear import refined
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
+from softehl.runtime.sensitivity import jacobian, linearised_step
+from softehl.runtime.sensitivity.linearised_step import refined
 from softehl.runtime.solve.superlu import SuperLU
 from softehl.runtime.study import StudyError
 
@@ -110,7 +110,7 @@ def both_ways(result: Result, monkeypatch: pytest.MonkeyPatch, **asked: Any) -> 
     """Sensitivities, for which both ways must have the same figures."""
     found = []
     for cheaper in (True, False):
-        monkeypatch.setattr(results, "_direct_is_cheaper", lambda *_, c=cheaper: c)
+        monkeypatch.setattr(jacobian, "_direct_is_cheaper", lambda *_, c=cheaper: c)
         found.append(result.sensitivity(**asked))
     for key, value in found[0].items():
         assert np.allclose(value, found[1][key], rtol=1e-10, atol=1e-13), key
@@ -391,7 +391,7 @@ def test_a_recorded_result_needs_no_new_factors(monkeypatch: pytest.MonkeyPatch)
     by = {"body": ["mu", "K"], "nodes": ["x"]}
     expected = panel(p=0.0).solve().sensitivity("u_y", at=PLACE, by=by)
     result = panel(p=0.0).solve(record=True)
-    monkeypatch.setattr(linear, "choose", lambda _: pytest.fail("factorised again"))
+    monkeypatch.setattr(linearised_step, "choose", lambda _: pytest.fail("factorised again"))
     found = result.sensitivity("u_y", at=PLACE, by=by)
     for key, value in expected.items():
         assert np.allclose(found[key], value, rtol=1e-10, atol=1e-12)

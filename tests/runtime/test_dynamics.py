@@ -93,7 +93,7 @@ def test_orders_are_two(method: str, c: float) -> None:
     assert order == pytest.approx(1.0 if method == "explicit" and c else 2.0, abs=0.15)
 
 
-@pytest.mark.filterwarnings("ignore::softehl.runtime.dynamics.motion.EnergyGain")
+@pytest.mark.filterwarnings("ignore::softehl.runtime.analyses.motion.EnergyGain")
 def test_the_spectral_radius_damps_what_is_too_fast() -> None:
     """A stiff oscillator loses the share rho_inf of its amplitude in a step, after the first."""
     study = Study(Mesh.line(1.0, cells=1))

@@ -13,10 +13,10 @@ import sympy as sp
 import softehl
 from softehl import Mesh, Study, load_kernel
 from softehl.runtime.arrays import Array
+from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.mesh.cells import CELLS, jacobians
 from softehl.runtime.mesh.facets import turns
 from softehl.runtime.mesh.mesh import MeshError
-from softehl.runtime.statement.records import StudyError
 from tests.codegen.test_fields import differences
 
 PAGE = Path(__file__).parents[2] / "docs" / "models" / "interior_penalty.py"

@@ -11,7 +11,7 @@ import sympy as sp
 from scipy.optimize import minimize
 
 from softehl import Mesh, Study, page
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 from softehl.runtime.study import StudyError
 
 MU, K = 0.4225, 0.9

@@ -11,7 +11,7 @@ import sympy as sp
 from softehl import Definition, Model, Newton, quadrature
 from softehl.runtime.engines.sizes import nodal_modes
 from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 from softehl.runtime.solve.amg import Multigrid
 from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.study import Study, StudyError

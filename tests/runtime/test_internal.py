@@ -12,7 +12,7 @@ from scipy.sparse import csc_array
 
 from softehl import Mesh, Study, load_kernel
 from softehl.runtime.arrays import Array
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 from softehl.runtime.solve.internal import Condensing
 from softehl.runtime.solve.linear import SingularMatrix
 from softehl.runtime.solve.superlu import SuperLU

@@ -12,7 +12,7 @@ import sympy as sp
 
 import softehl
 from softehl import Definition, Mesh, Model, Study, element, kinematics, quadrature
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 from softehl.runtime.solve.differences import differences
 from softehl.runtime.solve.solution import NotConverged, Status
 from softehl.runtime.study import StudyError

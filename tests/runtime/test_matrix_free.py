@@ -13,15 +13,15 @@ import softehl
 from softehl import Mesh, Study
 from softehl.codegen.language.fields import Fields
 from softehl.runtime.arrays import Array
-from softehl.runtime.derivatives import linear
+from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.engines.matrix_free import MatrixFree
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
+from softehl.runtime.sensitivity import linearised_step
 from softehl.runtime.solve import coarse, multigrid
 from softehl.runtime.solve.backends import choose
 from softehl.runtime.solve.gradients import conjugate_gradients, minimal_residuals
 from softehl.runtime.solve.multigrid import Level, Multigrid
 from softehl.runtime.solve.solution import NotConverged
-from softehl.runtime.statement.records import StudyError
 
 
 @softehl.page
@@ -276,13 +276,13 @@ def test_derivatives_need_no_factors(monkeypatch: pytest.MonkeyPatch) -> None:
 
     by = {"body": ["mu", "lam"], "load:top": ["u_x"], "fix:top": ["u_z"], "nodes": ["x"]}
     wanted, whole = pushed().solve(), pushed().solve().derivative(by={"body": ["mu"]})
-    monkeypatch.setattr(linear, "choose", None)
+    monkeypatch.setattr(linearised_step, "choose", None)
     found = pushed().solve(linear="matrix-free")
     asked: tuple[dict[str, Any], ...] = ({"at": (1, 1, 0.5)}, {"reaction": "bottom"})
     for where in asked:
         slopes = found.sensitivity("u_x", by=by, **where)
         with monkeypatch.context() as with_factors:
-            with_factors.setattr(linear, "choose", choose)
+            with_factors.setattr(linearised_step, "choose", choose)
             expected = wanted.sensitivity("u_x", by=by, **where)
         for key, slope in expected.items():
             np.testing.assert_allclose(slopes[key], slope, rtol=1e-8, atol=1e-10)

@@ -12,12 +12,12 @@ import sympy as sp
 from scipy.linalg import eigh
 
 import softehl
+from softehl.runtime.equations.mass_matrix import mass_matrix
+from softehl.runtime.equations.stability import Unstable
 from softehl.runtime.fem.mass import lumped, mass_matrices
-from softehl.runtime.mass import mass_matrix
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.result import Result
-from softehl.runtime.stability import Unstable
+from softehl.runtime.results.result import Result
 from softehl.runtime.study import Study, StudyError
 
 LENGTH, HEIGHT, YOUNG, RHO = 100.0, 1.0, 2000.0, 1e-9

@@ -11,7 +11,7 @@ import sympy as sp
 
 import softehl
 from softehl import Definition, Mesh, Model, NotConverged, quadrature
-from softehl.runtime.dynamics.motion import EnergyGain
+from softehl.runtime.analyses.motion import EnergyGain
 from softehl.runtime.study import Study, StudyError
 from tests.runtime.touching_bodies import force
 

@@ -11,7 +11,7 @@ import pytest
 
 from softehl import Mesh
 from softehl.runtime.arrays import Array
-from softehl.runtime.output import Picture
+from softehl.runtime.results.output import Picture
 
 SIZE = (2.0, 1.0, 3.0)
 FACES = {

@@ -16,8 +16,8 @@ import pytest
 
 import softehl
 from softehl import Mesh, Result, Study
+from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.mesh.mesh import MeshError
-from softehl.runtime.statement.records import StudyError
 
 QUAD = np.array([[0, 1, 2, 3]])
 E = 10.0

@@ -11,10 +11,10 @@ import sympy as sp
 from scipy.optimize import fsolve
 
 import softehl
+from softehl.runtime.analyses.homogenisation import Cell
 from softehl.runtime.arrays import Array
-from softehl.runtime.periodic import Cell
-from softehl.runtime.statement.given import node_partners, partners
-from softehl.runtime.statement.records import StudyError
+from softehl.runtime.definition.argument_checks import node_partners, partners
+from softehl.runtime.definition.problem_definition import StudyError
 
 SOFT, STIFF = (0.4, 1.3), (2.0, 5.0)
 SHARE = 0.25

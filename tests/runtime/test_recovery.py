@@ -15,8 +15,8 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.kernels import Rule
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.facets import split
-from softehl.runtime.recovery import projection
-from softehl.runtime.result import Result
+from softehl.runtime.results.recovery import projection
+from softehl.runtime.results.result import Result
 from softehl.runtime.study import StudyError
 
 MESHES: dict[str, dict[str, Any]] = {

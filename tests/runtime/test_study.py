@@ -14,7 +14,7 @@ import pytest
 import softehl
 from softehl import quadrature
 from softehl.runtime.mesh.mesh import Mesh, MeshError
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.study import Study, StudyError
 from tests.runtime import solid_page as pages

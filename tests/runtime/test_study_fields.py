@@ -12,7 +12,7 @@ import sympy as sp
 import softehl
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 from softehl.runtime.study import Study, StudyError
 
 AFFINE = np.array([[0.08, 0.05, -0.02], [-0.03, 0.1, 0.04], [0.02, -0.06, 0.07]])

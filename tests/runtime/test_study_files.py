@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from softehl import Mesh, Newton, Study
-from softehl.runtime.statement.records import StudyError
+from softehl.runtime.definition.problem_definition import StudyError
 
 
 def bar() -> Study:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from softehl import Definition, Mesh, Model, Study, element, kinematics, load_kernel, quadrature
-from softehl.runtime.begin import beginning
-from softehl.runtime.dynamics.motion import stored_energy
+from softehl.runtime.analyses.initial_state import beginning
+from softehl.runtime.analyses.motion import stored_energy
 from softehl.runtime.fem.dofs import separate_dofs
 from softehl.runtime.fem.products import NoProductError, require_product
 from softehl.runtime.fem.rules import film_rule

@@ -22,7 +22,9 @@ UNKNOWNS = ["u_x", "u_y", "u_z", "u"]
 VALUES = st.one_of(st.floats(-0.2, 0.2), st.sampled_from([float("nan"), float("inf"), 1e30]))
 
 
-@pytest.mark.filterwarnings("ignore::softehl.runtime.stability.Unstable")  # stretched by 1e30
+@pytest.mark.filterwarnings(
+    "ignore::softehl.runtime.equations.stability.Unstable"
+)  # stretched by 1e30
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(
     rises=st.lists(st.tuples(st.sampled_from(SIDES), st.sampled_from(UNKNOWNS)), max_size=5),

@@ -16,7 +16,7 @@ from softehl.codegen.language.material import Law, Material
 from softehl.codegen.tools.model_text import ModelFileError
 from softehl.runtime.arrays import Array
 from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 from softehl.runtime.study import Source, Study, StudyError
 
 

@@ -7,7 +7,7 @@ from functools import cache
 import pytest
 
 from softehl import Definition, Mesh, Model, Study, quadrature
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 from softehl.runtime.study import StudyError
 
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from softehl import Mesh, Study
+from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.fem.touching import TouchingProblem
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.mesh.thickness import in_chains, inner_radii, thickness
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 from softehl.runtime.solve.solution import NotConverged
-from softehl.runtime.statement.records import StudyError
 from tests.runtime.touching_bodies import (
     elastic,
     force,

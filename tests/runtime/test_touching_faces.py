@@ -9,9 +9,9 @@ import pytest
 
 from softehl import Mesh, Study
 from softehl.runtime.arrays import Array
-from softehl.runtime.result import Result
+from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.results.result import Result
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.statement.records import StudyError
 from tests.runtime.touching_bodies import elastic, extruded, force, gasket
 
 RUBBER: dict[str, Any] = {"mu": 1.0, "K": 5.0}

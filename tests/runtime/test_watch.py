@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from softehl import Mesh, Study
+from softehl.runtime.analyses.callbacks import Series, read_series
 from softehl.runtime.mesh.cells import for_vtk
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 from softehl.runtime.study import StudyError
-from softehl.runtime.watch import Series, read_series
 from tests.runtime import solid_page as pages
 from tests.runtime.test_study_elements import EVERY, poisson, unit_mesh
 

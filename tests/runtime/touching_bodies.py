@@ -8,7 +8,7 @@ import sympy as sp
 import softehl
 from softehl import Mesh
 from softehl.runtime.arrays import Array
-from softehl.runtime.result import Result
+from softehl.runtime.results.result import Result
 
 
 @softehl.page

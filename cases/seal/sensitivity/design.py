@@ -21,7 +21,7 @@ from softehl.cases.seal.gland.varied import BASES
 from softehl.cases.seal.sensitivity.quantities import CALLED, QUANTITIES
 from softehl.cases.seal.states.sensitivity_table import differentiable
 from softehl.cases.seal.states.state import FilmState
-from softehl.runtime.names import meant
+from softehl.runtime.suggestions import meant
 
 TOLERANCE = 0.01
 """Of the quantity, relative: about what two meshes of neighbouring values differ by."""

@@ -28,10 +28,10 @@ from softehl.cases.seal.solve.method import DryContact, Judge, verdict_of_contac
 from softehl.cases.seal.solve.path import StageError
 from softehl.cases.seal.states.state import FilmState, Observer
 from softehl.runtime.arrays import Array
-from softehl.runtime.names import meant
 from softehl.runtime.solve.homotopy import Continuation
 from softehl.runtime.solve.newton import Newton, NonlinearProblem
 from softehl.runtime.solve.steps import StepRule
+from softehl.runtime.suggestions import meant
 
 _SPEED = "not by the speed: sensitivity.csv has U, and each of `speeds` is a row of a run"
 _MODULUS = "the modulus follows from it: use mu, or mu_1 and mu_2"

@@ -10,8 +10,8 @@ import sympy as sp
 
 import softehl
 from softehl.codegen.language.fields import Fields
-from softehl.runtime.fit.in_jax import Operation
-from softehl.runtime.statement.records import StudyError
+from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.fit.jax_operation import Operation
 
 jax: Any = pytest.importorskip("jax")
 jnp: Any = pytest.importorskip("jax.numpy")

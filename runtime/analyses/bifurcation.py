@@ -1,0 +1,168 @@
+"""Bifurcations of a path: its tangent becomes singular without a turn of the load."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.equations.system import System
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.reduction import Reduction, symmetric
+from softehl.runtime.results.result import Result, Shape
+from softehl.runtime.solve.eigen import nearest_zero
+from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.solution import Branch, Point
+
+_SEARCHES = 20
+_LOCATED = 1e-9
+"""Of the load factor: a bifurcation is located where the next step is shorter."""
+
+
+class Blind(RuntimeWarning):
+    """Bifurcations are looked for where they cannot be seen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bifurcation:
+    """State from which another branch leaves; `Study.follow(start=...)` follows that branch.
+
+    Attributes
+    ----------
+    state : Result
+        The result there.
+    mode : Shape
+        Direction of the other branch, 1 at its largest displacement.
+    directions : int
+        Number of directions that lost or gained stability in this step.
+    located : bool
+        False if the search failed: the state is then the nearer end of the step.
+    """
+
+    state: Result
+    mode: Shape
+    directions: int
+    located: bool
+
+    def __repr__(self) -> str:
+        """Summary in one line."""
+        return f"<Bifurcation at t = {self.t:.6g}: {self.directions} directions>"
+
+    @property
+    def t(self) -> float:
+        """Load factor."""
+        return self.state.t
+
+    @property
+    def reversed(self) -> Bifurcation:
+        """The same state with the opposite direction of the other branch."""
+        return replace(self, mode=Shape.of(self.state, -self.mode.x))
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A point near a bifurcation: the eigenvalue next to zero, and its vector (n,)."""
+
+    t: float
+    x: Array
+    value: float
+    mode: Array
+
+
+@dataclass(eq=False)
+class Detector:
+    """Looks at a path after each of its points.
+
+    skip: the first point is on a bifurcation itself. folds: limit points that were met. blind: it
+    was told that a step cannot be judged.
+    """
+
+    system: System
+    newton: Newton
+    skip: bool = False
+    found: list[Bifurcation] = field(default_factory=list)
+    folds: int = 0
+    blind: bool = False
+
+    def look(self, results: Sequence[Result], branch: Branch) -> None:
+        """Look for a bifurcation between the last two results."""
+        folds, self.folds = len(branch.limit_points) - self.folds, len(branch.limit_points)
+        before, after = results[-2:]
+        if self.skip and len(results) == 2:
+            return
+        if before.unstable is None or after.unstable is None:
+            if not self.blind:
+                self.blind = True
+                warnings.warn(
+                    f"no symmetric, regular tangent at load factor {after.t:.4g} (friction, "
+                    "contact, follower loads): bifurcations of such a path are not seen",
+                    Blind,
+                    stacklevel=2,
+                )
+            return
+        change = after.unstable - before.unstable
+        if change and not (folds == 1 and abs(change) == 1):
+            self.found.append(self._locate(before, after, abs(change)))
+
+    def _locate(self, before: Result, after: Result, directions: int) -> Bifurcation:
+        """By the secant of the eigenvalue next to zero, over the load factor (Illinois)."""
+        a, b = (place(r.problem, r.t, r.point.solution.x) for r in (before, after))
+        near, located = min(a, b, key=lambda end: abs(end.value)), False
+        low, high = a.value, b.value
+        for _ in range(_SEARCHES):
+            if low * high >= 0.0 or a.t == b.t:
+                break
+            share = low / (low - high)
+            t = a.t + share * (b.t - a.t)
+            old, histories = before.point.solution.x, before.histories
+            problem = self.system.problem(self.system.still(t, old, histories))
+            with np.errstate(all="ignore"):
+                solution = self.newton.solve(problem, a.x + share * (b.x - a.x))
+            if not solution.converged:
+                break
+            moved = abs(t - near.t)
+            near = place(problem, t, solution.x)
+            located = moved <= _LOCATED * max(abs(t), abs(after.t - before.t))
+            if located or near.value == 0.0:
+                located = True
+                break
+            if near.value * high < 0.0:
+                a, low = b, high
+            else:
+                low *= 0.5
+            b, high = near, near.value
+        return self._told(before, near, directions, located=located)
+
+    def _told(self, before: Result, near: Place, directions: int, *, located: bool) -> Bifurcation:
+        old, histories = before.point.solution.x, before.histories
+        problem = self.system.problem(self.system.still(near.t, old, histories)).at(near.x)
+        solution = replace(before.point.solution, x=near.x)
+        state = Result(self.system, problem, Point(near.t, solution), before.histories)
+        mode = near.mode / np.abs(displacements(self.system, near.mode)).max()
+        return Bifurcation(state, Shape.of(state, mode), directions, located)
+
+
+def place(problem: Problem, t: float, x: Array) -> Place:
+    """Of a problem at unknowns x, (n,), with the contacts that it has there."""
+    here = problem.at(x)
+    K = here.assembler.linearise(x, here.parameters)[1]
+    free = Reduction.of(here, K)
+    value, mode = nearest_zero(symmetric(free.matrix(K)))
+    return Place(t, x, value, free.map @ mode)
+
+
+def displacements(system: System, x: Array) -> Array:
+    """Of unknowns (n,) the displacements u_x, u_y, u_z at the nodes; all at nodes without them."""
+    nodal = system.numbering.nodal
+    names = [name for name in ("u_x", "u_y", "u_z") if name in nodal] or list(nodal)
+    return np.concatenate([x[nodal[name][nodal[name] >= 0]] for name in names])
+
+
+def require_detect(detect: object) -> None:
+    """Raise StudyError for what cannot be looked for."""
+    if detect not in (None, "bifurcation"):
+        raise StudyError(f'detect = {detect!r}: allowed are "bifurcation" and None')

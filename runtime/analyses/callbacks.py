@@ -1,0 +1,163 @@
+"""Treatment of every converged result: shown on a terminal, written to files, handed on."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from softehl.runtime.definition.argument_checks import writable
+from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.io import write_pvd
+from softehl.runtime.results.result import Result
+
+OnStep = Callable[[Result], object]
+
+
+@dataclass(eq=False)
+class Series:
+    """A `.pvd` file that names a `.vtu` file for each result, whole at any moment.
+
+    part.pvd names part_0001.vtu, ... beside it. Given as `on_step` of a study's path, or as its
+    `write`. since: results up to there that the file names already are kept (a march that goes on).
+    """
+
+    path: Path
+    since: float | None = None
+    entries: list[tuple[float, str]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Raises StudyError for a name that does not end in .pvd, or cannot be written."""
+        self.path = Path(self.path)
+        if self.path.suffix != ".pvd":
+            raise StudyError(f"write = {str(self.path)!r}: a series of results is written as .pvd")
+        writable(f"write = {str(self.path)!r}", self.path)
+        if self.since is not None and self.path.exists():
+            self.entries = [e for e in read_series(self.path) if e[0] <= self.since]
+
+    def __call__(self, result: Result) -> None:
+        """Write one more result; its file first, then the list that names it."""
+        kind = "vtu" if result.system.mesh.piece is None else "pvtu"
+        name = f"{self.path.stem}_{len(self.entries) + 1:04d}.{kind}"
+        result.write(self.path.with_name(name))
+        self.entries.append((result.t, name))
+        if result.system.share.first:
+            write_pvd(self.path, self.entries)
+
+
+def read_series(path: Path) -> list[tuple[float, str]]:
+    """Times and files of a `.pvd`; raises OSError, or StudyError where it is none."""
+    from xml.etree import ElementTree  # late: few need it
+
+    try:
+        rows = ElementTree.parse(path).getroot().iter("DataSet")
+        return [(float(row.attrib["timestep"]), row.attrib["file"]) for row in rows]
+    except (ElementTree.ParseError, KeyError, ValueError):
+        raise StudyError(f"{str(path)!r} is no series of results; remove it") from None
+
+
+LOG = logging.getLogger("softehl")
+"""Every step, at the level INFO; nobody listens unless a script asks for it."""
+
+
+@dataclass(eq=False)
+class Progress:
+    """One line on the terminal that tells where a path is; a line for each step elsewhere.
+
+    name: of what grows, such as "load factor", from `begin` to `until` (None: it is not known).
+    inplace: rewrite the one line. note: gives what is said at the end of each. shown: on the
+    terminal; what is not goes to the log alone.
+    """
+
+    name: str
+    begin: float
+    until: float | None
+    inplace: bool
+    note: Callable[[], str] = str
+    shown: bool = True
+    steps: int = 0
+    since: float = field(default_factory=time.monotonic)
+
+    def __call__(self, result: Result) -> None:
+        """Tell of one more step."""
+        if not self.steps and result.t == self.begin:
+            return  # where the path begins
+        self.steps += 1
+        if not (self.shown or LOG.isEnabledFor(logging.INFO)):
+            return
+        end = "" if self.until is None else f" of {self.until:g}"
+        note = self.note()
+        text = (
+            f"step {self.steps}: {self.name} {result.t:.4g}{end}, {result.iterations} iterations, "
+            f"{time.monotonic() - self.since:.1f} s{f' ({note})' if note else ''}"
+        )
+        LOG.info(text)
+        if not self.shown:
+            return
+        sys.stderr.write(f"\r\x1b[K{text}" if self.inplace else f"{text}\n")
+        sys.stderr.flush()
+
+    def close(self) -> None:
+        """Leave the line as it is."""
+        if self.shown and self.inplace and self.steps:
+            sys.stderr.write("\n")
+
+
+class Watch:
+    """Everyone who is told of a converged result; a context, at whose end the line is left.
+
+    progress: tell of steps on stderr; None: where that is a terminal. write: a `.pvd` file.
+    """
+
+    def __init__(
+        self,
+        progress: Progress | None,
+        write: str | Path | Series | None = None,
+        on_step: OnStep | None = None,
+    ) -> None:
+        self._progress = progress
+        series = Series(Path(write)) if isinstance(write, str | Path) else write
+        self._told: list[OnStep] = [f for f in (series, progress, on_step) if f is not None]
+
+    def __call__(self, result: Result) -> None:
+        for f in self._told:
+            f(result)
+
+    def __enter__(self) -> Watch:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._progress is not None:
+            self._progress.close()
+
+
+def watched(results: Iterator[Result], watch: Watch) -> Iterator[Result]:
+    """The results, each of which `watch` is told of before it is given."""
+    with watch:
+        for result in results:
+            watch(result)
+            yield result
+
+
+@dataclass(frozen=True)
+class Telling:
+    """Who wants to be told: `wanted` or not, None where there is a terminal; only the first process
+    `speaks`. name: of what grows, begin: where from. note: on the linear solver.
+    """
+
+    wanted: bool | None
+    speaks: bool
+    name: str
+    begin: float
+    note: Callable[[], str] = str
+
+    def until(self, end: float | None) -> Progress | None:
+        """Progress up to an end, shown where it is wanted; None on the other processes."""
+        if not self.speaks:
+            return None
+        terminal = sys.stderr.isatty()
+        shown = terminal if self.wanted is None else self.wanted
+        return Progress(self.name, self.begin, end, terminal, self.note, shown)

@@ -1,0 +1,312 @@
+"""The equations of a body in motion: those of a study with its inertia."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from softehl.runtime.analyses.motion import Forces, Roles
+from softehl.runtime.analyses.time_integrators import Affine, Scheme
+from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.definition.problem_definition import Block, StudyError
+from softehl.runtime.equations.contact_setup import weighted
+from softehl.runtime.equations.mass_matrix import Masses, mass_blocks, mass_matrix
+from softehl.runtime.equations.system import Step, System
+from softehl.runtime.fem.assembly import Assembler, ElementBlock
+from softehl.runtime.fem.averaged import Averaged, time_derivatives, with_old
+from softehl.runtime.fem.loads import Tie
+from softehl.runtime.fem.mass import Mass, lumped
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.touching import TouchingProblem
+from softehl.runtime.share import Share
+from softehl.runtime.solve.gradients import conjugate_gradients
+from softehl.runtime.suggestions import listed
+
+_BEFORE = "forces of the step before"
+_EXACT, _MOST = 1e-14, 1000  # of accelerations at the start; the mass is well conditioned
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """Forces as a kernel, (n, 1): its data."""
+
+    name = _BEFORE
+    signature = "built in"
+    parameters: tuple[str, ...] = ()
+    fields: tuple[str, ...] = ()
+
+    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        return np.asarray(given["data"])
+
+    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+        return np.asarray(given["data"]), np.zeros((len(dofs), 1, 1))
+
+    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        return np.empty((len(dofs), 0, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class _Scaled:
+    """A kernel whose equations are multiplied by the last columns of its data."""
+
+    kernel: Any
+
+    def __getattr__(self, name: str) -> Any:
+        """Everything else, names above all, is the kernel's."""
+        if name == "kernel":
+            raise AttributeError(name)
+        return getattr(self.kernel, name)
+
+    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        """Residuals (n, ndof)."""
+        own, factors = self._parted(dofs, given)
+        return np.asarray(factors * self.kernel.residual(coordinates, dofs, **own))
+
+    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+        """Residuals and tangents (n, ndof, ndof)."""
+        own, factors = self._parted(dofs, given)
+        r, K = self.kernel.tangent(coordinates, dofs, **own)
+        return factors * r, factors[:, :, None] * K
+
+    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        """None, (n, 0, 0)."""
+        return np.empty((len(dofs), 0, 0))
+
+    def _parted(self, dofs: Array, given: dict[str, Any]) -> tuple[dict[str, Any], Array]:
+        own, factors = np.split(given["data"], [-dofs.shape[1]], axis=1)
+        data = np.ascontiguousarray(own) if own.shape[1] else None
+        return {**given, "data": data}, factors
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A study with inertia.
+
+    plain: its equations without. moving: with elements of mass, and forces of the step before or
+    averaged. M: consistent masses (n, n) at the start. lumps: (n,), of the explicit
+    scheme; both are what elements of this process add. heavy: unknowns with mass. roles: of its
+    blocks. weight: of the forces at the end of a step in `moving`; ties and contacts act through
+    the whole step, so that their unknowns there are those of the study over the weight. mass:
+    densities as they were given. factors: (n,) of equations in `moving`: the forces of ties and
+    contacts on unknowns without mass, too, are those of the study over the weight. constrained:
+    (n,) multipliers of ties, contacts and pages.
+    """
+
+    plain: System
+    moving: System
+    M: csc_array
+    lumps: Array
+    heavy: Flags
+    roles: Roles
+    weight: float = 1.0
+    mass: Masses | None = None
+    factors: Array = field(default_factory=lambda: np.empty(0))
+    constrained: Flags = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+
+    @classmethod
+    def of(cls, system: System, mass: Masses | None, scheme: Scheme | None, at: Step) -> Body:
+        """Raises StudyError where there is no mass, or where a rate belongs to none."""
+        problem, blocks = system.part(at), mass_blocks(system, mass)
+        share, M = system.share, mass_matrix(system, problem, at.old, mass)
+        heavy = share.added(M.diagonal()) > 0.0
+        for block in system.blocks.values():
+            for slot in block.rates.values():
+                numbers = system.numbering.nodal[slot.name]
+                if share.largest(float(not heavy[numbers[numbers >= 0]].all())):
+                    raise StudyError(
+                        f"{block.name!r} has a rate of {slot.name}, which has no mass everywhere: "
+                        'give it one, or march by "euler" or "bdf2"'
+                    )
+        roles, weight = Roles.in_system(system), 1.0 if scheme is None else scheme.weight()
+        own = list(system.assembler.blocks)
+        massless = _multipliers(system, problem, at.old, heavy, roles)
+        if scheme is not None and scheme.averaged:
+            free = [b for b in own if roles.of[b.name] not in ("tie", "contact")]
+            changed = {b.name: _averaged(b, system.blocks.get(b.name), massless) for b in free}
+            own = [changed.get(b.name, b) for b in own]
+        elif scheme is not None and not scheme.damps and share.largest(float(massless.any())):
+            raise StudyError(
+                f"{_name_of(system, massless)} is a multiplier, whose error grows in steps of "
+                'method = "newmark" or of rho_inf = 1, which damp nothing: take '
+                '"generalised-alpha" with rho_inf below 1, or "midpoint"'
+            )
+        contacts, stiffer = weighted(system, 1.0 / weight)
+        own = [stiffer.get(b.name, b) for b in own]
+        factors = np.ones(system.size)
+        factors[roles.bound[~heavy[roles.bound]]] = 1.0 / weight
+        own = [b if roles.of[b.name] in ("tie", "contact") else _scaled(b, factors) for b in own]
+        rows = share.owned(system.size)
+        rows = rows[heavy[rows]][:, None]
+        before = ElementBlock(_BEFORE, _Known(), np.empty((0, 0)), rows, check_orientation=False)
+        assembler = Assembler.build(system.size, [*own, *blocks, before])
+        lumps = _lumped(system, M, blocks) if scheme is None else M.diagonal()
+        moving = replace(system, assembler=assembler, contacts=contacts, share=share.renewed())
+        constrained = massless.copy()
+        constrained[roles.multipliers] = True
+        return cls(system, moving, M, lumps, heavy, roles, weight, mass, factors, constrained)
+
+    @property
+    def share(self) -> Share:
+        """Distribution of its unknowns over processes."""
+        return self.plain.share
+
+    def problem(self, step: Step, place: float, before: Array) -> Problem:
+        """Equations of a step that ends at step.t: loads of a place in it, supports of its end.
+
+        before: (n,) forces that are added where there is mass.
+        """
+        before = self.share.added(before)
+        problem = self.moving.part(replace(step, t=step.t - (1.0 - place) * step.dt))
+        end = problem if place == 1.0 else self.plain.part(step)
+        remainder = np.zeros(len(before)) if step.remainder is None else step.remainder
+        blocks, parameters = [], dict(problem.parameters)
+        for block in problem.assembler.blocks:
+            known = block
+            if isinstance(block.kernel, Averaged):
+                known = with_old(block, step.old)
+            elif isinstance(block.kernel, Mass):
+                known = replace(block, data=np.ascontiguousarray(remainder[block.dofs]))
+            elif isinstance(block.kernel, _Known):
+                known = replace(block, data=before[block.dofs])
+            elif isinstance(block.kernel, Tie):
+                parameters[block.name] = end.parameters[block.name]
+            if isinstance(block.kernel, _Scaled):
+                columns = self.factors[block.dofs]
+                data = [columns] if block.data is None else [block.data, columns]
+                known = replace(block, data=np.ascontiguousarray(np.concatenate(data, axis=1)))
+            blocks.append(known)
+        assembler = replace(problem.assembler, blocks=tuple(blocks))
+        return replace(
+            problem,
+            assembler=assembler,
+            parameters=parameters,
+            fixed=end.fixed,
+            values=end.values,
+        )
+
+    def algebraic(self, problem: Problem) -> Flags:
+        """Free unknowns (n,) without mass, which follow from the others without rates."""
+        massless = ~self.heavy
+        massless[problem.fixed] = False
+        return massless
+
+    def fastest(self, at: Step) -> float:
+        """Highest angular frequency of the mesh, estimated by the diagonals of the tangent."""
+        problem = self.plain.part(at)
+        with np.errstate(all="ignore"):
+            K = problem.assembler.linearise(at.old, problem.parameters)[1]
+        stiff, mass = (self.share.added(A.diagonal()) for A in (K, self.M))
+        known = (mass > 0.0) & np.isfinite(stiff)
+        ratio = float((np.abs(stiff[known]) / mass[known]).max(initial=0.0))
+        return float(np.sqrt(max(self.share.largest(ratio), np.finfo(np.float64).tiny)))
+
+    def weighted(self, x: Array, weight: float) -> Array:
+        """Unknowns (n,) with those of ties and contacts times a number."""
+        found = x.copy()
+        found[self.roles.multipliers] *= weight
+        return found
+
+    def friction(self, problem: Problem, x: Array, moved: Array) -> float:
+        """Work of friction at the end x of a step in which the unknowns moved (n,)."""
+        if not any(contact.friction for contact in self.plain.contacts):
+            return 0.0
+        assert isinstance(problem, TouchingProblem)
+        smooth = tuple(replace(c, friction=0.0) for c in self.plain.contacts)  # type: ignore[type-var]
+        other = replace(problem, contacts=smooth, latest=[])
+        whole, normal = (Forces.of(p, x, self.roles).contact for p in (problem, other))
+        return float((whole - normal) @ moved)
+
+    def at_end(self, step: Step, v: Array) -> Problem:
+        """The plain equations at the end of a step, with velocities v, (n,)."""
+        return self.plain.part(replace(step, rate=0.0, rest=v, acceleration=0.0, remainder=None))
+
+    def started(self, problem: Problem, x: Array) -> Array:
+        """Accelerations (n,) at the start x: M a = -f on what is free.  Raises StudyError."""
+        forces = Forces.of(problem, x, self.roles)
+        free = self.share.free(problem)
+        diagonal = free.gather(self.M.diagonal())
+        inverse = 1.0 / np.where(diagonal > 0.0, diagonal, np.inf)
+        found = conjugate_gradients(
+            lambda z: free.gather(self.M @ free.spread(z)),
+            lambda r: inverse * r,
+            np.where(diagonal > 0.0, -free.gather(forces.total + forces.constraints), 0.0),
+            *(_EXACT, _MOST, self.share.dot),
+        )
+        if not found.converged:
+            raise StudyError("the mass is not positive: no accelerations at the start are found")
+        return free.spread(found.x)
+
+    def masked(self, values: Affine) -> Affine:
+        """Zero in unknowns without mass, for their velocities and accelerations."""
+        return Affine(values.c, np.where(self.heavy, values.rest, 0.0))
+
+
+def _scaled(block: ElementBlock, factors: Array) -> ElementBlock:
+    """A block whose equations have these factors, (n,)."""
+    if (factors[block.dofs] == 1.0).all():
+        return block
+    return replace(block, kernel=_Scaled(block.kernel), constant=False)
+
+
+def _multipliers(system: System, problem: Problem, x: Array, heavy: Flags, roles: Roles) -> Flags:
+    """Unknowns (n,) of pages without mass that stand in no equation without mass, at x, (n,)."""
+    massless = ~heavy
+    massless[problem.fixed] = massless[roles.multipliers] = False
+    if not system.share.largest(float(massless.any())):
+        return massless
+    here = problem.at(x)
+    with np.errstate(all="ignore"):
+        K = here.assembler.linearise(x, here.parameters)[1]
+    among = system.share.added(np.asarray(abs(K) @ massless.astype(np.float64)))
+    found: Flags = massless & (among == 0.0)
+    return found
+
+
+def _name_of(system: System, numbers: Flags) -> str:
+    """Names of the unknowns among these, (n,)."""
+    layout = system.numbering.layout
+    return listed([repr(name) for name in layout.names if numbers[layout.part(name)].any()])
+
+
+def _averaged(block: ElementBlock, page: Block | None, multipliers: Flags) -> ElementBlock:
+    """A block that is averaged along a step; multipliers: (n,) unknowns that are one in it."""
+    timed: tuple[tuple[int, Integers, Integers], ...] = ()
+    if page is not None:
+        number = {slot: k for k, slot in enumerate(page.slots)}
+        tables = {"rate": page.rates, "acceleration": page.accelerations}
+        timed = time_derivatives(
+            block.kernel,
+            [(p, {d: number[s] for d, s in table.items()}) for p, table in tables.items()],
+        )
+    length = None
+    if page is not None and "dt" in block.kernel.parameters and "dt" not in page.parameters:
+        length = list(block.kernel.parameters).index("dt")
+    columns = np.flatnonzero(multipliers[block.dofs].any(axis=0))
+    averaged = Averaged(block.kernel, timed, length, columns)
+    return replace(block, kernel=averaged, constant=False)
+
+
+def _lumped(system: System, M: csc_array, blocks: list[ElementBlock]) -> Array:
+    """Masses (n,) at the nodes: of densities cell by cell, of pages unknown by unknown."""
+    found, consistent = np.zeros(system.size), np.zeros(system.size)
+    for block in blocks:
+        assert isinstance(block.kernel, Mass)
+        m, components = block.kernel.matrices, block.kernel.components
+        np.add.at(found, block.dofs, np.tile(lumped(m), (1, components)))
+        np.add.at(consistent, block.dofs, np.tile(np.einsum("naa->na", m), (1, components)))
+    share, rest = system.share, M.diagonal() - consistent
+    most = share.largest(float(np.abs(M.diagonal()).max(initial=0.0)))
+    if share.largest(float(np.abs(rest).max(initial=0.0))) <= 1e-12 * most:
+        return found
+    total = np.asarray(M.sum(axis=1)).ravel()
+    if blocks:
+        raise StudyError("explicit: give all masses as mass=..., or all in pages, not both")
+    for name in system.numbering.layout.names:
+        part = system.numbering.layout.part(name)
+        whole, known = share.total(np.array([total[part].sum(), rest[part].sum()])).tolist()
+        if known:
+            found[part] = rest[part] * whole / known
+    return found

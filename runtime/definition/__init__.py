@@ -1,0 +1,1 @@
+"""Definition of a boundary-value problem: blocks of elements, loads, supports, as written down."""

@@ -1,0 +1,275 @@
+"""A page on elements of a mesh: which elements, what its arguments are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.definition.argument_checks import datum, known, parameter
+from softehl.runtime.definition.line_fields import interpolated, placed
+from softehl.runtime.definition.problem_definition import Block, Form, StudyError
+from softehl.runtime.fem.unknowns import Slot, slots
+from softehl.runtime.kernels import Kernel, Rule
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.facets import beside, interior
+from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
+
+GEOMETRIES = {1: ("solid",), 2: ("plane strain", "axisymmetric"), 3: ("solid",)}
+"""Geometries of meshes by their dimension, the default first."""
+Elements = tuple[str, Integers]
+"""Kind of cells or faces and their nodes (n, k)."""
+On: TypeAlias = "str | Predicate | Integers | None"
+"""A side, or the nodes (n, k) of the elements themselves; None: cells."""
+
+
+def _faces(mesh: Mesh, on: str | Predicate, kernel: Kernel) -> Mapping[str, Integers]:
+    """Faces of a side; those of a page of fields have an outside, where its normals go."""
+    return mesh.outer_faces(on) if kernel.cell else mesh.faces(on)
+
+
+def kinds_of(mesh: Mesh, on: On, cells: str | None) -> tuple[str, ...]:
+    """The kinds of cells or faces that are meant; none where elements are given by their nodes."""
+    if isinstance(on, np.ndarray):
+        return ()
+    if on is None:
+        return tuple(mesh.cells_of(cells))
+    if on == "interior" and on not in mesh.sides:
+        return tuple(f"{kind}_interior" for kind in mesh.cells)
+    try:
+        return tuple(mesh.faces(on))
+    except MeshError:
+        return ()  # nodes without faces: for a page of one node
+
+
+def wants_traces(error: BaseException | None) -> bool:
+    """True where a page could not be read because it needs the cells beside a side."""
+    while error is not None:
+        if getattr(error, "traces", False):
+            return True
+        error = error.__cause__
+    return False
+
+
+def beside_of(mesh: Mesh, on: str | Predicate) -> tuple[str, ...]:
+    """Kinds of facets of a side with the cells beside it, of those cells that have faces there."""
+    there = mesh.outer_faces(on)
+    return tuple(f"{k}_side" for k in mesh.cells if there.keys() & set(CELLS[k].faces))
+
+
+def elements_of(mesh: Mesh, name: str, kernel: Kernel, on: On, cells: str | None) -> Elements:
+    """The elements of a kernel.  Raises StudyError, MeshError."""
+    if on is not None and cells is not None:
+        raise StudyError(f"{name!r}: give cells=... or on=..., not both")
+    if isinstance(on, np.ndarray):
+        return "point1", _listed(mesh, name, kernel, on)
+    if on is not None and kernel.nodes == 1:
+        return "point1", mesh.own(mesh.nodes(on))[:, None]
+    stem, _, facet = kernel.cell.partition("_")
+    if facet and (on is None or stem not in mesh.cells):
+        raise StudyError(
+            f'{name!r}: {kernel.name} stands on facets of {stem}: on="interior" or on=a side'
+        )
+    if facet:
+        assert on is not None
+        nodes = interior(mesh, stem) if facet == "interior" else beside(mesh, on, stem)
+        return CELLS[stem].side_nodes[0][0].name, nodes
+    there = _faces(mesh, on, kernel) if on is not None else mesh.cells_of(cells)
+    if kernel.cell in there:
+        return kernel.cell, there[kernel.cell]
+    fit = {kind: nodes for kind, nodes in there.items() if nodes.shape[1] == kernel.nodes}
+    if len(fit) != 1 or (cells is None and len(there) > 1):
+        kinds = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in there.items())
+        place = "the mesh" if on is None and cells is None else repr(cells or on)
+        raise StudyError(
+            f"{name!r}: {kernel.name} has {kernel.nodes} nodes, {place} has {kinds}"
+            + ("; name groups of cells of one kind" if len(there) > 1 else "")
+        )
+    return next(iter(fit.items()))
+
+
+def _listed(mesh: Mesh, name: str, kernel: Kernel, nodes: Integers) -> Integers:
+    """Elements that are given by their nodes (n, k); (n, 0) for a page that knows of none.
+
+    Raises StudyError.
+    """
+    nowhere = not kernel.coordinates and all(slot.node is None for slot in slots(kernel))
+    widths = (kernel.nodes, 0) if nowhere else (kernel.nodes,)
+    if nodes.dtype.kind not in "iu" or nodes.ndim != 2 or nodes.shape[1] not in widths:
+        raise StudyError(
+            f"{name!r}: elements of {kernel.name} are given as node numbers (n, {kernel.nodes}); "
+            f"given {nodes.dtype} of shape {nodes.shape}"
+        )
+    if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(mesh.points):
+        raise StudyError(f"{name!r}: node numbers go from 0 to {len(mesh.points) - 1}")
+    return nodes.astype(np.int64)
+
+
+def page_on(
+    mesh: Mesh,
+    name: str,
+    kernel: Kernel,
+    elements: Elements,
+    form: Form,
+    given: Mapping[str, Any],
+) -> Block:
+    """A block of elements with everything its page needs.  Raises StudyError."""
+    kind, nodes = elements
+    _require_fit(mesh, kernel)
+    found = slots(kernel)
+    known("unknown", form.shared, [s.name for s in found if s.node is None], kernel.name)
+    known("unknown", form.called, [s.name for s in found] + interpolated(kernel), kernel.name)
+    told = tuple(Slot(form.called.get(s.name, s.name), s.node) for s in found)
+    form = replace(form, shared=frozenset(form.called.get(s, s) for s in form.shared))
+    previous, rates, accelerations = _automatic(kernel, found, told)
+    told, form = placed(name, kernel, len(nodes), told, form)
+    at_nodes = _nodal_data(kernel)
+    known("argument", given, [*at_nodes, *_arguments(kernel)], kernel.name)
+    given = _by_node(mesh, name, nodes, at_nodes, given)
+    timed = {"rate": rates, "acceleration": accelerations}
+    automatic = ("dt", *(p for p, slots_of in timed.items() if slots_of))
+    for parameter_of_time in automatic[1:]:
+        if parameter_of_time in given:
+            raise StudyError(
+                f"{name!r}: {parameter_of_time} comes from the steps in time, it cannot be given"
+            )
+    filled = {**previous, **rates, **accelerations}
+    needed = [p for p in kernel.parameters if p not in automatic]
+    needed += [d for d in kernel.data if d not in filled]
+    missing = [a for a in needed if a not in given]
+    for whole, labels in at_nodes.items():
+        if set(labels) <= set(missing):
+            missing = [whole if a == labels[0] else a for a in missing if a not in labels[1:]]
+    if missing:
+        hint = "; where t is the time or load factor, give t=lambda t: t" if "t" in missing else ""
+        raise StudyError(f"{name!r}: {kernel.name} needs {', '.join(missing)}{hint}")
+    own = facet_nodes(kernel)
+    nowhere = np.full((len(nodes), mesh.dimension), np.nan)
+    around = nodes if own is None else nodes[:, own]
+    centres = mesh.points[around].mean(axis=1) if around.size else nowhere
+    data = {d: datum(name, d, given[d], centres) for d in kernel.data if d in given}
+    return Block(
+        name=name,
+        kernel=kernel,
+        nodes=nodes,
+        kind=kind,
+        slots=told,
+        form=form,
+        data=data,
+        previous={d: s for d, s in previous.items() if d not in data},
+        rates={d: s for d, s in rates.items() if d not in data},
+        accelerations={d: s for d, s in accelerations.items() if d not in data},
+        initial=_initial(name, kernel, given, centres, form.rule),
+        parameters={p: parameter(name, p, given[p]) for p in kernel.parameters if p in given},
+    )
+
+
+def facet_nodes(kernel: Kernel) -> Integers | None:
+    """Nodes on the facet, of the elements of a page on facets; None on cells and sides."""
+    stem, _, facet = kernel.cell.partition("_")
+    return np.array(CELLS[stem].side_nodes[0][1]) if facet else None
+
+
+def _require_fit(mesh: Mesh, kernel: Kernel) -> None:
+    if kernel.coordinates and len(kernel.coordinates) != mesh.dimension:
+        raise StudyError(
+            f"{kernel.name} has {len(kernel.coordinates)} coordinates a node "
+            f"({', '.join(kernel.coordinates)}), the mesh has {mesh.dimension}"
+        )
+
+
+def _arguments(kernel: Kernel) -> list[str]:
+    return [*kernel.parameters, *kernel.data, *kernel.point_data]
+
+
+def _nodal_data(kernel: Kernel) -> dict[str, list[str]]:
+    """Data that there are for each node of an element, D1, D2, ..., by their common name D."""
+    found = {}
+    for label in kernel.data:
+        if label.endswith("1") and label[:-1].isidentifier():
+            labels = [f"{label[:-1]}{node + 1}" for node in range(kernel.nodes)]
+            if kernel.nodes > 1 and set(labels) <= set(kernel.data):
+                found[label[:-1]] = labels
+    return found
+
+
+def _by_node(
+    mesh: Mesh,
+    block: str,
+    nodes: Integers,
+    at_nodes: Mapping[str, Sequence[str]],
+    given: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Data as the kernel calls them, where nodal ones are given by their common name: a number, one
+    for each node of the mesh, or a function of the places of nodes.  Raises StudyError.
+    """
+    found = dict(given)
+    for name in at_nodes.keys() & given.keys():
+        twice = [label for label in at_nodes[name] if label in given]
+        if twice:
+            raise StudyError(f"{block!r}: {name!r} and {twice[0]!r}: the same data twice")
+        values = datum(block, name, found.pop(name), mesh.points)
+        found |= {label: values[nodes[:, k]] for k, label in enumerate(at_nodes[name])}
+    return found
+
+
+def _automatic(
+    kernel: Kernel, found: Sequence[Slot], told: Sequence[Slot]
+) -> list[dict[str, Slot]]:
+    """Data u_old1, u_rate1, u_acceleration1, ... of nodal unknowns u: what a study fills itself.
+
+    found: unknowns as the page calls them; told: as the study does.
+    """
+    pairs = zip(found, told, strict=True)
+    nodal = {f"{s.name}{{}}{s.node + 1}": ours for s, ours in pairs if s.node is not None}
+    tables = [
+        {label.format(suffix): slot for label, slot in nodal.items()}
+        for suffix in ("_old", "_rate", "_acceleration")
+    ]
+    return [{d: table[d] for d in kernel.data if d in table} for table in tables]
+
+
+def _initial(
+    block: str, kernel: Kernel, given: Mapping[str, Any], centres: Array, rule: Rule | None
+) -> Array | None:
+    """Point data at the start, (n, points, k): numbers or functions of the centres, else zero."""
+    if not kernel.point_data:
+        return None
+    columns = [datum(block, name, given.get(name, 0.0), centres) for name in kernel.point_data]
+    points = len((rule or kernel.default_rule).weights)
+    return np.repeat(np.stack(columns, axis=1)[:, None, :], points, axis=1)
+
+
+def geometry_of(mesh: Mesh, geometry: str | None) -> str:
+    """The geometry of a mesh (None: the usual one).  Raises StudyError for one it cannot have."""
+    allowed = GEOMETRIES[mesh.dimension]
+    if geometry is not None and geometry not in allowed:
+        words = " or ".join(f'"{g}"' for g in allowed)
+        stress = "stress" in str(geometry) and mesh.dimension == 2
+        advice = "; plane stress is said on a page: docs/fields.md#plane-stress" if stress else ""
+        raise StudyError(
+            f"geometry = {geometry!r} of a mesh in {mesh.dimension}-D: allowed is {words}{advice}"
+        )
+    return geometry or allowed[0]
+
+
+def is_folder(source: object) -> bool:
+    """True for a folder of C, from which nothing can be derived."""
+    return isinstance(source, str | Path) and Path(source).is_dir()
+
+
+def require_page(source: object) -> None:
+    """Raise StudyError for what cannot be loaded."""
+    if isinstance(source, str | Path) or hasattr(source, "at_point"):
+        return
+    if callable(source) or hasattr(source, "finish") or not hasattr(source, "unknowns"):
+        name = getattr(source, "__name__", type(source).__name__)
+        hint = f", or what {name} returns when it is called" if callable(source) else ""
+        raise StudyError(
+            f"{type(source).__name__} is no page: give a model file, a function under "
+            f"@softehl.page, a kernel, a Definition that m.finish() made{hint}"
+        )

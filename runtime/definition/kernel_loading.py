@@ -1,0 +1,94 @@
+"""The kernel of a page: by the front door, which knows when the generator is needed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from softehl.runtime.definition.element_blocks import is_folder, require_page
+from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.kernels import Kernel
+
+Source: TypeAlias = "str | Path | Kernel | object"
+"""A model file, a folder of generated C, the name of a shipped kernel, a kernel, a Definition, or a
+function decorated by `softehl.page`."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Origin of kernels. model: one of several of a source. law: it is a stress law."""
+
+    source: Any
+    model: str | None
+    geometry: str
+    law: bool
+
+    def loaded(self, kind: str | None) -> Kernel:
+        """The kernel on a kind of cell; a kernel is there already."""
+        if isinstance(self.source, Kernel):
+            return self.source
+        require_page(self.source)
+        import softehl
+
+        return softehl.load_kernel(
+            self.source, self.model, cell=kind, geometry=self.geometry, materials=self.law
+        )
+
+    def differentiated(self, kernel: Kernel) -> Callable[[], Kernel] | None:
+        """Maker of the kernel of derivatives of a page, which is derived when it is asked for."""
+        if isinstance(self.source, Kernel) or is_folder(self.source):
+            return None
+        if "pseudo_load" in kernel.tasks and not kernel.point_data:
+            return None  # it comes with what is needed
+        return Derived(self, kernel)
+
+
+@dataclass(frozen=True, eq=False)
+class Derived:
+    """Maker of the kernel of derivatives of the page that a kernel was made of."""
+
+    origin: Origin | None
+    kernel: Kernel
+
+    def __call__(self) -> Kernel:
+        """That kernel.  Raises StudyError where the page is another one meanwhile."""
+        return self._kernel
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For `pickle`: a page that stands in no file stays behind."""
+        origin = self.origin
+        if origin is None or not isinstance(origin.source, str | Path):
+            return {"origin": None, "kernel": self.kernel}
+        in_file = str(origin.source).endswith(".py")
+        source = Path(origin.source).absolute() if in_file else origin.source
+        return {"origin": replace(origin, source=source), "kernel": self.kernel}
+
+    @cached_property
+    def _kernel(self) -> Kernel:
+        if self.origin is None:
+            raise StudyError(
+                f"derivatives of a study from a pickle need the page of {self.kernel.name}: add it "
+                "from a model file"
+            )
+        if self._loaded(self.origin).signature != self.kernel.signature:
+            raise StudyError(
+                f"the page of {self.kernel.name} is another one than the study was made with, and "
+                "derivatives would be those of another model: make the study again"
+            )
+        return self._loaded(self.origin, derivatives=True)
+
+    def _loaded(self, origin: Origin, *, derivatives: bool = False) -> Kernel:
+        import softehl
+
+        kernel = self.kernel
+        return softehl.load_kernel(
+            origin.source,
+            origin.model or (None if kernel.cell else kernel.name),
+            cell=kernel.cell or None,
+            geometry=origin.geometry,
+            materials=origin.law,
+            derivatives=derivatives,
+        )

@@ -1,1 +1,0 @@
-"""Second-order time: schemes of structural dynamics for a study, and their energies."""

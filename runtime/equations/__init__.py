@@ -1,0 +1,1 @@
+"""Discrete equations of a defined problem: unknowns, mass, contacts, stability, modes."""

@@ -1,0 +1,175 @@
+"""Contacts of a system: from what was written down to their search and their stiffness."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TypeAlias
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.definition.contact_sides import MULTIPLIERS, Touch
+from softehl.runtime.definition.problem_definition import Statement, StudyError
+from softehl.runtime.equations.system import Step, System
+from softehl.runtime.fem.assembly import ElementBlock
+from softehl.runtime.fem.face_pair import FacePair
+from softehl.runtime.fem.touching import Contact, Side, Sought
+from softehl.runtime.fem.touching_faces import FaceContact
+from softehl.runtime.fem.unknowns import Numbering
+from softehl.runtime.kernels import load_kernel
+from softehl.runtime.mesh.cells import CELLS, Cell, measures
+from softehl.runtime.mesh.thickness import inner_radii, thickness
+from softehl.runtime.suggestions import listed, meant
+
+AnyContact: TypeAlias = Contact | FaceContact
+_SOFTER, _SOFTEST = 0.25, 0.1
+"""Of the stiffness of the bodies at their sides; of quadratic faces in 3-D, whose gap varies inside
+them. Blocks, discs and dies with and without friction need as many iterations from 0.03 to 0.25;
+from 0.5 on, of quadratic faces from 0.25 on, sticking and slipping may cycle."""
+_NOTHING = 1e-9  # of the parent face, of order 1: exact shares are 0, or more than a tenth
+
+
+def contact_of(statement: Statement, numbering: Numbering, touch: Touch) -> AnyContact:
+    """The search and the elements of a contact, whose stiffness is not known yet.
+
+    Raises StudyError.
+    """
+    mesh = statement.mesh
+    _require_displacements(statement, touch)
+    sides = []
+    for label in touch.labels:
+        block = statement.blocks[label]
+        x = mesh.points[block.nodes]
+        reach = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)  # of the order of a face
+        body = mesh.points, mesh.boundary, block.nodes
+        depth = inner_radii(*body) if touch.alone else thickness(*body)
+        depth = np.minimum(depth, float(np.ptp(mesh.points, axis=0).max()))
+        if touch.depth is not None:
+            depth = np.full(len(reach), touch.depth)
+        sides.append(Side(block.kind, block.nodes, np.ones(len(reach)), depth, reach))
+    kinds = [(s.kind, other) for s in sides for other, _ in touch.others]
+    unknowns = [touch.unknown(m) for m in MULTIPLIERS[mesh.dimension]]
+    given = (
+        touch.name,
+        mesh.points,
+        np.stack([numbering.nodal[n] for n in touch.names], axis=1),
+        np.stack([numbering.nodal[n] for n in unknowns], axis=1),
+        tuple(sides),
+        touch.others,
+    )
+    if mesh.dimension == 3:
+        law = load_kernel("touch")
+        pairs = {(a, b): FacePair(law, CELLS[a], CELLS[b]) for a, b in kinds}
+        return FaceContact(*given, pairs, touch.friction, touch.alone)
+    nodes = {kind: len(CELLS[kind].nodes) for pair in kinds for kind in pair}
+    kernels = {(a, b): load_kernel(f"mortar_{nodes[a]}{nodes[b]}") for a, b in kinds}
+    return Contact(*given, kernels, touch.friction, touch.ring, touch.alone)
+
+
+def _require_displacements(statement: Statement, touch: Touch) -> None:
+    """Raise StudyError for displacements that no page of a body has."""
+    contacts = {label for other in statement.contacts for label in other.labels}
+    bodies = [block for label, block in statement.blocks.items() if label not in contacts]
+    known = list(dict.fromkeys(s.name for b in bodies for s in b.slots if s.node is not None))
+    for name in touch.names:
+        if name not in known:
+            raise StudyError(
+                f"{touch.name!r}: no unknown {name!r}{meant(name, known)}; at nodes: "
+                f"{listed(known)}; give of=(...), the displacements along x and y"
+            )
+
+
+def with_contacts(system: System, contacts: dict[str, AnyContact]) -> System:
+    """The system with its contacts, of the stiffness of the bodies at rest.  Raises StudyError."""
+    statement = system.statement
+    assert statement is not None
+    if not contacts:
+        return system
+    x = system.at_rest()
+    step = Step(0.0, 0.0, x, 0.0, np.zeros(system.size), 1.0, system.histories())
+    problem = system.problem(step)
+    with np.errstate(all="ignore"):
+        stiffness = problem.assembler.linearise(x, problem.parameters)[1].diagonal()
+    assembler, blocks, found = system.assembler, dict(system.blocks), []
+    for touch in statement.contacts:
+        contact = contacts[touch.name]
+        rho = [_rho(system, touch, contact, side, stiffness) for side in contact.sides]
+        for label, values in zip(touch.labels, rho, strict=True):
+            data = {**blocks[label].data, "rho": values}
+            blocks[label] = replace(blocks[label], data=data)
+            columns = [data[name] for name in blocks[label].kernel.data]
+            assembler = assembler.with_data(label, data=np.stack(columns, axis=1))
+        sides = tuple(replace(s, rho=r) for s, r in zip(contact.sides, rho, strict=True))
+        found.append(replace(contact, sides=sides))
+    return replace(system, assembler=assembler, blocks=blocks, contacts=tuple(found))
+
+
+def contact_blocks(system: System) -> dict[str, float]:
+    """Friction of each block of a contact, by name: those of its sides and of its pairs."""
+    touches = [] if system.statement is None else system.statement.contacts
+    found = {label: touch.friction for touch in touches for label in touch.labels}
+    pairs = {b.name: c.friction for c in system.contacts for b in c.empty()}
+    return {**found, **pairs}
+
+
+def weighted(system: System, weight: float) -> tuple[tuple[Sought, ...], dict[str, ElementBlock]]:
+    """Contacts and the blocks of their sides by name with a stiffness times `weight`.
+
+    Their unknowns times the same number then have forces times this number and the same gaps.
+    """
+    contacts, blocks = [], {}
+    for contact in system.contacts:
+        sides = tuple(replace(side, rho=weight * side.rho) for side in contact.sides)
+        contacts.append(replace(contact, sides=sides))  # type: ignore[type-var]
+    labels = [] if system.statement is None else system.statement.contacts
+    for label in (label for touch in labels for label in touch.labels):
+        block = system.assembler.block(label)
+        assert block.data is not None
+        data = block.data.copy()
+        data[:, list(system.blocks[label].kernel.data).index("rho")] *= weight
+        blocks[label] = replace(block, data=data)
+    return tuple(contacts), blocks
+
+
+def _rho(system: System, touch: Touch, contact: AnyContact, side: Side, K: Array) -> Array:
+    """Stiffness per area, (n,), about that of the softer of the two bodies beneath a side."""
+    if touch.stiffness is not None:
+        return np.full(len(side.faces), touch.stiffness)
+    at_nodes = _per_area(contact, [(side.kind, side.faces)], K)[side.faces]
+    own = at_nodes[:, _loaded(CELLS[side.kind])].mean(axis=1)
+    theirs = _per_area(contact, contact.others, K)
+    rho = np.minimum(own, np.median(theirs[theirs > 0.0]) if (theirs > 0.0).any() else np.inf)
+    if not (np.isfinite(rho) & (rho > 0.0)).all():
+        raise StudyError(
+            f"{touch.name!r}: the bodies have no stiffness at rest; give stiffness=..., about "
+            "Young's modulus over the length of a side"
+        )
+    curved = isinstance(contact, FaceContact) and CELLS[side.kind].order > 1
+    return np.asarray((_SOFTEST if curved else _SOFTER) * rho)
+
+
+def _per_area(contact: AnyContact, faces: object, K: Array) -> Array:
+    """Entries of the diagonal of K over the area of each node, (points,); zero elsewhere."""
+    area = np.zeros(len(contact.points))
+    for kind, nodes in faces:  # type: ignore[attr-defined]
+        ring = isinstance(contact, Contact) and contact.ring
+        at, weights = CELLS[kind].measured_rule(CELLS[kind].order, ring=ring)
+        places = contact.points[nodes]
+        density = measures(CELLS[kind], places, at)
+        shape = CELLS[kind].shape(at)
+        if ring:
+            density = density * 2.0 * np.pi * np.einsum("qk,nk->nq", shape, places[:, :, 1])
+        shares = np.einsum("nq,q,qk->nk", density, weights, shape)
+        first = _loaded(CELLS[kind]).start
+        np.add.at(area, nodes[:, first:], shares[:, first:])
+    there = area > 0.0
+    own = np.zeros(len(area))
+    own[there] = K[contact.displacements[there]].mean(axis=1) / area[there]
+    return own
+
+
+def _loaded(cell: Cell) -> slice:
+    """Corners of a face; or its other nodes, where a uniform pressure does not load the corners."""
+    at, weights = cell.rule(cell.order)
+    corners = (weights @ cell.shape(at))[: cell.corners]
+    return slice(0, cell.corners) if (corners > _NOTHING).all() else slice(cell.corners, None)

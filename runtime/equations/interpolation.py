@@ -1,0 +1,177 @@
+"""Values of fields between the nodes at which they stand.
+
+A field of lower order than its cells stands at their corners only: a pressure on quadratic cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.definition.problem_definition import Block
+from softehl.runtime.equations.system import System
+from softehl.runtime.fem.dofs import DofLayout
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.point_location import Located
+
+_NOTHING = 1e-9  # a shape function below that is zero but for rounding
+_APART = 1e-9  # of the largest component of a vector: values differ by more than rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Interpolation:
+    """Values of unknowns in cells that hold places.
+
+    layout: of the unknowns. located: pairs of a place and a cell. entries: unknown -> pairs,
+    unknowns and weights (e,) each. known: unknown -> whether a pair (m,) has a value of it.
+    """
+
+    layout: DofLayout
+    located: Located
+    entries: Mapping[str, tuple[Integers, Integers, Array]]
+    known: Mapping[str, Flags]
+
+    def values(self, x: Array) -> dict[str, Array]:
+        """Unknown -> values (m,) of x, (n,), nan where a cell has none."""
+        pairs = len(self.located.point)
+        return {
+            name: np.where(self.known[name], np.bincount(pair, weight * x[dof], pairs), np.nan)
+            for name, (pair, dof, weight) in self.entries.items()
+        }
+
+    def jump(self, x: Array) -> tuple[str, Integers] | None:
+        """An unknown of x that differs between two cells at a place where they have copies of
+        nodes, and these two pairs; None where all unknowns are continuous.
+        """
+        located = self.located
+        if len(located.first) == len(located.point):
+            return None
+        first = located.first[np.searchsorted(located.point[located.first], located.point)]
+        values = self.values(x)
+        vectors = zip(self.layout.vectors, self.layout.fields, strict=True)
+        sizes = {name: np.abs(x[part]).max(initial=0) for names, part in vectors for name in names}
+        for name, (pair, dof, weight) in self.entries.items():
+            apart = np.abs(values[name] - values[name][first])
+            for k in np.flatnonzero(apart > _APART * sizes[name]):
+                both = [set(dof[(pair == p) & (np.abs(weight) > _NOTHING)]) for p in (k, first[k])]
+                if both[0] != both[1]:
+                    return name, np.array([first[k], k])
+        return None
+
+
+def interpolation(system: System, places: Array, group: str | None = None) -> Interpolation:
+    """Unknowns at places (n, dim), in the cells, of a group, that hold them."""
+    located = system.mesh.holding(places, group)
+    entries: dict[str, list[tuple[Integers, Integers, Array]]] = {}
+    known: dict[str, Any] = {
+        name: np.zeros(len(located.point), np.bool_) for name in system.numbering.nodal
+    }
+    for kind, pairs in located.by_kind():
+        cell, nodes = CELLS[kind], system.mesh.cells[kind][located.row[pairs]]
+        weights = cell.shape(located.parent[pairs, : cell.dimension])
+        for name, numbers in system.numbering.nodal.items():
+            dofs = numbers[nodes]
+            inside = np.asarray(((dofs >= 0) | (np.abs(weights) <= _NOTHING)).all(axis=1))
+            parts = [(np.flatnonzero(inside), weights)]
+            for block in _at_corners(system, name) if not inside.all() else ():
+                if block.kind == kind:
+                    lower = np.flatnonzero(~inside & _among(nodes, block.nodes))
+                    linear = _linear(kind)
+                    corners = np.zeros_like(weights)
+                    corners[:, : linear.shape[1]] = weights @ linear
+                    parts.append((lower, corners))
+                    inside[lower] = True
+            for rows, own in parts:
+                row, column = np.nonzero(dofs[rows] >= 0)
+                row = rows[row]
+                entry = pairs[row], dofs[row, column], own[row, column]
+                entries.setdefault(name, []).append(entry)
+            known[name][pairs] = inside
+    joined = {
+        n: tuple(map(np.concatenate, zip(*parts, strict=True))) for n, parts in entries.items()
+    }
+    return Interpolation(system.numbering.layout, located, joined, known)  # type: ignore[arg-type]
+
+
+def _among(rows: Integers, known: Integers) -> Flags:
+    """Which rows (m, k) are among the known ones (n, k)."""
+    near = known[np.isin(known[:, 0], rows[:, 0])]
+    there = set(map(tuple, near.tolist()))
+    return np.array([tuple(row) in there for row in rows.tolist()], dtype=np.bool_)
+
+
+def shares(system: System, place: Array) -> dict[str, tuple[Integers, Array]] | None:
+    """Unknown -> numbers (k,) and weights (k,) that make its value at a place (dim,), in the first
+    cell that holds it.
+
+    Without unknowns that this cell does not have; None where no cell is there.
+    """
+    found = interpolation(system, np.asarray(place)[None])
+    if not len(found.located.point):
+        return None
+    chosen = {name: entry[0] == 0 for name, entry in found.entries.items() if found.known[name][0]}
+    return {n: (found.entries[n][1][rows], found.entries[n][2][rows]) for n, rows in chosen.items()}
+
+
+def between_nodes(
+    system: System, places: Array, nodal: Mapping[str, Array], group: str | None = None
+) -> list[dict[str, float] | None]:
+    """Values at places (n, dim) of fields by their values at nodes, (points,), in the first cell
+    of a group that has them; nan where none has, None where no cell is there.
+    """
+    located = system.mesh.holding(places, group)
+    values = {name: np.empty(len(located.point)) for name in nodal}
+    for kind, pairs in located.by_kind():
+        cell, nodes = CELLS[kind], system.mesh.cells[kind][located.row[pairs]]
+        weights = cell.shape(located.parent[pairs, : cell.dimension])
+        some = np.abs(weights) > _NOTHING  # at a side between blocks only nodes of the side matter
+        for name, field in nodal.items():
+            values[name][pairs] = np.where(some, field[nodes] * weights, 0.0).sum(axis=1)
+    rows: list[dict[str, float] | None] = [None] * len(places)
+    for pair, point in enumerate(located.point.tolist()):
+        known = rows[point]
+        if known is None or all(map(np.isnan, known.values())):
+            rows[point] = {name: float(field[pair]) for name, field in values.items()}
+    return rows
+
+
+def at_every_node(system: System, x: Array) -> dict[str, Array]:
+    """Unknown -> values (points,) of x, (n,), also at the other nodes of cells at whose corners it
+    stands; nan where there is none.
+    """
+    found = {}
+    for name, numbers in system.numbering.nodal.items():
+        values = found[name] = np.where(numbers >= 0, x[numbers], np.nan)
+        for block in _at_corners(system, name):
+            linear = _linear(block.kind)
+            corners = linear.shape[1]
+            values[block.nodes[:, corners:]] = values[block.nodes[:, :corners]] @ linear[corners:].T
+    return found
+
+
+def _at_corners(system: System, name: str) -> list[Block]:
+    """Blocks in which an unknown stands at the corners of the elements only."""
+    found = []
+    for block in system.blocks.values():
+        cell = CELLS.get(block.kind)
+        nodes = {slot.node for slot in block.slots if slot.name == name}
+        if cell and cell.order > 1 and nodes == set(range(cell.corners)):
+            found.append(block)
+    return found
+
+
+@cache
+def _linear(kind: str) -> Array:
+    """Values (nodes, corners) at all nodes of a cell by those at its corners."""
+    cell = CELLS[kind]
+    flat = next(
+        c
+        for c in CELLS.values()
+        if c.dimension == cell.dimension and c.corners == cell.corners and c.order == 1
+    )
+    return flat.shape(cell.nodes)

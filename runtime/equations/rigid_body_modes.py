@@ -1,0 +1,241 @@
+"""Support of a problem: affine motions that its tangent does not resist, and their names.
+
+A body that nothing holds is told before it is solved. Candidates are all fields that are constant
+or linear in the places, on each part of the unknowns that the tangent connects: rigid motions,
+shifts of a temperature, rotations of beams. One that is zero where unknowns are prescribed, and
+whose product with the tangent is zero but for rounding, is free.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_array
+from scipy.sparse.csgraph import connected_components
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.equations.system import System
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.mesh.mesh import place_text
+from softehl.runtime.solve.solution import NotConverged, Solution, Status
+
+_ROUNDING = 1e-12
+"""Of the terms of an equation: what is left of a free motion by rounding, with a margin.  A spring
+that is weaker than that, relative to the body, cannot be told from none."""
+
+_BALANCINGS = 20  # each halves the exponents that are left
+
+_AXES = "xyz"
+
+
+def require_held(system: System, problem: Any, x: Array) -> None:
+    """Raise NotConverged that names the free motion if nothing holds a part of the problem at x.
+
+    One that is spread over processes is looked at after its first step (`solve.held`).
+    """
+    if not isinstance(problem, Problem):
+        return
+    problem = problem.at(x)
+    with np.errstate(all="ignore"):
+        tangent = problem.assembler.linearise(x, problem.parameters)[1]
+    if not np.isfinite(tangent.data).all():
+        return  # Newton's method says where
+    K = csc_array((tangent.data, tangent.indices, tangent.indptr), shape=tangent.shape, copy=True)
+    K.eliminate_zeros()
+    parts = connected_components(K, directed=False)[1].astype(np.int64)
+    node, name = _nodal(system)
+    fields, centres, sizes = _candidates(system, parts, node, name)
+    units = _units(list(system.numbering.nodal), K, parts, name)
+    rows = np.asarray(K @ (units[:, None] * fields))
+    scale = np.asarray(abs(K) @ (units[:, None] * np.abs(fields))).sum(axis=1)
+    rows[scale > 0.0] /= scale[scale > 0.0, None]
+    rows[problem.fixed] = fields[problem.fixed]
+    order = np.argsort(parts, kind="stable")
+    for members in np.split(order, np.flatnonzero(np.diff(parts[order])) + 1):
+        if len(members) == 1 and scale[members[0]] > 0.0:
+            continue  # an equation for itself
+        basis = _independent(fields[members])
+        free = _null(rows[members] @ basis) @ basis.T
+        if not len(free):
+            continue
+        part = int(parts[members[0]])
+        shape = len(free), len(system.numbering.nodal), system.mesh.dimension + 1
+        unit = np.ones(shape[1])
+        unit[name[members]] = units[members]
+        told = _Motions(system, free.reshape(shape), unit, centres[part], sizes[part]).words()
+        first = int(node[members[node[members] >= 0]].min())
+        alone = (parts[node >= 0] == part).all()
+        raise NotConverged(_loose(system, x, told, first, alone=bool(alone)))
+
+
+def _loose(system: System, x: Array, told: str, node: int, *, alone: bool) -> Solution:
+    place = place_text(system.mesh.points[node])
+    words = f"nothing prevents {told}" + ("" if alone else f" of the part with node {node} {place}")
+    return Solution(x, Status.NOT_HELD, words, (), 0, 0)
+
+
+def _nodal(system: System) -> tuple[Integers, Integers]:
+    """Node and number of the name of each unknown, (n,), -1 where it is at no node."""
+    node, name = np.full(system.size, -1), np.full(system.size, -1)
+    for k, numbers in enumerate(system.numbering.nodal.values()):
+        there = np.flatnonzero(numbers >= 0)
+        node[numbers[there]], name[numbers[there]] = there, k
+    return node, name
+
+
+def _candidates(
+    system: System, parts: Integers, node: Integers, name: Integers
+) -> tuple[Array, Array, Array]:
+    """Fields (n, names (1 + dim)): each name's 1, x, y, z, about the centre of each part and
+    relative to its size; the centres (parts, dim) and sizes (parts,).
+    """
+    own = np.flatnonzero(node >= 0)
+    places, label, count = system.mesh.points[node[own]], parts[own], int(parts.max()) + 1
+    weights = np.maximum(np.bincount(label, minlength=count), 1)[:, None]
+    sums = [np.bincount(label, column, count) for column in places.T]
+    centres = np.stack(sums, axis=1) / weights
+    apart = places - centres[label]
+    sizes = np.zeros(count)
+    np.maximum.at(sizes, label, np.abs(apart).max(axis=1))
+    sizes[sizes == 0.0] = 1.0
+    width = places.shape[1] + 1
+    fields = np.zeros((len(node), len(system.numbering.nodal), width))
+    fields[own, name[own], 0] = 1.0
+    fields[own, name[own], 1:] = apart / sizes[label, None]
+    return fields.reshape(len(node), -1), centres, sizes
+
+
+def _units(known: list[str], K: csc_array, parts: Integers, name: Integers) -> Array:
+    """Units of the unknowns, (n,), in which the terms of an equation K x, (n, n), count alike: a
+    pressure in Pa beside displacements in mm. One for each part and each vector or scalar.
+    """
+    vectors = [stem if axis in _AXES else n for n in known for stem, _, axis in [n.rpartition("_")]]
+    kinds = {stem: k for k, stem in enumerate(dict.fromkeys(vectors))}
+    if len(kinds) < 2:
+        return np.ones(len(name))
+    kind = np.array([*(kinds[stem] for stem in vectors), len(kinds)])[name]  # the last: no node
+    found, group = np.unique(parts * (len(kinds) + 1) + kind, return_inverse=True)
+    ones, n = np.ones(len(name)), np.arange(len(name))
+    member = csc_array((ones, (n, group)), shape=(len(name), len(found)))
+    terms = csc_array(member.T @ abs(K) @ member)
+    rows, columns = np.ones(len(found)), np.ones(len(found))
+    for _ in range(_BALANCINGS):  # the method of Ruiz
+        scaled = terms.multiply(rows[:, None]).multiply(columns)
+        largest = [scaled.max(axis=k).toarray().ravel() for k in (1, 0)]
+        row, column = (1.0 / np.sqrt(np.where(a > 0.0, a, 1.0)) for a in largest)
+        rows, columns = rows * row, columns * column
+    return np.asarray(2.0 ** np.round(np.log2(columns[group])))  # adds no rounding of its own
+
+
+def _independent(fields: Array) -> Array:
+    """Combinations (columns, k) of the columns of (n, columns) that are independent and of size 1:
+    nodes on a line do not tell all coordinates apart.
+    """
+    triangle = np.linalg.qr(fields, mode="r") if len(fields) > fields.shape[1] else fields
+    _, values, vectors = np.linalg.svd(triangle, full_matrices=False)
+    kept = values > 1e-9 * np.sqrt(len(fields))
+    return np.asarray((vectors[kept] * (np.sqrt(len(fields)) / values[kept])[:, None]).T)
+
+
+def _null(rows: Array) -> Array:
+    """Combinations (k, columns) of the columns of (n, columns) that are zero but for rounding."""
+    if not rows.shape[1]:
+        return np.empty((0, 0))
+    triangle = np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows
+    _, values, vectors = np.linalg.svd(triangle)
+    values = np.append(values, np.zeros(len(vectors) - len(values)))
+    found = vectors[values <= _ROUNDING * np.sqrt(len(rows))]
+    return np.asarray(found[np.abs(rows @ found.T).max(axis=0, initial=0.0) <= _ROUNDING])
+
+
+@dataclass(frozen=True, eq=False)
+class _Motions:
+    """Free motions (k, names, 1 + dim) of a part: constants, and slopes by (x - centre) / size, in
+    units (names,).
+    """
+
+    system: System
+    motions: Array
+    units: Array
+    centre: Array
+    size: float
+
+    def words(self) -> str:
+        """Names of the motions: translations and shifts, then rotations, then anything else."""
+        k, names, width = self.motions.shape
+        slopes = self.motions[:, :, 1:].reshape(k, -1)
+        left, values, _ = np.linalg.svd(slopes)
+        bent = np.append(values, np.zeros(k))[:k] > 1e-6
+        turned = (left.T @ self.motions.reshape(k, -1)).reshape(k, names, width)
+        still = turned[~bent][:, :, 0]
+        found = [self._shift(v) for v in _along_axes(still)]
+        vector = self._vector()
+        if vector is None or not bent.any():
+            return ", ".join([*found, *("a motion linear in the places" for _ in turned[bent])])
+        return ", ".join([*found, *self._rotations(turned[bent][:, vector], moves=len(still) > 0)])
+
+    def _vector(self) -> list[int] | None:
+        """Numbers of the names that are components of one vector, along all coordinates."""
+        known, axes = list(self.system.numbering.nodal), _AXES[: self.system.mesh.dimension]
+        for stem in {name.rpartition("_")[0] for name in known}:
+            wanted = [f"{stem}_{axis}" for axis in axes]
+            if stem and len(axes) > 1 and all(name in known for name in wanted):
+                return [known.index(name) for name in wanted]
+        return None
+
+    def _shift(self, values: Array) -> str:
+        known, vector = list(self.system.numbering.nodal), self._vector() or []
+        moved = np.flatnonzero(np.abs(values) > 1e-6)
+        if len(moved) == 1 and moved[0] in vector:
+            return f"a translation along {_AXES[vector.index(int(moved[0]))]}"
+        if len(moved) == 1:
+            return f"a constant added to {known[moved[0]]}"
+        amounts = values * self.units / self.units[moved].max()
+        parts = ", ".join(f"{known[i]} by {amounts[i]:.3g}" for i in moved)
+        return f"a shift of {parts}"
+
+    def _rotations(self, turned: Array, *, moves: bool) -> list[str]:
+        """Of motions (k, dim, 1 + dim) of the displacements."""
+        slopes = turned[:, :, 1:]
+        if np.abs(slopes + slopes.transpose(0, 2, 1)).max() > 1e-6 * np.abs(slopes).max():
+            return ["a motion linear in the places"]
+        if slopes.shape[1] == 2:
+            axes, words = np.zeros((len(slopes), 0)), ["a rotation"]
+        else:
+            axes = np.stack([slopes[:, 2, 1], slopes[:, 0, 2], slopes[:, 1, 0]], axis=1)
+            words = [f"a rotation about {_direction(a)}" for a in _along_axes(axes)]
+        if moves or len(slopes) > 1:
+            return words
+        offset = np.linalg.lstsq(slopes[0], -turned[0, :, 0], rcond=1e-6)[0]
+        place = self.centre + self.size * offset
+        place[np.abs(place) < 1e-6 * self.size] = 0.0
+        axis = f"{_direction(axes[0])} through " if axes.size else ""
+        return [f"a rotation about {axis}{place_text(place)}"]
+
+
+def _direction(axis: Array) -> str:
+    """x, y or z, or the components of another direction."""
+    axis = axis / np.abs(axis).max()
+    where = np.flatnonzero(np.abs(axis) > 1e-6)
+    if len(where) == 1:
+        return _AXES[where[0]]
+    return "(" + ", ".join(f"{a:.3g}" for a in axis) + ")"
+
+
+def _along_axes(vectors: Array) -> Array:
+    """A basis (k, m) of the span of vectors (k, m), in reduced echelon form: few entries each."""
+    found, row = vectors.copy(), 0
+    for column in range(found.shape[1]):
+        if row == len(found):
+            break
+        pivot = row + int(np.abs(found[row:, column]).argmax())
+        if abs(found[pivot, column]) < 1e-6:
+            continue
+        found[[row, pivot]] = found[[pivot, row]]
+        found[row] /= found[row, column]
+        others = np.arange(len(found)) != row
+        found[others] -= found[others, column][:, None] * found[row]
+        row += 1
+    return found[:row]

@@ -1,0 +1,240 @@
+"""A study as equations: numbering, assembler, and the problem at a time or load factor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.definition.problem_definition import (
+    Block,
+    Condition,
+    Force,
+    Number,
+    Statement,
+    StudyError,
+)
+from softehl.runtime.fem.assembly import Assembler
+from softehl.runtime.fem.loads import Tie, amount
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.fem.touching import Sought, TouchingProblem
+from softehl.runtime.fem.unknowns import Numbering
+from softehl.runtime.mesh.mesh import Mesh, place_text
+from softehl.runtime.share import ALONE, Share
+from softehl.runtime.suggestions import few
+
+_SAME = 1e-12
+"""Of the largest of them: prescribed values that differ by less are the same but for rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """State of a problem in time: its time or load factor, and the step before.
+
+    factor: of all numbers in loads and supports. old: (n,) unknowns of the step
+    before. rate, rest: du/dt = rate u + rest, rest (n,). dt: length of the step. histories: block
+    -> (cells, points, k) point data. acceleration, remainder: likewise d2u/dt2 = acceleration u +
+    remainder; None is zero. weights: of the states before in rest, the latest first.
+    """
+
+    t: float
+    factor: float
+    old: Array
+    rate: float
+    rest: Array
+    dt: float
+    histories: Mapping[str, Array]
+    acceleration: float = 0.0
+    remainder: Array | None = None
+    weights: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Numbering and assembler, which all steps share.
+
+    conditions: prescribed values, as they were written down. implied: ties both sides of which
+    are prescribed: checked, not solved. start: name -> (points,) initial values, nan where nothing
+    was said. share: how the unknowns are spread over processes; whole: where they are, the system
+    of all of them. statement: what was written down, and written: how much of it there was.
+    contacts: whose elements are sought at each iterate.
+    """
+
+    mesh: Mesh
+    numbering: Numbering
+    assembler: Assembler
+    blocks: Mapping[str, Block]
+    conditions: tuple[Condition, ...]
+    implied: tuple[Force, ...] = ()
+    start: Mapping[str, Array] = field(default_factory=dict)
+    share: Share = ALONE
+    whole: System | None = None
+    statement: Statement | None = field(default=None, repr=False)
+    written: int = 0
+    contacts: tuple[Sought, ...] = ()
+
+    def __repr__(self) -> str:
+        """Summary in one line."""
+        names = few(self.numbering.layout.names)
+        return f"<System: {self.size} unknowns ({names}); blocks: {few(self.blocks)}>"
+
+    @property
+    def everywhere(self) -> System:
+        """The equations of all processes."""
+        return self.whole or self
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.numbering.layout.total
+
+    def at_rest(self) -> Array:
+        """Unknowns at the start, (n,): zero but for initial values."""
+        x = np.zeros(self.size)
+        for name, values in self.start.items():
+            numbers = self.numbering.nodal[name]
+            said = (numbers >= 0) & ~np.isnan(values)
+            x[numbers[said]] = values[said]
+        return x
+
+    def histories(self) -> dict[str, Array]:
+        """Point data at the start."""
+        return {b.name: b.initial for b in self.blocks.values() if b.initial is not None}
+
+    def still(self, t: float, old: Array, histories: Mapping[str, Array]) -> Step:
+        """A step without time: t is the load factor, rates are zero.  Raises StudyError."""
+        for block in self.blocks.values():
+            if "dt" in block.kernel.parameters and "dt" not in block.parameters:
+                raise StudyError(
+                    f"{block.name!r}: {block.kernel.name} has dt, the length of a step in time, "
+                    "and here is no time: march, or give dt=..."
+                )
+        return Step(t, t, old, 0.0, np.zeros(self.size), 0.0, histories)
+
+    def resting(self) -> Problem:
+        """The equations without time at load factor 0, at the values of the start."""
+        return self.problem(self.still(0.0, self.at_rest(), self.histories()))
+
+    def committed(
+        self, problem: Problem, x: Array, before: Mapping[str, Array]
+    ) -> dict[str, Array]:
+        """Point data after a converged step: what pages call their history."""
+        after = dict(before)
+        for block in self.blocks.values():
+            names = block.kernel.history
+            if names:
+                fields = problem.fields(block.name, x)
+                state = before[block.name].copy()
+                for name in names:
+                    state[:, :, block.kernel.point_data.index(name)] = fields[f"new_{name}"]
+                after[block.name] = state
+        return after
+
+    def problem(self, step: Step) -> Problem:
+        """The equations of a step, as a solver sees them.
+
+        Raises StudyError as `part` does.
+        """
+        posed: Problem = self.share.posed(self.part(step))
+        return posed
+
+    def part(self, step: Step) -> Problem:
+        """The equations of a step, those of this process.
+
+        Raises StudyError where prescribed values differ, or more was written down meanwhile.
+        """
+        if self.statement is not None and self.statement.count != self.written:
+            raise StudyError(
+                "the study was changed on its way, which this path does not see: end the loop and "
+                "go on from its last result, study.march(start=result, ...) or solve(start=result)"
+            )
+        fixed, values = self._prescribed(step)
+        for tie in self.implied:
+            self._require_tied(tie, step, dict(zip(fixed.tolist(), values.tolist(), strict=True)))
+        assembler, parameters = self.assembler, {}
+        for block in self.assembler.blocks:
+            page = self.blocks.get(block.name)
+            if page is None:
+                given: Mapping[str, Number] = {
+                    **{"t": step.t, "factor": step.factor},
+                    "acceleration": step.acceleration,
+                }
+            else:
+                given = {
+                    **{"rate": step.rate, "dt": step.dt, "acceleration": step.acceleration},
+                    **page.parameters,
+                }
+                if page.filled or page.initial is not None:
+                    state = {"data": self._data(page, step)}
+                    history = step.histories.get(page.name)
+                    assembler = assembler.with_data(page.name, **state, point_data=history)
+            numbers = [given[name] for name in block.kernel.parameters]
+            parameters[block.name] = np.array([v(step.t) if callable(v) else v for v in numbers])
+        layout = self.numbering.layout
+        posed_on: dict[str, Any] = {"fixed": fixed, "values": values}
+        if self.contacts:
+            posed_on |= {"contacts": self.contacts, "old": step.old}
+        kind = TouchingProblem if self.contacts else Problem
+        return kind(assembler, layout, parameters, **posed_on)
+
+    def _data(self, page: Block, step: Step) -> Array | None:
+        """Data of the elements of a page, (n, k), in the kernel's order."""
+        columns = []
+        for name in page.kernel.data:
+            if name in page.data:
+                columns.append(page.data[name])
+                continue
+            slot, source = page.filled[name], step.old
+            if name in page.rates:
+                source = step.rest
+            elif name in page.accelerations:
+                source = np.zeros(self.size) if step.remainder is None else step.remainder
+            columns.append(source[self.numbering.nodal[slot.name][page.nodes[:, slot.node or 0]]])
+        return np.stack(columns, axis=1) if columns else None
+
+    def _require_tied(self, tie: Force, step: Step, values: Mapping[int, float]) -> None:
+        """Raise StudyError where values that are prescribed on both sides break a tie."""
+        assert isinstance(tie.kernel, Tie)
+        places = self.mesh.points[tie.nodes[:, 0]]
+        offsets = amount(tie.kernel.offset, places, step.t, step.factor)
+        numbers = self.numbering.nodal[tie.names[0]][tie.nodes]
+        sizes = [abs(values[int(number)]) for number in numbers.ravel()]
+        size = max([*sizes, *np.abs(offsets)], default=0.0)
+        for (a, b), offset, node in zip(numbers, offsets, tie.nodes[:, 0], strict=True):
+            apart = values[int(a)] - values[int(b)] - float(offset)
+            if abs(apart) > _SAME * size:
+                raise StudyError(
+                    f"{tie.label}: at node {node} {place_text(self.mesh.points[node])} both sides "
+                    f"are prescribed, and {apart:g} apart"
+                )
+
+    def _prescribed(self, step: Step) -> tuple[Integers, Array]:
+        """Unknowns and values, each once; one that is given two values is refused."""
+        known = np.full(self.size, np.nan)
+        by = np.full(self.size, -1)
+        for k, condition in enumerate(self.conditions):
+            numbers = self.numbering.nodal[condition.name][condition.nodes]
+            places = self.mesh.points[condition.nodes]
+            values = amount(condition.value, places, step.t, step.factor)
+            there = numbers >= 0
+            numbers, values, nodes = numbers[there], values[there], condition.nodes[there]
+            wrong = np.flatnonzero((by[numbers] >= 0) & (known[numbers] != values))
+            if len(wrong):  # functions that agree at a corner do so but for rounding
+                all_of = self.numbering.nodal[condition.name]
+                size = np.nanmax(np.abs([*known[all_of[all_of >= 0]], *values]))
+                apart = np.abs(known[numbers[wrong]] - values[wrong])
+                wrong = wrong[apart > _SAME * size]
+            if len(wrong):
+                i = int(wrong[0])
+                before = self.conditions[int(by[numbers[i]])]
+                raise StudyError(
+                    f"{condition.name} at node {nodes[i]} "
+                    f"{place_text(self.mesh.points[nodes[i]])} is prescribed twice: "
+                    f"{known[numbers[i]]:g} by {before.words}, {values[i]:g} by {condition.words}"
+                )
+            known[numbers], by[numbers] = values, k
+        fixed = np.flatnonzero(by >= 0)
+        return fixed, known[fixed]

@@ -1,0 +1,170 @@
+"""From what was written down to equations: numbering, blocks of elements, the system."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.definition.element_blocks import facet_nodes
+from softehl.runtime.definition.problem_definition import Block, Force, Statement, StudyError
+from softehl.runtime.equations.contact_setup import contact_of, with_contacts
+from softehl.runtime.equations.system import System
+from softehl.runtime.fem.assembly import Assembler, ElementBlock
+from softehl.runtime.fem.loads import Spring, Tie
+from softehl.runtime.fem.unknowns import Elements, Numbering
+from softehl.runtime.mesh.faces import matched
+from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.suggestions import listed, meant
+
+
+def equations(statement: Statement, fields: Mapping[str, Sequence[str]] | None = None) -> System:
+    """Equations of a statement; fields: see `Numbering.of`.
+
+    Raises StudyError for what does not fit together.
+    """
+    if not statement.blocks:
+        raise StudyError("there are no elements: add a page, study.add('body', 'solid.py')")
+    mesh, pages = statement.mesh, statement.blocks.values()
+    _warn_of_holes(statement)
+    elements = [Elements(b.name, b.nodes, b.slots, b.shared, b.form.places) for b in pages]
+    try:
+        numbering = Numbering.of(len(mesh.points), elements, fields)
+    except ValueError as error:
+        raise StudyError(str(error)) from None
+    for c in statement.conditions:
+        _require(c.name, c.nodes, numbering, c.words, somewhere=mesh.anywhere)
+    forces, implied = _forces(statement, numbering)
+    ties = {f.label: len(f.nodes) for f in forces if isinstance(f.kernel, Tie)}
+    layout = replace(
+        numbering.layout,
+        names=(*numbering.layout.names, *ties),
+        counts=(*numbering.layout.counts, *ties.values()),
+    )
+    writer = _Writer(mesh, replace(numbering, layout=layout))
+    blocks = [writer.page(b) for b in pages] + [writer.force(f) for f in forces if len(f.nodes)]
+    contacts = {t.name: contact_of(statement, numbering, t) for t in statement.contacts}
+    blocks += [block for contact in contacts.values() for block in contact.empty()]
+    system = System(
+        mesh,
+        writer.numbering,
+        Assembler.build(layout.total, blocks),
+        dict(statement.blocks),
+        (*statement.conditions,),
+        implied,
+        _at_start(statement, numbering),
+        statement=statement,
+        written=statement.count,
+    )
+    return with_contacts(system, contacts)
+
+
+def _warn_of_holes(statement: Statement) -> None:
+    """Warn of cells without elements, where other cells have some: a body with a hole."""
+    mesh = statement.mesh
+    bare: dict[str, Flags] = {}
+    for kind, nodes in mesh.cells.items():
+        own = [block.nodes for block in statement.blocks.values() if block.kind == kind]
+        if any(part is nodes or np.array_equal(part, nodes) for part in own):
+            continue
+        known = np.concatenate([nodes[:0], *own])
+        bare[kind] = matched(nodes, known, nodes.shape[1]) < 0 if len(known) else nodes[:, 0] >= 0
+    count, total = sum(map(np.sum, bare.values())), sum(map(len, mesh.cells.values()))
+    if not 0 < count < total:  # pages on sides or nodes alone leave no hole
+        return
+    groups = [
+        name
+        for name, group in mesh.groups.items()
+        if any(map(len, group.values()))
+        and all(k in bare and bare[k][rows].all() for k, rows in group.items() if len(rows))
+    ]
+    of = f", those of {listed(map(repr, groups))}" if groups else ""
+    warnings.warn(
+        f"{count} of {total} cells of the mesh have no elements{of}: they are no part of the body; "
+        "study.add(...) is for all cells or for a group, cells=...",
+        stacklevel=4,
+    )
+
+
+def _forces(
+    statement: Statement, numbering: Numbering
+) -> tuple[tuple[Force, ...], tuple[Force, ...]]:
+    """Forces to be solved for, and ties both sides of which are prescribed."""
+    forces, implied = [], []
+    for force in statement.forces:
+        for name in force.names:
+            _require(name, force.nodes, numbering, force.label)
+        if isinstance(force.kernel, Tie):
+            # where both sides are prescribed nothing is left for a multiplier to do
+            both = np.isin(force.nodes, statement.prescribed(force.names[0])).all(axis=1)
+            implied.append(replace(force, nodes=force.nodes[both]))
+            force = replace(force, nodes=force.nodes[~both])
+        forces.append(force)
+    return (*forces,), (*implied,)
+
+
+def _require(
+    name: str,
+    nodes: Integers,
+    numbering: Numbering,
+    words: str,
+    *,
+    somewhere: Callable[[object], bool] | None = None,
+) -> None:
+    """Raise StudyError unless the nodes have an unknown of this name; somewhere: some of them."""
+    if name not in numbering.nodal:
+        known = listed(numbering.nodal)
+        raise StudyError(
+            f"{words}: no unknown {name!r}{meant(name, numbering.nodal)}; at nodes: {known}"
+        )
+    there = numbering.nodal[name][nodes] >= 0
+    if not (there.all() if somewhere is None else somewhere(there.any())):
+        raise StudyError(f"{words}: no page has the unknown {name!r} there")
+
+
+def _at_start(statement: Statement, numbering: Numbering) -> dict[str, Array]:
+    """Unknown -> its values at every node, (points,), nan where nothing was said."""
+    found: dict[str, Array] = {}
+    for start in statement.start:
+        somewhere = statement.mesh.anywhere
+        words = f"start({start.name}=...)"
+        _require(start.name, start.nodes, numbering, words, somewhere=somewhere)
+        values = found.setdefault(start.name, np.full(len(statement.mesh.points), np.nan))
+        values[start.nodes] = start.values
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Writer:
+    """Blocks of an assembler on a mesh with numbered unknowns."""
+
+    mesh: Mesh
+    numbering: Numbering
+
+    def page(self, block: Block) -> ElementBlock:
+        n = len(block.nodes)
+        width = block.nodes.shape[1] * self.mesh.dimension if block.kernel.coordinates else 0
+        places = self.mesh.points[block.nodes].reshape(n, width) if width else np.empty((n, 0))
+        given = [block.data[d] for d in block.kernel.data if d in block.data]
+        data = np.stack(given, axis=1) if given else None  # what else there is comes with steps
+        return ElementBlock(
+            *(block.name, block.kernel, places, self.numbering.dofs[block.name]),
+            data=data,
+            rule=block.form.rule,
+            constant=block.form.constant,
+            check_orientation=facet_nodes(block.kernel) is None,
+        )
+
+    def force(self, force: Force) -> ElementBlock:
+        dofs = self.numbering.at(force.names, force.nodes)
+        places = self.mesh.points[force.nodes].reshape(len(dofs), -1)
+        if isinstance(force.kernel, Tie):
+            places = self.mesh.points[force.nodes[:, 0]]
+            dofs = np.column_stack([dofs, self.numbering.layout.dofs(force.label)])
+        constant = isinstance(force.kernel, Spring | Tie)
+        return ElementBlock(
+            force.label, force.kernel, places, np.ascontiguousarray(dofs), constant=constant
+        )

@@ -1,0 +1,1 @@
+"""Results of a study: values at points, fields at nodes, modes, files."""

@@ -1,0 +1,144 @@
+"""Files for ParaView: one .vtu, or one for each process and a .pvtu that names them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.definition.problem_definition import Block
+from softehl.runtime.fem.dofs import AXES
+from softehl.runtime.io import replacing, write_text
+from softehl.runtime.mesh.cells import CELLS, for_vtk
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """Mesh and fields of a file.
+
+    points: (n, dim). cells: kind -> nodes (m, k). nodal: name -> (n,). cellwise: name -> kind ->
+    (m,).
+    """
+
+    points: Array
+    cells: Mapping[str, Integers]
+    nodal: Mapping[str, Array]
+    cellwise: Mapping[str, Mapping[str, Array]]
+
+    @classmethod
+    def of(
+        cls,
+        points: Array,
+        cells: Mapping[str, Integers],
+        nodal: Mapping[str, Array],
+        blocks: Mapping[str, Block],
+        fields: Callable[[str], Mapping[str, Array]],
+    ) -> Picture:
+        """With the means of the fields, (cells, points), of blocks that stand on these cells."""
+        rows = {kind: {tuple(r): k for k, r in enumerate(n.tolist())} for kind, n in cells.items()}
+        found: dict[str, dict[str, Array]] = {}
+        for name, block in blocks.items():
+            if block.kind not in cells or not block.kernel.fields:
+                continue
+            chosen = [rows[block.kind][tuple(row)] for row in block.nodes.tolist()]
+            for label, values in fields(name).items():
+                data = {kind: np.full(len(nodes), np.nan) for kind, nodes in cells.items()}
+                data[block.kind][chosen] = values.mean(axis=1)
+                found[f"{name}.{label}"] = data
+        return cls(points, cells, nodal, found)
+
+    def compact(self) -> Picture:
+        """Without the points that no cell has."""
+        used = np.unique(np.concatenate([np.empty(0, np.int64), *map(np.ravel, _lists(self))]))
+        number = np.zeros(len(self.points), dtype=np.int64)
+        number[used] = np.arange(len(used))
+        cells = {kind: number[nodes] for kind, nodes in self.cells.items()}
+        nodal = {name: values[used] for name, values in self.nodal.items()}
+        return Picture(self.points[used], cells, nodal, self.cellwise)
+
+    def write(self, path: Path) -> None:
+        """Write .vtu, atomically."""
+        import meshio  # late: it is slow to import
+
+        small = {kind: _small(kind, nodes) for kind, nodes in self.cells.items()}
+        found = meshio.Mesh(
+            np.pad(self.points, ((0, 0), (0, 3 - self.points.shape[1]))),
+            list(small.values()),
+            point_data={**self.nodal, **_vectors(self.nodal)},
+            cell_data={
+                name: [
+                    np.repeat(values, len(small[kind][1]) // max(len(values), 1))
+                    for kind, values in data.items()
+                ]
+                for name, data in self.cellwise.items()
+            },
+        )
+        with replacing(path) as temporary:
+            meshio.write(temporary, found, file_format="vtu")
+
+    def write_index(self, path: Path, pieces: list[str]) -> None:
+        """Write the .pvtu of these pieces, of which this is one."""
+        at_nodes = [_array(name, 1) for name in self.nodal]
+        at_nodes += [_array(name, 3) for name in _vectors(self.nodal)]
+        lines = [
+            '<?xml version="1.0"?>',
+            '<VTKFile type="PUnstructuredGrid" version="0.1" byte_order="LittleEndian">',
+            '<PUnstructuredGrid GhostLevel="0">',
+            *("<PPoints>", _array("Points", 3), "</PPoints>"),
+            *("<PPointData>", *at_nodes, "</PPointData>"),
+            *("<PCellData>", *(_array(name, 1) for name in self.cellwise), "</PCellData>"),
+            *(f"<Piece Source={quoteattr(piece)}/>" for piece in pieces),
+            "</PUnstructuredGrid>",
+            "</VTKFile>",
+        ]
+        write_text(path, "\n".join(lines) + "\n")
+
+
+def _small(kind: str, nodes: Integers) -> tuple[str, Integers]:
+    """Cells for a file; those of order 3 and more as linear ones between their nodes."""
+    cell = CELLS[kind]
+    if kind == "wedge6":  # VTK's first triangle runs the other way round
+        return cell.meshio, nodes[:, list(cell.mirrored)]
+    if cell.exponents:
+        return cell.meshio, for_vtk(kind, nodes)
+    linear = CELLS[{1: "line2", 2: "quad4", 3: "hex8"}[cell.dimension]]
+    rank = np.argsort(np.argsort(cell.line))[cell.lines]
+    at = np.empty((cell.order + 1,) * cell.dimension, dtype=np.int64)
+    at[tuple(rank.T)] = np.arange(len(nodes[0]))
+    steps = np.moveaxis(np.indices((cell.order,) * cell.dimension), 0, -1)
+    corners = steps.reshape(-1, 1, cell.dimension) + (linear.nodes > 0.0)
+    local = at[tuple(np.moveaxis(corners, -1, 0))]
+    return linear.meshio, nodes[:, local].reshape(-1, len(linear.nodes))
+
+
+def piece_names(path: Path, count: int) -> list[str]:
+    """Names of the pieces of a .pvtu, beside it."""
+    return [f"{path.stem}_{number:04d}.vtu" for number in range(count)]
+
+
+def _lists(picture: Picture) -> list[Integers]:
+    return list(picture.cells.values())
+
+
+def _array(name: str, components: int) -> str:
+    return f'<PDataArray type="Float64" Name={quoteattr(name)} NumberOfComponents="{components}"/>'
+
+
+def _vectors(nodal: Mapping[str, Array]) -> dict[str, Array]:
+    """u_x, u_y, ... as vectors u of three components, (points, 3)."""
+    stems: dict[str, list[str]] = {}
+    for name in nodal:
+        stem, _, axis = name.rpartition("_")
+        if stem and axis in AXES:
+            stems.setdefault(stem, []).append(name)
+    vectors = {}
+    for stem, names in stems.items():
+        if len(names) > 1 and stem not in nodal:
+            columns = [np.nan_to_num(nodal[name]) for name in names[:3]]
+            columns += [np.zeros_like(columns[0])] * (3 - len(columns))
+            vectors[stem] = np.stack(columns, axis=1)
+    return vectors

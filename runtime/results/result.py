@@ -1,0 +1,649 @@
+"""Result of a study at one load factor: values at places, sums, fields in cells, files."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from softehl.errors import UnknownNameError
+from softehl.runtime.arrays import Array, Integers, read_only
+from softehl.runtime.definition.argument_checks import writable
+from softehl.runtime.definition.problem_definition import Block, StudyError
+from softehl.runtime.equations.eigenproblems import natural
+from softehl.runtime.equations.interpolation import (
+    at_every_node,
+    between_nodes,
+    interpolation,
+)
+from softehl.runtime.equations.mass_matrix import Masses
+from softehl.runtime.equations.stability import negative_directions
+from softehl.runtime.fem.loads import Spring, Tie
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.mesh.mesh import MeshError, place_text
+from softehl.runtime.results.output import Picture, piece_names
+from softehl.runtime.results.recovery import nodal_operator
+from softehl.runtime.sensitivity.input_parsing import By, inputs
+from softehl.runtime.sensitivity.inputs import Input, Key
+from softehl.runtime.sensitivity.jacobian import derivative, sensitivity
+from softehl.runtime.sensitivity.quantities import quantity
+from softehl.runtime.sensitivity.tape import Trail
+from softehl.runtime.solve.solution import Point, Solution, Status
+from softehl.runtime.suggestions import few, listed, meant
+
+if TYPE_CHECKING:
+    from softehl.runtime.equations.system import System
+    from softehl.runtime.mesh.mesh import Predicate
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Converged state of a study: values at places, fields, reactions, derivatives, files.
+
+    Attributes
+    ----------
+    system : System
+        Equations of the study.
+    problem : Problem
+        The equations at this load factor or time.
+    point : Point
+        Load factor or time, unknowns, and record of Newton's method.
+    histories : mapping of str to array
+        Block -> history of the elements of this process.
+    trail : optional
+        The step with the previous ones, from which derivatives are computed.
+
+    Notes
+    -----
+    Under mpirun all processes call every method and get the same values; of a distributed mesh,
+    values at nodes and cells are those of the own part.
+    """
+
+    system: System
+    problem: Problem
+    point: Point
+    histories: Mapping[str, Array] = field(default_factory=dict)
+    trail: Trail | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        """Histories that cannot be written to."""
+        histories = {name: read_only(values) for name, values in self.histories.items()}
+        object.__setattr__(self, "histories", histories)
+
+    def __repr__(self) -> str:
+        """Summary in one line."""
+        whole = self._whole
+        return (
+            f"<{type(self).__name__} at t = {self.t:.6g}: {whole.size} unknowns "
+            f"({few(whole.numbering.layout.names)}); blocks: {few(whole.blocks)}>"
+        )
+
+    def __copy__(self) -> Self:
+        """Itself, as nothing of it changes."""
+        return self
+
+    def __deepcopy__(self, memo: object) -> Self:
+        """Itself, as nothing of it changes."""
+        return self
+
+    @property
+    def t(self) -> float:
+        """Load factor, or time [s]."""
+        return self.point.parameter
+
+    @cached_property
+    def x(self) -> Array:
+        """All unknowns, (n,)."""
+        return read_only(self.system.share.whole(self.point.solution.x))
+
+    @property
+    def state(self) -> dict[str, Array]:
+        """History of the quadrature points, block -> (cells, points, k)."""
+        return self.system.share.whole_state(self.histories)
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations of the last step."""
+        return self.point.solution.iterations
+
+    @property
+    def residual_norms(self) -> tuple[float, ...]:
+        """Norms of the residuals of these iterations."""
+        return self.point.solution.residual_norms
+
+    def norm(self) -> float:
+        """Return the 2-norm of all unknowns.
+
+        Returns
+        -------
+        float
+            The norm.
+        """
+        return self.system.share.norm(self.x)
+
+    def values(self, name: str) -> Array:
+        """Return the values of an unknown.
+
+        Parameters
+        ----------
+        name : str
+            Name of the unknown.
+
+        Returns
+        -------
+        array (points,)
+            At every node, nan where there is none; of an unknown without nodes all of its values.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such unknown; a KeyError.
+        """
+        numbers = self._whole.numbering.nodal.get(name)
+        if numbers is None:
+            layout = self._whole.numbering.layout
+            if name not in layout.names:
+                known = f"{meant(name, layout.names)}; there are {listed(layout.names)}"
+                raise UnknownNameError(f"no unknown {name!r}{self._field_called(name) or known}")
+            return self.x[layout.part(name)]
+        return np.where(numbers >= 0, self.x[numbers], np.nan)
+
+    def _field_called(self, name: str) -> str:
+        """A hint at the block whose field a name is, for messages."""
+        for label, block in self._whole.blocks.items():
+            if name in (*block.kernel.fields, *block.kernel.internal):
+                return (
+                    f", but a field: fields({label!r})[{name!r}] has it at the points, "
+                    f"at_nodes({label!r})[{name!r}] at the nodes"
+                )
+        return ""
+
+    def gathered(self, name: str) -> Array:
+        """Return an unknown at every node of the whole mesh, also of a distributed one.
+
+        Parameters
+        ----------
+        name : str
+            Name of an unknown at nodes.
+
+        Returns
+        -------
+        array (points,)
+            The same on all processes.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such unknown at nodes; a KeyError.
+        """
+        if name not in self._whole.numbering.nodal:
+            known = ", ".join(self._whole.numbering.nodal)
+            raise UnknownNameError(f"no unknown {name!r} at nodes; there are {known}")
+        return self.system.share.at_all_nodes(self.values(name))
+
+    def at(
+        self, place: tuple[float, ...], *, cells: str | None = None, block: str | None = None
+    ) -> dict[str, float]:
+        """Return the unknowns, or fields of a block, at a place or at places.
+
+        Parameters
+        ----------
+        place : tuple of float or array
+            Reference coordinates (dim,) [mm].
+        cells : str, optional
+            Group that contains the cell, where bodies meet that share no nodes.
+        block : str, optional
+            Block whose fields are returned in place of unknowns, interpolated between `at_nodes`;
+            nan outside the block.
+
+        Returns
+        -------
+        dict of str to float
+            Name -> value, interpolated by the shape functions of the cell.
+
+        Raises
+        ------
+        MeshError
+            The place lies outside the mesh or group.
+        """
+        (row,) = self._at_places(np.asarray(place, dtype=np.float64)[None], cells, block)
+        return row
+
+    def along(
+        self,
+        start: tuple[float, ...],
+        end: tuple[float, ...],
+        count: int = 100,
+        *,
+        cells: str | None = None,
+        block: str | None = None,
+    ) -> Any:
+        """Return the unknowns, or fields of a block, along a straight line.
+
+        Parameters
+        ----------
+        start : tuple of float
+            Reference coordinates (dim,) of the first place [mm].
+        end : tuple of float
+            Those of the last place.
+        count : int
+            Number of places, at equal distances.
+        cells : str, optional
+            As in `at`.
+        block : str, optional
+            As in `at`.
+
+        Returns
+        -------
+        dict of str to array (count,)
+            Name -> values; "s" is the distance from the start [mm].
+
+        Raises
+        ------
+        MeshError
+            A place lies outside the mesh or group.
+        """
+        a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+        shares = np.linspace(0.0, 1.0, count)
+        rows = self._at_places(a + shares[:, None] * (b - a), cells, block)
+        names = [name for name in rows[0] if all(name in row for row in rows)]
+        columns = {name: np.array([row[name] for row in rows]) for name in names}
+        return {"s": shares * float(np.linalg.norm(b - a)), **columns}
+
+    def _at_places(
+        self, places: Array, group: str | None, block: str | None
+    ) -> list[dict[str, float]]:
+        """Unknowns, or fields of a block, at each place (n, dim).  Raises MeshError for one
+        outside.
+        """
+        if block is None:
+            here = self._unknowns_at(places, group)
+        else:
+            here = between_nodes(self._whole, places, self.at_nodes(block), group)
+        rows = self.system.share.found_each(here)
+        for place, row in zip(places, rows, strict=True):
+            if row is None:
+                where = "the mesh" if group is None else f"the cells {group!r}"
+                raise MeshError(f"{place_text(place)} lies outside {where}")
+        return [row for row in rows if row is not None]
+
+    def _unknowns_at(self, places: Array, group: str | None) -> list[dict[str, float] | None]:
+        """Unknowns at each place (n, dim), None outside; a warning where bodies differ."""
+        mesh, found = self._whole.mesh, interpolation(self._whole, places, group)
+        located, values = found.located, found.values(self.x)
+        jump = found.jump(self.x)
+        if jump is not None:
+            name, pairs = jump
+            a, b = values[name][pairs]
+            point = place_text(places[located.point[pairs[0]]])
+            warnings.warn(
+                f"{name} at {point} is {a:.6g} in one cell and {b:.6g} in another, which do not "
+                f'share their nodes; the first is taken: name a group, cells="..." '
+                f"({listed(mesh.groups)})",
+                stacklevel=4,
+            )
+        here: list[dict[str, float] | None] = [None] * len(places)
+        for pair in located.first.tolist():
+            here[located.point[pair]] = {
+                n: float(values[n][pair]) for n, known in found.known.items() if known[pair]
+            }
+        return here
+
+    def fields(self, block: str) -> dict[str, Array]:
+        """Return the fields of a block at its quadrature points.
+
+        Parameters
+        ----------
+        block : str
+            Name of the block.
+
+        Returns
+        -------
+        dict of str to array (cells, points)
+            Field of the page (`m.fields(...)`) -> values; empty if the page declares none.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such block; a KeyError.
+        """
+        self._block(block)
+        share = self.system.share
+        return {n: share.whole_cells(block, v) for n, v in self._own_fields(block).items()}
+
+    def _block(self, name: str) -> Block:
+        """The block of a name, of all processes.  Raises KeyError that names what there is."""
+        blocks = self._whole.blocks
+        if name not in blocks:
+            known = listed(blocks)
+            raise UnknownNameError(f"no block {name!r}{meant(name, blocks)}; there are {known}")
+        return blocks[name]
+
+    def _own_fields(self, block: str) -> dict[str, Array]:
+        """Fields at the points of this process's elements."""
+        found = self.problem.fields(block, self.point.solution.x)
+        new = [f"new_{name}" for name in self.system.blocks[block].kernel.history]
+        return {name: values for name, values in found.items() if name not in new}
+
+    def at_nodes(self, block: str, *, recovery: str = "projection") -> dict[str, Array]:
+        """Return the fields of a block at the nodes.
+
+        Parameters
+        ----------
+        block : str
+            Name of the block.
+        recovery : str
+            "projection" fits a polynomial to the quadrature points of each cell by least squares,
+            of a degree one below the shape functions and at least 1; "mean" takes the mean of the
+            points. A node has the mean of the cells of the block around it.
+
+        Returns
+        -------
+        dict of str to array (points,)
+            Field -> values; nan outside the block.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such block; a KeyError.
+        StudyError
+            There is no such recovery.
+        """
+        self._block(block)
+        nodes, operator = nodal_operator(self.system.blocks[block], recovery)
+        points, piece = len(self.system.mesh.points), self.system.mesh.piece
+
+        def sums(weights: Array) -> Array:
+            here = np.bincount(nodes.ravel(), weights.ravel(), points).astype(np.float64)
+            return self.system.share.total(here) if piece is None else piece.added(here)
+
+        count = sums(np.ones(nodes.shape))
+        return {
+            name: np.where(count > 0, sums(values @ operator.T) / np.maximum(count, 1), np.nan)
+            for name, values in self._own_fields(block).items()
+        }
+
+    @cached_property
+    def _forces(self) -> Array:
+        """Forces of supports, ties and springs, (n,): internal less external forces.
+
+        They are zero to rounding where there are none.
+        """
+        x, assembler = self.point.solution.x, self.problem.assembler
+        holding = [b.name for b in assembler.blocks if isinstance(b.kernel, Spring | Tie)]
+        others = {n: v for n, v in self.problem.parameters.items() if n not in holding}
+        own = assembler.residual(x, others)
+        return self.system.share.whole_forces(own)
+
+    @property
+    def _whole(self) -> System:
+        return self.system.everywhere
+
+    def reaction(self, where: str | Predicate) -> dict[str, float]:
+        """Return the sums of the forces of supports, ties and springs at the nodes of a side.
+
+        Parameters
+        ----------
+        where : str or callable
+            Side, group, or predicate of coordinates.
+
+        Returns
+        -------
+        dict of str to float
+            Unknown -> force [N].
+
+        Raises
+        ------
+        MeshError
+            There is no such side.
+        """
+        nodes = self.system.mesh.nodes(where)
+        found = {}
+        for name, numbers in self._whole.numbering.nodal.items():
+            there = numbers[nodes]
+            found[name] = self.system.share.summed(self._forces, there[there >= 0])
+        return found
+
+    @cached_property
+    def unstable(self) -> int | None:
+        """Number of independent directions in which the energy decreases; 0 of a stable state.
+
+        None if there is no such number: the tangent is unsymmetric or singular.
+        """
+        return negative_directions(self.problem, self.point.solution.x)
+
+    def modes(self, count: int = 6, *, mass: Masses | None = None) -> Modes:
+        """Return natural modes about this state, with its prestress, the lowest first.
+
+        Parameters
+        ----------
+        count : int
+            Number of modes.
+        mass : mapping, optional
+            Block -> {"rho": density}, {"body": {"rho": 1e-9}}: mass per reference volume, in 2-D
+            per area, a number or a function of coordinates (n, dim). It is that of u_x, u_y, u_z,
+            or of the unknowns that "of" names. Pages with accelerations (`Model.rates(order=2)`)
+            have their own.
+
+        Returns
+        -------
+        Modes
+            Frequencies and shapes. Supports and ties hold; unknowns without mass follow statically.
+
+        Raises
+        ------
+        StudyError
+            There is no mass, or the tangent is unsymmetric.
+        """
+        x = self.point.solution.x
+        squares, found = natural(self.system, self.problem, x, count, mass)
+        return Modes(read_only(squares), tuple(Shape.of(self, mode) for mode in found))
+
+    def sensitivity(
+        self,
+        what: str | Callable[[Array], tuple[float, Array]],
+        *,
+        by: By,
+        at: tuple[float, ...] | None = None,
+        reaction: str | None = None,
+    ) -> dict[Key, float | Array]:
+        """Return the derivatives of a quantity with respect to inputs.
+
+        Parameters
+        ----------
+        what : str or callable
+            An unknown at the place `at`, or its `reaction` at a side; or a function of all unknowns
+            (n,) that returns its value and its gradient (n,).
+        by : mapping of str to sequence of str
+            The inputs: block -> parameters and data; "load:right" -> unknowns; "pressure:right" ->
+            ["pressure"]; "spring:foot", "tie:left" and "fix:left" -> unknowns; "nodes" or
+            "nodes:SIDE" -> axes, or modes {name: (points, dim)}.
+        at : tuple of float, optional
+            Reference coordinates (dim,).
+        reaction : str, optional
+            Name of a side.
+
+        Returns
+        -------
+        dict of tuple to float or array
+            {("rubber", "mu"): number, ...}. Data have a number for each element, axes one for each
+            node. An input that is a function is differentiated with respect to a factor of it.
+
+        Raises
+        ------
+        StudyError
+            The study has no such input, or the result no derivatives.
+        MeshError
+            The place lies outside the mesh.
+
+        Notes
+        -----
+        The adjoint method, through all steps of a path with history. Load and time steps are held.
+        """
+        trail, given = self._differentiated(by)
+        return sensitivity(trail, quantity(what, at, reaction), given)
+
+    def derivative(self, *, by: By) -> Array:
+        """Return the derivatives of all unknowns with respect to inputs.
+
+        Parameters
+        ----------
+        by : mapping of str to sequence of str
+            The inputs, as in `sensitivity`.
+
+        Returns
+        -------
+        array (n, k)
+            Columns in the order of `by`.
+
+        Raises
+        ------
+        StudyError
+            As of `sensitivity`.
+        """
+        return derivative(*self._differentiated(by))
+
+    def _differentiated(self, by: By) -> tuple[Trail, list[Input]]:
+        statement = self.system.everywhere.statement
+        if self.trail is None or statement is None:
+            raise StudyError(
+                "this result has no derivatives: results of solve, follow and march by euler "
+                "or bdf2 have them"
+            )
+        self.trail.chain()
+        return self.trail, inputs(statement, by)
+
+    def deformed(self, names: tuple[str, ...]) -> Array:
+        """Return the nodes' coordinates in the deformed state.
+
+        Parameters
+        ----------
+        names : tuple of str
+            Displacements along x, y, z.
+
+        Returns
+        -------
+        array (points, dim)
+            Reference coordinates plus displacements [mm].
+        """
+        moved = np.stack([np.nan_to_num(self.values(name)) for name in names], axis=1)
+        return np.asarray(self.system.mesh.points + moved)
+
+    def write(self, path: str | Path) -> None:
+        """Write the mesh with unknowns and fields to a file for ParaView.
+
+        Parameters
+        ----------
+        path : str or Path
+            "NAME.vtu": one file. "NAME.pvtu": one file for each process beside it, the only format
+            of a distributed mesh. The folder is made.
+
+        Raises
+        ------
+        StudyError
+            The file has another ending, or cannot be written.
+
+        Notes
+        -----
+        Fields are named BLOCK.FIELD, at nodes as by `at_nodes` and in cells as means. Unknowns u_x,
+        u_y, u_z are also written as a vector u. The file is complete at any moment.
+        """
+        words, target, share = f"write({str(path)!r})", Path(path), self.system.share
+        if target.suffix not in (".vtu", ".pvtu"):
+            raise StudyError(f"{words}: results are written as .vtu or .pvtu")
+        if target.suffix == ".vtu" and self.system.mesh.piece is not None:
+            raise StudyError(f"{words}: of a mesh in parts results are .pvtu")
+        writable(words, target)
+        if target.suffix == ".pvtu":
+            pieces = piece_names(target, share.pieces[1])
+            piece = self._picture(self.system, self._own_cells(), self.point.solution.x).compact()
+            piece.write(target.with_name(pieces[share.pieces[0]]))
+            share.together()
+            if share.first:
+                piece.write_index(target, pieces)
+        else:
+            picture = self._picture(self._whole, self.system.mesh.cells, self.x)
+            if share.first:
+                picture.write(target)
+        share.together()
+
+    def _picture(self, system: System, cells: Mapping[str, Integers], x: Array) -> Picture:
+        """Of all unknowns x, or of those of this process with its own fields."""
+        nodal = at_every_node(system, x)
+        for name, block in self._whole.blocks.items():
+            if block.kernel.fields and CELLS[block.kind].dimension:
+                nodal |= {f"{name}.{label}": v for label, v in self.at_nodes(name).items()}
+        fields = self.fields if system is self._whole else self._own_fields
+        return Picture.of(system.mesh.points, cells, nodal, system.blocks, fields)
+
+    def _own_cells(self) -> dict[str, Integers]:
+        """Cells of the elements of this process; on process 0 also those that have no elements."""
+        mesh, whole = self.system.mesh, self._whole.blocks.values()
+        if mesh.piece is not None:
+            return dict(mesh.cells)
+        found = {}
+        for kind, cells in mesh.cells.items():
+            own = [b.nodes for b in self.system.blocks.values() if b.kind == kind]
+            if self.system.share.first:
+                there = {tuple(row) for b in whole if b.kind == kind for row in b.nodes.tolist()}
+                own.append(cells[[tuple(row) not in there for row in cells.tolist()]])
+            found[kind] = np.unique(np.concatenate([cells[:0], *own]), axis=0)
+        return found
+
+
+class Shape(Result):
+    """Mode about a state: a Result whose unknowns are the mode; it has no fields."""
+
+    @classmethod
+    def of(cls, state: Result, mode: Array) -> Shape:
+        """A mode (n,) about a state."""
+        solution = Solution(mode, Status.CONVERGED, "", (), 0, 0)
+        return cls(state.system, state.problem, replace(state.point, solution=solution))
+
+    def fields(self, block: str) -> dict[str, Array]:
+        """None."""
+        return {}
+
+    def _own_fields(self, block: str) -> dict[str, Array]:
+        return {}
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Natural modes about a state, the lowest first; a sequence of their shapes.
+
+    Attributes
+    ----------
+    squares : array (k,)
+        Squares of the angular frequencies [1/s^2]; negative in unstable directions.
+    shapes : tuple of Shape
+        A Result for each, whose unknowns are the mode, of unit modal mass.
+    """
+
+    squares: Array
+    shapes: tuple[Shape, ...]
+
+    def __repr__(self) -> str:
+        """Summary in one line."""
+        return f"<Modes: frequencies {few(f'{f:.6g}' for f in self.frequencies)}>"
+
+    @property
+    def frequencies(self) -> Array:
+        """Frequencies (k,) [1/s]; nan in unstable directions."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.sqrt(self.squares) / (2.0 * np.pi))
+
+    def __len__(self) -> int:
+        return len(self.shapes)
+
+    def __getitem__(self, number: int) -> Result:
+        return self.shapes[number]
+
+    def __iter__(self) -> Iterator[Result]:
+        return iter(self.shapes)

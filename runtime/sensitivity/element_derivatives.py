@@ -1,0 +1,135 @@
+"""Rates of residuals and of history, element by element, along variations of their arguments.
+
+Pages have kernels for it. Loads are known in closed form by their amount; by the places of their
+nodes a central difference of order 6 is taken, of which rounding is left: 1e-12 or so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.fem.assembly import ElementBlock
+from softehl.runtime.fem.loads import Spring, Tie
+from softehl.runtime.kernels import Kernel
+from softehl.runtime.sensitivity.tape import Trail
+
+_WIDE = 1e-3
+"""Of the size of an element: step of a difference of order 6, whose own error is then 1e-18."""
+_WEIGHTS = ((1, 45.0), (2, -9.0), (3, 1.0))
+
+
+class Elements:
+    """The elements of a block in a converged step.
+
+    width: of rows, the arguments that may move: coordinates, data and parameters of a page,
+    coordinates and amount of a load.
+    """
+
+    def __init__(self, trail: Trail, name: str) -> None:
+        self.block: ElementBlock = trail.problem.assembler.block(name)
+        self.parameters: Array = trail.problem.parameters[name]
+        self.dofs = np.ascontiguousarray(trail.x[self.block.dofs])
+        self.page = trail.system.blocks.get(name)
+        self.coordinates = np.shape(self.block.coordinates)[1]
+        self.n = len(self.dofs)
+        self._dimension = trail.system.mesh.dimension
+        if self.page is None:
+            self.width = self.coordinates + 1
+        else:
+            known = self.page.kernel
+            self.width = self.coordinates + len(known.data) + len(known.parameters)
+
+    def still(self) -> Array:
+        """Rows (n, width) of arguments that do not move."""
+        return np.zeros((self.n, self.width))
+
+    def residual(self, rows: Array, history: Array | None = None) -> Array:
+        """Rate of the residuals (n, ndof) along rows (n, width), unknowns held.
+
+        history: (n, points, k) rates of the point data.
+        """
+        if self.page is None:
+            return self._load(rows)
+        kernel = self._kernel("pseudo_load")
+        given = self._given(history)
+        return kernel.pseudo_load(self.block.coordinates, self.dofs, rows, **given)
+
+    def history(self, rows: Array, dofs: Array | None, history: Array | None = None) -> Array:
+        """Rate of the point data after the step, (n, points, k), along a variation of all.
+
+        dofs: (n, ndof) rates of the unknowns, None for none.
+        """
+        assert self.page is not None
+        kernel, moved = self._kernel("fields_rate"), np.zeros_like(self.dofs)
+        along = np.hstack([rows, moved if dofs is None else dofs])
+        given = self._given(history)
+        rates = kernel.fields_rate(self.block.coordinates, self.dofs, along, **given)
+        page = self.page.kernel
+        after = np.zeros((*rates.shape[:2], len(page.point_data)))
+        for name in page.history:
+            column = kernel.fields.index(f"new_{name}")
+            after[:, :, page.point_data.index(name)] = rates[:, :, column]
+        return after
+
+    def _given(self, history: Array | None) -> dict[str, Any]:
+        block = self.block
+        given = block.given(self.parameters)
+        if block.point_data is None:
+            return given
+        moved = np.zeros_like(block.point_data) if history is None else history
+        return {**given, "point_data": np.concatenate([block.point_data, moved], axis=2)}
+
+    def _kernel(self, task: str) -> Kernel:
+        """The kernel of derivatives.  Raises StudyError where there is none."""
+        page = self.page
+        assert page is not None
+        if page.differentiated is not None:
+            return page.differentiated()
+        if task not in page.kernel.tasks or page.kernel.point_data:
+            raise StudyError(
+                f"{page.name!r}: {page.kernel.name} comes as C without derivatives: give its page "
+                "instead, or m.offer(pseudo_load=True) where it has no history"
+            )
+        return page.kernel
+
+    def _load(self, rows: Array) -> Array:
+        kernel, width = self.block.kernel, self.coordinates
+        rate = np.zeros_like(self.dofs)
+        amounts = rows[:, width]
+        if amounts.any():
+            name = _amount(kernel)
+            value = getattr(kernel, name)
+            one = replace(kernel, **{name: value if callable(value) else 1.0})  # type: ignore[type-var]
+            none = replace(kernel, **{name: 0.0})  # type: ignore[type-var]
+            rate += amounts[:, None] * (self._at(one, 0.0) - self._at(none, 0.0))
+        places = rows[:, :width]
+        if places.any():
+            step = _WIDE * self._size() / float(np.abs(places).max())
+            for k, weight in _WEIGHTS:
+                ahead = self._at(kernel, k * step * places)
+                rate += weight / (60.0 * step) * (ahead - self._at(kernel, -k * step * places))
+        return rate
+
+    def _at(self, kernel: Any, moved: Array | float) -> Array:
+        found = kernel.residual(
+            self.block.coordinates + moved, self.dofs, parameters=self.parameters
+        )
+        return np.asarray(found)
+
+    def _size(self) -> float:
+        """Of the smallest element, or of all of them where they are points."""
+        whole = np.abs(self.block.coordinates).max(initial=0.0)
+        nodes = self.block.coordinates.reshape(self.n, -1, self._dimension)
+        extents = np.ptp(nodes, axis=1).max(axis=1)
+        return float(extents.min(where=extents > 0.0, initial=whole or 1.0))
+
+
+def _amount(kernel: object) -> str:
+    if isinstance(kernel, Spring):
+        return "stiffness"
+    return "offset" if isinstance(kernel, Tie) else "value"

@@ -1,0 +1,301 @@
+"""Inputs by which results are differentiated: each knows the arguments that move with it.
+
+The value of an input may be read, and put into a statement. A function is differentiated by a
+factor of it, which is 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.definition.problem_definition import (
+    Block,
+    Condition,
+    Force,
+    Statement,
+    StudyError,
+)
+from softehl.runtime.fem.loads import NodalForce, Spring, Tie, amount
+from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.sensitivity.input_seeds import Column, Held, Moves
+from softehl.runtime.sensitivity.tape import Trail
+
+Key: TypeAlias = tuple[str, str]
+"""Block, load or support, and a name of it: ("rubber", "mu"), ("load:right", "u_y")."""
+
+_WIDE = 1e-3  # of the size of the mesh: step of a difference of order 6 of functions of places
+
+
+class Input(Protocol):
+    """Something that a study is given: a number or an array."""
+
+    @property
+    def key(self) -> Key:
+        """The names by which it was asked for."""
+        ...
+
+    @property
+    def value(self) -> Array:
+        """Its components, (k,)."""
+        ...
+
+    @property
+    def scalar(self) -> bool:
+        """True if it is one number."""
+        ...
+
+    def moves(self, trail: Trail) -> Moves:
+        """Arguments of elements and prescribed values that move with it in a step."""
+        ...
+
+    def put(self, statement: Statement, value: Array) -> None:
+        """Change a statement."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class PageParameter:
+    """A parameter of a page, on one kind of cells or several."""
+
+    key: Key
+    blocks: Sequence[Block]
+    scalar: bool = True
+
+    @property
+    def value(self) -> Array:
+        """See `Input`."""
+        return np.array([_number(self.blocks[0].parameters[self.key[1]])])
+
+    def moves(self, trail: Trail) -> Moves:
+        """See `Input`."""
+        columns, name = [], self.key[1]
+        for block in self.blocks:
+            n, kernel, given = len(block.nodes), block.kernel, block.parameters[self.key[1]]
+            rate = given(trail.step.t) if callable(given) else 1.0
+            width = kernel.nodes * len(kernel.coordinates) + len(kernel.data)
+            place = width + kernel.parameters.index(name)
+            columns.append(Column(block.name, place, _one(n), np.full(n, float(rate))))
+        return Moves(columns)
+
+    def put(self, statement: Statement, value: Array) -> None:
+        """See `Input`."""
+        for block in self.blocks:
+            given = _changed(block.parameters[self.key[1]], float(value[0]))
+            parameters = {**statement.blocks[block.name].parameters, self.key[1]: given}
+            changed = replace(statement.blocks[block.name], parameters=parameters)
+            statement.blocks[block.name] = changed
+
+
+@dataclass(frozen=True, eq=False)
+class PageDatum:
+    """Data of the elements of a page, one number an element."""
+
+    key: Key
+    blocks: Sequence[Block]
+    scalar: bool = False
+
+    @property
+    def value(self) -> Array:
+        """See `Input`."""
+        return np.concatenate([block.data[self.key[1]] for block in self.blocks])
+
+    def moves(self, trail: Trail) -> Moves:
+        """See `Input`."""
+        columns, start = [], 0
+        for block in self.blocks:
+            n, kernel = len(block.nodes), block.kernel
+            place = kernel.nodes * len(kernel.coordinates) + kernel.data.index(self.key[1])
+            columns.append(Column(block.name, place, start + np.arange(n), np.ones(n)))
+            start += n
+        return Moves(columns)
+
+    def put(self, statement: Statement, value: Array) -> None:
+        """See `Input`."""
+        start = 0
+        for block in self.blocks:
+            n, known = len(block.nodes), statement.blocks[block.name]
+            data = {**known.data, self.key[1]: np.asarray(value[start : start + n]).copy()}
+            statement.blocks[block.name] = replace(known, data=data)
+            start += n
+
+
+@dataclass(frozen=True, eq=False)
+class Amounts:
+    """The amount of a load, a pressure, a spring or the offset of a tie."""
+
+    key: Key
+    numbers: Sequence[int]
+    forces: Sequence[Force]
+    scalar: bool = True
+
+    @property
+    def value(self) -> Array:
+        """See `Input`."""
+        kernel = self.forces[0].kernel
+        return np.array([_number(getattr(kernel, _amount(self.forces[0])))])
+
+    def moves(self, trail: Trail) -> Moves:
+        """See `Input`."""
+        there = {b.name: b for b in trail.problem.assembler.blocks}
+        blocks = [there[f.label] for f in self.forces if f.label in there]
+        columns = []
+        for block in blocks:
+            n, width = len(block.dofs), np.shape(block.coordinates)[1]
+            columns.append(Column(block.name, width, _one(n), np.ones(n)))
+        return Moves(columns)
+
+    def put(self, statement: Statement, value: Array) -> None:
+        """See `Input`."""
+        for number in self.numbers:
+            force = statement.forces[number]
+            name = _amount(force)
+            given = {name: _changed(getattr(force.kernel, name), float(value[0]))}
+            kernel: Any = replace(force.kernel, **given)  # type: ignore[arg-type]
+            statement.forces[number] = replace(force, kernel=kernel)
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """A prescribed value."""
+
+    key: Key
+    numbers: Sequence[int]
+    conditions: Sequence[Condition]
+    scalar: bool = True
+
+    @property
+    def value(self) -> Array:
+        """See `Input`."""
+        return np.array([_number(self.conditions[0].value)])
+
+    def moves(self, trail: Trail) -> Moves:
+        """See `Input`."""
+        held, system, step = [], trail.system, trail.step
+        for c in self.conditions:
+            given = c.value if callable(c.value) else 1.0
+            rates = amount(given, system.mesh.points[c.nodes], step.t, step.factor)
+            numbers = system.numbering.nodal[c.name][c.nodes]
+            there = numbers >= 0
+            held.append(Held(numbers[there], _one(int(there.sum())), rates[there]))
+        return Moves(held=held)
+
+    def put(self, statement: Statement, value: Array) -> None:
+        """See `Input`."""
+        for number in self.numbers:
+            condition = statement.conditions[number]
+            given: Any = _changed(condition.value, float(value[0]))
+            statement.conditions[number] = replace(condition, value=given)
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Places of nodes: along an axis, each for itself, or all together along a mode.
+
+    weights: (points, dim, k) how the places move with each component. base: its components now.
+    Data and starts stay with their elements and nodes.
+    """
+
+    key: Key
+    mesh: Mesh
+    targets: Integers
+    directions: Array
+    base: Array
+    scalar: bool = False
+
+    @property
+    def value(self) -> Array:
+        """See `Input`."""
+        return self.base.copy()
+
+    def moves(self, trail: Trail) -> Moves:
+        """See `Input`."""
+        columns: list[Column] = []
+        for block in trail.system.blocks.values():
+            if block.kernel.coordinates:
+                columns += self._of_nodes(block.name, block.nodes)
+        there = {b.name: b for b in trail.problem.assembler.blocks}
+        statement = trail.system.statement
+        assert statement is not None
+        known = {*trail.system.blocks, *(f.label for f in statement.forces)}
+        for name in there:
+            if name not in known:
+                raise StudyError(f"by: places of nodes are not followed through {name!r}")
+        for force in statement.forces:
+            if isinstance(force.kernel, Tie) and callable(force.kernel.offset):
+                raise StudyError(f"{force.label}: an offset that depends on places is not followed")
+            if force.label in there and not isinstance(force.kernel, Spring | Tie):
+                still = isinstance(force.kernel, NodalForce) and not callable(force.kernel.value)
+                columns += [] if still else self._of_nodes(force.label, force.nodes)
+        return Moves(columns, [*self._held(trail)])
+
+    def put(self, statement: Statement, value: Array) -> None:
+        """See `Input`."""
+        points, there = statement.mesh.points.astype(np.float64), self.targets >= 0
+        moved = (value - self.base)[self.targets[there]]
+        points[there] += moved[:, None] * self.directions[there]
+        statement.mesh = replace(statement.mesh, points=points)
+
+    def _of_nodes(self, name: str, nodes: Integers) -> Iterator[Column]:
+        for k in range(nodes.shape[1]):
+            for axis in range(self.mesh.dimension):
+                factor = self.directions[nodes[:, k], axis]
+                if factor.any():
+                    place = k * self.mesh.dimension + axis
+                    yield Column(name, place, self.targets[nodes[:, k]], factor)
+
+    def _held(self, trail: Trail) -> Iterator[Held]:
+        """Functions of places that prescribe values."""
+        step, wide = trail.step, _WIDE * float(np.ptp(self.mesh.points, axis=0).max())
+        for c in trail.system.conditions:
+            if not callable(c.value):
+                continue
+            numbers = trail.system.numbering.nodal[c.name][c.nodes]
+            there = numbers >= 0
+            nodes = c.nodes[there]
+            places, along = self.mesh.points[nodes], wide * self.directions[nodes]
+            rates = np.zeros(len(nodes))
+            for k, weight in ((1, 45.0), (2, -9.0), (3, 1.0)):
+                ahead, behind = (
+                    amount(c.value, places + s * k * along, step.t, step.factor) for s in (1, -1)
+                )
+                rates += weight / (60.0 * wide) * (ahead - behind)
+            yield Held(numbers[there], self.targets[nodes], rates)
+
+
+def varied(statement: Statement, changes: Sequence[tuple[Input, Array]]) -> Statement:
+    """A copy of a statement with other values of inputs."""
+    changed = statement.copied()
+    for item, value in changes:
+        item.put(changed, value)
+    return changed
+
+
+def _one(n: int) -> Integers:
+    return np.zeros(n, dtype=np.int64)
+
+
+def _number(given: Any) -> float:
+    """A number itself, 1 for a function."""
+    return 1.0 if callable(given) else float(given)
+
+
+def _changed(given: Any, value: float) -> float | Callable[..., Any]:
+    """Another number, or a multiple of a function."""
+    if not callable(given):
+        return value
+
+    def multiple(*arguments: Any) -> Any:
+        return value * np.asarray(given(*arguments))
+
+    return multiple
+
+
+def _amount(force: Force) -> str:
+    if isinstance(force.kernel, Spring):
+        return "stiffness"
+    return "offset" if isinstance(force.kernel, Tie) else "value"

@@ -1,0 +1,117 @@
+"""A converged step of a path with the steps that led to it; derivatives are taken of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.equations.system import Step, System
+from softehl.runtime.fem.problem import Problem
+from softehl.runtime.solve.held import Remembering
+from softehl.runtime.solve.linear import LinearSolver
+
+
+@runtime_checkable
+class WithoutMatrix(Protocol):
+    """Equations in this process whose tangent is known by its products."""
+
+    @property
+    def equations(self) -> Problem:
+        """With a matrix."""
+        ...
+
+    def linearise(self, x: Array) -> tuple[Array, Any]:
+        """The residual and the tangent at x, (n,)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Trail:
+    """A converged step: its equations, its unknowns x (n,), and the step before it.
+
+    before: None at the beginning, and where the path was not recorded. kept: the linear solver of
+    the path with the factors of its latest step, None if it was not recorded. linear: the solver of
+    the path if it iterates. memo: factors that may be needed again. kept and memo save time only.
+    """
+
+    system: System
+    step: Step
+    posed: Any
+    x: Array
+    before: Trail | None = None
+    kept: Remembering | None = None
+    linear: LinearSolver | None = None
+    memo: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        """Summary in one line."""
+        return f"<Trail at t = {self.step.t:.6g}: {self.system!r}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For `copy` and `pickle`: this step alone, without what only saves time."""
+        return {**vars(self), "before": None, "kept": None, "linear": None, "memo": {}}
+
+    @property
+    def problem(self) -> Problem:
+        """Its equations, with a matrix."""
+        posed = self.posed.equations if isinstance(self.posed, WithoutMatrix) else self.posed
+        assert isinstance(posed, Problem)
+        return posed
+
+    def chain(self) -> list[Trail]:
+        """The steps on which the unknowns depend, first to last.
+
+        One alone where nothing remembers the step before. Raises StudyError where a step is missing
+        or the study was changed.
+        """
+        system = self.system
+        if not isinstance(self.posed, Problem | WithoutMatrix):
+            raise StudyError(
+                'derivatives need engine="serial": this result is of several processes'
+            )
+        if system.statement is None or system.statement.count != system.written:
+            raise StudyError("the study was changed after this result: solve it again")
+        rubbing = any(contact.friction for contact in system.statement.contacts)
+        if rubbing and not np.array_equal(self.step.old, system.at_rest()):
+            raise StudyError(
+                "friction between bodies is not followed through several steps: derivatives need "
+                "solve(steps=1) from rest, or contacts without friction"
+            )
+        if not remembers(system):
+            return [self]
+        steps: list[Trail] = []
+        step: Trail | None = self
+        while step is not None:
+            steps.append(step)
+            step = step.before
+        if not _at_rest(steps[-1]):
+            raise StudyError(
+                "the result depends on the steps before it, which were not recorded: give "
+                "record=True to solve or march, and to what it began with; copies and pickles of "
+                "results are without them"
+            )
+        return steps[::-1]
+
+
+def remembers(system: System) -> bool:
+    """True if a step depends on the steps before it."""
+    blocks = system.blocks.values()
+    return any(b.previous or b.rates or b.initial is not None for b in blocks)
+
+
+def continued(system: System, start: Trail | None) -> Trail | None:
+    """The path that goes on from a start: None where that is of another study."""
+    if start is None or start.system.statement is not system.statement:
+        return None
+    return start if start.system.written == system.written else None
+
+
+def _at_rest(first: Trail) -> bool:
+    """True if a step begins with the values that the study says of the start."""
+    rest = first.system.histories()
+    same = [np.array_equal(first.step.histories[name], values) for name, values in rest.items()]
+    return all(same) and np.array_equal(first.step.old, first.system.at_rest())

@@ -1,1 +1,0 @@
-"""Statement of a study: pages on elements, supports, loads, values at the start."""
