@@ -5,11 +5,12 @@ is no working C compiler the wheel is built without it, for all platforms.  An e
 compiles nothing: its kernels are tuned at their first use.
 """
 
-import atexit
 import platform
 import shutil
+import signal
 import sys
 import tempfile
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -23,13 +24,24 @@ sys.path.insert(0, str(HERE / "src"))
 from softehl.codegen.tools import build  # noqa: E402
 
 COMPILED = (build.LIBRARY, build.DIGEST)
+SCRATCH = tempfile.TemporaryDirectory(prefix="softehl-build-")
+
+
+def packages() -> list[str]:
+    """All packages, by the folders that package-dir of pyproject.toml names."""
+    project = tomllib.loads((HERE / "pyproject.toml").read_text(encoding="utf-8"))
+    found = ["softehl"]
+    for name, folder in project["tool"]["setuptools"]["package-dir"].items():
+        if name:
+            inside = setuptools.find_packages(str(HERE / folder))
+            found += [name, *(f"{name}.{package}" for package in inside)]
+    return found
 
 
 @cache
 def plain_library() -> Path | None:
     """A temporary folder with the plain library; None where there is no working compiler."""
-    folder = Path(tempfile.mkdtemp(prefix="softehl-build-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    folder = Path(SCRATCH.name)
     for source in build.GENERATED.glob("*.[ch]"):
         shutil.copy(source, folder)
     try:
@@ -81,4 +93,10 @@ class Wheel(bdist_wheel):
         return "py3", "none", tag[2].replace("universal2", platform.machine())
 
 
-setuptools.setup(distclass=Distribution, cmdclass={"build_py": BuildPackage, "bdist_wheel": Wheel})
+signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # ends by way of the `with`
+with SCRATCH:
+    setuptools.setup(
+        packages=packages(),
+        distclass=Distribution,
+        cmdclass={"build_py": BuildPackage, "bdist_wheel": Wheel},
+    )

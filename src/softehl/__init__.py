@@ -47,6 +47,9 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 
+if not (Path(__file__).parent / "runtime").is_dir():
+    __path__.append(str(Path(__file__).resolve().parents[2]))  # a checkout without symbolic links
+
 _PUBLIC = {
     "Arclength": "softehl.runtime.solve.arclength",
     "Assembler": "softehl.runtime.fem.assembly",

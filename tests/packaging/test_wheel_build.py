@@ -12,24 +12,33 @@ import pytest
 from softehl.codegen.tools import build
 
 ROOT = Path(__file__).parents[2]
-FOLDER = """
-import runpy, setuptools
-setuptools.setup = lambda **given: None
-print(runpy.run_path("setup.py")["plain_library"]())
+BUILD = """
+import os, runpy, setuptools, signal
+def setup(distclass, **given):
+    distribution = distclass()
+    distribution.commands = ["bdist_wheel"]
+    print(distribution.has_ext_modules(), flush=True)
+    {end}
+setuptools.setup = setup
+runpy.run_path("setup.py")
 """
 
 
-def test_a_build_leaves_no_temporary_folder(tmp_path: Path) -> None:
-    """Also one without a compiler, which says so."""
+@pytest.mark.parametrize(
+    ("end", "code"),
+    [("pass", 0), ("1 / 0", 1), ("os.kill(os.getpid(), signal.SIGTERM)", 143)],
+)
+def test_a_build_leaves_no_temporary_folder(tmp_path: Path, end: str, code: int) -> None:
+    """A build without a compiler, which says so; one that fails, and one that is ended."""
     done = subprocess.run(
-        [sys.executable, "-c", FOLDER],
+        [sys.executable, "-c", BUILD.format(end=end)],
         cwd=ROOT,
         env={**os.environ, "CC": "no-such-compiler", "TMPDIR": str(tmp_path)},
         capture_output=True,
         text=True,
-        check=True,
+        check=False,
     )
-    assert done.stdout.strip() == "None"
+    assert (done.returncode, done.stdout.strip()) == (code, "False")
     assert "THE WHEEL IS BUILT WITHOUT A LIBRARY" in done.stderr
     assert not list(tmp_path.glob("softehl-build-*"))
 

@@ -1,6 +1,6 @@
 """Build the sdist and from it the wheel, install that elsewhere, and use it as a stranger would.
 
-    python -m tests.packaging.wheel          (what `make wheel` calls; about five minutes)
+    python -m tests.packaging.wheel          (what `make wheel` calls; five minutes, online)
 
 Everything happens in a temporary folder outside the tree.  The commands run with a compiler (some
 twice: the first use tunes the kernels) and without one on the PATH; their seconds are shown.  Exit
@@ -27,6 +27,9 @@ REPRODUCE = ("reproduce", "table1")
 RUN = ("run", "oring", "--quiet")
 GENERATE = ("generate", "my_model.py")
 KERNELS = ("kernels",)
+CARRIED = ("tests/packaging/wheel.py", "benchmarks", "docs/conf.py", "CHANGELOG.md")
+CARRIED += ("CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile")
+"""Beside the packages, of which wheels are built from the sdist here."""
 
 
 class Trial:
@@ -84,7 +87,8 @@ def main() -> int:
         source = _sdist(trial)
         wheel = _wheel(trial, source)
         _wheel_without_compiler(trial, source)
-        python = _environment(trial, wheel)
+        _check(trial, wheel)
+        python = _environment(trial, "environment", str(wheel))
         _use(trial, python, wheel)
         for message in trial.wrong:
             print(f"not as it must be: {message}", file=sys.stderr)
@@ -105,6 +109,8 @@ def _sdist(trial: Trial) -> Path:
     (archive,) = trial.place.glob("softehl-*.tar.gz")
     shutil.unpack_archive(archive, trial.place / "unpacked", filter="data")
     (source,) = (trial.place / "unpacked").iterdir()
+    for name in CARRIED:
+        trial.expect((source / name).exists(), f"the sdist has no {name}")
     return source
 
 
@@ -139,13 +145,20 @@ def _wheel_without_compiler(trial: Trial, source: Path) -> None:
     trial.expect(len(found) == 1, "without a compiler there is no wheel for all platforms")
 
 
-def _environment(trial: Trial, wheel: Path) -> Path:
-    """Folder of the commands of an environment in which the wheel alone is installed."""
-    place = trial.place / "environment"
+def _check(trial: Trial, wheel: Path) -> None:
+    """Metadata and description, as PyPI reads them."""
+    commands = _environment(trial, "checking", "twine")
+    (archive,) = trial.place.glob("softehl-*.tar.gz")
+    trial.run("twine", [str(commands / "twine"), "check", "--strict", str(archive), str(wheel)])
+
+
+def _environment(trial: Trial, name: str, package: str) -> Path:
+    """Folder of the commands of an environment in which a package alone is installed."""
+    place = trial.place / name
     venv.create(place, with_pip=True)
     commands = place / "bin"
     pip = [str(commands / "python"), "-m", "pip", "--disable-pip-version-check", "--quiet"]
-    trial.run("install", [*pip, "install", str(wheel)])
+    trial.run("install", [*pip, "install", package])
     return commands
 
 
