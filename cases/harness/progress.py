@@ -18,6 +18,7 @@ from rich.progress import (
 )
 
 from softehl.cases.harness.row import Row
+from softehl.log import LOG
 
 _LINES = 10.0  # seconds between lines where there is no terminal
 
@@ -45,6 +46,7 @@ class Display:
 
     def stage(self, worker: str, title: str) -> None:
         """A stage begins in a worker."""
+        LOG.info(title)
         for line in self._foreword:
             self.say(line)
         self._foreword.clear()
@@ -54,6 +56,7 @@ class Display:
 
     def step(self, worker: str, text: str, fraction: float | None) -> None:
         """A step converged; fraction: share of the stage done in [0, 1], if known."""
+        LOG.info(text)
 
     def state(self, row: Row) -> None:
         """A row was saved."""
@@ -115,6 +118,7 @@ class Bars(Display):
 
     def step(self, worker: str, text: str, fraction: float | None) -> None:
         """See :class:`Display`."""
+        super().step(worker, text, fraction)
         if worker not in self._tasks:
             return
         self._counts[worker] += 1

@@ -12,11 +12,11 @@ import shutil
 import stat
 import sys
 import tempfile
-import warnings
 from functools import cache
 from pathlib import Path
 
 from softehl.errors import SoftehlError
+from softehl.log import warn
 
 _REMEDY = "set SOFTEHL_CACHE to a folder of yours that can be written"
 
@@ -85,7 +85,7 @@ def _fallback(reason: str) -> Path:
     """One folder for the life of the process."""
     instead = tempfile.mkdtemp(prefix="softehl-")
     atexit.register(shutil.rmtree, instead, ignore_errors=True)
-    warnings.warn(
+    warn(
         f"{reason}; until then kernels are built in a temporary folder and lost when this process "
         "ends",
         RuntimeWarning,

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from softehl.log import warn
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.equations.system import System
@@ -97,7 +97,7 @@ class Detector:
         if before.unstable is None or after.unstable is None:
             if not self.blind:
                 self.blind = True
-                warnings.warn(
+                warn(
                     f"no symmetric, regular tangent at load factor {after.t:.4g} (friction, "
                     "contact, follower loads): bifurcations of such a path are not seen",
                     Blind,

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from softehl.log import LOG
 from softehl.runtime.definition.argument_checks import writable
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.io import write_pvd
@@ -57,10 +58,6 @@ def read_series(path: Path) -> list[tuple[float, str]]:
         return [(float(row.attrib["timestep"]), row.attrib["file"]) for row in rows]
     except (ElementTree.ParseError, KeyError, ValueError):
         raise StudyError(f"{str(path)!r} is no series of results; remove it") from None
-
-
-LOG = logging.getLogger("softehl")
-"""Every step, at the level INFO; nobody listens unless a script asks for it."""
 
 
 @dataclass(eq=False)

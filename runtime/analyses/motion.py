@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
@@ -10,6 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from softehl.errors import UnknownNameError
+from softehl.log import warn
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.equations.contact_setup import contact_blocks
 from softehl.runtime.equations.mass_matrix import Masses
@@ -300,7 +300,7 @@ class Ledger:
         lasts = len(self.latest) == LASTS and min(self.latest) > GAIN * self.largest
         if lasts and not self.warned and self.share.first:
             self.warned = True
-            warnings.warn(
+            warn(
                 f"t = {t:.6g}: {balance / self.largest:.0%} of the energy of the motion come from "
                 'the scheme, not from loads: take a shorter dt, or method = "midpoint", which '
                 'conserves energy, or "generalised-alpha" with rho_inf = 0, which damps most',

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_array
 
+from softehl.log import warn
 from softehl.runtime.arrays import Array, Flags
 from softehl.runtime.fem.loads import Tie
 from softehl.runtime.fem.problem import Problem
@@ -88,7 +88,7 @@ def warn_unstable(problem: Any, x: Array, factors: tuple[Any, Any] | None, words
     """
     along = _falls_along(problem, x, factors)
     if along:
-        warnings.warn(
+        warn(
             f"the state at {words} is unstable: its energy falls along {along} "
             '(result.modes shows them); study.follow(detect="bifurcation") finds other branches',
             Unstable,

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from softehl.log import warn
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.definition.element_blocks import facet_nodes
 from softehl.runtime.definition.problem_definition import Block, Force, Statement, StudyError
@@ -82,7 +82,7 @@ def _warn_of_holes(statement: Statement) -> None:
         and all(k in bare and bare[k][rows].all() for k, rows in group.items() if len(rows))
     ]
     of = f", those of {listed(map(repr, groups))}" if groups else ""
-    warnings.warn(
+    warn(
         f"{count} of {total} cells of the mesh have no elements{of}: they are no part of the body; "
         "study.add(...) is for all cells or for a group, cells=...",
         stacklevel=4,

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from softehl.errors import SoftehlError
+from softehl.log import warn
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.content import Content
@@ -344,7 +344,7 @@ class _Model:
         if "COMBINE" in keyword.options:
             kind = keyword.options["COMBINE"].upper()
         if kind not in ("ELEMENT", "NODE", "UNION"):
-            warnings.warn(
+            warn(
                 f"{keyword.place}: the surface {name!r} is left out, {kind} is not read: faces of "
                 "elements and nodes are",
                 stacklevel=2,
@@ -600,7 +600,7 @@ def read(path: Path) -> Content:
     for keyword, data in _blocks(_lines(path, path.parent)):
         model.read(keyword, data)
     if model.rings:
-        warnings.warn(
+        warn(
             f'elements {model.rings} are rings about y, those of geometry="axisymmetric" about x: '
             "turn the mesh, mesh.map(lambda x: np.column_stack([-x[:, 1], x[:, 0]]))",
             stacklevel=2,

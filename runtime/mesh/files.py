@@ -4,7 +4,6 @@ those of Abaqus and CalculiX (.inp) by meshio.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from urllib.parse import quote, unquote
 
 import numpy as np
 
+from softehl.log import warn
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.io import write_text
 from softehl.runtime.mesh import abaqus, gmsh
@@ -196,7 +196,7 @@ def mesh_of(content: Content, points: Array, top: int) -> tuple[Mesh, Integers]:
         if not sides[name]:
             del sides[name]
     if lost:
-        warnings.warn(
+        warn(
             f"{listed(map(repr, lost))}: nodes of none of the cells of the mesh are left out",
             stacklevel=4,
         )
@@ -243,7 +243,7 @@ def _write_by_meshio(mesh: Mesh, points: Array, path: Path) -> None:
     if path.suffix in _VTK:
         cells, flags, data = _flagged(mesh, "" if path.suffix == ".vtk" else _PLAIN)
     elif mesh.groups or mesh.sides:
-        warnings.warn(
+        warn(
             f"{path.name}: names are not written ({listed([*mesh.groups, *mesh.sides])}); .msh, "
             ".inp, .vtu and .vtk keep them",
             stacklevel=4,

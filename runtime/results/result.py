@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from softehl.errors import UnknownNameError
+from softehl.log import warn
 from softehl.runtime.arrays import Array, Integers, read_only
 from softehl.runtime.definition.argument_checks import writable
 from softehl.runtime.definition.problem_definition import Block, StudyError
@@ -282,7 +282,7 @@ class Result:
             name, pairs = jump
             a, b = values[name][pairs]
             point = place_text(places[located.point[pairs[0]]])
-            warnings.warn(
+            warn(
                 f"{name} at {point} is {a:.6g} in one cell and {b:.6g} in another, which do not "
                 f'share their nodes; the first is taken: name a group, cells="..." '
                 f"({listed(mesh.groups)})",

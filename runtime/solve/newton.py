@@ -12,6 +12,7 @@ from typing import Any, Protocol, Self, runtime_checkable
 
 import numpy as np
 
+from softehl.log import LOG
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMatrix
 from softehl.runtime.solve.solution import Solution, Status
@@ -168,13 +169,16 @@ class Newton:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             state = self.terminate(self.init(problem, x0))
             best = state
+            LOG.debug("Newton iteration 0: norm %.3e", state.norms[-1])
             while state.status is None:
                 before = state.x
                 state = self.terminate(self.step(problem, state))
+                LOG.debug("Newton iteration %d: norm %.3e", state.iterations, state.norms[-1])
                 if state.norms[-1] < best.norms[-1]:
                     best = state
                 if isinstance(problem, EvolvingProblem):
                     problem = problem.after(before, state.x)
+        LOG.debug("Newton's method ends: %s, %s", state.status.value, state.message)
         return Solution(
             x=state.x,
             status=state.status,
