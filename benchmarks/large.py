@@ -41,8 +41,8 @@ class Clock:
 def softehl(n, clock):
     """The block as a study; parts are timed where Newton's method asks for them."""
     from softehl import Mesh, Study
-    from softehl.runtime.fem.problem import Problem
-    from softehl.runtime.solve import amg
+    from softehl.runtime.discretisation.problem import Problem
+    from softehl.runtime.solve.linear import amg
 
     krylov = []
 

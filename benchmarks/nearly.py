@@ -23,7 +23,7 @@ import sympy as sp
 
 import softehl
 from softehl import Mesh, Study
-from softehl.runtime.engines.matrix_free import TOLERANCE, MatrixFree
+from softehl.runtime.parallel.matrix_free import TOLERANCE, MatrixFree
 
 LOAD, RATIO = 0.005, 1000
 
@@ -51,13 +51,13 @@ def solved(n: int, solver: str) -> tuple[Any, list[int]]:
         return study.solve(engine=engine), engine.iterations
     counts: list[int] = []
     if solver == "gamg":
-        from softehl.runtime.engines import matrix, petsc
+        from softehl.runtime.parallel import petsc, petsc_matrix
 
-        _count(matrix.Solver, "solve", counts, lambda self, _: self.times.iterations)
+        _count(petsc_matrix.Solver, "solve", counts, lambda self, _: self.times.iterations)
         options = {"ksp_type": "cg", "pc_type": "gamg", "ksp_rtol": TOLERANCE}
         result = study.solve(engine=petsc.Petsc(options))
         return result, [b - a for a, b in zip([0, *counts], counts, strict=False)]
-    from softehl.runtime.solve import amg
+    from softehl.runtime.solve.linear import amg
 
     _count(amg.Preconditioned, "_solved", counts, lambda _, found: found[1] - 1)
     plain = amg.Multigrid.factorise

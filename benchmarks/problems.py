@@ -23,7 +23,7 @@ import sympy as sp
 
 from softehl import Definition, Mesh, Model, Newton, Study, element, kinematics, load_kernel
 from softehl.runtime.results.result import Result
-from softehl.runtime.solve.backends import choose
+from softehl.runtime.solve.linear.direct import choose
 
 MU, K, LOAD = 0.4225, 0.9154166666666667, 1 / 16
 STEPS = {"cook": 10, "block": 4}

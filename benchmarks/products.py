@@ -22,7 +22,7 @@ import softehl
 from softehl import Mesh, Study
 from softehl.codegen.language.fields import Fields
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.products import Places, Product
+from softehl.runtime.discretisation.matrix_free_products import Places, Product
 
 SAMPLES = 15
 IN_CACHE = 8e5

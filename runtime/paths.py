@@ -21,11 +21,11 @@ from softehl.runtime.analyses.time_stepping import Clock, March, Method
 from softehl.runtime.arrays import count_of
 from softehl.runtime.definition import argument_checks as read
 from softehl.runtime.definition.problem_definition import Datum, Statement, StudyError, Where
-from softehl.runtime.engines.engine import AnyEngine, engine_of, note_of
-from softehl.runtime.engines.sizes import Linear
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.system import System
 from softehl.runtime.equations.system_builder import equations
+from softehl.runtime.parallel.engine import AnyEngine, engine_of, note_of
+from softehl.runtime.parallel.linear_solver_choice import Linear
 from softehl.runtime.results.result import Modes, Result
 from softehl.runtime.sensitivity.tape import continued
 from softehl.runtime.solve.newton import Newton

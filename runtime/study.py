@@ -44,9 +44,9 @@ from softehl.runtime.definition.problem_definition import (
     Where,
     shown,
 )
-from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
+from softehl.runtime.discretisation.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
 from softehl.runtime.fit.fitted import Fitted
-from softehl.runtime.kernels import Kernel
+from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 from softehl.runtime.paths import Paths

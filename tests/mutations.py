@@ -221,25 +221,25 @@ FAULTS = (
     ),
     # the runtime
     Fault(
-        "runtime/fem/rules.py",
+        "runtime/discretisation/quadrature.py",
         "np.array([1.0, -1.0])",
         "np.array([-1.0, 1.0])",
         "tests/runtime/test_rules.py",
     ),
     Fault(
-        "runtime/fem/rules.py",
+        "runtime/discretisation/quadrature.py",
         "(nodes[cell + 1] - xi) / width, -1.0 / width",
         "(nodes[cell + 1] - xi) / width, 1.0 / width",
         "tests/cases/test_slider_cavitation.py tests/cases/test_rough_film.py",
     ),
     Fault(
-        "runtime/fem/touching.py",
+        "runtime/contact/search.py",
         "against[other]) < FACING",
         "against[other]) > FACING",
         "tests/runtime/test_touching.py",
     ),
     Fault(
-        "runtime/fem/face_pair.py",
+        "runtime/contact/mortar_pair.py",
         "change = off[1] - w[:, 2, None, None] * normal[1]",
         "change = off[1] + w[:, 2, None, None] * normal[1]",
         "tests/runtime/test_touching_faces.py",
@@ -258,25 +258,25 @@ FAULTS = (
         "mortar_22",
     ),
     Fault(
-        "runtime/fem/assembly.py",
+        "runtime/discretisation/element_blocks.py",
         "else self.data[part]",
         "else self.data[: len(self.dofs[part])]",
         "tests/runtime/test_assembly.py",
     ),
     Fault(
-        "runtime/solve/predictor.py",
+        "runtime/solve/continuation.py",
         "(t - b) / (a - b) for b",
         "(t - b) / (a + b) for b",
         "tests/runtime/test_continuation.py",
     ),
     Fault(
-        "runtime/solve/ladder.py",
+        "runtime/solve/solver_cascade.py",
         "failed.nearest if nearer else start",
         "failed.nearest",
         "tests/runtime/test_ladder.py",
     ),
     Fault(
-        "runtime/solve/record.py",
+        "runtime/solve/continuation.py",
         "before**2 / (now**2 - before**2)",
         "before / (now - before)",
         "tests/runtime/test_continuation.py",
@@ -288,7 +288,7 @@ FAULTS = (
         "tests/runtime/test_newton.py",
     ),
     Fault(
-        "runtime/solve/condensation.py",
+        "runtime/solve/linear/schur_complement.py",
         "full[self.interior] -= self.factors",
         "full[self.interior] += self.factors",
         "tests/runtime/test_condensation.py",
@@ -300,7 +300,7 @@ FAULTS = (
         "tests/runtime/test_elimination.py",
     ),
     Fault(
-        "runtime/fem/mass.py",
+        "runtime/discretisation/mass.py",
         "(places[some, :, 1] @ position.T)",
         "(places[some, :, 0] @ position.T)",
         "tests/runtime/test_modes.py",
@@ -312,7 +312,7 @@ FAULTS = (
         "tests/runtime/test_orders.py",
     ),
     Fault(
-        "runtime/fem/loads.py",
+        "runtime/discretisation/loads.py",
         "face.measured_rule(2 * face.order + _HIGHER, ring=ring)",
         "face.measured_rule(2 * face.order + _HIGHER - 4)",
         "tests/runtime/test_orders.py",
@@ -354,7 +354,7 @@ FAULTS = (
         "tests/runtime/test_follow.py",
     ),
     Fault(
-        "runtime/fem/touching.py",
+        "runtime/contact/search.py",
         "limit *= 0.5",
         "limit *= 1.0",
         "tests/runtime/test_touching.py -k exactly",
@@ -366,7 +366,7 @@ FAULTS = (
         "tests/runtime/test_modes.py",
     ),
     Fault(
-        "runtime/fem/averaged.py",
+        "runtime/discretisation/discrete_gradient.py",
         "s = 0.5 * (1.0 + xi)",
         "s = 0.5 + 0.0 * xi",
         "tests/runtime/test_dynamics.py",
@@ -402,7 +402,7 @@ FAULTS = (
         "tests/cases/test_sensitivity.py",
     ),
     Fault(
-        "runtime/solve/steps.py",
+        "runtime/solve/continuation.py",
         "self.target_iterations / max(iterations, 1)",
         "max(iterations, 1) / self.target_iterations",
         "tests/runtime/test_continuation.py",
@@ -415,7 +415,7 @@ FAULTS = (
         "tests/cases/test_leakage.py",
     ),
     Fault(
-        "runtime/fem/unknowns.py",
+        "runtime/discretisation/dofmap.py",
         "places in block.along.items() for column",
         "places in reversed(block.along.items()) for column",
         "tests/cases/test_cycle.py",

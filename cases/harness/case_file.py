@@ -19,7 +19,7 @@ from softehl.cases.harness.case import AnyCase, Run, load_case
 from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.parameters import Parameters, files_of, keys_of
 from softehl.cases.harness.units import is_number, is_quantity
-from softehl.runtime.library import KernelError
+from softehl.runtime.kernels.shared_library import KernelError
 from softehl.runtime.suggestions import meant
 
 Shipped = Mapping[str, str]

@@ -17,7 +17,7 @@ from softehl.cases.harness.errors import BadInput
 from softehl.cases.harness.files import file_digest
 from softehl.cases.harness.row import Row
 from softehl.runtime.io import read_csv, read_json
-from softehl.runtime.library import GENERATED, manifest
+from softehl.runtime.kernels.shared_library import GENERATED, manifest
 
 Existing: TypeAlias = Literal["refuse", "resume", "overwrite"]
 """Treatments of an earlier run in a folder."""

@@ -16,7 +16,7 @@ def leading(engine: str, jobs: int) -> Iterator[bool]:
         yield True
         return
     from softehl.runtime.mpi import MissingPetsc
-    from softehl.runtime.solve import mumps
+    from softehl.runtime.solve.linear import mumps
 
     if jobs > 1:
         raise BadInput(

@@ -33,7 +33,7 @@ from softehl.cases.harness.observer import Outcome, StageRecord, State
 from softehl.cases.harness.row import Record, Row
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_arrays, write_arrays, write_csv, write_json
-from softehl.runtime.library import library_of
+from softehl.runtime.kernels.shared_library import library_of
 
 _DRAFT = "unfinished.npz"
 _OURS = ("run.json", "curve.csv", _DRAFT)

@@ -6,7 +6,7 @@ from pathlib import Path
 from softehl.cases.harness.case import Case, P, R
 from softehl.cases.harness.observer import Observer, Outcome, State
 from softehl.cases.harness.pictures import KINDS, draw_columns
-from softehl.runtime.fem.problem import Problem
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.io import read_table
 from softehl.runtime.solve.solution import Solution, Status
 

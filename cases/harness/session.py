@@ -20,9 +20,9 @@ from softehl.cases.harness.row import Row
 from softehl.cases.harness.workers import solve_side_by_side
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_table
-from softehl.runtime.kernels import MissingKernelsError, StaleKernelsError
+from softehl.runtime.kernels.kernel import MissingKernelsError, StaleKernelsError
 from softehl.runtime.mesh.mesh import MeshError
-from softehl.runtime.solve.backends import MissingBackend
+from softehl.runtime.solve.linear.direct import MissingBackend
 from softehl.runtime.solve.solution import Status
 
 NOT_CONVERGED = 3

@@ -12,8 +12,8 @@ from softehl.cases.slider.film import conserving_solution, penalty_solution, str
 from softehl.cases.slider.parameters import Slider
 from softehl.cases.slider.strip import beyond_front, fronts
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.postprocess import element_means, interval_below
-from softehl.runtime.fem.problem import Problem
+from softehl.runtime.discretisation.postprocessing import element_means, interval_below
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.io import Cell
 from softehl.runtime.solve.solution import Solution
 

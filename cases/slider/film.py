@@ -11,14 +11,13 @@ from softehl.cases.seal.gland.surfaces import SurfacePair
 from softehl.cases.slider.parameters import Slider
 from softehl.cases.slider.strip import Oil, Strip
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem import dofs, rules
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.discretisation import dofmap, quadrature
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.solve.homotopy import Continuation
+from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Solution, Status
-from softehl.runtime.solve.steps import StepRule
 from softehl.runtime.study import Study
 
 
@@ -49,7 +48,7 @@ def film_problem(p: Slider, speed: float, alpha: float) -> Problem:
     """The film between its end pressures (alpha = 0: the reduced ones), on a rod of radius zero."""
     x, order, dg = p.nodes, p.pressure_order, p.reynolds == "dg"
     chain = np.arange(p.segments)[:, None] + np.arange(3)
-    places = (dofs.separate_dofs if dg else dofs.chain_dofs)(p.segments, order, 0)
+    places = (dofmap.separate_dofs if dg else dofmap.chain_dofs)(p.segments, order, 0)
     film, thinning = load_kernel(f"film{p.film_suffix}"), p.thinning_values(p.viscosity)
     oil: dict[str, Any] = {"rod_radius": 0.0, "rod_speed": speed, "viscosity": p.viscosity}
     oil["pressure_viscosity"] = alpha
@@ -57,9 +56,9 @@ def film_problem(p: Slider, speed: float, alpha: float) -> Problem:
     values = {**oil, **weights, **thinning}
     given = {name: values[name] for name in film.parameters}
     study = Study(Mesh(np.stack([x, p.gap(x)], axis=1), {"line2": chain[:, :2]}))
-    study.add(FILM, film, along={PRESSURE: places}, rule=rules.film_rule(order), **given)
+    study.add(FILM, film, along={PRESSURE: places}, rule=quadrature.film_rule(order), **given)
     if dg:
-        sides, rule = np.hstack([places[:-1], places[1:]]), rules.facet_rule(order)
+        sides, rule = np.hstack([places[:-1], places[1:]]), quadrature.facet_rule(order)
         facet, inner = load_kernel("film_facet"), chain[:-1]
         study.add("film_facet", facet, on=inner, along={PRESSURE: sides}, rule=rule, **oil)
     study.fix(np.arange(len(x)), u_z=0.0, u_r=0.0)

@@ -13,9 +13,9 @@ from softehl.cases.seal.equations import scales
 from softehl.cases.seal.equations.system import DISPLACEMENT, FILM, MOVED, PRESSURE, VOID
 from softehl.cases.seal.gland.surfaces import PRESSURE_SCALE, VOID_SCALE, SurfacePair, void_values
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem import dofs, rules
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.discretisation import dofmap, quadrature
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.study import Study
 
@@ -56,14 +56,14 @@ class Strip:
     @property
     def places(self) -> Array:
         """Places of pressures and void fractions, (unknowns,), mm."""
-        share = 0.5 * (1.0 + rules.pressure_nodes(self.order)[:-1])
+        share = 0.5 * (1.0 + quadrature.pressure_nodes(self.order)[:-1])
         inner = self.x[:, :1] + share * np.diff(self.x, axis=1)
         return np.append(inner.ravel(), self.x[-1, 1])
 
     @property
     def rows(self) -> Integers:
         """Unknowns (segments, order + 1) of a field in the segments, from 0."""
-        return dofs.chain_dofs(len(self.x), self.order, 0)
+        return dofmap.chain_dofs(len(self.x), self.order, 0)
 
     def study(self, speed: float) -> Study:
         """The film between surfaces at rest, one of which slides at a speed (mm/s)."""
@@ -78,7 +78,7 @@ class Strip:
         }
         points = np.stack([self.x, self.h], axis=2).reshape(2 * n, 2)
         study = Study(Mesh(points, {"line2": np.arange(2 * n).reshape(n, 2)}))
-        rule, each = rules.rupture_rule(self.order, polynomial=False), np.arange(self.unknowns)
+        rule, each = quadrature.rupture_rule(self.order, polynomial=False), np.arange(self.unknowns)
         known = {name: value for name, value in values.items() if name in flow.parameters}
         study.add(FILM, flow, along=along, rule=rule, **known)
         study.add(

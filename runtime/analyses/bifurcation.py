@@ -10,9 +10,9 @@ import numpy as np
 from softehl.log import warn
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.discretisation.constraints import Constraints, symmetric
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.reduction import Reduction, symmetric
 from softehl.runtime.results.result import Result, Shape
 from softehl.runtime.solve.eigen import nearest_zero
 from softehl.runtime.solve.newton import Newton
@@ -150,7 +150,7 @@ def place(problem: Problem, t: float, x: Array) -> Place:
     """Of a problem at unknowns x, (n,), with the contacts that it has there."""
     here = problem.at(x)
     K = here.assembler.linearise(x, here.parameters)[1]
-    free = Reduction.of(here, K)
+    free = Constraints.of(here, K)
     value, mode = nearest_zero(symmetric(free.matrix(K)))
     return Place(t, x, value, free.map @ mode)
 

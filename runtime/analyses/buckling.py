@@ -8,10 +8,10 @@ import numpy as np
 
 from softehl.runtime.analyses.initial_state import Beginning
 from softehl.runtime.arrays import Array, read_only
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.eigenproblems import buckled
 from softehl.runtime.equations.rigid_body_modes import require_held
 from softehl.runtime.equations.system import System
-from softehl.runtime.fem.problem import Problem
 from softehl.runtime.results.result import Result, Shape
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point

@@ -16,9 +16,9 @@ from softehl.runtime.analyses.time_integrators import METHODS, Backward, Scheme,
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.argument_checks import datum, known
 from softehl.runtime.definition.problem_definition import Datum, StudyError
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.system import Step, System
-from softehl.runtime.fem.problem import Problem
 from softehl.runtime.results.result import Result
 from softehl.runtime.solve.newton import Newton
 

@@ -11,18 +11,19 @@ from scipy.sparse import csc_array
 from softehl.runtime.analyses.motion import Forces, Roles
 from softehl.runtime.analyses.time_integrators import Affine, Scheme
 from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.contact.search import TouchingProblem
 from softehl.runtime.definition.problem_definition import Block, StudyError
+from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.communicator import Share
+from softehl.runtime.discretisation.discrete_gradient import Averaged, time_derivatives, with_old
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.loads import Tie
+from softehl.runtime.discretisation.mass import Mass, lumped
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.contact_setup import weighted
 from softehl.runtime.equations.mass_matrix import Masses, mass_blocks, mass_matrix
 from softehl.runtime.equations.system import Step, System
-from softehl.runtime.fem.assembly import Assembler, ElementBlock
-from softehl.runtime.fem.averaged import Averaged, time_derivatives, with_old
-from softehl.runtime.fem.loads import Tie
-from softehl.runtime.fem.mass import Mass, lumped
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.touching import TouchingProblem
-from softehl.runtime.share import Share
-from softehl.runtime.solve.gradients import conjugate_gradients
+from softehl.runtime.solve.linear.krylov import conjugate_gradients
 from softehl.runtime.suggestions import listed
 
 _BEFORE = "forces of the step before"

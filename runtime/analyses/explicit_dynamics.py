@@ -19,10 +19,10 @@ from softehl.runtime.analyses.motion import (
 from softehl.runtime.analyses.time_stepping import ROUNDING
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.fem.loads import Tie
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.reduction import symmetric
-from softehl.runtime.share import Free
+from softehl.runtime.discretisation.communicator import ConstraintMap
+from softehl.runtime.discretisation.constraints import symmetric
+from softehl.runtime.discretisation.loads import Tie
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.solve.eigen import highest
 from softehl.runtime.solve.solution import Branch, NotConverged, Point, Solution, Status
 
@@ -42,7 +42,7 @@ class Explicit:
     dt: float
     body: Body
     here: Phase
-    free: Free
+    free: ConstraintMap
     masses: Array
 
     def run(self, until: float) -> Iterator[Motion]:

@@ -21,15 +21,14 @@ from softehl.runtime.analyses.initial_state import SMALLEST
 from softehl.runtime.arrays import Array, Flags, Integers, count_of
 from softehl.runtime.definition import argument_checks as read
 from softehl.runtime.definition.problem_definition import Statement, StudyError
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
-from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.results.result import Result
-from softehl.runtime.solve.backends import choose
-from softehl.runtime.solve.homotopy import Continuation
+from softehl.runtime.solve.continuation import Continuation, StepRule
+from softehl.runtime.solve.linear.direct import choose
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Point
-from softehl.runtime.solve.steps import StepRule
 from softehl.runtime.suggestions import listed
 
 Gradient: TypeAlias = "Array | Sequence[Sequence[float | None]]"

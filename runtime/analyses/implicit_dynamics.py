@@ -19,13 +19,11 @@ from softehl.runtime.analyses.motion import (
 from softehl.runtime.analyses.time_integrators import Scheme
 from softehl.runtime.analyses.time_stepping import ROUNDING, towards
 from softehl.runtime.arrays import Array
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import Step
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.solve.homotopy import Trial, Way, walk
+from softehl.runtime.solve.continuation import End, Record, StepRule, Trial, Way, walk
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.record import End, Record
 from softehl.runtime.solve.solution import NotConverged, Point, Solution, Status
-from softehl.runtime.solve.steps import StepRule
 
 
 @dataclass(frozen=True, eq=False)

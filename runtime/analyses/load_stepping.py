@@ -10,21 +10,20 @@ import numpy as np
 from softehl.runtime.analyses.bifurcation import Bifurcation, Detector
 from softehl.runtime.analyses.initial_state import SMALLEST, Beginning
 from softehl.runtime.arrays import Array, Flags
+from softehl.runtime.discretisation.loads import Tie
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.rigid_body_modes import require_held
 from softehl.runtime.equations.stability import warn_unstable
 from softehl.runtime.equations.system import Step, System
-from softehl.runtime.fem.loads import Tie
-from softehl.runtime.fem.problem import Problem
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity.tape import Trail
 from softehl.runtime.solve.arclength import Arclength
-from softehl.runtime.solve.held import FirstStep, Remembering
-from softehl.runtime.solve.homotopy import Continuation
-from softehl.runtime.solve.kept import iterating
-from softehl.runtime.solve.linear import LinearSolver, SingularMatrix
+from softehl.runtime.solve.continuation import Continuation, StepRule
+from softehl.runtime.solve.linear.factorisation_cache import iterating
+from softehl.runtime.solve.linear.linear_solver import LinearSolver, SingularMatrix
 from softehl.runtime.solve.newton import Newton
+from softehl.runtime.solve.singularity_check import FirstStep, Remembering
 from softehl.runtime.solve.solution import Branch, LimitPoint, NotConverged, Point, Status
-from softehl.runtime.solve.steps import StepRule
 
 _NAME = "load factor"
 _KEPT = 100_000

@@ -11,15 +11,15 @@ import numpy as np
 from softehl.errors import UnknownNameError
 from softehl.log import warn
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.discretisation.communicator import Share
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.loads import DeadLoad, NodalForce, Pressure, Spring, Tie
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.contact_setup import contact_blocks
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.system import System
-from softehl.runtime.fem.assembly import ElementBlock
-from softehl.runtime.fem.loads import DeadLoad, NodalForce, Pressure, Spring, Tie
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.kernels import Kernel
+from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.results.result import Result
-from softehl.runtime.share import Share
 from softehl.runtime.suggestions import listed, meant
 
 GAIN = 0.05

@@ -105,7 +105,7 @@ class Weighted:
 
 @dataclass(frozen=True)
 class Midpoint:
-    """The midpoint rule with forces averaged along the step (`fem.averaged`): energy stays."""
+    """The midpoint rule with the `discrete_gradient` of the energy along the step: energy stays."""
 
     averaged = True
     damps = False

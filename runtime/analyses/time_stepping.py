@@ -16,22 +16,19 @@ from softehl.runtime.analyses.initial_state import SMALLEST, beginning
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.contact_sides import MULTIPLIERS
 from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.discretisation.communicator import Share
+from softehl.runtime.discretisation.loads import Tie
 from softehl.runtime.equations.rigid_body_modes import require_held
 from softehl.runtime.equations.system import Step, System
-from softehl.runtime.fem.loads import Tie
 from softehl.runtime.io import read_arrays, write_arrays
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity.tape import Trail
-from softehl.runtime.share import Share
+from softehl.runtime.solve.continuation import End, Record, StepRule, Trial, Way, through, walk
 from softehl.runtime.solve.differences import differences
-from softehl.runtime.solve.held import FirstStep, Remembering
-from softehl.runtime.solve.homotopy import Trial, Way, walk
-from softehl.runtime.solve.kept import iterating
+from softehl.runtime.solve.linear.factorisation_cache import iterating
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.predictor import through
-from softehl.runtime.solve.record import End, Record
+from softehl.runtime.solve.singularity_check import FirstStep, Remembering
 from softehl.runtime.solve.solution import NotConverged, Point, Status
-from softehl.runtime.solve.steps import StepRule
 
 Method: TypeAlias = Literal["euler", "bdf2"]
 

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import Datum, Number, StudyError, Where, shown
-from softehl.runtime.fem.loads import Amount
+from softehl.runtime.discretisation.loads import Amount
 from softehl.runtime.io import require_writable
 from softehl.runtime.mesh.mesh import Mesh, place_text
 from softehl.runtime.suggestions import listed, meant, misfit

@@ -10,7 +10,7 @@ import numpy as np
 from softehl.runtime.arrays import Integers
 from softehl.runtime.definition.element_blocks import On
 from softehl.runtime.definition.problem_definition import Form, StudyError
-from softehl.runtime.kernels import Rule
+from softehl.runtime.kernels.kernel import Rule
 
 
 def form_of(

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from softehl.runtime.arrays import Integers
+from softehl.runtime.contact.body_thickness import by_normals, in_chains
 from softehl.runtime.definition.argument_checks import finite
 from softehl.runtime.definition.element_blocks import page_on
 from softehl.runtime.definition.problem_definition import Block, Form, StudyError, shown
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh, Predicate
-from softehl.runtime.mesh.thickness import by_normals, in_chains
 from softehl.runtime.suggestions import listed
 
 MULTIPLIERS = {2: ("lambda", "tau"), 3: ("lambda", "tau_x", "tau_y", "tau_z")}

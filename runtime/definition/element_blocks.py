@@ -13,10 +13,10 @@ from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.argument_checks import datum, known, parameter
 from softehl.runtime.definition.line_fields import interpolated, placed
 from softehl.runtime.definition.problem_definition import Block, Form, StudyError
-from softehl.runtime.fem.unknowns import Slot, slots
-from softehl.runtime.kernels import Kernel, Rule
+from softehl.runtime.discretisation.dofmap import Slot, slots
+from softehl.runtime.kernels.kernel import Kernel, Rule
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.facets import beside, interior
+from softehl.runtime.mesh.interior_facets import beside, interior
 from softehl.runtime.mesh.mesh import Mesh, MeshError, Predicate
 
 GEOMETRIES = {1: ("solid",), 2: ("plane strain", "axisymmetric"), 3: ("solid",)}

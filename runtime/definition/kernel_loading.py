@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 from softehl.runtime.definition.element_blocks import is_folder, require_page
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.kernels import Kernel
+from softehl.runtime.kernels.kernel import Kernel
 
 Source: TypeAlias = "str | Path | Kernel | object"
 """A model file, a folder of generated C, the name of a shipped kernel, a kernel, a Definition, or a

@@ -10,15 +10,15 @@ import numpy as np
 from softehl.runtime.arrays import Integers
 from softehl.runtime.definition.argument_checks import known
 from softehl.runtime.definition.problem_definition import Block, Form, StudyError
-from softehl.runtime.fem.rules import (
+from softehl.runtime.discretisation.dofmap import Slot
+from softehl.runtime.discretisation.quadrature import (
     automatic_points,
     gauss,
     lagrange,
     pressure_nodes,
     several,
 )
-from softehl.runtime.fem.unknowns import Slot
-from softehl.runtime.kernels import Kernel, Rule
+from softehl.runtime.kernels.kernel import Kernel, Rule
 from softehl.runtime.suggestions import listed
 
 

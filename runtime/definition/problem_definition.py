@@ -11,9 +11,9 @@ import numpy as np
 
 from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
-from softehl.runtime.fem.unknowns import Slot
-from softehl.runtime.kernels import Kernel, Rule
+from softehl.runtime.discretisation.dofmap import Slot
+from softehl.runtime.discretisation.loads import Amount, DeadLoad, NodalForce, Pressure, Spring, Tie
+from softehl.runtime.kernels.kernel import Kernel, Rule
 from softehl.runtime.mesh.mesh import Mesh, Predicate
 
 Where: TypeAlias = "str | Predicate | Integers | Sequence[float]"

@@ -8,17 +8,17 @@ from typing import TypeAlias
 import numpy as np
 
 from softehl.runtime.arrays import Array
+from softehl.runtime.contact.body_thickness import inner_radii, thickness
+from softehl.runtime.contact.mortar_pair import FacePair
+from softehl.runtime.contact.search import Contact, Side, Sought
+from softehl.runtime.contact.search_3d import FaceContact
 from softehl.runtime.definition.contact_sides import MULTIPLIERS, Touch
 from softehl.runtime.definition.problem_definition import Statement, StudyError
+from softehl.runtime.discretisation.dofmap import Numbering
+from softehl.runtime.discretisation.element_blocks import ElementBlock
 from softehl.runtime.equations.system import Step, System
-from softehl.runtime.fem.assembly import ElementBlock
-from softehl.runtime.fem.face_pair import FacePair
-from softehl.runtime.fem.touching import Contact, Side, Sought
-from softehl.runtime.fem.touching_faces import FaceContact
-from softehl.runtime.fem.unknowns import Numbering
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.cells import CELLS, Cell, measures
-from softehl.runtime.mesh.thickness import inner_radii, thickness
 from softehl.runtime.suggestions import listed, meant
 
 AnyContact: TypeAlias = Contact | FaceContact

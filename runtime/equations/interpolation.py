@@ -14,8 +14,8 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.definition.problem_definition import Block
+from softehl.runtime.discretisation.dofmap import DofLayout
 from softehl.runtime.equations.system import System
-from softehl.runtime.fem.dofs import DofLayout
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.point_location import Located
 

@@ -11,10 +11,11 @@ from scipy.sparse import csc_array
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.argument_checks import datum, known
 from softehl.runtime.definition.problem_definition import Block, StudyError
+from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.mass import PARAMETER, Mass, interpolation, mass_matrices
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
-from softehl.runtime.fem.assembly import Assembler, ElementBlock
-from softehl.runtime.fem.mass import PARAMETER, Mass, interpolation, mass_matrices
-from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.suggestions import listed, meant
 

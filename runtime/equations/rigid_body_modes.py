@@ -16,8 +16,8 @@ from scipy.sparse import csc_array
 from scipy.sparse.csgraph import connected_components
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import System
-from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mesh.mesh import place_text
 from softehl.runtime.solve.solution import NotConverged, Solution, Status
 
@@ -33,7 +33,7 @@ _AXES = "xyz"
 def require_held(system: System, problem: Any, x: Array) -> None:
     """Raise NotConverged that names the free motion if nothing holds a part of the problem at x.
 
-    One that is spread over processes is looked at after its first step (`solve.held`).
+    One that is spread over processes is looked at after its first step (`solve.singularity_check`).
     """
     if not isinstance(problem, Problem):
         return

@@ -9,18 +9,18 @@ from scipy.sparse import csc_array
 
 from softehl.log import warn
 from softehl.runtime.arrays import Array, Flags
-from softehl.runtime.fem.loads import Tie
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.reduction import (
-    Reduction,
+from softehl.runtime.discretisation.constraints import (
+    Constraints,
     concave,
     internal_negative,
     is_symmetric,
     is_symmetric_where_free,
     symmetric,
 )
+from softehl.runtime.discretisation.loads import Tie
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.solve.eigen import Pivots
-from softehl.runtime.solve.linear import SingularMatrix
+from softehl.runtime.solve.linear.linear_solver import SingularMatrix
 
 
 class Unstable(RuntimeWarning):
@@ -40,7 +40,7 @@ def negative_directions(problem: Any, x: Array) -> int | None:
         K = problem.assembler.linearise(x, problem.parameters)[1]
     if not np.isfinite(K.data).all() or not is_symmetric_where_free(problem, K):
         return None
-    free = Reduction.of(problem, K)
+    free = Constraints.of(problem, K)
     if not free.map.shape[1]:
         return 0
     saddle = free.saddle(K)

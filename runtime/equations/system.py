@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.contact.search import Sought, TouchingProblem
 from softehl.runtime.definition.problem_definition import (
     Block,
     Condition,
@@ -17,13 +18,12 @@ from softehl.runtime.definition.problem_definition import (
     Statement,
     StudyError,
 )
-from softehl.runtime.fem.assembly import Assembler
-from softehl.runtime.fem.loads import Tie, amount
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.touching import Sought, TouchingProblem
-from softehl.runtime.fem.unknowns import Numbering
+from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.communicator import ALONE, Share
+from softehl.runtime.discretisation.dofmap import Numbering
+from softehl.runtime.discretisation.loads import Tie, amount
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.mesh.mesh import Mesh, place_text
-from softehl.runtime.share import ALONE, Share
 from softehl.runtime.suggestions import few
 
 _SAME = 1e-12

@@ -11,12 +11,13 @@ from softehl.log import warn
 from softehl.runtime.arrays import Array, Flags, Integers
 from softehl.runtime.definition.element_blocks import facet_nodes
 from softehl.runtime.definition.problem_definition import Block, Force, Statement, StudyError
+from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.dofmap import Elements, Numbering
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.loads import Spring, Tie
 from softehl.runtime.equations.contact_setup import contact_of, with_contacts
 from softehl.runtime.equations.system import System
-from softehl.runtime.fem.assembly import Assembler, ElementBlock
-from softehl.runtime.fem.loads import Spring, Tie
-from softehl.runtime.fem.unknowns import Elements, Numbering
-from softehl.runtime.mesh.faces import matched
+from softehl.runtime.mesh.face_matching import matched
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.suggestions import listed, meant
 

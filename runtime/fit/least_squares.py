@@ -9,12 +9,12 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.calls import ArgumentError
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.fem.checks import ProblemError
+from softehl.runtime.discretisation.problem_checks import ProblemError
 from softehl.runtime.fit.measurements import Data
 from softehl.runtime.fit.objective import Trials
 from softehl.runtime.fit.scaling import Bounds, Scale
+from softehl.runtime.kernels.kernel_call import ArgumentError
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity.inputs import Key
 from softehl.runtime.sensitivity.jacobian import Entry, by_key, jacobian

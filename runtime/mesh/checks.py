@@ -6,7 +6,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Integers
 from softehl.runtime.mesh.cells import CELLS, jacobians
-from softehl.runtime.mesh.faces import repeated
+from softehl.runtime.mesh.face_matching import repeated
 from softehl.runtime.mesh.mesh import Mesh, MeshError, place_text
 
 

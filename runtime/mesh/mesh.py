@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Flags, Integers, frozen
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.faces import as_known, matched, once
-from softehl.runtime.mesh.piece import Piece
+from softehl.runtime.mesh.face_matching import as_known, matched, once
+from softehl.runtime.mesh.partitioning import Piece
 from softehl.runtime.suggestions import few, listed, meant, misfit
 
 if TYPE_CHECKING:
@@ -309,8 +309,8 @@ class Mesh:
         MeshError
             The file cannot be read, or has unknown cells.
         """
-        from softehl.runtime.mesh.files import read
-        from softehl.runtime.mesh.part_files import read_parts
+        from softehl.runtime.mesh.readers.meshio import read
+        from softehl.runtime.mesh.readers.partitioned_files import read_parts
 
         return read_parts(Path(path)) if spread else read(Path(path))
 
@@ -330,8 +330,8 @@ class Mesh:
         MeshError
             The file cannot be written.
         """
-        from softehl.runtime.mesh.files import write
-        from softehl.runtime.mesh.part_files import write_parts
+        from softehl.runtime.mesh.readers.meshio import write
+        from softehl.runtime.mesh.readers.partitioned_files import write_parts
 
         if parts is None:
             write(self, Path(path))
@@ -423,7 +423,7 @@ class Mesh:
             The cells with copies of their nodes; `on="interior"` of `Study.add` selects the facets
             between them.
         """
-        from softehl.runtime.mesh.facets import split
+        from softehl.runtime.mesh.interior_facets import split
 
         return split(self)
 

@@ -12,7 +12,7 @@ import numpy as np
 from softehl.runtime.arrays import Array, Integers, count_of
 from softehl.runtime.mesh.cells import CELLS, lobatto
 from softehl.runtime.mesh.mesh import Mesh, MeshError
-from softehl.runtime.mesh.piece import joined
+from softehl.runtime.mesh.partitioning import joined
 from softehl.runtime.mpi import world
 
 KINDS = {

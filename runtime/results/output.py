@@ -11,7 +11,7 @@ import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import Block
-from softehl.runtime.fem.dofs import AXES
+from softehl.runtime.discretisation.dofmap import AXES
 from softehl.runtime.io import replacing, write_text
 from softehl.runtime.mesh.cells import CELLS, for_vtk
 

@@ -12,9 +12,9 @@ from itertools import product
 import numpy as np
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.calls import Rule
 from softehl.runtime.definition.element_blocks import facet_nodes
 from softehl.runtime.definition.problem_definition import Block, StudyError
+from softehl.runtime.kernels.kernel_call import Rule
 from softehl.runtime.mesh.cells import CELLS, Cell
 from softehl.runtime.suggestions import listed
 

@@ -15,6 +15,8 @@ from softehl.log import warn
 from softehl.runtime.arrays import Array, Integers, read_only
 from softehl.runtime.definition.argument_checks import writable
 from softehl.runtime.definition.problem_definition import Block, StudyError
+from softehl.runtime.discretisation.loads import Spring, Tie
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.eigenproblems import natural
 from softehl.runtime.equations.interpolation import (
     at_every_node,
@@ -23,8 +25,6 @@ from softehl.runtime.equations.interpolation import (
 )
 from softehl.runtime.equations.mass_matrix import Masses
 from softehl.runtime.equations.stability import negative_directions
-from softehl.runtime.fem.loads import Spring, Tie
-from softehl.runtime.fem.problem import Problem
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import MeshError, place_text
 from softehl.runtime.results.output import Picture, piece_names

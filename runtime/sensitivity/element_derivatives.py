@@ -13,9 +13,9 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.fem.assembly import ElementBlock
-from softehl.runtime.fem.loads import Spring, Tie
-from softehl.runtime.kernels import Kernel
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.loads import Spring, Tie
+from softehl.runtime.kernels.kernel import Kernel
 from softehl.runtime.sensitivity.tape import Trail
 
 _WIDE = 1e-3

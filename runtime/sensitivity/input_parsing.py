@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from softehl.runtime.definition.problem_definition import Block, Force, Statement, StudyError, shown
-from softehl.runtime.fem.loads import Spring, Tie
+from softehl.runtime.discretisation.loads import Spring, Tie
 from softehl.runtime.sensitivity.inputs import (
     Amounts,
     Input,

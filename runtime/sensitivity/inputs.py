@@ -20,7 +20,7 @@ from softehl.runtime.definition.problem_definition import (
     Statement,
     StudyError,
 )
-from softehl.runtime.fem.loads import NodalForce, Spring, Tie, amount
+from softehl.runtime.discretisation.loads import NodalForce, Spring, Tie, amount
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.sensitivity.input_seeds import Column, Held, Moves
 from softehl.runtime.sensitivity.tape import Trail

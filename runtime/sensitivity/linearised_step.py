@@ -11,11 +11,11 @@ from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Integers
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.fem.loads import Spring, Tie
+from softehl.runtime.discretisation.loads import Spring, Tie
 from softehl.runtime.sensitivity.element_derivatives import Elements
 from softehl.runtime.sensitivity.tape import Trail, WithoutMatrix
-from softehl.runtime.solve.backends import choose
-from softehl.runtime.solve.linear import Factorisation, Factors, SingularMatrix
+from softehl.runtime.solve.linear.direct import choose
+from softehl.runtime.solve.linear.linear_solver import Factorisation, Factors, SingularMatrix
 
 _EXACT, _ROUNDING = 1e-15, 1e-14
 """Errors of an equation relative to its terms: nothing is left, and only rounding can be left."""

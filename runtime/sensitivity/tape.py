@@ -9,10 +9,10 @@ import numpy as np
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.equations.system import Step, System
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.solve.held import Remembering
-from softehl.runtime.solve.linear import LinearSolver
+from softehl.runtime.solve.linear.linear_solver import LinearSolver
+from softehl.runtime.solve.singularity_check import Remembering
 
 
 @runtime_checkable

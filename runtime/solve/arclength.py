@@ -12,13 +12,20 @@ import numpy as np
 from scipy.sparse import csc_array, hstack, vstack
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.solve.homotopy import ProblemAt, Trial, Way, followed
-from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMatrix
+from softehl.runtime.solve.continuation import (
+    End,
+    OnPoint,
+    ProblemAt,
+    Record,
+    StepRule,
+    Trial,
+    Way,
+    admissible_fraction,
+    followed,
+)
+from softehl.runtime.solve.linear.linear_solver import LinearSolver, SingularMatrix, SparseMatrix
 from softehl.runtime.solve.newton import MeasuredProblem, Newton, NonlinearProblem
-from softehl.runtime.solve.predictor import admissible_fraction
-from softehl.runtime.solve.record import End, OnPoint, Record
 from softehl.runtime.solve.solution import Branch, LimitPoint, Solution, Status
-from softehl.runtime.solve.steps import StepRule
 
 Derivative: TypeAlias = Callable[[float, Array], Array]
 _FOLD_ITERATIONS = 20

@@ -16,8 +16,8 @@ from scipy.sparse import linalg as sparse_linalg
 
 from softehl.errors import SoftehlError
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.solve.linear import SingularMatrix
-from softehl.runtime.solve.ordering import without_zeros
+from softehl.runtime.solve.linear.elimination_ordering import without_zeros
+from softehl.runtime.solve.linear.linear_solver import SingularMatrix
 
 _SMALL_SHIFT = 1e-7
 """Of the largest ratio of the diagonals: the first shift below zero, above rounding."""

@@ -14,9 +14,9 @@ import numpy as np
 
 from softehl.log import LOG
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMatrix
+from softehl.runtime.solve.linear.linear_solver import LinearSolver, SingularMatrix, SparseMatrix
+from softehl.runtime.solve.linear.superlu import SuperLU
 from softehl.runtime.solve.solution import Solution, Status
-from softehl.runtime.solve.superlu import SuperLU
 
 _HARDLY_LESS = 0.5  # of the norm before: Newton does better unless rounding is all that is left
 _FEW = 10.0  # times the tolerance: more than that is iterated on before it counts as rounding

@@ -19,11 +19,9 @@ from math import inf
 from typing import Protocol, TypeAlias
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.homotopy import Trial, Way, followed
+from softehl.runtime.solve.continuation import End, OnPoint, Record, StepRule, Trial, Way, followed
 from softehl.runtime.solve.newton import Corrector, NonlinearProblem
-from softehl.runtime.solve.record import End, OnPoint, Record
 from softehl.runtime.solve.solution import Branch, Solution, Status
-from softehl.runtime.solve.steps import StepRule
 
 Finish: TypeAlias = Callable[[Array], Solution]
 """Solves the steady equations from the last state (n,) of a path."""

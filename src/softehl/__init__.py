@@ -30,19 +30,19 @@ if TYPE_CHECKING:
     from softehl.codegen.language.model import Model
     from softehl.codegen.language.pages import Page, page
     from softehl.runtime.definition.problem_definition import StudyError
-    from softehl.runtime.fem.assembly import Assembler, ElementBlock
-    from softehl.runtime.fem.checks import ProblemError
-    from softehl.runtime.fem.dofs import DofLayout
-    from softehl.runtime.fem.problem import Problem
-    from softehl.runtime.kernels import Kernel, KernelError
+    from softehl.runtime.discretisation.assembly import Assembler
+    from softehl.runtime.discretisation.dofmap import DofLayout
+    from softehl.runtime.discretisation.element_blocks import ElementBlock
+    from softehl.runtime.discretisation.problem import Problem
+    from softehl.runtime.discretisation.problem_checks import ProblemError
+    from softehl.runtime.kernels.kernel import Kernel, KernelError
     from softehl.runtime.mesh.mesh import Mesh, MeshError
     from softehl.runtime.results.result import Result
     from softehl.runtime.solve.arclength import Arclength
-    from softehl.runtime.solve.homotopy import Continuation
-    from softehl.runtime.solve.ladder import Ladder
+    from softehl.runtime.solve.continuation import Continuation, StepRule
     from softehl.runtime.solve.newton import Newton
     from softehl.runtime.solve.solution import Branch, NotConverged, Solution, Status
-    from softehl.runtime.solve.steps import StepRule
+    from softehl.runtime.solve.solver_cascade import Ladder
     from softehl.runtime.study import Study
 
 __version__ = "0.2.0"
@@ -52,16 +52,16 @@ if not (Path(__file__).parent / "runtime").is_dir():
 
 _PUBLIC = {
     "Arclength": "softehl.runtime.solve.arclength",
-    "Assembler": "softehl.runtime.fem.assembly",
+    "Assembler": "softehl.runtime.discretisation.assembly",
     "Branch": "softehl.runtime.solve.solution",
-    "Continuation": "softehl.runtime.solve.homotopy",
+    "Continuation": "softehl.runtime.solve.continuation",
     "Curve": "softehl.cases.harness.sweep",
-    "DofLayout": "softehl.runtime.fem.dofs",
-    "ElementBlock": "softehl.runtime.fem.assembly",
+    "DofLayout": "softehl.runtime.discretisation.dofmap",
+    "ElementBlock": "softehl.runtime.discretisation.element_blocks",
     "FilmState": "softehl.cases.seal.states.state",
-    "Kernel": "softehl.runtime.kernels",
-    "KernelError": "softehl.runtime.library",
-    "Ladder": "softehl.runtime.solve.ladder",
+    "Kernel": "softehl.runtime.kernels.kernel",
+    "KernelError": "softehl.runtime.kernels.shared_library",
+    "Ladder": "softehl.runtime.solve.solver_cascade",
     "Mesh": "softehl.runtime.mesh.mesh",
     "MeshError": "softehl.runtime.mesh.mesh",
     "Newton": "softehl.runtime.solve.newton",
@@ -69,14 +69,14 @@ _PUBLIC = {
     "ORing": "softehl.cases.seal.gland.parameters",
     "Observer": "softehl.cases.seal.states.state",
     "Outcome": "softehl.cases.seal.states.state",
-    "Problem": "softehl.runtime.fem.problem",
-    "ProblemError": "softehl.runtime.fem.checks",
+    "Problem": "softehl.runtime.discretisation.problem",
+    "ProblemError": "softehl.runtime.discretisation.problem_checks",
     "Result": "softehl.runtime.results.result",
     "Seal": "softehl.cases.seal.gland.parameters",
     "Silent": "softehl.cases.seal.states.state",
     "Solution": "softehl.runtime.solve.solution",
     "Status": "softehl.runtime.solve.solution",
-    "StepRule": "softehl.runtime.solve.steps",
+    "StepRule": "softehl.runtime.solve.continuation",
     "Study": "softehl.runtime.study",
     "StudyError": "softehl.runtime.definition.problem_definition",
     "main": "softehl.__main__",
@@ -221,7 +221,7 @@ def load_kernel(
     SymPyNeededError
         The kernel must be derived, and SymPy is not installed.
     """
-    from softehl.runtime import kernels
+    from softehl.runtime.kernels import kernel
 
     # os.path: a name that is too long for a file is none
     folder_given = isinstance(source, (str, Path)) and os.path.isdir(source)
@@ -231,8 +231,8 @@ def load_kernel(
             with with_sympy():
                 from softehl.codegen.tools.library import of_law
 
-                return kernels.kernel_in(of_law(source, where, derivatives=derivatives), None, cell)
-        shipped = kernels.load_kernel(source)
+                return kernel.kernel_in(of_law(source, where, derivatives=derivatives), None, cell)
+        shipped = kernel.load_kernel(source)
         if not derivatives:
             return shipped
         with with_sympy():
@@ -240,10 +240,10 @@ def load_kernel(
 
             return load_kernel(ALL[source](), derivatives=True)
     if isinstance(source, (str, Path)) and folder_given:
-        return kernels.kernel_in(Path(source).resolve(), name, cell)
+        return kernel.kernel_in(Path(source).resolve(), name, cell)
     from softehl.codegen.tools import library
 
     place = Path(source) if isinstance(source, str) else source
     with with_sympy():
         folder = library.folder_of(place, where, derivatives=derivatives)
-    return kernels.kernel_in(folder, name, cell)
+    return kernel.kernel_in(folder, name, cell)

@@ -166,7 +166,7 @@ def _commands() -> "click.Group":
         """Show what the kernels cost, and which compiled library of them is used."""
         from softehl.cases.harness.errors import BadInput
         from softehl.codegen.tools.table import kernels
-        from softehl.runtime.library import KernelError, library_of
+        from softehl.runtime.kernels.shared_library import KernelError, library_of
 
         try:
             library = library_of()

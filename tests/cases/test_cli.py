@@ -41,8 +41,8 @@ from softehl.cases.seal.states.state import (
     place,
 )
 from softehl.cases.shipped import SHIPPED
-from softehl.runtime.kernels import MissingKernelsError
-from softehl.runtime.library import library_of
+from softehl.runtime.kernels.kernel import MissingKernelsError
+from softehl.runtime.kernels.shared_library import library_of
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.solve.solution import Status
 from tests.cases.oring_cases import film_values
@@ -748,7 +748,7 @@ def test_a_full_disk_is_one_line(
 def test_a_linear_solver_that_is_missing_is_bad_input(
     here: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("softehl.runtime.solve.pardiso.available", lambda: False)
+    monkeypatch.setattr("softehl.runtime.solve.linear.pardiso.available", lambda: False)
     code, out, err = invoke("run", "oring", *FAST, "--set", "linear=pardiso", solver=solve_really)
     assert (code, out, len(err)) == (2, [], 1)
     assert 'allowed here: "auto" or "superlu"' in err[0]

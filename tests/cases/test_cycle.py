@@ -32,10 +32,10 @@ from softehl.cases.seal.report.cycle import (
 )
 from softehl.cases.slider.strip import Oil, Strip
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem import rules
-from softehl.runtime.fem.problem import Problem
+from softehl.runtime.discretisation import quadrature
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.io import read_arrays, read_table
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.solve.differences import differences
 from softehl.runtime.solve.newton import Newton
 from tests.reference.calling import fitted_order
@@ -55,7 +55,7 @@ def strip(h: float, segments: int = 8, length: float = 1.0) -> Strip:
 def problem_of(one: Strip, speed: float) -> Problem:
     """The film of a strip, and what it holds as a block of its own, at rest."""
     study, content = one.study(speed), load_kernel("film_squeeze")
-    along, rule = {PRESSURE: one.rows, VOID: one.rows}, rules.content_rule(one.order)
+    along, rule = {PRESSURE: one.rows, VOID: one.rows}, quadrature.content_rule(one.order)
     resting = dict[str, Any](dict.fromkeys(content.parameters, 0.0))
     study.add(SQUEEZE, content, along=along, rule=rule, **resting)
     return one.posed(study, speed).with_parameters(**{SQUEEZE: None})

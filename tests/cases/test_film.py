@@ -17,7 +17,7 @@ from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.solve.squeeze_film import film_layer, film_loads
 from softehl.cases.seal.states.state import Outcome
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.backends import choose
+from softehl.runtime.solve.linear.direct import choose
 from softehl.runtime.solve.solution import Solution, Status
 from tests.cases.oring_cases import oring
 from tests.cases.test_method import Recorder

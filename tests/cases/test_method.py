@@ -20,7 +20,7 @@ from softehl.cases.seal.states.state import (
     Outcome,
     Silent,
 )
-from softehl.runtime.fem.contact import tributary_areas
+from softehl.runtime.contact.rigid_obstacles import tributary_areas
 from tests.cases.oring_cases import oring
 
 

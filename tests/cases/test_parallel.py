@@ -24,9 +24,9 @@ from softehl.cases.harness.workers import solve_side_by_side
 from softehl.cases.oring import CASE
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.shipped import solve_cases
-from softehl.runtime.kernels import ArgumentError, MissingKernelsError, StaleKernelsError
-from softehl.runtime.solve.backends import MissingBackend
-from softehl.runtime.solve.linear import SingularMatrix
+from softehl.runtime.kernels.kernel import ArgumentError, MissingKernelsError, StaleKernelsError
+from softehl.runtime.solve.linear.direct import MissingBackend
+from softehl.runtime.solve.linear.linear_solver import SingularMatrix
 from tests.cases.elsewhere import double, fail, touch, wait_in_a_worker
 from tests.cases.test_cli import outcome
 

@@ -17,7 +17,7 @@ from softehl.cases.seal.gland.surfaces import SurfacePair, regime
 from softehl.cases.seal.solve.inlet import inlet_length
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import FilmRow, FilmState, Silent
-from softehl.runtime.fem.guards import ChangesLittle
+from softehl.runtime.discretisation.step_bounds import ChangesLittle
 
 VALIDATION = Path(__file__).parents[2] / "docs" / "validation"
 SPEEDS = (2000.0, 500.0, 200.0, 50.0, 10.0, 1.0, 0.1, 0.01)

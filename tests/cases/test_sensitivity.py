@@ -46,11 +46,11 @@ from softehl.cases.seal.states.sensitivity_table import SensitivityRow, differen
 from softehl.cases.seal.states.state import FilmRow, Silent
 from softehl.cases.seal.states.verdict import Verdict
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.postprocess import interval_below
+from softehl.runtime.discretisation.postprocessing import interval_below
 from softehl.runtime.io import read_csv, write_csv
-from softehl.runtime.solve.linear import Factorisation, SparseMatrix
+from softehl.runtime.solve.linear.linear_solver import Factorisation, SparseMatrix
+from softehl.runtime.solve.linear.superlu import SuperLU
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.superlu import SuperLU
 from tests.cases.oring_cases import film_values
 
 SLOPES = Mapping[str, Mapping[str, float]]

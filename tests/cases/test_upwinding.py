@@ -12,7 +12,7 @@ from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.solve.method import run
 from softehl.cases.seal.states.state import Outcome
-from softehl.runtime.fem.problem import Problem
+from softehl.runtime.discretisation.problem import Problem
 from tests.cases.oring_cases import oring
 from tests.cases.test_method import Recorder
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from softehl.runtime.library import GENERATED
+from softehl.runtime.kernels.shared_library import GENERATED
 
 PATH = Path(__file__).with_name("budget.json")
 REMEDY = "if the rise is meant: python -m tests.codegen.budget"

@@ -10,8 +10,8 @@ import numpy as np
 
 from softehl.codegen.graph.evaluate import State
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.rules import Kind, facet_rule, film_rule
-from softehl.runtime.kernels import Kernel, Rule, load_kernel
+from softehl.runtime.discretisation.quadrature import Kind, facet_rule, film_rule
+from softehl.runtime.kernels.kernel import Kernel, Rule, load_kernel
 from tests.reference.calling import rule_of
 from tests.reference.states import State as Known
 from tests.reference.states import (

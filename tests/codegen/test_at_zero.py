@@ -21,7 +21,7 @@ from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build, product
-from softehl.runtime.kernels import Kernel, load_kernel
+from softehl.runtime.kernels.kernel import Kernel, load_kernel
 
 Q = sp.Rational
 ALONG = np.array([0.6, 0.0, 0.8])

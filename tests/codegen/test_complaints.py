@@ -14,7 +14,7 @@ import pytest
 
 import softehl
 from softehl.codegen.tools import build, cache, cli
-from softehl.runtime.kernels import MissingKernelsError, StaleKernelsError
+from softehl.runtime.kernels.kernel import MissingKernelsError, StaleKernelsError
 
 MODEL = build.GENERATED.parent / "tests" / "codegen" / "pages" / "penalty_spring.py"
 NO_SYMPY = """

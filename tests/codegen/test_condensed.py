@@ -14,7 +14,7 @@ from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature, shapes
 from softehl.codegen.language.model import Model
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.kernels.kernel import load_kernel
 from tests.codegen.workshop import compiled, tangent_errors
 
 MU, LAME = 2.0, 3.0

@@ -13,7 +13,7 @@ from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
-from softehl.runtime.kernels import ArgumentError, Kernel
+from softehl.runtime.kernels.kernel import ArgumentError, Kernel
 from tests.codegen.workshop import compiled
 
 

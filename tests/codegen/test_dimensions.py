@@ -16,7 +16,7 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature, shapes
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools.oracle import Oracle
-from softehl.runtime.kernels import ArgumentError, Kernel
+from softehl.runtime.kernels.kernel import ArgumentError, Kernel
 from tests.codegen.workshop import compiled
 
 CUBE = (np.array(shapes.HEX_NODES) + 1.0) / 2

@@ -18,8 +18,9 @@ from softehl.codegen.abi import Target
 from softehl.codegen.models import ALL
 from softehl.codegen.pipeline import compile_model
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.assembly import Assembler, ElementBlock
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.kernels.kernel import load_kernel
 from tests.codegen.cell_kernels import TENSOR, CellKernels, Plane, cell_kernels, distorted
 from tests.codegen.element_states import MATERIALS
 

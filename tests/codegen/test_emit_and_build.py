@@ -22,8 +22,13 @@ from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import build, product, shipped
 from softehl.codegen.tools.oracle import Oracle
-from softehl.runtime.fem.rules import film_rule, gauss
-from softehl.runtime.kernels import Kernel, MissingKernelsError, StaleKernelsError, load_kernel
+from softehl.runtime.discretisation.quadrature import film_rule, gauss
+from softehl.runtime.kernels.kernel import (
+    Kernel,
+    MissingKernelsError,
+    StaleKernelsError,
+    load_kernel,
+)
 from tests.codegen.workshop import compiled, write
 
 x0, x1 = 0.37, -0.81

@@ -20,7 +20,7 @@ from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.pages import Form, Page
 from softehl.codegen.tools import build, library, verify
 from softehl.runtime.arrays import Array
-from softehl.runtime.kernels import Kernel, load_kernel
+from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from softehl.runtime.mesh.cells import CELLS
 from tests.codegen import field_pages
 from tests.codegen.workshop import compiled, write

@@ -24,7 +24,7 @@ from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build, product
 from softehl.codegen.tools.oracle import Oracle
-from softehl.runtime.kernels import ArgumentError, Kernel, load_kernel
+from softehl.runtime.kernels.kernel import ArgumentError, Kernel, load_kernel
 from tests.codegen.workshop import compiled, difference, element_state, off, tangent_errors
 
 HISTORY = np.array([[0.3], [0.5]])

@@ -24,8 +24,8 @@ from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build, timing
 from softehl.codegen.tools.oracle import Oracle
-from softehl.runtime.fem.rules import film_rule
-from softehl.runtime.kernels import Kernel, load_kernel
+from softehl.runtime.discretisation.quadrature import film_rule
+from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from tests.codegen.workshop import element_state, off, write
 
 LANES = ("-DSOFTEHL_LANES=1", "-DSOFTEHL_LANES=4", "-DSOFTEHL_LANES=8")

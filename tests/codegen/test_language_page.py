@@ -12,7 +12,7 @@ import pytest
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.lower import SUPPORTED
 from softehl.codegen.language.model import Model
-from softehl.runtime.kernels import Kernel
+from softehl.runtime.kernels.kernel import Kernel
 from tests.codegen.workshop import compiled, tangent_errors
 
 PAGE = (Path(__file__).parents[2] / "docs" / "language.md").read_text(encoding="utf-8")

@@ -14,7 +14,7 @@ import pytest
 
 import softehl
 from softehl.codegen.tools import library, user
-from softehl.runtime.kernels import Kernel
+from softehl.runtime.kernels.kernel import Kernel
 
 SPRING = """
 from softehl import Definition, Model, quadrature

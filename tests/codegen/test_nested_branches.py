@@ -14,7 +14,7 @@ from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
 from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.tools import build, product
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.kernels.kernel import load_kernel
 from tests.codegen.nested_models import (
     Nested,
     NoValueError,

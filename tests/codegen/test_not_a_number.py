@@ -13,7 +13,7 @@ from softehl.codegen.abi import Target
 from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build, product
-from softehl.runtime.kernels import Kernel, load_kernel
+from softehl.runtime.kernels.kernel import Kernel, load_kernel
 
 u, v, k = sp.symbols("u v k", real=True)
 SPOILT = [

@@ -22,7 +22,7 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.models import ALL
 from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.arrays import Array
-from softehl.runtime.kernels import Kernel, load_kernel
+from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from tests.codegen.element_states import Case, all_cases
 from tests.codegen.workshop import compiled
 from tests.shipped import ENERGIES, FIELDS

@@ -12,7 +12,7 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import shapes
 from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.arrays import Array
-from softehl.runtime.kernels import Kernel, Rule
+from softehl.runtime.kernels.kernel import Kernel, Rule
 from tests.codegen.pages.gent import gent
 from tests.codegen.pages.maxwell import maxwell
 from tests.codegen.pages.ogden_hex8 import ogden

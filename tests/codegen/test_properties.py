@@ -31,7 +31,7 @@ from softehl.codegen.graph.traverse import rewrite
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.optimise import passes
 from softehl.codegen.tools import build, product
-from softehl.runtime.kernels import Kernel, load_kernel
+from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from tests.codegen.random_models import (
     DIGITS,
     UNKNOWNS,

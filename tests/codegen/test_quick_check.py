@@ -18,8 +18,8 @@ from softehl.codegen.language.elements import quadrature
 from softehl.codegen.language.model import Model
 from softehl.codegen.optimise import passes
 from softehl.codegen.tools import quick
-from softehl.runtime.kernels import load_kernel
-from softehl.runtime.library import library_of
+from softehl.runtime.kernels.kernel import load_kernel
+from softehl.runtime.kernels.shared_library import library_of
 
 Last = Callable[[Graph, Node], Node]
 

@@ -20,7 +20,7 @@ from softehl.codegen.language.complaints import ModelError
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import build, product
 from softehl.runtime.arrays import Array
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.cells import CELLS
 from tests.codegen.nested_models import DIGITS, STEP, NoValueError
 from tests.codegen.random_pages import FIRST, TASKS, Meaning, RandomPage, moved, random_page

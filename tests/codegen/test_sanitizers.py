@@ -18,8 +18,8 @@ import pytest
 
 from softehl.codegen.abi import AT_POINTS, Task, function_name
 from softehl.codegen.tools import build
-from softehl.runtime.kernels import load_kernel
-from softehl.runtime.library import manifest
+from softehl.runtime.kernels.kernel import load_kernel
+from softehl.runtime.kernels.shared_library import manifest
 from tests.codegen.element_states import Case, all_cases
 
 BATCHES = (0, 1, 2, 3, 4, 5, 7, 9)

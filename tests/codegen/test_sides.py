@@ -19,7 +19,7 @@ from softehl.codegen.language.material import Law, Material, material
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build, product
 from softehl.codegen.tools.model_text import ModelFileError
-from softehl.runtime.kernels import Kernel, load_kernel
+from softehl.runtime.kernels.kernel import Kernel, load_kernel
 
 ROOT = sp.Rational(1, 2)
 

@@ -24,7 +24,7 @@ from softehl.codegen.language.model import Model
 from softehl.codegen.tools import build, verify
 from softehl.codegen.tools.oracle import Oracle
 from softehl.runtime.arrays import Array
-from softehl.runtime.kernels import Kernel, load_kernel
+from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from tests.codegen.workshop import compiled, element_state, off, tangent_errors, write
 
 PARAMETERS = (0.7, 1.7, 0.3)

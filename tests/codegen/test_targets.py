@@ -13,7 +13,7 @@ from softehl.codegen import pipeline
 from softehl.codegen.abi import Target
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import build, cli, product
-from softehl.runtime.kernels import Kernel, load_kernel
+from softehl.runtime.kernels.kernel import Kernel, load_kernel
 from tests.codegen.element_states import Case, all_cases
 
 FAMILIES = ("solid_taylor", "contact", "axial_spring")

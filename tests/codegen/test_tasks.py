@@ -18,8 +18,8 @@ from softehl.codegen.language.definition import Definition
 from softehl.codegen.language.elements import quadrature, shapes
 from softehl.codegen.language.model import Model
 from softehl.codegen.tools.oracle import Oracle
-from softehl.runtime.fem.rules import film_rule, several
-from softehl.runtime.kernels import ArgumentError, Kernel
+from softehl.runtime.discretisation.quadrature import film_rule, several
+from softehl.runtime.kernels.kernel import ArgumentError, Kernel
 from tests.codegen.workshop import compiled, element_state, off, tangent_errors
 
 X = np.array([[0.1, 0.0, 1.1, 0.2, 0.9, 1.0, -0.1, 0.9]])

@@ -23,8 +23,9 @@ from softehl.codegen.language.model import Model
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import samples
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.assembly import Assembler, ElementBlock
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.kernels.kernel import load_kernel
 from tests.codegen.cell_kernels import TENSOR, CellKernels, Plane, cell_kernels, distorted
 from tests.codegen.element_states import MATERIALS, Case, all_cases
 from tests.codegen.hosts.random_pages import FEW, pages

@@ -14,7 +14,7 @@ from softehl.codegen.tools import cli, compare, library, location, model_text, u
 from softehl.codegen.tools import files as cli_files
 from softehl.codegen.tools.build import DIGEST, LIBRARY
 from softehl.codegen.tools.model_text import ModelFileError
-from softehl.runtime.kernels import ArgumentError, MissingKernelsError, StaleKernelsError
+from softehl.runtime.kernels.kernel import ArgumentError, MissingKernelsError, StaleKernelsError
 
 SPRING = """
 from softehl import Definition, Model, quadrature

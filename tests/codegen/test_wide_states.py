@@ -18,7 +18,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 
 from softehl.codegen import pipeline
 from softehl.codegen.tools import build, product
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.kernels.kernel import load_kernel
 from tests.codegen.random_models import OutsideError, Recipe, recipes
 from tests.codegen.test_properties import error, expected
 

@@ -19,7 +19,7 @@ from softehl.codegen.graph.graph import Graph, Node
 from softehl.codegen.language.definition import Definition
 from softehl.codegen.tools import build, product
 from softehl.codegen.tools.oracle import Oracle
-from softehl.runtime.kernels import Kernel, load_kernel
+from softehl.runtime.kernels.kernel import Kernel, load_kernel
 
 Number = Any
 Inputs = Mapping[tuple[str, int], Number]

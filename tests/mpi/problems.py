@@ -23,8 +23,8 @@ from softehl.codegen.language.fields import Fields
 from softehl.runtime.analyses.motion import Motion
 from softehl.runtime.analyses.time_integrators import METHODS
 from softehl.runtime.arrays import Array
-from softehl.runtime.engines.petsc import Petsc
-from softehl.runtime.fem.loads import Amount
+from softehl.runtime.discretisation.loads import Amount
+from softehl.runtime.parallel.petsc import Petsc
 from softehl.runtime.results.result import Result
 
 DOCS = Path(__file__).parents[2] / "docs"

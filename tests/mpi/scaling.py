@@ -17,10 +17,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from softehl.runtime.engines.petsc import Petsc
-from softehl.runtime.engines.shares import Processes
-from softehl.runtime.engines.spread import Team
 from softehl.runtime.mpi import world
+from softehl.runtime.parallel.distributed_problem import Team
+from softehl.runtime.parallel.mpi_communicator import Processes
+from softehl.runtime.parallel.petsc import Petsc
 from tests.mpi.problems import cube
 
 

@@ -23,7 +23,7 @@ SOURCE = build.GENERATED.parent / "src"
 KEPT = ("contact.c", "signature.c", "softehl_kernels.h", "__init__.py")
 USE = """
 import numpy, softehl
-from softehl.runtime.library import library_of
+from softehl.runtime.kernels.shared_library import library_of
 kernel = softehl.load_kernel("contact")
 given = {"data": numpy.ones((1, 5)), "parameters": numpy.ones(len(kernel.parameters))}
 values = kernel.residual(numpy.zeros((1, 2)), numpy.zeros((1, 3)), **given)
@@ -131,7 +131,7 @@ def missing(process: subprocess.Popen[str]) -> str:
     _, err = process.communicate(timeout=300)
     assert process.returncode == 1
     kind, _, message = err.splitlines()[-1].partition(": ")
-    assert kind == "softehl.runtime.library.MissingKernelsError"
+    assert kind == "softehl.runtime.kernels.shared_library.MissingKernelsError"
     assert message.startswith("the kernels are not built, nor are there plain ones: ")
     return message
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softehl.runtime.kernels import ArgumentError, load_kernel
+from softehl.runtime.kernels.kernel import ArgumentError, load_kernel
 from tests.reference import oracles
 from tests.reference.calling import rule_of
 from tests.reference.differentiate import STEP, mpf, numbers

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from softehl.runtime.fem import rules
+from softehl.runtime.discretisation import quadrature
 from tests.reference.calling import Part, assemble
 
 ROD, OIL, G, H, DX = 25.0, 6.59e-8, 3.66, 6e-4, 0.05
@@ -48,7 +48,7 @@ class Bed:
         maps = np.hstack([moved, first + order * np.arange(n)[:, None] + np.arange(order + 1)])
         nodes = np.stack([DX * np.arange(n + 1), np.full(n + 1, ROD + H)], axis=1)
         given = nodes[ends].reshape(n, 4), maps
-        rule = rules.film_rule(order)
+        rule = quadrature.film_rule(order)
         film = Part("film", *given, (ROD, self.speed, OIL, 0.0, 0.0, 1.0, 0.0), rule=rule)
         oil = (ROD, self.speed, OIL, G, self.strength, 1.0)
         x = np.zeros(first + order * n + 1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.kernels.kernel import load_kernel
 from tests.reference.calling import Part, assemble, call
 from tests.reference.states import boundary_states
 

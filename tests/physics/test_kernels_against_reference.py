@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.kernels.kernel import load_kernel
 from tests.reference import film, material, oracles, rules, sheet, solids, upwind
 from tests.reference.calling import call, rule_of
 from tests.reference.differentiate import PI, Matrix, Vector, hessian, jacobian, numbers

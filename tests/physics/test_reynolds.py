@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from softehl.runtime.fem import rules
-from softehl.runtime.kernels import Rule
+from softehl.runtime.discretisation import quadrature
+from softehl.runtime.kernels.kernel import Rule
 from tests.reference.calling import Part, assemble, fitted_order, solve
 from tests.reference.slider import ROD, Slider
 
@@ -34,7 +34,7 @@ class Film:
 
     def error(self, slider: Slider) -> float:
         """L2 norm of the pressure error by a fine Gauss rule."""
-        fine = rules.film_rule(self.order, "gauss", self.order + 6)
+        fine = quadrature.film_rule(self.order, "gauss", self.order + 6)
         part = replace_rule(self.part, fine)
         values = part.fields(self.x)
         wrong = values["p"] - slider.pressure(values["x"])
@@ -46,7 +46,11 @@ def replace_rule(part: Part, rule: Rule) -> Part:
 
 
 def discretise(
-    slider: Slider, count: int, order: int, kind: rules.Kind = "gauss", points: int | None = None
+    slider: Slider,
+    count: int,
+    order: int,
+    kind: quadrature.Kind = "gauss",
+    points: int | None = None,
 ) -> Film:
     """Segments along the wedge; all displacements are zero and fixed."""
     z = np.linspace(0.0, slider.length, count + 1)
@@ -56,14 +60,18 @@ def discretise(
     first = 2 * (count + 1)
     maps = np.hstack([moved, first + order * np.arange(count)[:, None] + np.arange(order + 1)])
     parameters = (ROD, slider.speed, slider.viscosity, slider.alpha, slider.penalty, 1.0, 1.0)
-    rule = rules.film_rule(order, kind, points)
+    rule = quadrature.film_rule(order, kind, points)
     part = Part("film", nodes[ends].reshape(count, 4), maps, parameters, rule=rule)
     size = first + order * count + 1
     return Film(part, np.zeros(size), np.arange(first, size), order)
 
 
 def solved(
-    slider: Slider, count: int, order: int, kind: rules.Kind = "gauss", points: int | None = None
+    slider: Slider,
+    count: int,
+    order: int,
+    kind: quadrature.Kind = "gauss",
+    points: int | None = None,
 ) -> Film:
     film = discretise(slider, count, order, kind, points)
     x = solve([film.part], film.x, film.pressures[1:-1], tolerance=1e-11)
@@ -71,7 +79,7 @@ def solved(
 
 
 def orders(
-    slider: Slider, m_p: int, kind: rules.Kind, exact: Slider, points: int | None = None
+    slider: Slider, m_p: int, kind: quadrature.Kind, exact: Slider, points: int | None = None
 ) -> float:
     counts = MESHES[m_p]
     errors = [solved(slider, n, m_p, kind, points).error(exact) for n in counts]
@@ -82,7 +90,7 @@ def orders(
 @pytest.mark.parametrize("m_p", [1, 2, 3, 4, 5])
 @pytest.mark.parametrize("alpha", [0.0, 0.8], ids=["constant", "barus"])
 def test_pressure_converges_with_order_m_p_plus_one(
-    alpha: float, m_p: int, kind: rules.Kind
+    alpha: float, m_p: int, kind: quadrature.Kind
 ) -> None:
     slider = Slider(alpha=alpha)
     assert m_p + 0.85 < orders(slider, m_p, kind, slider) < m_p + 1.15
@@ -113,7 +121,7 @@ def test_load_and_flux_converge_with_twice_the_order(m_p: int) -> None:
 
 @pytest.mark.parametrize("kind", ["gauss", "lobatto"])
 @pytest.mark.parametrize("m_p", [1, 2, 3, 4, 5, 7])
-def test_element_mean_flux_is_constant_along_the_film(m_p: int, kind: rules.Kind) -> None:
+def test_element_mean_flux_is_constant_along_the_film(m_p: int, kind: quadrature.Kind) -> None:
     """The hat functions are among the test functions: the element means are equal to rounding."""
     film = solved(Slider(alpha=0.02), 6, m_p, kind)
     flux = film.element_flux()
@@ -147,7 +155,7 @@ def test_a_wrong_oil_wedge_or_law_loses_the_order() -> None:
 
 
 @pytest.mark.parametrize("kind", ["gauss", "lobatto"])
-def test_cavitated_diverging_wedge_sits_at_the_penalty_pressure(kind: rules.Kind) -> None:
+def test_cavitated_diverging_wedge_sits_at_the_penalty_pressure(kind: quadrature.Kind) -> None:
     """-dq/dx = eps p for p < 0: with constant h' the plateau is p = -ubar h' / eps exactly.
 
     The ends decay over sqrt(h^3 / (12 eta eps)), a small part of the length.
@@ -220,7 +228,7 @@ def resisting(degrees: float, length: float = 1e-3) -> float:
     middle, half = 0.02, 0.5 * length * np.array([np.cos(a := np.radians(degrees)), np.sin(a)])
     nodes = np.array([[-half[0], ROD + middle - half[1], half[0], ROD + middle + half[1]]])
     parameters = (ROD, 0.0, 1e-8, 0.0, 0.0, 0.0, 0.0)
-    part = Part("film", nodes, np.arange(6)[None], parameters, rule=rules.film_rule(1))
+    part = Part("film", nodes, np.arange(6)[None], parameters, rule=quadrature.film_rule(1))
     rows, _ = part.elements(np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0]))
     return -float(rows[0, 4])
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from softehl.runtime.fem import rules
-from softehl.runtime.fem.dofs import separate_dofs
-from softehl.runtime.kernels import Rule
+from softehl.runtime.discretisation import quadrature
+from softehl.runtime.discretisation.dofmap import separate_dofs
+from softehl.runtime.kernels.kernel import Rule
 from tests.reference.calling import Part, fitted_order
 from tests.reference.slider import ROD, Slider
 
@@ -30,7 +30,7 @@ class Film:
 
     def error(self, slider: Slider) -> float:
         """L2 norm of the pressure error by a fine Gauss rule."""
-        fine = rules.film_rule(self.order, "gauss", self.order + 6)
+        fine = quadrature.film_rule(self.order, "gauss", self.order + 6)
         given = (self.cells.coordinates, self.cells.maps, self.cells.parameters)
         values = Part("film", *given, rule=fine).fields(self.x)
         wrong = values["p"] - slider.pressure(values["x"])
@@ -56,9 +56,11 @@ def solved(slider: Slider, count: int, order: int, *, facet_sign: float = 1.0) -
         return Part(family, places, np.hstack([moved, after]), oil, rule=rule)
 
     oil = (ROD, slider.speed, slider.viscosity, slider.alpha)
-    cells = part("film", 2, pressures, (*oil, slider.penalty, 1.0, 1.0), rules.film_rule(order))
+    cells = part(
+        "film", 2, pressures, (*oil, slider.penalty, 1.0, 1.0), quadrature.film_rule(order)
+    )
     both = np.hstack([pressures[:-1], pressures[1:]])
-    facets = part("film_facet", 3, both, oil, rules.facet_rule(order))
+    facets = part("film_facet", 3, both, oil, quadrature.facet_rule(order))
     x = np.zeros(first + pressures.size)
     free = np.arange(first + 1, x.size - 1)
     for _ in range(40):

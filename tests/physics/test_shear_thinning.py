@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from softehl.runtime.fem.rules import film_rule
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.discretisation.quadrature import film_rule
+from softehl.runtime.kernels.kernel import load_kernel
 from tests.reference.calling import call
 from tests.reference.states import State, film_states, thin_film_states, thinned
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softehl.runtime.fem import rules
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.discretisation import quadrature
+from softehl.runtime.kernels.kernel import load_kernel
 from tests.reference.calling import Part, fitted_order
 
 ROD, U, OIL, G = 25.0, 400.0, 6.59e-8, 3.66
@@ -28,9 +28,9 @@ def chain(
     maps = np.hstack([moved, first + order * np.arange(count)[:, None] + np.arange(order + 1)])
     nodes = np.stack([x, ROD + h], axis=1)
     parameters = (ROD, speed, OIL, G, strength, 1.0)
-    rule = rules.film_rule(order)
+    rule = quadrature.film_rule(order)
     part = Part("film_upwind", nodes[ends].reshape(count, 4), maps, parameters, rule=rule)
-    inner = (1 + rules.pressure_nodes(order)[:-1]) / 2
+    inner = (1 + quadrature.pressure_nodes(order)[:-1]) / 2
     places = (x[:-1, None] + np.diff(x)[:, None] * inner).ravel()
     return part, np.append(places, x[-1])
 
@@ -42,7 +42,7 @@ def elements(rng: np.random.Generator, order: int, **changes: float) -> tuple[np
     u[:, 1::2] = ROD + rng.uniform(0.003, 0.03, (5, 2)) - X[:, 1::2]
     p = rng.uniform(1, 5, (5, order + 1))
     given = dict(zip(NAMES, (ROD, U, OIL, G, 1.0, 0.8), strict=True)) | changes
-    kernel, rule = load_kernel("film_upwind"), rules.film_rule(order)
+    kernel, rule = load_kernel("film_upwind"), quadrature.film_rule(order)
     assert kernel.parameters == NAMES
     return kernel.tangent(X, np.hstack([u, p]), parameters=given, rule=rule)
 

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from softehl.runtime.fem import rules
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.discretisation import quadrature
+from softehl.runtime.kernels.kernel import load_kernel
 from tests.reference.mixed import CONSERVING
 from tests.reference.states import State
 
 RULES = {
-    **dict.fromkeys(CONSERVING, rules.rupture_rule),
-    "film_rough": rules.rupture_rule,
-    "film_squeeze": rules.content_rule,
-    "film_squeeze_rough": rules.content_rule,
-    "film_upwind_rough": rules.film_rule,
+    **dict.fromkeys(CONSERVING, quadrature.rupture_rule),
+    "film_rough": quadrature.rupture_rule,
+    "film_squeeze": quadrature.content_rule,
+    "film_squeeze_rough": quadrature.content_rule,
+    "film_upwind_rough": quadrature.film_rule,
 }
 """Rules of the films that may rupture, by the order of the pressure."""
 
@@ -25,14 +25,14 @@ RULES = {
 def rule_of(state: State) -> Any:
     """The double-precision rule that goes with a state (None: the kernel's own)."""
     if state.family == "film_facet":
-        return rules.facet_rule((len(state.dofs) - 6) // 2 - 1)
+        return quadrature.facet_rule((len(state.dofs) - 6) // 2 - 1)
     if state.family in RULES:
         pressures = len(state.dofs) - 4
         both = state.family != "film_upwind_rough"
         return RULES[state.family]((pressures // 2 if both else pressures) - 1)
     if state.family not in ("film", "film_eyring", "film_carreau", "film_upwind"):
         return None
-    return rules.film_rule(len(state.dofs) - 5, state.kind, state.count)
+    return quadrature.film_rule(len(state.dofs) - 5, state.kind, state.count)
 
 
 def call(task: str, state: State) -> Any:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.kernels import Rule
+from softehl.runtime.kernels.kernel import Rule
 
 
 @dataclass(frozen=True)

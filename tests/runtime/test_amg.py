@@ -15,13 +15,13 @@ from scipy.sparse import csc_array, diags_array
 import softehl
 from softehl.runtime.arrays import Array, Flags
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.engines import sizes
+from softehl.runtime.parallel import linear_solver_choice
 from softehl.runtime.sensitivity import linearised_step as linear
-from softehl.runtime.solve import amg
 from softehl.runtime.solve.eigen import Pivots
-from softehl.runtime.solve.reordered import Entries
+from softehl.runtime.solve.linear import amg
+from softehl.runtime.solve.linear.amg import Entries
+from softehl.runtime.solve.linear.superlu import SuperLU
 from softehl.runtime.solve.solution import NotConverged
-from softehl.runtime.solve.superlu import SuperLU
 
 HEAT = Path(__file__).parents[2] / "docs" / "models" / "heat_fields.py"
 
@@ -71,7 +71,7 @@ def iterations(study: softehl.Study, motions: int = 6) -> int:
     system = study.system()
     problem = system.problem(system.still(1.0, system.at_rest(), {}))
     r, K = problem.linearise(system.at_rest())
-    modes = sizes.nodal_modes(system)
+    modes = linear_solver_choice.nodal_modes(system)
     assert modes is not None
     told = amg.Modes(modes.order, 3, modes.near[:, :motions])
     factors = amg.Multigrid(told).factorise(K)
@@ -121,7 +121,7 @@ def test_grids_serve_the_tangents_of_a_path(monkeypatch: pytest.MonkeyPatch) -> 
     system = cube().system()
     problem = system.problem(system.still(1.0, system.at_rest(), {}))
     r, K = problem.linearise(system.at_rest())
-    modes = sizes.nodal_modes(system)
+    modes = linear_solver_choice.nodal_modes(system)
     assert modes is not None
     solver, half = amg.Multigrid(modes), np.arange(len(r)) % 2
     held = csc_array(K + diags_array(1e4 * half))
@@ -134,7 +134,7 @@ def test_grids_serve_the_tangents_of_a_path(monkeypatch: pytest.MonkeyPatch) -> 
 def test_size_decides_and_progress_says_so(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setitem(sizes.FACTORS_UP_TO, 3, 100)
+    monkeypatch.setitem(linear_solver_choice.FACTORS_UP_TO, 3, 100)
     cube().solve(progress=True)
     assert "(multigrid, because of 1029 unknowns in 3-D)" in capsys.readouterr().err
     monkeypatch.setattr(amg, "available", lambda: False)
@@ -145,13 +145,13 @@ def test_size_decides_and_progress_says_so(
 def test_factors_stand_in_where_multigrid_fails(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setitem(sizes.FACTORS_UP_TO, 3, 100)
-    monkeypatch.setattr(sizes, "Multigrid", partial(amg.Multigrid, most=3))
+    monkeypatch.setitem(linear_solver_choice.FACTORS_UP_TO, 3, 100)
+    monkeypatch.setattr(linear_solver_choice, "Multigrid", partial(amg.Multigrid, most=3))
     study, reference = cube(), cube().solve(linear="direct")
     found = study.solve(progress=True)
     assert "superlu after multigrid failed, because of 1029" in capsys.readouterr().err
     assert np.abs(found.x - reference.x).max() < 1e-9
-    monkeypatch.setitem(sizes.FALL_BACK_UP_TO, 3, 100)
+    monkeypatch.setitem(linear_solver_choice.FALL_BACK_UP_TO, 3, 100)
     with pytest.raises(NotConverged, match=r'multigrid left .* Use linear = "direct"'):
         study.solve()
 

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem import assembly
-from softehl.runtime.fem.assembly import Assembler, ElementBlock
-from softehl.runtime.fem.dofs import DofLayout
-from softehl.runtime.fem.guards import KeepsOrientation, StaysPositive
-from softehl.runtime.fem.pattern import build_pattern
-from softehl.runtime.fem.problem import Problem
+from softehl.runtime.discretisation import assembly
+from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.dofmap import DofLayout
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.sparsity import build_pattern
+from softehl.runtime.discretisation.step_bounds import KeepsOrientation, StaysPositive
 from tests.runtime.springs import Spring
 
 SIZE, ELEMENTS = 12, 25

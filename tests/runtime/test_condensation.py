@@ -9,10 +9,10 @@ import pytest
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.solve import superlu
-from softehl.runtime.solve.condensation import SchurByFactors, SchurBySolves
-from softehl.runtime.solve.ordering import Order
-from softehl.runtime.solve.superlu import SuperLU
+from softehl.runtime.solve.linear import superlu
+from softehl.runtime.solve.linear.elimination_ordering import Order
+from softehl.runtime.solve.linear.schur_complement import SchurByFactors, SchurBySolves
+from softehl.runtime.solve.linear.superlu import SuperLU
 
 SIDE, HELD = 9, 4
 N = SIDE * SIDE + HELD

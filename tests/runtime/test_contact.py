@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softehl.runtime.fem.contact import (
+from softehl.runtime.contact.rigid_obstacles import (
     contact_block,
     inner_cylinder,
     outer_cylinder,

@@ -15,11 +15,9 @@ from scipy.optimize import brentq
 
 from softehl.runtime.arrays import Array
 from softehl.runtime.solve.arclength import Arclength
-from softehl.runtime.solve.homotopy import Continuation
+from softehl.runtime.solve.continuation import Continuation, Predictor, StepRule
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.predictor import Predictor
 from softehl.runtime.solve.solution import Branch, NotConverged, Point, Status
-from softehl.runtime.solve.steps import StepRule
 from tests.runtime.test_newton import Algebraic
 
 

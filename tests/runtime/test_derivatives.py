@@ -17,7 +17,7 @@ from softehl.runtime.arrays import Array
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity import jacobian, linearised_step
 from softehl.runtime.sensitivity.linearised_step import refined
-from softehl.runtime.solve.superlu import SuperLU
+from softehl.runtime.solve.linear.superlu import SuperLU
 from softehl.runtime.study import StudyError
 
 EXACT = Newton(tolerance=1e-13)

@@ -7,7 +7,7 @@ from scipy.sparse import csc_array
 from softehl.cases.seal.correctors.chord_newton import solved
 from softehl.cases.seal.correctors.layer_split import Cut, Parts
 from softehl.cases.seal.correctors.nested_dissection import Elimination
-from softehl.runtime.solve.linear import SingularMatrix
+from softehl.runtime.solve.linear.linear_solver import SingularMatrix
 
 SEGMENTS, SHARED = 23, 26
 

@@ -15,7 +15,7 @@ from softehl import Mesh, Study, load_kernel
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
 from softehl.runtime.mesh.cells import CELLS, jacobians
-from softehl.runtime.mesh.facets import turns
+from softehl.runtime.mesh.interior_facets import turns
 from softehl.runtime.mesh.mesh import MeshError
 from tests.codegen.test_fields import differences
 

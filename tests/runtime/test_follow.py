@@ -9,10 +9,10 @@ import pytest
 import sympy as sp
 
 from softehl import Definition, Model, Newton, quadrature
-from softehl.runtime.engines.sizes import nodal_modes
 from softehl.runtime.mesh.mesh import Mesh
+from softehl.runtime.parallel.linear_solver_choice import nodal_modes
 from softehl.runtime.results.result import Result
-from softehl.runtime.solve.amg import Multigrid
+from softehl.runtime.solve.linear.amg import Multigrid
 from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.study import Study, StudyError
 

@@ -11,9 +11,9 @@ import sympy as sp
 from scipy.sparse import csc_array, lil_array
 
 from softehl import Definition, Mesh, Model, Study, kinematics, quadrature, shapes
-from softehl.runtime.solve.held import loosest
+from softehl.runtime.solve.linear.superlu import SuperLU
+from softehl.runtime.solve.singularity_check import loosest
 from softehl.runtime.solve.solution import NotConverged
-from softehl.runtime.solve.superlu import SuperLU
 from tests.runtime import solid_page as pages
 from tests.runtime.test_measure import bar
 

@@ -13,9 +13,9 @@ from scipy.sparse import csc_array
 from softehl import Mesh, Study, load_kernel
 from softehl.runtime.arrays import Array
 from softehl.runtime.results.result import Result
-from softehl.runtime.solve.internal import Condensing
-from softehl.runtime.solve.linear import SingularMatrix
-from softehl.runtime.solve.superlu import SuperLU
+from softehl.runtime.solve.linear.linear_solver import SingularMatrix
+from softehl.runtime.solve.linear.static_condensation import Condensing
+from softehl.runtime.solve.linear.superlu import SuperLU
 
 MODELS = Path(__file__).parents[2] / "docs" / "models"
 SHEAR, LAME, BULK = 1.0, 30.0, 200.0

@@ -14,15 +14,21 @@ import pytest
 from softehl.codegen.models import ALL
 from softehl.codegen.tools import build
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.rules import content_rule, facet_rule, film_rule, gauss, rupture_rule
-from softehl.runtime.kernels import (
+from softehl.runtime.discretisation.quadrature import (
+    content_rule,
+    facet_rule,
+    film_rule,
+    gauss,
+    rupture_rule,
+)
+from softehl.runtime.kernels.kernel import (
     ArgumentError,
     Kernel,
     MissingKernelsError,
     Rule,
     load_kernel,
 )
-from softehl.runtime.library import manifest
+from softehl.runtime.kernels.shared_library import manifest
 from tests.codegen.workshop import write
 from tests.reference.states import mortar_states, touch_states
 from tests.shipped import SHIPPED, VALUES

@@ -12,10 +12,10 @@ import pytest
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.ladder import Ladder
-from softehl.runtime.solve.linear import SparseMatrix
+from softehl.runtime.solve.linear.linear_solver import SparseMatrix
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Solution, Status
+from softehl.runtime.solve.solver_cascade import Ladder
 
 
 class Root:

@@ -9,8 +9,8 @@ from softehl.cases.seal.correctors.perturbed_lagrangian import LaggedPressure, e
 from softehl.cases.seal.equations.equations import SealSystem, build_system
 from softehl.cases.seal.solve.contact import contact_problem
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.kernels.kernel import load_kernel
 from tests.cases.oring_cases import oring
 
 KAPPA = 500.0

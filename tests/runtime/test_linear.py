@@ -9,8 +9,8 @@ import pytest
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.linear import SingularMatrix, SparseMatrix
-from softehl.runtime.solve.superlu import SuperLU
+from softehl.runtime.solve.linear.linear_solver import SingularMatrix, SparseMatrix
+from softehl.runtime.solve.linear.superlu import SuperLU
 
 
 def laplacian(n: int) -> Array:

@@ -14,13 +14,13 @@ from softehl import Mesh, Study
 from softehl.codegen.language.fields import Fields
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.engines.matrix_free import MatrixFree
+from softehl.runtime.parallel.matrix_free import MatrixFree
 from softehl.runtime.results.result import Result
 from softehl.runtime.sensitivity import linearised_step
-from softehl.runtime.solve import coarse, multigrid
-from softehl.runtime.solve.backends import choose
-from softehl.runtime.solve.gradients import conjugate_gradients, minimal_residuals
-from softehl.runtime.solve.multigrid import Level, Multigrid
+from softehl.runtime.solve.linear import coarse_grid_solver, multigrid
+from softehl.runtime.solve.linear.direct import choose
+from softehl.runtime.solve.linear.krylov import conjugate_gradients, minimal_residuals
+from softehl.runtime.solve.linear.multigrid import Level, Multigrid
 from softehl.runtime.solve.solution import NotConverged
 
 
@@ -184,7 +184,7 @@ def test_too_few_iterations_are_said() -> None:
 
 def test_algebraic_multigrid_below(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pyamg")
-    monkeypatch.setattr(coarse, "DIRECT_BELOW", 0)
+    monkeypatch.setattr(coarse_grid_solver, "DIRECT_BELOW", 0)
     engine, study = MatrixFree(), block(2, 0.3, (6, 6, 6))
     assert apart(study.solve(), study.solve(engine=engine), ("u_x", "u_y", "u_z")) < 1e-8
     assert max(engine.iterations) < 25

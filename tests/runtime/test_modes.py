@@ -12,9 +12,9 @@ import sympy as sp
 from scipy.linalg import eigh
 
 import softehl
+from softehl.runtime.discretisation.mass import lumped, mass_matrices
 from softehl.runtime.equations.mass_matrix import mass_matrix
 from softehl.runtime.equations.stability import Unstable
-from softehl.runtime.fem.mass import lumped, mass_matrices
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.results.result import Result

@@ -12,7 +12,7 @@ import pytest
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.linear import SparseMatrix
+from softehl.runtime.solve.linear.linear_solver import SparseMatrix
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Solution, Status
 

@@ -12,9 +12,9 @@ from scipy.special import eval_legendre
 
 from softehl import Mesh, Model, Study, page, quadrature
 from softehl.runtime.arrays import Array
+from softehl.runtime.discretisation.loads import DeadLoad, Pressure
+from softehl.runtime.discretisation.mass import lumped, mass_matrices
 from softehl.runtime.equations.mass_matrix import mass_matrix
-from softehl.runtime.fem.loads import DeadLoad, Pressure
-from softehl.runtime.fem.mass import lumped, mass_matrices
 from softehl.runtime.mesh.cells import CELLS, Cell, lobatto
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.study import StudyError

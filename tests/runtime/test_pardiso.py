@@ -11,13 +11,13 @@ import pytest
 from scipy.sparse import csc_array, random_array
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve import pardiso
-from softehl.runtime.solve.backends import MissingBackend, choose
-from softehl.runtime.solve.linear import Factorisation, LinearSolver, SingularMatrix
+from softehl.runtime.solve.linear import pardiso
+from softehl.runtime.solve.linear.direct import MissingBackend, choose
+from softehl.runtime.solve.linear.linear_solver import Factorisation, LinearSolver, SingularMatrix
+from softehl.runtime.solve.linear.pardiso import Idle, Pardiso
+from softehl.runtime.solve.linear.superlu import SuperLU
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.pardiso import Idle, Pardiso
 from softehl.runtime.solve.solution import Status
-from softehl.runtime.solve.superlu import SuperLU
 from tests.runtime.test_linear import grid, laplacian
 
 installed = pytest.mark.skipif(not pardiso.available(), reason="the extra `fast` is not installed")

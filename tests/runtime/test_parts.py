@@ -12,11 +12,10 @@ import softehl
 from softehl import Mesh, Study
 from softehl.runtime.arrays import Array
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.engines.engine import engine_of
-from softehl.runtime.engines.local import Part, part_of
-from softehl.runtime.engines.partition import Cells, Partition, partition
 from softehl.runtime.equations.system import System
 from softehl.runtime.mpi import MissingPetsc
+from softehl.runtime.parallel.engine import engine_of
+from softehl.runtime.parallel.partitioning import Cells, Part, Partition, part_of, partition
 from tests.runtime import solid_page as pages
 
 PROCESSES = 3

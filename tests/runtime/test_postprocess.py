@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from softehl.runtime.fem.postprocess import (
+from softehl.runtime.discretisation.postprocessing import (
     element_means,
     interval_below,
     local_exponent,

@@ -12,16 +12,17 @@ import numpy as np
 import pytest
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.assembly import Assembler, ElementBlock
-from softehl.runtime.fem.checks import ProblemError
-from softehl.runtime.fem.dofs import DofLayout
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.dofmap import DofLayout
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.problem_checks import ProblemError
+from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.solve.arclength import Arclength
+from softehl.runtime.solve.continuation import StepRule
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import NotConverged, Status
-from softehl.runtime.solve.steps import StepRule
 from tests.runtime.springs import Spring
 
 SOLID = {"mu_1": 3.0, "mu_2": 0.6, "kappa": 500.0}

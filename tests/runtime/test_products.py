@@ -12,9 +12,10 @@ from softehl import Mesh
 from softehl.codegen.language.fields import Fields
 from softehl.codegen.language.pages import Page
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem import products
-from softehl.runtime.fem.assembly import Assembler, ElementBlock
-from softehl.runtime.fem.products import NoProductError, Places, Product
+from softehl.runtime.discretisation import matrix_free_products
+from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.matrix_free_products import NoProductError, Places, Product
 from softehl.runtime.mesh.cells import CELLS
 from tests.codegen import field_pages
 
@@ -114,6 +115,6 @@ def test_what_has_no_product_is_refused(rng: np.random.Generator) -> None:
 
 def test_threads_are_those_of_openmp(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
-    assert products.threads() == 3
+    assert matrix_free_products.threads() == 3
     monkeypatch.setenv("OMP_NUM_THREADS", "")
-    assert products.threads() >= 1
+    assert matrix_free_products.threads() >= 1

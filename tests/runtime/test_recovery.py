@@ -12,9 +12,9 @@ import sympy as sp
 
 from softehl import Mesh, Model, Study, element, page, quadrature
 from softehl.runtime.arrays import Array
-from softehl.runtime.kernels import Rule
+from softehl.runtime.kernels.kernel import Rule
 from softehl.runtime.mesh.cells import CELLS
-from softehl.runtime.mesh.facets import split
+from softehl.runtime.mesh.interior_facets import split
 from softehl.runtime.results.recovery import projection
 from softehl.runtime.results.result import Result
 from softehl.runtime.study import StudyError

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from softehl.runtime.fem.rules import (
+from softehl.runtime.discretisation.quadrature import (
     facet_rule,
     film_rule,
     gauss,

@@ -17,14 +17,13 @@ from softehl.cases.seal.correctors.chord_newton import ModifiedNewton
 from softehl.cases.seal.correctors.layer_split import Cut, Parts
 from softehl.cases.seal.correctors.schur_corrector import SchurCorrector, StaleTangent
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve import pardiso
-from softehl.runtime.solve.homotopy import Continuation
-from softehl.runtime.solve.linear import Condenser, SingularMatrix
+from softehl.runtime.solve.continuation import Continuation, StepRule
+from softehl.runtime.solve.linear import pardiso
+from softehl.runtime.solve.linear.linear_solver import Condenser, SingularMatrix
+from softehl.runtime.solve.linear.pardiso import Pardiso
+from softehl.runtime.solve.linear.superlu import SuperLU
 from softehl.runtime.solve.newton import Newton
-from softehl.runtime.solve.pardiso import Pardiso
 from softehl.runtime.solve.solution import Status
-from softehl.runtime.solve.steps import StepRule
-from softehl.runtime.solve.superlu import SuperLU
 
 N, M, K = 30, 4, 5
 SHARED, OWN = np.arange(10, 10 + M), np.arange(N - K, N)

@@ -12,9 +12,9 @@ import pytest
 from softehl import Definition, Mesh, Model, Study, element, kinematics, load_kernel, quadrature
 from softehl.runtime.analyses.initial_state import beginning
 from softehl.runtime.analyses.motion import stored_energy
-from softehl.runtime.fem.dofs import separate_dofs
-from softehl.runtime.fem.products import NoProductError, require_product
-from softehl.runtime.fem.rules import film_rule
+from softehl.runtime.discretisation.dofmap import separate_dofs
+from softehl.runtime.discretisation.matrix_free_products import NoProductError, require_product
+from softehl.runtime.discretisation.quadrature import film_rule
 from softehl.runtime.study import StudyError
 
 

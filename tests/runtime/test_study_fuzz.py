@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softehl import Mesh, Study
-from softehl.runtime.fem.checks import ProblemError
+from softehl.runtime.discretisation.problem_checks import ProblemError
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.solve.solution import NotConverged
 from softehl.runtime.study import StudyError

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from softehl import Definition, Mesh, Model, Study, element, kinematics
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.checks import ProblemError
+from softehl.runtime.discretisation.problem_checks import ProblemError
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.mesh.mesh import MeshError
 from softehl.runtime.solve.solution import NotConverged

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from softehl import Mesh, Study
+from softehl.runtime.contact.body_thickness import in_chains, inner_radii, thickness
+from softehl.runtime.contact.search import TouchingProblem
 from softehl.runtime.definition.problem_definition import StudyError
-from softehl.runtime.fem.touching import TouchingProblem
 from softehl.runtime.mesh.mesh import MeshError
-from softehl.runtime.mesh.thickness import in_chains, inner_radii, thickness
 from softehl.runtime.results.result import Result
 from softehl.runtime.solve.solution import NotConverged
 from tests.runtime.touching_bodies import (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softehl.runtime.fem.unknowns import Elements, Numbering, Slot
+from softehl.runtime.discretisation.dofmap import Elements, Numbering, Slot
 
 CHAIN = np.array([[0, 1], [1, 2]])
 DISPLACED = tuple(Slot(name, node) for node in (0, 1) for name in ("u", "w"))

@@ -26,7 +26,7 @@ from scipy.linalg import lapack
 
 from softehl.cases.seal.correctors.layer_split import Parts
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.solve.linear import Condensed, SingularMatrix, SparseMatrix
+from softehl.runtime.solve.linear.linear_solver import Condensed, SingularMatrix, SparseMatrix
 from softehl.runtime.solve.newton import NonlinearProblem
 from softehl.runtime.solve.solution import Solution, Status
 

@@ -17,9 +17,10 @@ from scipy.sparse import csc_array
 
 from softehl.cases.seal.correctors.nested_dissection import Elimination
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.assembly import Assembler, ElementBlock
-from softehl.runtime.fem.guards import Guard
-from softehl.runtime.fem.problem import Problem
+from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.step_bounds import Guard
 
 Small = NDArray[np.int32]
 

@@ -17,8 +17,8 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.assembly import ElementBlock, ElementKernel
-from softehl.runtime.fem.problem import Problem
+from softehl.runtime.discretisation.element_blocks import ElementBlock, ElementKernel
+from softehl.runtime.discretisation.problem import Problem
 
 _EDGES = np.array([[0, 1, 2, 3], [2, 3, 4, 5], [4, 5, 6, 7], [6, 7, 0, 1]])  # dofs of each edge
 _UNIT = np.ones(1)

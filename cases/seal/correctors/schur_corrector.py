@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from softehl.cases.seal.correctors.chord_newton import LayeredProblem, ModifiedNewton
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.linear import Condensed, Condenser, SingularMatrix
+from softehl.runtime.solve.linear.linear_solver import Condensed, Condenser, SingularMatrix
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Solution, Status
 

@@ -24,7 +24,7 @@ from softehl.cases.seal.solve.remedies import explained
 from softehl.cases.seal.solve.squeeze_film import film_layer
 from softehl.cases.seal.states.observer_adapter import ObserverAdapter
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.linear import Condenser
+from softehl.runtime.solve.linear.linear_solver import Condenser
 from softehl.runtime.solve.solution import Branch, Status
 
 OUTLINES = 48

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
-from softehl.runtime.fem import rules
+from softehl.runtime.discretisation import quadrature
 from softehl.runtime.io import read_table
 
 Rows = Sequence[Sequence[float]]
@@ -190,6 +190,6 @@ def missing(supply: float, outer: float, inner: float, order: int) -> float:
     outer, inner: h at this end and at the other of its segment, mm, which has `order` subcells.
     Of the outmost one the rod carries h_1 h_2 over their mean (`codegen/models/mixed_film.py`).
     """
-    share = 0.5 * (1.0 + rules.pressure_nodes(order)[1])
+    share = 0.5 * (1.0 + quadrature.pressure_nodes(order)[1])
     next_to = outer + share * (inner - outer)
     return float(max(0.0, 1.0 - supply * 0.5 * (outer + next_to) / (outer * next_to)))

@@ -21,13 +21,19 @@ from softehl.cases.seal.equations.loads import FilmLoads
 from softehl.cases.seal.equations.system import FILM, PRESSURE, SQUEEZE
 from softehl.cases.seal.states.results import rough_numbers
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.problem import Problem
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.solve.continuation import (
+    End,
+    Record,
+    StepRule,
+    Trial,
+    Way,
+    followed,
+    next_parameter,
+    through,
+)
 from softehl.runtime.solve.differences import differences
-from softehl.runtime.solve.homotopy import Trial, Way, followed
-from softehl.runtime.solve.predictor import through
-from softehl.runtime.solve.record import End, Record
 from softehl.runtime.solve.solution import Branch, Status
-from softehl.runtime.solve.steps import StepRule, next_parameter
 
 
 @dataclass(frozen=True, eq=False)

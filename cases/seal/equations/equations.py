@@ -37,12 +37,17 @@ from softehl.cases.seal.gland.records.discretisation import Discretisation
 from softehl.cases.seal.section.layout import Layout
 from softehl.cases.seal.section.section import SealSection, seal_section
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.assembly import ElementKernel
-from softehl.runtime.fem.contact import Obstacle, contact_data
-from softehl.runtime.fem.dofs import chain_dofs, separate_dofs
-from softehl.runtime.fem.guards import ChangesLittle, Guard, KeepsOrientation, StaysPositive
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.contact.rigid_obstacles import Obstacle, contact_data
+from softehl.runtime.discretisation.dofmap import chain_dofs, separate_dofs
+from softehl.runtime.discretisation.element_blocks import ElementKernel
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.step_bounds import (
+    ChangesLittle,
+    Guard,
+    KeepsOrientation,
+    StaysPositive,
+)
+from softehl.runtime.kernels.kernel import load_kernel
 from softehl.runtime.mesh.mesh import Mesh
 from softehl.runtime.study import Study
 

@@ -19,9 +19,14 @@ from softehl.cases.seal.gland.records.discretisation import Discretisation
 from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.gland.surfaces import void_values
 from softehl.cases.seal.section.section import BODY, SealSection
-from softehl.runtime.fem.contact import Obstacle, inner_cylinder, outer_cylinder, plane
-from softehl.runtime.fem.rules import content_rule, facet_rule, film_rule, rupture_rule
-from softehl.runtime.kernels import Rule
+from softehl.runtime.contact.rigid_obstacles import Obstacle, inner_cylinder, outer_cylinder, plane
+from softehl.runtime.discretisation.quadrature import (
+    content_rule,
+    facet_rule,
+    film_rule,
+    rupture_rule,
+)
+from softehl.runtime.kernels.kernel import Rule
 
 Values: TypeAlias = Mapping[str, float]
 """Parameters of a kernel by their names."""

@@ -25,9 +25,8 @@ from softehl.cases.seal.gland.parameters import Seal
 from softehl.cases.seal.meshing.section_mesh import SectionMesh
 from softehl.cases.seal.section.section import SealSection
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.contact import tributary_areas
-from softehl.runtime.fem.dofs import DofLayout
-from softehl.runtime.fem.unknowns import Numbering
+from softehl.runtime.contact.rigid_obstacles import tributary_areas
+from softehl.runtime.discretisation.dofmap import DofLayout, Numbering
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,8 @@ from softehl.cases.seal.report.paraview import gland_lines
 from softehl.cases.seal.states.observer_adapter import read_profile, read_section
 from softehl.cases.seal.states.state import FilmRow, Profile, Section
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.postprocess import von_mises
-from softehl.runtime.mesh.faces import once
+from softehl.runtime.discretisation.postprocessing import von_mises
+from softehl.runtime.mesh.face_matching import once
 
 _METAL, _FLUID, _FILM, _CONTACT, _LINE = "#d9dadd", "#d3e6f5", "#1b6ca8", "#8a8f98", "#3b3f45"
 _STRESSES = tuple(f"sigma_{name}" for name in ("zz", "rr", "tt", "zr"))

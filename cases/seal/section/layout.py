@@ -20,7 +20,7 @@ from softehl.cases.seal.meshing.section_mesh import SectionMesh
 from softehl.cases.seal.meshing.section_mesher import Sizes, section_mesh
 from softehl.cases.seal.meshing.spacing import Spacing, Spot, graded
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.postprocess import run_around
+from softehl.runtime.discretisation.postprocessing import run_around
 
 _LEVEL, _LOOKED_AT = 1e-6, 4001
 """Part of the height that two lobes as low may differ by, and places of a film that are compared.

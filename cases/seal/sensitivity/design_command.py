@@ -28,9 +28,8 @@ from softehl.cases.seal.solve.method import DryContact, Judge, verdict_of_contac
 from softehl.cases.seal.solve.path import StageError
 from softehl.cases.seal.states.state import FilmState, Observer
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.homotopy import Continuation
+from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.newton import Newton, NonlinearProblem
-from softehl.runtime.solve.steps import StepRule
 from softehl.runtime.suggestions import meant
 
 _SPEED = "not by the speed: sensitivity.csv has U, and each of `speeds` is a row of a run"

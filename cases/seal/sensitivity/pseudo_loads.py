@@ -14,9 +14,9 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.assembly import ElementBlock
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.kernels import Kernel
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.kernels.kernel import Kernel
 
 Weights = Mapping[str, Array]
 """Field of a block -> (elements, points), what a quantity weights its values with."""

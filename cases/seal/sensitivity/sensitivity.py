@@ -31,8 +31,8 @@ from softehl.cases.seal.sensitivity.variation import SPEED, FilmCase
 from softehl.cases.seal.solve.films import Film
 from softehl.cases.seal.solve.method import Differentiate
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.backends import choose
-from softehl.runtime.solve.linear import LinearSolver, SingularMatrix, SparseMatrix
+from softehl.runtime.solve.linear.direct import choose
+from softehl.runtime.solve.linear.linear_solver import LinearSolver, SingularMatrix, SparseMatrix
 
 
 def adjoints(linear: LinearSolver, K: SparseMatrix, gradients: Array) -> Array:

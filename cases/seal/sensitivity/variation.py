@@ -20,7 +20,7 @@ from softehl.cases.seal.gland.varied import LENGTHS, NUMBERS, PRESSURE_KEY
 from softehl.cases.seal.meshing.mesh_morphing import carried_mesh, carried_places
 from softehl.cases.seal.section.layout import uniform_layout
 from softehl.cases.seal.sensitivity.pseudo_loads import Inputs, rate_of
-from softehl.runtime.fem.problem import Problem
+from softehl.runtime.discretisation.problem import Problem
 
 SPEED = "U"
 """The rod speed as it is named in tables: a parameter of a film that is no key of a case."""

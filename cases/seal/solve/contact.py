@@ -18,9 +18,9 @@ from softehl.cases.seal.gland.records.gland import Gland
 from softehl.cases.seal.solve import remedies
 from softehl.cases.seal.solve.path import STEPS, Stage
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.problem import Problem
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.solve.continuation import StepRule
 from softehl.runtime.solve.newton import NonlinearProblem
-from softehl.runtime.solve.steps import StepRule
 
 OFFSET = GAP
 """Distance of the rod in contact, mm."""

@@ -34,7 +34,7 @@ from softehl.cases.seal.solve.path import Stage, StageError
 from softehl.cases.seal.states.contacts import unsealed
 from softehl.runtime.arrays import Array
 from softehl.runtime.io import read_arrays, write_arrays
-from softehl.runtime.kernels import load_kernel
+from softehl.runtime.kernels.kernel import load_kernel
 
 WITHOUT_INFLUENCE = (
     *(*Seal.names, "ogden_terms"),  # values of others follow

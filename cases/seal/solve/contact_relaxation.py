@@ -19,8 +19,8 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.solve.contact import contact_problem
 from softehl.cases.seal.solve.correctors import PressureNewton
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.mass import lumped, mass_matrices
-from softehl.runtime.fem.problem import Problem
+from softehl.runtime.discretisation.mass import lumped, mass_matrices
+from softehl.runtime.discretisation.problem import Problem
 from softehl.runtime.mesh.cells import CELLS
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.pseudo_transient import Moment, PseudoTransient

@@ -16,12 +16,12 @@ from softehl.cases.seal.correctors.schur_corrector import SchurCorrector
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.gland.parameters import Seal
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.kernels import load_kernel
-from softehl.runtime.solve.ladder import Ladder
-from softehl.runtime.solve.linear import Condenser
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.kernels.kernel import load_kernel
+from softehl.runtime.solve.linear.linear_solver import Condenser
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
 from softehl.runtime.solve.solution import Solution
+from softehl.runtime.solve.solver_cascade import Ladder
 
 TOLERANCE = 1e-5
 """Residual of a step in time; above 1e-3 some steps need no iteration, and nothing is squeezed out.

@@ -25,12 +25,11 @@ from softehl.cases.seal.solve.squeeze_film import (
 from softehl.cases.seal.states.results import film_numbers
 from softehl.cases.seal.states.verdict import FilmNumbers
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.solve.homotopy import Continuation
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.newton import NonlinearProblem
 from softehl.runtime.solve.pseudo_transient import Moment, PseudoTransient
 from softehl.runtime.solve.solution import Point, Solution, Status
-from softehl.runtime.solve.steps import StepRule
 
 _LEAST = 0.06
 """Least step on the way from the film at another speed, of the larger power of U. Of the smaller

@@ -42,7 +42,7 @@ from softehl.cases.seal.states.verdict import (
     fewest_inlet_segments,
 )
 from softehl.runtime.arrays import Array
-from softehl.runtime.solve.backends import choose
+from softehl.runtime.solve.linear.direct import choose
 from softehl.runtime.solve.newton import Newton
 from softehl.runtime.solve.solution import Status
 

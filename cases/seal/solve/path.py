@@ -12,11 +12,10 @@ from dataclasses import dataclass, field
 
 from softehl.cases.seal.states.state import Observer, StageRecord, place
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.solve.homotopy import Continuation
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.solve.continuation import Continuation, StepRule
 from softehl.runtime.solve.newton import Corrector, Newton, NonlinearProblem
 from softehl.runtime.solve.solution import Branch, Point, Solution
-from softehl.runtime.solve.steps import StepRule
 
 STEPS = StepRule(0.05, 3e-4, 0.3)
 """Steps of the way of the rod, of the pressure over the shear modulus, of what friction takes."""

@@ -35,7 +35,7 @@ from softehl.cases.seal.solve.contact import OFFSET, held_moment, held_place
 from softehl.cases.seal.solve.inlet import InletScales
 from softehl.cases.seal.solve.layouts import NO_WIDTH
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.rules import content_rule, pressure_nodes
+from softehl.runtime.discretisation.quadrature import content_rule, pressure_nodes
 
 _AT_WALL = 0.02
 """Part of the section within which a node counts as one at a wall. Without these an O-ring at

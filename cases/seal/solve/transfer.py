@@ -32,7 +32,7 @@ from softehl.cases.seal.solve.contact import contact_problem, correction_stage
 from softehl.cases.seal.solve.correctors import lagged
 from softehl.cases.seal.solve.path import Stage
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.fem.rules import lagrange, pressure_nodes
+from softehl.runtime.discretisation.quadrature import lagrange, pressure_nodes
 
 
 def carried_contact(

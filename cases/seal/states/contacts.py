@@ -15,7 +15,7 @@ from softehl.cases.seal.meshing.outline_checks import crossing
 from softehl.cases.seal.states.section_view import section_view
 from softehl.cases.seal.states.state import ContactState
 from softehl.runtime.arrays import Array, Flags, Integers
-from softehl.runtime.fem.contact import tributary_areas
+from softehl.runtime.contact.rigid_obstacles import tributary_areas
 
 CONTACT_FILM = 0.02
 """Film thickness that counts as contact, mm; a gap above it parts two contacts of a film."""

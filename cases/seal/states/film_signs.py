@@ -16,7 +16,7 @@ from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.equations.loads import FilmLoads, Stroke
 from softehl.cases.seal.states.contacts import CONTACT_FILM
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.postprocess import (
+from softehl.runtime.discretisation.postprocessing import (
     alternating_difference,
     first_below,
     interval_below,

@@ -36,14 +36,14 @@ from softehl.cases.seal.states.verdict import (
     Verdict,
 )
 from softehl.runtime.arrays import Array
-from softehl.runtime.fem.postprocess import (
+from softehl.runtime.discretisation.postprocessing import (
     element_means,
     interval_below,
     relative_spread,
     run_around,
 )
-from softehl.runtime.fem.problem import Problem
-from softehl.runtime.fem.rules import trace_rule
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.quadrature import trace_rule
 
 _TORN = 1e-6
 """Void fraction of a film that has ruptured; 1e-9 and 1e-3 give three seals the same ratios."""

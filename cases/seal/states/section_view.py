@@ -10,8 +10,8 @@ import numpy as np
 from softehl.cases.seal.equations.equations import SealSystem
 from softehl.cases.seal.states.state import Section
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.fem.contact import tributary_areas
-from softehl.runtime.fem.postprocess import nodal_average, von_mises
+from softehl.runtime.contact.rigid_obstacles import tributary_areas
+from softehl.runtime.discretisation.postprocessing import nodal_average, von_mises
 
 _SLOPES = np.array([[-1, 1, 1, -1], [-1, -1, 1, 1]])
 """Derivatives of a cell's corners by its own coordinates, in its middle, times 4."""

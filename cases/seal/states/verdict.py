@@ -15,7 +15,7 @@ from softehl.cases.seal.states.state import (
     UNCERTAIN,
     UNDER_RESOLVED,
 )
-from softehl.runtime.fem.postprocess import local_exponent
+from softehl.runtime.discretisation.postprocessing import local_exponent
 
 EXCESS_PRESSURE = 0.1
 """Largest credible excess of the film's maximum pressure over the contact's, relative: that of 27

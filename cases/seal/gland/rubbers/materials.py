@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from softehl.runtime.arrays import Array, Flags
-from softehl.runtime.kernels import Kernel, load_kernel
+from softehl.runtime.kernels.kernel import Kernel, load_kernel
 
 Name = Literal["mooney-rivlin", "neo-hooke", "yeoh", "ogden", "arruda-boyce", "gent"]
 Values = Mapping[str, float]

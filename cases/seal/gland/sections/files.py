@@ -22,9 +22,9 @@ from softehl.cases.seal.meshing.outline import Line, Outline, OutlineError, Poin
 from softehl.cases.seal.meshing.section_mesh import SectionMesh, corner_jacobians
 from softehl.cases.seal.meshing.subdivision import subdivided
 from softehl.runtime.arrays import Array, Integers
-from softehl.runtime.mesh.faces import once
+from softehl.runtime.contact.body_thickness import in_chains
+from softehl.runtime.mesh.face_matching import once
 from softehl.runtime.mesh.mesh import Mesh
-from softehl.runtime.mesh.thickness import in_chains
 
 COLUMNS = ("z_mm", "r_mm", "part")
 """Of a CSV file: points in order; part, of the side from a point to the next, may be left out."""

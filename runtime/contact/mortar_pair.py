@@ -1,0 +1,348 @@
+"""Elements of contact in space: the law of a point (page `touch`), integrated over a triangle.
+
+A triangle is part of what a face and another one have in common (`common_part`). Places, slopes and
+multipliers of a point are interpolated here, and the tangent of the law is carried over to the
+nodes: with the motion of the corners of the triangle, of the partner and of the normal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.contact.mortar_overlap import CORNER
+from softehl.runtime.kernels.kernel import Kernel
+from softehl.runtime.mesh.cells import CELLS, Cell
+
+MULTIPLIERS = 4
+"""lambda and the vector tau, at the corners of a face."""
+_ITERATIONS = 8
+_Varied: TypeAlias = tuple[Array, Array]
+"""Values (n, ...) and their derivatives (n, ..., ndof) by the unknowns of the element."""
+
+
+@dataclass(frozen=True, eq=False)
+class FacePair:
+    """A kernel of assembly: a triangle of a face and another one.
+
+    Unknowns are the displacements of the nodes of both, node by node, then lambda, tau_x, tau_y,
+    tau_z at the corners of the face. data: displacements of the step before, likewise; rho,
+    friction, depth, reach; the corners of the triangle, 3 times CORNER.
+    """
+
+    law: Kernel
+    one: Cell
+    other: Cell
+    parameters: tuple[str, ...] = ()
+    fields: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """For messages."""
+        return f"{self.law.name} of {self.one.name} on {self.other.name}"
+
+    @property
+    def signature(self) -> str:
+        """Of the law."""
+        return self.law.signature
+
+    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        """Element residuals (n, ndof)."""
+        return self.tangent(coordinates, dofs, **given)[0]
+
+    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+        """Element residuals (n, ndof) and tangents (n, ndof, ndof)."""
+        n, ndof = dofs.shape
+        R, K = np.zeros((n, ndof)), np.zeros((n, ndof, ndof))
+        if n:
+            at = _Places.of(self, coordinates, dofs, given["data"])
+            for weight, point in at.points():
+                self._add(R, K, at, weight, point)
+        return R, K
+
+    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        """None, (n, 0, 0): fields are those of the whole face."""
+        return np.empty((len(dofs), 0, 0))
+
+    def _add(self, R: Array, K: Array, at: _Places, weight: _Varied, point: _Point) -> None:
+        """Add a point of all triangles in place."""
+        n, width = len(R), 3 * at.nodes
+        z, dz = point.inputs
+        law = np.concatenate([z, at.limits], axis=1)
+        f, slopes = self.law.tangent(
+            np.empty((n, 0)),
+            np.ascontiguousarray(law[:, :16]),
+            data=np.ascontiguousarray(law[:, 16:]),
+            parameters=np.empty(0),
+        )
+        W, dW = weight
+        rows = [0, 1, 2, 12, 13, 14, 15]
+        f = f[:, rows]
+        df = W[:, None, None] * np.einsum("nij,njm->nim", slopes[:, rows], dz)
+        df += f[:, :, None] * dW[:, None]
+        f = W[:, None] * f
+        for part, columns, (S, dS) in (
+            (slice(width), slice(3), point.shares),
+            (slice(width, None), slice(3, None), point.own),
+        ):
+            k, c = S.shape[1], f[:, columns].shape[1]
+            R[:, part] += (S[:, :, None] * f[:, None, columns]).reshape(n, k * c)
+            change = S[:, :, None, None] * df[:, None, columns]
+            change += dS[:, :, None] * f[:, None, columns, None]
+            K[:, part] += change.reshape(n, k * c, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """inputs: of the law, (n, 16). shares: of the nodes of both; own: of the multipliers."""
+
+    inputs: _Varied
+    shares: _Varied
+    own: _Varied
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Nodes of the elements at rest X, now x, and before, (n, nodes, 3), and multipliers.
+
+    limits: rho, friction, depth, reach.
+    """
+
+    pair: FacePair
+    X: Array
+    x: Array
+    before: Array
+    multipliers: Array
+    limits: Array
+    corners: Array
+
+    @classmethod
+    def of(cls, pair: FacePair, coordinates: Array, dofs: Array, data: Array) -> _Places:
+        n, width = len(dofs), coordinates.shape[1]
+        X = coordinates.reshape(n, -1, 3)
+        x, before = (X + v[:, :width].reshape(X.shape) for v in (dofs, data))
+        corners = data[:, width + 4 :].reshape(n, 3, CORNER)
+        multipliers = dofs[:, width:].reshape(n, -1, MULTIPLIERS)
+        return cls(pair, X, x, before, multipliers, data[:, width : width + 4], corners)
+
+    @property
+    def nodes(self) -> int:
+        """Of both faces."""
+        return int(self.x.shape[1])
+
+    @property
+    def mine(self) -> slice:
+        """Nodes of the face."""
+        return slice(0, len(self.pair.one.nodes))
+
+    @property
+    def theirs(self) -> slice:
+        """Nodes of the other one."""
+        return slice(len(self.pair.one.nodes), None)
+
+    @property
+    def ndof(self) -> int:
+        """Unknowns of an element."""
+        return 3 * self.nodes + MULTIPLIERS * int(self.multipliers.shape[1])
+
+    def points(self) -> Iterator[tuple[_Varied, _Point]]:
+        """Weights and points of the rule of a triangle."""
+        normal = self._normal()
+        start, *ends = (self._corner(k, normal) for k in range(3))
+        along, across = (_minus(end, start) for end in ends)
+        part = _triple(along, across, normal)
+        there = part[0] > 0.0
+        part = part[0] * there, part[1] * there[:, None]
+        for (s, t), weight in zip(*_rule(self.pair), strict=True):
+            z = _plus(start, _plus(_times(s, along), _times(t, across)))
+            xi = self._met(self.pair.one, self.mine, z, normal)
+            slope = self._slopes(self.pair.one, self.mine, xi)
+            first, second = ((slope[0][:, :, d], slope[1][:, :, d]) for d in (0, 1))
+            share = _over(self._area(*xi), _triple(first, second, normal))
+            yield (
+                _product(_times(weight, part), share),
+                self._point(xi, self._met(self.pair.other, self.theirs, z, normal), first, second),
+            )
+
+    def _point(self, xi: _Varied, eta: _Varied, first: _Varied, second: _Varied) -> _Point:
+        one, other, mine, theirs = self.pair.one, self.pair.other, self.mine, self.theirs
+        x, y = self._place(one, self.x, mine, xi), self._place(other, self.x, theirs, eta)
+        was, were = (
+            self._held(cell, self.before[:, part], at)
+            for cell, part, at in ((one, mine, xi), (other, theirs, eta))
+        )
+        N, dN = _shapes(one, xi)
+        M, dM = _shapes(other, eta)
+        L, dL = _shapes(_corners(one), xi)
+        lam = np.einsum("nk,nkc->nc", L, self.multipliers)
+        dlam = np.einsum("nkm,nkc->ncm", dL, self.multipliers)
+        for c in range(MULTIPLIERS):
+            dlam[:, c, 3 * self.nodes + c :: MULTIPLIERS] += L
+        parts = [_minus(y, x), first, second, _minus(were, was), (lam, dlam)]
+        z, dz = (np.concatenate([p[i] for p in parts], axis=1) for i in (0, 1))
+        shares = np.concatenate([N, -M], axis=1), np.concatenate([dN, -dM], axis=1)
+        return _Point((z, dz), shares, (L, dL))
+
+    def _place(self, cell: Cell, x: Array, part: slice, at: _Varied) -> _Varied:
+        """Place of parent coordinates, with the motion of the nodes."""
+        found, change = self._held(cell, x[:, part], at)
+        shape = cell.shape(at[0])
+        numbers = range(self.nodes)[part]
+        for c in range(3):
+            change[:, c, [3 * i + c for i in numbers]] += shape
+        return found, change
+
+    def _held(self, cell: Cell, x: Array, at: _Varied) -> _Varied:
+        """Place of parent coordinates on nodes (n, k, 3) that do not move."""
+        N, dN = _shapes(cell, at)
+        return np.einsum("nk,nkc->nc", N, x), np.einsum("nkm,nkc->ncm", dN, x)
+
+    def _slopes(self, cell: Cell, part: slice, at: _Varied) -> _Varied:
+        """Slopes (n, 3, 2) of the face."""
+        G, dG = _gradients(cell, at)
+        x = self.x[:, part]
+        found = np.einsum("nkd,nkc->ncd", G, x)
+        change = np.einsum("nkdm,nkc->ncdm", dG, x)
+        numbers = range(self.nodes)[part]
+        for c in range(3):
+            change[:, c][:, :, [3 * i + c for i in numbers]] += G.transpose(0, 2, 1)
+        return found, change
+
+    def _area(self, xi: Array, dxi: Array) -> _Varied:
+        """Area at rest per parent area."""
+        k = len(self.pair.one.nodes)
+        G, dG = _gradients(self.pair.one, (xi, dxi))
+        X = self.X[:, :k]
+        slope = np.einsum("nkd,nkc->ncd", G, X)
+        change = np.einsum("nkdm,nkc->ncdm", dG, X)
+        a, b = slope[:, :, 0], slope[:, :, 1]
+        across = np.cross(a, b)
+        area = np.linalg.norm(across, axis=1)
+        moved = np.cross(change[:, :, 0], b[:, :, None], axis=1)
+        moved += np.cross(a[:, :, None], change[:, :, 1], axis=1)
+        return area, np.einsum("nc,ncm->nm", across / area[:, None], moved)
+
+    def _normal(self) -> _Varied:
+        """Mean normal of the face."""
+        flat = _corners(self.pair.one)
+        k = len(flat.nodes)
+        middle = np.tile(flat.nodes.mean(axis=0), (len(self.x), 1))
+        still = middle, np.zeros((len(middle), 2, self.ndof))
+        slope, change = self._slopes(flat, slice(0, k), still)
+        a, b = slope[:, :, 0], slope[:, :, 1]
+        across = np.cross(a, b)
+        moved = np.cross(change[:, :, 0], b[:, :, None], axis=1)
+        moved += np.cross(a[:, :, None], change[:, :, 1], axis=1)
+        length = np.linalg.norm(across, axis=1)[:, None]
+        n = across / length
+        moved -= n[:, :, None] * np.einsum("nc,ncm->nm", n, moved)[:, None]
+        return n, moved / length[:, :, None]
+
+    def _corner(self, k: int, normal: _Varied) -> _Varied:
+        """Place of a corner of the triangle."""
+        told = self.corners[:, k]
+        A = told[:, 2:6].reshape(-1, 2, 2).transpose(0, 2, 1)
+        B = told[:, 8:12].reshape(-1, 2, 2).transpose(0, 2, 1)
+        still = np.zeros((len(told), 2, self.ndof))
+        flat, far = _corners(self.pair.one), _corners(self.pair.other)
+        a, b = len(self.pair.one.nodes), len(far.nodes)
+        mine, theirs = slice(0, len(flat.nodes)), slice(a, a + b)
+        xi, eta = (told[:, :2], still), (told[:, 6:8], still)
+        x, y = self._place(flat, self.x, mine, xi), self._place(far, self.x, theirs, eta)
+        K = self._slopes(flat, mine, xi)[0] @ A - self._slopes(far, theirs, eta)[0] @ B
+        v, dv = _along(K, (y[0] - x[0], y[1] - x[1]), normal)
+        at = told[:, :2] + np.einsum("ndv,nv->nd", A, v), np.einsum("ndv,nvm->ndm", A, dv)
+        return self._place(flat, self.x, mine, at)
+
+    def _met(self, cell: Cell, part: slice, z: _Varied, normal: _Varied) -> _Varied:
+        """Parent coordinates on a face of what lies on the line through z along the normal."""
+        at = np.tile(cell.nodes[: cell.corners].mean(axis=0), (len(self.x), 1))
+        still = np.zeros((len(at), 2, self.ndof))
+        for _ in range(_ITERATIONS):
+            there = self._held(cell, self.x[:, part], (at, still))[0]
+            K = -np.einsum("nkd,nkc->ncd", cell.gradient(at), self.x[:, part])
+            step = _solved(K, normal[0], there - z[0])[:, :2]
+            at = at + np.clip(step, -2.0, 2.0)
+            if np.abs(step).max(initial=0.0) < 1e-14:
+                break
+        K = -self._slopes(cell, part, (at, still))[0]
+        return at, _along(K, _minus(self._place(cell, self.x, part, (at, still)), z), normal)[1]
+
+
+def _plus(a: _Varied, b: _Varied) -> _Varied:
+    return a[0] + b[0], a[1] + b[1]
+
+
+def _minus(a: _Varied, b: _Varied) -> _Varied:
+    return a[0] - b[0], a[1] - b[1]
+
+
+def _times(number: float, a: _Varied) -> _Varied:
+    return number * a[0], number * a[1]
+
+
+def _product(a: _Varied, b: _Varied) -> _Varied:
+    """Of scalars (n,)."""
+    return a[0] * b[0], a[0][:, None] * b[1] + b[0][:, None] * a[1]
+
+
+def _over(a: _Varied, b: _Varied) -> _Varied:
+    """Of scalars (n,)."""
+    found = a[0] / b[0]
+    return found, (a[1] - found[:, None] * b[1]) / b[0][:, None]
+
+
+def _triple(a: _Varied, b: _Varied, c: _Varied) -> _Varied:
+    """(a x b) . c of vectors (n, 3)."""
+    changes = (
+        np.einsum("nc,ncm->nm", np.cross(v[0], w[0]), u[1])
+        for u, v, w in ((a, b, c), (b, c, a), (c, a, b))
+    )
+    return np.einsum("nc,nc->n", np.cross(a[0], b[0]), c[0]), sum(changes)
+
+
+def _along(K: Array, off: _Varied, normal: _Varied) -> _Varied:
+    """v with K v + g n = off, and its derivatives where v is nearly zero."""
+    w = _solved(K, normal[0], off[0])
+    change = off[1] - w[:, 2, None, None] * normal[1]
+    return w[:, :2], _solved(K, normal[0], change)[:, :2]
+
+
+def _solved(K: Array, n: Array, right: Array) -> Array:
+    """Solution (n, 3, ...) of the columns of K (n, 3, 2) and n (n, 3); nan if any is singular."""
+    whole = np.concatenate([K, n[:, :, None]], axis=2)
+    flat = right.ndim == 2
+    try:
+        found = np.linalg.solve(whole, right[:, :, None] if flat else right)
+    except np.linalg.LinAlgError:
+        return np.full(right.shape, np.nan)
+    return np.asarray(found[:, :, 0] if flat else found)
+
+
+def _shapes(cell: Cell, at: _Varied) -> _Varied:
+    """Shape functions (n, k)."""
+    return cell.shape(at[0]), np.einsum("nkd,ndm->nkm", cell.gradient(at[0]), at[1])
+
+
+def _gradients(cell: Cell, at: _Varied) -> _Varied:
+    """Their derivatives (n, k, 2); differences are exact, they are at most quadratic."""
+    change = np.zeros((*at[0].shape[:1], len(cell.nodes), 2, at[1].shape[2]))
+    for d in (0, 1):
+        h = 0.5 * np.eye(2)[d]
+        second = cell.gradient(at[0] + h) - cell.gradient(at[0] - h)
+        change += second[:, :, :, None] * at[1][:, None, None, d]
+    return cell.gradient(at[0]), change
+
+
+def _corners(cell: Cell) -> Cell:
+    return CELLS["tri3" if cell.corners == 3 else "quad4"]
+
+
+def _rule(pair: FacePair) -> tuple[Array, Array]:
+    """Exact for a uniform pressure on faces that are parallelograms, and more on triangles."""
+    order = max(pair.one.order, pair.other.order)
+    return CELLS["tri3"].rule(2 * order)

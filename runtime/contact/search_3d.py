@@ -1,0 +1,109 @@
+"""Contact of faces in space: pairs that look at each other, and triangles of what they share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.contact.mortar_overlap import CORNER, common_part, mean_normal
+from softehl.runtime.contact.mortar_pair import MULTIPLIERS, FacePair
+from softehl.runtime.contact.search import Balls, Side, apart, by_kind, facing, limits, nodes_of
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.mesh.cells import CELLS
+
+
+@dataclass(frozen=True, eq=False)
+class FaceContact:
+    """A contact between `sides`, which have the multipliers, and `others`.
+
+    points: (p, 3) of the mesh. displacements (p, 3), multipliers (p, 4): numbers of the unknowns
+    at each node, -1 where there are none. kernels: (kind, other kind) -> elements. alone: both are
+    one surface, of which a pair has its first face as the side.
+    """
+
+    name: str
+    points: Array
+    displacements: Integers
+    multipliers: Integers
+    sides: tuple[Side, ...]
+    others: tuple[tuple[str, Integers], ...]
+    kernels: dict[tuple[str, str], FacePair]
+    friction: float = 0.0
+    alone: bool = False
+
+    @property
+    def nodes(self) -> Integers:
+        """Of all its faces."""
+        return nodes_of(self.sides, self.others)
+
+    def empty(self) -> list[ElementBlock]:
+        """Its blocks without elements, which keep their places."""
+        x = np.zeros(int(max(self.displacements.max(), self.multipliers.max())) + 1)
+        none = np.empty(0, dtype=np.int64)
+        chosen, corners = by_kind(self.sides, self.others, none, none), np.empty((0, 3, CORNER))
+        return [self._block(a, b, (i, j, corners), x) for a, b, i, j in chosen]
+
+    def blocks(self, x: Array, old: Array) -> list[ElementBlock]:
+        """Elements of the pairs at unknowns x; old: of the step before."""
+        moved = np.where(self.displacements >= 0, x[self.displacements], 0.0)
+        if not np.isfinite(moved).all():
+            return self.empty()
+        places = self.points + moved
+        found = []
+        for a, b, i, j in by_kind(self.sides, self.others, *self._pairs(places)):
+            side, (label, faces) = self.sides[a], self.others[b]
+            cells = CELLS[side.kind], CELLS[label]
+            part = common_part(cells[0], places[side.faces[i]], cells[1], places[faces[j]])
+            found.append(self._block(a, b, (i[part.pairs], j[part.pairs], part.corners), old))
+        return found
+
+    def _pairs(self, places: Array) -> tuple[Integers, Integers]:
+        """Numbers of sides and of others, both counted through their kinds, that may meet."""
+        mine = [(s.kind, s.faces) for s in self.sides]
+        found = facing(_balls(places, mine), _balls(places, self.others), limits(self.sides))
+        return apart(_corners(mine), _corners(self.others), *found, alone=self.alone)
+
+    def _block(
+        self, a: int, b: int, found: tuple[Integers, Integers, Array], old: Array
+    ) -> ElementBlock:
+        """Elements of triangles of sides of kind a and others of kind b."""
+        side, (kind, faces) = self.sides[a], self.others[b]
+        one, other, corners = found
+        own = side.faces[one]
+        nodes = np.concatenate([own, faces[other]], axis=1)
+        n, width = len(nodes), 3 * nodes.shape[1]
+        moved = self.displacements[nodes].reshape(n, width)
+        before = np.where(moved >= 0, old[moved], 0.0)
+        given = [side.rho[one], np.full(n, self.friction), side.depth[one], side.reach[one]]
+        ends = own[:, : CELLS[side.kind].corners]
+        multipliers = self.multipliers[ends].reshape(n, MULTIPLIERS * ends.shape[1])
+        return ElementBlock(
+            f"{self.name}: {side.kind} on {kind}",
+            self.kernels[side.kind, kind],
+            self.points[nodes].reshape(n, width),
+            np.ascontiguousarray(np.concatenate([moved, multipliers], axis=1)),
+            np.concatenate(
+                [before, np.stack(given, axis=1), corners.reshape(n, 3 * CORNER)], axis=1
+            ),
+            check_orientation=False,
+        )
+
+
+def _balls(places: Array, kinds: Sequence[tuple[str, Integers]]) -> Balls:
+    """Centres, radii and normals of the faces of all kinds."""
+    found = []
+    for kind, faces in kinds:
+        corners = places[faces[:, : CELLS[kind].corners]]
+        centre = corners.mean(axis=1)
+        radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
+        found.append((centre, radius, mean_normal(CELLS[kind], corners)))
+    centre, radius, normal = (np.concatenate([f[k] for f in found]) for k in (0, 1, 2))
+    return centre, radius, normal
+
+
+def _corners(kinds: Sequence[tuple[str, Integers]]) -> Integers:
+    """Corners of the faces of all kinds, (n, 4), the last one twice on triangles."""
+    return np.concatenate([faces[:, [0, 1, 2, CELLS[kind].corners - 1]] for kind, faces in kinds])

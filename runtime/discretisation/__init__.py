@@ -1,0 +1,1 @@
+"""Discretisation: dofmap, element blocks, assembly, constraints, loads, mass; without physics."""

@@ -1,0 +1,235 @@
+"""Assembly of element kernels into a residual vector and a sparse tangent.
+
+The sparsity pattern and the position of every element entry in it are computed once; assembling
+is then a gather, a kernel call and an `add.at` for each piece of a block of like elements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from softehl.errors import UnknownNameError
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.problem_checks import not_finite, require_sound_elements
+from softehl.runtime.discretisation.sparsity import Pattern, Structure
+from softehl.runtime.suggestions import few
+
+_SETS = 4  # sets of prescribed unknowns that are remembered
+
+
+@dataclass(eq=False)
+class Memo:
+    """Results of assembly that may be needed again; they only save time.
+
+    tangents: block name -> the latest parameters of a constant tangent, the positions of its
+    entries and their values. crosses: prescribed unknowns -> see `Assembler.cross`. counts: names
+    of blocks -> see `Assembler.counts`. reach: see `Assembler.reach`.
+    """
+
+    tangents: dict[str, tuple[Array, Integers, Array]] = field(default_factory=dict)
+    crosses: dict[bytes, Integers] = field(default_factory=dict)
+    counts: dict[frozenset[str], Integers] = field(default_factory=dict)
+    reach: Array | None = None
+
+    def without(self, name: str) -> Memo:
+        """A copy that knows nothing of one block's tangent."""
+        tangents = {n: known for n, known in self.tangents.items() if n != name}
+        return replace(self, tangents=tangents, crosses=dict(self.crosses))
+
+    def keep_cross(self, key: bytes, places: Integers) -> None:
+        """Remember the positions of a set of unknowns; the oldest of too many is forgotten."""
+        while len(self.crosses) >= _SETS:
+            del self.crosses[next(iter(self.crosses))]
+        self.crosses[key] = places
+
+
+@dataclass(eq=False)
+class Assembler:
+    """Blocks of elements and the pattern they share.
+
+    Parameters are given block by block, in the kernel's order; a block without parameters is
+    switched off, its place in the pattern stays. Results depend on the arguments alone; `memo` is
+    the one field that changes with calls.
+    """
+
+    size: int
+    blocks: tuple[ElementBlock, ...]
+    structure: Structure
+    memo: Memo = field(default_factory=Memo)
+
+    def __repr__(self) -> str:
+        """Summary in one line."""
+        return f"<Assembler: {self.size} unknowns; blocks: {few(b.name for b in self.blocks)}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For `copy` and `pickle`: without what only saves time."""
+        return {**vars(self), "memo": Memo()}
+
+    @classmethod
+    def build(cls, size: int, blocks: Sequence[ElementBlock]) -> Assembler:
+        """Assembler of blocks over `size` unknowns.
+
+        Raises ValueError if two blocks share a name, and for elements that are inside out.
+        """
+        names = [block.name for block in blocks]
+        if len(set(names)) < len(names):
+            raise ValueError(f"two blocks have the same name: {', '.join(names)}")
+        for block in blocks:
+            require_sound_elements(block)
+        return cls(size, tuple(blocks), Structure(size, tuple(block.dofs for block in blocks)))
+
+    @property
+    def pattern(self) -> Pattern:
+        """Sparsity of the tangent, and where every element entry goes in it."""
+        return self.structure.pattern
+
+    def block(self, name: str) -> ElementBlock:
+        """The block of that name; KeyError if there is none."""
+        for block in self.blocks:
+            if block.name == name:
+                return block
+        raise UnknownNameError(
+            f"no block {name!r}; there are {', '.join(b.name for b in self.blocks)}"
+        )
+
+    def with_data(
+        self, name: str, *, data: Array | None = None, point_data: Array | None = None
+    ) -> Assembler:
+        """The assembler with other data of one block; the pattern is shared."""
+        changed = replace(self.block(name), data=data, point_data=point_data)
+        blocks = tuple(changed if b.name == name else b for b in self.blocks)
+        return replace(self, blocks=blocks, memo=self.memo.without(name))
+
+    def since(self, x: Array) -> Assembler:
+        """The assembler in the step after x; see `ElementBlock.since`."""
+        blocks = tuple(block.since(x) for block in self.blocks)
+        changed = any(new is not old for new, old in zip(blocks, self.blocks, strict=True))
+        return replace(self, blocks=blocks) if changed else self
+
+    def residual(self, x: Array, parameters: Mapping[str, Array]) -> Array:
+        """Sum of the element residuals, (size,)."""
+        total = np.zeros(self.size)
+        for block in self.blocks:
+            if block.name in parameters:
+                self._add_residual(total, block, x, parameters[block.name])
+        return total
+
+    def residual_and_size(self, x: Array, parameters: Mapping[str, Array]) -> tuple[Array, Array]:
+        """Sum of the element residuals, and of their magnitudes: both (size,).
+
+        At an equilibrium the second is the size of the loads, reactions and internal forces.
+        """
+        total, size = np.zeros(self.size), np.zeros(self.size)
+        for block in self.blocks:
+            if block.name in parameters:
+                local = block.residual(x, parameters[block.name]).ravel()
+                np.add.at(total, block.dofs.ravel(), local)
+                np.add.at(size, block.dofs.ravel(), np.abs(local))
+        return total, size
+
+    def loose(self, names: Iterable[str]) -> Integers:
+        """Unknowns that no element of the blocks of these names has, rising."""
+        return np.flatnonzero(self.counts(names) == 0)
+
+    def counts(self, names: Iterable[str]) -> Integers:
+        """Number of elements of the blocks of these names that have each unknown, (size,)."""
+        key = frozenset(names)
+        if key not in self.memo.counts:
+            found = np.zeros(self.size, dtype=np.int64)
+            for block in self.blocks:
+                if block.name in key:
+                    np.add.at(found, block.dofs.ravel(), 1)
+            self.memo.counts[key] = found
+        return self.memo.counts[key]
+
+    def around(self, values: Array, names: Iterable[str]) -> Array:
+        """For each unknown the sum of values (size,) over all unknowns of the elements that it is
+        in, of the blocks of these names: (size,).
+        """
+        found, chosen = np.zeros(self.size), frozenset(names)
+        for block in self.blocks:
+            if block.name in chosen:
+                sums = values[block.dofs].sum(axis=1)
+                np.add.at(found, block.dofs, sums[:, None])
+        return found
+
+    def reach(self) -> Array:
+        """Largest coordinate of the elements that each unknown occurs in, (size,).
+
+        Kernels that add displacements to coordinates lose a displacement in the rounding of
+        this number.
+        """
+        if self.memo.reach is None:
+            reach = np.zeros(self.size)
+            for block in self.blocks:
+                if not np.size(block.coordinates):
+                    continue  # its kernel has none
+                flat = np.abs(block.coordinates).reshape(len(block.dofs), -1)
+                largest = flat.max(axis=1, initial=0.0)
+                np.maximum.at(reach, block.dofs, largest[:, None])
+            self.memo.reach = reach
+        return self.memo.reach
+
+    def not_finite(self, x: Array, parameters: Mapping[str, Array]) -> str:
+        """The element whose residual or tangent at x is not finite, for messages; empty if none."""
+        for block in self.blocks:
+            if block.name in parameters:
+                found = not_finite(block, *block.tangent(x, parameters[block.name]))
+                if found:
+                    return found
+        return ""
+
+    def linearise(
+        self, x: Array, parameters: Mapping[str, Array]
+    ) -> tuple[Array, csc_array[np.float64]]:
+        """Residual (size,) and tangent (size, size), csc with the fixed pattern."""
+        total, data = np.zeros(self.size), np.zeros(self.pattern.nnz)
+        for block, scatter in zip(self.blocks, self.pattern.scatter, strict=True):
+            if block.name not in parameters:
+                continue
+            given = parameters[block.name]
+            if block.constant:
+                self._add_residual(total, block, x, given)
+                places, entries = self._constant(block, scatter, given)
+                np.add.at(data, places, entries)
+                continue
+            for piece, places in block.pieces(scatter):
+                local, tangents = piece.tangent(x, given)
+                np.add.at(data, places, tangents.ravel())
+                np.add.at(total, piece.dofs.ravel(), local.ravel())
+        return total, self.pattern.matrix(data)
+
+    def cross(self, fixed: Integers) -> Integers:
+        """Positions in the data of the rows and columns of these unknowns; kept for later calls."""
+        key = fixed.tobytes()
+        places = self.memo.crosses.get(key)
+        if places is None:
+            chosen = np.zeros(self.size, dtype=bool)
+            chosen[fixed] = True
+            columns = np.repeat(chosen, np.diff(self.pattern.indptr))
+            places = np.flatnonzero(columns | chosen[self.pattern.indices])
+            self.memo.keep_cross(key, places)
+        return places
+
+    def _add_residual(self, total: Array, block: ElementBlock, x: Array, given: Array) -> None:
+        """Add the residuals of a block to the sum, in place."""
+        np.add.at(total, block.dofs.ravel(), block.residual(x, given).ravel())
+
+    def _constant(
+        self, block: ElementBlock, scatter: Integers, parameters: Array
+    ) -> tuple[Integers, Array]:
+        """Places and values of the entries of a constant tangent."""
+        known = self.memo.tangents.get(block.name)
+        if known is None or not np.array_equal(known[0], parameters):
+            data = np.zeros(self.pattern.nnz)
+            np.add.at(data, scatter, block.tangent(np.zeros(self.size), parameters)[1].ravel())
+            places = np.flatnonzero(data)
+            known = parameters.copy(), places, data[places]
+            self.memo.tangents[block.name] = known
+        return known[1], known[2]

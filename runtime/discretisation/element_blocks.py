@@ -1,0 +1,211 @@
+"""Blocks of like elements: kernel, coordinates, unknowns, data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.discretisation.mass import Mass
+from softehl.runtime.kernels.kernel import Kernel, Rule
+
+Again: TypeAlias = Callable[[Array, Array, Array | None], None]
+"""A task of a kernel: of its unknowns, and of the values and the tangent that it writes."""
+
+
+_PIECE = 1 << 18  # entries of the tangents that are evaluated before they are added up
+_GROUP = 8  # elements that a kernel evaluates at once at most
+
+
+class ElementKernel(Protocol):
+    """Interface of a compiled kernel to assembly; arrays are batched over n elements."""
+
+    @property
+    def name(self) -> str:
+        """Family of the kernel."""
+        ...
+
+    @property
+    def signature(self) -> str:
+        """Identity of the compiled code."""
+        ...
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters, in the order of the parameter array."""
+        ...
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the fields of `fields_at`."""
+        ...
+
+    def residual(
+        self,
+        coordinates: Array,
+        dofs: Array,
+        *,
+        data: Array | None = None,
+        parameters: Array,
+        rule: Rule | None = None,
+    ) -> Array:
+        """Element residuals (n, ndof)."""
+        ...
+
+    def tangent(
+        self,
+        coordinates: Array,
+        dofs: Array,
+        *,
+        data: Array | None = None,
+        parameters: Array,
+        rule: Rule | None = None,
+    ) -> tuple[Array, Array]:
+        """Element residuals (n, ndof) and tangents (n, ndof, ndof)."""
+        ...
+
+    def fields_at(
+        self,
+        coordinates: Array,
+        dofs: Array,
+        *,
+        data: Array | None = None,
+        parameters: Array,
+        rule: Rule | None = None,
+    ) -> Array:
+        """Fields at the quadrature points (n, points, len(fields))."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class ElementBlock:
+    """Like elements of one kernel.
+
+    name: by which parameters are given. coordinates: (n, 2 nodes) reference (z, r), node by node.
+    dofs: (n, ndof) numbers of the unknowns. data: (n, k) constants of each element or None.
+    rule: quadrature rule, None for the kernel's own. constant: the tangent depends on parameters
+    alone, so that it is evaluated once for each set of them. point_data: (n, points, k) values at
+    the quadrature points, such as the history of the steps before, or None.
+    check_orientation: elements that are inside out are refused; False for a page whose nodes have
+    another order than VTK's. calls: the latest call of each task and the parameters it was made
+    with; it saves time only.
+    """
+
+    name: str
+    kernel: ElementKernel
+    coordinates: Array
+    dofs: Integers
+    data: Array | None = None
+    rule: Rule | None = None
+    constant: bool = False
+    point_data: Array | None = None
+    check_orientation: bool = True
+    calls: dict[str, tuple[Array, Again]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
+
+    def __repr__(self) -> str:
+        """Summary in one line."""
+        return f"<ElementBlock {self.name}: {len(self.dofs)} elements of {self.kernel.name}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For `copy` and `pickle`: without its latest calls."""
+        return {**vars(self), "calls": {}}
+
+    def residual(self, x: Array, parameters: Array) -> Array:
+        """Element residuals (n, ndof) at the global vector x."""
+        again, dofs = self._again("residual", parameters), self._gathered(x)
+        if again is None:
+            return self.kernel.residual(self.coordinates, dofs, **self.given(parameters))
+        again(dofs, values := np.empty(dofs.shape), None)
+        return values
+
+    def tangent(self, x: Array, parameters: Array) -> tuple[Array, Array]:
+        """Element residuals (n, ndof) and tangents (n, ndof, ndof) at the global vector x."""
+        again, dofs = self._again("tangent", parameters), self._gathered(x)
+        if again is None:
+            return self.kernel.tangent(self.coordinates, dofs, **self.given(parameters))
+        values, tangents = np.empty(dofs.shape), np.empty((*dofs.shape, dofs.shape[1]))
+        again(dofs, values, tangents)
+        return values, tangents
+
+    def _gathered(self, x: Array) -> Array:
+        """Unknowns (n, ndof) of the elements at the global vector x."""
+        return np.ascontiguousarray(x[self.dofs], dtype=np.float64)
+
+    def _again(self, task: str, parameters: Array) -> Again | None:
+        """The task with other unknowns than at its last call; None if more than they differ."""
+        if not isinstance(self.kernel, Kernel) or self.point_data is not None:
+            return None
+        known = self.calls.get(task)
+        if known is None or known[0] is not parameters:
+            at_rest = np.zeros(self.dofs.shape)
+            call = self.kernel.call(task, self.coordinates, at_rest, **self.given(parameters))
+            known = self.calls[task] = parameters, call.again()
+        return known[1]
+
+    def pieces(self, scatter: Integers) -> Iterator[tuple[ElementBlock, Integers]]:
+        """Parts of the block whose tangents fit into a core's cache, with theirs of `scatter`."""
+        n = len(self.dofs)
+        step = max(_PIECE // max(self.dofs.shape[1] ** 2, 1), _GROUP)
+        if n <= step:
+            yield self, scatter
+            return
+        width = len(scatter) // n
+        for first in range(0, n, step):
+            part = slice(first, first + step)
+            data = None if self.data is None else self.data[part]
+            history = None if self.point_data is None else self.point_data[part]
+            coordinates, dofs = self.coordinates[part], self.dofs[part]
+            piece = replace(self, coordinates=coordinates, dofs=dofs, data=data, point_data=history)
+            if isinstance(self.kernel, Mass):
+                piece = replace(piece, kernel=self.kernel.part(part))
+            yield piece, scatter[width * first : width * (first + step)]
+
+    def since(self, x: Array) -> ElementBlock:
+        """The block in the step after x: data u_old1, ... of unknowns u1, ... are those of x."""
+        unknowns, names = (tuple(getattr(self.kernel, n, ())) for n in ("unknowns", "data"))
+        places = {f"{u[:-1]}_old{u[-1]}": k for k, u in enumerate(unknowns)}
+        columns = [k for k, name in enumerate(names) if name in places]
+        if not columns or self.data is None:
+            return self
+        data = self.data.copy()
+        data[:, columns] = x[self.dofs[:, [places[names[k]] for k in columns]]]
+        return replace(self, data=data)
+
+    def given(self, parameters: Array) -> dict[str, Any]:
+        """Arguments of its kernel besides coordinates and unknowns."""
+        given = {"data": self.data, "parameters": parameters, "rule": self.rule}
+        return given if self.point_data is None else {**given, "point_data": self.point_data}
+
+    def fields(self, x: Array, parameters: Array) -> dict[str, Array]:
+        """Fields of the kernel at its quadrature points, name -> (n, points); with them its
+        internal unknowns, the same at all points of an element.
+        """
+        internal = self.internal
+        if not self.kernel.fields:
+            values = np.empty((len(self.dofs), len(self._rule.weights) if internal else 0, 0))
+        else:
+            given = self.given(parameters)
+            values = self.kernel.fields_at(self.coordinates, x[self.dofs], **given)
+        found = {name: values[:, :, i] for i, name in enumerate(self.kernel.fields)}
+        for name, numbers in internal.items():
+            found.setdefault(name, np.repeat(x[numbers][:, None], values.shape[1], axis=1))
+        return found
+
+    @property
+    def internal(self) -> dict[str, Integers]:
+        """Numbers (n,) of the unknowns that each element has for itself, by name."""
+        names = getattr(self.kernel, "internal", ())
+        unknowns = getattr(self.kernel, "unknowns", ())
+        return {name: self.dofs[:, unknowns.index(name)] for name in names}
+
+    @property
+    def _rule(self) -> Rule:
+        if self.rule is not None:
+            return self.rule
+        assert isinstance(self.kernel, Kernel)
+        return self.kernel.default_rule

@@ -1,0 +1,249 @@
+"""A tangent that is no matrix, and its solution by Krylov's methods with multigrid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.discretisation.constraints import Ties
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.loads import Tie
+from softehl.runtime.discretisation.matrix_free_products import Product
+from softehl.runtime.discretisation.p_multigrid import Levels
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.solve.linear.coarse_grid_solver import coarse_solver
+from softehl.runtime.solve.linear.krylov import conjugate_gradients, minimal_residuals
+from softehl.runtime.solve.linear.linear_solver import SingularMatrix
+from softehl.runtime.solve.linear.multigrid import Level, Multigrid
+
+
+@dataclass(frozen=True, eq=False)
+class Iteration:
+    """Tolerance of the residual, relative to the right-hand side; iterations at most; counts of all
+    solutions so far.
+    """
+
+    tolerance: float
+    most: int
+    counts: list[int] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """The tangent at a state: products of pages, a matrix of loads and springs, and multigrid.
+
+    rest: matrix of loads and springs, node by node as the first level has it. diagonals: of K,
+    (n,). ties: of its unknowns. lower: K at the first lower level, in what moves there. held:
+    places of what does not move by itself, and work: two vectors for products, node by node.
+    """
+
+    problem: Problem
+    levels: Levels
+    iteration: Iteration
+    products: tuple[Product, ...]
+    rest: csr_array
+    diagonals: Array
+    ties: Ties
+    lower: csr_array
+    held: Integers
+    work: tuple[Array, Array]
+
+    @classmethod
+    def of(
+        cls, problem: Problem, levels: Levels, iteration: Iteration, ties: Ties, x: Array
+    ) -> Tangent:
+        """At x, (n,)."""
+        products, diagonal, rest = [], np.zeros(len(x)), csr_array((len(x), len(x)))
+        count = levels.steps[0].shape[1]
+        lower = csr_array((count, count))
+        for block in problem.assembler.blocks:
+            given = problem.parameters.get(block.name)
+            if given is None or not len(block.dofs) or isinstance(block.kernel, Tie):
+                continue
+            if block.name in levels.places:
+                products.append(Product.of(block, x, given, levels.places[block.name]))
+                lower = lower + _projected(block, x, given, levels, ties.free, diagonal)
+            else:
+                tangents = block.tangent(x, given)[1]
+                rest = rest + _matrix(block.dofs, tangents, len(x))
+        diagonal += rest.diagonal()
+        order = levels.unknowns[0]
+        if rest.nnz:
+            rest = csr_array(rest)[order][:, order]
+            P = without(levels.steps[0], ties.free[order])
+            lower = lower + P.T @ rest @ P
+        T = ties.follows[1].matrix
+        found = csr_array(rest), diagonal, ties, csr_array(T.T @ lower @ T)
+        places = next(iter(levels.places.values()))
+        held = np.flatnonzero(~ties.follows[0].moving)
+        work = places.vector(), places.vector()
+        return cls(problem, levels, iteration, tuple(products), *found, held, work)
+
+    def times(self, v: Array) -> Array:
+        """K v, prescribed unknowns included."""
+        return np.asarray(self._untied(v) + self.ties.whole @ v)
+
+    def _untied(self, v: Array) -> Array:
+        """K v without ties."""
+        order, y = self.levels.unknowns[0], np.empty_like(v)
+        given, found = self.work
+        given[: len(v)] = v[order]
+        y[order] = self._product(given, found)
+        return y
+
+    def _product(self, given: Array, found: Array) -> Array:
+        """K v without ties, node by node, of the first numbers of a vector for products; a part
+        of the other one.
+        """
+        n = self.levels.unknowns[0].size
+        found.fill(0.0)
+        for product in self.products:
+            product(given, found)
+        if self.rest.nnz:
+            found[:n] += self.rest @ given[:n]
+        return found[:n]
+
+    def apply(self, v: Array) -> Array:
+        """T' K T v node by node, with ones for what does not move by itself."""
+        given, found = self.work
+        x, follow = given[: len(v)], self.ties.follows[0]
+        x[:] = v
+        x[self.held] = 0.0
+        follow.spread(x)
+        y = self._product(given, found).copy()
+        follow.gather(y)
+        y[self.held] = v[self.held]
+        return y
+
+    def __matmul__(self, v: Array) -> Array:
+        """K v as `solve` has it: prescribed unknowns have equations of their own."""
+        fixed = self.problem.fixed
+        moving = v.copy()
+        moving[fixed] = 0.0
+        found = self.times(moving)
+        found[fixed] = v[fixed]
+        return found
+
+    def diagonal(self) -> Array:
+        """Of K."""
+        return self.diagonals
+
+    def __abs__(self) -> _Bound:
+        return _Bound(self)
+
+    def loosest(self) -> None:
+        """See `Judging`: iterations that converged show that the matrix is regular."""
+
+    def solve(self, r: Array) -> Array:
+        """x of K x = r.  Raises SingularMatrix where the iteration does not get there."""
+        order, ties, follow = self.levels.unknowns[0], self.ties, self.ties.follows[0]
+        fixed, tied = self.problem.fixed, len(self.ties.forces) > 0
+        x = ties.shift(r)
+        b = (r - self._untied(x) if tied else r)[order]
+        follow.gather(b)
+        b[self.held] = 0.0
+        z = self._iterated(b)
+        follow.spread(z)
+        x[order] += z
+        if tied:
+            ties.put_forces(x, r - self._untied(x))
+        x[fixed] = r[fixed]
+        return x
+
+    def _iterated(self, b: Array) -> Array:
+        """z of T' K T z = b, node by node; zero for what does not move by itself."""
+        given, cycle = self.iteration, self._multigrid()
+        method = conjugate_gradients if self.is_symmetric() else minimal_residuals
+        found = method(self.apply, cycle, b, given.tolerance, given.most)
+        given.counts.append(found.iterations)
+        # up to a negative curvature it is a direction of descent, which Newton's method may take
+        if not (found.converged or found.negative) or not np.isfinite(found.x).all():
+            raise SingularMatrix(
+                f"matrix-free: no linear solution after {found.iterations} iterations: leave "
+                "linear out, or take more steps"
+            )
+        return found.x
+
+    def is_symmetric(self) -> bool:
+        """True if two random vectors say so."""
+        u, v = np.random.default_rng(0).uniform(-1.0, 1.0, (2, len(self.diagonals)))
+        Ku, Kv = self.apply(u), self.apply(v)
+        size = np.linalg.norm(u) * np.linalg.norm(Kv)
+        return bool(abs(u @ Kv - v @ Ku) <= 1e-10 * size)
+
+    def _multigrid(self) -> Multigrid:
+        levels, follows = self.levels, self.ties.follows
+        diagonal = self.diagonals[levels.unknowns[0]]
+        if not np.isfinite(diagonal).all():
+            raise SingularMatrix("the tangent has entries that are not finite")
+        follows[0].gather(diagonal)
+        diagonal[self.held] = 1.0
+        found, matrix = list[Level](), self.lower
+        for step, (upper, lower) in zip(levels.steps, pairwise(follows), strict=True):
+            P = without(step, upper.moving) @ lower.matrix
+            if not found:
+                found.append(Level.of(self.apply, diagonal, P))
+                continue
+            A = _with_ones(matrix, upper.moving)
+            found.append(Level.of(A.__matmul__, A.diagonal(), P))
+            matrix = csr_array(P.T @ matrix @ P)
+        moving = follows[-1].moving
+        near = np.where(moving[:, None], levels.near, 0.0)
+        lowest = coarse_solver(_with_ones(matrix, moving), near, levels.components)
+        return Multigrid(found, lowest)
+
+
+@dataclass(frozen=True, eq=False)
+class _Bound:
+    """A bound of |K|: |K_ij| <= sqrt(K_ii K_jj) inside every element."""
+
+    tangent: Tangent
+
+    def __matmul__(self, x: Array) -> Array:
+        problem = self.tangent.problem
+        root = np.sqrt(np.abs(self.tangent.diagonals))
+        root[problem.fixed] = 0.0
+        around = problem.assembler.around(root * x, problem.parameters)
+        return np.asarray(root * around + abs(self.tangent.ties.whole) @ x)
+
+
+def _projected(
+    block: ElementBlock, x: Array, given: Array, levels: Levels, free: Flags, diagonal: Array
+) -> csr_array:
+    """The matrix at the lower order, and the diagonal of K, from the tangents of elements."""
+    P, dofs = levels.transfers[block.name].whole(), levels.lower[block.name]
+    found, at = np.empty((len(dofs), P.shape[1], P.shape[1])), 0
+    for piece, _ in block.pieces(np.empty(0, dtype=np.int64)):
+        tangents = piece.tangent(x, given)[1]
+        np.add.at(diagonal, piece.dofs, np.einsum("nii->ni", tangents))
+        mask = free[piece.dofs].astype(np.float64)
+        held = P[None] * mask[:, :, None]
+        found[at : at + len(mask)] = np.swapaxes(held, 1, 2) @ (tangents @ held)
+        at += len(mask)
+    mask = free[levels.unknowns[1]][dofs].astype(np.float64)
+    found *= mask[:, :, None] * mask[:, None, :]
+    return _matrix(dofs, found, len(levels.unknowns[1]))
+
+
+def _matrix(dofs: Integers, tangents: Array, size: int) -> csr_array:
+    """Assembled from the matrices (n, k, k) of elements."""
+    k = dofs.shape[1]
+    rows, columns = np.repeat(dofs, k, axis=1).ravel(), np.tile(dofs, k).ravel()
+    return csr_array(coo_array((tangents.ravel(), (rows, columns)), (size, size)))
+
+
+def without(step: csr_array, moving: Flags) -> csr_array:
+    """Interpolation to what moves: without other rows."""
+    return csr_array(step.multiply(moving.astype(np.float64)[:, None]))
+
+
+def _with_ones(A: csr_array, free: Flags) -> csr_array:
+    """With a typical number on the diagonal of prescribed unknowns."""
+    typical = float(np.abs(A.diagonal()).mean()) or 1.0
+    held = np.where(free, 0.0, typical)
+    n = len(free)
+    return csr_array(A + csr_array((held, (np.arange(n), np.arange(n))), (n, n)))

@@ -1,0 +1,169 @@
+"""p-multigrid: levels of lower order of the shape functions on the same cells, all of one order.
+
+Nodes of the lower order are nodes of the higher one: corners, or corners and middles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.matrix_free_products import (
+    Places,
+    by_components,
+    require_product,
+)
+from softehl.runtime.discretisation.near_nullspace import motions
+from softehl.runtime.mesh.cells import CELLS, Cell
+
+LOWER = {2: 1, 3: 1, 4: 2, 5: 1, 6: 2}
+"""Order of the next level: where nodes of order 2 are not among those there are, 1."""
+
+
+def cell_of(cell: Cell, order: int) -> Cell:
+    """The cell of another order on the same corners."""
+    shape = cell.name.rstrip("0123456789")
+    return CELLS[f"{shape}{(order + 1) ** cell.dimension}"]
+
+
+@dataclass(frozen=True, eq=False)
+class Transfer:
+    """Elements of a block at a lower order.
+
+    local: (nodes, lower nodes) values of the lower shape functions at the nodes. inside: numbers of
+    the lower nodes among the nodes. columns: (nodes, components) numbers of an element's unknowns.
+    """
+
+    local: Array
+    inside: Integers
+    columns: Integers
+
+    @classmethod
+    def of(cls, block: ElementBlock, order: int) -> Transfer:
+        """To a lower order."""
+        kernel = require_product(block)
+        cell = CELLS[kernel.cell]
+        lower = cell_of(cell, order)
+        apart = np.linalg.norm(cell.nodes[:, None] - lower.nodes[None], axis=2)
+        return cls(lower.shape(cell.nodes), apart.argmin(axis=0), by_components(kernel))
+
+    def lower_dofs(self, block: ElementBlock) -> Integers:
+        """Unknowns (n, lower nodes, components) of the lower order, by their numbers."""
+        return np.asarray(block.dofs[:, self.columns[self.inside]])
+
+    def whole(self) -> Array:
+        """Interpolation (unknowns, lower unknowns) of an element, components running first."""
+        components = self.columns.shape[1]
+        found = np.zeros((self.columns.size, self.local.shape[1] * components))
+        for c in range(components):
+            found[self.columns[:, c], c::components] = self.local
+        return found
+
+
+def interpolation(
+    pairs: list[tuple[Integers, Integers, Array]], size: int, count: int
+) -> csr_array:
+    """Interpolation (size, count) of elements: unknowns (n, k), lower ones (n, l), and (k, l)."""
+    times = np.zeros(size)
+    for dofs, _, _ in pairs:
+        np.add.at(times, dofs, 1.0)
+    rows, columns, values = [], [], []
+    for dofs, lower, local in pairs:
+        i, j = np.nonzero(np.abs(local) > 1e-14)
+        rows.append(dofs[:, i].ravel())
+        columns.append(lower[:, j].ravel())
+        values.append((local[i, j] / times[dofs[:, i]]).ravel())
+    where = np.concatenate(rows), np.concatenate(columns)
+    return csr_array((np.concatenate(values), where), (size, count))
+
+
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """Places of elements and levels of lower order, which all states share.
+
+    places: of the elements of a block. transfers: to the first lower order, and lower: unknowns
+    (n, k) of the elements there. unknowns: of every level by their numbers in the system; those of
+    a node are neighbours. steps: interpolation to each level from the next.
+    components: unknowns of a node. near: (m, k) motions that the lowest level hardly resists.
+    """
+
+    places: dict[str, Places]
+    transfers: dict[str, Transfer]
+    lower: dict[str, Integers]
+    unknowns: tuple[Integers, ...]
+    steps: tuple[csr_array, ...]
+    components: int
+    near: Array
+
+    @classmethod
+    def of(
+        cls,
+        points: Array,
+        dofmap: Mapping[str, Integers],
+        pages: Sequence[ElementBlock],
+        *,
+        order: int,
+        size: int,
+        threads: int,
+    ) -> Levels:
+        """Levels for blocks of cells of an order.
+
+        points: (n, dim) nodes. dofmap: name -> (n,) unknowns at the nodes. size: of all unknowns.
+        """
+        names = list(dict.fromkeys(n for b in pages for n, _ in require_product(b).places))
+        nodal = [dofmap[name] for name in names]
+        orders = [order, LOWER[order]] if order > 1 else [1, 1]
+        while orders[-1] > 1:
+            orders.append(LOWER[orders[-1]])
+        numbers = _node_by_node(nodal, size)
+        whole = _inverse(numbers, size)
+        dofs = [{b.name: whole[b.dofs] for b in pages}]
+        unknowns = [numbers]
+        steps: list[csr_array] = []
+        for upper, now in pairwise(orders):
+            own = {b.name: Transfer.of(b, now).lower_dofs(b) for b in pages}
+            first = np.concatenate([d[:, :, 0].ravel() for d in own.values()])
+            at = np.flatnonzero(np.isin(nodal[0], first))
+            found = np.stack([numbers[at] for numbers in nodal], axis=1).ravel()
+            inverse = _inverse(found, size)
+            dofs.append({n: inverse[d.reshape(len(d), -1)] for n, d in own.items()})
+            pairs = [
+                (dofs[-2][b.name], dofs[-1][b.name], _element(b, upper, now, whole=len(steps) == 0))
+                for b in pages
+            ]
+            steps.append(interpolation(pairs, len(unknowns[-1]), len(found)))
+            unknowns.append(found)
+        places = {b.name: Places.of(b, threads, whole) for b in pages}
+        transfers = {b.name: Transfer.of(b, orders[1]) for b in pages}
+        near = motions(points[at], names)
+        return cls(places, transfers, dofs[1], (*unknowns,), (*steps,), len(names), near)
+
+
+def _node_by_node(nodal: Sequence[Integers], size: int) -> Integers:
+    """All unknowns: those of nodes that have every field node by node, then the others."""
+    columns = np.stack(nodal, axis=1)
+    first = columns[(columns >= 0).all(axis=1)].ravel()
+    return np.concatenate([first, np.setdiff1d(np.arange(size), first)])
+
+
+def _inverse(numbers: Integers, size: int) -> Integers:
+    """Place of each of `size` unknowns among numbers."""
+    found = np.empty(size, dtype=np.int64)
+    found[numbers] = np.arange(len(numbers))
+    return found
+
+
+def _element(block: ElementBlock, upper: int, lower: int, *, whole: bool) -> Array:
+    """Interpolation of an element; whole: to its unknowns in the order of the kernel."""
+    if whole:
+        return Transfer.of(block, lower).whole()
+    kernel = require_product(block)
+    cell, components = CELLS[kernel.cell], len(kernel.unknowns) // kernel.nodes
+    local = cell_of(cell, lower).shape(cell_of(cell, upper).nodes)
+    return np.asarray(np.kron(local, np.eye(components)))

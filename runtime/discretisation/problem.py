@@ -1,0 +1,339 @@
+"""A nonlinear problem: assembled blocks, prescribed unknowns, reference sizes, and guards.
+
+It satisfies the solvers' `MeasuredProblem` and `NamedProblem`. Continuation changes parameters,
+prescribed values and guards: `with_parameters` and `with_fixed` give another problem on
+the same assembler.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_array
+
+from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.dofmap import DofLayout
+from softehl.runtime.discretisation.problem_checks import (
+    ProblemError,
+    contradiction,
+    in_order,
+    require_known,
+    unknown_name,
+)
+from softehl.runtime.discretisation.residual_norm import ROUNDING, Balance, hides, is_far, size
+from softehl.runtime.discretisation.step_bounds import Guard
+from softehl.runtime.suggestions import few, listed
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Assembled equations with prescribed unknowns.
+
+    parameters: block name -> parameters, (k,) in the order of the kernel or a mapping by name (put
+    in order here); a block that is not named is switched off.
+    scales: field -> reference size of its residuals, one or one for each: a force (N), a flux
+    (mm^2/s), a gap times area (mm^3). They may be left out: residuals are measured by the terms of
+    their equations (`residual_norm`), with which a scale that is given must agree: the stricter of
+    both counts.
+    fixed, values: unknowns that are prescribed, and to what (same length). Their equations are
+    x = value, and they are eliminated from the others.
+    absolute: residuals are measured by `scales` alone, of which every field needs one, however
+    small the loads are: for families of problems that are solved to one accuracy.
+
+    Raises ProblemError for unknown names, parameters that are missing or not finite, and for an
+    unknown that is prescribed to two values.
+    """
+
+    assembler: Assembler
+    layout: DofLayout
+    parameters: Mapping[str, Any]
+    scales: Mapping[str, float | Array] = field(default_factory=dict)
+    fixed: Integers = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    values: Array = field(default_factory=lambda: np.empty(0))
+    guards: tuple[Guard, ...] = ()
+    absolute: bool = False
+
+    def __post_init__(self) -> None:
+        """Put parameters in order and refuse what makes no sense; see the class."""
+        names = [block.name for block in self.assembler.blocks]
+        require_known("block", self.parameters, names)
+        require_known("field", self.scales, self.layout.names)
+        if self.layout.total != self.assembler.size:
+            raise ProblemError(
+                f"the layout has {self.layout.total} unknowns, the assembler {self.assembler.size}"
+            )
+        missing = [name for name in self.layout.names if name not in self.scales]
+        if self.absolute and missing:
+            raise ProblemError(f"absolute scales: {listed(missing)} has none; give one for each")
+        ordered = {n: in_order(self.assembler.block(n), v) for n, v in self.parameters.items()}
+        object.__setattr__(self, "parameters", ordered)
+        self._require_prescribed()
+
+    def __repr__(self) -> str:
+        """Summary in one line."""
+        return (
+            f"<{type(self).__name__}: {self.layout.total} unknowns ({few(self.layout.names)}), "
+            f"{len(self.fixed)} prescribed; blocks: {few(self.parameters)}>"
+        )
+
+    def _require_prescribed(self) -> None:
+        fixed, n = self.fixed, self.layout.total
+        if np.shape(fixed) != np.shape(self.values) or np.ndim(fixed) != 1:
+            raise ProblemError(
+                f"fixed has shape {np.shape(fixed)} and values {np.shape(self.values)}: they are "
+                "lists of one length"
+            )
+        if len(fixed) and not 0 <= fixed.min() <= fixed.max() < n:
+            raise ProblemError(f"fixed: unknowns are numbered from 0 to {n - 1}")
+        if not np.isfinite(self.values).all():
+            first = int(fixed[~np.isfinite(self.values)][0])
+            raise ProblemError(f"{self.name_of(first)} is prescribed to a value that is not finite")
+        found = contradiction(fixed, self.values)
+        if found:
+            number, one, other = found
+            raise ProblemError(
+                f"{self.name_of(number)} is prescribed twice, to {one:g} and to {other:g}"
+            )
+
+    def name_of(self, number: int) -> str:
+        """An unknown for messages: its number, field, element and place."""
+        layout = self.layout
+        field_name = next(n for n in layout.names if number < layout.part(n).stop)
+        active = [block for block in self.assembler.blocks if block.name in self.parameters]
+        place = unknown_name([*active, *self.assembler.blocks], number)
+        return f"unknown {number} of field {field_name!r}{place}"
+
+    def where_not_finite(self, x: Array) -> str:
+        """The element whose residual or tangent is not finite at x, (n,); empty if none is."""
+        return self.assembler.not_finite(x, self.parameters)
+
+    def at(self, x: Array) -> Problem:
+        """The problem with the elements that it has at x, (n,): its own, unless they are sought."""
+        return self
+
+    def residual(self, x: Array) -> Array:
+        """R(x), (n,): internal minus external virtual work; x - value for prescribed unknowns."""
+        r = self.assembler.residual(x, self.parameters)
+        r[self.fixed] = x[self.fixed] - self.values
+        return r
+
+    def linearise(self, x: Array) -> tuple[Array, csc_array[np.float64]]:
+        """R(x), (n,), and K = dR/dx, (n, n), with prescribed unknowns eliminated.
+
+        If x does not yet have the prescribed values, their influence on the other equations
+        is moved into R, so that -K^-1 R is the exact Newton step of the whole system.
+        """
+        return self.linearise_with(x, None)
+
+    def linearise_with(
+        self, x: Array, addition: Array | None
+    ) -> tuple[Array, csc_array[np.float64]]:
+        """As `linearise`, with `addition` (nnz,) to the entries of K before the elimination."""
+        return self._linearised(x, addition, None)[:2]
+
+    def linearise_along(self, x: Array, rate: Array) -> tuple[Array, csc_array[np.float64], Array]:
+        """As `linearise`, and K times the rate (n,) before the elimination, zero where fixed."""
+        return self._linearised(x, None, rate)
+
+    def _linearised(
+        self, x: Array, addition: Array | None, rate: Array | None
+    ) -> tuple[Array, csc_array[np.float64], Array]:
+        r, K = self.assembler.linearise(x, self.parameters)
+        if addition is not None:
+            K.data += addition
+        defect, along = np.zeros_like(r), np.zeros_like(r)
+        defect[self.fixed] = x[self.fixed] - self.values
+        if defect.any():
+            r = r - K @ defect
+        r[self.fixed] = defect[self.fixed]
+        if rate is not None and rate.any():
+            along = np.asarray(K @ rate)
+            along[self.fixed] = 0.0
+        return r, self.eliminated(K), along
+
+    def norm(self, r: Array) -> float:
+        """Root of the sum over fields of |R / scale|^2, 2-norms; every field needs a scale."""
+        return float(np.linalg.norm(self.scaled(r)))
+
+    def scaled(self, r: Array) -> Array:
+        """Residual (n,) over the reference size of its field; `norm` is the 2-norm of it."""
+        return r * self._weights
+
+    @cached_property
+    def _weights(self) -> Array:
+        """One over the reference size of each residual, (n,)."""
+        weights = np.zeros(self.layout.total)
+        for name in self.layout.names:
+            if name not in self.scales:
+                raise ProblemError(f"field {name!r} has no scale: give one, it is needed here")
+            weights[self.layout.part(name)] = 1.0 / np.asarray(self.scales[name])
+        return weights
+
+    def measure(self, x: Array, K: csc_array[np.float64] | None, *, rounded: bool = False) -> float:
+        """Dimensionless size of the residual at x, (n,), inf where it is not finite.
+
+        `residual_norm` says how; prescribed unknowns count relative to their values. K: a tangent
+        near x. rounded: what rounding may have caused does not count. With `absolute` scales it is
+        the norm. Raises ProblemError if an unknown occurs in no block that is switched on.
+        """
+        self._require_determined()
+        if self.absolute:
+            r = self.residual(x)
+            return self.norm(r) if np.isfinite(r).all() else np.inf
+        r, forces = self.assembler.residual_and_size(x, self.parameters)
+        if not np.isfinite(r).all():
+            return np.inf
+        noise, terms = np.zeros_like(r), np.zeros_like(r)
+        if K is not None:
+            if self._is_lost(x, forces, K):
+                return 1.0
+            terms = self._terms(np.abs(x), K)
+            if rounded:
+                noise = self.noise(x, K)
+        free: Flags = np.ones(len(r), dtype=bool)
+        free[self.fixed] = False
+        defect = np.where(free, np.maximum(np.abs(r) - noise, 0.0), 0.0)
+        wanted = x.copy()
+        wanted[self.fixed] = self.values
+        off, extent = x - wanted, np.maximum(np.abs(x), np.abs(wanted))
+        met = ~free | (self.assembler.counts(self.parameters) > 1)
+        balance = Balance(defect, forces, terms, met, off, extent)
+        found = size(balance.squares(self.layout.fields), balance.worst())
+        return max(found, self._by_scales(defect))
+
+    def merit(self, x: Array) -> float:
+        """Norm of the residuals at x, (n,), each field relative to its forces there."""
+        if self.absolute:
+            return self.norm(self.residual(x))
+        r, forces = self.assembler.residual_and_size(x, self.parameters)
+        r[self.fixed] = 0.0
+        sizes = [[float(np.linalg.norm(v[f])) for v in (r, forces)] for f in self.layout.fields]
+        return float(np.linalg.norm([a / (b or 1.0) for a, b in sizes]))
+
+    def noise(self, x: Array, K: csc_array[np.float64]) -> Array:
+        """Share of rounding in each residual at x, (n,), at most. K: a tangent near x."""
+        return ROUNDING * self._terms(np.abs(x) + self.assembler.reach(), K)
+
+    def _terms(self, magnitudes: Array, K: csc_array[np.float64]) -> Array:
+        """Terms that cancel in each equation, (n,), for unknowns of these magnitudes, (n,).
+
+        An entry of K may itself be what is left of larger numbers, of which sqrt(K_ii K_jj) is a
+        bound wherever an energy is convex (Cauchy and Schwarz).
+        """
+        root = np.sqrt(np.abs(K.diagonal()))
+        root[self.fixed] = 0.0
+        around = self.assembler.around(root * magnitudes, self.parameters)
+        return np.asarray(_sizes(K) @ magnitudes) + root * around
+
+    def _by_scales(self, defect: Array) -> float:
+        """Largest norm of the residuals of a field over the scale that is given for it."""
+        given = self.scales.items()
+        found = [defect[self.layout.part(name)] / np.asarray(scale) for name, scale in given]
+        return max((float(np.linalg.norm(part)) for part in found), default=0.0)
+
+    def beyond_rounding(self, r: Array, x: Array, K: csc_array[np.float64]) -> float:
+        """Norm of what is left of the residual r at x, (n,), once what the last digits of x make of
+        it does not count; inf without `absolute` scales. K: a tangent near x.
+        """
+        if not self.absolute:
+            return np.inf
+        noise = np.finfo(np.float64).eps * np.asarray(abs(K) @ np.abs(x))
+        return self.norm(np.maximum(np.abs(r) - noise, 0.0))
+
+    def _is_lost(self, x: Array, forces: Array, K: csc_array[np.float64]) -> bool:
+        """True if unknowns have grown until rounding is as large as the loads."""
+        reach = self.assembler.reach()
+        known = max(float(reach.max()), float(np.abs(self.values).max(initial=0.0)))
+        largest = float(np.abs(x).max(initial=0.0))
+        if not is_far(largest, known):
+            return False
+        noise = ROUNDING * np.asarray(abs(K) @ (np.abs(x) + reach))
+        return hides(float(np.linalg.norm(noise)), float(np.linalg.norm(forces)))
+
+    def _require_determined(self) -> None:
+        loose = np.setdiff1d(self.assembler.loose(self.parameters), self.fixed)
+        if len(loose):
+            others = f" (and {len(loose) - 1} more)" if len(loose) > 1 else ""
+            raise ProblemError(
+                f"{self.name_of(int(loose[0]))}{others} occurs in no block that is switched on: "
+                "prescribe it, or give its block parameters"
+            )
+
+    def step_limit(self, x: Array, dx: Array) -> float:
+        """Largest fraction of the step that every guard admits."""
+        return min((guard.limit(x, dx) for guard in self.guards), default=1.0)
+
+    def with_parameters(self, **changes: Mapping[str, float] | None) -> Problem:
+        """The problem with other parameters: block={name: value, ...}, or block=None to switch off.
+
+        Parameters that are not named keep their value; a block that was off needs all of them.
+        """
+        parameters = dict(self.parameters)
+        for name, values in changes.items():
+            if values is None:
+                parameters.pop(name, None)
+            else:
+                parameters[name] = self._changed(name, values)
+        return replace(self, parameters=parameters)
+
+    def with_fixed(self, fixed: Sequence[Integers], values: Sequence[Array | float]) -> Problem:
+        """The problem with these unknowns prescribed, and no others; parts are joined."""
+        full = [
+            np.broadcast_to(np.asarray(v, dtype=np.float64), f.shape)
+            for f, v in zip(fixed, values, strict=True)
+        ]
+        return replace(
+            self,
+            fixed=np.concatenate([np.empty(0, dtype=np.int64), *fixed]),
+            values=np.concatenate([np.empty(0), *full]),
+        )
+
+    def also_fixed(self, fixed: Integers, value: Array | float) -> Problem:
+        """The problem with these unknowns prescribed too."""
+        return self.with_fixed([self.fixed, fixed], [self.values, value])
+
+    def admissible(self, x: Array) -> Array:
+        """x with the prescribed values."""
+        y = x.copy()
+        y[self.fixed] = self.values
+        return y
+
+    def since(self, x: Array) -> Problem:
+        """The problem of the step after x, for kernels that ask for unknowns of the step before."""
+        assembler = self.assembler.since(x)
+        return self if assembler is self.assembler else replace(self, assembler=assembler)
+
+    def fields(self, name: str, x: Array) -> dict[str, Array]:
+        """Fields of a block that is switched on, at its points: name -> (n, points)."""
+        return self.assembler.block(name).fields(x, self.parameters[name])
+
+    def _changed(self, name: str, values: Mapping[str, float]) -> Array:
+        require_known("block", [name], [block.name for block in self.assembler.blocks])
+        block = self.assembler.block(name)
+        names, old = block.kernel.parameters, self.parameters.get(name)
+        require_known(f"parameter of block {name!r}", values, names)
+        if old is None:
+            if set(values) != set(names):
+                raise ProblemError(f"block {name!r} is off: give all of {listed(names)}")
+            return in_order(block, values)
+        return in_order(block, {**dict(zip(names, old, strict=True)), **values})
+
+    def eliminated(self, K: csc_array[np.float64]) -> csc_array[np.float64]:
+        """K with the rows and columns of prescribed unknowns replaced by those of the identity."""
+        if not len(self.fixed):
+            return K
+        K.data[self.assembler.cross(self.fixed)] = 0.0
+        K.data[self.assembler.pattern.diagonal[self.fixed]] = 1.0
+        return K
+
+
+def _sizes(K: Any) -> Any:
+    """|K|; of a matrix without a copy of its structure."""
+    if not isinstance(K, csc_array):  # of an operator a bound
+        return abs(K)
+    return csc_array((np.abs(K.data), K.indices, K.indptr), shape=K.shape)

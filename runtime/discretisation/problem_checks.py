@@ -1,0 +1,159 @@
+"""Checks of a problem that name the fault: parameters, prescribed values, elements, unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softehl.errors import SoftehlError
+from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.kernels.kernel import Kernel
+from softehl.runtime.mesh.cells import CELLS, Cell, jacobians
+from softehl.runtime.suggestions import listed, meant
+
+if TYPE_CHECKING:
+    from softehl.runtime.discretisation.element_blocks import ElementBlock
+
+_CELLS = {(cell.dimension, len(cell.nodes)): cell for cell in CELLS.values()}
+
+
+class ProblemError(SoftehlError, ValueError):
+    """A problem cannot be posed; the message names what was given and what is allowed."""
+
+
+def require_known(what: str, given: Iterable[str], known: Iterable[str]) -> None:
+    """Raise ProblemError for a name that is not known."""
+    allowed = list(known)
+    for name in given:
+        if name not in allowed:
+            raise ProblemError(
+                f"no {what} {name!r}{meant(name, allowed)}; there are {listed(allowed)}"
+            )
+
+
+def in_order(block: ElementBlock, given: Any) -> Array:
+    """Parameters of a block, an array or a mapping by name, in the order of its kernel."""
+    names = block.kernel.parameters
+    if isinstance(given, Mapping):
+        require_known(f"parameter of block {block.name!r}", given, names)
+        missing = [name for name in names if name not in given]
+        if missing:
+            raise ProblemError(f"block {block.name!r} needs {', '.join(missing)} too")
+        given = [given[name] for name in names]
+    values = np.asarray(given)
+    if values.dtype.kind not in "fiu" or values.shape != (len(names),):
+        raise ProblemError(
+            f"block {block.name!r}: parameters {given!r}, must be {len(names)} numbers "
+            f"({listed(names)})"
+        )
+    values = values.astype(np.float64, copy=False)
+    if not np.isfinite(values).all():
+        k = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise ProblemError(f"block {block.name!r}: {names[k]} = {values[k]}, must be finite")
+    return values
+
+
+def contradiction(fixed: Integers, values: Array) -> tuple[int, float, float] | None:
+    """An unknown that is prescribed twice, and to which different values."""
+    order = np.argsort(fixed, kind="stable")
+    same = fixed[order][1:] == fixed[order][:-1]
+    differ = np.flatnonzero(same & (values[order][1:] != values[order][:-1]))
+    if not len(differ):
+        return None
+    first, second = order[differ[0]], order[differ[0] + 1]
+    return int(fixed[first]), float(values[first]), float(values[second])
+
+
+def require_sound_elements(block: ElementBlock) -> None:
+    """Raise ProblemError for an element that is inside out or flat, or has numbers not finite.
+
+    Elements are looked at whose kernel integrates over their volume (in the plane: their area).
+    """
+    n = len(block.dofs)
+    if np.size(block.coordinates) and len(block.coordinates) != n:
+        raise ProblemError(
+            f"block {block.name!r} has coordinates of {len(block.coordinates)} elements and dofs "
+            f"of {n}"
+        )
+    for what, numbers in (("coordinates", block.coordinates), ("data", block.data)):
+        wrong = ~np.isfinite(np.asarray(0.0 if numbers is None else numbers, dtype=np.float64))
+        if wrong.any():
+            row = int(np.nonzero(wrong)[0][0])
+            raise ProblemError(f"{element_name(block, row)}: its {what} are not finite")
+    cell = _cell(block)
+    if cell is None or not block.check_orientation:
+        return
+    places = np.asarray(block.coordinates, dtype=np.float64)
+    places = places.reshape(len(places), len(cell.nodes), cell.dimension)
+    smallest = jacobians(cell, places, cell.rule(2 * cell.order)[0]).min(axis=1)
+    wrong = smallest <= 0.0
+    if wrong.any():
+        row = int(smallest.argmin())
+        raise ProblemError(
+            f"{element_name(block, row)} is inside out or flat (det J = {smallest[row]:.3g}), as "
+            f"are {int(wrong.sum())} of {len(wrong)}: number its nodes in the order of VTK, in the "
+            "plane counterclockwise (check_orientation=False for a page with another order)"
+        )
+
+
+def _cell(block: ElementBlock) -> Cell | None:
+    """The kind of cell whose volume a kernel integrates over; None if it is no such kernel."""
+    kernel = block.kernel
+    if not isinstance(kernel, Kernel):
+        return None
+    points = kernel.default_rule.points
+    dimension = points.reshape(len(kernel.default_rule.weights), -1).shape[1]
+    if dimension == 0 or dimension != len(kernel.coordinates):
+        return None
+    return _CELLS.get((dimension, kernel.nodes))
+
+
+def element_name(block: ElementBlock, row: int) -> str:
+    """An element for a message: its number, its block, and where it is if that is known."""
+    places = _places(block, row)
+    where = "" if places is None else f" at {_shown(places.mean(axis=0))}"
+    return f"element {row} of block {block.name!r}{where}"
+
+
+def unknown_name(blocks: Iterable[ElementBlock], number: int) -> str:
+    """Name of an unknown by an element of the blocks; empty if none has it."""
+    for block in blocks:
+        rows, columns = np.nonzero(block.dofs == number)
+        if not len(rows):
+            continue
+        row, column = int(rows[0]), int(columns[0])
+        names = getattr(block.kernel, "unknowns", ())
+        name = f"{names[column]} of " if column < len(names) else ""
+        return f" ({name}{element_name(block, row)})"
+    return ""
+
+
+def _places(block: ElementBlock, row: int) -> Array | None:
+    dimension = len(getattr(block.kernel, "coordinates", ()))
+    if not dimension:
+        return None
+    places: Array = np.asarray(block.coordinates[row], dtype=np.float64).reshape(-1, dimension)
+    return places
+
+
+def _shown(place: Array) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in place) + ")"
+
+
+def not_finite(block: ElementBlock, *results: Array) -> str:
+    """The first element of a block with a result, (n, ...), that is not finite; empty if none."""
+    wrong = rows_not_finite(*results)
+    if not len(wrong):
+        return ""
+    more = f" and {len(wrong) - 1} more" if len(wrong) > 1 else ""
+    return element_name(block, int(wrong[0])) + more
+
+
+def rows_not_finite(*results: Array) -> Integers:
+    """Numbers of the elements that have a result, (n, ...), that is not finite."""
+    wrong: Flags = np.zeros(len(results[0]), dtype=bool)
+    for result in results:
+        wrong |= ~np.isfinite(result).all(axis=tuple(range(1, result.ndim)))
+    return np.flatnonzero(wrong)

@@ -1,1 +1,0 @@
-"""Finite elements: numbering, assembly, constraints and results, without physics."""

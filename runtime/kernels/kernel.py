@@ -1,0 +1,196 @@
+"""Generated kernels as functions of NumPy arrays.
+
+The shapes, orders and units of every array are those of `codegen/abi.py`; names and counts come
+from the `manifest.json` beside the C.  No SymPy is needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.kernels.kernel_call import ArgumentError, Call, Family, Given, Rule
+from softehl.runtime.kernels.shared_library import (
+    GENERATED,
+    KernelError,
+    Library,
+    MissingKernelsError,
+    StaleKernelsError,
+    damaged_manifest,
+    library_of,
+    manifest,
+)
+from softehl.runtime.suggestions import few
+
+__all__ = [
+    "ArgumentError",
+    "Kernel",
+    "KernelError",
+    "MissingKernelsError",
+    "Rule",
+    "StaleKernelsError",
+    "kernel_in",
+    "load_kernel",
+]
+
+
+@dataclass(frozen=True)
+class Kernel(Family):
+    """One kernel family, compiled; see `Family` for the arrays.
+
+    Calls also take, by name, what the family needs: data, point_data, parameters, rule.
+    A kernel is pickled by its key, the folder of its library: another process loads that.
+    """
+
+    def __repr__(self) -> str:
+        """Summary in one line."""
+        return (
+            f"<Kernel {self.name}: {self.nodes} nodes; unknowns: {few(self.unknowns)}; parameters: "
+            f"{few(self.parameters)}; data: {few(self.data)}>"
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For `copy` and `pickle`."""
+        return _reloaded, (self.name, _place(self.library), self.signature)
+
+    def call(self, task: str, coordinates: Array, dofs: Array, **given: Any) -> Call:
+        """A checked call of a task, which may be made again with other unknowns."""
+        return Call(self, task, coordinates, dofs, Given(**given))
+
+    def energy(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        """Potential of each element, (n,)."""
+        call = Call(self, "energy", coordinates, dofs, Given(**given))
+        return call.run(np.empty(call.n))
+
+    def residual(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        """Internal minus external virtual work, (n, ndof)."""
+        call = Call(self, "residual", coordinates, dofs, Given(**given))
+        return call.run(np.empty((call.n, call.ndof)))
+
+    def tangent(self, coordinates: Array, dofs: Array, **given: Any) -> tuple[Array, Array]:
+        """Residual (n, ndof) and tangent dR_i/du_j (n, ndof, ndof)."""
+        call = Call(self, "tangent", coordinates, dofs, Given(**given))
+        tangent = np.empty((call.n, call.ndof, call.ndof))
+        return call.run(np.empty((call.n, call.ndof)), tangent), tangent
+
+    def product(self, coordinates: Array, dofs: Array, direction: Array, **given: Any) -> Array:
+        """Tangent times `direction` (n, ndof), without forming the tangent: (n, ndof)."""
+        call = Call(self, "product", coordinates, dofs, Given(direction=direction, **given))
+        return call.run(np.empty((call.n, call.ndof)))
+
+    def derivative(self, name: str, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        """Derivative of the residual by the parameter, datum or coordinate `name`: (n, ndof)."""
+        call = Call(self, f"d_{name}", coordinates, dofs, Given(**given))
+        return call.run(np.empty((call.n, call.ndof)))
+
+    def pseudo_load(self, coordinates: Array, dofs: Array, direction: Array, **given: Any) -> Array:
+        """Derivative of the residual along a variation of the elements, unknowns held: (n, ndof).
+
+        direction: (n, coordinates + data + parameters), how each of these moves, in this order.
+        """
+        call = Call(self, "pseudo_load", coordinates, dofs, Given(direction=direction, **given))
+        return call.run(np.empty((call.n, call.ndof)))
+
+    def fields_rate(self, coordinates: Array, dofs: Array, direction: Array, **given: Any) -> Array:
+        """Derivative of `fields_at` along a variation: (n, points, len(fields)).
+
+        direction: (n, coordinates + data + parameters + ndof), how each of these moves.
+        """
+        call = Call(self, "fields_rate", coordinates, dofs, Given(direction=direction, **given))
+        return call.run(np.empty((call.n, len(call.rule.weights), len(self.fields))))
+
+    def fields_at(self, coordinates: Array, dofs: Array, **given: Any) -> Array:
+        """Post-processing values at the quadrature points, (n, points, len(fields))."""
+        call = Call(self, "fields", coordinates, dofs, Given(**given))
+        return call.run(np.empty((call.n, len(call.rule.weights), len(self.fields))))
+
+
+@cache
+def load_kernel(name: str, directory: Path = GENERATED) -> Kernel:
+    """The kernel family `name`; raises `KernelError` when it is missing or stale."""
+    entries = manifest(directory)
+    if name not in entries:
+        raise MissingKernelsError(
+            f"no kernel {name!r}; there are {', '.join(entries)}; a model file ends in .py, and a "
+            "law by name is given as material=..."
+        )
+    library = library_of(directory)
+    try:
+        return _kernel(name, entries[name], library)
+    except (KeyError, TypeError, ValueError):
+        raise damaged_manifest(directory) from None
+
+
+def _place(library: Library) -> Path | None:
+    """Folder of a library; None for the kernels that ship, which each installation has."""
+    return None if library.directory == GENERATED else library.directory
+
+
+def _reloaded(name: str, directory: Path | None, signature: str) -> Kernel:
+    """The kernel of that name and signature.  Raises `KernelError` where it is not there."""
+    place = GENERATED if directory is None else directory
+    remedy = "run the script that made it again on this machine"
+    if not (place / "manifest.json").exists():
+        raise MissingKernelsError(f"the kernel {name} is not in {place}: {remedy}")
+    kernel = load_kernel(name, place)
+    if kernel.signature != signature:
+        raise StaleKernelsError(f"the kernel {name} in {place} is another one now: {remedy}")
+    return kernel
+
+
+def _kernel(name: str, entry: Mapping[str, Any], library: Library) -> Kernel:
+    """The kernel that an entry of a manifest describes."""
+    rule = entry["rule"]
+    return Kernel(
+        name=name,
+        nodes=entry["nodes"],
+        coordinates=tuple(entry["coordinates"]),
+        unknowns=tuple(entry["unknowns"]),
+        interpolated=entry["interpolated"],
+        parameters=tuple(entry["parameters"]),
+        data=tuple(entry["data"]),
+        point_data=tuple(entry["point_data"]),
+        fields=tuple(entry["fields"]),
+        tasks=tuple(entry["tasks"]),
+        unrolled=entry["unrolled"],
+        default_rule=Rule(np.array(rule["points"]), np.array(rule["weights"]), None),
+        signature=entry["signature"],
+        library=library,
+        components=entry["components"],
+        conditions=tuple((n, r, b, w) for n, r, b, w in entry["conditions"]),
+        places=tuple((n, a) for n, a in entry.get("places", ())),
+        history=tuple(entry.get("history", ())),
+        internal=tuple(entry.get("internal", ())),
+        cell=entry.get("cell", ""),
+        kept=entry.get("kept", 0),
+    )
+
+
+def kernel_in(directory: Path, name: str | None = None, cell: str | None = None) -> Kernel:
+    """The kernel of a folder of generated C; `name` is needed if it holds several.
+
+    cell: on which a page of fields of that name stands.
+    Raises `KernelError`, also when the folder has changed since this process loaded it.
+    """
+    entries = manifest(directory)
+    stands = [n for n, entry in entries.items() if cell and entry.get("cell") == cell]
+    if name is None and len(entries) > 1 and len(stands) != 1:
+        raise MissingKernelsError(f"{directory.name} holds {', '.join(entries)}: name one of them")
+    if name is None:
+        chosen = stands[0] if len(stands) == 1 else next(iter(entries))
+    else:
+        named = [n for n in stands if n in (f"{name}_{cell}", f"{name}_{cell}_axisymmetric")]
+        chosen = name if name in entries or not named else named[0]
+    kernel = load_kernel(chosen, directory)
+    if not kernel.library.current:
+        raise StaleKernelsError(
+            f"{directory.name}/ has changed since it was loaded: start Python anew, or load the "
+            "model file itself"
+        )
+    return kernel

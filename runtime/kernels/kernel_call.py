@@ -1,0 +1,243 @@
+"""One call of a kernel: what its family takes, and the check of what is given.
+
+The shapes, orders and units of every array are those of `codegen/abi.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, frozen
+from softehl.runtime.kernels.shared_library import KernelError, Library
+
+
+class ArgumentError(KernelError, ValueError):
+    """An array has a wrong shape or kind, or a task is not offered."""
+
+
+_NOTHING = np.empty(0)
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """A quadrature rule and, for the film, the pressure shape functions at its points.
+
+    points: (q, dim) reference coordinates; weights: (q,); basis: (q, modes, 2) value and d/dxi of
+    every pressure shape function at every point, or None; a facet has two such pairs, (q, modes,
+    4). All arrays are read-only.
+    """
+
+    points: Array
+    weights: Array
+    basis: Array | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("points", "weights", "basis"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(np.asarray(getattr(self, name))))
+
+    @cached_property
+    def table(self) -> Array:
+        """Points with their weights, (q, dim + 1)."""
+        points = np.asarray(self.points, dtype=np.float64).reshape(len(self.weights), -1)
+        return np.column_stack([points, self.weights])
+
+    @cached_property
+    def shape_functions(self) -> Array:
+        """The basis, contiguous; empty for none."""
+        basis = _NOTHING if self.basis is None else self.basis
+        return np.ascontiguousarray(basis, dtype=np.float64)
+
+
+Condition = tuple[str, str, float, str]
+"""Name of a parameter or datum, relation, bound, and the line of the page that demands it."""
+RELATIONS = {">": np.greater, ">=": np.greater_equal, "<": np.less, "<=": np.less_equal}
+
+
+@dataclass(frozen=True)
+class Family:
+    """Arguments of one kernel family.  Calls take n elements at once, as arrays of float64.
+
+    coordinates (n, nodes*len(coordinates)) (any, for a kernel that has none), dofs (n, ndof),
+    data (n, len(data)), point_data (n, points, len(point_data)), parameters (len(parameters),) or
+    a mapping by name, rule None for the model's default (the only one when `unrolled`).
+    places: of every unknown its name without number, and its node or None. history: point data
+    whose new values the last fields are. internal: unknowns of one element alone. cell: on which a
+    page of fields stands. kept: numbers that products by sum factorisation keep at a point, 0 where
+    the family has none.
+    """
+
+    name: str
+    nodes: int
+    coordinates: tuple[str, ...]
+    unknowns: tuple[str, ...]
+    interpolated: str | None
+    parameters: tuple[str, ...]
+    data: tuple[str, ...]
+    point_data: tuple[str, ...]
+    fields: tuple[str, ...]
+    tasks: tuple[str, ...]
+    default_rule: Rule
+    unrolled: bool
+    signature: str
+    library: Library
+    components: int = 2
+    conditions: tuple[Condition, ...] = ()
+    places: tuple[tuple[str, int | None], ...] = ()
+    history: tuple[str, ...] = ()
+    internal: tuple[str, ...] = ()
+    cell: str = ""
+    kept: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """Arguments of a call besides coordinates and unknowns; see `Family` for the shapes."""
+
+    data: Array | None = None
+    point_data: Array | None = None
+    direction: Array | None = None
+    parameters: Array | Mapping[str, float] | tuple[float, ...] = ()
+    rule: Rule | None = None
+
+
+class Call:
+    """Checked arguments of one call.
+
+    rule: in use; n, modes, ndof: numbers of elements, of shape functions of the interpolated field
+    and of element unknowns.
+    """
+
+    def __init__(
+        self, kernel: Family, task: str, coordinates: Array, dofs: Array, given: Given
+    ) -> None:
+        """Raises ArgumentError for a task, shape, kind or value that does not fit."""
+        if task not in kernel.tasks:
+            raise ArgumentError(f"{kernel.name} offers {', '.join(kernel.tasks)}, not {task}")
+        self.kernel, self.task = kernel, task
+        self.function = kernel.library.function(kernel.name, task)
+        self.rule = self._rule(given.rule)
+        self.modes = self._modes()
+        self.n = len(dofs)
+        self.ndof = len(kernel.unknowns) + self.modes
+        width = kernel.nodes * len(kernel.coordinates)
+        self.read = (
+            self._array("coordinates", coordinates, (self.n, width)) if width else _NOTHING,
+            self._array("dofs", dofs, (self.n, self.ndof)),
+            *self._constants(given),
+            _NOTHING
+            if given.direction is None
+            else self._array("direction", given.direction, (self.n, self._along(task, width))),
+            *self._tables(),
+        )
+
+    def run(self, values: Array, tangent: Array | None = None) -> Array:
+        """Call the C function; `values` and `tangent` are written in place."""
+        self.function((self.n, len(self.rule.weights), self.modes), self.read, values, tangent)
+        return values
+
+    def again(self) -> Callable[[Array, Array, Array | None], None]:
+        """The call with other unknowns (n, ndof), float64 and contiguous: they are not checked."""
+        counts = self.n, len(self.rule.weights), self.modes
+        return self.kernel.library.again(self.kernel.name, self.task, counts, self.read)
+
+    def _along(self, task: str, width: int) -> int:
+        """Values of `direction` for an element: of its coordinates, data, parameters and dofs."""
+        if task == "product":
+            return self.ndof
+        design = width + len(self.kernel.data) + len(self.kernel.parameters)
+        return design + (self.ndof if task == "fields_rate" else 0)
+
+    def _rule(self, given: Rule | None) -> Rule:
+        if given is None:
+            return self.kernel.default_rule
+        if self.kernel.unrolled:
+            raise ArgumentError(
+                f"the quadrature rule of {self.kernel.name} is written into it: give none, or "
+                "write unroll=False on its page"
+            )
+        return given
+
+    def _constants(self, given: Given) -> tuple[Array, Array]:
+        """Data of elements and of their points side by side, (n, columns), and parameters."""
+        kernel, n, points = self.kernel, self.n, len(self.rule.weights)
+        data = np.empty((n, 0)) if given.data is None else given.data
+        data = self._array("data", data, (n, len(kernel.data)))
+        parameters = self._array(
+            "parameters", self._ordered(given.parameters), (len(kernel.parameters),)
+        )
+        for condition in kernel.conditions:
+            self._check(data, parameters, condition)
+        if kernel.point_data or given.point_data is not None:
+            at_points = _NOTHING if given.point_data is None else given.point_data
+            columns = len(kernel.point_data)
+            at_points = self._array("point_data", at_points, (n, points, columns))
+            data = np.hstack([data, at_points.reshape(n, points * columns)])
+        return data, parameters
+
+    def _tables(self) -> tuple[Array, Array]:
+        """Points with their weights, (q, dim + 1), and the basis at them."""
+        table, default = self.rule.table, self.kernel.default_rule.table
+        if table.shape[1] != default.shape[1]:
+            raise ArgumentError(
+                f"{self.kernel.name}: points of the rule are {table.shape[1] - 1}-dimensional, "
+                f"must be {default.shape[1] - 1}-dimensional"
+            )
+        return table, self.rule.shape_functions
+
+    def _check(self, data: Array, parameters: Array, condition: Condition) -> None:
+        name, relation, bound, where = condition
+        kernel = self.kernel
+        if name in kernel.parameters:
+            values = parameters[[kernel.parameters.index(name)]]
+        else:
+            values = data[:, kernel.data.index(name)]
+        wrong = ~RELATIONS[relation](values, bound)
+        if wrong.any():
+            given, allowed = f"{values[wrong][0]:g}", f"{relation} {bound:g}"
+            raise ArgumentError(f"{kernel.name}: {name} = {given}, must be {allowed} ({where})")
+
+    def _modes(self) -> int:
+        if self.kernel.interpolated is None:
+            return 0
+        if self.rule.basis is None:
+            raise ArgumentError(
+                f"{self.kernel.name} interpolates {self.kernel.interpolated}: give it a rule with "
+                "a basis, e.g. softehl.runtime.discretisation.quadrature.film_rule(m_p)"
+            )
+        shape = np.shape(self.rule.basis)
+        components = self.kernel.components
+        if len(shape) != 3 or shape[0] != len(self.rule.weights) or shape[2] != components:
+            raise ArgumentError(
+                f"{self.kernel.name}: basis has shape {shape}, "
+                f"must be (points, modes, {components})"
+            )
+        return int(shape[1])
+
+    def _ordered(self, parameters: Any) -> Any:
+        if not isinstance(parameters, Mapping):
+            return parameters
+        missing = [p for p in self.kernel.parameters if p not in parameters]
+        if missing:
+            raise ArgumentError(f"{self.kernel.name} needs {', '.join(missing)}")
+        return [parameters[p] for p in self.kernel.parameters]
+
+    def _array(self, what: str, value: Any, shape: tuple[int, ...]) -> Array:
+        if isinstance(value, np.ma.MaskedArray):
+            raise ArgumentError(f"{self.kernel.name}: {what} is a masked array: fill it first")
+        given = np.asarray(value)
+        if given.dtype.kind not in "fiu":
+            raise ArgumentError(
+                f"{self.kernel.name}: {what} holds {given.dtype}, must be real numbers"
+            )
+        array = np.ascontiguousarray(given, dtype=np.float64)
+        if array.shape != shape:
+            raise ArgumentError(
+                f"{self.kernel.name}: {what} has shape {array.shape}, must be {shape}"
+            )
+        return array

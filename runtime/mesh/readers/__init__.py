@@ -1,0 +1,1 @@
+"""Mesh files: Gmsh, Abaqus and CalculiX, all other formats by meshio, and meshes in parts."""

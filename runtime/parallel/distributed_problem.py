@@ -1,0 +1,265 @@
+"""A problem that is spread over processes, as Newton's method sees it: all decide alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.discretisation.p_multigrid import Levels
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.problem_checks import (
+    element_name,
+    rows_not_finite,
+    unknown_name,
+)
+from softehl.runtime.discretisation.residual_norm import ROUNDING, Balance, hides, is_far, size
+from softehl.runtime.mpi import world
+from softehl.runtime.parallel.halo_exchange import Exchange, largest, total
+from softehl.runtime.parallel.matshell import Shell
+from softehl.runtime.parallel.partitioning import Part
+from softehl.runtime.parallel.petsc_matrix import Operator, Solver, Tangent
+from softehl.runtime.parallel.static_condensation import Outer
+from softehl.runtime.solve.linear.linear_solver import SingularMatrix
+from softehl.runtime.solve.singularity_check import SINGULAR, moving, signs
+
+
+@dataclass(eq=False)
+class Team:
+    """Objects that the processes share through a whole path: exchange of vectors, and the matrix.
+
+    tangent: of the latest set of prescribed unknowns. levels: of multigrid in the order, where the
+    tangent is to be no matrix. outer: what PETSc has. reach, counts: see `Assembler`, of own
+    unknowns.
+    """
+
+    part: Part
+    exchange: Exchange
+    outer: Outer
+    interleaved: int
+    solver: Solver
+    levels: Levels | None = None
+    tangent: Operator | None = None
+    reach: Array = field(default_factory=lambda: np.empty(0))
+    counts: Array = field(default_factory=lambda: np.empty(0))
+
+    def renewed(self) -> Team:
+        """For other elements on the same unknowns."""
+        given = self.part, self.exchange, self.outer, self.interleaved
+        return Team(*given, replace(self.solver))
+
+    def tangent_of(self, problem: Problem) -> Operator:
+        """The matrix for the prescribed unknowns of a problem, or a new shell."""
+        known = self.tangent
+        same = isinstance(known, Tangent) and known.serves(problem.assembler, problem.fixed)
+        if world().allreduce(int(not same)) or known is None:
+            if known is not None:
+                known.matrix.destroy()  # a shell and PETSc's matrix hold each other
+            self.solver.reset()
+            self.tangent = known = self._new(problem)
+        return known
+
+    def _new(self, problem: Problem) -> Operator:
+        if self.levels is not None:
+            return Shell(problem, self.levels, self.exchange)
+        given = problem.assembler, problem.fixed, self.exchange, self.outer
+        return Tangent.of(*given, self.interleaved)
+
+
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """Matrix and solver of Newton's method on all processes."""
+
+    tangent: Operator
+    solver: Solver
+
+    def solve(self, r: Array) -> Array:
+        """Local x, (m,), of own r, (k,)."""
+        return self.tangent.solved(self.solver, r)
+
+    def loosest(self) -> int | None:
+        """See `solve.singularity_check.loosest`: PETSc's number. Only a direct solver is asked."""
+        if not self.solver.direct:
+            return None
+        exchange = self.tangent.exchange
+        try:
+            y = self.solve(signs(len(exchange.owned), world().rank))[exchange.owned]
+        except SingularMatrix:
+            return None
+        most = float(largest(np.abs(y).max(initial=0.0)))
+        y = moving(y, most)
+        resisted = np.abs(self.tangent.times(y)) > SINGULAR * self.tangent.times_magnitudes(
+            np.abs(y)
+        )
+        if world().allreduce(int(resisted.any())):
+            return None
+        mine = exchange.numbers[exchange.owned[np.abs(y) >= most]]
+        number: int = max(world().allgather(int(mine.max(initial=-1))))
+        return number
+
+
+@dataclass(frozen=True)
+class Distributed:
+    """The linear solver of spread problems: PETSc's."""
+
+    name: str = "petsc"
+
+    def factorise(self, K: Any) -> Factors:
+        """The matrix itself, which can solve."""
+        assert isinstance(K, Factors)
+        return K
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """The local part of a problem with what the processes share.  Vectors x are local, (m,); r is
+    that of own unknowns, (k,).  Every method is called by all processes alike.
+    """
+
+    problem: Problem
+    team: Team
+
+    @property
+    def assembler(self) -> Any:
+        """Of the elements of this process."""
+        return self.problem.assembler
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """See `Problem`."""
+        return self.problem.parameters
+
+    def fields(self, name: str, x: Array) -> dict[str, Array]:
+        """Fields of a block at the points of this process's elements."""
+        return self.problem.fields(name, x)
+
+    def at(self, x: Array) -> Any:
+        """See `Problem`: it has no elements that are sought."""
+        return self
+
+    def residual(self, x: Array) -> Array:
+        """See the class."""
+        r = self.team.exchange.added(self.problem.assembler.residual(x, self.parameters))
+        return self._prescribed(r, x - self._wanted(x))
+
+    def linearise(self, x: Array) -> tuple[Array, Factors]:
+        """Residual with the influence of prescribed unknowns moved into it, and the tangent."""
+        tangent = self.team.tangent_of(self.problem)
+        defect = x - self._wanted(x)
+        given = self.problem.assembler, x, self.parameters
+        r = tangent.fill(*given, defect, self.team.solver.times)
+        r = self._prescribed(self.team.exchange.added(r), defect)
+        return r, Factors(tangent, self.team.solver)
+
+    def norm(self, r: Array) -> float:
+        """Never asked: the problem measures its residuals itself."""
+        raise NotImplementedError
+
+    def step_limit(self, x: Array, dx: Array) -> float:
+        """Problems of studies have no guards."""
+        return 1.0
+
+    def measure(self, x: Array, K: Factors | None, *, rounded: bool = False) -> float:
+        """See `Problem.measure`: the same sums, over all processes."""
+        own, exchange, problem = self.team.part.owned, self.team.exchange, self.problem
+        sums = problem.assembler.residual_and_size(x, self.parameters)
+        r, forces = exchange.added(sums[0]), exchange.added(sums[1])
+        if total(np.array([float(not np.isfinite(r).all())]))[0]:
+            return float("inf")
+        noise, terms = np.zeros(len(own)), np.zeros(len(own))
+        if K is not None:
+            if self._is_lost(x, forces, K):
+                return 1.0
+            terms = self._terms(np.abs(x)[own], K)
+            if rounded:
+                noise = ROUNDING * self._terms(np.abs(x)[own] + self._reach(), K)
+        wanted = self._wanted(x)
+        free = np.ones(len(x), dtype=bool)
+        free[problem.fixed] = False
+        defect = np.maximum(np.abs(r) - noise, 0.0) * free[own]
+        off, extent = (x - wanted)[own], np.maximum(np.abs(x), np.abs(wanted))[own]
+        met = ~free[own] | (self._counts() > 1)
+        balance = Balance(defect, forces, terms, met, off, extent)
+        return size(total(balance.squares(self._fields())), largest(balance.worst()))
+
+    def name_of(self, number: int) -> str:
+        """An unknown for messages, by PETSc's number."""
+        exchange, part = self.team.exchange, self.team.part
+        there = np.flatnonzero(exchange.numbers == number)
+        words = ""
+        if len(there):
+            layout = self.problem.layout
+            field_name = next(n for n in layout.names if there[0] < layout.part(n).stop)
+            whole, n = part.system.everywhere, int(part.unknowns[there[0]])
+            place = unknown_name(whole.assembler.blocks, n)
+            words = f"unknown {n} of field {field_name!r}{place}"
+        return _first(words)
+
+    def where_not_finite(self, x: Array) -> str:
+        """The first element of any process whose residual or tangent is not finite."""
+        part, words = self.team.part, ""
+        for block in self.problem.assembler.blocks:
+            results = block.tangent(x, self.parameters[block.name])
+            rows = rows_not_finite(*results)
+            if len(rows) and not words and block.name in part.elements:
+                whole = part.system.everywhere.assembler.block(block.name)
+                words = element_name(whole, int(part.elements[block.name][rows[0]]))
+        return _first(words)
+
+    def _wanted(self, x: Array) -> Array:
+        """x with the prescribed values."""
+        wanted = x.copy()
+        wanted[self.problem.fixed] = self.problem.values
+        return wanted
+
+    def _prescribed(self, r: Array, defect: Array) -> Array:
+        own = self.team.part.owned
+        fixed = np.isin(own, self.problem.fixed)
+        r[fixed] = defect[own][fixed]
+        return r
+
+    def _reach(self) -> Array:
+        team = self.team
+        if not len(team.reach):
+            team.reach = team.exchange.highest(self.problem.assembler.reach())
+        return team.reach
+
+    def _counts(self) -> Array:
+        team = self.team
+        if not len(team.counts):
+            counts = self.problem.assembler.counts(self.parameters)
+            team.counts = team.exchange.added(counts.astype(np.float64))
+        return team.counts
+
+    def _terms(self, magnitudes: Array, K: Factors) -> Array:
+        """See `Problem`; magnitudes and sums of own unknowns, (k,)."""
+        exchange, problem = self.team.exchange, self.problem
+        root = np.sqrt(K.tangent.diagonal())
+        root[np.isin(self.team.part.owned, problem.fixed)] = 0.0
+        local = exchange.copied(root * magnitudes)
+        around = exchange.added(problem.assembler.around(local, self.parameters))
+        return K.tangent.times_magnitudes(magnitudes) + root * around
+
+    def _is_lost(self, x: Array, forces: Array, K: Factors) -> bool:
+        """See `Problem`."""
+        reach = self._reach()
+        values = np.abs(self.problem.values).max(initial=0.0)
+        known = largest(max(float(reach.max(initial=0.0)), float(values)))
+        if not is_far(largest(float(np.abs(x).max(initial=0.0))), known):
+            return False
+        noise = ROUNDING * K.tangent.times_magnitudes(np.abs(x)[self.team.part.owned] + reach)
+        norms = np.sqrt(total(np.array([noise @ noise, forces @ forces])))
+        return hides(*norms.tolist())
+
+    def _fields(self) -> list[Integers]:
+        """For each field the places of its unknowns among own ones."""
+        own = self.team.part.owned
+        return [np.flatnonzero(np.isin(own, numbers)) for numbers in self.problem.layout.fields]
+
+
+def _first(words: str) -> str:
+    """Words of the first process that has any."""
+    return next((w for w in world().allgather(words) if w), "")

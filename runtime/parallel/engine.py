@@ -1,0 +1,114 @@
+"""The interface between a study and its engine, and the engines by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol, TypeAlias
+
+from scipy.sparse import csc_array
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.discretisation.communicator import Share
+from softehl.runtime.discretisation.constraints import symmetric
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.equations.system import System
+from softehl.runtime.parallel.linear_solver_choice import Linear, linear_solver, modes_by_multigrid
+from softehl.runtime.solve.linear.amg import Modes
+from softehl.runtime.solve.linear.factorisation_cache import Kept
+from softehl.runtime.solve.linear.lobpcg import lowest
+from softehl.runtime.solve.newton import Newton
+
+
+@dataclass(eq=False)
+class Large(Share):
+    """All on one process, modes by multigrid. near: what it should know of."""
+
+    near: Modes
+
+    def lowest(
+        self, problem: Problem, K: csc_array, M: csc_array, count: int
+    ) -> tuple[Array, Array]:
+        """See `Share`."""
+        return lowest(symmetric(problem.eliminated(K)), symmetric(M), self.near, count)
+
+
+class Engine(Protocol):
+    """Spreads the equations of a study, and knows the linear solver that goes with that."""
+
+    def spread(self, system: System) -> System:
+        """The part of the equations that this process has; see `Share`."""
+        ...
+
+    def newton(self, system: System, given: Newton | None) -> Newton:
+        """Newton's method as it was asked for, on the linear solver for what `spread` gave."""
+        ...
+
+
+AnyEngine: TypeAlias = "str | Engine | None"
+"""An engine, or the name of one; None is "serial"."""
+
+
+@dataclass(eq=False)
+class Serial:
+    """Everything in this process, with the linear solver that is asked for.
+
+    note: says which one, where the size of the problem decides.
+    """
+
+    linear: Linear = "auto"
+    note: Callable[[], str] = str
+
+    def spread(self, system: System) -> System:
+        """See `Engine`."""
+        system.mesh.require_whole('engine = "serial"')
+        near = modes_by_multigrid(system, self.linear)
+        return system if near is None else replace(system, share=Large(near))
+
+    def newton(self, system: System, given: Newton | None) -> Newton:
+        """See `Engine`."""
+        if given is not None and self.linear != "auto":
+            raise StudyError("newton and linear: give one of them, newton has a linear solver")
+        if given is not None:
+            return given
+        solver, self.note = linear_solver(system, self.linear)
+        return Newton(linear=Kept(solver))
+
+
+def engine_of(engine: AnyEngine, linear: Linear = "auto") -> Engine:
+    """The engine of that name, or of a linear solver that is an engine by itself.
+
+    Raises StudyError for an unknown one, MissingPetsc.
+    """
+    if linear == "matrix-free":
+        return _matrix_free(engine)
+    if engine is None or engine == "serial":
+        return Serial(linear)
+    if linear != "auto":
+        raise StudyError(f'linear = {linear!r}: for engine = "serial" only')
+    if engine == "petsc":
+        from softehl.runtime.parallel.petsc import Petsc
+
+        return Petsc()
+    if isinstance(engine, str):
+        raise StudyError(f'engine = {engine!r}: allowed are "serial" and "petsc"')
+    return engine
+
+
+def _matrix_free(engine: AnyEngine) -> Engine:
+    """Without matrices, alone or by PETSc.  Raises StudyError, MissingPetsc."""
+    if engine == "petsc":
+        from softehl.runtime.parallel.petsc import Petsc
+
+        return Petsc(matrix_free=True)
+    if engine is not None:
+        raise StudyError('linear = "matrix-free": engine = "petsc" is allowed, or leave engine out')
+    from softehl.runtime.parallel.matrix_free import MatrixFree
+
+    return MatrixFree()
+
+
+def note_of(engine: Engine) -> Callable[[], str]:
+    """The words on the linear solver that an engine chose; none of others than `Serial`."""
+    return engine.note if isinstance(engine, Serial) else str

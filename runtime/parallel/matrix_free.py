@@ -1,0 +1,209 @@
+"""The engine `matrix-free`: conjugate gradients with products, and multigrid in the order.
+
+The tangent of pages is never a matrix. At every Newton step the tangents of elements are evaluated
+once, for its diagonal and for the matrix of the next lower order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.communicator import Share
+from softehl.runtime.discretisation.constraints import Ties
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.matrix_free_operator import Iteration, Tangent
+from softehl.runtime.discretisation.matrix_free_products import (
+    NoProductError,
+    require_product,
+    threads,
+)
+from softehl.runtime.discretisation.p_multigrid import Levels
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.discretisation.problem_checks import ProblemError
+from softehl.runtime.equations.system import System
+from softehl.runtime.mesh.cells import CELLS
+from softehl.runtime.solve.newton import Newton
+
+_WHO = 'linear = "matrix-free"'
+NO_INERTIA = f"{_WHO}: inertia has no such products; leave linear out"
+
+TOLERANCE = 1e-4
+"""Of linear solutions.  Iterations of a whole load step for 1e-6, 1e-5, 1e-4, 1e-3, all of which
+end at Newton's tolerance: K/mu = 1000 396, 321, 253, 264; nu = 0.3 26, 22, 18, 15.
+"""
+
+
+@dataclass(eq=False)
+class MatrixFree:
+    """Settings of the engine.
+
+    tolerance: of the linear solutions, relative to the residual. most: iterations of one. threads:
+    of products; None: $OMP_NUM_THREADS, or all processors. iterations: of every solution so far.
+    """
+
+    tolerance: float = TOLERANCE
+    most: int = 1000
+    threads: int | None = None
+    iterations: list[int] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Raises StudyError for settings that no solution can meet."""
+        if not (0 < self.tolerance < 1 and self.most >= 1 and (self.threads or 1) >= 1):
+            raise StudyError(
+                f"MatrixFree(tolerance={self.tolerance!r}, most={self.most!r}, threads="
+                f"{self.threads!r}): allowed are 0 < tolerance < 1, most >= 1, threads >= 1 or None"
+            )
+
+    def spread(self, system: System) -> System:
+        """See `Engine`.  Raises StudyError for what it cannot solve."""
+        system.mesh.require_whole(_WHO)
+        pages, order = suitable(system)
+        levels = levels_of(system, pages, order, self.threads or threads())
+        iteration = Iteration(self.tolerance, self.most, self.iterations)
+        return replace(system, share=_Alone(levels, iteration))
+
+    def newton(self, system: System, given: Newton | None) -> Newton:
+        """See `Engine`."""
+        return replace(given or Newton(), linear=Iterative())
+
+
+@dataclass(frozen=True)
+class Iterative:
+    """The linear solver of such problems."""
+
+    name: str = "matrix-free"
+
+    def factorise(self, K: Any) -> Tangent:
+        """The tangent itself, which can solve."""
+        assert isinstance(K, Tangent)
+        return K
+
+
+def suitable(system: System) -> tuple[list[ElementBlock], int]:
+    """Blocks of pages, and their order.  Raises StudyError for what has no such products."""
+    try:
+        pages = [system.assembler.block(name) for name in system.blocks]
+        kernels = [require_product(block) for block in pages]
+    except NoProductError as error:
+        raise StudyError(f"{_WHO}: {error}") from None
+    cells = {kernel.cell: CELLS[kernel.cell].order for kernel in kernels}
+    if len(set(cells.values())) > 1:
+        raise StudyError(f"{_WHO}: cells {', '.join(cells)} have several orders; it takes one")
+    fields = {tuple(dict.fromkeys(name for name, _ in kernel.places)) for kernel in kernels}
+    if len(fields) > 1:
+        raise StudyError(f"{_WHO}: pages have different fields; all must have the same")
+    return pages, next(iter(cells.values()))
+
+
+def levels_of(system: System, pages: list[ElementBlock], order: int, threads: int) -> Levels:
+    """Levels of multigrid for blocks of cells of an order."""
+    points, dofmap = system.mesh.points, system.numbering.nodal
+    return Levels.of(points, dofmap, pages, order=order, size=system.size, threads=threads)
+
+
+def ties_of(problem: Problem, levels: Levels) -> Ties:
+    """Ties of a problem on all levels.  Raises StudyError where one follows from others."""
+    try:
+        return Ties.of(problem, levels.unknowns)
+    except ProblemError as error:
+        raise StudyError(str(error)) from None
+
+
+class _Alone(Share):
+    """One process, without matrices."""
+
+    def __init__(self, levels: Levels, iteration: Iteration) -> None:
+        self.levels, self.iteration = levels, iteration
+
+    def part(self, posed: Matrixless) -> Problem:
+        """See `Share`."""
+        return posed.problem
+
+    def renewed(self) -> Share:
+        """See `Share`.  Raises StudyError."""
+        raise StudyError(NO_INERTIA)
+
+    def posed(self, problem: Problem) -> Matrixless:
+        """See `Share`."""
+        return Matrixless(problem, self.levels, self.iteration)
+
+
+@dataclass(frozen=True, eq=False)
+class Matrixless:
+    """A problem as Newton's method sees it, whose tangent is no matrix."""
+
+    problem: Problem
+    levels: Levels
+    iteration: Iteration
+
+    @property
+    def equations(self) -> Problem:
+        """With a matrix."""
+        return self.problem
+
+    @property
+    def assembler(self) -> Assembler:
+        """See `Problem`."""
+        return self.problem.assembler
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """See `Problem`."""
+        return self.problem.parameters
+
+    def fields(self, name: str, x: Array) -> dict[str, Array]:
+        """See `Problem`."""
+        return self.problem.fields(name, x)
+
+    def at(self, x: Array) -> Matrixless:
+        """See `Problem`: it has no elements that are sought."""
+        return self
+
+    @cached_property
+    def ties(self) -> Ties:
+        """Ties of all its steps.  Raises StudyError where one follows from others."""
+        return ties_of(self.problem, self.levels)
+
+    def residual(self, x: Array) -> Array:
+        """See `Problem`."""
+        return self.problem.residual(x)
+
+    def linearise(self, x: Array) -> tuple[Array, Tangent]:
+        """See `Problem`."""
+        problem = self.problem
+        r = problem.assembler.residual(x, problem.parameters)
+        tangent = Tangent.of(problem, self.levels, self.iteration, self.ties, x)
+        defect = np.zeros_like(r)
+        defect[problem.fixed] = x[problem.fixed] - problem.values
+        if defect.any():
+            r = r - tangent.times(defect)
+        r[problem.fixed] = defect[problem.fixed]
+        return r, tangent
+
+    def norm(self, r: Array) -> float:
+        """Never asked: the problem measures its residuals itself."""
+        raise NotImplementedError
+
+    def step_limit(self, x: Array, dx: Array) -> float:
+        """See `Problem`."""
+        return self.problem.step_limit(x, dx)
+
+    def measure(self, x: Array, K: Any, *, rounded: bool = False) -> float:
+        """See `Problem`, where |K| is taken for its bound by the diagonal."""
+        return self.problem.measure(x, K, rounded=rounded)
+
+    def name_of(self, number: int) -> str:
+        """See `Problem`."""
+        return self.problem.name_of(number)
+
+    def where_not_finite(self, x: Array) -> str:
+        """See `Problem`."""
+        return self.problem.where_not_finite(x)

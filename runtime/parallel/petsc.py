@@ -1,0 +1,142 @@
+"""The engine `petsc`: the same script, run plainly or under mpirun."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from softehl.runtime.arrays import Flags, Integers
+from softehl.runtime.definition.problem_definition import StudyError
+from softehl.runtime.discretisation.loads import Tie
+from softehl.runtime.equations.system import System
+from softehl.runtime.mpi import petsc, world
+from softehl.runtime.parallel.distributed_problem import Distributed, Team
+from softehl.runtime.parallel.halo_exchange import Exchange
+from softehl.runtime.parallel.matrix_free import levels_of, suitable
+from softehl.runtime.parallel.mpi_communicator import Parts, Processes
+from softehl.runtime.parallel.partitioning import Cells, Part, part_here, part_of, partition
+from softehl.runtime.parallel.petsc_matrix import Solver, Times
+from softehl.runtime.parallel.static_condensation import Outer
+from softehl.runtime.solve.newton import Newton
+
+_AXES = ("x", "y", "z")
+
+
+@dataclass(eq=False)
+class Petsc:
+    """PETSc on all processes.
+
+    options: by PETSc's own names, {"ksp_type": "cg", "pc_type": "gamg"}; those of the command line
+    and of PETSC_OPTIONS count too. matrix_free: whether the tangent is a shell matrix, with
+    multigrid in the order. times: what it has cost so far. Raises MissingPetsc.
+    """
+
+    options: Mapping[str, Any] = field(default_factory=dict)
+    matrix_free: bool = False
+    times: Times = field(default_factory=Times)
+
+    def __post_init__(self) -> None:
+        petsc()
+
+    def spread(self, system: System) -> System:
+        """See `Engine`."""
+        system = system.everywhere
+        if system.contacts:
+            raise StudyError('contact: its pairs are sought in one process, engine="serial"')
+        if system.mesh.piece is not None:
+            if self.matrix_free:
+                system.mesh.require_whole('linear = "matrix-free"')
+            part, exchange, interleaved = part_here(system, system.mesh.piece)
+            return replace(system, share=Parts(self._team(part, exchange, interleaved)))
+        order = self._order(system)
+        comm = world()
+        cells = Cells.of(system)
+        cut = partition(system, cells, _cut(system, cells), comm.size)
+        part = part_of(system, cut, comm.rank)
+        exchange = Exchange.of(cut.numbers[part.unknowns], part.owned, cut.starts)
+        team = self._team(part, exchange, cut.interleaved)
+        if order:
+            pages = [part.system.assembler.block(name) for name in system.blocks]
+            team.levels = levels_of(part.system, pages, order, 1)
+        return replace(part.system, share=Processes(team))
+
+    def _team(self, part: Part, exchange: Exchange, interleaved: int) -> Team:
+        outer = Outer.of(exchange, part.system.assembler)
+        near = _rigid_motions(part, interleaved, outer)
+        solver = Solver(self.options, near, _fields(part, outer), self.times)
+        return Team(part, exchange, outer, interleaved, solver)
+
+    def _order(self, system: System) -> int:
+        """Order of the cells of pages with products, 0 for a matrix.  Raises StudyError."""
+        if not self.matrix_free:
+            return 0
+        if any(isinstance(b.kernel, Tie) for b in system.assembler.blocks):
+            raise StudyError(
+                'linear = "matrix-free": ties are taken in one process, leave engine out'
+            )
+        return suitable(system)[1]
+
+    def newton(self, system: System, given: Newton | None) -> Newton:
+        """See `Engine`."""
+        return replace(given or Newton(), linear=Distributed())
+
+
+def _cut(system: System, cells: Cells) -> Integers:
+    """Process of each cell, by PETSc's partitioner."""
+    PETSc, comm = petsc(), world()
+    if comm.size == 1:
+        return np.zeros(cells.count, dtype=np.int64)
+    bounds = np.linspace(0, cells.count, comm.size + 1).astype(int)
+    part = slice(int(bounds[comm.rank]), int(bounds[comm.rank + 1]))
+    graph = cells.neighbours(part, system.mesh.dimension)
+    starts, columns = graph.indptr.astype(PETSc.IntType), graph.indices.astype(PETSc.IntType)
+    sizes = ((part.stop - part.start, cells.count),) * 2
+    matrix = PETSc.Mat().createAIJ(sizes, csr=(starts, columns, graph.data), comm=comm)
+    divider = PETSc.MatPartitioning().create(comm)
+    divider.setAdjacency(matrix.convert("mpiadj"))
+    divider.setType("ptscotch")
+    divider.setFromOptions()
+    processes = PETSc.IS().create(comm)
+    divider.apply(processes)
+    return np.concatenate(comm.allgather(processes.getIndices().astype(np.int64)))
+
+
+def _rigid_motions(part: Part, interleaved: int, outer: Outer) -> Any:
+    """Rigid-body motions for multigrid, where the only unknowns are displacements; else None."""
+    mesh, own = part.system.mesh, outer.owned
+    parts = _spans(part, own)
+    stems = {name.rpartition("_")[0] for name in parts}
+    axes = tuple(name.rpartition("_")[2] for name in parts)
+    if interleaved < 2 or len(stems) > 1 or axes != _AXES[: mesh.dimension]:
+        return None
+    places = np.empty(len(own))
+    for axis, (name, chosen) in enumerate(parts.items()):
+        numbers = part.system.numbering.nodal[name]
+        there = np.flatnonzero(numbers >= 0)
+        local = np.empty(part.system.size)
+        local[numbers[there]] = mesh.points[there, axis]
+        places[chosen] = local[own[chosen]]
+    coordinates = outer.exchange.to_petsc(places)
+    coordinates.setBlockSize(mesh.dimension)
+    return petsc().NullSpace().createRigidBody(coordinates)
+
+
+def _spans(part: Part, own: Integers) -> dict[str, Flags]:
+    """Unknown -> which of own ones, by their local numbers, are of that name; no internal ones."""
+    layout, blocks = part.system.numbering.layout, part.system.assembler.blocks
+    inner = {name for block in blocks for name in block.internal}
+    spans = {name: layout.part(name) for name in layout.names if name not in inner}
+    return {name: (own >= span.start) & (own < span.stop) for name, span in spans.items()}
+
+
+def _fields(part: Part, outer: Outer) -> dict[str, Integers]:
+    """Field -> where its own unknowns stand in this process's piece; displacements are one."""
+    found: dict[str, list[Integers]] = {}
+    for name, chosen in _spans(part, outer.owned).items():
+        stem, _, axis = name.rpartition("_")
+        label = stem if stem and axis in (*_AXES, "r") else name
+        found.setdefault(label, []).append(outer.exchange.places[chosen])
+    return {label: np.sort(np.concatenate(places)) for label, places in found.items()}

@@ -1,0 +1,364 @@
+"""The tangent as a matrix of PETSc, filled from batches of element tangents, and its solution."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.discretisation.assembly import Assembler
+from softehl.runtime.discretisation.element_blocks import ElementBlock
+from softehl.runtime.discretisation.sparsity import Structure
+from softehl.runtime.mpi import petsc, world
+from softehl.runtime.parallel.halo_exchange import Exchange
+from softehl.runtime.parallel.static_condensation import Columns, Outer, Piece, require_eliminated
+from softehl.runtime.solve.linear.linear_solver import SingularMatrix
+
+DIRECT_BELOW = 200_000
+"""Unknowns up to which the factors of MUMPS are the default."""
+
+
+@dataclass(eq=False)
+class Times:
+    """Seconds of this process: in kernels, in putting their results into the matrix, in solving."""
+
+    kernels: float = 0.0
+    matrix: float = 0.0
+    solver: float = 0.0
+    solves: int = 0
+    iterations: int = 0
+
+
+@dataclass(eq=False)
+class Tangent:
+    """The matrix that element blocks share: its structure is told PETSc once for a set of
+    prescribed unknowns, whose rows and columns are dropped by negative numbers. Internal unknowns
+    of elements are condensed before.
+
+    matrix: PETSc's. values: one for each entry of every element, then one for each own unknown on
+    the diagonal. fixed: local numbers of prescribed unknowns. columns: of blocks with internal
+    unknowns. exchange: of all unknowns; outer: of those that PETSc has. pieces, own: what `fill`
+    found: elements with internal unknowns, and the diagonal (k,).
+    """
+
+    matrix: Any
+    values: Array
+    fixed: Integers
+    structure: Structure
+    columns: dict[str, Columns]
+    exchange: Exchange
+    outer: Outer
+    pieces: list[Piece] = field(default_factory=list)
+    own: Array = field(default_factory=lambda: np.empty(0))
+
+    @classmethod
+    def of(
+        cls, assembler: Assembler, fixed: Integers, exchange: Exchange, outer: Outer, block: int
+    ) -> Tangent:
+        """An empty matrix; `fixed` are local numbers of prescribed unknowns."""
+        PETSc = petsc()
+        there = np.full(len(exchange.numbers), -1, dtype=PETSc.IntType)
+        there[outer.kept] = outer.exchange.numbers
+        own = there[outer.owned]
+        there[fixed] = -1
+        columns = {b.name: Columns.of(b) for b in assembler.blocks if b.internal}
+        maps = [
+            there[b.dofs[:, columns[b.name].outer] if b.internal else b.dofs]
+            for b in assembler.blocks
+        ]
+        rows = np.concatenate([*(np.repeat(m, m.shape[1], axis=1).ravel() for m in maps), own])
+        across = np.concatenate([*(np.tile(m, m.shape[1]).ravel() for m in maps), own])
+        matrix = PETSc.Mat().create(comm=world())
+        sizes = outer.exchange.vector.getSizes()
+        matrix.setSizes((sizes, sizes), block)
+        matrix.setType("aij")
+        matrix.setPreallocationCOO(rows, across)
+        values = np.zeros(len(rows))
+        values[len(rows) - len(own) :] = np.isin(outer.owned, fixed)
+        return cls(matrix, values, fixed, assembler.structure, columns, exchange, outer)
+
+    def serves(self, assembler: Assembler, fixed: Integers) -> bool:
+        """True if it has the structure of these elements and prescribed unknowns."""
+        return self.structure is assembler.structure and np.array_equal(self.fixed, fixed)
+
+    @property
+    def rows(self) -> Exchange:
+        """Of PETSc's vectors."""
+        return self.outer.exchange
+
+    def places(self, assembler: Assembler) -> Iterator[tuple[Any, Array]]:
+        """Pieces of blocks, with the place of their tangents' entries."""
+        first = 0
+        for block in assembler.blocks:
+            inner = len(self.columns[block.name].inner) if block.name in self.columns else 0
+            width = (block.dofs.shape[1] - inner) ** 2
+            for piece, _ in block.pieces(np.empty(0, dtype=np.int64)):
+                last = first + width * len(piece.dofs)
+                yield piece, self.values[first:last]
+                first = last
+
+    def fill(
+        self,
+        assembler: Assembler,
+        x: Array,
+        parameters: Mapping[str, Array],
+        defect: Array,
+        times: Times,
+    ) -> Array:
+        """Evaluate all elements at x, (m,); their residuals with K times defect taken off, (m,)."""
+        r, began = np.zeros(assembler.size), time.perf_counter()
+        diagonal, free = np.zeros(assembler.size), np.ones(assembler.size, dtype=bool)
+        free[self.fixed] = False
+        moved = bool(defect.any())
+        self.pieces = []
+        for piece, place in self.places(assembler):
+            if not len(piece.dofs):
+                continue
+            if piece.name not in parameters:
+                place[:] = 0.0
+                continue
+            local, tangents = piece.tangent(x, parameters[piece.name])
+            place[:] = self._condensed(piece, tangents, free).ravel()
+            np.add.at(diagonal, piece.dofs, np.einsum("nii->ni", tangents))
+            if moved:
+                local = local - np.einsum("nij,nj->ni", tangents, defect[piece.dofs])
+            np.add.at(r, piece.dofs.ravel(), local.ravel())
+        self.own = np.where(free[self.exchange.owned], self.exchange.added(diagonal), 1.0)
+        between = time.perf_counter()
+        self.matrix.setValuesCOO(self.values, petsc().InsertMode.INSERT_VALUES)
+        times.kernels += between - began
+        times.matrix += time.perf_counter() - between
+        return r
+
+    def _condensed(self, piece: ElementBlock, K: Array, free: Flags) -> Array:
+        """Tangents of the other unknowns, internal ones being condensed."""
+        columns = self.columns.get(piece.name)
+        if columns is None:
+            return K
+        found = Piece.of(columns, piece.dofs, K, free)
+        self.pieces.append(found)
+        return np.asarray(K[:, columns.outer][:, :, columns.outer] - found.back @ found.slopes)
+
+    def solved(self, solver: Solver, r: Array) -> Array:
+        """Local x (m,) of K x = r, own values (k,).  Raises SingularMatrix on all processes."""
+        if not self.columns:
+            return solver.solve(self, r)
+        require_eliminated(self.pieces, self.exchange)
+        exchange, right = self.exchange, np.zeros(len(self.exchange.numbers))
+        right[exchange.owned] = r
+        given = right.copy()
+        for piece in self.pieces:
+            piece.eliminate(right)
+        x = np.zeros(len(right))
+        left = exchange.copied(exchange.added(right))
+        x[self.outer.kept] = solver.solve(self, left[self.outer.owned])
+        for piece in self.pieces:
+            piece.recover(x, given)
+        return x
+
+    def diagonal(self) -> Array:
+        """Magnitudes of the diagonal of K, own rows, (k,)."""
+        return np.abs(self.own)
+
+    def times(self, x: Array) -> Array:
+        """K times own values x, (k,): own rows, (k,)."""
+        return self._product(self.matrix, x, lambda entries: entries)
+
+    def times_magnitudes(self, x: Array) -> Array:
+        """|K| times own values x, (k,), at least 0, own rows, (k,): a bound of internal ones."""
+        starts, columns, values = self.matrix.getValuesCSR()
+        np.abs(values, out=values)
+        csr = starts, columns, values
+        magnitudes = petsc().Mat().createAIJ(self.matrix.getSizes(), csr=csr, comm=world())
+        del starts, columns, values, csr
+        found = self._product(magnitudes, x, np.abs)
+        magnitudes.destroy()  # here and below: PETSc keeps what Python alone lets go
+        return found
+
+    def _product(self, matrix: Any, x: Array, of: Callable[[Array], Array]) -> Array:
+        local = np.zeros(len(self.exchange.numbers))
+        local[self.exchange.owned] = x
+        rows = self.rows
+        found, given = rows.vector.duplicate(), rows.to_petsc(local[self.outer.owned])
+        matrix.mult(given, found)
+        y = np.zeros(len(local))
+        y[self.outer.owned] = found.array_r[rows.places]
+        found.destroy()
+        given.destroy()
+        if self.columns:
+            local = self.exchange.copied(x)
+            for piece in self.pieces:
+                piece.add_product(y, local, of)
+            return self.exchange.added(y)
+        return np.asarray(y[self.exchange.owned])
+
+    def prepare(self, ksp: Any, near: Any) -> None:
+        """Krylov method and preconditioner, where no option says otherwise.
+
+        near: motions that multigrid should know of, or None.
+        """
+        pc = ksp.getPC()
+        if self.matrix.getSize()[0] < DIRECT_BELOW:
+            ksp.setType("preonly")
+            pc.setType("lu")
+            pc.setFactorSolverType("mumps")
+        else:
+            ksp.setType("gmres")
+            ksp.setTolerances(rtol=1e-6, max_it=500)
+            ksp.setGMRESRestart(60)
+            pc.setType("gamg")
+        if near is not None:
+            self.matrix.setNearNullSpace(near)
+
+    def empty_row(self) -> int:
+        """PETSc's number of a row of zeros, -1 if there is none."""
+        starts, _, values = self.matrix.getValuesCSR()
+        sums = np.add.reduceat(np.append(np.abs(values), 0.0), starts[:-1])
+        sums[starts[:-1] == starts[1:]] = 0.0
+        empty = self.outer.owned[sums[self.rows.places] == 0.0]
+        first = int(self.exchange.numbers[empty].min()) if len(empty) else -1
+        return next((n for n in world().allgather(first) if n >= 0), -1)
+
+
+class Operator(Protocol):
+    """A tangent that is spread over processes, as `Solver` and Newton's method see it: `Tangent`,
+    which says what its methods do, or `parallel.matshell.Shell`.
+    """
+
+    @property
+    def matrix(self) -> Any:
+        """PETSc's."""
+        ...
+
+    @property
+    def exchange(self) -> Exchange:
+        """Of all unknowns."""
+        ...
+
+    @property
+    def rows(self) -> Exchange:
+        """Of PETSc's vectors."""
+        ...
+
+    def solved(self, solver: Solver, r: Array) -> Array:
+        """See the class."""
+        ...
+
+    def fill(
+        self,
+        assembler: Assembler,
+        x: Array,
+        parameters: Mapping[str, Array],
+        defect: Array,
+        times: Times,
+    ) -> Array:
+        """See the class."""
+        ...
+
+    def diagonal(self) -> Array:
+        """See the class."""
+        ...
+
+    def times(self, x: Array) -> Array:
+        """See the class."""
+        ...
+
+    def times_magnitudes(self, x: Array) -> Array:
+        """See the class."""
+        ...
+
+    def prepare(self, ksp: Any, near: Any) -> None:
+        """See the class."""
+        ...
+
+    def empty_row(self) -> int:
+        """See the class."""
+        ...
+
+
+@dataclass(eq=False)
+class Solver:
+    """Krylov method and preconditioner, by PETSc's options; the default of a matrix is MUMPS below
+    `DIRECT_BELOW` unknowns and GMRES with algebraic multigrid above.
+
+    near: what multigrid should know of (rigid-body motions), or None. fields: name -> own numbers
+    of unknowns, for `-pc_type fieldsplit`.
+    """
+
+    options: Mapping[str, Any]
+    near: Any = None
+    fields: Mapping[str, Integers] = field(default_factory=dict)
+    times: Times = field(default_factory=Times)
+    _ksp: Any = field(default=None, init=False, repr=False)
+
+    def solve(self, tangent: Operator, r: Array) -> Array:
+        """Local x of the matrix for own values r, both of `rows`.
+
+        Raises SingularMatrix on all processes.
+        """
+        began = time.perf_counter()
+        ksp = self._prepared(tangent)
+        b = tangent.rows.to_petsc(r)
+        x = b.duplicate()
+        reason = 0
+        try:
+            ksp.solve(b, x)
+            reason = ksp.getConvergedReason()
+        except petsc().Error as error:
+            raise SingularMatrix(f"PETSc: {_words(error)}") from None
+        finally:
+            self.times.solver += time.perf_counter() - began
+        self.times.solves += 1
+        self.times.iterations += ksp.getIterationNumber()
+        size, found = x.norm(), tangent.rows.local(x)
+        b.destroy()
+        x.destroy()
+        if reason < 0 or not np.isfinite(size):
+            row = tangent.empty_row()
+            words = f"PETSc's {ksp.getType()} with {ksp.getPC().getType()} failed (reason {reason})"
+            raise SingularMatrix(words, None if row < 0 else row)
+        return found
+
+    @property
+    def direct(self) -> bool:
+        """True if a further right-hand side costs no iterations."""
+        return self._ksp is not None and self._ksp.getType() == "preonly"
+
+    def reset(self) -> None:
+        """Forget what belongs to another matrix."""
+        if self._ksp is not None:
+            self._ksp.destroy()
+        self._ksp = None
+
+    def _prepared(self, tangent: Operator) -> Any:
+        if self._ksp is None:
+            self._ksp = self._new(tangent)
+        self._ksp.setOperators(tangent.matrix)
+        return self._ksp
+
+    def _new(self, tangent: Operator) -> Any:
+        PETSc = petsc()
+        ksp = PETSc.KSP().create(world())
+        pc = ksp.getPC()
+        tangent.prepare(ksp, self.near)
+        database = PETSc.Options()
+        for name, value in self.options.items():
+            database[name.removeprefix("-")] = value
+        ksp.setFromOptions()
+        if pc.getType() == "fieldsplit":
+            first = tangent.matrix.getOwnershipRange()[0]
+            parts = [
+                (name, PETSc.IS().createGeneral((first + places).astype(PETSc.IntType), world()))
+                for name, places in self.fields.items()
+            ]
+            pc.setFieldSplitIS(*parts)
+        return ksp
+
+
+def _words(error: BaseException) -> str:
+    """Message of PETSc's error, after the calls that led there."""
+    return " ".join(str(error).split()).rsplit("] ", 1)[-1]

@@ -1,0 +1,250 @@
+"""Eigenproblems of the free unknowns on all processes: SLEPc, with factors of MUMPS."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array
+
+from softehl.runtime.arrays import Array, Integers
+from softehl.runtime.discretisation.constraints import symmetric, tied_groups
+from softehl.runtime.discretisation.loads import Tie
+from softehl.runtime.discretisation.problem import Problem
+from softehl.runtime.equations.system import System
+from softehl.runtime.mpi import petsc, slepc, world
+from softehl.runtime.parallel.halo_exchange import Exchange, largest, total
+from softehl.runtime.parallel.partitioning import Part
+from softehl.runtime.solve.eigen import (
+    NoModes,
+    below,
+    buckling_factors,
+    require_count,
+    terms,
+    without_rounding,
+)
+from softehl.runtime.solve.linear.linear_solver import SingularMatrix
+
+
+@dataclass(frozen=True, eq=False)
+class DistributedConstraints:
+    """As `discretisation.constraints.Constraints`, of the vectors of one process.
+
+    there: local numbers of unknowns that move. exchange: of these, where tied ones have the number
+    of the first of them.
+    """
+
+    size: int
+    there: Integers
+    exchange: Exchange
+
+    @classmethod
+    def of(cls, problem: Problem, part: Part, exchange: Exchange) -> DistributedConstraints:
+        """Of the local part of a problem."""
+        held = np.zeros(problem.assembler.size)
+        held[problem.fixed] = 1.0
+        for block in problem.assembler.blocks:
+            if isinstance(block.kernel, Tie):
+                held[block.dofs[:, 2]] = 1.0
+        first = _tied(part, exchange)
+        kept = first.highest(held) == 0.0
+        numbers, starts = first.renumbered(kept)
+        there = np.flatnonzero(numbers >= 0)
+        owned = np.searchsorted(there, first.owned[kept])
+        return cls(len(held), there, Exchange.of(numbers[there], owned, starts))
+
+    def gather(self, forces: Array) -> Array:
+        """T' f: own sums over all processes of forces (m,) that the elements of each have."""
+        return self.exchange.added(forces[self.there])
+
+    def spread(self, z: Array) -> Array:
+        """T z: unknowns (m,) of own free ones."""
+        x = np.zeros(self.size)
+        x[self.there] = self.exchange.copied(z)
+        return x
+
+
+def _tied(part: Part, exchange: Exchange) -> Exchange:
+    """The exchange of a part in which each unknown is the first of those that it is tied to."""
+    whole = part.system.everywhere
+    pairs = [b.dofs[:, :2] for b in whole.assembler.blocks if isinstance(b.kernel, Tie)]
+    if not pairs:
+        return exchange
+    first = _first(np.concatenate(pairs), whole.size)
+    numbers = _all_numbers(whole, part, exchange)
+    own = first[part.unknowns[part.owned]] == part.unknowns[part.owned]
+    comm = world()
+    ends = comm.allgather(len(part.owned))
+    starts = np.concatenate([[0], np.cumsum(ends)])
+    return Exchange.of(numbers[first[part.unknowns]], part.owned[own], starts)
+
+
+def _first(pairs: Integers, n: int) -> Integers:
+    """For each of n unknowns the first of those that are tied to it."""
+    groups = tied_groups(pairs[:, 0], pairs[:, 1], n)
+    _, first, inverse = np.unique(groups, return_index=True, return_inverse=True)
+    return np.asarray(first[inverse], dtype=np.int64)
+
+
+def _all_numbers(whole: System, part: Part, exchange: Exchange) -> Integers:
+    """PETSc's number of each unknown of the whole."""
+    found = np.zeros(whole.size, dtype=np.int64)
+    for unknowns, numbers in world().allgather(
+        (part.unknowns[part.owned], exchange.numbers[part.owned])
+    ):
+        found[unknowns] = numbers
+    return found
+
+
+_EXACT = 1e-11  # of eigenvalues
+_PREFIX = "softehl_eigen_"
+
+
+@dataclass(frozen=True, eq=False)
+class Pencil:
+    """Two matrices of free unknowns, each the sum of what the processes have (m, m)."""
+
+    free: DistributedConstraints
+    K: csc_array
+    M: csc_array
+
+    @property
+    def exchange(self) -> Exchange:
+        """Of free unknowns."""
+        return self.free.exchange
+
+    def lowest(self, count: int, saddle: int) -> tuple[Array, Array]:
+        """See `solve.eigen.lowest`; vectors (count, m) of the unknowns of this process."""
+        K, M = (self.free.gather(A.diagonal()) for A in (self.K, self.M))
+        require_count(count, int(total(np.array([float((M > 0.0).sum())]))[0]))
+        ratio = largest(float(np.abs(K[M > 0.0] / M[M > 0.0]).max(initial=0.0)))
+        eps, factors = self._shifted(count)
+        below(lambda shift: factors.at(eps, shift), self._nearly_singular, ratio, saddle)
+        values, found = _solved(eps, count, "modes")
+        mass, order = eps.getOperators()[1], np.argsort(values.real)[:count]
+        modes = np.empty((len(order), self.free.size))
+        for mode, k in zip(modes, order, strict=True):
+            # once more by the inverse: unknowns without mass follow from the others
+            right, shape = found[k].duplicate(), found[k].duplicate()
+            mass.mult(found[k], right)
+            factors.ksp.solve(right, shape)
+            mass.mult(shape, right)
+            shape.scale(1.0 / np.sqrt(shape.dot(right)))
+            mode[:] = self._local(shape)
+        size = total(terms(self.K, modes))
+        return without_rounding(values.real[order], size), signed(modes)
+
+    def factors(self, count: int) -> tuple[Array, Array]:
+        """See `solve.eigen.smallest_factors` of K and M; vectors as in `lowest`."""
+        eps = self._solver(count, -self._matrix(self.M), self._matrix(self.K))
+        eps.setProblemType(slepc().EPS.ProblemType.GNHEP)
+        eps.setWhichEigenpairs(slepc().EPS.Which.LARGEST_REAL)
+        _factorised(eps.getST().getKSP(), "lu")
+        values, found = _solved(eps, count, "buckling factors")
+        factors, order = buckling_factors(values)
+        modes = signed(np.stack([self._local(found[k]) for k in order[:count]]))
+        sizes = [largest(float(np.abs(mode).max(initial=0.0))) for mode in modes]
+        return factors[:count], modes / np.array(sizes)[:, None]
+
+    def _shifted(self, count: int) -> tuple[Any, _Factors]:
+        eps = self._solver(count, self._matrix(self.K), self._matrix(self.M))
+        eps.setProblemType(slepc().EPS.ProblemType.GHEP)
+        eps.setWhichEigenpairs(slepc().EPS.Which.TARGET_MAGNITUDE)
+        eps.getST().setType("sinvert")
+        ksp = eps.getST().getKSP()
+        _factorised(ksp, "cholesky")
+        return eps, _Factors(ksp, self.exchange)
+
+    def _solver(self, count: int, A: Any, B: Any) -> Any:
+        eps = slepc().EPS().create(world())
+        eps.setOptionsPrefix(_PREFIX)
+        eps.setOperators(A, B)
+        size = self.exchange.vector.getSize()
+        eps.setDimensions(count, min(size, 2 * count + 20))
+        eps.setTolerances(_EXACT)
+        return eps
+
+    def _matrix(self, A: csc_array) -> Any:
+        """T' A T as a matrix of PETSc's."""
+        PETSc, entries = petsc(), coo_array(symmetric(A))
+        numbers = np.full(self.free.size, -1, dtype=PETSc.IntType)
+        numbers[self.free.there] = self.exchange.numbers
+        found, sizes = PETSc.Mat().create(comm=world()), self.exchange.vector.getSizes()
+        found.setSizes((sizes, sizes), 1)
+        found.setType("aij")
+        found.setPreallocationCOO(numbers[entries.row], numbers[entries.col])
+        found.setValuesCOO(entries.data, PETSc.InsertMode.INSERT_VALUES)
+        return found
+
+    def _local(self, vector: Any) -> Array:
+        return self.free.spread(np.array(vector.array_r[self.exchange.places]))
+
+    def _nearly_singular(self, factors: _Factors) -> bool:
+        """See `solve.eigen.nearly_singular`."""
+        b = np.random.default_rng(world().rank).uniform(-1.0, 1.0, len(self.exchange.owned))
+        x = self.free.spread(factors.solve(b))
+        size = self.free.gather(abs(self.K) @ np.abs(x))
+        most = [largest(float(np.abs(v).max(initial=0.0))) for v in (b, size)]
+        return bool(most[0] <= 1e-11 * most[1])
+
+
+@dataclass(frozen=True, eq=False)
+class _Factors:
+    """Of a shifted matrix; see `solve.eigen.Pivots`."""
+
+    ksp: Any
+    exchange: Exchange
+
+    def at(self, eps: Any, shift: float) -> _Factors:
+        """With another shift.  Raises SingularMatrix."""
+        eps.setTarget(shift)
+        eps.getST().setShift(shift)
+        try:
+            eps.setUp()
+        except petsc().Error as error:
+            raise SingularMatrix(f"no factors: {error}") from None
+        return self
+
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues."""
+        return int(self.ksp.getPC().getFactorMatrix().getInertia()[0])
+
+    def solve(self, b: Array) -> Array:
+        """x of own values b."""
+        given = self.exchange.to_petsc(b)
+        found = given.duplicate()
+        self.ksp.solve(given, found)
+        return np.array(found.array_r[self.exchange.places])
+
+
+def _factorised(ksp: Any, kind: str) -> None:
+    """Factors of MUMPS, which count signs of pivots where none are hidden (13), nor zero (24)."""
+    for control in (13, 24):
+        petsc().Options()[f"{_PREFIX}st_mat_mumps_icntl_{control}"] = 1
+    ksp.setType("preonly")
+    pc = ksp.getPC()
+    pc.setType(kind)
+    pc.setFactorSolverType("mumps")
+
+
+def _solved(eps: Any, count: int, words: str) -> tuple[Array, list[Any]]:
+    """Eigenvalues, complex ones, and vectors.  Raises NoModes, SingularMatrix."""
+    eps.setFromOptions()
+    try:
+        eps.solve()
+    except petsc().Error as error:
+        raise SingularMatrix(f"no factors: {error}") from None
+    known = eps.getConverged()
+    if known < count:
+        raise NoModes(f"{count} {words}: {known} converged")
+    vectors = [eps.getOperators()[0].createVecRight() for _ in range(known)]
+    return np.array([eps.getEigenpair(k, v) for k, v in enumerate(vectors)]), vectors
+
+
+def signed(modes: Array) -> Array:
+    """Modes (k, m) with the largest entry on any process positive."""
+    found = [world().allgather(float(m[np.abs(m).argmax()]) if len(m) else 0.0) for m in modes]
+    signs = np.array([np.sign(max(of_all, key=abs)) for of_all in found])
+    return np.asarray(modes * signs[:, None])

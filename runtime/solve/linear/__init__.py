@@ -1,0 +1,1 @@
+"""Linear systems: direct solvers, Krylov methods, multigrid, condensation."""

@@ -1,0 +1,152 @@
+"""Condensation of unknowns that elements have for themselves, before the rest is factorised.
+
+With K = [[K_EE, K_EI], [K_IE, K_II]], where the block K_II of internal unknowns falls into a small
+one for each element, what is solved is S = K_EE - K_EI K_II^-1 K_IE; the internal unknowns follow
+from the others, K_II^-1 (r_I - K_IE x_E). This is exact: a step is that of the whole matrix.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import bsr_array, csc_array, csr_array
+
+from softehl.runtime.arrays import Array, Flags, Integers
+from softehl.runtime.solve.linear.linear_solver import (
+    Factors,
+    LinearSolver,
+    SingularMatrix,
+    SparseMatrix,
+)
+from softehl.runtime.solve.singularity_check import Judging, loosest
+
+
+@dataclass(frozen=True, eq=False)
+class Condensing:
+    """A linear solver of what is left when internal unknowns are eliminated.
+
+    groups: (n, k) numbers of the internal unknowns of n like elements. A matrix may have rows
+    beyond those of the problem, as paths by arc length do.
+    """
+
+    solver: LinearSolver
+    groups: tuple[Integers, ...]
+
+    @property
+    def name(self) -> str:
+        """See `LinearSolver`."""
+        return self.solver.name
+
+    def external(self, size: int) -> Integers:
+        """All other unknowns of so many, rising."""
+        kept: Flags = np.ones(size, dtype=bool)
+        for group in self.groups:
+            kept[group] = False
+        return np.flatnonzero(kept)
+
+    def factorise(self, K: SparseMatrix) -> Eliminated:
+        """Factors of K, (n, n); raises SingularMatrix, also where internal unknowns are loose."""
+        rows, parts, E = csr_array(K), [], self.external(K.shape[0])
+        S = rows[E][:, E]
+        for group in self.groups:
+            inner = group.ravel()
+            inverse, sign = inverted(rows[inner][:, inner], group)
+            out, back = rows[inner][:, E], rows[E][:, inner]
+            S = S - back @ (inverse @ out)
+            parts.append(_Group(inner, inverse, csr_array(out), csr_array(back), sign))
+        if not np.isfinite(S.data).all():
+            raise SingularMatrix("the matrix has entries that are not finite")
+        return Eliminated(E, tuple(parts), self.solver.factorise(csc_array(S)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Like elements: numbers of internal unknowns (m,), K_II^-1, K_IE, K_EI, and the sign of the
+    determinant of K_II.
+    """
+
+    inner: Integers
+    inverse: bsr_array
+    out: csr_array
+    back: csr_array
+    sign: float
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminated:
+    """Factors of a matrix by those of what is left of it; `external` are the unknowns there."""
+
+    external: Integers
+    parts: tuple[_Group, ...]
+    rest: Factors
+
+    def solve(self, b: Array) -> Array:
+        """x of K x = b, (n,)."""
+        x, right = np.empty(len(b)), b[self.external]
+        for part in self.parts:
+            right = right - part.back @ (part.inverse @ b[part.inner])
+        x[self.external] = found = self.rest.solve(right)
+        for part in self.parts:
+            x[part.inner] = part.inverse @ (b[part.inner] - part.out @ found)
+        return x
+
+    def pivots(self) -> Array | None:
+        """Pivots of the rest (m,), see `Factorisation.pivots`."""
+        known = getattr(self.rest, "pivots", None)
+        return None if known is None else known()
+
+    def sign(self) -> float | None:
+        """Sign of the determinant; None where it is not known."""
+        known = getattr(self.rest, "sign", None)
+        found = None if known is None else known()
+        return None if found is None else found * float(np.prod([p.sign for p in self.parts]))
+
+    def indefinite(self) -> bool | None:
+        """True if the rest has a negative eigenvalue; None where it is not known."""
+        known = getattr(self.rest, "indefinite", None)
+        return None if known is None else known()
+
+    def loosest(self) -> int | None:
+        """See `Judging`: what K_II admits is regular, so the rest decides."""
+        number = self.rest.loosest() if isinstance(self.rest, Judging) else self._loose()
+        return None if number is None else int(self.external[number])
+
+    def _loose(self) -> int | None:
+        matrix = getattr(self.rest, "matrix", None)
+        return None if matrix is None else loosest(matrix, self.rest)
+
+
+def inverted(K: csr_array, group: Integers) -> tuple[bsr_array, float]:
+    """Inverse of a matrix of one block for each of n elements, and the sign of its determinant.
+
+    Raises SingularMatrix.
+    """
+    n, k = group.shape
+    blocks, entries = np.zeros((n, k, k)), K.tocoo()
+    element = entries.row // k
+    if (element != entries.col // k).any():
+        raise SingularMatrix("internal unknowns of two elements know each other")
+    np.add.at(blocks, (element, entries.row % k, entries.col % k), entries.data)
+    inverse = inverses(blocks)
+    if not np.isfinite(inverse).all():
+        bad = weakest(blocks)
+        row = int(group[bad, 0])
+        raise SingularMatrix(f"internal unknowns of element {bad} cannot be eliminated", row)
+    where = np.arange(n)
+    sign = float(np.prod(np.linalg.slogdet(blocks)[0]))
+    return bsr_array((inverse, where, np.arange(n + 1)), shape=(n * k, n * k)), sign
+
+
+def inverses(blocks: Array) -> Array:
+    """Of matrices (n, k, k); not finite where one of them has none."""
+    try:
+        return np.asarray(np.linalg.inv(blocks))
+    except np.linalg.LinAlgError:
+        return np.full_like(blocks, np.nan)
+
+
+def weakest(blocks: Array) -> int:
+    """Number of the matrix of (n, k, k) that is closest to singular."""
+    sizes = np.abs(blocks).max(axis=(1, 2), initial=0.0)
+    return int(np.argmin(np.abs(np.linalg.det(blocks / np.maximum(sizes, 1e-300)[:, None, None]))))

@@ -1,0 +1,116 @@
+"""Support of a solved problem: a body that floats solves equations that rounding alone keeps
+regular, and where it ends up is an accident.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from softehl.runtime.arrays import Array
+from softehl.runtime.solve.linear.linear_solver import (
+    Factors,
+    LinearSolver,
+    SingularMatrix,
+    SparseMatrix,
+)
+from softehl.runtime.solve.newton import NamedProblem, Newton
+from softehl.runtime.solve.solution import NotConverged, Solution, Status
+
+SINGULAR = 1e-13
+"""A change of the entries of a matrix, relative to each, that rounding may have made."""
+
+_AT_REST = 1e-10  # of the largest entry of a vector
+
+
+@runtime_checkable
+class Judging(Protocol):
+    """Factors whose matrix is not at hand as a whole, and which say by themselves what is loose."""
+
+    def loosest(self) -> int | None:
+        """The number of the unknown that moves most where the matrix is singular, else None."""
+        ...
+
+
+@dataclass
+class Remembering:
+    """A linear solver that keeps the last matrix and its factors."""
+
+    solver: LinearSolver
+    last: tuple[SparseMatrix, Factors] | None = field(default=None, init=False)
+
+    @property
+    def name(self) -> str:
+        """See `LinearSolver`."""
+        return self.solver.name
+
+    def factorise(self, K: SparseMatrix) -> Factors:
+        """See `LinearSolver`."""
+        self.last = None  # never two at a time: they are what memory goes into
+        factors = self.solver.factorise(K)
+        self.last = K, factors
+        return factors
+
+
+@dataclass
+class FirstStep:
+    """Newton's method of a path whose first step that factorises is looked at once.
+
+    memory: its linear solver, which keeps the last factors.
+    """
+
+    newton: Newton
+    memory: Remembering = field(init=False)
+    _looked: bool = False
+
+    def __post_init__(self) -> None:
+        """Let the linear solver remember."""
+        self.memory = Remembering(self.newton.linear)
+        self.newton = replace(self.newton, linear=self.memory)
+
+    @property
+    def last(self) -> tuple[SparseMatrix, Factors] | None:
+        """The last matrix that was factorised, and its factors."""
+        return self.memory.last
+
+    def check(self, problem: NamedProblem, solution: Solution) -> None:
+        """Raise NotConverged if nothing held what was solved; ask after each converged step."""
+        memory = self.memory.last
+        if memory is None or self._looked:
+            return
+        self._looked = True
+        K, factors = memory
+        number = factors.loosest() if isinstance(factors, Judging) else loosest(K, factors)
+        if number is not None:
+            message = f"nothing prevents a motion of {problem.name_of(number)}"
+            raise NotConverged(replace(solution, status=Status.NOT_HELD, message=message))
+
+
+def loosest(K: SparseMatrix, factors: Factors) -> int | None:
+    """The unknown that moves most where K, (n, n), is singular but for rounding, else None.
+
+    For K y = b, changes of the entries of K by max |b| / (|K| |y|), relative to each, make K
+    singular (Oettli and Prager). What hardly moves with y, prescribed unknowns above all, is left
+    at rest.
+    """
+    try:
+        y = factors.solve(signs(K.shape[0]))
+    except SingularMatrix:
+        return None  # it was regular enough for the solution
+    y = moving(y, np.abs(y).max())
+    if np.all(np.abs(np.asarray(K @ y)) <= SINGULAR * np.asarray(abs(K) @ np.abs(y))):
+        return int(np.abs(y).argmax())
+    return None
+
+
+def signs(n: int, seed: int = 0) -> Array:
+    """Random entries -1 and 1, (n,)."""
+    found: Array = np.where(np.random.default_rng(seed).random(n) < 0.5, -1.0, 1.0)
+    return found
+
+
+def moving(y: Array, largest: float) -> Array:
+    """Entries (n,) with those at rest set to 0; largest: magnitude of any."""
+    return np.where(np.abs(y) <= _AT_REST * largest, 0.0, y)
